@@ -1,0 +1,91 @@
+/* Meshes and their instances. See base.h for units, ownership and errors. */
+#ifndef TRACER_GEOMETRY_H
+#define TRACER_GEOMETRY_H
+
+#include "tracer/base.h"
+
+TRC_BEGIN_DECLS
+
+/* Most motion keys of one object, and most UV maps or colour attributes of one mesh. */
+#define TRC_MAX_KEYS 33
+#define TRC_MAX_ATTRIBUTES 8
+
+enum { TRC_NORMALS_NONE = 0, TRC_NORMALS_VERTEX = 1, TRC_NORMALS_CORNER = 2 };
+
+/* A named array with one value per triangle corner, in triangle order. */
+typedef struct trc_corner_attribute {
+    uint32_t struct_size;
+    uint32_t width;       /* floats per corner: 2 (UV map) or 4 (colour, scene-linear RGBA) */
+    const char *name;     /* UTF-8, up to 63 bytes; not NULL */
+    const float *values;  /* width * 3 * triangle_count floats */
+    uint64_t value_count; /* number of floats, checked */
+} trc_corner_attribute;
+
+typedef struct trc_mesh_desc {
+    uint32_t struct_size;
+    uint32_t key_count;          /* motion keys, 1..TRC_MAX_KEYS, evenly spaced over [0, 1] */
+    uint64_t vertex_count;
+    uint64_t triangle_count;
+    const float *positions;      /* 3 * vertex_count * key_count floats, key after key */
+    uint64_t position_count;     /* number of floats, checked */
+    const uint32_t *indices;     /* 3 * triangle_count */
+    uint64_t index_count;        /* number of indices, checked */
+    const float *normals;        /* unit normals or NULL: then smooth triangles get angle-weighted
+                                    vertex normals; layout by normal_kind, key after key as positions */
+    uint64_t normal_count;       /* number of floats: 3 * (vertex_count | 3 * triangle_count) * key_count */
+    uint32_t normal_kind;        /* TRC_NORMALS_* */
+    uint32_t attribute_count;    /* 0..TRC_MAX_ATTRIBUTES */
+    const uint8_t *smooth;       /* per triangle, 0 flat, 1 smooth; NULL: all flat, unless
+                                    normal_kind is CORNER, which rules by itself */
+    const uint16_t *material_index; /* per triangle slot number, NULL: all 0 */
+    const trc_corner_attribute *attributes; /* the first of width 2 is the default UV map */
+} trc_mesh_desc;
+
+/* Copies a mesh into the scene. Triangles with a vertex that is not finite or beyond 1.8e18 at any
+ * key are skipped and counted (trc_scene_stats); an index out of range refuses the mesh, naming it.
+ * Cost: one copy; building happens at commit. */
+TRC_API trc_status trc_mesh_create(trc_scene scene, const trc_mesh_desc *desc, trc_id *mesh_out);
+
+/* New positions (and, if the mesh had any, normals) for the same topology: a pose. Counts as in the
+ * descriptor; the number of keys may differ from before. At commit the BVH is refitted, or rebuilt
+ * when its SAH cost has grown too far. */
+TRC_API trc_status trc_mesh_update(trc_scene scene, trc_id mesh, uint32_t key_count,
+                                   const float *positions, uint64_t position_count,
+                                   const float *normals, uint64_t normal_count);
+
+/* Fails with INVALID_ARGUMENT while an instance uses it. */
+TRC_API trc_status trc_mesh_destroy(trc_scene scene, trc_id mesh);
+
+/* Which rays see an instance or a light. */
+enum {
+    TRC_VISIBLE_CAMERA = 1,
+    TRC_VISIBLE_DIFFUSE = 2,
+    TRC_VISIBLE_GLOSSY = 4,
+    TRC_VISIBLE_TRANSMISSION = 8,
+    TRC_VISIBLE_SHADOW = 16,
+    TRC_VISIBLE_ALL = 31
+};
+
+typedef struct trc_instance_desc {
+    uint32_t struct_size;
+    uint32_t key_count;        /* transforms, 1..TRC_MAX_KEYS, evenly spaced over [0, 1] */
+    trc_id mesh;
+    const float *transforms;   /* 12 floats per key, see base.h; a singular one hides the instance
+                                  and is counted in trc_scene_stats */
+    const trc_id *materials;   /* material of each slot; 0: the default grey diffuse */
+    uint32_t material_count;   /* a triangle's slot beyond the last uses the last; 0: default */
+    uint32_t visibility;       /* TRC_VISIBLE_* */
+    int32_t pass_index;        /* Object Index pass */
+    float random;              /* Object Info's Random, [0, 1) */
+    float color[4];            /* Object Info's Color and Alpha */
+} trc_instance_desc;
+
+TRC_API trc_status trc_instance_create(trc_scene scene, const trc_instance_desc *desc,
+                                       trc_id *instance_out);
+TRC_API trc_status trc_instance_update(trc_scene scene, trc_id instance,
+                                       const trc_instance_desc *desc);
+TRC_API trc_status trc_instance_destroy(trc_scene scene, trc_id instance);
+
+TRC_END_DECLS
+
+#endif

@@ -1,0 +1,45 @@
+/* Ray queries over arrays in the caller's memory, on the kernels that render. */
+#ifndef TRACER_QUERY_H
+#define TRACER_QUERY_H
+
+#include "tracer/base.h"
+
+TRC_BEGIN_DECLS
+
+/* Arrays of count floats each; tmin, tmax and time may be NULL (0, infinity, 0). Directions need not
+ * be unit; distances are in units of their length. A ray with a NaN, an infinite origin or direction,
+ * a zero direction, or tmin > tmax hits nothing. */
+typedef struct trc_rays {
+    uint32_t struct_size;
+    uint32_t visibility;       /* TRC_VISIBLE_* bits an instance must share; TRC_VISIBLE_ALL usual */
+    uint64_t count;
+    const float *origin_x, *origin_y, *origin_z;
+    const float *direction_x, *direction_y, *direction_z;
+    const float *tmin, *tmax, *time;
+} trc_rays;
+
+#define TRC_NO_HIT 0xffffffffu
+
+/* Arrays of count each, any may be NULL except instance. Barycentrics: hit = (1-u-v) p0 + u p1 + v p2.
+ * On a miss instance is TRC_NO_HIT and the rest is untouched. Of equal distances, the lowest
+ * (instance, triangle) in creation order wins. */
+typedef struct trc_hits {
+    uint32_t struct_size;
+    uint32_t reserved;
+    uint32_t *instance;       /* position of the instance in creation order among the living */
+    uint32_t *triangle;
+    float *distance, *u, *v;
+    float *normal_x, *normal_y, *normal_z; /* geometric, world, not normalised, by winding */
+} trc_hits;
+
+/* Rays are taken in packets of packet_size neighbours: 1, 4, 16, 64 or 256; 0 chooses. */
+TRC_API trc_status trc_query_closest(trc_scene scene, const trc_rays *rays, uint32_t packet_size,
+                                     const trc_hits *hits_out);
+
+/* occluded_out[i] = 1 if anything lies strictly within (tmin, tmax), else 0. */
+TRC_API trc_status trc_query_occluded(trc_scene scene, const trc_rays *rays, uint32_t packet_size,
+                                      uint8_t *occluded_out, uint64_t occluded_count);
+
+TRC_END_DECLS
+
+#endif
