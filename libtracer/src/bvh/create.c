@@ -1,0 +1,398 @@
+/* The trees of a snapshot: which instances share a tree, which are joined, what is kept, refitted or
+ * rebuilt. */
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#include "bvh/bvh.h"
+#include "bvh/tree.h"
+#include "core/core.h"
+#include "shading/material.h"
+#include "threads/pool.h"
+
+/* Coordinates above it (or not finite) skip their triangle: squares of differences stay finite. */
+#define COORDINATE_LIMIT 1.8e18f
+/* A refitted tree whose SAH cost has grown by this factor is rebuilt. */
+#define REBUILD_GROWTH 1.4f
+
+struct create_job {
+    const struct trc_snapshot *snapshot;
+    const struct trc_bvh_options *options;
+    struct trc_pool *pool;
+    struct trc_bvh *bvh;
+    struct trc_bvh_build_stats *stats;
+    uint8_t *joined;            /* per instance: part of the joined tree */
+    uint8_t *transparent;       /* per material slot over all instances */
+    uint32_t *first_slot;       /* per instance */
+};
+
+static bool vertex_is_valid(const float p[3]) {
+    return fabsf(p[0]) <= COORDINATE_LIMIT && fabsf(p[1]) <= COORDINATE_LIMIT &&
+           fabsf(p[2]) <= COORDINATE_LIMIT; /* false for NaN */
+}
+
+/* Box of a triangle, the mean over its keys; false where a vertex is not valid at some key. */
+static bool triangle_ref(const struct trc_part *part, uint32_t triangle, struct trc_ref *ref) {
+    const uint32_t key_count = part->mesh->key_count;
+    const float share = 1.0f / (float)key_count;
+    float lower[3] = {0}, upper[3] = {0};
+    for (uint32_t key = 0; key < key_count; key++) {
+        float low[3] = {FLT_MAX, FLT_MAX, FLT_MAX}, high[3] = {-FLT_MAX, -FLT_MAX, -FLT_MAX};
+        for (uint32_t v = 0; v < 3; v++) {
+            float p[3];
+            trc_part_vertex(part, triangle, v, key, p);
+            if (!vertex_is_valid(p)) return false;
+            for (int i = 0; i < 3; i++) {
+                low[i] = fminf(low[i], p[i]);
+                high[i] = fmaxf(high[i], p[i]);
+            }
+        }
+        for (int i = 0; i < 3; i++) {
+            lower[i] += low[i] * share;
+            upper[i] += high[i] * share;
+        }
+    }
+    memcpy(ref->lower, lower, sizeof lower);
+    memcpy(ref->upper, upper, sizeof upper);
+    return true;
+}
+
+/* Appends the valid triangles of a part. */
+static uint32_t part_refs(const struct trc_part *part, uint32_t index, struct trc_ref *refs) {
+    uint32_t count = 0;
+    for (uint32_t t = 0; t < part->mesh->triangle_count; t++)
+        if (triangle_ref(part, t, &refs[count])) {
+            refs[count].part = index;
+            refs[count].primitive = t;
+            count++;
+        }
+    return count;
+}
+
+/* One tree over parts of one key count. */
+static trc_status tree_build(struct create_job *job, const struct trc_part *parts,
+                             uint32_t part_count, uint32_t key_count, struct trc_tree *tree) {
+    uint64_t total = 0;
+    for (uint32_t i = 0; i < part_count; i++) total += parts[i].mesh->triangle_count;
+    if (total > TRC_REF_INDEX_MASK)
+        return trc_fail(TRC_ERROR_TOO_LARGE, "%llu triangles in one tree, at most %u",
+                        (unsigned long long)total, TRC_REF_INDEX_MASK);
+    struct trc_ref *refs = trc_alloc(total ? total : 1, sizeof *refs);
+    if (!refs)
+        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory to build a tree of %llu triangles",
+                        (unsigned long long)total);
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < part_count; i++) count += part_refs(&parts[i], i, refs + count);
+    struct trc_topology topology;
+    trc_status status = trc_topology_build(refs, count, TRC_NODE_WIDTH, job->pool,
+                                           job->options->cancel, &topology);
+    if (status == TRC_OK) {
+        status = trc_tree_fill(&topology, refs, parts, key_count, job->pool, tree);
+        trc_topology_destroy(&topology);
+    }
+    trc_free(refs);
+    if (status != TRC_OK) return status;
+    tree->triangle_count = count;
+    tree->skipped_count = total - count;
+    job->stats->built_count++;
+    return TRC_OK;
+}
+
+static void blas_release(struct trc_blas *blas) {
+    if (!blas || atomic_fetch_sub(&blas->refs, 1) != 1) return;
+    trc_tree_destroy(&blas->tree);
+    trc_free(blas);
+}
+
+/* Transparency flags of a shared tree: a slot is flagged when any instance of the mesh has a transparent
+ * material there. */
+static trc_status mesh_slots(const struct create_job *job, uint32_t mesh, uint8_t **slots_out,
+                             uint32_t *count_out) {
+    const struct trc_snapshot *s = job->snapshot;
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < s->instance_count; i++)
+        if (s->instances[i].mesh == mesh && s->instances[i].material_count > count)
+            count = s->instances[i].material_count;
+    uint8_t *slots = trc_alloc_zeroed(count ? count : 1, 1);
+    if (!slots) return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for material slots");
+    for (uint32_t i = 0; i < s->instance_count; i++) {
+        if (s->instances[i].mesh != mesh) continue;
+        const uint32_t last = s->instances[i].material_count - 1;
+        for (uint32_t slot = 0; slot < count; slot++)
+            slots[slot] |= job->transparent[job->first_slot[i] + (slot < last ? slot : last)];
+    }
+    *slots_out = slots;
+    *count_out = count;
+    return TRC_OK;
+}
+
+static bool slots_match(const struct trc_tree *tree, const uint8_t *slots, uint32_t count) {
+    bool any = false;
+    for (uint32_t i = 0; i < count; i++) any = any || slots[i];
+    return !any && !tree->has_transparent; /* else rebuilt: flags are in the leaves */
+}
+
+/* The tree of a mesh: the former one, a refit of it, or a new one. */
+static trc_status blas_obtain(struct create_job *job, uint32_t mesh_index,
+                              const struct trc_bvh *previous, struct trc_mesh *const *replaced) {
+    const struct trc_mesh *mesh = job->snapshot->meshes[mesh_index];
+    const struct trc_mesh *source = replaced && replaced[mesh_index] ? replaced[mesh_index] : mesh;
+    uint8_t *slots = NULL;
+    uint32_t slot_count = 0;
+    trc_status status = mesh_slots(job, mesh_index, &slots, &slot_count);
+    if (status != TRC_OK) return status;
+    struct trc_blas *from = NULL;
+    for (uint32_t i = 0; previous && i < previous->blas_count && !from; i++)
+        if (previous->blas[i] && previous->blas[i]->mesh == source &&
+            slots_match(&previous->blas[i]->tree, slots, slot_count))
+            from = previous->blas[i];
+    if (from && source == mesh) {
+        atomic_fetch_add(&from->refs, 1);
+        job->bvh->blas[mesh_index] = from;
+        trc_free(slots);
+        return TRC_OK;
+    }
+    struct trc_blas *blas = trc_alloc_zeroed(1, sizeof *blas);
+    if (!blas) {
+        trc_free(slots);
+        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for a tree");
+    }
+    atomic_init(&blas->refs, 1);
+    blas->mesh = mesh;
+    const struct trc_part part = {mesh, 0, NULL, slots, slot_count};
+    bool done = false;
+    /* A skipped triangle may have become valid and the other way round: then the shape is stale. */
+    if (from && from->tree.skipped_count == 0) {
+        status = trc_tree_refit(&from->tree, &part, mesh->key_count, job->pool, &blas->tree);
+        blas->tree.triangle_count = from->tree.triangle_count;
+        blas->built_cost = from->built_cost;
+        done = status == TRC_OK && blas->tree.extent <= COORDINATE_LIMIT &&
+               blas->tree.sah_cost <= REBUILD_GROWTH * from->built_cost;
+        if (done)
+            job->stats->refitted_count++;
+        else
+            trc_tree_destroy(&blas->tree);
+    }
+    if (!done && status == TRC_OK) {
+        status = tree_build(job, &part, 1, mesh->key_count, &blas->tree);
+        blas->built_cost = blas->tree.sah_cost;
+    }
+    trc_free(slots);
+    if (status == TRC_OK)
+        job->bvh->blas[mesh_index] = blas;
+    else
+        blas_release(blas);
+    return status;
+}
+
+/* Which instances go to the joined tree: static, alone with their mesh, seen by all rays. */
+static void join_select(struct create_job *job) {
+    const struct trc_snapshot *s = job->snapshot;
+    if (!job->options->is_final) return;
+    for (uint32_t i = 0; i < s->instance_count; i++) {
+        const struct trc_instance *instance = &s->instances[i];
+        job->joined[i] = instance->key_count == 1 &&
+                         s->meshes[instance->mesh]->key_count == 1 &&
+                         instance->visibility == TRC_VISIBLE_ALL;
+    }
+    uint32_t *uses = trc_alloc_zeroed(s->mesh_count ? s->mesh_count : 1, sizeof *uses);
+    if (!uses) {
+        memset(job->joined, 0, s->instance_count); /* slower, not wrong */
+        return;
+    }
+    for (uint32_t i = 0; i < s->instance_count; i++) uses[s->instances[i].mesh]++;
+    for (uint32_t i = 0; i < s->instance_count; i++)
+        if (uses[s->instances[i].mesh] != 1) job->joined[i] = 0;
+    trc_free(uses);
+}
+
+static trc_status joined_build(struct create_job *job) {
+    const struct trc_snapshot *s = job->snapshot;
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < s->instance_count; i++) count += job->joined[i];
+    if (count == 0) return TRC_OK;
+    struct trc_part *parts = trc_alloc(count, sizeof *parts);
+    if (!parts) return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for %u meshes", count);
+    uint32_t n = 0;
+    for (uint32_t i = 0; i < s->instance_count; i++)
+        if (job->joined[i])
+            parts[n++] = (struct trc_part){s->meshes[s->instances[i].mesh], i,
+                                           s->instances[i].object_to_world,
+                                           job->transparent + job->first_slot[i],
+                                           s->instances[i].material_count};
+    const trc_status status = tree_build(job, parts, count, 1, &job->bvh->joined);
+    trc_free(parts);
+    return status;
+}
+
+/* World box of a box under all keys of an instance. M(t) p(t) is a convex combination of the keys' images
+ * of points of the box, so the hull of the images of its corners holds it at all times. */
+static void instance_bounds(const struct trc_instance *instance, const struct trc_tree *tree,
+                            float lower[3], float upper[3]) {
+    for (int i = 0; i < 3; i++) {
+        lower[i] = INFINITY;
+        upper[i] = -INFINITY;
+    }
+    for (uint32_t key = 0; key < instance->key_count; key++)
+        for (int corner = 0; corner < 8; corner++) {
+            const float *m = instance->object_to_world[key].m;
+            const double p[3] = {(corner & 1 ? tree->upper : tree->lower)[0],
+                                 (corner & 2 ? tree->upper : tree->lower)[1],
+                                 (corner & 4 ? tree->upper : tree->lower)[2]};
+            for (int i = 0; i < 3; i++) {
+                const double x = m[4 * i] * p[0] + m[4 * i + 1] * p[1] + m[4 * i + 2] * p[2] +
+                                 m[4 * i + 3];
+                lower[i] = fminf(lower[i], nextafterf((float)x, -INFINITY));
+                upper[i] = fmaxf(upper[i], nextafterf((float)x, INFINITY));
+            }
+        }
+}
+
+static uint32_t items_collect(struct create_job *job, struct trc_item *items, struct trc_ref *refs) {
+    const struct trc_snapshot *s = job->snapshot;
+    uint32_t count = 0;
+    if (job->bvh->joined.root != TRC_REF_EMPTY) {
+        items[0] = (struct trc_item){&job->bvh->joined, TRC_NO_HIT, TRC_VISIBLE_ALL};
+        memcpy(refs[0].lower, job->bvh->joined.lower, sizeof refs[0].lower);
+        memcpy(refs[0].upper, job->bvh->joined.upper, sizeof refs[0].upper);
+        count = 1;
+    }
+    for (uint32_t i = 0; i < s->instance_count; i++) {
+        const struct trc_instance *instance = &s->instances[i];
+        if (job->joined[i] || !instance->visibility) continue;
+        const struct trc_tree *tree = &job->bvh->blas[instance->mesh]->tree;
+        if (tree->root == TRC_REF_EMPTY) continue;
+        items[count] = (struct trc_item){tree, i, instance->visibility};
+        instance_bounds(instance, tree, refs[count].lower, refs[count].upper);
+        count++;
+    }
+    for (uint32_t i = 0; i < count; i++) {
+        refs[i].part = 0;
+        refs[i].primitive = i;
+    }
+    return count;
+}
+
+static trc_status top_build(struct create_job *job) {
+    struct trc_bvh *bvh = job->bvh;
+    const uint32_t capacity = job->snapshot->instance_count + 1;
+    struct trc_item *items = trc_alloc(capacity, sizeof *items);
+    struct trc_ref *refs = trc_alloc(capacity, sizeof *refs);
+    bvh->items = trc_alloc(capacity, sizeof *bvh->items);
+    trc_status status = TRC_OK;
+    if (!items || !refs || !bvh->items)
+        status = trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for %u instances", capacity - 1);
+    if (status == TRC_OK) {
+        const uint32_t count = items_collect(job, items, refs);
+        if (count == 1 && items[0].instance == TRC_NO_HIT) {
+            bvh->tree = &bvh->joined;
+        } else {
+            struct trc_topology topology;
+            status = trc_topology_build(refs, count, 1, job->pool, job->options->cancel, &topology);
+            if (status == TRC_OK) {
+                status = trc_tree_fill_top(&topology, refs, items, bvh->items, &bvh->top);
+                trc_topology_destroy(&topology);
+            }
+            for (int axis = 0; axis < 3; axis++) {
+                bvh->top.lower[axis] = INFINITY;
+                bvh->top.upper[axis] = -INFINITY;
+                for (uint32_t i = 0; i < count; i++) {
+                    bvh->top.lower[axis] = fminf(bvh->top.lower[axis], refs[i].lower[axis]);
+                    bvh->top.upper[axis] = fmaxf(bvh->top.upper[axis], refs[i].upper[axis]);
+                }
+                if (count)
+                    bvh->top.extent = fmaxf(bvh->top.extent, fmaxf(fabsf(bvh->top.lower[axis]),
+                                                                   fabsf(bvh->top.upper[axis])));
+            }
+            bvh->tree = &bvh->top;
+        }
+    }
+    trc_free(items);
+    trc_free(refs);
+    return status;
+}
+
+static trc_status slots_collect(struct create_job *job) {
+    const struct trc_snapshot *s = job->snapshot;
+    uint64_t total = 0;
+    for (uint32_t i = 0; i < s->instance_count; i++) total += s->instances[i].material_count;
+    job->joined = trc_alloc_zeroed(s->instance_count ? s->instance_count : 1, 1);
+    job->transparent = trc_alloc_zeroed(total ? total : 1, 1);
+    job->first_slot = trc_alloc(s->instance_count ? s->instance_count : 1, sizeof *job->first_slot);
+    if (!job->joined || !job->transparent || !job->first_slot)
+        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for %u instances", s->instance_count);
+    uint32_t slot = 0;
+    for (uint32_t i = 0; i < s->instance_count; i++) {
+        job->first_slot[i] = slot;
+        for (uint32_t k = 0; k < s->instances[i].material_count; k++, slot++)
+            job->transparent[slot] = trc_material_shadows_transparent(
+                s->materials[s->instances[i].materials[k]]);
+    }
+    return TRC_OK;
+}
+
+static trc_status trees_build(struct create_job *job, const struct trc_bvh *previous,
+                              struct trc_mesh *const *replaced) {
+    const struct trc_snapshot *s = job->snapshot;
+    trc_status status = slots_collect(job);
+    if (status == TRC_OK) {
+        join_select(job);
+        status = joined_build(job);
+    }
+    for (uint32_t i = 0; i < s->instance_count && status == TRC_OK; i++)
+        if (!job->joined[i] && !job->bvh->blas[s->instances[i].mesh])
+            status = blas_obtain(job, s->instances[i].mesh, previous, replaced);
+    if (status == TRC_OK) status = top_build(job);
+    trc_free(job->joined);
+    trc_free(job->transparent);
+    trc_free(job->first_slot);
+    return status;
+}
+
+static void stats_collect(const struct trc_bvh *bvh, struct trc_bvh_build_stats *stats) {
+    stats->bytes = bvh->top.bytes + bvh->joined.bytes;
+    stats->skipped_triangles = bvh->joined.skipped_count;
+    for (uint32_t i = 0; i < bvh->blas_count; i++)
+        if (bvh->blas[i]) {
+            stats->bytes += bvh->blas[i]->tree.bytes;
+            stats->skipped_triangles += bvh->blas[i]->tree.skipped_count;
+        }
+    memcpy(stats->bounds_lower, bvh->tree->lower, sizeof stats->bounds_lower);
+    memcpy(stats->bounds_upper, bvh->tree->upper, sizeof stats->bounds_upper);
+}
+
+trc_status trc_bvh_create(const struct trc_snapshot *snapshot, const struct trc_bvh *previous,
+                          struct trc_mesh *const *replaced, const struct trc_bvh_options *options,
+                          struct trc_pool *pool, struct trc_bvh **bvh_out,
+                          struct trc_bvh_build_stats *stats_out) {
+    const double start = trc_seconds();
+    struct trc_bvh_build_stats stats = {0};
+    struct trc_bvh *bvh = trc_alloc_zeroed(1, sizeof *bvh);
+    if (!bvh) return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for the trees");
+    bvh->top.root = bvh->joined.root = TRC_REF_EMPTY;
+    bvh->blas_count = snapshot->mesh_count;
+    bvh->blas = trc_alloc_zeroed(bvh->blas_count ? bvh->blas_count : 1, sizeof *bvh->blas);
+    struct create_job job = {.snapshot = snapshot, .options = options, .pool = pool, .bvh = bvh,
+                             .stats = &stats};
+    trc_status status = bvh->blas ? trees_build(&job, previous, replaced)
+                                  : trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for the trees");
+    if (status != TRC_OK) {
+        trc_bvh_destroy(bvh);
+        return status;
+    }
+    stats_collect(bvh, &stats);
+    stats.seconds = trc_seconds() - start;
+    *stats_out = stats;
+    *bvh_out = bvh;
+    return TRC_OK;
+}
+
+void trc_bvh_destroy(struct trc_bvh *bvh) {
+    if (!bvh) return;
+    for (uint32_t i = 0; bvh->blas && i < bvh->blas_count; i++) blas_release(bvh->blas[i]);
+    trc_tree_destroy(&bvh->top);
+    trc_tree_destroy(&bvh->joined);
+    trc_free(bvh->items);
+    trc_free(bvh->blas);
+    trc_free(bvh);
+}

@@ -1,0 +1,34 @@
+/* Status messages, memory, small helpers. */
+#ifndef TRACER_CORE_CORE_H
+#define TRACER_CORE_CORE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "tracer/base.h"
+
+/* Sets this thread's message (printf-like, cut to 511 bytes) and returns status. */
+trc_status trc_fail(trc_status status, const char *format, ...)
+    __attribute__((format(printf, 2, 3)));
+
+/* Memory of the library: 64-byte aligned, counted, may fail (NULL). Sizes are count * size, checked for
+ * overflow. trc_free(NULL) is fine. Freed blocks must come from here. */
+void *trc_alloc(size_t count, size_t size);
+void *trc_alloc_zeroed(size_t count, size_t size);
+void trc_free(void *block);
+
+/* Bytes in use now and at most. */
+uint64_t trc_memory_bytes(void);
+uint64_t trc_memory_peak_bytes(void);
+
+/* Test hook: the n-th allocation or thread creation from now fails (0: the next), and each later one too if
+ * all is true; negative n switches it off. */
+void trc_memory_fail_at(int64_t n, bool all);
+/* Whether an operation of that kind (thread creation) must fail now. */
+bool trc_memory_should_fail(void);
+
+/* Seconds of a monotonic clock. */
+double trc_seconds(void);
+
+#endif

@@ -1,0 +1,151 @@
+/* The beam: the hull of a packet's rays, tested against eight boxes at once.
+ *
+ * Boulos et al. 2007, section 3.2, cull a box against intervals of a packet's origins and directions.
+ * Here the rays of a beam share their dominant axis z and its sign, and the hull is kept as two ranges per cross
+ * axis, at a near and a far plane of z, joined linearly: each ray is linear in z, so the least and the
+ * largest x of all rays between the planes lie within the joined lines. It is tighter than intervals of
+ * slopes when origins differ.
+ *
+ * Everything here only culls. Rounding is covered by slack, an absolute widening of boxes: positions on a
+ * ray are wrong by less than 6 half-ulps (2^-24) of |o| + |p - o|, lines of the beam by as much
+ * again, and the triangle test moves vertices by less than 4 half-ulps of |v - o|. All lengths are below
+ * the largest |coordinate| of the origins plus that of the tree (M), twice: 16 half-ulps of 2 M is
+ * TRC_SLACK * M. */
+#ifndef TRACER_KERNELS_BEAM_H
+#define TRACER_KERNELS_BEAM_H
+
+#include "bvh/tree.h"
+#include "kernels/packet.h"
+#include "kernels/triangle.h"
+
+#define TRC_SLACK 2e-6f
+
+struct trc_beam {
+    struct trc_shear axis;
+    int side;               /* 0: rays go up z, 1: down; z below is mirrored when 1 */
+    float sign;             /* 1 or -1 */
+    float slack;
+    float z0, z1;           /* near and far plane, mirrored z; z1 shrinks as hits are found */
+    float u_min, u_max, v_min, v_max;                         /* at z0 */
+    float u_min_slope, u_max_slope, v_min_slope, v_max_slope; /* per z */
+};
+
+/* Everything a traversal derives from a packet for one group of its rays. */
+struct trc_group {
+    struct trc_beam beam;
+    float su[TRC_PACKET_SIZE], sv[TRC_PACKET_SIZE], sz[TRC_PACKET_SIZE]; /* shear; sz = 1 / dz */
+    float inv[3][TRC_PACKET_SIZE];  /* 1 / d, finite */
+    float f[TRC_PACKET_SIZE];       /* moving trees: position between the keys */
+    float f_min, f_max;
+} __attribute__((aligned(64)));
+
+/* A zero component becomes this, so that its reciprocal and products with coordinates stay finite. */
+#define TRC_TINY_DIRECTION 1e-18f
+
+TRC_INLINE vfloat trc_safe_inverse(vfloat d) {
+    const vmask tiny = vf_lt(vf_abs(d), vf_set(TRC_TINY_DIRECTION));
+    return vf_set(1.0f) / vf_select(tiny, vf_copysign(vf_set(TRC_TINY_DIRECTION), d), d);
+}
+
+TRC_INLINE float trc_lanes_min(vfloat a) {
+    float x[TRC_WIDTH], r;
+    vf_store(x, a);
+    r = x[0];
+    for (int i = 1; i < TRC_WIDTH; i++) r = x[i] < r ? x[i] : r;
+    return r;
+}
+TRC_INLINE float trc_lanes_max(vfloat a) { return -trc_lanes_min(-a); }
+
+/* Shear, inverses and beam of the rays in mask, all of dominant axis z and that side, against a tree. False:
+ * none can reach the tree. */
+TRC_INLINE bool trc_group_setup(struct trc_group *g, const struct trc_packet *p,
+                                const struct trc_tree *tree, uint64_t mask, int z, int side) {
+    struct trc_beam *b = &g->beam;
+    b->axis = (struct trc_shear){(z + 1) % 3, (z + 2) % 3, z};
+    b->side = side;
+    b->sign = side ? -1.0f : 1.0f;
+    const int au = b->axis.u, av = b->axis.v;
+    const vfloat sign = vf_set(b->sign), inf = vf_set(INFINITY);
+    vfloat z_near = inf, z_far = -inf, far_origin = vf_set(0.0f);
+    for (int c = 0; c < TRC_PACKET_CHUNKS; c++) {
+        const uint32_t bits = trc_chunk_bits(mask, c);
+        if (!bits) continue;
+        const int i = c * TRC_WIDTH;
+        const vmask m = vm_from_bits(bits);
+        const vfloat du = vf_load(&p->d[au][i]), dv = vf_load(&p->d[av][i]),
+                     dz = vf_load(&p->d[z][i]);
+        const vfloat ou = vf_load(&p->o[au][i]), ov = vf_load(&p->o[av][i]),
+                     oz = vf_load(&p->o[z][i]);
+        const vfloat sz = vf_set(1.0f) / dz;
+        vf_store(&g->sz[i], sz);
+        vf_store(&g->su[i], du * sz);
+        vf_store(&g->sv[i], dv * sz);
+        vf_store(&g->inv[z][i], sz);
+        vf_store(&g->inv[au][i], trc_safe_inverse(du));
+        vf_store(&g->inv[av][i], trc_safe_inverse(dv));
+        z_near = vf_min(z_near, vf_select(m, sign * (oz + vf_load(&p->tmin[i]) * dz), inf));
+        z_far = vf_max(z_far, vf_select(m, sign * (oz + vf_load(&p->t[i]) * dz), -inf));
+        const vfloat o = vf_max(vf_abs(ou), vf_max(vf_abs(ov), vf_abs(oz)));
+        far_origin = vf_max(far_origin, vf_select(m, o, vf_set(0.0f)));
+    }
+    b->slack = TRC_SLACK * (trc_lanes_max(far_origin) + tree->extent);
+    const float low = side ? -tree->upper[z] : tree->lower[z];
+    const float high = side ? -tree->lower[z] : tree->upper[z];
+    b->z0 = fmaxf(trc_lanes_min(z_near), low) - b->slack;
+    b->z1 = fminf(trc_lanes_max(z_far), high) + b->slack;
+    if (!(b->z0 <= b->z1)) return false;
+    vfloat u_low[2] = {inf, inf}, u_high[2] = {-inf, -inf}, v_low[2] = {inf, inf},
+           v_high[2] = {-inf, -inf};
+    const vfloat plane[2] = {sign * b->z0, sign * b->z1};
+    for (int c = 0; c < TRC_PACKET_CHUNKS; c++) {
+        const uint32_t bits = trc_chunk_bits(mask, c);
+        if (!bits) continue;
+        const int i = c * TRC_WIDTH;
+        const vmask m = vm_from_bits(bits);
+        const vfloat oz = vf_load(&p->o[z][i]);
+        for (int end = 0; end < 2; end++) {
+            const vfloat dz = plane[end] - oz;
+            const vfloat u = vf_load(&p->o[au][i]) + dz * vf_load(&g->su[i]);
+            const vfloat v = vf_load(&p->o[av][i]) + dz * vf_load(&g->sv[i]);
+            u_low[end] = vf_min(u_low[end], vf_select(m, u, inf));
+            u_high[end] = vf_max(u_high[end], vf_select(m, u, -inf));
+            v_low[end] = vf_min(v_low[end], vf_select(m, v, inf));
+            v_high[end] = vf_max(v_high[end], vf_select(m, v, -inf));
+        }
+    }
+    const float length = b->z1 - b->z0;
+    const float per_z = length > 0.0f ? 1.0f / length : 0.0f;
+    b->u_min = trc_lanes_min(u_low[0]) - b->slack;
+    b->u_max = trc_lanes_max(u_high[0]) + b->slack;
+    b->v_min = trc_lanes_min(v_low[0]) - b->slack;
+    b->v_max = trc_lanes_max(v_high[0]) + b->slack;
+    b->u_min_slope = (trc_lanes_min(u_low[1]) - b->slack - b->u_min) * per_z;
+    b->u_max_slope = (trc_lanes_max(u_high[1]) + b->slack - b->u_max) * per_z;
+    b->v_min_slope = (trc_lanes_min(v_low[1]) - b->slack - b->v_min) * per_z;
+    b->v_max_slope = (trc_lanes_max(v_high[1]) + b->slack - b->v_max) * per_z;
+    return true;
+}
+
+/* Bits of the boxes that the beam may touch; key: their nearest mirrored z, for ordering. bounds: lower and
+ * upper by axis. */
+TRC_INLINE uint32_t trc_beam_test(const struct trc_beam *b, const f8 lower[3], const f8 upper[3],
+                                  f8 *key) {
+    const int u = b->axis.u, v = b->axis.v, z = b->axis.z;
+    const f8 near = b->side ? -upper[z] : lower[z], far = b->side ? -lower[z] : upper[z];
+    const f8 z0 = f8_set(b->z0);
+    const f8 za = f8_max(near, z0), zb = f8_min(far, f8_set(b->z1 + b->slack));
+    const f8 da = za - z0, db = f8_max(zb, za) - z0;
+    const f8 u_low = f8_min(f8_madd(da, f8_set(b->u_min_slope), f8_set(b->u_min)),
+                            f8_madd(db, f8_set(b->u_min_slope), f8_set(b->u_min)));
+    const f8 u_high = f8_max(f8_madd(da, f8_set(b->u_max_slope), f8_set(b->u_max)),
+                             f8_madd(db, f8_set(b->u_max_slope), f8_set(b->u_max)));
+    const f8 v_low = f8_min(f8_madd(da, f8_set(b->v_min_slope), f8_set(b->v_min)),
+                            f8_madd(db, f8_set(b->v_min_slope), f8_set(b->v_min)));
+    const f8 v_high = f8_max(f8_madd(da, f8_set(b->v_max_slope), f8_set(b->v_max)),
+                             f8_madd(db, f8_set(b->v_max_slope), f8_set(b->v_max)));
+    *key = near;
+    return f8_le(za, zb) & f8_le(u_low, upper[u]) & f8_le(lower[u], u_high) &
+           f8_le(v_low, upper[v]) & f8_le(lower[v], v_high);
+}
+
+#endif

@@ -1,0 +1,37 @@
+/* Sample sequences: which number in [0, 1) each pixel, sample and dimension gets. */
+#ifndef TRACER_KERNELS_SAMPLER_H
+#define TRACER_KERNELS_SAMPLER_H
+
+#include "kernels/simd.h"
+
+/* Dimensions of one camera sample; the first TRC_JOINT_DIMENSIONS are one joint sequence. */
+enum trc_dimension {
+    TRC_DIM_FILTER_X = 0, TRC_DIM_FILTER_Y,
+    TRC_DIM_LENS_X, TRC_DIM_LENS_Y,
+    TRC_DIM_TIME,
+    TRC_DIM_BOUNCE = 5 /* first dimension of the first hit; TRC_DIMS_PER_BOUNCE for each further one */
+};
+/* Within a bounce. */
+enum {
+    TRC_DIM_LIGHT_SELECT = 0, TRC_DIM_LIGHT_X, TRC_DIM_LIGHT_Y,
+    TRC_DIM_LOBE, TRC_DIM_BSDF_X, TRC_DIM_BSDF_Y,
+    TRC_DIMS_PER_BOUNCE
+};
+
+struct trc_sampler {
+    uint32_t kind;          /* TRC_SAMPLER_* */
+    uint32_t seed;
+    uint32_t sample_count;  /* planned per pixel */
+    const uint32_t *table;  /* Sobol numbers: see sampling/sobol.h */
+};
+
+/* u for each lane: pixel = hash or number of the pixel (x | y << 16), index = sample number. */
+vfloat TRC_KERNEL(trc_sample)(const struct trc_sampler *sampler, vuint pixel, vuint index,
+                              uint32_t dimension);
+
+/* Light samples: number l of count for the camera sample index, stratified jointly over the pixel's
+ * samples (index * count + l in the sequence). */
+vfloat TRC_KERNEL(trc_sample_split)(const struct trc_sampler *sampler, vuint pixel, vuint index,
+                                    uint32_t dimension, uint32_t l, uint32_t count);
+
+#endif

@@ -1,0 +1,55 @@
+/* Shading points: TRC_WIDTH of them side by side, and the registers of a material's program. */
+#ifndef TRACER_KERNELS_SURFACE_H
+#define TRACER_KERNELS_SURFACE_H
+
+#include "kernels/simd.h"
+#include "scene/snapshot.h"
+#include "shading/material.h"
+
+/* What kind of ray arrived, for Light Path and for visibility: TRC_VISIBLE_* in the low bits. */
+enum {
+    TRC_PATH_SINGULAR = 1 << 8,      /* last bounce was ideal */
+    TRC_PATH_REFLECTED = 1 << 9,     /* last bounce was a reflection */
+    TRC_PATH_TRANSPARENT_BACKGROUND = 1 << 10 /* only ideal straight-through so far: film alpha */
+};
+
+struct trc_surface {
+    const struct trc_snapshot *snapshot;
+    vmask active;
+    vint instance, triangle;     /* of the lanes in active; -1 for world lookups */
+    vfloat u, v;                 /* barycentrics, see query.h */
+    vfloat time;
+    vvec3 p;                     /* world position */
+    vvec3 p_error;               /* bound of its rounding error per axis, world */
+    vvec3 ng;                    /* geometric normal, unit, on the side of wo */
+    vvec3 n;                     /* shading normal, unit, on the side of wo as Cycles has it */
+    vvec3 wo;                    /* unit, towards where the ray came from */
+    vmask backfacing;            /* the ray came from the back of the winding */
+    vfloat ray_length;
+    vuint path;                  /* TRC_VISIBLE_* | TRC_PATH_* */
+    vint depth, diffuse_depth, glossy_depth, transmission_depth, transparent_depth;
+    vfloat footprint;            /* width of the ray's cone at p, world, for texture filters */
+    vfloat raster_x, raster_y;   /* window coordinates [0, 1] */
+};
+
+/* Fills p, p_error, ng, n, backfacing from instance, triangle, u, v, time, wo. (kernels/surface.c) */
+void TRC_KERNEL(trc_surface_fetch)(struct trc_surface *s);
+
+/* The registers of one run of a program. */
+struct trc_registers {
+    vfloat r[TRC_MAX_REGISTERS];
+};
+
+/* Runs the material's program, if it has one, for the active lanes. (kernels/program.c) */
+void TRC_KERNEL(trc_program_run)(const struct trc_material *m, const struct trc_surface *s,
+                                 struct trc_registers *regs);
+
+TRC_INLINE vfloat trc_operand_value(const struct trc_operand *o, const struct trc_registers *regs) {
+    return o->reg >= 0 ? regs->r[o->reg] : vf_set(o->value);
+}
+TRC_INLINE vvec3 trc_operand_vec3(const struct trc_operand *o, const struct trc_registers *regs) {
+    return v3(trc_operand_value(o, regs), trc_operand_value(o + 1, regs),
+              trc_operand_value(o + 2, regs));
+}
+
+#endif

@@ -1,0 +1,572 @@
+/* Traversal: packets at the top, single rays where a packet has thinned out.
+ *
+ * Boulos et al. 2007: general packets against a BVH, first an interval cull of the whole packet, then the
+ * first active ray. Departures, each by measurement: 8-wide nodes; the interval test is a beam
+ * (kernels/beam.h) against eight children in one step; the first live ray, then all, are tried only when a
+ * child is taken from the stack, against distances as they are by then; a 64-bit mask instead of a first
+ * active index; packets are split by dominant axis and its side; rays that are few go on alone, eight boxes or
+ * eight triangles at a time. Hits do not depend on any of it: candidates are tested by
+ * kernels/triangle.h and compared by distance, then by number. */
+#include "bvh/tree.h"
+#include "kernels/beam.h"
+#include "kernels/packet.h"
+#include "kernels/triangle.h"
+
+/* Live rays at or below which they go on alone: rays of one origin stay together longer. */
+#define SINGLE_COMMON 4
+#define SINGLE_MIXED 8
+
+struct entry {
+    uint32_t ref;
+    uint32_t box;    /* parent node * 8 + child; UINT32_MAX for the root */
+    uint64_t mask;
+};
+
+struct walk {
+    const struct trc_snapshot *snapshot;
+    const struct trc_tree *tree;
+    struct trc_packet *packet;
+    struct trc_packet_hits *hits;  /* closest only */
+    uint64_t occluded;             /* any only: found so far */
+    uint32_t instance;             /* of the tree; TRC_NO_HIT: leaves say */
+    uint32_t key;                  /* moving trees: first key of the segment */
+    struct trc_group *group;
+};
+
+static void walk_packet(struct walk *w, uint64_t mask, bool any);
+static void single_item(struct walk *w, const struct trc_item *item, int ray, bool any);
+
+/* ---- bounds, static or moving ---- */
+
+/* Boxes of a node's children: at rest, or hulled over the group's interval of time. */
+TRC_INLINE void boxes_load(const struct walk *w, uint32_t node, bool motion, f8 lower[3],
+                           f8 upper[3]) {
+    const float *b = trc_node_bounds(w->tree, node, w->key);
+    for (int axis = 0; axis < 3; axis++) {
+        lower[axis] = f8_load(b + 16 * axis);
+        upper[axis] = f8_load(b + 16 * axis + 8);
+    }
+    if (!motion) return;
+    const float *e = b + TRC_NODE_KEY_BYTES / sizeof(float);
+    const f8 f0 = f8_set(w->group->f_min), f1 = f8_set(w->group->f_max);
+    const f8 g0 = f8_set(1.0f) - f0, g1 = f8_set(1.0f) - f1;
+    for (int axis = 0; axis < 3; axis++) {
+        const f8 l = f8_load(e + 16 * axis), h = f8_load(e + 16 * axis + 8);
+        lower[axis] = f8_min(g0 * lower[axis] + f0 * l, g1 * lower[axis] + f1 * l);
+        upper[axis] = f8_max(g0 * upper[axis] + f0 * h, g1 * upper[axis] + f1 * h);
+    }
+}
+
+/* Rays of mask whose own slabs meet the box. The first live ray is tried alone: mostly it hits and the
+ * rest need not be looked at. */
+TRC_INLINE uint64_t box_rays(const struct walk *w, uint32_t box, uint64_t mask, bool motion) {
+    const struct trc_packet *p = w->packet;
+    const struct trc_group *g = w->group;
+    const float *b = trc_node_bounds(w->tree, box >> 3, w->key) + (box & 7u);
+    const float *e = b + (motion ? TRC_NODE_KEY_BYTES / sizeof(float) : 0);
+    const float slack = g->beam.slack;
+    {
+        const int i = __builtin_ctzll(mask);
+        float near = p->tmin[i], far = p->t[i];
+        for (int axis = 0; axis < 3; axis++) {
+            float low = b[16 * axis], high = b[16 * axis + 8];
+            if (motion) {
+                const float f = g->f[i], k = 1.0f - f;
+                low = k * low + f * e[16 * axis];
+                high = k * high + f * e[16 * axis + 8];
+            }
+            const float o = p->o[axis][i], inv = g->inv[axis][i];
+            const float t0 = (low - slack - o) * inv, t1 = (high + slack - o) * inv;
+            near = fmaxf(near, fminf(t0, t1));
+            far = fminf(far, fmaxf(t0, t1));
+        }
+        if (near <= far) return mask;
+        mask &= mask - 1;
+    }
+    uint64_t live = 0;
+    for (int c = 0; c < TRC_PACKET_CHUNKS; c++) {
+        const uint32_t bits = trc_chunk_bits(mask, c);
+        if (!bits) continue;
+        const int i = c * TRC_WIDTH;
+        vfloat near = vf_load(&p->tmin[i]), far = vf_load(&p->t[i]);
+        const vfloat f = motion ? vf_load(&g->f[i]) : vf_set(0.0f), k = vf_set(1.0f) - f;
+        for (int axis = 0; axis < 3; axis++) {
+            vfloat low = vf_set(b[16 * axis]), high = vf_set(b[16 * axis + 8]);
+            if (motion) {
+                low = k * low + f * vf_set(e[16 * axis]);
+                high = k * high + f * vf_set(e[16 * axis + 8]);
+            }
+            const vfloat o = vf_load(&p->o[axis][i]), inv = vf_load(&g->inv[axis][i]);
+            const vfloat t0 = (low - vf_set(slack) - o) * inv, t1 = (high + vf_set(slack) - o) * inv;
+            near = vf_max(near, vf_min(t0, t1));
+            far = vf_min(far, vf_max(t0, t1));
+        }
+        live |= (uint64_t)(vm_bits(vf_le(near, far)) & bits) << i;
+    }
+    return live;
+}
+
+/* ---- leaves, packets ---- */
+
+/* Beam cull of the leaf's triangles by their boxes. */
+TRC_INLINE uint32_t leaf_candidates(const struct walk *w, uint32_t leaf, uint32_t count,
+                                    bool motion) {
+    f8 lower[3], upper[3], key;
+    const float *v = trc_leaf_vertices(w->tree, leaf, w->key);
+    const float *e = v + (motion ? TRC_LEAF_KEY_BYTES / sizeof(float) : 0);
+    const f8 f0 = f8_set(motion ? w->group->f_min : 0.0f), f1 = f8_set(motion ? w->group->f_max : 0.0f);
+    const f8 g0 = f8_set(1.0f) - f0, g1 = f8_set(1.0f) - f1;
+    for (int axis = 0; axis < 3; axis++) {
+        f8 low = f8_set(INFINITY), high = f8_set(-INFINITY);
+        for (int corner = 0; corner < 3; corner++) {
+            const f8 a = f8_load(v + 24 * corner + 8 * axis);
+            if (motion) {
+                const f8 b = f8_load(e + 24 * corner + 8 * axis);
+                const f8 x = g0 * a + f0 * b, y = g1 * a + f1 * b;
+                low = f8_min(low, f8_min(x, y));
+                high = f8_max(high, f8_max(x, y));
+            } else {
+                low = f8_min(low, a);
+                high = f8_max(high, a);
+            }
+        }
+        lower[axis] = low;
+        upper[axis] = high;
+    }
+    return trc_beam_test(&w->group->beam, lower, upper, &key) & ((1u << count) - 1u);
+}
+
+/* Broadcasts slot's triangle, or interpolates it for each ray of chunk i. */
+TRC_INLINE void lanes_load(const struct walk *w, const float *v, bool motion, int i,
+                           struct trc_triangle_lanes *tri) {
+    const int order[3] = {w->group->beam.axis.u, w->group->beam.axis.v, w->group->beam.axis.z};
+    const float *e = v + (motion ? TRC_LEAF_KEY_BYTES / sizeof(float) : 0);
+    const vfloat f = motion ? vf_load(&w->group->f[i]) : vf_set(0.0f), k = vf_set(1.0f) - f;
+    for (int corner = 0; corner < 3; corner++)
+        for (int axis = 0; axis < 3; axis++) {
+            const int at = 24 * corner + 8 * order[axis];
+            tri->v[corner][axis] =
+                motion ? k * vf_set(v[at]) + f * vf_set(e[at]) : vf_set(v[at]);
+        }
+}
+
+/* Keeps hits that are nearer than the ray's, or as near with a lower number. */
+TRC_INLINE uint32_t hits_keep(const struct walk *w, int i, vmask hit, vfloat t, vfloat u, vfloat v,
+                              uint32_t instance, uint32_t triangle) {
+    struct trc_packet *p = w->packet;
+    struct trc_packet_hits *h = w->hits;
+    const vfloat best = vf_load(&p->t[i]);
+    vmask keep = vm_and(hit, vm_and(vf_lt(t, best), vf_gt(t, vf_load(&p->tmin[i]))));
+    uint32_t ties = vm_bits(vm_and(hit, vf_eq(t, best)));
+    if (__builtin_expect(ties != 0, 0)) {
+        uint32_t bits = vm_bits(keep);
+        for (; ties; ties &= ties - 1) {
+            const int l = i + __builtin_ctz(ties);
+            const bool lower = instance < h->instance[l] ||
+                               (instance == h->instance[l] && triangle < h->triangle[l]);
+            if (lower && p->t[l] > p->tmin[l]) bits |= ties & -ties;
+        }
+        keep = vm_from_bits(bits);
+    }
+    if (!vm_any(keep)) return 0;
+    vf_store(&p->t[i], vf_select(keep, t, best));
+    vf_store(&h->u[i], vf_select(keep, u, vf_load(&h->u[i])));
+    vf_store(&h->v[i], vf_select(keep, v, vf_load(&h->v[i])));
+    vi_store((int32_t *)&h->instance[i], vi_select(keep, vi_set((int32_t)instance),
+                                                   vi_load((int32_t *)&h->instance[i])));
+    vi_store((int32_t *)&h->triangle[i], vi_select(keep, vi_set((int32_t)triangle),
+                                                   vi_load((int32_t *)&h->triangle[i])));
+    return vm_bits(keep);
+}
+
+/* Tests a leaf's triangles; true if any ray found a (nearer) hit. */
+TRC_INLINE bool leaf_packet(struct walk *w, uint32_t ref, uint64_t mask, bool any, bool motion) {
+    const struct trc_packet *p = w->packet;
+    const struct trc_group *g = w->group;
+    const uint32_t leaf = ref & TRC_REF_INDEX_MASK, count = ((ref >> 28) & 7u) + 1u;
+    const uint32_t *words = trc_leaf_instances(w->tree, leaf);
+    const uint32_t *triangles = words + TRC_NODE_WIDTH;
+    const struct trc_shear axis = g->beam.axis;
+    bool found = false;
+    for (uint32_t slots = leaf_candidates(w, leaf, count, motion); slots; slots &= slots - 1) {
+        const int slot = __builtin_ctz(slots);
+        if (any && p->skip_transparent && (words[slot] & TRC_SLOT_TRANSPARENT)) continue;
+        const float *v = trc_leaf_vertices(w->tree, leaf, w->key) + slot;
+        const uint32_t instance =
+            w->instance == TRC_NO_HIT ? words[slot] & TRC_SLOT_INSTANCE_MASK : w->instance;
+        struct trc_triangle_lanes tri;
+        if (!motion) lanes_load(w, v, false, 0, &tri);
+        for (int c = 0; c < TRC_PACKET_CHUNKS; c++) {
+            const uint32_t bits = trc_chunk_bits(mask, c);
+            if (!bits) continue;
+            const int i = c * TRC_WIDTH;
+            if (motion) lanes_load(w, v, true, i, &tri);
+            vfloat t, bu, bv;
+            vmask hit = trc_triangle_test(&tri, vf_load(&p->o[axis.u][i]), vf_load(&p->o[axis.v][i]),
+                                          vf_load(&p->o[axis.z][i]), vf_load(&g->su[i]),
+                                          vf_load(&g->sv[i]), vf_load(&g->sz[i]), vm_from_bits(bits),
+                                          &t, &bu, &bv);
+            if (!vm_any(hit)) continue;
+            if (any) {
+                hit = vm_and(hit, vm_and(vf_gt(t, vf_load(&p->tmin[i])), vf_lt(t, vf_load(&p->t[i]))));
+                const uint64_t blocked = (uint64_t)vm_bits(hit) << i;
+                w->occluded |= blocked;
+                mask &= ~blocked;
+                found = found || blocked;
+            } else {
+                found |= hits_keep(w, i, hit, t, bu, bv, instance, triangles[slot]) != 0;
+            }
+        }
+    }
+    return found;
+}
+
+/* After hits: the beam need not reach beyond the farthest ray. */
+static void beam_shorten(struct walk *w, uint64_t mask) {
+    const struct trc_packet *p = w->packet;
+    struct trc_beam *b = &w->group->beam;
+    const int z = b->axis.z;
+    vfloat far = vf_set(-INFINITY);
+    for (int c = 0; c < TRC_PACKET_CHUNKS; c++) {
+        const uint32_t bits = trc_chunk_bits(mask, c);
+        if (!bits) continue;
+        const int i = c * TRC_WIDTH;
+        const vfloat end = vf_load(&p->o[z][i]) + vf_load(&p->t[i]) * vf_load(&p->d[z][i]);
+        far = vf_max(far, vf_select(vm_from_bits(bits), vf_set(b->sign) * end, far));
+    }
+    b->z1 = fminf(b->z1, trc_lanes_max(far) + b->slack);
+}
+
+/* ---- single rays ---- */
+
+/* One ray's tests against a leaf. True: occluded (any only). */
+TRC_INLINE bool leaf_single(struct walk *w, uint32_t ref, int ray, bool any, bool motion) {
+    struct trc_packet *p = w->packet;
+    const struct trc_group *g = w->group;
+    const uint32_t leaf = ref & TRC_REF_INDEX_MASK, count = ((ref >> 28) & 7u) + 1u;
+    const uint32_t *words = trc_leaf_instances(w->tree, leaf);
+    const uint32_t *triangles = words + TRC_NODE_WIDTH;
+    const struct trc_shear axis = g->beam.axis;
+    const int order[3] = {axis.u, axis.v, axis.z};
+    const float *v = trc_leaf_vertices(w->tree, leaf, w->key);
+    const float *e = v + (motion ? TRC_LEAF_KEY_BYTES / sizeof(float) : 0);
+    struct trc_triangle8 tri;
+    for (int corner = 0; corner < 3; corner++)
+        for (int a = 0; a < 3; a++) {
+            const int at = 24 * corner + 8 * order[a];
+            tri.v[corner][a] = f8_load(v + at);
+            if (motion) {
+                const f8 f = f8_set(g->f[ray]);
+                tri.v[corner][a] = (f8_set(1.0f) - f) * tri.v[corner][a] + f * f8_load(e + at);
+            }
+        }
+    f8 t, bu, bv;
+    uint32_t hit = trc_triangle8_test(&tri, p->o[axis.u][ray], p->o[axis.v][ray], p->o[axis.z][ray],
+                                      g->su[ray], g->sv[ray], g->sz[ray], (1u << count) - 1u, &t, &bu,
+                                      &bv);
+    for (; hit; hit &= hit - 1) {
+        const int slot = __builtin_ctz(hit);
+        const float distance = t[slot];
+        if (!(distance > p->tmin[ray])) continue;
+        if (any) {
+            if (distance < p->t[ray] &&
+                !(p->skip_transparent && (words[slot] & TRC_SLOT_TRANSPARENT)))
+                return true;
+            continue;
+        }
+        const uint32_t instance =
+            w->instance == TRC_NO_HIT ? words[slot] & TRC_SLOT_INSTANCE_MASK : w->instance;
+        struct trc_packet_hits *h = w->hits;
+        const bool lower = instance < h->instance[ray] ||
+                           (instance == h->instance[ray] && triangles[slot] < h->triangle[ray]);
+        if (distance < p->t[ray] || (distance == p->t[ray] && lower)) {
+            p->t[ray] = distance;
+            h->u[ray] = bu[slot];
+            h->v[ray] = bv[slot];
+            h->instance[ray] = instance;
+            h->triangle[ray] = triangles[slot];
+        }
+    }
+    return false;
+}
+
+struct single_entry {
+    uint32_t ref;
+    float near;
+};
+
+/* Bits of the children one ray meets, and its entry distances. */
+TRC_INLINE uint32_t node_single(const struct walk *w, uint32_t node, int ray, bool motion,
+                                float near_out[8]) {
+    const struct trc_packet *p = w->packet;
+    const struct trc_group *g = w->group;
+    const float *b = trc_node_bounds(w->tree, node, w->key);
+    const float *e = b + (motion ? TRC_NODE_KEY_BYTES / sizeof(float) : 0);
+    const float slack = g->beam.slack;
+    f8 near = f8_set(p->tmin[ray]), far = f8_set(p->t[ray]);
+    const f8 f = f8_set(motion ? g->f[ray] : 0.0f), k = f8_set(1.0f) - f;
+    for (int axis = 0; axis < 3; axis++) {
+        const float inv = g->inv[axis][ray], o = p->o[axis][ray];
+        const int back = inv < 0.0f ? 8 : 0; /* which plane is met first */
+        f8 first = f8_load(b + 16 * axis + back), last = f8_load(b + 16 * axis + 8 - back);
+        if (motion) {
+            first = k * first + f * f8_load(e + 16 * axis + back);
+            last = k * last + f * f8_load(e + 16 * axis + 8 - back);
+        }
+        const float widen = inv < 0.0f ? -slack : slack;
+        near = f8_max(near, (first - f8_set(o + widen)) * f8_set(inv));
+        far = f8_min(far, (last - f8_set(o - widen)) * f8_set(inv));
+    }
+    f8_store(near_out, near);
+    return f8_le(near, far);
+}
+
+/* Walks one ray through the subtree at ref. True: occluded. */
+TRC_INLINE bool single_walk(struct walk *w, uint32_t ref, int ray, bool any, bool motion) {
+    struct single_entry stack[TRC_STACK_SIZE];
+    int top = 0;
+    stack[top++] = (struct single_entry){ref, w->packet->tmin[ray]};
+    while (top > 0) {
+        const struct single_entry at = stack[--top];
+        if (at.near > w->packet->t[ray]) continue;
+        if (at.ref & TRC_REF_LEAF) {
+            if (w->tree->is_top) {
+                single_item(w, &w->tree->items[at.ref & TRC_REF_INDEX_MASK], ray, any);
+                if (any && (w->occluded >> ray & 1u)) return true;
+            } else if (leaf_single(w, at.ref, ray, any, motion)) {
+                return true;
+            }
+            continue;
+        }
+        float near[8];
+        const uint32_t *children = trc_node_children(w->tree, at.ref);
+        const int first = top;
+        for (uint32_t bits = node_single(w, at.ref, ray, motion, near); bits; bits &= bits - 1) {
+            const int child = __builtin_ctz(bits);
+            const struct single_entry e = {children[child], near[child]};
+            int at_slot = top++;
+            for (; at_slot > first && stack[at_slot - 1].near < e.near; at_slot--)
+                stack[at_slot] = stack[at_slot - 1];
+            stack[at_slot] = e;
+        }
+    }
+    return false;
+}
+
+/* ---- the packet's walk ---- */
+
+static void item_packet(struct walk *w, const struct trc_item *item, uint64_t mask, bool any);
+
+/* Pushes the children the beam may touch, the nearest on top. */
+TRC_INLINE int children_push(const struct walk *w, uint32_t node, uint64_t mask, bool motion,
+                             struct entry *stack, int top) {
+    f8 lower[3], upper[3], key;
+    boxes_load(w, node, motion, lower, upper);
+    uint32_t bits = trc_beam_test(&w->group->beam, lower, upper, &key);
+    const uint32_t *children = trc_node_children(w->tree, node);
+    float z[TRC_NODE_WIDTH];
+    const int first = top;
+    for (; bits; bits &= bits - 1) {
+        const int child = __builtin_ctz(bits);
+        const float near = key[child];
+        int at = top++;
+        for (; at > first && z[at - 1 - first] < near; at--) {
+            stack[at] = stack[at - 1];
+            z[at - first] = z[at - 1 - first];
+        }
+        stack[at] = (struct entry){children[child], node * TRC_NODE_WIDTH + (uint32_t)child, mask};
+        z[at - first] = near;
+    }
+    return top;
+}
+
+TRC_INLINE void packet_walk(struct walk *w, uint64_t mask, bool any, bool motion) {
+    struct entry stack[TRC_STACK_SIZE];
+    const int few = w->packet->common_origin ? SINGLE_COMMON : SINGLE_MIXED;
+    const uint64_t all = mask;
+    int top = 0;
+    stack[top++] = (struct entry){w->tree->root, UINT32_MAX, mask};
+    while (top > 0) {
+        const struct entry at = stack[--top];
+        uint64_t live = at.mask;
+        if (any) live &= ~w->occluded;
+        if (live && at.box != UINT32_MAX) live = box_rays(w, at.box, live, motion);
+        if (!live) continue;
+        if (__builtin_popcountll(live) <= few) {
+            for (; live; live &= live - 1) {
+                const int ray = __builtin_ctzll(live);
+                if (single_walk(w, at.ref, ray, any, motion) && any) w->occluded |= 1ull << ray;
+            }
+            continue;
+        }
+        if (!(at.ref & TRC_REF_LEAF)) {
+            top = children_push(w, at.ref, live, motion, stack, top);
+        } else if (w->tree->is_top) {
+            item_packet(w, &w->tree->items[at.ref & TRC_REF_INDEX_MASK], live, any);
+            if (!any) beam_shorten(w, all);
+        } else if (leaf_packet(w, at.ref, live, any, motion) && !any) {
+            beam_shorten(w, all);
+        }
+    }
+}
+
+static void walk_any(struct walk *w, uint64_t mask) { packet_walk(w, mask, true, false); }
+static void walk_closest(struct walk *w, uint64_t mask) { packet_walk(w, mask, false, false); }
+static void walk_any_moving(struct walk *w, uint64_t mask) { packet_walk(w, mask, true, true); }
+static void walk_closest_moving(struct walk *w, uint64_t mask) { packet_walk(w, mask, false, true); }
+
+/* Moving trees: rays of one segment between keys at a time, each with its place in it. */
+static void walk_segments(struct walk *w, uint64_t mask, bool any) {
+    const struct trc_packet *p = w->packet;
+    struct trc_group *g = w->group;
+    uint8_t keys[TRC_PACKET_SIZE];
+    for (uint64_t m = mask; m; m &= m - 1) {
+        const int i = __builtin_ctzll(m);
+        uint32_t key;
+        trc_key_at(p->time[i], w->tree->key_count, &key, &g->f[i]);
+        keys[i] = (uint8_t)key;
+    }
+    while (mask) {
+        const uint8_t key = keys[__builtin_ctzll(mask)];
+        uint64_t same = 0;
+        g->f_min = 1.0f;
+        g->f_max = 0.0f;
+        for (uint64_t m = mask; m; m &= m - 1) {
+            const int i = __builtin_ctzll(m);
+            if (keys[i] != key) continue;
+            same |= 1ull << i;
+            g->f_min = fminf(g->f_min, g->f[i]);
+            g->f_max = fmaxf(g->f_max, g->f[i]);
+        }
+        mask &= ~same;
+        w->key = key;
+        (any ? walk_any_moving : walk_closest_moving)(w, same);
+    }
+}
+
+/* Splits the rays by dominant axis and side and walks each group. */
+static void walk_packet(struct walk *w, uint64_t mask, bool any) {
+    const struct trc_packet *p = w->packet;
+    struct trc_group group;
+    uint64_t groups[6] = {0};
+    if (w->tree->root == TRC_REF_EMPTY) return;
+    for (int c = 0; c < TRC_PACKET_CHUNKS; c++) {
+        const uint32_t bits = trc_chunk_bits(mask, c);
+        if (!bits) continue;
+        const int i = c * TRC_WIDTH;
+        const vfloat dx = vf_load(&p->d[0][i]), dy = vf_load(&p->d[1][i]), dz = vf_load(&p->d[2][i]);
+        const vfloat ax = vf_abs(dx), ay = vf_abs(dy), az = vf_abs(dz), zero = vf_set(0.0f);
+        const uint32_t x = bits & vm_bits(vm_and(vf_ge(ax, ay), vf_ge(ax, az)));
+        const uint32_t y = bits & ~x & vm_bits(vf_ge(ay, az)), z = bits & ~x & ~y;
+        const uint32_t nx = vm_bits(vf_lt(dx, zero)), ny = vm_bits(vf_lt(dy, zero)),
+                       nz = vm_bits(vf_lt(dz, zero));
+        const uint32_t split[6] = {x & ~nx, x & nx, y & ~ny, y & ny, z & ~nz, z & nz};
+        for (int k = 0; k < 6; k++) groups[k] |= (uint64_t)split[k] << i;
+    }
+    struct trc_group *const outer = w->group;
+    w->group = &group;
+    for (int k = 0; k < 6; k++) {
+        if (!groups[k] || !trc_group_setup(&group, p, w->tree, groups[k], k >> 1, k & 1)) continue;
+        if (w->tree->key_count > 1)
+            walk_segments(w, groups[k], any);
+        else
+            (any ? walk_any : walk_closest)(w, groups[k]);
+    }
+    w->group = outer;
+}
+
+/* ---- instances ---- */
+
+/* World-to-object matrix of each lane's time: the key's inverse, or the inverse of the interpolated
+ * matrix. */
+TRC_INLINE void instance_inverse(const struct trc_instance *instance, vfloat time, vfloat inverse[12]) {
+    if (instance->key_count < 2) {
+        for (int k = 0; k < 12; k++) inverse[k] = vf_set(instance->world_to_object->m[k]);
+        return;
+    }
+    const float last = (float)(instance->key_count - 1);
+    const vfloat x = vf_clamp(time, 0.0f, 1.0f) * vf_set(last);
+    const vfloat key = vf_min(vf_floor(x), vf_set(last - 1.0f)), f = x - key, g = vf_set(1.0f) - f;
+    const vint at = vf_to_int(key) * vi_set(12);
+    vfloat m[12];
+    const float *base = instance->object_to_world->m;
+    for (int k = 0; k < 12; k++)
+        m[k] = g * vf_gather(base + k, at, vm_all_set()) + f * vf_gather(base + 12 + k, at, vm_all_set());
+    const vvec3 r0 = v3(m[0], m[1], m[2]), r1 = v3(m[4], m[5], m[6]), r2 = v3(m[8], m[9], m[10]);
+    const vvec3 c0 = v3_cross(r1, r2), c1 = v3_cross(r2, r0), c2 = v3_cross(r0, r1);
+    const vfloat inv_det = vf_set(1.0f) / v3_dot(r0, c0);
+    const vfloat rows[3][3] = {{c0.x, c1.x, c2.x}, {c0.y, c1.y, c2.y}, {c0.z, c1.z, c2.z}};
+    for (int r = 0; r < 3; r++) {
+        for (int k = 0; k < 3; k++) inverse[4 * r + k] = rows[r][k] * inv_det;
+        inverse[4 * r + 3] =
+            -(inverse[4 * r] * m[3] + inverse[4 * r + 1] * m[7] + inverse[4 * r + 2] * m[11]);
+    }
+}
+
+/* The rays of mask in an instance's object space; distances keep their meaning. */
+static void packet_transform(const struct trc_instance *instance, const struct trc_packet *p,
+                             uint64_t mask, struct trc_packet *out) {
+    for (int c = 0; c < TRC_PACKET_CHUNKS; c++) {
+        if (!trc_chunk_bits(mask, c)) continue;
+        const int i = c * TRC_WIDTH;
+        vfloat m[12];
+        instance_inverse(instance, vf_load(&p->time[i]), m);
+        const vfloat ox = vf_load(&p->o[0][i]), oy = vf_load(&p->o[1][i]), oz = vf_load(&p->o[2][i]);
+        const vfloat dx = vf_load(&p->d[0][i]), dy = vf_load(&p->d[1][i]), dz = vf_load(&p->d[2][i]);
+        for (int r = 0; r < 3; r++) {
+            vf_store(&out->o[r][i], m[4 * r] * ox + m[4 * r + 1] * oy + m[4 * r + 2] * oz + m[4 * r + 3]);
+            vf_store(&out->d[r][i], m[4 * r] * dx + m[4 * r + 1] * dy + m[4 * r + 2] * dz);
+        }
+        vf_store(&out->tmin[i], vf_load(&p->tmin[i]));
+        vf_store(&out->t[i], vf_load(&p->t[i]));
+        vf_store(&out->time[i], vf_load(&p->time[i]));
+    }
+    out->visibility = p->visibility;
+    out->skip_transparent = p->skip_transparent;
+    out->common_origin = p->common_origin && instance->key_count < 2;
+}
+
+static void item_packet(struct walk *w, const struct trc_item *item, uint64_t mask, bool any) {
+    if (!(item->visibility & w->packet->visibility)) return;
+    const struct walk outer = *w;
+    struct trc_packet local;
+    w->tree = item->tree;
+    w->instance = item->instance;
+    if (item->instance != TRC_NO_HIT) {
+        packet_transform(&w->snapshot->instances[item->instance], outer.packet, mask, &local);
+        w->packet = &local;
+    }
+    walk_packet(w, mask, any);
+    if (item->instance != TRC_NO_HIT && !any)
+        for (int c = 0; c < TRC_PACKET_CHUNKS; c++) {
+            const uint32_t bits = trc_chunk_bits(mask, c);
+            const int i = c * TRC_WIDTH;
+            if (bits)
+                vf_store(&outer.packet->t[i], vf_select(vm_from_bits(bits), vf_load(&local.t[i]),
+                                                        vf_load(&outer.packet->t[i])));
+        }
+    const uint64_t occluded = w->occluded;
+    *w = outer;
+    w->occluded = occluded;
+}
+
+static void single_item(struct walk *w, const struct trc_item *item, int ray, bool any) {
+    item_packet(w, item, 1ull << ray, any);
+}
+
+/* ---- entries ---- */
+
+void TRC_KERNEL(trc_trace_closest)(const struct trc_snapshot *snapshot, struct trc_packet *packet,
+                                   struct trc_packet_hits *hits) {
+    struct walk w = {.snapshot = snapshot, .tree = snapshot->bvh->tree, .packet = packet, .hits = hits,
+                     .instance = TRC_NO_HIT};
+    if (packet->active) walk_packet(&w, packet->active, false);
+}
+
+uint64_t TRC_KERNEL(trc_trace_occluded)(const struct trc_snapshot *snapshot,
+                                        struct trc_packet *packet) {
+    struct walk w = {.snapshot = snapshot, .tree = snapshot->bvh->tree, .packet = packet,
+                     .instance = TRC_NO_HIT};
+    if (packet->active) walk_packet(&w, packet->active, true);
+    return w.occluded & packet->active;
+}

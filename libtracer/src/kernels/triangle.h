@@ -1,0 +1,131 @@
+/* The watertight ray-triangle test, for many rays against one triangle and one ray against eight.
+ *
+ * Sven Woop, Carsten Benthin, Ingo Wald, "Watertight Ray/Triangle Intersection", 2013. Vertices are
+ * moved to the ray's origin and sheared so that the ray is the axis of its dominant direction; each
+ * vertex is rounded the same way whatever triangle it belongs to, so a closed mesh stays closed in the
+ * sheared plane. An edge function a*b - c*d of floats, without contraction, can lose its sign to 0 but never
+ * change it, because rounding is monotonic; where one is (nearly) 0 all three are computed in double,
+ * where products of floats are exact. Departures: barycentrics are normalised before the distance is
+ * formed (no overflow up to 1.8e18), both windings hit, edge functions below TINY_EDGE also go to double
+ * (tiny triangles). Both forms make the same operations in the same order: the same bits. */
+#ifndef TRACER_KERNELS_TRIANGLE_H
+#define TRACER_KERNELS_TRIANGLE_H
+
+#include "kernels/packet.h"
+#include "kernels/simd8.h"
+
+/* Below it products may have lost bits to underflow, and 1 / det may overflow. */
+#define TRC_TINY_EDGE 1e-36f
+
+/* What the test needs of a ray: axes u, v, z with z dominant. */
+struct trc_shear {
+    int u, v, z;
+};
+
+/* One ray against one triangle whose sheared coordinates are given (a: vertex 0: x, y, z relative to the
+ * origin, x and y sheared); edge functions in double. False for a miss. */
+static __attribute__((noinline)) bool trc_triangle_exact(const float a[3], const float b[3],
+                                                         const float c[3], float sz, float *t,
+                                                         float *u, float *v) {
+    const double e0 = (double)c[0] * b[1] - (double)c[1] * b[0];
+    const double e1 = (double)a[0] * c[1] - (double)a[1] * c[0];
+    const double e2 = (double)b[0] * a[1] - (double)b[1] * a[0];
+    const bool inside = (e0 >= 0.0 && e1 >= 0.0 && e2 >= 0.0) || (e0 <= 0.0 && e1 <= 0.0 && e2 <= 0.0);
+    const double det = e0 + e1 + e2;
+    if (!inside || det == 0.0) return false;
+    const double inv = 1.0 / det;
+    *u = (float)(e1 * inv);
+    *v = (float)(e2 * inv);
+    *t = (float)((e0 * inv * a[2] + e1 * inv * b[2] + e2 * inv * c[2]) * sz);
+    return true;
+}
+
+/* Vertex coordinates of one triangle for the lanes: broadcast (static) or per ray (moving). */
+struct trc_triangle_lanes {
+    vfloat v[3][3]; /* vertex, axis in the order u, v, z */
+};
+
+/* Lanes of active whose ray passes through the triangle at distance *t; also barycentrics. */
+TRC_INLINE vmask trc_triangle_test(const struct trc_triangle_lanes *p, vfloat ou, vfloat ov,
+                                   vfloat oz, vfloat su, vfloat sv, vfloat sz, vmask active,
+                                   vfloat *t, vfloat *u, vfloat *v) {
+    const vfloat az = p->v[0][2] - oz, bz = p->v[1][2] - oz, cz = p->v[2][2] - oz;
+    const vfloat ax = (p->v[0][0] - ou) - su * az, ay = (p->v[0][1] - ov) - sv * az;
+    const vfloat bx = (p->v[1][0] - ou) - su * bz, by = (p->v[1][1] - ov) - sv * bz;
+    const vfloat cx = (p->v[2][0] - ou) - su * cz, cy = (p->v[2][1] - ov) - sv * cz;
+    const vfloat e0 = cx * by - cy * bx;
+    const vfloat e1 = ax * cy - ay * cx;
+    const vfloat e2 = bx * ay - by * ax;
+    const vfloat zero = vf_set(0.0f);
+    const vfloat least = vf_min(e0, vf_min(e1, e2)), most = vf_max(e0, vf_max(e1, e2));
+    vmask hit = vm_and(active, vm_or(vf_ge(least, zero), vf_le(most, zero)));
+    if (!vm_any(hit)) return hit;
+    const vfloat inv = vf_set(1.0f) / (e0 + e1 + e2);
+    *u = e1 * inv;
+    *v = e2 * inv;
+    *t = (e0 * inv * az + *u * bz + *v * cz) * sz;
+    const vfloat nearest = vf_min(vf_abs(e0), vf_min(vf_abs(e1), vf_abs(e2)));
+    uint32_t doubtful = vm_bits(vm_and(hit, vf_le(nearest, vf_set(TRC_TINY_EDGE))));
+    if (__builtin_expect(doubtful != 0, 0)) {
+        float lanes[9][TRC_WIDTH], s[TRC_WIDTH], rt[TRC_WIDTH], ru[TRC_WIDTH], rv[TRC_WIDTH];
+        uint32_t bits = vm_bits(hit);
+        vf_store(lanes[0], ax), vf_store(lanes[1], ay), vf_store(lanes[2], az);
+        vf_store(lanes[3], bx), vf_store(lanes[4], by), vf_store(lanes[5], bz);
+        vf_store(lanes[6], cx), vf_store(lanes[7], cy), vf_store(lanes[8], cz);
+        vf_store(s, sz), vf_store(rt, *t), vf_store(ru, *u), vf_store(rv, *v);
+        for (; doubtful; doubtful &= doubtful - 1) {
+            const int i = __builtin_ctz(doubtful);
+            const float a[3] = {lanes[0][i], lanes[1][i], lanes[2][i]};
+            const float b[3] = {lanes[3][i], lanes[4][i], lanes[5][i]};
+            const float c[3] = {lanes[6][i], lanes[7][i], lanes[8][i]};
+            if (!trc_triangle_exact(a, b, c, s[i], &rt[i], &ru[i], &rv[i])) bits &= ~(1u << i);
+        }
+        hit = vm_from_bits(bits);
+        *t = vf_load(rt), *u = vf_load(ru), *v = vf_load(rv);
+    }
+    return hit;
+}
+
+/* Eight triangles in the lanes: vertex, axis in the order u, v, z. */
+struct trc_triangle8 {
+    f8 v[3][3];
+};
+
+/* Bits of candidates the ray passes through at distance t[lane]; also barycentrics. */
+TRC_INLINE uint32_t trc_triangle8_test(const struct trc_triangle8 *p, float ou, float ov, float oz,
+                                       float su, float sv, float sz, uint32_t candidates, f8 *t,
+                                       f8 *u, f8 *v) {
+    const f8 az = p->v[0][2] - oz, bz = p->v[1][2] - oz, cz = p->v[2][2] - oz;
+    const f8 ax = (p->v[0][0] - ou) - su * az, ay = (p->v[0][1] - ov) - sv * az;
+    const f8 bx = (p->v[1][0] - ou) - su * bz, by = (p->v[1][1] - ov) - sv * bz;
+    const f8 cx = (p->v[2][0] - ou) - su * cz, cy = (p->v[2][1] - ov) - sv * cz;
+    const f8 e0 = cx * by - cy * bx;
+    const f8 e1 = ax * cy - ay * cx;
+    const f8 e2 = bx * ay - by * ax;
+    const f8 zero = f8_set(0.0f);
+    const f8 least = f8_min(e0, f8_min(e1, e2)), most = f8_max(e0, f8_max(e1, e2));
+    uint32_t hit = candidates & (f8_le(zero, least) | f8_le(most, zero));
+    if (!hit) return 0;
+    const f8 inv = f8_set(1.0f) / (e0 + e1 + e2);
+    *u = e1 * inv;
+    *v = e2 * inv;
+    *t = (e0 * inv * az + *u * bz + *v * cz) * sz;
+    const f8 nearest = f8_min(f8_abs(e0), f8_min(f8_abs(e1), f8_abs(e2)));
+    uint32_t doubtful = hit & f8_le(nearest, f8_set(TRC_TINY_EDGE));
+    for (; __builtin_expect(doubtful != 0, 0); doubtful &= doubtful - 1) {
+        const int i = __builtin_ctz(doubtful);
+        const float a[3] = {ax[i], ay[i], az[i]}, b[3] = {bx[i], by[i], bz[i]};
+        const float c[3] = {cx[i], cy[i], cz[i]};
+        float rt, ru, rv;
+        if (trc_triangle_exact(a, b, c, sz, &rt, &ru, &rv)) {
+            (*t)[i] = rt;
+            (*u)[i] = ru;
+            (*v)[i] = rv;
+        } else {
+            hit &= ~(1u << i);
+        }
+    }
+    return hit;
+}
+
+#endif

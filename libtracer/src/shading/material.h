@@ -1,0 +1,77 @@
+/* A compiled material: a list of shader leaves and the program that computes their inputs.
+ *
+ * Compiled by shading/compile.c from the public node list: mix and add shaders become weights of
+ * leaves, constants are folded, equal nodes merged, unreached ones dropped. An input is an operand:
+ * a constant, or a register of the program. A material of constants has no program. */
+#ifndef TRACER_SHADING_MATERIAL_H
+#define TRACER_SHADING_MATERIAL_H
+
+#include <stdatomic.h>
+#include <stdint.h>
+
+#include "tracer/tracer.h"
+
+#define TRC_MAX_LEAVES 16
+#define TRC_MAX_REGISTERS 256
+
+/* One float: a constant, or what the program left in a register. */
+struct trc_operand {
+    int32_t reg; /* -1: constant. -2: unlinked normal, tangent or vector: the default of its place */
+    float value;
+};
+
+/* One shader node that the output reaches, with the factor of the mix nodes above it. */
+struct trc_leaf {
+    uint32_t type;              /* TRC_NODE_DIFFUSE ... TRC_NODE_PRINCIPLED */
+    uint32_t mode;              /* distribution */
+    struct trc_operand weight;  /* product of mix factors, [0, 1] or more for added shaders */
+    uint32_t first_operand;     /* the node's inputs in order, 3 operands for a colour or vector */
+    uint32_t operand_count;
+};
+
+/* One step of a program on registers of TRC_WIDTH floats. Opcodes and their meaning of fields are
+ * private to shading/compile.c and kernels/program.c (shading/program.h). */
+struct trc_instruction {
+    uint16_t op;
+    uint16_t mode;
+    uint16_t out;               /* first register written */
+    uint16_t input_count;
+    uint32_t first_input;       /* into operands */
+    uint32_t resource;          /* image, attribute name or table offset */
+};
+
+/* What the leaves may do, over all values of their inputs: decides code paths and features. */
+enum {
+    TRC_MATERIAL_HAS_DIFFUSE = 1 << 0,
+    TRC_MATERIAL_HAS_SPECULAR = 1 << 1,    /* ideal lobes */
+    TRC_MATERIAL_HAS_GLOSSY = 1 << 2,      /* rough lobes */
+    TRC_MATERIAL_HAS_REFRACTION = 1 << 3,
+    TRC_MATERIAL_HAS_TRANSPARENCY = 1 << 4, /* transparent leaf or alpha below 1 */
+    TRC_MATERIAL_HAS_EMISSION = 1 << 5,
+    TRC_MATERIAL_HAS_PROGRAM = 1 << 6,
+    TRC_MATERIAL_HAS_TEXTURE = 1 << 7,
+    TRC_MATERIAL_HAS_TRANSLUCENT = 1 << 8,
+    TRC_MATERIAL_HAS_HOLDOUT = 1 << 9,
+    TRC_MATERIAL_EMISSION_VARIES = 1 << 10, /* emission depends on the program */
+    TRC_MATERIAL_READS_LIGHT_PATH = 1 << 11
+};
+
+struct trc_material {
+    atomic_uint refs;
+    uint32_t has;               /* TRC_MATERIAL_HAS_* */
+    uint32_t flags;             /* TRC_MATERIAL_* of the public header */
+    int32_t pass_index;
+    uint32_t leaf_count, operand_count, instruction_count, register_count, table_count;
+    struct trc_leaf leaves[TRC_MAX_LEAVES];
+    struct trc_operand *operands;
+    struct trc_instruction *instructions;
+    float *tables;
+    float emission[3];          /* constant emission; a mean estimate when it varies */
+};
+
+/* Whether shadow rays may pass it. */
+static inline uint8_t trc_material_shadows_transparent(const struct trc_material *m) {
+    return (m->has & TRC_MATERIAL_HAS_TRANSPARENCY) && (m->flags & TRC_MATERIAL_TRANSPARENT_SHADOW);
+}
+
+#endif
