@@ -358,6 +358,26 @@ TRC_INLINE int32_t vi_get(vint a, int lane) {
 #endif
 }
 
+/* Writes the lanes of bits to p one after the other; up to TRC_WIDTH elements at p may be written. */
+TRC_INLINE void vf_compress(float *p, vfloat a, uint32_t bits) {
+#if TRC_WIDTH == 16
+    _mm512_storeu_ps(p, _mm512_maskz_compress_ps((__mmask16)bits, a));
+#else
+    float lanes[TRC_WIDTH];
+    vf_store(lanes, a);
+    for (; bits; bits &= bits - 1) *p++ = lanes[__builtin_ctz(bits)];
+#endif
+}
+TRC_INLINE void vu_compress(uint32_t *p, vuint a, uint32_t bits) {
+#if TRC_WIDTH == 16
+    _mm512_storeu_si512(p, _mm512_maskz_compress_epi32((__mmask16)bits, (__m512i)a));
+#else
+    uint32_t lanes[TRC_WIDTH];
+    vu_store(lanes, a);
+    for (; bits; bits &= bits - 1) *p++ = lanes[__builtin_ctz(bits)];
+#endif
+}
+
 /* ---- three-component vectors ---- */
 
 typedef struct {

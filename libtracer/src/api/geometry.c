@@ -1,0 +1,147 @@
+/* Public calls on meshes and instances. */
+#include <inttypes.h>
+
+#include "core/checks.h"
+#include "core/core.h"
+#include "scene/names.h"
+#include "scene/scene.h"
+#include "tracer/tracer.h"
+
+/* Kernels address the floats of an array by 31 bits. */
+#define MAX_ELEMENTS ((uint64_t)INT32_MAX)
+
+/* a * b * c elements, within what kernels can address. */
+static trc_status check_product(uint64_t a, uint64_t b, uint64_t c, const char *name) {
+    uint64_t product;
+    if (!trc_multiply_u64(a, b, &product) || !trc_multiply_u64(product, c, &product) ||
+        product > MAX_ELEMENTS) {
+        return trc_fail(TRC_ERROR_TOO_LARGE, "%s: more than %" PRIu64 " elements", name,
+                        MAX_ELEMENTS);
+    }
+    return TRC_OK;
+}
+
+static trc_status check_attribute(const trc_corner_attribute *attribute, uint64_t triangle_count) {
+    const char *name = "trc_corner_attribute";
+    TRC_TRY(trc_check_struct(attribute, sizeof *attribute, name));
+    if (attribute->width != 2 && attribute->width != 4) {
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "%s: width is %" PRIu32 ", it can be 2 or 4",
+                        name, attribute->width);
+    }
+    if (!attribute->name) return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "%s: name is NULL", name);
+    TRC_TRY(check_product(attribute->width, 3, triangle_count, name));
+    return trc_check_array(attribute->values, attribute->value_count,
+                           attribute->width * 3 * triangle_count, 4, 4, "attribute values");
+}
+
+static trc_status check_normals(const trc_mesh_desc *desc) {
+    TRC_TRY(trc_check_enum(desc->normal_kind, 3, "normal_kind"));
+    uint64_t per_key = 0;
+    if (desc->normal_kind == TRC_NORMALS_VERTEX) per_key = desc->vertex_count;
+    if (desc->normal_kind == TRC_NORMALS_CORNER) per_key = 3 * desc->triangle_count;
+    TRC_TRY(check_product(3, per_key, desc->key_count, "normals"));
+    if (!desc->normals && !desc->normal_count) return TRC_OK; /* computed, whatever the kind */
+    return trc_check_array(desc->normals, desc->normal_count, 3 * per_key * desc->key_count, 4, 4,
+                           "normals");
+}
+
+static trc_status check_mesh(const trc_mesh_desc *desc) {
+    TRC_TRY(trc_check_struct(desc, sizeof *desc, "trc_mesh_desc"));
+    TRC_TRY(trc_check_count(desc->key_count, 1, TRC_MAX_KEYS, "key_count"));
+    /* Singles first: later products of them by 3 and 9 cannot wrap. */
+    TRC_TRY(check_product(3, desc->vertex_count, desc->key_count, "positions"));
+    TRC_TRY(check_product(3, desc->triangle_count, 1, "indices"));
+    TRC_TRY(trc_check_array(desc->positions, desc->position_count,
+                            3 * desc->vertex_count * desc->key_count, 4, 4, "positions"));
+    TRC_TRY(trc_check_array(desc->indices, desc->index_count, 3 * desc->triangle_count, 4, 4,
+                            "indices"));
+    TRC_TRY(check_normals(desc));
+    if (desc->material_index && (uintptr_t)desc->material_index % sizeof(uint16_t)) {
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "material_index is not aligned to 2 bytes");
+    }
+    TRC_TRY(trc_check_count(desc->attribute_count, 0, TRC_MAX_ATTRIBUTES, "attribute_count"));
+    if (desc->attribute_count && !desc->attributes) {
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "attributes is NULL");
+    }
+    for (uint32_t i = 0; i < desc->attribute_count; i++) {
+        TRC_TRY(check_attribute(&desc->attributes[i], desc->triangle_count));
+    }
+    return TRC_OK;
+}
+
+trc_status trc_mesh_create(trc_scene scene, const trc_mesh_desc *desc, trc_id *mesh_out) {
+    struct trc_scene_access access;
+    TRC_TRY(trc_scene_enter(scene, &access));
+    trc_status status = check_mesh(desc);
+    if (status == TRC_OK) status = trc_check_out(mesh_out, sizeof *mesh_out, "mesh_out");
+    if (status == TRC_OK) status = trc_scene_add_mesh(access.scene, desc, mesh_out);
+    trc_scene_leave(&access);
+    return status;
+}
+
+trc_status trc_mesh_update(trc_scene scene, trc_id mesh, uint32_t key_count,
+                           const float *positions, uint64_t position_count, const float *normals,
+                           uint64_t normal_count) {
+    struct trc_scene_access access;
+    TRC_TRY(trc_scene_enter(scene, &access));
+    trc_status status = trc_check_count(key_count, 1, TRC_MAX_KEYS, "key_count");
+    if (status == TRC_OK) {
+        status = trc_scene_pose_mesh(access.scene, mesh, key_count, positions, position_count,
+                                     normals, normal_count);
+    }
+    trc_scene_leave(&access);
+    return status;
+}
+
+trc_status trc_mesh_destroy(trc_scene scene, trc_id mesh) {
+    struct trc_scene_access access;
+    TRC_TRY(trc_scene_enter(scene, &access));
+    const trc_status status = trc_scene_remove_mesh(access.scene, mesh);
+    trc_scene_leave(&access);
+    return status;
+}
+
+/* Most material slots of an instance: a triangle's slot has 16 bits. */
+#define MAX_SLOTS 65536
+
+/* Transforms are checked at commit: one that is not finite hides the instance like a singular one. */
+static trc_status check_instance(const trc_instance_desc *desc) {
+    TRC_TRY(trc_check_struct(desc, sizeof *desc, "trc_instance_desc"));
+    TRC_TRY(trc_check_count(desc->key_count, 1, TRC_MAX_KEYS, "key_count"));
+    TRC_TRY(trc_check_out(desc->transforms, sizeof(float), "transforms"));
+    TRC_TRY(trc_check_count(desc->material_count, 0, MAX_SLOTS, "material_count"));
+    if (desc->material_count) {
+        TRC_TRY(trc_check_out(desc->materials, sizeof(trc_id), "materials"));
+    }
+    TRC_TRY(trc_check_enum(desc->visibility, TRC_VISIBLE_ALL + 1, "visibility"));
+    TRC_TRY(trc_check_finite(&desc->random, 1, "random"));
+    return trc_check_finite(desc->color, 4, "color");
+}
+
+trc_status trc_instance_create(trc_scene scene, const trc_instance_desc *desc,
+                               trc_id *instance_out) {
+    struct trc_scene_access access;
+    TRC_TRY(trc_scene_enter(scene, &access));
+    trc_status status = check_instance(desc);
+    if (status == TRC_OK) status = trc_check_out(instance_out, sizeof *instance_out, "instance_out");
+    if (status == TRC_OK) status = trc_scene_add_instance(access.scene, desc, instance_out);
+    trc_scene_leave(&access);
+    return status;
+}
+
+trc_status trc_instance_update(trc_scene scene, trc_id instance, const trc_instance_desc *desc) {
+    struct trc_scene_access access;
+    TRC_TRY(trc_scene_enter(scene, &access));
+    trc_status status = check_instance(desc);
+    if (status == TRC_OK) status = trc_scene_change_instance(access.scene, instance, desc);
+    trc_scene_leave(&access);
+    return status;
+}
+
+trc_status trc_instance_destroy(trc_scene scene, trc_id instance) {
+    struct trc_scene_access access;
+    TRC_TRY(trc_scene_enter(scene, &access));
+    const trc_status status = trc_scene_remove_instance(access.scene, instance);
+    trc_scene_leave(&access);
+    return status;
+}

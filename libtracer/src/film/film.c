@@ -1,0 +1,149 @@
+#define _POSIX_C_SOURCE 200809L
+#include "film/film.h"
+
+#include <float.h>
+#include <inttypes.h>
+#include <stdbool.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "core/checks.h"
+#include "core/core.h"
+
+uint32_t trc_pass_channels(uint32_t pass) {
+    static const uint8_t channels[TRC_PASS_COUNT] = {
+        [TRC_PASS_COMBINED] = 4,           [TRC_PASS_DEPTH] = 1,
+        [TRC_PASS_NORMAL] = 3,             [TRC_PASS_POSITION] = 3,
+        [TRC_PASS_UV] = 3,                 [TRC_PASS_OBJECT_INDEX] = 1,
+        [TRC_PASS_MATERIAL_INDEX] = 1,     [TRC_PASS_EMISSION] = 3,
+        [TRC_PASS_ENVIRONMENT] = 3,        [TRC_PASS_DIFFUSE_DIRECT] = 3,
+        [TRC_PASS_DIFFUSE_INDIRECT] = 3,   [TRC_PASS_DIFFUSE_COLOR] = 3,
+        [TRC_PASS_GLOSSY_DIRECT] = 3,      [TRC_PASS_GLOSSY_INDIRECT] = 3,
+        [TRC_PASS_GLOSSY_COLOR] = 3,       [TRC_PASS_TRANSMISSION_DIRECT] = 3,
+        [TRC_PASS_TRANSMISSION_INDIRECT] = 3, [TRC_PASS_TRANSMISSION_COLOR] = 3,
+        [TRC_PASS_SAMPLE_COUNT] = 1,
+    };
+    return pass < TRC_PASS_COUNT ? channels[pass] : 0;
+}
+
+/* Passes that hold the value of a pixel's first sample, not a sum. */
+static bool is_first_sample(uint32_t pass) {
+    return pass == TRC_PASS_DEPTH || pass == TRC_PASS_OBJECT_INDEX ||
+           pass == TRC_PASS_MATERIAL_INDEX;
+}
+
+/* Passes that are radiance: exposure scales them. */
+static bool is_light(uint32_t pass) {
+    switch (pass) {
+    case TRC_PASS_COMBINED:
+    case TRC_PASS_EMISSION:
+    case TRC_PASS_ENVIRONMENT:
+    case TRC_PASS_DIFFUSE_DIRECT:
+    case TRC_PASS_DIFFUSE_INDIRECT:
+    case TRC_PASS_GLOSSY_DIRECT:
+    case TRC_PASS_GLOSSY_INDIRECT:
+    case TRC_PASS_TRANSMISSION_DIRECT:
+    case TRC_PASS_TRANSMISSION_INDIRECT: return true;
+    default: return false;
+    }
+}
+
+/* The counts are a pass by themselves. */
+static bool has_sums(uint32_t pass, uint64_t passes) {
+    return pass != TRC_PASS_SAMPLE_COUNT && (passes >> pass & 1);
+}
+
+/* Memory of the machine, or as good as none of a limit if the system does not say. */
+static uint64_t physical_bytes(void) {
+    const long pages = sysconf(_SC_PHYS_PAGES), page_bytes = sysconf(_SC_PAGESIZE);
+    if (pages <= 0 || page_bytes <= 0) return UINT64_MAX / 2;
+    return (uint64_t)pages * (uint64_t)page_bytes;
+}
+
+/* The budget: a system that overcommits would grant more than there is and kill the host later.
+ * width and height are 32-bit and a pixel has less than 1 KiB, so checks of the products suffice. */
+static trc_status check_budget(uint32_t width, uint32_t height, uint64_t passes) {
+    uint64_t pixel_bytes = sizeof(uint32_t), bytes = 0;
+    for (uint32_t pass = 0; pass < TRC_PASS_COUNT; pass++) {
+        if (has_sums(pass, passes)) pixel_bytes += trc_pass_channels(pass) * sizeof(double);
+    }
+    const bool fits = trc_multiply_u64((uint64_t)width * height, pixel_bytes, &bytes) &&
+                      bytes <= PTRDIFF_MAX;
+    const uint64_t used = trc_memory_bytes(), physical = physical_bytes();
+    if (!fits || used > physical || bytes > physical - used) {
+        return trc_fail(TRC_ERROR_TOO_LARGE,
+                        "%" PRIu32 " x %" PRIu32 " pixels with these passes need %" PRIu64
+                        " MiB, the machine has %" PRIu64 " MiB in all",
+                        width, height, bytes >> 20, physical >> 20);
+    }
+    return TRC_OK;
+}
+
+trc_status trc_film_create(struct trc_film *film, uint32_t width, uint32_t height,
+                           uint64_t passes) {
+    passes |= UINT64_C(1) << TRC_PASS_COMBINED;
+    TRC_TRY(check_budget(width, height, passes));
+    const size_t pixels = (size_t)width * height;
+    struct trc_film made = {.width = width, .height = height, .passes = passes};
+    made.sample_counts = trc_alloc_zeroed(pixels, sizeof *made.sample_counts);
+    bool ok = made.sample_counts != NULL;
+    for (uint32_t pass = 0; ok && pass < TRC_PASS_COUNT; pass++) {
+        if (!has_sums(pass, passes)) continue;
+        made.sums[pass] = trc_alloc_zeroed(pixels, trc_pass_channels(pass) * sizeof(double));
+        ok = made.sums[pass] != NULL;
+    }
+    if (!ok) {
+        trc_film_destroy(&made);
+        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for the film");
+    }
+    *film = made;
+    return TRC_OK;
+}
+
+void trc_film_destroy(struct trc_film *film) {
+    for (uint32_t pass = 0; pass < TRC_PASS_COUNT; pass++) trc_free(film->sums[pass]);
+    trc_free(film->sample_counts);
+    memset(film, 0, sizeof *film);
+}
+
+static float to_float(double value) {
+    if (!(value > -FLT_MAX)) return value <= -FLT_MAX ? -FLT_MAX : 0.0f; /* NaN: 0 */
+    return value < FLT_MAX ? (float)value : FLT_MAX;
+}
+
+/* Tiles may be writing: each number is read once, whole, with no order among them. */
+static double load_sum(const double *p) {
+    double value;
+    __atomic_load(p, &value, __ATOMIC_RELAXED);
+    return value;
+}
+
+trc_status trc_film_read(const struct trc_film *film, uint32_t pass, float exposure, float *out,
+                         uint64_t float_count) {
+    const uint32_t channels = trc_pass_channels(pass);
+    if (!channels) return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "there is no pass %" PRIu32, pass);
+    if (!(film->passes >> pass & 1)) {
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "pass %" PRIu32 " was not asked for", pass);
+    }
+    const uint64_t pixels = (uint64_t)film->width * film->height;
+    TRC_TRY(trc_check_array(out, float_count, pixels * channels, sizeof(float), sizeof(float),
+                            "pixels_out"));
+    const double *sums = film->sums[pass];
+    const double light = is_light(pass) ? exposure : 1.0;
+    const bool first_sample = is_first_sample(pass);
+    for (uint64_t i = 0; i < pixels; i++) {
+        const uint32_t count = __atomic_load_n(&film->sample_counts[i], __ATOMIC_RELAXED);
+        float *pixel = out + i * channels;
+        if (pass == TRC_PASS_SAMPLE_COUNT) {
+            pixel[0] = (float)count;
+            continue;
+        }
+        const double factor = !count ? 0.0 : first_sample ? 1.0 : 1.0 / count;
+        for (uint32_t c = 0; c < channels; c++) {
+            const bool is_alpha = pass == TRC_PASS_COMBINED && c == 3;
+            const double value = load_sum(&sums[i * channels + c]);
+            pixel[c] = count ? to_float(value * factor * (is_alpha ? 1.0 : light)) : 0.0f;
+        }
+    }
+    return TRC_OK;
+}

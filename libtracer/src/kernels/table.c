@@ -1,0 +1,25 @@
+/* This instruction set's entry in the dispatch (cpu/dispatch.c). */
+#include "kernels/kernels.h"
+
+#include "kernels/light.h"
+#include "kernels/query.h"
+#include "kernels/tile.h"
+
+#define TRC_ISA_NUMBER_scalar TRC_ISA_SCALAR
+#define TRC_ISA_NUMBER_sse42 TRC_ISA_SSE42
+#define TRC_ISA_NUMBER_avx2 TRC_ISA_AVX2
+#define TRC_ISA_NUMBER_avx512 TRC_ISA_AVX512
+#define TRC_ISA_NUMBER_neon TRC_ISA_NEON
+#define TRC_ISA_NUMBER_(isa) TRC_ISA_NUMBER_##isa
+#define TRC_ISA_NUMBER(isa) TRC_ISA_NUMBER_(isa)
+
+extern const struct trc_kernels TRC_KERNEL(trc_kernels);
+const struct trc_kernels TRC_KERNEL(trc_kernels) = {
+    .isa = TRC_ISA_NUMBER(TRC_ISA),
+    .width = TRC_WIDTH,
+    .tile_memory_bytes = TRC_KERNEL(trc_tile_memory_bytes),
+    .tile_render = TRC_KERNEL(trc_tile_render),
+    .query_closest = TRC_KERNEL(trc_query_closest_rays),
+    .query_occluded = TRC_KERNEL(trc_query_occluded_rays),
+    .world_evaluate = TRC_KERNEL(trc_world_evaluate),
+};

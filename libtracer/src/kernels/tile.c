@@ -1,0 +1,356 @@
+/* A tile from camera rays to film. See kernels/tile.h for the way of working. */
+#include "kernels/tile.h"
+
+#include <time.h>
+
+#include "bvh/tree.h"
+#include "kernels/wide_math.h"
+
+/* ---- clocks: one reading per stage and step ---- */
+
+static double now(void) {
+    struct timespec ts;
+    clock_gettime(CLOCK_MONOTONIC, &ts);
+    return (double)ts.tv_sec + 1e-9 * (double)ts.tv_nsec;
+}
+static void clock_to(struct trc_tile *t, double *sum) {
+    const double at = now();
+    *t->clock += at - t->clock_start;
+    t->clock = sum;
+    t->clock_start = at;
+}
+void TRC_KERNEL(trc_clock_trace)(struct trc_tile *t) { clock_to(t, &t->job->counts.seconds_trace); }
+void TRC_KERNEL(trc_clock_shade)(struct trc_tile *t) { clock_to(t, &t->job->counts.seconds_shade); }
+static void clock_other(struct trc_tile *t) { clock_to(t, &t->job->counts.seconds_other); }
+
+/* ---- memory ---- */
+
+/* Hands out consecutive 64-byte aligned pieces of a block; with a NULL block it only measures. */
+struct carver {
+    char *base;
+    size_t used;
+};
+static void *carve(struct carver *c, size_t bytes) {
+    void *p = c->base ? c->base + c->used : NULL;
+    c->used += (bytes + 63) & ~(size_t)63;
+    return p;
+}
+
+static uint32_t stack_capacity(const trc_render_desc *desc) {
+    /* Whitted: each step takes up to a batch and leaves several rays for each; when room is short it
+     * follows one lobe, so any capacity works. */
+    return desc->integrator == TRC_INTEGRATOR_WHITTED ? TRC_BATCH * 8 : TRC_BATCH;
+}
+
+static void carve_rays(struct carver *c, struct trc_ray_store *r, uint32_t capacity) {
+    r->capacity = capacity;
+    r->count = 0;
+    for (int i = 0; i < TRC_RAY_FLOATS; i++) r->f[i] = carve(c, (capacity + TRC_WIDTH) * sizeof(float));
+    for (int i = 0; i < TRC_RAY_WORDS; i++) r->w[i] = carve(c, (capacity + TRC_WIDTH) * sizeof(uint32_t));
+}
+
+static bool wants_light_passes(const trc_render_desc *desc) {
+    return desc->passes >> TRC_PASS_DIFFUSE_DIRECT & 0x1ff;
+}
+
+static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc, void *memory) {
+    struct carver c = {memory, 0};
+    const size_t batch = (TRC_BATCH + TRC_WIDTH) * sizeof(float);
+    const size_t queue = (TRC_SHADOW_QUEUE + TRC_PACKET_SIZE) * sizeof(float);
+    carve_rays(&c, &t->stack, stack_capacity(desc));
+    carve_rays(&c, &t->work, stack_capacity(desc));
+    float **const hit_floats[] = {&t->hits.t, &t->hits.u, &t->hits.v};
+    for (int i = 0; i < 3; i++) *hit_floats[i] = carve(&c, batch);
+    uint32_t **const hit_words[] = {&t->hits.instance, &t->hits.triangle, &t->hits.material,
+                                    &t->samples.pixel, &t->samples.index};
+    for (int i = 0; i < 5; i++) *hit_words[i] = carve(&c, batch);
+    for (int i = 0; i < 3; i++) t->samples.radiance[i] = carve(&c, batch);
+    t->samples.transparency = carve(&c, batch);
+    for (uint32_t pass = 1; pass < TRC_PASS_SAMPLE_COUNT; pass++)
+        if (desc->passes >> pass & 1)
+            for (uint32_t k = 0; k < trc_pass_channels(pass); k++) t->samples.pass[pass][k] = carve(&c, batch);
+    struct trc_shadow_store *q = &t->shadows;
+    for (int i = 0; i < 3; i++) {
+        q->o[i] = carve(&c, queue);
+        q->d[i] = carve(&c, queue);
+        q->radiance[i] = carve(&c, queue);
+    }
+    q->tmax = carve(&c, queue);
+    q->time = carve(&c, queue);
+    if (wants_light_passes(desc))
+        for (int i = 0; i < 9; i++) q->split[i] = carve(&c, queue);
+    uint32_t **const words[] = {&q->slot, &q->path, &q->target, &q->depth, &t->order, &t->keys};
+    for (int i = 0; i < 6; i++) *words[i] = carve(&c, queue);
+    t->bins = carve(&c, (TRC_BINS + 1) * sizeof *t->bins);
+    t->filter = carve(&c, TRC_FILTER_TABLE * sizeof(float));
+    return c.used;
+}
+
+size_t TRC_KERNEL(trc_tile_memory_bytes)(const trc_render_desc *desc) {
+    struct trc_tile t;
+    memset(&t, 0, sizeof t);
+    return sizeof t + 64 + tile_carve(&t, desc, NULL);
+}
+
+/* ---- sorting ---- */
+
+void TRC_KERNEL(trc_tile_sort)(struct trc_tile *t, const uint32_t *keys, uint32_t count,
+                               uint32_t bin_count) {
+    uint32_t *const bins = t->bins;
+    memset(bins, 0, (bin_count + 1) * sizeof *bins);
+    for (uint32_t i = 0; i < count; i++) bins[keys[i] + 1]++;
+    for (uint32_t i = 1; i < bin_count; i++) bins[i + 1] += bins[i];
+    for (uint32_t i = 0; i < count; i++) t->order[bins[keys[i]]++] = i;
+}
+
+/* ---- tracing a step's rays ---- */
+
+uint32_t TRC_KERNEL(trc_hit_material)(const struct trc_snapshot *snapshot, uint32_t instance,
+                                      uint32_t triangle) {
+    const struct trc_instance *in = &snapshot->instances[instance];
+    const struct trc_mesh *mesh = snapshot->meshes[in->mesh];
+    const uint32_t slot = mesh->material_index ? mesh->material_index[triangle] : 0;
+    return in->materials[slot < in->material_count ? slot : in->material_count - 1];
+}
+
+/* Rays of one packet share their visibility; beyond that the assembly decides (Boulos et al. 2007, section
+ * 3.3). Keys are what rays of a packet share; runs break packets where the key changes. */
+static uint32_t assembly_key(const struct trc_tile *t, uint32_t ray) {
+    const struct trc_ray_store *r = &t->work;
+    const uint32_t kind = r->w[TRC_RAY_PATH][ray] & TRC_VISIBLE_ALL;
+    switch (t->desc->assembly) {
+    case TRC_ASSEMBLY_BLIND:
+        return t->snapshot->features & TRC_FEATURE_VISIBILITY ? kind : 0;
+    case TRC_ASSEMBLY_GROUPS:
+        return kind | (r->w[TRC_RAY_PARENT][ray] & 127u) << 5;
+    case TRC_ASSEMBLY_OCTANTS:
+        return kind | (uint32_t)(r->f[TRC_RAY_DX][ray] < 0.0f) << 5 |
+               (uint32_t)(r->f[TRC_RAY_DY][ray] < 0.0f) << 6 | (uint32_t)(r->f[TRC_RAY_DZ][ray] < 0.0f) << 7;
+    default:
+        return kind;
+    }
+}
+
+static void packet_trace(struct trc_tile *t, const uint32_t *order, uint32_t count) {
+    const struct trc_ray_store *r = &t->work;
+    struct trc_packet *p = &t->packet;
+    struct trc_packet_hits *h = &t->packet_hits;
+    uint32_t at_padded[TRC_PACKET_SIZE] = {0};
+    memcpy(at_padded, order, count * sizeof *order);
+    for (uint32_t i = 0; i < count; i += TRC_WIDTH) {
+        const vmask m = vm_first((int32_t)(count - i));
+        const vint at = vi_load((const int32_t *)at_padded + i);
+        for (int axis = 0; axis < 3; axis++) {
+            vf_store(&p->o[axis][i], vf_gather(r->f[TRC_RAY_OX + axis], at, m));
+            vf_store(&p->d[axis][i], vf_gather(r->f[TRC_RAY_DX + axis], at, m));
+        }
+        vf_store(&p->tmin[i], vf_gather(r->f[TRC_RAY_TMIN], at, m));
+        vf_store(&p->t[i], vf_gather(r->f[TRC_RAY_TMAX], at, m));
+        if (t->object_motion) vf_store(&p->time[i], vf_gather(r->f[TRC_RAY_TIME], at, m));
+    }
+    const uint32_t path = r->w[TRC_RAY_PATH][order[0]];
+    p->active = count < TRC_PACKET_SIZE ? (1ull << count) - 1 : ~0ull;
+    p->visibility = t->desc->assembly == TRC_ASSEMBLY_BLIND && !(t->snapshot->features & TRC_FEATURE_VISIBILITY)
+                        ? TRC_VISIBLE_ALL
+                        : path & TRC_VISIBLE_ALL;
+    p->common_origin = (path & TRC_VISIBLE_CAMERA) && t->camera_common;
+    p->skip_transparent = false;
+    memset(h->instance, 0xff, count * sizeof *h->instance);
+    TRC_KERNEL(trc_trace_closest)(t->snapshot, p, h);
+    for (uint32_t i = 0; i < count; i++) {
+        const uint32_t ray = order[i];
+        t->hits.t[ray] = p->t[i];
+        t->hits.instance[ray] = h->instance[i];
+        if (h->instance[i] == TRC_NO_HIT) continue;
+        t->hits.triangle[ray] = h->triangle[i];
+        t->hits.u[ray] = h->u[i];
+        t->hits.v[ray] = h->v[i];
+        t->hits.material[ray] = TRC_KERNEL(trc_hit_material)(t->snapshot, h->instance[i], h->triangle[i]);
+    }
+}
+
+static void count_rays(struct trc_tile *t) {
+    struct trc_tile_counts *counts = &t->job->counts;
+    for (uint32_t i = 0; i < t->work.count; i++) {
+        const uint32_t path = t->work.w[TRC_RAY_PATH][i];
+        if (path & TRC_VISIBLE_CAMERA)
+            counts->rays_camera++;
+        else if (path & TRC_PATH_REFLECTED)
+            counts->rays_reflection++;
+        else
+            counts->rays_refraction++;
+    }
+}
+
+static void trace_batch(struct trc_tile *t) {
+    const uint32_t count = t->work.count;
+    const bool runs = t->desc->assembly == TRC_ASSEMBLY_RUNS;
+    const uint32_t size = t->desc->assembly == TRC_ASSEMBLY_NONE ? 1 : t->packet_size;
+    for (uint32_t i = 0; i < count; i++) t->keys[i] = assembly_key(t, i);
+    TRC_KERNEL(trc_tile_sort)(t, t->keys, count, TRC_BINS);
+    for (uint32_t begin = 0; begin < count;) {
+        const uint32_t key = t->keys[t->order[begin]];
+        uint32_t end = begin + 1;
+        while (end < count && end - begin < size && t->keys[t->order[end]] == key &&
+               (!runs || t->work.w[TRC_RAY_PARENT][t->order[end]] ==
+                             t->work.w[TRC_RAY_PARENT][t->order[begin]]))
+            end++;
+        packet_trace(t, t->order + begin, end - begin);
+        begin = end;
+    }
+    count_rays(t);
+}
+
+/* ---- a batch of samples ---- */
+
+/* Takes up to TRC_BATCH rays from the top of the stack. */
+static void stack_take(struct trc_tile *t) {
+    struct trc_ray_store *from = &t->stack, *to = &t->work;
+    if (from->count <= TRC_BATCH) {
+        const struct trc_ray_store swap = *from;
+        *from = *to;
+        *to = swap;
+        from->count = 0;
+        return;
+    }
+    const uint32_t first = from->count - TRC_BATCH;
+    for (int i = 0; i < TRC_RAY_FLOATS; i++) memcpy(to->f[i], from->f[i] + first, TRC_BATCH * sizeof(float));
+    for (int i = 0; i < TRC_RAY_WORDS; i++) memcpy(to->w[i], from->w[i] + first, TRC_BATCH * sizeof(uint32_t));
+    to->count = TRC_BATCH;
+    from->count = first;
+}
+
+/* Deeper steps than this share their sample dimensions: their light is faint. */
+#define LAST_GENERATION 200
+
+static void samples_clear(struct trc_tile *t) {
+    const size_t bytes = TRC_BATCH * sizeof(float);
+    for (int k = 0; k < 3; k++) memset(t->samples.radiance[k], 0, bytes);
+    memset(t->samples.transparency, 0, bytes);
+    for (int pass = 0; pass < TRC_PASS_COUNT; pass++)
+        for (int k = 0; k < 3; k++)
+            if (t->samples.pass[pass][k]) memset(t->samples.pass[pass][k], 0, bytes);
+    if (t->samples.pass[TRC_PASS_DEPTH][0])
+        for (uint32_t i = 0; i < TRC_BATCH; i++) t->samples.pass[TRC_PASS_DEPTH][0][i] = 1e10f;
+}
+
+static bool first_sample_pass(uint32_t pass) {
+    return pass == TRC_PASS_DEPTH || pass == TRC_PASS_OBJECT_INDEX || pass == TRC_PASS_MATERIAL_INDEX;
+}
+
+/* Adds the batch's samples to the film in the order of their slots; samples that are not finite are left
+ * out and counted. */
+static void film_add(struct trc_tile *t) {
+    struct trc_film *film = t->job->film;
+    const trc_render_desc *desc = t->desc;
+    for (uint32_t slot = 0; slot < t->samples.count; slot++) {
+        const uint32_t x = (t->samples.pixel[slot] & 0xffffu) - desc->crop_x;
+        const uint32_t y = (t->samples.pixel[slot] >> 16) - desc->crop_y;
+        const size_t pixel = (size_t)y * film->width + x;
+        const float r = t->samples.radiance[0][slot], g = t->samples.radiance[1][slot],
+                    b = t->samples.radiance[2][slot];
+        if (!isfinite(r + g + b)) {
+            t->job->counts.dropped_samples++;
+            continue;
+        }
+        double *combined = film->sums[TRC_PASS_COMBINED] + 4 * pixel;
+        combined[0] += (double)r;
+        combined[1] += (double)g;
+        combined[2] += (double)b;
+        combined[3] += 1.0 - (double)t->samples.transparency[slot];
+        const bool first = film->sample_counts[pixel]++ == 0;
+        for (uint32_t pass = 1; pass < TRC_PASS_SAMPLE_COUNT; pass++) {
+            if (!t->samples.pass[pass][0]) continue;
+            const uint32_t channels = trc_pass_channels(pass);
+            double *sum = film->sums[pass] + channels * pixel;
+            for (uint32_t k = 0; k < channels; k++) {
+                const double value = (double)t->samples.pass[pass][k][slot];
+                if (!isfinite(value)) continue;
+                if (!first_sample_pass(pass))
+                    sum[k] += value;
+                else if (first)
+                    sum[k] = value;
+            }
+        }
+    }
+}
+
+static void batch_render(struct trc_tile *t) {
+    samples_clear(t);
+    TRC_KERNEL(trc_camera_rays)(t);
+    t->generation = 0;
+    while (t->stack.count) {
+        stack_take(t);
+        TRC_KERNEL(trc_clock_trace)(t);
+        trace_batch(t);
+        TRC_KERNEL(trc_clock_shade)(t);
+        TRC_KERNEL(trc_shade_batch)(t);
+        TRC_KERNEL(trc_shadow_flush)(t);
+        if (t->generation < LAST_GENERATION) t->generation++;
+    }
+    clock_other(t);
+    film_add(t);
+}
+
+/* ---- the tile ---- */
+
+/* Side of the square of pixels whose samples share packets. */
+#define QUAD 2
+
+/* Samples a pixel has in one batch: enough that a 2x2 square of pixels fills a packet. */
+#define SAMPLES_PER_BATCH 16
+
+/* Appends the samples [begin, end) of the square of pixels at x, y of the tile, clipped to it. */
+static void quad_append(struct trc_tile *t, uint32_t x, uint32_t y, uint32_t side, uint32_t begin, uint32_t end) {
+    const struct trc_tile_job *job = t->job;
+    for (uint32_t s = begin; s < end; s++)
+        for (uint32_t j = y; j < y + side && j < job->height; j++)
+            for (uint32_t i = x; i < x + side && i < job->width; i++) {
+                const uint32_t px = t->desc->crop_x + job->x + i, py = t->desc->crop_y + job->y + j;
+                t->samples.pixel[t->samples.count] = px | py << 16;
+                t->samples.index[t->samples.count++] = s;
+            }
+}
+
+/* Walks the tile in squares; with few samples the squares are larger so that packets are full. */
+static void samples_render(struct trc_tile *t, uint32_t begin, uint32_t end) {
+    const struct trc_tile_job *job = t->job;
+    const uint32_t count = end - begin;
+    const uint32_t side = count >= 16 ? QUAD : count >= 4 ? 2 * QUAD : 4 * QUAD;
+    t->samples.count = 0;
+    for (uint32_t y = 0; y < job->height; y += side)
+        for (uint32_t x = 0; x < job->width; x += side) {
+            if (t->samples.count + side * side * count > TRC_BATCH) {
+                batch_render(t);
+                t->samples.count = 0;
+            }
+            quad_append(t, x, y, side, begin, end);
+        }
+    if (t->samples.count) batch_render(t);
+}
+
+void TRC_KERNEL(trc_tile_render)(struct trc_tile_job *job) {
+    char *memory = job->memory;
+    struct trc_tile *t = (struct trc_tile *)memory;
+    memset(t, 0, sizeof *t);
+    tile_carve(t, job->desc, memory + ((sizeof *t + 63) & ~(size_t)63));
+    t->job = job;
+    t->snapshot = job->snapshot;
+    t->desc = job->desc;
+    t->sampler = (struct trc_sampler){job->desc->sampler, job->desc->seed, job->desc->sample_count,
+                                      job->sampler_table};
+    t->light_passes = wants_light_passes(job->desc);
+    t->object_motion = job->snapshot->features & (TRC_FEATURE_OBJECT_MOTION | TRC_FEATURE_DEFORMATION);
+    t->camera_common = job->snapshot->camera.aperture_radius <= 0.0f && job->snapshot->camera.key_count < 2 &&
+                       job->snapshot->camera.type == TRC_CAMERA_PERSPECTIVE;
+    t->packet_size = job->desc->packet_size < TRC_PACKET_SIZE ? job->desc->packet_size : TRC_PACKET_SIZE;
+    t->clock = &job->counts.seconds_other;
+    t->clock_start = now();
+    TRC_KERNEL(trc_filter_table)(job->desc->filter, job->desc->filter_width, t->filter);
+    for (uint32_t s = job->sample_begin; s < job->sample_end && !*job->cancel;) {
+        const uint32_t end = job->sample_end - s > SAMPLES_PER_BATCH ? s + SAMPLES_PER_BATCH : job->sample_end;
+        samples_render(t, s, end);
+        s = end;
+    }
+    clock_other(t);
+}

@@ -1,0 +1,144 @@
+/* The workspace of a tile: rays waiting, their hits, shadow rays, samples in flight.
+ *
+ * A tile works in batches of up to TRC_BATCH camera samples. Rays of a batch are traced as packets, hits are
+ * sorted by material and shaded TRC_WIDTH at a time, shadow rays collect in a queue that is flushed as
+ * full packets, continuation rays go on a stack that is worked off batch by batch. Everything is one
+ * thread's and in a fixed order. */
+#ifndef TRACER_KERNELS_TILE_H
+#define TRACER_KERNELS_TILE_H
+
+#include "kernels/bsdf.h"
+#include "kernels/kernels.h"
+#include "kernels/packet.h"
+#include "kernels/sampler.h"
+
+/* Rays of one step: 16 packets; their state stays in L2. */
+#define TRC_BATCH 1024
+/* Shadow rays that wait at most: flushed when a group of hits might not fit any more. */
+#define TRC_SHADOW_QUEUE 4096
+#define TRC_FILTER_TABLE 1024
+
+/* Bits of a ray's path word above those of kernels/surface.h. */
+enum {
+    TRC_PATH_CATEGORY_SHIFT = 12, /* 0 camera, 1 glossy, 2 transmission: by the first bounce */
+    TRC_PATH_LAST = 1 << 14,      /* only emission counts at the next surface */
+    TRC_PATH_DATA_DONE = 1 << 15  /* data passes of the sample are written */
+};
+
+/* A ray's four depth counters, 8 bits each, saturating by the limits on desc. */
+enum {
+    TRC_DEPTH_ALL_SHIFT = 0,
+    TRC_DEPTH_GLOSSY_SHIFT = 8,
+    TRC_DEPTH_TRANSMISSION_SHIFT = 16,
+    TRC_DEPTH_TRANSPARENT_SHIFT = 24
+};
+
+enum trc_ray_float {
+    TRC_RAY_OX, TRC_RAY_OY, TRC_RAY_OZ, TRC_RAY_DX, TRC_RAY_DY, TRC_RAY_DZ, TRC_RAY_TMIN,
+    TRC_RAY_TMAX, TRC_RAY_TIME, TRC_RAY_WEIGHT_R, TRC_RAY_WEIGHT_G, TRC_RAY_WEIGHT_B,
+    TRC_RAY_PDF,      /* of the bounce, solid angle; -1: camera or ideal, no MIS */
+    TRC_RAY_MIN_PDF,  /* smallest so far, for Filter Glossy */
+    TRC_RAY_NX, TRC_RAY_NY, TRC_RAY_NZ, /* normal where it left, as kernels/light.h wants it */
+    TRC_RAY_BEYOND,   /* factor on everything behind the next surface: kernels/bsdf.h */
+    TRC_RAY_FLOATS
+};
+enum trc_ray_word {
+    TRC_RAY_SLOT,     /* sample of the batch */
+    TRC_RAY_PATH,
+    TRC_RAY_DEPTHS,
+    TRC_RAY_PARENT,   /* material it left: key of runs and groups */
+    TRC_RAY_WORDS
+};
+
+struct trc_ray_store {
+    uint32_t capacity, count;
+    float *f[TRC_RAY_FLOATS];
+    uint32_t *w[TRC_RAY_WORDS];
+};
+
+struct trc_hit_store {
+    float *t, *u, *v;
+    uint32_t *instance, *triangle, *material;
+};
+
+/* Samples of the batch, by slot. */
+struct trc_sample_store {
+    uint32_t count;
+    uint32_t *pixel;      /* x | y << 16 in the full frame */
+    uint32_t *index;      /* number of the sample */
+    float *radiance[3];
+    float *transparency;  /* part of the film that is seen through */
+    float *pass[TRC_PASS_COUNT][3]; /* NULL unless asked for */
+};
+
+/* Shadow rays; target: the light's number and cell, what packets are sorted by. */
+struct trc_shadow_store {
+    uint32_t count;
+    float *o[3], *d[3], *tmax, *time, *radiance[3];
+    float *split[9];      /* diffuse, glossy, transmission parts, or NULL: no light passes */
+    uint32_t *slot, *path, *target, *depth;
+};
+
+struct trc_tile {
+    struct trc_tile_job *job;
+    const struct trc_snapshot *snapshot;
+    const trc_render_desc *desc;
+    struct trc_sampler sampler;
+    bool light_passes;    /* some pass wants light by kind */
+    bool object_motion;   /* rays need times */
+    bool camera_common;   /* camera rays start at one point */
+    uint32_t packet_size; /* 1..TRC_PACKET_SIZE */
+    double *clock, clock_start; /* the stage whose time is running */
+    uint32_t generation;  /* bounces the rays of this step have behind them */
+    struct trc_ray_store stack, work;
+    struct trc_hit_store hits;
+    struct trc_sample_store samples;
+    struct trc_shadow_store shadows;
+    uint32_t *order, *keys, *bins; /* scratch of sorts: TRC_BATCH or TRC_SHADOW_QUEUE, bins */
+    float *filter;        /* inverse distribution of the pixel filter, TRC_FILTER_TABLE */
+    struct trc_packet packet;
+    struct trc_packet_hits packet_hits;
+};
+
+/* Number of bins of the counting sorts. */
+#define TRC_BINS 4096
+
+/* order[0..count) = indices sorted stably by keys[i] < bin_count. */
+void TRC_KERNEL(trc_tile_sort)(struct trc_tile *t, const uint32_t *keys, uint32_t count,
+                               uint32_t bin_count);
+
+/* Material of a hit, into the snapshot's. */
+uint32_t TRC_KERNEL(trc_hit_material)(const struct trc_snapshot *snapshot, uint32_t instance,
+                                      uint32_t triangle);
+
+/* From here on time counts as tracing, as shading. */
+void TRC_KERNEL(trc_clock_trace)(struct trc_tile *t);
+void TRC_KERNEL(trc_clock_shade)(struct trc_tile *t);
+
+size_t TRC_KERNEL(trc_tile_memory_bytes)(const trc_render_desc *desc);
+void TRC_KERNEL(trc_tile_render)(struct trc_tile_job *job);
+
+/* Camera rays of the samples' slots, into the empty stack; also their times. (kernels/camera.c) */
+void TRC_KERNEL(trc_camera_rays)(struct trc_tile *t);
+
+/* Inverse of the filter's distribution over its half width. (kernels/camera.c) */
+void TRC_KERNEL(trc_filter_table)(uint32_t filter, float width, float table[TRC_FILTER_TABLE]);
+
+/* Shades the hits of t->work, sorted by material, and what missed. (kernels/shade.c) */
+void TRC_KERNEL(trc_shade_batch)(struct trc_tile *t);
+
+/* Traces and empties the shadow queue. (kernels/shadow.c) */
+void TRC_KERNEL(trc_shadow_flush)(struct trc_tile *t);
+
+/* Adds light that reached a sample to its radiance and passes. kind: 0 diffuse, 1 glossy, 2 transmission of
+ * the first surface. */
+TRC_INLINE void trc_sample_add(struct trc_tile *t, uint32_t slot, const float rgb[3]) {
+    for (int c = 0; c < 3; c++) t->samples.radiance[c][slot] += rgb[c];
+}
+TRC_INLINE void trc_pass_add(struct trc_tile *t, uint32_t pass, uint32_t slot, const float rgb[3]) {
+    float *const *p = t->samples.pass[pass];
+    for (int c = 0; c < 3; c++)
+        if (p[c]) p[c][slot] += rgb[c];
+}
+
+#endif

@@ -1,0 +1,355 @@
+#define _POSIX_C_SOURCE 200809L
+#include "render/render.h"
+
+#include <errno.h>
+#include <math.h>
+#include <pthread.h>
+#include <stdbool.h>
+#include <string.h>
+#include <time.h>
+
+#include "core/checks.h"
+#include "core/core.h"
+#include "kernels/kernels.h"
+#include "render/schedule.h"
+#include "sampling/sobol.h"
+#include "scene/commit.h"
+#include "threads/thread.h"
+
+/* Most samples of one call of a kernel: progress of a long tile shows after each. */
+#define SAMPLES_PER_JOB 16
+
+enum { STATE_RUNNING = 0, STATE_DONE = 1, STATE_CANCELLED = 2 };
+
+struct worker {
+    struct trc_render_state *render;
+    pthread_t thread;
+    void *memory; /* scratch of the kernels */
+};
+
+struct trc_render_state {
+    struct trc_snapshot *snapshot;
+    trc_render_desc desc;
+    const struct trc_kernels *kernels;
+    struct trc_film film;
+    struct trc_schedule schedule;
+    uint32_t *sampler_table;
+    uint32_t worker_count, started_count;
+    struct worker *workers;
+    atomic_uint cancel;
+    atomic_uint_fast64_t next_item;
+
+    pthread_mutex_t lock; /* all below */
+    pthread_cond_t tile_done;
+    pthread_cond_t ended;
+    uint32_t *tile_batches;  /* batches done of each tile */
+    uint32_t *batch_tiles;   /* tiles done of each batch */
+    uint32_t lowest_batch;   /* first batch that not all tiles have */
+    uint32_t tiles_done;     /* with all their batches */
+    uint64_t pixel_samples_done;
+    struct trc_tile_counts counts;
+    uint32_t version, state;
+    uint32_t running_count;  /* threads that have not ended, and the starter */
+    double time_start, time_end;
+};
+
+trc_render_desc trc_render_resolve(const trc_render_desc *desc) {
+    trc_render_desc r = *desc;
+    if (!r.crop_width) {
+        r.crop_x = r.crop_y = 0;
+        r.crop_width = r.width;
+        r.crop_height = r.height;
+    }
+    if (!r.light_samples) r.light_samples = TRC_DEFAULT_LIGHT_SAMPLES;
+    if (!r.packet_size) r.packet_size = TRC_DEFAULT_PACKET_SIZE;
+    if (!r.thread_count) r.thread_count = trc_thread_processor_count();
+    uint32_t *depths[] = {&r.max_depth, &r.max_transparent_depth, &r.max_glossy_depth,
+                          &r.max_transmission_depth};
+    for (size_t i = 0; i < sizeof depths / sizeof *depths; i++) {
+        if (*depths[i] > TRC_MAX_DEPTH) *depths[i] = TRC_MAX_DEPTH;
+    }
+    r.passes |= UINT64_C(1) << TRC_PASS_COMBINED;
+    return r;
+}
+
+/* ---- the threads ---- */
+
+/* Waits until the tile has all batches before this one; false if the render is cancelled. */
+static bool await_former_batch(struct trc_render_state *render, uint32_t tile, uint32_t batch) {
+    pthread_mutex_lock(&render->lock);
+    while (render->tile_batches[tile] < batch && !atomic_load(&render->cancel)) {
+        pthread_cond_wait(&render->tile_done, &render->lock);
+    }
+    pthread_mutex_unlock(&render->lock);
+    return !atomic_load(&render->cancel);
+}
+
+static void add_counts(struct trc_render_state *render, const struct trc_tile_job *job,
+                       bool complete) {
+    const struct trc_tile_counts *c = &job->counts;
+    pthread_mutex_lock(&render->lock);
+    render->counts.rays_camera += c->rays_camera;
+    render->counts.rays_shadow += c->rays_shadow;
+    render->counts.rays_reflection += c->rays_reflection;
+    render->counts.rays_refraction += c->rays_refraction;
+    render->counts.dropped_samples += c->dropped_samples;
+    render->counts.seconds_trace += c->seconds_trace;
+    render->counts.seconds_shade += c->seconds_shade;
+    render->counts.seconds_other += c->seconds_other;
+    if (complete) {
+        render->pixel_samples_done +=
+            (uint64_t)job->width * job->height * (job->sample_end - job->sample_begin);
+    }
+    pthread_mutex_unlock(&render->lock);
+}
+
+static void finish_item(struct trc_render_state *render, uint32_t tile, uint32_t batch) {
+    const struct trc_schedule *schedule = &render->schedule;
+    pthread_mutex_lock(&render->lock);
+    render->tile_batches[tile] = batch + 1;
+    if (batch + 1 == schedule->batch_count) render->tiles_done++;
+    render->batch_tiles[batch]++;
+    while (render->lowest_batch < schedule->batch_count &&
+           render->batch_tiles[render->lowest_batch] == schedule->tile_count) {
+        render->lowest_batch++;
+    }
+    render->version++;
+    pthread_cond_broadcast(&render->tile_done);
+    pthread_mutex_unlock(&render->lock);
+}
+
+/* All samples of an item; false if the render was cancelled before the end. */
+static bool render_item(struct trc_render_state *render, uint32_t tile, uint32_t batch,
+                        void *memory) {
+    const struct trc_schedule *schedule = &render->schedule;
+    const struct trc_tile area = trc_schedule_tile(schedule, tile);
+    const uint32_t end = trc_schedule_batch_begin(schedule, batch + 1);
+    for (uint32_t i = trc_schedule_batch_begin(schedule, batch); i < end; i += SAMPLES_PER_JOB) {
+        struct trc_tile_job job = {
+            .snapshot = render->snapshot,
+            .desc = &render->desc,
+            .sampler_table = render->sampler_table,
+            .film = &render->film,
+            .x = area.x,
+            .y = area.y,
+            .width = area.width,
+            .height = area.height,
+            .sample_begin = i,
+            .sample_end = end - i < SAMPLES_PER_JOB ? end : i + SAMPLES_PER_JOB,
+            .memory = memory,
+            .cancel = &render->cancel,
+        };
+        render->kernels->tile_render(&job);
+        const bool complete = !atomic_load(&render->cancel);
+        add_counts(render, &job, complete);
+        if (!complete) return false;
+    }
+    return true;
+}
+
+/* The last one to leave ends the render. */
+static void leave(struct trc_render_state *render) {
+    pthread_mutex_lock(&render->lock);
+    if (--render->running_count == 0) {
+        const bool complete = render->tiles_done == render->schedule.tile_count;
+        render->state = complete ? STATE_DONE : STATE_CANCELLED;
+        render->time_end = trc_seconds();
+        pthread_cond_broadcast(&render->ended);
+    }
+    pthread_mutex_unlock(&render->lock);
+}
+
+static void worker_main(void *context) {
+    const struct worker *worker = context;
+    struct trc_render_state *render = worker->render;
+    const struct trc_schedule *schedule = &render->schedule;
+    const uint64_t item_count = (uint64_t)schedule->batch_count * schedule->tile_count;
+    while (!atomic_load(&render->cancel)) {
+        const uint64_t item = atomic_fetch_add(&render->next_item, 1);
+        if (item >= item_count) break;
+        const uint32_t batch = (uint32_t)(item / schedule->tile_count);
+        const uint32_t tile = schedule->order[item % schedule->tile_count];
+        if (!await_former_batch(render, tile, batch)) break;
+        if (!render_item(render, tile, batch, worker->memory)) break;
+        finish_item(render, tile, batch);
+    }
+    leave(render);
+}
+
+/* ---- start ---- */
+
+static trc_status init_sync(struct trc_render_state *render) {
+    pthread_condattr_t monotonic;
+    if (pthread_condattr_init(&monotonic)) goto fail;
+    pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
+    if (pthread_mutex_init(&render->lock, NULL)) goto fail_attributes;
+    if (pthread_cond_init(&render->tile_done, NULL)) goto fail_lock;
+    if (pthread_cond_init(&render->ended, &monotonic)) goto fail_tile_done;
+    pthread_condattr_destroy(&monotonic);
+    return TRC_OK;
+fail_tile_done:
+    pthread_cond_destroy(&render->tile_done);
+fail_lock:
+    pthread_mutex_destroy(&render->lock);
+fail_attributes:
+    pthread_condattr_destroy(&monotonic);
+fail:
+    return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "the system has no resources for a render");
+}
+
+static trc_status take_memory(struct trc_render_state *render) {
+    const trc_render_desc *desc = &render->desc;
+    TRC_TRY(trc_film_create(&render->film, desc->crop_width, desc->crop_height, desc->passes));
+    TRC_TRY(trc_schedule_create(desc, &render->schedule));
+    const struct trc_schedule *schedule = &render->schedule;
+    TRC_TRY(trc_sobol_table_create(&render->sampler_table));
+    /* More threads than tiles would only wait. */
+    render->worker_count = desc->thread_count < schedule->tile_count ? desc->thread_count
+                                                                     : schedule->tile_count;
+    render->tile_batches = trc_alloc_zeroed(schedule->tile_count, sizeof(uint32_t));
+    render->batch_tiles = trc_alloc_zeroed(schedule->batch_count, sizeof(uint32_t));
+    render->workers = trc_alloc_zeroed(render->worker_count, sizeof *render->workers);
+    bool ok = render->tile_batches && render->batch_tiles && render->workers;
+    const size_t memory_bytes = render->kernels->tile_memory_bytes(desc);
+    for (uint32_t i = 0; ok && i < render->worker_count; i++) {
+        render->workers[i].render = render;
+        render->workers[i].memory = trc_alloc(memory_bytes, 1);
+        ok = render->workers[i].memory != NULL;
+    }
+    return ok ? TRC_OK : trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for the render's threads");
+}
+
+static void free_memory(struct trc_render_state *render) {
+    for (uint32_t i = 0; render->workers && i < render->worker_count; i++) {
+        trc_free(render->workers[i].memory);
+    }
+    trc_free(render->workers);
+    trc_free(render->batch_tiles);
+    trc_free(render->tile_batches);
+    trc_free(render->sampler_table);
+    trc_schedule_destroy(&render->schedule);
+    trc_film_destroy(&render->film);
+    trc_snapshot_release(render->snapshot);
+    trc_free(render);
+}
+
+/* NO_THREAD only if not one could be started. */
+static trc_status start_workers(struct trc_render_state *render) {
+    trc_status status = TRC_OK;
+    render->time_start = trc_seconds();
+    render->running_count = 1; /* this thread, so that early ends do not end the render */
+    for (uint32_t i = 0; i < render->worker_count && status == TRC_OK; i++) {
+        struct worker *worker = &render->workers[i];
+        pthread_mutex_lock(&render->lock);
+        render->running_count++;
+        pthread_mutex_unlock(&render->lock);
+        status = trc_thread_start(&worker->thread, worker_main, worker);
+        if (status == TRC_OK) render->started_count++;
+        else leave(render);
+    }
+    leave(render);
+    return render->started_count ? TRC_OK : status;
+}
+
+trc_status trc_render_state_start(struct trc_snapshot *snapshot, const trc_render_desc *desc,
+                                  struct trc_render_state **render_out) {
+    struct trc_render_state *render = trc_alloc_zeroed(1, sizeof *render);
+    if (!render) return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for a render");
+    render->snapshot = trc_snapshot_retain(snapshot);
+    render->desc = *desc;
+    render->kernels = trc_kernels_current();
+    atomic_init(&render->cancel, 0);
+    atomic_init(&render->next_item, 0);
+    trc_status status = take_memory(render);
+    if (status == TRC_OK) status = init_sync(render);
+    if (status != TRC_OK) {
+        free_memory(render);
+        return status;
+    }
+    status = start_workers(render);
+    if (status != TRC_OK) {
+        trc_render_state_destroy(render);
+        return status;
+    }
+    *render_out = render;
+    return TRC_OK;
+}
+
+/* ---- what the caller sees ---- */
+
+void trc_render_state_cancel(struct trc_render_state *render) {
+    pthread_mutex_lock(&render->lock);
+    atomic_store(&render->cancel, 1);
+    pthread_cond_broadcast(&render->tile_done);
+    pthread_mutex_unlock(&render->lock);
+}
+
+void trc_render_state_destroy(struct trc_render_state *render) {
+    if (!render) return;
+    trc_render_state_cancel(render);
+    for (uint32_t i = 0; i < render->started_count; i++) {
+        pthread_join(render->workers[i].thread, NULL);
+    }
+    pthread_cond_destroy(&render->ended);
+    pthread_cond_destroy(&render->tile_done);
+    pthread_mutex_destroy(&render->lock);
+    free_memory(render);
+}
+
+/* now + seconds, at most a century: what a timespec surely holds. */
+static struct timespec deadline_in(double seconds) {
+    struct timespec t = {0};
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    seconds = fmin(seconds, 100.0 * 365 * 86400);
+    const double whole = floor(seconds);
+    t.tv_sec += (time_t)whole;
+    t.tv_nsec += (long)((seconds - whole) * 1e9);
+    if (t.tv_nsec >= 1000000000L) {
+        t.tv_nsec -= 1000000000L;
+        t.tv_sec++;
+    }
+    return t;
+}
+
+void trc_render_state_wait(struct trc_render_state *render, double timeout_seconds) {
+    const bool limited = timeout_seconds >= 0.0;
+    const struct timespec deadline = deadline_in(limited ? timeout_seconds : 0.0);
+    int error = 0;
+    pthread_mutex_lock(&render->lock);
+    while (render->state == STATE_RUNNING && error != ETIMEDOUT) {
+        if (limited) error = pthread_cond_timedwait(&render->ended, &render->lock, &deadline);
+        else pthread_cond_wait(&render->ended, &render->lock);
+    }
+    pthread_mutex_unlock(&render->lock);
+}
+
+void trc_render_state_poll(struct trc_render_state *render, trc_render_progress *progress_out) {
+    const struct trc_schedule *schedule = &render->schedule;
+    const double pixel_samples =
+        (double)schedule->width * schedule->height * schedule->sample_count;
+    trc_render_progress p = {.struct_size = sizeof p, .tile_count = schedule->tile_count};
+    pthread_mutex_lock(&render->lock);
+    p.state = render->state;
+    p.fraction = (float)((double)render->pixel_samples_done / pixel_samples);
+    p.samples_done = trc_schedule_batch_begin(schedule, render->lowest_batch);
+    p.seconds = (p.state == STATE_RUNNING ? trc_seconds() : render->time_end) - render->time_start;
+    p.rays_camera = render->counts.rays_camera;
+    p.rays_shadow = render->counts.rays_shadow;
+    p.rays_reflection = render->counts.rays_reflection;
+    p.rays_refraction = render->counts.rays_refraction;
+    p.dropped_samples = render->counts.dropped_samples;
+    p.tiles_done = render->tiles_done;
+    p.version = render->version;
+    p.seconds_trace = render->counts.seconds_trace;
+    p.seconds_shade = render->counts.seconds_shade;
+    p.seconds_other = render->counts.seconds_other;
+    pthread_mutex_unlock(&render->lock);
+    p.memory_bytes = trc_memory_bytes();
+    p.peak_memory_bytes = trc_memory_peak_bytes();
+    *progress_out = p;
+}
+
+trc_status trc_render_state_read(struct trc_render_state *render, uint32_t pass,
+                                 float *pixels_out, uint64_t float_count) {
+    return trc_film_read(&render->film, pass, render->desc.film_exposure, pixels_out, float_count);
+}

@@ -1,0 +1,95 @@
+#include "scene/affine.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Below this ratio of volume to the product of edge lengths, columns that are exact floats lie in
+ * one plane but for rounding. Scale alone does not lower it. */
+#define SINGULAR_RATIO 1e-12
+
+struct columns {
+    double x[3], y[3], z[3], origin[3];
+};
+
+static struct columns columns_of(const struct trc_affine *a) {
+    struct columns c;
+    for (int row = 0; row < 3; row++) {
+        c.x[row] = a->m[4 * row];
+        c.y[row] = a->m[4 * row + 1];
+        c.z[row] = a->m[4 * row + 2];
+        c.origin[row] = a->m[4 * row + 3];
+    }
+    return c;
+}
+
+static void cross(const double a[3], const double b[3], double out[3]) {
+    out[0] = a[1] * b[2] - a[2] * b[1];
+    out[1] = a[2] * b[0] - a[0] * b[2];
+    out[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+static double dot(const double a[3], const double b[3]) {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* Determinant, or 0 if it is not worth the name. */
+static double determinant(const struct columns *c) {
+    double n[3];
+    cross(c->y, c->z, n);
+    const double volume = dot(c->x, n);
+    const double lengths = sqrt(dot(c->x, c->x)) * sqrt(dot(c->y, c->y)) * sqrt(dot(c->z, c->z));
+    return fabs(volume) > SINGULAR_RATIO * lengths && isfinite(volume) ? volume : 0.0;
+}
+
+bool trc_affine_invert(const struct trc_affine *a, struct trc_affine *inverse_out) {
+    const struct columns c = columns_of(a);
+    const double volume = determinant(&c);
+    if (volume == 0.0 || !isfinite(dot(c.origin, c.origin))) return false;
+    double rows[3][3];
+    cross(c.y, c.z, rows[0]);
+    cross(c.z, c.x, rows[1]);
+    cross(c.x, c.y, rows[2]);
+    struct trc_affine inverse;
+    bool usable = true;
+    for (int row = 0; row < 3; row++) {
+        for (int column = 0; column < 3; column++) {
+            inverse.m[4 * row + column] = (float)(rows[row][column] / volume);
+        }
+        inverse.m[4 * row + 3] = (float)(-dot(rows[row], c.origin) / volume);
+    }
+    for (int i = 0; i < 12; i++) usable = usable && isfinite(inverse.m[i]);
+    if (usable) *inverse_out = inverse;
+    return usable;
+}
+
+bool trc_affine_flips(const struct trc_affine *a) {
+    const struct columns c = columns_of(a);
+    return determinant(&c) < 0.0;
+}
+
+static void scale(double v[3], double s) {
+    for (int i = 0; i < 3; i++) v[i] *= s;
+}
+
+static void subtract_along(double v[3], const double unit[3]) {
+    const double s = dot(v, unit);
+    for (int i = 0; i < 3; i++) v[i] -= s * unit[i];
+}
+
+bool trc_affine_make_rigid(const struct trc_affine *a, struct trc_affine *rigid_out) {
+    struct columns c = columns_of(a);
+    if (determinant(&c) == 0.0 || !isfinite(dot(c.origin, c.origin))) return false;
+    scale(c.z, 1.0 / sqrt(dot(c.z, c.z)));
+    subtract_along(c.y, c.z);
+    scale(c.y, 1.0 / sqrt(dot(c.y, c.y)));
+    subtract_along(c.x, c.z);
+    subtract_along(c.x, c.y);
+    scale(c.x, 1.0 / sqrt(dot(c.x, c.x)));
+    for (int row = 0; row < 3; row++) {
+        rigid_out->m[4 * row] = (float)c.x[row];
+        rigid_out->m[4 * row + 1] = (float)c.y[row];
+        rigid_out->m[4 * row + 2] = (float)c.z[row];
+        rigid_out->m[4 * row + 3] = (float)c.origin[row];
+    }
+    return true;
+}

@@ -1,0 +1,20 @@
+/* Algebra of 3x4 transforms for commits, in doubles. */
+#ifndef TRACER_SCENE_AFFINE_H
+#define TRACER_SCENE_AFFINE_H
+
+#include <stdbool.h>
+
+#include "scene/snapshot.h"
+
+/* Whether the transform can be undone in floats; then *inverse_out is its inverse. Not finite or
+ * singular ones cannot, and leave the output alone. */
+bool trc_affine_invert(const struct trc_affine *a, struct trc_affine *inverse_out);
+
+/* Sign of the determinant of the linear part: true for a mirror. */
+bool trc_affine_flips(const struct trc_affine *a);
+
+/* Scale and shear taken out: Z keeps its direction, Y its plane with Z, X its side, so a mirrored
+ * camera stays mirrored. False (output untouched) if the transform is not finite or singular. */
+bool trc_affine_make_rigid(const struct trc_affine *a, struct trc_affine *rigid_out);
+
+#endif

@@ -1,0 +1,209 @@
+/* From the editable scene to the arrays of a snapshot. */
+#include <string.h>
+
+#include "core/checks.h"
+#include "core/core.h"
+#include "image/image.h"
+#include "scene/affine.h"
+#include "scene/commit.h"
+#include "scene/mesh.h"
+#include "scene/scene.h"
+#include "shading/compile.h"
+#include "shading/material.h"
+
+static trc_status no_memory(void) {
+    return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for the scene");
+}
+
+/* An image keeps its slot for life, so materials name images by slot; destroyed ones leave NULL. */
+trc_status trc_collect_images(const struct trc_scene_state *scene, struct trc_snapshot *s) {
+    const struct trc_store *store = &scene->images;
+    s->images = trc_alloc_zeroed(store->slot_count, sizeof *s->images);
+    if (!s->images) return no_memory();
+    s->image_count = store->slot_count;
+    for (uint32_t i = trc_store_first(store); i != TRC_STORE_END; i = trc_store_next(store, i)) {
+        s->images[i] = trc_image_retain(store->slots[i].object);
+    }
+    return TRC_OK;
+}
+
+/* Number 0, and every slot without a material, is the default. */
+trc_status trc_collect_materials(const struct trc_scene_state *scene, struct trc_snapshot *s) {
+    const struct trc_store *store = &scene->materials;
+    const uint32_t count = store->slot_count + 1;
+    s->materials = trc_alloc_zeroed(count, sizeof *s->materials);
+    if (!s->materials) return no_memory();
+    s->material_count = count;
+    for (uint32_t i = 0; i < count; i++) {
+        void *material = i ? store->slots[i - 1].object : NULL;
+        s->materials[i] = trc_material_retain(material ? material : scene->default_material);
+    }
+    return TRC_OK;
+}
+
+trc_status trc_collect_meshes(struct trc_scene_state *scene, struct trc_snapshot *s) {
+    const struct trc_store *store = &scene->meshes;
+    s->meshes = trc_alloc_zeroed(store->living_count, sizeof *s->meshes);
+    if (!s->meshes) return no_memory();
+    for (uint32_t i = trc_store_first(store); i != TRC_STORE_END; i = trc_store_next(store, i)) {
+        struct trc_scene_mesh *mesh = store->slots[i].object;
+        TRC_TRY(trc_geometry_finish(mesh->geometry, scene->pool, &scene->cancel));
+        mesh->index = s->mesh_count;
+        s->meshes[s->mesh_count++] = trc_geometry_retain(mesh->geometry);
+        if (atomic_load(&scene->cancel)) {
+            return trc_fail(TRC_ERROR_CANCELLED, "the commit was cancelled");
+        }
+    }
+    return TRC_OK;
+}
+
+/* ---- instances ---- */
+
+/* Arrays behind the instances of a snapshot. */
+struct instance_data {
+    struct trc_affine *transforms; /* for each instance its keys, then their inverses */
+    uint32_t *materials;
+};
+
+static void destroy_instance_data(void *object) {
+    struct instance_data *data = object;
+    trc_free(data->transforms);
+    trc_free(data->materials);
+    trc_free(data);
+}
+
+static trc_status create_instance_data(const struct trc_store *store,
+                                       struct trc_shared **shared_out) {
+    size_t transforms = 0, materials = 0;
+    for (uint32_t i = trc_store_first(store); i != TRC_STORE_END; i = trc_store_next(store, i)) {
+        const struct trc_scene_instance *source = store->slots[i].object;
+        transforms += (size_t)2 * source->key_count;
+        materials += source->material_count ? source->material_count : 1;
+    }
+    struct instance_data *data = trc_alloc_zeroed(1, sizeof *data);
+    if (!data) return no_memory();
+    data->transforms = trc_alloc(transforms, sizeof *data->transforms);
+    data->materials = trc_alloc(materials, sizeof *data->materials);
+    struct trc_shared *shared = NULL;
+    if (data->transforms && data->materials) shared = trc_shared_create(data, destroy_instance_data);
+    if (!shared) {
+        destroy_instance_data(data);
+        return no_memory();
+    }
+    *shared_out = shared;
+    return TRC_OK;
+}
+
+/* Keys that are all equal are one: an instance that stands still costs no motion. */
+static uint32_t distinct_keys(const struct trc_scene_instance *source) {
+    for (uint32_t key = 1; key < source->key_count; key++) {
+        if (memcmp(&source->transforms[0], &source->transforms[key], sizeof(struct trc_affine))) {
+            return source->key_count;
+        }
+    }
+    return 1;
+}
+
+/* Fills transforms and inverses. A transform that cannot be undone hides the instance: it keeps its
+ * place, as places are what queries report, but no ray sees it. */
+static void place(struct trc_instance *instance, const struct trc_scene_instance *source,
+                  struct trc_affine *transforms) {
+    static const struct trc_affine identity = {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
+    const uint32_t key_count = distinct_keys(source);
+    struct trc_affine *inverses = transforms + key_count;
+    instance->key_count = key_count;
+    instance->object_to_world = transforms;
+    instance->world_to_object = inverses;
+    bool usable = true;
+    for (uint32_t key = 0; key < key_count && usable; key++) {
+        transforms[key] = source->transforms[key];
+        usable = trc_affine_invert(&transforms[key], &inverses[key]);
+    }
+    if (!usable) {
+        transforms[0] = transforms[1] = identity;
+        instance->world_to_object = transforms + 1;
+        instance->key_count = 1;
+        instance->visibility = 0;
+    }
+    instance->flips = trc_affine_flips(&transforms[0]);
+}
+
+static uint64_t fill_instances(const struct trc_scene_state *scene, const struct instance_data *data,
+                               struct trc_snapshot *s) {
+    const struct trc_store *store = &scene->instances;
+    struct trc_affine *transforms = data->transforms;
+    uint32_t *materials = data->materials;
+    uint64_t hidden = 0;
+    for (uint32_t i = trc_store_first(store); i != TRC_STORE_END; i = trc_store_next(store, i)) {
+        const struct trc_scene_instance *source = store->slots[i].object;
+        const struct trc_scene_mesh *mesh = trc_store_get(&scene->meshes, source->mesh);
+        struct trc_instance *instance = &s->instances[s->instance_count++];
+        const uint32_t material_count = source->material_count ? source->material_count : 1;
+        *instance = (struct trc_instance){
+            .mesh = mesh->index,
+            .visibility = source->visibility,
+            .material_count = material_count,
+            .materials = materials,
+            .pass_index = source->pass_index,
+            .random = source->random,
+            .first_light = UINT32_MAX,
+        };
+        memcpy(instance->color, source->color, sizeof instance->color);
+        for (uint32_t m = 0; m < material_count; m++) {
+            const trc_id id = source->material_count ? source->materials[m] : 0;
+            materials[m] = trc_scene_material_index(scene, id);
+        }
+        place(instance, source, transforms);
+        hidden += !instance->visibility && source->visibility;
+        transforms += (size_t)2 * source->key_count;
+        materials += material_count;
+    }
+    return hidden;
+}
+
+trc_status trc_collect_instances(const struct trc_scene_state *scene,
+                                 const struct trc_snapshot_block *former,
+                                 struct trc_snapshot_block *block) {
+    struct trc_snapshot *s = &block->snapshot;
+    const struct trc_store *store = &scene->instances;
+    s->instances = trc_alloc(store->living_count, sizeof *s->instances);
+    if (!s->instances) return no_memory();
+    if (former && !(scene->changed & (TRC_CHANGED_MESHES | TRC_CHANGED_INSTANCES))) {
+        block->instance_data = trc_shared_retain(former->instance_data);
+        s->instance_count = former->snapshot.instance_count;
+        if (s->instance_count) {
+            memcpy(s->instances, former->snapshot.instances,
+                   s->instance_count * sizeof *s->instances);
+        }
+        s->stats.skipped_instance_count = former->snapshot.stats.skipped_instance_count;
+        return TRC_OK;
+    }
+    TRC_TRY(create_instance_data(store, &block->instance_data));
+    s->stats.skipped_instance_count = fill_instances(scene, block->instance_data->object, s);
+    return TRC_OK;
+}
+
+/* ---- camera and world ---- */
+
+void trc_collect_view(const struct trc_scene_state *scene, struct trc_snapshot_block *block) {
+    struct trc_snapshot *s = &block->snapshot;
+    block->camera = trc_shared_retain(scene->camera);
+    s->has_camera = scene->camera != NULL;
+    if (scene->camera) s->camera = *(const struct trc_camera *)scene->camera->object;
+
+    const trc_world_desc *desc = &scene->world;
+    const uint32_t index = trc_scene_material_index(scene, desc->material);
+    s->world = (struct trc_world){
+        .material = index ? index : UINT32_MAX,
+        .visibility = desc->visibility,
+        .is_constant = 1,
+        .ao_distance = desc->ao_distance,
+        .ao_factor = desc->ao_factor,
+    };
+    if (!index) return;
+    const struct trc_material *material = s->materials[index];
+    s->world.is_constant = !(material->has & TRC_MATERIAL_EMISSION_VARIES);
+    if (s->world.is_constant) {
+        memcpy(s->world.radiance, material->emission, sizeof s->world.radiance);
+    }
+}

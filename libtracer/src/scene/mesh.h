@@ -1,0 +1,75 @@
+/* Meshes of a scene: copies of what the caller described, immutable once a snapshot holds them. A
+ * new pose is a new trc_mesh that shares the topology of the former. */
+#ifndef TRACER_SCENE_MESH_H
+#define TRACER_SCENE_MESH_H
+
+#include "scene/names.h"
+#include "scene/snapshot.h"
+
+struct trc_pool; /* threads/pool.h */
+
+/* Coordinates beyond this, or not finite, take their triangles out of the scene: sums and
+ * differences of what remains stay far from overflow, and so do the squares in a triangle test
+ * (1.8e18^2 = 3.2e36). */
+#define TRC_MAX_COORDINATE 1.8e18f
+
+/* Whether all three coordinates are finite and within the limit. */
+static inline int trc_point_is_valid(const float p[3]) {
+    const float m = TRC_MAX_COORDINATE; /* a NaN fails every comparison */
+    return p[0] >= -m && p[0] <= m && p[1] >= -m && p[1] <= m && p[2] >= -m && p[2] <= m;
+}
+
+/* Copies a descriptor whose counts and pointers are checked (api/geometry.c). Indices are checked
+ * here. Keys that are all equal become one. Normals that are not finite or zero are replaced, so
+ * that stored ones are finite and not zero. INVALID_ARGUMENT, TOO_LARGE or OUT_OF_MEMORY. */
+trc_status trc_geometry_create(const trc_mesh_desc *desc, struct trc_names *names,
+                               struct trc_mesh **mesh_out);
+
+/* Another pose of the same topology; the arrays are checked and laid out as in the descriptor. */
+trc_status trc_geometry_pose(const struct trc_mesh *from, uint32_t key_count,
+                             const float *positions, const float *normals,
+                             struct trc_mesh **mesh_out);
+
+/* What normals the caller gave: TRC_NORMALS_*. */
+uint32_t trc_geometry_normal_kind(const struct trc_mesh *mesh);
+
+/* NULL is fine. */
+struct trc_mesh *trc_geometry_retain(struct trc_mesh *mesh);
+void trc_geometry_release(struct trc_mesh *mesh);
+
+/* Bytes of the mesh's arrays, topology included. */
+uint64_t trc_geometry_bytes(const struct trc_mesh *mesh);
+
+/* Computes angle-weighted vertex normals if smooth triangles lack them (scene/normals.c): the last
+ * step before a snapshot may hold the mesh. Angles weight as in Thuermer and Wuethrich, "Computing
+ * vertex normals from polygonal facets", 1998. All triangles at a vertex count, flat ones too, as
+ * in Blender. Deterministic for any number of threads. OUT_OF_MEMORY or CANCELLED. */
+trc_status trc_geometry_finish(struct trc_mesh *mesh, struct trc_pool *pool,
+                               const atomic_uint *cancel);
+
+/* ---- shared by scene/mesh.c and scene/normals.c ---- */
+
+/* What all poses of a mesh have in common. */
+struct trc_mesh_topology {
+    atomic_uint refs;
+    uint32_t normal_kind;    /* what the caller gives, TRC_NORMALS_* */
+    uint32_t *indices;
+    uint8_t *smooth;
+    uint16_t *material_index;
+    struct trc_attribute attributes[TRC_MAX_ATTRIBUTES];
+    uint32_t attribute_count;
+    /* Corners (3 * triangle + corner) of each vertex, made when normals are first needed:
+     * corners[corner_begin[v]] to corners[corner_begin[v + 1]]. */
+    uint32_t *corner_begin, *corners;
+    uint64_t bytes;
+};
+
+struct trc_geometry {
+    struct trc_mesh mesh; /* first: a trc_mesh is a trc_geometry */
+    struct trc_mesh_topology *topology;
+};
+
+/* A direction for a vertex whose triangles give none: away from the object's origin, as Blender. */
+void trc_normal_fallback(const float position[3], float normal_out[3]);
+
+#endif

@@ -1,0 +1,80 @@
+/* Edits of materials and images. */
+#include "core/checks.h"
+#include "core/core.h"
+#include "image/image.h"
+#include "scene/scene.h"
+#include "shading/compile.h"
+
+trc_status trc_scene_add_material(struct trc_scene_state *scene, const trc_material_desc *desc,
+                                  trc_id *id) {
+    struct trc_material *material;
+    TRC_TRY(trc_material_compile(desc, scene->names, &scene->images, &material));
+    const trc_status status = trc_store_add(&scene->materials, material, id);
+    if (status != TRC_OK) {
+        trc_material_release(material);
+        return status;
+    }
+    scene->changed |= TRC_CHANGED_MATERIALS;
+    return TRC_OK;
+}
+
+trc_status trc_scene_change_material(struct trc_scene_state *scene, trc_id id,
+                                     const trc_material_desc *desc) {
+    void *former;
+    TRC_TRY(trc_store_find(&scene->materials, id, &former));
+    struct trc_material *material;
+    TRC_TRY(trc_material_compile(desc, scene->names, &scene->images, &material));
+    scene->materials.slots[trc_store_slot_of(id)].object = material;
+    trc_material_release(former);
+    scene->changed |= TRC_CHANGED_MATERIALS;
+    return TRC_OK;
+}
+
+trc_status trc_scene_remove_material(struct trc_scene_state *scene, trc_id id) {
+    void *material;
+    TRC_TRY(trc_store_find(&scene->materials, id, &material));
+    trc_store_remove(&scene->materials, id);
+    trc_material_release(material);
+    /* Instances resolve to the default now, and the slot may get another material. */
+    scene->changed |= TRC_CHANGED_MATERIALS | TRC_CHANGED_INSTANCES | TRC_CHANGED_WORLD;
+    return TRC_OK;
+}
+
+uint32_t trc_scene_material_index(const struct trc_scene_state *scene, trc_id id) {
+    return trc_store_get(&scene->materials, id) ? trc_store_slot_of(id) + 1 : 0;
+}
+
+/* Blender's grey diffuse for objects without a material. */
+trc_status trc_scene_make_default_material(struct trc_scene_state *scene) {
+    const trc_node_input inputs[3] = {
+        {.node = -1, .value = {0.8f, 0.8f, 0.8f}}, {.node = -1}, {.node = -2}};
+    const trc_node node = {.type = TRC_NODE_DIFFUSE, .input_count = 3};
+    const trc_material_desc desc = {.struct_size = sizeof desc,
+                                    .node_count = 1,
+                                    .nodes = &node,
+                                    .inputs = inputs,
+                                    .input_count = 3};
+    return trc_material_compile(&desc, scene->names, &scene->images, &scene->default_material);
+}
+
+trc_status trc_scene_add_image(struct trc_scene_state *scene, const trc_image_desc *desc,
+                               trc_id *id) {
+    struct trc_image *image;
+    TRC_TRY(trc_image_load(desc, &image));
+    const trc_status status = trc_store_add(&scene->images, image, id);
+    if (status != TRC_OK) {
+        trc_image_release(image);
+        return status;
+    }
+    scene->changed |= TRC_CHANGED_IMAGES;
+    return TRC_OK;
+}
+
+trc_status trc_scene_remove_image(struct trc_scene_state *scene, trc_id id) {
+    void *image;
+    TRC_TRY(trc_store_find(&scene->images, id, &image));
+    trc_store_remove(&scene->images, id);
+    trc_image_release(image);
+    scene->changed |= TRC_CHANGED_IMAGES;
+    return TRC_OK;
+}
