@@ -47,15 +47,6 @@ TRC_INLINE vfloat trc_safe_inverse(vfloat d) {
     return vf_set(1.0f) / vf_select(tiny, vf_copysign(vf_set(TRC_TINY_DIRECTION), d), d);
 }
 
-TRC_INLINE float trc_lanes_min(vfloat a) {
-    float x[TRC_WIDTH], r;
-    vf_store(x, a);
-    r = x[0];
-    for (int i = 1; i < TRC_WIDTH; i++) r = x[i] < r ? x[i] : r;
-    return r;
-}
-TRC_INLINE float trc_lanes_max(vfloat a) { return -trc_lanes_min(-a); }
-
 /* Shear, inverses and beam of the rays in mask, all of dominant axis z and that side, against a tree. False:
  * none can reach the tree. */
 TRC_INLINE bool trc_group_setup(struct trc_group *g, const struct trc_packet *p,
@@ -88,11 +79,11 @@ TRC_INLINE bool trc_group_setup(struct trc_group *g, const struct trc_packet *p,
         const vfloat o = vf_max(vf_abs(ou), vf_max(vf_abs(ov), vf_abs(oz)));
         far_origin = vf_max(far_origin, vf_select(m, o, vf_set(0.0f)));
     }
-    b->slack = TRC_SLACK * (trc_lanes_max(far_origin) + tree->extent);
+    b->slack = TRC_SLACK * (vf_lanes_max(far_origin) + tree->extent);
     const float low = side ? -tree->upper[z] : tree->lower[z];
     const float high = side ? -tree->lower[z] : tree->upper[z];
-    b->z0 = fmaxf(trc_lanes_min(z_near), low) - b->slack;
-    b->z1 = fminf(trc_lanes_max(z_far), high) + b->slack;
+    b->z0 = f_max(vf_lanes_min(z_near), low) - b->slack;
+    b->z1 = f_min(vf_lanes_max(z_far), high) + b->slack;
     if (!(b->z0 <= b->z1)) return false;
     vfloat u_low[2] = {inf, inf}, u_high[2] = {-inf, -inf}, v_low[2] = {inf, inf},
            v_high[2] = {-inf, -inf};
@@ -115,14 +106,14 @@ TRC_INLINE bool trc_group_setup(struct trc_group *g, const struct trc_packet *p,
     }
     const float length = b->z1 - b->z0;
     const float per_z = length > 0.0f ? 1.0f / length : 0.0f;
-    b->u_min = trc_lanes_min(u_low[0]) - b->slack;
-    b->u_max = trc_lanes_max(u_high[0]) + b->slack;
-    b->v_min = trc_lanes_min(v_low[0]) - b->slack;
-    b->v_max = trc_lanes_max(v_high[0]) + b->slack;
-    b->u_min_slope = (trc_lanes_min(u_low[1]) - b->slack - b->u_min) * per_z;
-    b->u_max_slope = (trc_lanes_max(u_high[1]) + b->slack - b->u_max) * per_z;
-    b->v_min_slope = (trc_lanes_min(v_low[1]) - b->slack - b->v_min) * per_z;
-    b->v_max_slope = (trc_lanes_max(v_high[1]) + b->slack - b->v_max) * per_z;
+    b->u_min = vf_lanes_min(u_low[0]) - b->slack;
+    b->u_max = vf_lanes_max(u_high[0]) + b->slack;
+    b->v_min = vf_lanes_min(v_low[0]) - b->slack;
+    b->v_max = vf_lanes_max(v_high[0]) + b->slack;
+    b->u_min_slope = (vf_lanes_min(u_low[1]) - b->slack - b->u_min) * per_z;
+    b->u_max_slope = (vf_lanes_max(u_high[1]) + b->slack - b->u_max) * per_z;
+    b->v_min_slope = (vf_lanes_min(v_low[1]) - b->slack - b->v_min) * per_z;
+    b->v_max_slope = (vf_lanes_max(v_high[1]) + b->slack - b->v_max) * per_z;
     return true;
 }
 

@@ -304,6 +304,24 @@ TRC_INLINE vfloat vf_floor(vfloat a) {
 #endif
 }
 
+/* Scalars; b where either is NaN. fminf and fmaxf are calls without -ffinite-math-only. */
+TRC_INLINE float f_min(float a, float b) { return a < b ? a : b; }
+TRC_INLINE float f_max(float a, float b) { return a > b ? a : b; }
+
+/* Least and largest lane; undefined order for NaN. */
+TRC_INLINE float vf_lanes_min(vfloat a) {
+#if TRC_WIDTH == 1
+    return a;
+#elif TRC_WIDTH == 16
+    return _mm512_reduce_min_ps(a);
+#else
+    float r = a[0];
+    for (int i = 1; i < TRC_WIDTH; i++) r = f_min(r, a[i]);
+    return r;
+#endif
+}
+TRC_INLINE float vf_lanes_max(vfloat a) { return -vf_lanes_min(-a); }
+
 /* ---- gathers: base[index] in the lanes of m, 0 elsewhere (their index is not read) ---- */
 
 TRC_INLINE vfloat vf_gather(const float *base, vint index, vmask m) {

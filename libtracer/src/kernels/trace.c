@@ -77,8 +77,8 @@ TRC_INLINE uint64_t box_rays(const struct walk *w, uint32_t box, uint64_t mask, 
             }
             const float o = p->o[axis][i], inv = g->inv[axis][i];
             const float t0 = (low - slack - o) * inv, t1 = (high + slack - o) * inv;
-            near = fmaxf(near, fminf(t0, t1));
-            far = fminf(far, fmaxf(t0, t1));
+            near = f_max(near, f_min(t0, t1));
+            far = f_min(far, f_max(t0, t1));
         }
         if (near <= far) return mask;
         mask &= mask - 1;
@@ -234,7 +234,7 @@ static void beam_shorten(struct walk *w, uint64_t mask) {
         const vfloat end = vf_load(&p->o[z][i]) + vf_load(&p->t[i]) * vf_load(&p->d[z][i]);
         far = vf_max(far, vf_select(vm_from_bits(bits), vf_set(b->sign) * end, far));
     }
-    b->z1 = fminf(b->z1, trc_lanes_max(far) + b->slack);
+    b->z1 = f_min(b->z1, vf_lanes_max(far) + b->slack);
 }
 
 /* ---- single rays ---- */
@@ -435,8 +435,8 @@ static void walk_segments(struct walk *w, uint64_t mask, bool any) {
             const int i = __builtin_ctzll(m);
             if (keys[i] != key) continue;
             same |= 1ull << i;
-            g->f_min = fminf(g->f_min, g->f[i]);
-            g->f_max = fmaxf(g->f_max, g->f[i]);
+            g->f_min = f_min(g->f_min, g->f[i]);
+            g->f_max = f_max(g->f_max, g->f[i]);
         }
         mask &= ~same;
         w->key = key;

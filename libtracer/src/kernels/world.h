@@ -1,0 +1,18 @@
+/* Radiance of the world's material. */
+#ifndef TRACER_KERNELS_WORLD_H
+#define TRACER_KERNELS_WORLD_H
+
+#include "kernels/simd.h"
+#include "scene/snapshot.h"
+
+/* What rays that leave the scene along direction (unit) see, 0 in lanes that are not active; path is
+ * TRC_VISIBLE_* | TRC_PATH_* for the Light Path node. The world's visibility is the caller's business.
+ * A constant world costs a broadcast. */
+vvec3 TRC_KERNEL(trc_world_shade)(const struct trc_snapshot *snapshot, vvec3 direction, vuint path,
+                                  vmask active);
+
+/* trc_kernels.world_evaluate. Any length of directions but 0; seen by camera rays. */
+void TRC_KERNEL(trc_world_evaluate)(const struct trc_snapshot *snapshot, const float *directions,
+                                    float *radiance, uint32_t count);
+
+#endif
