@@ -1,20 +1,13 @@
 /* A tile from camera rays to film. See kernels/tile.h for the way of working. */
 #include "kernels/tile.h"
 
-#include <time.h>
-
-#include "bvh/tree.h"
+#include "core/core.h"
 #include "kernels/wide_math.h"
 
 /* ---- clocks: one reading per stage and step ---- */
 
-static double now(void) {
-    struct timespec ts;
-    clock_gettime(CLOCK_MONOTONIC, &ts);
-    return (double)ts.tv_sec + 1e-9 * (double)ts.tv_nsec;
-}
 static void clock_to(struct trc_tile *t, double *sum) {
-    const double at = now();
+    const double at = trc_seconds();
     *t->clock += at - t->clock_start;
     t->clock = sum;
     t->clock_start = at;
@@ -345,7 +338,7 @@ void TRC_KERNEL(trc_tile_render)(struct trc_tile_job *job) {
                        job->snapshot->camera.type == TRC_CAMERA_PERSPECTIVE;
     t->packet_size = job->desc->packet_size < TRC_PACKET_SIZE ? job->desc->packet_size : TRC_PACKET_SIZE;
     t->clock = &job->counts.seconds_other;
-    t->clock_start = now();
+    t->clock_start = trc_seconds();
     TRC_KERNEL(trc_filter_table)(job->desc->filter, job->desc->filter_width, t->filter);
     for (uint32_t s = job->sample_begin; s < job->sample_end && !*job->cancel;) {
         const uint32_t end = job->sample_end - s > SAMPLES_PER_BATCH ? s + SAMPLES_PER_BATCH : job->sample_end;

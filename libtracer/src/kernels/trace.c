@@ -34,7 +34,7 @@ struct walk {
 };
 
 static void walk_packet(struct walk *w, uint64_t mask, bool any);
-static void single_item(struct walk *w, const struct trc_item *item, int ray, bool any);
+static void item_packet(struct walk *w, const struct trc_item *item, uint64_t mask, bool any);
 
 /* ---- bounds, static or moving ---- */
 
@@ -295,67 +295,109 @@ struct single_entry {
     float near;
 };
 
-/* Bits of the children one ray meets, and its entry distances. */
-TRC_INLINE uint32_t node_single(const struct walk *w, uint32_t node, int ray, bool motion,
-                                float near_out[8]) {
+/* One ray as the box test wants it: for each axis which plane is met first, and the origin moved so that boxes are
+ * wider by the slack. */
+struct single_ray {
+    f8 inv[3], near_origin[3], far_origin[3];
+    int first[3], last[3]; /* floats from the node's bounds to the planes of the axis */
+    f8 tmin, f, k;         /* moving trees: place between the keys, and 1 - f */
+};
+
+TRC_INLINE void single_setup(const struct walk *w, int ray, bool motion, struct single_ray *r) {
     const struct trc_packet *p = w->packet;
     const struct trc_group *g = w->group;
-    const float *b = trc_node_bounds(w->tree, node, w->key);
-    const float *e = b + (motion ? TRC_NODE_KEY_BYTES / sizeof(float) : 0);
-    const float slack = g->beam.slack;
-    f8 near = f8_set(p->tmin[ray]), far = f8_set(p->t[ray]);
-    const f8 f = f8_set(motion ? g->f[ray] : 0.0f), k = f8_set(1.0f) - f;
     for (int axis = 0; axis < 3; axis++) {
         const float inv = g->inv[axis][ray], o = p->o[axis][ray];
-        const int back = inv < 0.0f ? 8 : 0; /* which plane is met first */
-        f8 first = f8_load(b + 16 * axis + back), last = f8_load(b + 16 * axis + 8 - back);
-        if (motion) {
-            first = k * first + f * f8_load(e + 16 * axis + back);
-            last = k * last + f * f8_load(e + 16 * axis + 8 - back);
-        }
-        const float widen = inv < 0.0f ? -slack : slack;
-        near = f8_max(near, (first - f8_set(o + widen)) * f8_set(inv));
-        far = f8_min(far, (last - f8_set(o - widen)) * f8_set(inv));
+        const bool down = inv < 0.0f;
+        const float widen = down ? -g->beam.slack : g->beam.slack;
+        r->inv[axis] = f8_set(inv);
+        r->near_origin[axis] = f8_set(o + widen);
+        r->far_origin[axis] = f8_set(o - widen);
+        r->first[axis] = 16 * axis + (down ? 8 : 0);
+        r->last[axis] = 16 * axis + (down ? 0 : 8);
     }
-    f8_store(near_out, near);
+    r->tmin = f8_set(p->tmin[ray]);
+    r->f = f8_set(motion ? g->f[ray] : 0.0f);
+    r->k = f8_set(1.0f) - r->f;
+}
+
+/* Bits of the children the ray meets before t, and its entry distances. */
+TRC_INLINE uint32_t node_single(const struct walk *w, uint32_t node, const struct single_ray *r,
+                                float t, bool motion, f8 *near_out) {
+    const float *b = trc_node_bounds(w->tree, node, w->key);
+    const float *e = b + (motion ? TRC_NODE_KEY_BYTES / sizeof(float) : 0);
+    f8 near = r->tmin, far = f8_set(t);
+    for (int axis = 0; axis < 3; axis++) {
+        f8 first = f8_load(b + r->first[axis]), last = f8_load(b + r->last[axis]);
+        if (motion) {
+            first = r->k * first + r->f * f8_load(e + r->first[axis]);
+            last = r->k * last + r->f * f8_load(e + r->last[axis]);
+        }
+        near = f8_max(near, (first - r->near_origin[axis]) * r->inv[axis]);
+        far = f8_min(far, (last - r->far_origin[axis]) * r->inv[axis]);
+    }
+    *near_out = near;
     return f8_le(near, far);
+}
+
+/* Pushes all children but the nearest, the farthest first, and returns the nearest. */
+TRC_INLINE uint32_t single_push(const uint32_t *children, f8 near, uint32_t bits,
+                                struct single_entry *stack, int *top_in_out) {
+    float distance[TRC_NODE_WIDTH];
+    f8_store(distance, near);
+    const int a = __builtin_ctz(bits);
+    bits &= bits - 1;
+    if (!bits) return children[a];
+    const int b = __builtin_ctz(bits);
+    bits &= bits - 1;
+    int top = *top_in_out;
+    if (!bits) { /* mostly two */
+        const bool a_first = distance[a] <= distance[b];
+        const int next = a_first ? a : b, later = a_first ? b : a;
+        stack[top] = (struct single_entry){children[later], distance[later]};
+        *top_in_out = top + 1;
+        return children[next];
+    }
+    const int bottom = top;
+    stack[top++] = (struct single_entry){children[a], distance[a]};
+    for (bits |= 1u << b; bits; bits &= bits - 1) {
+        const int child = __builtin_ctz(bits);
+        int at = top++;
+        for (; at > bottom && stack[at - 1].near < distance[child]; at--) stack[at] = stack[at - 1];
+        stack[at] = (struct single_entry){children[child], distance[child]};
+    }
+    *top_in_out = top - 1;
+    return stack[top - 1].ref;
 }
 
 /* Walks one ray through the subtree at ref. True: occluded. */
 TRC_INLINE bool single_walk(struct walk *w, uint32_t ref, int ray, bool any, bool motion) {
     struct single_entry stack[TRC_STACK_SIZE];
+    struct single_ray r;
     int top = 0;
-    stack[top++] = (struct single_entry){ref, w->packet->tmin[ray]};
-    while (top > 0) {
-        const struct single_entry at = stack[--top];
-        if (at.near > w->packet->t[ray]) continue;
-        if (at.ref & TRC_REF_LEAF) {
-            if (w->tree->is_top) {
-                single_item(w, &w->tree->items[at.ref & TRC_REF_INDEX_MASK], ray, any);
-                if (any && (w->occluded >> ray & 1u)) return true;
-            } else if (leaf_single(w, at.ref, ray, any, motion)) {
-                return true;
-            }
-            continue;
+    single_setup(w, ray, motion, &r);
+    for (;;) {
+        while (!(ref & TRC_REF_LEAF)) {
+            f8 near;
+            const uint32_t bits = node_single(w, ref, &r, w->packet->t[ray], motion, &near);
+            if (!bits) goto pop;
+            ref = single_push(trc_node_children(w->tree, ref), near, bits, stack, &top);
         }
-        float near[8];
-        const uint32_t *children = trc_node_children(w->tree, at.ref);
-        const int first = top;
-        for (uint32_t bits = node_single(w, at.ref, ray, motion, near); bits; bits &= bits - 1) {
-            const int child = __builtin_ctz(bits);
-            const struct single_entry e = {children[child], near[child]};
-            int at_slot = top++;
-            for (; at_slot > first && stack[at_slot - 1].near < e.near; at_slot--)
-                stack[at_slot] = stack[at_slot - 1];
-            stack[at_slot] = e;
+        if (w->tree->is_top) {
+            item_packet(w, &w->tree->items[ref & TRC_REF_INDEX_MASK], 1ull << ray, any);
+            if (any && (w->occluded >> ray & 1u)) return true;
+        } else if (leaf_single(w, ref, ray, any, motion)) {
+            return true;
         }
+    pop:
+        do {
+            if (top == 0) return false;
+            ref = stack[--top].ref;
+        } while (stack[top].near > w->packet->t[ray]);
     }
-    return false;
 }
 
 /* ---- the packet's walk ---- */
-
-static void item_packet(struct walk *w, const struct trc_item *item, uint64_t mask, bool any);
 
 /* Pushes the children the beam may touch, the nearest on top. */
 TRC_INLINE int children_push(const struct walk *w, uint32_t node, uint64_t mask, bool motion,
@@ -548,10 +590,6 @@ static void item_packet(struct walk *w, const struct trc_item *item, uint64_t ma
     const uint64_t occluded = w->occluded;
     *w = outer;
     w->occluded = occluded;
-}
-
-static void single_item(struct walk *w, const struct trc_item *item, int ray, bool any) {
-    item_packet(w, item, 1ull << ray, any);
 }
 
 /* ---- entries ---- */
