@@ -1,0 +1,282 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Prepare scenes and settings for comparing engines; runs inside Blender.
+
+Make a scene, ready to render, from files of a scene folder:
+
+    blender -b --factory-startup -P scene_setups.py -- prepare NAME SCENES_DIR OUT.blend
+
+Before a render, set resolution, samples and comparable transport from a JSON object:
+
+    blender -b FILE.blend -P scene_setups.py -E ENGINE -o OUT -f FRAME -- settings '{"samples": 64}'
+
+``SCENES`` and ``source_key`` can also be read outside Blender. Lengths are metres, powers watts.
+"""
+
+import hashlib
+import inspect
+import json
+import math
+import pathlib
+import runpy
+import sys
+import tempfile
+from dataclasses import dataclass
+from typing import Callable
+
+try:
+    import bpy
+    from mathutils import Vector
+except ImportError:  # outside Blender only the table of scenes is of use
+    bpy = None
+
+# Raise this when a helper below changes what prepared scenes look like.
+SETUP_VERSION = 1
+
+DEFAULT_SETTINGS = {
+    "width": 320, "height": 180, "samples": 64, "seed": 0, "max_depth": 50,
+    "filter": "BLACKMAN_HARRIS", "filter_width_px": 1.5, "volley": {},
+}
+
+
+# Comparable settings ---------------------------------------------------------------------------
+
+def apply_settings(scene, settings):
+    """Set output, sampling and the same light transport for Cycles and Volley."""
+    settings = {**DEFAULT_SETTINGS, **settings}
+    apply_output(scene, settings)
+    apply_cycles(scene, settings)
+    apply_volley(scene, settings)
+    for layer in scene.view_layers:
+        layer.samples = 0
+        set_if_present(getattr(layer, "cycles", None), {"use_denoising": False})
+
+
+def apply_output(scene, settings):
+    """Whole frame, no compositor, float EXR."""
+    render = scene.render
+    render.resolution_x, render.resolution_y = settings["width"], settings["height"]
+    render.resolution_percentage = 100
+    render.pixel_aspect_x = render.pixel_aspect_y = 1.0
+    render.use_border = False
+    render.use_compositing = render.use_sequencer = False
+    render.use_file_extension = True
+    render.image_settings.file_format = "OPEN_EXR"
+    render.image_settings.color_mode = "RGBA"
+    render.image_settings.color_depth = "32"
+    render.image_settings.exr_codec = "ZIP"
+
+
+def apply_cycles(scene, settings):
+    """Cycles without diffuse interreflection, clamps, adaptive sampling and denoising."""
+    depth = settings["max_depth"]
+    set_if_present(getattr(scene, "cycles", None), {
+        "device": "CPU", "samples": settings["samples"], "seed": settings["seed"],
+        "use_animated_seed": False, "use_adaptive_sampling": False, "use_denoising": False,
+        "time_limit": 0.0, "use_fast_gi": False, "use_guiding": False,
+        "max_bounces": depth, "diffuse_bounces": 0, "glossy_bounces": depth,
+        "transmission_bounces": depth, "transparent_max_bounces": depth, "volume_bounces": 0,
+        "min_light_bounces": 0, "min_transparent_bounces": 0,
+        "sample_clamp_direct": 0.0, "sample_clamp_indirect": 0.0, "blur_glossy": 0.0,
+        "light_sampling_threshold": 0.0, "caustics_reflective": True, "caustics_refractive": True,
+        "film_exposure": 1.0, "pixel_filter_type": settings["filter"],
+        "filter_width": settings["filter_width_px"]})
+
+
+def apply_volley(scene, settings):
+    """The Distribution integrator; ``settings["volley"]`` overrides any property."""
+    set_if_present(getattr(scene, "volley", None), {
+        "integrator": "DISTRIBUTION", "samples": settings["samples"], "seed": settings["seed"],
+        "max_depth": settings["max_depth"], **settings["volley"]})
+
+
+def set_if_present(target, values):
+    """Set those properties that ``target`` has in this Blender."""
+    for name, value in values.items():
+        if hasattr(target, name):
+            setattr(target, name, value)
+
+
+# Building blocks -------------------------------------------------------------------------------
+
+def add_area_light(name, location, target, size, power, color=(1.0, 1.0, 1.0)):
+    """A square area light of edge ``size``."""
+    data = bpy.data.lights.new(name, "AREA")
+    data.size, data.energy, data.color = size, power, color
+    return place(bpy.data.objects.new(name, data), location, target)
+
+
+def add_camera(location, target, lens_mm, fstop=None, focus=None):
+    """The scene's camera; with ``fstop`` it focuses on the point ``focus`` or the target."""
+    data = bpy.data.cameras.new("Camera")
+    data.lens = lens_mm
+    data.dof.use_dof = fstop is not None
+    if fstop is not None:
+        data.dof.aperture_fstop = fstop
+        data.dof.focus_distance = (Vector(focus or target) - Vector(location)).length
+    camera = place(bpy.data.objects.new("Camera", data), location, target)
+    bpy.context.scene.camera = camera
+    return camera
+
+
+def place(added, location, target):
+    """Link an object at ``location`` with its -Z towards ``target`` and Y up."""
+    added.location = location
+    direction = Vector(target) - Vector(location)
+    added.rotation_euler = direction.to_track_quat("-Z", "Y").to_euler()
+    bpy.context.scene.collection.objects.link(added)
+    return added
+
+
+def add_floor(size, color, roughness):
+    """A square Principled floor of edge ``size`` at z = 0."""
+    half = 0.5 * size
+    mesh = bpy.data.meshes.new("Floor")
+    mesh.from_pydata([(-half, -half, 0), (half, -half, 0), (half, half, 0), (-half, half, 0)], [],
+                     [(0, 1, 2, 3)])
+    material = bpy.data.materials.new("Floor")
+    material.use_nodes = True
+    shader = material.node_tree.nodes["Principled BSDF"]
+    shader.inputs["Base Color"].default_value = (*color, 1.0)
+    shader.inputs["Roughness"].default_value = roughness
+    mesh.materials.append(material)
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new("Floor", mesh))
+
+
+def set_world(color):
+    """A constant world."""
+    world = bpy.data.worlds.new("Comparison world")
+    world.use_nodes = True
+    world.node_tree.nodes["Background"].inputs["Color"].default_value = (*color, 1.0)
+    bpy.context.scene.world = world
+
+
+def pose_from_action(armature_name, action_name, frame):
+    """Play one action on an armature, alone, and go to ``frame``."""
+    armature = bpy.data.objects[armature_name]
+    animation = armature.animation_data or armature.animation_data_create()
+    animation.use_nla = False
+    animation.action = bpy.data.actions[action_name]
+    bpy.context.scene.frame_set(frame)
+
+
+def open_blend(path):
+    """Open a .blend file without its user interface."""
+    bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False)
+
+
+# Scenes ----------------------------------------------------------------------------------------
+
+def prepare_as_is(source, _folder):
+    """A .blend that already has camera and lights."""
+    open_blend(source)
+
+
+def prepare_robot(source, _folder):
+    """The robot on a polished floor, running, under three area lights, with depth of field."""
+    open_blend(source)
+    pose_from_action("RobotArmature", "Robot_Running", SCENES["robot"].frame)
+    add_floor(60.0, (0.16, 0.18, 0.20), 0.06)
+    set_world((0.10, 0.13, 0.18))
+    add_area_light("Key", (-5.0, -6.0, 8.0), (0, 0, 2.2), 4.0, 1600.0, (1.0, 0.95, 0.88))
+    add_area_light("Rim", (5.0, 5.0, 6.0), (0, 0, 2.5), 2.5, 1300.0, (0.7, 0.85, 1.0))
+    add_area_light("Fill", (7.0, -6.0, 3.0), (0, 0, 2.0), 5.0, 350.0)
+    add_camera((-4.8, -13.5, 3.6), (0.0, 0.0, 2.0), 52.0, fstop=0.35, focus=(-0.3, -1.2, 3.4))
+
+
+def prepare_knight(source, folder):
+    """The knight striking, with one sword and one shield, on a glossy floor."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    shims = folder / "import_shims.py"
+    runpy.run_path(str(shims))
+    bpy.ops.import_scene.gltf(filepath=str(source))
+    for name in ("1H_Sword_Offhand", "2H_Sword", "Badge_Shield", "Rectangle_Shield",
+                 "Spike_Shield"):
+        bpy.data.objects[name].hide_render = True
+    pose_from_action("Rig", "1H_Melee_Attack_Slice_Diagonal_Rig",
+                     SCENES["knight"].frame)
+    add_floor(40.0, (0.25, 0.20, 0.15), 0.12)
+    set_world((0.10, 0.12, 0.15))
+    add_area_light("Key", (-3.0, -3.0, 4.5), (0, 0, 1.0), 2.0, 420.0, (1.0, 0.92, 0.82))
+    add_area_light("Rim", (3.0, 2.5, 3.0), (0, 0, 1.2), 1.5, 350.0, (0.65, 0.8, 1.0))
+    add_area_light("Fill", (4.0, -3.5, 1.6), (0, 0, 1.0), 3.0, 90.0)
+    add_camera((1.6, -6.2, 1.7), (0.0, 0.0, 1.07), 45.0, fstop=0.6, focus=(0.0, -0.4, 1.6))
+
+
+def prepare_example(source, _folder):
+    """The project's own character, made by its script."""
+    with tempfile.TemporaryDirectory() as made:
+        output = str(pathlib.Path(made) / "example.blend")
+        saved, sys.argv = sys.argv, [str(source), "--", output]
+        try:
+            runpy.run_path(str(source), run_name="__main__")
+        finally:
+            sys.argv = saved
+        open_blend(output)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Where a scene comes from, how it is prepared, and at what size it is compared by default.
+
+    ``source`` is relative to the scene folder, or to the project when ``in_project``; ``frame`` is
+    the frame to render, ``stops`` the exposure of pictures to look at.
+    """
+
+    source: str
+    prepare: Callable
+    width: int
+    height: int
+    frame: int = 1
+    in_project: bool = False
+    stops: float = 0.0
+
+    def source_path(self, scenes_dir):
+        """The file the scene is made from."""
+        project = pathlib.Path(__file__).resolve().parents[2]
+        return (project if self.in_project else pathlib.Path(scenes_dir)) / self.source
+
+
+IGNIS = "07_ignis_cycles_refs/blender/"
+
+SCENES = {
+    "example": Scene("examples/make_character.py", prepare_example, 192, 108, 20, in_project=True),
+    "conference": Scene("01_conference/conference.blend", prepare_as_is, 160, 120),
+    "robot": Scene("06_quaternius_robot/robot.blend", prepare_robot, 192, 108, 6),
+    "knight": Scene("05_kaykit_knight/Knight.glb", prepare_knight, 192, 108, 9),
+    "box": Scene(IGNIS + "box.blend", prepare_as_is, 128, 128),
+    "sun": Scene(IGNIS + "sun.blend", prepare_as_is, 128, 128, stops=-6.0),
+    "lights": Scene(IGNIS + "lights.blend", prepare_as_is, 128, 128),
+    "tex": Scene(IGNIS + "tex.blend", prepare_as_is, 128, 128),
+}
+
+
+def source_key(name, scenes_dir):
+    """A hash that changes when the prepared scene would."""
+    scene = SCENES[name]
+    text = inspect.getsource(scene.prepare) + str(SETUP_VERSION)
+    data = scene.source_path(scenes_dir).read_bytes() + text.encode()
+    return hashlib.sha256(data).hexdigest()[:16]
+
+
+# Commands --------------------------------------------------------------------------------------
+
+def command_prepare(name, scenes_dir, output):
+    """Prepare a scene and save it."""
+    scene = SCENES[name]
+    scene.prepare(scene.source_path(scenes_dir).resolve(), pathlib.Path(scenes_dir).resolve())
+    bpy.ops.wm.save_as_mainfile(filepath=str(pathlib.Path(output).resolve()))
+
+
+def command_settings(text):
+    """Apply settings to the open file; Volley's and Cycles' engine ids come from ``-E``."""
+    apply_settings(bpy.context.scene, json.loads(text))
+
+
+def main():
+    """Run the command after ``--``."""
+    command, *arguments = sys.argv[sys.argv.index("--") + 1:]
+    {"prepare": command_prepare, "settings": command_settings}[command](*arguments)
+
+
+if __name__ == "__main__":
+    main()
