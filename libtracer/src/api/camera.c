@@ -45,9 +45,10 @@ static trc_status check_lens(const trc_camera_desc *desc) {
 
 static trc_status check_shutter(const trc_camera_desc *desc) {
     TRC_TRY(trc_check_float(desc->shutter_time, 0.0f, FLT_MAX, "shutter_time"));
-    TRC_TRY(trc_check_count(desc->shutter_curve_count, 0, MAX_SHUTTER_SAMPLES,
-                            "shutter_curve_count"));
-    if (!desc->shutter_curve_count) return TRC_OK;
+    TRC_TRY(
+        trc_check_count(desc->shutter_curve_count, 0, MAX_SHUTTER_SAMPLES, "shutter_curve_count"));
+    if (!desc->shutter_curve_count)
+        return TRC_OK;
     TRC_TRY(trc_check_out(desc->shutter_curve, sizeof(float), "shutter_curve"));
     for (uint32_t i = 0; i < desc->shutter_curve_count; i++) {
         TRC_TRY(trc_check_float(desc->shutter_curve[i], 0.0f, FLT_MAX, "shutter_curve"));
@@ -70,7 +71,8 @@ trc_status trc_scene_set_camera(trc_scene scene, const trc_camera_desc *desc) {
     struct trc_scene_access access;
     TRC_TRY(trc_scene_enter(scene, &access));
     trc_status status = check_camera(desc);
-    if (status == TRC_OK) status = trc_scene_put_camera(access.scene, desc);
+    if (status == TRC_OK)
+        status = trc_scene_put_camera(access.scene, desc);
     trc_scene_leave(&access);
     return status;
 }

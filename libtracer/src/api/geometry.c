@@ -28,7 +28,8 @@ static trc_status check_attribute(const trc_corner_attribute *attribute, uint64_
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "%s: width is %" PRIu32 ", it can be 2 or 4",
                         name, attribute->width);
     }
-    if (!attribute->name) return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "%s: name is NULL", name);
+    if (!attribute->name)
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "%s: name is NULL", name);
     TRC_TRY(check_product(attribute->width, 3, triangle_count, name));
     return trc_check_array(attribute->values, attribute->value_count,
                            attribute->width * 3 * triangle_count, 4, 4, "attribute values");
@@ -37,10 +38,13 @@ static trc_status check_attribute(const trc_corner_attribute *attribute, uint64_
 static trc_status check_normals(const trc_mesh_desc *desc) {
     TRC_TRY(trc_check_enum(desc->normal_kind, 3, "normal_kind"));
     uint64_t per_key = 0;
-    if (desc->normal_kind == TRC_NORMALS_VERTEX) per_key = desc->vertex_count;
-    if (desc->normal_kind == TRC_NORMALS_CORNER) per_key = 3 * desc->triangle_count;
+    if (desc->normal_kind == TRC_NORMALS_VERTEX)
+        per_key = desc->vertex_count;
+    if (desc->normal_kind == TRC_NORMALS_CORNER)
+        per_key = 3 * desc->triangle_count;
     TRC_TRY(check_product(3, per_key, desc->key_count, "normals"));
-    if (!desc->normals && !desc->normal_count) return TRC_OK; /* computed, whatever the kind */
+    if (!desc->normals && !desc->normal_count)
+        return TRC_OK; /* computed, whatever the kind */
     return trc_check_array(desc->normals, desc->normal_count, 3 * per_key * desc->key_count, 4, 4,
                            "normals");
 }
@@ -73,15 +77,16 @@ trc_status trc_mesh_create(trc_scene scene, const trc_mesh_desc *desc, trc_id *m
     struct trc_scene_access access;
     TRC_TRY(trc_scene_enter(scene, &access));
     trc_status status = check_mesh(desc);
-    if (status == TRC_OK) status = trc_check_out(mesh_out, sizeof *mesh_out, "mesh_out");
-    if (status == TRC_OK) status = trc_scene_add_mesh(access.scene, desc, mesh_out);
+    if (status == TRC_OK)
+        status = trc_check_out(mesh_out, sizeof *mesh_out, "mesh_out");
+    if (status == TRC_OK)
+        status = trc_scene_add_mesh(access.scene, desc, mesh_out);
     trc_scene_leave(&access);
     return status;
 }
 
-trc_status trc_mesh_update(trc_scene scene, trc_id mesh, uint32_t key_count,
-                           const float *positions, uint64_t position_count, const float *normals,
-                           uint64_t normal_count) {
+trc_status trc_mesh_update(trc_scene scene, trc_id mesh, uint32_t key_count, const float *positions,
+                           uint64_t position_count, const float *normals, uint64_t normal_count) {
     struct trc_scene_access access;
     TRC_TRY(trc_scene_enter(scene, &access));
     trc_status status = trc_check_count(key_count, 1, TRC_MAX_KEYS, "key_count");
@@ -104,7 +109,8 @@ trc_status trc_mesh_destroy(trc_scene scene, trc_id mesh) {
 /* Most material slots of an instance: a triangle's slot has 16 bits. */
 #define MAX_SLOTS 65536
 
-/* Transforms are checked at commit: one that is not finite hides the instance like a singular one. */
+/* Transforms are checked at commit: one that is not finite hides the instance like a singular one.
+ */
 static trc_status check_instance(const trc_instance_desc *desc) {
     TRC_TRY(trc_check_struct(desc, sizeof *desc, "trc_instance_desc"));
     TRC_TRY(trc_check_count(desc->key_count, 1, TRC_MAX_KEYS, "key_count"));
@@ -123,8 +129,10 @@ trc_status trc_instance_create(trc_scene scene, const trc_instance_desc *desc,
     struct trc_scene_access access;
     TRC_TRY(trc_scene_enter(scene, &access));
     trc_status status = check_instance(desc);
-    if (status == TRC_OK) status = trc_check_out(instance_out, sizeof *instance_out, "instance_out");
-    if (status == TRC_OK) status = trc_scene_add_instance(access.scene, desc, instance_out);
+    if (status == TRC_OK)
+        status = trc_check_out(instance_out, sizeof *instance_out, "instance_out");
+    if (status == TRC_OK)
+        status = trc_scene_add_instance(access.scene, desc, instance_out);
     trc_scene_leave(&access);
     return status;
 }
@@ -133,7 +141,8 @@ trc_status trc_instance_update(trc_scene scene, trc_id instance, const trc_insta
     struct trc_scene_access access;
     TRC_TRY(trc_scene_enter(scene, &access));
     trc_status status = check_instance(desc);
-    if (status == TRC_OK) status = trc_scene_change_instance(access.scene, instance, desc);
+    if (status == TRC_OK)
+        status = trc_scene_change_instance(access.scene, instance, desc);
     trc_scene_leave(&access);
     return status;
 }

@@ -39,8 +39,10 @@ trc_status trc_light_create(trc_scene scene, const trc_light_desc *desc, trc_id 
     struct trc_scene_access access;
     TRC_TRY(trc_scene_enter(scene, &access));
     trc_status status = check_light(desc);
-    if (status == TRC_OK) status = trc_check_out(light_out, sizeof *light_out, "light_out");
-    if (status == TRC_OK) status = trc_scene_add_light(access.scene, desc, light_out);
+    if (status == TRC_OK)
+        status = trc_check_out(light_out, sizeof *light_out, "light_out");
+    if (status == TRC_OK)
+        status = trc_scene_add_light(access.scene, desc, light_out);
     trc_scene_leave(&access);
     return status;
 }
@@ -49,7 +51,8 @@ trc_status trc_light_update(trc_scene scene, trc_id light, const trc_light_desc 
     struct trc_scene_access access;
     TRC_TRY(trc_scene_enter(scene, &access));
     trc_status status = check_light(desc);
-    if (status == TRC_OK) status = trc_scene_change_light(access.scene, light, desc);
+    if (status == TRC_OK)
+        status = trc_scene_change_light(access.scene, light, desc);
     trc_scene_leave(&access);
     return status;
 }
@@ -69,7 +72,8 @@ static trc_status check_world(const trc_world_desc *desc) {
     TRC_TRY(trc_check_count(desc->map_resolution, 0, MAX_MAP_RESOLUTION, "map_resolution"));
     TRC_TRY(trc_check_float(desc->ao_factor, 0.0f, FLT_MAX, "ao_factor"));
     /* Without ambient occlusion its distance has no meaning. */
-    if (desc->ao_factor == 0.0f) return TRC_OK;
+    if (desc->ao_factor == 0.0f)
+        return TRC_OK;
     return trc_check_float(desc->ao_distance, FLT_MIN, FLT_MAX, "ao_distance");
 }
 
@@ -77,7 +81,8 @@ trc_status trc_scene_set_world(trc_scene scene, const trc_world_desc *desc) {
     struct trc_scene_access access;
     TRC_TRY(trc_scene_enter(scene, &access));
     trc_status status = check_world(desc);
-    if (status == TRC_OK) status = trc_scene_put_world(access.scene, desc);
+    if (status == TRC_OK)
+        status = trc_scene_put_world(access.scene, desc);
     trc_scene_leave(&access);
     return status;
 }

@@ -13,9 +13,10 @@
 static trc_status check_material(const trc_material_desc *desc) {
     TRC_TRY(trc_check_struct(desc, sizeof *desc, "trc_material_desc"));
     TRC_TRY(trc_check_count(desc->node_count, 0, TRC_MAX_NODES, "node_count"));
-    TRC_TRY(trc_check_count(desc->input_count, 0, TRC_MAX_NODES * TRC_MAX_NODE_INPUTS,
-                            "input_count"));
-    if (desc->node_count) TRC_TRY(trc_check_out(desc->nodes, _Alignof(trc_node), "nodes"));
+    TRC_TRY(
+        trc_check_count(desc->input_count, 0, TRC_MAX_NODES * TRC_MAX_NODE_INPUTS, "input_count"));
+    if (desc->node_count)
+        TRC_TRY(trc_check_out(desc->nodes, _Alignof(trc_node), "nodes"));
     if (desc->input_count) {
         TRC_TRY(trc_check_out(desc->inputs, _Alignof(trc_node_input), "inputs"));
     }
@@ -30,7 +31,8 @@ static trc_status check_material(const trc_material_desc *desc) {
                             "node %" PRIu32 ": its inputs are beyond the last", i);
         }
         TRC_TRY(trc_check_count(node->table_count, 0, MAX_TABLE, "table_count"));
-        if (node->table_count) TRC_TRY(trc_check_out(node->table, sizeof(float), "table"));
+        if (node->table_count)
+            TRC_TRY(trc_check_out(node->table, sizeof(float), "table"));
     }
     return TRC_OK;
 }
@@ -40,8 +42,10 @@ trc_status trc_material_create(trc_scene scene, const trc_material_desc *desc,
     struct trc_scene_access access;
     TRC_TRY(trc_scene_enter(scene, &access));
     trc_status status = check_material(desc);
-    if (status == TRC_OK) status = trc_check_out(material_out, sizeof *material_out, "material_out");
-    if (status == TRC_OK) status = trc_scene_add_material(access.scene, desc, material_out);
+    if (status == TRC_OK)
+        status = trc_check_out(material_out, sizeof *material_out, "material_out");
+    if (status == TRC_OK)
+        status = trc_scene_add_material(access.scene, desc, material_out);
     trc_scene_leave(&access);
     return status;
 }
@@ -50,7 +54,8 @@ trc_status trc_material_update(trc_scene scene, trc_id material, const trc_mater
     struct trc_scene_access access;
     TRC_TRY(trc_scene_enter(scene, &access));
     trc_status status = check_material(desc);
-    if (status == TRC_OK) status = trc_scene_change_material(access.scene, material, desc);
+    if (status == TRC_OK)
+        status = trc_scene_change_material(access.scene, material, desc);
     trc_scene_leave(&access);
     return status;
 }
@@ -84,7 +89,8 @@ static trc_status check_image(const trc_image_desc *desc) {
     if (!desc->path == !desc->pixels) {
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "an image needs either pixels or a path");
     }
-    if (desc->path) return TRC_OK;
+    if (desc->path)
+        return TRC_OK;
     TRC_TRY(trc_check_enum(desc->is_float, 2, "is_float"));
     return check_pixels(desc);
 }
@@ -93,8 +99,10 @@ trc_status trc_image_create(trc_scene scene, const trc_image_desc *desc, trc_id 
     struct trc_scene_access access;
     TRC_TRY(trc_scene_enter(scene, &access));
     trc_status status = check_image(desc);
-    if (status == TRC_OK) status = trc_check_out(image_out, sizeof *image_out, "image_out");
-    if (status == TRC_OK) status = trc_scene_add_image(access.scene, desc, image_out);
+    if (status == TRC_OK)
+        status = trc_check_out(image_out, sizeof *image_out, "image_out");
+    if (status == TRC_OK)
+        status = trc_scene_add_image(access.scene, desc, image_out);
     trc_scene_leave(&access);
     return status;
 }

@@ -16,7 +16,8 @@
 /* An array of count elements that may be NULL unless it is required. */
 static trc_status check_column(const void *column, uint64_t count, bool required,
                                const char *name) {
-    if (!column && !required) return TRC_OK;
+    if (!column && !required)
+        return TRC_OK;
     return trc_check_array(column, count, count, sizeof(float), sizeof(float), name);
 }
 
@@ -28,15 +29,18 @@ static trc_status check_rays(const trc_rays *rays) {
         bool required;
         const char *name;
     } columns[] = {
-        {rays->origin_x, true, "origin_x"},       {rays->origin_y, true, "origin_y"},
-        {rays->origin_z, true, "origin_z"},       {rays->direction_x, true, "direction_x"},
-        {rays->direction_y, true, "direction_y"}, {rays->direction_z, true, "direction_z"},
-        {rays->tmin, false, "tmin"},              {rays->tmax, false, "tmax"},
+        {rays->origin_x, true, "origin_x"},
+        {rays->origin_y, true, "origin_y"},
+        {rays->origin_z, true, "origin_z"},
+        {rays->direction_x, true, "direction_x"},
+        {rays->direction_y, true, "direction_y"},
+        {rays->direction_z, true, "direction_z"},
+        {rays->tmin, false, "tmin"},
+        {rays->tmax, false, "tmax"},
         {rays->time, false, "time"},
     };
     for (size_t i = 0; i < sizeof columns / sizeof *columns; i++) {
-        TRC_TRY(check_column(columns[i].column, rays->count, columns[i].required,
-                             columns[i].name));
+        TRC_TRY(check_column(columns[i].column, rays->count, columns[i].required, columns[i].name));
     }
     return TRC_OK;
 }
@@ -48,8 +52,12 @@ static trc_status check_hits(const trc_hits *hits, uint64_t count) {
         const void *column;
         const char *name;
     } columns[] = {
-        {hits->triangle, "triangle"}, {hits->distance, "distance"}, {hits->u, "u"},
-        {hits->v, "v"},               {hits->normal_x, "normal_x"}, {hits->normal_y, "normal_y"},
+        {hits->triangle, "triangle"},
+        {hits->distance, "distance"},
+        {hits->u, "u"},
+        {hits->v, "v"},
+        {hits->normal_x, "normal_x"},
+        {hits->normal_y, "normal_y"},
         {hits->normal_z, "normal_z"},
     };
     for (size_t i = 0; i < sizeof columns / sizeof *columns; i++) {
@@ -60,12 +68,16 @@ static trc_status check_hits(const trc_hits *hits, uint64_t count) {
 
 static trc_status resolve_packet_size(uint32_t packet_size, uint32_t *size_out) {
     switch (packet_size) {
-    case 0: *size_out = DEFAULT_PACKET_SIZE; return TRC_OK;
+    case 0:
+        *size_out = DEFAULT_PACKET_SIZE;
+        return TRC_OK;
     case 1:
     case 4:
     case 16:
     case 64:
-    case 256: *size_out = packet_size; return TRC_OK;
+    case 256:
+        *size_out = packet_size;
+        return TRC_OK;
     default:
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT,
                         "packet_size is %u, it can be 0, 1, 4, 16, 64 or 256", packet_size);
@@ -98,7 +110,7 @@ static trc_status check_closest(const trc_rays *rays, uint32_t packet_size, cons
 
 trc_status trc_query_closest(trc_scene scene, const trc_rays *rays, uint32_t packet_size,
                              const trc_hits *hits_out) {
-    struct trc_snapshot *snapshot;
+    struct trc_snapshot *snapshot = NULL;
     TRC_TRY(take_snapshot(scene, &snapshot));
     uint32_t size = 0;
     const trc_status status = check_closest(rays, packet_size, hits_out, &size);
@@ -124,7 +136,7 @@ static trc_status check_occluded(const trc_rays *rays, uint32_t packet_size,
 
 trc_status trc_query_occluded(trc_scene scene, const trc_rays *rays, uint32_t packet_size,
                               uint8_t *occluded_out, uint64_t occluded_count) {
-    struct trc_snapshot *snapshot;
+    struct trc_snapshot *snapshot = NULL;
     TRC_TRY(take_snapshot(scene, &snapshot));
     uint32_t size = 0;
     const trc_status status =

@@ -26,7 +26,8 @@ static trc_status check_frame(const trc_render_desc *desc) {
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT,
                         "crop_width and crop_height must both be 0 or neither");
     }
-    if (!desc->crop_width) return TRC_OK;
+    if (!desc->crop_width)
+        return TRC_OK;
     if ((uint64_t)desc->crop_x + desc->crop_width > desc->width ||
         (uint64_t)desc->crop_y + desc->crop_height > desc->height) {
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "the crop is not within the frame");
@@ -35,9 +36,10 @@ static trc_status check_frame(const trc_render_desc *desc) {
 }
 
 static trc_status check_packet_size(uint32_t size) {
-    if (size == 0 || size == 4 || size == 16 || size == 64 || size == 256) return TRC_OK;
-    return trc_fail(TRC_ERROR_INVALID_ARGUMENT,
-                    "packet_size is %u, it can be 0, 4, 16, 64 or 256", size);
+    if (size == 0 || size == 4 || size == 16 || size == 64 || size == 256)
+        return TRC_OK;
+    return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "packet_size is %u, it can be 0, 4, 16, 64 or 256",
+                    size);
 }
 
 static trc_status check_sampling(const trc_render_desc *desc) {
@@ -89,12 +91,12 @@ static trc_status start(struct trc_scene_state *scene, const trc_render_desc *de
     struct trc_render_state *render;
     TRC_TRY(trc_render_state_start(snapshot, &resolved, &render));
     const trc_status status = trc_handle_create(TRC_HANDLE_RENDER, render, render_out);
-    if (status != TRC_OK) trc_render_state_destroy(render);
+    if (status != TRC_OK)
+        trc_render_state_destroy(render);
     return status;
 }
 
-trc_status trc_render_start(trc_scene scene, const trc_render_desc *desc,
-                            trc_render *render_out) {
+trc_status trc_render_start(trc_scene scene, const trc_render_desc *desc, trc_render *render_out) {
     struct trc_scene_access access;
     TRC_TRY(trc_scene_enter(scene, &access));
     const trc_status status = start(access.scene, desc, render_out);

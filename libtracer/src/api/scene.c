@@ -20,7 +20,8 @@ trc_status trc_scene_create(const trc_scene_desc *desc, trc_scene *scene_out) {
     trc_status status = trc_scene_state_create(desc, &scene);
     if (status == TRC_OK) {
         status = trc_handle_create(TRC_HANDLE_SCENE, scene, scene_out);
-        if (status != TRC_OK) trc_scene_state_destroy(scene);
+        if (status != TRC_OK)
+            trc_scene_state_destroy(scene);
     }
     trc_fp_leave(fp_state);
     return status;
@@ -28,7 +29,8 @@ trc_status trc_scene_create(const trc_scene_desc *desc, trc_scene *scene_out) {
 
 static void cancel_commit(struct trc_scene_state *scene) {
     pthread_mutex_lock(&scene->cancel_lock);
-    if (scene->committing) atomic_store(&scene->cancel, 1);
+    if (scene->committing)
+        atomic_store(&scene->cancel, 1);
     pthread_mutex_unlock(&scene->cancel_lock);
 }
 
@@ -66,8 +68,10 @@ trc_status trc_scene_get_stats(trc_scene scene, trc_scene_stats *stats_out) {
     struct trc_scene_access access;
     TRC_TRY(trc_scene_enter(scene, &access));
     trc_status status = trc_check_struct(stats_out, sizeof *stats_out, "trc_scene_stats");
-    if (status == TRC_OK && !access.scene->snapshot) status = not_committed();
-    if (status == TRC_OK) *stats_out = access.scene->snapshot->stats;
+    if (status == TRC_OK && !access.scene->snapshot)
+        status = not_committed();
+    if (status == TRC_OK)
+        *stats_out = access.scene->snapshot->stats;
     trc_scene_leave(&access);
     return status;
 }
@@ -75,9 +79,11 @@ trc_status trc_scene_get_stats(trc_scene scene, trc_scene_stats *stats_out) {
 /* Copies as much of text as fits, not ending within a character. */
 static void copy_text(const char *text, uint64_t size, char *text_out, uint64_t capacity) {
     uint64_t count = size < capacity ? size : capacity;
-    if (!count) return;
+    if (!count)
+        return;
     count--; /* the terminator */
-    while (count > 0 && ((uint8_t)text[count] & 0xc0) == 0x80) count--;
+    while (count > 0 && ((uint8_t)text[count] & 0xc0) == 0x80)
+        count--;
     memcpy(text_out, text, count);
     text_out[count] = '\0';
 }
@@ -92,12 +98,14 @@ trc_status trc_scene_get_warnings(trc_scene scene, char *text_out, uint64_t capa
     } else if (size_out) {
         status = trc_check_out(size_out, sizeof *size_out, "size_out");
     }
-    if (status == TRC_OK && !access.scene->snapshot) status = not_committed();
+    if (status == TRC_OK && !access.scene->snapshot)
+        status = not_committed();
     if (status == TRC_OK) {
         const char *text = trc_snapshot_warnings(access.scene->snapshot);
         const uint64_t size = strlen(text) + 1;
         copy_text(text, size, text_out, capacity);
-        if (size_out) *size_out = size;
+        if (size_out)
+            *size_out = size;
     }
     trc_scene_leave(&access);
     return status;

@@ -43,8 +43,8 @@ static bool triangle_ref(const struct trc_part *part, uint32_t triangle, struct 
             trc_part_vertex(part, triangle, v, key, p);
             if (!vertex_is_valid(p)) return false;
             for (int i = 0; i < 3; i++) {
-                low[i] = fminf(low[i], p[i]);
-                high[i] = fmaxf(high[i], p[i]);
+                low[i] = p[i] < low[i] ? p[i] : low[i];
+                high[i] = p[i] > high[i] ? p[i] : high[i];
             }
         }
         for (int i = 0; i < 3; i++) {

@@ -32,7 +32,8 @@ bool trc_memory_should_fail(void) {
     while (left >= 0) {
         /* At 0 the failure happens; it stays at 0 when every later operation shall fail too. */
         const int_fast64_t next = left > 0 ? left - 1 : atomic_load(&fail_all) ? 0 : -1;
-        if (atomic_compare_exchange_weak(&fail_countdown, &left, next)) return left == 0;
+        if (atomic_compare_exchange_weak(&fail_countdown, &left, next))
+            return left == 0;
     }
     return false;
 }
@@ -45,13 +46,16 @@ static void count_block(size_t bytes) {
 }
 
 static void *allocate(size_t count, size_t size, bool zeroed) {
-    if (trc_memory_should_fail()) return NULL;
-    if (size && count > (PTRDIFF_MAX - 2 * ALIGNMENT) / size) return NULL;
+    if (trc_memory_should_fail())
+        return NULL;
+    if (size && count > (PTRDIFF_MAX - 2 * ALIGNMENT) / size)
+        return NULL;
     const size_t bytes = count * size;
     const size_t total = bytes + sizeof(struct header) + ALIGNMENT - 1;
     /* calloc leaves untouched pages of a large film to the system. */
     char *base = zeroed ? calloc(1, total) : malloc(total);
-    if (!base) return NULL;
+    if (!base)
+        return NULL;
     const uintptr_t first = (uintptr_t)base + sizeof(struct header);
     char *block = base + sizeof(struct header) + (-first & (ALIGNMENT - 1));
     const struct header header = {base, bytes};
@@ -65,7 +69,8 @@ void *trc_alloc(size_t count, size_t size) { return allocate(count, size, false)
 void *trc_alloc_zeroed(size_t count, size_t size) { return allocate(count, size, true); }
 
 void trc_free(void *block) {
-    if (!block) return;
+    if (!block)
+        return;
     struct header header;
     memcpy(&header, (char *)block - sizeof header, sizeof header);
     atomic_fetch_sub(&bytes_in_use, header.bytes);

@@ -8,7 +8,8 @@
 #include "tracer/version.h"
 
 bool trc_multiply_u64(uint64_t a, uint64_t b, uint64_t *out) {
-    if (b && a > UINT64_MAX / b) return false;
+    if (b && a > UINT64_MAX / b)
+        return false;
     *out = a * b;
     return true;
 }
@@ -26,7 +27,8 @@ trc_status trc_check_struct(const void *desc, size_t expected_size, const char *
 }
 
 trc_status trc_check_out(const void *out, size_t alignment, const char *name) {
-    if (!out) return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "%s is NULL", name);
+    if (!out)
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "%s is NULL", name);
     if ((uintptr_t)out % alignment) {
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "%s is not aligned to %zu bytes", name,
                         alignment);
@@ -47,7 +49,8 @@ trc_status trc_check_array(const void *data, uint64_t count, uint64_t expected_c
                         "%s: the buffer has %" PRIu64 " elements, %" PRIu64 " are needed", name,
                         count, expected_count);
     }
-    if (!expected_count) return TRC_OK;
+    if (!expected_count)
+        return TRC_OK;
     return trc_check_out(data, alignment, name);
 }
 
@@ -65,8 +68,9 @@ trc_status trc_check_count(uint64_t value, uint64_t low, uint64_t high, const ch
 
 trc_status trc_check_enum(uint32_t value, uint32_t count, const char *name) {
     if (value >= count) {
-        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "%s is %" PRIu32 ", which is none of the %" PRIu32
-                        " values it can have", name, value, count);
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT,
+                        "%s is %" PRIu32 ", which is none of the %" PRIu32 " values it can have",
+                        name, value, count);
     }
     return TRC_OK;
 }

@@ -1,5 +1,5 @@
-/* Checks of what a caller passes, shared by the entry points. Each returns TRC_OK, or an error whose
- * message names the argument. */
+/* Checks of what a caller passes, shared by the entry points. Each returns TRC_OK, or an error
+ * whose message names the argument. */
 #ifndef TRACER_CORE_CHECKS_H
 #define TRACER_CORE_CHECKS_H
 
@@ -36,10 +36,11 @@ trc_status trc_check_float(float value, float low, float high, const char *name)
 trc_status trc_check_finite(const float *values, size_t count, const char *name);
 
 /* Returns from the calling function on an error. */
-#define TRC_TRY(call)                                 \
-    do {                                              \
-        const trc_status try_status_ = (call);        \
-        if (try_status_ != TRC_OK) return try_status_; \
+#define TRC_TRY(call)                          \
+    do {                                       \
+        const trc_status try_status_ = (call); \
+        if (try_status_ != TRC_OK)             \
+            return try_status_;                \
     } while (0)
 
 #endif

@@ -1,4 +1,5 @@
-/* The floating-point control state of a thread: rounding, flushing of denormals, exception masks and flags.
+/* The floating-point control state of a thread: rounding, flushing of denormals, exception masks
+ * and flags.
  *
  * The library computes in the default state whatever the host has set, and gives the host its own
  * state back, flags included. */

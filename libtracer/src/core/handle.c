@@ -8,11 +8,11 @@
 #include "core/core.h"
 
 struct slot {
-    void *object;         /* NULL: free */
-    uint32_t generation;  /* of the object, or of the next one */
+    void *object;        /* NULL: free */
+    uint32_t generation; /* of the object, or of the next one */
     uint32_t pins;
     enum trc_handle_kind kind;
-    bool removed;         /* stale already, waiting for its pins */
+    bool removed; /* stale already, waiting for its pins */
 };
 
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
@@ -31,7 +31,8 @@ static uint64_t handle_of(uint32_t index) {
 /* The slot of a handle that is alive or waiting for its pins, else NULL. Under the lock. */
 static struct slot *slot_of(uint64_t handle) {
     const uint32_t number = (uint32_t)handle;
-    if (number == 0 || number > slot_count) return NULL;
+    if (number == 0 || number > slot_count)
+        return NULL;
     struct slot *slot = &slots[number - 1];
     return slot->object && slot->generation == handle >> 32 ? slot : NULL;
 }
@@ -45,13 +46,17 @@ static bool take_slot(uint32_t *index) {
             return true;
         }
     }
-    if (slot_count >= MAX_SLOTS) return false;
+    if (slot_count >= MAX_SLOTS)
+        return false;
     const uint32_t count = slot_count ? slot_count * 2 : 8;
     struct slot *grown = trc_alloc_zeroed(count, sizeof *grown);
-    if (!grown) return false;
-    if (slot_count) memcpy(grown, slots, slot_count * sizeof *slots);
+    if (!grown)
+        return false;
+    if (slot_count)
+        memcpy(grown, slots, slot_count * sizeof *slots);
     trc_free(slots);
-    for (uint32_t i = slot_count; i < count; i++) grown[i].generation = 1;
+    for (uint32_t i = slot_count; i < count; i++)
+        grown[i].generation = 1;
     *index = slot_count;
     slots = grown;
     slot_count = count;
@@ -95,7 +100,8 @@ trc_status trc_handle_acquire(uint64_t handle, enum trc_handle_kind kind, void *
         *object_out = slot->object;
     }
     pthread_mutex_unlock(&lock);
-    if (ok) return TRC_OK;
+    if (ok)
+        return TRC_OK;
     return trc_fail(TRC_ERROR_INVALID_HANDLE, "the %s handle is %s", kind_name(kind),
                     handle == 0 ? "null"
                     : foreign   ? "one of another kind of object"
@@ -105,7 +111,8 @@ trc_status trc_handle_acquire(uint64_t handle, enum trc_handle_kind kind, void *
 void trc_handle_release(uint64_t handle) {
     pthread_mutex_lock(&lock);
     struct slot *slot = slot_of(handle);
-    if (slot && --slot->pins <= 1 && slot->removed) pthread_cond_broadcast(&unpinned);
+    if (slot && --slot->pins <= 1 && slot->removed)
+        pthread_cond_broadcast(&unpinned);
     pthread_mutex_unlock(&lock);
 }
 
@@ -116,13 +123,15 @@ trc_status trc_handle_remove(uint64_t handle) {
     if (first) {
         slot->removed = true;
         /* The table may move while the lock is given up: look the slot up again each time. */
-        while ((slot = slot_of(handle))->pins > 1) pthread_cond_wait(&unpinned, &lock);
+        while ((slot = slot_of(handle))->pins > 1)
+            pthread_cond_wait(&unpinned, &lock);
         clear_slot(slot);
     } else if (--slot->pins <= 1) {
         pthread_cond_broadcast(&unpinned);
     }
     pthread_mutex_unlock(&lock);
-    if (first) return TRC_OK;
+    if (first)
+        return TRC_OK;
     return trc_fail(TRC_ERROR_INVALID_HANDLE, "the handle is being destroyed by another thread");
 }
 

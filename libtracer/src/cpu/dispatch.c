@@ -47,16 +47,19 @@ static void detect(void) {
     const uint64_t ymm_saved = 0x6, zmm_saved = 0xe6;
     uint32_t a, b, c, d;
     available[TRC_ISA_SCALAR] = true;
-    if (!__get_cpuid(1, &a, &b, &c, &d) || !has(c, sse42_popcnt)) return;
+    if (!__get_cpuid(1, &a, &b, &c, &d) || !has(c, sse42_popcnt))
+        return;
     available[TRC_ISA_SSE42] = true;
-    if (!has(c, fma_f16c | osxsave_avx)) return;
+    if (!has(c, fma_f16c | osxsave_avx))
+        return;
     const uint64_t saved = read_xcr0();
-    if ((saved & ymm_saved) != ymm_saved) return;
+    if ((saved & ymm_saved) != ymm_saved)
+        return;
     const bool lzcnt = __get_cpuid(0x80000001u, &a, &b, &c, &d) && has(c, 1u << 5);
-    if (!lzcnt || !__get_cpuid_count(7, 0, &a, &b, &c, &d) || !has(b, bmi_avx2)) return;
+    if (!lzcnt || !__get_cpuid_count(7, 0, &a, &b, &c, &d) || !has(b, bmi_avx2))
+        return;
     available[TRC_ISA_AVX2] = true;
-    available[TRC_ISA_AVX512] =
-        has(b, avx512_f_dq_cd_bw_vl) && (saved & zmm_saved) == zmm_saved;
+    available[TRC_ISA_AVX512] = has(b, avx512_f_dq_cd_bw_vl) && (saved & zmm_saved) == zmm_saved;
 }
 #else
 static void detect(void) {
@@ -70,28 +73,37 @@ static void detect(void) {
 static void initialise(void) {
     detect();
     for (uint32_t isa = TRC_ISA_SCALAR; isa < ISA_COUNT; isa++) {
-        if (available[isa]) best = isa;
+        if (available[isa])
+            best = isa;
     }
     /* A name that is unknown or not available changes nothing: there is nobody to tell. */
     const char *wanted = getenv("TRACER_ISA");
     for (uint32_t isa = TRC_ISA_SCALAR; wanted && isa < ISA_COUNT; isa++) {
-        if (available[isa] && strcmp(wanted, isa_names[isa]) == 0) best = isa;
+        if (available[isa] && strcmp(wanted, isa_names[isa]) == 0)
+            best = isa;
     }
 }
 
 const struct trc_kernels *trc_kernels_get(uint32_t isa) {
     pthread_once(&once, initialise);
-    if (isa >= ISA_COUNT || !available[isa]) return NULL;
+    if (isa >= ISA_COUNT || !available[isa])
+        return NULL;
     switch (isa) {
-    case TRC_ISA_SCALAR: return &trc_kernels_scalar;
+    case TRC_ISA_SCALAR:
+        return &trc_kernels_scalar;
 #if defined(__x86_64__)
-    case TRC_ISA_SSE42: return &trc_kernels_sse42;
-    case TRC_ISA_AVX2: return &trc_kernels_avx2;
-    case TRC_ISA_AVX512: return &trc_kernels_avx512;
+    case TRC_ISA_SSE42:
+        return &trc_kernels_sse42;
+    case TRC_ISA_AVX2:
+        return &trc_kernels_avx2;
+    case TRC_ISA_AVX512:
+        return &trc_kernels_avx512;
 #elif defined(__aarch64__)
-    case TRC_ISA_NEON: return &trc_kernels_neon;
+    case TRC_ISA_NEON:
+        return &trc_kernels_neon;
 #endif
-    default: return NULL;
+    default:
+        return NULL;
     }
 }
 

@@ -12,15 +12,24 @@
 
 uint32_t trc_pass_channels(uint32_t pass) {
     static const uint8_t channels[TRC_PASS_COUNT] = {
-        [TRC_PASS_COMBINED] = 4,           [TRC_PASS_DEPTH] = 1,
-        [TRC_PASS_NORMAL] = 3,             [TRC_PASS_POSITION] = 3,
-        [TRC_PASS_UV] = 3,                 [TRC_PASS_OBJECT_INDEX] = 1,
-        [TRC_PASS_MATERIAL_INDEX] = 1,     [TRC_PASS_EMISSION] = 3,
-        [TRC_PASS_ENVIRONMENT] = 3,        [TRC_PASS_DIFFUSE_DIRECT] = 3,
-        [TRC_PASS_DIFFUSE_INDIRECT] = 3,   [TRC_PASS_DIFFUSE_COLOR] = 3,
-        [TRC_PASS_GLOSSY_DIRECT] = 3,      [TRC_PASS_GLOSSY_INDIRECT] = 3,
-        [TRC_PASS_GLOSSY_COLOR] = 3,       [TRC_PASS_TRANSMISSION_DIRECT] = 3,
-        [TRC_PASS_TRANSMISSION_INDIRECT] = 3, [TRC_PASS_TRANSMISSION_COLOR] = 3,
+        [TRC_PASS_COMBINED] = 4,
+        [TRC_PASS_DEPTH] = 1,
+        [TRC_PASS_NORMAL] = 3,
+        [TRC_PASS_POSITION] = 3,
+        [TRC_PASS_UV] = 3,
+        [TRC_PASS_OBJECT_INDEX] = 1,
+        [TRC_PASS_MATERIAL_INDEX] = 1,
+        [TRC_PASS_EMISSION] = 3,
+        [TRC_PASS_ENVIRONMENT] = 3,
+        [TRC_PASS_DIFFUSE_DIRECT] = 3,
+        [TRC_PASS_DIFFUSE_INDIRECT] = 3,
+        [TRC_PASS_DIFFUSE_COLOR] = 3,
+        [TRC_PASS_GLOSSY_DIRECT] = 3,
+        [TRC_PASS_GLOSSY_INDIRECT] = 3,
+        [TRC_PASS_GLOSSY_COLOR] = 3,
+        [TRC_PASS_TRANSMISSION_DIRECT] = 3,
+        [TRC_PASS_TRANSMISSION_INDIRECT] = 3,
+        [TRC_PASS_TRANSMISSION_COLOR] = 3,
         [TRC_PASS_SAMPLE_COUNT] = 1,
     };
     return pass < TRC_PASS_COUNT ? channels[pass] : 0;
@@ -43,8 +52,10 @@ static bool is_light(uint32_t pass) {
     case TRC_PASS_GLOSSY_DIRECT:
     case TRC_PASS_GLOSSY_INDIRECT:
     case TRC_PASS_TRANSMISSION_DIRECT:
-    case TRC_PASS_TRANSMISSION_INDIRECT: return true;
-    default: return false;
+    case TRC_PASS_TRANSMISSION_INDIRECT:
+        return true;
+    default:
+        return false;
     }
 }
 
@@ -56,19 +67,22 @@ static bool has_sums(uint32_t pass, uint64_t passes) {
 /* Memory of the machine, or as good as none of a limit if the system does not say. */
 static uint64_t physical_bytes(void) {
     const long pages = sysconf(_SC_PHYS_PAGES), page_bytes = sysconf(_SC_PAGESIZE);
-    if (pages <= 0 || page_bytes <= 0) return UINT64_MAX / 2;
+    if (pages <= 0 || page_bytes <= 0)
+        return UINT64_MAX / 2;
     return (uint64_t)pages * (uint64_t)page_bytes;
 }
 
 /* The budget: a system that overcommits would grant more than there is and kill the host later.
- * width and height are 32-bit and a pixel has less than 1 KiB, so checks of the products suffice. */
+ * width and height are 32-bit and a pixel has less than 1 KiB, so checks of the products suffice.
+ */
 static trc_status check_budget(uint32_t width, uint32_t height, uint64_t passes) {
     uint64_t pixel_bytes = sizeof(uint32_t), bytes = 0;
     for (uint32_t pass = 0; pass < TRC_PASS_COUNT; pass++) {
-        if (has_sums(pass, passes)) pixel_bytes += trc_pass_channels(pass) * sizeof(double);
+        if (has_sums(pass, passes))
+            pixel_bytes += trc_pass_channels(pass) * sizeof(double);
     }
-    const bool fits = trc_multiply_u64((uint64_t)width * height, pixel_bytes, &bytes) &&
-                      bytes <= PTRDIFF_MAX;
+    const bool fits =
+        trc_multiply_u64((uint64_t)width * height, pixel_bytes, &bytes) && bytes <= PTRDIFF_MAX;
     const uint64_t used = trc_memory_bytes(), physical = physical_bytes();
     if (!fits || used > physical || bytes > physical - used) {
         return trc_fail(TRC_ERROR_TOO_LARGE,
@@ -88,7 +102,8 @@ trc_status trc_film_create(struct trc_film *film, uint32_t width, uint32_t heigh
     made.sample_counts = trc_alloc_zeroed(pixels, sizeof *made.sample_counts);
     bool ok = made.sample_counts != NULL;
     for (uint32_t pass = 0; ok && pass < TRC_PASS_COUNT; pass++) {
-        if (!has_sums(pass, passes)) continue;
+        if (!has_sums(pass, passes))
+            continue;
         made.sums[pass] = trc_alloc_zeroed(pixels, trc_pass_channels(pass) * sizeof(double));
         ok = made.sums[pass] != NULL;
     }
@@ -101,13 +116,15 @@ trc_status trc_film_create(struct trc_film *film, uint32_t width, uint32_t heigh
 }
 
 void trc_film_destroy(struct trc_film *film) {
-    for (uint32_t pass = 0; pass < TRC_PASS_COUNT; pass++) trc_free(film->sums[pass]);
+    for (uint32_t pass = 0; pass < TRC_PASS_COUNT; pass++)
+        trc_free(film->sums[pass]);
     trc_free(film->sample_counts);
     memset(film, 0, sizeof *film);
 }
 
 static float to_float(double value) {
-    if (!(value > -FLT_MAX)) return value <= -FLT_MAX ? -FLT_MAX : 0.0f; /* NaN: 0 */
+    if (!(value > -FLT_MAX))
+        return value <= -FLT_MAX ? -FLT_MAX : 0.0f; /* NaN: 0 */
     return value < FLT_MAX ? (float)value : FLT_MAX;
 }
 
@@ -121,7 +138,8 @@ static double load_sum(const double *p) {
 trc_status trc_film_read(const struct trc_film *film, uint32_t pass, float exposure, float *out,
                          uint64_t float_count) {
     const uint32_t channels = trc_pass_channels(pass);
-    if (!channels) return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "there is no pass %" PRIu32, pass);
+    if (!channels)
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "there is no pass %" PRIu32, pass);
     if (!(film->passes >> pass & 1)) {
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "pass %" PRIu32 " was not asked for", pass);
     }

@@ -37,6 +37,8 @@ struct trc_group {
     float inv[3][TRC_PACKET_SIZE];  /* 1 / d, finite */
     float f[TRC_PACKET_SIZE];       /* moving trees: position between the keys */
     float f_min, f_max;
+    /* Packets of one origin: it, and the range of shears, in the order u, v, z. */
+    float origin[3], su_min, su_max, sv_min, sv_max;
 } __attribute__((aligned(64)));
 
 /* A zero component becomes this, so that its reciprocal and products with coordinates stay finite. */
@@ -87,6 +89,7 @@ TRC_INLINE bool trc_group_setup(struct trc_group *g, const struct trc_packet *p,
     if (!(b->z0 <= b->z1)) return false;
     vfloat u_low[2] = {inf, inf}, u_high[2] = {-inf, -inf}, v_low[2] = {inf, inf},
            v_high[2] = {-inf, -inf};
+    vfloat shear[4] = {inf, -inf, inf, -inf};
     const vfloat plane[2] = {sign * b->z0, sign * b->z1};
     for (int c = 0; c < TRC_PACKET_CHUNKS; c++) {
         const uint32_t bits = trc_chunk_bits(mask, c);
@@ -94,15 +97,30 @@ TRC_INLINE bool trc_group_setup(struct trc_group *g, const struct trc_packet *p,
         const int i = c * TRC_WIDTH;
         const vmask m = vm_from_bits(bits);
         const vfloat oz = vf_load(&p->o[z][i]);
+        const vfloat su = vf_load(&g->su[i]), sv = vf_load(&g->sv[i]);
+        shear[0] = vf_min(shear[0], vf_select(m, su, inf));
+        shear[1] = vf_max(shear[1], vf_select(m, su, -inf));
+        shear[2] = vf_min(shear[2], vf_select(m, sv, inf));
+        shear[3] = vf_max(shear[3], vf_select(m, sv, -inf));
         for (int end = 0; end < 2; end++) {
             const vfloat dz = plane[end] - oz;
-            const vfloat u = vf_load(&p->o[au][i]) + dz * vf_load(&g->su[i]);
-            const vfloat v = vf_load(&p->o[av][i]) + dz * vf_load(&g->sv[i]);
+            const vfloat u = vf_load(&p->o[au][i]) + dz * su;
+            const vfloat v = vf_load(&p->o[av][i]) + dz * sv;
             u_low[end] = vf_min(u_low[end], vf_select(m, u, inf));
             u_high[end] = vf_max(u_high[end], vf_select(m, u, -inf));
             v_low[end] = vf_min(v_low[end], vf_select(m, v, inf));
             v_high[end] = vf_max(v_high[end], vf_select(m, v, -inf));
         }
+    }
+    if (p->common_origin) {
+        const int first = __builtin_ctzll(mask);
+        g->origin[0] = p->o[au][first];
+        g->origin[1] = p->o[av][first];
+        g->origin[2] = p->o[z][first];
+        g->su_min = vf_lanes_min(shear[0]);
+        g->su_max = vf_lanes_max(shear[1]);
+        g->sv_min = vf_lanes_min(shear[2]);
+        g->sv_max = vf_lanes_max(shear[3]);
     }
     const float length = b->z1 - b->z0;
     const float per_z = length > 0.0f ? 1.0f / length : 0.0f;

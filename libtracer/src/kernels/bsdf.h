@@ -50,6 +50,9 @@ struct trc_lobe {
     vvec3 f0, f90;
     vfloat cos_o;           /* n . wo */
     vfloat g1_o;            /* masking of wo */
+    vfloat pdf_scale;       /* density of a sampled direction over D of its half vector */
+    vvec3 multi_weight;     /* MULTI_GGX: what the lobe of the missing energy is scaled by */
+    vfloat multi_chance;    /* and how often it is sampled, by cosine */
     vfloat mix_weight;      /* Cycles' sample weight, of every lobe */
     vfloat sample_weight;   /* chance in proportion, 0 for lobes that are not continued */
 };
@@ -80,7 +83,9 @@ vvec3 TRC_KERNEL(trc_lobes_emission)(const struct trc_material *m, const struct 
 
 /* Value times cosine towards wi, split as the passes want it, without ideal lobes; pdf is the density of
  * trc_bsdf_sample for wi over the lobes that are continued (solid angle, 0 for diffuse-only). Lanes
- * outside active are 0. */
+ * outside active are 0. Where light samples and continuation rays share the work, the weight of a light
+ * sample (p_l^2 / (p_l^2 + pdf^2)) goes to all three parts, diffuse included: the weight of a sampled ray
+ * carries all three too. */
 struct trc_bsdf_value {
     vvec3 diffuse, glossy, transmission;
     vfloat pdf;

@@ -45,7 +45,8 @@ vuint TRC_KERNEL(trc_light_visibility)(const struct trc_snapshot *snapshot,
  * the weights. Adds to radiance what the rays see, MIS-weighted (power heuristic). */
 void TRC_KERNEL(trc_light_hit)(const struct trc_snapshot *snapshot, vvec3 p, vvec3 n, vvec3 wi,
                                vfloat tmin, vfloat tmax, vfloat bsdf_pdf,
-                               vfloat light_sample_count, vuint path, vfloat time, vmask active, vvec3 *radiance);
+                               vfloat light_sample_count, vuint path, vfloat time, vmask active,
+                               vvec3 *radiance);
 
 /* MIS weight of emission found on triangle lights by such rays: s is the emissive surface, p_from/n_from the
  * point the ray left. 1 where the triangle is not sampled as a light or bsdf_pdf < 0. */
@@ -58,9 +59,5 @@ vfloat TRC_KERNEL(trc_light_triangle_weight)(const struct trc_surface *s, vvec3 
 vvec3 TRC_KERNEL(trc_world_radiance)(const struct trc_snapshot *snapshot, vvec3 p_from, vvec3 n_from,
                                      vvec3 wi, vfloat bsdf_pdf, vfloat light_sample_count,
                                      vuint path, vmask active);
-
-/* The table entry kernels->world_evaluate. (kernels/light_world.c) */
-void TRC_KERNEL(trc_world_evaluate)(const struct trc_snapshot *snapshot, const float *directions,
-                                    float *radiance, uint32_t count);
 
 #endif

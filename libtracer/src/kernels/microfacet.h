@@ -96,32 +96,25 @@ TRC_INLINE vfloat trc_gtr1_d(vfloat sin2, vfloat alpha) {
 
 /* ---- sampling ---- */
 
-/* Micro-normal of GGX visible from wo (local, z > 0). With bounded, the cap is the smallest that Eto and
- * Tokuyoshi prove to hold all reflections above the surface: the density is then trc_ggx_bounded_pdf of
- * the reflected direction. */
-TRC_INLINE vfloat trc_ggx_cap(vvec3 wo, vfloat alpha_x, vfloat alpha_y) {
+/* How far below the horizon the cap of stretched directions must reach (Eto and Tokuyoshi, eq. 5), as a
+ * fraction of the stretched z of wo; 1 is the whole cap. */
+TRC_INLINE vfloat trc_ggx_bound(vfloat cos_o, vfloat alpha_x, vfloat alpha_y) {
     const vfloat a2 = vf_square(vf_min(vf_min(alpha_x, alpha_y), vf_one()));
-    const vfloat s = vf_one() + vf_safe_sqrt(wo.x * wo.x + wo.y * wo.y);
-    const vfloat s2 = s * s;
-    return (vf_one() - a2) * s2 / (s2 + a2 * wo.z * wo.z);
+    const vfloat s2 = vf_square(vf_one() + vf_safe_sqrt(vf_one() - cos_o * cos_o));
+    return (vf_one() - a2) * s2 / (s2 + a2 * cos_o * cos_o);
 }
-TRC_INLINE vvec3 trc_ggx_sample(vvec3 wo, vfloat alpha_x, vfloat alpha_y, bool bounded, vfloat u1,
+/* Micro-normal of GGX visible from wo (local, z > 0). bound: 1, or trc_ggx_bound where the result serves
+ * reflection only. The density of the reflected direction is D / (2 cos_o (bound + 2 / G1 - 1)). */
+TRC_INLINE vvec3 trc_ggx_sample(vvec3 wo, vfloat alpha_x, vfloat alpha_y, vfloat bound, vfloat u1,
                                 vfloat u2) {
     const vvec3 stretched = v3_normalize(v3(wo.x * alpha_x, wo.y * alpha_y, wo.z));
     vfloat s, c;
     vf_sincos_turns(u1, &s, &c);
-    vfloat low = stretched.z;
-    if (bounded)
-        low = low * trc_ggx_cap(wo, alpha_x, alpha_y);
+    const vfloat low = stretched.z * bound;
     const vfloat z = (vf_one() - u2) * (vf_one() + low) - low;
     const vfloat r = vf_safe_sqrt(vf_one() - z * z);
     const vvec3 h = v3(r * c + stretched.x, r * s + stretched.y, z + stretched.z);
     return v3_normalize(v3(h.x * alpha_x, h.y * alpha_y, vf_max(h.z, vf_set(1e-9f))));
-}
-TRC_INLINE vfloat trc_ggx_bounded_pdf(vvec3 wo, vfloat alpha_x, vfloat alpha_y, vfloat d) {
-    const vfloat k = trc_ggx_cap(wo, alpha_x, alpha_y);
-    const vfloat t = vf_sqrt(vf_square(wo.x * alpha_x) + vf_square(wo.y * alpha_y) + wo.z * wo.z);
-    return d / (vf_set(2.0f) * (k * wo.z + t));
 }
 
 /* Micro-normal of Beckmann visible from wo: inverts the distribution of the slope towards wo by Newton's
@@ -193,7 +186,8 @@ TRC_INLINE vfloat trc_ashikhmin_lobe(vvec3 m, vfloat alpha_x, vfloat alpha_y) {
     const vfloat mean = vf_divide(nx * m.x * m.x + ny * m.y * m.y, sin2);
     const vfloat exponent = vf_select(vf_gt(sin2, vf_zero()), mean, nx);
     /* cos^n = (1 - sin^2)^(n/2), which keeps digits where the exponent is large. */
-    const vfloat power = vf_exp(vf_set(0.5f) * exponent * vf_log(vf_max(vf_one() - sin2, vf_set(1e-12f))));
+    const vfloat below_one = vf_max(-sin2, vf_set(-0.99999994f));
+    const vfloat power = vf_exp(vf_set(0.5f) * exponent * vf_log1p(below_one));
     const vfloat norm = vf_sqrt((nx + vf_one()) * (ny + vf_one())) * vf_set(0.125f * TRC_INV_PI);
     return norm * power;
 }

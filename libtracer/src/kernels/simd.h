@@ -304,6 +304,17 @@ TRC_INLINE vfloat vf_floor(vfloat a) {
 #endif
 }
 
+/* a * b + c, fused where the hardware can: only where an error bound covers either rounding. */
+TRC_INLINE vfloat vf_madd(vfloat a, vfloat b, vfloat c) {
+#if TRC_WIDTH == 16
+    return _mm512_fmadd_ps(a, b, c);
+#elif TRC_WIDTH == 8 && defined(__FMA__)
+    return _mm256_fmadd_ps(a, b, c);
+#else
+    return a * b + c;
+#endif
+}
+
 /* Scalars; b where either is NaN. fminf and fmaxf are calls without -ffinite-math-only. */
 TRC_INLINE float f_min(float a, float b) { return a < b ? a : b; }
 TRC_INLINE float f_max(float a, float b) { return a > b ? a : b; }

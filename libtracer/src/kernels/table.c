@@ -1,7 +1,7 @@
 /* This instruction set's entry in the dispatch (cpu/dispatch.c). */
 #include "kernels/kernels.h"
 
-#include "kernels/light.h"
+#include "kernels/world.h"
 #include "kernels/query.h"
 #include "kernels/tile.h"
 

@@ -287,14 +287,16 @@ static void batch_render(struct trc_tile *t) {
 
 /* ---- the tile ---- */
 
-/* Side of the square of pixels whose samples share packets. */
-#define QUAD 2
-
-/* Samples a pixel has in one batch: enough that a 2x2 square of pixels fills a packet. */
+/* Samples a pixel has in one batch. Packets of a pinhole camera then hold a 2x2 square of pixels: the narrowest
+ * beam. */
 #define SAMPLES_PER_BATCH 16
+#define QUAD 2
+/* With a lens or an open shutter packets hold an 8x8 square and one cell of lens and time each. */
+#define CELL_SQUARE 8
 
 /* Appends the samples [begin, end) of the square of pixels at x, y of the tile, clipped to it. */
-static void quad_append(struct trc_tile *t, uint32_t x, uint32_t y, uint32_t side, uint32_t begin, uint32_t end) {
+static void square_append(struct trc_tile *t, uint32_t x, uint32_t y, uint32_t side, uint32_t begin,
+                          uint32_t end) {
     const struct trc_tile_job *job = t->job;
     for (uint32_t s = begin; s < end; s++)
         for (uint32_t j = y; j < y + side && j < job->height; j++)
@@ -305,21 +307,56 @@ static void quad_append(struct trc_tile *t, uint32_t x, uint32_t y, uint32_t sid
             }
 }
 
+/* Orders the batch by cells of lens and time, so that rays of a packet share one: 16 cells, as a pixel has 16
+ * samples in a batch and the sampler puts about one into each. This is what the paper's interleaved tile
+ * does for coherence, without giving pixels the same pattern. */
+static void samples_order(struct trc_tile *t, bool lens, bool motion) {
+    const uint32_t count = t->samples.count;
+    const float lens_cells = motion ? 2.0f : 4.0f, time_cells = lens ? 4.0f : 16.0f;
+    for (uint32_t i = 0; i < count; i += TRC_WIDTH) {
+        const vuint pixel = vu_load(t->samples.pixel + i), index = vu_load(t->samples.index + i);
+        vint key = vi_set(0);
+        if (lens) {
+            const vfloat u = TRC_KERNEL(trc_sample)(&t->sampler, pixel, index, TRC_DIM_LENS_X);
+            const vfloat v = TRC_KERNEL(trc_sample)(&t->sampler, pixel, index, TRC_DIM_LENS_Y);
+            key = vf_to_int(u * vf_set(lens_cells)) * vi_set((int32_t)lens_cells) +
+                  vf_to_int(v * vf_set(lens_cells));
+        }
+        if (motion) {
+            const vfloat u = TRC_KERNEL(trc_sample)(&t->sampler, pixel, index, TRC_DIM_TIME);
+            key = key * vi_set((int32_t)time_cells) + vf_to_int(u * vf_set(time_cells));
+        }
+        vi_store((int32_t *)t->keys + i, key);
+    }
+    TRC_KERNEL(trc_tile_sort)(t, t->keys, count, 64);
+    uint32_t *const columns[] = {t->samples.pixel, t->samples.index};
+    for (int k = 0; k < 2; k++) {
+        memcpy(t->keys, columns[k], count * sizeof *t->keys);
+        for (uint32_t i = 0; i < count; i++) columns[k][i] = t->keys[t->order[i]];
+    }
+}
+
 /* Walks the tile in squares; with few samples the squares are larger so that packets are full. */
 static void samples_render(struct trc_tile *t, uint32_t begin, uint32_t end) {
     const struct trc_tile_job *job = t->job;
     const uint32_t count = end - begin;
-    const uint32_t side = count >= 16 ? QUAD : count >= 4 ? 2 * QUAD : 4 * QUAD;
+    const bool lens = t->snapshot->camera.aperture_radius > 0.0f, motion = t->snapshot->camera.has_motion;
+    const bool cells = (lens || motion) && count >= 4;
+    const uint32_t side = cells ? CELL_SQUARE : count >= 16 ? QUAD : count >= 4 ? 2 * QUAD : 4 * QUAD;
+    const uint32_t room = cells ? CELL_SQUARE * CELL_SQUARE * count : TRC_BATCH;
     t->samples.count = 0;
     for (uint32_t y = 0; y < job->height; y += side)
         for (uint32_t x = 0; x < job->width; x += side) {
-            if (t->samples.count + side * side * count > TRC_BATCH) {
+            if (t->samples.count + side * side * count > room) {
+                if (cells) samples_order(t, lens, motion);
                 batch_render(t);
                 t->samples.count = 0;
             }
-            quad_append(t, x, y, side, begin, end);
+            square_append(t, x, y, side, begin, end);
         }
-    if (t->samples.count) batch_render(t);
+    if (!t->samples.count) return;
+    if (cells) samples_order(t, lens, motion);
+    batch_render(t);
 }
 
 void TRC_KERNEL(trc_tile_render)(struct trc_tile_job *job) {

@@ -255,6 +255,12 @@ TRC_INLINE vfloat vf_log(vfloat x) {
     return vf_log_special(x, y + e * vf_set(0.693359375f));
 }
 
+/* log(1 + x) for x > -1, 4 ulp (W. Kahan's correction of the rounded sum). */
+TRC_INLINE vfloat vf_log1p(vfloat x) {
+    const vfloat sum = vf_one() + x, kept = sum - vf_one();
+    return vf_select(vf_eq(kept, vf_zero()), x, vf_log(sum) * (x / kept));
+}
+
 /* a * b as high + low, exact (Dekker) while nothing overflows. */
 TRC_INLINE vfloat vf_product_low(vfloat a, vfloat b, vfloat high) {
     const vint upper = vi_set((int32_t)0xfffff000);

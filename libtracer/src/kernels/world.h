@@ -11,7 +11,8 @@
 vvec3 TRC_KERNEL(trc_world_shade)(const struct trc_snapshot *snapshot, vvec3 direction, vuint path,
                                   vmask active);
 
-/* trc_kernels.world_evaluate. Any length of directions but 0; seen by camera rays. */
+/* trc_kernels.world_evaluate. Any length of directions but 0. Light Path is no kind of ray, as when
+ * Cycles fills its importance map: what only the camera sees does not count. */
 void TRC_KERNEL(trc_world_evaluate)(const struct trc_snapshot *snapshot, const float *directions,
                                     float *radiance, uint32_t count);
 

@@ -42,14 +42,14 @@ struct trc_render_state {
     pthread_mutex_t lock; /* all below */
     pthread_cond_t tile_done;
     pthread_cond_t ended;
-    uint32_t *tile_batches;  /* batches done of each tile */
-    uint32_t *batch_tiles;   /* tiles done of each batch */
-    uint32_t lowest_batch;   /* first batch that not all tiles have */
-    uint32_t tiles_done;     /* with all their batches */
+    uint32_t *tile_batches; /* batches done of each tile */
+    uint32_t *batch_tiles;  /* tiles done of each batch */
+    uint32_t lowest_batch;  /* first batch that not all tiles have */
+    uint32_t tiles_done;    /* with all their batches */
     uint64_t pixel_samples_done;
     struct trc_tile_counts counts;
     uint32_t version, state;
-    uint32_t running_count;  /* threads that have not ended, and the starter */
+    uint32_t running_count; /* threads that have not ended, and the starter */
     double time_start, time_end;
 };
 
@@ -60,13 +60,17 @@ trc_render_desc trc_render_resolve(const trc_render_desc *desc) {
         r.crop_width = r.width;
         r.crop_height = r.height;
     }
-    if (!r.light_samples) r.light_samples = TRC_DEFAULT_LIGHT_SAMPLES;
-    if (!r.packet_size) r.packet_size = TRC_DEFAULT_PACKET_SIZE;
-    if (!r.thread_count) r.thread_count = trc_thread_processor_count();
+    if (!r.light_samples)
+        r.light_samples = TRC_DEFAULT_LIGHT_SAMPLES;
+    if (!r.packet_size)
+        r.packet_size = TRC_DEFAULT_PACKET_SIZE;
+    if (!r.thread_count)
+        r.thread_count = trc_thread_processor_count();
     uint32_t *depths[] = {&r.max_depth, &r.max_transparent_depth, &r.max_glossy_depth,
                           &r.max_transmission_depth};
     for (size_t i = 0; i < sizeof depths / sizeof *depths; i++) {
-        if (*depths[i] > TRC_MAX_DEPTH) *depths[i] = TRC_MAX_DEPTH;
+        if (*depths[i] > TRC_MAX_DEPTH)
+            *depths[i] = TRC_MAX_DEPTH;
     }
     r.passes |= UINT64_C(1) << TRC_PASS_COMBINED;
     return r;
@@ -107,7 +111,8 @@ static void finish_item(struct trc_render_state *render, uint32_t tile, uint32_t
     const struct trc_schedule *schedule = &render->schedule;
     pthread_mutex_lock(&render->lock);
     render->tile_batches[tile] = batch + 1;
-    if (batch + 1 == schedule->batch_count) render->tiles_done++;
+    if (batch + 1 == schedule->batch_count)
+        render->tiles_done++;
     render->batch_tiles[batch]++;
     while (render->lowest_batch < schedule->batch_count &&
            render->batch_tiles[render->lowest_batch] == schedule->tile_count) {
@@ -122,7 +127,7 @@ static void finish_item(struct trc_render_state *render, uint32_t tile, uint32_t
 static bool render_item(struct trc_render_state *render, uint32_t tile, uint32_t batch,
                         void *memory) {
     const struct trc_schedule *schedule = &render->schedule;
-    const struct trc_tile area = trc_schedule_tile(schedule, tile);
+    const struct trc_tile_area area = trc_schedule_tile(schedule, tile);
     const uint32_t end = trc_schedule_batch_begin(schedule, batch + 1);
     for (uint32_t i = trc_schedule_batch_begin(schedule, batch); i < end; i += SAMPLES_PER_JOB) {
         struct trc_tile_job job = {
@@ -142,7 +147,8 @@ static bool render_item(struct trc_render_state *render, uint32_t tile, uint32_t
         render->kernels->tile_render(&job);
         const bool complete = !atomic_load(&render->cancel);
         add_counts(render, &job, complete);
-        if (!complete) return false;
+        if (!complete)
+            return false;
     }
     return true;
 }
@@ -166,11 +172,14 @@ static void worker_main(void *context) {
     const uint64_t item_count = (uint64_t)schedule->batch_count * schedule->tile_count;
     while (!atomic_load(&render->cancel)) {
         const uint64_t item = atomic_fetch_add(&render->next_item, 1);
-        if (item >= item_count) break;
+        if (item >= item_count)
+            break;
         const uint32_t batch = (uint32_t)(item / schedule->tile_count);
         const uint32_t tile = schedule->order[item % schedule->tile_count];
-        if (!await_former_batch(render, tile, batch)) break;
-        if (!render_item(render, tile, batch, worker->memory)) break;
+        if (!await_former_batch(render, tile, batch))
+            break;
+        if (!render_item(render, tile, batch, worker->memory))
+            break;
         finish_item(render, tile, batch);
     }
     leave(render);
@@ -180,11 +189,15 @@ static void worker_main(void *context) {
 
 static trc_status init_sync(struct trc_render_state *render) {
     pthread_condattr_t monotonic;
-    if (pthread_condattr_init(&monotonic)) goto fail;
+    if (pthread_condattr_init(&monotonic))
+        goto fail;
     pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
-    if (pthread_mutex_init(&render->lock, NULL)) goto fail_attributes;
-    if (pthread_cond_init(&render->tile_done, NULL)) goto fail_lock;
-    if (pthread_cond_init(&render->ended, &monotonic)) goto fail_tile_done;
+    if (pthread_mutex_init(&render->lock, NULL))
+        goto fail_attributes;
+    if (pthread_cond_init(&render->tile_done, NULL))
+        goto fail_lock;
+    if (pthread_cond_init(&render->ended, &monotonic))
+        goto fail_tile_done;
     pthread_condattr_destroy(&monotonic);
     return TRC_OK;
 fail_tile_done:
@@ -204,8 +217,8 @@ static trc_status take_memory(struct trc_render_state *render) {
     const struct trc_schedule *schedule = &render->schedule;
     TRC_TRY(trc_sobol_table_create(&render->sampler_table));
     /* More threads than tiles would only wait. */
-    render->worker_count = desc->thread_count < schedule->tile_count ? desc->thread_count
-                                                                     : schedule->tile_count;
+    render->worker_count =
+        desc->thread_count < schedule->tile_count ? desc->thread_count : schedule->tile_count;
     render->tile_batches = trc_alloc_zeroed(schedule->tile_count, sizeof(uint32_t));
     render->batch_tiles = trc_alloc_zeroed(schedule->batch_count, sizeof(uint32_t));
     render->workers = trc_alloc_zeroed(render->worker_count, sizeof *render->workers);
@@ -244,8 +257,10 @@ static trc_status start_workers(struct trc_render_state *render) {
         render->running_count++;
         pthread_mutex_unlock(&render->lock);
         status = trc_thread_start(&worker->thread, worker_main, worker);
-        if (status == TRC_OK) render->started_count++;
-        else leave(render);
+        if (status == TRC_OK)
+            render->started_count++;
+        else
+            leave(render);
     }
     leave(render);
     return render->started_count ? TRC_OK : status;
@@ -254,14 +269,16 @@ static trc_status start_workers(struct trc_render_state *render) {
 trc_status trc_render_state_start(struct trc_snapshot *snapshot, const trc_render_desc *desc,
                                   struct trc_render_state **render_out) {
     struct trc_render_state *render = trc_alloc_zeroed(1, sizeof *render);
-    if (!render) return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for a render");
+    if (!render)
+        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for a render");
     render->snapshot = trc_snapshot_retain(snapshot);
     render->desc = *desc;
     render->kernels = trc_kernels_current();
     atomic_init(&render->cancel, 0);
     atomic_init(&render->next_item, 0);
     trc_status status = take_memory(render);
-    if (status == TRC_OK) status = init_sync(render);
+    if (status == TRC_OK)
+        status = init_sync(render);
     if (status != TRC_OK) {
         free_memory(render);
         return status;
@@ -285,7 +302,8 @@ void trc_render_state_cancel(struct trc_render_state *render) {
 }
 
 void trc_render_state_destroy(struct trc_render_state *render) {
-    if (!render) return;
+    if (!render)
+        return;
     trc_render_state_cancel(render);
     for (uint32_t i = 0; i < render->started_count; i++) {
         pthread_join(render->workers[i].thread, NULL);
@@ -317,8 +335,10 @@ void trc_render_state_wait(struct trc_render_state *render, double timeout_secon
     int error = 0;
     pthread_mutex_lock(&render->lock);
     while (render->state == STATE_RUNNING && error != ETIMEDOUT) {
-        if (limited) error = pthread_cond_timedwait(&render->ended, &render->lock, &deadline);
-        else pthread_cond_wait(&render->ended, &render->lock);
+        if (limited)
+            error = pthread_cond_timedwait(&render->ended, &render->lock, &deadline);
+        else
+            pthread_cond_wait(&render->ended, &render->lock);
     }
     pthread_mutex_unlock(&render->lock);
 }
@@ -349,7 +369,7 @@ void trc_render_state_poll(struct trc_render_state *render, trc_render_progress 
     *progress_out = p;
 }
 
-trc_status trc_render_state_read(struct trc_render_state *render, uint32_t pass,
-                                 float *pixels_out, uint64_t float_count) {
+trc_status trc_render_state_read(struct trc_render_state *render, uint32_t pass, float *pixels_out,
+                                 uint64_t float_count) {
     return trc_film_read(&render->film, pass, render->desc.film_exposure, pixels_out, float_count);
 }

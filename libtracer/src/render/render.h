@@ -1,6 +1,6 @@
 /* A render in the background: its threads take items of the schedule until all are done or it is
- * cancelled. An item is claimed by one thread; a batch of a tile waits for the tile's former batch, so
- * each pixel gets its samples in order and the image does not depend on the number of threads.
+ * cancelled. An item is claimed by one thread; a batch of a tile waits for the tile's former batch,
+ * so each pixel gets its samples in order and the image does not depend on the number of threads.
  *
  * Every function may be called from any thread, destroy once and last. */
 #ifndef TRACER_RENDER_RENDER_H
@@ -13,17 +13,18 @@
 #define TRC_DEFAULT_LIGHT_SAMPLES 1
 #define TRC_DEFAULT_PACKET_SIZE 64
 
-/* Deepest path there is. Limits above it ("none") mean this: a path must end. */
-#define TRC_MAX_DEPTH 1024
+/* Deepest path there is. Limits above it ("none") mean this: a path must end, and kernels count the
+ * depths of a ray in 8 bits each. */
+#define TRC_MAX_DEPTH 254
 
 struct trc_render_state;
 
 /* A checked descriptor with every value that 0 leaves to the library filled in. */
 trc_render_desc trc_render_resolve(const trc_render_desc *desc);
 
-/* Takes film and scratch memory and starts the threads. Takes a reference of its own on the snapshot,
- * which has a camera. desc is resolved. TOO_LARGE, OUT_OF_MEMORY, or NO_THREAD if not a single thread
- * could be started; one is enough to go on. */
+/* Takes film and scratch memory and starts the threads. Takes a reference of its own on the
+ * snapshot, which has a camera. desc is resolved. TOO_LARGE, OUT_OF_MEMORY, or NO_THREAD if not a
+ * single thread could be started; one is enough to go on. */
 trc_status trc_render_state_start(struct trc_snapshot *snapshot, const trc_render_desc *desc,
                                   struct trc_render_state **render_out);
 
@@ -36,8 +37,8 @@ void trc_render_state_wait(struct trc_render_state *render, double timeout_secon
 /* struct_size stays. */
 void trc_render_state_poll(struct trc_render_state *render, trc_render_progress *progress_out);
 
-trc_status trc_render_state_read(struct trc_render_state *render, uint32_t pass,
-                                 float *pixels_out, uint64_t float_count);
+trc_status trc_render_state_read(struct trc_render_state *render, uint32_t pass, float *pixels_out,
+                                 uint64_t float_count);
 
 /* Cancels, joins and frees. NULL is fine. */
 void trc_render_state_destroy(struct trc_render_state *render);

@@ -13,16 +13,20 @@ static uint32_t clamp_u32(int64_t value, uint32_t high) {
 
 /* Appends the tiles of row y from x0 to x1 that lie in the frame. */
 static void append_row(struct trc_schedule *s, uint32_t *count, int64_t y, int64_t x0, int64_t x1) {
-    if (y < 0 || y >= s->tiles_y || x1 < 0 || x0 >= s->tiles_x) return;
+    if (y < 0 || y >= s->tiles_y || x1 < 0 || x0 >= s->tiles_x)
+        return;
     const uint32_t begin = clamp_u32(x0, s->tiles_x - 1), end = clamp_u32(x1, s->tiles_x - 1);
-    for (uint32_t x = begin; x <= end; x++) s->order[(*count)++] = (uint32_t)y * s->tiles_x + x;
+    for (uint32_t x = begin; x <= end; x++)
+        s->order[(*count)++] = (uint32_t)y * s->tiles_x + x;
 }
 
 static void append_column(struct trc_schedule *s, uint32_t *count, int64_t x, int64_t y0,
                           int64_t y1) {
-    if (x < 0 || x >= s->tiles_x || y1 < 0 || y0 >= s->tiles_y || y0 > y1) return;
+    if (x < 0 || x >= s->tiles_x || y1 < 0 || y0 >= s->tiles_y || y0 > y1)
+        return;
     const uint32_t begin = clamp_u32(y0, s->tiles_y - 1), end = clamp_u32(y1, s->tiles_y - 1);
-    for (uint32_t y = begin; y <= end; y++) s->order[(*count)++] = y * s->tiles_x + (uint32_t)x;
+    for (uint32_t y = begin; y <= end; y++)
+        s->order[(*count)++] = y * s->tiles_x + (uint32_t)x;
 }
 
 /* Rings of growing radius around the centre; each side of a ring is cut to the frame first, so the
@@ -40,18 +44,24 @@ static void order_from_centre(struct trc_schedule *s) {
 }
 
 uint32_t trc_schedule_batch_begin(const struct trc_schedule *schedule, uint32_t batch) {
-    if (batch == 0) return 0;
-    if (!schedule->progressive || batch >= schedule->batch_count) return schedule->sample_count;
-    if (batch <= MAX_BATCH_LOG2 + 1) return 1u << (batch - 1);
+    if (batch == 0)
+        return 0;
+    if (!schedule->progressive || batch >= schedule->batch_count)
+        return schedule->sample_count;
+    if (batch <= MAX_BATCH_LOG2 + 1)
+        return 1u << (batch - 1);
     return (batch - MAX_BATCH_LOG2) << MAX_BATCH_LOG2;
 }
 
 static uint32_t count_batches(const trc_render_desc *desc) {
-    if (!desc->progressive) return 1;
+    if (!desc->progressive)
+        return 1;
     const uint32_t doubling = 1u << MAX_BATCH_LOG2;
     uint32_t batches = 1;
-    for (uint32_t end = 1; end < desc->sample_count && end < doubling; end *= 2) batches++;
-    if (desc->sample_count > doubling) batches += (desc->sample_count - 1) / doubling;
+    for (uint32_t end = 1; end < desc->sample_count && end < doubling; end *= 2)
+        batches++;
+    if (desc->sample_count > doubling)
+        batches += (desc->sample_count - 1) / doubling;
     return batches;
 }
 
@@ -67,7 +77,8 @@ trc_status trc_schedule_create(const trc_render_desc *desc, struct trc_schedule 
     };
     made.tile_count = made.tiles_x * made.tiles_y;
     made.order = trc_alloc(made.tile_count, sizeof *made.order);
-    if (!made.order) return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for the order of tiles");
+    if (!made.order)
+        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for the order of tiles");
     order_from_centre(&made);
     *schedule = made;
     return TRC_OK;
@@ -78,9 +89,9 @@ void trc_schedule_destroy(struct trc_schedule *schedule) {
     memset(schedule, 0, sizeof *schedule);
 }
 
-struct trc_tile trc_schedule_tile(const struct trc_schedule *schedule, uint32_t tile) {
-    struct trc_tile t = {.x = tile % schedule->tiles_x * TRC_TILE_SIZE,
-                         .y = tile / schedule->tiles_x * TRC_TILE_SIZE};
+struct trc_tile_area trc_schedule_tile(const struct trc_schedule *schedule, uint32_t tile) {
+    struct trc_tile_area t = {.x = tile % schedule->tiles_x * TRC_TILE_SIZE,
+                              .y = tile / schedule->tiles_x * TRC_TILE_SIZE};
     t.width = schedule->width - t.x < TRC_TILE_SIZE ? schedule->width - t.x : TRC_TILE_SIZE;
     t.height = schedule->height - t.y < TRC_TILE_SIZE ? schedule->height - t.y : TRC_TILE_SIZE;
     return t;

@@ -1,8 +1,9 @@
 /* In which order a render's pixels and samples are taken. Pure arithmetic; nothing here is shared
  * between threads.
  *
- * The crop is cut into tiles, taken in a square spiral from the centre, where people look first. Samples
- * are cut into batches; an item is one batch of one tile, and items are numbered batch by batch. */
+ * The crop is cut into tiles, taken in a square spiral from the centre, where people look first.
+ * Samples are cut into batches; an item is one batch of one tile, and items are numbered batch by
+ * batch. */
 #ifndef TRACER_RENDER_SCHEDULE_H
 #define TRACER_RENDER_SCHEDULE_H
 
@@ -11,21 +12,21 @@
 
 #include "tracer/render.h"
 
-/* Pixels of a tile's side. 1024 pixels fill packets of 256 with one sample and still sort into useful
- * groups by material; sums of all passes of a tile (49 doubles a pixel at most) stay in a
+/* Pixels of a tile's side. 1024 pixels fill packets of 256 with one sample and still sort into
+ * useful groups by material; sums of all passes of a tile (49 doubles a pixel at most) stay in a
  * second-level cache; a small preview still has tiles for all threads. */
 #define TRC_TILE_SIZE 32
 
 struct trc_schedule {
-    uint32_t width, height;      /* of the crop */
+    uint32_t width, height; /* of the crop */
     uint32_t tiles_x, tiles_y, tile_count;
-    uint32_t *order;             /* tile_count: tile numbers, rows from the bottom */
+    uint32_t *order; /* tile_count: tile numbers, rows from the bottom */
     uint32_t sample_count;
     uint32_t batch_count;
-    bool progressive;            /* batches 1, 1, 2, 4, ... samples; else one batch of all */
+    bool progressive; /* batches 1, 1, 2, 4, ... samples; else one batch of all */
 };
 
-struct trc_tile {
+struct trc_tile_area {
     uint32_t x, y, width, height; /* pixels of the crop */
 };
 
@@ -36,6 +37,6 @@ void trc_schedule_destroy(struct trc_schedule *schedule);
 /* First sample of a batch; of batch_count: sample_count. */
 uint32_t trc_schedule_batch_begin(const struct trc_schedule *schedule, uint32_t batch);
 
-struct trc_tile trc_schedule_tile(const struct trc_schedule *schedule, uint32_t tile);
+struct trc_tile_area trc_schedule_tile(const struct trc_schedule *schedule, uint32_t tile);
 
 #endif

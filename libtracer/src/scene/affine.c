@@ -44,7 +44,8 @@ static double determinant(const struct columns *c) {
 bool trc_affine_invert(const struct trc_affine *a, struct trc_affine *inverse_out) {
     const struct columns c = columns_of(a);
     const double volume = determinant(&c);
-    if (volume == 0.0 || !isfinite(dot(c.origin, c.origin))) return false;
+    if (volume == 0.0 || !isfinite(dot(c.origin, c.origin)))
+        return false;
     double rows[3][3];
     cross(c.y, c.z, rows[0]);
     cross(c.z, c.x, rows[1]);
@@ -57,8 +58,10 @@ bool trc_affine_invert(const struct trc_affine *a, struct trc_affine *inverse_ou
         }
         inverse.m[4 * row + 3] = (float)(-dot(rows[row], c.origin) / volume);
     }
-    for (int i = 0; i < 12; i++) usable = usable && isfinite(inverse.m[i]);
-    if (usable) *inverse_out = inverse;
+    for (int i = 0; i < 12; i++)
+        usable = usable && isfinite(inverse.m[i]);
+    if (usable)
+        *inverse_out = inverse;
     return usable;
 }
 
@@ -68,17 +71,20 @@ bool trc_affine_flips(const struct trc_affine *a) {
 }
 
 static void scale(double v[3], double s) {
-    for (int i = 0; i < 3; i++) v[i] *= s;
+    for (int i = 0; i < 3; i++)
+        v[i] *= s;
 }
 
 static void subtract_along(double v[3], const double unit[3]) {
     const double s = dot(v, unit);
-    for (int i = 0; i < 3; i++) v[i] -= s * unit[i];
+    for (int i = 0; i < 3; i++)
+        v[i] -= s * unit[i];
 }
 
 bool trc_affine_make_rigid(const struct trc_affine *a, struct trc_affine *rigid_out) {
     struct columns c = columns_of(a);
-    if (determinant(&c) == 0.0 || !isfinite(dot(c.origin, c.origin))) return false;
+    if (determinant(&c) == 0.0 || !isfinite(dot(c.origin, c.origin)))
+        return false;
     scale(c.z, 1.0 / sqrt(dot(c.z, c.z)));
     subtract_along(c.y, c.z);
     scale(c.y, 1.0 / sqrt(dot(c.y, c.y)));

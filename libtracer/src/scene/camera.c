@@ -21,8 +21,8 @@ static void destroy_camera(void *object) {
     trc_free(camera);
 }
 
-/* The time up to which a piecewise-linear opening has let through the share u of its light: inverse of
- * the integral, a quadratic in each piece. */
+/* The time up to which a piecewise-linear opening has let through the share u of its light: inverse
+ * of the integral, a quadratic in each piece. */
 static float invert_shutter(const float *curve, uint32_t count, double total, double u) {
     double left = u * total;
     const uint32_t pieces = count - 1;
@@ -41,13 +41,19 @@ static float invert_shutter(const float *curve, uint32_t count, double total, do
     return 1.0f;
 }
 
-/* A curve that lets nothing through, or one sample, is a box: *inverse_out is NULL. */
+/* A curve that lets nothing through, or is the same all over, is a box: *inverse_out is NULL. */
 static trc_status make_shutter(const float *curve, uint32_t count, float **inverse_out) {
     double total = 0.0;
-    for (uint32_t i = 0; i + 1 < count; i++) total += 0.5 * ((double)curve[i] + curve[i + 1]);
-    if (!(total > 0.0)) return TRC_OK;
+    bool constant = true;
+    for (uint32_t i = 0; i + 1 < count; i++) {
+        total += 0.5 * ((double)curve[i] + curve[i + 1]);
+        constant = constant && curve[i] == curve[i + 1];
+    }
+    if (constant || !(total > 0.0))
+        return TRC_OK;
     float *inverse = trc_alloc(SHUTTER_ENTRIES, sizeof *inverse);
-    if (!inverse) return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for the camera");
+    if (!inverse)
+        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for the camera");
     for (int i = 0; i < SHUTTER_ENTRIES; i++) {
         inverse[i] = invert_shutter(curve, count, total, (double)i / (SHUTTER_ENTRIES - 1));
     }
@@ -71,8 +77,8 @@ static void copy_settings(struct trc_camera *camera, const trc_camera_desc *desc
 static void merge_equal_keys(struct trc_camera *camera) {
     for (uint32_t key = 1; key < camera->key_count; key++) {
         if (memcmp(&camera->camera_to_world[0], &camera->camera_to_world[key],
-                   sizeof camera->camera_to_world[0]) ||
-            memcmp(&camera->windows[0], &camera->windows[key], sizeof camera->windows[0])) {
+                   sizeof camera->camera_to_world[0]) != 0 ||
+            memcmp(&camera->windows[0], &camera->windows[key], sizeof camera->windows[0]) != 0) {
             return;
         }
     }
@@ -105,12 +111,14 @@ static trc_status fill_camera(struct trc_camera *camera, const trc_camera_desc *
 
 trc_status trc_scene_put_camera(struct trc_scene_state *scene, const trc_camera_desc *desc) {
     struct trc_camera *camera = trc_alloc_zeroed(1, sizeof *camera);
-    if (!camera) return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for the camera");
+    if (!camera)
+        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for the camera");
     trc_status status = fill_camera(camera, desc);
     struct trc_shared *shared = NULL;
     if (status == TRC_OK) {
         shared = trc_shared_create(camera, destroy_camera);
-        if (!shared) status = trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for the camera");
+        if (!shared)
+            status = trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for the camera");
     }
     if (status != TRC_OK) {
         destroy_camera(camera);
@@ -124,7 +132,8 @@ trc_status trc_scene_put_camera(struct trc_scene_state *scene, const trc_camera_
 
 trc_status trc_scene_put_world(struct trc_scene_state *scene, const trc_world_desc *desc) {
     void *ignored;
-    if (desc->material) TRC_TRY(trc_store_find(&scene->materials, desc->material, &ignored));
+    if (desc->material)
+        TRC_TRY(trc_store_find(&scene->materials, desc->material, &ignored));
     scene->world = *desc;
     scene->changed |= TRC_CHANGED_WORLD;
     return TRC_OK;

@@ -19,7 +19,8 @@ static trc_status no_memory(void) {
 trc_status trc_collect_images(const struct trc_scene_state *scene, struct trc_snapshot *s) {
     const struct trc_store *store = &scene->images;
     s->images = trc_alloc_zeroed(store->slot_count, sizeof *s->images);
-    if (!s->images) return no_memory();
+    if (!s->images)
+        return no_memory();
     s->image_count = store->slot_count;
     for (uint32_t i = trc_store_first(store); i != TRC_STORE_END; i = trc_store_next(store, i)) {
         s->images[i] = trc_image_retain(store->slots[i].object);
@@ -32,7 +33,8 @@ trc_status trc_collect_materials(const struct trc_scene_state *scene, struct trc
     const struct trc_store *store = &scene->materials;
     const uint32_t count = store->slot_count + 1;
     s->materials = trc_alloc_zeroed(count, sizeof *s->materials);
-    if (!s->materials) return no_memory();
+    if (!s->materials)
+        return no_memory();
     s->material_count = count;
     for (uint32_t i = 0; i < count; i++) {
         void *material = i ? store->slots[i - 1].object : NULL;
@@ -44,7 +46,8 @@ trc_status trc_collect_materials(const struct trc_scene_state *scene, struct trc
 trc_status trc_collect_meshes(struct trc_scene_state *scene, struct trc_snapshot *s) {
     const struct trc_store *store = &scene->meshes;
     s->meshes = trc_alloc_zeroed(store->living_count, sizeof *s->meshes);
-    if (!s->meshes) return no_memory();
+    if (!s->meshes)
+        return no_memory();
     for (uint32_t i = trc_store_first(store); i != TRC_STORE_END; i = trc_store_next(store, i)) {
         struct trc_scene_mesh *mesh = store->slots[i].object;
         TRC_TRY(trc_geometry_finish(mesh->geometry, scene->pool, &scene->cancel));
@@ -81,11 +84,13 @@ static trc_status create_instance_data(const struct trc_store *store,
         materials += source->material_count ? source->material_count : 1;
     }
     struct instance_data *data = trc_alloc_zeroed(1, sizeof *data);
-    if (!data) return no_memory();
+    if (!data)
+        return no_memory();
     data->transforms = trc_alloc(transforms, sizeof *data->transforms);
     data->materials = trc_alloc(materials, sizeof *data->materials);
     struct trc_shared *shared = NULL;
-    if (data->transforms && data->materials) shared = trc_shared_create(data, destroy_instance_data);
+    if (data->transforms && data->materials)
+        shared = trc_shared_create(data, destroy_instance_data);
     if (!shared) {
         destroy_instance_data(data);
         return no_memory();
@@ -97,7 +102,8 @@ static trc_status create_instance_data(const struct trc_store *store,
 /* Keys that are all equal are one: an instance that stands still costs no motion. */
 static uint32_t distinct_keys(const struct trc_scene_instance *source) {
     for (uint32_t key = 1; key < source->key_count; key++) {
-        if (memcmp(&source->transforms[0], &source->transforms[key], sizeof(struct trc_affine))) {
+        if (memcmp(&source->transforms[0], &source->transforms[key], sizeof(struct trc_affine)) !=
+            0) {
             return source->key_count;
         }
     }
@@ -128,8 +134,8 @@ static void place(struct trc_instance *instance, const struct trc_scene_instance
     instance->flips = trc_affine_flips(&transforms[0]);
 }
 
-static uint64_t fill_instances(const struct trc_scene_state *scene, const struct instance_data *data,
-                               struct trc_snapshot *s) {
+static uint64_t fill_instances(const struct trc_scene_state *scene,
+                               const struct instance_data *data, struct trc_snapshot *s) {
     const struct trc_store *store = &scene->instances;
     struct trc_affine *transforms = data->transforms;
     uint32_t *materials = data->materials;
@@ -167,7 +173,8 @@ trc_status trc_collect_instances(const struct trc_scene_state *scene,
     struct trc_snapshot *s = &block->snapshot;
     const struct trc_store *store = &scene->instances;
     s->instances = trc_alloc(store->living_count, sizeof *s->instances);
-    if (!s->instances) return no_memory();
+    if (!s->instances)
+        return no_memory();
     if (former && !(scene->changed & (TRC_CHANGED_MESHES | TRC_CHANGED_INSTANCES))) {
         block->instance_data = trc_shared_retain(former->instance_data);
         s->instance_count = former->snapshot.instance_count;
@@ -189,7 +196,8 @@ void trc_collect_view(const struct trc_scene_state *scene, struct trc_snapshot_b
     struct trc_snapshot *s = &block->snapshot;
     block->camera = trc_shared_retain(scene->camera);
     s->has_camera = scene->camera != NULL;
-    if (scene->camera) s->camera = *(const struct trc_camera *)scene->camera->object;
+    if (scene->camera)
+        s->camera = *(const struct trc_camera *)scene->camera->object;
 
     const trc_world_desc *desc = &scene->world;
     const uint32_t index = trc_scene_material_index(scene, desc->material);
@@ -200,7 +208,8 @@ void trc_collect_view(const struct trc_scene_state *scene, struct trc_snapshot_b
         .ao_distance = desc->ao_distance,
         .ao_factor = desc->ao_factor,
     };
-    if (!index) return;
+    if (!index)
+        return;
     const struct trc_material *material = s->materials[index];
     s->world.is_constant = !(material->has & TRC_MATERIAL_EMISSION_VARIES);
     if (s->world.is_constant) {

@@ -1,8 +1,8 @@
 /* Commit: from edits to an immutable snapshot.
  *
- * A snapshot is built beside the one in force and replaces it only when complete. Parts whose inputs have not
- * changed are shared with it: meshes and materials always, trees when geometry stands still, lights
- * when only the camera has moved. */
+ * A snapshot is built beside the one in force and replaces it only when complete. Parts whose
+ * inputs have not changed are shared with it: meshes and materials always, trees when geometry
+ * stands still, lights when only the camera has moved. */
 #include "scene/commit.h"
 
 #include <inttypes.h>
@@ -30,9 +30,12 @@ static void destroy_block(struct trc_snapshot_block *block) {
     trc_shared_release(block->bvh);
     trc_shared_release(block->instance_data);
     trc_shared_release(block->camera);
-    for (uint32_t i = 0; i < s->mesh_count; i++) trc_geometry_release(s->meshes[i]);
-    for (uint32_t i = 0; i < s->material_count; i++) trc_material_release(s->materials[i]);
-    for (uint32_t i = 0; i < s->image_count; i++) trc_image_release(s->images[i]);
+    for (uint32_t i = 0; i < s->mesh_count; i++)
+        trc_geometry_release(s->meshes[i]);
+    for (uint32_t i = 0; i < s->material_count; i++)
+        trc_material_release(s->materials[i]);
+    for (uint32_t i = 0; i < s->image_count; i++)
+        trc_image_release(s->images[i]);
     trc_free(s->meshes);
     trc_free(s->instances);
     trc_free(s->materials);
@@ -41,12 +44,14 @@ static void destroy_block(struct trc_snapshot_block *block) {
 }
 
 struct trc_snapshot *trc_snapshot_retain(struct trc_snapshot *snapshot) {
-    if (snapshot) atomic_fetch_add_explicit(&snapshot->refs, 1, memory_order_relaxed);
+    if (snapshot)
+        atomic_fetch_add_explicit(&snapshot->refs, 1, memory_order_relaxed);
     return snapshot;
 }
 
 void trc_snapshot_release(struct trc_snapshot *snapshot) {
-    if (!snapshot || atomic_fetch_sub(&snapshot->refs, 1) != 1) return;
+    if (!snapshot || atomic_fetch_sub(&snapshot->refs, 1) != 1)
+        return;
     destroy_block((struct trc_snapshot_block *)snapshot);
 }
 
@@ -60,12 +65,12 @@ static void destroy_bvh(void *object) { trc_bvh_destroy(object); }
 
 /* What the trees read of materials is the same in both snapshots. */
 static bool transparency_is_equal(const struct trc_snapshot *a, const struct trc_snapshot *b) {
-    if (a->material_count != b->material_count) return false;
+    if (a->material_count != b->material_count)
+        return false;
     for (uint32_t i = 0; i < a->material_count; i++) {
         const struct trc_material *x = a->materials[i], *y = b->materials[i];
-        if (x == y) continue;
-        if ((x->has ^ y->has) & TRC_MATERIAL_HAS_TRANSPARENCY) return false;
-        if ((x->flags ^ y->flags) & TRC_MATERIAL_TRANSPARENT_SHADOW) return false;
+        if (x != y && trc_material_shadows_transparent(x) != trc_material_shadows_transparent(y))
+            return false;
     }
     return true;
 }
@@ -74,18 +79,21 @@ static trc_status build_bvh(struct trc_scene_state *scene, const struct trc_snap
                             struct trc_snapshot_block *block) {
     struct trc_snapshot *s = &block->snapshot;
     struct trc_mesh **replaced = trc_alloc_zeroed(s->mesh_count, sizeof *replaced);
-    if (!replaced) return no_memory();
+    if (!replaced)
+        return no_memory();
     const struct trc_store *store = &scene->meshes;
     for (uint32_t i = trc_store_first(store); i != TRC_STORE_END; i = trc_store_next(store, i)) {
         const struct trc_scene_mesh *mesh = store->slots[i].object;
-        if (mesh->committed != mesh->geometry) replaced[mesh->index] = mesh->committed;
+        if (mesh->committed != mesh->geometry)
+            replaced[mesh->index] = mesh->committed;
     }
     const struct trc_bvh_options options = {.is_final = scene->is_final, .cancel = &scene->cancel};
     struct trc_bvh *bvh;
     const trc_status status = trc_bvh_create(s, former ? former->snapshot.bvh : NULL, replaced,
                                              &options, scene->pool, &bvh, &block->build);
     trc_free(replaced);
-    if (status != TRC_OK) return status;
+    if (status != TRC_OK)
+        return status;
     block->bvh = trc_shared_create(bvh, destroy_bvh);
     if (!block->bvh) {
         trc_bvh_destroy(bvh);
@@ -98,7 +106,8 @@ static trc_status build_bvh(struct trc_scene_state *scene, const struct trc_snap
 static trc_status collect_bvh(struct trc_scene_state *scene,
                               const struct trc_snapshot_block *former,
                               struct trc_snapshot_block *block) {
-    if (former && former->isa != block->isa) former = NULL;
+    if (former && former->isa != block->isa)
+        former = NULL;
     const bool still = !(scene->changed & (TRC_CHANGED_MESHES | TRC_CHANGED_INSTANCES));
     if (former && still && transparency_is_equal(&former->snapshot, &block->snapshot)) {
         block->bvh = trc_shared_retain(former->bvh);
@@ -116,20 +125,39 @@ static trc_status collect_bvh(struct trc_scene_state *scene,
 
 static void destroy_lights(void *object) { trc_light_table_destroy(object); }
 
+static const struct trc_material *world_material(const struct trc_snapshot *s) {
+    return s->world.material == UINT32_MAX ? NULL : s->materials[s->world.material];
+}
+
+/* The table whose importance map of the world is still right, or NULL. */
+static const struct trc_light_table *same_world(const struct trc_scene_state *scene,
+                                                const struct trc_snapshot_block *former,
+                                                const struct trc_snapshot_block *block) {
+    if (!former || (scene->changed & (TRC_CHANGED_WORLD | TRC_CHANGED_IMAGES)))
+        return NULL;
+    if (world_material(&former->snapshot) != world_material(&block->snapshot))
+        return NULL;
+    return former->snapshot.lights;
+}
+
 static trc_status build_lights(const struct trc_scene_state *scene,
+                               const struct trc_snapshot_block *former,
                                struct trc_snapshot_block *block) {
     const struct trc_store *store = &scene->lights;
     trc_light_desc *descs = trc_alloc(store->living_count, sizeof *descs);
-    if (!descs) return no_memory();
+    if (!descs)
+        return no_memory();
     uint32_t count = 0;
     for (uint32_t i = trc_store_first(store); i != TRC_STORE_END; i = trc_store_next(store, i)) {
         descs[count++] = *(const trc_light_desc *)store->slots[i].object;
     }
     struct trc_light_table *lights;
-    const trc_status status = trc_light_table_create(&block->snapshot, descs, count,
-                                                     &scene->world, &lights);
+    const trc_status status = trc_light_table_create_like(
+        same_world(scene, former, block), &block->snapshot, descs, count,
+        scene->world.struct_size ? &scene->world : NULL, &lights);
     trc_free(descs);
-    if (status != TRC_OK) return status;
+    if (status != TRC_OK)
+        return status;
     block->lights = trc_shared_create(lights, destroy_lights);
     if (!block->lights) {
         trc_light_table_destroy(lights);
@@ -138,8 +166,8 @@ static trc_status build_lights(const struct trc_scene_state *scene,
     return TRC_OK;
 }
 
-/* A light table depends on all but the camera. The instances of former, with their light numbers, are
- * those of the new snapshot then. */
+/* A light table depends on all but the camera. The instances of former, with their light numbers,
+ * are those of the new snapshot then. */
 static trc_status collect_lights(const struct trc_scene_state *scene,
                                  const struct trc_snapshot_block *former,
                                  struct trc_snapshot_block *block) {
@@ -147,8 +175,9 @@ static trc_status collect_lights(const struct trc_scene_state *scene,
         block->lights = trc_shared_retain(former->lights);
     } else {
         struct trc_snapshot *s = &block->snapshot;
-        for (uint32_t i = 0; i < s->instance_count; i++) s->instances[i].first_light = UINT32_MAX;
-        TRC_TRY(build_lights(scene, block));
+        for (uint32_t i = 0; i < s->instance_count; i++)
+            s->instances[i].first_light = UINT32_MAX;
+        TRC_TRY(build_lights(scene, former, block));
     }
     block->snapshot.lights = block->lights->object;
     return TRC_OK;
@@ -169,7 +198,8 @@ static void finish_stats(const struct trc_scene_state *scene, struct trc_snapsho
     memcpy(stats->bounds_lower, block->build.bounds_lower, sizeof stats->bounds_lower);
     memcpy(stats->bounds_upper, block->build.bounds_upper, sizeof stats->bounds_upper);
     if (stats->skipped_triangle_count) {
-        trc_warn(block, "%" PRIu64 " triangles are left out: a vertex is not finite or beyond 1.8e18",
+        trc_warn(block,
+                 "%" PRIu64 " triangles are left out: a vertex is not finite or beyond 1.8e18",
                  stats->skipped_triangle_count);
     }
     if (stats->skipped_instance_count) {
@@ -179,7 +209,8 @@ static void finish_stats(const struct trc_scene_state *scene, struct trc_snapsho
 }
 
 static trc_status check_cancel(const struct trc_scene_state *scene) {
-    if (!atomic_load(&scene->cancel)) return TRC_OK;
+    if (!atomic_load(&scene->cancel))
+        return TRC_OK;
     return trc_fail(TRC_ERROR_CANCELLED, "the commit was cancelled");
 }
 
@@ -214,9 +245,11 @@ static void publish(struct trc_scene_state *scene, struct trc_snapshot_block *bl
 
 static trc_status commit(struct trc_scene_state *scene) {
     const double start = trc_seconds();
-    if (!scene->pool) TRC_TRY(trc_pool_create(scene->thread_count, &scene->pool));
+    if (!scene->pool)
+        TRC_TRY(trc_pool_create(scene->thread_count, &scene->pool));
     struct trc_snapshot_block *block = trc_alloc_zeroed(1, sizeof *block);
-    if (!block) return no_memory();
+    if (!block)
+        return no_memory();
     atomic_init(&block->snapshot.refs, 1);
     block->isa = trc_isa();
     const struct trc_snapshot_block *former =

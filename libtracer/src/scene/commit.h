@@ -31,8 +31,8 @@ struct trc_snapshot_block {
     char warnings[TRC_WARNING_BYTES];
 };
 
-static inline const struct trc_snapshot_block *
-trc_snapshot_block_of(const struct trc_snapshot *snapshot) {
+static inline const struct trc_snapshot_block *trc_snapshot_block_of(
+    const struct trc_snapshot *snapshot) {
     return (const struct trc_snapshot_block *)snapshot;
 }
 

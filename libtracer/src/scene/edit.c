@@ -12,11 +12,13 @@
 trc_status trc_scene_add_mesh(struct trc_scene_state *scene, const trc_mesh_desc *desc,
                               trc_id *id) {
     struct trc_scene_mesh *mesh = trc_alloc_zeroed(1, sizeof *mesh);
-    if (!mesh) return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for a mesh");
+    if (!mesh)
+        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for a mesh");
     trc_status status = trc_geometry_create(desc, scene->names, &mesh->geometry);
     if (status == TRC_OK) {
         status = trc_store_add(&scene->meshes, mesh, id);
-        if (status != TRC_OK) trc_geometry_release(mesh->geometry);
+        if (status != TRC_OK)
+            trc_geometry_release(mesh->geometry);
     }
     if (status != TRC_OK) {
         trc_free(mesh);
@@ -35,15 +37,15 @@ trc_status trc_scene_pose_mesh(struct trc_scene_state *scene, trc_id id, uint32_
     const struct trc_mesh *former = mesh->geometry;
     const uint32_t kind = trc_geometry_normal_kind(former);
     const uint64_t expected = (uint64_t)3 * former->vertex_count * key_count;
-    const uint64_t expected_normals = kind == TRC_NORMALS_NONE     ? 0
-                                      : kind == TRC_NORMALS_VERTEX ? expected
-                                                                   : (uint64_t)9 *
-                                                                         former->triangle_count *
-                                                                         key_count;
+    const uint64_t expected_normals = kind == TRC_NORMALS_NONE ? 0
+                                      : kind == TRC_NORMALS_VERTEX
+                                          ? expected
+                                          : (uint64_t)9 * former->triangle_count * key_count;
     TRC_TRY(trc_check_array(positions, position_count, expected, 4, 4, "positions"));
     TRC_TRY(trc_check_array(normals, normal_count, expected_normals, 4, 4, "normals"));
     if (expected > INT32_MAX || expected_normals > INT32_MAX) {
-        return trc_fail(TRC_ERROR_TOO_LARGE, "a mesh can have at most 2^31 - 1 floats of each kind");
+        return trc_fail(TRC_ERROR_TOO_LARGE,
+                        "a mesh can have at most 2^31 - 1 floats of each kind");
     }
     struct trc_mesh *pose;
     TRC_TRY(trc_geometry_pose(former, key_count, positions, normals, &pose));
@@ -82,11 +84,13 @@ static trc_status make_instance(const struct trc_scene_state *scene, const trc_i
     const size_t material_bytes = desc->material_count * sizeof(trc_id);
     struct trc_scene_instance *instance =
         trc_alloc(1, sizeof *instance + transform_bytes + material_bytes);
-    if (!instance) return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for an instance");
+    if (!instance)
+        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for an instance");
     struct trc_affine *transforms = (struct trc_affine *)(instance + 1);
     trc_id *materials = (trc_id *)(transforms + desc->key_count);
     memcpy(transforms, desc->transforms, transform_bytes);
-    if (material_bytes) memcpy(materials, desc->materials, material_bytes);
+    if (material_bytes)
+        memcpy(materials, desc->materials, material_bytes);
     *instance = (struct trc_scene_instance){
         .mesh = desc->mesh,
         .key_count = desc->key_count,
@@ -120,7 +124,7 @@ trc_status trc_scene_add_instance(struct trc_scene_state *scene, const trc_insta
 
 trc_status trc_scene_change_instance(struct trc_scene_state *scene, trc_id id,
                                      const trc_instance_desc *desc) {
-    void *former, *mesh;
+    void *former = NULL, *mesh = NULL;
     TRC_TRY(trc_store_find(&scene->instances, id, &former));
     TRC_TRY(trc_store_find(&scene->meshes, desc->mesh, &mesh));
     struct trc_scene_instance *instance;
@@ -152,7 +156,8 @@ trc_status trc_scene_remove_instance(struct trc_scene_state *scene, trc_id id) {
 trc_status trc_scene_add_light(struct trc_scene_state *scene, const trc_light_desc *desc,
                                trc_id *id) {
     trc_light_desc *light = trc_alloc(1, sizeof *light);
-    if (!light) return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for a light");
+    if (!light)
+        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for a light");
     *light = *desc;
     const trc_status status = trc_store_add(&scene->lights, light, id);
     if (status != TRC_OK) {

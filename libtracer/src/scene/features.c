@@ -21,7 +21,8 @@ static uint32_t material_features(uint32_t has) {
     };
     uint32_t features = 0;
     for (size_t i = 0; i < sizeof pairs / sizeof *pairs; i++) {
-        if (has & pairs[i][0]) features |= pairs[i][1];
+        if (has & pairs[i][0])
+            features |= pairs[i][1];
     }
     return features;
 }
@@ -31,10 +32,14 @@ static uint32_t instance_features(const struct trc_snapshot *s) {
     uint32_t features = 0;
     for (uint32_t i = 0; i < s->instance_count; i++) {
         const struct trc_instance *instance = &s->instances[i];
-        if (instance->visibility != TRC_VISIBLE_ALL) features |= TRC_FEATURE_VISIBILITY;
-        if (!instance->visibility) continue;
-        if (instance->key_count > 1) features |= TRC_FEATURE_OBJECT_MOTION;
-        if (s->meshes[instance->mesh]->key_count > 1) features |= TRC_FEATURE_DEFORMATION;
+        if (instance->visibility != TRC_VISIBLE_ALL)
+            features |= TRC_FEATURE_VISIBILITY;
+        if (!instance->visibility)
+            continue;
+        if (instance->key_count > 1)
+            features |= TRC_FEATURE_OBJECT_MOTION;
+        if (s->meshes[instance->mesh]->key_count > 1)
+            features |= TRC_FEATURE_DEFORMATION;
         for (uint32_t m = 0; m < instance->material_count; m++) {
             features |= material_features(s->materials[instance->materials[m]]->has);
         }
@@ -45,7 +50,8 @@ static uint32_t instance_features(const struct trc_snapshot *s) {
 static bool is_instanced(const struct trc_scene_state *scene) {
     const struct trc_store *store = &scene->meshes;
     for (uint32_t i = trc_store_first(store); i != TRC_STORE_END; i = trc_store_next(store, i)) {
-        if (((const struct trc_scene_mesh *)store->slots[i].object)->use_count > 1) return true;
+        if (((const struct trc_scene_mesh *)store->slots[i].object)->use_count > 1)
+            return true;
     }
     return false;
 }
@@ -59,7 +65,8 @@ static uint32_t light_features(const struct trc_scene_state *scene) {
         const float extent = light->type == TRC_LIGHT_SUN    ? light->angle
                              : light->type == TRC_LIGHT_AREA ? 1.0f
                                                              : light->radius;
-        if (extent > 0.0f) features |= TRC_FEATURE_AREA_LIGHTS;
+        if (extent > 0.0f)
+            features |= TRC_FEATURE_AREA_LIGHTS;
     }
     return features;
 }
@@ -68,18 +75,23 @@ static uint32_t view_features(const struct trc_snapshot *s) {
     const struct trc_world *world = &s->world;
     uint32_t features = 0;
     if (s->has_camera) {
-        if (s->camera.aperture_radius > 0.0f) features |= TRC_FEATURE_LENS;
-        if (s->camera.has_motion && s->camera.key_count > 1) features |= TRC_FEATURE_CAMERA_MOTION;
+        if (s->camera.aperture_radius > 0.0f)
+            features |= TRC_FEATURE_LENS;
+        if (s->camera.has_motion && s->camera.key_count > 1)
+            features |= TRC_FEATURE_CAMERA_MOTION;
     }
-    if (world->ao_factor > 0.0f) features |= TRC_FEATURE_AMBIENT_OCCLUSION;
-    if (world->material == UINT32_MAX) return features;
+    if (world->ao_factor > 0.0f)
+        features |= TRC_FEATURE_AMBIENT_OCCLUSION;
+    if (world->material == UINT32_MAX)
+        return features;
     const uint32_t has = s->materials[world->material]->has;
     const float *radiance = world->radiance;
     if (!world->is_constant) {
         /* Programs and textures of the world are looked up like those of surfaces. */
         features |= TRC_FEATURE_ENVIRONMENT |
                     (material_features(has) & (TRC_FEATURE_PROGRAMS | TRC_FEATURE_TEXTURES));
-        if (has & TRC_MATERIAL_HAS_TEXTURE) features |= TRC_FEATURE_ENVIRONMENT_IMAGE;
+        if (has & TRC_MATERIAL_HAS_TEXTURE)
+            features |= TRC_FEATURE_ENVIRONMENT_IMAGE;
     } else if (radiance[0] > 0.0f || radiance[1] > 0.0f || radiance[2] > 0.0f) {
         features |= TRC_FEATURE_ENVIRONMENT;
     }
@@ -107,7 +119,8 @@ void trc_count_stats(const struct trc_scene_state *scene, struct trc_snapshot *s
         stats->instanced_triangle_count += s->meshes[s->instances[i].mesh]->triangle_count;
     }
     for (uint32_t i = 0; i < s->image_count; i++) {
-        if (s->images[i]) stats->image_bytes += trc_image_bytes(s->images[i]);
+        if (s->images[i])
+            stats->image_bytes += trc_image_bytes(s->images[i]);
     }
 }
 
@@ -118,6 +131,7 @@ void trc_warn(struct trc_snapshot_block *block, const char *format, ...) {
     const int size = vsnprintf(block->warnings + used, room, format, arguments);
     va_end(arguments);
     const bool fits = size >= 0 && (size_t)size + 1 < room; /* and the end of the line */
-    if (fits) block->warnings[used + (size_t)size] = '\n';
+    if (fits)
+        block->warnings[used + (size_t)size] = '\n';
     block->warnings[used + (fits ? (size_t)size + 1 : 0)] = '\0';
 }

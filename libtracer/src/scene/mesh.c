@@ -15,7 +15,8 @@ static trc_status no_memory(void) {
 /* ---- topology ---- */
 
 static void release_topology(struct trc_mesh_topology *topology) {
-    if (!topology || atomic_fetch_sub(&topology->refs, 1) != 1) return;
+    if (!topology || atomic_fetch_sub(&topology->refs, 1) != 1)
+        return;
     trc_free(topology->indices);
     trc_free(topology->smooth);
     trc_free(topology->material_index);
@@ -33,7 +34,8 @@ static bool copy_array(struct trc_mesh_topology *topology, const void *source, u
     void *copy = NULL;
     if (source && count) {
         copy = trc_alloc(count, size);
-        if (!copy) return false;
+        if (!copy)
+            return false;
         memcpy(copy, source, count * size);
         topology->bytes += count * size;
     }
@@ -63,14 +65,14 @@ static trc_status copy_attribute(struct trc_mesh_topology *topology,
     struct trc_attribute *attribute = &topology->attributes[topology->attribute_count];
     attribute->width = desc->width;
     TRC_TRY(trc_names_add(names, desc->name, &attribute->name));
-    if (!copy_array(topology, desc->values, desc->value_count, sizeof(float),
-                    &attribute->values)) {
+    if (!copy_array(topology, desc->values, desc->value_count, sizeof(float), &attribute->values)) {
         return no_memory();
     }
     topology->attribute_count++;
     /* A NaN coordinate would reach integer conversions in texture lookups. */
     for (uint64_t i = 0; i < desc->value_count; i++) {
-        if (!isfinite(attribute->values[i])) attribute->values[i] = 0.0f;
+        if (!isfinite(attribute->values[i]))
+            attribute->values[i] = 0.0f;
     }
     return TRC_OK;
 }
@@ -80,12 +82,11 @@ static trc_status fill_topology(struct trc_mesh_topology *topology, const trc_me
     const uint64_t triangles = desc->triangle_count;
     topology->normal_kind = desc->normals ? desc->normal_kind : TRC_NORMALS_NONE;
     /* Corner normals rule over the flags; flags that say nothing are not kept. */
-    const bool smooth = topology->normal_kind != TRC_NORMALS_CORNER &&
-                        !all_zero(desc->smooth, triangles);
+    const bool smooth =
+        topology->normal_kind != TRC_NORMALS_CORNER && !all_zero(desc->smooth, triangles);
     const bool slots = !all_zero(desc->material_index, triangles * sizeof(uint16_t));
     TRC_TRY(check_indices(desc->indices, 3 * triangles, desc->vertex_count));
-    if (!copy_array(topology, desc->indices, 3 * triangles, sizeof(uint32_t),
-                    &topology->indices) ||
+    if (!copy_array(topology, desc->indices, 3 * triangles, sizeof(uint32_t), &topology->indices) ||
         !copy_array(topology, smooth ? desc->smooth : NULL, triangles, 1, &topology->smooth) ||
         !copy_array(topology, slots ? desc->material_index : NULL, triangles, sizeof(uint16_t),
                     &topology->material_index)) {
@@ -120,11 +121,13 @@ static void repair_normals(struct trc_mesh *mesh) {
         const float *p = mesh->positions + (size_t)3 * mesh->vertex_count * key;
         for (size_t i = 0; vertex && i < mesh->vertex_count; i++) {
             float *n = vertex + 3 * (mesh->vertex_count * (size_t)key + i);
-            if (!normal_is_valid(n)) trc_normal_fallback(p + 3 * i, n);
+            if (!normal_is_valid(n))
+                trc_normal_fallback(p + 3 * i, n);
         }
         for (size_t i = 0; corner && i < (size_t)3 * mesh->triangle_count; i++) {
             float *n = corner + 3 * ((size_t)3 * mesh->triangle_count * key + i);
-            if (!normal_is_valid(n)) trc_normal_fallback(p + 3 * (size_t)mesh->indices[i], n);
+            if (!normal_is_valid(n))
+                trc_normal_fallback(p + 3 * (size_t)mesh->indices[i], n);
         }
     }
 }
@@ -135,7 +138,8 @@ static void find_bounds(struct trc_mesh *mesh) {
     const size_t count = (size_t)mesh->vertex_count * mesh->key_count;
     for (size_t i = 0; i < count; i++) {
         const float *p = mesh->positions + 3 * i;
-        if (!trc_point_is_valid(p)) continue;
+        if (!trc_point_is_valid(p))
+            continue;
         for (int axis = 0; axis < 3; axis++) {
             lower[axis] = p[axis] < lower[axis] ? p[axis] : lower[axis];
             upper[axis] = p[axis] > upper[axis] ? p[axis] : upper[axis];
@@ -150,7 +154,8 @@ static void find_bounds(struct trc_mesh *mesh) {
 
 static bool keys_are_equal(const float *values, uint64_t per_key, uint32_t key_count) {
     for (uint32_t key = 1; values && key < key_count; key++) {
-        if (memcmp(values, values + per_key * key, per_key * sizeof *values)) return false;
+        if (memcmp(values, values + per_key * key, per_key * sizeof *values) != 0)
+            return false;
     }
     return true;
 }
@@ -165,7 +170,8 @@ static void share_topology(struct trc_geometry *geometry, struct trc_mesh_topolo
     memcpy(mesh->attributes, topology->attributes, sizeof mesh->attributes);
     mesh->default_uv = -1;
     for (uint32_t i = 0; i < mesh->attribute_count && mesh->default_uv < 0; i++) {
-        if (mesh->attributes[i].width == 2) mesh->default_uv = (int32_t)i;
+        if (mesh->attributes[i].width == 2)
+            mesh->default_uv = (int32_t)i;
     }
 }
 
@@ -201,14 +207,17 @@ static trc_status create_pose(struct trc_mesh_topology *topology, uint32_t verte
         if (ok && normals_per_key) {
             memcpy(copy, normals, normals_per_key * key_count * sizeof(float));
         }
-        if (kind == TRC_NORMALS_CORNER) mesh->corner_normals = copy;
-        else mesh->vertex_normals = copy;
+        if (kind == TRC_NORMALS_CORNER)
+            mesh->corner_normals = copy;
+        else
+            mesh->vertex_normals = copy;
     }
     if (!ok) {
         trc_geometry_release(mesh);
         return no_memory();
     }
-    if (per_key) memcpy(mesh->positions, positions, per_key * key_count * sizeof(float));
+    if (per_key)
+        memcpy(mesh->positions, positions, per_key * key_count * sizeof(float));
     repair_normals(mesh);
     find_bounds(mesh);
     *mesh_out = mesh;
@@ -218,7 +227,8 @@ static trc_status create_pose(struct trc_mesh_topology *topology, uint32_t verte
 trc_status trc_geometry_create(const trc_mesh_desc *desc, struct trc_names *names,
                                struct trc_mesh **mesh_out) {
     struct trc_mesh_topology *topology = trc_alloc_zeroed(1, sizeof *topology);
-    if (!topology) return no_memory();
+    if (!topology)
+        return no_memory();
     atomic_init(&topology->refs, 1);
     const trc_status status = fill_topology(topology, desc, names);
     if (status != TRC_OK) {
@@ -243,12 +253,14 @@ uint32_t trc_geometry_normal_kind(const struct trc_mesh *mesh) {
 }
 
 struct trc_mesh *trc_geometry_retain(struct trc_mesh *mesh) {
-    if (mesh) atomic_fetch_add_explicit(&mesh->refs, 1, memory_order_relaxed);
+    if (mesh)
+        atomic_fetch_add_explicit(&mesh->refs, 1, memory_order_relaxed);
     return mesh;
 }
 
 void trc_geometry_release(struct trc_mesh *mesh) {
-    if (!mesh || atomic_fetch_sub(&mesh->refs, 1) != 1) return;
+    if (!mesh || atomic_fetch_sub(&mesh->refs, 1) != 1)
+        return;
     trc_free(mesh->positions);
     trc_free(mesh->vertex_normals);
     trc_free(mesh->corner_normals);

@@ -52,7 +52,7 @@ trc_status trc_geometry_finish(struct trc_mesh *mesh, struct trc_pool *pool,
 /* What all poses of a mesh have in common. */
 struct trc_mesh_topology {
     atomic_uint refs;
-    uint32_t normal_kind;    /* what the caller gives, TRC_NORMALS_* */
+    uint32_t normal_kind; /* what the caller gives, TRC_NORMALS_* */
     uint32_t *indices;
     uint8_t *smooth;
     uint16_t *material_index;

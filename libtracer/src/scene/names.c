@@ -18,10 +18,13 @@ struct trc_names {
     uint32_t count, capacity;
 };
 
-struct trc_names *trc_names_create(void) { return trc_alloc_zeroed(1, sizeof(struct trc_names)); }
+struct trc_names *trc_names_create(void) {
+    return trc_alloc_zeroed(1, sizeof(struct trc_names));
+}
 
 void trc_names_destroy(struct trc_names *names) {
-    if (!names) return;
+    if (!names)
+        return;
     trc_free(names->items);
     trc_free(names);
 }
@@ -29,15 +32,18 @@ void trc_names_destroy(struct trc_names *names) {
 /* FNV-1a. */
 static uint32_t hash_text(const char *text, size_t size) {
     uint32_t hash = 2166136261u;
-    for (size_t i = 0; i < size; i++) hash = (hash ^ (uint8_t)text[i]) * 16777619u;
+    for (size_t i = 0; i < size; i++)
+        hash = (hash ^ (uint8_t)text[i]) * 16777619u;
     return hash;
 }
 
 static bool grow(struct trc_names *names) {
     const uint32_t capacity = names->capacity ? names->capacity * 2 : 16;
     struct name *items = trc_alloc(capacity, sizeof *items);
-    if (!items) return false;
-    if (names->count) memcpy(items, names->items, names->count * sizeof *items);
+    if (!items)
+        return false;
+    if (names->count)
+        memcpy(items, names->items, names->count * sizeof *items);
     trc_free(names->items);
     names->items = items;
     names->capacity = capacity;
@@ -45,7 +51,8 @@ static bool grow(struct trc_names *names) {
 }
 
 trc_status trc_names_add(struct trc_names *names, const char *name, uint32_t *number_out) {
-    if (!name) return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "an attribute name is NULL");
+    if (!name)
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "an attribute name is NULL");
     const size_t size = strnlen(name, TRC_MAX_NAME_BYTES + 1);
     if (size > TRC_MAX_NAME_BYTES) {
         return trc_fail(TRC_ERROR_TOO_LARGE, "an attribute name is longer than %d bytes",

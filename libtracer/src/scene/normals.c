@@ -46,7 +46,8 @@ static double dot(const double a[3], const double b[3]) {
 /* Doubles, because squares of large coordinates leave the range of floats. */
 static void make_face(const float *p0, const float *p1, const float *p2, struct face *face) {
     memset(face, 0, sizeof *face);
-    if (!trc_point_is_valid(p0) || !trc_point_is_valid(p1) || !trc_point_is_valid(p2)) return;
+    if (!trc_point_is_valid(p0) || !trc_point_is_valid(p1) || !trc_point_is_valid(p2))
+        return;
     double a[3], b[3], c[3]; /* p0 to p1, p1 to p2, p2 to p0 */
     for (int i = 0; i < 3; i++) {
         a[i] = (double)p1[i] - (double)p0[i];
@@ -57,11 +58,13 @@ static void make_face(const float *p0, const float *p1, const float *p2, struct 
                          a[0] * b[1] - a[1] * b[0]};
     const double area = sqrt(dot(n, n));
     const double aa = dot(a, a), bb = dot(b, b), cc = dot(c, c);
-    if (!(area > 0.0 && aa > 0.0 && bb > 0.0 && cc > 0.0)) return;
+    if (!(area > 0.0 && aa > 0.0 && bb > 0.0 && cc > 0.0))
+        return;
     const double angle0 = arc_cosine(-dot(c, a) / sqrt(cc * aa));
     const double angle1 = arc_cosine(-dot(a, b) / sqrt(aa * bb));
     const double angle2 = 3.14159265358979323846 - angle0 - angle1;
-    for (int i = 0; i < 3; i++) face->normal[i] = (float)(n[i] / area);
+    for (int i = 0; i < 3; i++)
+        face->normal[i] = (float)(n[i] / area);
     face->angle[0] = (float)angle0;
     face->angle[1] = (float)angle1;
     face->angle[2] = angle2 > 0.0 ? (float)angle2 : 0.0f;
@@ -91,14 +94,16 @@ static void vertex_task(void *context, uint32_t index, uint32_t worker) {
             const uint32_t corner = job->topology->corners[i];
             const struct face *face = &job->faces[corner / 3];
             const float angle = face->angle[corner % 3];
-            for (int axis = 0; axis < 3; axis++) sum[axis] += angle * face->normal[axis];
+            for (int axis = 0; axis < 3; axis++)
+                sum[axis] += angle * face->normal[axis];
         }
         const float square = sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2];
         float *normal = job->normals + (size_t)3 * v;
         /* Triangles that cancel each other give a direction of rounding errors. */
         if (square > 1e-12f) {
             const float inverse = 1.0f / sqrtf(square);
-            for (int axis = 0; axis < 3; axis++) normal[axis] = sum[axis] * inverse;
+            for (int axis = 0; axis < 3; axis++)
+                normal[axis] = sum[axis] * inverse;
         } else {
             trc_normal_fallback(job->positions + (size_t)3 * v, normal);
         }
@@ -107,7 +112,8 @@ static void vertex_task(void *context, uint32_t index, uint32_t worker) {
 
 /* Counting sort of the corners by vertex. */
 static bool find_corners(const struct trc_mesh *mesh, struct trc_mesh_topology *topology) {
-    if (topology->corner_begin) return true;
+    if (topology->corner_begin)
+        return true;
     const uint32_t corner_count = 3 * mesh->triangle_count;
     uint32_t *begin = trc_alloc_zeroed((size_t)mesh->vertex_count + 2, sizeof *begin);
     uint32_t *corners = trc_alloc(corner_count, sizeof *corners);
@@ -117,9 +123,12 @@ static bool find_corners(const struct trc_mesh *mesh, struct trc_mesh_topology *
         return false;
     }
     /* begin[v + 2] counts, becomes the place where v + 1 starts, and moves on as it is filled. */
-    for (uint32_t i = 0; i < corner_count; i++) begin[mesh->indices[i] + 2]++;
-    for (uint32_t v = 0; v < mesh->vertex_count; v++) begin[v + 2] += begin[v + 1];
-    for (uint32_t i = 0; i < corner_count; i++) corners[begin[mesh->indices[i] + 1]++] = i;
+    for (uint32_t i = 0; i < corner_count; i++)
+        begin[mesh->indices[i] + 2]++;
+    for (uint32_t v = 0; v < mesh->vertex_count; v++)
+        begin[v + 2] += begin[v + 1];
+    for (uint32_t i = 0; i < corner_count; i++)
+        corners[begin[mesh->indices[i] + 1]++] = i;
     topology->corner_begin = begin;
     topology->corners = corners;
     topology->bytes += ((uint64_t)mesh->vertex_count + 2 + corner_count) * sizeof(uint32_t);
@@ -128,7 +137,8 @@ static bool find_corners(const struct trc_mesh *mesh, struct trc_mesh_topology *
 
 trc_status trc_geometry_finish(struct trc_mesh *mesh, struct trc_pool *pool,
                                const atomic_uint *cancel) {
-    if (!mesh->smooth || mesh->vertex_normals || mesh->corner_normals) return TRC_OK;
+    if (!mesh->smooth || mesh->vertex_normals || mesh->corner_normals)
+        return TRC_OK;
     struct trc_mesh_topology *topology = ((struct trc_geometry *)mesh)->topology;
     const size_t per_key = (size_t)3 * mesh->vertex_count;
     struct face *faces = trc_alloc(mesh->triangle_count, sizeof *faces);

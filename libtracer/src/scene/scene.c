@@ -27,10 +27,10 @@ static void init_stores(struct trc_scene_state *scene) {
     trc_store_init(&scene->lights, TRC_STORE_LIGHT, false, seed);
 }
 
-trc_status trc_scene_state_create(const trc_scene_desc *desc,
-                                  struct trc_scene_state **scene_out) {
+trc_status trc_scene_state_create(const trc_scene_desc *desc, struct trc_scene_state **scene_out) {
     struct trc_scene_state *scene = trc_alloc_zeroed(1, sizeof *scene);
-    if (!scene) return no_memory();
+    if (!scene)
+        return no_memory();
     if (pthread_mutex_init(&scene->lock, NULL)) {
         trc_free(scene);
         return no_memory();

@@ -49,18 +49,18 @@ struct trc_scene_instance {
 struct trc_scene_state {
     uint32_t thread_count;
     bool is_final;
-    pthread_mutex_t lock;              /* all but the next three */
+    pthread_mutex_t lock; /* all but the next three */
     pthread_mutex_t cancel_lock;
-    bool committing;                   /* under cancel_lock */
-    atomic_uint cancel;                /* read by the workers of a commit */
+    bool committing;    /* under cancel_lock */
+    atomic_uint cancel; /* read by the workers of a commit */
     struct trc_names *names;
     struct trc_store meshes, instances, materials, images, lights;
     struct trc_material *default_material;
-    struct trc_shared *camera;         /* of struct trc_camera, or NULL */
-    trc_world_desc world;              /* struct_size 0: none was set */
-    uint32_t changed;                  /* TRC_CHANGED_* */
-    struct trc_snapshot *snapshot;     /* the last one published, or NULL */
-    struct trc_pool *pool;             /* for commits, started by the first */
+    struct trc_shared *camera;     /* of struct trc_camera, or NULL */
+    trc_world_desc world;          /* struct_size 0: none was set */
+    uint32_t changed;              /* TRC_CHANGED_* */
+    struct trc_snapshot *snapshot; /* the last one published, or NULL */
+    struct trc_pool *pool;         /* for commits, started by the first */
 };
 
 /* OUT_OF_MEMORY. */

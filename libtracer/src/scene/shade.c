@@ -5,10 +5,20 @@
 #include "scene/scene.h"
 #include "shading/compile.h"
 
+static uint32_t image_index(const void *images, trc_id image) {
+    return trc_store_get(images, image) ? trc_store_slot_of(image) : UINT32_MAX;
+}
+
+static trc_status compile(const struct trc_scene_state *scene, const trc_material_desc *desc,
+                          struct trc_material **material_out) {
+    const struct trc_compile_context context = {scene->names, image_index, &scene->images};
+    return trc_material_compile(desc, &context, material_out);
+}
+
 trc_status trc_scene_add_material(struct trc_scene_state *scene, const trc_material_desc *desc,
                                   trc_id *id) {
     struct trc_material *material;
-    TRC_TRY(trc_material_compile(desc, scene->names, &scene->images, &material));
+    TRC_TRY(compile(scene, desc, &material));
     const trc_status status = trc_store_add(&scene->materials, material, id);
     if (status != TRC_OK) {
         trc_material_release(material);
@@ -23,7 +33,7 @@ trc_status trc_scene_change_material(struct trc_scene_state *scene, trc_id id,
     void *former;
     TRC_TRY(trc_store_find(&scene->materials, id, &former));
     struct trc_material *material;
-    TRC_TRY(trc_material_compile(desc, scene->names, &scene->images, &material));
+    TRC_TRY(compile(scene, desc, &material));
     scene->materials.slots[trc_store_slot_of(id)].object = material;
     trc_material_release(former);
     scene->changed |= TRC_CHANGED_MATERIALS;
@@ -54,7 +64,7 @@ trc_status trc_scene_make_default_material(struct trc_scene_state *scene) {
                                     .nodes = &node,
                                     .inputs = inputs,
                                     .input_count = 3};
-    return trc_material_compile(&desc, scene->names, &scene->images, &scene->default_material);
+    return compile(scene, &desc, &scene->default_material);
 }
 
 trc_status trc_scene_add_image(struct trc_scene_state *scene, const trc_image_desc *desc,

@@ -30,8 +30,10 @@ void trc_store_free(struct trc_store *store) {
 static bool grow(struct trc_store *store) {
     const uint32_t capacity = store->capacity ? store->capacity * 2 : 16;
     struct trc_store_slot *slots = trc_alloc(capacity, sizeof *slots);
-    if (!slots) return false;
-    if (store->slot_count) memcpy(slots, store->slots, store->slot_count * sizeof *slots);
+    if (!slots)
+        return false;
+    if (store->slot_count)
+        memcpy(slots, store->slots, store->slot_count * sizeof *slots);
     trc_free(store->slots);
     store->slots = slots;
     store->capacity = capacity;
@@ -63,8 +65,10 @@ trc_status trc_store_add(struct trc_store *store, void *object, trc_id *id_out) 
     slot->object = object;
     slot->former = store->last;
     slot->next = TRC_STORE_END;
-    if (store->last == TRC_STORE_END) store->first = i;
-    else store->slots[store->last].next = i;
+    if (store->last == TRC_STORE_END)
+        store->first = i;
+    else
+        store->slots[store->last].next = i;
     store->last = i;
     store->living_count++;
     *id_out = (uint64_t)store->kind << 60 | (uint64_t)slot->generation << 32 | (i + 1);
@@ -73,7 +77,8 @@ trc_status trc_store_add(struct trc_store *store, void *object, trc_id *id_out) 
 
 void *trc_store_get(const struct trc_store *store, trc_id id) {
     const uint32_t number = (uint32_t)id;
-    if (id >> 60 != store->kind || number == 0 || number > store->slot_count) return NULL;
+    if (id >> 60 != store->kind || number == 0 || number > store->slot_count)
+        return NULL;
     const struct trc_store_slot *slot = &store->slots[number - 1];
     return slot->generation == (id >> 32 & GENERATION_MASK) ? slot->object : NULL;
 }
@@ -84,7 +89,7 @@ trc_status trc_store_find(const struct trc_store *store, trc_id id, void **objec
         *object_out = object;
         return TRC_OK;
     }
-    const char *why = id == 0 ? "null"
+    const char *why = id == 0                   ? "null"
                       : id >> 60 != store->kind ? "that of another kind of object"
                                                 : "stale, or of another scene";
     return trc_fail(TRC_ERROR_INVALID_HANDLE, "the %s id is %s", kind_name(store->kind), why);
@@ -93,15 +98,20 @@ trc_status trc_store_find(const struct trc_store *store, trc_id id, void **objec
 void trc_store_remove(struct trc_store *store, trc_id id) {
     const uint32_t i = trc_store_slot_of(id);
     struct trc_store_slot *slot = &store->slots[i];
-    if (slot->former == TRC_STORE_END) store->first = slot->next;
-    else store->slots[slot->former].next = slot->next;
-    if (slot->next == TRC_STORE_END) store->last = slot->former;
-    else store->slots[slot->next].former = slot->former;
+    if (slot->former == TRC_STORE_END)
+        store->first = slot->next;
+    else
+        store->slots[slot->former].next = slot->next;
+    if (slot->next == TRC_STORE_END)
+        store->last = slot->former;
+    else
+        store->slots[slot->next].former = slot->former;
     slot->object = NULL;
     store->living_count--;
     /* A slot whose generations are used up is never used again. */
     slot->generation = (slot->generation + 1) & GENERATION_MASK;
-    if (store->keeps_slots || slot->generation == store->first_generation) return;
+    if (store->keeps_slots || slot->generation == store->first_generation)
+        return;
     slot->next = store->free_slot;
     store->free_slot = i;
 }

@@ -27,11 +27,11 @@ struct trc_store_slot {
 
 struct trc_store {
     enum trc_store_kind kind;
-    bool keeps_slots;        /* a slot is used once: for objects that others name by slot number */
+    bool keeps_slots; /* a slot is used once: for objects that others name by slot number */
     uint32_t first_generation;
     struct trc_store_slot *slots;
     uint32_t slot_count, capacity;
-    uint32_t first, last;    /* of the living; TRC_STORE_END: none */
+    uint32_t first, last; /* of the living; TRC_STORE_END: none */
     uint32_t free_slot;
     uint32_t living_count;
 };

@@ -34,7 +34,8 @@ struct trc_pool {
 static void work(struct trc_pool *pool, uint32_t number) {
     for (;;) {
         const uint64_t index = atomic_fetch_add_explicit(&pool->next, 1, memory_order_relaxed);
-        if (index >= pool->count) return;
+        if (index >= pool->count)
+            return;
         pool->task(pool->context, (uint32_t)index, number);
     }
 }
@@ -45,13 +46,16 @@ static void worker_main(void *argument) {
     uint64_t seen = 0;
     pthread_mutex_lock(&pool->lock);
     for (;;) {
-        while (!pool->stop && pool->run == seen) pthread_cond_wait(&pool->wake, &pool->lock);
-        if (pool->stop) break;
+        while (!pool->stop && pool->run == seen)
+            pthread_cond_wait(&pool->wake, &pool->lock);
+        if (pool->stop)
+            break;
         seen = pool->run;
         pthread_mutex_unlock(&pool->lock);
         work(pool, worker->number);
         pthread_mutex_lock(&pool->lock);
-        if (--pool->busy == 0) pthread_cond_signal(&pool->done);
+        if (--pool->busy == 0)
+            pthread_cond_signal(&pool->done);
     }
     pthread_mutex_unlock(&pool->lock);
 }
@@ -62,16 +66,20 @@ static trc_status start_workers(struct trc_pool *pool) {
         worker->pool = pool;
         worker->number = i + 1;
         const trc_status status = trc_thread_start(&worker->thread, worker_main, worker);
-        if (status != TRC_OK) return status;
+        if (status != TRC_OK)
+            return status;
         pool->started_count++;
     }
     return TRC_OK;
 }
 
 static trc_status init_sync(struct trc_pool *pool) {
-    if (pthread_mutex_init(&pool->lock, NULL)) goto fail;
-    if (pthread_cond_init(&pool->wake, NULL)) goto fail_lock;
-    if (pthread_cond_init(&pool->done, NULL)) goto fail_wake;
+    if (pthread_mutex_init(&pool->lock, NULL))
+        goto fail;
+    if (pthread_cond_init(&pool->wake, NULL))
+        goto fail_lock;
+    if (pthread_cond_init(&pool->done, NULL))
+        goto fail_wake;
     return TRC_OK;
 fail_wake:
     pthread_cond_destroy(&pool->wake);
@@ -82,7 +90,8 @@ fail:
 }
 
 trc_status trc_pool_create(uint32_t thread_count, struct trc_pool **pool_out) {
-    if (!thread_count) thread_count = trc_thread_processor_count();
+    if (!thread_count)
+        thread_count = trc_thread_processor_count();
     if (thread_count > TRC_MAX_THREADS) {
         return trc_fail(TRC_ERROR_TOO_LARGE, "%u threads, at most %d", thread_count,
                         TRC_MAX_THREADS);
@@ -112,12 +121,14 @@ trc_status trc_pool_create(uint32_t thread_count, struct trc_pool **pool_out) {
 }
 
 void trc_pool_destroy(struct trc_pool *pool) {
-    if (!pool) return;
+    if (!pool)
+        return;
     pthread_mutex_lock(&pool->lock);
     pool->stop = true;
     pthread_cond_broadcast(&pool->wake);
     pthread_mutex_unlock(&pool->lock);
-    for (uint32_t i = 0; i < pool->started_count; i++) pthread_join(pool->workers[i].thread, NULL);
+    for (uint32_t i = 0; i < pool->started_count; i++)
+        pthread_join(pool->workers[i].thread, NULL);
     pthread_cond_destroy(&pool->done);
     pthread_cond_destroy(&pool->wake);
     pthread_mutex_destroy(&pool->lock);
@@ -129,11 +140,13 @@ uint32_t trc_pool_thread_count(const struct trc_pool *pool) { return pool->threa
 
 void trc_pool_run(struct trc_pool *pool, uint32_t count,
                   void (*task)(void *context, uint32_t index, uint32_t worker), void *context) {
-    if (!count) return;
+    if (!count)
+        return;
     const uint64_t former = trc_fp_enter();
     /* One task, or no workers: waking them would only cost. */
     if (count == 1 || !pool->started_count) {
-        for (uint32_t i = 0; i < count; i++) task(context, i, 0);
+        for (uint32_t i = 0; i < count; i++)
+            task(context, i, 0);
         trc_fp_leave(former);
         return;
     }
@@ -148,7 +161,8 @@ void trc_pool_run(struct trc_pool *pool, uint32_t count,
     pthread_mutex_unlock(&pool->lock);
     work(pool, 0);
     pthread_mutex_lock(&pool->lock);
-    while (pool->busy) pthread_cond_wait(&pool->done, &pool->lock);
+    while (pool->busy)
+        pthread_cond_wait(&pool->done, &pool->lock);
     pthread_mutex_unlock(&pool->lock);
     trc_fp_leave(former);
 }

@@ -28,7 +28,8 @@ static void *thread_main(void *argument) {
 static int create(pthread_t *thread, void *argument) {
     pthread_attr_t attributes;
     int error = pthread_attr_init(&attributes);
-    if (error) return error;
+    if (error)
+        return error;
     pthread_attr_setstacksize(&attributes, STACK_BYTES);
     /* The new thread inherits the mask: no signal of the host is ever handled in it. */
     sigset_t all, former;
@@ -44,7 +45,8 @@ static int create(pthread_t *thread, void *argument) {
 
 trc_status trc_thread_start(pthread_t *thread_out, void (*body)(void *context), void *context) {
     struct start *start = trc_alloc(1, sizeof *start);
-    if (!start) return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for a thread");
+    if (!start)
+        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for a thread");
     start->body = body;
     start->context = context;
     if (trc_memory_should_fail() || create(thread_out, start)) {
@@ -60,9 +62,12 @@ uint32_t trc_thread_processor_count(void) {
     /* A fixed set covers 1024 processors; a larger machine makes the call fail, not overflow. */
     cpu_set_t set;
     CPU_ZERO(&set);
-    if (sched_getaffinity(0, sizeof set, &set) == 0) count = CPU_COUNT(&set);
+    if (sched_getaffinity(0, sizeof set, &set) == 0)
+        count = CPU_COUNT(&set);
 #endif
-    if (count <= 0) count = sysconf(_SC_NPROCESSORS_ONLN);
-    if (count < 1) return 1;
+    if (count <= 0)
+        count = sysconf(_SC_NPROCESSORS_ONLN);
+    if (count < 1)
+        return 1;
     return count < TRC_MAX_THREADS ? (uint32_t)count : TRC_MAX_THREADS;
 }

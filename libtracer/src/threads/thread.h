@@ -1,5 +1,5 @@
-/* Starting a thread of the library: all signals blocked, default floating-point state, a stack of known
- * size. */
+/* Starting a thread of the library: all signals blocked, default floating-point state, a stack of
+ * known size. */
 #ifndef TRACER_THREADS_THREAD_H
 #define TRACER_THREADS_THREAD_H
 

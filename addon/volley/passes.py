@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The render passes: one list that registers them, asks the library for them and reads them back."""
+
+from collections import namedtuple
+
+import numpy as np
+
+from .compat import HAS_LONG_PASS_NAMES
+
+# index: TRC_PASS_*; names: before 5.0 and since; channels: one letter each; kind: as Blender's;
+# setting: path below the view layer.
+Pass = namedtuple("Pass", "index names channels kind setting")
+
+PASSES = (
+    Pass(0, ("Combined", "Combined"), "RGBA", 'COLOR', "use_pass_combined"),
+    Pass(1, ("Depth", "Depth"), "Z", 'VALUE', "use_pass_z"),
+    Pass(3, ("Position", "Position"), "XYZ", 'VECTOR', "use_pass_position"),
+    Pass(2, ("Normal", "Normal"), "XYZ", 'VECTOR', "use_pass_normal"),
+    Pass(4, ("UV", "UV"), "UVA", 'VECTOR', "use_pass_uv"),
+    Pass(5, ("IndexOB", "Object Index"), "X", 'VALUE', "use_pass_object_index"),
+    Pass(6, ("IndexMA", "Material Index"), "X", 'VALUE', "use_pass_material_index"),
+    Pass(9, ("DiffDir", "Diffuse Direct"), "RGB", 'COLOR', "use_pass_diffuse_direct"),
+    Pass(10, ("DiffInd", "Diffuse Indirect"), "RGB", 'COLOR', "use_pass_diffuse_indirect"),
+    Pass(11, ("DiffCol", "Diffuse Color"), "RGB", 'COLOR', "use_pass_diffuse_color"),
+    Pass(12, ("GlossDir", "Glossy Direct"), "RGB", 'COLOR', "use_pass_glossy_direct"),
+    Pass(13, ("GlossInd", "Glossy Indirect"), "RGB", 'COLOR', "use_pass_glossy_indirect"),
+    Pass(14, ("GlossCol", "Glossy Color"), "RGB", 'COLOR', "use_pass_glossy_color"),
+    Pass(15, ("TransDir", "Transmission Direct"), "RGB", 'COLOR', "use_pass_transmission_direct"),
+    Pass(16, ("TransInd", "Transmission Indirect"), "RGB", 'COLOR', "use_pass_transmission_indirect"),
+    Pass(17, ("TransCol", "Transmission Color"), "RGB", 'COLOR', "use_pass_transmission_color"),
+    Pass(7, ("Emit", "Emission"), "RGB", 'COLOR', "use_pass_emit"),
+    Pass(8, ("Env", "Environment"), "RGB", 'COLOR', "use_pass_environment"),
+    Pass(18, ("Debug Sample Count", "Debug Sample Count"), "X", 'VALUE',
+         "volley.use_pass_sample_count"),
+)
+COMBINED = PASSES[0]
+
+
+def name_of(entry, long_names=HAS_LONG_PASS_NAMES):
+    """The pass's name in this Blender."""
+    return entry.names[1 if long_names else 0]
+
+
+def is_enabled(entry, view_layer):
+    """Whether the view layer asks for the pass; Combined is always there."""
+    if entry is COMBINED:
+        return True
+    value = view_layer
+    for part in entry.setting.split("."):
+        value = getattr(value, part, False)
+    return bool(value)
+
+
+def enabled(view_layer):
+    """The passes a view layer asks for."""
+    return [entry for entry in PASSES if is_enabled(entry, view_layer)]
+
+
+def register_passes(engine, scene, view_layer):
+    """Tell the compositor which sockets there are."""
+    for entry in enabled(view_layer):
+        engine.register_pass(scene, view_layer, name_of(entry), len(entry.channels), entry.channels,
+                             entry.kind)
+
+
+def add_to_result(engine, entries):
+    """Make room in the render result for all passes but Blender's own Combined."""
+    for entry in entries:
+        if entry is not COMBINED:
+            engine.add_pass(name_of(entry), len(entry.channels), entry.channels)
+
+
+def request_mask(entries):
+    """The passes as bits for the library."""
+    return sum(1 << entry.index for entry in entries)
+
+
+def write(render, layer, entries):
+    """Copy the film into a render layer's passes with one assignment.
+
+    The collection's ``rect`` is the passes' pixels one after the other, width * height * channels
+    float32 each, bottom row first. A pass that is not ours becomes black."""
+    by_name = {name_of(entry): entry for entry in entries}
+    pixel_count = render.size[0] * render.size[1]
+    targets = [(by_name.get(target.name), target.channels * pixel_count) for target in layer.passes]
+    flat = np.zeros(sum(count for _, count in targets), np.float32)
+    start = 0
+    for entry, count in targets:
+        if entry is not None:
+            render.read(entry.index, flat[start:start + count])
+        start += count
+    layer.passes.foreach_set("rect", flat)
+
+
+def read_combined(render):
+    """The film's Combined pass, (height, width, 4) float32, bottom row first."""
+    width, height = render.size
+    pixels = np.empty(width * height * 4, np.float32)
+    return render.read(COMBINED.index, pixels).reshape(height, width, 4)

@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Settings of the engine: ``scene.volley`` and ``view_layer.volley``. Names are part of the interface.
+
+Where Cycles has a setting of the same meaning, the default is Cycles' own, so that a file looks the
+same in both engines without touching anything.
+"""
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty
+
+SINGLE_SAMPLE = 1    # default of the integrators without distribution
+DISTRIBUTION_SAMPLES = 64
+
+INTEGRATOR_ITEMS = (
+    ('RAYCAST', "Ray Casting", "Camera rays and shadow rays: direct light alone"),
+    ('WHITTED', "Whitted", "Ideal reflection and refraction, both branches traced; hard shadows"),
+    ('DISTRIBUTION', "Distribution", "Soft shadows, gloss, depth of field and motion blur by "
+                                     "distributing rays over light, lobe, lens and time"),
+)
+ASSEMBLY_ITEMS = (
+    ('AUTO', "Automatic", "Let the library choose"),
+    ('TYPES', "Ray Types", "Packets of shadow, reflection and refraction rays apart"),
+    ('RUNS', "Runs", "Packets of neighbours that hit the same material"),
+    ('GROUPS', "Groups", "Packets by material over the whole packet"),
+    ('OCTANTS', "Octants", "Packets by the signs of the direction"),
+    ('BLIND', "Blind", "Packets in the order the rays arise"),
+    ('NONE', "None", "Every secondary ray alone"),
+)
+PACKET_ITEMS = (
+    ('AUTO', "Automatic", "Let the library choose"),
+    ('4', "2 x 2", "4 rays in a packet"),
+    ('16', "4 x 4", "16 rays in a packet"),
+    ('64', "8 x 8", "64 rays in a packet"),
+    ('256', "16 x 16", "256 rays in a packet"),
+)
+SAMPLER_ITEMS = (
+    ('SOBOL', "Sobol", "Joint Owen-scrambled Sobol sequence"),
+    ('SUDOKU', "Interleaved", "One sample set on a tile of pixels, interleaved; static over time"),
+    ('JITTER', "Jittered", "Stratified samples"),
+    ('INDEPENDENT', "Independent", "Random samples, as a reference"),
+    ('BLUE_NOISE', "Blue Noise", "Sobol with blue-noise ordering over the screen"),
+)
+FILTER_ITEMS = (
+    ('BOX', "Box", "Box filter"),
+    ('GAUSSIAN', "Gaussian", "Gaussian filter"),
+    ('BLACKMAN_HARRIS', "Blackman-Harris", "Blackman-Harris filter"),
+)
+
+
+def _changed(_settings, _context):
+    """An update function, even an empty one, makes Blender tell the depsgraph of an edit by script;
+    without it, viewports and persistent data would not notice."""
+
+
+def _integrator_changed(settings, _context):
+    """Follow the integrator's own default number of samples, unless the user chose another."""
+    before, after = SINGLE_SAMPLE, DISTRIBUTION_SAMPLES
+    if settings.integrator != 'DISTRIBUTION':
+        before, after = after, before
+    if settings.samples == before:
+        settings.samples = after
+
+
+class VolleySceneSettings(bpy.types.PropertyGroup):
+    """Render settings, ``scene.volley``."""
+
+    integrator: EnumProperty(
+        name="Integrator", items=INTEGRATOR_ITEMS, default='DISTRIBUTION', update=_integrator_changed,
+        description="What is modelled")
+    samples: IntProperty(
+        name="Samples", default=DISTRIBUTION_SAMPLES, min=1, max=1 << 20, soft_max=4096,
+        description="Samples of each pixel in the final render", update=_changed)
+    preview_samples: IntProperty(
+        name="Samples", default=32, min=1, max=1 << 20, soft_max=4096,
+        description="Samples of each pixel in the viewport", update=_changed)
+    light_samples: IntProperty(
+        name="Light Samples", default=0, min=0, max=64,
+        description="Shadow rays at each point the camera sees; 0 lets the library choose",
+        update=_changed)
+    noise_threshold: FloatProperty(
+        name="Noise Threshold", default=0.0, min=0.0, max=1.0, precision=4,
+        description="Stop sampling a pixel when its estimated noise is below this; 0 samples all "
+                    "pixels alike", update=_changed)
+    sampler: EnumProperty(
+        name="Sampler", items=SAMPLER_ITEMS, default='SOBOL', description="Where samples are taken",
+        update=_changed)
+    seed: IntProperty(
+        name="Seed", default=0, min=0, description="Another number gives other noise", update=_changed)
+    use_animated_seed: BoolProperty(
+        name="Animate Seed", default=False, description="Other noise on every frame", update=_changed)
+
+    max_depth: IntProperty(
+        name="Total", default=50, min=0, max=1024, soft_max=64,
+        description="Most bounces of a ray; 0 is direct light alone", update=_changed)
+    max_glossy_depth: IntProperty(
+        name="Glossy", default=50, min=0, max=1024, soft_max=64, description="Most reflections of a ray",
+        update=_changed)
+    max_transmission_depth: IntProperty(
+        name="Transmission", default=50, min=0, max=1024, soft_max=64,
+        description="Most refractions of a ray", update=_changed)
+    max_transparent_depth: IntProperty(
+        name="Transparent", default=8, min=0, max=1024, soft_max=64,
+        description="Most transparent surfaces a ray passes straight", update=_changed)
+    attenuation_cutoff: FloatProperty(
+        name="Attenuation Cutoff", default=0.001, min=0.0, max=1.0, precision=4,
+        description="Rays that would add less than this to the picture are not followed (Whitted), or "
+                    "by chance and without bias (Distribution)", update=_changed)
+    clamp_direct: FloatProperty(
+        name="Direct Light", default=0.0, min=0.0, soft_max=100.0,
+        description="Largest value of direct light in a sample; 0 is no limit", update=_changed)
+    clamp_indirect: FloatProperty(
+        name="Indirect Light", default=10.0, min=0.0, soft_max=100.0,
+        description="Largest value of reflected light in a sample; 0 is no limit", update=_changed)
+    filter_glossy: FloatProperty(
+        name="Filter Glossy", default=1.0, min=0.0, max=10.0,
+        description="Blur reflections seen in reflections, for less noise; 0 is off", update=_changed)
+    use_ambient_occlusion: BoolProperty(
+        name="Ambient Occlusion", default=False,
+        description="Add world light where nothing is near, a cheap stand-in for light between "
+                    "surfaces", update=_changed)
+    ao_factor: FloatProperty(
+        name="Factor", default=1.0, min=0.0, soft_max=1.0, description="Strength of ambient occlusion",
+        update=_changed)
+    ao_distance: FloatProperty(
+        name="Distance", default=10.0, min=0.001, subtype='DISTANCE', unit='LENGTH',
+        description="Objects farther away do not occlude", update=_changed)
+
+    assembly: EnumProperty(
+        name="Packet Assembly", items=ASSEMBLY_ITEMS, default='AUTO',
+        description="How secondary rays are put into packets", update=_changed)
+    packet_size: EnumProperty(
+        name="Packet Size", items=PACKET_ITEMS, default='AUTO', description="Rays in a packet",
+        update=_changed)
+
+    film_exposure: FloatProperty(
+        name="Exposure", default=1.0, min=0.0, soft_max=10.0, description="Factor on all light",
+        update=_changed)
+    pixel_filter_type: EnumProperty(
+        name="Filter Type", items=FILTER_ITEMS, default='BLACKMAN_HARRIS', description="Pixel filter",
+        update=_changed)
+    filter_width: FloatProperty(
+        name="Width", default=1.5, min=0.01, max=10.0, subtype='PIXEL',
+        description="Width of the pixel filter", update=_changed)
+
+
+class VolleyViewLayerSettings(bpy.types.PropertyGroup):
+    """Settings of a view layer, ``view_layer.volley``."""
+
+    use_pass_sample_count: BoolProperty(
+        name="Sample Count", default=False, description="Deliver the number of samples of each pixel",
+        update=_changed)
+
+
+_classes = (VolleySceneSettings, VolleyViewLayerSettings)
+
+
+def register():
+    for cls in _classes:
+        bpy.utils.register_class(cls)
+    bpy.types.Scene.volley = PointerProperty(type=VolleySceneSettings, name="Volley Settings")
+    bpy.types.ViewLayer.volley = PointerProperty(type=VolleyViewLayerSettings, name="Volley Settings")
+
+
+def unregister():
+    del bpy.types.ViewLayer.volley
+    del bpy.types.Scene.volley
+    for cls in reversed(_classes):
+        bpy.utils.unregister_class(cls)

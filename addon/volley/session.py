@@ -1,0 +1,270 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The life of one final render or preview: sync, build, run, read back, free.
+
+Nothing of Blender is kept between calls. With persistent data the library's scene stays, and the next
+frame sends only what differs.
+"""
+
+import threading
+import time
+
+import bpy
+
+from . import native, passes
+from .compat import motion_position
+from .log import logger
+from .sync import Cancelled, SceneSync, Source, camera, motion
+from .sync.changes import Changes
+
+POLL_SECONDS = 0.02
+FIRST_PICTURE_SECONDS = 0.2  # until the first unfinished picture is shown
+PICTURE_SECONDS = 0.7        # between two of them
+PICTURE_COST = 20            # at least this many times what showing one takes
+MEGA = 1024.0 * 1024.0
+
+
+class Session:
+    """What a render engine instance holds of the library."""
+
+    def __init__(self):
+        self._sync = None
+        self._sync_settings = None  # what the scene was created with
+
+    def free(self):
+        """Free everything native. May be called at any time, more than once."""
+        sync, self._sync = self._sync, None
+        if sync is not None:
+            sync.destroy()
+
+    def render(self, engine, depsgraph):
+        """Render one view layer; called by Blender for each of them."""
+        keep = depsgraph.scene_eval.render.use_persistent_data and not engine.is_preview
+        try:
+            self._render_layer(engine, depsgraph, keep)
+        except Cancelled:
+            pass
+        finally:
+            if not keep:
+                self.free()
+
+    def _render_layer(self, engine, depsgraph, keep):
+        scene = depsgraph.scene_eval
+        view_layer = depsgraph.view_layer_eval
+        entries = passes.enabled(view_layer)
+        passes.add_to_result(engine, entries)
+        film = engine.get_result()
+        frame = camera.frame_of(scene.render, (engine.resolution_x, engine.resolution_y))
+        crop = _fit_crop(camera.crop_of(scene.render, frame), (film.resolution_x, film.resolution_y))
+        view_names = [view.name for view in film.views] or [""]
+
+        self._open(scene, keep)
+        shutter = motion.shutter_of(scene, motion_position(depsgraph.scene))
+        views = self._synchronise(engine, depsgraph, frame, shutter, view_names)
+        for view_name, keys in views:
+            self._sync.set_camera(keys, shutter)
+            self._commit(engine)
+            self._report_warnings(engine)
+            settings = render_fields(scene, frame, crop, entries, engine.is_preview)
+            render = self._sync.scene.start_render(**settings)
+            try:
+                _Run(engine, self._sync, render, settings["sample_count"]).follow(
+                    view_layer.name, view_name, entries)
+            finally:
+                render.destroy()
+
+    def _open(self, scene, keep):
+        """The library's scene: the one kept from the last frame, or a new one."""
+        settings = (keep, thread_count(scene.render))
+        if self._sync is None or self._sync_settings != settings:
+            self.free()
+            self._sync = SceneSync(is_final=True, thread_count=settings[1], will_resync=keep)
+            self._sync_settings = settings
+
+    def _synchronise(self, engine, depsgraph, frame, shutter, view_names):
+        """Send everything but the camera; the cameras come back, one for each view."""
+        engine.update_stats("", "Synchronizing")
+        scene = depsgraph.scene_eval
+        now = motion.split_frame(scene.frame_current_final)
+        source = Source(depsgraph, Changes.everything(), engine=engine, is_cancelled=engine.test_break,
+                        needs_uv=depsgraph.view_layer_eval.use_pass_uv)
+        cameras = CameraMotion(engine, frame, shutter, view_names, self._sync.warnings)
+        moved = shutter is not None
+        try:
+            if moved and shutter.frame_at(motion.CENTER) != now:
+                engine.frame_set(*shutter.frame_at(motion.CENTER))
+            cameras.look(motion.CENTER)
+            self._sync.update(source, shutter, cameras)
+        finally:
+            if moved:
+                engine.frame_set(*now)
+        return list(cameras.keys.items())
+
+    def _commit(self, engine):
+        """Build on another thread, so that Esc is heard meanwhile."""
+        engine.update_stats("", "Building")
+        failure = []
+
+        def work():
+            try:
+                self._sync.scene.commit()
+            except native.TracerError as error:
+                failure.append(error)
+
+        worker = threading.Thread(target=work, name="volley commit")
+        worker.start()
+        cancelled = False
+        while worker.is_alive():
+            worker.join(POLL_SECONDS)
+            if not cancelled and engine.test_break():
+                cancelled = True
+                self._sync.scene.cancel()
+        if cancelled or (failure and failure[0].status == native.ERROR_CANCELLED):
+            raise Cancelled()
+        if failure:
+            raise failure[0]
+
+    def _report_warnings(self, engine):
+        for message in self._sync.warnings.take() + self._sync.scene.warnings():
+            report_warning(engine, message)
+
+
+class CameraMotion:
+    """The render camera over the shutter, for each stereo view: keys by view name.
+
+    ``count`` is how many times it wants to be looked at."""
+
+    def __init__(self, engine, frame, shutter, view_names, warnings):
+        self._engine, self._frame, self._warnings = engine, frame, warnings
+        self._view_names = view_names
+        self.count = 1
+        if engine.camera_override is None:
+            raise native.TracerError(native.ERROR_INVALID_ARGUMENT, "the scene has no camera")
+        if shutter is not None:
+            self.count = motion.key_count(engine.camera_override)
+        self.keys = {}
+
+    def look(self, fraction):
+        """Note where the camera is at a fraction of the shutter; the centre comes first."""
+        for name in self._view_names:
+            if name:
+                self._engine.active_view_set(name)
+            keys = camera.render_camera(self._engine, self._engine.camera_override, self._frame,
+                                        self._warnings)
+            if name not in self.keys:
+                keys.transforms *= self.count
+                keys.windows *= self.count
+                self.keys[name] = keys
+                continue
+            index = motion.key_index(fraction, self.count)
+            if index is not None:
+                self.keys[name].transforms[index] = keys.transforms[0]
+                self.keys[name].windows[index] = keys.windows[0]
+
+
+class _Run:
+    """One running render: progress, unfinished pictures, Esc, the result."""
+
+    def __init__(self, engine, sync, render, sample_count):
+        self._engine, self._render, self._sample_count = engine, render, sample_count
+        self._features = ", ".join(sync.scene.features())
+        self._next_picture = time.monotonic() + FIRST_PICTURE_SECONDS
+        self._shown_version = 0
+
+    def follow(self, layer_name, view_name, entries):
+        """Poll until it ends or the user stops it; what is finished is kept either way."""
+        engine, render = self._engine, self._render
+        width, height = render.size
+        result = engine.begin_result(0, 0, width, height, layer=layer_name, view=view_name)
+        layer = result.layers[0]
+        is_done = False
+        try:
+            while not is_done:
+                render.wait(POLL_SECONDS)
+                if engine.test_break():
+                    render.cancel()
+                    render.wait(-1.0)
+                progress = render.poll()
+                is_done = progress.state != native.STATE_RUNNING
+                self._show_progress(progress)
+                if not is_done:
+                    self._show_picture(progress, result, layer, entries)
+            if progress.state == native.STATE_FAILED:
+                raise native.TracerError(native.ERROR_OUT_OF_MEMORY, "the render failed")
+            passes.write(render, layer, entries)
+        finally:
+            engine.end_result(result)
+
+    def _show_progress(self, progress):
+        self._engine.update_progress(progress.fraction)
+        self._engine.update_stats("", status_text(progress, self._sample_count, self._features))
+        self._engine.update_memory_stats(memory_used=progress.memory_bytes / MEGA,
+                                         memory_peak=progress.peak_memory_bytes / MEGA)
+
+    def _show_picture(self, progress, result, layer, entries):
+        """Show what there is, seldom enough not to cost more than a few percent."""
+        now = time.monotonic()
+        if bpy.app.background or now < self._next_picture or progress.version == self._shown_version:
+            return
+        self._shown_version = progress.version
+        passes.write(self._render, layer, entries)
+        self._engine.update_result(result)
+        cost = time.monotonic() - now
+        self._next_picture = now + max(PICTURE_SECONDS, PICTURE_COST * cost)
+
+
+def status_text(progress, sample_count, features):
+    """The line Blender shows while it renders."""
+    parts = [f"Sample {progress.samples_done}/{sample_count}"]
+    if progress.seconds > 0.0:
+        parts.append(f"{progress.ray_count / progress.seconds * 1e-6:.1f} Mrays/s")
+    parts.append(f"Mem {progress.memory_bytes / MEGA:.1f}M, "
+                 f"Peak {progress.peak_memory_bytes / MEGA:.1f}M")
+    if features:
+        parts.append(features)
+    return " | ".join(parts)
+
+
+def report_warning(engine, message):
+    """A warning where the user sees it: in Blender's reports, and on the console when there is no
+    window to show them in."""
+    engine.report({'WARNING'}, message)
+    if bpy.app.background:
+        logger.warning(message)
+
+
+def thread_count(render):
+    """Threads the user allows, 0 for all."""
+    return render.threads if render.threads_mode == 'FIXED' else 0
+
+
+def render_fields(scene, frame, crop, entries, is_preview=False):
+    """The fields of trc_render_desc for an evaluated scene."""
+    settings = scene.volley
+    seed = settings.seed
+    if settings.use_animated_seed:
+        seed += scene.frame_current
+    return {
+        "width": frame.width, "height": frame.height,
+        "crop_x": crop[0], "crop_y": crop[1], "crop_width": crop[2], "crop_height": crop[3],
+        "integrator": native.INTEGRATORS[settings.integrator],
+        "sample_count": settings.preview_samples if is_preview else settings.samples,
+        "light_samples": settings.light_samples,
+        "max_depth": settings.max_depth, "max_transparent_depth": settings.max_transparent_depth,
+        "max_glossy_depth": settings.max_glossy_depth,
+        "max_transmission_depth": settings.max_transmission_depth,
+        "attenuation_cutoff": settings.attenuation_cutoff, "filter_glossy": settings.filter_glossy,
+        "clamp_direct": settings.clamp_direct, "clamp_indirect": settings.clamp_indirect,
+        "assembly": native.ASSEMBLIES[settings.assembly],
+        "packet_size": 0 if settings.packet_size == 'AUTO' else int(settings.packet_size),
+        "sampler": native.SAMPLERS[settings.sampler], "seed": seed & 0xFFFFFFFF,
+        "filter": native.FILTERS[settings.pixel_filter_type], "filter_width": settings.filter_width,
+        "film_transparent": int(scene.render.film_transparent),
+        "film_exposure": settings.film_exposure, "passes": passes.request_mask(entries),
+        "thread_count": thread_count(scene.render), "noise_threshold": settings.noise_threshold,
+    }
+
+
+def _fit_crop(crop, film_size):
+    """The crop in the size that Blender's result has, which rules where rounding differs."""
+    x, y, _, _ = crop
+    return x, y, film_size[0], film_size[1]

@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender's evaluated scene into a scene of the library: marking first, copying after.
+
+:class:`SceneSync` holds what is in the library and brings it up to date with a depsgraph. Nothing of
+Blender is kept from one sync to the next but names and numbers.
+"""
+
+from dataclasses import dataclass
+
+import bpy
+
+from .. import native
+from ..log import Warnings
+from . import camera, instance, light, mesh, motion, visibility, world
+from .changes import Changes
+from .image import Images
+from .material import Materials
+from .matrix import rows12
+
+_BREAK_INTERVAL = 32  # instances between two looks at whether the user pressed Esc
+
+
+class Cancelled(Exception):
+    """The user stopped the sync."""
+
+
+@dataclass
+class Source:
+    """Where a sync reads from. engine: moves the scene in time for motion blur, else None; v3d: the
+    viewport whose visibility counts, None for a render; is_cancelled: asked now and then."""
+
+    depsgraph: object
+    changes: Changes
+    engine: object = None
+    v3d: object = None
+    needs_uv: bool = False
+    is_cancelled: object = staticmethod(lambda: False)
+
+
+class SceneSync:
+    """One scene of the library and what it was last told."""
+
+    def __init__(self, is_final, thread_count, will_resync):
+        self.scene = native.Scene(is_final, thread_count)
+        self.warnings = Warnings()
+        self._images = Images(self.scene, self.warnings)
+        self._materials = Materials(self.scene, self._images, self.warnings)
+        self._meshes = mesh.Meshes(self.scene, will_resync)
+        self._instances = instance.Instances(self.scene)
+        self._lights = light.Lights(self.scene)
+
+    def destroy(self):
+        """Free the library's scene."""
+        self.scene.destroy()
+
+    def update(self, source, shutter=None, camera_keys=None):
+        """Bring everything but the camera up to date. With a shutter, Blender is moved through it;
+        camera_keys(fraction) is called at each time to look at the camera too. The caller restores
+        the frame."""
+        self._images.begin(source.changes)
+        self._materials.begin()
+        self._meshes.begin()
+        self._sync_materials(source)
+        walk = _Walk(self, source, shutter)
+        walk.run()
+        if shutter is not None:
+            walk.follow_motion(camera_keys)
+        walk.send_deforming()
+        self._instances.update(walk.items.values(), self._meshes.ids())
+        self._lights.update(walk.lights)
+        self._sync_world(source)
+        self._meshes.end()
+        self._materials.end()
+        self._images.end()
+
+    def _sync_materials(self, source):
+        """Flatten the materials first: they say which attributes the meshes must bring."""
+        override = source.depsgraph.view_layer_eval.material_override
+        for data in source.depsgraph.ids:
+            if isinstance(data, bpy.types.Material) and override in (None, data):
+                self._materials.entry_of(data)
+
+    def _sync_world(self, source):
+        scene = source.depsgraph.scene_eval
+        material_id = self._materials.world_id(scene.world) if scene.world else 0
+        self.scene.set_world(**world.describe(scene.world, material_id, scene.volley))
+
+    def set_camera(self, keys, shutter=None):
+        """Send the camera; keys as camera.CameraKeys."""
+        if shutter is None:
+            camera.send(self.scene, keys)
+        else:
+            camera.send(self.scene, keys, shutter.length, shutter.curve)
+
+
+class _Walk:
+    """One sync's walks over the depsgraph: the first finds everything, more follow motion."""
+
+    def __init__(self, sync, source, shutter):
+        self._sync, self._source, self._shutter = sync, source, shutter
+        self._view_layer = source.depsgraph.view_layer_eval
+        self._override = self._view_layer.material_override
+        uv_names, color_names = sync._materials.attribute_names()
+        if source.needs_uv:
+            uv_names.add("")
+        self._names = frozenset(uv_names), frozenset(color_names)
+        self._owners = {}     # pointer of a mesh -> key of its owner, within this walk
+        self._deforming = {}  # owner key -> (pointer, MeshData, MeshMotion)
+        self.items = {}       # key -> Item with a mesh
+        self.lights = {}      # key -> fields of a light
+
+    def run(self):
+        """Find what is there now."""
+        for each in self._shown_instances():
+            if instance.is_light(each):
+                self._add_light(each)
+            elif instance.has_mesh(each):
+                self._add_mesh_instance(each)
+
+    def follow_motion(self, camera_keys):
+        """Look at every moving thing at its other times."""
+        counts = {item.motion_keys for item in self.items.values()}
+        counts.add(camera_keys.count)
+        for fraction in motion.fractions_of(counts):
+            self._source.engine.frame_set(*self._shutter.frame_at(fraction))
+            camera_keys.look(fraction)
+            for each in self._shown_instances():
+                item = self.items.get(instance.key_of(each))
+                if item is not None:
+                    self._look_again(item, each, fraction)
+
+    def send_deforming(self):
+        """Send the meshes that waited for their motion keys."""
+        for key, (pointer, data, shapes) in self._deforming.items():
+            self._sync._meshes.put(key, pointer, data, self._names, shapes)
+
+    def _shown_instances(self):
+        for number, each in enumerate(self._source.depsgraph.object_instances):
+            if number % _BREAK_INTERVAL == 0 and self._source.is_cancelled():
+                raise Cancelled()
+            if instance.is_shown(each, self._source.v3d):
+                yield each
+
+    def _add_light(self, each):
+        item = instance.describe(each, self._view_layer)
+        fields = light.describe(each.object, item.transforms[0], item.visibility, self._sync.warnings)
+        if fields is not None:
+            self.lights[item.key] = fields
+
+    def _add_mesh_instance(self, each):
+        blender_object = each.object
+        item = instance.describe(each, self._view_layer)
+        item.materials = self._material_ids(each)
+        if self._shutter is not None:
+            parent = each.parent if each.is_instance else None
+            item.motion_keys = motion.key_count(blender_object, parent)
+            item.transforms *= item.motion_keys
+        item.mesh_key = self._mesh_key(item, blender_object)
+        if item.mesh_key is not None:
+            self.items[item.key] = item
+
+    def _mesh_key(self, item, blender_object):
+        """The key of the mesh the item shows, which is read now if no other item showed it before."""
+        data = blender_object.data
+        pointer = data.as_pointer()
+        if pointer in self._owners:
+            return self._owners[pointer]
+        self._owners[pointer] = item.key if self._read_mesh(item, blender_object, pointer) else None
+        return self._owners[pointer]
+
+    def _read_mesh(self, item, blender_object, pointer):
+        meshes = self._sync._meshes
+        is_changed = self._source.changes.geometry_of(item.owner)
+        if not is_changed and meshes.reuse(item.key, pointer, self._names):
+            return True
+        slot_count = max(len(blender_object.material_slots), len(blender_object.data.materials))
+        data = mesh.extract(blender_object.data, *self._names, slot_count)
+        if data is None:
+            return False
+        if item.motion_keys > 1 and motion.may_deform(blender_object):
+            shapes = mesh.MeshMotion(blender_object.data, data, item.motion_keys)
+            self._deforming[item.key] = (pointer, data, shapes)
+        else:
+            meshes.put(item.key, pointer, data, self._names)
+        return True
+
+    def _material_ids(self, each):
+        materials = self._sync._materials
+        slots = [slot.material for slot in each.object.material_slots]
+        if visibility.is_holdout(each, self._view_layer):
+            return (materials.holdout_id(),)
+        if self._override is not None:
+            return (materials.id_of(self._override),)
+        return tuple(materials.id_of(material) for material in slots)
+
+    def _look_again(self, item, each, fraction):
+        index = motion.key_index(fraction, item.motion_keys)
+        if index is None:
+            return
+        item.transforms[index] = rows12(each.matrix_world)
+        waiting = self._deforming.get(item.key)
+        if waiting is None or waiting[2].is_dropped:
+            return
+        if not waiting[2].set_key(index, each.object.data):
+            self._sync.warnings.add(
+                f"Object '{each.object.name}': its topology changes in time, no deformation blur")

@@ -1,0 +1,258 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Node trees to flat node lists.
+
+Walks a tree from its output: groups are entered, reroutes and muted nodes and links are followed as
+Blender does, values are converted between colour, vector and number where a link does so. What single
+nodes mean is in ``nodes.py``. Works on any node tree and keeps nothing of it.
+
+Fallbacks: a node that is not supported leaves the input it feeds at that socket's own value; a shader
+that is not supported becomes a diffuse of its colour. Each is named once in the warnings.
+"""
+
+from . import nodes
+from .values import CONSTANT, DEFAULT, NO_SHADER, Value
+
+_KINDS = {'VALUE': 'f', 'INT': 'f', 'BOOLEAN': 'f', 'RGBA': 'c', 'VECTOR': 'v', 'ROTATION': 'v',
+          'SHADER': 's'}
+_MAX_DEPTH = 120  # nodes in a chain; Python's own stack ends at about a thousand calls
+
+
+class FlatNode:
+    """One node of the list, with the fields native.Scene.create_material reads."""
+
+    __slots__ = ("type", "mode", "inputs", "image", "name", "table")
+
+    def __init__(self, node_type, inputs, mode=0, image=0, name="", table=None):
+        self.type, self.inputs, self.mode = node_type, inputs, mode
+        self.image, self.name, self.table = image, name, table
+
+    def signature(self):
+        """Equal for nodes that mean the same."""
+        table = None if self.table is None else self.table.tobytes()
+        return self.type, self.mode, tuple(self.inputs), self.image, self.name, table
+
+
+class FlatTree:
+    """A flattened tree: nodes, the index of the output shader, the mesh attributes it reads."""
+
+    def __init__(self):
+        self.nodes = []
+        self.surface = -1
+        self.uv_names = set()     # "" is the default UV map
+        self.color_names = set()  # "" is the active colour attribute
+
+    def signature(self):
+        """Equal for trees that mean the same."""
+        return self.surface, tuple(node.signature() for node in self.nodes)
+
+
+def flatten(tree, label, warnings, image_of=None):
+    """The surface of a material or world tree as a FlatTree.
+
+    label names the owner in messages; image_of(node) gives the library's id of an image node's image,
+    0 for a missing one."""
+    walker = Walker(label, warnings, image_of)
+    output = tree.get_output_node('CYCLES')
+    if output is None:
+        return walker.flat
+    sockets = {socket.identifier: socket for socket in output.inputs}
+    for name in ("Volume", "Displacement"):
+        if name in sockets and sockets[name].is_linked:
+            warnings.add(f"{label}: {name.lower()} is not supported and is left out")
+    try:
+        value = walker.input_value(sockets["Surface"], ())
+    except RecursionError:
+        warnings.add(f"{label}: the node tree is too deep and is left out")
+        return FlatTree()
+    if value.kind == 's' and value.node >= 0:
+        walker.flat.surface = value.node
+    return walker.flat
+
+
+def constant_emission(tree, label, warnings):
+    """Colour times strength of a light's tree, three floats, as far as it is constant."""
+    flat = flatten(tree, label, warnings)
+    if flat.surface < 0:
+        return 0.0, 0.0, 0.0
+    color = _emission(flat, flat.surface)
+    if color is None:
+        warnings.add(f"{label}: only constant Emission nodes are supported, white is used")
+        return 1.0, 1.0, 1.0
+    return color
+
+
+def _emission(flat, index):
+    """The constant emission of a shader node of a list, None if it is not constant."""
+    node = flat.nodes[index]
+    constants = [value for source, _, value in node.inputs if source == CONSTANT]
+    if node.type == nodes.EMISSION and len(constants) == 2:
+        return tuple(component * constants[1][0] for component in constants[0])
+    if node.type in (nodes.ADD_SHADER, nodes.MIX_SHADER):
+        shaders = [source for source, _, _ in node.inputs[-2:]]
+        colors = [_emission(flat, source) if source >= 0 else (0.0, 0.0, 0.0) for source in shaders]
+        weights = (1.0, 1.0)
+        if node.type == nodes.MIX_SHADER:
+            if node.inputs[0][0] != CONSTANT:
+                return None
+            factor = min(max(node.inputs[0][2][0], 0.0), 1.0)
+            weights = (1.0 - factor, factor)
+        if None not in colors:
+            return tuple(a * weights[0] + b * weights[1] for a, b in zip(*colors))
+    return None
+
+
+class Walker:
+    """Walks one tree. A path is the tuple of group nodes that were entered on the way."""
+
+    def __init__(self, label, warnings, image_of=None):
+        self.flat = FlatTree()
+        self.label = label
+        self.image_of = image_of or (lambda node: 0)
+        self._warnings = warnings
+        self._done = {}       # (path names, node name) -> {output identifier: Value}
+        self._active = set()  # the nodes being walked, to notice loops
+
+    def warn(self, text):
+        """Add a message about this tree."""
+        self._warnings.add(f"{self.label}: {text}")
+
+    def emit(self, node_type, values, mode=0, image=0, name="", table=None):
+        """Append a node; values: its inputs as Values in the library's order. Returns its index."""
+        inputs = [(value.node, value.output, value.constant) for value in values]
+        self.flat.nodes.append(FlatNode(node_type, inputs, mode, image, name, table))
+        return len(self.flat.nodes) - 1
+
+    # Inputs
+
+    def input_value(self, socket, path):
+        """What an input socket holds, in the socket's own kind."""
+        kind = _KINDS.get(socket.type, 'f')
+        source = _source(socket)
+        if source is not None:
+            value = self._output_value(source, path)
+            if value is not None:
+                return self.convert(value, kind)
+        return socket_constant(socket, kind)
+
+    def is_linked(self, socket):
+        """Whether a link that counts ends at the socket."""
+        return _source(socket) is not None
+
+    # Outputs
+
+    def _output_value(self, socket, path):
+        """The value of an output socket, None where nothing is supported behind it."""
+        node = socket.node
+        if node.mute:
+            return self._through_muted(node, socket, path)
+        if node.type == 'REROUTE':
+            source = _source(node.inputs[0])
+            return self._output_value(source, path) if source is not None \
+                else socket_constant(node.inputs[0], _KINDS.get(socket.type, 'f'))
+        if node.type == 'GROUP':
+            return self._into_group(node, socket, path)
+        if node.type == 'GROUP_INPUT':
+            return self._out_of_group(socket, path)
+        return self._node_outputs(node, path).get(socket.identifier)
+
+    def _through_muted(self, node, socket, path):
+        for link in node.internal_links:
+            if link.to_socket == socket:
+                return self.input_value(link.from_socket, path)
+        return NO_SHADER if socket.type == 'SHADER' \
+            else Value(_KINDS.get(socket.type, 'f'), CONSTANT, 0)
+
+    def _into_group(self, node, socket, path):
+        tree = node.node_tree
+        if tree is None:
+            return None
+        if len(path) >= _MAX_DEPTH or any(entered.node_tree == tree for entered in path):
+            self.warn(f"group '{tree.name}' contains itself, its value is left out")
+            return None
+        outputs = [n for n in tree.nodes if n.type == 'GROUP_OUTPUT']
+        active = next((n for n in outputs if n.is_active_output), outputs[0] if outputs else None)
+        if active is None:
+            return None
+        inside = next((s for s in active.inputs if s.identifier == socket.identifier), None)
+        return None if inside is None else self.input_value(inside, path + (node,))
+
+    def _out_of_group(self, socket, path):
+        if not path:
+            return None
+        group = path[-1]
+        outside = next((s for s in group.inputs if s.identifier == socket.identifier), None)
+        return None if outside is None else self.input_value(outside, path[:-1])
+
+    def _node_outputs(self, node, path):
+        key = (tuple(group.name for group in path), node.name)
+        if key in self._done:
+            return self._done[key]
+        if key in self._active or len(self._active) >= _MAX_DEPTH:
+            self.warn(f"node '{node.name}' is in a loop or too deep, its value is left out")
+            return {}
+        self._active.add(key)
+        outputs = nodes.translate(self, node, path)
+        self._active.discard(key)
+        self._done[key] = outputs
+        return outputs
+
+    # Conversions
+
+    def convert(self, value, kind):
+        """A value as another kind, by Blender's rules for links."""
+        if value.kind == kind or {value.kind, kind} == {'c', 'v'}:
+            return value._replace(kind=kind)
+        if kind == 's':
+            return self._as_emission(value)
+        if value.kind == 's':
+            return Value(kind, CONSTANT, 0)
+        if value.kind == 'f':
+            return self._spread(value, kind)
+        return self._to_number(value)
+
+    def _spread(self, value, kind):
+        if value.node == CONSTANT:
+            return Value(kind, CONSTANT, 0, (value.constant[0],) * 3)
+        if value.node == DEFAULT:
+            return value._replace(kind=kind)
+        return Value(kind, self.emit(nodes.COMBINE, (value, value, value)), 0)
+
+    def _to_number(self, value):
+        """Luminance of a colour, mean of a vector."""
+        if value.kind == 'c':
+            return Value('f', self.emit(nodes.RGB_TO_BW, (value,)), 0)
+        third = Value('v', CONSTANT, 0, (1.0 / 3.0,) * 3)
+        zero = Value('v', CONSTANT, 0)
+        index = self.emit(nodes.VECTOR_MATH, (value, third, zero, Value('f', CONSTANT, 0)),
+                          mode=nodes.VECTOR_DOT)
+        return Value('f', index, 1)
+
+    def _as_emission(self, value):
+        """A colour where a shader is expected shines with that colour."""
+        color = self.convert(value, 'c')
+        one = Value('f', CONSTANT, 0, (1.0, 0.0, 0.0))
+        return Value('s', self.emit(nodes.EMISSION, (color, one)), 0)
+
+
+def _source(socket):
+    """The output socket that feeds an input, None without a link that counts."""
+    if not socket.is_linked:
+        return None
+    for link in socket.links:
+        if link.is_valid and not link.is_muted:
+            return link.from_socket
+    return None
+
+
+def socket_constant(socket, kind):
+    """An input's own value. Vectors that Blender hides the value of (normals, texture coordinates)
+    take the library's default."""
+    if kind == 's':
+        return NO_SHADER
+    if socket.hide_value and kind == 'v':
+        return Value(kind, DEFAULT, 0)
+    default = getattr(socket, "default_value", 0.0)
+    if kind == 'f':
+        return Value('f', CONSTANT, 0, (float(default), 0.0, 0.0))
+    components = tuple(default) if hasattr(default, "__len__") else (float(default),) * 3
+    return Value(kind, CONSTANT, 0, components[:3])

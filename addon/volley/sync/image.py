@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Images: files by their path, everything else by its pixels.
+
+A plain file is read by the library itself. Packed, generated, painted and movie images, and files the
+library cannot read, come from Blender's pixels. A missing image is 0, which renders magenta.
+"""
+
+import os
+import zlib
+
+import numpy as np
+
+from .. import native
+
+_ALPHA_MODES = {'STRAIGHT': native.ALPHA_STRAIGHT, 'PREMUL': native.ALPHA_PREMULTIPLIED,
+                'CHANNEL_PACKED': native.ALPHA_CHANNEL_PACKED, 'NONE': native.ALPHA_NONE}
+_DATA_SPACES = ("Non-Color", "Raw", "Linear", "scene_linear")
+
+
+class Images:
+    """The images of one scene of the library, by Blender image and frame."""
+
+    def __init__(self, scene, warnings):
+        self._scene, self._warnings = scene, warnings
+        self._entries = {}  # key -> (signature, id)
+        self._seen = set()
+        self._look_again = True
+
+    def begin(self, changes):
+        """Start a sync: nothing has been asked for yet. Unless changes names images, those known are
+        taken as they are."""
+        self._seen = set()
+        self._look_again = changes.full or changes.all_materials
+
+    def id_of(self, node):
+        """The library's image of an image or environment texture node, 0 for a missing one."""
+        image = node.image
+        if image is None:
+            return 0
+        path = _file_path(image, node.image_user)
+        key = (image.name_full, path)
+        known = self._entries.get(key)
+        if known and (key in self._seen or not self._look_again):
+            self._seen.add(key)
+            return known[1]
+        self._seen.add(key)
+        signature = _signature(image, path)
+        if known and known[0] == signature:
+            return known[1]
+        self._entries[key] = (signature, self._create(image, path))
+        if known and known[1]:
+            self._scene.destroy_image(known[1])
+        return self._entries[key][1]
+
+    def end(self):
+        """Free what nothing asked for since begin."""
+        for key in [key for key in self._entries if key not in self._seen]:
+            _, image_id = self._entries.pop(key)
+            if image_id:
+                self._scene.destroy_image(image_id)
+
+    def _create(self, image, path):
+        is_srgb = self._is_srgb(image)
+        if path:
+            try:
+                return self._scene.create_image(
+                    path=path, is_srgb=is_srgb,
+                    alpha_mode=_ALPHA_MODES.get(image.alpha_mode, native.ALPHA_STRAIGHT))
+            except native.TracerError as error:
+                if error.status not in (native.ERROR_UNSUPPORTED, native.ERROR_IMAGE):
+                    raise
+        return self._from_pixels(image, is_srgb)
+
+    def _from_pixels(self, image, is_srgb):
+        pixels = read_pixels(image)
+        if pixels is None:
+            self._warnings.add(f"Image '{image.name}': cannot be read, magenta is used")
+            return 0
+        if image.source == 'TILED':
+            self._warnings.add(f"Image '{image.name}': of its tiles only the first is used")
+        return self._scene.create_image(
+            pixels=pixels, alpha_mode=_pixel_alpha_mode(image),
+            is_srgb=is_srgb and not image.is_float)
+
+    def _is_srgb(self, image):
+        name = image.colorspace_settings.name
+        if name != "sRGB" and not name.startswith(_DATA_SPACES):
+            self._warnings.add(f"Image '{image.name}': colour space {name} is not supported, sRGB is used")
+            return True
+        return name == "sRGB"
+
+
+def read_pixels(image):
+    """An image's pixels from Blender, (height, width, 4) float32, or uint8 for an 8-bit image, bottom
+    row first; None when it has none. Bytes are in the image's own colour space, floats are linear."""
+    width, height = image.size
+    if width == 0 or height == 0 or image.channels == 0:
+        return None
+    pixels = np.empty(len(image.pixels), np.float32)
+    image.pixels.foreach_get(pixels)
+    pixels = _to_rgba(pixels.reshape(height, width, -1))
+    if image.is_float:
+        return pixels
+    return (pixels * 255.0 + 0.5).astype(np.uint8)
+
+
+def _to_rgba(pixels):
+    """Any number of channels as four."""
+    channels = pixels.shape[2]
+    if channels == 4:
+        return pixels
+    rgba = np.ones(pixels.shape[:2] + (4,), np.float32)
+    rgba[..., :3] = pixels[..., :3] if channels >= 3 else pixels[..., :1]
+    if channels == 2:
+        rgba[..., 3] = pixels[..., 1]
+    return rgba
+
+
+def _pixel_alpha_mode(image):
+    """Alpha of Blender's own buffers: floats are premultiplied, bytes are not."""
+    if image.alpha_mode in {'NONE', 'CHANNEL_PACKED'}:
+        return _ALPHA_MODES[image.alpha_mode]
+    return native.ALPHA_PREMULTIPLIED if image.is_float else native.ALPHA_STRAIGHT
+
+
+def _file_path(image, image_user):
+    """The absolute path of an image the library can read itself, "" for one of Blender's own."""
+    if image.source not in {'FILE', 'SEQUENCE'} or image.packed_file is not None or image.is_dirty:
+        return ""
+    path = image.filepath_from_user(image_user=image_user)
+    return os.path.abspath(path) if path and os.path.isfile(path) else ""
+
+
+def _signature(image, path):
+    """Equal while the image's pixels and their meaning are."""
+    meaning = (image.colorspace_settings.name, image.alpha_mode, path)
+    if path:
+        status = os.stat(path)
+        return meaning + (status.st_mtime_ns, status.st_size)
+    pixels = read_pixels(image)
+    return meaning + ((0,) if pixels is None else (pixels.shape, zlib.crc32(pixels.tobytes())))

@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Instances: one walk over the depsgraph finds every object that is drawn, however it came to be.
+
+Items of ``depsgraph.object_instances`` die with the loop, so everything is copied while they live. A
+mesh that many instances show is read once; the first of them to come along owns it.
+"""
+
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+
+from . import visibility
+from .matrix import rows12
+
+
+@dataclass
+class Item:
+    """What one instance shows, copied out of the depsgraph."""
+
+    key: tuple                 # stable from sync to sync, see key_of
+    owner: str                 # name of the object it is of, as Blender's updates name it
+    transforms: list           # 12 floats for each motion key
+    mesh_key: tuple = None     # the key of the item that owns the mesh
+    materials: tuple = ()
+    visibility: int = 0
+    pass_index: int = 0
+    random: float = 0.0
+    color: tuple = (1.0, 1.0, 1.0, 1.0)
+    light: dict = None         # fields of a light instead of a mesh
+    motion_keys: int = 1       # how many the object asks for
+    deforms: bool = False      # whether the mesh may change its shape in time
+
+
+def key_of(instance):
+    """What names an instance at every time and in every sync: object, instancer, numbers."""
+    blender_object = instance.object
+    data = blender_object.data
+    kind = type(data).__name__ if data is not None else ""
+    if not instance.is_instance:
+        return (blender_object.name_full, kind)
+    parent = instance.parent
+    return (blender_object.name_full, kind, parent.name_full if parent else "",
+            tuple(instance.persistent_id))
+
+
+def is_shown(instance, v3d=None):
+    """Whether the instance takes part: instancers may hide themselves, viewports have local views."""
+    if not instance.show_self:
+        return False
+    if v3d is None:
+        return True
+    owner = instance.parent if instance.is_instance and instance.parent else instance.object
+    return owner.visible_in_viewport_get(v3d)
+
+
+def random_of(instance):
+    """Object Info's Random, [0, 1), the number Cycles has for the same instance."""
+    number = instance.random_id & 0xFFFFFFFF if instance.is_instance \
+        else _hash_pair(_hash_name(instance.object.name), 0)
+    return min(number / 0xFFFFFFFF, 1.0 - 2.0 ** -24)
+
+
+def _hash_name(name):
+    """A 32-bit polynomial hash of the name's bytes, base 37."""
+    value = 0
+    for byte in name.encode("utf-8"):
+        value = (value * 37 + byte) & 0xFFFFFFFF
+    return value
+
+
+def _hash_pair(x, y):
+    """Bob Jenkins, "lookup3" (2006), final mixing of two 32-bit words."""
+    mask = 0xFFFFFFFF
+
+    def rotate(value, bits):
+        return ((value << bits) | (value >> (32 - bits))) & mask
+
+    a = b = c = (0xDEADBEEF + (2 << 2) + 13) & mask
+    a, b = (a + x) & mask, (b + y) & mask
+    c = ((c ^ b) - rotate(b, 14)) & mask
+    a = ((a ^ c) - rotate(c, 11)) & mask
+    b = ((b ^ a) - rotate(a, 25)) & mask
+    c = ((c ^ b) - rotate(b, 16)) & mask
+    a = ((a ^ c) - rotate(c, 4)) & mask
+    b = ((b ^ a) - rotate(a, 14)) & mask
+    return ((c ^ b) - rotate(b, 24)) & mask
+
+
+def describe(instance, view_layer):
+    """The parts of an item that meshes and lights share."""
+    blender_object = instance.object
+    return Item(
+        key=key_of(instance), owner=blender_object.name_full,
+        transforms=[rows12(instance.matrix_world)],
+        visibility=visibility.instance_visibility(instance, view_layer),
+        pass_index=blender_object.pass_index, random=random_of(instance),
+        color=tuple(blender_object.color))
+
+
+def has_mesh(instance):
+    """Whether the instance shows a mesh; curves, text and the like come along as one of their own."""
+    return isinstance(instance.object.data, bpy.types.Mesh)
+
+
+def is_light(instance):
+    """Whether the instance is a light."""
+    return instance.object.type == 'LIGHT'
+
+
+@dataclass
+class InstanceEntry:
+    """An instance in the library."""
+
+    id: int
+    mesh_id: int
+    signature: tuple
+
+
+@dataclass
+class Instances:
+    """The instances of one scene of the library."""
+
+    scene: object
+    _entries: dict = field(default_factory=dict)
+
+    def update(self, items, mesh_ids):
+        """Make the library's instances those of the items; mesh_ids: library id by mesh key."""
+        seen = set()
+        for item in items:
+            mesh_id = mesh_ids.get(item.mesh_key)
+            if mesh_id is None:
+                continue
+            seen.add(item.key)
+            self._update_one(item, mesh_id)
+        for key in [key for key in self._entries if key not in seen]:
+            self.scene.destroy_instance(self._entries.pop(key).id)
+
+    def _update_one(self, item, mesh_id):
+        transforms = collapse(item.transforms)
+        signature = (mesh_id, transforms.tobytes(), item.materials, item.visibility, item.pass_index,
+                     item.random, item.color)
+        entry = self._entries.get(item.key)
+        if entry is not None and entry.signature == signature:
+            return
+        values = {"mesh": mesh_id, "transforms": transforms, "materials": item.materials,
+                  "visibility": item.visibility, "pass_index": item.pass_index,
+                  "random": item.random, "color": item.color}
+        if entry is None:
+            self._entries[item.key] = InstanceEntry(self.scene.create_instance(**values), mesh_id,
+                                                    signature)
+        else:
+            self.scene.update_instance(entry.id, **values)
+            entry.mesh_id, entry.signature = mesh_id, signature
+
+
+def collapse(arrays):
+    """Equal motion keys as one; (keys, ...) float32."""
+    stacked = np.stack(arrays)
+    return stacked[:1] if len(arrays) > 1 and (stacked == stacked[0]).all() else stacked

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Lights: Blender's light objects to the library's descriptors.
+
+A light's node tree is evaluated here as far as it is constant: Emission nodes whose inputs are not
+linked to textures. Anything else is named in the warnings and its unlinked part is used.
+"""
+
+import math
+
+from .. import native
+from ..compat import casts_shadow, cycles, uses_nodes
+from . import flatten
+from .visibility import light_visibility
+
+
+def describe(light_object, transform, visibility_mask, warnings):
+    """The fields of trc_light_desc for an evaluated light object, or None for one that is skipped."""
+    light = light_object.data
+    if light.type not in native.LIGHT_TYPES:
+        warnings.add(f"Light '{light.name}': type {light.type} is not supported, it is left out")
+        return None
+    if light.type == 'AREA' and cycles(light, "is_portal", False):
+        warnings.add(f"Light '{light.name}': portals are not supported, it is left out")
+        return None
+    factor = _node_color(light, warnings)
+    fields = {
+        "type": native.LIGHT_TYPES[light.type],
+        "transform": tuple(transform),
+        "color": tuple(c * f for c, f in zip(_color(light), factor)),
+        "strength": light.energy * 2.0 ** getattr(light, "exposure", 0.0),
+        "spread": math.pi, "spot_angle": math.pi,
+        "visibility": light_visibility(light_object) & visibility_mask,
+        "cast_shadow": int(casts_shadow(light)),
+        "use_mis": int(cycles(light, "use_multiple_importance_sampling", True)),
+    }
+    fields.update(_SHAPES[light.type](light))
+    return fields
+
+
+def _color(light):
+    """The light's colour with its temperature where Blender has that (4.5 on)."""
+    color = tuple(light.color)
+    if getattr(light, "use_temperature", False):
+        color = tuple(c * t for c, t in zip(color, light.temperature_color))
+    return color
+
+
+def _point(light):
+    return {"radius": light.shadow_soft_size}
+
+
+def _spot(light):
+    return {"radius": light.shadow_soft_size, "spot_angle": light.spot_size,
+            "spot_blend": light.spot_blend}
+
+
+def _sun(light):
+    return {"angle": light.angle}
+
+
+def _area(light):
+    is_square = light.shape in {'SQUARE', 'DISK'}
+    return {"size_x": light.size, "size_y": light.size if is_square else light.size_y,
+            "area_shape": native.AREA_RECTANGLE if light.shape in {'SQUARE', 'RECTANGLE'}
+            else native.AREA_ELLIPSE,
+            "spread": min(max(getattr(light, "spread", math.pi), 1e-4), math.pi)}
+
+
+_SHAPES = {'POINT': _point, 'SPOT': _spot, 'SUN': _sun, 'AREA': _area}
+
+
+def _node_color(light, warnings):
+    """Colour times strength of the light's constant Emission, (1, 1, 1) without nodes."""
+    if not uses_nodes(light):
+        return 1.0, 1.0, 1.0
+    return flatten.constant_emission(light.node_tree, f"Light '{light.name}'", warnings)
+
+
+class Lights:
+    """The lights of one scene of the library, by instance key."""
+
+    def __init__(self, scene):
+        self._scene = scene
+        self._entries = {}  # key -> (id, fields)
+
+    def update(self, lights):
+        """Make the library's lights those of {key: fields}."""
+        for key, fields in lights.items():
+            known = self._entries.get(key)
+            if known is None:
+                self._entries[key] = (self._scene.create_light(**fields), fields)
+            elif known[1] != fields:
+                self._scene.update_light(known[0], **fields)
+                self._entries[key] = (known[0], fields)
+        for key in [key for key in self._entries if key not in lights]:
+            self._scene.destroy_light(self._entries.pop(key)[0])

@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Materials: node trees or plain settings to the library's node lists, once per change."""
+
+from .. import native
+from ..compat import cycles, uses_nodes
+from . import flatten, nodes
+from .values import CONSTANT, DEFAULT, Value
+
+_HOLDOUT_KEY = ("holdout",)
+
+
+class Materials:
+    """The materials of one scene of the library, by name."""
+
+    def __init__(self, scene, images, warnings):
+        self._scene, self._images, self._warnings = scene, images, warnings
+        self._entries = {}  # key -> Entry
+        self._seen = set()
+
+    def begin(self):
+        """Start a sync: nothing has been asked for yet."""
+        self._seen = set()
+
+    def id_of(self, material):
+        """The library's id of an evaluated material, 0 (the default) for None."""
+        return self.entry_of(material).id if material is not None else 0
+
+    def entry_of(self, material):
+        """The entry of an evaluated material, brought up to date once per sync."""
+        key = material.name_full
+        if key not in self._seen:
+            self._seen.add(key)
+            label = f"Material '{material.name}'"
+            flat = self.flatten(material, label)
+            self._update(key, flat, material.pass_index, _flags(material))
+        return self._entries[key]
+
+    def holdout_id(self):
+        """A material that punches a hole."""
+        if _HOLDOUT_KEY not in self._seen:
+            self._seen.add(_HOLDOUT_KEY)
+            flat = flatten.FlatTree()
+            flat.nodes.append(flatten.FlatNode(nodes.HOLDOUT, []))
+            flat.surface = 0
+            self._update(_HOLDOUT_KEY, flat, 0, 0)
+        return self._entries[_HOLDOUT_KEY].id
+
+    def world_id(self, world):
+        """A world's surface as a material."""
+        key = ("world", world.name_full)
+        label = f"World '{world.name}'"
+        if uses_nodes(world):
+            flat = flatten.flatten(world.node_tree, label, self._warnings, self._images.id_of)
+        else:
+            flat = _background(world.color)
+        self._seen.add(key)
+        self._update(key, flat, 0, 0)
+        return self._entries[key].id
+
+    def attribute_names(self):
+        """The UV maps and colour attributes that the materials of this sync read: two sets."""
+        uv_names, color_names = set(), set()
+        for key in self._seen:
+            uv_names |= self._entries[key].uv_names
+            color_names |= self._entries[key].color_names
+        return uv_names, color_names
+
+    def end(self):
+        """Free what nothing asked for since begin; call when no instance uses it any more."""
+        for key in [key for key in self._entries if key not in self._seen]:
+            self._scene.destroy_material(self._entries.pop(key).id)
+
+    def flatten(self, material, label):
+        """A material's surface as a flat tree."""
+        if uses_nodes(material):
+            return flatten.flatten(material.node_tree, label, self._warnings, self._images.id_of)
+        return _plain_surface(material)
+
+    def _update(self, key, flat, pass_index, flags):
+        signature = (flat.signature(), pass_index, flags)
+        entry = self._entries.get(key)
+        if entry is None:
+            entry = self._entries[key] = Entry()
+            entry.id = self._scene.create_material(flat.nodes, flat.surface, pass_index, flags)
+        elif entry.signature != signature:
+            self._scene.update_material(entry.id, flat.nodes, flat.surface, pass_index, flags)
+        entry.signature = signature
+        entry.uv_names, entry.color_names = flat.uv_names, flat.color_names
+
+
+class Entry:
+    """What is known of one material in the library."""
+
+    __slots__ = ("id", "signature", "uv_names", "color_names")
+
+
+def _flags(material):
+    flags = native.MATERIAL_TRANSPARENT_SHADOW if _has_transparent_shadow(material) else 0
+    if cycles(material, "sample_as_light", cycles(material, "emission_sampling", 'AUTO') != 'NONE'):
+        flags |= native.MATERIAL_SAMPLE_EMISSION
+    return flags
+
+
+def _has_transparent_shadow(material):
+    """The switch moved from Cycles' settings to the material itself in 4.2."""
+    return getattr(material, "use_transparent_shadow", cycles(material, "use_transparent_shadow", True))
+
+
+def _plain_surface(material):
+    """A material without nodes: as in Cycles, a diffuse of its viewport colour."""
+    walker = flatten.Walker("", None)
+    values = (Value('c', CONSTANT, 0, tuple(material.diffuse_color)[:3]), Value('f', CONSTANT, 0),
+              Value('v', DEFAULT, 0))
+    walker.flat.surface = walker.emit(nodes.DIFFUSE, values)
+    return walker.flat
+
+
+def _background(color):
+    walker = flatten.Walker("", None)
+    values = (Value('c', CONSTANT, 0, tuple(color)[:3]), Value('f', CONSTANT, 0, (1.0, 0.0, 0.0)))
+    walker.flat.surface = walker.emit(nodes.BACKGROUND, values)
+    return walker.flat

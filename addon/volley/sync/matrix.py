@@ -1,0 +1,9 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Transforms in the library's layout: the three upper rows of a 4x4 matrix, 12 floats, row-major."""
+
+import numpy as np
+
+
+def rows12(matrix):
+    """A mathutils Matrix (or nested sequence) as a float32 array of 12."""
+    return np.array(matrix, dtype=np.float32)[:3].reshape(12)

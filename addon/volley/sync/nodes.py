@@ -1,0 +1,438 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What each node type means in the library's terms.
+
+``translate`` gives the values of a node's outputs. Most nodes are a line in ``_SPECS``: the library's
+type, the inputs in the library's order with Blender's socket identifiers (old and new names), and the
+outputs. The rest have a function. A node in neither table is not supported.
+"""
+
+from collections import namedtuple
+
+import numpy as np
+
+from .values import CONSTANT, DEFAULT, Value
+
+# TRC_NODE_*
+(DIFFUSE, GLOSSY, GLASS, REFRACTION, TRANSPARENT, TRANSLUCENT, EMISSION, BACKGROUND, MIX_SHADER,
+ ADD_SHADER, HOLDOUT, PRINCIPLED) = range(1, 13)
+(IMAGE, ENVIRONMENT, UV_MAP, COLOR_ATTRIBUTE, TEXTURE_COORDINATE, MAPPING, MIX_COLOR, MATH, FRESNEL,
+ LAYER_WEIGHT, LIGHT_PATH, GEOMETRY, NORMAL_MAP, INVERT, GAMMA, HUE_SATURATION, BRIGHT_CONTRAST,
+ COLOR_RAMP, SEPARATE, COMBINE, MAP_RANGE, CLAMP, CHECKER, OBJECT_INFO, VECTOR_MATH,
+ RGB_TO_BW) = range(64, 90)
+
+_DISTRIBUTIONS = {'GGX': 0, 'MULTI_GGX': 1, 'BECKMANN': 2, 'SHARP': 3, 'ASHIKHMIN_SHIRLEY': 4}
+
+_BLENDS = ('MIX', 'DARKEN', 'MULTIPLY', 'BURN', 'LIGHTEN', 'SCREEN', 'DODGE', 'ADD', 'OVERLAY',
+           'SOFT_LIGHT', 'LINEAR_LIGHT', 'DIFFERENCE', 'SUBTRACT', 'DIVIDE', 'HUE', 'SATURATION',
+           'COLOR', 'VALUE', 'EXCLUSION')
+
+_MATH = ('ADD', 'SUBTRACT', 'MULTIPLY', 'DIVIDE', 'MULTIPLY_ADD', 'POWER', 'LOGARITHM', 'SQRT',
+         'INVERSE_SQRT', 'ABSOLUTE', 'EXPONENT', 'MINIMUM', 'MAXIMUM', 'LESS_THAN', 'GREATER_THAN',
+         'SIGN', 'COMPARE', 'SMOOTH_MIN', 'SMOOTH_MAX', 'ROUND', 'FLOOR', 'CEIL', 'TRUNC', 'FRACT',
+         'MODULO', 'WRAP', 'SNAP', 'PINGPONG', 'SINE', 'COSINE', 'TANGENT', 'ARCSINE', 'ARCCOSINE',
+         'ARCTANGENT', 'ARCTAN2', 'SINH', 'COSH', 'TANH', 'RADIANS', 'DEGREES')
+
+_VECTOR_MATH = ('ADD', 'SUBTRACT', 'MULTIPLY', 'DIVIDE', 'MULTIPLY_ADD', 'CROSS_PRODUCT', 'PROJECT',
+                'REFLECT', 'DOT_PRODUCT', 'DISTANCE', 'LENGTH', 'SCALE', 'NORMALIZE', 'ABSOLUTE',
+                'MINIMUM', 'MAXIMUM', 'FLOOR', 'CEIL', 'FRACTION')
+VECTOR_SUBTRACT, VECTOR_MULTIPLY_ADD, VECTOR_DOT, VECTOR_NORMALIZE = 1, 4, 8, 12
+VECTOR_MINIMUM, VECTOR_MAXIMUM = 14, 15
+_MATH_SUBTRACT, _MATH_MULTIPLY, _MATH_DIVIDE, _MATH_MULTIPLY_ADD = 1, 2, 3, 4
+
+_INTERPOLATIONS = {'Linear': 0, 'Closest': 1, 'Cubic': 2, 'Smart': 2}
+_EXTENSIONS = {'REPEAT': 0, 'EXTEND': 1, 'CLIP': 2, 'MIRROR': 3}
+_PROJECTIONS = {'FLAT': 0, 'BOX': 1, 'SPHERE': 2, 'TUBE': 3}
+_CLAMP_RESULT = 256
+RAMP_SIZE = 256
+
+# inputs: (kind, socket identifiers by preference...); outputs: (socket identifier, kind) in the
+# library's order; mode(node): mode bits or None where the node is set to something unsupported.
+Spec = namedtuple("Spec", "type inputs outputs mode", defaults=(None,))
+
+# Socket names of the Principled shader: 3.4's in the library's order, then the newer ones.
+_PRINCIPLED_INPUTS = (
+    ('c', "Base Color"), ('f', "Subsurface", "Subsurface Weight"), ('c', "Subsurface Color", "Base Color"),
+    ('f', "Metallic"), ('f', "Specular"), ('f', "Specular Tint"), ('f', "Roughness"),
+    ('f', "Anisotropic"), ('f', "Anisotropic Rotation"), ('f', "Sheen", "Sheen Weight"),
+    ('f', "Sheen Tint"), ('f', "Clearcoat", "Coat Weight"),
+    ('f', "Clearcoat Roughness", "Coat Roughness"), ('f', "IOR"),
+    ('f', "Transmission", "Transmission Weight"), ('f', "Transmission Roughness"),
+    ('c', "Emission", "Emission Color"), ('f', "Emission Strength"), ('f', "Alpha"), ('v', "Normal"),
+    ('v', "Clearcoat Normal", "Coat Normal"), ('v', "Tangent"))
+
+_SHADER = (("BSDF", 's'),)
+
+
+def _distribution(node):
+    return _DISTRIBUTIONS.get(getattr(node, "distribution", 'GGX'))
+
+
+def _of_rgb(node):
+    return 0 if getattr(node, "mode", 'RGB') == 'RGB' else None
+
+
+def _math_mode(node):
+    if node.operation not in _MATH:
+        return None
+    return _MATH.index(node.operation) | (_CLAMP_RESULT if node.use_clamp else 0)
+
+
+def _vector_math_mode(node):
+    return _VECTOR_MATH.index(node.operation) if node.operation in _VECTOR_MATH else None
+
+
+def _mix_rgb_mode(node):
+    if node.blend_type not in _BLENDS:
+        return None
+    return _BLENDS.index(node.blend_type) | (_CLAMP_RESULT if node.use_clamp else 0)
+
+
+def _map_range_mode(node):
+    if getattr(node, "data_type", 'FLOAT') != 'FLOAT' or node.interpolation_type != 'LINEAR':
+        return None
+    return _CLAMP_RESULT if node.clamp else 0
+
+
+_SPECS = {
+    "ShaderNodeBsdfDiffuse": Spec(
+        DIFFUSE, (('c', "Color"), ('f', "Roughness"), ('v', "Normal")), _SHADER),
+    "ShaderNodeBsdfGlossy": Spec(
+        GLOSSY, (('c', "Color"), ('f', "Roughness"), ('f', "Anisotropy"), ('f', "Rotation"),
+                 ('v', "Normal"), ('v', "Tangent")), _SHADER, _distribution),
+    "ShaderNodeBsdfGlass": Spec(
+        GLASS, (('c', "Color"), ('f', "Roughness"), ('f', "IOR"), ('v', "Normal")), _SHADER,
+        _distribution),
+    "ShaderNodeBsdfRefraction": Spec(
+        REFRACTION, (('c', "Color"), ('f', "Roughness"), ('f', "IOR"), ('v', "Normal")), _SHADER,
+        _distribution),
+    "ShaderNodeBsdfTransparent": Spec(TRANSPARENT, (('c', "Color"),), _SHADER),
+    "ShaderNodeBsdfTranslucent": Spec(TRANSLUCENT, (('c', "Color"), ('v', "Normal")), _SHADER),
+    "ShaderNodeEmission": Spec(
+        EMISSION, (('c', "Color"), ('f', "Strength")), (("Emission", 's'),)),
+    "ShaderNodeBackground": Spec(
+        BACKGROUND, (('c', "Color"), ('f', "Strength")), (("Background", 's'),)),
+    "ShaderNodeMixShader": Spec(
+        MIX_SHADER, (('f', "Fac"), ('s', "Shader"), ('s', "Shader_001")), (("Shader", 's'),)),
+    "ShaderNodeAddShader": Spec(
+        ADD_SHADER, (('s', "Shader"), ('s', "Shader_001")), (("Shader", 's'),)),
+    "ShaderNodeHoldout": Spec(HOLDOUT, (), (("Holdout", 's'),)),
+    "ShaderNodeMapping": Spec(
+        MAPPING, (('v', "Vector"), ('v', "Location"), ('v', "Rotation"), ('v', "Scale")),
+        (("Vector", 'v'),), lambda node: ('POINT', 'TEXTURE', 'VECTOR', 'NORMAL').index(node.vector_type)),
+    "ShaderNodeMixRGB": Spec(
+        MIX_COLOR, (('f', "Fac"), ('c', "Color1"), ('c', "Color2")), (("Color", 'c'),), _mix_rgb_mode),
+    "ShaderNodeMath": Spec(
+        MATH, (('f', "Value"), ('f', "Value_001"), ('f', "Value_002")), (("Value", 'f'),), _math_mode),
+    "ShaderNodeVectorMath": Spec(
+        VECTOR_MATH, (('v', "Vector"), ('v', "Vector_001"), ('v', "Vector_002"), ('f', "Scale")),
+        (("Vector", 'v'), ("Value", 'f')), _vector_math_mode),
+    "ShaderNodeFresnel": Spec(FRESNEL, (('f', "IOR"), ('v', "Normal")), (("Fac", 'f'),)),
+    "ShaderNodeLayerWeight": Spec(
+        LAYER_WEIGHT, (('f', "Blend"), ('v', "Normal")), (("Fresnel", 'f'), ("Facing", 'f'))),
+    "ShaderNodeLightPath": Spec(
+        LIGHT_PATH, (), tuple((name, 'f') for name in (
+            "Is Camera Ray", "Is Shadow Ray", "Is Diffuse Ray", "Is Glossy Ray", "Is Singular Ray",
+            "Is Reflection Ray", "Is Transmission Ray", "Ray Length", "Ray Depth", "Diffuse Depth",
+            "Glossy Depth", "Transparent Depth", "Transmission Depth"))),
+    "ShaderNodeNewGeometry": Spec(
+        GEOMETRY, (), (("Position", 'v'), ("Normal", 'v'), ("Tangent", 'v'), ("True Normal", 'v'),
+                       ("Incoming", 'v'), ("Parametric", 'v'), ("Backfacing", 'f'),
+                       ("Pointiness", 'f'), ("Random Per Island", 'f'))),
+    "ShaderNodeInvert": Spec(INVERT, (('f', "Fac"), ('c', "Color")), (("Color", 'c'),)),
+    "ShaderNodeGamma": Spec(GAMMA, (('c', "Color"), ('f', "Gamma")), (("Color", 'c'),)),
+    "ShaderNodeHueSaturation": Spec(
+        HUE_SATURATION, (('f', "Hue"), ('f', "Saturation"), ('f', "Value"), ('f', "Fac"),
+                         ('c', "Color")), (("Color", 'c'),)),
+    "ShaderNodeBrightContrast": Spec(
+        BRIGHT_CONTRAST, (('c', "Color"), ('f', "Bright"), ('f', "Contrast")), (("Color", 'c'),)),
+    "ShaderNodeSeparateXYZ": Spec(SEPARATE, (('v', "Vector"),), (("X", 'f'), ("Y", 'f'), ("Z", 'f'))),
+    "ShaderNodeSeparateRGB": Spec(SEPARATE, (('c', "Image"),), (("R", 'f'), ("G", 'f'), ("B", 'f'))),
+    "ShaderNodeSeparateColor": Spec(
+        SEPARATE, (('c', "Color"),), (("Red", 'f'), ("Green", 'f'), ("Blue", 'f')), _of_rgb),
+    "ShaderNodeCombineXYZ": Spec(COMBINE, (('f', "X"), ('f', "Y"), ('f', "Z")), (("Vector", 'v'),)),
+    "ShaderNodeCombineRGB": Spec(COMBINE, (('f', "R"), ('f', "G"), ('f', "B")), (("Image", 'c'),)),
+    "ShaderNodeCombineColor": Spec(
+        COMBINE, (('f', "Red"), ('f', "Green"), ('f', "Blue")), (("Color", 'c'),), _of_rgb),
+    "ShaderNodeMapRange": Spec(
+        MAP_RANGE, (('f', "Value"), ('f', "From Min"), ('f', "From Max"), ('f', "To Min"),
+                    ('f', "To Max")), (("Result", 'f'),), _map_range_mode),
+    "ShaderNodeClamp": Spec(
+        CLAMP, (('f', "Value"), ('f', "Min"), ('f', "Max")), (("Result", 'f'),),
+        lambda node: 0 if node.clamp_type == 'MINMAX' else 1),
+    "ShaderNodeTexChecker": Spec(
+        CHECKER, (('v', "Vector"), ('c', "Color1"), ('c', "Color2"), ('f', "Scale")),
+        (("Color", 'c'), ("Fac", 'f'))),
+    "ShaderNodeObjectInfo": Spec(
+        OBJECT_INFO, (), (("Location", 'v'), ("Color", 'c'), ("Alpha", 'f'), ("Object Index", 'f'),
+                          ("Material Index", 'f'), ("Random", 'f'))),
+    "ShaderNodeRGBToBW": Spec(RGB_TO_BW, (('c', "Color"),), (("Val", 'f'),)),
+}
+_SPECS["ShaderNodeBsdfAnisotropic"] = _SPECS["ShaderNodeBsdfGlossy"]
+
+# Nodes that bend what goes through them: unsupported, what comes in goes out.
+_PASSED_THROUGH = {"ShaderNodeBump": ("Normal", "Normal"), "ShaderNodeRGBCurve": ("Color", "Color"),
+                   "ShaderNodeVectorCurve": ("Vector", "Vector"),
+                   "ShaderNodeVectorRotate": ("Vector", "Vector")}
+
+
+def translate(walker, node, path):
+    """The outputs of a node as {socket identifier: Value}; nothing for an unsupported one."""
+    sockets = Sockets(walker, node, path)
+    special = _SPECIAL.get(node.bl_idname)
+    if special is not None:
+        outputs = special(walker, node, sockets)
+        return _unsupported(walker, node, sockets) if outputs is None else outputs
+    spec = _SPECS.get(node.bl_idname)
+    mode = None if spec is None else 0 if spec.mode is None else spec.mode(node)
+    if mode is None:
+        return _unsupported(walker, node, sockets)
+    values = [sockets.get(kind, *names) for kind, *names in spec.inputs]
+    return _outputs(walker, walker.emit(spec.type, values, mode), spec.outputs)
+
+
+class Sockets:
+    """The inputs of one node by identifier."""
+
+    def __init__(self, walker, node, path):
+        self._walker, self._path = walker, path
+        self._by_name = {socket.identifier: socket for socket in node.inputs}
+
+    def find(self, *names):
+        """The first socket of those names, None without one."""
+        return next((self._by_name[name] for name in names if name in self._by_name), None)
+
+    def get(self, kind, *names):
+        """The value of the first socket of those names; one that this Blender lacks is 0 or, for a
+        vector, the library's default."""
+        socket = self.find(*names)
+        if socket is None:
+            return Value(kind, DEFAULT if kind == 'v' else CONSTANT, 0)
+        return self._walker.convert(self._walker.input_value(socket, self._path), kind)
+
+    def is_linked(self, *names):
+        """Whether something is linked to it."""
+        socket = self.find(*names)
+        return socket is not None and self._walker.is_linked(socket)
+
+
+def _constant(kind, x, y=None, z=None):
+    if kind == 'f':
+        return Value('f', -1, 0, (x, 0.0, 0.0))
+    return Value(kind, -1, 0, (x, x if y is None else y, x if z is None else z))
+
+
+def _outputs(walker, index, outputs):
+    return {name: Value(kind, index, i) for i, (name, kind) in enumerate(outputs)}
+
+
+def _number(walker, operation, *values):
+    """A MATH node's result as a Value."""
+    values = list(values) + [_constant('f', 0.0)] * (3 - len(values))
+    return Value('f', walker.emit(MATH, values, operation), 0)
+
+
+def _vector(walker, operation, *values):
+    """A VECTOR_MATH node's vector result as a Value."""
+    values = list(values) + [_constant('v', 0.0)] * (3 - len(values)) + [_constant('f', 0.0)]
+    return Value('v', walker.emit(VECTOR_MATH, values, operation), 0)
+
+
+def _unsupported(walker, node, sockets):
+    """Name the node in the warnings and give the fallback's outputs."""
+    shader = next((s for s in node.outputs if s.type == 'SHADER'), None)
+    if shader is not None:
+        if sockets.find("Color", "Base Color") is None:
+            walker.warn(f"{node.bl_label} is not supported and is left out")
+            return {}
+        walker.warn(f"{node.bl_label} is not supported, a diffuse of its colour is used")
+        values = (sockets.get('c', "Color", "Base Color"), _constant('f', 0.0),
+                  sockets.get('v', "Normal"))
+        return {shader.identifier: Value('s', walker.emit(DIFFUSE, values), 0)}
+    if node.bl_idname in _PASSED_THROUGH:
+        source, target = _PASSED_THROUGH[node.bl_idname]
+        walker.warn(f"{node.bl_label} is not supported, its input {source} is passed on")
+        kind = 'c' if source == "Color" else 'v'
+        return {target: sockets.get(kind, source)}
+    setting = next((getattr(node, name) for name in ("operation", "mode", "blend_type")
+                    if node.bl_idname in _SPECS and hasattr(node, name)), "")
+    detail = f" ({setting})" if setting else ""
+    walker.warn(f"{node.bl_label}{detail} is not supported, the values of the sockets it feeds are used")
+    return {}
+
+
+# Nodes with a function of their own --------------------------------------------------------------
+
+def _principled(walker, node, sockets):
+    """Principled of 3.4 as it is; of 4.0 and later by the sockets that have a counterpart."""
+    values = [sockets.get(kind, *names) for kind, *names in _PRINCIPLED_INPUTS]
+    is_new = sockets.find("Specular IOR Level") is not None
+    if is_new:
+        values[4] = _specular_of_level(walker, sockets)
+        values[5] = values[10] = _constant('f', 0.0)
+        values[15] = _constant('f', 0.0)
+        _name_missing(walker, sockets)
+    return {"BSDF": Value('s', walker.emit(PRINCIPLED, values, _distribution(node) or 0), 0)}
+
+
+def _specular_of_level(walker, sockets):
+    """3.4's specular from 4.0's level and IOR: level scales the reflectance that the IOR gives, and
+    3.4's specular is that reflectance over 0.08."""
+    level, ior = sockets.get('f', "Specular IOR Level"), sockets.get('f', "IOR")
+    one = _constant('f', 1.0)
+    ratio = _number(walker, _MATH_DIVIDE, _number(walker, _MATH_SUBTRACT, ior, one),
+                    _number(walker, 0, ior, one))
+    reflectance = _number(walker, _MATH_MULTIPLY, ratio, ratio)
+    return _number(walker, _MATH_MULTIPLY, _number(walker, _MATH_MULTIPLY, reflectance, level),
+                   _constant('f', 2.0 / 0.08))
+
+
+def _name_missing(walker, sockets):
+    """Warn of 4.0's inputs that have no counterpart and are in use."""
+    neutral = (("Specular Tint", (1.0, 1.0, 1.0)), ("Coat Tint", (1.0, 1.0, 1.0)),
+               ("Thin Film Thickness", (0.0, 0.0, 0.0)), ("Diffuse Roughness", (0.0, 0.0, 0.0)))
+    for name, unused in neutral:
+        socket = sockets.find(name)
+        if socket is None:
+            continue
+        value = sockets.get('c' if name.endswith("Tint") else 'f', name)
+        if value.node >= 0 or any(abs(a - b) > 1e-6 for a, b in zip(value.constant, unused)):
+            walker.warn(f"Principled BSDF: {name} is not supported and is left out")
+
+
+def _value(walker, node, _sockets):
+    return {"Value": _constant('f', float(node.outputs[0].default_value))}
+
+
+def _rgb(walker, node, _sockets):
+    return {"Color": _constant('c', *tuple(node.outputs[0].default_value)[:3])}
+
+
+def _normal(walker, node, sockets):
+    """The Normal node: a direction of its own, and the cosine of its input to it."""
+    direction = _constant('v', *node.outputs[0].default_value)
+    values = (_vector(walker, VECTOR_NORMALIZE, sockets.get('v', "Normal")),
+              _vector(walker, VECTOR_NORMALIZE, direction), _constant('v', 0.0), _constant('f', 0.0))
+    dot = walker.emit(VECTOR_MATH, values, VECTOR_DOT)
+    return {"Normal": direction, "Dot": Value('f', dot, 1)}
+
+
+def _image(walker, node, sockets):
+    vector = sockets.get('v', "Vector")
+    if vector.node == DEFAULT:
+        walker.flat.uv_names.add("")
+    mode = (_INTERPOLATIONS.get(node.interpolation, 0) | _EXTENSIONS.get(node.extension, 0) << 2
+            | _PROJECTIONS.get(node.projection, 0) << 4)
+    index = walker.emit(IMAGE, (vector,), mode, image=walker.image_of(node))
+    return _outputs(walker, index, (("Color", 'c'), ("Alpha", 'f')))
+
+
+def _environment(walker, node, sockets):
+    mode = (_INTERPOLATIONS.get(node.interpolation, 0)
+            | (16 if node.projection == 'MIRROR_BALL' else 0))
+    index = walker.emit(ENVIRONMENT, (sockets.get('v', "Vector"),), mode, image=walker.image_of(node))
+    return _outputs(walker, index, (("Color", 'c'),))
+
+
+def _uv_map(walker, node, _sockets):
+    if node.from_instancer:
+        return None
+    walker.flat.uv_names.add(node.uv_map)
+    return _outputs(walker, walker.emit(UV_MAP, (), name=node.uv_map), (("UV", 'v'),))
+
+
+def _texture_coordinate(walker, node, _sockets):
+    if node.from_instancer:
+        walker.warn("Texture Coordinate: From Instancer is not supported, the object's own are used")
+    if node.object is not None:
+        walker.warn("Texture Coordinate: another object's coordinates are not supported, the "
+                    "object's own are used")
+    if any(s.is_linked for s in node.outputs if s.identifier == "UV"):
+        walker.flat.uv_names.add("")
+    index = walker.emit(TEXTURE_COORDINATE, ())
+    return _outputs(walker, index, tuple((name, 'v') for name in (
+        "Generated", "Normal", "UV", "Object", "Camera", "Window", "Reflection")))
+
+
+def _color_attribute(walker, node, _sockets):
+    walker.flat.color_names.add(node.layer_name)
+    index = walker.emit(COLOR_ATTRIBUTE, (), name=node.layer_name)
+    return _outputs(walker, index, (("Color", 'c'), ("Alpha", 'f')))
+
+
+def _attribute(walker, node, _sockets):
+    """A mesh attribute of any type: sent as a colour, whose mean is its number."""
+    if getattr(node, "attribute_type", 'GEOMETRY') != 'GEOMETRY' or not node.attribute_name:
+        return None
+    walker.flat.color_names.add(node.attribute_name)
+    index = walker.emit(COLOR_ATTRIBUTE, (), name=node.attribute_name)
+    outputs = _outputs(walker, index, (("Color", 'c'), ("Alpha", 'f')))
+    outputs["Vector"] = outputs["Color"]._replace(kind='v')
+    outputs["Fac"] = walker.convert(outputs["Vector"], 'f')
+    return outputs
+
+
+def _normal_map(walker, node, sockets):
+    space = {'TANGENT': 0, 'OBJECT': 1, 'BLENDER_OBJECT': 1, 'WORLD': 2, 'BLENDER_WORLD': 2}[node.space]
+    if space == 0:
+        walker.flat.uv_names.add(node.uv_map)
+    index = walker.emit(NORMAL_MAP, (sockets.get('f', "Strength"), sockets.get('c', "Color")), space,
+                        name=node.uv_map)
+    return _outputs(walker, index, (("Normal", 'v'),))
+
+
+def _color_ramp(walker, node, sockets):
+    ramp = node.color_ramp
+    table = np.array([ramp.evaluate(i / (RAMP_SIZE - 1)) for i in range(RAMP_SIZE)], np.float32)
+    index = walker.emit(COLOR_RAMP, (sockets.get('f', "Fac"),), table=table)
+    return _outputs(walker, index, (("Color", 'c'), ("Alpha", 'f')))
+
+
+def _mix(walker, node, sockets):
+    """The Mix node of 3.4 and later: numbers, vectors or colours."""
+    if node.data_type == 'FLOAT':
+        factor = _clamped(walker, sockets.get('f', "Factor_Float"), node.clamp_factor)
+        first, second = sockets.get('f', "A_Float"), sockets.get('f', "B_Float")
+        difference = _number(walker, _MATH_SUBTRACT, second, first)
+        return {"Result_Float": _number(walker, _MATH_MULTIPLY_ADD, difference, factor, first)}
+    if node.data_type == 'VECTOR':
+        return {"Result_Vector": _mix_vectors(walker, node, sockets)}
+    if node.data_type != 'RGBA' or node.blend_type not in _BLENDS:
+        return None
+    mode = _BLENDS.index(node.blend_type) | (_CLAMP_RESULT if node.clamp_result else 0)
+    values = (_clamped(walker, sockets.get('f', "Factor_Float"), node.clamp_factor),
+              sockets.get('c', "A_Color"), sockets.get('c', "B_Color"))
+    return {"Result_Color": Value('c', walker.emit(MIX_COLOR, values, mode), 0)}
+
+
+def _mix_vectors(walker, node, sockets):
+    if node.factor_mode == 'NON_UNIFORM':
+        factor = sockets.get('v', "Factor_Vector")
+        if node.clamp_factor:
+            factor = _vector(walker, VECTOR_MAXIMUM, factor, _constant('v', 0.0))
+            factor = _vector(walker, VECTOR_MINIMUM, factor, _constant('v', 1.0))
+    else:
+        number = _clamped(walker, sockets.get('f', "Factor_Float"), node.clamp_factor)
+        factor = walker.convert(number, 'v')
+    first, second = sockets.get('v', "A_Vector"), sockets.get('v', "B_Vector")
+    difference = _vector(walker, VECTOR_SUBTRACT, second, first)
+    return _vector(walker, VECTOR_MULTIPLY_ADD, difference, factor, first)
+
+
+def _clamped(walker, value, is_clamped):
+    """A number limited to [0, 1] if it is to be; a constant at once."""
+    if not is_clamped:
+        return value
+    if value.node == CONSTANT:
+        return _constant('f', min(max(value.constant[0], 0.0), 1.0))
+    values = (value, _constant('f', 0.0), _constant('f', 1.0))
+    return Value('f', walker.emit(CLAMP, values), 0)
+
+
+_SPECIAL = {
+    "ShaderNodeBsdfPrincipled": _principled, "ShaderNodeValue": _value, "ShaderNodeRGB": _rgb,
+    "ShaderNodeNormal": _normal, "ShaderNodeTexImage": _image,
+    "ShaderNodeTexEnvironment": _environment, "ShaderNodeUVMap": _uv_map,
+    "ShaderNodeTexCoord": _texture_coordinate, "ShaderNodeVertexColor": _color_attribute,
+    "ShaderNodeAttribute": _attribute, "ShaderNodeNormalMap": _normal_map,
+    "ShaderNodeValToRGB": _color_ramp, "ShaderNodeMix": _mix,
+}

@@ -1,0 +1,11 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Values in a flat node list."""
+
+from collections import namedtuple
+
+# kind: 'f' number, 'c' colour, 'v' vector, 's' shader. node: the index of a node, whose output it is,
+# or CONSTANT (three floats; a number is the first) or DEFAULT (the library's default for the input).
+Value = namedtuple("Value", "kind node output constant", defaults=((0.0, 0.0, 0.0),))
+
+CONSTANT, DEFAULT = -1, -2
+NO_SHADER = Value('s', CONSTANT, 0)

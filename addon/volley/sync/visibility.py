@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which rays see an object: Blender's ray visibility switches as the library's bits."""
+
+from .. import native
+
+_OBJECT_BITS = (
+    ("visible_camera", native.VISIBLE_CAMERA), ("visible_diffuse", native.VISIBLE_DIFFUSE),
+    ("visible_glossy", native.VISIBLE_GLOSSY), ("visible_transmission", native.VISIBLE_TRANSMISSION),
+    ("visible_shadow", native.VISIBLE_SHADOW))
+
+_WORLD_BITS = (
+    ("camera", native.VISIBLE_CAMERA), ("diffuse", native.VISIBLE_DIFFUSE),
+    ("glossy", native.VISIBLE_GLOSSY), ("transmission", native.VISIBLE_TRANSMISSION))
+
+
+def object_visibility(blender_object):
+    """VISIBLE_* bits of an object's own switches."""
+    return sum(bit for name, bit in _OBJECT_BITS if getattr(blender_object, name))
+
+
+def light_visibility(light_object):
+    """VISIBLE_* bits of a light; shadow rays do not apply."""
+    return object_visibility(light_object) | native.VISIBLE_SHADOW
+
+
+def world_visibility(world):
+    """VISIBLE_* bits of a world; they live with Cycles' settings."""
+    switches = getattr(world, "cycles_visibility", None)
+    if switches is None:
+        return native.VISIBLE_ALL
+    return sum(bit for name, bit in _WORLD_BITS if getattr(switches, name)) | native.VISIBLE_SHADOW
+
+
+def instance_visibility(instance, view_layer):
+    """VISIBLE_* bits of one depsgraph instance: the object's and its instancer's switches."""
+    blender_object = instance.object
+    mask = object_visibility(blender_object)
+    parent = instance.parent if instance.is_instance else None
+    if parent is not None:
+        mask &= object_visibility(parent)
+    owner = parent or blender_object
+    if owner.indirect_only_get(view_layer=view_layer):
+        mask &= ~native.VISIBLE_CAMERA
+    return mask
+
+
+def is_holdout(instance, view_layer):
+    """Whether the instance punches a hole into the picture."""
+    owner = instance.parent if instance.is_instance and instance.parent else instance.object
+    return instance.object.is_holdout or owner.holdout_get(view_layer=view_layer)

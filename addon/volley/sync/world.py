@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The world: background, its visibility and sampling, ambient occlusion."""
+
+from .. import native
+from ..compat import cycles
+from .visibility import world_visibility
+
+
+def describe(world, material_id, settings):
+    """The fields of trc_world_desc; settings: ``scene.volley``. Without a world all is black."""
+    fields = {
+        "material": material_id, "visibility": native.VISIBLE_ALL, "use_sampling": 0,
+        "map_resolution": 0, "ao_distance": max(settings.ao_distance, 1e-6),
+        "ao_factor": settings.ao_factor if settings.use_ambient_occlusion else 0.0,
+    }
+    if world is None:
+        return fields
+    method = cycles(world, "sampling_method", 'AUTOMATIC')
+    fields["visibility"] = world_visibility(world)
+    fields["use_sampling"] = int(method != 'NONE')
+    if method == 'MANUAL':
+        fields["map_resolution"] = cycles(world, "sample_map_resolution", 0)
+    return fields

@@ -1,0 +1,472 @@
+/* Invariants of trees, by walking them whole: for tests and for debugging, not for speed.
+ *
+ * What traversal relies on: references in range, every node and leaf reached once and nodes after
+ * their parents (so there is no cycle), no path longer than the stack allows, boxes that hold what
+ * is below them at every key, leaves that hold their triangles' vertices as the mesh and the
+ * transform give them. Containment between keys follows: boxes and vertices are interpolated by the
+ * same formula, and rounding is monotonic. */
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "bvh/bvh.h"
+#include "bvh/tree.h"
+#include "core/core.h"
+#include "scene/mesh.h"
+
+struct checker {
+    const struct trc_bvh *bvh;
+    const struct trc_snapshot *snapshot;
+    char *message;
+    uint32_t capacity;
+};
+
+/* One tree under check. */
+struct tree_check {
+    struct checker *checker;
+    const char *name; /* for messages */
+    const struct trc_tree *tree;
+    const struct trc_part *parts; /* by instance number: joined; one part: a mesh's own */
+    const uint64_t *first;        /* of each part: its triangles in seen */
+    bool is_joined;
+    uint8_t *nodes, *leaves; /* reached */
+    uint8_t *seen;           /* triangles found in leaves */
+    uint64_t seen_count;
+    bool transparent;
+};
+
+__attribute__((format(printf, 2, 3))) static bool complain(struct checker *c, const char *format,
+                                                           ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    if (c->message && c->capacity)
+        vsnprintf(c->message, c->capacity, format, arguments);
+    va_end(arguments);
+    return false;
+}
+
+/* False for NaN anywhere. An empty inner box is inside everything. */
+static bool box_holds(const float lower[3], const float upper[3], const float inner_lower[3],
+                      const float inner_upper[3]) {
+    for (int axis = 0; axis < 3; axis++) {
+        if (inner_lower[axis] > inner_upper[axis])
+            return true;
+        if (!(lower[axis] <= inner_lower[axis] && inner_upper[axis] <= upper[axis]))
+            return false;
+    }
+    return true;
+}
+
+static void child_box(const struct trc_tree *tree, uint32_t node, uint32_t child, uint32_t key,
+                      float lower[3], float upper[3]) {
+    const float *b = trc_node_bounds(tree, node, key);
+    for (uint32_t axis = 0; axis < 3; axis++) {
+        lower[axis] = b[16 * axis + child];
+        upper[axis] = b[16 * axis + 8 + child];
+    }
+}
+
+/* ---- leaves ---- */
+
+/* The part of a used slot, or NULL with a message. */
+static const struct trc_part *slot_part(struct tree_check *t, uint32_t leaf, uint32_t slot) {
+    const struct trc_snapshot *s = t->checker->snapshot;
+    const uint32_t word = trc_leaf_instances(t->tree, leaf)[slot];
+    const uint32_t instance = word & TRC_SLOT_INSTANCE_MASK;
+    const uint32_t triangle = trc_leaf_triangles(t->tree, leaf)[slot];
+    const struct trc_part *part = NULL;
+    if (!t->is_joined && instance == 0)
+        part = t->parts;
+    if (t->is_joined && instance < s->instance_count)
+        part = &t->parts[instance];
+    if (!part || !part->mesh) {
+        complain(t->checker, "%s: leaf %u slot %u: instance %u does not belong here", t->name, leaf,
+                 slot, instance);
+        return NULL;
+    }
+    if (triangle >= part->mesh->triangle_count) {
+        complain(t->checker, "%s: leaf %u slot %u: triangle %u of %u", t->name, leaf, slot,
+                 triangle, part->mesh->triangle_count);
+        return NULL;
+    }
+    if (word & TRC_SLOT_TRANSPARENT)
+        t->transparent = true;
+    return part;
+}
+
+/* The vertices in a slot are those of a triangle of the part, and valid. */
+static bool check_vertices(struct tree_check *t, uint32_t leaf, uint32_t slot,
+                           const struct trc_part *part, uint32_t triangle) {
+    for (uint32_t key = 0; key < t->tree->key_count; key++) {
+        const float *v = trc_leaf_vertices(t->tree, leaf, key);
+        for (uint32_t corner = 0; corner < 3; corner++) {
+            float expected[3], actual[3];
+            trc_part_vertex(part, triangle, corner, key, expected);
+            for (uint32_t axis = 0; axis < 3; axis++)
+                actual[axis] = v[(3 * corner + axis) * TRC_NODE_WIDTH + slot];
+            if (memcmp(expected, actual, sizeof actual) != 0)
+                return complain(
+                    t->checker,
+                    "%s: leaf %u slot %u: corner %u of triangle %u is not the mesh's at "
+                    "key %u",
+                    t->name, leaf, slot, corner, triangle, key);
+            if (!trc_point_is_valid(actual))
+                return complain(t->checker,
+                                "%s: triangle %u has an invalid vertex and is in a leaf", t->name,
+                                triangle);
+        }
+    }
+    return true;
+}
+
+static bool check_leaf(struct tree_check *t, uint32_t ref) {
+    const uint32_t leaf = ref & TRC_REF_INDEX_MASK, count = ((ref >> 28) & 7u) + 1u;
+    const uint32_t *triangles = trc_leaf_triangles(t->tree, leaf);
+    const struct trc_part *part = NULL;
+    uint32_t last = 0;
+    for (uint32_t slot = 0; slot < TRC_NODE_WIDTH; slot++) {
+        if ((triangles[slot] != TRC_EMPTY_SLOT) != (slot < count))
+            return complain(t->checker, "%s: leaf %u: slot %u of %u is %s", t->name, leaf, slot,
+                            count, slot < count ? "empty" : "used");
+        if (slot < count) {
+            part = slot_part(t, leaf, slot);
+            if (!part)
+                return false;
+            last = triangles[slot];
+            uint8_t *seen = &t->seen[t->first[part - t->parts] + last];
+            if (*seen)
+                return complain(t->checker, "%s: triangle %u is in two leaves", t->name, last);
+            *seen = 1;
+            t->seen_count++;
+        }
+        if (!check_vertices(t, leaf, slot, part, last))
+            return false;
+    }
+    return true;
+}
+
+static void leaf_box(const struct trc_tree *tree, uint32_t leaf, uint32_t key, float lower[3],
+                     float upper[3]) {
+    const float *v = trc_leaf_vertices(tree, leaf, key);
+    for (uint32_t axis = 0; axis < 3; axis++) {
+        lower[axis] = INFINITY;
+        upper[axis] = -INFINITY;
+        for (uint32_t corner = 0; corner < 3; corner++)
+            for (uint32_t slot = 0; slot < TRC_NODE_WIDTH; slot++) {
+                const float x = v[(3 * corner + axis) * TRC_NODE_WIDTH + slot];
+                lower[axis] = fminf(lower[axis], x);
+                upper[axis] = fmaxf(upper[axis], x);
+            }
+    }
+}
+
+/* ---- items of a top tree ---- */
+
+/* Box of the images of the tree's corners at every key: in double, so that it is no wider than it
+ * is. */
+static void item_box(const struct trc_snapshot *s, const struct trc_item *item, double lower[3],
+                     double upper[3]) {
+    static const struct trc_affine identity = {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
+    const bool placed = item->instance != TRC_NO_HIT;
+    const uint32_t key_count = placed ? s->instances[item->instance].key_count : 1;
+    for (int axis = 0; axis < 3; axis++) {
+        lower[axis] = INFINITY;
+        upper[axis] = -INFINITY;
+    }
+    for (uint32_t key = 0; key < key_count; key++) {
+        const float *m =
+            (placed ? &s->instances[item->instance].object_to_world[key] : &identity)->m;
+        for (int corner = 0; corner < 8; corner++) {
+            const double p[3] = {(corner & 1 ? item->tree->upper : item->tree->lower)[0],
+                                 (corner & 2 ? item->tree->upper : item->tree->lower)[1],
+                                 (corner & 4 ? item->tree->upper : item->tree->lower)[2]};
+            for (int i = 0; i < 3; i++) {
+                const double x =
+                    m[4 * i] * p[0] + m[4 * i + 1] * p[1] + m[4 * i + 2] * p[2] + m[4 * i + 3];
+                lower[i] = fmin(lower[i], x);
+                upper[i] = fmax(upper[i], x);
+            }
+        }
+    }
+}
+
+/* The box that a top tree's parent keeps for an item (of the whole tree, when it is the root). */
+static bool check_item_box(struct tree_check *t, uint32_t leaf, const float lower[3],
+                           const float upper[3]) {
+    double item_lower[3], item_upper[3];
+    item_box(t->checker->snapshot, &t->tree->items[leaf], item_lower, item_upper);
+    for (int axis = 0; axis < 3; axis++)
+        if (!((double)lower[axis] <= item_lower[axis] && item_upper[axis] <= (double)upper[axis]))
+            return complain(t->checker, "%s: item %u sticks out of its box on axis %d", t->name,
+                            leaf, axis);
+    return true;
+}
+
+static bool check_item(struct checker *c, const struct trc_item *item, uint8_t *placed) {
+    const struct trc_snapshot *s = c->snapshot;
+    if (item->instance == TRC_NO_HIT) {
+        if (item->tree != &c->bvh->joined || item->visibility != TRC_VISIBLE_ALL)
+            return complain(c, "the joined tree's item is not right");
+        return true;
+    }
+    if (item->instance >= s->instance_count)
+        return complain(c, "an item stands for instance %u of %u", item->instance,
+                        s->instance_count);
+    const struct trc_instance *instance = &s->instances[item->instance];
+    const struct trc_blas *blas = c->bvh->blas[instance->mesh];
+    if (!blas || item->tree != &blas->tree)
+        return complain(c, "the item of instance %u has another tree", item->instance);
+    if (item->visibility != instance->visibility)
+        return complain(c, "the item of instance %u has visibility %u", item->instance,
+                        item->visibility);
+    if (placed[item->instance]++)
+        return complain(c, "instance %u has two items", item->instance);
+    return true;
+}
+
+/* ---- nodes ---- */
+
+/* ref is new, in range, and comes after its parent. */
+static bool check_ref(struct tree_check *t, uint32_t ref, uint32_t parent) {
+    const bool is_leaf = (ref & TRC_REF_LEAF) != 0;
+    const uint32_t index = ref & TRC_REF_INDEX_MASK;
+    if (index >= (is_leaf ? t->tree->leaf_count : t->tree->node_count))
+        return complain(t->checker, "%s: reference %08x is out of range", t->name, ref);
+    if (!is_leaf && parent != UINT32_MAX && index <= parent)
+        return complain(t->checker, "%s: node %u stands before its parent %u", t->name, index,
+                        parent);
+    uint8_t *reached = is_leaf ? &t->leaves[index] : &t->nodes[index];
+    if (*reached)
+        return complain(t->checker, "%s: reference %08x is reached twice", t->name, ref);
+    *reached = 1;
+    return true;
+}
+
+/* What is below ref lies in the box its parent keeps for it, at a key. */
+static bool check_box(struct tree_check *t, uint32_t ref, uint32_t key, const float lower[3],
+                      const float upper[3]) {
+    const uint32_t index = ref & TRC_REF_INDEX_MASK;
+    float low[3], high[3];
+    if ((ref & TRC_REF_LEAF) && t->tree->is_top)
+        return check_item_box(t, index, lower, upper);
+    if (ref & TRC_REF_LEAF) {
+        leaf_box(t->tree, index, key, low, high);
+        if (box_holds(lower, upper, low, high))
+            return true;
+        return complain(t->checker, "%s: leaf %u sticks out of its box at key %u", t->name, index,
+                        key);
+    }
+    for (uint32_t i = 0; i < TRC_NODE_WIDTH; i++) {
+        if (trc_node_children(t->tree, index)[i] == TRC_REF_EMPTY)
+            continue;
+        child_box(t->tree, index, i, key, low, high);
+        if (!box_holds(lower, upper, low, high))
+            return complain(t->checker, "%s: child %u of node %u sticks out at key %u", t->name, i,
+                            index, key);
+    }
+    return true;
+}
+
+/* An unused child must never be entered: its box is inverted. */
+static bool check_empty(struct tree_check *t, uint32_t node, uint32_t child) {
+    for (uint32_t key = 0; key < t->tree->key_count; key++) {
+        float low[3], high[3];
+        child_box(t->tree, node, child, key, low, high);
+        for (int axis = 0; axis < 3; axis++)
+            if (low[axis] != INFINITY || high[axis] != -INFINITY)
+                return complain(t->checker, "%s: unused child %u of node %u has a box", t->name,
+                                child, node);
+    }
+    return true;
+}
+
+/* Everything below ref; level: nodes on the way to it. */
+static bool check_below(struct tree_check *t, uint32_t ref, uint32_t parent, uint32_t level) {
+    if (!check_ref(t, ref, parent))
+        return false;
+    if (ref & TRC_REF_LEAF)
+        return t->tree->is_top || check_leaf(t, ref);
+    if (level >= TRC_MAX_LEVELS)
+        return complain(t->checker, "%s: more than %d levels", t->name, TRC_MAX_LEVELS);
+    for (uint32_t i = 0; i < TRC_NODE_WIDTH; i++) {
+        const uint32_t child = trc_node_children(t->tree, ref)[i];
+        if (child == TRC_REF_EMPTY) {
+            if (!check_empty(t, ref, i))
+                return false;
+            continue;
+        }
+        if (!check_below(t, child, ref, level + 1))
+            return false;
+        for (uint32_t key = 0; key < t->tree->key_count; key++) {
+            float low[3], high[3];
+            child_box(t->tree, ref, i, key, low, high);
+            if (!check_box(t, child, key, low, high))
+                return false;
+        }
+    }
+    return true;
+}
+
+/* Shape and boxes from the root; every node and leaf is reached. */
+static bool check_shape(struct tree_check *t) {
+    const struct trc_tree *tree = t->tree;
+    if (tree->root != TRC_REF_EMPTY) {
+        if (!check_below(t, tree->root, UINT32_MAX, 0))
+            return false;
+        for (uint32_t key = 0; key < tree->key_count; key++)
+            if (!check_box(t, tree->root, key, tree->lower, tree->upper))
+                return false;
+        for (int axis = 0; axis < 3; axis++)
+            if (!(fabsf(tree->lower[axis]) <= tree->extent &&
+                  fabsf(tree->upper[axis]) <= tree->extent))
+                return complain(t->checker, "%s: the extent is too small", t->name);
+    }
+    for (uint32_t i = 0; i < tree->node_count; i++)
+        if (!t->nodes[i])
+            return complain(t->checker, "%s: node %u is not reached", t->name, i);
+    for (uint32_t i = 0; i < tree->leaf_count; i++)
+        if (!t->leaves[i])
+            return complain(t->checker, "%s: leaf %u is not reached", t->name, i);
+    return true;
+}
+
+/* ---- whole trees ---- */
+
+static bool triangle_is_valid(const struct trc_part *part, uint32_t triangle, uint32_t key_count) {
+    for (uint32_t key = 0; key < key_count; key++)
+        for (uint32_t corner = 0; corner < 3; corner++) {
+            float p[3];
+            trc_part_vertex(part, triangle, corner, key, p);
+            if (!trc_point_is_valid(p))
+                return false;
+        }
+    return true;
+}
+
+/* Triangles that are in no leaf are invalid, and counted. */
+static bool check_absent(struct tree_check *t, uint32_t part_count) {
+    uint64_t absent = 0;
+    for (uint32_t i = 0; i < part_count; i++) {
+        const struct trc_part *part = &t->parts[i];
+        for (uint32_t k = 0; part->mesh && k < part->mesh->triangle_count; k++) {
+            if (t->seen[t->first[i] + k])
+                continue;
+            absent++;
+            if (triangle_is_valid(part, k, t->tree->key_count))
+                return complain(t->checker, "%s: triangle %u is in no leaf", t->name, k);
+        }
+    }
+    if (absent != t->tree->skipped_count || t->seen_count != t->tree->triangle_count)
+        return complain(t->checker,
+                        "%s: %llu triangles and %llu skipped, the tree says %llu and %llu", t->name,
+                        (unsigned long long)t->seen_count, (unsigned long long)absent,
+                        (unsigned long long)t->tree->triangle_count,
+                        (unsigned long long)t->tree->skipped_count);
+    if (t->tree->has_transparent != t->transparent)
+        return complain(t->checker, "%s: has_transparent is %d", t->name, t->tree->has_transparent);
+    return true;
+}
+
+/* Checks a tree over parts; those with a NULL mesh take no part. first: room for part_count. */
+static bool check_tree(struct tree_check *t, uint32_t part_count, uint64_t *first) {
+    uint64_t total = 0;
+    for (uint32_t i = 0; i < part_count; i++) {
+        first[i] = total;
+        total += t->parts[i].mesh ? t->parts[i].mesh->triangle_count : 0;
+    }
+    t->first = first;
+    t->nodes = trc_alloc_zeroed(t->tree->node_count, 1);
+    t->leaves = trc_alloc_zeroed(t->tree->leaf_count, 1);
+    t->seen = trc_alloc_zeroed(total, 1);
+    bool good = t->nodes && t->leaves && t->seen;
+    if (!good)
+        complain(t->checker, "no memory to check a tree");
+    good = good && check_shape(t) && (t->tree->is_top || check_absent(t, part_count));
+    trc_free(t->nodes);
+    trc_free(t->leaves);
+    trc_free(t->seen);
+    return good;
+}
+
+static bool check_blas(struct checker *c, uint32_t mesh) {
+    const struct trc_blas *blas = c->bvh->blas[mesh];
+    char name[32];
+    uint64_t first;
+    if (blas->mesh != c->snapshot->meshes[mesh])
+        return complain(c, "tree %u is of another mesh", mesh);
+    if (blas->tree.key_count != blas->mesh->key_count)
+        return complain(c, "tree %u has %u keys", mesh, blas->tree.key_count);
+    (void)snprintf(name, sizeof name, "mesh %u", mesh);
+    const struct trc_part part = {.mesh = blas->mesh};
+    struct tree_check t = {.checker = c, .name = name, .tree = &blas->tree, .parts = &part};
+    return check_tree(&t, 1, &first);
+}
+
+/* An instance without an item is invisible, has an empty tree, or is joined; only static ones are
+ * joined, and their mesh is nobody else's. */
+static bool is_joined(const struct checker *c, uint32_t i, const uint8_t *placed) {
+    const struct trc_instance *instance = &c->snapshot->instances[i];
+    if (placed[i] || instance->visibility != TRC_VISIBLE_ALL)
+        return false;
+    return !c->bvh->blas[instance->mesh];
+}
+
+static bool check_joined(struct checker *c, const uint8_t *placed) {
+    const struct trc_snapshot *s = c->snapshot;
+    struct trc_part *parts = trc_alloc_zeroed(s->instance_count, sizeof *parts);
+    uint64_t *first = trc_alloc_zeroed(s->instance_count, sizeof *first);
+    bool good = parts && first;
+    if (!good)
+        complain(c, "no memory to check a tree");
+    for (uint32_t i = 0; good && i < s->instance_count; i++) {
+        const struct trc_instance *instance = &s->instances[i];
+        const struct trc_blas *blas = c->bvh->blas[instance->mesh];
+        if (is_joined(c, i, placed))
+            parts[i] = (struct trc_part){.mesh = s->meshes[instance->mesh],
+                                         .transform = instance->object_to_world};
+        else if (!placed[i] && instance->visibility && (!blas || blas->tree.root != TRC_REF_EMPTY))
+            good = complain(c, "instance %u is nowhere", i);
+    }
+    if (good) {
+        struct tree_check t = {.checker = c,
+                               .name = "joined tree",
+                               .tree = &c->bvh->joined,
+                               .parts = parts,
+                               .is_joined = true};
+        good = check_tree(&t, s->instance_count, first);
+    }
+    trc_free(parts);
+    trc_free(first);
+    return good;
+}
+
+static bool check_top(struct checker *c, uint8_t *placed) {
+    const struct trc_tree *top = &c->bvh->top;
+    if (c->bvh->tree != top)
+        return true;
+    for (uint32_t i = 0; i < top->leaf_count; i++)
+        if (!check_item(c, &top->items[i], placed))
+            return false;
+    struct tree_check t = {.checker = c, .name = "top tree", .tree = top};
+    return check_tree(&t, 0, NULL);
+}
+
+bool trc_bvh_check(const struct trc_bvh *bvh, const struct trc_snapshot *snapshot, char *message,
+                   uint32_t capacity) {
+    struct checker c = {bvh, snapshot, message, capacity};
+    if (bvh->tree != &bvh->top && bvh->tree != &bvh->joined)
+        return complain(&c, "the tree in use is neither of its own");
+    if (bvh->blas_count != snapshot->mesh_count)
+        return complain(&c, "trees for %u meshes, there are %u", bvh->blas_count,
+                        snapshot->mesh_count);
+    for (uint32_t i = 0; i < bvh->blas_count; i++)
+        if (bvh->blas[i] && !check_blas(&c, i))
+            return false;
+    uint8_t *placed = trc_alloc_zeroed(snapshot->instance_count, 1);
+    if (!placed)
+        return complain(&c, "no memory to check the trees");
+    const bool good = check_top(&c, placed) && check_joined(&c, placed);
+    trc_free(placed);
+    return good;
+}

@@ -1,0 +1,239 @@
+/* Storage of images: from pixels or files to texels ready for lookups. */
+#include "image/image.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <stdbool.h>
+#include <string.h>
+
+#include "core/checks.h"
+#include "core/core.h"
+#include "image/oiio.h"
+
+static const uint8_t texel_bytes[] = {
+    [TRC_TEXEL_U8] = 4, [TRC_TEXEL_U16] = 8, [TRC_TEXEL_F16] = 8, [TRC_TEXEL_F32] = 16};
+
+/* 1.0 as a half float, and what all infinities and NaN have set. */
+#define HALF_ONE 0x3c00u
+#define HALF_EXPONENT 0x7c00u
+
+/* ---- life ---- */
+
+struct trc_image *trc_image_retain(struct trc_image *image) {
+    if (image) atomic_fetch_add_explicit(&image->refs, 1, memory_order_relaxed);
+    return image;
+}
+
+static void image_free(struct trc_image *image) {
+    for (uint32_t i = 0; i < image->level_count; i++) trc_free(image->levels[i].texels);
+    trc_free(image);
+}
+
+void trc_image_release(struct trc_image *image) {
+    if (!image) return;
+    if (atomic_fetch_sub_explicit(&image->refs, 1, memory_order_acq_rel) == 1) image_free(image);
+}
+
+uint64_t trc_image_bytes(const struct trc_image *image) { return image ? image->bytes : 0; }
+
+/* An image of one level with texels still to be filled. */
+static trc_status image_create(uint32_t width, uint32_t height, enum trc_texel format,
+                               const trc_image_desc *desc, struct trc_image **image_out) {
+    const uint64_t texels = (uint64_t)width * height, bytes = texels * texel_bytes[format];
+    if (width > TRC_IMAGE_MAX_SIDE || height > TRC_IMAGE_MAX_SIDE || texels > TRC_IMAGE_MAX_TEXELS ||
+        bytes > TRC_IMAGE_MAX_BYTES) {
+        return trc_fail(TRC_ERROR_TOO_LARGE,
+                        "an image of %" PRIu32 " x %" PRIu32 " pixels, %" PRIu64
+                        " bytes, is too large: at most %u per side, %u in all, %" PRIu64 " bytes",
+                        width, height, bytes, TRC_IMAGE_MAX_SIDE, TRC_IMAGE_MAX_TEXELS,
+                        (uint64_t)TRC_IMAGE_MAX_BYTES);
+    }
+    struct trc_image *image = trc_alloc_zeroed(1, sizeof *image);
+    void *block = trc_alloc(texels, texel_bytes[format]);
+    if (!image || !block) {
+        trc_free(image);
+        trc_free(block);
+        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for an image of %" PRIu64 " bytes",
+                        bytes);
+    }
+    atomic_init(&image->refs, 1);
+    image->format = format;
+    image->is_srgb = desc->is_srgb != 0;
+    image->level_count = 1;
+    image->levels[0] = (struct trc_image_level){width, height, block};
+    image->bytes = bytes;
+    *image_out = image;
+    return TRC_OK;
+}
+
+/* ---- texels ---- */
+
+/* Grey, grey with alpha and RGB, whose channels stand at the start of each texel, to RGBA. one: 1.0 of
+ * the format. A macro, as it is the same for three types of number. */
+#define DEFINE_SPREAD(name, type)                                                                  \
+    static void name(type *t, uint64_t count, uint32_t channels, type one) {                       \
+        for (uint64_t i = 0; i < count; i++, t += 4) {                                             \
+            if (channels < 4) t[3] = channels == 2 ? t[1] : one;                                   \
+            if (channels < 3) t[1] = t[2] = t[0];                                                  \
+        }                                                                                          \
+    }
+DEFINE_SPREAD(spread_u8, uint8_t)
+DEFINE_SPREAD(spread_u16, uint16_t)
+DEFINE_SPREAD(spread_f32, float)
+
+static void spread_channels(struct trc_image *image, uint64_t count, uint32_t channels) {
+    void *texels = image->levels[0].texels;
+    if (channels == 4) return;
+    switch (image->format) {
+    case TRC_TEXEL_U8: spread_u8(texels, count, channels, UINT8_MAX); break;
+    case TRC_TEXEL_U16: spread_u16(texels, count, channels, UINT16_MAX); break;
+    case TRC_TEXEL_F16: spread_u16(texels, count, channels, HALF_ONE); break;
+    case TRC_TEXEL_F32: spread_f32(texels, count, channels, 1.0f); break;
+    }
+}
+
+static float half_to_float(uint16_t half) {
+    const uint32_t bits = (uint32_t)(half & 0x7fffu) << 13;
+    float value;
+    memcpy(&value, &bits, sizeof value);
+    value *= 0x1p112f;
+    return half & 0x8000u ? -value : value;
+}
+
+/* To the nearest half float; infinite above the largest. */
+static uint16_t float_to_half(float value) {
+    const float scaled = fminf(fabsf(value), 65536.0f) * 0x1p-112f;
+    uint32_t bits;
+    memcpy(&bits, &scaled, sizeof bits);
+    bits += 0x0fffu + ((bits >> 13) & 1u); /* ties to even */
+    return (uint16_t)(bits >> 13 | (signbit(value) ? 0x8000u : 0u));
+}
+
+/* Texels with a NaN or an infinity become 0, as in Cycles: other channels alone would have a strange
+ * hue. */
+static void drop_bad_texels(struct trc_image *image, uint64_t count) {
+    uint16_t *h = image->levels[0].texels;
+    float *f = image->levels[0].texels;
+    for (uint64_t i = 0; i < count; i++) {
+        bool is_bad = false;
+        for (int c = 0; c < 4; c++) {
+            is_bad |= image->format == TRC_TEXEL_F16
+                          ? (h[4 * i + c] & HALF_EXPONENT) == HALF_EXPONENT
+                          : !isfinite(f[4 * i + c]);
+        }
+        if (!is_bad) continue;
+        image->bad_texel_count++;
+        memset((char *)image->levels[0].texels + i * texel_bytes[image->format], 0,
+               texel_bytes[image->format]);
+    }
+}
+
+static void set_opaque(struct trc_image *image, uint64_t count) {
+    uint8_t *b = image->levels[0].texels;
+    uint16_t *h = image->levels[0].texels;
+    float *f = image->levels[0].texels;
+    for (uint64_t i = 0; i < count; i++) {
+        switch (image->format) {
+        case TRC_TEXEL_U8: b[4 * i + 3] = UINT8_MAX; break;
+        case TRC_TEXEL_U16: h[4 * i + 3] = UINT16_MAX; break;
+        case TRC_TEXEL_F16: h[4 * i + 3] = HALF_ONE; break;
+        case TRC_TEXEL_F32: f[4 * i + 3] = 1.0f; break;
+        }
+    }
+}
+
+/* Colours times alpha, in the encoding of the file and rounded down for bytes, as Cycles. */
+static void multiply_by_alpha(struct trc_image *image, uint64_t count) {
+    uint8_t *b = image->levels[0].texels;
+    uint16_t *h = image->levels[0].texels;
+    float *f = image->levels[0].texels;
+    for (uint64_t i = 0; i < count; i++, b += 4, h += 4, f += 4) {
+        for (int c = 0; c < 3; c++) {
+            switch (image->format) {
+            case TRC_TEXEL_U8: b[c] = (uint8_t)(b[c] * b[3] / UINT8_MAX); break;
+            case TRC_TEXEL_U16: h[c] = (uint16_t)((uint32_t)h[c] * h[3] / UINT16_MAX); break;
+            case TRC_TEXEL_F16: h[c] = float_to_half(half_to_float(h[c]) * half_to_float(h[3])); break;
+            case TRC_TEXEL_F32: f[c] *= f[3]; break;
+            }
+        }
+    }
+}
+
+/* What is left to do when the channels are there. */
+static void finish(struct trc_image *image, uint32_t alpha_mode, uint32_t channels,
+                   bool is_unassociated) {
+    const uint64_t count = (uint64_t)image->levels[0].width * image->levels[0].height;
+    const bool has_alpha = channels == 2 || channels == 4;
+    const bool is_float = image->format == TRC_TEXEL_F16 || image->format == TRC_TEXEL_F32;
+    spread_channels(image, count, channels);
+    if (is_float) drop_bad_texels(image, count);
+    if (has_alpha && alpha_mode == TRC_ALPHA_NONE) set_opaque(image, count);
+    image->is_associated = has_alpha && (alpha_mode == TRC_ALPHA_STRAIGHT ||
+                                         alpha_mode == TRC_ALPHA_PREMULTIPLIED);
+    if (image->is_associated && is_unassociated) {
+        multiply_by_alpha(image, count);
+        if (is_float) drop_bad_texels(image, count); /* products may overflow */
+    }
+}
+
+/* ---- sources ---- */
+
+static trc_status load_pixels(const trc_image_desc *desc, struct trc_image **image_out) {
+    const enum trc_texel format = desc->is_float ? TRC_TEXEL_F32 : TRC_TEXEL_U8;
+    const size_t element = desc->is_float ? sizeof(float) : 1;
+    if (!desc->width || !desc->height) {
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "an image of %" PRIu32 " x %" PRIu32 " pixels",
+                        desc->width, desc->height);
+    }
+    TRC_TRY(trc_check_count(desc->width, 1, TRC_IMAGE_MAX_SIDE, "width"));
+    TRC_TRY(trc_check_count(desc->height, 1, TRC_IMAGE_MAX_SIDE, "height"));
+    const uint64_t bytes = (uint64_t)desc->width * desc->height * texel_bytes[format];
+    TRC_TRY(trc_check_array(desc->pixels, desc->pixel_bytes, bytes, 1, element, "pixels"));
+    TRC_TRY(image_create(desc->width, desc->height, format, desc, image_out));
+    memcpy((*image_out)->levels[0].texels, desc->pixels, bytes);
+    finish(*image_out, desc->alpha_mode, 4, desc->alpha_mode == TRC_ALPHA_STRAIGHT);
+    return TRC_OK;
+}
+
+#ifdef TRC_WITH_OIIO
+static trc_status read_file(struct trc_oiio *file, const struct trc_file_info *info,
+                            const trc_image_desc *desc, struct trc_image **image_out) {
+    struct trc_image *image;
+    TRC_TRY(image_create(info->width, info->height, (enum trc_texel)info->format, desc, &image));
+    const uint64_t texel = texel_bytes[info->format];
+    const trc_status status =
+        trc_oiio_read(file, image->levels[0].texels, image->bytes, texel, texel * info->width);
+    if (status != TRC_OK) {
+        trc_image_release(image);
+        return status;
+    }
+    finish(image, desc->alpha_mode, info->channels, info->is_unassociated);
+    *image_out = image;
+    return TRC_OK;
+}
+
+static trc_status load_file(const trc_image_desc *desc, struct trc_image **image_out) {
+    struct trc_oiio *file;
+    struct trc_file_info info;
+    TRC_TRY(trc_oiio_open(desc->path, &file, &info));
+    const trc_status status = read_file(file, &info, desc, image_out);
+    trc_oiio_close(file);
+    return status;
+}
+#else
+static trc_status load_file(const trc_image_desc *desc, struct trc_image **image_out) {
+    (void)image_out;
+    return trc_fail(TRC_ERROR_UNSUPPORTED,
+                    "this build cannot read image files (no OpenImageIO): %s", desc->path);
+}
+#endif
+
+trc_status trc_image_load(const trc_image_desc *desc, struct trc_image **image_out) {
+    TRC_TRY(trc_check_struct(desc, sizeof *desc, "trc_image_desc"));
+    TRC_TRY(trc_check_enum(desc->alpha_mode, TRC_ALPHA_NONE + 1, "alpha_mode"));
+    if ((desc->path != NULL) == (desc->pixels != NULL)) {
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "an image needs either pixels or a path");
+    }
+    if (desc->path) return load_file(desc, image_out);
+    return load_pixels(desc, image_out);
+}

@@ -1,0 +1,56 @@
+/* Images that Image and Environment nodes read: texels as the lookups want them.
+ *
+ * As in Cycles, what is stored is what the file or the caller gave: sRGB-encoded bytes stay encoded and
+ * are decoded after filtering, and colours of images with alpha are multiplied by it before filtering
+ * (in their encoding). Rows run from the bottom (v = 0) upwards, texels are RGBA. Immutable once
+ * created; the count of holders is atomic. */
+#ifndef TRACER_IMAGE_IMAGE_H
+#define TRACER_IMAGE_IMAGE_H
+
+#include <stdatomic.h>
+#include <stdint.h>
+
+#include "tracer/tracer.h"
+
+#define TRC_IMAGE_MAX_SIDE 65536u
+#define TRC_IMAGE_MAX_TEXELS (1u << 30)
+/* Texels of all levels are addressed by a signed 32-bit number of 4-byte words. */
+#define TRC_IMAGE_MAX_BYTES (((uint64_t)1 << 33) - 4)
+/* 65536 halved down to 1. */
+#define TRC_IMAGE_MAX_LEVELS 17
+
+/* How one texel is stored. */
+enum trc_texel {
+    TRC_TEXEL_U8,  /* 4 bytes, value / 255 */
+    TRC_TEXEL_U16, /* 8 bytes, value / 65535 */
+    TRC_TEXEL_F16, /* 8 bytes, finite */
+    TRC_TEXEL_F32  /* 16 bytes, finite */
+};
+
+struct trc_image_level {
+    uint32_t width, height;
+    void *texels;
+};
+
+struct trc_image {
+    atomic_uint refs;
+    enum trc_texel format;
+    uint32_t is_srgb;           /* colours are sRGB-encoded: to be decoded after filtering */
+    uint32_t is_associated;     /* colours are multiplied by alpha: divided when alpha is used too */
+    uint32_t level_count;       /* 1: smaller levels come with mip-mapping */
+    struct trc_image_level levels[TRC_IMAGE_MAX_LEVELS];
+    uint64_t bytes;             /* of the texels */
+    uint64_t bad_texel_count;   /* were NaN or infinite, and are 0 now: worth a warning */
+};
+
+/* Copies the pixels or reads the file of a descriptor, which is checked in full. INVALID_ARGUMENT,
+ * STRUCT_SIZE, TOO_LARGE, OUT_OF_MEMORY, IMAGE (unreadable file), UNSUPPORTED (a path in a build
+ * without OpenImageIO). One holder: the caller. */
+trc_status trc_image_load(const trc_image_desc *desc, struct trc_image **image_out);
+
+/* NULL is fine for all three. The last release frees. */
+struct trc_image *trc_image_retain(struct trc_image *image);
+void trc_image_release(struct trc_image *image);
+uint64_t trc_image_bytes(const struct trc_image *image);
+
+#endif

@@ -1,0 +1,259 @@
+/* Choosing among lights: how much each might give to a point, and with what chance it is chosen.
+ *
+ * A. Conty Estevez and C. Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting" (2018):
+ * intensity over squared distance, times the least angle any part of the light may make with its own
+ * axis, times the least angle it may make with the receiver's normal. Both bounds are conservative, so a
+ * light of importance 0 gives nothing. */
+#ifndef TRACER_KERNELS_LIGHT_SELECT_H
+#define TRACER_KERNELS_LIGHT_SELECT_H
+
+#include "kernels/wide_math.h"
+#include "shading/lights.h"
+
+/* Importances are kept for so many candidates; what is beyond is computed twice. */
+#define TRC_CANDIDATES_KEPT 48
+
+/* Who receives: the point and the normal of kernels/light.h. */
+struct trc_receiver {
+    vvec3 p, n;
+    vmask has_n;
+};
+TRC_INLINE struct trc_receiver trc_receiver_make(vvec3 p, vvec3 n) {
+    return (struct trc_receiver){p, n, vf_gt(v3_dot(n, n), vf_set(0.25f))};
+}
+
+struct trc_wide_bound {
+    vvec3 center, axis;
+    vfloat radius, cos_o, sin_o, cos_e, intensity;
+    vmask two_sided;
+};
+TRC_INLINE struct trc_wide_bound trc_bound_broadcast(const struct trc_light_bound *b) {
+    return (struct trc_wide_bound){v3_set(b->center),
+                                   v3_set(b->axis),
+                                   vf_set(b->radius),
+                                   vf_set(b->cos_o),
+                                   vf_set(b->sin_o),
+                                   vf_set(b->cos_e),
+                                   vf_set(b->intensity),
+                                   b->two_sided ? vm_all_set() : vm_none()};
+}
+/* Bounds number index of each lane. */
+TRC_INLINE struct trc_wide_bound trc_bound_gather(const struct trc_light_bound *bounds, vint index,
+                                                  vmask m) {
+    const float *base = (const float *)bounds;
+    const vint at = index * vi_set(TRC_BOUND_WORDS);
+    struct trc_wide_bound b;
+    b.center = v3_gather(base, at, m);
+    b.radius = vf_gather(base + 3, at, m);
+    b.axis = v3_gather(base + 4, at, m);
+    b.cos_o = vf_gather(base + 7, at, m);
+    b.sin_o = vf_gather(base + 8, at, m);
+    b.cos_e = vf_gather(base + 9, at, m);
+    b.intensity = vf_gather(base + 10, at, m);
+    b.two_sided = vm_not(vi_eq(vi_gather(&bounds->two_sided, at, m), vi_set(0)));
+    return b;
+}
+
+/* cos of max(0, a - b). */
+TRC_INLINE vfloat trc_cos_less(vfloat cos_a, vfloat sin_a, vfloat cos_b, vfloat sin_b) {
+    return vf_select(vf_gt(cos_a, cos_b), vf_one(), cos_a * cos_b + sin_a * sin_b);
+}
+/* sin of max(0, a - b). */
+TRC_INLINE vfloat trc_sin_less(vfloat cos_a, vfloat sin_a, vfloat cos_b, vfloat sin_b) {
+    return vf_select(vf_gt(cos_a, cos_b), vf_zero(), sin_a * cos_b - cos_a * sin_b);
+}
+
+TRC_INLINE vfloat trc_bound_importance(const struct trc_wide_bound *b,
+                                       const struct trc_receiver *r) {
+    const vvec3 d = v3_sub(b->center, r->p);
+    const vfloat d2 = v3_dot(d, d), r2 = b->radius * b->radius;
+    const vfloat inverse = vf_rcp(vf_sqrt(vf_max(d2, vf_set(1e-30f))));
+    const vvec3 w = v3_scale(d, inverse);
+    /* Half angle of the sphere seen from p; within it, everything. */
+    const vfloat sin_b = vf_min(b->radius * inverse, vf_one());
+    const vmask outside = vf_lt(r2, d2);
+    const vfloat cos_b = vf_select(outside, vf_safe_sqrt(vf_one() - sin_b * sin_b), -vf_one());
+    const vfloat sin_b_or_0 = vf_where(outside, sin_b);
+    vfloat cos_l = -v3_dot(b->axis, w);
+    cos_l = vf_select(b->two_sided, vf_abs(cos_l), cos_l);
+    const vfloat sin_l = vf_safe_sqrt(vf_one() - cos_l * cos_l);
+    const vfloat cos_x = trc_cos_less(cos_l, sin_l, b->cos_o, b->sin_o);
+    const vfloat sin_x = trc_sin_less(cos_l, sin_l, b->cos_o, b->sin_o);
+    const vfloat cos_light = trc_cos_less(cos_x, sin_x, cos_b, sin_b_or_0);
+    const vfloat cos_n = v3_dot(r->n, w);
+    const vfloat sin_n = vf_safe_sqrt(vf_one() - cos_n * cos_n);
+    const vfloat bound_n = trc_cos_less(cos_n, sin_n, cos_b, sin_b_or_0);
+    const vfloat cos_receiver = vf_select(r->has_n, bound_n, vf_one());
+    /* A little tolerance for rounding; then at least 1/16 of what head-on gives, for lobes that are not
+     * diffuse. */
+    const vfloat slack = vf_set(-1e-4f);
+    const vmask reaches = vm_and(vf_gt(cos_light, b->cos_e + slack), vf_gt(cos_receiver, slack));
+    const vfloat least = vf_set(0.0625f);
+    const vfloat factor = vf_max(cos_light, least) * vf_max(cos_receiver, least);
+    return vf_where(reaches, b->intensity * factor / vf_max(vf_max(d2, r2), vf_set(1e-20f)));
+}
+
+/* A sun or the world: irradiance, over the horizon of n. */
+TRC_INLINE vfloat trc_distant_importance(const struct trc_light_table *t, uint32_t i,
+                                         const struct trc_receiver *r) {
+    const vfloat irradiance = vf_set(t->distant_irradiance[i]);
+    if (t->distant[i] == t->world_light)
+        return irradiance;
+    const struct trc_lamp *sun = &t->lamps[t->distant[i]];
+    const vfloat cos_n = v3_dot(r->n, v3_set(sun->position));
+    const vfloat sin_n = vf_safe_sqrt(vf_one() - cos_n * cos_n);
+    const float sine = sqrtf(fmaxf(1.0f - sun->cos_cone * sun->cos_cone, 0.0f));
+    vfloat cosine = trc_cos_less(cos_n, sin_n, vf_set(sun->cos_cone), vf_set(sine));
+    cosine = vf_select(r->has_n, cosine, vf_one());
+    const vmask reaches = vf_gt(cosine, vf_set(-1e-4f));
+    return vf_where(reaches, irradiance * vf_max(cosine, vf_set(0.0625f)));
+}
+
+/* Candidates: the listed lights or the tree as one, then suns and world. */
+TRC_INLINE uint32_t trc_candidate_count(const struct trc_light_table *t) {
+    return (t->is_tree ? 1u : t->bound_count) + t->distant_count;
+}
+TRC_INLINE vfloat trc_candidate_importance(const struct trc_light_table *t, uint32_t i,
+                                           const struct trc_receiver *r) {
+    const uint32_t placed = t->is_tree ? 1u : t->bound_count;
+    if (i >= placed)
+        return trc_distant_importance(t, i - placed, r);
+    const struct trc_wide_bound b = trc_bound_broadcast(&t->bounds[i]);
+    return trc_bound_importance(&b, r);
+}
+
+/* ---- the tree ---- */
+
+/* Chance of the first child of each lane's node, as if both could be chosen; -1 where neither gives
+ * anything. */
+static inline vfloat trc_tree_first_chance(const struct trc_light_table *t, vint node, vint second,
+                                           const struct trc_receiver *r, vmask m) {
+    const struct trc_wide_bound a = trc_bound_gather(t->bounds, node + vi_set(1), m);
+    const struct trc_wide_bound b = trc_bound_gather(t->bounds, second, m);
+    const vfloat ia = trc_bound_importance(&a, r), ib = trc_bound_importance(&b, r);
+    const vfloat sum = ia + ib;
+    return vf_select(vf_gt(sum, vf_zero()), ia / sum, vf_set(-1.0f));
+}
+TRC_INLINE vint trc_tree_second(const struct trc_light_table *t, vint node, vmask m) {
+    return vi_select(m, vi_gather(&t->bounds->child, node * vi_set(TRC_BOUND_WORDS), m), vi_set(-1));
+}
+
+/* From the root to a light; u is used up on the way. chance gets multiplied; lanes that end where no light
+ * reaches the point leave *found. */
+static inline vint trc_tree_choose(const struct trc_light_table *t, const struct trc_receiver *r,
+                                   vfloat u, vmask m, vfloat *chance, vmask *found) {
+    vint node = vi_set(0);
+    *found = m;
+    for (;;) {
+        const vint second = trc_tree_second(t, node, *found);
+        const vmask inner = vm_andnot(*found, vi_lt(second, vi_set(0)));
+        if (!vm_any(inner))
+            break;
+        const vfloat first = trc_tree_first_chance(t, node, second, r, inner);
+        *found = vm_andnot(*found, vm_and(inner, vf_lt(first, vf_zero())));
+        const vmask go = vm_and(inner, *found);
+        const vmask left = vf_lt(u, first);
+        const vfloat other = vf_one() - first;
+        vfloat rest = vf_select(left, vf_divide(u, first), vf_divide(u - first, other));
+        rest = vf_min(vf_max(rest, vf_zero()), vf_set(0x1.fffffep-1f));
+        u = vf_select(go, rest, u);
+        *chance = vf_select(go, *chance * vf_select(left, first, other), *chance);
+        node = vi_select(go, vi_select(left, node + vi_set(1), second), node);
+    }
+    const vint light =
+        vi_gather(&t->bounds->light, node * vi_set(TRC_BOUND_WORDS), *found);
+    return vi_select(*found, light, vi_set(-1));
+}
+
+/* Chance with which trc_tree_choose arrives at the light. */
+static inline vfloat trc_tree_chance(const struct trc_light_table *t, const struct trc_receiver *r,
+                                     vint light, vmask m) {
+    vuint trail = vu_gather(t->trails, light, m);
+    vint node = vi_set(0);
+    vfloat chance = vf_one();
+    for (;;) {
+        const vint second = trc_tree_second(t, node, m);
+        const vmask inner = vm_andnot(m, vi_lt(second, vi_set(0)));
+        if (!vm_any(inner))
+            return chance;
+        const vfloat first = trc_tree_first_chance(t, node, second, r, inner);
+        const vmask to_second = vi_eq((vint)(trail & vu_set(1u)), vi_set(1));
+        vfloat factor = vf_select(to_second, vf_one() - first, first);
+        factor = vf_where(vf_ge(first, vf_zero()), factor);
+        chance = vf_select(inner, chance * factor, chance);
+        node = vi_select(inner, vi_select(to_second, second, node + vi_set(1)), node);
+        trail = trail >> 1;
+    }
+}
+
+/* ---- both ---- */
+
+/* A light for every lane of m, -1 where none reaches the point; its chance. */
+static inline vint trc_light_choose(const struct trc_light_table *t, const struct trc_receiver *r,
+                                    vfloat u, vmask m, vfloat *chance) {
+    const uint32_t count = trc_candidate_count(t);
+    const uint32_t placed = t->is_tree ? 1u : t->bound_count;
+    vfloat kept[TRC_CANDIDATES_KEPT];
+    vfloat sum = vf_zero();
+    for (uint32_t i = 0; i < count; i++) {
+        const vfloat w = trc_candidate_importance(t, i, r);
+        if (i < TRC_CANDIDATES_KEPT)
+            kept[i] = w;
+        sum = sum + w;
+    }
+    vint light = vi_set(-1);
+    vfloat rest = u * sum, remainder = vf_zero();
+    vmask waiting = vm_and(m, vf_gt(sum, vf_zero())), to_tree = vm_none();
+    *chance = vf_zero();
+    for (uint32_t i = 0; i < count && vm_any(waiting); i++) {
+        const vfloat w = i < TRC_CANDIDATES_KEPT ? kept[i] : trc_candidate_importance(t, i, r);
+        vmask take = vm_and(waiting, vf_gt(w, vf_zero()));
+        if (i + 1 < count)
+            take = vm_and(take, vf_lt(rest, w));
+        if (t->is_tree && i == 0) {
+            to_tree = take;
+            remainder = vf_divide(rest, w);
+        } else {
+            const uint32_t number =
+                i < placed ? (uint32_t)t->bounds[i].light : t->distant[i - placed];
+            light = vi_select(take, vi_set((int32_t)number), light);
+        }
+        *chance = vf_select(take, w / sum, *chance);
+        rest = rest - w;
+        waiting = vm_andnot(waiting, take);
+    }
+    if (vm_any(to_tree)) {
+        vmask found;
+        const vint chosen = trc_tree_choose(t, r, remainder, to_tree, chance, &found);
+        light = vi_select(to_tree, chosen, light);
+    }
+    return light;
+}
+
+/* Chance with which trc_light_choose gives the light (number per lane, a real one in lanes of m). */
+static inline vfloat trc_light_chance(const struct trc_light_table *t, const struct trc_receiver *r,
+                                      vint light, vmask m) {
+    if (t->single)
+        return vf_one();
+    const uint32_t count = trc_candidate_count(t);
+    const uint32_t placed = t->is_tree ? 1u : t->bound_count;
+    vfloat sum = vf_zero(), own = vf_zero();
+    vmask placed_lanes = m;
+    for (uint32_t i = 0; i < count; i++) {
+        const vfloat w = trc_candidate_importance(t, i, r);
+        sum = sum + w;
+        if (t->is_tree && i == 0) {
+            own = w;
+            continue;
+        }
+        const uint32_t number = i < placed ? (uint32_t)t->bounds[i].light : t->distant[i - placed];
+        const vmask same = vi_eq(light, vi_set((int32_t)number));
+        own = vf_select(same, w, own);
+        placed_lanes = vm_andnot(placed_lanes, same);
+    }
+    if (t->is_tree && vm_any(placed_lanes))
+        own = vf_select(placed_lanes, own * trc_tree_chance(t, r, light, placed_lanes), own);
+    return vf_divide(own, sum);
+}
+
+#endif

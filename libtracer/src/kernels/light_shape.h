@@ -1,0 +1,399 @@
+/* Places on lights: sampling them, the density of that, the radiance they send to a point.
+ *
+ * C. Urena, M. Fajardo and A. King, "An Area-Preserving Parametrization for Spherical Rectangles" (2013); J.
+ * Arvo, "Stratified Sampling of Spherical Triangles" (1995); A. van Oosterom and J. Strackee, "The Solid
+ * Angle of a Plane Triangle" (1983). Lights that are small as seen from the point are sampled by area:
+ * there the density is nearly constant anyway, and spherical angles would lose their digits. */
+#ifndef TRACER_KERNELS_LIGHT_SHAPE_H
+#define TRACER_KERNELS_LIGHT_SHAPE_H
+
+#include "kernels/light.h"
+#include "kernels/mesh_fetch.h"
+#include "kernels/wide_math.h"
+#include "shading/lights.h"
+
+/* Solid angles below it are sampled by area. */
+#define TRC_SMALL_RECTANGLE 4e-3f
+#define TRC_SMALL_TRIANGLE 2e-2f
+
+struct trc_wide_lamp {
+    vvec3 position, axis_u, axis_v, normal, radiance;
+    vfloat half_u, half_v, cos_cone, inv_smooth, tan_spread, spread_scale, inv_area;
+    vint kind, flags;
+};
+
+TRC_INLINE struct trc_wide_lamp trc_lamp_broadcast(const struct trc_lamp *l) {
+    return (struct trc_wide_lamp){v3_set(l->position),      v3_set(l->axis_u),
+                                  v3_set(l->axis_v),        v3_set(l->normal),
+                                  v3_set(l->radiance),      vf_set(l->half_u),
+                                  vf_set(l->half_v),        vf_set(l->cos_cone),
+                                  vf_set(l->inv_smooth),    vf_set(l->tan_spread),
+                                  vf_set(l->spread_scale),  vf_set(l->inv_area),
+                                  vi_set(l->kind),          vi_set(l->flags)};
+}
+/* Lamps number index of each lane. */
+TRC_INLINE struct trc_wide_lamp trc_lamp_gather(const struct trc_lamp *lamps, vint index, vmask m) {
+    const float *base = (const float *)lamps;
+    const vint at = index * vi_set(TRC_LAMP_WORDS);
+    struct trc_wide_lamp l;
+    l.position = v3_gather(base, at, m);
+    l.axis_u = v3_gather(base + 3, at, m);
+    l.axis_v = v3_gather(base + 6, at, m);
+    l.normal = v3_gather(base + 9, at, m);
+    l.radiance = v3_gather(base + 12, at, m);
+    l.half_u = vf_gather(base + 15, at, m);
+    l.half_v = vf_gather(base + 16, at, m);
+    l.cos_cone = vf_gather(base + 17, at, m);
+    l.inv_smooth = vf_gather(base + 18, at, m);
+    l.tan_spread = vf_gather(base + 19, at, m);
+    l.spread_scale = vf_gather(base + 20, at, m);
+    l.inv_area = vf_gather(base + 21, at, m);
+    l.kind = vi_gather(&lamps->kind, at, m);
+    l.flags = vi_gather(&lamps->flags, at, m);
+    return l;
+}
+
+/* A sampled place as seen from the point. */
+struct trc_place {
+    vvec3 wi, radiance;
+    vfloat distance, pdf;
+};
+
+/* ---- point and spot: a disk that faces the point ---- */
+
+TRC_INLINE vfloat trc_spot_factor(const struct trc_wide_lamp *l, vvec3 wi) {
+    const vfloat c = -v3_dot(l->normal, wi);
+    const vfloat over = c - l->cos_cone;
+    const vfloat t = vf_saturate(over * l->inv_smooth);
+    const vfloat soft = t * t * (vf_set(3.0f) - vf_set(2.0f) * t);
+    const vfloat edge = vf_select(vf_gt(l->inv_smooth, vf_zero()), soft, vf_one());
+    return vf_where(vf_gt(over, vf_zero()), c * edge);
+}
+
+TRC_INLINE struct trc_place trc_point_sample(const struct trc_wide_lamp *l, vvec3 p, vfloat u1,
+                                             vfloat u2) {
+    vfloat reach;
+    const vvec3 facing = v3_normalize_length(v3_sub(p, l->position), &reach);
+    vvec3 a, b;
+    v3_frame(facing, &a, &b);
+    vfloat x, y;
+    trc_warp_disk(u1, u2, &x, &y);
+    const vvec3 offset = v3_add(v3_scale(a, x * l->half_u), v3_scale(b, y * l->half_u));
+    struct trc_place s;
+    s.wi = v3_normalize_length(v3_sub(v3_add(l->position, offset), p), &s.distance);
+    const vfloat d2 = s.distance * s.distance;
+    const vmask delta = vf_eq(l->half_u, vf_zero());
+    /* A point without extent: intensity over squared distance, density 1. */
+    const vfloat scale = vf_select(delta, vf_divide(vf_one(), d2), vf_one());
+    s.radiance = v3_scale(l->radiance, scale);
+    const vfloat cosine = -v3_dot(facing, s.wi);
+    s.pdf = vf_select(delta, vf_one(), vf_divide(d2 * l->inv_area, vf_max(cosine, vf_zero())));
+    return s;
+}
+/* Ray against the disk: distance, or beyond any. */
+TRC_INLINE vfloat trc_point_hit(const struct trc_wide_lamp *l, vvec3 p, vvec3 wi, vfloat *pdf) {
+    vfloat reach;
+    const vvec3 to = v3_sub(l->position, p);
+    const vvec3 facing = v3_normalize_length(to, &reach);
+    const vfloat cosine = v3_dot(facing, wi);
+    const vfloat t = vf_divide(reach, cosine);
+    const vvec3 off = v3_sub(v3_scale(wi, t), to);
+    const vmask hit = vm_and(vf_gt(cosine, vf_zero()),
+                             vf_lt(v3_dot(off, off), l->half_u * l->half_u));
+    *pdf = vf_divide(t * t * l->inv_area, cosine);
+    return vf_select(hit, t, vf_set(INFINITY));
+}
+
+/* ---- sun: a disk at distance 1 across its axis ---- */
+
+TRC_INLINE vfloat trc_sun_density(const struct trc_wide_lamp *l, vfloat cosine) {
+    return l->inv_area / (cosine * cosine * cosine);
+}
+TRC_INLINE struct trc_place trc_sun_sample(const struct trc_wide_lamp *l, vfloat u1, vfloat u2) {
+    vvec3 a, b;
+    v3_frame(l->position, &a, &b);
+    vfloat x, y;
+    trc_warp_disk(u1, u2, &x, &y);
+    const vvec3 offset = v3_add(v3_scale(a, x * l->half_u), v3_scale(b, y * l->half_u));
+    struct trc_place s;
+    s.wi = v3_normalize(v3_add(l->position, offset));
+    s.distance = vf_set(TRC_FAR);
+    const vfloat c = v3_dot(l->position, s.wi), spread = vf_rcp(c * c * c);
+    const vmask delta = vf_eq(l->half_u, vf_zero());
+    s.radiance = v3_scale(l->radiance, vf_select(delta, vf_one(), spread));
+    s.pdf = vf_select(delta, vf_one(), l->inv_area * spread);
+    return s;
+}
+
+/* ---- area lights ---- */
+
+/* What the slats let through towards -wi. */
+TRC_INLINE vfloat trc_spread_factor(const struct trc_wide_lamp *l, vvec3 wi) {
+    const vfloat c = -v3_dot(l->normal, wi);
+    const vfloat tangent = vf_divide(vf_safe_sqrt(vf_one() - c * c), c);
+    const vfloat factor = (vf_one() - l->tan_spread * tangent) * l->spread_scale;
+    return vf_select(vf_gt(l->tan_spread, vf_zero()), vf_max(factor, vf_zero()), vf_one());
+}
+
+TRC_INLINE struct trc_place trc_ellipse_sample(const struct trc_wide_lamp *l, vvec3 p, vfloat u1,
+                                               vfloat u2) {
+    vfloat x, y;
+    trc_warp_disk(u1, u2, &x, &y);
+    const vvec3 at = v3_mad(l->axis_u, x * l->half_u, v3_mad(l->axis_v, y * l->half_v, l->position));
+    struct trc_place s;
+    s.wi = v3_normalize_length(v3_sub(at, p), &s.distance);
+    const vfloat cosine = vf_max(-v3_dot(l->normal, s.wi), vf_zero());
+    s.pdf = vf_divide(s.distance * s.distance * l->inv_area, cosine);
+    s.radiance = v3_scale(l->radiance, trc_spread_factor(l, s.wi));
+    return s;
+}
+
+/* A rectangle in the frame of its axes with the point at the origin: x0..x1, y0..y1 at depth z > 0, cut to what
+ * the slats show of it. */
+struct trc_view_rectangle {
+    vfloat x0, x1, y0, y1, z;
+    vmask lit; /* the point is in front and sees some of it */
+};
+TRC_INLINE struct trc_view_rectangle trc_rectangle_view(const struct trc_wide_lamp *l, vvec3 p) {
+    const vvec3 to = v3_sub(l->position, p);
+    const vfloat cx = v3_dot(to, l->axis_u), cy = v3_dot(to, l->axis_v);
+    struct trc_view_rectangle r;
+    r.z = -v3_dot(to, l->normal);
+    r.x0 = cx - l->half_u;
+    r.x1 = cx + l->half_u;
+    r.y0 = cy - l->half_v;
+    r.y1 = cy + l->half_v;
+    /* Light passes up to the slats' angle: a circle about the foot of the point. */
+    const vfloat inverse = vf_divide(vf_one(), l->tan_spread);
+    const vfloat limit = vf_select(vf_gt(l->tan_spread, vf_zero()), r.z * inverse, vf_set(INFINITY));
+    r.x0 = vf_max(r.x0, -limit);
+    r.x1 = vf_min(r.x1, limit);
+    r.y0 = vf_max(r.y0, -limit);
+    r.y1 = vf_min(r.y1, limit);
+    r.lit = vm_and(vf_gt(r.z, vf_zero()), vm_and(vf_lt(r.x0, r.x1), vf_lt(r.y0, r.y1)));
+    return r;
+}
+
+/* Inner angles of the spherical rectangle (Urena et al., 3.2): normals of its sides have only these z. */
+struct trc_spherical_rectangle {
+    vfloat b0, b1, k, solid_angle;
+    vmask small;
+};
+TRC_INLINE vfloat trc_edge_slope(vfloat offset, vfloat z) {
+    return offset * vf_rcp(vf_sqrt(z * z + offset * offset));
+}
+TRC_INLINE struct trc_spherical_rectangle trc_rectangle_angles(const struct trc_view_rectangle *r) {
+    /* Side at y0 runs along +x, at x1 along +y, at y1 along -x, at x0 along -y; z of the paper is -r->z. */
+    const vfloat n0 = -trc_edge_slope(r->y0, r->z), n1 = trc_edge_slope(r->x1, r->z);
+    const vfloat n2 = trc_edge_slope(r->y1, r->z), n3 = -trc_edge_slope(r->x0, r->z);
+    struct trc_spherical_rectangle q;
+    const vfloat g0 = vf_acos(-n0 * n1), g1 = vf_acos(-n1 * n2);
+    const vfloat g2 = vf_acos(-n2 * n3), g3 = vf_acos(-n3 * n0);
+    q.b0 = n0;
+    q.b1 = n2;
+    q.k = vf_set(TRC_TWO_PI) - g2 - g3;
+    q.solid_angle = g0 + g1 - q.k;
+    q.small = vm_not(vf_gt(q.solid_angle, vf_set(TRC_SMALL_RECTANGLE)));
+    return q;
+}
+/* Density at the place (x, y) of the view. */
+TRC_INLINE vfloat trc_rectangle_density(const struct trc_view_rectangle *r,
+                                        const struct trc_spherical_rectangle *q, vfloat x,
+                                        vfloat y) {
+    const vfloat d2 = x * x + y * y + r->z * r->z, area = (r->x1 - r->x0) * (r->y1 - r->y0);
+    const vfloat by_area = d2 * vf_sqrt(d2) / (area * r->z);
+    return vf_where(r->lit, vf_select(q->small, by_area, vf_rcp(q->solid_angle)));
+}
+TRC_INLINE struct trc_place trc_rectangle_sample(const struct trc_wide_lamp *l, vvec3 p, vfloat u1,
+                                                 vfloat u2) {
+    const struct trc_view_rectangle r = trc_rectangle_view(l, p);
+    const struct trc_spherical_rectangle q = trc_rectangle_angles(&r);
+    vfloat sa, ca;
+    vf_sincos(u1 * q.solid_angle + q.k, &sa, &ca);
+    const vfloat fu = vf_divide(ca * q.b0 - q.b1, sa);
+    const vfloat cu =
+        vf_clamp(vf_copysign(vf_rcp(vf_sqrt(fu * fu + q.b0 * q.b0)), fu), -1.0f, 1.0f);
+    vfloat x = cu * r.z * vf_rcp(vf_max(vf_safe_sqrt(vf_one() - cu * cu), vf_set(1e-7f)));
+    x = vf_min(vf_max(x, r.x0), r.x1);
+    const vfloat d2 = x * x + r.z * r.z, d = vf_sqrt(d2);
+    const vfloat h0 = r.y0 * vf_rcp(vf_sqrt(d2 + r.y0 * r.y0));
+    const vfloat h1 = r.y1 * vf_rcp(vf_sqrt(d2 + r.y1 * r.y1));
+    const vfloat h = h0 + u2 * (h1 - h0), h2 = h * h;
+    vfloat y = vf_select(vf_lt(h2, vf_set(1.0f - 1e-6f)), h * d * vf_rcp(vf_sqrt(vf_one() - h2)),
+                         r.y1);
+    y = vf_min(vf_max(y, r.y0), r.y1);
+    x = vf_select(q.small, vf_lerp(r.x0, r.x1, u1), x);
+    y = vf_select(q.small, vf_lerp(r.y0, r.y1, u2), y);
+    struct trc_place s;
+    const vvec3 to = v3_sub(v3_add(v3_scale(l->axis_u, x), v3_scale(l->axis_v, y)),
+                            v3_scale(l->normal, r.z));
+    s.wi = v3_normalize_length(to, &s.distance);
+    s.pdf = trc_rectangle_density(&r, &q, x, y);
+    s.radiance = v3_scale(l->radiance, trc_spread_factor(l, s.wi));
+    return s;
+}
+/* Ray against a rectangle or an ellipse; u, v the place over the half sizes. */
+TRC_INLINE vfloat trc_area_hit(const struct trc_wide_lamp *l, vvec3 p, vvec3 wi, vfloat *u,
+                               vfloat *v) {
+    const vvec3 to = v3_sub(l->position, p);
+    const vfloat cosine = -v3_dot(l->normal, wi), z = -v3_dot(l->normal, to);
+    const vfloat t = vf_divide(z, cosine);
+    const vvec3 off = v3_sub(v3_scale(wi, t), to);
+    *u = v3_dot(off, l->axis_u) / l->half_u;
+    *v = v3_dot(off, l->axis_v) / l->half_v;
+    const vmask front = vm_and(vf_gt(cosine, vf_zero()), vf_gt(z, vf_zero()));
+    return vf_select(front, t, vf_set(INFINITY));
+}
+
+/* ---- triangles ---- */
+
+struct trc_view_triangle {
+    vvec3 a, b, c;      /* corners from the point */
+    vvec3 normal;       /* cross product of two edges: twice the area long */
+    vfloat solid_angle;
+    vmask small;
+};
+TRC_INLINE struct trc_view_triangle trc_triangle_view(const struct trc_corners *t, vvec3 p) {
+    struct trc_view_triangle v;
+    v.a = v3_sub(t->corner[0], p);
+    v.b = v3_sub(t->corner[1], p);
+    v.c = v3_sub(t->corner[2], p);
+    v.normal = v3_cross(v3_sub(t->corner[1], t->corner[0]), v3_sub(t->corner[2], t->corner[0]));
+    const vvec3 a = v3_normalize(v.a), b = v3_normalize(v.b), c = v3_normalize(v.c);
+    const vfloat volume = vf_abs(v3_dot(a, v3_cross(b, c)));
+    const vfloat below = vf_one() + v3_dot(a, b) + v3_dot(b, c) + v3_dot(c, a);
+    v.solid_angle = vf_set(2.0f) * vf_atan2(volume, below);
+    v.small = vm_not(vm_and(vf_gt(v.solid_angle, vf_set(TRC_SMALL_TRIANGLE)),
+                            vf_lt(v.solid_angle, vf_set(6.0f))));
+    return v;
+}
+/* Density of the place at distance along wi. */
+TRC_INLINE vfloat trc_triangle_density(const struct trc_view_triangle *v, vvec3 wi, vfloat distance) {
+    const vfloat twice_projected = vf_abs(v3_dot(v->normal, wi));
+    const vfloat by_area = vf_divide(vf_set(2.0f) * distance * distance, twice_projected);
+    return vf_select(v->small, by_area, vf_rcp(v->solid_angle));
+}
+
+/* Direction into the spherical triangle. */
+static inline vvec3 trc_spherical_triangle(const struct trc_view_triangle *v, vfloat u1, vfloat u2) {
+    const vvec3 a = v3_normalize(v->a), b = v3_normalize(v->b), c = v3_normalize(v->c);
+    const vvec3 ab = v3_normalize(v3_cross(a, b)), ca = v3_normalize(v3_cross(c, a));
+    /* The angle at a, and the cosine of the side c. */
+    const vfloat cos_alpha = vf_clamp(-v3_dot(ab, ca), -1.0f, 1.0f);
+    const vfloat sin_alpha = vf_safe_sqrt(vf_one() - cos_alpha * cos_alpha);
+    const vfloat alpha = vf_acos(cos_alpha);
+    vfloat s, t;
+    vf_sincos(u1 * v->solid_angle - alpha, &s, &t);
+    const vfloat p = t - cos_alpha, q = s + sin_alpha * v3_dot(a, b);
+    const vfloat num = (q * t - p * s) * cos_alpha - q, den = (q * s + p * t) * sin_alpha;
+    const vfloat cosine = vf_clamp(vf_divide(num, den), -1.0f, 1.0f);
+    const vvec3 across = v3_normalize(v3_sub(c, v3_scale(a, v3_dot(c, a))));
+    const vvec3 d = v3_mad(across, vf_safe_sqrt(vf_one() - cosine * cosine), v3_scale(a, cosine));
+    const vfloat db = v3_dot(d, b);
+    const vfloat z = vf_one() - u2 * (vf_one() - db);
+    const vvec3 side = v3_normalize(v3_sub(d, v3_scale(b, db)));
+    return v3_mad(side, vf_safe_sqrt((vf_one() - z) * (vf_one() + z)), v3_scale(b, z));
+}
+
+/* wi, distance, density and the barycentrics of the second and third corner. */
+TRC_INLINE struct trc_place trc_triangle_sample(const struct trc_corners *t, vvec3 p, vfloat u1,
+                                                vfloat u2, vfloat *u, vfloat *v) {
+    const struct trc_view_triangle view = trc_triangle_view(t, p);
+    vfloat b1, b2;
+    trc_warp_triangle(u1, u2, &b1, &b2);
+    if (!vm_all(view.small)) {
+        const vvec3 w = trc_spherical_triangle(&view, u1, u2);
+        /* Where the ray meets the plane (Moeller and Trumbore 1997), kept inside. */
+        const vvec3 e1 = v3_sub(view.b, view.a), e2 = v3_sub(view.c, view.a);
+        const vvec3 h = v3_cross(w, e2);
+        const vfloat inverse = vf_divide(vf_one(), v3_dot(e1, h));
+        const vvec3 s = v3_neg(view.a);
+        const vfloat x = vf_saturate(v3_dot(s, h) * inverse);
+        const vfloat y = vf_saturate(v3_dot(w, v3_cross(s, e1)) * inverse);
+        const vfloat over = vf_max(x + y, vf_one());
+        b1 = vf_select(view.small, b1, x / over);
+        b2 = vf_select(view.small, b2, y / over);
+    }
+    const vvec3 to = v3_mad(v3_sub(view.b, view.a), b1,
+                            v3_mad(v3_sub(view.c, view.a), b2, view.a));
+    struct trc_place s;
+    s.wi = v3_normalize_length(to, &s.distance);
+    s.pdf = trc_triangle_density(&view, s.wi, s.distance);
+    s.radiance = v3_zero();
+    *u = b1;
+    *v = b2;
+    return s;
+}
+
+/* ---- world ---- */
+
+/* Cell of the map and density per solid angle. theta by v, azimuth by u. */
+TRC_INLINE vfloat trc_map_density(const struct trc_world_map *map, vvec3 wi, vmask m) {
+    vfloat u = vf_atan2(wi.y, wi.x) * vf_set(0.5f * TRC_INV_PI);
+    u = vf_select(vf_lt(u, vf_zero()), u + vf_one(), u);
+    const vfloat v = vf_acos(wi.z) * vf_set(TRC_INV_PI);
+    const vfloat width = vf_set((float)map->width), height = vf_set((float)map->height);
+    const vint x = vf_to_int(vf_min(u * width, width - vf_one()));
+    const vint y = vf_to_int(vf_min(v * height, height - vf_one()));
+    const vfloat density = vf_gather(map->density, y * vi_set((int32_t)map->width) + x, m);
+    const vfloat sine = vf_safe_sqrt((vf_one() - wi.z) * (vf_one() + wi.z));
+    return vf_divide(density, sine * vf_set(2.0f * TRC_PI * TRC_PI));
+}
+
+/* Interval of rising sums that holds u, and where in it: count intervals from base (per lane an offset). */
+TRC_INLINE vint trc_sum_search(const float *sums, vint base, uint32_t count, vfloat u, vmask m,
+                               vfloat *within) {
+    vint low = vi_set(0), size = vi_set((int32_t)count);
+    /* Halves of odd sizes differ by one from lane to lane; a size of 1 stays where it is. */
+    for (uint32_t left = count; left > 1; left = (left + 1) / 2) {
+        const vint half = size >> 1;
+        const vmask up = vf_le(vf_gather(sums, base + low + half, m), u);
+        low = vi_select(up, low + half, low);
+        size = vi_select(up, size - half, half);
+    }
+    const vfloat start = vf_gather(sums, base + low, m), end = vf_gather(sums, base + low + vi_set(1), m);
+    *within = vf_saturate(vf_divide(u - start, end - start));
+    return low;
+}
+static inline vvec3 trc_map_sample(const struct trc_world_map *map, vfloat u1, vfloat u2, vmask m,
+                                   vfloat *pdf) {
+    vfloat dx, dy;
+    const vint y = trc_sum_search(map->marginal, vi_set(0), map->height, u2, m, &dy);
+    const vint row = y * vi_set((int32_t)map->width + 1);
+    const vint x = trc_sum_search(map->rows, row, map->width, u1, m, &dx);
+    const vfloat u = (vi_to_float(x) + dx) / vf_set((float)map->width);
+    const vfloat v = (vi_to_float(y) + dy) / vf_set((float)map->height);
+    vfloat sine, cosine, s, c;
+    vf_sincos_turns(v * vf_set(0.5f), &sine, &cosine);
+    vf_sincos_turns(u, &s, &c);
+    const vfloat density = vf_gather(map->density, y * vi_set((int32_t)map->width) + x, m);
+    *pdf = vf_divide(density, sine * vf_set(2.0f * TRC_PI * TRC_PI));
+    return v3(sine * c, sine * s, cosine);
+}
+
+/* Without a map: by cosine above n, or over the sphere. */
+TRC_INLINE vfloat trc_world_density(const struct trc_light_table *t, vvec3 n, vmask has_n, vvec3 wi,
+                                    vmask m) {
+    if (t->map)
+        return trc_map_density(t->map, wi, m);
+    const vfloat cosine = vf_max(v3_dot(n, wi), vf_zero()) * vf_set(TRC_INV_PI);
+    return vf_select(has_n, cosine, vf_set(0.25f * TRC_INV_PI));
+}
+TRC_INLINE struct trc_place trc_world_sample(const struct trc_light_table *t, vvec3 n, vmask has_n,
+                                             vfloat u1, vfloat u2, vmask m) {
+    struct trc_place s;
+    s.distance = vf_set(TRC_FAR);
+    s.radiance = v3_zero();
+    if (t->map) {
+        s.wi = trc_map_sample(t->map, u1, u2, m, &s.pdf);
+        return s;
+    }
+    vvec3 a, b;
+    v3_frame(n, &a, &b);
+    const vvec3 above = v3_from_frame(trc_warp_cosine(u1, u2), a, b, n);
+    s.wi = v3_select(has_n, above, trc_warp_sphere(u1, u2));
+    s.pdf = trc_world_density(t, n, has_n, s.wi, m);
+    return s;
+}
+
+#endif

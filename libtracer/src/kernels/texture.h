@@ -1,0 +1,211 @@
+/* Image lookups for TRC_WIDTH places at once: one image, any coordinates.
+ *
+ * Filters and extensions are those of Cycles 3.4: B-spline weights for cubic, texels outside a clipped
+ * image count as transparent black, sRGB is decoded after filtering. Coordinates may be huge or not
+ * finite: NaN reads as 0. Only level 0 is read; a later choice of level by footprint belongs in
+ * texture_lookup, the filters take any level. */
+#ifndef TRACER_KERNELS_TEXTURE_H
+#define TRACER_KERNELS_TEXTURE_H
+
+#include "image/image.h"
+#include "kernels/wide_math.h"
+#include "shading/program.h"
+
+/* ---- texels ---- */
+
+/* Two half floats without infinities or NaN, from the low and the high part of a word. */
+TRC_INLINE void half_unpack(vuint word, vfloat *low, vfloat *high) {
+    const vuint magnitude = vu_set(0x7fffu), sign = vu_set(0x8000u);
+    const vfloat scale = vf_set(0x1p112f); /* moves the exponent's bias from 15 to 127 */
+    const vuint upper = word >> 16;
+    const vfloat a = vi_as_float((vint)((word & magnitude) << 13)) * scale;
+    const vfloat b = vi_as_float((vint)((upper & magnitude) << 13)) * scale;
+    *low = vf_copysign(a, vi_as_float((vint)((word & sign) << 16)));
+    *high = vf_copysign(b, vi_as_float((vint)((upper & sign) << 16)));
+}
+
+/* RGBA of the texels with these numbers, without the scale of integer formats; 0 outside lanes. */
+TRC_INLINE void texel_load(const struct trc_image *image, const void *texels, vint index,
+                           vmask lanes, vfloat out[4]) {
+    const uint32_t *words = texels;
+    switch (image->format) {
+    case TRC_TEXEL_U8: {
+        const vuint t = vu_gather(words, index, lanes), byte = vu_set(0xffu);
+        out[0] = vi_to_float((vint)(t & byte));
+        out[1] = vi_to_float((vint)((t >> 8) & byte));
+        out[2] = vi_to_float((vint)((t >> 16) & byte));
+        out[3] = vi_to_float((vint)(t >> 24));
+        break;
+    }
+    case TRC_TEXEL_U16: {
+        const vuint low = vu_set(0xffffu);
+        const vuint rg = vu_gather(words, index << 1, lanes);
+        const vuint ba = vu_gather(words + 1, index << 1, lanes);
+        out[0] = vi_to_float((vint)(rg & low));
+        out[1] = vi_to_float((vint)(rg >> 16));
+        out[2] = vi_to_float((vint)(ba & low));
+        out[3] = vi_to_float((vint)(ba >> 16));
+        break;
+    }
+    case TRC_TEXEL_F16:
+        half_unpack(vu_gather(words, index << 1, lanes), &out[0], &out[1]);
+        half_unpack(vu_gather(words + 1, index << 1, lanes), &out[2], &out[3]);
+        break;
+    case TRC_TEXEL_F32:
+    default:
+        for (int c = 0; c < 4; c++) out[c] = vf_gather((const float *)texels + c, index << 2, lanes);
+        break;
+    }
+}
+
+/* ---- coordinates ---- */
+
+/* Where a coordinate falls on a row of size texels: the texel at or before it (relative to centres if
+ * centred) and how far beyond. Repeated and mirrored coordinates are brought into one period first:
+ * that keeps their digits and the integers small. */
+TRC_INLINE vint axis_place(vfloat u, uint32_t size, uint32_t extension, bool centred, vfloat *t) {
+    const vfloat zero = vf_zero(), count = vf_set((float)size);
+    vfloat x;
+    if (extension == TRC_IMAGE_REPEAT) {
+        x = vf_saturate(u - vf_floor(u));
+    } else if (extension == TRC_IMAGE_MIRROR) {
+        const vfloat half = u * vf_set(0.5f);
+        x = vf_clamp((half - vf_floor(half)) * vf_set(2.0f), 0.0f, 2.0f);
+    } else { /* far outside is as good as three sizes outside */
+        x = vf_clamp(vf_select(vf_eq(u, u), u, zero), -3.0f, 4.0f);
+    }
+    x = x * count - (centred ? vf_set(0.5f) : zero);
+    const vfloat whole = vf_floor(x);
+    *t = x - whole;
+    return vf_to_int(whole);
+}
+
+/* Texel number i, up to two outside the period, within the image; clip: clamped, and left out of
+ * inside. */
+TRC_INLINE vint axis_wrap(vint i, uint32_t size, uint32_t extension, vmask *inside) {
+    const vint n = vi_set((int32_t)size), zero = vi_set(0), last = vi_set((int32_t)size - 1);
+    if (extension == TRC_IMAGE_REPEAT || extension == TRC_IMAGE_MIRROR) {
+        const vint period = extension == TRC_IMAGE_MIRROR ? n + n : n;
+        for (uint32_t step = 0; step < (size > 1 ? 1u : 2u); step++) {
+            i = vi_select(vi_lt(i, zero), i + period, i);
+            i = vi_select(vi_lt(i, period), i, i - period);
+        }
+        if (extension == TRC_IMAGE_MIRROR) {
+            i = vi_select(vi_lt(i, n), i, period - vi_set(1) - i);
+        }
+    }
+    const vint bounded = vi_select(vi_lt(i, zero), zero, vi_select(vi_lt(last, i), last, i));
+    if (extension == TRC_IMAGE_CLIP) *inside = vm_and(*inside, vi_eq(bounded, i));
+    return bounded;
+}
+
+/* ---- filters: sums over texels, without the scale of integer formats ---- */
+
+TRC_INLINE void texel_add(const struct trc_image *image, const struct trc_image_level *level,
+                          vint x, vint y, uint32_t extension, vfloat weight, vmask lanes,
+                          vfloat sum[4]) {
+    vfloat texel[4];
+    const vint column = axis_wrap(x, level->width, extension, &lanes);
+    const vint row = axis_wrap(y, level->height, extension, &lanes);
+    texel_load(image, level->texels, row * vi_set((int32_t)level->width) + column, lanes, texel);
+    for (int c = 0; c < 4; c++) sum[c] = sum[c] + weight * texel[c];
+}
+
+static void filter_closest(const struct trc_image *image, const struct trc_image_level *level,
+                           uint32_t extension, vfloat u, vfloat v, vmask lanes, vfloat sum[4]) {
+    vfloat t;
+    const vint x = axis_place(u, level->width, extension, false, &t);
+    const vint y = axis_place(v, level->height, extension, false, &t);
+    texel_add(image, level, x, y, extension, vf_one(), lanes, sum);
+}
+
+static void filter_linear(const struct trc_image *image, const struct trc_image_level *level,
+                          uint32_t extension, vfloat u, vfloat v, vmask lanes, vfloat sum[4]) {
+    vfloat tx, ty;
+    const vint x = axis_place(u, level->width, extension, true, &tx), x1 = x + vi_set(1);
+    const vint y = axis_place(v, level->height, extension, true, &ty), y1 = y + vi_set(1);
+    const vfloat one = vf_one(), sx = one - tx, sy = one - ty;
+    texel_add(image, level, x, y, extension, sy * sx, lanes, sum);
+    texel_add(image, level, x1, y, extension, sy * tx, lanes, sum);
+    texel_add(image, level, x, y1, extension, ty * sx, lanes, sum);
+    texel_add(image, level, x1, y1, extension, ty * tx, lanes, sum);
+}
+
+/* Uniform cubic B-spline. */
+TRC_INLINE void cubic_weights(vfloat t, vfloat w[4]) {
+    const vfloat half = vf_set(0.5f), sixth = vf_set(1.0f / 6.0f);
+    w[0] = ((half - t * sixth) * t - half) * t + sixth;
+    w[1] = (half * t - vf_one()) * t * t + vf_set(2.0f / 3.0f);
+    w[2] = ((half - half * t) * t + half) * t + sixth;
+    w[3] = sixth * t * t * t;
+}
+
+static void filter_cubic(const struct trc_image *image, const struct trc_image_level *level,
+                         uint32_t extension, vfloat u, vfloat v, vmask lanes, vfloat sum[4]) {
+    vfloat tx, ty, wx[4], wy[4];
+    const vint x = axis_place(u, level->width, extension, true, &tx) - vi_set(1);
+    const vint y = axis_place(v, level->height, extension, true, &ty) - vi_set(1);
+    cubic_weights(tx, wx);
+    cubic_weights(ty, wy);
+    for (int j = 0; j < 4; j++) {
+        for (int i = 0; i < 4; i++) {
+            texel_add(image, level, x + vi_set(i), y + vi_set(j), extension, wy[j] * wx[i], lanes, sum);
+        }
+    }
+}
+
+/* ---- colour ---- */
+
+/* sRGB to linear on [0, 1]: minimax polynomial of ((x + 0.055) / 1.055)^2.4, relative error 1.3e-5,
+ * and the straight part. */
+TRC_INLINE vfloat srgb_decode_unit(vfloat x) {
+    vfloat p = vf_set(-0.20740075409412384f);
+    p = p * x + vf_set(0.8699970841407776f);
+    p = p * x + vf_set(-1.5605111122131348f);
+    p = p * x + vf_set(1.6143866777420044f);
+    p = p * x + vf_set(-1.1669092178344727f);
+    p = p * x + vf_set(0.9384191632270813f);
+    p = p * x + vf_set(0.4752274453639984f);
+    p = p * x + vf_set(0.035937875509262085f);
+    p = p * x + vf_set(0.0008404380641877651f);
+    return vf_select(vf_lt(x, vf_set(0.04045f)), x * vf_set(1.0f / 12.92f), p);
+}
+
+/* Any value; below 0 is 0. */
+TRC_INLINE vfloat srgb_decode(vfloat x) {
+    const vfloat low = vf_max(x, vf_zero()) * vf_set(1.0f / 12.92f);
+    const vfloat base = (vf_max(x, vf_zero()) + vf_set(0.055f)) * vf_set(1.0f / 1.055f);
+    return vf_select(vf_lt(x, vf_set(0.04045f)), low, vf_pow(base, vf_set(2.4f)));
+}
+
+/* RGBA of an image; NULL is magenta. mode: as TRC_OP_IMAGE. */
+static void texture_lookup(const struct trc_image *image, uint32_t mode, vfloat u, vfloat v,
+                           vmask lanes, vfloat out[4]) {
+    if (!image) {
+        out[0] = out[2] = out[3] = vf_one();
+        out[1] = vf_zero();
+        return;
+    }
+    const struct trc_image_level *level = &image->levels[0];
+    const uint32_t extension = mode & TRC_IMAGE_MODE_EXTENSION;
+    for (int c = 0; c < 4; c++) out[c] = vf_zero();
+    switch (mode & TRC_IMAGE_MODE_INTERPOLATION) {
+    case TRC_IMAGE_CLOSEST: filter_closest(image, level, extension, u, v, lanes, out); break;
+    case TRC_IMAGE_CUBIC: filter_cubic(image, level, extension, u, v, lanes, out); break;
+    default: filter_linear(image, level, extension, u, v, lanes, out); break;
+    }
+    const bool is_integer = image->format == TRC_TEXEL_U8 || image->format == TRC_TEXEL_U16;
+    if (is_integer) {
+        const vfloat scale = vf_set(image->format == TRC_TEXEL_U8 ? 1.0f / 255.0f : 1.0f / 65535.0f);
+        for (int c = 0; c < 4; c++) out[c] = out[c] * scale;
+    }
+    if ((mode & TRC_IMAGE_MODE_ALPHA) && image->is_associated) {
+        const vfloat inverse =
+            vf_select(vf_ne(out[3], vf_zero()), vf_rcp(out[3]), vf_one());
+        for (int c = 0; c < 3; c++) out[c] = out[c] * inverse;
+    }
+    if (!image->is_srgb) return;
+    for (int c = 0; c < 3; c++) out[c] = is_integer ? srgb_decode_unit(out[c]) : srgb_decode(out[c]);
+}
+
+#endif

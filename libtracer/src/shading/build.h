@@ -1,0 +1,135 @@
+/* A material under compilation: shared by the files of shading/. Not for others. */
+#ifndef TRACER_SHADING_BUILD_H
+#define TRACER_SHADING_BUILD_H
+
+#include <stdbool.h>
+
+#include "shading/compile.h"
+#include "shading/material.h"
+#include "shading/program.h"
+
+/* ---- what is known of node types (shading/nodes.c) ---- */
+
+/* Kinds of inputs: f float, c colour or vector, s shader; with a default when node is -2: n normal,
+ * t tangent (of leaves), u UV, g Generated, p position. Kinds of outputs: f float, c colour, v vector,
+ * s shader. */
+struct trc_node_info {
+    uint32_t type;
+    const char *name;
+    const char *inputs;        /* one letter each */
+    const char *input_names;   /* separated by spaces */
+    const char *outputs;
+};
+
+/* Kind of a node's output; Combine XYZ gives a vector, the other modes a colour. */
+char trc_node_output_kind(const trc_node *node, uint32_t output);
+
+/* NULL: unknown type. */
+const struct trc_node_info *trc_node_info_of(uint32_t type);
+bool trc_node_is_shader(uint32_t type);
+/* Whether mode is one that the type has. */
+bool trc_node_mode_is_valid(uint32_t type, uint32_t mode);
+static inline bool trc_kind_is_float(char kind) { return kind == 'f'; }
+/* Floats of an input or output. */
+static inline uint32_t trc_kind_floats(char kind) {
+    return kind == 's' ? 0 : trc_kind_is_float(kind) ? 1 : 3;
+}
+
+/* Where the inputs of leaves stand among their operands, in floats. The colour comes first. */
+enum {
+    TRC_EMISSION_STRENGTH = 3,
+    TRC_ROUGHNESS = 3, /* of the simple shaders */
+    TRC_GLOSSY_ANISOTROPY = 4,
+    TRC_GLOSSY_TANGENT = 9,
+    TRC_PRINCIPLED_SUBSURFACE = 3,
+    TRC_PRINCIPLED_METALLIC = 7,
+    TRC_PRINCIPLED_SPECULAR = 8,
+    TRC_PRINCIPLED_ROUGHNESS = 10,
+    TRC_PRINCIPLED_ANISOTROPY = 11,
+    TRC_PRINCIPLED_SHEEN = 13,
+    TRC_PRINCIPLED_CLEARCOAT = 15,
+    TRC_PRINCIPLED_CLEARCOAT_ROUGHNESS = 16,
+    TRC_PRINCIPLED_TRANSMISSION = 18,
+    TRC_PRINCIPLED_TRANSMISSION_ROUGHNESS = 19,
+    TRC_PRINCIPLED_EMISSION = 20,
+    TRC_PRINCIPLED_EMISSION_STRENGTH = 23,
+    TRC_PRINCIPLED_ALPHA = 24,
+    TRC_PRINCIPLED_TANGENT = 31
+};
+
+/* Every node of the descriptor, reached or not (shading/validate.c). */
+trc_status trc_material_validate(const trc_material_desc *desc);
+
+/* ---- operations on values ---- */
+
+/* Until registers are given, a value is named by an operand too: its reg is the value's number. */
+struct trc_build_op {
+    uint16_t op, mode;
+    uint32_t resource;
+    uint32_t first_input;      /* into inputs */
+    uint32_t first_value;      /* outputs are values first_value... */
+    uint32_t next;             /* with the same hash, UINT32_MAX: none */
+    bool is_live;
+};
+
+#define TRC_BUILD_BUCKETS 1024
+
+struct trc_build {
+    const trc_material_desc *desc;
+    const struct trc_compile_context *context;
+    struct trc_build_op *ops;
+    uint32_t op_count, op_capacity;
+    struct trc_operand *inputs; /* of operations */
+    uint32_t input_count, input_capacity;
+    float *tables;
+    uint32_t table_count, table_capacity;
+    uint32_t value_count;
+    uint8_t *value_is_live;      /* by trc_build_mark */
+    uint32_t buckets[TRC_BUILD_BUCKETS];
+    struct trc_operand *outputs; /* of nodes: three per colour or vector, one per float */
+    uint32_t *first_output;      /* of each node, into outputs */
+    struct trc_leaf leaves[TRC_MAX_LEAVES];
+    uint32_t leaf_count;
+    struct trc_operand leaf_operands[TRC_MAX_LEAVES * 3 * TRC_MAX_NODE_INPUTS];
+    uint32_t leaf_operand_count;
+};
+
+static inline struct trc_operand trc_constant(float value) {
+    return (struct trc_operand){-1, value};
+}
+static inline bool trc_is_constant(struct trc_operand o) { return o.reg == -1; }
+static inline bool trc_is_value(struct trc_operand o, float value) {
+    return o.reg == -1 && o.value == value;
+}
+
+uint32_t trc_op_inputs(uint32_t op);
+uint32_t trc_op_outputs(uint32_t op);
+
+/* Values of an operation: constants when all inputs are, those of an equal operation if there is one,
+ * else new ones. outputs has room for trc_op_outputs(op) and may overlap inputs. OUT_OF_MEMORY, TOO_LARGE.
+ * (shading/fold.c) */
+trc_status trc_build_op(struct trc_build *b, uint32_t op, uint32_t mode, uint32_t resource,
+                        const struct trc_operand *inputs, struct trc_operand *outputs);
+/* A TRC_OP_MATH; inputs that the mode does not read are ignored. (shading/fold.c) */
+trc_status trc_build_math(struct trc_build *b, uint32_t mode, struct trc_operand x,
+                          struct trc_operand y, struct trc_operand z, struct trc_operand *out);
+
+/* Operands of an input of a value or shader node, converted to its kind; defaults are made, but for
+ * normals and tangents of shader nodes, whose operands get reg -2. (shading/lower.c) */
+trc_status trc_build_input(struct trc_build *b, const trc_node *node, uint32_t input,
+                           struct trc_operand *out);
+/* Outputs of all value nodes. (shading/lower.c) */
+trc_status trc_build_values(struct trc_build *b);
+/* Leaves, their weights and operands. (shading/leaves.c) */
+trc_status trc_build_leaves(struct trc_build *b);
+/* has and emission, from the leaves and the live operations. (shading/traits.c) */
+void trc_build_traits(const struct trc_build *b, struct trc_material *m);
+/* Marks the operations that leaves need. (shading/emit.c) */
+trc_status trc_build_mark(struct trc_build *b);
+/* Gives registers and fills the program, its tables and the leaves of m. (shading/emit.c) */
+trc_status trc_build_emit(const struct trc_build *b, struct trc_material *m);
+
+/* Makes room for needed elements of size bytes. OUT_OF_MEMORY. */
+trc_status trc_build_reserve(void **array, uint32_t *capacity, uint32_t needed, size_t size);
+
+#endif

@@ -1,0 +1,72 @@
+/* The compiler's driver and the life of materials. */
+#include "shading/compile.h"
+
+#include <string.h>
+
+#include "core/checks.h"
+#include "core/core.h"
+#include "shading/build.h"
+
+static void build_free(struct trc_build *b) {
+    trc_free(b->ops);
+    trc_free(b->inputs);
+    trc_free(b->tables);
+    trc_free(b->outputs);
+    trc_free(b->first_output);
+    trc_free(b->value_is_live);
+    trc_free(b);
+}
+
+static void material_free(struct trc_material *m) {
+    trc_free(m->operands);
+    trc_free(m->instructions);
+    trc_free(m->tables);
+    trc_free(m);
+}
+
+static trc_status compile(struct trc_build *b, struct trc_material *m) {
+    memset(b->buckets, 0xff, sizeof b->buckets);
+    TRC_TRY(trc_build_values(b));
+    TRC_TRY(trc_build_leaves(b));
+    TRC_TRY(trc_build_mark(b));
+    trc_build_traits(b, m);
+    return trc_build_emit(b, m);
+}
+
+trc_status trc_material_compile(const trc_material_desc *desc,
+                                const struct trc_compile_context *context,
+                                struct trc_material **material_out) {
+    TRC_TRY(trc_material_validate(desc));
+    struct trc_build *b = trc_alloc_zeroed(1, sizeof *b);
+    struct trc_material *m = trc_alloc_zeroed(1, sizeof *m);
+    trc_status status = TRC_ERROR_OUT_OF_MEMORY;
+    if (b && m) {
+        b->desc = desc;
+        b->context = context;
+        atomic_init(&m->refs, 1);
+        m->flags = desc->flags;
+        m->pass_index = desc->pass_index;
+        status = compile(b, m);
+    } else {
+        trc_fail(status, "no memory to compile a material");
+    }
+    if (b) build_free(b);
+    if (status != TRC_OK) {
+        if (m) material_free(m);
+        return status;
+    }
+    *material_out = m;
+    return TRC_OK;
+}
+
+struct trc_material *trc_material_retain(struct trc_material *material) {
+    if (material) atomic_fetch_add_explicit(&material->refs, 1, memory_order_relaxed);
+    return material;
+}
+
+void trc_material_release(struct trc_material *material) {
+    if (!material) return;
+    if (atomic_fetch_sub_explicit(&material->refs, 1, memory_order_acq_rel) == 1) {
+        material_free(material);
+    }
+}

@@ -1,0 +1,112 @@
+/* The shader tree to a list of leaves with weights. */
+#include "core/checks.h"
+#include "core/core.h"
+#include "shading/build.h"
+
+static trc_status multiply(struct trc_build *b, struct trc_operand x, struct trc_operand y,
+                           struct trc_operand *out) {
+    return trc_build_math(b, TRC_MATH_MULTIPLY, x, y, trc_constant(0.0f), out);
+}
+
+/* Adds a weight to that of the shader an input is linked to. */
+static trc_status give_weight(struct trc_build *b, const trc_node *node, uint32_t input,
+                              struct trc_operand weight, struct trc_operand *weights) {
+    const trc_node_input *link = &b->desc->inputs[node->first_input + input];
+    if (link->node < 0) return TRC_OK;
+    struct trc_operand *sum = &weights[link->node];
+    return trc_build_math(b, TRC_MATH_ADD, *sum, weight, trc_constant(0.0f), sum);
+}
+
+/* A mix gives w (1 - f) and w f, the factor clamped to [0, 1]; a sum gives w to both. */
+static trc_status share_weight(struct trc_build *b, const trc_node *node, struct trc_operand weight,
+                               struct trc_operand *weights) {
+    if (node->type == TRC_NODE_ADD_SHADER) {
+        TRC_TRY(give_weight(b, node, 0, weight, weights));
+        return give_weight(b, node, 1, weight, weights);
+    }
+    struct trc_operand factor, rest, first, second;
+    const struct trc_operand zero = trc_constant(0.0f), one = trc_constant(1.0f);
+    TRC_TRY(trc_build_input(b, node, 0, &factor));
+    const struct trc_operand clamp[3] = {factor, zero, one};
+    TRC_TRY(trc_build_op(b, TRC_OP_CLAMP, 0, TRC_NO_RESOURCE, clamp, &factor));
+    TRC_TRY(trc_build_math(b, TRC_MATH_SUBTRACT, one, factor, zero, &rest));
+    TRC_TRY(multiply(b, weight, rest, &first));
+    TRC_TRY(multiply(b, weight, factor, &second));
+    TRC_TRY(give_weight(b, node, 1, first, weights));
+    return give_weight(b, node, 2, second, weights);
+}
+
+static bool is_black(const struct trc_operand *color) {
+    return trc_is_value(color[0], 0.0f) && trc_is_value(color[1], 0.0f) &&
+           trc_is_value(color[2], 0.0f);
+}
+
+/* Whether a leaf of these operands neither scatters nor emits, whatever the light. */
+static bool is_nothing(uint32_t type, const struct trc_operand *in) {
+    if (type == TRC_NODE_EMISSION || type == TRC_NODE_BACKGROUND) {
+        return is_black(in) || trc_is_value(in[3], 0.0f);
+    }
+    return type == TRC_NODE_TRANSPARENT && is_black(in);
+}
+
+/* The default tangent of an anisotropic leaf is the one around the object's Z axis. */
+static trc_status fill_tangent(struct trc_build *b, uint32_t type, struct trc_operand *in) {
+    const uint32_t anisotropy =
+        type == TRC_NODE_GLOSSY ? (uint32_t)TRC_GLOSSY_ANISOTROPY : (uint32_t)TRC_PRINCIPLED_ANISOTROPY;
+    const uint32_t tangent =
+        type == TRC_NODE_GLOSSY ? (uint32_t)TRC_GLOSSY_TANGENT : (uint32_t)TRC_PRINCIPLED_TANGENT;
+    if (type != TRC_NODE_GLOSSY && type != TRC_NODE_PRINCIPLED) return TRC_OK;
+    if (in[tangent].reg != -2 || trc_is_value(in[anisotropy], 0.0f)) return TRC_OK;
+    return trc_build_op(b, TRC_OP_TANGENT, 0, TRC_NO_RESOURCE, NULL, in + tangent);
+}
+
+static trc_status add_leaf(struct trc_build *b, const trc_node *node, struct trc_operand weight) {
+    struct trc_operand *in = b->leaf_operands + b->leaf_operand_count;
+    if (b->leaf_count == TRC_MAX_LEAVES) {
+        return trc_fail(TRC_ERROR_TOO_LARGE, "the material mixes more than %d shaders",
+                        TRC_MAX_LEAVES);
+    }
+    const char *kinds = trc_node_info_of(node->type)->inputs;
+    uint32_t floats = 0;
+    for (uint32_t i = 0; i < node->input_count; i++) {
+        TRC_TRY(trc_build_input(b, node, i, in + floats));
+        floats += trc_kind_floats(kinds[i]);
+    }
+    if (is_nothing(node->type, in)) return TRC_OK;
+    TRC_TRY(fill_tangent(b, node->type, in));
+    b->leaves[b->leaf_count++] = (struct trc_leaf){
+        .type = node->type,
+        .mode = node->mode,
+        .weight = weight,
+        .first_operand = b->leaf_operand_count,
+        .operand_count = floats,
+    };
+    b->leaf_operand_count += floats;
+    return TRC_OK;
+}
+
+/* From the output backwards: links lead to earlier nodes only, so a weight is complete when its node's
+ * turn comes. A shader that is used twice is one leaf with the sum of both weights, as in Cycles. */
+static trc_status weigh(struct trc_build *b, struct trc_operand *weights) {
+    for (uint32_t i = 0; i < b->desc->node_count; i++) weights[i] = trc_constant(0.0f);
+    weights[b->desc->surface] = trc_constant(1.0f);
+    for (uint32_t i = (uint32_t)b->desc->surface + 1; i-- > 0;) {
+        const trc_node *node = &b->desc->nodes[i];
+        if (!trc_node_is_shader(node->type) || trc_is_value(weights[i], 0.0f)) continue;
+        if (node->type == TRC_NODE_MIX_SHADER || node->type == TRC_NODE_ADD_SHADER) {
+            TRC_TRY(share_weight(b, node, weights[i], weights));
+        } else {
+            TRC_TRY(add_leaf(b, node, weights[i]));
+        }
+    }
+    return TRC_OK;
+}
+
+trc_status trc_build_leaves(struct trc_build *b) {
+    if (b->desc->node_count == 0 || b->desc->surface < 0) return TRC_OK;
+    struct trc_operand *weights = trc_alloc(b->desc->node_count, sizeof *weights);
+    if (!weights) return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory to compile a material");
+    const trc_status status = weigh(b, weights);
+    trc_free(weights);
+    return status;
+}

@@ -1,0 +1,125 @@
+/* The importance map of a world that is not constant. */
+#include <math.h>
+#include <string.h>
+
+#include "core/core.h"
+#include "kernels/kernels.h"
+#include "shading/lights.h"
+
+#define PI 3.14159265358979f
+
+/* Directions per side of a cell: bright spots smaller than a cell are seen by one of them. */
+#define SUBSAMPLES 2
+/* Share of the mean that every cell gets: what the samples missed must not be impossible. */
+#define LEAST_SHARE 0.05f
+
+/* Same mapping as kernels/light_world.c: u by azimuth from +X, v by angle from +Z. */
+static void cell_direction(float u, float v, float d[3]) {
+    const float phi = 2.0f * PI * u, theta = PI * v;
+    d[0] = sinf(theta) * cosf(phi);
+    d[1] = sinf(theta) * sinf(phi);
+    d[2] = cosf(theta);
+}
+
+/* Brightness of each cell of a row, the largest of its samples leaning on their mean, times sin theta. */
+static void measure_row(const struct trc_snapshot *s, struct trc_world_map *map, uint32_t row,
+                        float *directions, float *radiance, double total[4]) {
+    const uint32_t per_cell = SUBSAMPLES * SUBSAMPLES;
+    for (uint32_t x = 0; x < map->width; x++)
+        for (uint32_t k = 0; k < per_cell; k++) {
+            const float du = ((float)(k % SUBSAMPLES) + 0.5f) / SUBSAMPLES;
+            const float dv = ((float)(k / SUBSAMPLES) + 0.5f) / SUBSAMPLES;
+            cell_direction(((float)x + du) / (float)map->width,
+                           ((float)row + dv) / (float)map->height,
+                           directions + 3 * ((size_t)x * per_cell + k));
+        }
+    trc_kernels_current()->world_evaluate(s, directions, radiance, map->width * per_cell);
+    const float weight = sinf(PI * ((float)row + 0.5f) / (float)map->height);
+    for (uint32_t x = 0; x < map->width; x++) {
+        float mean = 0.0f;
+        for (uint32_t k = 0; k < per_cell; k++) {
+            const float *c = radiance + 3 * ((size_t)x * per_cell + k);
+            const float light = 0.2126729f * c[0] + 0.7151522f * c[1] + 0.0721750f * c[2];
+            mean += light > 0.0f && light < 1e30f ? light / (float)per_cell : 0.0f;
+            for (int i = 0; i < 3; i++)
+                total[i] += c[i] > 0.0f && c[i] < 1e30f ? (double)(c[i] * weight) : 0.0;
+        }
+        total[3] += (double)per_cell * (double)weight;
+        map->density[(size_t)row * map->width + x] = mean * weight;
+    }
+}
+
+/* Running sums, each row's from 0 to 1; values become multiples of the mean. */
+static void accumulate(struct trc_world_map *map) {
+    const uint32_t width = map->width, height = map->height;
+    double sum = 0.0;
+    for (size_t i = 0; i < (size_t)width * height; i++)
+        sum += (double)map->density[i];
+    const double mean = sum / ((double)width * height);
+    double down = 0.0;
+    for (uint32_t y = 0; y < height; y++) {
+        float *cell = map->density + (size_t)y * width, *row = map->rows + (size_t)y * (width + 1);
+        const double least = LEAST_SHARE * sin(3.14159265358979 * (y + 0.5) / height);
+        double along = 0.0;
+        for (uint32_t x = 0; x < width; x++) {
+            cell[x] = (float)((mean > 0.0 ? (double)cell[x] / mean : 0.0) + least);
+            row[x] = (float)along;
+            along += (double)cell[x];
+        }
+        for (uint32_t x = 1; x < width; x++)
+            row[x] = (float)((double)row[x] / along);
+        row[width] = 1.0f;
+        map->marginal[y] = (float)down;
+        down += along / width;
+    }
+    for (uint32_t y = 1; y < height; y++)
+        map->marginal[y] = (float)((double)map->marginal[y] / down);
+    map->marginal[height] = 1.0f;
+    const float scale = (float)(height / down);
+    for (size_t i = 0; i < (size_t)width * height; i++)
+        map->density[i] *= scale;
+}
+
+trc_status trc_world_map_create(const struct trc_snapshot *snapshot, uint32_t width,
+                                struct trc_world_map **out) {
+    const uint32_t height = width / 2;
+    struct trc_world_map *map = trc_alloc_zeroed(1, sizeof *map);
+    const size_t samples = (size_t)width * SUBSAMPLES * SUBSAMPLES;
+    float *directions = trc_alloc(samples, 3 * sizeof(float));
+    float *radiance = trc_alloc(samples, 3 * sizeof(float));
+    if (map) {
+        atomic_init(&map->refs, 1);
+        map->width = width;
+        map->height = height;
+        map->rows = trc_alloc((size_t)(width + 1) * height, sizeof(float));
+        map->marginal = trc_alloc((size_t)height + 1, sizeof(float));
+        map->density = trc_alloc((size_t)width * height, sizeof(float));
+    }
+    const bool has_all =
+        map && directions && radiance && map->rows && map->marginal && map->density;
+    if (has_all) {
+        double total[4] = {0};
+        for (uint32_t y = 0; y < height; y++)
+            measure_row(snapshot, map, y, directions, radiance, total);
+        for (int i = 0; i < 3; i++)
+            map->average[i] = (float)(total[i] / total[3]);
+        accumulate(map);
+        *out = map;
+    }
+    trc_free(directions);
+    trc_free(radiance);
+    if (has_all)
+        return TRC_OK;
+    if (map)
+        trc_world_map_release(map);
+    return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for the importance map of the world");
+}
+
+void trc_world_map_release(struct trc_world_map *map) {
+    if (!map || atomic_fetch_sub_explicit(&map->refs, 1, memory_order_acq_rel) != 1)
+        return;
+    trc_free(map->rows);
+    trc_free(map->marginal);
+    trc_free(map->density);
+    trc_free(map);
+}

@@ -1,0 +1,91 @@
+/* The table of node types: tracer/material.h in a form that code can check against. */
+#include "shading/build.h"
+
+#include <stddef.h>
+
+static const struct trc_node_info infos[] = {
+    {TRC_NODE_DIFFUSE, "Diffuse", "cfn", "color roughness normal", "s"},
+    {TRC_NODE_GLOSSY, "Glossy", "cfffnt", "color roughness anisotropy rotation normal tangent", "s"},
+    {TRC_NODE_GLASS, "Glass", "cffn", "color roughness ior normal", "s"},
+    {TRC_NODE_REFRACTION, "Refraction", "cffn", "color roughness ior normal", "s"},
+    {TRC_NODE_TRANSPARENT, "Transparent", "c", "color", "s"},
+    {TRC_NODE_TRANSLUCENT, "Translucent", "cn", "color normal", "s"},
+    {TRC_NODE_EMISSION, "Emission", "cf", "color strength", "s"},
+    {TRC_NODE_BACKGROUND, "Background", "cf", "color strength", "s"},
+    {TRC_NODE_MIX_SHADER, "Mix Shader", "fss", "factor first second", "s"},
+    {TRC_NODE_ADD_SHADER, "Add Shader", "ss", "first second", "s"},
+    {TRC_NODE_HOLDOUT, "Holdout", "", "", "s"},
+    {TRC_NODE_PRINCIPLED, "Principled", "cfcfffffffffffffcffnnt",
+     "base_color subsurface subsurface_color metallic specular specular_tint roughness anisotropic "
+     "anisotropic_rotation sheen sheen_tint clearcoat clearcoat_roughness ior transmission "
+     "transmission_roughness emission emission_strength alpha normal clearcoat_normal tangent",
+     "s"},
+
+    {TRC_NODE_IMAGE, "Image", "u", "vector", "cf"},
+    {TRC_NODE_ENVIRONMENT, "Environment", "p", "vector", "c"},
+    {TRC_NODE_UV_MAP, "UV Map", "", "", "v"},
+    {TRC_NODE_COLOR_ATTRIBUTE, "Color Attribute", "", "", "cf"},
+    {TRC_NODE_TEXTURE_COORDINATE, "Texture Coordinate", "", "", "vvvvvvv"},
+    {TRC_NODE_MAPPING, "Mapping", "cccc", "vector location rotation scale", "v"},
+    {TRC_NODE_MIX_COLOR, "Mix Color", "fcc", "factor a b", "c"},
+    {TRC_NODE_MATH, "Math", "fff", "a b c", "f"},
+    {TRC_NODE_FRESNEL, "Fresnel", "fn", "ior normal", "f"},
+    {TRC_NODE_LAYER_WEIGHT, "Layer Weight", "fn", "blend normal", "ff"},
+    {TRC_NODE_LIGHT_PATH, "Light Path", "", "", "fffffffffffff"},
+    {TRC_NODE_GEOMETRY, "Geometry", "", "", "vvvvvvfff"},
+    {TRC_NODE_NORMAL_MAP, "Normal Map", "fc", "strength color", "v"},
+    {TRC_NODE_INVERT, "Invert", "fc", "factor color", "c"},
+    {TRC_NODE_GAMMA, "Gamma", "cf", "color gamma", "c"},
+    {TRC_NODE_HUE_SATURATION, "Hue Saturation Value", "ffffc", "hue saturation value factor color",
+     "c"},
+    {TRC_NODE_BRIGHT_CONTRAST, "Bright/Contrast", "cff", "color bright contrast", "c"},
+    {TRC_NODE_COLOR_RAMP, "Color Ramp", "f", "factor", "cf"},
+    {TRC_NODE_SEPARATE, "Separate", "c", "color", "fff"},
+    {TRC_NODE_COMBINE, "Combine", "fff", "x y z", "c"},
+    {TRC_NODE_MAP_RANGE, "Map Range", "fffff", "value from_min from_max to_min to_max", "f"},
+    {TRC_NODE_CLAMP, "Clamp", "fff", "value min max", "f"},
+    {TRC_NODE_CHECKER, "Checker", "gccf", "vector color1 color2 scale", "cf"},
+    {TRC_NODE_OBJECT_INFO, "Object Info", "", "", "vcffff"},
+    {TRC_NODE_VECTOR_MATH, "Vector Math", "cccf", "a b c scale", "vf"},
+    {TRC_NODE_RGB_TO_BW, "RGB to BW", "c", "color", "f"},
+};
+
+const struct trc_node_info *trc_node_info_of(uint32_t type) {
+    for (size_t i = 0; i < sizeof infos / sizeof *infos; i++) {
+        if (infos[i].type == type) return &infos[i];
+    }
+    return NULL;
+}
+
+bool trc_node_is_shader(uint32_t type) { return type < TRC_NODE_IMAGE; }
+
+char trc_node_output_kind(const trc_node *node, uint32_t output) {
+    if (node->type == TRC_NODE_COMBINE && node->mode == TRC_SEPARATE_XYZ) return 'v';
+    return trc_node_info_of(node->type)->outputs[output];
+}
+
+#define CLAMP_BIT 256u
+
+bool trc_node_mode_is_valid(uint32_t type, uint32_t mode) {
+    const uint32_t base = mode & ~CLAMP_BIT;
+    switch (type) {
+    case TRC_NODE_GLOSSY:
+    case TRC_NODE_GLASS:
+    case TRC_NODE_REFRACTION: return mode <= TRC_DISTRIBUTION_ASHIKHMIN;
+    case TRC_NODE_PRINCIPLED: return mode <= TRC_DISTRIBUTION_MULTI_GGX;
+    case TRC_NODE_IMAGE: return mode < 64 && (mode & TRC_IMAGE_MODE_INTERPOLATION) <= TRC_IMAGE_CUBIC;
+    case TRC_NODE_ENVIRONMENT:
+        return (mode & ~(3u | 1u << 4)) == 0 && (mode & 3u) <= TRC_IMAGE_CUBIC;
+    case TRC_NODE_MAPPING: return mode <= 3;
+    case TRC_NODE_MIX_COLOR: return base <= TRC_BLEND_EXCLUSION;
+    case TRC_NODE_MATH: return base <= TRC_MATH_DEGREES;
+    case TRC_NODE_NORMAL_MAP: return mode <= 4;
+    case TRC_NODE_COLOR_RAMP: return mode <= 1;
+    case TRC_NODE_SEPARATE:
+    case TRC_NODE_COMBINE: return mode <= TRC_SEPARATE_XYZ;
+    case TRC_NODE_MAP_RANGE: return base == 0;
+    case TRC_NODE_CLAMP: return mode <= 1;
+    case TRC_NODE_VECTOR_MATH: return mode <= TRC_VECTOR_FRACT;
+    default: return mode == 0;
+    }
+}

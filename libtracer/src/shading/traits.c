@@ -1,0 +1,163 @@
+/* What a material may do over all values of its inputs, and what it emits. */
+#include <math.h>
+
+#include "shading/build.h"
+
+/* The cut-off of weights in Cycles. */
+#define WEIGHT_CUTOFF 1e-5f
+/* Microfacets of alpha^2 at or below it are ideal: TRC_SINGULAR_ALPHA2 of kernels/bsdf.h. alpha is the
+ * square of roughness. */
+#define SINGULAR_ALPHA2 1e-7f
+/* Some more than rounding may cost, so that a flag is never missing. */
+#define MARGIN 1.001f
+
+/* What is taken for a colour or a strength that a program computes, in the mean estimate. */
+#define GUESSED_COLOR 0.5f
+#define GUESSED_STRENGTH 1.0f
+
+/* ---- values an operand may have ---- */
+
+static bool may_exceed(struct trc_operand o, float limit) {
+    return !trc_is_constant(o) || !(o.value <= limit);
+}
+static bool may_be_below(struct trc_operand o, float limit) {
+    return !trc_is_constant(o) || !(o.value >= limit);
+}
+
+static bool is_constant3(const struct trc_operand *o) {
+    return trc_is_constant(o[0]) && trc_is_constant(o[1]) && trc_is_constant(o[2]);
+}
+
+/* ---- microfacets ---- */
+
+/* Ideal, rough or both, for roughness between low and high. */
+static uint32_t roughness_bits(float low, float high) {
+    uint32_t has = 0;
+    const float l2 = low * low, h2 = high * high;
+    if (!(l2 * l2 > SINGULAR_ALPHA2 * MARGIN)) has |= TRC_MATERIAL_HAS_SPECULAR;
+    if (!(h2 * h2 * MARGIN <= SINGULAR_ALPHA2)) has |= TRC_MATERIAL_HAS_GLOSSY;
+    return has;
+}
+
+static uint32_t microfacet_bits(uint32_t distribution, struct trc_operand roughness) {
+    if (distribution == TRC_DISTRIBUTION_SHARP) return TRC_MATERIAL_HAS_SPECULAR;
+    if (!trc_is_constant(roughness)) return roughness_bits(0.0f, INFINITY);
+    const float r = fmaxf(roughness.value, 0.0f);
+    return roughness_bits(r, r);
+}
+
+/* Refraction of the Principled shader: roughness and its own add up, with the GGX distribution. */
+static uint32_t transmission_bits(uint32_t distribution, struct trc_operand roughness,
+                                  struct trc_operand own) {
+    const uint32_t reflected = microfacet_bits(distribution, roughness);
+    if (distribution != TRC_DISTRIBUTION_GGX) return reflected;
+    if (!trc_is_constant(own) || !trc_is_constant(roughness)) {
+        return TRC_MATERIAL_HAS_SPECULAR | TRC_MATERIAL_HAS_GLOSSY;
+    }
+    const float sum = 1.0f - (1.0f - roughness.value) * (1.0f - own.value);
+    return reflected | roughness_bits(fabsf(sum), fabsf(sum));
+}
+
+/* ---- leaves ---- */
+
+static uint32_t principled_bits(uint32_t distribution, const struct trc_operand *in) {
+    const struct trc_operand metallic = in[TRC_PRINCIPLED_METALLIC];
+    const struct trc_operand transmission = in[TRC_PRINCIPLED_TRANSMISSION];
+    const struct trc_operand roughness = in[TRC_PRINCIPLED_ROUGHNESS];
+    const struct trc_operand alpha = in[TRC_PRINCIPLED_ALPHA];
+    uint32_t has = may_be_below(alpha, 1.0f) ? TRC_MATERIAL_HAS_TRANSPARENCY : 0u;
+    if (!may_exceed(alpha, 0.0f)) return has;
+    const bool not_metal = may_be_below(metallic, 1.0f), not_glass = may_be_below(transmission, 1.0f);
+    if (not_metal && not_glass) has |= TRC_MATERIAL_HAS_DIFFUSE;
+    if ((not_glass || may_exceed(metallic, 0.0f)) &&
+        (may_exceed(in[TRC_PRINCIPLED_SPECULAR], WEIGHT_CUTOFF) ||
+         may_exceed(metallic, WEIGHT_CUTOFF))) {
+        has |= microfacet_bits(distribution, roughness);
+    }
+    if (not_metal && may_exceed(transmission, WEIGHT_CUTOFF)) {
+        has |= TRC_MATERIAL_HAS_REFRACTION |
+               transmission_bits(distribution, roughness, in[TRC_PRINCIPLED_TRANSMISSION_ROUGHNESS]);
+    }
+    if (may_exceed(in[TRC_PRINCIPLED_CLEARCOAT], WEIGHT_CUTOFF)) {
+        has |= microfacet_bits(TRC_DISTRIBUTION_GGX, in[TRC_PRINCIPLED_CLEARCOAT_ROUGHNESS]);
+    }
+    return has;
+}
+
+static uint32_t leaf_bits(const struct trc_leaf *leaf, const struct trc_operand *in) {
+    switch (leaf->type) {
+    case TRC_NODE_DIFFUSE: return TRC_MATERIAL_HAS_DIFFUSE;
+    case TRC_NODE_TRANSLUCENT: return TRC_MATERIAL_HAS_TRANSLUCENT;
+    case TRC_NODE_TRANSPARENT: return TRC_MATERIAL_HAS_TRANSPARENCY;
+    case TRC_NODE_HOLDOUT: return TRC_MATERIAL_HAS_HOLDOUT;
+    case TRC_NODE_GLOSSY: return microfacet_bits(leaf->mode, in[TRC_ROUGHNESS]);
+    case TRC_NODE_GLASS:
+    case TRC_NODE_REFRACTION:
+        return TRC_MATERIAL_HAS_REFRACTION | microfacet_bits(leaf->mode, in[TRC_ROUGHNESS]);
+    case TRC_NODE_PRINCIPLED: return principled_bits(leaf->mode, in);
+    default: return 0;
+    }
+}
+
+/* ---- emission ---- */
+
+/* Colour, strength and the factor above them of a leaf that emits, in operands. */
+struct emitter {
+    const struct trc_operand *color;
+    struct trc_operand strength, alpha;
+};
+
+/* False: the leaf emits nothing, whatever its inputs. */
+static bool emitter_of(const struct trc_leaf *leaf, const struct trc_operand *in,
+                       struct emitter *out) {
+    if (leaf->type == TRC_NODE_EMISSION || leaf->type == TRC_NODE_BACKGROUND) {
+        *out = (struct emitter){in, in[TRC_EMISSION_STRENGTH], trc_constant(1.0f)};
+    } else if (leaf->type == TRC_NODE_PRINCIPLED) {
+        *out = (struct emitter){in + TRC_PRINCIPLED_EMISSION, in[TRC_PRINCIPLED_EMISSION_STRENGTH],
+                                in[TRC_PRINCIPLED_ALPHA]};
+    } else {
+        return false;
+    }
+    const struct trc_operand *c = out->color;
+    const bool is_black =
+        trc_is_value(c[0], 0.0f) && trc_is_value(c[1], 0.0f) && trc_is_value(c[2], 0.0f);
+    return !is_black && !trc_is_value(out->strength, 0.0f) && may_exceed(out->alpha, 0.0f);
+}
+
+static float clamped_alpha(struct trc_operand o) {
+    if (!trc_is_constant(o)) return 1.0f;
+    return fminf(fmaxf(o.value, 0.0f), 1.0f);
+}
+
+static void add_emission(const struct trc_leaf *leaf, const struct trc_operand *in,
+                         struct trc_material *m) {
+    struct emitter e;
+    if (!emitter_of(leaf, in, &e)) return;
+    m->has |= TRC_MATERIAL_HAS_EMISSION;
+    if (!is_constant3(e.color) || !trc_is_constant(e.strength) || !trc_is_constant(e.alpha) ||
+        !trc_is_constant(leaf->weight)) {
+        m->has |= TRC_MATERIAL_EMISSION_VARIES;
+    }
+    const float strength = trc_is_constant(e.strength) ? e.strength.value : GUESSED_STRENGTH;
+    const float weight = trc_is_constant(leaf->weight) ? leaf->weight.value : GUESSED_COLOR;
+    for (int c = 0; c < 3; c++) {
+        const float color = trc_is_constant(e.color[c]) ? e.color[c].value : GUESSED_COLOR;
+        m->emission[c] += weight * (color * strength * clamped_alpha(e.alpha));
+    }
+}
+
+void trc_build_traits(const struct trc_build *b, struct trc_material *m) {
+    for (uint32_t i = 0; i < b->leaf_count; i++) {
+        const struct trc_leaf *leaf = &b->leaves[i];
+        const struct trc_operand *in = b->leaf_operands + leaf->first_operand;
+        m->has |= leaf_bits(leaf, in);
+        add_emission(leaf, in, m);
+    }
+    for (uint32_t i = 0; i < b->op_count; i++) {
+        const struct trc_build_op *o = &b->ops[i];
+        if (!o->is_live) continue;
+        m->has |= TRC_MATERIAL_HAS_PROGRAM;
+        if (o->op == TRC_OP_IMAGE || o->op == TRC_OP_IMAGE_BOX) m->has |= TRC_MATERIAL_HAS_TEXTURE;
+        if (o->op == TRC_OP_LIGHT_PATH) m->has |= TRC_MATERIAL_READS_LIGHT_PATH;
+    }
+}

@@ -1,0 +1,225 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The same scene by Cycles without diffuse bounces and by Volley: pixels where nothing is random but
+the film, channel means where light is sampled."""
+
+import numpy as np
+import pytest
+
+FILM_SAMPLES = 16
+LIGHT_SAMPLES = 128
+MEAN_TOLERANCE = 0.01
+
+
+def _both(samples):
+    """The current scene by both engines."""
+    import scenes
+    pictures = []
+    for engine in ('VOLLEY', 'CYCLES'):
+        scenes.set_engine(engine, samples)
+        pictures.append(scenes.render())
+    return pictures
+
+
+def _walls():
+    import scenes
+    scenes.wall("Red", 2.0, 0.0, (-1.0, 0.0), scenes.emitter((1.0, 0.1, 0.05), "Red"))
+    scenes.wall("Green", 2.0, 2.0, (1.2, 0.5), scenes.emitter((0.1, 0.8, 0.2), "Green"))
+    scenes.wall("Blue", 9.0, 5.0, (0.5, -0.6), scenes.emitter((0.05, 0.2, 0.9), "Blue"))
+
+
+# Geometry and camera: plain colours, so that pixels agree -----------------------------------------
+
+def inside_cameras():
+    import scenes
+    scene = scenes.empty(size=(72, 48))
+    made = scenes.camera()
+    _walls()
+    pairs = {}
+
+    def look(name, **settings):
+        for key, value in settings.items():
+            setattr(made.data, key, value)
+        pairs[name] = _both(FILM_SAMPLES)
+
+    look("perspective")
+    look("shifted", shift_x=0.2, shift_y=-0.1, sensor_fit='VERTICAL', sensor_height=30.0)
+    look("orthographic", type='ORTHO', ortho_scale=5.0, sensor_fit='AUTO')
+    look("clipped", type='PERSP', shift_x=0.0, shift_y=0.0, clip_start=6.5, clip_end=10.0)
+    made.data.clip_start, made.data.clip_end = 0.1, 100.0
+    scene.render.pixel_aspect_x = 2.0
+    scene.render.resolution_x, scene.render.resolution_y = 40, 72
+    look("tall, wide pixels")
+    return pairs
+
+
+def inside_geometry():
+    """Modifiers, text, curves, metaballs, instances, mirrored objects, hidden ones."""
+    import bpy
+    import scenes
+    scenes.empty(size=(96, 64))
+    scenes.camera(location=(0, -12, 0))
+    red, green = scenes.emitter((1, 0.1, 0.05), "Red"), scenes.emitter((0.1, 0.8, 0.2), "Green")
+    blue = scenes.emitter((0.05, 0.2, 0.9), "Blue")
+    scenes.wall("Back", 14.0, 6.0, (0, 0), scenes.emitter((0.2, 0.2, 0.2), "Grey"))
+    bpy.ops.mesh.primitive_monkey_add(location=(-3, 0, 1.5), size=1.6)
+    monkey = bpy.context.object
+    monkey.data.materials.append(red)
+    monkey.data.materials.append(green)
+    for polygon in monkey.data.polygons[::3]:
+        polygon.material_index = 1
+    monkey.modifiers.new("Subdivision", 'SUBSURF')
+    monkey.scale = (-1, 1, 1)
+    monkey.rotation_euler = (1.2, 0.3, 0.4)
+    for operator, location in ((bpy.ops.object.text_add, (-1.5, 0, 1)),
+                               (bpy.ops.object.metaball_add, (1, 0, 2)),
+                               (bpy.ops.curve.primitive_bezier_circle_add, (3, 0, 1.5)),
+                               (bpy.ops.surface.primitive_nurbs_surface_torus_add, (3, 0, -1.5))):
+        operator(location=location)
+        made = bpy.context.object
+        made.rotation_euler = (1.5, 0, 0)
+        made.data.materials.append(blue)
+        if made.type == 'CURVE':
+            made.data.bevel_depth = 0.3
+    collection = bpy.data.collections.new("Group")
+    source = scenes.wall("Source", 0.4, 0.0, (0, -1.5), red)
+    collection.objects.link(source)
+    for i in range(4):
+        instancer = scenes.link(f"Instancer{i}", None)
+        instancer.instance_type, instancer.instance_collection = 'COLLECTION', collection
+        instancer.location = (-3.5 + i, 0, 0.3 * i)
+        instancer.rotation_euler = (0, 0.3 * i, 0)
+    scenes.wall("Hidden", 3.0, -2.0, material=green).hide_render = True
+    scenes.wall("Unseen", 3.0, -2.0, material=green).visible_camera = False
+    return _both(FILM_SAMPLES)
+
+
+def _close(ours, theirs, share=0.01):
+    """Within film noise: few pixels differ by much, the mean hardly."""
+    difference = np.abs(ours - theirs)[..., :3].max(axis=-1)
+    assert (difference > 0.25).mean() < share, f"{(difference > 0.25).mean():.3%} of the pixels differ"
+    assert difference.mean() < 0.02
+    assert ours[..., 3].mean() == pytest.approx(theirs[..., 3].mean(), abs=5e-3)
+
+
+def test_cameras(blender):
+    for name, (ours, theirs) in blender.run(inside_cameras).items():
+        assert theirs[..., :3].max() > 0.5, name
+        _close(ours, theirs)
+
+
+def test_geometry(blender):
+    ours, theirs = blender.run(inside_geometry)
+    _close(ours, theirs)
+
+
+# Blur ----------------------------------------------------------------------------------------------
+
+def inside_blur():
+    import bpy
+    import scenes
+    scene = scenes.empty(size=(72, 48))
+    made = scenes.camera()
+    _walls()
+    pairs = {}
+    dof = made.data.dof
+    dof.use_dof, dof.aperture_fstop, dof.focus_distance = True, 0.05, 6.0
+    dof.aperture_blades, dof.aperture_ratio = 5, 1.5
+    pairs["lens"] = _both(LIGHT_SAMPLES)
+    dof.use_dof = False
+    moving = bpy.data.objects["Red"]
+    for frame, x in ((0, -2.0), (4, 6.0)):
+        moving.location.x = x
+        moving.rotation_euler.y = 0.3 * frame
+        moving.keyframe_insert("location", frame=frame)
+        moving.keyframe_insert("rotation_euler", frame=frame)
+    for frame, z in ((0, 0.0), (4, 2.0)):
+        made.location.z = z
+        made.keyframe_insert("location", frame=frame)
+    growing = bpy.data.objects["Green"]
+    growing.shape_key_add(name="Basis")
+    key = growing.shape_key_add(name="Wide")
+    for point in key.data:
+        point.co.x *= 2.0
+    for frame, value in ((0, 0.0), (4, 1.0)):
+        key.value = value
+        key.keyframe_insert("value", frame=frame)
+    scene.frame_set(2)
+    scene.render.use_motion_blur, scene.render.motion_blur_shutter = True, 0.8
+    pairs["motion"] = _both(LIGHT_SAMPLES)
+    return pairs
+
+
+@pytest.mark.parametrize("kind", ["lens", "motion"])
+def test_blur(blender, kind):
+    ours, theirs = blender.run(inside_blur)[kind]
+    blocks = [picture.reshape(6, 8, 9, 8, 4).mean(axis=(1, 3)) for picture in (ours, theirs)]
+    assert np.abs(blocks[0] - blocks[1]).max() < 0.06
+    assert ours[..., :3].mean(axis=(0, 1)) == pytest.approx(theirs[..., :3].mean(axis=(0, 1)), rel=0.02)
+
+
+# Light ---------------------------------------------------------------------------------------------
+
+def _stage():
+    """A floor and a sphere, seen from above."""
+    import scenes
+    scenes.camera(location=(0.0, -5.0, 3.0), rotation=(1.05, 0.0, 0.0))
+    floor = scenes.mesh("Floor", [(-5, -5, 0), (5, -5, 0), (5, 5, 0), (-5, 5, 0)], [(0, 1, 2, 3)],
+                        scenes.material("Floor", "ShaderNodeBsdfDiffuse", Color=(0.8, 0.6, 0.4)))
+    return floor, scenes.sphere(location=(0, 0, 1), material=scenes.material(
+        "Ball", "ShaderNodeBsdfDiffuse", Color=(0.3, 0.5, 0.8)))
+
+
+def _shine(kind):
+    import math
+    import scenes
+    if kind == 'WORLD':
+        import bpy
+        bpy.context.scene.world.color = (0.5, 0.6, 0.8)
+        return
+    settings = {
+        'POINT': {"energy": 500.0, "shadow_soft_size": 0.5},
+        'SPOT': {"energy": 900.0, "shadow_soft_size": 0.2, "spot_size": 1.2, "spot_blend": 0.4},
+        'SUN': {"energy": 3.0, "angle": 0.2},
+        'RECTANGLE': {"energy": 300.0, "shape": 'RECTANGLE', "size": 2.0, "size_y": 0.5},
+        'ELLIPSE': {"energy": 300.0, "shape": 'ELLIPSE', "size": 2.0, "size_y": 0.7, "spread": 1.5},
+    }[kind]
+    blender_kind = kind if kind in {'POINT', 'SPOT', 'SUN'} else 'AREA'
+    made = scenes.light(blender_kind, location=(2.0, -2.0, 4.0), **settings)
+    made.rotation_euler = (math.atan2(math.hypot(2, 2), 3.2), 0.0, math.pi / 4)
+
+
+def inside_lights(kind):
+    import scenes
+    scenes.empty(size=(64, 48))
+    _stage()
+    _shine(kind)
+    return [scenes.channel_means(picture) for picture in _both(LIGHT_SAMPLES)]
+
+
+@pytest.mark.parametrize("kind", ['POINT', 'SPOT', 'SUN', 'RECTANGLE', 'ELLIPSE', 'WORLD'])
+def test_lights(blender, kind):
+    ours, theirs = blender.run(inside_lights, kind)
+    assert ours == pytest.approx(theirs, rel=MEAN_TOLERANCE)
+
+
+def inside_materials(node_type, inputs):
+    import scenes
+    scenes.empty(size=(64, 48))
+    _, ball = _stage()
+    ball.data.materials[0] = scenes.material("Shiny", node_type, **inputs)
+    _shine('RECTANGLE')
+    _shine('WORLD')
+    return [scenes.channel_means(picture) for picture in _both(LIGHT_SAMPLES)]
+
+
+@pytest.mark.parametrize("node_type, inputs", [
+    ("ShaderNodeBsdfGlossy", {"Color": (0.9, 0.7, 0.5), "Roughness": 0.3}),
+    ("ShaderNodeBsdfGlass", {"Color": (0.9, 0.95, 1.0), "Roughness": 0.0, "IOR": 1.45}),
+    ("ShaderNodeBsdfPrincipled", {"Base Color": (0.8, 0.3, 0.2), "Metallic": 0.0, "Roughness": 0.4}),
+    ("ShaderNodeBsdfPrincipled", {"Base Color": (0.8, 0.6, 0.2), "Metallic": 1.0, "Roughness": 0.25}),
+    ("ShaderNodeBsdfTransparent", {"Color": (0.5, 0.7, 0.9)}),
+    ("ShaderNodeBsdfTranslucent", {"Color": (0.5, 0.7, 0.9)}),
+], ids=["glossy", "glass", "principled", "metal", "transparent", "translucent"])
+def test_materials(blender, node_type, inputs):
+    ours, theirs = blender.run(inside_materials, node_type, inputs)
+    assert ours == pytest.approx(theirs, rel=MEAN_TOLERANCE)

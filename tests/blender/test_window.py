@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The rendered viewport, panels and previews in a window on a virtual display."""
+
+import shutil
+
+import numpy as np
+import pytest
+
+DRAW_SECONDS = 0.5
+
+
+@pytest.fixture
+def window(blender):
+    """A Blender that can open a window."""
+    if shutil.which("xvfb-run") is None:
+        pytest.skip("no xvfb-run found")
+    return blender
+
+
+def _view():
+    """The window, its 3D view and that view's space."""
+    import bpy
+    window = bpy.context.window_manager.windows[0]
+    area = next(area for area in window.screen.areas if area.type == 'VIEW_3D')
+    return window, area, area.spaces.active
+
+
+def _shot():
+    """What the 3D view shows, (height, width, 3), display colours."""
+    import bpy
+    import scenes
+    window, area, _ = _view()
+    path = bpy.app.tempdir + "shot.png"
+    with bpy.context.temp_override(window=window):
+        bpy.ops.screen.screenshot(filepath=path)
+    picture = scenes.load(path)
+    region = next(region for region in area.regions if region.type == 'WINDOW')
+    return picture[region.y:region.y + region.height, region.x:region.x + region.width, :3]
+
+
+def _open(scene):
+    """A plain view through the camera: no overlays, no gizmos, colours as they are."""
+    import bpy
+    bpy.context.preferences.view.show_splash = False
+    scene.view_settings.view_transform = 'Standard'
+    scene.volley.preview_samples = 2
+    _, _, space = _view()
+    space.overlay.show_overlays = space.show_gizmo = False
+    space.shading.type = 'RENDERED'
+    return space
+
+
+def inside_edits():
+    import bpy
+    import scenes
+    yield 0.1
+    scene = scenes.empty(samples=2)
+    yield DRAW_SECONDS
+    scenes.camera()
+    material = scenes.emitter((0.0, 1.0, 0.0))
+    wall = scenes.wall(size=30.0, material=material)
+    space = _open(scene)
+    colors = {}
+
+    def center():
+        picture = _shot()
+        height, width = picture.shape[:2]
+        return picture[height // 2 - 8:height // 2 + 8, width // 2 - 8:width // 2 + 8].mean(axis=(0, 1))
+
+    space.region_3d.view_perspective = 'CAMERA'
+    yield DRAW_SECONDS
+    colors["camera"] = center()
+    space.region_3d.view_perspective = 'PERSP'
+    space.region_3d.view_rotation = scene.camera.rotation_euler.to_quaternion()
+    yield DRAW_SECONDS
+    colors["perspective"] = center()
+    space.region_3d.view_perspective = 'ORTHO'
+    yield DRAW_SECONDS
+    colors["orthographic"] = center()
+    space.region_3d.view_perspective = 'CAMERA'
+    material.node_tree.nodes["Emission"].inputs["Color"].default_value = (1.0, 0.0, 0.0, 1.0)
+    yield DRAW_SECONDS
+    colors["recoloured"] = center()
+    near = scenes.wall("Near", 30.0, -1.0, material=scenes.emitter((0.0, 0.0, 1.0), "Blue"))
+    yield DRAW_SECONDS
+    colors["added"] = center()
+    near.location.y = 5.0
+    yield DRAW_SECONDS
+    colors["moved"] = center()
+    near.location.y = 0.0
+    bpy.data.objects.remove(wall)
+    yield DRAW_SECONDS
+    colors["deleted"] = center()
+    space.shading.type = 'SOLID'
+    yield DRAW_SECONDS
+    space.shading.type = 'RENDERED'
+    yield DRAW_SECONDS
+    colors["again"] = center()
+    window, area, _ = _view()
+    with bpy.context.temp_override(window=window, area=area,
+                                   region=next(r for r in area.regions if r.type == 'WINDOW')):
+        bpy.ops.screen.region_quadview()
+    yield DRAW_SECONDS
+    scene.render.engine = 'BLENDER_WORKBENCH'
+    yield DRAW_SECONDS
+    return colors
+
+
+def test_viewport_follows_edits(window):
+    colors = window.run_in_window(inside_edits)
+    expected = {"camera": 'g', "perspective": 'g', "orthographic": 'g', "recoloured": 'r', "added": 'b',
+                "moved": 'r', "deleted": 'b', "again": 'b'}
+    for name, channel in expected.items():
+        wanted = [float(letter == channel) for letter in "rgb"]
+        assert colors[name] == pytest.approx(wanted, abs=0.03), name
+    assert "Traceback" not in window.output and "rror" not in window.output
+
+
+def inside_panels():
+    """Every tab of the Properties editor for a mesh, a light and a camera, all panels open."""
+    import bpy
+    import scenes
+    yield 0.1
+    scene = scenes.empty()
+    yield DRAW_SECONDS
+    scenes.camera()
+    wall = scenes.wall(material=scenes.emitter((1.0, 1.0, 1.0)))
+    lamps = [scenes.light(kind) for kind in ('POINT', 'SPOT', 'SUN', 'AREA')]
+    for panel in bpy.types.Panel.__subclasses__():
+        if panel.__name__.startswith("VOLLEY") and 'DEFAULT_CLOSED' in getattr(panel, "bl_options", ()):
+            bpy.utils.unregister_class(panel)
+            panel.bl_options = set()
+            bpy.utils.register_class(panel)
+    window, area, _ = _view()
+    area.type = 'PROPERTIES'
+    drawn = 0
+    for active in [wall, scene.camera] + lamps:
+        bpy.context.view_layer.objects.active = active
+        yield 0.1
+        for context in ('RENDER', 'VIEW_LAYER', 'WORLD', 'OBJECT', 'DATA', 'MATERIAL'):
+            if context == 'MATERIAL' and active != wall:
+                continue
+            area.spaces.active.context = context
+            area.tag_redraw()
+            yield 0.1
+            drawn += 1
+    material = wall.active_material
+    with bpy.context.temp_override(id=material):
+        bpy.ops.ed.lib_id_generate_preview()
+    yield 3.0
+    preview = np.array(material.preview.image_pixels_float[:]).reshape(-1, 4)
+    return drawn, preview.max(axis=0).tolist()
+
+
+def test_panels_draw_and_previews_render(window):
+    drawn, preview = window.run_in_window(inside_panels)
+    assert drawn == 31
+    assert preview[0] > 0.5 and preview[3] > 0.5
+    assert "Traceback" not in window.output and "rror" not in window.output

@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Runs functions of a test module inside Blender.
+
+``Blender().run(function, *arguments)`` starts ``blender -b`` with the staged add-on, imports the module
+the function stands in, calls it there and returns its result (anything that can be pickled; numpy arrays
+too). An exception inside, a crash or a time-out fails the test with Blender's output.
+
+    VOLLEY_BLENDER        the Blender to run, else ``blender``
+    BLENDER_USER_SCRIPTS  the user-scripts folder of the build, else build/blender
+"""
+
+import os
+import pickle
+import shutil
+import subprocess
+import sys
+import tempfile
+
+SUPPORT = os.path.dirname(os.path.abspath(__file__))
+REPOSITORY = os.path.dirname(os.path.dirname(SUPPORT))
+_ANSWER = "answer.pickle"
+
+
+class BlenderError(AssertionError):
+    """Blender crashed, hung, or the function raised."""
+
+
+def executable():
+    """The Blender to test with, None if there is none."""
+    return shutil.which(os.environ.get("VOLLEY_BLENDER", "blender"))
+
+
+def user_scripts():
+    """The user-scripts folder with the add-on."""
+    return os.environ.get("BLENDER_USER_SCRIPTS") or os.path.join(REPOSITORY, "build", "blender")
+
+
+class Blender:
+    """Starts Blender in a folder of its own; ``output`` is what the last run wrote."""
+
+    def __init__(self, folder=None):
+        self.folder = folder or tempfile.mkdtemp(prefix="volley_")
+        self.output = ""
+
+    def command(self, *arguments):
+        """Run Blender with these arguments; the finished process, whatever its exit code."""
+        line = [executable(), "-b", "--factory-startup", "--addons", "volley"]
+        return self._start(line + list(arguments), timeout=120)
+
+    def run(self, function, *arguments, timeout=120):
+        """Call a module-level function inside Blender and return what it returns."""
+        answer, line = self._request(function, arguments)
+        return self._answer(answer, self._start(line, timeout))
+
+    def _request(self, function, arguments):
+        """Write down what to call; the answer's path and the command line."""
+        answer = os.path.join(self.folder, _ANSWER)
+        if os.path.exists(answer):
+            os.remove(answer)
+        request = os.path.join(self.folder, "request.pickle")
+        module = os.path.abspath(sys.modules[function.__module__].__file__)
+        with open(request, "wb") as file:
+            pickle.dump((module, function.__name__, arguments, answer), file)
+        return answer, [executable(), "-b", "--factory-startup", "--addons", "volley",
+                        "--python-exit-code", "3", "--python", os.path.abspath(__file__), "--", request]
+
+    def _answer(self, path, process):
+        if not os.path.exists(path):
+            raise BlenderError(f"Blender ended with {process.returncode} and no answer:\n{self.output}")
+        with open(path, "rb") as file:
+            result, error = pickle.load(file)
+        if error:
+            raise BlenderError(f"{error}\nBlender's output:\n{self.output}")
+        return result
+
+    def run_in_window(self, function, *arguments, timeout=120):
+        """The same with a window on a virtual display. The function returns a generator: what it
+        yields is the seconds to let Blender draw, what it returns is the result."""
+        answer, line = self._request(function, arguments)
+        display = ["xvfb-run", "-a", "-s", "-screen 0 1280x800x24"]
+        line = display + [argument for argument in line if argument != "-b"]
+        process = self._start(line, timeout, {"LIBGL_ALWAYS_SOFTWARE": "1"})
+        return self._answer(answer, process)
+
+    def _start(self, line, timeout, environment=None):
+        variables = dict(os.environ, BLENDER_USER_SCRIPTS=user_scripts(), **(environment or {}))
+        try:
+            process = subprocess.run(line, cwd=self.folder, env=variables, timeout=timeout, text=True,
+                                     errors="replace", stdin=subprocess.DEVNULL,
+                                     stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+        except subprocess.TimeoutExpired as error:
+            raise BlenderError(f"Blender did not end within {timeout} s:\n{error.output}") from error
+        self.output = process.stdout
+        return process
+
+
+def _answer_request(path):
+    """Inside Blender: import the test's module and call its function."""
+    import importlib.util
+    import traceback
+    with open(path, "rb") as file:
+        module_path, name, arguments, answer = pickle.load(file)
+
+    def finish(result, error=""):
+        with open(answer, "wb") as file:
+            pickle.dump((result, error), file)
+
+    sys.path[:0] = [SUPPORT, os.path.dirname(module_path)]
+    try:
+        spec = importlib.util.spec_from_file_location("volley_inside", module_path)
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        result = getattr(module, name)(*arguments)
+    except BaseException:
+        finish(None, traceback.format_exc())
+        return
+    if hasattr(result, "send"):
+        _follow(result, finish)
+    else:
+        finish(result)
+
+
+def _follow(steps, finish):
+    """Run a generator from one of Blender's timers, so that windows are drawn between its steps."""
+    import traceback
+    import bpy
+
+    def step():
+        try:
+            return next(steps)
+        except StopIteration as end:
+            finish(end.value)
+        except BaseException:
+            finish(None, traceback.format_exc())
+        bpy.ops.wm.quit_blender()
+        return None
+
+    bpy.app.timers.register(step, first_interval=0.5, persistent=True)
+
+
+if __name__ == "__main__":
+    _answer_request(sys.argv[sys.argv.index("--") + 1])

@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Small scenes for tests, built inside Blender, and renders read back as arrays.
+
+Lengths are metres. Pictures are (height, width, 4) float32, scene-linear, bottom row first.
+"""
+
+import math
+import os
+import tempfile
+
+import bpy
+import numpy as np
+
+
+def empty(engine='VOLLEY', size=(64, 48), samples=4):
+    """A scene with nothing in it but a black world, for both engines with the same settings."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    if engine == 'VOLLEY':
+        bpy.ops.preferences.addon_enable(module="volley")
+    scene = bpy.context.scene
+    scene.world = bpy.data.worlds.new("World")
+    scene.world.color = (0.0, 0.0, 0.0)
+    render = scene.render
+    render.resolution_x, render.resolution_y = size
+    render.resolution_percentage = 100
+    render.image_settings.file_format = 'OPEN_EXR'
+    render.image_settings.color_depth = '32'
+    render.image_settings.color_mode = 'RGBA'
+    scene.view_settings.view_transform = 'Raw'
+    set_engine(engine, samples)
+    return scene
+
+
+def set_engine(engine, samples):
+    """Choose the engine; Cycles is held to the same light transport."""
+    scene = bpy.context.scene
+    scene.render.engine = engine
+    if engine == 'VOLLEY':
+        scene.volley.samples = samples
+    elif engine == 'CYCLES':
+        cycles = scene.cycles
+        cycles.samples = samples
+        cycles.use_denoising = cycles.use_adaptive_sampling = False
+        cycles.max_bounces = cycles.glossy_bounces = cycles.transmission_bounces = 50
+        cycles.diffuse_bounces = 0
+        cycles.caustics_reflective = cycles.caustics_refractive = True
+        cycles.device = 'CPU'
+
+
+def link(name, data):
+    """A new object of that data in the scene's collection."""
+    made = bpy.data.objects.new(name, data)
+    bpy.context.scene.collection.objects.link(made)
+    return made
+
+
+def camera(location=(0.0, -6.0, 0.0), rotation=(math.pi / 2, 0.0, 0.0), **settings):
+    """The scene's camera; by default it looks along +Y from 6 m before the origin."""
+    made = link("Camera", bpy.data.cameras.new("Camera"))
+    made.location, made.rotation_euler = location, rotation
+    for name, value in settings.items():
+        setattr(made.data, name, value)
+    bpy.context.scene.camera = made
+    return made
+
+
+def mesh(name, vertices, faces, material=None, smooth=False):
+    """An object of a mesh given by vertices and faces."""
+    data = bpy.data.meshes.new(name)
+    data.from_pydata(vertices, [], faces)
+    for polygon in data.polygons:
+        polygon.use_smooth = smooth
+    data.update()
+    made = link(name, data)
+    if material is not None:
+        data.materials.append(material)
+    return made
+
+
+def wall(name="Wall", size=2.0, y=0.0, center=(0.0, 0.0), material=None):
+    """A square that faces the default camera (-Y), with UVs from 0 to 1."""
+    h, (x, z) = 0.5 * size, center
+    corners = [(x - h, y, z - h), (x + h, y, z - h), (x + h, y, z + h), (x - h, y, z + h)]
+    made = mesh(name, corners, [(0, 1, 2, 3)], material)
+    layer = made.data.uv_layers.new(name="UVMap")
+    for loop, uv in zip(layer.data, ((0, 0), (1, 0), (1, 1), (0, 1))):
+        loop.uv = uv
+    return made
+
+
+def sphere(name="Sphere", radius=1.0, location=(0.0, 0.0, 0.0), material=None, smooth=True):
+    """A UV sphere of 32 by 16 faces."""
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=32, ring_count=16, radius=radius, location=location)
+    made = bpy.context.object
+    made.name = name
+    for polygon in made.data.polygons:
+        polygon.use_smooth = smooth
+    if material is not None:
+        made.data.materials.append(material)
+    return made
+
+
+def light(kind='AREA', location=(0.0, -4.0, 4.0), rotation=(math.pi / 4, 0.0, 0.0), **settings):
+    """A light; settings are those of its data."""
+    made = link("Light", bpy.data.lights.new("Light", kind))
+    made.location, made.rotation_euler = location, rotation
+    for name, value in settings.items():
+        setattr(made.data, name, value)
+    return made
+
+
+def material(name, node_type, **inputs):
+    """A material of one shader node; keywords are its inputs with underscores for spaces."""
+    made = bpy.data.materials.new(name)
+    made.use_nodes = True
+    tree = made.node_tree
+    tree.nodes.clear()
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    node = tree.nodes.new(node_type)
+    for key, value in inputs.items():
+        socket = node.inputs[key.replace("_", " ")]
+        is_color = hasattr(socket.default_value, "__len__") and len(socket.default_value) == 4
+        socket.default_value = (*value, 1.0) if is_color and len(value) == 3 else value
+    tree.links.new(node.outputs[0], output.inputs["Surface"])
+    return made
+
+
+def emitter(color, name="Emitter", strength=1.0):
+    """A material that shines with a colour: its pixels are known without any lighting."""
+    return material(name, "ShaderNodeEmission", Color=color, Strength=strength)
+
+
+def render():
+    """Render the scene as F12 does; its Combined picture."""
+    path = os.path.join(tempfile.mkdtemp(prefix="volley_"), "picture.exr")
+    bpy.context.scene.render.filepath = path
+    bpy.ops.render.render(write_still=True)
+    return load(path)
+
+
+def load(path):
+    """A picture file's pixels."""
+    image = bpy.data.images.load(path, check_existing=False)
+    image.colorspace_settings.name = "Non-Color"
+    width, height = image.size
+    pixels = np.empty(width * height * 4, np.float32)
+    image.pixels.foreach_get(pixels)
+    bpy.data.images.remove(image)
+    return pixels.reshape(height, width, 4)
+
+
+def render_passes(names):
+    """Render once; {pass name: picture} of the active view layer, through the compositor."""
+    scene = bpy.context.scene
+    folder = tempfile.mkdtemp(prefix="volley_")
+    scene.use_nodes = True
+    tree = scene.node_tree
+    tree.nodes.clear()
+    layers = tree.nodes.new("CompositorNodeRLayers")
+    output = tree.nodes.new("CompositorNodeOutputFile")
+    output.base_path = folder
+    output.format.file_format, output.format.color_depth = 'OPEN_EXR', '32'
+    output.format.color_mode = 'RGBA'
+    output.file_slots.clear()
+    for number, name in enumerate(names):
+        output.file_slots.new(f"pass{number}_")
+        tree.links.new(layers.outputs["Image" if name == "Combined" else name], output.inputs[-1])
+    tree.links.new(layers.outputs["Image"], tree.nodes.new("CompositorNodeComposite").inputs[0])
+    bpy.ops.render.render()
+    files = sorted(os.listdir(folder))
+    assert len(files) == len(names), f"{files} for passes {names}"
+    return {name: load(os.path.join(folder, file)) for name, file in zip(names, files)}
+
+
+def channel_means(picture):
+    """Mean of each channel, a list."""
+    return [float(value) for value in picture.reshape(-1, 4).mean(axis=0)]

@@ -1,0 +1,268 @@
+/* Every allocation and thread start of a whole session is made to fail, one after the other, once
+ * or from there on. Each call must then succeed or fail cleanly: an error with a message, outputs
+ * untouched, the object usable (the same call succeeds at once), nothing lost at the end. */
+#include "fixture.h"
+
+#include <stdbool.h>
+#include <stdlib.h>
+
+#include "core/core.h"
+
+#define UNTOUCHED UINT64_C(0x1234567812345678)
+
+/* A failed call is checked and made again without failures. */
+static bool failed_cleanly(trc_status status) {
+    if (status == TRC_OK)
+        return false;
+    trc_memory_fail_at(-1, false);
+    assert_true(status == TRC_ERROR_OUT_OF_MEMORY || status == TRC_ERROR_NO_THREAD);
+    assert_true(trc_last_message()[0] != '\0');
+    return true;
+}
+
+#define STEP(call)                            \
+    do {                                      \
+        (void)trc_fail(TRC_OK, "%s", "");     \
+        if (failed_cleanly(call))             \
+            assert_int_equal((call), TRC_OK); \
+    } while (0)
+
+/* The same for a call that makes something. */
+#define STEP_OUT(out, call)                            \
+    do {                                               \
+        (out) = UNTOUCHED;                             \
+        (void)trc_fail(TRC_OK, "%s", "");              \
+        if (failed_cleanly(call)) {                    \
+            assert_true((out) == UNTOUCHED);           \
+            assert_int_equal((call), TRC_OK);          \
+        }                                              \
+        assert_true((out) != UNTOUCHED && (out) != 0); \
+    } while (0)
+
+struct session {
+    trc_scene scene;
+    trc_id mesh, instance, second, material, glow, image, light;
+};
+
+static trc_mesh_desc rich_mesh(void) {
+    static float uv[72], positions[48];
+    static trc_corner_attribute attribute;
+    memcpy(positions, cube_positions, sizeof cube_positions);
+    memcpy(positions + 24, cube_positions, sizeof cube_positions);
+    positions[47] = 1.5f;
+    attribute = (trc_corner_attribute){.struct_size = sizeof attribute,
+                                       .width = 2,
+                                       .name = "UVMap",
+                                       .values = uv,
+                                       .value_count = 72};
+    trc_mesh_desc desc = fixture_mesh_desc();
+    desc.key_count = 2;
+    desc.positions = positions;
+    desc.position_count = 48;
+    desc.smooth = cube_smooth;
+    desc.material_index = cube_slots;
+    desc.attributes = &attribute;
+    desc.attribute_count = 1;
+    return desc;
+}
+
+/* A diffuse material that reads the image by the mesh's UV map: attribute name, program, texture.
+ */
+static void create_textured(struct session *s) {
+    const trc_node nodes[3] = {
+        {.type = TRC_NODE_UV_MAP, .name = "UVMap"},
+        {.type = TRC_NODE_IMAGE, .first_input = 0, .input_count = 1, .image = s->image},
+        {.type = TRC_NODE_DIFFUSE, .first_input = 1, .input_count = 3}};
+    const trc_node_input inputs[4] = {{.node = 0}, {.node = 1}, {.node = -1}, {.node = -2}};
+    const trc_material_desc desc = {.struct_size = sizeof desc,
+                                    .node_count = 3,
+                                    .nodes = nodes,
+                                    .inputs = inputs,
+                                    .input_count = 4,
+                                    .surface = 2};
+    STEP_OUT(s->material, trc_material_create(s->scene, &desc, &s->material));
+    STEP(trc_material_update(s->scene, s->material, &desc));
+}
+
+static void create_objects(struct session *s) {
+    const trc_mesh_desc mesh = rich_mesh();
+    const trc_image_desc image = fixture_image_desc();
+    const trc_light_desc light = fixture_light_desc();
+    struct fixture_material glow;
+    fixture_material_init(&glow, TRC_NODE_EMISSION);
+    STEP_OUT(s->mesh, trc_mesh_create(s->scene, &mesh, &s->mesh));
+    STEP_OUT(s->image, trc_image_create(s->scene, &image, &s->image));
+    create_textured(s);
+    STEP_OUT(s->glow, trc_material_create(s->scene, &glow.desc, &s->glow));
+    const trc_id materials[2] = {s->material, s->glow};
+    trc_instance_desc instance = fixture_instance_desc(s->mesh);
+    instance.materials = materials;
+    instance.material_count = 2;
+    STEP_OUT(s->instance, trc_instance_create(s->scene, &instance, &s->instance));
+    float aside[12];
+    memcpy(aside, identity_transform, sizeof aside);
+    aside[3] = 3.0f;
+    instance.transforms = aside;
+    STEP_OUT(s->second, trc_instance_create(s->scene, &instance, &s->second));
+    STEP(trc_instance_update(s->scene, s->second, &instance));
+    STEP_OUT(s->light, trc_light_create(s->scene, &light, &s->light));
+}
+
+static void set_view(struct session *s) {
+    static const float curve[3] = {0, 1, 0};
+    struct fixture_material background;
+    fixture_material_init(&background, TRC_NODE_BACKGROUND);
+    trc_id material = 0;
+    STEP_OUT(material, trc_material_create(s->scene, &background.desc, &material));
+    trc_world_desc world = fixture_world_desc(material);
+    world.use_sampling = 1;
+    STEP(trc_scene_set_world(s->scene, &world));
+    trc_camera_desc camera = fixture_camera_desc();
+    camera.shutter_time = 0.5f;
+    camera.shutter_curve = curve;
+    camera.shutter_curve_count = 3;
+    STEP(trc_scene_set_camera(s->scene, &camera));
+}
+
+static void check_render(struct session *s, uint32_t progressive) {
+    enum { WIDTH = 40, HEIGHT = 36 };
+    trc_render_desc desc = fixture_render_desc(WIDTH, HEIGHT, 2);
+    desc.progressive = progressive;
+    desc.passes = (1u << TRC_PASS_COUNT) - 1;
+    trc_render render;
+    STEP_OUT(render, trc_render_start(s->scene, &desc, &render));
+    STEP(trc_render_wait(render, -1.0));
+    trc_render_progress progress = {.struct_size = sizeof progress};
+    STEP(trc_render_poll(render, &progress));
+    assert_int_equal(progress.state, 1);
+    static float pixels[WIDTH * HEIGHT * 4];
+    STEP(trc_render_read(render, TRC_PASS_COMBINED, pixels, WIDTH * HEIGHT * 4));
+    for (int i = 0; i < WIDTH * HEIGHT * 4; i++)
+        assert_true(isfinite(pixels[i]));
+    STEP(trc_render_destroy(render));
+}
+
+static void check_queries(struct session *s) {
+    static const float zero[5], up[5] = {5, 5, 5, 5, 5}, down[5] = {-1, -1, -1, -1, -1};
+    uint32_t instance[5];
+    uint8_t occluded[5];
+    const trc_rays rays = {.struct_size = sizeof rays,
+                           .visibility = TRC_VISIBLE_ALL,
+                           .count = 5,
+                           .origin_x = zero,
+                           .origin_y = zero,
+                           .origin_z = up,
+                           .direction_x = zero,
+                           .direction_y = zero,
+                           .direction_z = down};
+    const trc_hits hits = {.struct_size = sizeof hits, .instance = instance};
+    STEP(trc_query_closest(s->scene, &rays, 0, &hits));
+    STEP(trc_query_occluded(s->scene, &rays, 0, occluded, 5));
+}
+
+/* Everything a host does between opening and closing a file. */
+static void run_session(uint32_t is_final) {
+    struct session s = {0};
+    trc_scene_desc desc = fixture_scene_desc();
+    desc.is_final = is_final;
+    STEP_OUT(s.scene, trc_scene_create(&desc, &s.scene));
+    create_objects(&s);
+    set_view(&s);
+    STEP(trc_scene_commit(s.scene));
+    check_queries(&s);
+    check_render(&s, 0);
+    /* A pose, an edit of everything, a second commit beside the first. */
+    const trc_light_desc light = fixture_light_desc();
+    STEP(trc_mesh_update(s.scene, s.mesh, 1, cube_positions, 24, NULL, 0));
+    STEP(trc_light_update(s.scene, s.light, &light));
+    STEP(trc_scene_commit(s.scene));
+    check_render(&s, 1);
+    STEP(trc_instance_destroy(s.scene, s.second));
+    STEP(trc_material_destroy(s.scene, s.glow));
+    STEP(trc_image_destroy(s.scene, s.image));
+    STEP(trc_scene_commit(s.scene));
+    char text[64];
+    STEP(trc_scene_get_warnings(s.scene, text, sizeof text, NULL));
+    STEP(trc_scene_destroy(s.scene));
+}
+
+/* Whether the failure is still to come: the session was shorter than that. */
+static bool is_pending(int64_t n) {
+    bool pending = false;
+    for (int64_t i = 0; i <= n && !pending; i++)
+        pending = trc_memory_should_fail();
+    trc_memory_fail_at(-1, false);
+    return pending;
+}
+
+static void fail_everywhere(uint32_t is_final, bool all) {
+    run_session(is_final); /* what stays for the life of the process is taken here */
+    const uint64_t before = trc_memory_bytes();
+    int64_t n = 0;
+    for (bool pending = false; !pending; n++) {
+        trc_memory_fail_at(n, all);
+        run_session(is_final);
+        pending = is_pending(n);
+        assert_int_equal(trc_memory_bytes(), before);
+        assert_true(n < 1000000);
+    }
+    assert_true(n > 100); /* the hook reaches the library */
+}
+
+static void each_operation_fails_once(void **state) {
+    (void)state;
+    fail_everywhere(0, false);
+}
+
+static void all_operations_fail_from_one_on(void **state) {
+    (void)state;
+    fail_everywhere(0, true);
+}
+
+static void each_operation_of_a_final_frame_fails_once(void **state) {
+    (void)state;
+    fail_everywhere(1, false);
+}
+
+/* A render needs one thread, not all it asked for. */
+static void renders_go_on_with_fewer_threads(void **state) {
+    (void)state;
+    const trc_scene scene = fixture_scene();
+    trc_render_desc desc = fixture_render_desc(200, 200, 1);
+    desc.thread_count = 4;
+    int whole = 0, reduced = 0, refused = 0;
+    for (int64_t n = 0; whole == 0; n++) {
+        trc_render render = UNTOUCHED;
+        trc_memory_fail_at(n, false);
+        const trc_status status = trc_render_start(scene, &desc, &render);
+        const bool consumed = !is_pending(n);
+        if (status != TRC_OK) {
+            assert_true(status == TRC_ERROR_OUT_OF_MEMORY || status == TRC_ERROR_NO_THREAD);
+            assert_true(render == UNTOUCHED);
+            refused++;
+            continue;
+        }
+        if (consumed)
+            reduced++;
+        else
+            whole++;
+        trc_render_progress progress = {.struct_size = sizeof progress};
+        assert_int_equal(trc_render_wait(render, -1.0), TRC_OK);
+        assert_int_equal(trc_render_poll(render, &progress), TRC_OK);
+        assert_int_equal(progress.state, 1);
+        assert_int_equal(progress.samples_done, 1);
+        assert_int_equal(trc_render_destroy(render), TRC_OK);
+    }
+    assert_true(refused > 0 && reduced > 0);
+    assert_int_equal(trc_scene_destroy(scene), TRC_OK);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(each_operation_fails_once),
+        cmocka_unit_test(all_operations_fail_from_one_on),
+        cmocka_unit_test(each_operation_of_a_final_frame_fails_once),
+        cmocka_unit_test(renders_go_on_with_fewer_threads),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

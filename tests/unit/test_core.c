@@ -1,0 +1,733 @@
+/* The parts everything else stands on: status, memory, handles, ids, names, pool, dispatch, film,
+ * schedule, and how a scene becomes a snapshot. */
+#define _GNU_SOURCE
+#include "fixture.h"
+
+#include <float.h>
+#include <pthread.h>
+#include <signal.h>
+#include <stdatomic.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "core/checks.h"
+#include "core/core.h"
+#include "core/fpstate.h"
+#include "core/handle.h"
+#include "film/film.h"
+#include "kernels/kernels.h"
+#include "render/schedule.h"
+#include "scene/affine.h"
+#include "scene/mesh.h"
+#include "scene/names.h"
+#include "scene/scene.h"
+#include "scene/store.h"
+#include "threads/pool.h"
+#include "threads/thread.h"
+
+/* ---- status ---- */
+
+static void message_is_formatted_and_cut(void **state) {
+    (void)state;
+    assert_int_equal(trc_fail(TRC_ERROR_TOO_LARGE, "%d of %s", 3, "four"), TRC_ERROR_TOO_LARGE);
+    assert_string_equal(trc_last_message(), "3 of four");
+    /* 300 characters of 2 bytes: 511 is odd, so the cut falls within one. */
+    char text[601] = {0};
+    for (int i = 0; i < 300; i++)
+        memcpy(text + 2 * i, "\xc3\xa4", 2);
+    (void)trc_fail(TRC_ERROR_IMAGE, "%s", text);
+    assert_int_equal(strlen(trc_last_message()), 510);
+    (void)trc_fail(TRC_ERROR_IMAGE, "x%s", text);
+    assert_int_equal(strlen(trc_last_message()), 511);
+}
+
+static void *other_thread_message(void *context) {
+    (void)context;
+    return (void *)(uintptr_t)(trc_last_message()[0] == '\0');
+}
+
+static void message_is_per_thread(void **state) {
+    (void)state;
+    pthread_t thread;
+    void *empty = NULL;
+    (void)trc_fail(TRC_ERROR_IMAGE, "mine");
+    assert_int_equal(pthread_create(&thread, NULL, other_thread_message, NULL), 0);
+    pthread_join(thread, &empty);
+    assert_non_null(empty);
+    assert_string_equal(trc_last_message(), "mine");
+}
+
+static void sizes_and_versions(void **state) {
+    (void)state;
+    assert_int_equal(trc_abi_version(), TRC_ABI_VERSION);
+    assert_string_equal(trc_version_string(), "0.1.0");
+    assert_int_equal(trc_struct_size("trc_mesh_desc"), sizeof(trc_mesh_desc));
+    assert_int_equal(trc_struct_size("trc_corner_attribute"), sizeof(trc_corner_attribute));
+    assert_int_equal(trc_struct_size("trc_instance_desc"), sizeof(trc_instance_desc));
+    assert_int_equal(trc_struct_size("trc_camera_desc"), sizeof(trc_camera_desc));
+    assert_int_equal(trc_struct_size("trc_light_desc"), sizeof(trc_light_desc));
+    assert_int_equal(trc_struct_size("trc_world_desc"), sizeof(trc_world_desc));
+    assert_int_equal(trc_struct_size("trc_node"), sizeof(trc_node));
+    assert_int_equal(trc_struct_size("trc_node_input"), sizeof(trc_node_input));
+    assert_int_equal(trc_struct_size("trc_material_desc"), sizeof(trc_material_desc));
+    assert_int_equal(trc_struct_size("trc_image_desc"), sizeof(trc_image_desc));
+    assert_int_equal(trc_struct_size("trc_rays"), sizeof(trc_rays));
+    assert_int_equal(trc_struct_size("trc_hits"), sizeof(trc_hits));
+    assert_int_equal(trc_struct_size("trc_render_desc"), sizeof(trc_render_desc));
+    assert_int_equal(trc_struct_size("trc_render_progress"), sizeof(trc_render_progress));
+    assert_int_equal(trc_struct_size("trc_scene_desc"), sizeof(trc_scene_desc));
+    assert_int_equal(trc_struct_size("trc_scene_stats"), sizeof(trc_scene_stats));
+    assert_int_equal(trc_struct_size("trc_nothing"), 0);
+    assert_int_equal(trc_struct_size(NULL), 0);
+}
+
+/* ---- memory ---- */
+
+static void memory_is_aligned_and_counted(void **state) {
+    (void)state;
+    const uint64_t before = trc_memory_bytes();
+    char *blocks[64];
+    for (size_t i = 0; i < 64; i++) {
+        blocks[i] = i % 2 ? trc_alloc(i, 3) : trc_alloc_zeroed(i, 3);
+        assert_non_null(blocks[i]);
+        assert_int_equal((uintptr_t)blocks[i] % 64, 0);
+        for (size_t b = 0; i % 2 == 0 && b < 3 * i; b++)
+            assert_int_equal(blocks[i][b], 0);
+        memset(blocks[i], 0x5a, 3 * i);
+    }
+    assert_int_equal(trc_memory_bytes() - before, 3 * 63 * 64 / 2);
+    assert_true(trc_memory_peak_bytes() >= trc_memory_bytes());
+    for (size_t i = 0; i < 64; i++)
+        trc_free(blocks[i]);
+    assert_int_equal(trc_memory_bytes(), before);
+    trc_free(NULL);
+}
+
+static void memory_sizes_do_not_wrap(void **state) {
+    (void)state;
+    assert_null(trc_alloc(SIZE_MAX, 2));
+    assert_null(trc_alloc(SIZE_MAX / 2 + 1, 2));
+    assert_null(trc_alloc(SIZE_MAX, 1));
+    assert_null(trc_alloc_zeroed((size_t)1 << 33, (size_t)1 << 33));
+    assert_null(trc_alloc(PTRDIFF_MAX, 1));
+}
+
+static void memory_fails_when_told(void **state) {
+    (void)state;
+    trc_memory_fail_at(2, false);
+    void *a = trc_alloc(1, 1), *b = trc_alloc(1, 1), *c = trc_alloc(1, 1), *d = trc_alloc(1, 1);
+    assert_non_null(a);
+    assert_non_null(b);
+    assert_null(c);
+    assert_non_null(d);
+    trc_memory_fail_at(1, true);
+    assert_false(trc_memory_should_fail());
+    assert_true(trc_memory_should_fail());
+    assert_null(trc_alloc_zeroed(1, 1));
+    trc_memory_fail_at(-1, false);
+    assert_false(trc_memory_should_fail());
+    trc_free(a);
+    trc_free(b);
+    trc_free(d);
+}
+
+static void products_are_checked(void **state) {
+    (void)state;
+    uint64_t product = 7;
+    assert_true(trc_multiply_u64(UINT64_MAX, 1, &product));
+    assert_true(product == UINT64_MAX);
+    assert_true(trc_multiply_u64(0, UINT64_MAX, &product));
+    assert_int_equal(product, 0);
+    assert_false(trc_multiply_u64(UINT64_C(1) << 32, UINT64_C(1) << 32, &product));
+    assert_int_equal(product, 0);
+}
+
+/* ---- handles, ids, names ---- */
+
+static void handles_know_their_generation(void **state) {
+    (void)state;
+    int object = 0, other = 0;
+    void *found = NULL;
+    uint64_t first = 0, second = 0;
+    assert_int_equal(trc_handle_create(TRC_HANDLE_SCENE, &object, &first), TRC_OK);
+    assert_int_equal(trc_handle_acquire(first, TRC_HANDLE_RENDER, &found),
+                     TRC_ERROR_INVALID_HANDLE);
+    assert_int_equal(trc_handle_acquire(0, TRC_HANDLE_SCENE, &found), TRC_ERROR_INVALID_HANDLE);
+    assert_int_equal(trc_handle_acquire(first + 1000, TRC_HANDLE_SCENE, &found),
+                     TRC_ERROR_INVALID_HANDLE);
+    assert_null(found);
+    assert_int_equal(trc_handle_acquire(first, TRC_HANDLE_SCENE, &found), TRC_OK);
+    assert_ptr_equal(found, &object);
+    assert_int_equal(trc_handle_remove(first), TRC_OK);
+    assert_int_equal(trc_handle_acquire(first, TRC_HANDLE_SCENE, &found), TRC_ERROR_INVALID_HANDLE);
+    assert_int_equal(trc_handle_create(TRC_HANDLE_SCENE, &other, &second), TRC_OK);
+    assert_true(first != second);
+    assert_int_equal(trc_handle_acquire(first, TRC_HANDLE_SCENE, &found), TRC_ERROR_INVALID_HANDLE);
+    assert_int_equal(trc_handle_acquire(second, TRC_HANDLE_SCENE, &found), TRC_OK);
+    assert_int_equal(trc_handle_remove(second), TRC_OK);
+}
+
+struct pin_job {
+    uint64_t handle;
+    atomic_int pinned, released;
+};
+
+static void *hold_pin(void *context) {
+    struct pin_job *job = context;
+    void *object;
+    if (trc_handle_acquire(job->handle, TRC_HANDLE_SCENE, &object) != TRC_OK)
+        return NULL;
+    atomic_store(&job->pinned, 1);
+    const double until = trc_seconds() + 0.05;
+    while (trc_seconds() < until) {
+    }
+    atomic_store(&job->released, 1);
+    trc_handle_release(job->handle);
+    return context;
+}
+
+static void removing_a_handle_waits_for_pins(void **state) {
+    (void)state;
+    int object = 0;
+    void *found, *ok = NULL;
+    struct pin_job job = {0};
+    pthread_t thread;
+    assert_int_equal(trc_handle_create(TRC_HANDLE_SCENE, &object, &job.handle), TRC_OK);
+    assert_int_equal(trc_handle_acquire(job.handle, TRC_HANDLE_SCENE, &found), TRC_OK);
+    assert_int_equal(pthread_create(&thread, NULL, hold_pin, &job), 0);
+    while (!atomic_load(&job.pinned)) {
+    }
+    assert_int_equal(trc_handle_remove(job.handle), TRC_OK);
+    assert_int_equal(atomic_load(&job.released), 1);
+    pthread_join(thread, &ok);
+    assert_non_null(ok);
+}
+
+static void ids_keep_creation_order(void **state) {
+    (void)state;
+    int objects[6];
+    trc_id ids[6];
+    struct trc_store store;
+    trc_store_init(&store, TRC_STORE_INSTANCE, false, 5);
+    for (int i = 0; i < 4; i++) {
+        assert_int_equal(trc_store_add(&store, &objects[i], &ids[i]), TRC_OK);
+    }
+    trc_store_remove(&store, ids[1]);
+    trc_store_remove(&store, ids[0]);
+    assert_null(trc_store_get(&store, ids[1]));
+    for (int i = 4; i < 6; i++) {
+        assert_int_equal(trc_store_add(&store, &objects[i], &ids[i]), TRC_OK);
+    }
+    assert_true(trc_store_slot_of(ids[4]) < 2); /* slots are used again, ids are not */
+    assert_null(trc_store_get(&store, ids[0]));
+    const int expected[] = {2, 3, 4, 5};
+    int n = 0;
+    for (uint32_t i = trc_store_first(&store); i != TRC_STORE_END; i = trc_store_next(&store, i)) {
+        assert_ptr_equal(store.slots[i].object, &objects[expected[n++]]);
+    }
+    assert_int_equal(n, 4);
+    assert_int_equal(store.living_count, 4);
+    void *found = NULL;
+    assert_int_equal(trc_store_find(&store, ids[3] ^ (UINT64_C(1) << 60), &found),
+                     TRC_ERROR_INVALID_HANDLE);
+    assert_int_equal(trc_store_find(&store, 0, &found), TRC_ERROR_INVALID_HANDLE);
+    assert_int_equal(trc_store_find(&store, ids[3], &found), TRC_OK);
+    assert_ptr_equal(found, &objects[3]);
+    trc_store_free(&store);
+}
+
+static void image_slots_are_used_once(void **state) {
+    (void)state;
+    int object;
+    trc_id first, second;
+    struct trc_store store;
+    trc_store_init(&store, TRC_STORE_IMAGE, true, 1);
+    assert_int_equal(trc_store_add(&store, &object, &first), TRC_OK);
+    trc_store_remove(&store, first);
+    assert_int_equal(trc_store_add(&store, &object, &second), TRC_OK);
+    assert_int_equal(trc_store_slot_of(first), 0);
+    assert_int_equal(trc_store_slot_of(second), 1);
+    trc_store_free(&store);
+}
+
+static void names_are_interned(void **state) {
+    (void)state;
+    struct trc_names *names = trc_names_create();
+    bool ok = false;
+    char name[80];
+    for (int round = 0; round < 2; round++) {
+        for (int i = 0; i < 100; i++) {
+            snprintf(name, sizeof name, "map %d", i);
+            assert_int_equal(trc_name_intern(names, name, &ok), i);
+            assert_true(ok);
+        }
+    }
+    memset(name, 'x', sizeof name);
+    name[63] = '\0';
+    assert_int_equal(trc_name_intern(names, name, &ok), 100);
+    assert_true(ok);
+    name[63] = 'x';
+    name[64] = '\0';
+    uint32_t number = 77;
+    assert_int_equal(trc_names_add(names, name, &number), TRC_ERROR_TOO_LARGE);
+    assert_int_equal(trc_names_add(names, NULL, &number), TRC_ERROR_INVALID_ARGUMENT);
+    assert_int_equal(number, 77);
+    (void)trc_name_intern(names, NULL, &ok);
+    assert_false(ok);
+    trc_names_destroy(names);
+}
+
+/* ---- threads ---- */
+
+#define TASKS 10000
+
+struct pool_job {
+    atomic_uchar done[TASKS];
+    atomic_uint active[8]; /* per worker: tasks running at once, at most 1 */
+    atomic_uint bad;
+};
+
+static void pool_task(void *context, uint32_t index, uint32_t worker) {
+    struct pool_job *job = context;
+    if (worker >= 4 || atomic_fetch_add(&job->active[worker], 1) != 0)
+        atomic_fetch_add(&job->bad, 1);
+    atomic_fetch_add(&job->done[index], 1);
+    if (worker < 8)
+        atomic_fetch_sub(&job->active[worker], 1);
+}
+
+static void pool_runs_every_task_once(void **state) {
+    (void)state;
+    static struct pool_job job;
+    struct trc_pool *pool = NULL;
+    assert_int_equal(trc_pool_create(4, &pool), TRC_OK);
+    assert_int_equal(trc_pool_thread_count(pool), 4);
+    for (int round = 0; round < 50; round++) {
+        memset(&job, 0, sizeof job);
+        const uint32_t count = round % 5 == 0 ? (uint32_t)round / 5 : TASKS;
+        trc_pool_run(pool, count, pool_task, &job);
+        assert_int_equal(job.bad, 0);
+        for (uint32_t i = 0; i < TASKS; i++)
+            assert_int_equal(job.done[i], i < count);
+    }
+    trc_pool_destroy(pool);
+}
+
+/* Waits for the other side, so that the pool's own threads are sure to take part. */
+struct state_job {
+    atomic_uint arrived, bad_state, unblocked;
+};
+
+static void state_task(void *context, uint32_t index, uint32_t worker) {
+    (void)index;
+    struct state_job *job = context;
+    atomic_fetch_add(&job->arrived, 1);
+    while (atomic_load(&job->arrived) < 2) {
+    }
+#if defined(__SSE__)
+    if ((_mm_getcsr() & ~0x3fu) != TRC_FP_DEFAULT_MXCSR)
+        atomic_fetch_add(&job->bad_state, 1);
+#endif
+    sigset_t mask;
+    pthread_sigmask(SIG_SETMASK, NULL, &mask);
+    if (worker > 0 && (!sigismember(&mask, SIGINT) || !sigismember(&mask, SIGUSR1))) {
+        atomic_fetch_add(&job->unblocked, 1);
+    }
+}
+
+static void pool_sets_and_restores_float_state(void **state) {
+    (void)state;
+    struct state_job job = {0};
+    struct trc_pool *pool = NULL;
+    sigset_t before, after;
+    pthread_sigmask(SIG_SETMASK, NULL, &before);
+#if defined(__SSE__)
+    const uint32_t odd =
+        TRC_FP_DEFAULT_MXCSR | 0x8040u | 0x4000u | 0x01u; /* FTZ, DAZ, up, a flag */
+    const uint32_t former = _mm_getcsr();
+    _mm_setcsr(odd);
+#endif
+    assert_int_equal(trc_pool_create(2, &pool), TRC_OK);
+    trc_pool_run(pool, 2, state_task, &job);
+    trc_pool_destroy(pool);
+#if defined(__SSE__)
+    const uint32_t now = _mm_getcsr();
+    _mm_setcsr(former);
+    assert_int_equal(now, odd);
+#endif
+    assert_int_equal(job.bad_state, 0);
+    assert_int_equal(job.unblocked, 0);
+    pthread_sigmask(SIG_SETMASK, NULL, &after);
+    assert_int_equal(sigismember(&before, SIGINT), sigismember(&after, SIGINT));
+}
+
+static void pool_creation_can_fail(void **state) {
+    (void)state;
+    const uint64_t before = trc_memory_bytes();
+    int failures = 0;
+    for (int64_t n = 0;; n++) {
+        struct trc_pool *pool = NULL;
+        trc_memory_fail_at(n, false);
+        const trc_status status = trc_pool_create(4, &pool);
+        trc_memory_fail_at(-1, false);
+        if (status == TRC_OK) {
+            trc_pool_destroy(pool);
+            break;
+        }
+        assert_null(pool);
+        assert_true(status == TRC_ERROR_OUT_OF_MEMORY || status == TRC_ERROR_NO_THREAD);
+        assert_int_equal(trc_memory_bytes(), before);
+        failures++;
+    }
+    assert_int_equal(failures, 2 + 3 * 2); /* pool, workers; a block and a thread for each of 3 */
+    assert_int_equal(trc_pool_create(TRC_MAX_THREADS + 1, &(struct trc_pool *){NULL}),
+                     TRC_ERROR_TOO_LARGE);
+}
+
+static void dispatch_chooses_and_lowers(void **state) {
+    (void)state;
+    const uint32_t best = trc_isa();
+    assert_true(best >= TRC_ISA_SCALAR);
+    assert_non_null(trc_kernels_get(TRC_ISA_SCALAR));
+    assert_null(trc_kernels_get(TRC_ISA_AUTO));
+    assert_null(trc_kernels_get(99));
+    for (uint32_t isa = TRC_ISA_SCALAR; isa <= TRC_ISA_NEON; isa++) {
+        const struct trc_kernels *kernels = trc_kernels_get(isa);
+        assert_int_equal(trc_set_isa(isa), kernels ? TRC_OK : TRC_ERROR_UNSUPPORTED);
+        if (!kernels)
+            continue;
+        assert_int_equal(kernels->isa, isa);
+        assert_int_equal(trc_isa(), isa);
+        assert_ptr_equal(trc_kernels_current(), kernels);
+    }
+    assert_int_equal(trc_set_isa(6), TRC_ERROR_INVALID_ARGUMENT);
+    assert_int_equal(trc_set_isa(TRC_ISA_AUTO), TRC_OK);
+    assert_int_equal(trc_isa(), best);
+    assert_string_equal(trc_isa_name(TRC_ISA_AVX512), "avx512");
+    assert_string_equal(trc_isa_name(6), "unknown");
+}
+
+/* ---- schedule and film ---- */
+
+static void schedule_covers_every_pixel_once(void **state) {
+    (void)state;
+    static const uint32_t sizes[][2] = {{1, 1},     {32, 32},   {33, 31},
+                                        {640, 360}, {65536, 1}, {1, 5000}};
+    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
+        trc_render_desc desc = fixture_render_desc(sizes[i][0], sizes[i][1], 1);
+        desc.crop_width = desc.width;
+        desc.crop_height = desc.height;
+        struct trc_schedule schedule;
+        assert_int_equal(trc_schedule_create(&desc, &schedule), TRC_OK);
+        uint8_t *seen = calloc((size_t)desc.width * desc.height, 1);
+        for (uint32_t k = 0; k < schedule.tile_count; k++) {
+            const struct trc_tile_area t = trc_schedule_tile(&schedule, schedule.order[k]);
+            for (uint32_t y = t.y; y < t.y + t.height; y++) {
+                for (uint32_t x = t.x; x < t.x + t.width; x++)
+                    seen[(size_t)y * desc.width + x]++;
+            }
+        }
+        for (size_t p = 0; p < (size_t)desc.width * desc.height; p++)
+            assert_int_equal(seen[p], 1);
+        free(seen);
+        trc_schedule_destroy(&schedule);
+    }
+}
+
+static void schedule_batches_rise(void **state) {
+    (void)state;
+    static const struct {
+        uint32_t samples, batches;
+    } cases[] = {{1, 1},  {2, 2},  {3, 3},   {4, 3},   {5, 4},
+                 {64, 7}, {65, 8}, {128, 8}, {129, 9}, {1000, 22}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        trc_render_desc desc = fixture_render_desc(8, 8, cases[i].samples);
+        desc.crop_width = desc.crop_height = 8;
+        desc.progressive = 1;
+        struct trc_schedule s;
+        assert_int_equal(trc_schedule_create(&desc, &s), TRC_OK);
+        assert_int_equal(s.batch_count, cases[i].batches);
+        assert_int_equal(trc_schedule_batch_begin(&s, 0), 0);
+        for (uint32_t b = 0; b < s.batch_count; b++) {
+            const uint32_t begin = trc_schedule_batch_begin(&s, b);
+            const uint32_t end = trc_schedule_batch_begin(&s, b + 1);
+            assert_true(end > begin && end <= cases[i].samples);
+            if (b == 0)
+                assert_int_equal(end, 1);
+        }
+        assert_int_equal(trc_schedule_batch_begin(&s, s.batch_count), cases[i].samples);
+        trc_schedule_destroy(&s);
+    }
+}
+
+static void film_divides_and_exposes(void **state) {
+    (void)state;
+    struct trc_film film;
+    const uint64_t passes =
+        1u << TRC_PASS_DEPTH | 1u << TRC_PASS_SAMPLE_COUNT | 1u << TRC_PASS_DIFFUSE_COLOR;
+    assert_int_equal(trc_film_create(&film, 2, 1, passes), TRC_OK);
+    const double combined[4] = {4.0, 8.0, INFINITY, 2.0};
+    memcpy(film.sums[TRC_PASS_COMBINED], combined, sizeof combined);
+    film.sums[TRC_PASS_COMBINED][4] = 5.0; /* a pixel whose sample is not counted yet */
+    film.sums[TRC_PASS_DEPTH][0] = 7.0;
+    film.sums[TRC_PASS_DIFFUSE_COLOR][0] = 3.0;
+    film.sample_counts[0] = 4;
+    float out[8];
+    assert_int_equal(trc_film_read(&film, TRC_PASS_COMBINED, 2.0f, out, 8), TRC_OK);
+    const float expected[8] = {2.0f, 4.0f, FLT_MAX, 0.5f, 0, 0, 0, 0};
+    assert_memory_equal(out, expected, sizeof out);
+    assert_int_equal(trc_film_read(&film, TRC_PASS_DEPTH, 2.0f, out, 2), TRC_OK);
+    assert_true(out[0] == 7.0f && out[1] == 0.0f);
+    assert_int_equal(trc_film_read(&film, TRC_PASS_DIFFUSE_COLOR, 2.0f, out, 6), TRC_OK);
+    assert_true(out[0] == 0.75f);
+    assert_int_equal(trc_film_read(&film, TRC_PASS_SAMPLE_COUNT, 2.0f, out, 2), TRC_OK);
+    assert_true(out[0] == 4.0f && out[1] == 0.0f);
+    out[0] = -1.0f;
+    assert_int_equal(trc_film_read(&film, TRC_PASS_COMBINED, 1.0f, out, 7),
+                     TRC_ERROR_INVALID_ARGUMENT);
+    assert_int_equal(trc_film_read(&film, TRC_PASS_NORMAL, 1.0f, out, 6),
+                     TRC_ERROR_INVALID_ARGUMENT);
+    assert_int_equal(trc_film_read(&film, TRC_PASS_COUNT, 1.0f, out, 6),
+                     TRC_ERROR_INVALID_ARGUMENT);
+    assert_true(out[0] == -1.0f);
+    trc_film_destroy(&film);
+}
+
+static void film_refuses_what_the_machine_has_not(void **state) {
+    (void)state;
+    struct trc_film film;
+    const uint64_t before = trc_memory_bytes(), all = (1u << TRC_PASS_COUNT) - 1;
+    assert_int_equal(trc_film_create(&film, 65536, 65536, all), TRC_ERROR_TOO_LARGE);
+    assert_int_equal(trc_film_create(&film, UINT32_MAX, UINT32_MAX, all), TRC_ERROR_TOO_LARGE);
+    assert_int_equal(trc_memory_bytes(), before);
+}
+
+static void pass_channels(void **state) {
+    (void)state;
+    uint32_t total = 0;
+    for (uint32_t pass = 0; pass < TRC_PASS_COUNT; pass++) {
+        assert_in_range(trc_pass_channels(pass), 1, 4);
+        total += trc_pass_channels(pass);
+    }
+    assert_int_equal(total, 50);
+    assert_int_equal(trc_pass_channels(TRC_PASS_COMBINED), 4);
+    assert_int_equal(trc_pass_channels(TRC_PASS_DEPTH), 1);
+    assert_int_equal(trc_pass_channels(TRC_PASS_COUNT), 0);
+    assert_int_equal(trc_pass_channels(UINT32_MAX), 0);
+}
+
+/* ---- transforms ---- */
+
+static void affine_inverts_what_it_can(void **state) {
+    (void)state;
+    const struct trc_affine a = {{2, 1, 0, 5, 0, -3, 0.5f, 6, 0.25f, 0, 4, -7}};
+    struct trc_affine inverse, rigid;
+    assert_true(trc_affine_invert(&a, &inverse));
+    assert_true(trc_affine_flips(&a));
+    for (int row = 0; row < 3; row++) {
+        for (int column = 0; column < 4; column++) {
+            double sum = column == 3 ? a.m[4 * row + 3] : 0.0;
+            for (int k = 0; k < 3; k++)
+                sum += (double)a.m[4 * row + k] * inverse.m[4 * k + column];
+            assert_true(fabs(sum - (row == column)) < 1e-5);
+        }
+    }
+    const struct trc_affine tiny = {{1e-12f, 0, 0, 0, 0, 1e-12f, 0, 0, 0, 0, 1e-12f, 0}};
+    assert_true(trc_affine_invert(&tiny, &inverse));
+    const struct trc_affine flat = {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0}};
+    const struct trc_affine sheet = {{1, 2, 3, 0, 2, 4, 6, 0, 1, 1, 1, 0}};
+    const struct trc_affine thin = {{1, 1, 0, 0, 0, 1e-14f, 0, 0, 0, 0, 1, 0}};
+    const struct trc_affine nan = {{1, 0, 0, NAN, 0, 1, 0, 0, 0, 0, 1, 0}};
+    const struct trc_affine inf = {{INFINITY, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
+    assert_false(trc_affine_invert(&flat, &inverse));
+    assert_false(trc_affine_invert(&sheet, &inverse));
+    assert_false(trc_affine_invert(&thin, &inverse));
+    assert_false(trc_affine_invert(&nan, &inverse));
+    assert_false(trc_affine_invert(&inf, &inverse));
+    assert_false(trc_affine_make_rigid(&flat, &rigid));
+    assert_true(trc_affine_make_rigid(&a, &rigid));
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++) {
+            float dot = 0;
+            for (int row = 0; row < 3; row++)
+                dot += rigid.m[4 * row + i] * rigid.m[4 * row + j];
+            assert_true(fabsf(dot - (i == j)) < 1e-6f);
+        }
+    }
+    assert_true(trc_affine_flips(&rigid)); /* a mirrored camera stays mirrored */
+    assert_true(rigid.m[3] == 5.0f && rigid.m[7] == 6.0f && rigid.m[11] == -7.0f);
+}
+
+/* ---- meshes ---- */
+
+static void normals_are_weighted_by_angle(void **state) {
+    (void)state;
+    struct trc_names *names = trc_names_create();
+    struct trc_pool *pool = NULL;
+    struct trc_mesh *mesh = NULL;
+    const atomic_uint cancel = 0;
+    assert_int_equal(trc_pool_create(3, &pool), TRC_OK);
+    trc_mesh_desc desc = fixture_mesh_desc();
+    desc.smooth = cube_smooth;
+    assert_int_equal(trc_geometry_create(&desc, names, &mesh), TRC_OK);
+    assert_int_equal(trc_geometry_finish(mesh, pool, &cancel), TRC_OK);
+    /* A cube's corners point along its diagonals however its faces are cut in two: only weights by
+     * angle do that. */
+    for (int i = 0; i < 24; i++) {
+        assert_true(fabsf(mesh->vertex_normals[i] - cube_positions[i] * 0.57735027f) < 1e-6f);
+    }
+    for (int i = 0; i < 3; i++) {
+        assert_true(mesh->bounds_lower[i] == -1.0f && mesh->bounds_upper[i] == 1.0f);
+    }
+    trc_geometry_release(mesh);
+    trc_pool_destroy(pool);
+    trc_names_destroy(names);
+}
+
+static void bad_vertices_do_not_spread(void **state) {
+    (void)state;
+    float positions[30];
+    memcpy(positions, cube_positions, sizeof cube_positions);
+    const float extra[6] = {NAN, 0, 0, 0, 3e18f, 0};
+    memcpy(positions + 24, extra, sizeof extra);
+    uint32_t indices[42];
+    memcpy(indices, cube_indices, sizeof cube_indices);
+    const uint32_t more[6] = {0, 1, 8, 9, 2, 3};
+    memcpy(indices + 36, more, sizeof more);
+    uint8_t smooth[14];
+    memset(smooth, 1, sizeof smooth);
+    trc_mesh_desc desc = fixture_mesh_desc();
+    desc.vertex_count = 10;
+    desc.triangle_count = 14;
+    desc.positions = positions;
+    desc.position_count = 30;
+    desc.indices = indices;
+    desc.index_count = 42;
+    desc.smooth = smooth;
+    struct trc_names *names = trc_names_create();
+    struct trc_pool *pool = NULL;
+    struct trc_mesh *mesh = NULL;
+    const atomic_uint cancel = 0;
+    assert_int_equal(trc_pool_create(1, &pool), TRC_OK);
+    assert_int_equal(trc_geometry_create(&desc, names, &mesh), TRC_OK);
+    assert_int_equal(trc_geometry_finish(mesh, pool, &cancel), TRC_OK);
+    for (int i = 0; i < 24; i++) {
+        assert_true(fabsf(mesh->vertex_normals[i] - cube_positions[i] * 0.57735027f) < 1e-6f);
+    }
+    for (int i = 24; i < 30; i++)
+        assert_true(isfinite(mesh->vertex_normals[i]));
+    for (int i = 0; i < 3; i++) {
+        assert_true(mesh->bounds_lower[i] == -1.0f && mesh->bounds_upper[i] == 1.0f);
+    }
+    trc_geometry_release(mesh);
+    trc_pool_destroy(pool);
+    trc_names_destroy(names);
+}
+
+static void normals_do_not_depend_on_threads(void **state) {
+    (void)state;
+    enum { SIDE = 150 };
+    static float positions[2 * SIDE * SIDE * 3];
+    static uint32_t indices[(SIDE - 1) * (SIDE - 1) * 6];
+    static uint8_t smooth[(SIDE - 1) * (SIDE - 1) * 2];
+    memset(smooth, 1, sizeof smooth);
+    uint32_t n = 0;
+    for (uint32_t k = 0; k < 2 * SIDE * SIDE; k++) {
+        positions[3 * k] = (float)(k % SIDE);
+        positions[3 * k + 1] = (float)(k / SIDE % SIDE);
+        positions[3 * k + 2] = sinf(0.37f * (float)k);
+    }
+    for (uint32_t y = 0; y + 1 < SIDE; y++) {
+        for (uint32_t x = 0; x + 1 < SIDE; x++) {
+            const uint32_t a = y * SIDE + x;
+            const uint32_t quad[6] = {a, a + 1, a + SIDE, a + 1, a + SIDE + 1, a + SIDE};
+            memcpy(indices + n, quad, sizeof quad);
+            n += 6;
+        }
+    }
+    trc_mesh_desc desc = {.struct_size = sizeof desc,
+                          .key_count = 2,
+                          .vertex_count = SIDE * SIDE,
+                          .triangle_count = n / 3,
+                          .positions = positions,
+                          .position_count = 2 * SIDE * SIDE * 3,
+                          .indices = indices,
+                          .index_count = n,
+                          .smooth = smooth};
+    struct trc_names *names = trc_names_create();
+    struct trc_mesh *meshes[2] = {0};
+    const atomic_uint cancel = 0, cancelled = 1;
+    for (uint32_t i = 0; i < 2; i++) {
+        struct trc_pool *pool = NULL;
+        assert_int_equal(trc_pool_create(i ? 4 : 1, &pool), TRC_OK);
+        assert_int_equal(trc_geometry_create(&desc, names, &meshes[i]), TRC_OK);
+        assert_int_equal(trc_geometry_finish(meshes[i], pool, &cancelled), TRC_ERROR_CANCELLED);
+        assert_null(meshes[i]->vertex_normals);
+        assert_int_equal(trc_geometry_finish(meshes[i], pool, &cancel), TRC_OK);
+        trc_pool_destroy(pool);
+    }
+    assert_int_equal(meshes[0]->key_count, 2);
+    assert_memory_equal(meshes[0]->vertex_normals, meshes[1]->vertex_normals,
+                        2 * SIDE * SIDE * 3 * sizeof(float));
+    trc_geometry_release(meshes[0]);
+    trc_geometry_release(meshes[1]);
+    trc_names_destroy(names);
+}
+
+static void equal_keys_become_one(void **state) {
+    (void)state;
+    float positions[48];
+    memcpy(positions, cube_positions, sizeof cube_positions);
+    memcpy(positions + 24, cube_positions, sizeof cube_positions);
+    trc_mesh_desc desc = fixture_mesh_desc();
+    desc.key_count = 2;
+    desc.positions = positions;
+    desc.position_count = 48;
+    struct trc_names *names = trc_names_create();
+    struct trc_mesh *mesh = NULL, *pose = NULL;
+    assert_int_equal(trc_geometry_create(&desc, names, &mesh), TRC_OK);
+    assert_int_equal(mesh->key_count, 1);
+    positions[47] = 2.0f;
+    assert_int_equal(trc_geometry_pose(mesh, 2, positions, NULL, &pose), TRC_OK);
+    assert_int_equal(pose->key_count, 2);
+    assert_ptr_equal(pose->indices, mesh->indices);
+    assert_true(pose->bounds_upper[2] == 2.0f);
+    trc_geometry_release(mesh);
+    assert_int_equal(pose->indices[35],
+                     cube_indices[35]); /* the topology lives with its last pose */
+    trc_geometry_release(pose);
+    trc_names_destroy(names);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(message_is_formatted_and_cut),
+        cmocka_unit_test(message_is_per_thread),
+        cmocka_unit_test(sizes_and_versions),
+        cmocka_unit_test(memory_is_aligned_and_counted),
+        cmocka_unit_test(memory_sizes_do_not_wrap),
+        cmocka_unit_test(memory_fails_when_told),
+        cmocka_unit_test(products_are_checked),
+        cmocka_unit_test(handles_know_their_generation),
+        cmocka_unit_test(removing_a_handle_waits_for_pins),
+        cmocka_unit_test(ids_keep_creation_order),
+        cmocka_unit_test(image_slots_are_used_once),
+        cmocka_unit_test(names_are_interned),
+        cmocka_unit_test(pool_runs_every_task_once),
+        cmocka_unit_test(pool_sets_and_restores_float_state),
+        cmocka_unit_test(pool_creation_can_fail),
+        cmocka_unit_test(dispatch_chooses_and_lowers),
+        cmocka_unit_test(schedule_covers_every_pixel_once),
+        cmocka_unit_test(schedule_batches_rise),
+        cmocka_unit_test(film_divides_and_exposes),
+        cmocka_unit_test(film_refuses_what_the_machine_has_not),
+        cmocka_unit_test(pass_channels),
+        cmocka_unit_test(affine_inverts_what_it_can),
+        cmocka_unit_test(normals_are_weighted_by_angle),
+        cmocka_unit_test(bad_vertices_do_not_spread),
+        cmocka_unit_test(normals_do_not_depend_on_threads),
+        cmocka_unit_test(equal_keys_become_one),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
