@@ -10,9 +10,19 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(
 import blender as blender_support  # noqa: E402  (found by the line above)
 
 
+def _blender(folder):
+    if blender_support.executable() is None:
+        pytest.skip("no Blender found")
+    return blender_support.Blender(str(folder))
+
+
 @pytest.fixture
 def blender(tmp_path):
     """A Blender to run functions in; skips where there is no Blender."""
-    if blender_support.executable() is None:
-        pytest.skip("no Blender found")
-    return blender_support.Blender(str(tmp_path))
+    return _blender(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def blender_of_module(tmp_path_factory):
+    """The same for fixtures whose results several tests look at."""
+    return _blender(tmp_path_factory.mktemp("blender"))

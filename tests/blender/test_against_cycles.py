@@ -65,8 +65,8 @@ def inside_geometry():
     monkey = bpy.context.object
     monkey.data.materials.append(red)
     monkey.data.materials.append(green)
-    for polygon in monkey.data.polygons[::3]:
-        polygon.material_index = 1
+    for polygon in monkey.data.polygons:
+        polygon.material_index = polygon.index % 3 == 0
     monkey.modifiers.new("Subdivision", 'SUBSURF')
     monkey.scale = (-1, 1, 1)
     monkey.rotation_euler = (1.2, 0.3, 0.4)
@@ -149,12 +149,12 @@ def inside_blur():
     return pairs
 
 
-@pytest.mark.parametrize("kind", ["lens", "motion"])
-def test_blur(blender, kind):
-    ours, theirs = blender.run(inside_blur)[kind]
-    blocks = [picture.reshape(6, 8, 9, 8, 4).mean(axis=(1, 3)) for picture in (ours, theirs)]
-    assert np.abs(blocks[0] - blocks[1]).max() < 0.06
-    assert ours[..., :3].mean(axis=(0, 1)) == pytest.approx(theirs[..., :3].mean(axis=(0, 1)), rel=0.02)
+def test_blur(blender):
+    for kind, (ours, theirs) in blender.run(inside_blur).items():
+        blocks = [picture.reshape(6, 8, 9, 8, 4).mean(axis=(1, 3)) for picture in (ours, theirs)]
+        assert np.abs(blocks[0] - blocks[1]).max() < 0.06, kind
+        assert ours[..., :3].mean(axis=(0, 1)) == pytest.approx(theirs[..., :3].mean(axis=(0, 1)),
+                                                                rel=0.02), kind
 
 
 # Light ---------------------------------------------------------------------------------------------
@@ -188,38 +188,45 @@ def _shine(kind):
     made.rotation_euler = (math.atan2(math.hypot(2, 2), 3.2), 0.0, math.pi / 4)
 
 
-def inside_lights(kind):
+_LIGHTS = ('POINT', 'SPOT', 'SUN', 'RECTANGLE', 'ELLIPSE', 'WORLD')
+
+_MATERIALS = {
+    "glossy": ("ShaderNodeBsdfGlossy", {"Color": (0.9, 0.7, 0.5), "Roughness": 0.3}),
+    "glass": ("ShaderNodeBsdfGlass", {"Color": (0.9, 0.95, 1.0), "Roughness": 0.0, "IOR": 1.45}),
+    "principled": ("ShaderNodeBsdfPrincipled", {"Base Color": (0.8, 0.3, 0.2), "Roughness": 0.4}),
+    "metal": ("ShaderNodeBsdfPrincipled",
+              {"Base Color": (0.8, 0.6, 0.2), "Metallic": 1.0, "Roughness": 0.25}),
+    "transparent": ("ShaderNodeBsdfTransparent", {"Color": (0.5, 0.7, 0.9)}),
+    "translucent": ("ShaderNodeBsdfTranslucent", {"Color": (0.5, 0.7, 0.9)}),
+}
+
+
+def inside_light(names):
+    """Channel means of both engines for each kind of light and each material."""
     import scenes
-    scenes.empty(size=(64, 48))
-    _stage()
-    _shine(kind)
-    return [scenes.channel_means(picture) for picture in _both(LIGHT_SAMPLES)]
+    means = {}
+    for name in names:
+        scenes.empty(size=(64, 48))
+        _, ball = _stage()
+        if name in _MATERIALS:
+            node_type, inputs = _MATERIALS[name]
+            ball.data.materials[0] = scenes.material("Tried", node_type,
+                                                     **{k.replace(" ", "_"): v for k, v in inputs.items()})
+            _shine('RECTANGLE')
+            _shine('WORLD')
+        else:
+            _shine(name)
+        means[name] = [scenes.channel_means(picture) for picture in _both(LIGHT_SAMPLES)]
+    return means
 
 
-@pytest.mark.parametrize("kind", ['POINT', 'SPOT', 'SUN', 'RECTANGLE', 'ELLIPSE', 'WORLD'])
-def test_lights(blender, kind):
-    ours, theirs = blender.run(inside_lights, kind)
-    assert ours == pytest.approx(theirs, rel=MEAN_TOLERANCE)
+@pytest.fixture(scope="module")
+def light_means(blender_of_module):
+    """The means of all kinds, from one Blender."""
+    return blender_of_module.run(inside_light, _LIGHTS + tuple(_MATERIALS), timeout=300)
 
 
-def inside_materials(node_type, inputs):
-    import scenes
-    scenes.empty(size=(64, 48))
-    _, ball = _stage()
-    ball.data.materials[0] = scenes.material("Shiny", node_type, **inputs)
-    _shine('RECTANGLE')
-    _shine('WORLD')
-    return [scenes.channel_means(picture) for picture in _both(LIGHT_SAMPLES)]
-
-
-@pytest.mark.parametrize("node_type, inputs", [
-    ("ShaderNodeBsdfGlossy", {"Color": (0.9, 0.7, 0.5), "Roughness": 0.3}),
-    ("ShaderNodeBsdfGlass", {"Color": (0.9, 0.95, 1.0), "Roughness": 0.0, "IOR": 1.45}),
-    ("ShaderNodeBsdfPrincipled", {"Base Color": (0.8, 0.3, 0.2), "Metallic": 0.0, "Roughness": 0.4}),
-    ("ShaderNodeBsdfPrincipled", {"Base Color": (0.8, 0.6, 0.2), "Metallic": 1.0, "Roughness": 0.25}),
-    ("ShaderNodeBsdfTransparent", {"Color": (0.5, 0.7, 0.9)}),
-    ("ShaderNodeBsdfTranslucent", {"Color": (0.5, 0.7, 0.9)}),
-], ids=["glossy", "glass", "principled", "metal", "transparent", "translucent"])
-def test_materials(blender, node_type, inputs):
-    ours, theirs = blender.run(inside_materials, node_type, inputs)
+@pytest.mark.parametrize("kind", _LIGHTS + tuple(_MATERIALS))
+def test_light(light_means, kind):
+    ours, theirs = light_means[kind]
     assert ours == pytest.approx(theirs, rel=MEAN_TOLERANCE)

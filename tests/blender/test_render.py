@@ -215,9 +215,9 @@ def inside_animation(keep):
     scene = scenes.empty()
     scene.render.use_persistent_data = keep
     scenes.camera()
-    wall = scenes.wall(size=2.0, material=scenes.emitter((1.0, 1.0, 1.0)))
+    wall = scenes.wall(size=1.0, material=scenes.emitter((1.0, 1.0, 1.0)))
     strength = wall.active_material.node_tree.nodes["Emission"].inputs["Strength"]
-    for frame, x in ((1, 0.0), (2, 1.0), (3, 2.0)):
+    for frame, x in ((1, 0.0), (2, 0.75), (3, 1.5)):
         wall.location.x = x
         wall.keyframe_insert("location", frame=frame)
         strength.default_value = frame
@@ -235,7 +235,7 @@ def test_animation_with_and_without_persistent_data(blender):
         assert a[..., 0].max() == pytest.approx(number, rel=1e-4)
         assert np.array_equal(a, b)
     columns = [np.flatnonzero(picture[24, :, 0] > 0.5).mean() for picture in plain]
-    assert columns[1] - columns[0] == pytest.approx(32 / (6 * 0.36), abs=1.0)
+    assert columns[1] - columns[0] == pytest.approx(0.75 * 32 / (6 * 0.36), abs=1.0)
     assert columns[2] - columns[1] == pytest.approx(columns[1] - columns[0], abs=1.0)
 
 

@@ -163,7 +163,7 @@ def render_passes(names):
     output.format.color_mode = 'RGBA'
     output.file_slots.clear()
     for number, name in enumerate(names):
-        output.file_slots.new(f"pass{number}_")
+        output.file_slots.new(f"pass{number:02d}_")
         tree.links.new(layers.outputs["Image" if name == "Combined" else name], output.inputs[-1])
     tree.links.new(layers.outputs["Image"], tree.nodes.new("CompositorNodeComposite").inputs[0])
     bpy.ops.render.render()

@@ -45,9 +45,9 @@ class SceneSync:
         self.warnings = Warnings()
         self._images = Images(self.scene, self.warnings)
         self._materials = Materials(self.scene, self._images, self.warnings)
-        self._meshes = mesh.Meshes(self.scene, will_resync)
-        self._instances = instance.Instances(self.scene)
-        self._lights = light.Lights(self.scene)
+        self._meshes = mesh.Meshes(self.scene, will_resync, self.warnings)
+        self._instances = instance.Instances(self.scene, self.warnings)
+        self._lights = light.Lights(self.scene, self.warnings)
 
     def destroy(self):
         """Free the library's scene."""

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import bpy
 import numpy as np
 
+from .. import native
 from . import visibility
 from .matrix import rows12
 
@@ -122,17 +123,24 @@ class Instances:
     """The instances of one scene of the library."""
 
     scene: object
+    warnings: object
     _entries: dict = field(default_factory=dict)
 
     def update(self, items, mesh_ids):
-        """Make the library's instances those of the items; mesh_ids: library id by mesh key."""
+        """Make the library's instances those of the items; mesh_ids: library id by mesh key. One that
+        the library refuses is left out."""
         seen = set()
         for item in items:
             mesh_id = mesh_ids.get(item.mesh_key)
             if mesh_id is None:
                 continue
-            seen.add(item.key)
-            self._update_one(item, mesh_id)
+            try:
+                self._update_one(item, mesh_id)
+                seen.add(item.key)
+            except native.TracerError as error:
+                if error.status != native.ERROR_INVALID_ARGUMENT:
+                    raise
+                self.warnings.add(f"Object '{item.owner}': {error}; it is left out")
         for key in [key for key in self._entries if key not in seen]:
             self.scene.destroy_instance(self._entries.pop(key).id)
 

@@ -79,18 +79,28 @@ def _node_color(light, warnings):
 class Lights:
     """The lights of one scene of the library, by instance key."""
 
-    def __init__(self, scene):
-        self._scene = scene
+    def __init__(self, scene, warnings):
+        self._scene, self._warnings = scene, warnings
         self._entries = {}  # key -> (id, fields)
 
     def update(self, lights):
-        """Make the library's lights those of {key: fields}."""
+        """Make the library's lights those of {key: fields}; one it refuses is left out."""
+        refused = set()
         for key, fields in lights.items():
-            known = self._entries.get(key)
-            if known is None:
-                self._entries[key] = (self._scene.create_light(**fields), fields)
-            elif known[1] != fields:
-                self._scene.update_light(known[0], **fields)
-                self._entries[key] = (known[0], fields)
-        for key in [key for key in self._entries if key not in lights]:
+            try:
+                self._update_one(key, fields)
+            except native.TracerError as error:
+                if error.status != native.ERROR_INVALID_ARGUMENT:
+                    raise
+                self._warnings.add(f"Light '{key[0]}': {error}; it is left out")
+                refused.add(key)
+        for key in [key for key in self._entries if key not in lights or key in refused]:
             self._scene.destroy_light(self._entries.pop(key)[0])
+
+    def _update_one(self, key, fields):
+        known = self._entries.get(key)
+        if known is None:
+            self._entries[key] = (self._scene.create_light(**fields), fields)
+        elif known[1] != fields:
+            self._scene.update_light(known[0], **fields)
+            self._entries[key] = (known[0], fields)

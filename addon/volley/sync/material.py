@@ -68,7 +68,9 @@ class Materials:
     def end(self):
         """Free what nothing asked for since begin; call when no instance uses it any more."""
         for key in [key for key in self._entries if key not in self._seen]:
-            self._scene.destroy_material(self._entries.pop(key).id)
+            material_id = self._entries.pop(key).id
+            if material_id:
+                self._scene.destroy_material(material_id)
 
     def flatten(self, material, label):
         """A material's surface as a flat tree."""
@@ -81,17 +83,35 @@ class Materials:
         entry = self._entries.get(key)
         if entry is None:
             entry = self._entries[key] = Entry()
-            entry.id = self._scene.create_material(flat.nodes, flat.surface, pass_index, flags)
-        elif entry.signature != signature:
-            self._scene.update_material(entry.id, flat.nodes, flat.surface, pass_index, flags)
+        if entry.signature != signature:
+            self._send(entry, key, (flat.nodes, flat.surface, pass_index, flags))
         entry.signature = signature
         entry.uv_names, entry.color_names = flat.uv_names, flat.color_names
+
+    def _send(self, entry, key, arguments):
+        """Create or change it in the library; a refused one becomes the default material."""
+        try:
+            if entry.id:
+                self._scene.update_material(entry.id, *arguments)
+            else:
+                entry.id = self._scene.create_material(*arguments)
+        except native.TracerError as error:
+            if error.status not in (native.ERROR_INVALID_ARGUMENT, native.ERROR_TOO_LARGE):
+                raise
+            self._warnings.add(f"Material '{key[-1] if isinstance(key, tuple) else key}': {error}; the "
+                               "default material is used")
+            if entry.id:
+                self._scene.destroy_material(entry.id)
+            entry.id = 0
 
 
 class Entry:
     """What is known of one material in the library."""
 
-    __slots__ = ("id", "signature", "uv_names", "color_names")
+    def __init__(self):
+        self.id = 0
+        self.signature = None
+        self.uv_names, self.color_names = set(), set()
 
 
 def _flags(material):

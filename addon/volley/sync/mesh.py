@@ -259,8 +259,8 @@ class Meshes:
 
     With will_resync, checksums are kept so that a later sync sends only what differs."""
 
-    def __init__(self, scene, will_resync):
-        self._scene, self._will_resync = scene, will_resync
+    def __init__(self, scene, will_resync, warnings):
+        self._scene, self._will_resync, self._warnings = scene, will_resync, warnings
         self._entries, self._seen, self._retired = {}, set(), []
 
     def begin(self):
@@ -276,26 +276,41 @@ class Meshes:
         return True
 
     def put(self, key, pointer, data, names, motion=None):
-        """Bring a mesh up to date: nothing, positions alone, or all of it."""
+        """Bring a mesh up to date: nothing, positions alone, or all of it. One that the library
+        refuses is left out."""
         positions, normals = motion.keys() if motion else (
             data.positions[None], None if data.normals is None else data.normals[None])
-        topology = shape = None
-        if self._will_resync:
-            topology = data.topology_signature()
-            shape = zlib.crc32(positions.tobytes()), 0 if normals is None else zlib.crc32(normals.tobytes())
         entry = self._entries.get(key)
-        if entry is not None and topology is not None and entry.topology == topology:
-            if entry.shape != shape:
+        topology, shape = self._signatures(data, positions, normals)
+        try:
+            if entry is None or topology is None or entry.topology != topology:
+                entry = self._create(key, data, positions, normals)
+            elif entry.shape != shape:
                 self._scene.update_mesh(entry.id, positions, normals)
-        else:
-            if entry is not None:
-                self._retired.append(entry.id)
-            entry = self._entries[key] = MeshEntry()
-            entry.id = self._scene.create_mesh(
-                positions, data.indices, normals, data.normal_kind, data.smooth, data.material_index,
-                data.attributes)
+        except native.TracerError as error:
+            if error.status not in (native.ERROR_INVALID_ARGUMENT, native.ERROR_TOO_LARGE):
+                raise
+            self._warnings.add(f"Mesh of '{key[0]}': {error}; it is left out")
+            return
         entry.pointer, entry.topology, entry.shape, entry.names = pointer, topology, shape, names
         self._seen.add(key)
+
+    def _signatures(self, data, positions, normals):
+        """Checksums of topology and shape, None where no later sync will compare them."""
+        if not self._will_resync:
+            return None, None
+        normal_sum = 0 if normals is None else zlib.crc32(normals.tobytes())
+        return data.topology_signature(), (zlib.crc32(positions.tobytes()), normal_sum)
+
+    def _create(self, key, data, positions, normals):
+        """A new mesh; one of the same key goes when no instance shows it any more."""
+        entry = MeshEntry()
+        entry.id = self._scene.create_mesh(positions, data.indices, normals, data.normal_kind,
+                                           data.smooth, data.material_index, data.attributes)
+        if key in self._entries:
+            self._retired.append(self._entries[key].id)
+        self._entries[key] = entry
+        return entry
 
     def ids(self):
         """Library id of each mesh of this sync, by key."""

@@ -49,7 +49,7 @@ static trc_status image_create(uint32_t width, uint32_t height, enum trc_texel f
                         (uint64_t)TRC_IMAGE_MAX_BYTES);
     }
     struct trc_image *image = trc_alloc_zeroed(1, sizeof *image);
-    void *block = trc_alloc(texels, texel_bytes[format]);
+    void *block = trc_alloc_zeroed(texels, texel_bytes[format]);
     if (!image || !block) {
         trc_free(image);
         trc_free(block);

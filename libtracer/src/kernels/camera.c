@@ -21,7 +21,9 @@ static double filter_value(uint32_t filter, double x, double width) {
 
 void TRC_KERNEL(trc_filter_table)(uint32_t filter, float width, float table[TRC_FILTER_TABLE]) {
     enum { STEPS = 2 * TRC_FILTER_TABLE };
-    const double half = filter == TRC_FILTER_BOX ? 0.5 : 0.5 * (double)width;
+    /* Support of the filters in widths, as Cycles has it. */
+    const double support = filter == TRC_FILTER_GAUSSIAN ? 3.0 : filter == TRC_FILTER_BLACKMAN_HARRIS ? 2.0 : 1.0;
+    const double half = 0.5 * support * (double)width;
     const double full = 2.0 * half, step = full / STEPS;
     double total = 0.0, sum = 0.0;
     for (int i = 0; i < STEPS; i++) total += filter_value(filter, -half + (i + 0.5) * step, full);

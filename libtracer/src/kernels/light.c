@@ -56,14 +56,14 @@ static void sample_lamps(const struct draw *d, const struct trc_wide_lamp *l, ui
     if (kinds & 1u << TRC_KIND_RECTANGLE) {
         const vmask lanes = vm_and(m, is_kind(l, TRC_KIND_RECTANGLE));
         if (vm_any(lanes)) {
-            const struct trc_place place = trc_rectangle_sample(l, p, d->u1, d->u2);
+            const struct trc_place place = trc_area_sample(l, false, p, d->u1, d->u2);
             set_place(d, &place, lanes);
         }
     }
     if (kinds & 1u << TRC_KIND_ELLIPSE) {
         const vmask lanes = vm_and(m, is_kind(l, TRC_KIND_ELLIPSE));
         if (vm_any(lanes)) {
-            const struct trc_place place = trc_ellipse_sample(l, p, d->u1, d->u2);
+            const struct trc_place place = trc_area_sample(l, true, p, d->u1, d->u2);
             set_place(d, &place, lanes);
         }
     }

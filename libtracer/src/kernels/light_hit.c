@@ -65,18 +65,15 @@ static vfloat meet_lamp(const struct trc_lamp *lamp, vvec3 p, vvec3 wi, vfloat *
     const vfloat t = trc_area_hit(&l, p, wi, &u, &v);
     const vmask round = vf_le(u * u + v * v, vf_one());
     const vmask square = vm_and(vf_le(vf_abs(u), vf_one()), vf_le(vf_abs(v), vf_one()));
-    const vmask hit = lamp->kind == TRC_KIND_ELLIPSE ? round : square;
+    const bool is_ellipse = lamp->kind == TRC_KIND_ELLIPSE;
+    const vmask hit = is_ellipse ? round : square;
     if (!vm_any(vm_and(hit, vf_lt(t, vf_set(INFINITY)))))
         return vf_set(INFINITY);
     *radiance = v3_scale(l.radiance, trc_spread_factor(&l, wi));
-    if (lamp->kind == TRC_KIND_ELLIPSE) {
-        *pdf = vf_divide(t * t * l.inv_area, -v3_dot(l.normal, wi));
-    } else {
-        const struct trc_view_rectangle r = trc_rectangle_view(&l, p);
-        const struct trc_spherical_rectangle q = trc_rectangle_angles(&r);
-        const vvec3 to = v3_scale(wi, t);
-        *pdf = trc_rectangle_density(&r, &q, v3_dot(to, l.axis_u), v3_dot(to, l.axis_v));
-    }
+    const struct trc_view_rectangle r = trc_rectangle_view(&l, p);
+    const struct trc_spherical_rectangle q = trc_rectangle_angles(&r, is_ellipse);
+    const vvec3 to = v3_scale(wi, t);
+    *pdf = trc_area_density(&l, &r, &q, is_ellipse, v3_dot(to, l.axis_u), v3_dot(to, l.axis_v));
     return vf_select(hit, t, vf_set(INFINITY));
 }
 

@@ -12,8 +12,10 @@
 #include "kernels/wide_math.h"
 #include "shading/lights.h"
 
-/* Solid angles below it are sampled by area. */
+/* Solid angles below it are sampled by area. Ellipses that are large are sampled as their rectangle, whose
+ * corners give nothing: a fifth of the samples, but none with a huge weight. */
 #define TRC_SMALL_RECTANGLE 4e-3f
+#define TRC_SMALL_ELLIPSE 0.5f
 #define TRC_SMALL_TRIANGLE 2e-2f
 
 struct trc_wide_lamp {
@@ -70,37 +72,44 @@ TRC_INLINE vfloat trc_spot_factor(const struct trc_wide_lamp *l, vvec3 wi) {
     return vf_where(vf_gt(over, vf_zero()), c * edge);
 }
 
+/* The disk faces the point, so what is seen is a cone about the way to its centre: sampled uniformly by solid
+ * angle. 1 - cos of its half angle, without cancellation. */
+TRC_INLINE vfloat trc_point_cone(const struct trc_wide_lamp *l, vfloat reach) {
+    const vfloat far = vf_sqrt(reach * reach + l->half_u * l->half_u);
+    return vf_divide(l->half_u * l->half_u, far * (far + reach));
+}
 TRC_INLINE struct trc_place trc_point_sample(const struct trc_wide_lamp *l, vvec3 p, vfloat u1,
                                              vfloat u2) {
     vfloat reach;
-    const vvec3 facing = v3_normalize_length(v3_sub(p, l->position), &reach);
+    const vvec3 axis = v3_normalize_length(v3_sub(l->position, p), &reach);
+    const vfloat k = trc_point_cone(l, reach);
     vvec3 a, b;
-    v3_frame(facing, &a, &b);
+    v3_frame(axis, &a, &b);
     vfloat x, y;
     trc_warp_disk(u1, u2, &x, &y);
-    const vvec3 offset = v3_add(v3_scale(a, x * l->half_u), v3_scale(b, y * l->half_u));
-    struct trc_place s;
-    s.wi = v3_normalize_length(v3_sub(v3_add(l->position, offset), p), &s.distance);
-    const vfloat d2 = s.distance * s.distance;
+    const vfloat rise = (x * x + y * y) * k, scale = vf_safe_sqrt(k * (vf_set(2.0f) - rise));
+    const vfloat cosine = vf_one() - rise;
     const vmask delta = vf_eq(l->half_u, vf_zero());
+    struct trc_place s;
+    s.wi = v3_select(delta, axis, v3_from_frame(v3(x * scale, y * scale, cosine), a, b, axis));
+    s.distance = reach / cosine;
     /* A point without extent: intensity over squared distance, density 1. */
-    const vfloat scale = vf_select(delta, vf_divide(vf_one(), d2), vf_one());
-    s.radiance = v3_scale(l->radiance, scale);
-    const vfloat cosine = -v3_dot(facing, s.wi);
-    s.pdf = vf_select(delta, vf_one(), vf_divide(d2 * l->inv_area, vf_max(cosine, vf_zero())));
+    const vfloat fade = vf_select(delta, vf_divide(vf_one(), reach * reach), vf_one());
+    s.radiance = v3_scale(l->radiance, fade);
+    s.pdf = vf_select(delta, vf_one(), vf_divide(vf_set(0.5f * TRC_INV_PI), k));
     return s;
 }
 /* Ray against the disk: distance, or beyond any. */
 TRC_INLINE vfloat trc_point_hit(const struct trc_wide_lamp *l, vvec3 p, vvec3 wi, vfloat *pdf) {
     vfloat reach;
     const vvec3 to = v3_sub(l->position, p);
-    const vvec3 facing = v3_normalize_length(to, &reach);
-    const vfloat cosine = v3_dot(facing, wi);
+    const vvec3 axis = v3_normalize_length(to, &reach);
+    const vfloat cosine = v3_dot(axis, wi);
     const vfloat t = vf_divide(reach, cosine);
     const vvec3 off = v3_sub(v3_scale(wi, t), to);
     const vmask hit = vm_and(vf_gt(cosine, vf_zero()),
                              vf_lt(v3_dot(off, off), l->half_u * l->half_u));
-    *pdf = vf_divide(t * t * l->inv_area, cosine);
+    *pdf = vf_divide(vf_set(0.5f * TRC_INV_PI), trc_point_cone(l, reach));
     return vf_select(hit, t, vf_set(INFINITY));
 }
 
@@ -133,19 +142,6 @@ TRC_INLINE vfloat trc_spread_factor(const struct trc_wide_lamp *l, vvec3 wi) {
     const vfloat tangent = vf_divide(vf_safe_sqrt(vf_one() - c * c), c);
     const vfloat factor = (vf_one() - l->tan_spread * tangent) * l->spread_scale;
     return vf_select(vf_gt(l->tan_spread, vf_zero()), vf_max(factor, vf_zero()), vf_one());
-}
-
-TRC_INLINE struct trc_place trc_ellipse_sample(const struct trc_wide_lamp *l, vvec3 p, vfloat u1,
-                                               vfloat u2) {
-    vfloat x, y;
-    trc_warp_disk(u1, u2, &x, &y);
-    const vvec3 at = v3_mad(l->axis_u, x * l->half_u, v3_mad(l->axis_v, y * l->half_v, l->position));
-    struct trc_place s;
-    s.wi = v3_normalize_length(v3_sub(at, p), &s.distance);
-    const vfloat cosine = vf_max(-v3_dot(l->normal, s.wi), vf_zero());
-    s.pdf = vf_divide(s.distance * s.distance * l->inv_area, cosine);
-    s.radiance = v3_scale(l->radiance, trc_spread_factor(l, s.wi));
-    return s;
 }
 
 /* A rectangle in the frame of its axes with the point at the origin: x0..x1, y0..y1 at depth z > 0, cut to what
@@ -182,7 +178,8 @@ struct trc_spherical_rectangle {
 TRC_INLINE vfloat trc_edge_slope(vfloat offset, vfloat z) {
     return offset * vf_rcp(vf_sqrt(z * z + offset * offset));
 }
-TRC_INLINE struct trc_spherical_rectangle trc_rectangle_angles(const struct trc_view_rectangle *r) {
+TRC_INLINE struct trc_spherical_rectangle trc_rectangle_angles(const struct trc_view_rectangle *r,
+                                                               bool is_ellipse) {
     /* Side at y0 runs along +x, at x1 along +y, at y1 along -x, at x0 along -y; z of the paper is -r->z. */
     const vfloat n0 = -trc_edge_slope(r->y0, r->z), n1 = trc_edge_slope(r->x1, r->z);
     const vfloat n2 = trc_edge_slope(r->y1, r->z), n3 = -trc_edge_slope(r->x0, r->z);
@@ -193,42 +190,66 @@ TRC_INLINE struct trc_spherical_rectangle trc_rectangle_angles(const struct trc_
     q.b1 = n2;
     q.k = vf_set(TRC_TWO_PI) - g2 - g3;
     q.solid_angle = g0 + g1 - q.k;
-    q.small = vm_not(vf_gt(q.solid_angle, vf_set(TRC_SMALL_RECTANGLE)));
+    const float small = is_ellipse ? TRC_SMALL_ELLIPSE : TRC_SMALL_RECTANGLE;
+    q.small = vm_not(vf_gt(q.solid_angle, vf_set(small)));
     return q;
 }
-/* Density at the place (x, y) of the view. */
-TRC_INLINE vfloat trc_rectangle_density(const struct trc_view_rectangle *r,
-                                        const struct trc_spherical_rectangle *q, vfloat x,
-                                        vfloat y) {
-    const vfloat d2 = x * x + y * y + r->z * r->z, area = (r->x1 - r->x0) * (r->y1 - r->y0);
-    const vfloat by_area = d2 * vf_sqrt(d2) / (area * r->z);
+/* Density at the place (x, y) of the view. Small ellipses are sampled all over, whatever the slats show. */
+TRC_INLINE vfloat trc_area_density(const struct trc_wide_lamp *l, const struct trc_view_rectangle *r,
+                                   const struct trc_spherical_rectangle *q, bool is_ellipse, vfloat x,
+                                   vfloat y) {
+    const vfloat d2 = x * x + y * y + r->z * r->z, cube = d2 * vf_sqrt(d2);
+    const vfloat by_area = is_ellipse ? cube * l->inv_area / r->z
+                                      : cube / ((r->x1 - r->x0) * (r->y1 - r->y0) * r->z);
     return vf_where(r->lit, vf_select(q->small, by_area, vf_rcp(q->solid_angle)));
 }
-TRC_INLINE struct trc_place trc_rectangle_sample(const struct trc_wide_lamp *l, vvec3 p, vfloat u1,
-                                                 vfloat u2) {
-    const struct trc_view_rectangle r = trc_rectangle_view(l, p);
-    const struct trc_spherical_rectangle q = trc_rectangle_angles(&r);
+
+/* Place in the spherical rectangle (Urena et al., 3.3). */
+TRC_INLINE void trc_spherical_place(const struct trc_view_rectangle *r,
+                                    const struct trc_spherical_rectangle *q, vfloat u1, vfloat u2,
+                                    vfloat *x_out, vfloat *y_out) {
     vfloat sa, ca;
-    vf_sincos(u1 * q.solid_angle + q.k, &sa, &ca);
-    const vfloat fu = vf_divide(ca * q.b0 - q.b1, sa);
+    vf_sincos(u1 * q->solid_angle + q->k, &sa, &ca);
+    const vfloat fu = vf_divide(ca * q->b0 - q->b1, sa);
     const vfloat cu =
-        vf_clamp(vf_copysign(vf_rcp(vf_sqrt(fu * fu + q.b0 * q.b0)), fu), -1.0f, 1.0f);
-    vfloat x = cu * r.z * vf_rcp(vf_max(vf_safe_sqrt(vf_one() - cu * cu), vf_set(1e-7f)));
-    x = vf_min(vf_max(x, r.x0), r.x1);
-    const vfloat d2 = x * x + r.z * r.z, d = vf_sqrt(d2);
-    const vfloat h0 = r.y0 * vf_rcp(vf_sqrt(d2 + r.y0 * r.y0));
-    const vfloat h1 = r.y1 * vf_rcp(vf_sqrt(d2 + r.y1 * r.y1));
+        vf_clamp(vf_copysign(vf_rcp(vf_sqrt(fu * fu + q->b0 * q->b0)), fu), -1.0f, 1.0f);
+    const vfloat x = cu * r->z * vf_rcp(vf_max(vf_safe_sqrt(vf_one() - cu * cu), vf_set(1e-7f)));
+    *x_out = vf_min(vf_max(x, r->x0), r->x1);
+    const vfloat d2 = *x_out * *x_out + r->z * r->z, d = vf_sqrt(d2);
+    const vfloat h0 = r->y0 * vf_rcp(vf_sqrt(d2 + r->y0 * r->y0));
+    const vfloat h1 = r->y1 * vf_rcp(vf_sqrt(d2 + r->y1 * r->y1));
     const vfloat h = h0 + u2 * (h1 - h0), h2 = h * h;
-    vfloat y = vf_select(vf_lt(h2, vf_set(1.0f - 1e-6f)), h * d * vf_rcp(vf_sqrt(vf_one() - h2)),
-                         r.y1);
-    y = vf_min(vf_max(y, r.y0), r.y1);
-    x = vf_select(q.small, vf_lerp(r.x0, r.x1, u1), x);
-    y = vf_select(q.small, vf_lerp(r.y0, r.y1, u2), y);
+    const vfloat y = vf_select(vf_lt(h2, vf_set(1.0f - 1e-6f)),
+                               h * d * vf_rcp(vf_safe_sqrt(vf_one() - h2)), r->y1);
+    *y_out = vf_min(vf_max(y, r->y0), r->y1);
+}
+
+TRC_INLINE struct trc_place trc_area_sample(const struct trc_wide_lamp *l, bool is_ellipse, vvec3 p,
+                                            vfloat u1, vfloat u2) {
+    const struct trc_view_rectangle r = trc_rectangle_view(l, p);
+    const struct trc_spherical_rectangle q = trc_rectangle_angles(&r, is_ellipse);
+    const vvec3 center = v3_sub(l->position, p);
+    const vfloat cx = v3_dot(center, l->axis_u), cy = v3_dot(center, l->axis_v);
+    vfloat x, y, even_x, even_y;
+    trc_spherical_place(&r, &q, u1, u2, &x, &y);
+    vmask inside = r.lit;
+    if (is_ellipse) {
+        const vfloat u = (x - cx) / l->half_u, v = (y - cy) / l->half_v;
+        inside = vm_and(inside, vm_or(q.small, vf_le(u * u + v * v, vf_one())));
+        trc_warp_disk(u1, u2, &even_x, &even_y);
+        even_x = cx + even_x * l->half_u;
+        even_y = cy + even_y * l->half_v;
+    } else {
+        even_x = vf_lerp(r.x0, r.x1, u1);
+        even_y = vf_lerp(r.y0, r.y1, u2);
+    }
+    x = vf_select(q.small, even_x, x);
+    y = vf_select(q.small, even_y, y);
     struct trc_place s;
     const vvec3 to = v3_sub(v3_add(v3_scale(l->axis_u, x), v3_scale(l->axis_v, y)),
                             v3_scale(l->normal, r.z));
     s.wi = v3_normalize_length(to, &s.distance);
-    s.pdf = trc_rectangle_density(&r, &q, x, y);
+    s.pdf = vf_where(inside, trc_area_density(l, &r, &q, is_ellipse, x, y));
     s.radiance = v3_scale(l->radiance, trc_spread_factor(l, s.wi));
     return s;
 }

@@ -38,25 +38,28 @@ static vfloat math_logarithm(vfloat a, vfloat b) {
                                      vf_log(vf_select(valid, b, one))));
 }
 
-/* The exact remainder with the sign of a; 0 where b is 0. */
+/* The remainder with the sign of a; 0 where b is 0. */
 static vfloat math_modulo(vfloat a, vfloat b) {
-    const vmask valid = vf_ne(b, vf_zero());
-    const vfloat quotient = vf_trunc(vf_divide(a, b));
-    const vmask small = vm_or(vf_lt(vf_abs(quotient), vf_set(4194304.0f)), vm_not(valid));
-    if (!vm_all(small)) { /* the short way would lose digits: exact, lane by lane */
-        float x[TRC_WIDTH], y[TRC_WIDTH];
-        vf_store(x, a);
-        vf_store(y, b);
-        for (int i = 0; i < TRC_WIDTH; i++) x[i] = y[i] != 0.0f ? fmodf(x[i], y[i]) : 0.0f;
-        return vf_load(x);
-    }
+    const vfloat size = vf_abs(b), quotient = vf_trunc(vf_divide(a, b));
     const vfloat product = quotient * b;
     vfloat r = (a - product) - vf_product_low(quotient, b, product);
     /* A quotient that was rounded up to the next whole number leaves a remainder of the other sign. */
     const vfloat step = vf_copysign(b, a);
     r = vf_select(vf_lt(r * a, vf_zero()), r + step, r);
-    r = vf_select(vf_ge(vf_abs(r), vf_abs(b)), r - step, r);
-    return vf_where(valid, vf_copysign(r, a));
+    r = vf_select(vf_ge(vf_abs(r), size), r - step, r);
+    r = vf_where(vf_ne(b, vf_zero()), vf_copysign(r, a));
+    /* Where digits would be lost: lane by lane, exact. */
+    vmask easy = vm_and(vf_gt(size, vf_set(1e-18f)), vf_lt(size, vf_set(1e18f)));
+    easy = vm_and(easy, vf_lt(vf_abs(quotient), vf_set(4194304.0f)));
+    uint32_t rest = TRC_LANE_BITS & ~vm_bits(vm_or(easy, vf_eq(b, vf_zero())));
+    if (!rest) return r;
+    float x[TRC_WIDTH];
+    vf_store(x, r);
+    for (; rest; rest &= rest - 1) {
+        const int i = __builtin_ctz(rest);
+        x[i] = fmodf(vf_get(a, i), vf_get(b, i));
+    }
+    return vf_load(x);
 }
 
 static vfloat math_wrap(vfloat value, vfloat high, vfloat low) {

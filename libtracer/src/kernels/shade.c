@@ -237,10 +237,11 @@ static vmask light_contribute(const struct trc_tile *t, const struct arrival *a,
     const vfloat one = vf_set(1.0f), zero = vf_set(0.0f);
     const vuint seen = TRC_KERNEL(trc_light_visibility)(t->snapshot, l);
     const vmask alone = vm_or(l->delta, l->no_mis);
-    vfloat mis;
+    vfloat mis, mis_diffuse = one;
     if (t->desc->integrator == TRC_INTEGRATOR_DISTRIBUTION) {
+        /* A continuation ray's weight has all lobes in it (kernels/bsdf.h), so this has too. */
         const vfloat pl = l->pdf * count, pl2 = pl * pl, pb2 = f.pdf * f.pdf;
-        mis = vf_select(alone, one, pl2 / (pl2 + pb2));
+        mis = mis_diffuse = vf_select(alone, one, pl2 / (pl2 + pb2));
     } else {
         /* Ideal continuation rays find lights of extent by themselves; highlights of points are here. */
         mis = vf_select(alone, one, zero);
@@ -248,7 +249,8 @@ static vmask light_contribute(const struct trc_tile *t, const struct arrival *a,
     const vfloat scale = one / (l->pdf * count);
     const vvec3 light = v3_mul(a->weight, v3_scale(l->radiance, scale));
 #define SEEN(bit) vi_eq((vint)(seen & vu_set(bit)), vi_set(bit))
-    out->diffuse = v3_mul(light, v3_select(SEEN(TRC_VISIBLE_DIFFUSE), f.diffuse, v3_zero()));
+    out->diffuse =
+        v3_mul(light, v3_scale(v3_select(SEEN(TRC_VISIBLE_DIFFUSE), f.diffuse, v3_zero()), mis_diffuse));
     out->glossy =
         v3_mul(light, v3_scale(v3_select(SEEN(TRC_VISIBLE_GLOSSY), f.glossy, v3_zero()), mis));
     out->transmission = v3_mul(

@@ -17,6 +17,23 @@
 /* Below it products may have lost bits to underflow, and 1 / det may overflow. */
 #define TRC_TINY_EDGE 1e-36f
 
+/* Bound of the error of t, after M. Pharr, W. Jakob, G. Humphreys, "Physically Based Rendering", 3rd ed. 2016,
+ * section 3.9.6, in half-ulps: z 3, sheared x and y 5 of x + z, edge functions 2 of x y and what x and y carry, the
+ * sum 3. A ray that leaves a surface starts outside the box of its point's error; nothing nearer than
+ * this bound can be told from that surface, so it does not count. */
+#define TRC_GAMMA(n) ((n) * 0x1p-24f / (1.0f - (n) * 0x1p-24f))
+#define TRC_T_ERROR(name, type, set)                                                               \
+    TRC_INLINE type name(type x, type y, type z, type e, type inv) {                               \
+        const type xi = x * inv, zi = z * inv; /* first, so that nothing overflows */              \
+        const type dxi = set(TRC_GAMMA(5)) * (xi + zi), dy = set(TRC_GAMMA(5)) * (y + z);          \
+        const type de = set(2.0f) * (set(TRC_GAMMA(2)) * xi * y + dy * xi + dxi * y);              \
+        return set(3.0f) * (set(2.0f * TRC_GAMMA(3)) * (e * inv) + de) * z;                        \
+    }
+/* Largest |x|, |y|, |z| of the sheared vertices, largest |edge function|, 1 / |det|: the bound over sz. */
+TRC_T_ERROR(trc_t_error, vfloat, vf_set)
+TRC_T_ERROR(trc_t_error8, f8, f8_set)
+TRC_T_ERROR(trc_t_error_exact, double, (double))
+
 /* What the test needs of a ray: axes u, v, z with z dominant. */
 struct trc_shear {
     int u, v, z;
@@ -36,8 +53,12 @@ static __attribute__((noinline)) bool trc_triangle_exact(const float a[3], const
     const double inv = 1.0 / det;
     *u = (float)(e1 * inv);
     *v = (float)(e2 * inv);
-    *t = (float)((e0 * inv * a[2] + e1 * inv * b[2] + e2 * inv * c[2]) * sz);
-    return true;
+    const double distance = (e0 * inv * a[2] + e1 * inv * b[2] + e2 * inv * c[2]) * sz;
+    double most[4] = {fmax(fabs(e0), fmax(fabs(e1), fabs(e2)))}; /* edge function, x, y, z */
+    for (int k = 0; k < 3; k++)
+        most[k + 1] = fmax(fabs((double)a[k]), fmax(fabs((double)b[k]), fabs((double)c[k])));
+    *t = (float)distance;
+    return distance > trc_t_error_exact(most[1], most[2], most[3], most[0], fabs(inv)) * fabs((double)sz);
 }
 
 /* Vertex coordinates of one triangle for the lanes: broadcast (static) or per ray (moving). */
@@ -65,7 +86,13 @@ TRC_INLINE vmask trc_triangle_test(const struct trc_triangle_lanes *p, vfloat ou
     *v = e2 * inv;
     *t = (e0 * inv * az + *u * bz + *v * cz) * sz;
     const vfloat nearest = vf_min(vf_abs(e0), vf_min(vf_abs(e1), vf_abs(e2)));
-    uint32_t doubtful = vm_bits(vm_and(hit, vf_le(nearest, vf_set(TRC_TINY_EDGE))));
+    const vmask near_edge = vm_and(hit, vf_le(nearest, vf_set(TRC_TINY_EDGE)));
+    const vfloat x = vf_max(vf_abs(ax), vf_max(vf_abs(bx), vf_abs(cx)));
+    const vfloat y = vf_max(vf_abs(ay), vf_max(vf_abs(by), vf_abs(cy)));
+    const vfloat z = vf_max(vf_abs(az), vf_max(vf_abs(bz), vf_abs(cz)));
+    const vfloat e = vf_max(vf_abs(e0), vf_max(vf_abs(e1), vf_abs(e2)));
+    hit = vm_or(near_edge, vm_and(hit, vf_gt(*t, trc_t_error(x, y, z, e, vf_abs(inv)) * vf_abs(sz))));
+    uint32_t doubtful = vm_bits(near_edge);
     if (__builtin_expect(doubtful != 0, 0)) {
         float lanes[9][TRC_WIDTH], s[TRC_WIDTH], rt[TRC_WIDTH], ru[TRC_WIDTH], rv[TRC_WIDTH];
         uint32_t bits = vm_bits(hit);
@@ -111,7 +138,12 @@ TRC_INLINE uint32_t trc_triangle8_test(const struct trc_triangle8 *p, float ou, 
     *v = e2 * inv;
     *t = (e0 * inv * az + *u * bz + *v * cz) * sz;
     const f8 nearest = f8_min(f8_abs(e0), f8_min(f8_abs(e1), f8_abs(e2)));
+    const f8 x = f8_max(f8_abs(ax), f8_max(f8_abs(bx), f8_abs(cx)));
+    const f8 y = f8_max(f8_abs(ay), f8_max(f8_abs(by), f8_abs(cy)));
+    const f8 z = f8_max(f8_abs(az), f8_max(f8_abs(bz), f8_abs(cz)));
+    const f8 e = f8_max(f8_abs(e0), f8_max(f8_abs(e1), f8_abs(e2)));
     uint32_t doubtful = hit & f8_le(nearest, f8_set(TRC_TINY_EDGE));
+    hit &= doubtful | ~f8_le(*t, trc_t_error8(x, y, z, e, f8_abs(inv)) * f8_set(fabsf(sz)));
     for (; __builtin_expect(doubtful != 0, 0); doubtful &= doubtful - 1) {
         const int i = __builtin_ctz(doubtful);
         const float a[3] = {ax[i], ay[i], az[i]}, b[3] = {bx[i], by[i], bz[i]};

@@ -22,6 +22,7 @@ struct job {
     const float *positions; /* of the key */
     float *normals;         /* of the key */
     struct face *faces;
+    const atomic_uint *cancel;
 };
 
 /* Abramowitz and Stegun 4.4.46: the arc cosine to 2e-8, several times faster than acos. */
@@ -73,6 +74,8 @@ static void make_face(const float *p0, const float *p1, const float *p2, struct 
 static void face_task(void *context, uint32_t index, uint32_t worker) {
     (void)worker;
     const struct job *job = context;
+    if (atomic_load_explicit(job->cancel, memory_order_relaxed))
+        return;
     const uint32_t count = job->mesh->triangle_count;
     const uint32_t begin = index * CHUNK, end = count - begin > CHUNK ? begin + CHUNK : count;
     for (uint32_t t = begin; t < end; t++) {
@@ -85,6 +88,8 @@ static void face_task(void *context, uint32_t index, uint32_t worker) {
 static void vertex_task(void *context, uint32_t index, uint32_t worker) {
     (void)worker;
     const struct job *job = context;
+    if (atomic_load_explicit(job->cancel, memory_order_relaxed))
+        return;
     const uint32_t count = job->mesh->vertex_count;
     const uint32_t begin = index * CHUNK, end = count - begin > CHUNK ? begin + CHUNK : count;
     for (uint32_t v = begin; v < end; v++) {
@@ -150,8 +155,8 @@ trc_status trc_geometry_finish(struct trc_mesh *mesh, struct trc_pool *pool,
     }
     bool cancelled = false;
     for (uint32_t key = 0; key < mesh->key_count && !cancelled; key++) {
-        struct job job = {mesh, topology, mesh->positions + per_key * key, normals + per_key * key,
-                          faces};
+        struct job job = {mesh,  topology, mesh->positions + per_key * key, normals + per_key * key,
+                          faces, cancel};
         trc_pool_run(pool, (mesh->triangle_count + CHUNK - 1) / CHUNK, face_task, &job);
         trc_pool_run(pool, (mesh->vertex_count + CHUNK - 1) / CHUNK, vertex_task, &job);
         cancelled = atomic_load(cancel) != 0;

@@ -1,0 +1,616 @@
+/* Lights: irradiance against closed forms and against figures measured on Cycles 3.4, densities that integrate to
+ * one, light samples and rays that agree on them, many lights through the tree. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "core/core.h"
+#include "kernels/light.h"
+#include "kernels/light_select.h"
+#include "kernels/wide_math.h"
+#include "shading/lights.h"
+#include "wide_test.h"
+
+#define SAMPLES (1 << 18)
+#define MESH_TRIANGLES 600
+
+/* ---- a scene by hand ---- */
+
+struct scene {
+    struct trc_snapshot snapshot;
+    struct trc_light_table *table;
+    struct trc_mesh mesh, *meshes[1];
+    struct trc_instance instance;
+    struct trc_affine to_world[2];
+    struct trc_material material, plain, *materials[2];
+    uint32_t slots[2];
+    float positions[2 * 9 * MESH_TRIANGLES];
+    uint32_t indices[3 * MESH_TRIANGLES];
+    uint16_t material_index[MESH_TRIANGLES];
+};
+
+static const struct trc_affine identity = {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
+
+static void scene_begin(struct scene *s) {
+    memset(s, 0, sizeof *s);
+    s->meshes[0] = &s->mesh;
+    s->materials[0] = &s->material;
+    s->materials[1] = &s->plain;
+    s->slots[1] = 1;
+    s->mesh.key_count = 1;
+    s->mesh.positions = s->positions;
+    s->mesh.indices = s->indices;
+    s->mesh.material_index = s->material_index;
+    s->to_world[0] = s->to_world[1] = identity;
+    s->instance.key_count = 1;
+    s->instance.object_to_world = s->to_world;
+    s->instance.world_to_object = s->to_world;
+    s->instance.visibility = TRC_VISIBLE_ALL;
+    s->instance.materials = s->slots;
+    s->instance.material_count = 2;
+    s->snapshot.meshes = s->meshes;
+    s->snapshot.materials = s->materials;
+    s->snapshot.instances = &s->instance;
+    s->snapshot.mesh_count = 1;
+    s->snapshot.material_count = 2;
+    s->snapshot.world.material = UINT32_MAX;
+    s->snapshot.world.visibility = TRC_VISIBLE_ALL;
+    s->snapshot.world.is_constant = 1;
+}
+static void scene_emit(struct scene *s, float r, float g, float b) {
+    s->material.has = TRC_MATERIAL_HAS_EMISSION;
+    s->material.emission[0] = r;
+    s->material.emission[1] = g;
+    s->material.emission[2] = b;
+}
+static void scene_triangle(struct scene *s, const float corners[9], uint16_t material) {
+    const uint32_t n = s->mesh.triangle_count++;
+    memcpy(s->positions + 9 * n, corners, 9 * sizeof(float));
+    for (uint32_t k = 0; k < 3; k++)
+        s->indices[3 * n + k] = 3 * n + k;
+    s->material_index[n] = material;
+    s->mesh.vertex_count = 3 * s->mesh.triangle_count;
+    s->snapshot.instance_count = 1;
+}
+static void scene_commit(struct scene *s, const trc_light_desc *lights, uint32_t count) {
+    assert_int_equal(trc_light_table_create(&s->snapshot, lights, count, NULL, &s->table), TRC_OK);
+    s->snapshot.lights = s->table;
+}
+static void scene_end(struct scene *s) { trc_light_table_destroy(s->table); }
+
+/* A lamp of 100 W at height z above the origin, shining down. */
+static trc_light_desc lamp(uint32_t type, float x, float y, float z) {
+    trc_light_desc d;
+    memset(&d, 0, sizeof d);
+    d.struct_size = sizeof d;
+    d.type = type;
+    d.transform[0] = d.transform[5] = d.transform[10] = 1.0f;
+    d.transform[3] = x;
+    d.transform[7] = y;
+    d.transform[11] = z;
+    d.color[0] = d.color[1] = d.color[2] = 1.0f;
+    d.strength = 100.0f;
+    d.size_x = d.size_y = 1.0f;
+    d.spread = 3.14159265f;
+    d.spot_angle = 3.0f;
+    d.visibility = TRC_VISIBLE_ALL;
+    d.cast_shadow = d.use_mis = 1;
+    return d;
+}
+
+static struct trc_surface receiver(const struct scene *scene, double x, double y, double z) {
+    struct trc_surface s;
+    memset(&s, 0, sizeof s);
+    s.snapshot = &scene->snapshot;
+    s.active = vm_all_set();
+    s.p = v3(vf_set((float)x), vf_set((float)y), vf_set((float)z));
+    s.n = s.ng = v3(vf_zero(), vf_zero(), vf_one());
+    return s;
+}
+
+/* ---- estimates ---- */
+
+struct estimate {
+    double value, error;
+};
+
+/* Irradiance at the point through light samples. */
+static struct estimate irradiance(const struct trc_surface *s) {
+    struct test_random random = test_random_seed(7);
+    double sum = 0, sum2 = 0;
+    for (int i = 0; i < SAMPLES; i += TRC_WIDTH) {
+        struct trc_light_sample l;
+        const vfloat u0 = test_wide_uniform(&random), u1 = test_wide_uniform(&random);
+        TRC_KERNEL(trc_light_sample)(s, s->n, u0, u1, test_wide_uniform(&random), &l);
+        const vfloat e = vf_where(l.valid, l.radiance.y * vf_max(v3_dot(s->n, l.wi), vf_zero()) / l.pdf);
+        for (int k = 0; k < TRC_WIDTH; k++) {
+            const double v = (double)vf_get(e, k);
+            assert_true(isfinite(v) && v >= 0);
+            sum += v;
+            sum2 += v * v;
+        }
+    }
+    const double mean = sum / SAMPLES;
+    return (struct estimate){mean, sqrt(fmax(sum2 / SAMPLES - mean * mean, 0) / SAMPLES)};
+}
+
+static void expect(const char *what, struct estimate e, double want) {
+    printf("  %-34s %.6f +- %.6f, expected %.6f\n", what, e.value, e.error, want);
+    assert_true(fabs(e.value - want) <= 5 * e.error + 2e-4 * want);
+}
+
+static double one_lamp(trc_light_desc d, double *error) {
+    struct scene s;
+    scene_begin(&s);
+    scene_commit(&s, &d, 1);
+    const struct trc_surface r = receiver(&s, 0, 0, 0);
+    const struct estimate e = irradiance(&r);
+    *error = e.error;
+    scene_end(&s);
+    return e.value;
+}
+
+/* Irradiance of a polygon of unit radiance above the plane z = 0 at the origin (Lambert 1760). */
+static double polygon(const double (*corner)[3], int count) {
+    double sum = 0;
+    for (int i = 0; i < count; i++) {
+        const double *a = corner[i], *b = corner[(i + 1) % count];
+        const double la = sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
+        const double lb = sqrt(b[0] * b[0] + b[1] * b[1] + b[2] * b[2]);
+        const double c = (a[0] * b[0] + a[1] * b[1] + a[2] * b[2]) / (la * lb);
+        const double n[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
+                             a[0] * b[1] - a[1] * b[0]};
+        const double size = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+        sum += acos(fmin(fmax(c, -1), 1)) * n[2] / size;
+    }
+    return 0.5 * fabs(sum);
+}
+
+static void lamps_have_cycles_units(void **state) {
+    (void)state;
+    struct estimate e;
+    /* Figures of Cycles 3.4 are radiances of a diffuse plane of albedo 0.8. */
+    const double to_plane = 0.8 / M_PI;
+    const float radii[] = {0.0f, 0.3f, 2.0f};
+    const double points[] = {0.126648, 0.125942, 0.101320};
+    for (int i = 0; i < 3; i++) {
+        trc_light_desc d = lamp(TRC_LIGHT_POINT, 0, 0, 4);
+        d.radius = radii[i];
+        e.value = one_lamp(d, &e.error);
+        expect("point", e, points[i] / to_plane);
+        expect("point, closed form", e, 100 / (4 * M_PI) / (16 + (double)radii[i] * (double)radii[i]));
+    }
+    trc_light_desc spot = lamp(TRC_LIGHT_SPOT, 0, 0, 4);
+    spot.radius = 2.0f;
+    e.value = one_lamp(spot, &e.error);
+    expect("spot, radius 2", e, 0.096071 / to_plane);
+    trc_light_desc sun = lamp(TRC_LIGHT_SUN, 0, 0, 0);
+    sun.strength = 3.0f;
+    e.value = one_lamp(sun, &e.error);
+    expect("sun", e, 3.0);
+    sun.angle = 0.174532925f;
+    e.value = one_lamp(sun, &e.error);
+    expect("sun, 10 degrees", e, 3.0 * 0.762488 / 0.763921);
+    sun.angle = 2.0943951f;
+    e.value = one_lamp(sun, &e.error);
+    expect("sun, 120 degrees", e, 3.0 * 0.509295 / 0.763921);
+    trc_light_desc area = lamp(TRC_LIGHT_AREA, 0, 0, 4);
+    e.value = one_lamp(area, &e.error);
+    expect("area", e, 0.3898 / to_plane);
+    area.spread = 1.57079633f;
+    e.value = one_lamp(area, &e.error);
+    expect("area, spread 90 degrees", e, 1.6433 / to_plane);
+}
+
+static void areas_match_closed_forms(void **state) {
+    (void)state;
+    struct estimate e;
+    const float heights[] = {0.02f, 0.5f, 3.0f, 40.0f};
+    for (int i = 0; i < 4; i++) {
+        const double h = (double)heights[i];
+        trc_light_desc disk = lamp(TRC_LIGHT_AREA, 0, 0, heights[i]);
+        disk.area_shape = TRC_AREA_ELLIPSE;
+        e.value = one_lamp(disk, &e.error);
+        expect("disk", e, M_PI * (100 / M_PI) * 0.25 / (0.25 + h * h));
+        trc_light_desc rectangle = lamp(TRC_LIGHT_AREA, 0.2f, -0.7f, heights[i]);
+        rectangle.size_x = 1.5f;
+        rectangle.size_y = 0.4f;
+        e.value = one_lamp(rectangle, &e.error);
+        const double x0 = 0.2 - 0.75, x1 = 0.2 + 0.75, y0 = -0.7 - 0.2, y1 = -0.7 + 0.2;
+        const double corners[4][3] = {{x0, y0, h}, {x1, y0, h}, {x1, y1, h}, {x0, y1, h}};
+        expect("rectangle", e, 100 / (4 * 0.6) * polygon(corners, 4));
+    }
+    /* Scale and mirror in the transform. */
+    trc_light_desc scaled = lamp(TRC_LIGHT_AREA, 0, 0, 1);
+    scaled.transform[0] = -2.0f;
+    scaled.transform[5] = 3.0f;
+    e.value = one_lamp(scaled, &e.error);
+    const double corners[4][3] = {{-1, -1.5, 1}, {1, -1.5, 1}, {1, 1.5, 1}, {-1, 1.5, 1}};
+    expect("scaled rectangle", e, 100.0 / 24 * polygon(corners, 4));
+    /* A diffuse world. */
+    struct scene s;
+    scene_begin(&s);
+    s.snapshot.world.material = 1;
+    for (int i = 0; i < 3; i++)
+        s.snapshot.world.radiance[i] = 2.0f;
+    scene_commit(&s, NULL, 0);
+    const struct trc_surface r = receiver(&s, 0, 0, 0);
+    expect("world", irradiance(&r), 2 * M_PI);
+    scene_end(&s);
+}
+
+static void triangles_match_closed_forms(void **state) {
+    (void)state;
+    const double scales[] = {20.0, 1.0, 0.05};
+    for (int i = 0; i < 3; i++) {
+        struct scene s;
+        scene_begin(&s);
+        scene_emit(&s, 1, 5, 2);
+        const double k = scales[i];
+        const double c[3][3] = {{-k, -0.5 * k, 1}, {k, -0.3 * k, 1.5}, {0.2 * k, 0.9 * k, 0.7}};
+        float corners[9];
+        for (int j = 0; j < 9; j++)
+            corners[j] = (float)c[j / 3][j % 3];
+        scene_triangle(&s, corners, 1);
+        scene_triangle(&s, corners, 0);
+        scene_commit(&s, NULL, 0);
+        assert_int_equal((int)trc_light_table_triangle_count(s.table), 1);
+        const struct trc_surface r = receiver(&s, 0, 0, 0);
+        expect("triangle", irradiance(&r), 5 * polygon(c, 3));
+        scene_end(&s);
+    }
+}
+
+/* ---- densities ---- */
+
+/* Density of light sampling that trc_light_hit weighs with, from the weight it gives. */
+static double implied_pdf(double seen, double radiance, double pb) {
+    const double w = seen / radiance;
+    return pb * sqrt(fmax(1.0 / w - 1.0, 0.0));
+}
+
+/* A sampled direction must be met by a ray, with the same density. */
+static void rays_agree_with_samples(void **state) {
+    (void)state;
+    trc_light_desc lights[] = {lamp(TRC_LIGHT_AREA, 0, 0, 2), lamp(TRC_LIGHT_AREA, 4, 0, 3),
+                               lamp(TRC_LIGHT_POINT, -3, 1, 2), lamp(TRC_LIGHT_SPOT, 0, 4, 3),
+                               lamp(TRC_LIGHT_SUN, 0, 0, 0)};
+    lights[1].area_shape = TRC_AREA_ELLIPSE;
+    lights[1].size_y = 0.5f;
+    lights[0].spread = 1.2f;
+    lights[0].strength = 3.0f;
+    lights[2].radius = lights[3].radius = 0.4f;
+    lights[3].spot_blend = 0.5f;
+    lights[4].angle = 0.3f;
+    lights[4].strength = 5.0f;
+    /* The sun comes from the side. */
+    lights[4].transform[2] = 0.6f;
+    lights[4].transform[6] = -0.7f;
+    lights[4].transform[10] = 0.4f;
+    struct scene s;
+    scene_begin(&s);
+    scene_commit(&s, lights, 5);
+    struct test_random random = test_random_seed(3);
+    int seen[5] = {0}, missed = 0;
+    double most = 0.0;
+    for (int i = 0; i < 20000; i += TRC_WIDTH) {
+        struct trc_surface r = receiver(&s, 0, 0, 0);
+        r.p = v3(test_wide_uniform(&random), test_wide_uniform(&random), test_wide_uniform(&random));
+        struct trc_light_sample l;
+        const vfloat u0 = test_wide_uniform(&random), u1 = test_wide_uniform(&random);
+        TRC_KERNEL(trc_light_sample)(&r, r.n, u0, u1, test_wide_uniform(&random), &l);
+        const vfloat pb = vf_set(0.7f);
+        vvec3 radiance = v3_zero();
+        const vfloat far = vf_select(vf_ge(l.distance, vf_set(TRC_FAR)), l.distance,
+                                     l.distance * vf_set(1.001f));
+        TRC_KERNEL(trc_light_hit)(&s.snapshot, r.p, r.n, l.wi, vf_zero(), far, pb, vf_one(),
+                                  vu_set(TRC_VISIBLE_GLOSSY | TRC_PATH_REFLECTED), vf_zero(), l.valid,
+                                  &radiance);
+        for (int k = 0; k < TRC_WIDTH; k++) {
+            if (!((vm_bits(l.valid) >> k) & 1u))
+                continue;
+            const double got = (double)vf_get(radiance.y, k), want = (double)vf_get(l.radiance.y, k);
+            if (got == 0.0) {
+                missed++; /* on the very rim */
+                continue;
+            }
+            seen[vi_get(l.light, k)]++;
+            /* Several lamps may lie on the way; those give more. */
+            if (got > want)
+                continue;
+            const double pdf = implied_pdf(got, want, 0.7);
+            most = fmax(most, fabs(pdf - (double)vf_get(l.pdf, k)) / (double)vf_get(l.pdf, k));
+        }
+    }
+    printf("  densities differ by %.2g at most; %d rays missed\n", most, missed);
+    assert_true(most < 5e-3);
+    assert_true(missed < 20);
+    for (int i = 0; i < 5; i++) {
+        printf("  lamp %d: %d samples\n", i, seen[i]);
+        assert_true(seen[i] > 50);
+    }
+    scene_end(&s);
+}
+
+/* The density over the sphere, from rays in all directions, is the chance of the one light: 1. */
+static void densities_integrate_to_one(void **state) {
+    (void)state;
+    for (int kind = 0; kind < 6; kind++) {
+        trc_light_desc d = lamp(TRC_LIGHT_AREA, 0.3f, 0.2f, 0.6f);
+        if (kind == 1)
+            d.area_shape = TRC_AREA_ELLIPSE;
+        if (kind == 2)
+            d = lamp(TRC_LIGHT_POINT, 0, 0, 1);
+        if (kind == 3)
+            d = lamp(TRC_LIGHT_SUN, 0, 0, 1);
+        if (kind == 4)
+            d.spread = 1.5f;
+        if (kind == 5)
+            d = lamp(TRC_LIGHT_AREA, 0.3f, 0.2f, 25.0f), d.size_x = 4.0f;
+        d.radius = 0.8f;
+        d.angle = 1.0f;
+        struct scene s;
+        scene_begin(&s);
+        scene_commit(&s, &d, 1);
+        const struct trc_surface r = receiver(&s, 0, 0, 0);
+        /* Rays into a cone that holds the light. */
+        const double cos_cone = kind == 5 ? 0.99 : 0.0;
+        const int side = 2048;
+        double sum = 0;
+        for (int i = 0; i < side; i++)
+            for (int j = 0; j < side; j += TRC_WIDTH) {
+                const vfloat u1 = vf_set(((float)i + 0.5f) / (float)side);
+                const vfloat u2 =
+                    (vi_to_float(vi_lane() + vi_set(j)) + vf_set(0.5f)) / vf_set((float)side);
+                const vvec3 wi = trc_warp_cone(vf_set((float)cos_cone), u1, u2);
+                vvec3 weighed = v3_zero(), whole = v3_zero();
+                const vuint path = vu_set(TRC_VISIBLE_GLOSSY | TRC_PATH_REFLECTED);
+                TRC_KERNEL(trc_light_hit)(&s.snapshot, r.p, r.n, wi, vf_zero(), vf_set(TRC_FAR), vf_one(),
+                                          vf_one(), path, vf_zero(), vm_all_set(), &weighed);
+                TRC_KERNEL(trc_light_hit)(&s.snapshot, r.p, r.n, wi, vf_zero(), vf_set(TRC_FAR),
+                                          vf_set(-1.0f), vf_one(), path, vf_zero(), vm_all_set(),
+                                          &whole);
+                for (int k = 0; k < TRC_WIDTH; k++)
+                    if (vf_get(weighed.y, k) > 0.0f)
+                        sum += implied_pdf((double)vf_get(weighed.y, k), (double)vf_get(whole.y, k), 1.0);
+            }
+        const double total = sum * 2 * M_PI * (1 - cos_cone) / ((double)side * side);
+        printf("  kind %d: %.5f\n", kind, total);
+        /* With slats the corners of the visible rectangle are sampled, but dark: rays do not see them. A large
+         * disk is sampled as a square. */
+        if (kind == 4 || kind == 1)
+            assert_true(total > 0.7 && total < 1.001);
+        else
+            assert_true(fabs(total - 1.0) < 3e-3);
+        scene_end(&s);
+    }
+}
+
+/* ---- many lights ---- */
+
+/* A cloud of triangles above and around the origin. */
+static void cloud(struct scene *s, int count, double corners[][3][3]) {
+    struct test_random random = test_random_seed(21);
+    scene_begin(s);
+    scene_emit(s, 3, 3, 3);
+    for (int i = 0; i < count; i++) {
+        float c[9];
+        double center[3];
+        for (int k = 0; k < 3; k++)
+            center[k] = 8.0 * ((double)test_uniform(&random) - 0.5);
+        center[2] = fabs(center[2]) + 0.9;
+        for (int k = 0; k < 9; k++) {
+            c[k] = (float)(center[k % 3] + 0.6 * ((double)test_uniform(&random) - 0.5));
+            corners[i][k / 3][k % 3] = (double)c[k];
+        }
+        scene_triangle(s, c, i % 7 == 3 ? 1 : 0);
+    }
+}
+
+static void many_triangles(void **state) {
+    (void)state;
+    static double corners[MESH_TRIANGLES][3][3];
+    static struct scene s;
+    const int counts[] = {20, 200, MESH_TRIANGLES};
+    for (int i = 0; i < 3; i++) {
+        cloud(&s, counts[i], corners);
+        scene_commit(&s, NULL, 0);
+        assert_true(s.table->is_tree == (counts[i] > 40));
+        double want = 0;
+        for (int k = 0; k < counts[i]; k++)
+            if (k % 7 != 3)
+                want += 3 * polygon(corners[k], 3);
+        const struct trc_surface r = receiver(&s, 0, 0, 0);
+        char what[40];
+        snprintf(what, sizeof what, "%d triangles", counts[i]);
+        expect(what, irradiance(&r), want);
+        scene_end(&s);
+    }
+}
+
+/* Chances by counting against chances by asking, for lists and trees; sampled lights must agree with
+ * trc_light_triangle_weight. */
+static void chances_match(void **state) {
+    (void)state;
+    static double corners[MESH_TRIANGLES][3][3];
+    static struct scene s;
+    const int counts[] = {20, 300};
+    for (int i = 0; i < 2; i++) {
+        cloud(&s, counts[i], corners);
+        trc_light_desc lights[] = {lamp(TRC_LIGHT_SUN, 0, 0, 0), lamp(TRC_LIGHT_POINT, 1, 1, 2)};
+        lights[0].strength = 2.0f;
+        scene_commit(&s, lights, 2);
+        struct trc_surface r = receiver(&s, 0.3, 0.1, 0);
+        const struct trc_receiver who = trc_receiver_make(r.p, r.n);
+        static int count[MESH_TRIANGLES + 3];
+        memset(count, 0, sizeof count);
+        struct test_random random = test_random_seed(5);
+        double worst = 0.0, chi = 0.0, sum = 0.0;
+        for (int n = 0; n < SAMPLES; n += TRC_WIDTH) {
+            struct trc_light_sample l;
+            const vfloat u0 = test_wide_uniform(&random), u1 = test_wide_uniform(&random);
+            TRC_KERNEL(trc_light_sample)(&r, r.n, u0, u1, test_wide_uniform(&random), &l);
+            struct trc_surface e = receiver(&s, 0, 0, 0);
+            const uint32_t first = s.table->first_triangle;
+            e.active = vm_andnot(l.valid, vi_lt(l.light, vi_set((int32_t)first)));
+            e.triangle = vi_gather(&s.table->triangles->triangle,
+                                   (l.light - vi_set((int32_t)first)) * vi_set(TRC_TRIANGLE_WORDS),
+                                   e.active);
+            e.p = v3_mad(l.wi, l.distance, r.p);
+            e.wo = v3_neg(l.wi);
+            const vfloat w = TRC_KERNEL(trc_light_triangle_weight)(&e, r.p, r.n, vf_one(), vf_one());
+            for (int k = 0; k < TRC_WIDTH; k++) {
+                if (vi_get(l.light, k) >= 0)
+                    count[vi_get(l.light, k)]++;
+                if ((vm_bits(e.active) >> k) & 1u) {
+                    const double pdf = implied_pdf((double)vf_get(w, k), 1.0, 1.0);
+                    /* The weight loses digits where the density is far from 1. */
+                    if (pdf > 0.1 && pdf < 30.0)
+                        worst = fmax(worst, fabs(pdf / (double)vf_get(l.pdf, k) - 1.0));
+                }
+            }
+        }
+        int degrees = 0;
+        const int lights_in_all = (int)(s.table->first_triangle + s.table->triangle_count);
+        for (int k = 0; k < lights_in_all; k++) {
+            const double chance =
+                (double)vf_get(trc_light_chance(s.table, &who, vi_set(k), vm_all_set()), 0);
+            sum += chance;
+            const double expected = chance * SAMPLES;
+            if (expected < 5.0)
+                continue;
+            chi += (count[k] - expected) * (count[k] - expected) / expected;
+            degrees++;
+        }
+        printf("  %d lights: chances sum to %.5f, chi2 %.0f of %d, weights off by %.2g\n",
+               lights_in_all, sum, chi, degrees, worst);
+        /* A branch without light loses what was given to it. */
+        assert_true(sum <= 1.0001 && sum > 0.95);
+        assert_true(chi < degrees + 6 * sqrt(2.0 * degrees));
+        assert_true(worst < 2e-2);
+        scene_end(&s);
+    }
+}
+
+static void moving_triangles(void **state) {
+    (void)state;
+    static struct scene s;
+    scene_begin(&s);
+    scene_emit(&s, 1, 1, 1);
+    const double c[3][3] = {{-1, -1, 1}, {1, -1, 1}, {0, 1, 1}};
+    float corners[9];
+    for (int j = 0; j < 9; j++)
+        corners[j] = (float)c[j / 3][j % 3];
+    scene_triangle(&s, corners, 0);
+    /* The mesh rises by 1 and the instance by 2 over the shutter. */
+    for (int j = 0; j < 9; j++)
+        s.positions[9 + j] = corners[j] + (j % 3 == 2 ? 1.0f : 0.0f);
+    s.mesh.key_count = 2;
+    s.instance.key_count = 2;
+    s.to_world[1].m[11] = 2.0f;
+    scene_commit(&s, NULL, 0);
+    for (double t = 0; t <= 1.0; t += 0.25) {
+        double now[3][3];
+        memcpy(now, c, sizeof now);
+        for (int k = 0; k < 3; k++)
+            now[k][2] += 3 * t;
+        struct trc_surface r = receiver(&s, 0, 0, 0);
+        r.time = vf_set((float)t);
+        expect("moving triangle", irradiance(&r), polygon(now, 3));
+    }
+    scene_end(&s);
+}
+
+/* ---- visibility ---- */
+
+static void hidden_lamps(void **state) {
+    (void)state;
+    trc_light_desc d = lamp(TRC_LIGHT_AREA, 0, 0, 2);
+    const vvec3 up = v3(vf_zero(), vf_zero(), vf_one());
+    struct {
+        uint32_t visibility, use_mis, path;
+        bool seen;
+    } cases[] = {
+        {TRC_VISIBLE_ALL & ~TRC_VISIBLE_CAMERA, 1, TRC_VISIBLE_CAMERA, false},
+        {TRC_VISIBLE_ALL, 1, TRC_VISIBLE_CAMERA, true},
+        {TRC_VISIBLE_ALL, 0, TRC_VISIBLE_CAMERA, true},
+        {TRC_VISIBLE_ALL, 0, TRC_VISIBLE_GLOSSY | TRC_PATH_REFLECTED, false},
+        {TRC_VISIBLE_ALL & ~TRC_VISIBLE_GLOSSY, 1, TRC_VISIBLE_GLOSSY | TRC_PATH_REFLECTED, false},
+        {TRC_VISIBLE_ALL & ~TRC_VISIBLE_GLOSSY, 1, TRC_VISIBLE_GLOSSY | TRC_VISIBLE_TRANSMISSION, true},
+        {TRC_VISIBLE_ALL & ~TRC_VISIBLE_TRANSMISSION, 1, TRC_VISIBLE_TRANSMISSION, false},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        d.visibility = cases[i].visibility;
+        d.use_mis = cases[i].use_mis;
+        struct scene s;
+        scene_begin(&s);
+        scene_commit(&s, &d, 1);
+        vvec3 radiance = v3_zero();
+        TRC_KERNEL(trc_light_hit)(&s.snapshot, v3_zero(), v3_zero(), up, vf_zero(), vf_set(5.0f),
+                                  vf_set(-1.0f), vf_one(), vu_set(cases[i].path), vf_zero(),
+                                  vm_all_set(), &radiance);
+        const float want = cases[i].seen ? 25.0f : 0.0f;
+        assert_true(fabsf(vf_get(radiance.x, 0) - want) < 1e-3f);
+        /* Rays that pass do not end at lamps; those that stop before do not see them. */
+        TRC_KERNEL(trc_light_hit)(&s.snapshot, v3_zero(), v3_zero(), up, vf_zero(), vf_set(1.9f),
+                                  vf_set(-1.0f), vf_one(), vu_set(cases[i].path), vf_zero(),
+                                  vm_all_set(), &radiance);
+        assert_true(fabsf(vf_get(radiance.x, 0) - want) < 1e-3f);
+        scene_end(&s);
+    }
+}
+
+static void dark_tables(void **state) {
+    (void)state;
+    struct scene s;
+    scene_begin(&s);
+    trc_light_desc off[] = {lamp(TRC_LIGHT_POINT, 0, 0, 1), lamp(TRC_LIGHT_AREA, 0, 0, 1)};
+    off[0].strength = 0.0f;
+    off[1].size_x = 0.0f;
+    scene_commit(&s, off, 2);
+    assert_int_equal((int)s.table->lamp_count, 0);
+    const struct trc_surface r = receiver(&s, 0, 0, 0);
+    struct trc_light_sample l;
+    TRC_KERNEL(trc_light_sample)(&r, r.n, vf_set(0.5f), vf_set(0.5f), vf_set(0.5f), &l);
+    assert_false(vm_any(l.valid));
+    scene_end(&s);
+    trc_light_table_destroy(NULL);
+}
+
+static void allocation_failures(void **state) {
+    (void)state;
+    static double corners[MESH_TRIANGLES][3][3];
+    static struct scene s;
+    cloud(&s, 100, corners);
+    const trc_light_desc d = lamp(TRC_LIGHT_POINT, 0, 0, 1);
+    const uint64_t before = trc_memory_bytes();
+    for (int64_t n = 0;; n++) {
+        trc_memory_fail_at(n, false);
+        struct trc_light_table *table = NULL;
+        const trc_status status = trc_light_table_create(&s.snapshot, &d, 1, NULL, &table);
+        trc_memory_fail_at(-1, false);
+        if (status == TRC_OK) {
+            assert_true(n > 5);
+            trc_light_table_destroy(table);
+            break;
+        }
+        assert_int_equal(status, TRC_ERROR_OUT_OF_MEMORY);
+        assert_null(table);
+        assert_true(trc_memory_bytes() == before);
+    }
+    assert_true(trc_memory_bytes() == before);
+}
+
+int main(void) {
+    if (!test_cpu_can())
+        return 77;
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(lamps_have_cycles_units),      cmocka_unit_test(areas_match_closed_forms),
+        cmocka_unit_test(triangles_match_closed_forms), cmocka_unit_test(rays_agree_with_samples),
+        cmocka_unit_test(densities_integrate_to_one),   cmocka_unit_test(many_triangles),
+        cmocka_unit_test(chances_match),                cmocka_unit_test(moving_triangles),
+        cmocka_unit_test(hidden_lamps),                 cmocka_unit_test(dark_tables),
+        cmocka_unit_test(allocation_failures),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

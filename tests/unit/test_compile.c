@@ -1,0 +1,877 @@
+/* The material compiler: what is refused, what becomes of node lists, and that folding and sharing do not
+ * change values. Programs are run on the scalar kernels. */
+#define TRC_WIDTH 1
+#define TRC_ISA scalar
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "core/core.h"
+#include "kernels/surface.h"
+#include "shading/compile.h"
+#include "shading/program.h"
+
+/* ---- node lists ---- */
+
+#define MAX_INPUTS (TRC_MAX_NODES * 4)
+
+static struct graph {
+    trc_node nodes[TRC_MAX_NODES];
+    trc_node_input inputs[MAX_INPUTS];
+    uint32_t node_count, input_count;
+    int32_t surface;
+    uint32_t flags;
+    int32_t pass_index;
+} graph;
+
+static void graph_clear(void) {
+    memset(&graph, 0, sizeof graph);
+    graph.surface = -1;
+}
+
+static trc_node_input value(float x) { return (trc_node_input){.node = -1, .value = {x, x, x}}; }
+static trc_node_input color(float r, float g, float b) {
+    return (trc_node_input){.node = -1, .value = {r, g, b}};
+}
+static trc_node_input standard(void) { return (trc_node_input){.node = -2}; }
+static trc_node_input link_to(int32_t node, uint32_t output) {
+    return (trc_node_input){.node = node, .output = output};
+}
+
+/* Adds a node and makes it the output if it is a shader; returns its number. */
+static int32_t add(uint32_t type, uint32_t mode, uint32_t count, const trc_node_input *inputs) {
+    trc_node *node = &graph.nodes[graph.node_count];
+    *node = (trc_node){.type = type, .mode = mode, .first_input = graph.input_count,
+                       .input_count = count};
+    for (uint32_t i = 0; i < count; i++) graph.inputs[graph.input_count++] = inputs[i];
+    if (type < TRC_NODE_IMAGE) graph.surface = (int32_t)graph.node_count;
+    return (int32_t)graph.node_count++;
+}
+#define ADD(type, mode, ...)                                                                       \
+    add(type, mode, sizeof((trc_node_input[]){__VA_ARGS__}) / sizeof(trc_node_input),              \
+        (trc_node_input[]){__VA_ARGS__})
+
+static int32_t add_diffuse(trc_node_input c) {
+    return ADD(TRC_NODE_DIFFUSE, 0, c, value(0), standard());
+}
+static int32_t add_emission(trc_node_input c, float strength) {
+    return ADD(TRC_NODE_EMISSION, 0, c, value(strength));
+}
+static int32_t add_mix(trc_node_input factor, int32_t first, int32_t second) {
+    return ADD(TRC_NODE_MIX_SHADER, 0, factor, link_to(first, 0), link_to(second, 0));
+}
+
+enum { PRINCIPLED_INPUTS = 22 };
+static int32_t add_principled(uint32_t mode) {
+    trc_node_input in[PRINCIPLED_INPUTS] = {
+        color(.8f, .8f, .8f), value(0), color(1, 1, 1), value(0), value(.5f), value(0), value(.5f),
+        value(0), value(0), value(0), value(.5f), value(0), value(.03f), value(1.45f), value(0),
+        value(0), color(0, 0, 0), value(1), value(1), standard(), standard(), standard()};
+    return add(TRC_NODE_PRINCIPLED, mode, PRINCIPLED_INPUTS, in);
+}
+static trc_node_input *input_of(int32_t node, uint32_t input) {
+    return &graph.inputs[graph.nodes[node].first_input + input];
+}
+
+/* ---- compiling ---- */
+
+static uint32_t index_of_image(const void *images, trc_id image) {
+    (void)images;
+    return image < 100 ? (uint32_t)image : UINT32_MAX;
+}
+
+static struct trc_names *names;
+
+static trc_status compile(struct trc_material **m) {
+    const trc_material_desc desc = {.struct_size = sizeof desc,
+                                    .node_count = graph.node_count,
+                                    .nodes = graph.nodes,
+                                    .inputs = graph.inputs,
+                                    .input_count = graph.input_count,
+                                    .surface = graph.surface,
+                                    .pass_index = graph.pass_index,
+                                    .flags = graph.flags};
+    const struct trc_compile_context context = {names, index_of_image, NULL};
+    return trc_material_compile(&desc, &context, m);
+}
+
+static struct trc_material *compiled(void) {
+    struct trc_material *m = NULL;
+    const trc_status status = compile(&m);
+    if (status != TRC_OK) fail_msg("status %d: %s", status, trc_last_message());
+    return m;
+}
+
+static uint32_t traits(void) {
+    struct trc_material *m = compiled();
+    const uint32_t has = m->has;
+    trc_material_release(m);
+    return has;
+}
+
+/* The graph must be refused with that status and a message with these words. */
+static void refused(trc_status expected, const char *first, const char *second) {
+    struct trc_material *m = NULL;
+    const uint64_t bytes = trc_memory_bytes();
+    const trc_status status = compile(&m);
+    if (status != expected || !strstr(trc_last_message(), first) ||
+        !strstr(trc_last_message(), second)) {
+        fail_msg("status %d, message: %s", status, trc_last_message());
+    }
+    assert_null(m);
+    assert_true(trc_memory_bytes() == bytes);
+}
+
+static int setup(void **state) {
+    (void)state;
+    names = trc_names_create();
+    return names ? 0 : -1;
+}
+static int teardown(void **state) {
+    (void)state;
+    trc_names_destroy(names);
+    return 0;
+}
+
+/* ---- constants ---- */
+
+static void test_constant_material(void **state) {
+    (void)state;
+    graph_clear();
+    ADD(TRC_NODE_GLOSSY, TRC_DISTRIBUTION_BECKMANN, color(.1f, .2f, .3f), value(.4f), value(0),
+        value(0), standard(), standard());
+    graph.pass_index = 7;
+    graph.flags = TRC_MATERIAL_SAMPLE_EMISSION;
+    struct trc_material *m = compiled();
+    assert_int_equal(m->leaf_count, 1);
+    assert_int_equal(m->instruction_count, 0);
+    assert_int_equal(m->pass_index, 7);
+    assert_int_equal(m->flags, TRC_MATERIAL_SAMPLE_EMISSION);
+    const struct trc_leaf *leaf = &m->leaves[0];
+    assert_int_equal(leaf->type, TRC_NODE_GLOSSY);
+    assert_int_equal(leaf->mode, TRC_DISTRIBUTION_BECKMANN);
+    assert_int_equal(leaf->operand_count, 12);
+    assert_true(leaf->weight.reg == -1 && leaf->weight.value == 1.0f);
+    const float expected[6] = {.1f, .2f, .3f, .4f, 0, 0};
+    for (int i = 0; i < 6; i++) {
+        const struct trc_operand o = m->operands[leaf->first_operand + i];
+        assert_true(o.reg == -1 && o.value == expected[i]);
+    }
+    for (int i = 6; i < 12; i++) assert_int_equal(m->operands[leaf->first_operand + i].reg, -2);
+    trc_material_release(m);
+}
+
+static void test_empty_materials(void **state) {
+    (void)state;
+    graph_clear();
+    struct trc_material *m = compiled();
+    assert_int_equal(m->leaf_count, 0);
+    assert_int_equal(m->has, 0);
+    trc_material_release(m);
+    add_diffuse(color(1, 1, 1));
+    graph.surface = -1;
+    m = compiled();
+    assert_int_equal(m->leaf_count, 0);
+    trc_material_release(m);
+}
+
+/* (2 + 3) * 4 = 20, halved by a clamped mix, as strength of a red emission. */
+static void test_folding(void **state) {
+    (void)state;
+    graph_clear();
+    const int32_t sum = ADD(TRC_NODE_MATH, TRC_MATH_ADD, value(2), value(3), value(0));
+    const int32_t product = ADD(TRC_NODE_MATH, TRC_MATH_MULTIPLY, link_to(sum, 0), value(4), value(0));
+    const int32_t mix =
+        ADD(TRC_NODE_MIX_COLOR, TRC_BLEND_MULTIPLY, value(7), link_to(product, 0), value(.5f));
+    ADD(TRC_NODE_EMISSION, 0, color(1, 0, 0), link_to(mix, 0));
+    struct trc_material *m = compiled();
+    assert_int_equal(m->instruction_count, 0);
+    assert_int_equal(m->has, TRC_MATERIAL_HAS_EMISSION);
+    assert_true(fabsf(m->emission[0] - 10) < 1e-5f && m->emission[1] == 0 && m->emission[2] == 0);
+    trc_material_release(m);
+}
+
+/* Colour to float is luminance, vector to float the mean, float to colour itself three times. */
+static void test_conversions(void **state) {
+    (void)state;
+    const struct {
+        uint32_t combine_mode;
+        float expected;
+    } cases[] = {{TRC_SEPARATE_RGB, .2126729f * .2f + .7151522f * .5f + .072175f * .8f},
+                 {TRC_SEPARATE_XYZ, .5f}};
+    for (int i = 0; i < 2; i++) {
+        graph_clear();
+        const int32_t c = ADD(TRC_NODE_COMBINE, cases[i].combine_mode, value(.2f), value(.5f), value(.8f));
+        const int32_t f = ADD(TRC_NODE_MATH, TRC_MATH_ABSOLUTE, link_to(c, 0), value(0), value(0));
+        add_emission(link_to(f, 0), 1);
+        struct trc_material *m = compiled();
+        for (int k = 0; k < 3; k++) assert_true(fabsf(m->emission[k] - cases[i].expected) < 1e-5f);
+        trc_material_release(m);
+    }
+}
+
+/* ---- sharing and dropping ---- */
+
+static int32_t add_image(trc_id image, const char *uv) {
+    const int32_t map = add(TRC_NODE_UV_MAP, 0, 0, NULL);
+    graph.nodes[map].name = uv;
+    const int32_t node = ADD(TRC_NODE_IMAGE, TRC_IMAGE_EXTEND, link_to(map, 0));
+    graph.nodes[node].image = image;
+    return node;
+}
+
+static uint32_t count_op(const struct trc_material *m, uint32_t op) {
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < m->instruction_count; i++) count += m->instructions[i].op == op;
+    return count;
+}
+
+static void test_equal_nodes_are_shared(void **state) {
+    (void)state;
+    graph_clear();
+    const int32_t a = add_image(3, "map"), b = add_image(3, "map"), c = add_image(4, "map");
+    const int32_t mix =
+        ADD(TRC_NODE_MIX_COLOR, TRC_BLEND_ADD, value(.5f), link_to(a, 0), link_to(b, 0));
+    const int32_t all =
+        ADD(TRC_NODE_MIX_COLOR, TRC_BLEND_ADD, value(.5f), link_to(mix, 0), link_to(c, 0));
+    add_diffuse(link_to(all, 0));
+    struct trc_material *m = compiled();
+    assert_int_equal(count_op(m, TRC_OP_UV), 1);
+    assert_int_equal(count_op(m, TRC_OP_IMAGE), 2);
+    assert_int_equal(m->instruction_count, 5);
+    assert_int_equal(m->has, TRC_MATERIAL_HAS_DIFFUSE | TRC_MATERIAL_HAS_PROGRAM |
+                                 TRC_MATERIAL_HAS_TEXTURE);
+    trc_material_release(m);
+}
+
+static void test_unreached_nodes_are_dropped(void **state) {
+    (void)state;
+    graph_clear();
+    const int32_t image = add_image(3, "map");
+    add(TRC_NODE_LIGHT_PATH, 0, 0, NULL);
+    const int32_t lost = add_emission(link_to(image, 0), 5);
+    const int32_t kept = add_diffuse(color(.5f, .5f, .5f));
+    add_mix(value(0), kept, lost);
+    struct trc_material *m = compiled();
+    assert_int_equal(m->instruction_count, 0);
+    assert_int_equal(m->leaf_count, 1);
+    assert_int_equal(m->has, TRC_MATERIAL_HAS_DIFFUSE);
+    trc_material_release(m);
+}
+
+/* An Image node divides by alpha only if alpha is used by what is reached. */
+static void test_alpha_of_images(void **state) {
+    (void)state;
+    for (int used = 0; used < 2; used++) {
+        graph_clear();
+        const int32_t image = add_image(3, "");
+        const int32_t principled = add_principled(0);
+        *input_of(principled, 0) = link_to(image, 0);
+        if (used) *input_of(principled, 18) = link_to(image, 1);
+        struct trc_material *m = compiled();
+        assert_int_equal(count_op(m, TRC_OP_IMAGE), 1);
+        const struct trc_instruction *last = &m->instructions[m->instruction_count - 1];
+        assert_int_equal(last->mode, TRC_IMAGE_EXTEND | (used ? TRC_IMAGE_MODE_ALPHA : 0u));
+        assert_int_equal(last->resource, 3);
+        assert_int_equal((m->has & TRC_MATERIAL_HAS_TRANSPARENCY) != 0, used);
+        trc_material_release(m);
+    }
+}
+
+static void test_unknown_images(void **state) {
+    (void)state;
+    static const trc_id ids[2] = {0, 1000};
+    for (int i = 0; i < 2; i++) {
+        graph_clear();
+        add_diffuse(link_to(add_image(ids[i], NULL), 0));
+        struct trc_material *m = compiled();
+        assert_int_equal(m->instructions[1].resource, TRC_NO_RESOURCE);
+        trc_material_release(m);
+    }
+}
+
+static void test_ramps_share_tables(void **state) {
+    (void)state;
+    static float tables[3][4 * TRC_RAMP_SIZE];
+    for (uint32_t i = 0; i < 4 * TRC_RAMP_SIZE; i++) {
+        tables[0][i] = tables[1][i] = (float)i;
+        tables[2][i] = -(float)i;
+    }
+    graph_clear();
+    const int32_t info = add(TRC_NODE_OBJECT_INFO, 0, 0, NULL);
+    int32_t ramp[3];
+    for (int i = 0; i < 3; i++) {
+        ramp[i] = ADD(TRC_NODE_COLOR_RAMP, 0, link_to(info, i == 1 ? 3 : 5));
+        graph.nodes[ramp[i]].table = tables[i];
+        graph.nodes[ramp[i]].table_count = 4 * TRC_RAMP_SIZE;
+    }
+    const int32_t mix =
+        ADD(TRC_NODE_MIX_COLOR, 0, link_to(ramp[2], 1), link_to(ramp[0], 0), link_to(ramp[1], 0));
+    add_diffuse(link_to(mix, 0));
+    struct trc_material *m = compiled();
+    assert_int_equal(m->table_count, 2 * 4 * TRC_RAMP_SIZE);
+    assert_int_equal(count_op(m, TRC_OP_RAMP), 3);
+    trc_material_release(m);
+}
+
+/* ---- the shader tree ---- */
+
+static void test_mixes_become_weights(void **state) {
+    (void)state;
+    graph_clear();
+    const int32_t a = add_diffuse(color(1, 0, 0)), b = add_diffuse(color(0, 1, 0));
+    const int32_t c = add_diffuse(color(0, 0, 1));
+    const int32_t inner = add_mix(value(.25f), a, b);
+    const int32_t outer = add_mix(value(.5f), inner, c);
+    ADD(TRC_NODE_ADD_SHADER, 0, link_to(outer, 0), link_to(a, 0));
+    struct trc_material *m = compiled();
+    assert_int_equal(m->leaf_count, 3);
+    float sum[3] = {0, 0, 0};
+    for (int i = 0; i < 3; i++) {
+        for (int k = 0; k < 3; k++) {
+            sum[k] += m->leaves[i].weight.value * m->operands[m->leaves[i].first_operand + k].value;
+        }
+    }
+    assert_true(sum[0] == 1.375f && sum[1] == .125f && sum[2] == .5f);
+    trc_material_release(m);
+}
+
+static void test_factors_are_clamped(void **state) {
+    (void)state;
+    static const float factors[4] = {-3, 0, 1, 9};
+    for (int i = 0; i < 4; i++) {
+        graph_clear();
+        const int32_t a = add_diffuse(color(1, 0, 0)), b = add_emission(color(0, 1, 0), 1);
+        add_mix(value(factors[i]), a, b);
+        assert_int_equal(traits(), i < 2 ? TRC_MATERIAL_HAS_DIFFUSE : TRC_MATERIAL_HAS_EMISSION);
+    }
+}
+
+static void test_varying_factor(void **state) {
+    (void)state;
+    graph_clear();
+    const int32_t path = add(TRC_NODE_LIGHT_PATH, 0, 0, NULL);
+    const int32_t a = add_diffuse(color(1, 0, 0)), b = add_emission(color(0, 1, 0), 1);
+    add_mix(link_to(path, 0), a, b);
+    struct trc_material *m = compiled();
+    assert_int_equal(m->leaf_count, 2);
+    assert_int_equal(m->has, TRC_MATERIAL_HAS_DIFFUSE | TRC_MATERIAL_HAS_EMISSION |
+                                 TRC_MATERIAL_EMISSION_VARIES | TRC_MATERIAL_HAS_PROGRAM |
+                                 TRC_MATERIAL_READS_LIGHT_PATH);
+    struct trc_registers regs;
+    struct trc_surface s = {.active = vm_all_set(), .path = TRC_VISIBLE_CAMERA};
+    for (int camera = 0; camera < 2; camera++) {
+        s.path = camera ? TRC_VISIBLE_CAMERA : TRC_VISIBLE_GLOSSY;
+        trc_program_run_scalar(m, &s, &regs);
+        for (int i = 0; i < 2; i++) {
+            const bool is_second = m->leaves[i].type == TRC_NODE_EMISSION;
+            assert_true(trc_operand_value(&m->leaves[i].weight, &regs) == (is_second == camera));
+        }
+    }
+    trc_material_release(m);
+}
+
+static void test_shaders_without_effect(void **state) {
+    (void)state;
+    graph_clear();
+    add_emission(color(1, 1, 1), 0);
+    assert_int_equal(traits(), 0);
+    graph_clear();
+    add_emission(color(0, 0, 0), 3);
+    assert_int_equal(traits(), 0);
+    graph_clear();
+    ADD(TRC_NODE_TRANSPARENT, 0, color(0, 0, 0));
+    assert_int_equal(traits(), 0);
+    graph_clear(); /* an empty socket */
+    ADD(TRC_NODE_MIX_SHADER, 0, value(.5f), value(0), value(0));
+    assert_int_equal(traits(), 0);
+}
+
+/* ---- traits ---- */
+
+enum {
+    D = TRC_MATERIAL_HAS_DIFFUSE, S = TRC_MATERIAL_HAS_SPECULAR, G = TRC_MATERIAL_HAS_GLOSSY,
+    R = TRC_MATERIAL_HAS_REFRACTION, T = TRC_MATERIAL_HAS_TRANSPARENCY, E = TRC_MATERIAL_HAS_EMISSION
+};
+
+static void test_traits_of_principled(void **state) {
+    (void)state;
+    static const struct {
+        uint32_t mode;
+        struct {
+            uint32_t input;
+            float value;
+        } changes[4];
+        uint32_t has;
+    } cases[] = {
+        {0, {{0, .8f}}, D | G},
+        {0, {{4, 0}}, D},                               /* no specular */
+        {0, {{3, 1}}, G},                               /* metal */
+        {0, {{3, 1}, {6, 0}}, S},                       /* polished */
+        {0, {{6, .0177f}}, D | S},                      /* alpha^2 below 1e-7 */
+        {0, {{6, .0179f}}, D | G},
+        {0, {{4, 0}, {11, 1}}, D | G},                  /* clearcoat alone */
+        {0, {{4, 0}, {11, 1}, {12, 0}}, D | S},
+        {0, {{14, 1}}, G | R},                          /* glass */
+        {0, {{14, 1}, {6, 0}}, S | R},
+        {0, {{14, 1}, {6, 0}, {15, .5f}}, S | G | R},   /* rough refraction only */
+        {1, {{14, 1}, {6, 0}, {15, .5f}}, S | R},       /* which multiscatter ignores */
+        {0, {{14, 1}, {3, 1}}, G},                      /* metal rules */
+        {0, {{14, .5f}}, D | G | R},
+        {0, {{18, .5f}}, D | G | T},
+        {0, {{18, 0}}, T},
+        {0, {{18, 2}}, D | G},
+        {0, {{16, 1}}, D | G | E},
+        {0, {{16, 1}, {17, 0}}, D | G},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        graph_clear();
+        const int32_t node = add_principled(cases[i].mode);
+        for (int k = 0; k < 4; k++) {
+            if (k && !cases[i].changes[k].input) continue;
+            *input_of(node, cases[i].changes[k].input) = value(cases[i].changes[k].value);
+        }
+        const uint32_t has = traits();
+        if (has != cases[i].has) fail_msg("case %zu: %#x, not %#x", i, has, cases[i].has);
+    }
+}
+
+/* An input that a program computes may have any value. */
+static void test_traits_of_varying_inputs(void **state) {
+    (void)state;
+    graph_clear();
+    const int32_t info = add(TRC_NODE_OBJECT_INFO, 0, 0, NULL), node = add_principled(0);
+    static const uint32_t inputs[] = {3, 6, 14, 18};
+    for (int i = 0; i < 4; i++) *input_of(node, inputs[i]) = link_to(info, 5);
+    assert_int_equal(traits(), D | S | G | R | T | TRC_MATERIAL_HAS_PROGRAM);
+}
+
+static void test_traits_of_simple_shaders(void **state) {
+    (void)state;
+    const trc_node_input white = color(1, 1, 1), n = standard();
+    graph_clear();
+    ADD(TRC_NODE_GLOSSY, TRC_DISTRIBUTION_SHARP, white, value(.5f), value(0), value(0), n, n);
+    assert_int_equal(traits(), S);
+    graph_clear();
+    ADD(TRC_NODE_GLASS, TRC_DISTRIBUTION_GGX, white, value(-.5f), value(1.5f), n);
+    assert_int_equal(traits(), S | R);
+    graph_clear();
+    ADD(TRC_NODE_REFRACTION, TRC_DISTRIBUTION_GGX, white, value(.5f), value(1.5f), n);
+    assert_int_equal(traits(), G | R);
+    graph_clear();
+    ADD(TRC_NODE_TRANSPARENT, 0, white);
+    assert_int_equal(traits(), T);
+    graph_clear();
+    ADD(TRC_NODE_TRANSLUCENT, 0, white, n);
+    assert_int_equal(traits(), TRC_MATERIAL_HAS_TRANSLUCENT);
+    graph_clear();
+    add(TRC_NODE_HOLDOUT, 0, 0, NULL);
+    assert_int_equal(traits(), TRC_MATERIAL_HAS_HOLDOUT);
+    graph_clear();
+    ADD(TRC_NODE_BACKGROUND, 0, white, value(2));
+    assert_int_equal(traits(), E);
+}
+
+static void test_emission_of_principled(void **state) {
+    (void)state;
+    graph_clear();
+    const int32_t node = add_principled(0);
+    *input_of(node, 16) = color(1, .5f, 0);
+    *input_of(node, 17) = value(4);
+    *input_of(node, 18) = value(.5f);
+    struct trc_material *m = compiled();
+    assert_true(m->emission[0] == 2 && m->emission[1] == 1 && m->emission[2] == 0);
+    trc_material_release(m);
+}
+
+/* Anisotropy without a tangent gets the one around the object's Z axis; else nothing runs. */
+static void test_default_tangent(void **state) {
+    (void)state;
+    for (int anisotropic = 0; anisotropic < 2; anisotropic++) {
+        graph_clear();
+        *input_of(add_principled(0), 7) = value(anisotropic ? .5f : 0);
+        struct trc_material *m = compiled();
+        const struct trc_operand *tangent = &m->operands[m->leaves[0].first_operand + 31];
+        assert_int_equal(m->instruction_count, anisotropic);
+        assert_true(anisotropic ? tangent->reg >= 0 : tangent->reg == -2);
+        trc_material_release(m);
+    }
+}
+
+/* ---- limits ---- */
+
+static void test_registers_are_reused(void **state) {
+    (void)state;
+    graph_clear();
+    const int32_t info = add(TRC_NODE_OBJECT_INFO, 0, 0, NULL);
+    int32_t last = info;
+    for (int i = 0; i < 3000; i++) {
+        last = ADD(TRC_NODE_MATH, TRC_MATH_MULTIPLY_ADD, link_to(last, i ? 0 : 5), value(.5f),
+                   value((float)i));
+    }
+    add_diffuse(link_to(last, 0));
+    struct trc_material *m = compiled();
+    assert_int_equal(m->instruction_count, 3001);
+    assert_int_equal(m->register_count, 1);
+    trc_material_release(m);
+}
+
+static void test_too_many_registers(void **state) {
+    (void)state;
+    graph_clear();
+    const int32_t info = add(TRC_NODE_OBJECT_INFO, 0, 0, NULL);
+    int32_t values[300];
+    for (int i = 0; i < 300; i++) {
+        values[i] = ADD(TRC_NODE_MATH, TRC_MATH_ADD, link_to(info, 5), value(1 + (float)i), value(0));
+    }
+    int32_t sum = values[0];
+    for (int i = 1; i < 300; i++) {
+        sum = ADD(TRC_NODE_MATH, TRC_MATH_ADD, link_to(sum, 0), link_to(values[i], 0), value(0));
+    }
+    add_diffuse(link_to(sum, 0));
+    refused(TRC_ERROR_TOO_LARGE, "256", "values");
+}
+
+static void test_too_many_leaves(void **state) {
+    (void)state;
+    graph_clear();
+    int32_t sum = add_diffuse(color(1, 1, 1));
+    for (int i = 0; i < TRC_MAX_LEAVES; i++) {
+        const int32_t leaf = add_diffuse(color(1, 1, 1));
+        sum = ADD(TRC_NODE_ADD_SHADER, 0, link_to(sum, 0), link_to(leaf, 0));
+    }
+    refused(TRC_ERROR_TOO_LARGE, "16", "shaders");
+}
+
+/* A ladder of mixes that all share their shaders: its tree would have 2^1000 leaves. */
+static void test_shared_shaders_do_not_multiply(void **state) {
+    (void)state;
+    graph_clear();
+    int32_t a = add_diffuse(color(1, 0, 0)), b = add_diffuse(color(0, 1, 0));
+    for (int i = 0; i < 1000; i++) {
+        const int32_t c = add_mix(value(.5f), a, b);
+        a = b;
+        b = c;
+    }
+    struct trc_material *m = compiled();
+    assert_int_equal(m->leaf_count, 2);
+    assert_true(fabsf(m->leaves[0].weight.value + m->leaves[1].weight.value - 1) < 1e-5f);
+    trc_material_release(m);
+}
+
+/* ---- what is refused ---- */
+
+static void test_refused_inputs(void **state) {
+    (void)state;
+    graph_clear();
+    add_principled(0);
+    *input_of(0, 6) = value(NAN);
+    refused(TRC_ERROR_INVALID_ARGUMENT, "node 0 (Principled)", "input 6 (roughness)");
+    *input_of(0, 6) = value(INFINITY);
+    refused(TRC_ERROR_INVALID_ARGUMENT, "node 0 (Principled)", "(roughness)");
+    *input_of(0, 6) = (trc_node_input){.node = -1, .value = {.5f, NAN, NAN}}; /* not read */
+    trc_material_release(compiled());
+    *input_of(0, 6) = standard();
+    refused(TRC_ERROR_INVALID_ARGUMENT, "(roughness)", "default");
+    *input_of(0, 6) = link_to(0, 0);
+    refused(TRC_ERROR_INVALID_ARGUMENT, "(roughness)", "not earlier");
+    *input_of(0, 6) = link_to(-3, 0);
+    refused(TRC_ERROR_INVALID_ARGUMENT, "(roughness)", "not earlier");
+    *input_of(0, 6) = link_to(INT32_MIN, 0);
+    refused(TRC_ERROR_INVALID_ARGUMENT, "(roughness)", "not earlier");
+
+    graph_clear();
+    const int32_t info = add(TRC_NODE_OBJECT_INFO, 0, 0, NULL), diffuse = add_diffuse(color(1, 1, 1));
+    *input_of(diffuse, 0) = link_to(info, 6);
+    refused(TRC_ERROR_INVALID_ARGUMENT, "(color)", "output that does not exist");
+    *input_of(diffuse, 0) = link_to(info, 1);
+    trc_material_release(compiled());
+    add_diffuse(link_to(diffuse, 0));
+    refused(TRC_ERROR_INVALID_ARGUMENT, "node 2 (Diffuse)", "to a shader");
+    graph.node_count--;
+    ADD(TRC_NODE_ADD_SHADER, 0, link_to(diffuse, 0), link_to(info, 0));
+    refused(TRC_ERROR_INVALID_ARGUMENT, "input 1 (second)", "to a value");
+}
+
+static void test_refused_nodes(void **state) {
+    (void)state;
+    graph_clear();
+    add_diffuse(color(1, 1, 1));
+    graph.nodes[0].type = 77777;
+    refused(TRC_ERROR_INVALID_ARGUMENT, "node 0", "77777");
+    graph.nodes[0].type = 0;
+    refused(TRC_ERROR_INVALID_ARGUMENT, "node 0", "type");
+    graph.nodes[0].type = TRC_NODE_DIFFUSE;
+    graph.nodes[0].mode = 3;
+    refused(TRC_ERROR_INVALID_ARGUMENT, "(Diffuse)", "mode");
+    graph.nodes[0].mode = 0;
+    graph.nodes[0].input_count = 2;
+    refused(TRC_ERROR_INVALID_ARGUMENT, "2 inputs", "3");
+    graph.nodes[0].input_count = 3;
+    graph.nodes[0].first_input = 1;
+    refused(TRC_ERROR_INVALID_ARGUMENT, "(Diffuse)", "beyond");
+    graph.nodes[0].first_input = UINT32_MAX;
+    refused(TRC_ERROR_INVALID_ARGUMENT, "(Diffuse)", "beyond");
+    graph.nodes[0].first_input = 0;
+    graph.surface = 1;
+    refused(TRC_ERROR_INVALID_ARGUMENT, "surface", "1");
+    graph.surface = -2;
+    refused(TRC_ERROR_INVALID_ARGUMENT, "surface", "-2");
+    graph.surface = add(TRC_NODE_OBJECT_INFO, 0, 0, NULL);
+    refused(TRC_ERROR_INVALID_ARGUMENT, "surface", "shader");
+    graph.surface = 0;
+    graph.flags = 64;
+    refused(TRC_ERROR_INVALID_ARGUMENT, "flags", "0x40");
+}
+
+static void test_refused_tables(void **state) {
+    (void)state;
+    static float table[4 * TRC_RAMP_SIZE];
+    graph_clear();
+    const int32_t ramp = ADD(TRC_NODE_COLOR_RAMP, 0, value(.5f));
+    refused(TRC_ERROR_INVALID_ARGUMENT, "(Color Ramp)", "table");
+    graph.nodes[ramp].table = table;
+    graph.nodes[ramp].table_count = 4 * TRC_RAMP_SIZE - 4;
+    refused(TRC_ERROR_INVALID_ARGUMENT, "(Color Ramp)", "1020");
+    graph.nodes[ramp].table_count = 4 * TRC_RAMP_SIZE;
+    trc_material_release(compiled());
+    table[17] = NAN;
+    refused(TRC_ERROR_INVALID_ARGUMENT, "(Color Ramp)", "17");
+    table[17] = 0;
+}
+
+static void test_refused_descriptors(void **state) {
+    (void)state;
+    struct trc_material *m = NULL;
+    const struct trc_compile_context context = {names, index_of_image, NULL};
+    trc_material_desc desc = {.struct_size = sizeof desc, .surface = -1};
+    assert_int_equal(trc_material_compile(NULL, &context, &m), TRC_ERROR_INVALID_ARGUMENT);
+    desc.struct_size = 4;
+    assert_int_equal(trc_material_compile(&desc, &context, &m), TRC_ERROR_STRUCT_SIZE);
+    desc.struct_size = sizeof desc;
+    desc.node_count = 1;
+    assert_int_equal(trc_material_compile(&desc, &context, &m), TRC_ERROR_INVALID_ARGUMENT);
+    desc.node_count = TRC_MAX_NODES + 1;
+    assert_int_equal(trc_material_compile(&desc, &context, &m), TRC_ERROR_TOO_LARGE);
+    desc.node_count = 0;
+    desc.input_count = UINT32_MAX;
+    assert_int_equal(trc_material_compile(&desc, &context, &m), TRC_ERROR_TOO_LARGE);
+    desc.input_count = 3;
+    assert_int_equal(trc_material_compile(&desc, &context, &m), TRC_ERROR_INVALID_ARGUMENT);
+    assert_null(m);
+    static char name[80];
+    memset(name, 'x', sizeof name - 1);
+    graph_clear();
+    add_diffuse(link_to(add_image(1, name), 0));
+    refused(TRC_ERROR_TOO_LARGE, "name", "63");
+}
+
+/* ---- values survive ---- */
+
+static uint32_t random_state;
+static uint32_t random_below(uint32_t n) {
+    random_state = random_state * 1664525u + 1013904223u;
+    return (random_state >> 8) % n;
+}
+/* Never exactly 0 or 1, which short cuts look for. */
+static float random_value(void) {
+    return ((float)random_below(1u << 20) + .37f) / (float)(1u << 18) - 1.3f;
+}
+
+static const struct {
+    uint32_t type, modes;
+    const char *inputs;
+} random_types[] = {
+    {TRC_NODE_MATH, TRC_MATH_DEGREES + 1, "fff"},
+    {TRC_NODE_MIX_COLOR, TRC_BLEND_EXCLUSION + 1, "fcc"},
+    {TRC_NODE_VECTOR_MATH, TRC_VECTOR_FRACT + 1, "cccf"},
+    {TRC_NODE_SEPARATE, 4, "c"},
+    {TRC_NODE_COMBINE, 4, "fff"},
+    {TRC_NODE_CLAMP, 2, "fff"},
+    {TRC_NODE_MAP_RANGE, 1, "fffff"},
+    {TRC_NODE_GAMMA, 1, "cf"},
+    {TRC_NODE_INVERT, 1, "fc"},
+    {TRC_NODE_HUE_SATURATION, 1, "ffffc"},
+    {TRC_NODE_BRIGHT_CONTRAST, 1, "cff"},
+    {TRC_NODE_CHECKER, 1, "cccf"},
+    {TRC_NODE_MAPPING, 4, "cccc"},
+    {TRC_NODE_RGB_TO_BW, 1, "c"},
+};
+static uint32_t outputs_of(uint32_t type) {
+    return type == TRC_NODE_SEPARATE ? 3 : type == TRC_NODE_CHECKER || type == TRC_NODE_VECTOR_MATH ? 2 : 1;
+}
+
+/* A random graph of operations on constants. If hidden, each constant is multiplied by the random number of
+ * the object, which is 1 when the program runs: nothing can be folded. */
+static void random_graph(uint32_t seed, bool hidden) {
+    int32_t made[24];
+    random_state = seed;
+    graph_clear();
+    const int32_t info = add(TRC_NODE_OBJECT_INFO, 0, 0, NULL);
+    for (int n = 0; n < 24; n++) {
+        const uint32_t t = random_below(sizeof random_types / sizeof *random_types);
+        const uint32_t count = (uint32_t)strlen(random_types[t].inputs);
+        trc_node_input in[8];
+        for (uint32_t i = 0; i < count; i++) {
+            if (n && random_below(2)) {
+                const int32_t from = made[random_below((uint32_t)n)];
+                in[i] = link_to(from, random_below(outputs_of(graph.nodes[from].type)));
+                continue;
+            }
+            in[i] = color(random_value(), random_value(), random_value());
+            if (!hidden) continue;
+            in[i] = link_to(ADD(TRC_NODE_VECTOR_MATH, TRC_VECTOR_SCALE, in[i], value(0), value(0),
+                                link_to(info, 5)),
+                            0);
+            if (random_types[t].inputs[i] == 'f') { /* the first component, not the mean */
+                in[i] = link_to(ADD(TRC_NODE_SEPARATE, 0, in[i]), 0);
+            }
+        }
+        made[n] = add(random_types[t].type, random_below(random_types[t].modes), count, in);
+    }
+    add_emission(link_to(made[23], 0), 1);
+}
+
+static void test_folded_equals_run(void **state) {
+    (void)state;
+    struct trc_instance instance = {.random = 1.0f};
+    struct trc_mesh mesh = {.default_uv = -1}, *meshes[1] = {&mesh};
+    const struct trc_snapshot snapshot = {.instance_count = 1, .instances = &instance,
+                                          .mesh_count = 1, .meshes = meshes};
+    const struct trc_surface s = {.snapshot = &snapshot, .active = vm_all_set()};
+    static struct trc_registers regs;
+    uint32_t programs = 0;
+    for (uint32_t seed = 1; seed <= 3000; seed++) {
+        random_graph(seed, false);
+        struct trc_material *folded = compiled();
+        assert_int_equal(folded->instruction_count, 0);
+        random_graph(seed, true);
+        struct trc_material *run = compiled();
+        if (folded->leaf_count == 1 && run->leaf_count == 1) {
+            programs += run->instruction_count > 0;
+            trc_program_run_scalar(run, &s, &regs);
+            for (int c = 0; c < 3; c++) {
+                const float a = folded->operands[folded->leaves[0].first_operand + c].value;
+                const float b =
+                    trc_operand_value(&run->operands[run->leaves[0].first_operand + c], &regs);
+                if (memcmp(&a, &b, sizeof a) != 0 && !(isnan(a) && isnan(b)) && a != b) {
+                    fail_msg("seed %u: folded %.9g, run %.9g", seed, a, b);
+                }
+            }
+        }
+        trc_material_release(folded);
+        trc_material_release(run);
+    }
+    assert_true(programs > 1000);
+}
+
+/* Random node lists, mostly nonsense: compiled or refused, never worse. */
+static void test_random_descriptors(void **state) {
+    (void)state;
+    const uint64_t bytes = trc_memory_bytes();
+    uint32_t accepted = 0;
+    for (uint32_t seed = 1; seed <= 20000; seed++) {
+        random_graph(seed, seed & 1);
+        for (uint32_t i = random_below(4); i > 0; i--) {
+            trc_node *node = &graph.nodes[random_below(graph.node_count)];
+            trc_node_input *input = &graph.inputs[random_below(graph.input_count)];
+            switch (random_below(7)) {
+            case 0: node->type = random_below(100); break;
+            case 1: node->mode = random_below(2) ? random_below(512) : random_state; break;
+            case 2: node->first_input = random_below(graph.input_count + 8); break;
+            case 3: input->node = (int32_t)random_below(graph.node_count + 4) - 3; break;
+            case 4: input->output = random_below(14); break;
+            case 5: memcpy(input->value, &random_state, 4); break;
+            default: graph.surface = (int32_t)random_below(graph.node_count + 2) - 1; break;
+            }
+        }
+        struct trc_material *m = NULL;
+        if (compile(&m) == TRC_OK) accepted++;
+        trc_material_release(m);
+    }
+    assert_true(accepted > 1000);
+    assert_true(trc_memory_bytes() == bytes);
+}
+
+static void test_memory_failures(void **state) {
+    (void)state;
+    static float table[4 * TRC_RAMP_SIZE];
+    graph_clear();
+    const int32_t image = add_image(3, "map");
+    const int32_t ramp = ADD(TRC_NODE_COLOR_RAMP, 0, link_to(image, 1));
+    graph.nodes[ramp].table = table;
+    graph.nodes[ramp].table_count = 4 * TRC_RAMP_SIZE;
+    add_diffuse(link_to(ramp, 0));
+    trc_material_release(compiled()); /* the name is known now */
+    const uint64_t bytes = trc_memory_bytes();
+    trc_status status = TRC_ERROR_OUT_OF_MEMORY;
+    for (int64_t n = 0; status != TRC_OK; n++) {
+        struct trc_material *m = NULL;
+        trc_memory_fail_at(n, false);
+        status = compile(&m);
+        trc_memory_fail_at(-1, false);
+        assert_true(status == TRC_OK || status == TRC_ERROR_OUT_OF_MEMORY);
+        trc_material_release(m);
+        assert_true(trc_memory_bytes() == bytes);
+        assert_true(n < 100);
+    }
+}
+
+static void test_holders(void **state) {
+    (void)state;
+    graph_clear();
+    add_diffuse(color(1, 1, 1));
+    const uint64_t bytes = trc_memory_bytes();
+    struct trc_material *m = compiled();
+    assert_ptr_equal(trc_material_retain(m), m);
+    trc_material_release(m);
+    assert_true(trc_memory_bytes() > bytes);
+    trc_material_release(m);
+    assert_true(trc_memory_bytes() == bytes);
+    assert_null(trc_material_retain(NULL));
+    trc_material_release(NULL);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_constant_material),
+        cmocka_unit_test(test_empty_materials),
+        cmocka_unit_test(test_folding),
+        cmocka_unit_test(test_conversions),
+        cmocka_unit_test(test_equal_nodes_are_shared),
+        cmocka_unit_test(test_unreached_nodes_are_dropped),
+        cmocka_unit_test(test_alpha_of_images),
+        cmocka_unit_test(test_unknown_images),
+        cmocka_unit_test(test_ramps_share_tables),
+        cmocka_unit_test(test_mixes_become_weights),
+        cmocka_unit_test(test_factors_are_clamped),
+        cmocka_unit_test(test_varying_factor),
+        cmocka_unit_test(test_shaders_without_effect),
+        cmocka_unit_test(test_traits_of_principled),
+        cmocka_unit_test(test_traits_of_varying_inputs),
+        cmocka_unit_test(test_traits_of_simple_shaders),
+        cmocka_unit_test(test_emission_of_principled),
+        cmocka_unit_test(test_default_tangent),
+        cmocka_unit_test(test_registers_are_reused),
+        cmocka_unit_test(test_too_many_registers),
+        cmocka_unit_test(test_too_many_leaves),
+        cmocka_unit_test(test_shared_shaders_do_not_multiply),
+        cmocka_unit_test(test_refused_inputs),
+        cmocka_unit_test(test_refused_nodes),
+        cmocka_unit_test(test_refused_tables),
+        cmocka_unit_test(test_refused_descriptors),
+        cmocka_unit_test(test_folded_equals_run),
+        cmocka_unit_test(test_random_descriptors),
+        cmocka_unit_test(test_memory_failures),
+        cmocka_unit_test(test_holders),
+    };
+    return cmocka_run_group_tests(tests, setup, teardown);
+}

@@ -1,0 +1,447 @@
+/* Images: what pixels become, what is refused, and files that are damaged in every way. */
+#define _XOPEN_SOURCE 700 /* P_tmpdir */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/core.h"
+#include "image/image.h"
+
+static trc_image_desc pixels_desc(uint32_t width, uint32_t height, const void *pixels, bool is_float) {
+    return (trc_image_desc){.struct_size = sizeof(trc_image_desc),
+                            .width = width,
+                            .height = height,
+                            .alpha_mode = TRC_ALPHA_STRAIGHT,
+                            .is_float = is_float,
+                            .pixels = pixels,
+                            .pixel_bytes = (uint64_t)width * height * (is_float ? 16 : 4)};
+}
+
+static struct trc_image *loaded(const trc_image_desc *desc) {
+    struct trc_image *image = NULL;
+    const trc_status status = trc_image_load(desc, &image);
+    if (status != TRC_OK) fail_msg("status %d: %s", status, trc_last_message());
+    return image;
+}
+
+static void refused(const trc_image_desc *desc, trc_status expected) {
+    struct trc_image *image = NULL;
+    const uint64_t bytes = trc_memory_bytes();
+    const trc_status status = trc_image_load(desc, &image);
+    if (status != expected) fail_msg("status %d: %s", status, trc_last_message());
+    assert_true(trc_last_message()[0] != '\0');
+    assert_null(image);
+    assert_true(trc_memory_bytes() == bytes);
+}
+
+/* ---- pixels ---- */
+
+static void test_bytes(void **state) {
+    (void)state;
+    static const uint8_t pixels[8] = {200, 100, 50, 128, 255, 1, 2, 0};
+    static const uint8_t expected[4][8] = {
+        {100, 50, 25, 128, 0, 0, 0, 0},      /* straight: multiplied, rounded down */
+        {200, 100, 50, 128, 255, 1, 2, 0},   /* premultiplied: as it is */
+        {200, 100, 50, 128, 255, 1, 2, 0},   /* channel packed */
+        {200, 100, 50, 255, 255, 1, 2, 255}, /* none */
+    };
+    for (uint32_t mode = 0; mode < 4; mode++) {
+        trc_image_desc desc = pixels_desc(2, 1, pixels, false);
+        desc.alpha_mode = mode;
+        desc.is_srgb = 1;
+        struct trc_image *image = loaded(&desc);
+        assert_int_equal(image->format, TRC_TEXEL_U8);
+        assert_int_equal(image->is_srgb, 1);
+        assert_int_equal(image->is_associated, mode < 2);
+        assert_int_equal(image->levels[0].width, 2);
+        assert_int_equal(image->levels[0].height, 1);
+        assert_int_equal(image->bytes, 8);
+        assert_memory_equal(image->levels[0].texels, expected[mode], 8);
+        trc_image_release(image);
+    }
+}
+
+static void test_floats(void **state) {
+    (void)state;
+    static const float pixels[16] = {1, 2, 3, .5f, NAN, 1, 1, 1, 1, 1, -INFINITY, 1, 3e38f, 0, 0, 4};
+    static const float expected[16] = {.5f, 1, 1.5f, .5f};
+    const trc_image_desc desc = pixels_desc(2, 2, pixels, true);
+    struct trc_image *image = loaded(&desc);
+    assert_int_equal(image->format, TRC_TEXEL_F32);
+    assert_memory_equal(image->levels[0].texels, expected, sizeof expected);
+    assert_int_equal(image->bad_texel_count, 3); /* the last overflows when multiplied */
+    trc_image_release(image);
+}
+
+static void test_refused_pixels(void **state) {
+    (void)state;
+    static float pixels[16];
+    const trc_image_desc good = pixels_desc(2, 2, pixels, true);
+    trc_image_desc desc = good;
+    desc.struct_size = 3;
+    refused(&desc, TRC_ERROR_STRUCT_SIZE);
+    desc = good;
+    desc.width = 0;
+    refused(&desc, TRC_ERROR_INVALID_ARGUMENT);
+    desc = good;
+    desc.height = TRC_IMAGE_MAX_SIDE + 1;
+    refused(&desc, TRC_ERROR_TOO_LARGE);
+    desc = good;
+    desc.pixel_bytes--;
+    refused(&desc, TRC_ERROR_INVALID_ARGUMENT);
+    desc = good;
+    desc.pixels = (const char *)pixels + 1;
+    refused(&desc, TRC_ERROR_INVALID_ARGUMENT);
+    desc = good;
+    desc.pixels = NULL;
+    refused(&desc, TRC_ERROR_INVALID_ARGUMENT);
+    desc = good;
+    desc.path = "x.png";
+    refused(&desc, TRC_ERROR_INVALID_ARGUMENT);
+    desc = good;
+    desc.alpha_mode = 4;
+    refused(&desc, TRC_ERROR_INVALID_ARGUMENT);
+    desc = pixels_desc(65536, 65536, pixels, false);
+    refused(&desc, TRC_ERROR_TOO_LARGE);
+    desc = pixels_desc(32768, 32768, pixels, true); /* beyond what lookups can address */
+    refused(&desc, TRC_ERROR_TOO_LARGE);
+}
+
+static void test_holders(void **state) {
+    (void)state;
+    static const uint8_t pixels[4];
+    const uint64_t bytes = trc_memory_bytes();
+    const trc_image_desc desc = pixels_desc(1, 1, pixels, false);
+    struct trc_image *image = loaded(&desc);
+    assert_ptr_equal(trc_image_retain(image), image);
+    trc_image_release(image);
+    assert_int_equal(trc_image_bytes(image), 4);
+    trc_image_release(image);
+    assert_true(trc_memory_bytes() == bytes);
+    assert_null(trc_image_retain(NULL));
+    trc_image_release(NULL);
+    assert_int_equal(trc_image_bytes(NULL), 0);
+}
+
+static void test_memory_failures(void **state) {
+    (void)state;
+    static const uint8_t pixels[16];
+    const trc_image_desc desc = pixels_desc(2, 2, pixels, false);
+    for (int64_t n = 0; n < 2; n++) {
+        trc_memory_fail_at(n, false);
+        refused(&desc, TRC_ERROR_OUT_OF_MEMORY);
+        trc_memory_fail_at(-1, false);
+    }
+    struct trc_image *image = loaded(&desc);
+    trc_image_release(image);
+}
+
+/* ---- files ---- */
+
+static char path[256];
+
+static trc_image_desc file_desc(void) {
+    return (trc_image_desc){.struct_size = sizeof(trc_image_desc),
+                            .alpha_mode = TRC_ALPHA_STRAIGHT,
+                            .path = path};
+}
+
+static void write_file(const char *name, const void *bytes, size_t size) {
+    const char *folder = getenv("TMPDIR");
+    snprintf(path, sizeof path, "%s/trc_test_image_%s", folder ? folder : P_tmpdir, name);
+    FILE *file = fopen(path, "wb");
+    assert_non_null(file);
+    assert_int_equal(fwrite(bytes, 1, size, file), size);
+    assert_int_equal(fclose(file), 0);
+}
+
+#ifdef TRC_WITH_OIIO
+
+struct sample {
+    const char *name;
+    uint8_t bytes[1024];
+    size_t size;
+};
+
+static void put(struct sample *f, const void *bytes, size_t size) {
+    memcpy(f->bytes + f->size, bytes, size);
+    f->size += size;
+}
+static void put8(struct sample *f, uint8_t x) { put(f, &x, 1); }
+static void put32(struct sample *f, uint32_t x) {
+    for (int i = 0; i < 4; i++) put8(f, (uint8_t)(x >> (8 * i)));
+}
+static void put_text(struct sample *f, const char *text) { put(f, text, strlen(text) + 1); }
+
+/* 2 x 2 texels of Targa with 8 bits of alpha, the top row first. */
+static struct sample make_targa(void) {
+    struct sample f = {.name = "a.tga"};
+    static const uint8_t head[18] = {0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 0, 2, 0, 32, 0x28};
+    static const uint8_t bgra[16] = {30, 20, 10, 255, 60, 50, 40, 128, 3, 2, 1, 255, 6, 5, 4, 0};
+    put(&f, head, sizeof head);
+    put(&f, bgra, sizeof bgra);
+    return f;
+}
+
+/* 3 x 1 of 16-bit RGB. */
+static struct sample make_pnm(void) {
+    struct sample f = {.name = "b.ppm"};
+    static const uint8_t rgb[18] = {0, 0, 0x12, 0x34, 0xff, 0xff, 1, 0, 2, 0, 3, 0, 4, 0, 5, 0, 6, 0};
+    put(&f, "P6\n3 1\n65535\n", 13);
+    put(&f, rgb, sizeof rgb);
+    return f;
+}
+
+static void put_channel(struct sample *f, const char *name) {
+    put_text(f, name);
+    put32(f, 1); /* half */
+    put32(f, 0);
+    put32(f, 1);
+    put32(f, 1);
+}
+static void put_attribute(struct sample *f, const char *name, const char *type, uint32_t size) {
+    put_text(f, name);
+    put_text(f, type);
+    put32(f, size);
+}
+static void put_box(struct sample *f, const char *name) {
+    put_attribute(f, name, "box2i", 16);
+    put32(f, 0);
+    put32(f, 0);
+    put32(f, 2);
+    put32(f, 0);
+}
+
+/* 3 x 1 of half floats, not compressed: (1, 2, 4), then one with a NaN, then one with an infinity. */
+static struct sample make_exr(void) {
+    struct sample f = {.name = "c.exr"};
+    static const uint16_t rows[9] = {0x4400, 0x3c00, 0x7c00, 0x4000, 0x7e00, 0x3c00, 0x3c00, 0x3c00, 0x3c00};
+    put32(&f, 20000630);
+    put32(&f, 2);
+    put_attribute(&f, "channels", "chlist", 3 * 18 + 1);
+    put_channel(&f, "B");
+    put_channel(&f, "G");
+    put_channel(&f, "R");
+    put8(&f, 0);
+    put_attribute(&f, "compression", "compression", 1);
+    put8(&f, 0);
+    put_box(&f, "dataWindow");
+    put_box(&f, "displayWindow");
+    put_attribute(&f, "lineOrder", "lineOrder", 1);
+    put8(&f, 0);
+    put_attribute(&f, "pixelAspectRatio", "float", 4);
+    put32(&f, 0x3f800000);
+    put_attribute(&f, "screenWindowCenter", "v2f", 8);
+    put32(&f, 0);
+    put32(&f, 0);
+    put_attribute(&f, "screenWindowWidth", "float", 4);
+    put32(&f, 0x3f800000);
+    put8(&f, 0);
+    put32(&f, (uint32_t)f.size + 8);
+    put32(&f, 0);
+    put32(&f, 0);
+    put32(&f, sizeof rows);
+    put(&f, rows, sizeof rows);
+    return f;
+}
+
+/* 1 x 1 of Radiance RGBE. */
+static struct sample make_hdr(void) {
+    struct sample f = {.name = "d.hdr"};
+    static const char head[] = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\n";
+    static const uint8_t rgbe[4] = {128, 64, 32, 130};
+    put(&f, head, sizeof head - 1);
+    put(&f, rgbe, sizeof rgbe);
+    return f;
+}
+
+typedef struct sample (*sample_maker)(void);
+static const sample_maker makers[] = {make_targa, make_pnm, make_exr, make_hdr};
+#define SAMPLES (sizeof makers / sizeof *makers)
+
+static void test_targa(void **state) {
+    (void)state;
+    static const uint8_t expected[16] = {1, 2, 3, 255, 0, 0, 0, 0, 10, 20, 30, 255, 20, 25, 30, 128};
+    const struct sample f = make_targa();
+    write_file(f.name, f.bytes, f.size);
+    const trc_image_desc desc = file_desc();
+    struct trc_image *image = loaded(&desc);
+    assert_int_equal(image->format, TRC_TEXEL_U8);
+    assert_int_equal(image->is_associated, 1);
+    assert_memory_equal(image->levels[0].texels, expected, 16); /* the bottom row first */
+    trc_image_release(image);
+    remove(path);
+}
+
+static void test_16_bits(void **state) {
+    (void)state;
+    static const uint16_t expected[12] = {0, 0x1234, 0xffff, 0xffff, 0x100, 0x200,
+                                          0x300, 0xffff, 0x400, 0x500, 0x600, 0xffff};
+    const struct sample f = make_pnm();
+    write_file(f.name, f.bytes, f.size);
+    const trc_image_desc desc = file_desc();
+    struct trc_image *image = loaded(&desc);
+    assert_int_equal(image->format, TRC_TEXEL_U16);
+    assert_int_equal(image->is_associated, 0); /* it has no alpha */
+    const uint16_t *texels = image->levels[0].texels; /* OpenImageIO may round the largest down */
+    for (int i = 0; i < 12; i++) assert_in_range(texels[i], expected[i] ? expected[i] - 1 : 0, expected[i]);
+    trc_image_release(image);
+    remove(path);
+}
+
+static void test_exr(void **state) {
+    (void)state;
+    static const uint16_t expected[12] = {0x3c00, 0x4000, 0x4400, 0x3c00};
+    const struct sample f = make_exr();
+    write_file(f.name, f.bytes, f.size);
+    const trc_image_desc desc = file_desc();
+    struct trc_image *image = loaded(&desc);
+    assert_int_equal(image->format, TRC_TEXEL_F16);
+    assert_int_equal(image->bad_texel_count, 2);
+    assert_memory_equal(image->levels[0].texels, expected, sizeof expected);
+    trc_image_release(image);
+    remove(path);
+}
+
+static void test_hdr(void **state) {
+    (void)state;
+    const struct sample f = make_hdr();
+    write_file(f.name, f.bytes, f.size);
+    const trc_image_desc desc = file_desc();
+    struct trc_image *image = loaded(&desc);
+    const float *texel = image->levels[0].texels;
+    assert_int_equal(image->format, TRC_TEXEL_F32);
+    assert_true(fabsf(texel[0] - 2) < .02f && fabsf(texel[1] - 1) < .02f && texel[3] == 1);
+    trc_image_release(image);
+    remove(path);
+}
+
+/* Either an image or an error of a file; nothing is leaked. */
+static void load_damaged(void) {
+    const uint64_t bytes = trc_memory_bytes();
+    const trc_image_desc desc = file_desc();
+    struct trc_image *image = NULL;
+    const trc_status status = trc_image_load(&desc, &image);
+    if (status != TRC_OK && status != TRC_ERROR_IMAGE && status != TRC_ERROR_TOO_LARGE &&
+        status != TRC_ERROR_OUT_OF_MEMORY) {
+        fail_msg("status %d: %s", status, trc_last_message());
+    }
+    assert_true((status == TRC_OK) == (image != NULL));
+    trc_image_release(image);
+    assert_true(trc_memory_bytes() == bytes);
+}
+
+static void test_truncated_files(void **state) {
+    (void)state;
+    for (size_t k = 0; k < SAMPLES; k++) {
+        const struct sample f = makers[k]();
+        for (size_t size = 0; size < f.size; size++) {
+            write_file(f.name, f.bytes, size);
+            load_damaged();
+        }
+        remove(path);
+    }
+}
+
+static void test_corrupt_files(void **state) {
+    (void)state;
+    uint32_t random = 1;
+    for (size_t k = 0; k < SAMPLES; k++) {
+        for (int round = 0; round < 500; round++) {
+            struct sample f = makers[k]();
+            for (int change = 0; change < 3; change++) {
+                random = random * 1664525u + 1013904223u;
+                const size_t at = (random >> 8) % f.size;
+                random = random * 1664525u + 1013904223u;
+                f.bytes[at] = (uint8_t)(random >> 24);
+            }
+            write_file(f.name, f.bytes, f.size);
+            load_damaged();
+        }
+        remove(path);
+    }
+}
+
+/* A small file that claims to be huge is refused before memory is taken. */
+static void test_claimed_sizes(void **state) {
+    (void)state;
+    struct sample f = make_targa();
+    f.bytes[12] = f.bytes[13] = f.bytes[14] = f.bytes[15] = 0xff;
+    write_file(f.name, f.bytes, f.size);
+    const trc_image_desc desc = file_desc();
+    refused(&desc, TRC_ERROR_TOO_LARGE);
+    assert_non_null(strstr(trc_last_message(), "65535"));
+    remove(path);
+}
+
+static void test_missing_files(void **state) {
+    (void)state;
+    static const char *const paths[] = {"/nonexistent/image.png", "", "/", "no extension at all"};
+    for (size_t i = 0; i < sizeof paths / sizeof *paths; i++) {
+        snprintf(path, sizeof path, "%s", paths[i]);
+        const trc_image_desc desc = file_desc();
+        refused(&desc, TRC_ERROR_IMAGE);
+    }
+    write_file("e.png", "this is not a picture", 21);
+    const trc_image_desc desc = file_desc();
+    refused(&desc, TRC_ERROR_IMAGE);
+    assert_non_null(strstr(trc_last_message(), "e.png"));
+    remove(path);
+}
+
+static void test_files_without_memory(void **state) {
+    (void)state;
+    const struct sample f = make_targa();
+    write_file(f.name, f.bytes, f.size);
+    const trc_image_desc desc = file_desc();
+    for (int64_t n = 0; n < 2; n++) {
+        trc_memory_fail_at(n, false);
+        refused(&desc, TRC_ERROR_OUT_OF_MEMORY);
+        trc_memory_fail_at(-1, false);
+    }
+    remove(path);
+}
+
+#else
+
+static void test_no_files(void **state) {
+    (void)state;
+    write_file("a.tga", "", 0);
+    const trc_image_desc desc = file_desc();
+    refused(&desc, TRC_ERROR_UNSUPPORTED);
+    remove(path);
+}
+
+#endif
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_bytes),
+        cmocka_unit_test(test_floats),
+        cmocka_unit_test(test_refused_pixels),
+        cmocka_unit_test(test_holders),
+        cmocka_unit_test(test_memory_failures),
+#ifdef TRC_WITH_OIIO
+        cmocka_unit_test(test_targa),
+        cmocka_unit_test(test_16_bits),
+        cmocka_unit_test(test_exr),
+        cmocka_unit_test(test_hdr),
+        cmocka_unit_test(test_truncated_files),
+        cmocka_unit_test(test_corrupt_files),
+        cmocka_unit_test(test_claimed_sizes),
+        cmocka_unit_test(test_missing_files),
+        cmocka_unit_test(test_files_without_memory),
+#else
+        cmocka_unit_test(test_no_files),
+#endif
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
