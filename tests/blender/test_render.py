@@ -116,7 +116,7 @@ def inside_passes():
     import bpy
     import scenes
     from volley import passes
-    scene = scenes.empty()
+    scene = scenes.empty(samples=64)
     scenes.camera()
     layer = bpy.context.view_layer
     wall = scenes.wall(size=20.0, material=scenes.material(
@@ -153,7 +153,8 @@ def test_passes_hold_what_they_say(blender):
     assert not by_short["Emit"][corner][:3].any() and not by_short["Env"][..., :3].any()
     assert by_short["DiffCol"][corner][:3] == pytest.approx([0.5, 0.25, 0.75], rel=1e-3)
     combined = found["Combined"][corner][:3]
-    assert combined == pytest.approx([2.0 / np.pi * c for c in (0.5, 0.25, 0.75)], rel=1e-2)
+    # The sun's part; the small emitter adds a little.
+    assert combined == pytest.approx([2.0 / np.pi * c for c in (0.5, 0.25, 0.75)], rel=0.05)
     product = by_short["DiffDir"][corner][:3] * by_short["DiffCol"][corner][:3]
     assert product == pytest.approx(combined, rel=1e-3)
 

@@ -217,6 +217,45 @@ static void extreme_sizes(void **state) {
     }
 }
 
+/* From outside, ever farther away: the surface still turns once around the axis of the ray, so rays
+ * through the middle meet it, though its triangles are small against the distance. */
+static void seen_from_far(void **state) {
+    (void)state;
+    struct query_world world;
+    const uint32_t count = query_test_rays(USUAL_RAYS) / 4;
+    query_world_init(&world);
+    mesh_add_uv_sphere(query_world_object(&world), origin, 1.0f, 24, 32);
+    struct query_scene scene = query_test_scene(&world, false);
+    for (float distance = 1e3f; distance < 2e6f; distance *= 10.0f) {
+        struct rng rng = rng_seed(15);
+        struct ray_set rays;
+        struct hit_set hits;
+        float o[3] = {0};
+        ray_set_init(&rays);
+        hit_set_init(&hits, count);
+        for (uint32_t i = 0; i < count; i++) {
+            float target[3];
+            if (i % 64 == 0 || (i / 64 & 1)) {
+                rng_direction(&rng, o);
+                for (int axis = 0; axis < 3; axis++)
+                    o[axis] *= distance;
+            }
+            for (int axis = 0; axis < 3; axis++)
+                target[axis] = rng_range(&rng, -0.1f, 0.1f);
+            ray_set_aim(&rays, o, target, 0.0f);
+        }
+        assert_ok(hit_set_query(&hits, scene.scene, &rays, 64));
+        const uint64_t misses = batch_misses(&rays, &hits);
+        print_message("15: seen from %-29g %llu misses of %u rays\n", (double)distance,
+                      (unsigned long long)misses, count);
+        assert_int_equal(misses, 0);
+        hit_set_free(&hits);
+        ray_set_free(&rays);
+    }
+    query_scene_destroy(&scene);
+    query_world_free(&world);
+}
+
 /* ---- instances ---- */
 
 /* The mesh as it stands in the world at a time, vertices rounded once: only to aim at. */
@@ -503,6 +542,7 @@ int main(void) {
         cmocka_unit_test(far_spheres),
         cmocka_unit_test(needles_and_valence),
         cmocka_unit_test(extreme_sizes),
+        cmocka_unit_test(seen_from_far),
         cmocka_unit_test(instances),
         cmocka_unit_test(moving_spheres),
         cmocka_unit_test(static_and_moving),

@@ -77,8 +77,10 @@ class Blender:
         """The same with a window on a virtual display. The function returns a generator: what it
         yields is the seconds to let Blender draw, what it returns is the result."""
         answer, line = self._request(function, arguments)
-        display = ["xvfb-run", "-a", "-s", "-screen 0 1280x800x24"]
+        display = ["xvfb-run", "-a", "-s", "-screen 0 640x480x24"]
         line = display + [argument for argument in line if argument != "-b"]
+        position = line.index("--factory-startup")
+        line[position:position] = ["--window-geometry", "0", "0", "640", "480"]
         process = self._start(line, timeout, {"LIBGL_ALWAYS_SOFTWARE": "1"})
         return self._answer(answer, process)
 
