@@ -32,7 +32,9 @@ class Viewport:
         self._version = -1
         self._next_read = 0.0
         self._features = ""
-        self._failed = ""
+        self._samples = 0
+        self._progress = None
+        self._reported = set()  # warnings are shown once, not at every edit
 
     def free(self):
         """Stop rendering and free everything native."""
@@ -57,8 +59,7 @@ class Viewport:
         self._stop()
         self._view = None
         self._sync.update(Source(depsgraph, changes, v3d=context.space_data))
-        for message in self._sync.warnings.take():
-            engine.report({'WARNING'}, message)
+        self._report(engine, self._sync.warnings.take())
 
     def draw(self, engine, context, depsgraph):
         """Start a render if the view is another, read the film if there is more of it, draw it."""
@@ -72,6 +73,12 @@ class Viewport:
         self._draw_texture(engine, scene)
         if is_running:
             engine.tag_redraw()
+
+    def _report(self, engine, messages):
+        for message in messages:
+            if message not in self._reported:
+                self._reported.add(message)
+                engine.report({'WARNING'}, message)
 
     def _start(self, scene, view):
         self._stop()

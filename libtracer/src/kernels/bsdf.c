@@ -236,7 +236,9 @@ TRC_INLINE void sides(const struct trc_lobes *l, const struct trc_surface *s, vv
     const vfloat cos_n = v3_dot(s->n, wi), cos_g = v3_dot(s->ng, wi);
     const vmask over = vm_or(vf_gt(cos_g, vf_zero()), l->below_horizon);
     *above = vm_and(active, vm_and(vf_gt(cos_n, vf_zero()), over));
-    *below = vm_and(active, vm_and(vf_lt(cos_n, vf_zero()), vf_lt(cos_g, vf_zero())));
+    /* By the shading normal alone, as Cycles: near the silhouette of a smooth surface refraction may leave on the
+     * side of the flat triangle it came from, and still has to go on. */
+    *below = vm_and(active, vf_lt(cos_n, vf_zero()));
 }
 
 TRC_INLINE bool is_reflection(enum trc_lobe_kind kind) {
@@ -325,7 +327,6 @@ static vvec3 ideal_direction(const struct trc_lobe *lobe, const struct trc_surfa
         good = vm_and(good, vf_gt(v3_dot(s->ng, wi), vf_zero()));
     } else {
         good = vm_and(good, trc_refract(s->wo, lobe->n, lobe->ior, &wi));
-        good = vm_and(good, vf_lt(v3_dot(s->ng, wi), vf_zero()));
     }
     *weight = v3_where(good, v3_mul(lobe->weight, fresnel_of(lobe, lobe->cos_o)));
     return wi;

@@ -446,9 +446,13 @@ static void principled_specular(struct setup *c, const struct trc_leaf *leaf, vf
         lobe->tangent = leaf_tangent(c, leaf, P_TANGENT, n, number(c, leaf, P_ROTATION));
     }
     const vvec3 base = colour(c, leaf, P_BASE);
-    const vfloat bright = vf_set(0.3f) * base.x + vf_set(0.6f) * base.y + vf_set(0.1f) * base.z;
-    const vvec3 tint = mix_white(hue_of(base, bright), number(c, leaf, P_SPECULAR_TINT));
-    const vvec3 dielectric = v3_scale(tint, vf_set(0.08f) * specular);
+    vvec3 dielectric = v3_splat(vf_set(0.08f) * specular);
+    if (may_exceed_zero(c, leaf, P_SPECULAR_TINT)) {
+        const vfloat bright =
+            vf_set(0.3f) * base.x + vf_set(0.6f) * base.y + vf_set(0.1f) * base.z;
+        const vvec3 tint = mix_white(hue_of(base, bright), number(c, leaf, P_SPECULAR_TINT));
+        dielectric = v3_mul(tint, dielectric);
+    }
     const vvec3 f0 = v3_saturate(v3_lerp(dielectric, base, metallic));
     /* Cycles keeps single scattering at low roughness; where lanes disagree the missing energy is nil. */
     const bool multiple = leaf->mode == TRC_DISTRIBUTION_MULTI_GGX &&

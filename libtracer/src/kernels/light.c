@@ -74,25 +74,34 @@ TRC_INLINE vmask has_bit(vint word, int32_t bit) {
     return vi_eq(word & vi_set(bit), vi_set(bit));
 }
 
+/* Lamps that lanes chose are taken one by one while there are few of them: their data is broadcast then and only
+ * their own shape is computed. */
+#define SEPARATE_LAMPS 3
+
+static void mark_flags(const struct draw *d, vint flags, vmask m) {
+    struct trc_light_sample *out = d->out;
+    out->delta = vm_or(out->delta, vm_and(m, has_bit(flags, TRC_LAMP_DELTA)));
+    out->no_mis = vm_or(out->no_mis, vm_andnot(m, has_bit(flags, TRC_LAMP_MIS)));
+    out->casts_shadow =
+        vm_andnot(out->casts_shadow, vm_andnot(m, has_bit(flags, TRC_LAMP_CASTS_SHADOW)));
+}
+
 static void sample_chosen_lamps(const struct draw *d, vmask m) {
     const struct trc_light_table *t = d->table;
-    const vint first = vi_set(vi_get(d->light, __builtin_ctz(vm_bits(m))));
     struct trc_wide_lamp l;
-    uint32_t kinds = t->kinds;
-    /* Often all lanes chose the same one. */
-    if (!vm_any(vm_andnot(m, vi_eq(d->light, first)))) {
-        const struct trc_lamp *lamp = &t->lamps[vi_get(first, 0)];
-        l = trc_lamp_broadcast(lamp);
-        kinds = 1u << lamp->kind;
-    } else {
-        l = trc_lamp_gather(t->lamps, d->light, m);
+    for (int i = 0; i < SEPARATE_LAMPS; i++) {
+        const int32_t number = vi_get(d->light, __builtin_ctz(vm_bits(m)));
+        const vmask same = vm_and(m, vi_eq(d->light, vi_set(number)));
+        l = trc_lamp_broadcast(&t->lamps[number]);
+        sample_lamps(d, &l, 1u << t->lamps[number].kind, same);
+        mark_flags(d, l.flags, same);
+        m = vm_andnot(m, same);
+        if (!vm_any(m))
+            return;
     }
-    sample_lamps(d, &l, kinds, m);
-    struct trc_light_sample *out = d->out;
-    out->delta = vm_or(out->delta, vm_and(m, has_bit(l.flags, TRC_LAMP_DELTA)));
-    out->no_mis = vm_or(out->no_mis, vm_andnot(m, has_bit(l.flags, TRC_LAMP_MIS)));
-    out->casts_shadow =
-        vm_andnot(out->casts_shadow, vm_andnot(m, has_bit(l.flags, TRC_LAMP_CASTS_SHADOW)));
+    l = trc_lamp_gather(t->lamps, d->light, m);
+    sample_lamps(d, &l, t->kinds, m);
+    mark_flags(d, l.flags, m);
 }
 
 /* ---- triangles ---- */
@@ -248,17 +257,31 @@ TRC_INLINE int32_t single_light(const struct trc_light_table *t) {
     return t->bound_count ? t->bounds[0].light : (int32_t)t->distant[0];
 }
 
+void TRC_KERNEL(trc_light_prepare)(const struct trc_surface *s, vvec3 n,
+                                   struct trc_light_choices *out) {
+    out->p = s->p;
+    out->n = n;
+    trc_candidates_weigh(s->snapshot->lights, out);
+}
+
 void TRC_KERNEL(trc_light_sample)(const struct trc_surface *s, vvec3 n, vfloat u_select, vfloat u1,
                                   vfloat u2, struct trc_light_sample *out) {
+    struct trc_light_choices choices;
+    TRC_KERNEL(trc_light_prepare)(s, n, &choices);
+    TRC_KERNEL(trc_light_sample_prepared)(s, &choices, u_select, u1, u2, out);
+}
+
+void TRC_KERNEL(trc_light_sample_prepared)(const struct trc_surface *s,
+                                           const struct trc_light_choices *choices, vfloat u_select,
+                                           vfloat u1, vfloat u2, struct trc_light_sample *out) {
     const struct trc_snapshot *scene = s->snapshot;
     const struct trc_light_table *t = scene->lights;
     clear_sample(out);
-    struct draw d = {scene, t,  s,        trc_receiver_make(s->p, n), u1, u2, vf_one(),
-                     vi_set(-1), out};
+    struct draw d = {scene, t, s, trc_receiver_make(s->p, choices->n), u1, u2, vf_one(), vi_set(-1), out};
     if (t->single)
         d.light = vi_select(s->active, vi_set(single_light(t)), d.light);
     else if (trc_candidate_count(t) > 0)
-        d.light = trc_light_choose(t, &d.receiver, u_select, s->active, &d.chance);
+        d.light = trc_light_choose(t, choices, &d.receiver, u_select, s->active, &d.chance);
     const vmask chosen = vm_andnot(s->active, vi_lt(d.light, vi_set(0)));
     if (!vm_any(chosen))
         return;

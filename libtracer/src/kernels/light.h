@@ -33,6 +33,20 @@ struct trc_light_sample {
 void TRC_KERNEL(trc_light_sample)(const struct trc_surface *s, vvec3 n, vfloat u_select, vfloat u1,
                                   vfloat u2, struct trc_light_sample *out);
 
+/* The same in two steps, for several samples of one point: what each light may give is computed once. Up to
+ * TRC_LIGHT_CHOICES_KEPT lights are remembered, further ones are computed at each sample. */
+#define TRC_LIGHT_CHOICES_KEPT 48
+struct trc_light_choices {
+    vvec3 p, n;
+    vfloat sum;
+    vfloat kept[TRC_LIGHT_CHOICES_KEPT];
+};
+void TRC_KERNEL(trc_light_prepare)(const struct trc_surface *s, vvec3 n,
+                                   struct trc_light_choices *out);
+void TRC_KERNEL(trc_light_sample_prepared)(const struct trc_surface *s,
+                                           const struct trc_light_choices *choices, vfloat u_select,
+                                           vfloat u1, vfloat u2, struct trc_light_sample *out);
+
 /* Visibility bits (TRC_VISIBLE_*) of the light each lane chose; all bits in lanes that chose none. When the
  * scene's lights hide from nothing, the caller can skip it: trc_light_table.hides is false. */
 vuint TRC_KERNEL(trc_light_visibility)(const struct trc_snapshot *snapshot,

@@ -43,6 +43,18 @@ static vmask lamp_viewers(const struct trc_lamp *lamp, vuint path, vmask active)
     return viewers;
 }
 
+/* Lanes whose ray comes within the sphere about the lamp: most lamps are missed by all. */
+TRC_INLINE vmask near_lamp(const struct trc_lamp *lamp, vvec3 p, vvec3 wi) {
+    if (lamp->kind == TRC_KIND_SUN)
+        return vf_ge(v3_dot(v3_set(lamp->position), wi), vf_set(lamp->cos_cone));
+    const vvec3 to = v3_sub(v3_set(lamp->position), p);
+    const vfloat along = v3_dot(to, wi);
+    const float r2 = lamp->half_u * lamp->half_u + lamp->half_v * lamp->half_v;
+    /* Rounding of the difference grows with the squared distance. */
+    const vfloat d2 = v3_dot(to, to), slack = d2 * vf_set(1e-5f) + vf_set(1.001f * r2);
+    return vf_le(d2 - along * along, slack);
+}
+
 /* Distance to the lamp along the ray, infinite where it is missed; density of sampling that place, radiance. */
 static vfloat meet_lamp(const struct trc_lamp *lamp, vvec3 p, vvec3 wi, vfloat *pdf,
                         vvec3 *radiance) {
@@ -87,7 +99,10 @@ void TRC_KERNEL(trc_light_hit)(const struct trc_snapshot *snapshot, vvec3 p, vve
     for (uint32_t i = 0; i < t->seen_count; i++) {
         const uint32_t number = t->seen[i];
         const struct trc_lamp *lamp = &t->lamps[number];
-        const vmask viewers = lamp_viewers(lamp, path, active);
+        vmask viewers = vm_and(active, near_lamp(lamp, p, wi));
+        if (!vm_any(viewers))
+            continue;
+        viewers = lamp_viewers(lamp, path, viewers);
         if (!vm_any(viewers))
             continue;
         vfloat pdf = vf_zero();

@@ -7,11 +7,9 @@
 #ifndef TRACER_KERNELS_LIGHT_SELECT_H
 #define TRACER_KERNELS_LIGHT_SELECT_H
 
+#include "kernels/light.h"
 #include "kernels/wide_math.h"
 #include "shading/lights.h"
-
-/* Importances are kept for so many candidates; what is beyond is computed twice. */
-#define TRC_CANDIDATES_KEPT 48
 
 /* Who receives: the point and the normal of kernels/light.h. */
 struct trc_receiver {
@@ -63,34 +61,59 @@ TRC_INLINE vfloat trc_sin_less(vfloat cos_a, vfloat sin_a, vfloat cos_b, vfloat 
     return vf_select(vf_gt(cos_a, cos_b), vf_zero(), sin_a * cos_b - cos_a * sin_b);
 }
 
-TRC_INLINE vfloat trc_bound_importance(const struct trc_wide_bound *b,
-                                       const struct trc_receiver *r) {
+/* How a light's directions are bounded, and at what price. */
+enum trc_bound_shape {
+    TRC_BOUND_SPHERE,     /* shines everywhere */
+    TRC_BOUND_HEMISPHERE, /* one normal, 90 degrees about it: flat lights */
+    TRC_BOUND_CONE
+};
+TRC_INLINE enum trc_bound_shape trc_shape_of(const struct trc_light_bound *b) {
+    if (b->cos_o <= -1.0f)
+        return TRC_BOUND_SPHERE;
+    return b->cos_o >= 1.0f && b->cos_e == 0.0f ? TRC_BOUND_HEMISPHERE : TRC_BOUND_CONE;
+}
+
+/* Part of the light may be within 90 degrees of an axis iff cos a + sin b > 0, a the angle of its centre, b its
+ * half angle; the sum also stands for the cosine of the nearest part, without roots. */
+TRC_INLINE vfloat trc_bound_importance(const struct trc_wide_bound *b, const struct trc_receiver *r,
+                                       enum trc_bound_shape shape, bool has_radius) {
     const vvec3 d = v3_sub(b->center, r->p);
-    const vfloat d2 = v3_dot(d, d), r2 = b->radius * b->radius;
-    const vfloat inverse = vf_rcp(vf_sqrt(vf_max(d2, vf_set(1e-30f))));
+    const vfloat d2 = vf_max(v3_dot(d, d), vf_set(1e-20f));
+    const vfloat inverse = vf_rcp(vf_sqrt(d2));
     const vvec3 w = v3_scale(d, inverse);
-    /* Half angle of the sphere seen from p; within it, everything. */
-    const vfloat sin_b = vf_min(b->radius * inverse, vf_one());
-    const vmask outside = vf_lt(r2, d2);
-    const vfloat cos_b = vf_select(outside, vf_safe_sqrt(vf_one() - sin_b * sin_b), -vf_one());
-    const vfloat sin_b_or_0 = vf_where(outside, sin_b);
-    vfloat cos_l = -v3_dot(b->axis, w);
-    cos_l = vf_select(b->two_sided, vf_abs(cos_l), cos_l);
-    const vfloat sin_l = vf_safe_sqrt(vf_one() - cos_l * cos_l);
-    const vfloat cos_x = trc_cos_less(cos_l, sin_l, b->cos_o, b->sin_o);
-    const vfloat sin_x = trc_sin_less(cos_l, sin_l, b->cos_o, b->sin_o);
-    const vfloat cos_light = trc_cos_less(cos_x, sin_x, cos_b, sin_b_or_0);
-    const vfloat cos_n = v3_dot(r->n, w);
-    const vfloat sin_n = vf_safe_sqrt(vf_one() - cos_n * cos_n);
-    const vfloat bound_n = trc_cos_less(cos_n, sin_n, cos_b, sin_b_or_0);
-    const vfloat cos_receiver = vf_select(r->has_n, bound_n, vf_one());
-    /* A little tolerance for rounding; then at least 1/16 of what head-on gives, for lobes that are not
-     * diffuse. */
-    const vfloat slack = vf_set(-1e-4f);
-    const vmask reaches = vm_and(vf_gt(cos_light, b->cos_e + slack), vf_gt(cos_receiver, slack));
-    const vfloat least = vf_set(0.0625f);
-    const vfloat factor = vf_max(cos_light, least) * vf_max(cos_receiver, least);
-    return vf_where(reaches, b->intensity * factor / vf_max(vf_max(d2, r2), vf_set(1e-20f)));
+    /* Sine of the half angle of the sphere seen from p; within it, everything. */
+    vfloat sin_b = vf_zero(), fade = inverse * inverse;
+    vmask within = vm_none();
+    if (has_radius) {
+        sin_b = b->radius * inverse;
+        within = vf_ge(sin_b, vf_one());
+        sin_b = vf_min(sin_b, vf_one());
+        fade = vf_min(fade, vf_rcp(vf_max(b->radius * b->radius, vf_set(1e-20f))));
+    }
+    vfloat cos_light = vf_one();
+    vmask reaches = vm_all_set();
+    if (shape != TRC_BOUND_SPHERE) {
+        vfloat cos_l = -v3_dot(b->axis, w);
+        cos_l = vf_select(b->two_sided, vf_abs(cos_l), cos_l);
+        vfloat limit = vf_zero();
+        if (shape == TRC_BOUND_HEMISPHERE) {
+            cos_light = cos_l + sin_b;
+        } else {
+            const vfloat sin_l = vf_safe_sqrt(vf_one() - cos_l * cos_l);
+            const vfloat cos_x = trc_cos_less(cos_l, sin_l, b->cos_o, b->sin_o);
+            const vfloat sin_x = trc_sin_less(cos_l, sin_l, b->cos_o, b->sin_o);
+            const vfloat cos_b = vf_safe_sqrt(vf_one() - sin_b * sin_b);
+            cos_light = trc_cos_less(cos_x, sin_x, cos_b, sin_b);
+            limit = b->cos_e;
+        }
+        reaches = vm_or(within, vf_gt(cos_light, limit - vf_set(1e-4f)));
+    }
+    const vfloat cos_receiver = vf_select(r->has_n, v3_dot(r->n, w) + sin_b, vf_one());
+    reaches = vm_and(reaches, vm_or(within, vf_gt(cos_receiver, vf_set(-1e-4f))));
+    /* At least 1/16 of what head-on gives, for lobes that are not diffuse. */
+    const vfloat factor =
+        vf_clamp(cos_light, 0.0625f, 1.0f) * vf_clamp(cos_receiver, 0.0625f, 1.0f);
+    return vf_where(reaches, b->intensity * factor * fade);
 }
 
 /* A sun or the world: irradiance, over the horizon of n. */
@@ -118,8 +141,9 @@ TRC_INLINE vfloat trc_candidate_importance(const struct trc_light_table *t, uint
     const uint32_t placed = t->is_tree ? 1u : t->bound_count;
     if (i >= placed)
         return trc_distant_importance(t, i - placed, r);
-    const struct trc_wide_bound b = trc_bound_broadcast(&t->bounds[i]);
-    return trc_bound_importance(&b, r);
+    const struct trc_light_bound *bound = &t->bounds[i];
+    const struct trc_wide_bound b = trc_bound_broadcast(bound);
+    return trc_bound_importance(&b, r, trc_shape_of(bound), bound->radius > 0.0f);
 }
 
 /* ---- the tree ---- */
@@ -128,9 +152,19 @@ TRC_INLINE vfloat trc_candidate_importance(const struct trc_light_table *t, uint
  * anything. */
 static inline vfloat trc_tree_first_chance(const struct trc_light_table *t, vint node, vint second,
                                            const struct trc_receiver *r, vmask m) {
-    const struct trc_wide_bound a = trc_bound_gather(t->bounds, node + vi_set(1), m);
-    const struct trc_wide_bound b = trc_bound_gather(t->bounds, second, m);
-    const vfloat ia = trc_bound_importance(&a, r), ib = trc_bound_importance(&b, r);
+    struct trc_wide_bound a, b;
+    const vint lead = vi_set(vi_get(node, __builtin_ctz(vm_bits(m))));
+    if (!vm_any(vm_andnot(m, vi_eq(node, lead)))) {
+        /* Near the root lanes go together. */
+        const struct trc_light_bound *parent = &t->bounds[vi_get(lead, 0)];
+        a = trc_bound_broadcast(parent + 1);
+        b = trc_bound_broadcast(&t->bounds[parent->child]);
+    } else {
+        a = trc_bound_gather(t->bounds, node + vi_set(1), m);
+        b = trc_bound_gather(t->bounds, second, m);
+    }
+    const vfloat ia = trc_bound_importance(&a, r, TRC_BOUND_CONE, true);
+    const vfloat ib = trc_bound_importance(&b, r, TRC_BOUND_CONE, true);
     const vfloat sum = ia + ib;
     return vf_select(vf_gt(sum, vf_zero()), ia / sum, vf_set(-1.0f));
 }
@@ -188,25 +222,34 @@ static inline vfloat trc_tree_chance(const struct trc_light_table *t, const stru
 
 /* ---- both ---- */
 
+static inline void trc_candidates_weigh(const struct trc_light_table *t,
+                                        struct trc_light_choices *c) {
+    const struct trc_receiver r = trc_receiver_make(c->p, c->n);
+    const uint32_t count = t->single ? 0 : trc_candidate_count(t);
+    c->sum = vf_zero();
+    for (uint32_t i = 0; i < count; i++) {
+        const vfloat w = trc_candidate_importance(t, i, &r);
+        if (i < TRC_LIGHT_CHOICES_KEPT)
+            c->kept[i] = w;
+        c->sum = c->sum + w;
+    }
+}
+
 /* A light for every lane of m, -1 where none reaches the point; its chance. */
-static inline vint trc_light_choose(const struct trc_light_table *t, const struct trc_receiver *r,
-                                    vfloat u, vmask m, vfloat *chance) {
+static inline vint trc_light_choose(const struct trc_light_table *t,
+                                    const struct trc_light_choices *c,
+                                    const struct trc_receiver *r, vfloat u, vmask m,
+                                    vfloat *chance) {
     const uint32_t count = trc_candidate_count(t);
     const uint32_t placed = t->is_tree ? 1u : t->bound_count;
-    vfloat kept[TRC_CANDIDATES_KEPT];
-    vfloat sum = vf_zero();
-    for (uint32_t i = 0; i < count; i++) {
-        const vfloat w = trc_candidate_importance(t, i, r);
-        if (i < TRC_CANDIDATES_KEPT)
-            kept[i] = w;
-        sum = sum + w;
-    }
+    const vfloat sum = c->sum;
     vint light = vi_set(-1);
     vfloat rest = u * sum, remainder = vf_zero();
     vmask waiting = vm_and(m, vf_gt(sum, vf_zero())), to_tree = vm_none();
     *chance = vf_zero();
     for (uint32_t i = 0; i < count && vm_any(waiting); i++) {
-        const vfloat w = i < TRC_CANDIDATES_KEPT ? kept[i] : trc_candidate_importance(t, i, r);
+        const vfloat w =
+            i < TRC_LIGHT_CHOICES_KEPT ? c->kept[i] : trc_candidate_importance(t, i, r);
         vmask take = vm_and(waiting, vf_gt(w, vf_zero()));
         if (i + 1 < count)
             take = vm_and(take, vf_lt(rest, w));

@@ -138,6 +138,8 @@ TRC_INLINE struct trc_place trc_sun_sample(const struct trc_wide_lamp *l, vfloat
 
 /* What the slats let through towards -wi. */
 TRC_INLINE vfloat trc_spread_factor(const struct trc_wide_lamp *l, vvec3 wi) {
+    if (!vm_any(vf_gt(l->tan_spread, vf_zero())))
+        return vf_one();
     const vfloat c = -v3_dot(l->normal, wi);
     const vfloat tangent = vf_divide(vf_safe_sqrt(vf_one() - c * c), c);
     const vfloat factor = (vf_one() - l->tan_spread * tangent) * l->spread_scale;
@@ -159,13 +161,16 @@ TRC_INLINE struct trc_view_rectangle trc_rectangle_view(const struct trc_wide_la
     r.x1 = cx + l->half_u;
     r.y0 = cy - l->half_v;
     r.y1 = cy + l->half_v;
-    /* Light passes up to the slats' angle: a circle about the foot of the point. */
-    const vfloat inverse = vf_divide(vf_one(), l->tan_spread);
-    const vfloat limit = vf_select(vf_gt(l->tan_spread, vf_zero()), r.z * inverse, vf_set(INFINITY));
-    r.x0 = vf_max(r.x0, -limit);
-    r.x1 = vf_min(r.x1, limit);
-    r.y0 = vf_max(r.y0, -limit);
-    r.y1 = vf_min(r.y1, limit);
+    const vmask narrow = vf_gt(l->tan_spread, vf_zero());
+    if (vm_any(narrow)) {
+        /* Light passes up to the slats' angle: a circle about the foot of the point. */
+        const vfloat limit =
+            vf_select(narrow, vf_divide(r.z, l->tan_spread), vf_set(INFINITY));
+        r.x0 = vf_max(r.x0, -limit);
+        r.x1 = vf_min(r.x1, limit);
+        r.y0 = vf_max(r.y0, -limit);
+        r.y1 = vf_min(r.y1, limit);
+    }
     r.lit = vm_and(vf_gt(r.z, vf_zero()), vm_and(vf_lt(r.x0, r.x1), vf_lt(r.y0, r.y1)));
     return r;
 }
@@ -175,21 +180,28 @@ struct trc_spherical_rectangle {
     vfloat b0, b1, k, solid_angle;
     vmask small;
 };
-TRC_INLINE vfloat trc_edge_slope(vfloat offset, vfloat z) {
-    return offset * vf_rcp(vf_sqrt(z * z + offset * offset));
+/* a / sqrt(z2 + a^2) and b / sqrt(z2 + b^2), with one division. */
+TRC_INLINE void trc_edge_slopes(vfloat z2, vfloat a, vfloat b, vfloat *slope_a, vfloat *slope_b) {
+    const vfloat ra = vf_sqrt(z2 + a * a), rb = vf_sqrt(z2 + b * b);
+    const vfloat inverse = vf_rcp(ra * rb);
+    *slope_a = a * rb * inverse;
+    *slope_b = b * ra * inverse;
 }
 TRC_INLINE struct trc_spherical_rectangle trc_rectangle_angles(const struct trc_view_rectangle *r,
                                                                bool is_ellipse) {
-    /* Side at y0 runs along +x, at x1 along +y, at y1 along -x, at x0 along -y; z of the paper is -r->z. */
-    const vfloat n0 = -trc_edge_slope(r->y0, r->z), n1 = trc_edge_slope(r->x1, r->z);
-    const vfloat n2 = trc_edge_slope(r->y1, r->z), n3 = -trc_edge_slope(r->x0, r->z);
+    /* Side at y0 runs along +x, at x1 along +y, at y1 along -x, at x0 along -y; z of the paper is -r->z. An
+     * angle is acos(-a b) = pi/2 + asin(a b), which keeps its digits for small rectangles. */
+    const vfloat z2 = r->z * r->z;
+    vfloat n0, n1, n2, n3;
+    trc_edge_slopes(z2, -r->y0, r->y1, &n0, &n2);
+    trc_edge_slopes(z2, r->x1, -r->x0, &n1, &n3);
     struct trc_spherical_rectangle q;
-    const vfloat g0 = vf_acos(-n0 * n1), g1 = vf_acos(-n1 * n2);
-    const vfloat g2 = vf_acos(-n2 * n3), g3 = vf_acos(-n3 * n0);
+    const vfloat first = vf_asin(n0 * n1) + vf_asin(n1 * n2);
+    const vfloat second = vf_asin(n2 * n3) + vf_asin(n3 * n0);
     q.b0 = n0;
     q.b1 = n2;
-    q.k = vf_set(TRC_TWO_PI) - g2 - g3;
-    q.solid_angle = g0 + g1 - q.k;
+    q.k = vf_set(TRC_PI) - second;
+    q.solid_angle = first + second;
     const float small = is_ellipse ? TRC_SMALL_ELLIPSE : TRC_SMALL_RECTANGLE;
     q.small = vm_not(vf_gt(q.solid_angle, vf_set(small)));
     return q;
@@ -198,10 +210,13 @@ TRC_INLINE struct trc_spherical_rectangle trc_rectangle_angles(const struct trc_
 TRC_INLINE vfloat trc_area_density(const struct trc_wide_lamp *l, const struct trc_view_rectangle *r,
                                    const struct trc_spherical_rectangle *q, bool is_ellipse, vfloat x,
                                    vfloat y) {
+    const vfloat by_angle = vf_rcp(q->solid_angle);
+    if (!vm_any(q->small))
+        return vf_where(r->lit, by_angle);
     const vfloat d2 = x * x + y * y + r->z * r->z, cube = d2 * vf_sqrt(d2);
     const vfloat by_area = is_ellipse ? cube * l->inv_area / r->z
                                       : cube / ((r->x1 - r->x0) * (r->y1 - r->y0) * r->z);
-    return vf_where(r->lit, vf_select(q->small, by_area, vf_rcp(q->solid_angle)));
+    return vf_where(r->lit, vf_select(q->small, by_area, by_angle));
 }
 
 /* Place in the spherical rectangle (Urena et al., 3.3). */
@@ -210,14 +225,16 @@ TRC_INLINE void trc_spherical_place(const struct trc_view_rectangle *r,
                                     vfloat *x_out, vfloat *y_out) {
     vfloat sa, ca;
     vf_sincos(u1 * q->solid_angle + q->k, &sa, &ca);
-    const vfloat fu = vf_divide(ca * q->b0 - q->b1, sa);
-    const vfloat cu =
-        vf_clamp(vf_copysign(vf_rcp(vf_sqrt(fu * fu + q->b0 * q->b0)), fu), -1.0f, 1.0f);
-    const vfloat x = cu * r->z * vf_rcp(vf_max(vf_safe_sqrt(vf_one() - cu * cu), vf_set(1e-7f)));
+    /* With f = (b0 cos - b1) / sin the paper's cu is +-1 / sqrt(f^2 + b0^2), and the place along x is z cu /
+     * sqrt(1 - cu^2) = +-z / sqrt(f^2 + b0^2 - 1). */
+    const vfloat num = ca * q->b0 - q->b1;
+    const vfloat below = num * num - (vf_one() - q->b0 * q->b0) * sa * sa;
+    const vfloat ratio = sa * vf_rcp(vf_sqrt(vf_max(below, vf_set(1e-14f))));
+    const vfloat x = vf_copysign(r->z * ratio, num * sa);
     *x_out = vf_min(vf_max(x, r->x0), r->x1);
     const vfloat d2 = *x_out * *x_out + r->z * r->z, d = vf_sqrt(d2);
-    const vfloat h0 = r->y0 * vf_rcp(vf_sqrt(d2 + r->y0 * r->y0));
-    const vfloat h1 = r->y1 * vf_rcp(vf_sqrt(d2 + r->y1 * r->y1));
+    vfloat h0, h1;
+    trc_edge_slopes(d2, r->y0, r->y1, &h0, &h1);
     const vfloat h = h0 + u2 * (h1 - h0), h2 = h * h;
     const vfloat y = vf_select(vf_lt(h2, vf_set(1.0f - 1e-6f)),
                                h * d * vf_rcp(vf_safe_sqrt(vf_one() - h2)), r->y1);
@@ -230,21 +247,23 @@ TRC_INLINE struct trc_place trc_area_sample(const struct trc_wide_lamp *l, bool 
     const struct trc_spherical_rectangle q = trc_rectangle_angles(&r, is_ellipse);
     const vvec3 center = v3_sub(l->position, p);
     const vfloat cx = v3_dot(center, l->axis_u), cy = v3_dot(center, l->axis_v);
-    vfloat x, y, even_x, even_y;
+    vfloat x, y;
     trc_spherical_place(&r, &q, u1, u2, &x, &y);
     vmask inside = r.lit;
     if (is_ellipse) {
         const vfloat u = (x - cx) / l->half_u, v = (y - cy) / l->half_v;
         inside = vm_and(inside, vm_or(q.small, vf_le(u * u + v * v, vf_one())));
-        trc_warp_disk(u1, u2, &even_x, &even_y);
-        even_x = cx + even_x * l->half_u;
-        even_y = cy + even_y * l->half_v;
-    } else {
-        even_x = vf_lerp(r.x0, r.x1, u1);
-        even_y = vf_lerp(r.y0, r.y1, u2);
     }
-    x = vf_select(q.small, even_x, x);
-    y = vf_select(q.small, even_y, y);
+    if (vm_any(q.small)) {
+        vfloat even_x = vf_lerp(r.x0, r.x1, u1), even_y = vf_lerp(r.y0, r.y1, u2);
+        if (is_ellipse) {
+            trc_warp_disk(u1, u2, &even_x, &even_y);
+            even_x = cx + even_x * l->half_u;
+            even_y = cy + even_y * l->half_v;
+        }
+        x = vf_select(q.small, even_x, x);
+        y = vf_select(q.small, even_y, y);
+    }
     struct trc_place s;
     const vvec3 to = v3_sub(v3_add(v3_scale(l->axis_u, x), v3_scale(l->axis_v, y)),
                             v3_scale(l->normal, r.z));

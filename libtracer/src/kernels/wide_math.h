@@ -147,6 +147,8 @@ TRC_INLINE vfloat vf_acos(vfloat x) {
 TRC_INLINE vfloat vf_asin(vfloat x) {
     const vfloat a = vf_min(vf_abs(x), vf_one());
     const vmask large = vf_gt(a, vf_set(0.5f));
+    if (!vm_any(large)) /* the same bits without the root */
+        return vf_copysign(vf_asin_core(a, a * a), x);
     const vfloat z = vf_select(large, (vf_one() - a) * vf_set(0.5f), a * a);
     const vfloat core = vf_asin_core(vf_select(large, vf_sqrt(z), a), z);
     const vfloat outer = vf_set(TRC_HALF_PI) - (vf_set(2.0f) * core - vf_set(-4.371139e-8f));
