@@ -83,10 +83,12 @@ def apply_cycles(scene, settings):
 
 
 def apply_volley(scene, settings):
-    """The Distribution integrator; ``settings["volley"]`` overrides any property."""
+    """Distribution without clamps and filters; ``settings["volley"]`` overrides any property."""
     set_if_present(getattr(scene, "volley", None), {
         "integrator": "DISTRIBUTION", "samples": settings["samples"], "seed": settings["seed"],
-        "max_depth": settings["max_depth"], **settings["volley"]})
+        "max_depth": settings["max_depth"], "max_transparent_depth": settings["max_depth"],
+        "clamp_direct": 0.0, "clamp_indirect": 0.0, "filter_glossy": 0.0,
+        **settings["volley"]})
 
 
 def set_if_present(target, values):

@@ -10,6 +10,7 @@
 #define USUAL_RAYS 3000
 
 enum {
+    RAYS_FAR,      /* one origin, 10,000 times as far */
     RAYS_PINHOLE,  /* one origin outside */
     RAYS_INSIDE,   /* one origin, all directions: all octants in a packet */
     RAYS_BEAM,     /* origins close together, nearly parallel: a lens or an area light */
@@ -36,11 +37,11 @@ static float world_size(const struct ray_maker *m) {
                  fmaxf(m->upper[1] - m->lower[1], m->upper[2] - m->lower[2]));
 }
 
-static void point_outside(struct ray_maker *m, float p[3]) {
+static void point_outside(struct ray_maker *m, float away, float p[3]) {
     float d[3];
     rng_direction(&m->rng, d);
     for (int axis = 0; axis < 3; axis++)
-        p[axis] = 0.5f * (m->lower[axis] + m->upper[axis]) + world_size(m) * d[axis];
+        p[axis] = 0.5f * (m->lower[axis] + m->upper[axis]) + away * world_size(m) * d[axis];
 }
 
 static void aligned_direction(struct rng *rng, float d[3]) {
@@ -114,9 +115,9 @@ static void make_ray(struct ray_maker *m, uint32_t kind, const float o[3], const
     float a[3], b[3];
     memcpy(a, o, sizeof a);
     memcpy(b, d, sizeof b);
-    if (kind == RAYS_PINHOLE || kind == RAYS_BEAM) {
+    if (kind == RAYS_FAR || kind == RAYS_PINHOLE || kind == RAYS_BEAM) {
         for (int axis = 0; axis < 3; axis++) {
-            b[axis] += rng_range(&m->rng, -0.1f, 0.1f) * world_size(m);
+            b[axis] += rng_range(&m->rng, -0.2f, 0.2f) * world_size(m);
             if (kind == RAYS_BEAM)
                 a[axis] += rng_range(&m->rng, -0.02f, 0.02f) * world_size(m);
         }
@@ -144,7 +145,7 @@ static void make_packet(struct ray_maker *m, uint32_t kind) {
     if (kind == RAYS_INSIDE)
         point_within(m, o);
     else
-        point_outside(m, o);
+        point_outside(m, kind == RAYS_FAR ? 1e4f : 1.0f, o);
     point_within(m, target);
     for (int axis = 0; axis < 3; axis++)
         d[axis] = target[axis] - o[axis];

@@ -231,6 +231,13 @@ static void lowest_number_wins(void **state) {
 
 /* ---- triangles that do not count ---- */
 
+static void add_corners(struct mesh *mesh, const float p[9]) {
+    const uint32_t first = mesh->vertex_count;
+    for (int k = 0; k < 3; k++)
+        mesh_add_vertex(mesh, p[3 * k], p[3 * k + 1], p[3 * k + 2]);
+    mesh_add_triangle(mesh, first, first + 1, first + 2);
+}
+
 /* Duplicate vertices, no extent, vertices on a line: never hit, wherever rays aim. */
 static void degenerate_triangles_are_never_hit(void **state) {
     (void)state;
@@ -244,21 +251,26 @@ static void degenerate_triangles_are_never_hit(void **state) {
         {0, 0, 0, 1, 1, 1, 2, 2, 2},          {-1, -1, -1, 0, 0, 0, 3, 3, 3},
         {0, 0, 1, 0, 0, 3, 0, 0, -4},         {1, 2, 3, 3, 6, 9, 2, 4, 6},
         {0.1f, 0, 0, 0.2f, 0, 0, 0.7f, 0, 0}, {-3, 5, 0, 3, -5, 0, 0, 0, 0}};
-    const uint32_t count = sizeof corners / sizeof *corners;
-    for (uint32_t i = 0; i < count; i++) {
-        for (int k = 0; k < 3; k++)
-            mesh_add_vertex(mesh, corners[i][3 * k], corners[i][3 * k + 1], corners[i][3 * k + 2]);
-        mesh_add_triangle(mesh, 3 * i, 3 * i + 1, 3 * i + 2);
+    for (size_t i = 0; i < sizeof corners / sizeof *corners; i++)
+        add_corners(mesh, corners[i]);
+    for (uint32_t i = 0; i < 300; i++) { /* whole numbers on a line */
+        float p[9];
+        for (int axis = 0; axis < 3; axis++) {
+            const float from = (float)rng_below(&rng, 201) - 100.0f;
+            const float step = (float)rng_below(&rng, 201) - 100.0f;
+            p[axis] = from;
+            p[3 + axis] = from + step;
+            p[6 + axis] = from + 3.0f * step;
+        }
+        add_corners(mesh, p);
     }
-    for (uint32_t i = 0; i < 20000; i++) {
-        const float *p = corners[rng_below(&rng, count)];
-        const float a = (float)rng_below(&rng, 3) / 2.0f,
-                    b = (1.0f - a) * (float)rng_below(&rng, 2);
+    for (uint32_t i = 0; i < 30000; i++) {
+        const float *p = mesh->positions + 9 * (size_t)rng_below(&rng, mesh->triangle_count);
+        const float share = i % 3 ? rng_unit(&rng) : (float)rng_below(&rng, 3) / 2.0f;
         float target[3], o[3];
         for (int axis = 0; axis < 3; axis++) {
-            target[axis] = a * p[axis] + b * p[3 + axis] + (1.0f - a - b) * p[6 + axis];
-            o[axis] = i & 1 ? rng_range(&rng, -5.0f, 5.0f)
-                            : (float)rng_below(&rng, 9) - 4.0f; /* exact lines */
+            target[axis] = p[axis] + share * (p[6 + axis] - p[axis]);
+            o[axis] = i & 1 ? rng_range(&rng, -50.0f, 50.0f) : (float)rng_below(&rng, 9) - 4.0f;
         }
         ray_set_aim(&t.rays, o, target, 0.0f);
     }

@@ -24,6 +24,8 @@
 #define COORDINATE_LIMIT 1.8e18f
 /* Twice the smallest float: what underflow may add. */
 #define UNDERFLOW_ERROR 0x1p-148
+/* Largest share of a triangle's depth within which kernels may drop hits. */
+#define BLIND_SHARE 0x1p-8
 
 /* A ray in the object space of an instance, with the errors of getting there. */
 struct view {
@@ -197,6 +199,10 @@ static bool classify(const struct view *view, const double p[3][3], double verte
     c->distance_error =
         (fmin(1.0, c->barycentric_error) * (high - low) + rounding * view->condition) /
         fabs(view->d[view->z]);
+    const double share = 4.0 * c->barycentric_error + 20.0 * HALF_ULP;
+    const double farthest = fmax(fabs(low), fabs(high)) / fabs(view->d[view->z]);
+    const bool in_front = view->d[view->z] > 0.0 ? low > rounding : high < -rounding;
+    c->blind_distance = in_front ? 0.0 : fmin(share, BLIND_SHARE) * farthest * view->condition;
     return true;
 }
 
@@ -299,7 +305,8 @@ static bool may_count(const struct brute_candidate *c, double tmin, double tmax)
 }
 static bool must_count(const struct brute_candidate *c, double tmin, double tmax) {
     return c->sure && c->distance - c->distance_error > tmin &&
-           c->distance + c->distance_error < tmax;
+           c->distance + c->distance_error < tmax &&
+           fabs(c->distance) > c->blind_distance + c->distance_error;
 }
 
 static enum brute_verdict judge_hit(const struct brute_list *list, const struct ray_set *rays,

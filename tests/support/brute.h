@@ -21,6 +21,8 @@ struct brute_candidate {
     double distance, u, v;
     double distance_error;    /* bound for a kernel's result */
     double barycentric_error; /* may exceed 1 for slivers */
+    double blind_distance;    /* hits no farther than this, either way, may be taken for the surface
+                                 the    ray left, and dropped */
 };
 
 struct brute_list {

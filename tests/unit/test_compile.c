@@ -1,145 +1,7 @@
-/* The material compiler: what is refused, what becomes of node lists, and that folding and sharing do not
- * change values. Programs are run on the scalar kernels. */
-#define TRC_WIDTH 1
-#define TRC_ISA scalar
-
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
+/* The material compiler: what is refused, and what becomes of node lists. */
+#include "graph.h"
 
 #include <math.h>
-#include <stdio.h>
-#include <string.h>
-
-#include "core/core.h"
-#include "kernels/surface.h"
-#include "shading/compile.h"
-#include "shading/program.h"
-
-/* ---- node lists ---- */
-
-#define MAX_INPUTS (TRC_MAX_NODES * 4)
-
-static struct graph {
-    trc_node nodes[TRC_MAX_NODES];
-    trc_node_input inputs[MAX_INPUTS];
-    uint32_t node_count, input_count;
-    int32_t surface;
-    uint32_t flags;
-    int32_t pass_index;
-} graph;
-
-static void graph_clear(void) {
-    memset(&graph, 0, sizeof graph);
-    graph.surface = -1;
-}
-
-static trc_node_input value(float x) { return (trc_node_input){.node = -1, .value = {x, x, x}}; }
-static trc_node_input color(float r, float g, float b) {
-    return (trc_node_input){.node = -1, .value = {r, g, b}};
-}
-static trc_node_input standard(void) { return (trc_node_input){.node = -2}; }
-static trc_node_input link_to(int32_t node, uint32_t output) {
-    return (trc_node_input){.node = node, .output = output};
-}
-
-/* Adds a node and makes it the output if it is a shader; returns its number. */
-static int32_t add(uint32_t type, uint32_t mode, uint32_t count, const trc_node_input *inputs) {
-    trc_node *node = &graph.nodes[graph.node_count];
-    *node = (trc_node){.type = type, .mode = mode, .first_input = graph.input_count,
-                       .input_count = count};
-    for (uint32_t i = 0; i < count; i++) graph.inputs[graph.input_count++] = inputs[i];
-    if (type < TRC_NODE_IMAGE) graph.surface = (int32_t)graph.node_count;
-    return (int32_t)graph.node_count++;
-}
-#define ADD(type, mode, ...)                                                                       \
-    add(type, mode, sizeof((trc_node_input[]){__VA_ARGS__}) / sizeof(trc_node_input),              \
-        (trc_node_input[]){__VA_ARGS__})
-
-static int32_t add_diffuse(trc_node_input c) {
-    return ADD(TRC_NODE_DIFFUSE, 0, c, value(0), standard());
-}
-static int32_t add_emission(trc_node_input c, float strength) {
-    return ADD(TRC_NODE_EMISSION, 0, c, value(strength));
-}
-static int32_t add_mix(trc_node_input factor, int32_t first, int32_t second) {
-    return ADD(TRC_NODE_MIX_SHADER, 0, factor, link_to(first, 0), link_to(second, 0));
-}
-
-enum { PRINCIPLED_INPUTS = 22 };
-static int32_t add_principled(uint32_t mode) {
-    trc_node_input in[PRINCIPLED_INPUTS] = {
-        color(.8f, .8f, .8f), value(0), color(1, 1, 1), value(0), value(.5f), value(0), value(.5f),
-        value(0), value(0), value(0), value(.5f), value(0), value(.03f), value(1.45f), value(0),
-        value(0), color(0, 0, 0), value(1), value(1), standard(), standard(), standard()};
-    return add(TRC_NODE_PRINCIPLED, mode, PRINCIPLED_INPUTS, in);
-}
-static trc_node_input *input_of(int32_t node, uint32_t input) {
-    return &graph.inputs[graph.nodes[node].first_input + input];
-}
-
-/* ---- compiling ---- */
-
-static uint32_t index_of_image(const void *images, trc_id image) {
-    (void)images;
-    return image < 100 ? (uint32_t)image : UINT32_MAX;
-}
-
-static struct trc_names *names;
-
-static trc_status compile(struct trc_material **m) {
-    const trc_material_desc desc = {.struct_size = sizeof desc,
-                                    .node_count = graph.node_count,
-                                    .nodes = graph.nodes,
-                                    .inputs = graph.inputs,
-                                    .input_count = graph.input_count,
-                                    .surface = graph.surface,
-                                    .pass_index = graph.pass_index,
-                                    .flags = graph.flags};
-    const struct trc_compile_context context = {names, index_of_image, NULL};
-    return trc_material_compile(&desc, &context, m);
-}
-
-static struct trc_material *compiled(void) {
-    struct trc_material *m = NULL;
-    const trc_status status = compile(&m);
-    if (status != TRC_OK) fail_msg("status %d: %s", status, trc_last_message());
-    return m;
-}
-
-static uint32_t traits(void) {
-    struct trc_material *m = compiled();
-    const uint32_t has = m->has;
-    trc_material_release(m);
-    return has;
-}
-
-/* The graph must be refused with that status and a message with these words. */
-static void refused(trc_status expected, const char *first, const char *second) {
-    struct trc_material *m = NULL;
-    const uint64_t bytes = trc_memory_bytes();
-    const trc_status status = compile(&m);
-    if (status != expected || !strstr(trc_last_message(), first) ||
-        !strstr(trc_last_message(), second)) {
-        fail_msg("status %d, message: %s", status, trc_last_message());
-    }
-    assert_null(m);
-    assert_true(trc_memory_bytes() == bytes);
-}
-
-static int setup(void **state) {
-    (void)state;
-    names = trc_names_create();
-    return names ? 0 : -1;
-}
-static int teardown(void **state) {
-    (void)state;
-    trc_names_destroy(names);
-    return 0;
-}
 
 /* ---- constants ---- */
 
@@ -165,7 +27,8 @@ static void test_constant_material(void **state) {
         const struct trc_operand o = m->operands[leaf->first_operand + i];
         assert_true(o.reg == -1 && o.value == expected[i]);
     }
-    for (int i = 6; i < 12; i++) assert_int_equal(m->operands[leaf->first_operand + i].reg, -2);
+    for (int i = 6; i < 12; i++)
+        assert_int_equal(m->operands[leaf->first_operand + i].reg, -2);
     trc_material_release(m);
 }
 
@@ -188,7 +51,8 @@ static void test_folding(void **state) {
     (void)state;
     graph_clear();
     const int32_t sum = ADD(TRC_NODE_MATH, TRC_MATH_ADD, value(2), value(3), value(0));
-    const int32_t product = ADD(TRC_NODE_MATH, TRC_MATH_MULTIPLY, link_to(sum, 0), value(4), value(0));
+    const int32_t product =
+        ADD(TRC_NODE_MATH, TRC_MATH_MULTIPLY, link_to(sum, 0), value(4), value(0));
     const int32_t mix =
         ADD(TRC_NODE_MIX_COLOR, TRC_BLEND_MULTIPLY, value(7), link_to(product, 0), value(.5f));
     ADD(TRC_NODE_EMISSION, 0, color(1, 0, 0), link_to(mix, 0));
@@ -209,11 +73,13 @@ static void test_conversions(void **state) {
                  {TRC_SEPARATE_XYZ, .5f}};
     for (int i = 0; i < 2; i++) {
         graph_clear();
-        const int32_t c = ADD(TRC_NODE_COMBINE, cases[i].combine_mode, value(.2f), value(.5f), value(.8f));
+        const int32_t c =
+            ADD(TRC_NODE_COMBINE, cases[i].combine_mode, value(.2f), value(.5f), value(.8f));
         const int32_t f = ADD(TRC_NODE_MATH, TRC_MATH_ABSOLUTE, link_to(c, 0), value(0), value(0));
         add_emission(link_to(f, 0), 1);
         struct trc_material *m = compiled();
-        for (int k = 0; k < 3; k++) assert_true(fabsf(m->emission[k] - cases[i].expected) < 1e-5f);
+        for (int k = 0; k < 3; k++)
+            assert_true(fabsf(m->emission[k] - cases[i].expected) < 1e-5f);
         trc_material_release(m);
     }
 }
@@ -230,7 +96,8 @@ static int32_t add_image(trc_id image, const char *uv) {
 
 static uint32_t count_op(const struct trc_material *m, uint32_t op) {
     uint32_t count = 0;
-    for (uint32_t i = 0; i < m->instruction_count; i++) count += m->instructions[i].op == op;
+    for (uint32_t i = 0; i < m->instruction_count; i++)
+        count += m->instructions[i].op == op;
     return count;
 }
 
@@ -275,7 +142,8 @@ static void test_alpha_of_images(void **state) {
         const int32_t image = add_image(3, "");
         const int32_t principled = add_principled(0);
         *input_of(principled, 0) = link_to(image, 0);
-        if (used) *input_of(principled, 18) = link_to(image, 1);
+        if (used)
+            *input_of(principled, 18) = link_to(image, 1);
         struct trc_material *m = compiled();
         assert_int_equal(count_op(m, TRC_OP_IMAGE), 1);
         const struct trc_instruction *last = &m->instructions[m->instruction_count - 1];
@@ -398,8 +266,12 @@ static void test_shaders_without_effect(void **state) {
 /* ---- traits ---- */
 
 enum {
-    D = TRC_MATERIAL_HAS_DIFFUSE, S = TRC_MATERIAL_HAS_SPECULAR, G = TRC_MATERIAL_HAS_GLOSSY,
-    R = TRC_MATERIAL_HAS_REFRACTION, T = TRC_MATERIAL_HAS_TRANSPARENCY, E = TRC_MATERIAL_HAS_EMISSION
+    D = TRC_MATERIAL_HAS_DIFFUSE,
+    S = TRC_MATERIAL_HAS_SPECULAR,
+    G = TRC_MATERIAL_HAS_GLOSSY,
+    R = TRC_MATERIAL_HAS_REFRACTION,
+    T = TRC_MATERIAL_HAS_TRANSPARENCY,
+    E = TRC_MATERIAL_HAS_EMISSION
 };
 
 static void test_traits_of_principled(void **state) {
@@ -413,18 +285,18 @@ static void test_traits_of_principled(void **state) {
         uint32_t has;
     } cases[] = {
         {0, {{0, .8f}}, D | G},
-        {0, {{4, 0}}, D},                               /* no specular */
-        {0, {{3, 1}}, G},                               /* metal */
-        {0, {{3, 1}, {6, 0}}, S},                       /* polished */
-        {0, {{6, .0177f}}, D | S},                      /* alpha^2 below 1e-7 */
+        {0, {{4, 0}}, D},          /* no specular */
+        {0, {{3, 1}}, G},          /* metal */
+        {0, {{3, 1}, {6, 0}}, S},  /* polished */
+        {0, {{6, .0177f}}, D | S}, /* alpha^2 below 1e-7 */
         {0, {{6, .0179f}}, D | G},
-        {0, {{4, 0}, {11, 1}}, D | G},                  /* clearcoat alone */
+        {0, {{4, 0}, {11, 1}}, D | G}, /* clearcoat alone */
         {0, {{4, 0}, {11, 1}, {12, 0}}, D | S},
-        {0, {{14, 1}}, G | R},                          /* glass */
+        {0, {{14, 1}}, G | R}, /* glass */
         {0, {{14, 1}, {6, 0}}, S | R},
-        {0, {{14, 1}, {6, 0}, {15, .5f}}, S | G | R},   /* rough refraction only */
-        {1, {{14, 1}, {6, 0}, {15, .5f}}, S | R},       /* which multiscatter ignores */
-        {0, {{14, 1}, {3, 1}}, G},                      /* metal rules */
+        {0, {{14, 1}, {6, 0}, {15, .5f}}, S | G | R}, /* rough refraction only */
+        {1, {{14, 1}, {6, 0}, {15, .5f}}, S | R},     /* which multiscatter ignores */
+        {0, {{14, 1}, {3, 1}}, G},                    /* metal rules */
         {0, {{14, .5f}}, D | G | R},
         {0, {{18, .5f}}, D | G | T},
         {0, {{18, 0}}, T},
@@ -436,11 +308,13 @@ static void test_traits_of_principled(void **state) {
         graph_clear();
         const int32_t node = add_principled(cases[i].mode);
         for (int k = 0; k < 4; k++) {
-            if (k && !cases[i].changes[k].input) continue;
+            if (k && !cases[i].changes[k].input)
+                continue;
             *input_of(node, cases[i].changes[k].input) = value(cases[i].changes[k].value);
         }
         const uint32_t has = traits();
-        if (has != cases[i].has) fail_msg("case %zu: %#x, not %#x", i, has, cases[i].has);
+        if (has != cases[i].has)
+            fail_msg("case %zu: %#x, not %#x", i, has, cases[i].has);
     }
 }
 
@@ -450,7 +324,8 @@ static void test_traits_of_varying_inputs(void **state) {
     graph_clear();
     const int32_t info = add(TRC_NODE_OBJECT_INFO, 0, 0, NULL), node = add_principled(0);
     static const uint32_t inputs[] = {3, 6, 14, 18};
-    for (int i = 0; i < 4; i++) *input_of(node, inputs[i]) = link_to(info, 5);
+    for (int i = 0; i < 4; i++)
+        *input_of(node, inputs[i]) = link_to(info, 5);
     assert_int_equal(traits(), D | S | G | R | T | TRC_MATERIAL_HAS_PROGRAM);
 }
 
@@ -530,7 +405,8 @@ static void test_too_many_registers(void **state) {
     const int32_t info = add(TRC_NODE_OBJECT_INFO, 0, 0, NULL);
     int32_t values[300];
     for (int i = 0; i < 300; i++) {
-        values[i] = ADD(TRC_NODE_MATH, TRC_MATH_ADD, link_to(info, 5), value(1 + (float)i), value(0));
+        values[i] =
+            ADD(TRC_NODE_MATH, TRC_MATH_ADD, link_to(info, 5), value(1 + (float)i), value(0));
     }
     int32_t sum = values[0];
     for (int i = 1; i < 300; i++) {
@@ -589,7 +465,8 @@ static void test_refused_inputs(void **state) {
     refused(TRC_ERROR_INVALID_ARGUMENT, "(roughness)", "not earlier");
 
     graph_clear();
-    const int32_t info = add(TRC_NODE_OBJECT_INFO, 0, 0, NULL), diffuse = add_diffuse(color(1, 1, 1));
+    const int32_t info = add(TRC_NODE_OBJECT_INFO, 0, 0, NULL),
+                  diffuse = add_diffuse(color(1, 1, 1));
     *input_of(diffuse, 0) = link_to(info, 6);
     refused(TRC_ERROR_INVALID_ARGUMENT, "(color)", "output that does not exist");
     *input_of(diffuse, 0) = link_to(info, 1);
@@ -674,133 +551,6 @@ static void test_refused_descriptors(void **state) {
     refused(TRC_ERROR_TOO_LARGE, "name", "63");
 }
 
-/* ---- values survive ---- */
-
-static uint32_t random_state;
-static uint32_t random_below(uint32_t n) {
-    random_state = random_state * 1664525u + 1013904223u;
-    return (random_state >> 8) % n;
-}
-/* Never exactly 0 or 1, which short cuts look for. */
-static float random_value(void) {
-    return ((float)random_below(1u << 20) + .37f) / (float)(1u << 18) - 1.3f;
-}
-
-static const struct {
-    uint32_t type, modes;
-    const char *inputs;
-} random_types[] = {
-    {TRC_NODE_MATH, TRC_MATH_DEGREES + 1, "fff"},
-    {TRC_NODE_MIX_COLOR, TRC_BLEND_EXCLUSION + 1, "fcc"},
-    {TRC_NODE_VECTOR_MATH, TRC_VECTOR_FRACT + 1, "cccf"},
-    {TRC_NODE_SEPARATE, 4, "c"},
-    {TRC_NODE_COMBINE, 4, "fff"},
-    {TRC_NODE_CLAMP, 2, "fff"},
-    {TRC_NODE_MAP_RANGE, 1, "fffff"},
-    {TRC_NODE_GAMMA, 1, "cf"},
-    {TRC_NODE_INVERT, 1, "fc"},
-    {TRC_NODE_HUE_SATURATION, 1, "ffffc"},
-    {TRC_NODE_BRIGHT_CONTRAST, 1, "cff"},
-    {TRC_NODE_CHECKER, 1, "cccf"},
-    {TRC_NODE_MAPPING, 4, "cccc"},
-    {TRC_NODE_RGB_TO_BW, 1, "c"},
-};
-static uint32_t outputs_of(uint32_t type) {
-    return type == TRC_NODE_SEPARATE ? 3 : type == TRC_NODE_CHECKER || type == TRC_NODE_VECTOR_MATH ? 2 : 1;
-}
-
-/* A random graph of operations on constants. If hidden, each constant is multiplied by the random number of
- * the object, which is 1 when the program runs: nothing can be folded. */
-static void random_graph(uint32_t seed, bool hidden) {
-    int32_t made[24];
-    random_state = seed;
-    graph_clear();
-    const int32_t info = add(TRC_NODE_OBJECT_INFO, 0, 0, NULL);
-    for (int n = 0; n < 24; n++) {
-        const uint32_t t = random_below(sizeof random_types / sizeof *random_types);
-        const uint32_t count = (uint32_t)strlen(random_types[t].inputs);
-        trc_node_input in[8];
-        for (uint32_t i = 0; i < count; i++) {
-            if (n && random_below(2)) {
-                const int32_t from = made[random_below((uint32_t)n)];
-                in[i] = link_to(from, random_below(outputs_of(graph.nodes[from].type)));
-                continue;
-            }
-            in[i] = color(random_value(), random_value(), random_value());
-            if (!hidden) continue;
-            in[i] = link_to(ADD(TRC_NODE_VECTOR_MATH, TRC_VECTOR_SCALE, in[i], value(0), value(0),
-                                link_to(info, 5)),
-                            0);
-            if (random_types[t].inputs[i] == 'f') { /* the first component, not the mean */
-                in[i] = link_to(ADD(TRC_NODE_SEPARATE, 0, in[i]), 0);
-            }
-        }
-        made[n] = add(random_types[t].type, random_below(random_types[t].modes), count, in);
-    }
-    add_emission(link_to(made[23], 0), 1);
-}
-
-static void test_folded_equals_run(void **state) {
-    (void)state;
-    struct trc_instance instance = {.random = 1.0f};
-    struct trc_mesh mesh = {.default_uv = -1}, *meshes[1] = {&mesh};
-    const struct trc_snapshot snapshot = {.instance_count = 1, .instances = &instance,
-                                          .mesh_count = 1, .meshes = meshes};
-    const struct trc_surface s = {.snapshot = &snapshot, .active = vm_all_set()};
-    static struct trc_registers regs;
-    uint32_t programs = 0;
-    for (uint32_t seed = 1; seed <= 3000; seed++) {
-        random_graph(seed, false);
-        struct trc_material *folded = compiled();
-        assert_int_equal(folded->instruction_count, 0);
-        random_graph(seed, true);
-        struct trc_material *run = compiled();
-        if (folded->leaf_count == 1 && run->leaf_count == 1) {
-            programs += run->instruction_count > 0;
-            trc_program_run_scalar(run, &s, &regs);
-            for (int c = 0; c < 3; c++) {
-                const float a = folded->operands[folded->leaves[0].first_operand + c].value;
-                const float b =
-                    trc_operand_value(&run->operands[run->leaves[0].first_operand + c], &regs);
-                if (memcmp(&a, &b, sizeof a) != 0 && !(isnan(a) && isnan(b)) && a != b) {
-                    fail_msg("seed %u: folded %.9g, run %.9g", seed, a, b);
-                }
-            }
-        }
-        trc_material_release(folded);
-        trc_material_release(run);
-    }
-    assert_true(programs > 1000);
-}
-
-/* Random node lists, mostly nonsense: compiled or refused, never worse. */
-static void test_random_descriptors(void **state) {
-    (void)state;
-    const uint64_t bytes = trc_memory_bytes();
-    uint32_t accepted = 0;
-    for (uint32_t seed = 1; seed <= 20000; seed++) {
-        random_graph(seed, seed & 1);
-        for (uint32_t i = random_below(4); i > 0; i--) {
-            trc_node *node = &graph.nodes[random_below(graph.node_count)];
-            trc_node_input *input = &graph.inputs[random_below(graph.input_count)];
-            switch (random_below(7)) {
-            case 0: node->type = random_below(100); break;
-            case 1: node->mode = random_below(2) ? random_below(512) : random_state; break;
-            case 2: node->first_input = random_below(graph.input_count + 8); break;
-            case 3: input->node = (int32_t)random_below(graph.node_count + 4) - 3; break;
-            case 4: input->output = random_below(14); break;
-            case 5: memcpy(input->value, &random_state, 4); break;
-            default: graph.surface = (int32_t)random_below(graph.node_count + 2) - 1; break;
-            }
-        }
-        struct trc_material *m = NULL;
-        if (compile(&m) == TRC_OK) accepted++;
-        trc_material_release(m);
-    }
-    assert_true(accepted > 1000);
-    assert_true(trc_memory_bytes() == bytes);
-}
-
 static void test_memory_failures(void **state) {
     (void)state;
     static float table[4 * TRC_RAMP_SIZE];
@@ -868,8 +618,6 @@ int main(void) {
         cmocka_unit_test(test_refused_nodes),
         cmocka_unit_test(test_refused_tables),
         cmocka_unit_test(test_refused_descriptors),
-        cmocka_unit_test(test_folded_equals_run),
-        cmocka_unit_test(test_random_descriptors),
         cmocka_unit_test(test_memory_failures),
         cmocka_unit_test(test_holders),
     };

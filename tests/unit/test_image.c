@@ -15,7 +15,8 @@
 #include "core/core.h"
 #include "image/image.h"
 
-static trc_image_desc pixels_desc(uint32_t width, uint32_t height, const void *pixels, bool is_float) {
+static trc_image_desc pixels_desc(uint32_t width, uint32_t height, const void *pixels,
+                                  bool is_float) {
     return (trc_image_desc){.struct_size = sizeof(trc_image_desc),
                             .width = width,
                             .height = height,
@@ -28,7 +29,8 @@ static trc_image_desc pixels_desc(uint32_t width, uint32_t height, const void *p
 static struct trc_image *loaded(const trc_image_desc *desc) {
     struct trc_image *image = NULL;
     const trc_status status = trc_image_load(desc, &image);
-    if (status != TRC_OK) fail_msg("status %d: %s", status, trc_last_message());
+    if (status != TRC_OK)
+        fail_msg("status %d: %s", status, trc_last_message());
     return image;
 }
 
@@ -36,7 +38,8 @@ static void refused(const trc_image_desc *desc, trc_status expected) {
     struct trc_image *image = NULL;
     const uint64_t bytes = trc_memory_bytes();
     const trc_status status = trc_image_load(desc, &image);
-    if (status != expected) fail_msg("status %d: %s", status, trc_last_message());
+    if (status != expected)
+        fail_msg("status %d: %s", status, trc_last_message());
     assert_true(trc_last_message()[0] != '\0');
     assert_null(image);
     assert_true(trc_memory_bytes() == bytes);
@@ -71,7 +74,8 @@ static void test_bytes(void **state) {
 
 static void test_floats(void **state) {
     (void)state;
-    static const float pixels[16] = {1, 2, 3, .5f, NAN, 1, 1, 1, 1, 1, -INFINITY, 1, 3e38f, 0, 0, 4};
+    static const float pixels[16] = {1, 2, 3,         .5f, NAN,   1, 1, 1,
+                                     1, 1, -INFINITY, 1,   3e38f, 0, 0, 4};
     static const float expected[16] = {.5f, 1, 1.5f, .5f};
     const trc_image_desc desc = pixels_desc(2, 2, pixels, true);
     struct trc_image *image = loaded(&desc);
@@ -149,9 +153,8 @@ static void test_memory_failures(void **state) {
 static char path[256];
 
 static trc_image_desc file_desc(void) {
-    return (trc_image_desc){.struct_size = sizeof(trc_image_desc),
-                            .alpha_mode = TRC_ALPHA_STRAIGHT,
-                            .path = path};
+    return (trc_image_desc){
+        .struct_size = sizeof(trc_image_desc), .alpha_mode = TRC_ALPHA_STRAIGHT, .path = path};
 }
 
 static void write_file(const char *name, const void *bytes, size_t size) {
@@ -177,7 +180,8 @@ static void put(struct sample *f, const void *bytes, size_t size) {
 }
 static void put8(struct sample *f, uint8_t x) { put(f, &x, 1); }
 static void put32(struct sample *f, uint32_t x) {
-    for (int i = 0; i < 4; i++) put8(f, (uint8_t)(x >> (8 * i)));
+    for (int i = 0; i < 4; i++)
+        put8(f, (uint8_t)(x >> (8 * i)));
 }
 static void put_text(struct sample *f, const char *text) { put(f, text, strlen(text) + 1); }
 
@@ -194,7 +198,8 @@ static struct sample make_targa(void) {
 /* 3 x 1 of 16-bit RGB. */
 static struct sample make_pnm(void) {
     struct sample f = {.name = "b.ppm"};
-    static const uint8_t rgb[18] = {0, 0, 0x12, 0x34, 0xff, 0xff, 1, 0, 2, 0, 3, 0, 4, 0, 5, 0, 6, 0};
+    static const uint8_t rgb[18] = {0, 0, 0x12, 0x34, 0xff, 0xff, 1, 0, 2,
+                                    0, 3, 0,    4,    0,    5,    0, 6, 0};
     put(&f, "P6\n3 1\n65535\n", 13);
     put(&f, rgb, sizeof rgb);
     return f;
@@ -220,10 +225,12 @@ static void put_box(struct sample *f, const char *name) {
     put32(f, 0);
 }
 
-/* 3 x 1 of half floats, not compressed: (1, 2, 4), then one with a NaN, then one with an infinity. */
+/* 3 x 1 of half floats, not compressed: (1, 2, 4), then one with a NaN, then one with an infinity.
+ */
 static struct sample make_exr(void) {
     struct sample f = {.name = "c.exr"};
-    static const uint16_t rows[9] = {0x4400, 0x3c00, 0x7c00, 0x4000, 0x7e00, 0x3c00, 0x3c00, 0x3c00, 0x3c00};
+    static const uint16_t rows[9] = {0x4400, 0x3c00, 0x7c00, 0x4000, 0x7e00,
+                                     0x3c00, 0x3c00, 0x3c00, 0x3c00};
     put32(&f, 20000630);
     put32(&f, 2);
     put_attribute(&f, "channels", "chlist", 3 * 18 + 1);
@@ -269,7 +276,8 @@ static const sample_maker makers[] = {make_targa, make_pnm, make_exr, make_hdr};
 
 static void test_targa(void **state) {
     (void)state;
-    static const uint8_t expected[16] = {1, 2, 3, 255, 0, 0, 0, 0, 10, 20, 30, 255, 20, 25, 30, 128};
+    static const uint8_t expected[16] = {1,  2,  3,  255, 0,  0,  0,  0,
+                                         10, 20, 30, 255, 20, 25, 30, 128};
     const struct sample f = make_targa();
     write_file(f.name, f.bytes, f.size);
     const trc_image_desc desc = file_desc();
@@ -283,16 +291,17 @@ static void test_targa(void **state) {
 
 static void test_16_bits(void **state) {
     (void)state;
-    static const uint16_t expected[12] = {0, 0x1234, 0xffff, 0xffff, 0x100, 0x200,
-                                          0x300, 0xffff, 0x400, 0x500, 0x600, 0xffff};
+    static const uint16_t expected[12] = {0,     0x1234, 0xffff, 0xffff, 0x100, 0x200,
+                                          0x300, 0xffff, 0x400,  0x500,  0x600, 0xffff};
     const struct sample f = make_pnm();
     write_file(f.name, f.bytes, f.size);
     const trc_image_desc desc = file_desc();
     struct trc_image *image = loaded(&desc);
     assert_int_equal(image->format, TRC_TEXEL_U16);
-    assert_int_equal(image->is_associated, 0); /* it has no alpha */
+    assert_int_equal(image->is_associated, 0);        /* it has no alpha */
     const uint16_t *texels = image->levels[0].texels; /* OpenImageIO may round the largest down */
-    for (int i = 0; i < 12; i++) assert_in_range(texels[i], expected[i] ? expected[i] - 1 : 0, expected[i]);
+    for (int i = 0; i < 12; i++)
+        assert_in_range(texels[i], expected[i] ? expected[i] - 1 : 0, expected[i]);
     trc_image_release(image);
     remove(path);
 }

@@ -135,6 +135,19 @@ static double load_sum(const double *p) {
     return value;
 }
 
+/* The sums that a light pass is divided by, as Cycles divides it: the colour of its kind; NULL: none. */
+static const double *divisor_of(const struct trc_film *film, uint32_t pass) {
+    const uint32_t color = trc_film_color_pass(pass);
+    return color != TRC_PASS_COMBINED && color != pass ? film->sums[color] : NULL;
+}
+
+uint32_t trc_film_color_pass(uint32_t pass) {
+    if (pass < TRC_PASS_DIFFUSE_DIRECT || pass > TRC_PASS_TRANSMISSION_COLOR)
+        return TRC_PASS_COMBINED;
+    /* direct, indirect, colour of one kind stand together */
+    return pass + 2 - (pass - TRC_PASS_DIFFUSE_DIRECT) % 3;
+}
+
 trc_status trc_film_read(const struct trc_film *film, uint32_t pass, float exposure, float *out,
                          uint64_t float_count) {
     const uint32_t channels = trc_pass_channels(pass);
@@ -146,7 +159,7 @@ trc_status trc_film_read(const struct trc_film *film, uint32_t pass, float expos
     const uint64_t pixels = (uint64_t)film->width * film->height;
     TRC_TRY(trc_check_array(out, float_count, pixels * channels, sizeof(float), sizeof(float),
                             "pixels_out"));
-    const double *sums = film->sums[pass];
+    const double *sums = film->sums[pass], *divisor = divisor_of(film, pass);
     const double light = is_light(pass) ? exposure : 1.0;
     const bool first_sample = is_first_sample(pass);
     for (uint64_t i = 0; i < pixels; i++) {
@@ -159,7 +172,12 @@ trc_status trc_film_read(const struct trc_film *film, uint32_t pass, float expos
         const double factor = !count ? 0.0 : first_sample ? 1.0 : 1.0 / count;
         for (uint32_t c = 0; c < channels; c++) {
             const bool is_alpha = pass == TRC_PASS_COMBINED && c == 3;
-            const double value = load_sum(&sums[i * channels + c]);
+            double value = load_sum(&sums[i * channels + c]);
+            if (divisor) {
+                /* Both are sums of the same samples: the counts cancel. */
+                const double by = load_sum(&divisor[i * channels + c]);
+                value = by != 0.0 ? value / by * count : 0.0;
+            }
             pixel[c] = count ? to_float(value * factor * (is_alpha ? 1.0 : light)) : 0.0f;
         }
     }

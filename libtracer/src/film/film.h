@@ -21,6 +21,10 @@ struct trc_film {
 trc_status trc_film_create(struct trc_film *film, uint32_t width, uint32_t height, uint64_t passes);
 void trc_film_destroy(struct trc_film *film);
 
+/* The colour pass that goes with a diffuse, glossy or transmission pass, TRC_PASS_COMBINED for others: light
+ * passes are divided by it when read, so whoever asks for one asks for it too. */
+uint32_t trc_film_color_pass(uint32_t pass);
+
 /* Sums over counts as float32, times exposure for light passes. A tile that is being written may show
  * some of its samples; every value is finite. */
 trc_status trc_film_read(const struct trc_film *film, uint32_t pass, float exposure, float *out,

@@ -20,18 +20,22 @@ static const uint8_t texel_bytes[] = {
 /* ---- life ---- */
 
 struct trc_image *trc_image_retain(struct trc_image *image) {
-    if (image) atomic_fetch_add_explicit(&image->refs, 1, memory_order_relaxed);
+    if (image)
+        atomic_fetch_add_explicit(&image->refs, 1, memory_order_relaxed);
     return image;
 }
 
 static void image_free(struct trc_image *image) {
-    for (uint32_t i = 0; i < image->level_count; i++) trc_free(image->levels[i].texels);
+    for (uint32_t i = 0; i < image->level_count; i++)
+        trc_free(image->levels[i].texels);
     trc_free(image);
 }
 
 void trc_image_release(struct trc_image *image) {
-    if (!image) return;
-    if (atomic_fetch_sub_explicit(&image->refs, 1, memory_order_acq_rel) == 1) image_free(image);
+    if (!image)
+        return;
+    if (atomic_fetch_sub_explicit(&image->refs, 1, memory_order_acq_rel) == 1)
+        image_free(image);
 }
 
 uint64_t trc_image_bytes(const struct trc_image *image) { return image ? image->bytes : 0; }
@@ -40,8 +44,8 @@ uint64_t trc_image_bytes(const struct trc_image *image) { return image ? image->
 static trc_status image_create(uint32_t width, uint32_t height, enum trc_texel format,
                                const trc_image_desc *desc, struct trc_image **image_out) {
     const uint64_t texels = (uint64_t)width * height, bytes = texels * texel_bytes[format];
-    if (width > TRC_IMAGE_MAX_SIDE || height > TRC_IMAGE_MAX_SIDE || texels > TRC_IMAGE_MAX_TEXELS ||
-        bytes > TRC_IMAGE_MAX_BYTES) {
+    if (width > TRC_IMAGE_MAX_SIDE || height > TRC_IMAGE_MAX_SIDE ||
+        texels > TRC_IMAGE_MAX_TEXELS || bytes > TRC_IMAGE_MAX_BYTES) {
         return trc_fail(TRC_ERROR_TOO_LARGE,
                         "an image of %" PRIu32 " x %" PRIu32 " pixels, %" PRIu64
                         " bytes, is too large: at most %u per side, %u in all, %" PRIu64 " bytes",
@@ -68,14 +72,16 @@ static trc_status image_create(uint32_t width, uint32_t height, enum trc_texel f
 
 /* ---- texels ---- */
 
-/* Grey, grey with alpha and RGB, whose channels stand at the start of each texel, to RGBA. one: 1.0 of
- * the format. A macro, as it is the same for three types of number. */
-#define DEFINE_SPREAD(name, type)                                                                  \
-    static void name(type *t, uint64_t count, uint32_t channels, type one) {                       \
-        for (uint64_t i = 0; i < count; i++, t += 4) {                                             \
-            if (channels < 4) t[3] = channels == 2 ? t[1] : one;                                   \
-            if (channels < 3) t[1] = t[2] = t[0];                                                  \
-        }                                                                                          \
+/* Grey, grey with alpha and RGB, whose channels stand at the start of each texel, to RGBA. one: 1.0
+ * of the format. A macro, as it is the same for three types of number. */
+#define DEFINE_SPREAD(name, type)                                            \
+    static void name(type *t, uint64_t count, uint32_t channels, type one) { \
+        for (uint64_t i = 0; i < count; i++, t += 4) {                       \
+            if (channels < 4)                                                \
+                t[3] = channels == 2 ? t[1] : one;                           \
+            if (channels < 3)                                                \
+                t[1] = t[2] = t[0];                                          \
+        }                                                                    \
     }
 DEFINE_SPREAD(spread_u8, uint8_t)
 DEFINE_SPREAD(spread_u16, uint16_t)
@@ -83,12 +89,21 @@ DEFINE_SPREAD(spread_f32, float)
 
 static void spread_channels(struct trc_image *image, uint64_t count, uint32_t channels) {
     void *texels = image->levels[0].texels;
-    if (channels == 4) return;
+    if (channels == 4)
+        return;
     switch (image->format) {
-    case TRC_TEXEL_U8: spread_u8(texels, count, channels, UINT8_MAX); break;
-    case TRC_TEXEL_U16: spread_u16(texels, count, channels, UINT16_MAX); break;
-    case TRC_TEXEL_F16: spread_u16(texels, count, channels, HALF_ONE); break;
-    case TRC_TEXEL_F32: spread_f32(texels, count, channels, 1.0f); break;
+    case TRC_TEXEL_U8:
+        spread_u8(texels, count, channels, UINT8_MAX);
+        break;
+    case TRC_TEXEL_U16:
+        spread_u16(texels, count, channels, UINT16_MAX);
+        break;
+    case TRC_TEXEL_F16:
+        spread_u16(texels, count, channels, HALF_ONE);
+        break;
+    case TRC_TEXEL_F32:
+        spread_f32(texels, count, channels, 1.0f);
+        break;
     }
 }
 
@@ -109,8 +124,8 @@ static uint16_t float_to_half(float value) {
     return (uint16_t)(bits >> 13 | (signbit(value) ? 0x8000u : 0u));
 }
 
-/* Texels with a NaN or an infinity become 0, as in Cycles: other channels alone would have a strange
- * hue. */
+/* Texels with a NaN or an infinity become 0, as in Cycles: other channels alone would have a
+ * strange hue. */
 static void drop_bad_texels(struct trc_image *image, uint64_t count) {
     uint16_t *h = image->levels[0].texels;
     float *f = image->levels[0].texels;
@@ -121,7 +136,8 @@ static void drop_bad_texels(struct trc_image *image, uint64_t count) {
                           ? (h[4 * i + c] & HALF_EXPONENT) == HALF_EXPONENT
                           : !isfinite(f[4 * i + c]);
         }
-        if (!is_bad) continue;
+        if (!is_bad)
+            continue;
         image->bad_texel_count++;
         memset((char *)image->levels[0].texels + i * texel_bytes[image->format], 0,
                texel_bytes[image->format]);
@@ -134,10 +150,18 @@ static void set_opaque(struct trc_image *image, uint64_t count) {
     float *f = image->levels[0].texels;
     for (uint64_t i = 0; i < count; i++) {
         switch (image->format) {
-        case TRC_TEXEL_U8: b[4 * i + 3] = UINT8_MAX; break;
-        case TRC_TEXEL_U16: h[4 * i + 3] = UINT16_MAX; break;
-        case TRC_TEXEL_F16: h[4 * i + 3] = HALF_ONE; break;
-        case TRC_TEXEL_F32: f[4 * i + 3] = 1.0f; break;
+        case TRC_TEXEL_U8:
+            b[4 * i + 3] = UINT8_MAX;
+            break;
+        case TRC_TEXEL_U16:
+            h[4 * i + 3] = UINT16_MAX;
+            break;
+        case TRC_TEXEL_F16:
+            h[4 * i + 3] = HALF_ONE;
+            break;
+        case TRC_TEXEL_F32:
+            f[4 * i + 3] = 1.0f;
+            break;
         }
     }
 }
@@ -150,10 +174,18 @@ static void multiply_by_alpha(struct trc_image *image, uint64_t count) {
     for (uint64_t i = 0; i < count; i++, b += 4, h += 4, f += 4) {
         for (int c = 0; c < 3; c++) {
             switch (image->format) {
-            case TRC_TEXEL_U8: b[c] = (uint8_t)(b[c] * b[3] / UINT8_MAX); break;
-            case TRC_TEXEL_U16: h[c] = (uint16_t)((uint32_t)h[c] * h[3] / UINT16_MAX); break;
-            case TRC_TEXEL_F16: h[c] = float_to_half(half_to_float(h[c]) * half_to_float(h[3])); break;
-            case TRC_TEXEL_F32: f[c] *= f[3]; break;
+            case TRC_TEXEL_U8:
+                b[c] = (uint8_t)(b[c] * b[3] / UINT8_MAX);
+                break;
+            case TRC_TEXEL_U16:
+                h[c] = (uint16_t)((uint32_t)h[c] * h[3] / UINT16_MAX);
+                break;
+            case TRC_TEXEL_F16:
+                h[c] = float_to_half(half_to_float(h[c]) * half_to_float(h[3]));
+                break;
+            case TRC_TEXEL_F32:
+                f[c] *= f[3];
+                break;
             }
         }
     }
@@ -166,13 +198,16 @@ static void finish(struct trc_image *image, uint32_t alpha_mode, uint32_t channe
     const bool has_alpha = channels == 2 || channels == 4;
     const bool is_float = image->format == TRC_TEXEL_F16 || image->format == TRC_TEXEL_F32;
     spread_channels(image, count, channels);
-    if (is_float) drop_bad_texels(image, count);
-    if (has_alpha && alpha_mode == TRC_ALPHA_NONE) set_opaque(image, count);
-    image->is_associated = has_alpha && (alpha_mode == TRC_ALPHA_STRAIGHT ||
-                                         alpha_mode == TRC_ALPHA_PREMULTIPLIED);
+    if (is_float)
+        drop_bad_texels(image, count);
+    if (has_alpha && alpha_mode == TRC_ALPHA_NONE)
+        set_opaque(image, count);
+    image->is_associated =
+        has_alpha && (alpha_mode == TRC_ALPHA_STRAIGHT || alpha_mode == TRC_ALPHA_PREMULTIPLIED);
     if (image->is_associated && is_unassociated) {
         multiply_by_alpha(image, count);
-        if (is_float) drop_bad_texels(image, count); /* products may overflow */
+        if (is_float)
+            drop_bad_texels(image, count); /* products may overflow */
     }
 }
 
@@ -234,6 +269,7 @@ trc_status trc_image_load(const trc_image_desc *desc, struct trc_image **image_o
     if ((desc->path != NULL) == (desc->pixels != NULL)) {
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "an image needs either pixels or a path");
     }
-    if (desc->path) return load_file(desc, image_out);
+    if (desc->path)
+        return load_file(desc, image_out);
     return load_pixels(desc, image_out);
 }

@@ -1,9 +1,9 @@
 /* Images that Image and Environment nodes read: texels as the lookups want them.
  *
- * As in Cycles, what is stored is what the file or the caller gave: sRGB-encoded bytes stay encoded and
- * are decoded after filtering, and colours of images with alpha are multiplied by it before filtering
- * (in their encoding). Rows run from the bottom (v = 0) upwards, texels are RGBA. Immutable once
- * created; the count of holders is atomic. */
+ * As in Cycles, what is stored is what the file or the caller gave: sRGB-encoded bytes stay encoded
+ * and are decoded after filtering, and colours of images with alpha are multiplied by it before
+ * filtering (in their encoding). Rows run from the bottom (v = 0) upwards, texels are RGBA.
+ * Immutable once created; the count of holders is atomic. */
 #ifndef TRACER_IMAGE_IMAGE_H
 #define TRACER_IMAGE_IMAGE_H
 
@@ -35,12 +35,12 @@ struct trc_image_level {
 struct trc_image {
     atomic_uint refs;
     enum trc_texel format;
-    uint32_t is_srgb;           /* colours are sRGB-encoded: to be decoded after filtering */
-    uint32_t is_associated;     /* colours are multiplied by alpha: divided when alpha is used too */
-    uint32_t level_count;       /* 1: smaller levels come with mip-mapping */
+    uint32_t is_srgb;       /* colours are sRGB-encoded: to be decoded after filtering */
+    uint32_t is_associated; /* colours are multiplied by alpha: divided when alpha is used too */
+    uint32_t level_count;   /* 1: smaller levels come with mip-mapping */
     struct trc_image_level levels[TRC_IMAGE_MAX_LEVELS];
-    uint64_t bytes;             /* of the texels */
-    uint64_t bad_texel_count;   /* were NaN or infinite, and are 0 now: worth a warning */
+    uint64_t bytes;           /* of the texels */
+    uint64_t bad_texel_count; /* were NaN or infinite, and are 0 now: worth a warning */
 };
 
 /* Copies the pixels or reads the file of a descriptor, which is checked in full. INVALID_ARGUMENT,

@@ -43,34 +43,49 @@ uint32_t format_of(const OIIO::ImageSpec &spec) {
         uint32_t own = TEXEL_F32;
         switch (spec.channelformat(i).basetype) {
         case OIIO::TypeDesc::UINT8:
-        case OIIO::TypeDesc::INT8: own = TEXEL_U8; break;
+        case OIIO::TypeDesc::INT8:
+            own = TEXEL_U8;
+            break;
         case OIIO::TypeDesc::UINT16:
-        case OIIO::TypeDesc::INT16: own = TEXEL_U16; break;
-        case OIIO::TypeDesc::HALF: own = TEXEL_F16; break;
-        default: break;
+        case OIIO::TypeDesc::INT16:
+            own = TEXEL_U16;
+            break;
+        case OIIO::TypeDesc::HALF:
+            own = TEXEL_F16;
+            break;
+        default:
+            break;
         }
         // Whole numbers of 16 bits do not fit into half floats.
-        if (own != format && own + format == TEXEL_U16 + TEXEL_F16) own = TEXEL_F32;
-        if (own > format) format = own;
+        if (own != format && own + format == TEXEL_U16 + TEXEL_F16)
+            own = TEXEL_F32;
+        if (own > format)
+            format = own;
     }
     return format;
 }
 
-// Whether colours still have to be multiplied by alpha. Some readers do not say; Blender takes Targa, DDS
-// and Photoshop files as not multiplied unless marked, and so does this.
+// Whether colours still have to be multiplied by alpha. Some readers do not say; Blender takes
+// Targa, DDS and Photoshop files as not multiplied unless marked, and so does this.
 bool is_unassociated(const OIIO::ImageInput &input, const OIIO::ImageSpec &spec) {
     const std::string format = input.format_name();
-    if (spec.get_int_attribute("oiio:UnassociatedAlpha", 0) != 0) return true;
-    if (format == "targa") return spec.get_int_attribute("targa:alpha_type", -1) != 4;
+    if (spec.get_int_attribute("oiio:UnassociatedAlpha", 0) != 0)
+        return true;
+    if (format == "targa")
+        return spec.get_int_attribute("targa:alpha_type", -1) != 4;
     return format == "dds" || format == "psd";
 }
 
 OIIO::TypeDesc type_of(uint32_t format) {
     switch (format) {
-    case TEXEL_U8: return OIIO::TypeDesc::UINT8;
-    case TEXEL_U16: return OIIO::TypeDesc::UINT16;
-    case TEXEL_F16: return OIIO::TypeDesc::HALF;
-    default: return OIIO::TypeDesc::FLOAT;
+    case TEXEL_U8:
+        return OIIO::TypeDesc::UINT8;
+    case TEXEL_U16:
+        return OIIO::TypeDesc::UINT16;
+    case TEXEL_F16:
+        return OIIO::TypeDesc::HALF;
+    default:
+        return OIIO::TypeDesc::FLOAT;
     }
 }
 
@@ -80,7 +95,8 @@ trc_status fail_open(const char *path, const std::string &reason) {
 
 } // namespace
 
-extern "C" trc_status trc_oiio_open(const char *path, trc_oiio **file_out, trc_file_info *info_out) {
+extern "C" trc_status trc_oiio_open(const char *path, trc_oiio **file_out,
+                                    trc_file_info *info_out) {
     return guarded(path, [&]() -> trc_status {
         std::unique_ptr<trc_oiio> file(new trc_oiio());
         file->path = path;
@@ -88,9 +104,11 @@ extern "C" trc_status trc_oiio_open(const char *path, trc_oiio **file_out, trc_f
         OIIO::ImageSpec config, spec;
         config.attribute("oiio:UnassociatedAlpha", 1);
         file->input = OIIO::ImageInput::create(path, false, &config);
-        if (!file->input) return fail_open(path, OIIO::geterror());
+        if (!file->input)
+            return fail_open(path, OIIO::geterror());
         file->input->threads(1); // no thread pool in the host's process
-        if (!file->input->open(path, spec, config)) return fail_open(path, file->input->geterror());
+        if (!file->input->open(path, spec, config))
+            return fail_open(path, file->input->geterror());
         if (spec.width <= 0 || spec.height <= 0 || spec.depth > 1 || spec.nchannels <= 0)
             return fail_open(path, "it has no pixels in two dimensions");
         file->info.width = uint32_t(spec.width);
@@ -121,7 +139,8 @@ extern "C" trc_status trc_oiio_read(trc_oiio *file, void *texels, uint64_t capac
 }
 
 extern "C" void trc_oiio_close(trc_oiio *file) {
-    if (!file) return;
+    if (!file)
+        return;
     guarded("", [&]() -> trc_status {
         delete file;
         return TRC_OK;

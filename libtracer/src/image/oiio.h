@@ -19,13 +19,14 @@ struct trc_file_info {
 
 struct trc_oiio;
 
-/* Opens the first picture of a file. OUT_OF_MEMORY or IMAGE, with the reason; the size is as the file
- * claims, to be checked before memory is taken. */
-trc_status trc_oiio_open(const char *path, struct trc_oiio **file_out, struct trc_file_info *info_out);
+/* Opens the first picture of a file. OUT_OF_MEMORY or IMAGE, with the reason; the size is as the
+ * file claims, to be checked before memory is taken. */
+trc_status trc_oiio_open(const char *path, struct trc_oiio **file_out,
+                         struct trc_file_info *info_out);
 
 /* Reads all pixels as info says, the bottom row first, each channel 1, 2 (U16, F16) or 4 bytes;
- * row_bytes from row to row, texel_bytes from texel to texel: what is between stays. capacity is the
- * size of texels. IMAGE, OUT_OF_MEMORY. */
+ * row_bytes from row to row, texel_bytes from texel to texel: what is between stays. capacity is
+ * the size of texels. IMAGE, OUT_OF_MEMORY. */
 trc_status trc_oiio_read(struct trc_oiio *file, void *texels, uint64_t capacity,
                          uint64_t texel_bytes, uint64_t row_bytes);
 

@@ -1,19 +1,19 @@
 /* Evaluating and sampling lobes.
  *
- * A direction on the upper side of a reflecting lobe counts only if it is above the lobe's normal, the
- * shading normal and the geometric surface; for transmission below all three. So nothing shines through
- * a surface whose normals are bent, and evaluation and sampling have the same support.
+ * A direction on the upper side of a reflecting lobe counts only if it is above the lobe's normal,
+ * the shading normal and the geometric surface; for transmission below all three. So nothing shines
+ * through a surface whose normals are bent, and evaluation and sampling have the same support.
  *
- * Departures from Cycles 3.4: reflections are sampled by bounded visible normals, refractions by the spherical
- * cap; densities are the true ones, where Cycles gives clearcoat the density of GTR1 and samples GGX. What
- * that does to its pictures is kept in trc_bsdf_sample.beyond. */
+ * Departures from Cycles 3.4: reflections are sampled by bounded visible normals, refractions by
+ * the spherical cap; densities are the true ones, where Cycles gives clearcoat the density of GTR1
+ * and samples GGX. What that does to its pictures is kept in trc_bsdf_sample.beyond. */
 #include "kernels/bsdf.h"
 
 #include "kernels/ggx_energy.h"
 #include "kernels/microfacet.h"
 
-/* Value times cosine, and three densities: of this file's sampling; of Cycles' sampling; and the one that
- * Cycles weights it with. */
+/* Value times cosine, and three densities: of this file's sampling; of Cycles' sampling; and the
+ * one that Cycles weights it with. */
 struct lobe_value {
     vvec3 value;
     vfloat pdf, pick, claim;
@@ -25,8 +25,8 @@ TRC_INLINE struct lobe_value no_value(void) {
 
 /* ---- diffuse lobes ---- */
 
-/* Softens the terminator of normals bent by a texture: M. J.-Y. Chiang, Y. K. Li and B. Burley, "Taming the
- * Shadow Terminator" (2019). */
+/* Softens the terminator of normals bent by a texture: M. J.-Y. Chiang, Y. K. Li and B. Burley,
+ * "Taming the Shadow Terminator" (2019). */
 TRC_INLINE vfloat bump_shadowing(vvec3 n_surface, vvec3 n_lobe, vvec3 wi, vfloat cos_i) {
     const vfloat g = vf_divide(v3_dot(n_surface, wi), cos_i * v3_dot(n_surface, n_lobe));
     const vfloat g2 = g * g;
@@ -36,8 +36,7 @@ TRC_INLINE vfloat bump_shadowing(vvec3 n_surface, vvec3 n_lobe, vvec3 wi, vfloat
 
 /* M. Oren and S. Nayar (1994) in the form of Y. Fujii, as Cycles has it. */
 TRC_INLINE vfloat oren_nayar(vfloat sigma, vfloat cos_i, vfloat cos_o, vfloat cos_io) {
-    const vfloat scale =
-        vf_rcp(vf_set(TRC_PI) + vf_set((3.0f * TRC_PI - 4.0f) / 6.0f) * sigma);
+    const vfloat scale = vf_rcp(vf_set(TRC_PI) + vf_set((3.0f * TRC_PI - 4.0f) / 6.0f) * sigma);
     const vfloat no = vf_max(cos_o, vf_zero());
     const vfloat t = cos_io - cos_i * no;
     const vfloat high = vf_max(vf_max(cos_i, no), vf_set(1e-30f));
@@ -83,14 +82,16 @@ TRC_INLINE struct lobe_value diffuse_value(const struct trc_lobe *lobe, const st
 
 /* The half vector and the direction as seen from the normal. */
 struct half_vector {
-    vfloat cos_m;  /* n . m */
-    vfloat sin2_m; /* isotropic lobes: its sine squared; from the cross product, which keeps digits */
-    vfloat e;      /* see microfacet.h */
+    vfloat cos_m; /* n . m */
+    vfloat
+        sin2_m; /* isotropic lobes: its sine squared; from the cross product, which keeps digits */
+    vfloat e;   /* see microfacet.h */
     vfloat tan2_i; /* alpha-weighted, of wi */
     vvec3 local;   /* m in the frame, anisotropic lobes */
 };
 
-TRC_INLINE struct half_vector half_of(const struct trc_lobe *lobe, vvec3 m, vvec3 wi, vfloat cos_i) {
+TRC_INLINE struct half_vector half_of(const struct trc_lobe *lobe, vvec3 m, vvec3 wi,
+                                      vfloat cos_i) {
     struct half_vector h;
     h.cos_m = v3_dot(lobe->n, m);
     const vfloat inverse_i = vf_rcp(cos_i * cos_i);
@@ -154,10 +155,9 @@ static struct lobe_value clearcoat_value(const struct trc_lobe *lobe, const stru
     const vfloat quarter = vf_set(0.25f) / lobe->cos_o;
     const vfloat claim = vf_where(m, g_o * d * quarter);
     const vfloat sampled_d = trc_ggx_d(h->e, h->cos_m, lobe->alpha_x * lobe->alpha_y);
-    return (struct lobe_value){
-        v3_mul(v3_scale(lobe->weight, claim * g_i), fresnel_of(lobe, cos_h)),
-        vf_where(m, sampled_d * lobe->pdf_scale),
-        vf_where(m, sampled_d * lobe->g1_o * quarter), claim};
+    return (struct lobe_value){v3_mul(v3_scale(lobe->weight, claim * g_i), fresnel_of(lobe, cos_h)),
+                               vf_where(m, sampled_d * lobe->pdf_scale),
+                               vf_where(m, sampled_d * lobe->g1_o * quarter), claim};
 }
 
 TRC_INLINE struct lobe_value reflect_value(const struct trc_lobe *lobe, vvec3 wo, vvec3 wi) {
@@ -188,7 +188,8 @@ TRC_INLINE struct lobe_value reflect_value(const struct trc_lobe *lobe, vvec3 wo
         const vfloat spread = lobe->multi_chance;
         r.pdf = vf_lerp(r.pdf, cosine * vf_set(TRC_INV_PI), spread);
         r.claim = vf_lerp(r.claim, cosine * vf_set(TRC_INV_PI), spread);
-        r.value = v3_add(v3_scale(fresnel_of(lobe, cos_h), f), v3_scale(lobe->multi_weight, missing));
+        r.value =
+            v3_add(v3_scale(fresnel_of(lobe, cos_h), f), v3_scale(lobe->multi_weight, missing));
         r.value = v3_mul(r.value, lobe->weight);
     } else {
         r.value = v3_mul(v3_scale(lobe->weight, f), fresnel_of(lobe, cos_h));
@@ -231,13 +232,13 @@ TRC_INLINE struct lobe_value refract_value(const struct trc_lobe *lobe, vvec3 wo
 /* ---- all lobes ---- */
 
 /* Lanes in which wi counts as reflected, as transmitted. */
-TRC_INLINE void sides(const struct trc_lobes *l, const struct trc_surface *s, vvec3 wi, vmask active,
-                      vmask *above, vmask *below) {
+TRC_INLINE void sides(const struct trc_lobes *l, const struct trc_surface *s, vvec3 wi,
+                      vmask active, vmask *above, vmask *below) {
     const vfloat cos_n = v3_dot(s->n, wi), cos_g = v3_dot(s->ng, wi);
     const vmask over = vm_or(vf_gt(cos_g, vf_zero()), l->below_horizon);
     *above = vm_and(active, vm_and(vf_gt(cos_n, vf_zero()), over));
-    /* By the shading normal alone, as Cycles: near the silhouette of a smooth surface refraction may leave on the
-     * side of the flat triangle it came from, and still has to go on. */
+    /* By the shading normal alone, as Cycles: near the silhouette of a smooth surface refraction
+     * may leave on the side of the flat triangle it came from, and still has to go on. */
     *below = vm_and(active, vf_lt(cos_n, vf_zero()));
 }
 
@@ -310,14 +311,13 @@ static void weigh_direction(const struct trc_lobes *l, const struct trc_surface 
     out->pdf = vf_select(active, pdf, out->pdf);
     out->weight = v3_select(active, v3_where(lit, v3_scale(value, vf_rcp(pdf))), out->weight);
     out->beyond = vf_select(lit, vf_divide(picked, claimed), out->beyond);
-    out->valid = vm_or(vm_andnot(out->valid, active),
-                       vm_and(lit, vf_gt(v3_max(value), vf_zero())));
+    out->valid = vm_or(vm_andnot(out->valid, active), vm_and(lit, vf_gt(v3_max(value), vf_zero())));
 }
 
 /* ---- sampling ---- */
 
-/* Mirror direction or ideal refraction, with what the lobe gives there. Lanes that have none get weight
- * 0. */
+/* Mirror direction or ideal refraction, with what the lobe gives there. Lanes that have none get
+ * weight 0. */
 static vvec3 ideal_direction(const struct trc_lobe *lobe, const struct trc_surface *s,
                              vvec3 *weight) {
     vvec3 wi;
@@ -332,8 +332,9 @@ static vvec3 ideal_direction(const struct trc_lobe *lobe, const struct trc_surfa
     return wi;
 }
 
-/* A direction of the lobe's density. Lanes leave *alive where total reflection leaves none, or where it is
- * on the wrong side: other lobes may have a density there, but it was not theirs that was sampled. */
+/* A direction of the lobe's density. Lanes leave *alive where total reflection leaves none, or
+ * where it is on the wrong side: other lobes may have a density there, but it was not theirs that
+ * was sampled. */
 static vvec3 rough_direction(const struct trc_lobe *lobe, const struct trc_surface *s, vfloat u1,
                              vfloat u2, vmask *alive) {
     vvec3 a, b;

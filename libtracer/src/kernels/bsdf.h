@@ -1,5 +1,5 @@
-/* Lobes of a shading point: set up from a material's leaves, evaluated, sampled. TRC_WIDTH points at
- * once, all of one material, so the kinds of lobes are uniform and their parameters are not.
+/* Lobes of a shading point: set up from a material's leaves, evaluated, sampled. TRC_WIDTH points
+ * at once, all of one material, so the kinds of lobes are uniform and their parameters are not.
  *
  * The formulas are those of Cycles in Blender 3.4; where a lobe departs from it, bsdf.c says so. */
 #ifndef TRACER_KERNELS_BSDF_H
@@ -11,25 +11,25 @@
 #define TRC_MAX_LOBES 24
 
 enum trc_lobe_kind {
-    TRC_LOBE_DIFFUSE,       /* see TRC_DIFFUSE_* */
-    TRC_LOBE_SHEEN,         /* Principled's sheen, counts as diffuse */
-    TRC_LOBE_TRANSLUCENT,   /* counts as diffuse in passes and for light visibility, as in Cycles */
-    TRC_LOBE_REFLECT,       /* microfacet reflection or ideal mirror */
-    TRC_LOBE_REFRACT,       /* microfacet refraction or ideal */
-    TRC_LOBE_TRANSPARENT    /* straight through */
+    TRC_LOBE_DIFFUSE,     /* see TRC_DIFFUSE_* */
+    TRC_LOBE_SHEEN,       /* Principled's sheen, counts as diffuse */
+    TRC_LOBE_TRANSLUCENT, /* counts as diffuse in passes and for light visibility, as in Cycles */
+    TRC_LOBE_REFLECT,     /* microfacet reflection or ideal mirror */
+    TRC_LOBE_REFRACT,     /* microfacet refraction or ideal */
+    TRC_LOBE_TRANSPARENT  /* straight through */
 };
 
 /* trc_lobe.distribution of TRC_LOBE_DIFFUSE ... */
 enum { TRC_DIFFUSE_LAMBERT, TRC_DIFFUSE_OREN_NAYAR, TRC_DIFFUSE_PRINCIPLED };
-/* ... and of microfacets. MULTI_GGX: GGX with height-correlated masking and the energy of the single
- * scattering restored, in place of Cycles' random walk. */
+/* ... and of microfacets. MULTI_GGX: GGX with height-correlated masking and the energy of the
+ * single scattering restored, in place of Cycles' random walk. */
 enum { TRC_LOBE_GGX, TRC_LOBE_GTR1, TRC_LOBE_BECKMANN, TRC_LOBE_ASHIKHMIN, TRC_LOBE_MULTI_GGX };
 
 /* trc_lobe.fresnel: what multiplies the weight at a microfacet. */
 enum {
-    TRC_FRESNEL_NONE,       /* 1 (glass has the factor of the macro normal in its weight) */
-    TRC_FRESNEL_BLEND,      /* f0 to f90 as the dielectric of index ior goes from F(0) to 1 */
-    TRC_FRESNEL_DIELECTRIC  /* F of ior for reflection, 1 - F for refraction */
+    TRC_FRESNEL_NONE,      /* 1 (glass has the factor of the macro normal in its weight) */
+    TRC_FRESNEL_BLEND,     /* f0 to f90 as the dielectric of index ior goes from F(0) to 1 */
+    TRC_FRESNEL_DIELECTRIC /* F of ior for reflection, 1 - F for refraction */
 };
 
 /* Lanes where alpha_x * alpha_y is at or below it are ideal (Cycles 3.4 uses the same bound). */
@@ -39,35 +39,35 @@ struct trc_lobe {
     enum trc_lobe_kind kind;
     uint32_t distribution;
     uint32_t fresnel;
-    bool anisotropic;       /* tangent is set and alpha_x may differ from alpha_y */
-    vmask ideal;            /* lanes that scatter into one direction only */
-    vvec3 weight;           /* throughput colour, >= 0; 0 in lanes that do not have the lobe */
-    vvec3 n;                /* the lobe's normal */
-    vvec3 tangent;          /* unit, orthogonal to n, anisotropic lobes only; bitangent is n x tangent */
+    bool anisotropic; /* tangent is set and alpha_x may differ from alpha_y */
+    vmask ideal;      /* lanes that scatter into one direction only */
+    vvec3 weight;     /* throughput colour, >= 0; 0 in lanes that do not have the lobe */
+    vvec3 n;          /* the lobe's normal */
+    vvec3 tangent;    /* unit, orthogonal to n, anisotropic lobes only; bitangent is n x tangent */
     vfloat alpha_x, alpha_y;
-    vfloat ior;             /* refraction: relative index, transmitted over incident side */
-    vfloat roughness;       /* Oren-Nayar sigma; Principled's roughness */
+    vfloat ior;       /* refraction: relative index, transmitted over incident side */
+    vfloat roughness; /* Oren-Nayar sigma; Principled's roughness */
     vvec3 f0, f90;
-    vfloat cos_o;           /* n . wo */
-    vfloat g1_o;            /* masking of wo */
-    vfloat pdf_scale;       /* density of a sampled direction over D of its half vector */
-    vvec3 multi_weight;     /* MULTI_GGX: what the lobe of the missing energy is scaled by */
-    vfloat multi_chance;    /* and how often it is sampled, by cosine */
-    vfloat mix_weight;      /* Cycles' sample weight, of every lobe */
-    vfloat sample_weight;   /* chance in proportion, 0 for lobes that are not continued */
+    vfloat cos_o;         /* n . wo */
+    vfloat g1_o;          /* masking of wo */
+    vfloat pdf_scale;     /* density of a sampled direction over D of its half vector */
+    vvec3 multi_weight;   /* MULTI_GGX: what the lobe of the missing energy is scaled by */
+    vfloat multi_chance;  /* and how often it is sampled, by cosine */
+    vfloat mix_weight;    /* Cycles' sample weight, of every lobe */
+    vfloat sample_weight; /* chance in proportion, 0 for lobes that are not continued */
 };
 
 struct trc_lobes {
     int count;
-    uint32_t kinds;         /* 1 << kind of every lobe */
+    uint32_t kinds; /* 1 << kind of every lobe */
     struct trc_lobe lobe[TRC_MAX_LOBES];
     vvec3 emission;         /* radiance towards wo */
     vfloat holdout;         /* weight of holdout leaves */
     vfloat mix_weight;      /* sum over the lobes */
     vfloat continue_weight; /* sum of sample_weight */
-    /* Lanes where light from below the geometric surface may reach reflecting lobes, as Cycles allows for
-     * every smooth surface; trc_lobes_setup sets none: nothing shines through. Set by a caller that moves
-     * shadow rays off the flat triangle (Cycles' shadow terminator offset). */
+    /* Lanes where light from below the geometric surface may reach reflecting lobes, as Cycles
+     * allows for every smooth surface; trc_lobes_setup sets none: nothing shines through. Set by a
+     * caller that moves shadow rays off the flat triangle (Cycles' shadow terminator offset). */
     vmask below_horizon;
 };
 
@@ -79,13 +79,14 @@ void TRC_KERNEL(trc_lobes_setup)(const struct trc_material *m, const struct trc_
                                  struct trc_lobes *out);
 
 /* Emission of the leaves alone: what a light sample or a world lookup needs. */
-vvec3 TRC_KERNEL(trc_lobes_emission)(const struct trc_material *m, const struct trc_registers *regs);
+vvec3 TRC_KERNEL(trc_lobes_emission)(const struct trc_material *m,
+                                     const struct trc_registers *regs);
 
-/* Value times cosine towards wi, split as the passes want it, without ideal lobes; pdf is the density of
- * trc_bsdf_sample for wi over the lobes that are continued (solid angle, 0 for diffuse-only). Lanes
- * outside active are 0. Where light samples and continuation rays share the work, the weight of a light
- * sample (p_l^2 / (p_l^2 + pdf^2)) goes to all three parts, diffuse included: the weight of a sampled ray
- * carries all three too. */
+/* Value times cosine towards wi, split as the passes want it, without ideal lobes; pdf is the
+ * density of trc_bsdf_sample for wi over the lobes that are continued (solid angle, 0 for
+ * diffuse-only). Lanes outside active are 0. Where light samples and continuation rays share the
+ * work, the weight of a light sample (p_l^2 / (p_l^2 + pdf^2)) goes to all three parts, diffuse
+ * included: the weight of a sampled ray carries all three too. */
 struct trc_bsdf_value {
     vvec3 diffuse, glossy, transmission;
     vfloat pdf;
@@ -93,31 +94,33 @@ struct trc_bsdf_value {
 void TRC_KERNEL(trc_bsdf_eval)(const struct trc_lobes *l, const struct trc_surface *s, vvec3 wi,
                                vmask active, struct trc_bsdf_value *out);
 
-/* One continuation ray per lane: the lobe by u_lobe in proportion to sample_weight, the direction by u1,
- * u2. Diffuse and sheen lobes are never continued; transparent and translucent are.
+/* One continuation ray per lane: the lobe by u_lobe in proportion to sample_weight, the direction
+ * by u1, u2. Diffuse and sheen lobes are never continued; transparent and translucent are.
  *
  * Two throughputs. weight is for the emission, lamps and world that the ray itself finds (through
- * transparent surfaces too), with MIS against light samples: unbiased. Everything behind the next surface
- * gets weight * beyond. beyond differs from 1 only where a rough lobe shares its direction with lobes that
- * are not continued: Cycles picks one lobe, diffuse ones included, and weights the pick by the densities of
- * all of them (balance heuristic); with diffuse bounces 0 the picks of diffuse lobes then end, so the
- * others carry S(wi) / P(wi), S the densities of continued lobes and P of all. A picture without that
- * factor would be "right" and differ from Cycles' by several per cent on rough Principled materials. */
+ * transparent surfaces too), with MIS against light samples: unbiased. Everything behind the next
+ * surface gets weight * beyond. beyond differs from 1 only where a rough lobe shares its direction
+ * with lobes that are not continued: Cycles picks one lobe, diffuse ones included, and weights the
+ * pick by the densities of all of them (balance heuristic); with diffuse bounces 0 the picks of
+ * diffuse lobes then end, so the others carry S(wi) / P(wi), S the densities of continued lobes and
+ * P of all. A picture without that factor would be "right" and differ from Cycles' by several per
+ * cent on rough Principled materials. */
 struct trc_bsdf_sample {
-    vvec3 wi;               /* unit */
-    vvec3 weight;           /* value * cos / pdf, over all lobes for rough ones, for this lobe if ideal */
-    vfloat beyond;          /* 1 for ideal and transparent ones */
-    vfloat pdf;             /* as in trc_bsdf_eval; 0 where ideal or transparent */
-    vmask valid;            /* the ray is worth tracing */
-    vmask singular, transparent, transmitted; /* transmitted: to the other side, incl. translucent */
-    vmask diffuse;          /* the lobe was translucent: a diffuse transmission ray */
-    vfloat alpha_min;       /* sqrt(alpha_x * alpha_y) of the lobe, for Filter Glossy; 1 if translucent */
+    vvec3 wi;      /* unit */
+    vvec3 weight;  /* value * cos / pdf, over all lobes for rough ones, for this lobe if ideal */
+    vfloat beyond; /* 1 for ideal and transparent ones */
+    vfloat pdf;    /* as in trc_bsdf_eval; 0 where ideal or transparent */
+    vmask valid;   /* the ray is worth tracing */
+    vmask singular, transparent,
+        transmitted;  /* transmitted: to the other side, incl. translucent */
+    vmask diffuse;    /* the lobe was translucent: a diffuse transmission ray */
+    vfloat alpha_min; /* sqrt(alpha_x * alpha_y) of the lobe, for Filter Glossy; 1 if translucent */
 };
 void TRC_KERNEL(trc_bsdf_sample)(const struct trc_lobes *l, const struct trc_surface *s,
                                  vfloat u_lobe, vfloat u1, vfloat u2, struct trc_bsdf_sample *out);
 
-/* Whitted: the same for lobe number i alone (weight not divided by a choice; rough lobes are taken along
- * their ideal direction). valid is none for lobes that are not continued. */
+/* Whitted: the same for lobe number i alone (weight not divided by a choice; rough lobes are taken
+ * along their ideal direction). valid is none for lobes that are not continued. */
 void TRC_KERNEL(trc_bsdf_ideal)(const struct trc_lobes *l, int i, const struct trc_surface *s,
                                 struct trc_bsdf_sample *out);
 

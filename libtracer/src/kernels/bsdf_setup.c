@@ -1,7 +1,7 @@
 /* From the leaves of a material to lobes, as Cycles 3.4 sets up its closures.
  *
- * Departures: subsurface scattering is Principled's diffuse lobe with the mixed colour; multiple-scattering
- * GGX is an analytic lobe instead of a random walk (ggx_energy.h). */
+ * Departures: subsurface scattering is Principled's diffuse lobe with the mixed colour;
+ * multiple-scattering GGX is an analytic lobe instead of a random walk (ggx_energy.h). */
 #include "kernels/bsdf.h"
 
 #include "kernels/ggx_energy.h"
@@ -17,7 +17,7 @@ struct setup {
     const struct trc_surface *s;
     const struct trc_registers *regs;
     vfloat filter_alpha;
-    vvec3 default_n;  /* s->n made valid; set once asked for */
+    vvec3 default_n; /* s->n made valid; set once asked for */
     bool has_default_n;
     struct trc_lobes *out;
 };
@@ -39,8 +39,8 @@ TRC_INLINE bool is_unlinked(const struct setup *c, const struct trc_leaf *leaf, 
 
 /* ---- normals and tangents ---- */
 
-/* Of two candidates for the squared z of the bent normal, the one whose mirror direction is valid; see
- * below. Returns x and z in the plane of ng and n. */
+/* Of two candidates for the squared z of the bent normal, the one whose mirror direction is valid;
+ * see below. Returns x and z in the plane of ng and n. */
 static void choose_bend(vfloat first2, vfloat second2, vfloat ix, vfloat iz, vfloat *x, vfloat *z,
                         vmask *any) {
     const vfloat least = vf_set(1e-5f), most = vf_set(1.0f + 1e-5f);
@@ -60,9 +60,9 @@ static void choose_bend(vfloat first2, vfloat second2, vfloat ix, vfloat iz, vfl
     *any = vm_or(fits1, fits2);
 }
 
-/* Turns n towards the geometric normal as little as makes the mirror direction of wo rise above the surface
- * by a threshold t. With z = ng and x = the part of n across it, the turned normal (x, 0, z) satisfies
- * 2 (x ix + z iz) z - iz = t, a quadratic in z^2 because x^2 = 1 - z^2. */
+/* Turns n towards the geometric normal as little as makes the mirror direction of wo rise above the
+ * surface by a threshold t. With z = ng and x = the part of n across it, the turned normal (x, 0,
+ * z) satisfies 2 (x ix + z iz) z - iz = t, a quadratic in z^2 because x^2 = 1 - z^2. */
 static vvec3 valid_normal(const struct trc_surface *s, vvec3 n) {
     const vfloat iz = v3_dot(s->ng, s->wo);
     const vfloat t = vf_min(vf_set(0.9f) * iz, vf_set(0.01f));
@@ -142,8 +142,8 @@ static vvec3 leaf_tangent(const struct setup *c, const struct trc_leaf *leaf, ui
 /* A lobe of weight in the lanes where it matters, or NULL where it matters in none. */
 static struct trc_lobe *add_lobe(struct setup *c, enum trc_lobe_kind kind, vvec3 weight) {
     struct trc_lobes *out = c->out;
-    const vvec3 w = v3(vf_max(weight.x, vf_zero()), vf_max(weight.y, vf_zero()),
-                       vf_max(weight.z, vf_zero()));
+    const vvec3 w =
+        v3(vf_max(weight.x, vf_zero()), vf_max(weight.y, vf_zero()), vf_max(weight.z, vf_zero()));
     const vfloat mean = v3_average(w);
     /* False for NaN too. */
     const vmask counts = vm_and(c->s->active, vf_ge(mean, vf_set(WEIGHT_CUTOFF)));
@@ -198,10 +198,10 @@ static void add_transparent(struct setup *c, vvec3 weight) {
 
 /* What both kinds of microfacet lobe need once alpha, ior and tangent are set. */
 static void finish_microfacets(const struct setup *c, struct trc_lobe *lobe, bool is_sharp) {
-    const vfloat least = vf_set(lobe->distribution == TRC_LOBE_ASHIKHMIN ||
-                                        lobe->distribution == TRC_LOBE_MULTI_GGX
-                                    ? 1e-4f
-                                    : 0.0f);
+    const vfloat least =
+        vf_set(lobe->distribution == TRC_LOBE_ASHIKHMIN || lobe->distribution == TRC_LOBE_MULTI_GGX
+                   ? 1e-4f
+                   : 0.0f);
     if (is_sharp) {
         lobe->alpha_x = lobe->alpha_y = vf_zero();
     } else {
@@ -234,8 +234,8 @@ static void finish_microfacets(const struct setup *c, struct trc_lobe *lobe, boo
     lobe->pdf_scale = vf_set(0.5f) / (cos_o * (bound + whole - vf_one()));
 }
 
-/* Mean over the cosine-weighted hemisphere of how far a dielectric is from its F0, after the fit of Kulla
- * and Conty (2017) to the mean of F. */
+/* Mean over the cosine-weighted hemisphere of how far a dielectric is from its F0, after the fit of
+ * Kulla and Conty (2017) to the mean of F. */
 static vfloat mean_blend(vfloat ior) {
     const vfloat eta = vf_max(ior, vf_rcp(ior));
     const vfloat f0 = trc_fresnel_normal(eta);
@@ -320,16 +320,18 @@ static struct trc_lobe *add_dielectric(struct setup *c, enum trc_lobe_kind kind,
     return lobe;
 }
 
-/* Multiple-scattering glass: both lobes with the factor of the micro-normal, scaled so that they keep all
- * energy together. f0: colour of the reflection at normal incidence, white for plain glass. */
-static void add_multi_glass(struct setup *c, vvec3 weight, vvec3 reflected, vvec3 refracted, vvec3 n,
-                            vfloat alpha, vfloat eta) {
+/* Multiple-scattering glass: both lobes with the factor of the micro-normal, scaled so that they
+ * keep all energy together. f0: colour of the reflection at normal incidence, white for plain
+ * glass. */
+static void add_multi_glass(struct setup *c, vvec3 weight, vvec3 reflected, vvec3 refracted,
+                            vvec3 n, vfloat alpha, vfloat eta) {
     const vfloat rough = vf_clamp(alpha, 1e-4f, 1.0f);
     const vfloat kept = trc_glass_albedo(v3_dot(n, c->s->wo), rough, eta);
     const vvec3 w = v3_scale(weight, vf_rcp(vf_max(kept, vf_set(0.1f))));
     struct trc_lobe *lobe = add_dielectric(c, TRC_LOBE_REFLECT, v3_mul(w, reflected), n, rough, eta,
                                            TRC_DISTRIBUTION_GGX);
-    /* Micro-normals may reflect or refract where the macro normal does not: neither chance goes to 0. */
+    /* Micro-normals may reflect or refract where the macro normal does not: neither chance goes to
+     * 0. */
     const vfloat f = vf_clamp(trc_fresnel_dielectric(v3_dot(n, c->s->wo), eta), 0.1f, 0.9f);
     if (lobe) {
         lobe->fresnel = TRC_FRESNEL_DIELECTRIC;
@@ -372,11 +374,28 @@ static void add_refraction(struct setup *c, const struct trc_leaf *leaf, vfloat 
 
 /* Where the inputs of the node stand. */
 enum {
-    P_BASE = 0, P_SUBSURFACE = 3, P_SUBSURFACE_COLOR = 4, P_METALLIC = 7, P_SPECULAR = 8,
-    P_SPECULAR_TINT = 9, P_ROUGHNESS = 10, P_ANISOTROPIC = 11, P_ROTATION = 12, P_SHEEN = 13,
-    P_SHEEN_TINT = 14, P_CLEARCOAT = 15, P_CLEARCOAT_ROUGHNESS = 16, P_IOR = 17, P_TRANSMISSION = 18,
-    P_TRANSMISSION_ROUGHNESS = 19, P_EMISSION = 20, P_EMISSION_STRENGTH = 23, P_ALPHA = 24,
-    P_NORMAL = 25, P_CLEARCOAT_NORMAL = 28, P_TANGENT = 31
+    P_BASE = 0,
+    P_SUBSURFACE = 3,
+    P_SUBSURFACE_COLOR = 4,
+    P_METALLIC = 7,
+    P_SPECULAR = 8,
+    P_SPECULAR_TINT = 9,
+    P_ROUGHNESS = 10,
+    P_ANISOTROPIC = 11,
+    P_ROTATION = 12,
+    P_SHEEN = 13,
+    P_SHEEN_TINT = 14,
+    P_CLEARCOAT = 15,
+    P_CLEARCOAT_ROUGHNESS = 16,
+    P_IOR = 17,
+    P_TRANSMISSION = 18,
+    P_TRANSMISSION_ROUGHNESS = 19,
+    P_EMISSION = 20,
+    P_EMISSION_STRENGTH = 23,
+    P_ALPHA = 24,
+    P_NORMAL = 25,
+    P_CLEARCOAT_NORMAL = 28,
+    P_TANGENT = 31
 };
 
 /* Whether an input can differ from 0. */
@@ -385,7 +404,8 @@ static bool may_exceed_zero(const struct setup *c, const struct trc_leaf *leaf, 
     return o->reg >= 0 || o->value > 0.0f;
 }
 
-/* Turns a lobe into one that goes from f0 at normal incidence to f90, and accounts for it in the chance. */
+/* Turns a lobe into one that goes from f0 at normal incidence to f90, and accounts for it in the
+ * chance. */
 static void set_blend(const struct setup *c, struct trc_lobe *lobe, vvec3 f0, vvec3 f90) {
     lobe->fresnel = TRC_FRESNEL_BLEND;
     lobe->f0 = f0;
@@ -422,20 +442,19 @@ static void principled_diffuse(struct setup *c, const struct trc_leaf *leaf, vfl
     add_diffuse(c, TRC_LOBE_SHEEN, 0, v3_scale(sheen, w * number(c, leaf, P_SHEEN)), n, vf_zero());
 }
 
-static void principled_specular(struct setup *c, const struct trc_leaf *leaf, vfloat weight, vvec3 n,
-                                vfloat metallic, vfloat specular_weight) {
+static void principled_specular(struct setup *c, const struct trc_leaf *leaf, vfloat weight,
+                                vvec3 n, vfloat metallic, vfloat specular_weight) {
     const vfloat specular = number(c, leaf, P_SPECULAR);
     const vfloat cutoff = vf_set(WEIGHT_CUTOFF);
     const vmask kept = vm_and(vf_gt(specular_weight, cutoff),
                               vm_or(vf_gt(specular, cutoff), vf_gt(metallic, cutoff)));
-    struct trc_lobe *lobe = add_lobe(c, TRC_LOBE_REFLECT,
-                                     v3_splat(vf_where(kept, weight * specular_weight)));
+    struct trc_lobe *lobe =
+        add_lobe(c, TRC_LOBE_REFLECT, v3_splat(vf_where(kept, weight * specular_weight)));
     if (!lobe)
         return;
     const vfloat roughness = number(c, leaf, P_ROUGHNESS), alpha = roughness * roughness;
     lobe->n = n;
-    lobe->ior =
-        vf_set(2.0f) / (vf_one() - vf_safe_sqrt(vf_set(0.08f) * specular)) - vf_one();
+    lobe->ior = vf_set(2.0f) / (vf_one() - vf_safe_sqrt(vf_set(0.08f) * specular)) - vf_one();
     lobe->alpha_x = lobe->alpha_y = alpha;
     lobe->anisotropic = may_exceed_zero(c, leaf, P_ANISOTROPIC);
     if (lobe->anisotropic) {
@@ -448,13 +467,13 @@ static void principled_specular(struct setup *c, const struct trc_leaf *leaf, vf
     const vvec3 base = colour(c, leaf, P_BASE);
     vvec3 dielectric = v3_splat(vf_set(0.08f) * specular);
     if (may_exceed_zero(c, leaf, P_SPECULAR_TINT)) {
-        const vfloat bright =
-            vf_set(0.3f) * base.x + vf_set(0.6f) * base.y + vf_set(0.1f) * base.z;
+        const vfloat bright = vf_set(0.3f) * base.x + vf_set(0.6f) * base.y + vf_set(0.1f) * base.z;
         const vvec3 tint = mix_white(hue_of(base, bright), number(c, leaf, P_SPECULAR_TINT));
         dielectric = v3_mul(tint, dielectric);
     }
     const vvec3 f0 = v3_saturate(v3_lerp(dielectric, base, metallic));
-    /* Cycles keeps single scattering at low roughness; where lanes disagree the missing energy is nil. */
+    /* Cycles keeps single scattering at low roughness; where lanes disagree the missing energy is
+     * nil. */
     const bool multiple = leaf->mode == TRC_DISTRIBUTION_MULTI_GGX &&
                           vm_any(vm_and(c->s->active, vf_gt(roughness, vf_set(0.075f))));
     lobe->distribution = multiple ? TRC_LOBE_MULTI_GGX : TRC_LOBE_GGX;
@@ -483,8 +502,8 @@ static void principled_glass(struct setup *c, const struct trc_leaf *leaf, vvec3
         set_blend(c, lobe, f0, v3_splat(vf_one()));
     vfloat through = roughness;
     if (leaf->mode != TRC_DISTRIBUTION_MULTI_GGX)
-        through = vf_one() - (vf_one() - roughness) *
-                                 (vf_one() - number(c, leaf, P_TRANSMISSION_ROUGHNESS));
+        through = vf_one() -
+                  (vf_one() - roughness) * (vf_one() - number(c, leaf, P_TRANSMISSION_ROUGHNESS));
     const vvec3 weight = v3_scale(v3_mul(base, glass), vf_max(vf_one() - f, vf_set(1e-4f)));
     add_dielectric(c, TRC_LOBE_REFRACT, weight, n, through * through, eta, TRC_DISTRIBUTION_GGX);
 }
@@ -492,8 +511,7 @@ static void principled_glass(struct setup *c, const struct trc_leaf *leaf, vvec3
 static void principled_clearcoat(struct setup *c, const struct trc_leaf *leaf, vfloat weight) {
     const vfloat coat = number(c, leaf, P_CLEARCOAT);
     const vmask kept = vf_gt(coat, vf_set(WEIGHT_CUTOFF));
-    struct trc_lobe *lobe =
-        add_lobe(c, TRC_LOBE_REFLECT, v3_splat(vf_where(kept, weight)));
+    struct trc_lobe *lobe = add_lobe(c, TRC_LOBE_REFLECT, v3_splat(vf_where(kept, weight)));
     if (!lobe)
         return;
     lobe->distribution = TRC_LOBE_GTR1;
@@ -520,8 +538,7 @@ static void add_principled(struct setup *c, const struct trc_leaf *leaf, vfloat 
     const vfloat diffuse_weight =
         (vf_one() - metallic) * (vf_one() - vf_saturate(number(c, leaf, P_TRANSMISSION)));
     principled_diffuse(c, leaf, weight, n, diffuse_weight);
-    principled_specular(c, leaf, weight, n, number(c, leaf, P_METALLIC),
-                        vf_one() - transmission);
+    principled_specular(c, leaf, weight, n, number(c, leaf, P_METALLIC), vf_one() - transmission);
     if (may_exceed_zero(c, leaf, P_TRANSMISSION)) {
         const vmask kept = vf_gt(transmission, vf_set(WEIGHT_CUTOFF));
         principled_glass(c, leaf, v3_splat(vf_where(kept, weight * transmission)), n);

@@ -1,13 +1,13 @@
 /* Energy that single scattering on a GGX surface keeps, for the two models that put the rest back.
  *
- * Tables are integrals of the models in microfacet.h over 400 x 400 (reflection) or 150 x 150 (glass)
- * visible normals; tests/kernels/wide/test_bsdf.c checks them through the white furnace. Rows go by
- * sqrt(alpha), columns by sqrt(cos theta_o), both from 0 to 1 in equal steps; glass tables go by
- * (ior - 1) / (ior + 1) from -1/2 to 1/2. Interpolation is linear; it is off by at most 0.013, except below
- * cos = 0.002, where it may be 0.04.
+ * Tables are integrals of the models in microfacet.h over 400 x 400 (reflection) or 150 x 150
+ * (glass) visible normals; tests/kernels/wide/test_bsdf.c checks them through the white furnace.
+ * Rows go by sqrt(alpha), columns by sqrt(cos theta_o), both from 0 to 1 in equal steps; glass
+ * tables go by (ior - 1) / (ior + 1) from -1/2 to 1/2. Interpolation is linear; it is off by at
+ * most 0.013, except below cos = 0.002, where it may be 0.04.
  *
- * Model of the missing energy: C. Kulla and A. Conty, "Revisiting Physically Based Shading at Imageworks"
- * (2017). */
+ * Model of the missing energy: C. Kulla and A. Conty, "Revisiting Physically Based Shading at
+ * Imageworks" (2017). */
 #ifndef TRACER_KERNELS_GGX_ENERGY_H
 #define TRACER_KERNELS_GGX_ENERGY_H
 
@@ -19,22 +19,38 @@
 /* clang-format off */
 /* Albedo of reflection with height-correlated masking, no Fresnel factor. */
 static const float trc_ggx_energy[TRC_GGX_ENERGY_SIZE * TRC_GGX_ENERGY_SIZE] = {
-    0.8921f, 0.9999f, 1.0000f, 1.0000f, 1.0000f, 1.0000f, 1.0000f, 1.0000f, 1.0000f, 1.0000f, 1.0000f, 1.0000f, 1.0000f, 1.0000f, 1.0000f, 1.0000f,
-    0.9953f, 0.8921f, 0.9645f, 0.9927f, 0.9978f, 0.9992f, 0.9996f, 0.9999f, 0.9999f, 1.0000f, 1.0000f, 1.0000f, 1.0000f, 1.0000f, 1.0000f, 1.0000f,
-    0.9988f, 0.9525f, 0.8920f, 0.9221f, 0.9645f, 0.9846f, 0.9927f, 0.9962f, 0.9978f, 0.9986f, 0.9992f, 0.9994f, 0.9996f, 0.9999f, 1.0000f, 1.0000f,
-    0.9995f, 0.9772f, 0.9245f, 0.8912f, 0.9052f, 0.9380f, 0.9640f, 0.9794f, 0.9878f, 0.9924f, 0.9950f, 0.9965f, 0.9974f, 0.9979f, 0.9982f, 0.9975f,
-    0.9997f, 0.9863f, 0.9498f, 0.9089f, 0.8877f, 0.8948f, 0.9179f, 0.9422f, 0.9609f, 0.9735f, 0.9816f, 0.9867f, 0.9900f, 0.9921f, 0.9934f, 0.9946f,
-    0.9998f, 0.9900f, 0.9630f, 0.9282f, 0.8970f, 0.8816f, 0.8849f, 0.9010f, 0.9213f, 0.9401f, 0.9550f, 0.9659f, 0.9736f, 0.9790f, 0.9827f, 0.9854f,
-    0.9998f, 0.9913f, 0.9692f, 0.9393f, 0.9080f, 0.8829f, 0.8703f, 0.8714f, 0.8828f, 0.8994f, 0.9167f, 0.9322f, 0.9449f, 0.9547f, 0.9622f, 0.9678f,
-    0.9998f, 0.9913f, 0.9708f, 0.9435f, 0.9132f, 0.8851f, 0.8637f, 0.8523f, 0.8515f, 0.8592f, 0.8723f, 0.8876f, 0.9027f, 0.9163f, 0.9278f, 0.9372f,
-    0.9998f, 0.9903f, 0.9700f, 0.9428f, 0.9124f, 0.8825f, 0.8563f, 0.8366f, 0.8253f, 0.8225f, 0.8270f, 0.8368f, 0.8497f, 0.8637f, 0.8774f, 0.8900f,
-    0.9997f, 0.9894f, 0.9671f, 0.9383f, 0.9064f, 0.8743f, 0.8444f, 0.8189f, 0.7995f, 0.7872f, 0.7821f, 0.7833f, 0.7896f, 0.7996f, 0.8116f, 0.8245f,
-    0.9997f, 0.9879f, 0.9628f, 0.9310f, 0.8962f, 0.8608f, 0.8271f, 0.7966f, 0.7707f, 0.7504f, 0.7361f, 0.7280f, 0.7255f, 0.7278f, 0.7340f, 0.7430f,
-    0.9996f, 0.9861f, 0.9574f, 0.9216f, 0.8826f, 0.8430f, 0.8047f, 0.7692f, 0.7374f, 0.7101f, 0.6879f, 0.6708f, 0.6590f, 0.6520f, 0.6495f, 0.6508f,
-    0.9996f, 0.9839f, 0.9510f, 0.9104f, 0.8663f, 0.8216f, 0.7782f, 0.7373f, 0.6998f, 0.6662f, 0.6368f, 0.6120f, 0.5915f, 0.5754f, 0.5634f, 0.5552f,
-    0.9995f, 0.9814f, 0.9440f, 0.8979f, 0.8480f, 0.7976f, 0.7485f, 0.7019f, 0.6587f, 0.6192f, 0.5837f, 0.5521f, 0.5244f, 0.5005f, 0.4801f, 0.4631f,
-    0.9994f, 0.9786f, 0.9363f, 0.8842f, 0.8282f, 0.7716f, 0.7165f, 0.6642f, 0.6154f, 0.5706f, 0.5296f, 0.4926f, 0.4593f, 0.4295f, 0.4030f, 0.3794f,
-    0.9993f, 0.9759f, 0.9281f, 0.8697f, 0.8071f, 0.7442f, 0.6830f, 0.6251f, 0.5712f, 0.5215f, 0.4762f, 0.4350f, 0.3978f, 0.3642f, 0.3340f, 0.3069f,
+    0.8921f, 0.9999f, 1.0000f, 1.0000f, 1.0000f, 1.0000f, 1.0000f, 1.0000f,
+    1.0000f, 1.0000f, 1.0000f, 1.0000f, 1.0000f, 1.0000f, 1.0000f, 1.0000f,
+    0.9953f, 0.8921f, 0.9645f, 0.9927f, 0.9978f, 0.9992f, 0.9996f, 0.9999f,
+    0.9999f, 1.0000f, 1.0000f, 1.0000f, 1.0000f, 1.0000f, 1.0000f, 1.0000f,
+    0.9988f, 0.9525f, 0.8920f, 0.9221f, 0.9645f, 0.9846f, 0.9927f, 0.9962f,
+    0.9978f, 0.9986f, 0.9992f, 0.9994f, 0.9996f, 0.9999f, 1.0000f, 1.0000f,
+    0.9995f, 0.9772f, 0.9245f, 0.8912f, 0.9052f, 0.9380f, 0.9640f, 0.9794f,
+    0.9878f, 0.9924f, 0.9950f, 0.9965f, 0.9974f, 0.9979f, 0.9982f, 0.9975f,
+    0.9997f, 0.9863f, 0.9498f, 0.9089f, 0.8877f, 0.8948f, 0.9179f, 0.9422f,
+    0.9609f, 0.9735f, 0.9816f, 0.9867f, 0.9900f, 0.9921f, 0.9934f, 0.9946f,
+    0.9998f, 0.9900f, 0.9630f, 0.9282f, 0.8970f, 0.8816f, 0.8849f, 0.9010f,
+    0.9213f, 0.9401f, 0.9550f, 0.9659f, 0.9736f, 0.9790f, 0.9827f, 0.9854f,
+    0.9998f, 0.9913f, 0.9692f, 0.9393f, 0.9080f, 0.8829f, 0.8703f, 0.8714f,
+    0.8828f, 0.8994f, 0.9167f, 0.9322f, 0.9449f, 0.9547f, 0.9622f, 0.9678f,
+    0.9998f, 0.9913f, 0.9708f, 0.9435f, 0.9132f, 0.8851f, 0.8637f, 0.8523f,
+    0.8515f, 0.8592f, 0.8723f, 0.8876f, 0.9027f, 0.9163f, 0.9278f, 0.9372f,
+    0.9998f, 0.9903f, 0.9700f, 0.9428f, 0.9124f, 0.8825f, 0.8563f, 0.8366f,
+    0.8253f, 0.8225f, 0.8270f, 0.8368f, 0.8497f, 0.8637f, 0.8774f, 0.8900f,
+    0.9997f, 0.9894f, 0.9671f, 0.9383f, 0.9064f, 0.8743f, 0.8444f, 0.8189f,
+    0.7995f, 0.7872f, 0.7821f, 0.7833f, 0.7896f, 0.7996f, 0.8116f, 0.8245f,
+    0.9997f, 0.9879f, 0.9628f, 0.9310f, 0.8962f, 0.8608f, 0.8271f, 0.7966f,
+    0.7707f, 0.7504f, 0.7361f, 0.7280f, 0.7255f, 0.7278f, 0.7340f, 0.7430f,
+    0.9996f, 0.9861f, 0.9574f, 0.9216f, 0.8826f, 0.8430f, 0.8047f, 0.7692f,
+    0.7374f, 0.7101f, 0.6879f, 0.6708f, 0.6590f, 0.6520f, 0.6495f, 0.6508f,
+    0.9996f, 0.9839f, 0.9510f, 0.9104f, 0.8663f, 0.8216f, 0.7782f, 0.7373f,
+    0.6998f, 0.6662f, 0.6368f, 0.6120f, 0.5915f, 0.5754f, 0.5634f, 0.5552f,
+    0.9995f, 0.9814f, 0.9440f, 0.8979f, 0.8480f, 0.7976f, 0.7485f, 0.7019f,
+    0.6587f, 0.6192f, 0.5837f, 0.5521f, 0.5244f, 0.5005f, 0.4801f, 0.4631f,
+    0.9994f, 0.9786f, 0.9363f, 0.8842f, 0.8282f, 0.7716f, 0.7165f, 0.6642f,
+    0.6154f, 0.5706f, 0.5296f, 0.4926f, 0.4593f, 0.4295f, 0.4030f, 0.3794f,
+    0.9993f, 0.9759f, 0.9281f, 0.8697f, 0.8071f, 0.7442f, 0.6830f, 0.6251f,
+    0.5712f, 0.5215f, 0.4762f, 0.4350f, 0.3978f, 0.3642f, 0.3340f, 0.3069f,
 };
 /* Its mean over the cosine-weighted hemisphere, by sqrt(alpha). */
 static const float trc_ggx_energy_mean[TRC_GGX_ENERGY_SIZE] = {
@@ -42,7 +58,8 @@ static const float trc_ggx_energy_mean[TRC_GGX_ENERGY_SIZE] = {
     0.85803f, 0.80293f, 0.74058f, 0.67342f, 0.60421f, 0.53565f, 0.47006f, 0.40913f,
 };
 /* Albedo of reflection and refraction together, separable masking, Fresnel by micro-normal. */
-static const float trc_glass_energy[TRC_GLASS_ENERGY_SIZE * TRC_GLASS_ENERGY_SIZE * TRC_GLASS_ENERGY_SIZE] = {
+#define TRC_GLASS_ENERGY_COUNT 512
+static const float trc_glass_energy[TRC_GLASS_ENERGY_COUNT] = {
     0.994f, 1.000f, 1.000f, 1.000f, 1.000f, 1.000f, 1.000f, 1.000f,
     0.930f, 0.881f, 0.964f, 0.993f, 0.998f, 1.000f, 1.000f, 1.000f,
     0.925f, 0.903f, 0.873f, 0.912f, 0.957f, 0.979f, 0.987f, 0.993f,

@@ -70,12 +70,10 @@ static void sample_lamps(const struct draw *d, const struct trc_wide_lamp *l, ui
 }
 
 /* Lanes whose bits are set in a word. */
-TRC_INLINE vmask has_bit(vint word, int32_t bit) {
-    return vi_eq(word & vi_set(bit), vi_set(bit));
-}
+TRC_INLINE vmask has_bit(vint word, int32_t bit) { return vi_eq(word & vi_set(bit), vi_set(bit)); }
 
-/* Lamps that lanes chose are taken one by one while there are few of them: their data is broadcast then and only
- * their own shape is computed. */
+/* Lamps that lanes chose are taken one by one while there are few of them: their data is broadcast
+ * then and only their own shape is computed. */
 #define SEPARATE_LAMPS 3
 
 static void mark_flags(const struct draw *d, vint flags, vmask m) {
@@ -122,7 +120,8 @@ static struct trc_corners moving_corners(const struct draw *d, vint index, vmask
         trc_affine_at(instance, time, e);
         for (int k = 0; k < 3; k++)
             for (int i = 0; i < 3; i++)
-                p[9 * lane + 3 * k + i] = e[4 * i] * corner[3 * k] + e[4 * i + 1] * corner[3 * k + 1] +
+                p[9 * lane + 3 * k + i] = e[4 * i] * corner[3 * k] +
+                                          e[4 * i + 1] * corner[3 * k + 1] +
                                           e[4 * i + 2] * corner[3 * k + 2] + e[4 * i + 3];
     }
     struct trc_corners c;
@@ -132,7 +131,8 @@ static struct trc_corners moving_corners(const struct draw *d, vint index, vmask
     return c;
 }
 
-/* Emission that a program computes: the surface at the sampled place, one material after the other. */
+/* Emission that a program computes: the surface at the sampled place, one material after the
+ * other. */
 static void evaluate_emission(const struct draw *d, vint index, vfloat u, vfloat v, vmask m) {
     const struct trc_light_triangle *all = d->table->triangles;
     const vint at = index * vi_set(TRC_TRIANGLE_WORDS);
@@ -192,8 +192,8 @@ static void sample_triangles(const struct draw *d, vmask m) {
 /* ---- world ---- */
 
 static void sample_world(const struct draw *d, vmask m) {
-    struct trc_place place = trc_world_sample(d->table, d->receiver.n, d->receiver.has_n, d->u1,
-                                              d->u2, m);
+    struct trc_place place =
+        trc_world_sample(d->table, d->receiver.n, d->receiver.has_n, d->u1, d->u2, m);
     /* No kind of ray: Cycles evaluates light samples without any either. */
     place.radiance = TRC_KERNEL(trc_world_shade)(d->scene, place.wi, vu_set(0), m);
     set_place(d, &place, m);
@@ -277,7 +277,8 @@ void TRC_KERNEL(trc_light_sample_prepared)(const struct trc_surface *s,
     const struct trc_snapshot *scene = s->snapshot;
     const struct trc_light_table *t = scene->lights;
     clear_sample(out);
-    struct draw d = {scene, t, s, trc_receiver_make(s->p, choices->n), u1, u2, vf_one(), vi_set(-1), out};
+    struct draw d = {scene,    t,          s,  trc_receiver_make(s->p, choices->n), u1, u2,
+                     vf_one(), vi_set(-1), out};
     if (t->single)
         d.light = vi_select(s->active, vi_set(single_light(t)), d.light);
     else if (trc_candidate_count(t) > 0)

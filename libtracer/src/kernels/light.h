@@ -1,11 +1,12 @@
 /* Light sampling for TRC_WIDTH points at once. Tables are built by shading/lights.c.
  *
- * Numbers of lights: lamps of the scene first, then the world if it shines, then emissive triangles.
+ * Numbers of lights: lamps of the scene first, then the world if it shines, then emissive
+ * triangles.
  *
- * What n means below: the shading normal (s->n) of a point that scatters to its upper side only, or the
- * zero vector for one whose material lets light through (translucent, refracting lobes). Lights wholly
- * below n are not chosen. The same n must be passed when a light is sampled and when a continuation ray of
- * the same point asks for the weights. */
+ * What n means below: the shading normal (s->n) of a point that scatters to its upper side only, or
+ * the zero vector for one whose material lets light through (translucent, refracting lobes). Lights
+ * wholly below n are not chosen. The same n must be passed when a light is sampled and when a
+ * continuation ray of the same point asks for the weights. */
 #ifndef TRACER_KERNELS_LIGHT_H
 #define TRACER_KERNELS_LIGHT_H
 
@@ -13,28 +14,30 @@
 #include "kernels/surface.h"
 
 struct trc_light_sample {
-    vvec3 wi;               /* unit, from the point to the light */
-    vfloat distance;        /* to the point on the light; TRC_FAR for the sun and the world */
-    vvec3 radiance;         /* emitted towards the point, before division by pdf; intensity form for
-                               delta lights so that contribution = radiance * f * cos / pdf */
-    vfloat pdf;             /* solid angle, times the chance of having chosen this light */
-    vmask valid;            /* pdf > 0 and radiance > 0 */
-    vmask delta;            /* point light or sun without extent: no MIS */
-    vmask no_mis;           /* continuation rays towards wi do not see this light: weight 1 */
+    vvec3 wi;        /* unit, from the point to the light */
+    vfloat distance; /* to the point on the light; TRC_FAR for the sun and the world */
+    vvec3 radiance;  /* emitted towards the point, before division by pdf; intensity form for
+                        delta lights so that contribution = radiance * f * cos / pdf */
+    vfloat pdf;      /* solid angle, times the chance of having chosen this light */
+    vmask valid;     /* pdf > 0 and radiance > 0 */
+    vmask delta;     /* point light or sun without extent: no MIS */
+    vmask no_mis;    /* continuation rays towards wi do not see this light: weight 1 */
     vmask casts_shadow;
-    vint light;             /* number for sorting shadow rays; emissive triangles and world included */
+    vint light; /* number for sorting shadow rays; emissive triangles and world included */
 };
 
 #define TRC_FAR 1e30f
 
-/* Chooses a light by u_select (importance for the point) and a place on it by u1, u2, for the lanes in
- * s->active. Lights that are hidden from diffuse, glossy and transmission alike are not chosen; for one
- * that is hidden from some of them, trc_light_visibility tells which parts of the BSDF to leave out. */
+/* Chooses a light by u_select (importance for the point) and a place on it by u1, u2, for the lanes
+ * in s->active. Lights that are hidden from diffuse, glossy and transmission alike are not chosen;
+ * for one that is hidden from some of them, trc_light_visibility tells which parts of the BSDF to
+ * leave out. */
 void TRC_KERNEL(trc_light_sample)(const struct trc_surface *s, vvec3 n, vfloat u_select, vfloat u1,
                                   vfloat u2, struct trc_light_sample *out);
 
-/* The same in two steps, for several samples of one point: what each light may give is computed once. Up to
- * TRC_LIGHT_CHOICES_KEPT lights are remembered, further ones are computed at each sample. */
+/* The same in two steps, for several samples of one point: what each light may give is computed
+ * once. Up to TRC_LIGHT_CHOICES_KEPT lights are remembered, further ones are computed at each
+ * sample. */
 #define TRC_LIGHT_CHOICES_KEPT 48
 struct trc_light_choices {
     vvec3 p, n;
@@ -47,31 +50,33 @@ void TRC_KERNEL(trc_light_sample_prepared)(const struct trc_surface *s,
                                            const struct trc_light_choices *choices, vfloat u_select,
                                            vfloat u1, vfloat u2, struct trc_light_sample *out);
 
-/* Visibility bits (TRC_VISIBLE_*) of the light each lane chose; all bits in lanes that chose none. When the
- * scene's lights hide from nothing, the caller can skip it: trc_light_table.hides is false. */
+/* Visibility bits (TRC_VISIBLE_*) of the light each lane chose; all bits in lanes that chose none.
+ * When the scene's lights hide from nothing, the caller can skip it: trc_light_table.hides is
+ * false. */
 vuint TRC_KERNEL(trc_light_visibility)(const struct trc_snapshot *snapshot,
                                        const struct trc_light_sample *sample);
 
-/* Light seen directly by rays that were traced from p in direction wi over (tmin, tmax] (tmax TRC_FAR for a
- * miss): area, point, spot with extent; with tmax == TRC_FAR also the sun. Lights do not occlude.
- * bsdf_pdf: density of the bounce (solid angle); < 0 for camera rays and ideal bounces (no MIS). n: see
- * above, of the point at p. path: TRC_VISIBLE_* | TRC_PATH_*. light_sample_count: L of the point, for
- * the weights. Adds to radiance what the rays see, MIS-weighted (power heuristic). */
+/* Light seen directly by rays that were traced from p in direction wi over (tmin, tmax] (tmax
+ * TRC_FAR for a miss): area, point, spot with extent; with tmax == TRC_FAR also the sun. Lights do
+ * not occlude. bsdf_pdf: density of the bounce (solid angle); < 0 for camera rays and ideal bounces
+ * (no MIS). n: see above, of the point at p. path: TRC_VISIBLE_* | TRC_PATH_*. light_sample_count:
+ * L of the point, for the weights. Adds to radiance what the rays see, MIS-weighted (power
+ * heuristic). */
 void TRC_KERNEL(trc_light_hit)(const struct trc_snapshot *snapshot, vvec3 p, vvec3 n, vvec3 wi,
-                               vfloat tmin, vfloat tmax, vfloat bsdf_pdf,
-                               vfloat light_sample_count, vuint path, vfloat time, vmask active,
-                               vvec3 *radiance);
+                               vfloat tmin, vfloat tmax, vfloat bsdf_pdf, vfloat light_sample_count,
+                               vuint path, vfloat time, vmask active, vvec3 *radiance);
 
-/* MIS weight of emission found on triangle lights by such rays: s is the emissive surface, p_from/n_from the
- * point the ray left. 1 where the triangle is not sampled as a light or bsdf_pdf < 0. */
+/* MIS weight of emission found on triangle lights by such rays: s is the emissive surface,
+ * p_from/n_from the point the ray left. 1 where the triangle is not sampled as a light or bsdf_pdf
+ * < 0. */
 vfloat TRC_KERNEL(trc_light_triangle_weight)(const struct trc_surface *s, vvec3 p_from,
                                              vvec3 n_from, vfloat bsdf_pdf,
                                              vfloat light_sample_count);
 
-/* Radiance of the world in direction wi, MIS-weighted in the same way; 0 where the world is hidden from
- * rays of that path. */
-vvec3 TRC_KERNEL(trc_world_radiance)(const struct trc_snapshot *snapshot, vvec3 p_from, vvec3 n_from,
-                                     vvec3 wi, vfloat bsdf_pdf, vfloat light_sample_count,
-                                     vuint path, vmask active);
+/* Radiance of the world in direction wi, MIS-weighted in the same way; 0 where the world is hidden
+ * from rays of that path. */
+vvec3 TRC_KERNEL(trc_world_radiance)(const struct trc_snapshot *snapshot, vvec3 p_from,
+                                     vvec3 n_from, vvec3 wi, vfloat bsdf_pdf,
+                                     vfloat light_sample_count, vuint path, vmask active);
 
 #endif

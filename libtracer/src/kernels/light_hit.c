@@ -4,16 +4,17 @@
 #include "kernels/light_shape.h"
 #include "kernels/world.h"
 
-/* Power heuristic (E. Veach, "Robust Monte Carlo Methods for Light Transport Simulation", 1997) for the ray, one
- * of them, against count light samples of density pl. Negative pb: no light sample could have been. */
+/* Power heuristic (E. Veach, "Robust Monte Carlo Methods for Light Transport Simulation", 1997) for
+ * the ray, one of them, against count light samples of density pl. Negative pb: no light sample
+ * could have been. */
 TRC_INLINE vfloat ray_weight(vfloat pb, vfloat pl, vfloat count) {
     const vfloat b2 = pb * pb, l = pl * count, l2 = l * l;
     const vfloat w = vf_divide(b2, b2 + l2);
     return vf_select(vf_lt(pb, vf_zero()), vf_one(), w);
 }
 
-/* Lanes that an object of these visibility bits hides from, as Cycles tests lights: diffuse and transmitted
- * rays by their bit, glossy ones only when reflected. */
+/* Lanes that an object of these visibility bits hides from, as Cycles tests lights: diffuse and
+ * transmitted rays by their bit, glossy ones only when reflected. */
 TRC_INLINE vmask hidden_from(uint32_t visibility, vuint path) {
     uint32_t hides = ~visibility & (TRC_VISIBLE_DIFFUSE | TRC_VISIBLE_TRANSMISSION);
     vmask hidden = vm_none();
@@ -28,8 +29,8 @@ TRC_INLINE vmask hidden_from(uint32_t visibility, vuint path) {
 TRC_INLINE vmask is_camera_ray(vuint path) {
     return vi_eq((vint)(path & vu_set(TRC_VISIBLE_CAMERA)), vi_set(TRC_VISIBLE_CAMERA));
 }
-/* Of the lanes in active, those that may see the lamp. Camera rays see lamps that are visible to them; suns
- * in addition need multiple importance. */
+/* Of the lanes in active, those that may see the lamp. Camera rays see lamps that are visible to
+ * them; suns in addition need multiple importance. */
 static vmask lamp_viewers(const struct trc_lamp *lamp, vuint path, vmask active) {
     const vmask camera = is_camera_ray(path);
     const bool mis = lamp->flags & TRC_LAMP_MIS;
@@ -55,7 +56,8 @@ TRC_INLINE vmask near_lamp(const struct trc_lamp *lamp, vvec3 p, vvec3 wi) {
     return vf_le(d2 - along * along, slack);
 }
 
-/* Distance to the lamp along the ray, infinite where it is missed; density of sampling that place, radiance. */
+/* Distance to the lamp along the ray, infinite where it is missed; density of sampling that place,
+ * radiance. */
 static vfloat meet_lamp(const struct trc_lamp *lamp, vvec3 p, vvec3 wi, vfloat *pdf,
                         vvec3 *radiance) {
     const struct trc_wide_lamp l = trc_lamp_broadcast(lamp);
@@ -90,9 +92,8 @@ static vfloat meet_lamp(const struct trc_lamp *lamp, vvec3 p, vvec3 wi, vfloat *
 }
 
 void TRC_KERNEL(trc_light_hit)(const struct trc_snapshot *snapshot, vvec3 p, vvec3 n, vvec3 wi,
-                               vfloat tmin, vfloat tmax, vfloat bsdf_pdf,
-                               vfloat light_sample_count, vuint path, vfloat time, vmask active,
-                               vvec3 *radiance) {
+                               vfloat tmin, vfloat tmax, vfloat bsdf_pdf, vfloat light_sample_count,
+                               vuint path, vfloat time, vmask active, vvec3 *radiance) {
     (void)time;
     const struct trc_light_table *t = snapshot->lights;
     const struct trc_receiver receiver = trc_receiver_make(p, n);
@@ -115,16 +116,15 @@ void TRC_KERNEL(trc_light_hit)(const struct trc_snapshot *snapshot, vvec3 p, vve
         vfloat weight = vf_one();
         const vmask weighed = vm_andnot(hit, vf_lt(bsdf_pdf, vf_zero()));
         if (vm_any(weighed)) {
-            const vfloat chance =
-                trc_light_chance(t, &receiver, vi_set((int32_t)number), weighed);
+            const vfloat chance = trc_light_chance(t, &receiver, vi_set((int32_t)number), weighed);
             weight = ray_weight(bsdf_pdf, pdf * chance, light_sample_count);
         }
         *radiance = v3_add(*radiance, v3_where(hit, v3_scale(light, weight)));
     }
 }
 
-/* Numbers of the triangles as lights, -1 for those that are none. Lights of an instance are in the order of
- * its triangles: usually all of them are lights, else a search finds the place. */
+/* Numbers of the triangles as lights, -1 for those that are none. Lights of an instance are in the
+ * order of its triangles: usually all of them are lights, else a search finds the place. */
 static vint triangle_lights(const struct trc_surface *s, vmask m) {
     const struct trc_light_table *t = s->snapshot->lights;
     vint light = vi_set(-1);
@@ -200,9 +200,9 @@ vfloat TRC_KERNEL(trc_light_triangle_weight)(const struct trc_surface *s, vvec3 
     return vf_select(m, ray_weight(bsdf_pdf, pdf * chance, light_sample_count), vf_one());
 }
 
-vvec3 TRC_KERNEL(trc_world_radiance)(const struct trc_snapshot *snapshot, vvec3 p_from, vvec3 n_from,
-                                     vvec3 wi, vfloat bsdf_pdf, vfloat light_sample_count,
-                                     vuint path, vmask active) {
+vvec3 TRC_KERNEL(trc_world_radiance)(const struct trc_snapshot *snapshot, vvec3 p_from,
+                                     vvec3 n_from, vvec3 wi, vfloat bsdf_pdf,
+                                     vfloat light_sample_count, vuint path, vmask active) {
     const struct trc_light_table *t = snapshot->lights;
     vmask m = active;
     const uint32_t visibility = snapshot->world.visibility;

@@ -1,9 +1,9 @@
 /* Choosing among lights: how much each might give to a point, and with what chance it is chosen.
  *
- * A. Conty Estevez and C. Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting" (2018):
- * intensity over squared distance, times the least angle any part of the light may make with its own
- * axis, times the least angle it may make with the receiver's normal. Both bounds are conservative, so a
- * light of importance 0 gives nothing. */
+ * A. Conty Estevez and C. Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting"
+ * (2018): intensity over squared distance, times the least angle any part of the light may make
+ * with its own axis, times the least angle it may make with the receiver's normal. Both bounds are
+ * conservative, so a light of importance 0 gives nothing. */
 #ifndef TRACER_KERNELS_LIGHT_SELECT_H
 #define TRACER_KERNELS_LIGHT_SELECT_H
 
@@ -26,14 +26,10 @@ struct trc_wide_bound {
     vmask two_sided;
 };
 TRC_INLINE struct trc_wide_bound trc_bound_broadcast(const struct trc_light_bound *b) {
-    return (struct trc_wide_bound){v3_set(b->center),
-                                   v3_set(b->axis),
-                                   vf_set(b->radius),
-                                   vf_set(b->cos_o),
-                                   vf_set(b->sin_o),
-                                   vf_set(b->cos_e),
-                                   vf_set(b->intensity),
-                                   b->two_sided ? vm_all_set() : vm_none()};
+    return (struct trc_wide_bound){v3_set(b->center),    v3_set(b->axis),
+                                   vf_set(b->radius),    vf_set(b->cos_o),
+                                   vf_set(b->sin_o),     vf_set(b->cos_e),
+                                   vf_set(b->intensity), b->two_sided ? vm_all_set() : vm_none()};
 }
 /* Bounds number index of each lane. */
 TRC_INLINE struct trc_wide_bound trc_bound_gather(const struct trc_light_bound *bounds, vint index,
@@ -73,8 +69,9 @@ TRC_INLINE enum trc_bound_shape trc_shape_of(const struct trc_light_bound *b) {
     return b->cos_o >= 1.0f && b->cos_e == 0.0f ? TRC_BOUND_HEMISPHERE : TRC_BOUND_CONE;
 }
 
-/* Part of the light may be within 90 degrees of an axis iff cos a + sin b > 0, a the angle of its centre, b its
- * half angle; the sum also stands for the cosine of the nearest part, without roots. */
+/* Part of the light may be within 90 degrees of an axis iff cos a + sin b > 0, a the angle of its
+ * centre, b its half angle; the sum also stands for the cosine of the nearest part, without
+ * roots. */
 TRC_INLINE vfloat trc_bound_importance(const struct trc_wide_bound *b, const struct trc_receiver *r,
                                        enum trc_bound_shape shape, bool has_radius) {
     const vvec3 d = v3_sub(b->center, r->p);
@@ -169,11 +166,12 @@ static inline vfloat trc_tree_first_chance(const struct trc_light_table *t, vint
     return vf_select(vf_gt(sum, vf_zero()), ia / sum, vf_set(-1.0f));
 }
 TRC_INLINE vint trc_tree_second(const struct trc_light_table *t, vint node, vmask m) {
-    return vi_select(m, vi_gather(&t->bounds->child, node * vi_set(TRC_BOUND_WORDS), m), vi_set(-1));
+    return vi_select(m, vi_gather(&t->bounds->child, node * vi_set(TRC_BOUND_WORDS), m),
+                     vi_set(-1));
 }
 
-/* From the root to a light; u is used up on the way. chance gets multiplied; lanes that end where no light
- * reaches the point leave *found. */
+/* From the root to a light; u is used up on the way. chance gets multiplied; lanes that end where
+ * no light reaches the point leave *found. */
 static inline vint trc_tree_choose(const struct trc_light_table *t, const struct trc_receiver *r,
                                    vfloat u, vmask m, vfloat *chance, vmask *found) {
     vint node = vi_set(0);
@@ -194,8 +192,7 @@ static inline vint trc_tree_choose(const struct trc_light_table *t, const struct
         *chance = vf_select(go, *chance * vf_select(left, first, other), *chance);
         node = vi_select(go, vi_select(left, node + vi_set(1), second), node);
     }
-    const vint light =
-        vi_gather(&t->bounds->light, node * vi_set(TRC_BOUND_WORDS), *found);
+    const vint light = vi_gather(&t->bounds->light, node * vi_set(TRC_BOUND_WORDS), *found);
     return vi_select(*found, light, vi_set(-1));
 }
 
@@ -237,9 +234,8 @@ static inline void trc_candidates_weigh(const struct trc_light_table *t,
 
 /* A light for every lane of m, -1 where none reaches the point; its chance. */
 static inline vint trc_light_choose(const struct trc_light_table *t,
-                                    const struct trc_light_choices *c,
-                                    const struct trc_receiver *r, vfloat u, vmask m,
-                                    vfloat *chance) {
+                                    const struct trc_light_choices *c, const struct trc_receiver *r,
+                                    vfloat u, vmask m, vfloat *chance) {
     const uint32_t count = trc_candidate_count(t);
     const uint32_t placed = t->is_tree ? 1u : t->bound_count;
     const vfloat sum = c->sum;
@@ -273,7 +269,8 @@ static inline vint trc_light_choose(const struct trc_light_table *t,
     return light;
 }
 
-/* Chance with which trc_light_choose gives the light (number per lane, a real one in lanes of m). */
+/* Chance with which trc_light_choose gives the light (number per lane, a real one in lanes of
+ * m). */
 static inline vfloat trc_light_chance(const struct trc_light_table *t, const struct trc_receiver *r,
                                       vint light, vmask m) {
     if (t->single)

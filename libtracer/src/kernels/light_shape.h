@@ -1,9 +1,10 @@
 /* Places on lights: sampling them, the density of that, the radiance they send to a point.
  *
- * C. Urena, M. Fajardo and A. King, "An Area-Preserving Parametrization for Spherical Rectangles" (2013); J.
- * Arvo, "Stratified Sampling of Spherical Triangles" (1995); A. van Oosterom and J. Strackee, "The Solid
- * Angle of a Plane Triangle" (1983). Lights that are small as seen from the point are sampled by area:
- * there the density is nearly constant anyway, and spherical angles would lose their digits. */
+ * C. Urena, M. Fajardo and A. King, "An Area-Preserving Parametrization for Spherical Rectangles"
+ * (2013); J. Arvo, "Stratified Sampling of Spherical Triangles" (1995); A. van Oosterom and J.
+ * Strackee, "The Solid Angle of a Plane Triangle" (1983). Lights that are small as seen from the
+ * point are sampled by area: there the density is nearly constant anyway, and spherical angles
+ * would lose their digits. */
 #ifndef TRACER_KERNELS_LIGHT_SHAPE_H
 #define TRACER_KERNELS_LIGHT_SHAPE_H
 
@@ -12,8 +13,8 @@
 #include "kernels/wide_math.h"
 #include "shading/lights.h"
 
-/* Solid angles below it are sampled by area. Ellipses that are large are sampled as their rectangle, whose
- * corners give nothing: a fifth of the samples, but none with a huge weight. */
+/* Solid angles below it are sampled by area. Ellipses that are large are sampled as their
+ * rectangle, whose corners give nothing: a fifth of the samples, but none with a huge weight. */
 #define TRC_SMALL_RECTANGLE 4e-3f
 #define TRC_SMALL_ELLIPSE 0.5f
 #define TRC_SMALL_TRIANGLE 2e-2f
@@ -25,13 +26,11 @@ struct trc_wide_lamp {
 };
 
 TRC_INLINE struct trc_wide_lamp trc_lamp_broadcast(const struct trc_lamp *l) {
-    return (struct trc_wide_lamp){v3_set(l->position),      v3_set(l->axis_u),
-                                  v3_set(l->axis_v),        v3_set(l->normal),
-                                  v3_set(l->radiance),      vf_set(l->half_u),
-                                  vf_set(l->half_v),        vf_set(l->cos_cone),
-                                  vf_set(l->inv_smooth),    vf_set(l->tan_spread),
-                                  vf_set(l->spread_scale),  vf_set(l->inv_area),
-                                  vi_set(l->kind),          vi_set(l->flags)};
+    return (struct trc_wide_lamp){
+        v3_set(l->position),   v3_set(l->axis_u),     v3_set(l->axis_v),       v3_set(l->normal),
+        v3_set(l->radiance),   vf_set(l->half_u),     vf_set(l->half_v),       vf_set(l->cos_cone),
+        vf_set(l->inv_smooth), vf_set(l->tan_spread), vf_set(l->spread_scale), vf_set(l->inv_area),
+        vi_set(l->kind),       vi_set(l->flags)};
 }
 /* Lamps number index of each lane. */
 TRC_INLINE struct trc_wide_lamp trc_lamp_gather(const struct trc_lamp *lamps, vint index, vmask m) {
@@ -72,8 +71,8 @@ TRC_INLINE vfloat trc_spot_factor(const struct trc_wide_lamp *l, vvec3 wi) {
     return vf_where(vf_gt(over, vf_zero()), c * edge);
 }
 
-/* The disk faces the point, so what is seen is a cone about the way to its centre: sampled uniformly by solid
- * angle. 1 - cos of its half angle, without cancellation. */
+/* The disk faces the point, so what is seen is a cone about the way to its centre: sampled
+ * uniformly by solid angle. 1 - cos of its half angle, without cancellation. */
 TRC_INLINE vfloat trc_point_cone(const struct trc_wide_lamp *l, vfloat reach) {
     const vfloat far = vf_sqrt(reach * reach + l->half_u * l->half_u);
     return vf_divide(l->half_u * l->half_u, far * (far + reach));
@@ -107,8 +106,8 @@ TRC_INLINE vfloat trc_point_hit(const struct trc_wide_lamp *l, vvec3 p, vvec3 wi
     const vfloat cosine = v3_dot(axis, wi);
     const vfloat t = vf_divide(reach, cosine);
     const vvec3 off = v3_sub(v3_scale(wi, t), to);
-    const vmask hit = vm_and(vf_gt(cosine, vf_zero()),
-                             vf_lt(v3_dot(off, off), l->half_u * l->half_u));
+    const vmask hit =
+        vm_and(vf_gt(cosine, vf_zero()), vf_lt(v3_dot(off, off), l->half_u * l->half_u));
     *pdf = vf_divide(vf_set(0.5f * TRC_INV_PI), trc_point_cone(l, reach));
     return vf_select(hit, t, vf_set(INFINITY));
 }
@@ -146,8 +145,8 @@ TRC_INLINE vfloat trc_spread_factor(const struct trc_wide_lamp *l, vvec3 wi) {
     return vf_select(vf_gt(l->tan_spread, vf_zero()), vf_max(factor, vf_zero()), vf_one());
 }
 
-/* A rectangle in the frame of its axes with the point at the origin: x0..x1, y0..y1 at depth z > 0, cut to what
- * the slats show of it. */
+/* A rectangle in the frame of its axes with the point at the origin: x0..x1, y0..y1 at depth z > 0,
+ * cut to what the slats show of it. */
 struct trc_view_rectangle {
     vfloat x0, x1, y0, y1, z;
     vmask lit; /* the point is in front and sees some of it */
@@ -164,8 +163,7 @@ TRC_INLINE struct trc_view_rectangle trc_rectangle_view(const struct trc_wide_la
     const vmask narrow = vf_gt(l->tan_spread, vf_zero());
     if (vm_any(narrow)) {
         /* Light passes up to the slats' angle: a circle about the foot of the point. */
-        const vfloat limit =
-            vf_select(narrow, vf_divide(r.z, l->tan_spread), vf_set(INFINITY));
+        const vfloat limit = vf_select(narrow, vf_divide(r.z, l->tan_spread), vf_set(INFINITY));
         r.x0 = vf_max(r.x0, -limit);
         r.x1 = vf_min(r.x1, limit);
         r.y0 = vf_max(r.y0, -limit);
@@ -175,7 +173,8 @@ TRC_INLINE struct trc_view_rectangle trc_rectangle_view(const struct trc_wide_la
     return r;
 }
 
-/* Inner angles of the spherical rectangle (Urena et al., 3.2): normals of its sides have only these z. */
+/* Inner angles of the spherical rectangle (Urena et al., 3.2): normals of its sides have only these
+ * z. */
 struct trc_spherical_rectangle {
     vfloat b0, b1, k, solid_angle;
     vmask small;
@@ -189,8 +188,9 @@ TRC_INLINE void trc_edge_slopes(vfloat z2, vfloat a, vfloat b, vfloat *slope_a, 
 }
 TRC_INLINE struct trc_spherical_rectangle trc_rectangle_angles(const struct trc_view_rectangle *r,
                                                                bool is_ellipse) {
-    /* Side at y0 runs along +x, at x1 along +y, at y1 along -x, at x0 along -y; z of the paper is -r->z. An
-     * angle is acos(-a b) = pi/2 + asin(a b), which keeps its digits for small rectangles. */
+    /* Side at y0 runs along +x, at x1 along +y, at y1 along -x, at x0 along -y; z of the paper is
+     * -r->z. An angle is acos(-a b) = pi/2 + asin(a b), which keeps its digits for small
+     * rectangles. */
     const vfloat z2 = r->z * r->z;
     vfloat n0, n1, n2, n3;
     trc_edge_slopes(z2, -r->y0, r->y1, &n0, &n2);
@@ -206,16 +206,18 @@ TRC_INLINE struct trc_spherical_rectangle trc_rectangle_angles(const struct trc_
     q.small = vm_not(vf_gt(q.solid_angle, vf_set(small)));
     return q;
 }
-/* Density at the place (x, y) of the view. Small ellipses are sampled all over, whatever the slats show. */
-TRC_INLINE vfloat trc_area_density(const struct trc_wide_lamp *l, const struct trc_view_rectangle *r,
-                                   const struct trc_spherical_rectangle *q, bool is_ellipse, vfloat x,
-                                   vfloat y) {
+/* Density at the place (x, y) of the view. Small ellipses are sampled all over, whatever the slats
+ * show. */
+TRC_INLINE vfloat trc_area_density(const struct trc_wide_lamp *l,
+                                   const struct trc_view_rectangle *r,
+                                   const struct trc_spherical_rectangle *q, bool is_ellipse,
+                                   vfloat x, vfloat y) {
     const vfloat by_angle = vf_rcp(q->solid_angle);
     if (!vm_any(q->small))
         return vf_where(r->lit, by_angle);
     const vfloat d2 = x * x + y * y + r->z * r->z, cube = d2 * vf_sqrt(d2);
-    const vfloat by_area = is_ellipse ? cube * l->inv_area / r->z
-                                      : cube / ((r->x1 - r->x0) * (r->y1 - r->y0) * r->z);
+    const vfloat by_area =
+        is_ellipse ? cube * l->inv_area / r->z : cube / ((r->x1 - r->x0) * (r->y1 - r->y0) * r->z);
     return vf_where(r->lit, vf_select(q->small, by_area, by_angle));
 }
 
@@ -225,8 +227,8 @@ TRC_INLINE void trc_spherical_place(const struct trc_view_rectangle *r,
                                     vfloat *x_out, vfloat *y_out) {
     vfloat sa, ca;
     vf_sincos(u1 * q->solid_angle + q->k, &sa, &ca);
-    /* With f = (b0 cos - b1) / sin the paper's cu is +-1 / sqrt(f^2 + b0^2), and the place along x is z cu /
-     * sqrt(1 - cu^2) = +-z / sqrt(f^2 + b0^2 - 1). */
+    /* With f = (b0 cos - b1) / sin the paper's cu is +-1 / sqrt(f^2 + b0^2), and the place along x
+     * is z cu / sqrt(1 - cu^2) = +-z / sqrt(f^2 + b0^2 - 1). */
     const vfloat num = ca * q->b0 - q->b1;
     const vfloat below = num * num - (vf_one() - q->b0 * q->b0) * sa * sa;
     const vfloat ratio = sa * vf_rcp(vf_sqrt(vf_max(below, vf_set(1e-14f))));
@@ -265,8 +267,8 @@ TRC_INLINE struct trc_place trc_area_sample(const struct trc_wide_lamp *l, bool 
         y = vf_select(q.small, even_y, y);
     }
     struct trc_place s;
-    const vvec3 to = v3_sub(v3_add(v3_scale(l->axis_u, x), v3_scale(l->axis_v, y)),
-                            v3_scale(l->normal, r.z));
+    const vvec3 to =
+        v3_sub(v3_add(v3_scale(l->axis_u, x), v3_scale(l->axis_v, y)), v3_scale(l->normal, r.z));
     s.wi = v3_normalize_length(to, &s.distance);
     s.pdf = vf_where(inside, trc_area_density(l, &r, &q, is_ellipse, x, y));
     s.radiance = v3_scale(l->radiance, trc_spread_factor(l, s.wi));
@@ -288,8 +290,8 @@ TRC_INLINE vfloat trc_area_hit(const struct trc_wide_lamp *l, vvec3 p, vvec3 wi,
 /* ---- triangles ---- */
 
 struct trc_view_triangle {
-    vvec3 a, b, c;      /* corners from the point */
-    vvec3 normal;       /* cross product of two edges: twice the area long */
+    vvec3 a, b, c; /* corners from the point */
+    vvec3 normal;  /* cross product of two edges: twice the area long */
     vfloat solid_angle;
     vmask small;
 };
@@ -308,14 +310,16 @@ TRC_INLINE struct trc_view_triangle trc_triangle_view(const struct trc_corners *
     return v;
 }
 /* Density of the place at distance along wi. */
-TRC_INLINE vfloat trc_triangle_density(const struct trc_view_triangle *v, vvec3 wi, vfloat distance) {
+TRC_INLINE vfloat trc_triangle_density(const struct trc_view_triangle *v, vvec3 wi,
+                                       vfloat distance) {
     const vfloat twice_projected = vf_abs(v3_dot(v->normal, wi));
     const vfloat by_area = vf_divide(vf_set(2.0f) * distance * distance, twice_projected);
     return vf_select(v->small, by_area, vf_rcp(v->solid_angle));
 }
 
 /* Direction into the spherical triangle. */
-static inline vvec3 trc_spherical_triangle(const struct trc_view_triangle *v, vfloat u1, vfloat u2) {
+static inline vvec3 trc_spherical_triangle(const struct trc_view_triangle *v, vfloat u1,
+                                           vfloat u2) {
     const vvec3 a = v3_normalize(v->a), b = v3_normalize(v->b), c = v3_normalize(v->c);
     const vvec3 ab = v3_normalize(v3_cross(a, b)), ca = v3_normalize(v3_cross(c, a));
     /* The angle at a, and the cosine of the side c. */
@@ -354,8 +358,7 @@ TRC_INLINE struct trc_place trc_triangle_sample(const struct trc_corners *t, vve
         b1 = vf_select(view.small, b1, x / over);
         b2 = vf_select(view.small, b2, y / over);
     }
-    const vvec3 to = v3_mad(v3_sub(view.b, view.a), b1,
-                            v3_mad(v3_sub(view.c, view.a), b2, view.a));
+    const vvec3 to = v3_mad(v3_sub(view.b, view.a), b1, v3_mad(v3_sub(view.c, view.a), b2, view.a));
     struct trc_place s;
     s.wi = v3_normalize_length(to, &s.distance);
     s.pdf = trc_triangle_density(&view, s.wi, s.distance);
@@ -380,7 +383,8 @@ TRC_INLINE vfloat trc_map_density(const struct trc_world_map *map, vvec3 wi, vma
     return vf_divide(density, sine * vf_set(2.0f * TRC_PI * TRC_PI));
 }
 
-/* Interval of rising sums that holds u, and where in it: count intervals from base (per lane an offset). */
+/* Interval of rising sums that holds u, and where in it: count intervals from base (per lane an
+ * offset). */
 TRC_INLINE vint trc_sum_search(const float *sums, vint base, uint32_t count, vfloat u, vmask m,
                                vfloat *within) {
     vint low = vi_set(0), size = vi_set((int32_t)count);
@@ -391,7 +395,8 @@ TRC_INLINE vint trc_sum_search(const float *sums, vint base, uint32_t count, vfl
         low = vi_select(up, low + half, low);
         size = vi_select(up, size - half, half);
     }
-    const vfloat start = vf_gather(sums, base + low, m), end = vf_gather(sums, base + low + vi_set(1), m);
+    const vfloat start = vf_gather(sums, base + low, m),
+                 end = vf_gather(sums, base + low + vi_set(1), m);
     *within = vf_saturate(vf_divide(u - start, end - start));
     return low;
 }

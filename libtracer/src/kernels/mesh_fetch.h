@@ -24,9 +24,7 @@ TRC_INLINE vint trc_wide_key(vfloat time, uint32_t key_count, vfloat *fraction) 
     return key;
 }
 /* (1 - f) * a + f * b: see snapshot.h. */
-TRC_INLINE vfloat trc_between(vfloat a, vfloat b, vfloat f) {
-    return (vf_one() - f) * a + f * b;
-}
+TRC_INLINE vfloat trc_between(vfloat a, vfloat b, vfloat f) { return (vf_one() - f) * a + f * b; }
 TRC_INLINE vvec3 trc_between3(vvec3 a, vvec3 b, vfloat f) {
     return v3(trc_between(a.x, b.x, f), trc_between(a.y, b.y, f), trc_between(a.z, b.z, f));
 }
@@ -63,9 +61,11 @@ TRC_INLINE void trc_load_affine(const struct trc_instance *instance, vfloat time
     m->origin = v3(e[3], e[7], e[11]);
 }
 
-/* 9 floats per lane from an array of 3-vectors by 3 indices (in vectors); stride vectors between keys. */
+/* 9 floats per lane from an array of 3-vectors by 3 indices (in vectors); stride vectors between
+ * keys. */
 TRC_INLINE void trc_load_vectors(const float *values, const vint index[3], uint32_t stride,
-                                 uint32_t key_count, vfloat time, vmask m, struct trc_corners *out) {
+                                 uint32_t key_count, vfloat time, vmask m,
+                                 struct trc_corners *out) {
     if (key_count < 2) {
         for (int k = 0; k < 3; k++)
             out->corner[k] = v3_gather(values, index[k] * vi_set(3), m);

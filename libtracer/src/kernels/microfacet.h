@@ -1,13 +1,13 @@
 /* Microfacet distributions, their masking, and the sampling of visible normals.
  *
- * Local frame: z along the lobe's normal. B. Walter, S. Marschner, H. Li and K. Torrance, "Microfacet Models
- * for Refraction through Rough Surfaces" (2007); E. Heitz, "Understanding the Masking-Shadowing Function
- * in Microfacet-Based BRDFs" (2014) and "Sampling the GGX Distribution of Visible Normals" (2018), here in
- * the spherical-cap form of J. Dupuy and A. Benyoub (2023); K. Eto and Y. Tokuyoshi, "Bounded VNDF Sampling
- * for Smith-GGX Reflections" (2023), which spends few samples on directions below the surface; W. Jakob, "An
- * Improved Visible Normal Sampling Routine for the Beckmann Distribution" (2014); B. Burley, "Physically
- * Based Shading at Disney" (2012), GTR1; M. Ashikhmin and P. Shirley, "An Anisotropic Phong BRDF Model"
- * (2000). */
+ * Local frame: z along the lobe's normal. B. Walter, S. Marschner, H. Li and K. Torrance,
+ * "Microfacet Models for Refraction through Rough Surfaces" (2007); E. Heitz, "Understanding the
+ * Masking-Shadowing Function in Microfacet-Based BRDFs" (2014) and "Sampling the GGX Distribution
+ * of Visible Normals" (2018), here in the spherical-cap form of J. Dupuy and A. Benyoub (2023); K.
+ * Eto and Y. Tokuyoshi, "Bounded VNDF Sampling for Smith-GGX Reflections" (2023), which spends few
+ * samples on directions below the surface; W. Jakob, "An Improved Visible Normal Sampling Routine
+ * for the Beckmann Distribution" (2014); B. Burley, "Physically Based Shading at Disney" (2012),
+ * GTR1; M. Ashikhmin and P. Shirley, "An Anisotropic Phong BRDF Model" (2000). */
 #ifndef TRACER_KERNELS_MICROFACET_H
 #define TRACER_KERNELS_MICROFACET_H
 
@@ -40,8 +40,8 @@ TRC_INLINE vfloat trc_schlick_weight(vfloat u) {
     return m2 * m2 * m;
 }
 
-/* Refracted direction of wo at the unit normal m (m . wo > 0); lanes of total reflection are not in the
- * result's mask. eta as above. */
+/* Refracted direction of wo at the unit normal m (m . wo > 0); lanes of total reflection are not in
+ * the result's mask. eta as above. */
 TRC_INLINE vmask trc_refract(vvec3 wo, vvec3 m, vfloat eta, vvec3 *wi) {
     const vfloat inverse = vf_rcp(eta), c = v3_dot(wo, m);
     const vfloat k = vf_one() - inverse * inverse * (vf_one() - c * c);
@@ -96,15 +96,16 @@ TRC_INLINE vfloat trc_gtr1_d(vfloat sin2, vfloat alpha) {
 
 /* ---- sampling ---- */
 
-/* How far below the horizon the cap of stretched directions must reach (Eto and Tokuyoshi, eq. 5), as a
- * fraction of the stretched z of wo; 1 is the whole cap. */
+/* How far below the horizon the cap of stretched directions must reach (Eto and Tokuyoshi, eq. 5),
+ * as a fraction of the stretched z of wo; 1 is the whole cap. */
 TRC_INLINE vfloat trc_ggx_bound(vfloat cos_o, vfloat alpha_x, vfloat alpha_y) {
     const vfloat a2 = vf_square(vf_min(vf_min(alpha_x, alpha_y), vf_one()));
     const vfloat s2 = vf_square(vf_one() + vf_safe_sqrt(vf_one() - cos_o * cos_o));
     return (vf_one() - a2) * s2 / (s2 + a2 * cos_o * cos_o);
 }
-/* Micro-normal of GGX visible from wo (local, z > 0). bound: 1, or trc_ggx_bound where the result serves
- * reflection only. The density of the reflected direction is D / (2 cos_o (bound + 2 / G1 - 1)). */
+/* Micro-normal of GGX visible from wo (local, z > 0). bound: 1, or trc_ggx_bound where the result
+ * serves reflection only. The density of the reflected direction is D / (2 cos_o (bound + 2 / G1 -
+ * 1)). */
 TRC_INLINE vvec3 trc_ggx_sample(vvec3 wo, vfloat alpha_x, vfloat alpha_y, vfloat bound, vfloat u1,
                                 vfloat u2) {
     const vvec3 stretched = v3_normalize(v3(wo.x * alpha_x, wo.y * alpha_y, wo.z));
@@ -117,9 +118,10 @@ TRC_INLINE vvec3 trc_ggx_sample(vvec3 wo, vfloat alpha_x, vfloat alpha_y, vfloat
     return v3_normalize(v3(h.x * alpha_x, h.y * alpha_y, vf_max(h.z, vf_set(1e-9f))));
 }
 
-/* Micro-normal of Beckmann visible from wo: inverts the distribution of the slope towards wo by Newton's
- * method, the slope across is a Gaussian. */
-TRC_INLINE vvec3 trc_beckmann_sample(vvec3 wo, vfloat alpha_x, vfloat alpha_y, vfloat u1, vfloat u2) {
+/* Micro-normal of Beckmann visible from wo: inverts the distribution of the slope towards wo by
+ * Newton's method, the slope across is a Gaussian. */
+TRC_INLINE vvec3 trc_beckmann_sample(vvec3 wo, vfloat alpha_x, vfloat alpha_y, vfloat u1,
+                                     vfloat u2) {
     const vvec3 w = v3_normalize(v3(wo.x * alpha_x, wo.y * alpha_y, wo.z));
     const vfloat sin_o = vf_sqrt(w.x * w.x + w.y * w.y);
     const vmask upright = vf_lt(sin_o, vf_set(1e-3f));
@@ -129,8 +131,8 @@ TRC_INLINE vvec3 trc_beckmann_sample(vvec3 wo, vfloat alpha_x, vfloat alpha_y, v
     const vfloat k = tan_o * vf_set(0.5641895835f);
     const vfloat total = vf_one() + erf_a + k * vf_exp(-cot_o * cot_o);
     const vfloat goal = vf_clamp(u1, 1e-6f, 0.999999f) * total;
-    /* Solve 1 + b + k exp(-erfinv(b)^2) = goal on (-1, erf_a); the start replaces the exponential by
-     * 1 - b^2. */
+    /* Solve 1 + b + k exp(-erfinv(b)^2) = goal on (-1, erf_a); the start replaces the exponential
+     * by 1 - b^2. */
     const vfloat y0 = goal * (vf_one() + erf_a + k * (vf_one() - erf_a * erf_a)) / total;
     vfloat b = (vf_set(0.5f) - vf_safe_sqrt(k * (k - y0 + vf_one()) + vf_set(0.25f))) / k;
     vfloat slope = vf_zero();

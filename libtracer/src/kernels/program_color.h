@@ -6,8 +6,7 @@
 #include "kernels/program_math.h"
 
 /* Applies a function of (t, a, b) to each channel. */
-#define TRC_EACH(f, t, a, b)                                                                       \
-    v3(f((t), (a).x, (b).x), f((t), (a).y, (b).y), f((t), (a).z, (b).z))
+#define TRC_EACH(f, t, a, b) v3(f((t), (a).x, (b).x), f((t), (a).y, (b).y), f((t), (a).z, (b).z))
 
 /* a + t (b - a): rounds otherwise than vf_lerp, and as Cycles does. */
 TRC_INLINE vfloat blend_lerp(vfloat t, vfloat a, vfloat b) { return a + t * (b - a); }
@@ -47,8 +46,8 @@ static vvec3 color_rgb_to_hsl(vvec3 c) {
     const vfloat high = v3_max(c), low = vf_min(c.x, vf_min(c.y, c.z)), range = high - low;
     const vfloat lightness = vf_min(one, (high + low) * vf_set(0.5f));
     const vmask grey = vf_eq(high, low);
-    const vfloat saturation = vf_divide(
-        range, vf_select(vf_gt(lightness, vf_set(0.5f)), two - high - low, high + low));
+    const vfloat saturation =
+        vf_divide(range, vf_select(vf_gt(lightness, vf_set(0.5f)), two - high - low, high + low));
     vfloat hue = vf_divide(c.x - c.y, range) + vf_set(4.0f);
     hue = vf_select(vf_eq(c.y, high), vf_divide(c.z - c.x, range) + two, hue);
     const vfloat red = vf_divide(c.y - c.z, range) + vf_where(vf_lt(c.y, c.z), six);
@@ -129,7 +128,8 @@ static vvec3 blend_hue(vfloat t, vvec3 a, vvec3 b, bool both) {
     const vvec3 target = color_rgb_to_hsv(b);
     vvec3 c = color_rgb_to_hsv(a);
     c.x = target.x;
-    if (both) c.y = target.y;
+    if (both)
+        c.y = target.y;
     return v3_select(vf_ne(target.y, vf_zero()), v3_blend(t, a, color_hsv_to_rgb(c)), a);
 }
 static vvec3 blend_saturation(vfloat t, vvec3 a, vvec3 b) {
@@ -148,26 +148,46 @@ static vvec3 blend_value(vfloat t, vvec3 a, vvec3 b) {
 static vvec3 op_mix(uint32_t mode, vfloat factor, vvec3 a, vvec3 b) {
     const vfloat t = vf_saturate(factor);
     switch (mode) {
-    case TRC_BLEND_MIX: return v3_blend(t, a, b);
-    case TRC_BLEND_DARKEN: return v3_blend(t, a, v3_min(a, b));
-    case TRC_BLEND_MULTIPLY: return v3_blend(t, a, v3_mul(a, b));
-    case TRC_BLEND_BURN: return TRC_EACH(blend_burn, t, a, b);
-    case TRC_BLEND_LIGHTEN: return v3_blend(t, a, v3_max_each(a, b));
-    case TRC_BLEND_SCREEN: return TRC_EACH(blend_screen, t, a, b);
-    case TRC_BLEND_DODGE: return TRC_EACH(blend_dodge, t, a, b);
-    case TRC_BLEND_ADD: return v3_blend(t, a, v3_add(a, b));
-    case TRC_BLEND_OVERLAY: return TRC_EACH(blend_overlay, t, a, b);
-    case TRC_BLEND_SOFT_LIGHT: return TRC_EACH(blend_soft_light, t, a, b);
-    case TRC_BLEND_LINEAR_LIGHT: return TRC_EACH(blend_linear_light, t, a, b);
-    case TRC_BLEND_DIFFERENCE: return v3_blend(t, a, v3_abs(v3_sub(a, b)));
-    case TRC_BLEND_SUBTRACT: return v3_blend(t, a, v3_sub(a, b));
-    case TRC_BLEND_DIVIDE: return TRC_EACH(blend_divide, t, a, b);
-    case TRC_BLEND_HUE: return blend_hue(t, a, b, false);
-    case TRC_BLEND_SATURATION: return blend_saturation(t, a, b);
-    case TRC_BLEND_COLOR: return blend_hue(t, a, b, true);
-    case TRC_BLEND_VALUE: return blend_value(t, a, b);
-    case TRC_BLEND_EXCLUSION: return TRC_EACH(blend_exclusion, t, a, b);
-    default: return a;
+    case TRC_BLEND_MIX:
+        return v3_blend(t, a, b);
+    case TRC_BLEND_DARKEN:
+        return v3_blend(t, a, v3_min(a, b));
+    case TRC_BLEND_MULTIPLY:
+        return v3_blend(t, a, v3_mul(a, b));
+    case TRC_BLEND_BURN:
+        return TRC_EACH(blend_burn, t, a, b);
+    case TRC_BLEND_LIGHTEN:
+        return v3_blend(t, a, v3_max_each(a, b));
+    case TRC_BLEND_SCREEN:
+        return TRC_EACH(blend_screen, t, a, b);
+    case TRC_BLEND_DODGE:
+        return TRC_EACH(blend_dodge, t, a, b);
+    case TRC_BLEND_ADD:
+        return v3_blend(t, a, v3_add(a, b));
+    case TRC_BLEND_OVERLAY:
+        return TRC_EACH(blend_overlay, t, a, b);
+    case TRC_BLEND_SOFT_LIGHT:
+        return TRC_EACH(blend_soft_light, t, a, b);
+    case TRC_BLEND_LINEAR_LIGHT:
+        return TRC_EACH(blend_linear_light, t, a, b);
+    case TRC_BLEND_DIFFERENCE:
+        return v3_blend(t, a, v3_abs(v3_sub(a, b)));
+    case TRC_BLEND_SUBTRACT:
+        return v3_blend(t, a, v3_sub(a, b));
+    case TRC_BLEND_DIVIDE:
+        return TRC_EACH(blend_divide, t, a, b);
+    case TRC_BLEND_HUE:
+        return blend_hue(t, a, b, false);
+    case TRC_BLEND_SATURATION:
+        return blend_saturation(t, a, b);
+    case TRC_BLEND_COLOR:
+        return blend_hue(t, a, b, true);
+    case TRC_BLEND_VALUE:
+        return blend_value(t, a, b);
+    case TRC_BLEND_EXCLUSION:
+        return TRC_EACH(blend_exclusion, t, a, b);
+    default:
+        return a;
     }
 }
 

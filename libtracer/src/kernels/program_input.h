@@ -1,10 +1,11 @@
 /* Operations that read the shading point, its object, its mesh and the camera.
  *
- * Lanes may be on different objects: what belongs to an object is done once for each object among the
- * lanes, with the others masked off. Hits come sorted, so mostly there is one. Meanings are those of
- * Cycles 3.4. Departures: Generated coordinates and tangents come from the mesh as it is rendered, not
- * from its undeformed shape; tangents of normal maps are made from the triangle's own UVs, projected to
- * the normal of each corner as MikkTSpace does but not averaged between triangles. */
+ * Lanes may be on different objects: what belongs to an object is done once for each object among
+ * the lanes, with the others masked off. Hits come sorted, so mostly there is one. Meanings are
+ * those of Cycles 3.4. Departures: Generated coordinates and tangents come from the mesh as it is
+ * rendered, not from its undeformed shape; tangents of normal maps are made from the triangle's own
+ * UVs, projected to the normal of each corner as MikkTSpace does but not averaged between
+ * triangles. */
 #ifndef TRACER_KERNELS_PROGRAM_INPUT_H
 #define TRACER_KERNELS_PROGRAM_INPUT_H
 
@@ -15,9 +16,9 @@
 /* ---- objects among the lanes ---- */
 
 struct lane_group {
-    uint32_t rest;                        /* lanes still to come */
+    uint32_t rest; /* lanes still to come */
     vmask lanes;
-    const struct trc_instance *instance;  /* NULL: the world */
+    const struct trc_instance *instance; /* NULL: the world */
     const struct trc_mesh *mesh;
 };
 
@@ -25,7 +26,8 @@ TRC_INLINE struct lane_group groups_begin(const struct trc_surface *s) {
     return (struct lane_group){.rest = vm_bits(s->active)};
 }
 TRC_INLINE bool groups_next(const struct trc_surface *s, struct lane_group *g) {
-    if (!g->rest) return false;
+    if (!g->rest)
+        return false;
     const int32_t id = vi_get(s->instance, __builtin_ctz(g->rest));
     g->lanes = vm_and(vi_eq(s->instance, vi_set(id)), vm_from_bits(g->rest));
     g->rest &= ~vm_bits(g->lanes);
@@ -45,10 +47,12 @@ static void affine_inverse(const struct trc_wide_affine *a, struct trc_wide_affi
 }
 
 /* The inverse of an instance's matrix at the lanes' times. */
-static void load_world_to_object(const struct lane_group *g, vfloat time, struct trc_wide_affine *m) {
+static void load_world_to_object(const struct lane_group *g, vfloat time,
+                                 struct trc_wide_affine *m) {
     if (g->instance->key_count < 2) {
         const float *e = g->instance->world_to_object->m;
-        for (int i = 0; i < 3; i++) m->column[i] = v3(vf_set(e[i]), vf_set(e[4 + i]), vf_set(e[8 + i]));
+        for (int i = 0; i < 3; i++)
+            m->column[i] = v3(vf_set(e[i]), vf_set(e[4 + i]), vf_set(e[8 + i]));
         m->origin = v3(vf_set(e[3]), vf_set(e[7]), vf_set(e[11]));
         return;
     }
@@ -62,12 +66,13 @@ static vvec3 normal_to_object(const struct trc_wide_affine *object_to_world, vve
     const vvec3 *c = object_to_world->column;
     return v3_normalize(v3(v3_dot(c[0], n), v3_dot(c[1], n), v3_dot(c[2], n)));
 }
-/* By the inverse transposed matrix, unit: a normal from object to world space. Columns are scaled first, so
- * that their products neither overflow nor vanish. */
+/* By the inverse transposed matrix, unit: a normal from object to world space. Columns are scaled
+ * first, so that their products neither overflow nor vanish. */
 static vvec3 normal_to_world(const struct trc_wide_affine *object_to_world, vvec3 n) {
     vvec3 c[3];
     vfloat most = vf_zero();
-    for (int k = 0; k < 3; k++) most = vf_max(most, v3_max(v3_abs(object_to_world->column[k])));
+    for (int k = 0; k < 3; k++)
+        most = vf_max(most, v3_max(v3_abs(object_to_world->column[k])));
     for (int k = 0; k < 3; k++) {
         c[k] = v3_scale(object_to_world->column[k], vf_divide(vf_one(), most));
     }
@@ -95,7 +100,8 @@ static const struct trc_attribute *mesh_attribute(const struct trc_mesh *mesh, u
     }
     for (uint32_t i = 0; i < mesh->attribute_count; i++) {
         const struct trc_attribute *a = &mesh->attributes[i];
-        if (name == TRC_NO_RESOURCE ? a->width == width : a->name == name) return a;
+        if (name == TRC_NO_RESOURCE ? a->width == width : a->name == name)
+            return a;
     }
     return NULL;
 }
@@ -104,7 +110,8 @@ static const struct trc_attribute *mesh_attribute(const struct trc_mesh *mesh, u
 TRC_INLINE void attribute_corners(const struct trc_attribute *a, uint32_t c, vint triangle,
                                   vmask lanes, vfloat out[3]) {
     const vint first = triangle * vi_set((int32_t)(3 * a->width));
-    for (uint32_t k = 0; k < 3; k++) out[k] = vf_gather(a->values + k * a->width + c, first, lanes);
+    for (uint32_t k = 0; k < 3; k++)
+        out[k] = vf_gather(a->values + k * a->width + c, first, lanes);
 }
 
 /* ---- attributes ---- */
@@ -127,7 +134,8 @@ static void op_uv(const struct trc_surface *s, uint32_t name, vfloat *out) {
 /* Black and transparent where the mesh does not have it. */
 static void op_color_attribute(const struct trc_surface *s, uint32_t name, vfloat *out) {
     const vvec3 w = corner_weights(s);
-    for (int c = 0; c < 4; c++) out[c] = vf_zero();
+    for (int c = 0; c < 4; c++)
+        out[c] = vf_zero();
     struct lane_group g = groups_begin(s);
     while (groups_next(s, &g)) {
         const struct trc_attribute *a = g.mesh ? mesh_attribute(g.mesh, name, 4) : NULL;
@@ -137,13 +145,15 @@ static void op_color_attribute(const struct trc_surface *s, uint32_t name, vfloa
             const vfloat value = corner[1] * w.y + corner[2] * w.z + corner[0] * w.x;
             out[c] = vf_select(g.lanes, value, out[c]);
         }
-        if (a && a->width < 4) out[3] = vf_select(g.lanes, vf_one(), out[3]);
+        if (a && a->width < 4)
+            out[3] = vf_select(g.lanes, vf_one(), out[3]);
     }
 }
 
 /* ---- texture coordinates ---- */
 
-/* Blender's default texture space: the bounding box becomes the unit cube; a flat side becomes 0.5. */
+/* Blender's default texture space: the bounding box becomes the unit cube; a flat side becomes 0.5.
+ */
 static vvec3 generated_of_group(const struct trc_surface *s, const struct lane_group *g) {
     const struct trc_mesh *mesh = g->mesh;
     vint index[3];
@@ -166,7 +176,8 @@ static vvec3 op_generated(const struct trc_surface *s) {
     vvec3 out = s->p; /* the world: the direction */
     struct lane_group g = groups_begin(s);
     while (groups_next(s, &g)) {
-        if (g.mesh) out = v3_select(g.lanes, generated_of_group(s, &g), out);
+        if (g.mesh)
+            out = v3_select(g.lanes, generated_of_group(s, &g), out);
     }
     return out;
 }
@@ -175,7 +186,8 @@ static vvec3 op_object_position(const struct trc_surface *s) {
     vvec3 out = s->p;
     struct lane_group g = groups_begin(s);
     while (groups_next(s, &g)) {
-        if (!g.instance) continue;
+        if (!g.instance)
+            continue;
         struct trc_wide_affine a;
         load_world_to_object(&g, s->time, &a);
         out = v3_select(g.lanes, trc_transform_point(&a, s->p), out);
@@ -187,7 +199,8 @@ static vvec3 op_object_normal(const struct trc_surface *s) {
     vvec3 out = s->n;
     struct lane_group g = groups_begin(s);
     while (groups_next(s, &g)) {
-        if (!g.instance) continue;
+        if (!g.instance)
+            continue;
         struct trc_wide_affine a;
         trc_load_affine(g.instance, s->time, &a);
         out = v3_select(g.lanes, normal_to_object(&a, s->n), out);
@@ -200,7 +213,8 @@ static vvec3 op_tangent(const struct trc_surface *s) {
     vvec3 out = v3_zero();
     struct lane_group g = groups_begin(s);
     while (groups_next(s, &g)) {
-        if (!g.instance) continue;
+        if (!g.instance)
+            continue;
         const vvec3 p = generated_of_group(s, &g);
         const vfloat half = vf_set(0.5f);
         struct trc_wide_affine a;
@@ -212,8 +226,8 @@ static vvec3 op_tangent(const struct trc_surface *s) {
     return out;
 }
 
-/* The world as the camera sees it at the middle of the shutter, looking along +Z as in Cycles. Without a
- * camera it stands at the origin. */
+/* The world as the camera sees it at the middle of the shutter, looking along +Z as in Cycles.
+ * Without a camera it stands at the origin. */
 static void load_world_to_camera(const struct trc_snapshot *snapshot, struct trc_wide_affine *m) {
     const struct trc_camera *camera = &snapshot->camera;
     uint32_t key = 0;
@@ -222,7 +236,8 @@ static void load_world_to_camera(const struct trc_snapshot *snapshot, struct trc
         trc_key_at(0.5f, camera->key_count, &key, &f);
         const float *a = camera->camera_to_world[key].m;
         const float *b = camera->camera_to_world[key + (camera->key_count > 1)].m;
-        for (int i = 0; i < 12; i++) e[i] = (1.0f - f) * a[i] + f * b[i];
+        for (int i = 0; i < 12; i++)
+            e[i] = (1.0f - f) * a[i] + f * b[i];
     }
     struct trc_wide_affine to_world;
     for (int i = 0; i < 3; i++) {
@@ -244,7 +259,8 @@ static vvec3 op_camera_position(const struct trc_surface *s) {
 static void op_window(const struct trc_surface *s, vfloat *out) {
     const struct trc_camera *camera = &s->snapshot->camera;
     out[0] = out[1] = vf_zero();
-    if (!s->snapshot->has_camera) return;
+    if (!s->snapshot->has_camera)
+        return;
     uint32_t key;
     float f;
     trc_key_at(0.5f, camera->key_count, &key, &f);
@@ -273,7 +289,8 @@ static vvec3 op_object_location(const struct trc_surface *s) {
     vvec3 out = v3_zero();
     struct lane_group g = groups_begin(s);
     while (groups_next(s, &g)) {
-        if (!g.instance) continue;
+        if (!g.instance)
+            continue;
         struct trc_wide_affine a;
         trc_load_affine(g.instance, s->time, &a);
         out = v3_select(g.lanes, a.origin, out);
@@ -286,7 +303,8 @@ static vfloat object_number(const struct trc_surface *s, int which) {
     vfloat out = vf_zero();
     struct lane_group g = groups_begin(s);
     while (groups_next(s, &g)) {
-        if (!g.instance) continue;
+        if (!g.instance)
+            continue;
         const float value = which < 4    ? g.instance->color[which]
                             : which == 4 ? (float)g.instance->pass_index
                                          : g.instance->random;
@@ -304,20 +322,34 @@ TRC_INLINE vfloat path_bit(const struct trc_surface *s, uint32_t bit) {
 
 static vfloat op_light_path(const struct trc_surface *s, uint32_t mode) {
     switch (mode) {
-    case TRC_PATH_IS_CAMERA: return path_bit(s, TRC_VISIBLE_CAMERA);
-    case TRC_PATH_IS_SHADOW: return path_bit(s, TRC_VISIBLE_SHADOW);
-    case TRC_PATH_IS_DIFFUSE: return path_bit(s, TRC_VISIBLE_DIFFUSE);
-    case TRC_PATH_IS_GLOSSY: return path_bit(s, TRC_VISIBLE_GLOSSY);
-    case TRC_PATH_IS_SINGULAR: return path_bit(s, TRC_PATH_SINGULAR);
-    case TRC_PATH_IS_REFLECTION: return path_bit(s, TRC_PATH_REFLECTED);
-    case TRC_PATH_IS_TRANSMISSION: return path_bit(s, TRC_VISIBLE_TRANSMISSION);
-    case TRC_PATH_RAY_LENGTH: return s->ray_length;
-    case TRC_PATH_DEPTH: return vi_to_float(s->depth);
-    case TRC_PATH_DIFFUSE_DEPTH: return vi_to_float(s->diffuse_depth);
-    case TRC_PATH_GLOSSY_DEPTH: return vi_to_float(s->glossy_depth);
-    case TRC_PATH_TRANSPARENT_DEPTH: return vi_to_float(s->transparent_depth);
-    case TRC_PATH_TRANSMISSION_DEPTH: return vi_to_float(s->transmission_depth);
-    default: return vf_zero();
+    case TRC_PATH_IS_CAMERA:
+        return path_bit(s, TRC_VISIBLE_CAMERA);
+    case TRC_PATH_IS_SHADOW:
+        return path_bit(s, TRC_VISIBLE_SHADOW);
+    case TRC_PATH_IS_DIFFUSE:
+        return path_bit(s, TRC_VISIBLE_DIFFUSE);
+    case TRC_PATH_IS_GLOSSY:
+        return path_bit(s, TRC_VISIBLE_GLOSSY);
+    case TRC_PATH_IS_SINGULAR:
+        return path_bit(s, TRC_PATH_SINGULAR);
+    case TRC_PATH_IS_REFLECTION:
+        return path_bit(s, TRC_PATH_REFLECTED);
+    case TRC_PATH_IS_TRANSMISSION:
+        return path_bit(s, TRC_VISIBLE_TRANSMISSION);
+    case TRC_PATH_RAY_LENGTH:
+        return s->ray_length;
+    case TRC_PATH_DEPTH:
+        return vi_to_float(s->depth);
+    case TRC_PATH_DIFFUSE_DEPTH:
+        return vi_to_float(s->diffuse_depth);
+    case TRC_PATH_GLOSSY_DEPTH:
+        return vi_to_float(s->glossy_depth);
+    case TRC_PATH_TRANSPARENT_DEPTH:
+        return vi_to_float(s->transparent_depth);
+    case TRC_PATH_TRANSMISSION_DEPTH:
+        return vi_to_float(s->transmission_depth);
+    default:
+        return vf_zero();
     }
 }
 

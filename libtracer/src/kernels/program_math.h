@@ -34,8 +34,8 @@ static vfloat math_power(vfloat a, vfloat b) {
 static vfloat math_logarithm(vfloat a, vfloat b) {
     const vmask valid = vm_and(vf_gt(a, vf_zero()), vf_gt(b, vf_zero()));
     const vfloat one = vf_one();
-    return vf_where(valid, vf_divide(vf_log(vf_select(valid, a, one)),
-                                     vf_log(vf_select(valid, b, one))));
+    return vf_where(valid,
+                    vf_divide(vf_log(vf_select(valid, a, one)), vf_log(vf_select(valid, b, one))));
 }
 
 /* The remainder with the sign of a; 0 where b is 0. */
@@ -43,7 +43,8 @@ static vfloat math_modulo(vfloat a, vfloat b) {
     const vfloat size = vf_abs(b), quotient = vf_trunc(vf_divide(a, b));
     const vfloat product = quotient * b;
     vfloat r = (a - product) - vf_product_low(quotient, b, product);
-    /* A quotient that was rounded up to the next whole number leaves a remainder of the other sign. */
+    /* A quotient that was rounded up to the next whole number leaves a remainder of the other sign.
+     */
     const vfloat step = vf_copysign(b, a);
     r = vf_select(vf_lt(r * a, vf_zero()), r + step, r);
     r = vf_select(vf_ge(vf_abs(r), size), r - step, r);
@@ -52,7 +53,8 @@ static vfloat math_modulo(vfloat a, vfloat b) {
     vmask easy = vm_and(vf_gt(size, vf_set(1e-18f)), vf_lt(size, vf_set(1e18f)));
     easy = vm_and(easy, vf_lt(vf_abs(quotient), vf_set(4194304.0f)));
     uint32_t rest = TRC_LANE_BITS & ~vm_bits(vm_or(easy, vf_eq(b, vf_zero())));
-    if (!rest) return r;
+    if (!rest)
+        return r;
     float x[TRC_WIDTH];
     vf_store(x, r);
     for (; rest; rest &= rest - 1) {
@@ -113,52 +115,94 @@ static vfloat math_compare(vfloat a, vfloat b, vfloat c) {
 /* The Math node without its clamp. Long because it is the list of its modes. */
 static vfloat op_math(uint32_t mode, vfloat a, vfloat b, vfloat c) {
     switch (mode) {
-    case TRC_MATH_ADD: return a + b;
-    case TRC_MATH_SUBTRACT: return a - b;
-    case TRC_MATH_MULTIPLY: return a * b;
-    case TRC_MATH_DIVIDE: return vf_divide(a, b);
-    case TRC_MATH_MULTIPLY_ADD: return a * b + c;
-    case TRC_MATH_POWER: return math_power(a, b);
-    case TRC_MATH_LOGARITHM: return math_logarithm(a, b);
-    case TRC_MATH_SQRT: return vf_safe_sqrt(a);
-    case TRC_MATH_INVERSE_SQRT: return vf_where(vf_gt(a, vf_zero()), vf_rcp(vf_safe_sqrt(a)));
-    case TRC_MATH_ABSOLUTE: return vf_abs(a);
-    case TRC_MATH_EXPONENT: return vf_exp(a);
-    case TRC_MATH_MINIMUM: return vf_min(a, b);
-    case TRC_MATH_MAXIMUM: return vf_max(a, b);
-    case TRC_MATH_LESS_THAN: return vf_truth(vf_lt(a, b));
-    case TRC_MATH_GREATER_THAN: return vf_truth(vf_gt(a, b));
-    case TRC_MATH_SIGN: return math_sign(a);
-    case TRC_MATH_COMPARE: return math_compare(a, b, c);
-    case TRC_MATH_SMOOTH_MIN: return math_smooth_min(a, b, c);
-    case TRC_MATH_SMOOTH_MAX: return -math_smooth_min(-a, -b, c);
-    case TRC_MATH_ROUND: return vf_floor(a + vf_set(0.5f));
-    case TRC_MATH_FLOOR: return vf_floor(a);
-    case TRC_MATH_CEIL: return vf_ceil(a);
-    case TRC_MATH_TRUNC: return vf_trunc(a);
-    case TRC_MATH_FRACT: return a - vf_floor(a);
-    case TRC_MATH_MODULO: return math_modulo(a, b);
-    case TRC_MATH_WRAP: return math_wrap(a, b, c);
-    case TRC_MATH_SNAP: return vf_floor(vf_divide(a, b)) * b;
-    case TRC_MATH_PINGPONG: return math_ping_pong(a, b);
-    case TRC_MATH_SINE: return vf_sin(a);
-    case TRC_MATH_COSINE: return vf_cos(a);
-    case TRC_MATH_TANGENT: return vf_tan(a);
-    case TRC_MATH_ARCSINE: return vf_asin(a);
-    case TRC_MATH_ARCCOSINE: return vf_acos(a);
-    case TRC_MATH_ARCTANGENT: return vf_atan(a);
-    case TRC_MATH_ARCTAN2: return vf_atan2(a, b);
-    case TRC_MATH_SINH: return math_sinh(a);
-    case TRC_MATH_COSH: return math_cosh(a);
-    case TRC_MATH_TANH: return math_tanh(a);
-    case TRC_MATH_RADIANS: return a * vf_set(TRC_PI / 180.0f);
-    case TRC_MATH_DEGREES: return a * vf_set(180.0f / TRC_PI);
-    default: return vf_zero();
+    case TRC_MATH_ADD:
+        return a + b;
+    case TRC_MATH_SUBTRACT:
+        return a - b;
+    case TRC_MATH_MULTIPLY:
+        return a * b;
+    case TRC_MATH_DIVIDE:
+        return vf_divide(a, b);
+    case TRC_MATH_MULTIPLY_ADD:
+        return a * b + c;
+    case TRC_MATH_POWER:
+        return math_power(a, b);
+    case TRC_MATH_LOGARITHM:
+        return math_logarithm(a, b);
+    case TRC_MATH_SQRT:
+        return vf_safe_sqrt(a);
+    case TRC_MATH_INVERSE_SQRT:
+        return vf_where(vf_gt(a, vf_zero()), vf_rcp(vf_safe_sqrt(a)));
+    case TRC_MATH_ABSOLUTE:
+        return vf_abs(a);
+    case TRC_MATH_EXPONENT:
+        return vf_exp(a);
+    case TRC_MATH_MINIMUM:
+        return vf_min(a, b);
+    case TRC_MATH_MAXIMUM:
+        return vf_max(a, b);
+    case TRC_MATH_LESS_THAN:
+        return vf_truth(vf_lt(a, b));
+    case TRC_MATH_GREATER_THAN:
+        return vf_truth(vf_gt(a, b));
+    case TRC_MATH_SIGN:
+        return math_sign(a);
+    case TRC_MATH_COMPARE:
+        return math_compare(a, b, c);
+    case TRC_MATH_SMOOTH_MIN:
+        return math_smooth_min(a, b, c);
+    case TRC_MATH_SMOOTH_MAX:
+        return -math_smooth_min(-a, -b, c);
+    case TRC_MATH_ROUND:
+        return vf_floor(a + vf_set(0.5f));
+    case TRC_MATH_FLOOR:
+        return vf_floor(a);
+    case TRC_MATH_CEIL:
+        return vf_ceil(a);
+    case TRC_MATH_TRUNC:
+        return vf_trunc(a);
+    case TRC_MATH_FRACT:
+        return a - vf_floor(a);
+    case TRC_MATH_MODULO:
+        return math_modulo(a, b);
+    case TRC_MATH_WRAP:
+        return math_wrap(a, b, c);
+    case TRC_MATH_SNAP:
+        return vf_floor(vf_divide(a, b)) * b;
+    case TRC_MATH_PINGPONG:
+        return math_ping_pong(a, b);
+    case TRC_MATH_SINE:
+        return vf_sin(a);
+    case TRC_MATH_COSINE:
+        return vf_cos(a);
+    case TRC_MATH_TANGENT:
+        return vf_tan(a);
+    case TRC_MATH_ARCSINE:
+        return vf_asin(a);
+    case TRC_MATH_ARCCOSINE:
+        return vf_acos(a);
+    case TRC_MATH_ARCTANGENT:
+        return vf_atan(a);
+    case TRC_MATH_ARCTAN2:
+        return vf_atan2(a, b);
+    case TRC_MATH_SINH:
+        return math_sinh(a);
+    case TRC_MATH_COSH:
+        return math_cosh(a);
+    case TRC_MATH_TANH:
+        return math_tanh(a);
+    case TRC_MATH_RADIANS:
+        return a * vf_set(TRC_PI / 180.0f);
+    case TRC_MATH_DEGREES:
+        return a * vf_set(180.0f / TRC_PI);
+    default:
+        return vf_zero();
     }
 }
 
 TRC_INLINE vfloat op_clamp(uint32_t mode, vfloat value, vfloat low, vfloat high) {
-    if (mode == 0) return vf_min(vf_max(value, low), high);
+    if (mode == 0)
+        return vf_min(vf_max(value, low), high);
     return vf_min(vf_max(value, vf_min(low, high)), vf_max(low, high));
 }
 
@@ -194,32 +238,53 @@ static vvec3 vector_reflect(vvec3 a, vvec3 b) {
 
 static vvec3 op_vector_math(uint32_t mode, vvec3 a, vvec3 b, vvec3 c, vfloat scale) {
     switch (mode) {
-    case TRC_VECTOR_ADD: return v3_add(a, b);
-    case TRC_VECTOR_SUBTRACT: return v3_sub(a, b);
-    case TRC_VECTOR_MULTIPLY: return v3_mul(a, b);
-    case TRC_VECTOR_DIVIDE: return v3_divide(a, b);
-    case TRC_VECTOR_MULTIPLY_ADD: return v3_add(v3_mul(a, b), c);
-    case TRC_VECTOR_CROSS: return v3_cross(a, b);
-    case TRC_VECTOR_PROJECT: return vector_project(a, b);
-    case TRC_VECTOR_REFLECT: return vector_reflect(a, b);
-    case TRC_VECTOR_SCALE: return v3_scale(a, scale);
-    case TRC_VECTOR_NORMALIZE: return v3_normalize(a);
-    case TRC_VECTOR_ABSOLUTE: return v3_abs(a);
-    case TRC_VECTOR_MINIMUM: return v3_min(a, b);
-    case TRC_VECTOR_MAXIMUM: return v3_max_each(a, b);
-    case TRC_VECTOR_FLOOR: return v3_floor(a);
-    case TRC_VECTOR_CEIL: return v3(vf_ceil(a.x), vf_ceil(a.y), vf_ceil(a.z));
-    case TRC_VECTOR_FRACT: return v3_sub(a, v3_floor(a));
-    default: return v3_zero();
+    case TRC_VECTOR_ADD:
+        return v3_add(a, b);
+    case TRC_VECTOR_SUBTRACT:
+        return v3_sub(a, b);
+    case TRC_VECTOR_MULTIPLY:
+        return v3_mul(a, b);
+    case TRC_VECTOR_DIVIDE:
+        return v3_divide(a, b);
+    case TRC_VECTOR_MULTIPLY_ADD:
+        return v3_add(v3_mul(a, b), c);
+    case TRC_VECTOR_CROSS:
+        return v3_cross(a, b);
+    case TRC_VECTOR_PROJECT:
+        return vector_project(a, b);
+    case TRC_VECTOR_REFLECT:
+        return vector_reflect(a, b);
+    case TRC_VECTOR_SCALE:
+        return v3_scale(a, scale);
+    case TRC_VECTOR_NORMALIZE:
+        return v3_normalize(a);
+    case TRC_VECTOR_ABSOLUTE:
+        return v3_abs(a);
+    case TRC_VECTOR_MINIMUM:
+        return v3_min(a, b);
+    case TRC_VECTOR_MAXIMUM:
+        return v3_max_each(a, b);
+    case TRC_VECTOR_FLOOR:
+        return v3_floor(a);
+    case TRC_VECTOR_CEIL:
+        return v3(vf_ceil(a.x), vf_ceil(a.y), vf_ceil(a.z));
+    case TRC_VECTOR_FRACT:
+        return v3_sub(a, v3_floor(a));
+    default:
+        return v3_zero();
     }
 }
 
 TRC_INLINE vfloat op_vector_measure(uint32_t mode, vvec3 a, vvec3 b) {
     switch (mode) {
-    case TRC_VECTOR_DOT: return v3_dot(a, b);
-    case TRC_VECTOR_DISTANCE: return v3_length(v3_sub(a, b));
-    case TRC_VECTOR_LENGTH: return v3_length(a);
-    default: return vf_zero();
+    case TRC_VECTOR_DOT:
+        return v3_dot(a, b);
+    case TRC_VECTOR_DISTANCE:
+        return v3_length(v3_sub(a, b));
+    case TRC_VECTOR_LENGTH:
+        return v3_length(a);
+    default:
+        return vf_zero();
     }
 }
 
@@ -247,7 +312,8 @@ static vvec3 op_mapping(uint32_t mode, const vfloat *in) {
     }
     v = mode == 3 ? v3_divide(v, scale) : v3_mul(v, scale);
     v = v3(v3_dot(r0, v), v3_dot(r1, v), v3_dot(r2, v));
-    if (mode == 0) return v3_add(v, location);
+    if (mode == 0)
+        return v3_add(v, location);
     return mode == 3 ? v3_normalize(v) : v;
 }
 

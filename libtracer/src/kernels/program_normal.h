@@ -5,16 +5,23 @@
 #include "kernels/program_input.h"
 
 /* Modes of the node. The last two turn Y and Z around. */
-enum { NORMAL_MAP_TANGENT, NORMAL_MAP_OBJECT, NORMAL_MAP_WORLD, NORMAL_MAP_BLENDER_OBJECT,
-       NORMAL_MAP_BLENDER_WORLD };
+enum {
+    NORMAL_MAP_TANGENT,
+    NORMAL_MAP_OBJECT,
+    NORMAL_MAP_WORLD,
+    NORMAL_MAP_BLENDER_OBJECT,
+    NORMAL_MAP_BLENDER_WORLD
+};
 
-/* Normals at the corners in object space, not normalised, and the lanes that have them: those of smooth
+/* Normals at the corners in object space (unit) and the lanes that have them: those of smooth
  * triangles. */
-static vmask load_normals(const struct trc_surface *s, const struct lane_group *g, const vint index[3],
-                          struct trc_corners *n) {
+static vmask load_normals(const struct trc_surface *s, const struct lane_group *g,
+                          const vint index[3], struct trc_corners *n) {
     const struct trc_mesh *mesh = g->mesh;
-    for (int k = 0; k < 3; k++) n->corner[k] = v3_zero();
-    if (!mesh->corner_normals && (!mesh->smooth || !mesh->vertex_normals)) return vm_none();
+    for (int k = 0; k < 3; k++)
+        n->corner[k] = v3_zero();
+    if (!mesh->corner_normals && (!mesh->smooth || !mesh->vertex_normals))
+        return vm_none();
     vmask smooth = g->lanes;
     if (mesh->smooth) {
         uint32_t bits = 0;
@@ -36,7 +43,7 @@ static vmask load_normals(const struct trc_surface *s, const struct lane_group *
     return smooth;
 }
 
-/* Direction of growing U on the triangle (unit) and the sign of its UV area, as Mikkelsen,
+/* Direction of growing U on the triangle, of any length, and the sign of its UV area, as Mikkelsen,
  * "Simulation of Wrinkled Surfaces Revisited", 2008 (MikkTSpace), has them for one triangle. */
 static vvec3 triangle_tangent(const struct trc_attribute *uv, vint triangle, const vvec3 p[3],
                               vmask lanes, vfloat *sign) {
@@ -49,7 +56,7 @@ static vvec3 triangle_tangent(const struct trc_attribute *uv, vint triangle, con
     *sign = vf_select(vf_gt(area, vf_zero()), vf_one(), vf_set(-1.0f));
     const vvec3 t = v3_scale(v3_sub(v3_scale(e1, v2), v3_scale(e2, v1)), *sign);
     const vvec3 fallback = v3(vf_one(), vf_zero(), vf_zero());
-    return v3_select(vf_ne(area, vf_zero()), v3_normalize(t), fallback);
+    return v3_select(vf_ne(area, vf_zero()), t, fallback);
 }
 
 /* Interpolated normal and tangent, not normalised, of one object's lanes in object space. */
@@ -64,10 +71,13 @@ static void tangent_frame(const struct trc_surface *s, const struct lane_group *
     trc_load_vectors(mesh->positions, index, mesh->vertex_count, mesh->key_count, s->time, g->lanes,
                      &p);
     const vvec3 t = triangle_tangent(uv, s->triangle, p.corner, g->lanes, sign);
-    const vvec3 flat = v3_normalize(
-        v3_cross(v3_sub(p.corner[1], p.corner[0]), v3_sub(p.corner[2], p.corner[0])));
     const vmask smooth = load_normals(s, g, index, &n);
-    for (int k = 0; k < 3; k++) n.corner[k] = v3_select(smooth, v3_normalize(n.corner[k]), flat);
+    if (vm_any(vm_andnot(g->lanes, smooth))) {
+        const vvec3 flat = v3_normalize(
+            v3_cross(v3_sub(p.corner[1], p.corner[0]), v3_sub(p.corner[2], p.corner[0])));
+        for (int k = 0; k < 3; k++)
+            n.corner[k] = v3_select(smooth, n.corner[k], flat);
+    }
     vvec3 along[3];
     for (int k = 0; k < 3; k++) {
         along[k] = v3_normalize(v3_sub(t, v3_scale(n.corner[k], v3_dot(n.corner[k], t))));
@@ -76,18 +86,19 @@ static void tangent_frame(const struct trc_surface *s, const struct lane_group *
     *tangent = corners_mix(w, along);
 }
 
-/* The mapped normal of one object's lanes, world space, on the side of the winding; c in [-1, 1]. */
+/* The mapped normal of one object's lanes, world space, on the side of the winding; c in [-1, 1].
+ */
 static vvec3 normal_of_group(const struct trc_surface *s, const struct lane_group *g, uint32_t mode,
                              const struct trc_attribute *uv, vvec3 c) {
-    if (mode == NORMAL_MAP_WORLD || mode == NORMAL_MAP_BLENDER_WORLD) return v3_normalize(c);
+    if (mode == NORMAL_MAP_WORLD || mode == NORMAL_MAP_BLENDER_WORLD)
+        return v3_normalize(c);
     vvec3 n = c;
     if (mode == NORMAL_MAP_TANGENT) {
         vvec3 normal, tangent;
         vfloat sign;
         tangent_frame(s, g, uv, &normal, &tangent, &sign);
         const vvec3 bitangent = v3_scale(v3_cross(normal, tangent), sign);
-        n = v3_normalize(v3_add(v3_add(v3_scale(tangent, c.x), v3_scale(bitangent, c.y)),
-                                v3_scale(normal, c.z)));
+        n = v3_mad(tangent, c.x, v3_mad(bitangent, c.y, v3_scale(normal, c.z)));
     }
     struct trc_wide_affine a;
     trc_load_affine(g->instance, s->time, &a);
@@ -95,22 +106,27 @@ static vvec3 normal_of_group(const struct trc_surface *s, const struct lane_grou
 }
 
 /* The shading normal stays where there is no such UV map. */
-static vvec3 op_normal_map(const struct trc_surface *s, uint32_t mode, uint32_t name, vfloat strength,
-                           vvec3 color) {
+static vvec3 op_normal_map(const struct trc_surface *s, uint32_t mode, uint32_t name,
+                           vfloat strength, vvec3 color) {
     const vfloat half = vf_set(0.5f), two = vf_set(2.0f);
     vvec3 c = v3(two * (color.x - half), two * (color.y - half), two * (color.z - half));
-    if (mode >= NORMAL_MAP_BLENDER_OBJECT) c = v3(c.x, -c.y, -c.z);
+    if (mode >= NORMAL_MAP_BLENDER_OBJECT)
+        c = v3(c.x, -c.y, -c.z);
+    const vmask full = vf_eq(strength, vf_one());
     vvec3 out = s->n;
     struct lane_group g = groups_begin(s);
     while (groups_next(s, &g)) {
-        if (!g.instance) continue;
+        if (!g.instance)
+            continue;
         const struct trc_attribute *uv = mesh_attribute(g.mesh, name, 2);
-        if (mode == NORMAL_MAP_TANGENT && !uv) continue;
+        if (mode == NORMAL_MAP_TANGENT && !uv)
+            continue;
         vvec3 n = normal_of_group(s, &g, mode, uv, c);
         n = v3_select(s->backfacing, v3_neg(n), n);
-        const vvec3 moved = v3_normalize(
-            v3_add(s->n, v3_scale(v3_sub(n, s->n), vf_max(strength, vf_zero()))));
-        n = v3_select(vf_eq(strength, vf_one()), n, moved);
+        if (!vm_all(full)) {
+            const vvec3 moved = v3_mad(v3_sub(n, s->n), vf_max(strength, vf_zero()), s->n);
+            n = v3_select(full, n, v3_normalize(moved));
+        }
         n = v3_select(vf_gt(v3_dot(n, n), vf_zero()), n, s->n);
         out = v3_select(g.lanes, n, out);
     }

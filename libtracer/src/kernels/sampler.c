@@ -1,15 +1,16 @@
 /* Sample sequences, TRC_WIDTH numbers at once.
  *
- * Sources: A. Owen, "Randomly Permuted (t,m,s)-Nets and (t,s)-Sequences" (1995); S. Laine and T. Karras,
- * "Stratified Sampling for Stochastic Transparency" (2011), the hash that scrambles a number in Owen's
- * sense when its digits are reversed; B. Burley, "Practical Hash-based Owen Scrambling" (2020), shuffled
- * padding; N. Vegdahl, "Building a Better LK Hash" (2021), constants of the hash; A. Ahmed and P. Wonka,
- * "Screen-Space Blue-Noise Diffusion of Monte Carlo Sampling Error via Hierarchical Ordering of Pixels"
- * (2020); A. Keller and W. Heidrich, "Interleaved Sampling" (2001), and S. Boulos et al., "Packet-based
- * Whitted and Distribution Ray Tracing" (2007), the tile of static samples.
+ * Sources: A. Owen, "Randomly Permuted (t,m,s)-Nets and (t,s)-Sequences" (1995); S. Laine and T.
+ * Karras, "Stratified Sampling for Stochastic Transparency" (2011), the hash that scrambles a
+ * number in Owen's sense when its digits are reversed; B. Burley, "Practical Hash-based Owen
+ * Scrambling" (2020), shuffled padding; N. Vegdahl, "Building a Better LK Hash" (2021), constants
+ * of the hash; A. Ahmed and P. Wonka, "Screen-Space Blue-Noise Diffusion of Monte Carlo Sampling
+ * Error via Hierarchical Ordering of Pixels" (2020); A. Keller and W. Heidrich, "Interleaved
+ * Sampling" (2001), and S. Boulos et al., "Packet-based Whitted and Distribution Ray Tracing"
+ * (2007), the tile of static samples.
  *
- * Every number is a function of (seed, pixel, index, dimension) alone: pictures do not depend on threads,
- * tiles or widths. */
+ * Every number is a function of (seed, pixel, index, dimension) alone: pictures do not depend on
+ * threads, tiles or widths. */
 #include "kernels/sampler.h"
 
 #include "kernels/wide_math.h"
@@ -26,7 +27,8 @@ _Static_assert(TRC_DIM_BOUNCE + 2 * TRC_DIMS_PER_BOUNCE == TRC_JOINT_DIMENSIONS,
 
 /* Bits of every lane in reverse order. */
 TRC_INLINE vuint reverse_bits(vuint x) {
-#if TRC_WIDTH == 16 || (TRC_WIDTH == 8 && defined(__AVX2__)) || (TRC_WIDTH == 4 && defined(__SSSE3__))
+#if TRC_WIDTH == 16 || (TRC_WIDTH == 8 && defined(__AVX2__)) || \
+    (TRC_WIDTH == 4 && defined(__SSSE3__))
     /* Reversed nibbles by table, low ones to the high half, and reversed bytes by shuffle. */
 #define TRC_TABLE_LOW 0, 8, 4, 12, 2, 10, 6, 14, 1, 9, 5, 13, 3, 11, 7, 15
 #define TRC_BYTES 3, 2, 1, 0, 7, 6, 5, 4, 11, 10, 9, 8, 15, 14, 13, 12
@@ -57,8 +59,8 @@ TRC_INLINE vuint reverse_bits(vuint x) {
 #endif
 }
 
-/* Owen scrambling of numbers whose first digit is bit 0: each step lets a digit depend on earlier ones
- * only. */
+/* Owen scrambling of numbers whose first digit is bit 0: each step lets a digit depend on earlier
+ * ones only. */
 TRC_INLINE vuint scramble_reversed(vuint x, vuint seed) {
     x ^= x * vu_set(0x3d20adeau);
     x += seed;
@@ -86,9 +88,10 @@ TRC_INLINE vuint sobol_reversed(const uint32_t *table, vuint index, uint32_t dim
         const uint32_t i = (uint32_t)vi_get((vint)index, 0);
         uint32_t x = table[trc_sobol_offset(0, dimension) + (i & POINT_MASK)];
         if (i >> TRC_SOBOL_POINT_BITS)
-            x ^= table[trc_sobol_offset(1, dimension) + ((i >> TRC_SOBOL_POINT_BITS) & POINT_MASK)] ^
-                 table[trc_sobol_offset(2, dimension) +
-                       ((i >> (2 * TRC_SOBOL_POINT_BITS)) & POINT_MASK)];
+            x ^=
+                table[trc_sobol_offset(1, dimension) + ((i >> TRC_SOBOL_POINT_BITS) & POINT_MASK)] ^
+                table[trc_sobol_offset(2, dimension) +
+                      ((i >> (2 * TRC_SOBOL_POINT_BITS)) & POINT_MASK)];
         return vu_set(x);
     }
     const vuint mask = vu_set(POINT_MASK);
@@ -103,15 +106,16 @@ TRC_INLINE vuint sobol_reversed(const uint32_t *table, vuint index, uint32_t dim
     return x;
 }
 
-/* Nested uniform shuffle of index within blocks of 2^bits: keeps every aligned block of 2^k whole. */
+/* Nested uniform shuffle of index within blocks of 2^bits: keeps every aligned block of 2^k
+ * whole. */
 TRC_INLINE vuint shuffle_index(vuint index, vuint seed, uint32_t bits) {
     const vuint low = vu_set(bits < 32 ? (1u << bits) - 1u : ~0u);
     const vuint shuffled = reverse_bits(scramble_reversed(reverse_bits(index), seed));
     return (shuffled & low) | (index & ~low);
 }
 
-/* Dimension of the table that serves a dimension, and the number of its padding group: 0 for the joint
- * sequence. Two deeper hits share a group and repeat the dimensions of the first two. */
+/* Dimension of the table that serves a dimension, and the number of its padding group: 0 for the
+ * joint sequence. Two deeper hits share a group and repeat the dimensions of the first two. */
 TRC_INLINE uint32_t joint_dimension(uint32_t dimension, uint32_t *group) {
     *group = 0;
     if (dimension < TRC_JOINT_DIMENSIONS)
@@ -128,11 +132,11 @@ static vfloat sobol_number(const uint32_t *table, vuint key, vuint index, uint32
     if (group > 0)
         index = shuffle_index(index, vu_hash(key ^ vu_set(group * 0x68e31da4u)), index_bits);
     const vuint seed = vu_hash(key + vu_set(dimension * 0x9e3779b9u));
-    return vu_to_unit(
-        reverse_bits(scramble_reversed(sobol_reversed(table, index, joint), seed)));
+    return vu_to_unit(reverse_bits(scramble_reversed(sobol_reversed(table, index, joint), seed)));
 }
 
-/* ---- blue noise: one sequence for a block of 256 x 256 pixels, visited in shuffled Z-order ---- */
+/* ---- blue noise: one sequence for a block of 256 x 256 pixels, visited in shuffled Z-order
+ * ---- */
 
 #define BLOCK_BITS 8
 
@@ -143,8 +147,8 @@ TRC_INLINE vuint spread_bits(vuint x) {
     return (x | (x << 1)) & vu_set(0x5555u);
 }
 
-/* Order of the pixel in its block: at every level the four quadrants come in an order that a hash of the
- * levels above chooses. */
+/* Order of the pixel in its block: at every level the four quadrants come in an order that a hash
+ * of the levels above chooses. */
 static vuint z_order(vuint x, vuint y, vuint seed) {
     const vuint mask = vu_set((1u << BLOCK_BITS) - 1u);
     const vuint z = spread_bits(x & mask) | (spread_bits(y & mask) << 1);
@@ -153,8 +157,8 @@ static vuint z_order(vuint x, vuint y, vuint seed) {
         const vuint digit = (z >> (2 * level)) & vu_set(3u);
         const vuint h = vu_hash(seed + (z >> (2 * level + 2)) * vu_set(0x9e3779b9u) +
                                 vu_set((uint32_t)level * 0x85ebca6bu));
-        /* Of the 24 orders, those that are affine in the two bits: 3 nonzero images of bit 0, then 2 of bit
-         * 1, then 4 offsets: all 24. */
+        /* Of the 24 orders, those that are affine in the two bits: 3 nonzero images of bit 0, then
+         * 2 of bit 1, then 4 offsets: all 24. */
         const vuint image0 = vu_set(1u) + (((h >> 16) * vu_set(3u)) >> 16);
         const vuint other = (h & vu_set(1u)) + vu_set(1u);
         vuint image1 = image0 + other;
@@ -183,24 +187,25 @@ static vfloat blue_number(const struct trc_sampler *sampler, vuint pixel, vuint 
 
 /* ---- interleaved tile ---- */
 
-/* The tile is 8 x 8 pixels. A sample's stratum among the planned ones is common to the tile (so that
- * packets share lens, light and time cells); its 64 cells go to the 64 pixels: the upper digit (of 8)
- * by a Sudoku square, in which every row, column and 4 x 2 block has each digit once, the lower digit
- * by a second square that makes the pair of digits different for all pixels. Squares over GF(8): digit
- * a = y * g + x' is a Latin square for every g != 0, where x' renumbers x so that blocks come out right;
- * g = 2 and g = 3 are orthogonal. */
+/* The tile is 8 x 8 pixels. A sample's stratum among the planned ones is common to the tile (so
+ * that packets share lens, light and time cells); its 64 cells go to the 64 pixels: the upper digit
+ * (of 8) by a Sudoku square, in which every row, column and 4 x 2 block has each digit once, the
+ * lower digit by a second square that makes the pair of digits different for all pixels. Squares
+ * over GF(8): digit a = y * g + x' is a Latin square for every g != 0, where x' renumbers x so that
+ * blocks come out right; g = 2 and g = 3 are orthogonal. */
 TRC_INLINE vuint gf8_double(vuint a) {
     const vuint twice = a << 1;
     return twice ^ (vu_set(0x0bu) & (vu_set(0) - (twice >> 3))); /* modulo t^3 + t + 1 */
 }
 
 static vuint sudoku_cell(vuint x, vuint y, uint32_t h) {
-    /* Renumbering of rows and columns that keeps blocks (4 columns x 2 rows): bands and their rows, stacks and
-     * their columns are permuted by xor with hash bits. */
+    /* Renumbering of rows and columns that keeps blocks (4 columns x 2 rows): bands and their rows,
+     * stacks and their columns are permuted by xor with hash bits. */
     x = (x ^ vu_set(h & 7u)) & vu_set(7u);
     y = (y ^ vu_set((h >> 3) & 7u)) & vu_set(7u);
-    /* In a block y differs in bit 0 and x in bits 0, 1: digits 4 * bit0(y) xor ... are all different when the
-     * image of y's bit 0 is independent of x's bits 0 and 1. Doubling y twice maps 1 to 4. */
+    /* In a block y differs in bit 0 and x in bits 0, 1: digits 4 * bit0(y) xor ... are all
+     * different when the image of y's bit 0 is independent of x's bits 0 and 1. Doubling y twice
+     * maps 1 to 4. */
     const vuint y2 = gf8_double(y), y4 = gf8_double(y2);
     const vuint upper = x ^ y4;
     const vuint lower = x ^ y2;
@@ -221,7 +226,8 @@ static vfloat sudoku_number(const struct trc_sampler *sampler, vuint pixel, vuin
     if (vm_all(vu_eq(h, vu_set((uint32_t)vi_get((vint)h, 0))))) {
         cell = sudoku_cell(x, y, (uint32_t)vi_get((vint)h, 0));
     } else {
-        /* Lanes of several tiles: the square is linear, so the hash may as well be added afterwards. */
+        /* Lanes of several tiles: the square is linear, so the hash may as well be added
+         * afterwards. */
         const vuint none = sudoku_cell(x ^ h, y ^ (h >> 3), 0);
         cell = none ^ ((h >> 3) & vu_set(0x38u)) ^ ((h >> 9) & vu_set(7u));
     }

@@ -4,32 +4,40 @@
 
 #include "kernels/simd.h"
 
-/* Dimensions of one camera sample; the first TRC_JOINT_DIMENSIONS are one joint sequence: camera, first and
- * second hit. Each deeper hit is another such sequence, shuffled against the first. */
+/* Dimensions of one camera sample; the first TRC_JOINT_DIMENSIONS are one joint sequence: camera,
+ * first and second hit. Each deeper hit is another such sequence, shuffled against the first. */
 #define TRC_JOINT_DIMENSIONS 17
 enum trc_dimension {
-    TRC_DIM_FILTER_X = 0, TRC_DIM_FILTER_Y,
-    TRC_DIM_LENS_X, TRC_DIM_LENS_Y,
+    TRC_DIM_FILTER_X = 0,
+    TRC_DIM_FILTER_Y,
+    TRC_DIM_LENS_X,
+    TRC_DIM_LENS_Y,
     TRC_DIM_TIME,
-    TRC_DIM_BOUNCE = 5 /* first dimension of the first hit; TRC_DIMS_PER_BOUNCE for each further one */
+    TRC_DIM_BOUNCE =
+        5 /* first dimension of the first hit; TRC_DIMS_PER_BOUNCE for each further one */
 };
 /* Within a bounce. */
 enum {
-    TRC_DIM_LIGHT_SELECT = 0, TRC_DIM_LIGHT_X, TRC_DIM_LIGHT_Y,
-    TRC_DIM_LOBE, TRC_DIM_BSDF_X, TRC_DIM_BSDF_Y,
+    TRC_DIM_LIGHT_SELECT = 0,
+    TRC_DIM_LIGHT_X,
+    TRC_DIM_LIGHT_Y,
+    TRC_DIM_LOBE,
+    TRC_DIM_BSDF_X,
+    TRC_DIM_BSDF_Y,
     TRC_DIMS_PER_BOUNCE
 };
 
 struct trc_sampler {
-    uint32_t kind;          /* TRC_SAMPLER_* */
+    uint32_t kind; /* TRC_SAMPLER_* */
     uint32_t seed;
-    uint32_t sample_count;  /* planned per pixel */
-    const uint32_t *table;  /* Sobol numbers: trc_sobol_table_create, sampling/sobol.h */
+    uint32_t sample_count; /* planned per pixel */
+    const uint32_t *table; /* Sobol numbers: trc_sobol_table_create, sampling/sobol.h */
 };
 
-/* u in [0, 1) for each lane: pixel = number of the pixel (x | y << 16), index = sample number, below
- * 2^30. Lanes may differ in both. One number costs about 3 instructions per lane at 16 lanes; the table is
- * read with one load where index is uniform and the dimension belongs to the joint ones. */
+/* u in [0, 1) for each lane: pixel = number of the pixel (x | y << 16), index = sample number,
+ * below 2^30. Lanes may differ in both. One number costs about 3 instructions per lane at 16 lanes;
+ * the table is read with one load where index is uniform and the dimension belongs to the joint
+ * ones. */
 vfloat TRC_KERNEL(trc_sample)(const struct trc_sampler *sampler, vuint pixel, vuint index,
                               uint32_t dimension);
 

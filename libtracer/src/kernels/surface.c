@@ -46,7 +46,8 @@ static void load_uniform(const struct trc_surface *s, const struct trc_instance 
         out->smooth = vm_none();
 }
 
-/* One lane: 9 positions, 9 normals, 12 elements. Returns 1 for smooth, 2 for a mirrored instance. */
+/* One lane: 9 positions, 9 normals, 12 elements. Returns 1 for smooth, 2 for a mirrored
+ * instance. */
 static uint32_t load_lane(const struct trc_surface *s, int lane, float p[9], float n[9],
                           float m[12]) {
     const struct trc_instance *instance = &s->snapshot->instances[vi_get(s->instance, lane)];
@@ -88,8 +89,8 @@ static void load_mixed(const struct trc_surface *s, struct raw_hit *out) {
                               trc_column_of(p, 9, 3 * k + 2));
         out->n.corner[k] = v3(trc_column_of(n, 9, 3 * k), trc_column_of(n, 9, 3 * k + 1),
                               trc_column_of(n, 9, 3 * k + 2));
-        out->m.column[k] = v3(trc_column_of(m, 12, k), trc_column_of(m, 12, 4 + k),
-                              trc_column_of(m, 12, 8 + k));
+        out->m.column[k] =
+            v3(trc_column_of(m, 12, k), trc_column_of(m, 12, 4 + k), trc_column_of(m, 12, 8 + k));
     }
     out->m.origin = v3(trc_column_of(m, 12, 3), trc_column_of(m, 12, 7), trc_column_of(m, 12, 11));
     out->smooth = vm_from_bits(smooth);
@@ -98,18 +99,19 @@ static void load_mixed(const struct trc_surface *s, struct raw_hit *out) {
 
 /* ---- arithmetic ---- */
 
-/* Object position v0 + u e1 + v e2, and a bound of how far it is from the plane of the float corners, in the
- * manner of M. Pharr, W. Jakob and G. Humphreys, "Physically Based Rendering", 3.9 and 6.8: with
- * e = 2^-24, gamma(n) = n e / (1 - n e).
+/* Object position v0 + u e1 + v e2, and a bound of how far it is from the plane of the float
+ * corners, in the manner of M. Pharr, W. Jakob and G. Humphreys, "Physically Based Rendering", 3.9
+ * and 6.8: with e = 2^-24, gamma(n) = n e / (1 - n e).
  *
- * e1, e2 are rounded differences (1 e each); a product adds 1 e, the two sums at most 2 e to each of their
- * terms: the u and v terms carry gamma(4), v0 gamma(2). That the barycentrics are rounded does not matter,
- * any u, v give a point of the plane. The world point M p adds, per axis, gamma(3) of |M||p| and
- * gamma(1) of the translation in the sum (one product, at most three sums), and carries the object bound
- * through |M| with its own rounding, gamma(3) of it, which the last digit below covers. Trees over world-space
- * meshes are built from corners M v that were rounded themselves: gamma(4) of |M||v| + |t|, and the hit
- * is on the triangle of those; hence gamma(3) + gamma(4) on the world terms. */
-#define GAMMA(n) ((n) * 0x1p-24f / (1.0f - (n) * 0x1p-24f))
+ * e1, e2 are rounded differences (1 e each); a product adds 1 e, the two sums at most 2 e to each
+ * of their terms: the u and v terms carry gamma(4), v0 gamma(2). That the barycentrics are rounded
+ * does not matter, any u, v give a point of the plane. The world point M p adds, per axis, gamma(3)
+ * of |M||p| and gamma(1) of the translation in the sum (one product, at most three sums), and
+ * carries the object bound through |M| with its own rounding, gamma(3) of it, which the last digit
+ * below covers. Trees over world-space meshes are built from corners M v that were rounded
+ * themselves: gamma(4) of |M||v| + |t|, and the hit is on the triangle of those; hence gamma(3) +
+ * gamma(4) on the world terms. */
+#define GAMMA(n) ((n)*0x1p-24f / (1.0f - (n)*0x1p-24f))
 
 static void set_position(struct trc_surface *s, const struct raw_hit *h, vvec3 e1, vvec3 e2) {
     const vvec3 v0 = h->p.corner[0];
@@ -121,8 +123,8 @@ static void set_position(struct trc_surface *s, const struct raw_hit *h, vvec3 e
                            g2 * vf_abs(v0.z) + g4 * (vf_abs(u1.z) + vf_abs(v2.z)));
     s->p = trc_transform_point(&h->m, p);
     /* |M| (bound + g7 |p|) + g7 |t| */
-    const vvec3 reach = v3(bound.x + g7 * vf_abs(p.x), bound.y + g7 * vf_abs(p.y),
-                           bound.z + g7 * vf_abs(p.z));
+    const vvec3 reach =
+        v3(bound.x + g7 * vf_abs(p.x), bound.y + g7 * vf_abs(p.y), bound.z + g7 * vf_abs(p.z));
     const vvec3 *c = h->m.column;
     s->p_error = v3(vf_abs(c[0].x) * reach.x + vf_abs(c[1].x) * reach.y + vf_abs(c[2].x) * reach.z +
                         g7 * vf_abs(h->m.origin.x),
@@ -137,8 +139,9 @@ static vvec3 scaled_to_one(vvec3 a) {
     return v3_scale(a, vf_divide(vf_one(), v3_max(v3(vf_abs(a.x), vf_abs(a.y), vf_abs(a.z)))));
 }
 
-/* A normal goes by the inverse transpose, which is the matrix of cofactors over the determinant; its columns are
- * cross products of the columns of M. Only the sign of the determinant matters here. */
+/* A normal goes by the inverse transpose, which is the matrix of cofactors over the determinant;
+ * its columns are cross products of the columns of M. Only the sign of the determinant matters
+ * here. */
 static vvec3 transform_normal(const struct trc_wide_affine *m, vvec3 n) {
     vvec3 c[3];
     vfloat most = vf_zero();
@@ -165,8 +168,8 @@ static void set_normals(struct trc_surface *s, const struct raw_hit *h, vvec3 e1
     vvec3 n = ng;
     if (vm_any(h->smooth)) {
         const vfloat w = vf_one() - s->u - s->v;
-        vvec3 sum = v3_mad(h->n.corner[0], w,
-                           v3_mad(h->n.corner[1], s->u, v3_scale(h->n.corner[2], s->v)));
+        vvec3 sum =
+            v3_mad(h->n.corner[0], w, v3_mad(h->n.corner[1], s->u, v3_scale(h->n.corner[2], s->v)));
         sum = v3_normalize(v3_scale(transform_normal(&h->m, sum), sign));
         const vmask usable = vm_and(h->smooth, vf_gt(v3_dot(sum, sum), vf_set(0.5f)));
         n = v3_select(usable, sum, ng);

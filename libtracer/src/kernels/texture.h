@@ -1,9 +1,9 @@
 /* Image lookups for TRC_WIDTH places at once: one image, any coordinates.
  *
- * Filters and extensions are those of Cycles 3.4: B-spline weights for cubic, texels outside a clipped
- * image count as transparent black, sRGB is decoded after filtering. Coordinates may be huge or not
- * finite: NaN reads as 0. Only level 0 is read; a later choice of level by footprint belongs in
- * texture_lookup, the filters take any level. */
+ * Filters and extensions are those of Cycles 3.4: B-spline weights for cubic, texels outside a
+ * clipped image count as transparent black, sRGB is decoded after filtering. Coordinates may be
+ * huge or not finite: NaN reads as 0. Only level 0 is read; a later choice of level by footprint
+ * belongs in texture_lookup, the filters take any level. */
 #ifndef TRACER_KERNELS_TEXTURE_H
 #define TRACER_KERNELS_TEXTURE_H
 
@@ -53,16 +53,17 @@ TRC_INLINE void texel_load(const struct trc_image *image, const void *texels, vi
         break;
     case TRC_TEXEL_F32:
     default:
-        for (int c = 0; c < 4; c++) out[c] = vf_gather((const float *)texels + c, index << 2, lanes);
+        for (int c = 0; c < 4; c++)
+            out[c] = vf_gather((const float *)texels + c, index << 2, lanes);
         break;
     }
 }
 
 /* ---- coordinates ---- */
 
-/* Where a coordinate falls on a row of size texels: the texel at or before it (relative to centres if
- * centred) and how far beyond. Repeated and mirrored coordinates are brought into one period first:
- * that keeps their digits and the integers small. */
+/* Where a coordinate falls on a row of size texels: the texel at or before it (relative to centres
+ * if centred) and how far beyond. Repeated and mirrored coordinates are brought into one period
+ * first: that keeps their digits and the integers small. */
 TRC_INLINE vint axis_place(vfloat u, uint32_t size, uint32_t extension, bool centred, vfloat *t) {
     const vfloat zero = vf_zero(), count = vf_set((float)size);
     vfloat x;
@@ -80,9 +81,8 @@ TRC_INLINE vint axis_place(vfloat u, uint32_t size, uint32_t extension, bool cen
     return vf_to_int(whole);
 }
 
-/* Texel number i, up to two outside the period, within the image; clip: clamped, and left out of
- * inside. */
-TRC_INLINE vint axis_wrap(vint i, uint32_t size, uint32_t extension, vmask *inside) {
+/* Texel number i, up to two outside the period, within the image. */
+TRC_INLINE vint axis_wrap(vint i, uint32_t size, uint32_t extension) {
     const vint n = vi_set((int32_t)size), zero = vi_set(0), last = vi_set((int32_t)size - 1);
     if (extension == TRC_IMAGE_REPEAT || extension == TRC_IMAGE_MIRROR) {
         const vint period = extension == TRC_IMAGE_MIRROR ? n + n : n;
@@ -90,46 +90,23 @@ TRC_INLINE vint axis_wrap(vint i, uint32_t size, uint32_t extension, vmask *insi
             i = vi_select(vi_lt(i, zero), i + period, i);
             i = vi_select(vi_lt(i, period), i, i - period);
         }
-        if (extension == TRC_IMAGE_MIRROR) {
+        if (extension == TRC_IMAGE_MIRROR)
             i = vi_select(vi_lt(i, n), i, period - vi_set(1) - i);
-        }
     }
-    const vint bounded = vi_select(vi_lt(i, zero), zero, vi_select(vi_lt(last, i), last, i));
-    if (extension == TRC_IMAGE_CLIP) *inside = vm_and(*inside, vi_eq(bounded, i));
-    return bounded;
+    return vi_select(vi_lt(i, zero), zero, vi_select(vi_lt(last, i), last, i));
 }
 
-/* ---- filters: sums over texels, without the scale of integer formats ---- */
+/* ---- filters ---- */
 
-TRC_INLINE void texel_add(const struct trc_image *image, const struct trc_image_level *level,
-                          vint x, vint y, uint32_t extension, vfloat weight, vmask lanes,
-                          vfloat sum[4]) {
-    vfloat texel[4];
-    const vint column = axis_wrap(x, level->width, extension, &lanes);
-    const vint row = axis_wrap(y, level->height, extension, &lanes);
-    texel_load(image, level->texels, row * vi_set((int32_t)level->width) + column, lanes, texel);
-    for (int c = 0; c < 4; c++) sum[c] = sum[c] + weight * texel[c];
-}
+#define TRC_MAX_TAPS 4
 
-static void filter_closest(const struct trc_image *image, const struct trc_image_level *level,
-                           uint32_t extension, vfloat u, vfloat v, vmask lanes, vfloat sum[4]) {
-    vfloat t;
-    const vint x = axis_place(u, level->width, extension, false, &t);
-    const vint y = axis_place(v, level->height, extension, false, &t);
-    texel_add(image, level, x, y, extension, vf_one(), lanes, sum);
-}
-
-static void filter_linear(const struct trc_image *image, const struct trc_image_level *level,
-                          uint32_t extension, vfloat u, vfloat v, vmask lanes, vfloat sum[4]) {
-    vfloat tx, ty;
-    const vint x = axis_place(u, level->width, extension, true, &tx), x1 = x + vi_set(1);
-    const vint y = axis_place(v, level->height, extension, true, &ty), y1 = y + vi_set(1);
-    const vfloat one = vf_one(), sx = one - tx, sy = one - ty;
-    texel_add(image, level, x, y, extension, sy * sx, lanes, sum);
-    texel_add(image, level, x1, y, extension, sy * tx, lanes, sum);
-    texel_add(image, level, x, y1, extension, ty * sx, lanes, sum);
-    texel_add(image, level, x1, y1, extension, ty * tx, lanes, sum);
-}
+/* The columns (or rows) of texels that a filter reads, with their weights. inside: whether each is
+ * part of the image; only a clipped one has others. */
+struct axis_taps {
+    vint index[TRC_MAX_TAPS];
+    vfloat weight[TRC_MAX_TAPS];
+    vmask inside[TRC_MAX_TAPS];
+};
 
 /* Uniform cubic B-spline. */
 TRC_INLINE void cubic_weights(vfloat t, vfloat w[4]) {
@@ -140,16 +117,41 @@ TRC_INLINE void cubic_weights(vfloat t, vfloat w[4]) {
     w[3] = sixth * t * t * t;
 }
 
-static void filter_cubic(const struct trc_image *image, const struct trc_image_level *level,
-                         uint32_t extension, vfloat u, vfloat v, vmask lanes, vfloat sum[4]) {
-    vfloat tx, ty, wx[4], wy[4];
-    const vint x = axis_place(u, level->width, extension, true, &tx) - vi_set(1);
-    const vint y = axis_place(v, level->height, extension, true, &ty) - vi_set(1);
-    cubic_weights(tx, wx);
-    cubic_weights(ty, wy);
-    for (int j = 0; j < 4; j++) {
-        for (int i = 0; i < 4; i++) {
-            texel_add(image, level, x + vi_set(i), y + vi_set(j), extension, wy[j] * wx[i], lanes, sum);
+/* taps: 1 closest, 2 linear, 4 cubic. */
+TRC_INLINE void axis_prepare(vfloat u, uint32_t size, uint32_t extension, int taps,
+                             struct axis_taps *a) {
+    vfloat t;
+    const vint place = axis_place(u, size, extension, taps > 1, &t) - vi_set(taps > 2 ? 1 : 0);
+    for (int k = 0; k < taps; k++) {
+        const vint i = place + vi_set(k);
+        a->index[k] = axis_wrap(i, size, extension);
+        a->inside[k] = extension == TRC_IMAGE_CLIP ? vi_eq(a->index[k], i) : vm_all_set();
+    }
+    a->weight[0] = taps > 1 ? vf_one() - t : vf_one();
+    a->weight[1] = t;
+    if (taps == 4)
+        cubic_weights(t, a->weight);
+}
+
+/* Sum over the texels of a filter, without the scale of integer formats. */
+TRC_INLINE void filter_sum(const struct trc_image *image, const struct trc_image_level *level,
+                           uint32_t extension, int taps, vfloat u, vfloat v, vmask lanes,
+                           vfloat sum[4]) {
+    struct axis_taps x, y;
+    axis_prepare(u, level->width, extension, taps, &x);
+    axis_prepare(v, level->height, extension, taps, &y);
+    for (int c = 0; c < 4; c++)
+        sum[c] = vf_zero();
+    for (int j = 0; j < taps; j++) {
+        const vint row = y.index[j] * vi_set((int32_t)level->width);
+        const vmask row_lanes = vm_and(lanes, y.inside[j]);
+        for (int i = 0; i < taps; i++) {
+            vfloat texel[4];
+            const vfloat weight = y.weight[j] * x.weight[i];
+            texel_load(image, level->texels, row + x.index[i], vm_and(row_lanes, x.inside[i]),
+                       texel);
+            for (int c = 0; c < 4; c++)
+                sum[c] = sum[c] + weight * texel[c];
         }
     }
 }
@@ -188,24 +190,33 @@ static void texture_lookup(const struct trc_image *image, uint32_t mode, vfloat 
     }
     const struct trc_image_level *level = &image->levels[0];
     const uint32_t extension = mode & TRC_IMAGE_MODE_EXTENSION;
-    for (int c = 0; c < 4; c++) out[c] = vf_zero();
     switch (mode & TRC_IMAGE_MODE_INTERPOLATION) {
-    case TRC_IMAGE_CLOSEST: filter_closest(image, level, extension, u, v, lanes, out); break;
-    case TRC_IMAGE_CUBIC: filter_cubic(image, level, extension, u, v, lanes, out); break;
-    default: filter_linear(image, level, extension, u, v, lanes, out); break;
+    case TRC_IMAGE_CLOSEST:
+        filter_sum(image, level, extension, 1, u, v, lanes, out);
+        break;
+    case TRC_IMAGE_CUBIC:
+        filter_sum(image, level, extension, 4, u, v, lanes, out);
+        break;
+    default:
+        filter_sum(image, level, extension, 2, u, v, lanes, out);
+        break;
     }
     const bool is_integer = image->format == TRC_TEXEL_U8 || image->format == TRC_TEXEL_U16;
     if (is_integer) {
-        const vfloat scale = vf_set(image->format == TRC_TEXEL_U8 ? 1.0f / 255.0f : 1.0f / 65535.0f);
-        for (int c = 0; c < 4; c++) out[c] = out[c] * scale;
+        const vfloat scale =
+            vf_set(image->format == TRC_TEXEL_U8 ? 1.0f / 255.0f : 1.0f / 65535.0f);
+        for (int c = 0; c < 4; c++)
+            out[c] = out[c] * scale;
     }
     if ((mode & TRC_IMAGE_MODE_ALPHA) && image->is_associated) {
-        const vfloat inverse =
-            vf_select(vf_ne(out[3], vf_zero()), vf_rcp(out[3]), vf_one());
-        for (int c = 0; c < 3; c++) out[c] = out[c] * inverse;
+        const vfloat inverse = vf_select(vf_ne(out[3], vf_zero()), vf_rcp(out[3]), vf_one());
+        for (int c = 0; c < 3; c++)
+            out[c] = out[c] * inverse;
     }
-    if (!image->is_srgb) return;
-    for (int c = 0; c < 3; c++) out[c] = is_integer ? srgb_decode_unit(out[c]) : srgb_decode(out[c]);
+    if (!image->is_srgb)
+        return;
+    for (int c = 0; c < 3; c++)
+        out[c] = is_integer ? srgb_decode_unit(out[c]) : srgb_decode(out[c]);
 }
 
 #endif

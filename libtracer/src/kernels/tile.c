@@ -252,6 +252,7 @@ static void film_add(struct trc_tile *t) {
         combined[2] += (double)b;
         combined[3] += 1.0 - (double)t->samples.transparency[slot];
         const bool first = film->sample_counts[pixel]++ == 0;
+        if (!t->extra_passes) continue;
         for (uint32_t pass = 1; pass < TRC_PASS_SAMPLE_COUNT; pass++) {
             if (!t->samples.pass[pass][0]) continue;
             const uint32_t channels = trc_pass_channels(pass);
@@ -369,6 +370,7 @@ void TRC_KERNEL(trc_tile_render)(struct trc_tile_job *job) {
     t->desc = job->desc;
     t->sampler = (struct trc_sampler){job->desc->sampler, job->desc->seed, job->desc->sample_count,
                                       job->sampler_table};
+    t->extra_passes = job->desc->passes & ~(1ull << TRC_PASS_COMBINED);
     t->light_passes = wants_light_passes(job->desc);
     t->object_motion = job->snapshot->features & (TRC_FEATURE_OBJECT_MOTION | TRC_FEATURE_DEFORMATION);
     t->camera_common = job->snapshot->camera.aperture_radius <= 0.0f && job->snapshot->camera.key_count < 2 &&

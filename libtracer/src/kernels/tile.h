@@ -84,6 +84,7 @@ struct trc_tile {
     const struct trc_snapshot *snapshot;
     const trc_render_desc *desc;
     struct trc_sampler sampler;
+    bool extra_passes;    /* more than Combined */
     bool light_passes;    /* some pass wants light by kind */
     bool object_motion;   /* rays need times */
     bool camera_common;   /* camera rays start at one point */

@@ -1,13 +1,14 @@
 /* Elementary functions, hashes, frames and sampling warps on TRC_WIDTH lanes.
  *
- * No function here calls libm (square roots apart) and none branches on data, so every width gives the same
- * bits. Errors in units in the last place (ulp) are the bounds tests/kernels/test_wide_math.c holds them to.
- * Denormal results may be flushed to zero.
+ * No function here calls libm (square roots apart) and none branches on data, so every width gives
+ * the same bits. Errors in units in the last place (ulp) are the bounds
+ * tests/kernels/test_wide_math.c holds them to. Denormal results may be flushed to zero.
  *
- * Sources: S. L. Moshier, Cephes mathematical library 2.8 (1995), polynomials of sin, cos, exp, log, asin,
- * atan in single precision; W. J. Cody and W. Waite, "Software Manual for the Elementary Functions"
- * (1980), argument reduction; T. J. Dekker, "A floating-point technique for extending the available
- * precision" (1971), products in pow; M. Giles, "Approximating the erfinv function" (2012). */
+ * Sources: S. L. Moshier, Cephes mathematical library 2.8 (1995), polynomials of sin, cos, exp,
+ * log, asin, atan in single precision; W. J. Cody and W. Waite, "Software Manual for the Elementary
+ * Functions" (1980), argument reduction; T. J. Dekker, "A floating-point technique for extending
+ * the available precision" (1971), products in pow; M. Giles, "Approximating the erfinv function"
+ * (2012). */
 #ifndef TRACER_KERNELS_WIDE_MATH_H
 #define TRACER_KERNELS_WIDE_MATH_H
 
@@ -77,15 +78,15 @@ TRC_INLINE void vf_sincos_octant(vfloat r, vfloat *s, vfloat *c) {
 /* Turns sin and cos of the remainder into those of remainder + quadrant * pi/2. */
 TRC_INLINE void vf_sincos_quadrant(vint quadrant, vfloat s, vfloat c, vfloat *sin_out,
                                    vfloat *cos_out) {
-    const vint sin_sign = (quadrant & vi_set(2)) << 30;
-    const vint cos_sign = ((quadrant + vi_set(1)) & vi_set(2)) << 30;
+    const vint sin_sign = (vint)((vuint)(quadrant & vi_set(2)) << 30);
+    const vint cos_sign = (vint)((vuint)((quadrant + vi_set(1)) & vi_set(2)) << 30);
     const vmask swap = vi_eq(quadrant & vi_set(1), vi_set(1));
     *sin_out = vi_as_float(vf_as_int(vf_select(swap, c, s)) ^ sin_sign);
     *cos_out = vi_as_float(vf_as_int(vf_select(swap, s, c)) ^ cos_sign);
 }
 
-/* 2 ulp for |x| <= 8192 (near multiples of pi/2: absolute error 2^-24 instead); larger arguments lose digits
- * in proportion. */
+/* 2 ulp for |x| <= 8192 (near multiples of pi/2: absolute error 2^-24 instead); larger arguments
+ * lose digits in proportion. */
 TRC_INLINE void vf_sincos(vfloat x, vfloat *s, vfloat *c) {
     const vfloat q = vf_round(vf_clamp(x * vf_set(0.636619772367581f), -4.0e6f, 4.0e6f));
     /* pi/2 in three parts of at most 11 bits each but the last: products with q are exact. */
@@ -96,7 +97,8 @@ TRC_INLINE void vf_sincos(vfloat x, vfloat *s, vfloat *c) {
     vf_sincos_octant(r, &rs, &rc);
     vf_sincos_quadrant(vf_to_int(q), rs, rc, s, c);
 }
-/* sin and cos of 2 pi turns, 2 ulp for |turns| < 2^20: for sampling, where angles come as fractions. */
+/* sin and cos of 2 pi turns, 2 ulp for |turns| < 2^20: for sampling, where angles come as
+ * fractions. */
 TRC_INLINE void vf_sincos_turns(vfloat turns, vfloat *s, vfloat *c) {
     const vfloat q = vf_round(turns * vf_set(4.0f));
     vfloat rs, rc;
@@ -274,7 +276,8 @@ TRC_INLINE vfloat vf_product_low(vfloat a, vfloat b, vfloat high) {
 TRC_INLINE void vf_log2_split(vfloat x, vfloat *high, vfloat *low) {
     vfloat e;
     const vfloat m = vf_split_exponent(x, &e);
-    /* log2 m = 2/ln2 (s + s^3/3 + s^5/5 + ...), s = (m - 1) / (m + 1); only s needs a second word. */
+    /* log2 m = 2/ln2 (s + s^3/3 + s^5/5 + ...), s = (m - 1) / (m + 1); only s needs a second
+     * word. */
     const vfloat f = m - vf_one();
     const vfloat d = m + vf_one(), d_low = m - (d - vf_one());
     const vfloat s = f / d;
@@ -301,7 +304,8 @@ TRC_INLINE vfloat vf_log2(vfloat x) {
     vf_log2_split(vf_max(x, vf_set(1e-45f)), &high, &low);
     return vf_log_special(x, high);
 }
-/* x^y for x >= 0, 4 ulp; 0^y is 0 for y > 0, 1 for y == 0, infinite for y < 0. Negative x is NaN. */
+/* x^y for x >= 0, 4 ulp; 0^y is 0 for y > 0, 1 for y == 0, infinite for y < 0. Negative x is
+ * NaN. */
 TRC_INLINE vfloat vf_pow(vfloat x, vfloat y) {
     vfloat high, low;
     vf_log2_split(vf_max(x, vf_set(1e-45f)), &high, &low);
@@ -315,7 +319,8 @@ TRC_INLINE vfloat vf_pow(vfloat x, vfloat y) {
     return vf_select(vf_eq(y, vf_zero()), vf_one(), r);
 }
 
-/* Error function, absolute error 7e-7 (Abramowitz and Stegun 1964, 7.1.26 has 1.5e-7 before rounding). */
+/* Error function, absolute error 7e-7 (Abramowitz and Stegun 1964, 7.1.26 has 1.5e-7 before
+ * rounding). */
 TRC_INLINE vfloat vf_erf(vfloat x) {
     const vfloat a = vf_min(vf_abs(x), vf_set(6.0f));
     const vfloat t = vf_rcp(vf_one() + vf_set(0.3275911f) * a);
@@ -370,7 +375,9 @@ TRC_INLINE uint32_t trc_hash(uint32_t x) {
     x *= 0xd35a2d97u;
     return x ^ (x >> 15);
 }
-TRC_INLINE vuint vu_hash2(vuint a, vuint b) { return vu_hash(a ^ (vu_hash(b) + vu_set(0x9e3779b9u))); }
+TRC_INLINE vuint vu_hash2(vuint a, vuint b) {
+    return vu_hash(a ^ (vu_hash(b) + vu_set(0x9e3779b9u)));
+}
 
 /* ---- frames ---- */
 
@@ -396,8 +403,8 @@ TRC_INLINE vvec3 v3_reflect(vvec3 v, vvec3 m) {
 
 /* ---- warps of the unit square ---- */
 
-/* Unit disk, area-preserving and continuous: P. Shirley and K. Chiu, "A Low Distortion Map Between Disk
- * and Square" (1997). */
+/* Unit disk, area-preserving and continuous: P. Shirley and K. Chiu, "A Low Distortion Map Between
+ * Disk and Square" (1997). */
 TRC_INLINE void trc_warp_disk(vfloat u1, vfloat u2, vfloat *x, vfloat *y) {
     const vfloat a = vf_set(2.0f) * u1 - vf_one(), b = vf_set(2.0f) * u2 - vf_one();
     const vmask wide = vf_gt(a * a, b * b);
@@ -431,8 +438,8 @@ TRC_INLINE vvec3 trc_warp_cone(vfloat cos_max, vfloat u1, vfloat u2) {
     const vfloat r = vf_safe_sqrt((vf_one() - z) * (vf_one() + z));
     return v3(r * c, r * s, z);
 }
-/* Barycentrics of the second and third vertex, uniform by area: E. Heitz, "A Low-Distortion Map Between
- * Triangle and Square" (2019). */
+/* Barycentrics of the second and third vertex, uniform by area: E. Heitz, "A Low-Distortion Map
+ * Between Triangle and Square" (2019). */
 TRC_INLINE void trc_warp_triangle(vfloat u1, vfloat u2, vfloat *b1, vfloat *b2) {
     const vmask upper = vf_gt(u2, u1);
     const vfloat half1 = vf_set(0.5f) * u1, half2 = vf_set(0.5f) * u2;

@@ -6,7 +6,8 @@
 #include "kernels/wide_math.h"
 
 /* A shading point as Cycles gives it to the world: the position is the direction, the normals look
- * back. A ray that is not the camera's counts as one bounce deep. */
+ * back, and it lies one bounce beyond what the ray left; a ray that is not the camera's has one behind
+ * it. */
 static void world_surface(const struct trc_snapshot *snapshot, vvec3 direction, vuint path,
                           vmask active, struct trc_surface *s) {
     const vvec3 back = v3_neg(direction);
@@ -23,20 +24,23 @@ static void world_surface(const struct trc_snapshot *snapshot, vvec3 direction, 
         .wo = back,
         .backfacing = vm_none(),
         .path = path,
-        .depth = vi_select(vi_eq(camera, vi_set(0)), vi_set(1), vi_set(0)),
+        .depth = vi_select(vi_eq(camera, vi_set(0)), vi_set(2), vi_set(1)),
     };
 }
 
 vvec3 TRC_KERNEL(trc_world_shade)(const struct trc_snapshot *snapshot, vvec3 direction, vuint path,
                                   vmask active) {
     const struct trc_world *world = &snapshot->world;
-    if (world->material == UINT32_MAX) return v3_zero();
-    if (world->is_constant) return v3_where(active, v3_set(world->radiance));
+    if (world->material == UINT32_MAX)
+        return v3_zero();
+    if (world->is_constant)
+        return v3_where(active, v3_set(world->radiance));
     const struct trc_material *m = snapshot->materials[world->material];
     struct trc_surface s;
     struct trc_registers regs;
     world_surface(snapshot, direction, path, active, &s);
-    if (m->instruction_count) TRC_KERNEL(trc_program_run)(m, &s, &regs);
+    if (m->instruction_count)
+        TRC_KERNEL(trc_program_run)(m, &s, &regs);
     return v3_where(active, TRC_KERNEL(trc_lobes_emission)(m, &regs));
 }
 
@@ -54,7 +58,8 @@ void TRC_KERNEL(trc_world_evaluate)(const struct trc_snapshot *snapshot, const f
         vf_store(rgb[1], c.y);
         vf_store(rgb[2], c.z);
         for (uint32_t i = 0; i < n; i++) {
-            for (int k = 0; k < 3; k++) radiance[3 * ((size_t)first + i) + k] = rgb[k][i];
+            for (int k = 0; k < 3; k++)
+                radiance[3 * ((size_t)first + i) + k] = rgb[k][i];
         }
     }
 }

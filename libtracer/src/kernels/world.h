@@ -5,9 +5,9 @@
 #include "kernels/simd.h"
 #include "scene/snapshot.h"
 
-/* What rays that leave the scene along direction (unit) see, 0 in lanes that are not active; path is
- * TRC_VISIBLE_* | TRC_PATH_* for the Light Path node. The world's visibility is the caller's business.
- * A constant world costs a broadcast. */
+/* What rays that leave the scene along direction (unit) see, 0 in lanes that are not active; path
+ * is TRC_VISIBLE_* | TRC_PATH_* for the Light Path node. The world's visibility is the caller's
+ * business. A constant world costs a broadcast. */
 vvec3 TRC_KERNEL(trc_world_shade)(const struct trc_snapshot *snapshot, vvec3 direction, vuint path,
                                   vmask active);
 

@@ -2,8 +2,8 @@
 
 #include "core/core.h"
 
-/* Rows of Joe and Kuo's file new-joe-kuo-6: degree s of the primitive polynomial, its inner coefficients a,
- * initial direction numbers m. Row 0 stands for the van der Corput sequence. */
+/* Rows of Joe and Kuo's file new-joe-kuo-6: degree s of the primitive polynomial, its inner
+ * coefficients a, initial direction numbers m. Row 0 stands for the van der Corput sequence. */
 struct direction_seed {
     uint8_t s, a;
     uint8_t m[7];
@@ -28,13 +28,13 @@ static const struct direction_seed seeds[TRC_SOBOL_DIMENSIONS] = {
     {6, 19, {1, 1, 1, 15, 7, 5}},
 };
 
-/* Row of seeds for each dimension of enum trc_dimension. Rows 0 and 1 are a perfect (0,2)-sequence and serve
- * the place on the light at the first hit; for the other pairs the sum of their t-values over the first
- * 2^2 to 2^10 points is 8 or 9, against 13 for an average pair of rows. */
+/* Row of seeds for each dimension of enum trc_dimension. Rows 0 and 1 are a perfect (0,2)-sequence
+ * and serve the place on the light at the first hit; for the other pairs the sum of their t-values
+ * over the first 2^2 to 2^10 points is 8 or 9, against 13 for an average pair of rows. */
 static const uint8_t row_of[TRC_SOBOL_DIMENSIONS] = {
-    5, 7,               /* pixel */
-    2, 3,               /* lens */
-    11,                 /* time */
+    5,  7,                /* pixel */
+    2,  3,                /* lens */
+    11,                   /* time */
     9,  0,  1,  12, 4, 6, /* first hit: light, place on it, lobe, direction */
     16, 10, 13, 14, 8, 15 /* second hit */
 };
@@ -47,8 +47,8 @@ static uint32_t reverse_bits(uint32_t x) {
     return ((x >> 1) & 0x55555555u) | ((x & 0x55555555u) << 1);
 }
 
-/* v[i]: what bit i of the index contributes, first binary digit in bit 31. The recurrence is eq. 2 of
- * the paper. */
+/* v[i]: what bit i of the index contributes, first binary digit in bit 31. The recurrence is eq. 2
+ * of the paper. */
 static void direction_numbers(const struct direction_seed *seed, uint32_t v[32]) {
     const uint32_t s = seed->s;
     if (s == 0) {
@@ -56,7 +56,7 @@ static void direction_numbers(const struct direction_seed *seed, uint32_t v[32])
             v[i] = 1u << (31 - i);
         return;
     }
-    for (uint32_t i = 0; i < s; i++)
+    for (uint32_t i = 0; i < s && i < sizeof seed->m; i++)
         v[i] = (uint32_t)seed->m[i] << (31 - i);
     for (uint32_t i = s; i < 32; i++) {
         v[i] = v[i - s] ^ (v[i - s] >> s);

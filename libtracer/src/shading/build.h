@@ -11,13 +11,13 @@
 /* ---- what is known of node types (shading/nodes.c) ---- */
 
 /* Kinds of inputs: f float, c colour or vector, s shader; with a default when node is -2: n normal,
- * t tangent (of leaves), u UV, g Generated, p position. Kinds of outputs: f float, c colour, v vector,
- * s shader. */
+ * t tangent (of leaves), u UV, g Generated, p position. Kinds of outputs: f float, c colour, v
+ * vector, s shader. */
 struct trc_node_info {
     uint32_t type;
     const char *name;
-    const char *inputs;        /* one letter each */
-    const char *input_names;   /* separated by spaces */
+    const char *inputs;      /* one letter each */
+    const char *input_names; /* separated by spaces */
     const char *outputs;
 };
 
@@ -66,9 +66,9 @@ trc_status trc_material_validate(const trc_material_desc *desc);
 struct trc_build_op {
     uint16_t op, mode;
     uint32_t resource;
-    uint32_t first_input;      /* into inputs */
-    uint32_t first_value;      /* outputs are values first_value... */
-    uint32_t next;             /* with the same hash, UINT32_MAX: none */
+    uint32_t first_input; /* into inputs */
+    uint32_t first_value; /* outputs are values first_value... */
+    uint32_t next;        /* with the same hash, UINT32_MAX: none */
     bool is_live;
 };
 
@@ -84,7 +84,7 @@ struct trc_build {
     float *tables;
     uint32_t table_count, table_capacity;
     uint32_t value_count;
-    uint8_t *value_is_live;      /* by trc_build_mark */
+    uint8_t *value_is_live; /* by trc_build_mark */
     uint32_t buckets[TRC_BUILD_BUCKETS];
     struct trc_operand *outputs; /* of nodes: three per colour or vector, one per float */
     uint32_t *first_output;      /* of each node, into outputs */
@@ -105,9 +105,9 @@ static inline bool trc_is_value(struct trc_operand o, float value) {
 uint32_t trc_op_inputs(uint32_t op);
 uint32_t trc_op_outputs(uint32_t op);
 
-/* Values of an operation: constants when all inputs are, those of an equal operation if there is one,
- * else new ones. outputs has room for trc_op_outputs(op) and may overlap inputs. OUT_OF_MEMORY, TOO_LARGE.
- * (shading/fold.c) */
+/* Values of an operation: constants when all inputs are, those of an equal operation if there is
+ * one, else new ones. outputs has room for trc_op_outputs(op) and may overlap inputs.
+ * OUT_OF_MEMORY, TOO_LARGE. (shading/fold.c) */
 trc_status trc_build_op(struct trc_build *b, uint32_t op, uint32_t mode, uint32_t resource,
                         const struct trc_operand *inputs, struct trc_operand *outputs);
 /* A TRC_OP_MATH; inputs that the mode does not read are ignored. (shading/fold.c) */

@@ -50,9 +50,11 @@ trc_status trc_material_compile(const trc_material_desc *desc,
     } else {
         trc_fail(status, "no memory to compile a material");
     }
-    if (b) build_free(b);
+    if (b)
+        build_free(b);
     if (status != TRC_OK) {
-        if (m) material_free(m);
+        if (m)
+            material_free(m);
         return status;
     }
     *material_out = m;
@@ -60,12 +62,14 @@ trc_status trc_material_compile(const trc_material_desc *desc,
 }
 
 struct trc_material *trc_material_retain(struct trc_material *material) {
-    if (material) atomic_fetch_add_explicit(&material->refs, 1, memory_order_relaxed);
+    if (material)
+        atomic_fetch_add_explicit(&material->refs, 1, memory_order_relaxed);
     return material;
 }
 
 void trc_material_release(struct trc_material *material) {
-    if (!material) return;
+    if (!material)
+        return;
     if (atomic_fetch_sub_explicit(&material->refs, 1, memory_order_acq_rel) == 1) {
         material_free(material);
     }

@@ -17,20 +17,24 @@ static trc_status no_memory(void) {
 
 static void mark_operands(struct trc_build *b, const struct trc_operand *operands, uint32_t count) {
     for (uint32_t i = 0; i < count; i++) {
-        if (operands[i].reg >= 0) b->value_is_live[operands[i].reg] = 1;
+        if (operands[i].reg >= 0)
+            b->value_is_live[operands[i].reg] = 1;
     }
 }
 
 trc_status trc_build_mark(struct trc_build *b) {
     b->value_is_live = trc_alloc_zeroed(b->value_count, 1);
-    if (!b->value_is_live) return no_memory();
+    if (!b->value_is_live)
+        return no_memory();
     mark_operands(b, b->leaf_operands, b->leaf_operand_count);
-    for (uint32_t i = 0; i < b->leaf_count; i++) mark_operands(b, &b->leaves[i].weight, 1);
+    for (uint32_t i = 0; i < b->leaf_count; i++)
+        mark_operands(b, &b->leaves[i].weight, 1);
     for (uint32_t i = b->op_count; i-- > 0;) {
         struct trc_build_op *o = &b->ops[i];
         const uint8_t *live = b->value_is_live + o->first_value;
         o->is_live = memchr(live, 1, trc_op_outputs(o->op)) != NULL;
-        if (!o->is_live) continue;
+        if (!o->is_live)
+            continue;
         mark_operands(b, b->inputs + o->first_input, trc_op_inputs(o->op));
         if ((o->op == TRC_OP_IMAGE || o->op == TRC_OP_IMAGE_BOX) && live[3]) {
             o->mode |= TRC_IMAGE_MODE_ALPHA;
@@ -43,27 +47,32 @@ trc_status trc_build_mark(struct trc_build *b) {
 
 struct registers {
     const struct trc_build *b;
-    uint32_t *last_use;     /* of each value */
-    uint16_t *reg;          /* of each value */
+    uint32_t *last_use; /* of each value */
+    uint16_t *reg;      /* of each value */
     uint8_t taken[TRC_MAX_REGISTERS];
-    uint32_t count;         /* highest one in use so far + 1 */
+    uint32_t count; /* highest one in use so far + 1 */
 };
 
 static void find_last_uses(struct registers *r) {
     const struct trc_build *b = r->b;
-    for (uint32_t i = 0; i < b->value_count; i++) r->last_use[i] = NEVER_USED;
+    for (uint32_t i = 0; i < b->value_count; i++)
+        r->last_use[i] = NEVER_USED;
     for (uint32_t i = 0; i < b->op_count; i++) {
-        if (!b->ops[i].is_live) continue;
+        if (!b->ops[i].is_live)
+            continue;
         const struct trc_operand *in = b->inputs + b->ops[i].first_input;
         for (uint32_t k = 0; k < trc_op_inputs(b->ops[i].op); k++) {
-            if (in[k].reg >= 0) r->last_use[in[k].reg] = i;
+            if (in[k].reg >= 0)
+                r->last_use[in[k].reg] = i;
         }
     }
     for (uint32_t i = 0; i < b->leaf_operand_count; i++) {
-        if (b->leaf_operands[i].reg >= 0) r->last_use[b->leaf_operands[i].reg] = USED_BY_LEAF;
+        if (b->leaf_operands[i].reg >= 0)
+            r->last_use[b->leaf_operands[i].reg] = USED_BY_LEAF;
     }
     for (uint32_t i = 0; i < b->leaf_count; i++) {
-        if (b->leaves[i].weight.reg >= 0) r->last_use[b->leaves[i].weight.reg] = USED_BY_LEAF;
+        if (b->leaves[i].weight.reg >= 0)
+            r->last_use[b->leaves[i].weight.reg] = USED_BY_LEAF;
     }
 }
 
@@ -72,24 +81,27 @@ static uint32_t take(struct registers *r, uint32_t count) {
     uint32_t run = 0;
     for (uint32_t i = 0; i < TRC_MAX_REGISTERS; i++) {
         run = r->taken[i] ? 0 : run + 1;
-        if (run < count) continue;
+        if (run < count)
+            continue;
         const uint32_t first = i + 1 - count;
         memset(r->taken + first, 1, count);
-        if (i + 1 > r->count) r->count = i + 1;
+        if (i + 1 > r->count)
+            r->count = i + 1;
         return first;
     }
     return UINT32_MAX;
 }
 
-/* Registers of one operation's outputs. Those of inputs that it is the last to read are free for them:
- * kernels copy inputs before they write. */
+/* Registers of one operation's outputs. Those of inputs that it is the last to read are free for
+ * them: kernels copy inputs before they write. */
 static trc_status place_op(struct registers *r, uint32_t index) {
     const struct trc_build *b = r->b;
     const struct trc_build_op *o = &b->ops[index];
     const struct trc_operand *in = b->inputs + o->first_input;
     const uint32_t count = trc_op_outputs(o->op);
     for (uint32_t k = 0; k < trc_op_inputs(o->op); k++) {
-        if (in[k].reg >= 0 && r->last_use[in[k].reg] == index) r->taken[r->reg[in[k].reg]] = 0;
+        if (in[k].reg >= 0 && r->last_use[in[k].reg] == index)
+            r->taken[r->reg[in[k].reg]] = 0;
     }
     const uint32_t first = take(r, count);
     if (first == UINT32_MAX) {
@@ -99,7 +111,8 @@ static trc_status place_op(struct registers *r, uint32_t index) {
     }
     for (uint32_t k = 0; k < count; k++) {
         r->reg[o->first_value + k] = (uint16_t)(first + k);
-        if (r->last_use[o->first_value + k] == NEVER_USED) r->taken[first + k] = 0;
+        if (r->last_use[o->first_value + k] == NEVER_USED)
+            r->taken[first + k] = 0;
     }
     return TRC_OK;
 }
@@ -107,7 +120,8 @@ static trc_status place_op(struct registers *r, uint32_t index) {
 /* ---- output ---- */
 
 static struct trc_operand placed(const struct registers *r, struct trc_operand o) {
-    if (o.reg >= 0) o.reg = r->reg[o.reg];
+    if (o.reg >= 0)
+        o.reg = r->reg[o.reg];
     return o;
 }
 
@@ -115,7 +129,8 @@ static struct trc_operand placed(const struct registers *r, struct trc_operand o
 static uint32_t copy_table(const struct trc_build *b, uint32_t first, struct trc_material *m) {
     const uint32_t floats = 4 * TRC_RAMP_SIZE;
     for (uint32_t i = 0; i < m->table_count; i += floats) {
-        if (memcmp(m->tables + i, b->tables + first, floats * sizeof(float)) == 0) return i;
+        if (memcmp(m->tables + i, b->tables + first, floats * sizeof(float)) == 0)
+            return i;
     }
     memcpy(m->tables + m->table_count, b->tables + first, floats * sizeof(float));
     m->table_count += floats;
@@ -134,7 +149,8 @@ static void write_op(const struct registers *r, const struct trc_build_op *o,
         .first_input = m->operand_count,
         .resource = o->op == TRC_OP_RAMP ? copy_table(r->b, o->resource, m) : o->resource,
     };
-    for (uint32_t k = 0; k < count; k++) m->operands[m->operand_count++] = placed(r, in[k]);
+    for (uint32_t k = 0; k < count; k++)
+        m->operands[m->operand_count++] = placed(r, in[k]);
 }
 
 static void write_leaves(const struct registers *r, struct trc_material *m) {
@@ -156,10 +172,12 @@ static void write_leaves(const struct registers *r, struct trc_material *m) {
 static trc_status make_room(const struct trc_build *b, struct trc_material *m) {
     uint32_t ops = 0, operands = b->leaf_operand_count, tables = 0;
     for (uint32_t i = 0; i < b->op_count; i++) {
-        if (!b->ops[i].is_live) continue;
+        if (!b->ops[i].is_live)
+            continue;
         ops++;
         operands += trc_op_inputs(b->ops[i].op);
-        if (b->ops[i].op == TRC_OP_RAMP) tables = b->table_count;
+        if (b->ops[i].op == TRC_OP_RAMP)
+            tables = b->table_count;
     }
     m->operands = operands ? trc_alloc(operands, sizeof *m->operands) : NULL;
     m->instructions = ops ? trc_alloc(ops, sizeof *m->instructions) : NULL;
@@ -175,7 +193,8 @@ static trc_status emit(struct registers *r, struct trc_material *m) {
     TRC_TRY(make_room(b, m));
     find_last_uses(r);
     for (uint32_t i = 0; i < b->op_count; i++) {
-        if (!b->ops[i].is_live) continue;
+        if (!b->ops[i].is_live)
+            continue;
         TRC_TRY(place_op(r, i));
         write_op(r, &b->ops[i], m);
     }

@@ -1,4 +1,5 @@
-/* Operations of a material under compilation: folded where inputs are constants, shared where equal. */
+/* Operations of a material under compilation: folded where inputs are constants, shared where
+ * equal. */
 #include <string.h>
 
 #include "core/checks.h"
@@ -21,12 +22,16 @@ uint32_t trc_op_inputs(uint32_t op) { return op_infos[op].inputs; }
 uint32_t trc_op_outputs(uint32_t op) { return op_infos[op].outputs; }
 
 trc_status trc_build_reserve(void **array, uint32_t *capacity, uint32_t needed, size_t size) {
-    if (needed <= *capacity) return TRC_OK;
+    if (needed <= *capacity)
+        return TRC_OK;
     uint32_t room = *capacity ? *capacity : 64;
-    while (room < needed) room *= 2;
+    while (room < needed)
+        room *= 2;
     void *block = trc_alloc(room, size);
-    if (!block) return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory to compile a material");
-    if (*capacity) memcpy(block, *array, *capacity * size);
+    if (!block)
+        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory to compile a material");
+    if (*capacity)
+        memcpy(block, *array, *capacity * size);
     trc_free(*array);
     *array = block;
     *capacity = room;
@@ -35,7 +40,8 @@ trc_status trc_build_reserve(void **array, uint32_t *capacity, uint32_t needed, 
 
 static bool all_constant(const struct trc_operand *inputs, uint32_t count) {
     for (uint32_t i = 0; i < count; i++) {
-        if (!trc_is_constant(inputs[i])) return false;
+        if (!trc_is_constant(inputs[i]))
+            return false;
     }
     return true;
 }
@@ -43,30 +49,41 @@ static bool all_constant(const struct trc_operand *inputs, uint32_t count) {
 static void fold(const struct trc_build *b, uint32_t op, uint32_t mode, uint32_t resource,
                  const struct trc_operand *inputs, struct trc_operand *outputs) {
     float in[TRC_OP_MAX_INPUTS] = {0}, out[TRC_OP_MAX_OUTPUTS] = {0};
-    for (uint32_t i = 0; i < op_infos[op].inputs; i++) in[i] = inputs[i].value;
+    for (uint32_t i = 0; i < op_infos[op].inputs; i++)
+        in[i] = inputs[i].value;
     trc_program_fold_scalar(op, mode, op == TRC_OP_RAMP ? b->tables + resource : NULL, in, out);
-    for (uint32_t i = 0; i < op_infos[op].outputs; i++) outputs[i] = trc_constant(out[i]);
+    for (uint32_t i = 0; i < op_infos[op].outputs; i++)
+        outputs[i] = trc_constant(out[i]);
 }
 
 /* Operations that give one of their inputs back whatever the others are. */
-static const struct trc_operand *identity(uint32_t op, uint32_t mode, const struct trc_operand *in) {
+static const struct trc_operand *identity(uint32_t op, uint32_t mode,
+                                          const struct trc_operand *in) {
     if (op == TRC_OP_MIX && trc_is_constant(in[0])) {
         const bool through_hsv = mode == TRC_BLEND_SATURATION || mode == TRC_BLEND_VALUE;
-        if (in[0].value <= 0.0f && !through_hsv) return in + 1;
-        if (in[0].value >= 1.0f && mode == TRC_BLEND_MIX) return in + 4;
+        if (in[0].value <= 0.0f && !through_hsv)
+            return in + 1;
+        if (in[0].value >= 1.0f && mode == TRC_BLEND_MIX)
+            return in + 4;
     }
-    if (op != TRC_OP_MATH) return NULL;
+    if (op != TRC_OP_MATH)
+        return NULL;
     switch (mode) {
     case TRC_MATH_ADD:
-        if (trc_is_value(in[0], 0.0f)) return in + 1;
+        if (trc_is_value(in[0], 0.0f))
+            return in + 1;
         return trc_is_value(in[1], 0.0f) ? in : NULL;
-    case TRC_MATH_SUBTRACT: return trc_is_value(in[1], 0.0f) ? in : NULL;
+    case TRC_MATH_SUBTRACT:
+        return trc_is_value(in[1], 0.0f) ? in : NULL;
     case TRC_MATH_MULTIPLY:
-        if (trc_is_value(in[0], 1.0f) || trc_is_value(in[1], 0.0f)) return in + 1;
+        if (trc_is_value(in[0], 1.0f) || trc_is_value(in[1], 0.0f))
+            return in + 1;
         return trc_is_value(in[1], 1.0f) || trc_is_value(in[0], 0.0f) ? in : NULL;
     case TRC_MATH_DIVIDE:
-    case TRC_MATH_POWER: return trc_is_value(in[1], 1.0f) ? in : NULL;
-    default: return NULL;
+    case TRC_MATH_POWER:
+        return trc_is_value(in[1], 1.0f) ? in : NULL;
+    default:
+        return NULL;
     }
 }
 
@@ -74,7 +91,8 @@ static uint32_t hash_op(uint32_t op, uint32_t mode, uint32_t resource,
                         const struct trc_operand *inputs) {
     uint32_t h = 2166136261u;
     const uint32_t head[3] = {op, mode, resource};
-    for (uint32_t i = 0; i < 3; i++) h = (h ^ head[i]) * 16777619u;
+    for (uint32_t i = 0; i < 3; i++)
+        h = (h ^ head[i]) * 16777619u;
     for (uint32_t i = 0; i < op_infos[op].inputs; i++) {
         uint32_t words[2];
         memcpy(words, &inputs[i], sizeof words);
@@ -90,8 +108,8 @@ static const struct trc_build_op *find_equal(const struct trc_build *b, uint32_t
     for (uint32_t i = b->buckets[hash]; i != UINT32_MAX; i = b->ops[i].next) {
         const struct trc_build_op *o = &b->ops[i];
         if (o->op == op && o->mode == mode && o->resource == resource &&
-            (op_infos[op].inputs == 0 ||
-             memcmp(b->inputs + o->first_input, inputs, op_infos[op].inputs * sizeof *inputs) == 0)) {
+            (op_infos[op].inputs == 0 || memcmp(b->inputs + o->first_input, inputs,
+                                                op_infos[op].inputs * sizeof *inputs) == 0)) {
             return o;
         }
     }
@@ -115,7 +133,8 @@ static trc_status append(struct trc_build *b, uint32_t hash, uint32_t op, uint32
         .first_value = b->value_count,
         .next = b->buckets[hash],
     };
-    for (uint32_t i = 0; i < count; i++) b->inputs[b->input_count++] = inputs[i];
+    for (uint32_t i = 0; i < count; i++)
+        b->inputs[b->input_count++] = inputs[i];
     b->buckets[hash] = b->op_count++;
     b->value_count += op_infos[op].outputs;
     return TRC_OK;
@@ -152,7 +171,8 @@ static uint32_t math_arity(uint32_t mode) {
     case TRC_MATH_COMPARE:
     case TRC_MATH_SMOOTH_MIN:
     case TRC_MATH_SMOOTH_MAX:
-    case TRC_MATH_WRAP: return 3;
+    case TRC_MATH_WRAP:
+        return 3;
     case TRC_MATH_ADD:
     case TRC_MATH_SUBTRACT:
     case TRC_MATH_MULTIPLY:
@@ -166,8 +186,10 @@ static uint32_t math_arity(uint32_t mode) {
     case TRC_MATH_MODULO:
     case TRC_MATH_SNAP:
     case TRC_MATH_PINGPONG:
-    case TRC_MATH_ARCTAN2: return 2;
-    default: return 1;
+    case TRC_MATH_ARCTAN2:
+        return 2;
+    default:
+        return 1;
     }
 }
 

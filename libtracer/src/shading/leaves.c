@@ -12,7 +12,8 @@ static trc_status multiply(struct trc_build *b, struct trc_operand x, struct trc
 static trc_status give_weight(struct trc_build *b, const trc_node *node, uint32_t input,
                               struct trc_operand weight, struct trc_operand *weights) {
     const trc_node_input *link = &b->desc->inputs[node->first_input + input];
-    if (link->node < 0) return TRC_OK;
+    if (link->node < 0)
+        return TRC_OK;
     struct trc_operand *sum = &weights[link->node];
     return trc_build_math(b, TRC_MATH_ADD, *sum, weight, trc_constant(0.0f), sum);
 }
@@ -51,12 +52,14 @@ static bool is_nothing(uint32_t type, const struct trc_operand *in) {
 
 /* The default tangent of an anisotropic leaf is the one around the object's Z axis. */
 static trc_status fill_tangent(struct trc_build *b, uint32_t type, struct trc_operand *in) {
-    const uint32_t anisotropy =
-        type == TRC_NODE_GLOSSY ? (uint32_t)TRC_GLOSSY_ANISOTROPY : (uint32_t)TRC_PRINCIPLED_ANISOTROPY;
+    const uint32_t anisotropy = type == TRC_NODE_GLOSSY ? (uint32_t)TRC_GLOSSY_ANISOTROPY
+                                                        : (uint32_t)TRC_PRINCIPLED_ANISOTROPY;
     const uint32_t tangent =
         type == TRC_NODE_GLOSSY ? (uint32_t)TRC_GLOSSY_TANGENT : (uint32_t)TRC_PRINCIPLED_TANGENT;
-    if (type != TRC_NODE_GLOSSY && type != TRC_NODE_PRINCIPLED) return TRC_OK;
-    if (in[tangent].reg != -2 || trc_is_value(in[anisotropy], 0.0f)) return TRC_OK;
+    if (type != TRC_NODE_GLOSSY && type != TRC_NODE_PRINCIPLED)
+        return TRC_OK;
+    if (in[tangent].reg != -2 || trc_is_value(in[anisotropy], 0.0f))
+        return TRC_OK;
     return trc_build_op(b, TRC_OP_TANGENT, 0, TRC_NO_RESOURCE, NULL, in + tangent);
 }
 
@@ -72,7 +75,8 @@ static trc_status add_leaf(struct trc_build *b, const trc_node *node, struct trc
         TRC_TRY(trc_build_input(b, node, i, in + floats));
         floats += trc_kind_floats(kinds[i]);
     }
-    if (is_nothing(node->type, in)) return TRC_OK;
+    if (is_nothing(node->type, in))
+        return TRC_OK;
     TRC_TRY(fill_tangent(b, node->type, in));
     b->leaves[b->leaf_count++] = (struct trc_leaf){
         .type = node->type,
@@ -85,14 +89,17 @@ static trc_status add_leaf(struct trc_build *b, const trc_node *node, struct trc
     return TRC_OK;
 }
 
-/* From the output backwards: links lead to earlier nodes only, so a weight is complete when its node's
- * turn comes. A shader that is used twice is one leaf with the sum of both weights, as in Cycles. */
+/* From the output backwards: links lead to earlier nodes only, so a weight is complete when its
+ * node's turn comes. A shader that is used twice is one leaf with the sum of both weights, as in
+ * Cycles. */
 static trc_status weigh(struct trc_build *b, struct trc_operand *weights) {
-    for (uint32_t i = 0; i < b->desc->node_count; i++) weights[i] = trc_constant(0.0f);
+    for (uint32_t i = 0; i < b->desc->node_count; i++)
+        weights[i] = trc_constant(0.0f);
     weights[b->desc->surface] = trc_constant(1.0f);
     for (uint32_t i = (uint32_t)b->desc->surface + 1; i-- > 0;) {
         const trc_node *node = &b->desc->nodes[i];
-        if (!trc_node_is_shader(node->type) || trc_is_value(weights[i], 0.0f)) continue;
+        if (!trc_node_is_shader(node->type) || trc_is_value(weights[i], 0.0f))
+            continue;
         if (node->type == TRC_NODE_MIX_SHADER || node->type == TRC_NODE_ADD_SHADER) {
             TRC_TRY(share_weight(b, node, weights[i], weights));
         } else {
@@ -103,9 +110,11 @@ static trc_status weigh(struct trc_build *b, struct trc_operand *weights) {
 }
 
 trc_status trc_build_leaves(struct trc_build *b) {
-    if (b->desc->node_count == 0 || b->desc->surface < 0) return TRC_OK;
+    if (b->desc->node_count == 0 || b->desc->surface < 0)
+        return TRC_OK;
     struct trc_operand *weights = trc_alloc(b->desc->node_count, sizeof *weights);
-    if (!weights) return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory to compile a material");
+    if (!weights)
+        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory to compile a material");
     const trc_status status = weigh(b, weights);
     trc_free(weights);
     return status;

@@ -1,9 +1,9 @@
 /* Light tables: strengths to radiance, bounds for choosing, emissive triangles.
  *
- * Units, as measured on and read from Cycles 3.4: a point or spot of P watts has the intensity P / (4 pi)
- * and, with a radius r, is a disk that faces whoever looks, of radiance P / (4 pi^2 r^2); an area light
- * has the radiance P / (4 area); a sun of strength S and half angle h is a disk at distance 1 of radius
- * tan h and radiance S / (pi tan^2 h cos^3 theta). */
+ * Units, as measured on and read from Cycles 3.4: a point or spot of P watts has the intensity P /
+ * (4 pi) and, with a radius r, is a disk that faces whoever looks, of radiance P / (4 pi^2 r^2); an
+ * area light has the radiance P / (4 area); a sun of strength S and half angle h is a disk at
+ * distance 1 of radius tan h and radiance S / (pi tan^2 h cos^3 theta). */
 #include "shading/lights.h"
 
 #include <math.h>
@@ -103,7 +103,8 @@ static bool make_area(struct trc_lamp *lamp, const trc_light_desc *desc) {
     lamp->spread_scale = 1.0f;
     const float half = 0.5f * fmaxf(desc->spread, 0.0f);
     if (half < 0.5f * PI - 1e-4f) {
-        /* A grid of slats: what passes at theta is 1 - tan(theta) / tan(half), scaled to keep the power. */
+        /* A grid of slats: what passes at theta is 1 - tan(theta) / tan(half), scaled to keep the
+         * power. */
         const float t = tanf(fmaxf(half, 1e-3f));
         lamp->tan_spread = 1.0f / t;
         lamp->spread_scale = 1.0f / (1.0f - fmaxf(half, 1e-3f) / t);
@@ -123,7 +124,8 @@ static bool make_lamp(struct trc_lamp *lamp, const trc_light_desc *desc) {
         lamp->position[i] = m[4 * i + 3];
     lamp->kind = TRC_KIND_POINT;
     lamp->visibility = desc->visibility | TRC_VISIBLE_SHADOW;
-    lamp->flags = (desc->use_mis ? TRC_LAMP_MIS : 0) | (desc->cast_shadow ? TRC_LAMP_CASTS_SHADOW : 0);
+    lamp->flags =
+        (desc->use_mis ? TRC_LAMP_MIS : 0) | (desc->cast_shadow ? TRC_LAMP_CASTS_SHADOW : 0);
     if (desc->type == TRC_LIGHT_SUN)
         make_sun(lamp, desc);
     else if (desc->type != TRC_LIGHT_AREA)
@@ -187,7 +189,8 @@ static void bound_triangle(const struct trc_light_triangle *t, float light, uint
 
 static void transform_point(const struct trc_affine *a, const float p[3], float out[3]) {
     for (int i = 0; i < 3; i++)
-        out[i] = a->m[4 * i] * p[0] + a->m[4 * i + 1] * p[1] + a->m[4 * i + 2] * p[2] + a->m[4 * i + 3];
+        out[i] =
+            a->m[4 * i] * p[0] + a->m[4 * i + 1] * p[1] + a->m[4 * i + 2] * p[2] + a->m[4 * i + 3];
 }
 
 static const struct trc_material *material_of(const struct trc_snapshot *s,
@@ -201,8 +204,9 @@ static const struct trc_material *material_of(const struct trc_snapshot *s,
     return s->materials[*number];
 }
 
-/* Whether a material's triangles are lights. Cycles samples those only whose "multiple importance sample"
- * is on, and finds the others with diffuse rays; there are none here, so all are sampled. */
+/* Whether a material's triangles are lights. Cycles samples those only whose "multiple importance
+ * sample" is on, and finds the others with diffuse rays; there are none here, so all are
+ * sampled. */
 static bool is_emissive(const struct trc_material *m) {
     if (!m || !(m->has & TRC_MATERIAL_HAS_EMISSION))
         return false;
@@ -218,8 +222,9 @@ static bool instance_may_shine(const struct trc_snapshot *s, const struct trc_in
     return false;
 }
 
-/* World corners at the first keys, and the box over all keys: vertices and matrices are interpolated linearly,
- * so the box over all pairs of keys holds what lies between. False for a triangle without area. */
+/* World corners at the first keys, and the box over all keys: vertices and matrices are
+ * interpolated linearly, so the box over all pairs of keys holds what lies between. False for a
+ * triangle without area. */
 static bool world_triangle(const struct trc_instance *instance, const struct trc_mesh *mesh,
                            uint32_t triangle, struct trc_light_triangle *t, float lower[3],
                            float upper[3]) {
@@ -234,7 +239,8 @@ static bool world_triangle(const struct trc_instance *instance, const struct trc
         for (uint32_t pose = 0; pose < instance->key_count; pose++)
             for (int k = 0; k < 3; k++) {
                 float p[3];
-                transform_point(&instance->object_to_world[pose], positions + 3 * (size_t)index[k], p);
+                transform_point(&instance->object_to_world[pose], positions + 3 * (size_t)index[k],
+                                p);
                 if (key == 0 && pose == 0)
                     memcpy(corners[k], p, sizeof p);
                 for (int i = 0; i < 3; i++) {
@@ -329,7 +335,8 @@ static trc_status add_world(struct trc_light_table *table, const struct trc_ligh
             table->map = previous->map;
             atomic_fetch_add_explicit(&table->map->refs, 1, memory_order_relaxed);
         } else {
-            const uint32_t wanted = world && world->map_resolution ? world->map_resolution : MAP_WIDTH;
+            const uint32_t wanted =
+                world && world->map_resolution ? world->map_resolution : MAP_WIDTH;
             const uint32_t width = wanted < 16 ? 16 : wanted > 8192 ? 8192 : wanted;
             const trc_status status = trc_world_map_create(s, width, &table->map);
             if (status != TRC_OK)
@@ -410,7 +417,8 @@ static trc_status fill(struct trc_light_table *table, const struct trc_light_tab
                        const struct trc_snapshot *s, const trc_light_desc *lights,
                        uint32_t light_count, const trc_world_desc *world) {
     struct trc_light_bound *bounds = NULL;
-    trc_status status = allocate(table, light_count, count_triangles(s), s->instance_count, &bounds);
+    trc_status status =
+        allocate(table, light_count, count_triangles(s), s->instance_count, &bounds);
     if (status != TRC_OK)
         return status;
     uint32_t bound_count = 0;

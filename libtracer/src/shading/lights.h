@@ -1,9 +1,9 @@
 /* The lights of a committed scene: what kernels/light*.c read.
  *
- * Lamps, the world and emissive triangles, their strengths turned into radiance as Cycles 3.4 does, and what
- * chooses among them: a list of suns and world, and for lights with a place either a list or, when there
- * are many, a tree (A. Conty Estevez and C. Kulla, "Importance Sampling of Many Lights with Adaptive Tree
- * Splitting", 2018). Immutable once created; threads share it. */
+ * Lamps, the world and emissive triangles, their strengths turned into radiance as Cycles 3.4 does,
+ * and what chooses among them: a list of suns and world, and for lights with a place either a list
+ * or, when there are many, a tree (A. Conty Estevez and C. Kulla, "Importance Sampling of Many
+ * Lights with Adaptive Tree Splitting", 2018). Immutable once created; threads share it. */
 #ifndef TRACER_SHADING_LIGHTS_H
 #define TRACER_SHADING_LIGHTS_H
 
@@ -24,26 +24,27 @@ enum trc_light_kind {
 };
 
 enum {
-    TRC_LAMP_DELTA = 1,       /* no extent: continuation rays never meet it */
-    TRC_LAMP_MIS = 2,         /* continuation rays see it */
+    TRC_LAMP_DELTA = 1, /* no extent: continuation rays never meet it */
+    TRC_LAMP_MIS = 2,   /* continuation rays see it */
     TRC_LAMP_CASTS_SHADOW = 4
 };
 
 /* A lamp: 32 words, read by gathers of TRC_LAMP_WORDS stride. Positions in world space. */
 #define TRC_LAMP_WORDS 32
 struct trc_lamp {
-    float position[3];      /* centre; of a sun the unit direction towards it */
+    float position[3];          /* centre; of a sun the unit direction towards it */
     float axis_u[3], axis_v[3]; /* area: unit */
-    float normal[3];        /* the way spot and area shine, unit */
-    float radiance[3];      /* towards a point that sees it head-on; delta: intensity, sun irradiance */
-    float half_u, half_v;   /* area: half sizes; point, spot: radius; sun: tangent of the half angle */
-    float cos_cone;         /* spot: of the half angle; sun: of its angular radius */
-    float inv_smooth;       /* spot: 1 / width of the soft edge in cosine, 0 for a hard one */
-    float tan_spread;       /* area: cotangent of half the spread, 0 for no limit */
-    float spread_scale;     /* area: factor that keeps the power */
+    float normal[3];            /* the way spot and area shine, unit */
+    float radiance[3]; /* towards a point that sees it head-on; delta: intensity, sun irradiance */
+    float half_u,
+        half_v;         /* area: half sizes; point, spot: radius; sun: tangent of the half angle */
+    float cos_cone;     /* spot: of the half angle; sun: of its angular radius */
+    float inv_smooth;   /* spot: 1 / width of the soft edge in cosine, 0 for a hard one */
+    float tan_spread;   /* area: cotangent of half the spread, 0 for no limit */
+    float spread_scale; /* area: factor that keeps the power */
     float inv_area;
     int32_t kind, flags;
-    uint32_t visibility;    /* TRC_VISIBLE_* */
+    uint32_t visibility; /* TRC_VISIBLE_* */
     float unused[7];
 };
 
@@ -51,10 +52,10 @@ struct trc_lamp {
 #define TRC_TRIANGLE_WORDS 16
 struct trc_light_triangle {
     float v0[3], v1[3], v2[3]; /* world corners; of a moving one at key 0 */
-    float emission[3];      /* constant, or an estimate where varies */
+    float emission[3];         /* constant, or an estimate where varies */
     int32_t instance, triangle;
-    uint32_t material;      /* into snapshot materials */
-    uint32_t flags;         /* TRC_TRIANGLE_* */
+    uint32_t material; /* into snapshot materials */
+    uint32_t flags;    /* TRC_TRIANGLE_* */
 };
 enum {
     TRC_TRIANGLE_MOVES = 1, /* its corners depend on time */
@@ -65,13 +66,13 @@ enum {
 #define TRC_BOUND_WORDS 16
 struct trc_light_bound {
     float center[3], radius;
-    float axis[3];          /* mean direction of emission */
-    float cos_o, sin_o;     /* spread of the normals about the axis */
-    float cos_e;            /* emission beyond the normals' cone; cos of the angle */
-    float intensity;        /* on the axis, W / sr */
-    int32_t two_sided;      /* the axis counts in both directions */
-    int32_t child;          /* inner node: index of the second child, the first is the next node; leaf: -1 */
-    int32_t light;          /* leaf: number of the light */
+    float axis[3];      /* mean direction of emission */
+    float cos_o, sin_o; /* spread of the normals about the axis */
+    float cos_e;        /* emission beyond the normals' cone; cos of the angle */
+    float intensity;    /* on the axis, W / sr */
+    int32_t two_sided;  /* the axis counts in both directions */
+    int32_t child; /* inner node: index of the second child, the first is the next node; leaf: -1 */
+    int32_t light; /* leaf: number of the light */
     int32_t unused[2];
 };
 
@@ -79,10 +80,10 @@ struct trc_light_bound {
 struct trc_world_map {
     atomic_uint refs;
     uint32_t width, height;
-    float *rows;            /* (width + 1) * height: running sums of each row, 0 to 1 */
-    float *marginal;        /* height + 1 */
-    float *density;         /* width * height: value over the mean, per unit square */
-    float average[3];       /* mean radiance over the sphere */
+    float *rows;      /* (width + 1) * height: running sums of each row, 0 to 1 */
+    float *marginal;  /* height + 1 */
+    float *density;   /* width * height: value over the mean, per unit square */
+    float average[3]; /* mean radiance over the sphere */
 };
 
 /* Up to so many lights with a place the chances of all are computed at each point. */
@@ -90,40 +91,41 @@ struct trc_world_map {
 
 struct trc_light_table {
     uint32_t lamp_count, triangle_count;
-    uint32_t world_light;   /* number of the world as a light, or UINT32_MAX */
+    uint32_t world_light;    /* number of the world as a light, or UINT32_MAX */
     uint32_t first_triangle; /* number of the first emissive triangle */
-    uint32_t kinds;         /* 1 << kind of every light present */
-    bool hides;             /* some light is not visible to all of diffuse, glossy, transmission */
-    bool single;            /* there is exactly one light: nothing to choose */
-    bool moves;             /* some emissive triangle moves */
-    bool varies;            /* some has emission by program */
+    uint32_t kinds;          /* 1 << kind of every light present */
+    bool hides;              /* some light is not visible to all of diffuse, glossy, transmission */
+    bool single;             /* there is exactly one light: nothing to choose */
+    bool moves;              /* some emissive triangle moves */
+    bool varies;             /* some has emission by program */
     struct trc_lamp *lamps;
     struct trc_light_triangle *triangles;
     /* Chosen among: bound_count bounds in a list, or a tree of which bounds[0] is the root. */
     struct trc_light_bound *bounds;
     uint32_t bound_count;
     bool is_tree;
-    uint32_t *trails;       /* tree: per light, the turns from the root, first in bit 0, 1 the second child */
-    uint32_t *distant;      /* numbers of suns and the world */
+    uint32_t
+        *trails; /* tree: per light, the turns from the root, first in bit 0, 1 the second child */
+    uint32_t *distant; /* numbers of suns and the world */
     float *distant_irradiance;
     uint32_t distant_count;
-    uint32_t *seen;         /* lamps that rays can meet */
+    uint32_t *seen; /* lamps that rays can meet */
     uint32_t seen_count;
     uint32_t *instance_triangles; /* per instance: how many of its triangles are lights */
     struct trc_world_map *map;    /* NULL: cosine or uniform sampling */
     uint32_t world_visibility;
 };
 
-/* Builds the table and sets instance.first_light. Reads snapshot->meshes, instances, materials, images and
- * world, which must be complete; calls trc_kernels_current()->world_evaluate for a world that is not
- * constant. world: use_sampling and map_resolution are read, NULL stands for 1 and 0. Ownership of *out goes
- * to the caller. TRC_ERROR_OUT_OF_MEMORY leaves nothing behind. Cost: linear in lights, n log n with a
- * tree; a map takes some 50 ms. */
+/* Builds the table and sets instance.first_light. Reads snapshot->meshes, instances, materials,
+ * images and world, which must be complete; calls trc_kernels_current()->world_evaluate for a world
+ * that is not constant. world: use_sampling and map_resolution are read, NULL stands for 1 and 0.
+ * Ownership of *out goes to the caller. TRC_ERROR_OUT_OF_MEMORY leaves nothing behind. Cost: linear
+ * in lights, n log n with a tree; a map takes some 50 ms. */
 trc_status trc_light_table_create(const struct trc_snapshot *snapshot, const trc_light_desc *lights,
                                   uint32_t light_count, const trc_world_desc *world,
                                   struct trc_light_table **out);
-/* The same, sharing the world's map with previous (may be NULL): the table of an earlier snapshot whose
- * world, materials and images are the same. */
+/* The same, sharing the world's map with previous (may be NULL): the table of an earlier snapshot
+ * whose world, materials and images are the same. */
 trc_status trc_light_table_create_like(const struct trc_light_table *previous,
                                        const struct trc_snapshot *snapshot,
                                        const trc_light_desc *lights, uint32_t light_count,

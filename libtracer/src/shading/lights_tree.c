@@ -1,5 +1,5 @@
-/* The light tree: binary, split by the surface-area-orientation heuristic of Conty Estevez and Kulla (2018),
- * one light per leaf. */
+/* The light tree: binary, split by the surface-area-orientation heuristic of Conty Estevez and
+ * Kulla (2018), one light per leaf. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,7 +11,8 @@
 #define BIN_COUNT 12
 /* Turns are kept in 32 bits: where an uneven split could need more, the count is halved. */
 #define DEPTH_MAX 31u
-/* Larger sets are split without regard to orientation, which costs most of the time and says little there. */
+/* Larger sets are split without regard to orientation, which costs most of the time and says little
+ * there. */
 #define ORIENTED_COUNT_MAX 4096u
 
 /* What a set of lights is bounded by. */
@@ -204,8 +205,7 @@ static bool best_split(const struct trc_light_bound *leaves, uint32_t count, int
             unite(&left, &bins[i - 1]);
             if (left.count == 0 || right[i].count == 0)
                 continue;
-            const float cost =
-                (cluster_cost(&left) + cluster_cost(&right[i])) * (longest / extent);
+            const float cost = (cluster_cost(&left) + cluster_cost(&right[i])) * (longest / extent);
             if (cost < best) {
                 best = cost;
                 *axis_out = axis;
@@ -218,7 +218,8 @@ static bool best_split(const struct trc_light_bound *leaves, uint32_t count, int
     return best < INFINITY;
 }
 
-static int compare_axis(const struct trc_light_bound *a, const struct trc_light_bound *b, int axis) {
+static int compare_axis(const struct trc_light_bound *a, const struct trc_light_bound *b,
+                        int axis) {
     if (a->center[axis] != b->center[axis])
         return a->center[axis] < b->center[axis] ? -1 : 1;
     return a->light < b->light ? -1 : 1;

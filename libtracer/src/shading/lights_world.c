@@ -21,7 +21,8 @@ static void cell_direction(float u, float v, float d[3]) {
     d[2] = cosf(theta);
 }
 
-/* Brightness of each cell of a row, the largest of its samples leaning on their mean, times sin theta. */
+/* Brightness of each cell of a row, the largest of its samples leaning on their mean, times sin
+ * theta. */
 static void measure_row(const struct trc_snapshot *s, struct trc_world_map *map, uint32_t row,
                         float *directions, float *radiance, double total[4]) {
     const uint32_t per_cell = SUBSAMPLES * SUBSAMPLES;

@@ -7,7 +7,8 @@
 
 #define CLAMP_BIT 256u
 
-/* A node on its way: its inputs in order, three operands for a colour or vector, and its outputs. */
+/* A node on its way: its inputs in order, three operands for a colour or vector, and its outputs.
+ */
 struct lowering {
     struct trc_build *b;
     const trc_node *node;
@@ -25,20 +26,25 @@ static trc_status op(struct trc_build *b, uint32_t code, uint32_t mode,
 
 static uint32_t output_offset(const trc_node *node, uint32_t output) {
     uint32_t offset = 0;
-    for (uint32_t i = 0; i < output; i++) offset += trc_kind_floats(trc_node_output_kind(node, i));
+    for (uint32_t i = 0; i < output; i++)
+        offset += trc_kind_floats(trc_node_output_kind(node, i));
     return offset;
 }
 
 /* What an unlinked input of that kind stands for in a value node. */
 static trc_status default_input(struct trc_build *b, char kind, struct trc_operand *out) {
     switch (kind) {
-    case 'n': return op(b, TRC_OP_NORMAL, 0, NULL, out);
-    case 'g': return op(b, TRC_OP_GENERATED, 0, NULL, out);
-    case 'p': return op(b, TRC_OP_POSITION, 0, NULL, out);
+    case 'n':
+        return op(b, TRC_OP_NORMAL, 0, NULL, out);
+    case 'g':
+        return op(b, TRC_OP_GENERATED, 0, NULL, out);
+    case 'p':
+        return op(b, TRC_OP_POSITION, 0, NULL, out);
     case 'u':
         out[2] = trc_constant(0.0f);
         return op(b, TRC_OP_UV, 0, NULL, out);
-    default: return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "an input has no default");
+    default:
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "an input has no default");
     }
 }
 
@@ -49,7 +55,8 @@ static trc_status linked_input(struct trc_build *b, const trc_node_input *input,
     const struct trc_operand *value =
         b->outputs + b->first_output[input->node] + output_offset(from, input->output);
     if (trc_kind_is_float(given)) {
-        for (uint32_t i = 0; i < trc_kind_floats(kind); i++) out[i] = *value;
+        for (uint32_t i = 0; i < trc_kind_floats(kind); i++)
+            out[i] = *value;
         return TRC_OK;
     }
     if (trc_kind_is_float(kind)) {
@@ -64,13 +71,17 @@ trc_status trc_build_input(struct trc_build *b, const trc_node *node, uint32_t i
     const trc_node_input *input = &b->desc->inputs[node->first_input + index];
     const char kind = trc_node_info_of(node->type)->inputs[index];
     const uint32_t floats = trc_kind_floats(kind);
-    if (input->node >= 0) return linked_input(b, input, kind, out);
+    if (input->node >= 0)
+        return linked_input(b, input, kind, out);
     if (input->node == -2) {
-        if (!trc_node_is_shader(node->type)) return default_input(b, kind, out);
-        for (uint32_t i = 0; i < floats; i++) out[i] = (struct trc_operand){-2, 0.0f};
+        if (!trc_node_is_shader(node->type))
+            return default_input(b, kind, out);
+        for (uint32_t i = 0; i < floats; i++)
+            out[i] = (struct trc_operand){-2, 0.0f};
         return TRC_OK;
     }
-    for (uint32_t i = 0; i < floats; i++) out[i] = trc_constant(input->value[i]);
+    for (uint32_t i = 0; i < floats; i++)
+        out[i] = trc_constant(input->value[i]);
     return TRC_OK;
 }
 
@@ -78,13 +89,15 @@ trc_status trc_build_input(struct trc_build *b, const trc_node *node, uint32_t i
 
 static trc_status name_of(const struct lowering *l, uint32_t *resource) {
     *resource = TRC_NO_RESOURCE;
-    if (!l->node->name || !l->node->name[0]) return TRC_OK;
+    if (!l->node->name || !l->node->name[0])
+        return TRC_OK;
     return trc_names_add(l->b->context->names, l->node->name, resource);
 }
 
 static uint32_t image_of(const struct lowering *l) {
     const struct trc_compile_context *context = l->b->context;
-    if (!l->node->image || !context->image_index) return TRC_NO_RESOURCE;
+    if (!l->node->image || !context->image_index)
+        return TRC_NO_RESOURCE;
     return context->image_index(context->images, l->node->image);
 }
 
@@ -94,7 +107,8 @@ static trc_status table_of(const struct lowering *l, uint32_t *resource) {
     const uint32_t count = (uint32_t)l->node->table_count;
     for (uint32_t i = 0; i < b->table_count; i += count) {
         *resource = i;
-        if (memcmp(b->tables + i, l->node->table, count * sizeof(float)) == 0) return TRC_OK;
+        if (memcmp(b->tables + i, l->node->table, count * sizeof(float)) == 0)
+            return TRC_OK;
     }
     TRC_TRY(trc_build_reserve((void **)&b->tables, &b->table_capacity, b->table_count + count,
                               sizeof(float)));
@@ -111,7 +125,8 @@ static trc_status lower_outputs(const struct lowering *l, const uint16_t *codes,
     struct trc_operand *out = l->out;
     for (uint32_t i = 0; i < count; i++) {
         TRC_TRY(op(l->b, codes[i], 0, NULL, out));
-        if (trc_op_outputs(codes[i]) == 2) out[2] = trc_constant(0.0f);
+        if (trc_op_outputs(codes[i]) == 2)
+            out[2] = trc_constant(0.0f);
         const uint32_t floats = trc_op_outputs(codes[i]);
         out += floats == 2 ? 3 : floats;
     }
@@ -119,7 +134,7 @@ static trc_status lower_outputs(const struct lowering *l, const uint16_t *codes,
 }
 
 static trc_status lower_texture_coordinate(const struct lowering *l) {
-    static const uint16_t codes[] = {TRC_OP_GENERATED, TRC_OP_OBJECT_NORMAL, TRC_OP_UV,
+    static const uint16_t codes[] = {TRC_OP_GENERATED,       TRC_OP_OBJECT_NORMAL,   TRC_OP_UV,
                                      TRC_OP_OBJECT_POSITION, TRC_OP_CAMERA_POSITION, TRC_OP_WINDOW,
                                      TRC_OP_REFLECTION};
     return lower_outputs(l, codes, sizeof codes / sizeof *codes);
@@ -136,7 +151,8 @@ static trc_status lower_geometry(const struct lowering *l) {
 }
 
 static trc_status lower_object_info(const struct lowering *l) {
-    static const uint16_t codes[] = {TRC_OP_OBJECT_LOCATION, TRC_OP_OBJECT_COLOR, TRC_OP_OBJECT_INDEX};
+    static const uint16_t codes[] = {TRC_OP_OBJECT_LOCATION, TRC_OP_OBJECT_COLOR,
+                                     TRC_OP_OBJECT_INDEX};
     TRC_TRY(lower_outputs(l, codes, sizeof codes / sizeof *codes));
     l->out[8] = trc_constant((float)l->b->desc->pass_index);
     return op(l->b, TRC_OP_OBJECT_RANDOM, 0, NULL, l->out + 9);
@@ -146,7 +162,8 @@ static trc_status lower_image(const struct lowering *l) {
     const uint32_t projection = l->node->mode >> 4, mode = l->node->mode & 15u;
     const uint32_t image = image_of(l);
     struct trc_operand uv[2] = {l->in[0], l->in[1]};
-    if (projection == 1) return trc_build_op(l->b, TRC_OP_IMAGE_BOX, mode, image, l->in, l->out);
+    if (projection == 1)
+        return trc_build_op(l->b, TRC_OP_IMAGE_BOX, mode, image, l->in, l->out);
     if (projection) {
         const uint32_t wrap = projection == 2 ? TRC_PROJECT_SPHERE : TRC_PROJECT_TUBE;
         TRC_TRY(op(l->b, TRC_OP_PROJECT, wrap, l->in, uv));
@@ -158,8 +175,8 @@ static trc_status lower_environment(const struct lowering *l) {
     const bool is_ball = l->node->mode >> 4;
     const uint32_t mode = (l->node->mode & TRC_IMAGE_MODE_INTERPOLATION) | TRC_IMAGE_REPEAT;
     struct trc_operand uv[2], rgba[4];
-    TRC_TRY(op(l->b, TRC_OP_PROJECT, is_ball ? TRC_PROJECT_MIRROR_BALL : TRC_PROJECT_EQUIRECTANGULAR,
-               l->in, uv));
+    TRC_TRY(op(l->b, TRC_OP_PROJECT,
+               is_ball ? TRC_PROJECT_MIRROR_BALL : TRC_PROJECT_EQUIRECTANGULAR, l->in, uv));
     TRC_TRY(trc_build_op(l->b, TRC_OP_IMAGE, mode, image_of(l), uv, rgba));
     memcpy(l->out, rgba, 3 * sizeof *rgba);
     return TRC_OK;
@@ -168,7 +185,8 @@ static trc_status lower_environment(const struct lowering *l) {
 static trc_status lower_named(const struct lowering *l, uint32_t code, uint32_t mode) {
     uint32_t name;
     TRC_TRY(name_of(l, &name));
-    if (code == TRC_OP_UV) l->out[2] = trc_constant(0.0f);
+    if (code == TRC_OP_UV)
+        l->out[2] = trc_constant(0.0f);
     return trc_build_op(l->b, code, mode, name, l->in, l->out);
 }
 
@@ -176,7 +194,8 @@ static trc_status lower_mapping(const struct lowering *l) {
     struct trc_operand in[TRC_OP_MAX_INPUTS];
     const bool is_moved = l->node->mode < 2;
     memcpy(in, l->in, 3 * sizeof *in);
-    for (int i = 0; i < 3; i++) in[3 + i] = is_moved ? l->in[3 + i] : trc_constant(0.0f);
+    for (int i = 0; i < 3; i++)
+        in[3 + i] = is_moved ? l->in[3 + i] : trc_constant(0.0f);
     memcpy(in + 6, l->in + 9, 3 * sizeof *in);
     TRC_TRY(op(l->b, TRC_OP_ROTATION, 0, l->in + 6, in + 9));
     return op(l->b, TRC_OP_MAPPING, l->node->mode, in, l->out);
@@ -189,14 +208,16 @@ static trc_status lower_mix(const struct lowering *l) {
 
 static trc_status lower_math(const struct lowering *l) {
     TRC_TRY(trc_build_math(l->b, l->node->mode & ~CLAMP_BIT, l->in[0], l->in[1], l->in[2], l->out));
-    if (!(l->node->mode & CLAMP_BIT)) return TRC_OK;
+    if (!(l->node->mode & CLAMP_BIT))
+        return TRC_OK;
     const struct trc_operand in[3] = {l->out[0], trc_constant(0.0f), trc_constant(1.0f)};
     return op(l->b, TRC_OP_CLAMP, 0, in, l->out);
 }
 
 static trc_status lower_map_range(const struct lowering *l) {
     TRC_TRY(op(l->b, TRC_OP_MAP_RANGE, 0, l->in, l->out));
-    if (!(l->node->mode & CLAMP_BIT)) return TRC_OK;
+    if (!(l->node->mode & CLAMP_BIT))
+        return TRC_OK;
     const struct trc_operand in[3] = {l->out[0], l->in[3], l->in[4]};
     return op(l->b, TRC_OP_CLAMP, 1, in, l->out);
 }
@@ -205,15 +226,20 @@ static trc_status lower_vector_math(const struct lowering *l) {
     const uint32_t mode = l->node->mode;
     const struct trc_operand zero = trc_constant(0.0f);
     struct trc_operand in[TRC_OP_MAX_INPUTS];
-    for (int i = 0; i < TRC_OP_MAX_INPUTS; i++) in[i] = zero;
+    for (int i = 0; i < TRC_OP_MAX_INPUTS; i++)
+        in[i] = zero;
     memcpy(in, l->in, 3 * sizeof *in);
     const bool is_unary = mode == TRC_VECTOR_LENGTH || mode == TRC_VECTOR_SCALE ||
                           mode == TRC_VECTOR_NORMALIZE || mode == TRC_VECTOR_ABSOLUTE ||
                           mode >= TRC_VECTOR_FLOOR;
-    if (!is_unary) memcpy(in + 3, l->in + 3, 3 * sizeof *in);
-    if (mode == TRC_VECTOR_MULTIPLY_ADD) memcpy(in + 6, l->in + 6, 3 * sizeof *in);
-    if (mode == TRC_VECTOR_SCALE) in[9] = l->in[9];
-    for (int i = 0; i < 4; i++) l->out[i] = zero;
+    if (!is_unary)
+        memcpy(in + 3, l->in + 3, 3 * sizeof *in);
+    if (mode == TRC_VECTOR_MULTIPLY_ADD)
+        memcpy(in + 6, l->in + 6, 3 * sizeof *in);
+    if (mode == TRC_VECTOR_SCALE)
+        in[9] = l->in[9];
+    for (int i = 0; i < 4; i++)
+        l->out[i] = zero;
     if (mode == TRC_VECTOR_DOT || mode == TRC_VECTOR_DISTANCE || mode == TRC_VECTOR_LENGTH) {
         return op(l->b, TRC_OP_VECTOR_MEASURE, mode, in, l->out + 3);
     }
@@ -223,7 +249,8 @@ static trc_status lower_vector_math(const struct lowering *l) {
 /* Red, green, blue and X, Y, Z are what the operands are already. */
 static trc_status lower_components(const struct lowering *l, uint32_t code) {
     const uint32_t mode = l->node->mode;
-    if (mode != TRC_SEPARATE_RGB && mode != TRC_SEPARATE_XYZ) return op(l->b, code, mode, l->in, l->out);
+    if (mode != TRC_SEPARATE_RGB && mode != TRC_SEPARATE_XYZ)
+        return op(l->b, code, mode, l->in, l->out);
     memcpy(l->out, l->in, 3 * sizeof *l->in);
     return TRC_OK;
 }
@@ -234,58 +261,86 @@ static trc_status lower_node(const struct lowering *l) {
     const uint32_t mode = l->node->mode;
     uint32_t resource = TRC_NO_RESOURCE;
     switch (l->node->type) {
-    case TRC_NODE_IMAGE: return lower_image(l);
-    case TRC_NODE_ENVIRONMENT: return lower_environment(l);
-    case TRC_NODE_UV_MAP: return lower_named(l, TRC_OP_UV, 0);
-    case TRC_NODE_COLOR_ATTRIBUTE: return lower_named(l, TRC_OP_COLOR_ATTRIBUTE, 0);
-    case TRC_NODE_NORMAL_MAP: return lower_named(l, TRC_OP_NORMAL_MAP, mode);
-    case TRC_NODE_TEXTURE_COORDINATE: return lower_texture_coordinate(l);
-    case TRC_NODE_GEOMETRY: return lower_geometry(l);
-    case TRC_NODE_OBJECT_INFO: return lower_object_info(l);
+    case TRC_NODE_IMAGE:
+        return lower_image(l);
+    case TRC_NODE_ENVIRONMENT:
+        return lower_environment(l);
+    case TRC_NODE_UV_MAP:
+        return lower_named(l, TRC_OP_UV, 0);
+    case TRC_NODE_COLOR_ATTRIBUTE:
+        return lower_named(l, TRC_OP_COLOR_ATTRIBUTE, 0);
+    case TRC_NODE_NORMAL_MAP:
+        return lower_named(l, TRC_OP_NORMAL_MAP, mode);
+    case TRC_NODE_TEXTURE_COORDINATE:
+        return lower_texture_coordinate(l);
+    case TRC_NODE_GEOMETRY:
+        return lower_geometry(l);
+    case TRC_NODE_OBJECT_INFO:
+        return lower_object_info(l);
     case TRC_NODE_LIGHT_PATH:
         for (uint32_t i = 0; i < TRC_PATH_OUTPUTS; i++) {
             TRC_TRY(op(b, TRC_OP_LIGHT_PATH, i, NULL, l->out + i));
         }
         return TRC_OK;
-    case TRC_NODE_MAPPING: return lower_mapping(l);
-    case TRC_NODE_MIX_COLOR: return lower_mix(l);
-    case TRC_NODE_MATH: return lower_math(l);
-    case TRC_NODE_VECTOR_MATH: return lower_vector_math(l);
-    case TRC_NODE_MAP_RANGE: return lower_map_range(l);
-    case TRC_NODE_CLAMP: return op(b, TRC_OP_CLAMP, mode, l->in, l->out);
-    case TRC_NODE_FRESNEL: return op(b, TRC_OP_FRESNEL, 0, l->in, l->out);
+    case TRC_NODE_MAPPING:
+        return lower_mapping(l);
+    case TRC_NODE_MIX_COLOR:
+        return lower_mix(l);
+    case TRC_NODE_MATH:
+        return lower_math(l);
+    case TRC_NODE_VECTOR_MATH:
+        return lower_vector_math(l);
+    case TRC_NODE_MAP_RANGE:
+        return lower_map_range(l);
+    case TRC_NODE_CLAMP:
+        return op(b, TRC_OP_CLAMP, mode, l->in, l->out);
+    case TRC_NODE_FRESNEL:
+        return op(b, TRC_OP_FRESNEL, 0, l->in, l->out);
     case TRC_NODE_LAYER_WEIGHT:
         TRC_TRY(op(b, TRC_OP_LAYER_FRESNEL, 0, l->in, l->out));
         return op(b, TRC_OP_LAYER_FACING, 0, l->in, l->out + 1);
-    case TRC_NODE_INVERT: return op(b, TRC_OP_INVERT, 0, l->in, l->out);
-    case TRC_NODE_GAMMA: return op(b, TRC_OP_GAMMA, 0, l->in, l->out);
-    case TRC_NODE_HUE_SATURATION: return op(b, TRC_OP_HUE_SATURATION, 0, l->in, l->out);
-    case TRC_NODE_BRIGHT_CONTRAST: return op(b, TRC_OP_BRIGHT_CONTRAST, 0, l->in, l->out);
+    case TRC_NODE_INVERT:
+        return op(b, TRC_OP_INVERT, 0, l->in, l->out);
+    case TRC_NODE_GAMMA:
+        return op(b, TRC_OP_GAMMA, 0, l->in, l->out);
+    case TRC_NODE_HUE_SATURATION:
+        return op(b, TRC_OP_HUE_SATURATION, 0, l->in, l->out);
+    case TRC_NODE_BRIGHT_CONTRAST:
+        return op(b, TRC_OP_BRIGHT_CONTRAST, 0, l->in, l->out);
     case TRC_NODE_COLOR_RAMP:
         TRC_TRY(table_of(l, &resource));
         return trc_build_op(b, TRC_OP_RAMP, mode, resource, l->in, l->out);
-    case TRC_NODE_SEPARATE: return lower_components(l, TRC_OP_SEPARATE);
-    case TRC_NODE_COMBINE: return lower_components(l, TRC_OP_COMBINE);
-    case TRC_NODE_CHECKER: return op(b, TRC_OP_CHECKER, 0, l->in, l->out);
-    case TRC_NODE_RGB_TO_BW: return op(b, TRC_OP_LUMINANCE, 0, l->in, l->out);
-    default: return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "a node has an unknown type");
+    case TRC_NODE_SEPARATE:
+        return lower_components(l, TRC_OP_SEPARATE);
+    case TRC_NODE_COMBINE:
+        return lower_components(l, TRC_OP_COMBINE);
+    case TRC_NODE_CHECKER:
+        return op(b, TRC_OP_CHECKER, 0, l->in, l->out);
+    case TRC_NODE_RGB_TO_BW:
+        return op(b, TRC_OP_LUMINANCE, 0, l->in, l->out);
+    default:
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "a node has an unknown type");
     }
 }
 
 trc_status trc_build_values(struct trc_build *b) {
     uint32_t total = 0;
     b->first_output = trc_alloc(b->desc->node_count, sizeof *b->first_output);
-    if (!b->first_output) goto no_memory;
+    if (!b->first_output)
+        goto no_memory;
     for (uint32_t i = 0; i < b->desc->node_count; i++) {
         const trc_node *node = &b->desc->nodes[i];
         b->first_output[i] = total;
         total += output_offset(node, (uint32_t)strlen(trc_node_info_of(node->type)->outputs));
     }
     b->outputs = trc_alloc(total, sizeof *b->outputs);
-    if (!b->outputs) goto no_memory;
+    if (!b->outputs)
+        goto no_memory;
     for (uint32_t i = 0; i < b->desc->node_count; i++) {
-        struct lowering l = {.b = b, .node = &b->desc->nodes[i], .out = b->outputs + b->first_output[i]};
-        if (trc_node_is_shader(l.node->type)) continue;
+        struct lowering l = {
+            .b = b, .node = &b->desc->nodes[i], .out = b->outputs + b->first_output[i]};
+        if (trc_node_is_shader(l.node->type))
+            continue;
         uint32_t floats = 0;
         for (uint32_t k = 0; k < l.node->input_count; k++) {
             TRC_TRY(trc_build_input(b, l.node, k, l.in + floats));

@@ -5,7 +5,8 @@
 
 static const struct trc_node_info infos[] = {
     {TRC_NODE_DIFFUSE, "Diffuse", "cfn", "color roughness normal", "s"},
-    {TRC_NODE_GLOSSY, "Glossy", "cfffnt", "color roughness anisotropy rotation normal tangent", "s"},
+    {TRC_NODE_GLOSSY, "Glossy", "cfffnt", "color roughness anisotropy rotation normal tangent",
+     "s"},
     {TRC_NODE_GLASS, "Glass", "cffn", "color roughness ior normal", "s"},
     {TRC_NODE_REFRACTION, "Refraction", "cffn", "color roughness ior normal", "s"},
     {TRC_NODE_TRANSPARENT, "Transparent", "c", "color", "s"},
@@ -52,7 +53,8 @@ static const struct trc_node_info infos[] = {
 
 const struct trc_node_info *trc_node_info_of(uint32_t type) {
     for (size_t i = 0; i < sizeof infos / sizeof *infos; i++) {
-        if (infos[i].type == type) return &infos[i];
+        if (infos[i].type == type)
+            return &infos[i];
     }
     return NULL;
 }
@@ -60,7 +62,8 @@ const struct trc_node_info *trc_node_info_of(uint32_t type) {
 bool trc_node_is_shader(uint32_t type) { return type < TRC_NODE_IMAGE; }
 
 char trc_node_output_kind(const trc_node *node, uint32_t output) {
-    if (node->type == TRC_NODE_COMBINE && node->mode == TRC_SEPARATE_XYZ) return 'v';
+    if (node->type == TRC_NODE_COMBINE && node->mode == TRC_SEPARATE_XYZ)
+        return 'v';
     return trc_node_info_of(node->type)->outputs[output];
 }
 
@@ -71,21 +74,34 @@ bool trc_node_mode_is_valid(uint32_t type, uint32_t mode) {
     switch (type) {
     case TRC_NODE_GLOSSY:
     case TRC_NODE_GLASS:
-    case TRC_NODE_REFRACTION: return mode <= TRC_DISTRIBUTION_ASHIKHMIN;
-    case TRC_NODE_PRINCIPLED: return mode <= TRC_DISTRIBUTION_MULTI_GGX;
-    case TRC_NODE_IMAGE: return mode < 64 && (mode & TRC_IMAGE_MODE_INTERPOLATION) <= TRC_IMAGE_CUBIC;
+    case TRC_NODE_REFRACTION:
+        return mode <= TRC_DISTRIBUTION_ASHIKHMIN;
+    case TRC_NODE_PRINCIPLED:
+        return mode <= TRC_DISTRIBUTION_MULTI_GGX;
+    case TRC_NODE_IMAGE:
+        return mode < 64 && (mode & TRC_IMAGE_MODE_INTERPOLATION) <= TRC_IMAGE_CUBIC;
     case TRC_NODE_ENVIRONMENT:
         return (mode & ~(3u | 1u << 4)) == 0 && (mode & 3u) <= TRC_IMAGE_CUBIC;
-    case TRC_NODE_MAPPING: return mode <= 3;
-    case TRC_NODE_MIX_COLOR: return base <= TRC_BLEND_EXCLUSION;
-    case TRC_NODE_MATH: return base <= TRC_MATH_DEGREES;
-    case TRC_NODE_NORMAL_MAP: return mode <= 4;
-    case TRC_NODE_COLOR_RAMP: return mode <= 1;
+    case TRC_NODE_MAPPING:
+        return mode <= 3;
+    case TRC_NODE_MIX_COLOR:
+        return base <= TRC_BLEND_EXCLUSION;
+    case TRC_NODE_MATH:
+        return base <= TRC_MATH_DEGREES;
+    case TRC_NODE_NORMAL_MAP:
+        return mode <= 4;
+    case TRC_NODE_COLOR_RAMP:
+        return mode <= 1;
     case TRC_NODE_SEPARATE:
-    case TRC_NODE_COMBINE: return mode <= TRC_SEPARATE_XYZ;
-    case TRC_NODE_MAP_RANGE: return base == 0;
-    case TRC_NODE_CLAMP: return mode <= 1;
-    case TRC_NODE_VECTOR_MATH: return mode <= TRC_VECTOR_FRACT;
-    default: return mode == 0;
+    case TRC_NODE_COMBINE:
+        return mode <= TRC_SEPARATE_XYZ;
+    case TRC_NODE_MAP_RANGE:
+        return base == 0;
+    case TRC_NODE_CLAMP:
+        return mode <= 1;
+    case TRC_NODE_VECTOR_MATH:
+        return mode <= TRC_VECTOR_FRACT;
+    default:
+        return mode == 0;
     }
 }

@@ -1,8 +1,8 @@
 /* Operations of material programs: what shading/compile.c emits and kernels/program.c runs.
  *
- * An operation reads floats and writes floats; a colour or vector is three of them. One definition of
- * each operation's meaning (kernels/program_*.h) serves rendering at every width and, on the scalar
- * kernels, the folding of constants. */
+ * An operation reads floats and writes floats; a colour or vector is three of them. One definition
+ * of each operation's meaning (kernels/program_*.h) serves rendering at every width and, on the
+ * scalar kernels, the folding of constants. */
 #ifndef TRACER_SHADING_PROGRAM_H
 #define TRACER_SHADING_PROGRAM_H
 
@@ -20,62 +20,62 @@
 /* Entries (RGBA) of a colour ramp's table. */
 #define TRC_RAMP_SIZE 256u
 
-/* X(name, inputs, outputs, is_pure): pure ones depend on inputs, mode and table only. Outputs are three
- * floats of a vector or colour unless the list of values says otherwise. */
-#define TRC_OPS(X)                                                                                 \
-    /* the shading point, world space */                                                           \
-    X(POSITION, 0, 3, 0)                                                                           \
-    X(NORMAL, 0, 3, 0)          /* shading normal */                                               \
-    X(TRUE_NORMAL, 0, 3, 0)                                                                        \
-    X(INCOMING, 0, 3, 0)                                                                           \
-    X(TANGENT, 0, 3, 0)         /* around the object's Z axis */                                   \
-    X(PARAMETRIC, 0, 2, 0)                                                                         \
-    X(BACKFACING, 0, 1, 0)                                                                         \
-    /* texture coordinates */                                                                      \
-    X(GENERATED, 0, 3, 0)                                                                          \
-    X(OBJECT_NORMAL, 0, 3, 0)                                                                      \
-    X(OBJECT_POSITION, 0, 3, 0)                                                                    \
-    X(CAMERA_POSITION, 0, 3, 0)                                                                    \
-    X(WINDOW, 0, 2, 0)                                                                             \
-    X(REFLECTION, 0, 3, 0)                                                                         \
-    X(UV, 0, 2, 0)              /* resource: name */                                               \
-    X(COLOR_ATTRIBUTE, 0, 4, 0) /* resource: name; RGBA */                                         \
-    /* the ray and the object */                                                                   \
-    X(LIGHT_PATH, 0, 1, 0)      /* mode: number of the Light Path node's output */                 \
-    X(OBJECT_LOCATION, 0, 3, 0)                                                                    \
-    X(OBJECT_COLOR, 0, 4, 0)    /* RGBA */                                                         \
-    X(OBJECT_INDEX, 0, 1, 0)                                                                       \
-    X(OBJECT_RANDOM, 0, 1, 0)                                                                      \
-    /* inputs and the point */                                                                     \
-    X(FRESNEL, 4, 1, 0)         /* ior, normal */                                                  \
-    X(LAYER_FRESNEL, 4, 1, 0)   /* blend, normal */                                                \
-    X(LAYER_FACING, 4, 1, 0)    /* blend, normal */                                                \
-    X(NORMAL_MAP, 4, 3, 0)      /* strength, color; mode: space; resource: name */                 \
-    /* textures */                                                                                 \
-    X(IMAGE, 2, 4, 0)           /* u, v; mode: TRC_IMAGE_MODE_*; resource: image; RGBA */          \
-    X(IMAGE_BOX, 3, 4, 0)       /* vector; the same */                                             \
-    X(PROJECT, 3, 2, 1)         /* vector -> u, v; mode: TRC_PROJECT_* */                          \
-    X(CHECKER, 10, 4, 1)        /* vector, color 1, color 2, scale -> color, factor */             \
-    /* floats */                                                                                   \
-    X(MATH, 3, 1, 1)            /* mode: TRC_MATH_* */                                             \
-    X(CLAMP, 3, 1, 1)           /* value, min, max; mode 1: min and max in either order */         \
-    X(MAP_RANGE, 5, 1, 1)                                                                          \
-    /* vectors */                                                                                  \
-    X(VECTOR_MATH, 10, 3, 1)    /* a, b, c, scale; mode: TRC_VECTOR_* that give a vector */        \
-    X(VECTOR_MEASURE, 6, 1, 1)  /* a, b; mode: TRC_VECTOR_DOT, DISTANCE, LENGTH */                 \
-    X(ROTATION, 3, 9, 1)        /* Euler angles XYZ -> rows of the matrix */                       \
-    X(MAPPING, 18, 3, 1)        /* vector, location, scale, rows; mode as the node's */            \
-    /* colours */                                                                                  \
-    X(MIX, 7, 3, 1)             /* factor, a, b; mode: TRC_BLEND_* */                              \
-    X(SATURATE, 3, 3, 1)        /* each to [0, 1] */                                               \
-    X(LUMINANCE, 3, 1, 1)       /* colour to float */                                              \
-    X(AVERAGE, 3, 1, 1)         /* vector to float */                                              \
-    X(INVERT, 4, 3, 1)          /* factor, color */                                                \
-    X(GAMMA, 4, 3, 1)           /* color, gamma */                                                 \
-    X(HUE_SATURATION, 7, 3, 1)  /* hue, saturation, value, factor, color */                        \
-    X(BRIGHT_CONTRAST, 5, 3, 1) /* color, bright, contrast */                                      \
-    X(RAMP, 1, 4, 1)            /* resource: first float in tables; mode 1: steps; RGBA */         \
-    X(SEPARATE, 3, 3, 1)        /* mode: TRC_SEPARATE_HSV, HSL */                                  \
+/* X(name, inputs, outputs, is_pure): pure ones depend on inputs, mode and table only. Outputs are
+ * three floats of a vector or colour unless the list of values says otherwise. */
+#define TRC_OPS(X)                                                                         \
+    /* the shading point, world space */                                                   \
+    X(POSITION, 0, 3, 0)                                                                   \
+    X(NORMAL, 0, 3, 0) /* shading normal */                                                \
+    X(TRUE_NORMAL, 0, 3, 0)                                                                \
+    X(INCOMING, 0, 3, 0)                                                                   \
+    X(TANGENT, 0, 3, 0) /* around the object's Z axis */                                   \
+    X(PARAMETRIC, 0, 2, 0)                                                                 \
+    X(BACKFACING, 0, 1, 0)                                                                 \
+    /* texture coordinates */                                                              \
+    X(GENERATED, 0, 3, 0)                                                                  \
+    X(OBJECT_NORMAL, 0, 3, 0)                                                              \
+    X(OBJECT_POSITION, 0, 3, 0)                                                            \
+    X(CAMERA_POSITION, 0, 3, 0)                                                            \
+    X(WINDOW, 0, 2, 0)                                                                     \
+    X(REFLECTION, 0, 3, 0)                                                                 \
+    X(UV, 0, 2, 0)              /* resource: name */                                       \
+    X(COLOR_ATTRIBUTE, 0, 4, 0) /* resource: name; RGBA */                                 \
+    /* the ray and the object */                                                           \
+    X(LIGHT_PATH, 0, 1, 0) /* mode: number of the Light Path node's output */              \
+    X(OBJECT_LOCATION, 0, 3, 0)                                                            \
+    X(OBJECT_COLOR, 0, 4, 0) /* RGBA */                                                    \
+    X(OBJECT_INDEX, 0, 1, 0)                                                               \
+    X(OBJECT_RANDOM, 0, 1, 0)                                                              \
+    /* inputs and the point */                                                             \
+    X(FRESNEL, 4, 1, 0)       /* ior, normal */                                            \
+    X(LAYER_FRESNEL, 4, 1, 0) /* blend, normal */                                          \
+    X(LAYER_FACING, 4, 1, 0)  /* blend, normal */                                          \
+    X(NORMAL_MAP, 4, 3, 0)    /* strength, color; mode: space; resource: name */           \
+    /* textures */                                                                         \
+    X(IMAGE, 2, 4, 0)     /* u, v; mode: TRC_IMAGE_MODE_*; resource: image; RGBA */        \
+    X(IMAGE_BOX, 3, 4, 0) /* vector; the same */                                           \
+    X(PROJECT, 3, 2, 1)   /* vector -> u, v; mode: TRC_PROJECT_* */                        \
+    X(CHECKER, 10, 4, 1)  /* vector, color 1, color 2, scale -> color, factor */           \
+    /* floats */                                                                           \
+    X(MATH, 3, 1, 1)  /* mode: TRC_MATH_* */                                               \
+    X(CLAMP, 3, 1, 1) /* value, min, max; mode 1: min and max in either order */           \
+    X(MAP_RANGE, 5, 1, 1)                                                                  \
+    /* vectors */                                                                          \
+    X(VECTOR_MATH, 10, 3, 1)   /* a, b, c, scale; mode: TRC_VECTOR_* that give a vector */ \
+    X(VECTOR_MEASURE, 6, 1, 1) /* a, b; mode: TRC_VECTOR_DOT, DISTANCE, LENGTH */          \
+    X(ROTATION, 3, 9, 1)       /* Euler angles XYZ -> rows of the matrix */                \
+    X(MAPPING, 18, 3, 1)       /* vector, location, scale, rows; mode as the node's */     \
+    /* colours */                                                                          \
+    X(MIX, 7, 3, 1)             /* factor, a, b; mode: TRC_BLEND_* */                      \
+    X(SATURATE, 3, 3, 1)        /* each to [0, 1] */                                       \
+    X(LUMINANCE, 3, 1, 1)       /* colour to float */                                      \
+    X(AVERAGE, 3, 1, 1)         /* vector to float */                                      \
+    X(INVERT, 4, 3, 1)          /* factor, color */                                        \
+    X(GAMMA, 4, 3, 1)           /* color, gamma */                                         \
+    X(HUE_SATURATION, 7, 3, 1)  /* hue, saturation, value, factor, color */                \
+    X(BRIGHT_CONTRAST, 5, 3, 1) /* color, bright, contrast */                              \
+    X(RAMP, 1, 4, 1)            /* resource: first float in tables; mode 1: steps; RGBA */ \
+    X(SEPARATE, 3, 3, 1)        /* mode: TRC_SEPARATE_HSV, HSL */                          \
     X(COMBINE, 3, 3, 1)
 
 enum trc_op {
@@ -85,7 +85,8 @@ enum trc_op {
         TRC_OP_COUNT
 };
 
-/* TRC_OP_IMAGE: interpolation in bits 0-1 and extension in bits 2-3 as in the public header, and: */
+/* TRC_OP_IMAGE: interpolation in bits 0-1 and extension in bits 2-3 as in the public header, and:
+ */
 #define TRC_IMAGE_MODE_INTERPOLATION 3u
 #define TRC_IMAGE_MODE_EXTENSION (3u << 2)
 #define TRC_IMAGE_MODE_ALPHA (1u << 4) /* the alpha is used too: colours are divided by it */
@@ -97,10 +98,20 @@ enum { TRC_SEPARATE_RGB, TRC_SEPARATE_HSV, TRC_SEPARATE_HSL, TRC_SEPARATE_XYZ };
 
 /* Outputs of TRC_NODE_LIGHT_PATH. */
 enum {
-    TRC_PATH_IS_CAMERA, TRC_PATH_IS_SHADOW, TRC_PATH_IS_DIFFUSE, TRC_PATH_IS_GLOSSY,
-    TRC_PATH_IS_SINGULAR, TRC_PATH_IS_REFLECTION, TRC_PATH_IS_TRANSMISSION, TRC_PATH_RAY_LENGTH,
-    TRC_PATH_DEPTH, TRC_PATH_DIFFUSE_DEPTH, TRC_PATH_GLOSSY_DEPTH, TRC_PATH_TRANSPARENT_DEPTH,
-    TRC_PATH_TRANSMISSION_DEPTH, TRC_PATH_OUTPUTS
+    TRC_PATH_IS_CAMERA,
+    TRC_PATH_IS_SHADOW,
+    TRC_PATH_IS_DIFFUSE,
+    TRC_PATH_IS_GLOSSY,
+    TRC_PATH_IS_SINGULAR,
+    TRC_PATH_IS_REFLECTION,
+    TRC_PATH_IS_TRANSMISSION,
+    TRC_PATH_RAY_LENGTH,
+    TRC_PATH_DEPTH,
+    TRC_PATH_DIFFUSE_DEPTH,
+    TRC_PATH_GLOSSY_DEPTH,
+    TRC_PATH_TRANSPARENT_DEPTH,
+    TRC_PATH_TRANSMISSION_DEPTH,
+    TRC_PATH_OUTPUTS
 };
 
 /* Runs a pure operation once: out gets its outputs. table: of TRC_OP_RAMP, else unused.

@@ -5,8 +5,8 @@
 
 /* The cut-off of weights in Cycles. */
 #define WEIGHT_CUTOFF 1e-5f
-/* Microfacets of alpha^2 at or below it are ideal: TRC_SINGULAR_ALPHA2 of kernels/bsdf.h. alpha is the
- * square of roughness. */
+/* Microfacets of alpha^2 at or below it are ideal: TRC_SINGULAR_ALPHA2 of kernels/bsdf.h. alpha is
+ * the square of roughness. */
 #define SINGULAR_ALPHA2 1e-7f
 /* Some more than rounding may cost, so that a flag is never missing. */
 #define MARGIN 1.001f
@@ -34,14 +34,18 @@ static bool is_constant3(const struct trc_operand *o) {
 static uint32_t roughness_bits(float low, float high) {
     uint32_t has = 0;
     const float l2 = low * low, h2 = high * high;
-    if (!(l2 * l2 > SINGULAR_ALPHA2 * MARGIN)) has |= TRC_MATERIAL_HAS_SPECULAR;
-    if (!(h2 * h2 * MARGIN <= SINGULAR_ALPHA2)) has |= TRC_MATERIAL_HAS_GLOSSY;
+    if (!(l2 * l2 > SINGULAR_ALPHA2 * MARGIN))
+        has |= TRC_MATERIAL_HAS_SPECULAR;
+    if (!(h2 * h2 * MARGIN <= SINGULAR_ALPHA2))
+        has |= TRC_MATERIAL_HAS_GLOSSY;
     return has;
 }
 
 static uint32_t microfacet_bits(uint32_t distribution, struct trc_operand roughness) {
-    if (distribution == TRC_DISTRIBUTION_SHARP) return TRC_MATERIAL_HAS_SPECULAR;
-    if (!trc_is_constant(roughness)) return roughness_bits(0.0f, INFINITY);
+    if (distribution == TRC_DISTRIBUTION_SHARP)
+        return TRC_MATERIAL_HAS_SPECULAR;
+    if (!trc_is_constant(roughness))
+        return roughness_bits(0.0f, INFINITY);
     const float r = fmaxf(roughness.value, 0.0f);
     return roughness_bits(r, r);
 }
@@ -50,7 +54,8 @@ static uint32_t microfacet_bits(uint32_t distribution, struct trc_operand roughn
 static uint32_t transmission_bits(uint32_t distribution, struct trc_operand roughness,
                                   struct trc_operand own) {
     const uint32_t reflected = microfacet_bits(distribution, roughness);
-    if (distribution != TRC_DISTRIBUTION_GGX) return reflected;
+    if (distribution != TRC_DISTRIBUTION_GGX)
+        return reflected;
     if (!trc_is_constant(own) || !trc_is_constant(roughness)) {
         return TRC_MATERIAL_HAS_SPECULAR | TRC_MATERIAL_HAS_GLOSSY;
     }
@@ -66,17 +71,21 @@ static uint32_t principled_bits(uint32_t distribution, const struct trc_operand 
     const struct trc_operand roughness = in[TRC_PRINCIPLED_ROUGHNESS];
     const struct trc_operand alpha = in[TRC_PRINCIPLED_ALPHA];
     uint32_t has = may_be_below(alpha, 1.0f) ? TRC_MATERIAL_HAS_TRANSPARENCY : 0u;
-    if (!may_exceed(alpha, 0.0f)) return has;
-    const bool not_metal = may_be_below(metallic, 1.0f), not_glass = may_be_below(transmission, 1.0f);
-    if (not_metal && not_glass) has |= TRC_MATERIAL_HAS_DIFFUSE;
+    if (!may_exceed(alpha, 0.0f))
+        return has;
+    const bool not_metal = may_be_below(metallic, 1.0f),
+               not_glass = may_be_below(transmission, 1.0f);
+    if (not_metal && not_glass)
+        has |= TRC_MATERIAL_HAS_DIFFUSE;
     if ((not_glass || may_exceed(metallic, 0.0f)) &&
         (may_exceed(in[TRC_PRINCIPLED_SPECULAR], WEIGHT_CUTOFF) ||
          may_exceed(metallic, WEIGHT_CUTOFF))) {
         has |= microfacet_bits(distribution, roughness);
     }
     if (not_metal && may_exceed(transmission, WEIGHT_CUTOFF)) {
-        has |= TRC_MATERIAL_HAS_REFRACTION |
-               transmission_bits(distribution, roughness, in[TRC_PRINCIPLED_TRANSMISSION_ROUGHNESS]);
+        has |=
+            TRC_MATERIAL_HAS_REFRACTION |
+            transmission_bits(distribution, roughness, in[TRC_PRINCIPLED_TRANSMISSION_ROUGHNESS]);
     }
     if (may_exceed(in[TRC_PRINCIPLED_CLEARCOAT], WEIGHT_CUTOFF)) {
         has |= microfacet_bits(TRC_DISTRIBUTION_GGX, in[TRC_PRINCIPLED_CLEARCOAT_ROUGHNESS]);
@@ -86,16 +95,23 @@ static uint32_t principled_bits(uint32_t distribution, const struct trc_operand 
 
 static uint32_t leaf_bits(const struct trc_leaf *leaf, const struct trc_operand *in) {
     switch (leaf->type) {
-    case TRC_NODE_DIFFUSE: return TRC_MATERIAL_HAS_DIFFUSE;
-    case TRC_NODE_TRANSLUCENT: return TRC_MATERIAL_HAS_TRANSLUCENT;
-    case TRC_NODE_TRANSPARENT: return TRC_MATERIAL_HAS_TRANSPARENCY;
-    case TRC_NODE_HOLDOUT: return TRC_MATERIAL_HAS_HOLDOUT;
-    case TRC_NODE_GLOSSY: return microfacet_bits(leaf->mode, in[TRC_ROUGHNESS]);
+    case TRC_NODE_DIFFUSE:
+        return TRC_MATERIAL_HAS_DIFFUSE;
+    case TRC_NODE_TRANSLUCENT:
+        return TRC_MATERIAL_HAS_TRANSLUCENT;
+    case TRC_NODE_TRANSPARENT:
+        return TRC_MATERIAL_HAS_TRANSPARENCY;
+    case TRC_NODE_HOLDOUT:
+        return TRC_MATERIAL_HAS_HOLDOUT;
+    case TRC_NODE_GLOSSY:
+        return microfacet_bits(leaf->mode, in[TRC_ROUGHNESS]);
     case TRC_NODE_GLASS:
     case TRC_NODE_REFRACTION:
         return TRC_MATERIAL_HAS_REFRACTION | microfacet_bits(leaf->mode, in[TRC_ROUGHNESS]);
-    case TRC_NODE_PRINCIPLED: return principled_bits(leaf->mode, in);
-    default: return 0;
+    case TRC_NODE_PRINCIPLED:
+        return principled_bits(leaf->mode, in);
+    default:
+        return 0;
     }
 }
 
@@ -125,14 +141,16 @@ static bool emitter_of(const struct trc_leaf *leaf, const struct trc_operand *in
 }
 
 static float clamped_alpha(struct trc_operand o) {
-    if (!trc_is_constant(o)) return 1.0f;
+    if (!trc_is_constant(o))
+        return 1.0f;
     return fminf(fmaxf(o.value, 0.0f), 1.0f);
 }
 
 static void add_emission(const struct trc_leaf *leaf, const struct trc_operand *in,
                          struct trc_material *m) {
     struct emitter e;
-    if (!emitter_of(leaf, in, &e)) return;
+    if (!emitter_of(leaf, in, &e))
+        return;
     m->has |= TRC_MATERIAL_HAS_EMISSION;
     if (!is_constant3(e.color) || !trc_is_constant(e.strength) || !trc_is_constant(e.alpha) ||
         !trc_is_constant(leaf->weight)) {
@@ -155,9 +173,12 @@ void trc_build_traits(const struct trc_build *b, struct trc_material *m) {
     }
     for (uint32_t i = 0; i < b->op_count; i++) {
         const struct trc_build_op *o = &b->ops[i];
-        if (!o->is_live) continue;
+        if (!o->is_live)
+            continue;
         m->has |= TRC_MATERIAL_HAS_PROGRAM;
-        if (o->op == TRC_OP_IMAGE || o->op == TRC_OP_IMAGE_BOX) m->has |= TRC_MATERIAL_HAS_TEXTURE;
-        if (o->op == TRC_OP_LIGHT_PATH) m->has |= TRC_MATERIAL_READS_LIGHT_PATH;
+        if (o->op == TRC_OP_IMAGE || o->op == TRC_OP_IMAGE_BOX)
+            m->has |= TRC_MATERIAL_HAS_TEXTURE;
+        if (o->op == TRC_OP_LIGHT_PATH)
+            m->has |= TRC_MATERIAL_READS_LIGHT_PATH;
     }
 }

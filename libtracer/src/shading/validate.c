@@ -36,15 +36,18 @@ static trc_status fail_input(const struct place *at, uint32_t input, const char 
 static trc_status check_constant(const struct place *at, uint32_t index, char kind,
                                  const trc_node_input *input) {
     for (uint32_t i = 0; i < trc_kind_floats(kind); i++) {
-        if (!isfinite(input->value[i])) return fail_input(at, index, "the value is not finite");
+        if (!isfinite(input->value[i]))
+            return fail_input(at, index, "the value is not finite");
     }
     return TRC_OK;
 }
 
-static trc_status check_input(const trc_material_desc *desc, const struct place *at, uint32_t index) {
+static trc_status check_input(const trc_material_desc *desc, const struct place *at,
+                              uint32_t index) {
     const trc_node_input *input = &desc->inputs[desc->nodes[at->node].first_input + index];
     const char kind = at->info->inputs[index];
-    if (input->node == -1) return check_constant(at, index, kind, input);
+    if (input->node == -1)
+        return check_constant(at, index, kind, input);
     if (input->node == -2) {
         return strchr("fcs", kind) ? fail_input(at, index, "it has no default") : TRC_OK;
     }
@@ -56,24 +59,27 @@ static trc_status check_input(const trc_material_desc *desc, const struct place 
         return fail_input(at, index, "it is linked to an output that does not exist");
     }
     if ((kind == 's') != (from->outputs[input->output] == 's')) {
-        return fail_input(at, index, kind == 's' ? "it is linked to a value, not to a shader"
-                                                 : "it is linked to a shader, not to a value");
+        return fail_input(at, index,
+                          kind == 's' ? "it is linked to a value, not to a shader"
+                                      : "it is linked to a shader, not to a value");
     }
     return TRC_OK;
 }
 
 static trc_status check_table(const trc_node *node, const struct place *at) {
-    if (node->type != TRC_NODE_COLOR_RAMP) return TRC_OK;
+    if (node->type != TRC_NODE_COLOR_RAMP)
+        return TRC_OK;
     if (!node->table || (uintptr_t)node->table % sizeof(float) ||
         node->table_count != 4 * TRC_RAMP_SIZE) {
-        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "node %" PRIu32 " (%s): the table has %" PRIu64
-                        " floats, not %u", at->node, at->info->name,
-                        node->table ? node->table_count : 0, 4 * TRC_RAMP_SIZE);
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT,
+                        "node %" PRIu32 " (%s): the table has %" PRIu64 " floats, not %u", at->node,
+                        at->info->name, node->table ? node->table_count : 0, 4 * TRC_RAMP_SIZE);
     }
     for (uint64_t i = 0; i < node->table_count; i++) {
         if (!isfinite(node->table[i])) {
-            return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "node %" PRIu32 " (%s): number %" PRIu64
-                            " of the table is not finite", at->node, at->info->name, i);
+            return trc_fail(TRC_ERROR_INVALID_ARGUMENT,
+                            "node %" PRIu32 " (%s): number %" PRIu64 " of the table is not finite",
+                            at->node, at->info->name, i);
         }
     }
     return TRC_OK;
@@ -83,12 +89,13 @@ static trc_status check_node(const trc_material_desc *desc, uint32_t index) {
     const trc_node *node = &desc->nodes[index];
     const struct place at = {trc_node_info_of(node->type), index};
     if (!at.info) {
-        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "node %" PRIu32 " has the unknown type %" PRIu32,
-                        index, node->type);
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT,
+                        "node %" PRIu32 " has the unknown type %" PRIu32, index, node->type);
     }
     if (!trc_node_mode_is_valid(node->type, node->mode)) {
-        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "node %" PRIu32 " (%s) has the unknown mode %" PRIu32,
-                        index, at.info->name, node->mode);
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT,
+                        "node %" PRIu32 " (%s) has the unknown mode %" PRIu32, index, at.info->name,
+                        node->mode);
     }
     const uint32_t count = (uint32_t)strlen(at.info->inputs);
     if (node->input_count != count) {
@@ -96,13 +103,15 @@ static trc_status check_node(const trc_material_desc *desc, uint32_t index) {
                         "node %" PRIu32 " (%s) has %" PRIu32 " inputs, not %" PRIu32, index,
                         at.info->name, node->input_count, count);
     }
-    if (count && (node->first_input > desc->input_count ||
-                  count > desc->input_count - node->first_input)) {
+    if (count &&
+        (node->first_input > desc->input_count || count > desc->input_count - node->first_input)) {
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT,
-                        "node %" PRIu32 " (%s): its inputs are beyond the %" PRIu32 " of the material",
+                        "node %" PRIu32 " (%s): its inputs are beyond the %" PRIu32
+                        " of the material",
                         index, at.info->name, desc->input_count);
     }
-    for (uint32_t i = 0; i < count; i++) TRC_TRY(check_input(desc, &at, i));
+    for (uint32_t i = 0; i < count; i++)
+        TRC_TRY(check_input(desc, &at, i));
     return check_table(node, &at);
 }
 
@@ -110,20 +119,24 @@ trc_status trc_material_validate(const trc_material_desc *desc) {
     const uint32_t known = TRC_MATERIAL_SAMPLE_EMISSION | TRC_MATERIAL_TRANSPARENT_SHADOW;
     TRC_TRY(trc_check_struct(desc, sizeof *desc, "trc_material_desc"));
     TRC_TRY(trc_check_count(desc->node_count, 0, TRC_MAX_NODES, "node_count"));
-    TRC_TRY(trc_check_count(desc->input_count, 0, TRC_MAX_NODES * TRC_MAX_NODE_INPUTS, "input_count"));
+    TRC_TRY(
+        trc_check_count(desc->input_count, 0, TRC_MAX_NODES * TRC_MAX_NODE_INPUTS, "input_count"));
     TRC_TRY(trc_check_array(desc->nodes, desc->node_count, desc->node_count, sizeof *desc->nodes,
                             _Alignof(trc_node), "nodes"));
     TRC_TRY(trc_check_array(desc->inputs, desc->input_count, desc->input_count,
                             sizeof *desc->inputs, _Alignof(trc_node_input), "inputs"));
     if (desc->flags & ~known) {
-        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "flags has unknown bits: %#" PRIx32, desc->flags);
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "flags has unknown bits: %#" PRIx32,
+                        desc->flags);
     }
-    for (uint32_t i = 0; i < desc->node_count; i++) TRC_TRY(check_node(desc, i));
-    if (desc->node_count == 0 || desc->surface == -1) return TRC_OK;
+    for (uint32_t i = 0; i < desc->node_count; i++)
+        TRC_TRY(check_node(desc, i));
+    if (desc->node_count == 0 || desc->surface == -1)
+        return TRC_OK;
     if (desc->surface < 0 || (uint32_t)desc->surface >= desc->node_count ||
         !trc_node_is_shader(desc->nodes[desc->surface].type)) {
-        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "surface is %" PRId32 ", which is no shader node",
-                        desc->surface);
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT,
+                        "surface is %" PRId32 ", which is no shader node", desc->surface);
     }
     return TRC_OK;
 }

@@ -1,5 +1,5 @@
-/* Lobes: sampling against its density, energy, reciprocity, agreement of evaluating and sampling, and values
- * against formulas in double. */
+/* Lobes: sampling against its density, energy, reciprocity, agreement of evaluating and sampling,
+ * and values against formulas in double. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -25,8 +25,7 @@ static void begin(struct model *m, const char *name, uint32_t type, uint32_t mod
     memset(m, 0, sizeof *m);
     m->name = name;
     m->material.leaf_count = 1;
-    m->material.leaves[0] =
-        (struct trc_leaf){type, mode, {-1, 1.0f}, 0, count};
+    m->material.leaves[0] = (struct trc_leaf){type, mode, {-1, 1.0f}, 0, count};
     for (uint32_t i = 0; i < OPERANDS; i++)
         m->operands[i] = constant(0.0f);
 }
@@ -224,10 +223,10 @@ static void draw_samples(const struct trc_lobes *l, const struct trc_surface *s,
     }
 }
 
-/* Integrals of density and value over one cell by the midpoint rule, FINE x FINE directions, finer where
- * asked. */
-static void integrate_cell(const struct trc_lobes *l, const struct trc_surface *s, int row, int column,
-                           int fine, double *density, double *value) {
+/* Integrals of density and value over one cell by the midpoint rule, FINE x FINE directions, finer
+ * where asked. */
+static void integrate_cell(const struct trc_lobes *l, const struct trc_surface *s, int row,
+                           int column, int fine, double *density, double *value) {
     *density = *value = 0.0;
     for (int i = 0; i < fine; i++)
         for (int j = 0; j < fine; j += TRC_WIDTH) {
@@ -241,7 +240,8 @@ static void integrate_cell(const struct trc_lobes *l, const struct trc_surface *
                 z[k] = (float)c;
             }
             struct trc_bsdf_value v;
-            TRC_KERNEL(trc_bsdf_eval)(l, s, v3(vf_load(x), vf_load(y), vf_load(z)), vm_all_set(), &v);
+            TRC_KERNEL(trc_bsdf_eval)
+            (l, s, v3(vf_load(x), vf_load(y), vf_load(z)), vm_all_set(), &v);
             for (int k = 0; k < TRC_WIDTH; k++) {
                 *density += (double)vf_get(v.pdf, k);
                 *value += (double)(vf_get(v.diffuse.x, k) + vf_get(v.glossy.x, k) +
@@ -338,7 +338,8 @@ static void sampling_matches_density(void **state) {
     assert_int_equal(failed, 0);
 }
 
-/* Mean weight of samples against the integral of the value: with what is sampled only, no diffuse lobes. */
+/* Mean weight of samples against the integral of the value: with what is sampled only, no diffuse
+ * lobes. */
 static void weights_match_values(void **state) {
     (void)state;
     struct model models[] = {
@@ -363,11 +364,13 @@ static void weights_match_values(void **state) {
         for (int k = 0; k < 3; k++) {
             const double cosines[] = {0.95, 0.5, 0.15};
             const struct result r = check_sampling(&models[i], cosines[k], 0.7, FINE);
-            /* Lobes that do not continue reach directions no sample does; those materials only must not give
-             * more. */
-            const double off = fabs(r.mean - r.value), allowed = 5 * r.error + 0.004 * r.value + 1e-4;
+            /* Lobes that do not continue reach directions no sample does; those materials only must
+             * not give more. */
+            const double off = fabs(r.mean - r.value),
+                         allowed = 5 * r.error + 0.004 * r.value + 1e-4;
             const bool mixed = models[i].material.leaves[0].type == TRC_NODE_PRINCIPLED &&
-                               models[i].operands[0].value < 1.0f && models[i].operands[0].value > 0.0f;
+                               models[i].operands[0].value < 1.0f &&
+                               models[i].operands[0].value > 0.0f;
             const bool bad = mixed ? r.mean > r.value + allowed : off > allowed;
             failed += bad;
             if (bad || k == 1)
@@ -403,7 +406,8 @@ static void furnace_is_white(void **state) {
             set(&metal, 11, 0.0f);
             const double a = albedo(&multi, cosines[k]), b = albedo(&multi_glass, cosines[k]);
             const double c = albedo(&from_inside, cosines[k]), d = albedo(&metal, cosines[k]);
-            printf("multi-scatter, cos %.2f, roughness %.2f: glossy %.3f, glass %.3f and %.3f, metal %.3f\n",
+            printf("multi-scatter, cos %.2f, roughness %.2f: glossy %.3f, glass %.3f and %.3f, "
+                   "metal %.3f\n",
                    cosines[k], (double)r, a, b, c, d);
             assert_true(fabs(a - 1.0) < 0.02);
             assert_true(fabs(d - 1.0) < 0.02);
@@ -440,8 +444,8 @@ static void diffuse_albedos(void **state) {
     for (double c = 0.1; c <= 1.0; c += 0.3) {
         assert_true(fabs(diffuse_albedo(&lambert, c) - 1.0) < 2e-3);
         assert_true(diffuse_albedo(&rough, c) < 1.01);
-        printf("cos %.1f: Oren-Nayar %.3f, Principled diffuse %.3f\n", c,
-               diffuse_albedo(&rough, c), diffuse_albedo(&all, c));
+        printf("cos %.1f: Oren-Nayar %.3f, Principled diffuse %.3f\n", c, diffuse_albedo(&rough, c),
+               diffuse_albedo(&all, c));
     }
 }
 
@@ -472,8 +476,8 @@ static void ideal_glass_splits_energy(void **state) {
                     assert_true(fabs(hypot(x, y) - sine) < 2e-6);
                     assert_true(fabs((double)vf_get(v3_length(b.wi), 0) - 1.0) < 1e-6);
                 }
-                /* Cycles never drops refraction altogether: 1e-4 at total reflection, which the ray then
-                 * does not take. */
+                /* Cycles never drops refraction altogether: 1e-4 at total reflection, which the ray
+                 * then does not take. */
                 assert_true(fabs(sum - 1.0) < 1e-5);
             }
 }
@@ -493,10 +497,12 @@ static void rough_goes_over_into_ideal(void **state) {
 
 static void lobes_are_reciprocal(void **state) {
     (void)state;
-    struct model models[] = {
-        diffuse(0.0f), glossy(TRC_DISTRIBUTION_GGX, 0.5f, 0.4f),
-        glossy(TRC_DISTRIBUTION_BECKMANN, 0.5f, 0.0f), glossy(TRC_DISTRIBUTION_MULTI_GGX, 0.9f, 0.0f),
-        glossy(TRC_DISTRIBUTION_ASHIKHMIN, 0.6f, 0.3f), principled("Principled")};
+    struct model models[] = {diffuse(0.0f),
+                             glossy(TRC_DISTRIBUTION_GGX, 0.5f, 0.4f),
+                             glossy(TRC_DISTRIBUTION_BECKMANN, 0.5f, 0.0f),
+                             glossy(TRC_DISTRIBUTION_MULTI_GGX, 0.9f, 0.0f),
+                             glossy(TRC_DISTRIBUTION_ASHIKHMIN, 0.6f, 0.3f),
+                             principled("Principled")};
     struct test_random random = test_random_seed(9);
     for (size_t i = 0; i < sizeof models / sizeof models[0]; i++)
         for (int n = 0; n < 200; n++) {
@@ -566,11 +572,15 @@ static void extremes_stay_finite(void **state) {
     for (int k = 0; k < 4; k++)
         for (int j = 0; j < 5; j++) {
             const float r = roughnesses[j];
-            struct model models[] = {
-                glossy(TRC_DISTRIBUTION_GGX, r, 0.9f),      glossy(TRC_DISTRIBUTION_BECKMANN, r, 0.0f),
-                glossy(TRC_DISTRIBUTION_ASHIKHMIN, r, 0.2f), glossy(TRC_DISTRIBUTION_MULTI_GGX, r, 0.0f),
-                glass(TRC_DISTRIBUTION_GGX, r, 1.0f, true), glass(TRC_DISTRIBUTION_MULTI_GGX, r, 8.0f, true),
-                glass(TRC_DISTRIBUTION_BECKMANN, r, 1.0000001f, false), principled_all(), clearcoat(r)};
+            struct model models[] = {glossy(TRC_DISTRIBUTION_GGX, r, 0.9f),
+                                     glossy(TRC_DISTRIBUTION_BECKMANN, r, 0.0f),
+                                     glossy(TRC_DISTRIBUTION_ASHIKHMIN, r, 0.2f),
+                                     glossy(TRC_DISTRIBUTION_MULTI_GGX, r, 0.0f),
+                                     glass(TRC_DISTRIBUTION_GGX, r, 1.0f, true),
+                                     glass(TRC_DISTRIBUTION_MULTI_GGX, r, 8.0f, true),
+                                     glass(TRC_DISTRIBUTION_BECKMANN, r, 1.0000001f, false),
+                                     principled_all(),
+                                     clearcoat(r)};
             for (size_t i = 0; i < sizeof models / sizeof models[0]; i++) {
                 struct trc_surface s;
                 struct trc_lobes l;
@@ -579,7 +589,8 @@ static void extremes_stay_finite(void **state) {
                 draw_samples(&l, &s, &h); /* asserts */
                 for (int n = 0; n < 64; n++) {
                     struct trc_bsdf_value v;
-                    TRC_KERNEL(trc_bsdf_eval)(&l, &s, direction(1.0 - n / 31.5, n), vm_all_set(), &v);
+                    TRC_KERNEL(trc_bsdf_eval)
+                    (&l, &s, direction(1.0 - n / 31.5, n), vm_all_set(), &v);
                     assert_true(isfinite(vf_get(v.diffuse.x + v.glossy.x + v.transmission.x, 0)));
                     assert_true(vf_get(v.pdf, 0) >= 0.0f && isfinite(vf_get(v.pdf, 0)));
                 }
@@ -589,7 +600,8 @@ static void extremes_stay_finite(void **state) {
 
 static void nothing_shines_through(void **state) {
     (void)state;
-    struct model models[] = {diffuse(0.0f), glossy(TRC_DISTRIBUTION_GGX, 0.6f, 0.0f), principled("")};
+    struct model models[] = {diffuse(0.0f), glossy(TRC_DISTRIBUTION_GGX, 0.6f, 0.0f),
+                             principled("")};
     for (size_t i = 0; i < 3; i++)
         for (int n = 0; n < 100; n++) {
             struct trc_surface s;
@@ -601,10 +613,12 @@ static void nothing_shines_through(void **state) {
             s.n = direction(cos(0.87), 0.06 * n);
             TRC_KERNEL(trc_lobes_setup)(material_of(&models[i]), &s, &regs, vf_zero(), &l);
             struct trc_bsdf_value v;
-            TRC_KERNEL(trc_bsdf_eval)(&l, &s, direction(-0.05 - 0.009 * n, 0.06 * n), vm_all_set(), &v);
+            TRC_KERNEL(trc_bsdf_eval)
+            (&l, &s, direction(-0.05 - 0.009 * n, 0.06 * n), vm_all_set(), &v);
             assert_true(vf_get(v3_max(v.diffuse) + v3_max(v.glossy), 0) == 0.0f);
             struct trc_bsdf_sample b;
-            TRC_KERNEL(trc_bsdf_sample)(&l, &s, vf_set(0.5f), vf_set(0.01f * (float)n), vf_set(0.9f), &b);
+            TRC_KERNEL(trc_bsdf_sample)
+            (&l, &s, vf_set(0.5f), vf_set(0.01f * (float)n), vf_set(0.9f), &b);
             if (vm_any(b.valid))
                 assert_true(vf_get(b.wi.z, 0) > 0.0f);
         }
@@ -652,12 +666,18 @@ int main(void) {
     if (!test_cpu_can())
         return 77;
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(sampling_matches_density), cmocka_unit_test(weights_match_values),
-        cmocka_unit_test(furnace_is_white),         cmocka_unit_test(diffuse_albedos),
-        cmocka_unit_test(ideal_glass_splits_energy), cmocka_unit_test(rough_goes_over_into_ideal),
-        cmocka_unit_test(lobes_are_reciprocal),     cmocka_unit_test(values_match_formulas),
-        cmocka_unit_test(extremes_stay_finite),     cmocka_unit_test(nothing_shines_through),
-        cmocka_unit_test(factor_beyond),            cmocka_unit_test(light_weights_drop_out),
+        cmocka_unit_test(sampling_matches_density),
+        cmocka_unit_test(weights_match_values),
+        cmocka_unit_test(furnace_is_white),
+        cmocka_unit_test(diffuse_albedos),
+        cmocka_unit_test(ideal_glass_splits_energy),
+        cmocka_unit_test(rough_goes_over_into_ideal),
+        cmocka_unit_test(lobes_are_reciprocal),
+        cmocka_unit_test(values_match_formulas),
+        cmocka_unit_test(extremes_stay_finite),
+        cmocka_unit_test(nothing_shines_through),
+        cmocka_unit_test(factor_beyond),
+        cmocka_unit_test(light_weights_drop_out),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,5 +1,6 @@
-/* Lights: irradiance against closed forms and against figures measured on Cycles 3.4, densities that integrate to
- * one, light samples and rays that agree on them, many lights through the tree. */
+/* Lights: irradiance against closed forms and against figures measured on Cycles 3.4, densities
+ * that integrate to one, light samples and rays that agree on them, many lights through the
+ * tree. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -122,7 +123,8 @@ static struct estimate irradiance(const struct trc_surface *s) {
         struct trc_light_sample l;
         const vfloat u0 = test_wide_uniform(&random), u1 = test_wide_uniform(&random);
         TRC_KERNEL(trc_light_sample)(s, s->n, u0, u1, test_wide_uniform(&random), &l);
-        const vfloat e = vf_where(l.valid, l.radiance.y * vf_max(v3_dot(s->n, l.wi), vf_zero()) / l.pdf);
+        const vfloat e =
+            vf_where(l.valid, l.radiance.y * vf_max(v3_dot(s->n, l.wi), vf_zero()) / l.pdf);
         for (int k = 0; k < TRC_WIDTH; k++) {
             const double v = (double)vf_get(e, k);
             assert_true(isfinite(v) && v >= 0);
@@ -178,7 +180,8 @@ static void lamps_have_cycles_units(void **state) {
         d.radius = radii[i];
         e.value = one_lamp(d, &e.error);
         expect("point", e, points[i] / to_plane);
-        expect("point, closed form", e, 100 / (4 * M_PI) / (16 + (double)radii[i] * (double)radii[i]));
+        expect("point, closed form", e,
+               100 / (4 * M_PI) / (16 + (double)radii[i] * (double)radii[i]));
     }
     trc_light_desc spot = lamp(TRC_LIGHT_SPOT, 0, 0, 4);
     spot.radius = 2.0f;
@@ -295,21 +298,23 @@ static void rays_agree_with_samples(void **state) {
     double most = 0.0;
     for (int i = 0; i < 20000; i += TRC_WIDTH) {
         struct trc_surface r = receiver(&s, 0, 0, 0);
-        r.p = v3(test_wide_uniform(&random), test_wide_uniform(&random), test_wide_uniform(&random));
+        r.p =
+            v3(test_wide_uniform(&random), test_wide_uniform(&random), test_wide_uniform(&random));
         struct trc_light_sample l;
         const vfloat u0 = test_wide_uniform(&random), u1 = test_wide_uniform(&random);
         TRC_KERNEL(trc_light_sample)(&r, r.n, u0, u1, test_wide_uniform(&random), &l);
         const vfloat pb = vf_set(0.7f);
         vvec3 radiance = v3_zero();
-        const vfloat far = vf_select(vf_ge(l.distance, vf_set(TRC_FAR)), l.distance,
-                                     l.distance * vf_set(1.001f));
-        TRC_KERNEL(trc_light_hit)(&s.snapshot, r.p, r.n, l.wi, vf_zero(), far, pb, vf_one(),
-                                  vu_set(TRC_VISIBLE_GLOSSY | TRC_PATH_REFLECTED), vf_zero(), l.valid,
-                                  &radiance);
+        const vfloat far =
+            vf_select(vf_ge(l.distance, vf_set(TRC_FAR)), l.distance, l.distance * vf_set(1.001f));
+        TRC_KERNEL(trc_light_hit)
+        (&s.snapshot, r.p, r.n, l.wi, vf_zero(), far, pb, vf_one(),
+         vu_set(TRC_VISIBLE_GLOSSY | TRC_PATH_REFLECTED), vf_zero(), l.valid, &radiance);
         for (int k = 0; k < TRC_WIDTH; k++) {
             if (!((vm_bits(l.valid) >> k) & 1u))
                 continue;
-            const double got = (double)vf_get(radiance.y, k), want = (double)vf_get(l.radiance.y, k);
+            const double got = (double)vf_get(radiance.y, k),
+                         want = (double)vf_get(l.radiance.y, k);
             if (got == 0.0) {
                 missed++; /* on the very rim */
                 continue;
@@ -365,19 +370,21 @@ static void densities_integrate_to_one(void **state) {
                 const vvec3 wi = trc_warp_cone(vf_set((float)cos_cone), u1, u2);
                 vvec3 weighed = v3_zero(), whole = v3_zero();
                 const vuint path = vu_set(TRC_VISIBLE_GLOSSY | TRC_PATH_REFLECTED);
-                TRC_KERNEL(trc_light_hit)(&s.snapshot, r.p, r.n, wi, vf_zero(), vf_set(TRC_FAR), vf_one(),
-                                          vf_one(), path, vf_zero(), vm_all_set(), &weighed);
-                TRC_KERNEL(trc_light_hit)(&s.snapshot, r.p, r.n, wi, vf_zero(), vf_set(TRC_FAR),
-                                          vf_set(-1.0f), vf_one(), path, vf_zero(), vm_all_set(),
-                                          &whole);
+                TRC_KERNEL(trc_light_hit)
+                (&s.snapshot, r.p, r.n, wi, vf_zero(), vf_set(TRC_FAR), vf_one(), vf_one(), path,
+                 vf_zero(), vm_all_set(), &weighed);
+                TRC_KERNEL(trc_light_hit)
+                (&s.snapshot, r.p, r.n, wi, vf_zero(), vf_set(TRC_FAR), vf_set(-1.0f), vf_one(),
+                 path, vf_zero(), vm_all_set(), &whole);
                 for (int k = 0; k < TRC_WIDTH; k++)
                     if (vf_get(weighed.y, k) > 0.0f)
-                        sum += implied_pdf((double)vf_get(weighed.y, k), (double)vf_get(whole.y, k), 1.0);
+                        sum += implied_pdf((double)vf_get(weighed.y, k), (double)vf_get(whole.y, k),
+                                           1.0);
             }
         const double total = sum * 2 * M_PI * (1 - cos_cone) / ((double)side * side);
         printf("  kind %d: %.5f\n", kind, total);
-        /* With slats the corners of the visible rectangle are sampled, but dark: rays do not see them. A large
-         * disk is sampled as a square. */
+        /* With slats the corners of the visible rectangle are sampled, but dark: rays do not see
+         * them. A large disk is sampled as a square. */
         if (kind == 4 || kind == 1)
             assert_true(total > 0.7 && total < 1.001);
         else
@@ -428,8 +435,8 @@ static void many_triangles(void **state) {
     }
 }
 
-/* Chances by counting against chances by asking, for lists and trees; sampled lights must agree with
- * trc_light_triangle_weight. */
+/* Chances by counting against chances by asking, for lists and trees; sampled lights must agree
+ * with trc_light_triangle_weight. */
 static void chances_match(void **state) {
     (void)state;
     static double corners[MESH_TRIANGLES][3][3];
@@ -458,7 +465,8 @@ static void chances_match(void **state) {
                                    e.active);
             e.p = v3_mad(l.wi, l.distance, r.p);
             e.wo = v3_neg(l.wi);
-            const vfloat w = TRC_KERNEL(trc_light_triangle_weight)(&e, r.p, r.n, vf_one(), vf_one());
+            const vfloat w =
+                TRC_KERNEL(trc_light_triangle_weight)(&e, r.p, r.n, vf_one(), vf_one());
             for (int k = 0; k < TRC_WIDTH; k++) {
                 if (vi_get(l.light, k) >= 0)
                     count[vi_get(l.light, k)]++;
@@ -536,7 +544,8 @@ static void hidden_lamps(void **state) {
         {TRC_VISIBLE_ALL, 0, TRC_VISIBLE_CAMERA, true},
         {TRC_VISIBLE_ALL, 0, TRC_VISIBLE_GLOSSY | TRC_PATH_REFLECTED, false},
         {TRC_VISIBLE_ALL & ~TRC_VISIBLE_GLOSSY, 1, TRC_VISIBLE_GLOSSY | TRC_PATH_REFLECTED, false},
-        {TRC_VISIBLE_ALL & ~TRC_VISIBLE_GLOSSY, 1, TRC_VISIBLE_GLOSSY | TRC_VISIBLE_TRANSMISSION, true},
+        {TRC_VISIBLE_ALL & ~TRC_VISIBLE_GLOSSY, 1, TRC_VISIBLE_GLOSSY | TRC_VISIBLE_TRANSMISSION,
+         true},
         {TRC_VISIBLE_ALL & ~TRC_VISIBLE_TRANSMISSION, 1, TRC_VISIBLE_TRANSMISSION, false},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
@@ -546,15 +555,15 @@ static void hidden_lamps(void **state) {
         scene_begin(&s);
         scene_commit(&s, &d, 1);
         vvec3 radiance = v3_zero();
-        TRC_KERNEL(trc_light_hit)(&s.snapshot, v3_zero(), v3_zero(), up, vf_zero(), vf_set(5.0f),
-                                  vf_set(-1.0f), vf_one(), vu_set(cases[i].path), vf_zero(),
-                                  vm_all_set(), &radiance);
+        TRC_KERNEL(trc_light_hit)
+        (&s.snapshot, v3_zero(), v3_zero(), up, vf_zero(), vf_set(5.0f), vf_set(-1.0f), vf_one(),
+         vu_set(cases[i].path), vf_zero(), vm_all_set(), &radiance);
         const float want = cases[i].seen ? 25.0f : 0.0f;
         assert_true(fabsf(vf_get(radiance.x, 0) - want) < 1e-3f);
         /* Rays that pass do not end at lamps; those that stop before do not see them. */
-        TRC_KERNEL(trc_light_hit)(&s.snapshot, v3_zero(), v3_zero(), up, vf_zero(), vf_set(1.9f),
-                                  vf_set(-1.0f), vf_one(), vu_set(cases[i].path), vf_zero(),
-                                  vm_all_set(), &radiance);
+        TRC_KERNEL(trc_light_hit)
+        (&s.snapshot, v3_zero(), v3_zero(), up, vf_zero(), vf_set(1.9f), vf_set(-1.0f), vf_one(),
+         vu_set(cases[i].path), vf_zero(), vm_all_set(), &radiance);
         assert_true(fabsf(vf_get(radiance.x, 0) - want) < 1e-3f);
         scene_end(&s);
     }
@@ -605,11 +614,16 @@ int main(void) {
     if (!test_cpu_can())
         return 77;
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(lamps_have_cycles_units),      cmocka_unit_test(areas_match_closed_forms),
-        cmocka_unit_test(triangles_match_closed_forms), cmocka_unit_test(rays_agree_with_samples),
-        cmocka_unit_test(densities_integrate_to_one),   cmocka_unit_test(many_triangles),
-        cmocka_unit_test(chances_match),                cmocka_unit_test(moving_triangles),
-        cmocka_unit_test(hidden_lamps),                 cmocka_unit_test(dark_tables),
+        cmocka_unit_test(lamps_have_cycles_units),
+        cmocka_unit_test(areas_match_closed_forms),
+        cmocka_unit_test(triangles_match_closed_forms),
+        cmocka_unit_test(rays_agree_with_samples),
+        cmocka_unit_test(densities_integrate_to_one),
+        cmocka_unit_test(many_triangles),
+        cmocka_unit_test(chances_match),
+        cmocka_unit_test(moving_triangles),
+        cmocka_unit_test(hidden_lamps),
+        cmocka_unit_test(dark_tables),
         cmocka_unit_test(allocation_failures),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

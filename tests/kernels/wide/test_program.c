@@ -1,5 +1,5 @@
-/* Material programs: every operation against Cycles' values, against the scalar kernels bit by bit, and
- * operations on meshes, objects, cameras and images against values in double. */
+/* Material programs: every operation against Cycles' values, against the scalar kernels bit by bit,
+ * and operations on meshes, objects, cameras and images against values in double. */
 #include "wide_test.h"
 
 #include <math.h>
@@ -16,7 +16,8 @@
 
 /* ---- one operation at a time ---- */
 
-/* A program of one operation on registers 0, 1, ...; the results go to register 100 and following. */
+/* A program of one operation on registers 0, 1, ...; the results go to register 100 and following.
+ */
 struct single {
     struct trc_material material;
     struct trc_instruction instruction;
@@ -52,7 +53,8 @@ static void single_init(struct single *p, uint32_t op, uint32_t mode, uint32_t r
                                               .out = OUT,
                                               .input_count = op_input_counts[op],
                                               .resource = resource};
-    for (int i = 0; i < TRC_OP_MAX_INPUTS; i++) p->operands[i].reg = i;
+    for (int i = 0; i < TRC_OP_MAX_INPUTS; i++)
+        p->operands[i].reg = i;
     p->material.operands = p->operands;
     p->material.instructions = &p->instruction;
     p->material.instruction_count = 1;
@@ -63,12 +65,14 @@ static void ramp_table(float table[4 * TRC_RAMP_SIZE]) {
     static const float from[4] = {.1f, .9f, .4f, 1}, to[4] = {.7f, .2f, .8f, 1};
     for (uint32_t i = 0; i < TRC_RAMP_SIZE; i++) {
         const float t = (float)i / (float)(TRC_RAMP_SIZE - 1);
-        for (int c = 0; c < 4; c++) table[4 * i + c] = (1 - t) * from[c] + t * to[c];
+        for (int c = 0; c < 4; c++)
+            table[4 * i + c] = (1 - t) * from[c] + t * to[c];
     }
 }
 
 static bool is_near(float value, float expected, float relative) {
-    if (isinf(expected)) return value == expected;
+    if (isinf(expected))
+        return value == expected;
     return fabsf(value - expected) <= relative * fmaxf(fabsf(expected), 1.0f);
 }
 
@@ -77,7 +81,8 @@ static int alike(size_t first, size_t numbers[], int capacity) {
     int count = 0;
     const struct program_case *a = &program_cases[first];
     for (size_t i = 0; i < sizeof program_cases / sizeof *program_cases && count < capacity; i++) {
-        if (program_cases[i].op == a->op && program_cases[i].mode == a->mode) numbers[count++] = i;
+        if (program_cases[i].op == a->op && program_cases[i].mode == a->mode)
+            numbers[count++] = i;
     }
     return count;
 }
@@ -102,7 +107,8 @@ static void test_against_cycles(void **state) {
     for (size_t i = 0; i < sizeof program_cases / sizeof *program_cases; i++) {
         size_t numbers[32];
         const int count = alike(i, numbers, 32);
-        if (numbers[0] != i) continue;
+        if (numbers[0] != i)
+            continue;
         static struct trc_registers regs;
         struct single p;
         single_init(&p, program_cases[i].op, program_cases[i].mode, 0);
@@ -111,16 +117,19 @@ static void test_against_cycles(void **state) {
             float lanes[TRC_OP_MAX_INPUTS][TRC_WIDTH], in[TRC_OP_MAX_INPUTS];
             for (int l = 0; l < TRC_WIDTH; l++) {
                 case_inputs(&program_cases[numbers[(start + l) % count]], in);
-                for (int k = 0; k < TRC_OP_MAX_INPUTS; k++) lanes[k][l] = in[k];
+                for (int k = 0; k < TRC_OP_MAX_INPUTS; k++)
+                    lanes[k][l] = in[k];
             }
-            for (int k = 0; k < TRC_OP_MAX_INPUTS; k++) regs.r[k] = vf_load(lanes[k]);
+            for (int k = 0; k < TRC_OP_MAX_INPUTS; k++)
+                regs.r[k] = vf_load(lanes[k]);
             TRC_KERNEL(trc_program_run)(&p.material, NULL, &regs);
             for (int l = 0; l < TRC_WIDTH; l++) {
                 const struct program_case *c = &program_cases[numbers[(start + l) % count]];
                 const int outputs = op_output_counts[c->op] < 3 ? op_output_counts[c->op] : 3;
                 for (int k = 0; k < outputs; k++) {
                     const float value = vf_get(regs.r[OUT + k], l);
-                    if (is_near(value, c->out[k], 3e-6f)) continue;
+                    if (is_near(value, c->out[k], 3e-6f))
+                        continue;
                     failures++;
                     printf("%s mode %u (%g %g %g %g ...) output %d: %.9g, Cycles has %.9g\n",
                            op_names[c->op], c->mode, c->in[0], c->in[1], c->in[2], c->in[3], k,
@@ -136,28 +145,40 @@ static void test_against_cycles(void **state) {
 static float any_number(struct test_random *r) {
     const uint32_t kind = test_bits(r) % 16;
     const float u = test_uniform(r) * 2.0f - 1.0f;
-    if (kind == 0) return 0.0f;
-    if (kind == 1) return (float)(int)(u * 9.0f);
-    if (kind == 2) return u * 1e6f;
-    if (kind == 3) return u * 1e-6f;
-    if (kind == 4 && (test_bits(r) & 7) == 0) return u > 0 ? INFINITY : NAN;
+    if (kind == 0)
+        return 0.0f;
+    if (kind == 1)
+        return (float)(int)(u * 9.0f);
+    if (kind == 2)
+        return u * 1e6f;
+    if (kind == 3)
+        return u * 1e-6f;
+    if (kind == 4 && (test_bits(r) & 7) == 0)
+        return u > 0 ? INFINITY : NAN;
     return u * 3.0f;
 }
 
 /* Highest mode of an operation. */
 static uint32_t last_mode(uint32_t op) {
     switch (op) {
-    case TRC_OP_MATH: return TRC_MATH_DEGREES;
-    case TRC_OP_MIX: return TRC_BLEND_EXCLUSION;
+    case TRC_OP_MATH:
+        return TRC_MATH_DEGREES;
+    case TRC_OP_MIX:
+        return TRC_BLEND_EXCLUSION;
     case TRC_OP_VECTOR_MATH:
-    case TRC_OP_VECTOR_MEASURE: return TRC_VECTOR_FRACT;
+    case TRC_OP_VECTOR_MEASURE:
+        return TRC_VECTOR_FRACT;
     case TRC_OP_MAPPING:
-    case TRC_OP_PROJECT: return 3;
+    case TRC_OP_PROJECT:
+        return 3;
     case TRC_OP_CLAMP:
-    case TRC_OP_RAMP: return 1;
+    case TRC_OP_RAMP:
+        return 1;
     case TRC_OP_SEPARATE:
-    case TRC_OP_COMBINE: return TRC_SEPARATE_HSL;
-    default: return 0;
+    case TRC_OP_COMBINE:
+        return TRC_SEPARATE_HSL;
+    default:
+        return 0;
     }
 }
 
@@ -180,17 +201,20 @@ static void test_against_scalar(void **state) {
             for (int round = 0; round < 200; round++) {
                 float lanes[TRC_OP_MAX_INPUTS][TRC_WIDTH];
                 for (int k = 0; k < TRC_OP_MAX_INPUTS; k++) {
-                    for (int l = 0; l < TRC_WIDTH; l++) lanes[k][l] = any_number(&r);
+                    for (int l = 0; l < TRC_WIDTH; l++)
+                        lanes[k][l] = any_number(&r);
                     regs.r[k] = vf_load(lanes[k]);
                 }
                 TRC_KERNEL(trc_program_run)(&p.material, NULL, &regs);
                 for (int l = 0; l < TRC_WIDTH; l++) {
                     float in[TRC_OP_MAX_INPUTS], out[TRC_OP_MAX_OUTPUTS];
-                    for (int k = 0; k < TRC_OP_MAX_INPUTS; k++) in[k] = lanes[k][l];
+                    for (int k = 0; k < TRC_OP_MAX_INPUTS; k++)
+                        in[k] = lanes[k][l];
                     trc_program_fold_scalar(op, mode, table, in, out);
                     for (int k = 0; k < op_output_counts[op]; k++) {
                         const float value = vf_get(regs.r[OUT + k], l);
-                        if (same_bits_or_nan(value, out[k])) continue;
+                        if (same_bits_or_nan(value, out[k]))
+                            continue;
                         fail_msg("%s mode %u (%g %g %g %g): lane %d has %.9g, scalar %.9g",
                                  op_names[op], mode, in[0], in[1], in[2], in[3], l, value, out[k]);
                     }
@@ -207,11 +231,13 @@ static void test_outputs_over_inputs(void **state) {
     struct single p;
     single_init(&p, TRC_OP_VECTOR_MATH, TRC_VECTOR_CROSS, 0);
     p.instruction.out = 0;
-    for (int k = 0; k < TRC_OP_MAX_INPUTS; k++) regs.r[k] = vf_set((float)k);
+    for (int k = 0; k < TRC_OP_MAX_INPUTS; k++)
+        regs.r[k] = vf_set((float)k);
     TRC_KERNEL(trc_program_run)(&p.material, NULL, &regs);
     const float expected[3] = {1 * 5 - 2 * 4, 2 * 3 - 0 * 5, 0 * 4 - 1 * 3};
     for (int k = 0; k < 3; k++) {
-        for (int l = 0; l < TRC_WIDTH; l++) assert_true(vf_get(regs.r[k], l) == expected[k]);
+        for (int l = 0; l < TRC_WIDTH; l++)
+            assert_true(vf_get(regs.r[k], l) == expected[k]);
     }
 }
 
@@ -238,19 +264,25 @@ struct world_of_test {
 static const float turned[12] = {0, -1, 0, 10, 2, 0, 0, 20, 0, 0, 3, 30};
 static const float turned_inverse[12] = {0, .5f, 0, -10, -1, 0, 0, 10, 0, 0, 1.0f / 3.0f, -10};
 
-static void build_scene(struct world_of_test *w) {
+static void build_meshes(struct world_of_test *w) {
     static const float first[9] = {0, 0, 0, 2, 0, 0, 0, 4, 0};
     static const float uv[6] = {0, 0, 0, 1, -1, 0}; /* U along -Y, V along X: mirrored is false */
-    memset(w, 0, sizeof *w);
     for (int k = 0; k < 9; k++) {
         w->positions[0][0][k] = w->positions[1][0][k] = first[k];
         w->positions[1][1][k] = first[k] + (k % 3 == 2 ? 1.0f : 0.0f);
-        w->normals[k] = k % 3 == 2 ? 1.0f : 0.25f * (float)(k / 3);
     }
-    for (uint32_t k = 0; k < 3; k++) w->indices[k] = k;
+    for (int k = 0; k < 3; k++) { /* (x, x, 1) made unit */
+        const float x = 0.25f * (float)k, length = sqrtf(2 * x * x + 1);
+        w->normals[3 * k] = w->normals[3 * k + 1] = x / length;
+        w->normals[3 * k + 2] = 1 / length;
+    }
+    for (uint32_t k = 0; k < 3; k++)
+        w->indices[k] = k;
     memcpy(w->uv, uv, sizeof uv);
-    for (int k = 0; k < 6; k++) w->other[k] = (float)k;
-    for (int k = 0; k < 12; k++) w->color[k] = 0.1f * (float)k;
+    for (int k = 0; k < 6; k++)
+        w->other[k] = (float)k;
+    for (int k = 0; k < 12; k++)
+        w->color[k] = 0.1f * (float)k;
     w->smooth = 1;
     for (int i = 0; i < 2; i++) {
         w->mesh[i] = (struct trc_mesh){
@@ -260,39 +292,61 @@ static void build_scene(struct world_of_test *w) {
             .positions = w->positions[i][0],
             .indices = w->indices,
             .attribute_count = i ? 0 : 3,
-            .attributes = {{NAME_UV, 2, w->uv}, {NAME_OTHER, 2, w->other}, {NAME_COLOR, 4, w->color}},
+            .attributes = {{NAME_UV, 2, w->uv},
+                           {NAME_OTHER, 2, w->other},
+                           {NAME_COLOR, 4, w->color}},
             .default_uv = i ? -1 : 0,
             .bounds_lower = {0, 0, 0},
             .bounds_upper = {2, 4, 0},
         };
         w->meshes[i] = &w->mesh[i];
     }
+}
+
+static void build_scene(struct world_of_test *w) {
+    memset(w, 0, sizeof *w);
+    build_meshes(w);
     memcpy(w->to_world[0].m, turned, sizeof turned);
     memcpy(w->to_object[0].m, turned_inverse, sizeof turned_inverse);
     for (int k = 0; k < 2; k++) {
-        w->to_world[1 + k] = (struct trc_affine){{1, 0, 0, 2.0f * (float)k, 0, 1, 0, 0, 0, 0, 1, 0}};
-        w->to_object[1 + k] = (struct trc_affine){{1, 0, 0, -2.0f * (float)k, 0, 1, 0, 0, 0, 0, 1, 0}};
+        w->to_world[1 + k] =
+            (struct trc_affine){{1, 0, 0, 2.0f * (float)k, 0, 1, 0, 0, 0, 0, 1, 0}};
+        w->to_object[1 + k] =
+            (struct trc_affine){{1, 0, 0, -2.0f * (float)k, 0, 1, 0, 0, 0, 0, 1, 0}};
     }
-    w->instances[0] = (struct trc_instance){.mesh = 0, .key_count = 1, .object_to_world = w->to_world,
-                                            .world_to_object = w->to_object, .pass_index = 3,
-                                            .random = .25f, .color = {.1f, .2f, .3f, .4f}};
-    w->instances[1] = (struct trc_instance){.mesh = 1, .key_count = 2,
+    w->instances[0] = (struct trc_instance){.mesh = 0,
+                                            .key_count = 1,
+                                            .object_to_world = w->to_world,
+                                            .world_to_object = w->to_object,
+                                            .pass_index = 3,
+                                            .random = .25f,
+                                            .color = {.1f, .2f, .3f, .4f}};
+    w->instances[1] = (struct trc_instance){.mesh = 1,
+                                            .key_count = 2,
                                             .object_to_world = w->to_world + 1,
-                                            .world_to_object = w->to_object + 1, .pass_index = 4,
-                                            .random = .75f, .color = {.5f, .6f, .7f, .8f}};
+                                            .world_to_object = w->to_object + 1,
+                                            .pass_index = 4,
+                                            .random = .75f,
+                                            .color = {.5f, .6f, .7f, .8f}};
     w->camera = (struct trc_affine){{1, 0, 0, 1, 0, 1, 0, 2, 0, 0, 1, 50}};
     const float window[4] = {-.5f, .5f, -.25f, .25f};
     memcpy(w->window[0], window, sizeof window);
-    w->snapshot = (struct trc_snapshot){.mesh_count = 2, .instance_count = 2, .meshes = w->meshes,
-                                        .instances = w->instances, .has_camera = 1};
-    w->snapshot.camera = (struct trc_camera){.type = TRC_CAMERA_PERSPECTIVE, .key_count = 1,
-                                             .camera_to_world = &w->camera, .windows = w->window};
+    w->snapshot = (struct trc_snapshot){.mesh_count = 2,
+                                        .instance_count = 2,
+                                        .meshes = w->meshes,
+                                        .instances = w->instances,
+                                        .has_camera = 1};
+    w->snapshot.camera = (struct trc_camera){.type = TRC_CAMERA_PERSPECTIVE,
+                                             .key_count = 1,
+                                             .camera_to_world = &w->camera,
+                                             .windows = w->window};
 }
 
 /* Lane l on instance l % 2, or in the world every third lane; barycentrics (.25, .5), time .5. */
 static void build_surface(const struct world_of_test *w, struct trc_surface *s) {
     int32_t instance[TRC_WIDTH];
-    for (int l = 0; l < TRC_WIDTH; l++) instance[l] = l % 3 == 2 ? -1 : l % 2;
+    for (int l = 0; l < TRC_WIDTH; l++)
+        instance[l] = l % 3 == 2 ? -1 : l % 2;
     memset(s, 0, sizeof *s);
     s->snapshot = &w->snapshot;
     s->active = vm_all_set();
@@ -347,7 +401,8 @@ static const struct expectation expectations[] = {
     {TRC_OP_FRESNEL, 0, 0, {1.5f, .6f, 0, .8f}, {{.04f}, {.04f}, {.04f}}},
     {TRC_OP_LAYER_FACING, 0, 0, {.5f, 0, 0, 1}, {{.2f}, {.2f}, {.2f}}},
     {TRC_OP_LAYER_FACING, 0, 0, {.25f, 0, 0, 1}, {{.10557281f}, {.10557281f}, {.10557281f}}},
-    /* grown U runs along -Y, grown V along +X of the object, which a quarter turn makes +X and +Y */
+    /* grown U runs along -Y, grown V along +X of the object, which a quarter turn makes +X and +Y
+     */
     {TRC_OP_NORMAL_MAP, 0, TRC_NO_RESOURCE, {1, 1, .5f, .5f}, {{1, 0, 0}, {0, 0, 1}, {0, 0, 1}}},
     {TRC_OP_NORMAL_MAP, 0, TRC_NO_RESOURCE, {1, .5f, 1, .5f}, {{0, 1, 0}, {0, 0, 1}, {0, 0, 1}}},
     {TRC_OP_NORMAL_MAP, 0, NAME_UV, {1, .5f, .5f, 1}, {{0, 0, 1}, {0, 0, 1}, {0, 0, 1}}},
@@ -362,14 +417,16 @@ static void check_expectation(const struct expectation *e, const struct trc_surf
     static struct trc_registers regs;
     struct single p;
     single_init(&p, e->op, e->mode, e->resource);
-    for (int k = 0; k < 4; k++) regs.r[k] = vf_set(e->in[k]);
+    for (int k = 0; k < 4; k++)
+        regs.r[k] = vf_set(e->in[k]);
     TRC_KERNEL(trc_program_run)(&p.material, s, &regs);
     for (int l = 0; l < TRC_WIDTH; l++) {
         const int32_t instance = vi_get(s->instance, l);
         const float *expected = e->out[instance < 0 ? 2 : instance];
         for (int k = 0; k < op_output_counts[e->op]; k++) {
             const float value = vf_get(regs.r[OUT + k], l);
-            if (is_near(value, expected[k], 1e-5f)) continue;
+            if (is_near(value, expected[k], 1e-5f))
+                continue;
             fail_msg("%s mode %u on instance %d, output %d: %.9g, not %.9g", op_names[e->op],
                      e->mode, instance, k, value, expected[k]);
         }
@@ -401,7 +458,8 @@ static void test_inactive_lanes(void **state) {
     for (size_t i = 0; i < sizeof expectations / sizeof *expectations; i++) {
         struct single p;
         single_init(&p, expectations[i].op, expectations[i].mode, expectations[i].resource);
-        for (int k = 0; k < 4; k++) regs.r[k] = vf_set(expectations[i].in[k]);
+        for (int k = 0; k < 4; k++)
+            regs.r[k] = vf_set(expectations[i].in[k]);
         TRC_KERNEL(trc_program_run)(&p.material, &s, &regs);
         assert_true(is_near(vf_get(regs.r[OUT], 0), expectations[i].out[0][0], 1e-5f));
     }
@@ -420,11 +478,15 @@ static void test_smooth_normal_map(void **state) {
     s.instance = vi_set(0);
     struct single p;
     single_init(&p, TRC_OP_NORMAL_MAP, 0, TRC_NO_RESOURCE);
-    for (int k = 0; k < 4; k++) regs.r[k] = vf_set(k == 0 || k == 3 ? 1.0f : .5f);
+    for (int k = 0; k < 4; k++)
+        regs.r[k] = vf_set(k == 0 || k == 3 ? 1.0f : .5f);
     TRC_KERNEL(trc_program_run)(&p.material, &s, &regs);
     double n[3] = {0, 0, 0};
     for (int k = 0; k < 3; k++) {
-        const double x = .25 * k, length = sqrt(2 * x * x + 1), weight = k == 1 ? .25 : k == 2 ? .5 : .25;
+        const double x = .25 * k, length = sqrt(2 * x * x + 1),
+                     weight = k == 1   ? .25
+                              : k == 2 ? .5
+                                       : .25;
         n[0] += weight * x / length;
         n[1] += weight * x / length;
         n[2] += weight / length;
@@ -433,7 +495,8 @@ static void test_smooth_normal_map(void **state) {
     const double world[3] = {-n[1], .5 * n[0], n[2] / 3};
     const double length = sqrt(world[0] * world[0] + world[1] * world[1] + world[2] * world[2]);
     for (int k = 0; k < 3; k++) {
-        assert_true(is_near(vf_get(regs.r[OUT + k], TRC_WIDTH - 1), (float)(world[k] / length), 1e-6f));
+        assert_true(
+            is_near(vf_get(regs.r[OUT + k], TRC_WIDTH - 1), (float)(world[k] / length), 1e-6f));
     }
 }
 
@@ -441,7 +504,8 @@ static void test_smooth_normal_map(void **state) {
 
 static double wrap_reference(int i, int n, uint32_t extension, bool *outside) {
     *outside = extension == TRC_IMAGE_CLIP && (i < 0 || i >= n);
-    if (extension == TRC_IMAGE_REPEAT) return ((i % n) + n) % n;
+    if (extension == TRC_IMAGE_REPEAT)
+        return ((i % n) + n) % n;
     if (extension == TRC_IMAGE_MIRROR) {
         const int m = ((i % (2 * n)) + 2 * n) % (2 * n);
         return m < n ? m : 2 * n - 1 - m;
@@ -465,20 +529,23 @@ static double spline(int i, double t) {
 
 static double lookup_reference(const float *texels, int width, int height, uint32_t mode, double u,
                                double v, int c) {
-    const uint32_t extension = mode & TRC_IMAGE_MODE_EXTENSION, kind = mode & TRC_IMAGE_MODE_INTERPOLATION;
+    const uint32_t extension = mode & TRC_IMAGE_MODE_EXTENSION,
+                   kind = mode & TRC_IMAGE_MODE_INTERPOLATION;
     const double shift = kind == TRC_IMAGE_CLOSEST ? 0.0 : 0.5;
     const double x = u * width - shift, y = v * height - shift;
     const int ix = (int)floor(x), iy = (int)floor(y);
     const double tx = x - ix, ty = y - iy;
-    if (kind == TRC_IMAGE_CLOSEST) return texel_reference(texels, width, height, ix, iy, extension, c);
+    if (kind == TRC_IMAGE_CLOSEST)
+        return texel_reference(texels, width, height, ix, iy, extension, c);
     const int taps = kind == TRC_IMAGE_CUBIC ? 4 : 2, first = kind == TRC_IMAGE_CUBIC ? -1 : 0;
     double sum = 0;
     for (int j = 0; j < taps; j++) {
         for (int i = 0; i < taps; i++) {
             const double wx = taps == 4 ? spline(i, tx) : i ? tx : 1 - tx;
             const double wy = taps == 4 ? spline(j, ty) : j ? ty : 1 - ty;
-            sum += wx * wy * texel_reference(texels, width, height, ix + first + i, iy + first + j,
-                                             extension, c);
+            sum += wx * wy *
+                   texel_reference(texels, width, height, ix + first + i, iy + first + j, extension,
+                                   c);
         }
     }
     return sum;
@@ -487,9 +554,13 @@ static double lookup_reference(const float *texels, int width, int height, uint3
 /* Every filter and extension on images of several sizes against double. */
 static void check_lookups(int width, int height, struct test_random *r) {
     float *texels = malloc((size_t)(width * height) * 4 * sizeof *texels);
-    for (int i = 0; i < width * height * 4; i++) texels[i] = test_uniform(r);
-    const trc_image_desc desc = {.struct_size = sizeof desc, .width = (uint32_t)width,
-                                 .height = (uint32_t)height, .is_float = 1, .pixels = texels,
+    for (int i = 0; i < width * height * 4; i++)
+        texels[i] = test_uniform(r);
+    const trc_image_desc desc = {.struct_size = sizeof desc,
+                                 .width = (uint32_t)width,
+                                 .height = (uint32_t)height,
+                                 .is_float = 1,
+                                 .pixels = texels,
                                  .alpha_mode = TRC_ALPHA_CHANNEL_PACKED,
                                  .pixel_bytes = (uint64_t)(width * height) * 16};
     struct trc_image *image;
@@ -499,7 +570,8 @@ static void check_lookups(int width, int height, struct test_random *r) {
     static struct trc_registers regs;
     for (uint32_t mode = 0; mode < 16; mode++) {
         struct single p;
-        if ((mode & 3u) == 3) continue;
+        if ((mode & 3u) == 3)
+            continue;
         single_init(&p, TRC_OP_IMAGE, mode, 0);
         for (int round = 0; round < 20; round++) {
             regs.r[0] = test_wide_uniform(r) * vf_set(5) - vf_set(2);
@@ -509,9 +581,10 @@ static void check_lookups(int width, int height, struct test_random *r) {
                 for (int c = 0; c < 4; c++) {
                     const float u = vf_get(regs.r[0], l), v = vf_get(regs.r[1], l);
                     const double expected = lookup_reference(texels, width, height, mode, u, v, c);
-                    if (fabs(vf_get(regs.r[OUT + c], l) - expected) < 2e-5) continue;
-                    fail_msg("%d x %d mode %u at (%.9g, %.9g): %.9g, not %.9g", width, height, mode, u,
-                             v, vf_get(regs.r[OUT + c], l), expected);
+                    if (fabs(vf_get(regs.r[OUT + c], l) - expected) < 2e-5)
+                        continue;
+                    fail_msg("%d x %d mode %u at (%.9g, %.9g): %.9g, not %.9g", width, height, mode,
+                             u, v, vf_get(regs.r[OUT + c], l), expected);
                 }
             }
         }
@@ -532,12 +605,12 @@ static void test_filters(void **state) {
 /* Coordinates that are huge or not finite read inside the image. */
 static void test_wild_coordinates(void **state) {
     (void)state;
-    static const float wild[] = {NAN, INFINITY, -INFINITY, 1e38f, -1e38f, 2147483648.0f, -1e-30f,
-                                 0.99999994f, 1.0f, -0.0f, 16777217.0f, 3e9f};
+    static const float wild[] = {NAN,     INFINITY,    -INFINITY, 1e38f, -1e38f,      2147483648.0f,
+                                 -1e-30f, 0.99999994f, 1.0f,      -0.0f, 16777217.0f, 3e9f};
     const uint8_t pixels[16] = {255, 255, 255, 255, 255, 255, 255, 255,
                                 255, 255, 255, 255, 255, 255, 255, 255};
-    const trc_image_desc desc = {.struct_size = sizeof desc, .width = 2, .height = 2,
-                                 .pixels = pixels, .pixel_bytes = 16};
+    const trc_image_desc desc = {
+        .struct_size = sizeof desc, .width = 2, .height = 2, .pixels = pixels, .pixel_bytes = 16};
     struct trc_image *image;
     assert_int_equal(trc_image_load(&desc, &image), TRC_OK);
     const struct trc_snapshot snapshot = {.image_count = 1, .images = &image};
@@ -545,7 +618,8 @@ static void test_wild_coordinates(void **state) {
     static struct trc_registers regs;
     for (uint32_t mode = 0; mode < 16; mode++) {
         struct single p;
-        if ((mode & 3u) == 3) continue;
+        if ((mode & 3u) == 3)
+            continue;
         single_init(&p, TRC_OP_IMAGE, mode, 0);
         for (size_t i = 0; i < sizeof wild / sizeof *wild; i++) {
             for (size_t j = 0; j < sizeof wild / sizeof *wild; j++) {
@@ -554,20 +628,25 @@ static void test_wild_coordinates(void **state) {
                 TRC_KERNEL(trc_program_run)(&p.material, &s, &regs);
                 const float value = vf_get(regs.r[OUT], 0);
                 assert_true(value >= 0.0f && value <= 1.00001f);
-                if ((mode & TRC_IMAGE_MODE_EXTENSION) != TRC_IMAGE_CLIP) assert_true(value > 0.99999f);
+                if ((mode & TRC_IMAGE_MODE_EXTENSION) != TRC_IMAGE_CLIP)
+                    assert_true(value > 0.99999f);
             }
         }
     }
     trc_image_release(image);
 }
 
-/* sRGB is decoded after filtering, associated colours are divided when alpha is used, missing images are
- * magenta. */
+/* sRGB is decoded after filtering, associated colours are divided when alpha is used, missing
+ * images are magenta. */
 static void test_colors_of_images(void **state) {
     (void)state;
     const uint8_t pixels[8] = {255, 0, 128, 255, 0, 200, 100, 51};
-    const trc_image_desc desc = {.struct_size = sizeof desc, .width = 2, .height = 1, .is_srgb = 1,
-                                 .pixels = pixels, .pixel_bytes = 8,
+    const trc_image_desc desc = {.struct_size = sizeof desc,
+                                 .width = 2,
+                                 .height = 1,
+                                 .is_srgb = 1,
+                                 .pixels = pixels,
+                                 .pixel_bytes = 8,
                                  .alpha_mode = TRC_ALPHA_STRAIGHT};
     struct trc_image *image, *none = NULL;
     assert_int_equal(trc_image_load(&desc, &image), TRC_OK);
@@ -593,7 +672,8 @@ static void test_colors_of_images(void **state) {
         struct single p;
         single_init(&p, TRC_OP_IMAGE, 0, i == 3 ? TRC_NO_RESOURCE : i);
         TRC_KERNEL(trc_program_run)(&p.material, &s, &regs);
-        for (int c = 0; c < 4; c++) assert_true(vf_get(regs.r[OUT + c], 0) == (c == 1 ? 0.0f : 1.0f));
+        for (int c = 0; c < 4; c++)
+            assert_true(vf_get(regs.r[OUT + c], 0) == (c == 1 ? 0.0f : 1.0f));
     }
     trc_image_release(image);
 }
@@ -606,7 +686,8 @@ static void check_projection(uint32_t mode, float x, float y, float z, float u, 
     regs.r[1] = vf_set(y);
     regs.r[2] = vf_set(z);
     TRC_KERNEL(trc_program_run)(&p.material, NULL, &regs);
-    if (!is_near(vf_get(regs.r[OUT], 0), u, 1e-6f) || !is_near(vf_get(regs.r[OUT + 1], 0), v, 1e-6f)) {
+    if (!is_near(vf_get(regs.r[OUT], 0), u, 1e-6f) ||
+        !is_near(vf_get(regs.r[OUT + 1], 0), v, 1e-6f)) {
         fail_msg("projection %u of (%g, %g, %g): (%.9g, %.9g), not (%.9g, %.9g)", mode, x, y, z,
                  vf_get(regs.r[OUT], 0), vf_get(regs.r[OUT + 1], 0), u, v);
     }
@@ -640,39 +721,49 @@ static void test_world(void **state) {
                                     .register_count = 3,
                                     .operands = operands,
                                     .instructions = &instruction,
-                                    .has = TRC_MATERIAL_HAS_EMISSION | TRC_MATERIAL_EMISSION_VARIES};
+                                    .has =
+                                        TRC_MATERIAL_HAS_EMISSION | TRC_MATERIAL_EMISSION_VARIES};
     material.leaves[0] = (struct trc_leaf){TRC_NODE_BACKGROUND, 0, {-1, 1.0f}, 0, 4};
     struct trc_material *materials[1] = {&material};
     struct trc_snapshot snapshot = {.material_count = 1, .materials = materials};
     enum { COUNT = 2 * TRC_WIDTH + 1 };
     float directions[3 * COUNT], radiance[3 * COUNT];
     struct test_random r = test_random_seed(3);
-    for (int i = 0; i < 3 * COUNT; i++) directions[i] = test_uniform(&r) + .1f;
+    for (int i = 0; i < 3 * COUNT; i++)
+        directions[i] = test_uniform(&r) + .1f;
     TRC_KERNEL(trc_world_evaluate)(&snapshot, directions, radiance, COUNT);
     for (int i = 0; i < COUNT; i++) {
         const float *d = directions + 3 * i;
         const float length = sqrtf(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
-        for (int c = 0; c < 3; c++) assert_true(is_near(radiance[3 * i + c], 2 * d[c] / length, 1e-6f));
+        for (int c = 0; c < 3; c++)
+            assert_true(is_near(radiance[3 * i + c], 2 * d[c] / length, 1e-6f));
     }
     snapshot.world.is_constant = 1;
     snapshot.world.radiance[1] = 5;
     const vvec3 up = v3(vf_zero(), vf_zero(), vf_one());
     vvec3 c = TRC_KERNEL(trc_world_shade)(&snapshot, up, vu_set(0), vm_from_bits(1));
     assert_true(vf_get(c.y, 0) == 5.0f && vf_get(c.x, 0) == 0.0f);
-    if (TRC_WIDTH > 1) assert_true(vf_get(c.y, TRC_WIDTH - 1) == 0.0f);
+    if (TRC_WIDTH > 1)
+        assert_true(vf_get(c.y, TRC_WIDTH - 1) == 0.0f);
     snapshot.world.material = UINT32_MAX;
     c = TRC_KERNEL(trc_world_shade)(&snapshot, up, vu_set(0), vm_all_set());
     assert_true(vf_get(c.y, 0) == 0.0f);
 }
 
 int main(void) {
-    if (!test_cpu_can()) return 77;
+    if (!test_cpu_can())
+        return 77;
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_against_cycles),      cmocka_unit_test(test_against_scalar),
-        cmocka_unit_test(test_outputs_over_inputs), cmocka_unit_test(test_at_surfaces),
-        cmocka_unit_test(test_inactive_lanes),      cmocka_unit_test(test_smooth_normal_map),
-        cmocka_unit_test(test_filters),             cmocka_unit_test(test_wild_coordinates),
-        cmocka_unit_test(test_colors_of_images),    cmocka_unit_test(test_projections),
+        cmocka_unit_test(test_against_cycles),
+        cmocka_unit_test(test_against_scalar),
+        cmocka_unit_test(test_outputs_over_inputs),
+        cmocka_unit_test(test_at_surfaces),
+        cmocka_unit_test(test_inactive_lanes),
+        cmocka_unit_test(test_smooth_normal_map),
+        cmocka_unit_test(test_filters),
+        cmocka_unit_test(test_wild_coordinates),
+        cmocka_unit_test(test_colors_of_images),
+        cmocka_unit_test(test_projections),
         cmocka_unit_test(test_world),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -36,7 +36,8 @@ static uint32_t pixel_at(uint32_t x, uint32_t y) { return x | y << 16; }
 static void numbers(const struct trc_sampler *s, uint32_t pixel, uint32_t dimension, uint32_t count,
                     float *out) {
     for (uint32_t i = 0; i < count; i += TRC_WIDTH) {
-        const vfloat u = TRC_KERNEL(trc_sample)(s, vu_set(pixel), (vuint)vi_lane() + vu_set(i), dimension);
+        const vfloat u =
+            TRC_KERNEL(trc_sample)(s, vu_set(pixel), (vuint)vi_lane() + vu_set(i), dimension);
         for (uint32_t k = 0; k < TRC_WIDTH && i + k < count; k++) {
             out[i + k] = vf_get(u, (int)k);
             assert_true(out[i + k] >= 0.0f && out[i + k] < 1.0f);
@@ -69,7 +70,8 @@ static void sobol_is_stratified(void **state) {
             for (uint32_t first = 0; first < 256; first += 1u << k)
                 assert_true(fills_boxes(x + first, x, 1u << k, k, 0));
     }
-    /* The place on the first light is a (0, 8, 2)-net: every box shape is filled; also in deeper hits. */
+    /* The place on the first light is a (0, 8, 2)-net: every box shape is filled; also in deeper
+     * hits. */
     for (uint32_t hit = 0; hit < 5; hit += 2) {
         const uint32_t d = TRC_DIM_BOUNCE + hit * TRC_DIMS_PER_BOUNCE + TRC_DIM_LIGHT_X;
         numbers(&s, pixel_at(1000, 77), d, 256, x);
@@ -99,7 +101,8 @@ static void split_samples_are_stratified(void **state) {
             for (uint32_t l = 0; l < 8; l++) {
                 const vuint pixel = vu_set(pixel_at(8, 2)), index = vu_set(i);
                 x[8 * i + l] = vf_get(TRC_KERNEL(trc_sample_split)(&s, pixel, index, d, l, 8), 0);
-                y[8 * i + l] = vf_get(TRC_KERNEL(trc_sample_split)(&s, pixel, index, d + 1, l, 8), 0);
+                y[8 * i + l] =
+                    vf_get(TRC_KERNEL(trc_sample_split)(&s, pixel, index, d + 1, l, 8), 0);
             }
         for (uint32_t a = 0; a <= 7; a++)
             assert_true(fills_boxes(x, y, 128, a, 7 - a));
@@ -144,8 +147,8 @@ static void jitter_fills_its_grid(void **state) {
     }
 }
 
-/* In a tile of 8 x 8, for every sample: 64 cells once each; every row, column and block of 4 x 2 has the 8
- * coarse cells once; the stratum is the same for all. */
+/* In a tile of 8 x 8, for every sample: 64 cells once each; every row, column and block of 4 x 2
+ * has the 8 coarse cells once; the stratum is the same for all. */
 static void sudoku_covers_tiles(void **state) {
     (void)state;
     const uint32_t count = 16;
@@ -193,7 +196,8 @@ static void lanes_do_not_matter(void **state) {
             const uint32_t d = test_bits(&random) % 40;
             const vfloat u = TRC_KERNEL(trc_sample)(&s, vu_load(pixel), vu_load(index), d);
             for (int i = 0; i < TRC_WIDTH; i++) {
-                const vfloat one = TRC_KERNEL(trc_sample)(&s, vu_set(pixel[i]), vu_set(index[i]), d);
+                const vfloat one =
+                    TRC_KERNEL(trc_sample)(&s, vu_set(pixel[i]), vu_set(index[i]), d);
                 assert_true(vf_get(u, i) == vf_get(one, 0));
             }
         }
@@ -203,7 +207,8 @@ static void lanes_do_not_matter(void **state) {
 /* The same on every instruction set: sums of a few numbers, as the scalar build gave them. */
 static void widths_agree(void **state) {
     (void)state;
-    static const uint32_t expected[5] = {0xc4ac4916u, 0x0e225077u, 0x921dd762u, 0x207255b9u, 0x1a12e8ffu};
+    static const uint32_t expected[5] = {0xc4ac4916u, 0x0e225077u, 0x921dd762u, 0x207255b9u,
+                                         0x1a12e8ffu};
     bool sums_match = true;
     for (size_t k = 0; k < 5; k++) {
         const struct trc_sampler s = sampler(kinds[k], 48);
@@ -278,7 +283,8 @@ static void blue_noise_is_blue(void **state) {
         for (uint32_t y = 0; y < 128; y++)
             for (uint32_t x = 0; x < 128; x += TRC_WIDTH) {
                 const vuint at = ((vuint)vi_lane() + vu_set(x)) | vu_set(y << 16);
-                vf_store(&image[y][x], TRC_KERNEL(trc_sample)(&s, at, vu_set(0), TRC_DIM_BOUNCE + 1));
+                vf_store(&image[y][x],
+                         TRC_KERNEL(trc_sample)(&s, at, vu_set(0), TRC_DIM_BOUNCE + 1));
             }
         for (int y = 0; y < 128; y += 4)
             for (int x = 0; x < 128; x += 4) {
@@ -305,11 +311,16 @@ int main(void) {
     if (!test_cpu_can())
         return 77;
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(sobol_is_stratified),       cmocka_unit_test(split_samples_are_stratified),
-        cmocka_unit_test(every_kind_has_its_strata), cmocka_unit_test(jitter_fills_its_grid),
-        cmocka_unit_test(sudoku_covers_tiles),       cmocka_unit_test(lanes_do_not_matter),
-        cmocka_unit_test(widths_agree),              cmocka_unit_test(errors_are_small),
-        cmocka_unit_test(blue_noise_is_blue),        cmocka_unit_test(table_fails_cleanly),
+        cmocka_unit_test(sobol_is_stratified),
+        cmocka_unit_test(split_samples_are_stratified),
+        cmocka_unit_test(every_kind_has_its_strata),
+        cmocka_unit_test(jitter_fills_its_grid),
+        cmocka_unit_test(sudoku_covers_tiles),
+        cmocka_unit_test(lanes_do_not_matter),
+        cmocka_unit_test(widths_agree),
+        cmocka_unit_test(errors_are_small),
+        cmocka_unit_test(blue_noise_is_blue),
+        cmocka_unit_test(table_fails_cleanly),
     };
     return cmocka_run_group_tests(tests, make_table, drop_table);
 }

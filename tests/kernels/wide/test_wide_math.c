@@ -7,7 +7,8 @@
 
 #define POINTS (1 << 20)
 
-/* |got - want| in ulps of want, or of smallest where want is below it (absolute error near roots). */
+/* |got - want| in ulps of want, or of smallest where want is below it (absolute error near
+ * roots). */
 static double ulps(float got, long double want, long double smallest) {
     if (isnan(got) && isnan(want))
         return 0.0;
@@ -140,8 +141,8 @@ static void angles(void **state) {
         vf_store(r, vf_atan2(vf_load(y), vf_load(x)));
         for (int k = 0; k < TRC_WIDTH; k++) {
             most = fmax(most, ulps(r[k], atan2l((long double)y[k], (long double)x[k]), 0.0L));
-            most_turns = fmax(most_turns, ulps(s[k], sinl(6.283185307179586476925L * (long double)t[k]),
-                                               1e-3L));
+            most_turns = fmax(
+                most_turns, ulps(s[k], sinl(6.283185307179586476925L * (long double)t[k]), 1e-3L));
             most_inverse = fmax(most_inverse, fabs((double)e[k] - (double)t[k] * 0.998));
         }
     }
@@ -162,8 +163,12 @@ static void frames_are_orthonormal(void **state) {
         vvec3 a, b;
         v3_frame(n, &a, &b);
         const vvec3 c = v3_cross(a, b);
-        const vfloat errors[] = {v3_dot(a, b), v3_dot(a, n), v3_dot(b, n), v3_dot(a, a) - vf_one(),
-                                 v3_dot(b, b) - vf_one(), v3_dot(c, n) - vf_one()};
+        const vfloat errors[] = {v3_dot(a, b),
+                                 v3_dot(a, n),
+                                 v3_dot(b, n),
+                                 v3_dot(a, a) - vf_one(),
+                                 v3_dot(b, b) - vf_one(),
+                                 v3_dot(c, n) - vf_one()};
         for (size_t k = 0; k < sizeof errors / sizeof errors[0]; k++)
             for (int lane = 0; lane < TRC_WIDTH; lane++)
                 most = fmax(most, fabs((double)vf_get(errors[k], lane)));
@@ -180,7 +185,8 @@ static void warps_keep_their_moments(void **state) {
     for (int i = 0; i < side; i++) {
         for (int j = 0; j < side; j += TRC_WIDTH) {
             const vfloat u1 = vf_set(((float)i + 0.5f) / (float)side);
-            const vfloat u2 = (vi_to_float(vi_lane() + vi_set(j)) + vf_set(0.5f)) / vf_set((float)side);
+            const vfloat u2 =
+                (vi_to_float(vi_lane() + vi_set(j)) + vf_set(0.5f)) / vf_set((float)side);
             vfloat x, y, b1, b2;
             trc_warp_disk(u1, u2, &x, &y);
             trc_warp_triangle(u1, u2, &b1, &b2);
@@ -210,8 +216,10 @@ int main(void) {
     if (!test_cpu_can())
         return 77;
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(bounds_of_functions),    cmocka_unit_test(power),
-        cmocka_unit_test(angles),                 cmocka_unit_test(frames_are_orthonormal),
+        cmocka_unit_test(bounds_of_functions),
+        cmocka_unit_test(power),
+        cmocka_unit_test(angles),
+        cmocka_unit_test(frames_are_orthonormal),
         cmocka_unit_test(warps_keep_their_moments),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,5 +1,5 @@
-/* What the tests of wide kernel code share. Each program is compiled once per instruction set, with the
- * flags and the macros TRC_ISA, TRC_WIDTH, TRC_TARGET_* of the kernels. */
+/* What the tests of wide kernel code share. Each program is compiled once per instruction set, with
+ * the flags and the macros TRC_ISA, TRC_WIDTH, TRC_TARGET_* of the kernels. */
 #ifndef WIDE_TEST_H
 #define WIDE_TEST_H
 
