@@ -8,11 +8,12 @@
  * that the caller passes is kept. What the library writes goes to memory of the caller.
  *
  * Errors: every function returns a status. On anything but TRC_OK the outputs are untouched, the
- * object is as it was before the call, and trc_last_message() says what was wrong. The library never
- * prints, exits, aborts, installs signal handlers or changes the caller's floating-point state.
+ * object is as it was before the call, and trc_last_message() says what was wrong. The library
+ * never prints, exits, aborts, installs signal handlers or changes the caller's floating-point
+ * state.
  *
- * Threads: functions on different scenes or renders may run at once. Functions on one scene must not
- * overlap, except trc_scene_cancel. Functions on one render may be called from any thread. */
+ * Threads: functions on different scenes or renders may run at once. Functions on one scene must
+ * not overlap, except trc_scene_cancel. Functions on one render may be called from any thread. */
 #ifndef TRACER_BASE_H
 #define TRACER_BASE_H
 
@@ -43,15 +44,15 @@ enum {
     TRC_ERROR_STRUCT_SIZE = 3,      /* struct_size is not the one of this ABI version */
     TRC_ERROR_TOO_LARGE = 4,        /* a count or a size exceeds the limit or the address space */
     TRC_ERROR_OUT_OF_MEMORY = 5,
-    TRC_ERROR_NO_THREAD = 6,        /* the system refused to start a thread */
-    TRC_ERROR_NOT_COMMITTED = 7,    /* the scene has no committed snapshot yet */
+    TRC_ERROR_NO_THREAD = 6,     /* the system refused to start a thread */
+    TRC_ERROR_NOT_COMMITTED = 7, /* the scene has no committed snapshot yet */
     TRC_ERROR_CANCELLED = 8,
-    TRC_ERROR_UNSUPPORTED = 9,      /* this build or this CPU cannot do it */
-    TRC_ERROR_IMAGE = 10            /* an image file is missing, damaged or too large */
+    TRC_ERROR_UNSUPPORTED = 9, /* this build or this CPU cannot do it */
+    TRC_ERROR_IMAGE = 10       /* an image file is missing, damaged or too large */
 };
 
-/* Generation-checked names of objects. 0 is never a valid one. A scene or render handle is unique in
- * the process; an id is unique in its scene. */
+/* Generation-checked names of objects. 0 is never a valid one. A scene or render handle is unique
+ * in the process; an id is unique in its scene. */
 typedef uint64_t trc_scene;
 typedef uint64_t trc_render;
 typedef uint64_t trc_id;

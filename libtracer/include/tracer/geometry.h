@@ -23,20 +23,21 @@ typedef struct trc_corner_attribute {
 
 typedef struct trc_mesh_desc {
     uint32_t struct_size;
-    uint32_t key_count;          /* motion keys, 1..TRC_MAX_KEYS, evenly spaced over [0, 1] */
+    uint32_t key_count; /* motion keys, 1..TRC_MAX_KEYS, evenly spaced over [0, 1] */
     uint64_t vertex_count;
     uint64_t triangle_count;
-    const float *positions;      /* 3 * vertex_count * key_count floats, key after key */
-    uint64_t position_count;     /* number of floats, checked */
-    const uint32_t *indices;     /* 3 * triangle_count */
-    uint64_t index_count;        /* number of indices, checked */
-    const float *normals;        /* unit normals or NULL: then smooth triangles get angle-weighted
-                                    vertex normals; layout by normal_kind, key after key as positions */
-    uint64_t normal_count;       /* number of floats: 3 * (vertex_count | 3 * triangle_count) * key_count */
-    uint32_t normal_kind;        /* TRC_NORMALS_* */
-    uint32_t attribute_count;    /* 0..TRC_MAX_ATTRIBUTES */
-    const uint8_t *smooth;       /* per triangle, 0 flat, 1 smooth; NULL: all flat, unless
-                                    normal_kind is CORNER, which rules by itself */
+    const float *positions;  /* 3 * vertex_count * key_count floats, key after key */
+    uint64_t position_count; /* number of floats, checked */
+    const uint32_t *indices; /* 3 * triangle_count */
+    uint64_t index_count;    /* number of indices, checked */
+    const float *normals;    /* unit normals or NULL: then smooth triangles get angle-weighted
+                                vertex normals; layout by normal_kind, key after key as positions */
+    uint64_t
+        normal_count; /* number of floats: 3 * (vertex_count | 3 * triangle_count) * key_count */
+    uint32_t normal_kind;           /* TRC_NORMALS_* */
+    uint32_t attribute_count;       /* 0..TRC_MAX_ATTRIBUTES */
+    const uint8_t *smooth;          /* per triangle, 0 flat, 1 smooth; NULL: all flat, unless
+                                       normal_kind is CORNER, which rules by itself */
     const uint16_t *material_index; /* per triangle slot number, NULL: all 0 */
     const trc_corner_attribute *attributes; /* the first of width 2 is the default UV map */
 } trc_mesh_desc;
@@ -68,16 +69,16 @@ enum {
 
 typedef struct trc_instance_desc {
     uint32_t struct_size;
-    uint32_t key_count;        /* transforms, 1..TRC_MAX_KEYS, evenly spaced over [0, 1] */
+    uint32_t key_count; /* transforms, 1..TRC_MAX_KEYS, evenly spaced over [0, 1] */
     trc_id mesh;
-    const float *transforms;   /* 12 floats per key, see base.h; a singular one hides the instance
-                                  and is counted in trc_scene_stats */
-    const trc_id *materials;   /* material of each slot; 0: the default grey diffuse */
-    uint32_t material_count;   /* a triangle's slot beyond the last uses the last; 0: default */
-    uint32_t visibility;       /* TRC_VISIBLE_* */
-    int32_t pass_index;        /* Object Index pass */
-    float random;              /* Object Info's Random, [0, 1) */
-    float color[4];            /* Object Info's Color and Alpha */
+    const float *transforms; /* 12 floats per key, see base.h; a singular one hides the instance
+                                and is counted in trc_scene_stats */
+    const trc_id *materials; /* material of each slot; 0: the default grey diffuse */
+    uint32_t material_count; /* a triangle's slot beyond the last uses the last; 0: default */
+    uint32_t visibility;     /* TRC_VISIBLE_* */
+    int32_t pass_index;      /* Object Index pass */
+    float random;            /* Object Info's Random, [0, 1) */
+    float color[4];          /* Object Info's Color and Alpha */
 } trc_instance_desc;
 
 TRC_API trc_status trc_instance_create(trc_scene scene, const trc_instance_desc *desc,

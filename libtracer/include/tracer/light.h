@@ -13,21 +13,21 @@ enum { TRC_AREA_RECTANGLE = 0, TRC_AREA_ELLIPSE = 1 };
  * shines along its -Z; area lights span X and Y. */
 typedef struct trc_light_desc {
     uint32_t struct_size;
-    uint32_t type;            /* TRC_LIGHT_* */
-    float transform[12];      /* light to world */
-    float color[3];           /* scene-linear, times the nodes' constant colour and strength */
+    uint32_t type;       /* TRC_LIGHT_* */
+    float transform[12]; /* light to world */
+    float color[3];      /* scene-linear, times the nodes' constant colour and strength */
     float strength;
-    float radius;             /* point, spot: metres, >= 0 */
-    float angle;              /* sun: angular diameter, radians, [0, pi] */
-    float size_x, size_y;     /* area: metres, full width before the transform's scale */
-    uint32_t area_shape;      /* TRC_AREA_* */
-    float spread;             /* area: radians, (0, pi]; pi: no restriction */
-    float spot_angle;         /* full cone, radians, (0, pi] */
-    float spot_blend;         /* [0, 1] */
-    uint32_t visibility;      /* TRC_VISIBLE_*; SHADOW has no meaning for a light */
-    uint32_t cast_shadow;     /* 0: shines through everything */
-    uint32_t use_mis;         /* reflected and refracted rays see it ("multiple importance") */
-    uint32_t light_group;     /* reserved, 0 */
+    float radius;         /* point, spot: metres, >= 0 */
+    float angle;          /* sun: angular diameter, radians, [0, pi] */
+    float size_x, size_y; /* area: metres, full width before the transform's scale */
+    uint32_t area_shape;  /* TRC_AREA_* */
+    float spread;         /* area: radians, (0, pi]; pi: no restriction */
+    float spot_angle;     /* full cone, radians, (0, pi] */
+    float spot_blend;     /* [0, 1] */
+    uint32_t visibility;  /* TRC_VISIBLE_*; SHADOW has no meaning for a light */
+    uint32_t cast_shadow; /* 0: shines through everything */
+    uint32_t use_mis;     /* reflected and refracted rays see it ("multiple importance") */
+    uint32_t light_group; /* reserved, 0 */
 } trc_light_desc;
 
 TRC_API trc_status trc_light_create(trc_scene scene, const trc_light_desc *desc, trc_id *light_out);
@@ -36,12 +36,12 @@ TRC_API trc_status trc_light_destroy(trc_scene scene, trc_id light);
 
 typedef struct trc_world_desc {
     uint32_t struct_size;
-    uint32_t use_sampling;      /* 1: the environment image is sampled by importance */
-    trc_id material;            /* a material whose surface is BACKGROUND (or a mix); 0: black */
-    uint32_t visibility;        /* TRC_VISIBLE_* */
-    uint32_t map_resolution;    /* width of the importance map, 0: chosen from the image */
-    float ao_distance;          /* ambient occlusion: metres, > 0 */
-    float ao_factor;            /* 0: off. Adds factor * unoccluded fraction * world colour */
+    uint32_t use_sampling;   /* 1: the environment image is sampled by importance */
+    trc_id material;         /* a material whose surface is BACKGROUND (or a mix); 0: black */
+    uint32_t visibility;     /* TRC_VISIBLE_* */
+    uint32_t map_resolution; /* width of the importance map, 0: chosen from the image */
+    float ao_distance;       /* ambient occlusion: metres, > 0 */
+    float ao_factor;         /* 0: off. Adds factor * unoccluded fraction * world colour */
 } trc_world_desc;
 
 TRC_API trc_status trc_scene_set_world(trc_scene scene, const trc_world_desc *desc);

@@ -1,9 +1,9 @@
 /* Materials: flat node lists, compiled at commit. Images that nodes read.
  *
- * A node list is a directed graph in an array: an input takes its value from an output of a node that
- * stands EARLIER in the array, or is a constant. The library folds constants, merges equal nodes,
- * drops what the output does not reach. Meanings follow Blender 3.4's Cycles unless a comment says
- * otherwise. */
+ * A node list is a directed graph in an array: an input takes its value from an output of a node
+ * that stands EARLIER in the array, or is a constant. The library folds constants, merges equal
+ * nodes, drops what the output does not reach. Meanings follow Blender 3.4's Cycles unless a
+ * comment says otherwise. */
 #ifndef TRACER_MATERIAL_H
 #define TRACER_MATERIAL_H
 
@@ -18,11 +18,11 @@ TRC_BEGIN_DECLS
  * Outputs in order after "->". */
 enum {
     /* shaders (one output, the closure) */
-    TRC_NODE_DIFFUSE = 1,     /* c color, f roughness, c normal */
-    TRC_NODE_GLOSSY = 2,      /* c color, f roughness, f anisotropy, f rotation, c normal, c tangent;
-                                 mode: TRC_DISTRIBUTION_* */
-    TRC_NODE_GLASS = 3,       /* c color, f roughness, f ior, c normal; mode: distribution */
-    TRC_NODE_REFRACTION = 4,  /* c color, f roughness, f ior, c normal; mode: distribution */
+    TRC_NODE_DIFFUSE = 1,    /* c color, f roughness, c normal */
+    TRC_NODE_GLOSSY = 2,     /* c color, f roughness, f anisotropy, f rotation, c normal, c tangent;
+                                mode: TRC_DISTRIBUTION_* */
+    TRC_NODE_GLASS = 3,      /* c color, f roughness, f ior, c normal; mode: distribution */
+    TRC_NODE_REFRACTION = 4, /* c color, f roughness, f ior, c normal; mode: distribution */
     TRC_NODE_TRANSPARENT = 5, /* c color */
     TRC_NODE_TRANSLUCENT = 6, /* c color, c normal */
     TRC_NODE_EMISSION = 7,    /* c color, f strength */
@@ -38,42 +38,42 @@ enum {
     TRC_NODE_PRINCIPLED = 12,
 
     /* values */
-    TRC_NODE_IMAGE = 64,      /* c vector -> c color, f alpha; image, interpolation in mode bits 0-1,
-                                 extension in bits 2-3, projection in bits 4-5 */
-    TRC_NODE_ENVIRONMENT = 65,/* c vector -> c color; image; mode: interpolation bits 0-1, bit 4: 0
-                                 equirectangular, 1 mirror ball */
-    TRC_NODE_UV_MAP = 66,     /* -> c uv; name: the attribute, "" for the default map */
-    TRC_NODE_COLOR_ATTRIBUTE = 67, /* -> c color, f alpha; name */
-    TRC_NODE_TEXTURE_COORDINATE = 68, /* -> c generated, c normal, c uv, c object, c camera, c window,
-                                         c reflection */
-    TRC_NODE_MAPPING = 69,    /* c vector, c location, c rotation, c scale -> c; mode 0 point,
-                                 1 texture, 2 vector, 3 normal */
-    TRC_NODE_MIX_COLOR = 70,  /* f factor, c a, c b -> c; mode: TRC_BLEND_* | 256 clamp */
-    TRC_NODE_MATH = 71,       /* f a, f b, f c -> f; mode: TRC_MATH_* | 256 clamp */
-    TRC_NODE_FRESNEL = 72,    /* f ior, c normal -> f */
+    TRC_NODE_IMAGE = 64, /* c vector -> c color, f alpha; image, interpolation in mode bits 0-1,
+                            extension in bits 2-3, projection in bits 4-5 */
+    TRC_NODE_ENVIRONMENT = 65, /* c vector -> c color; image; mode: interpolation bits 0-1, bit 4: 0
+                                  equirectangular, 1 mirror ball */
+    TRC_NODE_UV_MAP = 66,      /* -> c uv; name: the attribute, "" for the default map */
+    TRC_NODE_COLOR_ATTRIBUTE = 67,    /* -> c color, f alpha; name */
+    TRC_NODE_TEXTURE_COORDINATE = 68, /* -> c generated, c normal, c uv, c object, c camera, c
+                                         window, c reflection */
+    TRC_NODE_MAPPING = 69,      /* c vector, c location, c rotation, c scale -> c; mode 0 point,
+                                   1 texture, 2 vector, 3 normal */
+    TRC_NODE_MIX_COLOR = 70,    /* f factor, c a, c b -> c; mode: TRC_BLEND_* | 256 clamp */
+    TRC_NODE_MATH = 71,         /* f a, f b, f c -> f; mode: TRC_MATH_* | 256 clamp */
+    TRC_NODE_FRESNEL = 72,      /* f ior, c normal -> f */
     TRC_NODE_LAYER_WEIGHT = 73, /* f blend, c normal -> f fresnel, f facing */
-    TRC_NODE_LIGHT_PATH = 74, /* -> f is camera, shadow, diffuse, glossy, singular, reflection,
-                                 transmission, ray length, ray depth, diffuse depth, glossy depth,
-                                 transparent depth, transmission depth */
-    TRC_NODE_GEOMETRY = 75,   /* -> c position, c normal, c tangent, c true_normal, c incoming,
-                                 c parametric, f backfacing, f pointiness, f random_per_island */
+    TRC_NODE_LIGHT_PATH = 74,   /* -> f is camera, shadow, diffuse, glossy, singular, reflection,
+                                   transmission, ray length, ray depth, diffuse depth, glossy depth,
+                                   transparent depth, transmission depth */
+    TRC_NODE_GEOMETRY = 75,     /* -> c position, c normal, c tangent, c true_normal, c incoming,
+                                   c parametric, f backfacing, f pointiness, f random_per_island */
     TRC_NODE_NORMAL_MAP = 76, /* f strength, c color -> c normal; mode 0 tangent, 1 object, 2 world;
                                  name: UV map */
     TRC_NODE_INVERT = 77,     /* f factor, c color -> c */
     TRC_NODE_GAMMA = 78,      /* c color, f gamma -> c */
-    TRC_NODE_HUE_SATURATION = 79, /* f hue, f saturation, f value, f factor, c color -> c */
-    TRC_NODE_BRIGHT_CONTRAST = 80,/* c color, f bright, f contrast -> c */
-    TRC_NODE_COLOR_RAMP = 81, /* f factor -> c color, f alpha; table: 256 RGBA values */
-    TRC_NODE_SEPARATE = 82,   /* c -> f, f, f; mode 0 RGB/XYZ */
-    TRC_NODE_COMBINE = 83,    /* f, f, f -> c; mode 0 */
-    TRC_NODE_MAP_RANGE = 84,  /* f value, f from_min, f from_max, f to_min, f to_max -> f; linear;
-                                 mode bit 8: clamp */
-    TRC_NODE_CLAMP = 85,      /* f value, f min, f max -> f; mode 0 min-max, 1 range */
-    TRC_NODE_CHECKER = 86,    /* c vector, c color1, c color2, f scale -> c color, f factor */
-    TRC_NODE_OBJECT_INFO = 87,/* -> c location, c color, f alpha, f object_index, f material_index,
-                                 f random */
-    TRC_NODE_VECTOR_MATH = 88,/* c a, c b, c c, f scale -> c vector, f value; mode: TRC_VECTOR_* */
-    TRC_NODE_RGB_TO_BW = 89   /* c color -> f */
+    TRC_NODE_HUE_SATURATION = 79,  /* f hue, f saturation, f value, f factor, c color -> c */
+    TRC_NODE_BRIGHT_CONTRAST = 80, /* c color, f bright, f contrast -> c */
+    TRC_NODE_COLOR_RAMP = 81,      /* f factor -> c color, f alpha; table: 256 RGBA values */
+    TRC_NODE_SEPARATE = 82,        /* c -> f, f, f; mode 0 RGB/XYZ */
+    TRC_NODE_COMBINE = 83,         /* f, f, f -> c; mode 0 */
+    TRC_NODE_MAP_RANGE = 84,   /* f value, f from_min, f from_max, f to_min, f to_max -> f; linear;
+                                  mode bit 8: clamp */
+    TRC_NODE_CLAMP = 85,       /* f value, f min, f max -> f; mode 0 min-max, 1 range */
+    TRC_NODE_CHECKER = 86,     /* c vector, c color1, c color2, f scale -> c color, f factor */
+    TRC_NODE_OBJECT_INFO = 87, /* -> c location, c color, f alpha, f object_index, f material_index,
+                                  f random */
+    TRC_NODE_VECTOR_MATH = 88, /* c a, c b, c c, f scale -> c vector, f value; mode: TRC_VECTOR_* */
+    TRC_NODE_RGB_TO_BW = 89    /* c color -> f */
 };
 
 /* Microfacet distributions. SHARP ignores roughness. */
@@ -86,70 +86,137 @@ enum {
 };
 
 enum {
-    TRC_BLEND_MIX = 0, TRC_BLEND_DARKEN, TRC_BLEND_MULTIPLY, TRC_BLEND_BURN, TRC_BLEND_LIGHTEN,
-    TRC_BLEND_SCREEN, TRC_BLEND_DODGE, TRC_BLEND_ADD, TRC_BLEND_OVERLAY, TRC_BLEND_SOFT_LIGHT,
-    TRC_BLEND_LINEAR_LIGHT, TRC_BLEND_DIFFERENCE, TRC_BLEND_SUBTRACT, TRC_BLEND_DIVIDE,
-    TRC_BLEND_HUE, TRC_BLEND_SATURATION, TRC_BLEND_COLOR, TRC_BLEND_VALUE, TRC_BLEND_EXCLUSION
+    TRC_BLEND_MIX = 0,
+    TRC_BLEND_DARKEN,
+    TRC_BLEND_MULTIPLY,
+    TRC_BLEND_BURN,
+    TRC_BLEND_LIGHTEN,
+    TRC_BLEND_SCREEN,
+    TRC_BLEND_DODGE,
+    TRC_BLEND_ADD,
+    TRC_BLEND_OVERLAY,
+    TRC_BLEND_SOFT_LIGHT,
+    TRC_BLEND_LINEAR_LIGHT,
+    TRC_BLEND_DIFFERENCE,
+    TRC_BLEND_SUBTRACT,
+    TRC_BLEND_DIVIDE,
+    TRC_BLEND_HUE,
+    TRC_BLEND_SATURATION,
+    TRC_BLEND_COLOR,
+    TRC_BLEND_VALUE,
+    TRC_BLEND_EXCLUSION
 };
 
 enum {
-    TRC_MATH_ADD = 0, TRC_MATH_SUBTRACT, TRC_MATH_MULTIPLY, TRC_MATH_DIVIDE, TRC_MATH_MULTIPLY_ADD,
-    TRC_MATH_POWER, TRC_MATH_LOGARITHM, TRC_MATH_SQRT, TRC_MATH_INVERSE_SQRT, TRC_MATH_ABSOLUTE,
-    TRC_MATH_EXPONENT, TRC_MATH_MINIMUM, TRC_MATH_MAXIMUM, TRC_MATH_LESS_THAN, TRC_MATH_GREATER_THAN,
-    TRC_MATH_SIGN, TRC_MATH_COMPARE, TRC_MATH_SMOOTH_MIN, TRC_MATH_SMOOTH_MAX, TRC_MATH_ROUND,
-    TRC_MATH_FLOOR, TRC_MATH_CEIL, TRC_MATH_TRUNC, TRC_MATH_FRACT, TRC_MATH_MODULO, TRC_MATH_WRAP,
-    TRC_MATH_SNAP, TRC_MATH_PINGPONG, TRC_MATH_SINE, TRC_MATH_COSINE, TRC_MATH_TANGENT,
-    TRC_MATH_ARCSINE, TRC_MATH_ARCCOSINE, TRC_MATH_ARCTANGENT, TRC_MATH_ARCTAN2, TRC_MATH_SINH,
-    TRC_MATH_COSH, TRC_MATH_TANH, TRC_MATH_RADIANS, TRC_MATH_DEGREES
+    TRC_MATH_ADD = 0,
+    TRC_MATH_SUBTRACT,
+    TRC_MATH_MULTIPLY,
+    TRC_MATH_DIVIDE,
+    TRC_MATH_MULTIPLY_ADD,
+    TRC_MATH_POWER,
+    TRC_MATH_LOGARITHM,
+    TRC_MATH_SQRT,
+    TRC_MATH_INVERSE_SQRT,
+    TRC_MATH_ABSOLUTE,
+    TRC_MATH_EXPONENT,
+    TRC_MATH_MINIMUM,
+    TRC_MATH_MAXIMUM,
+    TRC_MATH_LESS_THAN,
+    TRC_MATH_GREATER_THAN,
+    TRC_MATH_SIGN,
+    TRC_MATH_COMPARE,
+    TRC_MATH_SMOOTH_MIN,
+    TRC_MATH_SMOOTH_MAX,
+    TRC_MATH_ROUND,
+    TRC_MATH_FLOOR,
+    TRC_MATH_CEIL,
+    TRC_MATH_TRUNC,
+    TRC_MATH_FRACT,
+    TRC_MATH_MODULO,
+    TRC_MATH_WRAP,
+    TRC_MATH_SNAP,
+    TRC_MATH_PINGPONG,
+    TRC_MATH_SINE,
+    TRC_MATH_COSINE,
+    TRC_MATH_TANGENT,
+    TRC_MATH_ARCSINE,
+    TRC_MATH_ARCCOSINE,
+    TRC_MATH_ARCTANGENT,
+    TRC_MATH_ARCTAN2,
+    TRC_MATH_SINH,
+    TRC_MATH_COSH,
+    TRC_MATH_TANH,
+    TRC_MATH_RADIANS,
+    TRC_MATH_DEGREES
 };
 
 enum {
-    TRC_VECTOR_ADD = 0, TRC_VECTOR_SUBTRACT, TRC_VECTOR_MULTIPLY, TRC_VECTOR_DIVIDE,
-    TRC_VECTOR_MULTIPLY_ADD, TRC_VECTOR_CROSS, TRC_VECTOR_PROJECT, TRC_VECTOR_REFLECT,
-    TRC_VECTOR_DOT, TRC_VECTOR_DISTANCE, TRC_VECTOR_LENGTH, TRC_VECTOR_SCALE, TRC_VECTOR_NORMALIZE,
-    TRC_VECTOR_ABSOLUTE, TRC_VECTOR_MINIMUM, TRC_VECTOR_MAXIMUM, TRC_VECTOR_FLOOR, TRC_VECTOR_CEIL,
+    TRC_VECTOR_ADD = 0,
+    TRC_VECTOR_SUBTRACT,
+    TRC_VECTOR_MULTIPLY,
+    TRC_VECTOR_DIVIDE,
+    TRC_VECTOR_MULTIPLY_ADD,
+    TRC_VECTOR_CROSS,
+    TRC_VECTOR_PROJECT,
+    TRC_VECTOR_REFLECT,
+    TRC_VECTOR_DOT,
+    TRC_VECTOR_DISTANCE,
+    TRC_VECTOR_LENGTH,
+    TRC_VECTOR_SCALE,
+    TRC_VECTOR_NORMALIZE,
+    TRC_VECTOR_ABSOLUTE,
+    TRC_VECTOR_MINIMUM,
+    TRC_VECTOR_MAXIMUM,
+    TRC_VECTOR_FLOOR,
+    TRC_VECTOR_CEIL,
     TRC_VECTOR_FRACT
 };
 
 /* Mode bits of TRC_NODE_IMAGE. */
 enum {
-    TRC_IMAGE_LINEAR = 0, TRC_IMAGE_CLOSEST = 1, TRC_IMAGE_CUBIC = 2,
-    TRC_IMAGE_REPEAT = 0 << 2, TRC_IMAGE_EXTEND = 1 << 2, TRC_IMAGE_CLIP = 2 << 2, TRC_IMAGE_MIRROR = 3 << 2
+    TRC_IMAGE_LINEAR = 0,
+    TRC_IMAGE_CLOSEST = 1,
+    TRC_IMAGE_CUBIC = 2,
+    TRC_IMAGE_REPEAT = 0 << 2,
+    TRC_IMAGE_EXTEND = 1 << 2,
+    TRC_IMAGE_CLIP = 2 << 2,
+    TRC_IMAGE_MIRROR = 3 << 2
 };
 
 typedef struct trc_node_input {
     int32_t node;    /* index of an earlier node, or -1: the constant */
     uint32_t output; /* number of that node's output */
-    float value[3];  /* the constant; a float input reads value[0]. An unlinked "c normal", "c tangent"
-                        or texture "c vector" input takes its default when node is -2 */
+    float value[3];  /* the constant; a float input reads value[0]. An unlinked "c normal", "c
+                        tangent"  or texture "c vector" input takes its default when node is -2 */
 } trc_node_input;
 
 typedef struct trc_node {
-    uint32_t type;         /* TRC_NODE_* */
+    uint32_t type; /* TRC_NODE_* */
     uint32_t mode;
-    uint32_t first_input;  /* into trc_material_desc.inputs */
-    uint32_t input_count;  /* exactly the count of the type */
-    trc_id image;          /* IMAGE, ENVIRONMENT; 0 renders magenta */
-    const char *name;      /* attribute name or NULL */
-    const float *table;    /* COLOR_RAMP: table_count floats, else NULL */
+    uint32_t first_input; /* into trc_material_desc.inputs */
+    uint32_t input_count; /* exactly the count of the type */
+    trc_id image;         /* IMAGE, ENVIRONMENT; 0 renders magenta */
+    const char *name;     /* attribute name or NULL */
+    const float *table;   /* COLOR_RAMP: table_count floats, else NULL */
     uint64_t table_count;
 } trc_node;
 
 typedef struct trc_material_desc {
     uint32_t struct_size;
-    uint32_t node_count;        /* 0: black, opaque */
+    uint32_t node_count; /* 0: black, opaque */
     const trc_node *nodes;
     const trc_node_input *inputs;
     uint32_t input_count;
-    int32_t surface;            /* index of the shader node that is the output; -1: black */
-    int32_t pass_index;         /* Material Index pass */
-    uint32_t flags;             /* TRC_MATERIAL_* */
+    int32_t surface;    /* index of the shader node that is the output; -1: black */
+    int32_t pass_index; /* Material Index pass */
+    uint32_t flags;     /* TRC_MATERIAL_* */
 } trc_material_desc;
 
 enum {
-    TRC_MATERIAL_SAMPLE_EMISSION = 1,    /* sample its emissive triangles as lights ("multiple
-                                            importance sample") */
-    TRC_MATERIAL_TRANSPARENT_SHADOW = 2  /* shadow rays see its transparency; else it is opaque to them */
+    TRC_MATERIAL_SAMPLE_EMISSION = 1, /* sample its emissive triangles as lights ("multiple
+                                         importance sample") */
+    TRC_MATERIAL_TRANSPARENT_SHADOW =
+        2 /* shadow rays see its transparency; else it is opaque to them */
 };
 
 /* NaN or infinite constants refuse the material; out-of-range ones (roughness < 0, IOR <= 0) are
@@ -161,17 +228,22 @@ TRC_API trc_status trc_material_update(trc_scene scene, trc_id material,
 /* Instances that still use it fall back to the default material. */
 TRC_API trc_status trc_material_destroy(trc_scene scene, trc_id material);
 
-enum { TRC_ALPHA_STRAIGHT = 0, TRC_ALPHA_PREMULTIPLIED = 1, TRC_ALPHA_CHANNEL_PACKED = 2, TRC_ALPHA_NONE = 3 };
+enum {
+    TRC_ALPHA_STRAIGHT = 0,
+    TRC_ALPHA_PREMULTIPLIED = 1,
+    TRC_ALPHA_CHANNEL_PACKED = 2,
+    TRC_ALPHA_NONE = 3
+};
 
 typedef struct trc_image_desc {
     uint32_t struct_size;
-    uint32_t width, height;     /* pixels, 1..65536, width * height <= 2^30; 0 with a path */
-    uint32_t alpha_mode;        /* TRC_ALPHA_* */
-    uint32_t is_srgb;           /* 1: colour values are sRGB-encoded and are linearised, 0: as they are */
-    uint32_t is_float;          /* pixels are float (else uint8); ignored with a path */
-    const void *pixels;         /* RGBA, bottom row first, float or uint8; NULL with a path */
-    uint64_t pixel_bytes;       /* size of that buffer, checked */
-    const char *path;           /* file read by OpenImageIO at once; NULL with pixels */
+    uint32_t width, height; /* pixels, 1..65536, width * height <= 2^30; 0 with a path */
+    uint32_t alpha_mode;    /* TRC_ALPHA_* */
+    uint32_t is_srgb;     /* 1: colour values are sRGB-encoded and are linearised, 0: as they are */
+    uint32_t is_float;    /* pixels are float (else uint8); ignored with a path */
+    const void *pixels;   /* RGBA, bottom row first, float or uint8; NULL with a path */
+    uint64_t pixel_bytes; /* size of that buffer, checked */
+    const char *path;     /* file read by OpenImageIO at once; NULL with pixels */
 } trc_image_desc;
 
 /* TRC_ERROR_IMAGE for a file that cannot be read: the caller may go on with image 0 (magenta). */

@@ -6,12 +6,12 @@
 
 TRC_BEGIN_DECLS
 
-/* Arrays of count floats each; tmin, tmax and time may be NULL (0, infinity, 0). Directions need not
- * be unit; distances are in units of their length. A ray with a NaN, an infinite origin or direction,
- * a zero direction, or tmin > tmax hits nothing. */
+/* Arrays of count floats each; tmin, tmax and time may be NULL (0, infinity, 0). Directions need
+ * not be unit; distances are in units of their length. A ray with a NaN, an infinite origin or
+ * direction, a zero direction, or tmin > tmax hits nothing. */
 typedef struct trc_rays {
     uint32_t struct_size;
-    uint32_t visibility;       /* TRC_VISIBLE_* bits an instance must share; TRC_VISIBLE_ALL usual */
+    uint32_t visibility; /* TRC_VISIBLE_* bits an instance must share; TRC_VISIBLE_ALL usual */
     uint64_t count;
     const float *origin_x, *origin_y, *origin_z;
     const float *direction_x, *direction_y, *direction_z;
@@ -20,13 +20,13 @@ typedef struct trc_rays {
 
 #define TRC_NO_HIT 0xffffffffu
 
-/* Arrays of count each, any may be NULL except instance. Barycentrics: hit = (1-u-v) p0 + u p1 + v p2.
- * On a miss instance is TRC_NO_HIT and the rest is untouched. Of equal distances, the lowest
+/* Arrays of count each, any may be NULL except instance. Barycentrics: hit = (1-u-v) p0 + u p1 + v
+ * p2. On a miss instance is TRC_NO_HIT and the rest is untouched. Of equal distances, the lowest
  * (instance, triangle) in creation order wins. */
 typedef struct trc_hits {
     uint32_t struct_size;
     uint32_t reserved;
-    uint32_t *instance;       /* position of the instance in creation order among the living */
+    uint32_t *instance; /* position of the instance in creation order among the living */
     uint32_t *triangle;
     float *distance, *u, *v;
     float *normal_x, *normal_y, *normal_z; /* geometric, world, not normalised, by winding */

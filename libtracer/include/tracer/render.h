@@ -9,16 +9,21 @@ TRC_BEGIN_DECLS
 enum { TRC_INTEGRATOR_RAYCAST = 0, TRC_INTEGRATOR_WHITTED = 1, TRC_INTEGRATOR_DISTRIBUTION = 2 };
 
 enum {
-    TRC_SAMPLER_SOBOL = 0,       /* joint Owen-scrambled Sobol */
-    TRC_SAMPLER_SUDOKU = 1,      /* the paper's interleaved tile */
-    TRC_SAMPLER_JITTER = 2,      /* stratified */
+    TRC_SAMPLER_SOBOL = 0,  /* joint Owen-scrambled Sobol */
+    TRC_SAMPLER_SUDOKU = 1, /* the paper's interleaved tile */
+    TRC_SAMPLER_JITTER = 2, /* stratified */
     TRC_SAMPLER_INDEPENDENT = 3,
-    TRC_SAMPLER_BLUE_NOISE = 4   /* Sobol with blue-noise ordering over the screen, for previews */
+    TRC_SAMPLER_BLUE_NOISE = 4 /* Sobol with blue-noise ordering over the screen, for previews */
 };
 
 enum {
-    TRC_ASSEMBLY_AUTO = 0, TRC_ASSEMBLY_TYPES, TRC_ASSEMBLY_RUNS, TRC_ASSEMBLY_GROUPS,
-    TRC_ASSEMBLY_OCTANTS, TRC_ASSEMBLY_BLIND, TRC_ASSEMBLY_NONE
+    TRC_ASSEMBLY_AUTO = 0,
+    TRC_ASSEMBLY_TYPES,
+    TRC_ASSEMBLY_RUNS,
+    TRC_ASSEMBLY_GROUPS,
+    TRC_ASSEMBLY_OCTANTS,
+    TRC_ASSEMBLY_BLIND,
+    TRC_ASSEMBLY_NONE
 };
 
 enum { TRC_FILTER_BOX = 0, TRC_FILTER_GAUSSIAN = 1, TRC_FILTER_BLACKMAN_HARRIS = 2 };
@@ -35,61 +40,67 @@ enum {
     TRC_PASS_MATERIAL_INDEX = 6, /* 1: first sample */
     TRC_PASS_EMISSION = 7,       /* 3 */
     TRC_PASS_ENVIRONMENT = 8,    /* 3 */
-    TRC_PASS_DIFFUSE_DIRECT = 9, TRC_PASS_DIFFUSE_INDIRECT = 10, TRC_PASS_DIFFUSE_COLOR = 11,
-    TRC_PASS_GLOSSY_DIRECT = 12, TRC_PASS_GLOSSY_INDIRECT = 13, TRC_PASS_GLOSSY_COLOR = 14,
-    TRC_PASS_TRANSMISSION_DIRECT = 15, TRC_PASS_TRANSMISSION_INDIRECT = 16,
+    TRC_PASS_DIFFUSE_DIRECT = 9,
+    TRC_PASS_DIFFUSE_INDIRECT = 10,
+    TRC_PASS_DIFFUSE_COLOR = 11,
+    TRC_PASS_GLOSSY_DIRECT = 12,
+    TRC_PASS_GLOSSY_INDIRECT = 13,
+    TRC_PASS_GLOSSY_COLOR = 14,
+    TRC_PASS_TRANSMISSION_DIRECT = 15,
+    TRC_PASS_TRANSMISSION_INDIRECT = 16,
     TRC_PASS_TRANSMISSION_COLOR = 17,
-    TRC_PASS_SAMPLE_COUNT = 18,  /* 1 */
+    TRC_PASS_SAMPLE_COUNT = 18, /* 1 */
     TRC_PASS_COUNT = 19
 };
 
 typedef struct trc_render_desc {
     uint32_t struct_size;
-    uint32_t width, height;        /* the full frame, 1..65536 each */
-    uint32_t crop_x, crop_y;       /* lower left corner of the part that is rendered */
+    uint32_t width, height;           /* the full frame, 1..65536 each */
+    uint32_t crop_x, crop_y;          /* lower left corner of the part that is rendered */
     uint32_t crop_width, crop_height; /* 0: the full frame */
     uint32_t integrator;
-    uint32_t sample_count;         /* per pixel, 1..2^20 */
-    uint32_t light_samples;        /* shadow rays per camera hit, 1..64; 0 chooses */
-    uint32_t max_depth;            /* bounces; 0: direct light only */
+    uint32_t sample_count;  /* per pixel, 1..2^20 */
+    uint32_t light_samples; /* shadow rays per camera hit, 1..64; 0 chooses */
+    uint32_t max_depth;     /* bounces; 0: direct light only */
     uint32_t max_transparent_depth;
     uint32_t max_glossy_depth, max_transmission_depth; /* further limits; UINT32_MAX none */
-    float attenuation_cutoff;      /* Whitted: a ray whose throughput is below is not traced. Distribution:
-                                      below it Russian roulette decides, unbiased */
-    float filter_glossy;           /* Cycles' Filter Glossy; 0 off */
+    float attenuation_cutoff;           /* Whitted: a ray whose throughput is below is not traced.
+                                           Distribution:           below it Russian roulette decides, unbiased
+                                         */
+    float filter_glossy;                /* Cycles' Filter Glossy; 0 off */
     float clamp_direct, clamp_indirect; /* as Cycles; 0 off */
     uint32_t assembly;
-    uint32_t packet_size;          /* 4, 16, 64 or 256; 0 chooses */
+    uint32_t packet_size; /* 4, 16, 64 or 256; 0 chooses */
     uint32_t sampler;
     uint32_t seed;
-    uint32_t filter;               /* TRC_FILTER_* */
-    float filter_width;            /* pixels, > 0 */
-    uint32_t film_transparent;     /* 1: the background adds no radiance and no alpha */
-    float film_exposure;           /* factor on Combined and light passes */
-    uint64_t passes;               /* bit per TRC_PASS_*, COMBINED is always there */
-    uint32_t thread_count;         /* 0: one per logical processor */
-    uint32_t progressive;          /* 1: whole frame, samples in rising batches (previews); 0: tiles to
-                                      the end one after the other */
-    float noise_threshold;         /* adaptive sampling; 0 off */
+    uint32_t filter;           /* TRC_FILTER_* */
+    float filter_width;        /* pixels, > 0 */
+    uint32_t film_transparent; /* 1: the background adds no radiance and no alpha */
+    float film_exposure;       /* factor on Combined and light passes */
+    uint64_t passes;           /* bit per TRC_PASS_*, COMBINED is always there */
+    uint32_t thread_count;     /* 0: one per logical processor */
+    uint32_t progressive;      /* 1: whole frame, samples in rising batches (previews); 0: tiles to
+                                  the end one after the other */
+    float noise_threshold;     /* adaptive sampling; 0 off */
     uint32_t reserved;
 } trc_render_desc;
 
-/* Starts rendering the scene's current snapshot in threads of the library. Memory is checked and taken
- * before anything starts. A missing camera is INVALID_ARGUMENT. */
+/* Starts rendering the scene's current snapshot in threads of the library. Memory is checked and
+ * taken before anything starts. A missing camera is INVALID_ARGUMENT. */
 TRC_API trc_status trc_render_start(trc_scene scene, const trc_render_desc *desc,
                                     trc_render *render_out);
 
 typedef struct trc_render_progress {
     uint32_t struct_size;
-    uint32_t state;                /* 0 running, 1 done, 2 cancelled, 3 failed (see message) */
-    float fraction;                /* [0, 1] of the samples */
-    uint32_t samples_done;         /* lowest count over all pixels */
-    double seconds;                /* since the start, stands still at the end */
+    uint32_t state;        /* 0 running, 1 done, 2 cancelled, 3 failed (see message) */
+    float fraction;        /* [0, 1] of the samples */
+    uint32_t samples_done; /* lowest count over all pixels */
+    double seconds;        /* since the start, stands still at the end */
     uint64_t rays_camera, rays_shadow, rays_reflection, rays_refraction;
-    uint64_t dropped_samples;      /* not finite, left out */
+    uint64_t dropped_samples;                 /* not finite, left out */
     uint64_t memory_bytes, peak_memory_bytes; /* of the library */
     uint32_t tiles_done, tile_count;
-    uint32_t version;              /* rises with every finished tile or batch: something to draw */
+    uint32_t version; /* rises with every finished tile or batch: something to draw */
     uint32_t reserved;
     double seconds_trace, seconds_shade, seconds_other; /* summed over threads */
 } trc_render_progress;

@@ -1,8 +1,8 @@
 /* A scene: its life, its committed snapshot, what it uses.
  *
  * Edits (create, update, destroy, set) collect until trc_scene_commit, which builds or refits what
- * changed and publishes an immutable snapshot. Renders and queries use the snapshot that was current
- * when they started, and keep it alive; edits and later commits never disturb them. */
+ * changed and publishes an immutable snapshot. Renders and queries use the snapshot that was
+ * current when they started, and keep it alive; edits and later commits never disturb them. */
 #ifndef TRACER_SCENE_H
 #define TRACER_SCENE_H
 
@@ -12,9 +12,9 @@ TRC_BEGIN_DECLS
 
 typedef struct trc_scene_desc {
     uint32_t struct_size;
-    uint32_t thread_count;  /* for builds; 0: one per logical processor */
-    uint32_t is_final;      /* 1: final frame, best trees, static meshes of one instance are joined in
-                               world space; 0: interactive, per-mesh trees that can be refitted */
+    uint32_t thread_count; /* for builds; 0: one per logical processor */
+    uint32_t is_final; /* 1: final frame, best trees, static meshes of one instance are joined in
+                          world space; 0: interactive, per-mesh trees that can be refitted */
     uint32_t reserved;
 } trc_scene_desc;
 
@@ -23,8 +23,9 @@ TRC_API trc_status trc_scene_create(const trc_scene_desc *desc, trc_scene *scene
 /* Renders that run on its snapshot are not disturbed. The handle and all its ids become stale. */
 TRC_API trc_status trc_scene_destroy(trc_scene scene);
 
-/* Compiles materials, refits or rebuilds trees, builds light tables, derives the feature set. Cost in
- * proportion to what changed. TRC_ERROR_CANCELLED after trc_scene_cancel: the former snapshot stays. */
+/* Compiles materials, refits or rebuilds trees, builds light tables, derives the feature set. Cost
+ * in proportion to what changed. TRC_ERROR_CANCELLED after trc_scene_cancel: the former snapshot
+ * stays. */
 TRC_API trc_status trc_scene_commit(trc_scene scene);
 
 /* From any thread: makes a running commit return soon. No effect when none runs. */
@@ -37,8 +38,8 @@ enum {
     TRC_FEATURE_OBJECT_MOTION = 1 << 2,
     TRC_FEATURE_DEFORMATION = 1 << 3,
     TRC_FEATURE_INSTANCES = 1 << 4,
-    TRC_FEATURE_SPECULAR = 1 << 5,     /* ideal reflection or refraction */
-    TRC_FEATURE_GLOSSY = 1 << 6,       /* rough reflection or refraction */
+    TRC_FEATURE_SPECULAR = 1 << 5, /* ideal reflection or refraction */
+    TRC_FEATURE_GLOSSY = 1 << 6,   /* rough reflection or refraction */
     TRC_FEATURE_REFRACTION = 1 << 7,
     TRC_FEATURE_TRANSPARENCY = 1 << 8,
     TRC_FEATURE_TEXTURES = 1 << 9,
@@ -48,22 +49,22 @@ enum {
     TRC_FEATURE_EMISSIVE_MESHES = 1 << 13,
     TRC_FEATURE_ENVIRONMENT = 1 << 14, /* the world is not black */
     TRC_FEATURE_ENVIRONMENT_IMAGE = 1 << 15,
-    TRC_FEATURE_VISIBILITY = 1 << 16,  /* some instance is hidden from some rays */
+    TRC_FEATURE_VISIBILITY = 1 << 16, /* some instance is hidden from some rays */
     TRC_FEATURE_AMBIENT_OCCLUSION = 1 << 17
 };
 
 typedef struct trc_scene_stats {
     uint32_t struct_size;
-    uint32_t features;             /* TRC_FEATURE_* */
-    uint64_t triangle_count;       /* in meshes, once however many instances */
+    uint32_t features;       /* TRC_FEATURE_* */
+    uint64_t triangle_count; /* in meshes, once however many instances */
     uint64_t instanced_triangle_count;
     uint64_t skipped_triangle_count; /* not finite or too large */
     uint64_t mesh_count, instance_count, skipped_instance_count, light_count, material_count;
     uint64_t emissive_triangle_count;
     uint64_t bvh_bytes, geometry_bytes, image_bytes;
-    double build_seconds;          /* of the last commit, trees only */
-    double commit_seconds;         /* of the last commit, all */
-    uint32_t built_count, refitted_count; /* trees in the last commit */
+    double build_seconds;                   /* of the last commit, trees only */
+    double commit_seconds;                  /* of the last commit, all */
+    uint32_t built_count, refitted_count;   /* trees in the last commit */
     float bounds_lower[3], bounds_upper[3]; /* world, over the shutter; lower > upper when empty */
 } trc_scene_stats;
 

@@ -1,10 +1,10 @@
 /* Shape of a tree: binned SAH.
  *
- * Ingo Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies", 2007, for the binning;
- * nodes are opened to eight children by splitting the child of the largest area, as in Wald, Benthin
- * and Boulos, "Getting Rid of Packets", 2008. The upper part of the tree is made by one thread that
- * leaves subtrees of TASK_SIZE refs or less as tasks; sizes do not depend on the number of threads, so the
- * tree does not either. */
+ * Ingo Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies", 2007, for the
+ * binning; nodes are opened to eight children by splitting the child of the largest area, as in
+ * Wald, Benthin and Boulos, "Getting Rid of Packets", 2008. The upper part of the tree is made by
+ * one thread that leaves subtrees of TASK_SIZE refs or less as tasks; sizes do not depend on the
+ * number of threads, so the tree does not either. */
 #include <float.h>
 #include <string.h>
 
@@ -16,11 +16,11 @@
 #define BIN_COUNT 16
 /* Largest subtree that is one task. */
 #define TASK_SIZE 8192
-/* Cost of visiting a node against one triangle of a leaf. A leaf is one block whatever its count, and packets
- * cull its triangles in one step, so leaves may be full. */
+/* Cost of visiting a node against one triangle of a leaf. A leaf is one block whatever its count,
+ * and packets cull its triangles in one step, so leaves may be full. */
 #define NODE_COST 3.0f
-/* From this level (of 8-wide nodes) on, ranges are halved whatever the SAH says: 2^28 refs are exhausted
- * within TRC_MAX_LEVELS. */
+/* From this level (of 8-wide nodes) on, ranges are halved whatever the SAH says: 2^28 refs are
+ * exhausted within TRC_MAX_LEVELS. */
 #define MEDIAN_LEVEL 32
 
 typedef float f4 __attribute__((vector_size(16)));
@@ -79,10 +79,10 @@ struct range {
 };
 
 struct split {
-    int axis;          /* -1: none found */
-    int bin;           /* refs of bins < bin go left */
-    float cost;        /* sum of area * count of both sides */
-    f4 origin, scale;  /* bin = (centroid - origin) * scale */
+    int axis;         /* -1: none found */
+    int bin;          /* refs of bins < bin go left */
+    float cost;       /* sum of area * count of both sides */
+    f4 origin, scale; /* bin = (centroid - origin) * scale */
 };
 
 static struct range range_measure(const struct trc_ref *refs, uint32_t begin, uint32_t end) {
@@ -141,7 +141,8 @@ static void bins_sweep(const struct bins *bins, int axis, struct split *s) {
     for (int i = 1; i < BIN_COUNT; i++) {
         box_grow(&box, bins->box[axis][i - 1]);
         count += bins->count[axis][i - 1];
-        if (count == 0 || right_cost[i] < 0.0f) continue;
+        if (count == 0 || right_cost[i] < 0.0f)
+            continue;
         const float cost = box_area(box) * (float)count + right_cost[i];
         if (cost < s->cost) {
             s->cost = cost;
@@ -164,7 +165,8 @@ static struct split split_find(const struct trc_ref *refs, const struct range *r
     struct bins bins;
     bins_fill(refs, r, &s, &bins);
     for (int axis = 0; axis < 3; axis++)
-        if (s.scale[axis] > 0.0f) bins_sweep(&bins, axis, &s);
+        if (s.scale[axis] > 0.0f)
+            bins_sweep(&bins, axis, &s);
     return s;
 }
 
@@ -228,8 +230,10 @@ struct builder {
 static bool grow(void **array, uint32_t *capacity, size_t size) {
     const uint32_t larger = *capacity ? *capacity * 2 : 64;
     void *block = trc_alloc(larger, size);
-    if (!block) return false;
-    if (*array) memcpy(block, *array, *capacity * size);
+    if (!block)
+        return false;
+    if (*array)
+        memcpy(block, *array, *capacity * size);
     trc_free(*array);
     *array = block;
     *capacity = larger;
@@ -245,7 +249,8 @@ static uint32_t arena_node(struct arena *a) {
         }
         a->children = children;
     }
-    for (int i = 0; i < TRC_NODE_WIDTH; i++) a->children[a->node_count][i] = TRC_REF_EMPTY;
+    for (int i = 0; i < TRC_NODE_WIDTH; i++)
+        a->children[a->node_count][i] = TRC_REF_EMPTY;
     return a->node_count++;
 }
 
@@ -267,14 +272,17 @@ static bool range_divide(struct builder *b, const struct range *r, uint32_t leve
                          struct range *left, struct range *right) {
     const uint32_t count = r->end - r->begin;
     const bool must = count > b->leaf_size;
-    if (count < 2) return false;
+    if (count < 2)
+        return false;
     if (level >= MEDIAN_LEVEL) {
-        if (must) split_middle(b->refs, r, left, right);
+        if (must)
+            split_middle(b->refs, r, left, right);
         return must;
     }
     const struct split s = split_find(b->refs, r);
     const float area = box_area(r->bounds);
-    if (!must && !(s.axis >= 0 && s.cost + area * NODE_COST < area * (float)count)) return false;
+    if (!must && !(s.axis >= 0 && s.cost + area * NODE_COST < area * (float)count))
+        return false;
     if (s.axis < 0) {
         split_middle(b->refs, r, left, right);
         return true;
@@ -299,7 +307,8 @@ static int range_open(struct builder *b, const struct range *r, uint32_t level,
                 best = i;
             }
         }
-        if (best < 0) break;
+        if (best < 0)
+            break;
         struct range left, right;
         if (!range_divide(b, &out[best], level, &left, &right)) {
             closed[best] = true;
@@ -311,15 +320,19 @@ static int range_open(struct builder *b, const struct range *r, uint32_t level,
     return count;
 }
 
-/* Builds r into the arena, depth first; in the upper part (tasks true) small ranges become tasks. */
+/* Builds r into the arena, depth first; in the upper part (tasks true) small ranges become tasks.
+ */
 static uint32_t build_range(struct builder *b, struct arena *a, const struct range *r,
                             uint32_t level, bool tasks) {
     struct range child[TRC_NODE_WIDTH];
-    if (a->failed || b->failed || (b->cancel && *b->cancel)) return TRC_REF_EMPTY;
+    if (a->failed || b->failed || (b->cancel && *b->cancel))
+        return TRC_REF_EMPTY;
     const int count = range_open(b, r, level, child);
-    if (count == 1) return arena_leaf(a, r);
+    if (count == 1)
+        return arena_leaf(a, r);
     const uint32_t node = arena_node(a);
-    if (a->failed) return TRC_REF_EMPTY;
+    if (a->failed)
+        return TRC_REF_EMPTY;
     for (int i = 0; i < count; i++) {
         if (tasks && child[i].end - child[i].begin <= TASK_SIZE) {
             if (b->task_count == b->task_capacity) {
@@ -330,8 +343,8 @@ static uint32_t build_range(struct builder *b, struct arena *a, const struct ran
                 }
                 b->tasks = array;
             }
-            b->tasks[b->task_count++] =
-                (struct task){.range = child[i], .parent = node, .slot = (uint32_t)i, .level = level + 1};
+            b->tasks[b->task_count++] = (struct task){
+                .range = child[i], .parent = node, .slot = (uint32_t)i, .level = level + 1};
         } else {
             const uint32_t ref = build_range(b, a, &child[i], level + 1, tasks);
             a->children[node][i] = ref; /* a->children may have moved meanwhile */
@@ -357,8 +370,10 @@ static trc_status join(struct builder *b, struct arena *top, uint32_t root,
         leaf_count += b->tasks[i].arena.leaf_count;
         failed = failed || b->tasks[i].arena.failed;
     }
-    if (b->cancel && *b->cancel) return trc_fail(TRC_ERROR_CANCELLED, "the build was cancelled");
-    if (failed) return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for a tree");
+    if (b->cancel && *b->cancel)
+        return trc_fail(TRC_ERROR_CANCELLED, "the build was cancelled");
+    if (failed)
+        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for a tree");
     *out = (struct trc_topology){.node_count = node_count, .leaf_count = leaf_count, .root = root};
     out->children = trc_alloc(node_count ? node_count : 1, sizeof *out->children);
     out->leaf_begin = trc_alloc(leaf_count ? leaf_count : 1, sizeof *out->leaf_begin);
@@ -366,7 +381,8 @@ static trc_status join(struct builder *b, struct arena *top, uint32_t root,
         trc_topology_destroy(out);
         return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for a tree of %u nodes", node_count);
     }
-    if (top->node_count) memcpy(out->children, top->children, top->node_count * sizeof *out->children);
+    if (top->node_count)
+        memcpy(out->children, top->children, top->node_count * sizeof *out->children);
     if (top->leaf_count)
         memcpy(out->leaf_begin, top->leaf_begin, top->leaf_count * sizeof *out->leaf_begin);
     uint32_t node = top->node_count, leaf = top->leaf_count;
@@ -394,13 +410,15 @@ trc_status trc_topology_build(struct trc_ref *refs, uint32_t count, uint32_t lea
     struct builder b = {.refs = refs, .leaf_size = leaf_size, .cancel = cancel};
     struct arena top = {0};
     *out = (struct trc_topology){.root = TRC_REF_EMPTY};
-    if (count == 0) return TRC_OK;
+    if (count == 0)
+        return TRC_OK;
     if (count > TRC_REF_INDEX_MASK)
         return trc_fail(TRC_ERROR_TOO_LARGE, "%u primitives in one tree, at most %u", count,
                         TRC_REF_INDEX_MASK);
     const struct range all = range_measure(refs, 0, count);
     const uint32_t root = build_range(&b, &top, &all, 0, count > TASK_SIZE);
-    if (!top.failed && !b.failed) trc_pool_run(pool, b.task_count, task_run, &b);
+    if (!top.failed && !b.failed)
+        trc_pool_run(pool, b.task_count, task_run, &b);
     const trc_status status = join(&b, &top, root, out);
     for (uint32_t i = 0; i < b.task_count; i++) {
         trc_free(b.tasks[i].arena.children);

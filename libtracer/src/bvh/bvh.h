@@ -14,8 +14,8 @@ struct trc_pool; /* threads/pool.h */
 struct trc_bvh;
 
 struct trc_bvh_options {
-    bool is_final;               /* join static single-instance meshes into one world-space tree */
-    const atomic_uint *cancel;   /* non-zero: return TRC_ERROR_CANCELLED soon */
+    bool is_final;             /* join static single-instance meshes into one world-space tree */
+    const atomic_uint *cancel; /* non-zero: return TRC_ERROR_CANCELLED soon */
 };
 
 struct trc_bvh_build_stats {
@@ -26,19 +26,20 @@ struct trc_bvh_build_stats {
     float bounds_lower[3], bounds_upper[3]; /* world, over all keys; lower > upper when empty */
 };
 
-/* Builds the trees for snapshot->meshes, ->instances and ->materials (which must be complete; transparency
- * flags of materials are read), reusing what it can of previous (NULL: none): a mesh pointer that
- * is in both keeps its BLAS; a mesh with the same index array contents but new positions, told by
- * replaced[i] = the mesh of the previous snapshot it comes from (or NULL), is refitted. Ownership of
- * the result goes to the caller. OUT_OF_MEMORY, NO_THREAD or CANCELLED leave nothing behind. */
+/* Builds the trees for snapshot->meshes, ->instances and ->materials (which must be complete;
+ * transparency flags of materials are read), reusing what it can of previous (NULL: none): a mesh
+ * pointer that is in both keeps its BLAS; a mesh with the same index array contents but new
+ * positions, told by replaced[i] = the mesh of the previous snapshot it comes from (or NULL), is
+ * refitted. Ownership of the result goes to the caller. OUT_OF_MEMORY, NO_THREAD or CANCELLED leave
+ * nothing behind. */
 trc_status trc_bvh_create(const struct trc_snapshot *snapshot, const struct trc_bvh *previous,
                           struct trc_mesh *const *replaced, const struct trc_bvh_options *options,
                           struct trc_pool *pool, struct trc_bvh **bvh_out,
                           struct trc_bvh_build_stats *stats_out);
 void trc_bvh_destroy(struct trc_bvh *bvh);
 
-/* Checks the invariants: every child inside its parent at every key, every triangle in exactly one leaf
- * (or counted as skipped), acyclic, depth within the stack. False writes why to message. */
+/* Checks the invariants: every child inside its parent at every key, every triangle in exactly one
+ * leaf (or counted as skipped), acyclic, depth within the stack. False writes why to message. */
 bool trc_bvh_check(const struct trc_bvh *bvh, const struct trc_snapshot *snapshot, char *message,
                    uint32_t capacity);
 

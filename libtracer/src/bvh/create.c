@@ -1,5 +1,5 @@
-/* The trees of a snapshot: which instances share a tree, which are joined, what is kept, refitted or
- * rebuilt. */
+/* The trees of a snapshot: which instances share a tree, which are joined, what is kept, refitted
+ * or rebuilt. */
 #include <float.h>
 #include <math.h>
 #include <string.h>
@@ -21,9 +21,9 @@ struct create_job {
     struct trc_pool *pool;
     struct trc_bvh *bvh;
     struct trc_bvh_build_stats *stats;
-    uint8_t *joined;            /* per instance: part of the joined tree */
-    uint8_t *transparent;       /* per material slot over all instances */
-    uint32_t *first_slot;       /* per instance */
+    uint8_t *joined;      /* per instance: part of the joined tree */
+    uint8_t *transparent; /* per material slot over all instances */
+    uint32_t *first_slot; /* per instance */
 };
 
 static bool vertex_is_valid(const float p[3]) {
@@ -41,7 +41,8 @@ static bool triangle_ref(const struct trc_part *part, uint32_t triangle, struct 
         for (uint32_t v = 0; v < 3; v++) {
             float p[3];
             trc_part_vertex(part, triangle, v, key, p);
-            if (!vertex_is_valid(p)) return false;
+            if (!vertex_is_valid(p))
+                return false;
             for (int i = 0; i < 3; i++) {
                 low[i] = p[i] < low[i] ? p[i] : low[i];
                 high[i] = p[i] > high[i] ? p[i] : high[i];
@@ -73,7 +74,8 @@ static uint32_t part_refs(const struct trc_part *part, uint32_t index, struct tr
 static trc_status tree_build(struct create_job *job, const struct trc_part *parts,
                              uint32_t part_count, uint32_t key_count, struct trc_tree *tree) {
     uint64_t total = 0;
-    for (uint32_t i = 0; i < part_count; i++) total += parts[i].mesh->triangle_count;
+    for (uint32_t i = 0; i < part_count; i++)
+        total += parts[i].mesh->triangle_count;
     if (total > TRC_REF_INDEX_MASK)
         return trc_fail(TRC_ERROR_TOO_LARGE, "%llu triangles in one tree, at most %u",
                         (unsigned long long)total, TRC_REF_INDEX_MASK);
@@ -82,16 +84,18 @@ static trc_status tree_build(struct create_job *job, const struct trc_part *part
         return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory to build a tree of %llu triangles",
                         (unsigned long long)total);
     uint32_t count = 0;
-    for (uint32_t i = 0; i < part_count; i++) count += part_refs(&parts[i], i, refs + count);
+    for (uint32_t i = 0; i < part_count; i++)
+        count += part_refs(&parts[i], i, refs + count);
     struct trc_topology topology;
-    trc_status status = trc_topology_build(refs, count, TRC_NODE_WIDTH, job->pool,
-                                           job->options->cancel, &topology);
+    trc_status status =
+        trc_topology_build(refs, count, TRC_NODE_WIDTH, job->pool, job->options->cancel, &topology);
     if (status == TRC_OK) {
         status = trc_tree_fill(&topology, refs, parts, key_count, job->pool, tree);
         trc_topology_destroy(&topology);
     }
     trc_free(refs);
-    if (status != TRC_OK) return status;
+    if (status != TRC_OK)
+        return status;
     tree->triangle_count = count;
     tree->skipped_count = total - count;
     job->stats->built_count++;
@@ -99,13 +103,14 @@ static trc_status tree_build(struct create_job *job, const struct trc_part *part
 }
 
 static void blas_release(struct trc_blas *blas) {
-    if (!blas || atomic_fetch_sub(&blas->refs, 1) != 1) return;
+    if (!blas || atomic_fetch_sub(&blas->refs, 1) != 1)
+        return;
     trc_tree_destroy(&blas->tree);
     trc_free(blas);
 }
 
-/* Transparency flags of a shared tree: a slot is flagged when any instance of the mesh has a transparent
- * material there. */
+/* Transparency flags of a shared tree: a slot is flagged when any instance of the mesh has a
+ * transparent material there. */
 static trc_status mesh_slots(const struct create_job *job, uint32_t mesh, uint8_t **slots_out,
                              uint32_t *count_out) {
     const struct trc_snapshot *s = job->snapshot;
@@ -114,9 +119,11 @@ static trc_status mesh_slots(const struct create_job *job, uint32_t mesh, uint8_
         if (s->instances[i].mesh == mesh && s->instances[i].material_count > count)
             count = s->instances[i].material_count;
     uint8_t *slots = trc_alloc_zeroed(count ? count : 1, 1);
-    if (!slots) return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for material slots");
+    if (!slots)
+        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for material slots");
     for (uint32_t i = 0; i < s->instance_count; i++) {
-        if (s->instances[i].mesh != mesh) continue;
+        if (s->instances[i].mesh != mesh)
+            continue;
         const uint32_t last = s->instances[i].material_count - 1;
         for (uint32_t slot = 0; slot < count; slot++)
             slots[slot] |= job->transparent[job->first_slot[i] + (slot < last ? slot : last)];
@@ -128,7 +135,8 @@ static trc_status mesh_slots(const struct create_job *job, uint32_t mesh, uint8_
 
 static bool slots_match(const struct trc_tree *tree, const uint8_t *slots, uint32_t count) {
     bool any = false;
-    for (uint32_t i = 0; i < count; i++) any = any || slots[i];
+    for (uint32_t i = 0; i < count; i++)
+        any = any || slots[i];
     return !any && !tree->has_transparent; /* else rebuilt: flags are in the leaves */
 }
 
@@ -140,7 +148,8 @@ static trc_status blas_obtain(struct create_job *job, uint32_t mesh_index,
     uint8_t *slots = NULL;
     uint32_t slot_count = 0;
     trc_status status = mesh_slots(job, mesh_index, &slots, &slot_count);
-    if (status != TRC_OK) return status;
+    if (status != TRC_OK)
+        return status;
     struct trc_blas *from = NULL;
     for (uint32_t i = 0; previous && i < previous->blas_count && !from; i++)
         if (previous->blas[i] && previous->blas[i]->mesh == source &&
@@ -188,11 +197,11 @@ static trc_status blas_obtain(struct create_job *job, uint32_t mesh_index,
 /* Which instances go to the joined tree: static, alone with their mesh, seen by all rays. */
 static void join_select(struct create_job *job) {
     const struct trc_snapshot *s = job->snapshot;
-    if (!job->options->is_final) return;
+    if (!job->options->is_final)
+        return;
     for (uint32_t i = 0; i < s->instance_count; i++) {
         const struct trc_instance *instance = &s->instances[i];
-        job->joined[i] = instance->key_count == 1 &&
-                         s->meshes[instance->mesh]->key_count == 1 &&
+        job->joined[i] = instance->key_count == 1 && s->meshes[instance->mesh]->key_count == 1 &&
                          instance->visibility == TRC_VISIBLE_ALL;
     }
     uint32_t *uses = trc_alloc_zeroed(s->mesh_count ? s->mesh_count : 1, sizeof *uses);
@@ -200,33 +209,37 @@ static void join_select(struct create_job *job) {
         memset(job->joined, 0, s->instance_count); /* slower, not wrong */
         return;
     }
-    for (uint32_t i = 0; i < s->instance_count; i++) uses[s->instances[i].mesh]++;
     for (uint32_t i = 0; i < s->instance_count; i++)
-        if (uses[s->instances[i].mesh] != 1) job->joined[i] = 0;
+        uses[s->instances[i].mesh]++;
+    for (uint32_t i = 0; i < s->instance_count; i++)
+        if (uses[s->instances[i].mesh] != 1)
+            job->joined[i] = 0;
     trc_free(uses);
 }
 
 static trc_status joined_build(struct create_job *job) {
     const struct trc_snapshot *s = job->snapshot;
     uint32_t count = 0;
-    for (uint32_t i = 0; i < s->instance_count; i++) count += job->joined[i];
-    if (count == 0) return TRC_OK;
+    for (uint32_t i = 0; i < s->instance_count; i++)
+        count += job->joined[i];
+    if (count == 0)
+        return TRC_OK;
     struct trc_part *parts = trc_alloc(count, sizeof *parts);
-    if (!parts) return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for %u meshes", count);
+    if (!parts)
+        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for %u meshes", count);
     uint32_t n = 0;
     for (uint32_t i = 0; i < s->instance_count; i++)
         if (job->joined[i])
-            parts[n++] = (struct trc_part){s->meshes[s->instances[i].mesh], i,
-                                           s->instances[i].object_to_world,
-                                           job->transparent + job->first_slot[i],
-                                           s->instances[i].material_count};
+            parts[n++] = (struct trc_part){
+                s->meshes[s->instances[i].mesh], i, s->instances[i].object_to_world,
+                job->transparent + job->first_slot[i], s->instances[i].material_count};
     const trc_status status = tree_build(job, parts, count, 1, &job->bvh->joined);
     trc_free(parts);
     return status;
 }
 
-/* World box of a box under all keys of an instance. M(t) p(t) is a convex combination of the keys' images
- * of points of the box, so the hull of the images of its corners holds it at all times. */
+/* World box of a box under all keys of an instance. M(t) p(t) is a convex combination of the keys'
+ * images of points of the box, so the hull of the images of its corners holds it at all times. */
 static void instance_bounds(const struct trc_instance *instance, const struct trc_tree *tree,
                             float lower[3], float upper[3]) {
     for (int i = 0; i < 3; i++) {
@@ -240,15 +253,16 @@ static void instance_bounds(const struct trc_instance *instance, const struct tr
                                  (corner & 2 ? tree->upper : tree->lower)[1],
                                  (corner & 4 ? tree->upper : tree->lower)[2]};
             for (int i = 0; i < 3; i++) {
-                const double x = m[4 * i] * p[0] + m[4 * i + 1] * p[1] + m[4 * i + 2] * p[2] +
-                                 m[4 * i + 3];
+                const double x =
+                    m[4 * i] * p[0] + m[4 * i + 1] * p[1] + m[4 * i + 2] * p[2] + m[4 * i + 3];
                 lower[i] = fminf(lower[i], nextafterf((float)x, -INFINITY));
                 upper[i] = fmaxf(upper[i], nextafterf((float)x, INFINITY));
             }
         }
 }
 
-static uint32_t items_collect(struct create_job *job, struct trc_item *items, struct trc_ref *refs) {
+static uint32_t items_collect(struct create_job *job, struct trc_item *items,
+                              struct trc_ref *refs) {
     const struct trc_snapshot *s = job->snapshot;
     uint32_t count = 0;
     if (job->bvh->joined.root != TRC_REF_EMPTY) {
@@ -259,9 +273,11 @@ static uint32_t items_collect(struct create_job *job, struct trc_item *items, st
     }
     for (uint32_t i = 0; i < s->instance_count; i++) {
         const struct trc_instance *instance = &s->instances[i];
-        if (job->joined[i] || !instance->visibility) continue;
+        if (job->joined[i] || !instance->visibility)
+            continue;
         const struct trc_tree *tree = &job->bvh->blas[instance->mesh]->tree;
-        if (tree->root == TRC_REF_EMPTY) continue;
+        if (tree->root == TRC_REF_EMPTY)
+            continue;
         items[count] = (struct trc_item){tree, i, instance->visibility};
         instance_bounds(instance, tree, refs[count].lower, refs[count].upper);
         count++;
@@ -315,7 +331,8 @@ static trc_status top_build(struct create_job *job) {
 static trc_status slots_collect(struct create_job *job) {
     const struct trc_snapshot *s = job->snapshot;
     uint64_t total = 0;
-    for (uint32_t i = 0; i < s->instance_count; i++) total += s->instances[i].material_count;
+    for (uint32_t i = 0; i < s->instance_count; i++)
+        total += s->instances[i].material_count;
     job->joined = trc_alloc_zeroed(s->instance_count ? s->instance_count : 1, 1);
     job->transparent = trc_alloc_zeroed(total ? total : 1, 1);
     job->first_slot = trc_alloc(s->instance_count ? s->instance_count : 1, sizeof *job->first_slot);
@@ -325,8 +342,8 @@ static trc_status slots_collect(struct create_job *job) {
     for (uint32_t i = 0; i < s->instance_count; i++) {
         job->first_slot[i] = slot;
         for (uint32_t k = 0; k < s->instances[i].material_count; k++, slot++)
-            job->transparent[slot] = trc_material_shadows_transparent(
-                s->materials[s->instances[i].materials[k]]);
+            job->transparent[slot] =
+                trc_material_shadows_transparent(s->materials[s->instances[i].materials[k]]);
     }
     return TRC_OK;
 }
@@ -342,7 +359,8 @@ static trc_status trees_build(struct create_job *job, const struct trc_bvh *prev
     for (uint32_t i = 0; i < s->instance_count && status == TRC_OK; i++)
         if (!job->joined[i] && !job->bvh->blas[s->instances[i].mesh])
             status = blas_obtain(job, s->instances[i].mesh, previous, replaced);
-    if (status == TRC_OK) status = top_build(job);
+    if (status == TRC_OK)
+        status = top_build(job);
     trc_free(job->joined);
     trc_free(job->transparent);
     trc_free(job->first_slot);
@@ -368,12 +386,13 @@ trc_status trc_bvh_create(const struct trc_snapshot *snapshot, const struct trc_
     const double start = trc_seconds();
     struct trc_bvh_build_stats stats = {0};
     struct trc_bvh *bvh = trc_alloc_zeroed(1, sizeof *bvh);
-    if (!bvh) return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for the trees");
+    if (!bvh)
+        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for the trees");
     bvh->top.root = bvh->joined.root = TRC_REF_EMPTY;
     bvh->blas_count = snapshot->mesh_count;
     bvh->blas = trc_alloc_zeroed(bvh->blas_count ? bvh->blas_count : 1, sizeof *bvh->blas);
-    struct create_job job = {.snapshot = snapshot, .options = options, .pool = pool, .bvh = bvh,
-                             .stats = &stats};
+    struct create_job job = {
+        .snapshot = snapshot, .options = options, .pool = pool, .bvh = bvh, .stats = &stats};
     trc_status status = bvh->blas ? trees_build(&job, previous, replaced)
                                   : trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for the trees");
     if (status != TRC_OK) {
@@ -388,8 +407,10 @@ trc_status trc_bvh_create(const struct trc_snapshot *snapshot, const struct trc_
 }
 
 void trc_bvh_destroy(struct trc_bvh *bvh) {
-    if (!bvh) return;
-    for (uint32_t i = 0; bvh->blas && i < bvh->blas_count; i++) blas_release(bvh->blas[i]);
+    if (!bvh)
+        return;
+    for (uint32_t i = 0; bvh->blas && i < bvh->blas_count; i++)
+        blas_release(bvh->blas[i]);
     trc_tree_destroy(&bvh->top);
     trc_tree_destroy(&bvh->joined);
     trc_free(bvh->items);

@@ -14,8 +14,8 @@ void trc_part_vertex(const struct trc_part *part, uint32_t triangle, uint32_t v,
                      float out[3]) {
     const struct trc_mesh *mesh = part->mesh;
     const uint32_t k = mesh->key_count > 1 ? key : 0;
-    const float *p = mesh->positions + 3 * ((size_t)k * mesh->vertex_count +
-                                            mesh->indices[3 * (size_t)triangle + v]);
+    const float *p = mesh->positions +
+                     3 * ((size_t)k * mesh->vertex_count + mesh->indices[3 * (size_t)triangle + v]);
     if (!part->transform) {
         memcpy(out, p, 3 * sizeof(float));
         return;
@@ -33,16 +33,17 @@ static trc_status tree_alloc(struct trc_tree *tree, uint32_t node_count, uint32_
                               .root = TRC_REF_EMPTY,
                               .is_top = is_top};
     tree->node_stride = TRC_NODE_HEADER_BYTES + (size_t)key_count * TRC_NODE_KEY_BYTES;
-    tree->leaf_stride =
-        is_top ? 0 : TRC_LEAF_HEADER_BYTES + (size_t)key_count * TRC_LEAF_KEY_BYTES;
+    tree->leaf_stride = is_top ? 0 : TRC_LEAF_HEADER_BYTES + (size_t)key_count * TRC_LEAF_KEY_BYTES;
     tree->nodes = trc_alloc(node_count ? node_count : 1, tree->node_stride);
-    if (!is_top) tree->leaves = trc_alloc(leaf_count ? leaf_count : 1, tree->leaf_stride);
+    if (!is_top)
+        tree->leaves = trc_alloc(leaf_count ? leaf_count : 1, tree->leaf_stride);
     if (!tree->nodes || (!is_top && !tree->leaves)) {
         trc_tree_destroy(tree);
         return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for a tree of %u nodes and %u leaves",
                         node_count, leaf_count);
     }
-    tree->bytes = node_count * (uint64_t)tree->node_stride + leaf_count * (uint64_t)tree->leaf_stride;
+    tree->bytes =
+        node_count * (uint64_t)tree->node_stride + leaf_count * (uint64_t)tree->leaf_stride;
     return TRC_OK;
 }
 
@@ -52,11 +53,14 @@ void trc_tree_destroy(struct trc_tree *tree) {
     *tree = (struct trc_tree){.root = TRC_REF_EMPTY};
 }
 
-/* Vertices of all slots of a leaf from the triangle numbers in its header. part_of: the part of a slot. */
-static void leaf_vertices(struct trc_tree *tree, uint32_t leaf, const struct trc_part *const *part_of) {
+/* Vertices of all slots of a leaf from the triangle numbers in its header. part_of: the part of a
+ * slot. */
+static void leaf_vertices(struct trc_tree *tree, uint32_t leaf,
+                          const struct trc_part *const *part_of) {
     const uint32_t *triangles = trc_leaf_triangles(tree, leaf);
     uint32_t used = 0;
-    while (used < TRC_NODE_WIDTH && triangles[used] != TRC_EMPTY_SLOT) used++;
+    while (used < TRC_NODE_WIDTH && triangles[used] != TRC_EMPTY_SLOT)
+        used++;
     for (uint32_t key = 0; key < tree->key_count; key++) {
         float *v = (float *)trc_leaf_vertices(tree, leaf, key);
         for (uint32_t slot = 0; slot < TRC_NODE_WIDTH; slot++) {
@@ -81,7 +85,8 @@ struct fill_job {
 };
 
 static bool part_is_transparent(const struct trc_part *part, uint32_t triangle) {
-    if (!part->transparent) return false;
+    if (!part->transparent)
+        return false;
     const uint32_t slot = part->mesh->material_index ? part->mesh->material_index[triangle] : 0;
     return part->transparent[slot < part->slot_count ? slot : part->slot_count - 1] != 0;
 }
@@ -103,7 +108,8 @@ static void fill_task(void *context, uint32_t index, uint32_t worker) {
                 &job->refs[job->topology->leaf_begin[leaf] + (slot < count ? slot : count - 1)];
             part_of[slot] = &job->parts[ref->part];
             const bool transparent = part_is_transparent(part_of[slot], ref->primitive);
-            if (transparent) atomic_store_explicit(&job->transparent, true, memory_order_relaxed);
+            if (transparent)
+                atomic_store_explicit(&job->transparent, true, memory_order_relaxed);
             instances[slot] = part_of[slot]->instance | (transparent ? TRC_SLOT_TRANSPARENT : 0u);
             triangles[slot] = slot < count ? ref->primitive : TRC_EMPTY_SLOT;
         }
@@ -128,7 +134,8 @@ trc_status trc_tree_fill(const struct trc_topology *topology, const struct trc_r
                          struct trc_tree *tree) {
     const trc_status status =
         tree_alloc(tree, topology->node_count, topology->leaf_count, key_count, false);
-    if (status != TRC_OK) return status;
+    if (status != TRC_OK)
+        return status;
     uint8_t *counts = trc_alloc_zeroed(topology->leaf_count ? topology->leaf_count : 1, 1);
     if (!counts) {
         trc_tree_destroy(tree);
@@ -157,7 +164,8 @@ static void refit_task(void *context, uint32_t index, uint32_t worker) {
     (void)worker;
     struct refit_job *job = context;
     const struct trc_part *part_of[TRC_NODE_WIDTH];
-    for (int i = 0; i < TRC_NODE_WIDTH; i++) part_of[i] = job->part;
+    for (int i = 0; i < TRC_NODE_WIDTH; i++)
+        part_of[i] = job->part;
     const uint32_t begin = index * LEAVES_PER_TASK, count = job->tree->leaf_count;
     for (uint32_t leaf = begin; leaf < count && leaf < begin + LEAVES_PER_TASK; leaf++)
         leaf_vertices(job->tree, leaf, part_of);
@@ -167,7 +175,8 @@ trc_status trc_tree_refit(const struct trc_tree *from, const struct trc_part *pa
                           uint32_t key_count, struct trc_pool *pool, struct trc_tree *tree) {
     const trc_status status =
         tree_alloc(tree, from->node_count, from->leaf_count, key_count, false);
-    if (status != TRC_OK) return status;
+    if (status != TRC_OK)
+        return status;
     for (uint32_t n = 0; n < from->node_count; n++)
         memcpy(tree->nodes + n * tree->node_stride, from->nodes + n * from->node_stride,
                TRC_NODE_HEADER_BYTES);
@@ -177,7 +186,8 @@ trc_status trc_tree_refit(const struct trc_tree *from, const struct trc_part *pa
     tree->root = from->root;
     tree->has_transparent = from->has_transparent;
     struct refit_job job = {part, tree};
-    trc_pool_run(pool, (tree->leaf_count + LEAVES_PER_TASK - 1) / LEAVES_PER_TASK, refit_task, &job);
+    trc_pool_run(pool, (tree->leaf_count + LEAVES_PER_TASK - 1) / LEAVES_PER_TASK, refit_task,
+                 &job);
     trc_tree_bound(tree, pool);
     return TRC_OK;
 }
@@ -242,7 +252,8 @@ static float box_area(const float lower[3], const float upper[3]) {
     return x >= 0.0f ? x * y + y * z + z * x : 0.0f;
 }
 
-/* Root bounds, their scale, and the SAH cost at key 0: area of every child's box over the root's. */
+/* Root bounds, their scale, and the SAH cost at key 0: area of every child's box over the root's.
+ */
 static void tree_finish(struct trc_tree *tree) {
     for (int axis = 0; axis < 3; axis++) {
         tree->lower[axis] = INFINITY;
@@ -253,13 +264,17 @@ static void tree_finish(struct trc_tree *tree) {
         float lower[3], upper[3];
         ref_bounds(tree, tree->root, key, lower, upper);
         for (int axis = 0; axis < 3; axis++) {
-            if (lower[axis] < tree->lower[axis]) tree->lower[axis] = lower[axis];
-            if (upper[axis] > tree->upper[axis]) tree->upper[axis] = upper[axis];
+            if (lower[axis] < tree->lower[axis])
+                tree->lower[axis] = lower[axis];
+            if (upper[axis] > tree->upper[axis])
+                tree->upper[axis] = upper[axis];
         }
     }
-    if (tree->root == TRC_REF_EMPTY) return;
+    if (tree->root == TRC_REF_EMPTY)
+        return;
     for (int axis = 0; axis < 3; axis++)
-        tree->extent = fmaxf(tree->extent, fmaxf(fabsf(tree->lower[axis]), fabsf(tree->upper[axis])));
+        tree->extent =
+            fmaxf(tree->extent, fmaxf(fabsf(tree->lower[axis]), fabsf(tree->upper[axis])));
     double sum = 0.0;
     for (uint32_t n = 0; n < tree->node_count; n++) {
         const float *b = trc_node_bounds(tree, n, 0);
@@ -290,9 +305,9 @@ void trc_tree_bound(struct trc_tree *tree, struct trc_pool *pool) {
 trc_status trc_tree_fill_top(const struct trc_topology *topology, const struct trc_ref *refs,
                              const struct trc_item *items, struct trc_item *items_out,
                              struct trc_tree *tree) {
-    const trc_status status =
-        tree_alloc(tree, topology->node_count, topology->leaf_count, 1, true);
-    if (status != TRC_OK) return status;
+    const trc_status status = tree_alloc(tree, topology->node_count, topology->leaf_count, 1, true);
+    if (status != TRC_OK)
+        return status;
     for (uint32_t leaf = 0; leaf < topology->leaf_count; leaf++)
         items_out[leaf] = items[refs[topology->leaf_begin[leaf]].primitive];
     tree->items = items_out;

@@ -1,11 +1,11 @@
-/* The memory of a tree: 8-wide nodes and leaves of up to 8 triangles, with bounds and vertices at every
- * motion key.
+/* The memory of a tree: 8-wide nodes and leaves of up to 8 triangles, with bounds and vertices at
+ * every motion key.
  *
- * A node is TRC_NODE_HEADER_BYTES of header (8 child references) followed, for each key, by 48 floats:
- * for each axis 8 lower bounds, then 8 upper ones. Unused children have inverted infinite bounds. A leaf is a
- * header (8 instance words, 8 triangle numbers) followed, for each key, by 72 floats: vertex by axis by
- * slot. Unused slots repeat the last triangle, with number TRC_EMPTY_SLOT. Nodes stand before their children, so
- * that a backward walk refits.
+ * A node is TRC_NODE_HEADER_BYTES of header (8 child references) followed, for each key, by 48
+ * floats: for each axis 8 lower bounds, then 8 upper ones. Unused children have inverted infinite
+ * bounds. A leaf is a header (8 instance words, 8 triangle numbers) followed, for each key, by 72
+ * floats: vertex by axis by slot. Unused slots repeat the last triangle, with number
+ * TRC_EMPTY_SLOT. Nodes stand before their children, so that a backward walk refits.
  *
  * A TLAS has the same nodes; its leaves have no vertices: each is one entry of items. */
 #ifndef TRACER_BVH_TREE_H
@@ -30,8 +30,8 @@
 #define TRC_REF_EMPTY 0xffffffffu
 #define TRC_EMPTY_SLOT 0xffffffffu
 
-/* Instance word of a leaf slot: the instance's index, and a bit for materials that shadow rays may see
- * through. */
+/* Instance word of a leaf slot: the instance's index, and a bit for materials that shadow rays may
+ * see through. */
 #define TRC_SLOT_TRANSPARENT 0x80000000u
 #define TRC_SLOT_INSTANCE_MASK 0x7fffffffu
 
@@ -45,22 +45,22 @@ struct trc_tree;
 /* What a TLAS leaf stands for. */
 struct trc_item {
     const struct trc_tree *tree;
-    uint32_t instance;       /* into the snapshot's instances; TRC_NO_HIT: the joined world-space tree */
-    uint32_t visibility;     /* TRC_VISIBLE_* */
+    uint32_t instance; /* into the snapshot's instances; TRC_NO_HIT: the joined world-space tree */
+    uint32_t visibility; /* TRC_VISIBLE_* */
 };
 
 struct trc_tree {
     uint32_t key_count;
     uint32_t node_count, leaf_count;
-    uint32_t root;           /* reference; TRC_REF_EMPTY for no triangles */
+    uint32_t root; /* reference; TRC_REF_EMPTY for no triangles */
     size_t node_stride, leaf_stride;
-    uint8_t *nodes;          /* node_count * node_stride, 64-byte aligned */
-    uint8_t *leaves;         /* leaf_count * leaf_stride */
+    uint8_t *nodes;               /* node_count * node_stride, 64-byte aligned */
+    uint8_t *leaves;              /* leaf_count * leaf_stride */
     const struct trc_item *items; /* TLAS only, by leaf index */
     bool is_top;
-    bool has_transparent;    /* some slot has TRC_SLOT_TRANSPARENT */
+    bool has_transparent;     /* some slot has TRC_SLOT_TRANSPARENT */
     float lower[3], upper[3]; /* over all keys; lower > upper when empty */
-    float extent;            /* largest |coordinate| of the bounds: scale of rounding errors */
+    float extent;             /* largest |coordinate| of the bounds: scale of rounding errors */
     uint64_t triangle_count, skipped_count;
     float sah_cost;
     uint64_t bytes;
@@ -69,8 +69,9 @@ struct trc_tree {
 /* A tree shared between snapshots. */
 struct trc_blas {
     atomic_uint refs;
-    const struct trc_mesh *mesh; /* identity only: compared while the snapshot that holds it lives */
-    float built_cost;            /* SAH cost when last built, to judge refits */
+    const struct trc_mesh
+        *mesh;        /* identity only: compared while the snapshot that holds it lives */
+    float built_cost; /* SAH cost when last built, to judge refits */
     struct trc_tree tree;
 };
 
@@ -78,7 +79,7 @@ struct trc_bvh {
     const struct trc_tree *tree; /* the TLAS, or the joined tree when it is all there is */
     struct trc_tree top, joined;
     struct trc_item *items;
-    struct trc_blas **blas;      /* per snapshot mesh, NULL where only the joined tree has it */
+    struct trc_blas **blas; /* per snapshot mesh, NULL where only the joined tree has it */
     uint32_t blas_count;
 };
 
@@ -97,7 +98,8 @@ static inline const uint32_t *trc_leaf_triangles(const struct trc_tree *t, uint3
     return trc_leaf_instances(t, leaf) + TRC_NODE_WIDTH;
 }
 /* 72 floats: [vertex][axis][slot]. */
-static inline const float *trc_leaf_vertices(const struct trc_tree *t, uint32_t leaf, uint32_t key) {
+static inline const float *trc_leaf_vertices(const struct trc_tree *t, uint32_t leaf,
+                                             uint32_t key) {
     return (const float *)(t->leaves + (size_t)leaf * t->leaf_stride + TRC_LEAF_HEADER_BYTES +
                            (size_t)key * TRC_LEAF_KEY_BYTES);
 }
@@ -109,9 +111,9 @@ struct trc_pool;
 /* One primitive for the builder: its box (of a moving one: the mean over the keys). */
 struct trc_ref {
     float lower[3];
-    uint32_t part;           /* index of the part, see below; TLAS: unused */
+    uint32_t part; /* index of the part, see below; TLAS: unused */
     float upper[3];
-    uint32_t primitive;      /* triangle of the part's mesh; TLAS: item */
+    uint32_t primitive; /* triangle of the part's mesh; TLAS: item */
 };
 
 /* A mesh as it stands in a tree. */
@@ -131,8 +133,9 @@ struct trc_topology {
     uint32_t *leaf_begin;                 /* leaf_count: first ref; the count is in the reference */
 };
 
-/* Binned SAH (Wald, "On fast construction of SAH-based bounding volume hierarchies", 2007), opened to 8
- * children by largest area. leaf_size: most refs of a leaf, 1..8. Same result for any thread count. */
+/* Binned SAH (Wald, "On fast construction of SAH-based bounding volume hierarchies", 2007), opened
+ * to 8 children by largest area. leaf_size: most refs of a leaf, 1..8. Same result for any thread
+ * count. */
 trc_status trc_topology_build(struct trc_ref *refs, uint32_t count, uint32_t leaf_size,
                               struct trc_pool *pool, const atomic_uint *cancel,
                               struct trc_topology *out);
@@ -147,11 +150,13 @@ trc_status trc_tree_fill(const struct trc_topology *topology, const struct trc_r
                          const struct trc_part *parts, uint32_t key_count, struct trc_pool *pool,
                          struct trc_tree *tree);
 
-/* The same tree with other positions of the same topology: a copy of *from, refilled and bounded. */
+/* The same tree with other positions of the same topology: a copy of *from, refilled and bounded.
+ */
 trc_status trc_tree_refit(const struct trc_tree *from, const struct trc_part *part,
                           uint32_t key_count, struct trc_pool *pool, struct trc_tree *tree);
 
-/* A TLAS: leaf i stands for items[refs[topology leaf i].primitive], whose world box is its ref's. */
+/* A TLAS: leaf i stands for items[refs[topology leaf i].primitive], whose world box is its ref's.
+ */
 trc_status trc_tree_fill_top(const struct trc_topology *topology, const struct trc_ref *refs,
                              const struct trc_item *items, struct trc_item *items_out,
                              struct trc_tree *tree);

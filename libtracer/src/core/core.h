@@ -12,8 +12,8 @@
 trc_status trc_fail(trc_status status, const char *format, ...)
     __attribute__((format(printf, 2, 3)));
 
-/* Memory of the library: 64-byte aligned, counted, may fail (NULL). Sizes are count * size, checked for
- * overflow. trc_free(NULL) is fine. Freed blocks must come from here. */
+/* Memory of the library: 64-byte aligned, counted, may fail (NULL). Sizes are count * size, checked
+ * for overflow. trc_free(NULL) is fine. Freed blocks must come from here. */
 void *trc_alloc(size_t count, size_t size);
 void *trc_alloc_zeroed(size_t count, size_t size);
 void trc_free(void *block);
@@ -22,8 +22,8 @@ void trc_free(void *block);
 uint64_t trc_memory_bytes(void);
 uint64_t trc_memory_peak_bytes(void);
 
-/* Test hook: the n-th allocation or thread creation from now fails (0: the next), and each later one too if
- * all is true; negative n switches it off. */
+/* Test hook: the n-th allocation or thread creation from now fails (0: the next), and each later
+ * one too if all is true; negative n switches it off. */
 void trc_memory_fail_at(int64_t n, bool all);
 /* Whether an operation of that kind (thread creation) must fail now. */
 bool trc_memory_should_fail(void);

@@ -135,7 +135,8 @@ static double load_sum(const double *p) {
     return value;
 }
 
-/* The sums that a light pass is divided by, as Cycles divides it: the colour of its kind; NULL: none. */
+/* The sums that a light pass is divided by, as Cycles divides it: the colour of its kind; NULL:
+ * none. */
 static const double *divisor_of(const struct trc_film *film, uint32_t pass) {
     const uint32_t color = trc_film_color_pass(pass);
     return color != TRC_PASS_COMBINED && color != pass ? film->sums[color] : NULL;

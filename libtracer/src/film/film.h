@@ -1,7 +1,8 @@
 /* The film: sums of samples per pixel and pass, written by tiles, read at any time.
  *
  * A pixel belongs to one tile and a tile to one thread, so sums need no locks and their order is
- * fixed. Sums are doubles: 1e9 samples over 1e8 of dynamic range keep a relative error below 1e-6. */
+ * fixed. Sums are doubles: 1e9 samples over 1e8 of dynamic range keep a relative error below 1e-6.
+ */
 #ifndef TRACER_FILM_FILM_H
 #define TRACER_FILM_FILM_H
 
@@ -10,23 +11,23 @@
 #include "tracer/render.h"
 
 struct trc_film {
-    uint32_t width, height;              /* of the crop */
-    uint64_t passes;                     /* bit per TRC_PASS_*, COMBINED included */
-    double *sums[TRC_PASS_COUNT];        /* channels * width * height, or NULL; bottom row first.
-                                            "First sample" passes hold the value itself */
-    uint32_t *sample_counts;             /* width * height */
+    uint32_t width, height;       /* of the crop */
+    uint64_t passes;              /* bit per TRC_PASS_*, COMBINED included */
+    double *sums[TRC_PASS_COUNT]; /* channels * width * height, or NULL; bottom row first.
+                                     "First sample" passes hold the value itself */
+    uint32_t *sample_counts;      /* width * height */
 };
 
 /* Takes the memory of the passes, zeroed. TRC_ERROR_TOO_LARGE or OUT_OF_MEMORY. */
 trc_status trc_film_create(struct trc_film *film, uint32_t width, uint32_t height, uint64_t passes);
 void trc_film_destroy(struct trc_film *film);
 
-/* The colour pass that goes with a diffuse, glossy or transmission pass, TRC_PASS_COMBINED for others: light
- * passes are divided by it when read, so whoever asks for one asks for it too. */
+/* The colour pass that goes with a diffuse, glossy or transmission pass, TRC_PASS_COMBINED for
+ * others: light passes are divided by it when read, so whoever asks for one asks for it too. */
 uint32_t trc_film_color_pass(uint32_t pass);
 
-/* Sums over counts as float32, times exposure for light passes. A tile that is being written may show
- * some of its samples; every value is finite. */
+/* Sums over counts as float32, times exposure for light passes. A tile that is being written may
+ * show some of its samples; every value is finite. */
 trc_status trc_film_read(const struct trc_film *film, uint32_t pass, float exposure, float *out,
                          uint64_t float_count);
 

@@ -1,16 +1,16 @@
 /* The beam: the hull of a packet's rays, tested against eight boxes at once.
  *
- * Boulos et al. 2007, section 3.2, cull a box against intervals of a packet's origins and directions.
- * Here the rays of a beam share their dominant axis z and its sign, and the hull is kept as two ranges per cross
- * axis, at a near and a far plane of z, joined linearly: each ray is linear in z, so the least and the
- * largest x of all rays between the planes lie within the joined lines. It is tighter than intervals of
- * slopes when origins differ.
+ * Boulos et al. 2007, section 3.2, cull a box against intervals of a packet's origins and
+ * directions. Here the rays of a beam share their dominant axis z and its sign, and the hull is
+ * kept as two ranges per cross axis, at a near and a far plane of z, joined linearly: each ray is
+ * linear in z, so the least and the largest x of all rays between the planes lie within the joined
+ * lines. It is tighter than intervals of slopes when origins differ.
  *
- * Everything here only culls. Rounding is covered by slack, an absolute widening of boxes: positions on a
- * ray are wrong by less than 6 half-ulps (2^-24) of |o| + |p - o|, lines of the beam by as much
- * again, and the triangle test moves vertices by less than 4 half-ulps of |v - o|. All lengths are below
- * the largest |coordinate| of the origins plus that of the tree (M), twice: 16 half-ulps of 2 M is
- * TRC_SLACK * M. */
+ * Everything here only culls. Rounding is covered by slack, an absolute widening of boxes:
+ * positions on a ray are wrong by less than 6 half-ulps (2^-24) of |o| + |p - o|, lines of the beam
+ * by as much again, and the triangle test moves vertices by less than 4 half-ulps of |v - o|. All
+ * lengths are below the largest |coordinate| of the origins plus that of the tree (M), twice: 16
+ * half-ulps of 2 M is TRC_SLACK * M. */
 #ifndef TRACER_KERNELS_BEAM_H
 #define TRACER_KERNELS_BEAM_H
 
@@ -22,10 +22,10 @@
 
 struct trc_beam {
     struct trc_shear axis;
-    int side;               /* 0: rays go up z, 1: down; z below is mirrored when 1 */
-    float sign;             /* 1 or -1 */
+    int side;   /* 0: rays go up z, 1: down; z below is mirrored when 1 */
+    float sign; /* 1 or -1 */
     float slack;
-    float z0, z1;           /* near and far plane, mirrored z; z1 shrinks as hits are found */
+    float z0, z1; /* near and far plane, mirrored z; z1 shrinks as hits are found */
     float u_min, u_max, v_min, v_max;                         /* at z0 */
     float u_min_slope, u_max_slope, v_min_slope, v_max_slope; /* per z */
 };
@@ -34,14 +34,15 @@ struct trc_beam {
 struct trc_group {
     struct trc_beam beam;
     float su[TRC_PACKET_SIZE], sv[TRC_PACKET_SIZE], sz[TRC_PACKET_SIZE]; /* shear; sz = 1 / dz */
-    float inv[3][TRC_PACKET_SIZE];  /* 1 / d, finite */
-    float f[TRC_PACKET_SIZE];       /* moving trees: position between the keys */
+    float inv[3][TRC_PACKET_SIZE];                                       /* 1 / d, finite */
+    float f[TRC_PACKET_SIZE]; /* moving trees: position between the keys */
     float f_min, f_max;
     /* Packets of one origin: it, and the range of shears, in the order u, v, z. */
     float origin[3], su_min, su_max, sv_min, sv_max;
 } __attribute__((aligned(64)));
 
-/* A zero component becomes this, so that its reciprocal and products with coordinates stay finite. */
+/* A zero component becomes this, so that its reciprocal and products with coordinates stay finite.
+ */
 #define TRC_TINY_DIRECTION 1e-18f
 
 TRC_INLINE vfloat trc_safe_inverse(vfloat d) {
@@ -49,8 +50,8 @@ TRC_INLINE vfloat trc_safe_inverse(vfloat d) {
     return vf_set(1.0f) / vf_select(tiny, vf_copysign(vf_set(TRC_TINY_DIRECTION), d), d);
 }
 
-/* Shear, inverses and beam of the rays in mask, all of dominant axis z and that side, against a tree. False:
- * none can reach the tree. */
+/* Shear, inverses and beam of the rays in mask, all of dominant axis z and that side, against a
+ * tree. False: none can reach the tree. */
 TRC_INLINE bool trc_group_setup(struct trc_group *g, const struct trc_packet *p,
                                 const struct trc_tree *tree, uint64_t mask, int z, int side) {
     struct trc_beam *b = &g->beam;
@@ -62,7 +63,8 @@ TRC_INLINE bool trc_group_setup(struct trc_group *g, const struct trc_packet *p,
     vfloat z_near = inf, z_far = -inf, far_origin = vf_set(0.0f);
     for (int c = 0; c < TRC_PACKET_CHUNKS; c++) {
         const uint32_t bits = trc_chunk_bits(mask, c);
-        if (!bits) continue;
+        if (!bits)
+            continue;
         const int i = c * TRC_WIDTH;
         const vmask m = vm_from_bits(bits);
         const vfloat du = vf_load(&p->d[au][i]), dv = vf_load(&p->d[av][i]),
@@ -86,14 +88,16 @@ TRC_INLINE bool trc_group_setup(struct trc_group *g, const struct trc_packet *p,
     const float high = side ? -tree->lower[z] : tree->upper[z];
     b->z0 = f_max(vf_lanes_min(z_near), low) - b->slack;
     b->z1 = f_min(vf_lanes_max(z_far), high) + b->slack;
-    if (!(b->z0 <= b->z1)) return false;
+    if (!(b->z0 <= b->z1))
+        return false;
     vfloat u_low[2] = {inf, inf}, u_high[2] = {-inf, -inf}, v_low[2] = {inf, inf},
            v_high[2] = {-inf, -inf};
     vfloat shear[4] = {inf, -inf, inf, -inf};
     const vfloat plane[2] = {sign * b->z0, sign * b->z1};
     for (int c = 0; c < TRC_PACKET_CHUNKS; c++) {
         const uint32_t bits = trc_chunk_bits(mask, c);
-        if (!bits) continue;
+        if (!bits)
+            continue;
         const int i = c * TRC_WIDTH;
         const vmask m = vm_from_bits(bits);
         const vfloat oz = vf_load(&p->o[z][i]);
@@ -135,8 +139,8 @@ TRC_INLINE bool trc_group_setup(struct trc_group *g, const struct trc_packet *p,
     return true;
 }
 
-/* Bits of the boxes that the beam may touch; key: their nearest mirrored z, for ordering. bounds: lower and
- * upper by axis. */
+/* Bits of the boxes that the beam may touch; key: their nearest mirrored z, for ordering. bounds:
+ * lower and upper by axis. */
 TRC_INLINE uint32_t trc_beam_test(const struct trc_beam *b, const f8 lower[3], const f8 upper[3],
                                   f8 *key) {
     const int u = b->axis.u, v = b->axis.v, z = b->axis.z;

@@ -1,8 +1,9 @@
 /* Camera rays: pixel filter, lens, shutter.
  *
- * Samples of a pixel are drawn from the pixel filter's shape, so that a pixel is a plain mean (Ernst,
- * Stamminger and Greiner, "Filter Importance Sampling", 2006; Cycles does the same, so images agree). The
- * lens is a disk by the concentric map of Shirley and Chiu, 1997, or a regular polygon. */
+ * Samples of a pixel are drawn from the pixel filter's shape, so that a pixel is a plain mean
+ * (Ernst, Stamminger and Greiner, "Filter Importance Sampling", 2006; Cycles does the same, so
+ * images agree). The lens is a disk by the concentric map of Shirley and Chiu, 1997, or a regular
+ * polygon. */
 #include "kernels/tile.h"
 #include "kernels/wide_math.h"
 
@@ -22,17 +23,21 @@ static double filter_value(uint32_t filter, double x, double width) {
 void TRC_KERNEL(trc_filter_table)(uint32_t filter, float width, float table[TRC_FILTER_TABLE]) {
     enum { STEPS = 2 * TRC_FILTER_TABLE };
     /* Support of the filters in widths, as Cycles has it. */
-    const double support = filter == TRC_FILTER_GAUSSIAN ? 3.0 : filter == TRC_FILTER_BLACKMAN_HARRIS ? 2.0 : 1.0;
+    const double support = filter == TRC_FILTER_GAUSSIAN          ? 3.0
+                           : filter == TRC_FILTER_BLACKMAN_HARRIS ? 2.0
+                                                                  : 1.0;
     const double half = 0.5 * support * (double)width;
     const double full = 2.0 * half, step = full / STEPS;
     double total = 0.0, sum = 0.0;
-    for (int i = 0; i < STEPS; i++) total += filter_value(filter, -half + (i + 0.5) * step, full);
+    for (int i = 0; i < STEPS; i++)
+        total += filter_value(filter, -half + (i + 0.5) * step, full);
     int filled = 0;
     for (int i = 0; i < STEPS && filled < TRC_FILTER_TABLE; i++) {
         const double value = filter_value(filter, -half + (i + 0.5) * step, full);
         for (; filled < TRC_FILTER_TABLE; filled++) {
             const double target = total * filled / (TRC_FILTER_TABLE - 1);
-            if (target > sum + value && i < STEPS - 1) break;
+            if (target > sum + value && i < STEPS - 1)
+                break;
             const double f = value > 0.0 ? (target - sum) / value : 0.0;
             table[filled] = (float)(-half + (i + (f < 1.0 ? f : 1.0)) * step);
         }
@@ -50,7 +55,8 @@ TRC_INLINE vfloat table_lookup(const float *table, uint32_t n, vfloat u, vmask m
 }
 
 /* A point of the aperture, radius 1. */
-TRC_INLINE void lens_point(const struct trc_camera *camera, vfloat u, vfloat v, vfloat *x, vfloat *y) {
+TRC_INLINE void lens_point(const struct trc_camera *camera, vfloat u, vfloat v, vfloat *x,
+                           vfloat *y) {
     const vfloat one = vf_set(1.0f);
     if (camera->blade_count < 3) {
         const vfloat a = vf_set(2.0f) * u - one, b = vf_set(2.0f) * v - one;
@@ -68,11 +74,11 @@ TRC_INLINE void lens_point(const struct trc_camera *camera, vfloat u, vfloat v, 
         const vfloat scaled = u * vf_set(corners), corner = vf_floor(scaled);
         const vfloat w = vf_sqrt(scaled - corner);
         const float half = 3.14159265358979f / corners;
-        /* Weights of the corners at +half and -half of the triangle's axis; the centre has the rest. */
+        /* Weights of the corners at +half and -half of the triangle's axis; the centre has the
+         * rest. */
         const vfloat a = v * w, b = (one - v) * w;
         const vfloat lx = (a + b) * vf_set(cosf(half)), ly = (a - b) * vf_set(sinf(half));
-        const vfloat angle =
-            corner * vf_set(2.0f * half) + vf_set(half + camera->blade_rotation);
+        const vfloat angle = corner * vf_set(2.0f * half) + vf_set(half + camera->blade_rotation);
         const vfloat c = vf_cos(angle), sn = vf_sin(angle);
         *x = c * lx - sn * ly;
         *y = sn * lx + c * ly;
@@ -81,12 +87,14 @@ TRC_INLINE void lens_point(const struct trc_camera *camera, vfloat u, vfloat v, 
 }
 
 /* Camera-to-world of each lane's time. */
-TRC_INLINE void camera_matrix(const struct trc_camera *camera, vfloat time, vmask active, vfloat m[12],
-                              vfloat window[4]) {
+TRC_INLINE void camera_matrix(const struct trc_camera *camera, vfloat time, vmask active,
+                              vfloat m[12], vfloat window[4]) {
     const float *base = camera->camera_to_world->m, *windows = camera->windows[0];
     if (camera->key_count < 2) {
-        for (int k = 0; k < 12; k++) m[k] = vf_set(base[k]);
-        for (int k = 0; k < 4; k++) window[k] = vf_set(windows[k]);
+        for (int k = 0; k < 12; k++)
+            m[k] = vf_set(base[k]);
+        for (int k = 0; k < 4; k++)
+            window[k] = vf_set(windows[k]);
         return;
     }
     const float last = (float)(camera->key_count - 1);
@@ -124,8 +132,10 @@ void TRC_KERNEL(trc_camera_rays)(struct trc_tile *t) {
         }
         vfloat m[12], window[4];
         camera_matrix(camera, time, active, m, window);
-        const vfloat sx = window[0] + (window[1] - window[0]) * px * vf_set(1.0f / (float)t->desc->width);
-        const vfloat sy = window[2] + (window[3] - window[2]) * py * vf_set(1.0f / (float)t->desc->height);
+        const vfloat sx =
+            window[0] + (window[1] - window[0]) * px * vf_set(1.0f / (float)t->desc->width);
+        const vfloat sy =
+            window[2] + (window[3] - window[2]) * py * vf_set(1.0f / (float)t->desc->height);
         const vfloat zero = vf_set(0.0f), one = vf_set(1.0f);
         vvec3 o = orthographic ? v3(sx, sy, zero) : v3_zero();
         vvec3 d = orthographic ? v3(zero, zero, -one) : v3(sx, sy, -one);
@@ -149,10 +159,12 @@ void TRC_KERNEL(trc_camera_rays)(struct trc_tile *t) {
         vf_store(out->f[TRC_RAY_TMIN] + i, vf_set(camera->clip_start) * per_z);
         vf_store(out->f[TRC_RAY_TMAX] + i, vf_set(camera->clip_end) * per_z);
         vf_store(out->f[TRC_RAY_TIME] + i, time);
-        for (int k = TRC_RAY_WEIGHT_R; k <= TRC_RAY_WEIGHT_B; k++) vf_store(out->f[k] + i, one);
+        for (int k = TRC_RAY_WEIGHT_R; k <= TRC_RAY_WEIGHT_B; k++)
+            vf_store(out->f[k] + i, one);
         vf_store(out->f[TRC_RAY_PDF] + i, -one);
         vf_store(out->f[TRC_RAY_MIN_PDF] + i, vf_set(3.4e38f));
-        for (int k = TRC_RAY_NX; k <= TRC_RAY_NZ; k++) vf_store(out->f[k] + i, zero);
+        for (int k = TRC_RAY_NX; k <= TRC_RAY_NZ; k++)
+            vf_store(out->f[k] + i, zero);
         vf_store(out->f[TRC_RAY_BEYOND] + i, one);
         vi_store((int32_t *)out->w[TRC_RAY_SLOT] + i, vi_set((int32_t)i) + vi_lane());
         vu_store(out->w[TRC_RAY_PATH] + i,

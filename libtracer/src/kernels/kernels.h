@@ -20,24 +20,25 @@ struct trc_tile_counts {
 /* A rectangle of the crop and a range of its samples, for one thread. */
 struct trc_tile_job {
     const struct trc_snapshot *snapshot;
-    const trc_render_desc *desc;     /* resolved: no 0-means-chosen values left */
-    const uint32_t *sampler_table;   /* sampling/sobol.h */
+    const trc_render_desc *desc;   /* resolved: no 0-means-chosen values left */
+    const uint32_t *sampler_table; /* sampling/sobol.h */
     struct trc_film *film;
-    uint32_t x, y, width, height;    /* in the crop, pixels */
+    uint32_t x, y, width, height; /* in the crop, pixels */
     uint32_t sample_begin, sample_end;
-    void *memory;                    /* tile_memory_bytes(desc) bytes, 64-byte aligned, one thread's */
-    const atomic_uint *cancel;       /* non-zero: return soon, the tile's pixels keep whole samples */
-    struct trc_tile_counts counts;   /* added to */
+    void *memory;              /* tile_memory_bytes(desc) bytes, 64-byte aligned, one thread's */
+    const atomic_uint *cancel; /* non-zero: return soon, the tile's pixels keep whole samples */
+    struct trc_tile_counts counts; /* added to */
 };
 
 struct trc_kernels {
-    uint32_t isa;                    /* TRC_ISA_* */
-    uint32_t width;                  /* lanes */
+    uint32_t isa;   /* TRC_ISA_* */
+    uint32_t width; /* lanes */
     /* Bytes of scratch memory a tile job needs. */
     size_t (*tile_memory_bytes)(const trc_render_desc *desc);
     /* Renders a job; never fails. The thread's floating-point state must be the default. */
     void (*tile_render)(struct trc_tile_job *job);
-    /* trc_query_*: arguments already validated; chunk [begin, end) of the arrays. packet_size resolved. */
+    /* trc_query_*: arguments already validated; chunk [begin, end) of the arrays. packet_size
+     * resolved. */
     void (*query_closest)(const struct trc_snapshot *snapshot, const trc_rays *rays,
                           const trc_hits *hits, uint64_t begin, uint64_t end, uint32_t packet_size);
     void (*query_occluded)(const struct trc_snapshot *snapshot, const trc_rays *rays,
@@ -48,8 +49,8 @@ struct trc_kernels {
                            float *radiance, uint32_t count);
 };
 
-/* The table of an instruction set that this build and CPU have, else NULL (cpu/dispatch.c). Tables are
- * constants named trc_kernels_scalar, _sse42, _avx2, _avx512, _neon (kernels/table.c). */
+/* The table of an instruction set that this build and CPU have, else NULL (cpu/dispatch.c). Tables
+ * are constants named trc_kernels_scalar, _sse42, _avx2, _avx512, _neon (kernels/table.c). */
 const struct trc_kernels *trc_kernels_get(uint32_t isa);
 
 /* The table in force: trc_set_isa, TRACER_ISA, CPU. Never NULL. */

@@ -10,18 +10,18 @@
 #define TRC_PACKET_SIZE 64
 #define TRC_PACKET_CHUNKS (TRC_PACKET_SIZE / TRC_WIDTH)
 
-/* Directions need not be unit, but their largest component must be in [2^-60, 2^60]; distances are in units of
- * the direction. Lanes out of the active mask may hold anything. */
+/* Directions need not be unit, but their largest component must be in [2^-60, 2^60]; distances are
+ * in units of the direction. Lanes out of the active mask may hold anything. */
 struct trc_packet {
     float o[3][TRC_PACKET_SIZE];
     float d[3][TRC_PACKET_SIZE];
     float tmin[TRC_PACKET_SIZE];
-    float t[TRC_PACKET_SIZE];     /* in: farthest distance; out: distance of the hit */
-    float time[TRC_PACKET_SIZE];  /* [0, 1]; read only in scenes with object motion */
+    float t[TRC_PACKET_SIZE];    /* in: farthest distance; out: distance of the hit */
+    float time[TRC_PACKET_SIZE]; /* [0, 1]; read only in scenes with object motion */
     uint64_t active;
-    uint32_t visibility;          /* TRC_VISIBLE_* */
-    bool common_origin;           /* all active rays start at the same point */
-    bool skip_transparent;        /* occlusion: materials that shadow rays see through do not count */
+    uint32_t visibility;   /* TRC_VISIBLE_* */
+    bool common_origin;    /* all active rays start at the same point */
+    bool skip_transparent; /* occlusion: materials that shadow rays see through do not count */
 } __attribute__((aligned(64)));
 
 /* Written where a ray hits; instance must be TRC_NO_HIT before. */
@@ -43,7 +43,8 @@ TRC_INLINE uint32_t trc_chunk_bits(uint64_t mask, int c) {
 struct trc_bvh;
 struct trc_snapshot;
 
-/* Nearest hit of each active ray in (tmin, t]; among equal distances the lowest (instance, triangle). */
+/* Nearest hit of each active ray in (tmin, t]; among equal distances the lowest (instance,
+ * triangle). */
 void TRC_KERNEL(trc_trace_closest)(const struct trc_snapshot *snapshot, struct trc_packet *packet,
                                    struct trc_packet_hits *hits);
 

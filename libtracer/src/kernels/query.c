@@ -4,10 +4,11 @@
 #include "kernels/packet.h"
 #include "scene/snapshot.h"
 
-/* Rays are scaled by a power of two so that the largest component of the direction is in [1, 2): exact, and distances
- * scale back exactly. Rays that documented rules exclude stay inactive. */
+/* Rays are scaled by a power of two so that the largest component of the direction is in [1, 2):
+ * exact, and distances scale back exactly. Rays that documented rules exclude stay inactive. */
 
-static bool ray_load(const trc_rays *rays, uint64_t from, int lane, struct trc_packet *p, float *scale) {
+static bool ray_load(const trc_rays *rays, uint64_t from, int lane, struct trc_packet *p,
+                     float *scale) {
     const float o[3] = {rays->origin_x[from], rays->origin_y[from], rays->origin_z[from]};
     const float d[3] = {rays->direction_x[from], rays->direction_y[from], rays->direction_z[from]};
     const float tmin = rays->tmin ? rays->tmin[from] : 0.0f;
@@ -15,10 +16,12 @@ static bool ray_load(const trc_rays *rays, uint64_t from, int lane, struct trc_p
     const float time = rays->time ? rays->time[from] : 0.0f;
     float largest = 0.0f;
     for (int k = 0; k < 3; k++) {
-        if (!isfinite(o[k]) || !isfinite(d[k])) return false;
+        if (!isfinite(o[k]) || !isfinite(d[k]))
+            return false;
         largest = fmaxf(largest, fabsf(d[k]));
     }
-    if (largest == 0.0f || !(tmin <= tmax)) return false;
+    if (largest == 0.0f || !(tmin <= tmax))
+        return false;
     int exponent;
     (void)frexpf(largest, &exponent);
     *scale = ldexpf(1.0f, exponent - 1 < -126 ? -126 : exponent - 1);
@@ -37,11 +40,13 @@ static void packet_load(const trc_rays *rays, uint64_t begin, uint32_t count, st
     p->active = 0;
     p->common_origin = true;
     for (uint32_t i = 0; i < count; i++)
-        if (ray_load(rays, begin + i, (int)i, p, &scale[i])) p->active |= 1ull << i;
+        if (ray_load(rays, begin + i, (int)i, p, &scale[i]))
+            p->active |= 1ull << i;
     const int first = p->active ? __builtin_ctzll(p->active) : 0;
     for (uint64_t m = p->active; m && p->common_origin; m &= m - 1) {
         const int i = __builtin_ctzll(m);
-        for (int k = 0; k < 3; k++) p->common_origin = p->common_origin && p->o[k][i] == p->o[k][first];
+        for (int k = 0; k < 3; k++)
+            p->common_origin = p->common_origin && p->o[k][i] == p->o[k][first];
     }
     p->visibility = rays->visibility;
     p->skip_transparent = false;
@@ -51,16 +56,24 @@ static void hit_store(const struct trc_snapshot *snapshot, const trc_hits *out, 
                       const struct trc_packet *p, const struct trc_packet_hits *h, uint32_t i,
                       float scale) {
     out->instance[to] = h->instance[i];
-    if (out->triangle) out->triangle[to] = h->triangle[i];
-    if (out->distance) out->distance[to] = p->t[i] / scale;
-    if (out->u) out->u[to] = h->u[i];
-    if (out->v) out->v[to] = h->v[i];
-    if (!out->normal_x && !out->normal_y && !out->normal_z) return;
+    if (out->triangle)
+        out->triangle[to] = h->triangle[i];
+    if (out->distance)
+        out->distance[to] = p->t[i] / scale;
+    if (out->u)
+        out->u[to] = h->u[i];
+    if (out->v)
+        out->v[to] = h->v[i];
+    if (!out->normal_x && !out->normal_y && !out->normal_z)
+        return;
     float n[3];
     TRC_KERNEL(trc_query_normal)(snapshot, h->instance[i], h->triangle[i], p->time[i], n);
-    if (out->normal_x) out->normal_x[to] = n[0];
-    if (out->normal_y) out->normal_y[to] = n[1];
-    if (out->normal_z) out->normal_z[to] = n[2];
+    if (out->normal_x)
+        out->normal_x[to] = n[0];
+    if (out->normal_y)
+        out->normal_y[to] = n[1];
+    if (out->normal_z)
+        out->normal_z[to] = n[2];
 }
 
 void TRC_KERNEL(trc_query_normal)(const struct trc_snapshot *snapshot, uint32_t instance,
@@ -123,6 +136,7 @@ void TRC_KERNEL(trc_query_occluded_rays)(const struct trc_snapshot *snapshot, co
         const uint32_t count = end - at < size ? (uint32_t)(end - at) : size;
         packet_load(rays, at, count, &p, scale);
         const uint64_t blocked = TRC_KERNEL(trc_trace_occluded)(snapshot, &p);
-        for (uint32_t i = 0; i < count; i++) occluded[at + i] = (uint8_t)(blocked >> i & 1u);
+        for (uint32_t i = 0; i < count; i++)
+            occluded[at + i] = (uint8_t)(blocked >> i & 1u);
     }
 }

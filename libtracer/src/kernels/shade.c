@@ -1,23 +1,24 @@
 /* Shading of a step's hits: emission, direct light, continuation rays.
  *
- * Hits come sorted by material, so a group of TRC_WIDTH runs one material's code; loops over lobes and
- * light samples are uniform. N rays in, N rays out (Boulos et al. 2007, section 4.1): Distribution chooses one
- * lobe per ray from the sample sequence; Whitted follows every lobe along its ideal direction. Diffuse
- * lobes end here: their light is all in the light samples. Rough lobes join light samples and continuation
- * rays by multiple importance sampling (Veach and Guibas 1995, power heuristic). */
+ * Hits come sorted by material, so a group of TRC_WIDTH runs one material's code; loops over lobes
+ * and light samples are uniform. N rays in, N rays out (Boulos et al. 2007, section 4.1):
+ * Distribution chooses one lobe per ray from the sample sequence; Whitted follows every lobe along
+ * its ideal direction. Diffuse lobes end here: their light is all in the light samples. Rough lobes
+ * join light samples and continuation rays by multiple importance sampling (Veach and Guibas 1995,
+ * power heuristic). */
 #include "kernels/light.h"
 #include "kernels/tile.h"
 #include "kernels/wide_math.h"
 
 /* Everything a group of lanes carries from the ray that arrived. */
 struct arrival {
-    vint index;               /* into t->work */
+    vint index; /* into t->work */
     vmask active;
     vvec3 o, d, n_from;
-    vvec3 found_weight;       /* of emission the ray finds, also straight on through transparency */
-    vvec3 weight;             /* of light and rays that scatter here: found_weight * beyond */
-    vfloat beyond;            /* kernels/bsdf.h, trc_bsdf_sample */
-    vvec3 receive_n;          /* normal as kernels/light.h wants it of the surface hit */
+    vvec3 found_weight; /* of emission the ray finds, also straight on through transparency */
+    vvec3 weight;       /* of light and rays that scatter here: found_weight * beyond */
+    vfloat beyond;      /* kernels/bsdf.h, trc_bsdf_sample */
+    vvec3 receive_n;    /* normal as kernels/light.h wants it of the surface hit */
     vfloat t, tmin, time, pdf, min_pdf;
     vuint slot, path, depths;
     uint32_t slots[TRC_WIDTH];
@@ -31,15 +32,18 @@ static void arrival_load(const struct trc_tile *t, vint index, vmask active, str
     const struct trc_ray_store *r = &t->work;
     a->index = index;
     a->active = active;
-    a->o = v3(vf_gather(r->f[TRC_RAY_OX], index, active), vf_gather(r->f[TRC_RAY_OY], index, active),
-              vf_gather(r->f[TRC_RAY_OZ], index, active));
-    a->d = v3(vf_gather(r->f[TRC_RAY_DX], index, active), vf_gather(r->f[TRC_RAY_DY], index, active),
-              vf_gather(r->f[TRC_RAY_DZ], index, active));
+    a->o =
+        v3(vf_gather(r->f[TRC_RAY_OX], index, active), vf_gather(r->f[TRC_RAY_OY], index, active),
+           vf_gather(r->f[TRC_RAY_OZ], index, active));
+    a->d =
+        v3(vf_gather(r->f[TRC_RAY_DX], index, active), vf_gather(r->f[TRC_RAY_DY], index, active),
+           vf_gather(r->f[TRC_RAY_DZ], index, active));
     a->found_weight = v3(vf_gather(r->f[TRC_RAY_WEIGHT_R], index, active),
                          vf_gather(r->f[TRC_RAY_WEIGHT_G], index, active),
                          vf_gather(r->f[TRC_RAY_WEIGHT_B], index, active));
-    a->n_from = v3(vf_gather(r->f[TRC_RAY_NX], index, active), vf_gather(r->f[TRC_RAY_NY], index, active),
-                   vf_gather(r->f[TRC_RAY_NZ], index, active));
+    a->n_from =
+        v3(vf_gather(r->f[TRC_RAY_NX], index, active), vf_gather(r->f[TRC_RAY_NY], index, active),
+           vf_gather(r->f[TRC_RAY_NZ], index, active));
     a->tmin = vf_gather(r->f[TRC_RAY_TMIN], index, active);
     a->beyond = vf_gather(r->f[TRC_RAY_BEYOND], index, active);
     a->weight = v3_scale(a->found_weight, a->beyond);
@@ -69,17 +73,19 @@ TRC_INLINE vfloat light_count_before(const struct trc_tile *t, vuint depths) {
 
 /* Cycles' clamps: the sum of the channels of one contribution. */
 TRC_INLINE vvec3 clamp_radiance(vvec3 c, float limit) {
-    if (limit <= 0.0f) return c;
+    if (limit <= 0.0f)
+        return c;
     const vfloat sum = vf_abs(c.x) + vf_abs(c.y) + vf_abs(c.z);
     const vmask over = vf_gt(sum, vf_set(limit));
     return v3_select(over, v3_scale(c, vf_set(limit) / vf_select(over, sum, vf_set(1.0f))), c);
 }
 
-/* Emission or background found by rays: to the samples, and to the pass its depth says. direct_pass: what camera
- * rays see it as. */
+/* Emission or background found by rays: to the samples, and to the pass its depth says.
+ * direct_pass: what camera rays see it as. */
 static void emission_add(struct trc_tile *t, const struct arrival *a, vmask active, vvec3 radiance,
                          uint32_t camera_pass) {
-    if (!vm_any(active)) return;
+    if (!vm_any(active))
+        return;
     vvec3 c = v3_mul(a->found_weight, radiance);
     const vuint depth = depth_of(a->depths, TRC_DEPTH_ALL_SHIFT);
     if (t->desc->clamp_indirect > 0.0f || t->desc->clamp_direct > 0.0f)
@@ -97,16 +103,19 @@ static void emission_add(struct trc_tile *t, const struct arrival *a, vmask acti
         if (category == 0)
             trc_pass_add(t, camera_pass, a->slots[i], rgb);
         else if (t->light_passes)
-            trc_pass_add(t, (category == 1 ? TRC_PASS_GLOSSY_DIRECT : TRC_PASS_TRANSMISSION_DIRECT) +
-                                (depths[i] > 1 ? 1 : 0), a->slots[i], rgb);
+            trc_pass_add(t,
+                         (category == 1 ? TRC_PASS_GLOSSY_DIRECT : TRC_PASS_TRANSMISSION_DIRECT) +
+                             (depths[i] > 1 ? 1 : 0),
+                         a->slots[i], rgb);
     }
 }
 
 /* Rays that left the scene. */
 static void shade_misses(struct trc_tile *t, const struct arrival *a, vmask missed) {
     if (t->desc->film_transparent) {
-        const vmask seen = vm_and(missed, vi_eq((vint)(a->path & vu_set(TRC_PATH_TRANSPARENT_BACKGROUND)),
-                                                vi_set(TRC_PATH_TRANSPARENT_BACKGROUND)));
+        const vmask seen =
+            vm_and(missed, vi_eq((vint)(a->path & vu_set(TRC_PATH_TRANSPARENT_BACKGROUND)),
+                                 vi_set(TRC_PATH_TRANSPARENT_BACKGROUND)));
         float through[TRC_WIDTH];
         vf_store(through, v3_average(a->found_weight));
         for (uint32_t bits = vm_bits(seen); bits; bits &= bits - 1) {
@@ -115,9 +124,11 @@ static void shade_misses(struct trc_tile *t, const struct arrival *a, vmask miss
         }
         missed = vm_andnot(missed, seen);
     }
-    if (!(t->snapshot->features & TRC_FEATURE_ENVIRONMENT) || !vm_any(missed)) return;
-    const vvec3 c = TRC_KERNEL(trc_world_radiance)(t->snapshot, a->o, a->n_from, a->d, a->pdf,
-                                                   light_count_before(t, a->depths), a->path, missed);
+    if (!(t->snapshot->features & TRC_FEATURE_ENVIRONMENT) || !vm_any(missed))
+        return;
+    const vvec3 c =
+        TRC_KERNEL(trc_world_radiance)(t->snapshot, a->o, a->n_from, a->d, a->pdf,
+                                       light_count_before(t, a->depths), a->path, missed);
     emission_add(t, a, missed, c, TRC_PASS_ENVIRONMENT);
 }
 
@@ -129,46 +140,58 @@ static void shade_rays(struct trc_tile *t) {
         const vmask active = vm_first((int32_t)(t->work.count - i));
         const vmask missed =
             vm_and(active, vi_eq(vi_load((int32_t *)t->hits.instance + i), vi_set(-1)));
-        if (!lights && !vm_any(missed)) continue;
+        if (!lights && !vm_any(missed))
+            continue;
         struct arrival a;
         arrival_load(t, index, active, &a);
         if (lights) {
             vvec3 c = v3_zero();
             const vfloat end = vf_select(missed, vf_set(TRC_FAR), a.t);
-            TRC_KERNEL(trc_light_hit)(t->snapshot, a.o, a.n_from, a.d, a.tmin, end, a.pdf,
-                                      light_count_before(t, a.depths), a.path, a.time, active, &c);
+            TRC_KERNEL(trc_light_hit)
+            (t->snapshot, a.o, a.n_from, a.d, a.tmin, end, a.pdf, light_count_before(t, a.depths),
+             a.path, a.time, active, &c);
             const vmask seen = vm_and(active, vf_gt(v3_max(c), vf_set(0.0f)));
             emission_add(t, &a, seen, c, TRC_PASS_EMISSION);
         }
-        if (vm_any(missed)) shade_misses(t, &a, missed);
+        if (vm_any(missed))
+            shade_misses(t, &a, missed);
     }
 }
 
 /* ---- data passes ---- */
 
-static void store_vector(struct trc_tile *t, uint32_t pass, uint32_t slot, float x, float y, float z) {
+static void store_vector(struct trc_tile *t, uint32_t pass, uint32_t slot, float x, float y,
+                         float z) {
     float *const *p = t->samples.pass[pass];
-    if (p[0]) p[0][slot] = x;
-    if (p[1]) p[1][slot] = y;
-    if (p[2]) p[2][slot] = z;
+    if (p[0])
+        p[0][slot] = x;
+    if (p[1])
+        p[1][slot] = y;
+    if (p[2])
+        p[2][slot] = z;
 }
 
 /* Depth, normal, indices ... of the first surface that is not mostly seen through. */
 static void data_passes(struct trc_tile *t, struct arrival *a, const struct trc_surface *s,
                         const struct trc_material *m, const struct trc_lobes *lobes, vmask active) {
     const uint64_t wanted = t->desc->passes & ~(1ull << TRC_PASS_COMBINED);
-    if (!wanted) return;
+    if (!wanted)
+        return;
     const vvec3 through = TRC_KERNEL(trc_lobes_transparency)(lobes);
-    vmask write = vm_and(active, vi_eq((vint)(a->path & vu_set(TRC_PATH_DATA_DONE | TRC_VISIBLE_CAMERA)),
-                                       vi_set(TRC_VISIBLE_CAMERA)));
+    vmask write =
+        vm_and(active, vi_eq((vint)(a->path & vu_set(TRC_PATH_DATA_DONE | TRC_VISIBLE_CAMERA)),
+                             vi_set(TRC_VISIBLE_CAMERA)));
     write = vm_and(write, vf_lt(v3_average(through), vf_set(0.5f)));
-    if (!vm_any(write)) return;
+    if (!vm_any(write))
+        return;
     a->path = (vuint)vi_select(write, (vint)(a->path | vu_set(TRC_PATH_DATA_DONE)), (vint)a->path);
     vvec3 albedo[3];
     TRC_KERNEL(trc_bsdf_albedo)(lobes, s, albedo);
-    const float *view = t->snapshot->camera.camera_to_world->m; /* column 2: backwards along the axis */
+    const float *view =
+        t->snapshot->camera.camera_to_world->m; /* column 2: backwards along the axis */
     float z[TRC_WIDTH], n[3][TRC_WIDTH], p[3][TRC_WIDTH], uv[2][TRC_WIDTH], color[9][TRC_WIDTH];
-    vf_store(z, (vf_set(view[3]) - s->p.x) * vf_set(view[2]) + (vf_set(view[7]) - s->p.y) * vf_set(view[6]) +
+    vf_store(z, (vf_set(view[3]) - s->p.x) * vf_set(view[2]) +
+                    (vf_set(view[7]) - s->p.y) * vf_set(view[6]) +
                     (vf_set(view[11]) - s->p.z) * vf_set(view[10]));
     vf_store(n[0], s->n.x), vf_store(n[1], s->n.y), vf_store(n[2], s->n.z);
     vf_store(p[0], s->p.x), vf_store(p[1], s->p.y), vf_store(p[2], s->p.z);
@@ -189,22 +212,25 @@ static void data_passes(struct trc_tile *t, struct arrival *a, const struct trc_
         store_vector(t, TRC_PASS_OBJECT_INDEX, slot, (float)instance->pass_index, 0.0f, 0.0f);
         store_vector(t, TRC_PASS_MATERIAL_INDEX, slot, (float)m->pass_index, 0.0f, 0.0f);
         if (mesh->default_uv >= 0 && (wanted & 1ull << TRC_PASS_UV)) {
-            const float *c = mesh->attributes[mesh->default_uv].values + 6 * (size_t)vi_get(s->triangle, i);
+            const float *c =
+                mesh->attributes[mesh->default_uv].values + 6 * (size_t)vi_get(s->triangle, i);
             const float u = uv[0][i], v = uv[1][i], w = 1.0f - u - v;
             store_vector(t, TRC_PASS_UV, slot, w * c[0] + u * c[2] + v * c[4],
                          w * c[1] + u * c[3] + v * c[5], 1.0f);
         }
-        const uint32_t pass[3] = {TRC_PASS_DIFFUSE_COLOR, TRC_PASS_GLOSSY_COLOR, TRC_PASS_TRANSMISSION_COLOR};
+        const uint32_t pass[3] = {TRC_PASS_DIFFUSE_COLOR, TRC_PASS_GLOSSY_COLOR,
+                                  TRC_PASS_TRANSMISSION_COLOR};
         for (int k = 0; k < 3; k++)
-            store_vector(t, pass[k], slot, color[3 * k][i], color[3 * k + 1][i], color[3 * k + 2][i]);
+            store_vector(t, pass[k], slot, color[3 * k][i], color[3 * k + 1][i],
+                         color[3 * k + 2][i]);
     }
 }
 
 /* ---- direct light ---- */
 
-/* Origin of a ray that leaves s towards w: moved along the geometric normal out of the box of the position's
- * rounding error, then each coordinate to the next float (Pharr, Jakob, Humphreys, "Physically
- * Based Rendering", 3rd ed. 2016, section 3.9). */
+/* Origin of a ray that leaves s towards w: moved along the geometric normal out of the box of the
+ * position's rounding error, then each coordinate to the next float (Pharr, Jakob, Humphreys,
+ * "Physically Based Rendering", 3rd ed. 2016, section 3.9). */
 TRC_INLINE vfloat away(vfloat x, vfloat offset) {
     const vfloat moved = x + offset;
     /* One float further in the direction of the offset: the bits of a float count upwards with its
@@ -227,7 +253,8 @@ struct light_result {
     vvec3 diffuse, glossy, transmission; /* unshadowed contributions */
 };
 
-/* Contributions of the lanes' light samples, weighted; lanes that get nothing are dropped from active. */
+/* Contributions of the lanes' light samples, weighted; lanes that get nothing are dropped from
+ * active. */
 static vmask light_contribute(const struct trc_tile *t, const struct arrival *a,
                               const struct trc_surface *s, const struct trc_lobes *lobes,
                               const struct trc_light_sample *l, vfloat count, vmask active,
@@ -243,14 +270,15 @@ static vmask light_contribute(const struct trc_tile *t, const struct arrival *a,
         const vfloat pl = l->pdf * count, pl2 = pl * pl, pb2 = f.pdf * f.pdf;
         mis = mis_diffuse = vf_select(alone, one, pl2 / (pl2 + pb2));
     } else {
-        /* Ideal continuation rays find lights of extent by themselves; highlights of points are here. */
+        /* Ideal continuation rays find lights of extent by themselves; highlights of points are
+         * here. */
         mis = vf_select(alone, one, zero);
     }
     const vfloat scale = one / (l->pdf * count);
     const vvec3 light = v3_mul(a->weight, v3_scale(l->radiance, scale));
 #define SEEN(bit) vi_eq((vint)(seen & vu_set(bit)), vi_set(bit))
-    out->diffuse =
-        v3_mul(light, v3_scale(v3_select(SEEN(TRC_VISIBLE_DIFFUSE), f.diffuse, v3_zero()), mis_diffuse));
+    out->diffuse = v3_mul(
+        light, v3_scale(v3_select(SEEN(TRC_VISIBLE_DIFFUSE), f.diffuse, v3_zero()), mis_diffuse));
     out->glossy =
         v3_mul(light, v3_scale(v3_select(SEEN(TRC_VISIBLE_GLOSSY), f.glossy, v3_zero()), mis));
     out->transmission = v3_mul(
@@ -278,12 +306,15 @@ static void shadow_push(struct trc_tile *t, const struct arrival *a, const struc
         sum = v3_select(vi_lt((vint)depth, vi_set(1)), clamp_radiance(sum, limit),
                         clamp_radiance(sum, t->desc->clamp_indirect));
     const vuint target_key = ((vuint)l->light << 4) | cell;
-    const vfloat values[] = {o.x, o.y, o.z, target.x, target.y, target.z, tmax, a->time, sum.x, sum.y, sum.z};
+    const vfloat values[] = {o.x,  o.y,     o.z,   target.x, target.y, target.z,
+                             tmax, a->time, sum.x, sum.y,    sum.z};
     struct trc_shadow_store *q = &t->shadows;
-    float *const columns[] = {q->o[0], q->o[1], q->o[2], q->d[0], q->d[1], q->d[2], q->tmax, q->time,
+    float *const columns[] = {q->o[0],        q->o[1],        q->o[2],       q->d[0],
+                              q->d[1],        q->d[2],        q->tmax,       q->time,
                               q->radiance[0], q->radiance[1], q->radiance[2]};
     const uint32_t bits = vm_bits(active);
-    for (int k = 0; k < 11; k++) vf_compress(columns[k] + q->count, values[k], bits);
+    for (int k = 0; k < 11; k++)
+        vf_compress(columns[k] + q->count, values[k], bits);
     vu_compress(q->slot + q->count, a->slot, bits);
     vu_compress(q->path + q->count, a->path, bits);
     vu_compress(q->target + q->count, target_key, bits);
@@ -306,20 +337,25 @@ static void direct_light(struct trc_tile *t, const struct arrival *a, const stru
     const vuint index = vu_gather(t->samples.index, (vint)a->slot, active);
     const uint32_t most = t->generation == 0 ? t->desc->light_samples : 1;
     const vfloat count = light_count(t, a->depths);
-    if (t->shadows.count + most * TRC_WIDTH > TRC_SHADOW_QUEUE) TRC_KERNEL(trc_shadow_flush)(t);
+    if (t->shadows.count + most * TRC_WIDTH > TRC_SHADOW_QUEUE)
+        TRC_KERNEL(trc_shadow_flush)(t);
     for (uint32_t l = 0; l < most; l++) {
         vfloat u[3];
         for (uint32_t k = 0; k < 3; k++)
-            u[k] = most > 1 ? TRC_KERNEL(trc_sample_split)(&t->sampler, pixel, index, dimension + k, l, most)
+            u[k] = most > 1 ? TRC_KERNEL(trc_sample_split)(&t->sampler, pixel, index, dimension + k,
+                                                           l, most)
                             : TRC_KERNEL(trc_sample)(&t->sampler, pixel, index, dimension + k);
         struct trc_light_sample sample;
         TRC_KERNEL(trc_light_sample)(s, a->receive_n, u[0], u[1], u[2], &sample);
         vmask lit = vm_and(active, vm_and(sample.valid, vf_lt(vf_set((float)l), count)));
-        if (!vm_any(lit)) continue;
+        if (!vm_any(lit))
+            continue;
         struct light_result r;
         lit = light_contribute(t, a, s, lobes, &sample, count, lit, &r);
-        if (!vm_any(lit)) continue;
-        const vuint cell = (vuint)(vf_to_int(u[1] * vf_set(4.0f)) | (vf_to_int(u[2] * vf_set(4.0f)) << 2));
+        if (!vm_any(lit))
+            continue;
+        const vuint cell =
+            (vuint)(vf_to_int(u[1] * vf_set(4.0f)) | (vf_to_int(u[2] * vf_set(4.0f)) << 2));
         shadow_push(t, a, s, &sample, &r, cell, lit);
     }
 }
@@ -342,12 +378,14 @@ static void ray_push(struct trc_tile *t, const struct arrival *a, const struct t
     const vfloat tmax = vf_select(straight, old_far, vf_set(INFINITY));
     const vmask ideal = vm_or(b->singular, vf_le(b->pdf, vf_set(0.0f)));
     const vfloat pdf = vf_select(straight, a->pdf, vf_select(ideal, vf_set(-1.0f), b->pdf));
-    const vfloat min_pdf = vf_select(vm_or(straight, ideal), a->min_pdf, vf_min(a->min_pdf, b->pdf));
+    const vfloat min_pdf =
+        vf_select(vm_or(straight, ideal), a->min_pdf, vf_min(a->min_pdf, b->pdf));
 
     const vuint one = vu_set(1);
     vuint depths = a->depths;
-    const vuint by_kind = (vuint)vi_select(b->transmitted, vi_set(1 << TRC_DEPTH_TRANSMISSION_SHIFT),
-                                           vi_set(1 << TRC_DEPTH_GLOSSY_SHIFT));
+    const vuint by_kind =
+        (vuint)vi_select(b->transmitted, vi_set(1 << TRC_DEPTH_TRANSMISSION_SHIFT),
+                         vi_set(1 << TRC_DEPTH_GLOSSY_SHIFT));
     depths = depths + (vuint)vi_select(straight, vi_set(1 << TRC_DEPTH_TRANSPARENT_SHIFT),
                                        (vint)(by_kind + one));
     const vmask over = vm_or(
@@ -372,10 +410,12 @@ static void ray_push(struct trc_tile *t, const struct arrival *a, const struct t
     vuint path = (vuint)vi_select(straight, (vint)a->path, (vint)kind);
     path = path | (vuint)vi_select(over, vi_set(TRC_PATH_LAST), vi_set(0));
 
-    const vfloat values[TRC_RAY_FLOATS] = {o.x, o.y, o.z, w.x, w.y, w.z, tmin, tmax, a->time,
-                                           weight.x, weight.y, weight.z, pdf, min_pdf, n.x, n.y, n.z, beyond};
+    const vfloat values[TRC_RAY_FLOATS] = {o.x,  o.y,     o.z,     w.x,      w.y,      w.z,
+                                           tmin, tmax,    a->time, weight.x, weight.y, weight.z,
+                                           pdf,  min_pdf, n.x,     n.y,      n.z,      beyond};
     const uint32_t bits = vm_bits(active);
-    for (int k = 0; k < TRC_RAY_FLOATS; k++) vf_compress(out->f[k] + out->count, values[k], bits);
+    for (int k = 0; k < TRC_RAY_FLOATS; k++)
+        vf_compress(out->f[k] + out->count, values[k], bits);
     vu_compress(out->w[TRC_RAY_SLOT] + out->count, a->slot, bits);
     vu_compress(out->w[TRC_RAY_PATH] + out->count, path, bits);
     vu_compress(out->w[TRC_RAY_DEPTHS] + out->count, depths, bits);
@@ -383,36 +423,48 @@ static void ray_push(struct trc_tile *t, const struct arrival *a, const struct t
     out->count += (uint32_t)__builtin_popcount(bits);
 }
 
-/* Rays of small weight: not traced (Whitted), or by chance with their weight raised (Distribution). */
+/* Rays of small weight: not traced (Whitted), or by chance with their weight raised (Distribution).
+ */
 static vmask attenuate(const struct trc_tile *t, const struct arrival *a, struct trc_bsdf_sample *b,
                        vmask active) {
     const vfloat size = v3_max(v3_mul(a->weight, b->weight));
     active = vm_and(active, vm_and(vf_gt(size, vf_set(0.0f)), vf_lt(size, vf_set(3e38f))));
     const float cutoff = t->desc->attenuation_cutoff;
-    if (cutoff <= 0.0f) return active;
+    if (cutoff <= 0.0f)
+        return active;
     const vmask low = vm_and(active, vf_lt(size, vf_set(cutoff)));
-    if (!vm_any(low)) return active;
-    if (t->desc->integrator != TRC_INTEGRATOR_DISTRIBUTION) return vm_andnot(active, low);
+    if (!vm_any(low))
+        return active;
+    if (t->desc->integrator != TRC_INTEGRATOR_DISTRIBUTION)
+        return vm_andnot(active, low);
     const vuint pixel = vu_gather(t->samples.pixel, (vint)a->slot, active);
     const vuint index = vu_gather(t->samples.index, (vint)a->slot, active);
-    const vfloat u = vu_to_unit(vu_hash(pixel ^ vu_hash(index ^ vu_hash(a->depths ^ vu_set(t->desc->seed)))));
+    const vfloat u =
+        vu_to_unit(vu_hash(pixel ^ vu_hash(index ^ vu_hash(a->depths ^ vu_set(t->desc->seed)))));
     const vfloat chance = size * vf_set(1.0f / cutoff);
-    b->weight = v3_select(low, v3_scale(b->weight, vf_set(1.0f) / vf_select(low, chance, vf_set(1.0f))),
-                          b->weight);
+    b->weight = v3_select(
+        low, v3_scale(b->weight, vf_set(1.0f) / vf_select(low, chance, vf_set(1.0f))), b->weight);
     return vm_andnot(active, vm_andnot(low, vf_lt(u, chance)));
 }
 
 /* Straight on through transparency alone, for rays that may not bounce any more. */
-static void continue_straight(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
-                              const struct trc_lobes *lobes, uint32_t material, vmask active) {
-    struct trc_bsdf_sample b = {.wi = a->d, .weight = TRC_KERNEL(trc_lobes_transparency)(lobes),
-                                .beyond = vf_set(1.0f), .pdf = vf_set(0.0f), .singular = vm_all_set(),
-                                .transparent = vm_all_set(), .transmitted = vm_none(),
-                                .diffuse = vm_none(), .valid = active};
+static void continue_straight(struct trc_tile *t, const struct arrival *a,
+                              const struct trc_surface *s, const struct trc_lobes *lobes,
+                              uint32_t material, vmask active) {
+    struct trc_bsdf_sample b = {.wi = a->d,
+                                .weight = TRC_KERNEL(trc_lobes_transparency)(lobes),
+                                .beyond = vf_set(1.0f),
+                                .pdf = vf_set(0.0f),
+                                .singular = vm_all_set(),
+                                .transparent = vm_all_set(),
+                                .transmitted = vm_none(),
+                                .diffuse = vm_none(),
+                                .valid = active};
     const vmask below = vi_lt((vint)depth_of(a->depths, TRC_DEPTH_TRANSPARENT_SHIFT),
                               vi_set((int32_t)t->desc->max_transparent_depth + 1));
     active = attenuate(t, a, &b, vm_and(active, below));
-    if (vm_any(active)) ray_push(t, a, s, &b, material, active);
+    if (vm_any(active))
+        ray_push(t, a, s, &b, material, active);
 }
 
 static void continue_rays(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
@@ -423,7 +475,8 @@ static void continue_rays(struct trc_tile *t, const struct arrival *a, const str
         for (int i = 0; i < lobes->count; i++) {
             TRC_KERNEL(trc_bsdf_ideal)(lobes, i, s, &b);
             const vmask go = attenuate(t, a, &b, vm_and(active, b.valid));
-            if (vm_any(go)) ray_push(t, a, s, &b, material, go);
+            if (vm_any(go))
+                ray_push(t, a, s, &b, material, go);
         }
         return;
     }
@@ -435,7 +488,8 @@ static void continue_rays(struct trc_tile *t, const struct arrival *a, const str
         u[k] = TRC_KERNEL(trc_sample)(&t->sampler, pixel, index, dimension + TRC_DIM_LOBE + k);
     TRC_KERNEL(trc_bsdf_sample)(lobes, s, u[0], u[1], u[2], &b);
     const vmask go = attenuate(t, a, &b, vm_and(active, b.valid));
-    if (vm_any(go)) ray_push(t, a, s, &b, material, go);
+    if (vm_any(go))
+        ray_push(t, a, s, &b, material, go);
 }
 
 /* ---- a group of one material ---- */
@@ -460,19 +514,24 @@ static void surface_setup(struct trc_tile *t, const struct arrival *a, struct tr
     const vuint pixel = vu_gather(t->samples.pixel, (vint)a->slot, a->active);
     s->raster_x = (vi_to_float((vint)(pixel & vu_set(0xffffu))) + vf_set(0.5f)) *
                   vf_set(1.0f / (float)t->desc->width);
-    s->raster_y = (vi_to_float((vint)(pixel >> 16)) + vf_set(0.5f)) * vf_set(1.0f / (float)t->desc->height);
+    s->raster_y =
+        (vi_to_float((vint)(pixel >> 16)) + vf_set(0.5f)) * vf_set(1.0f / (float)t->desc->height);
     TRC_KERNEL(trc_surface_fetch)(s);
 }
 
-/* Filter Glossy: roughness is at least what the sharpest bounce so far can no longer resolve (Cycles). */
+/* Filter Glossy: roughness is at least what the sharpest bounce so far can no longer resolve
+ * (Cycles). */
 TRC_INLINE vfloat filter_alpha(const struct trc_tile *t, const struct arrival *a) {
-    if (t->desc->filter_glossy <= 0.0f) return vf_set(0.0f);
+    if (t->desc->filter_glossy <= 0.0f)
+        return vf_set(0.0f);
     const vfloat blur = a->min_pdf * vf_set(1.0f / t->desc->filter_glossy);
-    return vf_select(vf_lt(blur, vf_set(1.0f)), vf_sqrt(vf_max(vf_set(1.0f) - blur, vf_set(0.0f))) * vf_set(0.5f),
+    return vf_select(vf_lt(blur, vf_set(1.0f)),
+                     vf_sqrt(vf_max(vf_set(1.0f) - blur, vf_set(0.0f))) * vf_set(0.5f),
                      vf_set(0.0f));
 }
 
-static void holdout(struct trc_tile *t, const struct arrival *a, const struct trc_lobes *lobes, vmask active) {
+static void holdout(struct trc_tile *t, const struct arrival *a, const struct trc_lobes *lobes,
+                    vmask active) {
     float part[TRC_WIDTH];
     const vmask background = vi_eq((vint)(a->path & vu_set(TRC_PATH_TRANSPARENT_BACKGROUND)),
                                    vi_set(TRC_PATH_TRANSPARENT_BACKGROUND));
@@ -491,11 +550,13 @@ static void shade_group(struct trc_tile *t, uint32_t material, vint index, vmask
     struct trc_lobes lobes;
     arrival_load(t, index, active, &a);
     surface_setup(t, &a, &s);
-    if (m->instruction_count) TRC_KERNEL(trc_program_run)(m, &s, &regs);
+    if (m->instruction_count)
+        TRC_KERNEL(trc_program_run)(m, &s, &regs);
     TRC_KERNEL(trc_lobes_setup)(m, &s, &regs, filter_alpha(t, &a), &lobes);
     const bool lets_through = m->has & (TRC_MATERIAL_HAS_REFRACTION | TRC_MATERIAL_HAS_TRANSLUCENT);
     a.receive_n = lets_through ? v3_zero() : s.n;
-    if (m->has & TRC_MATERIAL_HAS_HOLDOUT) holdout(t, &a, &lobes, active);
+    if (m->has & TRC_MATERIAL_HAS_HOLDOUT)
+        holdout(t, &a, &lobes, active);
     if (t->generation == 0 || (t->snapshot->features & TRC_FEATURE_TRANSPARENCY))
         data_passes(t, &a, &s, m, &lobes, active);
     if (m->has & TRC_MATERIAL_HAS_EMISSION) {
@@ -510,24 +571,30 @@ static void shade_group(struct trc_tile *t, uint32_t material, vint index, vmask
     const vmask on = vm_andnot(active, last);
     if ((m->has & TRC_MATERIAL_HAS_TRANSPARENCY) && vm_any(vm_and(active, last)))
         continue_straight(t, &a, &s, &lobes, material, vm_and(active, last));
-    if (!vm_any(on)) return;
-    if (m->has & (TRC_MATERIAL_HAS_DIFFUSE | TRC_MATERIAL_HAS_TRANSLUCENT | TRC_MATERIAL_HAS_GLOSSY))
+    if (!vm_any(on))
+        return;
+    if (m->has &
+        (TRC_MATERIAL_HAS_DIFFUSE | TRC_MATERIAL_HAS_TRANSLUCENT | TRC_MATERIAL_HAS_GLOSSY))
         direct_light(t, &a, &s, &lobes, on);
     if (t->desc->integrator == TRC_INTEGRATOR_RAYCAST) {
-        if (m->has & TRC_MATERIAL_HAS_TRANSPARENCY) continue_straight(t, &a, &s, &lobes, material, on);
+        if (m->has & TRC_MATERIAL_HAS_TRANSPARENCY)
+            continue_straight(t, &a, &s, &lobes, material, on);
     } else if (vm_any(vm_and(on, vf_gt(lobes.continue_weight, vf_set(0.0f))))) {
         continue_rays(t, &a, &s, &lobes, material, on);
     }
 }
 
 void TRC_KERNEL(trc_shade_batch)(struct trc_tile *t) {
-    if (t->snapshot->features & (TRC_FEATURE_LIGHTS | TRC_FEATURE_ENVIRONMENT) || t->desc->film_transparent)
+    if (t->snapshot->features & (TRC_FEATURE_LIGHTS | TRC_FEATURE_ENVIRONMENT) ||
+        t->desc->film_transparent)
         shade_rays(t);
     /* Hits by material; those that missed have the last key. */
     uint32_t keys_count = t->snapshot->material_count + 1;
-    if (keys_count > TRC_BINS) keys_count = TRC_BINS;
+    if (keys_count > TRC_BINS)
+        keys_count = TRC_BINS;
     for (uint32_t i = 0; i < t->work.count; i++) {
-        const uint32_t key = t->hits.instance[i] == TRC_NO_HIT ? keys_count - 1 : t->hits.material[i];
+        const uint32_t key =
+            t->hits.instance[i] == TRC_NO_HIT ? keys_count - 1 : t->hits.material[i];
         t->keys[i] = key < keys_count ? key : keys_count - 1;
     }
     TRC_KERNEL(trc_tile_sort)(t, t->keys, t->work.count, keys_count);

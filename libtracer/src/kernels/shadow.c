@@ -1,8 +1,8 @@
 /* Shadow rays: sorted by light and by the place on it, traced as full packets, occlusion only.
  *
- * Boulos et al. 2007, section 3.3: shadow rays are assembled apart from others. Rays of a packet go from
- * neighbouring points to the same part of the same light. Where materials let shadow rays through, packets that
- * nothing opaque blocks are walked from surface to surface. */
+ * Boulos et al. 2007, section 3.3: shadow rays are assembled apart from others. Rays of a packet go
+ * from neighbouring points to the same part of the same light. Where materials let shadow rays
+ * through, packets that nothing opaque blocks are walked from surface to surface. */
 #include "kernels/tile.h"
 #include "kernels/wide_math.h"
 
@@ -20,7 +20,8 @@ static void packet_load(struct trc_tile *t, const uint32_t *order, uint32_t coun
         vf_store(&p->tmin[i], vf_set(0.0f));
         const vfloat tmax = vf_gather(q->tmax, at, m);
         vf_store(&p->t[i], tmax);
-        if (t->object_motion) vf_store(&p->time[i], vf_gather(q->time, at, m));
+        if (t->object_motion)
+            vf_store(&p->time[i], vf_gather(q->time, at, m));
         /* Lights that cast no shadow have a negative reach: not traced, never occluded. */
         p->active |= (uint64_t)(vm_bits(vm_and(m, vf_gt(tmax, vf_set(0.0f))))) << i;
     }
@@ -29,24 +30,28 @@ static void packet_load(struct trc_tile *t, const uint32_t *order, uint32_t coun
     p->skip_transparent = t->snapshot->features & TRC_FEATURE_TRANSPARENCY;
 }
 
-/* What the surfaces that the lanes' rays meet let through; 0 where a material is opaque to shadows. */
+/* What the surfaces that the lanes' rays meet let through; 0 where a material is opaque to shadows.
+ */
 static vvec3 surface_transparency(struct trc_tile *t, const struct trc_packet *p,
-                                  const struct trc_packet_hits *hits, int i, vmask active, vuint path) {
+                                  const struct trc_packet_hits *hits, int i, vmask active,
+                                  vuint path) {
     vvec3 through = v3_zero();
     uint32_t todo = vm_bits(active);
     while (todo) {
         const int first = i + __builtin_ctz(todo);
-        const uint32_t material = TRC_KERNEL(trc_hit_material)(t->snapshot, hits->instance[first],
-                                                               hits->triangle[first]);
+        const uint32_t material =
+            TRC_KERNEL(trc_hit_material)(t->snapshot, hits->instance[first], hits->triangle[first]);
         uint32_t same = 0;
         for (uint32_t bits = todo; bits; bits &= bits - 1) {
             const int k = i + __builtin_ctz(bits);
-            if (TRC_KERNEL(trc_hit_material)(t->snapshot, hits->instance[k], hits->triangle[k]) == material)
+            if (TRC_KERNEL(trc_hit_material)(t->snapshot, hits->instance[k], hits->triangle[k]) ==
+                material)
                 same |= bits & -bits;
         }
         todo &= ~same;
         const struct trc_material *m = t->snapshot->materials[material];
-        if (!trc_material_shadows_transparent(m)) continue;
+        if (!trc_material_shadows_transparent(m))
+            continue;
         struct trc_surface s = {.snapshot = t->snapshot, .active = vm_from_bits(same)};
         struct trc_registers regs;
         struct trc_lobes lobes;
@@ -55,21 +60,25 @@ static vvec3 surface_transparency(struct trc_tile *t, const struct trc_packet *p
         s.u = vf_load(&hits->u[i]);
         s.v = vf_load(&hits->v[i]);
         s.time = t->object_motion ? vf_load(&p->time[i]) : vf_set(0.0f);
-        s.wo = v3_normalize(v3_neg(v3(vf_load(&p->d[0][i]), vf_load(&p->d[1][i]), vf_load(&p->d[2][i]))));
+        s.wo = v3_normalize(
+            v3_neg(v3(vf_load(&p->d[0][i]), vf_load(&p->d[1][i]), vf_load(&p->d[2][i]))));
         s.path = path;
         s.ray_length = vf_load(&p->t[i]);
-        s.depth = s.diffuse_depth = s.glossy_depth = s.transmission_depth = s.transparent_depth = vi_set(0);
+        s.depth = s.diffuse_depth = s.glossy_depth = s.transmission_depth = s.transparent_depth =
+            vi_set(0);
         s.footprint = s.raster_x = s.raster_y = vf_set(0.0f);
         TRC_KERNEL(trc_surface_fetch)(&s);
-        if (m->instruction_count) TRC_KERNEL(trc_program_run)(m, &s, &regs);
+        if (m->instruction_count)
+            TRC_KERNEL(trc_program_run)(m, &s, &regs);
         TRC_KERNEL(trc_lobes_setup)(m, &s, &regs, vf_set(0.0f), &lobes);
-        through = v3_select(vm_from_bits(same), TRC_KERNEL(trc_lobes_transparency)(&lobes), through);
+        through =
+            v3_select(vm_from_bits(same), TRC_KERNEL(trc_lobes_transparency)(&lobes), through);
     }
     return through;
 }
 
-/* Walks the packet's rays from surface to surface; factor: what of their light arrives. Returns the rays
- * that are blocked after all. */
+/* Walks the packet's rays from surface to surface; factor: what of their light arrives. Returns the
+ * rays that are blocked after all. */
 static uint64_t transparency(struct trc_tile *t, float factor[3][TRC_PACKET_SIZE]) {
     struct trc_packet *p = &t->packet;
     struct trc_packet_hits *hits = &t->packet_hits;
@@ -83,14 +92,17 @@ static uint64_t transparency(struct trc_tile *t, float factor[3][TRC_PACKET_SIZE
         for (int c = 0; c < TRC_PACKET_CHUNKS; c++) {
             const int i = c * TRC_WIDTH;
             const uint32_t bits = trc_chunk_bits(p->active, c);
-            const vmask met = vm_andnot(vm_from_bits(bits), vi_eq(vi_load((int32_t *)&hits->instance[i]), vi_set(-1)));
-            if (!vm_any(met)) continue;
+            const vmask met = vm_andnot(vm_from_bits(bits),
+                                        vi_eq(vi_load((int32_t *)&hits->instance[i]), vi_set(-1)));
+            if (!vm_any(met))
+                continue;
             vvec3 f = v3_zero();
             if (depth <= t->desc->max_transparent_depth)
                 f = surface_transparency(t, p, hits, i, met, vu_set(TRC_VISIBLE_SHADOW));
             const vfloat channel[3] = {f.x, f.y, f.z};
             for (int k = 0; k < 3; k++)
-                vf_store(&factor[k][i], vf_select(met, vf_load(&factor[k][i]) * channel[k], vf_load(&factor[k][i])));
+                vf_store(&factor[k][i], vf_select(met, vf_load(&factor[k][i]) * channel[k],
+                                                  vf_load(&factor[k][i])));
             const vmask shut = vm_and(met, vf_le(v3_max(f), vf_set(0.0f)));
             blocked |= (uint64_t)vm_bits(shut) << i;
             next |= (uint64_t)vm_bits(vm_andnot(met, shut)) << i;
@@ -108,15 +120,18 @@ static void light_add(struct trc_tile *t, uint32_t ray, const float factor[3]) {
     const float rgb[3] = {q->radiance[0][ray] * factor[0], q->radiance[1][ray] * factor[1],
                           q->radiance[2][ray] * factor[2]};
     trc_sample_add(t, slot, rgb);
-    if (!t->light_passes) return;
-    static const uint32_t direct[3] = {TRC_PASS_DIFFUSE_DIRECT, TRC_PASS_GLOSSY_DIRECT, TRC_PASS_TRANSMISSION_DIRECT};
+    if (!t->light_passes)
+        return;
+    static const uint32_t direct[3] = {TRC_PASS_DIFFUSE_DIRECT, TRC_PASS_GLOSSY_DIRECT,
+                                       TRC_PASS_TRANSMISSION_DIRECT};
     const uint32_t category = q->path[ray] >> TRC_PATH_CATEGORY_SHIFT & 3u;
     if (category) {
         trc_pass_add(t, direct[category] + 1, slot, rgb);
         return;
     }
     for (int k = 0; k < 3; k++) {
-        const float part[3] = {q->split[3 * k][ray] * factor[0], q->split[3 * k + 1][ray] * factor[1],
+        const float part[3] = {q->split[3 * k][ray] * factor[0],
+                               q->split[3 * k + 1][ray] * factor[1],
                                q->split[3 * k + 2][ray] * factor[2]};
         trc_pass_add(t, direct[k], slot, part);
     }
@@ -124,7 +139,8 @@ static void light_add(struct trc_tile *t, uint32_t ray, const float factor[3]) {
 
 void TRC_KERNEL(trc_shadow_flush)(struct trc_tile *t) {
     struct trc_shadow_store *q = &t->shadows;
-    if (!q->count) return;
+    if (!q->count)
+        return;
     const bool transparent = t->snapshot->features & TRC_FEATURE_TRANSPARENCY;
     TRC_KERNEL(trc_clock_trace)(t);
     for (uint32_t i = 0; i < q->count; i++)
@@ -132,7 +148,8 @@ void TRC_KERNEL(trc_shadow_flush)(struct trc_tile *t) {
     TRC_KERNEL(trc_tile_sort)(t, t->keys, q->count, TRC_BINS);
     memset(t->order + q->count, 0, TRC_PACKET_SIZE * sizeof *t->order);
     for (uint32_t begin = 0; begin < q->count; begin += t->packet_size) {
-        const uint32_t count = q->count - begin < t->packet_size ? q->count - begin : t->packet_size;
+        const uint32_t count =
+            q->count - begin < t->packet_size ? q->count - begin : t->packet_size;
         const uint32_t *order = t->order + begin;
         float factor[3][TRC_PACKET_SIZE];
         packet_load(t, order, count);
@@ -141,13 +158,16 @@ void TRC_KERNEL(trc_shadow_flush)(struct trc_tile *t) {
         t->job->counts.rays_shadow += (uint64_t)__builtin_popcountll(traced);
         if (transparent) {
             for (int k = 0; k < 3; k++)
-                for (int i = 0; i < TRC_PACKET_SIZE; i++) factor[k][i] = 1.0f;
+                for (int i = 0; i < TRC_PACKET_SIZE; i++)
+                    factor[k][i] = 1.0f;
             t->packet.active = traced & ~blocked;
             blocked |= transparency(t, factor);
         }
         for (uint32_t i = 0; i < count; i++) {
-            if (blocked >> i & 1u) continue;
-            const float f[3] = {transparent ? factor[0][i] : 1.0f, transparent ? factor[1][i] : 1.0f,
+            if (blocked >> i & 1u)
+                continue;
+            const float f[3] = {transparent ? factor[0][i] : 1.0f,
+                                transparent ? factor[1][i] : 1.0f,
                                 transparent ? factor[2][i] : 1.0f};
             light_add(t, order[i], f);
         }

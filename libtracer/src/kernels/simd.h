@@ -1,8 +1,9 @@
 /* The vector types of the kernels: TRC_WIDTH lanes of float and 32-bit integers.
  *
- * One kernel source is compiled once per instruction set with TRC_WIDTH 1, 4, 8 or 16; arithmetic is
- * the compiler's infix arithmetic on vector types, the rest is here. Lanes are independent, there is no
- * contraction (-ffp-contract=off), so every width gives the same bits for the same operations. */
+ * One kernel source is compiled once per instruction set with TRC_WIDTH 1, 4, 8 or 16; arithmetic
+ * is the compiler's infix arithmetic on vector types, the rest is here. Lanes are independent,
+ * there is no contraction (-ffp-contract=off), so every width gives the same bits for the same
+ * operations. */
 #ifndef TRACER_KERNELS_SIMD_H
 #define TRACER_KERNELS_SIMD_H
 
@@ -136,17 +137,15 @@ TRC_INLINE vfloat vi_to_float(vint a) {
 #endif
 }
 /* [0, 1): the top 24 bits over 2^24, exact. */
-TRC_INLINE vfloat vu_to_unit(vuint a) {
-    return vi_to_float((vint)(a >> 8)) * vf_set(0x1p-24f);
-}
+TRC_INLINE vfloat vu_to_unit(vuint a) { return vi_to_float((vint)(a >> 8)) * vf_set(0x1p-24f); }
 
 /* ---- comparisons (false for NaN, except vf_ne) ---- */
 
 #if TRC_WIDTH == 16
-#define TRC_VF_COMPARE(name, op, imm)                                                              \
+#define TRC_VF_COMPARE(name, op, imm) \
     TRC_INLINE vmask name(vfloat a, vfloat b) { return _mm512_cmp_ps_mask(a, b, imm); }
 #else
-#define TRC_VF_COMPARE(name, op, imm)                                                              \
+#define TRC_VF_COMPARE(name, op, imm) \
     TRC_INLINE vmask name(vfloat a, vfloat b) { return TRC_LANES(a op b); }
 #if TRC_WIDTH == 1
 #define TRC_LANES(x) (-(int32_t)(x))
@@ -190,7 +189,8 @@ TRC_INLINE uint32_t vm_bits(vmask m) {
     return (uint32_t)_mm_movemask_ps((__m128)m);
 #else
     uint32_t bits = 0;
-    for (int i = 0; i < TRC_WIDTH; i++) bits |= (uint32_t)(m[i] & 1) << i;
+    for (int i = 0; i < TRC_WIDTH; i++)
+        bits |= (uint32_t)(m[i] & 1) << i;
     return bits;
 #endif
 }
@@ -279,7 +279,8 @@ TRC_INLINE vfloat vf_sqrt(vfloat a) {
     return _mm_sqrt_ps(a);
 #else
     vfloat r;
-    for (int i = 0; i < TRC_WIDTH; i++) r[i] = sqrtf(a[i]);
+    for (int i = 0; i < TRC_WIDTH; i++)
+        r[i] = sqrtf(a[i]);
     return r;
 #endif
 }
@@ -299,7 +300,8 @@ TRC_INLINE vfloat vf_floor(vfloat a) {
     return _mm_floor_ps(a);
 #else
     vfloat r;
-    for (int i = 0; i < TRC_WIDTH; i++) r[i] = floorf(a[i]);
+    for (int i = 0; i < TRC_WIDTH; i++)
+        r[i] = floorf(a[i]);
     return r;
 #endif
 }
@@ -327,7 +329,8 @@ TRC_INLINE float vf_lanes_min(vfloat a) {
     return _mm512_reduce_min_ps(a);
 #else
     float r = a[0];
-    for (int i = 1; i < TRC_WIDTH; i++) r = f_min(r, a[i]);
+    for (int i = 1; i < TRC_WIDTH; i++)
+        r = f_min(r, a[i]);
     return r;
 #endif
 }
@@ -345,7 +348,8 @@ TRC_INLINE vfloat vf_gather(const float *base, vint index, vmask m) {
 #else
     vfloat r = vf_set(0.0f);
     for (int i = 0; i < TRC_WIDTH; i++)
-        if (m[i]) r[i] = base[index[i]];
+        if (m[i])
+            r[i] = base[index[i]];
     return r;
 #endif
 }
@@ -360,7 +364,8 @@ TRC_INLINE vint vi_gather(const int32_t *base, vint index, vmask m) {
 #else
     vint r = vi_set(0);
     for (int i = 0; i < TRC_WIDTH; i++)
-        if (m[i]) r[i] = base[index[i]];
+        if (m[i])
+            r[i] = base[index[i]];
     return r;
 #endif
 }
@@ -387,14 +392,16 @@ TRC_INLINE int32_t vi_get(vint a, int lane) {
 #endif
 }
 
-/* Writes the lanes of bits to p one after the other; up to TRC_WIDTH elements at p may be written. */
+/* Writes the lanes of bits to p one after the other; up to TRC_WIDTH elements at p may be written.
+ */
 TRC_INLINE void vf_compress(float *p, vfloat a, uint32_t bits) {
 #if TRC_WIDTH == 16
     _mm512_storeu_ps(p, _mm512_maskz_compress_ps((__mmask16)bits, a));
 #else
     float lanes[TRC_WIDTH];
     vf_store(lanes, a);
-    for (; bits; bits &= bits - 1) *p++ = lanes[__builtin_ctz(bits)];
+    for (; bits; bits &= bits - 1)
+        *p++ = lanes[__builtin_ctz(bits)];
 #endif
 }
 TRC_INLINE void vu_compress(uint32_t *p, vuint a, uint32_t bits) {
@@ -403,7 +410,8 @@ TRC_INLINE void vu_compress(uint32_t *p, vuint a, uint32_t bits) {
 #else
     uint32_t lanes[TRC_WIDTH];
     vu_store(lanes, a);
-    for (; bits; bits &= bits - 1) *p++ = lanes[__builtin_ctz(bits)];
+    for (; bits; bits &= bits - 1)
+        *p++ = lanes[__builtin_ctz(bits)];
 #endif
 }
 

@@ -47,7 +47,8 @@ TRC_INLINE uint32_t f8_le(f8 a, f8 b) {
 #else
     const i8x m = a <= b;
     uint32_t bits = 0;
-    for (int i = 0; i < 8; i++) bits |= (uint32_t)(m[i] & 1) << i;
+    for (int i = 0; i < 8; i++)
+        bits |= (uint32_t)(m[i] & 1) << i;
     return bits;
 #endif
 }

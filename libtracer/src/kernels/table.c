@@ -1,9 +1,9 @@
 /* This instruction set's entry in the dispatch (cpu/dispatch.c). */
 #include "kernels/kernels.h"
 
-#include "kernels/world.h"
 #include "kernels/query.h"
 #include "kernels/tile.h"
+#include "kernels/world.h"
 
 #define TRC_ISA_NUMBER_scalar TRC_ISA_SCALAR
 #define TRC_ISA_NUMBER_sse42 TRC_ISA_SSE42

@@ -30,16 +30,18 @@ static void *carve(struct carver *c, size_t bytes) {
 }
 
 static uint32_t stack_capacity(const trc_render_desc *desc) {
-    /* Whitted: each step takes up to a batch and leaves several rays for each; when room is short it
-     * follows one lobe, so any capacity works. */
+    /* Whitted: each step takes up to a batch and leaves several rays for each; when room is short
+     * it follows one lobe, so any capacity works. */
     return desc->integrator == TRC_INTEGRATOR_WHITTED ? TRC_BATCH * 8 : TRC_BATCH;
 }
 
 static void carve_rays(struct carver *c, struct trc_ray_store *r, uint32_t capacity) {
     r->capacity = capacity;
     r->count = 0;
-    for (int i = 0; i < TRC_RAY_FLOATS; i++) r->f[i] = carve(c, (capacity + TRC_WIDTH) * sizeof(float));
-    for (int i = 0; i < TRC_RAY_WORDS; i++) r->w[i] = carve(c, (capacity + TRC_WIDTH) * sizeof(uint32_t));
+    for (int i = 0; i < TRC_RAY_FLOATS; i++)
+        r->f[i] = carve(c, (capacity + TRC_WIDTH) * sizeof(float));
+    for (int i = 0; i < TRC_RAY_WORDS; i++)
+        r->w[i] = carve(c, (capacity + TRC_WIDTH) * sizeof(uint32_t));
 }
 
 static bool wants_light_passes(const trc_render_desc *desc) {
@@ -53,15 +55,19 @@ static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc, void *
     carve_rays(&c, &t->stack, stack_capacity(desc));
     carve_rays(&c, &t->work, stack_capacity(desc));
     float **const hit_floats[] = {&t->hits.t, &t->hits.u, &t->hits.v};
-    for (int i = 0; i < 3; i++) *hit_floats[i] = carve(&c, batch);
+    for (int i = 0; i < 3; i++)
+        *hit_floats[i] = carve(&c, batch);
     uint32_t **const hit_words[] = {&t->hits.instance, &t->hits.triangle, &t->hits.material,
                                     &t->samples.pixel, &t->samples.index};
-    for (int i = 0; i < 5; i++) *hit_words[i] = carve(&c, batch);
-    for (int i = 0; i < 3; i++) t->samples.radiance[i] = carve(&c, batch);
+    for (int i = 0; i < 5; i++)
+        *hit_words[i] = carve(&c, batch);
+    for (int i = 0; i < 3; i++)
+        t->samples.radiance[i] = carve(&c, batch);
     t->samples.transparency = carve(&c, batch);
     for (uint32_t pass = 1; pass < TRC_PASS_SAMPLE_COUNT; pass++)
         if (desc->passes >> pass & 1)
-            for (uint32_t k = 0; k < trc_pass_channels(pass); k++) t->samples.pass[pass][k] = carve(&c, batch);
+            for (uint32_t k = 0; k < trc_pass_channels(pass); k++)
+                t->samples.pass[pass][k] = carve(&c, batch);
     struct trc_shadow_store *q = &t->shadows;
     for (int i = 0; i < 3; i++) {
         q->o[i] = carve(&c, queue);
@@ -71,9 +77,11 @@ static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc, void *
     q->tmax = carve(&c, queue);
     q->time = carve(&c, queue);
     if (wants_light_passes(desc))
-        for (int i = 0; i < 9; i++) q->split[i] = carve(&c, queue);
+        for (int i = 0; i < 9; i++)
+            q->split[i] = carve(&c, queue);
     uint32_t **const words[] = {&q->slot, &q->path, &q->target, &q->depth, &t->order, &t->keys};
-    for (int i = 0; i < 6; i++) *words[i] = carve(&c, queue);
+    for (int i = 0; i < 6; i++)
+        *words[i] = carve(&c, queue);
     t->bins = carve(&c, (TRC_BINS + 1) * sizeof *t->bins);
     t->filter = carve(&c, TRC_FILTER_TABLE * sizeof(float));
     return c.used;
@@ -91,9 +99,12 @@ void TRC_KERNEL(trc_tile_sort)(struct trc_tile *t, const uint32_t *keys, uint32_
                                uint32_t bin_count) {
     uint32_t *const bins = t->bins;
     memset(bins, 0, (bin_count + 1) * sizeof *bins);
-    for (uint32_t i = 0; i < count; i++) bins[keys[i] + 1]++;
-    for (uint32_t i = 1; i < bin_count; i++) bins[i + 1] += bins[i];
-    for (uint32_t i = 0; i < count; i++) t->order[bins[keys[i]]++] = i;
+    for (uint32_t i = 0; i < count; i++)
+        bins[keys[i] + 1]++;
+    for (uint32_t i = 1; i < bin_count; i++)
+        bins[i + 1] += bins[i];
+    for (uint32_t i = 0; i < count; i++)
+        t->order[bins[keys[i]]++] = i;
 }
 
 /* ---- tracing a step's rays ---- */
@@ -106,8 +117,8 @@ uint32_t TRC_KERNEL(trc_hit_material)(const struct trc_snapshot *snapshot, uint3
     return in->materials[slot < in->material_count ? slot : in->material_count - 1];
 }
 
-/* Rays of one packet share their visibility; beyond that the assembly decides (Boulos et al. 2007, section
- * 3.3). Keys are what rays of a packet share; runs break packets where the key changes. */
+/* Rays of one packet share their visibility; beyond that the assembly decides (Boulos et al. 2007,
+ * section 3.3). Keys are what rays of a packet share; runs break packets where the key changes. */
 static uint32_t assembly_key(const struct trc_tile *t, uint32_t ray) {
     const struct trc_ray_store *r = &t->work;
     const uint32_t kind = r->w[TRC_RAY_PATH][ray] & TRC_VISIBLE_ALL;
@@ -118,7 +129,8 @@ static uint32_t assembly_key(const struct trc_tile *t, uint32_t ray) {
         return kind | (r->w[TRC_RAY_PARENT][ray] & 127u) << 5;
     case TRC_ASSEMBLY_OCTANTS:
         return kind | (uint32_t)(r->f[TRC_RAY_DX][ray] < 0.0f) << 5 |
-               (uint32_t)(r->f[TRC_RAY_DY][ray] < 0.0f) << 6 | (uint32_t)(r->f[TRC_RAY_DZ][ray] < 0.0f) << 7;
+               (uint32_t)(r->f[TRC_RAY_DY][ray] < 0.0f) << 6 |
+               (uint32_t)(r->f[TRC_RAY_DZ][ray] < 0.0f) << 7;
     default:
         return kind;
     }
@@ -139,13 +151,15 @@ static void packet_trace(struct trc_tile *t, const uint32_t *order, uint32_t cou
         }
         vf_store(&p->tmin[i], vf_gather(r->f[TRC_RAY_TMIN], at, m));
         vf_store(&p->t[i], vf_gather(r->f[TRC_RAY_TMAX], at, m));
-        if (t->object_motion) vf_store(&p->time[i], vf_gather(r->f[TRC_RAY_TIME], at, m));
+        if (t->object_motion)
+            vf_store(&p->time[i], vf_gather(r->f[TRC_RAY_TIME], at, m));
     }
     const uint32_t path = r->w[TRC_RAY_PATH][order[0]];
     p->active = count < TRC_PACKET_SIZE ? (1ull << count) - 1 : ~0ull;
-    p->visibility = t->desc->assembly == TRC_ASSEMBLY_BLIND && !(t->snapshot->features & TRC_FEATURE_VISIBILITY)
-                        ? TRC_VISIBLE_ALL
-                        : path & TRC_VISIBLE_ALL;
+    p->visibility =
+        t->desc->assembly == TRC_ASSEMBLY_BLIND && !(t->snapshot->features & TRC_FEATURE_VISIBILITY)
+            ? TRC_VISIBLE_ALL
+            : path & TRC_VISIBLE_ALL;
     p->common_origin = (path & TRC_VISIBLE_CAMERA) && t->camera_common;
     p->skip_transparent = false;
     memset(h->instance, 0xff, count * sizeof *h->instance);
@@ -154,11 +168,13 @@ static void packet_trace(struct trc_tile *t, const uint32_t *order, uint32_t cou
         const uint32_t ray = order[i];
         t->hits.t[ray] = p->t[i];
         t->hits.instance[ray] = h->instance[i];
-        if (h->instance[i] == TRC_NO_HIT) continue;
+        if (h->instance[i] == TRC_NO_HIT)
+            continue;
         t->hits.triangle[ray] = h->triangle[i];
         t->hits.u[ray] = h->u[i];
         t->hits.v[ray] = h->v[i];
-        t->hits.material[ray] = TRC_KERNEL(trc_hit_material)(t->snapshot, h->instance[i], h->triangle[i]);
+        t->hits.material[ray] =
+            TRC_KERNEL(trc_hit_material)(t->snapshot, h->instance[i], h->triangle[i]);
     }
 }
 
@@ -179,7 +195,8 @@ static void trace_batch(struct trc_tile *t) {
     const uint32_t count = t->work.count;
     const bool runs = t->desc->assembly == TRC_ASSEMBLY_RUNS;
     const uint32_t size = t->desc->assembly == TRC_ASSEMBLY_NONE ? 1 : t->packet_size;
-    for (uint32_t i = 0; i < count; i++) t->keys[i] = assembly_key(t, i);
+    for (uint32_t i = 0; i < count; i++)
+        t->keys[i] = assembly_key(t, i);
     TRC_KERNEL(trc_tile_sort)(t, t->keys, count, TRC_BINS);
     for (uint32_t begin = 0; begin < count;) {
         const uint32_t key = t->keys[t->order[begin]];
@@ -207,8 +224,10 @@ static void stack_take(struct trc_tile *t) {
         return;
     }
     const uint32_t first = from->count - TRC_BATCH;
-    for (int i = 0; i < TRC_RAY_FLOATS; i++) memcpy(to->f[i], from->f[i] + first, TRC_BATCH * sizeof(float));
-    for (int i = 0; i < TRC_RAY_WORDS; i++) memcpy(to->w[i], from->w[i] + first, TRC_BATCH * sizeof(uint32_t));
+    for (int i = 0; i < TRC_RAY_FLOATS; i++)
+        memcpy(to->f[i], from->f[i] + first, TRC_BATCH * sizeof(float));
+    for (int i = 0; i < TRC_RAY_WORDS; i++)
+        memcpy(to->w[i], from->w[i] + first, TRC_BATCH * sizeof(uint32_t));
     to->count = TRC_BATCH;
     from->count = first;
 }
@@ -218,21 +237,25 @@ static void stack_take(struct trc_tile *t) {
 
 static void samples_clear(struct trc_tile *t) {
     const size_t bytes = TRC_BATCH * sizeof(float);
-    for (int k = 0; k < 3; k++) memset(t->samples.radiance[k], 0, bytes);
+    for (int k = 0; k < 3; k++)
+        memset(t->samples.radiance[k], 0, bytes);
     memset(t->samples.transparency, 0, bytes);
     for (int pass = 0; pass < TRC_PASS_COUNT; pass++)
         for (int k = 0; k < 3; k++)
-            if (t->samples.pass[pass][k]) memset(t->samples.pass[pass][k], 0, bytes);
+            if (t->samples.pass[pass][k])
+                memset(t->samples.pass[pass][k], 0, bytes);
     if (t->samples.pass[TRC_PASS_DEPTH][0])
-        for (uint32_t i = 0; i < TRC_BATCH; i++) t->samples.pass[TRC_PASS_DEPTH][0][i] = 1e10f;
+        for (uint32_t i = 0; i < TRC_BATCH; i++)
+            t->samples.pass[TRC_PASS_DEPTH][0][i] = 1e10f;
 }
 
 static bool first_sample_pass(uint32_t pass) {
-    return pass == TRC_PASS_DEPTH || pass == TRC_PASS_OBJECT_INDEX || pass == TRC_PASS_MATERIAL_INDEX;
+    return pass == TRC_PASS_DEPTH || pass == TRC_PASS_OBJECT_INDEX ||
+           pass == TRC_PASS_MATERIAL_INDEX;
 }
 
-/* Adds the batch's samples to the film in the order of their slots; samples that are not finite are left
- * out and counted. */
+/* Adds the batch's samples to the film in the order of their slots; samples that are not finite are
+ * left out and counted. */
 static void film_add(struct trc_tile *t) {
     struct trc_film *film = t->job->film;
     const trc_render_desc *desc = t->desc;
@@ -252,14 +275,17 @@ static void film_add(struct trc_tile *t) {
         combined[2] += (double)b;
         combined[3] += 1.0 - (double)t->samples.transparency[slot];
         const bool first = film->sample_counts[pixel]++ == 0;
-        if (!t->extra_passes) continue;
+        if (!t->extra_passes)
+            continue;
         for (uint32_t pass = 1; pass < TRC_PASS_SAMPLE_COUNT; pass++) {
-            if (!t->samples.pass[pass][0]) continue;
+            if (!t->samples.pass[pass][0])
+                continue;
             const uint32_t channels = trc_pass_channels(pass);
             double *sum = film->sums[pass] + channels * pixel;
             for (uint32_t k = 0; k < channels; k++) {
                 const double value = (double)t->samples.pass[pass][k][slot];
-                if (!isfinite(value)) continue;
+                if (!isfinite(value))
+                    continue;
                 if (!first_sample_pass(pass))
                     sum[k] += value;
                 else if (first)
@@ -280,7 +306,8 @@ static void batch_render(struct trc_tile *t) {
         TRC_KERNEL(trc_clock_shade)(t);
         TRC_KERNEL(trc_shade_batch)(t);
         TRC_KERNEL(trc_shadow_flush)(t);
-        if (t->generation < LAST_GENERATION) t->generation++;
+        if (t->generation < LAST_GENERATION)
+            t->generation++;
     }
     clock_other(t);
     film_add(t);
@@ -288,8 +315,8 @@ static void batch_render(struct trc_tile *t) {
 
 /* ---- the tile ---- */
 
-/* Samples a pixel has in one batch. Packets of a pinhole camera then hold a 2x2 square of pixels: the narrowest
- * beam. */
+/* Samples a pixel has in one batch. Packets of a pinhole camera then hold a 2x2 square of pixels:
+ * the narrowest beam. */
 #define SAMPLES_PER_BATCH 16
 #define QUAD 2
 /* With a lens or an open shutter packets hold an 8x8 square and one cell of lens and time each. */
@@ -308,9 +335,9 @@ static void square_append(struct trc_tile *t, uint32_t x, uint32_t y, uint32_t s
             }
 }
 
-/* Orders the batch by cells of lens and time, so that rays of a packet share one: 16 cells, as a pixel has 16
- * samples in a batch and the sampler puts about one into each. This is what the paper's interleaved tile
- * does for coherence, without giving pixels the same pattern. */
+/* Orders the batch by cells of lens and time, so that rays of a packet share one: 16 cells, as a
+ * pixel has 16 samples in a batch and the sampler puts about one into each. This is what the
+ * paper's interleaved tile does for coherence, without giving pixels the same pattern. */
 static void samples_order(struct trc_tile *t, bool lens, bool motion) {
     const uint32_t count = t->samples.count;
     const float lens_cells = motion ? 2.0f : 4.0f, time_cells = lens ? 4.0f : 16.0f;
@@ -333,7 +360,8 @@ static void samples_order(struct trc_tile *t, bool lens, bool motion) {
     uint32_t *const columns[] = {t->samples.pixel, t->samples.index};
     for (int k = 0; k < 2; k++) {
         memcpy(t->keys, columns[k], count * sizeof *t->keys);
-        for (uint32_t i = 0; i < count; i++) columns[k][i] = t->keys[t->order[i]];
+        for (uint32_t i = 0; i < count; i++)
+            columns[k][i] = t->keys[t->order[i]];
     }
 }
 
@@ -341,22 +369,29 @@ static void samples_order(struct trc_tile *t, bool lens, bool motion) {
 static void samples_render(struct trc_tile *t, uint32_t begin, uint32_t end) {
     const struct trc_tile_job *job = t->job;
     const uint32_t count = end - begin;
-    const bool lens = t->snapshot->camera.aperture_radius > 0.0f, motion = t->snapshot->camera.has_motion;
+    const bool lens = t->snapshot->camera.aperture_radius > 0.0f,
+               motion = t->snapshot->camera.has_motion;
     const bool cells = (lens || motion) && count >= 4;
-    const uint32_t side = cells ? CELL_SQUARE : count >= 16 ? QUAD : count >= 4 ? 2 * QUAD : 4 * QUAD;
+    const uint32_t side = cells         ? CELL_SQUARE
+                          : count >= 16 ? QUAD
+                          : count >= 4  ? 2 * QUAD
+                                        : 4 * QUAD;
     const uint32_t room = cells ? CELL_SQUARE * CELL_SQUARE * count : TRC_BATCH;
     t->samples.count = 0;
     for (uint32_t y = 0; y < job->height; y += side)
         for (uint32_t x = 0; x < job->width; x += side) {
             if (t->samples.count + side * side * count > room) {
-                if (cells) samples_order(t, lens, motion);
+                if (cells)
+                    samples_order(t, lens, motion);
                 batch_render(t);
                 t->samples.count = 0;
             }
             square_append(t, x, y, side, begin, end);
         }
-    if (!t->samples.count) return;
-    if (cells) samples_order(t, lens, motion);
+    if (!t->samples.count)
+        return;
+    if (cells)
+        samples_order(t, lens, motion);
     batch_render(t);
 }
 
@@ -372,15 +407,19 @@ void TRC_KERNEL(trc_tile_render)(struct trc_tile_job *job) {
                                       job->sampler_table};
     t->extra_passes = job->desc->passes & ~(1ull << TRC_PASS_COMBINED);
     t->light_passes = wants_light_passes(job->desc);
-    t->object_motion = job->snapshot->features & (TRC_FEATURE_OBJECT_MOTION | TRC_FEATURE_DEFORMATION);
-    t->camera_common = job->snapshot->camera.aperture_radius <= 0.0f && job->snapshot->camera.key_count < 2 &&
+    t->object_motion =
+        job->snapshot->features & (TRC_FEATURE_OBJECT_MOTION | TRC_FEATURE_DEFORMATION);
+    t->camera_common = job->snapshot->camera.aperture_radius <= 0.0f &&
+                       job->snapshot->camera.key_count < 2 &&
                        job->snapshot->camera.type == TRC_CAMERA_PERSPECTIVE;
-    t->packet_size = job->desc->packet_size < TRC_PACKET_SIZE ? job->desc->packet_size : TRC_PACKET_SIZE;
+    t->packet_size =
+        job->desc->packet_size < TRC_PACKET_SIZE ? job->desc->packet_size : TRC_PACKET_SIZE;
     t->clock = &job->counts.seconds_other;
     t->clock_start = trc_seconds();
     TRC_KERNEL(trc_filter_table)(job->desc->filter, job->desc->filter_width, t->filter);
     for (uint32_t s = job->sample_begin; s < job->sample_end && !*job->cancel;) {
-        const uint32_t end = job->sample_end - s > SAMPLES_PER_BATCH ? s + SAMPLES_PER_BATCH : job->sample_end;
+        const uint32_t end =
+            job->sample_end - s > SAMPLES_PER_BATCH ? s + SAMPLES_PER_BATCH : job->sample_end;
         samples_render(t, s, end);
         s = end;
     }

@@ -1,9 +1,9 @@
 /* The workspace of a tile: rays waiting, their hits, shadow rays, samples in flight.
  *
- * A tile works in batches of up to TRC_BATCH camera samples. Rays of a batch are traced as packets, hits are
- * sorted by material and shaded TRC_WIDTH at a time, shadow rays collect in a queue that is flushed as
- * full packets, continuation rays go on a stack that is worked off batch by batch. Everything is one
- * thread's and in a fixed order. */
+ * A tile works in batches of up to TRC_BATCH camera samples. Rays of a batch are traced as packets,
+ * hits are sorted by material and shaded TRC_WIDTH at a time, shadow rays collect in a queue that
+ * is flushed as full packets, continuation rays go on a stack that is worked off batch by batch.
+ * Everything is one thread's and in a fixed order. */
 #ifndef TRACER_KERNELS_TILE_H
 #define TRACER_KERNELS_TILE_H
 
@@ -34,19 +34,31 @@ enum {
 };
 
 enum trc_ray_float {
-    TRC_RAY_OX, TRC_RAY_OY, TRC_RAY_OZ, TRC_RAY_DX, TRC_RAY_DY, TRC_RAY_DZ, TRC_RAY_TMIN,
-    TRC_RAY_TMAX, TRC_RAY_TIME, TRC_RAY_WEIGHT_R, TRC_RAY_WEIGHT_G, TRC_RAY_WEIGHT_B,
-    TRC_RAY_PDF,      /* of the bounce, solid angle; -1: camera or ideal, no MIS */
-    TRC_RAY_MIN_PDF,  /* smallest so far, for Filter Glossy */
-    TRC_RAY_NX, TRC_RAY_NY, TRC_RAY_NZ, /* normal where it left, as kernels/light.h wants it */
-    TRC_RAY_BEYOND,   /* factor on everything behind the next surface: kernels/bsdf.h */
+    TRC_RAY_OX,
+    TRC_RAY_OY,
+    TRC_RAY_OZ,
+    TRC_RAY_DX,
+    TRC_RAY_DY,
+    TRC_RAY_DZ,
+    TRC_RAY_TMIN,
+    TRC_RAY_TMAX,
+    TRC_RAY_TIME,
+    TRC_RAY_WEIGHT_R,
+    TRC_RAY_WEIGHT_G,
+    TRC_RAY_WEIGHT_B,
+    TRC_RAY_PDF,     /* of the bounce, solid angle; -1: camera or ideal, no MIS */
+    TRC_RAY_MIN_PDF, /* smallest so far, for Filter Glossy */
+    TRC_RAY_NX,
+    TRC_RAY_NY,
+    TRC_RAY_NZ,     /* normal where it left, as kernels/light.h wants it */
+    TRC_RAY_BEYOND, /* factor on everything behind the next surface: kernels/bsdf.h */
     TRC_RAY_FLOATS
 };
 enum trc_ray_word {
-    TRC_RAY_SLOT,     /* sample of the batch */
+    TRC_RAY_SLOT, /* sample of the batch */
     TRC_RAY_PATH,
     TRC_RAY_DEPTHS,
-    TRC_RAY_PARENT,   /* material it left: key of runs and groups */
+    TRC_RAY_PARENT, /* material it left: key of runs and groups */
     TRC_RAY_WORDS
 };
 
@@ -64,10 +76,10 @@ struct trc_hit_store {
 /* Samples of the batch, by slot. */
 struct trc_sample_store {
     uint32_t count;
-    uint32_t *pixel;      /* x | y << 16 in the full frame */
-    uint32_t *index;      /* number of the sample */
+    uint32_t *pixel; /* x | y << 16 in the full frame */
+    uint32_t *index; /* number of the sample */
     float *radiance[3];
-    float *transparency;  /* part of the film that is seen through */
+    float *transparency;            /* part of the film that is seen through */
     float *pass[TRC_PASS_COUNT][3]; /* NULL unless asked for */
 };
 
@@ -75,7 +87,7 @@ struct trc_sample_store {
 struct trc_shadow_store {
     uint32_t count;
     float *o[3], *d[3], *tmax, *time, *radiance[3];
-    float *split[9];      /* diffuse, glossy, transmission parts, or NULL: no light passes */
+    float *split[9]; /* diffuse, glossy, transmission parts, or NULL: no light passes */
     uint32_t *slot, *path, *target, *depth;
 };
 
@@ -84,19 +96,19 @@ struct trc_tile {
     const struct trc_snapshot *snapshot;
     const trc_render_desc *desc;
     struct trc_sampler sampler;
-    bool extra_passes;    /* more than Combined */
-    bool light_passes;    /* some pass wants light by kind */
-    bool object_motion;   /* rays need times */
-    bool camera_common;   /* camera rays start at one point */
-    uint32_t packet_size; /* 1..TRC_PACKET_SIZE */
+    bool extra_passes;          /* more than Combined */
+    bool light_passes;          /* some pass wants light by kind */
+    bool object_motion;         /* rays need times */
+    bool camera_common;         /* camera rays start at one point */
+    uint32_t packet_size;       /* 1..TRC_PACKET_SIZE */
     double *clock, clock_start; /* the stage whose time is running */
-    uint32_t generation;  /* bounces the rays of this step have behind them */
+    uint32_t generation;        /* bounces the rays of this step have behind them */
     struct trc_ray_store stack, work;
     struct trc_hit_store hits;
     struct trc_sample_store samples;
     struct trc_shadow_store shadows;
     uint32_t *order, *keys, *bins; /* scratch of sorts: TRC_BATCH or TRC_SHADOW_QUEUE, bins */
-    float *filter;        /* inverse distribution of the pixel filter, TRC_FILTER_TABLE */
+    float *filter;                 /* inverse distribution of the pixel filter, TRC_FILTER_TABLE */
     struct trc_packet packet;
     struct trc_packet_hits packet_hits;
 };
@@ -131,15 +143,17 @@ void TRC_KERNEL(trc_shade_batch)(struct trc_tile *t);
 /* Traces and empties the shadow queue. (kernels/shadow.c) */
 void TRC_KERNEL(trc_shadow_flush)(struct trc_tile *t);
 
-/* Adds light that reached a sample to its radiance and passes. kind: 0 diffuse, 1 glossy, 2 transmission of
- * the first surface. */
+/* Adds light that reached a sample to its radiance and passes. kind: 0 diffuse, 1 glossy, 2
+ * transmission of the first surface. */
 TRC_INLINE void trc_sample_add(struct trc_tile *t, uint32_t slot, const float rgb[3]) {
-    for (int c = 0; c < 3; c++) t->samples.radiance[c][slot] += rgb[c];
+    for (int c = 0; c < 3; c++)
+        t->samples.radiance[c][slot] += rgb[c];
 }
 TRC_INLINE void trc_pass_add(struct trc_tile *t, uint32_t pass, uint32_t slot, const float rgb[3]) {
     float *const *p = t->samples.pass[pass];
     for (int c = 0; c < 3; c++)
-        if (p[c]) p[c][slot] += rgb[c];
+        if (p[c])
+            p[c][slot] += rgb[c];
 }
 
 #endif

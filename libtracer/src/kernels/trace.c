@@ -1,12 +1,12 @@
 /* Traversal: packets at the top, single rays where a packet has thinned out.
  *
- * Boulos et al. 2007: general packets against a BVH, first an interval cull of the whole packet, then the
- * first active ray. Departures, each by measurement: 8-wide nodes; the interval test is a beam
- * (kernels/beam.h) against eight children in one step; the first live ray, then all, are tried only when a
- * child is taken from the stack, against distances as they are by then; a 64-bit mask instead of a first
- * active index; packets are split by dominant axis and its side; rays that are few go on alone, eight boxes or
- * eight triangles at a time. Hits do not depend on any of it: candidates are tested by
- * kernels/triangle.h and compared by distance, then by number. */
+ * Boulos et al. 2007: general packets against a BVH, first an interval cull of the whole packet,
+ * then the first active ray. Departures, each by measurement: 8-wide nodes; the interval test is a
+ * beam (kernels/beam.h) against eight children in one step; the first live ray, then all, are tried
+ * only when a child is taken from the stack, against distances as they are by then; a 64-bit mask
+ * instead of a first active index; packets are split by dominant axis and its side; rays that are
+ * few go on alone, eight boxes or eight triangles at a time. Hits do not depend on any of it:
+ * candidates are tested by kernels/triangle.h and compared by distance, then by number. */
 #include "bvh/tree.h"
 #include "kernels/beam.h"
 #include "kernels/packet.h"
@@ -18,7 +18,7 @@
 
 struct entry {
     uint32_t ref;
-    uint32_t box;    /* parent node * 8 + child; UINT32_MAX for the root */
+    uint32_t box; /* parent node * 8 + child; UINT32_MAX for the root */
     uint64_t mask;
 };
 
@@ -26,10 +26,10 @@ struct walk {
     const struct trc_snapshot *snapshot;
     const struct trc_tree *tree;
     struct trc_packet *packet;
-    struct trc_packet_hits *hits;  /* closest only */
-    uint64_t occluded;             /* any only: found so far */
-    uint32_t instance;             /* of the tree; TRC_NO_HIT: leaves say */
-    uint32_t key;                  /* moving trees: first key of the segment */
+    struct trc_packet_hits *hits; /* closest only */
+    uint64_t occluded;            /* any only: found so far */
+    uint32_t instance;            /* of the tree; TRC_NO_HIT: leaves say */
+    uint32_t key;                 /* moving trees: first key of the segment */
     struct trc_group *group;
 };
 
@@ -46,7 +46,8 @@ TRC_INLINE void boxes_load(const struct walk *w, uint32_t node, bool motion, f8 
         lower[axis] = f8_load(b + 16 * axis);
         upper[axis] = f8_load(b + 16 * axis + 8);
     }
-    if (!motion) return;
+    if (!motion)
+        return;
     const float *e = b + TRC_NODE_KEY_BYTES / sizeof(float);
     const f8 f0 = f8_set(w->group->f_min), f1 = f8_set(w->group->f_max);
     const f8 g0 = f8_set(1.0f) - f0, g1 = f8_set(1.0f) - f1;
@@ -57,8 +58,8 @@ TRC_INLINE void boxes_load(const struct walk *w, uint32_t node, bool motion, f8 
     }
 }
 
-/* Rays of mask whose own slabs meet the box. The first live ray is tried alone: mostly it hits and the
- * rest need not be looked at. */
+/* Rays of mask whose own slabs meet the box. The first live ray is tried alone: mostly it hits and
+ * the rest need not be looked at. */
 TRC_INLINE uint64_t box_rays(const struct walk *w, uint32_t box, uint64_t mask, bool motion) {
     const struct trc_packet *p = w->packet;
     const struct trc_group *g = w->group;
@@ -80,13 +81,15 @@ TRC_INLINE uint64_t box_rays(const struct walk *w, uint32_t box, uint64_t mask, 
             near = f_max(near, f_min(t0, t1));
             far = f_min(far, f_max(t0, t1));
         }
-        if (near <= far) return mask;
+        if (near <= far)
+            return mask;
         mask &= mask - 1;
     }
     uint64_t live = 0;
     for (int c = 0; c < TRC_PACKET_CHUNKS; c++) {
         const uint32_t bits = trc_chunk_bits(mask, c);
-        if (!bits) continue;
+        if (!bits)
+            continue;
         const int i = c * TRC_WIDTH;
         vfloat near = vf_load(&p->tmin[i]), far = vf_load(&p->t[i]);
         const vfloat f = motion ? vf_load(&g->f[i]) : vf_set(0.0f), k = vf_set(1.0f) - f;
@@ -97,7 +100,8 @@ TRC_INLINE uint64_t box_rays(const struct walk *w, uint32_t box, uint64_t mask, 
                 high = k * high + f * vf_set(e[16 * axis + 8]);
             }
             const vfloat o = vf_load(&p->o[axis][i]), inv = vf_load(&g->inv[axis][i]);
-            const vfloat t0 = (low - vf_set(slack) - o) * inv, t1 = (high + vf_set(slack) - o) * inv;
+            const vfloat t0 = (low - vf_set(slack) - o) * inv,
+                         t1 = (high + vf_set(slack) - o) * inv;
             near = vf_max(near, vf_min(t0, t1));
             far = vf_min(far, vf_max(t0, t1));
         }
@@ -114,7 +118,8 @@ TRC_INLINE uint32_t leaf_candidates(const struct walk *w, uint32_t leaf, uint32_
     f8 lower[3], upper[3], key;
     const float *v = trc_leaf_vertices(w->tree, leaf, w->key);
     const float *e = v + (motion ? TRC_LEAF_KEY_BYTES / sizeof(float) : 0);
-    const f8 f0 = f8_set(motion ? w->group->f_min : 0.0f), f1 = f8_set(motion ? w->group->f_max : 0.0f);
+    const f8 f0 = f8_set(motion ? w->group->f_min : 0.0f),
+             f1 = f8_set(motion ? w->group->f_max : 0.0f);
     const f8 g0 = f8_set(1.0f) - f0, g1 = f8_set(1.0f) - f1;
     for (int axis = 0; axis < 3; axis++) {
         f8 low = f8_set(INFINITY), high = f8_set(-INFINITY);
@@ -145,8 +150,7 @@ TRC_INLINE void lanes_load(const struct walk *w, const float *v, bool motion, in
     for (int corner = 0; corner < 3; corner++)
         for (int axis = 0; axis < 3; axis++) {
             const int at = 24 * corner + 8 * order[axis];
-            tri->v[corner][axis] =
-                motion ? k * vf_set(v[at]) + f * vf_set(e[at]) : vf_set(v[at]);
+            tri->v[corner][axis] = motion ? k * vf_set(v[at]) + f * vf_set(e[at]) : vf_set(v[at]);
         }
 }
 
@@ -164,32 +168,35 @@ TRC_INLINE uint32_t hits_keep(const struct walk *w, int i, vmask hit, vfloat t, 
             const int l = i + __builtin_ctz(ties);
             const bool lower = instance < h->instance[l] ||
                                (instance == h->instance[l] && triangle < h->triangle[l]);
-            if (lower && p->t[l] > p->tmin[l]) bits |= ties & -ties;
+            if (lower && p->t[l] > p->tmin[l])
+                bits |= ties & -ties;
         }
         keep = vm_from_bits(bits);
     }
-    if (!vm_any(keep)) return 0;
+    if (!vm_any(keep))
+        return 0;
     vf_store(&p->t[i], vf_select(keep, t, best));
     vf_store(&h->u[i], vf_select(keep, u, vf_load(&h->u[i])));
     vf_store(&h->v[i], vf_select(keep, v, vf_load(&h->v[i])));
-    vi_store((int32_t *)&h->instance[i], vi_select(keep, vi_set((int32_t)instance),
-                                                   vi_load((int32_t *)&h->instance[i])));
-    vi_store((int32_t *)&h->triangle[i], vi_select(keep, vi_set((int32_t)triangle),
-                                                   vi_load((int32_t *)&h->triangle[i])));
+    vi_store((int32_t *)&h->instance[i],
+             vi_select(keep, vi_set((int32_t)instance), vi_load((int32_t *)&h->instance[i])));
+    vi_store((int32_t *)&h->triangle[i],
+             vi_select(keep, vi_set((int32_t)triangle), vi_load((int32_t *)&h->triangle[i])));
     return vm_bits(keep);
 }
 
-/* The triangles of a leaf as seen from the packet's common origin: edge normals, so that an edge function is one dot
- * product with a direction (du/dz, dv/dz, 1), and the bound of its error.
+/* The triangles of a leaf as seen from the packet's common origin: edge normals, so that an edge
+ * function is one dot product with a direction (du/dz, dv/dz, 1), and the bound of its error.
  *
- * It only rejects: lanes that may hit take the full test, so hits stay the same bits. The normal of the
- * edge from a to b is (b - a) x (a + b), vertices relative to the origin, which keeps its precision far away
- * (products of vertices do not). Error: each difference and sum half an ulp, products and sums of the normal and of
- * the dot product together below 10 half-ulps of |b - a| (|a| + |b|), 1-norms; the full test's own
- * movement of vertices below 8 more. EDGE_MARGIN is 33 half-ulps. */
+ * It only rejects: lanes that may hit take the full test, so hits stay the same bits. The normal of
+ * the edge from a to b is (b - a) x (a + b), vertices relative to the origin, which keeps its
+ * precision far away (products of vertices do not). Error: each difference and sum half an ulp,
+ * products and sums of the normal and of the dot product together below 10 half-ulps of |b - a|
+ * (|a| + |b|), 1-norms; the full test's own movement of vertices below 8 more. EDGE_MARGIN is 33
+ * half-ulps. */
 struct edge_filter {
-    f8 n[3][3];  /* edge opposite to the vertex, axis u, v, z */
-    f8 margin;   /* largest of the three edges */
+    f8 n[3][3]; /* edge opposite to the vertex, axis u, v, z */
+    f8 margin;  /* largest of the three edges */
     uint32_t candidates;
 };
 #define EDGE_MARGIN 2e-6f
@@ -205,7 +212,8 @@ TRC_INLINE void edge_filter_setup(const struct walk *w, const float *vertices, u
             a[corner][axis] = v[corner][axis] - f8_set(g->origin[axis]);
         }
     f8 inside = f8_set(INFINITY), outside = f8_set(-INFINITY), margin = f8_set(0.0f);
-    const f8 u0 = f8_set(g->su_min), u1 = f8_set(g->su_max), v0 = f8_set(g->sv_min), v1 = f8_set(g->sv_max);
+    const f8 u0 = f8_set(g->su_min), u1 = f8_set(g->su_max), v0 = f8_set(g->sv_min),
+             v1 = f8_set(g->sv_max);
     for (int k = 0; k < 3; k++) {
         const int from = (k + 1) % 3, to = (k + 2) % 3;
         f8 d[3], sum[3], length = f8_set(0.0f), reach = f8_set(0.0f);
@@ -221,7 +229,8 @@ TRC_INLINE void edge_filter_setup(const struct walk *w, const float *vertices, u
         }
         margin = f8_max(margin, length * reach);
         /* Over all directions of the packet. */
-        const f8 x0 = e->n[k][0] * u0, x1 = e->n[k][0] * u1, y0 = e->n[k][1] * v0, y1 = e->n[k][1] * v1;
+        const f8 x0 = e->n[k][0] * u0, x1 = e->n[k][0] * u1, y0 = e->n[k][1] * v0,
+                 y1 = e->n[k][1] * v1;
         inside = f8_min(inside, f8_max(x0, x1) + f8_max(y0, y1) + e->n[k][2]);
         outside = f8_max(outside, f8_min(x0, x1) + f8_min(y0, y1) + e->n[k][2]);
     }
@@ -259,29 +268,36 @@ TRC_INLINE bool leaf_packet(struct walk *w, uint32_t ref, uint64_t mask, bool an
     }
     for (; slots; slots &= slots - 1) {
         const int slot = __builtin_ctz(slots);
-        if (any && p->skip_transparent && (words[slot] & TRC_SLOT_TRANSPARENT)) continue;
+        if (any && p->skip_transparent && (words[slot] & TRC_SLOT_TRANSPARENT))
+            continue;
         const float *v = trc_leaf_vertices(w->tree, leaf, w->key) + slot;
         const uint32_t instance =
             w->instance == TRC_NO_HIT ? words[slot] & TRC_SLOT_INSTANCE_MASK : w->instance;
         struct trc_triangle_lanes tri;
-        if (!motion) lanes_load(w, v, false, 0, &tri);
+        if (!motion)
+            lanes_load(w, v, false, 0, &tri);
         for (int c = 0; c < TRC_PACKET_CHUNKS; c++) {
             uint32_t bits = trc_chunk_bits(mask, c);
-            if (!bits) continue;
+            if (!bits)
+                continue;
             const int i = c * TRC_WIDTH;
             const vfloat su = vf_load(&g->su[i]), sv = vf_load(&g->sv[i]);
             if (filter) {
                 bits &= edge_filter_lanes(&edges, slot, su, sv);
-                if (!bits) continue;
+                if (!bits)
+                    continue;
             }
-            if (motion) lanes_load(w, v, true, i, &tri);
+            if (motion)
+                lanes_load(w, v, true, i, &tri);
             vfloat t, bu, bv;
-            vmask hit = trc_triangle_test(&tri, vf_load(&p->o[axis.u][i]), vf_load(&p->o[axis.v][i]),
-                                          vf_load(&p->o[axis.z][i]), su, sv, vf_load(&g->sz[i]),
-                                          vm_from_bits(bits), &t, &bu, &bv);
-            if (!vm_any(hit)) continue;
+            vmask hit = trc_triangle_test(&tri, vf_load(&p->o[axis.u][i]),
+                                          vf_load(&p->o[axis.v][i]), vf_load(&p->o[axis.z][i]), su,
+                                          sv, vf_load(&g->sz[i]), vm_from_bits(bits), &t, &bu, &bv);
+            if (!vm_any(hit))
+                continue;
             if (any) {
-                hit = vm_and(hit, vm_and(vf_gt(t, vf_load(&p->tmin[i])), vf_lt(t, vf_load(&p->t[i]))));
+                hit = vm_and(hit,
+                             vm_and(vf_gt(t, vf_load(&p->tmin[i])), vf_lt(t, vf_load(&p->t[i]))));
                 const uint64_t blocked = (uint64_t)vm_bits(hit) << i;
                 w->occluded |= blocked;
                 mask &= ~blocked;
@@ -302,7 +318,8 @@ static void beam_shorten(struct walk *w, uint64_t mask) {
     vfloat far = vf_set(-INFINITY);
     for (int c = 0; c < TRC_PACKET_CHUNKS; c++) {
         const uint32_t bits = trc_chunk_bits(mask, c);
-        if (!bits) continue;
+        if (!bits)
+            continue;
         const int i = c * TRC_WIDTH;
         const vfloat end = vf_load(&p->o[z][i]) + vf_load(&p->t[i]) * vf_load(&p->d[z][i]);
         far = vf_max(far, vf_select(vm_from_bits(bits), vf_set(b->sign) * end, far));
@@ -334,13 +351,14 @@ TRC_INLINE bool leaf_single(struct walk *w, uint32_t ref, int ray, bool any, boo
             }
         }
     f8 t, bu, bv;
-    uint32_t hit = trc_triangle8_test(&tri, p->o[axis.u][ray], p->o[axis.v][ray], p->o[axis.z][ray],
-                                      g->su[ray], g->sv[ray], g->sz[ray], (1u << count) - 1u, &t, &bu,
-                                      &bv);
+    uint32_t hit =
+        trc_triangle8_test(&tri, p->o[axis.u][ray], p->o[axis.v][ray], p->o[axis.z][ray],
+                           g->su[ray], g->sv[ray], g->sz[ray], (1u << count) - 1u, &t, &bu, &bv);
     for (; hit; hit &= hit - 1) {
         const int slot = __builtin_ctz(hit);
         const float distance = t[slot];
-        if (!(distance > p->tmin[ray])) continue;
+        if (!(distance > p->tmin[ray]))
+            continue;
         if (any) {
             if (distance < p->t[ray] &&
                 !(p->skip_transparent && (words[slot] & TRC_SLOT_TRANSPARENT)))
@@ -368,8 +386,8 @@ struct single_entry {
     float near;
 };
 
-/* One ray as the box test wants it: for each axis which plane is met first, and the origin moved so that boxes are
- * wider by the slack. */
+/* One ray as the box test wants it: for each axis which plane is met first, and the origin moved so
+ * that boxes are wider by the slack. */
 struct single_ray {
     f8 inv[3], near_origin[3], far_origin[3];
     int first[3], last[3]; /* floats from the node's bounds to the planes of the axis */
@@ -420,7 +438,8 @@ TRC_INLINE uint32_t single_push(const uint32_t *children, f8 near, uint32_t bits
     f8_store(distance, near);
     const int a = __builtin_ctz(bits);
     bits &= bits - 1;
-    if (!bits) return children[a];
+    if (!bits)
+        return children[a];
     const int b = __builtin_ctz(bits);
     bits &= bits - 1;
     int top = *top_in_out;
@@ -436,7 +455,8 @@ TRC_INLINE uint32_t single_push(const uint32_t *children, f8 near, uint32_t bits
     for (bits |= 1u << b; bits; bits &= bits - 1) {
         const int child = __builtin_ctz(bits);
         int at = top++;
-        for (; at > bottom && stack[at - 1].near < distance[child]; at--) stack[at] = stack[at - 1];
+        for (; at > bottom && stack[at - 1].near < distance[child]; at--)
+            stack[at] = stack[at - 1];
         stack[at] = (struct single_entry){children[child], distance[child]};
     }
     *top_in_out = top - 1;
@@ -453,18 +473,21 @@ TRC_INLINE bool single_walk(struct walk *w, uint32_t ref, int ray, bool any, boo
         while (!(ref & TRC_REF_LEAF)) {
             f8 near;
             const uint32_t bits = node_single(w, ref, &r, w->packet->t[ray], motion, &near);
-            if (!bits) goto pop;
+            if (!bits)
+                goto pop;
             ref = single_push(trc_node_children(w->tree, ref), near, bits, stack, &top);
         }
         if (w->tree->is_top) {
             item_packet(w, &w->tree->items[ref & TRC_REF_INDEX_MASK], 1ull << ray, any);
-            if (any && (w->occluded >> ray & 1u)) return true;
+            if (any && (w->occluded >> ray & 1u))
+                return true;
         } else if (leaf_single(w, ref, ray, any, motion)) {
             return true;
         }
     pop:
         do {
-            if (top == 0) return false;
+            if (top == 0)
+                return false;
             ref = stack[--top].ref;
         } while (stack[top].near > w->packet->t[ray]);
     }
@@ -504,13 +527,17 @@ TRC_INLINE void packet_walk(struct walk *w, uint64_t mask, bool any, bool motion
     while (top > 0) {
         const struct entry at = stack[--top];
         uint64_t live = at.mask;
-        if (any) live &= ~w->occluded;
-        if (live && at.box != UINT32_MAX) live = box_rays(w, at.box, live, motion);
-        if (!live) continue;
+        if (any)
+            live &= ~w->occluded;
+        if (live && at.box != UINT32_MAX)
+            live = box_rays(w, at.box, live, motion);
+        if (!live)
+            continue;
         if (__builtin_popcountll(live) <= few) {
             for (; live; live &= live - 1) {
                 const int ray = __builtin_ctzll(live);
-                if (single_walk(w, at.ref, ray, any, motion) && any) w->occluded |= 1ull << ray;
+                if (single_walk(w, at.ref, ray, any, motion) && any)
+                    w->occluded |= 1ull << ray;
             }
             continue;
         }
@@ -518,7 +545,8 @@ TRC_INLINE void packet_walk(struct walk *w, uint64_t mask, bool any, bool motion
             top = children_push(w, at.ref, live, motion, stack, top);
         } else if (w->tree->is_top) {
             item_packet(w, &w->tree->items[at.ref & TRC_REF_INDEX_MASK], live, any);
-            if (!any) beam_shorten(w, all);
+            if (!any)
+                beam_shorten(w, all);
         } else if (leaf_packet(w, at.ref, live, any, motion) && !any) {
             beam_shorten(w, all);
         }
@@ -528,7 +556,9 @@ TRC_INLINE void packet_walk(struct walk *w, uint64_t mask, bool any, bool motion
 static void walk_any(struct walk *w, uint64_t mask) { packet_walk(w, mask, true, false); }
 static void walk_closest(struct walk *w, uint64_t mask) { packet_walk(w, mask, false, false); }
 static void walk_any_moving(struct walk *w, uint64_t mask) { packet_walk(w, mask, true, true); }
-static void walk_closest_moving(struct walk *w, uint64_t mask) { packet_walk(w, mask, false, true); }
+static void walk_closest_moving(struct walk *w, uint64_t mask) {
+    packet_walk(w, mask, false, true);
+}
 
 /* Moving trees: rays of one segment between keys at a time, each with its place in it. */
 static void walk_segments(struct walk *w, uint64_t mask, bool any) {
@@ -548,7 +578,8 @@ static void walk_segments(struct walk *w, uint64_t mask, bool any) {
         g->f_max = 0.0f;
         for (uint64_t m = mask; m; m &= m - 1) {
             const int i = __builtin_ctzll(m);
-            if (keys[i] != key) continue;
+            if (keys[i] != key)
+                continue;
             same |= 1ull << i;
             g->f_min = f_min(g->f_min, g->f[i]);
             g->f_max = f_max(g->f_max, g->f[i]);
@@ -564,24 +595,29 @@ static void walk_packet(struct walk *w, uint64_t mask, bool any) {
     const struct trc_packet *p = w->packet;
     struct trc_group group;
     uint64_t groups[6] = {0};
-    if (w->tree->root == TRC_REF_EMPTY) return;
+    if (w->tree->root == TRC_REF_EMPTY)
+        return;
     for (int c = 0; c < TRC_PACKET_CHUNKS; c++) {
         const uint32_t bits = trc_chunk_bits(mask, c);
-        if (!bits) continue;
+        if (!bits)
+            continue;
         const int i = c * TRC_WIDTH;
-        const vfloat dx = vf_load(&p->d[0][i]), dy = vf_load(&p->d[1][i]), dz = vf_load(&p->d[2][i]);
+        const vfloat dx = vf_load(&p->d[0][i]), dy = vf_load(&p->d[1][i]),
+                     dz = vf_load(&p->d[2][i]);
         const vfloat ax = vf_abs(dx), ay = vf_abs(dy), az = vf_abs(dz), zero = vf_set(0.0f);
         const uint32_t x = bits & vm_bits(vm_and(vf_ge(ax, ay), vf_ge(ax, az)));
         const uint32_t y = bits & ~x & vm_bits(vf_ge(ay, az)), z = bits & ~x & ~y;
         const uint32_t nx = vm_bits(vf_lt(dx, zero)), ny = vm_bits(vf_lt(dy, zero)),
                        nz = vm_bits(vf_lt(dz, zero));
         const uint32_t split[6] = {x & ~nx, x & nx, y & ~ny, y & ny, z & ~nz, z & nz};
-        for (int k = 0; k < 6; k++) groups[k] |= (uint64_t)split[k] << i;
+        for (int k = 0; k < 6; k++)
+            groups[k] |= (uint64_t)split[k] << i;
     }
     struct trc_group *const outer = w->group;
     w->group = &group;
     for (int k = 0; k < 6; k++) {
-        if (!groups[k] || !trc_group_setup(&group, p, w->tree, groups[k], k >> 1, k & 1)) continue;
+        if (!groups[k] || !trc_group_setup(&group, p, w->tree, groups[k], k >> 1, k & 1))
+            continue;
         if (w->tree->key_count > 1)
             walk_segments(w, groups[k], any);
         else
@@ -594,9 +630,11 @@ static void walk_packet(struct walk *w, uint64_t mask, bool any) {
 
 /* World-to-object matrix of each lane's time: the key's inverse, or the inverse of the interpolated
  * matrix. */
-TRC_INLINE void instance_inverse(const struct trc_instance *instance, vfloat time, vfloat inverse[12]) {
+TRC_INLINE void instance_inverse(const struct trc_instance *instance, vfloat time,
+                                 vfloat inverse[12]) {
     if (instance->key_count < 2) {
-        for (int k = 0; k < 12; k++) inverse[k] = vf_set(instance->world_to_object->m[k]);
+        for (int k = 0; k < 12; k++)
+            inverse[k] = vf_set(instance->world_to_object->m[k]);
         return;
     }
     const float last = (float)(instance->key_count - 1);
@@ -606,13 +644,15 @@ TRC_INLINE void instance_inverse(const struct trc_instance *instance, vfloat tim
     vfloat m[12];
     const float *base = instance->object_to_world->m;
     for (int k = 0; k < 12; k++)
-        m[k] = g * vf_gather(base + k, at, vm_all_set()) + f * vf_gather(base + 12 + k, at, vm_all_set());
+        m[k] = g * vf_gather(base + k, at, vm_all_set()) +
+               f * vf_gather(base + 12 + k, at, vm_all_set());
     const vvec3 r0 = v3(m[0], m[1], m[2]), r1 = v3(m[4], m[5], m[6]), r2 = v3(m[8], m[9], m[10]);
     const vvec3 c0 = v3_cross(r1, r2), c1 = v3_cross(r2, r0), c2 = v3_cross(r0, r1);
     const vfloat inv_det = vf_set(1.0f) / v3_dot(r0, c0);
     const vfloat rows[3][3] = {{c0.x, c1.x, c2.x}, {c0.y, c1.y, c2.y}, {c0.z, c1.z, c2.z}};
     for (int r = 0; r < 3; r++) {
-        for (int k = 0; k < 3; k++) inverse[4 * r + k] = rows[r][k] * inv_det;
+        for (int k = 0; k < 3; k++)
+            inverse[4 * r + k] = rows[r][k] * inv_det;
         inverse[4 * r + 3] =
             -(inverse[4 * r] * m[3] + inverse[4 * r + 1] * m[7] + inverse[4 * r + 2] * m[11]);
     }
@@ -622,14 +662,18 @@ TRC_INLINE void instance_inverse(const struct trc_instance *instance, vfloat tim
 static void packet_transform(const struct trc_instance *instance, const struct trc_packet *p,
                              uint64_t mask, struct trc_packet *out) {
     for (int c = 0; c < TRC_PACKET_CHUNKS; c++) {
-        if (!trc_chunk_bits(mask, c)) continue;
+        if (!trc_chunk_bits(mask, c))
+            continue;
         const int i = c * TRC_WIDTH;
         vfloat m[12];
         instance_inverse(instance, vf_load(&p->time[i]), m);
-        const vfloat ox = vf_load(&p->o[0][i]), oy = vf_load(&p->o[1][i]), oz = vf_load(&p->o[2][i]);
-        const vfloat dx = vf_load(&p->d[0][i]), dy = vf_load(&p->d[1][i]), dz = vf_load(&p->d[2][i]);
+        const vfloat ox = vf_load(&p->o[0][i]), oy = vf_load(&p->o[1][i]),
+                     oz = vf_load(&p->o[2][i]);
+        const vfloat dx = vf_load(&p->d[0][i]), dy = vf_load(&p->d[1][i]),
+                     dz = vf_load(&p->d[2][i]);
         for (int r = 0; r < 3; r++) {
-            vf_store(&out->o[r][i], m[4 * r] * ox + m[4 * r + 1] * oy + m[4 * r + 2] * oz + m[4 * r + 3]);
+            vf_store(&out->o[r][i],
+                     m[4 * r] * ox + m[4 * r + 1] * oy + m[4 * r + 2] * oz + m[4 * r + 3]);
             vf_store(&out->d[r][i], m[4 * r] * dx + m[4 * r + 1] * dy + m[4 * r + 2] * dz);
         }
         vf_store(&out->tmin[i], vf_load(&p->tmin[i]));
@@ -642,7 +686,8 @@ static void packet_transform(const struct trc_instance *instance, const struct t
 }
 
 static void item_packet(struct walk *w, const struct trc_item *item, uint64_t mask, bool any) {
-    if (!(item->visibility & w->packet->visibility)) return;
+    if (!(item->visibility & w->packet->visibility))
+        return;
     const struct walk outer = *w;
     struct trc_packet local;
     w->tree = item->tree;
@@ -669,15 +714,22 @@ static void item_packet(struct walk *w, const struct trc_item *item, uint64_t ma
 
 void TRC_KERNEL(trc_trace_closest)(const struct trc_snapshot *snapshot, struct trc_packet *packet,
                                    struct trc_packet_hits *hits) {
-    struct walk w = {.snapshot = snapshot, .tree = snapshot->bvh->tree, .packet = packet, .hits = hits,
+    struct walk w = {.snapshot = snapshot,
+                     .tree = snapshot->bvh->tree,
+                     .packet = packet,
+                     .hits = hits,
                      .instance = TRC_NO_HIT};
-    if (packet->active) walk_packet(&w, packet->active, false);
+    if (packet->active)
+        walk_packet(&w, packet->active, false);
 }
 
 uint64_t TRC_KERNEL(trc_trace_occluded)(const struct trc_snapshot *snapshot,
                                         struct trc_packet *packet) {
-    struct walk w = {.snapshot = snapshot, .tree = snapshot->bvh->tree, .packet = packet,
+    struct walk w = {.snapshot = snapshot,
+                     .tree = snapshot->bvh->tree,
+                     .packet = packet,
                      .instance = TRC_NO_HIT};
-    if (packet->active) walk_packet(&w, packet->active, true);
+    if (packet->active)
+        walk_packet(&w, packet->active, true);
     return w.occluded & packet->active;
 }

@@ -2,12 +2,13 @@
  *
  * Sven Woop, Carsten Benthin, Ingo Wald, "Watertight Ray/Triangle Intersection", 2013. Vertices are
  * moved to the ray's origin and sheared so that the ray is the axis of its dominant direction; each
- * vertex is rounded the same way whatever triangle it belongs to, so a closed mesh stays closed in the
- * sheared plane. An edge function a*b - c*d of floats, without contraction, can lose its sign to 0 but never
- * change it, because rounding is monotonic; where one is (nearly) 0 all three are computed in double,
- * where products of floats are exact. Departures: barycentrics are normalised before the distance is
- * formed (no overflow up to 1.8e18), both windings hit, edge functions below TINY_EDGE also go to double
- * (tiny triangles). Both forms make the same operations in the same order: the same bits. */
+ * vertex is rounded the same way whatever triangle it belongs to, so a closed mesh stays closed in
+ * the sheared plane. An edge function a*b - c*d of floats, without contraction, can lose its sign
+ * to 0 but never change it, because rounding is monotonic; where one is (nearly) 0 all three are
+ * computed in double, where products of floats are exact. Departures: barycentrics are normalised
+ * before the distance is formed (no overflow up to 1.8e18), both windings hit, edge functions below
+ * TINY_EDGE also go to double (tiny triangles). Both forms make the same operations in the same
+ * order: the same bits. */
 #ifndef TRACER_KERNELS_TRIANGLE_H
 #define TRACER_KERNELS_TRIANGLE_H
 
@@ -17,19 +18,21 @@
 /* Below it products may have lost bits to underflow, and 1 / det may overflow. */
 #define TRC_TINY_EDGE 1e-36f
 
-/* Bound of the error of t, after M. Pharr, W. Jakob, G. Humphreys, "Physically Based Rendering", 3rd ed. 2016,
- * section 3.9.6, in half-ulps: z 3, sheared x and y 5 of x + z, edge functions 2 of x y and what x and y carry, the
- * sum 3. A ray that leaves a surface starts outside the box of its point's error; nothing nearer than
- * this bound can be told from that surface, so it does not count. */
-#define TRC_GAMMA(n) ((n) * 0x1p-24f / (1.0f - (n) * 0x1p-24f))
-#define TRC_T_ERROR(name, type, set)                                                               \
-    TRC_INLINE type name(type x, type y, type z, type e, type inv) {                               \
-        const type xi = x * inv, zi = z * inv; /* first, so that nothing overflows */              \
-        const type dxi = set(TRC_GAMMA(5)) * (xi + zi), dy = set(TRC_GAMMA(5)) * (y + z);          \
-        const type de = set(2.0f) * (set(TRC_GAMMA(2)) * xi * y + dy * xi + dxi * y);              \
-        return set(3.0f) * (set(2.0f * TRC_GAMMA(3)) * (e * inv) + de) * z;                        \
+/* Bound of the error of t, after M. Pharr, W. Jakob, G. Humphreys, "Physically Based Rendering",
+ * 3rd ed. 2016, section 3.9.6, in half-ulps: z 3, sheared x and y 5 of x + z, edge functions 2 of x
+ * y and what x and y carry, the sum 3. A ray that leaves a surface starts outside the box of its
+ * point's error; nothing nearer than this bound can be told from that surface, so it does not
+ * count. */
+#define TRC_GAMMA(n) ((n)*0x1p-24f / (1.0f - (n)*0x1p-24f))
+#define TRC_T_ERROR(name, type, set)                                                      \
+    TRC_INLINE type name(type x, type y, type z, type e, type inv) {                      \
+        const type xi = x * inv, zi = z * inv; /* first, so that nothing overflows */     \
+        const type dxi = set(TRC_GAMMA(5)) * (xi + zi), dy = set(TRC_GAMMA(5)) * (y + z); \
+        const type de = set(2.0f) * (set(TRC_GAMMA(2)) * xi * y + dy * xi + dxi * y);     \
+        return set(3.0f) * (set(2.0f * TRC_GAMMA(3)) * (e * inv) + de) * z;               \
     }
-/* Largest |x|, |y|, |z| of the sheared vertices, largest |edge function|, 1 / |det|: the bound over sz. */
+/* Largest |x|, |y|, |z| of the sheared vertices, largest |edge function|, 1 / |det|: the bound over
+ * sz. */
 TRC_T_ERROR(trc_t_error, vfloat, vf_set)
 TRC_T_ERROR(trc_t_error8, f8, f8_set)
 TRC_T_ERROR(trc_t_error_exact, double, (double))
@@ -39,17 +42,19 @@ struct trc_shear {
     int u, v, z;
 };
 
-/* One ray against one triangle whose sheared coordinates are given (a: vertex 0: x, y, z relative to the
- * origin, x and y sheared); edge functions in double. False for a miss. */
+/* One ray against one triangle whose sheared coordinates are given (a: vertex 0: x, y, z relative
+ * to the origin, x and y sheared); edge functions in double. False for a miss. */
 static __attribute__((noinline)) bool trc_triangle_exact(const float a[3], const float b[3],
                                                          const float c[3], float sz, float *t,
                                                          float *u, float *v) {
     const double e0 = (double)c[0] * b[1] - (double)c[1] * b[0];
     const double e1 = (double)a[0] * c[1] - (double)a[1] * c[0];
     const double e2 = (double)b[0] * a[1] - (double)b[1] * a[0];
-    const bool inside = (e0 >= 0.0 && e1 >= 0.0 && e2 >= 0.0) || (e0 <= 0.0 && e1 <= 0.0 && e2 <= 0.0);
+    const bool inside =
+        (e0 >= 0.0 && e1 >= 0.0 && e2 >= 0.0) || (e0 <= 0.0 && e1 <= 0.0 && e2 <= 0.0);
     const double det = e0 + e1 + e2;
-    if (!inside || det == 0.0) return false;
+    if (!inside || det == 0.0)
+        return false;
     const double inv = 1.0 / det;
     *u = (float)(e1 * inv);
     *v = (float)(e2 * inv);
@@ -58,7 +63,8 @@ static __attribute__((noinline)) bool trc_triangle_exact(const float a[3], const
     for (int k = 0; k < 3; k++)
         most[k + 1] = fmax(fabs((double)a[k]), fmax(fabs((double)b[k]), fabs((double)c[k])));
     *t = (float)distance;
-    return distance > trc_t_error_exact(most[1], most[2], most[3], most[0], fabs(inv)) * fabs((double)sz);
+    return distance >
+           trc_t_error_exact(most[1], most[2], most[3], most[0], fabs(inv)) * fabs((double)sz);
 }
 
 /* Vertex coordinates of one triangle for the lanes: broadcast (static) or per ray (moving). */
@@ -80,7 +86,8 @@ TRC_INLINE vmask trc_triangle_test(const struct trc_triangle_lanes *p, vfloat ou
     const vfloat zero = vf_set(0.0f);
     const vfloat least = vf_min(e0, vf_min(e1, e2)), most = vf_max(e0, vf_max(e1, e2));
     vmask hit = vm_and(active, vm_or(vf_ge(least, zero), vf_le(most, zero)));
-    if (!vm_any(hit)) return hit;
+    if (!vm_any(hit))
+        return hit;
     const vfloat inv = vf_set(1.0f) / (e0 + e1 + e2);
     *u = e1 * inv;
     *v = e2 * inv;
@@ -91,7 +98,8 @@ TRC_INLINE vmask trc_triangle_test(const struct trc_triangle_lanes *p, vfloat ou
     const vfloat y = vf_max(vf_abs(ay), vf_max(vf_abs(by), vf_abs(cy)));
     const vfloat z = vf_max(vf_abs(az), vf_max(vf_abs(bz), vf_abs(cz)));
     const vfloat e = vf_max(vf_abs(e0), vf_max(vf_abs(e1), vf_abs(e2)));
-    hit = vm_or(near_edge, vm_and(hit, vf_gt(*t, trc_t_error(x, y, z, e, vf_abs(inv)) * vf_abs(sz))));
+    hit =
+        vm_or(near_edge, vm_and(hit, vf_gt(*t, trc_t_error(x, y, z, e, vf_abs(inv)) * vf_abs(sz))));
     uint32_t doubtful = vm_bits(near_edge);
     if (__builtin_expect(doubtful != 0, 0)) {
         float lanes[9][TRC_WIDTH], s[TRC_WIDTH], rt[TRC_WIDTH], ru[TRC_WIDTH], rv[TRC_WIDTH];
@@ -105,7 +113,8 @@ TRC_INLINE vmask trc_triangle_test(const struct trc_triangle_lanes *p, vfloat ou
             const float a[3] = {lanes[0][i], lanes[1][i], lanes[2][i]};
             const float b[3] = {lanes[3][i], lanes[4][i], lanes[5][i]};
             const float c[3] = {lanes[6][i], lanes[7][i], lanes[8][i]};
-            if (!trc_triangle_exact(a, b, c, s[i], &rt[i], &ru[i], &rv[i])) bits &= ~(1u << i);
+            if (!trc_triangle_exact(a, b, c, s[i], &rt[i], &ru[i], &rv[i]))
+                bits &= ~(1u << i);
         }
         hit = vm_from_bits(bits);
         *t = vf_load(rt), *u = vf_load(ru), *v = vf_load(rv);
@@ -132,7 +141,8 @@ TRC_INLINE uint32_t trc_triangle8_test(const struct trc_triangle8 *p, float ou, 
     const f8 zero = f8_set(0.0f);
     const f8 least = f8_min(e0, f8_min(e1, e2)), most = f8_max(e0, f8_max(e1, e2));
     uint32_t hit = candidates & (f8_le(zero, least) | f8_le(most, zero));
-    if (!hit) return 0;
+    if (!hit)
+        return 0;
     const f8 inv = f8_set(1.0f) / (e0 + e1 + e2);
     *u = e1 * inv;
     *v = e2 * inv;

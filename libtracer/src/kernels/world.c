@@ -6,8 +6,8 @@
 #include "kernels/wide_math.h"
 
 /* A shading point as Cycles gives it to the world: the position is the direction, the normals look
- * back, and it lies one bounce beyond what the ray left; a ray that is not the camera's has one behind
- * it. */
+ * back, and it lies one bounce beyond what the ray left; a ray that is not the camera's has one
+ * behind it. */
 static void world_surface(const struct trc_snapshot *snapshot, vvec3 direction, vuint path,
                           vmask active, struct trc_surface *s) {
     const vvec3 back = v3_neg(direction);

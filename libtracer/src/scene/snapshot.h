@@ -1,8 +1,8 @@
 /* The committed scene: everything that kernels read, immutable once published.
  *
- * Built by commit (scene/commit.c), reference-counted, kept alive by renders and queries. What did not
- * change between two commits is shared between their snapshots. No pointers back to the editable
- * scene. */
+ * Built by commit (scene/commit.c), reference-counted, kept alive by renders and queries. What did
+ * not change between two commits is shared between their snapshots. No pointers back to the
+ * editable scene. */
 #ifndef TRACER_SCENE_SNAPSHOT_H
 #define TRACER_SCENE_SNAPSHOT_H
 
@@ -11,16 +11,16 @@
 
 #include "tracer/tracer.h"
 
-struct trc_bvh;          /* bvh/bvh.h */
-struct trc_material;     /* shading/material.h */
-struct trc_light_table;  /* shading/lights.h */
-struct trc_image;        /* image/image.h */
+struct trc_bvh;         /* bvh/bvh.h */
+struct trc_material;    /* shading/material.h */
+struct trc_light_table; /* shading/lights.h */
+struct trc_image;       /* image/image.h */
 
 /* One attribute per triangle corner. */
 struct trc_attribute {
-    uint32_t name;     /* index of the name in the snapshot's name table (trc_names) */
-    uint32_t width;    /* 2 or 4 */
-    float *values;     /* width * 3 * triangle_count */
+    uint32_t name;  /* index of the name in the snapshot's name table (trc_names) */
+    uint32_t width; /* 2 or 4 */
+    float *values;  /* width * 3 * triangle_count */
 };
 
 /* Geometry of a mesh, shared and immutable; refs counts the holders. */
@@ -28,16 +28,17 @@ struct trc_mesh {
     atomic_uint refs;
     uint32_t key_count;
     uint32_t vertex_count, triangle_count;
-    float *positions;        /* 3 * vertex_count * key_count */
-    uint32_t *indices;       /* 3 * triangle_count */
-    float *vertex_normals;   /* 3 * vertex_count * key_count or NULL */
-    float *corner_normals;   /* 9 * triangle_count * key_count or NULL; rules over vertex_normals */
-    uint8_t *smooth;         /* per triangle, or NULL: none smooth (corner normals: all) */
+    float *positions;      /* 3 * vertex_count * key_count */
+    uint32_t *indices;     /* 3 * triangle_count */
+    float *vertex_normals; /* 3 * vertex_count * key_count or NULL */
+    float *corner_normals; /* 9 * triangle_count * key_count or NULL; rules over vertex_normals */
+    uint8_t *smooth;       /* per triangle, or NULL: none smooth (corner normals: all) */
     uint16_t *material_index; /* per triangle, or NULL: all 0 */
     uint32_t attribute_count;
     struct trc_attribute attributes[TRC_MAX_ATTRIBUTES];
-    int32_t default_uv;      /* index of the first attribute of width 2, or -1 */
-    float bounds_lower[3], bounds_upper[3]; /* object space, all keys: Generated coordinates use key 0 */
+    int32_t default_uv; /* index of the first attribute of width 2, or -1 */
+    float bounds_lower[3],
+        bounds_upper[3]; /* object space, all keys: Generated coordinates use key 0 */
 };
 
 /* A 3x4 matrix, rows. */
@@ -46,18 +47,18 @@ struct trc_affine {
 };
 
 struct trc_instance {
-    uint32_t mesh;           /* into snapshot meshes */
+    uint32_t mesh; /* into snapshot meshes */
     uint32_t key_count;
     const struct trc_affine *object_to_world; /* key_count */
     const struct trc_affine *world_to_object; /* key_count, inverse of each key */
-    uint32_t visibility;     /* TRC_VISIBLE_* */
-    uint32_t material_count; /* >= 1 */
-    const uint32_t *materials; /* into snapshot materials, per slot */
+    uint32_t visibility;                      /* TRC_VISIBLE_* */
+    uint32_t material_count;                  /* >= 1 */
+    const uint32_t *materials;                /* into snapshot materials, per slot */
     int32_t pass_index;
     float random;
     float color[4];
-    uint32_t first_light;    /* first emissive-triangle light of this instance or UINT32_MAX */
-    uint32_t flips;          /* 1: negative determinant at key 0 */
+    uint32_t first_light; /* first emissive-triangle light of this instance or UINT32_MAX */
+    uint32_t flips;       /* 1: negative determinant at key 0 */
 };
 
 struct trc_camera {
@@ -68,28 +69,28 @@ struct trc_camera {
     float clip_start, clip_end;
     float aperture_radius, focus_distance, blade_rotation, aperture_ratio;
     uint32_t blade_count;
-    float *shutter_cdf_inverse;         /* 256 values of time, or NULL: identity */
-    uint32_t has_motion;                /* shutter open: rays carry a time */
+    float *shutter_cdf_inverse; /* 256 values of time, or NULL: identity */
+    uint32_t has_motion;        /* shutter open: rays carry a time */
 };
 
 struct trc_world {
-    uint32_t material;                  /* into snapshot materials, or UINT32_MAX: black */
+    uint32_t material; /* into snapshot materials, or UINT32_MAX: black */
     uint32_t visibility;
-    uint32_t is_constant;               /* radiance below rules, no program */
+    uint32_t is_constant; /* radiance below rules, no program */
     float radiance[3];
     float ao_distance, ao_factor;
 };
 
 struct trc_snapshot {
     atomic_uint refs;
-    uint32_t features;                  /* TRC_FEATURE_* */
+    uint32_t features; /* TRC_FEATURE_* */
     uint32_t mesh_count, instance_count, material_count, image_count;
     struct trc_mesh **meshes;
     struct trc_instance *instances;
-    struct trc_material **materials;    /* [0] is the default material */
+    struct trc_material **materials; /* [0] is the default material */
     struct trc_image **images;
-    const struct trc_bvh *bvh;          /* what rays are traced against; never NULL, may be empty */
-    struct trc_light_table *lights;     /* never NULL */
+    const struct trc_bvh *bvh;      /* what rays are traced against; never NULL, may be empty */
+    struct trc_light_table *lights; /* never NULL */
     struct trc_camera camera;
     uint32_t has_camera;
     struct trc_world world;
@@ -106,7 +107,8 @@ static inline void trc_key_at(float time, uint32_t key_count, uint32_t *key, flo
     }
     const float x = (time > 0.0f ? (time < 1.0f ? time : 1.0f) : 0.0f) * (float)(key_count - 1);
     uint32_t k = (uint32_t)x;
-    if (k > key_count - 2) k = key_count - 2;
+    if (k > key_count - 2)
+        k = key_count - 2;
     *key = k;
     *f = x - (float)k;
 }

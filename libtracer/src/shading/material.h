@@ -16,16 +16,17 @@
 
 /* One float: a constant, or what the program left in a register. */
 struct trc_operand {
-    int32_t reg; /* -1: constant. -2: unlinked normal, tangent or vector: the default of its place */
+    int32_t
+        reg; /* -1: constant. -2: unlinked normal, tangent or vector: the default of its place */
     float value;
 };
 
 /* One shader node that the output reaches, with the factor of the mix nodes above it. */
 struct trc_leaf {
-    uint32_t type;              /* TRC_NODE_DIFFUSE ... TRC_NODE_PRINCIPLED */
-    uint32_t mode;              /* distribution */
-    struct trc_operand weight;  /* product of mix factors, [0, 1] or more for added shaders */
-    uint32_t first_operand;     /* the node's inputs in order, 3 operands for a colour or vector */
+    uint32_t type;             /* TRC_NODE_DIFFUSE ... TRC_NODE_PRINCIPLED */
+    uint32_t mode;             /* distribution */
+    struct trc_operand weight; /* product of mix factors, [0, 1] or more for added shaders */
+    uint32_t first_operand;    /* the node's inputs in order, 3 operands for a colour or vector */
     uint32_t operand_count;
 };
 
@@ -34,17 +35,17 @@ struct trc_leaf {
 struct trc_instruction {
     uint16_t op;
     uint16_t mode;
-    uint16_t out;               /* first register written */
+    uint16_t out; /* first register written */
     uint16_t input_count;
-    uint32_t first_input;       /* into operands */
-    uint32_t resource;          /* image, attribute name or table offset */
+    uint32_t first_input; /* into operands */
+    uint32_t resource;    /* image, attribute name or table offset */
 };
 
 /* What the leaves may do, over all values of their inputs: decides code paths and features. */
 enum {
     TRC_MATERIAL_HAS_DIFFUSE = 1 << 0,
-    TRC_MATERIAL_HAS_SPECULAR = 1 << 1,    /* ideal lobes */
-    TRC_MATERIAL_HAS_GLOSSY = 1 << 2,      /* rough lobes */
+    TRC_MATERIAL_HAS_SPECULAR = 1 << 1, /* ideal lobes */
+    TRC_MATERIAL_HAS_GLOSSY = 1 << 2,   /* rough lobes */
     TRC_MATERIAL_HAS_REFRACTION = 1 << 3,
     TRC_MATERIAL_HAS_TRANSPARENCY = 1 << 4, /* transparent leaf or alpha below 1 */
     TRC_MATERIAL_HAS_EMISSION = 1 << 5,
@@ -58,15 +59,15 @@ enum {
 
 struct trc_material {
     atomic_uint refs;
-    uint32_t has;               /* TRC_MATERIAL_HAS_* */
-    uint32_t flags;             /* TRC_MATERIAL_* of the public header */
+    uint32_t has;   /* TRC_MATERIAL_HAS_* */
+    uint32_t flags; /* TRC_MATERIAL_* of the public header */
     int32_t pass_index;
     uint32_t leaf_count, operand_count, instruction_count, register_count, table_count;
     struct trc_leaf leaves[TRC_MAX_LEAVES];
     struct trc_operand *operands;
     struct trc_instruction *instructions;
     float *tables;
-    float emission[3];          /* constant emission; a mean estimate when it varies */
+    float emission[3]; /* constant emission; a mean estimate when it varies */
 };
 
 /* Whether shadow rays may pass it. */
