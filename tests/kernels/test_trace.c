@@ -10,7 +10,7 @@
 #define USUAL_RAYS 3000
 
 enum {
-    RAYS_FAR,      /* one origin, 10,000 times as far */
+    RAYS_FAR,      /* one origin, 300 times as far */
     RAYS_PINHOLE,  /* one origin outside */
     RAYS_INSIDE,   /* one origin, all directions: all octants in a packet */
     RAYS_BEAM,     /* origins close together, nearly parallel: a lens or an area light */
@@ -145,7 +145,7 @@ static void make_packet(struct ray_maker *m, uint32_t kind) {
     if (kind == RAYS_INSIDE)
         point_within(m, o);
     else
-        point_outside(m, kind == RAYS_FAR ? 1e4f : 1.0f, o);
+        point_outside(m, kind == RAYS_FAR ? 300.0f : 1.0f, o);
     point_within(m, target);
     for (int axis = 0; axis < 3; axis++)
         d[axis] = target[axis] - o[axis];
