@@ -19,6 +19,8 @@
 #include "kernels/triangle.h"
 
 #define TRC_SLACK 2e-6f
+/* Denormal coordinates: errors are absolute there. */
+#define TRC_LEAST_SLACK 1e-42f
 
 struct trc_beam {
     struct trc_shear axis;
@@ -83,7 +85,7 @@ TRC_INLINE bool trc_group_setup(struct trc_group *g, const struct trc_packet *p,
         const vfloat o = vf_max(vf_abs(ou), vf_max(vf_abs(ov), vf_abs(oz)));
         far_origin = vf_max(far_origin, vf_select(m, o, vf_set(0.0f)));
     }
-    b->slack = TRC_SLACK * (vf_lanes_max(far_origin) + tree->extent);
+    b->slack = TRC_SLACK * (vf_lanes_max(far_origin) + tree->extent) + TRC_LEAST_SLACK;
     const float low = side ? -tree->upper[z] : tree->lower[z];
     const float high = side ? -tree->lower[z] : tree->upper[z];
     b->z0 = f_max(vf_lanes_min(z_near), low) - b->slack;

@@ -8,7 +8,7 @@
  * exact, and distances scale back exactly. Rays that documented rules exclude stay inactive. */
 
 static bool ray_load(const trc_rays *rays, uint64_t from, int lane, struct trc_packet *p,
-                     float *scale) {
+                     int *power) {
     const float o[3] = {rays->origin_x[from], rays->origin_y[from], rays->origin_z[from]};
     const float d[3] = {rays->direction_x[from], rays->direction_y[from], rays->direction_z[from]};
     const float tmin = rays->tmin ? rays->tmin[from] : 0.0f;
@@ -20,27 +20,27 @@ static bool ray_load(const trc_rays *rays, uint64_t from, int lane, struct trc_p
             return false;
         largest = fmaxf(largest, fabsf(d[k]));
     }
-    if (largest == 0.0f || !(tmin <= tmax))
+    if (largest == 0.0f || !(tmin <= tmax) || isnan(time))
         return false;
     int exponent;
     (void)frexpf(largest, &exponent);
-    *scale = ldexpf(1.0f, exponent - 1 < -126 ? -126 : exponent - 1);
+    *power = exponent - 1;
     for (int k = 0; k < 3; k++) {
         p->o[k][lane] = o[k];
         p->d[k][lane] = ldexpf(d[k], 1 - exponent);
     }
-    p->tmin[lane] = tmin * *scale;
-    p->t[lane] = tmax * *scale;
-    p->time[lane] = isfinite(time) ? time : 0.0f;
+    p->tmin[lane] = ldexpf(tmin, *power);
+    p->t[lane] = ldexpf(tmax, *power);
+    p->time[lane] = f_min(f_max(time, 0.0f), 1.0f);
     return true;
 }
 
 static void packet_load(const trc_rays *rays, uint64_t begin, uint32_t count, struct trc_packet *p,
-                        float scale[TRC_PACKET_SIZE]) {
+                        int power[TRC_PACKET_SIZE]) {
     p->active = 0;
     p->common_origin = true;
     for (uint32_t i = 0; i < count; i++)
-        if (ray_load(rays, begin + i, (int)i, p, &scale[i]))
+        if (ray_load(rays, begin + i, (int)i, p, &power[i]))
             p->active |= 1ull << i;
     const int first = p->active ? __builtin_ctzll(p->active) : 0;
     for (uint64_t m = p->active; m && p->common_origin; m &= m - 1) {
@@ -54,12 +54,12 @@ static void packet_load(const trc_rays *rays, uint64_t begin, uint32_t count, st
 
 static void hit_store(const struct trc_snapshot *snapshot, const trc_hits *out, uint64_t to,
                       const struct trc_packet *p, const struct trc_packet_hits *h, uint32_t i,
-                      float scale) {
+                      int power) {
     out->instance[to] = h->instance[i];
     if (out->triangle)
         out->triangle[to] = h->triangle[i];
     if (out->distance)
-        out->distance[to] = p->t[i] / scale;
+        out->distance[to] = ldexpf(p->t[i], -power);
     if (out->u)
         out->u[to] = h->u[i];
     if (out->v)
@@ -110,16 +110,16 @@ void TRC_KERNEL(trc_query_closest_rays)(const struct trc_snapshot *snapshot, con
                                         uint32_t packet_size) {
     struct trc_packet p;
     struct trc_packet_hits h;
-    float scale[TRC_PACKET_SIZE];
+    int power[TRC_PACKET_SIZE];
     const uint32_t size = packet_size < TRC_PACKET_SIZE ? packet_size : TRC_PACKET_SIZE;
     for (uint64_t at = begin; at < end; at += size) {
         const uint32_t count = end - at < size ? (uint32_t)(end - at) : size;
-        packet_load(rays, at, count, &p, scale);
+        packet_load(rays, at, count, &p, power);
         memset(h.instance, 0xff, sizeof h.instance);
         TRC_KERNEL(trc_trace_closest)(snapshot, &p, &h);
         for (uint32_t i = 0; i < count; i++) {
             if ((p.active >> i & 1u) && h.instance[i] != TRC_NO_HIT)
-                hit_store(snapshot, hits, at + i, &p, &h, i, scale[i]);
+                hit_store(snapshot, hits, at + i, &p, &h, i, power[i]);
             else
                 hits->instance[at + i] = TRC_NO_HIT;
         }
@@ -130,11 +130,11 @@ void TRC_KERNEL(trc_query_occluded_rays)(const struct trc_snapshot *snapshot, co
                                          uint8_t *occluded, uint64_t begin, uint64_t end,
                                          uint32_t packet_size) {
     struct trc_packet p;
-    float scale[TRC_PACKET_SIZE];
+    int power[TRC_PACKET_SIZE];
     const uint32_t size = packet_size < TRC_PACKET_SIZE ? packet_size : TRC_PACKET_SIZE;
     for (uint64_t at = begin; at < end; at += size) {
         const uint32_t count = end - at < size ? (uint32_t)(end - at) : size;
-        packet_load(rays, at, count, &p, scale);
+        packet_load(rays, at, count, &p, power);
         const uint64_t blocked = TRC_KERNEL(trc_trace_occluded)(snapshot, &p);
         for (uint32_t i = 0; i < count; i++)
             occluded[at + i] = (uint8_t)(blocked >> i & 1u);

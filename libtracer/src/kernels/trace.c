@@ -234,7 +234,7 @@ TRC_INLINE void edge_filter_setup(const struct walk *w, const float *vertices, u
         inside = f8_min(inside, f8_max(x0, x1) + f8_max(y0, y1) + e->n[k][2]);
         outside = f8_max(outside, f8_min(x0, x1) + f8_min(y0, y1) + e->n[k][2]);
     }
-    e->margin = margin * f8_set(EDGE_MARGIN);
+    e->margin = margin * f8_set(EDGE_MARGIN) + f8_set(TRC_TINY_EDGE); /* products may underflow */
     e->candidates = candidates & (f8_le(-e->margin, inside) | f8_le(outside, e->margin));
 }
 
@@ -290,9 +290,10 @@ TRC_INLINE bool leaf_packet(struct walk *w, uint32_t ref, uint64_t mask, bool an
             if (motion)
                 lanes_load(w, v, true, i, &tri);
             vfloat t, bu, bv;
-            vmask hit = trc_triangle_test(&tri, vf_load(&p->o[axis.u][i]),
-                                          vf_load(&p->o[axis.v][i]), vf_load(&p->o[axis.z][i]), su,
-                                          sv, vf_load(&g->sz[i]), vm_from_bits(bits), &t, &bu, &bv);
+            vmask hit =
+                trc_triangle_test(&tri, vf_load(&p->o[axis.u][i]), vf_load(&p->o[axis.v][i]),
+                                  vf_load(&p->o[axis.z][i]), su, sv, vf_load(&g->sz[i]),
+                                  vf_load(&p->tmin[i]), vm_from_bits(bits), &t, &bu, &bv);
             if (!vm_any(hit))
                 continue;
             if (any) {
@@ -351,9 +352,9 @@ TRC_INLINE bool leaf_single(struct walk *w, uint32_t ref, int ray, bool any, boo
             }
         }
     f8 t, bu, bv;
-    uint32_t hit =
-        trc_triangle8_test(&tri, p->o[axis.u][ray], p->o[axis.v][ray], p->o[axis.z][ray],
-                           g->su[ray], g->sv[ray], g->sz[ray], (1u << count) - 1u, &t, &bu, &bv);
+    uint32_t hit = trc_triangle8_test(&tri, p->o[axis.u][ray], p->o[axis.v][ray], p->o[axis.z][ray],
+                                      g->su[ray], g->sv[ray], g->sz[ray], p->tmin[ray],
+                                      (1u << count) - 1u, &t, &bu, &bv);
     for (; hit; hit &= hit - 1) {
         const int slot = __builtin_ctz(hit);
         const float distance = t[slot];

@@ -35,12 +35,25 @@
  * sz. */
 TRC_T_ERROR(trc_t_error, vfloat, vf_set)
 TRC_T_ERROR(trc_t_error8, f8, f8_set)
-TRC_T_ERROR(trc_t_error_exact, double, (double))
 
 /* What the test needs of a ray: axes u, v, z with z dominant. */
 struct trc_shear {
     int u, v, z;
 };
+
+/* How far rounding of the sheared vertices can move the triangle's plane where the ray meets it:
+ * each vertex by 8 half-ulps of its lengths, sideways ones times the slope of the plane; inside the
+ * triangle that is a mean of the vertices' errors, however thin it is. */
+static double trc_plane_error(const float a[3], const float b[3], const float c[3], double det) {
+    const double p[3] = {(double)b[0] - a[0], (double)b[1] - a[1], (double)b[2] - a[2]};
+    const double q[3] = {(double)c[0] - a[0], (double)c[1] - a[1], (double)c[2] - a[2]};
+    const double slope =
+        (fabs(p[1] * q[2] - p[2] * q[1]) + fabs(p[2] * q[0] - p[0] * q[2])) / fabs(det);
+    double most[3];
+    for (int k = 0; k < 3; k++)
+        most[k] = fmax(fabs((double)a[k]), fmax(fabs((double)b[k]), fabs((double)c[k])));
+    return (double)TRC_GAMMA(8) * (most[2] + slope * (fmax(most[0], most[1]) + most[2]));
+}
 
 /* One ray against one triangle whose sheared coordinates are given (a: vertex 0: x, y, z relative
  * to the origin, x and y sheared); edge functions in double. False for a miss. */
@@ -59,12 +72,8 @@ static __attribute__((noinline)) bool trc_triangle_exact(const float a[3], const
     *u = (float)(e1 * inv);
     *v = (float)(e2 * inv);
     const double distance = (e0 * inv * a[2] + e1 * inv * b[2] + e2 * inv * c[2]) * sz;
-    double most[4] = {fmax(fabs(e0), fmax(fabs(e1), fabs(e2)))}; /* edge function, x, y, z */
-    for (int k = 0; k < 3; k++)
-        most[k + 1] = fmax(fabs((double)a[k]), fmax(fabs((double)b[k]), fabs((double)c[k])));
     *t = (float)distance;
-    return distance >
-           trc_t_error_exact(most[1], most[2], most[3], most[0], fabs(inv)) * fabs((double)sz);
+    return fabs(distance) > trc_plane_error(a, b, c, det) * fabs((double)sz);
 }
 
 /* Vertex coordinates of one triangle for the lanes: broadcast (static) or per ray (moving). */
@@ -74,8 +83,8 @@ struct trc_triangle_lanes {
 
 /* Lanes of active whose ray passes through the triangle at distance *t; also barycentrics. */
 TRC_INLINE vmask trc_triangle_test(const struct trc_triangle_lanes *p, vfloat ou, vfloat ov,
-                                   vfloat oz, vfloat su, vfloat sv, vfloat sz, vmask active,
-                                   vfloat *t, vfloat *u, vfloat *v) {
+                                   vfloat oz, vfloat su, vfloat sv, vfloat sz, vfloat tmin,
+                                   vmask active, vfloat *t, vfloat *u, vfloat *v) {
     const vfloat az = p->v[0][2] - oz, bz = p->v[1][2] - oz, cz = p->v[2][2] - oz;
     const vfloat ax = (p->v[0][0] - ou) - su * az, ay = (p->v[0][1] - ov) - sv * az;
     const vfloat bx = (p->v[1][0] - ou) - su * bz, by = (p->v[1][1] - ov) - sv * bz;
@@ -93,14 +102,14 @@ TRC_INLINE vmask trc_triangle_test(const struct trc_triangle_lanes *p, vfloat ou
     *v = e2 * inv;
     *t = (e0 * inv * az + *u * bz + *v * cz) * sz;
     const vfloat nearest = vf_min(vf_abs(e0), vf_min(vf_abs(e1), vf_abs(e2)));
-    const vmask near_edge = vm_and(hit, vf_le(nearest, vf_set(TRC_TINY_EDGE)));
     const vfloat x = vf_max(vf_abs(ax), vf_max(vf_abs(bx), vf_abs(cx)));
     const vfloat y = vf_max(vf_abs(ay), vf_max(vf_abs(by), vf_abs(cy)));
     const vfloat z = vf_max(vf_abs(az), vf_max(vf_abs(bz), vf_abs(cz)));
     const vfloat e = vf_max(vf_abs(e0), vf_max(vf_abs(e1), vf_abs(e2)));
-    hit =
-        vm_or(near_edge, vm_and(hit, vf_gt(*t, trc_t_error(x, y, z, e, vf_abs(inv)) * vf_abs(sz))));
-    uint32_t doubtful = vm_bits(near_edge);
+    const vfloat bound = trc_t_error(x, y, z, e, vf_abs(inv)) * vf_abs(sz);
+    const vmask too_near = vm_and(vf_gt(*t, tmin), vf_le(vf_abs(*t), bound));
+    const vmask near_edge = vf_le(nearest, vf_set(TRC_TINY_EDGE));
+    uint32_t doubtful = vm_bits(vm_and(hit, vm_or(near_edge, too_near)));
     if (__builtin_expect(doubtful != 0, 0)) {
         float lanes[9][TRC_WIDTH], s[TRC_WIDTH], rt[TRC_WIDTH], ru[TRC_WIDTH], rv[TRC_WIDTH];
         uint32_t bits = vm_bits(hit);
@@ -129,8 +138,8 @@ struct trc_triangle8 {
 
 /* Bits of candidates the ray passes through at distance t[lane]; also barycentrics. */
 TRC_INLINE uint32_t trc_triangle8_test(const struct trc_triangle8 *p, float ou, float ov, float oz,
-                                       float su, float sv, float sz, uint32_t candidates, f8 *t,
-                                       f8 *u, f8 *v) {
+                                       float su, float sv, float sz, float tmin,
+                                       uint32_t candidates, f8 *t, f8 *u, f8 *v) {
     const f8 az = p->v[0][2] - oz, bz = p->v[1][2] - oz, cz = p->v[2][2] - oz;
     const f8 ax = (p->v[0][0] - ou) - su * az, ay = (p->v[0][1] - ov) - sv * az;
     const f8 bx = (p->v[1][0] - ou) - su * bz, by = (p->v[1][1] - ov) - sv * bz;
@@ -152,8 +161,9 @@ TRC_INLINE uint32_t trc_triangle8_test(const struct trc_triangle8 *p, float ou, 
     const f8 y = f8_max(f8_abs(ay), f8_max(f8_abs(by), f8_abs(cy)));
     const f8 z = f8_max(f8_abs(az), f8_max(f8_abs(bz), f8_abs(cz)));
     const f8 e = f8_max(f8_abs(e0), f8_max(f8_abs(e1), f8_abs(e2)));
-    uint32_t doubtful = hit & f8_le(nearest, f8_set(TRC_TINY_EDGE));
-    hit &= doubtful | ~f8_le(*t, trc_t_error8(x, y, z, e, f8_abs(inv)) * f8_set(fabsf(sz)));
+    const f8 bound = trc_t_error8(x, y, z, e, f8_abs(inv)) * f8_set(fabsf(sz));
+    const uint32_t too_near = ~f8_le(*t, f8_set(tmin)) & f8_le(f8_abs(*t), bound);
+    uint32_t doubtful = hit & (f8_le(nearest, f8_set(TRC_TINY_EDGE)) | too_near);
     for (; __builtin_expect(doubtful != 0, 0); doubtful &= doubtful - 1) {
         const int i = __builtin_ctz(doubtful);
         const float a[3] = {ax[i], ay[i], az[i]}, b[3] = {bx[i], by[i], bz[i]};
