@@ -369,32 +369,6 @@ static void moving_meshes(void **state) {
     }
 }
 
-static void moving_instances(void **state) {
-    (void)state;
-    struct rng rng = rng_seed(7);
-    for (uint32_t keys = 2; keys <= 5; keys++) {
-        struct query_world world;
-        char name[40];
-        query_world_init(&world);
-        mesh_add_soup(query_world_mesh(&world), &rng, 120, unit_lower, unit_upper, 0.5f);
-        mesh_add_icosphere(query_world_mesh(&world), origin, 1.0f, 1);
-        if (keys == 3)
-            jitter_keys(&world.meshes[0], &rng, 2, 0.3f); /* mesh and instance move */
-        add_instances(&world, &rng, 0, 2);
-        add_instances(&world, &rng, 1, 6);
-        for (uint32_t i = 0; i < world.instance_count; i++) {
-            struct query_instance *instance = &world.instances[i];
-            instance->key_count = keys;
-            for (uint32_t key = 1; key < keys; key++)
-                for (int k = 0; k < 12; k++)
-                    instance->transforms[key][k] =
-                        instance->transforms[key - 1][k] + rng_range(&rng, -0.1f, 0.1f);
-        }
-        (void)snprintf(name, sizeof name, "moving instances, %u keys", keys);
-        check_world(name, &world, false);
-    }
-}
-
 /* Static, moving, joined and instanced objects together, with ties between objects. */
 static void mixed_world(void **state) {
     (void)state;
@@ -424,11 +398,8 @@ static void mixed_world(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(soups),
-        cmocka_unit_test(closed_shapes),
-        cmocka_unit_test(instances),
-        cmocka_unit_test(moving_meshes),
-        cmocka_unit_test(moving_instances),
+        cmocka_unit_test(soups),       cmocka_unit_test(closed_shapes),
+        cmocka_unit_test(instances),   cmocka_unit_test(moving_meshes),
         cmocka_unit_test(mixed_world),
     };
     if (!query_test_isa())

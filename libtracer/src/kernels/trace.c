@@ -200,6 +200,8 @@ struct edge_filter {
     uint32_t candidates;
 };
 #define EDGE_MARGIN 2e-6f
+#define FILTER_LEAST_SLACK 1e-18f
+#define FILTER_MOST_SLACK 1e6f
 
 TRC_INLINE void edge_filter_setup(const struct walk *w, const float *vertices, uint32_t candidates,
                                   struct edge_filter *e) {
@@ -258,7 +260,9 @@ TRC_INLINE bool leaf_packet(struct walk *w, uint32_t ref, uint64_t mask, bool an
     const uint32_t *words = trc_leaf_instances(w->tree, leaf);
     const uint32_t *triangles = words + TRC_NODE_WIDTH;
     const struct trc_shear axis = g->beam.axis;
-    const bool filter = !motion && p->common_origin;
+    /* Products of lengths must neither overflow nor vanish; slack is in proportion to lengths. */
+    const bool filter = !motion && p->common_origin && g->beam.slack > FILTER_LEAST_SLACK &&
+                        g->beam.slack < FILTER_MOST_SLACK;
     struct edge_filter edges;
     bool found = false;
     uint32_t slots = leaf_candidates(w, leaf, count, motion);
