@@ -8,7 +8,7 @@
  * TRACER_TEST_RAYS sets the number of rays of each case. */
 #include "query_test.h"
 
-#define USUAL_RAYS 200000
+#define USUAL_RAYS 48000
 /* Rays of one query. */
 #define BATCH 16384
 

@@ -8,8 +8,9 @@
  *
  * Everything here only culls. Rounding is covered by slack, an absolute widening of boxes:
  * positions on a ray are wrong by less than 6 half-ulps (2^-24) of |o| + |p - o|, lines of the beam
- * by as much again, and the triangle test moves vertices by less than 4 half-ulps of |v - o|. All
- * lengths are below the largest |coordinate| of the origins plus that of the tree (M), twice: 16
+ * by as much again, the triangle test moves vertices by less than 4 half-ulps of |v - o|, and
+ * interpolation between keys moves vertices and boxes by less than 2 each of the larger key. All
+ * lengths are below the largest |coordinate| of the origins plus that of the tree (M), twice: 20
  * half-ulps of 2 M is TRC_SLACK * M. */
 #ifndef TRACER_KERNELS_BEAM_H
 #define TRACER_KERNELS_BEAM_H
@@ -18,7 +19,7 @@
 #include "kernels/packet.h"
 #include "kernels/triangle.h"
 
-#define TRC_SLACK 2e-6f
+#define TRC_SLACK 2.4e-6f
 /* Denormal coordinates: errors are absolute there. */
 #define TRC_LEAST_SLACK 1e-42f
 

@@ -23,8 +23,8 @@ TRC_INLINE vint trc_wide_key(vfloat time, uint32_t key_count, vfloat *fraction) 
     *fraction = x - vi_to_float(key);
     return key;
 }
-/* (1 - f) * a + f * b: see snapshot.h. */
-TRC_INLINE vfloat trc_between(vfloat a, vfloat b, vfloat f) { return (vf_one() - f) * a + f * b; }
+/* a + f * (b - a): see snapshot.h. */
+TRC_INLINE vfloat trc_between(vfloat a, vfloat b, vfloat f) { return a + f * (b - a); }
 TRC_INLINE vvec3 trc_between3(vvec3 a, vvec3 b, vfloat f) {
     return v3(trc_between(a.x, b.x, f), trc_between(a.y, b.y, f), trc_between(a.z, b.z, f));
 }
@@ -110,7 +110,7 @@ static inline void trc_corner_at(const float *values, const uint32_t index[3], u
     for (int k = 0; k < 3; k++)
         for (int axis = 0; axis < 3; axis++) {
             const size_t i = 3 * (size_t)index[k] + (size_t)axis;
-            out[3 * k + axis] = (1.0f - f) * a[i] + f * b[i];
+            out[3 * k + axis] = a[i] + f * (b[i] - a[i]);
         }
 }
 static inline void trc_affine_at(const struct trc_instance *instance, float time, float out[12]) {
@@ -124,7 +124,7 @@ static inline void trc_affine_at(const struct trc_instance *instance, float time
     }
     const float *b = instance->object_to_world[key + 1].m;
     for (int i = 0; i < 12; i++)
-        out[i] = (1.0f - f) * a[i] + f * b[i];
+        out[i] = a[i] + f * (b[i] - a[i]);
 }
 /* Turns TRC_WIDTH rows of width floats into registers. */
 TRC_INLINE vfloat trc_column_of(const float *rows, int width, int column) {

@@ -50,11 +50,11 @@ TRC_INLINE void boxes_load(const struct walk *w, uint32_t node, bool motion, f8 
         return;
     const float *e = b + TRC_NODE_KEY_BYTES / sizeof(float);
     const f8 f0 = f8_set(w->group->f_min), f1 = f8_set(w->group->f_max);
-    const f8 g0 = f8_set(1.0f) - f0, g1 = f8_set(1.0f) - f1;
     for (int axis = 0; axis < 3; axis++) {
-        const f8 l = f8_load(e + 16 * axis), h = f8_load(e + 16 * axis + 8);
-        lower[axis] = f8_min(g0 * lower[axis] + f0 * l, g1 * lower[axis] + f1 * l);
-        upper[axis] = f8_max(g0 * upper[axis] + f0 * h, g1 * upper[axis] + f1 * h);
+        const f8 l = f8_load(e + 16 * axis) - lower[axis];
+        const f8 h = f8_load(e + 16 * axis + 8) - upper[axis];
+        lower[axis] = f8_min(lower[axis] + f0 * l, lower[axis] + f1 * l);
+        upper[axis] = f8_max(upper[axis] + f0 * h, upper[axis] + f1 * h);
     }
 }
 
@@ -72,9 +72,8 @@ TRC_INLINE uint64_t box_rays(const struct walk *w, uint32_t box, uint64_t mask, 
         for (int axis = 0; axis < 3; axis++) {
             float low = b[16 * axis], high = b[16 * axis + 8];
             if (motion) {
-                const float f = g->f[i], k = 1.0f - f;
-                low = k * low + f * e[16 * axis];
-                high = k * high + f * e[16 * axis + 8];
+                low += g->f[i] * (e[16 * axis] - low);
+                high += g->f[i] * (e[16 * axis + 8] - high);
             }
             const float o = p->o[axis][i], inv = g->inv[axis][i];
             const float t0 = (low - slack - o) * inv, t1 = (high + slack - o) * inv;
@@ -92,12 +91,12 @@ TRC_INLINE uint64_t box_rays(const struct walk *w, uint32_t box, uint64_t mask, 
             continue;
         const int i = c * TRC_WIDTH;
         vfloat near = vf_load(&p->tmin[i]), far = vf_load(&p->t[i]);
-        const vfloat f = motion ? vf_load(&g->f[i]) : vf_set(0.0f), k = vf_set(1.0f) - f;
+        const vfloat f = motion ? vf_load(&g->f[i]) : vf_set(0.0f);
         for (int axis = 0; axis < 3; axis++) {
             vfloat low = vf_set(b[16 * axis]), high = vf_set(b[16 * axis + 8]);
             if (motion) {
-                low = k * low + f * vf_set(e[16 * axis]);
-                high = k * high + f * vf_set(e[16 * axis + 8]);
+                low = low + f * (vf_set(e[16 * axis]) - low);
+                high = high + f * (vf_set(e[16 * axis + 8]) - high);
             }
             const vfloat o = vf_load(&p->o[axis][i]), inv = vf_load(&g->inv[axis][i]);
             const vfloat t0 = (low - vf_set(slack) - o) * inv,
@@ -120,14 +119,13 @@ TRC_INLINE uint32_t leaf_candidates(const struct walk *w, uint32_t leaf, uint32_
     const float *e = v + (motion ? TRC_LEAF_KEY_BYTES / sizeof(float) : 0);
     const f8 f0 = f8_set(motion ? w->group->f_min : 0.0f),
              f1 = f8_set(motion ? w->group->f_max : 0.0f);
-    const f8 g0 = f8_set(1.0f) - f0, g1 = f8_set(1.0f) - f1;
     for (int axis = 0; axis < 3; axis++) {
         f8 low = f8_set(INFINITY), high = f8_set(-INFINITY);
         for (int corner = 0; corner < 3; corner++) {
             const f8 a = f8_load(v + 24 * corner + 8 * axis);
             if (motion) {
-                const f8 b = f8_load(e + 24 * corner + 8 * axis);
-                const f8 x = g0 * a + f0 * b, y = g1 * a + f1 * b;
+                const f8 way = f8_load(e + 24 * corner + 8 * axis) - a;
+                const f8 x = a + f0 * way, y = a + f1 * way;
                 low = f8_min(low, f8_min(x, y));
                 high = f8_max(high, f8_max(x, y));
             } else {
@@ -146,11 +144,12 @@ TRC_INLINE void lanes_load(const struct walk *w, const float *v, bool motion, in
                            struct trc_triangle_lanes *tri) {
     const int order[3] = {w->group->beam.axis.u, w->group->beam.axis.v, w->group->beam.axis.z};
     const float *e = v + (motion ? TRC_LEAF_KEY_BYTES / sizeof(float) : 0);
-    const vfloat f = motion ? vf_load(&w->group->f[i]) : vf_set(0.0f), k = vf_set(1.0f) - f;
+    const vfloat f = motion ? vf_load(&w->group->f[i]) : vf_set(0.0f);
     for (int corner = 0; corner < 3; corner++)
         for (int axis = 0; axis < 3; axis++) {
             const int at = 24 * corner + 8 * order[axis];
-            tri->v[corner][axis] = motion ? k * vf_set(v[at]) + f * vf_set(e[at]) : vf_set(v[at]);
+            const vfloat a = vf_set(v[at]);
+            tri->v[corner][axis] = motion ? a + f * (vf_set(e[at]) - a) : a;
         }
 }
 
@@ -351,8 +350,8 @@ TRC_INLINE bool leaf_single(struct walk *w, uint32_t ref, int ray, bool any, boo
             const int at = 24 * corner + 8 * order[a];
             tri.v[corner][a] = f8_load(v + at);
             if (motion) {
-                const f8 f = f8_set(g->f[ray]);
-                tri.v[corner][a] = (f8_set(1.0f) - f) * tri.v[corner][a] + f * f8_load(e + at);
+                const f8 way = f8_load(e + at) - tri.v[corner][a];
+                tri.v[corner][a] = tri.v[corner][a] + f8_set(g->f[ray]) * way;
             }
         }
     f8 t, bu, bv;
@@ -396,7 +395,7 @@ struct single_entry {
 struct single_ray {
     f8 inv[3], near_origin[3], far_origin[3];
     int first[3], last[3]; /* floats from the node's bounds to the planes of the axis */
-    f8 tmin, f, k;         /* moving trees: place between the keys, and 1 - f */
+    f8 tmin, f;            /* f: moving trees: place between the keys */
 };
 
 TRC_INLINE void single_setup(const struct walk *w, int ray, bool motion, struct single_ray *r) {
@@ -414,7 +413,6 @@ TRC_INLINE void single_setup(const struct walk *w, int ray, bool motion, struct 
     }
     r->tmin = f8_set(p->tmin[ray]);
     r->f = f8_set(motion ? g->f[ray] : 0.0f);
-    r->k = f8_set(1.0f) - r->f;
 }
 
 /* Bits of the children the ray meets before t, and its entry distances. */
@@ -426,8 +424,8 @@ TRC_INLINE uint32_t node_single(const struct walk *w, uint32_t node, const struc
     for (int axis = 0; axis < 3; axis++) {
         f8 first = f8_load(b + r->first[axis]), last = f8_load(b + r->last[axis]);
         if (motion) {
-            first = r->k * first + r->f * f8_load(e + r->first[axis]);
-            last = r->k * last + r->f * f8_load(e + r->last[axis]);
+            first = first + r->f * (f8_load(e + r->first[axis]) - first);
+            last = last + r->f * (f8_load(e + r->last[axis]) - last);
         }
         near = f8_max(near, (first - r->near_origin[axis]) * r->inv[axis]);
         far = f8_min(far, (last - r->far_origin[axis]) * r->inv[axis]);
@@ -569,6 +567,7 @@ static void walk_closest_moving(struct walk *w, uint64_t mask) {
 static void walk_segments(struct walk *w, uint64_t mask, bool any) {
     const struct trc_packet *p = w->packet;
     struct trc_group *g = w->group;
+    const float z1 = g->beam.z1; /* each segment's walk shortens the beam for its own rays */
     uint8_t keys[TRC_PACKET_SIZE];
     for (uint64_t m = mask; m; m &= m - 1) {
         const int i = __builtin_ctzll(m);
@@ -581,6 +580,7 @@ static void walk_segments(struct walk *w, uint64_t mask, bool any) {
         uint64_t same = 0;
         g->f_min = 1.0f;
         g->f_max = 0.0f;
+        g->beam.z1 = z1;
         for (uint64_t m = mask; m; m &= m - 1) {
             const int i = __builtin_ctzll(m);
             if (keys[i] != key)
@@ -644,13 +644,14 @@ TRC_INLINE void instance_inverse(const struct trc_instance *instance, vfloat tim
     }
     const float last = (float)(instance->key_count - 1);
     const vfloat x = vf_clamp(time, 0.0f, 1.0f) * vf_set(last);
-    const vfloat key = vf_min(vf_floor(x), vf_set(last - 1.0f)), f = x - key, g = vf_set(1.0f) - f;
+    const vfloat key = vf_min(vf_floor(x), vf_set(last - 1.0f)), f = x - key;
     const vint at = vf_to_int(key) * vi_set(12);
     vfloat m[12];
     const float *base = instance->object_to_world->m;
-    for (int k = 0; k < 12; k++)
-        m[k] = g * vf_gather(base + k, at, vm_all_set()) +
-               f * vf_gather(base + 12 + k, at, vm_all_set());
+    for (int k = 0; k < 12; k++) {
+        const vfloat a = vf_gather(base + k, at, vm_all_set());
+        m[k] = a + f * (vf_gather(base + 12 + k, at, vm_all_set()) - a);
+    }
     const vvec3 r0 = v3(m[0], m[1], m[2]), r1 = v3(m[4], m[5], m[6]), r2 = v3(m[8], m[9], m[10]);
     const vvec3 c0 = v3_cross(r1, r2), c1 = v3_cross(r2, r0), c2 = v3_cross(r0, r1);
     const vfloat inv_det = vf_set(1.0f) / v3_dot(r0, c0);

@@ -43,16 +43,17 @@ struct trc_shear {
 
 /* How far rounding of the sheared vertices can move the triangle's plane where the ray meets it:
  * each vertex by 8 half-ulps of its lengths, sideways ones times the slope of the plane; inside the
- * triangle that is a mean of the vertices' errors, however thin it is. */
-static double trc_plane_error(const float a[3], const float b[3], const float c[3], double det) {
+ * triangle that is the mean of the vertices' errors by the barycentrics w, however thin it is. */
+static double trc_plane_error(const float a[3], const float b[3], const float c[3],
+                              const double w[3], double det) {
     const double p[3] = {(double)b[0] - a[0], (double)b[1] - a[1], (double)b[2] - a[2]};
     const double q[3] = {(double)c[0] - a[0], (double)c[1] - a[1], (double)c[2] - a[2]};
     const double slope =
         (fabs(p[1] * q[2] - p[2] * q[1]) + fabs(p[2] * q[0] - p[0] * q[2])) / fabs(det);
-    double most[3];
+    double mean[3]; /* of the lengths */
     for (int k = 0; k < 3; k++)
-        most[k] = fmax(fabs((double)a[k]), fmax(fabs((double)b[k]), fabs((double)c[k])));
-    return (double)TRC_GAMMA(8) * (most[2] + slope * (fmax(most[0], most[1]) + most[2]));
+        mean[k] = w[0] * fabs((double)a[k]) + w[1] * fabs((double)b[k]) + w[2] * fabs((double)c[k]);
+    return (double)TRC_GAMMA(8) * (mean[2] + slope * (fmax(mean[0], mean[1]) + mean[2]));
 }
 
 /* One ray against one triangle whose sheared coordinates are given (a: vertex 0: x, y, z relative
@@ -69,11 +70,12 @@ static __attribute__((noinline)) bool trc_triangle_exact(const float a[3], const
     if (!inside || det == 0.0)
         return false;
     const double inv = 1.0 / det;
-    *u = (float)(e1 * inv);
-    *v = (float)(e2 * inv);
-    const double distance = (e0 * inv * a[2] + e1 * inv * b[2] + e2 * inv * c[2]) * sz;
+    const double w[3] = {e0 * inv, e1 * inv, e2 * inv};
+    *u = (float)w[1];
+    *v = (float)w[2];
+    const double distance = (w[0] * a[2] + w[1] * b[2] + w[2] * c[2]) * sz;
     *t = (float)distance;
-    return fabs(distance) > trc_plane_error(a, b, c, det) * fabs((double)sz);
+    return fabs(distance) > trc_plane_error(a, b, c, w, det) * fabs((double)sz);
 }
 
 /* Vertex coordinates of one triangle for the lanes: broadcast (static) or per ray (moving). */
