@@ -231,6 +231,65 @@ static void lowest_number_wins(void **state) {
 
 /* ---- triangles that do not count ---- */
 
+static void add_corners(struct mesh *mesh, const float p[9]) {
+    const uint32_t first = mesh->vertex_count;
+    for (int k = 0; k < 3; k++)
+        mesh_add_vertex(mesh, p[3 * k], p[3 * k + 1], p[3 * k + 2]);
+    mesh_add_triangle(mesh, first, first + 1, first + 2);
+}
+
+/* Duplicate vertices, no extent, vertices on a line: never hit, wherever rays aim. */
+static void degenerate_triangles_are_never_hit(void **state) {
+    (void)state;
+    struct trial t;
+    struct rng rng = rng_seed(11);
+    trial_init(&t);
+    struct mesh *mesh = query_world_object(&t.world);
+    static const float corners[][9] = {
+        {1, 2, 3, 1, 2, 3, 1, 2, 3},          {0, 0, 0, 1, 1, 1, 1, 1, 1},
+        {0, 0, 0, 0, 0, 0, 1, -1, 2},         {1, 0, 0, 0, 1, 0, 1, 0, 0},
+        {0, 0, 0, 1, 1, 1, 2, 2, 2},          {-1, -1, -1, 0, 0, 0, 3, 3, 3},
+        {0, 0, 1, 0, 0, 3, 0, 0, -4},         {1, 2, 3, 3, 6, 9, 2, 4, 6},
+        {0.1f, 0, 0, 0.2f, 0, 0, 0.7f, 0, 0}, {-3, 5, 0, 3, -5, 0, 0, 0, 0}};
+    for (size_t i = 0; i < sizeof corners / sizeof *corners; i++)
+        add_corners(mesh, corners[i]);
+    for (uint32_t i = 0; i < 300; i++) { /* whole numbers on a line */
+        float p[9];
+        for (int axis = 0; axis < 3; axis++) {
+            const float from = (float)rng_below(&rng, 201) - 100.0f;
+            const float step = (float)rng_below(&rng, 201) - 100.0f;
+            p[axis] = from;
+            p[3 + axis] = from + step;
+            p[6 + axis] = from + 3.0f * step;
+        }
+        add_corners(mesh, p);
+    }
+    for (uint32_t i = 0; i < 30000; i++) {
+        const float *p = mesh->positions + 9 * (size_t)rng_below(&rng, mesh->triangle_count);
+        const float share = i % 3 ? rng_unit(&rng) : (float)rng_below(&rng, 3) / 2.0f;
+        float target[3], o[3];
+        for (int axis = 0; axis < 3; axis++) {
+            target[axis] = p[axis] + share * (p[6 + axis] - p[axis]);
+            o[axis] = i & 1 ? rng_range(&rng, -50.0f, 50.0f) : (float)rng_below(&rng, 9) - 4.0f;
+        }
+        ray_set_aim(&t.rays, o, target, 0.0f);
+    }
+    for (int is_final = 0; is_final < 2; is_final++) {
+        uint32_t wrong = 0;
+        run(&t, is_final);
+        for (uint32_t i = 0; i < t.rays.count; i++) {
+            if (t.hits.instance[i] == TRC_NO_HIT && !t.hits.occluded[i])
+                continue;
+            if (!wrong++)
+                hit_set_print(&t.hits, &t.rays, i);
+        }
+        if (wrong)
+            print_message("%u of %u rays hit a degenerate triangle\n", wrong, t.rays.count);
+        assert_int_equal(wrong, 0);
+    }
+    trial_free(&t);
+}
+
 /* Not finite or beyond 1.8e18: skipped and counted; what shares the mesh is hit as before. */
 static void invalid_triangles_are_skipped(void **state) {
     (void)state;
@@ -661,11 +720,47 @@ static void extreme_instances(void **state) {
     }
 }
 
+/* The caller's floating-point state neither changes nor matters. */
+static void host_state_is_kept(void **state) {
+    (void)state;
+#if defined(__SSE__)
+    struct trial t;
+    struct rng rng = rng_seed(12);
+    trial_init(&t);
+    mesh_add_icosphere(query_world_object(&t.world), origin, 1e-39f, 1);
+    for (int i = 0; i < 640; i++) {
+        float d[3];
+        rng_direction(&rng, d);
+        for (int axis = 0; axis < 3; axis++)
+            d[axis] *= 1e-3f;
+        ray_set_add_simple(&t.rays, origin, d);
+    }
+    struct query_scene scene = query_test_scene(&t.world, false);
+    query(&t, scene.scene);
+    struct hit_set flushed;
+    hit_set_init(&flushed, t.rays.count);
+    const uint32_t before = _mm_getcsr();
+    const uint32_t unusual = (before | 0x8040u | 0x6000u) & ~0x3fu; /* FTZ, DAZ, round to zero */
+    _mm_setcsr(unusual);
+    const trc_status status = hit_set_query(&flushed, scene.scene, &t.rays, 64);
+    const uint32_t after = _mm_getcsr();
+    _mm_setcsr(before);
+    assert_ok(status);
+    assert_int_equal(after & ~0x3fu, unusual);
+    assert_int_equal(after & 0x3fu, 0);
+    assert_int_equal(hit_set_difference(&t.hits, &flushed), UINT32_MAX);
+    hit_set_free(&flushed);
+    query_scene_destroy(&scene);
+    trial_free(&t);
+#endif
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(intervals_are_half_open),
         cmocka_unit_test(directions_need_not_be_unit),
         cmocka_unit_test(lowest_number_wins),
+        cmocka_unit_test(degenerate_triangles_are_never_hit),
         cmocka_unit_test(invalid_triangles_are_skipped),
         cmocka_unit_test(empty_scenes_are_never_hit),
         cmocka_unit_test(bad_rays_disturb_nobody),
@@ -678,6 +773,7 @@ int main(void) {
         cmocka_unit_test(many_scales_in_one_scene),
         cmocka_unit_test(far_origins_give_numbers),
         cmocka_unit_test(extreme_instances),
+        cmocka_unit_test(host_state_is_kept),
     };
     if (!query_test_isa())
         return QUERY_TEST_SKIPPED;

@@ -3,8 +3,8 @@
  * What traversal relies on: references in range, every node and leaf reached once and nodes after
  * their parents (so there is no cycle), no path longer than the stack allows, boxes that hold what
  * is below them at every key, leaves that hold their triangles' vertices as the mesh and the
- * transform give them. Containment between keys follows: boxes and vertices are interpolated by the
- * same formula, and rounding is monotonic. */
+ * transform give them. Containment between keys follows up to rounding, as boxes and vertices are
+ * interpolated by the same formula; kernels/beam.h allows for the rounding. */
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -100,9 +100,11 @@ static bool check_vertices(struct tree_check *t, uint32_t leaf, uint32_t slot,
                            const struct trc_part *part, uint32_t triangle) {
     for (uint32_t key = 0; key < t->tree->key_count; key++) {
         const float *v = trc_leaf_vertices(t->tree, leaf, key);
+        float triangle_corners[3][3];
+        trc_part_triangle(part, triangle, key, triangle_corners);
         for (uint32_t corner = 0; corner < 3; corner++) {
-            float expected[3], actual[3];
-            trc_part_vertex(part, triangle, corner, key, expected);
+            const float *expected = triangle_corners[corner];
+            float actual[3];
             for (uint32_t axis = 0; axis < 3; axis++)
                 actual[axis] = v[(3 * corner + axis) * TRC_NODE_WIDTH + slot];
             if (memcmp(expected, actual, sizeof actual) != 0)

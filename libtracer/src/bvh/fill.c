@@ -25,6 +25,29 @@ void trc_part_vertex(const struct trc_part *part, uint32_t triangle, uint32_t v,
         out[i] = m[4 * i] * p[0] + m[4 * i + 1] * p[1] + m[4 * i + 2] * p[2] + m[4 * i + 3];
 }
 
+/* Whether a triangle's corners, by double arithmetic, lie on a line. */
+static bool is_on_a_line(const float *a, const float *b, const float *c) {
+    double p[3], q[3];
+    for (int i = 0; i < 3; i++) {
+        p[i] = (double)b[i] - a[i];
+        q[i] = (double)c[i] - a[i];
+    }
+    return p[1] * q[2] == p[2] * q[1] && p[2] * q[0] == p[0] * q[2] && p[0] * q[1] == p[1] * q[0];
+}
+
+void trc_part_triangle(const struct trc_part *part, uint32_t triangle, uint32_t key,
+                       float out[3][3]) {
+    const struct trc_mesh *mesh = part->mesh;
+    const uint32_t *index = mesh->indices + 3 * (size_t)triangle;
+    const float *p = mesh->positions;
+    for (uint32_t v = 0; v < 3; v++)
+        trc_part_vertex(part, triangle, v, key, out[v]);
+    if (mesh->key_count == 1 &&
+        is_on_a_line(p + 3 * (size_t)index[0], p + 3 * (size_t)index[1], p + 3 * (size_t)index[2]))
+        for (int v = 1; v < 3; v++)
+            memcpy(out[v], out[0], sizeof out[0]);
+}
+
 static trc_status tree_alloc(struct trc_tree *tree, uint32_t node_count, uint32_t leaf_count,
                              uint32_t key_count, bool is_top) {
     *tree = (struct trc_tree){.key_count = key_count,
@@ -65,12 +88,11 @@ static void leaf_vertices(struct trc_tree *tree, uint32_t leaf,
         float *v = (float *)trc_leaf_vertices(tree, leaf, key);
         for (uint32_t slot = 0; slot < TRC_NODE_WIDTH; slot++) {
             const uint32_t from = slot < used ? slot : used - 1;
-            for (uint32_t corner = 0; corner < 3; corner++) {
-                float p[3];
-                trc_part_vertex(part_of[from], triangles[from], corner, key, p);
-                for (int axis = 0; axis < 3; axis++)
-                    v[(3 * corner + (uint32_t)axis) * TRC_NODE_WIDTH + slot] = p[axis];
-            }
+            float p[3][3];
+            trc_part_triangle(part_of[from], triangles[from], key, p);
+            for (uint32_t corner = 0; corner < 3; corner++)
+                for (uint32_t axis = 0; axis < 3; axis++)
+                    v[(3 * corner + axis) * TRC_NODE_WIDTH + slot] = p[corner][axis];
         }
     }
 }

@@ -145,6 +145,11 @@ void trc_topology_destroy(struct trc_topology *topology);
 void trc_part_vertex(const struct trc_part *part, uint32_t triangle, uint32_t v, uint32_t key,
                      float out[3]);
 
+/* All three, as a leaf holds them: corners on a line (of meshes at rest) become one point, which no
+ * ray hits, where rounding would give them an area. */
+void trc_part_triangle(const struct trc_part *part, uint32_t triangle, uint32_t key,
+                       float out[3][3]);
+
 /* Takes memory for a tree of that shape and copies leaves and vertices; then trc_tree_bound. */
 trc_status trc_tree_fill(const struct trc_topology *topology, const struct trc_ref *refs,
                          const struct trc_part *parts, uint32_t key_count, struct trc_pool *pool,

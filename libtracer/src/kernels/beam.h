@@ -22,6 +22,8 @@
 #define TRC_SLACK 2.4e-6f
 /* Denormal coordinates: errors are absolute there. */
 #define TRC_LEAST_SLACK 1e-42f
+/* Between planes nearer than this, slopes per z would overflow. */
+#define TRC_SHORT_BEAM 1e-37f
 
 struct trc_beam {
     struct trc_shear axis;
@@ -130,7 +132,14 @@ TRC_INLINE bool trc_group_setup(struct trc_group *g, const struct trc_packet *p,
         g->sv_max = vf_lanes_max(shear[3]);
     }
     const float length = b->z1 - b->z0;
-    const float per_z = length > 0.0f ? 1.0f / length : 0.0f;
+    const bool is_short = length < TRC_SHORT_BEAM;
+    const float per_z = is_short ? 0.0f : 1.0f / length;
+    if (is_short) { /* one range over both planes */
+        u_low[0] = vf_min(u_low[0], u_low[1]);
+        u_high[0] = vf_max(u_high[0], u_high[1]);
+        v_low[0] = vf_min(v_low[0], v_low[1]);
+        v_high[0] = vf_max(v_high[0], v_high[1]);
+    }
     b->u_min = vf_lanes_min(u_low[0]) - b->slack;
     b->u_max = vf_lanes_max(u_high[0]) + b->slack;
     b->v_min = vf_lanes_min(v_low[0]) - b->slack;
