@@ -101,7 +101,8 @@ static float between(const float *keys, uint32_t key_count, size_t stride, size_
     trc_key_at(time, key_count, &key, &f);
     if (key_count < 2)
         return keys[at];
-    return (1.0f - f) * keys[stride * key + at] + f * keys[stride * (key + 1) + at];
+    const float a = keys[stride * key + at];
+    return a + f * (keys[stride * (key + 1) + at] - a);
 }
 static struct truth exact(int instance_number, int triangle, float u, float v, float time) {
     const struct trc_instance *instance = &scene.instance[instance_number];
