@@ -65,9 +65,9 @@ struct trc_lobes {
     vfloat holdout;         /* weight of holdout leaves */
     vfloat mix_weight;      /* sum over the lobes */
     vfloat continue_weight; /* sum of sample_weight */
-    /* Lanes where light from below the geometric surface may reach reflecting lobes, as Cycles
-     * allows for every smooth surface; trc_lobes_setup sets none: nothing shines through. Set by a
-     * caller that moves shadow rays off the flat triangle (Cycles' shadow terminator offset). */
+    /* Lanes where light from below the geometric surface may reach reflecting lobes;
+     * trc_lobes_setup sets none: nothing shines through. Direct light sets it for smooth surfaces,
+     * as its shadow rays start off the flat triangle. */
     vmask below_horizon;
 };
 

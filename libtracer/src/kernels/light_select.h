@@ -219,6 +219,28 @@ static inline vfloat trc_tree_chance(const struct trc_light_table *t, const stru
 
 /* ---- both ---- */
 
+/* Chances of few candidates are whole sixteenths: numbers that are stratified in blocks of 16 then
+ * give each light the same share of any block's samples, where a remainder would make a sample more
+ * or less by chance (box of the tests, 64 samples: 4 to 13 times the squared error). */
+#define TRC_SHARED_CANDIDATES 8
+#define TRC_SHARES 16.0f
+static inline void trc_shares_round(vfloat *weight, uint32_t count, vfloat *sum) {
+    vfloat positive = vf_zero();
+    for (uint32_t i = 0; i < count; i++)
+        positive = positive + vf_where(vf_gt(weight[i], vf_zero()), vf_one());
+    /* One each, the rest by weight. */
+    const vfloat scale = (vf_set(TRC_SHARES) - positive) / *sum;
+    vfloat cumulative = vf_zero(), before = vf_zero();
+    for (uint32_t i = 0; i < count; i++) {
+        const vmask shines = vf_gt(weight[i], vf_zero());
+        cumulative = cumulative + weight[i];
+        const vfloat upto = vf_floor(cumulative * scale + vf_set(0.5f));
+        weight[i] = vf_where(shines, upto - before + vf_one());
+        before = vf_select(shines, upto, before);
+    }
+    *sum = vf_where(vf_gt(*sum, vf_zero()), before + positive);
+}
+
 static inline void trc_candidates_weigh(const struct trc_light_table *t,
                                         struct trc_light_choices *c) {
     const struct trc_receiver r = trc_receiver_make(c->p, c->n);
@@ -230,6 +252,8 @@ static inline void trc_candidates_weigh(const struct trc_light_table *t,
             c->kept[i] = w;
         c->sum = c->sum + w;
     }
+    if (count <= TRC_SHARED_CANDIDATES)
+        trc_shares_round(c->kept, count, &c->sum);
 }
 
 /* A light for every lane of m, -1 where none reaches the point; its chance. */
@@ -277,11 +301,24 @@ static inline vfloat trc_light_chance(const struct trc_light_table *t, const str
         return vf_one();
     const uint32_t count = trc_candidate_count(t);
     const uint32_t placed = t->is_tree ? 1u : t->bound_count;
+    const bool shared = count <= TRC_SHARED_CANDIDATES;
+    vfloat weight[TRC_SHARED_CANDIDATES];
     vfloat sum = vf_zero(), own = vf_zero();
     vmask placed_lanes = m;
+    for (uint32_t i = 0; shared && i < count; i++) {
+        weight[i] = trc_candidate_importance(t, i, r);
+        sum = sum + weight[i];
+    }
+    if (shared)
+        trc_shares_round(weight, count, &sum);
     for (uint32_t i = 0; i < count; i++) {
-        const vfloat w = trc_candidate_importance(t, i, r);
-        sum = sum + w;
+        vfloat w;
+        if (shared) {
+            w = weight[i];
+        } else {
+            w = trc_candidate_importance(t, i, r);
+            sum = sum + w;
+        }
         if (t->is_tree && i == 0) {
             own = w;
             continue;

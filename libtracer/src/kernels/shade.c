@@ -241,12 +241,32 @@ TRC_INLINE vfloat away(vfloat x, vfloat offset) {
     return vf_select(vm_or(vf_eq(offset, vf_set(0.0f)), vf_eq(moved, vf_set(0.0f))), moved,
                      vi_as_float(next));
 }
-TRC_INLINE vvec3 spawn_origin(const struct trc_surface *s, vvec3 w) {
+TRC_INLINE vvec3 spawn_origin(const struct trc_surface *s, vmask outside) {
     const vfloat reach = vf_abs(s->ng.x) * s->p_error.x + vf_abs(s->ng.y) * s->p_error.y +
                          vf_abs(s->ng.z) * s->p_error.z;
-    const vfloat side = vf_copysign(reach, v3_dot(w, s->ng));
-    const vvec3 offset = v3_scale(s->ng, side);
+    const vvec3 offset = v3_scale(s->ng, vf_select(outside, reach, -reach));
     return v3(away(s->p.x, offset.x), away(s->p.y, offset.y), away(s->p.z, offset.z));
+}
+TRC_INLINE vmask goes_out(const struct trc_surface *s, vvec3 w) {
+    return vf_ge(v3_dot(w, s->ng), vf_set(0.0f));
+}
+
+/* Origin of a shadow ray: where light grazes a smooth surface it starts from the curved surface
+ * that the normals describe, or the flat triangles would cast shadows with edges of their own.
+ * Shape and limit of the transition as in Cycles, with its default of the geometry offset. */
+#define TERMINATOR_COSINE 0.1f
+TRC_INLINE vvec3 shadow_origin(const struct trc_surface *s, vvec3 w) {
+    const vfloat zero = vf_set(0.0f), one = vf_set(1.0f);
+    const vfloat cos_n = v3_dot(w, s->n), cos_g = v3_dot(w, s->ng);
+    const vmask outside = vf_ge(cos_n, zero);
+    const vvec3 o = spawn_origin(s, outside);
+    if (!vm_any(s->smooth))
+        return o;
+    const vfloat scale = vf_set(1.0f / TERMINATOR_COSINE);
+    const vfloat near = vf_select(vf_lt(cos_n, vf_set(TERMINATOR_COSINE)),
+                                  vf_set(2.0f) - (cos_g + cos_n) * scale, one - cos_g * scale);
+    const vfloat amount = vf_min(vf_max(near, zero), one);
+    return v3_add(o, v3_scale(s->bulge, vf_select(outside, amount, zero)));
 }
 
 struct light_result {
@@ -293,7 +313,7 @@ static vmask light_contribute(const struct trc_tile *t, const struct arrival *a,
 static void shadow_push(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
                         const struct trc_light_sample *l, const struct light_result *r, vuint cell,
                         vmask active) {
-    const vvec3 o = spawn_origin(s, l->wi);
+    const vvec3 o = shadow_origin(s, l->wi);
     const vmask far = vf_ge(l->distance, vf_set(TRC_FAR));
     const vvec3 target = v3_add(v3_scale(l->wi, vf_select(far, vf_set(1.0f), l->distance)),
                                 v3_select(far, v3_zero(), v3_sub(s->p, o)));
@@ -369,7 +389,7 @@ static void ray_push(struct trc_tile *t, const struct arrival *a, const struct t
     const trc_render_desc *desc = t->desc;
     const vmask straight = b->transparent;
     const vvec3 w = v3_select(straight, a->d, b->wi);
-    const vvec3 o = v3_select(straight, a->o, spawn_origin(s, b->wi));
+    const vvec3 o = v3_select(straight, a->o, spawn_origin(s, goes_out(s, b->wi)));
     const vvec3 n = v3_select(straight, a->n_from, a->receive_n);
     const vvec3 weight = v3_mul(v3_select(straight, a->found_weight, a->weight), b->weight);
     const vfloat beyond = vf_select(straight, a->beyond, b->beyond);
@@ -574,8 +594,11 @@ static void shade_group(struct trc_tile *t, uint32_t material, vint index, vmask
     if (!vm_any(on))
         return;
     if (m->has &
-        (TRC_MATERIAL_HAS_DIFFUSE | TRC_MATERIAL_HAS_TRANSLUCENT | TRC_MATERIAL_HAS_GLOSSY))
+        (TRC_MATERIAL_HAS_DIFFUSE | TRC_MATERIAL_HAS_TRANSLUCENT | TRC_MATERIAL_HAS_GLOSSY)) {
+        lobes.below_horizon = s.smooth;
         direct_light(t, &a, &s, &lobes, on);
+        lobes.below_horizon = vm_none();
+    }
     if (t->desc->integrator == TRC_INTEGRATOR_RAYCAST) {
         if (m->has & TRC_MATERIAL_HAS_TRANSPARENCY)
             continue_straight(t, &a, &s, &lobes, material, on);

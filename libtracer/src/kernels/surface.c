@@ -154,6 +154,20 @@ static vvec3 transform_normal(const struct trc_wide_affine *m, vvec3 n) {
                   v3_mad(v3_cross(c[2], c[0]), n.y, v3_scale(v3_cross(c[0], c[1]), n.z)));
 }
 
+/* The curved surface above the triangle: along each edge a parabola whose height, weights wa and wb
+ * of its ends, is wa wb (na - nb) . (pa - pb), the sum of the three along the interpolated normal.
+ * Twice the height of the arc that has the normals at its ends, so that it clears its neighbours
+ * (J. Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems II, 2021, has tangent planes in
+ * place of parabolas). Object space. */
+static vvec3 bulge_of(const struct trc_surface *s, const struct raw_hit *h, vvec3 e1, vvec3 e2,
+                      vvec3 n) {
+    const vvec3 *c = h->n.corner;
+    const vfloat w = vf_one() - s->u - s->v;
+    const vfloat k01 = v3_dot(v3_sub(c[1], c[0]), e1), k02 = v3_dot(v3_sub(c[2], c[0]), e2),
+                 k12 = v3_dot(v3_sub(c[2], c[1]), v3_sub(e2, e1));
+    return v3_scale(n, w * (s->u * k01 + s->v * k02) + s->u * s->v * k12);
+}
+
 static void set_normals(struct trc_surface *s, const struct raw_hit *h, vvec3 e1, vvec3 e2) {
     /* The winding as the object has it: a mirroring matrix turns the world cross product over. */
     const vvec3 w1 = scaled_to_one(trc_transform_vector(&h->m, e1));
@@ -166,16 +180,21 @@ static void set_normals(struct trc_surface *s, const struct raw_hit *h, vvec3 e1
         ng = v3_select(flat, s->wo, ng);
     ng = v3_scale(ng, sign);
     vvec3 n = ng;
+    s->smooth = vm_none();
+    s->bulge = v3_zero();
+    s->backfacing = vf_lt(v3_dot(ng, s->wo), vf_zero());
+    const vfloat side = vf_select(s->backfacing, vf_set(-1.0f), vf_one());
     if (vm_any(h->smooth)) {
         const vfloat w = vf_one() - s->u - s->v;
         vvec3 sum =
             v3_mad(h->n.corner[0], w, v3_mad(h->n.corner[1], s->u, v3_scale(h->n.corner[2], s->v)));
+        const vvec3 bulge = trc_transform_vector(&h->m, bulge_of(s, h, e1, e2, sum));
         sum = v3_normalize(v3_scale(transform_normal(&h->m, sum), sign));
-        const vmask usable = vm_and(h->smooth, vf_gt(v3_dot(sum, sum), vf_set(0.5f)));
-        n = v3_select(usable, sum, ng);
+        s->smooth = vm_and(h->smooth, vf_gt(v3_dot(sum, sum), vf_set(0.5f)));
+        n = v3_select(s->smooth, sum, ng);
+        const vmask above = vf_gt(v3_dot(bulge, ng) * side, vf_zero());
+        s->bulge = v3_where(vm_and(s->smooth, above), bulge);
     }
-    s->backfacing = vf_lt(v3_dot(ng, s->wo), vf_zero());
-    const vfloat side = vf_select(s->backfacing, vf_set(-1.0f), vf_one());
     s->ng = v3_scale(ng, side);
     s->n = v3_scale(n, side);
 }

@@ -25,6 +25,9 @@ struct trc_surface {
     vvec3 n;          /* shading normal, unit, on the side of wo as Cycles has it */
     vvec3 wo;         /* unit, towards where the ray came from */
     vmask backfacing; /* the ray came from the back of the winding */
+    vmask smooth;     /* n is interpolated */
+    vvec3 bulge;      /* from p to the curved surface that the normals describe, on the side of wo;
+                         0 where that is below the triangle or where not smooth */
     vfloat ray_length;
     vuint path; /* TRC_VISIBLE_* | TRC_PATH_* */
     vint depth, diffuse_depth, glossy_depth, transmission_depth, transparent_depth;
@@ -32,8 +35,8 @@ struct trc_surface {
     vfloat raster_x, raster_y; /* window coordinates [0, 1] */
 };
 
-/* Fills p, p_error, ng, n, backfacing from instance, triangle, u, v, time, wo. (kernels/surface.c)
- */
+/* Fills p, p_error, ng, n, backfacing, smooth, bulge from instance, triangle, u, v, time, wo.
+ * (kernels/surface.c) */
 void TRC_KERNEL(trc_surface_fetch)(struct trc_surface *s);
 
 /* The registers of one run of a program. */

@@ -98,8 +98,8 @@ struct trc_snapshot {
 };
 
 /* Position of an instance's transform at a time. Formula of every interpolation in the library:
- * a + f * (b - a), so that what stands still keeps its bits beside what never had keys. Bounds built
- * from keys contain what lies between up to rounding, which kernels/beam.h allows for. */
+ * a + f * (b - a), so that what stands still keeps its bits beside what never had keys. Bounds
+ * built from keys contain what lies between up to rounding, which kernels/beam.h allows for. */
 static inline void trc_key_at(float time, uint32_t key_count, uint32_t *key, float *f) {
     if (key_count < 2) {
         *key = 0;
