@@ -252,6 +252,17 @@ static void clear_sample(struct trc_light_sample *out) {
     out->light = vi_set(-1);
 }
 
+/* What all kinds of lights have in common, after a place was set in lanes m. */
+static void finish_sample(const struct draw *d, vmask m) {
+    struct trc_light_sample *out = d->out;
+    if (d->table->hides)
+        mark_hidden(d, m);
+    const vvec3 r = out->radiance;
+    const vfloat most = vf_max(vf_max(vf_abs(r.x), vf_abs(r.y)), vf_abs(r.z));
+    const vmask finite = vm_and(vf_gt(out->pdf, vf_zero()), vf_lt(out->pdf, vf_set(INFINITY)));
+    out->valid = vm_and(m, vm_and(finite, vf_gt(most, vf_zero())));
+}
+
 /* The only light of a scene. */
 TRC_INLINE int32_t single_light(const struct trc_light_table *t) {
     return t->bound_count ? t->bounds[0].light : (int32_t)t->distant[0];
@@ -269,6 +280,18 @@ void TRC_KERNEL(trc_light_sample)(const struct trc_surface *s, vvec3 n, vfloat u
     struct trc_light_choices choices;
     TRC_KERNEL(trc_light_prepare)(s, n, &choices);
     TRC_KERNEL(trc_light_sample_prepared)(s, &choices, u_select, u1, u2, out);
+}
+
+void TRC_KERNEL(trc_light_sample_world)(const struct trc_surface *s, vvec3 n, vfloat u1, vfloat u2,
+                                        struct trc_light_sample *out) {
+    const struct trc_snapshot *scene = s->snapshot;
+    const struct trc_light_table *t = scene->lights;
+    clear_sample(out);
+    out->light = vi_select(s->active, vi_set((int32_t)t->world_light), out->light);
+    const struct draw d = {scene,    t,          s,  trc_receiver_make(s->p, n), u1, u2,
+                           vf_one(), out->light, out};
+    sample_world(&d, s->active);
+    finish_sample(&d, s->active);
 }
 
 void TRC_KERNEL(trc_light_sample_prepared)(const struct trc_surface *s,
@@ -301,10 +324,5 @@ void TRC_KERNEL(trc_light_sample_prepared)(const struct trc_surface *s,
         if (vm_any(triangles))
             sample_triangles(&d, triangles);
     }
-    if (t->hides)
-        mark_hidden(&d, chosen);
-    const vvec3 r = out->radiance;
-    const vfloat most = vf_max(vf_max(vf_abs(r.x), vf_abs(r.y)), vf_abs(r.z));
-    const vmask finite = vm_and(vf_gt(out->pdf, vf_zero()), vf_lt(out->pdf, vf_set(INFINITY)));
-    out->valid = vm_and(chosen, vm_and(finite, vf_gt(most, vf_zero())));
+    finish_sample(&d, chosen);
 }

@@ -35,6 +35,11 @@ struct trc_light_sample {
 void TRC_KERNEL(trc_light_sample)(const struct trc_surface *s, vvec3 n, vfloat u_select, vfloat u1,
                                   vfloat u2, struct trc_light_sample *out);
 
+/* The same for the world alone, where trc_light_table.world_apart says that trc_light_sample leaves
+ * it out. */
+void TRC_KERNEL(trc_light_sample_world)(const struct trc_surface *s, vvec3 n, vfloat u1, vfloat u2,
+                                        struct trc_light_sample *out);
+
 /* The same in two steps, for several samples of one point: what each light may give is computed
  * once. Up to TRC_LIGHT_CHOICES_KEPT lights are remembered, further ones are computed at each
  * sample. */

@@ -113,7 +113,7 @@ TRC_INLINE vfloat trc_bound_importance(const struct trc_wide_bound *b, const str
     return vf_where(reaches, b->intensity * factor * fade);
 }
 
-/* A sun or the world: irradiance, over the horizon of n. */
+/* A sun or the world, if it is not apart: irradiance, over the horizon of n. */
 TRC_INLINE vfloat trc_distant_importance(const struct trc_light_table *t, uint32_t i,
                                          const struct trc_receiver *r) {
     const vfloat irradiance = vf_set(t->distant_irradiance[i]);
@@ -129,7 +129,7 @@ TRC_INLINE vfloat trc_distant_importance(const struct trc_light_table *t, uint32
     return vf_where(reaches, irradiance * vf_max(cosine, vf_set(0.0625f)));
 }
 
-/* Candidates: the listed lights or the tree as one, then suns and world. */
+/* Candidates: the listed lights or the tree as one, then suns, then the world unless apart. */
 TRC_INLINE uint32_t trc_candidate_count(const struct trc_light_table *t) {
     return (t->is_tree ? 1u : t->bound_count) + t->distant_count;
 }
@@ -330,7 +330,10 @@ static inline vfloat trc_light_chance(const struct trc_light_table *t, const str
     }
     if (t->is_tree && vm_any(placed_lanes))
         own = vf_select(placed_lanes, own * trc_tree_chance(t, r, light, placed_lanes), own);
-    return vf_divide(own, sum);
+    const vfloat chance = vf_divide(own, sum);
+    return t->world_apart
+               ? vf_select(vi_eq(light, vi_set((int32_t)t->world_light)), vf_one(), chance)
+               : chance;
 }
 
 #endif

@@ -9,6 +9,7 @@
 #include "kernels/light.h"
 #include "kernels/tile.h"
 #include "kernels/wide_math.h"
+#include "shading/lights.h"
 
 /* Everything a group of lanes carries from the ray that arrived. */
 struct arrival {
@@ -350,6 +351,17 @@ static void shadow_push(struct trc_tile *t, const struct arrival *a, const struc
     q->count += (uint32_t)__builtin_popcount(bits);
 }
 
+static void sample_use(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
+                       const struct trc_lobes *lobes, const struct trc_light_sample *sample,
+                       vfloat count, vuint cell, vmask active) {
+    struct light_result r;
+    vmask lit = vm_and(active, sample->valid);
+    if (vm_any(lit))
+        lit = light_contribute(t, a, s, lobes, sample, count, lit, &r);
+    if (vm_any(lit))
+        shadow_push(t, a, s, sample, &r, cell, lit);
+}
+
 static void direct_light(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
                          const struct trc_lobes *lobes, vmask active) {
     const uint32_t dimension = TRC_DIM_BOUNCE + t->generation * TRC_DIMS_PER_BOUNCE;
@@ -357,7 +369,8 @@ static void direct_light(struct trc_tile *t, const struct arrival *a, const stru
     const vuint index = vu_gather(t->samples.index, (vint)a->slot, active);
     const uint32_t most = t->generation == 0 ? t->desc->light_samples : 1;
     const vfloat count = light_count(t, a->depths);
-    if (t->shadows.count + most * TRC_WIDTH > TRC_SHADOW_QUEUE)
+    const bool world_apart = t->snapshot->lights->world_apart;
+    if (t->shadows.count + most * (world_apart ? 2 : 1) * TRC_WIDTH > TRC_SHADOW_QUEUE)
         TRC_KERNEL(trc_shadow_flush)(t);
     for (uint32_t l = 0; l < most; l++) {
         vfloat u[3];
@@ -365,18 +378,16 @@ static void direct_light(struct trc_tile *t, const struct arrival *a, const stru
             u[k] = most > 1 ? TRC_KERNEL(trc_sample_split)(&t->sampler, pixel, index, dimension + k,
                                                            l, most)
                             : TRC_KERNEL(trc_sample)(&t->sampler, pixel, index, dimension + k);
-        struct trc_light_sample sample;
-        TRC_KERNEL(trc_light_sample)(s, a->receive_n, u[0], u[1], u[2], &sample);
-        vmask lit = vm_and(active, vm_and(sample.valid, vf_lt(vf_set((float)l), count)));
-        if (!vm_any(lit))
-            continue;
-        struct light_result r;
-        lit = light_contribute(t, a, s, lobes, &sample, count, lit, &r);
-        if (!vm_any(lit))
-            continue;
+        const vmask wanted = vm_and(active, vf_lt(vf_set((float)l), count));
         const vuint cell =
             (vuint)(vf_to_int(u[1] * vf_set(4.0f)) | (vf_to_int(u[2] * vf_set(4.0f)) << 2));
-        shadow_push(t, a, s, &sample, &r, cell, lit);
+        struct trc_light_sample sample;
+        TRC_KERNEL(trc_light_sample)(s, a->receive_n, u[0], u[1], u[2], &sample);
+        sample_use(t, a, s, lobes, &sample, count, cell, wanted);
+        if (world_apart) {
+            TRC_KERNEL(trc_light_sample_world)(s, a->receive_n, u[1], u[2], &sample);
+            sample_use(t, a, s, lobes, &sample, count, cell, wanted);
+        }
     }
 }
 

@@ -436,6 +436,12 @@ static trc_status fill(struct trc_light_table *table, const struct trc_light_tab
         trc_free(bounds);
         return status;
     }
+    /* What the world gives differs from direction to direction, so its samples are worth a shadow
+     * ray of their own; the world comes last. */
+    const bool others = bound_count > 0 || table->distant_count > 1;
+    table->world_apart = table->world_light != UINT32_MAX && others;
+    if (table->world_apart)
+        table->distant_count--;
     return set_bounds(table, bounds, bound_count);
 }
 

@@ -95,9 +95,10 @@ struct trc_light_table {
     uint32_t first_triangle; /* number of the first emissive triangle */
     uint32_t kinds;          /* 1 << kind of every light present */
     bool hides;              /* some light is not visible to all of diffuse, glossy, transmission */
-    bool single;             /* there is exactly one light: nothing to choose */
-    bool moves;              /* some emissive triangle moves */
-    bool varies;             /* some has emission by program */
+    bool single;             /* there is exactly one light (world apart: besides it) */
+    bool world_apart; /* the world is sampled beside the other lights, not chosen among them */
+    bool moves;       /* some emissive triangle moves */
+    bool varies;      /* some has emission by program */
     struct trc_lamp *lamps;
     struct trc_light_triangle *triangles;
     /* Chosen among: bound_count bounds in a list, or a tree of which bounds[0] is the root. */
@@ -106,7 +107,7 @@ struct trc_light_table {
     bool is_tree;
     uint32_t
         *trails; /* tree: per light, the turns from the root, first in bit 0, 1 the second child */
-    uint32_t *distant; /* numbers of suns and the world */
+    uint32_t *distant; /* numbers of suns, and the world unless apart */
     float *distant_irradiance;
     uint32_t distant_count;
     uint32_t *seen; /* lamps that rays can meet */
