@@ -103,8 +103,8 @@ class VolleySceneSettings(bpy.types.PropertyGroup):
         description="Most transparent surfaces a ray passes straight", update=_changed)
     attenuation_cutoff: FloatProperty(
         name="Attenuation Cutoff", default=0.001, min=0.0, max=1.0, precision=4,
-        description="Rays that would add less than this to the picture are not followed (Whitted), or "
-                    "by chance and without bias (Distribution)", update=_changed)
+        description="Rays that would add less than this to the picture are not followed. Distribution "
+                    "decides by chance instead, without bias", update=_changed)
     clamp_direct: FloatProperty(
         name="Direct Light", default=0.0, min=0.0, soft_max=100.0,
         description="Largest value of direct light in a sample; 0 is no limit", update=_changed)

@@ -64,10 +64,9 @@ typedef struct trc_render_desc {
     uint32_t max_depth;     /* bounces; 0: direct light only */
     uint32_t max_transparent_depth;
     uint32_t max_glossy_depth, max_transmission_depth; /* further limits; UINT32_MAX none */
-    float attenuation_cutoff;           /* Whitted: a ray whose throughput is below is not traced.
-                                           Distribution:           below it Russian roulette decides, unbiased
-                                         */
-    float filter_glossy;                /* Cycles' Filter Glossy; 0 off */
+    float attenuation_cutoff; /* a ray whose throughput is below is not traced; Distribution decides
+                                 by chance instead, unbiased, and does not read it */
+    float filter_glossy;      /* Cycles' Filter Glossy; 0 off */
     float clamp_direct, clamp_indirect; /* as Cycles; 0 off */
     uint32_t assembly;
     uint32_t packet_size; /* 4, 16, 64 or 256; 0 chooses */

@@ -21,6 +21,8 @@ struct arrival {
     vfloat beyond;      /* kernels/bsdf.h, trc_bsdf_sample */
     vvec3 receive_n;    /* normal as kernels/light.h wants it of the surface hit */
     vfloat t, tmin, time, pdf, min_pdf;
+    vfloat
+        chance; /* that a continuation ray is sent: densities of its directions have it in them */
     vuint slot, path, depths;
     uint32_t slots[TRC_WIDTH];
 };
@@ -288,7 +290,8 @@ static vmask light_contribute(const struct trc_tile *t, const struct arrival *a,
     vfloat mis, mis_diffuse = one;
     if (t->desc->integrator == TRC_INTEGRATOR_DISTRIBUTION) {
         /* A continuation ray's weight has all lobes in it (kernels/bsdf.h), so this has too. */
-        const vfloat pl = l->pdf * count, pl2 = pl * pl, pb2 = f.pdf * f.pdf;
+        const vfloat pl = l->pdf * count, pb = f.pdf * a->chance;
+        const vfloat pl2 = pl * pl, pb2 = pb * pb;
         mis = mis_diffuse = vf_select(alone, one, pl2 / (pl2 + pb2));
     } else {
         /* Ideal continuation rays find lights of extent by themselves; highlights of points are
@@ -408,7 +411,8 @@ static void ray_push(struct trc_tile *t, const struct arrival *a, const struct t
     const vfloat old_far = vf_gather(t->work.f[TRC_RAY_TMAX], a->index, a->active);
     const vfloat tmax = vf_select(straight, old_far, vf_set(INFINITY));
     const vmask ideal = vm_or(b->singular, vf_le(b->pdf, vf_set(0.0f)));
-    const vfloat pdf = vf_select(straight, a->pdf, vf_select(ideal, vf_set(-1.0f), b->pdf));
+    const vfloat pdf =
+        vf_select(straight, a->pdf, vf_select(ideal, vf_set(-1.0f), b->pdf * a->chance));
     const vfloat min_pdf =
         vf_select(vm_or(straight, ideal), a->min_pdf, vf_min(a->min_pdf, b->pdf));
 
@@ -454,28 +458,29 @@ static void ray_push(struct trc_tile *t, const struct arrival *a, const struct t
     out->count += (uint32_t)__builtin_popcount(bits);
 }
 
-/* Rays of small weight: not traced (Whitted), or by chance with their weight raised (Distribution).
- */
-static vmask attenuate(const struct trc_tile *t, const struct arrival *a, struct trc_bsdf_sample *b,
-                       vmask active) {
+/* Lanes whose rays are worth tracing: Whitted prunes its tree where a ray would add next to nothing
+ * (Boulos et al. 2007). */
+static vmask attenuate(const struct trc_tile *t, const struct arrival *a,
+                       const struct trc_bsdf_sample *b, vmask active) {
     const vfloat size = v3_max(v3_mul(a->weight, b->weight));
     active = vm_and(active, vm_and(vf_gt(size, vf_set(0.0f)), vf_lt(size, vf_set(3e38f))));
-    const float cutoff = t->desc->attenuation_cutoff;
-    if (cutoff <= 0.0f)
+    if (t->desc->integrator == TRC_INTEGRATOR_DISTRIBUTION)
         return active;
-    const vmask low = vm_and(active, vf_lt(size, vf_set(cutoff)));
-    if (!vm_any(low))
-        return active;
+    return vm_andnot(active, vf_lt(size, vf_set(t->desc->attenuation_cutoff)));
+}
+
+/* Chance that the one continuation ray is traced at all, in proportion to what it can bring to the
+ * picture (Russian roulette); certain from ROULETTE_FULL on. A matt surface with a weak gloss sends
+ * a ray now and then instead of always: conference 1.9 times as fast at the same error, at most 1.2
+ * times the error elsewhere. */
+#define ROULETTE_FULL 0.25f
+static vfloat roulette_chance(const struct trc_tile *t, const struct arrival *a,
+                              const struct trc_lobes *lobes) {
+    const vfloat one = vf_set(1.0f);
     if (t->desc->integrator != TRC_INTEGRATOR_DISTRIBUTION)
-        return vm_andnot(active, low);
-    const vuint pixel = vu_gather(t->samples.pixel, (vint)a->slot, active);
-    const vuint index = vu_gather(t->samples.index, (vint)a->slot, active);
-    const vfloat u =
-        vu_to_unit(vu_hash(pixel ^ vu_hash(index ^ vu_hash(a->depths ^ vu_set(t->desc->seed)))));
-    const vfloat chance = size * vf_set(1.0f / cutoff);
-    b->weight = v3_select(
-        low, v3_scale(b->weight, vf_set(1.0f) / vf_select(low, chance, vf_set(1.0f))), b->weight);
-    return vm_andnot(active, vm_andnot(low, vf_lt(u, chance)));
+        return one;
+    const vfloat brings = v3_max(a->weight) * lobes->continue_weight;
+    return vf_min(brings * vf_set(1.0f / ROULETTE_FULL), one);
 }
 
 /* Straight on through transparency alone, for rays that may not bounce any more. */
@@ -517,7 +522,13 @@ static void continue_rays(struct trc_tile *t, const struct arrival *a, const str
     vfloat u[3];
     for (uint32_t k = 0; k < 3; k++)
         u[k] = TRC_KERNEL(trc_sample)(&t->sampler, pixel, index, dimension + TRC_DIM_LOBE + k);
+    /* One stratified number for both choices: whether, and which lobe. */
+    active = vm_and(active, vf_lt(u[0], a->chance));
+    if (!vm_any(active))
+        return;
+    u[0] = vf_min(vf_divide(u[0], a->chance), vf_set(0x1.fffffep-1f));
     TRC_KERNEL(trc_bsdf_sample)(lobes, s, u[0], u[1], u[2], &b);
+    b.weight = v3_scale(b.weight, vf_divide(vf_set(1.0f), a->chance));
     const vmask go = attenuate(t, a, &b, vm_and(active, b.valid));
     if (vm_any(go))
         ray_push(t, a, s, &b, material, go);
@@ -584,6 +595,7 @@ static void shade_group(struct trc_tile *t, uint32_t material, vint index, vmask
     if (m->instruction_count)
         TRC_KERNEL(trc_program_run)(m, &s, &regs);
     TRC_KERNEL(trc_lobes_setup)(m, &s, &regs, filter_alpha(t, &a), &lobes);
+    a.chance = roulette_chance(t, &a, &lobes);
     const bool lets_through = m->has & (TRC_MATERIAL_HAS_REFRACTION | TRC_MATERIAL_HAS_TRANSLUCENT);
     a.receive_n = lets_through ? v3_zero() : s.n;
     if (m->has & TRC_MATERIAL_HAS_HOLDOUT)
