@@ -13,7 +13,8 @@
 
 /* Everything a group of lanes carries from the ray that arrived. */
 struct arrival {
-    vint index; /* into t->work */
+    vint index;  /* into t->work */
+    int32_t run; /* index of the first lane where all lanes are active and follow each other, or -1 */
     vmask active;
     vvec3 o, d, n_from;
     vvec3 found_weight; /* of emission the ray finds, also straight on through transparency */
@@ -23,7 +24,7 @@ struct arrival {
     vfloat t, tmin, time, pdf, min_pdf;
     vfloat
         chance; /* that a continuation ray is sent: densities of its directions have it in them */
-    vuint slot, path, depths;
+    vuint slot, path, depths, pixel, sample;
     uint32_t slots[TRC_WIDTH];
 };
 
@@ -31,33 +32,43 @@ struct arrival {
  * themselves, whatever the rounding of both ends. */
 #define SHADOW_END (1.0f - 2e-5f)
 
+/* Numbers of the lanes' rays in a column: mostly side by side, as sorts are stable. */
+TRC_INLINE vfloat column(const float *values, const struct arrival *a) {
+    return a->run >= 0 ? vf_load(values + a->run) : vf_gather(values, a->index, a->active);
+}
+TRC_INLINE vuint word_column(const uint32_t *values, const struct arrival *a) {
+    return a->run >= 0 ? vu_load(values + a->run) : vu_gather(values, a->index, a->active);
+}
+
 static void arrival_load(const struct trc_tile *t, vint index, vmask active, struct arrival *a) {
     const struct trc_ray_store *r = &t->work;
+    const int32_t first = vi_get(index, 0);
     a->index = index;
     a->active = active;
-    a->o =
-        v3(vf_gather(r->f[TRC_RAY_OX], index, active), vf_gather(r->f[TRC_RAY_OY], index, active),
-           vf_gather(r->f[TRC_RAY_OZ], index, active));
-    a->d =
-        v3(vf_gather(r->f[TRC_RAY_DX], index, active), vf_gather(r->f[TRC_RAY_DY], index, active),
-           vf_gather(r->f[TRC_RAY_DZ], index, active));
-    a->found_weight = v3(vf_gather(r->f[TRC_RAY_WEIGHT_R], index, active),
-                         vf_gather(r->f[TRC_RAY_WEIGHT_G], index, active),
-                         vf_gather(r->f[TRC_RAY_WEIGHT_B], index, active));
-    a->n_from =
-        v3(vf_gather(r->f[TRC_RAY_NX], index, active), vf_gather(r->f[TRC_RAY_NY], index, active),
-           vf_gather(r->f[TRC_RAY_NZ], index, active));
-    a->tmin = vf_gather(r->f[TRC_RAY_TMIN], index, active);
-    a->beyond = vf_gather(r->f[TRC_RAY_BEYOND], index, active);
+    a->run = vm_all(vm_and(active, vi_eq(index, vi_set(first) + vi_lane()))) ? first : -1;
+    float *const *f = r->f;
+    a->o = v3(column(f[TRC_RAY_OX], a), column(f[TRC_RAY_OY], a), column(f[TRC_RAY_OZ], a));
+    a->d = v3(column(f[TRC_RAY_DX], a), column(f[TRC_RAY_DY], a), column(f[TRC_RAY_DZ], a));
+    a->found_weight = v3(column(f[TRC_RAY_WEIGHT_R], a), column(f[TRC_RAY_WEIGHT_G], a),
+                         column(f[TRC_RAY_WEIGHT_B], a));
+    a->n_from = v3(column(f[TRC_RAY_NX], a), column(f[TRC_RAY_NY], a), column(f[TRC_RAY_NZ], a));
+    a->tmin = column(f[TRC_RAY_TMIN], a);
+    a->beyond = column(f[TRC_RAY_BEYOND], a);
     a->weight = v3_scale(a->found_weight, a->beyond);
-    a->time = vf_gather(r->f[TRC_RAY_TIME], index, active);
-    a->pdf = vf_gather(r->f[TRC_RAY_PDF], index, active);
-    a->min_pdf = vf_gather(r->f[TRC_RAY_MIN_PDF], index, active);
-    a->slot = vu_gather(r->w[TRC_RAY_SLOT], index, active);
-    a->path = vu_gather(r->w[TRC_RAY_PATH], index, active);
-    a->depths = vu_gather(r->w[TRC_RAY_DEPTHS], index, active);
-    a->t = vf_gather(t->hits.t, index, active);
+    a->time = column(f[TRC_RAY_TIME], a);
+    a->pdf = column(f[TRC_RAY_PDF], a);
+    a->min_pdf = column(f[TRC_RAY_MIN_PDF], a);
+    a->slot = word_column(r->w[TRC_RAY_SLOT], a);
+    a->path = word_column(r->w[TRC_RAY_PATH], a);
+    a->depths = word_column(r->w[TRC_RAY_DEPTHS], a);
+    a->t = column(t->hits.t, a);
     vu_store(a->slots, a->slot);
+}
+
+/* The lanes' pixels and sample numbers, for those that shade. */
+static void arrival_load_samples(const struct trc_tile *t, struct arrival *a) {
+    a->pixel = vu_gather(t->samples.pixel, (vint)a->slot, a->active);
+    a->sample = vu_gather(t->samples.index, (vint)a->slot, a->active);
 }
 
 TRC_INLINE vuint depth_of(vuint depths, int shift) { return (depths >> shift) & vu_set(255u); }
@@ -368,8 +379,6 @@ static void sample_use(struct trc_tile *t, const struct arrival *a, const struct
 static void direct_light(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
                          const struct trc_lobes *lobes, vmask active) {
     const uint32_t dimension = TRC_DIM_BOUNCE + t->generation * TRC_DIMS_PER_BOUNCE;
-    const vuint pixel = vu_gather(t->samples.pixel, (vint)a->slot, active);
-    const vuint index = vu_gather(t->samples.index, (vint)a->slot, active);
     const uint32_t most = t->generation == 0 ? t->desc->light_samples : 1;
     const vfloat count = light_count(t, a->depths);
     const bool world_apart = t->snapshot->lights->world_apart;
@@ -378,9 +387,9 @@ static void direct_light(struct trc_tile *t, const struct arrival *a, const stru
     for (uint32_t l = 0; l < most; l++) {
         vfloat u[3];
         for (uint32_t k = 0; k < 3; k++)
-            u[k] = most > 1 ? TRC_KERNEL(trc_sample_split)(&t->sampler, pixel, index, dimension + k,
+            u[k] = most > 1 ? TRC_KERNEL(trc_sample_split)(&t->sampler, a->pixel, a->sample, dimension + k,
                                                            l, most)
-                            : TRC_KERNEL(trc_sample)(&t->sampler, pixel, index, dimension + k);
+                            : TRC_KERNEL(trc_sample)(&t->sampler, a->pixel, a->sample, dimension + k);
         const vmask wanted = vm_and(active, vf_lt(vf_set((float)l), count));
         const vuint cell =
             (vuint)(vf_to_int(u[1] * vf_set(4.0f)) | (vf_to_int(u[2] * vf_set(4.0f)) << 2));
@@ -408,7 +417,7 @@ static void ray_push(struct trc_tile *t, const struct arrival *a, const struct t
     const vvec3 weight = v3_mul(v3_select(straight, a->found_weight, a->weight), b->weight);
     const vfloat beyond = vf_select(straight, a->beyond, b->beyond);
     const vfloat tmin = vf_select(straight, a->t, vf_set(0.0f));
-    const vfloat old_far = vf_gather(t->work.f[TRC_RAY_TMAX], a->index, a->active);
+    const vfloat old_far = column(t->work.f[TRC_RAY_TMAX], a);
     const vfloat tmax = vf_select(straight, old_far, vf_set(INFINITY));
     const vmask ideal = vm_or(b->singular, vf_le(b->pdf, vf_set(0.0f)));
     const vfloat pdf =
@@ -517,11 +526,9 @@ static void continue_rays(struct trc_tile *t, const struct arrival *a, const str
         return;
     }
     const uint32_t dimension = TRC_DIM_BOUNCE + t->generation * TRC_DIMS_PER_BOUNCE;
-    const vuint pixel = vu_gather(t->samples.pixel, (vint)a->slot, active);
-    const vuint index = vu_gather(t->samples.index, (vint)a->slot, active);
     vfloat u[3];
     for (uint32_t k = 0; k < 3; k++)
-        u[k] = TRC_KERNEL(trc_sample)(&t->sampler, pixel, index, dimension + TRC_DIM_LOBE + k);
+        u[k] = TRC_KERNEL(trc_sample)(&t->sampler, a->pixel, a->sample, dimension + TRC_DIM_LOBE + k);
     /* One stratified number for both choices: whether, and which lobe. */
     active = vm_and(active, vf_lt(u[0], a->chance));
     if (!vm_any(active))
@@ -539,10 +546,10 @@ static void continue_rays(struct trc_tile *t, const struct arrival *a, const str
 static void surface_setup(struct trc_tile *t, const struct arrival *a, struct trc_surface *s) {
     s->snapshot = t->snapshot;
     s->active = a->active;
-    s->instance = vi_gather((const int32_t *)t->hits.instance, a->index, a->active);
-    s->triangle = vi_gather((const int32_t *)t->hits.triangle, a->index, a->active);
-    s->u = vf_gather(t->hits.u, a->index, a->active);
-    s->v = vf_gather(t->hits.v, a->index, a->active);
+    s->instance = (vint)word_column(t->hits.instance, a);
+    s->triangle = (vint)word_column(t->hits.triangle, a);
+    s->u = column(t->hits.u, a);
+    s->v = column(t->hits.v, a);
     s->time = a->time;
     s->wo = v3_neg(a->d);
     s->ray_length = a->t;
@@ -553,11 +560,10 @@ static void surface_setup(struct trc_tile *t, const struct arrival *a, struct tr
     s->transmission_depth = (vint)depth_of(a->depths, TRC_DEPTH_TRANSMISSION_SHIFT);
     s->transparent_depth = (vint)depth_of(a->depths, TRC_DEPTH_TRANSPARENT_SHIFT);
     s->footprint = vf_set(0.0f);
-    const vuint pixel = vu_gather(t->samples.pixel, (vint)a->slot, a->active);
-    s->raster_x = (vi_to_float((vint)(pixel & vu_set(0xffffu))) + vf_set(0.5f)) *
+    s->raster_x = (vi_to_float((vint)(a->pixel & vu_set(0xffffu))) + vf_set(0.5f)) *
                   vf_set(1.0f / (float)t->desc->width);
     s->raster_y =
-        (vi_to_float((vint)(pixel >> 16)) + vf_set(0.5f)) * vf_set(1.0f / (float)t->desc->height);
+        (vi_to_float((vint)(a->pixel >> 16)) + vf_set(0.5f)) * vf_set(1.0f / (float)t->desc->height);
     TRC_KERNEL(trc_surface_fetch)(s);
 }
 
@@ -591,6 +597,7 @@ static void shade_group(struct trc_tile *t, uint32_t material, vint index, vmask
     struct trc_registers regs;
     struct trc_lobes lobes;
     arrival_load(t, index, active, &a);
+    arrival_load_samples(t, &a);
     surface_setup(t, &a, &s);
     if (m->instruction_count)
         TRC_KERNEL(trc_program_run)(m, &s, &regs);

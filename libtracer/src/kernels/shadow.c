@@ -143,9 +143,12 @@ void TRC_KERNEL(trc_shadow_flush)(struct trc_tile *t) {
         return;
     const bool transparent = t->snapshot->features & TRC_FEATURE_TRANSPARENCY;
     TRC_KERNEL(trc_clock_trace)(t);
-    for (uint32_t i = 0; i < q->count; i++)
+    uint32_t last = 0;
+    for (uint32_t i = 0; i < q->count; i++) {
         t->keys[i] = q->target[i] < TRC_BINS ? q->target[i] : TRC_BINS - 1;
-    TRC_KERNEL(trc_tile_sort)(t, t->keys, q->count, TRC_BINS);
+        last = t->keys[i] > last ? t->keys[i] : last;
+    }
+    TRC_KERNEL(trc_tile_sort)(t, t->keys, q->count, last + 1);
     memset(t->order + q->count, 0, TRC_PACKET_SIZE * sizeof *t->order);
     for (uint32_t begin = 0; begin < q->count; begin += t->packet_size) {
         const uint32_t count =

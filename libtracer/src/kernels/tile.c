@@ -136,23 +136,39 @@ static uint32_t assembly_key(const struct trc_tile *t, uint32_t ray) {
     }
 }
 
+/* More than any key. */
+static uint32_t assembly_bins(const struct trc_tile *t) {
+    switch (t->desc->assembly) {
+    case TRC_ASSEMBLY_GROUPS:
+        return TRC_BINS;
+    case TRC_ASSEMBLY_OCTANTS:
+        return 256;
+    default:
+        return TRC_VISIBLE_ALL + 1;
+    }
+}
+
 static void packet_trace(struct trc_tile *t, const uint32_t *order, uint32_t count) {
     const struct trc_ray_store *r = &t->work;
     struct trc_packet *p = &t->packet;
     struct trc_packet_hits *h = &t->packet_hits;
-    uint32_t at_padded[TRC_PACKET_SIZE] = {0};
-    memcpy(at_padded, order, count * sizeof *order);
-    for (uint32_t i = 0; i < count; i += TRC_WIDTH) {
-        const vmask m = vm_first((int32_t)(count - i));
-        const vint at = vi_load((const int32_t *)at_padded + i);
-        for (int axis = 0; axis < 3; axis++) {
-            vf_store(&p->o[axis][i], vf_gather(r->f[TRC_RAY_OX + axis], at, m));
-            vf_store(&p->d[axis][i], vf_gather(r->f[TRC_RAY_DX + axis], at, m));
+    float *const to[] = {p->o[0], p->o[1], p->o[2], p->d[0], p->d[1],
+                         p->d[2], p->tmin, p->t,    p->time};
+    static const int from[] = {TRC_RAY_OX, TRC_RAY_OY, TRC_RAY_OZ,   TRC_RAY_DX,  TRC_RAY_DY,
+                               TRC_RAY_DZ, TRC_RAY_TMIN, TRC_RAY_TMAX, TRC_RAY_TIME};
+    const int columns = t->object_motion ? 9 : 8;
+    if (order[count - 1] - order[0] == count - 1) { /* sorted stably, so they follow each other */
+        for (int k = 0; k < columns; k++)
+            memcpy(to[k], r->f[from[k]] + order[0], count * sizeof(float));
+    } else {
+        uint32_t at_padded[TRC_PACKET_SIZE] = {0};
+        memcpy(at_padded, order, count * sizeof *order);
+        for (uint32_t i = 0; i < count; i += TRC_WIDTH) {
+            const vmask m = vm_first((int32_t)(count - i));
+            const vint at = vi_load((const int32_t *)at_padded + i);
+            for (int k = 0; k < columns; k++)
+                vf_store(to[k] + i, vf_gather(r->f[from[k]], at, m));
         }
-        vf_store(&p->tmin[i], vf_gather(r->f[TRC_RAY_TMIN], at, m));
-        vf_store(&p->t[i], vf_gather(r->f[TRC_RAY_TMAX], at, m));
-        if (t->object_motion)
-            vf_store(&p->time[i], vf_gather(r->f[TRC_RAY_TIME], at, m));
     }
     const uint32_t path = r->w[TRC_RAY_PATH][order[0]];
     p->active = count < TRC_PACKET_SIZE ? (1ull << count) - 1 : ~0ull;
@@ -197,7 +213,7 @@ static void trace_batch(struct trc_tile *t) {
     const uint32_t size = t->desc->assembly == TRC_ASSEMBLY_NONE ? 1 : t->packet_size;
     for (uint32_t i = 0; i < count; i++)
         t->keys[i] = assembly_key(t, i);
-    TRC_KERNEL(trc_tile_sort)(t, t->keys, count, TRC_BINS);
+    TRC_KERNEL(trc_tile_sort)(t, t->keys, count, assembly_bins(t));
     for (uint32_t begin = 0; begin < count;) {
         const uint32_t key = t->keys[t->order[begin]];
         uint32_t end = begin + 1;
