@@ -13,8 +13,9 @@
 
 /* Everything a group of lanes carries from the ray that arrived. */
 struct arrival {
-    vint index;  /* into t->work */
-    int32_t run; /* index of the first lane where all lanes are active and follow each other, or -1 */
+    vint index; /* into t->work */
+    int32_t
+        run; /* index of the first lane where all lanes are active and follow each other, or -1 */
     vmask active;
     vvec3 o, d, n_from;
     vvec3 found_weight; /* of emission the ray finds, also straight on through transparency */
@@ -387,9 +388,10 @@ static void direct_light(struct trc_tile *t, const struct arrival *a, const stru
     for (uint32_t l = 0; l < most; l++) {
         vfloat u[3];
         for (uint32_t k = 0; k < 3; k++)
-            u[k] = most > 1 ? TRC_KERNEL(trc_sample_split)(&t->sampler, a->pixel, a->sample, dimension + k,
-                                                           l, most)
-                            : TRC_KERNEL(trc_sample)(&t->sampler, a->pixel, a->sample, dimension + k);
+            u[k] = most > 1
+                       ? TRC_KERNEL(trc_sample_split)(&t->sampler, a->pixel, a->sample,
+                                                      dimension + k, l, most)
+                       : TRC_KERNEL(trc_sample)(&t->sampler, a->pixel, a->sample, dimension + k);
         const vmask wanted = vm_and(active, vf_lt(vf_set((float)l), count));
         const vuint cell =
             (vuint)(vf_to_int(u[1] * vf_set(4.0f)) | (vf_to_int(u[2] * vf_set(4.0f)) << 2));
@@ -528,7 +530,8 @@ static void continue_rays(struct trc_tile *t, const struct arrival *a, const str
     const uint32_t dimension = TRC_DIM_BOUNCE + t->generation * TRC_DIMS_PER_BOUNCE;
     vfloat u[3];
     for (uint32_t k = 0; k < 3; k++)
-        u[k] = TRC_KERNEL(trc_sample)(&t->sampler, a->pixel, a->sample, dimension + TRC_DIM_LOBE + k);
+        u[k] =
+            TRC_KERNEL(trc_sample)(&t->sampler, a->pixel, a->sample, dimension + TRC_DIM_LOBE + k);
     /* One stratified number for both choices: whether, and which lobe. */
     active = vm_and(active, vf_lt(u[0], a->chance));
     if (!vm_any(active))
@@ -562,8 +565,8 @@ static void surface_setup(struct trc_tile *t, const struct arrival *a, struct tr
     s->footprint = vf_set(0.0f);
     s->raster_x = (vi_to_float((vint)(a->pixel & vu_set(0xffffu))) + vf_set(0.5f)) *
                   vf_set(1.0f / (float)t->desc->width);
-    s->raster_y =
-        (vi_to_float((vint)(a->pixel >> 16)) + vf_set(0.5f)) * vf_set(1.0f / (float)t->desc->height);
+    s->raster_y = (vi_to_float((vint)(a->pixel >> 16)) + vf_set(0.5f)) *
+                  vf_set(1.0f / (float)t->desc->height);
     TRC_KERNEL(trc_surface_fetch)(s);
 }
 

@@ -154,7 +154,7 @@ static void packet_trace(struct trc_tile *t, const uint32_t *order, uint32_t cou
     struct trc_packet_hits *h = &t->packet_hits;
     float *const to[] = {p->o[0], p->o[1], p->o[2], p->d[0], p->d[1],
                          p->d[2], p->tmin, p->t,    p->time};
-    static const int from[] = {TRC_RAY_OX, TRC_RAY_OY, TRC_RAY_OZ,   TRC_RAY_DX,  TRC_RAY_DY,
+    static const int from[] = {TRC_RAY_OX, TRC_RAY_OY,   TRC_RAY_OZ,   TRC_RAY_DX,  TRC_RAY_DY,
                                TRC_RAY_DZ, TRC_RAY_TMIN, TRC_RAY_TMAX, TRC_RAY_TIME};
     const int columns = t->object_motion ? 9 : 8;
     if (order[count - 1] - order[0] == count - 1) { /* sorted stably, so they follow each other */

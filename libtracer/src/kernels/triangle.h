@@ -78,6 +78,53 @@ static __attribute__((noinline)) bool trc_triangle_exact(const float a[3], const
     return fabs(distance) > trc_plane_error(a, b, c, w, det) * fabs((double)sz);
 }
 
+#if TRC_WIDTH > 1
+/* The same for lanes side by side: a packet that leaves a surface asks it of that surface's
+ * triangle in every lane. a, b, c: sheared coordinates as above. */
+typedef double trc_vdouble __attribute__((vector_size(8 * TRC_WIDTH)));
+typedef int64_t trc_vlong __attribute__((vector_size(8 * TRC_WIDTH)));
+TRC_INLINE trc_vdouble trc_vd_abs(trc_vdouble x) { return (trc_vdouble)((trc_vlong)x & INT64_MAX); }
+TRC_INLINE trc_vdouble trc_vd_max(trc_vdouble a, trc_vdouble b) {
+    const trc_vlong over = a > b;
+    return (trc_vdouble)((over & (trc_vlong)a) | (~over & (trc_vlong)b));
+}
+
+static __attribute__((noinline)) vmask trc_triangle_exact_lanes(const vfloat *corner, vfloat sz,
+                                                                vfloat *t, vfloat *u, vfloat *v) {
+    trc_vdouble p[3][3];
+    for (int k = 0; k < 3; k++)
+        for (int axis = 0; axis < 3; axis++)
+            p[k][axis] = __builtin_convertvector(corner[3 * k + axis], trc_vdouble);
+    const trc_vdouble *a = p[0], *b = p[1], *c = p[2];
+    const trc_vdouble e0 = c[0] * b[1] - c[1] * b[0];
+    const trc_vdouble e1 = a[0] * c[1] - a[1] * c[0];
+    const trc_vdouble e2 = b[0] * a[1] - b[1] * a[0];
+    const trc_vdouble det = e0 + e1 + e2, inv = 1.0 / det;
+    const trc_vlong inside =
+        ((e0 >= 0.0) & (e1 >= 0.0) & (e2 >= 0.0)) | ((e0 <= 0.0) & (e1 <= 0.0) & (e2 <= 0.0));
+    const trc_vdouble w[3] = {e0 * inv, e1 * inv, e2 * inv};
+    const trc_vdouble scale = __builtin_convertvector(sz, trc_vdouble);
+    const trc_vdouble distance = (w[0] * a[2] + w[1] * b[2] + w[2] * c[2]) * scale;
+    trc_vdouble q[3], r[3], mean[3];
+    for (int k = 0; k < 3; k++) {
+        q[k] = b[k] - a[k];
+        r[k] = c[k] - a[k];
+        mean[k] = w[0] * trc_vd_abs(a[k]) + w[1] * trc_vd_abs(b[k]) + w[2] * trc_vd_abs(c[k]);
+    }
+    const trc_vdouble slope =
+        (trc_vd_abs(q[1] * r[2] - q[2] * r[1]) + trc_vd_abs(q[2] * r[0] - q[0] * r[2])) /
+        trc_vd_abs(det);
+    const trc_vdouble error =
+        (double)TRC_GAMMA(8) * (mean[2] + slope * (trc_vd_max(mean[0], mean[1]) + mean[2]));
+    *t = __builtin_convertvector(distance, vfloat);
+    *u = __builtin_convertvector(w[1], vfloat);
+    *v = __builtin_convertvector(w[2], vfloat);
+    const trc_vlong hit =
+        inside & (det != 0.0) & (trc_vd_abs(distance) > error * trc_vd_abs(scale));
+    return vi_lt(__builtin_convertvector(hit, vint), vi_set(0));
+}
+#endif
+
 /* Vertex coordinates of one triangle for the lanes: broadcast (static) or per ray (moving). */
 struct trc_triangle_lanes {
     vfloat v[3][3]; /* vertex, axis in the order u, v, z */
@@ -111,24 +158,21 @@ TRC_INLINE vmask trc_triangle_test(const struct trc_triangle_lanes *p, vfloat ou
     const vfloat bound = trc_t_error(x, y, z, e, vf_abs(inv)) * vf_abs(sz);
     const vmask too_near = vm_and(vf_gt(*t, tmin), vf_le(vf_abs(*t), bound));
     const vmask near_edge = vf_le(nearest, vf_set(TRC_TINY_EDGE));
-    uint32_t doubtful = vm_bits(vm_and(hit, vm_or(near_edge, too_near)));
-    if (__builtin_expect(doubtful != 0, 0)) {
-        float lanes[9][TRC_WIDTH], s[TRC_WIDTH], rt[TRC_WIDTH], ru[TRC_WIDTH], rv[TRC_WIDTH];
-        uint32_t bits = vm_bits(hit);
-        vf_store(lanes[0], ax), vf_store(lanes[1], ay), vf_store(lanes[2], az);
-        vf_store(lanes[3], bx), vf_store(lanes[4], by), vf_store(lanes[5], bz);
-        vf_store(lanes[6], cx), vf_store(lanes[7], cy), vf_store(lanes[8], cz);
-        vf_store(s, sz), vf_store(rt, *t), vf_store(ru, *u), vf_store(rv, *v);
-        for (; doubtful; doubtful &= doubtful - 1) {
-            const int i = __builtin_ctz(doubtful);
-            const float a[3] = {lanes[0][i], lanes[1][i], lanes[2][i]};
-            const float b[3] = {lanes[3][i], lanes[4][i], lanes[5][i]};
-            const float c[3] = {lanes[6][i], lanes[7][i], lanes[8][i]};
-            if (!trc_triangle_exact(a, b, c, s[i], &rt[i], &ru[i], &rv[i]))
-                bits &= ~(1u << i);
-        }
-        hit = vm_from_bits(bits);
-        *t = vf_load(rt), *u = vf_load(ru), *v = vf_load(rv);
+    const vmask doubtful = vm_and(hit, vm_or(near_edge, too_near));
+    if (__builtin_expect(vm_any(doubtful), 0)) {
+#if TRC_WIDTH > 1
+        const vfloat corner[9] = {ax, ay, az, bx, by, bz, cx, cy, cz};
+        vfloat exact_t, exact_u, exact_v;
+        const vmask exact = trc_triangle_exact_lanes(corner, sz, &exact_t, &exact_u, &exact_v);
+        hit = vm_andnot(hit, vm_andnot(doubtful, exact));
+        *t = vf_select(doubtful, exact_t, *t);
+        *u = vf_select(doubtful, exact_u, *u);
+        *v = vf_select(doubtful, exact_v, *v);
+#else
+        const float a[3] = {ax, ay, az}, b[3] = {bx, by, bz}, c[3] = {cx, cy, cz};
+        if (!trc_triangle_exact(a, b, c, sz, t, u, v))
+            hit = vm_none();
+#endif
     }
     return hit;
 }
