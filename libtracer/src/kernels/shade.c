@@ -325,7 +325,8 @@ static vmask light_contribute(const struct trc_tile *t, const struct arrival *a,
     return vm_and(active, vm_and(vf_gt(size, zero), vf_lt(size, vf_set(3e38f))));
 }
 
-/* Adds the lanes' shadow rays to the queue. cell: where on the light, for sorting. */
+/* Adds the lanes' shadow rays to the queue. cell: where on the light, for sorting, below
+ * TRC_DIRECTION_CELLS. */
 static void shadow_push(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
                         const struct trc_light_sample *l, const struct light_result *r, vuint cell,
                         vmask active) {
@@ -341,7 +342,7 @@ static void shadow_push(struct trc_tile *t, const struct arrival *a, const struc
     if (limit > 0.0f || t->desc->clamp_indirect > 0.0f)
         sum = v3_select(vi_lt((vint)depth, vi_set(1)), clamp_radiance(sum, limit),
                         clamp_radiance(sum, t->desc->clamp_indirect));
-    const vuint target_key = ((vuint)l->light << 4) | cell;
+    const vuint target_key = (vuint)l->light * vu_set(TRC_DIRECTION_CELLS) + cell;
     const vfloat values[] = {o.x,  o.y,     o.z,   target.x, target.y, target.z,
                              tmax, a->time, sum.x, sum.y,    sum.z};
     struct trc_shadow_store *q = &t->shadows;
@@ -400,7 +401,7 @@ static void direct_light(struct trc_tile *t, const struct arrival *a, const stru
         sample_use(t, a, s, lobes, &sample, count, cell, wanted);
         if (world_apart) {
             TRC_KERNEL(trc_light_sample_world)(s, a->receive_n, u[1], u[2], &sample);
-            sample_use(t, a, s, lobes, &sample, count, cell, wanted);
+            sample_use(t, a, s, lobes, &sample, count, trc_direction_cell(sample.wi), wanted);
         }
     }
 }

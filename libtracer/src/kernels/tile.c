@@ -136,6 +136,20 @@ static uint32_t assembly_key(const struct trc_tile *t, uint32_t ray) {
     }
 }
 
+/* The default: rays other than the camera's also share a cell of directions. */
+static void keys_by_direction(struct trc_tile *t) {
+    const struct trc_ray_store *r = &t->work;
+    for (uint32_t i = 0; i < r->count; i += TRC_WIDTH) {
+        const vuint kind = vu_load(r->w[TRC_RAY_PATH] + i) & vu_set(TRC_VISIBLE_ALL);
+        const vvec3 d = v3(vf_load(r->f[TRC_RAY_DX] + i), vf_load(r->f[TRC_RAY_DY] + i),
+                           vf_load(r->f[TRC_RAY_DZ] + i));
+        const vuint cell = kind * vu_set(TRC_DIRECTION_CELLS) + trc_direction_cell(d);
+        const vmask camera =
+            vi_eq((vint)(kind & vu_set(TRC_VISIBLE_CAMERA)), vi_set(TRC_VISIBLE_CAMERA));
+        vi_store((int32_t *)t->keys + i, vi_select(camera, vi_set(0), (vint)cell));
+    }
+}
+
 /* More than any key. */
 static uint32_t assembly_bins(const struct trc_tile *t) {
     switch (t->desc->assembly) {
@@ -143,6 +157,8 @@ static uint32_t assembly_bins(const struct trc_tile *t) {
         return TRC_BINS;
     case TRC_ASSEMBLY_OCTANTS:
         return 256;
+    case TRC_ASSEMBLY_AUTO:
+        return (TRC_VISIBLE_ALL + 1) * TRC_DIRECTION_CELLS;
     default:
         return TRC_VISIBLE_ALL + 1;
     }
@@ -211,8 +227,11 @@ static void trace_batch(struct trc_tile *t) {
     const uint32_t count = t->work.count;
     const bool runs = t->desc->assembly == TRC_ASSEMBLY_RUNS;
     const uint32_t size = t->desc->assembly == TRC_ASSEMBLY_NONE ? 1 : t->packet_size;
-    for (uint32_t i = 0; i < count; i++)
-        t->keys[i] = assembly_key(t, i);
+    if (t->desc->assembly == TRC_ASSEMBLY_AUTO)
+        keys_by_direction(t);
+    else
+        for (uint32_t i = 0; i < count; i++)
+            t->keys[i] = assembly_key(t, i);
     TRC_KERNEL(trc_tile_sort)(t, t->keys, count, assembly_bins(t));
     for (uint32_t begin = 0; begin < count;) {
         const uint32_t key = t->keys[t->order[begin]];

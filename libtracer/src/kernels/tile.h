@@ -113,6 +113,17 @@ struct trc_tile {
     struct trc_packet_hits packet_hits;
 };
 
+/* Rays that share their dominant axis and its side share a beam (kernels/trace.c): six cells of
+ * directions, below TRC_DIRECTION_CELLS. */
+#define TRC_DIRECTION_CELLS 16u
+TRC_INLINE vuint trc_direction_cell(vvec3 d) {
+    const vfloat x = vf_abs(d.x), y = vf_abs(d.y), z = vf_abs(d.z);
+    const vmask by_x = vm_and(vf_ge(x, y), vf_ge(x, z)), by_y = vf_ge(y, z);
+    const vint axis = vi_select(by_x, vi_set(0), vi_select(by_y, vi_set(2), vi_set(4)));
+    const vfloat along = vf_select(by_x, d.x, vf_select(by_y, d.y, d.z));
+    return (vuint)(axis + vi_select(vf_lt(along, vf_set(0.0f)), vi_set(1), vi_set(0)));
+}
+
 /* Number of bins of the counting sorts. */
 #define TRC_BINS 4096
 
