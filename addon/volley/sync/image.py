@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Images: files by their path, everything else by its pixels.
 
-A plain file is read by the library itself. Packed, generated, painted and movie images, and files the
-library cannot read, come from Blender's pixels. A missing image is 0, which renders magenta.
+Plain and packed files are read by the library itself. Generated, painted and movie images, and files
+the library cannot read, come from Blender's pixels. A missing image is 0, which renders magenta.
 """
 
 import os
+import tempfile
 import zlib
 
 import numpy as np
@@ -61,15 +62,27 @@ class Images:
 
     def _create(self, image, path):
         is_srgb = self._is_srgb(image)
+        created = 0
         if path:
-            try:
-                return self._scene.create_image(
-                    path=path, is_srgb=is_srgb,
-                    alpha_mode=_ALPHA_MODES.get(image.alpha_mode, native.ALPHA_STRAIGHT))
-            except native.TracerError as error:
-                if error.status not in (native.ERROR_UNSUPPORTED, native.ERROR_IMAGE):
-                    raise
-        return self._from_pixels(image, is_srgb)
+            created = self._from_file(image, path, is_srgb)
+        elif _is_packed(image):
+            with tempfile.TemporaryDirectory() as folder:
+                path = os.path.join(folder, os.path.basename(image.filepath) or image.name)
+                with open(path, "wb") as file:
+                    file.write(image.packed_file.data)
+                created = self._from_file(image, path, is_srgb)
+        return created or self._from_pixels(image, is_srgb)
+
+    def _from_file(self, image, path, is_srgb):
+        """The image as the library reads it, 0 where it cannot."""
+        try:
+            return self._scene.create_image(
+                path=path, is_srgb=is_srgb,
+                alpha_mode=_ALPHA_MODES.get(image.alpha_mode, native.ALPHA_STRAIGHT))
+        except native.TracerError as error:
+            if error.status not in (native.ERROR_UNSUPPORTED, native.ERROR_IMAGE):
+                raise
+            return 0
 
     def _from_pixels(self, image, is_srgb):
         pixels = read_pixels(image)
@@ -98,10 +111,11 @@ def read_pixels(image):
         return None
     pixels = np.empty(len(image.pixels), np.float32)
     image.pixels.foreach_get(pixels)
-    pixels = _to_rgba(pixels.reshape(height, width, -1))
-    if image.is_float:
-        return pixels
-    return (pixels * 255.0 + 0.5).astype(np.uint8)
+    if not image.is_float:
+        np.multiply(pixels, 255.0, out=pixels)
+        pixels += 0.5
+        pixels = pixels.astype(np.uint8)
+    return _to_rgba(pixels.reshape(height, width, -1))
 
 
 def _to_rgba(pixels):
@@ -109,7 +123,8 @@ def _to_rgba(pixels):
     channels = pixels.shape[2]
     if channels == 4:
         return pixels
-    rgba = np.ones(pixels.shape[:2] + (4,), np.float32)
+    opaque = 255 if pixels.dtype == np.uint8 else 1.0
+    rgba = np.full(pixels.shape[:2] + (4,), opaque, pixels.dtype)
     rgba[..., :3] = pixels[..., :3] if channels >= 3 else pixels[..., :1]
     if channels == 2:
         rgba[..., 3] = pixels[..., 1]
@@ -131,11 +146,18 @@ def _file_path(image, image_user):
     return os.path.abspath(path) if path and os.path.isfile(path) else ""
 
 
+def _is_packed(image):
+    """Whether the file inside the .blend is what the image shows."""
+    return image.source == 'FILE' and image.packed_file is not None and not image.is_dirty
+
+
 def _signature(image, path):
     """Equal while the image's pixels and their meaning are."""
     meaning = (image.colorspace_settings.name, image.alpha_mode, path)
     if path:
         status = os.stat(path)
         return meaning + (status.st_mtime_ns, status.st_size)
+    if _is_packed(image):
+        return meaning + (zlib.crc32(image.packed_file.data),)
     pixels = read_pixels(image)
     return meaning + ((0,) if pixels is None else (pixels.shape, zlib.crc32(pixels.tobytes())))
