@@ -115,6 +115,10 @@ struct estimate {
     double value, error;
 };
 
+static vfloat lit_by(const struct trc_surface *s, const struct trc_light_sample *l) {
+    return vf_where(l->valid, l->radiance.y * vf_max(v3_dot(s->n, l->wi), vf_zero()) / l->pdf);
+}
+
 /* Irradiance at the point through light samples. */
 static struct estimate irradiance(const struct trc_surface *s) {
     struct test_random random = test_random_seed(7);
@@ -122,9 +126,13 @@ static struct estimate irradiance(const struct trc_surface *s) {
     for (int i = 0; i < SAMPLES; i += TRC_WIDTH) {
         struct trc_light_sample l;
         const vfloat u0 = test_wide_uniform(&random), u1 = test_wide_uniform(&random);
-        TRC_KERNEL(trc_light_sample)(s, s->n, u0, u1, test_wide_uniform(&random), &l);
-        const vfloat e =
-            vf_where(l.valid, l.radiance.y * vf_max(v3_dot(s->n, l.wi), vf_zero()) / l.pdf);
+        const vfloat u2 = test_wide_uniform(&random);
+        TRC_KERNEL(trc_light_sample)(s, s->n, u0, u1, u2, &l);
+        vfloat e = lit_by(s, &l);
+        if (s->snapshot->lights->world_apart) {
+            TRC_KERNEL(trc_light_sample_world)(s, s->n, u1, u2, &l);
+            e = e + lit_by(s, &l);
+        }
         for (int k = 0; k < TRC_WIDTH; k++) {
             const double v = (double)vf_get(e, k);
             assert_true(isfinite(v) && v >= 0);
@@ -237,8 +245,23 @@ static void areas_match_closed_forms(void **state) {
     for (int i = 0; i < 3; i++)
         s.snapshot.world.radiance[i] = 2.0f;
     scene_commit(&s, NULL, 0);
-    const struct trc_surface r = receiver(&s, 0, 0, 0);
+    struct trc_surface r = receiver(&s, 0, 0, 0);
+    assert_false(s.table->world_apart);
     expect("world", irradiance(&r), 2 * M_PI);
+    scene_end(&s);
+    /* Beside a lamp: each by samples of its own, and both are certain. */
+    scene_begin(&s);
+    s.snapshot.world.material = 1;
+    for (int i = 0; i < 3; i++)
+        s.snapshot.world.radiance[i] = 2.0f;
+    scene_commit(&s, &scaled, 1);
+    r = receiver(&s, 0, 0, 0);
+    assert_true(s.table->world_apart);
+    expect("world and rectangle", irradiance(&r), 2 * M_PI + 100.0 / 24 * polygon(corners, 4));
+    const struct trc_receiver who = trc_receiver_make(r.p, r.n);
+    for (int k = 0; k < 2; k++)
+        assert_true(
+            vm_all(vf_eq(trc_light_chance(s.table, &who, vi_set(k), vm_all_set()), vf_one())));
     scene_end(&s);
 }
 
