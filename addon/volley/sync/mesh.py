@@ -115,7 +115,12 @@ def _read(collection, name, shape, dtype):
 
 def _material_index(mesh, loops):
     """(triangles,) uint16, None when all are 0."""
-    slots = _read(mesh.polygons, "material_index", (len(mesh.polygons),), np.int32)
+    count = len(mesh.polygons)
+    attribute = mesh.attributes.get("material_index")
+    if attribute is not None and attribute.data_type == 'INT' and attribute.domain == 'FACE':
+        slots = _read(attribute.data, "value", (count,), np.int32)  # one copy, not a call per face
+    else:
+        slots = _read(mesh.polygons, "material_index", (count,), np.int32)
     if not slots.any():
         return None
     return slots.clip(0, 0xFFFF).astype(np.uint16)[loops.polygons]

@@ -58,15 +58,58 @@ static bool triangle_ref(const struct trc_part *part, uint32_t triangle, struct 
     return true;
 }
 
-/* Appends the valid triangles of a part. */
-static uint32_t part_refs(const struct trc_part *part, uint32_t index, struct trc_ref *refs) {
-    uint32_t count = 0;
-    for (uint32_t t = 0; t < part->mesh->triangle_count; t++)
-        if (triangle_ref(part, t, &refs[count])) {
-            refs[count].part = index;
-            refs[count].primitive = t;
-            count++;
+/* Triangles of a part that one task measures. */
+#define BLOCK_TRIANGLES 8192
+struct ref_block {
+    uint32_t part, begin, end; /* triangles */
+    uint32_t at, count;        /* where its refs start, and how many are valid */
+};
+struct ref_job {
+    const struct trc_part *parts;
+    struct trc_ref *refs;
+    struct ref_block *blocks;
+};
+
+static void block_task(void *context, uint32_t index, uint32_t worker) {
+    (void)worker;
+    const struct ref_job *job = context;
+    struct ref_block *block = &job->blocks[index];
+    for (uint32_t t = block->begin; t < block->end; t++) {
+        struct trc_ref *ref = &job->refs[block->at + block->count];
+        if (!triangle_ref(&job->parts[block->part], t, ref))
+            continue;
+        ref->part = block->part;
+        ref->primitive = t;
+        block->count++;
+    }
+}
+
+/* The valid triangles of all parts, in order; UINT32_MAX without memory. */
+static uint32_t refs_collect(const struct trc_part *parts, uint32_t part_count,
+                             struct trc_pool *pool, struct trc_ref *refs) {
+    uint32_t block_count = 0, at = 0;
+    for (uint32_t i = 0; i < part_count; i++)
+        block_count += (parts[i].mesh->triangle_count + BLOCK_TRIANGLES - 1) / BLOCK_TRIANGLES;
+    struct ref_block *blocks = trc_alloc_zeroed(block_count ? block_count : 1, sizeof *blocks);
+    if (!blocks)
+        return UINT32_MAX;
+    struct ref_block *block = blocks;
+    for (uint32_t i = 0; i < part_count; i++)
+        for (uint32_t t = 0; t < parts[i].mesh->triangle_count; t += BLOCK_TRIANGLES, block++) {
+            const uint32_t left = parts[i].mesh->triangle_count - t;
+            const uint32_t size = left < BLOCK_TRIANGLES ? left : BLOCK_TRIANGLES;
+            *block = (struct ref_block){.part = i, .begin = t, .end = t + size, .at = at};
+            at += size;
         }
+    struct ref_job job = {parts, refs, blocks};
+    trc_pool_run(pool, block_count, block_task, &job);
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < block_count; i++) {
+        if (count != blocks[i].at)
+            memmove(refs + count, refs + blocks[i].at, blocks[i].count * sizeof *refs);
+        count += blocks[i].count;
+    }
+    trc_free(blocks);
     return count;
 }
 
@@ -83,9 +126,12 @@ static trc_status tree_build(struct create_job *job, const struct trc_part *part
     if (!refs)
         return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory to build a tree of %llu triangles",
                         (unsigned long long)total);
-    uint32_t count = 0;
-    for (uint32_t i = 0; i < part_count; i++)
-        count += part_refs(&parts[i], i, refs + count);
+    const uint32_t count = refs_collect(parts, part_count, job->pool, refs);
+    if (count == UINT32_MAX) {
+        trc_free(refs);
+        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory to build a tree of %llu triangles",
+                        (unsigned long long)total);
+    }
     struct trc_topology topology;
     trc_status status =
         trc_topology_build(refs, count, TRC_NODE_WIDTH, job->pool, job->options->cancel, &topology);

@@ -9,6 +9,7 @@
 
 /* Leaves one task fills: large enough that handing out tasks costs nothing. */
 #define LEAVES_PER_TASK 1024
+#define NODES_PER_TASK 512
 
 void trc_part_vertex(const struct trc_part *part, uint32_t triangle, uint32_t v, uint32_t key,
                      float out[3]) {
@@ -219,15 +220,21 @@ static void leaf_bounds(const struct trc_tree *tree, uint32_t leaf, uint32_t key
                         float upper[3]) {
     const float *v = trc_leaf_vertices(tree, leaf, key);
     for (int axis = 0; axis < 3; axis++) {
-        float low = FLT_MAX, high = -FLT_MAX;
-        for (int corner = 0; corner < 3; corner++)
-            for (int slot = 0; slot < TRC_NODE_WIDTH; slot++) {
-                const float x = v[(3 * corner + axis) * TRC_NODE_WIDTH + slot];
-                low = x < low ? x : low;
-                high = x > high ? x : high;
-            }
-        lower[axis] = low;
-        upper[axis] = high;
+        const float *a = v + axis * TRC_NODE_WIDTH, *b = a + 3 * TRC_NODE_WIDTH,
+                    *c = b + 3 * TRC_NODE_WIDTH;
+        float low[TRC_NODE_WIDTH], high[TRC_NODE_WIDTH];
+        for (int slot = 0; slot < TRC_NODE_WIDTH; slot++) { /* side by side */
+            const float l = a[slot] < b[slot] ? a[slot] : b[slot];
+            const float h = a[slot] > b[slot] ? a[slot] : b[slot];
+            low[slot] = l < c[slot] ? l : c[slot];
+            high[slot] = h > c[slot] ? h : c[slot];
+        }
+        lower[axis] = low[0];
+        upper[axis] = high[0];
+        for (int slot = 1; slot < TRC_NODE_WIDTH; slot++) {
+            lower[axis] = low[slot] < lower[axis] ? low[slot] : lower[axis];
+            upper[axis] = high[slot] > upper[axis] ? high[slot] : upper[axis];
+        }
     }
 }
 
@@ -310,17 +317,34 @@ static void tree_finish(struct trc_tree *tree) {
     tree->sah_cost = root_area > 0.0f ? (float)(sum / root_area) : 0.0f;
 }
 
-void trc_tree_bound(struct trc_tree *tree, struct trc_pool *pool) {
-    (void)pool;
-    for (uint32_t n = tree->node_count; n-- > 0;) {
-        const uint32_t *children = trc_node_children(tree, n);
-        for (uint32_t key = 0; key < tree->key_count; key++)
-            for (uint32_t i = 0; i < TRC_NODE_WIDTH; i++) {
-                float lower[3], upper[3];
-                ref_bounds(tree, children[i], key, lower, upper);
-                child_store(tree, n, i, key, lower, upper);
-            }
+/* Boxes of a node's children of one sort: leaves and empty ones, or nodes. */
+static void children_bound(struct trc_tree *tree, uint32_t node, bool nodes) {
+    const uint32_t *children = trc_node_children(tree, node);
+    for (uint32_t i = 0; i < TRC_NODE_WIDTH; i++) {
+        const bool is_node = children[i] != TRC_REF_EMPTY && !(children[i] & TRC_REF_LEAF);
+        if (is_node != nodes)
+            continue;
+        for (uint32_t key = 0; key < tree->key_count; key++) {
+            float lower[3], upper[3];
+            ref_bounds(tree, children[i], key, lower, upper);
+            child_store(tree, node, i, key, lower, upper);
+        }
     }
+}
+
+static void bound_task(void *context, uint32_t index, uint32_t worker) {
+    (void)worker;
+    struct trc_tree *tree = context;
+    const uint32_t begin = index * NODES_PER_TASK;
+    for (uint32_t n = begin; n < tree->node_count && n < begin + NODES_PER_TASK; n++)
+        children_bound(tree, n, false);
+}
+
+/* Leaves by all threads, then nodes after their children. */
+void trc_tree_bound(struct trc_tree *tree, struct trc_pool *pool) {
+    trc_pool_run(pool, (tree->node_count + NODES_PER_TASK - 1) / NODES_PER_TASK, bound_task, tree);
+    for (uint32_t n = tree->node_count; n-- > 0;)
+        children_bound(tree, n, true);
     tree_finish(tree);
 }
 
