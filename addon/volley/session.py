@@ -18,6 +18,7 @@ from .sync.changes import Changes
 
 POLL_SECONDS = 0.02
 FIRST_PICTURE_SECONDS = 0.2  # until the first unfinished picture is shown
+STATUS_SECONDS = 0.2         # between two status lines
 PICTURE_SECONDS = 0.7        # between two of them
 PICTURE_COST = 20            # at least this many times what showing one takes
 MEGA = 1024.0 * 1024.0
@@ -169,6 +170,7 @@ class _Run:
         self._features = ", ".join(sync.scene.features())
         self._next_picture = time.monotonic() + FIRST_PICTURE_SECONDS
         self._shown_version = 0
+        self._next_status = 0.0
 
     def follow(self, layer_name, view_name, entries):
         """Poll until it ends or the user stops it; what is finished is kept either way."""
@@ -185,7 +187,7 @@ class _Run:
                     render.wait(-1.0)
                 progress = render.poll()
                 is_done = progress.state != native.STATE_RUNNING
-                self._show_progress(progress)
+                self._show_progress(progress, is_done)
                 if not is_done:
                     self._show_picture(progress, result, layer, entries)
             if progress.state == native.STATE_FAILED:
@@ -194,7 +196,11 @@ class _Run:
         finally:
             engine.end_result(result)
 
-    def _show_progress(self, progress):
+    def _show_progress(self, progress, is_done):
+        now = time.monotonic()
+        if now < self._next_status and not is_done:
+            return
+        self._next_status = now + STATUS_SECONDS
         self._engine.update_progress(progress.fraction)
         self._engine.update_stats("", status_text(progress, self._sample_count, self._features))
         self._engine.update_memory_stats(memory_used=progress.memory_bytes / MEGA,
