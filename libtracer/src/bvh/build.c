@@ -297,7 +297,9 @@ static bool range_divide(struct builder *b, const struct range *r, uint32_t leve
     return true;
 }
 
-/* Opens r into up to eight ranges, the largest area first; 1 when r stays a leaf. */
+/* Opens r into up to eight ranges, the largest area first, then the most refs; 1 when r stays a
+ * leaf.
+ */
 static int range_open(struct builder *b, const struct range *r, uint32_t level,
                       struct range out[TRC_NODE_WIDTH]) {
     int count = 1;
@@ -308,7 +310,9 @@ static int range_open(struct builder *b, const struct range *r, uint32_t level,
         float best_area = -1.0f;
         for (int i = 0; i < count; i++) {
             const float area = closed[i] ? -1.0f : box_area(out[i].bounds);
-            if (area > best_area) {
+            const bool ties = best >= 0 && area == best_area &&
+                              out[i].end - out[i].begin > out[best].end - out[best].begin;
+            if (area > best_area || ties) {
                 best_area = area;
                 best = i;
             }
