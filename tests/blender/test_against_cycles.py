@@ -230,3 +230,38 @@ def light_means(blender_of_module):
 def test_light(light_means, kind):
     ours, theirs = light_means[kind]
     assert ours == pytest.approx(theirs, rel=MEAN_TOLERANCE)
+
+
+# Whitted ---------------------------------------------------------------------------------------------
+
+def inside_whitted():
+    """A mirror and a glass ball under a point without size: every bounce is ideal, so Cycles, which
+    picks one branch at random, has the tree of rays for its mean."""
+    import bpy
+    import scenes
+    scenes.empty(size=(96, 64))
+    _, ball = _stage()
+    ball.location.x = -1.2
+    ball.data.materials[0] = scenes.material("Mirror", "ShaderNodeBsdfGlossy",
+                                             Color=(0.9, 0.8, 0.6), Roughness=0.0)
+    scenes.sphere("Glass", location=(1.2, 0, 1), material=scenes.material(
+        "Glass", "ShaderNodeBsdfGlass", Color=(0.9, 0.95, 1.0), Roughness=0.0, IOR=1.5))
+    scenes.wall("Back", 12.0, 4.0, (0, 2), scenes.emitter((0.2, 0.3, 0.5), "Sky"))
+    scenes.light('POINT', location=(2.0, -3.0, 4.0), energy=400.0, shadow_soft_size=0.0)
+    pictures = {}
+    for integrator in ('WHITTED', 'DISTRIBUTION'):
+        scenes.set_engine('VOLLEY', LIGHT_SAMPLES)
+        bpy.context.scene.volley.integrator = integrator
+        pictures[integrator] = scenes.render()
+    scenes.set_engine('CYCLES', 16 * LIGHT_SAMPLES)
+    pictures['CYCLES'] = scenes.render()
+    return pictures
+
+
+def test_whitted(blender):
+    pictures = blender.run(inside_whitted, timeout=300)
+    for integrator in ('WHITTED', 'DISTRIBUTION'):
+        difference = np.abs(pictures[integrator] - pictures['CYCLES'])[..., :3].max(axis=-1)
+        assert (difference > 0.1).mean() < 0.01, integrator
+        assert pictures[integrator][..., :3].mean(axis=(0, 1)) == pytest.approx(
+            pictures['CYCLES'][..., :3].mean(axis=(0, 1)), rel=MEAN_TOLERANCE), integrator
