@@ -346,13 +346,15 @@ static void trees_do_not_depend_on_threads(void **state) {
         const struct trc_tree *a = &query_scene_snapshot(one.scene)->bvh->blas[0]->tree;
         const struct trc_tree *b = &query_scene_snapshot(other.scene)->bvh->blas[0]->tree;
         assert_int_equal(a->node_count, b->node_count);
-        assert_int_equal(a->leaf_count, b->leaf_count);
+        assert_int_equal(a->slot_count, b->slot_count);
         for (uint32_t n = 0; n < a->node_count; n++) { /* the rest of the header is not used */
             assert_memory_equal(trc_node_children(a, n), trc_node_children(b, n), 32);
             assert_memory_equal(trc_node_bounds(a, n, 0), trc_node_bounds(b, n, 0),
                                 TRC_NODE_KEY_BYTES);
         }
-        assert_memory_equal(a->leaves, b->leaves, a->leaf_count * a->leaf_stride);
+        assert_memory_equal(a->slots, b->slots, a->slot_count * sizeof *a->slots);
+        assert_memory_equal(a->vertices, b->vertices,
+                            a->slot_count * TRC_TRIANGLE_FLOATS * sizeof *a->vertices);
         query_scene_destroy(&other);
     }
     query_scene_destroy(&one);
@@ -363,9 +365,9 @@ static void trees_do_not_depend_on_threads(void **state) {
 
 /* What is done to a tree; each is undone by restoring its bytes. */
 static void damage(struct trc_tree *tree, int kind) {
-    uint32_t *root = (uint32_t *)tree->nodes, *leaf = (uint32_t *)tree->leaves;
+    uint32_t *root = (uint32_t *)tree->nodes;
+    struct trc_slot *slots = tree->slots;
     float *bounds = (float *)(tree->nodes + TRC_NODE_HEADER_BYTES);
-    float *vertices = (float *)(tree->leaves + TRC_LEAF_HEADER_BYTES);
     switch (kind) {
     case 0:
         bounds[0] = nextafterf(bounds[0], INFINITY);
@@ -386,22 +388,22 @@ static void damage(struct trc_tree *tree, int kind) {
         root[0] = TRC_REF_EMPTY;
         break; /* a part lost */
     case 6:
-        leaf[8] = leaf[9];
+        slots[0].triangle = slots[1].triangle;
         break; /* a triangle twice */
     case 7:
-        leaf[8] = 1u << 30;
+        slots[0].triangle = 1u << 30;
         break; /* a number out of range */
     case 8:
-        leaf[0] = 5;
+        slots[0].instance = 5;
         break; /* another instance */
     case 9:
-        leaf[8] = TRC_EMPTY_SLOT;
-        break; /* a hole */
+        slots[0] = slots[tree->slot_count - 1];
+        break; /* one in two leaves */
     case 10:
-        vertices[3] += 1e-3f;
+        tree->vertices[3] += 1e-3f;
         break; /* another place */
     case 11:
-        leaf[0] |= TRC_SLOT_TRANSPARENT;
+        slots[0].instance |= TRC_SLOT_TRANSPARENT;
         break; /* a flag the tree does not know of */
     default:
         break;
@@ -418,11 +420,12 @@ static void check_finds_damage(void **state) {
     assert_ok(query_scene_create(&world, false, 1, &scene));
     const struct trc_snapshot *snapshot = query_scene_snapshot(scene.scene);
     struct trc_tree *tree = &snapshot->bvh->blas[0]->tree;
-    const size_t node_bytes = tree->node_stride, leaf_bytes = tree->leaf_stride;
-    uint8_t *node = malloc(node_bytes), *leaf = malloc(leaf_bytes);
-    assert_true(node && leaf);
+    const size_t node_bytes = tree->node_stride;
+    uint8_t *node = malloc(node_bytes);
+    assert_non_null(node);
     memcpy(node, tree->nodes, node_bytes);
-    memcpy(leaf, tree->leaves, leaf_bytes);
+    const struct trc_slot slot = tree->slots[0];
+    const float coordinate = tree->vertices[3];
     for (int kind = 0; kind < 12; kind++) {
         char message[256] = "";
         damage(tree, kind);
@@ -431,7 +434,8 @@ static void check_finds_damage(void **state) {
         assert_true(strlen(message) > 0);
         assert_false(trc_bvh_check(snapshot->bvh, snapshot, NULL, 0));
         memcpy(tree->nodes, node, node_bytes);
-        memcpy(tree->leaves, leaf, leaf_bytes);
+        tree->slots[0] = slot;
+        tree->vertices[3] = coordinate;
         expect_good(scene.scene, "mended");
     }
     tree->triangle_count++;
@@ -440,7 +444,6 @@ static void check_finds_damage(void **state) {
     tree->upper[0] = 0.0f;
     assert_false(trc_bvh_check(snapshot->bvh, snapshot, NULL, 0));
     free(node);
-    free(leaf);
     query_scene_destroy(&scene);
     query_world_free(&world);
 }

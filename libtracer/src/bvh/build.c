@@ -211,8 +211,7 @@ static void split_middle(const struct trc_ref *refs, const struct range *r, stru
 /* A growing part of the tree. */
 struct arena {
     uint32_t (*children)[TRC_NODE_WIDTH];
-    uint32_t *leaf_begin;
-    uint32_t node_count, node_capacity, leaf_count, leaf_capacity;
+    uint32_t node_count, node_capacity;
     bool failed;
 };
 
@@ -258,19 +257,6 @@ static uint32_t arena_node(struct arena *a) {
     for (int i = 0; i < TRC_NODE_WIDTH; i++)
         a->children[a->node_count][i] = TRC_REF_EMPTY;
     return a->node_count++;
-}
-
-static uint32_t arena_leaf(struct arena *a, const struct range *r) {
-    if (a->leaf_count == a->leaf_capacity) {
-        void *begins = a->leaf_begin;
-        if (!grow(&begins, &a->leaf_capacity, sizeof *a->leaf_begin)) {
-            a->failed = true;
-            return TRC_REF_EMPTY;
-        }
-        a->leaf_begin = begins;
-    }
-    a->leaf_begin[a->leaf_count] = r->begin;
-    return TRC_REF_LEAF | ((r->end - r->begin - 1) << 28) | a->leaf_count++;
 }
 
 /* Splits r in two unless it is better, and possible, to leave it a leaf. */
@@ -339,7 +325,7 @@ static uint32_t build_range(struct builder *b, struct arena *a, const struct ran
         return TRC_REF_EMPTY;
     const int count = range_open(b, r, level, child);
     if (count == 1)
-        return arena_leaf(a, r);
+        return trc_leaf_ref(r->begin, r->end - r->begin);
     const uint32_t node = arena_node(a);
     if (a->failed)
         return TRC_REF_EMPTY;
@@ -373,43 +359,34 @@ static void task_run(void *context, uint32_t index, uint32_t worker) {
 /* Appends the tasks' parts to the upper part. */
 static trc_status join(struct builder *b, struct arena *top, uint32_t root,
                        struct trc_topology *out) {
-    uint32_t node_count = top->node_count, leaf_count = top->leaf_count;
+    uint32_t node_count = top->node_count;
     bool failed = top->failed || b->failed;
     for (uint32_t i = 0; i < b->task_count; i++) {
         node_count += b->tasks[i].arena.node_count;
-        leaf_count += b->tasks[i].arena.leaf_count;
         failed = failed || b->tasks[i].arena.failed;
     }
     if (b->cancel && *b->cancel)
         return trc_fail(TRC_ERROR_CANCELLED, "the build was cancelled");
     if (failed)
         return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for a tree");
-    *out = (struct trc_topology){.node_count = node_count, .leaf_count = leaf_count, .root = root};
+    *out = (struct trc_topology){.node_count = node_count, .root = root};
     out->children = trc_alloc(node_count ? node_count : 1, sizeof *out->children);
-    out->leaf_begin = trc_alloc(leaf_count ? leaf_count : 1, sizeof *out->leaf_begin);
-    if (!out->children || !out->leaf_begin) {
+    if (!out->children) {
         trc_topology_destroy(out);
         return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for a tree of %u nodes", node_count);
     }
     if (top->node_count)
         memcpy(out->children, top->children, top->node_count * sizeof *out->children);
-    if (top->leaf_count)
-        memcpy(out->leaf_begin, top->leaf_begin, top->leaf_count * sizeof *out->leaf_begin);
-    uint32_t node = top->node_count, leaf = top->leaf_count;
+    uint32_t node = top->node_count;
     for (uint32_t i = 0; i < b->task_count; i++) {
         const struct task *t = &b->tasks[i];
         for (uint32_t n = 0; n < t->arena.node_count; n++)
             for (int c = 0; c < TRC_NODE_WIDTH; c++) {
                 const uint32_t ref = t->arena.children[n][c];
-                out->children[node + n][c] =
-                    ref == TRC_REF_EMPTY ? ref : ref + ((ref & TRC_REF_LEAF) ? leaf : node);
+                out->children[node + n][c] = (ref & TRC_REF_LEAF) ? ref : ref + node;
             }
-        if (t->arena.leaf_count)
-            memcpy(out->leaf_begin + leaf, t->arena.leaf_begin,
-                   t->arena.leaf_count * sizeof *out->leaf_begin);
-        out->children[t->parent][t->slot] = t->root + ((t->root & TRC_REF_LEAF) ? leaf : node);
+        out->children[t->parent][t->slot] = (t->root & TRC_REF_LEAF) ? t->root : t->root + node;
         node += t->arena.node_count;
-        leaf += t->arena.leaf_count;
     }
     return TRC_OK;
 }
@@ -430,18 +407,14 @@ trc_status trc_topology_build(struct trc_ref *refs, uint32_t count, uint32_t lea
     if (!top.failed && !b.failed)
         trc_pool_run(pool, b.task_count, task_run, &b);
     const trc_status status = join(&b, &top, root, out);
-    for (uint32_t i = 0; i < b.task_count; i++) {
+    for (uint32_t i = 0; i < b.task_count; i++)
         trc_free(b.tasks[i].arena.children);
-        trc_free(b.tasks[i].arena.leaf_begin);
-    }
     trc_free(b.tasks);
     trc_free(top.children);
-    trc_free(top.leaf_begin);
     return status;
 }
 
 void trc_topology_destroy(struct trc_topology *topology) {
     trc_free(topology->children);
-    trc_free(topology->leaf_begin);
     *topology = (struct trc_topology){.root = TRC_REF_EMPTY};
 }

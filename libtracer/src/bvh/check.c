@@ -1,6 +1,6 @@
 /* Invariants of trees, by walking them whole: for tests and for debugging, not for speed.
  *
- * What traversal relies on: references in range, every node and leaf reached once and nodes after
+ * What traversal relies on: references in range, every node and slot reached once and nodes after
  * their parents (so there is no cycle), no path longer than the stack allows, boxes that hold what
  * is below them at every key, leaves that hold their triangles' vertices as the mesh and the
  * transform give them. Containment between keys follows up to rounding, as boxes and vertices are
@@ -30,8 +30,8 @@ struct tree_check {
     const struct trc_part *parts; /* by instance number: joined; one part: a mesh's own */
     const uint64_t *first;        /* of each part: its triangles in seen */
     bool is_joined;
-    uint8_t *nodes, *leaves; /* reached */
-    uint8_t *seen;           /* triangles found in leaves */
+    uint8_t *nodes, *slots; /* reached */
+    uint8_t *seen;          /* triangles found in leaves */
     uint64_t seen_count;
     bool transparent;
 };
@@ -70,24 +70,24 @@ static void child_box(const struct trc_tree *tree, uint32_t node, uint32_t child
 /* ---- leaves ---- */
 
 /* The part of a used slot, or NULL with a message. */
-static const struct trc_part *slot_part(struct tree_check *t, uint32_t leaf, uint32_t slot) {
+static const struct trc_part *slot_part(struct tree_check *t, uint32_t slot) {
     const struct trc_snapshot *s = t->checker->snapshot;
-    const uint32_t word = trc_leaf_instances(t->tree, leaf)[slot];
+    const uint32_t word = t->tree->slots[slot].instance;
     const uint32_t instance = word & TRC_SLOT_INSTANCE_MASK;
-    const uint32_t triangle = trc_leaf_triangles(t->tree, leaf)[slot];
+    const uint32_t triangle = t->tree->slots[slot].triangle;
     const struct trc_part *part = NULL;
     if (!t->is_joined && instance == 0)
         part = t->parts;
     if (t->is_joined && instance < s->instance_count)
         part = &t->parts[instance];
     if (!part || !part->mesh) {
-        complain(t->checker, "%s: leaf %u slot %u: instance %u does not belong here", t->name, leaf,
-                 slot, instance);
+        complain(t->checker, "%s: slot %u: instance %u does not belong here", t->name, slot,
+                 instance);
         return NULL;
     }
     if (triangle >= part->mesh->triangle_count) {
-        complain(t->checker, "%s: leaf %u slot %u: triangle %u of %u", t->name, leaf, slot,
-                 triangle, part->mesh->triangle_count);
+        complain(t->checker, "%s: slot %u: triangle %u of %u", t->name, slot, triangle,
+                 part->mesh->triangle_count);
         return NULL;
     }
     if (word & TRC_SLOT_TRANSPARENT)
@@ -95,24 +95,23 @@ static const struct trc_part *slot_part(struct tree_check *t, uint32_t leaf, uin
     return part;
 }
 
-/* The vertices in a slot are those of a triangle of the part, and valid. */
-static bool check_vertices(struct tree_check *t, uint32_t leaf, uint32_t slot,
+/* The vertices in a leaf's slot i are those of a triangle of the part, and valid. */
+static bool check_vertices(struct tree_check *t, uint32_t ref, uint32_t i,
                            const struct trc_part *part, uint32_t triangle) {
+    const uint32_t count = trc_leaf_count(ref);
     for (uint32_t key = 0; key < t->tree->key_count; key++) {
-        const float *v = trc_leaf_vertices(t->tree, leaf, key);
+        const float *v = trc_leaf_vertices(t->tree, ref, key);
         float triangle_corners[3][3];
         trc_part_triangle(part, triangle, key, triangle_corners);
         for (uint32_t corner = 0; corner < 3; corner++) {
             const float *expected = triangle_corners[corner];
             float actual[3];
             for (uint32_t axis = 0; axis < 3; axis++)
-                actual[axis] = v[(3 * corner + axis) * TRC_NODE_WIDTH + slot];
+                actual[axis] = v[(3 * corner + axis) * count + i];
             if (memcmp(expected, actual, sizeof actual) != 0)
-                return complain(
-                    t->checker,
-                    "%s: leaf %u slot %u: corner %u of triangle %u is not the mesh's at "
-                    "key %u",
-                    t->name, leaf, slot, corner, triangle, key);
+                return complain(t->checker,
+                                "%s: slot %u: corner %u of triangle %u is not the mesh's at key %u",
+                                t->name, trc_leaf_first(ref) + i, corner, triangle, key);
             if (!trc_point_is_valid(actual))
                 return complain(t->checker,
                                 "%s: triangle %u has an invalid vertex and is in a leaf", t->name,
@@ -123,40 +122,33 @@ static bool check_vertices(struct tree_check *t, uint32_t leaf, uint32_t slot,
 }
 
 static bool check_leaf(struct tree_check *t, uint32_t ref) {
-    const uint32_t leaf = ref & TRC_REF_INDEX_MASK, count = ((ref >> 28) & 7u) + 1u;
-    const uint32_t *triangles = trc_leaf_triangles(t->tree, leaf);
-    const struct trc_part *part = NULL;
-    uint32_t last = 0;
-    for (uint32_t slot = 0; slot < TRC_NODE_WIDTH; slot++) {
-        if ((triangles[slot] != TRC_EMPTY_SLOT) != (slot < count))
-            return complain(t->checker, "%s: leaf %u: slot %u of %u is %s", t->name, leaf, slot,
-                            count, slot < count ? "empty" : "used");
-        if (slot < count) {
-            part = slot_part(t, leaf, slot);
-            if (!part)
-                return false;
-            last = triangles[slot];
-            uint8_t *seen = &t->seen[t->first[part - t->parts] + last];
-            if (*seen)
-                return complain(t->checker, "%s: triangle %u is in two leaves", t->name, last);
-            *seen = 1;
-            t->seen_count++;
-        }
-        if (!check_vertices(t, leaf, slot, part, last))
+    const uint32_t first = trc_leaf_first(ref), count = trc_leaf_count(ref);
+    for (uint32_t i = 0; i < count; i++) {
+        const struct trc_part *part = slot_part(t, first + i);
+        if (!part)
+            return false;
+        const uint32_t triangle = t->tree->slots[first + i].triangle;
+        uint8_t *seen = &t->seen[t->first[part - t->parts] + triangle];
+        if (*seen)
+            return complain(t->checker, "%s: triangle %u is in two leaves", t->name, triangle);
+        *seen = 1;
+        t->seen_count++;
+        if (!check_vertices(t, ref, i, part, triangle))
             return false;
     }
     return true;
 }
 
-static void leaf_box(const struct trc_tree *tree, uint32_t leaf, uint32_t key, float lower[3],
+static void leaf_box(const struct trc_tree *tree, uint32_t ref, uint32_t key, float lower[3],
                      float upper[3]) {
-    const float *v = trc_leaf_vertices(tree, leaf, key);
+    const uint32_t count = trc_leaf_count(ref);
+    const float *v = trc_leaf_vertices(tree, ref, key);
     for (uint32_t axis = 0; axis < 3; axis++) {
         lower[axis] = INFINITY;
         upper[axis] = -INFINITY;
         for (uint32_t corner = 0; corner < 3; corner++)
-            for (uint32_t slot = 0; slot < TRC_NODE_WIDTH; slot++) {
-                const float x = v[(3 * corner + axis) * TRC_NODE_WIDTH + slot];
+            for (uint32_t i = 0; i < count; i++) {
+                const float x = v[(3 * corner + axis) * count + i];
                 lower[axis] = fminf(lower[axis], x);
                 upper[axis] = fmaxf(upper[axis], x);
             }
@@ -194,14 +186,14 @@ static void item_box(const struct trc_snapshot *s, const struct trc_item *item, 
 }
 
 /* The box that a top tree's parent keeps for an item (of the whole tree, when it is the root). */
-static bool check_item_box(struct tree_check *t, uint32_t leaf, const float lower[3],
+static bool check_item_box(struct tree_check *t, uint32_t slot, const float lower[3],
                            const float upper[3]) {
     double item_lower[3], item_upper[3];
-    item_box(t->checker->snapshot, &t->tree->items[leaf], item_lower, item_upper);
+    item_box(t->checker->snapshot, &t->tree->items[slot], item_lower, item_upper);
     for (int axis = 0; axis < 3; axis++)
         if (!((double)lower[axis] <= item_lower[axis] && item_upper[axis] <= (double)upper[axis]))
             return complain(t->checker, "%s: item %u sticks out of its box on axis %d", t->name,
-                            leaf, axis);
+                            slot, axis);
     return true;
 }
 
@@ -233,15 +225,18 @@ static bool check_item(struct checker *c, const struct trc_item *item, uint8_t *
 static bool check_ref(struct tree_check *t, uint32_t ref, uint32_t parent) {
     const bool is_leaf = (ref & TRC_REF_LEAF) != 0;
     const uint32_t index = ref & TRC_REF_INDEX_MASK;
-    if (index >= (is_leaf ? t->tree->leaf_count : t->tree->node_count))
+    const uint32_t end = index + (is_leaf ? trc_leaf_count(ref) : 1u);
+    if (end > (is_leaf ? t->tree->slot_count : t->tree->node_count))
         return complain(t->checker, "%s: reference %08x is out of range", t->name, ref);
     if (!is_leaf && parent != UINT32_MAX && index <= parent)
         return complain(t->checker, "%s: node %u stands before its parent %u", t->name, index,
                         parent);
-    uint8_t *reached = is_leaf ? &t->leaves[index] : &t->nodes[index];
-    if (*reached)
-        return complain(t->checker, "%s: reference %08x is reached twice", t->name, ref);
-    *reached = 1;
+    uint8_t *reached = is_leaf ? t->slots : t->nodes;
+    for (uint32_t i = index; i < end; i++) {
+        if (reached[i])
+            return complain(t->checker, "%s: reference %08x is reached twice", t->name, ref);
+        reached[i] = 1;
+    }
     return true;
 }
 
@@ -253,10 +248,10 @@ static bool check_box(struct tree_check *t, uint32_t ref, uint32_t key, const fl
     if ((ref & TRC_REF_LEAF) && t->tree->is_top)
         return check_item_box(t, index, lower, upper);
     if (ref & TRC_REF_LEAF) {
-        leaf_box(t->tree, index, key, low, high);
+        leaf_box(t->tree, ref, key, low, high);
         if (box_holds(lower, upper, low, high))
             return true;
-        return complain(t->checker, "%s: leaf %u sticks out of its box at key %u", t->name, index,
+        return complain(t->checker, "%s: leaf %08x sticks out of its box at key %u", t->name, ref,
                         key);
     }
     for (uint32_t i = 0; i < TRC_NODE_WIDTH; i++) {
@@ -310,7 +305,7 @@ static bool check_below(struct tree_check *t, uint32_t ref, uint32_t parent, uin
     return true;
 }
 
-/* Shape and boxes from the root; every node and leaf is reached. */
+/* Shape and boxes from the root; every node and slot is reached. */
 static bool check_shape(struct tree_check *t) {
     const struct trc_tree *tree = t->tree;
     if (tree->root != TRC_REF_EMPTY) {
@@ -327,9 +322,9 @@ static bool check_shape(struct tree_check *t) {
     for (uint32_t i = 0; i < tree->node_count; i++)
         if (!t->nodes[i])
             return complain(t->checker, "%s: node %u is not reached", t->name, i);
-    for (uint32_t i = 0; i < tree->leaf_count; i++)
-        if (!t->leaves[i])
-            return complain(t->checker, "%s: leaf %u is not reached", t->name, i);
+    for (uint32_t i = 0; i < tree->slot_count; i++)
+        if (!t->slots[i])
+            return complain(t->checker, "%s: slot %u is not reached", t->name, i);
     return true;
 }
 
@@ -379,14 +374,14 @@ static bool check_tree(struct tree_check *t, uint32_t part_count, uint64_t *firs
     }
     t->first = first;
     t->nodes = trc_alloc_zeroed(t->tree->node_count, 1);
-    t->leaves = trc_alloc_zeroed(t->tree->leaf_count, 1);
+    t->slots = trc_alloc_zeroed(t->tree->slot_count, 1);
     t->seen = trc_alloc_zeroed(total, 1);
-    bool good = t->nodes && t->leaves && t->seen;
+    bool good = t->nodes && t->slots && t->seen;
     if (!good)
         complain(t->checker, "no memory to check a tree");
     good = good && check_shape(t) && (t->tree->is_top || check_absent(t, part_count));
     trc_free(t->nodes);
-    trc_free(t->leaves);
+    trc_free(t->slots);
     trc_free(t->seen);
     return good;
 }
@@ -447,7 +442,7 @@ static bool check_top(struct checker *c, uint8_t *placed) {
     const struct trc_tree *top = &c->bvh->top;
     if (c->bvh->tree != top)
         return true;
-    for (uint32_t i = 0; i < top->leaf_count; i++)
+    for (uint32_t i = 0; i < top->slot_count; i++)
         if (!check_item(c, &top->items[i], placed))
             return false;
     struct tree_check t = {.checker = c, .name = "top tree", .tree = top};

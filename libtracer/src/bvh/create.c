@@ -136,7 +136,7 @@ static trc_status tree_build(struct create_job *job, const struct trc_part *part
     trc_status status =
         trc_topology_build(refs, count, TRC_NODE_WIDTH, job->pool, job->options->cancel, &topology);
     if (status == TRC_OK) {
-        status = trc_tree_fill(&topology, refs, parts, key_count, job->pool, tree);
+        status = trc_tree_fill(&topology, refs, count, parts, key_count, job->pool, tree);
         trc_topology_destroy(&topology);
     }
     trc_free(refs);
@@ -352,7 +352,7 @@ static trc_status top_build(struct create_job *job) {
             struct trc_topology topology;
             status = trc_topology_build(refs, count, 1, job->pool, job->options->cancel, &topology);
             if (status == TRC_OK) {
-                status = trc_tree_fill_top(&topology, refs, items, bvh->items, &bvh->top);
+                status = trc_tree_fill_top(&topology, refs, count, items, bvh->items, &bvh->top);
                 trc_topology_destroy(&topology);
             }
             for (int axis = 0; axis < 3; axis++) {

@@ -7,9 +7,10 @@
 #include "core/core.h"
 #include "threads/pool.h"
 
-/* Leaves one task fills: large enough that handing out tasks costs nothing. */
-#define LEAVES_PER_TASK 1024
-#define NODES_PER_TASK 512
+/* Nodes whose leaves one task fills: large enough that handing out tasks costs nothing. */
+#define NODES_PER_TASK 256
+/* Kernels load this many slots from wherever a leaf begins. */
+#define LOAD_SLOTS 8
 
 void trc_part_vertex(const struct trc_part *part, uint32_t triangle, uint32_t v, uint32_t key,
                      float out[3]) {
@@ -49,60 +50,44 @@ void trc_part_triangle(const struct trc_part *part, uint32_t triangle, uint32_t 
             memcpy(out[v], out[0], sizeof out[0]);
 }
 
-static trc_status tree_alloc(struct trc_tree *tree, uint32_t node_count, uint32_t leaf_count,
+static trc_status tree_alloc(struct trc_tree *tree, uint32_t node_count, uint32_t slot_count,
                              uint32_t key_count, bool is_top) {
     *tree = (struct trc_tree){.key_count = key_count,
                               .node_count = node_count,
-                              .leaf_count = leaf_count,
+                              .slot_count = slot_count,
                               .root = TRC_REF_EMPTY,
                               .is_top = is_top};
     tree->node_stride = TRC_NODE_HEADER_BYTES + (size_t)key_count * TRC_NODE_KEY_BYTES;
-    tree->leaf_stride = is_top ? 0 : TRC_LEAF_HEADER_BYTES + (size_t)key_count * TRC_LEAF_KEY_BYTES;
     tree->nodes = trc_alloc(node_count ? node_count : 1, tree->node_stride);
-    if (!is_top)
-        tree->leaves = trc_alloc(leaf_count ? leaf_count : 1, tree->leaf_stride);
-    if (!tree->nodes || (!is_top && !tree->leaves)) {
-        trc_tree_destroy(tree);
-        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for a tree of %u nodes and %u leaves",
-                        node_count, leaf_count);
+    const size_t floats = (size_t)slot_count * key_count * TRC_TRIANGLE_FLOATS;
+    if (!is_top) {
+        tree->vertices = trc_alloc(floats + LOAD_SLOTS, sizeof *tree->vertices);
+        tree->slots = trc_alloc(slot_count ? slot_count : 1, sizeof *tree->slots);
     }
-    tree->bytes =
-        node_count * (uint64_t)tree->node_stride + leaf_count * (uint64_t)tree->leaf_stride;
+    if (!tree->nodes || (!is_top && (!tree->vertices || !tree->slots))) {
+        trc_tree_destroy(tree);
+        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for a tree of %u nodes and %u slots",
+                        node_count, slot_count);
+    }
+    tree->bytes = node_count * (uint64_t)tree->node_stride;
+    if (!is_top) {
+        memset(tree->vertices + floats, 0, LOAD_SLOTS * sizeof *tree->vertices);
+        tree->bytes += (floats + LOAD_SLOTS) * sizeof *tree->vertices +
+                       slot_count * (uint64_t)sizeof *tree->slots;
+    }
     return TRC_OK;
 }
 
 void trc_tree_destroy(struct trc_tree *tree) {
     trc_free(tree->nodes);
-    trc_free(tree->leaves);
+    trc_free(tree->vertices);
+    trc_free(tree->slots);
     *tree = (struct trc_tree){.root = TRC_REF_EMPTY};
 }
 
-/* Vertices of all slots of a leaf from the triangle numbers in its header. part_of: the part of a
- * slot. */
-static void leaf_vertices(struct trc_tree *tree, uint32_t leaf,
-                          const struct trc_part *const *part_of) {
-    const uint32_t *triangles = trc_leaf_triangles(tree, leaf);
-    uint32_t used = 0;
-    while (used < TRC_NODE_WIDTH && triangles[used] != TRC_EMPTY_SLOT)
-        used++;
-    for (uint32_t key = 0; key < tree->key_count; key++) {
-        float *v = (float *)trc_leaf_vertices(tree, leaf, key);
-        for (uint32_t slot = 0; slot < TRC_NODE_WIDTH; slot++) {
-            const uint32_t from = slot < used ? slot : used - 1;
-            float p[3][3];
-            trc_part_triangle(part_of[from], triangles[from], key, p);
-            for (uint32_t corner = 0; corner < 3; corner++)
-                for (uint32_t axis = 0; axis < 3; axis++)
-                    v[(3 * corner + axis) * TRC_NODE_WIDTH + slot] = p[corner][axis];
-        }
-    }
-}
-
 struct fill_job {
-    const struct trc_topology *topology;
-    const struct trc_ref *refs;
+    const struct trc_ref *refs; /* by slot; NULL: the slots are there, all of parts[0] */
     const struct trc_part *parts;
-    const uint8_t *leaf_counts;
     struct trc_tree *tree;
     atomic_bool transparent;
 };
@@ -114,127 +99,53 @@ static bool part_is_transparent(const struct trc_part *part, uint32_t triangle) 
     return part->transparent[slot < part->slot_count ? slot : part->slot_count - 1] != 0;
 }
 
-static void fill_task(void *context, uint32_t index, uint32_t worker) {
-    (void)worker;
-    struct fill_job *job = context;
+static const struct trc_part *slot_fill(struct fill_job *job, uint32_t slot) {
+    if (!job->refs)
+        return job->parts;
+    const struct trc_ref *ref = &job->refs[slot];
+    const struct trc_part *part = &job->parts[ref->part];
+    const bool transparent = part_is_transparent(part, ref->primitive);
+    if (transparent)
+        atomic_store_explicit(&job->transparent, true, memory_order_relaxed);
+    job->tree->slots[slot] = (struct trc_slot){
+        part->instance | (transparent ? TRC_SLOT_TRANSPARENT : 0u), ref->primitive};
+    return part;
+}
+
+static void leaf_fill(struct fill_job *job, uint32_t ref) {
     struct trc_tree *tree = job->tree;
-    const uint32_t begin = index * LEAVES_PER_TASK;
-    const uint32_t end =
-        tree->leaf_count - begin < LEAVES_PER_TASK ? tree->leaf_count : begin + LEAVES_PER_TASK;
-    for (uint32_t leaf = begin; leaf < end; leaf++) {
-        uint32_t *instances = (uint32_t *)trc_leaf_instances(tree, leaf);
-        uint32_t *triangles = instances + TRC_NODE_WIDTH;
-        const struct trc_part *part_of[TRC_NODE_WIDTH];
-        const uint32_t count = job->leaf_counts[leaf];
-        for (uint32_t slot = 0; slot < TRC_NODE_WIDTH; slot++) {
-            const struct trc_ref *ref =
-                &job->refs[job->topology->leaf_begin[leaf] + (slot < count ? slot : count - 1)];
-            part_of[slot] = &job->parts[ref->part];
-            const bool transparent = part_is_transparent(part_of[slot], ref->primitive);
-            if (transparent)
-                atomic_store_explicit(&job->transparent, true, memory_order_relaxed);
-            instances[slot] = part_of[slot]->instance | (transparent ? TRC_SLOT_TRANSPARENT : 0u);
-            triangles[slot] = slot < count ? ref->primitive : TRC_EMPTY_SLOT;
+    const uint32_t first = trc_leaf_first(ref), count = trc_leaf_count(ref);
+    for (uint32_t slot = 0; slot < count; slot++) {
+        const struct trc_part *part = slot_fill(job, first + slot);
+        for (uint32_t key = 0; key < tree->key_count; key++) {
+            float *v = trc_leaf_vertices(tree, ref, key) + slot;
+            float p[3][3];
+            trc_part_triangle(part, tree->slots[first + slot].triangle, key, p);
+            for (uint32_t corner = 0; corner < 3; corner++)
+                for (uint32_t axis = 0; axis < 3; axis++)
+                    v[(3 * corner + axis) * count] = p[corner][axis];
         }
-        leaf_vertices(tree, leaf, part_of);
     }
-}
-
-/* Counts live in the references, the task wants them by leaf. */
-static void leaf_counts_collect(const struct trc_topology *topology, uint8_t *counts) {
-    if (topology->root != TRC_REF_EMPTY && (topology->root & TRC_REF_LEAF))
-        counts[topology->root & TRC_REF_INDEX_MASK] = (uint8_t)(((topology->root >> 28) & 7u) + 1u);
-    for (uint32_t n = 0; n < topology->node_count; n++)
-        for (int i = 0; i < TRC_NODE_WIDTH; i++) {
-            const uint32_t ref = topology->children[n][i];
-            if (ref != TRC_REF_EMPTY && (ref & TRC_REF_LEAF))
-                counts[ref & TRC_REF_INDEX_MASK] = (uint8_t)(((ref >> 28) & 7u) + 1u);
-        }
-}
-
-trc_status trc_tree_fill(const struct trc_topology *topology, const struct trc_ref *refs,
-                         const struct trc_part *parts, uint32_t key_count, struct trc_pool *pool,
-                         struct trc_tree *tree) {
-    const trc_status status =
-        tree_alloc(tree, topology->node_count, topology->leaf_count, key_count, false);
-    if (status != TRC_OK)
-        return status;
-    uint8_t *counts = trc_alloc_zeroed(topology->leaf_count ? topology->leaf_count : 1, 1);
-    if (!counts) {
-        trc_tree_destroy(tree);
-        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for %u leaves", topology->leaf_count);
-    }
-    leaf_counts_collect(topology, counts);
-    for (uint32_t n = 0; n < topology->node_count; n++)
-        memcpy(tree->nodes + n * tree->node_stride, topology->children[n],
-               sizeof topology->children[n]);
-    struct fill_job job = {topology, refs, parts, counts, tree, false};
-    trc_pool_run(pool, (topology->leaf_count + LEAVES_PER_TASK - 1) / LEAVES_PER_TASK, fill_task,
-                 &job);
-    trc_free(counts);
-    tree->root = topology->root;
-    tree->has_transparent = job.transparent;
-    trc_tree_bound(tree, pool);
-    return TRC_OK;
-}
-
-struct refit_job {
-    const struct trc_part *part;
-    struct trc_tree *tree;
-};
-
-static void refit_task(void *context, uint32_t index, uint32_t worker) {
-    (void)worker;
-    struct refit_job *job = context;
-    const struct trc_part *part_of[TRC_NODE_WIDTH];
-    for (int i = 0; i < TRC_NODE_WIDTH; i++)
-        part_of[i] = job->part;
-    const uint32_t begin = index * LEAVES_PER_TASK, count = job->tree->leaf_count;
-    for (uint32_t leaf = begin; leaf < count && leaf < begin + LEAVES_PER_TASK; leaf++)
-        leaf_vertices(job->tree, leaf, part_of);
-}
-
-trc_status trc_tree_refit(const struct trc_tree *from, const struct trc_part *part,
-                          uint32_t key_count, struct trc_pool *pool, struct trc_tree *tree) {
-    const trc_status status =
-        tree_alloc(tree, from->node_count, from->leaf_count, key_count, false);
-    if (status != TRC_OK)
-        return status;
-    for (uint32_t n = 0; n < from->node_count; n++)
-        memcpy(tree->nodes + n * tree->node_stride, from->nodes + n * from->node_stride,
-               TRC_NODE_HEADER_BYTES);
-    for (uint32_t n = 0; n < from->leaf_count; n++)
-        memcpy(tree->leaves + n * tree->leaf_stride, from->leaves + n * from->leaf_stride,
-               TRC_LEAF_HEADER_BYTES);
-    tree->root = from->root;
-    tree->has_transparent = from->has_transparent;
-    struct refit_job job = {part, tree};
-    trc_pool_run(pool, (tree->leaf_count + LEAVES_PER_TASK - 1) / LEAVES_PER_TASK, refit_task,
-                 &job);
-    trc_tree_bound(tree, pool);
-    return TRC_OK;
 }
 
 /* lower and upper of a leaf at a key. */
-static void leaf_bounds(const struct trc_tree *tree, uint32_t leaf, uint32_t key, float lower[3],
+static void leaf_bounds(const struct trc_tree *tree, uint32_t ref, uint32_t key, float lower[3],
                         float upper[3]) {
-    const float *v = trc_leaf_vertices(tree, leaf, key);
-    for (int axis = 0; axis < 3; axis++) {
-        const float *a = v + axis * TRC_NODE_WIDTH, *b = a + 3 * TRC_NODE_WIDTH,
-                    *c = b + 3 * TRC_NODE_WIDTH;
-        float low[TRC_NODE_WIDTH], high[TRC_NODE_WIDTH];
-        for (int slot = 0; slot < TRC_NODE_WIDTH; slot++) { /* side by side */
+    const uint32_t count = trc_leaf_count(ref);
+    const float *v = trc_leaf_vertices(tree, ref, key);
+    for (uint32_t axis = 0; axis < 3; axis++) {
+        const float *a = v + axis * count, *b = a + 3 * count, *c = b + 3 * count;
+        float low = a[0], high = a[0];
+        for (uint32_t slot = 0; slot < count; slot++) {
             const float l = a[slot] < b[slot] ? a[slot] : b[slot];
             const float h = a[slot] > b[slot] ? a[slot] : b[slot];
-            low[slot] = l < c[slot] ? l : c[slot];
-            high[slot] = h > c[slot] ? h : c[slot];
+            low = l < low ? l : low;
+            low = c[slot] < low ? c[slot] : low;
+            high = h > high ? h : high;
+            high = c[slot] > high ? c[slot] : high;
         }
-        lower[axis] = low[0];
-        upper[axis] = high[0];
-        for (int slot = 1; slot < TRC_NODE_WIDTH; slot++) {
-            lower[axis] = low[slot] < lower[axis] ? low[slot] : lower[axis];
-            upper[axis] = high[slot] > upper[axis] ? high[slot] : upper[axis];
-        }
+        lower[axis] = low;
+        upper[axis] = high;
     }
 }
 
@@ -261,7 +172,7 @@ static void ref_bounds(const struct trc_tree *tree, uint32_t ref, uint32_t key, 
             upper[axis] = -INFINITY;
         }
     } else if (ref & TRC_REF_LEAF) {
-        leaf_bounds(tree, ref & TRC_REF_INDEX_MASK, key, lower, upper);
+        leaf_bounds(tree, ref, key, lower, upper);
     } else {
         node_bounds(tree, ref, key, lower, upper);
     }
@@ -332,30 +243,74 @@ static void children_bound(struct trc_tree *tree, uint32_t node, bool nodes) {
     }
 }
 
-static void bound_task(void *context, uint32_t index, uint32_t worker) {
+/* Leaves of a run of nodes, and their boxes while they are at hand. */
+static void fill_task(void *context, uint32_t index, uint32_t worker) {
     (void)worker;
-    struct trc_tree *tree = context;
+    struct fill_job *job = context;
+    struct trc_tree *tree = job->tree;
     const uint32_t begin = index * NODES_PER_TASK;
-    for (uint32_t n = begin; n < tree->node_count && n < begin + NODES_PER_TASK; n++)
+    for (uint32_t n = begin; n < tree->node_count && n < begin + NODES_PER_TASK; n++) {
+        const uint32_t *children = trc_node_children(tree, n);
+        for (int i = 0; i < TRC_NODE_WIDTH; i++)
+            if (children[i] != TRC_REF_EMPTY && (children[i] & TRC_REF_LEAF))
+                leaf_fill(job, children[i]);
         children_bound(tree, n, false);
+    }
 }
 
-/* Leaves by all threads, then nodes after their children. */
-void trc_tree_bound(struct trc_tree *tree, struct trc_pool *pool) {
-    trc_pool_run(pool, (tree->node_count + NODES_PER_TASK - 1) / NODES_PER_TASK, bound_task, tree);
+/* Leaves by all threads, then nodes after their children; all keys in one pass. */
+static void tree_fill(struct fill_job *job, struct trc_pool *pool) {
+    struct trc_tree *tree = job->tree;
+    if (tree->root != TRC_REF_EMPTY && (tree->root & TRC_REF_LEAF))
+        leaf_fill(job, tree->root);
+    trc_pool_run(pool, (tree->node_count + NODES_PER_TASK - 1) / NODES_PER_TASK, fill_task, job);
     for (uint32_t n = tree->node_count; n-- > 0;)
         children_bound(tree, n, true);
     tree_finish(tree);
 }
 
-trc_status trc_tree_fill_top(const struct trc_topology *topology, const struct trc_ref *refs,
-                             const struct trc_item *items, struct trc_item *items_out,
-                             struct trc_tree *tree) {
-    const trc_status status = tree_alloc(tree, topology->node_count, topology->leaf_count, 1, true);
+trc_status trc_tree_fill(const struct trc_topology *topology, const struct trc_ref *refs,
+                         uint32_t count, const struct trc_part *parts, uint32_t key_count,
+                         struct trc_pool *pool, struct trc_tree *tree) {
+    const trc_status status = tree_alloc(tree, topology->node_count, count, key_count, false);
     if (status != TRC_OK)
         return status;
-    for (uint32_t leaf = 0; leaf < topology->leaf_count; leaf++)
-        items_out[leaf] = items[refs[topology->leaf_begin[leaf]].primitive];
+    for (uint32_t n = 0; n < topology->node_count; n++)
+        memcpy(tree->nodes + n * tree->node_stride, topology->children[n],
+               sizeof topology->children[n]);
+    tree->root = topology->root;
+    struct fill_job job = {refs, parts, tree, false};
+    tree_fill(&job, pool);
+    tree->has_transparent = job.transparent;
+    return TRC_OK;
+}
+
+trc_status trc_tree_refit(const struct trc_tree *from, const struct trc_part *part,
+                          uint32_t key_count, struct trc_pool *pool, struct trc_tree *tree) {
+    const trc_status status =
+        tree_alloc(tree, from->node_count, from->slot_count, key_count, false);
+    if (status != TRC_OK)
+        return status;
+    for (uint32_t n = 0; n < from->node_count; n++)
+        memcpy(tree->nodes + n * tree->node_stride, from->nodes + n * from->node_stride,
+               TRC_NODE_HEADER_BYTES);
+    if (from->slot_count)
+        memcpy(tree->slots, from->slots, from->slot_count * sizeof *tree->slots);
+    tree->root = from->root;
+    tree->has_transparent = from->has_transparent;
+    struct fill_job job = {NULL, part, tree, false};
+    tree_fill(&job, pool);
+    return TRC_OK;
+}
+
+trc_status trc_tree_fill_top(const struct trc_topology *topology, const struct trc_ref *refs,
+                             uint32_t count, const struct trc_item *items,
+                             struct trc_item *items_out, struct trc_tree *tree) {
+    const trc_status status = tree_alloc(tree, topology->node_count, count, 1, true);
+    if (status != TRC_OK)
+        return status;
+    for (uint32_t slot = 0; slot < count; slot++)
+        items_out[slot] = items[refs[slot].primitive];
     tree->items = items_out;
     for (uint32_t n = tree->node_count; n-- > 0;) {
         uint32_t *children = (uint32_t *)trc_node_children(tree, n);
@@ -364,7 +319,7 @@ trc_status trc_tree_fill_top(const struct trc_topology *topology, const struct t
             float lower[3], upper[3];
             const uint32_t ref = children[i];
             if (ref != TRC_REF_EMPTY && (ref & TRC_REF_LEAF)) {
-                const struct trc_ref *r = &refs[topology->leaf_begin[ref & TRC_REF_INDEX_MASK]];
+                const struct trc_ref *r = &refs[trc_leaf_first(ref)];
                 memcpy(lower, r->lower, sizeof lower);
                 memcpy(upper, r->upper, sizeof upper);
             } else {

@@ -1,11 +1,15 @@
-/* The memory of a tree: 8-wide nodes and leaves of up to 8 triangles, with bounds and vertices at
+/* The memory of a tree: 8-wide nodes and leaves of 1 to 8 triangles, with bounds and vertices at
  * every motion key.
  *
  * A node is TRC_NODE_HEADER_BYTES of header (8 child references) followed, for each key, by 48
  * floats: for each axis 8 lower bounds, then 8 upper ones. Unused children have inverted infinite
- * bounds. A leaf is a header (8 instance words, 8 triangle numbers) followed, for each key, by 72
- * floats: vertex by axis by slot. Unused slots repeat the last triangle, with number
- * TRC_EMPTY_SLOT. Nodes stand before their children, so that a backward walk refits.
+ * bounds. Nodes stand before their children, so that a backward walk refits.
+ *
+ * Triangles stand in slots, those of a leaf side by side: its reference has the first and the
+ * count. A leaf of n has, for each key, 9 n floats: vertex by axis by slot, without gaps between
+ * leaves, since fetching leaves is a good part of an incoherent ray's time. Kernels load 8 slots
+ * whatever the count and ignore the lanes beyond it; after the last leaf there is room for that.
+ * What a hit needs to know of a slot is kept apart.
  *
  * A TLAS has the same nodes; its leaves have no vertices: each is one entry of items. */
 #ifndef TRACER_BVH_TREE_H
@@ -21,16 +25,15 @@
 #define TRC_NODE_WIDTH 8
 #define TRC_NODE_HEADER_BYTES 64
 #define TRC_NODE_KEY_BYTES 192
-#define TRC_LEAF_HEADER_BYTES 64
-#define TRC_LEAF_KEY_BYTES 288
+#define TRC_TRIANGLE_FLOATS 9
 
-/* A reference: a node's index, or a leaf's with TRC_REF_LEAF and its count - 1 in bits 28-30. */
+/* A reference: a node's index, or a leaf's first slot with TRC_REF_LEAF and its count - 1 in bits
+ * 28-30. */
 #define TRC_REF_LEAF 0x80000000u
 #define TRC_REF_INDEX_MASK 0x0fffffffu
 #define TRC_REF_EMPTY 0xffffffffu
-#define TRC_EMPTY_SLOT 0xffffffffu
 
-/* Instance word of a leaf slot: the instance's index, and a bit for materials that shadow rays may
+/* Instance word of a slot: the instance's index, and a bit for materials that shadow rays may
  * see through. */
 #define TRC_SLOT_TRANSPARENT 0x80000000u
 #define TRC_SLOT_INSTANCE_MASK 0x7fffffffu
@@ -42,6 +45,11 @@
 
 struct trc_tree;
 
+struct trc_slot {
+    uint32_t instance; /* word, see above */
+    uint32_t triangle; /* of the mesh */
+};
+
 /* What a TLAS leaf stands for. */
 struct trc_item {
     const struct trc_tree *tree;
@@ -51,12 +59,13 @@ struct trc_item {
 
 struct trc_tree {
     uint32_t key_count;
-    uint32_t node_count, leaf_count;
+    uint32_t node_count, slot_count;
     uint32_t root; /* reference; TRC_REF_EMPTY for no triangles */
-    size_t node_stride, leaf_stride;
+    size_t node_stride;
     uint8_t *nodes;               /* node_count * node_stride, 64-byte aligned */
-    uint8_t *leaves;              /* leaf_count * leaf_stride */
-    const struct trc_item *items; /* TLAS only, by leaf index */
+    float *vertices;              /* slot_count * key_count * 9, and a load beyond */
+    struct trc_slot *slots;       /* slot_count; TLAS: NULL, as vertices are */
+    const struct trc_item *items; /* TLAS only, by slot */
     bool is_top;
     bool has_transparent;     /* some slot has TRC_SLOT_TRANSPARENT */
     float lower[3], upper[3]; /* over all keys; lower > upper when empty */
@@ -91,17 +100,15 @@ static inline const float *trc_node_bounds(const struct trc_tree *t, uint32_t no
     return (const float *)(t->nodes + (size_t)node * t->node_stride + TRC_NODE_HEADER_BYTES +
                            (size_t)key * TRC_NODE_KEY_BYTES);
 }
-static inline const uint32_t *trc_leaf_instances(const struct trc_tree *t, uint32_t leaf) {
-    return (const uint32_t *)(t->leaves + (size_t)leaf * t->leaf_stride);
+static inline uint32_t trc_leaf_first(uint32_t ref) { return ref & TRC_REF_INDEX_MASK; }
+static inline uint32_t trc_leaf_count(uint32_t ref) { return ((ref >> 28) & 7u) + 1u; }
+static inline uint32_t trc_leaf_ref(uint32_t first, uint32_t count) {
+    return TRC_REF_LEAF | (count - 1) << 28 | first;
 }
-static inline const uint32_t *trc_leaf_triangles(const struct trc_tree *t, uint32_t leaf) {
-    return trc_leaf_instances(t, leaf) + TRC_NODE_WIDTH;
-}
-/* 72 floats: [vertex][axis][slot]. */
-static inline const float *trc_leaf_vertices(const struct trc_tree *t, uint32_t leaf,
-                                             uint32_t key) {
-    return (const float *)(t->leaves + (size_t)leaf * t->leaf_stride + TRC_LEAF_HEADER_BYTES +
-                           (size_t)key * TRC_LEAF_KEY_BYTES);
+/* 9 * count floats: [vertex][axis][slot]; the next key's follow. */
+static inline float *trc_leaf_vertices(const struct trc_tree *t, uint32_t ref, uint32_t key) {
+    return t->vertices + TRC_TRIANGLE_FLOATS * ((size_t)trc_leaf_first(ref) * t->key_count +
+                                                (size_t)key * trc_leaf_count(ref));
 }
 
 /* ---- building (bvh/build.c, bvh/fill.c) ---- */
@@ -125,12 +132,11 @@ struct trc_part {
     uint32_t slot_count;
 };
 
-/* Shape of the tree over refs (reordered): nodes without bounds, leaves as ranges of refs. */
+/* Shape of the tree over refs (reordered: slot i is ref i): nodes without bounds. */
 struct trc_topology {
-    uint32_t node_count, leaf_count;
+    uint32_t node_count;
     uint32_t root;
     uint32_t (*children)[TRC_NODE_WIDTH]; /* node_count */
-    uint32_t *leaf_begin;                 /* leaf_count: first ref; the count is in the reference */
 };
 
 /* Binned SAH (Wald, "On fast construction of SAH-based bounding volume hierarchies", 2007), opened
@@ -150,24 +156,20 @@ void trc_part_vertex(const struct trc_part *part, uint32_t triangle, uint32_t v,
 void trc_part_triangle(const struct trc_part *part, uint32_t triangle, uint32_t key,
                        float out[3][3]);
 
-/* Takes memory for a tree of that shape and copies leaves and vertices; then trc_tree_bound. */
+/* A tree of that shape over count refs, with its vertices, bounds and SAH cost. */
 trc_status trc_tree_fill(const struct trc_topology *topology, const struct trc_ref *refs,
-                         const struct trc_part *parts, uint32_t key_count, struct trc_pool *pool,
-                         struct trc_tree *tree);
+                         uint32_t count, const struct trc_part *parts, uint32_t key_count,
+                         struct trc_pool *pool, struct trc_tree *tree);
 
 /* The same tree with other positions of the same topology: a copy of *from, refilled and bounded.
  */
 trc_status trc_tree_refit(const struct trc_tree *from, const struct trc_part *part,
                           uint32_t key_count, struct trc_pool *pool, struct trc_tree *tree);
 
-/* A TLAS: leaf i stands for items[refs[topology leaf i].primitive], whose world box is its ref's.
- */
+/* A TLAS: slot i stands for items[refs[i].primitive], whose world box is its ref's. */
 trc_status trc_tree_fill_top(const struct trc_topology *topology, const struct trc_ref *refs,
-                             const struct trc_item *items, struct trc_item *items_out,
-                             struct trc_tree *tree);
-
-/* Bounds of all nodes from the leaves, all keys in one pass, and the SAH cost. */
-void trc_tree_bound(struct trc_tree *tree, struct trc_pool *pool);
+                             uint32_t count, const struct trc_item *items,
+                             struct trc_item *items_out, struct trc_tree *tree);
 
 void trc_tree_destroy(struct trc_tree *tree);
 

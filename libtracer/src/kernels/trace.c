@@ -112,19 +112,19 @@ TRC_INLINE uint64_t box_rays(const struct walk *w, uint32_t box, uint64_t mask, 
 /* ---- leaves, packets ---- */
 
 /* Beam cull of the leaf's triangles by their boxes. */
-TRC_INLINE uint32_t leaf_candidates(const struct walk *w, uint32_t leaf, uint32_t count,
+TRC_INLINE uint32_t leaf_candidates(const struct walk *w, const float *v, uint32_t count,
                                     bool motion) {
     f8 lower[3], upper[3], key;
-    const float *v = trc_leaf_vertices(w->tree, leaf, w->key);
-    const float *e = v + (motion ? TRC_LEAF_KEY_BYTES / sizeof(float) : 0);
+    const float *e = v + TRC_TRIANGLE_FLOATS * count; /* the next key */
     const f8 f0 = f8_set(motion ? w->group->f_min : 0.0f),
              f1 = f8_set(motion ? w->group->f_max : 0.0f);
     for (int axis = 0; axis < 3; axis++) {
         f8 low = f8_set(INFINITY), high = f8_set(-INFINITY);
         for (int corner = 0; corner < 3; corner++) {
-            const f8 a = f8_load(v + 24 * corner + 8 * axis);
+            const uint32_t at = (uint32_t)(3 * corner + axis) * count;
+            const f8 a = f8_load(v + at);
             if (motion) {
-                const f8 way = f8_load(e + 24 * corner + 8 * axis) - a;
+                const f8 way = f8_load(e + at) - a;
                 const f8 x = a + f0 * way, y = a + f1 * way;
                 low = f8_min(low, f8_min(x, y));
                 high = f8_max(high, f8_max(x, y));
@@ -139,25 +139,30 @@ TRC_INLINE uint32_t leaf_candidates(const struct walk *w, uint32_t leaf, uint32_
     return trc_beam_test(&w->group->beam, lower, upper, &key) & ((1u << count) - 1u);
 }
 
-/* Broadcasts slot's triangle, or interpolates it for each ray of chunk i. */
-TRC_INLINE void lanes_load(const struct walk *w, const float *v, bool motion, int i,
+/* Broadcasts the triangle of v's first slot, or interpolates it for each ray of chunk i. */
+TRC_INLINE void lanes_load(const struct walk *w, const float *v, uint32_t count, bool motion, int i,
                            struct trc_triangle_lanes *tri) {
     const int order[3] = {w->group->beam.axis.u, w->group->beam.axis.v, w->group->beam.axis.z};
-    const float *e = v + (motion ? TRC_LEAF_KEY_BYTES / sizeof(float) : 0);
+    const float *e = v + TRC_TRIANGLE_FLOATS * count;
     const vfloat f = motion ? vf_load(&w->group->f[i]) : vf_set(0.0f);
     for (int corner = 0; corner < 3; corner++)
         for (int axis = 0; axis < 3; axis++) {
-            const int at = 24 * corner + 8 * order[axis];
+            const uint32_t at = (uint32_t)(3 * corner + order[axis]) * count;
             const vfloat a = vf_set(v[at]);
             tri->v[corner][axis] = motion ? a + f * (vf_set(e[at]) - a) : a;
         }
 }
 
+TRC_INLINE uint32_t slot_instance(const struct walk *w, struct trc_slot slot) {
+    return w->instance == TRC_NO_HIT ? slot.instance & TRC_SLOT_INSTANCE_MASK : w->instance;
+}
+
 /* Keeps hits that are nearer than the ray's, or as near with a lower number. */
 TRC_INLINE uint32_t hits_keep(const struct walk *w, int i, vmask hit, vfloat t, vfloat u, vfloat v,
-                              uint32_t instance, uint32_t triangle) {
+                              struct trc_slot slot) {
     struct trc_packet *p = w->packet;
     struct trc_packet_hits *h = w->hits;
+    const uint32_t instance = slot_instance(w, slot), triangle = slot.triangle;
     const vfloat best = vf_load(&p->t[i]);
     vmask keep = vm_and(hit, vm_and(vf_lt(t, best), vf_gt(t, vf_load(&p->tmin[i]))));
     uint32_t ties = vm_bits(vm_and(hit, vf_eq(t, best)));
@@ -202,14 +207,14 @@ struct edge_filter {
 #define FILTER_LEAST_SLACK 1e-18f
 #define FILTER_MOST_SLACK 1e6f
 
-TRC_INLINE void edge_filter_setup(const struct walk *w, const float *vertices, uint32_t candidates,
-                                  struct edge_filter *e) {
+TRC_INLINE void edge_filter_setup(const struct walk *w, const float *vertices, uint32_t count,
+                                  uint32_t candidates, struct edge_filter *e) {
     const struct trc_group *g = w->group;
     const int order[3] = {g->beam.axis.u, g->beam.axis.v, g->beam.axis.z};
     f8 v[3][3], a[3][3];
     for (int corner = 0; corner < 3; corner++)
         for (int axis = 0; axis < 3; axis++) {
-            v[corner][axis] = f8_load(vertices + 24 * corner + 8 * order[axis]);
+            v[corner][axis] = f8_load(vertices + (uint32_t)(3 * corner + order[axis]) * count);
             a[corner][axis] = v[corner][axis] - f8_set(g->origin[axis]);
         }
     f8 inside = f8_set(INFINITY), outside = f8_set(-INFINITY), margin = f8_set(0.0f);
@@ -255,30 +260,28 @@ TRC_INLINE uint32_t edge_filter_lanes(const struct edge_filter *e, int slot, vfl
 TRC_INLINE bool leaf_packet(struct walk *w, uint32_t ref, uint64_t mask, bool any, bool motion) {
     const struct trc_packet *p = w->packet;
     const struct trc_group *g = w->group;
-    const uint32_t leaf = ref & TRC_REF_INDEX_MASK, count = ((ref >> 28) & 7u) + 1u;
-    const uint32_t *words = trc_leaf_instances(w->tree, leaf);
-    const uint32_t *triangles = words + TRC_NODE_WIDTH;
+    const uint32_t count = trc_leaf_count(ref);
+    const struct trc_slot *ids = w->tree->slots + trc_leaf_first(ref);
+    const float *vertices = trc_leaf_vertices(w->tree, ref, w->key);
     const struct trc_shear axis = g->beam.axis;
     /* Products of lengths must neither overflow nor vanish; slack is in proportion to lengths. */
     const bool filter = !motion && p->common_origin && g->beam.slack > FILTER_LEAST_SLACK &&
                         g->beam.slack < FILTER_MOST_SLACK;
     struct edge_filter edges;
     bool found = false;
-    uint32_t slots = leaf_candidates(w, leaf, count, motion);
+    uint32_t slots = leaf_candidates(w, vertices, count, motion);
     if (slots && filter) {
-        edge_filter_setup(w, trc_leaf_vertices(w->tree, leaf, w->key), slots, &edges);
+        edge_filter_setup(w, vertices, count, slots, &edges);
         slots = edges.candidates;
     }
     for (; slots; slots &= slots - 1) {
         const int slot = __builtin_ctz(slots);
-        if (any && p->skip_transparent && (words[slot] & TRC_SLOT_TRANSPARENT))
+        if (any && p->skip_transparent && (ids[slot].instance & TRC_SLOT_TRANSPARENT))
             continue;
-        const float *v = trc_leaf_vertices(w->tree, leaf, w->key) + slot;
-        const uint32_t instance =
-            w->instance == TRC_NO_HIT ? words[slot] & TRC_SLOT_INSTANCE_MASK : w->instance;
+        const float *v = vertices + slot;
         struct trc_triangle_lanes tri;
         if (!motion)
-            lanes_load(w, v, false, 0, &tri);
+            lanes_load(w, v, count, false, 0, &tri);
         for (int c = 0; c < TRC_PACKET_CHUNKS; c++) {
             uint32_t bits = trc_chunk_bits(mask, c);
             if (!bits)
@@ -291,7 +294,7 @@ TRC_INLINE bool leaf_packet(struct walk *w, uint32_t ref, uint64_t mask, bool an
                     continue;
             }
             if (motion)
-                lanes_load(w, v, true, i, &tri);
+                lanes_load(w, v, count, true, i, &tri);
             vfloat t, bu, bv;
             vmask hit =
                 trc_triangle_test(&tri, vf_load(&p->o[axis.u][i]), vf_load(&p->o[axis.v][i]),
@@ -307,7 +310,7 @@ TRC_INLINE bool leaf_packet(struct walk *w, uint32_t ref, uint64_t mask, bool an
                 mask &= ~blocked;
                 found = found || blocked;
             } else {
-                found |= hits_keep(w, i, hit, t, bu, bv, instance, triangles[slot]) != 0;
+                found |= hits_keep(w, i, hit, t, bu, bv, ids[slot]) != 0;
             }
         }
     }
@@ -337,17 +340,16 @@ static void beam_shorten(struct walk *w, uint64_t mask) {
 TRC_INLINE bool leaf_single(struct walk *w, uint32_t ref, int ray, bool any, bool motion) {
     struct trc_packet *p = w->packet;
     const struct trc_group *g = w->group;
-    const uint32_t leaf = ref & TRC_REF_INDEX_MASK, count = ((ref >> 28) & 7u) + 1u;
-    const uint32_t *words = trc_leaf_instances(w->tree, leaf);
-    const uint32_t *triangles = words + TRC_NODE_WIDTH;
+    const uint32_t count = trc_leaf_count(ref);
+    const struct trc_slot *ids = w->tree->slots + trc_leaf_first(ref);
     const struct trc_shear axis = g->beam.axis;
     const int order[3] = {axis.u, axis.v, axis.z};
-    const float *v = trc_leaf_vertices(w->tree, leaf, w->key);
-    const float *e = v + (motion ? TRC_LEAF_KEY_BYTES / sizeof(float) : 0);
+    const float *v = trc_leaf_vertices(w->tree, ref, w->key);
+    const float *e = v + TRC_TRIANGLE_FLOATS * count;
     struct trc_triangle8 tri;
     for (int corner = 0; corner < 3; corner++)
         for (int a = 0; a < 3; a++) {
-            const int at = 24 * corner + 8 * order[a];
+            const uint32_t at = (uint32_t)(3 * corner + order[a]) * count;
             tri.v[corner][a] = f8_load(v + at);
             if (motion) {
                 const f8 way = f8_load(e + at) - tri.v[corner][a];
@@ -365,21 +367,20 @@ TRC_INLINE bool leaf_single(struct walk *w, uint32_t ref, int ray, bool any, boo
             continue;
         if (any) {
             if (distance < p->t[ray] &&
-                !(p->skip_transparent && (words[slot] & TRC_SLOT_TRANSPARENT)))
+                !(p->skip_transparent && (ids[slot].instance & TRC_SLOT_TRANSPARENT)))
                 return true;
             continue;
         }
-        const uint32_t instance =
-            w->instance == TRC_NO_HIT ? words[slot] & TRC_SLOT_INSTANCE_MASK : w->instance;
+        const uint32_t instance = slot_instance(w, ids[slot]), triangle = ids[slot].triangle;
         struct trc_packet_hits *h = w->hits;
         const bool lower = instance < h->instance[ray] ||
-                           (instance == h->instance[ray] && triangles[slot] < h->triangle[ray]);
+                           (instance == h->instance[ray] && triangle < h->triangle[ray]);
         if (distance < p->t[ray] || (distance == p->t[ray] && lower)) {
             p->t[ray] = distance;
             h->u[ray] = bu[slot];
             h->v[ray] = bv[slot];
             h->instance[ray] = instance;
-            h->triangle[ray] = triangles[slot];
+            h->triangle[ray] = triangle;
         }
     }
     return false;
@@ -481,7 +482,7 @@ TRC_INLINE bool single_walk(struct walk *w, uint32_t ref, int ray, bool any, boo
             ref = single_push(trc_node_children(w->tree, ref), near, bits, stack, &top);
         }
         if (w->tree->is_top) {
-            item_packet(w, &w->tree->items[ref & TRC_REF_INDEX_MASK], 1ull << ray, any);
+            item_packet(w, &w->tree->items[trc_leaf_first(ref)], 1ull << ray, any);
             if (any && (w->occluded >> ray & 1u))
                 return true;
         } else if (leaf_single(w, ref, ray, any, motion)) {
@@ -547,7 +548,7 @@ TRC_INLINE void packet_walk(struct walk *w, uint64_t mask, bool any, bool motion
         if (!(at.ref & TRC_REF_LEAF)) {
             top = children_push(w, at.ref, live, motion, stack, top);
         } else if (w->tree->is_top) {
-            item_packet(w, &w->tree->items[at.ref & TRC_REF_INDEX_MASK], live, any);
+            item_packet(w, &w->tree->items[trc_leaf_first(at.ref)], live, any);
             if (!any)
                 beam_shorten(w, all);
         } else if (leaf_packet(w, at.ref, live, any, motion) && !any) {
