@@ -129,16 +129,15 @@ TRC_INLINE vfloat trc_distant_importance(const struct trc_light_table *t, uint32
     return vf_where(reaches, irradiance * vf_max(cosine, vf_set(0.0625f)));
 }
 
-/* Candidates: the listed lights or the tree as one, then suns, then the world unless apart. */
+/* Candidates: the cut, then suns, then the world unless apart. */
 TRC_INLINE uint32_t trc_candidate_count(const struct trc_light_table *t) {
-    return (t->is_tree ? 1u : t->bound_count) + t->distant_count;
+    return t->cut_count + t->distant_count;
 }
 TRC_INLINE vfloat trc_candidate_importance(const struct trc_light_table *t, uint32_t i,
                                            const struct trc_receiver *r) {
-    const uint32_t placed = t->is_tree ? 1u : t->bound_count;
-    if (i >= placed)
-        return trc_distant_importance(t, i - placed, r);
-    const struct trc_light_bound *bound = &t->bounds[i];
+    if (i >= t->cut_count)
+        return trc_distant_importance(t, i - t->cut_count, r);
+    const struct trc_light_bound *bound = &t->bounds[t->cut[i]];
     const struct trc_wide_bound b = trc_bound_broadcast(bound);
     return trc_bound_importance(&b, r, trc_shape_of(bound), bound->radius > 0.0f);
 }
@@ -170,11 +169,10 @@ TRC_INLINE vint trc_tree_second(const struct trc_light_table *t, vint node, vmas
                      vi_set(-1));
 }
 
-/* From the root to a light; u is used up on the way. chance gets multiplied; lanes that end where
- * no light reaches the point leave *found. */
+/* From each lane's node to a light; u is used up on the way. chance gets multiplied; lanes that end
+ * where no light reaches the point leave *found. */
 static inline vint trc_tree_choose(const struct trc_light_table *t, const struct trc_receiver *r,
-                                   vfloat u, vmask m, vfloat *chance, vmask *found) {
-    vint node = vi_set(0);
+                                   vint node, vfloat u, vmask m, vfloat *chance, vmask *found) {
     *found = m;
     for (;;) {
         const vint second = trc_tree_second(t, node, *found);
@@ -196,11 +194,11 @@ static inline vint trc_tree_choose(const struct trc_light_table *t, const struct
     return vi_select(*found, light, vi_set(-1));
 }
 
-/* Chance with which trc_tree_choose arrives at the light. */
+/* Chance with which trc_tree_choose arrives at the light from its candidate. */
 static inline vfloat trc_tree_chance(const struct trc_light_table *t, const struct trc_receiver *r,
-                                     vint light, vmask m) {
+                                     vint light, vint candidate, vmask m) {
     vuint trail = vu_gather(t->trails, light, m);
-    vint node = vi_set(0);
+    vint node = vi_gather((const int32_t *)t->cut, candidate, m);
     vfloat chance = vf_one();
     for (;;) {
         const vint second = trc_tree_second(t, node, m);
@@ -224,21 +222,30 @@ static inline vfloat trc_tree_chance(const struct trc_light_table *t, const stru
  * or less by chance (box of the tests, 64 samples: 4 to 13 times the squared error). */
 #define TRC_SHARED_CANDIDATES 8
 #define TRC_SHARES 16.0f
+/* Candidates due less than this part of a share keep their own small chance: a whole share would
+ * take samples from lights that matter, and walk a tree of lights that do not. */
+#define TRC_WEAK_SHARE 0.125f
 static inline void trc_shares_round(vfloat *weight, uint32_t count, vfloat *sum) {
-    vfloat positive = vf_zero();
-    for (uint32_t i = 0; i < count; i++)
-        positive = positive + vf_where(vf_gt(weight[i], vf_zero()), vf_one());
-    /* One each, the rest by weight. */
-    const vfloat scale = (vf_set(TRC_SHARES) - positive) / *sum;
-    vfloat cumulative = vf_zero(), before = vf_zero();
+    const vfloat weak = *sum * vf_set(TRC_WEAK_SHARE / TRC_SHARES);
+    const vfloat share = vf_divide(vf_set(TRC_SHARES), *sum);
+    vfloat strong = vf_zero(), strong_count = vf_zero();
     for (uint32_t i = 0; i < count; i++) {
-        const vmask shines = vf_gt(weight[i], vf_zero());
-        cumulative = cumulative + weight[i];
-        const vfloat upto = vf_floor(cumulative * scale + vf_set(0.5f));
-        weight[i] = vf_where(shines, upto - before + vf_one());
-        before = vf_select(shines, upto, before);
+        const vmask is_strong = vf_gt(weight[i], weak);
+        strong = strong + vf_where(is_strong, weight[i]);
+        strong_count = strong_count + vf_where(is_strong, vf_one());
     }
-    *sum = vf_where(vf_gt(*sum, vf_zero()), before + positive);
+    /* One each, the rest by weight. */
+    const vfloat scale = vf_divide(vf_set(TRC_SHARES) - strong_count, strong);
+    vfloat cumulative = vf_zero(), before = vf_zero(), total = vf_zero();
+    for (uint32_t i = 0; i < count; i++) {
+        const vmask is_strong = vf_gt(weight[i], weak);
+        cumulative = cumulative + vf_where(is_strong, weight[i]);
+        const vfloat upto = vf_floor(cumulative * scale + vf_set(0.5f));
+        weight[i] = vf_select(is_strong, upto - before + vf_one(), weight[i] * share);
+        before = vf_select(is_strong, upto, before);
+        total = total + weight[i];
+    }
+    *sum = vf_where(vf_gt(*sum, vf_zero()), total);
 }
 
 static inline void trc_candidates_weigh(const struct trc_light_table *t,
@@ -256,30 +263,33 @@ static inline void trc_candidates_weigh(const struct trc_light_table *t,
         trc_shares_round(c->kept, count, &c->sum);
 }
 
+_Static_assert(TRC_LIGHT_CHOICES_KEPT >= TRC_LIGHT_LIST_MAX, "what is not kept is distant");
+
 /* A light for every lane of m, -1 where none reaches the point; its chance. */
 static inline vint trc_light_choose(const struct trc_light_table *t,
                                     const struct trc_light_choices *c, const struct trc_receiver *r,
                                     vfloat u, vmask m, vfloat *chance) {
     const uint32_t count = trc_candidate_count(t);
-    const uint32_t placed = t->is_tree ? 1u : t->bound_count;
     const vfloat sum = c->sum;
-    vint light = vi_set(-1);
+    vint light = vi_set(-1), node = vi_set(0);
     vfloat rest = u * sum, remainder = vf_zero();
     vmask waiting = vm_and(m, vf_gt(sum, vf_zero())), to_tree = vm_none();
     *chance = vf_zero();
     for (uint32_t i = 0; i < count && vm_any(waiting); i++) {
-        const vfloat w =
-            i < TRC_LIGHT_CHOICES_KEPT ? c->kept[i] : trc_candidate_importance(t, i, r);
+        const vfloat w = i < TRC_LIGHT_CHOICES_KEPT
+                             ? c->kept[i]
+                             : trc_distant_importance(t, i - t->cut_count, r);
         vmask take = vm_and(waiting, vf_gt(w, vf_zero()));
         if (i + 1 < count)
             take = vm_and(take, vf_lt(rest, w));
-        if (t->is_tree && i == 0) {
-            to_tree = take;
-            remainder = vf_divide(rest, w);
+        const struct trc_light_bound *bound = i < t->cut_count ? &t->bounds[t->cut[i]] : NULL;
+        if (bound && bound->child >= 0) {
+            to_tree = vm_or(to_tree, take);
+            remainder = vf_select(take, vf_divide(rest, w), remainder);
+            node = vi_select(take, vi_set((int32_t)t->cut[i]), node);
         } else {
-            const uint32_t number =
-                i < placed ? (uint32_t)t->bounds[i].light : t->distant[i - placed];
-            light = vi_select(take, vi_set((int32_t)number), light);
+            const int32_t number = bound ? bound->light : (int32_t)t->distant[i - t->cut_count];
+            light = vi_select(take, vi_set(number), light);
         }
         *chance = vf_select(take, w / sum, *chance);
         rest = rest - w;
@@ -287,7 +297,7 @@ static inline vint trc_light_choose(const struct trc_light_table *t,
     }
     if (vm_any(to_tree)) {
         vmask found;
-        const vint chosen = trc_tree_choose(t, r, remainder, to_tree, chance, &found);
+        const vint chosen = trc_tree_choose(t, r, node, remainder, to_tree, chance, &found);
         light = vi_select(to_tree, chosen, light);
     }
     return light;
@@ -300,11 +310,10 @@ static inline vfloat trc_light_chance(const struct trc_light_table *t, const str
     if (t->single)
         return vf_one();
     const uint32_t count = trc_candidate_count(t);
-    const uint32_t placed = t->is_tree ? 1u : t->bound_count;
+    const vint candidate = vi_gather((const int32_t *)t->candidates, light, m);
     const bool shared = count <= TRC_SHARED_CANDIDATES;
     vfloat weight[TRC_SHARED_CANDIDATES];
     vfloat sum = vf_zero(), own = vf_zero();
-    vmask placed_lanes = m;
     for (uint32_t i = 0; shared && i < count; i++) {
         weight[i] = trc_candidate_importance(t, i, r);
         sum = sum + weight[i];
@@ -319,17 +328,12 @@ static inline vfloat trc_light_chance(const struct trc_light_table *t, const str
             w = trc_candidate_importance(t, i, r);
             sum = sum + w;
         }
-        if (t->is_tree && i == 0) {
-            own = w;
-            continue;
-        }
-        const uint32_t number = i < placed ? (uint32_t)t->bounds[i].light : t->distant[i - placed];
-        const vmask same = vi_eq(light, vi_set((int32_t)number));
-        own = vf_select(same, w, own);
-        placed_lanes = vm_andnot(placed_lanes, same);
+        own = vf_select(vi_eq(candidate, vi_set((int32_t)i)), w, own);
     }
-    if (t->is_tree && vm_any(placed_lanes))
-        own = vf_select(placed_lanes, own * trc_tree_chance(t, r, light, placed_lanes), own);
+    vmask placed = vm_and(m, vi_lt(candidate, vi_set((int32_t)t->cut_count)));
+    placed = vm_andnot(placed, vi_lt(candidate, vi_set(0)));
+    if (t->trails && vm_any(placed))
+        own = vf_select(placed, own * trc_tree_chance(t, r, light, candidate, placed), own);
     const vfloat chance = vf_divide(own, sum);
     return t->world_apart
                ? vf_select(vi_eq(light, vi_set((int32_t)t->world_light)), vf_one(), chance)

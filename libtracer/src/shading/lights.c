@@ -379,17 +379,34 @@ static void add_lamps(struct trc_light_table *table, const trc_light_desc *descs
     }
 }
 
-/* Chooses between list and tree. Takes over bounds. */
+/* Chooses between list and tree, and enters lights with their candidates. Takes over bounds. */
 static trc_status set_bounds(struct trc_light_table *table, struct trc_light_bound *bounds,
                              uint32_t count) {
+    const size_t lights = (size_t)table->first_triangle + table->triangle_count;
+    trc_status status = TRC_OK;
     table->single = count + table->distant_count == 1;
+    table->candidates = trc_alloc(lights ? lights : 1, sizeof *table->candidates);
+    if (!table->candidates) {
+        trc_free(bounds);
+        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for %zu lights", lights);
+    }
+    for (size_t i = 0; i < lights; i++)
+        table->candidates[i] = UINT32_MAX;
     if (count <= TRC_LIGHT_LIST_MAX) {
         table->bounds = bounds;
-        table->bound_count = count;
-        return TRC_OK;
+        table->bound_count = table->cut_count = count;
+        for (uint32_t i = 0; i < count; i++) {
+            table->cut[i] = i;
+            table->candidates[bounds[i].light] = i;
+        }
+    } else {
+        const uint32_t distant = table->distant_count;
+        status = trc_light_tree_build(
+            table, bounds, count, distant < TRC_LIGHT_CUT_MAX ? TRC_LIGHT_CUT_MAX - distant : 1);
+        trc_free(bounds);
     }
-    const trc_status status = trc_light_tree_build(table, bounds, count);
-    trc_free(bounds);
+    for (uint32_t i = 0; i < table->distant_count; i++)
+        table->candidates[table->distant[i]] = table->cut_count + i;
     return status;
 }
 
@@ -474,6 +491,7 @@ void trc_light_table_destroy(struct trc_light_table *table) {
     trc_free(table->lamps);
     trc_free(table->triangles);
     trc_free(table->bounds);
+    trc_free(table->candidates);
     trc_free(table->trails);
     trc_free(table->distant);
     trc_free(table->distant_irradiance);

@@ -88,6 +88,9 @@ struct trc_world_map {
 
 /* Up to so many lights with a place the chances of all are computed at each point. */
 #define TRC_LIGHT_LIST_MAX 32
+/* With more there is a tree, and what is computed at each point are the chances of so many of its
+ * nodes, suns included. */
+#define TRC_LIGHT_CUT_MAX 8
 
 struct trc_light_table {
     uint32_t lamp_count, triangle_count;
@@ -101,13 +104,15 @@ struct trc_light_table {
     bool varies;      /* some has emission by program */
     struct trc_lamp *lamps;
     struct trc_light_triangle *triangles;
-    /* Chosen among: bound_count bounds in a list, or a tree of which bounds[0] is the root. */
+    /* Chosen among: bounds in a list, or a tree of which bounds[0] is the root. Candidates are the
+     * list or a cut through the tree, as indices of bounds, then what is distant. */
     struct trc_light_bound *bounds;
     uint32_t bound_count;
-    bool is_tree;
-    uint32_t
-        *trails; /* tree: per light, the turns from the root, first in bit 0, 1 the second child */
-    uint32_t *distant; /* numbers of suns, and the world unless apart */
+    uint32_t cut[TRC_LIGHT_LIST_MAX], cut_count;
+    uint32_t *candidates; /* per light: the candidate it belongs to; UINT32_MAX: never chosen */
+    uint32_t *trails;     /* tree: per light, the turns from its candidate on, first in bit 0, 1 the
+                             second child */
+    uint32_t *distant;    /* numbers of suns, and the world unless apart */
     float *distant_irradiance;
     uint32_t distant_count;
     uint32_t *seen; /* lamps that rays can meet */
@@ -138,7 +143,7 @@ uint64_t trc_light_table_triangle_count(const struct trc_light_table *table);
 
 /* Parts of the above, for shading/lights*.c. */
 trc_status trc_light_tree_build(struct trc_light_table *table, struct trc_light_bound *leaves,
-                                uint32_t count);
+                                uint32_t count, uint32_t cut_max);
 trc_status trc_world_map_create(const struct trc_snapshot *snapshot, uint32_t width,
                                 struct trc_world_map **out);
 void trc_world_map_release(struct trc_world_map *map);

@@ -260,36 +260,77 @@ static uint32_t split(struct trc_light_bound *leaves, uint32_t count, uint32_t d
 }
 
 /* Recursion is at most 32 deep. */
-static struct cluster build_node(struct builder *b, uint32_t first, uint32_t count, uint32_t depth,
-                                 uint32_t trail) {
+static struct cluster build_node(struct builder *b, uint32_t first, uint32_t count,
+                                 uint32_t depth) {
     const uint32_t number = b->node_count++;
     struct trc_light_bound *node = &b->table->bounds[number];
     if (count == 1) {
         *node = b->leaves[first];
         node->child = -1;
-        b->table->trails[node->light] = trail;
         return leaf_cluster(node, true);
     }
     const uint32_t left = split(b->leaves + first, count, depth);
-    struct cluster c = build_node(b, first, left, depth + 1, trail);
+    struct cluster c = build_node(b, first, left, depth + 1);
     node->child = (int32_t)b->node_count;
-    const struct cluster right =
-        build_node(b, first + left, count - left, depth + 1, trail | 1u << depth);
+    const struct cluster right = build_node(b, first + left, count - left, depth + 1);
     unite(&c, &right);
     set_node(node, &c);
     return c;
 }
 
+/* Parts of the whole below which a node of the cut stays closed: each gets one of the 16 shares of
+ * kernels/light_select.h at least. */
+#define LEAST_PART (1.0f / 16.0f)
+
+/* Opens nodes that are strong, first where lights are far apart, until there are cut_max. */
+static void choose_cut(struct trc_light_table *table, uint32_t cut_max) {
+    const float least = table->bounds[0].intensity * LEAST_PART;
+    table->cut[0] = 0;
+    table->cut_count = 1;
+    while (table->cut_count < cut_max) {
+        int best = -1;
+        float most = -1.0f;
+        for (uint32_t i = 0; i < table->cut_count; i++) {
+            const struct trc_light_bound *b = &table->bounds[table->cut[i]];
+            const float gain = b->intensity * b->radius * b->radius;
+            if (b->child >= 0 && b->intensity > least && gain > most) {
+                most = gain;
+                best = (int)i;
+            }
+        }
+        if (best < 0)
+            return;
+        const uint32_t node = table->cut[best];
+        table->cut[best] = node + 1;
+        table->cut[table->cut_count++] = (uint32_t)table->bounds[node].child;
+    }
+}
+
+/* Enters the lights below a node. Recursion is at most 32 deep. */
+static void enter_lights(struct trc_light_table *table, uint32_t node, uint32_t candidate,
+                         uint32_t depth, uint32_t trail) {
+    const struct trc_light_bound *b = &table->bounds[node];
+    if (b->child < 0) {
+        table->candidates[b->light] = candidate;
+        table->trails[b->light] = trail;
+        return;
+    }
+    enter_lights(table, node + 1, candidate, depth + 1, trail);
+    enter_lights(table, (uint32_t)b->child, candidate, depth + 1, trail | 1u << depth);
+}
+
 trc_status trc_light_tree_build(struct trc_light_table *table, struct trc_light_bound *leaves,
-                                uint32_t count) {
+                                uint32_t count, uint32_t cut_max) {
     const size_t lights = (size_t)table->first_triangle + table->triangle_count;
     table->bounds = trc_alloc_zeroed(2 * (size_t)count, sizeof *table->bounds);
     table->trails = trc_alloc_zeroed(lights, sizeof *table->trails);
     if (!table->bounds || !table->trails)
         return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for the tree of %u lights", count);
     struct builder b = {table, leaves, 0};
-    build_node(&b, 0, count, 0, 0);
+    build_node(&b, 0, count, 0);
     table->bound_count = b.node_count;
-    table->is_tree = true;
+    choose_cut(table, cut_max);
+    for (uint32_t i = 0; i < table->cut_count; i++)
+        enter_lights(table, table->cut[i], i, 0, 0);
     return TRC_OK;
 }
