@@ -1,0 +1,181 @@
+/* tracer_bench: how fast rays are traced and trees are built, beside Embree on the same work. */
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "check.h"
+#include "options.h"
+#include "report.h"
+#include "threads/pool.h"
+#include "volley.h"
+
+struct bench {
+    struct options options;
+    struct bench_scene scene;
+    FILE *json;
+};
+
+static bool ok(trc_status status) {
+    if (status != TRC_OK)
+        fprintf(stderr, "tracer_bench: %s\n", trc_last_message());
+    return status == TRC_OK;
+}
+
+static struct report_table table_of(const struct bench *b, bool moving, uint32_t isa,
+                                    uint32_t threads) {
+    return (struct report_table){.scene = b->scene.name,
+                                 .triangle_count = b->scene.worlds[0].meshes[0].triangle_count,
+                                 .moving = moving,
+                                 .streamed = b->options.streamed,
+                                 .isa = isa,
+                                 .threads = threads};
+}
+
+/* One list's hits and rates. peers: Embree's default and robust scene, or NULL both. */
+static void race_list(const struct bench *b, const struct volley *volley,
+                      struct embree_scene *const peers[2], const struct ray_list *list,
+                      struct trc_pool *pool, struct race_row *row) {
+    struct contestant all[1 + 2 * EMBREE_MODES];
+    struct rate rates[1 + 2 * EMBREE_MODES];
+    struct hit_set ours, theirs;
+    uint32_t count = 0;
+    memset(row, 0, sizeof *row);
+    row->list = list;
+    all[count++] = volley_contestant(volley);
+    hit_set_init(&ours, list->rays.count);
+    hit_set_init(&theirs, list->rays.count);
+    race_hits(&all[0], list, &ours);
+    row->miss_share = race_miss_share(list, &ours);
+    for (int use = 0; use < 2 && peers[0]; use++) {
+        row->mode_count = embree_contestants(peers[use], all + count);
+        memcpy(row->modes, all + count, row->mode_count * sizeof *all);
+        race_hits(&all[count], list, &theirs);
+        row->difference[use] = race_difference(list, &ours, &theirs);
+        row->peer_miss_share[use] = race_miss_share(list, &theirs);
+        count += row->mode_count;
+    }
+    race_run(all, count, list, pool, b->options.repeats, b->options.streamed, rates);
+    row->volley = rates[0];
+    for (uint32_t i = 0; i < row->mode_count; i++)
+        for (int use = 0; use < 2; use++)
+            row->peer[use][i] = rates[1 + (uint32_t)use * row->mode_count + i];
+    hit_set_free(&ours);
+    hit_set_free(&theirs);
+}
+
+static bool measure_table(const struct bench *b, const struct trc_snapshot *snapshot,
+                          const struct report_table *table, struct embree_scene *const peers[2]) {
+    const struct options *o = &b->options;
+    const struct volley volley = {snapshot, packet_kernels_get(table->isa)};
+    struct trc_pool *pool = NULL;
+    if (!ok(trc_pool_create(table->threads, &pool)))
+        return false;
+    report_races_begin(table, peers[0]);
+    for (int kind = 0; kind < RAY_KIND_COUNT; kind++)
+        for (int order = 0; order < RAY_ORDER_COUNT; order++) {
+            struct ray_list list;
+            struct race_row row;
+            if (!(o->kinds >> kind & 1) || !(o->orders >> order & 1))
+                continue;
+            ray_list_make(&list, (enum ray_kind)kind, (enum ray_order)order, &b->scene,
+                          table->moving, o, snapshot, packet_kernels_get(trc_isa()));
+            race_list(b, &volley, peers, &list, pool, &row);
+            report_race(table, &row, b->json);
+            ray_list_free(&list);
+        }
+    trc_pool_destroy(pool);
+    return true;
+}
+
+/* Tables of one instruction set, one for each number of threads. */
+static bool measure_isa(const struct bench *b, const struct trc_snapshot *snapshot, bool moving,
+                        uint32_t isa) {
+    const struct options *o = &b->options;
+    const struct mesh *mesh = &b->scene.worlds[moving].meshes[0];
+    struct embree_device *device = o->embree ? embree_open(isa, 0) : NULL;
+    struct embree_scene *peers[2] = {NULL, NULL};
+    bool done = true;
+    if (device) {
+        peers[0] = embree_scene_create(device, mesh, EMBREE_FAST);
+        peers[1] = embree_scene_create(device, mesh, EMBREE_ROBUST);
+    }
+    for (uint32_t i = 0; i < o->thread_count && done; i++) {
+        const struct report_table table = table_of(b, moving, isa, o->threads[i]);
+        done = measure_table(b, snapshot, &table, peers);
+    }
+    embree_scene_destroy(peers[0]);
+    embree_scene_destroy(peers[1]);
+    embree_close(device);
+    return done;
+}
+
+static bool measure_builds(const struct bench *b, bool moving) {
+    for (uint32_t i = 0; i < b->options.thread_count; i++) {
+        struct build_result result;
+        const struct report_table table = table_of(b, moving, trc_isa(), b->options.threads[i]);
+        if (!builds_measure(&b->scene, moving, table.threads, &b->options, &result))
+            return false;
+        report_builds(&table, &result, b->json);
+    }
+    return true;
+}
+
+static bool measure_scene(const struct bench *b) {
+    for (int moving = 0; moving < 2; moving++) {
+        struct query_scene built;
+        if (!(b->options.motions >> moving & 1))
+            continue;
+        if (b->options.builds && !measure_builds(b, moving))
+            return false;
+        if (!ok(query_scene_create(&b->scene.worlds[moving], true, 0, &built)))
+            return false;
+        const struct trc_snapshot *snapshot = query_scene_snapshot(built.scene);
+        bool done = true;
+        for (uint32_t i = 0; i < b->options.isa_count && done; i++)
+            done = measure_isa(b, snapshot, moving, b->options.isas[i]);
+        query_scene_destroy(&built);
+        if (!done)
+            return false;
+    }
+    return true;
+}
+
+static bool run(struct bench *b) {
+    bool good = true;
+    for (uint32_t i = 0; i < b->options.scene_count && good; i++) {
+        char message[512];
+        const char *name = b->options.scenes[i];
+        if (!bench_scene_load(name, &b->scene, message, sizeof message)) {
+            fprintf(stderr, "tracer_bench: '%s' is no generated scene and cannot be read: %s\n",
+                    name, message);
+            return false;
+        }
+        good = b->options.check ? check_scene(&b->scene, &b->options) : measure_scene(b);
+        bench_scene_free(&b->scene);
+    }
+    return good;
+}
+
+int main(int argc, char **argv) {
+    static struct bench bench;
+    switch (options_parse(argc, argv, &bench.options)) {
+    case OPTIONS_DONE:
+        return EXIT_SUCCESS;
+    case OPTIONS_ERROR:
+        return EXIT_FAILURE;
+    default:
+        break;
+    }
+    const char *path = bench.options.json;
+    if (path && !(bench.json = fopen(path, "w"))) {
+        fprintf(stderr, "tracer_bench: %s: %s\n", path, strerror(errno));
+        return EXIT_FAILURE;
+    }
+    bool good = run(&bench);
+    if (bench.json && fclose(bench.json) != 0) {
+        fprintf(stderr, "tracer_bench: %s: %s\n", path, strerror(errno));
+        good = false;
+    }
+    return good ? EXIT_SUCCESS : EXIT_FAILURE;
+}
