@@ -64,9 +64,18 @@ static void race_list(const struct bench *b, const struct volley *volley,
     hit_set_free(&theirs);
 }
 
+static bool list_wanted(const struct bench *b, int kind, int order) {
+    return (b->options.kinds >> kind & 1) && (b->options.orders >> order & 1);
+}
+
+static void list_make(const struct bench *b, const struct trc_snapshot *snapshot, bool moving,
+                      int kind, int order, struct ray_list *list) {
+    ray_list_make(list, (enum ray_kind)kind, (enum ray_order)order, &b->scene, moving, &b->options,
+                  snapshot, packet_kernels_get(trc_isa()));
+}
+
 static bool measure_table(const struct bench *b, const struct trc_snapshot *snapshot,
                           const struct report_table *table, struct embree_scene *const peers[2]) {
-    const struct options *o = &b->options;
     const struct volley volley = {snapshot, packet_kernels_get(table->isa)};
     struct trc_pool *pool = NULL;
     if (!ok(trc_pool_create(table->threads, &pool)))
@@ -76,16 +85,31 @@ static bool measure_table(const struct bench *b, const struct trc_snapshot *snap
         for (int order = 0; order < RAY_ORDER_COUNT; order++) {
             struct ray_list list;
             struct race_row row;
-            if (!(o->kinds >> kind & 1) || !(o->orders >> order & 1))
+            if (!list_wanted(b, kind, order))
                 continue;
-            ray_list_make(&list, (enum ray_kind)kind, (enum ray_order)order, &b->scene,
-                          table->moving, o, snapshot, packet_kernels_get(trc_isa()));
+            list_make(b, snapshot, table->moving, kind, order, &list);
             race_list(b, &volley, peers, &list, pool, &row);
             report_race(table, &row, b->json);
             ray_list_free(&list);
         }
     trc_pool_destroy(pool);
     return true;
+}
+
+static void measure_counts(const struct bench *b, const struct trc_snapshot *snapshot,
+                           bool moving) {
+    const struct report_table table = table_of(b, moving, trc_isa(), 1);
+    report_counts_begin(&table);
+    for (int kind = 0; kind < RAY_KIND_COUNT; kind++)
+        for (int order = 0; order < RAY_ORDER_COUNT; order++) {
+            struct ray_list list;
+            if (!list_wanted(b, kind, order))
+                continue;
+            list_make(b, snapshot, moving, kind, order, &list);
+            const struct trace_counts counts = counted_trace(snapshot, &list);
+            report_counts(&table, &list, &counts, b->json);
+            ray_list_free(&list);
+        }
 }
 
 /* Tables of one instruction set, one for each number of threads. */
@@ -132,6 +156,8 @@ static bool measure_scene(const struct bench *b) {
             return false;
         const struct trc_snapshot *snapshot = query_scene_snapshot(built.scene);
         bool done = true;
+        if (b->options.counts)
+            measure_counts(b, snapshot, moving);
         for (uint32_t i = 0; i < b->options.isa_count && done; i++)
             done = measure_isa(b, snapshot, moving, b->options.isas[i]);
         query_scene_destroy(&built);
@@ -147,8 +173,7 @@ static bool run(struct bench *b) {
         char message[512];
         const char *name = b->options.scenes[i];
         if (!bench_scene_load(name, &b->scene, message, sizeof message)) {
-            fprintf(stderr, "tracer_bench: '%s' is no generated scene and cannot be read: %s\n",
-                    name, message);
+            fprintf(stderr, "tracer_bench: no generated scene has that name: %s\n", message);
             return false;
         }
         good = b->options.check ? check_scene(&b->scene, &b->options) : measure_scene(b);

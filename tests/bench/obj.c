@@ -20,6 +20,11 @@ static bool fail(const struct obj_reader *r, const char *what) {
     return false;
 }
 
+static bool fail_file(const struct obj_reader *r, const char *what) {
+    snprintf(r->message, r->capacity, "%s: %s", r->path, what);
+    return false;
+}
+
 static bool read_vertex(const struct obj_reader *r, const char *text) {
     float p[3];
     if (sscanf(text, "%f %f %f", &p[0], &p[1], &p[2]) != 3)
@@ -63,17 +68,17 @@ static bool read_lines(struct obj_reader *r, FILE *file) {
                 return false;
         }
     }
-    return r->mesh->triangle_count ? true : fail(r, "there is no face in this file");
+    if (ferror(file))
+        return fail_file(r, strerror(errno));
+    return r->mesh->triangle_count || fail_file(r, "there is no face in this file");
 }
 
 bool obj_load(const char *path, struct mesh *mesh, char *message, size_t capacity) {
     struct obj_reader reader = {mesh, path, 0, message, capacity};
     FILE *file = fopen(path, "r");
     mesh_init(mesh);
-    if (!file) {
-        snprintf(message, capacity, "%s: %s", path, strerror(errno));
-        return false;
-    }
+    if (!file)
+        return fail_file(&reader, strerror(errno));
     const bool done = read_lines(&reader, file);
     fclose(file);
     if (!done)

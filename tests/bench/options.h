@@ -26,7 +26,8 @@ struct options {
     bool streamed;    /* rays and results of a whole set in memory, not of one batch in cache */
     bool embree;
     bool builds;
-    bool check; /* hits against brute force, nothing is measured */
+    bool counts; /* steps of traversal */
+    bool check;  /* hits against brute force, nothing is measured */
     const char *json;
 };
 

@@ -30,8 +30,8 @@ static void json_rate(FILE *json, const char *key, const struct rate *rate) {
 static void json_table(FILE *json, const char *what, const struct report_table *t) {
     fprintf(json, "{\"row\": \"%s\", ", what);
     json_string(json, "scene", t->scene);
-    fprintf(json, ", \"triangles\": %u, \"motion\": %s, \"isa\": \"%s\", \"threads\": %u",
-            t->triangle_count, t->moving ? "true" : "false", trc_isa_name(t->isa), t->threads);
+    fprintf(json, ", \"triangles\": %u, \"motion\": %s, \"threads\": %u", t->triangle_count,
+            t->moving ? "true" : "false", t->threads);
 }
 
 /* ---- text ---- */
@@ -39,9 +39,8 @@ static void json_table(FILE *json, const char *what, const struct report_table *
 static double divide(double a, double b) { return b > 0.0 ? a / b : 0.0; }
 
 static void print_title(const struct report_table *t) {
-    printf("\n%s (%u triangles), %s, %s, %u %s", t->scene, t->triangle_count,
-           t->moving ? "moving" : "still", trc_isa_name(t->isa), t->threads,
-           t->threads == 1 ? "thread" : "threads");
+    printf("\n%s (%u triangles), %s, %u %s", t->scene, t->triangle_count,
+           t->moving ? "moving" : "still", t->threads, t->threads == 1 ? "thread" : "threads");
 }
 
 /* ---- builds ---- */
@@ -98,7 +97,8 @@ static uint32_t best_mode(const struct race_row *row, int use) {
 
 void report_races_begin(const struct report_table *table, bool peer) {
     print_title(table);
-    printf(", rays %s, Mrays/s\n", table->streamed ? "streamed" : "in cache");
+    printf(", %s, rays %s, Mrays/s\n", trc_isa_name(table->isa),
+           table->streamed ? "streamed" : "in cache");
     printf("  %-16s %-5s %6s %7s %15s %6s", "rays", "order", "in pkt", "volley", "(least-most)",
            "miss%");
     if (peer)
@@ -154,13 +154,53 @@ void report_race(const struct report_table *table, const struct race_row *row, F
         return;
     json_table(json, "rays", table);
     fprintf(json,
-            ", \"streamed\": %s, \"kind\": \"%s\", \"order\": \"%s\", \"rays\": %u, \"packets\": "
+            ", \"isa\": \"%s\", \"streamed\": %s, \"kind\": \"%s\", \"order\": \"%s\", \"rays\": "
+            "%u, \"packets\": "
             "%u, \"miss_share\": %.6g",
-            table->streamed ? "true" : "false", ray_kind_names[list->kind],
-            ray_order_names[list->order], list->rays.count, list->packet_count, row->miss_share);
+            trc_isa_name(table->isa), table->streamed ? "true" : "false",
+            ray_kind_names[list->kind], ray_order_names[list->order], list->rays.count,
+            list->packet_count, row->miss_share);
     json_rate(json, "volley_mrays_s", &row->volley);
     for (int use = 0; use < 2 && row->mode_count; use++)
         json_peer(json, row, use);
     fprintf(json, "}\n");
     fflush(json);
+}
+
+/* ---- counts ---- */
+
+void report_counts_begin(const struct report_table *table) {
+    print_title(table);
+    printf(", counts per ray\n  %-16s %-5s %8s %8s %9s %12s %13s %6s\n", "rays", "order", "beams",
+           "boxes", "triangles", "nodes alone", "leaves alone", "live");
+}
+
+void report_counts(const struct report_table *table, const struct ray_list *list,
+                   const struct trace_counts *counts, FILE *json) {
+    const double rays = list->rays.count;
+    const double live = divide((double)counts->visit_rays, (double)counts->visits);
+    const struct {
+        const char *key;
+        int width;
+        double value;
+    } columns[] = {{"beams", 8, divide((double)counts->nodes, rays)},
+                   {"box_tests", 8, divide((double)counts->box_rays, rays)},
+                   {"triangle_tests", 9, divide((double)counts->triangle_rays, rays)},
+                   {"nodes_alone", 12, divide((double)counts->single_nodes, rays)},
+                   {"leaves_alone", 13, divide((double)counts->single_leaves, rays)},
+                   {"live_rays", 6, live}};
+    const size_t count = sizeof columns / sizeof *columns;
+    printf("  %-16s %-5s", ray_kind_names[list->kind], ray_order_names[list->order]);
+    for (size_t i = 0; i < count; i++)
+        printf(" %*.2f", columns[i].width, columns[i].value);
+    printf("\n");
+    fflush(stdout);
+    if (!json)
+        return;
+    json_table(json, "counts", table);
+    fprintf(json, ", \"kind\": \"%s\", \"order\": \"%s\"", ray_kind_names[list->kind],
+            ray_order_names[list->order]);
+    for (size_t i = 0; i < count; i++)
+        fprintf(json, ", \"%s\": %.6g", columns[i].key, columns[i].value);
+    fprintf(json, "}\n");
 }

@@ -6,6 +6,7 @@
 #include <stdio.h>
 
 #include "builds.h"
+#include "counted.h"
 #include "embree.h"
 #include "race.h"
 
@@ -33,5 +34,9 @@ struct race_row {
 void report_builds(const struct report_table *table, const struct build_result *result, FILE *json);
 void report_races_begin(const struct report_table *table, bool peer);
 void report_race(const struct report_table *table, const struct race_row *row, FILE *json);
+
+void report_counts_begin(const struct report_table *table);
+void report_counts(const struct report_table *table, const struct ray_list *list,
+                   const struct trace_counts *counts, FILE *json);
 
 #endif

@@ -12,6 +12,11 @@
 #include "kernels/packet.h"
 #include "kernels/triangle.h"
 
+/* The benchmark compiles this file once more to count the steps of a walk; here it is nothing. */
+#ifndef TRC_COUNT
+#define TRC_COUNT(what, amount) ((void)0)
+#endif
+
 /* Live rays at or below which they go on alone: rays of one origin stay together longer. */
 #define SINGLE_COMMON 4
 #define SINGLE_MIXED 8
@@ -66,6 +71,7 @@ TRC_INLINE uint64_t box_rays(const struct walk *w, uint32_t box, uint64_t mask, 
     const float *b = trc_node_bounds(w->tree, box >> 3, w->key) + (box & 7u);
     const float *e = b + (motion ? TRC_NODE_KEY_BYTES / sizeof(float) : 0);
     const float slack = g->beam.slack;
+    TRC_COUNT(box_rays, 1);
     {
         const int i = __builtin_ctzll(mask);
         float near = p->tmin[i], far = p->t[i];
@@ -84,6 +90,7 @@ TRC_INLINE uint64_t box_rays(const struct walk *w, uint32_t box, uint64_t mask, 
             return mask;
         mask &= mask - 1;
     }
+    TRC_COUNT(box_rays, __builtin_popcountll(mask));
     uint64_t live = 0;
     for (int c = 0; c < TRC_PACKET_CHUNKS; c++) {
         const uint32_t bits = trc_chunk_bits(mask, c);
@@ -295,6 +302,7 @@ TRC_INLINE bool leaf_packet(struct walk *w, uint32_t ref, uint64_t mask, bool an
             }
             if (motion)
                 lanes_load(w, v, count, true, i, &tri);
+            TRC_COUNT(triangle_rays, __builtin_popcount(bits));
             vfloat t, bu, bv;
             vmask hit =
                 trc_triangle_test(&tri, vf_load(&p->o[axis.u][i]), vf_load(&p->o[axis.v][i]),
@@ -357,6 +365,7 @@ TRC_INLINE bool leaf_single(struct walk *w, uint32_t ref, int ray, bool any, boo
             }
         }
     f8 t, bu, bv;
+    TRC_COUNT(single_leaves, 1);
     uint32_t hit = trc_triangle8_test(&tri, p->o[axis.u][ray], p->o[axis.v][ray], p->o[axis.z][ray],
                                       g->su[ray], g->sv[ray], g->sz[ray], p->tmin[ray],
                                       (1u << count) - 1u, &t, &bu, &bv);
@@ -476,6 +485,7 @@ TRC_INLINE bool single_walk(struct walk *w, uint32_t ref, int ray, bool any, boo
     for (;;) {
         while (!(ref & TRC_REF_LEAF)) {
             f8 near;
+            TRC_COUNT(single_nodes, 1);
             const uint32_t bits = node_single(w, ref, &r, w->packet->t[ray], motion, &near);
             if (!bits)
                 goto pop;
@@ -545,7 +555,10 @@ TRC_INLINE void packet_walk(struct walk *w, uint64_t mask, bool any, bool motion
             }
             continue;
         }
+        TRC_COUNT(visits, 1);
+        TRC_COUNT(visit_rays, __builtin_popcountll(live));
         if (!(at.ref & TRC_REF_LEAF)) {
+            TRC_COUNT(nodes, 1);
             top = children_push(w, at.ref, live, motion, stack, top);
         } else if (w->tree->is_top) {
             item_packet(w, &w->tree->items[trc_leaf_first(at.ref)], live, any);
