@@ -115,11 +115,15 @@ def comparison_settings(options):
             "volley": dict(options.volley)}
 
 
+def blender_version(options):
+    """The first line of what Blender says of itself."""
+    return subprocess.run([options.blender, "--version"], capture_output=True, text=True,
+                          check=True).stdout.splitlines()[0]
+
+
 def reference_path(key, name, settings, options):
     """Where the reference of a scene and settings is kept."""
-    version = subprocess.run([options.blender, "--version"], capture_output=True, text=True,
-                             check=True).stdout.splitlines()[0]
-    identity = json.dumps([key, version, options.frame, settings], sort_keys=True)
+    identity = json.dumps([key, blender_version(options), options.frame, settings], sort_keys=True)
     digest = hashlib.sha256(identity.encode()).hexdigest()[:16]
     return options.build / "references" / f"{name}-{settings['samples']}spp-{digest}.exr"
 

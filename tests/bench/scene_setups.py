@@ -9,6 +9,11 @@ Before a render, set resolution, samples and comparable transport from a JSON ob
 
     blender -b FILE.blend -P scene_setups.py -E ENGINE -o OUT -f FRAME -- settings '{"samples": 64}'
 
+Render many pictures of the open file, one after the other in one process, and write down how long
+each took; JOBS.json is a list of {"engine", "frame", "settings", "output"}:
+
+    blender -b FILE.blend -P scene_setups.py -- batch JOBS.json SECONDS.json
+
 ``SCENES`` and ``source_key`` can also be read outside Blender. Lengths are metres, powers watts.
 """
 
@@ -20,8 +25,9 @@ import pathlib
 import runpy
 import sys
 import tempfile
+import time
 from dataclasses import dataclass
-from typing import Callable
+from typing import Callable, Optional
 
 try:
     import bpy
@@ -204,6 +210,64 @@ def prepare_knight(source, folder):
     add_camera((1.6, -6.2, 1.7), (0.0, 0.0, 1.07), 45.0, fstop=0.6, focus=(0.0, -0.4, 1.6))
 
 
+def prepare_conference(source, _folder):
+    """The conference room from a camera that moves past the table, with depth of field."""
+    open_blend(source)
+    camera = bpy.context.scene.camera
+    camera.data.dof.use_dof, camera.data.dof.aperture_fstop = True, 0.25
+    animate(camera, "location", {0: Vector((-0.06, 0.03, 0.0)), 2: Vector((0.06, -0.03, 0.0))})
+
+
+def prepare_billiards(_source, _folder):
+    """Five glossy balls on cloth under one lamp: one rolls, one is struck within the frame, three
+    rest (the arrangement of R. L. Cook, T. Porter and L. Carpenter, "Distributed Ray Tracing",
+    1984)."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    add_floor(8.0, (0.02, 0.16, 0.06), 0.8)
+    set_world((0.04, 0.05, 0.06))
+    add_area_light("Lamp", (-0.6, 0.8, 2.2), (0, 0, 0), 0.8, 60.0, (1.0, 0.93, 0.82))
+    add_area_light("Window", (2.5, -1.5, 1.6), (0, 0, 0), 1.0, 25.0, (0.75, 0.85, 1.0))
+    balls = [add_ball(f"Ball {i}", (x, y, 0.25), 0.25, color) for i, (x, y, color) in enumerate((
+        (-0.75, 0.25, (0.75, 0.50, 0.03)), (-0.15, 0.55, (0.80, 0.80, 0.72)),
+        (0.45, 0.80, (0.45, 0.02, 0.02)), (0.35, -0.15, (0.02, 0.10, 0.45)),
+        (-0.45, -0.45, (0.03, 0.03, 0.03))))]
+    animate(balls[1], "location", {0: Vector((-0.18, -0.24, 0.0)), 2: Vector((0.18, 0.24, 0.0))})
+    animate(balls[1], "rotation_euler", {0: Vector((-1.0, 0.7, 0.0)), 2: Vector((1.0, -0.7, 0.0))})
+    animate(balls[3], "location", {0: Vector((0.0, 0.0, 0.0)), 1: Vector((0.0, 0.0, 0.0)),
+                                   2: Vector((0.3, -0.12, 0.0))})
+    add_camera((-0.4, -3.4, 1.5), (-0.05, 0.15, 0.2), 50.0, fstop=0.35, focus=(-0.45, -0.45, 0.4))
+
+
+def add_ball(name, location, radius, color):
+    """A polished ball with a pale band, so that rolling shows."""
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=24, radius=radius,
+                                         location=location)
+    ball = bpy.context.object
+    ball.name = name
+    bpy.ops.object.shade_smooth()
+    for slot_color in (color, (0.8, 0.75, 0.65)):
+        material = bpy.data.materials.new(name)
+        material.use_nodes = True
+        shader = material.node_tree.nodes["Principled BSDF"]
+        shader.inputs["Base Color"].default_value = (*slot_color, 1.0)
+        shader.inputs["Roughness"].default_value = 0.15
+        ball.data.materials.append(material)
+    for polygon in ball.data.polygons:
+        polygon.material_index = abs(polygon.center.y) < 0.3 * radius
+    return ball
+
+
+def animate(moved, path, offsets):
+    """Key a property at frames, each ``offsets[frame]`` off its value, linear in between."""
+    rest = getattr(moved, path).copy()
+    for frame, offset in offsets.items():
+        setattr(moved, path, tuple(r + o for r, o in zip(rest, offset)))
+        moved.keyframe_insert(path, frame=frame)
+    for curve in moved.animation_data.action.fcurves:
+        for key in curve.keyframe_points:
+            key.interpolation = "LINEAR"
+
+
 def prepare_example(source, _folder):
     """The project's own character, made by its script."""
     with tempfile.TemporaryDirectory() as made:
@@ -220,20 +284,24 @@ def prepare_example(source, _folder):
 class Scene:
     """Where a scene comes from, how it is prepared, and at what size it is compared by default.
 
-    ``source`` is relative to the scene folder, or to the project when ``in_project``; ``frame`` is
-    the frame to render, ``stops`` the exposure of pictures to look at.
+    ``source`` is relative to the scene folder, or to the project when ``in_project``, or None for a
+    scene made here; ``frame`` is the frame to render, ``stops`` the exposure of pictures to look at;
+    with ``shutter``, in frames, there is motion blur.
     """
 
-    source: str
+    source: Optional[str]
     prepare: Callable
     width: int
     height: int
     frame: int = 1
     in_project: bool = False
     stops: float = 0.0
+    shutter: float = 0.0
 
     def source_path(self, scenes_dir):
-        """The file the scene is made from."""
+        """The file the scene is made from, None if it is made here."""
+        if self.source is None:
+            return None
         project = pathlib.Path(__file__).resolve().parents[2]
         return (project if self.in_project else pathlib.Path(scenes_dir)) / self.source
 
@@ -249,6 +317,13 @@ SCENES = {
     "sun": Scene(IGNIS + "sun.blend", prepare_as_is, 128, 128, stops=-6.0),
     "lights": Scene(IGNIS + "lights.blend", prepare_as_is, 128, 128),
     "tex": Scene(IGNIS + "tex.blend", prepare_as_is, 128, 128),
+    "example_motion": Scene("examples/make_character.py", prepare_example, 160, 90, 12,
+                            in_project=True, shutter=0.5),
+    "robot_motion": Scene("06_quaternius_robot/robot.blend", prepare_robot, 160, 90, 6, shutter=0.7),
+    "knight_motion": Scene("05_kaykit_knight/Knight.glb", prepare_knight, 160, 90, 9, shutter=0.6),
+    "conference_motion": Scene("01_conference/conference.blend", prepare_conference, 160, 120,
+                               shutter=0.8),
+    "billiards": Scene(None, prepare_billiards, 160, 90, shutter=0.9),
 }
 
 
@@ -256,7 +331,10 @@ def source_key(name, scenes_dir):
     """A hash that changes when the prepared scene would."""
     scene = SCENES[name]
     text = inspect.getsource(scene.prepare) + str(SETUP_VERSION)
-    data = scene.source_path(scenes_dir).read_bytes() + text.encode()
+    if scene.shutter > 0.0:
+        text += str(scene.shutter)
+    source = scene.source_path(scenes_dir)
+    data = (source.read_bytes() if source else b"") + text.encode()
     return hashlib.sha256(data).hexdigest()[:16]
 
 
@@ -265,7 +343,11 @@ def source_key(name, scenes_dir):
 def command_prepare(name, scenes_dir, output):
     """Prepare a scene and save it."""
     scene = SCENES[name]
-    scene.prepare(scene.source_path(scenes_dir).resolve(), pathlib.Path(scenes_dir).resolve())
+    source = scene.source_path(scenes_dir)
+    scene.prepare(source and source.resolve(), pathlib.Path(scenes_dir).resolve())
+    if scene.shutter > 0.0:
+        render = bpy.context.scene.render
+        render.use_motion_blur, render.motion_blur_shutter = True, scene.shutter
     bpy.ops.wm.save_as_mainfile(filepath=str(pathlib.Path(output).resolve()))
 
 
@@ -274,10 +356,25 @@ def command_settings(text):
     apply_settings(bpy.context.scene, json.loads(text))
 
 
+def command_batch(jobs_path, seconds_path):
+    """Render a list of jobs; the seconds of each render, with synchronising and saving, are kept."""
+    scene, seconds = bpy.context.scene, []
+    for job in json.loads(pathlib.Path(jobs_path).read_text()):
+        apply_settings(scene, job["settings"])
+        scene.render.engine = job["engine"]
+        scene.render.filepath = job["output"]
+        scene.frame_set(job["frame"])
+        start = time.perf_counter()
+        bpy.ops.render.render(write_still=True)
+        seconds.append(time.perf_counter() - start)
+    pathlib.Path(seconds_path).write_text(json.dumps(seconds))
+
+
 def main():
     """Run the command after ``--``."""
     command, *arguments = sys.argv[sys.argv.index("--") + 1:]
-    {"prepare": command_prepare, "settings": command_settings}[command](*arguments)
+    {"prepare": command_prepare, "settings": command_settings,
+     "batch": command_batch}[command](*arguments)
 
 
 if __name__ == "__main__":

@@ -148,12 +148,12 @@ void TRC_KERNEL(trc_shadow_flush)(struct trc_tile *t) {
         t->keys[i] = q->target[i] < TRC_BINS ? q->target[i] : TRC_BINS - 1;
         last = t->keys[i] > last ? t->keys[i] : last;
     }
-    TRC_KERNEL(trc_tile_sort)(t, t->keys, q->count, last + 1);
-    memset(t->order + q->count, 0, TRC_PACKET_SIZE * sizeof *t->order);
+    TRC_KERNEL(trc_tile_sort)(t, t->keys, q->count, last + 1, q->order);
+    memset(q->order + q->count, 0, TRC_PACKET_SIZE * sizeof *q->order);
     for (uint32_t begin = 0; begin < q->count; begin += t->packet_size) {
         const uint32_t count =
             q->count - begin < t->packet_size ? q->count - begin : t->packet_size;
-        const uint32_t *order = t->order + begin;
+        const uint32_t *order = q->order + begin;
         float factor[3][TRC_PACKET_SIZE];
         packet_load(t, order, count);
         uint64_t blocked = TRC_KERNEL(trc_trace_occluded)(t->snapshot, &t->packet);

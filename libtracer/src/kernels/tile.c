@@ -79,9 +79,10 @@ static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc, void *
     if (wants_light_passes(desc))
         for (int i = 0; i < 9; i++)
             q->split[i] = carve(&c, queue);
-    uint32_t **const words[] = {&q->slot, &q->path, &q->target, &q->depth, &t->order, &t->keys};
+    uint32_t **const words[] = {&q->slot, &q->path, &q->target, &q->depth, &q->order, &t->keys};
     for (int i = 0; i < 6; i++)
         *words[i] = carve(&c, queue);
+    t->order = carve(&c, batch);
     t->bins = carve(&c, (TRC_BINS + 1) * sizeof *t->bins);
     t->filter = carve(&c, TRC_FILTER_TABLE * sizeof(float));
     return c.used;
@@ -96,7 +97,7 @@ size_t TRC_KERNEL(trc_tile_memory_bytes)(const trc_render_desc *desc) {
 /* ---- sorting ---- */
 
 void TRC_KERNEL(trc_tile_sort)(struct trc_tile *t, const uint32_t *keys, uint32_t count,
-                               uint32_t bin_count) {
+                               uint32_t bin_count, uint32_t *order) {
     uint32_t *const bins = t->bins;
     memset(bins, 0, (bin_count + 1) * sizeof *bins);
     for (uint32_t i = 0; i < count; i++)
@@ -104,7 +105,7 @@ void TRC_KERNEL(trc_tile_sort)(struct trc_tile *t, const uint32_t *keys, uint32_
     for (uint32_t i = 1; i < bin_count; i++)
         bins[i + 1] += bins[i];
     for (uint32_t i = 0; i < count; i++)
-        t->order[bins[keys[i]]++] = i;
+        order[bins[keys[i]]++] = i;
 }
 
 /* ---- tracing a step's rays ---- */
@@ -232,7 +233,7 @@ static void trace_batch(struct trc_tile *t) {
     else
         for (uint32_t i = 0; i < count; i++)
             t->keys[i] = assembly_key(t, i);
-    TRC_KERNEL(trc_tile_sort)(t, t->keys, count, assembly_bins(t));
+    TRC_KERNEL(trc_tile_sort)(t, t->keys, count, assembly_bins(t), t->order);
     for (uint32_t begin = 0; begin < count;) {
         const uint32_t key = t->keys[t->order[begin]];
         uint32_t end = begin + 1;
@@ -391,7 +392,7 @@ static void samples_order(struct trc_tile *t, bool lens, bool motion) {
         }
         vi_store((int32_t *)t->keys + i, key);
     }
-    TRC_KERNEL(trc_tile_sort)(t, t->keys, count, 64);
+    TRC_KERNEL(trc_tile_sort)(t, t->keys, count, 64, t->order);
     uint32_t *const columns[] = {t->samples.pixel, t->samples.index};
     for (int k = 0; k < 2; k++) {
         memcpy(t->keys, columns[k], count * sizeof *t->keys);

@@ -89,6 +89,7 @@ struct trc_shadow_store {
     float *o[3], *d[3], *tmax, *time, *radiance[3];
     float *split[9]; /* diffuse, glossy, transmission parts, or NULL: no light passes */
     uint32_t *slot, *path, *target, *depth;
+    uint32_t *order; /* own: the queue may be flushed while hits are shaded in t->order */
 };
 
 struct trc_tile {
@@ -107,8 +108,9 @@ struct trc_tile {
     struct trc_hit_store hits;
     struct trc_sample_store samples;
     struct trc_shadow_store shadows;
-    uint32_t *order, *keys, *bins; /* scratch of sorts: TRC_BATCH or TRC_SHADOW_QUEUE, bins */
-    float *filter;                 /* inverse distribution of the pixel filter, TRC_FILTER_TABLE */
+    uint32_t *order;       /* of the rays of a step */
+    uint32_t *keys, *bins; /* scratch of sorts: TRC_BATCH or TRC_SHADOW_QUEUE, bins */
+    float *filter;         /* inverse distribution of the pixel filter, TRC_FILTER_TABLE */
     struct trc_packet packet;
     struct trc_packet_hits packet_hits;
 };
@@ -129,7 +131,7 @@ TRC_INLINE vuint trc_direction_cell(vvec3 d) {
 
 /* order[0..count) = indices sorted stably by keys[i] < bin_count. */
 void TRC_KERNEL(trc_tile_sort)(struct trc_tile *t, const uint32_t *keys, uint32_t count,
-                               uint32_t bin_count);
+                               uint32_t bin_count, uint32_t *order);
 
 /* Material of a hit, into the snapshot's. */
 uint32_t TRC_KERNEL(trc_hit_material)(const struct trc_snapshot *snapshot, uint32_t instance,
