@@ -59,13 +59,15 @@ class Session:
         view_names = [view.name for view in film.views] or [""]
 
         self._open(scene, keep)
-        shutter = motion.shutter_of(scene, motion_position(depsgraph.scene))
+        shutter = motion.shutter_of(scene, view_layer, motion_position(depsgraph.scene))
         views = self._synchronise(engine, depsgraph, frame, shutter, view_names)
         for view_name, keys in views:
             self._sync.set_camera(keys, shutter)
             self._commit(engine)
             self._report_warnings(engine)
             settings = render_fields(scene, frame, crop, entries, engine.is_preview)
+            if view_layer.samples > 0:
+                settings["sample_count"] = view_layer.samples
             render = self._sync.scene.start_render(**settings)
             try:
                 _Run(engine, self._sync, render, settings["sample_count"]).follow(

@@ -240,13 +240,29 @@ class VOLLEY_RENDER_PT_performance_final(_VolleyPanel, Panel):
 
 # View layer ------------------------------------------------------------------------------------
 
+class VOLLEY_VIEWLAYER_PT_filter(_VolleyPanel, Panel):
+    bl_label = "Filter"
+    bl_context = "view_layer"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context):
+        column = _column(self).column(heading="Include")
+        column.prop(context.view_layer, "use_sky", text="Environment")
+        column.prop(context.view_layer, "use_solid", text="Surfaces")
+        motion = column.column()
+        motion.active = context.scene.render.use_motion_blur
+        motion.prop(context.view_layer, "use_motion_blur", text="Motion Blur")
+
+
 class VOLLEY_VIEWLAYER_PT_override(_VolleyPanel, Panel):
     bl_label = "Override"
     bl_context = "view_layer"
     bl_options = {'DEFAULT_CLOSED'}
 
     def draw(self, context):
-        _column(self).prop(context.view_layer, "material_override")
+        layout = _column(self)
+        layout.prop(context.view_layer, "material_override")
+        layout.prop(context.view_layer, "samples")
 
 
 class VOLLEY_VIEWLAYER_PT_passes(_VolleyPanel, Panel):

@@ -322,7 +322,7 @@ def print_scene(name, scene, options):
                 f"{point['seconds']:12.3f}" for point in points.values()))
     print("at equal error, the first needs so many times the samples, and the time, of:\n"
           "                         slope   MSE    relMSE   time MSE  relMSE   "
-          "bias^2/variance at most samples, tiles biased")
+          "at most samples: bias^2/variance, mean/reference (R G B), tiles biased")
     for configuration, entry in scene["comparison"].items():
         finest = scene["curves"][configuration][options.samples[-1]]
         bias = scene["bias"].get(configuration)
@@ -331,7 +331,8 @@ def print_scene(name, scene, options):
               f"{format_ratio(entry, 'samples_ratio_rel_mse')} "
               f"{format_ratio(entry, 'seconds_ratio_mse')} "
               f"{format_ratio(entry, 'seconds_ratio_rel_mse')}   "
-              f"{finest['bias_squared'] / max(finest['variance'], 1e-300):8.3f}"
+              f"{finest['bias_squared'] / max(finest['variance'], 1e-300):8.3f}  "
+              + " ".join(f"{ratio:.4f}" for ratio in finest["mean_ratios"])
               + (f"   {bias['failed']} of {bias['tests']}" if bias else ""), flush=True)
 
 

@@ -257,6 +257,57 @@ def add_ball(name, location, radius, color):
     return ball
 
 
+def prepare_appleseed(source, _folder):
+    """A scene of another renderer: its materials, aperture and light sizes are made here, all else
+    is as it was. The keys run from frame 1 to 2 where the shutter opens at the frame."""
+    open_blend(source)
+    scene = bpy.context.scene
+    gray = bpy.data.materials.new("Comparison")
+    for material in bpy.data.materials:
+        material.use_nodes = True
+        tree = material.node_tree
+        tree.nodes.clear()
+        shader = tree.nodes.new("ShaderNodeBsdfPrincipled")
+        shader.inputs["Base Color"].default_value = (0.6, 0.45, 0.3, 1.0)
+        shader.inputs["Roughness"].default_value = 0.25
+        output = tree.nodes.new("ShaderNodeOutputMaterial")
+        tree.links.new(shader.outputs[0], output.inputs["Surface"])
+    for data in bpy.data.meshes:
+        if not data.materials:
+            data.materials.append(gray)
+    for data in bpy.data.lights:
+        if data.type in {"POINT", "SPOT"}:
+            data.shadow_soft_size, data.energy = 0.5, 1500.0
+        elif data.type == "SUN":
+            data.angle = 0.1
+        else:
+            data.energy = 800.0
+    set_world((0.25, 0.3, 0.4))
+    dof = scene.camera.data.dof
+    dof.use_dof, dof.aperture_fstop = True, 0.12
+    if dof.focus_object is None:
+        # In front of what the camera looks at, so that that is blurred too.
+        dof.focus_distance = 0.7 * scene.camera.matrix_world.translation.length
+    scene.cycles.motion_blur_position = "START"
+
+
+def prepare_spin(_source, _folder):
+    """Two propellers that make a third of a turn while the shutter is open, one of them growing, in
+    front of a camera that rolls."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    set_world((0.5, 0.55, 0.6))
+    add_area_light("Lamp", (3.0, -5.0, 5.0), (0, 0, 0), 2.0, 500.0)
+    for x, growth in ((-1.3, 0.0), (1.3, 0.4)):
+        bpy.ops.mesh.primitive_cube_add(size=1.0, location=(x, 0.0, 0.0), rotation=(0.3, 0.0, 0.0))
+        blade = bpy.context.object
+        blade.scale = (2.0, 0.3, 0.4)
+        turn = math.radians(60.0)
+        animate(blade, "rotation_euler", {0: (0.0, -turn, 0.0), 2: (0.0, turn, 0.0)})
+        animate(blade, "scale", {0: (0.0, 0.0, 0.0), 2: (growth, growth, 0.0)})
+    camera = add_camera((0.0, -6.0, 0.0), (0.0, 0.0, 0.0), 40.0)
+    animate(camera, "rotation_euler", {0: (0.0, -0.1, 0.0), 2: (0.0, 0.1, 0.0)})
+
+
 def animate(moved, path, offsets):
     """Key a property at frames, each ``offsets[frame]`` off its value, linear in between."""
     rest = getattr(moved, path).copy()
@@ -307,6 +358,7 @@ class Scene:
 
 
 IGNIS = "07_ignis_cycles_refs/blender/"
+APPLESEED = "08_appleseed_motion_dof_lamps/"
 
 SCENES = {
     "example": Scene("examples/make_character.py", prepare_example, 192, 108, 20, in_project=True),
@@ -324,6 +376,21 @@ SCENES = {
     "conference_motion": Scene("01_conference/conference.blend", prepare_conference, 160, 120,
                                shutter=0.8),
     "billiards": Scene(None, prepare_billiards, 160, 90, shutter=0.9),
+    "spin": Scene(None, prepare_spin, 128, 80, shutter=1.0),
+    "lens": Scene(APPLESEED + "cameras/01 - basic_dof.blend", prepare_appleseed, 96, 96),
+    "lens_shift": Scene(APPLESEED + "cameras/02 - camera_shift.blend", prepare_appleseed, 96, 72),
+    "area_lamp": Scene(APPLESEED + "lamps/01 - area.blend", prepare_appleseed, 96, 56),
+    "spot_lamp": Scene(APPLESEED + "lamps/02 - textured_spot.blend", prepare_appleseed, 96, 96),
+    "sun_lamp": Scene(APPLESEED + "lamps/03 - sun_lamp.blend", prepare_appleseed, 96, 96),
+    "sun_sky": Scene(APPLESEED + "lamps/04 - sun_environ.blend", prepare_appleseed, 96, 96),
+    "camera_motion": Scene(APPLESEED + "motion_blur/01 - camera.blend", prepare_appleseed, 96, 56,
+                           shutter=0.8),
+    "object_motion": Scene(APPLESEED + "motion_blur/02 - object.blend", prepare_appleseed, 96, 56,
+                           shutter=0.8),
+    "group_motion": Scene(APPLESEED + "motion_blur/03 - linked_group.blend", prepare_appleseed,
+                          96, 56, shutter=0.8),
+    "mesh_motion": Scene(APPLESEED + "motion_blur/04 - mesh.blend", prepare_appleseed, 96, 72,
+                         frame=3, shutter=1.0),
 }
 
 

@@ -112,6 +112,50 @@ def test_view_layers_and_override(blender):
     assert pictures[2] == pytest.approx([0, 0, 1, 1], abs=1e-5)
 
 
+def inside_layer_switches():
+    """Channel means of a shining wall before half of a world, with a layer's switches."""
+    import bpy
+    import scenes
+    scene = scenes.empty()
+    scene.world.color = (0.25, 0.25, 0.25)
+    scenes.camera()
+    moving = scenes.wall("Wall", 40.0, 0.0, (-20.0, 0.0), scenes.emitter((1.0, 0.0, 0.0)))
+    for frame, x in ((0, -24.0), (1, -20.0), (2, -16.0)):
+        moving.location.x = x + 20.0
+        moving.keyframe_insert("location", frame=frame)
+    scene.frame_set(1)
+    scene.render.use_motion_blur, scene.render.motion_blur_shutter = True, 0.5
+    layer = bpy.context.view_layer
+    pictures = {}
+    for name in ("as it is", "use_sky", "use_solid", "use_motion_blur"):
+        if name != "as it is":
+            setattr(layer, name, False)
+        pictures[name] = scenes.render()
+        if name != "as it is":
+            setattr(layer, name, True)
+    layer.samples = 7
+    layer.volley.use_pass_sample_count = True
+    pictures["samples"] = scenes.render_passes(["Debug Sample Count"])["Debug Sample Count"]
+    return pictures
+
+
+def test_switches_of_a_layer(blender):
+    pictures = blender.run(inside_layer_switches)
+
+    def column(name, x):
+        return pictures[name][:, x, :3].mean(axis=0)
+
+    assert column("as it is", 5) == pytest.approx([1, 0, 0], abs=1e-5)
+    assert column("as it is", 58) == pytest.approx([0.25] * 3, abs=1e-5)
+    assert 0.05 < column("as it is", 32)[1] < 0.2
+    assert column("use_sky", 5) == pytest.approx([1, 0, 0], abs=1e-5)
+    assert column("use_sky", 58) == pytest.approx([0, 0, 0], abs=1e-5)
+    assert pictures["use_solid"][..., :3] == pytest.approx(0.25, abs=1e-5)
+    assert column("use_motion_blur", 29) == pytest.approx([1, 0, 0], abs=1e-5)
+    assert column("as it is", 29)[1] > 0.01
+    assert pictures["samples"][..., 0] == pytest.approx(7.0)
+
+
 def inside_passes():
     import bpy
     import scenes

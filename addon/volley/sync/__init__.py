@@ -82,8 +82,9 @@ class SceneSync:
 
     def _sync_world(self, source):
         scene = source.depsgraph.scene_eval
-        material_id = self._materials.world_id(scene.world) if scene.world else 0
-        self.scene.set_world(**world.describe(scene.world, material_id, scene.volley))
+        shown = scene.world if source.depsgraph.view_layer_eval.use_sky else None
+        material_id = self._materials.world_id(shown) if shown else 0
+        self.scene.set_world(**world.describe(shown, material_id, scene.volley))
 
     def set_camera(self, keys, shutter=None):
         """Send the camera; keys as camera.CameraKeys."""
@@ -114,7 +115,7 @@ class _Walk:
         for each in self._shown_instances():
             if instance.is_light(each):
                 self._add_light(each)
-            elif instance.has_mesh(each):
+            elif instance.has_mesh(each) and self._view_layer.use_solid:
                 self._add_mesh_instance(each)
 
     def follow_motion(self, camera_keys):

@@ -38,11 +38,12 @@ def split_frame(frame):
     return whole, frame - whole
 
 
-def shutter_of(scene, position):
+def shutter_of(scene, view_layer, position):
     """The shutter of an evaluated scene, None without motion blur; position: 'START', 'CENTER' or
     'END' of the interval is the current frame."""
     render = scene.render
-    if not render.use_motion_blur or render.motion_blur_shutter <= 0.0:
+    is_used = render.use_motion_blur and view_layer.use_motion_blur
+    if not is_used or render.motion_blur_shutter <= 0.0:
         return None
     now = scene.frame_current_final
     length = render.motion_blur_shutter
