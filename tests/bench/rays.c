@@ -382,13 +382,18 @@ struct rectangle {
 
 static void square_append(struct maker *m, const struct rectangle *tile, uint32_t x, uint32_t y,
                           uint32_t side, uint32_t begin, uint32_t end) {
-    for (uint32_t index = begin; index < end; index++)
-        for (uint32_t j = y; j < y + side && j < tile->height; j++)
-            for (uint32_t i = x; i < x + side && i < tile->width; i++) {
-                struct sample *s = &m->samples[m->sample_count++];
-                *s = (struct sample){(tile->x + i) | (tile->y + j) << 16, index, 0};
-                s->key = sample_cell(m, s);
-            }
+    for (uint32_t place = 0; place < side * side; place++) {
+        uint32_t i = x, j = y;
+        for (uint32_t bit = 0; 1u << bit < side; bit++) {
+            i += (place >> (2 * bit) & 1u) << bit;
+            j += (place >> (2 * bit + 1) & 1u) << bit;
+        }
+        for (uint32_t index = begin; i < tile->width && j < tile->height && index < end; index++) {
+            struct sample *s = &m->samples[m->sample_count++];
+            *s = (struct sample){(tile->x + i) | (tile->y + j) << 16, index, 0};
+            s->key = sample_cell(m, s);
+        }
+    }
 }
 
 /* A range of a tile's samples, at most SAMPLES_PER_BATCH, in squares as kernels/tile.c walks it. */

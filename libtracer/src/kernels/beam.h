@@ -33,6 +33,8 @@ struct trc_beam {
     float z0, z1; /* near and far plane, mirrored z; z1 shrinks as hits are found */
     float u_min, u_max, v_min, v_max;                         /* at z0 */
     float u_min_slope, u_max_slope, v_min_slope, v_max_slope; /* per z */
+    /* The same as middle and half width. */
+    float u_mid, v_mid, u_half, v_half, u_mid_slope, v_mid_slope, u_half_slope, v_half_slope;
 };
 
 /* Everything a traversal derives from a packet for one group of its rays. */
@@ -132,7 +134,8 @@ TRC_INLINE bool trc_group_setup(struct trc_group *g, const struct trc_packet *p,
         g->sv_max = vf_lanes_max(shear[3]);
     }
     const float length = b->z1 - b->z0;
-    const bool is_short = length < TRC_SHORT_BEAM;
+    /* In a beam no longer than its slack, rounding would be most of a slope. */
+    const bool is_short = length < f_max(b->slack, TRC_SHORT_BEAM);
     const float per_z = is_short ? 0.0f : 1.0f / length;
     if (is_short) { /* one range over both planes */
         u_low[0] = vf_min(u_low[0], u_low[1]);
@@ -148,6 +151,14 @@ TRC_INLINE bool trc_group_setup(struct trc_group *g, const struct trc_packet *p,
     b->u_max_slope = (vf_lanes_max(u_high[1]) + b->slack - b->u_max) * per_z;
     b->v_min_slope = (vf_lanes_min(v_low[1]) - b->slack - b->v_min) * per_z;
     b->v_max_slope = (vf_lanes_max(v_high[1]) + b->slack - b->v_max) * per_z;
+    b->u_mid = 0.5f * (b->u_min + b->u_max);
+    b->v_mid = 0.5f * (b->v_min + b->v_max);
+    b->u_half = 0.5f * (b->u_max - b->u_min);
+    b->v_half = 0.5f * (b->v_max - b->v_min);
+    b->u_mid_slope = 0.5f * (b->u_min_slope + b->u_max_slope);
+    b->v_mid_slope = 0.5f * (b->v_min_slope + b->v_max_slope);
+    b->u_half_slope = 0.5f * (b->u_max_slope - b->u_min_slope);
+    b->v_half_slope = 0.5f * (b->v_max_slope - b->v_min_slope);
     return true;
 }
 
@@ -171,6 +182,88 @@ TRC_INLINE uint32_t trc_beam_test(const struct trc_beam *b, const f8 lower[3], c
     *key = near;
     return f8_le(za, zb) & f8_le(u_low, upper[u]) & f8_le(lower[u], u_high) &
            f8_le(v_low, upper[v]) & f8_le(lower[v], v_high);
+}
+
+/* Corners of eight triangles in the beam's space: u, v from its middle, z from its near plane. */
+struct trc_beam_corners {
+    f8 u[3], v[3], z[3];
+};
+
+TRC_INLINE void trc_beam_corners_set(const struct trc_beam *b, int corner, f8 u, f8 v, f8 z,
+                                     struct trc_beam_corners *c) {
+    c->z[corner] = f8_set(b->sign) * z - f8_set(b->z0);
+    c->u[corner] = u - f8_madd(c->z[corner], f8_set(b->u_mid_slope), f8_set(b->u_mid));
+    c->v[corner] = v - f8_madd(c->z[corner], f8_set(b->v_mid_slope), f8_set(b->v_mid));
+}
+
+/* Edge functions: rounding of their terms, and products that underflow. */
+#define TRC_EDGE_ROUNDING 1e-6f
+#define TRC_EDGE_LEAST 1e-36f
+
+/* Bits of the triangles that some ray of the beam may hit. later: where the corners are at the end
+ * of the group's interval of time (linear between), or NULL.
+ *
+ * A ray that meets a triangle does so at a place of the beam's cross-section, a rectangle about the
+ * middle; seen along the middle, the triangle must overlap the largest rectangle of its stretch of
+ * z: compared by their boxes and by the sides of the triangle's edges, for either winding. An edge
+ * in motion has a quadratic edge function: its ends, and a quarter of its square term, bound it.
+ * Rounding of the corners, 16 half-ulps of M at most (slopes are below 1.1, products below 3 M), is
+ * within another slack on the rectangle. */
+TRC_INLINE uint32_t trc_beam_triangles(const struct trc_beam *b, const struct trc_beam_corners *c,
+                                       const struct trc_beam_corners *later) {
+    f8 z_low = f8_min(c->z[0], f8_min(c->z[1], c->z[2]));
+    f8 z_high = f8_max(c->z[0], f8_max(c->z[1], c->z[2]));
+    f8 u_low = f8_min(c->u[0], f8_min(c->u[1], c->u[2]));
+    f8 u_high = f8_max(c->u[0], f8_max(c->u[1], c->u[2]));
+    f8 v_low = f8_min(c->v[0], f8_min(c->v[1], c->v[2]));
+    f8 v_high = f8_max(c->v[0], f8_max(c->v[1], c->v[2]));
+    for (int k = 0; later && k < 3; k++) {
+        z_low = f8_min(z_low, later->z[k]);
+        z_high = f8_max(z_high, later->z[k]);
+        u_low = f8_min(u_low, later->u[k]);
+        u_high = f8_max(u_high, later->u[k]);
+        v_low = f8_min(v_low, later->v[k]);
+        v_high = f8_max(v_high, later->v[k]);
+    }
+    const f8 zero = f8_set(0.0f), slack = f8_set(b->slack);
+    const f8 from = f8_max(z_low, zero), to = f8_min(z_high, f8_set(b->z1 - b->z0 + b->slack));
+    const f8 u_slope = f8_set(b->u_half_slope), v_slope = f8_set(b->v_half_slope);
+    const f8 u_half =
+        f8_max(f8_madd(from, u_slope, f8_set(b->u_half)), f8_madd(to, u_slope, f8_set(b->u_half))) +
+        slack;
+    const f8 v_half =
+        f8_max(f8_madd(from, v_slope, f8_set(b->v_half)), f8_madd(to, v_slope, f8_set(b->v_half))) +
+        slack;
+    const uint32_t boxes = f8_le(from, to) & f8_le(u_low, u_half) & f8_le(-u_half, u_high) &
+                           f8_le(v_low, v_half) & f8_le(-v_half, v_high);
+    if (!boxes)
+        return 0;
+    const f8 rounding = f8_set(TRC_EDGE_ROUNDING);
+    const f8 u_reach = f8_madd(rounding, f8_max(f8_abs(u_low), f8_abs(u_high)) + u_half, u_half);
+    const f8 v_reach = f8_madd(rounding, f8_max(f8_abs(v_low), f8_abs(v_high)) + v_half, v_half);
+    f8 most = f8_set(INFINITY), least = f8_set(-INFINITY); /* of the edge functions' bounds */
+    for (int k = 0; k < 3; k++) {
+        const int next = (k + 1) % 3;
+        const f8 du = c->u[next] - c->u[k], dv = c->v[next] - c->v[k];
+        f8 high = dv * c->u[k] - du * c->v[k], low = high;
+        f8 reach = f8_madd(f8_abs(du), v_reach, f8_abs(dv) * u_reach);
+        if (later) {
+            const f8 eu = later->u[next] - later->u[k], ev = later->v[next] - later->v[k];
+            const f8 end = ev * later->u[k] - eu * later->v[k];
+            const f8 square = f8_abs(ev - dv) * f8_abs(later->u[k] - c->u[k]) +
+                              f8_abs(eu - du) * f8_abs(later->v[k] - c->v[k]);
+            high = f8_max(high, end);
+            low = f8_min(low, end);
+            reach = f8_max(reach, f8_madd(f8_abs(eu), v_reach, f8_abs(ev) * u_reach)) +
+                    f8_set(0.2501f) * square;
+        }
+        most = f8_min(most, high + reach);
+        least = f8_max(least, low - reach);
+    }
+    /* Outside of an edge, whichever way it turns. Not a number stays in. */
+    const uint32_t outside =
+        f8_le(most, f8_set(-TRC_EDGE_LEAST)) & f8_le(f8_set(TRC_EDGE_LEAST), least);
+    return boxes & ~outside;
 }
 
 #endif

@@ -362,13 +362,20 @@ static void batch_render(struct trc_tile *t) {
 static void square_append(struct trc_tile *t, uint32_t x, uint32_t y, uint32_t side, uint32_t begin,
                           uint32_t end) {
     const struct trc_tile_job *job = t->job;
-    for (uint32_t s = begin; s < end; s++)
-        for (uint32_t j = y; j < y + side && j < job->height; j++)
-            for (uint32_t i = x; i < x + side && i < job->width; i++) {
-                const uint32_t px = t->desc->crop_x + job->x + i, py = t->desc->crop_y + job->y + j;
-                t->samples.pixel[t->samples.count] = px | py << 16;
-                t->samples.index[t->samples.count++] = s;
-            }
+    for (uint32_t place = 0; place < side * side; place++) { /* in Z-order */
+        uint32_t i = x, j = y;
+        for (uint32_t bit = 0; 1u << bit < side; bit++) {
+            i += (place >> (2 * bit) & 1u) << bit;
+            j += (place >> (2 * bit + 1) & 1u) << bit;
+        }
+        if (i >= job->width || j >= job->height)
+            continue;
+        const uint32_t px = t->desc->crop_x + job->x + i, py = t->desc->crop_y + job->y + j;
+        for (uint32_t s = begin; s < end; s++) {
+            t->samples.pixel[t->samples.count] = px | py << 16;
+            t->samples.index[t->samples.count++] = s;
+        }
+    }
 }
 
 /* Orders the batch by cells of lens and time, so that rays of a packet share one: 16 cells, as a

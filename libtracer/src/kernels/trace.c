@@ -118,32 +118,29 @@ TRC_INLINE uint64_t box_rays(const struct walk *w, uint32_t box, uint64_t mask, 
 
 /* ---- leaves, packets ---- */
 
-/* Beam cull of the leaf's triangles by their boxes. */
+/* Beam cull of the leaf's triangles. */
 TRC_INLINE uint32_t leaf_candidates(const struct walk *w, const float *v, uint32_t count,
                                     bool motion) {
-    f8 lower[3], upper[3], key;
+    const struct trc_beam *b = &w->group->beam;
     const float *e = v + TRC_TRIANGLE_FLOATS * count; /* the next key */
-    const f8 f0 = f8_set(motion ? w->group->f_min : 0.0f),
-             f1 = f8_set(motion ? w->group->f_max : 0.0f);
-    for (int axis = 0; axis < 3; axis++) {
-        f8 low = f8_set(INFINITY), high = f8_set(-INFINITY);
-        for (int corner = 0; corner < 3; corner++) {
-            const uint32_t at = (uint32_t)(3 * corner + axis) * count;
-            const f8 a = f8_load(v + at);
-            if (motion) {
-                const f8 way = f8_load(e + at) - a;
-                const f8 x = a + f0 * way, y = a + f1 * way;
-                low = f8_min(low, f8_min(x, y));
-                high = f8_max(high, f8_max(x, y));
-            } else {
-                low = f8_min(low, a);
-                high = f8_max(high, a);
-            }
+    struct trc_beam_corners now, later;
+    for (uint32_t corner = 0; corner < 3; corner++) {
+        const uint32_t u = (3 * corner + (uint32_t)b->axis.u) * count,
+                       y = (3 * corner + (uint32_t)b->axis.v) * count,
+                       z = (3 * corner + (uint32_t)b->axis.z) * count;
+        const f8 p[3] = {f8_load(v + u), f8_load(v + y), f8_load(v + z)};
+        if (motion) {
+            const f8 f0 = f8_set(w->group->f_min), f1 = f8_set(w->group->f_max);
+            const f8 way[3] = {f8_load(e + u) - p[0], f8_load(e + y) - p[1], f8_load(e + z) - p[2]};
+            trc_beam_corners_set(b, (int)corner, p[0] + f0 * way[0], p[1] + f0 * way[1],
+                                 p[2] + f0 * way[2], &now);
+            trc_beam_corners_set(b, (int)corner, p[0] + f1 * way[0], p[1] + f1 * way[1],
+                                 p[2] + f1 * way[2], &later);
+        } else {
+            trc_beam_corners_set(b, (int)corner, p[0], p[1], p[2], &now);
         }
-        lower[axis] = low;
-        upper[axis] = high;
     }
-    return trc_beam_test(&w->group->beam, lower, upper, &key) & ((1u << count) - 1u);
+    return trc_beam_triangles(b, &now, motion ? &later : NULL) & ((1u << count) - 1u);
 }
 
 /* Broadcasts the triangle of v's first slot, or interpolates it for each ray of chunk i. */
