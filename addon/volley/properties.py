@@ -77,10 +77,30 @@ class VolleySceneSettings(bpy.types.PropertyGroup):
         name="Light Samples", default=0, min=0, max=64,
         description="Shadow rays at each point the camera sees; 0 lets the library choose",
         update=_changed)
+    use_adaptive_sampling: BoolProperty(
+        name="Use Adaptive Sampling", default=False,
+        description="Stop sampling a pixel when its estimated noise is low enough", update=_changed)
     noise_threshold: FloatProperty(
-        name="Noise Threshold", default=0.0, min=0.0, max=1.0, precision=4,
-        description="Stop sampling a pixel when its estimated noise is below this; 0 samples all "
-                    "pixels alike", update=_changed)
+        name="Noise Threshold", default=0.01, min=0.0, max=1.0, soft_min=0.001, precision=4,
+        description="Noise at which sampling stops; lower is better and slower. 0 chooses by the "
+                    "number of samples", update=_changed)
+    adaptive_min_samples: IntProperty(
+        name="Min Samples", default=0, min=0, max=4096,
+        description="Samples of each pixel before noise is judged, to discover noisy features; "
+                    "rounded up to a power of two. 0 chooses by the noise threshold",
+        update=_changed)
+    use_preview_adaptive_sampling: BoolProperty(
+        name="Use Adaptive Sampling", default=False,
+        description="Stop sampling a pixel of the viewport when its estimated noise is low enough",
+        update=_changed)
+    preview_noise_threshold: FloatProperty(
+        name="Noise Threshold", default=0.1, min=0.0, max=1.0, soft_min=0.001, precision=4,
+        description="Noise at which sampling stops in the viewport; lower is better and slower. 0 "
+                    "chooses by the number of samples", update=_changed)
+    preview_adaptive_min_samples: IntProperty(
+        name="Min Samples", default=0, min=0, max=4096,
+        description="Samples of each pixel of the viewport before noise is judged; rounded up to a "
+                    "power of two. 0 chooses by the noise threshold", update=_changed)
     sampler: EnumProperty(
         name="Sampler", items=SAMPLER_ITEMS, default='SOBOL', description="Where samples are taken",
         update=_changed)

@@ -22,6 +22,7 @@ STATUS_SECONDS = 0.2         # between two status lines
 PICTURE_SECONDS = 0.7        # between two of them
 PICTURE_COST = 20            # at least this many times what showing one takes
 MEGA = 1024.0 * 1024.0
+LEAST_NOISE_THRESHOLD = 0.001  # that is chosen without the user
 
 
 class Session:
@@ -268,8 +269,20 @@ def render_fields(scene, frame, crop, entries, is_preview=False):
         "filter": native.FILTERS[settings.pixel_filter_type], "filter_width": settings.filter_width,
         "film_transparent": int(scene.render.film_transparent),
         "film_exposure": settings.film_exposure, "passes": passes.request_mask(entries),
-        "thread_count": thread_count(scene.render), "noise_threshold": settings.noise_threshold,
+        "thread_count": thread_count(scene.render), **_adaptive_fields(settings, is_preview),
     }
+
+
+def _adaptive_fields(settings, is_preview):
+    """The fields of trc_render_desc that stop pixels by their noise."""
+    prefix = "preview_" if is_preview else ""
+    if not getattr(settings, f"use_{prefix}adaptive_sampling"):
+        return {"noise_threshold": 0.0}
+    threshold = getattr(settings, f"{prefix}noise_threshold")
+    if threshold == 0.0:  # as Cycles chooses it
+        threshold = max(LEAST_NOISE_THRESHOLD, 1.0 / getattr(settings, f"{prefix}samples"))
+    return {"noise_threshold": threshold,
+            "min_samples": getattr(settings, f"{prefix}adaptive_min_samples")}
 
 
 def _fit_crop(crop, film_size):

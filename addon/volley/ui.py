@@ -62,12 +62,27 @@ class VOLLEY_RENDER_PT_sampling(_VolleyPanel, Panel):
         _column(self).prop(context.scene.volley, "integrator")
 
 
+def _draw_samples(layout, settings, prefix=""):
+    """Numbers of samples and the noise threshold; prefix: "preview_" for the viewport's."""
+    switch = f"use_{prefix}adaptive_sampling"
+    is_adaptive = getattr(settings, switch)
+    row = layout.column(align=True, heading="Noise Threshold").row(align=True)
+    row.prop(settings, switch, text="")
+    value = row.row()
+    value.active = is_adaptive
+    value.prop(settings, f"{prefix}noise_threshold", text="")
+    column = layout.column(align=True)
+    column.prop(settings, f"{prefix}samples", text="Max Samples" if is_adaptive else "Samples")
+    if is_adaptive:
+        column.prop(settings, f"{prefix}adaptive_min_samples")
+
+
 class VOLLEY_RENDER_PT_sampling_viewport(_VolleyPanel, Panel):
     bl_label = "Viewport"
     bl_parent_id = "VOLLEY_RENDER_PT_sampling"
 
     def draw(self, context):
-        _column(self).prop(context.scene.volley, "preview_samples", text="Samples")
+        _draw_samples(_column(self), context.scene.volley, "preview_")
 
 
 class VOLLEY_RENDER_PT_sampling_render(_VolleyPanel, Panel):
@@ -76,9 +91,8 @@ class VOLLEY_RENDER_PT_sampling_render(_VolleyPanel, Panel):
 
     def draw(self, context):
         settings, layout = context.scene.volley, _column(self)
-        layout.prop(settings, "samples")
+        _draw_samples(layout, settings)
         layout.prop(settings, "light_samples")
-        layout.prop(settings, "noise_threshold")
 
 
 class VOLLEY_RENDER_PT_sampling_advanced(_VolleyPanel, Panel):

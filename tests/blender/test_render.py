@@ -228,6 +228,36 @@ class _EscPressed:
         return self.pressed is not None
 
 
+def inside_adaptive():
+    import scenes
+    scene = scenes.empty(samples=128)
+    scenes.camera(location=(0.0, -6.0, 0.0))
+    scenes.wall(material=scenes.material("Grey", "ShaderNodeBsdfDiffuse", Color=(0.5, 0.5, 0.5)))
+    scenes.light('AREA', energy=300.0, size=3.0)
+    scene.view_layers[0].volley.use_pass_sample_count = True
+    settings, counts = scene.volley, {}
+    for name, values in (("off", {}), ("fine", {"noise_threshold": 0.0001}),
+                         ("coarse", {"noise_threshold": 0.01}),
+                         ("few", {"noise_threshold": 0.01, "adaptive_min_samples": 9}),
+                         ("automatic", {"noise_threshold": 0.0})):
+        settings.use_adaptive_sampling = bool(values)
+        settings.adaptive_min_samples = 0
+        for key, value in values.items():
+            setattr(settings, key, value)
+        counts[name] = scenes.render_passes(["Debug Sample Count"])["Debug Sample Count"][..., 0]
+    return counts
+
+
+def test_adaptive_sampling_and_its_settings(blender):
+    counts = blender.run(inside_adaptive)
+    assert (counts["off"] == 128).all()
+    assert counts["fine"].max() == 128 and counts["fine"].mean() > counts["coarse"].mean()
+    # Automatic choices are those of Cycles: 64 samples before the first look at 0.01.
+    assert counts["coarse"].min() == 64 and counts["automatic"].min() == 64
+    assert set(np.unique(counts["few"])) <= {16, 32, 64, 128} and counts["few"].min() == 16
+    assert len(np.unique(counts["few"])) > 1
+
+
 def inside_cancel():
     """Press Esc during a render that would take minutes."""
     import time

@@ -126,8 +126,12 @@ static void set_view(struct session *s) {
 
 static void check_render(struct session *s, uint32_t progressive) {
     enum { WIDTH = 33, HEIGHT = 1 }; /* two tiles; hundreds of sessions run */
-    trc_render_desc desc = fixture_render_desc(WIDTH, HEIGHT, 2);
+    trc_render_desc desc = fixture_render_desc(WIDTH, HEIGHT, progressive ? 8 : 2);
     desc.progressive = progressive;
+    if (progressive) {
+        desc.noise_threshold = 0.1f;
+        desc.min_samples = 4;
+    }
     desc.passes = (1u << TRC_PASS_COUNT) - 1;
     trc_render render;
     STEP_OUT(render, trc_render_start(s->scene, &desc, &render));

@@ -59,6 +59,7 @@ static void render_settings(void **state) {
     REFUSE_RENDER(LARGE, desc.thread_count = 1025);
     REFUSE_RENDER(ARGUMENT, desc.progressive = 2);
     REFUSE_RENDER(ARGUMENT, desc.noise_threshold = NAN);
+    REFUSE_RENDER(LARGE, desc.min_samples = (1u << 20) + 1);
 }
 
 static void render_reads(void **state) {

@@ -80,8 +80,14 @@ typedef struct trc_render_desc {
     uint32_t thread_count;     /* 0: one per logical processor */
     uint32_t progressive;      /* 1: whole frame, samples in rising batches (previews); 0: tiles to
                                   the end one after the other */
-    float noise_threshold;     /* adaptive sampling; 0 off */
-    uint32_t reserved;
+    /* Adaptive sampling, off where noise_threshold is 0: a pixel gets min_samples (rounded up to a
+     * power of two; 0 chooses by the threshold, 64 for 0.01) and then doubles its count until the
+     * estimated error is below the threshold, in units of Cycles' Noise Threshold, or sample_count
+     * is reached. Pixels decide for their neighbours, not for themselves, so the mean is unbiased
+     * (with TRC_SAMPLER_SUDOKU and BLUE_NOISE, whose pixels share sequences, nearly). Counts:
+     * TRC_PASS_SAMPLE_COUNT. */
+    float noise_threshold;
+    uint32_t min_samples;
 } trc_render_desc;
 
 /* Starts rendering the scene's current snapshot in threads of the library. Memory is checked and
@@ -92,8 +98,8 @@ TRC_API trc_status trc_render_start(trc_scene scene, const trc_render_desc *desc
 typedef struct trc_render_progress {
     uint32_t struct_size;
     uint32_t state;        /* 0 running, 1 done, 2 cancelled, 3 failed (see message) */
-    float fraction;        /* [0, 1] of the samples */
-    uint32_t samples_done; /* lowest count over all pixels */
+    float fraction;        /* [0, 1] of the samples; those that adaptive sampling spares are done */
+    uint32_t samples_done; /* lowest count over all pixels, as if every pixel took them all */
     double seconds;        /* since the start, stands still at the end */
     uint64_t rays_camera, rays_shadow, rays_reflection, rays_refraction;
     uint64_t dropped_samples;                 /* not finite, left out */

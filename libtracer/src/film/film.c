@@ -72,21 +72,14 @@ static uint64_t physical_bytes(void) {
     return (uint64_t)pages * (uint64_t)page_bytes;
 }
 
-/* The budget: a system that overcommits would grant more than there is and kill the host later.
- * width and height are 32-bit and a pixel has less than 1 KiB, so checks of the products suffice.
- */
-static trc_status check_budget(uint32_t width, uint32_t height, uint64_t passes) {
-    uint64_t pixel_bytes = sizeof(uint32_t), bytes = 0;
-    for (uint32_t pass = 0; pass < TRC_PASS_COUNT; pass++) {
-        if (has_sums(pass, passes))
-            pixel_bytes += trc_pass_channels(pass) * sizeof(double);
-    }
+trc_status trc_film_check_budget(uint32_t width, uint32_t height, uint64_t pixel_bytes) {
+    uint64_t bytes = 0;
     const bool fits =
         trc_multiply_u64((uint64_t)width * height, pixel_bytes, &bytes) && bytes <= PTRDIFF_MAX;
     const uint64_t used = trc_memory_bytes(), physical = physical_bytes();
     if (!fits || used > physical || bytes > physical - used) {
         return trc_fail(TRC_ERROR_TOO_LARGE,
-                        "%" PRIu32 " x %" PRIu32 " pixels with these passes need %" PRIu64
+                        "%" PRIu32 " x %" PRIu32 " pixels with these settings need %" PRIu64
                         " MiB, the machine has %" PRIu64 " MiB in all",
                         width, height, bytes >> 20, physical >> 20);
     }
@@ -96,7 +89,12 @@ static trc_status check_budget(uint32_t width, uint32_t height, uint64_t passes)
 trc_status trc_film_create(struct trc_film *film, uint32_t width, uint32_t height,
                            uint64_t passes) {
     passes |= UINT64_C(1) << TRC_PASS_COMBINED;
-    TRC_TRY(check_budget(width, height, passes));
+    uint64_t pixel_bytes = sizeof *film->sample_counts;
+    for (uint32_t pass = 0; pass < TRC_PASS_COUNT; pass++) {
+        if (has_sums(pass, passes))
+            pixel_bytes += trc_pass_channels(pass) * sizeof(double);
+    }
+    TRC_TRY(trc_film_check_budget(width, height, pixel_bytes));
     const size_t pixels = (size_t)width * height;
     struct trc_film made = {.width = width, .height = height, .passes = passes};
     made.sample_counts = trc_alloc_zeroed(pixels, sizeof *made.sample_counts);

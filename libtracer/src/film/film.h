@@ -18,6 +18,10 @@ struct trc_film {
     uint32_t *sample_counts;      /* width * height */
 };
 
+/* TRC_ERROR_TOO_LARGE unless so many bytes for every pixel fit into the machine's memory: a system
+ * that overcommits would grant more than there is and kill the host later. pixel_bytes < 1 KiB. */
+trc_status trc_film_check_budget(uint32_t width, uint32_t height, uint64_t pixel_bytes);
+
 /* Takes the memory of the passes, zeroed. TRC_ERROR_TOO_LARGE or OUT_OF_MEMORY. */
 trc_status trc_film_create(struct trc_film *film, uint32_t width, uint32_t height, uint64_t passes);
 void trc_film_destroy(struct trc_film *film);

@@ -6,6 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "film/adaptive.h"
 #include "film/film.h"
 #include "scene/snapshot.h"
 #include "tracer/tracer.h"
@@ -23,7 +24,8 @@ struct trc_tile_job {
     const trc_render_desc *desc;   /* resolved: no 0-means-chosen values left */
     const uint32_t *sampler_table; /* sampling/sobol.h */
     struct trc_film *film;
-    uint32_t x, y, width, height; /* in the crop, pixels */
+    struct trc_adaptive *adaptive; /* NULL: every pixel gets every sample */
+    uint32_t x, y, width, height;  /* in the crop, pixels */
     uint32_t sample_begin, sample_end;
     void *memory;              /* tile_memory_bytes(desc) bytes, 64-byte aligned, one thread's */
     const atomic_uint *cancel; /* non-zero: return soon, the tile's pixels keep whole samples */

@@ -290,44 +290,69 @@ static bool first_sample_pass(uint32_t pass) {
            pass == TRC_PASS_MATERIAL_INDEX;
 }
 
+/* A sample's pixel in the film. */
+TRC_INLINE size_t film_pixel(const struct trc_tile *t, uint32_t slot) {
+    const uint32_t x = (t->samples.pixel[slot] & 0xffffu) - t->desc->crop_x;
+    const uint32_t y = (t->samples.pixel[slot] >> 16) - t->desc->crop_y;
+    return (size_t)y * t->job->film->width + x;
+}
+
+TRC_INLINE bool is_finite_sample(const struct trc_tile *t, uint32_t slot) {
+    return isfinite(t->samples.radiance[0][slot] + t->samples.radiance[1][slot] +
+                    t->samples.radiance[2][slot]);
+}
+
+/* Adds a sample to its pixel. */
+static void film_add_sample(struct trc_tile *t, uint32_t slot, size_t pixel) {
+    struct trc_film *film = t->job->film;
+    double *combined = film->sums[TRC_PASS_COMBINED] + 4 * pixel;
+    for (int c = 0; c < 3; c++)
+        combined[c] += (double)t->samples.radiance[c][slot];
+    combined[3] += 1.0 - (double)t->samples.transparency[slot];
+    const bool first = film->sample_counts[pixel]++ == 0;
+    if (!t->extra_passes)
+        return;
+    for (uint32_t pass = 1; pass < TRC_PASS_SAMPLE_COUNT; pass++) {
+        if (!t->samples.pass[pass][0])
+            continue;
+        const uint32_t channels = trc_pass_channels(pass);
+        double *sum = film->sums[pass] + channels * pixel;
+        for (uint32_t k = 0; k < channels; k++) {
+            const double value = (double)t->samples.pass[pass][k][slot];
+            if (!isfinite(value))
+                continue;
+            if (!first_sample_pass(pass))
+                sum[k] += value;
+            else if (first)
+                sum[k] = value;
+        }
+    }
+}
+
 /* Adds the batch's samples to the film in the order of their slots; samples that are not finite are
  * left out and counted. */
 static void film_add(struct trc_tile *t) {
-    struct trc_film *film = t->job->film;
-    const trc_render_desc *desc = t->desc;
     for (uint32_t slot = 0; slot < t->samples.count; slot++) {
-        const uint32_t x = (t->samples.pixel[slot] & 0xffffu) - desc->crop_x;
-        const uint32_t y = (t->samples.pixel[slot] >> 16) - desc->crop_y;
-        const size_t pixel = (size_t)y * film->width + x;
-        const float r = t->samples.radiance[0][slot], g = t->samples.radiance[1][slot],
-                    b = t->samples.radiance[2][slot];
-        if (!isfinite(r + g + b)) {
+        if (is_finite_sample(t, slot))
+            film_add_sample(t, slot, film_pixel(t, slot));
+        else
+            t->job->counts.dropped_samples++;
+    }
+}
+
+/* The same with adaptive sampling, whose sums may go on where the film's count has ended. */
+static void film_add_adaptive(struct trc_tile *t) {
+    for (uint32_t slot = 0; slot < t->samples.count; slot++) {
+        if (!is_finite_sample(t, slot)) {
             t->job->counts.dropped_samples++;
             continue;
         }
-        double *combined = film->sums[TRC_PASS_COMBINED] + 4 * pixel;
-        combined[0] += (double)r;
-        combined[1] += (double)g;
-        combined[2] += (double)b;
-        combined[3] += 1.0 - (double)t->samples.transparency[slot];
-        const bool first = film->sample_counts[pixel]++ == 0;
-        if (!t->extra_passes)
-            continue;
-        for (uint32_t pass = 1; pass < TRC_PASS_SAMPLE_COUNT; pass++) {
-            if (!t->samples.pass[pass][0])
-                continue;
-            const uint32_t channels = trc_pass_channels(pass);
-            double *sum = film->sums[pass] + channels * pixel;
-            for (uint32_t k = 0; k < channels; k++) {
-                const double value = (double)t->samples.pass[pass][k][slot];
-                if (!isfinite(value))
-                    continue;
-                if (!first_sample_pass(pass))
-                    sum[k] += value;
-                else if (first)
-                    sum[k] = value;
-            }
-        }
+        const size_t pixel = film_pixel(t, slot);
+        struct trc_adaptive_pixel *p = &t->job->adaptive->pixels[pixel];
+        for (int c = 0; c < 3; c++)
+            p->sum[c] += (double)t->samples.radiance[c][slot];
+        if (p->reasons & TRC_PIXEL_COUNTS)
+            film_add_sample(t, slot, pixel);
     }
 }
 
@@ -346,7 +371,10 @@ static void batch_render(struct trc_tile *t) {
             t->generation++;
     }
     clock_other(t);
-    film_add(t);
+    if (t->job->adaptive)
+        film_add_adaptive(t);
+    else
+        film_add(t);
 }
 
 /* ---- the tile ---- */
@@ -358,6 +386,24 @@ static void batch_render(struct trc_tile *t) {
 /* With a lens or an open shutter packets hold an 8x8 square and one cell of lens and time each. */
 #define CELL_SQUARE 8
 
+/* Whether a pixel of the tile gets samples. */
+TRC_INLINE bool is_sampled(const struct trc_tile_job *job, uint32_t x, uint32_t y) {
+    const struct trc_adaptive *a = job->adaptive;
+    return !a || a->pixels[(size_t)(job->y + y) * a->width + job->x + x].reasons;
+}
+
+/* How many pixels of the square at x, y get samples, at most. */
+static uint32_t square_pixels(const struct trc_tile *t, uint32_t x, uint32_t y, uint32_t side) {
+    const struct trc_tile_job *job = t->job;
+    if (!job->adaptive)
+        return side * side;
+    uint32_t count = 0;
+    for (uint32_t j = y; j < y + side && j < job->height; j++)
+        for (uint32_t i = x; i < x + side && i < job->width; i++)
+            count += is_sampled(job, i, j);
+    return count;
+}
+
 /* Appends the samples [begin, end) of the square of pixels at x, y of the tile, clipped to it. */
 static void square_append(struct trc_tile *t, uint32_t x, uint32_t y, uint32_t side, uint32_t begin,
                           uint32_t end) {
@@ -368,7 +414,7 @@ static void square_append(struct trc_tile *t, uint32_t x, uint32_t y, uint32_t s
             i += (place >> (2 * bit) & 1u) << bit;
             j += (place >> (2 * bit + 1) & 1u) << bit;
         }
-        if (i >= job->width || j >= job->height)
+        if (i >= job->width || j >= job->height || !is_sampled(job, i, j))
             continue;
         const uint32_t px = t->desc->crop_x + job->x + i, py = t->desc->crop_y + job->y + j;
         for (uint32_t s = begin; s < end; s++) {
@@ -423,7 +469,7 @@ static void samples_render(struct trc_tile *t, uint32_t begin, uint32_t end) {
     t->samples.count = 0;
     for (uint32_t y = 0; y < job->height; y += side)
         for (uint32_t x = 0; x < job->width; x += side) {
-            if (t->samples.count + side * side * count > room) {
+            if (t->samples.count + square_pixels(t, x, y, side) * count > room) {
                 if (cells)
                     samples_order(t, lens, motion);
                 batch_render(t);

@@ -32,6 +32,7 @@ struct trc_render_state {
     trc_render_desc desc;
     const struct trc_kernels *kernels;
     struct trc_film film;
+    struct trc_adaptive adaptive; /* without pixels: off */
     struct trc_schedule schedule;
     uint32_t *sampler_table;
     uint32_t worker_count, started_count;
@@ -64,6 +65,11 @@ trc_render_desc trc_render_resolve(const trc_render_desc *desc) {
         r.light_samples = TRC_DEFAULT_LIGHT_SAMPLES;
     if (!r.packet_size)
         r.packet_size = TRC_DEFAULT_PACKET_SIZE;
+    if (r.noise_threshold > 0.0f) {
+        r.min_samples = trc_adaptive_min_samples(r.noise_threshold, r.min_samples);
+        if (r.min_samples >= r.sample_count)
+            r.noise_threshold = 0.0f;
+    }
     if (!r.thread_count)
         r.thread_count = trc_thread_processor_count();
     uint32_t *depths[] = {&r.max_depth, &r.max_transparent_depth, &r.max_glossy_depth,
@@ -126,6 +132,30 @@ static void finish_item(struct trc_render_state *render, uint32_t tile, uint32_t
     pthread_mutex_unlock(&render->lock);
 }
 
+/* Samples [begin, end) of a tile; false if the render was cancelled before the end. */
+static bool render_samples(struct trc_render_state *render, const struct trc_tile_area *area,
+                           uint32_t begin, uint32_t end, void *memory) {
+    struct trc_tile_job job = {
+        .snapshot = render->snapshot,
+        .desc = &render->desc,
+        .sampler_table = render->sampler_table,
+        .film = &render->film,
+        .adaptive = render->adaptive.pixels ? &render->adaptive : NULL,
+        .x = area->x,
+        .y = area->y,
+        .width = area->width,
+        .height = area->height,
+        .sample_begin = begin,
+        .sample_end = end,
+        .memory = memory,
+        .cancel = &render->cancel,
+    };
+    render->kernels->tile_render(&job);
+    const bool complete = !atomic_load(&render->cancel);
+    add_counts(render, &job, complete);
+    return complete;
+}
+
 /* All samples of an item; false if the render was cancelled before the end. */
 static bool render_item(struct trc_render_state *render, uint32_t tile, uint32_t batch,
                         void *memory) {
@@ -133,26 +163,34 @@ static bool render_item(struct trc_render_state *render, uint32_t tile, uint32_t
     const struct trc_tile_area area = trc_schedule_tile(schedule, tile);
     const uint32_t end = trc_schedule_batch_begin(schedule, batch + 1);
     for (uint32_t i = trc_schedule_batch_begin(schedule, batch); i < end; i += SAMPLES_PER_JOB) {
-        struct trc_tile_job job = {
-            .snapshot = render->snapshot,
-            .desc = &render->desc,
-            .sampler_table = render->sampler_table,
-            .film = &render->film,
-            .x = area.x,
-            .y = area.y,
-            .width = area.width,
-            .height = area.height,
-            .sample_begin = i,
-            .sample_end = end - i < SAMPLES_PER_JOB ? end : i + SAMPLES_PER_JOB,
-            .memory = memory,
-            .cancel = &render->cancel,
-        };
-        render->kernels->tile_render(&job);
-        const bool complete = !atomic_load(&render->cancel);
-        add_counts(render, &job, complete);
-        if (!complete)
+        const uint32_t next = end - i < SAMPLES_PER_JOB ? end : i + SAMPLES_PER_JOB;
+        if (!render_samples(render, &area, i, next, memory))
             return false;
     }
+    return true;
+}
+
+/* The same with adaptive sampling: stops at its stages to decide, and when no pixel is left. */
+static bool render_item_adaptive(struct trc_render_state *render, uint32_t tile, uint32_t batch,
+                                 void *memory) {
+    const struct trc_schedule *schedule = &render->schedule;
+    struct trc_adaptive *adaptive = &render->adaptive;
+    const struct trc_tile_area a = trc_schedule_tile(schedule, tile);
+    const uint32_t end = trc_schedule_batch_begin(schedule, batch + 1);
+    uint32_t i = trc_schedule_batch_begin(schedule, batch);
+    while (i < end && trc_adaptive_tile_runs(adaptive, a.x, a.y, a.width, a.height)) {
+        const uint32_t stage = trc_adaptive_next_stage(adaptive, i);
+        uint32_t next = end - i < SAMPLES_PER_JOB ? end : i + SAMPLES_PER_JOB;
+        next = next < stage ? next : stage;
+        if (!render_samples(render, &a, i, next, memory))
+            return false;
+        if (next == stage)
+            trc_adaptive_update(adaptive, a.x, a.y, a.width, a.height, stage);
+        i = next;
+    }
+    pthread_mutex_lock(&render->lock);
+    render->pixel_samples_done += (uint64_t)a.width * a.height * (end - i);
+    pthread_mutex_unlock(&render->lock);
     return true;
 }
 
@@ -181,7 +219,10 @@ static void worker_main(void *context) {
         const uint32_t tile = schedule->order[item % schedule->tile_count];
         if (!await_former_batch(render, tile, batch))
             break;
-        if (!render_item(render, tile, batch, worker->memory))
+        const bool complete = render->adaptive.pixels
+                                  ? render_item_adaptive(render, tile, batch, worker->memory)
+                                  : render_item(render, tile, batch, worker->memory);
+        if (!complete)
             break;
         finish_item(render, tile, batch);
     }
@@ -216,6 +257,8 @@ fail:
 static trc_status take_memory(struct trc_render_state *render) {
     const trc_render_desc *desc = &render->desc;
     TRC_TRY(trc_film_create(&render->film, desc->crop_width, desc->crop_height, desc->passes));
+    if (desc->noise_threshold > 0.0f)
+        TRC_TRY(trc_adaptive_create(desc, &render->adaptive));
     TRC_TRY(trc_schedule_create(desc, &render->schedule));
     const struct trc_schedule *schedule = &render->schedule;
     TRC_TRY(trc_sobol_table_create(&render->sampler_table));
@@ -244,6 +287,7 @@ static void free_memory(struct trc_render_state *render) {
     trc_free(render->tile_batches);
     trc_free(render->sampler_table);
     trc_schedule_destroy(&render->schedule);
+    trc_adaptive_destroy(&render->adaptive);
     trc_film_destroy(&render->film);
     trc_snapshot_release(render->snapshot);
     trc_free(render);
