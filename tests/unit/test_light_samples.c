@@ -1,0 +1,44 @@
+/* Several light samples for each camera hit: more than the queue of shadow rays holds at once. */
+#include "fixture.h"
+
+enum { WIDTH = 64, HEIGHT = 48, FRAME = WIDTH * HEIGHT };
+
+static void draw(trc_scene scene, uint32_t samples, uint32_t light_samples, float *pixels) {
+    trc_render_desc desc = fixture_render_desc(WIDTH, HEIGHT, samples);
+    desc.light_samples = light_samples;
+    trc_render render = 0;
+    assert_int_equal(trc_render_start(scene, &desc, &render), TRC_OK);
+    assert_int_equal(trc_render_wait(render, -1.0), TRC_OK);
+    assert_int_equal(trc_render_read(render, TRC_PASS_COMBINED, pixels, 4 * FRAME), TRC_OK);
+    assert_int_equal(trc_render_destroy(render), TRC_OK);
+}
+
+/* The picture does not depend on how its light samples are spread over its samples: the means of
+ * all pixels agree, and the means of blocks of 8 x 8. */
+static void any_number(void **state) {
+    (void)state;
+    static float reference[4 * FRAME], pixels[4 * FRAME];
+    const trc_scene scene = fixture_scene();
+    draw(scene, 256, 1, reference);
+    for (uint32_t light_samples = 2; light_samples <= 64; light_samples *= 2) {
+        draw(scene, 32, light_samples, pixels);
+        for (int y = 0; y < HEIGHT; y += 8)
+            for (int x = 0; x < WIDTH; x += 8) {
+                double sum = 0.0, expected = 0.0;
+                for (int j = y; j < y + 8; j++)
+                    for (int i = x; i < x + 8; i++) {
+                        sum += (double)pixels[4 * (j * WIDTH + i)];
+                        expected += (double)reference[4 * (j * WIDTH + i)];
+                    }
+                if (fabs(sum - expected) > 0.01 * expected + 1e-3)
+                    fail_msg("%u light samples, block %d %d: %f, not %f", light_samples, x, y, sum,
+                             expected);
+            }
+    }
+    assert_int_equal(trc_scene_destroy(scene), TRC_OK);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(any_number)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
