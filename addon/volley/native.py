@@ -16,7 +16,7 @@ import sys
 
 import numpy as np
 
-ABI_VERSION = 1
+ABI_VERSION = 2
 
 # Limits and enumerators of the headers ---------------------------------------------------------
 
@@ -50,6 +50,8 @@ INTEGRATORS = {'RAYCAST': 0, 'WHITTED': 1, 'DISTRIBUTION': 2}
 SAMPLERS = {'SOBOL': 0, 'SUDOKU': 1, 'JITTER': 2, 'INDEPENDENT': 3, 'BLUE_NOISE': 4}
 ASSEMBLIES = {'AUTO': 0, 'TYPES': 1, 'RUNS': 2, 'GROUPS': 3, 'OCTANTS': 4, 'BLIND': 5, 'NONE': 6}
 FILTERS = {'BOX': 0, 'GAUSSIAN': 1, 'BLACKMAN_HARRIS': 2}
+
+AO_METHODS = {'ADD': 0, 'REPLACE': 1}
 
 PASS_COMBINED = 0
 
@@ -113,7 +115,7 @@ class _LightDesc(_Struct):
 class _WorldDesc(_Struct):
     _fields_ = [("struct_size", _u32), ("use_sampling", _u32), ("material", _u64),
                 ("visibility", _u32), ("map_resolution", _u32), ("ao_distance", _f32),
-                ("ao_factor", _f32)]
+                ("ao_factor", _f32), ("ao_method", _u32), ("reserved", _u32)]
 
 
 class _CameraDesc(_Struct):

@@ -40,6 +40,10 @@ SAMPLER_ITEMS = (
     ('INDEPENDENT', "Independent", "Random samples, as a reference"),
     ('BLUE_NOISE', "Blue Noise", "Sobol with blue-noise ordering over the screen"),
 )
+AO_METHOD_ITEMS = (
+    ('REPLACE', "Replace", "The world's light, which only near objects keep away from diffuse surfaces"),
+    ('ADD', "Add", "White light on diffuse surfaces besides all other"),
+)
 FILTER_ITEMS = (
     ('BOX', "Box", "Box filter"),
     ('GAUSSIAN', "Gaussian", "Gaussian filter"),
@@ -136,14 +140,11 @@ class VolleySceneSettings(bpy.types.PropertyGroup):
         description="Blur reflections seen in reflections, for less noise; 0 is off", update=_changed)
     use_ambient_occlusion: BoolProperty(
         name="Ambient Occlusion", default=False,
-        description="Add world light where nothing is near, a cheap stand-in for light between "
-                    "surfaces", update=_changed)
-    ao_factor: FloatProperty(
-        name="Factor", default=1.0, min=0.0, soft_max=1.0, description="Strength of ambient occlusion",
+        description="Light diffuse surfaces where nothing is near, a cheap stand-in for light between "
+                    "surfaces. Factor and distance are the world's", update=_changed)
+    ao_method: EnumProperty(
+        name="Method", items=AO_METHOD_ITEMS, default='ADD', description="What light it is",
         update=_changed)
-    ao_distance: FloatProperty(
-        name="Distance", default=10.0, min=0.001, subtype='DISTANCE', unit='LENGTH',
-        description="Objects farther away do not occlude", update=_changed)
 
     assembly: EnumProperty(
         name="Packet Assembly", items=ASSEMBLY_ITEMS, default='AUTO',

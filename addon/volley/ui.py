@@ -152,10 +152,13 @@ class VOLLEY_RENDER_PT_ambient_occlusion(_VolleyPanel, Panel):
         self.layout.prop(context.scene.volley, "use_ambient_occlusion", text="")
 
     def draw(self, context):
-        settings, layout = context.scene.volley, _column(self)
-        layout.active = settings.use_ambient_occlusion
-        layout.prop(settings, "ao_factor")
-        layout.prop(settings, "ao_distance")
+        scene, layout = context.scene, _column(self)
+        layout.active = scene.volley.use_ambient_occlusion
+        layout.prop(scene.volley, "ao_method")
+        if scene.world is not None:
+            column = layout.column(align=True)
+            column.prop(scene.world.light_settings, "ao_factor", text="AO Factor")
+            column.prop(scene.world.light_settings, "distance", text="AO Distance")
 
 
 class VOLLEY_RENDER_PT_motion_blur(_VolleyPanel, Panel):

@@ -232,6 +232,47 @@ def test_light(light_means, kind):
     assert ours == pytest.approx(theirs, rel=MEAN_TOLERANCE)
 
 
+# Ambient occlusion -----------------------------------------------------------------------------------
+
+def inside_ambient():
+    """Pictures by both engines with Cycles' Fast GI Approximation. For Replace the world is not a light
+    that is sampled: where it is, Cycles takes part of its light from samples that anything blocks. And
+    no gloss is beside a diffuse lobe: there, Cycles scales a part of it too."""
+    import bpy
+    import scenes
+    pictures = {}
+    for method, sampling in (('ADD', 'AUTOMATIC'), ('REPLACE', 'NONE')):
+        scene = scenes.empty(size=(96, 64))
+        _, ball = _stage()
+        ball.location.x = -1.1
+        sheer = scenes.material("Sheer", "ShaderNodeBsdfPrincipled", Base_Color=(0.8, 0.3, 0.2),
+                                Sheen=0.5, Alpha=0.6, Specular=0.5 if method == 'ADD' else 0.0)
+        scenes.sphere("Sheer", location=(1.1, 0, 1), material=sheer)
+        scenes.wall("Mirror", 6.0, 2.5, (0, 2), scenes.material(
+            "Mirror", "ShaderNodeBsdfGlossy", Color=(0.9, 0.9, 0.9), Roughness=0.0))
+        scenes.light('POINT', location=(2.0, -3.0, 4.0), energy=200.0, shadow_soft_size=0.5)
+        scene.world.color = (0.5, 0.6, 0.8)
+        scene.world.cycles.sampling_method = sampling
+        settings = scene.world.light_settings
+        settings.ao_factor, settings.distance = 0.7, 1.5
+        plain = scenes.render()
+        scene.volley.use_ambient_occlusion, scene.volley.ao_method = True, method
+        scene.cycles.use_fast_gi, scene.cycles.fast_gi_method = True, method
+        scene.cycles.ao_bounces_render = 1
+        pictures[method] = _both(2 * LIGHT_SAMPLES) + [plain]
+    return pictures
+
+
+def test_ambient_occlusion(blender):
+    for method, (ours, theirs, plain) in blender.run(inside_ambient, timeout=300).items():
+        means = [picture[..., :3].mean(axis=(0, 1)) for picture in (ours, theirs, plain)]
+        assert means[0] == pytest.approx(means[1], rel=MEAN_TOLERANCE), method
+        assert np.abs(means[0] / means[2] - 1.0).min() > 0.05, method
+        # Blocks of 16 x 16 pixels too: the light is where Cycles has it.
+        blocks = [picture.reshape(4, 16, 6, 16, 4).mean(axis=(1, 3)) for picture in (ours, theirs)]
+        assert np.abs(blocks[0] - blocks[1]).max() < 0.02, method
+
+
 # Whitted ---------------------------------------------------------------------------------------------
 
 def inside_whitted():

@@ -603,6 +603,7 @@ static void worlds(void **state) {
     REFUSE_WORLD(ARGUMENT, desc.use_sampling = 2);
     REFUSE_WORLD(ARGUMENT, desc.visibility = 32);
     REFUSE_WORLD(LARGE, desc.map_resolution = UINT32_MAX);
+    REFUSE_WORLD(ARGUMENT, desc.ao_method = 2);
     REFUSE_WORLD(ARGUMENT, desc.ao_factor = NAN);
     REFUSE_WORLD(ARGUMENT, desc.ao_factor = -1.0f);
     REFUSE_WORLD(ARGUMENT, desc.ao_factor = 1.0f; desc.ao_distance = 0.0f);

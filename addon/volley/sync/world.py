@@ -6,15 +6,19 @@ from ..compat import cycles
 from .visibility import world_visibility
 
 
+LEAST_AO_DISTANCE = 1e-6  # m; Blender's slider goes down to 0
+
+
 def describe(world, material_id, settings):
     """The fields of trc_world_desc; settings: ``scene.volley``. Without a world all is black."""
-    fields = {
-        "material": material_id, "visibility": native.VISIBLE_ALL, "use_sampling": 0,
-        "map_resolution": 0, "ao_distance": max(settings.ao_distance, 1e-6),
-        "ao_factor": settings.ao_factor if settings.use_ambient_occlusion else 0.0,
-    }
+    fields = {"material": material_id, "visibility": native.VISIBLE_ALL, "use_sampling": 0,
+              "map_resolution": 0, "ao_factor": 0.0}
     if world is None:
         return fields
+    if settings.use_ambient_occlusion:
+        fields["ao_factor"] = world.light_settings.ao_factor
+        fields["ao_distance"] = max(world.light_settings.distance, LEAST_AO_DISTANCE)
+        fields["ao_method"] = native.AO_METHODS[settings.ao_method]
     method = cycles(world, "sampling_method", 'AUTOMATIC')
     fields["visibility"] = world_visibility(world)
     fields["use_sampling"] = int(method != 'NONE')

@@ -34,6 +34,19 @@ TRC_API trc_status trc_light_create(trc_scene scene, const trc_light_desc *desc,
 TRC_API trc_status trc_light_update(trc_scene scene, trc_id light, const trc_light_desc *desc);
 TRC_API trc_status trc_light_destroy(trc_scene scene, trc_id light);
 
+/* Ambient occlusion, the Fast GI Approximation of Cycles: rays from every shading point with
+ * diffuse lobes, as many as light samples, by the cosine; light comes from those that meet nothing
+ * within ao_distance. Shadow rays as any: transparent materials let them through. In the light
+ * passes it is direct diffuse light. */
+enum {
+    TRC_AO_ADD = 0,    /* white light of radiance ao_factor, besides all other light. As in Cycles,
+                          what    is partly transparent gets it times its opacity once more */
+    TRC_AO_REPLACE = 1 /* the world's own light on diffuse lobes, times ao_factor, in place of its
+                          samples, which anything blocks at any distance: as in Cycles after one
+                          bounce with a world that is not sampled as a light (there, a rough gloss
+                          beside the diffuse lobe loses a part, too) */
+};
+
 typedef struct trc_world_desc {
     uint32_t struct_size;
     uint32_t use_sampling;   /* 1: the environment image is sampled by importance */
@@ -41,7 +54,9 @@ typedef struct trc_world_desc {
     uint32_t visibility;     /* TRC_VISIBLE_* */
     uint32_t map_resolution; /* width of the importance map, 0: chosen from the image */
     float ao_distance;       /* ambient occlusion: metres, > 0 */
-    float ao_factor;         /* 0: off. Adds factor * unoccluded fraction * world colour */
+    float ao_factor;         /* 0: off */
+    uint32_t ao_method;      /* TRC_AO_* */
+    uint32_t reserved;
 } trc_world_desc;
 
 TRC_API trc_status trc_scene_set_world(trc_scene scene, const trc_world_desc *desc);

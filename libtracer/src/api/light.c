@@ -70,6 +70,7 @@ static trc_status check_world(const trc_world_desc *desc) {
     TRC_TRY(trc_check_enum(desc->use_sampling, 2, "use_sampling"));
     TRC_TRY(trc_check_enum(desc->visibility, TRC_VISIBLE_ALL + 1, "visibility"));
     TRC_TRY(trc_check_count(desc->map_resolution, 0, MAX_MAP_RESOLUTION, "map_resolution"));
+    TRC_TRY(trc_check_enum(desc->ao_method, TRC_AO_REPLACE + 1, "ao_method"));
     TRC_TRY(trc_check_float(desc->ao_factor, 0.0f, FLT_MAX, "ao_factor"));
     /* Without ambient occlusion its distance has no meaning. */
     if (desc->ao_factor == 0.0f)

@@ -481,6 +481,21 @@ void TRC_KERNEL(trc_bsdf_albedo)(const struct trc_lobes *l, const struct trc_sur
     }
 }
 
+vvec3 TRC_KERNEL(trc_lobes_diffuse)(const struct trc_lobes *l, const struct trc_surface *s,
+                                    vvec3 *normal_out) {
+    vvec3 weight = v3_zero(), n = v3_zero();
+    for (int i = 0; i < l->count; i++) {
+        const struct trc_lobe *lobe = &l->lobe[i];
+        if (lobe->kind == TRC_LOBE_DIFFUSE || lobe->kind == TRC_LOBE_SHEEN ||
+            lobe->kind == TRC_LOBE_TRANSLUCENT) {
+            weight = v3_add(weight, lobe->weight);
+            n = v3_mad(lobe->n, v3_average(lobe->weight), n);
+        }
+    }
+    *normal_out = v3_select(vf_gt(v3_dot(n, n), vf_zero()), v3_normalize(n), s->n);
+    return weight;
+}
+
 vvec3 TRC_KERNEL(trc_lobes_transparency)(const struct trc_lobes *l) {
     vvec3 sum = v3_zero();
     for (int i = 0; i < l->count; i++)

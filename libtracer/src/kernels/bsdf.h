@@ -129,6 +129,11 @@ void TRC_KERNEL(trc_bsdf_ideal)(const struct trc_lobes *l, int i, const struct t
 void TRC_KERNEL(trc_bsdf_albedo)(const struct trc_lobes *l, const struct trc_surface *s,
                                  vvec3 albedo_out[3]);
 
+/* What ambient light meets: the weights of diffuse lobes, translucent ones too, and the mean of
+ * their normals, the shading normal without any. */
+vvec3 TRC_KERNEL(trc_lobes_diffuse)(const struct trc_lobes *l, const struct trc_surface *s,
+                                    vvec3 *normal_out);
+
 /* Sum of transparent weights: what a shadow ray or the film's alpha sees through. */
 vvec3 TRC_KERNEL(trc_lobes_transparency)(const struct trc_lobes *l);
 

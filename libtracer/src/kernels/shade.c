@@ -378,6 +378,14 @@ static void sample_use(struct trc_tile *t, const struct arrival *a, const struct
         shadow_push(t, a, s, sample, &r, cell, lit);
 }
 
+/* Number of a dimension for light sample l of `most`. */
+TRC_INLINE vfloat light_number(const struct trc_tile *t, const struct arrival *a,
+                               uint32_t dimension, uint32_t l, uint32_t most) {
+    if (most > 1)
+        return TRC_KERNEL(trc_sample_split)(&t->sampler, a->pixel, a->sample, dimension, l, most);
+    return TRC_KERNEL(trc_sample)(&t->sampler, a->pixel, a->sample, dimension);
+}
+
 static void direct_light(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
                          const struct trc_lobes *lobes, vmask active) {
     const uint32_t dimension = TRC_DIM_BOUNCE + t->generation * TRC_DIMS_PER_BOUNCE;
@@ -389,10 +397,7 @@ static void direct_light(struct trc_tile *t, const struct arrival *a, const stru
     for (uint32_t l = 0; l < most; l++) {
         vfloat u[3];
         for (uint32_t k = 0; k < 3; k++)
-            u[k] = most > 1
-                       ? TRC_KERNEL(trc_sample_split)(&t->sampler, a->pixel, a->sample,
-                                                      dimension + k, l, most)
-                       : TRC_KERNEL(trc_sample)(&t->sampler, a->pixel, a->sample, dimension + k);
+            u[k] = light_number(t, a, dimension + k, l, most);
         const vmask wanted = vm_and(active, vf_lt(vf_set((float)l), count));
         const vuint cell =
             (vuint)(vf_to_int(u[1] * vf_set(4.0f)) | (vf_to_int(u[2] * vf_set(4.0f)) << 2));
@@ -403,6 +408,67 @@ static void direct_light(struct trc_tile *t, const struct arrival *a, const stru
             TRC_KERNEL(trc_light_sample_world)(s, a->receive_n, u[1], u[2], &sample);
             sample_use(t, a, s, lobes, &sample, count, trc_direction_cell(sample.wi), wanted);
         }
+    }
+}
+
+/* ---- ambient occlusion ---- */
+
+/* White light on diffuse lobes, whatever the direction. */
+static vvec3 ambient_white(const struct trc_lobes *lobes, vvec3 albedo) {
+    const vfloat one = vf_set(1.0f);
+    const vvec3 through = TRC_KERNEL(trc_lobes_transparency)(lobes);
+    return v3_mul(albedo, v3(one - vf_min(through.x, one), one - vf_min(through.y, one),
+                             one - vf_min(through.z, one)));
+}
+
+/* The world's light on diffuse lobes from wi, drawn by the cosine to n. */
+static vvec3 ambient_world(const struct trc_tile *t, const struct trc_surface *s,
+                           const struct trc_lobes *lobes, vvec3 n, vvec3 wi, vmask active) {
+    struct trc_bsdf_value f;
+    TRC_KERNEL(trc_bsdf_eval)(lobes, s, wi, active, &f);
+    const vfloat one = vf_set(1.0f), no_mis = vf_set(-1.0f);
+    const vvec3 world = TRC_KERNEL(trc_world_radiance)(t->snapshot, s->p, n, wi, no_mis, one,
+                                                       vu_set(TRC_VISIBLE_DIFFUSE), active);
+    const vfloat cosine = vf_max(v3_dot(n, wi), vf_set(1e-6f));
+    return v3_scale(v3_mul(f.diffuse, world), vf_divide(vf_set(TRC_PI), cosine));
+}
+
+/* Sends the rays of ambient occlusion along with the shadow rays. Diffuse lobes are not continued,
+ * so the numbers of the continuation ray are free for them. */
+static void ambient_light(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
+                          const struct trc_lobes *lobes, vmask active) {
+    const struct trc_world *world = &t->snapshot->world;
+    const struct trc_light_table *lights = t->snapshot->lights;
+    const uint32_t dimension =
+        TRC_DIM_BOUNCE + t->generation * TRC_DIMS_PER_BOUNCE + TRC_DIM_BSDF_X;
+    const uint32_t most = t->generation == 0 ? t->desc->light_samples : 1;
+    const vfloat count = light_count(t, a->depths);
+    vvec3 n, x, y;
+    const vvec3 albedo = TRC_KERNEL(trc_lobes_diffuse)(lobes, s, &n);
+    const vvec3 white = ambient_white(lobes, albedo);
+    const vvec3 weight = v3_scale(a->weight, vf_set(world->ao_factor) / count);
+    v3_frame(n, &x, &y);
+    if (t->shadows.count + most * TRC_WIDTH > TRC_SHADOW_QUEUE)
+        TRC_KERNEL(trc_shadow_flush)(t);
+    /* Packets of their own: numbered after all lights. */
+    const int32_t number = (int32_t)(lights->first_triangle + lights->triangle_count);
+    for (uint32_t l = 0; l < most; l++) {
+        vfloat u[2];
+        for (uint32_t k = 0; k < 2; k++)
+            u[k] = light_number(t, a, dimension + k, l, most);
+        const struct trc_light_sample sample = {
+            .wi = v3_from_frame(trc_warp_cosine(u[0], u[1]), x, y, n),
+            .distance = vf_set(world->ao_distance),
+            .casts_shadow = vm_all_set(),
+            .light = vi_set(number)};
+        vmask lit = vm_and(active, vf_lt(vf_set((float)l), count));
+        const vvec3 light =
+            world->ao_method == TRC_AO_ADD ? white : ambient_world(t, s, lobes, n, sample.wi, lit);
+        const struct light_result r = {v3_mul(weight, light), v3_zero(), v3_zero()};
+        const vfloat size = v3_max(r.diffuse);
+        lit = vm_and(lit, vm_and(vf_gt(size, vf_set(0.0f)), vf_lt(size, vf_set(3e38f))));
+        if (vm_any(lit))
+            shadow_push(t, a, s, &sample, &r, trc_direction_cell(sample.wi), lit);
     }
 }
 
@@ -631,6 +697,9 @@ static void shade_group(struct trc_tile *t, uint32_t material, vint index, vmask
         (TRC_MATERIAL_HAS_DIFFUSE | TRC_MATERIAL_HAS_TRANSLUCENT | TRC_MATERIAL_HAS_GLOSSY)) {
         lobes.below_horizon = s.smooth;
         direct_light(t, &a, &s, &lobes, on);
+        if ((t->snapshot->features & TRC_FEATURE_AMBIENT_OCCLUSION) &&
+            (m->has & (TRC_MATERIAL_HAS_DIFFUSE | TRC_MATERIAL_HAS_TRANSLUCENT)))
+            ambient_light(t, &a, &s, &lobes, on);
         lobes.below_horizon = vm_none();
     }
     if (t->desc->integrator == TRC_INTEGRATOR_RAYCAST) {

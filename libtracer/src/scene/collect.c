@@ -207,6 +207,7 @@ void trc_collect_view(const struct trc_scene_state *scene, struct trc_snapshot_b
         .is_constant = 1,
         .ao_distance = desc->ao_distance,
         .ao_factor = desc->ao_factor,
+        .ao_method = desc->ao_method,
     };
     if (!index)
         return;

@@ -79,6 +79,7 @@ struct trc_world {
     uint32_t is_constant; /* radiance below rules, no program */
     float radiance[3];
     float ao_distance, ao_factor;
+    uint32_t ao_method; /* TRC_AO_* */
 };
 
 struct trc_snapshot {

@@ -312,6 +312,13 @@ static uint64_t count_triangles(const struct trc_snapshot *s) {
 
 /* ---- world ---- */
 
+/* Which lobes samples of the world light: ambient occlusion that stands for its diffuse light
+ * leaves them the others. */
+static uint32_t world_sample_visibility(const struct trc_world *w) {
+    const bool replaced = w->ao_factor > 0.0f && w->ao_method == TRC_AO_REPLACE;
+    return replaced ? w->visibility & ~(uint32_t)TRC_VISIBLE_DIFFUSE : w->visibility;
+}
+
 static bool world_shines(const struct trc_snapshot *s) {
     const struct trc_world *w = &s->world;
     if (w->material == UINT32_MAX || !(w->visibility & RECEIVERS))
@@ -327,7 +334,7 @@ static trc_status add_world(struct trc_light_table *table, const struct trc_ligh
     if (table->world_light == UINT32_MAX)
         return TRC_OK;
     table->kinds |= 1u << TRC_KIND_WORLD;
-    table->hides |= (s->world.visibility & RECEIVERS) != RECEIVERS;
+    table->hides |= (table->world_visibility & RECEIVERS) != RECEIVERS;
     float average[3];
     memcpy(average, s->world.radiance, sizeof average);
     if (!s->world.is_constant) {
@@ -440,7 +447,7 @@ static trc_status fill(struct trc_light_table *table, const struct trc_light_tab
         return status;
     uint32_t bound_count = 0;
     add_lamps(table, lights, light_count, bounds, &bound_count);
-    table->world_visibility = s->world.visibility;
+    table->world_visibility = world_sample_visibility(&s->world);
     table->world_light = world_shines(s) ? table->lamp_count : UINT32_MAX;
     table->first_triangle = table->lamp_count + (table->world_light != UINT32_MAX);
     for (uint32_t i = 0; i < s->instance_count; i++) {

@@ -119,7 +119,7 @@ struct trc_light_table {
     uint32_t seen_count;
     uint32_t *instance_triangles; /* per instance: how many of its triangles are lights */
     struct trc_world_map *map;    /* NULL: cosine or uniform sampling */
-    uint32_t world_visibility;
+    uint32_t world_visibility;    /* of its light samples */
 };
 
 /* Builds the table and sets instance.first_light. Reads snapshot->meshes, instances, materials,
