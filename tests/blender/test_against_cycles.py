@@ -157,6 +157,99 @@ def test_blur(blender):
                                                                 rel=0.02), kind
 
 
+# Values ----------------------------------------------------------------------------------------------
+
+def _shown(node_type, output, color=False, **settings):
+    """A wall that shines with a node's output, times a half plus a half unless it is a colour; the node
+    and its tree."""
+    import bpy
+    import scenes
+    material = scenes.material("Shown", "ShaderNodeEmission")
+    tree = material.node_tree
+    node = tree.nodes.new(node_type)
+    for name, value in settings.items():
+        setattr(node, name, value)
+    scale = tree.nodes.new("ShaderNodeVectorMath")
+    scale.operation = 'MULTIPLY_ADD'
+    scale.inputs[1].default_value = (1.0,) * 3 if color else (0.5,) * 3
+    scale.inputs[2].default_value = (0.0,) * 3 if color else (0.5,) * 3
+    tree.links.new(node.outputs[output], scale.inputs[0])
+    tree.links.new(scale.outputs[0], tree.nodes["Emission"].inputs["Color"])
+    bpy.data.objects["Wall"].data.materials.clear()
+    bpy.data.objects["Wall"].data.materials.append(material)
+    return node, tree
+
+
+def inside_values():
+    """Node outputs as the colour of a wall, by both engines."""
+    import bpy
+    import scenes
+    scene = scenes.empty(size=(48, 48))
+    made = scenes.camera()
+    wall = scenes.wall("Wall", 2.6, 0.0)
+    wall.rotation_euler = (0.3, 0.2, 0.4)
+    pairs = {}
+    ramp, tree = _shown("ShaderNodeValToRGB", "Color", color=True)
+    tree.links.new(tree.nodes.new("ShaderNodeUVMap").outputs[0], ramp.inputs[0])
+    ramp.color_ramp.interpolation = 'CONSTANT'
+    ramp.color_ramp.elements[0].color, ramp.color_ramp.elements[1].color = (1, 0, 0, 1), (0, 0, 1, 1)
+    ramp.color_ramp.elements.new(0.4).color = (0, 1, 0, 1)
+    pairs["constant ramp"] = _both(FILM_SAMPLES)
+    for space in ('OBJECT', 'WORLD', 'BLENDER_OBJECT', 'BLENDER_WORLD'):
+        node, _ = _shown("ShaderNodeNormalMap", "Normal", space=space)
+        node.inputs["Color"].default_value = (0.7, 0.2, 0.3, 1.0)
+        pairs[space] = _both(FILM_SAMPLES)
+    for mode in ('HSV', 'HSL'):
+        node, _ = _shown("ShaderNodeCombineColor", "Color", color=True, mode=mode)
+        for socket, value in zip(node.inputs, (0.6, 0.7, 0.4)):
+            socket.default_value = value
+        pairs[mode] = _both(FILM_SAMPLES)
+    image = bpy.data.images.new("Image", 2, 2, alpha=True)
+    image.pixels.foreach_set([0.8, 0.5, 0.3, 0.25] * 4)
+    image.filepath_raw, image.file_format = bpy.app.tempdir + "sheer.png", 'PNG'
+    image.save()
+    for space in ("sRGB", "Non-Color"):
+        for name in ("file", "generated"):
+            node, _ = _shown("ShaderNodeTexImage", "Color", color=True)
+            node.image = bpy.data.images.load(image.filepath_raw, check_existing=False) \
+                if name == "file" else image
+            node.image.colorspace_settings.name = space
+            pairs[f"{space} {name}"] = _both(FILM_SAMPLES)
+    node, _ = _shown("ShaderNodeLightPath", "Ray Length")
+    made.data.clip_start = 3.0
+    pairs["ray length"] = _both(FILM_SAMPLES)
+    made.location.x = -1.0
+    made.keyframe_insert("location", frame=0)
+    made.rotation_euler.z = -0.2
+    made.keyframe_insert("rotation_euler", frame=0)
+    made.location.x = 1.0
+    made.keyframe_insert("location", frame=2)
+    made.rotation_euler.z = 0.2
+    made.keyframe_insert("rotation_euler", frame=2)
+    scene.render.use_motion_blur = True
+    scene.frame_set(1)
+    pairs["ray length in motion"] = _both(FILM_SAMPLES)
+    return pairs
+
+
+@pytest.fixture(scope="module")
+def value_pairs(blender_of_module):
+    """All values, from one Blender."""
+    return blender_of_module.run(inside_values, timeout=300)
+
+
+@pytest.mark.parametrize("name", (
+    "constant ramp", "OBJECT", "WORLD", "BLENDER_OBJECT", "BLENDER_WORLD", "HSV", "HSL", "sRGB file",
+    "sRGB generated", "Non-Color file", "Non-Color generated", "ray length", "ray length in motion"))
+def test_values(value_pairs, name):
+    ours, theirs = value_pairs[name]
+    assert np.array_equal(ours[24, 24, :3] == 0.0, theirs[24, 24, :3] == 0.0)
+    _close(ours, theirs, share=0.05 if "motion" in name else 0.02)
+    inside = np.s_[20:28, 20:28, :3]
+    assert ours[inside].mean(axis=(0, 1)) == pytest.approx(theirs[inside].mean(axis=(0, 1)),
+                                                           rel=5e-3, abs=2e-3)
+
+
 # Light ---------------------------------------------------------------------------------------------
 
 def _stage():

@@ -97,6 +97,25 @@ static void features_are_what_the_scene_uses(void **state) {
     assert_int_equal(trc_scene_destroy(scene), TRC_OK);
 }
 
+static void bad_texels_are_named(void **state) {
+    (void)state;
+    const trc_scene scene = fixture_scene();
+    float pixels[16] = {1, 2, 3, 1, NAN, 0, 0, 1, 0, INFINITY, 0, 1, 1, 1, 1, 1};
+    trc_image_desc desc = fixture_image_desc();
+    desc.pixels = pixels;
+    trc_id image = 0;
+    char text[256];
+    assert_int_equal(trc_image_create(scene, &desc, &image), TRC_OK);
+    assert_int_equal(trc_scene_commit(scene), TRC_OK);
+    assert_int_equal(trc_scene_get_warnings(scene, text, sizeof text, NULL), TRC_OK);
+    assert_non_null(strstr(text, "2 texels in 1 images"));
+    assert_int_equal(trc_image_destroy(scene, image), TRC_OK);
+    assert_int_equal(trc_scene_commit(scene), TRC_OK);
+    assert_int_equal(trc_scene_get_warnings(scene, text, sizeof text, NULL), TRC_OK);
+    assert_string_equal(text, "");
+    assert_int_equal(trc_scene_destroy(scene), TRC_OK);
+}
+
 static void singular_instances_are_hidden_and_counted(void **state) {
     (void)state;
     const trc_scene scene = fixture_scene();
@@ -368,6 +387,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(commits_share_what_stays),
         cmocka_unit_test(features_are_what_the_scene_uses),
+        cmocka_unit_test(bad_texels_are_named),
         cmocka_unit_test(singular_instances_are_hidden_and_counted),
         cmocka_unit_test(destroyed_materials_leave_the_default),
         cmocka_unit_test(image_does_not_depend_on_threads),

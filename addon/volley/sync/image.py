@@ -15,7 +15,8 @@ from .. import native
 
 _ALPHA_MODES = {'STRAIGHT': native.ALPHA_STRAIGHT, 'PREMUL': native.ALPHA_PREMULTIPLIED,
                 'CHANNEL_PACKED': native.ALPHA_CHANNEL_PACKED, 'NONE': native.ALPHA_NONE}
-_DATA_SPACES = ("Non-Color", "Raw", "Linear", "scene_linear")
+_UNTOUCHED_SPACES = ("Non-Color", "Raw")  # data in the sense of OpenColorIO
+_DATA_SPACES = _UNTOUCHED_SPACES + ("Linear", "scene_linear")
 
 
 class Images:
@@ -77,8 +78,7 @@ class Images:
         """The image as the library reads it, 0 where it cannot."""
         try:
             return self._scene.create_image(
-                path=path, is_srgb=is_srgb,
-                alpha_mode=_ALPHA_MODES.get(image.alpha_mode, native.ALPHA_STRAIGHT))
+                path=path, is_srgb=is_srgb, alpha_mode=_alpha_mode(image))
         except native.TracerError as error:
             if error.status not in (native.ERROR_UNSUPPORTED, native.ERROR_IMAGE):
                 raise
@@ -131,10 +131,18 @@ def _to_rgba(pixels):
     return rgba
 
 
+def _alpha_mode(image):
+    """What an image file's alpha means. As in Cycles, data is not multiplied by it."""
+    mode = _ALPHA_MODES.get(image.alpha_mode, native.ALPHA_STRAIGHT)
+    is_data = image.colorspace_settings.name in _UNTOUCHED_SPACES
+    return native.ALPHA_CHANNEL_PACKED if is_data and mode != native.ALPHA_NONE else mode
+
+
 def _pixel_alpha_mode(image):
     """Alpha of Blender's own buffers: floats are premultiplied, bytes are not."""
-    if image.alpha_mode in {'NONE', 'CHANNEL_PACKED'}:
-        return _ALPHA_MODES[image.alpha_mode]
+    mode = _alpha_mode(image)
+    if mode in (native.ALPHA_NONE, native.ALPHA_CHANNEL_PACKED):
+        return mode
     return native.ALPHA_PREMULTIPLIED if image.is_float else native.ALPHA_STRAIGHT
 
 

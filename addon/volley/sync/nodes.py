@@ -67,8 +67,8 @@ def _distribution(node):
     return _DISTRIBUTIONS.get(getattr(node, "distribution", 'GGX'))
 
 
-def _of_rgb(node):
-    return 0 if getattr(node, "mode", 'RGB') == 'RGB' else None
+def _color_model(node):
+    return ('RGB', 'HSV', 'HSL').index(node.mode)
 
 
 def _math_mode(node):
@@ -148,11 +148,15 @@ _SPECS = {
     "ShaderNodeSeparateXYZ": Spec(SEPARATE, (('v', "Vector"),), (("X", 'f'), ("Y", 'f'), ("Z", 'f'))),
     "ShaderNodeSeparateRGB": Spec(SEPARATE, (('c', "Image"),), (("R", 'f'), ("G", 'f'), ("B", 'f'))),
     "ShaderNodeSeparateColor": Spec(
-        SEPARATE, (('c', "Color"),), (("Red", 'f'), ("Green", 'f'), ("Blue", 'f')), _of_rgb),
+        SEPARATE, (('c', "Color"),), (("Red", 'f'), ("Green", 'f'), ("Blue", 'f')), _color_model),
+    "ShaderNodeSeparateHSV": Spec(
+        SEPARATE, (('c', "Color"),), (("H", 'f'), ("S", 'f'), ("V", 'f')), lambda node: 1),
+    "ShaderNodeCombineHSV": Spec(
+        COMBINE, (('f', "H"), ('f', "S"), ('f', "V")), (("Color", 'c'),), lambda node: 1),
     "ShaderNodeCombineXYZ": Spec(COMBINE, (('f', "X"), ('f', "Y"), ('f', "Z")), (("Vector", 'v'),)),
     "ShaderNodeCombineRGB": Spec(COMBINE, (('f', "R"), ('f', "G"), ('f', "B")), (("Image", 'c'),)),
     "ShaderNodeCombineColor": Spec(
-        COMBINE, (('f', "Red"), ('f', "Green"), ('f', "Blue")), (("Color", 'c'),), _of_rgb),
+        COMBINE, (('f', "Red"), ('f', "Green"), ('f', "Blue")), (("Color", 'c'),), _color_model),
     "ShaderNodeMapRange": Spec(
         MAP_RANGE, (('f', "Value"), ('f', "From Min"), ('f', "From Max"), ('f', "To Min"),
                     ('f', "To Max")), (("Result", 'f'),), _map_range_mode),
@@ -372,7 +376,7 @@ def _attribute(walker, node, _sockets):
 
 
 def _normal_map(walker, node, sockets):
-    space = {'TANGENT': 0, 'OBJECT': 1, 'BLENDER_OBJECT': 1, 'WORLD': 2, 'BLENDER_WORLD': 2}[node.space]
+    space = ('TANGENT', 'OBJECT', 'WORLD', 'BLENDER_OBJECT', 'BLENDER_WORLD').index(node.space)
     if space == 0:
         walker.flat.uv_names.add(node.uv_map)
     index = walker.emit(NORMAL_MAP, (sockets.get('f', "Strength"), sockets.get('c', "Color")), space,
@@ -383,7 +387,8 @@ def _normal_map(walker, node, sockets):
 def _color_ramp(walker, node, sockets):
     ramp = node.color_ramp
     table = np.array([ramp.evaluate(i / (RAMP_SIZE - 1)) for i in range(RAMP_SIZE)], np.float32)
-    index = walker.emit(COLOR_RAMP, (sockets.get('f', "Fac"),), table=table)
+    is_constant = ramp.interpolation == 'CONSTANT'
+    index = walker.emit(COLOR_RAMP, (sockets.get('f', "Fac"),), mode=int(is_constant), table=table)
     return _outputs(walker, index, (("Color", 'c'), ("Alpha", 'f')))
 
 

@@ -57,15 +57,17 @@ enum {
                                    transparent depth, transmission depth */
     TRC_NODE_GEOMETRY = 75,     /* -> c position, c normal, c tangent, c true_normal, c incoming,
                                    c parametric, f backfacing, f pointiness, f random_per_island */
-    TRC_NODE_NORMAL_MAP = 76, /* f strength, c color -> c normal; mode 0 tangent, 1 object, 2 world;
-                                 name: UV map */
+    TRC_NODE_NORMAL_MAP = 76, /* f strength, c color -> c normal; mode 0 tangent, 1 object, 2 world,
+                                 3 and 4 object and world with Y and Z turned around (Blender's own
+                                 baked maps); name: UV map */
     TRC_NODE_INVERT = 77,     /* f factor, c color -> c */
     TRC_NODE_GAMMA = 78,      /* c color, f gamma -> c */
     TRC_NODE_HUE_SATURATION = 79,  /* f hue, f saturation, f value, f factor, c color -> c */
     TRC_NODE_BRIGHT_CONTRAST = 80, /* c color, f bright, f contrast -> c */
-    TRC_NODE_COLOR_RAMP = 81,      /* f factor -> c color, f alpha; table: 256 RGBA values */
-    TRC_NODE_SEPARATE = 82,        /* c -> f, f, f; mode 0 RGB/XYZ */
-    TRC_NODE_COMBINE = 83,         /* f, f, f -> c; mode 0 */
+    TRC_NODE_COLOR_RAMP = 81,      /* f factor -> c color, f alpha; table: 256 RGBA values;
+                                      mode 0 linear between them, 1 constant */
+    TRC_NODE_SEPARATE = 82,        /* c -> f, f, f; mode 0 RGB, 1 HSV, 2 HSL, 3 XYZ */
+    TRC_NODE_COMBINE = 83,         /* f, f, f -> c; mode as SEPARATE */
     TRC_NODE_MAP_RANGE = 84,   /* f value, f from_min, f from_max, f to_min, f to_max -> f; linear;
                                   mode bit 8: clamp */
     TRC_NODE_CLAMP = 85,       /* f value, f min, f max -> f; mode 0 min-max, 1 range */

@@ -320,6 +320,33 @@ TRC_INLINE vfloat path_bit(const struct trc_surface *s, uint32_t bit) {
     return vf_truth(vm_not(vi_eq(masked, vi_set(0))));
 }
 
+/* Cycles' camera rays start at the near clip, ours at the camera. */
+static vfloat op_ray_length(const struct trc_surface *s) {
+    const struct trc_camera *camera = &s->snapshot->camera;
+    const vmask seen =
+        vi_eq((vint)(s->path & vu_set(TRC_VISIBLE_CAMERA)), vi_set(TRC_VISIBLE_CAMERA));
+    if (!s->snapshot->has_camera || !vm_any(seen))
+        return s->ray_length;
+    /* Backwards along the view axis, at the lanes' times. */
+    vvec3 axis = v3(vf_set(camera->camera_to_world->m[2]), vf_set(camera->camera_to_world->m[6]),
+                    vf_set(camera->camera_to_world->m[10]));
+    if (camera->key_count > 1) {
+        float at[3 * TRC_WIDTH];
+        for (int lane = 0; lane < TRC_WIDTH; lane++) {
+            uint32_t key;
+            float f;
+            trc_key_at(vf_get(s->time, lane), camera->key_count, &key, &f);
+            const float *a = camera->camera_to_world[key].m,
+                        *b = camera->camera_to_world[key + 1].m;
+            for (int k = 0; k < 3; k++)
+                at[k * TRC_WIDTH + lane] = a[4 * k + 2] + f * (b[4 * k + 2] - a[4 * k + 2]);
+        }
+        axis = v3(vf_load(at), vf_load(at + TRC_WIDTH), vf_load(at + 2 * TRC_WIDTH));
+    }
+    const vfloat near = vf_divide(vf_set(camera->clip_start), v3_dot(s->wo, axis));
+    return vf_select(seen, s->ray_length - near, s->ray_length);
+}
+
 static vfloat op_light_path(const struct trc_surface *s, uint32_t mode) {
     switch (mode) {
     case TRC_PATH_IS_CAMERA:
@@ -337,7 +364,7 @@ static vfloat op_light_path(const struct trc_surface *s, uint32_t mode) {
     case TRC_PATH_IS_TRANSMISSION:
         return path_bit(s, TRC_VISIBLE_TRANSMISSION);
     case TRC_PATH_RAY_LENGTH:
-        return s->ray_length;
+        return op_ray_length(s);
     case TRC_PATH_DEPTH:
         return vi_to_float(s->depth);
     case TRC_PATH_DIFFUSE_DEPTH:

@@ -185,6 +185,22 @@ static trc_status collect_lights(const struct trc_scene_state *scene,
 
 /* ---- the whole ---- */
 
+static void warn_of_images(struct trc_snapshot_block *block) {
+    const struct trc_snapshot *s = &block->snapshot;
+    uint64_t images = 0, texels = 0;
+    for (uint32_t i = 0; i < s->image_count; i++) {
+        if (s->images[i] && s->images[i]->bad_texel_count) {
+            images++;
+            texels += s->images[i]->bad_texel_count;
+        }
+    }
+    if (images) {
+        trc_warn(block,
+                 "%" PRIu64 " texels in %" PRIu64 " images are not finite and count as black",
+                 texels, images);
+    }
+}
+
 static void finish_stats(const struct trc_scene_state *scene, struct trc_snapshot_block *block) {
     struct trc_snapshot *s = &block->snapshot;
     trc_count_stats(scene, s);
@@ -206,6 +222,7 @@ static void finish_stats(const struct trc_scene_state *scene, struct trc_snapsho
         trc_warn(block, "%" PRIu64 " instances are hidden: their transform is singular",
                  stats->skipped_instance_count);
     }
+    warn_of_images(block);
 }
 
 static trc_status check_cancel(const struct trc_scene_state *scene) {
