@@ -95,7 +95,8 @@ class _MeshDesc(_Struct):
                 ("triangle_count", _u64), ("positions", _ptr), ("position_count", _u64),
                 ("indices", _ptr), ("index_count", _u64), ("normals", _ptr), ("normal_count", _u64),
                 ("normal_kind", _u32), ("attribute_count", _u32), ("smooth", _ptr),
-                ("material_index", _ptr), ("attributes", _ptr)]
+                ("material_index", _ptr), ("attributes", _ptr), ("generated", _ptr),
+                ("generated_count", _u64)]
 
 
 class _InstanceDesc(_Struct):
@@ -374,13 +375,14 @@ class Scene:
     # Meshes
 
     def create_mesh(self, positions, indices, normals=None, normal_kind=NORMALS_NONE, smooth=None,
-                    material_index=None, attributes=()):
+                    material_index=None, attributes=(), generated=None):
         """A mesh. positions (keys, vertices, 3) float32; indices (triangles, 3) uint32; normals
         (keys, vertices | triangles * 3, 3); smooth (triangles,) uint8; material_index (triangles,)
-        uint16; attributes: (name, array (triangles * 3, 2 | 4) float32) pairs, default UV map first."""
+        uint16; attributes: (name, array (triangles * 3, 2 | 4) float32) pairs, default UV map first;
+        generated: (vertices, 3) or None."""
         positions, indices = _array(positions, np.float32), _array(indices, np.uint32)
         normals, smooth = _array(normals, np.float32), _array(smooth, np.uint8)
-        material_index = _array(material_index, np.uint16)
+        material_index, generated = _array(material_index, np.uint16), _array(generated, np.float32)
         arrays = [(_text(name) or b"", _array(values, np.float32)) for name, values in attributes]
         structs = (_CornerAttribute * max(1, len(arrays)))(*(
             _CornerAttribute(width=values.shape[-1], name=name, values=_address(values),
@@ -393,7 +395,8 @@ class Scene:
             normal_kind=NORMALS_NONE if normals is None else normal_kind,
             attribute_count=len(arrays), smooth=_address(smooth),
             material_index=_address(material_index),
-            attributes=ctypes.addressof(structs) if arrays else None)
+            attributes=ctypes.addressof(structs) if arrays else None, generated=_address(generated),
+            generated_count=0 if generated is None else generated.size)
         return self._create("trc_mesh_create", desc)
 
     def update_mesh(self, mesh, positions, normals=None):

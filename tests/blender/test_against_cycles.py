@@ -250,6 +250,67 @@ def test_values(value_pairs, name):
                                                            rel=5e-3, abs=2e-3)
 
 
+# Generated coordinates of a posed mesh -------------------------------------------------------------
+
+def _posed_column(material):
+    """A column of a rest pose along Z whose upper half an armature bends aside."""
+    import bpy
+    import scenes
+    rows = [(x, y, 0.25 * z) for z in range(-6, 7) for x, y in ((-.5, -.5), (.5, -.5), (.5, .5), (-.5, .5))]
+    faces = [(4 * z + k, 4 * z + (k + 1) % 4, 4 * z + 4 + (k + 1) % 4, 4 * z + 4 + k)
+             for z in range(12) for k in range(4)]
+    column = scenes.mesh("Column", rows, faces, material)
+    armature = scenes.link("Rig", bpy.data.armatures.new("Rig"))
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode='EDIT')
+    for name, low, high in (("Lower", -1.5, 0.0), ("Upper", 0.0, 1.5)):
+        bone = armature.data.edit_bones.new(name)
+        bone.head, bone.tail = (0, 0, low), (0, 0, high)
+    bpy.ops.object.mode_set(mode='OBJECT')
+    for name, vertices in (("Lower", range(0, 28)), ("Upper", range(28, 52))):
+        column.vertex_groups.new(name=name).add(list(vertices), 1.0, 'REPLACE')
+    column.modifiers.new("Armature", 'ARMATURE').object = armature
+    pose = armature.pose.bones["Upper"]
+    pose.rotation_mode = 'XYZ'
+    pose.rotation_euler = (0.0, 0.0, 0.9)
+    return column
+
+
+def inside_generated():
+    """Generated coordinates as colours: of the pose, with a subdivision behind it, with a texture space
+    of the mesh's own; and what the viewport's sync takes for them."""
+    import bpy
+    import scenes
+    from volley.sync import mesh
+    scenes.empty(size=(64, 64))
+    scenes.camera(location=(0.5, -6.0, 0.5))
+    material = scenes.material("Generated", "ShaderNodeEmission")
+    tree = material.node_tree
+    tree.links.new(tree.nodes.new("ShaderNodeTexCoord").outputs["Generated"],
+                   tree.nodes["Emission"].inputs["Color"])
+    column = _posed_column(material)
+    pairs = {"posed": _both(FILM_SAMPLES)}
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    evaluated = column.evaluated_get(depsgraph)
+    viewport = mesh.generated_coordinates(evaluated, mesh.read_positions(evaluated.data))
+    column.data.use_auto_texspace = False
+    column.data.texspace_size = (0.5, 1.0, 3.0)
+    pairs["own space"] = _both(FILM_SAMPLES)
+    column.modifiers.new("Subdivision", 'SUBSURF').render_levels = 1
+    pairs["subdivided"] = _both(FILM_SAMPLES)
+    return pairs, viewport
+
+
+def test_generated_coordinates(blender):
+    pairs, viewport = blender.run(inside_generated)
+    for name, (ours, theirs) in pairs.items():
+        assert theirs[..., :3].max() > 0.5, name
+        _close(ours, theirs)
+        assert ours[..., :3].mean(axis=(0, 1)) == pytest.approx(
+            theirs[..., :3].mean(axis=(0, 1)), rel=5e-3, abs=1e-3), name
+    assert viewport[:, 2].reshape(13, 4) == pytest.approx(np.repeat(np.linspace(0, 1, 13), 4).reshape(13, 4))
+
+
 # Light ---------------------------------------------------------------------------------------------
 
 def _stage():

@@ -318,6 +318,9 @@ static void refuse_mesh(trc_status status, const trc_mesh_desc *desc) {
 static void mesh_counts(void **state) {
     (void)state;
     REFUSE_MESH(ARGUMENT, desc.key_count = 0);
+    REFUSE_MESH(ARGUMENT, desc.generated = cube_positions; desc.generated_count = 23);
+    REFUSE_MESH(ARGUMENT, desc.generated_count = 24);
+    REFUSE_MESH(ARGUMENT, desc.generated = MISALIGNED(float); desc.generated_count = 24);
     REFUSE_MESH(LARGE, desc.key_count = TRC_MAX_KEYS + 1);
     REFUSE_MESH(LARGE, desc.key_count = UINT32_MAX);
     REFUSE_MESH(ARGUMENT, desc.key_count = 2);

@@ -101,10 +101,10 @@ class _Walk:
         self._sync, self._source, self._shutter = sync, source, shutter
         self._view_layer = source.depsgraph.view_layer_eval
         self._override = self._view_layer.material_override
-        uv_names, color_names = sync._materials.attribute_names()
+        uv_names, color_names, needs_generated = sync._materials.attribute_names()
         if source.needs_uv:
             uv_names.add("")
-        self._names = frozenset(uv_names), frozenset(color_names)
+        self._names = frozenset(uv_names), frozenset(color_names), needs_generated
         self._owners = {}     # pointer of a mesh -> key of its owner, within this walk
         self._deforming = {}  # owner key -> (pointer, MeshData, MeshMotion)
         self.items = {}       # key -> Item with a mesh
@@ -175,9 +175,11 @@ class _Walk:
         if not is_changed and meshes.reuse(item.key, pointer, self._names):
             return True
         slot_count = max(len(blender_object.material_slots), len(blender_object.data.materials))
-        data = mesh.extract(blender_object.data, *self._names, slot_count)
+        data = mesh.extract(blender_object.data, *self._names[:2], slot_count)
         if data is None:
             return False
+        if self._names[2]:
+            data.generated = mesh.generated_coordinates(blender_object, data.positions)
         if item.motion_keys > 1 and motion.may_deform(blender_object):
             shapes = mesh.MeshMotion(blender_object.data, data, item.motion_keys)
             self._deforming[item.key] = (pointer, data, shapes)

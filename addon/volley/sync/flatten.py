@@ -40,6 +40,7 @@ class FlatTree:
         self.surface = -1
         self.uv_names = set()     # "" is the default UV map
         self.color_names = set()  # "" is the active colour attribute
+        self.needs_generated = False  # coordinates of the undeformed mesh
 
     def signature(self):
         """Equal for trees that mean the same."""

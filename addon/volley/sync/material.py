@@ -58,12 +58,14 @@ class Materials:
         return self._entries[key].id
 
     def attribute_names(self):
-        """The UV maps and colour attributes that the materials of this sync read: two sets."""
-        uv_names, color_names = set(), set()
+        """The UV maps and colour attributes that the materials of this sync read, two sets, and whether
+        one reads Generated coordinates."""
+        uv_names, color_names, needs_generated = set(), set(), False
         for key in self._seen:
             uv_names |= self._entries[key].uv_names
             color_names |= self._entries[key].color_names
-        return uv_names, color_names
+            needs_generated |= self._entries[key].needs_generated
+        return uv_names, color_names, needs_generated
 
     def end(self):
         """Free what nothing asked for since begin; call when no instance uses it any more."""
@@ -87,6 +89,7 @@ class Materials:
             self._send(entry, key, (flat.nodes, flat.surface, pass_index, flags))
         entry.signature = signature
         entry.uv_names, entry.color_names = flat.uv_names, flat.color_names
+        entry.needs_generated = flat.needs_generated
 
     def _send(self, entry, key, arguments):
         """Create or change it in the library; a refused one becomes the default material."""
@@ -112,6 +115,7 @@ class Entry:
         self.id = 0
         self.signature = None
         self.uv_names, self.color_names = set(), set()
+        self.needs_generated = False
 
 
 def _flags(material):

@@ -8,10 +8,12 @@ slower. Curves, text, surfaces and metaballs reach this module as the meshes the
 import zlib
 from dataclasses import dataclass, field
 
+import bpy
 import numpy as np
 
 from .. import native
 
+_HAS_UNDEFORMED = "undeformed_co" in bpy.types.MeshVertex.bl_rna.properties
 _DEFAULT = ""  # the default UV map, the active colour attribute
 
 
@@ -26,10 +28,12 @@ class MeshData:
     smooth: np.ndarray = None         # (triangles,) uint8
     material_index: np.ndarray = None  # (triangles,) uint16
     attributes: list = field(default_factory=list)  # (name, (triangles * 3, 2 | 4) float32)
+    generated: np.ndarray = None      # (vertices, 3) float32
 
     def topology_signature(self):
         """Equal when only positions and normals may differ."""
-        arrays = [self.indices, self.smooth, self.material_index] + [v for _, v in self.attributes]
+        arrays = [self.indices, self.smooth, self.material_index, self.generated]
+        arrays += [v for _, v in self.attributes]
         sums = tuple(None if a is None else zlib.crc32(a.tobytes()) for a in arrays)
         return (len(self.positions), len(self.indices), self.normal_kind, self.normals is None,
                 tuple(name for name, _ in self.attributes), sums)
@@ -60,6 +64,38 @@ def read_positions(mesh):
     if attribute is not None and attribute.data_type == 'FLOAT_VECTOR':
         return _read(attribute.data, "vector", (count, 3), np.float32)
     return _read(mesh.vertices, "co", (count, 3), np.float32)
+
+
+def generated_coordinates(blender_object, positions):
+    """(vertices, 3) float32 of an evaluated object: its undeformed mesh in the mesh's texture space,
+    as Cycles has it. None where that is the bounding box of positions, the library's default."""
+    mesh = blender_object.data
+    undeformed = positions
+    if _HAS_UNDEFORMED:
+        undeformed = _read(mesh.vertices, "undeformed_co", positions.shape, np.float32)
+    is_deformed = not np.array_equal(undeformed, positions)
+    if not is_deformed:
+        # A viewport's meshes do not keep it; the original has it if modifiers left its vertices.
+        rest = blender_object.original.data
+        if not isinstance(rest, bpy.types.Mesh) or len(rest.vertices) != len(positions):
+            return None
+        undeformed = read_positions(rest)
+        is_deformed = not np.array_equal(undeformed, positions)
+    location = np.array(mesh.texspace_location, np.float32)
+    size = np.array(mesh.texspace_size, np.float32)
+    if not is_deformed and _is_bounding_box(positions, location, size):
+        return None
+    scale = np.divide(0.5, size, out=np.zeros_like(size), where=size != 0.0)
+    return undeformed * scale - (location * scale - np.float32(0.5))
+
+
+def _is_bounding_box(positions, location, size):
+    """Whether a texture space is the box around positions; Blender makes flat sides 1."""
+    lower, upper = positions.min(axis=0), positions.max(axis=0)
+    half = 0.5 * (upper - lower)
+    half[half == 0.0] = 1.0
+    return np.allclose(size, half, rtol=1e-5) and np.allclose(location, 0.5 * (lower + upper),
+                                                              atol=1e-5 * float(half.max()))
 
 
 def topology_hash(mesh):
@@ -311,7 +347,8 @@ class Meshes:
         """A new mesh; one of the same key goes when no instance shows it any more."""
         entry = MeshEntry()
         entry.id = self._scene.create_mesh(positions, data.indices, normals, data.normal_kind,
-                                           data.smooth, data.material_index, data.attributes)
+                                           data.smooth, data.material_index, data.attributes,
+                                           data.generated)
         if key in self._entries:
             self._retired.append(self._entries[key].id)
         self._entries[key] = entry

@@ -43,6 +43,7 @@ _INTERPOLATIONS = {'Linear': 0, 'Closest': 1, 'Cubic': 2, 'Smart': 2}
 _EXTENSIONS = {'REPEAT': 0, 'EXTEND': 1, 'CLIP': 2, 'MIRROR': 3}
 _PROJECTIONS = {'FLAT': 0, 'BOX': 1, 'SPHERE': 2, 'TUBE': 3}
 _CLAMP_RESULT = 256
+_ANISOTROPIC = {GLOSSY: (2, 5), PRINCIPLED: (7, 21)}  # inputs: anisotropy, tangent
 RAMP_SIZE = 256
 
 # inputs: (kind, socket identifiers by preference...); outputs: (socket identifier, kind) in the
@@ -191,7 +192,23 @@ def translate(walker, node, path):
     if mode is None:
         return _unsupported(walker, node, sockets)
     values = [sockets.get(kind, *names) for kind, *names in spec.inputs]
+    _note_generated(walker, node, spec.type, values)
     return _outputs(walker, walker.emit(spec.type, values, mode), spec.outputs)
+
+
+def _note_generated(walker, node, node_type, values):
+    """Ask for Generated coordinates where a node takes them unasked."""
+    if node_type == CHECKER:
+        is_needed = values[0].node == DEFAULT
+    elif node_type == GEOMETRY:
+        is_needed = node.outputs["Tangent"].is_linked
+    elif node_type in _ANISOTROPIC:  # around the Z axis of Generated, unless told otherwise
+        anisotropy, tangent = (values[i] for i in _ANISOTROPIC[node_type])
+        is_isotropic = anisotropy.node == CONSTANT and anisotropy.constant[0] == 0.0
+        is_needed = tangent.node == DEFAULT and not is_isotropic
+    else:
+        is_needed = False
+    walker.flat.needs_generated |= is_needed
 
 
 class Sockets:
@@ -275,6 +292,7 @@ def _principled(walker, node, sockets):
         values[5] = values[10] = _constant('f', 0.0)
         values[15] = _constant('f', 0.0)
         _name_missing(walker, sockets)
+    _note_generated(walker, node, PRINCIPLED, values)
     return {"BSDF": Value('s', walker.emit(PRINCIPLED, values, _distribution(node) or 0), 0)}
 
 
@@ -350,8 +368,10 @@ def _texture_coordinate(walker, node, _sockets):
     if node.object is not None:
         walker.warn("Texture Coordinate: another object's coordinates are not supported, the "
                     "object's own are used")
-    if any(s.is_linked for s in node.outputs if s.identifier == "UV"):
+    linked = {s.identifier for s in node.outputs if s.is_linked}
+    if "UV" in linked:
         walker.flat.uv_names.add("")
+    walker.flat.needs_generated |= "Generated" in linked
     index = walker.emit(TEXTURE_COORDINATE, ())
     return _outputs(walker, index, tuple((name, 'v') for name in (
         "Generated", "Normal", "UV", "Object", "Camera", "Window", "Reflection")))

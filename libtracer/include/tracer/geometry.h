@@ -40,6 +40,9 @@ typedef struct trc_mesh_desc {
                                        normal_kind is CORNER, which rules by itself */
     const uint16_t *material_index; /* per triangle slot number, NULL: all 0 */
     const trc_corner_attribute *attributes; /* the first of width 2 is the default UV map */
+    const float *generated; /* Generated coordinates of each vertex, 3 floats, the same at all keys
+                               and in all poses; NULL: the bounding box is the unit cube */
+    uint64_t generated_count; /* number of floats, checked */
 } trc_mesh_desc;
 
 /* Copies a mesh into the scene. Triangles with a vertex that is not finite or beyond 1.8e18 at any

@@ -55,6 +55,9 @@ static trc_status check_mesh(const trc_mesh_desc *desc) {
     /* Singles first: later products of them by 3 and 9 cannot wrap. */
     TRC_TRY(check_product(3, desc->vertex_count, desc->key_count, "positions"));
     TRC_TRY(check_product(3, desc->triangle_count, 1, "indices"));
+    if (desc->generated || desc->generated_count)
+        TRC_TRY(trc_check_array(desc->generated, desc->generated_count, 3 * desc->vertex_count,
+                                sizeof(float), sizeof(float), "generated"));
     TRC_TRY(trc_check_array(desc->positions, desc->position_count,
                             3 * desc->vertex_count * desc->key_count, 4, 4, "positions"));
     TRC_TRY(trc_check_array(desc->indices, desc->index_count, 3 * desc->triangle_count, 4, 4,

@@ -152,15 +152,18 @@ static void op_color_attribute(const struct trc_surface *s, uint32_t name, vfloa
 
 /* ---- texture coordinates ---- */
 
-/* Blender's default texture space: the bounding box becomes the unit cube; a flat side becomes 0.5.
- */
+/* Without coordinates of the mesh's own, Blender's default texture space: the bounding box becomes
+ * the unit cube; a flat side becomes 0.5. */
 static vvec3 generated_of_group(const struct trc_surface *s, const struct lane_group *g) {
     const struct trc_mesh *mesh = g->mesh;
     vint index[3];
     struct trc_corners c;
     trc_load_indices(mesh, s->triangle, g->lanes, index);
-    trc_load_vectors(mesh->positions, index, mesh->vertex_count, 1, s->time, g->lanes, &c);
+    const float *values = mesh->generated ? mesh->generated : mesh->positions;
+    trc_load_vectors(values, index, mesh->vertex_count, 1, s->time, g->lanes, &c);
     const vvec3 p = corners_mix(corner_weights(s), c.corner);
+    if (mesh->generated)
+        return p;
     const vfloat co[3] = {p.x, p.y, p.z};
     vfloat out[3];
     for (int axis = 0; axis < 3; axis++) {

@@ -20,6 +20,7 @@ static void release_topology(struct trc_mesh_topology *topology) {
     trc_free(topology->indices);
     trc_free(topology->smooth);
     trc_free(topology->material_index);
+    trc_free(topology->generated);
     for (uint32_t i = 0; i < topology->attribute_count; i++) {
         trc_free(topology->attributes[i].values);
     }
@@ -60,6 +61,14 @@ static bool all_zero(const void *data, uint64_t bytes) {
     return !b || !bytes || (b[0] == 0 && memcmp(b, b + 1, bytes - 1) == 0);
 }
 
+/* A NaN coordinate would reach integer conversions in texture lookups. */
+static void clear_bad_values(float *values, uint64_t count) {
+    for (uint64_t i = 0; i < count; i++) {
+        if (!isfinite(values[i]))
+            values[i] = 0.0f;
+    }
+}
+
 static trc_status copy_attribute(struct trc_mesh_topology *topology,
                                  const trc_corner_attribute *desc, struct trc_names *names) {
     struct trc_attribute *attribute = &topology->attributes[topology->attribute_count];
@@ -69,11 +78,7 @@ static trc_status copy_attribute(struct trc_mesh_topology *topology,
         return no_memory();
     }
     topology->attribute_count++;
-    /* A NaN coordinate would reach integer conversions in texture lookups. */
-    for (uint64_t i = 0; i < desc->value_count; i++) {
-        if (!isfinite(attribute->values[i]))
-            attribute->values[i] = 0.0f;
-    }
+    clear_bad_values(attribute->values, desc->value_count);
     return TRC_OK;
 }
 
@@ -89,9 +94,13 @@ static trc_status fill_topology(struct trc_mesh_topology *topology, const trc_me
     if (!copy_array(topology, desc->indices, 3 * triangles, sizeof(uint32_t), &topology->indices) ||
         !copy_array(topology, smooth ? desc->smooth : NULL, triangles, 1, &topology->smooth) ||
         !copy_array(topology, slots ? desc->material_index : NULL, triangles, sizeof(uint16_t),
-                    &topology->material_index)) {
+                    &topology->material_index) ||
+        !copy_array(topology, desc->generated, desc->generated_count, sizeof(float),
+                    &topology->generated)) {
         return no_memory();
     }
+    if (topology->generated)
+        clear_bad_values(topology->generated, desc->generated_count);
     for (uint32_t i = 0; i < desc->attribute_count; i++) {
         TRC_TRY(copy_attribute(topology, &desc->attributes[i], names));
     }
@@ -166,6 +175,7 @@ static void share_topology(struct trc_geometry *geometry, struct trc_mesh_topolo
     mesh->indices = topology->indices;
     mesh->smooth = topology->smooth;
     mesh->material_index = topology->material_index;
+    mesh->generated = topology->generated;
     mesh->attribute_count = topology->attribute_count;
     memcpy(mesh->attributes, topology->attributes, sizeof mesh->attributes);
     mesh->default_uv = -1;

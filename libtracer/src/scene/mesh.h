@@ -56,6 +56,7 @@ struct trc_mesh_topology {
     uint32_t *indices;
     uint8_t *smooth;
     uint16_t *material_index;
+    float *generated;
     struct trc_attribute attributes[TRC_MAX_ATTRIBUTES];
     uint32_t attribute_count;
     /* Corners (3 * triangle + corner) of each vertex, made when normals are first needed:

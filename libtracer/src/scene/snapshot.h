@@ -36,6 +36,7 @@ struct trc_mesh {
     uint16_t *material_index; /* per triangle, or NULL: all 0 */
     uint32_t attribute_count;
     struct trc_attribute attributes[TRC_MAX_ATTRIBUTES];
+    float *generated;   /* 3 * vertex_count or NULL */
     int32_t default_uv; /* index of the first attribute of width 2, or -1 */
     float bounds_lower[3],
         bounds_upper[3]; /* object space, all keys: Generated coordinates use key 0 */
