@@ -10,6 +10,7 @@ from collections import namedtuple
 
 import numpy as np
 
+from .textures import TEXTURES
 from .values import CONSTANT, DEFAULT, Value
 
 # TRC_NODE_*
@@ -183,7 +184,7 @@ _PASSED_THROUGH = {"ShaderNodeBump": ("Normal", "Normal"), "ShaderNodeRGBCurve":
 def translate(walker, node, path):
     """The outputs of a node as {socket identifier: Value}; nothing for an unsupported one."""
     sockets = Sockets(walker, node, path)
-    special = _SPECIAL.get(node.bl_idname)
+    special = _SPECIAL.get(node.bl_idname) or TEXTURES.get(node.bl_idname)
     if special is not None:
         outputs = special(walker, node, sockets)
         return _unsupported(walker, node, sockets) if outputs is None else outputs

@@ -75,8 +75,79 @@ enum {
     TRC_NODE_OBJECT_INFO = 87, /* -> c location, c color, f alpha, f object_index, f material_index,
                                   f random */
     TRC_NODE_VECTOR_MATH = 88, /* c a, c b, c c, f scale -> c vector, f value; mode: TRC_VECTOR_* */
-    TRC_NODE_RGB_TO_BW = 89    /* c color -> f */
+    TRC_NODE_RGB_TO_BW = 89,   /* c color -> f */
+
+    /* procedural textures; vectors default to Generated */
+    TRC_NODE_NOISE = 96,       /* c vector, f w, f scale, f detail, f roughness, f lacunarity,
+                                  f offset, f gain, f distortion -> f value, c color; mode: dimensions
+                                  - 1 in bits 0-1, TRC_FRACTAL_* from bit TRC_NOISE_TYPE_SHIFT */
+    TRC_NODE_MUSGRAVE = 97,    /* c vector, f w, f scale, f detail, f dimension, f lacunarity,
+                                  f offset, f gain -> f; mode as NOISE, without FBM_UNIT */
+    TRC_NODE_VORONOI = 98,     /* c vector, f w, f scale, f smoothness, f exponent, f randomness ->
+                                  f distance, c color, c position, f w, f radius; mode: dimensions - 1
+                                  in bits 0-1, metric and TRC_VORONOI_* feature from bits
+                                  TRC_VORONOI_METRIC_SHIFT and TRC_VORONOI_FEATURE_SHIFT */
+    TRC_NODE_WAVE = 99,        /* c vector, f scale, f distortion, f detail, f detail_scale,
+                                  f detail_roughness, f phase -> f; mode: profile in bits 0-1,
+                                  TRC_WAVE_RINGS, from bit TRC_WAVE_DIRECTION_SHIFT 0-2 X, Y, Z,
+                                  3 diagonal or spherical */
+    TRC_NODE_GRADIENT = 100,   /* c vector -> f; mode: TRC_GRADIENT_* */
+    TRC_NODE_WHITE_NOISE = 101, /* c vector, f w -> f value, c color; mode: dimensions - 1 */
+    TRC_NODE_MAGIC = 102,      /* c vector, f scale, f distortion -> c color, f factor; mode: depth,
+                                  0-10 */
+    TRC_NODE_BRICK = 103       /* c vector, c color1, c color2, c mortar, f scale, f mortar_size,
+                                  f mortar_smooth, f bias, f brick_width, f row_height, f offset,
+                                  f squash -> c color, f factor; mode: every how many rows are offset
+                                  in bits 0-6, squashed from bit TRC_BRICK_SQUASH_SHIFT, 0: never */
 };
+
+/* Fractals of gradient noise. FBM_UNIT is fractal Brownian motion scaled to [0, 1]. */
+enum {
+    TRC_FRACTAL_FBM_UNIT = 0,
+    TRC_FRACTAL_FBM,
+    TRC_FRACTAL_MULTIFRACTAL,
+    TRC_FRACTAL_HETERO_TERRAIN,
+    TRC_FRACTAL_HYBRID_MULTIFRACTAL,
+    TRC_FRACTAL_RIDGED_MULTIFRACTAL,
+    TRC_NOISE_TYPE_SHIFT = 2
+};
+
+enum { /* metrics */
+    TRC_VORONOI_EUCLIDEAN = 0,
+    TRC_VORONOI_MANHATTAN,
+    TRC_VORONOI_CHEBYCHEV,
+    TRC_VORONOI_MINKOWSKI,
+    TRC_VORONOI_METRIC_SHIFT = 2
+};
+enum { /* features */
+    TRC_VORONOI_F1 = 0,
+    TRC_VORONOI_F2,
+    TRC_VORONOI_SMOOTH_F1,
+    TRC_VORONOI_DISTANCE_TO_EDGE,
+    TRC_VORONOI_N_SPHERE_RADIUS,
+    TRC_VORONOI_FEATURE_SHIFT = 4
+};
+
+enum {
+    TRC_WAVE_SINE = 0,
+    TRC_WAVE_SAW,
+    TRC_WAVE_TRIANGLE,
+    TRC_WAVE_PROFILE = 3, /* mask */
+    TRC_WAVE_RINGS = 1 << 2,
+    TRC_WAVE_DIRECTION_SHIFT = 3
+};
+
+enum {
+    TRC_GRADIENT_LINEAR = 0,
+    TRC_GRADIENT_QUADRATIC,
+    TRC_GRADIENT_EASING,
+    TRC_GRADIENT_DIAGONAL,
+    TRC_GRADIENT_RADIAL,
+    TRC_GRADIENT_QUADRATIC_SPHERE,
+    TRC_GRADIENT_SPHERICAL
+};
+
+enum { TRC_BRICK_SQUASH_SHIFT = 7 };
 
 /* Microfacet distributions. SHARP ignores roughness. */
 enum {

@@ -4,6 +4,7 @@
 #include "kernels/program_input.h"
 #include "kernels/program_math.h"
 #include "kernels/program_normal.h"
+#include "kernels/program_procedural.h"
 #include "kernels/program_texture.h"
 #include "kernels/surface.h"
 
@@ -71,6 +72,15 @@ static bool run_pure(uint32_t op, uint32_t mode, const float *table, const vfloa
         return true;
     case TRC_OP_CHECKER:
         op_checker(in, out);
+        return true;
+    case TRC_OP_NOISE:
+    case TRC_OP_WHITE_NOISE:
+    case TRC_OP_VORONOI:
+    case TRC_OP_GRADIENT:
+    case TRC_OP_WAVE:
+    case TRC_OP_MAGIC:
+    case TRC_OP_BRICK:
+        TRC_KERNEL(trc_program_procedural)(op, mode, in, out);
         return true;
     default:
         return false;

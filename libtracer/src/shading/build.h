@@ -118,6 +118,10 @@ trc_status trc_build_math(struct trc_build *b, uint32_t mode, struct trc_operand
  * normals and tangents of shader nodes, whose operands get reg -2. (shading/lower.c) */
 trc_status trc_build_input(struct trc_build *b, const trc_node *node, uint32_t input,
                            struct trc_operand *out);
+/* The outputs of a procedural texture from its inputs, in floats as those of trc_build_input.
+ * (shading/lower_texture.c) */
+trc_status trc_build_texture(struct trc_build *b, const trc_node *node,
+                             const struct trc_operand *in, struct trc_operand *out);
 /* Outputs of all value nodes. (shading/lower.c) */
 trc_status trc_build_values(struct trc_build *b);
 /* Leaves, their weights and operands. (shading/leaves.c) */

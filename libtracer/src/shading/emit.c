@@ -39,6 +39,8 @@ trc_status trc_build_mark(struct trc_build *b) {
         if ((o->op == TRC_OP_IMAGE || o->op == TRC_OP_IMAGE_BOX) && live[3]) {
             o->mode |= TRC_IMAGE_MODE_ALPHA;
         }
+        if ((o->op == TRC_OP_NOISE || o->op == TRC_OP_VORONOI) && !memchr(live + 1, 1, 3))
+            o->mode |= TRC_MODE_NO_COLOR;
     }
     return TRC_OK;
 }

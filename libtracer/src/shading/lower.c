@@ -319,7 +319,7 @@ static trc_status lower_node(const struct lowering *l) {
     case TRC_NODE_RGB_TO_BW:
         return op(b, TRC_OP_LUMINANCE, 0, l->in, l->out);
     default:
-        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "a node has an unknown type");
+        return trc_build_texture(b, l->node, l->in, l->out);
     }
 }
 

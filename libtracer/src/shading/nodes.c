@@ -49,6 +49,22 @@ static const struct trc_node_info infos[] = {
     {TRC_NODE_OBJECT_INFO, "Object Info", "", "", "vcffff"},
     {TRC_NODE_VECTOR_MATH, "Vector Math", "cccf", "a b c scale", "vf"},
     {TRC_NODE_RGB_TO_BW, "RGB to BW", "c", "color", "f"},
+
+    {TRC_NODE_NOISE, "Noise", "gffffffff",
+     "vector w scale detail roughness lacunarity offset gain distortion", "fc"},
+    {TRC_NODE_MUSGRAVE, "Musgrave", "gfffffff",
+     "vector w scale detail dimension lacunarity offset gain", "f"},
+    {TRC_NODE_VORONOI, "Voronoi", "gfffff", "vector w scale smoothness exponent randomness",
+     "fcvff"},
+    {TRC_NODE_WAVE, "Wave", "gffffff",
+     "vector scale distortion detail detail_scale detail_roughness phase", "f"},
+    {TRC_NODE_GRADIENT, "Gradient", "g", "vector", "f"},
+    {TRC_NODE_WHITE_NOISE, "White Noise", "gf", "vector w", "fc"},
+    {TRC_NODE_MAGIC, "Magic", "gff", "vector scale distortion", "cf"},
+    {TRC_NODE_BRICK, "Brick", "gcccffffffff",
+     "vector color1 color2 mortar scale mortar_size mortar_smooth bias brick_width row_height "
+     "offset squash",
+     "cf"},
 };
 
 const struct trc_node_info *trc_node_info_of(uint32_t type) {
@@ -101,6 +117,24 @@ bool trc_node_mode_is_valid(uint32_t type, uint32_t mode) {
         return mode <= 1;
     case TRC_NODE_VECTOR_MATH:
         return mode <= TRC_VECTOR_FRACT;
+    case TRC_NODE_NOISE:
+        return mode >> TRC_NOISE_TYPE_SHIFT <= TRC_FRACTAL_RIDGED_MULTIFRACTAL;
+    case TRC_NODE_MUSGRAVE:
+        return mode >> TRC_NOISE_TYPE_SHIFT <= TRC_FRACTAL_RIDGED_MULTIFRACTAL &&
+               mode >> TRC_NOISE_TYPE_SHIFT != TRC_FRACTAL_FBM_UNIT;
+    case TRC_NODE_VORONOI:
+        return mode >> TRC_VORONOI_FEATURE_SHIFT <= TRC_VORONOI_N_SPHERE_RADIUS;
+    case TRC_NODE_WAVE:
+        return mode >> (TRC_WAVE_DIRECTION_SHIFT + 2) == 0 &&
+               (mode & TRC_WAVE_PROFILE) <= TRC_WAVE_TRIANGLE;
+    case TRC_NODE_GRADIENT:
+        return mode <= TRC_GRADIENT_SPHERICAL;
+    case TRC_NODE_WHITE_NOISE:
+        return mode <= 3;
+    case TRC_NODE_MAGIC:
+        return mode <= 10;
+    case TRC_NODE_BRICK:
+        return mode >> 2 * TRC_BRICK_SQUASH_SHIFT == 0;
     default:
         return mode == 0;
     }

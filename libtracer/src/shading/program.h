@@ -56,6 +56,20 @@
     X(IMAGE_BOX, 3, 4, 0) /* vector; the same */                                           \
     X(PROJECT, 3, 2, 1)   /* vector -> u, v; mode: TRC_PROJECT_* */                        \
     X(CHECKER, 10, 4, 1)  /* vector, color 1, color 2, scale -> color, factor */           \
+    /* procedural textures; TRC_MODE_NO_COLOR */                                           \
+    /* vector, w, octaves, roughness, lacunarity, offset, gain, distortion -> value, color; \
+     * mode: dimensions - 1, TRC_FRACTAL_* << TRC_NOISE_TYPE_SHIFT */                      \
+    X(NOISE, 10, 4, 1)                                                                     \
+    X(WHITE_NOISE, 4, 4, 1) /* vector, w -> value, color; mode: dimensions - 1 */          \
+    /* vector, w, smoothness, exponent, randomness -> distance, color, position, w,        \
+     * radius; mode: dimensions - 1, metric, feature */                                    \
+    X(VORONOI, 7, 9, 1)                                                                    \
+    X(GRADIENT, 3, 1, 1) /* vector; mode: TRC_GRADIENT_* */                                \
+    X(WAVE, 8, 1, 1)     /* vector, distortion, detail scale, octaves, roughness, phase */ \
+    X(MAGIC, 5, 3, 1)    /* vector, scale, distortion; mode: depth */                      \
+    /* vector, mortar size, mortar smoothness, bias, brick width, row height, offset,      \
+     * squash -> shade, mortar */                                                          \
+    X(BRICK, 10, 2, 1)                                                                     \
     /* floats */                                                                           \
     X(MATH, 3, 1, 1)  /* mode: TRC_MATH_* */                                               \
     X(CLAMP, 3, 1, 1) /* value, min, max; mode 1: min and max in either order */           \
@@ -92,6 +106,12 @@ enum trc_op {
 #define TRC_IMAGE_MODE_ALPHA (1u << 4) /* the alpha is used too: colours are divided by it */
 
 enum { TRC_PROJECT_EQUIRECTANGULAR, TRC_PROJECT_MIRROR_BALL, TRC_PROJECT_SPHERE, TRC_PROJECT_TUBE };
+
+/* Set where nothing reads the colour of an operation whose colour costs extra. */
+#define TRC_MODE_NO_COLOR (1u << 15)
+
+/* A last octave counts by the fraction. */
+#define TRC_MAX_OCTAVES 16.0f
 
 /* Modes of the Separate and Combine nodes; the first and the last need no operation. */
 enum { TRC_SEPARATE_RGB, TRC_SEPARATE_HSV, TRC_SEPARATE_HSL, TRC_SEPARATE_XYZ };

@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Procedural textures in the library's terms.
+
+Each function takes the walker, the node and its ``Sockets`` and gives {socket identifier: Value}, or
+None for a setting that is not supported. Sockets that 3.4 lacks (lacunarity, offset, gain) have the
+values that its textures imply.
+"""
+
+from .values import CONSTANT, DEFAULT, Value
+
+# TRC_NODE_*
+NOISE, MUSGRAVE, VORONOI, WAVE, GRADIENT, WHITE_NOISE, MAGIC, BRICK = range(96, 104)
+
+_DIMENSIONS = ('1D', '2D', '3D', '4D')
+_FBM_UNIT, _FBM = 0, 1
+_FRACTALS = {'FBM': _FBM, 'MULTIFRACTAL': 2, 'HETERO_TERRAIN': 3, 'HYBRID_MULTIFRACTAL': 4,
+             'RIDGED_MULTIFRACTAL': 5}
+_METRICS = ('EUCLIDEAN', 'MANHATTAN', 'CHEBYCHEV', 'MINKOWSKI')
+_FEATURES = ('F1', 'F2', 'SMOOTH_F1', 'DISTANCE_TO_EDGE', 'N_SPHERE_RADIUS')
+_PROFILES = ('SIN', 'SAW', 'TRI')
+_BANDS = ('X', 'Y', 'Z', 'DIAGONAL')
+_RINGS = ('X', 'Y', 'Z', 'SPHERICAL')
+_GRADIENTS = ('LINEAR', 'QUADRATIC', 'EASING', 'DIAGONAL', 'RADIAL', 'QUADRATIC_SPHERE', 'SPHERICAL')
+
+
+def _number(sockets, name, default):
+    """A number input; one that this Blender lacks has a default."""
+    if sockets.find(name) is None:
+        return Value('f', CONSTANT, 0, (default, 0.0, 0.0))
+    return sockets.get('f', name)
+
+
+def _place(node, sockets):
+    """The Vector and W inputs; the one that the number of dimensions leaves out is 0."""
+    dimensions = getattr(node, "noise_dimensions", getattr(node, "voronoi_dimensions",
+                                                           getattr(node, "musgrave_dimensions", '3D')))
+    zero = Value('v', CONSTANT, 0)
+    vector = zero if dimensions == '1D' else sockets.get('v', "Vector")
+    w = sockets.get('f', "W") if dimensions in {'1D', '4D'} else zero._replace(kind='f')
+    return _DIMENSIONS.index(dimensions), vector, w
+
+
+def _noise(walker, node, sockets):
+    dimensions, vector, w = _place(node, sockets)
+    kind = getattr(node, "noise_type", 'FBM')
+    if kind not in _FRACTALS:
+        return None
+    fractal = _FRACTALS[kind]
+    if fractal == _FBM and getattr(node, "normalize", True):
+        fractal = _FBM_UNIT
+    values = [vector, w, sockets.get('f', "Scale"), sockets.get('f', "Detail"),
+              sockets.get('f', "Roughness"), _number(sockets, "Lacunarity", 2.0),
+              _number(sockets, "Offset", 0.0), _number(sockets, "Gain", 1.0),
+              sockets.get('f', "Distortion")]
+    index = walker.emit(NOISE, values, dimensions | fractal << 2)
+    return {"Fac": Value('f', index, 0), "Color": Value('c', index, 1)}
+
+
+def _musgrave(walker, node, sockets):
+    dimensions, vector, w = _place(node, sockets)
+    if node.musgrave_type not in _FRACTALS:
+        return None
+    values = [vector, w] + [sockets.get('f', name) for name in (
+        "Scale", "Detail", "Dimension", "Lacunarity", "Offset", "Gain")]
+    index = walker.emit(MUSGRAVE, values, dimensions | _FRACTALS[node.musgrave_type] << 2)
+    return {"Fac": Value('f', index, 0)}
+
+
+def _voronoi(walker, node, sockets):
+    dimensions, vector, w = _place(node, sockets)
+    if node.feature not in _FEATURES or node.distance not in _METRICS:
+        return None
+    detail = _number(sockets, "Detail", 0.0)
+    if detail.node != CONSTANT or detail.constant[0] > 0.0 or getattr(node, "normalize", False):
+        walker.warn("Voronoi Texture: detail and normalisation are not supported, one plain octave is "
+                    "used")
+    values = [vector, w] + [sockets.get('f', name) for name in (
+        "Scale", "Smoothness", "Exponent", "Randomness")]
+    mode = dimensions | _METRICS.index(node.distance) << 2 | _FEATURES.index(node.feature) << 4
+    index = walker.emit(VORONOI, values, mode)
+    return {"Distance": Value('f', index, 0), "Color": Value('c', index, 1),
+            "Position": Value('v', index, 2), "W": Value('f', index, 3), "Radius": Value('f', index, 4)}
+
+
+def _wave(walker, node, sockets):
+    if node.wave_type == 'BANDS':
+        direction = _BANDS.index(node.bands_direction) << 3
+    else:
+        direction = 4 | _RINGS.index(node.rings_direction) << 3
+    values = [sockets.get('v', "Vector")] + [sockets.get('f', name) for name in (
+        "Scale", "Distortion", "Detail", "Detail Scale", "Detail Roughness", "Phase Offset")]
+    index = walker.emit(WAVE, values, _PROFILES.index(node.wave_profile) | direction)
+    return _grey(walker, Value('f', index, 0))
+
+
+def _gradient(walker, node, sockets):
+    index = walker.emit(GRADIENT, [sockets.get('v', "Vector")], _GRADIENTS.index(node.gradient_type))
+    return _grey(walker, Value('f', index, 0))
+
+
+def _grey(walker, value):
+    """A number that is the colour too."""
+    return {"Fac": value, "Color": walker.convert(value, 'c')}
+
+
+def _white_noise(walker, node, sockets):
+    dimensions, vector, w = _place(node, sockets)
+    if vector.node == DEFAULT:  # unlike other textures', an unlinked vector is 0
+        vector = Value('v', CONSTANT, 0)
+    index = walker.emit(WHITE_NOISE, [vector, w], dimensions)
+    return {"Value": Value('f', index, 0), "Color": Value('c', index, 1)}
+
+
+def _magic(walker, node, sockets):
+    values = [sockets.get('v', "Vector"), sockets.get('f', "Scale"), sockets.get('f', "Distortion")]
+    index = walker.emit(MAGIC, values, node.turbulence_depth)
+    return {"Color": Value('c', index, 0), "Fac": Value('f', index, 1)}
+
+
+def _brick(walker, node, sockets):
+    def amount(value):
+        return Value('f', CONSTANT, 0, (value, 0.0, 0.0))
+    values = [sockets.get('v', "Vector")]
+    values += [sockets.get('c', name) for name in ("Color1", "Color2", "Mortar")]
+    values += [sockets.get('f', name) for name in ("Scale", "Mortar Size", "Mortar Smooth", "Bias",
+                                                   "Brick Width", "Row Height")]
+    values += [amount(node.offset), amount(node.squash)]
+    index = walker.emit(BRICK, values, node.offset_frequency | node.squash_frequency << 7)
+    return {"Color": Value('c', index, 0), "Fac": Value('f', index, 1)}
+
+
+TEXTURES = {
+    "ShaderNodeTexNoise": _noise, "ShaderNodeTexMusgrave": _musgrave, "ShaderNodeTexVoronoi": _voronoi,
+    "ShaderNodeTexWave": _wave, "ShaderNodeTexGradient": _gradient,
+    "ShaderNodeTexWhiteNoise": _white_noise, "ShaderNodeTexMagic": _magic, "ShaderNodeTexBrick": _brick,
+}
