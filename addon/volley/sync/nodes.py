@@ -10,6 +10,7 @@ from collections import namedtuple
 
 import numpy as np
 
+from .converters import CONVERTERS
 from .textures import TEXTURES
 from .values import CONSTANT, DEFAULT, Value
 
@@ -35,7 +36,8 @@ _MATH = ('ADD', 'SUBTRACT', 'MULTIPLY', 'DIVIDE', 'MULTIPLY_ADD', 'POWER', 'LOGA
 
 _VECTOR_MATH = ('ADD', 'SUBTRACT', 'MULTIPLY', 'DIVIDE', 'MULTIPLY_ADD', 'CROSS_PRODUCT', 'PROJECT',
                 'REFLECT', 'DOT_PRODUCT', 'DISTANCE', 'LENGTH', 'SCALE', 'NORMALIZE', 'ABSOLUTE',
-                'MINIMUM', 'MAXIMUM', 'FLOOR', 'CEIL', 'FRACTION')
+                'MINIMUM', 'MAXIMUM', 'FLOOR', 'CEIL', 'FRACTION', 'SINE', 'COSINE', 'TANGENT', 'SNAP',
+                'MODULO', 'WRAP', 'FACEFORWARD', 'REFRACT')
 VECTOR_SUBTRACT, VECTOR_MULTIPLY_ADD, VECTOR_DOT, VECTOR_NORMALIZE = 1, 4, 8, 12
 VECTOR_MINIMUM, VECTOR_MAXIMUM = 14, 15
 _MATH_SUBTRACT, _MATH_MULTIPLY, _MATH_DIVIDE, _MATH_MULTIPLY_ADD = 1, 2, 3, 4
@@ -69,8 +71,9 @@ def _distribution(node):
     return _DISTRIBUTIONS.get(getattr(node, "distribution", 'GGX'))
 
 
-def _color_model(node):
-    return ('RGB', 'HSV', 'HSL').index(node.mode)
+def _color_mode(node):
+    """RGB, HSV or HSL of the Separate and Combine Color nodes."""
+    return ('RGB', 'HSV', 'HSL').index(getattr(node, "mode", 'RGB'))
 
 
 def _math_mode(node):
@@ -87,12 +90,6 @@ def _mix_rgb_mode(node):
     if node.blend_type not in _BLENDS:
         return None
     return _BLENDS.index(node.blend_type) | (_CLAMP_RESULT if node.use_clamp else 0)
-
-
-def _map_range_mode(node):
-    if getattr(node, "data_type", 'FLOAT') != 'FLOAT' or node.interpolation_type != 'LINEAR':
-        return None
-    return _CLAMP_RESULT if node.clamp else 0
 
 
 _SPECS = {
@@ -150,18 +147,15 @@ _SPECS = {
     "ShaderNodeSeparateXYZ": Spec(SEPARATE, (('v', "Vector"),), (("X", 'f'), ("Y", 'f'), ("Z", 'f'))),
     "ShaderNodeSeparateRGB": Spec(SEPARATE, (('c', "Image"),), (("R", 'f'), ("G", 'f'), ("B", 'f'))),
     "ShaderNodeSeparateColor": Spec(
-        SEPARATE, (('c', "Color"),), (("Red", 'f'), ("Green", 'f'), ("Blue", 'f')), _color_model),
+        SEPARATE, (('c', "Color"),), (("Red", 'f'), ("Green", 'f'), ("Blue", 'f')), _color_mode),
     "ShaderNodeSeparateHSV": Spec(
-        SEPARATE, (('c', "Color"),), (("H", 'f'), ("S", 'f'), ("V", 'f')), lambda node: 1),
+        SEPARATE, (('c', "Color"),), (("H", 'f'), ("S", 'f'), ("V", 'f')), lambda _node: 1),
     "ShaderNodeCombineHSV": Spec(
-        COMBINE, (('f', "H"), ('f', "S"), ('f', "V")), (("Color", 'c'),), lambda node: 1),
+        COMBINE, (('f', "H"), ('f', "S"), ('f', "V")), (("Color", 'c'),), lambda _node: 1),
     "ShaderNodeCombineXYZ": Spec(COMBINE, (('f', "X"), ('f', "Y"), ('f', "Z")), (("Vector", 'v'),)),
     "ShaderNodeCombineRGB": Spec(COMBINE, (('f', "R"), ('f', "G"), ('f', "B")), (("Image", 'c'),)),
     "ShaderNodeCombineColor": Spec(
-        COMBINE, (('f', "Red"), ('f', "Green"), ('f', "Blue")), (("Color", 'c'),), _color_model),
-    "ShaderNodeMapRange": Spec(
-        MAP_RANGE, (('f', "Value"), ('f', "From Min"), ('f', "From Max"), ('f', "To Min"),
-                    ('f', "To Max")), (("Result", 'f'),), _map_range_mode),
+        COMBINE, (('f', "Red"), ('f', "Green"), ('f', "Blue")), (("Color", 'c'),), _color_mode),
     "ShaderNodeClamp": Spec(
         CLAMP, (('f', "Value"), ('f', "Min"), ('f', "Max")), (("Result", 'f'),),
         lambda node: 0 if node.clamp_type == 'MINMAX' else 1),
@@ -176,15 +170,14 @@ _SPECS = {
 _SPECS["ShaderNodeBsdfAnisotropic"] = _SPECS["ShaderNodeBsdfGlossy"]
 
 # Nodes that bend what goes through them: unsupported, what comes in goes out.
-_PASSED_THROUGH = {"ShaderNodeBump": ("Normal", "Normal"), "ShaderNodeRGBCurve": ("Color", "Color"),
-                   "ShaderNodeVectorCurve": ("Vector", "Vector"),
-                   "ShaderNodeVectorRotate": ("Vector", "Vector")}
+_PASSED_THROUGH = {"ShaderNodeBump": ("Normal", "Normal")}
 
 
 def translate(walker, node, path):
     """The outputs of a node as {socket identifier: Value}; nothing for an unsupported one."""
     sockets = Sockets(walker, node, path)
-    special = _SPECIAL.get(node.bl_idname) or TEXTURES.get(node.bl_idname)
+    special = next((table[node.bl_idname] for table in (_SPECIAL, TEXTURES, CONVERTERS)
+                    if node.bl_idname in table), None)
     if special is not None:
         outputs = special(walker, node, sockets)
         return _unsupported(walker, node, sockets) if outputs is None else outputs

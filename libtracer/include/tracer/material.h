@@ -95,10 +95,36 @@ enum {
     TRC_NODE_WHITE_NOISE = 101, /* c vector, f w -> f value, c color; mode: dimensions - 1 */
     TRC_NODE_MAGIC = 102,      /* c vector, f scale, f distortion -> c color, f factor; mode: depth,
                                   0-10 */
-    TRC_NODE_BRICK = 103       /* c vector, c color1, c color2, c mortar, f scale, f mortar_size,
+    TRC_NODE_BRICK = 103,      /* c vector, c color1, c color2, c mortar, f scale, f mortar_size,
                                   f mortar_smooth, f bias, f brick_width, f row_height, f offset,
                                   f squash -> c color, f factor; mode: every how many rows are offset
                                   in bits 0-6, squashed from bit TRC_BRICK_SQUASH_SHIFT, 0: never */
+
+    /* the rest */
+    TRC_NODE_CURVES = 104,     /* f factor, c color, f low, f high -> c; table: 256 RGBA values, each
+                                  channel by its own, over low to high; mode 1: straight on beyond */
+    TRC_NODE_FLOAT_CURVE = 105, /* f factor, f value, f low, f high -> f; table: as CURVES, R is read;
+                                   mode as CURVES */
+    TRC_NODE_BLACKBODY = 106,  /* f temperature (K) -> c */
+    TRC_NODE_WAVELENGTH = 107, /* f wavelength (nm) -> c */
+    TRC_NODE_VECTOR_TRANSFORM = 108, /* c vector -> c; mode: TRC_SPACE_* of the source in bits 0-1, of
+                                        the target in bits 2-3, bits 4-5: 0 point, 1 vector,
+                                        2 normal */
+    TRC_NODE_VECTOR_ROTATE = 109, /* c vector, c center, c axis, f angle, c rotation -> c; mode:
+                                     TRC_ROTATE_* | 8 to turn the other way */
+    TRC_NODE_CAMERA_DATA = 110,   /* -> c view_vector, f view_z_depth, f view_distance */
+    TRC_NODE_WIREFRAME = 111      /* f size (m, world) -> f */
+};
+
+enum { TRC_SPACE_WORLD = 0, TRC_SPACE_OBJECT, TRC_SPACE_CAMERA };
+
+/* Radians; EULER reads rotation (XYZ), the others angle; AXIS_ANGLE axis too. */
+enum {
+    TRC_ROTATE_AXIS_ANGLE = 0,
+    TRC_ROTATE_X,
+    TRC_ROTATE_Y,
+    TRC_ROTATE_Z,
+    TRC_ROTATE_EULER
 };
 
 /* Fractals of gradient noise. FBM_UNIT is fractal Brownian motion scaled to [0, 1]. */
@@ -242,7 +268,15 @@ enum {
     TRC_VECTOR_MAXIMUM,
     TRC_VECTOR_FLOOR,
     TRC_VECTOR_CEIL,
-    TRC_VECTOR_FRACT
+    TRC_VECTOR_FRACT,
+    TRC_VECTOR_SINE,
+    TRC_VECTOR_COSINE,
+    TRC_VECTOR_TANGENT,
+    TRC_VECTOR_SNAP,
+    TRC_VECTOR_MODULO,
+    TRC_VECTOR_WRAP,
+    TRC_VECTOR_FACEFORWARD,
+    TRC_VECTOR_REFRACT /* scale: the relative index of refraction */
 };
 
 /* Mode bits of TRC_NODE_IMAGE. */
@@ -270,7 +304,7 @@ typedef struct trc_node {
     uint32_t input_count; /* exactly the count of the type */
     trc_id image;         /* IMAGE, ENVIRONMENT; 0 renders magenta */
     const char *name;     /* attribute name or NULL */
-    const float *table;   /* COLOR_RAMP: table_count floats, else NULL */
+    const float *table;   /* COLOR_RAMP, CURVES, FLOAT_CURVE: table_count floats, else NULL */
     uint64_t table_count;
 } trc_node;
 

@@ -5,6 +5,7 @@
 #include "kernels/program_math.h"
 #include "kernels/program_normal.h"
 #include "kernels/program_procedural.h"
+#include "kernels/program_table.h"
 #include "kernels/program_texture.h"
 #include "kernels/surface.h"
 
@@ -30,6 +31,18 @@ static bool run_pure(uint32_t op, uint32_t mode, const float *table, const vfloa
         return true;
     case TRC_OP_ROTATION:
         op_rotation(in, out);
+        return true;
+    case TRC_OP_AXIS_ROTATION:
+        op_axis_rotation(v3_read(in), in[3], out);
+        return true;
+    case TRC_OP_CURVE:
+        out[0] = op_curve(mode, table, in);
+        return true;
+    case TRC_OP_BLACKBODY:
+        v3_write(out, op_blackbody(in[0]));
+        return true;
+    case TRC_OP_WAVELENGTH:
+        v3_write(out, op_wavelength(in[0]));
         return true;
     case TRC_OP_MAPPING:
         v3_write(out, op_mapping(mode, in));
@@ -165,6 +178,12 @@ static void run_at_surface(const struct trc_surface *s, const struct trc_instruc
     case TRC_OP_NORMAL_MAP:
         v3_write(out, op_normal_map(s, i->mode, i->resource, in[0], v3_read(in + 1)));
         break;
+    case TRC_OP_TRANSFORM:
+        v3_write(out, op_transform(s, i->mode, v3_read(in)));
+        break;
+    case TRC_OP_WIREFRAME:
+        out[0] = op_wireframe(s, in[0]);
+        break;
     case TRC_OP_IMAGE:
         texture_lookup(image_of(s, i->resource), i->mode, in[0], in[1], s->active, out);
         break;
@@ -185,7 +204,7 @@ void TRC_KERNEL(trc_program_run)(const struct trc_material *m, const struct trc_
         for (uint32_t n = 0; n < i->input_count; n++)
             in[n] = trc_operand_value(&operands[n], regs);
         vfloat *out = &regs->r[i->out];
-        const float *table = i->op == TRC_OP_RAMP ? m->tables + i->resource : NULL;
+        const float *table = trc_op_has_table(i->op) ? m->tables + i->resource : NULL;
         if (!run_pure(i->op, i->mode, table, in, out))
             run_at_surface(s, i, in, out);
     }

@@ -229,9 +229,9 @@ static vvec3 op_tangent(const struct trc_surface *s) {
     return out;
 }
 
-/* The world as the camera sees it at the middle of the shutter, looking along +Z as in Cycles.
- * Without a camera it stands at the origin. */
-static void load_world_to_camera(const struct trc_snapshot *snapshot, struct trc_wide_affine *m) {
+/* The camera at the middle of the shutter, looking along +Z as in Cycles. Without a camera it stands
+ * at the origin. */
+static void load_camera_to_world(const struct trc_snapshot *snapshot, struct trc_wide_affine *m) {
     const struct trc_camera *camera = &snapshot->camera;
     uint32_t key = 0;
     float f = 0.0f, e[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
@@ -242,12 +242,15 @@ static void load_world_to_camera(const struct trc_snapshot *snapshot, struct trc
         for (int i = 0; i < 12; i++)
             e[i] = (1.0f - f) * a[i] + f * b[i];
     }
+    for (int i = 0; i < 3; i++)
+        m->column[i] = v3(vf_set(e[i]), vf_set(e[4 + i]), vf_set(e[8 + i]));
+    m->column[2] = v3_neg(m->column[2]);
+    m->origin = v3(vf_set(e[3]), vf_set(e[7]), vf_set(e[11]));
+}
+
+static void load_world_to_camera(const struct trc_snapshot *snapshot, struct trc_wide_affine *m) {
     struct trc_wide_affine to_world;
-    for (int i = 0; i < 3; i++) {
-        to_world.column[i] = v3(vf_set(e[i]), vf_set(e[4 + i]), vf_set(e[8 + i]));
-    }
-    to_world.column[2] = v3_neg(to_world.column[2]);
-    to_world.origin = v3(vf_set(e[3]), vf_set(e[7]), vf_set(e[11]));
+    load_camera_to_world(snapshot, &to_world);
     affine_inverse(&to_world, m);
 }
 
@@ -278,6 +281,60 @@ static void op_window(const struct trc_surface *s, vfloat *out) {
     const vfloat y = perspective ? vf_divide(p.y, p.z) : p.y;
     out[0] = (x - vf_set(window[0])) * vf_set(1.0f / (window[1] - window[0]));
     out[1] = (y - vf_set(window[2])) * vf_set(1.0f / (window[3] - window[2]));
+}
+
+/* A point or vector from one space to another. In the world there is no object space. */
+static vvec3 op_transform(const struct trc_surface *s, uint32_t mode, vvec3 v) {
+    const uint32_t way = mode & 3u;
+    const bool is_point = mode & TRC_TRANSFORM_POINT;
+    struct trc_wide_affine a;
+    if (way == TRC_TRANSFORM_WORLD_TO_CAMERA || way == TRC_TRANSFORM_CAMERA_TO_WORLD) {
+        if (way == TRC_TRANSFORM_WORLD_TO_CAMERA)
+            load_world_to_camera(s->snapshot, &a);
+        else
+            load_camera_to_world(s->snapshot, &a);
+        return is_point ? trc_transform_point(&a, v) : trc_transform_vector(&a, v);
+    }
+    vvec3 out = v;
+    struct lane_group g = groups_begin(s);
+    while (groups_next(s, &g)) {
+        if (!g.instance)
+            continue;
+        if (way == TRC_TRANSFORM_WORLD_TO_OBJECT)
+            load_world_to_object(&g, s->time, &a);
+        else
+            trc_load_affine(g.instance, s->time, &a);
+        const vvec3 moved = is_point ? trc_transform_point(&a, v) : trc_transform_vector(&a, v);
+        out = v3_select(g.lanes, moved, out);
+    }
+    return out;
+}
+
+/* 1 within half the size of an edge of the triangle, both in world space. */
+static vfloat op_wireframe(const struct trc_surface *s, vfloat size) {
+    const vfloat reach2 = vf_square(size * vf_set(0.5f));
+    vmask out = vm_none();
+    struct lane_group g = groups_begin(s);
+    while (groups_next(s, &g)) {
+        if (!g.mesh)
+            continue;
+        vint index[3];
+        struct trc_corners c;
+        struct trc_wide_affine a;
+        trc_load_indices(g.mesh, s->triangle, g.lanes, index);
+        trc_load_vectors(g.mesh->positions, index, g.mesh->vertex_count, g.mesh->key_count, s->time,
+                         g.lanes, &c);
+        trc_load_affine(g.instance, s->time, &a);
+        for (int k = 0; k < 3; k++)
+            c.corner[k] = trc_transform_point(&a, c.corner[k]);
+        for (int k = 0; k < 3; k++) {
+            const vvec3 edge = v3_sub(c.corner[k], c.corner[(k + 2) % 3]);
+            const vvec3 across = v3_cross(edge, v3_sub(s->p, c.corner[k]));
+            const vmask near = vf_lt(v3_dot(across, across), v3_dot(edge, edge) * reach2);
+            out = vm_or(out, vm_and(g.lanes, near));
+        }
+    }
+    return vf_truth(out);
 }
 
 TRC_INLINE vvec3 op_reflection(const struct trc_surface *s) {

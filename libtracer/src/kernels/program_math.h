@@ -33,6 +33,8 @@ static vfloat math_wrap(vfloat value, vfloat high, vfloat low) {
     return vf_select(vf_ne(range, vf_zero()), wrapped, low);
 }
 
+TRC_INLINE vfloat math_snap(vfloat a, vfloat b) { return vf_floor(vf_divide(a, b)) * b; }
+
 static vfloat math_ping_pong(vfloat a, vfloat b) {
     const vfloat x = (a - b) / (b * vf_set(2.0f));
     const vfloat folded = vf_abs((x - vf_floor(x)) * b * vf_set(2.0f) - b);
@@ -131,7 +133,7 @@ static vfloat op_math(uint32_t mode, vfloat a, vfloat b, vfloat c) {
     case TRC_MATH_WRAP:
         return math_wrap(a, b, c);
     case TRC_MATH_SNAP:
-        return vf_floor(vf_divide(a, b)) * b;
+        return math_snap(a, b);
     case TRC_MATH_PINGPONG:
         return math_ping_pong(a, b);
     case TRC_MATH_SINE:
@@ -199,6 +201,17 @@ static vvec3 vector_reflect(vvec3 a, vvec3 b) {
     return v3_sub(a, v3_scale(v3_scale(n, vf_set(2.0f)), v3_dot(a, n)));
 }
 
+/* Bent at a surface of normal b, both made unit; 0 where all is reflected. */
+static vvec3 vector_refract(vvec3 a, vvec3 b, vfloat ior) {
+    const vvec3 i = v3_normalize(a), n = v3_normalize(b);
+    const vfloat cosine = v3_dot(n, i), one = vf_one();
+    const vfloat k = one - ior * ior * (one - cosine * cosine);
+    const vfloat along = ior * cosine + vf_safe_sqrt(k);
+    const vmask reflected = vf_lt(k, vf_zero());
+    return v3_select(reflected, v3_zero(), v3_sub(v3_scale(i, ior), v3_scale(n, along)));
+}
+
+
 static vvec3 op_vector_math(uint32_t mode, vvec3 a, vvec3 b, vvec3 c, vfloat scale) {
     switch (mode) {
     case TRC_VECTOR_ADD:
@@ -233,6 +246,22 @@ static vvec3 op_vector_math(uint32_t mode, vvec3 a, vvec3 b, vvec3 c, vfloat sca
         return v3(vf_ceil(a.x), vf_ceil(a.y), vf_ceil(a.z));
     case TRC_VECTOR_FRACT:
         return v3_sub(a, v3_floor(a));
+    case TRC_VECTOR_SINE:
+        return v3(vf_sin(a.x), vf_sin(a.y), vf_sin(a.z));
+    case TRC_VECTOR_COSINE:
+        return v3(vf_cos(a.x), vf_cos(a.y), vf_cos(a.z));
+    case TRC_VECTOR_TANGENT:
+        return v3(vf_tan(a.x), vf_tan(a.y), vf_tan(a.z));
+    case TRC_VECTOR_SNAP:
+        return v3(math_snap(a.x, b.x), math_snap(a.y, b.y), math_snap(a.z, b.z));
+    case TRC_VECTOR_MODULO:
+        return v3(math_modulo(a.x, b.x), math_modulo(a.y, b.y), math_modulo(a.z, b.z));
+    case TRC_VECTOR_WRAP:
+        return v3(math_wrap(a.x, b.x, c.x), math_wrap(a.y, b.y, c.y), math_wrap(a.z, b.z, c.z));
+    case TRC_VECTOR_FACEFORWARD:
+        return v3_select(vf_lt(v3_dot(c, b), vf_zero()), a, v3_neg(a));
+    case TRC_VECTOR_REFRACT:
+        return vector_refract(a, b, scale);
     default:
         return v3_zero();
     }
@@ -260,6 +289,19 @@ static void op_rotation(const vfloat *in, vfloat *out) {
     v3_write(out, v3(cy * cz, sy * sx * cz - cx * sz, sy * cx * cz + sx * sz));
     v3_write(out + 3, v3(cy * sz, sy * sx * sz + cx * cz, sy * cx * sz - sx * cz));
     v3_write(out + 6, v3(-sy, cy * sx, cy * cx));
+}
+
+/* Rotation about an axis of any length; none about 0. */
+static void op_axis_rotation(vvec3 axis, vfloat angle, vfloat *out) {
+    const vvec3 a = v3_normalize(axis);
+    vfloat s, c;
+    vf_sincos(angle, &s, &c);
+    const vmask valid = vf_gt(v3_dot(axis, axis), vf_zero());
+    c = vf_select(valid, c, vf_one());
+    const vvec3 t = v3_scale(a, vf_one() - c);
+    v3_write(out, v3(c + a.x * t.x, a.x * t.y - s * a.z, a.x * t.z + s * a.y));
+    v3_write(out + 3, v3(a.x * t.y + s * a.z, c + a.y * t.y, a.y * t.z - s * a.x));
+    v3_write(out + 6, v3(a.x * t.z - s * a.y, a.y * t.z + s * a.x, c + a.z * t.z));
 }
 
 /* The Mapping node: 0 point, 1 texture (the inverse), 2 vector, 3 normal. */

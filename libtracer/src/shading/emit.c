@@ -149,7 +149,7 @@ static void write_op(const struct registers *r, const struct trc_build_op *o,
         .out = r->reg[o->first_value],
         .input_count = (uint16_t)count,
         .first_input = m->operand_count,
-        .resource = o->op == TRC_OP_RAMP ? copy_table(r->b, o->resource, m) : o->resource,
+        .resource = trc_op_has_table(o->op) ? copy_table(r->b, o->resource, m) : o->resource,
     };
     for (uint32_t k = 0; k < count; k++)
         m->operands[m->operand_count++] = placed(r, in[k]);
@@ -178,7 +178,7 @@ static trc_status make_room(const struct trc_build *b, struct trc_material *m) {
             continue;
         ops++;
         operands += trc_op_inputs(b->ops[i].op);
-        if (b->ops[i].op == TRC_OP_RAMP)
+        if (trc_op_has_table(b->ops[i].op))
             tables = b->table_count;
     }
     m->operands = operands ? trc_alloc(operands, sizeof *m->operands) : NULL;

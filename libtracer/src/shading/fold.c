@@ -51,7 +51,7 @@ static void fold(const struct trc_build *b, uint32_t op, uint32_t mode, uint32_t
     float in[TRC_OP_MAX_INPUTS] = {0}, out[TRC_OP_MAX_OUTPUTS] = {0};
     for (uint32_t i = 0; i < op_infos[op].inputs; i++)
         in[i] = inputs[i].value;
-    trc_program_fold_scalar(op, mode, op == TRC_OP_RAMP ? b->tables + resource : NULL, in, out);
+    trc_program_fold_scalar(op, mode, trc_op_has_table(op) ? b->tables + resource : NULL, in, out);
     for (uint32_t i = 0; i < op_infos[op].outputs; i++)
         outputs[i] = trc_constant(out[i]);
 }

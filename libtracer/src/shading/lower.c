@@ -231,12 +231,13 @@ static trc_status lower_vector_math(const struct lowering *l) {
     memcpy(in, l->in, 3 * sizeof *in);
     const bool is_unary = mode == TRC_VECTOR_LENGTH || mode == TRC_VECTOR_SCALE ||
                           mode == TRC_VECTOR_NORMALIZE || mode == TRC_VECTOR_ABSOLUTE ||
-                          mode >= TRC_VECTOR_FLOOR;
+                          (mode >= TRC_VECTOR_FLOOR && mode <= TRC_VECTOR_TANGENT);
     if (!is_unary)
         memcpy(in + 3, l->in + 3, 3 * sizeof *in);
-    if (mode == TRC_VECTOR_MULTIPLY_ADD)
+    if (mode == TRC_VECTOR_MULTIPLY_ADD || mode == TRC_VECTOR_WRAP ||
+        mode == TRC_VECTOR_FACEFORWARD)
         memcpy(in + 6, l->in + 6, 3 * sizeof *in);
-    if (mode == TRC_VECTOR_SCALE)
+    if (mode == TRC_VECTOR_SCALE || mode == TRC_VECTOR_REFRACT)
         in[9] = l->in[9];
     for (int i = 0; i < 4; i++)
         l->out[i] = zero;
@@ -253,6 +254,85 @@ static trc_status lower_components(const struct lowering *l, uint32_t code) {
         return op(l->b, code, mode, l->in, l->out);
     memcpy(l->out, l->in, 3 * sizeof *l->in);
     return TRC_OK;
+}
+
+/* Each channel by its curve, mixed with what came in by the factor. */
+static trc_status lower_curves(const struct lowering *l, uint32_t table) {
+    const uint32_t channels = l->node->type == TRC_NODE_CURVES ? 3 : 1;
+    const uint32_t mode = l->node->mode ? TRC_CURVE_EXTRAPOLATE : 0u;
+    const struct trc_operand none = trc_constant(0.0f), factor = l->in[0];
+    for (uint32_t i = 0; i < channels; i++) {
+        const struct trc_operand value = l->in[1 + i];
+        const struct trc_operand in[3] = {value, l->in[1 + channels], l->in[2 + channels]};
+        struct trc_operand change;
+        TRC_TRY(trc_build_op(l->b, TRC_OP_CURVE, mode | i, table, in, l->out + i));
+        if (trc_is_value(factor, 1.0f))
+            continue;
+        TRC_TRY(trc_build_math(l->b, TRC_MATH_SUBTRACT, l->out[i], value, none, &change));
+        TRC_TRY(trc_build_math(l->b, TRC_MATH_MULTIPLY_ADD, change, factor, value, l->out + i));
+    }
+    return TRC_OK;
+}
+
+/* A VECTOR_MATH of two vectors. */
+static trc_status combine(struct trc_build *b, uint32_t mode, const struct trc_operand *x,
+                          const struct trc_operand *y, struct trc_operand *out) {
+    struct trc_operand in[10];
+    for (int i = 0; i < 10; i++)
+        in[i] = trc_constant(0.0f);
+    memcpy(in, x, 3 * sizeof *in);
+    if (y)
+        memcpy(in + 3, y, 3 * sizeof *in);
+    return op(b, TRC_OP_VECTOR_MATH, mode, in, out);
+}
+
+/* By way of world space. */
+static trc_status lower_vector_transform(const struct lowering *l) {
+    const uint32_t from = l->node->mode & 3u, to = l->node->mode >> 2 & 3u;
+    const uint32_t type = l->node->mode >> 4, point = type == 0 ? TRC_TRANSFORM_POINT : 0u;
+    memcpy(l->out, l->in, 3 * sizeof *l->in);
+    if (from != to && from != TRC_SPACE_WORLD) {
+        const uint32_t way = from == TRC_SPACE_OBJECT ? TRC_TRANSFORM_OBJECT_TO_WORLD
+                                                      : TRC_TRANSFORM_CAMERA_TO_WORLD;
+        TRC_TRY(op(l->b, TRC_OP_TRANSFORM, way | point, l->out, l->out));
+    }
+    if (from != to && to != TRC_SPACE_WORLD) {
+        const uint32_t way = to == TRC_SPACE_OBJECT ? TRC_TRANSFORM_WORLD_TO_OBJECT
+                                                    : TRC_TRANSFORM_WORLD_TO_CAMERA;
+        TRC_TRY(op(l->b, TRC_OP_TRANSFORM, way | point, l->out, l->out));
+    }
+    return type == 2 ? combine(l->b, TRC_VECTOR_NORMALIZE, l->out, NULL, l->out) : TRC_OK;
+}
+
+/* in: vector, center, axis, angle, rotation */
+static trc_status lower_vector_rotate(const struct lowering *l) {
+    struct trc_operand in[TRC_OP_MAX_INPUTS], axis[4];
+    const uint32_t kind = l->node->mode & 7u;
+    const bool is_inverse = l->node->mode & 8u;
+    for (int i = 0; i < 9; i++)
+        in[i] = trc_constant(i < 6 ? 0.0f : 1.0f);
+    TRC_TRY(combine(l->b, TRC_VECTOR_SUBTRACT, l->in, l->in + 3, in));
+    if (kind == TRC_ROTATE_EULER) {
+        TRC_TRY(op(l->b, TRC_OP_ROTATION, 0, l->in + 10, in + 9));
+    } else {
+        for (uint32_t i = 0; i < 3; i++)
+            axis[i] = kind ? trc_constant(i + 1 == kind ? 1.0f : 0.0f) : l->in[6 + i];
+        axis[3] = l->in[9];
+        TRC_TRY(op(l->b, TRC_OP_AXIS_ROTATION, 0, axis, in + 9));
+    }
+    /* Modes of Mapping: 1 turns back, 2 turns. */
+    TRC_TRY(op(l->b, TRC_OP_MAPPING, is_inverse ? 1 : 2, in, l->out));
+    return combine(l->b, TRC_VECTOR_ADD, l->out, l->in + 3, l->out);
+}
+
+static trc_status lower_camera_data(const struct lowering *l) {
+    struct trc_operand seen[6];
+    TRC_TRY(op(l->b, TRC_OP_CAMERA_POSITION, 0, NULL, seen));
+    for (int i = 3; i < 6; i++)
+        seen[i] = trc_constant(0.0f);
+    l->out[3] = seen[2];
+    TRC_TRY(op(l->b, TRC_OP_VECTOR_MEASURE, TRC_VECTOR_LENGTH, seen, l->out + 4));
+    return combine(l->b, TRC_VECTOR_NORMALIZE, seen, NULL, l->out);
 }
 
 /* Long because it is the list of node types. */
@@ -310,6 +390,22 @@ static trc_status lower_node(const struct lowering *l) {
     case TRC_NODE_COLOR_RAMP:
         TRC_TRY(table_of(l, &resource));
         return trc_build_op(b, TRC_OP_RAMP, mode, resource, l->in, l->out);
+    case TRC_NODE_CURVES:
+    case TRC_NODE_FLOAT_CURVE:
+        TRC_TRY(table_of(l, &resource));
+        return lower_curves(l, resource);
+    case TRC_NODE_BLACKBODY:
+        return op(b, TRC_OP_BLACKBODY, 0, l->in, l->out);
+    case TRC_NODE_WAVELENGTH:
+        return op(b, TRC_OP_WAVELENGTH, 0, l->in, l->out);
+    case TRC_NODE_VECTOR_TRANSFORM:
+        return lower_vector_transform(l);
+    case TRC_NODE_VECTOR_ROTATE:
+        return lower_vector_rotate(l);
+    case TRC_NODE_CAMERA_DATA:
+        return lower_camera_data(l);
+    case TRC_NODE_WIREFRAME:
+        return op(b, TRC_OP_WIREFRAME, 0, l->in, l->out);
     case TRC_NODE_SEPARATE:
         return lower_components(l, TRC_OP_SEPARATE);
     case TRC_NODE_COMBINE:

@@ -65,6 +65,15 @@ static const struct trc_node_info infos[] = {
      "vector color1 color2 mortar scale mortar_size mortar_smooth bias brick_width row_height "
      "offset squash",
      "cf"},
+
+    {TRC_NODE_CURVES, "Curves", "fcff", "factor color low high", "c"},
+    {TRC_NODE_FLOAT_CURVE, "Float Curve", "ffff", "factor value low high", "f"},
+    {TRC_NODE_BLACKBODY, "Blackbody", "f", "temperature", "c"},
+    {TRC_NODE_WAVELENGTH, "Wavelength", "f", "wavelength", "c"},
+    {TRC_NODE_VECTOR_TRANSFORM, "Vector Transform", "c", "vector", "v"},
+    {TRC_NODE_VECTOR_ROTATE, "Vector Rotate", "cccfc", "vector center axis angle rotation", "v"},
+    {TRC_NODE_CAMERA_DATA, "Camera Data", "", "", "vff"},
+    {TRC_NODE_WIREFRAME, "Wireframe", "f", "size", "f"},
 };
 
 const struct trc_node_info *trc_node_info_of(uint32_t type) {
@@ -116,7 +125,7 @@ bool trc_node_mode_is_valid(uint32_t type, uint32_t mode) {
     case TRC_NODE_CLAMP:
         return mode <= 1;
     case TRC_NODE_VECTOR_MATH:
-        return mode <= TRC_VECTOR_FRACT;
+        return mode <= TRC_VECTOR_REFRACT;
     case TRC_NODE_NOISE:
         return mode >> TRC_NOISE_TYPE_SHIFT <= TRC_FRACTAL_RIDGED_MULTIFRACTAL;
     case TRC_NODE_MUSGRAVE:
@@ -131,6 +140,14 @@ bool trc_node_mode_is_valid(uint32_t type, uint32_t mode) {
         return mode <= TRC_GRADIENT_SPHERICAL;
     case TRC_NODE_WHITE_NOISE:
         return mode <= 3;
+    case TRC_NODE_CURVES:
+    case TRC_NODE_FLOAT_CURVE:
+        return mode <= 1;
+    case TRC_NODE_VECTOR_TRANSFORM:
+        return (mode & 3u) <= TRC_SPACE_CAMERA && (mode >> 2 & 3u) <= TRC_SPACE_CAMERA &&
+               mode >> 4 <= 2;
+    case TRC_NODE_VECTOR_ROTATE:
+        return (mode & ~8u) <= TRC_ROTATE_EULER;
     case TRC_NODE_MAGIC:
         return mode <= 10;
     case TRC_NODE_BRICK:

@@ -6,6 +6,7 @@
 #ifndef TRACER_SHADING_PROGRAM_H
 #define TRACER_SHADING_PROGRAM_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "shading/material.h"
@@ -51,6 +52,8 @@
     X(LAYER_FRESNEL, 4, 1, 0) /* blend, normal */                                          \
     X(LAYER_FACING, 4, 1, 0)  /* blend, normal */                                          \
     X(NORMAL_MAP, 4, 3, 0)    /* strength, color; mode: space; resource: name */           \
+    X(TRANSFORM, 3, 3, 0)     /* vector; mode: TRC_TRANSFORM_* */                          \
+    X(WIREFRAME, 1, 1, 0)     /* size */                                                   \
     /* textures */                                                                         \
     X(IMAGE, 2, 4, 0)     /* u, v; mode: TRC_IMAGE_MODE_*; resource: image; RGBA */        \
     X(IMAGE_BOX, 3, 4, 0) /* vector; the same */                                           \
@@ -79,6 +82,9 @@
     X(VECTOR_MEASURE, 6, 1, 1) /* a, b; mode: TRC_VECTOR_DOT, DISTANCE, LENGTH */          \
     X(ROTATION, 3, 9, 1)       /* Euler angles XYZ -> rows of the matrix */                \
     X(MAPPING, 18, 3, 1)       /* vector, location, scale, rows; mode as the node's */     \
+    X(AXIS_ROTATION, 4, 9, 1)  /* axis, angle -> rows of the matrix */                     \
+    X(CURVE, 3, 1, 1)          /* value, low, high; resource: first float in tables;       \
+                                  mode: channel, TRC_CURVE_EXTRAPOLATE */                  \
     /* colours */                                                                          \
     X(MIX, 7, 3, 1)             /* factor, a, b; mode: TRC_BLEND_* */                      \
     X(SATURATE, 3, 3, 1)        /* each to [0, 1] */                                       \
@@ -89,6 +95,8 @@
     X(HUE_SATURATION, 7, 3, 1)  /* hue, saturation, value, factor, color */                \
     X(BRIGHT_CONTRAST, 5, 3, 1) /* color, bright, contrast */                              \
     X(RAMP, 1, 4, 1)            /* resource: first float in tables; mode 1: steps; RGBA */ \
+    X(BLACKBODY, 1, 3, 1)       /* kelvin */                                               \
+    X(WAVELENGTH, 1, 3, 1)      /* nanometres */                                           \
     X(SEPARATE, 3, 3, 1)        /* mode: TRC_SEPARATE_HSV, HSL */                          \
     X(COMBINE, 3, 3, 1)
 
@@ -106,6 +114,18 @@ enum trc_op {
 #define TRC_IMAGE_MODE_ALPHA (1u << 4) /* the alpha is used too: colours are divided by it */
 
 enum { TRC_PROJECT_EQUIRECTANGULAR, TRC_PROJECT_MIRROR_BALL, TRC_PROJECT_SPHERE, TRC_PROJECT_TUBE };
+
+/* TRC_OP_CURVE: straight on beyond the ends of the table. */
+#define TRC_CURVE_EXTRAPOLATE 4u
+
+/* Modes of TRC_OP_TRANSFORM; points are moved too, vectors only turned and scaled. */
+enum {
+    TRC_TRANSFORM_OBJECT_TO_WORLD,
+    TRC_TRANSFORM_WORLD_TO_OBJECT,
+    TRC_TRANSFORM_WORLD_TO_CAMERA,
+    TRC_TRANSFORM_CAMERA_TO_WORLD,
+    TRC_TRANSFORM_POINT = 4 /* bit */
+};
 
 /* Set where nothing reads the colour of an operation whose colour costs extra. */
 #define TRC_MODE_NO_COLOR (1u << 15)
@@ -134,7 +154,12 @@ enum {
     TRC_PATH_OUTPUTS
 };
 
-/* Runs a pure operation once: out gets its outputs. table: of TRC_OP_RAMP, else unused.
+/* Whether the resource of an operation is a table. */
+static inline bool trc_op_has_table(uint32_t op) {
+    return op == TRC_OP_RAMP || op == TRC_OP_CURVE;
+}
+
+/* Runs a pure operation once: out gets its outputs. table: if trc_op_has_table.
  * (kernels/program.c, scalar build) */
 void trc_program_fold_scalar(uint32_t op, uint32_t mode, const float *table, const float *in,
                              float *out);

@@ -67,8 +67,10 @@ static trc_status check_input(const trc_material_desc *desc, const struct place 
 }
 
 static trc_status check_table(const trc_node *node, const struct place *at) {
-    if (node->type != TRC_NODE_COLOR_RAMP)
+    if (node->type != TRC_NODE_COLOR_RAMP && node->type != TRC_NODE_CURVES &&
+        node->type != TRC_NODE_FLOAT_CURVE) {
         return TRC_OK;
+    }
     if (!node->table || (uintptr_t)node->table % sizeof(float) ||
         node->table_count != 4 * TRC_RAMP_SIZE) {
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT,

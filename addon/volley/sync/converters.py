@@ -1,0 +1,195 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Curves, ranges, vectors between spaces and other single-purpose nodes in the library's terms.
+
+Functions as in ``textures.py``: of the walker, the node and its ``Sockets``.
+"""
+
+import numpy as np
+
+from .values import CONSTANT, DEFAULT, Value
+
+# TRC_NODE_*
+CURVES, FLOAT_CURVE, BLACKBODY, WAVELENGTH, VECTOR_TRANSFORM, VECTOR_ROTATE, CAMERA_DATA, \
+    WIREFRAME = range(104, 112)
+_MATH, _LIGHT_PATH, _GEOMETRY, _SEPARATE, _COMBINE, _MAP_RANGE = 71, 74, 75, 82, 83, 84
+
+# TRC_MATH_*
+_ADD, _SUBTRACT, _MULTIPLY, _DIVIDE, _MULTIPLY_ADD, _FLOOR = 0, 1, 2, 3, 4, 20
+_CLAMP_RESULT = 256
+_RAY_LENGTH = 7  # output of the Light Path node
+_TABLE_SIZE = 256
+
+_SPACES = ('WORLD', 'OBJECT', 'CAMERA')
+_TRANSFORMS = ('POINT', 'VECTOR', 'NORMAL')
+_ROTATIONS = ('AXIS_ANGLE', 'X_AXIS', 'Y_AXIS', 'Z_AXIS', 'EULER_XYZ')
+
+
+def _constant(kind, *values):
+    return Value(kind, CONSTANT, 0, tuple(values) + (0.0,) * (3 - len(values)))
+
+
+def _number(walker, operation, *values, clamped=False):
+    """The result of a Math node on values and plain numbers."""
+    values = [v if isinstance(v, Value) else _constant('f', v) for v in values]
+    values += [_constant('f', 0.0)] * (3 - len(values))
+    return Value('f', walker.emit(_MATH, values, operation | (_CLAMP_RESULT if clamped else 0)), 0)
+
+
+# Curves --------------------------------------------------------------------------------------------
+
+def _table(mapping, count):
+    """A curve mapping as a table of RGBA, its range, and whether it goes on straight beyond. Of four
+    curves the last comes first, and for all channels."""
+    mapping.initialize()
+    curves = list(mapping.curves)[:count]
+    low = min(curve.points[0].location[0] for curve in curves)
+    high = max(curve.points[-1].location[0] for curve in curves)
+    table = np.zeros((_TABLE_SIZE, 4), np.float32)
+    for i, x in enumerate(np.linspace(low, high, _TABLE_SIZE)):
+        if count == 4:
+            x = mapping.evaluate(curves[3], x)
+        for channel, curve in enumerate(curves[:3]):
+            table[i, channel] = mapping.evaluate(curve, x)
+    return table.reshape(-1), (_constant('f', low), _constant('f', high)), \
+        int(mapping.extend == 'EXTRAPOLATED')
+
+
+def _color_curves(count, name):
+    def translate(walker, node, sockets):
+        table, span, mode = _table(node.mapping, count)
+        kind = 'c' if count == 4 else 'v'
+        values = (sockets.get('f', "Fac"), sockets.get(kind, name), *span)
+        return {name: Value(kind, walker.emit(CURVES, values, mode, table=table), 0)}
+    return translate
+
+
+def _float_curve(walker, node, sockets):
+    table, span, mode = _table(node.mapping, 1)
+    values = (sockets.get('f', "Factor"), sockets.get('f', "Value"), *span)
+    return {"Value": Value('f', walker.emit(FLOAT_CURVE, values, mode, table=table), 0)}
+
+
+def _blackbody(walker, _node, sockets):
+    return {"Color": Value('c', walker.emit(BLACKBODY, (sockets.get('f', "Temperature"),)), 0)}
+
+
+def _wavelength(walker, _node, sockets):
+    return {"Color": Value('c', walker.emit(WAVELENGTH, (sockets.get('f', "Wavelength"),)), 0)}
+
+
+# Ranges --------------------------------------------------------------------------------------------
+
+def _ranged(walker, node, value, source, target, steps):
+    """A number from a source range to a target range."""
+    if node.interpolation_type == 'LINEAR':
+        mode = _CLAMP_RESULT if node.clamp else 0
+        return Value('f', walker.emit(_MAP_RANGE, (value, *source, *target), mode), 0)
+    unit = (_constant('f', 0.0), _constant('f', 1.0))
+    t = Value('f', walker.emit(_MAP_RANGE, (value, *source, *unit), 0), 0)
+    if node.interpolation_type == 'STEPPED':
+        whole = _number(walker, _FLOOR, _number(walker, _MULTIPLY, t, _number(walker, _ADD, steps, 1.0)))
+        t = _number(walker, _DIVIDE, whole, steps)
+    else:
+        t = _number(walker, _ADD, t, 0.0, clamped=True)
+        square = _number(walker, _MULTIPLY, t, t)
+        if node.interpolation_type == 'SMOOTHSTEP':
+            t = _number(walker, _MULTIPLY, square, _number(walker, _MULTIPLY_ADD, t, -2.0, 3.0))
+        else:
+            inner = _number(walker, _MULTIPLY_ADD, t, 6.0, -15.0)
+            inner = _number(walker, _MULTIPLY_ADD, t, inner, 10.0)
+            t = _number(walker, _MULTIPLY, _number(walker, _MULTIPLY, square, t), inner)
+    mode = _CLAMP_RESULT if node.clamp and node.interpolation_type == 'STEPPED' else 0
+    return Value('f', walker.emit(_MAP_RANGE, (t, *unit, *target), mode), 0)
+
+
+def _map_range(walker, node, sockets):
+    if node.interpolation_type not in {'LINEAR', 'STEPPED', 'SMOOTHSTEP', 'SMOOTHERSTEP'}:
+        return None
+    if getattr(node, "data_type", 'FLOAT') == 'FLOAT':
+        value, *ranges = [sockets.get('f', name) for name in (
+            "Value", "From Min", "From Max", "To Min", "To Max")]
+        steps = sockets.get('f', "Steps")
+        return {"Result": _ranged(walker, node, value, ranges[:2], ranges[2:], steps)}
+    names = ("Vector", "From_Min_FLOAT3", "From_Max_FLOAT3", "To_Min_FLOAT3", "To_Max_FLOAT3",
+             "Steps_FLOAT3")
+    separate = [walker.emit(_SEPARATE, (sockets.get('v', name),)) for name in names]
+    parts = []
+    for axis in range(3):
+        value, *ranges, steps = [Value('f', index, axis) for index in separate]
+        parts.append(_ranged(walker, node, value, ranges[:2], ranges[2:], steps))
+    return {"Vector": Value('v', walker.emit(_COMBINE, parts), 0)}
+
+
+# Vectors -------------------------------------------------------------------------------------------
+
+def _vector_transform(walker, node, sockets):
+    mode = (_SPACES.index(node.convert_from) | _SPACES.index(node.convert_to) << 2
+            | _TRANSFORMS.index(node.vector_type) << 4)
+    index = walker.emit(VECTOR_TRANSFORM, (sockets.get('v', "Vector"),), mode)
+    return {"Vector": Value('v', index, 0)}
+
+
+def _vector_rotate(walker, node, sockets):
+    vector = sockets.get('v', "Vector")
+    if vector.node == DEFAULT:
+        vector = _constant('v')
+    values = (vector, sockets.get('v', "Center"), sockets.get('v', "Axis"), sockets.get('f', "Angle"),
+              sockets.get('v', "Rotation"))
+    mode = _ROTATIONS.index(node.rotation_type) | (8 if node.invert else 0)
+    return {"Vector": Value('v', walker.emit(VECTOR_ROTATE, values, mode), 0)}
+
+
+# Inputs --------------------------------------------------------------------------------------------
+
+def _camera_data(walker, _node, _sockets):
+    index = walker.emit(CAMERA_DATA, ())
+    return {"View Vector": Value('v', index, 0), "View Z Depth": Value('f', index, 1),
+            "View Distance": Value('f', index, 2)}
+
+
+def _wireframe(walker, node, sockets):
+    if node.use_pixel_size:
+        return None
+    return {"Fac": Value('f', walker.emit(WIREFRAME, (sockets.get('f', "Size"),)), 0)}
+
+
+def _light_falloff(walker, _node, sockets):
+    """Strength times powers of the ray's length, since light fades with its square; faint nearby where
+    it is smooth."""
+    strength, smooth = sockets.get('f', "Strength"), sockets.get('f', "Smooth")
+    length = Value('f', walker.emit(_LIGHT_PATH, ()), _RAY_LENGTH)
+    square = _number(walker, _MULTIPLY, length, length)
+    if smooth.node != CONSTANT or smooth.constant[0] > 0.0:
+        share = _number(walker, _DIVIDE, square, _number(walker, _ADD, square, smooth))
+        strength = _number(walker, _MULTIPLY, strength, share)
+    return {"Quadratic": strength, "Linear": _number(walker, _MULTIPLY, strength, length),
+            "Constant": _number(walker, _MULTIPLY, strength, square)}
+
+
+def _ambient_occlusion(walker, _node, sockets):
+    walker.warn("Ambient Occlusion is approximated: nothing is taken to be near")
+    return {"Color": sockets.get('c', "Color"), "AO": _constant('f', 1.0)}
+
+
+def _bevel(walker, _node, sockets):
+    walker.warn("Bevel is approximated by the normal as it is")
+    normal = sockets.get('v', "Normal")
+    if normal.node == DEFAULT:
+        normal = Value('v', walker.emit(_GEOMETRY, ()), 1)
+    return {"Normal": normal}
+
+
+def _particle_info(walker, node, _sockets):
+    walker.warn("Particle Info is not supported, 0 is used")
+    return {s.identifier: _constant('v' if s.type == 'VECTOR' else 'f') for s in node.outputs}
+
+
+CONVERTERS = {
+    "ShaderNodeRGBCurve": _color_curves(4, "Color"), "ShaderNodeVectorCurve": _color_curves(3, "Vector"),
+    "ShaderNodeFloatCurve": _float_curve, "ShaderNodeBlackbody": _blackbody,
+    "ShaderNodeWavelength": _wavelength, "ShaderNodeMapRange": _map_range,
+    "ShaderNodeVectorTransform": _vector_transform, "ShaderNodeVectorRotate": _vector_rotate,
+    "ShaderNodeCameraData": _camera_data, "ShaderNodeWireframe": _wireframe,
+    "ShaderNodeLightFalloff": _light_falloff, "ShaderNodeAmbientOcclusion": _ambient_occlusion,
+    "ShaderNodeBevel": _bevel, "ShaderNodeParticleInfo": _particle_info,
+}
