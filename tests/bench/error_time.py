@@ -253,7 +253,7 @@ def slope(samples, errors):
     >>> round(slope([1, 4, 16], [1.0, 0.25, 0.0625]), 12)
     -1.0
     """
-    if min(errors) <= 0.0:
+    if len(errors) < 2 or min(errors) <= 0.0:
         return None
     return float(np.polyfit(np.log(samples), np.log(errors), 1)[0])
 

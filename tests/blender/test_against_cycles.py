@@ -311,6 +311,63 @@ def test_generated_coordinates(blender):
     assert viewport[:, 2].reshape(13, 4) == pytest.approx(np.repeat(np.linspace(0, 1, 13), 4).reshape(13, 4))
 
 
+def inside_shutter():
+    """Rows of a picture that an edge crosses while the shutter is open, by both engines, for a box and
+    for a shutter that opens slowly; a pixel is the share of the light that it saw the wall in."""
+    import bpy
+    import scenes
+    scene = scenes.empty(size=(128, 4))
+    scenes.camera(type='ORTHO', ortho_scale=4.0)
+    moving = scenes.wall("Wall", 8.0, 0.0, (-4.0, 0.0), scenes.emitter((1.0, 1.0, 1.0)))
+    for frame, x in ((0, -3.6), (2, 3.6)):
+        moving.location.x = x
+        moving.keyframe_insert("location", frame=frame)
+    for key in moving.animation_data.action.fcurves[0].keyframe_points:
+        key.interpolation = 'LINEAR'
+    scene.frame_set(1)
+    scene.render.use_motion_blur, scene.render.motion_blur_shutter = True, 1.0
+    box = _both(4096)
+    mapping = scene.render.motion_blur_shutter_curve
+    mapping.curves[0].points[0].location = (0.0, 0.1)
+    mapping.update()
+    return {"box": box, "opening": _both(4096)}
+
+
+def test_shutter(blender):
+    for shape, (ours, theirs) in blender.run(inside_shutter).items():
+        rows = [picture[..., 0].mean(axis=0) for picture in (ours, theirs)]
+        assert rows[1][3] > 0.99 and rows[1][-3] < 0.01, shape
+        assert np.abs(rows[0] - rows[1]).max() < 2e-3, shape
+        assert rows[0].mean() == pytest.approx(rows[1].mean(), abs=4e-4), shape
+
+
+def inside_turning():
+    """A shining bar that makes a third of a turn while it grows, before a camera that rolls."""
+    import math
+    import scenes
+    scene = scenes.empty(size=(64, 48))
+    made = scenes.camera()
+    bar = scenes.mesh("Bar", [(-2, 0, -0.3), (2, 0, -0.3), (2, 0, 0.3), (-2, 0, 0.3)], [(0, 1, 2, 3)],
+                      scenes.emitter((1.0, 0.5, 0.2)))
+    for moving, turn in ((bar, 60.0), (made, 15.0)):
+        for frame, sign in ((0, -1), (2, 1)):
+            moving.rotation_euler.y = sign * math.radians(turn)
+            moving.keyframe_insert("rotation_euler", frame=frame)
+            moving.scale.x = 1.0 + 0.2 * sign
+            if moving is bar:
+                moving.keyframe_insert("scale", frame=frame)
+    scene.frame_set(1)
+    scene.render.use_motion_blur, scene.render.motion_blur_shutter = True, 1.0
+    return _both(512)
+
+
+def test_turning_does_not_shrink(blender):
+    ours, theirs = blender.run(inside_turning)
+    blocks = [picture.reshape(6, 8, 8, 8, 4).mean(axis=(1, 3)) for picture in (ours, theirs)]
+    assert blocks[1][..., 0].max() > 0.5
+    assert np.abs(blocks[0] - blocks[1]).max() < 4e-3
+
+
 # Light ---------------------------------------------------------------------------------------------
 
 def _stage():

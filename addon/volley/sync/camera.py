@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from .. import native
+from . import motion
 from .matrix import rows12
 
 VIEW_SENSOR_MM = 72.0  # the viewport's lens is meant for a sensor of twice Blender's default
@@ -172,10 +173,12 @@ def view_camera_zoom_factor(view_camera_zoom):
 
 def send(scene, keys, shutter_time=0.0, shutter_curve=None):
     """Give the camera to the library; equal keys are sent as one."""
-    transforms, windows = _collapse(keys.transforms), _collapse(keys.windows)
-    lens = keys.lens
-    if len(windows) > 1 and len(transforms) == 1:
-        transforms = [transforms[0]] * len(windows)
+    transforms = motion.follow_turns(np.asarray(_collapse(keys.transforms), np.float32))
+    windows, lens = _collapse(keys.windows), keys.lens
+    if len(windows) > 1:
+        if len(transforms) == 1:
+            transforms = np.repeat(transforms, len(windows), axis=0)
+        windows = motion.resample(windows, len(transforms))
     scene.set_camera(
         transforms, windows, shutter_curve,
         type=native.CAMERA_ORTHOGRAPHIC if lens.is_ortho else native.CAMERA_PERSPECTIVE,

@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 
 from .. import native
-from . import visibility
+from . import motion, visibility
 from .matrix import rows12
 
 
@@ -145,7 +145,7 @@ class Instances:
             self.scene.destroy_instance(self._entries.pop(key).id)
 
     def _update_one(self, item, mesh_id):
-        transforms = collapse(item.transforms)
+        transforms = motion.follow_turns(collapse(item.transforms))
         signature = (mesh_id, transforms.tobytes(), item.materials, item.visibility, item.pass_index,
                      item.random, item.color)
         entry = self._entries.get(item.key)
