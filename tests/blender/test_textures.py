@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every procedural texture and value node beside Cycles: wired to Emission on a plane, one sample for
-each pixel. The table of all errors goes to results/textures.txt of the build."""
+"""Every procedural texture and value node beside Cycles: each wired to Emission on a panel of
+its own, one sample for each pixel. The table of all errors goes to results/textures.txt of the build."""
 
 import os
 
 import numpy as np
 import pytest
 
-SIZE = 64      # pixels
-PIXEL = 1.0 / 16.0  # m
+GRID = 6             # panels along each side of a picture
+SIZE = 40            # pixels along each side of a panel
+PIXEL = 1.0 / 16.0   # m
+CELL = SIZE * PIXEL  # m
 TOLERANCE = 1e-3      # of a pixel, relative where the value is above 1
 SHARE_WITHIN = 0.995  # of the pixels; edges of cells may fall on either side
 
@@ -137,20 +139,29 @@ for _mode in ("RGB", "HSV", "HSL"):
 # Inside Blender ------------------------------------------------------------------------------------
 
 def _stage():
-    """A plane that fills an orthographic picture, and sharp pixels in both engines."""
-    import bpy
+    """A scene before an orthographic camera, with sharp pixels in both engines."""
     import scenes
-    scene = scenes.empty(size=(SIZE, SIZE), samples=1)
-    scenes.camera(location=(4.0 * PIXEL, -6.0, 3.0 * PIXEL), type='ORTHO', ortho_scale=SIZE * PIXEL)
-    plane = scenes.wall("Plane", size=3.0)
-    plane.location, plane.scale, plane.rotation_euler = (0.3, 0.0, 0.2), (2.0, 1.0, 2.2), (0.0, 0.4, 0.0)
-    material = bpy.data.materials.new("Tried")
-    material.use_nodes = True
-    plane.data.materials.append(material)
+    scene = scenes.empty(size=(GRID * SIZE, GRID * SIZE), samples=1)
+    scenes.camera(location=(0.0, -6.0, 0.0), type='ORTHO', ortho_scale=GRID * CELL, clip_start=1e-4)
     scene.volley.pixel_filter_type, scene.volley.filter_width = 'BOX', 0.01
     scene.cycles.pixel_filter_type = 'BOX'
     scene.cycles.filter_width = 0.01
-    return scene, material.node_tree
+
+
+def _panel(number):
+    """A plane that fills one cell of the picture, as an object that is moved, turned and scaled: its
+    material's tree, its middle."""
+    import bpy
+    import scenes
+    center = tuple((i - 0.5 * (GRID - 1)) * CELL for i in (number % GRID, number // GRID))
+    corners = [(-1, 0, -0.5), (-1, 0, 0.5), (1, 0, 0.5), (1, 0, -0.5)]
+    made = scenes.mesh(f"Panel{number}", corners, [(3, 2, 1, 0)])
+    made.location, made.rotation_euler = (center[0], 0.0, center[1]), (0.0, 0.5 * np.pi, 0.0)
+    made.scale = (0.5 * CELL, 1.0, CELL)
+    material = bpy.data.materials.new(f"Panel{number}")
+    material.use_nodes = True
+    made.data.materials.append(material)
+    return material.node_tree, (center[0], 0.0, center[1])
 
 
 def _node(tree, kind, *links, **settings):
@@ -166,12 +177,14 @@ def _node(tree, kind, *links, **settings):
     return made
 
 
-def _feed(tree, kind):
-    """The output that an input of that kind is linked to. Places are those of the pixels' corners, so
-    that both engines have the same whatever their samples are, turned to vary along all axes."""
+def _feed(tree, kind, center):
+    """The output that an input of that kind is linked to. Places are those of the pixels' corners from
+    the panel's middle, the same in both engines wherever in a pixel they sample, turned to vary along
+    all axes."""
     place = _node(tree, "ShaderNodeNewGeometry").outputs["Position"]
     step = (0.25, 0.0, 0.25) if kind in {'cells', 'whole'} else (PIXEL, 0.0, PIXEL)
     place = _node(tree, "ShaderNodeVectorMath", place, step, operation='SNAP').outputs[0]
+    place = _node(tree, "ShaderNodeVectorMath", place, center, operation='SUBTRACT').outputs[0]
     if kind == 'cells':
         parts = _node(tree, "ShaderNodeSeparateXYZ", place).outputs
         return _node(tree, "ShaderNodeCombineXYZ", parts["X"], parts["Z"], parts["X"]).outputs[0]
@@ -179,20 +192,20 @@ def _feed(tree, kind):
         return _node(tree, "ShaderNodeMapping", place, (0.1, 0.2, 0.3), (0.3, 0.5, 0.7)).outputs[0]
     if kind == 'color':
         return _node(tree, "ShaderNodeMapping", place, (0.5, 0.4, 0.6), (0.3, 0.5, 0.7),
-                     (0.3, 0.3, 0.3)).outputs[0]
+                     (0.2, 0.2, 0.2)).outputs[0]
     x = _node(tree, "ShaderNodeSeparateXYZ", place).outputs["X"]
     if kind in {'number', 'whole'}:
         return x
     low, high = kind
     ramp = _node(tree, "ShaderNodeMapRange", x, clamp=False)
-    for name, value in (("From Min", -2.0), ("From Max", 2.0), ("To Min", low), ("To Max", high)):
+    for name, value in (("From Min", -0.5 * CELL), ("From Max", 0.5 * CELL), ("To Min", low), ("To Max", high)):
         ramp.inputs[name].default_value = value
     return ramp.outputs[0]
 
 
-def _build(tree, case):
-    """The node of a case with its inputs; the socket whose values are shown, halved and raised by 2 for
-    neither engine's clamping to matter."""
+def _build(tree, center, case, output):
+    """The node of a case, shown by an emission of its output, halved and raised by 2 for neither
+    engine's clamping to matter."""
     node_type, properties, inputs, _ = case
     tree.nodes.clear()
     shown = _node(tree, "ShaderNodeVectorMath", None, (0.5,) * 3, (2.0,) * 3, operation='MULTIPLY_ADD')
@@ -212,34 +225,33 @@ def _build(tree, case):
         if socket is None:  # not in this mode
             continue
         if isinstance(value, str) or (isinstance(value, tuple) and len(value) == 2):
-            tree.links.new(_feed(tree, value), socket)
+            tree.links.new(_feed(tree, value, center), socket)
         elif isinstance(value, tuple) and len(value) == 3 and socket.type == 'RGBA':
             socket.default_value = (*value, 1.0)
         else:
             socket.default_value = value
-    return node, shown.inputs[0]
+    tree.links.new(next(s for s in node.outputs if s.name == output and s.enabled), shown.inputs[0])
 
 
 def inside_cases(names):
-    """{case: {output: (picture by Volley, picture by Cycles)}}."""
+    """{(case, output): (picture by Volley, picture by Cycles)}."""
     import bpy
     import scenes
-    _, tree = _stage()
+    known = [name for name in names if hasattr(bpy.types, CASES[name][0])]
+    shown = [(name, output) for name in known for output in CASES[name][3]]
     pictures = {}
-    for name in names:
-        case = CASES[name]
-        if not hasattr(bpy.types, case[0]):
-            continue
-        node, shown = _build(tree, case)
-        pictures[name] = {}
-        for output in case[3]:
-            socket = next(s for s in node.outputs if s.name == output and s.enabled)
-            tree.links.new(socket, shown)
-            pair = []
-            for engine in ('VOLLEY', 'CYCLES'):
-                scenes.set_engine(engine, 1)
-                pair.append((scenes.render()[..., :3] - 2.0) * 2.0)
-            pictures[name][output] = pair
+    for start in range(0, len(shown), GRID * GRID):
+        _stage()
+        part = shown[start:start + GRID * GRID]
+        for number, (name, output) in enumerate(part):
+            _build(*_panel(number), CASES[name], output)
+        pair = []
+        for engine in ('VOLLEY', 'CYCLES'):
+            scenes.set_engine(engine, 1)
+            pair.append((scenes.render()[..., :3] - 2.0) * 2.0)
+        for number, key in enumerate(part):
+            x, y = number % GRID * SIZE, number // GRID * SIZE
+            pictures[key] = [picture[y:y + SIZE, x:x + SIZE] for picture in pair]
     return pictures
 
 
@@ -254,11 +266,10 @@ def pictures(blender_of_module):
     """All cases from one Blender, and the table of their errors."""
     found = blender_of_module.run(inside_cases, list(CASES), timeout=600)
     lines = [f"{'node':40} {'output':10} {'mean':>9} {'mean error':>10} {'largest':>9} {'beyond':>8}"]
-    for name, outputs in found.items():
-        for output, (ours, theirs) in outputs.items():
-            error = np.abs(ours - theirs)
-            lines.append(f"{name:40} {output:10} {theirs.mean():9.4f} {error.mean():10.2e} "
-                         f"{error.max():9.2e} {_beyond(ours, theirs):8.3%}")
+    for (name, output), (ours, theirs) in found.items():
+        error = np.abs(ours - theirs)
+        lines.append(f"{name:40} {output:10} {theirs.mean():9.4f} {error.mean():10.2e} "
+                     f"{error.max():9.2e} {_beyond(ours, theirs):8.3%}")
     folder = os.path.join(os.environ.get("VOLLEY_BUILD", ""), "results")
     if os.path.isdir(folder):
         with open(os.path.join(folder, "textures.txt"), "w", encoding="utf-8") as file:
@@ -274,8 +285,9 @@ def _beyond(ours, theirs):
 
 @pytest.mark.parametrize("name", CASES)
 def test_against_cycles(pictures, name):
-    if name not in pictures:
+    shown = {output: pair for (case, output), pair in pictures.items() if case == name}
+    if not shown:
         pytest.skip("this Blender has no such node")
-    for output, (ours, theirs) in pictures[name].items():
+    for output, (ours, theirs) in shown.items():
         assert theirs.std() > 1e-3 or output in _CONSTANT, f"{output}: the picture shows nothing"
         assert _beyond(ours, theirs) <= 1.0 - SHARE_WITHIN, output

@@ -201,9 +201,9 @@ static vvec3 vector_reflect(vvec3 a, vvec3 b) {
     return v3_sub(a, v3_scale(v3_scale(n, vf_set(2.0f)), v3_dot(a, n)));
 }
 
-/* Bent at a surface of normal b, both made unit; 0 where all is reflected. */
-static vvec3 vector_refract(vvec3 a, vvec3 b, vfloat ior) {
-    const vvec3 i = v3_normalize(a), n = v3_normalize(b);
+/* Bent at a surface of normal b, which is made unit; 0 where all is reflected. */
+static vvec3 vector_refract(vvec3 i, vvec3 b, vfloat ior) {
+    const vvec3 n = v3_normalize(b);
     const vfloat cosine = v3_dot(n, i), one = vf_one();
     const vfloat k = one - ior * ior * (one - cosine * cosine);
     const vfloat along = ior * cosine + vf_safe_sqrt(k);
