@@ -78,38 +78,39 @@ enum {
     TRC_NODE_RGB_TO_BW = 89,   /* c color -> f */
 
     /* procedural textures; vectors default to Generated */
-    TRC_NODE_NOISE = 96,       /* c vector, f w, f scale, f detail, f roughness, f lacunarity,
-                                  f offset, f gain, f distortion -> f value, c color; mode: dimensions
-                                  - 1 in bits 0-1, TRC_FRACTAL_* from bit TRC_NOISE_TYPE_SHIFT */
-    TRC_NODE_MUSGRAVE = 97,    /* c vector, f w, f scale, f detail, f dimension, f lacunarity,
-                                  f offset, f gain -> f; mode as NOISE, without FBM_UNIT */
-    TRC_NODE_VORONOI = 98,     /* c vector, f w, f scale, f smoothness, f exponent, f randomness ->
-                                  f distance, c color, c position, f w, f radius; mode: dimensions - 1
-                                  in bits 0-1, metric and TRC_VORONOI_* feature from bits
-                                  TRC_VORONOI_METRIC_SHIFT and TRC_VORONOI_FEATURE_SHIFT */
-    TRC_NODE_WAVE = 99,        /* c vector, f scale, f distortion, f detail, f detail_scale,
-                                  f detail_roughness, f phase -> f; mode: profile in bits 0-1,
-                                  TRC_WAVE_RINGS, from bit TRC_WAVE_DIRECTION_SHIFT 0-2 X, Y, Z,
-                                  3 diagonal or spherical */
-    TRC_NODE_GRADIENT = 100,   /* c vector -> f; mode: TRC_GRADIENT_* */
+    TRC_NODE_NOISE = 96,        /* c vector, f w, f scale, f detail, f roughness, f lacunarity,
+                                   f offset, f gain, f distortion -> f value, c color; mode: dimensions
+                                   - 1 in bits 0-1, TRC_FRACTAL_* from bit TRC_NOISE_TYPE_SHIFT */
+    TRC_NODE_MUSGRAVE = 97,     /* c vector, f w, f scale, f detail, f dimension, f lacunarity,
+                                   f offset, f gain -> f; mode as NOISE, without FBM_UNIT */
+    TRC_NODE_VORONOI = 98,      /* c vector, f w, f scale, f smoothness, f exponent, f randomness ->
+                                   f distance, c color, c position, f w, f radius; mode: dimensions - 1
+                                   in bits 0-1, metric and TRC_VORONOI_* feature from bits
+                                   TRC_VORONOI_METRIC_SHIFT and TRC_VORONOI_FEATURE_SHIFT */
+    TRC_NODE_WAVE = 99,         /* c vector, f scale, f distortion, f detail, f detail_scale,
+                                   f detail_roughness, f phase -> f; mode: profile in bits 0-1,
+                                   TRC_WAVE_RINGS, from bit TRC_WAVE_DIRECTION_SHIFT 0-2 X, Y, Z,
+                                   3 diagonal or spherical */
+    TRC_NODE_GRADIENT = 100,    /* c vector -> f; mode: TRC_GRADIENT_* */
     TRC_NODE_WHITE_NOISE = 101, /* c vector, f w -> f value, c color; mode: dimensions - 1 */
-    TRC_NODE_MAGIC = 102,      /* c vector, f scale, f distortion -> c color, f factor; mode: depth,
-                                  0-10 */
-    TRC_NODE_BRICK = 103,      /* c vector, c color1, c color2, c mortar, f scale, f mortar_size,
-                                  f mortar_smooth, f bias, f brick_width, f row_height, f offset,
-                                  f squash -> c color, f factor; mode: every how many rows are offset
-                                  in bits 0-6, squashed from bit TRC_BRICK_SQUASH_SHIFT, 0: never */
+    TRC_NODE_MAGIC = 102, /* c vector, f scale, f distortion -> c color, f factor; mode: depth,
+                             0-10 */
+    TRC_NODE_BRICK = 103, /* c vector, c color1, c color2, c mortar, f scale, f mortar_size,
+                             f mortar_smooth, f bias, f brick_width, f row_height, f offset,
+                             f squash -> c color, f factor; mode: every how many rows are offset
+                             in bits 0-6, squashed from bit TRC_BRICK_SQUASH_SHIFT, 0: never */
 
     /* the rest */
-    TRC_NODE_CURVES = 104,     /* f factor, c color, f low, f high -> c; table: 256 RGBA values, each
-                                  channel by its own, over low to high; mode 1: straight on beyond */
-    TRC_NODE_FLOAT_CURVE = 105, /* f factor, f value, f low, f high -> f; table: as CURVES, R is read;
-                                   mode as CURVES */
-    TRC_NODE_BLACKBODY = 106,  /* f temperature (K) -> c */
-    TRC_NODE_WAVELENGTH = 107, /* f wavelength (nm) -> c */
-    TRC_NODE_VECTOR_TRANSFORM = 108, /* c vector -> c; mode: TRC_SPACE_* of the source in bits 0-1, of
-                                        the target in bits 2-3, bits 4-5: 0 point, 1 vector,
-                                        2 normal */
+    TRC_NODE_CURVES = 104, /* f factor, c color, f low, f high -> c; table: 256 RGBA values, each
+                              channel by its own, over low to high; mode 1: straight on beyond */
+    TRC_NODE_FLOAT_CURVE = 105, /* f factor, f value, f low, f high -> f; table: as CURVES, R is
+                                   read; mode as CURVES */
+    TRC_NODE_BLACKBODY = 106,   /* f temperature (K) -> c */
+    TRC_NODE_WAVELENGTH = 107,  /* f wavelength (nm) -> c */
+    TRC_NODE_VECTOR_TRANSFORM =
+        108,                      /* c vector -> c; mode: TRC_SPACE_* of the source in bits 0-1, of
+                                     the target in bits 2-3, bits 4-5: 0 point, 1 vector,
+                                     2 normal */
     TRC_NODE_VECTOR_ROTATE = 109, /* c vector, c center, c axis, f angle, c rotation -> c; mode:
                                      TRC_ROTATE_* | 8 to turn the other way */
     TRC_NODE_CAMERA_DATA = 110,   /* -> c view_vector, f view_z_depth, f view_distance */
@@ -119,13 +120,7 @@ enum {
 enum { TRC_SPACE_WORLD = 0, TRC_SPACE_OBJECT, TRC_SPACE_CAMERA };
 
 /* Radians; EULER reads rotation (XYZ), the others angle; AXIS_ANGLE axis too. */
-enum {
-    TRC_ROTATE_AXIS_ANGLE = 0,
-    TRC_ROTATE_X,
-    TRC_ROTATE_Y,
-    TRC_ROTATE_Z,
-    TRC_ROTATE_EULER
-};
+enum { TRC_ROTATE_AXIS_ANGLE = 0, TRC_ROTATE_X, TRC_ROTATE_Y, TRC_ROTATE_Z, TRC_ROTATE_EULER };
 
 /* Fractals of gradient noise. FBM_UNIT is fractal Brownian motion scaled to [0, 1]. */
 enum {
@@ -139,19 +134,19 @@ enum {
 };
 
 enum { /* metrics */
-    TRC_VORONOI_EUCLIDEAN = 0,
-    TRC_VORONOI_MANHATTAN,
-    TRC_VORONOI_CHEBYCHEV,
-    TRC_VORONOI_MINKOWSKI,
-    TRC_VORONOI_METRIC_SHIFT = 2
+       TRC_VORONOI_EUCLIDEAN = 0,
+       TRC_VORONOI_MANHATTAN,
+       TRC_VORONOI_CHEBYCHEV,
+       TRC_VORONOI_MINKOWSKI,
+       TRC_VORONOI_METRIC_SHIFT = 2
 };
 enum { /* features */
-    TRC_VORONOI_F1 = 0,
-    TRC_VORONOI_F2,
-    TRC_VORONOI_SMOOTH_F1,
-    TRC_VORONOI_DISTANCE_TO_EDGE,
-    TRC_VORONOI_N_SPHERE_RADIUS,
-    TRC_VORONOI_FEATURE_SHIFT = 4
+       TRC_VORONOI_F1 = 0,
+       TRC_VORONOI_F2,
+       TRC_VORONOI_SMOOTH_F1,
+       TRC_VORONOI_DISTANCE_TO_EDGE,
+       TRC_VORONOI_N_SPHERE_RADIUS,
+       TRC_VORONOI_FEATURE_SHIFT = 4
 };
 
 enum {

@@ -229,8 +229,8 @@ static vvec3 op_tangent(const struct trc_surface *s) {
     return out;
 }
 
-/* The camera at the middle of the shutter, looking along +Z as in Cycles. Without a camera it stands
- * at the origin. */
+/* The camera at the middle of the shutter, looking along +Z as in Cycles. Without a camera it
+ * stands at the origin. */
 static void load_camera_to_world(const struct trc_snapshot *snapshot, struct trc_wide_affine *m) {
     const struct trc_camera *camera = &snapshot->camera;
     uint32_t key = 0;

@@ -211,7 +211,6 @@ static vvec3 vector_refract(vvec3 i, vvec3 b, vfloat ior) {
     return v3_select(reflected, v3_zero(), v3_sub(v3_scale(i, ior), v3_scale(n, along)));
 }
 
-
 static vvec3 op_vector_math(uint32_t mode, vvec3 a, vvec3 b, vvec3 c, vfloat scale) {
     switch (mode) {
     case TRC_VECTOR_ADD:

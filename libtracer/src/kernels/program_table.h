@@ -26,15 +26,15 @@ static vfloat op_curve(uint32_t mode, const float *table, const vfloat *in) {
 /* ---- blackbodies ---- */
 
 /* Rec.709 colour of unit luminance of a blackbody, fitted to what Cycles 3.4 shows: red and green
- * are a / T + b T + c, blue is a cubic in T, between these temperatures in kelvin. Below the first and
- * above the last the colour stays. */
+ * are a / T + b T + c, blue is a cubic in T, between these temperatures in kelvin. Below the first
+ * and above the last the colour stays. */
 #define BLACKBODY_SEGMENTS 7
 static const float blackbody_from[BLACKBODY_SEGMENTS] = {800.0f,  965.0f,  1167.0f, 1449.0f,
                                                          1902.0f, 3315.0f, 6365.0f};
 static const float blackbody_red[BLACKBODY_SEGMENTS][3] = {
-    {1619.18935f, -0.00205011157f, 5.02996177f},   {2488.45507f, -0.00111330872f, 3.22621456f},
-    {3341.43233f, -0.000486550855f, 1.76486688f},  {4094.62142f, -0.000127445045f, 0.725726668f},
-    {4670.28082f, 2.91258275e-05f, 0.126703228f},  {4595.09164f, 2.87495589e-05f, 0.150345088f},
+    {1619.18935f, -0.00205011157f, 5.02996177f},  {2488.45507f, -0.00111330872f, 3.22621456f},
+    {3341.43233f, -0.000486550855f, 1.76486688f}, {4094.62142f, -0.000127445045f, 0.725726668f},
+    {4670.28082f, 2.91258275e-05f, 0.126703228f}, {4595.09164f, 2.87495589e-05f, 0.150345088f},
     {3787.17457f, 9.35907693e-06f, 0.399075872f},
 };
 static const float blackbody_green[BLACKBODY_SEGMENTS][3] = {

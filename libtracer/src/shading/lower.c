@@ -297,8 +297,8 @@ static trc_status lower_vector_transform(const struct lowering *l) {
         TRC_TRY(op(l->b, TRC_OP_TRANSFORM, way | point, l->out, l->out));
     }
     if (from != to && to != TRC_SPACE_WORLD) {
-        const uint32_t way = to == TRC_SPACE_OBJECT ? TRC_TRANSFORM_WORLD_TO_OBJECT
-                                                    : TRC_TRANSFORM_WORLD_TO_CAMERA;
+        const uint32_t way =
+            to == TRC_SPACE_OBJECT ? TRC_TRANSFORM_WORLD_TO_OBJECT : TRC_TRANSFORM_WORLD_TO_CAMERA;
         TRC_TRY(op(l->b, TRC_OP_TRANSFORM, way | point, l->out, l->out));
     }
     return type == 2 ? combine(l->b, TRC_VECTOR_NORMALIZE, l->out, NULL, l->out) : TRC_OK;

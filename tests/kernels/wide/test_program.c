@@ -128,7 +128,7 @@ static void test_against_cycles(void **state) {
                 const int outputs = op_output_counts[c->op] < 3 ? op_output_counts[c->op] : 3;
                 for (int k = 0; k < outputs; k++) {
                     const float value = vf_get(regs.r[OUT + k], l);
-                    if (is_near(value, c->out[k], 3e-6f))
+                    if (isnan(c->out[k]) || is_near(value, c->out[k], 3e-6f))
                         continue;
                     failures++;
                     printf("%s mode %u (%g %g %g %g ...) output %d: %.9g, Cycles has %.9g\n",
@@ -185,6 +185,8 @@ static uint32_t last_mode(uint32_t op) {
     case TRC_OP_MAPPING:
     case TRC_OP_PROJECT:
         return 3;
+    case TRC_OP_CURVE:
+        return TRC_CURVE_EXTRAPOLATE | 3;
     case TRC_OP_CLAMP:
     case TRC_OP_RAMP:
         return 1;
@@ -255,6 +257,37 @@ static void test_outputs_over_inputs(void **state) {
         for (int l = 0; l < TRC_WIDTH; l++)
             assert_true(vf_get(regs.r[k], l) == expected[k]);
     }
+}
+
+/* On a straight table from .1 to .7 over 2 to 4, and straight on beyond. */
+static void test_curves(void **state) {
+    (void)state;
+    static const float at[5] = {2, 3, 4, 1, 6}, flat[5] = {.1f, .4f, .7f, .1f, .7f},
+                       straight[5] = {.1f, .4f, .7f, -.2f, 1.3f};
+    static float table[4 * TRC_RAMP_SIZE];
+    ramp_table(table);
+    for (int i = 0; i < 5; i++) {
+        const float in[3] = {at[i], 2, 4};
+        float out;
+        trc_program_fold_scalar(TRC_OP_CURVE, 0, table, in, &out);
+        assert_true(is_near(out, flat[i], 1e-6f));
+        trc_program_fold_scalar(TRC_OP_CURVE, TRC_CURVE_EXTRAPOLATE, table, in, &out);
+        assert_true(is_near(out, straight[i], 1e-5f));
+    }
+}
+
+/* Turned by a third of a turn about the diagonal, axes follow each other; not at all about 0. */
+static void test_axis_rotation(void **state) {
+    (void)state;
+    static const float around[4] = {5, 5, 5, 2.0943951f}, nothing[4] = {0, 0, 0, 1};
+    static const float expected[9] = {0, 0, 1, 1, 0, 0, 0, 1, 0};
+    float rows[9];
+    trc_program_fold_scalar(TRC_OP_AXIS_ROTATION, 0, NULL, around, rows);
+    for (int i = 0; i < 9; i++)
+        assert_true(is_near(rows[i], expected[i], 1e-6f));
+    trc_program_fold_scalar(TRC_OP_AXIS_ROTATION, 0, NULL, nothing, rows);
+    for (int i = 0; i < 9; i++)
+        assert_true(rows[i] == (i % 4 == 0 ? 1.0f : 0.0f));
 }
 
 /* ---- a scene of two meshes ---- */
@@ -425,6 +458,29 @@ static const struct expectation expectations[] = {
     {TRC_OP_NORMAL_MAP, 0, NAME_UV, {.5f, 1, .5f, .5f}, {{H, 0, H}, {0, 0, 1}, {0, 0, 1}}},
     {TRC_OP_NORMAL_MAP, 1, 0, {1, 1, .5f, .5f}, {{0, 1, 0}, {1, 0, 0}, {0, 0, 1}}},
     {TRC_OP_NORMAL_MAP, 2, 0, {1, 1, .5f, .5f}, {{1, 0, 0}, {1, 0, 0}, {0, 0, 1}}},
+    {TRC_OP_TRANSFORM,
+     TRC_TRANSFORM_OBJECT_TO_WORLD | TRC_TRANSFORM_POINT,
+     0,
+     {1, 0, 0},
+     {{10, 22, 30}, {2, 0, 0}, {1, 0, 0}}},
+    {TRC_OP_TRANSFORM,
+     TRC_TRANSFORM_WORLD_TO_OBJECT,
+     0,
+     {1, 0, 0},
+     {{0, -1, 0}, {1, 0, 0}, {1, 0, 0}}},
+    {TRC_OP_TRANSFORM,
+     TRC_TRANSFORM_WORLD_TO_CAMERA | TRC_TRANSFORM_POINT,
+     0,
+     {1, 2, 40},
+     {{0, 0, 10}, {0, 0, 10}, {0, 0, 10}}},
+    {TRC_OP_TRANSFORM,
+     TRC_TRANSFORM_CAMERA_TO_WORLD,
+     0,
+     {0, 0, 1},
+     {{0, 0, -1}, {0, 0, -1}, {0, 0, -1}}},
+    /* the point is sqrt(1/2) off the long side of its triangle */
+    {TRC_OP_WIREFRAME, 0, 0, {1.3f}, {{0}, {0}, {0}}},
+    {TRC_OP_WIREFRAME, 0, 0, {1.5f}, {{1}, {0}, {0}}},
     /* (-(y - .5), x - .5, 0) of Generated is (0, -.25, 0), which a quarter turn makes +X */
     {TRC_OP_TANGENT, 0, 0, {0}, {{1, 0, 0}, {0, -1, 0}, {0, 0, 0}}},
 };
@@ -773,6 +829,8 @@ int main(void) {
         cmocka_unit_test(test_against_cycles),
         cmocka_unit_test(test_against_scalar),
         cmocka_unit_test(test_outputs_over_inputs),
+        cmocka_unit_test(test_curves),
+        cmocka_unit_test(test_axis_rotation),
         cmocka_unit_test(test_at_surfaces),
         cmocka_unit_test(test_inactive_lanes),
         cmocka_unit_test(test_smooth_normal_map),
