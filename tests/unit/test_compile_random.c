@@ -19,7 +19,7 @@ static const struct {
 } random_types[] = {
     {TRC_NODE_MATH, TRC_MATH_DEGREES + 1, "fff"},
     {TRC_NODE_MIX_COLOR, TRC_BLEND_EXCLUSION + 1, "fcc"},
-    {TRC_NODE_VECTOR_MATH, TRC_VECTOR_FRACT + 1, "cccf"},
+    {TRC_NODE_VECTOR_MATH, TRC_VECTOR_REFRACT + 1, "cccf"},
     {TRC_NODE_SEPARATE, 4, "c"},
     {TRC_NODE_COMBINE, 4, "fff"},
     {TRC_NODE_CLAMP, 2, "fff"},
@@ -31,11 +31,30 @@ static const struct {
     {TRC_NODE_CHECKER, 1, "cccf"},
     {TRC_NODE_MAPPING, 4, "cccc"},
     {TRC_NODE_RGB_TO_BW, 1, "c"},
+    {TRC_NODE_NOISE, 6 << TRC_NOISE_TYPE_SHIFT, "cffffffff"},
+    {TRC_NODE_VORONOI, 5 << TRC_VORONOI_FEATURE_SHIFT, "cfffff"},
+    {TRC_NODE_WAVE, 2, "cffffff"},
+    {TRC_NODE_GRADIENT, 7, "c"},
+    {TRC_NODE_MAGIC, 11, "cff"},
+    {TRC_NODE_BRICK, 1, "ccccffffffff"},
+    {TRC_NODE_BLACKBODY, 1, "f"},
+    {TRC_NODE_VECTOR_ROTATE, 5, "cccfc"},
 };
 static uint32_t outputs_of(uint32_t type) {
-    return type == TRC_NODE_SEPARATE                                  ? 3
-           : type == TRC_NODE_CHECKER || type == TRC_NODE_VECTOR_MATH ? 2
-                                                                      : 1;
+    switch (type) {
+    case TRC_NODE_VORONOI:
+        return 5;
+    case TRC_NODE_SEPARATE:
+        return 3;
+    case TRC_NODE_CHECKER:
+    case TRC_NODE_VECTOR_MATH:
+    case TRC_NODE_NOISE:
+    case TRC_NODE_MAGIC:
+    case TRC_NODE_BRICK:
+        return 2;
+    default:
+        return 1;
+    }
 }
 
 /* A random graph of operations on constants. If hidden, each constant is multiplied by the random
@@ -48,7 +67,7 @@ static void random_graph(uint32_t seed, bool hidden) {
     for (int n = 0; n < 24; n++) {
         const uint32_t t = random_below(sizeof random_types / sizeof *random_types);
         const uint32_t count = (uint32_t)strlen(random_types[t].inputs);
-        trc_node_input in[8];
+        trc_node_input in[12];
         for (uint32_t i = 0; i < count; i++) {
             if (n && random_below(2)) {
                 const int32_t from = made[random_below((uint32_t)n)];
