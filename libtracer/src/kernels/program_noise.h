@@ -162,9 +162,9 @@ TRC_INLINE struct fractal_sum fractal_first(const struct fractal *f, vfloat n) {
 }
 
 TRC_INLINE struct fractal_sum fractal_select(vmask m, struct fractal_sum a, struct fractal_sum b) {
-    return (struct fractal_sum){
-        vf_select(m, a.value, b.value), vf_select(m, a.amplitude, b.amplitude),
-        vf_select(m, a.weight, b.weight), vf_select(m, a.signal, b.signal)};
+    return (struct fractal_sum){vf_select(m, a.value, b.value),
+                                vf_select(m, a.amplitude, b.amplitude),
+                                vf_select(m, a.weight, b.weight), vf_select(m, a.signal, b.signal)};
 }
 
 /* FBM normalised to [0, 1]: between the mean with and without the last octave. */
@@ -173,8 +173,8 @@ TRC_INLINE vfloat fbm_unit(vfloat value, vfloat weight) {
 }
 
 static vfloat fractal_noise(const struct fractal *f, const vfloat *place) {
-    const bool starts = f->type == TRC_FRACTAL_HETERO_TERRAIN ||
-                        f->type == TRC_FRACTAL_RIDGED_MULTIFRACTAL;
+    const bool starts =
+        f->type == TRC_FRACTAL_HETERO_TERRAIN || f->type == TRC_FRACTAL_RIDGED_MULTIFRACTAL;
     const vfloat zero = vf_zero(), one = vf_one();
     vfloat whole = vf_floor(f->octaves), rest = f->octaves - whole, scale = one;
     vfloat p[TRC_MAX_DIMENSIONS];
@@ -221,7 +221,7 @@ static vfloat fractal_noise(const struct fractal *f, const vfloat *place) {
 
 /* ---- textures ---- */
 
-/* Far places, one for each seed, that make independent noises of one: 100 to 200 along each axis. */
+/* Far places that make independent noises of one, by seed: 100 to 200 along each axis. */
 TRC_INLINE void noise_moved(int dims, const vfloat *p, int seed, vfloat *out) {
     const vfloat hundred = vf_set(100.0f), s = vf_set((float)seed);
     for (int i = 0; i < dims; i++) {

@@ -46,8 +46,7 @@ TRC_INLINE vfloat wave_place(uint32_t mode, vvec3 p) {
     const uint32_t direction = (mode >> TRC_WAVE_DIRECTION_SHIFT) & 3u;
     const vfloat c[3] = {p.x, p.y, p.z};
     if (!(mode & TRC_WAVE_RINGS)) {
-        return direction < 3 ? c[direction] * vf_set(20.0f)
-                             : (p.x + p.y + p.z) * vf_set(10.0f);
+        return direction < 3 ? c[direction] * vf_set(20.0f) : (p.x + p.y + p.z) * vf_set(10.0f);
     }
     vfloat sum = vf_zero();
     for (uint32_t i = 0; i < 3; i++)
@@ -92,9 +91,9 @@ struct magic_fold {
 };
 #define MAGIC_DEPTH 10
 static const struct magic_fold magic_folds[MAGIC_DEPTH] = {
-    {1, 1, -1, {1, -1, 1}}, {0, 1, 1, {1, -1, -1}},   {2, 0, 1, {-1, -1, -1}},
-    {0, 1, -1, {-1, 1, -1}}, {1, 0, -1, {-1, 1, 1}},  {1, 1, -1, {-1, 1, 1}},
-    {0, 1, 1, {1, 1, 1}},    {2, 0, 1, {1, 1, -1}},   {0, 1, -1, {-1, -1, 1}},
+    {1, 1, -1, {1, -1, 1}},  {0, 1, 1, {1, -1, -1}}, {2, 0, 1, {-1, -1, -1}},
+    {0, 1, -1, {-1, 1, -1}}, {1, 0, -1, {-1, 1, 1}}, {1, 1, -1, {-1, 1, 1}},
+    {0, 1, 1, {1, 1, 1}},    {2, 0, 1, {1, 1, -1}},  {0, 1, -1, {-1, -1, 1}},
     {1, 0, -1, {1, -1, 1}},
 };
 
@@ -154,7 +153,8 @@ TRC_INLINE vmask is_multiple(vint a, uint32_t n) {
 /* vector, mortar size, mortar smoothness, bias, brick width, row height, offset, squash -> shade of
  * the brick, share of mortar; mode: how often rows are offset, how often squashed */
 static void op_brick(uint32_t mode, const vfloat *in, vfloat *out) {
-    const uint32_t offset_every = mode & 127u, squash_every = (mode >> TRC_BRICK_SQUASH_SHIFT) & 127u;
+    const uint32_t offset_every = mode & 127u,
+                   squash_every = (mode >> TRC_BRICK_SQUASH_SHIFT) & 127u;
     const vfloat zero = vf_zero(), one = vf_one(), size = in[3], smooth = in[4], height = in[7];
     const vint row = vf_to_int(vf_floor(in[1] / height));
     vfloat width = in[6], shift = zero;

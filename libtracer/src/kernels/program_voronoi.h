@@ -140,8 +140,7 @@ static void voronoi_smooth(const struct voronoi *v, vfloat smoothness, bool has_
         voronoi_offset(v->dims, 2, k, p.offset);
         voronoi_at(v, p.offset, p.at);
         p.distance = voronoi_distance(v, p.at, v->local);
-        const vfloat t =
-            vf_saturate(half + half * (mean->distance - p.distance) / smoothness);
+        const vfloat t = vf_saturate(half + half * (mean->distance - p.distance) / smoothness);
         const vfloat h = t * t * (vf_set(3.0f) - vf_set(2.0f) * t);
         const vfloat dip = smoothness * h * (one - h);
         mean->distance = mean->distance + h * (p.distance - mean->distance) - dip;
