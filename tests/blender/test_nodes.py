@@ -123,12 +123,12 @@ def test_link_conversions(blender):
 def inside_fallbacks():
     tree, output = _new_tree()
     density, velvet = tree.nodes.new("ShaderNodeTexPointDensity"), tree.nodes.new("ShaderNodeBsdfTranslucent")
-    toon = tree.nodes.new("ShaderNodeBsdfToon")
-    toon.inputs["Color"].default_value = (0.2, 0.4, 0.6, 1.0)
+    scattering = tree.nodes.new("ShaderNodeSubsurfaceScattering")
+    scattering.inputs["Color"].default_value = (0.2, 0.4, 0.6, 1.0)
     mix = tree.nodes.new("ShaderNodeMixShader")
     mix.inputs[0].default_value = 0.125
     tree.links.new(density.outputs["Density"], mix.inputs[0])
-    tree.links.new(toon.outputs[0], mix.inputs[1])
+    tree.links.new(scattering.outputs[0], mix.inputs[1])
     tree.links.new(velvet.outputs[0], mix.inputs[2])
     tree.links.new(mix.outputs[0], output.inputs["Surface"])
     bump = tree.nodes.new("ShaderNodeBump")
@@ -146,7 +146,7 @@ def test_unsupported_nodes_fall_back_and_are_named(blender):
     assert flat["nodes"][2][3][0] == (-1, 0, (0.125, 0, 0))
     assert flat["nodes"][1][3][1] == (-2, 0, (0, 0, 0))
     text = "\n".join(flat["warnings"])
-    for name in ("Point Density", "Toon BSDF", "Bump", "volume"):
+    for name in ("Point Density", "Subsurface Scattering", "Bump", "volume"):
         assert text.count(name) == 1, text
 
 

@@ -16,7 +16,7 @@ from .values import CONSTANT, DEFAULT, Value
 
 # TRC_NODE_*
 (DIFFUSE, GLOSSY, GLASS, REFRACTION, TRANSPARENT, TRANSLUCENT, EMISSION, BACKGROUND, MIX_SHADER,
- ADD_SHADER, HOLDOUT, PRINCIPLED) = range(1, 13)
+ ADD_SHADER, HOLDOUT, PRINCIPLED, VELVET, TOON) = range(1, 15)
 (IMAGE, ENVIRONMENT, UV_MAP, COLOR_ATTRIBUTE, TEXTURE_COORDINATE, MAPPING, MIX_COLOR, MATH, FRESNEL,
  LAYER_WEIGHT, LIGHT_PATH, GEOMETRY, NORMAL_MAP, INVERT, GAMMA, HUE_SATURATION, BRIGHT_CONTRAST,
  COLOR_RAMP, SEPARATE, COMBINE, MAP_RANGE, CLAMP, CHECKER, OBJECT_INFO, VECTOR_MATH,
@@ -106,6 +106,11 @@ _SPECS = {
         _distribution),
     "ShaderNodeBsdfTransparent": Spec(TRANSPARENT, (('c', "Color"),), _SHADER),
     "ShaderNodeBsdfTranslucent": Spec(TRANSLUCENT, (('c', "Color"), ('v', "Normal")), _SHADER),
+    "ShaderNodeBsdfVelvet": Spec(
+        VELVET, (('c', "Color"), ('f', "Sigma"), ('v', "Normal")), _SHADER),
+    "ShaderNodeBsdfToon": Spec(
+        TOON, (('c', "Color"), ('f', "Size"), ('f', "Smooth"), ('v', "Normal")), _SHADER,
+        lambda node: 0 if node.component == 'DIFFUSE' else 1),
     "ShaderNodeEmission": Spec(
         EMISSION, (('c', "Color"), ('f', "Strength")), (("Emission", 's'),)),
     "ShaderNodeBackground": Spec(
@@ -315,6 +320,15 @@ def _name_missing(walker, sockets):
             walker.warn(f"Principled BSDF: {name} is not supported and is left out")
 
 
+def _sheen(walker, node, sockets):
+    """The Sheen shader of 4.0 and later; Velvet is one of its distributions."""
+    if node.distribution != 'ASHIKHMIN':
+        walker.warn("Sheen BSDF: the Microfiber distribution is approximated by Ashikhmin's")
+    values = [sockets.get(kind, name) for kind, name in (('c', "Color"), ('f', "Roughness"),
+                                                         ('v', "Normal"))]
+    return {"BSDF": Value('s', walker.emit(VELVET, values), 0)}
+
+
 def _value(walker, node, _sockets):
     return {"Value": _constant('f', float(node.outputs[0].default_value))}
 
@@ -448,7 +462,8 @@ def _clamped(walker, value, is_clamped):
 
 
 _SPECIAL = {
-    "ShaderNodeBsdfPrincipled": _principled, "ShaderNodeValue": _value, "ShaderNodeRGB": _rgb,
+    "ShaderNodeBsdfPrincipled": _principled, "ShaderNodeBsdfSheen": _sheen,
+    "ShaderNodeValue": _value, "ShaderNodeRGB": _rgb,
     "ShaderNodeNormal": _normal, "ShaderNodeTexImage": _image,
     "ShaderNodeTexEnvironment": _environment, "ShaderNodeUVMap": _uv_map,
     "ShaderNodeTexCoord": _texture_coordinate, "ShaderNodeVertexColor": _color_attribute,

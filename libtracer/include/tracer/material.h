@@ -36,6 +36,8 @@ enum {
      * f transmission, f transmission_roughness, c emission, f emission_strength, f alpha, c normal,
      * c clearcoat_normal, c tangent */
     TRC_NODE_PRINCIPLED = 12,
+    TRC_NODE_VELVET = 13, /* c color, f sigma, c normal */
+    TRC_NODE_TOON = 14,   /* c color, f size, f smooth, c normal; mode: 0 diffuse, 1 glossy */
 
     /* values */
     TRC_NODE_IMAGE = 64, /* c vector -> c color, f alpha; image, interpolation in mode bits 0-1,

@@ -4,9 +4,10 @@
  * the shading normal and the geometric surface; for transmission below all three. So nothing shines
  * through a surface whose normals are bent, and evaluation and sampling have the same support.
  *
- * Departures from Cycles 3.4: reflections are sampled by bounded visible normals, refractions by
- * the spherical cap; densities are the true ones, where Cycles gives clearcoat the density of GTR1
- * and samples GGX. What that does to its pictures is kept in trc_bsdf_sample.beyond. */
+ * Departures from Cycles 3.4: a sampled direction of a toon lobe fades as an evaluated one;
+ * reflections are sampled by bounded visible normals, refractions by the spherical cap; densities
+ * are the true ones, where Cycles gives clearcoat the density of GTR1 and samples GGX. What that
+ * does to its pictures is kept in trc_bsdf_sample.beyond. */
 #include "kernels/bsdf.h"
 
 #include "kernels/ggx_energy.h"
@@ -54,6 +55,39 @@ TRC_INLINE vfloat principled_diffuse(vfloat roughness, vfloat cos_i, vfloat cos_
            (lambert + retro * (fi + fo + fi * fo * (retro - vf_one())));
 }
 
+/* M. Ashikhmin, S. Premoze and P. Shirley, "A Microfacet-Based BRDF Generator" (2000): slopes are
+ * rare around the normal. */
+TRC_INLINE vfloat velvet(vfloat inverse_sigma2, vfloat cos_i, vfloat cos_o, vfloat cos_m,
+                         vfloat cos_mo) {
+    const vfloat one = vf_one(), least = vf_set(1e-5f), c = vf_abs(cos_mo);
+    const vmask valid =
+        vm_and(vm_and(vf_gt(cos_o, vf_zero()), vf_gt(c, least)), vf_lt(vf_abs(cos_m), one - least));
+    const vfloat ratio = vf_set(2.0f) * vf_max(vf_divide(cos_m, c), least);
+    const vfloat masking = vf_min(one, ratio * vf_min(vf_abs(cos_o), vf_abs(cos_i)));
+    const vfloat sin2 = vf_select(valid, one - cos_m * cos_m, one);
+    const vfloat d = vf_exp(-cos_m * cos_m / sin2 * inverse_sigma2) * inverse_sigma2 *
+                     vf_set(TRC_INV_PI) / (sin2 * sin2);
+    return vf_where(valid, vf_set(0.25f) * d * masking / cos_o);
+}
+
+/* Light from within an angle of the lobe's axis, fading beyond; cosine: to the axis. *pdf: of
+ * directions spread evenly over all of that cone. */
+TRC_INLINE vfloat toon(const struct trc_lobe *lobe, vfloat cosine, vfloat *pdf) {
+    const vfloat fade = lobe->f0.y, over = vf_acos(vf_max(cosine, vf_zero())) - lobe->f0.x;
+    const vfloat soft = vf_saturate(vf_one() - vf_divide(over, fade));
+    const vfloat light =
+        vf_select(vf_lt(over, vf_zero()), vf_one(), vf_where(vf_gt(fade, vf_zero()), soft));
+    const vfloat density = vf_divide(vf_set(0.5f * TRC_INV_PI), vf_one() - lobe->f0.z);
+    *pdf = vf_where(vf_ge(cosine, lobe->f0.z), density);
+    return density * light;
+}
+
+/* What Cycles spreads evenly over the hemisphere when it samples. */
+TRC_INLINE bool is_sampled_evenly(const struct trc_lobe *lobe) {
+    return lobe->kind == TRC_LOBE_DIFFUSE && (lobe->distribution == TRC_DIFFUSE_OREN_NAYAR ||
+                                              lobe->distribution == TRC_DIFFUSE_VELVET);
+}
+
 TRC_INLINE struct lobe_value diffuse_value(const struct trc_lobe *lobe, const struct trc_surface *s,
                                            vvec3 wi) {
     const vfloat cos_n = v3_dot(lobe->n, wi);
@@ -69,12 +103,16 @@ TRC_INLINE struct lobe_value diffuse_value(const struct trc_lobe *lobe, const st
         f = oren_nayar(lobe->roughness, cos_i, lobe->cos_o, v3_dot(wi, s->wo));
     } else if (lobe->kind == TRC_LOBE_DIFFUSE && lobe->distribution == TRC_DIFFUSE_PRINCIPLED) {
         f = principled_diffuse(lobe->roughness, cos_i, lobe->cos_o, v3_dot(wi, s->wo));
+    } else if (lobe->kind == TRC_LOBE_DIFFUSE && lobe->distribution == TRC_DIFFUSE_VELVET) {
+        const vvec3 h = v3_normalize(v3_add(wi, s->wo));
+        f = velvet(lobe->roughness, cos_i, lobe->cos_o, v3_dot(lobe->n, h), v3_dot(s->wo, h));
+    }
+    vfloat pdf = is_sampled_evenly(lobe) ? vf_where(faces, vf_set(0.5f * TRC_INV_PI)) : cosine;
+    if (lobe->kind == TRC_LOBE_DIFFUSE && lobe->distribution == TRC_DIFFUSE_TOON) {
+        f = toon(lobe, cos_i, &pdf);
+        pdf = vf_where(faces, pdf);
     }
     f = vf_where(faces, f * bump_shadowing(s->n, lobe->n, wi, cos_n));
-    /* Cycles samples Oren-Nayar uniformly over the hemisphere. */
-    const bool uniform =
-        lobe->kind == TRC_LOBE_DIFFUSE && lobe->distribution == TRC_DIFFUSE_OREN_NAYAR;
-    const vfloat pdf = uniform ? vf_where(faces, vf_set(0.5f * TRC_INV_PI)) : cosine;
     return (struct lobe_value){v3_scale(lobe->weight, f), pdf, pdf, pdf};
 }
 
@@ -160,12 +198,21 @@ static struct lobe_value clearcoat_value(const struct trc_lobe *lobe, const stru
                                vf_where(m, sampled_d * lobe->g1_o * quarter), claim};
 }
 
+static struct lobe_value toon_value(const struct trc_lobe *lobe, vvec3 wo, vvec3 wi, vmask m) {
+    vfloat pdf;
+    const vfloat f = toon(lobe, v3_dot(v3_reflect(wo, lobe->n), wi), &pdf);
+    pdf = vf_where(m, pdf);
+    return (struct lobe_value){v3_scale(lobe->weight, vf_where(m, f)), pdf, pdf, pdf};
+}
+
 TRC_INLINE struct lobe_value reflect_value(const struct trc_lobe *lobe, vvec3 wo, vvec3 wi) {
     const vfloat cos_i = v3_dot(lobe->n, wi);
     vmask m = vm_and(vf_gt(cos_i, vf_zero()), vf_gt(lobe->cos_o, vf_zero()));
     m = vm_andnot(m, lobe->ideal);
     if (!vm_any(m))
         return no_value();
+    if (lobe->distribution == TRC_LOBE_TOON)
+        return toon_value(lobe, wo, wi, m);
     const vvec3 half = v3_normalize(v3_add(wo, wi));
     const vfloat cos_h = v3_dot(half, wi);
     const struct half_vector h = half_of(lobe, half, wi, cos_i);
@@ -332,6 +379,19 @@ static vvec3 ideal_direction(const struct trc_lobe *lobe, const struct trc_surfa
     return wi;
 }
 
+/* Evenly in the cone about the mirror direction, of which what is below the surface is lost. */
+static vvec3 toon_direction(const struct trc_lobe *lobe, vvec3 wo, vfloat u1, vfloat u2,
+                            vmask *alive) {
+    const vvec3 axis = v3_reflect(wo, lobe->n);
+    vvec3 a, b;
+    v3_frame(axis, &a, &b);
+    const vvec3 wi = v3_from_frame(trc_warp_cone(lobe->f0.z, u1, u2), a, b, axis);
+    const vmask above =
+        vm_and(vf_gt(lobe->cos_o, vf_zero()), vf_gt(v3_dot(lobe->n, wi), vf_zero()));
+    *alive = vm_and(*alive, above);
+    return wi;
+}
+
 /* A direction of the lobe's density. Lanes leave *alive where total reflection leaves none, or
  * where it is on the wrong side: other lobes may have a density there, but it was not theirs that
  * was sampled. */
@@ -343,6 +403,8 @@ static vvec3 rough_direction(const struct trc_lobe *lobe, const struct trc_surfa
         v3_frame(n, &a, &b);
         return v3_from_frame(trc_warp_cosine(u1, u2), a, b, n);
     }
+    if (lobe->kind == TRC_LOBE_REFLECT && lobe->distribution == TRC_LOBE_TOON)
+        return toon_direction(lobe, s->wo, u1, u2, alive);
     if (lobe->anisotropic) {
         a = lobe->tangent;
         b = v3_cross(lobe->n, a);

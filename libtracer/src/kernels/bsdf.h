@@ -20,10 +20,23 @@ enum trc_lobe_kind {
 };
 
 /* trc_lobe.distribution of TRC_LOBE_DIFFUSE ... */
-enum { TRC_DIFFUSE_LAMBERT, TRC_DIFFUSE_OREN_NAYAR, TRC_DIFFUSE_PRINCIPLED };
+enum {
+    TRC_DIFFUSE_LAMBERT,
+    TRC_DIFFUSE_OREN_NAYAR,
+    TRC_DIFFUSE_PRINCIPLED,
+    TRC_DIFFUSE_VELVET,
+    TRC_DIFFUSE_TOON
+};
 /* ... and of microfacets. MULTI_GGX: GGX with height-correlated masking and the energy of the
  * single scattering restored, in place of Cycles' random walk. */
-enum { TRC_LOBE_GGX, TRC_LOBE_GTR1, TRC_LOBE_BECKMANN, TRC_LOBE_ASHIKHMIN, TRC_LOBE_MULTI_GGX };
+enum {
+    TRC_LOBE_GGX,
+    TRC_LOBE_GTR1,
+    TRC_LOBE_BECKMANN,
+    TRC_LOBE_ASHIKHMIN,
+    TRC_LOBE_MULTI_GGX,
+    TRC_LOBE_TOON /* no microfacets: a cone about the mirror direction */
+};
 
 /* trc_lobe.fresnel: what multiplies the weight at a microfacet. */
 enum {
@@ -45,9 +58,9 @@ struct trc_lobe {
     vvec3 n;          /* the lobe's normal */
     vvec3 tangent;    /* unit, orthogonal to n, anisotropic lobes only; bitangent is n x tangent */
     vfloat alpha_x, alpha_y;
-    vfloat ior;       /* refraction: relative index, transmitted over incident side */
-    vfloat roughness; /* Oren-Nayar sigma; Principled's roughness */
-    vvec3 f0, f90;
+    vfloat ior;           /* refraction: relative index, transmitted over incident side */
+    vfloat roughness;     /* Oren-Nayar sigma; Principled's roughness; velvet: 1 / sigma^2 */
+    vvec3 f0, f90;        /* toon, f0: angle of full light, angle of its fading, cosine of both */
     vfloat cos_o;         /* n . wo */
     vfloat g1_o;          /* masking of wo */
     vfloat pdf_scale;     /* density of a sampled direction over D of its half vector */

@@ -300,6 +300,35 @@ static void add_glossy(struct setup *c, const struct trc_leaf *leaf, vfloat weig
         set_multiple(lobe, v3_saturate(base), false);
 }
 
+/* As Cycles, which limits the cone to the hemisphere. */
+static void add_toon(struct setup *c, const struct trc_leaf *leaf, vfloat weight) {
+    const bool is_glossy = leaf->mode == 1;
+    struct trc_lobe *lobe = add_lobe(c, is_glossy ? TRC_LOBE_REFLECT : TRC_LOBE_DIFFUSE,
+                                     v3_scale(colour(c, leaf, 0), weight));
+    if (!lobe)
+        return;
+    const vfloat quarter = vf_set(TRC_HALF_PI);
+    const vfloat angle = vf_saturate(number(c, leaf, 3)) * quarter;
+    const vfloat fade = vf_saturate(number(c, leaf, 4)) * quarter;
+    const vfloat whole = vf_min(angle + fade, quarter);
+    lobe->distribution = is_glossy ? (uint32_t)TRC_LOBE_TOON : (uint32_t)TRC_DIFFUSE_TOON;
+    lobe->n = leaf_normal(c, leaf, 5);
+    lobe->cos_o = v3_dot(lobe->n, c->s->wo);
+    lobe->ior = vf_one();
+    lobe->f0 = v3(angle, fade, vf_cos(whole));
+    /* How wide it spreads, for Filter Glossy. */
+    lobe->alpha_x = lobe->alpha_y = whole / quarter;
+    const vmask is_nothing = vf_le(whole, vf_zero());
+    lobe->weight = v3_where(vm_not(is_nothing), lobe->weight);
+    lobe->mix_weight = vf_where(vm_not(is_nothing), lobe->mix_weight);
+}
+
+static void add_velvet(struct setup *c, const struct trc_leaf *leaf, vfloat weight) {
+    const vfloat sigma = vf_max(number(c, leaf, 3), vf_set(0.01f));
+    add_diffuse(c, TRC_LOBE_DIFFUSE, TRC_DIFFUSE_VELVET, v3_scale(colour(c, leaf, 0), weight),
+                leaf_normal(c, leaf, 4), vf_rcp(sigma * sigma));
+}
+
 /* Index seen from the side of wo. */
 static vfloat relative_ior(const struct setup *c, vfloat ior) {
     const vfloat eta = vf_max(ior, vf_set(1e-5f));
@@ -580,6 +609,12 @@ static void add_leaf(struct setup *c, const struct trc_leaf *leaf, vfloat weight
     case TRC_NODE_TRANSLUCENT:
         add_diffuse(c, TRC_LOBE_TRANSLUCENT, 0, v3_scale(colour(c, leaf, 0), weight),
                     leaf_normal(c, leaf, 3), vf_zero());
+        break;
+    case TRC_NODE_VELVET:
+        add_velvet(c, leaf, weight);
+        break;
+    case TRC_NODE_TOON:
+        add_toon(c, leaf, weight);
         break;
     case TRC_NODE_GLOSSY:
         add_glossy(c, leaf, weight);

@@ -21,6 +21,8 @@ static const struct trc_node_info infos[] = {
      "anisotropic_rotation sheen sheen_tint clearcoat clearcoat_roughness ior transmission "
      "transmission_roughness emission emission_strength alpha normal clearcoat_normal tangent",
      "s"},
+    {TRC_NODE_VELVET, "Velvet", "cfn", "color sigma normal", "s"},
+    {TRC_NODE_TOON, "Toon", "cffn", "color size smooth normal", "s"},
 
     {TRC_NODE_IMAGE, "Image", "u", "vector", "cf"},
     {TRC_NODE_ENVIRONMENT, "Environment", "p", "vector", "c"},
@@ -103,6 +105,8 @@ bool trc_node_mode_is_valid(uint32_t type, uint32_t mode) {
         return mode <= TRC_DISTRIBUTION_ASHIKHMIN;
     case TRC_NODE_PRINCIPLED:
         return mode <= TRC_DISTRIBUTION_MULTI_GGX;
+    case TRC_NODE_TOON:
+        return mode <= 1;
     case TRC_NODE_IMAGE:
         return mode < 64 && (mode & TRC_IMAGE_MODE_INTERPOLATION) <= TRC_IMAGE_CUBIC;
     case TRC_NODE_ENVIRONMENT:

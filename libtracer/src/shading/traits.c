@@ -96,7 +96,10 @@ static uint32_t principled_bits(uint32_t distribution, const struct trc_operand 
 static uint32_t leaf_bits(const struct trc_leaf *leaf, const struct trc_operand *in) {
     switch (leaf->type) {
     case TRC_NODE_DIFFUSE:
+    case TRC_NODE_VELVET:
         return TRC_MATERIAL_HAS_DIFFUSE;
+    case TRC_NODE_TOON:
+        return leaf->mode ? TRC_MATERIAL_HAS_GLOSSY : TRC_MATERIAL_HAS_DIFFUSE;
     case TRC_NODE_TRANSLUCENT:
         return TRC_MATERIAL_HAS_TRANSLUCENT;
     case TRC_NODE_TRANSPARENT:

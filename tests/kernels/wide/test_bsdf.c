@@ -138,6 +138,15 @@ static struct model principled_all(void) {
     set(&m, 18, 0.4f);
     return m;
 }
+static struct model toon(uint32_t mode, float size, float smooth) {
+    struct model m;
+    begin(&m, mode ? "glossy toon" : "toon", TRC_NODE_TOON, mode, 8);
+    set3(&m, 0, 1, 1, 1);
+    set(&m, 3, size);
+    set(&m, 4, smooth);
+    unlink_vector(&m, 5);
+    return m;
+}
 static struct model clearcoat(float roughness) {
     struct model m = principled("clearcoat");
     set3(&m, 0, 0, 0, 0);
@@ -323,6 +332,8 @@ static void sampling_matches_density(void **state) {
         principled_glass(TRC_DISTRIBUTION_GGX, 0.6f, false),
         principled_all(),
         clearcoat(0.6f),
+        toon(1, 0.4f, 0.0f),
+        toon(1, 0.4f, 0.1f),
     };
     int failed = 0;
     for (size_t i = 0; i < sizeof models / sizeof models[0]; i++)
@@ -358,6 +369,7 @@ static void weights_match_values(void **state) {
         principled("Principled"),
         principled_all(),
         clearcoat(0.6f),
+        toon(1, 0.4f, 0.1f),
     };
     int failed = 0;
     for (size_t i = 0; i < sizeof models / sizeof models[0]; i++)
