@@ -130,6 +130,17 @@ struct trc_triangle_lanes {
     vfloat v[3][3]; /* vertex, axis in the order u, v, z */
 };
 
+/* Lanes whose triangle is flat in u or v and not ahead of the ray: floors and walls, which rays
+ * that start on them would otherwise ask for in double. du, dv: have the signs of the direction. */
+TRC_INLINE vmask trc_flat_behind(const struct trc_triangle_lanes *p, vfloat ou, vfloat ov,
+                                 vfloat du, vfloat dv) {
+    const vfloat zero = vf_set(0.0f), one = vf_set(1.0f);
+    const vmask flat_u = vm_and(vf_eq(p->v[0][0], p->v[1][0]), vf_eq(p->v[0][0], p->v[2][0]));
+    const vmask flat_v = vm_and(vf_eq(p->v[0][1], p->v[1][1]), vf_eq(p->v[0][1], p->v[2][1]));
+    return vm_or(vm_and(flat_u, vf_le((p->v[0][0] - ou) * vf_copysign(one, du), zero)),
+                 vm_and(flat_v, vf_le((p->v[0][1] - ov) * vf_copysign(one, dv), zero)));
+}
+
 /* Lanes of active whose ray passes through the triangle at distance *t; also barycentrics. */
 TRC_INLINE vmask trc_triangle_test(const struct trc_triangle_lanes *p, vfloat ou, vfloat ov,
                                    vfloat oz, vfloat su, vfloat sv, vfloat sz, vfloat tmin,
@@ -158,8 +169,13 @@ TRC_INLINE vmask trc_triangle_test(const struct trc_triangle_lanes *p, vfloat ou
     const vfloat bound = trc_t_error(x, y, z, e, vf_abs(inv)) * vf_abs(sz);
     const vmask too_near = vm_and(vf_gt(*t, tmin), vf_le(vf_abs(*t), bound));
     const vmask near_edge = vf_le(nearest, vf_set(TRC_TINY_EDGE));
-    const vmask doubtful = vm_and(hit, vm_or(near_edge, too_near));
+    vmask doubtful = vm_and(hit, vm_or(near_edge, too_near));
     if (__builtin_expect(vm_any(doubtful), 0)) {
+        const vmask behind = trc_flat_behind(p, ou, ov, su * sz, sv * sz);
+        hit = vm_andnot(hit, vm_and(doubtful, behind));
+        doubtful = vm_andnot(doubtful, behind);
+        if (!vm_any(doubtful))
+            return hit;
 #if TRC_WIDTH > 1
         const vfloat corner[9] = {ax, ay, az, bx, by, bz, cx, cy, cz};
         vfloat exact_t, exact_u, exact_v;
@@ -181,6 +197,16 @@ TRC_INLINE vmask trc_triangle_test(const struct trc_triangle_lanes *p, vfloat ou
 struct trc_triangle8 {
     f8 v[3][3];
 };
+
+TRC_INLINE uint32_t trc_flat_behind8(const struct trc_triangle8 *p, float ou, float ov, float du,
+                                     float dv) {
+    const f8 zero = f8_set(0.0f);
+    const f8 u = p->v[0][0], v = p->v[0][1];
+    const uint32_t flat_u = f8_le(f8_abs(u - p->v[1][0]) + f8_abs(u - p->v[2][0]), zero);
+    const uint32_t flat_v = f8_le(f8_abs(v - p->v[1][1]) + f8_abs(v - p->v[2][1]), zero);
+    return (flat_u & f8_le((u - f8_set(ou)) * f8_set(copysignf(1.0f, du)), zero)) |
+           (flat_v & f8_le((v - f8_set(ov)) * f8_set(copysignf(1.0f, dv)), zero));
+}
 
 /* Bits of candidates the ray passes through at distance t[lane]; also barycentrics. */
 TRC_INLINE uint32_t trc_triangle8_test(const struct trc_triangle8 *p, float ou, float ov, float oz,
@@ -210,6 +236,11 @@ TRC_INLINE uint32_t trc_triangle8_test(const struct trc_triangle8 *p, float ou, 
     const f8 bound = trc_t_error8(x, y, z, e, f8_abs(inv)) * f8_set(fabsf(sz));
     const uint32_t too_near = ~f8_le(*t, f8_set(tmin)) & f8_le(f8_abs(*t), bound);
     uint32_t doubtful = hit & (f8_le(nearest, f8_set(TRC_TINY_EDGE)) | too_near);
+    if (__builtin_expect(doubtful != 0, 0)) {
+        const uint32_t behind = doubtful & trc_flat_behind8(p, ou, ov, su * sz, sv * sz);
+        hit &= ~behind;
+        doubtful &= ~behind;
+    }
     for (; __builtin_expect(doubtful != 0, 0); doubtful &= doubtful - 1) {
         const int i = __builtin_ctz(doubtful);
         const float a[3] = {ax[i], ay[i], az[i]}, b[3] = {bx[i], by[i], bz[i]};
