@@ -118,12 +118,12 @@ void TRC_KERNEL(trc_camera_rays)(struct trc_tile *t) {
     for (uint32_t i = 0; i < t->samples.count; i += TRC_WIDTH) {
         const vmask active = vm_first((int32_t)(t->samples.count - i));
         const vuint pixel = vu_load(t->samples.pixel + i), index = vu_load(t->samples.index + i);
-        const vfloat fx = TRC_KERNEL(trc_sample)(sampler, pixel, index, TRC_DIM_FILTER_X);
-        const vfloat fy = TRC_KERNEL(trc_sample)(sampler, pixel, index, TRC_DIM_FILTER_Y);
+        vfloat f[2];
+        TRC_KERNEL(trc_samples)(sampler, pixel, index, TRC_DIM_FILTER_X, 2, 0, 1, f);
         const vfloat px = vi_to_float((vint)(pixel & vu_set(0xffffu))) + vf_set(0.5f) +
-                          table_lookup(t->filter, TRC_FILTER_TABLE, fx, active);
+                          table_lookup(t->filter, TRC_FILTER_TABLE, f[0], active);
         const vfloat py = vi_to_float((vint)(pixel >> 16)) + vf_set(0.5f) +
-                          table_lookup(t->filter, TRC_FILTER_TABLE, fy, active);
+                          table_lookup(t->filter, TRC_FILTER_TABLE, f[1], active);
         vfloat time = vf_set(0.5f);
         if (camera->has_motion) {
             time = TRC_KERNEL(trc_sample)(sampler, pixel, index, TRC_DIM_TIME);
@@ -140,9 +140,9 @@ void TRC_KERNEL(trc_camera_rays)(struct trc_tile *t) {
         vvec3 o = orthographic ? v3(sx, sy, zero) : v3_zero();
         vvec3 d = orthographic ? v3(zero, zero, -one) : v3(sx, sy, -one);
         if (lens) {
-            vfloat lx, ly;
-            lens_point(camera, TRC_KERNEL(trc_sample)(sampler, pixel, index, TRC_DIM_LENS_X),
-                       TRC_KERNEL(trc_sample)(sampler, pixel, index, TRC_DIM_LENS_Y), &lx, &ly);
+            vfloat at[2], lx, ly;
+            TRC_KERNEL(trc_samples)(sampler, pixel, index, TRC_DIM_LENS_X, 2, 0, 1, at);
+            lens_point(camera, at[0], at[1], &lx, &ly);
             const vvec3 focus = v3_add(o, v3_scale(d, vf_set(camera->focus_distance)));
             const vfloat radius = vf_set(camera->aperture_radius);
             o = v3_add(o, v3(lx * radius, ly * radius, zero));

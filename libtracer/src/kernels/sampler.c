@@ -81,24 +81,49 @@ TRC_INLINE uint32_t log2_ceiling(uint32_t n) {
 
 /* ---- Sobol ---- */
 
-/* Reversed number of point index in a dimension of the table. */
-TRC_INLINE vuint sobol_reversed(const uint32_t *table, vuint index, uint32_t dimension) {
-    const vuint first = vu_set((uint32_t)vi_get((vint)index, 0));
-    if (vm_all(vu_eq(index, first))) {
-        const uint32_t i = (uint32_t)vi_get((vint)index, 0);
-        uint32_t x = table[trc_sobol_offset(0, dimension) + (i & POINT_MASK)];
-        if (i >> TRC_SOBOL_POINT_BITS)
-            x ^=
-                table[trc_sobol_offset(1, dimension) + ((i >> TRC_SOBOL_POINT_BITS) & POINT_MASK)] ^
-                table[trc_sobol_offset(2, dimension) +
-                      ((i >> (2 * TRC_SOBOL_POINT_BITS)) & POINT_MASK)];
-        return vu_set(x);
-    }
+/* Points of the lanes as the table is read for them. */
+struct table_points {
+    vuint index;
+    uint32_t first; /* of lane 0 */
+    enum { POINTS_EQUAL, POINTS_RUN, POINTS_MIXED } kind;
+    bool small; /* all within the first row of the table */
+};
+
+TRC_INLINE struct table_points points_of(vuint index) {
+    struct table_points p = {.index = index, .first = (uint32_t)vi_get((vint)index, 0)};
+    const uint32_t place = p.first & POINT_MASK;
+    const vuint from_first = index - vu_set(p.first);
+    p.small = vm_all(vu_eq(index >> TRC_SOBOL_POINT_BITS, vu_set(0)));
+    if (vm_all(vu_eq(from_first, vu_set(0))))
+        p.kind = POINTS_EQUAL;
+    else if (place <= TRC_SOBOL_POINTS - TRC_WIDTH && vm_all(vu_eq(from_first, (vuint)vi_lane())))
+        p.kind = POINTS_RUN;
+    else
+        p.kind = POINTS_MIXED;
+    return p;
+}
+
+/* What the bits of point index above the first row add. */
+TRC_INLINE uint32_t upper_rows(const uint32_t *table, uint32_t index, uint32_t dimension) {
+    const uint32_t upper = index >> TRC_SOBOL_POINT_BITS;
+    return table[trc_sobol_offset(1, dimension) + (upper & POINT_MASK)] ^
+           table[trc_sobol_offset(2, dimension) + (upper >> TRC_SOBOL_POINT_BITS & POINT_MASK)];
+}
+
+/* Reversed numbers of points in a dimension of the table. */
+TRC_INLINE vuint sobol_reversed(const uint32_t *table, const struct table_points *p,
+                                uint32_t dimension) {
+    const uint32_t *row = table + trc_sobol_offset(0, dimension);
     const vuint mask = vu_set(POINT_MASK);
-    vuint x = vu_gather(table + trc_sobol_offset(0, dimension), (vint)(index & mask), vm_all_set());
-    const vuint upper = index >> TRC_SOBOL_POINT_BITS;
-    const vmask large = vm_not(vu_eq(upper, vu_set(0)));
-    if (vm_any(large)) {
+    if (p->kind != POINTS_MIXED) {
+        const uint32_t place = p->first & POINT_MASK;
+        const vuint x = p->kind == POINTS_EQUAL ? vu_set(row[place]) : vu_load(row + place);
+        return p->small ? x : x ^ vu_set(upper_rows(table, p->first, dimension));
+    }
+    vuint x = vu_gather(row, (vint)(p->index & mask), vm_all_set());
+    if (!p->small) {
+        const vuint upper = p->index >> TRC_SOBOL_POINT_BITS;
+        const vmask large = vm_not(vu_eq(upper, vu_set(0)));
         x ^= vu_gather(table + trc_sobol_offset(1, dimension), (vint)(upper & mask), large);
         x ^= vu_gather(table + trc_sobol_offset(2, dimension),
                        (vint)((upper >> TRC_SOBOL_POINT_BITS) & mask), large);
@@ -125,14 +150,23 @@ TRC_INLINE uint32_t joint_dimension(uint32_t dimension, uint32_t *group) {
     return TRC_DIM_BOUNCE + deep % (2 * TRC_DIMS_PER_BOUNCE);
 }
 
-static vfloat sobol_number(const uint32_t *table, vuint key, vuint index, uint32_t index_bits,
-                           uint32_t dimension) {
-    uint32_t group;
-    const uint32_t joint = joint_dimension(dimension, &group);
-    if (group > 0)
-        index = shuffle_index(index, vu_hash(key ^ vu_set(group * 0x68e31da4u)), index_bits);
-    const vuint seed = vu_hash(key + vu_set(dimension * 0x9e3779b9u));
-    return vu_to_unit(reverse_bits(scramble_reversed(sobol_reversed(table, index, joint), seed)));
+/* n numbers of consecutive dimensions; their chains of multiplications overlap. */
+static void sobol_numbers(const uint32_t *table, vuint key, vuint index, uint32_t index_bits,
+                          uint32_t dimension, uint32_t n, vfloat *u) {
+    struct table_points points = points_of(index);
+    uint32_t shuffled = 0; /* the group whose order points has */
+    for (uint32_t k = 0; k < n; k++) {
+        uint32_t group;
+        const uint32_t joint = joint_dimension(dimension + k, &group);
+        if (group != shuffled) {
+            shuffled = group;
+            const vuint seed = vu_hash(key ^ vu_set(group * 0x68e31da4u));
+            points = points_of(shuffle_index(index, seed, index_bits));
+        }
+        const vuint seed = vu_hash(key + vu_set((dimension + k) * 0x9e3779b9u));
+        const vuint x = sobol_reversed(table, &points, joint);
+        u[k] = vu_to_unit(reverse_bits(scramble_reversed(x, seed)));
+    }
 }
 
 /* ---- blue noise: one sequence for a block of 256 x 256 pixels, visited in shuffled Z-order
@@ -170,8 +204,8 @@ static vuint z_order(vuint x, vuint y, vuint seed) {
     return ordered;
 }
 
-static vfloat blue_number(const struct trc_sampler *sampler, vuint pixel, vuint index,
-                          uint32_t index_bits, uint32_t dimension) {
+static void blue_numbers(const struct trc_sampler *sampler, vuint pixel, vuint index,
+                         uint32_t index_bits, uint32_t dimension, uint32_t n, vfloat *u) {
     const vuint x = pixel & vu_set(0xffffu), y = pixel >> 16;
     const vuint block = vu_hash2((x >> BLOCK_BITS) | ((y >> BLOCK_BITS) << 16),
                                  vu_set(sampler->seed ^ 0x517cc1b7u));
@@ -181,8 +215,8 @@ static vfloat blue_number(const struct trc_sampler *sampler, vuint pixel, vuint 
     const vuint key = block ^ vu_select(vu_eq(above, vu_set(0)), vu_set(0), vu_hash(above));
     const vuint order = z_order(x, y, block);
     const vuint low = index & vu_set((1u << bits) - 1u);
-    return sobol_number(sampler->table, key, (order << bits) | low, bits + 2 * BLOCK_BITS,
-                        dimension);
+    sobol_numbers(sampler->table, key, (order << bits) | low, bits + 2 * BLOCK_BITS, dimension, n,
+                  u);
 }
 
 /* ---- interleaved tile ---- */
@@ -218,7 +252,8 @@ static vfloat sudoku_number(const struct trc_sampler *sampler, vuint pixel, vuin
     const vuint x = pixel & vu_set(0xffffu), y = pixel >> 16;
     const vuint tile = vu_hash2((x >> 3) | ((y >> 3) << 16), vu_set(sampler->seed ^ 0x2545f491u));
     /* The stratum: leading digits of a Sobol number that the whole tile shares. */
-    const vfloat shared = sobol_number(sampler->table, tile, index, index_bits, dimension);
+    vfloat shared;
+    sobol_numbers(sampler->table, tile, index, index_bits, dimension, 1, &shared);
     const float strata = (float)(1u << (index_bits < 18 ? index_bits : 18));
     const vfloat stratum = vf_floor(shared * vf_set(strata));
     const vuint h = vu_hash(tile ^ vu_hash(index * vu_set(0x9e3779b9u) + vu_set(dimension)));
@@ -294,29 +329,36 @@ static vfloat jitter_number(vuint key, vuint index, uint32_t index_bits, uint32_
 
 /* ---- interface ---- */
 
-static vfloat sequence_number(const struct trc_sampler *sampler, vuint pixel, vuint index,
-                              uint32_t count, uint32_t dimension) {
-    const uint32_t index_bits = log2_ceiling(count);
-    if (sampler->kind == TRC_SAMPLER_SUDOKU)
-        return sudoku_number(sampler, pixel, index, index_bits, dimension);
-    if (sampler->kind == TRC_SAMPLER_BLUE_NOISE)
-        return blue_number(sampler, pixel, index, index_bits, dimension);
-    const vuint key = vu_hash2(pixel, vu_set(sampler->seed));
-    if (sampler->kind == TRC_SAMPLER_JITTER)
-        return jitter_number(key, index, index_bits < 24 ? index_bits : 24, dimension);
-    if (sampler->kind == TRC_SAMPLER_INDEPENDENT)
-        return vu_to_unit(vu_hash(key ^ vu_hash(index + vu_set(dimension * 0x9e3779b9u))));
-    return sobol_number(sampler->table, key, index, index_bits, dimension);
-}
-
 vfloat TRC_KERNEL(trc_sample)(const struct trc_sampler *sampler, vuint pixel, vuint index,
                               uint32_t dimension) {
-    return sequence_number(sampler, pixel, index, sampler->sample_count, dimension);
+    vfloat u;
+    TRC_KERNEL(trc_samples)(sampler, pixel, index, dimension, 1, 0, 1, &u);
+    return u;
 }
 
-vfloat TRC_KERNEL(trc_sample_split)(const struct trc_sampler *sampler, vuint pixel, vuint index,
-                                    uint32_t dimension, uint32_t l, uint32_t count) {
+void TRC_KERNEL(trc_samples)(const struct trc_sampler *sampler, vuint pixel, vuint index,
+                             uint32_t dimension, uint32_t n, uint32_t l, uint32_t count,
+                             vfloat *u) {
     /* At most 2^20 samples of 64 light samples: 26 bits. */
-    const uint32_t planned = sampler->sample_count * count;
-    return sequence_number(sampler, pixel, index * vu_set(count) + vu_set(l), planned, dimension);
+    const uint32_t bits = log2_ceiling(sampler->sample_count * count);
+    if (count > 1)
+        index = index * vu_set(count) + vu_set(l);
+    if (sampler->kind == TRC_SAMPLER_BLUE_NOISE) {
+        blue_numbers(sampler, pixel, index, bits, dimension, n, u);
+        return;
+    }
+    const vuint key = vu_hash2(pixel, vu_set(sampler->seed));
+    if (sampler->kind == TRC_SAMPLER_SOBOL) {
+        sobol_numbers(sampler->table, key, index, bits, dimension, n, u);
+        return;
+    }
+    for (uint32_t k = 0; k < n; k++) {
+        const uint32_t d = dimension + k;
+        if (sampler->kind == TRC_SAMPLER_SUDOKU)
+            u[k] = sudoku_number(sampler, pixel, index, bits, d);
+        else if (sampler->kind == TRC_SAMPLER_JITTER)
+            u[k] = jitter_number(key, index, bits < 24 ? bits : 24, d);
+        else
+            u[k] = vu_to_unit(vu_hash(key ^ vu_hash(index + vu_set(d * 0x9e3779b9u))));
+    }
 }

@@ -34,16 +34,16 @@ struct trc_sampler {
     const uint32_t *table; /* Sobol numbers: trc_sobol_table_create, sampling/sobol.h */
 };
 
-/* u in [0, 1) for each lane: pixel = number of the pixel (x | y << 16), index = sample number,
- * below 2^30. Lanes may differ in both. One number costs about 3 instructions per lane at 16 lanes;
- * the table is read with one load where index is uniform and the dimension belongs to the joint
- * ones. */
+/* u[0..n) in [0, 1), dimensions dimension .. dimension + n - 1, for each lane: pixel = number of
+ * the pixel (x | y << 16), index = sample number, below 2^30; lanes may differ in both. count > 1:
+ * light sample l of count, stratified jointly over the pixel's samples (index * count + l in the
+ * sequence). One number costs about 3 instructions per lane at 16 lanes; the table is read with one
+ * load where lanes hold the same or consecutive points of the joint dimensions. */
+void TRC_KERNEL(trc_samples)(const struct trc_sampler *sampler, vuint pixel, vuint index,
+                             uint32_t dimension, uint32_t n, uint32_t l, uint32_t count, vfloat *u);
+
+/* One of them, with count 1. */
 vfloat TRC_KERNEL(trc_sample)(const struct trc_sampler *sampler, vuint pixel, vuint index,
                               uint32_t dimension);
-
-/* Light samples: number l of count for the camera sample index, stratified jointly over the pixel's
- * samples (index * count + l in the sequence). */
-vfloat TRC_KERNEL(trc_sample_split)(const struct trc_sampler *sampler, vuint pixel, vuint index,
-                                    uint32_t dimension, uint32_t l, uint32_t count);
 
 #endif

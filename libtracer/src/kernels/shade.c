@@ -378,14 +378,6 @@ static void sample_use(struct trc_tile *t, const struct arrival *a, const struct
         shadow_push(t, a, s, sample, &r, cell, lit);
 }
 
-/* Number of a dimension for light sample l of `most`. */
-TRC_INLINE vfloat light_number(const struct trc_tile *t, const struct arrival *a,
-                               uint32_t dimension, uint32_t l, uint32_t most) {
-    if (most > 1)
-        return TRC_KERNEL(trc_sample_split)(&t->sampler, a->pixel, a->sample, dimension, l, most);
-    return TRC_KERNEL(trc_sample)(&t->sampler, a->pixel, a->sample, dimension);
-}
-
 static void direct_light(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
                          const struct trc_lobes *lobes, vmask active) {
     const uint32_t dimension = TRC_DIM_BOUNCE + t->generation * TRC_DIMS_PER_BOUNCE;
@@ -396,8 +388,7 @@ static void direct_light(struct trc_tile *t, const struct arrival *a, const stru
         TRC_KERNEL(trc_shadow_flush)(t);
     for (uint32_t l = 0; l < most; l++) {
         vfloat u[3];
-        for (uint32_t k = 0; k < 3; k++)
-            u[k] = light_number(t, a, dimension + k, l, most);
+        TRC_KERNEL(trc_samples)(&t->sampler, a->pixel, a->sample, dimension, 3, l, most, u);
         const vmask wanted = vm_and(active, vf_lt(vf_set((float)l), count));
         const vuint cell =
             (vuint)(vf_to_int(u[1] * vf_set(4.0f)) | (vf_to_int(u[2] * vf_set(4.0f)) << 2));
@@ -454,8 +445,7 @@ static void ambient_light(struct trc_tile *t, const struct arrival *a, const str
     const int32_t number = (int32_t)(lights->first_triangle + lights->triangle_count);
     for (uint32_t l = 0; l < most; l++) {
         vfloat u[2];
-        for (uint32_t k = 0; k < 2; k++)
-            u[k] = light_number(t, a, dimension + k, l, most);
+        TRC_KERNEL(trc_samples)(&t->sampler, a->pixel, a->sample, dimension, 2, l, most, u);
         const struct trc_light_sample sample = {
             .wi = v3_from_frame(trc_warp_cosine(u[0], u[1]), x, y, n),
             .distance = vf_set(world->ao_distance),
@@ -594,11 +584,9 @@ static void continue_rays(struct trc_tile *t, const struct arrival *a, const str
         }
         return;
     }
-    const uint32_t dimension = TRC_DIM_BOUNCE + t->generation * TRC_DIMS_PER_BOUNCE;
+    const uint32_t dimension = TRC_DIM_BOUNCE + t->generation * TRC_DIMS_PER_BOUNCE + TRC_DIM_LOBE;
     vfloat u[3];
-    for (uint32_t k = 0; k < 3; k++)
-        u[k] =
-            TRC_KERNEL(trc_sample)(&t->sampler, a->pixel, a->sample, dimension + TRC_DIM_LOBE + k);
+    TRC_KERNEL(trc_samples)(&t->sampler, a->pixel, a->sample, dimension, 3, 0, 1, u);
     /* One stratified number for both choices: whether, and which lobe. */
     active = vm_and(active, vf_lt(u[0], a->chance));
     if (!vm_any(active))

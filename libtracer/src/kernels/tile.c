@@ -434,10 +434,10 @@ static void samples_order(struct trc_tile *t, bool lens, bool motion) {
         const vuint pixel = vu_load(t->samples.pixel + i), index = vu_load(t->samples.index + i);
         vint key = vi_set(0);
         if (lens) {
-            const vfloat u = TRC_KERNEL(trc_sample)(&t->sampler, pixel, index, TRC_DIM_LENS_X);
-            const vfloat v = TRC_KERNEL(trc_sample)(&t->sampler, pixel, index, TRC_DIM_LENS_Y);
-            key = vf_to_int(u * vf_set(lens_cells)) * vi_set((int32_t)lens_cells) +
-                  vf_to_int(v * vf_set(lens_cells));
+            vfloat at[2];
+            TRC_KERNEL(trc_samples)(&t->sampler, pixel, index, TRC_DIM_LENS_X, 2, 0, 1, at);
+            key = vf_to_int(at[0] * vf_set(lens_cells)) * vi_set((int32_t)lens_cells) +
+                  vf_to_int(at[1] * vf_set(lens_cells));
         }
         if (motion) {
             const vfloat u = TRC_KERNEL(trc_sample)(&t->sampler, pixel, index, TRC_DIM_TIME);

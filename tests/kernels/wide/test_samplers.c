@@ -100,9 +100,10 @@ static void split_samples_are_stratified(void **state) {
         for (uint32_t i = 0; i < 16; i++)
             for (uint32_t l = 0; l < 8; l++) {
                 const vuint pixel = vu_set(pixel_at(8, 2)), index = vu_set(i);
-                x[8 * i + l] = vf_get(TRC_KERNEL(trc_sample_split)(&s, pixel, index, d, l, 8), 0);
-                y[8 * i + l] =
-                    vf_get(TRC_KERNEL(trc_sample_split)(&s, pixel, index, d + 1, l, 8), 0);
+                vfloat u[2];
+                TRC_KERNEL(trc_samples)(&s, pixel, index, d, 2, l, 8, u);
+                x[8 * i + l] = vf_get(u[0], 0);
+                y[8 * i + l] = vf_get(u[1], 0);
             }
         for (uint32_t a = 0; a <= 7; a++)
             assert_true(fills_boxes(x, y, 128, a, 7 - a));
@@ -181,7 +182,8 @@ static void sudoku_covers_tiles(void **state) {
         }
 }
 
-/* A number is a function of pixel, index and dimension: whatever the other lanes are. */
+/* A number is a function of pixel, index and dimension: whatever the other lanes are, and however
+ * many dimensions are asked for. Sample numbers are equal, consecutive or neither. */
 static void lanes_do_not_matter(void **state) {
     (void)state;
     struct test_random random = test_random_seed(2);
@@ -189,17 +191,22 @@ static void lanes_do_not_matter(void **state) {
         const struct trc_sampler s = sampler(kinds[k], 100);
         for (int n = 0; n < 2000; n++) {
             uint32_t pixel[TRC_WIDTH], index[TRC_WIDTH];
-            for (int i = 0; i < TRC_WIDTH; i++) {
+            const uint32_t first = test_bits(&random) % (n % 2 ? 2100 : 3000000);
+            for (uint32_t i = 0; i < TRC_WIDTH; i++) {
                 pixel[i] = pixel_at(test_bits(&random) % 500, test_bits(&random) % 500);
-                index[i] = n % 3 ? test_bits(&random) % (n % 2 ? 100 : 3000000) : 5;
+                index[i] = n % 4 == 0   ? first
+                           : n % 4 == 1 ? first + i
+                                        : test_bits(&random) % (n % 4 == 2 ? 100 : 3000000);
             }
-            const uint32_t d = test_bits(&random) % 40;
-            const vfloat u = TRC_KERNEL(trc_sample)(&s, vu_load(pixel), vu_load(index), d);
-            for (int i = 0; i < TRC_WIDTH; i++) {
-                const vfloat one =
-                    TRC_KERNEL(trc_sample)(&s, vu_set(pixel[i]), vu_set(index[i]), d);
-                assert_true(vf_get(u, i) == vf_get(one, 0));
-            }
+            const uint32_t d = test_bits(&random) % 40, dims = 1 + test_bits(&random) % 3;
+            vfloat u[3];
+            TRC_KERNEL(trc_samples)(&s, vu_load(pixel), vu_load(index), d, dims, 0, 1, u);
+            for (uint32_t j = 0; j < dims; j++)
+                for (int i = 0; i < TRC_WIDTH; i++) {
+                    const vfloat one =
+                        TRC_KERNEL(trc_sample)(&s, vu_set(pixel[i]), vu_set(index[i]), d + j);
+                    assert_true(vf_get(u[j], i) == vf_get(one, 0));
+                }
         }
     }
 }
