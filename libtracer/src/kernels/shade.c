@@ -711,7 +711,7 @@ void TRC_KERNEL(trc_shade_batch)(struct trc_tile *t) {
             t->hits.instance[i] == TRC_NO_HIT ? keys_count - 1 : t->hits.material[i];
         t->keys[i] = key < keys_count ? key : keys_count - 1;
     }
-    TRC_KERNEL(trc_tile_sort)(t, t->keys, t->work.count, keys_count, t->order);
+    TRC_KERNEL(trc_tile_sort)(t, t->keys, t->work.count, t->order);
     for (uint32_t i = 0; i < t->work.count;) {
         const uint32_t first = t->order[i];
         if (t->hits.instance[first] == TRC_NO_HIT) {

@@ -114,25 +114,31 @@ static uint64_t transparency(struct trc_tile *t, float factor[3][TRC_PACKET_SIZE
     return blocked;
 }
 
-static void light_add(struct trc_tile *t, uint32_t ray, const float factor[3]) {
-    const struct trc_shadow_store *q = &t->shadows;
-    const uint32_t slot = q->slot[ray];
-    const float rgb[3] = {q->radiance[0][ray] * factor[0], q->radiance[1][ray] * factor[1],
-                          q->radiance[2][ray] * factor[2]};
-    trc_sample_add(t, slot, rgb);
-    if (!t->light_passes)
-        return;
+/* Scales what a ray carries by what of its light arrives. */
+static void light_scale(struct trc_tile *t, uint32_t ray, float r, float g, float b) {
+    struct trc_shadow_store *q = &t->shadows;
+    const float factor[3] = {r, g, b};
+    for (int c = 0; c < 3; c++) {
+        q->radiance[c][ray] *= factor[c];
+        for (int k = 0; t->light_passes && k < 3; k++)
+            q->split[3 * k + c][ray] *= factor[c];
+    }
+}
+
+/* Adds what a ray carries to the passes of light by kind. */
+static void passes_add(struct trc_tile *t, uint32_t ray) {
     static const uint32_t direct[3] = {TRC_PASS_DIFFUSE_DIRECT, TRC_PASS_GLOSSY_DIRECT,
                                        TRC_PASS_TRANSMISSION_DIRECT};
-    const uint32_t category = q->path[ray] >> TRC_PATH_CATEGORY_SHIFT & 3u;
+    const struct trc_shadow_store *q = &t->shadows;
+    const uint32_t slot = q->slot[ray], category = q->path[ray] >> TRC_PATH_CATEGORY_SHIFT & 3u;
     if (category) {
+        const float rgb[3] = {q->radiance[0][ray], q->radiance[1][ray], q->radiance[2][ray]};
         trc_pass_add(t, direct[category] + 1, slot, rgb);
         return;
     }
     for (int k = 0; k < 3; k++) {
-        const float part[3] = {q->split[3 * k][ray] * factor[0],
-                               q->split[3 * k + 1][ray] * factor[1],
-                               q->split[3 * k + 2][ray] * factor[2]};
+        const float part[3] = {q->split[3 * k][ray], q->split[3 * k + 1][ray],
+                               q->split[3 * k + 2][ray]};
         trc_pass_add(t, direct[k], slot, part);
     }
 }
@@ -143,12 +149,9 @@ void TRC_KERNEL(trc_shadow_flush)(struct trc_tile *t) {
         return;
     const bool transparent = t->snapshot->features & TRC_FEATURE_TRANSPARENCY;
     TRC_KERNEL(trc_clock_trace)(t);
-    uint32_t last = 0;
-    for (uint32_t i = 0; i < q->count; i++) {
+    for (uint32_t i = 0; i < q->count; i++)
         t->keys[i] = q->target[i] < TRC_BINS ? q->target[i] : TRC_BINS - 1;
-        last = t->keys[i] > last ? t->keys[i] : last;
-    }
-    TRC_KERNEL(trc_tile_sort)(t, t->keys, q->count, last + 1, q->order);
+    TRC_KERNEL(trc_tile_sort)(t, t->keys, q->count, q->order);
     memset(q->order + q->count, 0, TRC_PACKET_SIZE * sizeof *q->order);
     for (uint32_t begin = 0; begin < q->count; begin += t->packet_size) {
         const uint32_t count =
@@ -165,15 +168,17 @@ void TRC_KERNEL(trc_shadow_flush)(struct trc_tile *t) {
                     factor[k][i] = 1.0f;
             t->packet.active = traced & ~blocked;
             blocked |= transparency(t, factor);
+            for (uint32_t i = 0; i < count; i++)
+                light_scale(t, order[i], factor[0][i], factor[1][i], factor[2][i]);
         }
-        for (uint32_t i = 0; i < count; i++) {
-            if (blocked >> i & 1u)
-                continue;
-            const float f[3] = {transparent ? factor[0][i] : 1.0f,
-                                transparent ? factor[1][i] : 1.0f,
-                                transparent ? factor[2][i] : 1.0f};
-            light_add(t, order[i], f);
-        }
+        for (; blocked; blocked &= blocked - 1)
+            light_scale(t, order[__builtin_ctzll(blocked)], 0.0f, 0.0f, 0.0f);
+    }
+    for (uint32_t i = 0; i < q->count; i++) {
+        const float rgb[3] = {q->radiance[0][i], q->radiance[1][i], q->radiance[2][i]};
+        trc_sample_add(t, q->slot[i], rgb);
+        if (t->light_passes)
+            passes_add(t, i);
     }
     q->count = 0;
     TRC_KERNEL(trc_clock_shade)(t);

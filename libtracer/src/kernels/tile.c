@@ -97,15 +97,26 @@ size_t TRC_KERNEL(trc_tile_memory_bytes)(const trc_render_desc *desc) {
 /* ---- sorting ---- */
 
 void TRC_KERNEL(trc_tile_sort)(struct trc_tile *t, const uint32_t *keys, uint32_t count,
-                               uint32_t bin_count, uint32_t *order) {
+                               uint32_t *order) {
+    uint32_t least = UINT32_MAX, most = 0;
+    for (uint32_t i = 0; i < count; i++) {
+        least = keys[i] < least ? keys[i] : least;
+        most = keys[i] > most ? keys[i] : most;
+    }
+    if (least >= most) { /* mostly so for camera rays */
+        for (uint32_t i = 0; i < count; i++)
+            order[i] = i;
+        return;
+    }
     uint32_t *const bins = t->bins;
+    const uint32_t bin_count = most - least + 1;
     memset(bins, 0, (bin_count + 1) * sizeof *bins);
     for (uint32_t i = 0; i < count; i++)
-        bins[keys[i] + 1]++;
+        bins[keys[i] - least + 1]++;
     for (uint32_t i = 1; i < bin_count; i++)
-        bins[i + 1] += bins[i];
+        bins[i] += bins[i - 1];
     for (uint32_t i = 0; i < count; i++)
-        order[bins[keys[i]]++] = i;
+        order[bins[keys[i] - least]++] = i;
 }
 
 /* ---- tracing a step's rays ---- */
@@ -148,20 +159,6 @@ static void keys_by_direction(struct trc_tile *t) {
         const vmask camera =
             vi_eq((vint)(kind & vu_set(TRC_VISIBLE_CAMERA)), vi_set(TRC_VISIBLE_CAMERA));
         vi_store((int32_t *)t->keys + i, vi_select(camera, vi_set(0), (vint)cell));
-    }
-}
-
-/* More than any key. */
-static uint32_t assembly_bins(const struct trc_tile *t) {
-    switch (t->desc->assembly) {
-    case TRC_ASSEMBLY_GROUPS:
-        return TRC_BINS;
-    case TRC_ASSEMBLY_OCTANTS:
-        return 256;
-    case TRC_ASSEMBLY_AUTO:
-        return (TRC_VISIBLE_ALL + 1) * TRC_DIRECTION_CELLS;
-    default:
-        return TRC_VISIBLE_ALL + 1;
     }
 }
 
@@ -233,7 +230,7 @@ static void trace_batch(struct trc_tile *t) {
     else
         for (uint32_t i = 0; i < count; i++)
             t->keys[i] = assembly_key(t, i);
-    TRC_KERNEL(trc_tile_sort)(t, t->keys, count, assembly_bins(t), t->order);
+    TRC_KERNEL(trc_tile_sort)(t, t->keys, count, t->order);
     for (uint32_t begin = 0; begin < count;) {
         const uint32_t key = t->keys[t->order[begin]];
         uint32_t end = begin + 1;
@@ -302,21 +299,13 @@ TRC_INLINE bool is_finite_sample(const struct trc_tile *t, uint32_t slot) {
                     t->samples.radiance[2][slot]);
 }
 
-/* Adds a sample to its pixel. */
-static void film_add_sample(struct trc_tile *t, uint32_t slot, size_t pixel) {
-    struct trc_film *film = t->job->film;
-    double *combined = film->sums[TRC_PASS_COMBINED] + 4 * pixel;
-    for (int c = 0; c < 3; c++)
-        combined[c] += (double)t->samples.radiance[c][slot];
-    combined[3] += 1.0 - (double)t->samples.transparency[slot];
-    const bool first = film->sample_counts[pixel]++ == 0;
-    if (!t->extra_passes)
-        return;
+/* Adds a sample's passes to its pixel. */
+static void film_add_passes(struct trc_tile *t, uint32_t slot, size_t pixel, bool first) {
     for (uint32_t pass = 1; pass < TRC_PASS_SAMPLE_COUNT; pass++) {
         if (!t->samples.pass[pass][0])
             continue;
         const uint32_t channels = trc_pass_channels(pass);
-        double *sum = film->sums[pass] + channels * pixel;
+        double *sum = t->job->film->sums[pass] + channels * pixel;
         for (uint32_t k = 0; k < channels; k++) {
             const double value = (double)t->samples.pass[pass][k][slot];
             if (!isfinite(value))
@@ -329,14 +318,38 @@ static void film_add_sample(struct trc_tile *t, uint32_t slot, size_t pixel) {
     }
 }
 
-/* Adds the batch's samples to the film in the order of their slots; samples that are not finite are
+/* Adds the samples [begin, end), of one pixel, to it, in their order. Those that are not finite are
  * left out and counted. */
-static void film_add(struct trc_tile *t) {
-    for (uint32_t slot = 0; slot < t->samples.count; slot++) {
-        if (is_finite_sample(t, slot))
-            film_add_sample(t, slot, film_pixel(t, slot));
-        else
+static void film_add_run(struct trc_tile *t, uint32_t begin, uint32_t end, size_t pixel) {
+    struct trc_film *film = t->job->film;
+    double *combined = film->sums[TRC_PASS_COMBINED] + 4 * pixel;
+    double sum[4] = {combined[0], combined[1], combined[2], combined[3]};
+    uint32_t count = film->sample_counts[pixel];
+    for (uint32_t slot = begin; slot < end; slot++) {
+        if (!is_finite_sample(t, slot)) {
             t->job->counts.dropped_samples++;
+            continue;
+        }
+        for (int c = 0; c < 3; c++)
+            sum[c] += (double)t->samples.radiance[c][slot];
+        sum[3] += 1.0 - (double)t->samples.transparency[slot];
+        if (t->extra_passes)
+            film_add_passes(t, slot, pixel, count == 0);
+        count++;
+    }
+    memcpy(combined, sum, sizeof sum);
+    film->sample_counts[pixel] = count;
+}
+
+/* Adds the batch's samples to the film in the order of their slots. */
+static void film_add(struct trc_tile *t) {
+    const uint32_t *pixel = t->samples.pixel, count = t->samples.count;
+    for (uint32_t begin = 0; begin < count;) {
+        uint32_t end = begin + 1;
+        while (end < count && pixel[end] == pixel[begin])
+            end++;
+        film_add_run(t, begin, end, film_pixel(t, begin));
+        begin = end;
     }
 }
 
@@ -352,7 +365,7 @@ static void film_add_adaptive(struct trc_tile *t) {
         for (int c = 0; c < 3; c++)
             p->sum[c] += (double)t->samples.radiance[c][slot];
         if (p->reasons & TRC_PIXEL_COUNTS)
-            film_add_sample(t, slot, pixel);
+            film_add_run(t, slot, slot + 1, pixel);
     }
 }
 
@@ -445,7 +458,7 @@ static void samples_order(struct trc_tile *t, bool lens, bool motion) {
         }
         vi_store((int32_t *)t->keys + i, key);
     }
-    TRC_KERNEL(trc_tile_sort)(t, t->keys, count, 64, t->order);
+    TRC_KERNEL(trc_tile_sort)(t, t->keys, count, t->order);
     uint32_t *const columns[] = {t->samples.pixel, t->samples.index};
     for (int k = 0; k < 2; k++) {
         memcpy(t->keys, columns[k], count * sizeof *t->keys);

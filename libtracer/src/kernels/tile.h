@@ -129,9 +129,9 @@ TRC_INLINE vuint trc_direction_cell(vvec3 d) {
 /* Number of bins of the counting sorts. */
 #define TRC_BINS 4096
 
-/* order[0..count) = indices sorted stably by keys[i] < bin_count. */
+/* order[0..count) = indices sorted stably by keys[i] < TRC_BINS. */
 void TRC_KERNEL(trc_tile_sort)(struct trc_tile *t, const uint32_t *keys, uint32_t count,
-                               uint32_t bin_count, uint32_t *order);
+                               uint32_t *order);
 
 /* Material of a hit, into the snapshot's. */
 uint32_t TRC_KERNEL(trc_hit_material)(const struct trc_snapshot *snapshot, uint32_t instance,
