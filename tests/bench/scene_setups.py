@@ -400,6 +400,8 @@ SCENES = {
                          frame=3, shutter=1.0),
     "mesh_motion_flat": Scene(APPLESEED + "motion_blur/04 - mesh.blend", prepare_appleseed, 96, 72,
                               frame=3, shutter=1.0, is_flat=True),
+    "knight_motion_flat": Scene("05_kaykit_knight/Knight.glb", prepare_knight, 160, 90, 9,
+                                shutter=0.6, is_flat=True),
     "example_motion_flat": Scene("examples/make_character.py", prepare_example, 160, 90, 12,
                                  in_project=True, shutter=0.5, is_flat=True),
 }
