@@ -14,7 +14,7 @@ packages=(
     python3 python3-numpy python3-pytest python3-openimageio
     xvfb xauth libgl1-mesa-dri
 )
-ci_packages=(clang-14 clang-format-14 binutils)
+ci_packages=(clang-14 libclang-rt-14-dev clang-format-14 binutils)
 
 say() { printf '== %s\n' "$*"; }
 die() { printf 'setup: %s\n' "$*" >&2; exit 1; }
