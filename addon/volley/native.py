@@ -338,6 +338,7 @@ class Scene:
         desc = _SceneDesc(thread_count=thread_count, is_final=int(is_final))
         _call("trc_scene_create", ctypes.byref(desc), ctypes.byref(handle))
         self._handle = handle.value
+        self.revision = 0  # rises with every edit: equal numbers mean nothing to commit
 
     def destroy(self):
         """Free everything; renders already started are not disturbed. May be called twice."""
@@ -402,11 +403,11 @@ class Scene:
     def update_mesh(self, mesh, positions, normals=None):
         """New positions, (keys, vertices, 3), and normals for the same topology."""
         positions, normals = _array(positions, np.float32), _array(normals, np.float32)
-        _call("trc_mesh_update", self._handle, mesh, positions.shape[0], _address(positions),
-              positions.size, _address(normals), 0 if normals is None else normals.size)
+        self._edit("trc_mesh_update", mesh, positions.shape[0], _address(positions),
+                   positions.size, _address(normals), 0 if normals is None else normals.size)
 
     def destroy_mesh(self, mesh):
-        _call("trc_mesh_destroy", self._handle, mesh)
+        self._edit("trc_mesh_destroy", mesh)
 
     # Instances
 
@@ -419,10 +420,10 @@ class Scene:
         """mesh: id; transforms (keys, 12) float32; materials: ids by slot; visibility; pass_index;
         random [0, 1); color: four floats."""
         desc, keep = self._instance_desc(**values)
-        _call("trc_instance_update", self._handle, instance, ctypes.byref(desc))
+        self._edit("trc_instance_update", instance, ctypes.byref(desc))
 
     def destroy_instance(self, instance):
-        _call("trc_instance_destroy", self._handle, instance)
+        self._edit("trc_instance_destroy", instance)
 
     @staticmethod
     def _instance_desc(mesh, transforms, materials=(), visibility=VISIBLE_ALL, pass_index=0,
@@ -442,14 +443,14 @@ class Scene:
         return self._create("trc_light_create", _LightDesc(**values))
 
     def update_light(self, light, **values):
-        _call("trc_light_update", self._handle, light, ctypes.byref(_LightDesc(**values)))
+        self._edit("trc_light_update", light, ctypes.byref(_LightDesc(**values)))
 
     def destroy_light(self, light):
-        _call("trc_light_destroy", self._handle, light)
+        self._edit("trc_light_destroy", light)
 
     def set_world(self, **values):
         """Keywords are the fields of trc_world_desc."""
-        _call("trc_scene_set_world", self._handle, ctypes.byref(_WorldDesc(**values)))
+        self._edit("trc_scene_set_world", ctypes.byref(_WorldDesc(**values)))
 
     def set_camera(self, transforms, windows, shutter_curve=None, **values):
         """transforms (keys, 12); windows (keys or 1, 4): left, right, bottom, top; shutter_curve:
@@ -461,7 +462,7 @@ class Scene:
             key_count=len(transforms), transforms=_address(transforms), windows=_address(windows),
             window_key_count=len(windows), shutter_curve=_address(curve),
             shutter_curve_count=0 if curve is None else len(curve), **values)
-        _call("trc_scene_set_camera", self._handle, ctypes.byref(desc))
+        self._edit("trc_scene_set_camera", ctypes.byref(desc))
 
     # Materials and images
 
@@ -474,10 +475,10 @@ class Scene:
         """nodes: objects with type, mode, inputs, image, name, table; inputs: (node, output, (x, y, z))
         triples, node -1 for the constant, -2 for the socket's own default. surface: node index."""
         desc, keep = self._material_desc(nodes, surface, pass_index, flags)
-        _call("trc_material_update", self._handle, material, ctypes.byref(desc))
+        self._edit("trc_material_update", material, ctypes.byref(desc))
 
     def destroy_material(self, material):
-        _call("trc_material_destroy", self._handle, material)
+        self._edit("trc_material_destroy", material)
 
     @staticmethod
     def _material_desc(nodes, surface, pass_index, flags):
@@ -510,7 +511,7 @@ class Scene:
         return self._create("trc_image_create", desc)
 
     def destroy_image(self, image):
-        _call("trc_image_destroy", self._handle, image)
+        self._edit("trc_image_destroy", image)
 
     def start_render(self, **values):
         """Start rendering the committed scene in the background; keywords are the fields of
@@ -523,8 +524,12 @@ class Scene:
 
     def _create(self, function, desc):
         new_id = _u64()
-        _call(function, self._handle, ctypes.byref(desc), ctypes.byref(new_id))
+        self._edit(function, ctypes.byref(desc), ctypes.byref(new_id))
         return new_id.value
+
+    def _edit(self, function, *arguments):
+        _call(function, self._handle, *arguments)
+        self.revision += 1
 
 
 class Render:

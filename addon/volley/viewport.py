@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The rendered viewport: the library renders progressively in its threads, Blender draws what is there.
+"""The rendered viewport: the library builds and renders in threads of its own, Blender draws what is there.
 
-An edit syncs what changed and starts anew; a view move sends the camera alone. The film is drawn as a
-scene-linear texture, which Blender turns into display colours.
+An edit is marked when Blender tells of it and copied at the next draw; what was built and rendered
+stays on the screen until the first complete picture after the edit replaces it. That one has a sample
+per pixel, and fewer pixels where a full one would take too long; the next has all pixels and gathers
+samples until the view or the scene changes. The film is drawn as a scene-linear texture, which Blender
+turns into display colours.
 """
 
+import threading
 import time
 
 import gpu
@@ -17,7 +21,11 @@ from .sync import SceneSync, Source, camera
 from .sync.changes import Changes
 
 MAX_HALF = 65504.0
-DRAW_SECONDS = 0.03  # at least this long between two read-outs of the film
+DRAW_SECONDS = 0.03     # at least this long between two read-outs of the film
+NAP_SECONDS = 0.004     # how long a draw may wait for what is nearly there
+PICTURE_SECONDS = 0.03  # the budget of the first picture
+MAX_DIVISOR = 8         # of the first picture's width and height
+SHOWN_SAMPLES = 4       # of a refined picture, before it replaces the first
 
 
 class Viewport:
@@ -25,54 +33,74 @@ class Viewport:
 
     def __init__(self):
         self._sync = None
-        self._render = None
-        self._view = None      # what the running render looks at
-        self._texture = None
-        self._origin = (0, 0)  # of the texture in the region, pixels
-        self._version = -1
-        self._next_read = 0.0
-        self._features = ""
-        self._samples = 0
-        self._progress = None
-        self._reported = set()  # warnings are shown once, not at every edit
+        self._changes = Changes.everything()  # not yet copied
+        self._visibility = None  # what of the view decides which objects it shows
+        self._build = None
+        self._built_revision = -1
+        self._pictures = _Pictures()
+        self._reported = set()   # warnings are shown once, not at every edit
 
     def free(self):
         """Stop rendering and free everything native."""
-        self._stop()
+        self._pictures.stop()
+        build, self._build = self._build, None
         sync, self._sync = self._sync, None
+        if build is not None:
+            build.cancel()
         if sync is not None:
             sync.destroy()
 
-    def update(self, engine, context, depsgraph):
-        """The scene changed: stop, sync, build; the next draw starts a render."""
+    def update(self, engine, _context, depsgraph):
+        """The scene changed: mark what."""
         if not native.load():
             raise native.TracerError(0, native.load_error())
-        scene = depsgraph.scene_eval
-        changes = Changes.of_depsgraph(depsgraph)
-        if self._sync is None:
-            self._sync = SceneSync(is_final=False, thread_count=thread_count(scene.render),
-                                   will_resync=True)
-            changes = Changes.everything()
-        elif not changes.any():
-            # A frame change without animation, or something Blender does not name.
-            changes = Changes.everything()
-        self._stop()
-        self._view = None
-        self._sync.update(Source(depsgraph, changes, v3d=context.space_data))
-        self._report(engine, self._sync.warnings.take())
+        self._changes.merge(Changes.of_depsgraph(depsgraph))
+        engine.tag_redraw()
 
     def draw(self, engine, context, depsgraph):
-        """Start a render if the view is another, read the film if there is more of it, draw it."""
-        if self._sync is None:
-            return
-        scene = depsgraph.scene_eval
-        view = _View.of_context(context, depsgraph, self._sync.warnings)
-        if self._view is None or self._view.signature != view.signature:
-            self._start(scene, view)
-        is_running = self._read()
-        self._draw_texture(engine, scene)
-        if is_running:
+        """Copy what was marked, start a build or a render where one is due, draw the latest picture."""
+        is_current = self._synchronise(engine, context, depsgraph)
+        if is_current:
+            self._pictures.follow(self._sync, context, depsgraph)
+        is_running = self._pictures.read()
+        self._pictures.draw(engine, depsgraph.scene_eval)
+        if is_running or not is_current:
             engine.tag_redraw()
+
+    def _synchronise(self, engine, context, depsgraph):
+        """Bring the library's scene up to date; whether it is."""
+        if self._build is not None and not self._end_build():
+            return False
+        if self._sync is None:
+            self._sync = SceneSync(is_final=False, thread_count=thread_count(depsgraph.scene_eval.render),
+                                   will_resync=True)
+        visibility = _visibility_of(context.space_data)
+        if visibility != self._visibility:  # Blender tells no engine of these
+            self._changes, self._visibility = Changes.everything(), visibility
+        changes, self._changes = self._changes, Changes()
+        if changes.any():
+            try:
+                self._sync.update(Source(depsgraph, changes, v3d=context.space_data))
+            except BaseException:
+                self._changes = Changes.everything()
+                raise
+            self._report(engine, self._sync.warnings.take())
+        self._pictures.look(self._sync, context, depsgraph)
+        if self._sync.scene.revision == self._built_revision:
+            return True
+        self._pictures.stop()
+        self._build = _Build(self._sync.scene)
+        return self._end_build()
+
+    def _end_build(self):
+        """Note a build that has ended; False while it runs."""
+        if not self._build.is_done(NAP_SECONDS):
+            return False
+        build, self._build = self._build, None
+        if build.failure is not None:
+            raise build.failure
+        self._built_revision = build.revision
+        return True
 
     def _report(self, engine, messages):
         for message in messages:
@@ -80,48 +108,175 @@ class Viewport:
                 self._reported.add(message)
                 engine.report({'WARNING'}, message)
 
-    def _start(self, scene, view):
-        self._stop()
-        self._sync.set_camera(view.keys)
-        self._sync.scene.commit()
-        self._features = ", ".join(self._sync.scene.features())
-        frame = camera.Frame(*view.size)
-        fields = render_fields(scene, frame, view.crop, [passes.COMBINED], is_preview=True)
-        self._samples = fields["sample_count"]
-        fields.update(progressive=1, film_transparent=int(scene.render.film_transparent))
-        self._render = self._sync.scene.start_render(**fields)
-        self._view, self._version, self._next_read = view, -1, 0.0
-        self._origin = view.crop[:2]
 
-    def _stop(self):
+class _Build:
+    """A commit on another thread, so that Blender goes on meanwhile."""
+
+    def __init__(self, scene):
+        self._scene = scene
+        self.revision, self.failure = scene.revision, None
+        self._thread = threading.Thread(target=self._work, name="volley commit")
+        self._thread.start()
+
+    def _work(self):
+        try:
+            self._scene.commit()
+        except native.TracerError as error:
+            self.failure = error
+
+    def is_done(self, seconds):
+        """Whether it has ended, after waiting for it that long."""
+        self._thread.join(seconds)
+        return not self._thread.is_alive()
+
+    def cancel(self):
+        """Stop it and wait; it looks often."""
+        while not self.is_done(NAP_SECONDS):
+            self._scene.cancel()
+
+
+class _Pictures:
+    """The render of one viewport: its stages from the first quick picture on, and the texture."""
+
+    def __init__(self):
+        self._view = None
+        self._wanted = None     # what the stages render: revision, view and settings
+        self._fields = {}
+        self._divisors = []     # of the stages that are still to come
+        self._divisor = 1
+        self._render = None
+        self._texture, self._place = None, (0, 0, 0, 0)
+        self._version, self._next_read = -1, 0.0
+        self._progress = None
+        self._status = ""
+        self._samples = 0
+        self._features = ""
+        self._started, self._first_seconds = 0.0, 0.0
+        self._pixel_seconds = 0.0  # of one sample of one pixel, as last measured
+
+    def look(self, sync, context, depsgraph):
+        """Note what the viewport looks at and tell the library if that is new."""
+        view = _View.of_context(context, depsgraph, sync.warnings)
+        if self._view is None or self._view.signature != view.signature:
+            sync.set_camera(view.keys)
+        self._view = view
+
+    def follow(self, sync, context, depsgraph):
+        """Start to render what is in the library, unless that is under way or done."""
+        scene, view = depsgraph.scene_eval, self._view
+        fields = render_fields(scene, camera.Frame(*view.size), view.crop, [passes.COMBINED],
+                               is_preview=True)
+        fields["progressive"] = 1
+        if scene.volley.sampler == 'SOBOL':
+            fields["sampler"] = native.SAMPLERS['BLUE_NOISE']
+        wanted = (sync.scene.revision, view.signature, tuple(sorted(fields.items())),
+                  scene.render.preview_pixel_size)
+        if wanted == self._wanted:
+            self._next_stage(sync)
+            return
+        self.stop()
+        self._wanted, self._fields = wanted, fields
+        self._features = ", ".join(sync.scene.features())
+        self._started, self._first_seconds = time.monotonic(), 0.0
+        size = scene.render.preview_pixel_size
+        least = 1 if size == 'AUTO' else int(size)
+        self._divisors = [max(least, self._first_divisor()), least]
+        self._next_stage(sync)
+
+    def stop(self):
+        """End what is rendered; the texture stays."""
         render, self._render = self._render, None
+        self._wanted, self._divisors = None, []
         if render is not None:
             render.destroy()
 
-    def _read(self):
-        """Bring the texture up to date; whether the render still runs."""
+    def _first_divisor(self):
+        """Of a picture that can be there within the budget."""
+        fields = self._fields
+        seconds = self._pixel_seconds * fields["crop_width"] * fields["crop_height"]
+        divisor = 1
+        while divisor < MAX_DIVISOR and seconds > PICTURE_SECONDS * divisor * divisor:
+            divisor *= 2
+        return divisor
+
+    def _next_stage(self, sync):
+        """Start the next stage when the one before has ended and been read."""
+        if not self._divisors or self._render is not None:
+            return
+        is_first = len(self._divisors) > 1
+        self._divisor = self._divisors.pop(0)
+        fields = _divided(self._fields, self._divisor)
+        if is_first:
+            fields.update(sample_count=1, noise_threshold=0.0)
+        self._samples = fields["sample_count"]
+        width, height = fields["width"], fields["height"]
+        scale_x, scale_y = self._view.size[0] / width, self._view.size[1] / height
+        self._place_next = (fields["crop_x"] * scale_x, fields["crop_y"] * scale_y,
+                            fields["crop_width"] * scale_x, fields["crop_height"] * scale_y)
+        self._render = sync.scene.start_render(**fields)
+        self._version, self._next_read = -1, 0.0
+
+    def read(self):
+        """Bring the texture up to date; whether there is more to come."""
         if self._render is None:
-            return False
-        progress = self._render.poll()
+            return bool(self._divisors)
+        is_first = bool(self._divisors)
+        if is_first:
+            self._render.wait(NAP_SECONDS)
+        progress = self._progress = self._render.poll()
         is_running = progress.state == native.STATE_RUNNING
+        shown = 1 if is_first else min(SHOWN_SAMPLES, self._samples)
         now = time.monotonic()
-        is_due = now >= self._next_read or not is_running
-        if progress.version != self._version and progress.version > 0 and is_due:
+        if progress.samples_done >= shown and progress.version != self._version and (
+                now >= self._next_read or not is_running):
             self._version, self._next_read = progress.version, now + DRAW_SECONDS
-            self._texture = _texture_of(passes.read_combined(self._render))
-        self._progress = progress
+            pixels = passes.read_combined(self._render)
+            self._texture, self._place = _texture_of(pixels), self._place_next
+            self._status = status_text(progress, self._samples, self._features)
+            if is_first:
+                self._first_seconds = now - self._started
+                self._pixel_seconds = progress.seconds / (pixels.shape[0] * pixels.shape[1])
+        if is_first and not is_running:
+            self._render.destroy()
+            self._render = None
+            return True
         return is_running or progress.version != self._version
 
-    def _draw_texture(self, engine, scene):
+    def draw(self, engine, scene):
+        """Draw the texture and write what it took."""
         if self._texture is None:
             return
         gpu.state.blend_set('ALPHA_PREMULT')
         engine.bind_display_space_shader(scene)
-        draw_texture_2d(self._texture, self._origin, self._texture.width, self._texture.height)
+        x, y, width, height = self._place
+        draw_texture_2d(self._texture, (x, y), width, height)
         engine.unbind_display_space_shader()
         gpu.state.blend_set('NONE')
-        if self._render is not None:
-            engine.update_stats("", status_text(self._progress, self._samples, self._features))
+        rate = f"{1.0 / self._first_seconds:.0f} fps | " if self._first_seconds > 0.0 else ""
+        engine.update_stats("", rate + self._status)
+
+
+def _divided(fields, divisor):
+    """Fields of a render of the same view with 1 / divisor the width and height."""
+    if divisor == 1:
+        return dict(fields)
+    width, height = (max(1, fields[name] // divisor) for name in ("width", "height"))
+    x, y = min(fields["crop_x"] // divisor, width - 1), min(fields["crop_y"] // divisor, height - 1)
+    return {**fields, "width": width, "height": height, "crop_x": x, "crop_y": y,
+            "crop_width": min(max(1, fields["crop_width"] // divisor), width - x),
+            "crop_height": min(max(1, fields["crop_height"] // divisor), height - y)}
+
+
+def _visibility_of(v3d):
+    """What a 3D view alone decides of which objects it shows."""
+    kinds = tuple(value for name in _OBJECT_KINDS if (value := getattr(v3d, name, None)) is not None)
+    local = v3d.local_view is not None
+    return local, v3d.use_local_collections, kinds
+
+
+_OBJECT_KINDS = tuple(f"show_object_viewport_{kind}" for kind in (
+    "mesh", "curve", "curves", "surf", "meta", "font", "hair", "pointcloud", "volume", "grease_pencil",
+    "armature", "lattice", "empty", "light", "light_probe", "camera", "speaker"))
 
 
 class _View:

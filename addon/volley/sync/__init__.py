@@ -5,6 +5,7 @@
 Blender is kept from one sync to the next but names and numbers.
 """
 
+from collections import Counter
 from dataclasses import dataclass
 
 import bpy
@@ -48,6 +49,8 @@ class SceneSync:
         self._meshes = mesh.Meshes(self.scene, will_resync, self.warnings)
         self._instances = instance.Instances(self.scene, self.warnings)
         self._lights = light.Lights(self.scene, self.warnings)
+        self._world = None   # what the library was last told of it
+        self._shown = None   # what the last full walk found
 
     def destroy(self):
         """Free the library's scene."""
@@ -57,8 +60,10 @@ class SceneSync:
         """Bring everything but the camera up to date. With a shutter, Blender is moved through it;
         camera_keys(fraction) is called at each time to look at the camera too. The caller restores
         the frame."""
+        if shutter is None and self._update_part(source):
+            return
         self._images.begin(source.changes)
-        self._materials.begin()
+        self._materials.begin(source.changes)
         self._meshes.begin()
         self._sync_materials(source)
         walk = _Walk(self, source, shutter)
@@ -72,6 +77,54 @@ class SceneSync:
         self._meshes.end()
         self._materials.end()
         self._images.end()
+        self._shown = _Shown(walk, source) if shutter is None else None
+
+    def _update_part(self, source):
+        """Bring up to date what changed, without a walk over everything; False where one is needed,
+        which is safe at any point before the end."""
+        changes, shown = source.changes, self._shown
+        if changes.full or changes.structure or shown is None or not shown.is_of(source):
+            return False
+        if not all(self._materials.knows(name) for name in changes.materials):
+            return False
+        touched = [shown.find(name, source) for name in changes.objects]
+        if not all(touched):
+            return False
+        self._shown = None  # until all is done
+        self._images.begin(changes)
+        names = self._materials.attribute_names()
+        if not self._materials.change(source.depsgraph, changes):
+            return False
+        if changes.world:
+            self._sync_world(source)
+        if self._materials.attribute_names() != names:
+            return False
+        for each in touched:
+            if each is not shown.IRRELEVANT and not self._change_object(each, shown, source):
+                return False
+        self._images.end()
+        self._shown = shown
+        return True
+
+    def _change_object(self, each, shown, source):
+        """Bring one object up to date; False where its mesh must be read in a walk."""
+        name, view_layer = each.object.name_full, source.depsgraph.view_layer_eval
+        if instance.is_light(each):
+            item = instance.describe(each, view_layer)
+            fields = light.describe(each.object, item.transforms[0], item.visibility, self.warnings)
+            return fields is not None and self._lights.change(item.key, fields)
+        known = shown.items[instance.key_of(each)]
+        if name in source.changes.geometry:
+            data = each.object.data
+            is_pose = name not in source.changes.topology and mesh.is_posable(each.object)
+            if shown.users[known.mesh_key] != 1 or not is_pose or not self._meshes.pose(
+                    known.mesh_key, data.as_pointer(), data):
+                return False
+        item = instance.describe(each, view_layer)
+        item.mesh_key = known.mesh_key
+        item.materials = _material_ids(self._materials, each, view_layer)
+        self._instances.change(item, self._meshes.id_of(item.mesh_key))
+        return True
 
     def _sync_materials(self, source):
         """Flatten the materials first: they say which attributes the meshes must bring."""
@@ -84,7 +137,10 @@ class SceneSync:
         scene = source.depsgraph.scene_eval
         shown = scene.world if source.depsgraph.view_layer_eval.use_sky else None
         material_id = self._materials.world_id(shown) if shown else 0
-        self.scene.set_world(**world.describe(shown, material_id, scene.volley))
+        fields = world.describe(shown, material_id, scene.volley)
+        if fields != self._world:
+            self.scene.set_world(**fields)
+        self._world = fields
 
     def set_camera(self, keys, shutter=None):
         """Send the camera; keys as camera.CameraKeys."""
@@ -94,13 +150,61 @@ class SceneSync:
             camera.send(self.scene, keys, shutter.length, shutter.curve)
 
 
+class _Shown:
+    """What a full walk found, by which later syncs know objects that stand for themselves."""
+
+    IRRELEVANT = object()  # an object that is no part of the picture
+
+    # These never show anything and never make instances.
+    _SILENT_TYPES = {'ARMATURE', 'CAMERA', 'LATTICE', 'SPEAKER', 'LIGHT_PROBE'}
+
+    def __init__(self, walk, source):
+        self.items, self._lights, self._tied = walk.items, walk.lights, walk.tied
+        self.users = Counter(item.mesh_key for item in walk.items.values())
+        self._identity = self._identity_of(source)
+
+    @staticmethod
+    def _identity_of(source):
+        depsgraph = source.depsgraph
+        return depsgraph.scene.name_full, depsgraph.view_layer.name, depsgraph.as_pointer()
+
+    def is_of(self, source):
+        """Whether a source shows the same scene and view layer."""
+        return self._identity == self._identity_of(source)
+
+    def find(self, name, source):
+        """The object of that name as an instance, IRRELEVANT, or None where only a walk can tell."""
+        original = bpy.data.objects.get(name)
+        if original is None or name in self._tied:
+            return None
+        evaluated = original.evaluated_get(source.depsgraph)
+        if not evaluated.is_evaluated:
+            return None
+        each = instance.Plain(evaluated)
+        key = instance.key_of(each)
+        if key in self.items or key in self._lights:
+            return each if instance.is_shown(each, source.v3d) else None
+        is_silent = evaluated.type in self._SILENT_TYPES or (
+            evaluated.type == 'EMPTY' and evaluated.instance_type == 'NONE')
+        return self.IRRELEVANT if is_silent else None
+
+
+def _material_ids(materials, each, view_layer):
+    """Library ids of an instance's material slots."""
+    slots = [slot.material for slot in each.object.material_slots]
+    if visibility.is_holdout(each, view_layer):
+        return (materials.holdout_id(),)
+    if view_layer.material_override is not None:
+        return (materials.id_of(view_layer.material_override),)
+    return tuple(materials.id_of(material) for material in slots)
+
+
 class _Walk:
     """One sync's walks over the depsgraph: the first finds everything, more follow motion."""
 
     def __init__(self, sync, source, shutter):
         self._sync, self._source, self._shutter = sync, source, shutter
         self._view_layer = source.depsgraph.view_layer_eval
-        self._override = self._view_layer.material_override
         uv_names, color_names, needs_generated = sync._materials.attribute_names()
         if source.needs_uv:
             uv_names.add("")
@@ -109,10 +213,13 @@ class _Walk:
         self._deforming = {}  # owner key -> (pointer, MeshData, MeshMotion)
         self.items = {}       # key -> Item with a mesh
         self.lights = {}      # key -> fields of a light
+        self.tied = set()     # names of objects that are instanced or make instances
 
     def run(self):
         """Find what is there now."""
         for each in self._shown_instances():
+            if each.is_instance:
+                self.tied.update(instance.names_of(each))
             if instance.is_light(each):
                 self._add_light(each)
             elif instance.has_mesh(each) and self._view_layer.use_solid:
@@ -151,7 +258,7 @@ class _Walk:
     def _add_mesh_instance(self, each):
         blender_object = each.object
         item = instance.describe(each, self._view_layer)
-        item.materials = self._material_ids(each)
+        item.materials = _material_ids(self._sync._materials, each, self._view_layer)
         if self._shutter is not None:
             parent = each.parent if each.is_instance else None
             item.motion_keys = motion.key_count(blender_object, parent)
@@ -180,21 +287,14 @@ class _Walk:
             return False
         if self._names[2]:
             data.generated = mesh.generated_coordinates(blender_object, data.positions)
+        if meshes.will_resync and mesh.is_posable(blender_object):
+            data.poses = mesh.topology_hash(blender_object.data)
         if item.motion_keys > 1 and motion.may_deform(blender_object):
             shapes = mesh.MeshMotion(blender_object.data, data, item.motion_keys)
             self._deforming[item.key] = (pointer, data, shapes)
         else:
             meshes.put(item.key, pointer, data, self._names)
         return True
-
-    def _material_ids(self, each):
-        materials = self._sync._materials
-        slots = [slot.material for slot in each.object.material_slots]
-        if visibility.is_holdout(each, self._view_layer):
-            return (materials.holdout_id(),)
-        if self._override is not None:
-            return (materials.id_of(self._override),)
-        return tuple(materials.id_of(material) for material in slots)
 
     def _look_again(self, item, each, fraction):
         index = motion.key_index(fraction, item.motion_keys)

@@ -3,7 +3,8 @@
 
 Blender's updates name objects and data blocks. Posing marks the mesh object with its geometry flag and
 gives no mesh, so geometry is keyed by object. The first update of a viewport and a frame change without
-animation come with an empty list; a first sync is therefore always a full one.
+animation come with an empty list; a first sync is therefore always a full one. Whatever adds, removes,
+hides or shows objects names the scene or a collection, and so do the settings of the render.
 """
 
 import bpy
@@ -14,14 +15,13 @@ class Changes:
 
     def __init__(self, full=False):
         self.full = full
-        self.objects = set()     # names of objects whose geometry may differ
-        self.transforms = False  # some object moved, appeared or disappeared
+        self.structure = False   # objects may have appeared, gone, or be hidden
+        self.geometry = set()    # names of objects whose mesh may be another
+        self.topology = set()    # those of them of which more than the vertices' places may differ
+        self.objects = set()     # names of objects of which anything changed, the above among them
         self.materials = set()   # names of materials to flatten again
         self.all_materials = False
         self.world = False
-        self.lights = False
-        self.camera = False
-        self.settings = False
 
     @classmethod
     def everything(cls):
@@ -34,17 +34,34 @@ class Changes:
         changes = cls()
         for update in depsgraph.updates:
             changes._mark(update)
+        if not depsgraph.updates:
+            # A frame change without animation, or something Blender does not name.
+            changes.full = True
         return changes
+
+    def merge(self, later):
+        """Add the marks of a later update."""
+        self.geometry |= later.geometry
+        self.topology |= later.topology
+        self.objects |= later.objects
+        self.materials |= later.materials
+        self.full |= later.full
+        self.structure |= later.structure
+        self.all_materials |= later.all_materials
+        self.world |= later.world
 
     def geometry_of(self, name):
         """Whether an object's mesh must be read again."""
-        return self.full or name in self.objects
+        return self.full or name in self.geometry
+
+    def material_of(self, name):
+        """Whether a material must be flattened again."""
+        return self.full or self.all_materials or name in self.materials
 
     def any(self):
         """Whether there is anything to sync at all."""
-        return bool(self.full or self.objects or self.transforms or self.materials
-                    or self.all_materials or self.world or self.lights or self.camera
-                    or self.settings)
+        return bool(self.full or self.structure or self.objects or self.materials
+                    or self.all_materials or self.world)
 
     def _mark(self, update):
         data = update.id
@@ -54,21 +71,26 @@ class Changes:
             self.materials.add(data.name_full)
         elif isinstance(data, bpy.types.World):
             self.world = True
-        elif isinstance(data, bpy.types.Light):
-            self.lights = self.transforms = True
-        elif isinstance(data, bpy.types.Camera):
-            self.camera = True
-        elif isinstance(data, bpy.types.Collection):
-            self.transforms = True
-        elif isinstance(data, (bpy.types.NodeTree, bpy.types.Image, bpy.types.Texture)):
-            # Groups and images do not say which material uses them.
-            self.all_materials = self.world = self.lights = True
-        elif isinstance(data, bpy.types.Scene):
-            self.settings = self.camera = self.transforms = True
+        elif isinstance(data, bpy.types.NodeTree):
+            # An embedded tree comes with its owner; a group does not say who uses it.
+            if not data.is_embedded_data:
+                self._mark_shared()
+        elif isinstance(data, (bpy.types.Image, bpy.types.Texture)):
+            self._mark_shared()
+        elif isinstance(data, (bpy.types.Scene, bpy.types.Collection)):
+            self.structure = True
+
+    def _mark_shared(self):
+        # Lights have nodes too and are read in a walk.
+        self.all_materials = self.world = self.structure = True
 
     def _mark_object(self, data, update):
-        if update.is_updated_geometry:
-            self.objects.add(data.name_full)
-        if data.type == 'CAMERA':
-            self.camera = True
-        self.transforms = True
+        name = data.name_full
+        self.objects.add(name)
+        if data.library is not None:
+            self.structure = True  # names of linked objects need not be unique
+        if not update.is_updated_geometry:
+            return
+        self.geometry.add(name)
+        if update.is_updated_shading:  # of an edited modifier or mesh, not of a pose
+            self.topology.add(name)

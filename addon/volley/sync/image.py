@@ -16,6 +16,7 @@ from .. import native
 _ALPHA_MODES = {'STRAIGHT': native.ALPHA_STRAIGHT, 'PREMUL': native.ALPHA_PREMULTIPLIED,
                 'CHANNEL_PACKED': native.ALPHA_CHANNEL_PACKED, 'NONE': native.ALPHA_NONE}
 _UNTOUCHED_SPACES = ("Non-Color", "Raw")  # data in the sense of OpenColorIO
+_ANIMATED_SOURCES = {'SEQUENCE', 'MOVIE'}
 _DATA_SPACES = _UNTOUCHED_SPACES + ("Linear", "scene_linear")
 
 
@@ -27,12 +28,23 @@ class Images:
         self._entries = {}  # key -> (signature, id)
         self._seen = set()
         self._look_again = True
+        self._asked = set(), False
 
     def begin(self, changes):
         """Start a sync: nothing has been asked for yet. Unless changes names images, those known are
         taken as they are."""
         self._seen = set()
         self._look_again = changes.full or changes.all_materials
+
+    def take_asked(self):
+        """The keys asked for since the last call, for :meth:`keep`, and whether one of the images may
+        be another on the next frame."""
+        asked, self._asked = self._asked, (set(), False)
+        return asked
+
+    def keep(self, keys):
+        """Keep images for whoever has asked for them in a former sync and has not changed."""
+        self._seen |= keys
 
     def id_of(self, node):
         """The library's image of an image or environment texture node, 0 for a missing one."""
@@ -41,6 +53,9 @@ class Images:
             return 0
         path = _file_path(image, node.image_user)
         key = (image.name_full, path)
+        keys, is_animated = self._asked
+        keys.add(key)
+        self._asked = keys, is_animated or image.source in _ANIMATED_SOURCES
         known = self._entries.get(key)
         if known and (key in self._seen or not self._look_again):
             self._seen.add(key)

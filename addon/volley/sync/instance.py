@@ -45,6 +45,15 @@ def key_of(instance):
             tuple(instance.persistent_id))
 
 
+class Plain:
+    """An object on its own, in the form of the depsgraph's instances."""
+
+    is_instance, parent, show_self = False, None, True
+
+    def __init__(self, evaluated):
+        self.object, self.matrix_world = evaluated, evaluated.matrix_world
+
+
 def is_shown(instance, v3d=None):
     """Whether the instance takes part: instancers may hide themselves, viewports have local views."""
     if not instance.show_self:
@@ -53,6 +62,12 @@ def is_shown(instance, v3d=None):
         return True
     owner = instance.parent if instance.is_instance and instance.parent else instance.object
     return owner.visible_in_viewport_get(v3d)
+
+
+def names_of(instance):
+    """Names of the object an instance shows and of the one that makes it."""
+    owners = [instance.object] + ([instance.parent] if instance.parent else [])
+    return {owner.name_full for owner in owners}
 
 
 def random_of(instance):
@@ -143,6 +158,15 @@ class Instances:
                 self.warnings.add(f"Object '{item.owner}': {error}; it is left out")
         for key in [key for key in self._entries if key not in seen]:
             self.scene.destroy_instance(self._entries.pop(key).id)
+
+    def change(self, item, mesh_id):
+        """Bring one of them up to date; one that the library refuses goes on as it was."""
+        try:
+            self._update_one(item, mesh_id)
+        except native.TracerError as error:
+            if error.status != native.ERROR_INVALID_ARGUMENT:
+                raise
+            self.warnings.add(f"Object '{item.owner}': {error}; it stays as it was")
 
     def _update_one(self, item, mesh_id):
         transforms = motion.follow_turns(collapse(item.transforms))

@@ -97,6 +97,16 @@ class Lights:
         for key in [key for key in self._entries if key not in lights or key in refused]:
             self._scene.destroy_light(self._entries.pop(key)[0])
 
+    def change(self, key, fields):
+        """Bring one of them up to date; False if the library refuses it."""
+        try:
+            self._update_one(key, fields)
+        except native.TracerError as error:
+            if error.status != native.ERROR_INVALID_ARGUMENT:
+                raise
+            return False
+        return True
+
     def _update_one(self, key, fields):
         known = self._entries.get(key)
         if known is None:

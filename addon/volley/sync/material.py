@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Materials: node trees or plain settings to the library's node lists, once per change."""
 
+import bpy
+
 from .. import native
 from ..compat import cycles, uses_nodes
 from . import flatten, nodes
+from .changes import Changes
 from .values import CONSTANT, DEFAULT, Value
 
 _HOLDOUT_KEY = ("holdout",)
@@ -16,10 +19,13 @@ class Materials:
         self._scene, self._images, self._warnings = scene, images, warnings
         self._entries = {}  # key -> Entry
         self._seen = set()
+        self._changes = Changes.everything()
 
-    def begin(self):
-        """Start a sync: nothing has been asked for yet."""
+    def begin(self, changes):
+        """Start a sync: nothing has been asked for yet. Materials that changes does not name are taken
+        as they are."""
         self._seen = set()
+        self._changes = changes
 
     def id_of(self, material):
         """The library's id of an evaluated material, 0 (the default) for None."""
@@ -28,17 +34,45 @@ class Materials:
     def entry_of(self, material):
         """The entry of an evaluated material, brought up to date once per sync."""
         key = material.name_full
-        if key not in self._seen:
-            self._seen.add(key)
+        if key not in self._seen and not self._keep(key):
             label = f"Material '{material.name}'"
             flat = self.flatten(material, label)
             self._update(key, flat, material.pass_index, _flags(material))
         return self._entries[key]
 
+    def knows(self, name):
+        """Whether the last sync had a material of that name."""
+        return name in self._entries
+
+    def change(self, depsgraph, changes):
+        """Flatten those again that changes names, all others stay. False if one cannot be found."""
+        self._changes = changes
+        self._seen = set()
+        for key in list(self._entries):
+            if isinstance(key, tuple):  # no material of Blender's
+                self._hold(key)
+            elif not self._keep(key):
+                material = bpy.data.materials.get(key)
+                if material is None or not material.evaluated_get(depsgraph).is_evaluated:
+                    return False
+                self.entry_of(material.evaluated_get(depsgraph))
+        return True
+
+    def _keep(self, key):
+        """Take a material as it is in the library, if it is there and has not changed."""
+        entry = self._entries.get(key)
+        if entry is None or entry.is_animated or self._changes.material_of(key):
+            return False
+        self._hold(key)
+        return True
+
+    def _hold(self, key):
+        self._seen.add(key)
+        self._images.keep(self._entries[key].images)
+
     def holdout_id(self):
         """A material that punches a hole."""
         if _HOLDOUT_KEY not in self._seen:
-            self._seen.add(_HOLDOUT_KEY)
             flat = flatten.FlatTree()
             flat.nodes.append(flatten.FlatNode(nodes.HOLDOUT, []))
             flat.surface = 0
@@ -53,7 +87,6 @@ class Materials:
             flat = flatten.flatten(world.node_tree, label, self._warnings, self._images.id_of)
         else:
             flat = _background(world.color)
-        self._seen.add(key)
         self._update(key, flat, 0, 0)
         return self._entries[key].id
 
@@ -81,6 +114,7 @@ class Materials:
         return _plain_surface(material)
 
     def _update(self, key, flat, pass_index, flags):
+        self._seen.add(key)
         signature = (flat.signature(), pass_index, flags)
         entry = self._entries.get(key)
         if entry is None:
@@ -90,6 +124,7 @@ class Materials:
         entry.signature = signature
         entry.uv_names, entry.color_names = flat.uv_names, flat.color_names
         entry.needs_generated = flat.needs_generated
+        entry.images, entry.is_animated = self._images.take_asked()
 
     def _send(self, entry, key, arguments):
         """Create or change it in the library; a refused one becomes the default material."""
@@ -116,6 +151,7 @@ class Entry:
         self.signature = None
         self.uv_names, self.color_names = set(), set()
         self.needs_generated = False
+        self.images, self.is_animated = set(), False  # those it reads; whether time changes them
 
 
 def _flags(material):

@@ -29,6 +29,8 @@ class MeshData:
     material_index: np.ndarray = None  # (triangles,) uint16
     attributes: list = field(default_factory=list)  # (name, (triangles * 3, 2 | 4) float32)
     generated: np.ndarray = None      # (vertices, 3) float32
+    corners: np.ndarray = None        # (triangles * 3,) int32: Blender's corners, for corner normals
+    poses: tuple = None               # topology_hash where later shapes are awaited
 
     def topology_signature(self):
         """Equal when only positions and normals may differ."""
@@ -108,7 +110,8 @@ def read_normals(mesh, data, loops=None):
     """Fill normals, their kind and the smooth flags, by what Blender would shade with."""
     loops = loops or _LazyLoops(mesh, len(data.indices))
     if _has_corner_normals(mesh):
-        data.normals, data.normal_kind = _corner_normals(mesh)[loops.of_triangles], native.NORMALS_CORNER
+        data.corners = loops.of_triangles
+        data.normals, data.normal_kind = _corner_normals(mesh)[data.corners], native.NORMALS_CORNER
         return
     smooth = _read(mesh.polygons, "use_smooth", (len(mesh.polygons),), np.bool_)
     if not smooth.any():
@@ -255,6 +258,20 @@ def _widen(values):
     return rgba
 
 
+# Modifiers that move vertices, or make new ones by a rule that does not look at where they are.
+_POSING_MODIFIERS = {
+    'ARMATURE', 'CAST', 'CORRECTIVE_SMOOTH', 'CURVE', 'HOOK', 'LAPLACIANDEFORM', 'LAPLACIANSMOOTH',
+    'LATTICE', 'MESH_CACHE', 'MESH_DEFORM', 'MIRROR', 'MULTIRES', 'SHRINKWRAP', 'SIMPLE_DEFORM',
+    'SMOOTH', 'SUBSURF', 'SURFACE_DEFORM', 'WARP', 'WAVE', 'CLOTH', 'SOFT_BODY'}
+
+
+def is_posable(blender_object):
+    """Whether a mesh object's new shapes differ in places alone, as long as their topology is equal."""
+    original = blender_object.original
+    return original.type == 'MESH' and bool(original.modifiers) and all(
+        modifier.type in _POSING_MODIFIERS for modifier in original.modifiers)
+
+
 class MeshMotion:
     """The shapes of one deforming mesh over the shutter, one slot per motion key."""
 
@@ -292,7 +309,7 @@ class MeshMotion:
 class MeshEntry:
     """A mesh in the library. pointer tells one evaluation's data from another's, never followed."""
 
-    __slots__ = ("id", "pointer", "topology", "shape", "names")
+    __slots__ = ("id", "pointer", "topology", "shape", "names", "corners", "normal_kind", "poses")
 
 
 class Meshes:
@@ -301,7 +318,7 @@ class Meshes:
     With will_resync, checksums are kept so that a later sync sends only what differs."""
 
     def __init__(self, scene, will_resync, warnings):
-        self._scene, self._will_resync, self._warnings = scene, will_resync, warnings
+        self._scene, self.will_resync, self._warnings = scene, will_resync, warnings
         self._entries, self._seen, self._retired = {}, set(), []
 
     def begin(self):
@@ -334,11 +351,32 @@ class Meshes:
             self._warnings.add(f"Mesh of '{key[0]}': {error}; it is left out")
             return
         entry.pointer, entry.topology, entry.shape, entry.names = pointer, topology, shape, names
+        entry.poses, entry.corners, entry.normal_kind = data.poses, data.corners, data.normal_kind
         self._seen.add(key)
+
+    def pose(self, key, pointer, mesh):
+        """Send a Blender mesh's positions and normals for a known topology. False, and nothing is sent,
+        where the topology turns out to be another.
+
+        Triangles stay those of the shape that was read in full: faces of more than three corners may
+        be cut otherwise in a fresh render, if they bend much."""
+        entry = self._entries.get(key)
+        if entry is None or entry.poses is None or entry.poses != topology_hash(mesh):
+            return False
+        normals = None
+        if _has_corner_normals(mesh) != (entry.normal_kind == native.NORMALS_CORNER):
+            return False
+        if entry.normal_kind == native.NORMALS_CORNER:
+            normals = _corner_normals(mesh)[entry.corners][None]
+        elif entry.normal_kind == native.NORMALS_VERTEX:
+            normals = _vertex_normals(mesh)[None]
+        self._scene.update_mesh(entry.id, read_positions(mesh)[None], normals)
+        entry.pointer, entry.shape = pointer, None
+        return True
 
     def _signatures(self, data, positions, normals):
         """Checksums of topology and shape, None where no later sync will compare them."""
-        if not self._will_resync:
+        if not self.will_resync:
             return None, None
         normal_sum = 0 if normals is None else zlib.crc32(normals.tobytes())
         return data.topology_signature(), (zlib.crc32(positions.tobytes()), normal_sum)
@@ -353,6 +391,10 @@ class Meshes:
             self._retired.append(self._entries[key].id)
         self._entries[key] = entry
         return entry
+
+    def id_of(self, key):
+        """Library id of one mesh."""
+        return self._entries[key].id
 
     def ids(self):
         """Library id of each mesh of this sync, by key."""
