@@ -316,3 +316,34 @@ def inside_hidden_flags():
 
 def test_holdout_and_indirect_only(blender):
     assert blender.run(inside_hidden_flags) == [(30, False), (31, False), (31, True)]
+
+
+def inside_edit_costs():
+    import random
+    import bpy
+    import edits
+    from volley.sync.changes import Changes
+    edits.make_scene()
+    sync, _ = _sync()
+    told, random = {}, random.Random(1)
+
+    def mark(_scene, depsgraph):
+        changes.merge(Changes.of_depsgraph(depsgraph))
+
+    bpy.context.view_layer.update()
+    bpy.app.handlers.depsgraph_update_post.append(mark)
+    for edit in (edits.pose, edits.transform, edits.material, edits.light_energy, edits.move_light,
+                 edits.world, edits.ray_visibility):
+        changes = Changes()
+        edit(random)
+        bpy.context.view_layer.update()
+        sync, recorder = _sync(changes, sync)
+        told[edit.__name__] = [name for name, _, _ in recorder.calls]
+    return told
+
+
+def test_an_edit_sends_what_it_touches(blender):
+    assert blender.run(inside_edit_costs) == {
+        "pose": ["update_mesh"], "transform": ["update_instance"], "material": ["update_material"],
+        "light_energy": ["update_light"], "move_light": ["update_light"], "world": ["update_material"],
+        "ray_visibility": ["update_instance"]}
