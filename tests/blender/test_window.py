@@ -116,6 +116,166 @@ def test_viewport_follows_edits(window):
     assert "Traceback" not in window.output and "rror" not in window.output
 
 
+def inside_random_edits(count):
+    """Random edits while the view renders; what it shows at the end and what a new view shows."""
+    import random
+    import bpy
+    import edits
+    import scenes
+    yield 0.1
+    scene = scenes.empty()
+    yield DRAW_SECONDS
+    window, area, _ = _view()
+    with bpy.context.temp_override(window=window, area=area,
+                                   region=next(r for r in area.regions if r.type == 'WINDOW')):
+        edits.fill(scene)
+    space = _open(scene)
+    scene.volley.preview_samples = 16
+    space.region_3d.view_perspective = 'CAMERA'
+    yield DRAW_SECONDS
+    random = random.Random(7)
+    for _ in range(count):
+        random.choice(edits.ALL)(random)
+        yield random.choice((0.0, 0.01, 0.05))
+    scene.render.film_transparent = False
+    yield 2.0 * DRAW_SECONDS
+    followed = _shot()
+    space.shading.type = 'SOLID'
+    yield DRAW_SECONDS
+    space.shading.type = 'RENDERED'
+    yield 2.0 * DRAW_SECONDS
+    return followed, _shot()
+
+
+def test_random_edits_in_a_window(window):
+    followed, fresh = window.run_in_window(inside_random_edits, 200)
+    rows = slice(0, len(fresh) * 3 // 4)  # without the status line, which tells of speed
+    assert fresh[rows].std() > 0.01
+    assert np.abs(followed[rows] - fresh[rows]).mean() < 0.002
+    assert "Traceback" not in window.output and "rror" not in window.output
+
+
+def inside_session():
+    """A working session: visibility, view layers, undo, playback, border, engines, another file."""
+    import bpy
+    import scenes
+    yield 0.1
+    scene = scenes.empty(samples=2)
+    yield DRAW_SECONDS
+    scenes.camera()
+    wall = scenes.wall(size=30.0, material=scenes.emitter((0.0, 1.0, 0.0), "Green"))
+    near = scenes.wall("Near", 30.0, -1.0, material=scenes.emitter((0.0, 0.0, 1.0), "Blue"))
+    layer = scene.view_layers.new("Without")
+    hidden = bpy.data.collections.new("Hidden")
+    scene.collection.children.link(hidden)
+    scene.collection.objects.unlink(near)
+    hidden.objects.link(near)
+    layer.layer_collection.children["Hidden"].exclude = True
+    space = _open(scene)
+    space.region_3d.view_perspective = 'CAMERA'
+    window, area, _ = _view()
+    region = next(r for r in area.regions if r.type == 'WINDOW')
+    view = {"window": window, "area": area, "region": region}
+    colors = {}
+
+    def center():
+        picture = _shot()
+        height, width = picture.shape[:2]
+        return picture[height // 2 - 8:height // 2 + 8, width // 2 - 8:width // 2 + 8].mean(axis=(0, 1))
+
+    yield DRAW_SECONDS
+    colors["start b"] = center()
+    near.hide_set(True)
+    yield DRAW_SECONDS
+    colors["hidden g"] = center()
+    near.hide_set(False)
+    yield DRAW_SECONDS
+    colors["shown b"] = center()
+    window.view_layer = layer
+    yield DRAW_SECONDS
+    colors["other layer g"] = center()
+    window.view_layer = scene.view_layers[0]
+    yield DRAW_SECONDS
+    colors["first layer b"] = center()
+    space.show_object_viewport_mesh = False
+    yield DRAW_SECONDS
+    colors["no meshes k"] = center()
+    space.show_object_viewport_mesh = True
+    bpy.ops.object.select_all(action='DESELECT')
+    wall.select_set(True)
+    with bpy.context.temp_override(**view):
+        bpy.ops.view3d.localview(frame_selected=False)
+    yield DRAW_SECONDS
+    space.region_3d.view_perspective = 'CAMERA'
+    yield DRAW_SECONDS
+    colors["local g"] = center()
+    with bpy.context.temp_override(**view):
+        bpy.ops.view3d.localview(frame_selected=False)
+    yield DRAW_SECONDS
+    bpy.ops.ed.undo_push(message="before")
+    bpy.data.materials["Blue"].node_tree.nodes["Emission"].inputs[0].default_value = (1, 0, 0, 1)
+    bpy.ops.ed.undo_push(message="red")
+    yield DRAW_SECONDS
+    colors["red r"] = center()
+    with bpy.context.temp_override(**view):
+        bpy.ops.ed.undo()
+    yield DRAW_SECONDS
+    colors["undone b"] = center()
+    with bpy.context.temp_override(**view):
+        bpy.ops.ed.redo()
+    yield DRAW_SECONDS
+    colors["redone r"] = center()
+    scene, near = bpy.context.scene, bpy.data.objects["Near"]
+    near.location.y = 0.0
+    near.keyframe_insert("location", frame=1)
+    near.location.y = 20.0
+    near.keyframe_insert("location", frame=20)
+    scene.frame_end = 20
+    scene.frame_set(1)
+    with bpy.context.temp_override(**view):
+        bpy.ops.screen.animation_play()
+    yield 1.0
+    with bpy.context.temp_override(**view):
+        bpy.ops.screen.animation_cancel(restore_frame=False)
+    scene.frame_set(20)
+    yield DRAW_SECONDS
+    colors["last frame g"] = center()
+    space.region_3d.view_perspective = 'PERSP'
+    space.region_3d.view_rotation = scene.camera.rotation_euler.to_quaternion()
+    space.use_render_border = True
+    space.render_border_min_x, space.render_border_max_x = 0.4, 0.6
+    space.render_border_min_y, space.render_border_max_y = 0.4, 0.6
+    yield DRAW_SECONDS
+    colors["border g"] = center()
+    space.use_render_border = False
+    scene.volley.preview_samples = 4096
+    yield 0.1
+    scene.render.engine = 'BLENDER_WORKBENCH'
+    yield DRAW_SECONDS
+    scene.render.engine = 'VOLLEY'
+    yield DRAW_SECONDS
+    colors["engine back g"] = center()
+    path = bpy.app.tempdir + "other.blend"
+    bpy.data.materials["Green"].node_tree.nodes["Emission"].inputs[0].default_value = (1, 0, 0, 1)
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.data.materials["Green"].node_tree.nodes["Emission"].inputs[0].default_value = (0, 1, 0, 1)
+    yield DRAW_SECONDS
+    bpy.ops.wm.open_mainfile(filepath=path, load_ui=False)
+    yield 2.0 * DRAW_SECONDS
+    _view()[2].shading.type = 'RENDERED'
+    yield DRAW_SECONDS
+    colors["loaded r"] = center()
+    return colors
+
+
+def test_a_session_of_work(window):
+    colors = window.run_in_window(inside_session)
+    for name, color in colors.items():
+        wanted = [float(letter == name[-1]) for letter in "rgb"]
+        assert color == pytest.approx(wanted, abs=0.03), name
+    assert "Traceback" not in window.output and "rror" not in window.output
+
+
 def inside_panels():
     """Every tab of the Properties editor for a mesh, a light and a camera, all panels open."""
     import bpy

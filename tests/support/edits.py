@@ -7,8 +7,12 @@ import scenes
 
 
 def make_scene():
-    """A skinned tube, instances, textures, groups, lights and a second view layer."""
-    scene = scenes.empty(size=(48, 36))
+    """An empty scene, filled."""
+    return fill(scenes.empty(size=(48, 36)))
+
+
+def fill(scene):
+    """Add a skinned tube, instances, textures, groups, lights and a second view layer."""
     scene.volley.preview_samples = 4
     scene.world.use_nodes = True
     scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (0.1, 0.1, 0.2, 1.0)
