@@ -83,6 +83,7 @@ class VOLLEY_RENDER_PT_sampling_viewport(_VolleyPanel, Panel):
 
     def draw(self, context):
         _draw_samples(_column(self), context.scene.volley, "preview_")
+        _column(self).prop(context.scene.render, "preview_pixel_size", text="Pixel Size")
 
 
 class VOLLEY_RENDER_PT_sampling_render(_VolleyPanel, Panel):

@@ -3,8 +3,8 @@
 
 An edit is marked when Blender tells of it and copied at the next draw; what was built and rendered
 stays on the screen until the first complete picture after the edit replaces it. That one has a sample
-per pixel, and fewer pixels where a full one would take too long; the next has all pixels and gathers
-samples until the view or the scene changes. The film is drawn as a scene-linear texture, which Blender
+per pixel, and fewer pixels where a full one would take too long; then comes one of all pixels, and then
+one that gathers samples until the view or the scene changes. The film is drawn as a scene-linear texture, which Blender
 turns into display colours.
 """
 
@@ -25,6 +25,7 @@ DRAW_SECONDS = 0.03     # at least this long between two read-outs of the film
 NAP_SECONDS = 0.004     # how long a draw may wait for what is nearly there
 PICTURE_SECONDS = 0.03  # the budget of the first picture
 MAX_DIVISOR = 8         # of the first picture's width and height
+PIXEL_SECONDS = 1e-6    # guess of what a sample of a pixel takes, before there was one
 SHOWN_SAMPLES = 4       # of a refined picture, before it replaces the first
 
 
@@ -39,9 +40,12 @@ class Viewport:
         self._built_revision = -1
         self._pictures = _Pictures()
         self._reported = set()   # warnings are shown once, not at every edit
+        self._is_freed = False   # until the next edit
 
     def free(self):
         """Stop rendering and free everything native."""
+        self._is_freed = True
+        self._changes, self._built_revision = Changes.everything(), -1
         self._pictures.stop()
         build, self._build = self._build, None
         sync, self._sync = self._sync, None
@@ -55,10 +59,13 @@ class Viewport:
         if not native.load():
             raise native.TracerError(0, native.load_error())
         self._changes.merge(Changes.of_depsgraph(depsgraph))
+        self._is_freed = False
         engine.tag_redraw()
 
     def draw(self, engine, context, depsgraph):
         """Copy what was marked, start a build or a render where one is due, draw the latest picture."""
+        if self._is_freed:
+            return
         is_current = self._synchronise(engine, context, depsgraph)
         if is_current:
             self._pictures.follow(self._sync, context, depsgraph)
@@ -142,17 +149,18 @@ class _Pictures:
         self._view = None
         self._wanted = None     # what the stages render: revision, view and settings
         self._fields = {}
-        self._divisors = []     # of the stages that are still to come
-        self._divisor = 1
+        self._stages = []       # still to come: divisor of the size, samples or None for all
+        self._is_last = True    # whether the stage under way is the last
         self._render = None
-        self._texture, self._place = None, (0, 0, 0, 0)
+        self._texture, self._place = None, (0.0, 0.0, 0.0, 0.0)
+        self._next_place = self._place  # x, y, width, height in the region, of what is rendered
         self._version, self._next_read = -1, 0.0
         self._progress = None
         self._status = ""
         self._samples = 0
         self._features = ""
         self._started, self._first_seconds = 0.0, 0.0
-        self._pixel_seconds = 0.0  # of one sample of one pixel, as last measured
+        self._pixel_seconds = PIXEL_SECONDS  # of one sample of one pixel, as last measured
 
     def look(self, sync, context, depsgraph):
         """Note what the viewport looks at and tell the library if that is new."""
@@ -180,13 +188,14 @@ class _Pictures:
         self._started, self._first_seconds = time.monotonic(), 0.0
         size = scene.render.preview_pixel_size
         least = 1 if size == 'AUTO' else int(size)
-        self._divisors = [max(least, self._first_divisor()), least]
+        first = max(least, self._first_divisor())
+        self._stages = [(first, 1)] + ([(least, 1)] if first > least else []) + [(least, None)]
         self._next_stage(sync)
 
     def stop(self):
         """End what is rendered; the texture stays."""
         render, self._render = self._render, None
-        self._wanted, self._divisors = None, []
+        self._wanted, self._stages = None, []
         if render is not None:
             render.destroy()
 
@@ -201,17 +210,17 @@ class _Pictures:
 
     def _next_stage(self, sync):
         """Start the next stage when the one before has ended and been read."""
-        if not self._divisors or self._render is not None:
+        if not self._stages or self._render is not None:
             return
-        is_first = len(self._divisors) > 1
-        self._divisor = self._divisors.pop(0)
-        fields = _divided(self._fields, self._divisor)
-        if is_first:
-            fields.update(sample_count=1, noise_threshold=0.0)
+        divisor, sample_count = self._stages.pop(0)
+        self._is_last = not self._stages
+        fields = _divided(self._fields, divisor)
+        if sample_count is not None:
+            fields.update(sample_count=sample_count, noise_threshold=0.0)
         self._samples = fields["sample_count"]
         width, height = fields["width"], fields["height"]
         scale_x, scale_y = self._view.size[0] / width, self._view.size[1] / height
-        self._place_next = (fields["crop_x"] * scale_x, fields["crop_y"] * scale_y,
+        self._next_place = (fields["crop_x"] * scale_x, fields["crop_y"] * scale_y,
                             fields["crop_width"] * scale_x, fields["crop_height"] * scale_y)
         self._render = sync.scene.start_render(**fields)
         self._version, self._next_read = -1, 0.0
@@ -219,24 +228,23 @@ class _Pictures:
     def read(self):
         """Bring the texture up to date; whether there is more to come."""
         if self._render is None:
-            return bool(self._divisors)
-        is_first = bool(self._divisors)
-        if is_first:
+            return bool(self._stages)
+        if not self._is_last:
             self._render.wait(NAP_SECONDS)
         progress = self._progress = self._render.poll()
         is_running = progress.state == native.STATE_RUNNING
-        shown = 1 if is_first else min(SHOWN_SAMPLES, self._samples)
+        shown = min(SHOWN_SAMPLES, self._samples)
         now = time.monotonic()
         if progress.samples_done >= shown and progress.version != self._version and (
                 now >= self._next_read or not is_running):
             self._version, self._next_read = progress.version, now + DRAW_SECONDS
             pixels = passes.read_combined(self._render)
-            self._texture, self._place = _texture_of(pixels), self._place_next
+            self._texture, self._place = _texture_of(pixels), self._next_place
             self._status = status_text(progress, self._samples, self._features)
-            if is_first:
-                self._first_seconds = now - self._started
+            self._first_seconds = self._first_seconds or now - self._started
+            if not self._is_last:
                 self._pixel_seconds = progress.seconds / (pixels.shape[0] * pixels.shape[1])
-        if is_first and not is_running:
+        if not self._is_last and not is_running:
             self._render.destroy()
             self._render = None
             return True

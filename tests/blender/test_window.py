@@ -276,6 +276,39 @@ def test_a_session_of_work(window):
     assert "Traceback" not in window.output and "rror" not in window.output
 
 
+def inside_drag():
+    """An object dragged before a bright wall, looked at after each step: how dark it ever was."""
+    import bpy
+    import scenes
+    yield 0.1
+    scene = scenes.empty()
+    yield DRAW_SECONDS
+    scenes.camera()
+    scenes.wall(size=60.0, material=scenes.emitter((1.0, 1.0, 1.0)))
+    ball = scenes.wall("Ball", 1.0, -1.0, material=scenes.emitter((0.0, 1.0, 0.0), "Green"))
+    space = _open(scene)
+    scene.volley.preview_samples = 256
+    space.region_3d.view_perspective = 'CAMERA'
+    yield DRAW_SECONDS
+    darkest, places = 1.0, []
+    for step in range(20):
+        ball.location.x = 0.1 * step - 1.0
+        yield 0.05
+        picture = _shot()
+        height, width = picture.shape[:2]  # within the camera's frame
+        picture = picture[height * 2 // 5:height * 3 // 5, width * 3 // 10:width * 7 // 10]
+        darkest = min(darkest, float(picture[..., 1].min()))
+        places.append(float(np.nonzero(picture[..., 0].min(axis=0) < 0.5)[0].mean()))
+    return darkest, places
+
+
+def test_a_dragged_object_is_always_a_whole_picture(window):
+    darkest, places = window.run_in_window(inside_drag)
+    assert darkest > 0.9
+    assert (np.diff(places) >= 0.0).all() and places[-1] - places[0] > 50.0
+    assert "Traceback" not in window.output and "rror" not in window.output
+
+
 def inside_panels():
     """Every tab of the Properties editor for a mesh, a light and a camera, all panels open."""
     import bpy

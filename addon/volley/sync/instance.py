@@ -5,6 +5,7 @@ Items of ``depsgraph.object_instances`` die with the loop, so everything is copi
 mesh that many instances show is read once; the first of them to come along owns it.
 """
 
+import functools
 from dataclasses import dataclass, field
 
 import bpy
@@ -73,7 +74,7 @@ def names_of(instance):
 def random_of(instance):
     """Object Info's Random, [0, 1), the number Cycles has for the same instance."""
     number = instance.random_id & 0xFFFFFFFF if instance.is_instance \
-        else _hash_pair(_hash_name(instance.object.name), 0)
+        else _name_random(instance.object.name)
     return min(number / 0xFFFFFFFF, 1.0 - 2.0 ** -24)
 
 
@@ -83,6 +84,11 @@ def _hash_name(name):
     for byte in name.encode("utf-8"):
         value = (value * 37 + byte) & 0xFFFFFFFF
     return value
+
+
+@functools.lru_cache(maxsize=1 << 16)  # a walk asks for every object
+def _name_random(name):
+    return _hash_pair(_hash_name(name), 0)
 
 
 def _hash_pair(x, y):
@@ -188,5 +194,7 @@ class Instances:
 
 def collapse(arrays):
     """Equal motion keys as one; (keys, ...) float32."""
+    if len(arrays) == 1:
+        return arrays[0][None]
     stacked = np.stack(arrays)
     return stacked[:1] if len(arrays) > 1 and (stacked == stacked[0]).all() else stacked

@@ -14,7 +14,9 @@ import numpy as np
 from .. import native
 
 _HAS_UNDEFORMED = "undeformed_co" in bpy.types.MeshVertex.bl_rna.properties
-_DEFAULT = ""  # the default UV map, the active colour attribute
+# What Blender keeps corners' vertices and triangles in; reading another type takes some twenty times as
+# long, signed instead of unsigned too.
+_INDEX_TYPE = np.uint32 if bpy.app.version < (4, 1, 0) else np.int32
 
 
 @dataclass
@@ -29,7 +31,7 @@ class MeshData:
     material_index: np.ndarray = None  # (triangles,) uint16
     attributes: list = field(default_factory=list)  # (name, (triangles * 3, 2 | 4) float32)
     generated: np.ndarray = None      # (vertices, 3) float32
-    corners: np.ndarray = None        # (triangles * 3,) int32: Blender's corners, for corner normals
+    corners: np.ndarray = None        # (triangles * 3,) integers: Blender's corners, for corner normals
     poses: tuple = None               # topology_hash where later shapes are awaited
 
     def topology_signature(self):
@@ -48,7 +50,7 @@ def extract(mesh, uv_names=(), color_names=(), material_count=1):
     triangle_count = len(mesh.loop_triangles)
     if triangle_count == 0:
         return None
-    indices = _read(mesh.loop_triangles, "vertices", (triangle_count, 3), np.int32)
+    indices = _read(mesh.loop_triangles, "vertices", (triangle_count, 3), _INDEX_TYPE)
     loops = _LazyLoops(mesh, triangle_count)
     data = MeshData(read_positions(mesh), indices.view(np.uint32))
     if material_count > 1:
@@ -102,8 +104,16 @@ def _is_bounding_box(positions, location, size):
 
 def topology_hash(mesh):
     """A number that differs when vertices or faces are others, not when they only move."""
-    corners = _read(mesh.loops, "vertex_index", (len(mesh.loops),), np.int32)
+    corners = _corner_vertices(mesh)
     return len(mesh.vertices), len(mesh.polygons), zlib.crc32(corners.tobytes())
+
+
+def _corner_vertices(mesh):
+    """(corners,) integers: the vertex of each; through the attribute where there is one (3.6 on)."""
+    attribute = mesh.attributes.get(".corner_vert")
+    if attribute is not None and attribute.data_type == 'INT':
+        return _read(attribute.data, "value", (len(attribute.data),), np.int32)
+    return _read(mesh.loops, "vertex_index", (len(mesh.loops),), _INDEX_TYPE)
 
 
 def read_normals(mesh, data, loops=None):
@@ -133,16 +143,17 @@ class _LazyLoops:
 
     @property
     def of_triangles(self):
-        """(triangles * 3,) int32: the mesh's corner of each triangle corner."""
+        """(triangles * 3,) integers: the mesh's corner of each triangle corner."""
         if self._of_triangles is None:
-            self._of_triangles = _read(self._mesh.loop_triangles, "loops", (self._count * 3,), np.int32)
+            self._of_triangles = _read(self._mesh.loop_triangles, "loops", (self._count * 3,), _INDEX_TYPE)
         return self._of_triangles
 
     @property
     def polygons(self):
-        """(triangles,) int32: the polygon of each triangle."""
+        """(triangles,) integers: the polygon of each triangle."""
         if self._polygons is None:
-            self._polygons = _read(self._mesh.loop_triangles, "polygon_index", (self._count,), np.int32)
+            self._polygons = _read(self._mesh.loop_triangles, "polygon_index", (self._count,),
+                                   _INDEX_TYPE)
         return self._polygons
 
 
@@ -241,7 +252,7 @@ def _attribute_values(mesh, name, loops):
     if attribute.domain == 'CORNER':
         return values[loops.of_triangles]
     if attribute.domain == 'POINT':
-        return values[_read(mesh.loops, "vertex_index", (len(mesh.loops),), np.int32)[loops.of_triangles]]
+        return values[_corner_vertices(mesh)[loops.of_triangles]]
     if attribute.domain == 'FACE':
         return values[np.repeat(loops.polygons, 3)]
     return None

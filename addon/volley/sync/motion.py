@@ -129,6 +129,8 @@ def follow_turns(transforms):
     evenly. That is how Cycles moves from key to key (polar decomposition: K. Shoemake and T. Duff,
     "Matrix Animation and Polar Decomposition", 1992)."""
     count = len(transforms)
+    if count == 1:
+        return transforms
     matrices = transforms.reshape(count, 3, 4).astype(np.float64)
     linear = matrices[:, :, :3]
     # A turn by an angle below pi moves the axes by its sine or more: most keys need no decomposition.
