@@ -11,6 +11,7 @@ turns into display colours.
 import threading
 import time
 
+import bpy
 import gpu
 import numpy as np
 from gpu_extras.presets import draw_texture_2d
@@ -71,8 +72,10 @@ class Viewport:
             self._pictures.follow(self._sync, context, depsgraph)
         is_running = self._pictures.read()
         self._pictures.draw(engine, depsgraph.scene_eval)
-        if is_running or not is_current:
+        if not is_current or self._pictures.is_urgent():
             engine.tag_redraw()
+        elif is_running:
+            _redraw_later()
 
     def _synchronise(self, engine, context, depsgraph):
         """Bring the library's scene up to date; whether it is."""
@@ -114,6 +117,20 @@ class Viewport:
             if message not in self._reported:
                 self._reported.add(message)
                 engine.report({'WARNING'}, message)
+
+
+def _redraw_later():
+    """Redraw rendered views when there may be more to show, and leave the processor to the render until
+    then. No engine is kept for it: it could be gone."""
+    if not bpy.app.timers.is_registered(_redraw):
+        bpy.app.timers.register(_redraw, first_interval=DRAW_SECONDS)
+
+
+def _redraw():
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == 'VIEW_3D' and area.spaces.active.shading.type == 'RENDERED':
+                area.tag_redraw()
 
 
 class _Build:
@@ -195,9 +212,13 @@ class _Pictures:
     def stop(self):
         """End what is rendered; the texture stays."""
         render, self._render = self._render, None
-        self._wanted, self._stages = None, []
+        self._wanted, self._stages, self._is_last = None, [], True
         if render is not None:
             render.destroy()
+
+    def is_urgent(self):
+        """Whether quick pictures are still to come."""
+        return bool(self._stages) or not self._is_last
 
     def _first_divisor(self):
         """Of a picture that can be there within the budget."""
