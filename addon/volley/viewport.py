@@ -4,8 +4,8 @@
 An edit is marked when Blender tells of it and copied at the next draw; what was built and rendered
 stays on the screen until the first complete picture after the edit replaces it. That one has a sample
 per pixel, and fewer pixels where a full one would take too long; then comes one of all pixels, and then
-one that gathers samples until the view or the scene changes. The film is drawn as a scene-linear texture, which Blender
-turns into display colours.
+one that gathers samples until the view or the scene changes. The film is drawn as a scene-linear
+texture, which Blender turns into display colours.
 """
 
 import threading
