@@ -171,7 +171,9 @@ class _RenderDesc(_Struct):
                 ("assembly", _u32), ("packet_size", _u32), ("sampler", _u32), ("seed", _u32),
                 ("filter", _u32), ("filter_width", _f32), ("film_transparent", _u32),
                 ("film_exposure", _f32), ("passes", _u64), ("thread_count", _u32),
-                ("progressive", _u32), ("noise_threshold", _f32), ("min_samples", _u32)]
+                ("progressive", _u32), ("noise_threshold", _f32), ("min_samples", _u32),
+                ("mist_start", _f32), ("mist_depth", _f32), ("mist_falloff", _f32),
+                ("reserved", _u32)]
 
 
 class _RenderProgress(_Struct):

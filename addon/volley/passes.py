@@ -30,6 +30,10 @@ PASSES = (
     Pass(17, ("TransCol", "Transmission Color"), "RGB", 'COLOR', "use_pass_transmission_color"),
     Pass(7, ("Emit", "Emission"), "RGB", 'COLOR', "use_pass_emit"),
     Pass(8, ("Env", "Environment"), "RGB", 'COLOR', "use_pass_environment"),
+    Pass(19, ("Mist", "Mist"), "Z", 'VALUE', "use_pass_mist"),
+    Pass(20, ("Denoising Albedo", "Denoising Albedo"), "RGB", 'COLOR', "volley.denoising_store_passes"),
+    Pass(21, ("Denoising Normal", "Denoising Normal"), "XYZ", 'VECTOR', "volley.denoising_store_passes"),
+    Pass(22, ("Denoising Depth", "Denoising Depth"), "Z", 'VALUE', "volley.denoising_store_passes"),
     Pass(18, ("Debug Sample Count", "Debug Sample Count"), "X", 'VALUE',
          "volley.use_pass_sample_count"),
 )

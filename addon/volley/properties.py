@@ -170,6 +170,10 @@ class VolleyViewLayerSettings(bpy.types.PropertyGroup):
     use_pass_sample_count: BoolProperty(
         name="Sample Count", default=False, description="Deliver the number of samples of each pixel",
         update=_changed)
+    denoising_store_passes: BoolProperty(
+        name="Denoising Data", default=False,
+        description="Deliver albedo, normal and depth for the compositor's Denoise node",
+        update=_changed)
 
 
 _classes = (VolleySceneSettings, VolleyViewLayerSettings)

@@ -13,7 +13,7 @@ import bpy
 from . import native, passes
 from .compat import motion_position
 from .log import logger
-from .sync import Cancelled, SceneSync, Source, camera, motion
+from .sync import Cancelled, SceneSync, Source, camera, motion, world
 from .sync.changes import Changes
 
 POLL_SECONDS = 0.02
@@ -270,6 +270,7 @@ def render_fields(scene, frame, crop, entries, is_preview=False):
         "film_transparent": int(scene.render.film_transparent),
         "film_exposure": settings.film_exposure, "passes": passes.request_mask(entries),
         "thread_count": thread_count(scene.render), **_adaptive_fields(settings, is_preview),
+        **world.mist_fields(scene.world),
     }
 
 

@@ -299,12 +299,14 @@ class VOLLEY_VIEWLAYER_PT_passes_data(_VolleyPanel, Panel):
     def draw(self, context):
         view_layer, layout = context.view_layer, _column(self)
         column = layout.column(heading="Include", align=True)
-        for name in ("combined", "z", "position", "normal", "uv"):
+        for name in ("combined", "z", "mist", "position", "normal", "uv"):
             column.prop(view_layer, f"use_pass_{name}")
         column = layout.column(heading="Indexes", align=True)
         column.prop(view_layer, "use_pass_object_index")
         column.prop(view_layer, "use_pass_material_index")
-        layout.column(heading="Debug").prop(view_layer.volley, "use_pass_sample_count")
+        column = layout.column(heading="Debug", align=True)
+        column.prop(view_layer.volley, "use_pass_sample_count")
+        column.prop(view_layer.volley, "denoising_store_passes")
 
 
 class VOLLEY_VIEWLAYER_PT_passes_light(_VolleyPanel, Panel):

@@ -78,7 +78,7 @@ def inside_render_passes():
     for entry in passes.PASSES:
         if "." not in entry.setting:
             setattr(view_layer, entry.setting, True)
-    view_layer.volley.use_pass_sample_count = True
+    view_layer.volley.use_pass_sample_count = view_layer.volley.denoising_store_passes = True
     passes.register_passes(Fake(), bpy.context.scene, view_layer)
     long_names = [passes.name_of(entry, True) for entry in passes.PASSES]
     return default, found, long_names
@@ -87,7 +87,7 @@ def inside_render_passes():
 def test_pass_names_are_blenders(blender):
     default, everything, long_names = blender.run(inside_render_passes)
     assert ("Combined", 4, "RGBA", 'COLOR') in default and len(default) <= 2
-    assert len(everything) == 19 and len({name for name, *_ in everything}) == 19
+    assert len(everything) == 23 and len({name for name, *_ in everything}) == 23
     assert ("Depth", 1, "Z", 'VALUE') in everything
     for name in ("Object Index", "Diffuse Direct", "Emission", "Environment"):
         assert name in long_names

@@ -138,6 +138,8 @@ FIXTURE_INLINE trc_render_desc fixture_render_desc(uint32_t width, uint32_t heig
                              .seed = 1,
                              .filter_width = 1.5f,
                              .film_exposure = 1.0f,
+                             .mist_depth = 1.0f,
+                             .mist_falloff = 1.0f,
                              .thread_count = 2};
 }
 

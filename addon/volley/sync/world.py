@@ -7,6 +7,7 @@ from .visibility import world_visibility
 
 
 LEAST_AO_DISTANCE = 1e-6  # m; Blender's slider goes down to 0
+MIST_EXPONENTS = {'QUADRATIC': 2.0, 'LINEAR': 1.0, 'INVERSE_QUADRATIC': 0.5}
 
 
 def describe(world, material_id, settings):
@@ -25,3 +26,12 @@ def describe(world, material_id, settings):
     if method == 'MANUAL':
         fields["map_resolution"] = cycles(world, "sample_map_resolution", 0)
     return fields
+
+
+def mist_fields(world):
+    """The fields of trc_render_desc for the Mist pass; without a world, Blender's defaults."""
+    if world is None:
+        return {"mist_start": 5.0, "mist_depth": 25.0, "mist_falloff": MIST_EXPONENTS['QUADRATIC']}
+    mist = world.mist_settings
+    return {"mist_start": mist.start, "mist_depth": mist.depth,
+            "mist_falloff": MIST_EXPONENTS[mist.falloff]}

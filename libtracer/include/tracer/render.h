@@ -50,7 +50,15 @@ enum {
     TRC_PASS_TRANSMISSION_INDIRECT = 16,
     TRC_PASS_TRANSMISSION_COLOR = 17,
     TRC_PASS_SAMPLE_COUNT = 18, /* 1 */
-    TRC_PASS_COUNT = 19
+    TRC_PASS_MIST = 19,         /* 1: Cycles' Mist, 0 at mist_start or nearer, 1 far away and on a
+                                   miss; transparent surfaces count by what they cover */
+    /* For denoisers, as Cycles' passes: of the first surface that is rough enough, seen directly,
+     * in mirrors or through glass. */
+    TRC_PASS_DENOISING_ALBEDO = 20, /* 3: its albedo, times the throughput of the way to it */
+    TRC_PASS_DENOISING_NORMAL =
+        21, /* 3: its mean normal in the camera's space: right, up, forward */
+    TRC_PASS_DENOISING_DEPTH = 22, /* 1: lengths of the rays to it, by their throughput; metres */
+    TRC_PASS_COUNT = 23
 };
 
 typedef struct trc_render_desc {
@@ -89,6 +97,11 @@ typedef struct trc_render_desc {
      * TRC_PASS_SAMPLE_COUNT. */
     float noise_threshold;
     uint32_t min_samples;
+    /* Of TRC_PASS_MIST, else not read: ((distance - mist_start) / mist_depth)^mist_falloff, the
+     * quotient cut to [0, 1]; distance from the camera (orthographic: along its axis). */
+    float mist_start, mist_depth; /* metres, >= 0; a mist_depth of 0 is no mist */
+    float mist_falloff; /* > 0; Blender's Quadratic is 2, Linear 1, Inverse Quadratic 0.5 */
+    uint32_t reserved;
 } trc_render_desc;
 
 /* Starts rendering the scene's current snapshot in threads of the library. Memory is checked and

@@ -67,7 +67,11 @@ static trc_status check_film(const trc_render_desc *desc) {
     if (desc->passes >> TRC_PASS_COUNT) {
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "passes has bits of no pass");
     }
-    return TRC_OK;
+    if (!(desc->passes >> TRC_PASS_MIST & 1))
+        return TRC_OK;
+    TRC_TRY(trc_check_float(desc->mist_start, 0.0f, FLT_MAX, "mist_start"));
+    TRC_TRY(trc_check_float(desc->mist_depth, 0.0f, FLT_MAX, "mist_depth"));
+    return trc_check_float(desc->mist_falloff, FLT_MIN, FLT_MAX, "mist_falloff");
 }
 
 static trc_status check_render(const trc_render_desc *desc) {

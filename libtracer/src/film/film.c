@@ -31,6 +31,10 @@ uint32_t trc_pass_channels(uint32_t pass) {
         [TRC_PASS_TRANSMISSION_INDIRECT] = 3,
         [TRC_PASS_TRANSMISSION_COLOR] = 3,
         [TRC_PASS_SAMPLE_COUNT] = 1,
+        [TRC_PASS_MIST] = 1,
+        [TRC_PASS_DENOISING_ALBEDO] = 3,
+        [TRC_PASS_DENOISING_NORMAL] = 3,
+        [TRC_PASS_DENOISING_DEPTH] = 1,
     };
     return pass < TRC_PASS_COUNT ? channels[pass] : 0;
 }

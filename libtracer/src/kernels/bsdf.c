@@ -543,6 +543,43 @@ void TRC_KERNEL(trc_bsdf_albedo)(const struct trc_lobes *l, const struct trc_sur
     }
 }
 
+/* Lanes where a lobe is too rough for the surfaces it shows to be told from each other. */
+#define FEATURE_ALPHA 0.075f
+static vmask is_rough(const struct trc_lobe *lobe) {
+    if (lobe->kind == TRC_LOBE_TRANSPARENT)
+        return vm_none();
+    if (lobe->kind != TRC_LOBE_REFLECT && lobe->kind != TRC_LOBE_REFRACT)
+        return vm_all_set();
+    if (lobe->distribution == TRC_LOBE_TOON)
+        return vm_all_set();
+    const vmask blurred =
+        vf_gt(lobe->alpha_x * lobe->alpha_y, vf_set(FEATURE_ALPHA * FEATURE_ALPHA));
+    return vm_andnot(blurred, lobe->ideal);
+}
+
+void TRC_KERNEL(trc_lobes_features)(const struct trc_lobes *l, const struct trc_surface *s,
+                                    struct trc_denoising_features *out) {
+    const vfloat zero = vf_zero();
+    vvec3 normal = v3_zero(), albedo = v3_zero();
+    vfloat all = zero, rough = zero;
+    for (int i = 0; i < l->count; i++) {
+        const struct trc_lobe *lobe = &l->lobe[i];
+        const bool is_microfacet = lobe->kind == TRC_LOBE_REFLECT || lobe->kind == TRC_LOBE_REFRACT;
+        const vmask told = is_rough(lobe);
+        const vvec3 n = lobe->kind == TRC_LOBE_TRANSPARENT ? s->n : lobe->n;
+        const vvec3 color =
+            is_microfacet ? v3_mul(lobe->weight, fresnel_of(lobe, v3_dot(n, s->wo))) : lobe->weight;
+        normal = v3_mad(n, lobe->mix_weight, normal);
+        all = all + lobe->mix_weight;
+        rough = rough + vf_where(told, lobe->mix_weight);
+        albedo = v3_add(albedo, v3_where(told, color));
+    }
+    const vmask some = vf_gt(all, zero);
+    out->normal = v3_where(some, v3_scale(normal, vf_rcp(vf_select(some, all, vf_one()))));
+    out->albedo = albedo;
+    out->is_told = vm_or(vm_not(some), vf_gt(rough * vf_set(4.0f), all));
+}
+
 vvec3 TRC_KERNEL(trc_lobes_diffuse)(const struct trc_lobes *l, const struct trc_surface *s,
                                     vvec3 *normal_out) {
     vvec3 weight = v3_zero(), n = v3_zero();

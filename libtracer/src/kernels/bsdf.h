@@ -142,6 +142,17 @@ void TRC_KERNEL(trc_bsdf_ideal)(const struct trc_lobes *l, int i, const struct t
 void TRC_KERNEL(trc_bsdf_albedo)(const struct trc_lobes *l, const struct trc_surface *s,
                                  vvec3 albedo_out[3]);
 
+/* What a denoiser is told of a surface, as Cycles chooses it: the mean normal of the lobes by their
+ * mix_weight, and the albedo, Fresnel factors included, of those too rough to show another surface.
+ * is_told: lanes where rough lobes are more than a quarter of all, or where there are none at all;
+ * elsewhere the denoiser is told of what is seen through or mirrored. */
+struct trc_denoising_features {
+    vvec3 normal, albedo;
+    vmask is_told;
+};
+void TRC_KERNEL(trc_lobes_features)(const struct trc_lobes *l, const struct trc_surface *s,
+                                    struct trc_denoising_features *out);
+
 /* What ambient light meets: the weights of diffuse lobes, translucent ones too, and the mean of
  * their normals, the shading normal without any. */
 vvec3 TRC_KERNEL(trc_lobes_diffuse)(const struct trc_lobes *l, const struct trc_surface *s,

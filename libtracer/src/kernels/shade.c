@@ -173,74 +173,6 @@ static void shade_rays(struct trc_tile *t) {
     }
 }
 
-/* ---- data passes ---- */
-
-static void store_vector(struct trc_tile *t, uint32_t pass, uint32_t slot, float x, float y,
-                         float z) {
-    float *const *p = t->samples.pass[pass];
-    if (p[0])
-        p[0][slot] = x;
-    if (p[1])
-        p[1][slot] = y;
-    if (p[2])
-        p[2][slot] = z;
-}
-
-/* Depth, normal, indices ... of the first surface that is not mostly seen through. */
-static void data_passes(struct trc_tile *t, struct arrival *a, const struct trc_surface *s,
-                        const struct trc_material *m, const struct trc_lobes *lobes, vmask active) {
-    const uint64_t wanted = t->desc->passes & ~(1ull << TRC_PASS_COMBINED);
-    if (!wanted)
-        return;
-    const vvec3 through = TRC_KERNEL(trc_lobes_transparency)(lobes);
-    vmask write =
-        vm_and(active, vi_eq((vint)(a->path & vu_set(TRC_PATH_DATA_DONE | TRC_VISIBLE_CAMERA)),
-                             vi_set(TRC_VISIBLE_CAMERA)));
-    write = vm_and(write, vf_lt(v3_average(through), vf_set(0.5f)));
-    if (!vm_any(write))
-        return;
-    a->path = (vuint)vi_select(write, (vint)(a->path | vu_set(TRC_PATH_DATA_DONE)), (vint)a->path);
-    vvec3 albedo[3];
-    TRC_KERNEL(trc_bsdf_albedo)(lobes, s, albedo);
-    const float *view =
-        t->snapshot->camera.camera_to_world->m; /* column 2: backwards along the axis */
-    float z[TRC_WIDTH], n[3][TRC_WIDTH], p[3][TRC_WIDTH], uv[2][TRC_WIDTH], color[9][TRC_WIDTH];
-    vf_store(z, (vf_set(view[3]) - s->p.x) * vf_set(view[2]) +
-                    (vf_set(view[7]) - s->p.y) * vf_set(view[6]) +
-                    (vf_set(view[11]) - s->p.z) * vf_set(view[10]));
-    vf_store(n[0], s->n.x), vf_store(n[1], s->n.y), vf_store(n[2], s->n.z);
-    vf_store(p[0], s->p.x), vf_store(p[1], s->p.y), vf_store(p[2], s->p.z);
-    vf_store(uv[0], s->u), vf_store(uv[1], s->v);
-    for (int k = 0; k < 3; k++) {
-        vf_store(color[3 * k], albedo[k].x * a->weight.x);
-        vf_store(color[3 * k + 1], albedo[k].y * a->weight.y);
-        vf_store(color[3 * k + 2], albedo[k].z * a->weight.z);
-    }
-    for (uint32_t bits = vm_bits(write); bits; bits &= bits - 1) {
-        const int i = __builtin_ctz(bits);
-        const uint32_t slot = a->slots[i];
-        const struct trc_instance *instance = &t->snapshot->instances[vi_get(s->instance, i)];
-        const struct trc_mesh *mesh = t->snapshot->meshes[instance->mesh];
-        store_vector(t, TRC_PASS_DEPTH, slot, z[i], 0.0f, 0.0f);
-        store_vector(t, TRC_PASS_NORMAL, slot, n[0][i], n[1][i], n[2][i]);
-        store_vector(t, TRC_PASS_POSITION, slot, p[0][i], p[1][i], p[2][i]);
-        store_vector(t, TRC_PASS_OBJECT_INDEX, slot, (float)instance->pass_index, 0.0f, 0.0f);
-        store_vector(t, TRC_PASS_MATERIAL_INDEX, slot, (float)m->pass_index, 0.0f, 0.0f);
-        if (mesh->default_uv >= 0 && (wanted & 1ull << TRC_PASS_UV)) {
-            const float *c =
-                mesh->attributes[mesh->default_uv].values + 6 * (size_t)vi_get(s->triangle, i);
-            const float u = uv[0][i], v = uv[1][i], w = 1.0f - u - v;
-            store_vector(t, TRC_PASS_UV, slot, w * c[0] + u * c[2] + v * c[4],
-                         w * c[1] + u * c[3] + v * c[5], 1.0f);
-        }
-        const uint32_t pass[3] = {TRC_PASS_DIFFUSE_COLOR, TRC_PASS_GLOSSY_COLOR,
-                                  TRC_PASS_TRANSMISSION_COLOR};
-        for (int k = 0; k < 3; k++)
-            store_vector(t, pass[k], slot, color[3 * k][i], color[3 * k + 1][i],
-                         color[3 * k + 2][i]);
-    }
-}
-
 /* ---- direct light ---- */
 
 /* Origin of a ray that leaves s towards w: moved along the geometric normal out of the box of the
@@ -509,7 +441,7 @@ static void ray_push(struct trc_tile *t, const struct arrival *a, const struct t
     kind = kind | (vuint)vi_select(ideal, vi_set(TRC_PATH_SINGULAR), vi_set(0));
     kind = kind | (vuint)vi_select(b->diffuse, vi_set(TRC_VISIBLE_DIFFUSE), vi_set(0));
     kind = kind | (vuint)vi_select(first, (vint)own, (vint)category);
-    kind = kind | (a->path & vu_set(TRC_PATH_DATA_DONE));
+    kind = kind | (a->path & vu_set(TRC_PATH_DATA_DONE | TRC_PATH_TOLD));
     vuint path = (vuint)vi_select(straight, (vint)a->path, (vint)kind);
     path = path | (vuint)vi_select(over, vi_set(TRC_PATH_LAST), vi_set(0));
 
@@ -665,8 +597,9 @@ static void shade_group(struct trc_tile *t, uint32_t material, vint index, vmask
     a.receive_n = lets_through ? v3_zero() : s.n;
     if (m->has & TRC_MATERIAL_HAS_HOLDOUT)
         holdout(t, &a, &lobes, active);
-    if (t->generation == 0 || (t->snapshot->features & TRC_FEATURE_TRANSPARENCY))
-        data_passes(t, &a, &s, m, &lobes, active);
+    if (t->extra_passes)
+        a.path = TRC_KERNEL(trc_data_passes)(t, &s, m, &lobes, a.found_weight, a.beyond,
+                                             a.t - a.tmin, a.slots);
     if (m->has & TRC_MATERIAL_HAS_EMISSION) {
         const vmask lit = vm_and(active, vf_gt(v3_max(lobes.emission), vf_set(0.0f)));
         if (vm_any(lit)) {

@@ -64,8 +64,8 @@ static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc, void *
     for (int i = 0; i < 3; i++)
         t->samples.radiance[i] = carve(&c, batch);
     t->samples.transparency = carve(&c, batch);
-    for (uint32_t pass = 1; pass < TRC_PASS_SAMPLE_COUNT; pass++)
-        if (desc->passes >> pass & 1)
+    for (uint32_t pass = 1; pass < TRC_PASS_COUNT; pass++)
+        if (pass != TRC_PASS_SAMPLE_COUNT && desc->passes >> pass & 1)
             for (uint32_t k = 0; k < trc_pass_channels(pass); k++)
                 t->samples.pass[pass][k] = carve(&c, batch);
     struct trc_shadow_store *q = &t->shadows;
@@ -277,9 +277,16 @@ static void samples_clear(struct trc_tile *t) {
         for (int k = 0; k < 3; k++)
             if (t->samples.pass[pass][k])
                 memset(t->samples.pass[pass][k], 0, bytes);
-    if (t->samples.pass[TRC_PASS_DEPTH][0])
-        for (uint32_t i = 0; i < TRC_BATCH; i++)
-            t->samples.pass[TRC_PASS_DEPTH][0][i] = 1e10f;
+    /* What a miss has. */
+    static const struct {
+        uint32_t pass;
+        float value;
+    } miss[] = {{TRC_PASS_DEPTH, 1e10f}, {TRC_PASS_MIST, 1.0f}};
+    for (size_t k = 0; k < sizeof miss / sizeof *miss; k++) {
+        float *values = t->samples.pass[miss[k].pass][0];
+        for (uint32_t i = 0; values && i < TRC_BATCH; i++)
+            values[i] = miss[k].value;
+    }
 }
 
 static bool first_sample_pass(uint32_t pass) {
@@ -301,7 +308,7 @@ TRC_INLINE bool is_finite_sample(const struct trc_tile *t, uint32_t slot) {
 
 /* Adds a sample's passes to its pixel. */
 static void film_add_passes(struct trc_tile *t, uint32_t slot, size_t pixel, bool first) {
-    for (uint32_t pass = 1; pass < TRC_PASS_SAMPLE_COUNT; pass++) {
+    for (uint32_t pass = 1; pass < TRC_PASS_COUNT; pass++) {
         if (!t->samples.pass[pass][0])
             continue;
         const uint32_t channels = trc_pass_channels(pass);

@@ -22,7 +22,8 @@
 enum {
     TRC_PATH_CATEGORY_SHIFT = 12, /* 0 camera, 1 glossy, 2 transmission: by the first bounce */
     TRC_PATH_LAST = 1 << 14,      /* only emission counts at the next surface */
-    TRC_PATH_DATA_DONE = 1 << 15  /* data passes of the sample are written */
+    TRC_PATH_DATA_DONE = 1 << 15, /* data passes of the sample are written */
+    TRC_PATH_TOLD = 1 << 16       /* and the denoising passes of this way of it */
 };
 
 /* A ray's four depth counters, 8 bits each, saturating by the limits on desc. */
@@ -152,6 +153,15 @@ void TRC_KERNEL(trc_filter_table)(uint32_t filter, float width, float table[TRC_
 
 /* Shades the hits of t->work, sorted by material, and what missed. (kernels/shade.c) */
 void TRC_KERNEL(trc_shade_batch)(struct trc_tile *t);
+
+/* Passes that hold no light but what surfaces are, for a group of hits of one material:
+ * found_weight and beyond as kernels/bsdf.h has them, of the rays that arrived; length: of their
+ * way since the last surface or the near clip. Returns the rays' path words, which remember what is
+ * written. Called only with more passes than Combined. (kernels/data_passes.c) */
+vuint TRC_KERNEL(trc_data_passes)(struct trc_tile *t, const struct trc_surface *s,
+                                  const struct trc_material *m, const struct trc_lobes *lobes,
+                                  vvec3 found_weight, vfloat beyond, vfloat length,
+                                  const uint32_t slots[TRC_WIDTH]);
 
 /* Traces and empties the shadow queue. (kernels/shadow.c) */
 void TRC_KERNEL(trc_shadow_flush)(struct trc_tile *t);

@@ -1,0 +1,180 @@
+/* Passes of what the camera sees, apart from light.
+ *
+ * Two kinds, as in Cycles: those of the first surface that is not mostly seen through (depth,
+ * normal, indices ...), and those that add up over all surfaces on the straight way through
+ * transparency, each by what it lets be seen of itself (colours, mist). */
+#include "kernels/tile.h"
+#include "kernels/wide_math.h"
+
+/* Cycles' default of the view layer's Alpha Threshold. */
+#define ALPHA_THRESHOLD 0.5f
+
+#define DENOISING_PASSES                                                     \
+    (1ull << TRC_PASS_DENOISING_ALBEDO | 1ull << TRC_PASS_DENOISING_NORMAL | \
+     1ull << TRC_PASS_DENOISING_DEPTH)
+
+static void store_vector(struct trc_tile *t, uint32_t pass, uint32_t slot, float x, float y,
+                         float z) {
+    float *const *p = t->samples.pass[pass];
+    if (p[0])
+        p[0][slot] = x;
+    if (p[1])
+        p[1][slot] = y;
+    if (p[2])
+        p[2][slot] = z;
+}
+
+/* Adds the lanes' vectors to a pass, if it is asked for. */
+static void add_lanes(struct trc_tile *t, uint32_t pass, vvec3 value, const uint32_t *slots,
+                      vmask active) {
+    if (!t->samples.pass[pass][0])
+        return;
+    float lanes[3][TRC_WIDTH];
+    vf_store(lanes[0], value.x), vf_store(lanes[1], value.y), vf_store(lanes[2], value.z);
+    for (uint32_t bits = vm_bits(active); bits; bits &= bits - 1) {
+        const int i = __builtin_ctz(bits);
+        const float v[3] = {lanes[0][i], lanes[1][i], lanes[2][i]};
+        trc_pass_add(t, pass, slots[i], v);
+    }
+}
+
+/* The camera in the middle of the shutter. */
+static const float *camera_matrix(const struct trc_tile *t) {
+    const struct trc_camera *c = &t->snapshot->camera;
+    return c->camera_to_world[c->key_count / 2].m;
+}
+
+/* From the camera's origin to the points. */
+static vvec3 from_camera(const struct trc_tile *t, vvec3 p) {
+    const float *m = camera_matrix(t);
+    return v3_sub(p, v3(vf_set(m[3]), vf_set(m[7]), vf_set(m[11])));
+}
+
+/* Distance along the view axis. */
+static vfloat axial_distance(const struct trc_tile *t, vvec3 p) {
+    const float *m = camera_matrix(t); /* column 2: backwards along the axis */
+    return vf_set(0.0f) - v3_dot(from_camera(t, p), v3(vf_set(m[2]), vf_set(m[6]), vf_set(m[10])));
+}
+
+/* ---- of the first surface ---- */
+
+static void first_surface(struct trc_tile *t, const struct trc_surface *s,
+                          const struct trc_material *m, const uint32_t *slots, vmask write) {
+    float z[TRC_WIDTH], n[3][TRC_WIDTH], p[3][TRC_WIDTH], uv[2][TRC_WIDTH];
+    vf_store(z, axial_distance(t, s->p));
+    vf_store(n[0], s->n.x), vf_store(n[1], s->n.y), vf_store(n[2], s->n.z);
+    vf_store(p[0], s->p.x), vf_store(p[1], s->p.y), vf_store(p[2], s->p.z);
+    vf_store(uv[0], s->u), vf_store(uv[1], s->v);
+    for (uint32_t bits = vm_bits(write); bits; bits &= bits - 1) {
+        const int i = __builtin_ctz(bits);
+        const uint32_t slot = slots[i];
+        const struct trc_instance *instance = &t->snapshot->instances[vi_get(s->instance, i)];
+        const struct trc_mesh *mesh = t->snapshot->meshes[instance->mesh];
+        store_vector(t, TRC_PASS_DEPTH, slot, z[i], 0.0f, 0.0f);
+        store_vector(t, TRC_PASS_NORMAL, slot, n[0][i], n[1][i], n[2][i]);
+        store_vector(t, TRC_PASS_POSITION, slot, p[0][i], p[1][i], p[2][i]);
+        store_vector(t, TRC_PASS_OBJECT_INDEX, slot, (float)instance->pass_index, 0.0f, 0.0f);
+        store_vector(t, TRC_PASS_MATERIAL_INDEX, slot, (float)m->pass_index, 0.0f, 0.0f);
+        if (mesh->default_uv >= 0 && t->samples.pass[TRC_PASS_UV][0]) {
+            const float *c =
+                mesh->attributes[mesh->default_uv].values + 6 * (size_t)vi_get(s->triangle, i);
+            const float u = uv[0][i], v = uv[1][i], w = 1.0f - u - v;
+            store_vector(t, TRC_PASS_UV, slot, w * c[0] + u * c[2] + v * c[4],
+                         w * c[1] + u * c[3] + v * c[5], 1.0f);
+        }
+    }
+}
+
+/* ---- of all surfaces on the way ---- */
+
+static void add_colors(struct trc_tile *t, const struct trc_surface *s,
+                       const struct trc_lobes *lobes, vvec3 weight, const uint32_t *slots,
+                       vmask active) {
+    static const uint32_t pass[3] = {TRC_PASS_DIFFUSE_COLOR, TRC_PASS_GLOSSY_COLOR,
+                                     TRC_PASS_TRANSMISSION_COLOR};
+    vvec3 albedo[3];
+    TRC_KERNEL(trc_bsdf_albedo)(lobes, s, albedo);
+    for (int k = 0; k < 3; k++)
+        add_lanes(t, pass[k], v3_mul(weight, albedo[k]), slots, active);
+}
+
+/* Takes what is seen before the mist from the pass, which starts at 1. */
+static void add_mist(struct trc_tile *t, const struct trc_surface *s, vvec3 seen,
+                     const uint32_t *slots, vmask active) {
+    if (!t->samples.pass[TRC_PASS_MIST][0])
+        return;
+    const trc_render_desc *d = t->desc;
+    const vvec3 way = from_camera(t, s->p);
+    const vfloat distance = t->snapshot->camera.type == TRC_CAMERA_ORTHOGRAPHIC
+                                ? vf_abs(axial_distance(t, s->p))
+                                : vf_sqrt(v3_dot(way, way));
+    const vfloat inv_depth = vf_set(d->mist_depth > 0.0f ? 1.0f / d->mist_depth : 0.0f);
+    const vfloat zero = vf_set(0.0f), one = vf_set(1.0f);
+    const vfloat depth = vf_min(vf_max((distance - vf_set(d->mist_start)) * inv_depth, zero), one);
+    const vfloat mist = d->mist_falloff == 1.0f ? depth : vf_pow(depth, vf_set(d->mist_falloff));
+    const vfloat clear = (mist - one) * v3_average(seen);
+    add_lanes(t, TRC_PASS_MIST, v3(clear, zero, zero), slots, active);
+}
+
+/* ---- for denoisers: of the first rough surface, through mirrors and glass too ----
+ *
+ * As Cycles, but for surfaces that are not told of and yet have diffuse lobes: with diffuse bounces
+ * 0 it loses the paths that pick those, and with them a part of what lies behind. */
+
+/* Writes the mean normal once, in the camera's space (x right, y up, z forward), whichever way of
+ * the sample comes first; the others add up by their throughput. Returns the new path words. */
+static vuint add_features(struct trc_tile *t, const struct trc_surface *s,
+                          const struct trc_lobes *lobes, vvec3 weight, vfloat length,
+                          const uint32_t *slots) {
+    const vmask on = vm_and(s->active, vi_eq((vint)s->path & vi_set(TRC_PATH_TOLD), vi_set(0)));
+    if (!vm_any(on))
+        return s->path;
+    struct trc_denoising_features f;
+    TRC_KERNEL(trc_lobes_features)(lobes, s, &f);
+    const vfloat zero = vf_set(0.0f);
+    const float *camera = camera_matrix(t);
+    const vfloat way = v3_average(weight) * length;
+    add_lanes(t, TRC_PASS_DENOISING_DEPTH, v3(way, zero, zero), slots, on);
+    const vmask told = vm_and(on, f.is_told);
+    add_lanes(t, TRC_PASS_DENOISING_ALBEDO, v3_mul(weight, f.albedo), slots, told);
+    if (t->samples.pass[TRC_PASS_DENOISING_NORMAL][0]) {
+        float n[3][TRC_WIDTH];
+        for (int k = 0; k < 3; k++) {
+            const vfloat along = v3_dot(
+                f.normal, v3(vf_set(camera[k]), vf_set(camera[4 + k]), vf_set(camera[8 + k])));
+            vf_store(n[k], k == 2 ? zero - along : along);
+        }
+        for (uint32_t bits = vm_bits(told); bits; bits &= bits - 1) {
+            const int i = __builtin_ctz(bits);
+            float *const *p = t->samples.pass[TRC_PASS_DENOISING_NORMAL];
+            if (p[0][slots[i]] == 0.0f && p[1][slots[i]] == 0.0f && p[2][slots[i]] == 0.0f)
+                store_vector(t, TRC_PASS_DENOISING_NORMAL, slots[i], n[0][i], n[1][i], n[2][i]);
+        }
+    }
+    return (vuint)vi_select(told, (vint)s->path | vi_set(TRC_PATH_TOLD), (vint)s->path);
+}
+
+vuint TRC_KERNEL(trc_data_passes)(struct trc_tile *t, const struct trc_surface *s,
+                                  const struct trc_material *m, const struct trc_lobes *lobes,
+                                  vvec3 found_weight, vfloat beyond, vfloat length,
+                                  const uint32_t slots[TRC_WIDTH]) {
+    const vuint path = t->desc->passes & DENOISING_PASSES
+                           ? add_features(t, s, lobes, found_weight, length, slots)
+                           : s->path;
+    const vint straight = vi_set(TRC_PATH_TRANSPARENT_BACKGROUND);
+    const vmask on = vm_and(s->active, vi_eq((vint)s->path & straight, straight));
+    if (!vm_any(on))
+        return path;
+    const vvec3 weight = v3_scale(found_weight, beyond);
+    const vvec3 one = v3(vf_set(1.0f), vf_set(1.0f), vf_set(1.0f));
+    const vvec3 alpha = v3_sub(one, TRC_KERNEL(trc_lobes_transparency)(lobes));
+    add_colors(t, s, lobes, weight, slots, on);
+    add_mist(t, s, v3_mul(weight, alpha), slots, on);
+    vmask first = vm_and(on, vi_eq((vint)s->path & vi_set(TRC_PATH_DATA_DONE), vi_set(0)));
+    if (m->has & TRC_MATERIAL_HAS_TRANSPARENCY)
+        first = vm_and(first, vf_ge(v3_average(alpha), vf_set(ALPHA_THRESHOLD)));
+    if (!vm_any(first))
+        return path;
+    first_surface(t, s, m, slots, first);
+    return (vuint)vi_select(first, (vint)path | vi_set(TRC_PATH_DATA_DONE), (vint)path);
+}
