@@ -16,6 +16,7 @@ PASSES = (
     Pass(1, ("Depth", "Depth"), "Z", 'VALUE', "use_pass_z"),
     Pass(3, ("Position", "Position"), "XYZ", 'VECTOR', "use_pass_position"),
     Pass(2, ("Normal", "Normal"), "XYZ", 'VECTOR', "use_pass_normal"),
+    Pass(23, ("Vector", "Vector"), "XYZW", 'VECTOR', "use_pass_vector"),
     Pass(4, ("UV", "UV"), "UVA", 'VECTOR', "use_pass_uv"),
     Pass(5, ("IndexOB", "Object Index"), "X", 'VALUE', "use_pass_object_index"),
     Pass(6, ("IndexMA", "Material Index"), "X", 'VALUE', "use_pass_material_index"),
@@ -72,6 +73,11 @@ def add_to_result(engine, entries):
     for entry in entries:
         if entry is not COMBINED:
             engine.add_pass(name_of(entry), len(entry.channels), entry.channels)
+
+
+def without_vector(entries):
+    """The passes to ask the library for with motion blur, which leaves Vector black as in Cycles."""
+    return [entry for entry in entries if entry.setting != "use_pass_vector"]
 
 
 def request_mask(entries):

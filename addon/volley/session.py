@@ -60,7 +60,10 @@ class Session:
         view_names = [view.name for view in film.views] or [""]
 
         self._open(scene, keep)
-        shutter = motion.shutter_of(scene, view_layer, motion_position(depsgraph.scene))
+        shutter = motion.shutter_of(scene, view_layer, motion_position(depsgraph.scene),
+                                   view_layer.use_pass_vector)
+        if shutter is not None and shutter.curve is not None:
+            entries = passes.without_vector(entries)
         views = self._synchronise(engine, depsgraph, frame, shutter, view_names)
         for view_name, keys in views:
             self._sync.set_camera(keys, shutter)

@@ -301,6 +301,9 @@ class VOLLEY_VIEWLAYER_PT_passes_data(_VolleyPanel, Panel):
         column = layout.column(heading="Include", align=True)
         for name in ("combined", "z", "mist", "position", "normal", "uv"):
             column.prop(view_layer, f"use_pass_{name}")
+        vector = column.column()
+        vector.active = not context.scene.render.use_motion_blur
+        vector.prop(view_layer, "use_pass_vector")
         column = layout.column(heading="Indexes", align=True)
         column.prop(view_layer, "use_pass_object_index")
         column.prop(view_layer, "use_pass_material_index")

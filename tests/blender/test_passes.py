@@ -100,3 +100,42 @@ def test_denoising_data(blender):
     pairs = blender.run(inside_denoising)
     for ours, theirs in pairs.values():
         _agree(ours, theirs, mean=5e-3, share=0.05, step=0.1)
+
+
+# Vector ---------------------------------------------------------------------------------------------
+
+def inside_vector():
+    """A camera that moves and turns, objects that move, turn and deform; with misses around."""
+    import bpy
+    import scenes
+    scene = _scene()
+    bpy.context.view_layer.use_pass_vector = True
+    bpy.data.objects.remove(bpy.data.objects["Back"])
+    made, metal, mirror = scene.camera, bpy.data.objects["Metal"], bpy.data.objects["Mirror"]
+    mirror.shape_key_add(name="Basis")
+    key = mirror.shape_key_add(name="Wide")
+    for point in key.data:
+        point.co.x *= 1.5
+    for frame in (0, 1, 2):
+        made.location.x, made.rotation_euler.z = 0.5 + 0.2 * frame, 0.1 + 0.02 * frame * frame
+        metal.location.z, metal.rotation_euler.y = 0.1 * frame * frame, 0.2 * frame
+        key.value = 0.3 * frame
+        for data, path in ((made, "location"), (made, "rotation_euler"), (metal, "location"),
+                           (metal, "rotation_euler"), (key, "value")):
+            data.keyframe_insert(path, frame=frame)
+    scene.frame_set(1)
+    pairs = {"perspective": _both(["Vector"])["Vector"]}
+    made.data.type, made.data.ortho_scale = 'ORTHO', 8.0
+    pairs["orthographic"] = _both(["Vector"])["Vector"]
+    scene.render.use_motion_blur = True
+    pairs["blurred"] = _both(["Vector"])["Vector"]
+    return pairs
+
+
+def test_vector(blender):
+    pairs = blender.run(inside_vector)
+    for picture in pairs.pop("blurred"):
+        assert not picture[..., :3].any()
+    for ours, theirs in pairs.values():  # the file has an alpha of 1 in place of the fourth channel
+        assert np.abs(theirs).max(axis=(0, 1)).min() > 0.5
+        _agree(ours, theirs, mean=5e-3, share=0.02)

@@ -144,7 +144,7 @@ class SceneSync:
 
     def set_camera(self, keys, shutter=None):
         """Send the camera; keys as camera.CameraKeys."""
-        if shutter is None:
+        if shutter is None or shutter.curve is None:
             camera.send(self.scene, keys)
         else:
             camera.send(self.scene, keys, shutter.length, shutter.curve)

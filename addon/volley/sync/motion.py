@@ -26,7 +26,8 @@ _SINGULAR = 1e-6               # smallest share of its size in any direction tha
 
 @dataclass
 class Shutter:
-    """When it is open: length and centre in frames; curve: samples of its opening."""
+    """When it is open: length and centre in frames; curve: samples of its opening, None where motion
+    is only told to the Vector pass and nothing is blurred."""
 
     length: float
     center: float
@@ -43,14 +44,15 @@ def split_frame(frame):
     return whole, frame - whole
 
 
-def shutter_of(scene, view_layer, position):
+def shutter_of(scene, view_layer, position, wants_vector=False):
     """The shutter of an evaluated scene, None without motion blur; position: 'START', 'CENTER' or
-    'END' of the interval is the current frame."""
+    'END' of the interval is the current frame; wants_vector: whether motion matters without blur."""
     render = scene.render
     is_used = render.use_motion_blur and view_layer.use_motion_blur
-    if not is_used or render.motion_blur_shutter <= 0.0:
-        return None
     now = scene.frame_current_final
+    if not is_used or render.motion_blur_shutter <= 0.0:
+        # From the frame before to the one after.
+        return Shutter(2.0, now, None) if wants_vector else None
     length = render.motion_blur_shutter
     center = now + _CENTER_OFFSETS[position] * length
     return Shutter(length, center, _curve_of(render))

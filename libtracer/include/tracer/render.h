@@ -58,7 +58,11 @@ enum {
     TRC_PASS_DENOISING_NORMAL =
         21, /* 3: its mean normal in the camera's space: right, up, forward */
     TRC_PASS_DENOISING_DEPTH = 22, /* 1: lengths of the rays to it, by their throughput; metres */
-    TRC_PASS_COUNT = 23
+    TRC_PASS_VECTOR = 23, /* 4: pixels in x and y that the first surface moves from the shutter's
+                             start to its middle, negated, and from there to its end, negated; right
+                             and up are positive. Mean of the samples that hit something. What has
+                             keys moves even where shutter_time is 0 and nothing is blurred */
+    TRC_PASS_COUNT = 24
 };
 
 typedef struct trc_render_desc {

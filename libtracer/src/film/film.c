@@ -35,8 +35,13 @@ uint32_t trc_pass_channels(uint32_t pass) {
         [TRC_PASS_DENOISING_ALBEDO] = 3,
         [TRC_PASS_DENOISING_NORMAL] = 3,
         [TRC_PASS_DENOISING_DEPTH] = 1,
+        [TRC_PASS_VECTOR] = 4,
     };
     return pass < TRC_PASS_COUNT ? channels[pass] : 0;
+}
+
+uint32_t trc_film_channels(uint32_t pass) {
+    return trc_pass_channels(pass) + (pass == TRC_PASS_VECTOR);
 }
 
 /* Passes that hold the value of a pixel's first sample, not a sum. */
@@ -96,7 +101,7 @@ trc_status trc_film_create(struct trc_film *film, uint32_t width, uint32_t heigh
     uint64_t pixel_bytes = sizeof *film->sample_counts;
     for (uint32_t pass = 0; pass < TRC_PASS_COUNT; pass++) {
         if (has_sums(pass, passes))
-            pixel_bytes += trc_pass_channels(pass) * sizeof(double);
+            pixel_bytes += trc_film_channels(pass) * sizeof(double);
     }
     TRC_TRY(trc_film_check_budget(width, height, pixel_bytes));
     const size_t pixels = (size_t)width * height;
@@ -106,7 +111,7 @@ trc_status trc_film_create(struct trc_film *film, uint32_t width, uint32_t heigh
     for (uint32_t pass = 0; ok && pass < TRC_PASS_COUNT; pass++) {
         if (!has_sums(pass, passes))
             continue;
-        made.sums[pass] = trc_alloc_zeroed(pixels, trc_pass_channels(pass) * sizeof(double));
+        made.sums[pass] = trc_alloc_zeroed(pixels, trc_film_channels(pass) * sizeof(double));
         ok = made.sums[pass] != NULL;
     }
     if (!ok) {
@@ -165,6 +170,7 @@ trc_status trc_film_read(const struct trc_film *film, uint32_t pass, float expos
     const double *sums = film->sums[pass], *divisor = divisor_of(film, pass);
     const double light = is_light(pass) ? exposure : 1.0;
     const bool first_sample = is_first_sample(pass);
+    const uint32_t stride = trc_film_channels(pass);
     for (uint64_t i = 0; i < pixels; i++) {
         const uint32_t count = __atomic_load_n(&film->sample_counts[i], __ATOMIC_RELAXED);
         float *pixel = out + i * channels;
@@ -172,10 +178,13 @@ trc_status trc_film_read(const struct trc_film *film, uint32_t pass, float expos
             pixel[0] = (float)count;
             continue;
         }
-        const double factor = !count ? 0.0 : first_sample ? 1.0 : 1.0 / count;
+        double weight = first_sample ? 1.0 : count;
+        if (pass == TRC_PASS_VECTOR)
+            weight = load_sum(&sums[i * stride + channels]);
+        const double factor = count && weight > 0.0 ? 1.0 / weight : 0.0;
         for (uint32_t c = 0; c < channels; c++) {
             const bool is_alpha = pass == TRC_PASS_COMBINED && c == 3;
-            double value = load_sum(&sums[i * channels + c]);
+            double value = load_sum(&sums[i * stride + c]);
             if (divisor) {
                 /* Both are sums of the same samples: the counts cancel. */
                 const double by = load_sum(&divisor[i * channels + c]);

@@ -13,7 +13,7 @@
 struct trc_film {
     uint32_t width, height;       /* of the crop */
     uint64_t passes;              /* bit per TRC_PASS_*, COMBINED included */
-    double *sums[TRC_PASS_COUNT]; /* channels * width * height, or NULL; bottom row first.
+    double *sums[TRC_PASS_COUNT]; /* trc_film_channels * width * height, or NULL; bottom row first.
                                      "First sample" passes hold the value itself */
     uint32_t *sample_counts;      /* width * height */
 };
@@ -21,6 +21,11 @@ struct trc_film {
 /* TRC_ERROR_TOO_LARGE unless so many bytes for every pixel fit into the machine's memory: a system
  * that overcommits would grant more than there is and kill the host later. pixel_bytes < 1 KiB. */
 trc_status trc_film_check_budget(uint32_t width, uint32_t height, uint64_t pixel_bytes);
+
+/* Sums of a pass for each pixel: its channels, and for the Vector pass the number of samples that
+ * hit something, as it is their mean. */
+#define TRC_MAX_FILM_CHANNELS 5
+uint32_t trc_film_channels(uint32_t pass);
 
 /* Takes the memory of the passes, zeroed. TRC_ERROR_TOO_LARGE or OUT_OF_MEMORY. */
 trc_status trc_film_create(struct trc_film *film, uint32_t width, uint32_t height, uint64_t passes);

@@ -3,6 +3,7 @@
  * Two kinds, as in Cycles: those of the first surface that is not mostly seen through (depth,
  * normal, indices ...), and those that add up over all surfaces on the straight way through
  * transparency, each by what it lets be seen of itself (colours, mist). */
+#include "kernels/mesh_fetch.h"
 #include "kernels/tile.h"
 #include "kernels/wide_math.h"
 
@@ -58,6 +59,59 @@ static vfloat axial_distance(const struct trc_tile *t, vvec3 p) {
 
 /* ---- of the first surface ---- */
 
+/* Where a point of a triangle is in the world at a time. */
+static void point_at(const struct trc_instance *instance, const struct trc_mesh *mesh,
+                     const uint32_t index[3], float u, float v, float time, float p[3]) {
+    float c[9], m[12], object[3];
+    trc_corner_at(mesh->positions, index, mesh->vertex_count, mesh->key_count, time, c);
+    trc_affine_at(instance, time, m);
+    for (int k = 0; k < 3; k++)
+        object[k] = (1.0f - u - v) * c[k] + u * c[3 + k] + v * c[6 + k];
+    for (int k = 0; k < 3; k++)
+        p[k] = m[4 * k] * object[0] + m[4 * k + 1] * object[1] + m[4 * k + 2] * object[2] +
+               m[4 * k + 3];
+}
+
+/* Where the camera of a time sees a point, in pixels from the lower left corner. */
+static void raster_at(const struct trc_tile *t, const float p[3], float time, float raster[2]) {
+    const struct trc_camera *c = &t->snapshot->camera;
+    uint32_t key;
+    float f, m[12], window[4], at[3];
+    trc_key_at(time, c->key_count, &key, &f);
+    const uint32_t next = key + (c->key_count > 1);
+    for (int k = 0; k < 12; k++)
+        m[k] = c->camera_to_world[key].m[k] +
+               f * (c->camera_to_world[next].m[k] - c->camera_to_world[key].m[k]);
+    for (int k = 0; k < 4; k++)
+        window[k] = c->windows[key][k] + f * (c->windows[next][k] - c->windows[key][k]);
+    for (int k = 0; k < 3; k++) /* the matrix is rigid */
+        at[k] = m[k] * (p[0] - m[3]) + m[4 + k] * (p[1] - m[7]) + m[8 + k] * (p[2] - m[11]);
+    const float scale = c->type == TRC_CAMERA_ORTHOGRAPHIC ? 1.0f : -1.0f / at[2];
+    const float size[2] = {(float)t->desc->width, (float)t->desc->height};
+    for (int k = 0; k < 2; k++)
+        raster[k] = (at[k] * scale - window[2 * k]) / (window[2 * k + 1] - window[2 * k]) * size[k];
+}
+
+/* Not counted where the camera does not see the point at all three times. */
+static void store_motion(struct trc_tile *t, const struct trc_instance *instance,
+                         const struct trc_mesh *mesh, uint32_t triangle, float u, float v,
+                         uint32_t slot) {
+    float *const *out = t->samples.pass[TRC_PASS_VECTOR];
+    float raster[3][2], p[3];
+    for (int k = 0; k < 3; k++) {
+        const float time = 0.5f * (float)k;
+        point_at(instance, mesh, mesh->indices + 3 * (size_t)triangle, u, v, time, p);
+        raster_at(t, p, time, raster[k]);
+    }
+    const float motion[4] = {raster[0][0] - raster[1][0], raster[0][1] - raster[1][1],
+                             raster[1][0] - raster[2][0], raster[1][1] - raster[2][1]};
+    if (!isfinite(motion[0] + motion[1] + motion[2] + motion[3]))
+        return;
+    for (int k = 0; k < 4; k++)
+        out[k][slot] = motion[k];
+    out[4][slot] = 1.0f;
+}
+
 static void first_surface(struct trc_tile *t, const struct trc_surface *s,
                           const struct trc_material *m, const uint32_t *slots, vmask write) {
     float z[TRC_WIDTH], n[3][TRC_WIDTH], p[3][TRC_WIDTH], uv[2][TRC_WIDTH];
@@ -75,6 +129,9 @@ static void first_surface(struct trc_tile *t, const struct trc_surface *s,
         store_vector(t, TRC_PASS_POSITION, slot, p[0][i], p[1][i], p[2][i]);
         store_vector(t, TRC_PASS_OBJECT_INDEX, slot, (float)instance->pass_index, 0.0f, 0.0f);
         store_vector(t, TRC_PASS_MATERIAL_INDEX, slot, (float)m->pass_index, 0.0f, 0.0f);
+        if (t->samples.pass[TRC_PASS_VECTOR][0])
+            store_motion(t, instance, mesh, (uint32_t)vi_get(s->triangle, i), uv[0][i], uv[1][i],
+                         slot);
         if (mesh->default_uv >= 0 && t->samples.pass[TRC_PASS_UV][0]) {
             const float *c =
                 mesh->attributes[mesh->default_uv].values + 6 * (size_t)vi_get(s->triangle, i);

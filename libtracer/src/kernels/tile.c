@@ -66,7 +66,7 @@ static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc, void *
     t->samples.transparency = carve(&c, batch);
     for (uint32_t pass = 1; pass < TRC_PASS_COUNT; pass++)
         if (pass != TRC_PASS_SAMPLE_COUNT && desc->passes >> pass & 1)
-            for (uint32_t k = 0; k < trc_pass_channels(pass); k++)
+            for (uint32_t k = 0; k < trc_film_channels(pass); k++)
                 t->samples.pass[pass][k] = carve(&c, batch);
     struct trc_shadow_store *q = &t->shadows;
     for (int i = 0; i < 3; i++) {
@@ -274,7 +274,7 @@ static void samples_clear(struct trc_tile *t) {
         memset(t->samples.radiance[k], 0, bytes);
     memset(t->samples.transparency, 0, bytes);
     for (int pass = 0; pass < TRC_PASS_COUNT; pass++)
-        for (int k = 0; k < 3; k++)
+        for (int k = 0; k < TRC_MAX_FILM_CHANNELS; k++)
             if (t->samples.pass[pass][k])
                 memset(t->samples.pass[pass][k], 0, bytes);
     /* What a miss has. */
@@ -311,7 +311,7 @@ static void film_add_passes(struct trc_tile *t, uint32_t slot, size_t pixel, boo
     for (uint32_t pass = 1; pass < TRC_PASS_COUNT; pass++) {
         if (!t->samples.pass[pass][0])
             continue;
-        const uint32_t channels = trc_pass_channels(pass);
+        const uint32_t channels = trc_film_channels(pass);
         double *sum = t->job->film->sums[pass] + channels * pixel;
         for (uint32_t k = 0; k < channels; k++) {
             const double value = (double)t->samples.pass[pass][k][slot];

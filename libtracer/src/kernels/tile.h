@@ -80,8 +80,9 @@ struct trc_sample_store {
     uint32_t *pixel; /* x | y << 16 in the full frame */
     uint32_t *index; /* number of the sample */
     float *radiance[3];
-    float *transparency;            /* part of the film that is seen through */
-    float *pass[TRC_PASS_COUNT][3]; /* NULL unless asked for */
+    float *transparency; /* part of the film that is seen through */
+    float *pass[TRC_PASS_COUNT]
+               [TRC_MAX_FILM_CHANNELS]; /* trc_film_channels each; NULL unless asked for */
 };
 
 /* Shadow rays; target: the light's number and cell, what packets are sorted by. */
