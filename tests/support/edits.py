@@ -45,7 +45,10 @@ def _make_materials():
     textured.node_tree.links.new(texture.outputs["Color"],
                                  textured.node_tree.nodes["Diffuse BSDF"].inputs["Color"])
     group = bpy.data.node_groups.new("Tint", 'ShaderNodeTree')
-    group.outputs.new('NodeSocketColor', "Color")
+    if hasattr(group, "interface"):  # since 4.0
+        group.interface.new_socket("Color", in_out='OUTPUT', socket_type='NodeSocketColor')
+    else:
+        group.outputs.new('NodeSocketColor', "Color")
     color = group.nodes.new("ShaderNodeRGB")
     group.links.new(color.outputs[0], group.nodes.new("NodeGroupOutput").inputs[0])
     grouped = scenes.material("Grouped", "ShaderNodeBsdfDiffuse")
