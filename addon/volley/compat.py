@@ -5,10 +5,16 @@ Per-object ray tracing settings (motion steps, emission sampling and so on) live
 of Blender's own Cycles add-on; they are read where that add-on is enabled, else its defaults hold.
 """
 
+import math
+
 import bpy
 
 # Render passes were renamed in 5.0, which leaves nothing to look at but the version.
 HAS_LONG_PASS_NAMES = bpy.app.version >= (5, 0, 0)
+
+# The power of an area light became its radiance times pi and its area in 4.0; before, times 4 (Blender's
+# issue 109404).
+AREA_LIGHT_POWER = 4.0 / math.pi if bpy.app.version >= (4, 0, 0) else 1.0
 
 
 def cycles(data, name, default):

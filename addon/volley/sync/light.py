@@ -8,7 +8,7 @@ linked to textures. Anything else is named in the warnings and its unlinked part
 import math
 
 from .. import native
-from ..compat import casts_shadow, cycles, uses_nodes
+from ..compat import AREA_LIGHT_POWER, casts_shadow, cycles, uses_nodes
 from . import flatten
 from .visibility import light_visibility
 
@@ -27,7 +27,8 @@ def describe(light_object, transform, visibility_mask, warnings):
         "type": native.LIGHT_TYPES[light.type],
         "transform": tuple(transform),
         "color": tuple(c * f for c, f in zip(_color(light), factor)),
-        "strength": light.energy * 2.0 ** getattr(light, "exposure", 0.0),
+        "strength": light.energy * 2.0 ** getattr(light, "exposure", 0.0) *
+        (AREA_LIGHT_POWER if light.type == 'AREA' else 1.0),
         "spread": math.pi, "spot_angle": math.pi,
         "visibility": light_visibility(light_object) & visibility_mask,
         "cast_shadow": int(casts_shadow(light)),
