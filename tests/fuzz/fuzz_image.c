@@ -1,17 +1,16 @@
-/* Images: pixels of any bits and sizes, and files of any bytes, looked up by every interpolation.
- */
+/* Images: pixels of any bits and sizes, files of any bytes, looked up by every interpolation. */
 #include "bytes.h"
 #include "stage.h"
 
 #include <stdio.h>
 #include <unistd.h>
 
-/* A file of the rest of the input in a format that the first byte chooses. The path is the
- * process's own, so that fuzzers can run side by side. */
+/* A file of the rest of the input in a format that the first byte chooses. It is in the
+ * current folder and the process's own, so that fuzzers can run side by side. */
 static void file_image(struct bytes *b, trc_image_desc *desc, char *path, size_t path_size) {
     static const char *const extensions[] = {"hdr", "bmp", "tga", "png", "pnm", "exr"};
     const char *extension = extensions[bytes_below(b, sizeof extensions / sizeof *extensions)];
-    (void)snprintf(path, path_size, "/tmp/fuzz_image_%ld.%s", (long)getpid(), extension);
+    (void)snprintf(path, path_size, "fuzz_image_%ld.%s", (long)getpid(), extension);
     FILE *file = fopen(path, "wb");
     if (!file)
         return;

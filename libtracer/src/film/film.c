@@ -44,8 +44,7 @@ uint32_t trc_film_channels(uint32_t pass) {
     return trc_pass_channels(pass) + (pass == TRC_PASS_VECTOR);
 }
 
-/* Passes that hold the value of a pixel's first sample, not a sum. */
-static bool is_first_sample(uint32_t pass) {
+bool trc_film_is_first_sample(uint32_t pass) {
     return pass == TRC_PASS_DEPTH || pass == TRC_PASS_OBJECT_INDEX ||
            pass == TRC_PASS_MATERIAL_INDEX;
 }
@@ -169,7 +168,7 @@ trc_status trc_film_read(const struct trc_film *film, uint32_t pass, float expos
                             "pixels_out"));
     const double *sums = film->sums[pass], *divisor = divisor_of(film, pass);
     const double light = is_light(pass) ? exposure : 1.0;
-    const bool first_sample = is_first_sample(pass);
+    const bool first_sample = trc_film_is_first_sample(pass);
     const uint32_t stride = trc_film_channels(pass);
     for (uint64_t i = 0; i < pixels; i++) {
         const uint32_t count = __atomic_load_n(&film->sample_counts[i], __ATOMIC_RELAXED);

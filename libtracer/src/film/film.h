@@ -6,6 +6,7 @@
 #ifndef TRACER_FILM_FILM_H
 #define TRACER_FILM_FILM_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "tracer/render.h"
@@ -26,6 +27,9 @@ trc_status trc_film_check_budget(uint32_t width, uint32_t height, uint64_t pixel
  * hit something, as it is their mean. */
 #define TRC_MAX_FILM_CHANNELS 5
 uint32_t trc_film_channels(uint32_t pass);
+
+/* Whether a pass holds the value of a pixel's first sample, not a sum. */
+bool trc_film_is_first_sample(uint32_t pass);
 
 /* Takes the memory of the passes, zeroed. TRC_ERROR_TOO_LARGE or OUT_OF_MEMORY. */
 trc_status trc_film_create(struct trc_film *film, uint32_t width, uint32_t height, uint64_t passes);

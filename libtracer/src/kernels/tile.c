@@ -289,11 +289,6 @@ static void samples_clear(struct trc_tile *t) {
     }
 }
 
-static bool first_sample_pass(uint32_t pass) {
-    return pass == TRC_PASS_DEPTH || pass == TRC_PASS_OBJECT_INDEX ||
-           pass == TRC_PASS_MATERIAL_INDEX;
-}
-
 /* A sample's pixel in the film. */
 TRC_INLINE size_t film_pixel(const struct trc_tile *t, uint32_t slot) {
     const uint32_t x = (t->samples.pixel[slot] & 0xffffu) - t->desc->crop_x;
@@ -317,7 +312,7 @@ static void film_add_passes(struct trc_tile *t, uint32_t slot, size_t pixel, boo
             const double value = (double)t->samples.pass[pass][k][slot];
             if (!isfinite(value))
                 continue;
-            if (!first_sample_pass(pass))
+            if (!trc_film_is_first_sample(pass))
                 sum[k] += value;
             else if (first)
                 sum[k] = value;
