@@ -24,8 +24,8 @@ _Static_assert(RAY_BATCH == TRC_BATCH, "batches are the renderer's");
 /* Pixels on a side of a tile, and samples of a pixel in one batch, as the renderer has them. */
 #define TILE_SIDE 32
 #define SAMPLES_PER_BATCH 16
-#define CELL_SQUARE 8
-#define QUAD 2
+#define SQUARE 8
+#define SHARED_CELLS 4
 /* Share of the scene's extent: how far secondary rays start off the surface, the lens's radius, how
  * far short hemisphere rays reach. */
 #define OFFSET_SHARE 1e-4f
@@ -151,17 +151,15 @@ static void camera_ray(const struct maker *m, const struct sample *s, struct ray
     r->key = 0;
 }
 
-/* The cell of lens and time that AUTO sorts camera samples by: kernels/tile.c, samples_order. */
+/* The cell of time or lens that AUTO sorts camera samples by: kernels/tile.c, samples_order; lenses
+ * are wide here. */
 static uint32_t sample_cell(const struct maker *m, const struct sample *s) {
-    const float lens_cells = m->moving ? 2.0f : 4.0f, time_cells = m->lens ? 4.0f : 16.0f;
-    uint32_t key = 0;
-    if (m->lens)
-        key = (uint32_t)(sample_number(m, s, TRC_DIM_LENS_X) * lens_cells) * (uint32_t)lens_cells +
-              (uint32_t)(sample_number(m, s, TRC_DIM_LENS_Y) * lens_cells);
     if (m->moving)
-        key =
-            key * (uint32_t)time_cells + (uint32_t)(sample_number(m, s, TRC_DIM_TIME) * time_cells);
-    return key;
+        return (uint32_t)(sample_number(m, s, TRC_DIM_TIME) * SHARED_CELLS);
+    if (!m->lens)
+        return 0;
+    return (uint32_t)(sample_number(m, s, TRC_DIM_LENS_X) * 2.0f) * 2u +
+           (uint32_t)(sample_number(m, s, TRC_DIM_LENS_Y) * 2.0f);
 }
 
 /* ---- the list ---- */
@@ -234,10 +232,6 @@ struct meeting {
     float d[3], time; /* of the camera ray */
 };
 
-static uint32_t light_cell(float u, float v) {
-    return (uint32_t)(u * 4.0f) | (uint32_t)(v * 4.0f) << 2;
-}
-
 /* Dominant axis and its side. */
 static uint32_t direction_cell(const float d[3]) {
     return trc_direction_cell(v3(d[0], d[1], d[2]));
@@ -250,7 +244,9 @@ static void shadow_ray(const struct maker *m, const struct meeting *at, float si
     const float target[3] = {light[0] + (u - 0.5f) * size, light[1] + (v - 0.5f) * size, light[2]};
     add_scaled(target, -1.0f, r->o, r->d);
     r->tmax = SHADOW_END;
-    r->key = light_cell(u, v);
+    /* The light faces down. */
+    const float reach = sqrtf(dot(r->d, r->d));
+    r->key = trc_light_cell(u, v, reach * reach * reach / (size * size * fabsf(r->d[2])));
 }
 
 static void mirror_direction(const struct meeting *at, float out[3]) {
@@ -381,10 +377,10 @@ struct rectangle {
 };
 
 static void square_append(struct maker *m, const struct rectangle *tile, uint32_t x, uint32_t y,
-                          uint32_t side, uint32_t begin, uint32_t end) {
-    for (uint32_t place = 0; place < side * side; place++) {
+                          uint32_t begin, uint32_t end) {
+    for (uint32_t place = 0; place < SQUARE * SQUARE; place++) {
         uint32_t i = x, j = y;
-        for (uint32_t bit = 0; 1u << bit < side; bit++) {
+        for (uint32_t bit = 0; 1u << bit < SQUARE; bit++) {
             i += (place >> (2 * bit) & 1u) << bit;
             j += (place >> (2 * bit + 1) & 1u) << bit;
         }
@@ -399,19 +395,13 @@ static void square_append(struct maker *m, const struct rectangle *tile, uint32_
 /* A range of a tile's samples, at most SAMPLES_PER_BATCH, in squares as kernels/tile.c walks it. */
 static void samples_make(struct maker *m, const struct rectangle *tile, uint32_t begin,
                          uint32_t end) {
-    const uint32_t count = end - begin;
-    const bool is_auto = m->list->order == RAY_ORDER_AUTO;
-    const bool cells = is_auto && (m->lens || m->moving) && count >= 4;
-    const uint32_t side = cells || !is_auto ? CELL_SQUARE
-                          : count >= 16     ? QUAD
-                          : count >= 4      ? 2 * QUAD
-                                            : 4 * QUAD;
-    const uint32_t room = cells ? CELL_SQUARE * CELL_SQUARE * count : RAY_BATCH;
-    for (uint32_t y = 0; y < tile->height; y += side)
-        for (uint32_t x = 0; x < tile->width; x += side) {
-            if (m->sample_count + side * side * count > room)
+    const bool cells =
+        m->list->order == RAY_ORDER_AUTO && (m->lens || m->moving) && end - begin >= SHARED_CELLS;
+    for (uint32_t y = 0; y < tile->height; y += SQUARE)
+        for (uint32_t x = 0; x < tile->width; x += SQUARE) {
+            if (m->sample_count + SQUARE * SQUARE * (end - begin) > RAY_BATCH)
                 batch_make(m, cells);
-            square_append(m, tile, x, y, side, begin, end);
+            square_append(m, tile, x, y, begin, end);
         }
     batch_make(m, cells);
 }
@@ -437,7 +427,7 @@ static bool is_occlusion(enum ray_kind kind) {
 
 /* No batch has fewer samples than a square of pixels. */
 static uint32_t most_batches(const struct options *options) {
-    const uint32_t squares = TILE_SIDE * TILE_SIDE / (QUAD * QUAD);
+    const uint32_t squares = TILE_SIDE * TILE_SIDE / (SQUARE * SQUARE);
     return options->tiles * squares * (1 + options->samples / SAMPLES_PER_BATCH);
 }
 

@@ -7,11 +7,12 @@
  * lines. It is tighter than intervals of slopes when origins differ.
  *
  * Everything here only culls. Rounding is covered by slack, an absolute widening of boxes:
- * positions on a ray are wrong by less than 6 half-ulps (2^-24) of |o| + |p - o|, lines of the beam
- * by as much again, the triangle test moves vertices by less than 4 half-ulps of |v - o|, and
- * interpolation between keys moves vertices and boxes by less than 2 each of the larger key. All
- * lengths are below the largest |coordinate| of the origins plus that of the tree (M), twice: 20
- * half-ulps of 2 M is TRC_SLACK * M. */
+ * positions on a ray are wrong by less than 6 half-ulps (2^-24) of |o| + |p - o| (planes of a box
+ * met by plane / d - o / d: 5 of the larger of |o| and |plane|), lines of the beam by as much
+ * again, the triangle test moves vertices by less than 4 half-ulps of |v - o|, and interpolation
+ * between keys moves vertices and boxes by less than 2 each of the larger key. All lengths are
+ * below the largest |coordinate| of the origins plus that of the tree (M), twice: 20 half-ulps of 2
+ * M is TRC_SLACK * M. */
 #ifndef TRACER_KERNELS_BEAM_H
 #define TRACER_KERNELS_BEAM_H
 
@@ -41,7 +42,7 @@ struct trc_beam {
 struct trc_group {
     struct trc_beam beam;
     float su[TRC_PACKET_SIZE], sv[TRC_PACKET_SIZE], sz[TRC_PACKET_SIZE]; /* shear; sz = 1 / dz */
-    float inv[3][TRC_PACKET_SIZE];                                       /* 1 / d, finite */
+    float inv[3][TRC_PACKET_SIZE], shift[3][TRC_PACKET_SIZE];            /* 1 / d, -o / d: finite */
     float f[TRC_PACKET_SIZE]; /* moving trees: position between the keys */
     float f_min, f_max;
     /* Packets of one origin: it, and the range of shears, in the order u, v, z. */
@@ -82,9 +83,13 @@ TRC_INLINE bool trc_group_setup(struct trc_group *g, const struct trc_packet *p,
         vf_store(&g->sz[i], sz);
         vf_store(&g->su[i], du * sz);
         vf_store(&g->sv[i], dv * sz);
+        const vfloat inv_u = trc_safe_inverse(du), inv_v = trc_safe_inverse(dv);
+        vf_store(&g->inv[au][i], inv_u);
+        vf_store(&g->inv[av][i], inv_v);
         vf_store(&g->inv[z][i], sz);
-        vf_store(&g->inv[au][i], trc_safe_inverse(du));
-        vf_store(&g->inv[av][i], trc_safe_inverse(dv));
+        vf_store(&g->shift[au][i], -ou * inv_u);
+        vf_store(&g->shift[av][i], -ov * inv_v);
+        vf_store(&g->shift[z][i], -oz * sz);
         z_near = vf_min(z_near, vf_select(m, sign * (oz + vf_load(&p->tmin[i]) * dz), inf));
         z_far = vf_max(z_far, vf_select(m, sign * (oz + vf_load(&p->t[i]) * dz), -inf));
         const vfloat o = vf_max(vf_abs(ou), vf_max(vf_abs(ov), vf_abs(oz)));

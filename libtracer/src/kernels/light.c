@@ -23,6 +23,7 @@ static void set_place(const struct draw *d, const struct trc_place *place, vmask
     out->wi = v3_select(m, place->wi, out->wi);
     out->distance = vf_select(m, place->distance, out->distance);
     out->radiance = v3_select(m, place->radiance, out->radiance);
+    out->density = vf_select(m, place->pdf, out->density);
     out->pdf = vf_select(m, place->pdf * d->chance, out->pdf);
 }
 
@@ -246,7 +247,7 @@ static void clear_sample(struct trc_light_sample *out) {
     out->wi = v3(vf_zero(), vf_zero(), vf_one());
     out->distance = vf_set(TRC_FAR);
     out->radiance = v3_zero();
-    out->pdf = vf_zero();
+    out->density = out->pdf = vf_zero();
     out->valid = out->delta = out->no_mis = vm_none();
     out->casts_shadow = vm_all_set();
     out->light = vi_set(-1);

@@ -18,7 +18,8 @@ struct trc_light_sample {
     vfloat distance; /* to the point on the light; TRC_FAR for the sun and the world */
     vvec3 radiance;  /* emitted towards the point, before division by pdf; intensity form for
                         delta lights so that contribution = radiance * f * cos / pdf */
-    vfloat pdf;      /* solid angle, times the chance of having chosen this light */
+    vfloat density;  /* of the place, per solid angle; 1 for delta lights */
+    vfloat pdf;      /* density, times the chance of having chosen this light */
     vmask valid;     /* pdf > 0 and radiance > 0 */
     vmask delta;     /* point light or sun without extent: no MIS */
     vmask no_mis;    /* continuation rays towards wi do not see this light: weight 1 */

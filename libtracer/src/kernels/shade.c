@@ -322,10 +322,10 @@ static void direct_light(struct trc_tile *t, const struct arrival *a, const stru
         vfloat u[3];
         TRC_KERNEL(trc_samples)(&t->sampler, a->pixel, a->sample, dimension, 3, l, most, u);
         const vmask wanted = vm_and(active, vf_lt(vf_set((float)l), count));
-        const vuint cell =
-            (vuint)(vf_to_int(u[1] * vf_set(4.0f)) | (vf_to_int(u[2] * vf_set(4.0f)) << 2));
         struct trc_light_sample sample;
         TRC_KERNEL(trc_light_sample)(s, a->receive_n, u[0], u[1], u[2], &sample);
+        const vuint cell =
+            trc_light_cell(u[1], u[2], vf_select(sample.delta, vf_set(INFINITY), sample.density));
         sample_use(t, a, s, lobes, &sample, count, cell, wanted);
         if (world_apart) {
             TRC_KERNEL(trc_light_sample_world)(s, a->receive_n, u[1], u[2], &sample);

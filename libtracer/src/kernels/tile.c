@@ -394,12 +394,17 @@ static void batch_render(struct trc_tile *t) {
 
 /* ---- the tile ---- */
 
-/* Samples a pixel has in one batch. Packets of a pinhole camera then hold a 2x2 square of pixels:
- * the narrowest beam. */
+/* Samples a pixel has in one batch, and the squares in which a batch takes pixels, in Z-order. A
+ * packet of a pinhole camera then holds a 2x2 square of pixels: the narrowest beam. */
 #define SAMPLES_PER_BATCH 16
-#define QUAD 2
-/* With a lens or an open shutter packets hold an 8x8 square and one cell of lens and time each. */
-#define CELL_SQUARE 8
+#define SQUARE 8
+/* With an open shutter packets hold a 4x4 square and a quarter of the time; with a wide lens, a
+ * quarter of that. One cell makes packets in fast motion up to 2.5 times as slow, and is at
+ * most 1.2 times as fast in slow motion; 16 cells are slower nearly everywhere, by up to 1.5 times.
+ */
+#define SHARED_CELLS 4
+/* Radius of the circle of confusion far behind the focus, from which on a lens is wide. */
+#define WIDE_LENS_PIXELS 8.0f
 
 /* Whether a pixel of the tile gets samples. */
 TRC_INLINE bool is_sampled(const struct trc_tile_job *job, uint32_t x, uint32_t y) {
@@ -408,24 +413,24 @@ TRC_INLINE bool is_sampled(const struct trc_tile_job *job, uint32_t x, uint32_t 
 }
 
 /* How many pixels of the square at x, y get samples, at most. */
-static uint32_t square_pixels(const struct trc_tile *t, uint32_t x, uint32_t y, uint32_t side) {
+static uint32_t square_pixels(const struct trc_tile *t, uint32_t x, uint32_t y) {
     const struct trc_tile_job *job = t->job;
     if (!job->adaptive)
-        return side * side;
+        return SQUARE * SQUARE;
     uint32_t count = 0;
-    for (uint32_t j = y; j < y + side && j < job->height; j++)
-        for (uint32_t i = x; i < x + side && i < job->width; i++)
+    for (uint32_t j = y; j < y + SQUARE && j < job->height; j++)
+        for (uint32_t i = x; i < x + SQUARE && i < job->width; i++)
             count += is_sampled(job, i, j);
     return count;
 }
 
 /* Appends the samples [begin, end) of the square of pixels at x, y of the tile, clipped to it. */
-static void square_append(struct trc_tile *t, uint32_t x, uint32_t y, uint32_t side, uint32_t begin,
+static void square_append(struct trc_tile *t, uint32_t x, uint32_t y, uint32_t begin,
                           uint32_t end) {
     const struct trc_tile_job *job = t->job;
-    for (uint32_t place = 0; place < side * side; place++) { /* in Z-order */
+    for (uint32_t place = 0; place < SQUARE * SQUARE; place++) { /* in Z-order */
         uint32_t i = x, j = y;
-        for (uint32_t bit = 0; 1u << bit < side; bit++) {
+        for (uint32_t bit = 0; 1u << bit < SQUARE; bit++) {
             i += (place >> (2 * bit) & 1u) << bit;
             j += (place >> (2 * bit + 1) & 1u) << bit;
         }
@@ -439,26 +444,37 @@ static void square_append(struct trc_tile *t, uint32_t x, uint32_t y, uint32_t s
     }
 }
 
-/* Orders the batch by cells of lens and time, so that rays of a packet share one: 16 cells, as a
- * pixel has 16 samples in a batch and the sampler puts about one into each. This is what the
+/* What rays of a packet share beside their neighbourhood. */
+enum sharing { SHARE_NOTHING, SHARE_TIME, SHARE_LENS };
+
+static enum sharing sharing_of(const struct trc_tile *t, uint32_t sample_count) {
+    const struct trc_camera *c = &t->snapshot->camera;
+    const float pixel = fabsf(c->windows[0][1] - c->windows[0][0]) / (float)t->desc->width *
+                        (c->type == TRC_CAMERA_ORTHOGRAPHIC ? 1.0f : c->focus_distance);
+    if (sample_count < SHARED_CELLS)
+        return SHARE_NOTHING;
+    if (c->has_motion)
+        return SHARE_TIME;
+    return c->aperture_radius > WIDE_LENS_PIXELS * pixel ? SHARE_LENS : SHARE_NOTHING;
+}
+
+/* Orders the batch by cells of lens or time, so that rays of a packet share one. This is what the
  * paper's interleaved tile does for coherence, without giving pixels the same pattern. */
-static void samples_order(struct trc_tile *t, bool lens, bool motion) {
+static void samples_order(struct trc_tile *t, enum sharing sharing) {
     const uint32_t count = t->samples.count;
-    const float lens_cells = motion ? 2.0f : 4.0f, time_cells = lens ? 4.0f : 16.0f;
     for (uint32_t i = 0; i < count; i += TRC_WIDTH) {
         const vuint pixel = vu_load(t->samples.pixel + i), index = vu_load(t->samples.index + i);
-        vint key = vi_set(0);
-        if (lens) {
+        vfloat cell;
+        if (sharing == SHARE_TIME) {
+            cell = TRC_KERNEL(trc_sample)(&t->sampler, pixel, index, TRC_DIM_TIME) *
+                   vf_set((float)SHARED_CELLS);
+        } else {
+            const vfloat two = vf_set(2.0f);
             vfloat at[2];
             TRC_KERNEL(trc_samples)(&t->sampler, pixel, index, TRC_DIM_LENS_X, 2, 0, 1, at);
-            key = vf_to_int(at[0] * vf_set(lens_cells)) * vi_set((int32_t)lens_cells) +
-                  vf_to_int(at[1] * vf_set(lens_cells));
+            cell = vf_floor(two * at[0]) * two + two * at[1];
         }
-        if (motion) {
-            const vfloat u = TRC_KERNEL(trc_sample)(&t->sampler, pixel, index, TRC_DIM_TIME);
-            key = key * vi_set((int32_t)time_cells) + vf_to_int(u * vf_set(time_cells));
-        }
-        vi_store((int32_t *)t->keys + i, key);
+        vi_store((int32_t *)t->keys + i, vf_to_int(cell));
     }
     TRC_KERNEL(trc_tile_sort)(t, t->keys, count, t->order);
     uint32_t *const columns[] = {t->samples.pixel, t->samples.index};
@@ -469,34 +485,27 @@ static void samples_order(struct trc_tile *t, bool lens, bool motion) {
     }
 }
 
-/* Walks the tile in squares; with few samples the squares are larger so that packets are full. */
-static void samples_render(struct trc_tile *t, uint32_t begin, uint32_t end) {
-    const struct trc_tile_job *job = t->job;
-    const uint32_t count = end - begin;
-    const bool lens = t->snapshot->camera.aperture_radius > 0.0f,
-               motion = t->snapshot->camera.has_motion;
-    const bool cells = (lens || motion) && count >= 4;
-    const uint32_t side = cells         ? CELL_SQUARE
-                          : count >= 16 ? QUAD
-                          : count >= 4  ? 2 * QUAD
-                                        : 4 * QUAD;
-    const uint32_t room = cells ? CELL_SQUARE * CELL_SQUARE * count : TRC_BATCH;
-    t->samples.count = 0;
-    for (uint32_t y = 0; y < job->height; y += side)
-        for (uint32_t x = 0; x < job->width; x += side) {
-            if (t->samples.count + square_pixels(t, x, y, side) * count > room) {
-                if (cells)
-                    samples_order(t, lens, motion);
-                batch_render(t);
-                t->samples.count = 0;
-            }
-            square_append(t, x, y, side, begin, end);
-        }
+static void batch_flush(struct trc_tile *t, enum sharing sharing) {
     if (!t->samples.count)
         return;
-    if (cells)
-        samples_order(t, lens, motion);
+    if (sharing != SHARE_NOTHING)
+        samples_order(t, sharing);
     batch_render(t);
+    t->samples.count = 0;
+}
+
+/* The samples [begin, end) of the tile's pixels. */
+static void samples_render(struct trc_tile *t, uint32_t begin, uint32_t end) {
+    const struct trc_tile_job *job = t->job;
+    const enum sharing sharing = sharing_of(t, end - begin);
+    t->samples.count = 0;
+    for (uint32_t y = 0; y < job->height; y += SQUARE)
+        for (uint32_t x = 0; x < job->width; x += SQUARE) {
+            if (t->samples.count + square_pixels(t, x, y) * (end - begin) > TRC_BATCH)
+                batch_flush(t, sharing);
+            square_append(t, x, y, begin, end);
+        }
+    batch_flush(t, sharing);
 }
 
 void TRC_KERNEL(trc_tile_render)(struct trc_tile_job *job) {

@@ -128,6 +128,21 @@ TRC_INLINE vuint trc_direction_cell(vvec3 d) {
     return (vuint)(axis + vi_select(vf_lt(along, vf_set(0.0f)), vi_set(1), vi_set(0)));
 }
 
+/* Cell of a place on a light, below TRC_DIRECTION_CELLS: rays to one cell share packets. More cells
+ * mean packets of more pixels, so a light that is small as seen from the point has fewer: 4x4, 2x2
+ * or one, by the density per solid angle. The bounds are where either is as fast, at 1024x1024 and
+ * 16 samples; in one cell, rays to a point light are 2.5 times as fast as in 4x4. */
+#define TRC_NARROW_LIGHT 64.0f
+#define TRC_MIDDLING_LIGHT 4.0f
+TRC_INLINE vuint trc_light_cell(vfloat u, vfloat v, vfloat density) {
+    const vint x = vf_to_int(u * vf_set(4.0f)), y = vf_to_int(v * vf_set(4.0f));
+    const vint one = vi_set(1), two = vi_set(2);
+    const vint coarse = ((x & two) >> 1 | (y & two)) << 2, fine = (x & one) | (y & one) << 1;
+    const vint cell =
+        coarse | vi_select(vf_gt(density, vf_set(TRC_MIDDLING_LIGHT)), vi_set(0), fine);
+    return (vuint)vi_select(vf_gt(density, vf_set(TRC_NARROW_LIGHT)), vi_set(0), cell);
+}
+
 /* Number of bins of the counting sorts. */
 #define TRC_BINS 4096
 

@@ -9,6 +9,7 @@
  * candidates are tested by kernels/triangle.h and compared by distance, then by number. */
 #include "bvh/tree.h"
 #include "kernels/beam.h"
+#include "kernels/edge_filter.h"
 #include "kernels/packet.h"
 #include "kernels/triangle.h"
 
@@ -21,10 +22,13 @@
 #define SINGLE_COMMON 4
 #define SINGLE_MIXED 8
 
+/* A subtree to visit. Its box comes with it, so that its parent is read once: lower and upper plane
+ * along u and v, near and far one along z, wider by the slack; of moving trees, hulled over the
+ * group's interval of time. */
 struct entry {
-    uint32_t ref;
-    uint32_t box; /* parent node * 8 + child; UINT32_MAX for the root */
     uint64_t mask;
+    float box[6];
+    uint32_t ref;
 };
 
 struct walk {
@@ -65,27 +69,21 @@ TRC_INLINE void boxes_load(const struct walk *w, uint32_t node, bool motion, f8 
 
 /* Rays of mask whose own slabs meet the box. The first live ray is tried alone: mostly it hits and
  * the rest need not be looked at. */
-TRC_INLINE uint64_t box_rays(const struct walk *w, uint32_t box, uint64_t mask, bool motion) {
+TRC_INLINE uint64_t box_rays(const struct walk *w, const float box[6], uint64_t mask) {
     const struct trc_packet *p = w->packet;
     const struct trc_group *g = w->group;
-    const float *b = trc_node_bounds(w->tree, box >> 3, w->key) + (box & 7u);
-    const float *e = b + (motion ? TRC_NODE_KEY_BYTES / sizeof(float) : 0);
-    const float slack = g->beam.slack;
+    const int u = g->beam.axis.u, v = g->beam.axis.v, z = g->beam.axis.z;
     TRC_COUNT(box_rays, 1);
     {
         const int i = __builtin_ctzll(mask);
-        float near = p->tmin[i], far = p->t[i];
-        for (int axis = 0; axis < 3; axis++) {
-            float low = b[16 * axis], high = b[16 * axis + 8];
-            if (motion) {
-                low += g->f[i] * (e[16 * axis] - low);
-                high += g->f[i] * (e[16 * axis + 8] - high);
-            }
-            const float o = p->o[axis][i], inv = g->inv[axis][i];
-            const float t0 = (low - slack - o) * inv, t1 = (high + slack - o) * inv;
-            near = f_max(near, f_min(t0, t1));
-            far = f_min(far, f_max(t0, t1));
-        }
+        const float u0 = box[0] * g->inv[u][i] + g->shift[u][i],
+                    u1 = box[1] * g->inv[u][i] + g->shift[u][i],
+                    v0 = box[2] * g->inv[v][i] + g->shift[v][i],
+                    v1 = box[3] * g->inv[v][i] + g->shift[v][i],
+                    z0 = box[4] * g->inv[z][i] + g->shift[z][i],
+                    z1 = box[5] * g->inv[z][i] + g->shift[z][i];
+        const float near = f_max(f_max(p->tmin[i], z0), f_max(f_min(u0, u1), f_min(v0, v1)));
+        const float far = f_min(f_min(p->t[i], z1), f_min(f_max(u0, u1), f_max(v0, v1)));
         if (near <= far)
             return mask;
         mask &= mask - 1;
@@ -97,20 +95,19 @@ TRC_INLINE uint64_t box_rays(const struct walk *w, uint32_t box, uint64_t mask, 
         if (!bits)
             continue;
         const int i = c * TRC_WIDTH;
-        vfloat near = vf_load(&p->tmin[i]), far = vf_load(&p->t[i]);
-        const vfloat f = motion ? vf_load(&g->f[i]) : vf_set(0.0f);
-        for (int axis = 0; axis < 3; axis++) {
-            vfloat low = vf_set(b[16 * axis]), high = vf_set(b[16 * axis + 8]);
-            if (motion) {
-                low = low + f * (vf_set(e[16 * axis]) - low);
-                high = high + f * (vf_set(e[16 * axis + 8]) - high);
-            }
-            const vfloat o = vf_load(&p->o[axis][i]), inv = vf_load(&g->inv[axis][i]);
-            const vfloat t0 = (low - vf_set(slack) - o) * inv,
-                         t1 = (high + vf_set(slack) - o) * inv;
-            near = vf_max(near, vf_min(t0, t1));
-            far = vf_min(far, vf_max(t0, t1));
-        }
+        const vfloat u_inv = vf_load(&g->inv[u][i]), u_shift = vf_load(&g->shift[u][i]),
+                     v_inv = vf_load(&g->inv[v][i]), v_shift = vf_load(&g->shift[v][i]),
+                     z_inv = vf_load(&g->inv[z][i]), z_shift = vf_load(&g->shift[z][i]);
+        const vfloat u0 = vf_madd(vf_set(box[0]), u_inv, u_shift),
+                     u1 = vf_madd(vf_set(box[1]), u_inv, u_shift),
+                     v0 = vf_madd(vf_set(box[2]), v_inv, v_shift),
+                     v1 = vf_madd(vf_set(box[3]), v_inv, v_shift),
+                     z0 = vf_madd(vf_set(box[4]), z_inv, z_shift),
+                     z1 = vf_madd(vf_set(box[5]), z_inv, z_shift);
+        const vfloat near =
+            vf_max(vf_max(vf_load(&p->tmin[i]), z0), vf_max(vf_min(u0, u1), vf_min(v0, v1)));
+        const vfloat far =
+            vf_min(vf_min(vf_load(&p->t[i]), z1), vf_min(vf_max(u0, u1), vf_max(v0, v1)));
         live |= (uint64_t)(vm_bits(vf_le(near, far)) & bits) << i;
     }
     return live;
@@ -118,29 +115,37 @@ TRC_INLINE uint64_t box_rays(const struct walk *w, uint32_t box, uint64_t mask, 
 
 /* ---- leaves, packets ---- */
 
-/* Beam cull of the leaf's triangles. */
-TRC_INLINE uint32_t leaf_candidates(const struct walk *w, const float *v, uint32_t count,
-                                    bool motion) {
-    const struct trc_beam *b = &w->group->beam;
+/* The leaf's triangles [vertex][axis u, v, z]; in motion: as the group's interval of time begins,
+ * and in later as it ends. */
+TRC_INLINE void leaf_corners(const struct walk *w, const float *v, uint32_t count, bool motion,
+                             f8 now[3][3], f8 later[3][3]) {
+    const int order[3] = {w->group->beam.axis.u, w->group->beam.axis.v, w->group->beam.axis.z};
     const float *e = v + TRC_TRIANGLE_FLOATS * count; /* the next key */
-    struct trc_beam_corners now, later;
-    for (uint32_t corner = 0; corner < 3; corner++) {
-        const uint32_t u = (3 * corner + (uint32_t)b->axis.u) * count,
-                       y = (3 * corner + (uint32_t)b->axis.v) * count,
-                       z = (3 * corner + (uint32_t)b->axis.z) * count;
-        const f8 p[3] = {f8_load(v + u), f8_load(v + y), f8_load(v + z)};
-        if (motion) {
-            const f8 f0 = f8_set(w->group->f_min), f1 = f8_set(w->group->f_max);
-            const f8 way[3] = {f8_load(e + u) - p[0], f8_load(e + y) - p[1], f8_load(e + z) - p[2]};
-            trc_beam_corners_set(b, (int)corner, p[0] + f0 * way[0], p[1] + f0 * way[1],
-                                 p[2] + f0 * way[2], &now);
-            trc_beam_corners_set(b, (int)corner, p[0] + f1 * way[0], p[1] + f1 * way[1],
-                                 p[2] + f1 * way[2], &later);
-        } else {
-            trc_beam_corners_set(b, (int)corner, p[0], p[1], p[2], &now);
+    for (int corner = 0; corner < 3; corner++)
+        for (int axis = 0; axis < 3; axis++) {
+            const uint32_t at = (uint32_t)(3 * corner + order[axis]) * count;
+            const f8 p = f8_load(v + at);
+            now[corner][axis] = p;
+            if (!motion)
+                continue;
+            const f8 way = f8_load(e + at) - p;
+            now[corner][axis] = p + f8_set(w->group->f_min) * way;
+            later[corner][axis] = p + f8_set(w->group->f_max) * way;
         }
+}
+
+/* Beam cull of the leaf's triangles. */
+TRC_INLINE uint32_t leaf_candidates(const struct walk *w, f8 v[3][3], f8 later[3][3],
+                                    uint32_t count, bool motion) {
+    const struct trc_beam *b = &w->group->beam;
+    struct trc_beam_corners begin, end;
+    for (int corner = 0; corner < 3; corner++) {
+        trc_beam_corners_set(b, corner, v[corner][0], v[corner][1], v[corner][2], &begin);
+        if (motion)
+            trc_beam_corners_set(b, corner, later[corner][0], later[corner][1], later[corner][2],
+                                 &end);
     }
-    return trc_beam_triangles(b, &now, motion ? &later : NULL) & ((1u << count) - 1u);
+    return trc_beam_triangles(b, &begin, motion ? &end : NULL) & ((1u << count) - 1u);
 }
 
 /* Broadcasts the triangle of v's first slot, or interpolates it for each ray of chunk i. */
@@ -193,73 +198,6 @@ TRC_INLINE uint32_t hits_keep(const struct walk *w, int i, vmask hit, vfloat t, 
     return vm_bits(keep);
 }
 
-/* The triangles of a leaf as seen from the packet's common origin: edge normals, so that an edge
- * function is one dot product with a direction (du/dz, dv/dz, 1), and the bound of its error.
- *
- * It only rejects: lanes that may hit take the full test, so hits stay the same bits. The normal of
- * the edge from a to b is (b - a) x (a + b), vertices relative to the origin, which keeps its
- * precision far away (products of vertices do not). Error: each difference and sum half an ulp,
- * products and sums of the normal and of the dot product together below 10 half-ulps of |b - a|
- * (|a| + |b|), 1-norms; the full test's own movement of vertices below 8 more. EDGE_MARGIN is 33
- * half-ulps. */
-struct edge_filter {
-    f8 n[3][3]; /* edge opposite to the vertex, axis u, v, z */
-    f8 margin;  /* largest of the three edges */
-    uint32_t candidates;
-};
-#define EDGE_MARGIN 2e-6f
-#define FILTER_LEAST_SLACK 1e-18f
-#define FILTER_MOST_SLACK 1e6f
-
-TRC_INLINE void edge_filter_setup(const struct walk *w, const float *vertices, uint32_t count,
-                                  uint32_t candidates, struct edge_filter *e) {
-    const struct trc_group *g = w->group;
-    const int order[3] = {g->beam.axis.u, g->beam.axis.v, g->beam.axis.z};
-    f8 v[3][3], a[3][3];
-    for (int corner = 0; corner < 3; corner++)
-        for (int axis = 0; axis < 3; axis++) {
-            v[corner][axis] = f8_load(vertices + (uint32_t)(3 * corner + order[axis]) * count);
-            a[corner][axis] = v[corner][axis] - f8_set(g->origin[axis]);
-        }
-    f8 inside = f8_set(INFINITY), outside = f8_set(-INFINITY), margin = f8_set(0.0f);
-    const f8 u0 = f8_set(g->su_min), u1 = f8_set(g->su_max), v0 = f8_set(g->sv_min),
-             v1 = f8_set(g->sv_max);
-    for (int k = 0; k < 3; k++) {
-        const int from = (k + 1) % 3, to = (k + 2) % 3;
-        f8 d[3], sum[3], length = f8_set(0.0f), reach = f8_set(0.0f);
-        for (int axis = 0; axis < 3; axis++) {
-            d[axis] = v[to][axis] - v[from][axis];
-            sum[axis] = a[to][axis] + a[from][axis];
-            length = length + f8_abs(d[axis]);
-            reach = reach + (f8_abs(a[to][axis]) + f8_abs(a[from][axis]));
-        }
-        for (int axis = 0; axis < 3; axis++) {
-            const int i = (axis + 1) % 3, j = (axis + 2) % 3;
-            e->n[k][axis] = d[i] * sum[j] - d[j] * sum[i];
-        }
-        margin = f8_max(margin, length * reach);
-        /* Over all directions of the packet. */
-        const f8 x0 = e->n[k][0] * u0, x1 = e->n[k][0] * u1, y0 = e->n[k][1] * v0,
-                 y1 = e->n[k][1] * v1;
-        inside = f8_min(inside, f8_max(x0, x1) + f8_max(y0, y1) + e->n[k][2]);
-        outside = f8_max(outside, f8_min(x0, x1) + f8_min(y0, y1) + e->n[k][2]);
-    }
-    e->margin = margin * f8_set(EDGE_MARGIN) + f8_set(TRC_TINY_EDGE); /* products may underflow */
-    e->candidates = candidates & (f8_le(-e->margin, inside) | f8_le(outside, e->margin));
-}
-
-/* Lanes of chunk i that may pass the triangle in slot. */
-TRC_INLINE uint32_t edge_filter_lanes(const struct edge_filter *e, int slot, vfloat su, vfloat sv) {
-    vfloat value[3];
-    for (int k = 0; k < 3; k++)
-        value[k] = vf_madd(vf_set(e->n[k][0][slot]), su,
-                           vf_madd(vf_set(e->n[k][1][slot]), sv, vf_set(e->n[k][2][slot])));
-    const vfloat least = vf_min(value[0], vf_min(value[1], value[2]));
-    const vfloat most = vf_max(value[0], vf_max(value[1], value[2]));
-    const vfloat margin = vf_set(e->margin[slot]);
-    return vm_bits(vm_or(vf_ge(least, -margin), vf_le(most, margin)));
-}
-
 /* Tests a leaf's triangles; true if any ray found a (nearer) hit. */
 TRC_INLINE bool leaf_packet(struct walk *w, uint32_t ref, uint64_t mask, bool any, bool motion) {
     const struct trc_packet *p = w->packet;
@@ -268,16 +206,14 @@ TRC_INLINE bool leaf_packet(struct walk *w, uint32_t ref, uint64_t mask, bool an
     const struct trc_slot *ids = w->tree->slots + trc_leaf_first(ref);
     const float *vertices = trc_leaf_vertices(w->tree, ref, w->key);
     const struct trc_shear axis = g->beam.axis;
-    /* Products of lengths must neither overflow nor vanish; slack is in proportion to lengths. */
-    const bool filter = !motion && p->common_origin && g->beam.slack > FILTER_LEAST_SLACK &&
-                        g->beam.slack < FILTER_MOST_SLACK;
-    struct edge_filter edges;
+    const bool filter = !motion && trc_edge_filter_applies(p, g);
+    struct trc_edge_filter edges;
+    f8 corners[3][3], later[3][3];
     bool found = false;
-    uint32_t slots = leaf_candidates(w, vertices, count, motion);
-    if (slots && filter) {
-        edge_filter_setup(w, vertices, count, slots, &edges);
-        slots = edges.candidates;
-    }
+    leaf_corners(w, vertices, count, motion, corners, later);
+    uint32_t slots = leaf_candidates(w, corners, later, count, motion);
+    if (slots && filter)
+        slots = trc_edge_filter_setup(g, corners, slots, &edges);
     for (; slots; slots &= slots - 1) {
         const int slot = __builtin_ctz(slots);
         if (any && p->skip_transparent && (ids[slot].instance & TRC_SLOT_TRANSPARENT))
@@ -291,9 +227,8 @@ TRC_INLINE bool leaf_packet(struct walk *w, uint32_t ref, uint64_t mask, bool an
             if (!bits)
                 continue;
             const int i = c * TRC_WIDTH;
-            const vfloat su = vf_load(&g->su[i]), sv = vf_load(&g->sv[i]);
             if (filter) {
-                bits &= edge_filter_lanes(&edges, slot, su, sv);
+                bits &= trc_edge_filter_lanes(&edges, g, slot, i);
                 if (!bits)
                     continue;
             }
@@ -301,10 +236,10 @@ TRC_INLINE bool leaf_packet(struct walk *w, uint32_t ref, uint64_t mask, bool an
                 lanes_load(w, v, count, true, i, &tri);
             TRC_COUNT(triangle_rays, __builtin_popcount(bits));
             vfloat t, bu, bv;
-            vmask hit =
-                trc_triangle_test(&tri, vf_load(&p->o[axis.u][i]), vf_load(&p->o[axis.v][i]),
-                                  vf_load(&p->o[axis.z][i]), su, sv, vf_load(&g->sz[i]),
-                                  vf_load(&p->tmin[i]), vm_from_bits(bits), &t, &bu, &bv);
+            vmask hit = trc_triangle_test(
+                &tri, vf_load(&p->o[axis.u][i]), vf_load(&p->o[axis.v][i]),
+                vf_load(&p->o[axis.z][i]), vf_load(&g->su[i]), vf_load(&g->sv[i]),
+                vf_load(&g->sz[i]), vf_load(&p->tmin[i]), vm_from_bits(bits), &t, &bu, &bv);
             if (!vm_any(hit))
                 continue;
             if (any) {
@@ -397,10 +332,10 @@ struct single_entry {
     float near;
 };
 
-/* One ray as the box test wants it: for each axis which plane is met first, and the origin moved so
- * that boxes are wider by the slack. */
+/* One ray as the box test wants it: for each axis which plane is met first, and -origin / direction
+ * with the origin moved so that boxes are wider by the slack. */
 struct single_ray {
-    f8 inv[3], near_origin[3], far_origin[3];
+    f8 inv[3], near_shift[3], far_shift[3];
     int first[3], last[3]; /* floats from the node's bounds to the planes of the axis */
     f8 tmin, f;            /* f: moving trees: place between the keys */
 };
@@ -413,8 +348,8 @@ TRC_INLINE void single_setup(const struct walk *w, int ray, bool motion, struct 
         const bool down = inv < 0.0f;
         const float widen = down ? -g->beam.slack : g->beam.slack;
         r->inv[axis] = f8_set(inv);
-        r->near_origin[axis] = f8_set(o + widen);
-        r->far_origin[axis] = f8_set(o - widen);
+        r->near_shift[axis] = f8_set(-(o + widen) * inv);
+        r->far_shift[axis] = f8_set(-(o - widen) * inv);
         r->first[axis] = 16 * axis + (down ? 8 : 0);
         r->last[axis] = 16 * axis + (down ? 0 : 8);
     }
@@ -434,8 +369,8 @@ TRC_INLINE uint32_t node_single(const struct walk *w, uint32_t node, const struc
             first = first + r->f * (f8_load(e + r->first[axis]) - first);
             last = last + r->f * (f8_load(e + r->last[axis]) - last);
         }
-        near = f8_max(near, (first - r->near_origin[axis]) * r->inv[axis]);
-        far = f8_min(far, (last - r->far_origin[axis]) * r->inv[axis]);
+        near = f8_max(near, f8_madd(first, r->inv[axis], r->near_shift[axis]));
+        far = f8_min(far, f8_madd(last, r->inv[axis], r->far_shift[axis]));
     }
     *near_out = near;
     return f8_le(near, far);
@@ -509,22 +444,38 @@ TRC_INLINE bool single_walk(struct walk *w, uint32_t ref, int ray, bool any, boo
 /* Pushes the children the beam may touch, the nearest on top. */
 TRC_INLINE int children_push(const struct walk *w, uint32_t node, uint64_t mask, bool motion,
                              struct entry *stack, int top) {
+    const struct trc_beam *b = &w->group->beam;
     f8 lower[3], upper[3], key;
     boxes_load(w, node, motion, lower, upper);
-    uint32_t bits = trc_beam_test(&w->group->beam, lower, upper, &key);
+    uint32_t bits = trc_beam_test(b, lower, upper, &key);
+    if (!bits)
+        return top;
     const uint32_t *children = trc_node_children(w->tree, node);
-    float z[TRC_NODE_WIDTH];
-    const int first = top;
+    const f8 slack = f8_set(b->slack);
+    const f8 z_low = lower[b->axis.z] - slack, z_high = upper[b->axis.z] + slack;
+    float planes[6][TRC_NODE_WIDTH], z[TRC_NODE_WIDTH];
+    f8_store(planes[0], lower[b->axis.u] - slack);
+    f8_store(planes[1], upper[b->axis.u] + slack);
+    f8_store(planes[2], lower[b->axis.v] - slack);
+    f8_store(planes[3], upper[b->axis.v] + slack);
+    f8_store(planes[4], b->side ? z_high : z_low);
+    f8_store(planes[5], b->side ? z_low : z_high);
+    f8_store(z, key);
+    uint8_t order[TRC_NODE_WIDTH];
+    int count = 0;
     for (; bits; bits &= bits - 1) {
         const int child = __builtin_ctz(bits);
-        const float near = key[child];
-        int at = top++;
-        for (; at > first && z[at - 1 - first] < near; at--) {
-            stack[at] = stack[at - 1];
-            z[at - first] = z[at - 1 - first];
-        }
-        stack[at] = (struct entry){children[child], node * TRC_NODE_WIDTH + (uint32_t)child, mask};
-        z[at - first] = near;
+        int at = count++;
+        for (; at > 0 && z[order[at - 1]] < z[child]; at--)
+            order[at] = order[at - 1];
+        order[at] = (uint8_t)child;
+    }
+    for (int i = 0; i < count; i++) {
+        struct entry *e = &stack[top++];
+        e->mask = mask;
+        e->ref = children[order[i]];
+        for (int k = 0; k < 6; k++)
+            e->box[k] = planes[k][order[i]];
     }
     return top;
 }
@@ -533,37 +484,39 @@ TRC_INLINE void packet_walk(struct walk *w, uint64_t mask, bool any, bool motion
     struct entry stack[TRC_STACK_SIZE];
     const int few = w->packet->common_origin ? SINGLE_COMMON : SINGLE_MIXED;
     const uint64_t all = mask;
+    uint64_t live = mask;
+    uint32_t ref = w->tree->root;
     int top = 0;
-    stack[top++] = (struct entry){w->tree->root, UINT32_MAX, mask};
-    while (top > 0) {
-        const struct entry at = stack[--top];
-        uint64_t live = at.mask;
-        if (any)
-            live &= ~w->occluded;
-        if (live && at.box != UINT32_MAX)
-            live = box_rays(w, at.box, live, motion);
-        if (!live)
-            continue;
+    for (;;) {
         if (__builtin_popcountll(live) <= few) {
             for (; live; live &= live - 1) {
                 const int ray = __builtin_ctzll(live);
-                if (single_walk(w, at.ref, ray, any, motion) && any)
+                if (single_walk(w, ref, ray, any, motion) && any)
                     w->occluded |= 1ull << ray;
             }
-            continue;
-        }
-        TRC_COUNT(visits, 1);
-        TRC_COUNT(visit_rays, __builtin_popcountll(live));
-        if (!(at.ref & TRC_REF_LEAF)) {
-            TRC_COUNT(nodes, 1);
-            top = children_push(w, at.ref, live, motion, stack, top);
-        } else if (w->tree->is_top) {
-            item_packet(w, &w->tree->items[trc_leaf_first(at.ref)], live, any);
-            if (!any)
+        } else {
+            TRC_COUNT(visits, 1);
+            TRC_COUNT(visit_rays, __builtin_popcountll(live));
+            if (!(ref & TRC_REF_LEAF)) {
+                TRC_COUNT(nodes, 1);
+                top = children_push(w, ref, live, motion, stack, top);
+            } else if (w->tree->is_top) {
+                item_packet(w, &w->tree->items[trc_leaf_first(ref)], live, any);
+                if (!any)
+                    beam_shorten(w, all);
+            } else if (leaf_packet(w, ref, live, any, motion) && !any) {
                 beam_shorten(w, all);
-        } else if (leaf_packet(w, at.ref, live, any, motion) && !any) {
-            beam_shorten(w, all);
+            }
         }
+        do {
+            if (top == 0)
+                return;
+            const struct entry *at = &stack[--top];
+            ref = at->ref;
+            live = any ? at->mask & ~w->occluded : at->mask;
+            if (live)
+                live = box_rays(w, at->box, live);
+        } while (!live);
     }
 }
 
