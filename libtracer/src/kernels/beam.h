@@ -23,6 +23,8 @@
 #define TRC_SLACK 2.4e-6f
 /* Denormal coordinates: errors are absolute there. */
 #define TRC_LEAST_SLACK 1e-42f
+/* Widest half of a narrow beam, per length. */
+#define TRC_NARROW_BEAM 0.03f
 /* Between planes nearer than this, slopes per z would overflow. */
 #define TRC_SHORT_BEAM 1e-37f
 
@@ -36,6 +38,7 @@ struct trc_beam {
     float u_min_slope, u_max_slope, v_min_slope, v_max_slope; /* per z */
     /* The same as middle and half width. */
     float u_mid, v_mid, u_half, v_half, u_mid_slope, v_mid_slope, u_half_slope, v_half_slope;
+    bool is_narrow; /* rays mostly meet the same boxes */
 };
 
 /* Everything a traversal derives from a packet for one group of its rays. */
@@ -164,6 +167,9 @@ TRC_INLINE bool trc_group_setup(struct trc_group *g, const struct trc_packet *p,
     b->v_mid_slope = 0.5f * (b->v_min_slope + b->v_max_slope);
     b->u_half_slope = 0.5f * (b->u_max_slope - b->u_min_slope);
     b->v_half_slope = 0.5f * (b->v_max_slope - b->v_min_slope);
+    const float widest = f_max(f_max(b->u_half, b->u_half + length * b->u_half_slope),
+                               f_max(b->v_half, b->v_half + length * b->v_half_slope));
+    b->is_narrow = widest < TRC_NARROW_BEAM * length;
     return true;
 }
 

@@ -67,14 +67,15 @@ TRC_INLINE void boxes_load(const struct walk *w, uint32_t node, bool motion, f8 
     }
 }
 
-/* Rays of mask whose own slabs meet the box. The first live ray is tried alone: mostly it hits and
- * the rest need not be looked at. */
-TRC_INLINE uint64_t box_rays(const struct walk *w, const float box[6], uint64_t mask) {
+/* Rays of mask whose own slabs meet the box. In narrow beams, while boxes take all rays or none,
+ * the first one is tried alone: when it hits, the others are not looked at. */
+TRC_INLINE uint64_t box_rays(const struct walk *w, const float box[6], uint64_t mask,
+                             bool *together) {
     const struct trc_packet *p = w->packet;
     const struct trc_group *g = w->group;
     const int u = g->beam.axis.u, v = g->beam.axis.v, z = g->beam.axis.z;
-    TRC_COUNT(box_rays, 1);
-    {
+    if (*together) {
+        TRC_COUNT(box_rays, 1);
         const int i = __builtin_ctzll(mask);
         const float u0 = box[0] * g->inv[u][i] + g->shift[u][i],
                     u1 = box[1] * g->inv[u][i] + g->shift[u][i],
@@ -86,7 +87,6 @@ TRC_INLINE uint64_t box_rays(const struct walk *w, const float box[6], uint64_t 
         const float far = f_min(f_min(p->t[i], z1), f_min(f_max(u0, u1), f_max(v0, v1)));
         if (near <= far)
             return mask;
-        mask &= mask - 1;
     }
     TRC_COUNT(box_rays, __builtin_popcountll(mask));
     uint64_t live = 0;
@@ -110,6 +110,7 @@ TRC_INLINE uint64_t box_rays(const struct walk *w, const float box[6], uint64_t 
             vf_min(vf_min(vf_load(&p->t[i]), z1), vf_min(vf_max(u0, u1), vf_max(v0, v1)));
         live |= (uint64_t)(vm_bits(vf_le(near, far)) & bits) << i;
     }
+    *together = g->beam.is_narrow && (live == 0 || live == mask);
     return live;
 }
 
@@ -484,6 +485,7 @@ TRC_INLINE void packet_walk(struct walk *w, uint64_t mask, bool any, bool motion
     struct entry stack[TRC_STACK_SIZE];
     const int few = w->packet->common_origin ? SINGLE_COMMON : SINGLE_MIXED;
     const uint64_t all = mask;
+    bool together = w->group->beam.is_narrow;
     uint64_t live = mask;
     uint32_t ref = w->tree->root;
     int top = 0;
@@ -515,7 +517,7 @@ TRC_INLINE void packet_walk(struct walk *w, uint64_t mask, bool any, bool motion
             ref = at->ref;
             live = any ? at->mask & ~w->occluded : at->mask;
             if (live)
-                live = box_rays(w, at->box, live);
+                live = box_rays(w, at->box, live, &together);
         } while (!live);
     }
 }
