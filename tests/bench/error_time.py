@@ -175,14 +175,16 @@ def point_errors(stack, reference):
     return errors
 
 
+def reference_stack(blend, key, options):
+    """Cycles' pictures that the reference is the mean of."""
+    seeds = list(range(FIRST_REFERENCE_SEED, FIRST_REFERENCE_SEED + options.reference_seeds))
+    return render_stacks(blend, key, Configuration("cycles", "CYCLES"),
+                         [(options.reference_samples, seeds)], options)[0]
+
+
 def scene_errors(blend, key, options):
     """{"reference": ..., "curves": {configuration: {samples: errors}}, "bias": ...} of one scene."""
-    cycles = Configuration("cycles", "CYCLES")
-    reference_seeds = list(range(FIRST_REFERENCE_SEED,
-                                 FIRST_REFERENCE_SEED + options.reference_seeds))
-    reference_stack = render_stacks(blend, key, cycles,
-                                    [(options.reference_samples, reference_seeds)], options)[0]
-    reference = Reference.of_stack(reference_stack)
+    reference = Reference.of_stack(reference_stack(blend, key, options))
     seeds = list(range(FIRST_SEED, FIRST_SEED + options.seeds))
     report = {"reference": {"samples": options.reference_samples, "seeds": options.reference_seeds,
                             "variance": float(reference.variance.mean())},

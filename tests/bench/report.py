@@ -14,7 +14,7 @@ import time
 
 import compare_cycles
 from reporting import (blender_costs, curves, document, frames, gate, kernels, machine, plots, povray,
-                       scope as scopes)
+                       readme, scope as scopes)
 
 
 def parse_arguments(arguments):
@@ -83,6 +83,8 @@ def main(arguments=None):
     plots.draw(results, options.out)
     document.write(results, options.out)
     print(f"report: {options.out / 'report.md'}")
+    if options.out.resolve() == readme.COMMITTED:
+        readme.write()
     if options.baseline:
         gate.write_baseline(results)
         return 0

@@ -7,12 +7,18 @@ count whose time was not measured gets that of the line through those that were:
 synchronising and saving, and a part for each sample.
 """
 
+import compare
+import compare_cycles
 import error_time
+import numpy as np
 
 from . import estimates
+from .scope import SAMPLERS
 
-MEASURES = ("mse", "rel_mse", "p999")
+MEASURES = {"mse": "MSE", "rel_mse": "relMSE", "p999": "99.9th percentile"}
 BASE = "cycles"
+DEFAULT = "volley sobol l1"  # Volley as it is without touching anything
+SHEET_SAMPLES = (1, 16)      # of the pictures to look at
 
 
 def measure(options, scope, pictures):
@@ -28,11 +34,27 @@ def measure_scene(name, options, scope, pictures):
         "--reference-samples", str(scope.reference_samples),
         "--reference-seeds", str(scope.reference_seeds), "--repeats", str(scope.repeats),
         "--times-scale", str(scope.times_scale), "--threads", str(options.threads),
-        "--build", str(options.build), "--pictures", str(pictures), "--blender", options.blender])
+        "--build", str(options.build), "--blender", options.blender])
     own.configurations = configurations(name, scope)
     scene = error_time.measure_scene(name, error_time.identify(own))
-    scene["comparison"] = compare(scene)
+    scene["comparison"] = compare_configurations(scene)
+    write_sheet(name, own, pictures)
     return scene
+
+
+def write_sheet(name, options, folder):
+    """One PNG: Cycles above Volley, at few and at more samples, the reference at the end of both. The
+    pictures are those that errors were taken of."""
+    own = error_time.scene_options(name, options)
+    blend, key, _name = compare_cycles.prepared_scene(own)
+    seeds = list(range(error_time.FIRST_SEED, error_time.FIRST_SEED + own.seeds))
+    points = [(samples, seeds) for samples in SHEET_SAMPLES if samples in own.samples]
+    reference = error_time.reference_stack(blend, key, own).mean(axis=0)
+    rows = [np.concatenate([*(stack[0] for stack in error_time.render_stacks(
+        blend, key, configuration, points, own)), reference], axis=1)
+        for configuration in own.configurations if configuration.name in (BASE, DEFAULT)]
+    folder.mkdir(parents=True, exist_ok=True)
+    compare.write_png(folder / f"{name}.png", np.concatenate(rows) * 2.0 ** own.stops)
 
 
 def configurations(name, scope):
@@ -41,14 +63,9 @@ def configurations(name, scope):
     for count in scope.light_samples:
         made.append(volley("SOBOL", count))
     if name in scope.sampler_scenes:
-        made += [volley(sampler, scope.light_samples[0]) for sampler in scope_samplers()]
+        made += [volley(sampler, scope.light_samples[0]) for sampler in SAMPLERS
+                 if sampler != "SOBOL"]
     return made
-
-
-def scope_samplers():
-    """All samplers but the default one."""
-    from .scope import SAMPLERS
-    return [sampler for sampler in SAMPLERS if sampler != "SOBOL"]
 
 
 def volley(sampler, light_samples):
@@ -69,7 +86,7 @@ def curve(scene, name, measure_name, mean=lambda values: sum(values) / len(value
     return seconds, [mean(point["seeds"][measure_name]) for point in points.values()]
 
 
-def compare(scene):
+def compare_configurations(scene):
     """{configuration: ratios of time at equal error to Cycles with intervals, slope, bias}."""
     report = {}
     for name in scene["curves"]:
@@ -116,3 +133,12 @@ def bias(scene, name):
     return {"bias_squared": finest["bias_squared"], "variance": finest["variance"],
             "mean_ratios": finest["mean_ratios"], "tiles": test.get("tests"),
             "biased_tiles": test.get("failed")}
+
+
+def headline_rows(scenes):
+    """(scene, {measure: ratio}) of Volley as it is by default, least ratio of MSE first."""
+    rows = []
+    for name, scene in scenes.items():
+        entry = scene["comparison"][DEFAULT]
+        rows.append((name, {key: entry[f"time_ratio_{key}"] for key in ("mse", "rel_mse")}))
+    return sorted(rows, key=lambda row: row[1]["mse"]["ratio"] if row[1]["mse"] else 0.0)

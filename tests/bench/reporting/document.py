@@ -73,7 +73,7 @@ def pictures(out):
     if not names:
         return ""
     lines = ["## Pictures",
-             "Rising samples per pixel from left to right, the reference last (POV-Ray: its picture, "
-             "Volley's, the reference)."]
+             "Cycles above Volley: 1 sample per pixel, 16 and the reference. POV-Ray: its picture, "
+             "Volley's, the reference, 16 samples each."]
     lines += [f"{name[:-4]}:\n\n![{name[:-4]}](pictures/{name})" for name in names]
     return "\n\n".join(lines)

@@ -2,7 +2,7 @@
 """Sections about whole frames: the paper's tables and figures, effects, growth, Blender."""
 
 from . import estimates, frames
-from .tables import digits, median_with_spread, table, words
+from .tables import digits, median_with_spread, ratio, table, words
 
 ARROW = " / "
 
@@ -82,11 +82,10 @@ def assemblies(group):
                      for name, each in group.items() if name.startswith(f"{stage} {integrator} ")}
             gain = estimates.ratio_with_interval(rates["types"], rates["runs"])
             middles = {name: estimates.spread(values)["median"] for name, values in rates.items()}
-            ratio_text = f"{gain['ratio']:.2f} ({gain['interval'][0]:.2f}–{gain['interval'][1]:.2f})"
             rows.append([words(stage), integrator,
                          *(digits(middles[name]) for name in frames.ASSEMBLIES),
                          *(digits(middles[f"types {size}"]) for size in frames.PACKET_SIZES),
-                         ratio_text if gain["ratio"] >= 1.0 else f"**{ratio_text}**",
+                         ratio(gain),
                          f"{middles['types'] / middles['none']:.2f}"])
     return ("## Packet assemblies\n\nMillions of rays per second, all of the frame with its shading. "
             "The paper found ray types 10 to 20 % over runs and 2 to 3 times over none.\n\n"
@@ -105,7 +104,7 @@ def effects(groups):
         cells = []
         for name in names:
             made = estimates.ratio_with_interval(frames.seconds(group[f"{stage} {name}"]), nothing)
-            cells.append(f"{made['ratio']:.2f} ({made['interval'][0]:.2f}–{made['interval'][1]:.2f})")
+            cells.append(ratio(made).replace("*", ""))
         rows.append([words(stage), *cells])
     shares = []
     for name, each in groups["integrators"].items():
@@ -135,8 +134,7 @@ def growth(groups):
             for count in counts[1:]:
                 made = estimates.ratio_with_interval(
                     one, frames.seconds(names[f"{stage} {integrator} {count}"]))
-                cells.append(f"{made['ratio']:.2f} ({made['interval'][0]:.2f}–"
-                             f"{made['interval'][1]:.2f})")
+                cells.append(ratio(made))
             rows.append([words(stage), integrator, *cells])
     return "\n\n".join([
         "## How costs grow",

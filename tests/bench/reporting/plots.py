@@ -2,6 +2,7 @@
 """The plots of a report as SVG, drawn with matplotlib."""
 
 import matplotlib
+import matplotlib.ticker
 
 matplotlib.use("svg")
 
@@ -12,7 +13,6 @@ from . import curves, estimates, frames, kernels  # noqa: E402
 # Okabe and Ito's colours, told apart by all eyes.
 CYCLES_COLOR, VOLLEY_COLOR = "#D55E00", "#0072B2"
 COLORS = (VOLLEY_COLOR, "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C510A", "#999999")
-MEASURES = {"mse": "MSE", "rel_mse": "relMSE", "p999": "99.9th percentile", "flip": "FLIP"}
 
 
 def draw(results, out):
@@ -42,6 +42,15 @@ def save(figure, path):
     plt.close(figure)
 
 
+def plain_log_ticks(axis, *names):
+    """Ticks at 1, 2, 5, 10 and so on, as plain numbers."""
+    for name in names:
+        part = getattr(axis, name + "axis")
+        part.set_major_locator(matplotlib.ticker.LogLocator(subs=(1.0, 2.0, 5.0)))
+        part.set_major_formatter(matplotlib.ticker.FormatStrFormatter("%g"))
+        part.set_minor_formatter(matplotlib.ticker.NullFormatter())
+
+
 # Error against time ------------------------------------------------------------------------------
 
 def configuration_style(name, names):
@@ -61,7 +70,7 @@ def seed_interval(point, measure):
 def draw_curves(name, scene, path):
     """Each measure against seconds, log-log, with the intervals of the mean over seeds."""
     shown = [each for each in scene["curves"] if is_main(each)]
-    measures = [key for key in MEASURES if key in next(iter(scene["curves"][shown[0]].values()))["seeds"]]
+    measures = [key for key in curves.MEASURES if key in next(iter(scene["curves"][shown[0]].values()))["seeds"]]
     figure, axes = plt.subplots(1, len(measures), figsize=(3.4 * len(measures), 3.0))
     for axis, measure in zip(axes, measures):
         for configuration in shown:
@@ -70,7 +79,8 @@ def draw_curves(name, scene, path):
                     for point in scene["curves"][configuration].values()]
             axis.errorbar(seconds, errors, yerr=list(zip(*bars)), label=configuration, markersize=4,
                           linewidth=1.3, capsize=2, **configuration_style(configuration, shown))
-        axis.set(xscale="log", yscale="log", xlabel="seconds", title=MEASURES[measure])
+        axis.set(xscale="log", yscale="log", xlabel="seconds", title=curves.MEASURES[measure])
+        plain_log_ticks(axis, "x")
     axes[0].legend(fontsize=7)
     figure.suptitle(name.replace("_", " "))
     figure.tight_layout()
@@ -95,14 +105,15 @@ def draw_samplers(scenes, folder):
                       label=configuration, markersize=4, **configuration_style(configuration, shown))
         axis.set(xscale="log", yscale="log", xlabel="samples per pixel", ylabel="MSE",
                  title=f"samplers, {name.replace('_', ' ')}")
+        plain_log_ticks(axis, "x")
         axis.legend(fontsize=7)
         save(figure, folder / f"samplers-{name}.svg")
 
 
 def draw_ratios(scenes, path):
     """Time that Cycles needs over Volley's at equal error, worst scene first."""
-    rows = headline_rows(scenes)
-    figure, axis = plt.subplots(figsize=(6.4, 0.6 + 0.36 * len(rows)))
+    rows = curves.headline_rows(scenes)
+    figure, axis = plt.subplots(figsize=(6.4, 1.0 + 0.34 * len(rows)))
     for y, (name, by_measure) in enumerate(reversed(rows)):
         for offset, (measure, color) in enumerate((("mse", VOLLEY_COLOR), ("rel_mse", COLORS[1]))):
             made = by_measure[measure]
@@ -112,26 +123,15 @@ def draw_ratios(scenes, path):
             place = y + 0.12 - 0.24 * offset
             axis.plot([low, high], [place, place], color=color, linewidth=2)
             axis.plot(made["ratio"], place, "o", color=color, markersize=5,
-                      label=MEASURES[measure] if y == 0 else None)
+                      label=curves.MEASURES[measure] if y == 0 else None)
     axis.axvline(1.0, color=CYCLES_COLOR, linewidth=1.2)
     axis.set(xscale="log", yticks=range(len(rows)),
              yticklabels=[name.replace("_", " ") for name, _ratios in reversed(rows)],
              xlabel="time of Cycles / time of Volley at equal error (1: as fast as Cycles)")
-    axis.xaxis.set_major_formatter(matplotlib.ticker.FormatStrFormatter("%g"))
-    axis.xaxis.set_minor_formatter(matplotlib.ticker.NullFormatter())
-    axis.set_xticks([tick for tick in (0.25, 0.5, 1, 2, 5, 10, 20, 50, 100, 200)
-                     if axis.get_xlim()[0] <= tick <= axis.get_xlim()[1]])
-    axis.legend(fontsize=8, loc="lower right")
+    plain_log_ticks(axis, "x")
+    axis.set_ylim(-0.6, len(rows) - 0.4)
+    axis.legend(fontsize=8, ncol=2, loc="lower left", bbox_to_anchor=(0.0, 1.0))
     save(figure, path)
-
-
-def headline_rows(scenes):
-    """(scene, {measure: ratio}) of Volley as it is by default, least ratio of MSE first."""
-    rows = []
-    for name, scene in scenes.items():
-        entry = scene["comparison"]["volley sobol l1"]
-        rows.append((name, {key: entry[f"time_ratio_{key}"] for key in ("mse", "rel_mse")}))
-    return sorted(rows, key=lambda row: row[1]["mse"]["ratio"] if row[1]["mse"] else 0.0)
 
 
 # Kernels -----------------------------------------------------------------------------------------
@@ -143,8 +143,8 @@ def draw_kernels(rows, path):
         return
     panels = sorted({(row["isa"], row["motion"]) for row in raced})
     kinds = list(dict.fromkeys(row["kind"] for row in rows if row["row"] == "rays"))
-    figure, axes = plt.subplots(1, len(panels), figsize=(3.2 * len(panels) + 1.2, 3.4), sharey=True,
-                                squeeze=False)
+    figure, axes = plt.subplots(1, len(panels), figsize=(3.2 * len(panels) + 1.2, 3.4), sharex=True,
+                                sharey=True, squeeze=False)
     scenes = list(dict.fromkeys(row["scene"] for row in raced))
     for axis, (isa, motion) in zip(axes[0], panels):
         for row in raced:
@@ -156,9 +156,7 @@ def draw_kernels(rows, path):
         axis.set(xscale="log", title=f"{isa}, {'moving' if motion else 'still'}",
                  xlabel="Mrays/s over Embree's best mode", yticks=range(len(kinds)),
                  yticklabels=[kind.replace("_", " ") for kind in reversed(kinds)])
-        axis.set_xticks((0.5, 1, 2, 4, 8))
-        axis.xaxis.set_major_formatter(matplotlib.ticker.FormatStrFormatter("%g"))
-        axis.xaxis.set_minor_formatter(matplotlib.ticker.NullFormatter())
+        plain_log_ticks(axis, "x")
     for index, scene in enumerate(scenes):
         axes[0][-1].plot([], [], "o", color=COLORS[index % len(COLORS)], label=scene)
     axes[0][-1].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
@@ -179,6 +177,7 @@ def draw_povray(scenes, path):
                       label={"povray": "POV-Ray", "volley": "Volley"}[program])
         axis.set(xscale="log", yscale="log", xlabel="seconds", ylabel="MSE",
                  title=name.replace("_", " "))
+        plain_log_ticks(axis, "x")
         axis.legend(fontsize=8)
     figure.tight_layout()
     save(figure, path)
