@@ -33,6 +33,7 @@ import scene_setups
 from reporting import estimates
 
 import compare  # found by compare_cycles' path
+import flip
 
 SCENES = ["example_motion", "robot_motion", "knight_motion", "conference_motion", "billiards"]
 FIRST_SEED = 101
@@ -165,7 +166,9 @@ def point_errors(stack, reference):
         errors[measure] = statistics.mean(per_seed)
         errors[measure + "_error"] = statistics.stdev(per_seed) / math.sqrt(len(per_seed))
     errors["seeds"]["p999"] = [compare.error_percentile(image, reference.mean) for image in stack]
-    errors["p999"] = statistics.mean(errors["seeds"]["p999"])
+    errors["seeds"]["flip"] = [flip.mean_flip(image, reference.mean) for image in stack]
+    for measure in ("p999", "flip"):
+        errors[measure] = statistics.mean(errors["seeds"][measure])
     variance = stack.var(axis=0, ddof=1)
     errors["variance"] = float(variance.mean())
     errors["bias_squared"] = float(np.mean((stack.mean(axis=0) - reference.mean) ** 2

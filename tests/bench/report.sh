@@ -1,13 +1,14 @@
 #!/usr/bin/env bash
 # Measures speed against error and writes a report: Markdown, SVG plots, pictures, raw JSON.
 #
-#   bash tests/bench/report.sh [--quick|--full] [--out DIR] [--draw] [--baseline]
+#   bash tests/bench/report.sh [--quick|--full] [--out DIR] [--draw] [--baseline] [--parts PART...]
 #
 # The default takes about 35 minutes on two quiet cores, --quick about 4, --full a night. --draw draws
 # the report of DIR anew from its JSON. DIR is build/report; tests/bench/report is the committed one.
 # With --quick the ratios are compared with the committed baseline: the exit code is 1 if one of them
 # fell far in repeated runs. --baseline writes that baseline instead. Debian's povray and libembree-dev
-# take part where they are installed, python3-matplotlib must be.
+# take part where they are installed. What is missing is installed as tests/setup.sh does it, with povray
+# and python3-matplotlib.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 
@@ -23,8 +24,9 @@ find_python() {
     return 1
 }
 
-python=$(find_python)
-if [ ! -x build/bin/tracer_bench ] || [ ! -x build/bin/frame_bench ]; then
-    bash tests/setup.sh
+# A build that is there is measured as it is; a report can be drawn without one.
+if [ ! -x build/bin/tracer_bench ] || [ ! -x build/bin/frame_bench ] || ! find_python >/dev/null; then
+    bash tests/setup.sh --report
 fi
+python=$(find_python)
 exec "$python" tests/bench/report.py "$@"

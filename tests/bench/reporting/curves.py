@@ -15,7 +15,7 @@ import numpy as np
 from . import estimates
 from .scope import SAMPLERS
 
-MEASURES = {"mse": "MSE", "rel_mse": "relMSE", "p999": "99.9th percentile"}
+MEASURES = {"mse": "MSE", "rel_mse": "relMSE", "p999": "99.9th percentile", "flip": "FLIP"}
 BASE = "cycles"
 DEFAULT = "volley sobol l1"  # Volley as it is without touching anything
 SHEET_SAMPLES = (1, 16)      # of the pictures to look at

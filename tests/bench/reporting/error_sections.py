@@ -138,7 +138,7 @@ def equal_error(scenes):
             "shadow rays at each point that the camera sees. Both engines run inside Blender, times "
             "are those of F12 with synchronising and saving.\n\n"
             "![Time to equal error](plots/time-to-equal-error.svg)\n\n"
-            + table(["scene", "Volley", "MSE", "relMSE", "99.9th percentile", "slope of MSE"], rows))
+            + table(["scene", "Volley", *curves.MEASURES.values(), "slope of MSE"], rows))
 
 
 def curves_and_bias(scenes):
@@ -156,8 +156,8 @@ def curves_and_bias(scenes):
         "## Curves of error against time",
         "Errors of small pictures, times of larger ones of the same scenes. relMSE is the mean of "
         "(x - r)² / (r + 0.01)². Bars are 95 % intervals over seeds. The references are Cycles' own, "
-        "with other seeds; their variance is known and taken off MSE and relMSE. FLIP is not among "
-        "the measures.",
+        "with other seeds; their variance is known and taken off MSE and relMSE. FLIP (Andersson et al. "
+        "2020) is that of the pictures cut to [0, 1].",
         *(f"![{name}](plots/curves-{name}.svg)" for name in scenes),
         *(f"![Samplers, {name}](plots/samplers-{name}.svg)" for name, scene in scenes.items()
           if len(scene["curves"]) > 4),
