@@ -141,7 +141,7 @@ def test_flip_tells_an_edge_from_a_soft_step():
 
 def test_figures_have_the_paper_own_points():
     scope = type("Scope", (), {"stages": ("tiny",), "counted_edge": 16})
-    assert len(frames.figure_7(scope)) == 15 and len(frames.figure_8(scope)) == 18
+    assert len(frames.figure_7(scope)) == 15 and len(frames.figure_8(scope)) == 16
 
 
 def test_gate_is_silent_until_a_loss_is_large_and_repeated(monkeypatch, tmp_path, capsys):

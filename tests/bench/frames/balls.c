@@ -37,9 +37,11 @@ void balls_place(uint32_t edge, uint32_t i, float transform_out[12]) {
 }
 
 void balls_make(uint32_t triangle_count, struct stage *stage) {
-    /* A ball of s stacks and 2 s slices has 4 s (s - 1) triangles. */
+    /* A ball of s stacks and r slices has 2 r (s - 1) triangles; about twice as many slices as
+     * stacks make them even. */
     const float each = (float)triangle_count / BALLS_COUNT;
-    const uint32_t stacks = (uint32_t)lrintf(0.5f + 0.5f * sqrtf(1.0f + each));
+    const uint32_t stacks = (uint32_t)(0.5f + 0.5f * sqrtf(1.0f + each));
+    const uint32_t slices = (uint32_t)lrintf(0.5f * each / (float)(stacks - 1));
     const uint32_t edge = edge_of(BALLS_COUNT);
     static const float origin[3] = {0, 0, 0};
     memset(stage, 0, sizeof *stage);
@@ -48,7 +50,7 @@ void balls_make(uint32_t triangle_count, struct stage *stage) {
         const uint32_t first = stage->mesh.vertex_count;
         float transform[12];
         balls_place(edge, i, transform);
-        mesh_add_uv_sphere(&stage->mesh, origin, 1.0f, stacks, 2 * stacks);
+        mesh_add_uv_sphere(&stage->mesh, origin, 1.0f, stacks, slices);
         mesh_transform(&stage->mesh, first, transform);
     }
     stage_look(stage);

@@ -179,11 +179,13 @@ def figure_7(scope):
 
 
 def figure_8(scope):
-    """"stage ASSEMBLY DEPTH": counts with at most so many bounces."""
+    """"stage ASSEMBLY LIMIT": counts with that limit of bounces. Rays of one bounce more are traced,
+    for the light that they meet."""
     return {f"{stage} {assembly} {count}": counted(scope, stage, integrator="whitted",
                                                    surface="mirror", assembly=assembly,
                                                    max_depth=count)
-            for stage in scope.stages for assembly in ("runs", "types") for count in (0, *DEPTHS)}
+            for stage in scope.stages for assembly in ("runs", "types")
+            for count in range(max(DEPTHS))}
 
 
 def counted(scope, stage, **settings):
@@ -238,6 +240,10 @@ def tests_per_ray(tests):
     return boxes / tests["rays"], triangle_tests / tests["rays"]
 
 
-def difference(deeper, shallower):
-    """Counts of the rays that one more bounce adds."""
-    return {key: deeper[key] - shallower[key] for key in deeper}
+def bounce_counts(group, stage, assembly, bounce):
+    """Counts of the reflection rays of one bounce, 1 the first: what they add to the limit before."""
+    counts = group[f"{stage} {assembly} {bounce - 1}"][0]["reflection"]
+    if bounce == 1:
+        return counts
+    before = group[f"{stage} {assembly} {bounce - 2}"][0]["reflection"]
+    return {key: counts[key] - before[key] for key in counts}

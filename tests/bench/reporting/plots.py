@@ -253,9 +253,7 @@ def figure_8_points(group, stage, assembly):
     """(bounces, tests per ray) of the bounces that have rays enough to tell."""
     depths, points = [], []
     for depth in frames.DEPTHS:
-        deeper, shallower = (group[f"{stage} {assembly} {count}"][0]["reflection"]
-                             for count in (depth, depth - 1))
-        added = frames.difference(deeper, shallower)
+        added = frames.bounce_counts(group, stage, assembly, depth)
         if added["rays"] >= frames.FEWEST_RAYS:
             depths.append(depth)
             points.append(frames.tests_per_ray(added))
