@@ -62,7 +62,7 @@ def test_instances_and_lights_are_there():
 
 
 def test_a_higher_limit_of_bounces_only_adds_rays():
-    rows = run(*(frames.spec(**SMALL, surface="mirror", counts=1, max_depth=depth)
+    rows = run(*(frames.spec(**SMALL, **frames.MIRRORS, counts=1, max_depth=depth)
                  for depth in (0, 1, 2)))
     rays = [row["reflection"]["rays"] for row in rows]
     assert 0 < rays[0] < rays[1] < rays[2]

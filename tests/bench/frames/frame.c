@@ -2,10 +2,6 @@
 
 #include <string.h>
 
-/* Rays whose share of a pixel is below are not followed. The paper gives no number; this one leaves
- * as many rays per pixel as its tables imply. */
-#define ATTENUATION_CUTOFF 0.02f
-
 trc_render_desc frame_desc(const struct spec *spec) {
     return (trc_render_desc){.struct_size = sizeof(trc_render_desc),
                              .width = spec->width,
@@ -17,7 +13,7 @@ trc_render_desc frame_desc(const struct spec *spec) {
                              .max_transparent_depth = spec->max_depth,
                              .max_glossy_depth = UINT32_MAX,
                              .max_transmission_depth = UINT32_MAX,
-                             .attenuation_cutoff = ATTENUATION_CUTOFF,
+                             .attenuation_cutoff = spec->cutoff,
                              .assembly = spec->assembly,
                              .packet_size = spec->packet_size,
                              .sampler = spec->sampler,

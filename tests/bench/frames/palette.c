@@ -2,6 +2,8 @@
 
 /* GGX roughness of glossy surfaces: about the lobe of a Phong exponent of 200. */
 #define ROUGHNESS 0.3f
+/* Of SURFACE_MIRROR and SURFACE_GLOSSY; the rest is diffuse. */
+#define REFLECTING_SHARE 0.5f
 #define GLASS_INDEX 1.45f
 #define CHECKER_SCALE 20.0f
 
@@ -79,9 +81,9 @@ static int32_t surface_add(struct graph *g, enum surface surface, uint32_t slot,
     case SURFACE_PAPER:
         return mixed(g, shares[slot], base, reflecting(g, roughness));
     case SURFACE_MIRROR:
-        return mixed(g, 0.3f, base, reflecting(g, 0.0f));
+        return mixed(g, REFLECTING_SHARE, base, reflecting(g, 0.0f));
     case SURFACE_GLOSSY:
-        return mixed(g, 0.3f, base, reflecting(g, ROUGHNESS));
+        return mixed(g, REFLECTING_SHARE, base, reflecting(g, ROUGHNESS));
     default:
         return base;
     }

@@ -9,6 +9,9 @@
 #include "threads/thread.h"
 #include "tracer/tracer.h"
 
+/* The paper gives no number; this one leaves as many rays per pixel as its tables imply. */
+#define ATTENUATION_CUTOFF 0.02f
+
 static const char *const integrator_names[] = {"raycast", "whitted", "distribution", NULL};
 static const char *const assembly_names[] = {"auto",    "types", "runs", "groups",
                                              "octants", "blind", "none", NULL};
@@ -47,6 +50,8 @@ static const struct {
     {"aperture", "times a reasonable one (0)", FIELD_FACTOR, AT(aperture), NULL, 0, 0},
     {"exposure", "times a reasonable one (0)", FIELD_FACTOR, AT(exposure), NULL, 0, 0},
     {"light_size", "times the stage's own (0)", FIELD_FACTOR, AT(light_size), NULL, 0, 0},
+    {"cutoff", "least share of a pixel that Whitted follows (0.02)", FIELD_FACTOR, AT(cutoff), NULL,
+     0, 0},
     {"counts", "1: count tests, measure no times (0)", FIELD_FLAG, AT(counts), NULL, 0, 0},
 #undef AT
 };
@@ -118,7 +123,8 @@ bool spec_parse(const char *line, struct spec *out) {
                          .height = 1024,
                          .eyes = STAGE_EYES,
                          .triangles = 100000,
-                         .lights = 1};
+                         .lights = 1,
+                         .cutoff = ATTENUATION_CUTOFF};
     if (strlen(line) >= SPEC_TEXT || strpbrk(line, "\"\\")) {
         fprintf(stderr, "frame_bench: a line is too long or has quotes\n");
         return false;

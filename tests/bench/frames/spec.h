@@ -31,6 +31,7 @@ struct spec {
     float aperture;     /* of the lens, in units of a reasonable one; 0: pinhole */
     float exposure;     /* of the shutter, in units of a reasonable one; 0: nothing moves */
     float light_size;   /* in units of the stage's own; 0: point lights */
+    float cutoff;       /* Whitted follows no ray whose share of its pixel is below */
     bool counts;        /* count tests of boxes and triangles instead of measuring times */
 };
 

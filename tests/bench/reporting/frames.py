@@ -23,6 +23,7 @@ PACKET_SIZES = (4, 16, 64)
 FACTORS = (0.0, 0.5, 1.0, 1.5, 2.0)  # of Figure 7
 DEPTHS = tuple(range(1, 9))          # of Figure 8
 REASONABLE = {"aperture": 1.0, "exposure": 1.0, "light_size": 1.0}
+MIRRORS = {"surface": "mirror", "cutoff": 0.001}  # enough for those bounces
 FEWEST_RAYS = 500                    # of a bounce, for a point of Figure 8
 FIGURE_KINDS = ("camera", "reflection", "refraction")
 # What is added to a frame of diffuse surfaces, a pinhole, a point light and nothing that moves.
@@ -156,7 +157,7 @@ def lights(scope):
 
 def depth(scope):
     """"DEPTH": most bounces, Whitted."""
-    return {str(count): frame(scope, 2, scene=scope.stages[0], surface="mirror", max_depth=count)
+    return {str(count): frame(scope, 2, scene=scope.stages[0], max_depth=count, **MIRRORS)
             for count in (0, 1, 2, 4, 8, 16, 50)}
 
 
@@ -182,8 +183,8 @@ def figure_8(scope):
     """"stage ASSEMBLY LIMIT": counts with that limit of bounces. Rays of one bounce more are traced,
     for the light that they meet."""
     return {f"{stage} {assembly} {count}": counted(scope, stage, integrator="whitted",
-                                                   surface="mirror", assembly=assembly,
-                                                   max_depth=count)
+                                                   assembly=assembly, max_depth=count,
+                                                   **MIRRORS)
             for stage in scope.stages for assembly in ("runs", "types")
             for count in range(max(DEPTHS))}
 
