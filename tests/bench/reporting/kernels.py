@@ -5,11 +5,16 @@ tracer_bench measures."""
 from . import programs
 
 
+# Builds use all threads, and whether rays do as well shows in one kind of them.
+ALL_THREADS = ("--threads", "all", "--kinds", "primary", "--order", "auto", "--motion", "still")
+
+
 def measure(options, scope):
-    """Rows of tracer_bench: "build" and "rays"."""
+    """Rows of tracer_bench: "build" and "rays", on one thread and, some of them, on all."""
     scenes = [word for name in scope.kernel_scenes for word in ("--scene", name)]
-    return programs.run_json([programs.tool(options, "tracer_bench"), *scenes,
-                              *scope.kernel_arguments])
+    program = programs.tool(options, "tracer_bench")
+    one = programs.run_json([program, *scenes, "--threads", 1, *scope.kernel_arguments])
+    return one + programs.run_json([program, *scenes, *scope.kernel_arguments, *ALL_THREADS])
 
 
 def races(rows):

@@ -49,8 +49,8 @@ QUICK = Scope(
     seeds=3, reference_samples=128, reference_seeds=2, light_samples=(1, 4), repeats=3, times_scale=2,
     classic_scenes=("classic",), classic_width=256,
     kernel_scenes=("character",),
-    kernel_arguments=("--threads", "1", "--order", "auto", "--motion", "still", "--repeats", "3",
-                      "--tiles", "8", "--size", "512"),
+    kernel_arguments=("--order", "auto", "--motion", "still", "--repeats", "3", "--tiles", "8",
+                      "--size", "512"),
     stages=("character",), frame_edge=256, frame_repeats=3, distribution_samples=4, counted_edge=64,
     largest_triangles=100_000, largest_lights=100, largest_instances=1000)
 
@@ -61,7 +61,7 @@ MEDIUM = Scope(
     light_samples=(1, 4), repeats=3, times_scale=3,
     classic_scenes=("classic", "classic_soft"), classic_width=384,
     kernel_scenes=("conference", "pool_hall", "character"),
-    kernel_arguments=("--threads", "1,all", "--order", "auto", "--repeats", "5", "--tiles", "8"),
+    kernel_arguments=("--order", "auto", "--repeats", "5", "--tiles", "8"),
     stages=("conference", "pool_hall", "character"), frame_edge=1024, frame_repeats=3,
     distribution_samples=8, counted_edge=128,
     largest_triangles=4_000_000, largest_lights=10_000, largest_instances=100_000)
@@ -74,7 +74,7 @@ FULL = Scope(
     times_scale=3,
     classic_scenes=("classic", "classic_soft"), classic_width=640,
     kernel_scenes=("conference", "pool_hall", "character"),
-    kernel_arguments=("--threads", "1,all", "--repeats", "9"),
+    kernel_arguments=("--repeats", "9"),
     stages=("conference", "pool_hall", "character"), frame_edge=1024, frame_repeats=5,
     distribution_samples=64, counted_edge=512,
     largest_triangles=20_000_000, largest_lights=10_000, largest_instances=1_000_000)
