@@ -140,7 +140,7 @@ def test_flip_tells_an_edge_from_a_soft_step():
 # Frames and the gate -----------------------------------------------------------------------------
 
 def test_figures_have_the_paper_own_points():
-    scope = type("Scope", (), {"stages": ("tiny",), "counted_edge": 16})
+    scope = type("Scope", (), {"stages": ("tiny",), "counted_edge": 16, "eyes": 1})
     assert len(frames.figure_7(scope)) == 15 and len(frames.figure_8(scope)) == 16
 
 

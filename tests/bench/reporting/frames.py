@@ -20,6 +20,7 @@ PAPER_SAMPLES = 64
 INTEGRATORS = ("raycast", "whitted", "distribution")
 ASSEMBLIES = ("auto", "types", "runs", "groups", "octants", "blind", "none")
 PACKET_SIZES = (4, 16, 64)
+EFFECT_EDGE = 256                    # pixels
 FACTORS = (0.0, 0.5, 1.0, 1.5, 2.0)  # of Figure 7
 DEPTHS = tuple(range(1, 9))          # of Figure 8
 REASONABLE = {"aperture": 1.0, "exposure": 1.0, "light_size": 1.0}
@@ -68,9 +69,9 @@ def run(options, specs, repeats):
 # Groups ------------------------------------------------------------------------------------------
 
 def frame(scope, share=1, **settings):
-    """A spec of the scope's size, or of a share of it."""
+    """A spec of the scope's size, or of a share of it, from the scope's places."""
     edge = max(16, scope.frame_edge // share)
-    return spec(width=edge, height=edge, **settings)
+    return spec(**{"width": edge, "height": edge, "eyes": scope.eyes, **settings})
 
 
 def integrators(scope):
@@ -89,8 +90,8 @@ def assemblies(scope):
     """"stage integrator assembly" and, of ray types, "stage integrator types SIZE"."""
     made = {}
     for stage in scope.stages:
-        for integrator, more in (("whitted", {}), ("distribution", {"samples": 4, **REASONABLE})):
-            base = {"scene": stage, "integrator": integrator, "eyes": 2, **more}
+        for integrator, more in (("whitted", {}), ("distribution", {"samples": 2, **REASONABLE})):
+            base = {"scene": stage, "integrator": integrator, **more}
             for assembly in ASSEMBLIES:
                 made[f"{stage} {integrator} {assembly}"] = frame(scope, 2, assembly=assembly, **base)
             for size in PACKET_SIZES:
@@ -104,12 +105,12 @@ def effects(scope):
     effect alone."""
     made = {}
     for stage in scope.stages:
-        base = {"scene": stage, "samples": 4}
+        base = {"scene": stage, "samples": 4, "width": EFFECT_EDGE, "height": EFFECT_EDGE}
         plain = {"surface": "diffuse", **base}
-        made[f"{stage} raycast"] = frame(scope, 2, integrator="raycast", **plain)
-        made[f"{stage} nothing"] = frame(scope, 2, integrator="distribution", **plain)
+        made[f"{stage} raycast"] = frame(scope, integrator="raycast", **plain)
+        made[f"{stage} nothing"] = frame(scope, integrator="distribution", **plain)
         for name, settings in EFFECTS.items():
-            made[f"{stage} {name}"] = frame(scope, 2, integrator="distribution",
+            made[f"{stage} {name}"] = frame(scope, integrator="distribution",
                                             **{**plain, **settings})
     return made
 
@@ -118,7 +119,7 @@ def threads(scope):
     """"stage integrator THREADS"."""
     counts = sorted({1, 2, os.cpu_count()})
     return {f"{stage} {integrator} {count}": frame(scope, scene=stage, integrator=integrator,
-                                                   threads=count)
+                                                   threads=count, eyes=1)
             for stage in scope.stages for integrator in ("raycast", "whitted") for count in counts}
 
 
@@ -192,7 +193,7 @@ def figure_8(scope):
 def counted(scope, stage, **settings):
     """A frame that is counted."""
     return spec(scene=stage, counts=1, width=scope.counted_edge, height=scope.counted_edge,
-                **settings)
+                eyes=scope.eyes, **settings)
 
 
 # Results -----------------------------------------------------------------------------------------

@@ -35,6 +35,7 @@ class Scope:
     # Whole frames of frame_bench.
     stages: tuple
     frame_edge: int
+    eyes: int               # places of the camera that a frame's time is the mean of
     frame_repeats: int
     distribution_samples: int
     counted_edge: int
@@ -51,7 +52,7 @@ QUICK = Scope(
     kernel_scenes=("character",),
     kernel_arguments=("--order", "auto", "--motion", "still", "--repeats", "3", "--tiles", "8",
                       "--size", "512"),
-    stages=("character",), frame_edge=256, frame_repeats=3, distribution_samples=4, counted_edge=64,
+    stages=("character",), frame_edge=256, eyes=2, frame_repeats=3, distribution_samples=4, counted_edge=64,
     largest_triangles=100_000, largest_lights=100, largest_instances=1000)
 
 MEDIUM = Scope(
@@ -62,7 +63,7 @@ MEDIUM = Scope(
     classic_scenes=("classic", "classic_soft"), classic_width=384,
     kernel_scenes=("conference", "pool_hall", "character"),
     kernel_arguments=("--order", "auto", "--repeats", "5", "--tiles", "8"),
-    stages=("conference", "pool_hall", "character"), frame_edge=1024, frame_repeats=3,
+    stages=("conference", "pool_hall", "character"), frame_edge=1024, eyes=2, frame_repeats=3,
     distribution_samples=8, counted_edge=128,
     largest_triangles=4_000_000, largest_lights=10_000, largest_instances=100_000)
 
@@ -75,7 +76,7 @@ FULL = Scope(
     classic_scenes=("classic", "classic_soft"), classic_width=640,
     kernel_scenes=("conference", "pool_hall", "character"),
     kernel_arguments=("--repeats", "9"),
-    stages=("conference", "pool_hall", "character"), frame_edge=1024, frame_repeats=5,
+    stages=("conference", "pool_hall", "character"), frame_edge=1024, eyes=4, frame_repeats=5,
     distribution_samples=64, counted_edge=512,
     largest_triangles=20_000_000, largest_lights=10_000, largest_instances=1_000_000)
 
