@@ -52,7 +52,8 @@ QUICK = Scope(
     kernel_scenes=("character",),
     kernel_arguments=("--order", "auto", "--motion", "still", "--repeats", "3", "--tiles", "8",
                       "--size", "512"),
-    stages=("character",), frame_edge=256, eyes=2, frame_repeats=3, distribution_samples=4, counted_edge=64,
+    stages=("character",), frame_edge=256, eyes=2, frame_repeats=3,
+    distribution_samples=4, counted_edge=64,
     largest_triangles=100_000, largest_lights=100, largest_instances=1000)
 
 MEDIUM = Scope(
@@ -62,7 +63,8 @@ MEDIUM = Scope(
     light_samples=(1, 4), repeats=3, times_scale=3,
     classic_scenes=("classic", "classic_soft"), classic_width=384,
     kernel_scenes=("conference", "pool_hall", "character"),
-    kernel_arguments=("--order", "auto", "--repeats", "5", "--tiles", "8"),
+    kernel_arguments=("--order", "auto", "--repeats", "5", "--tiles", "8",
+                      "--samples", "8"),
     stages=("conference", "pool_hall", "character"), frame_edge=1024, eyes=2, frame_repeats=3,
     distribution_samples=8, counted_edge=128,
     largest_triangles=4_000_000, largest_lights=10_000, largest_instances=100_000)
