@@ -31,6 +31,8 @@ def parse_arguments(arguments):
     parser.add_argument("--build", type=pathlib.Path, default=compare_cycles.PROJECT / "build")
     parser.add_argument("--blender", default="blender")
     options = parser.parse_args(arguments)
+    if options.baseline and options.scope != "quick":
+        parser.error("the baseline is that of --quick")
     options.scope = scopes.SCOPES[options.scope or "medium"]
     options.out = options.out or options.build / "report"
     return options

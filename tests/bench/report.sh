@@ -6,9 +6,8 @@
 # The default takes about 35 minutes on two quiet cores, --quick about 4, --full a night. --draw draws
 # the report of DIR anew from its JSON. DIR is build/report; tests/bench/report is the committed one.
 # With --quick the ratios are compared with the committed baseline: the exit code is 1 if one of them
-# fell far in repeated runs. --baseline writes that baseline instead. Debian's povray and libembree-dev
-# take part where they are installed. What is missing is installed as tests/setup.sh does it, with povray
-# and python3-matplotlib.
+# fell far in repeated runs; with --baseline too, that baseline is written instead. A run into
+# tests/bench/report brings README.md up to it. What is missing is installed as tests/setup.sh does it.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 

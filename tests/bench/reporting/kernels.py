@@ -26,7 +26,8 @@ def races(rows):
 def label(row):
     """What a row of rays is of."""
     motion = "moving" if row["motion"] else "still"
-    return f"{row['scene']} {motion}, {row['kind'].replace('_', ' ')} ({row['order']})"
+    order = "" if row["order"] == "auto" else f", {row['order']} order"
+    return f"{row['scene']} {motion}, {row['kind']}{order}".replace("_", " ")
 
 
 def builds(rows):
