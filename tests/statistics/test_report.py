@@ -78,8 +78,9 @@ def made_scene(speed, noise, seeds=6, bias=0.0):
         points, times = {}, {}
         for samples in (1, 4, 16, 64, 256):
             mse = [scale / samples * value + bias for value in generator.uniform(0.95, 1.05, seeds)]
-            points[samples] = {"seeds": {measure: mse for measure in curves.MEASURES}, "mse": np.mean(mse),
-                               "bias_squared": bias, "variance": scale / samples, "mean_ratios": [1.0]}
+            points[samples] = {"seeds": {measure: mse for measure in curves.MEASURES},
+                               "mse": np.mean(mse), "bias_squared": bias,
+                               "variance": scale / samples, "mean_ratios": [1.0]}
             if samples <= 64:
                 times[samples] = {"runs": [cost * samples * value
                                            for value in generator.uniform(0.95, 1.05, 3)]}

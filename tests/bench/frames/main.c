@@ -137,42 +137,44 @@ static void print_help(void) {
     spec_print_help();
 }
 
-static const char *next_argument(int argc, char **argv, int *i) {
-    if (*i + 1 < argc)
-        return argv[++*i];
-    fprintf(stderr, "frame_bench: %s needs a value\n", argv[*i]);
-    return NULL;
+/* False: what is wrong was printed to the standard error stream. */
+static bool set_option(struct bench *b, const char *name, const char *value, const char **json) {
+    if (!value) {
+        fprintf(stderr, "frame_bench: %s needs a value, see --help\n", name);
+        return false;
+    }
+    if (strcmp(name, "--json") == 0) {
+        *json = value;
+        return true;
+    }
+    if (strcmp(name, "--pictures") == 0) {
+        b->pictures = value;
+        return true;
+    }
+    if (strcmp(name, "--repeats") == 0) {
+        b->repeats = (uint32_t)strtoul(value, NULL, 10);
+        if (b->repeats > 0)
+            return true;
+    }
+    fprintf(stderr, "frame_bench: not an option: '%s %s', see --help\n", name, value);
+    return false;
 }
 
-static bool set_option(struct bench *b, int argc, char **argv, int *i, const char **json) {
-    const char *value = next_argument(argc, argv, i);
-    if (!value)
-        return false;
-    const char *name = argv[*i - 1];
-    if (strcmp(name, "--json") == 0)
-        *json = value;
-    else if (strcmp(name, "--pictures") == 0)
-        b->pictures = value;
-    else if (strcmp(name, "--repeats") == 0)
-        b->repeats = (uint32_t)strtoul(value, NULL, 10);
-    else
-        fprintf(stderr, "frame_bench: unknown option '%s', see --help\n", name);
-    return *json == value || b->pictures == value ||
-           (strcmp(name, "--repeats") == 0 && b->repeats > 0);
+static bool add_spec(struct bench *b, const char *line) {
+    if (b->spec_count < SPECS)
+        return spec_parse(line, &b->specs[b->spec_count++]);
+    fprintf(stderr, "frame_bench: more than %d frames\n", SPECS);
+    return false;
 }
 
 static bool parse(struct bench *b, int argc, char **argv, const char **json) {
     b->repeats = 3;
     for (int i = 1; i < argc; i++) {
-        if (strncmp(argv[i], "--", 2) == 0) {
-            if (!set_option(b, argc, argv, &i, json))
-                return false;
-        } else if (b->spec_count == SPECS) {
-            fprintf(stderr, "frame_bench: more than %d specs\n", SPECS);
+        const bool is_option = strncmp(argv[i], "--", 2) == 0;
+        const char *value = i + 1 < argc ? argv[i + 1] : NULL;
+        if (!(is_option ? set_option(b, argv[i], value, json) : add_spec(b, argv[i])))
             return false;
-        } else if (!spec_parse(argv[i], &b->specs[b->spec_count++])) {
-            return false;
-        }
+        i += is_option;
     }
     if (b->spec_count == 0)
         fprintf(stderr, "frame_bench: nothing to render, see --help\n");

@@ -48,7 +48,8 @@ def kernel_line(rows):
             parts.append(f"{word} {digits(estimates.geometric_mean(values), 3)} "
                          f"({digits(min(values), 3)} to {digits(max(values), 3)})")
     return ("Watertight rays per second over Embree's fastest mode, which is not watertight, on one "
-            f"thread, geometric mean over scenes, kinds of rays and instruction sets: {'; '.join(parts)}.")
+            "thread, geometric mean over scenes, kinds of rays and instruction sets: "
+            + "; ".join(parts) + ".")
 
 
 def povray_line(scenes):
@@ -198,7 +199,8 @@ def kernel_row(row):
 
     def differ(use):
         share = kernels.error_shares(row, use)
-        return f"{digits(share['only_volley'] + share['only_embree'], 2)}, {digits(share['distances'], 2)}"
+        hits = share["only_volley"] + share["only_embree"]
+        return f"{digits(hits, 2)}, {digits(share['distances'], 2)}"
 
     own = default["ratio"]
     return [kernels.label(row), row["isa"], str(row["threads"]),
@@ -250,6 +252,7 @@ def beside_povray(scenes):
     return ("## Beside POV-Ray\n\nThe same triangles, mirrors and sun; pixels are supersampled by both "
             "with a box filter. POV-Ray's time is what it says of parsing and tracing, Volley's all of "
             "F12. In *classic soft* POV-Ray takes 4×4 jittered places on the sun for each of its "
-            f"samples. Errors are against Cycles, whose own variance ({references}) is taken off. Time of POV-Ray over Volley's at equal MSE: {ratios}.\n\n"
+            f"samples. Errors are against Cycles, whose own variance ({references}) is taken off. Time "
+            f"of POV-Ray over Volley's at equal MSE: {ratios}.\n\n"
             "![Beside POV-Ray](plots/povray.svg)\n\n"
             + table(["scene", "program", "samples", "seconds", "MSE", "relMSE"], rows))

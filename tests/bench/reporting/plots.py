@@ -70,9 +70,8 @@ def seed_interval(point, measure):
 def draw_curves(name, scene, path):
     """Each measure against seconds, log-log, with the intervals of the mean over seeds."""
     shown = [each for each in scene["curves"] if is_main(each)]
-    measures = [key for key in curves.MEASURES if key in next(iter(scene["curves"][shown[0]].values()))["seeds"]]
-    figure, axes = plt.subplots(1, len(measures), figsize=(3.4 * len(measures), 3.0))
-    for axis, measure in zip(axes, measures):
+    figure, axes = plt.subplots(1, len(curves.MEASURES), figsize=(3.2 * len(curves.MEASURES), 3.0))
+    for axis, measure in zip(axes, curves.MEASURES):
         for configuration in shown:
             seconds, errors = curves.curve(scene, configuration, measure)
             bars = [seed_interval(point, measure)
