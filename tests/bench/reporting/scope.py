@@ -58,7 +58,7 @@ QUICK = Scope(
 
 MEDIUM = Scope(
     name="medium", minutes=35,
-    scenes=EFFECTS + JOINED, sampler_scenes=("area_light", "gallery"), samples=(1, 4, 16, 64, 256),
+    scenes=EFFECTS + JOINED, sampler_scenes=("gallery",), samples=(1, 4, 16, 64, 256),
     time_samples=(1, 4, 16, 64), seeds=5, reference_samples=1024, reference_seeds=3,
     light_samples=(1, 4), repeats=3, times_scale=3,
     classic_scenes=("classic", "classic_soft"), classic_width=384,
