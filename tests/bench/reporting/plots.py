@@ -12,6 +12,7 @@ from . import curves, estimates, frames, kernels  # noqa: E402
 
 # Okabe and Ito's colours, told apart by all eyes.
 CYCLES_COLOR, VOLLEY_COLOR = "#D55E00", "#0072B2"
+WIDE_RANGE = 200.0  # of a logarithmic axis
 COLORS = (VOLLEY_COLOR, "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C510A", "#999999")
 
 
@@ -42,11 +43,14 @@ def save(figure, path):
     plt.close(figure)
 
 
-def plain_log_ticks(axis, *names):
-    """Ticks at 1, 2, 5, 10 and so on, as plain numbers."""
+def plain_log_ticks(axis, names):
+    """Ticks as plain numbers at 1, 2, 5, 10 and so on, or at powers of ten over a wide range; call it
+    when all is drawn."""
     for name in names:
         part = getattr(axis, name + "axis")
-        part.set_major_locator(matplotlib.ticker.LogLocator(subs=(1.0, 2.0, 5.0)))
+        low, high = part.get_view_interval()
+        subs = (1.0, 2.0, 5.0) if high < WIDE_RANGE * low else (1.0,)
+        part.set_major_locator(matplotlib.ticker.LogLocator(subs=subs))
         part.set_major_formatter(matplotlib.ticker.FormatStrFormatter("%g"))
         part.set_minor_formatter(matplotlib.ticker.NullFormatter())
 
@@ -79,7 +83,7 @@ def draw_curves(name, scene, path):
             axis.errorbar(seconds, errors, yerr=list(zip(*bars)), label=configuration, markersize=4,
                           linewidth=1.3, capsize=2, **configuration_style(configuration, shown))
         axis.set(xscale="log", yscale="log", xlabel="seconds", title=curves.MEASURES[measure])
-        plain_log_ticks(axis, "x")
+        plain_log_ticks(axis, "xy")
     axes[0].legend(fontsize=7)
     figure.suptitle(name.replace("_", " "))
     figure.tight_layout()
@@ -104,7 +108,7 @@ def draw_samplers(scenes, folder):
                       label=configuration, markersize=4, **configuration_style(configuration, shown))
         axis.set(xscale="log", yscale="log", xlabel="samples per pixel", ylabel="MSE",
                  title=f"samplers, {name.replace('_', ' ')}")
-        plain_log_ticks(axis, "x")
+        plain_log_ticks(axis, "xy")
         axis.legend(fontsize=7)
         save(figure, folder / f"samplers-{name}.svg")
 
@@ -176,7 +180,7 @@ def draw_povray(scenes, path):
                       label={"povray": "POV-Ray", "volley": "Volley"}[program])
         axis.set(xscale="log", yscale="log", xlabel="seconds", ylabel="MSE",
                  title=name.replace("_", " "))
-        plain_log_ticks(axis, "x")
+        plain_log_ticks(axis, "xy")
         axis.legend(fontsize=8)
     figure.tight_layout()
     save(figure, path)
@@ -198,6 +202,11 @@ def stages_of(group):
     return list(dict.fromkeys(name.split()[0] for name in group))
 
 
+def from_zero(axis):
+    """A linear axis that begins at zero and leaves room above what is drawn."""
+    axis.set_ylim(0.0, 1.08 * axis.dataLim.y1)
+
+
 def draw_figure_7(group, path):
     """Tests of boxes and triangles per ray against aperture, exposure and light size."""
     whats = list(frames.REASONABLE)
@@ -216,11 +225,13 @@ def draw_figure_7(group, path):
                     axes[row][column].plot(frames.FACTORS, [point[1 - row] for point in points],
                                            style, marker=".", color=COLORS[line],
                                            label=f"{stage}, {kind}")
-        axes[0][column].set_title(what.replace("_", " "))
+        axes[0][column].set_title(what.replace("_", " ")
+                                  + (": shadow rays" if what == "light_size" else ""))
         axes[1][column].set_xlabel("times a reasonable one")
-        axes[0][column].legend(fontsize=6)
         for row in (0, 1):
-            axes[row][column].set_ylim(bottom=0)
+            from_zero(axes[row][column])
+    axes[0][-1].legend(*axes[0][0].get_legend_handles_labels(), fontsize=8, loc="upper left",
+                       bbox_to_anchor=(1.0, 1.0))
     axes[0][0].set_ylabel("triangle tests per ray")
     axes[1][0].set_ylabel("box tests per ray")
     figure.tight_layout()
@@ -240,7 +251,8 @@ def draw_figure_8(group, path):
         axes[0][column].set_title(stage)
         axes[1][column].set_xlabel("bounce")
         for row in (0, 1):
-            axes[row][column].set_ylim(bottom=0)
+            from_zero(axes[row][column])
+            axes[row][column].xaxis.set_major_locator(matplotlib.ticker.MaxNLocator(integer=True))
     axes[0][0].set_ylabel("triangle tests per reflection ray")
     axes[1][0].set_ylabel("box tests per reflection ray")
     axes[0][0].legend(fontsize=8)
