@@ -40,7 +40,7 @@ import effect_scenes  # noqa: E402  (the folder is on the path only now)
 from scene_blocks import (  # noqa: E402
     add_area_light, add_ball, add_camera, add_floor, animate, open_blend, pose_from_action, set_world)
 
-# Raise this when a helper below changes what prepared scenes look like.
+# Raise this when a helper, here or in scene_blocks.py, changes what prepared scenes look like.
 SETUP_VERSION = 1
 
 DEFAULT_SETTINGS = {
