@@ -59,10 +59,11 @@ def glass(roughness=0.0):
 
 
 def add_sun(degrees=0.0, strength=2.5):
-    """A sun from the upper left front."""
+    """A sun from the upper left front that mirrors do not show, as POV-Ray's lights."""
     data = bpy.data.lights.new("Sun", "SUN")
     data.energy, data.angle = strength, math.radians(degrees)
     sun = bpy.data.objects.new("Sun", data)
+    sun.visible_glossy = False
     sun.rotation_euler = Vector((0.5, 0.7, -1.0)).to_track_quat("-Z", "Y").to_euler()
     bpy.context.scene.collection.objects.link(sun)
 

@@ -61,7 +61,7 @@ MEDIUM = Scope(
     scenes=EFFECTS + JOINED, sampler_scenes=("gallery",), samples=(1, 4, 16, 64, 256),
     time_samples=(1, 4, 16, 64), seeds=5, reference_samples=1024, reference_seeds=3,
     light_samples=(1, 4), repeats=3, times_scale=3,
-    classic_scenes=("classic", "classic_soft"), classic_width=384,
+    classic_scenes=("classic", "classic_soft"), classic_width=320,
     kernel_scenes=("conference", "pool_hall", "character"),
     kernel_arguments=("--order", "auto", "--repeats", "5", "--tiles", "8",
                       "--samples", "8"),
