@@ -329,6 +329,8 @@ def draw_effects(group, path):
     axis.axhline(1.0, color="black", linewidth=1)
     axis.set(xticks=range(len(names)), ylabel="time / distribution with nothing on")
     axis.set_xticklabels(names, rotation=30, ha="right")
+    axis.set_yscale("log")
+    plain_log_ticks(axis, "y")
     axis.legend(fontsize=8)
     save(figure, path)
 
