@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
 # Installs what is missing (Debian) and builds into ./build.
 #
-#   bash tests/setup.sh [--ci] [packages|build]...     both steps if none is named
+#   bash tests/setup.sh [--ci] [--report] [packages|build]...     both steps if none is named
 #
-# Installs as root, or through sudo. --ci adds the packages that .ci/run needs. Quick when nothing is
+# Installs as root, or through sudo. --ci adds the packages that .ci/run needs, --report those of
+# tests/bench/report.sh. Quick when nothing is
 # missing and nothing changed. BUILD_DIR names another folder than build.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -15,6 +16,7 @@ packages=(
     xvfb xauth libgl1-mesa-dri
 )
 ci_packages=(clang-14 libclang-rt-14-dev clang-format-14 binutils)
+report_packages=(povray povray-includes python3-matplotlib)
 
 say() { printf '== %s\n' "$*"; }
 die() { printf 'setup: %s\n' "$*" >&2; exit 1; }
@@ -71,6 +73,7 @@ main() {
     for argument in "$@"; do
         case $argument in
             --ci) packages+=("${ci_packages[@]}") ;;
+            --report) packages+=("${report_packages[@]}") ;;
             packages | build) steps+=("$argument") ;;
             *) die "unknown argument: $argument" ;;
         esac

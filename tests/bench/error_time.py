@@ -30,8 +30,10 @@ from dataclasses import dataclass, field
 import compare_cycles
 import numpy as np
 import scene_setups
+from reporting import estimates
 
 import compare  # found by compare_cycles' path
+import flip
 
 SCENES = ["example_motion", "robot_motion", "knight_motion", "conference_motion", "billiards"]
 FIRST_SEED = 101
@@ -155,12 +157,18 @@ def point_errors(stack, reference):
     """
     stack = stack.astype(np.float64)
     errors = {}
+    errors["seeds"] = {}
     for measure in MEASURES:
         weights = reference.weights(measure)
         per_seed = [float(np.mean(weights * (compare.squared_error(image, reference.mean)
                                              - reference.variance))) for image in stack]
+        errors["seeds"][measure] = per_seed
         errors[measure] = statistics.mean(per_seed)
         errors[measure + "_error"] = statistics.stdev(per_seed) / math.sqrt(len(per_seed))
+    errors["seeds"]["p999"] = [compare.error_percentile(image, reference.mean) for image in stack]
+    errors["seeds"]["flip"] = [flip.mean_flip(image, reference.mean) for image in stack]
+    for measure in ("p999", "flip"):
+        errors[measure] = statistics.mean(errors["seeds"][measure])
     variance = stack.var(axis=0, ddof=1)
     errors["variance"] = float(variance.mean())
     errors["bias_squared"] = float(np.mean((stack.mean(axis=0) - reference.mean) ** 2
@@ -170,20 +178,22 @@ def point_errors(stack, reference):
     return errors
 
 
+def reference_stack(blend, key, options):
+    """Cycles' pictures that the reference is the mean of."""
+    seeds = list(range(FIRST_REFERENCE_SEED, FIRST_REFERENCE_SEED + options.reference_seeds))
+    return render_stacks(blend, key, Configuration("cycles", "CYCLES"),
+                         [(options.reference_samples, seeds)], options)[0]
+
+
 def scene_errors(blend, key, options):
     """{"reference": ..., "curves": {configuration: {samples: errors}}, "bias": ...} of one scene."""
-    cycles = Configuration("cycles", "CYCLES")
-    reference_seeds = list(range(FIRST_REFERENCE_SEED,
-                                 FIRST_REFERENCE_SEED + options.reference_seeds))
-    reference_stack = render_stacks(blend, key, cycles,
-                                    [(options.reference_samples, reference_seeds)], options)[0]
-    reference = Reference.of_stack(reference_stack)
+    reference = Reference.of_stack(reference_stack(blend, key, options))
     seeds = list(range(FIRST_SEED, FIRST_SEED + options.seeds))
     report = {"reference": {"samples": options.reference_samples, "seeds": options.reference_seeds,
                             "variance": float(reference.variance.mean())},
               "curves": {}, "bias": {}}
     first_pictures, finest = {}, {}
-    for configuration in configurations(options):
+    for configuration in options.configurations:
         stacks = render_stacks(blend, key, configuration,
                                [(samples, seeds) for samples in options.samples], options)
         report["curves"][configuration.name] = {
@@ -211,59 +221,37 @@ def write_sheets(pictures, reference, options):
 # Times -------------------------------------------------------------------------------------------
 
 def scene_times(blend, options):
-    """Median seconds of a render as F12 counts it, {configuration: {samples: seconds}}."""
-    runs = {made: {samples: [] for samples in options.samples} for made in
-            map(lambda each: each.name, configurations(options))}
+    """Median seconds of a render as F12 counts it, {configuration: {samples: seconds}}. All renders
+    are of one process, which takes the configurations in turn."""
+    made = options.configurations
+    points = [(repeat, samples, configuration) for repeat in range(options.repeats)
+              for samples in options.time_samples for configuration in made]
+    # The first render of an engine pays for the pages it touches.
+    warming = [(0, options.time_samples[0], configuration) for configuration in made]
+    runs = {configuration.name: {samples: [] for samples in options.time_samples}
+            for configuration in made}
     with tempfile.TemporaryDirectory() as folder:
         output = pathlib.Path(folder) / "timed.exr"
-        for repeat in range(options.repeats):
-            for made in configurations(options):
-                # The first render of a process pays for the pages it touches.
-                counts = [options.samples[0], *options.samples]
-                seconds = run_batch(
-                    blend, [(made.engine, settings_of(options, made, samples, FIRST_SEED + repeat,
-                                                      options.times_scale), output)
-                            for samples in counts], options)
-                for samples, value in zip(options.samples, seconds[1:]):
-                    runs[made.name][samples].append(value)
+        seconds = run_batch(
+            blend, [(configuration.engine,
+                     settings_of(options, configuration, samples, FIRST_SEED + repeat,
+                                 options.times_scale), output)
+                    for repeat, samples, configuration in warming + points], options)
+    for (_repeat, samples, configuration), value in zip(points, seconds[len(warming):]):
+        runs[configuration.name][samples].append(value)
     return {name: {samples: {"seconds": statistics.median(values), "least": min(values),
-                             "most": max(values)} for samples, values in points.items()}
-            for name, points in runs.items()}
+                             "most": max(values), "runs": values}
+                   for samples, values in timed.items()} for name, timed in runs.items()}
 
 
 # Comparison of curves ----------------------------------------------------------------------------
-
-def cost_at(costs, errors, wanted):
-    """What an error costs, by log-log interpolation; None outside the curve or where it rises.
-
-    >>> round(cost_at([1.0, 4.0, 16.0], [1.0, 0.25, 0.0625], 0.125), 9)
-    8.0
-    """
-    for i in range(len(costs) - 1):
-        high, low = errors[i], errors[i + 1]
-        if high > low > 0.0 and low <= wanted <= high:
-            part = math.log(high / wanted) / math.log(high / low)
-            return math.exp(math.log(costs[i]) + part * math.log(costs[i + 1] / costs[i]))
-    return None
-
-
-def slope(samples, errors):
-    """Exponent of samples in the error, by least squares over the logarithms.
-
-    >>> round(slope([1, 4, 16], [1.0, 0.25, 0.0625]), 12)
-    -1.0
-    """
-    if len(errors) < 2 or min(errors) <= 0.0:
-        return None
-    return float(np.polyfit(np.log(samples), np.log(errors), 1)[0])
-
 
 def cost_ratios(base, other):
     """How much more the base costs at equal error: {the base's samples: ratio}, and their geometric
     mean. Each curve is (samples, costs, errors)."""
     ratios = {}
     for samples, cost, error in zip(*base):
-        needed = cost_at(other[1], other[2], error)
+        needed = estimates.cost_at(other[1], other[2], error)
         if needed:
             ratios[samples] = cost / needed
     if not ratios:
@@ -274,7 +262,7 @@ def cost_ratios(base, other):
 
 def curve_of(points, times, measure):
     """(samples, costs, errors) of a curve; costs are samples without times."""
-    samples = list(points)
+    samples = [count for count in points if not times or count in times]
     costs = [times[count]["seconds"] for count in samples] if times else samples
     return samples, costs, [points[count][measure] for count in samples]
 
@@ -285,7 +273,7 @@ def compare_curves(scene):
     base = names[0]
     report = {}
     for name in names:
-        entry = {"slope": slope(*curve_of(scene["curves"][name], None, "mse")[1:])}
+        entry = {"slope": estimates.slope(*curve_of(scene["curves"][name], None, "mse")[1:])}
         for measure in MEASURES:
             for cost in ("samples", "seconds") if "times" in scene else ("samples",):
                 sides = [curve_of(scene["curves"][each],
@@ -316,7 +304,7 @@ def print_scene(name, scene, options):
             print(f"{configuration:22s}" + "".join(
                 f"{point[measure]:12.3e}" for point in points.values()))
     if "times" in scene:
-        print(f"{'seconds':22s}" + "".join(f"{samples:>12d}" for samples in options.samples))
+        print(f"{'seconds':22s}" + "".join(f"{samples:>12d}" for samples in options.time_samples))
         for configuration, points in scene["times"].items():
             print(f"{configuration:22s}" + "".join(
                 f"{point['seconds']:12.3f}" for point in points.values()))
@@ -355,6 +343,8 @@ def parse_arguments(arguments):
     parser.add_argument("--reference-samples", type=int, default=1024)
     parser.add_argument("--reference-seeds", type=int, default=4)
     parser.add_argument("--times", action="store_true", help="measure times too")
+    parser.add_argument("--time-samples", type=int, nargs="+",
+                        help="what is timed of --samples (all)")
     parser.add_argument("--times-scale", type=int, default=2,
                         help="times are those of pictures so many times as wide and high")
     parser.add_argument("--repeats", type=int, default=3, help="of each timed render")
@@ -367,6 +357,8 @@ def parse_arguments(arguments):
     if options.seeds < 2 or options.reference_seeds < 2:
         parser.error("variances need two seeds or more")
     options.samples = sorted(options.samples)
+    options.time_samples = sorted(options.time_samples or options.samples)
+    options.configurations = configurations(options)
     options.out = options.out or options.build / "error_time" / "report.json"
     return options
 
@@ -379,22 +371,32 @@ def scene_options(name, options):
         "width": options.width or known.width, "height": options.height or known.height})
 
 
-def main(arguments=None):
-    """Measure all scenes; print tables and write the JSON."""
-    options = parse_arguments(arguments)
+def measure_scene(name, options):
+    """All that is asked for of one scene, as the JSON has it."""
+    own = scene_options(name, options)
+    blend, key, _name = compare_cycles.prepared_scene(own)
+    scene = {"width": own.width, "height": own.height, "frame": own.frame, "seeds": own.seeds,
+             **scene_errors(blend, key, own)}
+    if options.times:
+        scene["times"] = scene_times(blend, own)
+    scene["comparison"] = compare_curves(scene)
+    return scene
+
+
+def identify(options):
+    """Fill in what kept pictures are known by: the add-on and Blender's version."""
     options.addon_key = addon_key(options.build)
     options.blender_version = compare_cycles.blender_version(options)
+    return options
+
+
+def main(arguments=None):
+    """Measure all scenes; print tables and write the JSON."""
+    options = identify(parse_arguments(arguments))
     report = {}
     for name in options.scene_names:
-        own = scene_options(name, options)
-        blend, key, _name = compare_cycles.prepared_scene(own)
-        scene = scene_errors(blend, key, own)
-        if options.times:
-            scene["times"] = scene_times(blend, own)
-        scene["comparison"] = compare_curves(scene)
-        report[name] = {"width": own.width, "height": own.height, "frame": own.frame,
-                        "seeds": own.seeds, **scene}
-        print_scene(name, scene, own)
+        report[name] = measure_scene(name, options)
+        print_scene(name, report[name], scene_options(name, options))
         options.out.parent.mkdir(parents=True, exist_ok=True)
         options.out.write_text(json.dumps(report, indent=1) + "\n")
     return 0

@@ -133,8 +133,12 @@ struct hit_difference race_difference(const struct ray_list *list, const struct 
         out.only_b += in_b && !in_a;
         if (list->any || !in_a || !in_b)
             continue;
-        const float limit = SAME_DISTANCE * fmaxf(fabsf(a->distance[i]), fabsf(b->distance[i]));
-        out.distance += !(fabsf(a->distance[i] - b->distance[i]) <= limit);
+        const float scale = fmaxf(fabsf(a->distance[i]), fabsf(b->distance[i]));
+        const float difference = fabsf(a->distance[i] - b->distance[i]);
+        if (!(difference <= SAME_DISTANCE * scale))
+            out.distance++;
+        else if (scale > 0.0f)
+            out.largest = fmax(out.largest, (double)(difference / scale));
     }
     return out;
 }

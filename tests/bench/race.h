@@ -20,6 +20,7 @@ void race_hits(const struct contestant *contestant, const struct ray_list *list,
 struct hit_difference {
     uint32_t only_a, only_b; /* hit, or occluded, in one of both */
     uint32_t distance;       /* hit in both, at distances that differ by more than 1e-4 of them */
+    double largest;          /* relative difference of the distances that differ by less */
 };
 struct hit_difference race_difference(const struct ray_list *list, const struct hit_set *a,
                                       const struct hit_set *b);

@@ -140,8 +140,10 @@ static void json_peer(FILE *json, const struct race_row *row, int use) {
             use_names[use], row->modes[best].name,
             divide(rate_median(&row->volley), rate_median(&row->peer[use][best])),
             row->peer_miss_share[use]);
-    fprintf(json, ", \"only_volley_hits\": %u, \"only_embree_hits\": %u, \"other_distances\": %u",
-            d->only_a, d->only_b, d->distance);
+    fprintf(json,
+            ", \"only_volley_hits\": %u, \"only_embree_hits\": %u, \"other_distances\": %u, "
+            "\"largest_relative_difference\": %.3g",
+            d->only_a, d->only_b, d->distance, d->largest);
     for (uint32_t i = 0; i < row->mode_count; i++)
         json_rate(json, row->modes[i].name, &row->peer[use][i]);
     fprintf(json, "}");

@@ -35,7 +35,12 @@ try:
 except ImportError:  # outside Blender only the table of scenes is of use
     bpy = None
 
-# Raise this when a helper below changes what prepared scenes look like.
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
+import effect_scenes  # noqa: E402  (the folder is on the path only now)
+from scene_blocks import (  # noqa: E402
+    add_area_light, add_ball, add_camera, add_floor, animate, open_blend, pose_from_action, set_world)
+
+# Raise this when a helper, here or in scene_blocks.py, changes what prepared scenes look like.
 SETUP_VERSION = 1
 
 DEFAULT_SETTINGS = {
@@ -104,74 +109,6 @@ def set_if_present(target, values):
             setattr(target, name, value)
 
 
-# Building blocks -------------------------------------------------------------------------------
-
-def add_area_light(name, location, target, size, power, color=(1.0, 1.0, 1.0)):
-    """A square area light of edge ``size``."""
-    data = bpy.data.lights.new(name, "AREA")
-    data.size, data.energy, data.color = size, power, color
-    return place(bpy.data.objects.new(name, data), location, target)
-
-
-def add_camera(location, target, lens_mm, fstop=None, focus=None):
-    """The scene's camera; with ``fstop`` it focuses on the point ``focus`` or the target."""
-    data = bpy.data.cameras.new("Camera")
-    data.lens = lens_mm
-    data.dof.use_dof = fstop is not None
-    if fstop is not None:
-        data.dof.aperture_fstop = fstop
-        data.dof.focus_distance = (Vector(focus or target) - Vector(location)).length
-    camera = place(bpy.data.objects.new("Camera", data), location, target)
-    bpy.context.scene.camera = camera
-    return camera
-
-
-def place(added, location, target):
-    """Link an object at ``location`` with its -Z towards ``target`` and Y up."""
-    added.location = location
-    direction = Vector(target) - Vector(location)
-    added.rotation_euler = direction.to_track_quat("-Z", "Y").to_euler()
-    bpy.context.scene.collection.objects.link(added)
-    return added
-
-
-def add_floor(size, color, roughness):
-    """A square Principled floor of edge ``size`` at z = 0."""
-    half = 0.5 * size
-    mesh = bpy.data.meshes.new("Floor")
-    mesh.from_pydata([(-half, -half, 0), (half, -half, 0), (half, half, 0), (-half, half, 0)], [],
-                     [(0, 1, 2, 3)])
-    material = bpy.data.materials.new("Floor")
-    material.use_nodes = True
-    shader = material.node_tree.nodes["Principled BSDF"]
-    shader.inputs["Base Color"].default_value = (*color, 1.0)
-    shader.inputs["Roughness"].default_value = roughness
-    mesh.materials.append(material)
-    bpy.context.scene.collection.objects.link(bpy.data.objects.new("Floor", mesh))
-
-
-def set_world(color):
-    """A constant world."""
-    world = bpy.data.worlds.new("Comparison world")
-    world.use_nodes = True
-    world.node_tree.nodes["Background"].inputs["Color"].default_value = (*color, 1.0)
-    bpy.context.scene.world = world
-
-
-def pose_from_action(armature_name, action_name, frame):
-    """Play one action on an armature, alone, and go to ``frame``."""
-    armature = bpy.data.objects[armature_name]
-    animation = armature.animation_data or armature.animation_data_create()
-    animation.use_nla = False
-    animation.action = bpy.data.actions[action_name]
-    bpy.context.scene.frame_set(frame)
-
-
-def open_blend(path):
-    """Open a .blend file without its user interface."""
-    bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False)
-
-
 # Scenes ----------------------------------------------------------------------------------------
 
 def prepare_as_is(source, _folder):
@@ -238,25 +175,6 @@ def prepare_billiards(_source, _folder):
     add_camera((-0.4, -3.4, 1.5), (-0.05, 0.15, 0.2), 50.0, fstop=0.35, focus=(-0.45, -0.45, 0.4))
 
 
-def add_ball(name, location, radius, color):
-    """A polished ball with a pale band, so that rolling shows."""
-    bpy.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=24, radius=radius,
-                                         location=location)
-    ball = bpy.context.object
-    ball.name = name
-    bpy.ops.object.shade_smooth()
-    for slot_color in (color, (0.8, 0.75, 0.65)):
-        material = bpy.data.materials.new(name)
-        material.use_nodes = True
-        shader = material.node_tree.nodes["Principled BSDF"]
-        shader.inputs["Base Color"].default_value = (*slot_color, 1.0)
-        shader.inputs["Roughness"].default_value = 0.15
-        ball.data.materials.append(material)
-    for polygon in ball.data.polygons:
-        polygon.material_index = abs(polygon.center.y) < 0.3 * radius
-    return ball
-
-
 def prepare_appleseed(source, _folder):
     """A scene of another renderer: its materials, aperture and light sizes are made here, all else
     is as it was. The keys run from frame 1 to 2 where the shutter opens at the frame."""
@@ -310,17 +228,6 @@ def prepare_spin(_source, _folder):
         animate(blade, "scale", {0: (0.0, 0.0, 0.0), 2: (growth, growth, 0.0)})
     camera = add_camera((0.0, -6.0, 0.0), (0.0, 0.0, 0.0), 40.0)
     animate(camera, "rotation_euler", {0: (0.0, -0.1, 0.0), 2: (0.0, 0.1, 0.0)})
-
-
-def animate(moved, path, offsets):
-    """Key a property at frames, each ``offsets[frame]`` off its value, linear in between."""
-    rest = getattr(moved, path).copy()
-    for frame, offset in offsets.items():
-        setattr(moved, path, tuple(r + o for r, o in zip(rest, offset)))
-        moved.keyframe_insert(path, frame=frame)
-    for curve in moved.animation_data.action.fcurves:
-        for key in curve.keyframe_points:
-            key.interpolation = "LINEAR"
 
 
 def prepare_example(source, _folder):
@@ -404,13 +311,18 @@ SCENES = {
                                 shutter=0.6, is_flat=True),
     "example_motion_flat": Scene("examples/make_character.py", prepare_example, 160, 90, 12,
                                  in_project=True, shutter=0.5, is_flat=True),
+    **{name: Scene(None, prepare, 128, 72, shutter=shutter)
+       for name, (prepare, shutter) in effect_scenes.SCENES.items()},
 }
 
 
 def source_key(name, scenes_dir):
     """A hash that changes when the prepared scene would."""
     scene = SCENES[name]
-    text = inspect.getsource(scene.prepare) + str(SETUP_VERSION)
+    module = inspect.getmodule(scene.prepare)
+    # Scenes of a module of their own share its helpers.
+    text = inspect.getsource(module if module is effect_scenes else scene.prepare)
+    text += str(SETUP_VERSION)
     if scene.shutter > 0.0:
         text += str(scene.shutter)
     if scene.is_flat:

@@ -299,6 +299,7 @@ TRC_INLINE bool leaf_single(struct walk *w, uint32_t ref, int ray, bool any, boo
         }
     f8 t, bu, bv;
     TRC_COUNT(single_leaves, 1);
+    TRC_COUNT(single_triangles, count);
     uint32_t hit = trc_triangle8_test(&tri, p->o[axis.u][ray], p->o[axis.v][ray], p->o[axis.z][ray],
                                       g->su[ray], g->sv[ray], g->sz[ray], p->tmin[ray],
                                       (1u << count) - 1u, &t, &bu, &bv);

@@ -1,0 +1,99 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Speed against error, measured and reported; report.sh says how it is called.
+
+Each part is measured into a JSON file of its own in DIR/data as soon as it is done; the report is drawn
+from those files alone.
+"""
+
+import argparse
+import json
+import pathlib
+import sys
+import time
+
+import compare_cycles
+from reporting import (blender_costs, curves, document, frames, gate, kernels, machine, plots, povray,
+                       readme, scope as scopes)
+
+
+def parse_arguments(arguments):
+    """Command line to options."""
+    parser = argparse.ArgumentParser(prog="report.sh", description=__doc__.split("\n")[0])
+    parser.add_argument("--quick", action="store_const", const="quick", dest="scope")
+    parser.add_argument("--full", action="store_const", const="full", dest="scope")
+    parser.add_argument("--out", type=pathlib.Path, help="folder of the report (BUILD/report)")
+    parser.add_argument("--draw", action="store_true", help="draw from the JSON that is there")
+    parser.add_argument("--baseline", action="store_true", help="write the baseline of the gate")
+    parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS),
+                        help="measure these alone; the others stay as they are")
+    parser.add_argument("--threads", type=int, default=0, help="0: all")
+    parser.add_argument("--build", type=pathlib.Path, default=compare_cycles.PROJECT / "build")
+    parser.add_argument("--blender", default="blender")
+    options = parser.parse_args(arguments)
+    if options.baseline and options.scope != "quick":
+        parser.error("the baseline is that of --quick")
+    options.scope = scopes.SCOPES[options.scope or "medium"]
+    options.out = options.out or options.build / "report"
+    return options
+
+
+PARTS = {
+    "kernels": lambda options: kernels.measure(options, options.scope),
+    "frames": lambda options: frames.measure(options, options.scope),
+    "blender": lambda options: blender_costs.measure(options, options.scope),
+    "povray": lambda options: povray.measure(options, options.scope, options.out / "pictures"),
+    "curves": lambda options: curves.measure(options, options.scope, options.out / "pictures"),
+}
+
+
+def measure(options):
+    """Measure all parts into DIR/data."""
+    data = options.out / "data"
+    data.mkdir(parents=True, exist_ok=True)
+    write(data / "machine.json", machine.describe(options, options.scope))
+    for name in options.parts:
+        print(f"== {name}", flush=True)
+        start = time.perf_counter()
+        write(data / f"{name}.json", PARTS[name](options))
+        print(f"   {time.perf_counter() - start:.0f} s", flush=True)
+
+
+def write(path, value):
+    """One JSON file, small numbers of digits."""
+    path.write_text(json.dumps(rounded(value), indent=None, separators=(",", ":")) + "\n",
+                    encoding="utf-8")
+
+
+def rounded(value):
+    """Six digits are more than any of this is good for."""
+    if isinstance(value, float):
+        return float(f"{value:.6g}")
+    if isinstance(value, dict):
+        return {str(key): rounded(each) for key, each in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [rounded(each) for each in value]
+    return value
+
+
+def main(arguments=None):
+    """Measure, draw, and in the quick scope look for losses."""
+    options = parse_arguments(arguments)
+    if not options.draw:
+        measure(options)
+    results = document.load(options.out)
+    plots.draw(results, options.out)
+    document.write(results, options.out)
+    print(f"report: {options.out / 'report.md'}")
+    if options.out.resolve() == readme.COMMITTED:
+        readme.write()
+    if options.baseline:
+        gate.write_baseline(results)
+        return 0
+    if options.scope.name == "quick" and not options.draw:
+        return gate.check(results, options)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What Blender waits for besides rays: starting with the add-on, and sending edits to the library."""
+
+import pathlib
+import time
+
+import compare_cycles
+
+from . import programs
+
+VIEWPORT = pathlib.Path(compare_cycles.SETUPS_FILE).with_name("viewport.py")
+
+
+def measure(options, scope):
+    """{"start": {case: seconds of each repeat}, "edits": rows of viewport.py}."""
+    cases = {"without the add-on": [], "with the add-on": ["--addons", "volley"]}
+    start = {case: [] for case in cases}
+    for _repeat in range(scope.repeats + 1):
+        for case, arguments in cases.items():
+            begin = time.perf_counter()
+            compare_cycles.run_blender([*arguments, "--python-expr", "pass"], options)
+            start[case].append(time.perf_counter() - begin)
+    # The first start of each reads its files from the disk.
+    return {"start": {case: seconds[1:] for case, seconds in start.items()},
+            "edits": edits(options, scope)}
+
+
+def edits(options, scope):
+    """Medians of each kind of edit, milliseconds."""
+    return programs.run_json_inside(
+        lambda path: compare_cycles.run_blender(
+            ["--addons", "volley", "--python-exit-code", 1, "--python", VIEWPORT, "--", "--repeats",
+             scope.repeats, "--json", path], options))

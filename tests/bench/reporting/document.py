@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Joins the sections of a report to report.md."""
+
+import json
+
+from . import error_sections, frame_sections, scope as scopes
+from .tables import table
+
+
+def load(out):
+    """{part: JSON} of a report's folder."""
+    return {path.stem: json.loads(path.read_text(encoding="utf-8"))
+            for path in sorted((out / "data").glob("*.json"))}
+
+
+def write(results, out):
+    """Write report.md beside its data."""
+    (out / "report.md").write_text(text(results, out), encoding="utf-8")
+
+
+def text(results, out):
+    """The whole report."""
+    parts = [head(results["machine"]), error_sections.headline(results),
+             error_sections.losing_cases(results)]
+    if results.get("curves"):
+        parts.append(error_sections.equal_error(results["curves"]))
+        parts.append(error_sections.curves_and_bias(results["curves"]))
+    if results.get("kernels"):
+        parts.append(error_sections.kernels_beside_embree(results["kernels"]))
+    if results.get("povray"):
+        parts.append(error_sections.beside_povray(results["povray"]))
+    if results.get("frames"):
+        parts.append(frame_sections.papers_tables(results["frames"]))
+        parts.append(frame_sections.papers_figures())
+        parts.append(frame_sections.assemblies(results["frames"]["assemblies"]))
+        parts.append(frame_sections.effects(results["frames"]))
+        parts.append(frame_sections.growth(results["frames"]))
+    if results.get("blender"):
+        parts.append(frame_sections.blender(results["blender"]))
+    parts.append(pictures(out))
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def head(machine):
+    """What it was measured with."""
+    scope = scopes.SCOPES[machine["scope"]]
+    rows = [
+        ["date", machine["date"]],
+        ["scope", f"{scope.name}: {scope.seeds} seeds, {scope.samples[0]} to {scope.samples[-1]} "
+                  f"samples, {scope.repeats} repeats of times"],
+        ["machine", f"{machine['cpu']}, {machine['processors']} logical processors, "
+                    f"{machine['memory_gib']} GiB"],
+        ["load before", str(machine["load_before"])],
+        ["system", machine["system"]],
+        ["compiler", machine["compiler"]],
+        ["instruction set", machine["isa"]],
+        ["Volley", machine["commit"]],
+        ["against", ", ".join(filter(None, (
+            f"{machine['blender']} with Cycles",
+            machine["embree"] and f"Embree {machine['embree']}",
+            machine["povray"] and f"POV-Ray {machine['povray']}")))],
+    ]
+    return ("# Speed against error\n\n"
+            "Written by `bash tests/bench/report.sh`, which repeats it. Times are medians of runs that "
+            "took turns; brackets hold least and most of the repeats, or, where a ratio is given, its "
+            "95 % bootstrap interval over seeds and repeats. Losing cases come first, and bold.\n\n"
+            + table(["", ""], rows))
+
+
+def pictures(out):
+    """The pictures that were compared."""
+    names = sorted(path.name for path in (out / "pictures").glob("*.png"))
+    if not names:
+        return ""
+    lines = ["## Pictures",
+             "Cycles above Volley: 1 sample per pixel, 16 and the reference. POV-Ray: its picture, "
+             "Volley's, the reference, 16 samples each."]
+    lines += [f"{name[:-4]}:\n\n![{name[:-4]}](pictures/{name})" for name in names]
+    return "\n\n".join(lines)

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How much is measured: quick for CI, medium by default, full by night."""
+
+from dataclasses import dataclass
+
+EFFECTS = ("edges", "defocus", "motion", "area_light", "gloss", "glass", "environment", "texture")
+JOINED = ("example_motion", "billiards", "gallery")
+SAMPLERS = ("SOBOL", "SUDOKU", "JITTER", "INDEPENDENT", "BLUE_NOISE")
+
+
+@dataclass(frozen=True)
+class Scope:
+    """Numbers of scenes, samples, seeds and repeats of a mode; ``minutes`` is about what it takes on
+    two cores of a 2024 desktop machine."""
+
+    name: str
+    minutes: int
+    # Error against time.
+    scenes: tuple
+    sampler_scenes: tuple   # where all samplers run, not Sobol alone
+    samples: tuple
+    time_samples: tuple     # of those, timed; between and beyond them times are interpolated
+    seeds: int
+    reference_samples: int
+    reference_seeds: int
+    light_samples: tuple
+    repeats: int
+    times_scale: int        # timed pictures are so many times as wide and high
+    # POV-Ray.
+    classic_scenes: tuple
+    classic_width: int
+    # Kernels against Embree: arguments of tracer_bench.
+    kernel_scenes: tuple
+    kernel_arguments: tuple
+    # Whole frames of frame_bench.
+    stages: tuple
+    frame_edge: int
+    eyes: int               # places of the camera that a frame's time is the mean of
+    frame_repeats: int
+    distribution_samples: int
+    counted_edge: int
+    largest_triangles: int
+    largest_lights: int
+    largest_instances: int
+
+
+QUICK = Scope(
+    name="quick", minutes=4,
+    scenes=("area_light", "gallery"), sampler_scenes=(), samples=(1, 4, 16), time_samples=(1, 4, 16),
+    seeds=3, reference_samples=128, reference_seeds=2, light_samples=(1, 4), repeats=3, times_scale=2,
+    classic_scenes=("classic",), classic_width=256,
+    kernel_scenes=("character",),
+    kernel_arguments=("--order", "auto", "--motion", "still", "--repeats", "3", "--tiles", "8",
+                      "--size", "512"),
+    stages=("character",), frame_edge=256, eyes=2, frame_repeats=3,
+    distribution_samples=4, counted_edge=64,
+    largest_triangles=100_000, largest_lights=100, largest_instances=1000)
+
+MEDIUM = Scope(
+    name="medium", minutes=35,
+    scenes=EFFECTS + JOINED, sampler_scenes=("gallery",), samples=(1, 4, 16, 64, 256),
+    time_samples=(1, 4, 16, 64), seeds=5, reference_samples=1024, reference_seeds=3,
+    light_samples=(1, 4), repeats=3, times_scale=3,
+    classic_scenes=("classic", "classic_soft"), classic_width=320,
+    kernel_scenes=("conference", "pool_hall", "character"),
+    kernel_arguments=("--order", "auto", "--repeats", "5", "--tiles", "8",
+                      "--samples", "8"),
+    stages=("conference", "pool_hall", "character"), frame_edge=1024, eyes=2, frame_repeats=3,
+    distribution_samples=8, counted_edge=128,
+    largest_triangles=4_000_000, largest_lights=10_000, largest_instances=100_000)
+
+FULL = Scope(
+    name="full", minutes=480,
+    scenes=EFFECTS + JOINED, sampler_scenes=EFFECTS + JOINED,
+    samples=tuple(2 ** i for i in range(11)), time_samples=tuple(2 ** i for i in range(11)),
+    seeds=10, reference_samples=4096, reference_seeds=8, light_samples=(1, 2, 4, 8), repeats=5,
+    times_scale=3,
+    classic_scenes=("classic", "classic_soft"), classic_width=640,
+    kernel_scenes=("conference", "pool_hall", "character"),
+    kernel_arguments=("--repeats", "9"),
+    stages=("conference", "pool_hall", "character"), frame_edge=1024, eyes=4, frame_repeats=5,
+    distribution_samples=64, counted_edge=512,
+    largest_triangles=20_000_000, largest_lights=10_000, largest_instances=1_000_000)
+
+SCOPES = {scope.name: scope for scope in (QUICK, MEDIUM, FULL)}

@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tests of the report's estimates, its gate and its headline; no renders, no times."""
+
+import doctest
+import importlib
+import pathlib
+import sys
+
+import numpy as np
+import pytest
+
+TESTS = pathlib.Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(TESTS / "support"), str(TESTS / "bench")]
+import flip  # noqa: E402  (the folders are on the path only now)
+from reporting import curves, estimates, frames, gate, readme  # noqa: E402
+
+
+@pytest.mark.parametrize("module", ["flip", "error_time", "reporting.estimates", "reporting.frames",
+                                    "reporting.gate", "reporting.readme", "reporting.tables"])
+def test_examples_in_comments(module):
+    result = doctest.testmod(importlib.import_module(module))
+    assert result.attempted and not result.failed
+
+
+@pytest.fixture(autouse=True)
+def few_resamples(monkeypatch):
+    """Enough to tell, and quick."""
+    monkeypatch.setattr(estimates, "RESAMPLES", 100)
+
+
+# Estimates ---------------------------------------------------------------------------------------
+
+def test_interval_of_the_mean_covers_it_as_often_as_it_says():
+    generator = np.random.default_rng(3)
+    covered = 0
+    for _trial in range(200):
+        low, high = estimates.mean_with_interval(generator.normal(5.0, 1.0, 30), 200)["interval"]
+        covered += low <= 5.0 <= high
+    # 95 % of 200 with four standard deviations of the binomial, less what percentile intervals of 30
+    # values are known to be short of.
+    assert 170 <= covered <= 200
+
+
+def test_intervals_are_the_same_in_every_run():
+    values = [1.0, 2.0, 4.0, 8.0]
+    assert estimates.mean_with_interval(values) == estimates.mean_with_interval(values)
+
+
+def test_affine_seconds_finds_the_line_through_noise():
+    generator = np.random.default_rng(5)
+    samples = [1, 4, 16, 64]
+    seconds = [(0.2 + 0.01 * count) * generator.uniform(0.98, 1.02) for count in samples]
+    fixed, each = estimates.affine_seconds(samples, seconds)
+    assert fixed == pytest.approx(0.2, rel=0.05) and each == pytest.approx(0.01, rel=0.05)
+
+
+def test_affine_seconds_are_never_negative():
+    fixed, each = estimates.affine_seconds([1, 4, 16], [0.001, 0.1, 3.0])
+    assert fixed >= 0.0 and each > 0.0
+    fixed, each = estimates.affine_seconds([1, 4, 16], [3.0, 2.0, 1.0])
+    assert fixed > 0.0 and each >= 0.0
+
+
+def test_cost_outside_a_curve_is_unknown():
+    assert estimates.cost_at([1.0, 2.0], [1.0, 0.5], 2.0) is None
+    assert estimates.cost_at([1.0, 2.0], [1.0, 0.5], 0.1) is None
+    assert estimates.cost_at([1.0, 2.0], [0.5, 1.0], 0.7) is None
+    assert estimates.cost_ratio(([1.0], [9.0]), ([1.0, 2.0], [1.0, 0.5])) is None
+
+
+# Curves ------------------------------------------------------------------------------------------
+
+def made_scene(speed, noise, seeds=6, bias=0.0):
+    """A scene as JSON holds it: Volley is ``speed`` times as fast, its MSE ``noise`` times Cycles'."""
+    generator = np.random.default_rng(11)
+    scene = {"curves": {}, "times": {}, "bias": {"volley sobol l1": {"tests": 3, "failed": 0}}}
+    for name, cost, scale in (("cycles", 1.0, 1.0), ("volley sobol l1", 1.0 / speed, noise)):
+        points, times = {}, {}
+        for samples in (1, 4, 16, 64, 256):
+            mse = [scale / samples * value + bias for value in generator.uniform(0.95, 1.05, seeds)]
+            points[samples] = {"seeds": {measure: mse for measure in curves.MEASURES},
+                               "mse": np.mean(mse), "bias_squared": bias,
+                               "variance": scale / samples, "mean_ratios": [1.0]}
+            if samples <= 64:
+                times[samples] = {"runs": [cost * samples * value
+                                           for value in generator.uniform(0.95, 1.05, 3)]}
+        scene["curves"][name], scene["times"][name] = points, times
+    return scene
+
+
+def test_time_at_equal_error_joins_speed_and_noise():
+    scene = made_scene(speed=3.0, noise=0.5)
+    made = curves.time_ratio(scene, "volley sobol l1", "mse")
+    assert made["ratio"] == pytest.approx(6.0, rel=0.08)
+    assert made["interval"][0] < made["ratio"] < made["interval"][1]
+    assert made["interval"][1] / made["interval"][0] < 1.3
+
+
+def test_curves_that_do_not_meet_have_no_ratio():
+    assert curves.time_ratio(made_scene(1.0, 1e6), "volley sobol l1", "mse") is None
+
+
+def test_slope_and_its_interval():
+    made = curves.slope(made_scene(1.0, 1.0), "cycles")
+    assert made["slope"] == pytest.approx(-1.0, abs=0.02)
+    assert made["interval"][0] <= made["slope"] <= made["interval"][1]
+
+
+def test_headline_puts_the_worst_scene_first():
+    scenes = {"fast": made_scene(4.0, 1.0), "slow": made_scene(0.5, 1.0)}
+    for scene in scenes.values():
+        scene["comparison"] = curves.compare_configurations(scene)
+    assert [name for name, _ratios in curves.headline_rows(scenes)] == ["slow", "fast"]
+
+
+# FLIP --------------------------------------------------------------------------------------------
+
+def test_flip_grows_with_noise_and_is_symmetric_in_nothing_changed():
+    picture = np.random.default_rng(2).random((24, 32, 3))
+    noise = np.random.default_rng(4).normal(0.0, 1.0, picture.shape)
+    errors = [flip.mean_flip(picture + size * noise, picture) for size in (0.0, 0.02, 0.1, 0.4)]
+    assert errors[0] == 0.0 and errors == sorted(errors) and errors[-1] < 1.0
+
+
+def test_flip_of_flat_colours_is_their_colour_difference():
+    # Without edges only the colour pipeline counts, and filters keep a flat picture as it is.
+    grey, lighter = (np.full((40, 40, 3), value) for value in (0.2, 0.25))
+    lightness = [116.0 * np.cbrt(value) - 16.0 for value in (0.2, 0.25)]
+    green, blue = flip.hunt_lab(np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]))
+    knee = 0.4 * flip.hyab(green, blue) ** 0.7
+    expected = 0.95 / knee * (lightness[1] - lightness[0]) ** 0.7
+    assert flip.flip_map(grey, lighter) == pytest.approx(np.full((40, 40), expected), rel=1e-6)
+
+
+def test_flip_tells_an_edge_from_a_soft_step():
+    x = np.linspace(0.0, 1.0, 64)[None, :, None] * np.ones((32, 1, 3))
+    hard = (x > 0.5).astype(float)
+    assert flip.mean_flip(hard, x) > flip.mean_flip(0.5 * hard + 0.5 * x, x)
+
+
+# Frames and the gate -----------------------------------------------------------------------------
+
+def test_figures_have_the_paper_own_points():
+    scope = type("Scope", (), {"stages": ("tiny",), "counted_edge": 16, "eyes": 1})
+    assert len(frames.figure_7(scope)) == 15 and len(frames.figure_8(scope)) == 16
+
+
+def test_gate_is_silent_until_a_loss_is_large_and_repeated(monkeypatch, tmp_path, capsys):
+    baseline = tmp_path / "baseline.json"
+    baseline.write_text('{"kernels a": 1.0, "kernels b": 2.0}')
+    monkeypatch.setattr(gate, "BASELINE", baseline)
+    options = None
+
+    def run(*ratios):
+        later = iter(ratios)
+        monkeypatch.setattr(gate, "ratios", lambda _results: next(later))
+        monkeypatch.setattr(gate, "measure_again", lambda *_arguments: {})
+        return gate.check({}, options)
+
+    assert run({"kernels a": 0.7, "kernels b": 1.9, "kernels new": 0.1}) == 0
+    assert run({"kernels a": 0.5}, {"kernels a": 0.9}) == 0
+    assert run({"kernels a": 0.5}, {"kernels a": 0.5}, {"kernels a": 0.8}) == 0
+    assert run({"kernels a": 0.5}, {"kernels a": 0.5}, {"kernels a": 0.5}) == 1
+    assert "LOST kernels a: 0.50, baseline 1.00" in capsys.readouterr().out
+
+
+def test_readme_holds_the_committed_report():
+    assert readme.agrees()
+
+
+def test_readme_that_differs_is_found(tmp_path):
+    text = (readme.PROJECT / "README.md").read_text(encoding="utf-8")
+    changed = tmp_path / "README.md"
+    changed.write_text(text.replace(readme.BEGIN, readme.BEGIN + "\nTen times faster."), encoding="utf-8")
+    assert not readme.agrees(changed)
+    readme.write(changed)
+    assert readme.agrees(changed)
