@@ -240,7 +240,7 @@ static void load_camera_to_world(const struct trc_snapshot *snapshot, struct trc
         const float *a = camera->camera_to_world[key].m;
         const float *b = camera->camera_to_world[key + (camera->key_count > 1)].m;
         for (int i = 0; i < 12; i++)
-            e[i] = (1.0f - f) * a[i] + f * b[i];
+            e[i] = a[i] + f * (b[i] - a[i]);
     }
     for (int i = 0; i < 3; i++)
         m->column[i] = v3(vf_set(e[i]), vf_set(e[4 + i]), vf_set(e[8 + i]));
@@ -273,7 +273,8 @@ static void op_window(const struct trc_surface *s, vfloat *out) {
     const uint32_t next = key + (camera->key_count > 1);
     float window[4];
     for (int i = 0; i < 4; i++) {
-        window[i] = (1.0f - f) * camera->windows[key][i] + f * camera->windows[next][i];
+        window[i] =
+            camera->windows[key][i] + f * (camera->windows[next][i] - camera->windows[key][i]);
     }
     const vvec3 p = op_camera_position(s);
     const bool perspective = camera->type == TRC_CAMERA_PERSPECTIVE;

@@ -207,7 +207,7 @@ static void cell_of(float x, float y, float z, int *row, int *column) {
 
 static void draw_samples(const struct trc_lobes *l, const struct trc_surface *s,
                          struct histogram *h) {
-    struct test_random random = test_random_seed(1);
+    struct rng random = rng_seed(1);
     memset(h, 0, sizeof *h);
     for (int i = 0; i < SAMPLES; i += TRC_WIDTH) {
         struct trc_bsdf_sample b;
@@ -515,13 +515,13 @@ static void lobes_are_reciprocal(void **state) {
                              glossy(TRC_DISTRIBUTION_MULTI_GGX, 0.9f, 0.0f),
                              glossy(TRC_DISTRIBUTION_ASHIKHMIN, 0.6f, 0.3f),
                              principled("Principled")};
-    struct test_random random = test_random_seed(9);
+    struct rng random = rng_seed(9);
     for (size_t i = 0; i < sizeof models / sizeof models[0]; i++)
         for (int n = 0; n < 200; n++) {
-            const double c1 = 0.05 + 0.95 * (double)test_uniform(&random);
-            const double c2 = 0.05 + 0.95 * (double)test_uniform(&random);
-            const vvec3 a = direction(c1, 6.28 * (double)test_uniform(&random));
-            const vvec3 b = direction(c2, 6.28 * (double)test_uniform(&random));
+            const double c1 = 0.05 + 0.95 * (double)rng_unit(&random);
+            const double c2 = 0.05 + 0.95 * (double)rng_unit(&random);
+            const vvec3 a = direction(c1, 6.28 * (double)rng_unit(&random));
+            const vvec3 b = direction(c2, 6.28 * (double)rng_unit(&random));
             float f[2];
             for (int k = 0; k < 2; k++) {
                 struct trc_surface s;
@@ -550,18 +550,18 @@ static double ggx_reference(double alpha, const double o[3], const double i[3]) 
 }
 static void values_match_formulas(void **state) {
     (void)state;
-    struct test_random random = test_random_seed(4);
+    struct rng random = rng_seed(4);
     const float roughnesses[] = {0.03f, 0.1f, 0.5f, 1.0f};
     for (int k = 0; k < 4; k++)
         for (int n = 0; n < 500; n++) {
             struct model m = glossy(TRC_DISTRIBUTION_GGX, roughnesses[k], 0.0f);
-            const double c = 0.05 + 0.95 * (double)test_uniform(&random), phi = 2.0;
+            const double c = 0.05 + 0.95 * (double)rng_unit(&random), phi = 2.0;
             const double r = sqrt(1 - c * c);
             const double o[3] = {r * cos(phi), r * sin(phi), c};
             /* Near the mirror direction, so that sharp lobes are looked at where they live. */
             const double spread = 4.0 * (double)(roughnesses[k] * roughnesses[k]);
-            double i[3] = {-o[0] + spread * ((double)test_uniform(&random) - 0.5),
-                           -o[1] + spread * ((double)test_uniform(&random) - 0.5), o[2]};
+            double i[3] = {-o[0] + spread * ((double)rng_unit(&random) - 0.5),
+                           -o[1] + spread * ((double)rng_unit(&random) - 0.5), o[2]};
             const double size = sqrt(i[0] * i[0] + i[1] * i[1] + i[2] * i[2]);
             for (int j = 0; j < 3; j++)
                 i[j] /= size;

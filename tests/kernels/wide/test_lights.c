@@ -121,7 +121,7 @@ static vfloat lit_by(const struct trc_surface *s, const struct trc_light_sample 
 
 /* Irradiance at the point through light samples. */
 static struct estimate irradiance(const struct trc_surface *s) {
-    struct test_random random = test_random_seed(7);
+    struct rng random = rng_seed(7);
     double sum = 0, sum2 = 0;
     for (int i = 0; i < SAMPLES; i += TRC_WIDTH) {
         struct trc_light_sample l;
@@ -316,7 +316,7 @@ static void rays_agree_with_samples(void **state) {
     struct scene s;
     scene_begin(&s);
     scene_commit(&s, lights, 5);
-    struct test_random random = test_random_seed(3);
+    struct rng random = rng_seed(3);
     int seen[5] = {0}, missed = 0;
     double most = 0.0;
     for (int i = 0; i < 20000; i += TRC_WIDTH) {
@@ -420,17 +420,17 @@ static void densities_integrate_to_one(void **state) {
 
 /* A cloud of triangles above and around the origin. */
 static void cloud(struct scene *s, int count, double corners[][3][3]) {
-    struct test_random random = test_random_seed(21);
+    struct rng random = rng_seed(21);
     scene_begin(s);
     scene_emit(s, 3, 3, 3);
     for (int i = 0; i < count; i++) {
         float c[9];
         double center[3];
         for (int k = 0; k < 3; k++)
-            center[k] = 8.0 * ((double)test_uniform(&random) - 0.5);
+            center[k] = 8.0 * ((double)rng_unit(&random) - 0.5);
         center[2] = fabs(center[2]) + 0.9;
         for (int k = 0; k < 9; k++) {
-            c[k] = (float)(center[k % 3] + 0.6 * ((double)test_uniform(&random) - 0.5));
+            c[k] = (float)(center[k % 3] + 0.6 * ((double)rng_unit(&random) - 0.5));
             corners[i][k / 3][k % 3] = (double)c[k];
         }
         scene_triangle(s, c, i % 7 == 3 ? 1 : 0);
@@ -474,7 +474,7 @@ static void chances_match(void **state) {
         const struct trc_receiver who = trc_receiver_make(r.p, r.n);
         static int count[MESH_TRIANGLES + 3];
         memset(count, 0, sizeof count);
-        struct test_random random = test_random_seed(5);
+        struct rng random = rng_seed(5);
         double worst = 0.0, chi = 0.0, sum = 0.0;
         for (int n = 0; n < SAMPLES; n += TRC_WIDTH) {
             struct trc_light_sample l;
