@@ -16,6 +16,9 @@ HAS_LONG_PASS_NAMES = bpy.app.version >= (5, 0, 0)
 # issue 109404).
 AREA_LIGHT_POWER = 4.0 / math.pi if bpy.app.version >= (4, 0, 0) else 1.0
 
+# A spot's cone became evenly bright in 4.0; before, it was times the cosine to its axis.
+SPOT_IS_EVEN = bpy.app.version >= (4, 0, 0)
+
 
 def cycles(data, name, default):
     """``data.cycles.name`` where Cycles' property groups exist, else default."""
@@ -31,6 +34,12 @@ def motion_position(scene):
 def uses_nodes(data):
     """Whether the node tree of a material, world or light rules (from 5.0 on it always does)."""
     return data.node_tree is not None and getattr(data, "use_nodes", True)
+
+
+def is_ball(light):
+    """Whether a point or spot light is a sphere: without Soft Falloff, which came in 4.1. With it, and
+    before, it is a disk that faces what it lights."""
+    return not getattr(light, "use_soft_falloff", True)
 
 
 def casts_shadow(light):
