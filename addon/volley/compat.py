@@ -19,6 +19,18 @@ AREA_LIGHT_POWER = 4.0 / math.pi if bpy.app.version >= (4, 0, 0) else 1.0
 # A spot's cone became evenly bright in 4.0; before, it was times the cosine to its axis.
 SPOT_IS_EVEN = bpy.app.version >= (4, 0, 0)
 
+# Cycles of 4.0 has other microfacets: one height for masking and shadowing, glass by the micro-normal.
+HAS_CORRELATED_MICROFACETS = bpy.app.version >= (4, 0, 0)
+
+# Its camera hits no longer choose faint lobes more often than their share.
+CHOOSES_LOBES_PLAINLY = bpy.app.version >= (4, 0, 0)
+
+# Rough diffuse surfaces keep their energy from 4.3 on.
+KEEPS_DIFFUSE_ENERGY = bpy.app.version >= (4, 3, 0)
+
+# The Vector Transform node treats normals as normals; 3.4 made unit vectors of them.
+TRANSFORMS_NORMALS = bpy.app.version >= (4, 0, 0)
+
 
 def cycles(data, name, default):
     """``data.cycles.name`` where Cycles' property groups exist, else default."""

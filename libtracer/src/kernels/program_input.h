@@ -305,7 +305,11 @@ static vvec3 op_transform(const struct trc_surface *s, uint32_t mode, vvec3 v) {
             load_world_to_object(&g, s->time, &a);
         else
             trc_load_affine(g.instance, s->time, &a);
-        const vvec3 moved = is_point ? trc_transform_point(&a, v) : trc_transform_vector(&a, v);
+        vvec3 moved;
+        if (mode & TRC_TRANSFORM_NORMAL)
+            moved = normal_to_world(&a, v); /* the target's side is as good as the world's */
+        else
+            moved = is_point ? trc_transform_point(&a, v) : trc_transform_vector(&a, v);
         out = v3_select(g.lanes, moved, out);
     }
     return out;

@@ -317,7 +317,7 @@ static void rays_agree_with_samples(void **state) {
     (void)state;
     trc_light_desc lights[] = {lamp(TRC_LIGHT_AREA, 0, 0, 2),   lamp(TRC_LIGHT_AREA, 4, 0, 3),
                                lamp(TRC_LIGHT_POINT, -3, 1, 2), lamp(TRC_LIGHT_SPOT, 0, 4, 3),
-                               lamp(TRC_LIGHT_SUN, 0, 0, 0),    lamp(TRC_LIGHT_POINT, 3, -4, 2),
+                               lamp(TRC_LIGHT_SUN, 0, 0, 0),    lamp(TRC_LIGHT_POINT, 3, 4, 1),
                                lamp(TRC_LIGHT_SPOT, -4, -3, 3)};
     lights[5].flags = TRC_LIGHT_SPHERE;
     lights[6].flags = TRC_LIGHT_SPHERE | TRC_LIGHT_EVEN_CONE;
