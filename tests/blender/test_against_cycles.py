@@ -416,6 +416,50 @@ _MATERIALS = {
     "translucent": ("ShaderNodeBsdfTranslucent", {"Color": (0.5, 0.7, 0.9)}),
 }
 
+_PRINCIPLED = "ShaderNodeBsdfPrincipled"
+# Shaders and sockets that came with Blender 4.
+_LATER_MATERIALS = {
+    "later glossy": ("ShaderNodeBsdfAnisotropic", {"Color": (0.9, 0.7, 0.5), "Roughness": 0.6}),
+    "later glossy GGX": ("ShaderNodeBsdfAnisotropic", {"Color": (0.9, 0.7, 0.5), "Roughness": 0.8},
+                         {"distribution": 'GGX'}),
+    "rough diffuse": ("ShaderNodeBsdfDiffuse", {"Color": (0.9, 0.7, 0.5), "Roughness": 0.8}),
+    "sheen": ("ShaderNodeBsdfSheen", {"Color": (0.9, 0.7, 0.5), "Roughness": 0.5}),
+    "metallic": ("ShaderNodeBsdfMetallic", {"Base Color": (0.9, 0.7, 0.5), "Edge Tint": (0.5, 0.7, 0.9),
+                                            "Roughness": 0.4}, {"fresnel_type": 'F82'}),
+    "conductor": ("ShaderNodeBsdfMetallic", {"Roughness": 0.4}, {"fresnel_type": 'PHYSICAL_CONDUCTOR'}),
+    "layers": (_PRINCIPLED, {"Base Color": (0.8, 0.8, 0.8), "Specular IOR Level": 0.5}),
+    "specular tint": (_PRINCIPLED, {"Base Color": (0.3, 0.3, 0.8), "Roughness": 0.2,
+                                    "Specular IOR Level": 0.9, "Specular Tint": (1.0, 0.5, 0.2)}),
+    "large ior": (_PRINCIPLED, {"Base Color": (0.3, 0.3, 0.8), "IOR": 2.0, "Specular IOR Level": 0.5},
+                  {"distribution": 'GGX'}),
+    "rough metal": (_PRINCIPLED, {"Base Color": (0.8, 0.6, 0.2), "Metallic": 1.0, "Roughness": 0.8,
+                                  "Specular Tint": (0.3, 0.6, 1.0)}),
+    "brushed metal": (_PRINCIPLED, {"Base Color": (0.8, 0.6, 0.2), "Metallic": 1.0,
+                                    "Anisotropic": 0.8, "Specular IOR Level": 0.5}),
+    "coat": (_PRINCIPLED, {"Base Color": (0.8, 0.3, 0.2), "Coat Weight": 1.0, "Coat Roughness": 0.1,
+                           "Coat Tint": (0.3, 0.8, 0.9)}),
+    "rough coat": (_PRINCIPLED, {"Base Color": (0.8, 0.3, 0.2), "Coat Weight": 0.7,
+                                 "Coat Roughness": 0.6, "Coat IOR": 1.9}),
+    "velvety": (_PRINCIPLED, {"Base Color": (0.1, 0.1, 0.1), "Sheen Weight": 1.0, "Sheen Roughness": 0.4,
+                              "Sheen Tint": (0.3, 0.8, 0.9)}),
+    "rough base": (_PRINCIPLED, {"Base Color": (0.8, 0.3, 0.2), "Diffuse Roughness": 0.8}),
+    "coated emission": (_PRINCIPLED, {"Base Color": (0.1, 0.1, 0.1), "Emission Color": (0.5, 0.2, 0.1),
+                                      "Emission Strength": 0.2, "Coat Weight": 1.0,
+                                      "Coat Tint": (0.5, 0.5, 0.9)}),
+}
+_MATERIALS.update(_LATER_MATERIALS)
+
+
+def _has(node_type, inputs):
+    """Whether this Blender has such a node with these sockets."""
+    import bpy
+    if not hasattr(bpy.types, node_type):
+        return False
+    tree = bpy.data.node_groups.new("Asked", "ShaderNodeTree")
+    sockets = tree.nodes.new(node_type).inputs.keys()
+    bpy.data.node_groups.remove(tree)
+    return all(name in sockets for name in inputs)
+
 
 def inside_light(names):
     """Channel means of both engines for each kind of light and each material."""
@@ -427,7 +471,7 @@ def inside_light(names):
         _, ball = _stage()
         if name in _MATERIALS:
             node_type, inputs, *settings = _MATERIALS[name]
-            if not hasattr(bpy.types, node_type):
+            if not _has(node_type, inputs):
                 continue
             tried = scenes.material("Tried", node_type,
                                     **{k.replace(" ", "_"): v for k, v in inputs.items()})

@@ -603,7 +603,10 @@ void TRC_KERNEL(trc_bsdf_albedo)(const struct trc_lobes *l, const struct trc_sur
         if (lobe->kind == TRC_LOBE_TRANSPARENT)
             continue;
         const int k = lobe->kind == TRC_LOBE_REFLECT ? 1 : lobe->kind == TRC_LOBE_REFRACT ? 2 : 0;
-        albedo_out[k] = v3_add(albedo_out[k], lobe->weight);
+        vvec3 albedo = v3_scale(lobe->weight, lobe->albedo_scale);
+        if (lobe->correlated)
+            albedo = v3_mul(albedo, fresnel_of(lobe, lobe->cos_o));
+        albedo_out[k] = v3_add(albedo_out[k], albedo);
     }
 }
 
@@ -631,8 +634,9 @@ void TRC_KERNEL(trc_lobes_features)(const struct trc_lobes *l, const struct trc_
         const bool is_microfacet = lobe->kind == TRC_LOBE_REFLECT || lobe->kind == TRC_LOBE_REFRACT;
         const vmask told = is_rough(lobe);
         const vvec3 n = lobe->kind == TRC_LOBE_TRANSPARENT ? s->n : lobe->n;
-        const vvec3 color =
-            is_microfacet ? v3_mul(lobe->weight, fresnel_of(lobe, v3_dot(n, s->wo))) : lobe->weight;
+        vvec3 color = v3_scale(lobe->weight, lobe->albedo_scale);
+        if (is_microfacet)
+            color = v3_mul(color, fresnel_of(lobe, v3_dot(n, s->wo)));
         normal = v3_mad(n, lobe->mix_weight, normal);
         all = all + lobe->mix_weight;
         rough = rough + vf_where(told, lobe->mix_weight);

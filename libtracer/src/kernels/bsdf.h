@@ -79,6 +79,7 @@ struct trc_lobe {
     vfloat pdf_scale;     /* density of a sampled direction over D of its half vector */
     vvec3 multi_weight;   /* MULTI_GGX: what the lobe of the missing energy is scaled by */
     vfloat multi_chance;  /* and how often it is sampled, by cosine */
+    vfloat albedo_scale;  /* what Cycles leaves of the weight where it tells the albedo */
     vfloat mix_weight;    /* Cycles' sample weight, of every lobe */
     vfloat sample_weight; /* chance in proportion, 0 for lobes that are not continued */
 };
@@ -151,7 +152,7 @@ void TRC_KERNEL(trc_bsdf_ideal)(const struct trc_lobes *l, int i, const struct t
                                 struct trc_bsdf_sample *out);
 
 /* Albedo of the lobes for the colour passes: diffuse, glossy, transmission. As Cycles: the weights,
- * without what a Fresnel factor or masking takes. */
+ * without what a Fresnel factor or masking takes; of correlated lobes with the Fresnel factor. */
 void TRC_KERNEL(trc_bsdf_albedo)(const struct trc_lobes *l, const struct trc_surface *s,
                                  vvec3 albedo_out[3]);
 

@@ -156,6 +156,7 @@ static struct trc_lobe *add_lobe(struct setup *c, enum trc_lobe_kind kind, vvec3
     lobe->distribution = 0;
     lobe->fresnel = TRC_FRESNEL_NONE;
     lobe->correlated = false;
+    lobe->albedo_scale = vf_one();
     lobe->anisotropic = false;
     lobe->ideal = vm_none();
     lobe->weight = v3_where(counts, w);
@@ -296,6 +297,7 @@ static void keep_energy(struct trc_lobe *lobe, vvec3 per_bounce) {
     const vvec3 gain = v3_mad(again, missing, v3_splat(one));
     lobe->distribution = TRC_LOBE_GGX;
     lobe->weight = v3_mul(lobe->weight, gain);
+    lobe->albedo_scale = single;
     lobe->mix_weight = lobe->mix_weight * v3_average(gain) * single;
 }
 
@@ -426,8 +428,9 @@ static void add_multi_glass(struct setup *c, vvec3 weight, vvec3 reflected, vvec
 static void add_correlated_glass(struct setup *c, vvec3 reflected, vvec3 refracted, vvec3 f0,
                                  vvec3 n, vfloat alpha, vfloat eta, uint32_t mode) {
     const vfloat cos_o = v3_dot(n, c->s->wo);
+    vfloat kept = vf_one();
     if (distribution_of(mode) == TRC_LOBE_MULTI_GGX) {
-        const vfloat kept = vf_max(trc_correlated_glass_albedo(cos_o, alpha, eta), vf_set(0.1f));
+        kept = vf_max(trc_correlated_glass_albedo(cos_o, alpha, eta), vf_set(0.1f));
         reflected = v3_scale(reflected, vf_rcp(kept));
         refracted = v3_scale(refracted, vf_rcp(kept));
     }
@@ -439,14 +442,16 @@ static void add_correlated_glass(struct setup *c, vvec3 reflected, vvec3 refract
         lobe->fresnel = TRC_FRESNEL_BLEND;
         lobe->f0 = f0;
         lobe->f90 = v3_splat(vf_one());
-        lobe->mix_weight = lobe->mix_weight * f;
+        lobe->albedo_scale = kept;
+        lobe->mix_weight = lobe->mix_weight * kept * f;
     }
     lobe = add_dielectric(c, TRC_LOBE_REFRACT, refracted, n, alpha, eta, mode);
     if (lobe) {
         lobe->fresnel = TRC_FRESNEL_BLEND;
         lobe->f0 = f0;
         lobe->f90 = v3_splat(vf_one());
-        lobe->mix_weight = lobe->mix_weight * (vf_one() - f);
+        lobe->albedo_scale = kept;
+        lobe->mix_weight = lobe->mix_weight * kept * (vf_one() - f);
     }
 }
 

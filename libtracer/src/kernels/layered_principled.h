@@ -70,25 +70,28 @@ static vfloat layered_sheen(struct setup *c, const struct trc_leaf *leaf, vfloat
     return below(v3_scale(tint, albedo));
 }
 
-/* Sets the part of a coat that is for what is below it, without adding its lobe. */
+/* What the tint of the coat leaves of light from below: it is that of the way straight down, the
+ * view refracted into the coat takes a longer one. */
+static vvec3 coat_tint(const struct setup *c, const struct trc_leaf *leaf, vfloat cos_o,
+                       vfloat coat, vfloat ior) {
+    const vvec3 white = v3_splat(vf_one());
+    if (!may_differ(c, leaf, TRC_LAYERED_COAT_TINT, 1.0f) &&
+        !may_differ(c, leaf, TRC_LAYERED_COAT_TINT + 1, 1.0f) &&
+        !may_differ(c, leaf, TRC_LAYERED_COAT_TINT + 2, 1.0f))
+        return white;
+    const vfloat sine2 = (vf_one() - cos_o * cos_o) / (ior * ior), none = vf_zero();
+    const vfloat depth = vf_rcp(vf_sqrt(vf_max(vf_one() - sine2, vf_set(1e-6f))));
+    const vvec3 tint = colour(c, leaf, TRC_LAYERED_COAT_TINT);
+    const vvec3 color = v3(vf_pow(vf_max(tint.x, none), depth), vf_pow(vf_max(tint.y, none), depth),
+                           vf_pow(vf_max(tint.z, none), depth));
+    return v3_lerp(white, color, coat);
+}
+
+/* What a coat leaves for the layers below. */
 static vvec3 coat_passes(const struct setup *c, const struct trc_leaf *leaf, vfloat cos_o,
                          vfloat coat, vfloat ior) {
     const vfloat f = trc_fresnel_dielectric(cos_o, ior);
-    const vfloat through = vf_saturate(vf_one() - coat * f);
-    const bool has_tint = may_differ(c, leaf, TRC_LAYERED_COAT_TINT, 1.0f) ||
-                          may_differ(c, leaf, TRC_LAYERED_COAT_TINT + 1, 1.0f) ||
-                          may_differ(c, leaf, TRC_LAYERED_COAT_TINT + 2, 1.0f);
-    if (!has_tint)
-        return v3_splat(through);
-    /* The tint is that of the way straight down; along the refracted view it is longer. */
-    const vfloat sine2 = (vf_one() - cos_o * cos_o) / (ior * ior);
-    const vfloat depth = vf_rcp(vf_sqrt(vf_max(vf_one() - sine2, vf_set(1e-6f))));
-    const vvec3 tint = colour(c, leaf, TRC_LAYERED_COAT_TINT);
-    const vfloat least = vf_zero();
-    const vvec3 color =
-        v3(vf_pow(vf_max(tint.x, least), depth), vf_pow(vf_max(tint.y, least), depth),
-           vf_pow(vf_max(tint.z, least), depth));
-    return v3_scale(v3_lerp(v3_splat(vf_one()), color, coat), through);
+    return v3_scale(coat_tint(c, leaf, cos_o, coat, ior), vf_saturate(vf_one() - coat * f));
 }
 
 static vvec3 layered_coat(struct setup *c, const struct trc_leaf *leaf, vfloat weight) {
@@ -241,24 +244,27 @@ static void add_layered_principled(struct setup *c, const struct trc_leaf *leaf,
                               vf_saturate(trc_operand_value(sigma, c->regs)));
 }
 
-/* Emission shines through sheen and coat, of which without a surface nothing is known. */
+/* Emission shines through sheen and coat. Without a surface, for samples of it as a light, Cycles
+ * knows of the coat's tint only; here as seen head-on. */
 static bool layered_emission(const struct setup *c, const struct trc_leaf *leaf, vfloat weight,
                              vvec3 *emission) {
     const struct trc_operand *strength = input(c, leaf, TRC_LAYERED_EMISSION_STRENGTH);
     if (strength->reg < 0 && strength->value == 0.0f)
         return false;
     vvec3 rest = v3_splat(trc_operand_value(strength, c->regs) * weight * opacity_of(c, leaf));
+    const vfloat cos_o = c->s ? vf_saturate(v3_dot(c->s->n, c->s->wo)) : vf_one();
     if (c->s && may_exceed_zero(c, leaf, TRC_LAYERED_SHEEN)) {
         const vvec3 tint = v3_scale(colour(c, leaf, TRC_LAYERED_SHEEN_TINT),
                                     vf_max(number(c, leaf, TRC_LAYERED_SHEEN), vf_zero()));
         const vfloat rough = vf_clamp(number(c, leaf, TRC_LAYERED_SHEEN_ROUGHNESS), 0.01f, 1.0f);
-        const vfloat cosine = vf_saturate(v3_dot(c->s->n, c->s->wo));
-        rest = v3_scale(rest, below(v3_scale(tint, fibres_albedo(cosine, rough))));
+        rest = v3_scale(rest, below(v3_scale(tint, fibres_albedo(cos_o, rough))));
     }
-    if (c->s && may_exceed_zero(c, leaf, TRC_LAYERED_COAT))
-        rest = v3_mul(rest, coat_passes(c, leaf, v3_dot(c->s->n, c->s->wo),
-                                        vf_max(number(c, leaf, TRC_LAYERED_COAT), vf_zero()),
-                                        vf_max(number(c, leaf, TRC_LAYERED_COAT_IOR), vf_one())));
+    if (may_exceed_zero(c, leaf, TRC_LAYERED_COAT)) {
+        const vfloat coat = vf_max(number(c, leaf, TRC_LAYERED_COAT), vf_zero());
+        const vfloat ior = vf_max(number(c, leaf, TRC_LAYERED_COAT_IOR), vf_one());
+        rest = v3_mul(rest, c->s ? coat_passes(c, leaf, cos_o, coat, ior)
+                                 : coat_tint(c, leaf, cos_o, coat, ior));
+    }
     *emission = v3_mul(colour(c, leaf, TRC_LAYERED_EMISSION), rest);
     return true;
 }

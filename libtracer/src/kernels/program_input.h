@@ -284,7 +284,7 @@ static void op_window(const struct trc_surface *s, vfloat *out) {
     out[1] = (y - vf_set(window[2])) * vf_set(1.0f / (window[3] - window[2]));
 }
 
-/* A point or vector from one space to another. In the world there is no object space. */
+/* A point, vector or normal from one space to another. In the world there is no object space. */
 static vvec3 op_transform(const struct trc_surface *s, uint32_t mode, vvec3 v) {
     const uint32_t way = mode & 3u;
     const bool is_point = mode & TRC_TRANSFORM_POINT;
@@ -307,7 +307,7 @@ static vvec3 op_transform(const struct trc_surface *s, uint32_t mode, vvec3 v) {
             trc_load_affine(g.instance, s->time, &a);
         vvec3 moved;
         if (mode & TRC_TRANSFORM_NORMAL)
-            moved = normal_to_world(&a, v); /* the target's side is as good as the world's */
+            moved = normal_to_world(&a, v);
         else
             moved = is_point ? trc_transform_point(&a, v) : trc_transform_vector(&a, v);
         out = v3_select(g.lanes, moved, out);
