@@ -194,7 +194,7 @@ def inside_values():
     ramp.color_ramp.interpolation = 'CONSTANT'
     ramp.color_ramp.elements[0].color, ramp.color_ramp.elements[1].color = (1, 0, 0, 1), (0, 0, 1, 1)
     ramp.color_ramp.elements.new(0.4).color = (0, 1, 0, 1)
-    pairs["constant ramp"] = _both(FILM_SAMPLES)
+    pairs["constant ramp"] = _both(8 * FILM_SAMPLES)  # an edge through the middle
     for space in ('OBJECT', 'WORLD', 'BLENDER_OBJECT', 'BLENDER_WORLD'):
         node, _ = _shown("ShaderNodeNormalMap", "Normal", space=space)
         node.inputs["Color"].default_value = (0.7, 0.2, 0.3, 1.0)
