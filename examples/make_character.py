@@ -37,12 +37,20 @@ def new_material(name):
     return material, tree, tree.nodes.new("ShaderNodeOutputMaterial")
 
 
+# Sockets of Principled that Blender 4.0 renamed.
+RENAMED_SOCKETS = {"Specular": "Specular IOR Level", "Clearcoat": "Coat Weight",
+                   "Clearcoat Roughness": "Coat Roughness", "Transmission": "Transmission Weight",
+                   "Emission": "Emission Color", "Sheen": "Sheen Weight"}
+
+
 def set_inputs(node, values):
     """Set a node's inputs by name; three-component colours get alpha 1."""
     for name, value in values.items():
         if isinstance(value, tuple) and len(value) == 3:
             value = (*value, 1.0)
-        node.inputs[name].default_value = value
+        is_renamed = isinstance(name, str) and name not in node.inputs
+        socket = node.inputs[RENAMED_SOCKETS[name] if is_renamed else name]
+        socket.default_value = value
     return node
 
 

@@ -1,10 +1,12 @@
 #!/usr/bin/env bash
 # Set-up, build, every test; the last line is "N passed, N failed" (", N skipped").
 #
-#   bash tests/run.sh [--checks FILE]
+#   bash tests/run.sh [--checks FILE] [--blender-next] [--blender-next-fast]
 #
-# FILE holds further results to count, one per line: "passed NAME" or "failed NAME". The exit code is 0
-# only if something passed and nothing failed. Python tests find the build through these variables:
+# FILE holds further results to count, one per line: "passed NAME" or "failed NAME". --blender-next runs
+# the Blender tests in Blender 4.3 too, --blender-next-fast a selection of them (see blender_next.sh);
+# where that cannot be set up, it is one test skipped. The exit code is 0 only if something passed and
+# nothing failed. Python tests find the build through these variables:
 #   VOLLEY_BUILD          the build folder
 #   BLENDER_USER_SCRIPTS  the folder that makes Blender find the add-on
 # tests/support is on their import path.
@@ -12,7 +14,8 @@ set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 results=build/results
-summary=(--ctest "$results/ctest.xml" --pytest "$results/pytest.xml")
+summary=()
+next="" # what to run in the next Blender: nothing, all or fast
 
 say() { printf '== %s\n' "$*"; }
 
@@ -50,9 +53,23 @@ run_pytest() {
         --junit-xml "$results/pytest.xml" "${folders[@]}" </dev/null
 }
 
+run_blender_next() {
+    local status=0 arguments=(--report "$results/next.xml")
+    [ "$next" = all ] || arguments+=(--fast)
+    bash tests/blender_next.sh "${arguments[@]}" 2>&1 | tee "$results/next.log" || status=$?
+    if [ "$status" -eq 77 ]; then
+        printf 'skipped %s\n' "$(tail -n 1 "$results/next.log")" >"$results/next.checks"
+        summary+=(--checks "$results/next.checks")
+    else
+        summary+=(--pytest "$results/next.xml" "$status")
+    fi
+}
+
 while [ $# -gt 0 ]; do
     case $1 in
         --checks) summary+=(--checks "${2:?--checks needs a file}"); shift 2 ;;
+        --blender-next) next=all; shift ;;
+        --blender-next-fast) next=fast; shift ;;
         *) printf 'tests/run.sh: unknown argument: %s\n' "$1" >&2; exit 2 ;;
     esac
 done
@@ -65,9 +82,11 @@ python=$(find_python)
 rm -rf "$results"
 mkdir -p "$results"
 
-ctest_status=0
-run_ctest || ctest_status=$?
-pytest_status=0
-run_pytest || pytest_status=$?
-exec "$python" tests/support/summary.py "${summary[@]}" \
-    --ctest-status "$ctest_status" --pytest-status "$pytest_status"
+status=0
+run_ctest || status=$?
+summary+=(--ctest "$results/ctest.xml" "$status")
+status=0
+run_pytest || status=$?
+summary+=(--pytest "$results/pytest.xml" "$status")
+[ -z "$next" ] || run_blender_next
+exec "$python" tests/support/summary.py "${summary[@]}"

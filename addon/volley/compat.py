@@ -16,6 +16,27 @@ HAS_LONG_PASS_NAMES = bpy.app.version >= (5, 0, 0)
 # issue 109404).
 AREA_LIGHT_POWER = 4.0 / math.pi if bpy.app.version >= (4, 0, 0) else 1.0
 
+# A spot's cone became evenly bright in 4.0; before, it was times the cosine to its axis.
+SPOT_IS_EVEN = bpy.app.version >= (4, 0, 0)
+
+# Cycles of 4.0 has other microfacets: one height for masking and shadowing, glass by the micro-normal.
+HAS_CORRELATED_MICROFACETS = bpy.app.version >= (4, 0, 0)
+
+# Its camera hits no longer choose faint lobes more often than their share.
+CHOOSES_LOBES_PLAINLY = bpy.app.version >= (4, 0, 0)
+
+# Rough diffuse surfaces keep their energy from 4.3 on.
+KEEPS_DIFFUSE_ENERGY = bpy.app.version >= (4, 3, 0)
+
+# Cycles' tables of colour ramps have 257 entries instead of 256, which moves constant steps.
+RAMP_STEPS = 256 if bpy.app.version >= (4, 0, 0) else 255
+
+# Its table of shutter times starts half an entry later (measured, 4.3).
+SHUTTER_DELAY = 0.5 if bpy.app.version >= (4, 0, 0) else 0.0
+
+# The Vector Transform node treats normals as normals; 3.4 made unit vectors of them.
+TRANSFORMS_NORMALS = bpy.app.version >= (4, 0, 0)
+
 
 def cycles(data, name, default):
     """``data.cycles.name`` where Cycles' property groups exist, else default."""
@@ -31,6 +52,12 @@ def motion_position(scene):
 def uses_nodes(data):
     """Whether the node tree of a material, world or light rules (from 5.0 on it always does)."""
     return data.node_tree is not None and getattr(data, "use_nodes", True)
+
+
+def is_ball(light):
+    """Whether a point or spot light is a sphere: without Soft Falloff, which came in 4.1. With it, and
+    before, it is a disk that faces what it lights."""
+    return not getattr(light, "use_soft_falloff", True)
 
 
 def casts_shadow(light):

@@ -45,6 +45,7 @@ CAMERA_PERSPECTIVE, CAMERA_ORTHOGRAPHIC = 0, 1
 
 LIGHT_TYPES = {'POINT': 0, 'SPOT': 1, 'SUN': 2, 'AREA': 3}
 AREA_RECTANGLE, AREA_ELLIPSE = 0, 1
+LIGHT_SPHERE, LIGHT_EVEN_CONE = 1, 2
 
 INTEGRATORS = {'RAYCAST': 0, 'WHITTED': 1, 'DISTRIBUTION': 2}
 SAMPLERS = {'SOBOL': 0, 'SUDOKU': 1, 'JITTER': 2, 'INDEPENDENT': 3, 'BLUE_NOISE': 4}
@@ -59,6 +60,7 @@ ALPHA_STRAIGHT, ALPHA_PREMULTIPLIED, ALPHA_CHANNEL_PACKED, ALPHA_NONE = 0, 1, 2,
 
 MATERIAL_SAMPLE_EMISSION = 1
 MATERIAL_TRANSPARENT_SHADOW = 2
+MATERIAL_PLAIN_CHOICE = 4
 
 STATE_RUNNING, STATE_DONE, STATE_CANCELLED, STATE_FAILED = 0, 1, 2, 3
 
@@ -110,7 +112,7 @@ class _LightDesc(_Struct):
                 ("strength", _f32), ("radius", _f32), ("angle", _f32), ("size_x", _f32),
                 ("size_y", _f32), ("area_shape", _u32), ("spread", _f32), ("spot_angle", _f32),
                 ("spot_blend", _f32), ("visibility", _u32), ("cast_shadow", _u32), ("use_mis", _u32),
-                ("light_group", _u32)]
+                ("light_group", _u32), ("flags", _u32)]
 
 
 class _WorldDesc(_Struct):

@@ -451,6 +451,7 @@ class VOLLEY_LIGHT_PT_light(_VolleyPanel, Panel):
     def _draw_shape(column, light):
         if light.type in {'POINT', 'SPOT'}:
             column.prop(light, "shadow_soft_size", text="Radius")
+            _prop_if_present(column, light, "use_soft_falloff")
         elif light.type == 'SUN':
             column.prop(light, "angle")
         elif light.type == 'AREA':

@@ -32,7 +32,7 @@ SETUPS_FILE = pathlib.Path(scene_setups.__file__).resolve()
 PROJECT = SETUPS_FILE.parents[2]
 REFERENCE_SEED = 1
 FIRST_REPEAT_SEED = 101
-BLENDER_TIME = re.compile(r"^ Time: ([\d:.]+) \(Saving: ([\d:.]+)\)", re.MULTILINE)
+BLENDER_TIME = re.compile(r"^ ?Time: ([\d:.]+) \(Saving: ([\d:.]+)\)", re.MULTILINE)
 
 
 # Running Blender -------------------------------------------------------------------------------

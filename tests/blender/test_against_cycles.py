@@ -194,7 +194,7 @@ def inside_values():
     ramp.color_ramp.interpolation = 'CONSTANT'
     ramp.color_ramp.elements[0].color, ramp.color_ramp.elements[1].color = (1, 0, 0, 1), (0, 0, 1, 1)
     ramp.color_ramp.elements.new(0.4).color = (0, 1, 0, 1)
-    pairs["constant ramp"] = _both(FILM_SAMPLES)
+    pairs["constant ramp"] = _both(8 * FILM_SAMPLES)  # an edge through the middle
     for space in ('OBJECT', 'WORLD', 'BLENDER_OBJECT', 'BLENDER_WORLD'):
         node, _ = _shown("ShaderNodeNormalMap", "Normal", space=space)
         node.inputs["Color"].default_value = (0.7, 0.2, 0.3, 1.0)
@@ -330,15 +330,18 @@ def inside_shutter():
     mapping = scene.render.motion_blur_shutter_curve
     mapping.curves[0].points[0].location = (0.0, 0.1)
     mapping.update()
-    return {"box": box, "opening": _both(4096)}
+    return {"box": box, "opening": _both(4096)}, bpy.app.version
 
 
 def test_shutter(blender):
-    for shape, (ours, theirs) in blender.run(inside_shutter).items():
+    pairs, version = blender.run(inside_shutter)
+    for shape, (ours, theirs) in pairs.items():
+        # How 4.3 makes its table of times is known for a box; of a curve a quarter entry is not.
+        slack = 2.5 if version >= (4, 0, 0) and shape == "opening" else 1.0
         rows = [picture[..., 0].mean(axis=0) for picture in (ours, theirs)]
         assert rows[1][3] > 0.99 and rows[1][-3] < 0.01, shape
-        assert np.abs(rows[0] - rows[1]).max() < 2e-3, shape
-        assert rows[0].mean() == pytest.approx(rows[1].mean(), abs=4e-4), shape
+        assert np.abs(rows[0] - rows[1]).max() < slack * 2e-3, shape
+        assert rows[0].mean() == pytest.approx(rows[1].mean(), abs=slack * 4e-4), shape
 
 
 def inside_turning():
@@ -416,6 +419,50 @@ _MATERIALS = {
     "translucent": ("ShaderNodeBsdfTranslucent", {"Color": (0.5, 0.7, 0.9)}),
 }
 
+_PRINCIPLED = "ShaderNodeBsdfPrincipled"
+# Shaders and sockets that came with Blender 4.
+_LATER_MATERIALS = {
+    "later glossy": ("ShaderNodeBsdfAnisotropic", {"Color": (0.9, 0.7, 0.5), "Roughness": 0.6}),
+    "later glossy GGX": ("ShaderNodeBsdfAnisotropic", {"Color": (0.9, 0.7, 0.5), "Roughness": 0.8},
+                         {"distribution": 'GGX'}),
+    "rough diffuse": ("ShaderNodeBsdfDiffuse", {"Color": (0.9, 0.7, 0.5), "Roughness": 0.8}),
+    "sheen": ("ShaderNodeBsdfSheen", {"Color": (0.9, 0.7, 0.5), "Roughness": 0.5}),
+    "metallic": ("ShaderNodeBsdfMetallic", {"Base Color": (0.9, 0.7, 0.5), "Edge Tint": (0.5, 0.7, 0.9),
+                                            "Roughness": 0.4}, {"fresnel_type": 'F82'}),
+    "conductor": ("ShaderNodeBsdfMetallic", {"Roughness": 0.4}, {"fresnel_type": 'PHYSICAL_CONDUCTOR'}),
+    "layers": (_PRINCIPLED, {"Base Color": (0.8, 0.8, 0.8), "Specular IOR Level": 0.5}),
+    "specular tint": (_PRINCIPLED, {"Base Color": (0.3, 0.3, 0.8), "Roughness": 0.2,
+                                    "Specular IOR Level": 0.9, "Specular Tint": (1.0, 0.5, 0.2)}),
+    "large ior": (_PRINCIPLED, {"Base Color": (0.3, 0.3, 0.8), "IOR": 2.0, "Specular IOR Level": 0.5},
+                  {"distribution": 'GGX'}),
+    "rough metal": (_PRINCIPLED, {"Base Color": (0.8, 0.6, 0.2), "Metallic": 1.0, "Roughness": 0.8,
+                                  "Specular IOR Level": 0.5, "Specular Tint": (0.3, 0.6, 1.0)}),
+    "brushed metal": (_PRINCIPLED, {"Base Color": (0.8, 0.6, 0.2), "Metallic": 1.0,
+                                    "Anisotropic": 0.8, "Specular IOR Level": 0.5}),
+    "coat": (_PRINCIPLED, {"Base Color": (0.8, 0.3, 0.2), "Coat Weight": 1.0, "Coat Roughness": 0.1,
+                           "Coat Tint": (0.3, 0.8, 0.9)}),
+    "rough coat": (_PRINCIPLED, {"Base Color": (0.8, 0.3, 0.2), "Coat Weight": 0.7,
+                                 "Coat Roughness": 0.6, "Coat IOR": 1.9}),
+    "velvety": (_PRINCIPLED, {"Base Color": (0.1, 0.1, 0.1), "Sheen Weight": 1.0, "Sheen Roughness": 0.4,
+                              "Sheen Tint": (0.3, 0.8, 0.9)}),
+    "rough base": (_PRINCIPLED, {"Base Color": (0.8, 0.3, 0.2), "Diffuse Roughness": 0.8}),
+    "coated emission": (_PRINCIPLED, {"Base Color": (0.1, 0.1, 0.1), "Emission Color": (0.5, 0.2, 0.1),
+                                      "Emission Strength": 0.2, "Coat Weight": 1.0,
+                                      "Coat Tint": (0.5, 0.5, 0.9)}),
+}
+_MATERIALS.update(_LATER_MATERIALS)
+
+
+def _has(node_type, inputs):
+    """Whether this Blender has such a node with these sockets."""
+    import bpy
+    if not hasattr(bpy.types, node_type):
+        return False
+    tree = bpy.data.node_groups.new("Asked", "ShaderNodeTree")
+    sockets = tree.nodes.new(node_type).inputs.keys()
+    bpy.data.node_groups.remove(tree)
+    return all(name in sockets for name in inputs)
+
 
 def inside_light(names):
     """Channel means of both engines for each kind of light and each material."""
@@ -427,7 +474,7 @@ def inside_light(names):
         _, ball = _stage()
         if name in _MATERIALS:
             node_type, inputs, *settings = _MATERIALS[name]
-            if not hasattr(bpy.types, node_type):
+            if not _has(node_type, inputs):
                 continue
             tried = scenes.material("Tried", node_type,
                                     **{k.replace(" ", "_"): v for k, v in inputs.items()})

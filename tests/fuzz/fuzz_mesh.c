@@ -56,7 +56,7 @@ static void create_instance(struct bytes *b, trc_scene scene, trc_id mesh, float
     const uint32_t keys = 1 + bytes_below(b, MOST_KEYS);
     for (uint32_t k = 0; k < keys; k++)
         for (int i = 0; i < 12; i++)
-            transforms[12 * k + (uint32_t)i] = stage_identity[i];
+            transforms[12 * k + (uint32_t)i] = identity_transform[i];
     if (bytes_below(b, 2))
         bytes_floats(b, transforms, (size_t)12 * keys);
     const trc_instance_desc desc = {.struct_size = sizeof desc,

@@ -1,17 +1,17 @@
 /* Whole pictures whose values are known without another renderer. */
 #include "query_test.h"
 
+#include "default_descs.h"
+
 #define PI 3.14159265358979
 
 /* ---- scenes ---- */
 
-/* 6 m above the origin, looking down: x is right, y is up. */
+/* Of the default camera, which looks down on the origin: x is right, y is up. */
 #define CAMERA_HEIGHT 6.0f
-static const float camera_transform[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, CAMERA_HEIGHT};
-static const float identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
 
 static trc_scene scene_create(void) {
-    const trc_scene_desc desc = {.struct_size = sizeof desc, .thread_count = 1};
+    const trc_scene_desc desc = default_scene_desc();
     trc_scene scene = 0;
     assert_ok(trc_scene_create(&desc, &scene));
     return scene;
@@ -19,17 +19,12 @@ static trc_scene scene_create(void) {
 
 /* A material of one node with a colour and a number (diffuse: roughness, emission: strength). */
 static trc_id add_material(trc_scene scene, uint32_t type, const float color[3], float number) {
-    const trc_node node = {.type = type, .input_count = type == TRC_NODE_DIFFUSE ? 3 : 2};
-    const trc_node_input inputs[3] = {{.node = -1, .value = {color[0], color[1], color[2]}},
-                                      {.node = -1, .value = {number}},
-                                      {.node = -2}};
-    const trc_material_desc desc = {.struct_size = sizeof desc,
-                                    .node_count = 1,
-                                    .nodes = &node,
-                                    .inputs = inputs,
-                                    .input_count = node.input_count};
+    struct default_material m;
     trc_id id = 0;
-    assert_ok(trc_material_create(scene, &desc, &id));
+    default_material_init(&m, type);
+    memcpy(m.inputs[0].value, color, sizeof m.inputs[0].value);
+    m.inputs[1].value[0] = number;
+    assert_ok(trc_material_create(scene, &m.desc, &id));
     return id;
 }
 
@@ -38,56 +33,35 @@ static void add_square(trc_scene scene, float x, float y, float z, float half, t
     const float positions[12] = {x - half, y - half, z, x + half, y - half, z,
                                  x + half, y + half, z, x - half, y + half, z};
     static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
-    const trc_mesh_desc mesh = {.struct_size = sizeof mesh,
-                                .key_count = 1,
-                                .vertex_count = 4,
-                                .triangle_count = 2,
-                                .positions = positions,
-                                .position_count = 12,
-                                .indices = indices,
-                                .index_count = 6};
+    trc_mesh_desc mesh = default_mesh_desc();
+    mesh.vertex_count = 4;
+    mesh.triangle_count = 2;
+    mesh.positions = positions;
+    mesh.position_count = 12;
+    mesh.indices = indices;
+    mesh.index_count = 6;
     trc_id mesh_id = 0, instance_id = 0;
     assert_ok(trc_mesh_create(scene, &mesh, &mesh_id));
-    const trc_instance_desc instance = {.struct_size = sizeof instance,
-                                        .key_count = 1,
-                                        .mesh = mesh_id,
-                                        .transforms = identity,
-                                        .materials = &material,
-                                        .material_count = 1,
-                                        .visibility = TRC_VISIBLE_ALL};
+    trc_instance_desc instance = default_instance_desc(mesh_id);
+    instance.materials = &material;
+    instance.material_count = 1;
     assert_ok(trc_instance_create(scene, &instance, &instance_id));
 }
 
 /* A camera whose picture spans left, right, bottom, top at distance 1. */
 static trc_camera_desc camera_desc(const float window[4]) {
-    return (trc_camera_desc){.struct_size = sizeof(trc_camera_desc),
-                             .type = TRC_CAMERA_PERSPECTIVE,
-                             .key_count = 1,
-                             .transforms = camera_transform,
-                             .windows = window,
-                             .window_key_count = 1,
-                             .clip_start = 0.1f,
-                             .clip_end = 100.0f,
-                             .focus_distance = CAMERA_HEIGHT,
-                             .aperture_ratio = 1.0f};
+    trc_camera_desc desc = default_camera_desc();
+    desc.windows = window;
+    desc.focus_distance = CAMERA_HEIGHT;
+    return desc;
 }
 
 /* A square picture seen through narrow pixels, so that each shows one point of the scene. */
 static trc_render_desc render_desc(uint32_t size, uint32_t samples) {
-    return (trc_render_desc){.struct_size = sizeof(trc_render_desc),
-                             .width = size,
-                             .height = size,
-                             .integrator = TRC_INTEGRATOR_DISTRIBUTION,
-                             .sample_count = samples,
-                             .max_depth = 4,
-                             .max_transparent_depth = 4,
-                             .max_glossy_depth = 4,
-                             .max_transmission_depth = 4,
-                             .seed = 7,
-                             .filter = TRC_FILTER_BOX,
-                             .filter_width = 0.01f,
-                             .film_exposure = 1.0f,
-                             .thread_count = 1};
+    trc_render_desc desc = default_render_desc(size, size, samples);
+    desc.filter = TRC_FILTER_BOX;
+    desc.filter_width = 0.01f;
+    return desc;
 }
 
 /* Renders the committed scene; pixels: RGBA, lowest row first. */
@@ -125,16 +99,10 @@ static void any_number_of_light_samples(void **state) {
                    ((float)(cell / GRID) + 0.5f - GRID / 2) * edge, 0.0f, 0.5f * edge,
                    add_material(scene, TRC_NODE_DIFFUSE, albedo, 0.0f));
     }
-    trc_light_desc sun = {.struct_size = sizeof sun,
-                          .type = TRC_LIGHT_SUN,
-                          .color = {1, 1, 1},
-                          .strength = irradiance,
-                          .visibility = TRC_VISIBLE_ALL,
-                          .cast_shadow = 1,
-                          .use_mis = 1,
-                          .spread = (float)PI,
-                          .spot_angle = 1.0f};
-    memcpy(sun.transform, identity, sizeof identity);
+    trc_light_desc sun = default_light_desc();
+    sun.type = TRC_LIGHT_SUN;
+    sun.size_x = sun.size_y = 0.0f;
+    sun.strength = irradiance;
     trc_id id = 0;
     assert_ok(trc_light_create(scene, &sun, &id));
     const trc_camera_desc camera = camera_desc(window);

@@ -12,6 +12,10 @@ import bpy
 import numpy as np
 
 
+# Sockets of Principled that 4.0 renamed.
+_RENAMED_SOCKETS = {"Specular": "Specular IOR Level", "Sheen": "Sheen Weight"}
+
+
 def empty(engine='VOLLEY', size=(64, 48), samples=4):
     """A scene with nothing in it but a black world, for both engines with the same settings."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -45,6 +49,9 @@ def set_engine(engine, samples):
         cycles.diffuse_bounces = 0
         cycles.caustics_reflective = cycles.caustics_refractive = True
         cycles.device = 'CPU'
+        # 4.2 has blue noise for its default, which samples time and film less evenly in one pixel.
+        if cycles.sampling_pattern == 'AUTOMATIC':
+            cycles.sampling_pattern = 'TABULATED_SOBOL'
 
 
 def link(name, data):
@@ -118,7 +125,8 @@ def material(name, node_type, **inputs):
     output = tree.nodes.new("ShaderNodeOutputMaterial")
     node = tree.nodes.new(node_type)
     for key, value in inputs.items():
-        socket = node.inputs[key.replace("_", " ")]
+        name = key.replace("_", " ")
+        socket = node.inputs[name if name in node.inputs else _RENAMED_SOCKETS[name]]
         is_color = hasattr(socket.default_value, "__len__") and len(socket.default_value) == 4
         socket.default_value = (*value, 1.0) if is_color and len(value) == 3 else value
     tree.links.new(node.outputs[0], output.inputs["Surface"])

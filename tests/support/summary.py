@@ -65,7 +65,7 @@ def add(count, name, result, why):
 def add_report(count, runner, path, status, result_of):
     """Adds one runner's report; status is the exit code of the runner."""
     failed_before = len(count.failed)
-    cases = read_report(path) if path else []
+    cases = read_report(path)
     if cases is None:
         if status or os.path.exists(path):
             count.failed.append((runner, f"exit code {status} and no readable report"))
@@ -81,23 +81,23 @@ def add_checks(count, path):
         for line in lines:
             result, _, name = line.strip().partition(" ")
             if result:
-                add(count, name, "passed" if result == "passed" else "failed", "check")
+                add(count, name, result if result in ("passed", "skipped") else "failed", "check")
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--ctest", metavar="XML")
-    parser.add_argument("--ctest-status", type=int, default=0)
-    parser.add_argument("--pytest", metavar="XML")
-    parser.add_argument("--pytest-status", type=int, default=0)
-    parser.add_argument("--checks", metavar="FILE")
+    for runner in ("--ctest", "--pytest"):
+        parser.add_argument(runner, nargs=2, metavar=("XML", "STATUS"), action="append", default=[])
+    parser.add_argument("--checks", metavar="FILE", action="append", default=[])
     options = parser.parse_args()
 
     count = Count()
-    add_report(count, "ctest", options.ctest, options.ctest_status, ctest_result)
-    add_report(count, "pytest", options.pytest, options.pytest_status, pytest_result)
-    if options.checks:
-        add_checks(count, options.checks)
+    for path, status in options.ctest:
+        add_report(count, "ctest", path, int(status), ctest_result)
+    for path, status in options.pytest:
+        add_report(count, "pytest", path, int(status), pytest_result)
+    for path in options.checks:
+        add_checks(count, path)
     if not count.passed and not count.failed:
         print("No test ran.")
 

@@ -38,7 +38,7 @@ FIXTURE_INLINE int set_up(void **state) {
 FIXTURE_INLINE int tear_down(void **state) {
     (void)state;
     trc_render render = 0;
-    const trc_render_desc desc = fixture_render_desc(40, 8, 1);
+    const trc_render_desc desc = default_render_desc(40, 8, 1);
     float pixels[40 * 8 * 4];
     assert_int_equal(trc_scene_commit(scene), TRC_OK);
     assert_int_equal(trc_render_start(scene, &desc, &render), TRC_OK);

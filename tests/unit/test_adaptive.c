@@ -36,7 +36,7 @@ static double moments_score(const struct moments *m, double truth) {
 }
 
 static trc_render_desc square_desc(float threshold, uint32_t min_samples) {
-    trc_render_desc desc = fixture_render_desc(SIDE, SIDE, MOST);
+    trc_render_desc desc = default_render_desc(SIDE, SIDE, MOST);
     desc.crop_width = desc.crop_height = SIDE;
     desc.noise_threshold = threshold;
     desc.min_samples = min_samples;
@@ -158,7 +158,7 @@ struct picture {
 };
 
 static trc_render_desc picture_desc(float threshold) {
-    trc_render_desc desc = fixture_render_desc(WIDTH, HEIGHT, 256);
+    trc_render_desc desc = default_render_desc(WIDTH, HEIGHT, 256);
     desc.passes = UINT64_C(1) << TRC_PASS_SAMPLE_COUNT;
     desc.noise_threshold = threshold;
     desc.min_samples = 8;

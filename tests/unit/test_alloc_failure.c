@@ -55,7 +55,7 @@ static trc_mesh_desc rich_mesh(void) {
                                        .name = "UVMap",
                                        .values = uv,
                                        .value_count = 72};
-    trc_mesh_desc desc = fixture_mesh_desc();
+    trc_mesh_desc desc = default_mesh_desc();
     desc.key_count = 2;
     desc.positions = positions;
     desc.position_count = 48;
@@ -86,16 +86,16 @@ static void create_textured(struct session *s) {
 
 static void create_objects(struct session *s) {
     const trc_mesh_desc mesh = rich_mesh();
-    const trc_image_desc image = fixture_image_desc();
-    const trc_light_desc light = fixture_light_desc();
-    struct fixture_material glow;
-    fixture_material_init(&glow, TRC_NODE_EMISSION);
+    const trc_image_desc image = default_image_desc();
+    const trc_light_desc light = default_light_desc();
+    struct default_material glow;
+    default_material_init(&glow, TRC_NODE_EMISSION);
     STEP_OUT(s->mesh, trc_mesh_create(s->scene, &mesh, &s->mesh));
     STEP_OUT(s->image, trc_image_create(s->scene, &image, &s->image));
     create_textured(s);
     STEP_OUT(s->glow, trc_material_create(s->scene, &glow.desc, &s->glow));
     const trc_id materials[2] = {s->material, s->glow};
-    trc_instance_desc instance = fixture_instance_desc(s->mesh);
+    trc_instance_desc instance = default_instance_desc(s->mesh);
     instance.materials = materials;
     instance.material_count = 2;
     STEP_OUT(s->instance, trc_instance_create(s->scene, &instance, &s->instance));
@@ -110,14 +110,14 @@ static void create_objects(struct session *s) {
 
 static void set_view(struct session *s) {
     static const float curve[3] = {0, 1, 0};
-    struct fixture_material background;
-    fixture_material_init(&background, TRC_NODE_BACKGROUND);
+    struct default_material background;
+    default_material_init(&background, TRC_NODE_BACKGROUND);
     trc_id material = 0;
     STEP_OUT(material, trc_material_create(s->scene, &background.desc, &material));
-    trc_world_desc world = fixture_world_desc(material);
+    trc_world_desc world = default_world_desc(material);
     world.use_sampling = 1;
     STEP(trc_scene_set_world(s->scene, &world));
-    trc_camera_desc camera = fixture_camera_desc();
+    trc_camera_desc camera = default_camera_desc();
     camera.shutter_time = 0.5f;
     camera.shutter_curve = curve;
     camera.shutter_curve_count = 3;
@@ -126,7 +126,7 @@ static void set_view(struct session *s) {
 
 static void check_render(struct session *s, uint32_t progressive) {
     enum { WIDTH = 33, HEIGHT = 1 }; /* two tiles; hundreds of sessions run */
-    trc_render_desc desc = fixture_render_desc(WIDTH, HEIGHT, progressive ? 8 : 2);
+    trc_render_desc desc = default_render_desc(WIDTH, HEIGHT, progressive ? 8 : 2);
     desc.progressive = progressive;
     if (progressive) {
         desc.noise_threshold = 0.1f;
@@ -167,7 +167,7 @@ static void check_queries(struct session *s) {
 /* Everything a host does between opening and closing a file. */
 static void run_session(uint32_t is_final) {
     struct session s = {0};
-    trc_scene_desc desc = fixture_scene_desc();
+    trc_scene_desc desc = default_scene_desc();
     desc.is_final = is_final;
     STEP_OUT(s.scene, trc_scene_create(&desc, &s.scene));
     create_objects(&s);
@@ -176,7 +176,7 @@ static void run_session(uint32_t is_final) {
     check_queries(&s);
     check_render(&s, 0);
     /* A pose, an edit of everything, a second commit beside the first. */
-    const trc_light_desc light = fixture_light_desc();
+    const trc_light_desc light = default_light_desc();
     STEP(trc_mesh_update(s.scene, s.mesh, 1, cube_positions, 24, NULL, 0));
     STEP(trc_light_update(s.scene, s.light, &light));
     STEP(trc_scene_commit(s.scene));
@@ -232,7 +232,7 @@ static void each_operation_of_a_final_frame_fails_once(void **state) {
 static void renders_go_on_with_fewer_threads(void **state) {
     (void)state;
     const trc_scene scene = fixture_scene();
-    trc_render_desc desc = fixture_render_desc(200, 200, 1);
+    trc_render_desc desc = default_render_desc(200, 200, 1);
     desc.thread_count = 4;
     int whole = 0, reduced = 0, refused = 0;
     for (int64_t n = 0; whole == 0; n++) {

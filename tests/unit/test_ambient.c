@@ -13,7 +13,7 @@ enum { WIDTH = 16, HEIGHT = 4, FRAME = WIDTH * HEIGHT, SAMPLES = 1024 };
 static trc_id add_quad(trc_scene scene, const float corners[12], trc_id material) {
     static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
     trc_id mesh = 0, instance = 0;
-    trc_mesh_desc desc = fixture_mesh_desc();
+    trc_mesh_desc desc = default_mesh_desc();
     desc.vertex_count = 4;
     desc.triangle_count = 2;
     desc.positions = corners;
@@ -21,7 +21,7 @@ static trc_id add_quad(trc_scene scene, const float corners[12], trc_id material
     desc.indices = indices;
     desc.index_count = 6;
     assert_int_equal(trc_mesh_create(scene, &desc, &mesh), TRC_OK);
-    trc_instance_desc instance_desc = fixture_instance_desc(mesh);
+    trc_instance_desc instance_desc = default_instance_desc(mesh);
     instance_desc.materials = &material;
     instance_desc.material_count = 1;
     assert_int_equal(trc_instance_create(scene, &instance_desc, &instance), TRC_OK);
@@ -35,9 +35,9 @@ static trc_id add_level(trc_scene scene, float half, float z, trc_id material) {
 }
 
 static trc_id add_material(trc_scene scene, uint32_t type, float value) {
-    struct fixture_material m;
+    struct default_material m;
     trc_id id = 0;
-    fixture_material_init(&m, type);
+    default_material_init(&m, type);
     for (int c = 0; c < 3; c++)
         m.inputs[0].value[c] = value;
     if (type == TRC_NODE_DIFFUSE)
@@ -51,8 +51,8 @@ static trc_scene open_scene(void) {
     static const float transform[12] = {1, 0, 0, 2, 0, 1, 0, 0, 0, 0, 1, 1};
     static const float window[4] = {-2.0f, 2.0f, -0.5f, 0.5f};
     trc_scene scene = 0;
-    const trc_scene_desc scene_desc = fixture_scene_desc();
-    trc_camera_desc camera = fixture_camera_desc();
+    const trc_scene_desc scene_desc = default_scene_desc();
+    trc_camera_desc camera = default_camera_desc();
     camera.type = TRC_CAMERA_ORTHOGRAPHIC;
     camera.transforms = transform;
     camera.windows = window;
@@ -69,13 +69,13 @@ struct setting {
 
 /* Radiance of the columns of pixels, from x = 0 on. */
 static void draw(trc_scene scene, const struct setting *s, uint32_t pass, double column[WIDTH]) {
-    trc_world_desc world = fixture_world_desc(s->world);
+    trc_world_desc world = default_world_desc(s->world);
     world.ao_distance = s->distance;
     world.ao_factor = s->factor;
     world.ao_method = s->method;
     assert_int_equal(trc_scene_set_world(scene, &world), TRC_OK);
     assert_int_equal(trc_scene_commit(scene), TRC_OK);
-    trc_render_desc desc = fixture_render_desc(WIDTH, HEIGHT, SAMPLES);
+    trc_render_desc desc = default_render_desc(WIDTH, HEIGHT, SAMPLES);
     desc.filter = TRC_FILTER_BOX;
     desc.filter_width = 1.0f;
     desc.light_samples = s->light_samples;
@@ -164,7 +164,7 @@ static void corner(void **state) {
     /* In the corner itself: 4 cm of floor. */
     static const float transform[12] = {1, 0, 0, 0.02f, 0, 1, 0, 0, 0, 0, 1, 1};
     static const float window[4] = {-0.02f, 0.02f, -0.5f, 0.5f};
-    trc_camera_desc camera = fixture_camera_desc();
+    trc_camera_desc camera = default_camera_desc();
     camera.type = TRC_CAMERA_ORTHOGRAPHIC;
     camera.transforms = transform;
     camera.windows = window;
@@ -180,10 +180,10 @@ static void box(void **state) {
     const trc_scene scene = open_scene();
     const float above[12] = {5, 0, 0, 0, 0, 5, 0, 0, 0, 0, 5, 4};
     trc_id mesh = 0, instance = 0;
-    trc_mesh_desc mesh_desc = fixture_mesh_desc();
+    trc_mesh_desc mesh_desc = default_mesh_desc();
     double column[WIDTH];
     assert_int_equal(trc_mesh_create(scene, &mesh_desc, &mesh), TRC_OK);
-    trc_instance_desc desc = fixture_instance_desc(mesh);
+    trc_instance_desc desc = default_instance_desc(mesh);
     desc.transforms = above;
     assert_int_equal(trc_instance_create(scene, &desc, &instance), TRC_OK);
     draw(scene, &(struct setting){.distance = 18.0f, .factor = 1.0f}, 0, column);
@@ -238,7 +238,7 @@ static void replaced(void **state) {
     const trc_scene scene = open_scene();
     double both[WIDTH], lamp[WIDTH];
     trc_id light = 0;
-    const trc_light_desc light_desc = fixture_light_desc();
+    const trc_light_desc light_desc = default_light_desc();
     const trc_id sky = add_material(scene, TRC_NODE_BACKGROUND, 0.25f);
     add_level(scene, 1000.0f, 0.0f, add_material(scene, TRC_NODE_DIFFUSE, 0.5f));
     assert_int_equal(trc_light_create(scene, &light_desc, &light), TRC_OK);

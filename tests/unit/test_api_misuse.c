@@ -8,15 +8,15 @@
 static void refuse_scene(trc_scene bad) {
     trc_id id = UNTOUCHED;
     uint64_t size = UNTOUCHED;
-    const trc_mesh_desc mesh = fixture_mesh_desc();
-    const trc_instance_desc instance = fixture_instance_desc(1);
-    const trc_camera_desc camera = fixture_camera_desc();
-    const trc_light_desc light = fixture_light_desc();
-    const trc_world_desc world = fixture_world_desc(0);
-    const trc_image_desc image = fixture_image_desc();
-    const trc_render_desc render = fixture_render_desc(8, 8, 1);
-    struct fixture_material material;
-    fixture_material_init(&material, TRC_NODE_DIFFUSE);
+    const trc_mesh_desc mesh = default_mesh_desc();
+    const trc_instance_desc instance = default_instance_desc(1);
+    const trc_camera_desc camera = default_camera_desc();
+    const trc_light_desc light = default_light_desc();
+    const trc_world_desc world = default_world_desc(0);
+    const trc_image_desc image = default_image_desc();
+    const trc_render_desc render = default_render_desc(8, 8, 1);
+    struct default_material material;
+    default_material_init(&material, TRC_NODE_DIFFUSE);
     trc_scene_stats stats = {.struct_size = sizeof stats, .mesh_count = 77};
     char text[8] = "same";
     uint32_t hit = 5;
@@ -76,8 +76,8 @@ static void refuse_render(trc_render bad) {
 
 static void bad_handles(void **state) {
     (void)state;
-    const trc_scene_desc scene_desc = fixture_scene_desc();
-    const trc_render_desc desc = fixture_render_desc(8, 8, 1);
+    const trc_scene_desc scene_desc = default_scene_desc();
+    const trc_render_desc desc = default_render_desc(8, 8, 1);
     trc_scene stale = 0;
     trc_render render = 0;
     assert_int_equal(trc_scene_create(&scene_desc, &stale), TRC_OK);
@@ -97,11 +97,11 @@ static void bad_handles(void **state) {
 
 static void bad_ids(void **state) {
     (void)state;
-    const trc_scene_desc scene_desc = fixture_scene_desc();
-    const trc_mesh_desc mesh = fixture_mesh_desc();
-    const trc_light_desc light = fixture_light_desc();
-    struct fixture_material material;
-    fixture_material_init(&material, TRC_NODE_DIFFUSE);
+    const trc_scene_desc scene_desc = default_scene_desc();
+    const trc_mesh_desc mesh = default_mesh_desc();
+    const trc_light_desc light = default_light_desc();
+    struct default_material material;
+    default_material_init(&material, TRC_NODE_DIFFUSE);
     trc_scene other = 0;
     trc_id stale = 0, foreign = 0, of_light = 0, id = UNTOUCHED;
     assert_int_equal(trc_mesh_create(scene, &mesh, &stale), TRC_OK);
@@ -111,7 +111,7 @@ static void bad_ids(void **state) {
     assert_int_equal(trc_mesh_create(other, &mesh, &foreign), TRC_OK);
     const trc_id bad[] = {0, 1, UINT64_MAX, stale, of_light + (UINT64_C(1) << 32), foreign};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
-        const trc_instance_desc instance = fixture_instance_desc(bad[i]);
+        const trc_instance_desc instance = default_instance_desc(bad[i]);
         REFUSED(HANDLE, trc_mesh_update(scene, bad[i], 1, cube_positions, 24, NULL, 0));
         REFUSED(HANDLE, trc_mesh_destroy(scene, bad[i]));
         REFUSED(HANDLE, trc_instance_create(scene, &instance, &id));
@@ -123,7 +123,7 @@ static void bad_ids(void **state) {
         REFUSED(HANDLE, trc_light_update(scene, bad[i], &light));
         REFUSED(HANDLE, trc_light_destroy(scene, bad[i]));
         if (bad[i]) {
-            const trc_world_desc world = fixture_world_desc(bad[i]);
+            const trc_world_desc world = default_world_desc(bad[i]);
             REFUSED(HANDLE, trc_scene_set_world(scene, &world));
         }
     }
@@ -152,19 +152,19 @@ static void bad_ids(void **state) {
 static void wrong_struct_sizes(void **state) {
     (void)state;
     trc_id id = UNTOUCHED, mesh = 0, instance = 0, light = 0, material = 0;
-    trc_scene_desc scene_desc = fixture_scene_desc();
-    trc_mesh_desc mesh_desc = fixture_mesh_desc();
-    trc_camera_desc camera = fixture_camera_desc();
-    trc_light_desc light_desc = fixture_light_desc();
-    trc_world_desc world = fixture_world_desc(0);
-    trc_image_desc image = fixture_image_desc();
-    trc_render_desc render_desc = fixture_render_desc(8, 8, 1);
+    trc_scene_desc scene_desc = default_scene_desc();
+    trc_mesh_desc mesh_desc = default_mesh_desc();
+    trc_camera_desc camera = default_camera_desc();
+    trc_light_desc light_desc = default_light_desc();
+    trc_world_desc world = default_world_desc(0);
+    trc_image_desc image = default_image_desc();
+    trc_render_desc render_desc = default_render_desc(8, 8, 1);
     trc_scene_stats stats = {.struct_size = sizeof stats};
     trc_render_progress progress = {.struct_size = sizeof progress};
-    struct fixture_material m;
-    fixture_material_init(&m, TRC_NODE_DIFFUSE);
+    struct default_material m;
+    default_material_init(&m, TRC_NODE_DIFFUSE);
     assert_int_equal(trc_mesh_create(scene, &mesh_desc, &mesh), TRC_OK);
-    trc_instance_desc instance_desc = fixture_instance_desc(mesh);
+    trc_instance_desc instance_desc = default_instance_desc(mesh);
     assert_int_equal(trc_instance_create(scene, &instance_desc, &instance), TRC_OK);
     assert_int_equal(trc_light_create(scene, &light_desc, &light), TRC_OK);
     assert_int_equal(trc_material_create(scene, &m.desc, &material), TRC_OK);
@@ -218,16 +218,16 @@ static void wrong_struct_sizes(void **state) {
 
 static void missing_outputs(void **state) {
     (void)state;
-    const trc_scene_desc scene_desc = fixture_scene_desc();
-    const trc_mesh_desc mesh_desc = fixture_mesh_desc();
-    const trc_light_desc light_desc = fixture_light_desc();
-    const trc_image_desc image = fixture_image_desc();
-    const trc_render_desc render_desc = fixture_render_desc(8, 8, 1);
-    struct fixture_material m;
-    fixture_material_init(&m, TRC_NODE_DIFFUSE);
+    const trc_scene_desc scene_desc = default_scene_desc();
+    const trc_mesh_desc mesh_desc = default_mesh_desc();
+    const trc_light_desc light_desc = default_light_desc();
+    const trc_image_desc image = default_image_desc();
+    const trc_render_desc render_desc = default_render_desc(8, 8, 1);
+    struct default_material m;
+    default_material_init(&m, TRC_NODE_DIFFUSE);
     trc_id mesh = 0;
     assert_int_equal(trc_mesh_create(scene, &mesh_desc, &mesh), TRC_OK);
-    const trc_instance_desc instance_desc = fixture_instance_desc(mesh);
+    const trc_instance_desc instance_desc = default_instance_desc(mesh);
     trc_id *const bad[] = {NULL, MISALIGNED(trc_id)};
     for (int i = 0; i < 2; i++) {
         REFUSED(ARGUMENT, trc_scene_create(&scene_desc, bad[i]));
@@ -255,13 +255,13 @@ static void missing_outputs(void **state) {
 
 static void scene_limits(void **state) {
     (void)state;
-    trc_scene_desc desc = fixture_scene_desc();
+    trc_scene_desc desc = default_scene_desc();
     trc_scene made = UNTOUCHED;
     desc.thread_count = 1025;
     REFUSED(LARGE, trc_scene_create(&desc, &made));
     desc.thread_count = UINT32_MAX;
     REFUSED(LARGE, trc_scene_create(&desc, &made));
-    desc = fixture_scene_desc();
+    desc = default_scene_desc();
     desc.is_final = 2;
     REFUSED(ARGUMENT, trc_scene_create(&desc, &made));
     assert_true(made == UNTOUCHED);
@@ -269,8 +269,8 @@ static void scene_limits(void **state) {
 
 static void nothing_committed(void **state) {
     (void)state;
-    const trc_scene_desc scene_desc = fixture_scene_desc();
-    const trc_render_desc desc = fixture_render_desc(8, 8, 1);
+    const trc_scene_desc scene_desc = default_scene_desc();
+    const trc_render_desc desc = default_render_desc(8, 8, 1);
     trc_scene empty = 0;
     trc_render render = UNTOUCHED;
     trc_scene_stats stats = {.struct_size = sizeof stats};
@@ -291,7 +291,7 @@ static void nothing_committed(void **state) {
     REFUSED(ARGUMENT, trc_render_start(empty, &desc, &render));
     assert_true(render == UNTOUCHED);
     /* With a camera it renders the background. */
-    const trc_camera_desc camera = fixture_camera_desc();
+    const trc_camera_desc camera = default_camera_desc();
     assert_int_equal(trc_scene_set_camera(empty, &camera), TRC_OK);
     assert_int_equal(trc_scene_commit(empty), TRC_OK);
     assert_int_equal(trc_render_start(empty, &desc, &render), TRC_OK);
@@ -310,7 +310,7 @@ static void refuse_mesh(trc_status status, const trc_mesh_desc *desc) {
 
 #define REFUSE_MESH(status, change)               \
     do {                                          \
-        trc_mesh_desc desc = fixture_mesh_desc(); \
+        trc_mesh_desc desc = default_mesh_desc(); \
         change;                                   \
         refuse_mesh(status, &desc);               \
     } while (0)
@@ -357,7 +357,7 @@ static void mesh_indices(void **state) {
     trc_id id = 0;
     trc_mesh_desc empty = {.struct_size = sizeof empty, .key_count = 1};
     assert_int_equal(trc_mesh_create(scene, &empty, &id), TRC_OK);
-    const trc_instance_desc instance = fixture_instance_desc(id);
+    const trc_instance_desc instance = default_instance_desc(id);
     assert_int_equal(trc_instance_create(scene, &instance, &id), TRC_OK);
 }
 
@@ -376,13 +376,13 @@ static void mesh_normals(void **state) {
                 desc.normal_count = 24);
     /* Zero and NaN normals are replaced. */
     normals[5] = NAN;
-    trc_mesh_desc desc = fixture_mesh_desc();
+    trc_mesh_desc desc = default_mesh_desc();
     desc.normals = normals;
     desc.normal_kind = TRC_NORMALS_CORNER;
     desc.normal_count = 108;
     trc_id id = 0;
     assert_int_equal(trc_mesh_create(scene, &desc, &id), TRC_OK);
-    const trc_instance_desc instance = fixture_instance_desc(id);
+    const trc_instance_desc instance = default_instance_desc(id);
     assert_int_equal(trc_instance_create(scene, &instance, &id), TRC_OK);
 }
 
@@ -415,7 +415,7 @@ static void mesh_attributes(void **state) {
     REFUSE_ATTRIBUTE(ARGUMENT, bad.value_count = 71);
     REFUSE_ATTRIBUTE(LARGE, bad.value_count = UINT64_MAX);
     values[3] = NAN; /* becomes 0 */
-    trc_mesh_desc desc = fixture_mesh_desc();
+    trc_mesh_desc desc = default_mesh_desc();
     desc.attributes = &good;
     desc.attribute_count = 1;
     trc_id id = 0;
@@ -424,7 +424,7 @@ static void mesh_attributes(void **state) {
 
 static void mesh_updates(void **state) {
     (void)state;
-    const trc_mesh_desc desc = fixture_mesh_desc();
+    const trc_mesh_desc desc = default_mesh_desc();
     trc_id mesh = 0, instance = 0;
     float two_keys[48] = {0};
     assert_int_equal(trc_mesh_create(scene, &desc, &mesh), TRC_OK);
@@ -437,7 +437,7 @@ static void mesh_updates(void **state) {
     REFUSED(ARGUMENT, trc_mesh_update(scene, mesh, 1, MISALIGNED(float), 24, NULL, 0));
     REFUSED(ARGUMENT, trc_mesh_update(scene, mesh, 1, cube_positions, 24, cube_positions, 24));
     assert_int_equal(trc_mesh_update(scene, mesh, 2, two_keys, 48, NULL, 0), TRC_OK);
-    const trc_instance_desc placed = fixture_instance_desc(mesh);
+    const trc_instance_desc placed = default_instance_desc(mesh);
     assert_int_equal(trc_instance_create(scene, &placed, &instance), TRC_OK);
     REFUSED(ARGUMENT, trc_mesh_destroy(scene, mesh));
     assert_int_equal(trc_instance_destroy(scene, instance), TRC_OK);
@@ -455,7 +455,7 @@ static void bad_vertices_are_counted(void **state) {
         expected += cube_indices[3 * t] == 0 || cube_indices[3 * t + 1] == 0 ||
                     cube_indices[3 * t + 2] == 0;
     }
-    trc_mesh_desc desc = fixture_mesh_desc();
+    trc_mesh_desc desc = default_mesh_desc();
     desc.positions = positions;
     trc_id mesh = 0, instance = 0;
     trc_scene_stats stats = {.struct_size = sizeof stats};
@@ -463,7 +463,7 @@ static void bad_vertices_are_counted(void **state) {
     for (size_t i = 0; i < sizeof values / sizeof *values; i++) {
         positions[0] = values[i];
         assert_int_equal(trc_mesh_create(scene, &desc, &mesh), TRC_OK);
-        const trc_instance_desc placed = fixture_instance_desc(mesh);
+        const trc_instance_desc placed = default_instance_desc(mesh);
         assert_int_equal(trc_instance_create(scene, &placed, &instance), TRC_OK);
         assert_int_equal(trc_scene_commit(scene), TRC_OK);
         assert_int_equal(trc_scene_get_stats(scene, &stats), TRC_OK);
@@ -475,11 +475,11 @@ static void bad_vertices_are_counted(void **state) {
 
 static void instances(void **state) {
     (void)state;
-    const trc_mesh_desc mesh_desc = fixture_mesh_desc();
+    const trc_mesh_desc mesh_desc = default_mesh_desc();
     const trc_id stale_materials[2] = {0, 12345};
     trc_id mesh = 0, id = UNTOUCHED, instance = 0;
     assert_int_equal(trc_mesh_create(scene, &mesh_desc, &mesh), TRC_OK);
-    const trc_instance_desc good = fixture_instance_desc(mesh);
+    const trc_instance_desc good = default_instance_desc(mesh);
     assert_int_equal(trc_instance_create(scene, &good, &instance), TRC_OK);
 #define REFUSE_INSTANCE(status, change)                               \
     do {                                                              \
@@ -517,7 +517,7 @@ static void instances(void **state) {
 
 static void lights(void **state) {
     (void)state;
-    const trc_light_desc good = fixture_light_desc();
+    const trc_light_desc good = default_light_desc();
     trc_id id = UNTOUCHED, light = 0;
     assert_int_equal(trc_light_create(scene, &good, &light), TRC_OK);
 #define REFUSE_LIGHT(change)                                      \
@@ -541,6 +541,7 @@ static void lights(void **state) {
     REFUSE_LIGHT(desc.spread = NAN);
     REFUSE_LIGHT(desc.type = TRC_LIGHT_SPOT; desc.spot_angle = 0.0f);
     REFUSE_LIGHT(desc.type = TRC_LIGHT_SPOT; desc.spot_blend = 1.5f);
+    REFUSE_LIGHT(desc.flags = 2 * TRC_LIGHT_EVEN_CONE);
     REFUSE_LIGHT(desc.visibility = 32);
     REFUSE_LIGHT(desc.cast_shadow = 2);
     REFUSE_LIGHT(desc.use_mis = 7);
@@ -554,7 +555,7 @@ static void cameras(void **state) {
     const float curve[3] = {1, -1, 1}, nan_curve[2] = {NAN, 1}, dark[3] = {0, 0, 0};
 #define REFUSE_CAMERA(status, change)                        \
     do {                                                     \
-        trc_camera_desc desc = fixture_camera_desc();        \
+        trc_camera_desc desc = default_camera_desc();        \
         change;                                              \
         REFUSED(status, trc_scene_set_camera(scene, &desc)); \
     } while (0)
@@ -586,7 +587,7 @@ static void cameras(void **state) {
     REFUSE_CAMERA(ARGUMENT, desc.shutter_curve = curve; desc.shutter_curve_count = 3);
     REFUSE_CAMERA(ARGUMENT, desc.shutter_curve = nan_curve; desc.shutter_curve_count = 2);
     /* A shutter that never opens is a box; focus at infinity is a focus. */
-    trc_camera_desc desc = fixture_camera_desc();
+    trc_camera_desc desc = default_camera_desc();
     desc.shutter_time = 0.5f;
     desc.shutter_curve = dark;
     desc.shutter_curve_count = 3;
@@ -599,7 +600,7 @@ static void worlds(void **state) {
     (void)state;
 #define REFUSE_WORLD(status, change)                        \
     do {                                                    \
-        trc_world_desc desc = fixture_world_desc(0);        \
+        trc_world_desc desc = default_world_desc(0);        \
         change;                                             \
         REFUSED(status, trc_scene_set_world(scene, &desc)); \
     } while (0)
@@ -618,12 +619,12 @@ static void worlds(void **state) {
 static void materials(void **state) {
     (void)state;
     trc_id id = UNTOUCHED, material = 0;
-    struct fixture_material good, bad;
-    fixture_material_init(&good, TRC_NODE_DIFFUSE);
+    struct default_material good, bad;
+    default_material_init(&good, TRC_NODE_DIFFUSE);
     assert_int_equal(trc_material_create(scene, &good.desc, &material), TRC_OK);
 #define REFUSE_MATERIAL(status, change)                                   \
     do {                                                                  \
-        fixture_material_init(&bad, TRC_NODE_DIFFUSE);                    \
+        default_material_init(&bad, TRC_NODE_DIFFUSE);                    \
         change;                                                           \
         REFUSED(status, trc_material_create(scene, &bad.desc, &id));      \
         REFUSED(status, trc_material_update(scene, material, &bad.desc)); \
@@ -650,7 +651,7 @@ static void images(void **state) {
     trc_id id = UNTOUCHED;
 #define REFUSE_IMAGE(status, change)                          \
     do {                                                      \
-        trc_image_desc desc = fixture_image_desc();           \
+        trc_image_desc desc = default_image_desc();           \
         change;                                               \
         REFUSED(status, trc_image_create(scene, &desc, &id)); \
     } while (0)
@@ -669,7 +670,7 @@ static void images(void **state) {
     const trc_status status = trc_image_create(scene, &desc, &id);
     assert_true(status == TRC_ERROR_IMAGE || status == TRC_ERROR_UNSUPPORTED);
     assert_true(id == UNTOUCHED);
-    desc = fixture_image_desc();
+    desc = default_image_desc();
     assert_int_equal(trc_image_create(scene, &desc, &id), TRC_OK);
     assert_int_equal(trc_image_destroy(scene, id), TRC_OK);
     REFUSED(HANDLE, trc_image_destroy(scene, id));

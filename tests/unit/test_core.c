@@ -415,7 +415,7 @@ static void schedule_covers_every_pixel_once(void **state) {
     static const uint32_t sizes[][2] = {{1, 1},     {32, 32},   {33, 31},
                                         {640, 360}, {65536, 1}, {1, 5000}};
     for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
-        trc_render_desc desc = fixture_render_desc(sizes[i][0], sizes[i][1], 1);
+        trc_render_desc desc = default_render_desc(sizes[i][0], sizes[i][1], 1);
         desc.crop_width = desc.width;
         desc.crop_height = desc.height;
         struct trc_schedule schedule;
@@ -442,7 +442,7 @@ static void schedule_batches_rise(void **state) {
     } cases[] = {{1, 1},  {2, 2},  {3, 3},   {4, 3},   {5, 4},
                  {64, 7}, {65, 8}, {128, 8}, {129, 9}, {1000, 22}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        trc_render_desc desc = fixture_render_desc(8, 8, cases[i].samples);
+        trc_render_desc desc = default_render_desc(8, 8, cases[i].samples);
         desc.crop_width = desc.crop_height = 8;
         desc.progressive = 1;
         struct trc_schedule s;
@@ -568,7 +568,7 @@ static void normals_are_weighted_by_angle(void **state) {
     struct trc_mesh *mesh = NULL;
     const atomic_uint cancel = 0;
     assert_int_equal(trc_pool_create(3, &pool), TRC_OK);
-    trc_mesh_desc desc = fixture_mesh_desc();
+    trc_mesh_desc desc = default_mesh_desc();
     desc.smooth = cube_smooth;
     assert_int_equal(trc_geometry_create(&desc, names, &mesh), TRC_OK);
     assert_int_equal(trc_geometry_finish(mesh, pool, &cancel), TRC_OK);
@@ -597,7 +597,7 @@ static void bad_vertices_do_not_spread(void **state) {
     memcpy(indices + 36, more, sizeof more);
     uint8_t smooth[14];
     memset(smooth, 1, sizeof smooth);
-    trc_mesh_desc desc = fixture_mesh_desc();
+    trc_mesh_desc desc = default_mesh_desc();
     desc.vertex_count = 10;
     desc.triangle_count = 14;
     desc.positions = positions;
@@ -680,7 +680,7 @@ static void equal_keys_become_one(void **state) {
     float positions[48];
     memcpy(positions, cube_positions, sizeof cube_positions);
     memcpy(positions + 24, cube_positions, sizeof cube_positions);
-    trc_mesh_desc desc = fixture_mesh_desc();
+    trc_mesh_desc desc = default_mesh_desc();
     desc.key_count = 2;
     desc.positions = positions;
     desc.position_count = 48;

@@ -4,7 +4,7 @@
 enum { WIDTH = 64, HEIGHT = 48, FRAME = WIDTH * HEIGHT };
 
 static void draw(trc_scene scene, uint32_t samples, uint32_t light_samples, float *pixels) {
-    trc_render_desc desc = fixture_render_desc(WIDTH, HEIGHT, samples);
+    trc_render_desc desc = default_render_desc(WIDTH, HEIGHT, samples);
     desc.light_samples = light_samples;
     trc_render render = 0;
     assert_int_equal(trc_render_start(scene, &desc, &render), TRC_OK);

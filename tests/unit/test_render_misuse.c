@@ -10,7 +10,7 @@
 
 #define REFUSE_RENDER(status, change)                             \
     do {                                                          \
-        trc_render_desc desc = fixture_render_desc(64, 48, 4);    \
+        trc_render_desc desc = default_render_desc(64, 48, 4);    \
         trc_render render = UNTOUCHED;                            \
         change;                                                   \
         REFUSED(status, trc_render_start(scene, &desc, &render)); \
@@ -67,7 +67,7 @@ static void render_settings(void **state) {
 
 static void render_reads(void **state) {
     (void)state;
-    trc_render_desc desc = fixture_render_desc(64, 48, 1);
+    trc_render_desc desc = default_render_desc(64, 48, 1);
     desc.crop_x = 3;
     desc.crop_y = 40;
     desc.crop_width = 10;
@@ -179,15 +179,15 @@ static void host_float_state_is_kept(void **state) {
     (void)state;
     const uint32_t former = _mm_getcsr();
     const uint32_t odd = 0x0040u | 0x8000u | 0x4000u; /* DAZ, FTZ, round up, nothing masked */
-    const trc_scene_desc scene_desc = fixture_scene_desc();
-    trc_mesh_desc mesh_desc = fixture_mesh_desc();
+    const trc_scene_desc scene_desc = default_scene_desc();
+    trc_mesh_desc mesh_desc = default_mesh_desc();
     mesh_desc.smooth = cube_smooth;
-    const trc_camera_desc camera = fixture_camera_desc();
-    const trc_light_desc light_desc = fixture_light_desc();
-    const trc_render_desc render_desc = fixture_render_desc(33, 17, 2);
-    const trc_image_desc image_desc = fixture_image_desc();
-    struct fixture_material material_desc;
-    fixture_material_init(&material_desc, TRC_NODE_EMISSION);
+    const trc_camera_desc camera = default_camera_desc();
+    const trc_light_desc light_desc = default_light_desc();
+    const trc_render_desc render_desc = default_render_desc(33, 17, 2);
+    const trc_image_desc image_desc = default_image_desc();
+    struct default_material material_desc;
+    default_material_init(&material_desc, TRC_NODE_EMISSION);
     trc_scene own = 0;
     trc_id mesh = 0, instance = 0, light = 0, image = 0;
     trc_id material = 0;
@@ -219,7 +219,7 @@ static void host_float_state_is_kept(void **state) {
     STEP(trc_mesh_create(own, &mesh_desc, &mesh));
     STEP(trc_image_create(own, &image_desc, &image));
     STEP(trc_material_create(own, &material_desc.desc, &material));
-    trc_instance_desc instance_desc = fixture_instance_desc(mesh);
+    trc_instance_desc instance_desc = default_instance_desc(mesh);
     instance_desc.materials = &material;
     instance_desc.material_count = 1;
     STEP(trc_instance_create(own, &instance_desc, &instance));

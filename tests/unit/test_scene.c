@@ -35,7 +35,7 @@ static void commits_share_what_stays(void **state) {
     assert_int_equal(first->instance_count, 1);
     assert_int_equal(first->has_camera, 1);
 
-    trc_camera_desc camera = fixture_camera_desc();
+    trc_camera_desc camera = default_camera_desc();
     camera.aperture_radius = 0.1f;
     assert_int_equal(trc_scene_set_camera(scene, &camera), TRC_OK);
     assert_int_equal(trc_scene_commit(scene), TRC_OK);
@@ -45,7 +45,7 @@ static void commits_share_what_stays(void **state) {
     assert_true(second->features & TRC_FEATURE_LENS);
     assert_int_equal(stats_of(scene).built_count, 0);
 
-    trc_light_desc light = fixture_light_desc();
+    trc_light_desc light = default_light_desc();
     trc_id id = 0;
     assert_int_equal(trc_light_create(scene, &light, &id), TRC_OK);
     assert_int_equal(trc_scene_commit(scene), TRC_OK);
@@ -60,9 +60,9 @@ static void features_are_what_the_scene_uses(void **state) {
     uint32_t features = stats_of(scene).features;
     assert_int_equal(features, TRC_FEATURE_LIGHTS | TRC_FEATURE_AREA_LIGHTS);
     trc_id mesh = 0, instance = 0;
-    const trc_mesh_desc mesh_desc = fixture_mesh_desc();
+    const trc_mesh_desc mesh_desc = default_mesh_desc();
     assert_int_equal(trc_mesh_create(scene, &mesh_desc, &mesh), TRC_OK);
-    trc_instance_desc desc = fixture_instance_desc(mesh);
+    trc_instance_desc desc = default_instance_desc(mesh);
     float transforms[24];
     memcpy(transforms, identity_transform, sizeof identity_transform);
     memcpy(transforms + 12, identity_transform, sizeof identity_transform);
@@ -85,7 +85,7 @@ static void features_are_what_the_scene_uses(void **state) {
     memcpy(positions + 24, cube_positions, sizeof cube_positions);
     positions[30] = 3.0f;
     assert_int_equal(trc_mesh_update(scene, mesh, 2, positions, 48, NULL, 0), TRC_OK);
-    trc_world_desc world = fixture_world_desc(0);
+    trc_world_desc world = default_world_desc(0);
     world.ao_factor = 0.5f;
     assert_int_equal(trc_scene_set_world(scene, &world), TRC_OK);
     assert_int_equal(trc_scene_commit(scene), TRC_OK);
@@ -101,7 +101,7 @@ static void bad_texels_are_named(void **state) {
     (void)state;
     const trc_scene scene = fixture_scene();
     float pixels[16] = {1, 2, 3, 1, NAN, 0, 0, 1, 0, INFINITY, 0, 1, 1, 1, 1, 1};
-    trc_image_desc desc = fixture_image_desc();
+    trc_image_desc desc = default_image_desc();
     desc.pixels = pixels;
     trc_id image = 0;
     char text[256];
@@ -124,12 +124,12 @@ static void singular_instances_are_hidden_and_counted(void **state) {
     memcpy(positions, cube_positions, sizeof cube_positions);
     memcpy(positions + 24, cube_positions, sizeof cube_positions);
     positions[30] = 3.0f;
-    trc_mesh_desc mesh_desc = fixture_mesh_desc();
+    trc_mesh_desc mesh_desc = default_mesh_desc();
     mesh_desc.key_count = 2;
     mesh_desc.positions = positions;
     mesh_desc.position_count = 48;
     assert_int_equal(trc_mesh_create(scene, &mesh_desc, &mesh), TRC_OK);
-    trc_instance_desc desc = fixture_instance_desc(mesh);
+    trc_instance_desc desc = default_instance_desc(mesh);
     float transform[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0};
     desc.transforms = transform;
     assert_int_equal(trc_instance_create(scene, &desc, &instance), TRC_OK);
@@ -158,14 +158,14 @@ static void destroyed_materials_leave_the_default(void **state) {
     (void)state;
     const trc_scene scene = fixture_scene();
     trc_id mesh = 0, instance = 0, materials[2] = {0};
-    struct fixture_material material;
-    fixture_material_init(&material, TRC_NODE_DIFFUSE);
+    struct default_material material;
+    default_material_init(&material, TRC_NODE_DIFFUSE);
     for (int i = 0; i < 2; i++) {
         assert_int_equal(trc_material_create(scene, &material.desc, &materials[i]), TRC_OK);
     }
-    const trc_mesh_desc mesh_desc = fixture_mesh_desc();
+    const trc_mesh_desc mesh_desc = default_mesh_desc();
     assert_int_equal(trc_mesh_create(scene, &mesh_desc, &mesh), TRC_OK);
-    trc_instance_desc desc = fixture_instance_desc(mesh);
+    trc_instance_desc desc = default_instance_desc(mesh);
     desc.materials = materials;
     desc.material_count = 2;
     assert_int_equal(trc_instance_create(scene, &desc, &instance), TRC_OK);
@@ -206,7 +206,7 @@ static float *render_image(trc_scene scene, const trc_render_desc *desc) {
 static void image_does_not_depend_on_threads(void **state) {
     (void)state;
     const trc_scene scene = fixture_scene();
-    trc_render_desc desc = fixture_render_desc(100, 70, 19);
+    trc_render_desc desc = default_render_desc(100, 70, 19);
     desc.thread_count = 1;
     float *reference = render_image(scene, &desc);
     const size_t bytes = (size_t)100 * 70 * 4 * sizeof(float);
@@ -229,7 +229,7 @@ static void image_does_not_depend_on_threads(void **state) {
 static void cancelled_renders_keep_what_they_have(void **state) {
     (void)state;
     const trc_scene scene = fixture_scene();
-    trc_render_desc desc = fixture_render_desc(256, 256, 1u << 20);
+    trc_render_desc desc = default_render_desc(256, 256, 1u << 20);
     desc.progressive = 1;
     trc_render render = 0;
     trc_render_progress progress = {.struct_size = sizeof progress};
@@ -267,7 +267,7 @@ static void *wait_for_end(void *context) {
 static void destroying_releases_waiters(void **state) {
     (void)state;
     const trc_scene scene = fixture_scene();
-    const trc_render_desc desc = fixture_render_desc(128, 128, 1u << 20);
+    const trc_render_desc desc = default_render_desc(128, 128, 1u << 20);
     trc_render render = 0;
     pthread_t thread;
     void *result = NULL;
@@ -288,7 +288,7 @@ static void several_renders_at_once(void **state) {
     enum { COUNT = 4 };
     trc_scene scenes[COUNT];
     trc_render renders[COUNT];
-    const trc_render_desc desc = fixture_render_desc(64, 64, 4);
+    const trc_render_desc desc = default_render_desc(64, 64, 4);
     const uint64_t floats = 64 * 64 * 4;
     static float first[64 * 64 * 4], other[64 * 64 * 4];
     for (int i = 0; i < COUNT; i++) {
@@ -351,7 +351,7 @@ static trc_id create_large_mesh(trc_scene scene) {
                                 .smooth = smooth};
     trc_id mesh = 0, instance = 0;
     assert_int_equal(trc_mesh_create(scene, &desc, &mesh), TRC_OK);
-    const trc_instance_desc placed = fixture_instance_desc(mesh);
+    const trc_instance_desc placed = default_instance_desc(mesh);
     assert_int_equal(trc_instance_create(scene, &placed, &instance), TRC_OK);
     free(positions);
     free(indices);

@@ -6,6 +6,7 @@ Functions as in ``textures.py``: of the walker, the node and its ``Sockets``.
 
 import numpy as np
 
+from ..compat import TRANSFORMS_NORMALS
 from .values import CONSTANT, DEFAULT, Value
 
 # TRC_NODE_*
@@ -20,7 +21,7 @@ _RAY_LENGTH = 7  # output of the Light Path node
 _TABLE_SIZE = 256
 
 _SPACES = ('WORLD', 'OBJECT', 'CAMERA')
-_TRANSFORMS = ('POINT', 'VECTOR', 'NORMAL')
+_TRANSFORMS = {'POINT': 0, 'VECTOR': 1, 'NORMAL': 3 if TRANSFORMS_NORMALS else 2}
 _ROTATIONS = ('AXIS_ANGLE', 'X_AXIS', 'Y_AXIS', 'Z_AXIS', 'EULER_XYZ')
 
 
@@ -124,7 +125,7 @@ def _map_range(walker, node, sockets):
 
 def _vector_transform(walker, node, sockets):
     mode = (_SPACES.index(node.convert_from) | _SPACES.index(node.convert_to) << 2
-            | _TRANSFORMS.index(node.vector_type) << 4)
+            | _TRANSFORMS[node.vector_type] << 4)
     index = walker.emit(VECTOR_TRANSFORM, (sockets.get('v', "Vector"),), mode)
     return {"Vector": Value('v', index, 0)}
 

@@ -8,7 +8,7 @@ linked to textures. Anything else is named in the warnings and its unlinked part
 import math
 
 from .. import native
-from ..compat import AREA_LIGHT_POWER, casts_shadow, cycles, uses_nodes
+from ..compat import AREA_LIGHT_POWER, SPOT_IS_EVEN, casts_shadow, cycles, is_ball, uses_nodes
 from . import flatten
 from .visibility import light_visibility
 
@@ -47,12 +47,13 @@ def _color(light):
 
 
 def _point(light):
-    return {"radius": light.shadow_soft_size}
+    return {"radius": light.shadow_soft_size, "flags": native.LIGHT_SPHERE if is_ball(light) else 0}
 
 
 def _spot(light):
-    return {"radius": light.shadow_soft_size, "spot_angle": light.spot_size,
-            "spot_blend": light.spot_blend}
+    fields = _point(light)
+    fields["flags"] |= native.LIGHT_EVEN_CONE if SPOT_IS_EVEN else 0
+    return {**fields, "spot_angle": light.spot_size, "spot_blend": light.spot_blend}
 
 
 def _sun(light):

@@ -4,7 +4,7 @@
 import bpy
 
 from .. import native
-from ..compat import cycles, uses_nodes
+from ..compat import CHOOSES_LOBES_PLAINLY, cycles, uses_nodes
 from . import flatten, nodes
 from .changes import Changes
 from .values import CONSTANT, DEFAULT, Value
@@ -156,6 +156,7 @@ class Entry:
 
 def _flags(material):
     flags = native.MATERIAL_TRANSPARENT_SHADOW if _has_transparent_shadow(material) else 0
+    flags |= native.MATERIAL_PLAIN_CHOICE if CHOOSES_LOBES_PLAINLY else 0
     if cycles(material, "sample_as_light", cycles(material, "emission_sampling", 'AUTO') != 'NONE'):
         flags |= native.MATERIAL_SAMPLE_EMISSION
     return flags

@@ -13,7 +13,7 @@ import numpy as np
 from mathutils import Matrix, Quaternion
 
 from .. import native
-from ..compat import cycles
+from ..compat import SHUTTER_DELAY, cycles
 
 _CURVE_SAMPLES = 256
 _TINY = 1e-30       # in place of a zero to divide by
@@ -87,6 +87,7 @@ def _opening(samples):
     # long as neighbours are alike; Cycles does so even where the curve rises from or falls to zero.
     back = np.where(area > 0.0, (total[piece] - shares) / np.maximum(area, _TINY), 0.0).clip(0.0, 2.0)
     times = np.append(np.maximum.accumulate((piece - back).clip(0.0)) / (count + 1), 1.0)
+    times[:-1] += SHUTTER_DELAY / count
     fine = (count + 1) * _PIECE_SAMPLES
     middles = (np.arange(fine) + 0.5) / fine
     let_through = np.interp(middles, times, np.linspace(0.0, 1.0, count))

@@ -10,19 +10,21 @@ from collections import namedtuple
 
 import numpy as np
 
+from ..compat import HAS_CORRELATED_MICROFACETS, KEEPS_DIFFUSE_ENERGY, RAMP_STEPS
 from .converters import CONVERTERS
 from .textures import TEXTURES
 from .values import CONSTANT, DEFAULT, Value
 
 # TRC_NODE_*
 (DIFFUSE, GLOSSY, GLASS, REFRACTION, TRANSPARENT, TRANSLUCENT, EMISSION, BACKGROUND, MIX_SHADER,
- ADD_SHADER, HOLDOUT, PRINCIPLED, VELVET, TOON) = range(1, 15)
+ ADD_SHADER, HOLDOUT, PRINCIPLED, VELVET, TOON, LAYERED_PRINCIPLED, SHEEN) = range(1, 17)
 (IMAGE, ENVIRONMENT, UV_MAP, COLOR_ATTRIBUTE, TEXTURE_COORDINATE, MAPPING, MIX_COLOR, MATH, FRESNEL,
  LAYER_WEIGHT, LIGHT_PATH, GEOMETRY, NORMAL_MAP, INVERT, GAMMA, HUE_SATURATION, BRIGHT_CONTRAST,
  COLOR_RAMP, SEPARATE, COMBINE, MAP_RANGE, CLAMP, CHECKER, OBJECT_INFO, VECTOR_MATH,
  RGB_TO_BW) = range(64, 90)
 
 _DISTRIBUTIONS = {'GGX': 0, 'MULTI_GGX': 1, 'BECKMANN': 2, 'SHARP': 3, 'ASHIKHMIN_SHIRLEY': 4}
+_CORRELATED = 16 if HAS_CORRELATED_MICROFACETS else 0
 
 _BLENDS = ('MIX', 'DARKEN', 'MULTIPLY', 'BURN', 'LIGHTEN', 'SCREEN', 'DODGE', 'ADD', 'OVERLAY',
            'SOFT_LIGHT', 'LINEAR_LIGHT', 'DIFFERENCE', 'SUBTRACT', 'DIVIDE', 'HUE', 'SATURATION',
@@ -40,35 +42,48 @@ _VECTOR_MATH = ('ADD', 'SUBTRACT', 'MULTIPLY', 'DIVIDE', 'MULTIPLY_ADD', 'CROSS_
                 'MODULO', 'WRAP', 'FACEFORWARD', 'REFRACT')
 VECTOR_SUBTRACT, VECTOR_MULTIPLY_ADD, VECTOR_DOT, VECTOR_NORMALIZE = 1, 4, 8, 12
 VECTOR_MINIMUM, VECTOR_MAXIMUM = 14, 15
-_MATH_SUBTRACT, _MATH_MULTIPLY, _MATH_DIVIDE, _MATH_MULTIPLY_ADD = 1, 2, 3, 4
+_MATH_SUBTRACT, _MATH_MULTIPLY, _MATH_MULTIPLY_ADD = 1, 2, 4
 
 _INTERPOLATIONS = {'Linear': 0, 'Closest': 1, 'Cubic': 2, 'Smart': 2}
 _EXTENSIONS = {'REPEAT': 0, 'EXTEND': 1, 'CLIP': 2, 'MIRROR': 3}
 _PROJECTIONS = {'FLAT': 0, 'BOX': 1, 'SPHERE': 2, 'TUBE': 3}
 _CLAMP_RESULT = 256
-_ANISOTROPIC = {GLOSSY: (2, 5), PRINCIPLED: (7, 21)}  # inputs: anisotropy, tangent
+_ANISOTROPIC = {GLOSSY: (2, 5), PRINCIPLED: (7, 21), LAYERED_PRINCIPLED: (9, 11)}  # anisotropy, tangent
 RAMP_SIZE = 256
 
 # inputs: (kind, socket identifiers by preference...); outputs: (socket identifier, kind) in the
 # library's order; mode(node): mode bits or None where the node is set to something unsupported.
 Spec = namedtuple("Spec", "type inputs outputs mode", defaults=(None,))
 
-# Socket names of the Principled shader: 3.4's in the library's order, then the newer ones.
+# Socket names of the Principled shader in the library's order: of 3.4 ...
 _PRINCIPLED_INPUTS = (
-    ('c', "Base Color"), ('f', "Subsurface", "Subsurface Weight"), ('c', "Subsurface Color", "Base Color"),
-    ('f', "Metallic"), ('f', "Specular"), ('f', "Specular Tint"), ('f', "Roughness"),
-    ('f', "Anisotropic"), ('f', "Anisotropic Rotation"), ('f', "Sheen", "Sheen Weight"),
-    ('f', "Sheen Tint"), ('f', "Clearcoat", "Coat Weight"),
-    ('f', "Clearcoat Roughness", "Coat Roughness"), ('f', "IOR"),
-    ('f', "Transmission", "Transmission Weight"), ('f', "Transmission Roughness"),
-    ('c', "Emission", "Emission Color"), ('f', "Emission Strength"), ('f', "Alpha"), ('v', "Normal"),
-    ('v', "Clearcoat Normal", "Coat Normal"), ('v', "Tangent"))
+    ('c', "Base Color"), ('f', "Subsurface"), ('c', "Subsurface Color"), ('f', "Metallic"),
+    ('f', "Specular"), ('f', "Specular Tint"), ('f', "Roughness"), ('f', "Anisotropic"),
+    ('f', "Anisotropic Rotation"), ('f', "Sheen"), ('f', "Sheen Tint"), ('f', "Clearcoat"),
+    ('f', "Clearcoat Roughness"), ('f', "IOR"), ('f', "Transmission"), ('f', "Transmission Roughness"),
+    ('c', "Emission"), ('f', "Emission Strength"), ('f', "Alpha"), ('v', "Normal"),
+    ('v', "Clearcoat Normal"), ('v', "Tangent"))
+
+# ... and from 4.0 on.
+_LAYERED_INPUTS = (
+    ('c', "Base Color"), ('f', "Metallic"), ('f', "Roughness"), ('f', "IOR"), ('f', "Alpha"),
+    ('v', "Normal"), ('f', "Diffuse Roughness"), ('f', "Specular IOR Level"), ('c', "Specular Tint"),
+    ('f', "Anisotropic"), ('f', "Anisotropic Rotation"), ('v', "Tangent"),
+    ('f', "Transmission Weight"), ('f', "Coat Weight"), ('f', "Coat Roughness"), ('f', "Coat IOR"),
+    ('c', "Coat Tint"), ('v', "Coat Normal"), ('f', "Sheen Weight"), ('f', "Sheen Roughness"),
+    ('c', "Sheen Tint"), ('c', "Emission Color"), ('f', "Emission Strength"))
 
 _SHADER = (("BSDF", 's'),)
 
 
 def _distribution(node):
     return _DISTRIBUTIONS.get(getattr(node, "distribution", 'GGX'))
+
+
+def _microfacets(node):
+    """A distribution with the model of this Blender's Cycles."""
+    distribution = _distribution(node)
+    return None if distribution is None else distribution | _CORRELATED
 
 
 def _color_mode(node):
@@ -94,16 +109,17 @@ def _mix_rgb_mode(node):
 
 _SPECS = {
     "ShaderNodeBsdfDiffuse": Spec(
-        DIFFUSE, (('c', "Color"), ('f', "Roughness"), ('v', "Normal")), _SHADER),
+        DIFFUSE, (('c', "Color"), ('f', "Roughness"), ('v', "Normal")), _SHADER,
+        lambda _node: int(KEEPS_DIFFUSE_ENERGY)),
     "ShaderNodeBsdfGlossy": Spec(
         GLOSSY, (('c', "Color"), ('f', "Roughness"), ('f', "Anisotropy"), ('f', "Rotation"),
-                 ('v', "Normal"), ('v', "Tangent")), _SHADER, _distribution),
+                 ('v', "Normal"), ('v', "Tangent")), _SHADER, _microfacets),
     "ShaderNodeBsdfGlass": Spec(
         GLASS, (('c', "Color"), ('f', "Roughness"), ('f', "IOR"), ('v', "Normal")), _SHADER,
-        _distribution),
+        _microfacets),
     "ShaderNodeBsdfRefraction": Spec(
         REFRACTION, (('c', "Color"), ('f', "Roughness"), ('f', "IOR"), ('v', "Normal")), _SHADER,
-        _distribution),
+        _microfacets),
     "ShaderNodeBsdfTransparent": Spec(TRANSPARENT, (('c', "Color"),), _SHADER),
     "ShaderNodeBsdfTranslucent": Spec(TRANSLUCENT, (('c', "Color"), ('v', "Normal")), _SHADER),
     "ShaderNodeBsdfVelvet": Spec(
@@ -283,50 +299,74 @@ def _unsupported(walker, node, sockets):
 # Nodes with a function of their own --------------------------------------------------------------
 
 def _principled(walker, node, sockets):
-    """Principled of 3.4 as it is; of 4.0 and later by the sockets that have a counterpart."""
-    values = [sockets.get(kind, *names) for kind, *names in _PRINCIPLED_INPUTS]
-    is_new = sockets.find("Specular IOR Level") is not None
-    if is_new:
-        values[4] = _specular_of_level(walker, sockets)
-        values[5] = values[10] = _constant('f', 0.0)
-        values[15] = _constant('f', 0.0)
-        _name_missing(walker, sockets)
-    _note_generated(walker, node, PRINCIPLED, values)
-    return {"BSDF": Value('s', walker.emit(PRINCIPLED, values, _distribution(node) or 0), 0)}
-
-
-def _specular_of_level(walker, sockets):
-    """3.4's specular from 4.0's level and IOR: level scales the reflectance that the IOR gives, and
-    3.4's specular is that reflectance over 0.08."""
-    level, ior = sockets.get('f', "Specular IOR Level"), sockets.get('f', "IOR")
-    one = _constant('f', 1.0)
-    ratio = _number(walker, _MATH_DIVIDE, _number(walker, _MATH_SUBTRACT, ior, one),
-                    _number(walker, 0, ior, one))
-    reflectance = _number(walker, _MATH_MULTIPLY, ratio, ratio)
-    return _number(walker, _MATH_MULTIPLY, _number(walker, _MATH_MULTIPLY, reflectance, level),
-                   _constant('f', 2.0 / 0.08))
+    """Principled of 3.4, or the layers of 4.0 and later."""
+    is_layered = sockets.find("Specular IOR Level") is not None
+    kind = LAYERED_PRINCIPLED if is_layered else PRINCIPLED
+    inputs = _LAYERED_INPUTS if is_layered else _PRINCIPLED_INPUTS
+    values = [sockets.get(kind_of_value, name) for kind_of_value, name in inputs]
+    _name_missing(walker, sockets)
+    _note_generated(walker, node, kind, values)
+    return {"BSDF": Value('s', walker.emit(kind, values, _distribution(node) or 0), 0)}
 
 
 def _name_missing(walker, sockets):
-    """Warn of 4.0's inputs that have no counterpart and are in use."""
-    neutral = (("Specular Tint", (1.0, 1.0, 1.0)), ("Coat Tint", (1.0, 1.0, 1.0)),
-               ("Thin Film Thickness", (0.0, 0.0, 0.0)), ("Diffuse Roughness", (0.0, 0.0, 0.0)))
-    for name, unused in neutral:
-        socket = sockets.find(name)
-        if socket is None:
+    """Warn of inputs of Principled that are in use and mean something else here, or nothing."""
+    for name, instead in (("Subsurface", "is rendered as diffuse"),
+                          ("Subsurface Weight", "is rendered as diffuse"),
+                          ("Thin Film Thickness", "is not supported and is left out")):
+        if sockets.find(name) is None:
             continue
-        value = sockets.get('c' if name.endswith("Tint") else 'f', name)
-        if value.node >= 0 or any(abs(a - b) > 1e-6 for a, b in zip(value.constant, unused)):
-            walker.warn(f"Principled BSDF: {name} is not supported and is left out")
+        value = sockets.get('f', name)
+        if value.node != CONSTANT or value.constant[0] > 0.0:
+            walker.warn(f"Principled BSDF: {name} {instead}")
+
+
+def _metallic(walker, node, sockets):
+    """The Metallic shader of 4.3: the metal of Principled. Of a physical conductor it gets the colours
+    head-on and at the edge."""
+    if node.fresnel_type == 'F82':
+        base, edge = sockets.get('c', "Base Color"), sockets.get('c', "Edge Tint")
+    else:
+        index, loss = sockets.get('v', "IOR"), sockets.get('v', "Extinction")
+        if index.node != CONSTANT or loss.node != CONSTANT:
+            return None
+        walker.warn("Metallic BSDF: a physical conductor is approximated by its colours")
+        pairs = tuple(zip(index.constant, loss.constant))
+        base = _constant('c', *(_conductor(n, k, 1.0) for n, k in pairs))
+        edge = _constant('c', *(_edge_tint(n, k) for n, k in pairs))
+    one, zero, none = _constant('f', 1.0), _constant('f', 0.0), Value('v', DEFAULT, 0)
+    white, black = _constant('c', 1.0), _constant('c', 0.0)
+    values = [base, one, sockets.get('f', "Roughness"), _constant('f', 1.5), one,
+              sockets.get('v', "Normal"), zero, zero, edge, sockets.get('f', "Anisotropy"),
+              sockets.get('f', "Rotation"), sockets.get('v', "Tangent"), zero, zero, zero, one, white,
+              none, zero, zero, white, black, zero]
+    _note_generated(walker, node, LAYERED_PRINCIPLED, values)
+    return {"BSDF": Value('s', walker.emit(LAYERED_PRINCIPLED, values, _distribution(node) or 0), 0)}
+
+
+_EDGE_COSINE = 1.0 / 7.0  # where the edge tint rules: 82 degrees
+
+
+def _conductor(n, k, cosine):
+    """Reflectance of a conductor of index n + ik."""
+    n2k2, c2 = n * n + k * k, cosine * cosine
+    parallel = (n2k2 * c2 - 2.0 * n * cosine + 1.0) / (n2k2 * c2 + 2.0 * n * cosine + 1.0)
+    across = (n2k2 - 2.0 * n * cosine + c2) / (n2k2 + 2.0 * n * cosine + c2)
+    return 0.5 * (parallel + across)
+
+
+def _edge_tint(n, k):
+    """A conductor's reflectance at the edge over Schlick's from its reflectance head-on."""
+    head_on = _conductor(n, k, 1.0)
+    return _conductor(n, k, _EDGE_COSINE) / (head_on + (1.0 - head_on) * (1.0 - _EDGE_COSINE) ** 5)
 
 
 def _sheen(walker, node, sockets):
     """The Sheen shader of 4.0 and later; Velvet is one of its distributions."""
-    if node.distribution != 'ASHIKHMIN':
-        walker.warn("Sheen BSDF: the Microfiber distribution is approximated by Ashikhmin's")
     values = [sockets.get(kind, name) for kind, name in (('c', "Color"), ('f', "Roughness"),
                                                          ('v', "Normal"))]
-    return {"BSDF": Value('s', walker.emit(VELVET, values), 0)}
+    kind = VELVET if node.distribution == 'ASHIKHMIN' else SHEEN
+    return {"BSDF": Value('s', walker.emit(kind, values), 0)}
 
 
 def _value(walker, node, _sockets):
@@ -413,10 +453,13 @@ def _normal_map(walker, node, sockets):
 
 
 def _color_ramp(walker, node, sockets):
-    ramp = node.color_ramp
-    table = np.array([ramp.evaluate(i / (RAMP_SIZE - 1)) for i in range(RAMP_SIZE)], np.float32)
+    ramp, factor, steps = node.color_ramp, sockets.get('f', "Fac"), RAMP_SIZE - 1
     is_constant = ramp.interpolation == 'CONSTANT'
-    index = walker.emit(COLOR_RAMP, (sockets.get('f', "Fac"),), mode=int(is_constant), table=table)
+    if is_constant and RAMP_STEPS != steps:  # the library's table without the last of Cycles' entries
+        factor = _number(walker, _MATH_MULTIPLY, factor, _constant('f', RAMP_STEPS / steps))
+        steps = RAMP_STEPS
+    table = np.array([ramp.evaluate(i / steps) for i in range(RAMP_SIZE)], np.float32)
+    index = walker.emit(COLOR_RAMP, (factor,), mode=int(is_constant), table=table)
     return _outputs(walker, index, (("Color", 'c'), ("Alpha", 'f')))
 
 
@@ -463,6 +506,7 @@ def _clamped(walker, value, is_clamped):
 
 _SPECIAL = {
     "ShaderNodeBsdfPrincipled": _principled, "ShaderNodeBsdfSheen": _sheen,
+    "ShaderNodeBsdfMetallic": _metallic,
     "ShaderNodeValue": _value, "ShaderNodeRGB": _rgb,
     "ShaderNodeNormal": _normal, "ShaderNodeTexImage": _image,
     "ShaderNodeTexEnvironment": _environment, "ShaderNodeUVMap": _uv_map,

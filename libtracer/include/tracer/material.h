@@ -18,7 +18,8 @@ TRC_BEGIN_DECLS
  * Outputs in order after "->". */
 enum {
     /* shaders (one output, the closure) */
-    TRC_NODE_DIFFUSE = 1,    /* c color, f roughness, c normal */
+    TRC_NODE_DIFFUSE = 1,    /* c color, f roughness, c normal; mode: 1 keeps the energy of rough
+                                surfaces, as Blender 4.3 and later */
     TRC_NODE_GLOSSY = 2,     /* c color, f roughness, f anisotropy, f rotation, c normal, c tangent;
                                 mode: TRC_DISTRIBUTION_* */
     TRC_NODE_GLASS = 3,      /* c color, f roughness, f ior, c normal; mode: distribution */
@@ -38,6 +39,14 @@ enum {
     TRC_NODE_PRINCIPLED = 12,
     TRC_NODE_VELVET = 13, /* c color, f sigma, c normal */
     TRC_NODE_TOON = 14,   /* c color, f size, f smooth, c normal; mode: 0 diffuse, 1 glossy */
+    /* Principled of Blender 4.0 and later; mode: GGX or MULTI_GGX; inputs: c base_color, f
+     * metallic, f roughness, f ior, f alpha, c normal, f diffuse_roughness, f specular_ior_level,
+     * c specular_tint, f anisotropic, f anisotropic_rotation, c tangent, f transmission_weight,
+     * f coat_weight, f coat_roughness, f coat_ior, c coat_tint, c coat_normal, f sheen_weight,
+     * f sheen_roughness, c sheen_tint, c emission_color, f emission_strength. Subsurface scattering
+     * is the diffuse lobe, thin film is left out. */
+    TRC_NODE_LAYERED_PRINCIPLED = 15,
+    TRC_NODE_SHEEN = 16, /* c color, f roughness, c normal: the microfibres of Blender 4.0 */
 
     /* values */
     TRC_NODE_IMAGE = 64, /* c vector -> c color, f alpha; image, interpolation in mode bits 0-1,
@@ -112,7 +121,8 @@ enum {
     TRC_NODE_VECTOR_TRANSFORM =
         108,                      /* c vector -> c; mode: TRC_SPACE_* of the source in bits 0-1, of
                                      the target in bits 2-3, bits 4-5: 0 point, 1 vector,
-                                     2 normal */
+                                     2 unit vector (the normal of Blender before 4.0), 3 normal:
+                                     by the inverse transpose, unit unless the spaces are one */
     TRC_NODE_VECTOR_ROTATE = 109, /* c vector, c center, c axis, f angle, c rotation -> c; mode:
                                      TRC_ROTATE_* | 8 to turn the other way */
     TRC_NODE_CAMERA_DATA = 110,   /* -> c view_vector, f view_z_depth, f view_distance */
@@ -178,7 +188,10 @@ enum {
     TRC_DISTRIBUTION_MULTI_GGX = 1,
     TRC_DISTRIBUTION_BECKMANN = 2,
     TRC_DISTRIBUTION_SHARP = 3,
-    TRC_DISTRIBUTION_ASHIKHMIN = 4
+    TRC_DISTRIBUTION_ASHIKHMIN = 4,
+    /* Bit for Glossy, Glass and Refraction, as Blender 4.0 and later: masking and shadowing of one
+     * height, Fresnel by the micro-normal, the energy of MULTI_GGX by a factor. */
+    TRC_DISTRIBUTION_CORRELATED = 16
 };
 
 enum {
@@ -320,7 +333,10 @@ enum {
     TRC_MATERIAL_SAMPLE_EMISSION = 1, /* sample its emissive triangles as lights ("multiple
                                          importance sample") */
     TRC_MATERIAL_TRANSPARENT_SHADOW =
-        2 /* shadow rays see its transparency; else it is opaque to them */
+        2, /* shadow rays see its transparency; else it is opaque to them */
+    /* Lobes are chosen by their weights at camera hits too, as in Cycles 4; else each at least one
+     * time in nine or so (Cycles 3.4). What Cycles loses with diffuse bounces 0 depends on it. */
+    TRC_MATERIAL_PLAIN_CHOICE = 4
 };
 
 /* NaN or infinite constants refuse the material; out-of-range ones (roughness < 0, IOR <= 0) are

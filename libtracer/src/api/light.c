@@ -32,7 +32,8 @@ static trc_status check_light(const trc_light_desc *desc) {
     }
     TRC_TRY(trc_check_enum(desc->visibility, TRC_VISIBLE_ALL + 1, "visibility"));
     TRC_TRY(trc_check_enum(desc->cast_shadow, 2, "cast_shadow"));
-    return trc_check_enum(desc->use_mis, 2, "use_mis");
+    TRC_TRY(trc_check_enum(desc->use_mis, 2, "use_mis"));
+    return trc_check_enum(desc->flags, 2 * TRC_LIGHT_EVEN_CONE, "flags");
 }
 
 trc_status trc_light_create(trc_scene scene, const trc_light_desc *desc, trc_id *light_out) {

@@ -55,6 +55,44 @@ TRC_INLINE vfloat principled_diffuse(vfloat roughness, vfloat cos_i, vfloat cos_
            (lambert + retro * (fi + fo + fi * fo * (retro - vf_one())));
 }
 
+/* Albedo of Fujii's form over sigma, less that of sigma 0 (OpenPBR specification 1.1, 2024). */
+TRC_INLINE vfloat oren_nayar_gain(vfloat cosine) {
+    const vfloat c = vf_max(cosine, vf_set(1e-6f)), third = vf_set(2.0f / 3.0f);
+    const vfloat s = vf_safe_sqrt(vf_one() - c * c);
+    return s * (vf_acos(vf_min(c, vf_one())) - third - s * c) +
+           third * (s / c) * (vf_one() - s * s * s);
+}
+/* Albedo towards a direction. */
+vfloat TRC_KERNEL(trc_oren_nayar_albedo)(vfloat sigma, vfloat cosine) {
+    const vfloat a = vf_rcp(vf_set(TRC_PI) + vf_set(0.5f * TRC_PI - 2.0f / 3.0f) * sigma);
+    return a * (vf_set(TRC_PI) + sigma * oren_nayar_gain(cosine));
+}
+/* Y. Fujii's other form with what scatters more than once: the first part is grey, the rest is
+ * multi. */
+TRC_INLINE vvec3 energy_oren_nayar(const struct trc_lobe *lobe, vfloat cos_i, vfloat cos_io) {
+    const vfloat sigma = lobe->roughness, no = vf_max(lobe->cos_o, vf_zero());
+    const vfloat a = vf_rcp(vf_set(TRC_PI) + vf_set(0.5f * TRC_PI - 2.0f / 3.0f) * sigma);
+    const vfloat t = cos_io - cos_i * no;
+    const vfloat high = vf_max(vf_max(cos_i, no), vf_set(1e-30f));
+    const vfloat tilt = vf_select(vf_gt(t, vf_zero()), t / high, t);
+    const vfloat once = a * (vf_one() + sigma * tilt);
+    const vfloat rest = vf_one() - TRC_KERNEL(trc_oren_nayar_albedo)(sigma, cos_i);
+    return v3_scale(v3_add(v3_splat(once), v3_scale(lobe->f0, rest)), cos_i);
+}
+
+/* A cosine lobe that a linear map has drawn out: T. Zeltner, B. Burley and M. J.-Y. Chiang,
+ * "Practical Multiple-Scattering Sheen Using Linearly Transformed Cosines" (2022). */
+TRC_INLINE vfloat fibres(const struct trc_lobe *lobe, vvec3 wo, vvec3 wi, vfloat cos_i) {
+    const vvec3 across = v3_sub(wo, v3_scale(lobe->n, lobe->cos_o));
+    const vfloat length2 = v3_dot(across, across);
+    const vvec3 x = v3_scale(across, vf_divide(vf_one(), vf_sqrt(length2)));
+    const vvec3 flat = v3_sub(wi, v3_scale(lobe->n, cos_i));
+    const vfloat along = v3_dot(flat, x), a = lobe->f0.x, b = lobe->f0.y;
+    const vfloat aside2 = vf_max(v3_dot(flat, flat) - along * along, vf_zero());
+    const vfloat size2 = vf_square(a * along + b * cos_i) + a * a * aside2 + cos_i * cos_i;
+    return vf_set(TRC_INV_PI) * cos_i * vf_square(vf_divide(a, size2));
+}
+
 /* M. Ashikhmin, S. Premoze and P. Shirley, "A Microfacet-Based BRDF Generator" (2000): slopes are
  * rare around the normal. */
 TRC_INLINE vfloat velvet(vfloat inverse_sigma2, vfloat cos_i, vfloat cos_o, vfloat cos_m,
@@ -95,7 +133,9 @@ TRC_INLINE struct lobe_value diffuse_value(const struct trc_lobe *lobe, const st
     const vmask faces = vf_gt(cos_i, vf_zero());
     vfloat f = cos_i * vf_set(TRC_INV_PI);
     const vfloat cosine = vf_where(faces, f);
-    if (lobe->kind == TRC_LOBE_SHEEN) {
+    if (lobe->kind == TRC_LOBE_SHEEN && lobe->distribution == TRC_SHEEN_FIBRES) {
+        f = vf_where(vf_gt(lobe->cos_o, vf_zero()), fibres(lobe, s->wo, wi, cos_i));
+    } else if (lobe->kind == TRC_LOBE_SHEEN) {
         const vvec3 h = v3_normalize(v3_add(wi, s->wo));
         f = trc_schlick_weight(v3_dot(wi, h)) * cos_i;
         f = vf_where(vf_ge(lobe->cos_o, vf_zero()), f);
@@ -112,7 +152,15 @@ TRC_INLINE struct lobe_value diffuse_value(const struct trc_lobe *lobe, const st
         f = toon(lobe, cos_i, &pdf);
         pdf = vf_where(faces, pdf);
     }
-    f = vf_where(faces, f * bump_shadowing(s->n, lobe->n, wi, cos_n));
+    if (lobe->kind == TRC_LOBE_SHEEN && lobe->distribution == TRC_SHEEN_FIBRES)
+        pdf = vf_where(faces, f);
+    const vfloat bumps = bump_shadowing(s->n, lobe->n, wi, cos_n);
+    if (lobe->kind == TRC_LOBE_DIFFUSE && lobe->distribution == TRC_DIFFUSE_ENERGY_OREN_NAYAR) {
+        const vvec3 value = energy_oren_nayar(lobe, cos_i, v3_dot(wi, s->wo));
+        const vvec3 lit = v3_where(faces, v3_scale(value, bumps));
+        return (struct lobe_value){v3_mul(lobe->weight, lit), pdf, pdf, pdf};
+    }
+    f = vf_where(faces, f * bumps);
     return (struct lobe_value){v3_scale(lobe->weight, f), pdf, pdf, pdf};
 }
 
@@ -153,8 +201,15 @@ TRC_INLINE struct half_vector half_of(const struct trc_lobe *lobe, vvec3 m, vvec
 }
 
 TRC_INLINE vvec3 fresnel_of(const struct trc_lobe *lobe, vfloat cos_m) {
-    if (lobe->fresnel == TRC_FRESNEL_BLEND)
-        return v3_lerp(lobe->f0, lobe->f90, trc_fresnel_blend(cos_m, lobe->ior));
+    if (lobe->fresnel == TRC_FRESNEL_BLEND) {
+        const vvec3 f = v3_lerp(lobe->f0, lobe->f90, trc_fresnel_blend(cos_m, lobe->ior));
+        return lobe->kind == TRC_LOBE_REFRACT ? v3_sub(v3_splat(vf_one()), f) : f;
+    }
+    if (lobe->fresnel == TRC_FRESNEL_F82) {
+        const vfloat rest = vf_saturate(vf_one() - cos_m), power = trc_schlick_weight(cos_m);
+        const vvec3 schlick = v3_lerp(lobe->f0, v3_splat(vf_one()), power);
+        return v3_saturate(v3_sub(schlick, v3_scale(lobe->f90, cos_m * power * rest)));
+    }
     if (lobe->fresnel == TRC_FRESNEL_DIELECTRIC) {
         const vfloat f = trc_fresnel_dielectric(cos_m, lobe->ior);
         return v3_splat(lobe->kind == TRC_LOBE_REFRACT ? vf_one() - f : f);
@@ -171,6 +226,15 @@ TRC_INLINE vfloat distribution_d(const struct trc_lobe *lobe, const struct half_
 }
 TRC_INLINE vfloat masking(const struct trc_lobe *lobe, vfloat tan2) {
     return lobe->distribution == TRC_LOBE_BECKMANN ? trc_beckmann_g1(tan2) : trc_ggx_g1(tan2);
+}
+
+/* Masking of wo times shadowing of wi, over that of wo. With one height for both it is 1 / (1 + L_o
+ * + L_i), where 1 / g1 = 1 + L. */
+TRC_INLINE vfloat shadowing(const struct trc_lobe *lobe, vfloat tan2_i) {
+    const vfloat g1_i = masking(lobe, tan2_i);
+    if (!lobe->correlated)
+        return g1_i;
+    return vf_rcp(vf_one() + lobe->g1_o * (vf_rcp(g1_i) - vf_one()));
 }
 
 static struct lobe_value ashikhmin_value(const struct trc_lobe *lobe, const struct half_vector *h,
@@ -225,7 +289,7 @@ TRC_INLINE struct lobe_value reflect_value(const struct trc_lobe *lobe, vvec3 wo
     struct lobe_value r;
     r.pdf = d * lobe->pdf_scale;
     r.claim = d * lobe->g1_o * quarter;
-    vfloat f = r.claim * masking(lobe, h.tan2_i);
+    vfloat f = r.claim * shadowing(lobe, h.tan2_i);
     if (lobe->distribution == TRC_LOBE_MULTI_GGX) {
         /* Height-correlated: 1 / (1 + L_o + L_i), with 1 + L_o = 1 / g1_o. */
         f = d * quarter / (vf_rcp(lobe->g1_o) + trc_ggx_lambda(h.tan2_i));
@@ -268,7 +332,7 @@ TRC_INLINE struct lobe_value refract_value(const struct trc_lobe *lobe, vvec3 wo
     struct lobe_value r;
     r.pdf = vf_set(4.0f) * lobe->pdf_scale * visible;
     r.claim = r.pick = lobe->g1_o * visible / lobe->cos_o;
-    const vfloat f = r.claim * masking(lobe, h.tan2_i);
+    const vfloat f = r.claim * shadowing(lobe, h.tan2_i);
     r.value = v3_mul(v3_scale(lobe->weight, f), fresnel_of(lobe, cos_ho));
     r.value = v3_where(m, r.value);
     r.pdf = vf_where(m, r.pdf);
@@ -539,7 +603,10 @@ void TRC_KERNEL(trc_bsdf_albedo)(const struct trc_lobes *l, const struct trc_sur
         if (lobe->kind == TRC_LOBE_TRANSPARENT)
             continue;
         const int k = lobe->kind == TRC_LOBE_REFLECT ? 1 : lobe->kind == TRC_LOBE_REFRACT ? 2 : 0;
-        albedo_out[k] = v3_add(albedo_out[k], lobe->weight);
+        vvec3 albedo = v3_scale(lobe->weight, lobe->albedo_scale);
+        if (lobe->correlated)
+            albedo = v3_mul(albedo, fresnel_of(lobe, lobe->cos_o));
+        albedo_out[k] = v3_add(albedo_out[k], albedo);
     }
 }
 
@@ -567,8 +634,9 @@ void TRC_KERNEL(trc_lobes_features)(const struct trc_lobes *l, const struct trc_
         const bool is_microfacet = lobe->kind == TRC_LOBE_REFLECT || lobe->kind == TRC_LOBE_REFRACT;
         const vmask told = is_rough(lobe);
         const vvec3 n = lobe->kind == TRC_LOBE_TRANSPARENT ? s->n : lobe->n;
-        const vvec3 color =
-            is_microfacet ? v3_mul(lobe->weight, fresnel_of(lobe, v3_dot(n, s->wo))) : lobe->weight;
+        vvec3 color = v3_scale(lobe->weight, lobe->albedo_scale);
+        if (is_microfacet)
+            color = v3_mul(color, fresnel_of(lobe, v3_dot(n, s->wo)));
         normal = v3_mad(n, lobe->mix_weight, normal);
         all = all + lobe->mix_weight;
         rough = rough + vf_where(told, lobe->mix_weight);

@@ -1,7 +1,8 @@
 /* Lobes of a shading point: set up from a material's leaves, evaluated, sampled. TRC_WIDTH points
  * at once, all of one material, so the kinds of lobes are uniform and their parameters are not.
  *
- * The formulas are those of Cycles in Blender 3.4; where a lobe departs from it, bsdf.c says so. */
+ * The formulas are those of Cycles in Blender 3.4, and of 4.3 for the nodes and modes that stand
+ * for it; where a lobe departs from it, bsdf.c says so. */
 #ifndef TRACER_KERNELS_BSDF_H
 #define TRACER_KERNELS_BSDF_H
 
@@ -12,7 +13,7 @@
 
 enum trc_lobe_kind {
     TRC_LOBE_DIFFUSE,     /* see TRC_DIFFUSE_* */
-    TRC_LOBE_SHEEN,       /* Principled's sheen, counts as diffuse */
+    TRC_LOBE_SHEEN,       /* see TRC_SHEEN_*; counts as diffuse */
     TRC_LOBE_TRANSLUCENT, /* counts as diffuse in passes and for light visibility, as in Cycles */
     TRC_LOBE_REFLECT,     /* microfacet reflection or ideal mirror */
     TRC_LOBE_REFRACT,     /* microfacet refraction or ideal */
@@ -25,7 +26,13 @@ enum {
     TRC_DIFFUSE_OREN_NAYAR,
     TRC_DIFFUSE_PRINCIPLED,
     TRC_DIFFUSE_VELVET,
-    TRC_DIFFUSE_TOON
+    TRC_DIFFUSE_TOON,
+    TRC_DIFFUSE_ENERGY_OREN_NAYAR /* what scatters more than once is kept */
+};
+/* ... of TRC_LOBE_SHEEN ... */
+enum {
+    TRC_SHEEN_SCHLICK, /* Principled of 3.4 */
+    TRC_SHEEN_FIBRES   /* of 4.0 */
 };
 /* ... and of microfacets. MULTI_GGX: GGX with height-correlated masking and the energy of the
  * single scattering restored, in place of Cycles' random walk. */
@@ -41,7 +48,9 @@ enum {
 /* trc_lobe.fresnel: what multiplies the weight at a microfacet. */
 enum {
     TRC_FRESNEL_NONE,      /* 1 (glass has the factor of the macro normal in its weight) */
-    TRC_FRESNEL_BLEND,     /* f0 to f90 as the dielectric of index ior goes from F(0) to 1 */
+    TRC_FRESNEL_BLEND,     /* f0 to f90 as the dielectric of index ior goes from F(0) to 1; 1 minus
+                              it for refraction */
+    TRC_FRESNEL_F82,       /* Schlick's from f0 to 1, less f90 * cos * (1 - cos)^6 */
     TRC_FRESNEL_DIELECTRIC /* F of ior for reflection, 1 - F for refraction */
 };
 
@@ -52,20 +61,25 @@ struct trc_lobe {
     enum trc_lobe_kind kind;
     uint32_t distribution;
     uint32_t fresnel;
+    bool correlated;  /* microfacets mask and shadow by one height, as in Cycles 4 */
     bool anisotropic; /* tangent is set and alpha_x may differ from alpha_y */
     vmask ideal;      /* lanes that scatter into one direction only */
     vvec3 weight;     /* throughput colour, >= 0; 0 in lanes that do not have the lobe */
     vvec3 n;          /* the lobe's normal */
     vvec3 tangent;    /* unit, orthogonal to n, anisotropic lobes only; bitangent is n x tangent */
     vfloat alpha_x, alpha_y;
-    vfloat ior;           /* refraction: relative index, transmitted over incident side */
-    vfloat roughness;     /* Oren-Nayar sigma; Principled's roughness; velvet: 1 / sigma^2 */
-    vvec3 f0, f90;        /* toon, f0: angle of full light, angle of its fading, cosine of both */
+    vfloat ior;       /* refraction: relative index, transmitted over incident side */
+    vfloat roughness; /* Oren-Nayar sigma; Principled's roughness; velvet: 1 / sigma^2 */
+    /* Toon, f0: angle of full light, angle of its fading, cosine of both. Fibres, f0: the two
+     * coefficients of their transform. Oren-Nayar that keeps energy, f0: factor of the part that
+     * scatters more than once. */
+    vvec3 f0, f90;
     vfloat cos_o;         /* n . wo */
     vfloat g1_o;          /* masking of wo */
     vfloat pdf_scale;     /* density of a sampled direction over D of its half vector */
     vvec3 multi_weight;   /* MULTI_GGX: what the lobe of the missing energy is scaled by */
     vfloat multi_chance;  /* and how often it is sampled, by cosine */
+    vfloat albedo_scale;  /* what Cycles leaves of the weight where it tells the albedo */
     vfloat mix_weight;    /* Cycles' sample weight, of every lobe */
     vfloat sample_weight; /* chance in proportion, 0 for lobes that are not continued */
 };
@@ -138,7 +152,7 @@ void TRC_KERNEL(trc_bsdf_ideal)(const struct trc_lobes *l, int i, const struct t
                                 struct trc_bsdf_sample *out);
 
 /* Albedo of the lobes for the colour passes: diffuse, glossy, transmission. As Cycles: the weights,
- * without what a Fresnel factor or masking takes. */
+ * without what a Fresnel factor or masking takes; of correlated lobes with the Fresnel factor. */
 void TRC_KERNEL(trc_bsdf_albedo)(const struct trc_lobes *l, const struct trc_surface *s,
                                  vvec3 albedo_out[3]);
 
@@ -157,6 +171,9 @@ void TRC_KERNEL(trc_lobes_features)(const struct trc_lobes *l, const struct trc_
  * their normals, the shading normal without any. */
 vvec3 TRC_KERNEL(trc_lobes_diffuse)(const struct trc_lobes *l, const struct trc_surface *s,
                                     vvec3 *normal_out);
+
+/* Albedo of the single-scattering part of an energy-keeping Oren-Nayar lobe. (kernels/bsdf.c) */
+vfloat TRC_KERNEL(trc_oren_nayar_albedo)(vfloat sigma, vfloat cosine);
 
 /* Sum of transparent weights: what a shadow ray or the film's alpha sees through. */
 vvec3 TRC_KERNEL(trc_lobes_transparency)(const struct trc_lobes *l);

@@ -6,10 +6,11 @@
 
 #include "kernels/ggx_energy.h"
 #include "kernels/microfacet.h"
+#include "shading/build.h"
 
 /* Lobes whose mean weight is below it are dropped, lane by lane (Cycles' closure cut-off). */
 #define WEIGHT_CUTOFF 1e-5f
-/* First hit: a lobe gets at least this share of the samples (Cycles' defensive sampling). */
+/* First hit: a lobe gets at least this share of the samples (Cycles 3.4's defensive sampling). */
 #define DEFENSIVE_SHARE 0.125f
 
 struct setup {
@@ -154,6 +155,8 @@ static struct trc_lobe *add_lobe(struct setup *c, enum trc_lobe_kind kind, vvec3
     lobe->kind = kind;
     lobe->distribution = 0;
     lobe->fresnel = TRC_FRESNEL_NONE;
+    lobe->correlated = false;
+    lobe->albedo_scale = vf_one();
     lobe->anisotropic = false;
     lobe->ideal = vm_none();
     lobe->weight = v3_where(counts, w);
@@ -162,19 +165,39 @@ static struct trc_lobe *add_lobe(struct setup *c, enum trc_lobe_kind kind, vvec3
     return lobe;
 }
 
-static void add_diffuse(struct setup *c, enum trc_lobe_kind kind, uint32_t model, vvec3 weight,
-                        vvec3 n, vfloat roughness) {
+static struct trc_lobe *add_diffuse(struct setup *c, enum trc_lobe_kind kind, uint32_t model,
+                                    vvec3 weight, vvec3 n, vfloat roughness) {
     struct trc_lobe *lobe = add_lobe(c, kind, weight);
     if (!lobe)
-        return;
+        return NULL;
     lobe->distribution = model;
     lobe->n = n;
     lobe->roughness = roughness;
     lobe->cos_o = v3_dot(n, c->s->wo);
-    if (kind == TRC_LOBE_SHEEN) {
+    if (kind == TRC_LOBE_SHEEN && model == TRC_SHEEN_SCHLICK) {
         const vfloat mean = trc_schlick_weight(lobe->cos_o) * lobe->cos_o;
         lobe->mix_weight = lobe->mix_weight * vf_max(mean, vf_zero());
     }
+    return lobe;
+}
+
+/* Rough diffuse that keeps its energy; albedo: the colour of what scatters more than once. */
+static void add_energy_oren_nayar(struct setup *c, vvec3 weight, vvec3 albedo, vvec3 n,
+                                  vfloat sigma) {
+    struct trc_lobe *lobe =
+        add_diffuse(c, TRC_LOBE_DIFFUSE, TRC_DIFFUSE_ENERGY_OREN_NAYAR, weight, n, sigma);
+    if (!lobe)
+        return;
+    const vfloat a = vf_rcp(vf_set(TRC_PI) + vf_set(0.5f * TRC_PI - 2.0f / 3.0f) * sigma);
+    const vfloat mean = a * (vf_set(TRC_PI) + vf_set((2.0f * TRC_PI - 5.6f) / 3.0f) * sigma);
+    const vfloat lost = vf_one() - mean;
+    const vfloat scale = vf_divide(vf_set(TRC_INV_PI) * mean, lost) *
+                         (vf_one() - TRC_KERNEL(trc_oren_nayar_albedo)(sigma, lobe->cos_o));
+    /* The weight has the colour once; Cycles gives the later bounces two more. */
+    const vvec3 color = v3_saturate(albedo);
+    lobe->f0 = v3(color.x * color.x * scale / (vf_one() - color.x * lost),
+                  color.y * color.y * scale / (vf_one() - color.y * lost),
+                  color.z * color.z * scale / (vf_one() - color.z * lost));
 }
 
 static void add_transparent(struct setup *c, vvec3 weight) {
@@ -260,10 +283,28 @@ static void set_multiple(struct trc_lobe *lobe, vvec3 per_bounce, bool is_first)
     lobe->multi_chance = missing;
 }
 
+/* The same in Cycles 4: E. Turquin, "Practical Multiple Scattering Compensation for Microfacet
+ * Models" (2019). The lobe of single scattering is scaled so that a white one keeps all energy; the
+ * rest of the bounces have per_bounce as their colour. From then on it is an ordinary GGX lobe. */
+static void keep_energy(struct trc_lobe *lobe, vvec3 per_bounce) {
+    const vfloat alpha = vf_sqrt(lobe->alpha_x * lobe->alpha_y), one = vf_one();
+    const vfloat mean = trc_ggx_mean_albedo(alpha), lost = one - mean;
+    const vfloat single = vf_max(trc_ggx_albedo(lobe->cos_o, alpha), vf_set(1e-3f));
+    const vfloat missing = (one - single) / single;
+    const vvec3 again = v3(per_bounce.x * mean / (one - per_bounce.x * lost),
+                           per_bounce.y * mean / (one - per_bounce.y * lost),
+                           per_bounce.z * mean / (one - per_bounce.z * lost));
+    const vvec3 gain = v3_mad(again, missing, v3_splat(one));
+    lobe->distribution = TRC_LOBE_GGX;
+    lobe->weight = v3_mul(lobe->weight, gain);
+    lobe->albedo_scale = single;
+    lobe->mix_weight = lobe->mix_weight * v3_average(gain) * single;
+}
+
 /* ---- leaves ---- */
 
 static uint32_t distribution_of(uint32_t mode) {
-    switch (mode) {
+    switch (mode & ~(uint32_t)TRC_DISTRIBUTION_CORRELATED) {
     case TRC_DISTRIBUTION_BECKMANN:
         return TRC_LOBE_BECKMANN;
     case TRC_DISTRIBUTION_ASHIKHMIN:
@@ -275,12 +316,17 @@ static uint32_t distribution_of(uint32_t mode) {
     }
 }
 
+static bool is_sharp(uint32_t mode) {
+    return (mode & ~(uint32_t)TRC_DISTRIBUTION_CORRELATED) == TRC_DISTRIBUTION_SHARP;
+}
+
 static void add_glossy(struct setup *c, const struct trc_leaf *leaf, vfloat weight) {
     const vvec3 base = colour(c, leaf, 0);
     struct trc_lobe *lobe = add_lobe(c, TRC_LOBE_REFLECT, v3_scale(base, weight));
     if (!lobe)
         return;
     lobe->distribution = distribution_of(leaf->mode);
+    lobe->correlated = leaf->mode & TRC_DISTRIBUTION_CORRELATED;
     lobe->n = leaf_normal(c, leaf, 6);
     lobe->ior = vf_one();
     const vfloat alpha = vf_square(number(c, leaf, 3));
@@ -295,8 +341,10 @@ static void add_glossy(struct setup *c, const struct trc_leaf *leaf, vfloat weig
         lobe->alpha_y = vf_select(negative, alpha * less, alpha / less);
         lobe->tangent = leaf_tangent(c, leaf, 9, lobe->n, number(c, leaf, 5));
     }
-    finish_microfacets(c, lobe, leaf->mode == TRC_DISTRIBUTION_SHARP);
-    if (lobe->distribution == TRC_LOBE_MULTI_GGX)
+    finish_microfacets(c, lobe, is_sharp(leaf->mode));
+    if (lobe->distribution == TRC_LOBE_MULTI_GGX && lobe->correlated)
+        keep_energy(lobe, v3_saturate(base));
+    else if (lobe->distribution == TRC_LOBE_MULTI_GGX)
         set_multiple(lobe, v3_saturate(base), false);
 }
 
@@ -341,11 +389,13 @@ static struct trc_lobe *add_dielectric(struct setup *c, enum trc_lobe_kind kind,
     struct trc_lobe *lobe = add_lobe(c, kind, weight);
     if (!lobe)
         return NULL;
-    lobe->distribution = mode == TRC_DISTRIBUTION_BECKMANN ? TRC_LOBE_BECKMANN : TRC_LOBE_GGX;
+    const uint32_t distribution = distribution_of(mode);
+    lobe->distribution = distribution == TRC_LOBE_BECKMANN ? TRC_LOBE_BECKMANN : TRC_LOBE_GGX;
+    lobe->correlated = mode & TRC_DISTRIBUTION_CORRELATED;
     lobe->n = n;
     lobe->alpha_x = lobe->alpha_y = alpha;
     lobe->ior = eta;
-    finish_microfacets(c, lobe, mode == TRC_DISTRIBUTION_SHARP);
+    finish_microfacets(c, lobe, is_sharp(mode));
     return lobe;
 }
 
@@ -374,11 +424,47 @@ static void add_multi_glass(struct setup *c, vvec3 weight, vvec3 reflected, vvec
     }
 }
 
+/* Glass of Cycles 4: both lobes with the factor of the micro-normal, which goes from f0 to 1. */
+static void add_correlated_glass(struct setup *c, vvec3 reflected, vvec3 refracted, vvec3 f0,
+                                 vvec3 n, vfloat alpha, vfloat eta, uint32_t mode) {
+    const vfloat cos_o = v3_dot(n, c->s->wo);
+    vfloat kept = vf_one();
+    if (distribution_of(mode) == TRC_LOBE_MULTI_GGX) {
+        kept = vf_max(trc_correlated_glass_albedo(cos_o, alpha, eta), vf_set(0.1f));
+        reflected = v3_scale(reflected, vf_rcp(kept));
+        refracted = v3_scale(refracted, vf_rcp(kept));
+    }
+    /* Micro-normals may reflect or refract where the macro normal does not: neither chance goes to
+     * 0. */
+    const vfloat f = vf_clamp(trc_fresnel_dielectric(cos_o, eta), 0.1f, 0.9f);
+    struct trc_lobe *lobe = add_dielectric(c, TRC_LOBE_REFLECT, reflected, n, alpha, eta, mode);
+    if (lobe) {
+        lobe->fresnel = TRC_FRESNEL_BLEND;
+        lobe->f0 = f0;
+        lobe->f90 = v3_splat(vf_one());
+        lobe->albedo_scale = kept;
+        lobe->mix_weight = lobe->mix_weight * kept * f;
+    }
+    lobe = add_dielectric(c, TRC_LOBE_REFRACT, refracted, n, alpha, eta, mode);
+    if (lobe) {
+        lobe->fresnel = TRC_FRESNEL_BLEND;
+        lobe->f0 = f0;
+        lobe->f90 = v3_splat(vf_one());
+        lobe->albedo_scale = kept;
+        lobe->mix_weight = lobe->mix_weight * kept * (vf_one() - f);
+    }
+}
+
 static void add_glass(struct setup *c, const struct trc_leaf *leaf, vfloat weight) {
     const vvec3 tint = v3_scale(colour(c, leaf, 0), weight);
     const vvec3 n = leaf_normal(c, leaf, 5);
     const vfloat alpha = vf_square(number(c, leaf, 3));
     const vfloat eta = relative_ior(c, number(c, leaf, 4));
+    if (leaf->mode & TRC_DISTRIBUTION_CORRELATED) {
+        add_correlated_glass(c, tint, tint, v3_splat(trc_fresnel_normal(eta)), n,
+                             vf_saturate(alpha), eta, leaf->mode);
+        return;
+    }
     if (leaf->mode == TRC_DISTRIBUTION_MULTI_GGX) {
         const vvec3 white = v3_splat(vf_one());
         add_multi_glass(c, tint, white, white, n, alpha, eta);
@@ -392,11 +478,9 @@ static void add_glass(struct setup *c, const struct trc_leaf *leaf, vfloat weigh
 }
 
 static void add_refraction(struct setup *c, const struct trc_leaf *leaf, vfloat weight) {
-    const uint32_t mode =
-        leaf->mode == TRC_DISTRIBUTION_MULTI_GGX ? (uint32_t)TRC_DISTRIBUTION_GGX : leaf->mode;
     add_dielectric(c, TRC_LOBE_REFRACT, v3_scale(colour(c, leaf, 0), weight),
                    leaf_normal(c, leaf, 5), vf_square(number(c, leaf, 3)),
-                   relative_ior(c, number(c, leaf, 4)), mode);
+                   relative_ior(c, number(c, leaf, 4)), leaf->mode);
 }
 
 /* ---- Principled ---- */
@@ -468,7 +552,8 @@ static void principled_diffuse(struct setup *c, const struct trc_leaf *leaf, vfl
         return;
     const vvec3 hue = hue_of(base, v3_luminance(base));
     const vvec3 sheen = mix_white(hue, number(c, leaf, P_SHEEN_TINT));
-    add_diffuse(c, TRC_LOBE_SHEEN, 0, v3_scale(sheen, w * number(c, leaf, P_SHEEN)), n, vf_zero());
+    add_diffuse(c, TRC_LOBE_SHEEN, TRC_SHEEN_SCHLICK, v3_scale(sheen, w * number(c, leaf, P_SHEEN)),
+                n, vf_zero());
 }
 
 static void principled_specular(struct setup *c, const struct trc_leaf *leaf, vfloat weight,
@@ -576,15 +661,20 @@ static void add_principled(struct setup *c, const struct trc_leaf *leaf, vfloat 
         principled_clearcoat(c, leaf, weight);
 }
 
+#include "kernels/layered_principled.h"
+
 /* ---- interface ---- */
 
-/* Emission of one leaf, false for a leaf that cannot emit. */
+/* Emission of one leaf, false for a leaf that cannot emit. Without a surface the layers above the
+ * emission of a layered Principled are left out, as Cycles does when it samples lights. */
 static bool leaf_emission(const struct setup *c, const struct trc_leaf *leaf, vfloat weight,
                           vvec3 *emission) {
     if (leaf->type == TRC_NODE_EMISSION || leaf->type == TRC_NODE_BACKGROUND) {
         *emission = v3_scale(colour(c, leaf, 0), number(c, leaf, 3) * weight);
         return true;
     }
+    if (leaf->type == TRC_NODE_LAYERED_PRINCIPLED)
+        return layered_emission(c, leaf, weight, emission);
     if (leaf->type != TRC_NODE_PRINCIPLED)
         return false;
     const struct trc_operand *strength = input(c, leaf, P_EMISSION_STRENGTH);
@@ -601,9 +691,14 @@ static void add_leaf(struct setup *c, const struct trc_leaf *leaf, vfloat weight
     case TRC_NODE_DIFFUSE: {
         const struct trc_operand *roughness = input(c, leaf, 3);
         const bool is_lambert = roughness->reg < 0 && roughness->value == 0.0f;
-        add_diffuse(c, TRC_LOBE_DIFFUSE, is_lambert ? TRC_DIFFUSE_LAMBERT : TRC_DIFFUSE_OREN_NAYAR,
-                    v3_scale(colour(c, leaf, 0), weight), leaf_normal(c, leaf, 4),
-                    vf_saturate(number(c, leaf, 3)));
+        const vvec3 base = colour(c, leaf, 0), tint = v3_scale(base, weight);
+        const vvec3 n = leaf_normal(c, leaf, 4);
+        const vfloat sigma = vf_saturate(number(c, leaf, 3));
+        if (leaf->mode && !is_lambert)
+            add_energy_oren_nayar(c, tint, base, n, sigma);
+        else
+            add_diffuse(c, TRC_LOBE_DIFFUSE,
+                        is_lambert ? TRC_DIFFUSE_LAMBERT : TRC_DIFFUSE_OREN_NAYAR, tint, n, sigma);
         break;
     }
     case TRC_NODE_TRANSLUCENT:
@@ -634,18 +729,29 @@ static void add_leaf(struct setup *c, const struct trc_leaf *leaf, vfloat weight
     case TRC_NODE_PRINCIPLED:
         add_principled(c, leaf, weight);
         break;
+    case TRC_NODE_LAYERED_PRINCIPLED:
+        add_layered_principled(c, leaf, weight);
+        break;
+    case TRC_NODE_SHEEN:
+        add_fibres(c, v3_scale(colour(c, leaf, 0), weight), leaf_normal(c, leaf, 4),
+                   number(c, leaf, 3));
+        break;
     default:
         break;
     }
 }
 
-/* Chances of the lobes. At the first hit Cycles raises small ones to a share of the sum. */
-static void set_chances(const struct trc_surface *s, struct trc_lobes *out) {
-    vfloat sum = vf_zero();
-    for (int i = 0; i < out->count; i++)
-        sum = sum + out->lobe[i].mix_weight;
-    const vmask is_first = vi_eq(s->depth + s->transparent_depth, vi_set(0));
-    const vfloat floor_weight = vf_where(is_first, sum * vf_set(DEFENSIVE_SHARE));
+/* Chances of the lobes. At the first hit small ones may be raised to a share of the sum. */
+static void set_chances(const struct trc_material *m, const struct trc_surface *s,
+                        struct trc_lobes *out) {
+    vfloat floor_weight = vf_zero();
+    if (!(m->flags & TRC_MATERIAL_PLAIN_CHOICE)) {
+        vfloat sum = vf_zero();
+        for (int i = 0; i < out->count; i++)
+            sum = sum + out->lobe[i].mix_weight;
+        const vmask is_first = vi_eq(s->depth + s->transparent_depth, vi_set(0));
+        floor_weight = vf_where(is_first, sum * vf_set(DEFENSIVE_SHARE));
+    }
     out->mix_weight = vf_zero();
     out->continue_weight = vf_zero();
     for (int i = 0; i < out->count; i++) {
@@ -679,7 +785,7 @@ void TRC_KERNEL(trc_lobes_setup)(const struct trc_material *m, const struct trc_
             out->emission = v3_add(out->emission, emission);
         add_leaf(&c, leaf, weight);
     }
-    set_chances(s, out);
+    set_chances(m, s, out);
 }
 
 vvec3 TRC_KERNEL(trc_lobes_emission)(const struct trc_material *m,

@@ -4,6 +4,7 @@
  * (Ernst, Stamminger and Greiner, "Filter Importance Sampling", 2006; Cycles does the same, so
  * images agree). The lens is a disk by the concentric map of Shirley and Chiu, 1997, or a regular
  * polygon. */
+#include "kernels/mesh_fetch.h"
 #include "kernels/tile.h"
 #include "kernels/wide_math.h"
 
@@ -97,16 +98,14 @@ TRC_INLINE void camera_matrix(const struct trc_camera *camera, vfloat time, vmas
             window[k] = vf_set(windows[k]);
         return;
     }
-    const float last = (float)(camera->key_count - 1);
-    const vfloat x = vf_clamp(time, 0.0f, 1.0f) * vf_set(last);
-    const vfloat key = vf_min(vf_floor(x), vf_set(last - 1.0f)), f = x - key, g = vf_set(1.0f) - f;
-    const vint at = vf_to_int(key);
+    vfloat f;
+    const vint key = trc_wide_key(time, camera->key_count, &f);
     for (int k = 0; k < 12; k++)
-        m[k] = g * vf_gather(base + k, at * vi_set(12), active) +
-               f * vf_gather(base + 12 + k, at * vi_set(12), active);
+        m[k] = trc_between(vf_gather(base + k, key * vi_set(12), active),
+                           vf_gather(base + 12 + k, key * vi_set(12), active), f);
     for (int k = 0; k < 4; k++)
-        window[k] = g * vf_gather(windows + k, at * vi_set(4), active) +
-                    f * vf_gather(windows + 4 + k, at * vi_set(4), active);
+        window[k] = trc_between(vf_gather(windows + k, key * vi_set(4), active),
+                                vf_gather(windows + 4 + k, key * vi_set(4), active), f);
 }
 
 void TRC_KERNEL(trc_camera_rays)(struct trc_tile *t) {

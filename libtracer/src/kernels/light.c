@@ -112,24 +112,10 @@ static struct trc_corners moving_corners(const struct draw *d, vint index, vmask
     for (uint32_t lanes = vm_bits(m); lanes; lanes &= lanes - 1) {
         const int lane = __builtin_ctz(lanes);
         const struct trc_light_triangle *t = &d->table->triangles[vi_get(index, lane)];
-        const struct trc_instance *instance = &d->scene->instances[t->instance];
-        const struct trc_mesh *mesh = d->scene->meshes[instance->mesh];
-        const float time = vf_get(d->s->time, lane);
-        float corner[9], e[12];
-        trc_corner_at(mesh->positions, mesh->indices + 3 * (size_t)t->triangle, mesh->vertex_count,
-                      mesh->key_count, time, corner);
-        trc_affine_at(instance, time, e);
-        for (int k = 0; k < 3; k++)
-            for (int i = 0; i < 3; i++)
-                p[9 * lane + 3 * k + i] = e[4 * i] * corner[3 * k] +
-                                          e[4 * i + 1] * corner[3 * k + 1] +
-                                          e[4 * i + 2] * corner[3 * k + 2] + e[4 * i + 3];
+        trc_world_corners_at(d->scene, t->instance, t->triangle, vf_get(d->s->time, lane),
+                             p + 9 * lane);
     }
-    struct trc_corners c;
-    for (int k = 0; k < 3; k++)
-        c.corner[k] = v3(trc_column_of(p, 9, 3 * k), trc_column_of(p, 9, 3 * k + 1),
-                         trc_column_of(p, 9, 3 * k + 2));
-    return c;
+    return trc_corners_of(p);
 }
 
 /* Emission that a program computes: the surface at the sampled place, one material after the

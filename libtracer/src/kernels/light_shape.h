@@ -60,7 +60,11 @@ struct trc_place {
     vfloat distance, pdf;
 };
 
-/* ---- point and spot: a disk that faces the point ---- */
+/* ---- point and spot: a disk that faces the point, or a sphere ---- */
+
+TRC_INLINE vmask trc_lamp_has(const struct trc_wide_lamp *l, int32_t flag) {
+    return vm_not(vi_eq(l->flags & vi_set(flag), vi_set(0)));
+}
 
 TRC_INLINE vfloat trc_spot_factor(const struct trc_wide_lamp *l, vvec3 wi) {
     const vfloat c = -v3_dot(l->normal, wi);
@@ -68,14 +72,31 @@ TRC_INLINE vfloat trc_spot_factor(const struct trc_wide_lamp *l, vvec3 wi) {
     const vfloat t = vf_saturate(over * l->inv_smooth);
     const vfloat soft = t * t * (vf_set(3.0f) - vf_set(2.0f) * t);
     const vfloat edge = vf_select(vf_gt(l->inv_smooth, vf_zero()), soft, vf_one());
-    return vf_where(vf_gt(over, vf_zero()), c * edge);
+    const vfloat level = vf_select(trc_lamp_has(l, TRC_LAMP_EVEN_CONE), vf_one(), c);
+    return vf_where(vf_gt(over, vf_zero()), level * edge);
 }
 
-/* The disk faces the point, so what is seen is a cone about the way to its centre: sampled
- * uniformly by solid angle. 1 - cos of its half angle, without cancellation. */
+/* What is seen is a cone about the way to the centre: sampled uniformly by solid angle. 1 - cos of
+ * its half angle, without cancellation; from inside a sphere all directions, 2. */
 TRC_INLINE vfloat trc_point_cone(const struct trc_wide_lamp *l, vfloat reach) {
-    const vfloat far = vf_sqrt(reach * reach + l->half_u * l->half_u);
-    return vf_divide(l->half_u * l->half_u, far * (far + reach));
+    const vfloat r2 = l->half_u * l->half_u, d2 = reach * reach;
+    const vfloat far = vf_sqrt(d2 + r2), disk = vf_divide(r2, far * (far + reach));
+    const vmask sphere = trc_lamp_has(l, TRC_LAMP_SPHERE);
+    if (!vm_any(sphere))
+        return disk;
+    const vfloat ball = vf_divide(r2, reach * (reach + vf_safe_sqrt(d2 - r2)));
+    return vf_select(sphere, vf_select(vf_gt(d2, r2), ball, vf_set(2.0f)), disk);
+}
+/* Distance along a direction of that cone, by its cosine to the way to the centre. */
+TRC_INLINE vfloat trc_point_distance(const struct trc_wide_lamp *l, vfloat reach, vfloat cosine) {
+    const vmask sphere = trc_lamp_has(l, TRC_LAMP_SPHERE);
+    const vfloat disk = vf_divide(reach, cosine);
+    if (!vm_any(sphere))
+        return disk;
+    const vfloat r2 = l->half_u * l->half_u, d2 = reach * reach;
+    const vfloat half_chord = vf_safe_sqrt(r2 - d2 * (vf_one() - cosine * cosine));
+    const vfloat sign = vf_select(vf_gt(d2, r2), vf_set(-1.0f), vf_one());
+    return vf_select(sphere, reach * cosine + sign * half_chord, disk);
 }
 TRC_INLINE struct trc_place trc_point_sample(const struct trc_wide_lamp *l, vvec3 p, vfloat u1,
                                              vfloat u2) {
@@ -91,25 +112,28 @@ TRC_INLINE struct trc_place trc_point_sample(const struct trc_wide_lamp *l, vvec
     const vmask delta = vf_eq(l->half_u, vf_zero());
     struct trc_place s;
     s.wi = v3_select(delta, axis, v3_from_frame(v3(x * scale, y * scale, cosine), a, b, axis));
-    s.distance = reach / cosine;
+    s.distance = trc_point_distance(l, reach, cosine);
     /* A point without extent: intensity over squared distance, density 1. */
     const vfloat fade = vf_select(delta, vf_divide(vf_one(), reach * reach), vf_one());
     s.radiance = v3_scale(l->radiance, fade);
     s.pdf = vf_select(delta, vf_one(), vf_divide(vf_set(0.5f * TRC_INV_PI), k));
     return s;
 }
-/* Ray against the disk: distance, or beyond any. */
+/* Ray against the disk or sphere: distance, or beyond any. */
 TRC_INLINE vfloat trc_point_hit(const struct trc_wide_lamp *l, vvec3 p, vvec3 wi, vfloat *pdf) {
     vfloat reach;
     const vvec3 to = v3_sub(l->position, p);
     const vvec3 axis = v3_normalize_length(to, &reach);
     const vfloat cosine = v3_dot(axis, wi);
-    const vfloat t = vf_divide(reach, cosine);
-    const vvec3 off = v3_sub(v3_scale(wi, t), to);
-    const vmask hit =
-        vm_and(vf_gt(cosine, vf_zero()), vf_lt(v3_dot(off, off), l->half_u * l->half_u));
+    const vfloat r2 = l->half_u * l->half_u;
+    const vmask sphere = trc_lamp_has(l, TRC_LAMP_SPHERE);
+    /* Where the ray passes the centre: in the disk's plane, or nearest to it. */
+    const vfloat at = vf_select(sphere, reach * cosine, vf_divide(reach, cosine));
+    const vvec3 off = v3_sub(v3_scale(wi, at), to);
+    const vmask inside = vm_and(sphere, vf_le(reach * reach, r2));
+    const vmask hit = vm_and(vm_or(vf_gt(cosine, vf_zero()), inside), vf_lt(v3_dot(off, off), r2));
     *pdf = vf_divide(vf_set(0.5f * TRC_INV_PI), trc_point_cone(l, reach));
-    return vf_select(hit, t, vf_set(INFINITY));
+    return vf_select(hit, trc_point_distance(l, reach, cosine), vf_set(INFINITY));
 }
 
 /* ---- sun: a disk at distance 1 across its axis ---- */

@@ -130,6 +130,28 @@ static inline void trc_affine_at(const struct trc_instance *instance, float time
 TRC_INLINE vfloat trc_column_of(const float *rows, int width, int column) {
     return vf_gather(rows + column, vi_lane() * vi_set(width), vm_all_set());
 }
+/* Rows of 9: three corners of a lane. */
+TRC_INLINE struct trc_corners trc_corners_of(const float *rows) {
+    struct trc_corners c;
+    for (int k = 0; k < 3; k++)
+        c.corner[k] = v3(trc_column_of(rows, 9, 3 * k), trc_column_of(rows, 9, 3 * k + 1),
+                         trc_column_of(rows, 9, 3 * k + 2));
+    return c;
+}
+/* One row of them: the triangle of an instance in the world. */
+static inline void trc_world_corners_at(const struct trc_snapshot *snapshot, uint32_t instance,
+                                        uint32_t triangle, float time, float out[9]) {
+    const struct trc_instance *object = &snapshot->instances[instance];
+    const struct trc_mesh *mesh = snapshot->meshes[object->mesh];
+    float corner[9], m[12];
+    trc_corner_at(mesh->positions, mesh->indices + 3 * (size_t)triangle, mesh->vertex_count,
+                  mesh->key_count, time, corner);
+    trc_affine_at(object, time, m);
+    for (int k = 0; k < 3; k++)
+        for (int i = 0; i < 3; i++)
+            out[3 * k + i] = m[4 * i] * corner[3 * k] + m[4 * i + 1] * corner[3 * k + 1] +
+                             m[4 * i + 2] * corner[3 * k + 2] + m[4 * i + 3];
+}
 
 /* The instance of all lanes in m, or -1 when they differ. m not empty. */
 TRC_INLINE int32_t trc_uniform_instance(vint instance, vmask m) {

@@ -240,7 +240,7 @@ static void load_camera_to_world(const struct trc_snapshot *snapshot, struct trc
         const float *a = camera->camera_to_world[key].m;
         const float *b = camera->camera_to_world[key + (camera->key_count > 1)].m;
         for (int i = 0; i < 12; i++)
-            e[i] = (1.0f - f) * a[i] + f * b[i];
+            e[i] = a[i] + f * (b[i] - a[i]);
     }
     for (int i = 0; i < 3; i++)
         m->column[i] = v3(vf_set(e[i]), vf_set(e[4 + i]), vf_set(e[8 + i]));
@@ -273,7 +273,8 @@ static void op_window(const struct trc_surface *s, vfloat *out) {
     const uint32_t next = key + (camera->key_count > 1);
     float window[4];
     for (int i = 0; i < 4; i++) {
-        window[i] = (1.0f - f) * camera->windows[key][i] + f * camera->windows[next][i];
+        window[i] =
+            camera->windows[key][i] + f * (camera->windows[next][i] - camera->windows[key][i]);
     }
     const vvec3 p = op_camera_position(s);
     const bool perspective = camera->type == TRC_CAMERA_PERSPECTIVE;
@@ -283,7 +284,7 @@ static void op_window(const struct trc_surface *s, vfloat *out) {
     out[1] = (y - vf_set(window[2])) * vf_set(1.0f / (window[3] - window[2]));
 }
 
-/* A point or vector from one space to another. In the world there is no object space. */
+/* A point, vector or normal from one space to another. In the world there is no object space. */
 static vvec3 op_transform(const struct trc_surface *s, uint32_t mode, vvec3 v) {
     const uint32_t way = mode & 3u;
     const bool is_point = mode & TRC_TRANSFORM_POINT;
@@ -304,7 +305,11 @@ static vvec3 op_transform(const struct trc_surface *s, uint32_t mode, vvec3 v) {
             load_world_to_object(&g, s->time, &a);
         else
             trc_load_affine(g.instance, s->time, &a);
-        const vvec3 moved = is_point ? trc_transform_point(&a, v) : trc_transform_vector(&a, v);
+        vvec3 moved;
+        if (mode & TRC_TRANSFORM_NORMAL)
+            moved = normal_to_world(&a, v);
+        else
+            moved = is_point ? trc_transform_point(&a, v) : trc_transform_vector(&a, v);
         out = v3_select(g.lanes, moved, out);
     }
     return out;

@@ -84,14 +84,11 @@ static void load_mixed(const struct trc_surface *s, struct raw_hit *out) {
         smooth |= (flags & 1u) << lane;
         flips |= (flags >> 1) << lane;
     }
-    for (int k = 0; k < 3; k++) {
-        out->p.corner[k] = v3(trc_column_of(p, 9, 3 * k), trc_column_of(p, 9, 3 * k + 1),
-                              trc_column_of(p, 9, 3 * k + 2));
-        out->n.corner[k] = v3(trc_column_of(n, 9, 3 * k), trc_column_of(n, 9, 3 * k + 1),
-                              trc_column_of(n, 9, 3 * k + 2));
+    out->p = trc_corners_of(p);
+    out->n = trc_corners_of(n);
+    for (int k = 0; k < 3; k++)
         out->m.column[k] =
             v3(trc_column_of(m, 12, k), trc_column_of(m, 12, 4 + k), trc_column_of(m, 12, 8 + k));
-    }
     out->m.origin = v3(trc_column_of(m, 12, 3), trc_column_of(m, 12, 7), trc_column_of(m, 12, 11));
     out->smooth = vm_from_bits(smooth);
     out->flips = vm_from_bits(flips);

@@ -10,6 +10,7 @@
 #include "bvh/tree.h"
 #include "kernels/beam.h"
 #include "kernels/edge_filter.h"
+#include "kernels/mesh_fetch.h"
 #include "kernels/packet.h"
 #include "kernels/triangle.h"
 
@@ -609,16 +610,12 @@ TRC_INLINE void instance_inverse(const struct trc_instance *instance, vfloat tim
             inverse[k] = vf_set(instance->world_to_object->m[k]);
         return;
     }
-    const float last = (float)(instance->key_count - 1);
-    const vfloat x = vf_clamp(time, 0.0f, 1.0f) * vf_set(last);
-    const vfloat key = vf_min(vf_floor(x), vf_set(last - 1.0f)), f = x - key;
-    const vint at = vf_to_int(key) * vi_set(12);
-    vfloat m[12];
+    vfloat m[12], f;
+    const vint at = trc_wide_key(time, instance->key_count, &f) * vi_set(12);
     const float *base = instance->object_to_world->m;
-    for (int k = 0; k < 12; k++) {
-        const vfloat a = vf_gather(base + k, at, vm_all_set());
-        m[k] = a + f * (vf_gather(base + 12 + k, at, vm_all_set()) - a);
-    }
+    for (int k = 0; k < 12; k++)
+        m[k] = trc_between(vf_gather(base + k, at, vm_all_set()),
+                           vf_gather(base + 12 + k, at, vm_all_set()), f);
     const vvec3 r0 = v3(m[0], m[1], m[2]), r1 = v3(m[4], m[5], m[6]), r2 = v3(m[8], m[9], m[10]);
     const vvec3 c0 = v3_cross(r1, r2), c1 = v3_cross(r2, r0), c2 = v3_cross(r0, r1);
     const vfloat inv_det = vf_set(1.0f) / v3_dot(r0, c0);

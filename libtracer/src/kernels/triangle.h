@@ -130,8 +130,9 @@ struct trc_triangle_lanes {
     vfloat v[3][3]; /* vertex, axis in the order u, v, z */
 };
 
-/* Lanes whose triangle is flat in u or v and not ahead of the ray: floors and walls, which rays
- * that start on them would otherwise ask for in double. du, dv: have the signs of the direction. */
+/* Lanes whose triangle is flat in u or v and not ahead of the ray's origin: floors and walls, which
+ * rays that start on them would otherwise ask for in double. du, dv: have the signs of the
+ * direction. Says nothing about rays with a negative tmin, which meet what is behind them. */
 TRC_INLINE vmask trc_flat_behind(const struct trc_triangle_lanes *p, vfloat ou, vfloat ov,
                                  vfloat du, vfloat dv) {
     const vfloat zero = vf_set(0.0f), one = vf_set(1.0f);
@@ -171,7 +172,8 @@ TRC_INLINE vmask trc_triangle_test(const struct trc_triangle_lanes *p, vfloat ou
     const vmask near_edge = vf_le(nearest, vf_set(TRC_TINY_EDGE));
     vmask doubtful = vm_and(hit, vm_or(near_edge, too_near));
     if (__builtin_expect(vm_any(doubtful), 0)) {
-        const vmask behind = trc_flat_behind(p, ou, ov, su * sz, sv * sz);
+        const vmask behind =
+            vm_and(vf_ge(tmin, zero), trc_flat_behind(p, ou, ov, su * sz, sv * sz));
         hit = vm_andnot(hit, vm_and(doubtful, behind));
         doubtful = vm_andnot(doubtful, behind);
         if (!vm_any(doubtful))
@@ -236,7 +238,7 @@ TRC_INLINE uint32_t trc_triangle8_test(const struct trc_triangle8 *p, float ou, 
     const f8 bound = trc_t_error8(x, y, z, e, f8_abs(inv)) * f8_set(fabsf(sz));
     const uint32_t too_near = ~f8_le(*t, f8_set(tmin)) & f8_le(f8_abs(*t), bound);
     uint32_t doubtful = hit & (f8_le(nearest, f8_set(TRC_TINY_EDGE)) | too_near);
-    if (__builtin_expect(doubtful != 0, 0)) {
+    if (__builtin_expect(doubtful != 0, 0) && tmin >= 0.0f) {
         const uint32_t behind = doubtful & trc_flat_behind8(p, ou, ov, su * sz, sv * sz);
         hit &= ~behind;
         doubtful &= ~behind;

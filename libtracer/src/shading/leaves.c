@@ -52,12 +52,16 @@ static bool is_nothing(uint32_t type, const struct trc_operand *in) {
 
 /* The default tangent of an anisotropic leaf is the one around the object's Z axis. */
 static trc_status fill_tangent(struct trc_build *b, uint32_t type, struct trc_operand *in) {
-    const uint32_t anisotropy = type == TRC_NODE_GLOSSY ? (uint32_t)TRC_GLOSSY_ANISOTROPY
-                                                        : (uint32_t)TRC_PRINCIPLED_ANISOTROPY;
-    const uint32_t tangent =
-        type == TRC_NODE_GLOSSY ? (uint32_t)TRC_GLOSSY_TANGENT : (uint32_t)TRC_PRINCIPLED_TANGENT;
-    if (type != TRC_NODE_GLOSSY && type != TRC_NODE_PRINCIPLED)
+    uint32_t anisotropy = TRC_GLOSSY_ANISOTROPY, tangent = TRC_GLOSSY_TANGENT;
+    if (type == TRC_NODE_PRINCIPLED) {
+        anisotropy = TRC_PRINCIPLED_ANISOTROPY;
+        tangent = TRC_PRINCIPLED_TANGENT;
+    } else if (type == TRC_NODE_LAYERED_PRINCIPLED) {
+        anisotropy = TRC_LAYERED_ANISOTROPY;
+        tangent = TRC_LAYERED_TANGENT;
+    } else if (type != TRC_NODE_GLOSSY) {
         return TRC_OK;
+    }
     if (in[tangent].reg != -2 || trc_is_value(in[anisotropy], 0.0f))
         return TRC_OK;
     return trc_build_op(b, TRC_OP_TANGENT, 0, TRC_NO_RESOURCE, NULL, in + tangent);

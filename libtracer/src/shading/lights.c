@@ -61,9 +61,13 @@ static void make_point(struct trc_lamp *lamp, const trc_light_desc *desc) {
     set_radiance(lamp, desc, 0.25f / PI * lamp->inv_area);
     if (r == 0.0f)
         lamp->flags |= TRC_LAMP_DELTA;
+    if (desc->flags & TRC_LIGHT_SPHERE)
+        lamp->flags |= TRC_LAMP_SPHERE;
     if (desc->type != TRC_LIGHT_SPOT)
         return;
     lamp->kind = TRC_KIND_SPOT;
+    if (desc->flags & TRC_LIGHT_EVEN_CONE)
+        lamp->flags |= TRC_LAMP_EVEN_CONE;
     lamp->cos_cone = cosf(0.5f * fminf(desc->spot_angle, PI));
     const float width = (1.0f - lamp->cos_cone) * fminf(fmaxf(desc->spot_blend, 0.0f), 1.0f);
     lamp->inv_smooth = width > 0.0f ? 1.0f / width : 0.0f;

@@ -26,7 +26,9 @@ enum trc_light_kind {
 enum {
     TRC_LAMP_DELTA = 1, /* no extent: continuation rays never meet it */
     TRC_LAMP_MIS = 2,   /* continuation rays see it */
-    TRC_LAMP_CASTS_SHADOW = 4
+    TRC_LAMP_CASTS_SHADOW = 4,
+    TRC_LAMP_SPHERE = 8,    /* TRC_LIGHT_SPHERE */
+    TRC_LAMP_EVEN_CONE = 16 /* TRC_LIGHT_EVEN_CONE */
 };
 
 /* A lamp: 32 words, read by gathers of TRC_LAMP_WORDS stride. Positions in world space. */

@@ -289,19 +289,24 @@ static trc_status combine(struct trc_build *b, uint32_t mode, const struct trc_o
 /* By way of world space. */
 static trc_status lower_vector_transform(const struct lowering *l) {
     const uint32_t from = l->node->mode & 3u, to = l->node->mode >> 2 & 3u;
-    const uint32_t type = l->node->mode >> 4, point = type == 0 ? TRC_TRANSFORM_POINT : 0u;
+    const uint32_t type = l->node->mode >> 4;
+    const uint32_t kind = type == 0   ? (uint32_t)TRC_TRANSFORM_POINT
+                          : type == 3 ? (uint32_t)TRC_TRANSFORM_NORMAL
+                                      : 0u;
     memcpy(l->out, l->in, 3 * sizeof *l->in);
     if (from != to && from != TRC_SPACE_WORLD) {
         const uint32_t way = from == TRC_SPACE_OBJECT ? TRC_TRANSFORM_OBJECT_TO_WORLD
                                                       : TRC_TRANSFORM_CAMERA_TO_WORLD;
-        TRC_TRY(op(l->b, TRC_OP_TRANSFORM, way | point, l->out, l->out));
+        TRC_TRY(op(l->b, TRC_OP_TRANSFORM, way | kind, l->out, l->out));
     }
     if (from != to && to != TRC_SPACE_WORLD) {
         const uint32_t way =
             to == TRC_SPACE_OBJECT ? TRC_TRANSFORM_WORLD_TO_OBJECT : TRC_TRANSFORM_WORLD_TO_CAMERA;
-        TRC_TRY(op(l->b, TRC_OP_TRANSFORM, way | point, l->out, l->out));
+        TRC_TRY(op(l->b, TRC_OP_TRANSFORM, way | kind, l->out, l->out));
     }
-    return type == 2 ? combine(l->b, TRC_VECTOR_NORMALIZE, l->out, NULL, l->out) : TRC_OK;
+    return type == 2 || (type == 3 && from != to)
+               ? combine(l->b, TRC_VECTOR_NORMALIZE, l->out, NULL, l->out)
+               : TRC_OK;
 }
 
 /* in: vector, center, axis, angle, rotation */

@@ -23,6 +23,13 @@ static const struct trc_node_info infos[] = {
      "s"},
     {TRC_NODE_VELVET, "Velvet", "cfn", "color sigma normal", "s"},
     {TRC_NODE_TOON, "Toon", "cffn", "color size smooth normal", "s"},
+    {TRC_NODE_LAYERED_PRINCIPLED, "Principled", "cffffnffcfftffffcnffccf",
+     "base_color metallic roughness ior alpha normal diffuse_roughness specular_ior_level "
+     "specular_tint anisotropic anisotropic_rotation tangent transmission_weight coat_weight "
+     "coat_roughness coat_ior coat_tint coat_normal sheen_weight sheen_roughness sheen_tint "
+     "emission_color emission_strength",
+     "s"},
+    {TRC_NODE_SHEEN, "Sheen", "cfn", "color roughness normal", "s"},
 
     {TRC_NODE_IMAGE, "Image", "u", "vector", "cf"},
     {TRC_NODE_ENVIRONMENT, "Environment", "p", "vector", "c"},
@@ -102,9 +109,11 @@ bool trc_node_mode_is_valid(uint32_t type, uint32_t mode) {
     case TRC_NODE_GLOSSY:
     case TRC_NODE_GLASS:
     case TRC_NODE_REFRACTION:
-        return mode <= TRC_DISTRIBUTION_ASHIKHMIN;
+        return (mode & ~(uint32_t)TRC_DISTRIBUTION_CORRELATED) <= TRC_DISTRIBUTION_ASHIKHMIN;
     case TRC_NODE_PRINCIPLED:
+    case TRC_NODE_LAYERED_PRINCIPLED:
         return mode <= TRC_DISTRIBUTION_MULTI_GGX;
+    case TRC_NODE_DIFFUSE:
     case TRC_NODE_TOON:
         return mode <= 1;
     case TRC_NODE_IMAGE:
@@ -149,7 +158,7 @@ bool trc_node_mode_is_valid(uint32_t type, uint32_t mode) {
         return mode <= 1;
     case TRC_NODE_VECTOR_TRANSFORM:
         return (mode & 3u) <= TRC_SPACE_CAMERA && (mode >> 2 & 3u) <= TRC_SPACE_CAMERA &&
-               mode >> 4 <= 2;
+               mode >> 4 <= 3;
     case TRC_NODE_VECTOR_ROTATE:
         return (mode & ~8u) <= TRC_ROTATE_EULER;
     case TRC_NODE_MAGIC:

@@ -124,7 +124,8 @@ enum {
     TRC_TRANSFORM_WORLD_TO_OBJECT,
     TRC_TRANSFORM_WORLD_TO_CAMERA,
     TRC_TRANSFORM_CAMERA_TO_WORLD,
-    TRC_TRANSFORM_POINT = 4 /* bit */
+    TRC_TRANSFORM_POINT = 4, /* bit */
+    TRC_TRANSFORM_NORMAL = 8 /* bit: by the inverse transpose, unit; between world and object */
 };
 
 /* Set where nothing reads the colour of an operation whose colour costs extra. */

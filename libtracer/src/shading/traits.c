@@ -42,7 +42,7 @@ static uint32_t roughness_bits(float low, float high) {
 }
 
 static uint32_t microfacet_bits(uint32_t distribution, struct trc_operand roughness) {
-    if (distribution == TRC_DISTRIBUTION_SHARP)
+    if ((distribution & ~(uint32_t)TRC_DISTRIBUTION_CORRELATED) == TRC_DISTRIBUTION_SHARP)
         return TRC_MATERIAL_HAS_SPECULAR;
     if (!trc_is_constant(roughness))
         return roughness_bits(0.0f, INFINITY);
@@ -93,10 +93,30 @@ static uint32_t principled_bits(uint32_t distribution, const struct trc_operand 
     return has;
 }
 
+static uint32_t layered_principled_bits(uint32_t distribution, const struct trc_operand *in) {
+    const struct trc_operand metallic = in[TRC_LAYERED_METALLIC];
+    const struct trc_operand transmission = in[TRC_LAYERED_TRANSMISSION];
+    const struct trc_operand alpha = in[TRC_LAYERED_ALPHA];
+    uint32_t has = may_be_below(alpha, 1.0f) ? TRC_MATERIAL_HAS_TRANSPARENCY : 0u;
+    if (!may_exceed(alpha, 0.0f))
+        return has;
+    has |= microfacet_bits(distribution, in[TRC_LAYERED_ROUGHNESS]);
+    if (may_be_below(metallic, 1.0f) && may_be_below(transmission, 1.0f))
+        has |= TRC_MATERIAL_HAS_DIFFUSE;
+    if (may_be_below(metallic, 1.0f) && may_exceed(transmission, WEIGHT_CUTOFF))
+        has |= TRC_MATERIAL_HAS_REFRACTION;
+    if (may_exceed(in[TRC_LAYERED_COAT], WEIGHT_CUTOFF))
+        has |= microfacet_bits(TRC_DISTRIBUTION_GGX, in[TRC_LAYERED_COAT_ROUGHNESS]);
+    if (may_exceed(in[TRC_LAYERED_SHEEN], WEIGHT_CUTOFF))
+        has |= TRC_MATERIAL_HAS_DIFFUSE;
+    return has;
+}
+
 static uint32_t leaf_bits(const struct trc_leaf *leaf, const struct trc_operand *in) {
     switch (leaf->type) {
     case TRC_NODE_DIFFUSE:
     case TRC_NODE_VELVET:
+    case TRC_NODE_SHEEN:
         return TRC_MATERIAL_HAS_DIFFUSE;
     case TRC_NODE_TOON:
         return leaf->mode ? TRC_MATERIAL_HAS_GLOSSY : TRC_MATERIAL_HAS_DIFFUSE;
@@ -113,6 +133,8 @@ static uint32_t leaf_bits(const struct trc_leaf *leaf, const struct trc_operand 
         return TRC_MATERIAL_HAS_REFRACTION | microfacet_bits(leaf->mode, in[TRC_ROUGHNESS]);
     case TRC_NODE_PRINCIPLED:
         return principled_bits(leaf->mode, in);
+    case TRC_NODE_LAYERED_PRINCIPLED:
+        return layered_principled_bits(leaf->mode, in);
     default:
         return 0;
     }
@@ -134,6 +156,9 @@ static bool emitter_of(const struct trc_leaf *leaf, const struct trc_operand *in
     } else if (leaf->type == TRC_NODE_PRINCIPLED) {
         *out = (struct emitter){in + TRC_PRINCIPLED_EMISSION, in[TRC_PRINCIPLED_EMISSION_STRENGTH],
                                 in[TRC_PRINCIPLED_ALPHA]};
+    } else if (leaf->type == TRC_NODE_LAYERED_PRINCIPLED) {
+        *out = (struct emitter){in + TRC_LAYERED_EMISSION, in[TRC_LAYERED_EMISSION_STRENGTH],
+                                in[TRC_LAYERED_ALPHA]};
     } else {
         return false;
     }

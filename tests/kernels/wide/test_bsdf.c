@@ -6,6 +6,7 @@
 
 #include "kernels/bsdf.h"
 #include "kernels/wide_math.h"
+#include "shading/build.h"
 #include "wide_test.h"
 
 #define OPERANDS 40
@@ -138,6 +139,49 @@ static struct model principled_all(void) {
     set(&m, 18, 0.4f);
     return m;
 }
+/* Principled of Blender 4 with every layer, or white metal, or white glass. */
+static struct model layered(const char *name, uint32_t mode, float roughness) {
+    struct model m;
+    begin(&m, name, TRC_NODE_LAYERED_PRINCIPLED, mode, 39);
+    set3(&m, 0, 1, 1, 1);
+    set(&m, TRC_LAYERED_ROUGHNESS, roughness);
+    set(&m, TRC_LAYERED_IOR, 1.5f);
+    set(&m, TRC_LAYERED_ALPHA, 1.0f);
+    unlink_vector(&m, TRC_LAYERED_NORMAL);
+    set(&m, TRC_LAYERED_SPECULAR_LEVEL, 0.5f);
+    set3(&m, TRC_LAYERED_SPECULAR_TINT, 1, 1, 1);
+    set3(&m, TRC_LAYERED_TANGENT, 1, 0, 0);
+    set(&m, TRC_LAYERED_COAT_ROUGHNESS, 0.3f);
+    set(&m, TRC_LAYERED_COAT_IOR, 1.5f);
+    set3(&m, TRC_LAYERED_COAT_TINT, 1, 1, 1);
+    unlink_vector(&m, TRC_LAYERED_COAT_NORMAL);
+    set(&m, TRC_LAYERED_SHEEN_ROUGHNESS, 0.5f);
+    set3(&m, TRC_LAYERED_SHEEN_TINT, 1, 1, 1);
+    return m;
+}
+static struct model layered_metal(uint32_t mode, float roughness) {
+    struct model m = layered("layered metal", mode, roughness);
+    set(&m, TRC_LAYERED_METALLIC, 1.0f);
+    return m;
+}
+static struct model layered_glass(uint32_t mode, float roughness, bool back) {
+    struct model m = layered("layered glass", mode, roughness);
+    set(&m, TRC_LAYERED_TRANSMISSION, 1.0f);
+    m.back = back;
+    return m;
+}
+static struct model layered_all(void) {
+    struct model m = layered("all layers", TRC_DISTRIBUTION_MULTI_GGX, 0.6f);
+    set(&m, TRC_LAYERED_METALLIC, 0.3f);
+    set(&m, TRC_LAYERED_TRANSMISSION, 0.4f);
+    set(&m, TRC_LAYERED_COAT, 0.7f);
+    set(&m, TRC_LAYERED_SHEEN, 0.8f);
+    set(&m, TRC_LAYERED_DIFFUSE_ROUGHNESS, 0.5f);
+    set(&m, TRC_LAYERED_ANISOTROPY, 0.4f);
+    set3(&m, TRC_LAYERED_COAT_TINT, 0.9f, 0.5f, 0.7f);
+    return m;
+}
+
 static struct model toon(uint32_t mode, float size, float smooth) {
     struct model m;
     begin(&m, mode ? "glossy toon" : "toon", TRC_NODE_TOON, mode, 8);
@@ -207,7 +251,7 @@ static void cell_of(float x, float y, float z, int *row, int *column) {
 
 static void draw_samples(const struct trc_lobes *l, const struct trc_surface *s,
                          struct histogram *h) {
-    struct test_random random = test_random_seed(1);
+    struct rng random = rng_seed(1);
     memset(h, 0, sizeof *h);
     for (int i = 0; i < SAMPLES; i += TRC_WIDTH) {
         struct trc_bsdf_sample b;
@@ -334,6 +378,10 @@ static void sampling_matches_density(void **state) {
         clearcoat(0.6f),
         toon(1, 0.4f, 0.0f),
         toon(1, 0.4f, 0.1f),
+        glossy(TRC_DISTRIBUTION_GGX | TRC_DISTRIBUTION_CORRELATED, 0.7f, 0.3f),
+        glass(TRC_DISTRIBUTION_MULTI_GGX | TRC_DISTRIBUTION_CORRELATED, 0.7f, 1.5f, true),
+        layered_glass(TRC_DISTRIBUTION_GGX, 0.6f, false),
+        layered_all(),
     };
     int failed = 0;
     for (size_t i = 0; i < sizeof models / sizeof models[0]; i++)
@@ -416,6 +464,17 @@ static void furnace_is_white(void **state) {
             struct model from_inside = glass(TRC_DISTRIBUTION_MULTI_GGX, r, 1.45f, true);
             struct model metal = principled_metal(TRC_DISTRIBUTION_MULTI_GGX, r);
             set(&metal, 11, 0.0f);
+            const uint32_t later = TRC_DISTRIBUTION_MULTI_GGX | TRC_DISTRIBUTION_CORRELATED;
+            struct model scaled[] = {glossy(later, r, 0.0f),
+                                     layered_metal(TRC_DISTRIBUTION_MULTI_GGX, r),
+                                     glass(later, r, 1.45f, false), glass(later, r, 1.45f, true),
+                                     layered_glass(TRC_DISTRIBUTION_MULTI_GGX, r, true)};
+            for (size_t i = 0; j % 2 == 0 && i < sizeof scaled / sizeof scaled[0]; i++) {
+                const double e = albedo(&scaled[i], cosines[k]);
+                printf("%s, cos %.2f, roughness %.2f: %.3f\n", scaled[i].name, cosines[k],
+                       (double)r, e);
+                assert_true(fabs(e - 1.0) < (i < 2 ? 0.02 : 0.06));
+            }
             const double a = albedo(&multi, cosines[k]), b = albedo(&multi_glass, cosines[k]);
             const double c = albedo(&from_inside, cosines[k]), d = albedo(&metal, cosines[k]);
             printf("multi-scatter, cos %.2f, roughness %.2f: glossy %.3f, glass %.3f and %.3f, "
@@ -458,6 +517,18 @@ static void diffuse_albedos(void **state) {
         assert_true(diffuse_albedo(&rough, c) < 1.01);
         printf("cos %.1f: Oren-Nayar %.3f, Principled diffuse %.3f\n", c, diffuse_albedo(&rough, c),
                diffuse_albedo(&all, c));
+        struct model whole = rough;
+        whole.material.leaves[0].mode = 1;
+        assert_true(fabs(diffuse_albedo(&whole, c) - 1.0) < 3e-3);
+        /* A linear map of a cosine lobe keeps its integral. */
+        struct model fibres = diffuse(0.4f);
+        fibres.material.leaves[0].type = TRC_NODE_SHEEN;
+        struct trc_surface s;
+        struct trc_lobes l;
+        prepare(&fibres, direction(c, 0.3), &s, &l);
+        const double kept = (double)vf_get(l.lobe[0].weight.x, 0);
+        assert_true(kept > 0.01 && kept < 1.0);
+        assert_true(fabs(diffuse_albedo(&fibres, c) / kept - 1.0) < 0.01);
     }
 }
 
@@ -515,13 +586,13 @@ static void lobes_are_reciprocal(void **state) {
                              glossy(TRC_DISTRIBUTION_MULTI_GGX, 0.9f, 0.0f),
                              glossy(TRC_DISTRIBUTION_ASHIKHMIN, 0.6f, 0.3f),
                              principled("Principled")};
-    struct test_random random = test_random_seed(9);
+    struct rng random = rng_seed(9);
     for (size_t i = 0; i < sizeof models / sizeof models[0]; i++)
         for (int n = 0; n < 200; n++) {
-            const double c1 = 0.05 + 0.95 * (double)test_uniform(&random);
-            const double c2 = 0.05 + 0.95 * (double)test_uniform(&random);
-            const vvec3 a = direction(c1, 6.28 * (double)test_uniform(&random));
-            const vvec3 b = direction(c2, 6.28 * (double)test_uniform(&random));
+            const double c1 = 0.05 + 0.95 * (double)rng_unit(&random);
+            const double c2 = 0.05 + 0.95 * (double)rng_unit(&random);
+            const vvec3 a = direction(c1, 6.28 * (double)rng_unit(&random));
+            const vvec3 b = direction(c2, 6.28 * (double)rng_unit(&random));
             float f[2];
             for (int k = 0; k < 2; k++) {
                 struct trc_surface s;
@@ -550,18 +621,18 @@ static double ggx_reference(double alpha, const double o[3], const double i[3]) 
 }
 static void values_match_formulas(void **state) {
     (void)state;
-    struct test_random random = test_random_seed(4);
+    struct rng random = rng_seed(4);
     const float roughnesses[] = {0.03f, 0.1f, 0.5f, 1.0f};
     for (int k = 0; k < 4; k++)
         for (int n = 0; n < 500; n++) {
             struct model m = glossy(TRC_DISTRIBUTION_GGX, roughnesses[k], 0.0f);
-            const double c = 0.05 + 0.95 * (double)test_uniform(&random), phi = 2.0;
+            const double c = 0.05 + 0.95 * (double)rng_unit(&random), phi = 2.0;
             const double r = sqrt(1 - c * c);
             const double o[3] = {r * cos(phi), r * sin(phi), c};
             /* Near the mirror direction, so that sharp lobes are looked at where they live. */
             const double spread = 4.0 * (double)(roughnesses[k] * roughnesses[k]);
-            double i[3] = {-o[0] + spread * ((double)test_uniform(&random) - 0.5),
-                           -o[1] + spread * ((double)test_uniform(&random) - 0.5), o[2]};
+            double i[3] = {-o[0] + spread * ((double)rng_unit(&random) - 0.5),
+                           -o[1] + spread * ((double)rng_unit(&random) - 0.5), o[2]};
             const double size = sqrt(i[0] * i[0] + i[1] * i[1] + i[2] * i[2]);
             for (int j = 0; j < 3; j++)
                 i[j] /= size;

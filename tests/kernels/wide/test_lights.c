@@ -121,7 +121,7 @@ static vfloat lit_by(const struct trc_surface *s, const struct trc_light_sample 
 
 /* Irradiance at the point through light samples. */
 static struct estimate irradiance(const struct trc_surface *s) {
-    struct test_random random = test_random_seed(7);
+    struct rng random = rng_seed(7);
     double sum = 0, sum2 = 0;
     for (int i = 0; i < SAMPLES; i += TRC_WIDTH) {
         struct trc_light_sample l;
@@ -191,6 +191,23 @@ static void lamps_have_cycles_units(void **state) {
         expect("point, closed form", e,
                100 / (4 * M_PI) / (16 + (double)radii[i] * (double)radii[i]));
     }
+    trc_light_desc ball = lamp(TRC_LIGHT_POINT, 0, 0, 4);
+    ball.flags = TRC_LIGHT_SPHERE;
+    for (int i = 0; i < 3; i++) { /* as if all came from the centre */
+        ball.radius = radii[i];
+        e.value = one_lamp(ball, &e.error);
+        expect("sphere", e, 100 / (4 * M_PI) / 16);
+    }
+    ball.radius = 8.0f;
+    e.value = one_lamp(ball, &e.error);
+    expect("sphere from inside", e, 100 / (4 * M_PI) / 64);
+    trc_light_desc even = lamp(TRC_LIGHT_SPOT, 3, 0, 4);
+    even.radius = 0.0f;
+    e.value = one_lamp(even, &e.error);
+    expect("spot from the side", e, 100 / (4 * M_PI) / 25 * 0.8 * 0.8);
+    even.flags = TRC_LIGHT_EVEN_CONE;
+    e.value = one_lamp(even, &e.error);
+    expect("even spot from the side", e, 100 / (4 * M_PI) / 25 * 0.8);
     trc_light_desc spot = lamp(TRC_LIGHT_SPOT, 0, 0, 4);
     spot.radius = 2.0f;
     e.value = one_lamp(spot, &e.error);
@@ -298,9 +315,13 @@ static double implied_pdf(double seen, double radiance, double pb) {
 /* A sampled direction must be met by a ray, with the same density. */
 static void rays_agree_with_samples(void **state) {
     (void)state;
-    trc_light_desc lights[] = {lamp(TRC_LIGHT_AREA, 0, 0, 2), lamp(TRC_LIGHT_AREA, 4, 0, 3),
+    trc_light_desc lights[] = {lamp(TRC_LIGHT_AREA, 0, 0, 2),   lamp(TRC_LIGHT_AREA, 4, 0, 3),
                                lamp(TRC_LIGHT_POINT, -3, 1, 2), lamp(TRC_LIGHT_SPOT, 0, 4, 3),
-                               lamp(TRC_LIGHT_SUN, 0, 0, 0)};
+                               lamp(TRC_LIGHT_SUN, 0, 0, 0),    lamp(TRC_LIGHT_POINT, 3, 4, 1),
+                               lamp(TRC_LIGHT_SPOT, -4, -3, 3)};
+    lights[5].flags = TRC_LIGHT_SPHERE;
+    lights[6].flags = TRC_LIGHT_SPHERE | TRC_LIGHT_EVEN_CONE;
+    lights[5].radius = lights[6].radius = 0.7f;
     lights[1].area_shape = TRC_AREA_ELLIPSE;
     lights[1].size_y = 0.5f;
     lights[0].spread = 1.2f;
@@ -315,9 +336,9 @@ static void rays_agree_with_samples(void **state) {
     lights[4].transform[10] = 0.4f;
     struct scene s;
     scene_begin(&s);
-    scene_commit(&s, lights, 5);
-    struct test_random random = test_random_seed(3);
-    int seen[5] = {0}, missed = 0;
+    scene_commit(&s, lights, 7);
+    struct rng random = rng_seed(3);
+    int seen[7] = {0}, missed = 0;
     double most = 0.0;
     for (int i = 0; i < 20000; i += TRC_WIDTH) {
         struct trc_surface r = receiver(&s, 0, 0, 0);
@@ -353,7 +374,7 @@ static void rays_agree_with_samples(void **state) {
     printf("  densities differ by %.2g at most; %d rays missed\n", most, missed);
     assert_true(most < 5e-3);
     assert_true(missed < 20);
-    for (int i = 0; i < 5; i++) {
+    for (int i = 0; i < 7; i++) {
         printf("  lamp %d: %d samples\n", i, seen[i]);
         assert_true(seen[i] > 50);
     }
@@ -363,7 +384,7 @@ static void rays_agree_with_samples(void **state) {
 /* The density over the sphere, from rays in all directions, is the chance of the one light: 1. */
 static void densities_integrate_to_one(void **state) {
     (void)state;
-    for (int kind = 0; kind < 6; kind++) {
+    for (int kind = 0; kind < 7; kind++) {
         trc_light_desc d = lamp(TRC_LIGHT_AREA, 0.3f, 0.2f, 0.6f);
         if (kind == 1)
             d.area_shape = TRC_AREA_ELLIPSE;
@@ -375,6 +396,8 @@ static void densities_integrate_to_one(void **state) {
             d.spread = 1.5f;
         if (kind == 5)
             d = lamp(TRC_LIGHT_AREA, 0.3f, 0.2f, 25.0f), d.size_x = 4.0f;
+        if (kind == 6)
+            d = lamp(TRC_LIGHT_POINT, 0, 0, 1), d.flags = TRC_LIGHT_SPHERE;
         d.radius = 0.8f;
         d.angle = 1.0f;
         struct scene s;
@@ -420,17 +443,17 @@ static void densities_integrate_to_one(void **state) {
 
 /* A cloud of triangles above and around the origin. */
 static void cloud(struct scene *s, int count, double corners[][3][3]) {
-    struct test_random random = test_random_seed(21);
+    struct rng random = rng_seed(21);
     scene_begin(s);
     scene_emit(s, 3, 3, 3);
     for (int i = 0; i < count; i++) {
         float c[9];
         double center[3];
         for (int k = 0; k < 3; k++)
-            center[k] = 8.0 * ((double)test_uniform(&random) - 0.5);
+            center[k] = 8.0 * ((double)rng_unit(&random) - 0.5);
         center[2] = fabs(center[2]) + 0.9;
         for (int k = 0; k < 9; k++) {
-            c[k] = (float)(center[k % 3] + 0.6 * ((double)test_uniform(&random) - 0.5));
+            c[k] = (float)(center[k % 3] + 0.6 * ((double)rng_unit(&random) - 0.5));
             corners[i][k / 3][k % 3] = (double)c[k];
         }
         scene_triangle(s, c, i % 7 == 3 ? 1 : 0);
@@ -474,7 +497,7 @@ static void chances_match(void **state) {
         const struct trc_receiver who = trc_receiver_make(r.p, r.n);
         static int count[MESH_TRIANGLES + 3];
         memset(count, 0, sizeof count);
-        struct test_random random = test_random_seed(5);
+        struct rng random = rng_seed(5);
         double worst = 0.0, chi = 0.0, sum = 0.0;
         for (int n = 0; n < SAMPLES; n += TRC_WIDTH) {
             struct trc_light_sample l;

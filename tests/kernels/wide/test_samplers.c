@@ -186,19 +186,19 @@ static void sudoku_covers_tiles(void **state) {
  * many dimensions are asked for. Sample numbers are equal, consecutive or neither. */
 static void lanes_do_not_matter(void **state) {
     (void)state;
-    struct test_random random = test_random_seed(2);
+    struct rng random = rng_seed(2);
     for (size_t k = 0; k < 5; k++) {
         const struct trc_sampler s = sampler(kinds[k], 100);
         for (int n = 0; n < 2000; n++) {
             uint32_t pixel[TRC_WIDTH], index[TRC_WIDTH];
-            const uint32_t first = test_bits(&random) % (n % 2 ? 2100 : 3000000);
+            const uint32_t first = rng_bits(&random) % (n % 2 ? 2100 : 3000000);
             for (uint32_t i = 0; i < TRC_WIDTH; i++) {
-                pixel[i] = pixel_at(test_bits(&random) % 500, test_bits(&random) % 500);
+                pixel[i] = pixel_at(rng_bits(&random) % 500, rng_bits(&random) % 500);
                 index[i] = n % 4 == 0   ? first
                            : n % 4 == 1 ? first + i
-                                        : test_bits(&random) % (n % 4 == 2 ? 100 : 3000000);
+                                        : rng_bits(&random) % (n % 4 == 2 ? 100 : 3000000);
             }
-            const uint32_t d = test_bits(&random) % 40, dims = 1 + test_bits(&random) % 3;
+            const uint32_t d = rng_bits(&random) % 40, dims = 1 + rng_bits(&random) % 3;
             vfloat u[3];
             TRC_KERNEL(trc_samples)(&s, vu_load(pixel), vu_load(index), d, dims, 0, 1, u);
             for (uint32_t j = 0; j < dims; j++)

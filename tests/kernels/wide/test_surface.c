@@ -25,12 +25,12 @@ struct scene {
 };
 static struct scene scene;
 
-static float around_zero(struct test_random *r) { return test_uniform(r) - 0.5f; }
+static float around_zero(struct rng *r) { return rng_unit(r) - 0.5f; }
 
 /* Mesh 0 static and flat, 1 with smooth vertex normals, 2 moving with corner normals, 3 far from
  * the origin. Instances: identity, others with scale and shear, mirrored, moving. */
 static void build(void) {
-    struct test_random r = test_random_seed(1);
+    struct rng r = rng_seed(1);
     memset(&scene, 0, sizeof scene);
     for (uint32_t i = 0; i < 3 * TRIANGLES; i++)
         scene.indices[i] = i;
@@ -158,14 +158,14 @@ struct hits {
     int32_t instance[TRC_WIDTH], triangle[TRC_WIDTH];
     float u[TRC_WIDTH], v[TRC_WIDTH], time[TRC_WIDTH];
 };
-static struct hits random_hits(struct test_random *r, bool uniform) {
+static struct hits random_hits(struct rng *r, bool uniform) {
     struct hits h;
     for (int k = 0; k < TRC_WIDTH; k++) {
-        h.instance[k] = uniform && k ? h.instance[0] : (int32_t)(test_bits(r) % INSTANCES);
-        h.triangle[k] = (int32_t)(test_bits(r) % TRIANGLES);
-        h.u[k] = test_uniform(r);
-        h.v[k] = test_uniform(r) * (1.0f - h.u[k]);
-        h.time[k] = test_bits(r) % 4 ? test_uniform(r) : (float)(test_bits(r) % 2);
+        h.instance[k] = uniform && k ? h.instance[0] : (int32_t)(rng_bits(r) % INSTANCES);
+        h.triangle[k] = (int32_t)(rng_bits(r) % TRIANGLES);
+        h.u[k] = rng_unit(r);
+        h.v[k] = rng_unit(r) * (1.0f - h.u[k]);
+        h.time[k] = rng_bits(r) % 4 ? rng_unit(r) : (float)(rng_bits(r) % 2);
     }
     return h;
 }
@@ -187,7 +187,7 @@ static struct trc_surface fetch(const struct hits *h, vvec3 wo) {
 static void agrees_with_exact_arithmetic(void **state) {
     (void)state;
     build();
-    struct test_random r = test_random_seed(2);
+    struct rng r = rng_seed(2);
     double worst = 0.0, worst_normal = 0.0;
     for (int n = 0; n < 4000; n++) {
         const struct hits h = random_hits(&r, n % 2);
@@ -227,7 +227,7 @@ static void agrees_with_exact_arithmetic(void **state) {
 static void lanes_do_not_matter(void **state) {
     (void)state;
     build();
-    struct test_random r = test_random_seed(3);
+    struct rng r = rng_seed(3);
     for (int n = 0; n < 2000; n++) {
         const struct hits h = random_hits(&r, false);
         const vvec3 wo = trc_warp_sphere(test_wide_uniform(&r), test_wide_uniform(&r));

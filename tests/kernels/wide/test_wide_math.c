@@ -91,16 +91,16 @@ static void bounds_of_functions(void **state) {
 
 static void power(void **state) {
     (void)state;
-    struct test_random random = test_random_seed(11);
+    struct rng random = rng_seed(11);
     double most = 0.0;
     for (int i = 0; i < POINTS; i += TRC_WIDTH) {
         float x[TRC_WIDTH], y[TRC_WIDTH], r[TRC_WIDTH];
         for (int k = 0; k < TRC_WIDTH; k++) {
-            x[k] = expf(10.0f * (test_uniform(&random) - 0.5f));
-            y[k] = 40.0f * (test_uniform(&random) - 0.5f);
+            x[k] = expf(10.0f * (rng_unit(&random) - 0.5f));
+            y[k] = 40.0f * (rng_unit(&random) - 0.5f);
             if (i / TRC_WIDTH & 1) {
-                x[k] = 1.0f - 0.3f * test_uniform(&random) * test_uniform(&random);
-                y[k] = 2000.0f * test_uniform(&random) * test_uniform(&random);
+                x[k] = 1.0f - 0.3f * rng_unit(&random) * rng_unit(&random);
+                y[k] = 2000.0f * rng_unit(&random) * rng_unit(&random);
             }
         }
         vf_store(r, vf_pow(vf_load(x), vf_load(y)));
@@ -124,14 +124,14 @@ static void power(void **state) {
 
 static void angles(void **state) {
     (void)state;
-    struct test_random random = test_random_seed(5);
+    struct rng random = rng_seed(5);
     double most = 0.0, most_turns = 0.0, most_inverse = 0.0;
     for (int i = 0; i < POINTS; i += TRC_WIDTH) {
         float x[TRC_WIDTH], y[TRC_WIDTH], t[TRC_WIDTH], s[TRC_WIDTH], e[TRC_WIDTH];
         for (int k = 0; k < TRC_WIDTH; k++) {
-            x[k] = (test_uniform(&random) - 0.5f) * expf(20.0f * (test_uniform(&random) - 0.5f));
-            y[k] = (test_uniform(&random) - 0.5f) * expf(20.0f * (test_uniform(&random) - 0.5f));
-            t[k] = test_uniform(&random);
+            x[k] = (rng_unit(&random) - 0.5f) * expf(20.0f * (rng_unit(&random) - 0.5f));
+            y[k] = (rng_unit(&random) - 0.5f) * expf(20.0f * (rng_unit(&random) - 0.5f));
+            t[k] = rng_unit(&random);
         }
         vfloat sine, cosine;
         vf_sincos_turns(vf_load(t), &sine, &cosine);
@@ -155,7 +155,7 @@ static void angles(void **state) {
 
 static void frames_are_orthonormal(void **state) {
     (void)state;
-    struct test_random random = test_random_seed(3);
+    struct rng random = rng_seed(3);
     double most = 0.0;
     for (int i = 0; i < 1 << 16; i++) {
         const vfloat u1 = test_wide_uniform(&random), u2 = test_wide_uniform(&random);

@@ -1,0 +1,131 @@
+#!/usr/bin/env bash
+# The add-on in the next Blender: Debian 13 with Blender 4.3.2 in a folder of its own, where the library
+# is built and tested as a user of Debian 13 would.
+#
+#   bash tests/blender_next.sh [--fast] [--report XML] [PYTEST ARGUMENT]...
+#
+# Runs all Blender tests if no argument says which; --fast leaves out what a change of Blender's version
+# hardly touches (see SLOW); --report writes JUnit XML. Needs root, a Debian
+# mirror and 2.5 GB; the folder is $XDG_CACHE_HOME/volley/trixie and stays, so that the next run
+# takes only the build and the tests. Nothing is mounted. Exit code 77: it cannot be set up here, with
+# the reason as the last line; else pytest's.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+SUITE=trixie
+CACHE=${XDG_CACHE_HOME:-$HOME/.cache}/volley
+ROOT=$CACHE/$SUITE
+# Without Xvfb: screenshots of Blender 4.3 on it are black, so tests in windows are skipped.
+PACKAGES=(
+    blender gcc g++ cmake ninja-build libc6-dev libopenimageio-dev openimageio-tools
+    python3-numpy python3-pytest
+)
+SKIPPED=77
+
+say() { printf '== %s\n' "$*"; }
+skip() { printf 'Blender of Debian 13: %s\n' "$*"; exit "$SKIPPED"; }
+die() { printf 'blender_next: %s\n' "$*" >&2; exit 1; }
+
+inside() {
+    chroot "$ROOT" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LC_ALL=C.UTF-8 \
+        ${http_proxy:+http_proxy="$http_proxy"} "$@" </dev/null
+}
+
+# The mirror that this system installs from.
+mirror() {
+    local found
+    found=$(apt-get indextargets --format '$(SITE) $(REPO_URI)' 'Created-By: Packages' 2>/dev/null |
+        sed -n 's|^[^ ]* \(.*/debian/\{0,1\}\)$|\1|p' | head -n 1)
+    printf '%s\n' "${found:-http://deb.debian.org/debian}"
+}
+
+# Packages without documentation and without waiting for the disk: the folder can be made again.
+configure_packages() {
+    local root=$1
+    printf '%s\n' force-unsafe-io 'path-exclude=/usr/share/doc/*' 'path-exclude=/usr/share/man/*' \
+        'path-exclude=/usr/share/locale/*' >"$root/etc/dpkg/dpkg.cfg.d/volley"
+    printf '%s\n' 'Acquire::Languages "none";' 'APT::Install-Recommends "false";' \
+        >"$root/etc/apt/apt.conf.d/volley"
+}
+
+make_root() {
+    local log=$CACHE/debootstrap.log proxy="" part=$ROOT.part
+    if ! command -v debootstrap >/dev/null; then
+        { apt-get update -q && apt-get install -q -y --no-install-recommends debootstrap; } \
+            </dev/null >/dev/null 2>&1 || skip "debootstrap cannot be installed"
+    fi
+    eval "$(apt-config shell proxy Acquire::http::Proxy)"
+    [ -z "$proxy" ] || export http_proxy=$proxy
+    mkdir -p "$CACHE"
+    rm -rf "$part"
+    say "Debian 13 into $ROOT"
+    # Its own mount name space, if there may be one: what debootstrap mounts goes away with it.
+    local private=()
+    ! unshare --mount true 2>/dev/null || private=(unshare --mount)
+    "${private[@]}" debootstrap --variant=minbase "$SUITE" "$part" "$(mirror)" >"$log" 2>&1 </dev/null ||
+        { tail -n 5 "$log"; skip "debootstrap failed, see $log"; }
+    configure_packages "$part"
+    mv "$part" "$ROOT"
+}
+
+install_packages() {
+    local log=$CACHE/packages.log
+    if inside dpkg-query -W -f '${db:Status-Status}\n' "${PACKAGES[@]}" 2>/dev/null |
+        awk '$1 != "installed" { bad = 1 } END { exit bad || NR < '${#PACKAGES[@]}' }'; then
+        return
+    fi
+    say "Packages of Debian 13"
+    { inside apt-get update -q &&
+        inside env DEBIAN_FRONTEND=noninteractive apt-get install -q -y "${PACKAGES[@]}"; } \
+        >"$log" 2>&1 || { tail -n 5 "$log"; skip "its packages cannot be installed, see $log"; }
+}
+
+# The sources as they are here, next to the build that stays; times are kept for ninja.
+copy_sources() {
+    local target=$ROOT/volley sources=(CMakeLists.txt LICENSE .cmake addon libtracer tests examples)
+    mkdir -p "$target"
+    (cd "$target" && rm -rf "${sources[@]}")
+    tar -c --exclude=__pycache__ "${sources[@]}" | tar -x -C "$target"
+}
+
+build() {
+    local log=$CACHE/build.log
+    say "Building with Debian 13's compiler and OpenImageIO"
+    inside sh -c 'cd /volley && cmake -G Ninja -C .cmake/ci.cmake -B build -DTRACER_BUILD_TESTS=OFF \
+        -DTRACER_BUILD_BENCH=OFF && cmake --build build' >"$log" 2>&1 ||
+        { tail -n 40 "$log" >&2; die "the build failed"; }
+}
+
+run_tests() {
+    say "Tests in $(inside blender --version 2>/dev/null | head -n 1)"
+    inside env VOLLEY_BUILD=/volley/build BLENDER_USER_SCRIPTS=/volley/build/blender \
+        PYTHONPATH=/volley/tests/support sh -c 'cd /volley && exec python3 -m pytest "$@"' pytest \
+        -q -ra -p no:cacheprovider --rootdir tests --junit-prefix next \
+        --junit-xml build/pytest.xml "$@"
+}
+
+# What takes long for what it says of Blender's version.
+SLOW="test_whitted"
+
+main() {
+    local report="" status=0 arguments=()
+    while [ $# -gt 0 ]; do
+        case $1 in
+            --fast) arguments+=(-k "not ($SLOW)"); shift ;;
+            --report) report=${2:?--report needs a file}; shift 2 ;;
+            *) break ;;
+        esac
+    done
+    [ $# -gt 0 ] || set -- tests/blender
+    [ "$(id -u)" -eq 0 ] || skip "changing into its folder needs root"
+    [ -d "$ROOT" ] || make_root
+    install_packages
+    copy_sources
+    build
+    rm -f "$ROOT/volley/build/pytest.xml"
+    run_tests "${arguments[@]}" "$@" || status=$?
+    [ -z "$report" ] || cp "$ROOT/volley/build/pytest.xml" "$report" || true
+    exit "$status"
+}
+
+main "$@"
