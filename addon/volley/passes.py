@@ -40,6 +40,13 @@ PASSES = (
 )
 COMBINED = PASSES[0]
 
+# By TRC_CRYPTOMATTE_*: name, setting of the view layer.
+CRYPTOMATTES = (("CryptoObject", "use_pass_cryptomatte_object"),
+                ("CryptoMaterial", "use_pass_cryptomatte_material"),
+                ("CryptoAsset", "use_pass_cryptomatte_asset"))
+_FIRST_CRYPTOMATTE, _MOST_LAYERS = 128, 8  # TRC_PASS_CRYPTOMATTE
+_LAYER_RANKS = 2
+
 
 def name_of(entry, long_names=HAS_LONG_PASS_NAMES):
     """The pass's name in this Blender."""
@@ -58,7 +65,18 @@ def is_enabled(entry, view_layer):
 
 def enabled(view_layer):
     """The passes a view layer asks for."""
-    return [entry for entry in PASSES if is_enabled(entry, view_layer)]
+    entries = [entry for entry in PASSES if is_enabled(entry, view_layer)]
+    return entries + list(_cryptomatte_layers(view_layer))
+
+
+def _cryptomatte_layers(view_layer):
+    """Channels in small letters: so Blender's OpenEXR writer knows that they must not be changed."""
+    ranks = min(view_layer.pass_cryptomatte_depth, _LAYER_RANKS * _MOST_LAYERS)
+    for kind, (name, setting) in enumerate(CRYPTOMATTES):
+        if getattr(view_layer, setting):
+            for layer in range((ranks + 1) // _LAYER_RANKS):
+                index = _FIRST_CRYPTOMATTE + kind * _MOST_LAYERS + layer
+                yield Pass(index, (f"{name}{layer:02d}",) * 2, "rgba", 'COLOR', setting)
 
 
 def register_passes(engine, scene, view_layer):
@@ -80,9 +98,15 @@ def without_vector(entries):
     return [entry for entry in entries if entry.setting != "use_pass_vector"]
 
 
-def request_mask(entries):
-    """The passes as bits for the library."""
-    return sum(1 << entry.index for entry in entries)
+def request_fields(entries):
+    """The passes as fields of trc_render_desc."""
+    layers = [divmod(entry.index - _FIRST_CRYPTOMATTE, _MOST_LAYERS) for entry in entries
+              if entry.index >= _FIRST_CRYPTOMATTE]
+    return {
+        "passes": sum(1 << entry.index for entry in entries if entry.index < _FIRST_CRYPTOMATTE),
+        "cryptomattes": sum(1 << kind for kind in {kind for kind, _ in layers}),
+        "cryptomatte_depth": _LAYER_RANKS * max((layer + 1 for _, layer in layers), default=0),
+    }
 
 
 def write(render, layer, entries):

@@ -10,7 +10,7 @@ import time
 
 import bpy
 
-from . import native, passes
+from . import cryptomatte, native, passes
 from .compat import motion_position
 from .log import logger
 from .sync import Cancelled, SceneSync, Source, camera, motion, world
@@ -78,6 +78,7 @@ class Session:
                     view_layer.name, view_name, entries)
             finally:
                 render.destroy()
+        cryptomatte.write_manifests(engine, view_layer, self._sync.cryptomatte_names())
 
     def _open(self, scene, keep):
         """The library's scene: the one kept from the last frame, or a new one."""
@@ -271,7 +272,7 @@ def render_fields(scene, frame, crop, entries, is_preview=False):
         "sampler": native.SAMPLERS[settings.sampler], "seed": seed & 0xFFFFFFFF,
         "filter": native.FILTERS[settings.pixel_filter_type], "filter_width": settings.filter_width,
         "film_transparent": int(scene.render.film_transparent),
-        "film_exposure": settings.film_exposure, "passes": passes.request_mask(entries),
+        "film_exposure": settings.film_exposure, **passes.request_fields(entries),
         "thread_count": thread_count(scene.render), **_adaptive_fields(settings, is_preview),
         **world.mist_fields(scene.world),
     }

@@ -8,6 +8,7 @@ shown where that add-on is enabled.
 import bpy
 from bpy.types import Panel
 
+from . import passes
 from .compat import motion_position
 
 ENGINE = 'VOLLEY'
@@ -326,6 +327,22 @@ class VOLLEY_VIEWLAYER_PT_passes_light(_VolleyPanel, Panel):
         column = layout.column(heading="Other", align=True)
         column.prop(view_layer, "use_pass_emit", text="Emission")
         column.prop(view_layer, "use_pass_environment")
+
+
+class VOLLEY_VIEWLAYER_PT_passes_cryptomatte(_VolleyPanel, Panel):
+    bl_label = "Cryptomatte"
+    bl_context = "view_layer"
+    bl_parent_id = "VOLLEY_VIEWLAYER_PT_passes"
+
+    def draw(self, context):
+        view_layer, layout = context.view_layer, _column(self)
+        settings = [setting for _, setting in passes.CRYPTOMATTES]
+        column = layout.column()
+        for setting in settings:
+            column.prop(view_layer, setting, text=setting.rpartition("_")[2].title())
+        column = layout.column()
+        column.active = any(getattr(view_layer, setting) for setting in settings)
+        column.prop(view_layer, "pass_cryptomatte_depth", text="Levels")
 
 
 # Objects ---------------------------------------------------------------------------------------

@@ -139,3 +139,142 @@ def test_vector(blender):
     for ours, theirs in pairs.values():  # the file has an alpha of 1 in place of the fourth channel
         assert np.abs(theirs).max(axis=(0, 1)).min() > 0.5
         _agree(ours, theirs, mean=5e-3, share=0.02)
+
+
+# Cryptomatte ----------------------------------------------------------------------------------------
+
+CRYPTOMATTES = ("CryptoObject", "CryptoMaterial", "CryptoAsset")
+LEVELS = 5  # three layers
+MATTED = "Metal,Veil"
+
+
+def _crypto_scene():
+    """Objects with and without materials, instances, a group, transparency, depth of field."""
+    import bpy
+    import scenes
+    scene = _scene()
+    made = scene.camera
+    made.data.dof.use_dof, made.data.dof.focus_distance = True, 5.0
+    made.data.dof.aperture_fstop = 0.3
+    bare = scenes.sphere("Bare", 0.4, (0.2, -1.5, -1.2))
+    bare.parent = bpy.data.objects["Metal"]
+    glass = scenes.sphere("Glass", 0.5, (-2.5, -1.0, 1.4), scenes.material(
+        "Glass", "ShaderNodeBsdfGlass", Color=(0.9, 0.9, 1.0)))
+    collection = bpy.data.collections.new("Source")
+    scene.collection.objects.unlink(glass)
+    collection.objects.link(glass)
+    for number in range(3):
+        copy = scenes.link(f"Copy{number}", None)
+        copy.instance_type, copy.instance_collection = 'COLLECTION', collection
+        copy.location = (1.3 * number, 0.3 * number, -0.5 * number)
+    layer = bpy.context.view_layer
+    layer.use_pass_cryptomatte_object = layer.use_pass_cryptomatte_material = True
+    layer.use_pass_cryptomatte_asset, layer.pass_cryptomatte_depth = True, LEVELS
+    return scene
+
+
+def _matte(names):
+    """The matte that the compositor's Cryptomatte node makes of the objects, of a new render."""
+    import os
+    import tempfile
+    import bpy
+    import scenes
+    scene = bpy.context.scene
+    tree, folder = scene.node_tree, tempfile.mkdtemp(prefix="volley_")
+    tree.nodes.clear()
+    node = tree.nodes.new("CompositorNodeCryptomatteV2")
+    node.scene, node.layer_name, node.matte_id = scene, "ViewLayer.CryptoObject", names
+    tree.links.new(tree.nodes.new("CompositorNodeRLayers").outputs["Image"], node.inputs["Image"])
+    output = tree.nodes.new("CompositorNodeOutputFile")
+    output.base_path = folder
+    output.format.file_format, output.format.color_depth = 'OPEN_EXR', '32'
+    tree.links.new(node.outputs["Matte"], output.inputs[0])
+    tree.links.new(node.outputs["Image"], tree.nodes.new("CompositorNodeComposite").inputs[0])
+    bpy.ops.render.render()
+    return scenes.load(os.path.join(folder, os.listdir(folder)[0]))
+
+
+def inside_cryptomatte():
+    import scenes
+    _crypto_scene()
+    names = [f"{kind}{layer:02d}" for kind in CRYPTOMATTES for layer in range((LEVELS + 1) // 2)]
+    pairs, mattes = _both(names, 256), []
+    for engine in ('VOLLEY', 'CYCLES'):
+        scenes.set_engine(engine, 256)
+        mattes.append(_matte(MATTED))
+    return pairs, mattes
+
+
+def _ranks(pairs, kind, engine):
+    """All channels of one kind of mattes by one engine: id and coverage in turn."""
+    layers = [pairs[name][engine] for name in sorted(pairs) if name.startswith(kind)]
+    return np.concatenate(layers, axis=-1)
+
+
+def _coverages(ranks):
+    """Coverage by each id."""
+    ids, parts = ranks[..., 0::2], ranks[..., 1::2]
+    return {float(number): np.where(ids == number, parts, 0.0).sum(axis=-1)
+            for number in np.unique(ids) if number != 0.0}
+
+
+def test_cryptomatte(blender):
+    pairs, mattes = blender.run(inside_cryptomatte, timeout=300)
+    for kind, count in zip(CRYPTOMATTES, (6, 6, 5)):
+        parts = _ranks(pairs, kind, 0)[..., 1::2]
+        assert (parts[..., :-1] >= parts[..., 1:]).all()  # Cycles sorts only the first kind
+        ours, theirs = (_coverages(_ranks(pairs, kind, engine)) for engine in (0, 1))
+        assert ours.keys() == theirs.keys() and len(ours) == count
+        for number, expected in theirs.items():
+            assert abs(ours[number].mean() - expected.mean()) < 1e-3
+            assert (np.abs(ours[number] - expected) > 0.1).mean() < 0.01
+    ours, theirs = (matte[..., 0] for matte in mattes)
+    assert 0.1 < theirs.mean() < 0.9
+    assert abs(ours.mean() - theirs.mean()) < 1e-3
+    assert (np.abs(ours - theirs) > 0.1).mean() < 0.01
+
+
+def inside_manifests(path):
+    import bpy
+    import scenes
+    scene = _crypto_scene()
+    bpy.data.objects["Veil"].name = "Veil é"
+    scene.render.image_settings.file_format = 'OPEN_EXR_MULTILAYER'
+    for engine in ('VOLLEY', 'CYCLES'):
+        scenes.set_engine(engine, 1)
+        scene.render.filepath = f"{path}/{engine}.exr"
+        bpy.ops.render.render(write_still=True)
+
+
+def _id_digits(digits):
+    """A hash as the bits of its id: Cycles writes the hash itself, which readers take as well."""
+    bits = int(digits, 16)
+    return f"{bits ^ 1 << 23 if bits >> 23 & 255 in (0, 255) else bits:08x}"
+
+
+def _manifests(path):
+    """{key: value} of the Cryptomatte metadata of an OpenEXR file, manifests as dictionaries."""
+    import json
+    import re
+    with open(path, "rb") as file:
+        header = file.read(1 << 16)
+    found = {}
+    for match in re.finditer(rb"(cryptomatte/[0-9a-f]{7}/\w+)\0string\0(.{4})", header, re.DOTALL):
+        size = int.from_bytes(match.group(2), "little")
+        value = header[match.end():match.end() + size].decode("utf-8")
+        is_manifest = match.group(1).endswith(b"manifest")
+        found[match.group(1).decode()] = json.loads(value) if is_manifest else value
+    return found
+
+
+def test_cryptomatte_manifests(blender, tmp_path):
+    blender.run(inside_manifests, str(tmp_path))
+    ours, theirs = _manifests(tmp_path / "VOLLEY.exr"), _manifests(tmp_path / "CYCLES.exr")
+    assert len(ours) == 12 and ours.keys() == theirs.keys()
+    for key, value in ours.items():
+        if key.endswith("manifest"):  # Cycles also names what nothing shows
+            named = {name: _id_digits(digits) for name, digits in theirs[key].items()}
+            assert value.items() <= named.items()
+            assert len(value) >= 5
+        else:
+            assert value == theirs[key]

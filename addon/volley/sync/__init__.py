@@ -142,6 +142,11 @@ class SceneSync:
             self.scene.set_world(**fields)
         self._world = fields
 
+    def cryptomatte_names(self):
+        """The names of objects, materials and assets in mattes: by TRC_CRYPTOMATTE."""
+        objects, assets = self._instances.names()
+        return objects, self._materials.names(), assets
+
     def set_camera(self, keys, shutter=None):
         """Send the camera; keys as camera.CameraKeys."""
         if shutter is None or shutter.curve is None:

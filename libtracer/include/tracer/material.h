@@ -314,6 +314,8 @@ typedef struct trc_material_desc {
     int32_t surface;    /* index of the shader node that is the output; -1: black */
     int32_t pass_index; /* Material Index pass */
     uint32_t flags;     /* TRC_MATERIAL_* */
+    float cryptomatte;  /* trc_cryptomatte_id of its name; 0: in no matte */
+    uint32_t reserved;
 } trc_material_desc;
 
 enum {

@@ -65,6 +65,23 @@ enum {
     TRC_PASS_COUNT = 24
 };
 
+/* Cryptomatte: which objects, materials or assets (an object's uppermost parent) cover a pixel, and
+ * how much of it (J. Friedman, A. Jones, "Fully Automatic ID Mattes with Support for Motion Blur
+ * and Transparency", SIGGRAPH 2015 posters; Psyop's specification 1.2.0). Ranks are pairs of an id
+ * and its coverage, largest first, two of them in the 4 channels of a layer. What is partly
+ * transparent shares the coverage with what is behind it. */
+enum { TRC_CRYPTOMATTE_OBJECT = 0, TRC_CRYPTOMATTE_MATERIAL, TRC_CRYPTOMATTE_ASSET };
+#define TRC_CRYPTOMATTE_KINDS 3
+#define TRC_MAX_CRYPTOMATTE_DEPTH 16 /* ranks */
+
+/* The number of a Cryptomatte layer for trc_render_read. */
+#define TRC_PASS_CRYPTOMATTE(kind, layer) (128u + 8u * (kind) + (layer))
+
+/* The id of a name: its bytes' MurmurHash3_x86_32 with seed 0 (A. Appleby, public domain) as the
+ * bits of a float, the exponent kept off the ends so that it is finite and normal. name: UTF-8,
+ * NULL gives 0, which stands for no id. */
+TRC_API float trc_cryptomatte_id(const char *name);
+
 typedef struct trc_render_desc {
     uint32_t struct_size;
     uint32_t width, height;           /* the full frame, 1..65536 each */
@@ -104,7 +121,10 @@ typedef struct trc_render_desc {
     /* Of TRC_PASS_MIST, else not read: ((distance - mist_start) / mist_depth)^mist_falloff, the
      * quotient cut to [0, 1]; distance from the camera (orthographic: along its axis). */
     float mist_start, mist_depth; /* metres, >= 0; a mist_depth of 0 is no mist */
-    float mist_falloff; /* > 0; Blender's Quadratic is 2, Linear 1, Inverse Quadratic 0.5 */
+    float mist_falloff;         /* > 0; Blender's Quadratic is 2, Linear 1, Inverse Quadratic 0.5 */
+    uint32_t cryptomattes;      /* bit per TRC_CRYPTOMATTE_* */
+    uint32_t cryptomatte_depth; /* ranks, 1..TRC_MAX_CRYPTOMATTE_DEPTH, rounded up to an even
+                                   number; not read without cryptomattes */
     uint32_t reserved;
 } trc_render_desc;
 
@@ -141,7 +161,7 @@ TRC_API trc_status trc_render_cancel(trc_render render);
 TRC_API trc_status trc_render_read(trc_render render, uint32_t pass, float *pixels_out,
                                    uint64_t float_count);
 
-/* Channels of a pass, 0 for an unknown one. */
+/* Channels of a pass, 0 for an unknown one; 4 for every Cryptomatte layer. */
 TRC_API uint32_t trc_pass_channels(uint32_t pass);
 
 /* Cancels, waits and frees. The handle becomes stale. */

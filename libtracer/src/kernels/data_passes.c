@@ -2,7 +2,7 @@
  *
  * Two kinds, as in Cycles: those of the first surface that is not mostly seen through (depth,
  * normal, indices ...), and those that add up over all surfaces on the straight way through
- * transparency, each by what it lets be seen of itself (colours, mist). */
+ * transparency, each by what it lets be seen of itself (colours, mist, mattes). */
 #include "kernels/mesh_fetch.h"
 #include "kernels/tile.h"
 #include "kernels/wide_math.h"
@@ -173,6 +173,43 @@ static void add_mist(struct trc_tile *t, const struct trc_surface *s, vvec3 seen
     add_lanes(t, TRC_PASS_MIST, v3(clear, zero, zero), slots, active);
 }
 
+/* ---- mattes ---- */
+
+/* Whether a sample counts towards the film. With adaptive sampling some are taken for their error
+ * alone. */
+static bool is_counted(const struct trc_tile *t, size_t pixel) {
+    const struct trc_adaptive *a = t->job->adaptive;
+    return !a || (a->pixels[pixel].reasons & TRC_PIXEL_COUNTS);
+}
+
+/* What the surfaces cover goes to the film at once, as a sample may meet any number of them. Whole
+ * holdouts are in no matte, as in Cycles. */
+static void add_mattes(struct trc_tile *t, const struct trc_surface *s,
+                       const struct trc_material *m, const struct trc_lobes *lobes, vvec3 seen,
+                       const uint32_t *slots, vmask active) {
+    const struct trc_film *film = t->job->film;
+    float weight[TRC_WIDTH];
+    if (m->has & TRC_MATERIAL_HAS_HOLDOUT)
+        active = vm_and(active, vf_lt(lobes->holdout, vf_set(1.0f)));
+    vf_store(weight, v3_average(seen));
+    for (uint32_t bits = vm_bits(active); bits; bits &= bits - 1) {
+        const int i = __builtin_ctz(bits);
+        const struct trc_instance *instance = &t->snapshot->instances[vi_get(s->instance, i)];
+        const float ids[TRC_CRYPTOMATTE_KINDS] = {
+            [TRC_CRYPTOMATTE_OBJECT] = instance->cryptomatte_object,
+            [TRC_CRYPTOMATTE_MATERIAL] = m->cryptomatte,
+            [TRC_CRYPTOMATTE_ASSET] = instance->cryptomatte_asset,
+        };
+        const size_t pixel = trc_film_pixel(t, slots[i]);
+        if (!(weight[i] > 0.0f && weight[i] < INFINITY) || !is_counted(t, pixel))
+            continue;
+        for (int k = 0; k < TRC_CRYPTOMATTE_KINDS; k++)
+            if (film->mattes[k] && ids[k] != 0.0f)
+                trc_matte_add(film->mattes[k] + pixel * film->matte_count, film->matte_count,
+                              ids[k], weight[i]);
+    }
+}
+
 /* ---- for denoisers: of the first rough surface, through mirrors and glass too ----
  *
  * As Cycles, but for surfaces that are not told of and yet have diffuse lobes: with diffuse bounces
@@ -227,6 +264,8 @@ vuint TRC_KERNEL(trc_data_passes)(struct trc_tile *t, const struct trc_surface *
     const vvec3 alpha = v3_sub(one, TRC_KERNEL(trc_lobes_transparency)(lobes));
     add_colors(t, s, lobes, weight, slots, on);
     add_mist(t, s, v3_mul(weight, alpha), slots, on);
+    if (t->desc->cryptomattes)
+        add_mattes(t, s, m, lobes, v3_mul(weight, alpha), slots, on);
     vmask first = vm_and(on, vi_eq((vint)s->path & vi_set(TRC_PATH_DATA_DONE), vi_set(0)));
     if (m->has & TRC_MATERIAL_HAS_TRANSPARENCY)
         first = vm_and(first, vf_ge(v3_average(alpha), vf_set(ALPHA_THRESHOLD)));

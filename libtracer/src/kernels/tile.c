@@ -289,13 +289,6 @@ static void samples_clear(struct trc_tile *t) {
     }
 }
 
-/* A sample's pixel in the film. */
-TRC_INLINE size_t film_pixel(const struct trc_tile *t, uint32_t slot) {
-    const uint32_t x = (t->samples.pixel[slot] & 0xffffu) - t->desc->crop_x;
-    const uint32_t y = (t->samples.pixel[slot] >> 16) - t->desc->crop_y;
-    return (size_t)y * t->job->film->width + x;
-}
-
 TRC_INLINE bool is_finite_sample(const struct trc_tile *t, uint32_t slot) {
     return isfinite(t->samples.radiance[0][slot] + t->samples.radiance[1][slot] +
                     t->samples.radiance[2][slot]);
@@ -350,7 +343,7 @@ static void film_add(struct trc_tile *t) {
         uint32_t end = begin + 1;
         while (end < count && pixel[end] == pixel[begin])
             end++;
-        film_add_run(t, begin, end, film_pixel(t, begin));
+        film_add_run(t, begin, end, trc_film_pixel(t, begin));
         begin = end;
     }
 }
@@ -362,7 +355,7 @@ static void film_add_adaptive(struct trc_tile *t) {
             t->job->counts.dropped_samples++;
             continue;
         }
-        const size_t pixel = film_pixel(t, slot);
+        const size_t pixel = trc_film_pixel(t, slot);
         struct trc_adaptive_pixel *p = &t->job->adaptive->pixels[pixel];
         for (int c = 0; c < 3; c++)
             p->sum[c] += (double)t->samples.radiance[c][slot];
@@ -518,7 +511,7 @@ void TRC_KERNEL(trc_tile_render)(struct trc_tile_job *job) {
     t->desc = job->desc;
     t->sampler = (struct trc_sampler){job->desc->sampler, job->desc->seed, job->desc->sample_count,
                                       job->sampler_table};
-    t->extra_passes = job->desc->passes & ~(1ull << TRC_PASS_COMBINED);
+    t->extra_passes = (job->desc->passes & ~(1ull << TRC_PASS_COMBINED)) || job->desc->cryptomattes;
     t->light_passes = wants_light_passes(job->desc);
     t->object_motion =
         job->snapshot->features & (TRC_FEATURE_OBJECT_MOTION | TRC_FEATURE_DEFORMATION);

@@ -99,7 +99,7 @@ struct trc_tile {
     const struct trc_snapshot *snapshot;
     const trc_render_desc *desc;
     struct trc_sampler sampler;
-    bool extra_passes;          /* more than Combined */
+    bool extra_passes;          /* more than Combined, or mattes */
     bool light_passes;          /* some pass wants light by kind */
     bool object_motion;         /* rays need times */
     bool camera_common;         /* camera rays start at one point */
@@ -181,6 +181,13 @@ vuint TRC_KERNEL(trc_data_passes)(struct trc_tile *t, const struct trc_surface *
 
 /* Traces and empties the shadow queue. (kernels/shadow.c) */
 void TRC_KERNEL(trc_shadow_flush)(struct trc_tile *t);
+
+/* A sample's pixel in the film. */
+TRC_INLINE size_t trc_film_pixel(const struct trc_tile *t, uint32_t slot) {
+    const uint32_t x = (t->samples.pixel[slot] & 0xffffu) - t->desc->crop_x;
+    const uint32_t y = (t->samples.pixel[slot] >> 16) - t->desc->crop_y;
+    return (size_t)y * t->job->film->width + x;
+}
 
 /* Adds light that reached a sample to its radiance and passes. kind: 0 diffuse, 1 glossy, 2
  * transmission of the first surface. */

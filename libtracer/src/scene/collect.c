@@ -152,6 +152,8 @@ static uint64_t fill_instances(const struct trc_scene_state *scene,
             .materials = materials,
             .pass_index = source->pass_index,
             .random = source->random,
+            .cryptomatte_object = source->cryptomatte_object,
+            .cryptomatte_asset = source->cryptomatte_asset,
             .first_light = UINT32_MAX,
         };
         memcpy(instance->color, source->color, sizeof instance->color);

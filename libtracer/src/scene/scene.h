@@ -44,6 +44,7 @@ struct trc_scene_instance {
     int32_t pass_index;
     float random;
     float color[4];
+    float cryptomatte_object, cryptomatte_asset;
 };
 
 struct trc_scene_state {

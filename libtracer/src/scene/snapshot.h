@@ -58,6 +58,7 @@ struct trc_instance {
     int32_t pass_index;
     float random;
     float color[4];
+    float cryptomatte_object, cryptomatte_asset;
     uint32_t first_light; /* first emissive-triangle light of this instance or UINT32_MAX */
     uint32_t flips;       /* 1: negative determinant at key 0 */
 };

@@ -46,6 +46,7 @@ trc_status trc_material_compile(const trc_material_desc *desc,
         atomic_init(&m->refs, 1);
         m->flags = desc->flags;
         m->pass_index = desc->pass_index;
+        m->cryptomatte = desc->cryptomatte;
         status = compile(b, m);
     } else {
         trc_fail(status, "no memory to compile a material");

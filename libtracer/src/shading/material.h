@@ -62,6 +62,7 @@ struct trc_material {
     uint32_t has;   /* TRC_MATERIAL_HAS_* */
     uint32_t flags; /* TRC_MATERIAL_* of the public header */
     int32_t pass_index;
+    float cryptomatte; /* id of its name */
     uint32_t leaf_count, operand_count, instruction_count, register_count, table_count;
     struct trc_leaf leaves[TRC_MAX_LEAVES];
     struct trc_operand *operands;
