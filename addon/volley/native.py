@@ -176,7 +176,8 @@ class _RenderDesc(_Struct):
                 ("film_exposure", _f32), ("passes", _u64), ("thread_count", _u32),
                 ("progressive", _u32), ("noise_threshold", _f32), ("min_samples", _u32),
                 ("mist_start", _f32), ("mist_depth", _f32), ("mist_falloff", _f32),
-                ("cryptomattes", _u32), ("cryptomatte_depth", _u32), ("reserved", _u32)]
+                ("cryptomattes", _u32), ("cryptomatte_depth", _u32), ("aov_value_count", _u32),
+                ("aov_color_count", _u32), ("reserved", _u32)]
 
 
 class _RenderProgress(_Struct):

@@ -47,6 +47,10 @@ CRYPTOMATTES = (("CryptoObject", "use_pass_cryptomatte_object"),
 _FIRST_CRYPTOMATTE, _MOST_LAYERS = 128, 8  # TRC_PASS_CRYPTOMATTE
 _LAYER_RANKS = 2
 
+# By the type of an AOV: TRC_PASS_AOV_*, channels, kind of pass.
+_AOVS = {'VALUE': (64, "X", 'VALUE'), 'COLOR': (80, "RGBA", 'COLOR')}
+_MOST_AOVS = 16
+
 
 def name_of(entry, long_names=HAS_LONG_PASS_NAMES):
     """The pass's name in this Blender."""
@@ -66,7 +70,23 @@ def is_enabled(entry, view_layer):
 def enabled(view_layer):
     """The passes a view layer asks for."""
     entries = [entry for entry in PASSES if is_enabled(entry, view_layer)]
-    return entries + list(_cryptomatte_layers(view_layer))
+    return entries + list(_aovs(view_layer)) + list(_cryptomatte_layers(view_layer))
+
+
+def aov_numbers(view_layer):
+    """{name: (type, number among those of its type)} of the AOVs that a view layer asks for."""
+    numbers, counts = {}, dict.fromkeys(_AOVS, 0)
+    for aov in view_layer.aovs:
+        if aov.is_valid and counts[aov.type] < _MOST_AOVS:
+            numbers[aov.name] = aov.type, counts[aov.type]
+            counts[aov.type] += 1
+    return numbers
+
+
+def _aovs(view_layer):
+    for name, (aov_type, number) in aov_numbers(view_layer).items():
+        first, channels, kind = _AOVS[aov_type]
+        yield Pass(first + number, (name, name), channels, kind, "aovs")
 
 
 def _cryptomatte_layers(view_layer):
@@ -102,8 +122,11 @@ def request_fields(entries):
     """The passes as fields of trc_render_desc."""
     layers = [divmod(entry.index - _FIRST_CRYPTOMATTE, _MOST_LAYERS) for entry in entries
               if entry.index >= _FIRST_CRYPTOMATTE]
+    aov_counts = [sum(first <= entry.index < first + _MOST_AOVS for entry in entries)
+                  for first, _, _ in _AOVS.values()]
     return {
-        "passes": sum(1 << entry.index for entry in entries if entry.index < _FIRST_CRYPTOMATTE),
+        "passes": sum(1 << entry.index for entry in entries if entry.index < _AOVS['VALUE'][0]),
+        "aov_value_count": aov_counts[0], "aov_color_count": aov_counts[1],
         "cryptomattes": sum(1 << kind for kind in {kind for kind, _ in layers}),
         "cryptomatte_depth": _LAYER_RANKS * max((layer + 1 for _, layer in layers), default=0),
     }

@@ -345,6 +345,23 @@ class VOLLEY_VIEWLAYER_PT_passes_cryptomatte(_VolleyPanel, Panel):
         column.prop(view_layer, "pass_cryptomatte_depth", text="Levels")
 
 
+class VOLLEY_VIEWLAYER_PT_passes_aov(_VolleyPanel, Panel):
+    bl_label = "Shader AOV"
+    bl_context = "view_layer"
+    bl_parent_id = "VOLLEY_VIEWLAYER_PT_passes"
+
+    def draw(self, context):
+        view_layer, layout = context.view_layer, _column(self)
+        row = layout.row()
+        row.column().template_list("VIEWLAYER_UL_aov", "aovs", view_layer, "aovs", view_layer,
+                                   "active_aov_index", rows=3)
+        buttons = row.column(align=True)
+        buttons.operator("scene.view_layer_add_aov", icon='ADD', text="")
+        buttons.operator("scene.view_layer_remove_aov", icon='REMOVE', text="")
+        if view_layer.active_aov and not view_layer.active_aov.is_valid:
+            layout.label(text="Conflicts with another pass of the same name", icon='ERROR')
+
+
 # Objects ---------------------------------------------------------------------------------------
 
 _SHAPED = {'MESH', 'CURVE', 'SURFACE', 'FONT', 'META', 'CURVES', 'POINTCLOUD'}

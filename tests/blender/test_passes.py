@@ -278,3 +278,62 @@ def test_cryptomatte_manifests(blender, tmp_path):
             assert len(value) >= 5
         else:
             assert value == theirs[key]
+
+
+# AOVs -----------------------------------------------------------------------------------------------
+
+def _aov(tree, name, source, path="Value"):
+    """An AOV Output node whose input is linked to an output."""
+    node = tree.nodes.new("ShaderNodeOutputAOV")
+    setattr(node, "aov_name" if hasattr(node, "aov_name") else "name", name)
+    tree.links.new(source, node.inputs[path])
+
+
+def _aov_scene():
+    """Values and colours of nodes that the surface needs, and of others, in a group too; seen through
+    a clear veil with an AOV of its own, and in the world."""
+    import bpy
+    import scenes
+    scene = _scene()
+    scene.world.use_nodes = True
+    layer = bpy.context.view_layer
+    for name, kind in (("height", 'VALUE'), ("tint", 'COLOR'), ("facing", 'VALUE'), ("unused", 'COLOR')):
+        aov = layer.aovs.add()
+        aov.name, aov.type = name, kind
+    bpy.data.objects["Back"].scale = (0.5, 1.0, 0.5)
+    tree = bpy.data.materials["Matt"].node_tree
+    coordinate = tree.nodes.new("ShaderNodeTexCoord")
+    checker = tree.nodes.new("ShaderNodeTexChecker")
+    checker.inputs["Scale"].default_value = 4.0
+    tree.links.new(coordinate.outputs["Generated"], checker.inputs["Vector"])
+    tree.links.new(checker.outputs["Color"], tree.nodes["Diffuse BSDF"].inputs["Color"])
+    _aov(tree, "tint", checker.outputs["Color"], "Color")
+    tree = bpy.data.materials["Metal"].node_tree
+    _aov(tree, "height", tree.nodes.new("ShaderNodeTexCoord").outputs["Object"])
+    group = bpy.data.node_groups.new("Inner", 'ShaderNodeTree')
+    weight = group.nodes.new("ShaderNodeLayerWeight")
+    _aov(group, "facing", weight.outputs["Facing"])
+    tree.nodes.new("ShaderNodeGroup").node_tree = group
+    bpy.data.objects["Veil"].data.materials[0] = clear = scenes.material(
+        "Clear", "ShaderNodeBsdfTransparent", Color=(1.0, 1.0, 1.0))
+    blue = clear.node_tree.nodes.new("ShaderNodeRGB")
+    blue.outputs[0].default_value = (0.0, 0.2, 0.7, 1.0)
+    _aov(clear.node_tree, "tint", blue.outputs[0], "Color")
+    tree = scene.world.node_tree
+    tree.nodes["Background"].inputs["Color"].default_value = (0.1, 0.2, 0.3, 1.0)
+    _aov(tree, "tint", tree.nodes.new("ShaderNodeTexCoord").outputs["Generated"], "Color")
+
+
+def inside_aovs():
+    _aov_scene()
+    return _both(["height", "tint", "facing", "unused"])
+
+
+def test_aovs(blender):
+    pairs = blender.run(inside_aovs)
+    for picture in pairs.pop("unused"):
+        assert not picture.any()
+    for name, (ours, theirs) in pairs.items():
+        channels = 4 if name == "tint" else 1
+        assert (theirs[..., :channels].std(axis=(0, 1)) > 0.02).all()
+        _agree(ours, theirs, channels, mean=3e-3, share=0.01, step=0.1)

@@ -6,7 +6,7 @@ Blender is kept from one sync to the next but names and numbers.
 """
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import bpy
 
@@ -28,13 +28,15 @@ class Cancelled(Exception):
 @dataclass
 class Source:
     """Where a sync reads from. engine: moves the scene in time for motion blur, else None; v3d: the
-    viewport whose visibility counts, None for a render; is_cancelled: asked now and then."""
+    viewport whose visibility counts, None for a render; aovs: {name: (type, number)} of those that are
+    rendered; is_cancelled: asked now and then."""
 
     depsgraph: object
     changes: Changes
     engine: object = None
     v3d: object = None
     needs_uv: bool = False
+    aovs: dict = field(default_factory=dict)
     is_cancelled: object = staticmethod(lambda: False)
 
 
@@ -63,7 +65,7 @@ class SceneSync:
         if shutter is None and self._update_part(source):
             return
         self._images.begin(source.changes)
-        self._materials.begin(source.changes)
+        self._materials.begin(source.changes, source.aovs)
         self._meshes.begin()
         self._sync_materials(source)
         walk = _Walk(self, source, shutter)

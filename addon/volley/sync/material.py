@@ -21,12 +21,14 @@ class Materials:
         self._entries = {}  # key -> Entry
         self._seen = set()
         self._changes = Changes.everything()
+        self._aovs = {}
 
-    def begin(self, changes):
+    def begin(self, changes, aovs):
         """Start a sync: nothing has been asked for yet. Materials that changes does not name are taken
-        as they are."""
+        as they are. aovs: {name: (type, number)}."""
         self._seen = set()
-        self._changes = changes
+        self._changes = changes if aovs == self._aovs else Changes.everything()
+        self._aovs = aovs
 
     def id_of(self, material):
         """The library's id of an evaluated material, 0 (the default) for None."""
@@ -86,7 +88,7 @@ class Materials:
         key = ("world", world.name_full)
         label = f"World '{world.name}'"
         if uses_nodes(world):
-            flat = flatten.flatten(world.node_tree, label, self._warnings, self._images.id_of)
+            flat = self._flatten(world.node_tree, label)
         else:
             flat = _background(world.color)
         self._update(key, flat)
@@ -112,8 +114,11 @@ class Materials:
     def flatten(self, material, label):
         """A material's surface as a flat tree."""
         if uses_nodes(material):
-            return flatten.flatten(material.node_tree, label, self._warnings, self._images.id_of)
+            return self._flatten(material.node_tree, label)
         return _plain_surface(material)
+
+    def _flatten(self, tree, label):
+        return flatten.flatten(tree, label, self._warnings, self._images.id_of, self._aovs)
 
     def names(self):
         """The names in mattes."""

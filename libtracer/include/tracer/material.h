@@ -116,7 +116,11 @@ enum {
     TRC_NODE_VECTOR_ROTATE = 109, /* c vector, c center, c axis, f angle, c rotation -> c; mode:
                                      TRC_ROTATE_* | 8 to turn the other way */
     TRC_NODE_CAMERA_DATA = 110,   /* -> c view_vector, f view_z_depth, f view_distance */
-    TRC_NODE_WIREFRAME = 111      /* f size (m, world) -> f */
+    TRC_NODE_WIREFRAME = 111,     /* f size (m, world) -> f */
+
+    /* outputs besides the surface: no node has to lead to them; mode: number of the AOV */
+    TRC_NODE_AOV_VALUE = 112, /* f value */
+    TRC_NODE_AOV_COLOR = 113  /* c color */
 };
 
 enum { TRC_SPACE_WORLD = 0, TRC_SPACE_OBJECT, TRC_SPACE_CAMERA };

@@ -65,6 +65,14 @@ enum {
     TRC_PASS_COUNT = 24
 };
 
+/* What the AOV nodes of materials and the world write, by the numbers of their modes: 1 channel,
+ * and 4 of which the last is 1. Of each sample the values at the first surface that is not mostly
+ * seen through, and as in Cycles at those before it, added up; those behind something transparent
+ * by what it lets through. */
+#define TRC_MAX_AOVS 16 /* of each of the two */
+#define TRC_PASS_AOV_VALUE(number) (64u + (number))
+#define TRC_PASS_AOV_COLOR(number) (80u + (number))
+
 /* Cryptomatte: which objects, materials or assets (an object's uppermost parent) cover a pixel, and
  * how much of it (J. Friedman, A. Jones, "Fully Automatic ID Mattes with Support for Motion Blur
  * and Transparency", SIGGRAPH 2015 posters; Psyop's specification 1.2.0). Ranks are pairs of an id
@@ -125,6 +133,7 @@ typedef struct trc_render_desc {
     uint32_t cryptomattes;      /* bit per TRC_CRYPTOMATTE_* */
     uint32_t cryptomatte_depth; /* ranks, 1..TRC_MAX_CRYPTOMATTE_DEPTH, rounded up to an even
                                    number; not read without cryptomattes */
+    uint32_t aov_value_count, aov_color_count; /* passes of each, 0..TRC_MAX_AOVS */
     uint32_t reserved;
 } trc_render_desc;
 
@@ -161,7 +170,7 @@ TRC_API trc_status trc_render_cancel(trc_render render);
 TRC_API trc_status trc_render_read(trc_render render, uint32_t pass, float *pixels_out,
                                    uint64_t float_count);
 
-/* Channels of a pass, 0 for an unknown one; 4 for every Cryptomatte layer. */
+/* Channels of a pass, 0 for an unknown one. */
 TRC_API uint32_t trc_pass_channels(uint32_t pass);
 
 /* Cancels, waits and frees. The handle becomes stale. */

@@ -19,6 +19,13 @@ static bool is_cryptomatte(uint32_t pass) {
            pass < TRC_PASS_CRYPTOMATTE(TRC_CRYPTOMATTE_KINDS, 0);
 }
 
+static bool is_aov_value(uint32_t pass) {
+    return pass >= TRC_PASS_AOV_VALUE(0) && pass < TRC_PASS_AOV_VALUE(TRC_MAX_AOVS);
+}
+static bool is_aov_color(uint32_t pass) {
+    return pass >= TRC_PASS_AOV_COLOR(0) && pass < TRC_PASS_AOV_COLOR(TRC_MAX_AOVS);
+}
+
 uint32_t trc_pass_channels(uint32_t pass) {
     static const uint8_t channels[TRC_PASS_COUNT] = {
         [TRC_PASS_COMBINED] = 4,
@@ -48,6 +55,10 @@ uint32_t trc_pass_channels(uint32_t pass) {
     };
     if (is_cryptomatte(pass))
         return TRC_MATTE_CHANNELS;
+    if (is_aov_value(pass))
+        return 1;
+    if (is_aov_color(pass))
+        return 4;
     return pass < TRC_PASS_COUNT ? channels[pass] : 0;
 }
 
@@ -78,9 +89,12 @@ static bool is_light(uint32_t pass) {
     }
 }
 
-/* The counts are a pass by themselves. */
-static bool has_sums(uint32_t pass, uint64_t passes) {
-    return pass != TRC_PASS_SAMPLE_COUNT && (passes >> pass & 1);
+bool trc_film_has_sums(const trc_render_desc *desc, uint32_t pass) {
+    if (is_aov_value(pass))
+        return pass - TRC_PASS_AOV_VALUE(0) < desc->aov_value_count;
+    if (is_aov_color(pass))
+        return pass - TRC_PASS_AOV_COLOR(0) < desc->aov_color_count;
+    return pass < TRC_PASS_COUNT && pass != TRC_PASS_SAMPLE_COUNT && (desc->passes >> pass & 1);
 }
 
 /* Memory of the machine, or as good as none of a limit if the system does not say. */
@@ -108,8 +122,8 @@ trc_status trc_film_check_budget(uint32_t width, uint32_t height, uint64_t pixel
 /* Bytes of a pixel. */
 static uint64_t pixel_bytes(const trc_render_desc *desc, uint32_t matte_count) {
     uint64_t bytes = sizeof(uint32_t); /* its sample count */
-    for (uint32_t pass = 0; pass < TRC_PASS_COUNT; pass++) {
-        if (has_sums(pass, desc->passes))
+    for (uint32_t pass = 0; pass < TRC_SUM_COUNT; pass++) {
+        if (trc_film_has_sums(desc, pass))
             bytes += trc_film_channels(pass) * sizeof(double);
     }
     return bytes + (uint64_t)__builtin_popcount(desc->cryptomattes) * matte_count *
@@ -124,14 +138,14 @@ static uint32_t matte_count(const trc_render_desc *desc) {
 trc_status trc_film_create(const trc_render_desc *desc, struct trc_film *film) {
     struct trc_film made = {.width = desc->crop_width,
                             .height = desc->crop_height,
-                            .passes = desc->passes,
+                            .shows_counts = desc->passes >> TRC_PASS_SAMPLE_COUNT & 1,
                             .matte_count = matte_count(desc)};
     TRC_TRY(trc_film_check_budget(made.width, made.height, pixel_bytes(desc, made.matte_count)));
     const size_t pixels = (size_t)made.width * made.height;
     made.sample_counts = trc_alloc_zeroed(pixels, sizeof *made.sample_counts);
     bool ok = made.sample_counts != NULL;
-    for (uint32_t pass = 0; ok && pass < TRC_PASS_COUNT; pass++) {
-        if (!has_sums(pass, made.passes))
+    for (uint32_t pass = 0; ok && pass < TRC_SUM_COUNT; pass++) {
+        if (!trc_film_has_sums(desc, pass))
             continue;
         made.sums[pass] = trc_alloc_zeroed(pixels, trc_film_channels(pass) * sizeof(double));
         ok = made.sums[pass] != NULL;
@@ -151,7 +165,7 @@ trc_status trc_film_create(const trc_render_desc *desc, struct trc_film *film) {
 }
 
 void trc_film_destroy(struct trc_film *film) {
-    for (uint32_t pass = 0; pass < TRC_PASS_COUNT; pass++)
+    for (uint32_t pass = 0; pass < TRC_SUM_COUNT; pass++)
         trc_free(film->sums[pass]);
     for (uint32_t kind = 0; kind < TRC_CRYPTOMATTE_KINDS; kind++)
         trc_free(film->mattes[kind]);
@@ -187,8 +201,10 @@ uint32_t trc_film_color_pass(uint32_t pass) {
 }
 
 static bool has_pass(const struct trc_film *film, uint32_t pass) {
+    if (pass == TRC_PASS_SAMPLE_COUNT)
+        return film->shows_counts;
     if (!is_cryptomatte(pass))
-        return film->passes >> pass & 1;
+        return film->sums[pass] != NULL;
     const uint32_t number = pass - TRC_PASS_CRYPTOMATTE(0, 0), layer = number % MAX_LAYERS;
     return film->mattes[number / MAX_LAYERS] &&
            layer * TRC_LAYER_RANKS + TRC_SPARE_MATTES < film->matte_count;

@@ -6,6 +6,7 @@
 #include "kernels/mesh_fetch.h"
 #include "kernels/tile.h"
 #include "kernels/wide_math.h"
+#include "kernels/world.h"
 
 /* Cycles' default of the view layer's Alpha Threshold. */
 #define ALPHA_THRESHOLD 0.5f
@@ -210,6 +211,45 @@ static void add_mattes(struct trc_tile *t, const struct trc_surface *s,
     }
 }
 
+/* ---- AOVs ---- */
+
+/* Until the first surface that is not mostly seen through, that one too. */
+static vmask is_not_done(vuint path) {
+    return vi_eq((vint)path & vi_set(TRC_PATH_DATA_DONE), vi_set(0));
+}
+
+static void add_aovs(struct trc_tile *t, const struct trc_material *m,
+                     const struct trc_registers *regs, vfloat weight, const uint32_t *slots,
+                     vmask active) {
+    for (uint32_t a = 0; a < m->aov_count; a++) {
+        float *const *out = t->samples.pass[m->aovs[a].pass];
+        const uint32_t channels = trc_pass_channels(m->aovs[a].pass);
+        float lanes[4][TRC_WIDTH];
+        if (!out[0])
+            continue;
+        for (uint32_t k = 0; k < channels; k++) {
+            const struct trc_operand *o = &m->operands[m->aovs[a].first_operand];
+            vf_store(lanes[k], k < 3 ? trc_operand_value(o + k, regs) * weight : weight);
+        }
+        for (uint32_t bits = vm_bits(active); bits; bits &= bits - 1) {
+            const int i = __builtin_ctz(bits);
+            for (uint32_t k = 0; k < channels; k++)
+                out[k][slots[i]] += lanes[k][i];
+        }
+    }
+}
+
+void TRC_KERNEL(trc_world_aovs)(struct trc_tile *t, vvec3 d, vuint path, vvec3 weight,
+                                const uint32_t slots[TRC_WIDTH], vmask active) {
+    const vint straight = vi_set(TRC_PATH_TRANSPARENT_BACKGROUND);
+    active = vm_and(active, vm_and(vi_eq((vint)path & straight, straight), is_not_done(path)));
+    if (!vm_any(active))
+        return;
+    struct trc_registers regs;
+    const struct trc_material *m = TRC_KERNEL(trc_world_run)(t->snapshot, d, path, active, &regs);
+    add_aovs(t, m, &regs, v3_average(weight), slots, active);
+}
+
 /* ---- for denoisers: of the first rough surface, through mirrors and glass too ----
  *
  * As Cycles, but for surfaces that are not told of and yet have diffuse lobes: with diffuse bounces
@@ -249,9 +289,9 @@ static vuint add_features(struct trc_tile *t, const struct trc_surface *s,
 }
 
 vuint TRC_KERNEL(trc_data_passes)(struct trc_tile *t, const struct trc_surface *s,
-                                  const struct trc_material *m, const struct trc_lobes *lobes,
-                                  vvec3 found_weight, vfloat beyond, vfloat length,
-                                  const uint32_t slots[TRC_WIDTH]) {
+                                  const struct trc_material *m, const struct trc_registers *regs,
+                                  const struct trc_lobes *lobes, vvec3 found_weight, vfloat beyond,
+                                  vfloat length, const uint32_t slots[TRC_WIDTH]) {
     const vuint path = t->desc->passes & DENOISING_PASSES
                            ? add_features(t, s, lobes, found_weight, length, slots)
                            : s->path;
@@ -266,7 +306,9 @@ vuint TRC_KERNEL(trc_data_passes)(struct trc_tile *t, const struct trc_surface *
     add_mist(t, s, v3_mul(weight, alpha), slots, on);
     if (t->desc->cryptomattes)
         add_mattes(t, s, m, lobes, v3_mul(weight, alpha), slots, on);
-    vmask first = vm_and(on, vi_eq((vint)s->path & vi_set(TRC_PATH_DATA_DONE), vi_set(0)));
+    vmask first = vm_and(on, is_not_done(s->path));
+    if (m->aov_count)
+        add_aovs(t, m, regs, v3_average(weight), slots, first);
     if (m->has & TRC_MATERIAL_HAS_TRANSPARENCY)
         first = vm_and(first, vf_ge(v3_average(alpha), vf_set(ALPHA_THRESHOLD)));
     if (!vm_any(first))

@@ -145,6 +145,9 @@ static void shade_misses(struct trc_tile *t, const struct arrival *a, vmask miss
         TRC_KERNEL(trc_world_radiance)(t->snapshot, a->o, a->n_from, a->d, a->pdf,
                                        light_count_before(t, a->depths), a->path, missed);
     emission_add(t, a, missed, c, TRC_PASS_ENVIRONMENT);
+    const uint32_t material = t->snapshot->world.material;
+    if (material != UINT32_MAX && t->snapshot->materials[material]->aov_count)
+        TRC_KERNEL(trc_world_aovs)(t, a->d, a->path, a->found_weight, a->slots, missed);
 }
 
 /* Lights that rays pass on their way, in the order of t->work. */
@@ -598,7 +601,7 @@ static void shade_group(struct trc_tile *t, uint32_t material, vint index, vmask
     if (m->has & TRC_MATERIAL_HAS_HOLDOUT)
         holdout(t, &a, &lobes, active);
     if (t->extra_passes)
-        a.path = TRC_KERNEL(trc_data_passes)(t, &s, m, &lobes, a.found_weight, a.beyond,
+        a.path = TRC_KERNEL(trc_data_passes)(t, &s, m, &regs, &lobes, a.found_weight, a.beyond,
                                              a.t - a.tmin, a.slots);
     if (m->has & TRC_MATERIAL_HAS_EMISSION) {
         const vmask lit = vm_and(active, vf_gt(v3_max(lobes.emission), vf_set(0.0f)));

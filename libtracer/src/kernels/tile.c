@@ -64,10 +64,13 @@ static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc, void *
     for (int i = 0; i < 3; i++)
         t->samples.radiance[i] = carve(&c, batch);
     t->samples.transparency = carve(&c, batch);
-    for (uint32_t pass = 1; pass < TRC_PASS_COUNT; pass++)
-        if (pass != TRC_PASS_SAMPLE_COUNT && desc->passes >> pass & 1)
-            for (uint32_t k = 0; k < trc_film_channels(pass); k++)
-                t->samples.pass[pass][k] = carve(&c, batch);
+    for (uint32_t pass = 1; pass < TRC_SUM_COUNT; pass++) {
+        if (!trc_film_has_sums(desc, pass))
+            continue;
+        t->samples.passes[t->samples.pass_count++] = (uint8_t)pass;
+        for (uint32_t k = 0; k < trc_film_channels(pass); k++)
+            t->samples.pass[pass][k] = carve(&c, batch);
+    }
     struct trc_shadow_store *q = &t->shadows;
     for (int i = 0; i < 3; i++) {
         q->o[i] = carve(&c, queue);
@@ -273,10 +276,9 @@ static void samples_clear(struct trc_tile *t) {
     for (int k = 0; k < 3; k++)
         memset(t->samples.radiance[k], 0, bytes);
     memset(t->samples.transparency, 0, bytes);
-    for (int pass = 0; pass < TRC_PASS_COUNT; pass++)
-        for (int k = 0; k < TRC_MAX_FILM_CHANNELS; k++)
-            if (t->samples.pass[pass][k])
-                memset(t->samples.pass[pass][k], 0, bytes);
+    for (uint32_t i = 0; i < t->samples.pass_count; i++)
+        for (uint32_t k = 0; k < trc_film_channels(t->samples.passes[i]); k++)
+            memset(t->samples.pass[t->samples.passes[i]][k], 0, bytes);
     /* What a miss has. */
     static const struct {
         uint32_t pass;
@@ -296,9 +298,8 @@ TRC_INLINE bool is_finite_sample(const struct trc_tile *t, uint32_t slot) {
 
 /* Adds a sample's passes to its pixel. */
 static void film_add_passes(struct trc_tile *t, uint32_t slot, size_t pixel, bool first) {
-    for (uint32_t pass = 1; pass < TRC_PASS_COUNT; pass++) {
-        if (!t->samples.pass[pass][0])
-            continue;
+    for (uint32_t i = 0; i < t->samples.pass_count; i++) {
+        const uint32_t pass = t->samples.passes[i];
         const uint32_t channels = trc_film_channels(pass);
         double *sum = t->job->film->sums[pass] + channels * pixel;
         for (uint32_t k = 0; k < channels; k++) {
@@ -511,7 +512,7 @@ void TRC_KERNEL(trc_tile_render)(struct trc_tile_job *job) {
     t->desc = job->desc;
     t->sampler = (struct trc_sampler){job->desc->sampler, job->desc->seed, job->desc->sample_count,
                                       job->sampler_table};
-    t->extra_passes = (job->desc->passes & ~(1ull << TRC_PASS_COMBINED)) || job->desc->cryptomattes;
+    t->extra_passes = t->samples.pass_count || job->desc->cryptomattes;
     t->light_passes = wants_light_passes(job->desc);
     t->object_motion =
         job->snapshot->features & (TRC_FEATURE_OBJECT_MOTION | TRC_FEATURE_DEFORMATION);

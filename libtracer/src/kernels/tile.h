@@ -81,8 +81,10 @@ struct trc_sample_store {
     uint32_t *index; /* number of the sample */
     float *radiance[3];
     float *transparency; /* part of the film that is seen through */
-    float *pass[TRC_PASS_COUNT]
+    float *pass[TRC_SUM_COUNT]
                [TRC_MAX_FILM_CHANNELS]; /* trc_film_channels each; NULL unless asked for */
+    uint8_t passes[TRC_SUM_COUNT];      /* the numbers of those */
+    uint32_t pass_count;
 };
 
 /* Shadow rays; target: the light's number and cell, what packets are sorted by. */
@@ -175,9 +177,14 @@ void TRC_KERNEL(trc_shade_batch)(struct trc_tile *t);
  * way since the last surface or the near clip. Returns the rays' path words, which remember what is
  * written. Called only with more passes than Combined. (kernels/data_passes.c) */
 vuint TRC_KERNEL(trc_data_passes)(struct trc_tile *t, const struct trc_surface *s,
-                                  const struct trc_material *m, const struct trc_lobes *lobes,
-                                  vvec3 found_weight, vfloat beyond, vfloat length,
-                                  const uint32_t slots[TRC_WIDTH]);
+                                  const struct trc_material *m, const struct trc_registers *regs,
+                                  const struct trc_lobes *lobes, vvec3 found_weight, vfloat beyond,
+                                  vfloat length, const uint32_t slots[TRC_WIDTH]);
+
+/* What the world's material gives to AOVs where rays in direction d with that weight leave the
+ * scene; path: their words. (kernels/data_passes.c) */
+void TRC_KERNEL(trc_world_aovs)(struct trc_tile *t, vvec3 d, vuint path, vvec3 weight,
+                                const uint32_t slots[TRC_WIDTH], vmask active);
 
 /* Traces and empties the shadow queue. (kernels/shadow.c) */
 void TRC_KERNEL(trc_shadow_flush)(struct trc_tile *t);

@@ -30,6 +30,13 @@ struct trc_leaf {
     uint32_t operand_count;
 };
 
+/* A value besides the surface that a pass shows. */
+#define TRC_MAX_AOV_OUTPUTS 32
+struct trc_aov_output {
+    uint32_t pass;          /* TRC_PASS_AOV_* */
+    uint32_t first_operand; /* one for a value, three for a colour */
+};
+
 /* One step of a program on registers of TRC_WIDTH floats. Opcodes and their meaning of fields are
  * private to shading/compile.c and kernels/program.c (shading/program.h). */
 struct trc_instruction {
@@ -65,6 +72,8 @@ struct trc_material {
     float cryptomatte; /* id of its name */
     uint32_t leaf_count, operand_count, instruction_count, register_count, table_count;
     struct trc_leaf leaves[TRC_MAX_LEAVES];
+    uint32_t aov_count;
+    struct trc_aov_output *aovs; /* NULL: none */
     struct trc_operand *operands;
     struct trc_instruction *instructions;
     float *tables;
