@@ -327,6 +327,8 @@ class VOLLEY_VIEWLAYER_PT_passes_light(_VolleyPanel, Panel):
         column = layout.column(heading="Other", align=True)
         column.prop(view_layer, "use_pass_emit", text="Emission")
         column.prop(view_layer, "use_pass_environment")
+        column.prop(view_layer, "use_pass_ambient_occlusion", text="Ambient Occlusion")
+        _prop_if_present(column, view_layer, "use_pass_shadow", text="Shadow")
 
 
 class VOLLEY_VIEWLAYER_PT_passes_cryptomatte(_VolleyPanel, Panel):

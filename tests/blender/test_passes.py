@@ -337,3 +337,40 @@ def test_aovs(blender):
         channels = 4 if name == "tint" else 1
         assert (theirs[..., :channels].std(axis=(0, 1)) > 0.02).all()
         _agree(ours, theirs, channels, mean=3e-3, share=0.01, step=0.1)
+
+
+# Ambient occlusion and shadow -----------------------------------------------------------------------
+
+def _occluded_scene():
+    """The objects stand on a floor under lamps of several kinds, with shadows of transparent ones."""
+    import bpy
+    import scenes
+    scene = _scene()
+    floor = scenes.wall("Floor", 20.0, 1.2, (0.0, 0.0), scenes.material(
+        "Floor", "ShaderNodeBsdfDiffuse", Color=(0.7, 0.7, 0.7)))
+    floor.rotation_euler.x = -np.pi / 2
+    bpy.data.objects["Veil"].data.materials[0] = scenes.material(
+        "Clear", "ShaderNodeBsdfTransparent", Color=(0.5, 0.9, 0.7))
+    scene.world.light_settings.distance = 1.5
+    scenes.light('AREA', (0.0, -4.0, 4.0), size=1.0, energy=300.0)
+    scenes.light('POINT', (-3.0, -2.0, 3.0), shadow_soft_size=0.3, energy=900.0)
+    scenes.light('SUN', rotation=(0.6, 0.4, 0.0), angle=0.1, energy=0.2)
+    return scene
+
+
+def inside_occlusion():
+    import bpy
+    _occluded_scene()
+    layer = bpy.context.view_layer
+    layer.use_pass_ambient_occlusion = True
+    names = ["AO"]
+    if bpy.app.version < (4, 0, 0):
+        layer.use_pass_shadow = True
+        names.append("Shadow")
+    return _both(names, 256)
+
+
+def test_occlusion(blender):
+    for ours, theirs in blender.run(inside_occlusion, timeout=300).values():
+        assert theirs[..., 0].std() > 0.1
+        _agree(ours, theirs, mean=5e-3, share=0.03, step=0.1)

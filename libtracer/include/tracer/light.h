@@ -53,7 +53,7 @@ typedef struct trc_world_desc {
     trc_id material;         /* a material whose surface is BACKGROUND (or a mix); 0: black */
     uint32_t visibility;     /* TRC_VISIBLE_* */
     uint32_t map_resolution; /* width of the importance map, 0: chosen from the image */
-    float ao_distance;       /* ambient occlusion: metres, > 0 */
+    float ao_distance;       /* ambient occlusion: metres, > 0 unless it is off */
     float ao_factor;         /* 0: off */
     uint32_t ao_method;      /* TRC_AO_* */
     uint32_t reserved;

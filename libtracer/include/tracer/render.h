@@ -62,7 +62,13 @@ enum {
                              start to its middle, negated, and from there to its end, negated; right
                              and up are positive. Mean of the samples that hit something. What has
                              keys moves even where shutter_time is 0 and nothing is blurred */
-    TRC_PASS_COUNT = 24
+    TRC_PASS_AMBIENT_OCCLUSION =
+        24,               /* 3: the part of the directions above a surface, by the cosine,
+                             in which nothing is within ao_distance of the world, which
+                             applies with an ao_factor of 0, too; by what is seen of it */
+    TRC_PASS_SHADOW = 25, /* 3: Cycles' Shadow up to 3.4: the part of all lamps, each of equal
+                             weight, that a surface sees of those that light it */
+    TRC_PASS_COUNT = 26
 };
 
 /* What the AOV nodes of materials and the world write, by the numbers of their modes: 1 channel,

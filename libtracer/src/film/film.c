@@ -52,6 +52,8 @@ uint32_t trc_pass_channels(uint32_t pass) {
         [TRC_PASS_DENOISING_NORMAL] = 3,
         [TRC_PASS_DENOISING_DEPTH] = 1,
         [TRC_PASS_VECTOR] = 4,
+        [TRC_PASS_AMBIENT_OCCLUSION] = 3,
+        [TRC_PASS_SHADOW] = 3,
     };
     if (is_cryptomatte(pass))
         return TRC_MATTE_CHANNELS;

@@ -56,6 +56,10 @@ void TRC_KERNEL(trc_light_sample_prepared)(const struct trc_surface *s,
                                            const struct trc_light_choices *choices, vfloat u_select,
                                            vfloat u1, vfloat u2, struct trc_light_sample *out);
 
+/* The chances with which the lanes of m chose their lights. */
+vfloat TRC_KERNEL(trc_light_chosen)(const struct trc_surface *s, vvec3 n,
+                                    const struct trc_light_sample *sample, vmask m);
+
 /* Visibility bits (TRC_VISIBLE_*) of the light each lane chose; all bits in lanes that chose none.
  * When the scene's lights hide from nothing, the caller can skip it: trc_light_table.hides is
  * false. */

@@ -221,6 +221,7 @@ TRC_INLINE vvec3 shadow_origin(const struct trc_surface *s, vvec3 w) {
 
 struct light_result {
     vvec3 diffuse, glossy, transmission; /* unshadowed contributions */
+    vfloat lamp;                         /* and that to the Shadow pass */
 };
 
 /* Contributions of the lanes' light samples, weighted; lanes that get nothing are dropped from
@@ -299,7 +300,24 @@ static void shadow_push(struct trc_tile *t, const struct arrival *a, const struc
             vf_compress(q->split[3 * k + 2] + q->count, parts[k].z, bits);
         }
     }
+    for (int k = 0; q->lamp[0] && k < 3; k++)
+        vf_compress(q->lamp[k] + q->count, r->lamp, bits);
     q->count += (uint32_t)__builtin_popcount(bits);
+}
+
+/* What the lanes' light samples are in the Shadow pass if nothing is in the way: lamps count
+ * equally, whatever they are chosen by; the world and emissive triangles do not. */
+static vfloat lamp_part(const struct trc_tile *t, const struct arrival *a,
+                        const struct trc_surface *s, const struct trc_light_sample *l, vfloat count,
+                        vmask active) {
+    const int32_t lamps = (int32_t)t->snapshot->lights->lamp_count;
+    const vint straight = vi_set(TRC_PATH_TRANSPARENT_BACKGROUND);
+    const vmask counts = vm_and(vm_and(active, vi_lt(l->light, vi_set(lamps))),
+                                vi_eq((vint)a->path & straight, straight));
+    if (!vm_any(counts))
+        return vf_set(0.0f);
+    const vfloat chance = TRC_KERNEL(trc_light_chosen)(s, a->receive_n, l, counts);
+    return vf_select(counts, vf_divide(vf_set(1.0f / (float)lamps), chance * count), vf_set(0.0f));
 }
 
 static void sample_use(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
@@ -309,6 +327,8 @@ static void sample_use(struct trc_tile *t, const struct arrival *a, const struct
     vmask lit = vm_and(active, sample->valid);
     if (vm_any(lit))
         lit = light_contribute(t, a, s, lobes, sample, count, lit, &r);
+    if (t->shadows.lamp[0] && vm_any(lit))
+        r.lamp = lamp_part(t, a, s, sample, count, lit);
     if (vm_any(lit))
         shadow_push(t, a, s, sample, &r, cell, lit);
 }
@@ -389,12 +409,42 @@ static void ambient_light(struct trc_tile *t, const struct arrival *a, const str
         vmask lit = vm_and(active, vf_lt(vf_set((float)l), count));
         const vvec3 light =
             world->ao_method == TRC_AO_ADD ? white : ambient_world(t, s, lobes, n, sample.wi, lit);
-        const struct light_result r = {v3_mul(weight, light), v3_zero(), v3_zero()};
+        const struct light_result r = {.diffuse = v3_mul(weight, light)};
         const vfloat size = v3_max(r.diffuse);
         lit = vm_and(lit, vm_and(vf_gt(size, vf_set(0.0f)), vf_lt(size, vf_set(3e38f))));
         if (vm_any(lit))
             shadow_push(t, a, s, &sample, &r, trc_direction_cell(sample.wi), lit);
     }
+}
+
+/* One ray for each lane that the camera sees, also through what is transparent, for the pass. */
+static void occlusion_pass(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
+                           const struct trc_lobes *lobes, vmask active) {
+    const vint camera = vi_set(TRC_VISIBLE_CAMERA);
+    active = vm_and(active, vi_eq((vint)a->path & camera, camera));
+    if (t->shadows.count + TRC_WIDTH > TRC_SHADOW_QUEUE)
+        TRC_KERNEL(trc_shadow_flush)(t);
+    vvec3 n, x, y;
+    vfloat u[2];
+    TRC_KERNEL(trc_lobes_diffuse)(lobes, s, &n);
+    v3_frame(n, &x, &y);
+    TRC_KERNEL(trc_samples)
+    (&t->sampler, a->pixel, a->sample,
+     TRC_DIM_BOUNCE + t->generation * TRC_DIMS_PER_BOUNCE + TRC_DIM_BSDF_X, 2, 0, 1, u);
+    const struct trc_light_table *lights = t->snapshot->lights;
+    const struct trc_light_sample sample = {
+        .wi = v3_from_frame(trc_warp_cosine(u[0], u[1]), x, y, n),
+        .distance = vf_set(t->snapshot->world.ao_distance),
+        .casts_shadow = vm_all_set(),
+        .light = vi_set((int32_t)(lights->first_triangle + lights->triangle_count))};
+    const vvec3 one = v3(vf_set(1.0f), vf_set(1.0f), vf_set(1.0f));
+    const vvec3 alpha = v3_sub(one, TRC_KERNEL(trc_lobes_transparency)(lobes));
+    const struct light_result r = {.diffuse = v3_mul(a->weight, alpha)};
+    active = vm_and(active, vf_gt(v3_max(r.diffuse), vf_set(0.0f)));
+    struct arrival own = *a;
+    own.path = a->path | vu_set(TRC_PATH_OCCLUSION);
+    if (vm_any(active))
+        shadow_push(t, &own, s, &sample, &r, trc_direction_cell(sample.wi), active);
 }
 
 /* ---- continuation ---- */
@@ -626,6 +676,8 @@ static void shade_group(struct trc_tile *t, uint32_t material, vint index, vmask
             ambient_light(t, &a, &s, &lobes, on);
         lobes.below_horizon = vm_none();
     }
+    if (t->samples.pass[TRC_PASS_AMBIENT_OCCLUSION][0])
+        occlusion_pass(t, &a, &s, &lobes, on);
     if (t->desc->integrator == TRC_INTEGRATOR_RAYCAST) {
         if (m->has & TRC_MATERIAL_HAS_TRANSPARENCY)
             continue_straight(t, &a, &s, &lobes, material, on);

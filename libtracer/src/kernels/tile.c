@@ -75,13 +75,16 @@ static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc, void *
     for (int i = 0; i < 3; i++) {
         q->o[i] = carve(&c, queue);
         q->d[i] = carve(&c, queue);
-        q->radiance[i] = carve(&c, queue);
+        q->radiance[i] = q->scaled[q->scaled_count++] = carve(&c, queue);
     }
     q->tmax = carve(&c, queue);
     q->time = carve(&c, queue);
     if (wants_light_passes(desc))
         for (int i = 0; i < 9; i++)
-            q->split[i] = carve(&c, queue);
+            q->split[i] = q->scaled[q->scaled_count++] = carve(&c, queue);
+    if (desc->passes >> TRC_PASS_SHADOW & 1)
+        for (int i = 0; i < 3; i++)
+            q->lamp[i] = q->scaled[q->scaled_count++] = carve(&c, queue);
     uint32_t **const words[] = {&q->slot, &q->path, &q->target, &q->depth, &q->order, &t->keys};
     for (int i = 0; i < 6; i++)
         *words[i] = carve(&c, queue);
@@ -514,6 +517,7 @@ void TRC_KERNEL(trc_tile_render)(struct trc_tile_job *job) {
                                       job->sampler_table};
     t->extra_passes = t->samples.pass_count || job->desc->cryptomattes;
     t->light_passes = wants_light_passes(job->desc);
+    t->occlusion_passes = t->samples.pass[TRC_PASS_AMBIENT_OCCLUSION][0] || t->shadows.lamp[0];
     t->object_motion =
         job->snapshot->features & (TRC_FEATURE_OBJECT_MOTION | TRC_FEATURE_DEFORMATION);
     t->camera_common = job->snapshot->camera.aperture_radius <= 0.0f &&

@@ -23,7 +23,8 @@ enum {
     TRC_PATH_CATEGORY_SHIFT = 12, /* 0 camera, 1 glossy, 2 transmission: by the first bounce */
     TRC_PATH_LAST = 1 << 14,      /* only emission counts at the next surface */
     TRC_PATH_DATA_DONE = 1 << 15, /* data passes of the sample are written */
-    TRC_PATH_TOLD = 1 << 16       /* and the denoising passes of this way of it */
+    TRC_PATH_TOLD = 1 << 16,      /* and the denoising passes of this way of it */
+    TRC_PATH_OCCLUSION = 1 << 17  /* shadow rays: of the pass of ambient occlusion, no light */
 };
 
 /* A ray's four depth counters, 8 bits each, saturating by the limits on desc. */
@@ -87,11 +88,17 @@ struct trc_sample_store {
     uint32_t pass_count;
 };
 
+/* Radiance, its three parts, and what the Shadow pass gets. */
+#define TRC_SCALED_COLUMNS (3 + 9 + 3)
+
 /* Shadow rays; target: the light's number and cell, what packets are sorted by. */
 struct trc_shadow_store {
     uint32_t count;
     float *o[3], *d[3], *tmax, *time, *radiance[3];
     float *split[9]; /* diffuse, glossy, transmission parts, or NULL: no light passes */
+    float *lamp[3];  /* for the Shadow pass, or NULL */
+    float *scaled[TRC_SCALED_COLUMNS]; /* those that what is in the way takes from, RGB by RGB */
+    uint32_t scaled_count;
     uint32_t *slot, *path, *target, *depth;
     uint32_t *order; /* own: the queue may be flushed while hits are shaded in t->order */
 };
@@ -103,6 +110,7 @@ struct trc_tile {
     struct trc_sampler sampler;
     bool extra_passes;          /* more than Combined, or mattes */
     bool light_passes;          /* some pass wants light by kind */
+    bool occlusion_passes;      /* some pass wants what shadow rays find, not light */
     bool object_motion;         /* rays need times */
     bool camera_common;         /* camera rays start at one point */
     uint32_t packet_size;       /* 1..TRC_PACKET_SIZE */
