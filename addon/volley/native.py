@@ -104,7 +104,8 @@ class _InstanceDesc(_Struct):
     _fields_ = [("struct_size", _u32), ("key_count", _u32), ("mesh", _u64), ("transforms", _ptr),
                 ("materials", _ptr), ("material_count", _u32), ("visibility", _u32),
                 ("pass_index", _i32), ("random", _f32), ("color", _f32 * 4),
-                ("cryptomatte_object", _f32), ("cryptomatte_asset", _f32)]
+                ("cryptomatte_object", _f32), ("cryptomatte_asset", _f32), ("light_group", _u32),
+                ("reserved", _u32)]
 
 
 class _LightDesc(_Struct):
@@ -118,7 +119,7 @@ class _LightDesc(_Struct):
 class _WorldDesc(_Struct):
     _fields_ = [("struct_size", _u32), ("use_sampling", _u32), ("material", _u64),
                 ("visibility", _u32), ("map_resolution", _u32), ("ao_distance", _f32),
-                ("ao_factor", _f32), ("ao_method", _u32), ("reserved", _u32)]
+                ("ao_factor", _f32), ("ao_method", _u32), ("light_group", _u32)]
 
 
 class _CameraDesc(_Struct):
@@ -177,7 +178,7 @@ class _RenderDesc(_Struct):
                 ("progressive", _u32), ("noise_threshold", _f32), ("min_samples", _u32),
                 ("mist_start", _f32), ("mist_depth", _f32), ("mist_falloff", _f32),
                 ("cryptomattes", _u32), ("cryptomatte_depth", _u32), ("aov_value_count", _u32),
-                ("aov_color_count", _u32), ("reserved", _u32)]
+                ("aov_color_count", _u32), ("light_group_count", _u32)]
 
 
 class _RenderProgress(_Struct):
@@ -431,7 +432,8 @@ class Scene:
 
     def update_instance(self, instance, **values):
         """mesh: id; transforms (keys, 12) float32; materials: ids by slot; visibility; pass_index;
-        random [0, 1); color: four floats; cryptomatte_object and cryptomatte_asset: ids."""
+        random [0, 1); color: four floats; cryptomatte_object and cryptomatte_asset: ids; light_group: of
+        its emission, 0 for none."""
         desc, keep = self._instance_desc(**values)
         self._edit("trc_instance_update", instance, ctypes.byref(desc))
 
@@ -441,14 +443,15 @@ class Scene:
     @staticmethod
     def _instance_desc(mesh, transforms, materials=(), visibility=VISIBLE_ALL, pass_index=0,
                        random=0.0, color=(1.0, 1.0, 1.0, 1.0), cryptomatte_object=0.0,
-                       cryptomatte_asset=0.0):
+                       cryptomatte_asset=0.0, light_group=0):
         transforms = _array(transforms, np.float32).reshape(-1, 12)
         ids = np.array(materials, dtype=np.uint64)
         desc = _InstanceDesc(
             key_count=len(transforms), mesh=mesh, transforms=_address(transforms),
             materials=_address(ids), material_count=len(ids), visibility=visibility,
             pass_index=pass_index, random=random, color=tuple(color),
-            cryptomatte_object=cryptomatte_object, cryptomatte_asset=cryptomatte_asset)
+            cryptomatte_object=cryptomatte_object, cryptomatte_asset=cryptomatte_asset,
+            light_group=light_group)
         return desc, (transforms, ids)
 
     # Lights, world, camera

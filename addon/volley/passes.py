@@ -53,6 +53,8 @@ _LAYER_RANKS = 2
 _AOVS = {'VALUE': (64, "X", 'VALUE'), 'COLOR': (80, "RGBA", 'COLOR')}
 _MOST_AOVS = 16
 
+_FIRST_LIGHT_GROUP, _MOST_LIGHT_GROUPS = 96, 32  # TRC_PASS_LIGHT_GROUP
+
 
 def name_of(entry, long_names=HAS_LONG_PASS_NAMES):
     """The pass's name in this Blender."""
@@ -72,7 +74,8 @@ def is_enabled(entry, view_layer):
 def enabled(view_layer):
     """The passes a view layer asks for."""
     entries = [entry for entry in PASSES if is_enabled(entry, view_layer)]
-    return entries + list(_aovs(view_layer)) + list(_cryptomatte_layers(view_layer))
+    return [*entries, *_aovs(view_layer), *_light_groups(view_layer),
+            *_cryptomatte_layers(view_layer)]
 
 
 def aov_numbers(view_layer):
@@ -89,6 +92,18 @@ def _aovs(view_layer):
     for name, (aov_type, number) in aov_numbers(view_layer).items():
         first, channels, kind = _AOVS[aov_type]
         yield Pass(first + number, (name, name), channels, kind, "aovs")
+
+
+def light_group_numbers(view_layer):
+    """{name: number from 1 on} of the light groups of a view layer."""
+    names = [group.name for group in view_layer.lightgroups[:_MOST_LIGHT_GROUPS]]
+    return {name: number + 1 for number, name in enumerate(names)}
+
+
+def _light_groups(view_layer):
+    for name, number in light_group_numbers(view_layer).items():
+        yield Pass(_FIRST_LIGHT_GROUP + number - 1, (f"Combined_{name}",) * 2, "RGB", 'COLOR',
+                   "lightgroups")
 
 
 def _cryptomatte_layers(view_layer):
@@ -129,6 +144,8 @@ def request_fields(entries):
     return {
         "passes": sum(1 << entry.index for entry in entries if entry.index < _AOVS['VALUE'][0]),
         "aov_value_count": aov_counts[0], "aov_color_count": aov_counts[1],
+        "light_group_count": sum(_FIRST_LIGHT_GROUP <= entry.index < _FIRST_CRYPTOMATTE
+                                 for entry in entries),
         "cryptomattes": sum(1 << kind for kind in {kind for kind, _ in layers}),
         "cryptomatte_depth": _LAYER_RANKS * max((layer + 1 for _, layer in layers), default=0),
     }

@@ -95,7 +95,8 @@ class Session:
         now = motion.split_frame(scene.frame_current_final)
         source = Source(depsgraph, Changes.everything(), engine=engine, is_cancelled=engine.test_break,
                         needs_uv=depsgraph.view_layer_eval.use_pass_uv,
-                        aovs=passes.aov_numbers(depsgraph.view_layer_eval))
+                        aovs=passes.aov_numbers(depsgraph.view_layer_eval),
+                        light_groups=passes.light_group_numbers(depsgraph.view_layer_eval))
         cameras = CameraMotion(engine, frame, shutter, view_names, self._sync.warnings)
         moved = shutter is not None
         try:

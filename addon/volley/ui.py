@@ -364,6 +364,33 @@ class VOLLEY_VIEWLAYER_PT_passes_aov(_VolleyPanel, Panel):
             layout.label(text="Conflicts with another pass of the same name", icon='ERROR')
 
 
+class VOLLEY_VIEWLAYER_PT_passes_lightgroups(_VolleyPanel, Panel):
+    bl_label = "Light Groups"
+    bl_context = "view_layer"
+    bl_parent_id = "VOLLEY_VIEWLAYER_PT_passes"
+
+    def draw(self, context):
+        view_layer = context.view_layer
+        row = _column(self).row()
+        row.column().template_list("UI_UL_list", "lightgroups", view_layer, "lightgroups", view_layer,
+                                   "active_lightgroup_index", rows=3)
+        buttons = row.column(align=True)
+        buttons.operator("scene.view_layer_add_lightgroup", icon='ADD', text="")
+        buttons.operator("scene.view_layer_remove_lightgroup", icon='REMOVE', text="")
+        buttons.separator()
+        buttons.menu("VIEWLAYER_MT_lightgroup_sync", icon='DOWNARROW_HLT', text="")
+
+
+def _draw_light_group(panel, data, view_layer):
+    """The light group of an object or world, and a button that adds one of that name."""
+    row = _column(panel).row(align=True)
+    row.prop_search(data, "lightgroup", view_layer, "lightgroups", text="Light Group",
+                    results_are_suggestions=True)
+    button = row.column(align=True)
+    button.enabled = bool(data.lightgroup) and data.lightgroup not in view_layer.lightgroups
+    button.operator("scene.view_layer_add_lightgroup", icon='ADD', text="").name = data.lightgroup
+
+
 # Objects ---------------------------------------------------------------------------------------
 
 _SHAPED = {'MESH', 'CURVE', 'SURFACE', 'FONT', 'META', 'CURVES', 'POINTCLOUD'}
@@ -427,6 +454,20 @@ class VOLLEY_OBJECT_PT_motion_blur(_VolleyPanel, Panel):
         layout.prop(settings, "motion_steps", text="Steps")
         if context.object.type != 'CAMERA':
             layout.prop(settings, "use_deform_motion", text="Deformation")
+
+
+class VOLLEY_OBJECT_PT_lightgroup(_VolleyPanel, Panel):
+    bl_label = "Light Group"
+    bl_context = "object"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    @classmethod
+    def poll(cls, context):
+        active = context.object
+        return super().poll(context) and active and (_has_shape(active) or active.type == 'LIGHT')
+
+    def draw(self, context):
+        _draw_light_group(self, context.object, context.view_layer)
 
 
 def _has_shape(active):
@@ -586,6 +627,19 @@ class VOLLEY_WORLD_PT_settings(_VolleyPanel, Panel):
         column.prop(settings, "sampling_method", text="Sampling")
         if settings.sampling_method == 'MANUAL':
             column.prop(settings, "sample_map_resolution")
+
+
+class VOLLEY_WORLD_PT_lightgroup(_VolleyPanel, Panel):
+    bl_label = "Light Group"
+    bl_context = "world"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and context.world
+
+    def draw(self, context):
+        _draw_light_group(self, context.world, context.view_layer)
 
 
 class VOLLEY_MATERIAL_PT_surface(_VolleyPanel, Panel):

@@ -374,3 +374,49 @@ def test_occlusion(blender):
     for ours, theirs in blender.run(inside_occlusion, timeout=300).values():
         assert theirs[..., 0].std() > 0.1
         _agree(ours, theirs, mean=5e-3, share=0.03, step=0.1)
+
+
+# Light groups ---------------------------------------------------------------------------------------
+
+LIGHT_GROUPS = {"key": ("Light", "Light.002"), "rim": ("Light.001",), "glow": ("Glow",), "sky": ()}
+
+
+def _grouped_scene():
+    """Lamps, a glowing ball and the world in groups, one lamp in none; mirrored and seen through."""
+    import bpy
+    import scenes
+    scene = _occluded_scene()
+    scenes.light('SPOT', (2.0, -5.0, 3.0), (0.9, 0.0, 0.3), energy=500.0, shadow_soft_size=0.2)
+    glow = scenes.sphere("Glow", 0.3, (0.3, -1.0, 1.6), scenes.emitter((4.0, 2.0, 1.0)))
+    assert len(bpy.data.lights) == 4 and glow.name == "Glow"
+    scene.world.color = (0.1, 0.15, 0.2)
+    layer = bpy.context.view_layer
+    for group, members in LIGHT_GROUPS.items():
+        layer.lightgroups.add(name=group) if hasattr(layer.lightgroups, "add") \
+            else bpy.ops.scene.view_layer_add_lightgroup(name=group)
+        for name in members:
+            bpy.data.objects[name].lightgroup = group
+    scene.world.lightgroup = "sky"
+    for name in ("Mirror", "Metal"):  # their caustics would be noise
+        bpy.data.materials[name].node_tree.nodes["Glossy BSDF"].inputs["Roughness"].default_value = 0.3
+    return scene
+
+
+def inside_light_groups():
+    import bpy
+    import scenes
+    _grouped_scene()
+    pairs = _both([f"Combined_{group}" for group in LIGHT_GROUPS], 256)
+    bpy.data.objects["Light.003"].hide_render = True  # in no group
+    scenes.set_engine('VOLLEY', 256)
+    return pairs, scenes.render_passes(["Combined"])["Combined"]
+
+
+def test_light_groups(blender):
+    pairs, grouped = blender.run(inside_light_groups, timeout=300)
+    for ours, theirs in pairs.values():
+        assert theirs[..., :3].mean() > 1e-3
+        limit = np.quantile(theirs, 0.995)  # Cycles counts mirrored suns to the group of the world
+        _agree(np.minimum(ours, limit), np.minimum(theirs, limit), mean=5e-3, share=0.03, step=0.1)
+    total = sum(ours[..., :3] for ours, _ in pairs.values())
+    assert total.mean() == pytest.approx(grouped[..., :3].mean(), rel=5e-3)

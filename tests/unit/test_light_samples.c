@@ -49,7 +49,7 @@ static void passes_change_nothing(void **state) {
     desc.passes = (UINT64_C(1) << TRC_PASS_COUNT) - 1;
     desc.cryptomattes = 1;
     desc.cryptomatte_depth = 2;
-    desc.aov_value_count = 1;
+    desc.aov_value_count = desc.light_group_count = 1;
     trc_render render = 0;
     assert_int_equal(trc_render_start(scene, &desc, &render), TRC_OK);
     assert_int_equal(trc_render_wait(render, -1.0), TRC_OK);

@@ -28,8 +28,8 @@ class Cancelled(Exception):
 @dataclass
 class Source:
     """Where a sync reads from. engine: moves the scene in time for motion blur, else None; v3d: the
-    viewport whose visibility counts, None for a render; aovs: {name: (type, number)} of those that are
-    rendered; is_cancelled: asked now and then."""
+    viewport whose visibility counts, None for a render; aovs: {name: (type, number)} and light_groups:
+    {name: number} of those that are rendered; is_cancelled: asked now and then."""
 
     depsgraph: object
     changes: Changes
@@ -37,6 +37,7 @@ class Source:
     v3d: object = None
     needs_uv: bool = False
     aovs: dict = field(default_factory=dict)
+    light_groups: dict = field(default_factory=dict)
     is_cancelled: object = staticmethod(lambda: False)
 
 
@@ -112,8 +113,8 @@ class SceneSync:
         """Bring one object up to date; False where its mesh must be read in a walk."""
         name, view_layer = each.object.name_full, source.depsgraph.view_layer_eval
         if instance.is_light(each):
-            item = instance.describe(each, view_layer)
-            fields = light.describe(each.object, item.transforms[0], item.visibility, self.warnings)
+            item = instance.describe(each, view_layer, source.light_groups)
+            fields = light.describe(each.object, item, self.warnings)
             return fields is not None and self._lights.change(item.key, fields)
         known = shown.items[instance.key_of(each)]
         if name in source.changes.geometry:
@@ -122,7 +123,7 @@ class SceneSync:
             if shown.users[known.mesh_key] != 1 or not is_pose or not self._meshes.pose(
                     known.mesh_key, data.as_pointer(), data):
                 return False
-        item = instance.describe(each, view_layer)
+        item = instance.describe(each, view_layer, source.light_groups)
         item.mesh_key = known.mesh_key
         item.materials = _material_ids(self._materials, each, view_layer)
         self._instances.change(item, self._meshes.id_of(item.mesh_key))
@@ -139,7 +140,7 @@ class SceneSync:
         scene = source.depsgraph.scene_eval
         shown = scene.world if source.depsgraph.view_layer_eval.use_sky else None
         material_id = self._materials.world_id(shown) if shown else 0
-        fields = world.describe(shown, material_id, scene.volley)
+        fields = world.describe(shown, material_id, scene.volley, source.light_groups)
         if fields != self._world:
             self.scene.set_world(**fields)
         self._world = fields
@@ -256,15 +257,18 @@ class _Walk:
             if instance.is_shown(each, self._source.v3d):
                 yield each
 
+    def _describe(self, each):
+        return instance.describe(each, self._view_layer, self._source.light_groups)
+
     def _add_light(self, each):
-        item = instance.describe(each, self._view_layer)
-        fields = light.describe(each.object, item.transforms[0], item.visibility, self._sync.warnings)
+        item = self._describe(each)
+        fields = light.describe(each.object, item, self._sync.warnings)
         if fields is not None:
             self.lights[item.key] = fields
 
     def _add_mesh_instance(self, each):
         blender_object = each.object
-        item = instance.describe(each, self._view_layer)
+        item = self._describe(each)
         item.materials = _material_ids(self._sync._materials, each, self._view_layer)
         if self._shutter is not None:
             parent = each.parent if each.is_instance else None

@@ -31,6 +31,7 @@ class Item:
     pass_index: int = 0
     random: float = 0.0
     color: tuple = (1.0, 1.0, 1.0, 1.0)
+    light_group: int = 0       # from 1 on, 0 for none
     light: dict = None         # fields of a light instead of a mesh
     motion_keys: int = 1       # how many the object asks for
     deforms: bool = False      # whether the mesh may change its shape in time
@@ -117,8 +118,8 @@ def _uppermost(blender_object):
     return blender_object
 
 
-def describe(instance, view_layer):
-    """The parts of an item that meshes and lights share."""
+def describe(instance, view_layer, light_groups):
+    """The parts of an item that meshes and lights share; light_groups: {name: number}."""
     blender_object = instance.object
     return Item(
         key=key_of(instance), owner=blender_object.name_full,
@@ -126,7 +127,8 @@ def describe(instance, view_layer):
         transforms=[rows12(instance.matrix_world)],
         visibility=visibility.instance_visibility(instance, view_layer),
         pass_index=blender_object.pass_index, random=random_of(instance),
-        color=tuple(blender_object.color))
+        color=tuple(blender_object.color),
+        light_group=light_groups.get(blender_object.lightgroup, 0))
 
 
 def has_mesh(instance):
@@ -193,13 +195,13 @@ class Instances:
     def _update_one(self, item, mesh_id):
         transforms = motion.follow_turns(collapse(item.transforms))
         signature = (mesh_id, transforms.tobytes(), item.materials, item.visibility, item.pass_index,
-                     item.random, item.color, item.name, item.asset)
+                     item.random, item.color, item.name, item.asset, item.light_group)
         entry = self._entries.get(item.key)
         if entry is not None and entry.signature == signature:
             return
         values = {"mesh": mesh_id, "transforms": transforms, "materials": item.materials,
                   "visibility": item.visibility, "pass_index": item.pass_index,
-                  "random": item.random, "color": item.color,
+                  "random": item.random, "color": item.color, "light_group": item.light_group,
                   "cryptomatte_object": native.cryptomatte_id(item.name),
                   "cryptomatte_asset": native.cryptomatte_id(item.asset)}
         if entry is None:

@@ -84,6 +84,8 @@ typedef struct trc_instance_desc {
     float color[4];          /* Object Info's Color and Alpha */
     float cryptomatte_object, cryptomatte_asset; /* trc_cryptomatte_id of its name and of its
                                                     asset's name; 0: in no matte */
+    uint32_t light_group;                        /* of its emission, 0..TRC_MAX_LIGHT_GROUPS */
+    uint32_t reserved;
 } trc_instance_desc;
 
 TRC_API trc_status trc_instance_create(trc_scene scene, const trc_instance_desc *desc,

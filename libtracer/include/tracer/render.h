@@ -79,6 +79,9 @@ enum {
 #define TRC_PASS_AOV_VALUE(number) (64u + (number))
 #define TRC_PASS_AOV_COLOR(number) (80u + (number))
 
+/* Light of one light group each: 3 channels. What is in no group is only in Combined. */
+#define TRC_PASS_LIGHT_GROUP(number) (96u + (number)) /* of group number + 1 */
+
 /* Cryptomatte: which objects, materials or assets (an object's uppermost parent) cover a pixel, and
  * how much of it (J. Friedman, A. Jones, "Fully Automatic ID Mattes with Support for Motion Blur
  * and Transparency", SIGGRAPH 2015 posters; Psyop's specification 1.2.0). Ranks are pairs of an id
@@ -140,7 +143,7 @@ typedef struct trc_render_desc {
     uint32_t cryptomatte_depth; /* ranks, 1..TRC_MAX_CRYPTOMATTE_DEPTH, rounded up to an even
                                    number; not read without cryptomattes */
     uint32_t aov_value_count, aov_color_count; /* passes of each, 0..TRC_MAX_AOVS */
-    uint32_t reserved;
+    uint32_t light_group_count;                /* passes, 0..TRC_MAX_LIGHT_GROUPS */
 } trc_render_desc;
 
 /* Starts rendering the scene's current snapshot in threads of the library. Memory is checked and

@@ -26,6 +26,10 @@ static bool is_aov_color(uint32_t pass) {
     return pass >= TRC_PASS_AOV_COLOR(0) && pass < TRC_PASS_AOV_COLOR(TRC_MAX_AOVS);
 }
 
+static bool is_light_group(uint32_t pass) {
+    return pass >= TRC_PASS_LIGHT_GROUP(0) && pass < TRC_PASS_LIGHT_GROUP(TRC_MAX_LIGHT_GROUPS);
+}
+
 uint32_t trc_pass_channels(uint32_t pass) {
     static const uint8_t channels[TRC_PASS_COUNT] = {
         [TRC_PASS_COMBINED] = 4,
@@ -61,6 +65,8 @@ uint32_t trc_pass_channels(uint32_t pass) {
         return 1;
     if (is_aov_color(pass))
         return 4;
+    if (is_light_group(pass))
+        return 3;
     return pass < TRC_PASS_COUNT ? channels[pass] : 0;
 }
 
@@ -87,7 +93,7 @@ static bool is_light(uint32_t pass) {
     case TRC_PASS_TRANSMISSION_INDIRECT:
         return true;
     default:
-        return false;
+        return is_light_group(pass);
     }
 }
 
@@ -96,6 +102,8 @@ bool trc_film_has_sums(const trc_render_desc *desc, uint32_t pass) {
         return pass - TRC_PASS_AOV_VALUE(0) < desc->aov_value_count;
     if (is_aov_color(pass))
         return pass - TRC_PASS_AOV_COLOR(0) < desc->aov_color_count;
+    if (is_light_group(pass))
+        return pass - TRC_PASS_LIGHT_GROUP(0) < desc->light_group_count;
     return pass < TRC_PASS_COUNT && pass != TRC_PASS_SAMPLE_COUNT && (desc->passes >> pass & 1);
 }
 

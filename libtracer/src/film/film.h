@@ -13,7 +13,7 @@
 #include "tracer/render.h"
 
 /* Passes that are sums have numbers below this. */
-#define TRC_SUM_COUNT TRC_PASS_AOV_COLOR(TRC_MAX_AOVS)
+#define TRC_SUM_COUNT TRC_PASS_LIGHT_GROUP(TRC_MAX_LIGHT_GROUPS)
 
 struct trc_film {
     uint32_t width, height;      /* of the crop */

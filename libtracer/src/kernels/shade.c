@@ -96,11 +96,11 @@ TRC_INLINE vvec3 clamp_radiance(vvec3 c, float limit) {
 }
 
 /* Emission or background found by rays: to the samples, and to the pass its depth says.
- * direct_pass: what camera rays see it as. */
-static void emission_add(struct trc_tile *t, const struct arrival *a, vmask active, vvec3 radiance,
-                         uint32_t camera_pass) {
+ * camera_pass: what camera rays see it as. Returns what is added. */
+static vvec3 emission_add(struct trc_tile *t, const struct arrival *a, vmask active, vvec3 radiance,
+                          uint32_t camera_pass) {
     if (!vm_any(active))
-        return;
+        return v3_zero();
     vvec3 c = v3_mul(a->found_weight, radiance);
     const vuint depth = depth_of(a->depths, TRC_DEPTH_ALL_SHIFT);
     if (t->desc->clamp_indirect > 0.0f || t->desc->clamp_direct > 0.0f)
@@ -123,6 +123,29 @@ static void emission_add(struct trc_tile *t, const struct arrival *a, vmask acti
                              (depths[i] > 1 ? 1 : 0),
                          a->slots[i], rgb);
     }
+    return c;
+}
+
+/* The same light to the passes of the lanes' light groups. */
+static void group_add(struct trc_tile *t, const struct arrival *a, vmask active, vvec3 light,
+                      const uint32_t groups[TRC_WIDTH]) {
+    float lanes[3][TRC_WIDTH];
+    vf_store(lanes[0], light.x), vf_store(lanes[1], light.y), vf_store(lanes[2], light.z);
+    for (uint32_t bits = vm_bits(active); bits; bits &= bits - 1) {
+        const int i = __builtin_ctz(bits);
+        const float rgb[3] = {lanes[0][i], lanes[1][i], lanes[2][i]};
+        if (groups[i])
+            trc_pass_add(t, TRC_PASS_LIGHT_GROUP(groups[i] - 1), a->slots[i], rgb);
+    }
+}
+
+/* Of one group for all lanes. */
+static void one_group_add(struct trc_tile *t, const struct arrival *a, vmask active, vvec3 light,
+                          uint32_t group) {
+    uint32_t groups[TRC_WIDTH];
+    vu_store(groups, vu_set(group));
+    if (group)
+        group_add(t, a, active, light, groups);
 }
 
 /* Rays that left the scene. */
@@ -144,15 +167,28 @@ static void shade_misses(struct trc_tile *t, const struct arrival *a, vmask miss
     const vvec3 c =
         TRC_KERNEL(trc_world_radiance)(t->snapshot, a->o, a->n_from, a->d, a->pdf,
                                        light_count_before(t, a->depths), a->path, missed);
-    emission_add(t, a, missed, c, TRC_PASS_ENVIRONMENT);
+    const vvec3 added = emission_add(t, a, missed, c, TRC_PASS_ENVIRONMENT);
+    if (t->desc->light_group_count)
+        one_group_add(t, a, missed, added, t->snapshot->world.light_group);
     const uint32_t material = t->snapshot->world.material;
     if (material != UINT32_MAX && t->snapshot->materials[material]->aov_count)
         TRC_KERNEL(trc_world_aovs)(t, a->d, a->path, a->found_weight, a->slots, missed);
 }
 
+/* Lamps of a light group, or of all, that the rays pass on their way to end. */
+static vvec3 pass_lamps(struct trc_tile *t, const struct arrival *a, vfloat end, uint32_t group) {
+    vvec3 c = v3_zero();
+    TRC_KERNEL(trc_light_hit)
+    (t->snapshot, a->o, a->n_from, a->d, a->tmin, end, a->pdf, light_count_before(t, a->depths),
+     a->path, group, a->active, &c);
+    const vmask seen = vm_and(a->active, vf_gt(v3_max(c), vf_set(0.0f)));
+    return v3_where(seen, emission_add(t, a, seen, c, TRC_PASS_EMISSION));
+}
+
 /* Lights that rays pass on their way, in the order of t->work. */
 static void shade_rays(struct trc_tile *t) {
     const bool lights = t->snapshot->features & TRC_FEATURE_LIGHTS;
+    const uint32_t *seen = t->snapshot->lights->group_seen;
     for (uint32_t i = 0; i < t->work.count; i += TRC_WIDTH) {
         const vint index = vi_set((int32_t)i) + vi_lane();
         const vmask active = vm_first((int32_t)(t->work.count - i));
@@ -163,13 +199,12 @@ static void shade_rays(struct trc_tile *t) {
         struct arrival a;
         arrival_load(t, index, active, &a);
         if (lights) {
-            vvec3 c = v3_zero();
             const vfloat end = vf_select(missed, vf_set(TRC_FAR), a.t);
-            TRC_KERNEL(trc_light_hit)
-            (t->snapshot, a.o, a.n_from, a.d, a.tmin, end, a.pdf, light_count_before(t, a.depths),
-             a.path, a.time, active, &c);
-            const vmask seen = vm_and(active, vf_gt(v3_max(c), vf_set(0.0f)));
-            emission_add(t, &a, seen, c, TRC_PASS_EMISSION);
+            if (!t->desc->light_group_count)
+                pass_lamps(t, &a, end, TRC_ALL_GROUPS);
+            for (uint32_t g = 0; t->desc->light_group_count && g <= TRC_MAX_LIGHT_GROUPS; g++)
+                if (seen[g] < seen[g + 1])
+                    one_group_add(t, &a, active, pass_lamps(t, &a, end, g), g);
         }
         if (vm_any(missed))
             shade_misses(t, &a, missed);
@@ -435,7 +470,7 @@ static void occlusion_pass(struct trc_tile *t, const struct arrival *a, const st
     const struct trc_light_sample sample = {
         .wi = v3_from_frame(trc_warp_cosine(u[0], u[1]), x, y, n),
         .distance = vf_set(t->snapshot->world.ao_distance),
-        .casts_shadow = vm_all_set(),
+        .casts_shadow = t->snapshot->world.ao_distance > 0.0f ? vm_all_set() : vm_none(),
         .light = vi_set((int32_t)(lights->first_triangle + lights->triangle_count))};
     const vvec3 one = v3(vf_set(1.0f), vf_set(1.0f), vf_set(1.0f));
     const vvec3 alpha = v3_sub(one, TRC_KERNEL(trc_lobes_transparency)(lobes));
@@ -633,6 +668,17 @@ static void holdout(struct trc_tile *t, const struct arrival *a, const struct tr
     }
 }
 
+/* Emission of surfaces to the passes of their instances' light groups. */
+static void surface_group_add(struct trc_tile *t, const struct arrival *a,
+                              const struct trc_surface *s, vmask active, vvec3 light) {
+    uint32_t groups[TRC_WIDTH];
+    for (uint32_t bits = vm_bits(active); bits; bits &= bits - 1) {
+        const int i = __builtin_ctz(bits);
+        groups[i] = t->snapshot->instances[vi_get(s->instance, i)].light_group;
+    }
+    group_add(t, a, active, light, groups);
+}
+
 static void shade_group(struct trc_tile *t, uint32_t material, vint index, vmask active) {
     const struct trc_material *m = t->snapshot->materials[material];
     struct arrival a;
@@ -658,7 +704,10 @@ static void shade_group(struct trc_tile *t, uint32_t material, vint index, vmask
         if (vm_any(lit)) {
             const vfloat w = TRC_KERNEL(trc_light_triangle_weight)(&s, a.o, a.n_from, a.pdf,
                                                                    light_count_before(t, a.depths));
-            emission_add(t, &a, lit, v3_scale(lobes.emission, w), TRC_PASS_EMISSION);
+            const vvec3 added =
+                emission_add(t, &a, lit, v3_scale(lobes.emission, w), TRC_PASS_EMISSION);
+            if (t->desc->light_group_count)
+                surface_group_add(t, &a, &s, lit, added);
         }
     }
     const vmask last = vi_eq((vint)(a.path & vu_set(TRC_PATH_LAST)), vi_set(TRC_PATH_LAST));

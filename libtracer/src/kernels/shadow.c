@@ -3,6 +3,7 @@
  * Boulos et al. 2007, section 3.3: shadow rays are assembled apart from others. Rays of a packet go
  * from neighbouring points to the same part of the same light. Where materials let shadow rays
  * through, packets that nothing opaque blocks are walked from surface to surface. */
+#include "kernels/light.h"
 #include "kernels/tile.h"
 #include "kernels/wide_math.h"
 
@@ -157,6 +158,18 @@ static void occlusion_add(struct trc_tile *t) {
     }
 }
 
+/* Adds light to the passes of light groups. */
+static void groups_add(struct trc_tile *t) {
+    const struct trc_shadow_store *q = &t->shadows;
+    for (uint32_t i = 0; i < q->count; i++) {
+        const float rgb[3] = {q->radiance[0][i], q->radiance[1][i], q->radiance[2][i]};
+        const uint32_t light = q->target[i] / TRC_DIRECTION_CELLS;
+        const uint32_t group = TRC_KERNEL(trc_light_group)(t->snapshot, light);
+        if (group)
+            trc_pass_add(t, TRC_PASS_LIGHT_GROUP(group - 1), q->slot[i], rgb);
+    }
+}
+
 void TRC_KERNEL(trc_shadow_flush)(struct trc_tile *t) {
     struct trc_shadow_store *q = &t->shadows;
     if (!q->count)
@@ -190,6 +203,8 @@ void TRC_KERNEL(trc_shadow_flush)(struct trc_tile *t) {
     }
     if (t->occlusion_passes)
         occlusion_add(t);
+    if (t->desc->light_group_count)
+        groups_add(t);
     for (uint32_t i = 0; i < q->count; i++) {
         const float rgb[3] = {q->radiance[0][i], q->radiance[1][i], q->radiance[2][i]};
         trc_sample_add(t, q->slot[i], rgb);

@@ -45,6 +45,7 @@ struct trc_scene_instance {
     float random;
     float color[4];
     float cryptomatte_object, cryptomatte_asset;
+    uint32_t light_group; /* of its emission, from 1 on; 0: none */
 };
 
 struct trc_scene_state {
