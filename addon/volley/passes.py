@@ -100,6 +100,17 @@ def light_group_numbers(view_layer):
     return {name: number + 1 for number, name in enumerate(names)}
 
 
+def left_out(view_layer):
+    """Messages about AOVs and light groups that are more than the library has room for."""
+    aovs = [aov.name for aov in view_layer.aovs if aov.is_valid]
+    groups = [group.name for group in view_layer.lightgroups]
+    kept_aovs, kept_groups = aov_numbers(view_layer), light_group_numbers(view_layer)
+    return [f"AOV '{name}': there are more than {_MOST_AOVS} of its type, it is left out"
+            for name in aovs if name not in kept_aovs] + [
+        f"Light group '{name}': there are more than {_MOST_LIGHT_GROUPS}, it is left out"
+        for name in groups if name not in kept_groups]
+
+
 def _light_groups(view_layer):
     for name, number in light_group_numbers(view_layer).items():
         yield Pass(_FIRST_LIGHT_GROUP + number - 1, (f"Combined_{name}",) * 2, "RGB", 'COLOR',

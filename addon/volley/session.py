@@ -60,6 +60,8 @@ class Session:
         view_names = [view.name for view in film.views] or [""]
 
         self._open(scene, keep)
+        for message in passes.left_out(view_layer):
+            self._sync.warnings.add(message)
         shutter = motion.shutter_of(scene, view_layer, motion_position(depsgraph.scene),
                                    view_layer.use_pass_vector)
         if shutter is not None and shutter.curve is not None:

@@ -412,6 +412,33 @@ def inside_light_groups():
     return pairs, scenes.render_passes(["Combined"])["Combined"]
 
 
+def inside_too_many():
+    import bpy
+    import scenes
+    from volley import passes
+    scenes.empty(samples=1)
+    scenes.camera()
+    scenes.wall("Catcher").is_shadow_catcher = True
+    layer = bpy.context.view_layer
+    for number in range(17):
+        aov = layer.aovs.add()
+        aov.name, aov.type = f"v{number}", 'VALUE'
+    for number in range(33):
+        bpy.ops.scene.view_layer_add_lightgroup(name=f"g{number:02d}")
+    entries = passes.enabled(layer)
+    bpy.ops.render.render()
+    return [entry.names[0] for entry in entries], passes.left_out(layer)
+
+
+def test_what_is_too_much_is_told(blender):
+    names, messages = blender.run(inside_too_many)
+    assert len(names) == 1 + 16 + 32 and "v16" not in names
+    assert [message.split("'")[1] for message in messages] == ["v16", "g32"]
+    for message in messages:
+        assert message in blender.output
+    assert "Catcher" in blender.output
+
+
 def test_light_groups(blender):
     pairs, grouped = blender.run(inside_light_groups, timeout=300)
     for ours, theirs in pairs.values():
