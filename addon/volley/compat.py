@@ -63,3 +63,8 @@ def is_ball(light):
 def casts_shadow(light):
     """A light's shadow switch: Blender's own from 4.2 or Cycles', whichever is off."""
     return getattr(light, "use_shadow", True) and cycles(light, "cast_shadow", True)
+
+
+def aov_name(node):
+    """The AOV that an AOV Output node writes; till 4.1 it is the name of the node."""
+    return getattr(node, "aov_name", node.name)

@@ -11,6 +11,7 @@ library's headers (metres, radians, column vectors, 3x4 row-major transforms).
 """
 
 import ctypes
+import functools
 import os
 import sys
 
@@ -104,7 +105,9 @@ class _MeshDesc(_Struct):
 class _InstanceDesc(_Struct):
     _fields_ = [("struct_size", _u32), ("key_count", _u32), ("mesh", _u64), ("transforms", _ptr),
                 ("materials", _ptr), ("material_count", _u32), ("visibility", _u32),
-                ("pass_index", _i32), ("random", _f32), ("color", _f32 * 4)]
+                ("pass_index", _i32), ("random", _f32), ("color", _f32 * 4),
+                ("cryptomatte_object", _f32), ("cryptomatte_asset", _f32), ("light_group", _u32),
+                ("reserved", _u32)]
 
 
 class _LightDesc(_Struct):
@@ -118,7 +121,7 @@ class _LightDesc(_Struct):
 class _WorldDesc(_Struct):
     _fields_ = [("struct_size", _u32), ("use_sampling", _u32), ("material", _u64),
                 ("visibility", _u32), ("map_resolution", _u32), ("ao_distance", _f32),
-                ("ao_factor", _f32), ("ao_method", _u32), ("reserved", _u32)]
+                ("ao_factor", _f32), ("ao_method", _u32), ("light_group", _u32)]
 
 
 class _CameraDesc(_Struct):
@@ -140,7 +143,8 @@ class _Node(_Struct):
 
 class _MaterialDesc(_Struct):
     _fields_ = [("struct_size", _u32), ("node_count", _u32), ("nodes", _ptr), ("inputs", _ptr),
-                ("input_count", _u32), ("surface", _i32), ("pass_index", _i32), ("flags", _u32)]
+                ("input_count", _u32), ("surface", _i32), ("pass_index", _i32), ("flags", _u32),
+                ("cryptomatte", _f32), ("reserved", _u32)]
 
 
 class _ImageDesc(_Struct):
@@ -175,7 +179,8 @@ class _RenderDesc(_Struct):
                 ("film_exposure", _f32), ("passes", _u64), ("thread_count", _u32),
                 ("progressive", _u32), ("noise_threshold", _f32), ("min_samples", _u32),
                 ("mist_start", _f32), ("mist_depth", _f32), ("mist_falloff", _f32),
-                ("reserved", _u32)]
+                ("cryptomattes", _u32), ("cryptomatte_depth", _u32), ("aov_value_count", _u32),
+                ("aov_color_count", _u32), ("light_group_count", _u32)]
 
 
 class _RenderProgress(_Struct):
@@ -203,6 +208,7 @@ _STRUCTS = {
 _FUNCTIONS = {  # name: (result, arguments); a status result is checked by _call
     "trc_version_string": (_str, ()), "trc_last_message": (_str, ()), "trc_isa": (_u32, ()),
     "trc_isa_name": (_str, (_u32,)), "trc_pass_channels": (_u32, (_u32,)),
+    "trc_cryptomatte_id": (_f32, (_str,)),
     "trc_scene_create": (_i32, (_ptr, _ptr)), "trc_scene_destroy": (_i32, (_u64,)),
     "trc_scene_commit": (_i32, (_u64,)), "trc_scene_cancel": (_i32, (_u64,)),
     "trc_scene_get_stats": (_i32, (_u64, _ptr)),
@@ -332,6 +338,12 @@ def pass_channels(pass_index):
     return _require().trc_pass_channels(pass_index)
 
 
+@functools.lru_cache(maxsize=1 << 16)  # a sync asks for every object
+def cryptomatte_id(name):
+    """The id of a name in Cryptomatte passes, a float32."""
+    return _require().trc_cryptomatte_id(name.encode("utf-8"))
+
+
 # Objects ---------------------------------------------------------------------------------------
 
 class Scene:
@@ -422,7 +434,8 @@ class Scene:
 
     def update_instance(self, instance, **values):
         """mesh: id; transforms (keys, 12) float32; materials: ids by slot; visibility; pass_index;
-        random [0, 1); color: four floats."""
+        random [0, 1); color: four floats; cryptomatte_object and cryptomatte_asset: ids; light_group: of
+        its emission, 0 for none."""
         desc, keep = self._instance_desc(**values)
         self._edit("trc_instance_update", instance, ctypes.byref(desc))
 
@@ -431,13 +444,16 @@ class Scene:
 
     @staticmethod
     def _instance_desc(mesh, transforms, materials=(), visibility=VISIBLE_ALL, pass_index=0,
-                       random=0.0, color=(1.0, 1.0, 1.0, 1.0)):
+                       random=0.0, color=(1.0, 1.0, 1.0, 1.0), cryptomatte_object=0.0,
+                       cryptomatte_asset=0.0, light_group=0):
         transforms = _array(transforms, np.float32).reshape(-1, 12)
         ids = np.array(materials, dtype=np.uint64)
         desc = _InstanceDesc(
             key_count=len(transforms), mesh=mesh, transforms=_address(transforms),
             materials=_address(ids), material_count=len(ids), visibility=visibility,
-            pass_index=pass_index, random=random, color=tuple(color))
+            pass_index=pass_index, random=random, color=tuple(color),
+            cryptomatte_object=cryptomatte_object, cryptomatte_asset=cryptomatte_asset,
+            light_group=light_group)
         return desc, (transforms, ids)
 
     # Lights, world, camera
@@ -470,22 +486,23 @@ class Scene:
 
     # Materials and images
 
-    def create_material(self, nodes, surface, pass_index=0, flags=0):
+    def create_material(self, nodes, surface, **values):
         """A material from a flat node list; see :meth:`update_material`."""
-        desc, keep = self._material_desc(nodes, surface, pass_index, flags)
+        desc, keep = self._material_desc(nodes, surface, **values)
         return self._create("trc_material_create", desc)
 
-    def update_material(self, material, nodes, surface, pass_index=0, flags=0):
+    def update_material(self, material, nodes, surface, **values):
         """nodes: objects with type, mode, inputs, image, name, table; inputs: (node, output, (x, y, z))
-        triples, node -1 for the constant, -2 for the socket's own default. surface: node index."""
-        desc, keep = self._material_desc(nodes, surface, pass_index, flags)
+        triples, node -1 for the constant, -2 for the socket's own default. surface: node index; other
+        keywords are fields of trc_material_desc: pass_index, flags, cryptomatte."""
+        desc, keep = self._material_desc(nodes, surface, **values)
         self._edit("trc_material_update", material, ctypes.byref(desc))
 
     def destroy_material(self, material):
         self._edit("trc_material_destroy", material)
 
     @staticmethod
-    def _material_desc(nodes, surface, pass_index, flags):
+    def _material_desc(nodes, surface, **values):
         keep, structs, inputs = [], [], []
         for node in nodes:
             table = _array(node.table, np.float32)
@@ -500,7 +517,7 @@ class Scene:
         desc = _MaterialDesc(
             node_count=len(structs), nodes=ctypes.addressof(structs) if len(structs) else None,
             inputs=ctypes.addressof(inputs) if len(inputs) else None, input_count=len(inputs),
-            surface=surface, pass_index=pass_index, flags=flags)
+            surface=surface, **values)
         return desc, (keep, structs, inputs)
 
     def create_image(self, pixels=None, path=None, alpha_mode=ALPHA_STRAIGHT, is_srgb=False):

@@ -31,6 +31,8 @@ PASSES = (
     Pass(17, ("TransCol", "Transmission Color"), "RGB", 'COLOR', "use_pass_transmission_color"),
     Pass(7, ("Emit", "Emission"), "RGB", 'COLOR', "use_pass_emit"),
     Pass(8, ("Env", "Environment"), "RGB", 'COLOR', "use_pass_environment"),
+    Pass(24, ("AO", "Ambient Occlusion"), "RGB", 'COLOR', "use_pass_ambient_occlusion"),
+    Pass(25, ("Shadow", "Shadow"), "RGB", 'COLOR', "use_pass_shadow"),
     Pass(19, ("Mist", "Mist"), "Z", 'VALUE', "use_pass_mist"),
     Pass(20, ("Denoising Albedo", "Denoising Albedo"), "RGB", 'COLOR', "volley.denoising_store_passes"),
     Pass(21, ("Denoising Normal", "Denoising Normal"), "XYZ", 'VECTOR', "volley.denoising_store_passes"),
@@ -39,6 +41,19 @@ PASSES = (
          "volley.use_pass_sample_count"),
 )
 COMBINED = PASSES[0]
+
+# By TRC_CRYPTOMATTE_*: name, setting of the view layer.
+CRYPTOMATTES = (("CryptoObject", "use_pass_cryptomatte_object"),
+                ("CryptoMaterial", "use_pass_cryptomatte_material"),
+                ("CryptoAsset", "use_pass_cryptomatte_asset"))
+_FIRST_CRYPTOMATTE, _MOST_LAYERS = 128, 8  # TRC_PASS_CRYPTOMATTE
+_LAYER_RANKS = 2
+
+# By the type of an AOV: TRC_PASS_AOV_*, channels, kind of pass.
+_AOVS = {'VALUE': (64, "X", 'VALUE'), 'COLOR': (80, "RGBA", 'COLOR')}
+_MOST_AOVS = 16
+
+_FIRST_LIGHT_GROUP, _MOST_LIGHT_GROUPS = 96, 32  # TRC_PASS_LIGHT_GROUP
 
 
 def name_of(entry, long_names=HAS_LONG_PASS_NAMES):
@@ -58,7 +73,58 @@ def is_enabled(entry, view_layer):
 
 def enabled(view_layer):
     """The passes a view layer asks for."""
-    return [entry for entry in PASSES if is_enabled(entry, view_layer)]
+    entries = [entry for entry in PASSES if is_enabled(entry, view_layer)]
+    return [*entries, *_aovs(view_layer), *_light_groups(view_layer),
+            *_cryptomatte_layers(view_layer)]
+
+
+def aov_numbers(view_layer):
+    """{name: (type, number among those of its type)} of the AOVs that a view layer asks for."""
+    numbers, counts = {}, dict.fromkeys(_AOVS, 0)
+    for aov in view_layer.aovs:
+        if aov.is_valid and counts[aov.type] < _MOST_AOVS:
+            numbers[aov.name] = aov.type, counts[aov.type]
+            counts[aov.type] += 1
+    return numbers
+
+
+def _aovs(view_layer):
+    for name, (aov_type, number) in aov_numbers(view_layer).items():
+        first, channels, kind = _AOVS[aov_type]
+        yield Pass(first + number, (name, name), channels, kind, "aovs")
+
+
+def light_group_numbers(view_layer):
+    """{name: number from 1 on} of the light groups of a view layer."""
+    names = [group.name for group in view_layer.lightgroups[:_MOST_LIGHT_GROUPS]]
+    return {name: number + 1 for number, name in enumerate(names)}
+
+
+def left_out(view_layer):
+    """Messages about AOVs and light groups that are more than the library has room for."""
+    aovs = [aov.name for aov in view_layer.aovs if aov.is_valid]
+    groups = [group.name for group in view_layer.lightgroups]
+    kept_aovs, kept_groups = aov_numbers(view_layer), light_group_numbers(view_layer)
+    return [f"AOV '{name}': there are more than {_MOST_AOVS} of its type, it is left out"
+            for name in aovs if name not in kept_aovs] + [
+        f"Light group '{name}': there are more than {_MOST_LIGHT_GROUPS}, it is left out"
+        for name in groups if name not in kept_groups]
+
+
+def _light_groups(view_layer):
+    for name, number in light_group_numbers(view_layer).items():
+        yield Pass(_FIRST_LIGHT_GROUP + number - 1, (f"Combined_{name}",) * 2, "RGB", 'COLOR',
+                   "lightgroups")
+
+
+def _cryptomatte_layers(view_layer):
+    """Channels in small letters: so Blender's OpenEXR writer knows that they must not be changed."""
+    ranks = min(view_layer.pass_cryptomatte_depth, _LAYER_RANKS * _MOST_LAYERS)
+    for kind, (name, setting) in enumerate(CRYPTOMATTES):
+        if getattr(view_layer, setting):
+            for layer in range((ranks + 1) // _LAYER_RANKS):
+                index = _FIRST_CRYPTOMATTE + kind * _MOST_LAYERS + layer
+                yield Pass(index, (f"{name}{layer:02d}",) * 2, "rgba", 'COLOR', setting)
 
 
 def register_passes(engine, scene, view_layer):
@@ -80,9 +146,20 @@ def without_vector(entries):
     return [entry for entry in entries if entry.setting != "use_pass_vector"]
 
 
-def request_mask(entries):
-    """The passes as bits for the library."""
-    return sum(1 << entry.index for entry in entries)
+def request_fields(entries):
+    """The passes as fields of trc_render_desc."""
+    layers = [divmod(entry.index - _FIRST_CRYPTOMATTE, _MOST_LAYERS) for entry in entries
+              if entry.index >= _FIRST_CRYPTOMATTE]
+    aov_counts = [sum(first <= entry.index < first + _MOST_AOVS for entry in entries)
+                  for first, _, _ in _AOVS.values()]
+    return {
+        "passes": sum(1 << entry.index for entry in entries if entry.index < _AOVS['VALUE'][0]),
+        "aov_value_count": aov_counts[0], "aov_color_count": aov_counts[1],
+        "light_group_count": sum(_FIRST_LIGHT_GROUP <= entry.index < _FIRST_CRYPTOMATTE
+                                 for entry in entries),
+        "cryptomattes": sum(1 << kind for kind in {kind for kind, _ in layers}),
+        "cryptomatte_depth": _LAYER_RANKS * max((layer + 1 for _, layer in layers), default=0),
+    }
 
 
 def write(render, layer, entries):

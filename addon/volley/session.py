@@ -10,7 +10,7 @@ import time
 
 import bpy
 
-from . import native, passes
+from . import cryptomatte, native, passes
 from .compat import motion_position
 from .log import logger
 from .sync import Cancelled, SceneSync, Source, camera, motion, world
@@ -60,6 +60,8 @@ class Session:
         view_names = [view.name for view in film.views] or [""]
 
         self._open(scene, keep)
+        for message in passes.left_out(view_layer):
+            self._sync.warnings.add(message)
         shutter = motion.shutter_of(scene, view_layer, motion_position(depsgraph.scene),
                                    view_layer.use_pass_vector)
         if shutter is not None and shutter.curve is not None:
@@ -78,6 +80,7 @@ class Session:
                     view_layer.name, view_name, entries)
             finally:
                 render.destroy()
+        cryptomatte.write_manifests(engine, view_layer, self._sync.cryptomatte_names())
 
     def _open(self, scene, keep):
         """The library's scene: the one kept from the last frame, or a new one."""
@@ -93,7 +96,9 @@ class Session:
         scene = depsgraph.scene_eval
         now = motion.split_frame(scene.frame_current_final)
         source = Source(depsgraph, Changes.everything(), engine=engine, is_cancelled=engine.test_break,
-                        needs_uv=depsgraph.view_layer_eval.use_pass_uv)
+                        needs_uv=depsgraph.view_layer_eval.use_pass_uv,
+                        aovs=passes.aov_numbers(depsgraph.view_layer_eval),
+                        light_groups=passes.light_group_numbers(depsgraph.view_layer_eval))
         cameras = CameraMotion(engine, frame, shutter, view_names, self._sync.warnings)
         moved = shutter is not None
         try:
@@ -271,7 +276,7 @@ def render_fields(scene, frame, crop, entries, is_preview=False):
         "sampler": native.SAMPLERS[settings.sampler], "seed": seed & 0xFFFFFFFF,
         "filter": native.FILTERS[settings.pixel_filter_type], "filter_width": settings.filter_width,
         "film_transparent": int(scene.render.film_transparent),
-        "film_exposure": settings.film_exposure, "passes": passes.request_mask(entries),
+        "film_exposure": settings.film_exposure, **passes.request_fields(entries),
         "thread_count": thread_count(scene.render), **_adaptive_fields(settings, is_preview),
         **world.mist_fields(scene.world),
     }

@@ -8,6 +8,7 @@ shown where that add-on is enabled.
 import bpy
 from bpy.types import Panel
 
+from . import passes
 from .compat import motion_position
 
 ENGINE = 'VOLLEY'
@@ -326,6 +327,68 @@ class VOLLEY_VIEWLAYER_PT_passes_light(_VolleyPanel, Panel):
         column = layout.column(heading="Other", align=True)
         column.prop(view_layer, "use_pass_emit", text="Emission")
         column.prop(view_layer, "use_pass_environment")
+        column.prop(view_layer, "use_pass_ambient_occlusion", text="Ambient Occlusion")
+        _prop_if_present(column, view_layer, "use_pass_shadow", text="Shadow")
+
+
+class VOLLEY_VIEWLAYER_PT_passes_cryptomatte(_VolleyPanel, Panel):
+    bl_label = "Cryptomatte"
+    bl_context = "view_layer"
+    bl_parent_id = "VOLLEY_VIEWLAYER_PT_passes"
+
+    def draw(self, context):
+        view_layer, layout = context.view_layer, _column(self)
+        settings = [setting for _, setting in passes.CRYPTOMATTES]
+        column = layout.column()
+        for setting in settings:
+            column.prop(view_layer, setting, text=setting.rpartition("_")[2].title())
+        column = layout.column()
+        column.active = any(getattr(view_layer, setting) for setting in settings)
+        column.prop(view_layer, "pass_cryptomatte_depth", text="Levels")
+
+
+class VOLLEY_VIEWLAYER_PT_passes_aov(_VolleyPanel, Panel):
+    bl_label = "Shader AOV"
+    bl_context = "view_layer"
+    bl_parent_id = "VOLLEY_VIEWLAYER_PT_passes"
+
+    def draw(self, context):
+        view_layer, layout = context.view_layer, _column(self)
+        row = layout.row()
+        row.column().template_list("VIEWLAYER_UL_aov", "aovs", view_layer, "aovs", view_layer,
+                                   "active_aov_index", rows=3)
+        buttons = row.column(align=True)
+        buttons.operator("scene.view_layer_add_aov", icon='ADD', text="")
+        buttons.operator("scene.view_layer_remove_aov", icon='REMOVE', text="")
+        if view_layer.active_aov and not view_layer.active_aov.is_valid:
+            layout.label(text="Conflicts with another pass of the same name", icon='ERROR')
+
+
+class VOLLEY_VIEWLAYER_PT_passes_lightgroups(_VolleyPanel, Panel):
+    bl_label = "Light Groups"
+    bl_context = "view_layer"
+    bl_parent_id = "VOLLEY_VIEWLAYER_PT_passes"
+
+    def draw(self, context):
+        view_layer = context.view_layer
+        row = _column(self).row()
+        row.column().template_list("UI_UL_list", "lightgroups", view_layer, "lightgroups", view_layer,
+                                   "active_lightgroup_index", rows=3)
+        buttons = row.column(align=True)
+        buttons.operator("scene.view_layer_add_lightgroup", icon='ADD', text="")
+        buttons.operator("scene.view_layer_remove_lightgroup", icon='REMOVE', text="")
+        buttons.separator()
+        buttons.menu("VIEWLAYER_MT_lightgroup_sync", icon='DOWNARROW_HLT', text="")
+
+
+def _draw_light_group(panel, data, view_layer):
+    """The light group of an object or world, and a button that adds one of that name."""
+    row = _column(panel).row(align=True)
+    row.prop_search(data, "lightgroup", view_layer, "lightgroups", text="Light Group",
+                    results_are_suggestions=True)
+    button = row.column(align=True)
+    button.enabled = bool(data.lightgroup) and data.lightgroup not in view_layer.lightgroups
+    button.operator("scene.view_layer_add_lightgroup", icon='ADD', text="").name = data.lightgroup
 
 
 # Objects ---------------------------------------------------------------------------------------
@@ -391,6 +454,20 @@ class VOLLEY_OBJECT_PT_motion_blur(_VolleyPanel, Panel):
         layout.prop(settings, "motion_steps", text="Steps")
         if context.object.type != 'CAMERA':
             layout.prop(settings, "use_deform_motion", text="Deformation")
+
+
+class VOLLEY_OBJECT_PT_lightgroup(_VolleyPanel, Panel):
+    bl_label = "Light Group"
+    bl_context = "object"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    @classmethod
+    def poll(cls, context):
+        active = context.object
+        return super().poll(context) and active and (_has_shape(active) or active.type == 'LIGHT')
+
+    def draw(self, context):
+        _draw_light_group(self, context.object, context.view_layer)
 
 
 def _has_shape(active):
@@ -551,6 +628,19 @@ class VOLLEY_WORLD_PT_settings(_VolleyPanel, Panel):
         column.prop(settings, "sampling_method", text="Sampling")
         if settings.sampling_method == 'MANUAL':
             column.prop(settings, "sample_map_resolution")
+
+
+class VOLLEY_WORLD_PT_lightgroup(_VolleyPanel, Panel):
+    bl_label = "Light Group"
+    bl_context = "world"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and context.world
+
+    def draw(self, context):
+        _draw_light_group(self, context.world, context.view_layer)
 
 
 class VOLLEY_MATERIAL_PT_surface(_VolleyPanel, Panel):

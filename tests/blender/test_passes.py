@@ -140,3 +140,311 @@ def test_vector(blender):
     for ours, theirs in pairs.values():  # the file has an alpha of 1 in place of the fourth channel
         assert np.abs(theirs).max(axis=(0, 1)).min() > 0.5
         _agree(ours, theirs, mean=5e-3, share=0.02)
+
+
+# Cryptomatte ----------------------------------------------------------------------------------------
+
+CRYPTOMATTES = ("CryptoObject", "CryptoMaterial", "CryptoAsset")
+LEVELS = 5  # three layers
+MATTED = "Metal,Veil"
+
+
+def _crypto_scene():
+    """Objects with and without materials, instances, a group, transparency, depth of field."""
+    import bpy
+    import scenes
+    scene = _scene()
+    made = scene.camera
+    made.data.dof.use_dof, made.data.dof.focus_distance = True, 5.0
+    made.data.dof.aperture_fstop = 0.3
+    bare = scenes.sphere("Bare", 0.4, (0.2, -1.5, -1.2))
+    bare.parent = bpy.data.objects["Metal"]
+    glass = scenes.sphere("Glass", 0.5, (-2.5, -1.0, 1.4), scenes.material(
+        "Glass", "ShaderNodeBsdfGlass", Color=(0.9, 0.9, 1.0)))
+    collection = bpy.data.collections.new("Source")
+    scene.collection.objects.unlink(glass)
+    collection.objects.link(glass)
+    for number in range(3):
+        copy = scenes.link(f"Copy{number}", None)
+        copy.instance_type, copy.instance_collection = 'COLLECTION', collection
+        copy.location = (1.3 * number, 0.3 * number, -0.5 * number)
+    layer = bpy.context.view_layer
+    layer.use_pass_cryptomatte_object = layer.use_pass_cryptomatte_material = True
+    layer.use_pass_cryptomatte_asset, layer.pass_cryptomatte_depth = True, LEVELS
+    return scene
+
+
+def _matte(names):
+    """The matte that the compositor's Cryptomatte node makes of the objects, of a new render."""
+    import os
+    import tempfile
+    import bpy
+    import scenes
+    scene = bpy.context.scene
+    tree, folder = scene.node_tree, tempfile.mkdtemp(prefix="volley_")
+    tree.nodes.clear()
+    node = tree.nodes.new("CompositorNodeCryptomatteV2")
+    node.scene, node.layer_name, node.matte_id = scene, "ViewLayer.CryptoObject", names
+    tree.links.new(tree.nodes.new("CompositorNodeRLayers").outputs["Image"], node.inputs["Image"])
+    output = tree.nodes.new("CompositorNodeOutputFile")
+    output.base_path = folder
+    output.format.file_format, output.format.color_depth = 'OPEN_EXR', '32'
+    tree.links.new(node.outputs["Matte"], output.inputs[0])
+    tree.links.new(node.outputs["Image"], tree.nodes.new("CompositorNodeComposite").inputs[0])
+    bpy.ops.render.render()
+    return scenes.load(os.path.join(folder, os.listdir(folder)[0]))
+
+
+def inside_cryptomatte():
+    import scenes
+    _crypto_scene()
+    names = [f"{kind}{layer:02d}" for kind in CRYPTOMATTES for layer in range((LEVELS + 1) // 2)]
+    pairs, mattes = _both(names, 256), []
+    for engine in ('VOLLEY', 'CYCLES'):
+        scenes.set_engine(engine, 256)
+        mattes.append(_matte(MATTED))
+    return pairs, mattes
+
+
+def _ranks(pairs, kind, engine):
+    """All channels of one kind of mattes by one engine: id and coverage in turn."""
+    layers = [pairs[name][engine] for name in sorted(pairs) if name.startswith(kind)]
+    return np.concatenate(layers, axis=-1)
+
+
+def _coverages(ranks):
+    """Coverage by each id."""
+    ids, parts = ranks[..., 0::2], ranks[..., 1::2]
+    return {float(number): np.where(ids == number, parts, 0.0).sum(axis=-1)
+            for number in np.unique(ids) if number != 0.0}
+
+
+def test_cryptomatte(blender):
+    pairs, mattes = blender.run(inside_cryptomatte, timeout=300)
+    for kind, count in zip(CRYPTOMATTES, (6, 6, 5)):
+        parts = _ranks(pairs, kind, 0)[..., 1::2]
+        assert (parts[..., :-1] >= parts[..., 1:]).all()  # Cycles sorts only the first kind
+        ours, theirs = (_coverages(_ranks(pairs, kind, engine)) for engine in (0, 1))
+        assert ours.keys() == theirs.keys() and len(ours) == count
+        for number, expected in theirs.items():
+            assert abs(ours[number].mean() - expected.mean()) < 1e-3
+            assert (np.abs(ours[number] - expected) > 0.1).mean() < 0.01
+    ours, theirs = (matte[..., 0] for matte in mattes)
+    assert 0.1 < theirs.mean() < 0.9
+    assert abs(ours.mean() - theirs.mean()) < 1e-3
+    assert (np.abs(ours - theirs) > 0.1).mean() < 0.01
+
+
+def inside_manifests(path):
+    import bpy
+    import scenes
+    scene = _crypto_scene()
+    bpy.data.objects["Veil"].name = "Veil é"
+    scene.render.image_settings.file_format = 'OPEN_EXR_MULTILAYER'
+    for engine in ('VOLLEY', 'CYCLES'):
+        scenes.set_engine(engine, 1)
+        scene.render.filepath = f"{path}/{engine}.exr"
+        bpy.ops.render.render(write_still=True)
+
+
+def _id_digits(digits):
+    """A hash as the bits of its id: Cycles writes the hash itself, which readers take as well."""
+    bits = int(digits, 16)
+    return f"{bits ^ 1 << 23 if bits >> 23 & 255 in (0, 255) else bits:08x}"
+
+
+def _manifests(path):
+    """{key: value} of the Cryptomatte metadata of an OpenEXR file, manifests as dictionaries."""
+    import json
+    import re
+    with open(path, "rb") as file:
+        header = file.read(1 << 16)
+    found = {}
+    for match in re.finditer(rb"(cryptomatte/[0-9a-f]{7}/\w+)\0string\0(.{4})", header, re.DOTALL):
+        size = int.from_bytes(match.group(2), "little")
+        value = header[match.end():match.end() + size].decode("utf-8")
+        is_manifest = match.group(1).endswith(b"manifest")
+        found[match.group(1).decode()] = json.loads(value) if is_manifest else value
+    return found
+
+
+def test_cryptomatte_manifests(blender, tmp_path):
+    blender.run(inside_manifests, str(tmp_path))
+    ours, theirs = _manifests(tmp_path / "VOLLEY.exr"), _manifests(tmp_path / "CYCLES.exr")
+    assert len(ours) == 12 and ours.keys() == theirs.keys()
+    for key, value in ours.items():
+        if key.endswith("manifest"):  # Cycles also names what nothing shows
+            named = {name: _id_digits(digits) for name, digits in theirs[key].items()}
+            assert value.items() <= named.items()
+            assert len(value) >= 5
+        else:
+            assert value == theirs[key]
+
+
+# AOVs -----------------------------------------------------------------------------------------------
+
+def _aov(tree, name, source, path="Value"):
+    """An AOV Output node whose input is linked to an output."""
+    node = tree.nodes.new("ShaderNodeOutputAOV")
+    setattr(node, "aov_name" if hasattr(node, "aov_name") else "name", name)
+    tree.links.new(source, node.inputs[path])
+
+
+def _aov_scene():
+    """Values and colours of nodes that the surface needs, and of others, in a group too; seen through
+    a clear veil with an AOV of its own, and in the world."""
+    import bpy
+    import scenes
+    scene = _scene()
+    scene.world.use_nodes = True
+    layer = bpy.context.view_layer
+    for name, kind in (("height", 'VALUE'), ("tint", 'COLOR'), ("facing", 'VALUE'), ("unused", 'COLOR')):
+        aov = layer.aovs.add()
+        aov.name, aov.type = name, kind
+    bpy.data.objects["Back"].scale = (0.5, 1.0, 0.5)
+    tree = bpy.data.materials["Matt"].node_tree
+    coordinate = tree.nodes.new("ShaderNodeTexCoord")
+    checker = tree.nodes.new("ShaderNodeTexChecker")
+    checker.inputs["Scale"].default_value = 4.0
+    tree.links.new(coordinate.outputs["Generated"], checker.inputs["Vector"])
+    tree.links.new(checker.outputs["Color"], tree.nodes["Diffuse BSDF"].inputs["Color"])
+    _aov(tree, "tint", checker.outputs["Color"], "Color")
+    tree = bpy.data.materials["Metal"].node_tree
+    _aov(tree, "height", tree.nodes.new("ShaderNodeTexCoord").outputs["Object"])
+    group = bpy.data.node_groups.new("Inner", 'ShaderNodeTree')
+    weight = group.nodes.new("ShaderNodeLayerWeight")
+    _aov(group, "facing", weight.outputs["Facing"])
+    tree.nodes.new("ShaderNodeGroup").node_tree = group
+    bpy.data.objects["Veil"].data.materials[0] = clear = scenes.material(
+        "Clear", "ShaderNodeBsdfTransparent", Color=(1.0, 1.0, 1.0))
+    blue = clear.node_tree.nodes.new("ShaderNodeRGB")
+    blue.outputs[0].default_value = (0.0, 0.2, 0.7, 1.0)
+    _aov(clear.node_tree, "tint", blue.outputs[0], "Color")
+    tree = scene.world.node_tree
+    tree.nodes["Background"].inputs["Color"].default_value = (0.1, 0.2, 0.3, 1.0)
+    _aov(tree, "tint", tree.nodes.new("ShaderNodeTexCoord").outputs["Generated"], "Color")
+
+
+def inside_aovs():
+    _aov_scene()
+    return _both(["height", "tint", "facing", "unused"])
+
+
+def test_aovs(blender):
+    pairs = blender.run(inside_aovs)
+    for picture in pairs.pop("unused"):
+        assert not picture.any()
+    for name, (ours, theirs) in pairs.items():
+        channels = 4 if name == "tint" else 1
+        assert (theirs[..., :channels].std(axis=(0, 1)) > 0.02).all()
+        _agree(ours, theirs, channels, mean=3e-3, share=0.01, step=0.1)
+
+
+# Ambient occlusion and shadow -----------------------------------------------------------------------
+
+def _occluded_scene():
+    """The objects stand on a floor under lamps of several kinds, with shadows of transparent ones."""
+    import bpy
+    import scenes
+    scene = _scene()
+    floor = scenes.wall("Floor", 20.0, 1.2, (0.0, 0.0), scenes.material(
+        "Floor", "ShaderNodeBsdfDiffuse", Color=(0.7, 0.7, 0.7)))
+    floor.rotation_euler.x = -np.pi / 2
+    bpy.data.objects["Veil"].data.materials[0] = scenes.material(
+        "Clear", "ShaderNodeBsdfTransparent", Color=(0.5, 0.9, 0.7))
+    scene.world.light_settings.distance = 1.5
+    scenes.light('AREA', (0.0, -4.0, 4.0), size=1.0, energy=300.0)
+    scenes.light('POINT', (-3.0, -2.0, 3.0), shadow_soft_size=0.3, energy=900.0)
+    scenes.light('SUN', rotation=(0.6, 0.4, 0.0), angle=0.1, energy=0.2)
+    return scene
+
+
+def inside_occlusion():
+    import bpy
+    _occluded_scene()
+    layer = bpy.context.view_layer
+    layer.use_pass_ambient_occlusion = True
+    names = ["AO"]
+    if bpy.app.version < (4, 0, 0):
+        layer.use_pass_shadow = True
+        names.append("Shadow")
+    return _both(names, 256)
+
+
+def test_occlusion(blender):
+    for ours, theirs in blender.run(inside_occlusion, timeout=300).values():
+        assert theirs[..., 0].std() > 0.1
+        _agree(ours, theirs, mean=5e-3, share=0.03, step=0.1)
+
+
+# Light groups ---------------------------------------------------------------------------------------
+
+LIGHT_GROUPS = {"key": ("Light", "Light.002"), "rim": ("Light.001",), "glow": ("Glow",), "sky": ()}
+
+
+def _grouped_scene():
+    """Lamps, a glowing ball and the world in groups, one lamp in none; mirrored and seen through."""
+    import bpy
+    import scenes
+    scene = _occluded_scene()
+    scenes.light('SPOT', (2.0, -5.0, 3.0), (0.9, 0.0, 0.3), energy=500.0, shadow_soft_size=0.2)
+    glow = scenes.sphere("Glow", 0.3, (0.3, -1.0, 1.6), scenes.emitter((4.0, 2.0, 1.0)))
+    assert len(bpy.data.lights) == 4 and glow.name == "Glow"
+    scene.world.color = (0.1, 0.15, 0.2)
+    layer = bpy.context.view_layer
+    for group, members in LIGHT_GROUPS.items():
+        layer.lightgroups.add(name=group) if hasattr(layer.lightgroups, "add") \
+            else bpy.ops.scene.view_layer_add_lightgroup(name=group)
+        for name in members:
+            bpy.data.objects[name].lightgroup = group
+    scene.world.lightgroup = "sky"
+    for name in ("Mirror", "Metal"):  # their caustics would be noise
+        bpy.data.materials[name].node_tree.nodes["Glossy BSDF"].inputs["Roughness"].default_value = 0.3
+    return scene
+
+
+def inside_light_groups():
+    import bpy
+    import scenes
+    _grouped_scene()
+    pairs = _both([f"Combined_{group}" for group in LIGHT_GROUPS], 256)
+    bpy.data.objects["Light.003"].hide_render = True  # in no group
+    scenes.set_engine('VOLLEY', 256)
+    return pairs, scenes.render_passes(["Combined"])["Combined"]
+
+
+def inside_too_many():
+    import bpy
+    import scenes
+    from volley import passes
+    scenes.empty(samples=1)
+    scenes.camera()
+    scenes.wall("Catcher").is_shadow_catcher = True
+    layer = bpy.context.view_layer
+    for number in range(17):
+        aov = layer.aovs.add()
+        aov.name, aov.type = f"v{number}", 'VALUE'
+    for number in range(33):
+        bpy.ops.scene.view_layer_add_lightgroup(name=f"g{number:02d}")
+    entries = passes.enabled(layer)
+    bpy.ops.render.render()
+    return [entry.names[0] for entry in entries], passes.left_out(layer)
+
+
+def test_what_is_too_much_is_told(blender):
+    names, messages = blender.run(inside_too_many)
+    assert len(names) == 1 + 16 + 32 and "v16" not in names
+    assert [message.split("'")[1] for message in messages] == ["v16", "g32"]
+    for message in messages:
+        assert message in blender.output
+    assert "Catcher" in blender.output
+
+
+def test_light_groups(blender):
+    pairs, grouped = blender.run(inside_light_groups, timeout=300)
+    for ours, theirs in pairs.values():
+        assert theirs[..., :3].mean() > 1e-3
+        limit = np.quantile(theirs, 0.995)  # Cycles counts mirrored suns to the group of the world
+        _agree(np.minimum(ours, limit), np.minimum(theirs, limit), mean=5e-3, share=0.03, step=0.1)
+    total = sum(ours[..., :3] for ours, _ in pairs.values())
+    assert total.mean() == pytest.approx(grouped[..., :3].mean(), rel=5e-3)

@@ -231,6 +231,20 @@ static void passes(void **state) {
     assert_int_equal(trc_scene_destroy(scene), TRC_OK);
 }
 
+/* The pass of its own is the free part alone, whatever the surface is and with the effect off. */
+static void own_pass(void **state) {
+    (void)state;
+    const trc_scene scene = open_scene();
+    double column[WIDTH];
+    add_level(scene, 1000.0f, 0.0f, add_material(scene, TRC_NODE_EMISSION, 0.5f));
+    add_level(scene, 1000.0f, 1.5f, 0);
+    draw(scene, &(struct setting){.distance = 3.0f}, TRC_PASS_AMBIENT_OCCLUSION, column);
+    expect_all(column, 0.25, 5e-3);
+    draw(scene, &(struct setting){.distance = 3.0f}, TRC_PASS_COMBINED, column);
+    expect_all(column, 0.5, 1e-6);
+    assert_int_equal(trc_scene_destroy(scene), TRC_OK);
+}
+
 /* Replacing takes the world's own light from diffuse surfaces, and only that: with a lamp the
  * picture is the sum. */
 static void replaced(void **state) {
@@ -251,9 +265,9 @@ static void replaced(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(plane),   cmocka_unit_test(ceiling),
-                                       cmocka_unit_test(corner),  cmocka_unit_test(box),
-                                       cmocka_unit_test(mirror),  cmocka_unit_test(passes),
-                                       cmocka_unit_test(replaced)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(plane),    cmocka_unit_test(ceiling),
+                                       cmocka_unit_test(corner),   cmocka_unit_test(box),
+                                       cmocka_unit_test(mirror),   cmocka_unit_test(passes),
+                                       cmocka_unit_test(own_pass), cmocka_unit_test(replaced)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

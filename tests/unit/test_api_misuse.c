@@ -611,6 +611,8 @@ static void worlds(void **state) {
     REFUSE_WORLD(ARGUMENT, desc.ao_factor = NAN);
     REFUSE_WORLD(ARGUMENT, desc.ao_factor = -1.0f);
     REFUSE_WORLD(ARGUMENT, desc.ao_factor = 1.0f; desc.ao_distance = 0.0f);
+    REFUSE_WORLD(ARGUMENT, desc.ao_distance = NAN);
+    REFUSE_WORLD(LARGE, desc.light_group = TRC_MAX_LIGHT_GROUPS + 1);
     REFUSE_WORLD(ARGUMENT, desc.ao_factor = 1.0f; desc.ao_distance = NAN);
 }
 

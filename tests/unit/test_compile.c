@@ -443,6 +443,51 @@ static void test_shared_shaders_do_not_multiply(void **state) {
     trc_material_release(m);
 }
 
+/* ---- AOVs ---- */
+
+/* Outputs of their own: constants cost no program, others share it with the surface. */
+static void test_aovs(void **state) {
+    (void)state;
+    graph_clear();
+    const int32_t info = add(TRC_NODE_OBJECT_INFO, 0, 0, NULL);
+    const int32_t half = ADD(TRC_NODE_MATH, TRC_MATH_MULTIPLY, value(2.0f), value(0.25f), value(0));
+    ADD(TRC_NODE_AOV_VALUE, 3, link_to(half, 0));
+    ADD(TRC_NODE_AOV_COLOR, 5, color(1, 2, 3));
+    struct trc_material *m = compiled();
+    assert_int_equal(m->aov_count, 2);
+    assert_int_equal(m->instruction_count, 0);
+    assert_int_equal(m->leaf_count, 0);
+    assert_int_equal(m->aovs[0].pass, TRC_PASS_AOV_VALUE(3));
+    assert_int_equal(m->aovs[1].pass, TRC_PASS_AOV_COLOR(5));
+    const struct trc_operand *o = m->operands;
+    assert_true(o[m->aovs[0].first_operand].value == 0.5f);
+    for (uint32_t k = 0; k < 3; k++)
+        assert_true(o[m->aovs[1].first_operand + k].value == (float)(k + 1));
+    trc_material_release(m);
+
+    add_diffuse(link_to(info, 1));
+    ADD(TRC_NODE_AOV_COLOR, 0, link_to(info, 1));
+    m = compiled();
+    assert_int_equal(m->aov_count, 3);
+    assert_int_equal(m->instruction_count, 1);
+    for (uint32_t k = 0; k < 3; k++) {
+        const int32_t reg = m->operands[m->aovs[2].first_operand + k].reg;
+        assert_true(reg >= 0 && reg == m->operands[m->leaves[0].first_operand + k].reg);
+    }
+    trc_material_release(m);
+
+    for (uint32_t i = 0; i < TRC_MAX_AOV_OUTPUTS; i++)
+        ADD(TRC_NODE_AOV_VALUE, i % TRC_MAX_AOVS, value(0));
+    refused(TRC_ERROR_TOO_LARGE, "32", "AOV");
+    graph_clear();
+    ADD(TRC_NODE_AOV_VALUE, TRC_MAX_AOVS, value(0));
+    refused(TRC_ERROR_INVALID_ARGUMENT, "AOV Value", "mode");
+    graph_clear();
+    const int32_t aov = ADD(TRC_NODE_AOV_VALUE, 0, value(0));
+    add_diffuse(link_to(aov, 0));
+    refused(TRC_ERROR_INVALID_ARGUMENT, "color", "output");
+}
+
 /* ---- what is refused ---- */
 
 static void test_refused_inputs(void **state) {
@@ -614,6 +659,7 @@ int main(void) {
         cmocka_unit_test(test_too_many_registers),
         cmocka_unit_test(test_too_many_leaves),
         cmocka_unit_test(test_shared_shaders_do_not_multiply),
+        cmocka_unit_test(test_aovs),
         cmocka_unit_test(test_refused_inputs),
         cmocka_unit_test(test_refused_nodes),
         cmocka_unit_test(test_refused_tables),

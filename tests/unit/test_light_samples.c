@@ -38,7 +38,29 @@ static void any_number(void **state) {
     assert_int_equal(trc_scene_destroy(scene), TRC_OK);
 }
 
+/* Passes only look: the picture with all of them has the same bits. */
+static void passes_change_nothing(void **state) {
+    (void)state;
+    static float without[4 * FRAME], with[4 * FRAME];
+    const trc_scene scene = fixture_scene();
+    draw(scene, 8, 4, without);
+    trc_render_desc desc = fixture_render_desc(WIDTH, HEIGHT, 8);
+    desc.light_samples = 4;
+    desc.passes = (UINT64_C(1) << TRC_PASS_COUNT) - 1;
+    desc.cryptomattes = 1;
+    desc.cryptomatte_depth = 2;
+    desc.aov_value_count = desc.light_group_count = 1;
+    trc_render render = 0;
+    assert_int_equal(trc_render_start(scene, &desc, &render), TRC_OK);
+    assert_int_equal(trc_render_wait(render, -1.0), TRC_OK);
+    assert_int_equal(trc_render_read(render, TRC_PASS_COMBINED, with, 4 * FRAME), TRC_OK);
+    assert_int_equal(trc_render_destroy(render), TRC_OK);
+    assert_memory_equal(with, without, sizeof with);
+    assert_int_equal(trc_scene_destroy(scene), TRC_OK);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(any_number)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(any_number),
+                                       cmocka_unit_test(passes_change_nothing)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -29,6 +29,12 @@ static void render_frames(void **state) {
     REFUSE_RENDER(ARGUMENT, desc.crop_x = 60; desc.crop_width = 5; desc.crop_height = 5);
     REFUSE_RENDER(ARGUMENT, desc.crop_y = UINT32_MAX; desc.crop_width = 5; desc.crop_height = 5);
     REFUSE_RENDER(ARGUMENT, desc.passes = UINT64_C(1) << TRC_PASS_COUNT);
+    REFUSE_RENDER(ARGUMENT, desc.cryptomattes = 1u << TRC_CRYPTOMATTE_KINDS);
+    REFUSE_RENDER(ARGUMENT, desc.cryptomattes = 1);
+    REFUSE_RENDER(LARGE, desc.aov_value_count = TRC_MAX_AOVS + 1);
+    REFUSE_RENDER(LARGE, desc.light_group_count = TRC_MAX_LIGHT_GROUPS + 1);
+    REFUSE_RENDER(LARGE, desc.aov_color_count = TRC_MAX_AOVS + 1);
+    REFUSE_RENDER(LARGE, desc.cryptomattes = 1; desc.cryptomatte_depth = 17);
     REFUSE_RENDER(ARGUMENT, desc.passes = 1u << TRC_PASS_MIST; desc.mist_start = -1.0f);
     REFUSE_RENDER(ARGUMENT, desc.passes = 1u << TRC_PASS_MIST; desc.mist_depth = NAN);
     REFUSE_RENDER(ARGUMENT, desc.passes = 1u << TRC_PASS_MIST; desc.mist_falloff = 0.0f);

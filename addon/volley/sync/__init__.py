@@ -6,7 +6,7 @@ Blender is kept from one sync to the next but names and numbers.
 """
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import bpy
 
@@ -28,13 +28,16 @@ class Cancelled(Exception):
 @dataclass
 class Source:
     """Where a sync reads from. engine: moves the scene in time for motion blur, else None; v3d: the
-    viewport whose visibility counts, None for a render; is_cancelled: asked now and then."""
+    viewport whose visibility counts, None for a render; aovs: {name: (type, number)} and light_groups:
+    {name: number} of those that are rendered; is_cancelled: asked now and then."""
 
     depsgraph: object
     changes: Changes
     engine: object = None
     v3d: object = None
     needs_uv: bool = False
+    aovs: dict = field(default_factory=dict)
+    light_groups: dict = field(default_factory=dict)
     is_cancelled: object = staticmethod(lambda: False)
 
 
@@ -63,7 +66,7 @@ class SceneSync:
         if shutter is None and self._update_part(source):
             return
         self._images.begin(source.changes)
-        self._materials.begin(source.changes)
+        self._materials.begin(source.changes, source.aovs)
         self._meshes.begin()
         self._sync_materials(source)
         walk = _Walk(self, source, shutter)
@@ -110,8 +113,8 @@ class SceneSync:
         """Bring one object up to date; False where its mesh must be read in a walk."""
         name, view_layer = each.object.name_full, source.depsgraph.view_layer_eval
         if instance.is_light(each):
-            item = instance.describe(each, view_layer)
-            fields = light.describe(each.object, item.transforms[0], item.visibility, self.warnings)
+            item = instance.describe(each, view_layer, source.light_groups)
+            fields = light.describe(each.object, item, self.warnings)
             return fields is not None and self._lights.change(item.key, fields)
         known = shown.items[instance.key_of(each)]
         if name in source.changes.geometry:
@@ -120,7 +123,7 @@ class SceneSync:
             if shown.users[known.mesh_key] != 1 or not is_pose or not self._meshes.pose(
                     known.mesh_key, data.as_pointer(), data):
                 return False
-        item = instance.describe(each, view_layer)
+        item = instance.describe(each, view_layer, source.light_groups)
         item.mesh_key = known.mesh_key
         item.materials = _material_ids(self._materials, each, view_layer)
         self._instances.change(item, self._meshes.id_of(item.mesh_key))
@@ -137,10 +140,15 @@ class SceneSync:
         scene = source.depsgraph.scene_eval
         shown = scene.world if source.depsgraph.view_layer_eval.use_sky else None
         material_id = self._materials.world_id(shown) if shown else 0
-        fields = world.describe(shown, material_id, scene.volley)
+        fields = world.describe(shown, material_id, scene.volley, source.light_groups)
         if fields != self._world:
             self.scene.set_world(**fields)
         self._world = fields
+
+    def cryptomatte_names(self):
+        """The names of objects, materials and assets in mattes: by TRC_CRYPTOMATTE."""
+        objects, assets = self._instances.names()
+        return objects, self._materials.names(), assets
 
     def set_camera(self, keys, shutter=None):
         """Send the camera; keys as camera.CameraKeys."""
@@ -249,15 +257,21 @@ class _Walk:
             if instance.is_shown(each, self._source.v3d):
                 yield each
 
+    def _describe(self, each):
+        return instance.describe(each, self._view_layer, self._source.light_groups)
+
     def _add_light(self, each):
-        item = instance.describe(each, self._view_layer)
-        fields = light.describe(each.object, item.transforms[0], item.visibility, self._sync.warnings)
+        item = self._describe(each)
+        fields = light.describe(each.object, item, self._sync.warnings)
         if fields is not None:
             self.lights[item.key] = fields
 
     def _add_mesh_instance(self, each):
         blender_object = each.object
-        item = instance.describe(each, self._view_layer)
+        if blender_object.is_shadow_catcher:
+            self._sync.warnings.add(f"Object '{blender_object.name}': shadow catchers are not "
+                                    "supported, it is shown as any other object")
+        item = self._describe(each)
         item.materials = _material_ids(self._sync._materials, each, self._view_layer)
         if self._shutter is not None:
             parent = each.parent if each.is_instance else None

@@ -9,6 +9,7 @@ Fallbacks: a node that is not supported leaves the input it feeds at that socket
 that is not supported becomes a diffuse of its colour. Each is named once in the warnings.
 """
 
+from ..compat import aov_name
 from . import nodes
 from .values import CONSTANT, DEFAULT, NO_SHADER, Value
 
@@ -47,11 +48,11 @@ class FlatTree:
         return self.surface, tuple(node.signature() for node in self.nodes)
 
 
-def flatten(tree, label, warnings, image_of=None):
+def flatten(tree, label, warnings, image_of=None, aovs=None):
     """The surface of a material or world tree as a FlatTree.
 
     label names the owner in messages; image_of(node) gives the library's id of an image node's image,
-    0 for a missing one."""
+    0 for a missing one; aovs: {name: (type, number)} of those that are asked for."""
     walker = Walker(label, warnings, image_of)
     output = tree.get_output_node('CYCLES')
     if output is None:
@@ -62,6 +63,8 @@ def flatten(tree, label, warnings, image_of=None):
             warnings.add(f"{label}: {name.lower()} is not supported and is left out")
     try:
         value = walker.input_value(sockets["Surface"], ())
+        if aovs:
+            walker.emit_aovs(tree, aovs, ())
     except RecursionError:
         warnings.add(f"{label}: the node tree is too deep and is left out")
         return FlatTree()
@@ -122,6 +125,19 @@ class Walker:
         inputs = [(value.node, value.output, value.constant) for value in values]
         self.flat.nodes.append(FlatNode(node_type, inputs, mode, image, name, table))
         return len(self.flat.nodes) - 1
+
+    def emit_aovs(self, tree, aovs, path):
+        """Append the AOV outputs of a tree and of the groups in it, wherever they stand."""
+        for node in tree.nodes:
+            if node.mute:
+                continue
+            if node.type == 'GROUP' and node.node_tree is not None and len(path) < _MAX_DEPTH:
+                self.emit_aovs(node.node_tree, aovs, path + (node,))
+            elif node.type == 'OUTPUT_AOV' and aov_name(node) in aovs:
+                aov_type, number = aovs[aov_name(node)]
+                socket = node.inputs["Value" if aov_type == 'VALUE' else "Color"]
+                node_type = nodes.AOV_VALUE if aov_type == 'VALUE' else nodes.AOV_COLOR
+                self.emit(node_type, (self.input_value(socket, path),), mode=number)
 
     # Inputs
 

@@ -22,6 +22,8 @@ class Item:
 
     key: tuple                 # stable from sync to sync, see key_of
     owner: str                 # name of the object it is of, as Blender's updates name it
+    name: str                  # in mattes, of the object and
+    asset: str                 # of its uppermost parent
     transforms: list           # 12 floats for each motion key
     mesh_key: tuple = None     # the key of the item that owns the mesh
     materials: tuple = ()
@@ -29,6 +31,7 @@ class Item:
     pass_index: int = 0
     random: float = 0.0
     color: tuple = (1.0, 1.0, 1.0, 1.0)
+    light_group: int = 0       # from 1 on, 0 for none
     light: dict = None         # fields of a light instead of a mesh
     motion_keys: int = 1       # how many the object asks for
     deforms: bool = False      # whether the mesh may change its shape in time
@@ -109,15 +112,23 @@ def _hash_pair(x, y):
     return ((c ^ b) - rotate(b, 24)) & mask
 
 
-def describe(instance, view_layer):
-    """The parts of an item that meshes and lights share."""
+def _uppermost(blender_object):
+    while blender_object.parent is not None:
+        blender_object = blender_object.parent
+    return blender_object
+
+
+def describe(instance, view_layer, light_groups):
+    """The parts of an item that meshes and lights share; light_groups: {name: number}."""
     blender_object = instance.object
     return Item(
         key=key_of(instance), owner=blender_object.name_full,
+        name=blender_object.name, asset=_uppermost(blender_object).name,
         transforms=[rows12(instance.matrix_world)],
         visibility=visibility.instance_visibility(instance, view_layer),
         pass_index=blender_object.pass_index, random=random_of(instance),
-        color=tuple(blender_object.color))
+        color=tuple(blender_object.color),
+        light_group=light_groups.get(blender_object.lightgroup, 0))
 
 
 def has_mesh(instance):
@@ -137,6 +148,8 @@ class InstanceEntry:
     id: int
     mesh_id: int
     signature: tuple
+    name: str
+    asset: str
 
 
 @dataclass
@@ -174,22 +187,29 @@ class Instances:
                 raise
             self.warnings.add(f"Object '{item.owner}': {error}; it stays as it was")
 
+    def names(self):
+        """The names in mattes, of objects and of assets: two sets."""
+        entries = self._entries.values()
+        return {entry.name for entry in entries}, {entry.asset for entry in entries}
+
     def _update_one(self, item, mesh_id):
         transforms = motion.follow_turns(collapse(item.transforms))
         signature = (mesh_id, transforms.tobytes(), item.materials, item.visibility, item.pass_index,
-                     item.random, item.color)
+                     item.random, item.color, item.name, item.asset, item.light_group)
         entry = self._entries.get(item.key)
         if entry is not None and entry.signature == signature:
             return
         values = {"mesh": mesh_id, "transforms": transforms, "materials": item.materials,
                   "visibility": item.visibility, "pass_index": item.pass_index,
-                  "random": item.random, "color": item.color}
+                  "random": item.random, "color": item.color, "light_group": item.light_group,
+                  "cryptomatte_object": native.cryptomatte_id(item.name),
+                  "cryptomatte_asset": native.cryptomatte_id(item.asset)}
         if entry is None:
-            self._entries[item.key] = InstanceEntry(self.scene.create_instance(**values), mesh_id,
-                                                    signature)
+            instance_id = self.scene.create_instance(**values)
         else:
-            self.scene.update_instance(entry.id, **values)
-            entry.mesh_id, entry.signature = mesh_id, signature
+            instance_id = entry.id
+            self.scene.update_instance(instance_id, **values)
+        self._entries[item.key] = InstanceEntry(instance_id, mesh_id, signature, item.name, item.asset)
 
 
 def collapse(arrays):

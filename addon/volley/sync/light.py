@@ -13,8 +13,9 @@ from . import flatten
 from .visibility import light_visibility
 
 
-def describe(light_object, transform, visibility_mask, warnings):
-    """The fields of trc_light_desc for an evaluated light object, or None for one that is skipped."""
+def describe(light_object, item, warnings):
+    """The fields of trc_light_desc for an evaluated light object, described as an item too, or None for
+    one that is skipped."""
     light = light_object.data
     if light.type not in native.LIGHT_TYPES:
         warnings.add(f"Light '{light.name}': type {light.type} is not supported, it is left out")
@@ -25,12 +26,13 @@ def describe(light_object, transform, visibility_mask, warnings):
     factor = _node_color(light, warnings)
     fields = {
         "type": native.LIGHT_TYPES[light.type],
-        "transform": tuple(transform),
+        "transform": tuple(item.transforms[0]),
         "color": tuple(c * f for c, f in zip(_color(light), factor)),
         "strength": light.energy * 2.0 ** getattr(light, "exposure", 0.0) *
         (AREA_LIGHT_POWER if light.type == 'AREA' else 1.0),
         "spread": math.pi, "spot_angle": math.pi,
-        "visibility": light_visibility(light_object) & visibility_mask,
+        "visibility": light_visibility(light_object) & item.visibility,
+        "light_group": item.light_group,
         "cast_shadow": int(casts_shadow(light)),
         "use_mis": int(cycles(light, "use_multiple_importance_sampling", True)),
     }

@@ -10,6 +10,7 @@ from .changes import Changes
 from .values import CONSTANT, DEFAULT, Value
 
 _HOLDOUT_KEY = ("holdout",)
+_DEFAULT_NAME = "default_surface"  # of the library's default material in mattes
 
 
 class Materials:
@@ -20,12 +21,14 @@ class Materials:
         self._entries = {}  # key -> Entry
         self._seen = set()
         self._changes = Changes.everything()
+        self._aovs = {}
 
-    def begin(self, changes):
+    def begin(self, changes, aovs):
         """Start a sync: nothing has been asked for yet. Materials that changes does not name are taken
-        as they are."""
+        as they are. aovs: {name: (type, number)}."""
         self._seen = set()
-        self._changes = changes
+        self._changes = changes if aovs == self._aovs else Changes.everything()
+        self._aovs = aovs
 
     def id_of(self, material):
         """The library's id of an evaluated material, 0 (the default) for None."""
@@ -37,7 +40,8 @@ class Materials:
         if key not in self._seen and not self._keep(key):
             label = f"Material '{material.name}'"
             flat = self.flatten(material, label)
-            self._update(key, flat, material.pass_index, _flags(material))
+            self._update(key, flat, material.name, pass_index=material.pass_index,
+                         flags=_flags(material))
         return self._entries[key]
 
     def knows(self, name):
@@ -76,7 +80,7 @@ class Materials:
             flat = flatten.FlatTree()
             flat.nodes.append(flatten.FlatNode(nodes.HOLDOUT, []))
             flat.surface = 0
-            self._update(_HOLDOUT_KEY, flat, 0, 0)
+            self._update(_HOLDOUT_KEY, flat)
         return self._entries[_HOLDOUT_KEY].id
 
     def world_id(self, world):
@@ -84,10 +88,10 @@ class Materials:
         key = ("world", world.name_full)
         label = f"World '{world.name}'"
         if uses_nodes(world):
-            flat = flatten.flatten(world.node_tree, label, self._warnings, self._images.id_of)
+            flat = self._flatten(world.node_tree, label)
         else:
             flat = _background(world.color)
-        self._update(key, flat, 0, 0)
+        self._update(key, flat)
         return self._entries[key].id
 
     def attribute_names(self):
@@ -110,29 +114,37 @@ class Materials:
     def flatten(self, material, label):
         """A material's surface as a flat tree."""
         if uses_nodes(material):
-            return flatten.flatten(material.node_tree, label, self._warnings, self._images.id_of)
+            return self._flatten(material.node_tree, label)
         return _plain_surface(material)
 
-    def _update(self, key, flat, pass_index, flags):
+    def _flatten(self, tree, label):
+        return flatten.flatten(tree, label, self._warnings, self._images.id_of, self._aovs)
+
+    def names(self):
+        """The names in mattes."""
+        return {entry.name for entry in self._entries.values() if entry.name} | {_DEFAULT_NAME}
+
+    def _update(self, key, flat, name="", **values):
         self._seen.add(key)
-        signature = (flat.signature(), pass_index, flags)
+        signature = (flat.signature(), name, tuple(values.items()))
         entry = self._entries.get(key)
         if entry is None:
             entry = self._entries[key] = Entry()
         if entry.signature != signature:
-            self._send(entry, key, (flat.nodes, flat.surface, pass_index, flags))
-        entry.signature = signature
+            values["cryptomatte"] = native.cryptomatte_id(name) if name else 0.0
+            self._send(entry, key, flat, values)
+        entry.signature, entry.name = signature, name
         entry.uv_names, entry.color_names = flat.uv_names, flat.color_names
         entry.needs_generated = flat.needs_generated
         entry.images, entry.is_animated = self._images.take_asked()
 
-    def _send(self, entry, key, arguments):
+    def _send(self, entry, key, flat, values):
         """Create or change it in the library; a refused one becomes the default material."""
         try:
             if entry.id:
-                self._scene.update_material(entry.id, *arguments)
+                self._scene.update_material(entry.id, flat.nodes, flat.surface, **values)
             else:
-                entry.id = self._scene.create_material(*arguments)
+                entry.id = self._scene.create_material(flat.nodes, flat.surface, **values)
         except native.TracerError as error:
             if error.status not in (native.ERROR_INVALID_ARGUMENT, native.ERROR_TOO_LARGE):
                 raise
@@ -149,6 +161,7 @@ class Entry:
     def __init__(self):
         self.id = 0
         self.signature = None
+        self.name = ""  # in mattes
         self.uv_names, self.color_names = set(), set()
         self.needs_generated = False
         self.images, self.is_animated = set(), False  # those it reads; whether time changes them

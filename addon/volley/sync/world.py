@@ -6,19 +6,22 @@ from ..compat import cycles
 from .visibility import world_visibility
 
 
+DEFAULT_AO_DISTANCE = 10.0  # m; Blender's of a new world
 LEAST_AO_DISTANCE = 1e-6  # m; Blender's slider goes down to 0
 MIST_EXPONENTS = {'QUADRATIC': 2.0, 'LINEAR': 1.0, 'INVERSE_QUADRATIC': 0.5}
 
 
-def describe(world, material_id, settings):
-    """The fields of trc_world_desc; settings: ``scene.volley``. Without a world all is black."""
+def describe(world, material_id, settings, light_groups):
+    """The fields of trc_world_desc; settings: ``scene.volley``; light_groups: {name: number}. Without a
+    world all is black."""
     fields = {"material": material_id, "visibility": native.VISIBLE_ALL, "use_sampling": 0,
-              "map_resolution": 0, "ao_factor": 0.0}
+              "map_resolution": 0, "ao_factor": 0.0, "ao_distance": DEFAULT_AO_DISTANCE}
     if world is None:
         return fields
+    fields["ao_distance"] = max(world.light_settings.distance, LEAST_AO_DISTANCE)
+    fields["light_group"] = light_groups.get(world.lightgroup, 0)
     if settings.use_ambient_occlusion:
         fields["ao_factor"] = world.light_settings.ao_factor
-        fields["ao_distance"] = max(world.light_settings.distance, LEAST_AO_DISTANCE)
         fields["ao_method"] = native.AO_METHODS[settings.ao_method]
     method = cycles(world, "sampling_method", 'AUTOMATIC')
     fields["visibility"] = world_visibility(world)

@@ -93,6 +93,10 @@ TRC_API trc_status trc_set_isa(uint32_t isa);
 /* "avx512" etc.; "unknown" for a value that is not an ISA. */
 TRC_API const char *trc_isa_name(uint32_t isa);
 
+/* Lights, instances that emit and the world can each be in one of so many light groups, from 1 on;
+ * 0 is none. */
+#define TRC_MAX_LIGHT_GROUPS 32
+
 TRC_END_DECLS
 
 #endif

@@ -82,6 +82,10 @@ typedef struct trc_instance_desc {
     int32_t pass_index;      /* Object Index pass */
     float random;            /* Object Info's Random, [0, 1) */
     float color[4];          /* Object Info's Color and Alpha */
+    float cryptomatte_object, cryptomatte_asset; /* trc_cryptomatte_id of its name and of its
+                                                    asset's name; 0: in no matte */
+    uint32_t light_group;                        /* of its emission, 0..TRC_MAX_LIGHT_GROUPS */
+    uint32_t reserved;
 } trc_instance_desc;
 
 TRC_API trc_status trc_instance_create(trc_scene scene, const trc_instance_desc *desc,

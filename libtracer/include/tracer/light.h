@@ -33,7 +33,7 @@ typedef struct trc_light_desc {
     uint32_t visibility;  /* TRC_VISIBLE_*; SHADOW has no meaning for a light */
     uint32_t cast_shadow; /* 0: shines through everything */
     uint32_t use_mis;     /* reflected and refracted rays see it ("multiple importance") */
-    uint32_t light_group; /* reserved, 0 */
+    uint32_t light_group; /* 0..TRC_MAX_LIGHT_GROUPS */
     uint32_t flags;       /* TRC_LIGHT_SPHERE, TRC_LIGHT_EVEN_CONE */
 } trc_light_desc;
 
@@ -60,10 +60,10 @@ typedef struct trc_world_desc {
     trc_id material;         /* a material whose surface is BACKGROUND (or a mix); 0: black */
     uint32_t visibility;     /* TRC_VISIBLE_* */
     uint32_t map_resolution; /* width of the importance map, 0: chosen from the image */
-    float ao_distance;       /* ambient occlusion: metres, > 0 */
+    float ao_distance;       /* ambient occlusion: metres, > 0; 0 if it is off */
     float ao_factor;         /* 0: off */
     uint32_t ao_method;      /* TRC_AO_* */
-    uint32_t reserved;
+    uint32_t light_group;    /* 0..TRC_MAX_LIGHT_GROUPS */
 } trc_world_desc;
 
 TRC_API trc_status trc_scene_set_world(trc_scene scene, const trc_world_desc *desc);

@@ -126,7 +126,11 @@ enum {
     TRC_NODE_VECTOR_ROTATE = 109, /* c vector, c center, c axis, f angle, c rotation -> c; mode:
                                      TRC_ROTATE_* | 8 to turn the other way */
     TRC_NODE_CAMERA_DATA = 110,   /* -> c view_vector, f view_z_depth, f view_distance */
-    TRC_NODE_WIREFRAME = 111      /* f size (m, world) -> f */
+    TRC_NODE_WIREFRAME = 111,     /* f size (m, world) -> f */
+
+    /* outputs besides the surface: no node has to lead to them; mode: number of the AOV */
+    TRC_NODE_AOV_VALUE = 112, /* f value */
+    TRC_NODE_AOV_COLOR = 113  /* c color */
 };
 
 enum { TRC_SPACE_WORLD = 0, TRC_SPACE_OBJECT, TRC_SPACE_CAMERA };
@@ -327,6 +331,8 @@ typedef struct trc_material_desc {
     int32_t surface;    /* index of the shader node that is the output; -1: black */
     int32_t pass_index; /* Material Index pass */
     uint32_t flags;     /* TRC_MATERIAL_* */
+    float cryptomatte;  /* trc_cryptomatte_id of its name; 0: in no matte */
+    uint32_t reserved;
 } trc_material_desc;
 
 enum {

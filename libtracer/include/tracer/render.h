@@ -62,8 +62,42 @@ enum {
                              start to its middle, negated, and from there to its end, negated; right
                              and up are positive. Mean of the samples that hit something. What has
                              keys moves even where shutter_time is 0 and nothing is blurred */
-    TRC_PASS_COUNT = 24
+    TRC_PASS_AMBIENT_OCCLUSION =
+        24,               /* 3: the part of the directions above a surface, by the cosine,
+                             in which nothing is within ao_distance of the world, which
+                             applies with an ao_factor of 0, too; by what is seen of it */
+    TRC_PASS_SHADOW = 25, /* 3: Cycles' Shadow up to 3.4: the part of all lamps, each of equal
+                             weight, that a surface sees of those that light it */
+    TRC_PASS_COUNT = 26
 };
+
+/* What the AOV nodes of materials and the world write, by the numbers of their modes: 1 channel,
+ * and 4 of which the last is 1. Of each sample the values at the first surface that is not mostly
+ * seen through, and as in Cycles at those before it, added up; those behind something transparent
+ * by what it lets through. */
+#define TRC_MAX_AOVS 16 /* of each of the two */
+#define TRC_PASS_AOV_VALUE(number) (64u + (number))
+#define TRC_PASS_AOV_COLOR(number) (80u + (number))
+
+/* Light of one light group each: 3 channels. What is in no group is only in Combined. */
+#define TRC_PASS_LIGHT_GROUP(number) (96u + (number)) /* of group number + 1 */
+
+/* Cryptomatte: which objects, materials or assets (an object's uppermost parent) cover a pixel, and
+ * how much of it (J. Friedman, A. Jones, "Fully Automatic ID Mattes with Support for Motion Blur
+ * and Transparency", SIGGRAPH 2015 posters; Psyop's specification 1.2.0). Ranks are pairs of an id
+ * and its coverage, largest first, two of them in the 4 channels of a layer. What is partly
+ * transparent shares the coverage with what is behind it. */
+enum { TRC_CRYPTOMATTE_OBJECT = 0, TRC_CRYPTOMATTE_MATERIAL, TRC_CRYPTOMATTE_ASSET };
+#define TRC_CRYPTOMATTE_KINDS 3
+#define TRC_MAX_CRYPTOMATTE_DEPTH 16 /* ranks */
+
+/* The number of a Cryptomatte layer for trc_render_read. */
+#define TRC_PASS_CRYPTOMATTE(kind, layer) (128u + 8u * (kind) + (layer))
+
+/* The id of a name: its bytes' MurmurHash3_x86_32 with seed 0 (A. Appleby, public domain) as the
+ * bits of a float, the exponent kept off the ends so that it is finite and normal. name: UTF-8,
+ * NULL gives 0, which stands for no id. */
+TRC_API float trc_cryptomatte_id(const char *name);
 
 typedef struct trc_render_desc {
     uint32_t struct_size;
@@ -104,8 +138,12 @@ typedef struct trc_render_desc {
     /* Of TRC_PASS_MIST, else not read: ((distance - mist_start) / mist_depth)^mist_falloff, the
      * quotient cut to [0, 1]; distance from the camera (orthographic: along its axis). */
     float mist_start, mist_depth; /* metres, >= 0; a mist_depth of 0 is no mist */
-    float mist_falloff; /* > 0; Blender's Quadratic is 2, Linear 1, Inverse Quadratic 0.5 */
-    uint32_t reserved;
+    float mist_falloff;         /* > 0; Blender's Quadratic is 2, Linear 1, Inverse Quadratic 0.5 */
+    uint32_t cryptomattes;      /* bit per TRC_CRYPTOMATTE_* */
+    uint32_t cryptomatte_depth; /* ranks, 1..TRC_MAX_CRYPTOMATTE_DEPTH, rounded up to an even
+                                   number; not read without cryptomattes */
+    uint32_t aov_value_count, aov_color_count; /* passes of each, 0..TRC_MAX_AOVS */
+    uint32_t light_group_count;                /* passes, 0..TRC_MAX_LIGHT_GROUPS */
 } trc_render_desc;
 
 /* Starts rendering the scene's current snapshot in threads of the library. Memory is checked and

@@ -124,7 +124,10 @@ static trc_status check_instance(const trc_instance_desc *desc) {
     }
     TRC_TRY(trc_check_enum(desc->visibility, TRC_VISIBLE_ALL + 1, "visibility"));
     TRC_TRY(trc_check_finite(&desc->random, 1, "random"));
-    return trc_check_finite(desc->color, 4, "color");
+    TRC_TRY(trc_check_finite(desc->color, 4, "color"));
+    TRC_TRY(trc_check_finite(&desc->cryptomatte_object, 1, "cryptomatte_object"));
+    TRC_TRY(trc_check_count(desc->light_group, 0, TRC_MAX_LIGHT_GROUPS, "light_group"));
+    return trc_check_finite(&desc->cryptomatte_asset, 1, "cryptomatte_asset");
 }
 
 trc_status trc_instance_create(trc_scene scene, const trc_instance_desc *desc,

@@ -33,6 +33,7 @@ static trc_status check_light(const trc_light_desc *desc) {
     TRC_TRY(trc_check_enum(desc->visibility, TRC_VISIBLE_ALL + 1, "visibility"));
     TRC_TRY(trc_check_enum(desc->cast_shadow, 2, "cast_shadow"));
     TRC_TRY(trc_check_enum(desc->use_mis, 2, "use_mis"));
+    TRC_TRY(trc_check_count(desc->light_group, 0, TRC_MAX_LIGHT_GROUPS, "light_group"));
     return trc_check_enum(desc->flags, 2 * TRC_LIGHT_EVEN_CONE, "flags");
 }
 
@@ -72,11 +73,10 @@ static trc_status check_world(const trc_world_desc *desc) {
     TRC_TRY(trc_check_enum(desc->visibility, TRC_VISIBLE_ALL + 1, "visibility"));
     TRC_TRY(trc_check_count(desc->map_resolution, 0, MAX_MAP_RESOLUTION, "map_resolution"));
     TRC_TRY(trc_check_enum(desc->ao_method, TRC_AO_REPLACE + 1, "ao_method"));
+    TRC_TRY(trc_check_count(desc->light_group, 0, TRC_MAX_LIGHT_GROUPS, "light_group"));
     TRC_TRY(trc_check_float(desc->ao_factor, 0.0f, FLT_MAX, "ao_factor"));
-    /* Without ambient occlusion its distance has no meaning. */
-    if (desc->ao_factor == 0.0f)
-        return TRC_OK;
-    return trc_check_float(desc->ao_distance, FLT_MIN, FLT_MAX, "ao_distance");
+    return trc_check_float(desc->ao_distance, desc->ao_factor > 0.0f ? FLT_MIN : 0.0f, FLT_MAX,
+                           "ao_distance");
 }
 
 trc_status trc_scene_set_world(trc_scene scene, const trc_world_desc *desc) {

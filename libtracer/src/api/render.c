@@ -59,6 +59,12 @@ static trc_status check_sampling(const trc_render_desc *desc) {
     return trc_check_enum(desc->progressive, 2, "progressive");
 }
 
+static trc_status check_mist(const trc_render_desc *desc) {
+    TRC_TRY(trc_check_float(desc->mist_start, 0.0f, FLT_MAX, "mist_start"));
+    TRC_TRY(trc_check_float(desc->mist_depth, 0.0f, FLT_MAX, "mist_depth"));
+    return trc_check_float(desc->mist_falloff, FLT_MIN, FLT_MAX, "mist_falloff");
+}
+
 static trc_status check_film(const trc_render_desc *desc) {
     TRC_TRY(trc_check_enum(desc->filter, TRC_FILTER_BLACKMAN_HARRIS + 1, "filter"));
     TRC_TRY(trc_check_float(desc->filter_width, FLT_MIN, MAX_FILTER_WIDTH, "filter_width"));
@@ -67,11 +73,15 @@ static trc_status check_film(const trc_render_desc *desc) {
     if (desc->passes >> TRC_PASS_COUNT) {
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "passes has bits of no pass");
     }
-    if (!(desc->passes >> TRC_PASS_MIST & 1))
-        return TRC_OK;
-    TRC_TRY(trc_check_float(desc->mist_start, 0.0f, FLT_MAX, "mist_start"));
-    TRC_TRY(trc_check_float(desc->mist_depth, 0.0f, FLT_MAX, "mist_depth"));
-    return trc_check_float(desc->mist_falloff, FLT_MIN, FLT_MAX, "mist_falloff");
+    TRC_TRY(trc_check_enum(desc->cryptomattes, 1u << TRC_CRYPTOMATTE_KINDS, "cryptomattes"));
+    if (desc->cryptomattes) {
+        TRC_TRY(trc_check_count(desc->cryptomatte_depth, 1, TRC_MAX_CRYPTOMATTE_DEPTH,
+                                "cryptomatte_depth"));
+    }
+    TRC_TRY(trc_check_count(desc->aov_value_count, 0, TRC_MAX_AOVS, "aov_value_count"));
+    TRC_TRY(trc_check_count(desc->aov_color_count, 0, TRC_MAX_AOVS, "aov_color_count"));
+    TRC_TRY(trc_check_count(desc->light_group_count, 0, TRC_MAX_LIGHT_GROUPS, "light_group_count"));
+    return desc->passes >> TRC_PASS_MIST & 1 ? check_mist(desc) : TRC_OK;
 }
 
 static trc_status check_render(const trc_render_desc *desc) {

@@ -10,6 +10,26 @@
 #include "core/checks.h"
 #include "core/core.h"
 
+/* Numbers of layers that TRC_PASS_CRYPTOMATTE keeps for each kind. */
+#define MAX_LAYERS (TRC_MAX_CRYPTOMATTE_DEPTH / TRC_LAYER_RANKS)
+
+/* Whether a pass is a layer of mattes. */
+static bool is_cryptomatte(uint32_t pass) {
+    return pass >= TRC_PASS_CRYPTOMATTE(0, 0) &&
+           pass < TRC_PASS_CRYPTOMATTE(TRC_CRYPTOMATTE_KINDS, 0);
+}
+
+static bool is_aov_value(uint32_t pass) {
+    return pass >= TRC_PASS_AOV_VALUE(0) && pass < TRC_PASS_AOV_VALUE(TRC_MAX_AOVS);
+}
+static bool is_aov_color(uint32_t pass) {
+    return pass >= TRC_PASS_AOV_COLOR(0) && pass < TRC_PASS_AOV_COLOR(TRC_MAX_AOVS);
+}
+
+static bool is_light_group(uint32_t pass) {
+    return pass >= TRC_PASS_LIGHT_GROUP(0) && pass < TRC_PASS_LIGHT_GROUP(TRC_MAX_LIGHT_GROUPS);
+}
+
 uint32_t trc_pass_channels(uint32_t pass) {
     static const uint8_t channels[TRC_PASS_COUNT] = {
         [TRC_PASS_COMBINED] = 4,
@@ -36,7 +56,17 @@ uint32_t trc_pass_channels(uint32_t pass) {
         [TRC_PASS_DENOISING_NORMAL] = 3,
         [TRC_PASS_DENOISING_DEPTH] = 1,
         [TRC_PASS_VECTOR] = 4,
+        [TRC_PASS_AMBIENT_OCCLUSION] = 3,
+        [TRC_PASS_SHADOW] = 3,
     };
+    if (is_cryptomatte(pass))
+        return TRC_MATTE_CHANNELS;
+    if (is_aov_value(pass))
+        return 1;
+    if (is_aov_color(pass))
+        return 4;
+    if (is_light_group(pass))
+        return 3;
     return pass < TRC_PASS_COUNT ? channels[pass] : 0;
 }
 
@@ -63,13 +93,18 @@ static bool is_light(uint32_t pass) {
     case TRC_PASS_TRANSMISSION_INDIRECT:
         return true;
     default:
-        return false;
+        return is_light_group(pass);
     }
 }
 
-/* The counts are a pass by themselves. */
-static bool has_sums(uint32_t pass, uint64_t passes) {
-    return pass != TRC_PASS_SAMPLE_COUNT && (passes >> pass & 1);
+bool trc_film_has_sums(const trc_render_desc *desc, uint32_t pass) {
+    if (is_aov_value(pass))
+        return pass - TRC_PASS_AOV_VALUE(0) < desc->aov_value_count;
+    if (is_aov_color(pass))
+        return pass - TRC_PASS_AOV_COLOR(0) < desc->aov_color_count;
+    if (is_light_group(pass))
+        return pass - TRC_PASS_LIGHT_GROUP(0) < desc->light_group_count;
+    return pass < TRC_PASS_COUNT && pass != TRC_PASS_SAMPLE_COUNT && (desc->passes >> pass & 1);
 }
 
 /* Memory of the machine, or as good as none of a limit if the system does not say. */
@@ -94,24 +129,42 @@ trc_status trc_film_check_budget(uint32_t width, uint32_t height, uint64_t pixel
     return TRC_OK;
 }
 
-trc_status trc_film_create(struct trc_film *film, uint32_t width, uint32_t height,
-                           uint64_t passes) {
-    passes |= UINT64_C(1) << TRC_PASS_COMBINED;
-    uint64_t pixel_bytes = sizeof *film->sample_counts;
-    for (uint32_t pass = 0; pass < TRC_PASS_COUNT; pass++) {
-        if (has_sums(pass, passes))
-            pixel_bytes += trc_film_channels(pass) * sizeof(double);
+/* Bytes of a pixel. */
+static uint64_t pixel_bytes(const trc_render_desc *desc, uint32_t matte_count) {
+    uint64_t bytes = sizeof(uint32_t); /* its sample count */
+    for (uint32_t pass = 0; pass < TRC_SUM_COUNT; pass++) {
+        if (trc_film_has_sums(desc, pass))
+            bytes += trc_film_channels(pass) * sizeof(double);
     }
-    TRC_TRY(trc_film_check_budget(width, height, pixel_bytes));
-    const size_t pixels = (size_t)width * height;
-    struct trc_film made = {.width = width, .height = height, .passes = passes};
+    return bytes + (uint64_t)__builtin_popcount(desc->cryptomattes) * matte_count *
+                       sizeof(struct trc_matte);
+}
+
+static uint32_t matte_count(const trc_render_desc *desc) {
+    const uint32_t layers = (desc->cryptomatte_depth + TRC_LAYER_RANKS - 1) / TRC_LAYER_RANKS;
+    return desc->cryptomattes ? layers * TRC_LAYER_RANKS + TRC_SPARE_MATTES : 0;
+}
+
+trc_status trc_film_create(const trc_render_desc *desc, struct trc_film *film) {
+    struct trc_film made = {.width = desc->crop_width,
+                            .height = desc->crop_height,
+                            .shows_counts = desc->passes >> TRC_PASS_SAMPLE_COUNT & 1,
+                            .matte_count = matte_count(desc)};
+    TRC_TRY(trc_film_check_budget(made.width, made.height, pixel_bytes(desc, made.matte_count)));
+    const size_t pixels = (size_t)made.width * made.height;
     made.sample_counts = trc_alloc_zeroed(pixels, sizeof *made.sample_counts);
     bool ok = made.sample_counts != NULL;
-    for (uint32_t pass = 0; ok && pass < TRC_PASS_COUNT; pass++) {
-        if (!has_sums(pass, passes))
+    for (uint32_t pass = 0; ok && pass < TRC_SUM_COUNT; pass++) {
+        if (!trc_film_has_sums(desc, pass))
             continue;
         made.sums[pass] = trc_alloc_zeroed(pixels, trc_film_channels(pass) * sizeof(double));
         ok = made.sums[pass] != NULL;
+    }
+    for (uint32_t kind = 0; ok && kind < TRC_CRYPTOMATTE_KINDS; kind++) {
+        if (!(desc->cryptomattes >> kind & 1))
+            continue;
+        made.mattes[kind] = trc_alloc_zeroed(pixels, made.matte_count * sizeof(struct trc_matte));
+        ok = made.mattes[kind] != NULL;
     }
     if (!ok) {
         trc_film_destroy(&made);
@@ -122,8 +175,10 @@ trc_status trc_film_create(struct trc_film *film, uint32_t width, uint32_t heigh
 }
 
 void trc_film_destroy(struct trc_film *film) {
-    for (uint32_t pass = 0; pass < TRC_PASS_COUNT; pass++)
+    for (uint32_t pass = 0; pass < TRC_SUM_COUNT; pass++)
         trc_free(film->sums[pass]);
+    for (uint32_t kind = 0; kind < TRC_CRYPTOMATTE_KINDS; kind++)
+        trc_free(film->mattes[kind]);
     trc_free(film->sample_counts);
     memset(film, 0, sizeof *film);
 }
@@ -155,17 +210,31 @@ uint32_t trc_film_color_pass(uint32_t pass) {
     return pass + 2 - (pass - TRC_PASS_DIFFUSE_DIRECT) % 3;
 }
 
-trc_status trc_film_read(const struct trc_film *film, uint32_t pass, float exposure, float *out,
-                         uint64_t float_count) {
-    const uint32_t channels = trc_pass_channels(pass);
-    if (!channels)
-        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "there is no pass %" PRIu32, pass);
-    if (!(film->passes >> pass & 1)) {
-        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "pass %" PRIu32 " was not asked for", pass);
-    }
+static bool has_pass(const struct trc_film *film, uint32_t pass) {
+    if (pass == TRC_PASS_SAMPLE_COUNT)
+        return film->shows_counts;
+    if (!is_cryptomatte(pass))
+        return film->sums[pass] != NULL;
+    const uint32_t number = pass - TRC_PASS_CRYPTOMATTE(0, 0), layer = number % MAX_LAYERS;
+    return film->mattes[number / MAX_LAYERS] &&
+           layer * TRC_LAYER_RANKS + TRC_SPARE_MATTES < film->matte_count;
+}
+
+static void read_mattes(const struct trc_film *film, uint32_t pass, float *out) {
+    const uint32_t number = pass - TRC_PASS_CRYPTOMATTE(0, 0);
+    const struct trc_matte *mattes = film->mattes[number / MAX_LAYERS];
     const uint64_t pixels = (uint64_t)film->width * film->height;
-    TRC_TRY(trc_check_array(out, float_count, pixels * channels, sizeof(float), sizeof(float),
-                            "pixels_out"));
+    for (uint64_t i = 0; i < pixels; i++) {
+        const uint32_t samples = __atomic_load_n(&film->sample_counts[i], __ATOMIC_RELAXED);
+        trc_mattes_read(mattes + i * film->matte_count, film->matte_count, number % MAX_LAYERS,
+                        samples, out + i * TRC_MATTE_CHANNELS);
+    }
+}
+
+/* Passes that are sums or values of samples. */
+static void read_sums(const struct trc_film *film, uint32_t pass, float exposure, float *out) {
+    const uint32_t channels = trc_pass_channels(pass);
+    const uint64_t pixels = (uint64_t)film->width * film->height;
     const double *sums = film->sums[pass], *divisor = divisor_of(film, pass);
     const double light = is_light(pass) ? exposure : 1.0;
     const bool first_sample = trc_film_is_first_sample(pass);
@@ -192,5 +261,21 @@ trc_status trc_film_read(const struct trc_film *film, uint32_t pass, float expos
             pixel[c] = count ? to_float(value * factor * (is_alpha ? 1.0 : light)) : 0.0f;
         }
     }
+}
+
+trc_status trc_film_read(const struct trc_film *film, uint32_t pass, float exposure, float *out,
+                         uint64_t float_count) {
+    const uint32_t channels = trc_pass_channels(pass);
+    if (!channels)
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "there is no pass %" PRIu32, pass);
+    if (!has_pass(film, pass)) {
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "pass %" PRIu32 " was not asked for", pass);
+    }
+    TRC_TRY(trc_check_array(out, float_count, (uint64_t)film->width * film->height * channels,
+                            sizeof(float), sizeof(float), "pixels_out"));
+    if (is_cryptomatte(pass))
+        read_mattes(film, pass, out);
+    else
+        read_sums(film, pass, exposure, out);
     return TRC_OK;
 }

@@ -9,19 +9,29 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "film/cryptomatte.h"
 #include "tracer/render.h"
 
+/* Passes that are sums have numbers below this. */
+#define TRC_SUM_COUNT TRC_PASS_LIGHT_GROUP(TRC_MAX_LIGHT_GROUPS)
+
 struct trc_film {
-    uint32_t width, height;       /* of the crop */
-    uint64_t passes;              /* bit per TRC_PASS_*, COMBINED included */
-    double *sums[TRC_PASS_COUNT]; /* trc_film_channels * width * height, or NULL; bottom row first.
-                                     "First sample" passes hold the value itself */
-    uint32_t *sample_counts;      /* width * height */
+    uint32_t width, height;      /* of the crop */
+    double *sums[TRC_SUM_COUNT]; /* by pass: trc_film_channels * width * height, or NULL; bottom row
+                                    first. "First sample" passes hold the value itself */
+    struct trc_matte *mattes[TRC_CRYPTOMATTE_KINDS]; /* matte_count * width * height, or NULL */
+    uint32_t matte_count;                            /* places of a pixel's table; 0: no mattes */
+    uint32_t *sample_counts;                         /* width * height */
+    bool shows_counts;                               /* they are a pass */
 };
 
 /* TRC_ERROR_TOO_LARGE unless so many bytes for every pixel fit into the machine's memory: a system
  * that overcommits would grant more than there is and kill the host later. pixel_bytes < 1 KiB. */
 trc_status trc_film_check_budget(uint32_t width, uint32_t height, uint64_t pixel_bytes);
+
+/* Whether the film has sums of a pass: it is asked for by the resolved desc, and by more than the
+ * counts of samples. */
+bool trc_film_has_sums(const trc_render_desc *desc, uint32_t pass);
 
 /* Sums of a pass for each pixel: its channels, and for the Vector pass the number of samples that
  * hit something, as it is their mean. */
@@ -31,8 +41,9 @@ uint32_t trc_film_channels(uint32_t pass);
 /* Whether a pass holds the value of a pixel's first sample, not a sum. */
 bool trc_film_is_first_sample(uint32_t pass);
 
-/* Takes the memory of the passes, zeroed. TRC_ERROR_TOO_LARGE or OUT_OF_MEMORY. */
-trc_status trc_film_create(struct trc_film *film, uint32_t width, uint32_t height, uint64_t passes);
+/* Takes the memory of the passes and mattes that desc asks for, zeroed; desc is resolved.
+ * TRC_ERROR_TOO_LARGE or OUT_OF_MEMORY. */
+trc_status trc_film_create(const trc_render_desc *desc, struct trc_film *film);
 void trc_film_destroy(struct trc_film *film);
 
 /* The colour pass that goes with a diffuse, glossy or transmission pass, TRC_PASS_COMBINED for

@@ -2,10 +2,11 @@
  *
  * Two kinds, as in Cycles: those of the first surface that is not mostly seen through (depth,
  * normal, indices ...), and those that add up over all surfaces on the straight way through
- * transparency, each by what it lets be seen of itself (colours, mist). */
+ * transparency, each by what it lets be seen of itself (colours, mist, mattes). */
 #include "kernels/mesh_fetch.h"
 #include "kernels/tile.h"
 #include "kernels/wide_math.h"
+#include "kernels/world.h"
 
 /* Cycles' default of the view layer's Alpha Threshold. */
 #define ALPHA_THRESHOLD 0.5f
@@ -173,6 +174,82 @@ static void add_mist(struct trc_tile *t, const struct trc_surface *s, vvec3 seen
     add_lanes(t, TRC_PASS_MIST, v3(clear, zero, zero), slots, active);
 }
 
+/* ---- mattes ---- */
+
+/* Whether a sample counts towards the film. With adaptive sampling some are taken for their error
+ * alone. */
+static bool is_counted(const struct trc_tile *t, size_t pixel) {
+    const struct trc_adaptive *a = t->job->adaptive;
+    return !a || (a->pixels[pixel].reasons & TRC_PIXEL_COUNTS);
+}
+
+/* What the surfaces cover goes to the film at once, as a sample may meet any number of them. Whole
+ * holdouts are in no matte, as in Cycles. */
+static void add_mattes(struct trc_tile *t, const struct trc_surface *s,
+                       const struct trc_material *m, const struct trc_lobes *lobes, vvec3 seen,
+                       const uint32_t *slots, vmask active) {
+    const struct trc_film *film = t->job->film;
+    float weight[TRC_WIDTH];
+    if (m->has & TRC_MATERIAL_HAS_HOLDOUT)
+        active = vm_and(active, vf_lt(lobes->holdout, vf_set(1.0f)));
+    vf_store(weight, v3_average(seen));
+    for (uint32_t bits = vm_bits(active); bits; bits &= bits - 1) {
+        const int i = __builtin_ctz(bits);
+        const struct trc_instance *instance = &t->snapshot->instances[vi_get(s->instance, i)];
+        const float ids[TRC_CRYPTOMATTE_KINDS] = {
+            [TRC_CRYPTOMATTE_OBJECT] = instance->cryptomatte_object,
+            [TRC_CRYPTOMATTE_MATERIAL] = m->cryptomatte,
+            [TRC_CRYPTOMATTE_ASSET] = instance->cryptomatte_asset,
+        };
+        const size_t pixel = trc_film_pixel(t, slots[i]);
+        if (!(weight[i] > 0.0f && weight[i] < INFINITY) || !is_counted(t, pixel))
+            continue;
+        for (int k = 0; k < TRC_CRYPTOMATTE_KINDS; k++)
+            if (film->mattes[k] && ids[k] != 0.0f)
+                trc_matte_add(film->mattes[k] + pixel * film->matte_count, film->matte_count,
+                              ids[k], weight[i]);
+    }
+}
+
+/* ---- AOVs ---- */
+
+/* Until the first surface that is not mostly seen through, that one too. */
+static vmask is_not_done(vuint path) {
+    return vi_eq((vint)path & vi_set(TRC_PATH_DATA_DONE), vi_set(0));
+}
+
+static void add_aovs(struct trc_tile *t, const struct trc_material *m,
+                     const struct trc_registers *regs, vfloat weight, const uint32_t *slots,
+                     vmask active) {
+    for (uint32_t a = 0; a < m->aov_count; a++) {
+        float *const *out = t->samples.pass[m->aovs[a].pass];
+        const uint32_t channels = trc_pass_channels(m->aovs[a].pass);
+        float lanes[4][TRC_WIDTH];
+        if (!out[0])
+            continue;
+        for (uint32_t k = 0; k < channels; k++) {
+            const struct trc_operand *o = &m->operands[m->aovs[a].first_operand];
+            vf_store(lanes[k], k < 3 ? trc_operand_value(o + k, regs) * weight : weight);
+        }
+        for (uint32_t bits = vm_bits(active); bits; bits &= bits - 1) {
+            const int i = __builtin_ctz(bits);
+            for (uint32_t k = 0; k < channels; k++)
+                out[k][slots[i]] += lanes[k][i];
+        }
+    }
+}
+
+void TRC_KERNEL(trc_world_aovs)(struct trc_tile *t, vvec3 d, vuint path, vvec3 weight,
+                                const uint32_t slots[TRC_WIDTH], vmask active) {
+    const vint straight = vi_set(TRC_PATH_TRANSPARENT_BACKGROUND);
+    active = vm_and(active, vm_and(vi_eq((vint)path & straight, straight), is_not_done(path)));
+    if (!vm_any(active))
+        return;
+    struct trc_registers regs;
+    const struct trc_material *m = TRC_KERNEL(trc_world_run)(t->snapshot, d, path, active, &regs);
+    add_aovs(t, m, &regs, v3_average(weight), slots, active);
+}
+
 /* ---- for denoisers: of the first rough surface, through mirrors and glass too ----
  *
  * As Cycles, but for surfaces that are not told of and yet have diffuse lobes: with diffuse bounces
@@ -212,9 +289,9 @@ static vuint add_features(struct trc_tile *t, const struct trc_surface *s,
 }
 
 vuint TRC_KERNEL(trc_data_passes)(struct trc_tile *t, const struct trc_surface *s,
-                                  const struct trc_material *m, const struct trc_lobes *lobes,
-                                  vvec3 found_weight, vfloat beyond, vfloat length,
-                                  const uint32_t slots[TRC_WIDTH]) {
+                                  const struct trc_material *m, const struct trc_registers *regs,
+                                  const struct trc_lobes *lobes, vvec3 found_weight, vfloat beyond,
+                                  vfloat length, const uint32_t slots[TRC_WIDTH]) {
     const vuint path = t->desc->passes & DENOISING_PASSES
                            ? add_features(t, s, lobes, found_weight, length, slots)
                            : s->path;
@@ -227,7 +304,11 @@ vuint TRC_KERNEL(trc_data_passes)(struct trc_tile *t, const struct trc_surface *
     const vvec3 alpha = v3_sub(one, TRC_KERNEL(trc_lobes_transparency)(lobes));
     add_colors(t, s, lobes, weight, slots, on);
     add_mist(t, s, v3_mul(weight, alpha), slots, on);
-    vmask first = vm_and(on, vi_eq((vint)s->path & vi_set(TRC_PATH_DATA_DONE), vi_set(0)));
+    if (t->desc->cryptomattes)
+        add_mattes(t, s, m, lobes, v3_mul(weight, alpha), slots, on);
+    vmask first = vm_and(on, is_not_done(s->path));
+    if (m->aov_count)
+        add_aovs(t, m, regs, v3_average(weight), slots, first);
     if (m->has & TRC_MATERIAL_HAS_TRANSPARENCY)
         first = vm_and(first, vf_ge(v3_average(alpha), vf_set(ALPHA_THRESHOLD)));
     if (!vm_any(first))

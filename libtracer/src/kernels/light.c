@@ -209,6 +209,12 @@ static vuint visibility_of(const struct trc_snapshot *scene, vint light, vmask m
     return bits;
 }
 
+vfloat TRC_KERNEL(trc_light_chosen)(const struct trc_surface *s, vvec3 n,
+                                    const struct trc_light_sample *sample, vmask m) {
+    const struct trc_receiver receiver = trc_receiver_make(s->p, n);
+    return trc_light_chance(s->snapshot->lights, &receiver, sample->light, m);
+}
+
 vuint TRC_KERNEL(trc_light_visibility)(const struct trc_snapshot *snapshot,
                                        const struct trc_light_sample *sample) {
     if (!snapshot->lights->hides)

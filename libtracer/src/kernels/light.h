@@ -28,6 +28,7 @@ struct trc_light_sample {
 };
 
 #define TRC_FAR 1e30f
+#define TRC_ALL_GROUPS UINT32_MAX
 
 /* Chooses a light by u_select (importance for the point) and a place on it by u1, u2, for the lanes
  * in s->active. Lights that are hidden from diffuse, glossy and transmission alike are not chosen;
@@ -56,6 +57,10 @@ void TRC_KERNEL(trc_light_sample_prepared)(const struct trc_surface *s,
                                            const struct trc_light_choices *choices, vfloat u_select,
                                            vfloat u1, vfloat u2, struct trc_light_sample *out);
 
+/* The chances with which the lanes of m chose their lights. */
+vfloat TRC_KERNEL(trc_light_chosen)(const struct trc_surface *s, vvec3 n,
+                                    const struct trc_light_sample *sample, vmask m);
+
 /* Visibility bits (TRC_VISIBLE_*) of the light each lane chose; all bits in lanes that chose none.
  * When the scene's lights hide from nothing, the caller can skip it: trc_light_table.hides is
  * false. */
@@ -66,11 +71,15 @@ vuint TRC_KERNEL(trc_light_visibility)(const struct trc_snapshot *snapshot,
  * TRC_FAR for a miss): area, point, spot with extent; with tmax == TRC_FAR also the sun. Lights do
  * not occlude. bsdf_pdf: density of the bounce (solid angle); < 0 for camera rays and ideal bounces
  * (no MIS). n: see above, of the point at p. path: TRC_VISIBLE_* | TRC_PATH_*. light_sample_count:
- * L of the point, for the weights. Adds to radiance what the rays see, MIS-weighted (power
- * heuristic). */
+ * L of the point, for the weights. group: only lamps of that light group, or TRC_ALL_GROUPS. Adds
+ * to radiance what the rays see, MIS-weighted (power heuristic). */
 void TRC_KERNEL(trc_light_hit)(const struct trc_snapshot *snapshot, vvec3 p, vvec3 n, vvec3 wi,
                                vfloat tmin, vfloat tmax, vfloat bsdf_pdf, vfloat light_sample_count,
-                               vuint path, vfloat time, vmask active, vvec3 *radiance);
+                               vuint path, uint32_t group, vmask active, vvec3 *radiance);
+
+/* The light group of a light, 0 for none. Numbers after the last light are ambient occlusion, which
+ * belongs to the world where it replaces its light. */
+uint32_t TRC_KERNEL(trc_light_group)(const struct trc_snapshot *snapshot, uint32_t light);
 
 /* MIS weight of emission found on triangle lights by such rays: s is the emissive surface,
  * p_from/n_from the point the ray left. 1 where the triangle is not sampled as a light or bsdf_pdf

@@ -93,11 +93,12 @@ static vfloat meet_lamp(const struct trc_lamp *lamp, vvec3 p, vvec3 wi, vfloat *
 
 void TRC_KERNEL(trc_light_hit)(const struct trc_snapshot *snapshot, vvec3 p, vvec3 n, vvec3 wi,
                                vfloat tmin, vfloat tmax, vfloat bsdf_pdf, vfloat light_sample_count,
-                               vuint path, vfloat time, vmask active, vvec3 *radiance) {
-    (void)time;
+                               vuint path, uint32_t group, vmask active, vvec3 *radiance) {
     const struct trc_light_table *t = snapshot->lights;
+    const bool all = group == TRC_ALL_GROUPS;
+    const uint32_t end = t->group_seen[all ? TRC_MAX_LIGHT_GROUPS + 1 : group + 1];
     const struct trc_receiver receiver = trc_receiver_make(p, n);
-    for (uint32_t i = 0; i < t->seen_count; i++) {
+    for (uint32_t i = all ? 0 : t->group_seen[group]; i < end; i++) {
         const uint32_t number = t->seen[i];
         const struct trc_lamp *lamp = &t->lamps[number];
         vmask viewers = vm_and(active, near_lamp(lamp, p, wi));
@@ -121,6 +122,18 @@ void TRC_KERNEL(trc_light_hit)(const struct trc_snapshot *snapshot, vvec3 p, vve
         }
         *radiance = v3_add(*radiance, v3_where(hit, v3_scale(light, weight)));
     }
+}
+
+uint32_t TRC_KERNEL(trc_light_group)(const struct trc_snapshot *snapshot, uint32_t light) {
+    const struct trc_light_table *t = snapshot->lights;
+    const struct trc_world *world = &snapshot->world;
+    if (light < t->lamp_count)
+        return t->lamps[light].group;
+    if (light == t->world_light)
+        return world->light_group;
+    if (light - t->first_triangle < t->triangle_count)
+        return snapshot->instances[t->triangles[light - t->first_triangle].instance].light_group;
+    return world->ao_method == TRC_AO_REPLACE ? world->light_group : 0;
 }
 
 /* Numbers of the triangles as lights, -1 for those that are none. Lights of an instance are in the

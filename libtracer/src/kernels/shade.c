@@ -96,11 +96,11 @@ TRC_INLINE vvec3 clamp_radiance(vvec3 c, float limit) {
 }
 
 /* Emission or background found by rays: to the samples, and to the pass its depth says.
- * direct_pass: what camera rays see it as. */
-static void emission_add(struct trc_tile *t, const struct arrival *a, vmask active, vvec3 radiance,
-                         uint32_t camera_pass) {
+ * camera_pass: what camera rays see it as. Returns what is added. */
+static vvec3 emission_add(struct trc_tile *t, const struct arrival *a, vmask active, vvec3 radiance,
+                          uint32_t camera_pass) {
     if (!vm_any(active))
-        return;
+        return v3_zero();
     vvec3 c = v3_mul(a->found_weight, radiance);
     const vuint depth = depth_of(a->depths, TRC_DEPTH_ALL_SHIFT);
     if (t->desc->clamp_indirect > 0.0f || t->desc->clamp_direct > 0.0f)
@@ -123,6 +123,29 @@ static void emission_add(struct trc_tile *t, const struct arrival *a, vmask acti
                              (depths[i] > 1 ? 1 : 0),
                          a->slots[i], rgb);
     }
+    return c;
+}
+
+/* The same light to the passes of the lanes' light groups. */
+static void group_add(struct trc_tile *t, const struct arrival *a, vmask active, vvec3 light,
+                      const uint32_t groups[TRC_WIDTH]) {
+    float lanes[3][TRC_WIDTH];
+    vf_store(lanes[0], light.x), vf_store(lanes[1], light.y), vf_store(lanes[2], light.z);
+    for (uint32_t bits = vm_bits(active); bits; bits &= bits - 1) {
+        const int i = __builtin_ctz(bits);
+        const float rgb[3] = {lanes[0][i], lanes[1][i], lanes[2][i]};
+        if (groups[i])
+            trc_pass_add(t, TRC_PASS_LIGHT_GROUP(groups[i] - 1), a->slots[i], rgb);
+    }
+}
+
+/* Of one group for all lanes. */
+static void one_group_add(struct trc_tile *t, const struct arrival *a, vmask active, vvec3 light,
+                          uint32_t group) {
+    uint32_t groups[TRC_WIDTH];
+    vu_store(groups, vu_set(group));
+    if (group)
+        group_add(t, a, active, light, groups);
 }
 
 /* Rays that left the scene. */
@@ -144,12 +167,28 @@ static void shade_misses(struct trc_tile *t, const struct arrival *a, vmask miss
     const vvec3 c =
         TRC_KERNEL(trc_world_radiance)(t->snapshot, a->o, a->n_from, a->d, a->pdf,
                                        light_count_before(t, a->depths), a->path, missed);
-    emission_add(t, a, missed, c, TRC_PASS_ENVIRONMENT);
+    const vvec3 added = emission_add(t, a, missed, c, TRC_PASS_ENVIRONMENT);
+    if (t->desc->light_group_count)
+        one_group_add(t, a, missed, added, t->snapshot->world.light_group);
+    const uint32_t material = t->snapshot->world.material;
+    if (material != UINT32_MAX && t->snapshot->materials[material]->aov_count)
+        TRC_KERNEL(trc_world_aovs)(t, a->d, a->path, a->found_weight, a->slots, missed);
+}
+
+/* Lamps of a light group, or of all, that the rays pass on their way to end. */
+static vvec3 pass_lamps(struct trc_tile *t, const struct arrival *a, vfloat end, uint32_t group) {
+    vvec3 c = v3_zero();
+    TRC_KERNEL(trc_light_hit)
+    (t->snapshot, a->o, a->n_from, a->d, a->tmin, end, a->pdf, light_count_before(t, a->depths),
+     a->path, group, a->active, &c);
+    const vmask seen = vm_and(a->active, vf_gt(v3_max(c), vf_set(0.0f)));
+    return v3_where(seen, emission_add(t, a, seen, c, TRC_PASS_EMISSION));
 }
 
 /* Lights that rays pass on their way, in the order of t->work. */
 static void shade_rays(struct trc_tile *t) {
     const bool lights = t->snapshot->features & TRC_FEATURE_LIGHTS;
+    const uint32_t *seen = t->snapshot->lights->group_seen;
     for (uint32_t i = 0; i < t->work.count; i += TRC_WIDTH) {
         const vint index = vi_set((int32_t)i) + vi_lane();
         const vmask active = vm_first((int32_t)(t->work.count - i));
@@ -160,13 +199,12 @@ static void shade_rays(struct trc_tile *t) {
         struct arrival a;
         arrival_load(t, index, active, &a);
         if (lights) {
-            vvec3 c = v3_zero();
             const vfloat end = vf_select(missed, vf_set(TRC_FAR), a.t);
-            TRC_KERNEL(trc_light_hit)
-            (t->snapshot, a.o, a.n_from, a.d, a.tmin, end, a.pdf, light_count_before(t, a.depths),
-             a.path, a.time, active, &c);
-            const vmask seen = vm_and(active, vf_gt(v3_max(c), vf_set(0.0f)));
-            emission_add(t, &a, seen, c, TRC_PASS_EMISSION);
+            if (!t->desc->light_group_count)
+                pass_lamps(t, &a, end, TRC_ALL_GROUPS);
+            for (uint32_t g = 0; t->desc->light_group_count && g <= TRC_MAX_LIGHT_GROUPS; g++)
+                if (seen[g] < seen[g + 1])
+                    one_group_add(t, &a, active, pass_lamps(t, &a, end, g), g);
         }
         if (vm_any(missed))
             shade_misses(t, &a, missed);
@@ -218,6 +256,7 @@ TRC_INLINE vvec3 shadow_origin(const struct trc_surface *s, vvec3 w) {
 
 struct light_result {
     vvec3 diffuse, glossy, transmission; /* unshadowed contributions */
+    vfloat lamp;                         /* and that to the Shadow pass */
 };
 
 /* Contributions of the lanes' light samples, weighted; lanes that get nothing are dropped from
@@ -296,7 +335,24 @@ static void shadow_push(struct trc_tile *t, const struct arrival *a, const struc
             vf_compress(q->split[3 * k + 2] + q->count, parts[k].z, bits);
         }
     }
+    for (int k = 0; q->lamp[0] && k < 3; k++)
+        vf_compress(q->lamp[k] + q->count, r->lamp, bits);
     q->count += (uint32_t)__builtin_popcount(bits);
+}
+
+/* What the lanes' light samples are in the Shadow pass if nothing is in the way: lamps count
+ * equally, whatever they are chosen by; the world and emissive triangles do not. */
+static vfloat lamp_part(const struct trc_tile *t, const struct arrival *a,
+                        const struct trc_surface *s, const struct trc_light_sample *l, vfloat count,
+                        vmask active) {
+    const int32_t lamps = (int32_t)t->snapshot->lights->lamp_count;
+    const vint straight = vi_set(TRC_PATH_TRANSPARENT_BACKGROUND);
+    const vmask counts = vm_and(vm_and(active, vi_lt(l->light, vi_set(lamps))),
+                                vi_eq((vint)a->path & straight, straight));
+    if (!vm_any(counts))
+        return vf_set(0.0f);
+    const vfloat chance = TRC_KERNEL(trc_light_chosen)(s, a->receive_n, l, counts);
+    return vf_select(counts, vf_divide(vf_set(1.0f / (float)lamps), chance * count), vf_set(0.0f));
 }
 
 static void sample_use(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
@@ -306,6 +362,8 @@ static void sample_use(struct trc_tile *t, const struct arrival *a, const struct
     vmask lit = vm_and(active, sample->valid);
     if (vm_any(lit))
         lit = light_contribute(t, a, s, lobes, sample, count, lit, &r);
+    if (t->shadows.lamp[0] && vm_any(lit))
+        r.lamp = lamp_part(t, a, s, sample, count, lit);
     if (vm_any(lit))
         shadow_push(t, a, s, sample, &r, cell, lit);
 }
@@ -386,12 +444,42 @@ static void ambient_light(struct trc_tile *t, const struct arrival *a, const str
         vmask lit = vm_and(active, vf_lt(vf_set((float)l), count));
         const vvec3 light =
             world->ao_method == TRC_AO_ADD ? white : ambient_world(t, s, lobes, n, sample.wi, lit);
-        const struct light_result r = {v3_mul(weight, light), v3_zero(), v3_zero()};
+        const struct light_result r = {.diffuse = v3_mul(weight, light)};
         const vfloat size = v3_max(r.diffuse);
         lit = vm_and(lit, vm_and(vf_gt(size, vf_set(0.0f)), vf_lt(size, vf_set(3e38f))));
         if (vm_any(lit))
             shadow_push(t, a, s, &sample, &r, trc_direction_cell(sample.wi), lit);
     }
+}
+
+/* One ray for each lane that the camera sees, also through what is transparent, for the pass. */
+static void occlusion_pass(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
+                           const struct trc_lobes *lobes, vmask active) {
+    const vint camera = vi_set(TRC_VISIBLE_CAMERA);
+    active = vm_and(active, vi_eq((vint)a->path & camera, camera));
+    if (t->shadows.count + TRC_WIDTH > TRC_SHADOW_QUEUE)
+        TRC_KERNEL(trc_shadow_flush)(t);
+    vvec3 n, x, y;
+    vfloat u[2];
+    TRC_KERNEL(trc_lobes_diffuse)(lobes, s, &n);
+    v3_frame(n, &x, &y);
+    TRC_KERNEL(trc_samples)
+    (&t->sampler, a->pixel, a->sample,
+     TRC_DIM_BOUNCE + t->generation * TRC_DIMS_PER_BOUNCE + TRC_DIM_BSDF_X, 2, 0, 1, u);
+    const struct trc_light_table *lights = t->snapshot->lights;
+    const struct trc_light_sample sample = {
+        .wi = v3_from_frame(trc_warp_cosine(u[0], u[1]), x, y, n),
+        .distance = vf_set(t->snapshot->world.ao_distance),
+        .casts_shadow = t->snapshot->world.ao_distance > 0.0f ? vm_all_set() : vm_none(),
+        .light = vi_set((int32_t)(lights->first_triangle + lights->triangle_count))};
+    const vvec3 one = v3(vf_set(1.0f), vf_set(1.0f), vf_set(1.0f));
+    const vvec3 alpha = v3_sub(one, TRC_KERNEL(trc_lobes_transparency)(lobes));
+    const struct light_result r = {.diffuse = v3_mul(a->weight, alpha)};
+    active = vm_and(active, vf_gt(v3_max(r.diffuse), vf_set(0.0f)));
+    struct arrival own = *a;
+    own.path = a->path | vu_set(TRC_PATH_OCCLUSION);
+    if (vm_any(active))
+        shadow_push(t, &own, s, &sample, &r, trc_direction_cell(sample.wi), active);
 }
 
 /* ---- continuation ---- */
@@ -580,6 +668,17 @@ static void holdout(struct trc_tile *t, const struct arrival *a, const struct tr
     }
 }
 
+/* Emission of surfaces to the passes of their instances' light groups. */
+static void surface_group_add(struct trc_tile *t, const struct arrival *a,
+                              const struct trc_surface *s, vmask active, vvec3 light) {
+    uint32_t groups[TRC_WIDTH];
+    for (uint32_t bits = vm_bits(active); bits; bits &= bits - 1) {
+        const int i = __builtin_ctz(bits);
+        groups[i] = t->snapshot->instances[vi_get(s->instance, i)].light_group;
+    }
+    group_add(t, a, active, light, groups);
+}
+
 static void shade_group(struct trc_tile *t, uint32_t material, vint index, vmask active) {
     const struct trc_material *m = t->snapshot->materials[material];
     struct arrival a;
@@ -598,14 +697,17 @@ static void shade_group(struct trc_tile *t, uint32_t material, vint index, vmask
     if (m->has & TRC_MATERIAL_HAS_HOLDOUT)
         holdout(t, &a, &lobes, active);
     if (t->extra_passes)
-        a.path = TRC_KERNEL(trc_data_passes)(t, &s, m, &lobes, a.found_weight, a.beyond,
+        a.path = TRC_KERNEL(trc_data_passes)(t, &s, m, &regs, &lobes, a.found_weight, a.beyond,
                                              a.t - a.tmin, a.slots);
     if (m->has & TRC_MATERIAL_HAS_EMISSION) {
         const vmask lit = vm_and(active, vf_gt(v3_max(lobes.emission), vf_set(0.0f)));
         if (vm_any(lit)) {
             const vfloat w = TRC_KERNEL(trc_light_triangle_weight)(&s, a.o, a.n_from, a.pdf,
                                                                    light_count_before(t, a.depths));
-            emission_add(t, &a, lit, v3_scale(lobes.emission, w), TRC_PASS_EMISSION);
+            const vvec3 added =
+                emission_add(t, &a, lit, v3_scale(lobes.emission, w), TRC_PASS_EMISSION);
+            if (t->desc->light_group_count)
+                surface_group_add(t, &a, &s, lit, added);
         }
     }
     const vmask last = vi_eq((vint)(a.path & vu_set(TRC_PATH_LAST)), vi_set(TRC_PATH_LAST));
@@ -623,6 +725,8 @@ static void shade_group(struct trc_tile *t, uint32_t material, vint index, vmask
             ambient_light(t, &a, &s, &lobes, on);
         lobes.below_horizon = vm_none();
     }
+    if (t->samples.pass[TRC_PASS_AMBIENT_OCCLUSION][0])
+        occlusion_pass(t, &a, &s, &lobes, on);
     if (t->desc->integrator == TRC_INTEGRATOR_RAYCAST) {
         if (m->has & TRC_MATERIAL_HAS_TRANSPARENCY)
             continue_straight(t, &a, &s, &lobes, material, on);

@@ -3,6 +3,7 @@
  * Boulos et al. 2007, section 3.3: shadow rays are assembled apart from others. Rays of a packet go
  * from neighbouring points to the same part of the same light. Where materials let shadow rays
  * through, packets that nothing opaque blocks are walked from surface to surface. */
+#include "kernels/light.h"
 #include "kernels/tile.h"
 #include "kernels/wide_math.h"
 
@@ -118,11 +119,8 @@ static uint64_t transparency(struct trc_tile *t, float factor[3][TRC_PACKET_SIZE
 static void light_scale(struct trc_tile *t, uint32_t ray, float r, float g, float b) {
     struct trc_shadow_store *q = &t->shadows;
     const float factor[3] = {r, g, b};
-    for (int c = 0; c < 3; c++) {
-        q->radiance[c][ray] *= factor[c];
-        for (int k = 0; t->light_passes && k < 3; k++)
-            q->split[3 * k + c][ray] *= factor[c];
-    }
+    for (uint32_t k = 0; k < q->scaled_count; k++)
+        q->scaled[k][ray] *= factor[k % 3];
 }
 
 /* Adds what a ray carries to the passes of light by kind. */
@@ -140,6 +138,35 @@ static void passes_add(struct trc_tile *t, uint32_t ray) {
         const float part[3] = {q->split[3 * k][ray], q->split[3 * k + 1][ray],
                                q->split[3 * k + 2][ray]};
         trc_pass_add(t, direct[k], slot, part);
+    }
+}
+
+/* Adds what rays found to the passes of ambient occlusion and shadow. Those of ambient occlusion
+ * carry no light beyond that. */
+static void occlusion_add(struct trc_tile *t) {
+    struct trc_shadow_store *q = &t->shadows;
+    for (uint32_t i = 0; i < q->count; i++) {
+        if (q->lamp[0]) {
+            const float lamp[3] = {q->lamp[0][i], q->lamp[1][i], q->lamp[2][i]};
+            trc_pass_add(t, TRC_PASS_SHADOW, q->slot[i], lamp);
+        }
+        if (!(q->path[i] & TRC_PATH_OCCLUSION))
+            continue;
+        const float open[3] = {q->radiance[0][i], q->radiance[1][i], q->radiance[2][i]};
+        trc_pass_add(t, TRC_PASS_AMBIENT_OCCLUSION, q->slot[i], open);
+        light_scale(t, i, 0.0f, 0.0f, 0.0f);
+    }
+}
+
+/* Adds light to the passes of light groups. */
+static void groups_add(struct trc_tile *t) {
+    const struct trc_shadow_store *q = &t->shadows;
+    for (uint32_t i = 0; i < q->count; i++) {
+        const float rgb[3] = {q->radiance[0][i], q->radiance[1][i], q->radiance[2][i]};
+        const uint32_t light = q->target[i] / TRC_DIRECTION_CELLS;
+        const uint32_t group = TRC_KERNEL(trc_light_group)(t->snapshot, light);
+        if (group)
+            trc_pass_add(t, TRC_PASS_LIGHT_GROUP(group - 1), q->slot[i], rgb);
     }
 }
 
@@ -174,6 +201,10 @@ void TRC_KERNEL(trc_shadow_flush)(struct trc_tile *t) {
         for (; blocked; blocked &= blocked - 1)
             light_scale(t, order[__builtin_ctzll(blocked)], 0.0f, 0.0f, 0.0f);
     }
+    if (t->occlusion_passes)
+        occlusion_add(t);
+    if (t->desc->light_group_count)
+        groups_add(t);
     for (uint32_t i = 0; i < q->count; i++) {
         const float rgb[3] = {q->radiance[0][i], q->radiance[1][i], q->radiance[2][i]};
         trc_sample_add(t, q->slot[i], rgb);

@@ -64,21 +64,27 @@ static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc, void *
     for (int i = 0; i < 3; i++)
         t->samples.radiance[i] = carve(&c, batch);
     t->samples.transparency = carve(&c, batch);
-    for (uint32_t pass = 1; pass < TRC_PASS_COUNT; pass++)
-        if (pass != TRC_PASS_SAMPLE_COUNT && desc->passes >> pass & 1)
-            for (uint32_t k = 0; k < trc_film_channels(pass); k++)
-                t->samples.pass[pass][k] = carve(&c, batch);
+    for (uint32_t pass = 1; pass < TRC_SUM_COUNT; pass++) {
+        if (!trc_film_has_sums(desc, pass))
+            continue;
+        t->samples.passes[t->samples.pass_count++] = (uint8_t)pass;
+        for (uint32_t k = 0; k < trc_film_channels(pass); k++)
+            t->samples.pass[pass][k] = carve(&c, batch);
+    }
     struct trc_shadow_store *q = &t->shadows;
     for (int i = 0; i < 3; i++) {
         q->o[i] = carve(&c, queue);
         q->d[i] = carve(&c, queue);
-        q->radiance[i] = carve(&c, queue);
+        q->radiance[i] = q->scaled[q->scaled_count++] = carve(&c, queue);
     }
     q->tmax = carve(&c, queue);
     q->time = carve(&c, queue);
     if (wants_light_passes(desc))
         for (int i = 0; i < 9; i++)
-            q->split[i] = carve(&c, queue);
+            q->split[i] = q->scaled[q->scaled_count++] = carve(&c, queue);
+    if (desc->passes >> TRC_PASS_SHADOW & 1)
+        for (int i = 0; i < 3; i++)
+            q->lamp[i] = q->scaled[q->scaled_count++] = carve(&c, queue);
     uint32_t **const words[] = {&q->slot, &q->path, &q->target, &q->depth, &q->order, &t->keys};
     for (int i = 0; i < 6; i++)
         *words[i] = carve(&c, queue);
@@ -273,10 +279,9 @@ static void samples_clear(struct trc_tile *t) {
     for (int k = 0; k < 3; k++)
         memset(t->samples.radiance[k], 0, bytes);
     memset(t->samples.transparency, 0, bytes);
-    for (int pass = 0; pass < TRC_PASS_COUNT; pass++)
-        for (int k = 0; k < TRC_MAX_FILM_CHANNELS; k++)
-            if (t->samples.pass[pass][k])
-                memset(t->samples.pass[pass][k], 0, bytes);
+    for (uint32_t i = 0; i < t->samples.pass_count; i++)
+        for (uint32_t k = 0; k < trc_film_channels(t->samples.passes[i]); k++)
+            memset(t->samples.pass[t->samples.passes[i]][k], 0, bytes);
     /* What a miss has. */
     static const struct {
         uint32_t pass;
@@ -289,13 +294,6 @@ static void samples_clear(struct trc_tile *t) {
     }
 }
 
-/* A sample's pixel in the film. */
-TRC_INLINE size_t film_pixel(const struct trc_tile *t, uint32_t slot) {
-    const uint32_t x = (t->samples.pixel[slot] & 0xffffu) - t->desc->crop_x;
-    const uint32_t y = (t->samples.pixel[slot] >> 16) - t->desc->crop_y;
-    return (size_t)y * t->job->film->width + x;
-}
-
 TRC_INLINE bool is_finite_sample(const struct trc_tile *t, uint32_t slot) {
     return isfinite(t->samples.radiance[0][slot] + t->samples.radiance[1][slot] +
                     t->samples.radiance[2][slot]);
@@ -303,9 +301,8 @@ TRC_INLINE bool is_finite_sample(const struct trc_tile *t, uint32_t slot) {
 
 /* Adds a sample's passes to its pixel. */
 static void film_add_passes(struct trc_tile *t, uint32_t slot, size_t pixel, bool first) {
-    for (uint32_t pass = 1; pass < TRC_PASS_COUNT; pass++) {
-        if (!t->samples.pass[pass][0])
-            continue;
+    for (uint32_t i = 0; i < t->samples.pass_count; i++) {
+        const uint32_t pass = t->samples.passes[i];
         const uint32_t channels = trc_film_channels(pass);
         double *sum = t->job->film->sums[pass] + channels * pixel;
         for (uint32_t k = 0; k < channels; k++) {
@@ -350,7 +347,7 @@ static void film_add(struct trc_tile *t) {
         uint32_t end = begin + 1;
         while (end < count && pixel[end] == pixel[begin])
             end++;
-        film_add_run(t, begin, end, film_pixel(t, begin));
+        film_add_run(t, begin, end, trc_film_pixel(t, begin));
         begin = end;
     }
 }
@@ -362,7 +359,7 @@ static void film_add_adaptive(struct trc_tile *t) {
             t->job->counts.dropped_samples++;
             continue;
         }
-        const size_t pixel = film_pixel(t, slot);
+        const size_t pixel = trc_film_pixel(t, slot);
         struct trc_adaptive_pixel *p = &t->job->adaptive->pixels[pixel];
         for (int c = 0; c < 3; c++)
             p->sum[c] += (double)t->samples.radiance[c][slot];
@@ -518,8 +515,9 @@ void TRC_KERNEL(trc_tile_render)(struct trc_tile_job *job) {
     t->desc = job->desc;
     t->sampler = (struct trc_sampler){job->desc->sampler, job->desc->seed, job->desc->sample_count,
                                       job->sampler_table};
-    t->extra_passes = job->desc->passes & ~(1ull << TRC_PASS_COMBINED);
+    t->extra_passes = t->samples.pass_count || job->desc->cryptomattes;
     t->light_passes = wants_light_passes(job->desc);
+    t->occlusion_passes = t->samples.pass[TRC_PASS_AMBIENT_OCCLUSION][0] || t->shadows.lamp[0];
     t->object_motion =
         job->snapshot->features & (TRC_FEATURE_OBJECT_MOTION | TRC_FEATURE_DEFORMATION);
     t->camera_common = job->snapshot->camera.aperture_radius <= 0.0f &&

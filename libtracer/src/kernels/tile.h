@@ -23,7 +23,8 @@ enum {
     TRC_PATH_CATEGORY_SHIFT = 12, /* 0 camera, 1 glossy, 2 transmission: by the first bounce */
     TRC_PATH_LAST = 1 << 14,      /* only emission counts at the next surface */
     TRC_PATH_DATA_DONE = 1 << 15, /* data passes of the sample are written */
-    TRC_PATH_TOLD = 1 << 16       /* and the denoising passes of this way of it */
+    TRC_PATH_TOLD = 1 << 16,      /* and the denoising passes of this way of it */
+    TRC_PATH_OCCLUSION = 1 << 17  /* shadow rays: of the pass of ambient occlusion, no light */
 };
 
 /* A ray's four depth counters, 8 bits each, saturating by the limits on desc. */
@@ -81,15 +82,23 @@ struct trc_sample_store {
     uint32_t *index; /* number of the sample */
     float *radiance[3];
     float *transparency; /* part of the film that is seen through */
-    float *pass[TRC_PASS_COUNT]
+    float *pass[TRC_SUM_COUNT]
                [TRC_MAX_FILM_CHANNELS]; /* trc_film_channels each; NULL unless asked for */
+    uint8_t passes[TRC_SUM_COUNT];      /* the numbers of those */
+    uint32_t pass_count;
 };
+
+/* Radiance, its three parts, and what the Shadow pass gets. */
+#define TRC_SCALED_COLUMNS (3 + 9 + 3)
 
 /* Shadow rays; target: the light's number and cell, what packets are sorted by. */
 struct trc_shadow_store {
     uint32_t count;
     float *o[3], *d[3], *tmax, *time, *radiance[3];
     float *split[9]; /* diffuse, glossy, transmission parts, or NULL: no light passes */
+    float *lamp[3];  /* for the Shadow pass, or NULL */
+    float *scaled[TRC_SCALED_COLUMNS]; /* those that what is in the way takes from, RGB by RGB */
+    uint32_t scaled_count;
     uint32_t *slot, *path, *target, *depth;
     uint32_t *order; /* own: the queue may be flushed while hits are shaded in t->order */
 };
@@ -99,8 +108,9 @@ struct trc_tile {
     const struct trc_snapshot *snapshot;
     const trc_render_desc *desc;
     struct trc_sampler sampler;
-    bool extra_passes;          /* more than Combined */
+    bool extra_passes;          /* more than Combined, or mattes */
     bool light_passes;          /* some pass wants light by kind */
+    bool occlusion_passes;      /* some pass wants what shadow rays find, not light */
     bool object_motion;         /* rays need times */
     bool camera_common;         /* camera rays start at one point */
     uint32_t packet_size;       /* 1..TRC_PACKET_SIZE */
@@ -175,12 +185,24 @@ void TRC_KERNEL(trc_shade_batch)(struct trc_tile *t);
  * way since the last surface or the near clip. Returns the rays' path words, which remember what is
  * written. Called only with more passes than Combined. (kernels/data_passes.c) */
 vuint TRC_KERNEL(trc_data_passes)(struct trc_tile *t, const struct trc_surface *s,
-                                  const struct trc_material *m, const struct trc_lobes *lobes,
-                                  vvec3 found_weight, vfloat beyond, vfloat length,
-                                  const uint32_t slots[TRC_WIDTH]);
+                                  const struct trc_material *m, const struct trc_registers *regs,
+                                  const struct trc_lobes *lobes, vvec3 found_weight, vfloat beyond,
+                                  vfloat length, const uint32_t slots[TRC_WIDTH]);
+
+/* What the world's material gives to AOVs where rays in direction d with that weight leave the
+ * scene; path: their words. (kernels/data_passes.c) */
+void TRC_KERNEL(trc_world_aovs)(struct trc_tile *t, vvec3 d, vuint path, vvec3 weight,
+                                const uint32_t slots[TRC_WIDTH], vmask active);
 
 /* Traces and empties the shadow queue. (kernels/shadow.c) */
 void TRC_KERNEL(trc_shadow_flush)(struct trc_tile *t);
+
+/* A sample's pixel in the film. */
+TRC_INLINE size_t trc_film_pixel(const struct trc_tile *t, uint32_t slot) {
+    const uint32_t x = (t->samples.pixel[slot] & 0xffffu) - t->desc->crop_x;
+    const uint32_t y = (t->samples.pixel[slot] >> 16) - t->desc->crop_y;
+    return (size_t)y * t->job->film->width + x;
+}
 
 /* Adds light that reached a sample to its radiance and passes. kind: 0 diffuse, 1 glossy, 2
  * transmission of the first surface. */

@@ -28,6 +28,17 @@ static void world_surface(const struct trc_snapshot *snapshot, vvec3 direction, 
     };
 }
 
+const struct trc_material *TRC_KERNEL(trc_world_run)(const struct trc_snapshot *snapshot,
+                                                     vvec3 direction, vuint path, vmask active,
+                                                     struct trc_registers *regs) {
+    const struct trc_material *m = snapshot->materials[snapshot->world.material];
+    struct trc_surface s;
+    world_surface(snapshot, direction, path, active, &s);
+    if (m->instruction_count)
+        TRC_KERNEL(trc_program_run)(m, &s, regs);
+    return m;
+}
+
 vvec3 TRC_KERNEL(trc_world_shade)(const struct trc_snapshot *snapshot, vvec3 direction, vuint path,
                                   vmask active) {
     const struct trc_world *world = &snapshot->world;
@@ -35,12 +46,9 @@ vvec3 TRC_KERNEL(trc_world_shade)(const struct trc_snapshot *snapshot, vvec3 dir
         return v3_zero();
     if (world->is_constant)
         return v3_where(active, v3_set(world->radiance));
-    const struct trc_material *m = snapshot->materials[world->material];
-    struct trc_surface s;
     struct trc_registers regs;
-    world_surface(snapshot, direction, path, active, &s);
-    if (m->instruction_count)
-        TRC_KERNEL(trc_program_run)(m, &s, &regs);
+    const struct trc_material *m =
+        TRC_KERNEL(trc_world_run)(snapshot, direction, path, active, &regs);
     return v3_where(active, TRC_KERNEL(trc_lobes_emission)(m, &regs));
 }
 

@@ -256,7 +256,7 @@ fail:
 
 static trc_status take_memory(struct trc_render_state *render) {
     const trc_render_desc *desc = &render->desc;
-    TRC_TRY(trc_film_create(&render->film, desc->crop_width, desc->crop_height, desc->passes));
+    TRC_TRY(trc_film_create(desc, &render->film));
     if (desc->noise_threshold > 0.0f)
         TRC_TRY(trc_adaptive_create(desc, &render->adaptive));
     TRC_TRY(trc_schedule_create(desc, &render->schedule));

@@ -152,6 +152,9 @@ static uint64_t fill_instances(const struct trc_scene_state *scene,
             .materials = materials,
             .pass_index = source->pass_index,
             .random = source->random,
+            .cryptomatte_object = source->cryptomatte_object,
+            .cryptomatte_asset = source->cryptomatte_asset,
+            .light_group = source->light_group,
             .first_light = UINT32_MAX,
         };
         memcpy(instance->color, source->color, sizeof instance->color);
@@ -208,6 +211,7 @@ void trc_collect_view(const struct trc_scene_state *scene, struct trc_snapshot_b
         .ao_distance = desc->ao_distance,
         .ao_factor = desc->ao_factor,
         .ao_method = desc->ao_method,
+        .light_group = desc->light_group,
     };
     if (!index)
         return;

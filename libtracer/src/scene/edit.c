@@ -100,6 +100,9 @@ static trc_status make_instance(const struct trc_scene_state *scene, const trc_i
         .visibility = desc->visibility,
         .pass_index = desc->pass_index,
         .random = desc->random,
+        .cryptomatte_object = desc->cryptomatte_object,
+        .cryptomatte_asset = desc->cryptomatte_asset,
+        .light_group = desc->light_group,
     };
     memcpy(instance->color, desc->color, sizeof instance->color);
     *instance_out = instance;

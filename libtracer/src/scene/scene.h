@@ -44,6 +44,8 @@ struct trc_scene_instance {
     int32_t pass_index;
     float random;
     float color[4];
+    float cryptomatte_object, cryptomatte_asset;
+    uint32_t light_group; /* of its emission, from 1 on; 0: none */
 };
 
 struct trc_scene_state {

@@ -54,7 +54,7 @@ uint32_t trc_scene_material_index(const struct trc_scene_state *scene, trc_id id
     return trc_store_get(&scene->materials, id) ? trc_store_slot_of(id) + 1 : 0;
 }
 
-/* Blender's grey diffuse for objects without a material. */
+/* Blender's grey diffuse for objects without a material; in mattes it has Cycles' name. */
 trc_status trc_scene_make_default_material(struct trc_scene_state *scene) {
     const trc_node_input inputs[3] = {
         {.node = -1, .value = {0.8f, 0.8f, 0.8f}}, {.node = -1}, {.node = -2}};
@@ -63,7 +63,8 @@ trc_status trc_scene_make_default_material(struct trc_scene_state *scene) {
                                     .node_count = 1,
                                     .nodes = &node,
                                     .inputs = inputs,
-                                    .input_count = 3};
+                                    .input_count = 3,
+                                    .cryptomatte = trc_cryptomatte_id("default_surface")};
     return compile(scene, &desc, &scene->default_material);
 }
 

@@ -58,6 +58,8 @@ struct trc_instance {
     int32_t pass_index;
     float random;
     float color[4];
+    float cryptomatte_object, cryptomatte_asset;
+    uint32_t light_group; /* of its emission, from 1 on; 0: none */
     uint32_t first_light; /* first emissive-triangle light of this instance or UINT32_MAX */
     uint32_t flips;       /* 1: negative determinant at key 0 */
 };
@@ -81,6 +83,7 @@ struct trc_world {
     float radiance[3];
     float ao_distance, ao_factor;
     uint32_t ao_method; /* TRC_AO_* */
+    uint32_t light_group;
 };
 
 struct trc_snapshot {

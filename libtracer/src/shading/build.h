@@ -27,6 +27,7 @@ char trc_node_output_kind(const trc_node *node, uint32_t output);
 /* NULL: unknown type. */
 const struct trc_node_info *trc_node_info_of(uint32_t type);
 bool trc_node_is_shader(uint32_t type);
+bool trc_node_is_output(uint32_t type);
 /* Whether mode is one that the type has. */
 bool trc_node_mode_is_valid(uint32_t type, uint32_t mode);
 static inline bool trc_kind_is_float(char kind) { return kind == 'f'; }
@@ -112,7 +113,11 @@ struct trc_build {
     uint32_t *first_output;      /* of each node, into outputs */
     struct trc_leaf leaves[TRC_MAX_LEAVES];
     uint32_t leaf_count;
-    struct trc_operand leaf_operands[TRC_MAX_LEAVES * 3 * TRC_MAX_NODE_INPUTS];
+    struct trc_aov_output aovs[TRC_MAX_AOV_OUTPUTS];
+    uint32_t aov_count;
+    /* Of leaves, then of AOVs. */
+    struct trc_operand
+        leaf_operands[TRC_MAX_LEAVES * 3 * TRC_MAX_NODE_INPUTS + 3 * TRC_MAX_AOV_OUTPUTS];
     uint32_t leaf_operand_count;
 };
 
@@ -148,9 +153,11 @@ trc_status trc_build_texture(struct trc_build *b, const trc_node *node,
 trc_status trc_build_values(struct trc_build *b);
 /* Leaves, their weights and operands. (shading/leaves.c) */
 trc_status trc_build_leaves(struct trc_build *b);
+/* AOVs and their operands, after the leaves. (shading/leaves.c) */
+trc_status trc_build_aovs(struct trc_build *b);
 /* has and emission, from the leaves and the live operations. (shading/traits.c) */
 void trc_build_traits(const struct trc_build *b, struct trc_material *m);
-/* Marks the operations that leaves need. (shading/emit.c) */
+/* Marks the operations that leaves and AOVs need. (shading/emit.c) */
 trc_status trc_build_mark(struct trc_build *b);
 /* Gives registers and fills the program, its tables and the leaves of m. (shading/emit.c) */
 trc_status trc_build_emit(const struct trc_build *b, struct trc_material *m);

@@ -18,6 +18,7 @@ static void build_free(struct trc_build *b) {
 }
 
 static void material_free(struct trc_material *m) {
+    trc_free(m->aovs);
     trc_free(m->operands);
     trc_free(m->instructions);
     trc_free(m->tables);
@@ -28,6 +29,7 @@ static trc_status compile(struct trc_build *b, struct trc_material *m) {
     memset(b->buckets, 0xff, sizeof b->buckets);
     TRC_TRY(trc_build_values(b));
     TRC_TRY(trc_build_leaves(b));
+    TRC_TRY(trc_build_aovs(b));
     TRC_TRY(trc_build_mark(b));
     trc_build_traits(b, m);
     return trc_build_emit(b, m);
@@ -46,6 +48,7 @@ trc_status trc_material_compile(const trc_material_desc *desc,
         atomic_init(&m->refs, 1);
         m->flags = desc->flags;
         m->pass_index = desc->pass_index;
+        m->cryptomatte = desc->cryptomatte;
         status = compile(b, m);
     } else {
         trc_fail(status, "no memory to compile a material");

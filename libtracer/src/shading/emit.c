@@ -170,6 +170,21 @@ static void write_leaves(const struct registers *r, struct trc_material *m) {
     m->leaf_count = b->leaf_count;
 }
 
+/* After the leaves, whose operands end where those of the AOVs begin. */
+static void write_aovs(const struct registers *r, struct trc_material *m) {
+    const struct trc_build *b = r->b;
+    for (uint32_t i = 0; i < b->aov_count; i++) {
+        const uint32_t first = b->aovs[i].first_operand;
+        const uint32_t end =
+            i + 1 < b->aov_count ? b->aovs[i + 1].first_operand : b->leaf_operand_count;
+        m->aovs[i] = b->aovs[i];
+        m->aovs[i].first_operand = m->operand_count;
+        for (uint32_t k = first; k < end; k++)
+            m->operands[m->operand_count++] = placed(r, b->leaf_operands[k]);
+    }
+    m->aov_count = b->aov_count;
+}
+
 /* Room for all that is live. */
 static trc_status make_room(const struct trc_build *b, struct trc_material *m) {
     uint32_t ops = 0, operands = b->leaf_operand_count, tables = 0;
@@ -184,7 +199,9 @@ static trc_status make_room(const struct trc_build *b, struct trc_material *m) {
     m->operands = operands ? trc_alloc(operands, sizeof *m->operands) : NULL;
     m->instructions = ops ? trc_alloc(ops, sizeof *m->instructions) : NULL;
     m->tables = tables ? trc_alloc(tables, sizeof *m->tables) : NULL;
-    if ((operands && !m->operands) || (ops && !m->instructions) || (tables && !m->tables)) {
+    m->aovs = b->aov_count ? trc_alloc(b->aov_count, sizeof *m->aovs) : NULL;
+    if ((operands && !m->operands) || (ops && !m->instructions) || (tables && !m->tables) ||
+        (b->aov_count && !m->aovs)) {
         return no_memory();
     }
     return TRC_OK;
@@ -201,6 +218,7 @@ static trc_status emit(struct registers *r, struct trc_material *m) {
         write_op(r, &b->ops[i], m);
     }
     write_leaves(r, m);
+    write_aovs(r, m);
     m->register_count = r->count;
     return TRC_OK;
 }

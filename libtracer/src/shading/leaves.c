@@ -123,3 +123,23 @@ trc_status trc_build_leaves(struct trc_build *b) {
     trc_free(weights);
     return status;
 }
+
+trc_status trc_build_aovs(struct trc_build *b) {
+    for (uint32_t i = 0; i < b->desc->node_count; i++) {
+        const trc_node *node = &b->desc->nodes[i];
+        if (!trc_node_is_output(node->type))
+            continue;
+        if (b->aov_count == TRC_MAX_AOV_OUTPUTS) {
+            return trc_fail(TRC_ERROR_TOO_LARGE, "the material has more than %d AOV nodes",
+                            TRC_MAX_AOV_OUTPUTS);
+        }
+        const bool is_value = node->type == TRC_NODE_AOV_VALUE;
+        TRC_TRY(trc_build_input(b, node, 0, b->leaf_operands + b->leaf_operand_count));
+        b->aovs[b->aov_count++] = (struct trc_aov_output){
+            .pass = is_value ? TRC_PASS_AOV_VALUE(node->mode) : TRC_PASS_AOV_COLOR(node->mode),
+            .first_operand = b->leaf_operand_count,
+        };
+        b->leaf_operand_count += is_value ? 1 : 3;
+    }
+    return TRC_OK;
+}

@@ -128,6 +128,7 @@ static bool make_lamp(struct trc_lamp *lamp, const trc_light_desc *desc) {
         lamp->position[i] = m[4 * i + 3];
     lamp->kind = TRC_KIND_POINT;
     lamp->visibility = desc->visibility | TRC_VISIBLE_SHADOW;
+    lamp->group = desc->light_group;
     lamp->flags =
         (desc->use_mis ? TRC_LAMP_MIS : 0) | (desc->cast_shadow ? TRC_LAMP_CASTS_SHADOW : 0);
     if (desc->type == TRC_LIGHT_SUN)
@@ -366,6 +367,23 @@ static trc_status add_world(struct trc_light_table *table, const struct trc_ligh
 
 /* ---- the table ---- */
 
+/* Whether rays can meet a lamp. */
+static bool is_seen(const struct trc_lamp *lamp) {
+    return !(lamp->flags & TRC_LAMP_DELTA) &&
+           ((lamp->flags & TRC_LAMP_MIS) || (lamp->visibility & TRC_VISIBLE_CAMERA));
+}
+
+static void list_seen(struct trc_light_table *table) {
+    uint32_t count = 0;
+    for (uint32_t group = 0; group <= TRC_MAX_LIGHT_GROUPS; group++) {
+        table->group_seen[group] = count;
+        for (uint32_t i = 0; i < table->lamp_count; i++)
+            if (table->lamps[i].group == group && is_seen(&table->lamps[i]))
+                table->seen[count++] = i;
+    }
+    table->group_seen[TRC_MAX_LIGHT_GROUPS + 1] = count;
+}
+
 static void add_lamps(struct trc_light_table *table, const trc_light_desc *descs, uint32_t count,
                       struct trc_light_bound *bounds, uint32_t *bound_count) {
     for (uint32_t i = 0; i < count; i++) {
@@ -374,9 +392,6 @@ static void add_lamps(struct trc_light_table *table, const trc_light_desc *descs
             continue;
         const uint32_t number = table->lamp_count++;
         table->kinds |= 1u << lamp->kind;
-        const bool extended = !(lamp->flags & TRC_LAMP_DELTA);
-        if (extended && ((lamp->flags & TRC_LAMP_MIS) || (lamp->visibility & TRC_VISIBLE_CAMERA)))
-            table->seen[table->seen_count++] = number;
         if (!(lamp->visibility & RECEIVERS))
             continue;
         table->hides |= (lamp->visibility & RECEIVERS) != RECEIVERS;
@@ -451,6 +466,7 @@ static trc_status fill(struct trc_light_table *table, const struct trc_light_tab
         return status;
     uint32_t bound_count = 0;
     add_lamps(table, lights, light_count, bounds, &bound_count);
+    list_seen(table);
     table->world_visibility = world_sample_visibility(&s->world);
     table->world_light = world_shines(s) ? table->lamp_count : UINT32_MAX;
     table->first_triangle = table->lamp_count + (table->world_light != UINT32_MAX);

@@ -47,7 +47,8 @@ struct trc_lamp {
     float inv_area;
     int32_t kind, flags;
     uint32_t visibility; /* TRC_VISIBLE_* */
-    float unused[7];
+    uint32_t group;      /* light group; 0: none */
+    float unused[6];
 };
 
 /* An emissive triangle. */
@@ -117,8 +118,8 @@ struct trc_light_table {
     uint32_t *distant;    /* numbers of suns, and the world unless apart */
     float *distant_irradiance;
     uint32_t distant_count;
-    uint32_t *seen; /* lamps that rays can meet */
-    uint32_t seen_count;
+    uint32_t *seen;                                /* lamps that rays can meet, by light group */
+    uint32_t group_seen[TRC_MAX_LIGHT_GROUPS + 2]; /* the first of each group, and their number */
     uint32_t *instance_triangles; /* per instance: how many of its triangles are lights */
     struct trc_world_map *map;    /* NULL: cosine or uniform sampling */
     uint32_t world_visibility;    /* of its light samples */

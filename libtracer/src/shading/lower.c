@@ -440,7 +440,7 @@ trc_status trc_build_values(struct trc_build *b) {
     for (uint32_t i = 0; i < b->desc->node_count; i++) {
         struct lowering l = {
             .b = b, .node = &b->desc->nodes[i], .out = b->outputs + b->first_output[i]};
-        if (trc_node_is_shader(l.node->type))
+        if (trc_node_is_shader(l.node->type) || trc_node_is_output(l.node->type))
             continue;
         uint32_t floats = 0;
         for (uint32_t k = 0; k < l.node->input_count; k++) {

@@ -30,6 +30,13 @@ struct trc_leaf {
     uint32_t operand_count;
 };
 
+/* A value besides the surface that a pass shows. */
+#define TRC_MAX_AOV_OUTPUTS 32
+struct trc_aov_output {
+    uint32_t pass;          /* TRC_PASS_AOV_* */
+    uint32_t first_operand; /* one for a value, three for a colour */
+};
+
 /* One step of a program on registers of TRC_WIDTH floats. Opcodes and their meaning of fields are
  * private to shading/compile.c and kernels/program.c (shading/program.h). */
 struct trc_instruction {
@@ -62,8 +69,11 @@ struct trc_material {
     uint32_t has;   /* TRC_MATERIAL_HAS_* */
     uint32_t flags; /* TRC_MATERIAL_* of the public header */
     int32_t pass_index;
+    float cryptomatte; /* id of its name */
     uint32_t leaf_count, operand_count, instruction_count, register_count, table_count;
     struct trc_leaf leaves[TRC_MAX_LEAVES];
+    uint32_t aov_count;
+    struct trc_aov_output *aovs; /* NULL: none */
     struct trc_operand *operands;
     struct trc_instruction *instructions;
     float *tables;

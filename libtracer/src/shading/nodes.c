@@ -83,6 +83,9 @@ static const struct trc_node_info infos[] = {
     {TRC_NODE_VECTOR_ROTATE, "Vector Rotate", "cccfc", "vector center axis angle rotation", "v"},
     {TRC_NODE_CAMERA_DATA, "Camera Data", "", "", "vff"},
     {TRC_NODE_WIREFRAME, "Wireframe", "f", "size", "f"},
+
+    {TRC_NODE_AOV_VALUE, "AOV Value", "f", "value", ""},
+    {TRC_NODE_AOV_COLOR, "AOV Color", "c", "color", ""},
 };
 
 const struct trc_node_info *trc_node_info_of(uint32_t type) {
@@ -94,6 +97,10 @@ const struct trc_node_info *trc_node_info_of(uint32_t type) {
 }
 
 bool trc_node_is_shader(uint32_t type) { return type < TRC_NODE_IMAGE; }
+
+bool trc_node_is_output(uint32_t type) {
+    return type == TRC_NODE_AOV_VALUE || type == TRC_NODE_AOV_COLOR;
+}
 
 char trc_node_output_kind(const trc_node *node, uint32_t output) {
     if (node->type == TRC_NODE_COMBINE && node->mode == TRC_SEPARATE_XYZ)
@@ -161,6 +168,9 @@ bool trc_node_mode_is_valid(uint32_t type, uint32_t mode) {
                mode >> 4 <= 3;
     case TRC_NODE_VECTOR_ROTATE:
         return (mode & ~8u) <= TRC_ROTATE_EULER;
+    case TRC_NODE_AOV_VALUE:
+    case TRC_NODE_AOV_COLOR:
+        return mode < TRC_MAX_AOVS;
     case TRC_NODE_MAGIC:
         return mode <= 10;
     case TRC_NODE_BRICK:

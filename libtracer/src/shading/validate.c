@@ -132,6 +132,7 @@ trc_status trc_material_validate(const trc_material_desc *desc) {
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "flags has unknown bits: %#" PRIx32,
                         desc->flags);
     }
+    TRC_TRY(trc_check_finite(&desc->cryptomatte, 1, "cryptomatte"));
     for (uint32_t i = 0; i < desc->node_count; i++)
         TRC_TRY(check_node(desc, i));
     if (desc->node_count == 0 || desc->surface == -1)

@@ -353,7 +353,7 @@ static void rays_agree_with_samples(void **state) {
             vf_select(vf_ge(l.distance, vf_set(TRC_FAR)), l.distance, l.distance * vf_set(1.001f));
         TRC_KERNEL(trc_light_hit)
         (&s.snapshot, r.p, r.n, l.wi, vf_zero(), far, pb, vf_one(),
-         vu_set(TRC_VISIBLE_GLOSSY | TRC_PATH_REFLECTED), vf_zero(), l.valid, &radiance);
+         vu_set(TRC_VISIBLE_GLOSSY | TRC_PATH_REFLECTED), TRC_ALL_GROUPS, l.valid, &radiance);
         for (int k = 0; k < TRC_WIDTH; k++) {
             if (!((vm_bits(l.valid) >> k) & 1u))
                 continue;
@@ -418,10 +418,10 @@ static void densities_integrate_to_one(void **state) {
                 const vuint path = vu_set(TRC_VISIBLE_GLOSSY | TRC_PATH_REFLECTED);
                 TRC_KERNEL(trc_light_hit)
                 (&s.snapshot, r.p, r.n, wi, vf_zero(), vf_set(TRC_FAR), vf_one(), vf_one(), path,
-                 vf_zero(), vm_all_set(), &weighed);
+                 TRC_ALL_GROUPS, vm_all_set(), &weighed);
                 TRC_KERNEL(trc_light_hit)
                 (&s.snapshot, r.p, r.n, wi, vf_zero(), vf_set(TRC_FAR), vf_set(-1.0f), vf_one(),
-                 path, vf_zero(), vm_all_set(), &whole);
+                 path, TRC_ALL_GROUPS, vm_all_set(), &whole);
                 for (int k = 0; k < TRC_WIDTH; k++)
                     if (vf_get(weighed.y, k) > 0.0f)
                         sum += implied_pdf((double)vf_get(weighed.y, k), (double)vf_get(whole.y, k),
@@ -603,13 +603,13 @@ static void hidden_lamps(void **state) {
         vvec3 radiance = v3_zero();
         TRC_KERNEL(trc_light_hit)
         (&s.snapshot, v3_zero(), v3_zero(), up, vf_zero(), vf_set(5.0f), vf_set(-1.0f), vf_one(),
-         vu_set(cases[i].path), vf_zero(), vm_all_set(), &radiance);
+         vu_set(cases[i].path), TRC_ALL_GROUPS, vm_all_set(), &radiance);
         const float want = cases[i].seen ? 25.0f : 0.0f;
         assert_true(fabsf(vf_get(radiance.x, 0) - want) < 1e-3f);
         /* Rays that pass do not end at lamps; those that stop before do not see them. */
         TRC_KERNEL(trc_light_hit)
         (&s.snapshot, v3_zero(), v3_zero(), up, vf_zero(), vf_set(1.9f), vf_set(-1.0f), vf_one(),
-         vu_set(cases[i].path), vf_zero(), vm_all_set(), &radiance);
+         vu_set(cases[i].path), TRC_ALL_GROUPS, vm_all_set(), &radiance);
         assert_true(fabsf(vf_get(radiance.x, 0) - want) < 1e-3f);
         scene_end(&s);
     }
