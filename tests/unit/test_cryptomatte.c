@@ -106,7 +106,7 @@ static void add_square(trc_scene scene, trc_id mesh, float distance, float part,
                        float object, float asset) {
     const float half = 0.5f * distance * sqrtf(part);
     const float transform[12] = {half, 0, 0, 0, 0, half, 0, 0, 0, 0, 1, 5.0f - distance};
-    trc_instance_desc desc = fixture_instance_desc(mesh);
+    trc_instance_desc desc = default_instance_desc(mesh);
     trc_id id = 0;
     desc.transforms = transform;
     desc.materials = &material;
@@ -119,9 +119,9 @@ static void add_square(trc_scene scene, trc_id mesh, float distance, float part,
 static trc_scene nested_squares(void) {
     trc_scene scene = 0;
     trc_id mesh = 0, glass = 0;
-    const trc_scene_desc scene_desc = fixture_scene_desc();
+    const trc_scene_desc scene_desc = default_scene_desc();
     assert_int_equal(trc_scene_create(&scene_desc, &scene), TRC_OK);
-    trc_mesh_desc mesh_desc = fixture_mesh_desc();
+    trc_mesh_desc mesh_desc = default_mesh_desc();
     mesh_desc.indices = cube_indices + 6; /* the top face */
     mesh_desc.index_count = 6;
     mesh_desc.triangle_count = 2;
@@ -139,7 +139,7 @@ static trc_scene nested_squares(void) {
     add_square(scene, mesh, 4.0f, near_part, glass, trc_cryptomatte_id("near"), both);
     add_square(scene, mesh, 6.0f, middle_part, 0, trc_cryptomatte_id("middle"), both);
     add_square(scene, mesh, 10.0f, far_part, 0, trc_cryptomatte_id("far"), 0.0f);
-    const trc_camera_desc camera = fixture_camera_desc();
+    const trc_camera_desc camera = default_camera_desc();
     assert_int_equal(trc_scene_set_camera(scene, &camera), TRC_OK);
     assert_int_equal(trc_scene_commit(scene), TRC_OK);
     return scene;
@@ -147,7 +147,7 @@ static trc_scene nested_squares(void) {
 
 static void draw(trc_scene scene, uint32_t threads,
                  float mattes[TRC_CRYPTOMATTE_KINDS][LAYERS][FLOATS]) {
-    trc_render_desc desc = fixture_render_desc(SIDE, SIDE, 64);
+    trc_render_desc desc = default_render_desc(SIDE, SIDE, 64);
     desc.filter = TRC_FILTER_BOX;
     desc.filter_width = 1.0f;
     desc.thread_count = threads;

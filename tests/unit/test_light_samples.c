@@ -44,7 +44,7 @@ static void passes_change_nothing(void **state) {
     static float without[4 * FRAME], with[4 * FRAME];
     const trc_scene scene = fixture_scene();
     draw(scene, 8, 4, without);
-    trc_render_desc desc = fixture_render_desc(WIDTH, HEIGHT, 8);
+    trc_render_desc desc = default_render_desc(WIDTH, HEIGHT, 8);
     desc.light_samples = 4;
     desc.passes = (UINT64_C(1) << TRC_PASS_COUNT) - 1;
     desc.cryptomattes = 1;

@@ -60,8 +60,7 @@ static trc_status eye_render(const struct frame_scene *scene, const trc_render_d
                              const uint32_t *table, struct frame_result *out) {
     struct trc_film film;
     const atomic_uint cancel = 0;
-    const trc_status status =
-        trc_film_create(&film, desc->crop_width, desc->crop_height, desc->passes);
+    const trc_status status = trc_film_create(desc, &film);
     if (status != TRC_OK)
         return status;
     const struct trc_tile_job job = {
