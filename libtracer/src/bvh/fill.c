@@ -12,12 +12,11 @@
 /* Kernels load this many slots from wherever a leaf begins. */
 #define LOAD_SLOTS 8
 
-void trc_part_vertex(const struct trc_part *part, uint32_t triangle, uint32_t v, uint32_t key,
-                     float out[3]) {
-    const struct trc_mesh *mesh = part->mesh;
-    const uint32_t k = mesh->key_count > 1 ? key : 0;
-    const float *p = mesh->positions +
-                     3 * ((size_t)k * mesh->vertex_count + mesh->indices[3 * (size_t)triangle + v]);
+static const float *key_positions(const struct trc_mesh *mesh, uint32_t key) {
+    return mesh->positions + (mesh->key_count > 1 ? 3 * (size_t)key * mesh->vertex_count : 0);
+}
+
+static inline void corner_load(const struct trc_part *part, const float *p, float out[3]) {
     if (!part->transform) {
         memcpy(out, p, 3 * sizeof(float));
         return;
@@ -25,6 +24,32 @@ void trc_part_vertex(const struct trc_part *part, uint32_t triangle, uint32_t v,
     const float *m = part->transform->m;
     for (int i = 0; i < 3; i++)
         out[i] = m[4 * i] * p[0] + m[4 * i + 1] * p[1] + m[4 * i + 2] * p[2] + m[4 * i + 3];
+}
+
+void trc_part_vertex(const struct trc_part *part, uint32_t triangle, uint32_t v, uint32_t key,
+                     float out[3]) {
+    const struct trc_mesh *mesh = part->mesh;
+    corner_load(
+        part, key_positions(mesh, key) + 3 * (size_t)mesh->indices[3 * (size_t)triangle + v], out);
+}
+
+/* Whether floats, whose products are off by less than 4 half-ulps of both, tell that corners are
+ * not on a line: nearly always. */
+#define BENT_MARGIN 1e-6f
+#define BENT_LEAST 1e-30f
+static inline bool is_surely_bent(const float *a, const float *b, const float *c) {
+    float p[3], q[3];
+    for (int i = 0; i < 3; i++) {
+        p[i] = b[i] - a[i];
+        q[i] = c[i] - a[i];
+    }
+    for (int i = 0; i < 3; i++) {
+        const int j = (i + 1) % 3;
+        const float x = p[i] * q[j], y = p[j] * q[i];
+        if (fabsf(x - y) > BENT_MARGIN * (fabsf(x) + fabsf(y)) + BENT_LEAST)
+            return true;
+    }
+    return false;
 }
 
 /* Whether a triangle's corners, by double arithmetic, lie on a line. */
@@ -37,17 +62,23 @@ static bool is_on_a_line(const float *a, const float *b, const float *c) {
     return p[1] * q[2] == p[2] * q[1] && p[2] * q[0] == p[0] * q[2] && p[0] * q[1] == p[1] * q[0];
 }
 
-void trc_part_triangle(const struct trc_part *part, uint32_t triangle, uint32_t key,
-                       float out[3][3]) {
-    const struct trc_mesh *mesh = part->mesh;
-    const uint32_t *index = mesh->indices + 3 * (size_t)triangle;
-    const float *p = mesh->positions;
-    for (uint32_t v = 0; v < 3; v++)
-        trc_part_vertex(part, triangle, v, key, out[v]);
-    if (mesh->key_count == 1 &&
-        is_on_a_line(p + 3 * (size_t)index[0], p + 3 * (size_t)index[1], p + 3 * (size_t)index[2]))
+/* The triangle of those vertices, as a leaf holds it. */
+static inline void triangle_load(const struct trc_part *part, const uint32_t index[3], uint32_t key,
+                                 float out[3][3]) {
+    const float *all = key_positions(part->mesh, key);
+    const float *p[3] = {all + 3 * (size_t)index[0], all + 3 * (size_t)index[1],
+                         all + 3 * (size_t)index[2]};
+    for (int v = 0; v < 3; v++)
+        corner_load(part, p[v], out[v]);
+    if (part->mesh->key_count == 1 && !is_surely_bent(p[0], p[1], p[2]) &&
+        is_on_a_line(p[0], p[1], p[2]))
         for (int v = 1; v < 3; v++)
             memcpy(out[v], out[0], sizeof out[0]);
+}
+
+void trc_part_triangle(const struct trc_part *part, uint32_t triangle, uint32_t key,
+                       float out[3][3]) {
+    triangle_load(part, part->mesh->indices + 3 * (size_t)triangle, key, out);
 }
 
 static trc_status tree_alloc(struct trc_tree *tree, uint32_t node_count, uint32_t slot_count,
@@ -89,7 +120,9 @@ struct fill_job {
     const struct trc_ref *refs; /* by slot; NULL: the slots are there, all of parts[0] */
     const struct trc_part *parts;
     struct trc_tree *tree;
-    atomic_bool transparent;
+    uint8_t *pending;                 /* per node: its box waits for nodes of other tasks */
+    double *area_sums;                /* per task: areas of the boxes that it set */
+    atomic_bool transparent, spoiled; /* spoiled: a coordinate is not finite */
 };
 
 static bool part_is_transparent(const struct trc_part *part, uint32_t triangle) {
@@ -112,20 +145,51 @@ static const struct trc_part *slot_fill(struct fill_job *job, uint32_t slot) {
     return part;
 }
 
-static void leaf_fill(struct fill_job *job, uint32_t ref) {
-    struct trc_tree *tree = job->tree;
+/* A triangle on its way into a leaf. */
+struct source {
+    const struct trc_part *part;
+    uint32_t index[3];
+};
+
+/* What the leaf is made of; asks for the vertices, since each is a miss of the cache. */
+static struct source *leaf_gather(struct fill_job *job, uint32_t ref, struct source *at) {
     const uint32_t first = trc_leaf_first(ref), count = trc_leaf_count(ref);
-    for (uint32_t slot = 0; slot < count; slot++) {
-        const struct trc_part *part = slot_fill(job, first + slot);
-        for (uint32_t key = 0; key < tree->key_count; key++) {
-            float *v = trc_leaf_vertices(tree, ref, key) + slot;
-            float p[3][3];
-            trc_part_triangle(part, tree->slots[first + slot].triangle, key, p);
-            for (uint32_t corner = 0; corner < 3; corner++)
-                for (uint32_t axis = 0; axis < 3; axis++)
-                    v[(3 * corner + axis) * count] = p[corner][axis];
-        }
+    for (uint32_t slot = first; slot < first + count; slot++, at++) {
+        at->part = slot_fill(job, slot);
+        const struct trc_mesh *mesh = at->part->mesh;
+        memcpy(at->index, mesh->indices + 3 * (size_t)job->tree->slots[slot].triangle,
+               sizeof at->index);
+        for (int v = 0; v < 3; v++)
+            __builtin_prefetch(mesh->positions + 3 * (size_t)at->index[v]);
     }
+    return at;
+}
+
+/* Fills the leaf at a key; its box. False if a coordinate is not finite: the box ignores NaN. */
+static bool leaf_fill(struct trc_tree *tree, uint32_t ref, uint32_t key,
+                      const struct source *sources, float lower_out[3], float upper_out[3]) {
+    const uint32_t count = trc_leaf_count(ref);
+    float *v = trc_leaf_vertices(tree, ref, key);
+    float lower[3] = {INFINITY, INFINITY, INFINITY}, upper[3] = {-INFINITY, -INFINITY, -INFINITY};
+    bool finite = true;
+    for (uint32_t slot = 0; slot < count; slot++, v++) {
+        float p[3][3], sum = 0.0f;
+        triangle_load(sources[slot].part, sources[slot].index, key, p);
+        for (int axis = 0; axis < 3; axis++) {
+            const float a = p[0][axis], b = p[1][axis], c = p[2][axis];
+            const float low = a < b ? a : b, high = a > b ? a : b;
+            const float low_c = c < low ? c : low, high_c = c > high ? c : high;
+            lower[axis] = low_c < lower[axis] ? low_c : lower[axis];
+            upper[axis] = high_c > upper[axis] ? high_c : upper[axis];
+            sum += a + b + c;
+        }
+        finite = finite && fabsf(sum) < INFINITY;
+        for (uint32_t k = 0; k < 9; k++)
+            v[k * count] = p[k / 3][k % 3];
+    }
+    memcpy(lower_out, lower, sizeof lower);
+    memcpy(upper_out, upper, sizeof upper);
+    return finite;
 }
 
 /* lower and upper of a leaf at a key. */
@@ -134,16 +198,13 @@ static void leaf_bounds(const struct trc_tree *tree, uint32_t ref, uint32_t key,
     const uint32_t count = trc_leaf_count(ref);
     const float *v = trc_leaf_vertices(tree, ref, key);
     for (uint32_t axis = 0; axis < 3; axis++) {
-        const float *a = v + axis * count, *b = a + 3 * count, *c = b + 3 * count;
-        float low = a[0], high = a[0];
-        for (uint32_t slot = 0; slot < count; slot++) {
-            const float l = a[slot] < b[slot] ? a[slot] : b[slot];
-            const float h = a[slot] > b[slot] ? a[slot] : b[slot];
-            low = l < low ? l : low;
-            low = c[slot] < low ? c[slot] : low;
-            high = h > high ? h : high;
-            high = c[slot] > high ? c[slot] : high;
-        }
+        float low = INFINITY, high = -INFINITY;
+        for (uint32_t corner = 0; corner < 3; corner++)
+            for (uint32_t slot = 0; slot < count; slot++) {
+                const float x = v[(3 * corner + axis) * count + slot];
+                low = x < low ? x : low;
+                high = x > high ? x : high;
+            }
         lower[axis] = low;
         upper[axis] = high;
     }
@@ -192,9 +253,21 @@ static float box_area(const float lower[3], const float upper[3]) {
     return x >= 0.0f ? x * y + y * z + z * x : 0.0f;
 }
 
-/* Root bounds, their scale, and the SAH cost at key 0: area of every child's box over the root's.
- */
-static void tree_finish(struct trc_tree *tree) {
+/* Areas of the boxes of a node's children at key 0. */
+static double children_area(const struct trc_tree *tree, uint32_t node) {
+    const float *b = trc_node_bounds(tree, node, 0);
+    double sum = 0.0;
+    for (int i = 0; i < TRC_NODE_WIDTH; i++) {
+        const float lower[3] = {b[i], b[16 + i], b[32 + i]};
+        const float upper[3] = {b[8 + i], b[24 + i], b[40 + i]};
+        sum += box_area(lower, upper);
+    }
+    return sum;
+}
+
+/* Root bounds, their scale, and the SAH cost at key 0: area_sum, that of every child's box, over
+ * the root's. */
+static void tree_finish(struct trc_tree *tree, double area_sum) {
     for (int axis = 0; axis < 3; axis++) {
         tree->lower[axis] = INFINITY;
         tree->upper[axis] = -INFINITY;
@@ -215,58 +288,106 @@ static void tree_finish(struct trc_tree *tree) {
     for (int axis = 0; axis < 3; axis++)
         tree->extent =
             fmaxf(tree->extent, fmaxf(fabsf(tree->lower[axis]), fabsf(tree->upper[axis])));
-    double sum = 0.0;
-    for (uint32_t n = 0; n < tree->node_count; n++) {
-        const float *b = trc_node_bounds(tree, n, 0);
-        for (int i = 0; i < TRC_NODE_WIDTH; i++) {
-            const float lower[3] = {b[i], b[16 + i], b[32 + i]};
-            const float upper[3] = {b[8 + i], b[24 + i], b[40 + i]};
-            sum += box_area(lower, upper);
-        }
-    }
     const float root_area = box_area(tree->lower, tree->upper);
-    tree->sah_cost = root_area > 0.0f ? (float)(sum / root_area) : 0.0f;
+    tree->sah_cost = root_area > 0.0f ? (float)(area_sum / root_area) : 0.0f;
 }
 
-/* Boxes of a node's children of one sort: leaves and empty ones, or nodes. */
-static void children_bound(struct trc_tree *tree, uint32_t node, bool nodes) {
+static bool is_leaf(uint32_t ref) { return ref != TRC_REF_EMPTY && (ref & TRC_REF_LEAF); }
+static bool is_node(uint32_t ref) { return !(ref & TRC_REF_LEAF); } /* the empty one has it too */
+
+/* The leaves of a node, and the boxes of those and of no children. */
+static void leaves_fill(struct fill_job *job, uint32_t node) {
+    struct trc_tree *tree = job->tree;
     const uint32_t *children = trc_node_children(tree, node);
+    struct source sources[TRC_NODE_WIDTH * LOAD_SLOTS], *end = sources;
+    for (uint32_t i = 0; i < TRC_NODE_WIDTH; i++)
+        if (is_leaf(children[i]))
+            end = leaf_gather(job, children[i], end);
+    const struct source *at = sources;
     for (uint32_t i = 0; i < TRC_NODE_WIDTH; i++) {
-        const bool is_node = children[i] != TRC_REF_EMPTY && !(children[i] & TRC_REF_LEAF);
-        if (is_node != nodes)
+        float lower[3], upper[3];
+        if (is_node(children[i]))
             continue;
         for (uint32_t key = 0; key < tree->key_count; key++) {
-            float lower[3], upper[3];
-            ref_bounds(tree, children[i], key, lower, upper);
+            if (is_leaf(children[i]) && !leaf_fill(tree, children[i], key, at, lower, upper))
+                atomic_store_explicit(&job->spoiled, true, memory_order_relaxed);
+            if (children[i] == TRC_REF_EMPTY)
+                ref_bounds(tree, TRC_REF_EMPTY, key, lower, upper);
             child_store(tree, node, i, key, lower, upper);
         }
+        if (is_leaf(children[i]))
+            at += trc_leaf_count(children[i]);
     }
 }
 
-/* Leaves of a run of nodes, and their boxes while they are at hand. */
+/* Boxes of a node's children that are nodes, whose own boxes must be there. */
+static void nodes_bound(struct trc_tree *tree, uint32_t node) {
+    const uint32_t *children = trc_node_children(tree, node);
+    for (uint32_t i = 0; i < TRC_NODE_WIDTH; i++)
+        for (uint32_t key = 0; is_node(children[i]) && key < tree->key_count; key++) {
+            float lower[3], upper[3];
+            node_bounds(tree, children[i], key, lower, upper);
+            child_store(tree, node, i, key, lower, upper);
+        }
+}
+
+/* A run of nodes, backwards: children come after their parents, mostly in the same run. */
 static void fill_task(void *context, uint32_t index, uint32_t worker) {
     (void)worker;
     struct fill_job *job = context;
     struct trc_tree *tree = job->tree;
-    const uint32_t begin = index * NODES_PER_TASK;
-    for (uint32_t n = begin; n < tree->node_count && n < begin + NODES_PER_TASK; n++) {
+    const uint32_t begin = index * NODES_PER_TASK, left = tree->node_count - begin;
+    const uint32_t end = begin + (left < NODES_PER_TASK ? left : NODES_PER_TASK);
+    double sum = 0.0;
+    for (uint32_t n = end; n-- > begin;) {
         const uint32_t *children = trc_node_children(tree, n);
+        leaves_fill(job, n);
+        job->pending[n] = false;
         for (int i = 0; i < TRC_NODE_WIDTH; i++)
-            if (children[i] != TRC_REF_EMPTY && (children[i] & TRC_REF_LEAF))
-                leaf_fill(job, children[i]);
-        children_bound(tree, n, false);
+            if (is_node(children[i]) && (children[i] >= end || job->pending[children[i]]))
+                job->pending[n] = true;
+        if (job->pending[n])
+            continue;
+        nodes_bound(tree, n);
+        sum += children_area(tree, n);
     }
+    job->area_sums[index] = sum;
 }
 
-/* Leaves by all threads, then nodes after their children; all keys in one pass. */
-static void tree_fill(struct fill_job *job, struct trc_pool *pool) {
+/* Leaves and most nodes by all threads, then the nodes above them; all keys in one pass. */
+static trc_status tree_fill(struct fill_job *job, struct trc_pool *pool) {
     struct trc_tree *tree = job->tree;
-    if (tree->root != TRC_REF_EMPTY && (tree->root & TRC_REF_LEAF))
-        leaf_fill(job, tree->root);
-    trc_pool_run(pool, (tree->node_count + NODES_PER_TASK - 1) / NODES_PER_TASK, fill_task, job);
-    for (uint32_t n = tree->node_count; n-- > 0;)
-        children_bound(tree, n, true);
-    tree_finish(tree);
+    const uint32_t task_count = (tree->node_count + NODES_PER_TASK - 1) / NODES_PER_TASK;
+    job->pending = trc_alloc(tree->node_count ? tree->node_count : 1, sizeof *job->pending);
+    job->area_sums = trc_alloc(task_count ? task_count : 1, sizeof *job->area_sums);
+    const bool enough = job->pending && job->area_sums;
+    if (enough && is_leaf(tree->root)) {
+        struct source sources[LOAD_SLOTS];
+        float lower[3], upper[3];
+        leaf_gather(job, tree->root, sources);
+        for (uint32_t key = 0; key < tree->key_count; key++)
+            if (!leaf_fill(tree, tree->root, key, sources, lower, upper))
+                job->spoiled = true;
+    }
+    double sum = 0.0;
+    if (enough)
+        trc_pool_run(pool, task_count, fill_task, job);
+    for (uint32_t i = 0; enough && i < task_count; i++)
+        sum += job->area_sums[i];
+    for (uint32_t n = tree->node_count; enough && n-- > 0;)
+        if (job->pending[n]) {
+            nodes_bound(tree, n);
+            sum += children_area(tree, n);
+        }
+    if (enough)
+        tree_finish(tree, sum);
+    if (job->spoiled)
+        tree->extent = INFINITY;
+    trc_free(job->pending);
+    trc_free(job->area_sums);
+    return enough ? TRC_OK
+                  : trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory to fill a tree of %u nodes",
+                             tree->node_count);
 }
 
 trc_status trc_tree_fill(const struct trc_topology *topology, const struct trc_ref *refs,
@@ -279,10 +400,12 @@ trc_status trc_tree_fill(const struct trc_topology *topology, const struct trc_r
         memcpy(tree->nodes + n * tree->node_stride, topology->children[n],
                sizeof topology->children[n]);
     tree->root = topology->root;
-    struct fill_job job = {refs, parts, tree, false};
-    tree_fill(&job, pool);
+    struct fill_job job = {.refs = refs, .parts = parts, .tree = tree};
+    const trc_status filled = tree_fill(&job, pool);
     tree->has_transparent = job.transparent;
-    return TRC_OK;
+    if (filled != TRC_OK)
+        trc_tree_destroy(tree);
+    return filled;
 }
 
 trc_status trc_tree_refit(const struct trc_tree *from, const struct trc_part *part,
@@ -298,9 +421,11 @@ trc_status trc_tree_refit(const struct trc_tree *from, const struct trc_part *pa
         memcpy(tree->slots, from->slots, from->slot_count * sizeof *tree->slots);
     tree->root = from->root;
     tree->has_transparent = from->has_transparent;
-    struct fill_job job = {NULL, part, tree, false};
-    tree_fill(&job, pool);
-    return TRC_OK;
+    struct fill_job job = {.parts = part, .tree = tree};
+    const trc_status filled = tree_fill(&job, pool);
+    if (filled != TRC_OK)
+        trc_tree_destroy(tree);
+    return filled;
 }
 
 trc_status trc_tree_fill_top(const struct trc_topology *topology, const struct trc_ref *refs,

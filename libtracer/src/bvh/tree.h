@@ -162,7 +162,7 @@ trc_status trc_tree_fill(const struct trc_topology *topology, const struct trc_r
                          struct trc_pool *pool, struct trc_tree *tree);
 
 /* The same tree with other positions of the same topology: a copy of *from, refilled and bounded.
- */
+ * Its extent is infinite if a position is not finite. */
 trc_status trc_tree_refit(const struct trc_tree *from, const struct trc_part *part,
                           uint32_t key_count, struct trc_pool *pool, struct trc_tree *tree);
 
