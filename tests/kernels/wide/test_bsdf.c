@@ -527,7 +527,8 @@ static void diffuse_albedos(void **state) {
         struct trc_lobes l;
         prepare(&fibres, direction(c, 0.3), &s, &l);
         const double kept = (double)vf_get(l.lobe[0].weight.x, 0);
-        assert_true(kept > 0.01 && kept < 1.0);
+        printf("cos %.1f: fibre sheen keeps %.4f\n", c, kept);
+        assert_true(kept > 1e-3 && kept < 1.0);
         assert_true(fabs(diffuse_albedo(&fibres, c) / kept - 1.0) < 0.01);
     }
 }
