@@ -105,7 +105,7 @@ run_tests() {
 }
 
 # What takes long for what it says of Blender's version.
-SLOW="test_whitted"
+SLOW="test_whitted or test_means_are_those_of_cycles"
 
 main() {
     local report="" status=0 arguments=()
