@@ -13,24 +13,13 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
+source tests/find_python.sh
+
 results=build/results
 summary=()
 next="" # what to run in the next Blender: nothing, all or fast
 
 say() { printf '== %s\n' "$*"; }
-
-# The first interpreter that has numpy and pytest: Debian's, even if another comes first in PATH.
-find_python() {
-    local python
-    for python in python3 /usr/bin/python3; do
-        if "$python" -c 'import numpy, pytest' >/dev/null 2>&1 </dev/null; then
-            printf '%s\n' "$python"
-            return
-        fi
-    done
-    printf 'tests/run.sh: no python3 with numpy and pytest\n' >&2
-    return 1
-}
 
 run_ctest() {
     say "Tests in C"
@@ -78,7 +67,7 @@ if ! bash tests/setup.sh; then
     printf '0 passed, 1 failed\n'
     exit 1
 fi
-python=$(find_python)
+python=$(find_python numpy pytest)
 rm -rf "$results"
 mkdir -p "$results"
 

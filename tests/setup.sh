@@ -4,8 +4,8 @@
 #   bash tests/setup.sh [--ci] [--report] [packages|build]...     both steps if none is named
 #
 # Installs as root, or through sudo. --ci adds the packages that .ci/run needs, --report those of
-# tests/bench/report.sh. Quick when nothing is
-# missing and nothing changed. BUILD_DIR names another folder than build.
+# tests/bench/report.sh. Quick when nothing is missing and nothing changed. BUILD_DIR names another
+# folder than build.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 

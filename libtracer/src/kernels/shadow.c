@@ -119,8 +119,9 @@ static uint64_t transparency(struct trc_tile *t, float factor[3][TRC_PACKET_SIZE
 static void light_scale(struct trc_tile *t, uint32_t ray, float r, float g, float b) {
     struct trc_shadow_store *q = &t->shadows;
     const float factor[3] = {r, g, b};
-    for (uint32_t k = 0; k < q->scaled_count; k++)
-        q->scaled[k][ray] *= factor[k % 3];
+    for (uint32_t k = 0; k < q->scaled_count; k += 3)
+        for (uint32_t c = 0; c < 3; c++)
+            q->scaled[k + c][ray] *= factor[c];
 }
 
 /* Adds what a ray carries to the passes of light by kind. */

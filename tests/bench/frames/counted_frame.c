@@ -17,7 +17,7 @@
 
 extern const struct trc_kernels trc_kernels_counted;
 
-struct ray_tests frame_tests[RAY_CLASSES];
+struct trace_counts frame_tests[RAY_CLASSES];
 
 enum ray_class frame_tests_class(uint32_t visibility) {
     switch (visibility) {
@@ -81,7 +81,7 @@ static trc_status eye_render(const struct frame_scene *scene, const trc_render_d
 }
 
 trc_status counted_frame_render(const struct frame_scene *scene, const struct spec *spec,
-                                struct frame_result *out, struct ray_tests *tests_out) {
+                                struct frame_result *out, struct trace_counts *tests_out) {
     const trc_render_desc chosen = frame_desc(spec), desc = trc_render_resolve(&chosen);
     uint32_t *table = NULL;
     memset(out, 0, sizeof *out);

@@ -7,6 +7,6 @@
 
 /* As frame_render, on the calling thread and without times; tests_out: RAY_CLASSES values. */
 trc_status counted_frame_render(const struct frame_scene *scene, const struct spec *spec,
-                                struct frame_result *out, struct ray_tests *tests_out);
+                                struct frame_result *out, struct trace_counts *tests_out);
 
 #endif

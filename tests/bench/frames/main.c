@@ -46,14 +46,14 @@ static void json_result(FILE *json, const struct spec *spec, const struct frame_
 }
 
 static void json_counts(FILE *json, const struct spec *spec, const struct frame_result *r,
-                        const struct ray_tests tests[RAY_CLASSES]) {
+                        const struct trace_counts tests[RAY_CLASSES]) {
     static const char *const names[RAY_CLASSES] = {"camera", "reflection", "refraction", "shadow",
                                                    "mixed"};
     const uint64_t rays[RAY_CLASSES] = {r->rays_camera, r->rays_reflection, r->rays_refraction,
                                         r->rays_shadow, 0};
     fprintf(json, "{\"row\": \"counts\", \"spec\": \"%s\"", spec->text);
     for (int i = 0; i < RAY_CLASSES; i++) {
-        const struct ray_tests *t = &tests[i];
+        const struct trace_counts *t = &tests[i];
         fprintf(json,
                 ", \"%s\": {\"rays\": %llu, \"nodes\": %llu, \"box_rays\": %llu, "
                 "\"triangle_rays\": %llu, \"visits\": %llu, \"visit_rays\": %llu, "
@@ -89,7 +89,7 @@ static bool measure(const struct bench *b, uint32_t number, const struct frame_s
                     uint32_t repeat) {
     const struct spec *spec = &b->specs[number];
     struct frame_result result;
-    struct ray_tests tests[RAY_CLASSES];
+    struct trace_counts tests[RAY_CLASSES];
     const bool wants_picture = b->pictures && repeat == 0 && !spec->counts;
     float *picture =
         wants_picture ? buffer_alloc((size_t)spec->width * spec->height, 4 * sizeof(float)) : NULL;

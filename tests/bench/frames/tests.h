@@ -4,7 +4,7 @@
 #ifndef TRACER_BENCH_FRAMES_TESTS_H
 #define TRACER_BENCH_FRAMES_TESTS_H
 
-#include <stdint.h>
+#include "../trace_counts.h"
 
 /* By the packet's visibility; RAYS_MIXED: packets of the blind assembly. */
 enum ray_class {
@@ -16,19 +16,8 @@ enum ray_class {
     RAY_CLASSES
 };
 
-struct ray_tests {
-    uint64_t nodes;            /* beams of packets against the eight boxes of a node */
-    uint64_t box_rays;         /* rays of packets against one box */
-    uint64_t triangle_rays;    /* rays of packets against one triangle */
-    uint64_t visits;           /* of nodes and leaves by packets */
-    uint64_t visit_rays;       /* live rays at those */
-    uint64_t single_nodes;     /* rays on their own against the eight boxes of a node */
-    uint64_t single_leaves;    /* rays on their own against the triangles of a leaf */
-    uint64_t single_triangles; /* and those triangles */
-};
-
 /* Of the frames counted so far. Not for several threads at once. */
-extern struct ray_tests frame_tests[RAY_CLASSES];
+extern struct trace_counts frame_tests[RAY_CLASSES];
 
 enum ray_class frame_tests_class(uint32_t visibility);
 

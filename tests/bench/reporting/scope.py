@@ -11,7 +11,7 @@ SAMPLERS = ("SOBOL", "SUDOKU", "JITTER", "INDEPENDENT", "BLUE_NOISE")
 @dataclass(frozen=True)
 class Scope:
     """Numbers of scenes, samples, seeds and repeats of a mode; ``minutes`` is about what it takes on
-    two cores of a 2024 desktop machine."""
+    two quiet cores, estimated for medium and full."""
 
     name: str
     minutes: int
