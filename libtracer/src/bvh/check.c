@@ -11,6 +11,7 @@
 #include <string.h>
 
 #include "bvh/bvh.h"
+#include "bvh/part.h"
 #include "bvh/tree.h"
 #include "core/core.h"
 #include "scene/mesh.h"
@@ -331,13 +332,16 @@ static bool check_shape(struct tree_check *t) {
 /* ---- whole trees ---- */
 
 static bool triangle_is_valid(const struct trc_part *part, uint32_t triangle, uint32_t key_count) {
-    for (uint32_t key = 0; key < key_count; key++)
-        for (uint32_t corner = 0; corner < 3; corner++) {
+    for (uint32_t key = 0; key < key_count; key++) {
+        f4 corner[3];
+        trc_part_corners(part, part->mesh->indices + 3 * (size_t)triangle, key, corner);
+        for (uint32_t v = 0; v < 3; v++) {
             float p[3];
-            trc_part_vertex(part, triangle, corner, key, p);
+            f4_store3(p, corner[v]);
             if (!trc_point_is_valid(p))
                 return false;
         }
+    }
     return true;
 }
 

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "bvh/bvh.h"
+#include "bvh/part.h"
 #include "bvh/tree.h"
 #include "core/core.h"
 #include "shading/material.h"
@@ -26,35 +27,23 @@ struct create_job {
     uint32_t *first_slot; /* per instance */
 };
 
-static bool vertex_is_valid(const float p[3]) {
-    return fabsf(p[0]) <= COORDINATE_LIMIT && fabsf(p[1]) <= COORDINATE_LIMIT &&
-           fabsf(p[2]) <= COORDINATE_LIMIT; /* false for NaN */
-}
-
-/* Box of a triangle, the mean over its keys; false where a vertex is not valid at some key. */
+/* Box of a triangle, the mean over its keys; false where a corner is not valid at some key. */
 static bool triangle_ref(const struct trc_part *part, uint32_t triangle, struct trc_ref *ref) {
+    const uint32_t *index = part->mesh->indices + 3 * (size_t)triangle;
     const uint32_t key_count = part->mesh->key_count;
-    const float share = 1.0f / (float)key_count;
-    float lower[3] = {0}, upper[3] = {0};
+    const f4 share = f4_set(1.0f / (float)key_count), limit = f4_set(COORDINATE_LIMIT);
+    f4 lower = f4_set(0.0f), upper = f4_set(0.0f);
     for (uint32_t key = 0; key < key_count; key++) {
-        float low[3] = {FLT_MAX, FLT_MAX, FLT_MAX}, high[3] = {-FLT_MAX, -FLT_MAX, -FLT_MAX};
-        for (uint32_t v = 0; v < 3; v++) {
-            float p[3];
-            trc_part_vertex(part, triangle, v, key, p);
-            if (!vertex_is_valid(p))
-                return false;
-            for (int i = 0; i < 3; i++) {
-                low[i] = p[i] < low[i] ? p[i] : low[i];
-                high[i] = p[i] > high[i] ? p[i] : high[i];
-            }
-        }
-        for (int i = 0; i < 3; i++) {
-            lower[i] += low[i] * share;
-            upper[i] += high[i] * share;
-        }
+        f4 p[3];
+        trc_part_corners(part, index, key, p);
+        /* False for what is not a number. */
+        if (!i4_all((f4_abs(p[0]) <= limit) & (f4_abs(p[1]) <= limit) & (f4_abs(p[2]) <= limit)))
+            return false;
+        lower += f4_min(p[0], f4_min(p[1], p[2])) * share;
+        upper += f4_max(p[0], f4_max(p[1], p[2])) * share;
     }
-    memcpy(ref->lower, lower, sizeof lower);
-    memcpy(ref->upper, upper, sizeof upper);
+    f4_store3(ref->lower, lower);
+    f4_store3(ref->upper, upper);
     return true;
 }
 

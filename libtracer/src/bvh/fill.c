@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "bvh/part.h"
 #include "bvh/tree.h"
 #include "core/core.h"
 #include "threads/pool.h"
@@ -12,44 +13,15 @@
 /* Kernels load this many slots from wherever a leaf begins. */
 #define LOAD_SLOTS 8
 
-static const float *key_positions(const struct trc_mesh *mesh, uint32_t key) {
-    return mesh->positions + (mesh->key_count > 1 ? 3 * (size_t)key * mesh->vertex_count : 0);
-}
-
-static inline void corner_load(const struct trc_part *part, const float *p, float out[3]) {
-    if (!part->transform) {
-        memcpy(out, p, 3 * sizeof(float));
-        return;
-    }
-    const float *m = part->transform->m;
-    for (int i = 0; i < 3; i++)
-        out[i] = m[4 * i] * p[0] + m[4 * i + 1] * p[1] + m[4 * i + 2] * p[2] + m[4 * i + 3];
-}
-
-void trc_part_vertex(const struct trc_part *part, uint32_t triangle, uint32_t v, uint32_t key,
-                     float out[3]) {
-    const struct trc_mesh *mesh = part->mesh;
-    corner_load(
-        part, key_positions(mesh, key) + 3 * (size_t)mesh->indices[3 * (size_t)triangle + v], out);
-}
-
 /* Whether floats, whose products are off by less than 4 half-ulps of both, tell that corners are
  * not on a line: nearly always. */
 #define BENT_MARGIN 1e-6f
 #define BENT_LEAST 1e-30f
-static inline bool is_surely_bent(const float *a, const float *b, const float *c) {
-    float p[3], q[3];
-    for (int i = 0; i < 3; i++) {
-        p[i] = b[i] - a[i];
-        q[i] = c[i] - a[i];
-    }
-    for (int i = 0; i < 3; i++) {
-        const int j = (i + 1) % 3;
-        const float x = p[i] * q[j], y = p[j] * q[i];
-        if (fabsf(x - y) > BENT_MARGIN * (fabsf(x) + fabsf(y)) + BENT_LEAST)
-            return true;
-    }
-    return false;
+static inline bool is_surely_bent(f4 a, f4 b, f4 c) {
+    const f4 p = b - a, q = c - a;
+    const f4 x = p * f4_yzx(q), y = f4_yzx(p) * q;
+    const f4 bound = f4_set(BENT_MARGIN) * (f4_abs(x) + f4_abs(y)) + f4_set(BENT_LEAST);
+    return i4_any(f4_abs(x - y) > bound);
 }
 
 /* Whether a triangle's corners, by double arithmetic, lie on a line. */
@@ -64,21 +36,24 @@ static bool is_on_a_line(const float *a, const float *b, const float *c) {
 
 /* The triangle of those vertices, as a leaf holds it. */
 static inline void triangle_load(const struct trc_part *part, const uint32_t index[3], uint32_t key,
-                                 float out[3][3]) {
-    const float *all = key_positions(part->mesh, key);
+                                 f4 out[3]) {
+    const float *all = trc_part_positions(part, key);
     const float *p[3] = {all + 3 * (size_t)index[0], all + 3 * (size_t)index[1],
                          all + 3 * (size_t)index[2]};
     for (int v = 0; v < 3; v++)
-        corner_load(part, p[v], out[v]);
-    if (part->mesh->key_count == 1 && !is_surely_bent(p[0], p[1], p[2]) &&
+        out[v] = trc_part_point(part, p[v]);
+    if (part->mesh->key_count == 1 &&
+        !is_surely_bent(f4_load3(p[0]), f4_load3(p[1]), f4_load3(p[2])) &&
         is_on_a_line(p[0], p[1], p[2]))
-        for (int v = 1; v < 3; v++)
-            memcpy(out[v], out[0], sizeof out[0]);
+        out[1] = out[2] = out[0];
 }
 
 void trc_part_triangle(const struct trc_part *part, uint32_t triangle, uint32_t key,
                        float out[3][3]) {
-    triangle_load(part, part->mesh->indices + 3 * (size_t)triangle, key, out);
+    f4 corner[3];
+    triangle_load(part, part->mesh->indices + 3 * (size_t)triangle, key, corner);
+    for (int v = 0; v < 3; v++)
+        f4_store3(out[v], corner[v]);
 }
 
 static trc_status tree_alloc(struct trc_tree *tree, uint32_t node_count, uint32_t slot_count,
@@ -170,44 +145,19 @@ static bool leaf_fill(struct trc_tree *tree, uint32_t ref, uint32_t key,
                       const struct source *sources, float lower_out[3], float upper_out[3]) {
     const uint32_t count = trc_leaf_count(ref);
     float *v = trc_leaf_vertices(tree, ref, key);
-    float lower[3] = {INFINITY, INFINITY, INFINITY}, upper[3] = {-INFINITY, -INFINITY, -INFINITY};
-    bool finite = true;
+    f4 lower = f4_set(INFINITY), upper = f4_set(-INFINITY), sum = f4_set(0.0f);
     for (uint32_t slot = 0; slot < count; slot++, v++) {
-        float p[3][3], sum = 0.0f;
+        f4 p[3];
         triangle_load(sources[slot].part, sources[slot].index, key, p);
-        for (int axis = 0; axis < 3; axis++) {
-            const float a = p[0][axis], b = p[1][axis], c = p[2][axis];
-            const float low = a < b ? a : b, high = a > b ? a : b;
-            const float low_c = c < low ? c : low, high_c = c > high ? c : high;
-            lower[axis] = low_c < lower[axis] ? low_c : lower[axis];
-            upper[axis] = high_c > upper[axis] ? high_c : upper[axis];
-            sum += a + b + c;
-        }
-        finite = finite && fabsf(sum) < INFINITY;
+        lower = f4_min(f4_min(p[0], f4_min(p[1], p[2])), lower);
+        upper = f4_max(f4_max(p[0], f4_max(p[1], p[2])), upper);
+        sum += p[0] + p[1] + p[2];
         for (uint32_t k = 0; k < 9; k++)
             v[k * count] = p[k / 3][k % 3];
     }
-    memcpy(lower_out, lower, sizeof lower);
-    memcpy(upper_out, upper, sizeof upper);
-    return finite;
-}
-
-/* lower and upper of a leaf at a key. */
-static void leaf_bounds(const struct trc_tree *tree, uint32_t ref, uint32_t key, float lower[3],
-                        float upper[3]) {
-    const uint32_t count = trc_leaf_count(ref);
-    const float *v = trc_leaf_vertices(tree, ref, key);
-    for (uint32_t axis = 0; axis < 3; axis++) {
-        float low = INFINITY, high = -INFINITY;
-        for (uint32_t corner = 0; corner < 3; corner++)
-            for (uint32_t slot = 0; slot < count; slot++) {
-                const float x = v[(3 * corner + axis) * count + slot];
-                low = x < low ? x : low;
-                high = x > high ? x : high;
-            }
-        lower[axis] = low;
-        upper[axis] = high;
-    }
+    f4_store3(lower_out, lower);
+    f4_store3(upper_out, upper);
+    return i4_all(f4_abs(sum) < f4_set(INFINITY));
 }
 
 static void node_bounds(const struct trc_tree *tree, uint32_t node, uint32_t key, float lower[3],
@@ -225,17 +175,11 @@ static void node_bounds(const struct trc_tree *tree, uint32_t node, uint32_t key
     }
 }
 
-static void ref_bounds(const struct trc_tree *tree, uint32_t ref, uint32_t key, float lower[3],
-                       float upper[3]) {
-    if (ref == TRC_REF_EMPTY) {
-        for (int axis = 0; axis < 3; axis++) {
-            lower[axis] = INFINITY;
-            upper[axis] = -INFINITY;
-        }
-    } else if (ref & TRC_REF_LEAF) {
-        leaf_bounds(tree, ref, key, lower, upper);
-    } else {
-        node_bounds(tree, ref, key, lower, upper);
+/* Of no child: inverted. */
+static void empty_bounds(float lower[3], float upper[3]) {
+    for (int axis = 0; axis < 3; axis++) {
+        lower[axis] = INFINITY;
+        upper[axis] = -INFINITY;
     }
 }
 
@@ -248,47 +192,35 @@ static void child_store(struct trc_tree *tree, uint32_t node, uint32_t child, ui
     }
 }
 
-static float box_area(const float lower[3], const float upper[3]) {
-    const float x = upper[0] - lower[0], y = upper[1] - lower[1], z = upper[2] - lower[2];
-    return x >= 0.0f ? x * y + y * z + z * x : 0.0f;
-}
-
 /* Areas of the boxes of a node's children at key 0. */
 static double children_area(const struct trc_tree *tree, uint32_t node) {
     const float *b = trc_node_bounds(tree, node, 0);
     double sum = 0.0;
     for (int i = 0; i < TRC_NODE_WIDTH; i++) {
-        const float lower[3] = {b[i], b[16 + i], b[32 + i]};
-        const float upper[3] = {b[8 + i], b[24 + i], b[40 + i]};
-        sum += box_area(lower, upper);
+        const f4 lower = {b[i], b[16 + i], b[32 + i]}, upper = {b[8 + i], b[24 + i], b[40 + i]};
+        sum += box_area((struct box){lower, upper});
     }
     return sum;
 }
 
-/* Root bounds, their scale, and the SAH cost at key 0: area_sum, that of every child's box, over
+/* Widens the tree's bounds. */
+static void bounds_grow(struct trc_tree *tree, const float lower[3], const float upper[3]) {
+    for (int axis = 0; axis < 3; axis++) {
+        tree->lower[axis] = fminf(tree->lower[axis], lower[axis]);
+        tree->upper[axis] = fmaxf(tree->upper[axis], upper[axis]);
+    }
+}
+
+/* Scale of the tree's bounds, and the SAH cost at key 0: area_sum, that of every child's box, over
  * the root's. */
 static void tree_finish(struct trc_tree *tree, double area_sum) {
-    for (int axis = 0; axis < 3; axis++) {
-        tree->lower[axis] = INFINITY;
-        tree->upper[axis] = -INFINITY;
-    }
     tree->extent = 0.0f;
-    for (uint32_t key = 0; key < tree->key_count; key++) {
-        float lower[3], upper[3];
-        ref_bounds(tree, tree->root, key, lower, upper);
-        for (int axis = 0; axis < 3; axis++) {
-            if (lower[axis] < tree->lower[axis])
-                tree->lower[axis] = lower[axis];
-            if (upper[axis] > tree->upper[axis])
-                tree->upper[axis] = upper[axis];
-        }
-    }
     if (tree->root == TRC_REF_EMPTY)
         return;
     for (int axis = 0; axis < 3; axis++)
         tree->extent =
             fmaxf(tree->extent, fmaxf(fabsf(tree->lower[axis]), fabsf(tree->upper[axis])));
-    const float root_area = box_area(tree->lower, tree->upper);
+    const float root_area = box_area((struct box){f4_load3(tree->lower), f4_load3(tree->upper)});
     tree->sah_cost = root_area > 0.0f ? (float)(area_sum / root_area) : 0.0f;
 }
 
@@ -312,7 +244,7 @@ static void leaves_fill(struct fill_job *job, uint32_t node) {
             if (is_leaf(children[i]) && !leaf_fill(tree, children[i], key, at, lower, upper))
                 atomic_store_explicit(&job->spoiled, true, memory_order_relaxed);
             if (children[i] == TRC_REF_EMPTY)
-                ref_bounds(tree, TRC_REF_EMPTY, key, lower, upper);
+                empty_bounds(lower, upper);
             child_store(tree, node, i, key, lower, upper);
         }
         if (is_leaf(children[i]))
@@ -354,33 +286,50 @@ static void fill_task(void *context, uint32_t index, uint32_t worker) {
     job->area_sums[index] = sum;
 }
 
+/* A tree that is one leaf. */
+static void root_leaf_fill(struct fill_job *job) {
+    struct trc_tree *tree = job->tree;
+    struct source sources[LOAD_SLOTS];
+    float lower[3], upper[3];
+    leaf_gather(job, tree->root, sources);
+    for (uint32_t key = 0; key < tree->key_count; key++) {
+        if (!leaf_fill(tree, tree->root, key, sources, lower, upper))
+            job->spoiled = true;
+        bounds_grow(tree, lower, upper);
+    }
+}
+
 /* Leaves and most nodes by all threads, then the nodes above them; all keys in one pass. */
+static void nodes_fill(struct fill_job *job, uint32_t task_count, struct trc_pool *pool) {
+    struct trc_tree *tree = job->tree;
+    double sum = 0.0;
+    trc_pool_run(pool, task_count, fill_task, job);
+    for (uint32_t i = 0; i < task_count; i++)
+        sum += job->area_sums[i];
+    for (uint32_t n = tree->node_count; n-- > 0;)
+        if (job->pending[n]) {
+            nodes_bound(tree, n);
+            sum += children_area(tree, n);
+        }
+    for (uint32_t key = 0; is_node(tree->root) && key < tree->key_count; key++) {
+        float lower[3], upper[3];
+        node_bounds(tree, tree->root, key, lower, upper);
+        bounds_grow(tree, lower, upper);
+    }
+    tree_finish(tree, sum);
+}
+
 static trc_status tree_fill(struct fill_job *job, struct trc_pool *pool) {
     struct trc_tree *tree = job->tree;
     const uint32_t task_count = (tree->node_count + NODES_PER_TASK - 1) / NODES_PER_TASK;
     job->pending = trc_alloc(tree->node_count ? tree->node_count : 1, sizeof *job->pending);
     job->area_sums = trc_alloc(task_count ? task_count : 1, sizeof *job->area_sums);
     const bool enough = job->pending && job->area_sums;
-    if (enough && is_leaf(tree->root)) {
-        struct source sources[LOAD_SLOTS];
-        float lower[3], upper[3];
-        leaf_gather(job, tree->root, sources);
-        for (uint32_t key = 0; key < tree->key_count; key++)
-            if (!leaf_fill(tree, tree->root, key, sources, lower, upper))
-                job->spoiled = true;
-    }
-    double sum = 0.0;
+    empty_bounds(tree->lower, tree->upper);
+    if (enough && is_leaf(tree->root))
+        root_leaf_fill(job);
     if (enough)
-        trc_pool_run(pool, task_count, fill_task, job);
-    for (uint32_t i = 0; enough && i < task_count; i++)
-        sum += job->area_sums[i];
-    for (uint32_t n = tree->node_count; enough && n-- > 0;)
-        if (job->pending[n]) {
-            nodes_bound(tree, n);
-            sum += children_area(tree, n);
-        }
-    if (enough)
-        tree_finish(tree, sum);
+        nodes_fill(job, task_count, pool);
     if (job->spoiled)
         tree->extent = INFINITY;
     trc_free(job->pending);
@@ -443,12 +392,14 @@ trc_status trc_tree_fill_top(const struct trc_topology *topology, const struct t
         for (uint32_t i = 0; i < TRC_NODE_WIDTH; i++) {
             float lower[3], upper[3];
             const uint32_t ref = children[i];
-            if (ref != TRC_REF_EMPTY && (ref & TRC_REF_LEAF)) {
+            if (is_leaf(ref)) {
                 const struct trc_ref *r = &refs[trc_leaf_first(ref)];
                 memcpy(lower, r->lower, sizeof lower);
                 memcpy(upper, r->upper, sizeof upper);
+            } else if (is_node(ref)) {
+                node_bounds(tree, ref, 0, lower, upper);
             } else {
-                ref_bounds(tree, ref, 0, lower, upper);
+                empty_bounds(lower, upper);
             }
             child_store(tree, n, i, 0, lower, upper);
         }

@@ -147,12 +147,8 @@ trc_status trc_topology_build(struct trc_ref *refs, uint32_t count, uint32_t lea
                               struct trc_topology *out);
 void trc_topology_destroy(struct trc_topology *topology);
 
-/* Vertex v of a triangle at a key, as it stands in the tree (transformed if the part is). */
-void trc_part_vertex(const struct trc_part *part, uint32_t triangle, uint32_t v, uint32_t key,
-                     float out[3]);
-
-/* All three, as a leaf holds them: corners on a line (of meshes at rest) become one point, which no
- * ray hits, where rounding would give them an area. */
+/* A triangle at a key, as a leaf holds it: corners on a line (of meshes at rest) become one point,
+ * which no ray hits, where rounding would give them an area. */
 void trc_part_triangle(const struct trc_part *part, uint32_t triangle, uint32_t key,
                        float out[3][3]);
 

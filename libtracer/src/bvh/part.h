@@ -1,0 +1,32 @@
+/* Triangles of a part, as they stand in its tree. */
+#ifndef TRACER_BVH_PART_H
+#define TRACER_BVH_PART_H
+
+#include "bvh/box.h"
+#include "bvh/tree.h"
+
+/* Corners of all triangles at a key: meshes at rest have the same ones at every key. */
+static inline const float *trc_part_positions(const struct trc_part *part, uint32_t key) {
+    const struct trc_mesh *mesh = part->mesh;
+    return mesh->positions + (mesh->key_count > 1 ? 3 * (size_t)key * mesh->vertex_count : 0);
+}
+
+/* One of those positions in the tree's space. */
+static inline f4 trc_part_point(const struct trc_part *part, const float p[3]) {
+    if (!part->transform)
+        return f4_load3(p);
+    const float *m = part->transform->m;
+    const f4 x = {m[0], m[4], m[8], 0.0f}, y = {m[1], m[5], m[9], 0.0f};
+    const f4 z = {m[2], m[6], m[10], 0.0f}, w = {m[3], m[7], m[11], 0.0f};
+    return x * f4_set(p[0]) + y * f4_set(p[1]) + z * f4_set(p[2]) + w;
+}
+
+/* The corners of the triangle with those vertices. */
+static inline void trc_part_corners(const struct trc_part *part, const uint32_t index[3],
+                                    uint32_t key, f4 corner[3]) {
+    const float *positions = trc_part_positions(part, key);
+    for (int v = 0; v < 3; v++)
+        corner[v] = trc_part_point(part, positions + 3 * (size_t)index[v]);
+}
+
+#endif
