@@ -205,7 +205,8 @@ class _Pictures:
         self._started, self._first_seconds = time.monotonic(), 0.0
         size = scene.render.preview_pixel_size
         least = 1 if size == 'AUTO' else int(size)
-        first = max(least, self._first_divisor())
+        pixel_count = fields["crop_width"] * fields["crop_height"]
+        first = max(least, first_divisor(pixel_count * self._pixel_seconds))
         self._stages = [(first, 1)] + ([(least, 1)] if first > least else []) + [(least, None)]
         self._next_stage(sync)
 
@@ -220,22 +221,13 @@ class _Pictures:
         """Whether quick pictures are still to come."""
         return bool(self._stages) or not self._is_last
 
-    def _first_divisor(self):
-        """Of a picture that can be there within the budget."""
-        fields = self._fields
-        seconds = self._pixel_seconds * fields["crop_width"] * fields["crop_height"]
-        divisor = 1
-        while divisor < MAX_DIVISOR and seconds > PICTURE_SECONDS * divisor * divisor:
-            divisor *= 2
-        return divisor
-
     def _next_stage(self, sync):
         """Start the next stage when the one before has ended and been read."""
         if not self._stages or self._render is not None:
             return
         divisor, sample_count = self._stages.pop(0)
         self._is_last = not self._stages
-        fields = _divided(self._fields, divisor)
+        fields = divided(self._fields, divisor)
         if sample_count is not None:
             fields.update(sample_count=sample_count, noise_threshold=0.0)
         self._samples = fields["sample_count"]
@@ -285,7 +277,15 @@ class _Pictures:
         engine.update_stats("", rate + self._status)
 
 
-def _divided(fields, divisor):
+def first_divisor(seconds):
+    """Of the size of a picture that can be there within the budget, where a full one takes seconds."""
+    divisor = 1
+    while divisor < MAX_DIVISOR and seconds > PICTURE_SECONDS * divisor * divisor:
+        divisor *= 2
+    return divisor
+
+
+def divided(fields, divisor):
     """Fields of a render of the same view with 1 / divisor the width and height."""
     if divisor == 1:
         return dict(fields)
