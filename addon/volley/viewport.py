@@ -4,10 +4,12 @@
 An edit is marked when Blender tells of it and copied at the next draw; what was built and rendered
 stays on the screen until the first complete picture after the edit replaces it. That one has a sample
 per pixel, and fewer pixels where a full one would take too long; then comes one of all pixels, and then
-one that gathers samples until the view or the scene changes. The film is drawn as a scene-linear
-texture, which Blender turns into display colours.
+one that gathers samples until the view or the scene changes. The draw that starts a build or a first
+picture waits for it as long as a frame may take, since it would else draw the old picture once more;
+no other waits. The film is drawn as a scene-linear texture, which Blender turns into display colours.
 """
 
+import math
 import threading
 import time
 
@@ -24,6 +26,7 @@ from .sync.changes import Changes
 MAX_HALF = 65504.0
 DRAW_SECONDS = 0.03     # at least this long between two read-outs of the film
 NAP_SECONDS = 0.004     # how long a draw may wait for what is nearly there
+FRAME_SECONDS = 0.04    # the same for what it has started itself
 PICTURE_SECONDS = 0.03  # the budget of the first picture
 MAX_DIVISOR = 8         # of the first picture's width and height
 PIXEL_SECONDS = 1e-6    # guess of what a sample of a pixel takes, before there was one
@@ -79,7 +82,7 @@ class Viewport:
 
     def _synchronise(self, engine, context, depsgraph):
         """Bring the library's scene up to date; whether it is."""
-        if self._build is not None and not self._end_build():
+        if self._build is not None and not self._end_build(NAP_SECONDS):
             return False
         if self._sync is None:
             self._sync = SceneSync(is_final=False, thread_count=thread_count(depsgraph.scene_eval.render),
@@ -100,11 +103,11 @@ class Viewport:
             return True
         self._pictures.stop()
         self._build = _Build(self._sync.scene)
-        return self._end_build()
+        return self._end_build(FRAME_SECONDS)
 
-    def _end_build(self):
-        """Note a build that has ended; False while it runs."""
-        if not self._build.is_done(NAP_SECONDS):
+    def _end_build(self, seconds):
+        """Note a build that has ended, after waiting for it that long; False while it runs."""
+        if not self._build.is_done(seconds):
             return False
         build, self._build = self._build, None
         if build.failure is not None:
@@ -177,6 +180,7 @@ class _Pictures:
         self._samples = 0
         self._features = ""
         self._started, self._first_seconds = 0.0, 0.0
+        self._patience = 0.0    # how long the next draw waits
         self._pixel_seconds = PIXEL_SECONDS  # of one sample of one pixel, as last measured
 
     def look(self, sync, context, depsgraph):
@@ -203,6 +207,7 @@ class _Pictures:
         self._wanted, self._fields = wanted, fields
         self._features = ", ".join(sync.scene.features())
         self._started, self._first_seconds = time.monotonic(), 0.0
+        self._patience = FRAME_SECONDS
         size = scene.render.preview_pixel_size
         least = 1 if size == 'AUTO' else int(size)
         pixel_count = fields["crop_width"] * fields["crop_height"]
@@ -243,7 +248,8 @@ class _Pictures:
         if self._render is None:
             return bool(self._stages)
         if not self._is_last:
-            self._render.wait(NAP_SECONDS)
+            self._render.wait(self._patience)
+            self._patience = NAP_SECONDS
         progress = self._progress = self._render.poll()
         is_running = progress.state == native.STATE_RUNNING
         shown = min(SHOWN_SAMPLES, self._samples)
@@ -279,10 +285,7 @@ class _Pictures:
 
 def first_divisor(seconds):
     """Of the size of a picture that can be there within the budget, where a full one takes seconds."""
-    divisor = 1
-    while divisor < MAX_DIVISOR and seconds > PICTURE_SECONDS * divisor * divisor:
-        divisor *= 2
-    return divisor
+    return min(max(1, math.ceil(math.sqrt(seconds / PICTURE_SECONDS))), MAX_DIVISOR)
 
 
 def divided(fields, divisor):
