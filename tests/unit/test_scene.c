@@ -97,6 +97,45 @@ static void features_are_what_the_scene_uses(void **state) {
     assert_int_equal(trc_scene_destroy(scene), TRC_OK);
 }
 
+static void removed_lights_are_gone(void **state) {
+    (void)state;
+    const trc_scene scene = fixture_scene();
+    const trc_light_desc desc = default_light_desc();
+    trc_id light = 0;
+    assert_int_equal(trc_light_create(scene, &desc, &light), TRC_OK);
+    assert_int_equal(trc_scene_commit(scene), TRC_OK);
+    assert_int_equal(stats_of(scene).light_count, 2);
+    assert_int_equal(trc_light_destroy(scene, light), TRC_OK);
+    assert_int_equal(trc_light_destroy(scene, light), TRC_ERROR_INVALID_HANDLE);
+    assert_int_equal(stats_of(scene).light_count, 2); /* until the commit */
+    assert_int_equal(trc_scene_commit(scene), TRC_OK);
+    assert_int_equal(stats_of(scene).light_count, 1);
+    assert_int_equal(trc_scene_destroy(scene), TRC_OK);
+}
+
+static void cameras_move_if_their_keys_differ(void **state) {
+    (void)state;
+    const trc_scene scene = fixture_scene();
+    float transforms[24], windows[8];
+    trc_camera_desc desc = default_camera_desc();
+    for (int key = 0; key < 2; key++) {
+        memcpy(transforms + 12 * key, desc.transforms, sizeof above_transform);
+        memcpy(windows + 4 * key, desc.windows, 4 * sizeof *windows);
+    }
+    desc.key_count = desc.window_key_count = 2;
+    desc.transforms = transforms;
+    desc.windows = windows;
+    desc.shutter_time = 0.5f;
+    for (int changed = 0; changed < 3; changed++) { /* nothing, where it is, how far it zooms */
+        transforms[12 + 3] = changed == 1 ? 1.0f : 0.0f;
+        windows[4] = changed == 2 ? -0.4f : -0.5f;
+        assert_int_equal(trc_scene_set_camera(scene, &desc), TRC_OK);
+        assert_int_equal(trc_scene_commit(scene), TRC_OK);
+        assert_int_equal((stats_of(scene).features & TRC_FEATURE_CAMERA_MOTION) != 0, changed != 0);
+    }
+    assert_int_equal(trc_scene_destroy(scene), TRC_OK);
+}
+
 static void bad_texels_are_named(void **state) {
     (void)state;
     const trc_scene scene = fixture_scene();
@@ -201,6 +240,25 @@ static float *render_image(trc_scene scene, const trc_render_desc *desc) {
     assert_int_equal(trc_render_read(render, TRC_PASS_COMBINED, pixels, count), TRC_OK);
     assert_int_equal(trc_render_destroy(render), TRC_OK);
     return pixels;
+}
+
+/* Trees are made anew for another instruction set, and pictures can be had of both. */
+static void instruction_sets_may_change(void **state) {
+    (void)state;
+    const trc_scene scene = fixture_scene();
+    const uint32_t isa = trc_isa();
+    const struct trc_bvh *bvh = snapshot_of(scene)->bvh;
+    assert_int_equal(trc_scene_commit(scene), TRC_OK);
+    assert_ptr_equal(snapshot_of(scene)->bvh, bvh);
+    assert_int_equal(trc_set_isa(TRC_ISA_SCALAR), TRC_OK);
+    assert_int_equal(trc_scene_commit(scene), TRC_OK);
+    assert_int_equal(stats_of(scene).built_count + stats_of(scene).refitted_count,
+                     isa == TRC_ISA_SCALAR ? 0 : 1);
+    trc_render_desc desc = default_render_desc(16, 16, 1);
+    desc.thread_count = 0; /* all processors */
+    free(render_image(scene, &desc));
+    assert_int_equal(trc_set_isa(isa), TRC_OK);
+    assert_int_equal(trc_scene_destroy(scene), TRC_OK);
 }
 
 static void image_does_not_depend_on_threads(void **state) {
@@ -387,6 +445,9 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(commits_share_what_stays),
         cmocka_unit_test(features_are_what_the_scene_uses),
+        cmocka_unit_test(removed_lights_are_gone),
+        cmocka_unit_test(cameras_move_if_their_keys_differ),
+        cmocka_unit_test(instruction_sets_may_change),
         cmocka_unit_test(bad_texels_are_named),
         cmocka_unit_test(singular_instances_are_hidden_and_counted),
         cmocka_unit_test(destroyed_materials_leave_the_default),
