@@ -70,19 +70,21 @@ class Viewport:
         """Copy what was marked, start a build or a render where one is due, draw the latest picture."""
         if self._is_freed:
             return
-        is_current = self._synchronise(engine, context, depsgraph)
+        may_wait = _may_wait()
+        is_current = self._synchronise(engine, context, depsgraph, may_wait)
         if is_current:
             self._pictures.follow(self._sync, context, depsgraph)
-        is_running = self._pictures.read()
+        is_running = self._pictures.read(may_wait)
         self._pictures.draw(engine, depsgraph.scene_eval)
-        if not is_current or self._pictures.is_urgent():
+        is_urgent = not is_current or self._pictures.is_urgent()
+        if is_urgent and may_wait:
             engine.tag_redraw()
-        elif is_running:
+        elif is_urgent or is_running:
             _redraw_later()
 
-    def _synchronise(self, engine, context, depsgraph):
+    def _synchronise(self, engine, context, depsgraph, may_wait):
         """Bring the library's scene up to date; whether it is."""
-        if self._build is not None and not self._end_build(NAP_SECONDS):
+        if self._build is not None and not self._end_build(NAP_SECONDS if may_wait else 0.0):
             return False
         if self._sync is None:
             self._sync = SceneSync(is_final=False, thread_count=thread_count(depsgraph.scene_eval.render),
@@ -103,7 +105,7 @@ class Viewport:
             return True
         self._pictures.stop()
         self._build = _Build(self._sync.scene)
-        return self._end_build(FRAME_SECONDS)
+        return self._end_build(FRAME_SECONDS if may_wait else 0.0)
 
     def _end_build(self, seconds):
         """Note a build that has ended, after waiting for it that long; False while it runs."""
@@ -120,6 +122,13 @@ class Viewport:
             if message not in self._reported:
                 self._reported.add(message)
                 engine.report({'WARNING'}, message)
+
+
+def _may_wait():
+    """Whether a draw may wait: not beside F12 or a preview. Blender forbids Python to write to its data
+    while an engine draws, by one switch for all threads; a render that starts within a draw finds it set,
+    and leaves it so for good when it ends."""
+    return not any(bpy.app.is_job_running(kind) for kind in ('RENDER', 'RENDER_PREVIEW'))
 
 
 def _redraw_later():
@@ -243,11 +252,11 @@ class _Pictures:
         self._render = sync.scene.start_render(**fields)
         self._version, self._next_read = -1, 0.0
 
-    def read(self):
+    def read(self, may_wait):
         """Bring the texture up to date; whether there is more to come."""
         if self._render is None:
             return bool(self._stages)
-        if not self._is_last:
+        if not self._is_last and may_wait:
             self._render.wait(self._patience)
             self._patience = NAP_SECONDS
         progress = self._progress = self._render.poll()

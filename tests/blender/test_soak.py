@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A short soak: renders started, cancelled and freed while a viewport renders. A long one is soak.py."""
+"""A short soak: renders started, cancelled and freed beside a viewport. A long one is soak.py."""
 
 import shutil
 

@@ -45,8 +45,8 @@ def _settled():
     from volley import viewport
     read, is_running = viewport._Pictures.read, [True]
 
-    def noting_read(self):
-        is_running[0] = read(self)
+    def noting_read(*arguments):
+        is_running[0] = read(*arguments)
         return is_running[0]
 
     viewport._Pictures.read = noting_read
