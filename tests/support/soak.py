@@ -35,6 +35,7 @@ def inside_soak(cycle_count):
     view = {"window": window, "area": area, "region": region}
     with bpy.context.temp_override(**view):
         edits.fill(scene)
+    bpy.ops.ed.undo_push(message="scene")
     bpy.context.preferences.view.render_display_type = 'NONE'
     scene.volley.preview_samples = 16
     with bpy.context.temp_override(**view):
@@ -87,7 +88,8 @@ def _edit(edit, dice):
 
 
 def _undo_storm(bpy, edits, dice, view):
-    """Edits, each with its undo step, then all of them undone and done again, drawing now and then."""
+    """Edits, each with its undo step, then all but the first undone and done again, drawing now and
+    then."""
     for _ in range(UNDO_STEPS):
         yield from _edit(dice.choice((edits.pose, edits.transform, edits.material, edits.duplicate)),
                          dice)
@@ -95,7 +97,7 @@ def _undo_storm(bpy, edits, dice, view):
         if dice.random() < 0.3:
             yield 0.01
     for operator in (bpy.ops.ed.undo, bpy.ops.ed.redo, bpy.ops.ed.undo):
-        for _ in range(UNDO_STEPS):
+        for _ in range(UNDO_STEPS - 1):
             with bpy.context.temp_override(**view):
                 if operator.poll():
                     operator()
