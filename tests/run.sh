@@ -5,7 +5,8 @@
 #
 # FILE holds further results to count, one per line: "passed NAME" or "failed NAME". --blender-next runs
 # the Blender tests in Blender 4.3 too, --blender-next-fast a selection of them (see blender_next.sh);
-# where that cannot be set up, it is one test skipped. The exit code is 0 only if something passed and
+# where that cannot be set up, it is one test skipped. What tests measured of numerical stability is in
+# build/results/stability.md. The exit code is 0 only if something passed and
 # nothing failed. Python tests find the build through these variables:
 #   VOLLEY_BUILD          the build folder
 #   BLENDER_USER_SCRIPTS  the folder that makes Blender find the add-on
@@ -24,7 +25,7 @@ say() { printf '== %s\n' "$*"; }
 run_ctest() {
     say "Tests in C"
     ctest --test-dir build --output-on-failure --no-tests=ignore -j "$(nproc)" --no-compress-output \
-        --output-junit "$PWD/$results/ctest.xml" </dev/null
+        --test-output-size-passed 1000000 --output-junit "$PWD/$results/ctest.xml" </dev/null
 }
 
 run_pytest() {
@@ -74,6 +75,7 @@ mkdir -p "$results"
 status=0
 run_ctest || status=$?
 summary+=(--ctest "$results/ctest.xml" "$status")
+"$python" tests/support/stability.py "$results/ctest.xml" --out "$results/stability.md" || true
 status=0
 run_pytest || status=$?
 summary+=(--pytest "$results/pytest.xml" "$status")

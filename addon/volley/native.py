@@ -329,6 +329,12 @@ def _address(array):
     return None if array is None or array.size == 0 else array.ctypes.data
 
 
+def view(address, shape, dtype):
+    """Memory of Blender's as an array; only while what it belongs to is there."""
+    size = int(np.prod(shape)) * np.dtype(dtype).itemsize
+    return np.frombuffer((ctypes.c_char * size).from_address(address), dtype).reshape(shape)
+
+
 def _text(value):
     return value.encode("utf-8") if value else None
 

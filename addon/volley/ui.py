@@ -34,10 +34,12 @@ class _VolleyPanel:
     bl_region_type = 'WINDOW'
     bl_context = "render"
     COMPAT_ENGINES = {ENGINE}
+    needs = None  # name of what the context must have
 
     @classmethod
     def poll(cls, context):
-        return context.engine in cls.COMPAT_ENGINES
+        return context.engine in cls.COMPAT_ENGINES and (
+            cls.needs is None or bool(getattr(context, cls.needs, None)))
 
 
 def _column(panel):
@@ -259,9 +261,16 @@ class VOLLEY_RENDER_PT_performance_final(_VolleyPanel, Panel):
 
 # View layer ------------------------------------------------------------------------------------
 
-class VOLLEY_VIEWLAYER_PT_filter(_VolleyPanel, Panel):
-    bl_label = "Filter"
+class _ViewLayerPanel(_VolleyPanel):
     bl_context = "view_layer"
+
+
+class _PassesPanel(_ViewLayerPanel):
+    bl_parent_id = "VOLLEY_VIEWLAYER_PT_passes"
+
+
+class VOLLEY_VIEWLAYER_PT_filter(_ViewLayerPanel, Panel):
+    bl_label = "Filter"
     bl_options = {'DEFAULT_CLOSED'}
 
     def draw(self, context):
@@ -273,9 +282,8 @@ class VOLLEY_VIEWLAYER_PT_filter(_VolleyPanel, Panel):
         motion.prop(context.view_layer, "use_motion_blur", text="Motion Blur")
 
 
-class VOLLEY_VIEWLAYER_PT_override(_VolleyPanel, Panel):
+class VOLLEY_VIEWLAYER_PT_override(_ViewLayerPanel, Panel):
     bl_label = "Override"
-    bl_context = "view_layer"
     bl_options = {'DEFAULT_CLOSED'}
 
     def draw(self, context):
@@ -284,18 +292,15 @@ class VOLLEY_VIEWLAYER_PT_override(_VolleyPanel, Panel):
         layout.prop(context.view_layer, "samples")
 
 
-class VOLLEY_VIEWLAYER_PT_passes(_VolleyPanel, Panel):
+class VOLLEY_VIEWLAYER_PT_passes(_ViewLayerPanel, Panel):
     bl_label = "Passes"
-    bl_context = "view_layer"
 
     def draw(self, context):
         pass
 
 
-class VOLLEY_VIEWLAYER_PT_passes_data(_VolleyPanel, Panel):
+class VOLLEY_VIEWLAYER_PT_passes_data(_PassesPanel, Panel):
     bl_label = "Data"
-    bl_context = "view_layer"
-    bl_parent_id = "VOLLEY_VIEWLAYER_PT_passes"
 
     def draw(self, context):
         view_layer, layout = context.view_layer, _column(self)
@@ -313,10 +318,8 @@ class VOLLEY_VIEWLAYER_PT_passes_data(_VolleyPanel, Panel):
         column.prop(view_layer.volley, "denoising_store_passes")
 
 
-class VOLLEY_VIEWLAYER_PT_passes_light(_VolleyPanel, Panel):
+class VOLLEY_VIEWLAYER_PT_passes_light(_PassesPanel, Panel):
     bl_label = "Light"
-    bl_context = "view_layer"
-    bl_parent_id = "VOLLEY_VIEWLAYER_PT_passes"
 
     def draw(self, context):
         view_layer, layout = context.view_layer, _column(self)
@@ -331,10 +334,8 @@ class VOLLEY_VIEWLAYER_PT_passes_light(_VolleyPanel, Panel):
         _prop_if_present(column, view_layer, "use_pass_shadow", text="Shadow")
 
 
-class VOLLEY_VIEWLAYER_PT_passes_cryptomatte(_VolleyPanel, Panel):
+class VOLLEY_VIEWLAYER_PT_passes_cryptomatte(_PassesPanel, Panel):
     bl_label = "Cryptomatte"
-    bl_context = "view_layer"
-    bl_parent_id = "VOLLEY_VIEWLAYER_PT_passes"
 
     def draw(self, context):
         view_layer, layout = context.view_layer, _column(self)
@@ -347,10 +348,8 @@ class VOLLEY_VIEWLAYER_PT_passes_cryptomatte(_VolleyPanel, Panel):
         column.prop(view_layer, "pass_cryptomatte_depth", text="Levels")
 
 
-class VOLLEY_VIEWLAYER_PT_passes_aov(_VolleyPanel, Panel):
+class VOLLEY_VIEWLAYER_PT_passes_aov(_PassesPanel, Panel):
     bl_label = "Shader AOV"
-    bl_context = "view_layer"
-    bl_parent_id = "VOLLEY_VIEWLAYER_PT_passes"
 
     def draw(self, context):
         view_layer, layout = context.view_layer, _column(self)
@@ -364,10 +363,8 @@ class VOLLEY_VIEWLAYER_PT_passes_aov(_VolleyPanel, Panel):
             layout.label(text="Conflicts with another pass of the same name", icon='ERROR')
 
 
-class VOLLEY_VIEWLAYER_PT_passes_lightgroups(_VolleyPanel, Panel):
+class VOLLEY_VIEWLAYER_PT_passes_lightgroups(_PassesPanel, Panel):
     bl_label = "Light Groups"
-    bl_context = "view_layer"
-    bl_parent_id = "VOLLEY_VIEWLAYER_PT_passes"
 
     def draw(self, context):
         view_layer = context.view_layer
@@ -396,14 +393,28 @@ def _draw_light_group(panel, data, view_layer):
 _SHAPED = {'MESH', 'CURVE', 'SURFACE', 'FONT', 'META', 'CURVES', 'POINTCLOUD'}
 
 
-class VOLLEY_OBJECT_PT_visibility(_VolleyPanel, Panel):
-    bl_label = "Visibility"
+def _has_shape(active):
+    return active.type in _SHAPED or (active.instance_type == 'COLLECTION'
+                                      and active.instance_collection is not None)
+
+
+class _ObjectPanel(_VolleyPanel):
     bl_context = "object"
-    bl_options = {'DEFAULT_CLOSED'}
+    needs = "object"
+
+
+class _SeenObjectPanel(_ObjectPanel):
+    """Of objects that rays meet: shapes and lights."""
 
     @classmethod
     def poll(cls, context):
-        return super().poll(context) and context.object
+        active = context.object
+        return super().poll(context) and (_has_shape(active) or active.type == 'LIGHT')
+
+
+class VOLLEY_OBJECT_PT_visibility(_ObjectPanel, Panel):
+    bl_label = "Visibility"
+    bl_options = {'DEFAULT_CLOSED'}
 
     def draw(self, context):
         layout, active = _column(self), context.object
@@ -415,15 +426,9 @@ class VOLLEY_OBJECT_PT_visibility(_VolleyPanel, Panel):
             layout.column(heading="Mask").prop(active, "is_holdout")
 
 
-class VOLLEY_OBJECT_PT_ray_visibility(_VolleyPanel, Panel):
+class VOLLEY_OBJECT_PT_ray_visibility(_SeenObjectPanel, Panel):
     bl_label = "Ray Visibility"
-    bl_context = "object"
     bl_parent_id = "VOLLEY_OBJECT_PT_visibility"
-
-    @classmethod
-    def poll(cls, context):
-        active = context.object
-        return super().poll(context) and active and (_has_shape(active) or active.type == 'LIGHT')
 
     def draw(self, context):
         column, active = _column(self).column(), context.object
@@ -433,15 +438,14 @@ class VOLLEY_OBJECT_PT_ray_visibility(_VolleyPanel, Panel):
             column.prop(active, "visible_shadow", text="Shadow")
 
 
-class VOLLEY_OBJECT_PT_motion_blur(_VolleyPanel, Panel):
+class VOLLEY_OBJECT_PT_motion_blur(_ObjectPanel, Panel):
     bl_label = "Motion Blur"
-    bl_context = "object"
     bl_options = {'DEFAULT_CLOSED'}
 
     @classmethod
     def poll(cls, context):
         active = context.object
-        return super().poll(context) and active and hasattr(active, "cycles") \
+        return super().poll(context) and hasattr(active, "cycles") \
             and (_has_shape(active) or active.type == 'CAMERA')
 
     def draw_header(self, context):
@@ -456,26 +460,34 @@ class VOLLEY_OBJECT_PT_motion_blur(_VolleyPanel, Panel):
             layout.prop(settings, "use_deform_motion", text="Deformation")
 
 
-class VOLLEY_OBJECT_PT_lightgroup(_VolleyPanel, Panel):
+class VOLLEY_OBJECT_PT_lightgroup(_SeenObjectPanel, Panel):
     bl_label = "Light Group"
-    bl_context = "object"
     bl_options = {'DEFAULT_CLOSED'}
-
-    @classmethod
-    def poll(cls, context):
-        active = context.object
-        return super().poll(context) and active and (_has_shape(active) or active.type == 'LIGHT')
 
     def draw(self, context):
         _draw_light_group(self, context.object, context.view_layer)
 
 
-def _has_shape(active):
-    return active.type in _SHAPED or (active.instance_type == 'COLLECTION'
-                                      and active.instance_collection is not None)
-
-
 # Lights, world, materials ------------------------------------------------------------------------
+
+class _LightPanel(_VolleyPanel):
+    bl_context = "data"
+    needs = "light"
+
+
+class _WorldPanel(_VolleyPanel):
+    bl_context = "world"
+    needs = "world"
+
+
+class _MaterialPanel(_VolleyPanel):
+    bl_context = "material"
+    needs = "material"
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and not context.material.grease_pencil
+
 
 def _draw_surface(panel, data, use_nodes_text):
     """The surface part of a node tree, as the Properties editor shows it."""
@@ -494,13 +506,8 @@ def _draw_surface(panel, data, use_nodes_text):
     return True
 
 
-class VOLLEY_LIGHT_PT_light(_VolleyPanel, Panel):
+class VOLLEY_LIGHT_PT_light(_LightPanel, Panel):
     bl_label = "Light"
-    bl_context = "data"
-
-    @classmethod
-    def poll(cls, context):
-        return super().poll(context) and context.light
 
     def draw(self, context):
         light, layout = context.light, self.layout
@@ -541,14 +548,13 @@ class VOLLEY_LIGHT_PT_light(_VolleyPanel, Panel):
                 sub.prop(light, "size_y", text="Y")
 
 
-class VOLLEY_LIGHT_PT_beam_shape(_VolleyPanel, Panel):
+class VOLLEY_LIGHT_PT_beam_shape(_LightPanel, Panel):
     bl_label = "Beam Shape"
-    bl_context = "data"
     bl_parent_id = "VOLLEY_LIGHT_PT_light"
 
     @classmethod
     def poll(cls, context):
-        return super().poll(context) and context.light and context.light.type in {'SPOT', 'AREA'}
+        return super().poll(context) and context.light.type in {'SPOT', 'AREA'}
 
     def draw(self, context):
         light, column = context.light, _column(self).column()
@@ -560,48 +566,32 @@ class VOLLEY_LIGHT_PT_beam_shape(_VolleyPanel, Panel):
             column.prop(light, "spread", text="Spread")
 
 
-class VOLLEY_LIGHT_PT_nodes(_VolleyPanel, Panel):
+class VOLLEY_LIGHT_PT_nodes(_LightPanel, Panel):
     bl_label = "Nodes"
-    bl_context = "data"
     bl_options = {'DEFAULT_CLOSED'}
-
-    @classmethod
-    def poll(cls, context):
-        return super().poll(context) and context.light
 
     def draw(self, context):
         _draw_surface(self, context.light, "Use Nodes")
 
 
-class VOLLEY_WORLD_PT_preview(_VolleyPanel, Panel):
+class VOLLEY_WORLD_PT_preview(_WorldPanel, Panel):
     bl_label = "Preview"
-    bl_context = "world"
     bl_options = {'DEFAULT_CLOSED'}
-
-    @classmethod
-    def poll(cls, context):
-        return super().poll(context) and context.world
 
     def draw(self, context):
         self.layout.template_preview(context.world)
 
 
-class VOLLEY_WORLD_PT_surface(_VolleyPanel, Panel):
+class VOLLEY_WORLD_PT_surface(_WorldPanel, Panel):
     bl_label = "Surface"
-    bl_context = "world"
-
-    @classmethod
-    def poll(cls, context):
-        return super().poll(context) and context.world
 
     def draw(self, context):
         if not _draw_surface(self, context.world, "Use Nodes"):
             self.layout.prop(context.world, "color")
 
 
-class VOLLEY_WORLD_PT_ray_visibility(_VolleyPanel, Panel):
+class VOLLEY_WORLD_PT_ray_visibility(_WorldPanel, Panel):
     bl_label = "Ray Visibility"
-    bl_context = "world"
     bl_options = {'DEFAULT_CLOSED'}
 
     @classmethod
@@ -614,9 +604,8 @@ class VOLLEY_WORLD_PT_ray_visibility(_VolleyPanel, Panel):
             column.prop(context.world.cycles_visibility, name)
 
 
-class VOLLEY_WORLD_PT_settings(_VolleyPanel, Panel):
+class VOLLEY_WORLD_PT_settings(_WorldPanel, Panel):
     bl_label = "Settings"
-    bl_context = "world"
     bl_options = {'DEFAULT_CLOSED'}
 
     @classmethod
@@ -630,42 +619,25 @@ class VOLLEY_WORLD_PT_settings(_VolleyPanel, Panel):
             column.prop(settings, "sample_map_resolution")
 
 
-class VOLLEY_WORLD_PT_lightgroup(_VolleyPanel, Panel):
+class VOLLEY_WORLD_PT_lightgroup(_WorldPanel, Panel):
     bl_label = "Light Group"
-    bl_context = "world"
     bl_options = {'DEFAULT_CLOSED'}
-
-    @classmethod
-    def poll(cls, context):
-        return super().poll(context) and context.world
 
     def draw(self, context):
         _draw_light_group(self, context.world, context.view_layer)
 
 
-class VOLLEY_MATERIAL_PT_surface(_VolleyPanel, Panel):
+class VOLLEY_MATERIAL_PT_surface(_MaterialPanel, Panel):
     bl_label = "Surface"
-    bl_context = "material"
-
-    @classmethod
-    def poll(cls, context):
-        material = context.material
-        return super().poll(context) and material and not material.grease_pencil
 
     def draw(self, context):
         if not _draw_surface(self, context.material, "Use Nodes"):
             self.layout.prop(context.material, "diffuse_color")
 
 
-class VOLLEY_MATERIAL_PT_settings(_VolleyPanel, Panel):
+class VOLLEY_MATERIAL_PT_settings(_MaterialPanel, Panel):
     bl_label = "Settings"
-    bl_context = "material"
     bl_options = {'DEFAULT_CLOSED'}
-
-    @classmethod
-    def poll(cls, context):
-        material = context.material
-        return super().poll(context) and material and not material.grease_pencil
 
     def draw(self, context):
         material, column = context.material, _column(self).column()

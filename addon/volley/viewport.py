@@ -4,10 +4,12 @@
 An edit is marked when Blender tells of it and copied at the next draw; what was built and rendered
 stays on the screen until the first complete picture after the edit replaces it. That one has a sample
 per pixel, and fewer pixels where a full one would take too long; then comes one of all pixels, and then
-one that gathers samples until the view or the scene changes. The film is drawn as a scene-linear
-texture, which Blender turns into display colours.
+one that gathers samples until the view or the scene changes. The draw that starts a build or a first
+picture waits for it as long as a frame may take, since it would else draw the old picture once more;
+no other waits. The film is drawn as a scene-linear texture, which Blender turns into display colours.
 """
 
+import math
 import threading
 import time
 
@@ -24,6 +26,7 @@ from .sync.changes import Changes
 MAX_HALF = 65504.0
 DRAW_SECONDS = 0.03     # at least this long between two read-outs of the film
 NAP_SECONDS = 0.004     # how long a draw may wait for what is nearly there
+FRAME_SECONDS = 0.04    # the same for what it has started itself
 PICTURE_SECONDS = 0.03  # the budget of the first picture
 MAX_DIVISOR = 8         # of the first picture's width and height
 PIXEL_SECONDS = 1e-6    # guess of what a sample of a pixel takes, before there was one
@@ -67,19 +70,21 @@ class Viewport:
         """Copy what was marked, start a build or a render where one is due, draw the latest picture."""
         if self._is_freed:
             return
-        is_current = self._synchronise(engine, context, depsgraph)
+        may_wait = _may_wait()
+        is_current = self._synchronise(engine, context, depsgraph, may_wait)
         if is_current:
             self._pictures.follow(self._sync, context, depsgraph)
-        is_running = self._pictures.read()
+        is_running = self._pictures.read(may_wait)
         self._pictures.draw(engine, depsgraph.scene_eval)
-        if not is_current or self._pictures.is_urgent():
+        is_urgent = not is_current or self._pictures.is_urgent()
+        if is_urgent and may_wait:
             engine.tag_redraw()
-        elif is_running:
+        elif is_urgent or is_running:
             _redraw_later()
 
-    def _synchronise(self, engine, context, depsgraph):
+    def _synchronise(self, engine, context, depsgraph, may_wait):
         """Bring the library's scene up to date; whether it is."""
-        if self._build is not None and not self._end_build():
+        if self._build is not None and not self._end_build(NAP_SECONDS if may_wait else 0.0):
             return False
         if self._sync is None:
             self._sync = SceneSync(is_final=False, thread_count=thread_count(depsgraph.scene_eval.render),
@@ -100,11 +105,11 @@ class Viewport:
             return True
         self._pictures.stop()
         self._build = _Build(self._sync.scene)
-        return self._end_build()
+        return self._end_build(FRAME_SECONDS if may_wait else 0.0)
 
-    def _end_build(self):
-        """Note a build that has ended; False while it runs."""
-        if not self._build.is_done(NAP_SECONDS):
+    def _end_build(self, seconds):
+        """Note a build that has ended, after waiting for it that long; False while it runs."""
+        if not self._build.is_done(seconds):
             return False
         build, self._build = self._build, None
         if build.failure is not None:
@@ -117,6 +122,13 @@ class Viewport:
             if message not in self._reported:
                 self._reported.add(message)
                 engine.report({'WARNING'}, message)
+
+
+def _may_wait():
+    """Whether a draw may wait: not beside F12 or a preview. Blender forbids Python to write to its data
+    while an engine draws, by one switch for all threads; a render that starts within a draw finds it set,
+    and leaves it so for good when it ends."""
+    return not any(bpy.app.is_job_running(kind) for kind in ('RENDER', 'RENDER_PREVIEW'))
 
 
 def _redraw_later():
@@ -177,6 +189,7 @@ class _Pictures:
         self._samples = 0
         self._features = ""
         self._started, self._first_seconds = 0.0, 0.0
+        self._patience = 0.0    # how long the next draw waits
         self._pixel_seconds = PIXEL_SECONDS  # of one sample of one pixel, as last measured
 
     def look(self, sync, context, depsgraph):
@@ -203,9 +216,11 @@ class _Pictures:
         self._wanted, self._fields = wanted, fields
         self._features = ", ".join(sync.scene.features())
         self._started, self._first_seconds = time.monotonic(), 0.0
+        self._patience = FRAME_SECONDS
         size = scene.render.preview_pixel_size
         least = 1 if size == 'AUTO' else int(size)
-        first = max(least, self._first_divisor())
+        pixel_count = fields["crop_width"] * fields["crop_height"]
+        first = max(least, first_divisor(pixel_count * self._pixel_seconds))
         self._stages = [(first, 1)] + ([(least, 1)] if first > least else []) + [(least, None)]
         self._next_stage(sync)
 
@@ -220,22 +235,13 @@ class _Pictures:
         """Whether quick pictures are still to come."""
         return bool(self._stages) or not self._is_last
 
-    def _first_divisor(self):
-        """Of a picture that can be there within the budget."""
-        fields = self._fields
-        seconds = self._pixel_seconds * fields["crop_width"] * fields["crop_height"]
-        divisor = 1
-        while divisor < MAX_DIVISOR and seconds > PICTURE_SECONDS * divisor * divisor:
-            divisor *= 2
-        return divisor
-
     def _next_stage(self, sync):
         """Start the next stage when the one before has ended and been read."""
         if not self._stages or self._render is not None:
             return
         divisor, sample_count = self._stages.pop(0)
         self._is_last = not self._stages
-        fields = _divided(self._fields, divisor)
+        fields = divided(self._fields, divisor)
         if sample_count is not None:
             fields.update(sample_count=sample_count, noise_threshold=0.0)
         self._samples = fields["sample_count"]
@@ -246,12 +252,13 @@ class _Pictures:
         self._render = sync.scene.start_render(**fields)
         self._version, self._next_read = -1, 0.0
 
-    def read(self):
+    def read(self, may_wait):
         """Bring the texture up to date; whether there is more to come."""
         if self._render is None:
             return bool(self._stages)
-        if not self._is_last:
-            self._render.wait(NAP_SECONDS)
+        if not self._is_last and may_wait:
+            self._render.wait(self._patience)
+            self._patience = NAP_SECONDS
         progress = self._progress = self._render.poll()
         is_running = progress.state == native.STATE_RUNNING
         shown = min(SHOWN_SAMPLES, self._samples)
@@ -285,7 +292,12 @@ class _Pictures:
         engine.update_stats("", rate + self._status)
 
 
-def _divided(fields, divisor):
+def first_divisor(seconds):
+    """Of the size of a picture that can be there within the budget, where a full one takes seconds."""
+    return min(max(1, math.ceil(math.sqrt(seconds / PICTURE_SECONDS))), MAX_DIVISOR)
+
+
+def divided(fields, divisor):
     """Fields of a render of the same view with 1 / divisor the width and height."""
     if divisor == 1:
         return dict(fields)

@@ -5,15 +5,15 @@
         --python tests/bench/viewport.py -- [--large] [--repeats N] [--json FILE]
 
 First a table of edits of a scene of 1,000 objects, each of a mesh of its own, of 200,000 triangles
-(2 million with --large). Then how long a pose of a skinned character of 60,000 triangles under an area
-light, over a reflecting floor, takes to its first complete picture of one sample per pixel at 960x540.
-Times are medians in milliseconds, beyond Blender's own evaluation: sync is Python and the copies it
-makes, commit builds trees and tables, picture renders.
+(2 million with --large). Then a pose of a skinned character of 60,000 triangles under an area light, over
+a reflecting floor. Times are medians in milliseconds, beyond Blender's own evaluation: sync is Python and
+the copies it makes; commit builds trees and tables, trees is the part of it for BLASes and the TLAS;
+first is the first complete picture, one sample per pixel and 1 / divisor of 960x540 as the viewport
+chooses it; full is the same with all pixels.
 """
 
 import argparse
 import json
-import math
 import pathlib
 import statistics
 import sys
@@ -21,92 +21,16 @@ import time
 from collections import Counter
 
 import bpy
-import numpy as np
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "support"))
 import scenes  # noqa: E402  (found by the line above)
+import viewport_scenes  # noqa: E402
 
-SIDE = 32                # objects in a row
-OBJECT_COUNT = 1000
 SMALL_CELLS, LARGE_CELLS = 10, 32  # quads along a side of each object's grid
 PICTURE = (960, 540)
-CHARACTER_RINGS, CHARACTER_SIDES, CHARACTER_BONES = 300, 100, 10
-
-
-# Scenes ----------------------------------------------------------------------------------------
-
-def grid(name, cells, material):
-    """A bumpy square of cells * cells quads."""
-    line = np.linspace(-0.4, 0.4, cells + 1)
-    x, y = np.meshgrid(line, line)
-    z = 0.05 * np.sin(20.0 * x) * np.cos(20.0 * y)
-    corner = np.arange(cells * (cells + 1)).reshape(cells, cells + 1)[:, :-1].ravel()
-    faces = np.stack([corner, corner + 1, corner + cells + 2, corner + cells + 1], axis=1)
-    points = np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1)
-    return scenes.mesh(name, points.tolist(), faces.tolist(), material, smooth=True)
-
-
-def make_field(cells):
-    """OBJECT_COUNT objects; the first is posed by a bone."""
-    scene = scenes.empty(size=PICTURE)
-    scene.world.use_nodes = True
-    materials = [scenes.material(f"Material{i}", "ShaderNodeBsdfDiffuse") for i in range(10)]
-    for i in range(OBJECT_COUNT):
-        made = grid(f"Object{i}", cells, materials[i % len(materials)])
-        made.location = (i % SIDE - SIDE / 2, i // SIDE - SIDE / 2, 0.0)
-    add_rig(bpy.data.objects["Object0"], 1, 1.0)
-    scenes.light('AREA', (0.0, 0.0, 20.0), (0.0, 0.0, 0.0), energy=2000.0, size=4.0)
-    scenes.camera((0.0, -28.0, 20.0), (math.radians(55), 0.0, 0.0))
-    return scene
-
-
-def add_rig(skinned, bone_count, height):
-    """A chain of bones along Z that moves an object; vertices follow the bone beside them."""
-    rig = scenes.link("Rig", bpy.data.armatures.new("Rig"))
-    rig.location = skinned.location
-    bpy.context.view_layer.objects.active = rig
-    bpy.ops.object.mode_set(mode='EDIT')
-    parent, length = None, height / bone_count
-    for i in range(bone_count):
-        bone = rig.data.edit_bones.new(f"Bone{i}")
-        bone.head, bone.tail, bone.parent = (0, 0, i * length), (0, 0, (i + 1) * length), parent
-        parent = bone
-    bpy.ops.object.mode_set(mode='OBJECT')
-    skinned.modifiers.new("Rig", 'ARMATURE').object = rig
-    groups = [skinned.vertex_groups.new(name=f"Bone{i}") for i in range(bone_count)]
-    heights = np.array([vertex.co.z for vertex in skinned.data.vertices])
-    owners = (heights / length).astype(int).clip(0, bone_count - 1)
-    for i, group in enumerate(groups):
-        group.add(np.flatnonzero(owners == i).tolist(), 1.0, 'REPLACE')
-
-
-def make_character():
-    """A skinned column of 60,000 triangles under an area light, over a reflecting floor."""
-    scene = scenes.empty(size=PICTURE)
-    turn = np.linspace(0.0, 2.0 * math.pi, CHARACTER_SIDES, endpoint=False)
-    z = np.linspace(0.0, 3.0, CHARACTER_RINGS + 1)[:, None]
-    radius = 0.5 + 0.1 * np.sin(5.0 * z)
-    points = np.stack(np.broadcast_arrays(radius * np.cos(turn), radius * np.sin(turn), z), axis=-1)
-    faces = [(r * CHARACTER_SIDES + s, r * CHARACTER_SIDES + (s + 1) % CHARACTER_SIDES,
-              (r + 1) * CHARACTER_SIDES + (s + 1) % CHARACTER_SIDES, (r + 1) * CHARACTER_SIDES + s)
-             for r in range(CHARACTER_RINGS) for s in range(CHARACTER_SIDES)]
-    skin = scenes.material("Skin", "ShaderNodeBsdfDiffuse", Color=(0.7, 0.4, 0.3))
-    character = scenes.mesh("Character", points.reshape(-1, 3).tolist(), faces, skin, smooth=True)
-    add_rig(character, CHARACTER_BONES, 3.0)
-    floor = scenes.material("Floor", "ShaderNodeBsdfPrincipled", Roughness=0.15)
-    scenes.mesh("Floor", [(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0)], [(0, 1, 2, 3)], floor)
-    scenes.light('AREA', (2.0, -3.0, 5.0), (0.5, 0.3, 0.0), energy=500.0, size=1.5)
-    scenes.camera((0.0, -7.0, 2.5), (math.radians(80), 0.0, 0.0))
-    return scene
 
 
 # Edits -----------------------------------------------------------------------------------------
-
-def pose(step):
-    bone = bpy.data.objects["Rig"].pose.bones[-1]
-    bone.rotation_mode = 'XYZ'
-    bone.rotation_euler.x = 0.3 * math.sin(step + 1.0)
-
 
 def transform(step):
     bpy.data.objects["Object500"].location.z = 0.1 * (step + 1)
@@ -168,8 +92,8 @@ def view(_step):
     """The view's own camera moves: nothing of the scene does."""
 
 
-EDITS = (pose, transform, material, node_link, light, world, ray_visibility, mesh_edit, duplicate,
-         delete, hide, settings, view)
+EDITS = (viewport_scenes.pose, transform, material, node_link, light, world, ray_visibility, mesh_edit,
+         duplicate, delete, hide, settings, view)
 
 
 # Measuring -------------------------------------------------------------------------------------
@@ -187,6 +111,7 @@ class Follower:
         self._edit = self._sync.scene._edit
         self._sync.scene._edit = self._count
         self._camera_offset = 0.0
+        self._full_seconds = 0.0  # of the last full picture
         bpy.app.handlers.depsgraph_update_post.append(self._mark)
 
     def _count(self, name, *arguments):
@@ -203,6 +128,7 @@ class Follower:
 
     def follow(self, moves_view=False):
         """Sync, commit and render a first picture: a row of the table."""
+        from volley import viewport
         from volley.sync import Source
         from volley.sync.changes import Changes
         depsgraph = bpy.context.evaluated_depsgraph_get()
@@ -215,13 +141,17 @@ class Follower:
         synced = time.perf_counter()
         self._sync.scene.commit()
         committed = time.perf_counter()
-        rays = self._render(depsgraph.scene_eval)
-        rendered = time.perf_counter()
+        divisor = viewport.first_divisor(self._full_seconds)
+        self._render(depsgraph.scene_eval, divisor)
+        shown = time.perf_counter()
+        progress = self._render(depsgraph.scene_eval)
+        full_ms = 1e3 * (time.perf_counter() - shown)
+        self._full_seconds = progress.seconds
         stats = self._sync.scene.stats()
         return {"sent": dict(self._calls), "built": stats.built_count, "refitted": stats.refitted_count,
                 "sync_ms": 1e3 * (synced - start), "commit_ms": 1e3 * (committed - synced),
-                "tree_ms": 1e3 * stats.build_seconds, "picture_ms": 1e3 * (rendered - committed),
-                "rays": rays}
+                "tree_ms": 1e3 * stats.build_seconds, "first_ms": 1e3 * (shown - committed),
+                "divisor": divisor, "picture_ms": full_ms, "rays": progress.ray_count}
 
     def _look(self, depsgraph, moves_view):
         from volley.sync import camera
@@ -237,19 +167,20 @@ class Follower:
         window = camera.window(lens, camera.frame_of(scene.render))
         self._sync.set_camera(camera.CameraKeys(lens, [transform], [window]))
 
-    def _render(self, scene):
-        from volley import native, passes
+    def _render(self, scene, divisor=1):
+        """A picture of 1 / divisor the size; what its render took."""
+        from volley import native, passes, viewport
         from volley.session import render_fields
         from volley.sync import camera
         fields = render_fields(scene, camera.frame_of(scene.render), (0, 0) + PICTURE,
                                [passes.COMBINED], is_preview=True)
         fields.update(sample_count=1, progressive=1, sampler=native.SAMPLERS['BLUE_NOISE'])
-        render = self._sync.scene.start_render(**fields)
+        render = self._sync.scene.start_render(**viewport.divided(fields, divisor))
         render.wait(-1.0)
         passes.read_combined(render)
-        rays = render.poll().ray_count
+        progress = render.poll()
         render.destroy()
-        return rays
+        return progress
 
 
 def measure(follower, edit, repeats):
@@ -263,10 +194,24 @@ def measure(follower, edit, repeats):
     return {"edit": edit.__name__, "sent": rows[-1]["sent"], **row}
 
 
+COLUMNS = (("sync", "sync_ms"), ("commit", "commit_ms"), ("trees", "tree_ms"), ("first", "first_ms"),
+           ("full", "picture_ms"), ("divisor", "divisor"), ("built", "built"), ("refit", "refitted"))
+
+
 def report(row):
     sent = ", ".join(f"{name} {count}" for name, count in sorted(row["sent"].items())) or "nothing"
-    print(f"{row['edit']:15} {row['sync_ms']:9.2f} {row['commit_ms']:9.2f} {row['tree_ms']:9.2f} "
-          f"{row['picture_ms']:10.2f} {row['built']:6.0f} {row['refitted']:6.0f}  {sent[:80]}")
+    numbers = [f"{row[key]:8.2f}" if key.endswith("_ms") else f"{row[key]:8.0f}" for _, key in COLUMNS]
+    print(f"{row['edit']:15}{''.join(numbers)}  {sent[:80]}")
+
+
+def report_pose(row, vertex_count):
+    """What a pose of the character takes, in the terms of what is wanted of it."""
+    prepared = row["sync_ms"] + row["commit_ms"]
+    first, full = prepared + row["first_ms"], prepared + row["picture_ms"]
+    print(f"character at {PICTURE[0]}x{PICTURE[1]}: pose to first picture {first:.1f} ms (1/{row['divisor']:.0f}"
+          f" size, {1e3 / first:.0f} a second), to a full one {full:.1f} ms; sync "
+          f"{row['sync_ms'] * 1e5 / vertex_count:.2f} ms per 100,000 moved vertices; refit and TLAS "
+          f"{row['tree_ms']:.2f} ms; {row['rays'] / row['picture_ms'] * 1e-3:.1f} Mrays/s")
 
 
 def parse_arguments():
@@ -277,30 +222,32 @@ def parse_arguments():
     return parser.parse_args(sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else [])
 
 
+def run(scene_name, edits, repeats):
+    """The rows of a scene, with its first sync in front."""
+    bpy.context.view_layer.update()
+    follower = Follower()
+    rows = [{"edit": "first sync", **follower.follow()}]
+    report(rows[0])
+    for edit in edits:
+        rows.append(measure(follower, edit, repeats))
+        report(rows[-1])
+    follower.close()
+    return [{"scene": scene_name, **row} for row in rows]
+
+
 def main():
     arguments = parse_arguments()
-    print(f"{'edit':15} {'sync ms':>9} {'commit ms':>9} {'trees ms':>9} {'picture ms':>10} "
-          f"{'built':>6} {'refit':>6}  sent")
-    rows = []
-    for make, edits in ((lambda: make_field(LARGE_CELLS if arguments.large else SMALL_CELLS), EDITS),
-                        (make_character, (pose, light, view))):
-        make()
-        bpy.context.view_layer.update()
-        follower = Follower()
-        rows.append({"edit": "first sync", **follower.follow()})
-        report(rows[-1])
-        for edit in edits:
-            rows.append(measure(follower, edit, arguments.repeats))
-            report(rows[-1])
-        follower.close()
-    posed = rows[-3]
-    total = posed["sync_ms"] + posed["commit_ms"] + posed["picture_ms"]
-    rate = posed["rays"] / posed["picture_ms"] * 1e-3
-    print(f"character: pose to first picture {total:.1f} ms at {PICTURE[0]}x{PICTURE[1]}, "
-          f"{rate:.1f} Mrays/s")
+    print(f"{'edit, ms':15}{''.join(f'{title:>8}' for title, _ in COLUMNS)}  sent")
+    scenes.empty(size=PICTURE)
+    viewport_scenes.fill_field(LARGE_CELLS if arguments.large else SMALL_CELLS)
+    rows = run("field", EDITS, arguments.repeats)
+    scenes.empty(size=PICTURE)
+    viewport_scenes.fill_character()
+    posed = run("character", (viewport_scenes.pose, light, view), arguments.repeats)
+    report_pose(posed[1], len(bpy.data.objects["Character"].data.vertices))
     if arguments.json:
         with open(arguments.json, "w", encoding="utf-8") as file:
-            file.writelines(json.dumps(row) + "\n" for row in rows)
+            file.writelines(json.dumps(row) + "\n" for row in rows + posed)
 
 
 main()

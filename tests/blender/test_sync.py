@@ -138,6 +138,36 @@ def test_normals_are_what_blender_shades_with(blender):
     assert np.allclose(normals[~on_caps, :2], radial / np.linalg.norm(radial, axis=1)[:, None], atol=2e-2)
 
 
+def inside_memory():
+    """Values as they lie in memory beside those Blender copies; what a misfit gives."""
+    import bpy
+    import numpy as np
+    import scenes
+    from volley.sync import mesh
+    scenes.empty()
+    data = scenes.sphere().data
+    count = len(data.vertices)
+    normals = np.empty(count * 3, np.float32)
+    data.vertex_normals.foreach_get("vector", normals)
+    corners = np.empty(len(data.loops), np.uint32)
+    data.loops.foreach_get("vertex_index", corners)
+    fits = {"normals": np.array_equal(mesh.memory_of(data.vertex_normals, "vector", 3, np.float32),
+                                      normals.reshape(count, 3)),
+            "corners": np.array_equal(mesh.memory_of(data.loops, "vertex_index", 1, np.uint32)[:, 0],
+                                      corners)}
+    too_wide = mesh.memory_of(data.vertex_normals, "vector", 4, np.float32)
+    other = mesh.memory_of(data.loops, "edge_index", 1, np.uint32)
+    topology = mesh.Topology(data)
+    before = topology.is_of(data)
+    data.polygons[40].vertices = tuple(reversed(data.polygons[40].vertices))
+    return {**fits, "too wide": too_wide is None, "other": other is None, "same": before,
+            "turned": not topology.is_of(data)}
+
+
+def test_memory_is_looked_at_only_where_it_fits(blender):
+    assert all(blender.run(inside_memory).values())
+
+
 def inside_resync():
     import bpy
     import scenes
@@ -347,3 +377,45 @@ def test_an_edit_sends_what_it_touches(blender):
         "pose": ["update_mesh"], "transform": ["update_instance"], "material": ["update_material"],
         "light_energy": ["update_light"], "move_light": ["update_light"], "world": ["update_material"],
         "ray_visibility": ["update_instance"]}
+
+
+def inside_edited_topology():
+    """What is sent when a face is turned while the mesh is posed, in ways that mark different things."""
+    import random
+    import bmesh
+    import bpy
+    import edits
+    from volley.sync.changes import Changes
+    edits.make_scene()
+    sync, _ = _sync()
+    data, told = bpy.data.objects["Tube"].data, []
+
+    def mark(_scene, depsgraph):
+        changes.merge(Changes.of_depsgraph(depsgraph))
+
+    def turn_in_place():
+        data.polygons[5].vertices = tuple(reversed(data.polygons[5].vertices))
+        data.update()
+
+    def turn_untold():
+        editable = bmesh.new()
+        editable.from_mesh(data)
+        editable.faces.ensure_lookup_table()
+        bmesh.ops.reverse_faces(editable, faces=[editable.faces[3]])
+        editable.to_mesh(data)
+        editable.free()
+
+    bpy.context.view_layer.update()
+    bpy.app.handlers.depsgraph_update_post.append(mark)
+    for turn in (turn_in_place, turn_untold, lambda: None):
+        changes = Changes()
+        turn()
+        edits.pose(random.Random(len(told)))
+        bpy.context.view_layer.update()
+        sync, recorder = _sync(changes, sync)
+        told.append({name for name, _, _ in recorder.calls} & {"create_mesh", "update_mesh"})
+    return told
+
+
+def test_a_pose_with_other_faces_sends_them(blender):
+    assert blender.run(inside_edited_topology) == [{"create_mesh"}, {"create_mesh"}, {"update_mesh"}]

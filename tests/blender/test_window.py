@@ -40,15 +40,26 @@ def _shot():
 
 
 def _settled():
-    """The view once it no longer changes, without the status line, which tells of speed."""
+    """The view once it no longer changes, without the status line, which tells of speed. Pictures that
+    are equal do not tell: on a busy machine one may stay for long before the next."""
+    from volley import viewport
+    read, is_running = viewport._Pictures.read, [True]
+
+    def noting_read(*arguments):
+        is_running[0] = read(*arguments)
+        return is_running[0]
+
+    viewport._Pictures.read = noting_read
     before = None
     for _ in range(LONGEST_DRAWS):
+        _view()[1].tag_redraw()
         yield DRAW_SECONDS
         shot = _shot()
         shot = shot[:len(shot) * 3 // 4]
-        if before is not None and np.array_equal(shot, before):
+        if before is not None and np.array_equal(shot, before) and not is_running[0]:
             break
         before = shot
+    viewport._Pictures.read = read
     return shot
 
 

@@ -4,6 +4,7 @@
  * one (a tree per mesh). For both: packets of every size give the same bits, scalar kernels give
  * the bits of the instruction set under test, occlusion is what the closest hit implies, and the
  * oracle in double precision finds nothing wrong. */
+#include "figures.h"
 #include "query_test.h"
 
 /* Rays of a world against brute force. */
@@ -229,8 +230,8 @@ static void judge(const char *name, const struct query_world *world, const struc
             fail_msg("%s, %s scene: wrong at ray %u", name, k ? "final" : "interactive", i);
         }
     }
-    print_message("%s: %u rays twice, %u hits, %u doubtful\n", name, rays->count, hit_count,
-                  doubtful);
+    print_figure(name, "0 wrong of %u rays, %u of them hit, %u in doubt", 2 * rays->count,
+                 hit_count, doubtful);
     assert_true(hit_count > rays->count / 10);
     /* Matrices in motion are inverted in single precision for each ray, so bounds are wide. */
     bool turns = false;

@@ -6,6 +6,7 @@
  * and prints how many rays missed. Rays without a miss bound the rate of misses at 3 / rays (95 %).
  *
  * TRACER_TEST_RAYS sets the number of rays of each case. */
+#include "figures.h"
 #include "query_test.h"
 
 #define USUAL_RAYS 48000
@@ -122,8 +123,7 @@ static void expect_closed(const struct watertight_case *c) {
             misses += count_misses(c, scene.scene, count, sizes[i], 2 * i + (uint32_t)is_final);
         query_scene_destroy(&scene);
     }
-    print_message("%-44s %llu misses of %llu rays\n", c->name, (unsigned long long)misses,
-                  6ull * count);
+    print_misses(c->name, misses, 6ull * count);
     assert_int_equal(misses, 0);
 }
 
@@ -246,8 +246,9 @@ static void seen_from_far(void **state) {
         }
         assert_ok(hit_set_query(&hits, scene.scene, &rays, 64));
         const uint64_t misses = batch_misses(&rays, &hits);
-        print_message("15: seen from %-29g %llu misses of %u rays\n", (double)distance,
-                      (unsigned long long)misses, count);
+        char title[64];
+        (void)snprintf(title, sizeof title, "15: seen from %g", (double)distance);
+        print_misses(title, misses, count);
         assert_int_equal(misses, 0);
         hit_set_free(&hits);
         ray_set_free(&rays);
@@ -283,7 +284,7 @@ static void instances(void **state) {
         const uint64_t misses = count_misses(&c, scene.scene, count, 64, 9);
         (void)snprintf(title, sizeof title, "instance scaled by %g %g %g", scales[i][0],
                        scales[i][1], scales[i][2]);
-        print_message("%-44s %llu misses of %u rays\n", title, (unsigned long long)misses, count);
+        print_misses(title, misses, count);
         assert_int_equal(misses, 0);
         query_scene_destroy(&scene);
         query_world_free(&aimed);
@@ -378,8 +379,7 @@ static void two_meshes(void **state) {
         misses += count_misses(&c, scene.scene, count, 64, 11 + (uint32_t)is_final);
         query_scene_destroy(&scene);
     }
-    print_message("%-44s %llu misses of %u rays\n", "20: static beside moving, two meshes",
-                  (unsigned long long)misses, 2 * count);
+    print_misses("20: static beside moving, two meshes", misses, 2 * count);
     query_world_free(&whole);
     query_world_free(&parts);
     assert_int_equal(misses, 0);
@@ -423,8 +423,7 @@ static void through_the_origin(void **state) {
     hit_set_init(&hits, count);
     assert_ok(hit_set_query(&hits, scene.scene, &rays, 64));
     const uint64_t misses = batch_misses(&rays, &hits);
-    print_message("%-44s %llu misses of %u rays\n", "21: through the origin at 1e6",
-                  (unsigned long long)misses, count);
+    print_misses("21: through the origin at 1e6", misses, count);
     assert_int_equal(misses, 0);
     hit_set_free(&hits);
     ray_set_free(&rays);
@@ -461,8 +460,7 @@ static void joins_of_segments(void **state) {
         rays.time[i] = fminf(fmaxf(rays.time[i], 0.0f), 1.0f);
     assert_ok(hit_set_query(&clamped, scene.scene, &rays, 64));
     const uint64_t misses = batch_misses(&rays, &hits);
-    print_message("%-44s %llu misses of %u rays\n", "22: joins of segments",
-                  (unsigned long long)misses, count);
+    print_misses("22: joins of segments", misses, count);
     assert_int_equal(misses, 0);
     assert_int_equal(hit_set_difference(&hits, &clamped), UINT32_MAX);
     hit_set_free(&hits);
@@ -515,8 +513,7 @@ static void collapse_and_inversion(void **state) {
         if (!misses++)
             hit_set_print(&hits, &rays, i);
     }
-    print_message("%-44s %llu wrong of %u rays\n", "23: collapse and inversion",
-                  (unsigned long long)misses, count);
+    print_misses("23: collapse and inversion", misses, count);
     assert_int_equal(misses, 0);
     hit_set_free(&hits);
     ray_set_free(&rays);

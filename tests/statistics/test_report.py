@@ -15,7 +15,7 @@ import flip  # noqa: E402  (the folders are on the path only now)
 from reporting import curves, estimates, frames, gate, readme  # noqa: E402
 
 
-@pytest.mark.parametrize("module", ["flip", "error_time", "reporting.estimates", "reporting.frames",
+@pytest.mark.parametrize("module", ["flip", "error_time", "stability", "reporting.estimates", "reporting.frames",
                                     "reporting.gate", "reporting.readme", "reporting.tables"])
 def test_examples_in_comments(module):
     result = doctest.testmod(importlib.import_module(module))
@@ -168,10 +168,12 @@ def test_readme_holds_the_committed_report():
     assert readme.agrees()
 
 
-def test_readme_that_differs_is_found(tmp_path):
+@pytest.mark.parametrize("name", ["report", "stability"])
+def test_readme_that_differs_is_found(tmp_path, name):
+    begin = readme.BEGIN.format(name)
     text = (readme.PROJECT / "README.md").read_text(encoding="utf-8")
     changed = tmp_path / "README.md"
-    changed.write_text(text.replace(readme.BEGIN, readme.BEGIN + "\nTen times faster."), encoding="utf-8")
+    changed.write_text(text.replace(begin, begin + "\nTen times faster."), encoding="utf-8")
     assert not readme.agrees(changed)
     readme.write(changed)
     assert readme.agrees(changed)

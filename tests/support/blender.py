@@ -73,14 +73,14 @@ class Blender:
             raise BlenderError(f"{error}\nBlender's output:\n{self.output}")
         return result
 
-    def run_in_window(self, function, *arguments, timeout=120):
-        """The same with a window on a virtual display. The function returns a generator: what it
-        yields is the seconds to let Blender draw, what it returns is the result."""
+    def run_in_window(self, function, *arguments, timeout=120, size=(640, 480)):
+        """The same with a window of that size on a virtual display. The function returns a generator:
+        what it yields is the seconds to let Blender draw, what it returns is the result."""
         answer, line = self._request(function, arguments)
-        display = ["xvfb-run", "-a", "-s", "-screen 0 640x480x24"]
+        display = ["xvfb-run", "-a", "-s", f"-screen 0 {size[0]}x{size[1]}x24"]
         line = display + [argument for argument in line if argument != "-b"]
         position = line.index("--factory-startup")
-        line[position:position] = ["--window-geometry", "0", "0", "640", "480"]
+        line[position:position] = ["--window-geometry", "0", "0", *map(str, size)]
         process = self._start(line, timeout, {"LIBGL_ALWAYS_SOFTWARE": "1"})
         return self._answer(answer, process)
 

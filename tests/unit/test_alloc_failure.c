@@ -264,12 +264,48 @@ static void renders_go_on_with_fewer_threads(void **state) {
     assert_int_equal(trc_scene_destroy(scene), TRC_OK);
 }
 
+/* Scenes and renders by the dozen, so that the table of handles must grow, each made while one of
+ * its allocations fails. */
+static void handles_without_memory(void **state) {
+    (void)state;
+    enum { COUNT = 40 };
+    trc_scene scenes[COUNT];
+    trc_render renders[COUNT];
+    const trc_scene_desc scene_desc = default_scene_desc();
+    trc_render_desc desc = default_render_desc(8, 8, 1);
+    desc.thread_count = 1;
+    const trc_scene shown = fixture_scene();
+    for (uint32_t i = 0; i < COUNT; i++) {
+        bool made = false;
+        for (int64_t n = 0; !made; n++) {
+            trc_memory_fail_at(n, false);
+            scenes[i] = UNTOUCHED;
+            made = !failed_cleanly(trc_scene_create(&scene_desc, &scenes[i]));
+            assert_true(made != (scenes[i] == UNTOUCHED));
+        }
+        made = false;
+        for (int64_t n = 0; !made; n++) {
+            trc_memory_fail_at(n, false);
+            renders[i] = UNTOUCHED;
+            made = !failed_cleanly(trc_render_start(shown, &desc, &renders[i]));
+            assert_true(made != (renders[i] == UNTOUCHED));
+        }
+        trc_memory_fail_at(-1, false);
+    }
+    for (uint32_t i = 0; i < COUNT; i++) {
+        assert_int_equal(trc_render_destroy(renders[i]), TRC_OK);
+        assert_int_equal(trc_scene_destroy(scenes[i]), TRC_OK);
+    }
+    assert_int_equal(trc_scene_destroy(shown), TRC_OK);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(each_operation_fails_once),
         cmocka_unit_test(all_operations_fail_from_one_on),
         cmocka_unit_test(each_operation_of_a_final_frame_fails_once),
         cmocka_unit_test(renders_go_on_with_fewer_threads),
+        cmocka_unit_test(handles_without_memory),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -4,6 +4,7 @@
 
 #include "bvh/tree.h"
 #include "core/core.h"
+#include "figures.h"
 
 static const float unit_lower[3] = {-1, -1, -1}, unit_upper[3] = {1, 1, 1}, origin[3] = {0, 0, 0};
 
@@ -282,7 +283,7 @@ static void one_million_identical_centroids(void **state) {
     assert_ok(query_scene_create(&world, true, 1, &scene));
     const struct trc_tree *tree = query_scene_snapshot(scene.scene)->bvh->tree;
     const uint32_t depth = depth_of(tree, tree->root);
-    print_message("1,000,000 copies: %u levels of %d\n", depth, TRC_MAX_LEVELS);
+    print_figure("17: 1,000,000 triangles in one place", "%u levels of %d", depth, TRC_MAX_LEVELS);
     assert_true(depth <= 8);
     expect_good(scene.scene, "copies");
     query_scene_destroy(&scene);
@@ -317,7 +318,7 @@ static void ladder(const char *name, uint32_t rung_size, uint32_t foot, float to
         mesh_add_triangle(mesh, v, v + 1, v + 2);
     assert_ok(query_scene_create(&world, true, 1, &scene));
     const struct trc_tree *tree = query_scene_snapshot(scene.scene)->bvh->tree;
-    print_message("%s: %u levels of %d\n", name, depth_of(tree, tree->root), TRC_MAX_LEVELS);
+    print_figure(name, "%u levels of %d", depth_of(tree, tree->root), TRC_MAX_LEVELS);
     expect_good(scene.scene, name);
     query_scene_destroy(&scene);
     query_world_free(&world);

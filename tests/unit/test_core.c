@@ -632,6 +632,80 @@ static void bad_vertices_do_not_spread(void **state) {
     trc_names_destroy(names);
 }
 
+/* Normals and coordinates that cannot be interpolated are replaced when a mesh comes in. */
+static void bad_normals_are_replaced(void **state) {
+    (void)state;
+    static float vertex[24], corner[108], generated[24];
+    const float bad[][3] = {{NAN, 0, 0}, {0, 0, 0}, {1e9f, 0, 0}, {0, INFINITY, 0}};
+    for (uint32_t kind = TRC_NORMALS_VERTEX; kind <= TRC_NORMALS_CORNER; kind++) {
+        float *normals = kind == TRC_NORMALS_VERTEX ? vertex : corner;
+        const uint32_t count = kind == TRC_NORMALS_VERTEX ? 8 : 36;
+        for (uint32_t i = 0; i < count; i++)
+            memcpy(normals + 3 * i, bad[i % 4], sizeof bad[0]);
+        for (int i = 0; i < 24; i++)
+            generated[i] = i % 2 ? NAN : 0.25f;
+        trc_mesh_desc desc = default_mesh_desc();
+        desc.normal_kind = kind;
+        desc.normals = normals;
+        desc.normal_count = 3 * count;
+        desc.smooth = cube_smooth;
+        desc.generated = generated;
+        desc.generated_count = 24;
+        struct trc_names *names = trc_names_create();
+        struct trc_mesh *mesh = NULL;
+        assert_int_equal(trc_geometry_create(&desc, names, &mesh), TRC_OK);
+        const float *stored =
+            kind == TRC_NORMALS_VERTEX ? mesh->vertex_normals : mesh->corner_normals;
+        for (uint32_t i = 0; i < count; i++) { /* away from the origin */
+            const float *p =
+                cube_positions + 3 * (kind == TRC_NORMALS_VERTEX ? i : cube_indices[i]);
+            for (int axis = 0; axis < 3; axis++)
+                assert_true(fabsf(stored[3 * i + axis] - p[axis] * 0.57735027f) < 1e-6f);
+        }
+        for (int i = 0; i < 24; i++)
+            assert_true(mesh->generated[i] == (i % 2 ? 0.0f : 0.25f));
+        trc_geometry_release(mesh);
+        trc_names_destroy(names);
+    }
+}
+
+/* Bounds over blocks of points, over the rest of them, and past points that do not count. */
+static void bounds_are_those_of_valid_points(void **state) {
+    (void)state;
+    enum { MOST = 70 };
+    static float positions[3 * MOST];
+    static const uint32_t indices[3] = {0, 1, 2};
+    for (uint32_t count = 3; count <= MOST; count++) {
+        for (uint32_t spoiled = 0; spoiled < 2; spoiled++) {
+            float lower[3] = {INFINITY, INFINITY, INFINITY},
+                  upper[3] = {-INFINITY, -INFINITY, -INFINITY};
+            for (uint32_t i = 0; i < count; i++) {
+                const bool bad = spoiled && i == count / 2;
+                for (int axis = 0; axis < 3; axis++) {
+                    const float x = (float)((i * 37 + 11 * (uint32_t)axis) % 101) - 50.0f;
+                    positions[3 * i + axis] = bad && axis == 1 ? NAN : x;
+                    lower[axis] = bad ? lower[axis] : fminf(lower[axis], x);
+                    upper[axis] = bad ? upper[axis] : fmaxf(upper[axis], x);
+                }
+            }
+            trc_mesh_desc desc = default_mesh_desc();
+            desc.vertex_count = count;
+            desc.positions = positions;
+            desc.position_count = 3 * count;
+            desc.triangle_count = 1;
+            desc.indices = indices;
+            desc.index_count = 3;
+            struct trc_names *names = trc_names_create();
+            struct trc_mesh *mesh = NULL;
+            assert_int_equal(trc_geometry_create(&desc, names, &mesh), TRC_OK);
+            assert_memory_equal(mesh->bounds_lower, lower, sizeof lower);
+            assert_memory_equal(mesh->bounds_upper, upper, sizeof upper);
+            trc_geometry_release(mesh);
+            trc_names_destroy(names);
+        }
+    }
+}
+
 static void normals_do_not_depend_on_threads(void **state) {
     (void)state;
     enum { SIDE = 150 };
@@ -733,6 +807,8 @@ int main(void) {
         cmocka_unit_test(affine_inverts_what_it_can),
         cmocka_unit_test(normals_are_weighted_by_angle),
         cmocka_unit_test(bad_vertices_do_not_spread),
+        cmocka_unit_test(bad_normals_are_replaced),
+        cmocka_unit_test(bounds_are_those_of_valid_points),
         cmocka_unit_test(normals_do_not_depend_on_threads),
         cmocka_unit_test(equal_keys_become_one),
     };

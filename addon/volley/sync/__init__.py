@@ -120,8 +120,10 @@ class SceneSync:
         if name in source.changes.geometry:
             data = each.object.data
             is_pose = name not in source.changes.topology and mesh.is_posable(each.object)
+            is_known = mesh.keeps_topology(each.object) \
+                and each.object.original.data.name_full not in source.changes.meshes
             if shown.users[known.mesh_key] != 1 or not is_pose or not self._meshes.pose(
-                    known.mesh_key, data.as_pointer(), data):
+                    known.mesh_key, data.as_pointer(), data, is_known):
                 return False
         item = instance.describe(each, view_layer, source.light_groups)
         item.mesh_key = known.mesh_key
@@ -302,7 +304,7 @@ class _Walk:
         if self._names[2]:
             data.generated = mesh.generated_coordinates(blender_object, data.positions)
         if meshes.will_resync and mesh.is_posable(blender_object):
-            data.poses = mesh.topology_hash(blender_object.data)
+            data.poses = mesh.Topology(blender_object.data)
         if item.motion_keys > 1 and motion.may_deform(blender_object):
             shapes = mesh.MeshMotion(blender_object.data, data, item.motion_keys)
             self._deforming[item.key] = (pointer, data, shapes)

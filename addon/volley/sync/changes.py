@@ -18,6 +18,7 @@ class Changes:
         self.structure = False   # objects may have appeared, gone, or be hidden
         self.geometry = set()    # names of objects whose mesh may be another
         self.topology = set()    # those of them of which more than the vertices' places may differ
+        self.meshes = set()      # names of meshes that were edited: a pose names none
         self.objects = set()     # names of objects of which anything changed, the above among them
         self.materials = set()   # names of materials to flatten again
         self.all_materials = False
@@ -43,6 +44,7 @@ class Changes:
         """Add the marks of a later update."""
         self.geometry |= later.geometry
         self.topology |= later.topology
+        self.meshes |= later.meshes
         self.objects |= later.objects
         self.materials |= later.materials
         self.full |= later.full
@@ -67,6 +69,8 @@ class Changes:
         data = update.id
         if isinstance(data, bpy.types.Object):
             self._mark_object(data, update)
+        elif isinstance(data, bpy.types.Mesh):
+            self.meshes.add(data.name_full)
         elif isinstance(data, bpy.types.Material):
             self.materials.add(data.name_full)
         elif isinstance(data, bpy.types.World):

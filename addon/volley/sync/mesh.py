@@ -2,7 +2,9 @@
 """Meshes: Blender's evaluated meshes as flat arrays.
 
 Arrays are read with ``foreach_get`` into the property's own type: another type is some twenty times
-slower. Curves, text, surfaces and metaballs reach this module as the meshes they evaluate to.
+slower. Where even that calls a function for each item (vertex normals, and corners before 3.6), Blender's
+memory is looked at instead, if it proves to be laid out as expected. Curves, text, surfaces and metaballs
+reach this module as the meshes they evaluate to.
 """
 
 import zlib
@@ -32,7 +34,7 @@ class MeshData:
     attributes: list = field(default_factory=list)  # (name, (triangles * 3, 2 | 4) float32)
     generated: np.ndarray = None      # (vertices, 3) float32
     corners: np.ndarray = None        # (triangles * 3,) integers: Blender's corners, for corner normals
-    poses: tuple = None               # topology_hash where later shapes are awaited
+    poses: object = None              # Topology where later shapes are awaited
 
     def topology_signature(self):
         """Equal when only positions and normals may differ."""
@@ -102,18 +104,58 @@ def _is_bounding_box(positions, location, size):
                                                               atol=1e-5 * float(half.max()))
 
 
-def topology_hash(mesh):
-    """A number that differs when vertices or faces are others, not when they only move."""
-    corners = _corner_vertices(mesh)
-    return len(mesh.vertices), len(mesh.polygons), zlib.crc32(corners.tobytes())
+class Topology:
+    """Which vertices the faces of a mesh join, to tell whether a later shape only moves them."""
+
+    def __init__(self, mesh):
+        self._counts = len(mesh.vertices), len(mesh.polygons)
+        self._corners = np.array(_corner_items(mesh))
+
+    def has_counts_of(self, mesh):
+        """Whether a mesh has as many vertices and faces: of itself that proves nothing."""
+        return self._counts == (len(mesh.vertices), len(mesh.polygons))
+
+    def is_of(self, mesh):
+        """Whether a mesh has the same."""
+        return self.has_counts_of(mesh) and np.array_equal(self._corners, _corner_items(mesh))
 
 
 def _corner_vertices(mesh):
-    """(corners,) integers: the vertex of each; through the attribute where there is one (3.6 on)."""
+    """(corners,) integers: the vertex of each. They may be Blender's own: copy what is kept."""
+    return _corner_items(mesh)[:, 0]
+
+
+def _corner_items(mesh):
+    """(corners, 1 or more) integers, the first of which is the vertex; through the attribute where there
+    is one (3.6 on)."""
     attribute = mesh.attributes.get(".corner_vert")
     if attribute is not None and attribute.data_type == 'INT':
-        return _read(attribute.data, "value", (len(attribute.data),), np.int32)
-    return _read(mesh.loops, "vertex_index", (len(mesh.loops),), _INDEX_TYPE)
+        return _read(attribute.data, "value", (len(attribute.data), 1), np.int32)
+    memory = memory_of(mesh.loops, "vertex_index", 1, _INDEX_TYPE)
+    if memory is not None:
+        return memory
+    return _read(mesh.loops, "vertex_index", (len(mesh.loops), 1), _INDEX_TYPE)
+
+
+def memory_of(collection, name, width, dtype):
+    """Items as they lie in Blender's memory, (count, width or more), where each begins with the values of
+    a property; None where that cannot be told: side by side, with the values that Blender gives for
+    some."""
+    count, size = len(collection), np.dtype(dtype).itemsize
+    if count < 2:
+        return None
+    places = 0, 1, count - 1
+    items = [collection[place] for place in places]
+    address, second, last = (item.as_pointer() for item in items)
+    stride = second - address
+    if stride < width * size or stride % size or last - address != (count - 1) * stride:
+        return None
+    values = native.view(address, (count, stride // size), dtype)
+    for place, item in zip(places, items):
+        expected = getattr(item, name)
+        if values[place, :width].tolist() != ([expected] if width == 1 else list(expected)):
+            return None
+    return values
 
 
 def read_normals(mesh, data, loops=None):
@@ -126,7 +168,7 @@ def read_normals(mesh, data, loops=None):
     smooth = _read(mesh.polygons, "use_smooth", (len(mesh.polygons),), np.bool_)
     if not smooth.any():
         return
-    data.normals = _vertex_normals(mesh)
+    data.normals = np.array(_vertex_normals(mesh))
     data.normal_kind = native.NORMALS_VERTEX
     if smooth.all():
         data.smooth = np.ones(len(data.indices), np.uint8)
@@ -195,7 +237,10 @@ def _corner_normals(mesh):
 
 
 def _vertex_normals(mesh):
-    """(vertices, 3) float32, unit."""
+    """(vertices, 3) float32, unit. They may be Blender's own: copy what is kept."""
+    memory = memory_of(mesh.vertex_normals, "vector", 3, np.float32)
+    if memory is not None:
+        return memory[:, :3]
     return _read(mesh.vertex_normals, "vector", (len(mesh.vertices), 3), np.float32)
 
 
@@ -276,6 +321,15 @@ _POSING_MODIFIERS = {
     'SMOOTH', 'SUBSURF', 'SURFACE_DEFORM', 'WARP', 'WAVE', 'CLOTH', 'SOFT_BODY'}
 
 
+# Those of them that join vertices which come near each other.
+_JOINING_MODIFIERS = {'MIRROR'}
+
+
+def keeps_topology(blender_object):
+    """Whether a posable object's topology is another only when its mesh or modifiers were edited."""
+    return not any(modifier.type in _JOINING_MODIFIERS for modifier in blender_object.original.modifiers)
+
+
 def is_posable(blender_object):
     """Whether a mesh object's new shapes differ in places alone, as long as their topology is equal."""
     original = blender_object.original
@@ -287,7 +341,7 @@ class MeshMotion:
     """The shapes of one deforming mesh over the shutter, one slot per motion key."""
 
     def __init__(self, mesh, data, key_count):
-        self._topology = topology_hash(mesh)
+        self._topology = Topology(mesh)
         self._data = data
         self._corners = None
         if data.normal_kind == native.NORMALS_CORNER:
@@ -298,14 +352,14 @@ class MeshMotion:
 
     def set_key(self, index, mesh):
         """Take the mesh's shape as that key; False (and no motion) when its topology is another."""
-        if topology_hash(mesh) != self._topology:
+        if not self._topology.is_of(mesh):
             self.is_dropped = True
             return False
         self.positions[index] = read_positions(mesh)
         if self._data.normal_kind == native.NORMALS_CORNER:
             self.normals[index] = _corner_normals(mesh)[self._corners]
         elif self._data.normal_kind == native.NORMALS_VERTEX:
-            self.normals[index] = _vertex_normals(mesh)
+            self.normals[index] = np.array(_vertex_normals(mesh))
         return True
 
     def keys(self):
@@ -365,14 +419,16 @@ class Meshes:
         entry.poses, entry.corners, entry.normal_kind = data.poses, data.corners, data.normal_kind
         self._seen.add(key)
 
-    def pose(self, key, pointer, mesh):
+    def pose(self, key, pointer, mesh, is_known):
         """Send a Blender mesh's positions and normals for a known topology. False, and nothing is sent,
-        where the topology turns out to be another.
+        where the topology turns out to be another; is_known: nobody edited it.
 
         Triangles stay those of the shape that was read in full: faces of more than three corners may
         be cut otherwise in a fresh render, if they bend much."""
         entry = self._entries.get(key)
-        if entry is None or entry.poses is None or entry.poses != topology_hash(mesh):
+        if entry is None or entry.poses is None:
+            return False
+        if not (entry.poses.has_counts_of(mesh) if is_known else entry.poses.is_of(mesh)):
             return False
         normals = None
         if _has_corner_normals(mesh) != (entry.normal_kind == native.NORMALS_CORNER):

@@ -51,8 +51,9 @@ typedef struct trc_mesh_desc {
 TRC_API trc_status trc_mesh_create(trc_scene scene, const trc_mesh_desc *desc, trc_id *mesh_out);
 
 /* New positions (and, if the mesh had any, normals) for the same topology: a pose. Counts as in the
- * descriptor; the number of keys may differ from before. At commit the BVH is refitted, or rebuilt
- * when its SAH cost has grown too far. */
+ * descriptor; the number of keys may differ from before. At commit the BVH is refitted. When its
+ * SAH cost has grown too far, a final scene rebuilds it at once; another builds it in a thread of
+ * its own, and a later commit that finds it ready takes it. Hits are the same either way. */
 TRC_API trc_status trc_mesh_update(trc_scene scene, trc_id mesh, uint32_t key_count,
                                    const float *positions, uint64_t position_count,
                                    const float *normals, uint64_t normal_count);

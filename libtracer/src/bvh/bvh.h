@@ -13,9 +13,16 @@ struct trc_pool; /* threads/pool.h */
 /* The trees of a snapshot: BLASes and the TLAS over instances. */
 struct trc_bvh;
 
+/* The tree of one mesh. */
+struct trc_blas;
+
 struct trc_bvh_options {
-    bool is_final;             /* join static single-instance meshes into one world-space tree */
-    const atomic_uint *cancel; /* non-zero: return TRC_ERROR_CANCELLED soon */
+    bool is_final;    /* join static single-instance meshes into one world-space tree */
+    bool keeps_grown; /* refitted trees whose SAH cost has grown too far stay for now, unless by
+                         much: the caller builds them anew apart */
+    struct trc_blas *const *rebuilt; /* per mesh, from trc_blas_build for any pose of it: what to
+                                        start from instead of the previous tree; NULL: none */
+    const atomic_uint *cancel;       /* non-zero: return TRC_ERROR_CANCELLED soon */
 };
 
 struct trc_bvh_build_stats {
@@ -37,6 +44,16 @@ trc_status trc_bvh_create(const struct trc_snapshot *snapshot, const struct trc_
                           struct trc_pool *pool, struct trc_bvh **bvh_out,
                           struct trc_bvh_build_stats *stats_out);
 void trc_bvh_destroy(struct trc_bvh *bvh);
+
+/* Whether refits have made the tree of a mesh so bad that it should be built anew. */
+bool trc_bvh_has_grown(const struct trc_bvh *bvh, uint32_t mesh);
+
+/* A tree for one mesh, which must outlive it, without transparent slots. OUT_OF_MEMORY, TOO_LARGE
+ * or CANCELLED. */
+trc_status trc_blas_build(const struct trc_mesh *mesh, struct trc_pool *pool,
+                          const atomic_uint *cancel, struct trc_blas **blas_out);
+/* NULL is fine; trees that took it on keep it. */
+void trc_blas_release(struct trc_blas *blas);
 
 /* Checks the invariants: every child inside its parent at every key, every triangle in exactly one
  * leaf (or counted as skipped), acyclic, depth within the stack. False writes why to message. */

@@ -15,6 +15,8 @@
 #define COORDINATE_LIMIT 1.8e18f
 /* A refitted tree whose SAH cost has grown by this factor is rebuilt. */
 #define REBUILD_GROWTH 1.4f
+/* The same where the caller builds such trees apart: beyond it a build costs less than the rays. */
+#define REBUILD_GROWTH_AT_ONCE 3.0f
 
 struct create_job {
     const struct trc_snapshot *snapshot;
@@ -137,7 +139,7 @@ static trc_status tree_build(struct create_job *job, const struct trc_part *part
     return TRC_OK;
 }
 
-static void blas_release(struct trc_blas *blas) {
+void trc_blas_release(struct trc_blas *blas) {
     if (!blas || atomic_fetch_sub(&blas->refs, 1) != 1)
         return;
     trc_tree_destroy(&blas->tree);
@@ -190,7 +192,9 @@ static trc_status blas_obtain(struct create_job *job, uint32_t mesh_index,
         if (previous->blas[i] && previous->blas[i]->mesh == source &&
             slots_match(&previous->blas[i]->tree, slots, slot_count))
             from = previous->blas[i];
-    if (from && source == mesh) {
+    if (from && job->options->rebuilt && job->options->rebuilt[mesh_index])
+        from = job->options->rebuilt[mesh_index];
+    if (from && from->mesh == mesh) {
         atomic_fetch_add(&from->refs, 1);
         job->bvh->blas[mesh_index] = from;
         trc_free(slots);
@@ -205,13 +209,14 @@ static trc_status blas_obtain(struct create_job *job, uint32_t mesh_index,
     blas->mesh = mesh;
     const struct trc_part part = {mesh, 0, NULL, slots, slot_count};
     bool done = false;
+    const float growth = job->options->keeps_grown ? REBUILD_GROWTH_AT_ONCE : REBUILD_GROWTH;
     /* A skipped triangle may have become valid and the other way round: then the shape is stale. */
     if (from && from->tree.skipped_count == 0) {
         status = trc_tree_refit(&from->tree, &part, mesh->key_count, job->pool, &blas->tree);
         blas->tree.triangle_count = from->tree.triangle_count;
         blas->built_cost = from->built_cost;
         done = status == TRC_OK && blas->tree.extent <= COORDINATE_LIMIT &&
-               blas->tree.sah_cost <= REBUILD_GROWTH * from->built_cost;
+               blas->tree.sah_cost <= growth * from->built_cost;
         if (done)
             job->stats->refitted_count++;
         else
@@ -225,8 +230,34 @@ static trc_status blas_obtain(struct create_job *job, uint32_t mesh_index,
     if (status == TRC_OK)
         job->bvh->blas[mesh_index] = blas;
     else
-        blas_release(blas);
+        trc_blas_release(blas);
     return status;
+}
+
+bool trc_bvh_has_grown(const struct trc_bvh *bvh, uint32_t mesh) {
+    const struct trc_blas *blas = bvh->blas[mesh];
+    return blas && blas->tree.sah_cost > REBUILD_GROWTH * blas->built_cost;
+}
+
+trc_status trc_blas_build(const struct trc_mesh *mesh, struct trc_pool *pool,
+                          const atomic_uint *cancel, struct trc_blas **blas_out) {
+    struct trc_blas *blas = trc_alloc_zeroed(1, sizeof *blas);
+    if (!blas)
+        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for a tree");
+    atomic_init(&blas->refs, 1);
+    blas->mesh = mesh;
+    struct trc_bvh_build_stats stats = {0};
+    const struct trc_bvh_options options = {.cancel = cancel};
+    struct create_job job = {.options = &options, .pool = pool, .stats = &stats};
+    const struct trc_part part = {.mesh = mesh};
+    const trc_status status = tree_build(&job, &part, 1, mesh->key_count, &blas->tree);
+    if (status != TRC_OK) {
+        trc_blas_release(blas);
+        return status;
+    }
+    blas->built_cost = blas->tree.sah_cost;
+    *blas_out = blas;
+    return TRC_OK;
 }
 
 /* Which instances go to the joined tree: static, alone with their mesh, seen by all rays. */
@@ -445,7 +476,7 @@ void trc_bvh_destroy(struct trc_bvh *bvh) {
     if (!bvh)
         return;
     for (uint32_t i = 0; bvh->blas && i < bvh->blas_count; i++)
-        blas_release(bvh->blas[i]);
+        trc_blas_release(bvh->blas[i]);
     trc_tree_destroy(&bvh->top);
     trc_tree_destroy(&bvh->joined);
     trc_free(bvh->items);

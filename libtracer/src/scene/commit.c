@@ -12,6 +12,7 @@
 #include "core/core.h"
 #include "image/image.h"
 #include "scene/mesh.h"
+#include "scene/rebuild.h"
 #include "scene/scene.h"
 #include "shading/compile.h"
 #include "shading/lights.h"
@@ -79,19 +80,31 @@ static trc_status build_bvh(struct trc_scene_state *scene, const struct trc_snap
                             struct trc_snapshot_block *block) {
     struct trc_snapshot *s = &block->snapshot;
     struct trc_mesh **replaced = trc_alloc_zeroed(s->mesh_count, sizeof *replaced);
-    if (!replaced)
+    struct trc_blas **rebuilt = NULL;
+    if (block->takes_rebuild)
+        rebuilt = trc_alloc_zeroed(s->mesh_count, sizeof(struct trc_blas *));
+    if (!replaced || (block->takes_rebuild && !rebuilt)) {
+        trc_free(replaced);
+        trc_free(rebuilt);
         return no_memory();
+    }
+    if (rebuilt)
+        trc_rebuild_offer(scene->rebuild, &scene->meshes, rebuilt);
     const struct trc_store *store = &scene->meshes;
     for (uint32_t i = trc_store_first(store); i != TRC_STORE_END; i = trc_store_next(store, i)) {
         const struct trc_scene_mesh *mesh = store->slots[i].object;
         if (mesh->committed != mesh->geometry)
             replaced[mesh->index] = mesh->committed;
     }
-    const struct trc_bvh_options options = {.is_final = scene->is_final, .cancel = &scene->cancel};
+    const struct trc_bvh_options options = {.is_final = scene->is_final,
+                                            .keeps_grown = !scene->is_final,
+                                            .rebuilt = rebuilt,
+                                            .cancel = &scene->cancel};
     struct trc_bvh *bvh;
     const trc_status status = trc_bvh_create(s, former ? former->snapshot.bvh : NULL, replaced,
                                              &options, scene->pool, &bvh, &block->build);
     trc_free(replaced);
+    trc_free(rebuilt);
     if (status != TRC_OK)
         return status;
     block->bvh = trc_shared_create(bvh, destroy_bvh);
@@ -115,6 +128,7 @@ static trc_status collect_bvh(struct trc_scene_state *scene,
         block->build.seconds = 0.0;
         block->build.built_count = block->build.refitted_count = 0;
     } else {
+        block->takes_rebuild = trc_rebuild_is_done(scene->rebuild);
         TRC_TRY(build_bvh(scene, former, block));
     }
     block->snapshot.bvh = block->bvh->object;
@@ -249,6 +263,16 @@ static trc_status fill_block(struct trc_scene_state *scene, const struct trc_sna
     return TRC_OK;
 }
 
+/* Lets go of a rebuilt tree that was taken, and starts on the next. */
+static void follow_rebuilds(struct trc_scene_state *scene, const struct trc_snapshot_block *block) {
+    if (block->takes_rebuild) {
+        trc_rebuild_destroy(scene->rebuild);
+        scene->rebuild = NULL;
+    }
+    if (!scene->is_final && !scene->rebuild)
+        scene->rebuild = trc_rebuild_start(&scene->meshes, block->snapshot.bvh);
+}
+
 static void publish(struct trc_scene_state *scene, struct trc_snapshot_block *block) {
     trc_snapshot_release(scene->snapshot);
     scene->snapshot = &block->snapshot;
@@ -258,6 +282,7 @@ static void publish(struct trc_scene_state *scene, struct trc_snapshot_block *bl
         struct trc_scene_mesh *mesh = store->slots[i].object;
         mesh->committed = mesh->geometry;
     }
+    follow_rebuilds(scene, block);
 }
 
 static trc_status commit(struct trc_scene_state *scene) {

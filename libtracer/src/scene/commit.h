@@ -2,6 +2,8 @@
 #ifndef TRACER_SCENE_COMMIT_H
 #define TRACER_SCENE_COMMIT_H
 
+#include <stdbool.h>
+
 #include "bvh/bvh.h"
 #include "scene/shared.h"
 #include "scene/snapshot.h"
@@ -28,6 +30,7 @@ struct trc_snapshot_block {
     struct trc_shared *camera;
     struct trc_bvh_build_stats build; /* of the trees, when they were built */
     uint32_t isa;                     /* in force at the commit */
+    bool takes_rebuild;               /* its trees start from the scene's rebuilt one */
     char warnings[TRC_WARNING_BYTES];
 };
 

@@ -141,19 +141,48 @@ static void repair_normals(struct trc_mesh *mesh) {
     }
 }
 
+/* Floats of the points that find_bounds takes at once: a multiple of 3 and of most vector widths.
+ */
+#define BOUNDS_LANES 48
+
+static bool all_valid(const float *values, size_t count) {
+    const float m = TRC_MAX_COORDINATE;
+    unsigned bad = 0;
+    for (size_t i = 0; i < count; i++)
+        bad |= !(values[i] >= -m) | !(values[i] <= m);
+    return !bad;
+}
+
+static void grow_bounds(const float *p, float lower[3], float upper[3]) {
+    for (int axis = 0; axis < 3; axis++) {
+        lower[axis] = p[axis] < lower[axis] ? p[axis] : lower[axis];
+        upper[axis] = p[axis] > upper[axis] ? p[axis] : upper[axis];
+    }
+}
+
 /* Over all keys and vertices; those that take no part in the scene do not count. */
 static void find_bounds(struct trc_mesh *mesh) {
     float lower[3] = {INFINITY, INFINITY, INFINITY}, upper[3] = {-INFINITY, -INFINITY, -INFINITY};
-    const size_t count = (size_t)mesh->vertex_count * mesh->key_count;
-    for (size_t i = 0; i < count; i++) {
-        const float *p = mesh->positions + 3 * i;
-        if (!trc_point_is_valid(p))
-            continue;
-        for (int axis = 0; axis < 3; axis++) {
-            lower[axis] = p[axis] < lower[axis] ? p[axis] : lower[axis];
-            upper[axis] = p[axis] > upper[axis] ? p[axis] : upper[axis];
+    const size_t count = (size_t)3 * mesh->vertex_count * mesh->key_count;
+    const float *p = mesh->positions;
+    size_t i = 0;
+    if (count >= BOUNDS_LANES && all_valid(p, count)) {
+        float low[BOUNDS_LANES], high[BOUNDS_LANES];
+        memcpy(low, p, sizeof low);
+        memcpy(high, p, sizeof high);
+        for (; i + BOUNDS_LANES <= count; i += BOUNDS_LANES)
+            for (int k = 0; k < BOUNDS_LANES; k++) {
+                low[k] = p[i + k] < low[k] ? p[i + k] : low[k];
+                high[k] = p[i + k] > high[k] ? p[i + k] : high[k];
+            }
+        for (int k = 0; k < BOUNDS_LANES; k += 3) {
+            grow_bounds(low + k, lower, upper);
+            grow_bounds(high + k, lower, upper);
         }
     }
+    for (; i < count; i += 3)
+        if (trc_point_is_valid(p + i))
+            grow_bounds(p + i, lower, upper);
     const bool empty = lower[0] > upper[0];
     for (int axis = 0; axis < 3; axis++) {
         mesh->bounds_lower[axis] = empty ? 0.0f : lower[axis];

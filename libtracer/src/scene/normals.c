@@ -115,29 +115,54 @@ static void vertex_task(void *context, uint32_t index, uint32_t worker) {
     }
 }
 
-/* Counting sort of the corners by vertex. */
-static bool find_corners(const struct trc_mesh *mesh, struct trc_mesh_topology *topology) {
+/* Corners between two looks at whether the commit was cancelled: some milliseconds. */
+#define CORNERS_PER_LOOK (1u << 20)
+
+static trc_status no_memory(void) {
+    return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for the normals of a mesh");
+}
+
+static trc_status cancelled(void) {
+    return trc_fail(TRC_ERROR_CANCELLED, "the commit was cancelled");
+}
+
+/* Counting sort of the corners by vertex into begin and corners; false if cancelled. */
+static bool sort_corners(const struct trc_mesh *mesh, const atomic_uint *cancel, uint32_t *begin,
+                         uint32_t *corners) {
+    const uint32_t corner_count = 3 * mesh->triangle_count;
+    /* begin[v + 2] counts, becomes the place where v + 1 starts, and moves on as it is filled. */
+    for (uint32_t i = 0; i < corner_count; i++) {
+        if (i % CORNERS_PER_LOOK == 0 && atomic_load(cancel))
+            return false;
+        begin[mesh->indices[i] + 2]++;
+    }
+    for (uint32_t v = 0; v < mesh->vertex_count; v++)
+        begin[v + 2] += begin[v + 1];
+    for (uint32_t i = 0; i < corner_count; i++) {
+        if (i % CORNERS_PER_LOOK == 0 && atomic_load(cancel))
+            return false;
+        corners[begin[mesh->indices[i] + 1]++] = i;
+    }
+    return true;
+}
+
+static trc_status find_corners(const struct trc_mesh *mesh, const atomic_uint *cancel,
+                               struct trc_mesh_topology *topology) {
     if (topology->corner_begin)
-        return true;
+        return TRC_OK;
     const uint32_t corner_count = 3 * mesh->triangle_count;
     uint32_t *begin = trc_alloc_zeroed((size_t)mesh->vertex_count + 2, sizeof *begin);
     uint32_t *corners = trc_alloc(corner_count, sizeof *corners);
-    if (!begin || !corners) {
+    const bool enough = begin && corners;
+    if (!enough || !sort_corners(mesh, cancel, begin, corners)) {
         trc_free(begin);
         trc_free(corners);
-        return false;
+        return enough ? cancelled() : no_memory();
     }
-    /* begin[v + 2] counts, becomes the place where v + 1 starts, and moves on as it is filled. */
-    for (uint32_t i = 0; i < corner_count; i++)
-        begin[mesh->indices[i] + 2]++;
-    for (uint32_t v = 0; v < mesh->vertex_count; v++)
-        begin[v + 2] += begin[v + 1];
-    for (uint32_t i = 0; i < corner_count; i++)
-        corners[begin[mesh->indices[i] + 1]++] = i;
     topology->corner_begin = begin;
     topology->corners = corners;
     topology->bytes += ((uint64_t)mesh->vertex_count + 2 + corner_count) * sizeof(uint32_t);
-    return true;
+    return TRC_OK;
 }
 
 trc_status trc_geometry_finish(struct trc_mesh *mesh, struct trc_pool *pool,
@@ -148,23 +173,19 @@ trc_status trc_geometry_finish(struct trc_mesh *mesh, struct trc_pool *pool,
     const size_t per_key = (size_t)3 * mesh->vertex_count;
     struct face *faces = trc_alloc(mesh->triangle_count, sizeof *faces);
     float *normals = trc_alloc(per_key * mesh->key_count, sizeof *normals);
-    if (!faces || !normals || !find_corners(mesh, topology)) {
-        trc_free(faces);
-        trc_free(normals);
-        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for the normals of a mesh");
-    }
-    bool cancelled = false;
-    for (uint32_t key = 0; key < mesh->key_count && !cancelled; key++) {
+    trc_status status = faces && normals ? find_corners(mesh, cancel, topology) : no_memory();
+    for (uint32_t key = 0; key < mesh->key_count && status == TRC_OK; key++) {
         struct job job = {mesh,  topology, mesh->positions + per_key * key, normals + per_key * key,
                           faces, cancel};
         trc_pool_run(pool, (mesh->triangle_count + CHUNK - 1) / CHUNK, face_task, &job);
         trc_pool_run(pool, (mesh->vertex_count + CHUNK - 1) / CHUNK, vertex_task, &job);
-        cancelled = atomic_load(cancel) != 0;
+        if (atomic_load(cancel))
+            status = cancelled();
     }
     trc_free(faces);
-    if (cancelled) {
+    if (status != TRC_OK) {
         trc_free(normals);
-        return trc_fail(TRC_ERROR_CANCELLED, "the commit was cancelled");
+        return status;
     }
     mesh->vertex_normals = normals;
     return TRC_OK;

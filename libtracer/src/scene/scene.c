@@ -1,6 +1,7 @@
 /* Life of the editable scene, and how public calls get at it. */
 #define _POSIX_C_SOURCE 200809L
 #include "scene/scene.h"
+#include "scene/rebuild.h"
 
 #include <string.h>
 
@@ -72,6 +73,7 @@ static void destroy_all(struct trc_store *store, void (*destroy)(void *object)) 
 }
 
 void trc_scene_state_destroy(struct trc_scene_state *scene) {
+    trc_rebuild_destroy(scene->rebuild);
     trc_pool_destroy(scene->pool);
     trc_snapshot_release(scene->snapshot);
     trc_shared_release(scene->camera);

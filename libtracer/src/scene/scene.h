@@ -63,6 +63,7 @@ struct trc_scene_state {
     uint32_t changed;              /* TRC_CHANGED_* */
     struct trc_snapshot *snapshot; /* the last one published, or NULL */
     struct trc_pool *pool;         /* for commits, started by the first */
+    struct trc_rebuild *rebuild;   /* under way or ready to be taken, or NULL */
 };
 
 /* OUT_OF_MEMORY. */

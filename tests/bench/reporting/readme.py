@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Keeps the headline in README.md the committed report's.
+"""Keeps what README.md quotes the committed report's and the committed table of stability's.
 
     readme.py           say whether they agree; the exit code is 1 if not
     readme.py --write   write it anew
@@ -8,6 +8,7 @@
 
 import pathlib
 import sys
+import textwrap
 
 BENCH = pathlib.Path(__file__).resolve().parents[1]
 for folder in (BENCH, BENCH.parent / "support"):
@@ -16,7 +17,8 @@ from reporting import document, error_sections  # noqa: E402  (the folders are o
 
 PROJECT = BENCH.parents[1]
 COMMITTED = BENCH / "report"
-BEGIN, END = "<!-- report: begin -->", "<!-- report: end -->"
+STABILITY = PROJECT / "tests" / "stability.md"  # of a run of the tests, from build/results
+BEGIN, END = "<!-- {}: begin -->", "<!-- {}: end -->"
 PLOTS = {"time-to-equal-error": "Time of Cycles over Volley's at equal error",
          "kernels": "Rays per second over Embree's"}
 
@@ -37,30 +39,40 @@ def headline(report=COMMITTED):
     return "\n".join(lines)
 
 
-def replace_between(text, middle):
-    """The text with another middle between the markers.
+def stability(table=STABILITY):
+    """What the table of stability begins with."""
+    return table.read_text(encoding="utf-8").split("\n\n")[0]
 
-    >>> replace_between(f"a\\n{BEGIN}\\nold\\n{END}\\nb", "new").split("\\n")
-    ['a', '<!-- report: begin -->', 'new', '<!-- report: end -->', 'b']
+
+def replace_between(text, name, middle):
+    """The text with another middle between the markers of that name.
+
+    >>> replace_between("a\\n<!-- x: begin -->\\nold\\n<!-- x: end -->\\nb", "x", "new").split("\\n")
+    ['a', '<!-- x: begin -->', 'new', '<!-- x: end -->', 'b']
     """
-    before, rest = text.split(BEGIN)
-    _old, after = rest.split(END)
-    return f"{before}{BEGIN}\n{middle}\n{END}{after}"
+    begin, end = BEGIN.format(name), END.format(name)
+    before, rest = text.split(begin)
+    _old, after = rest.split(end)
+    return f"{before}{begin}\n{middle}\n{end}{after}"
+
+
+def _written(readme, report):
+    """README as it should be."""
+    text = replace_between(readme.read_text(encoding="utf-8"), "report", headline(report))
+    return replace_between(text, "stability", textwrap.fill(stability(), 100))
 
 
 def agrees(readme=PROJECT / "README.md", report=COMMITTED):
-    """Whether README holds the report's headline."""
-    text = readme.read_text(encoding="utf-8")
-    return text == replace_between(text, headline(report))
+    """Whether README holds the report's headline and the table's summary."""
+    return readme.read_text(encoding="utf-8") == _written(readme, report)
 
 
 def write(readme=PROJECT / "README.md", report=COMMITTED):
-    """Bring README up to the report."""
-    text = replace_between(readme.read_text(encoding="utf-8"), headline(report))
-    readme.write_text(text, encoding="utf-8")
+    """Bring README up to the report and the table."""
+    readme.write_text(_written(readme, report), encoding="utf-8")
 
 
 if __name__ == "__main__":
     if "--write" in sys.argv[1:]:
         write()
-    sys.exit(0 if agrees() else "README.md and tests/bench/report disagree: readme.py --write")
+    sys.exit(0 if agrees() else "README.md and tests/bench/report or tests/stability.md disagree: readme.py --write")

@@ -55,6 +55,20 @@ static double lookup_reference(const float *texels, int width, int height, uint3
     return sum;
 }
 
+/* Shading points where image 0 is the one described and image 1 was destroyed. */
+struct image_scene {
+    struct trc_image *images[2];
+    struct trc_snapshot snapshot;
+    struct trc_surface surface;
+};
+
+static void image_scene_init(struct image_scene *scene, const trc_image_desc *desc) {
+    *scene =
+        (struct image_scene){.snapshot = {.image_count = 2, .images = scene->images},
+                             .surface = {.snapshot = &scene->snapshot, .active = vm_all_set()}};
+    assert_int_equal(trc_image_load(desc, &scene->images[0]), TRC_OK);
+}
+
 /* Every filter and extension on images of several sizes against double. */
 static void check_lookups(int width, int height, struct rng *r) {
     float *texels = malloc((size_t)(width * height) * 4 * sizeof *texels);
@@ -67,10 +81,8 @@ static void check_lookups(int width, int height, struct rng *r) {
                                  .pixels = texels,
                                  .alpha_mode = TRC_ALPHA_CHANNEL_PACKED,
                                  .pixel_bytes = (uint64_t)(width * height) * 16};
-    struct trc_image *image;
-    assert_int_equal(trc_image_load(&desc, &image), TRC_OK);
-    const struct trc_snapshot snapshot = {.image_count = 1, .images = &image};
-    const struct trc_surface s = {.snapshot = &snapshot, .active = vm_all_set()};
+    struct image_scene scene;
+    image_scene_init(&scene, &desc);
     static struct trc_registers regs;
     for (uint32_t mode = 0; mode < 16; mode++) {
         struct single p;
@@ -80,7 +92,7 @@ static void check_lookups(int width, int height, struct rng *r) {
         for (int round = 0; round < 20; round++) {
             regs.r[0] = test_wide_uniform(r) * vf_set(5) - vf_set(2);
             regs.r[1] = test_wide_uniform(r) * vf_set(5) - vf_set(2);
-            TRC_KERNEL(trc_program_run)(&p.material, &s, &regs);
+            TRC_KERNEL(trc_program_run)(&p.material, &scene.surface, &regs);
             for (int l = 0; l < TRC_WIDTH; l++) {
                 for (int c = 0; c < 4; c++) {
                     const float u = vf_get(regs.r[0], l), v = vf_get(regs.r[1], l);
@@ -93,7 +105,7 @@ static void check_lookups(int width, int height, struct rng *r) {
             }
         }
     }
-    trc_image_release(image);
+    trc_image_release(scene.images[0]);
     free(texels);
 }
 
@@ -115,10 +127,8 @@ static void test_wild_coordinates(void **state) {
                                 255, 255, 255, 255, 255, 255, 255, 255};
     const trc_image_desc desc = {
         .struct_size = sizeof desc, .width = 2, .height = 2, .pixels = pixels, .pixel_bytes = 16};
-    struct trc_image *image;
-    assert_int_equal(trc_image_load(&desc, &image), TRC_OK);
-    const struct trc_snapshot snapshot = {.image_count = 1, .images = &image};
-    const struct trc_surface s = {.snapshot = &snapshot, .active = vm_all_set()};
+    struct image_scene scene;
+    image_scene_init(&scene, &desc);
     static struct trc_registers regs;
     for (uint32_t mode = 0; mode < 16; mode++) {
         struct single p;
@@ -129,7 +139,7 @@ static void test_wild_coordinates(void **state) {
             for (size_t j = 0; j < sizeof wild / sizeof *wild; j++) {
                 regs.r[0] = vf_set(wild[i]);
                 regs.r[1] = vf_set(wild[j]);
-                TRC_KERNEL(trc_program_run)(&p.material, &s, &regs);
+                TRC_KERNEL(trc_program_run)(&p.material, &scene.surface, &regs);
                 const float value = vf_get(regs.r[OUT], 0);
                 assert_true(value >= 0.0f && value <= 1.00001f);
                 if ((mode & TRC_IMAGE_MODE_EXTENSION) != TRC_IMAGE_CLIP)
@@ -137,7 +147,7 @@ static void test_wild_coordinates(void **state) {
             }
         }
     }
-    trc_image_release(image);
+    trc_image_release(scene.images[0]);
 }
 
 /* sRGB is decoded after filtering, associated colours are divided when alpha is used, missing
@@ -152,17 +162,14 @@ static void test_colors_of_images(void **state) {
                                  .pixels = pixels,
                                  .pixel_bytes = 8,
                                  .alpha_mode = TRC_ALPHA_STRAIGHT};
-    struct trc_image *image, *none = NULL;
-    assert_int_equal(trc_image_load(&desc, &image), TRC_OK);
-    struct trc_image *images[2] = {image, none};
-    const struct trc_snapshot snapshot = {.image_count = 2, .images = images};
-    const struct trc_surface s = {.snapshot = &snapshot, .active = vm_all_set()};
+    struct image_scene scene;
+    image_scene_init(&scene, &desc);
     static struct trc_registers regs;
     regs.r[0] = regs.r[1] = vf_set(.5f);
     for (int alpha = 0; alpha < 2; alpha++) {
         struct single p;
         single_init(&p, TRC_OP_IMAGE, TRC_IMAGE_EXTEND | (alpha ? TRC_IMAGE_MODE_ALPHA : 0), 0);
-        TRC_KERNEL(trc_program_run)(&p.material, &s, &regs);
+        TRC_KERNEL(trc_program_run)(&p.material, &scene.surface, &regs);
         /* bytes of the second texel times 51 / 255, rounded down: 0, 40, 20 */
         const double encoded[3] = {.5, 20.0 / 255, 74.0 / 255}, a = .5 + .5 * 51 / 255;
         for (int c = 0; c < 3; c++) {
@@ -175,11 +182,11 @@ static void test_colors_of_images(void **state) {
     for (uint32_t i = 1; i < 4; i++) { /* destroyed, beyond the end, never there */
         struct single p;
         single_init(&p, TRC_OP_IMAGE, 0, i == 3 ? TRC_NO_RESOURCE : i);
-        TRC_KERNEL(trc_program_run)(&p.material, &s, &regs);
+        TRC_KERNEL(trc_program_run)(&p.material, &scene.surface, &regs);
         for (int c = 0; c < 4; c++)
             assert_true(vf_get(regs.r[OUT + c], 0) == (c == 1 ? 0.0f : 1.0f));
     }
-    trc_image_release(image);
+    trc_image_release(scene.images[0]);
 }
 
 static void check_projection(uint32_t mode, float x, float y, float z, float u, float v) {

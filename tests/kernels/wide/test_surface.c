@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "figures.h"
 #include "kernels/surface.h"
 #include "kernels/wide_math.h"
 #include "wide_test.h"
@@ -219,7 +220,8 @@ static void agrees_with_exact_arithmetic(void **state) {
             }
         }
     }
-    printf("positions off by %.2f of their bound at most, normals by %.2g\n", worst, worst_normal);
+    print_figure("hit points", "off by %.2f of their bound", worst);
+    print_figure("normals at hits", "off by %.2g", worst_normal);
     assert_true(worst_normal < 1e-4);
     assert_true(worst > 0.05);
 }

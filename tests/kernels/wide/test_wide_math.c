@@ -2,6 +2,7 @@
 #include <float.h>
 #include <stdio.h>
 
+#include "figures.h"
 #include "kernels/wide_math.h"
 #include "wide_test.h"
 
@@ -23,8 +24,8 @@ static double ulps(float got, long double want, long double smallest) {
 typedef vfloat (*wide_function)(vfloat x);
 typedef long double (*long_function)(long double x);
 
-static double worst(wide_function f, long_function g, double from, double to, bool by_exponent,
-                    long double smallest) {
+static double worst(const char *name, wide_function f, long_function g, double from, double to,
+                    bool by_exponent, long double smallest) {
     double most = 0.0;
     float at = 0.0f;
     for (int i = 0; i < POINTS; i += TRC_WIDTH) {
@@ -42,7 +43,12 @@ static double worst(wide_function f, long_function g, double from, double to, bo
             }
         }
     }
-    printf("    worst %.2f ulp at %.9g\n", most, (double)at);
+    char title[64];
+    (void)snprintf(title, sizeof title, "%s from %g to %g", name, from, to);
+    if (smallest >= 0.5L)
+        print_figure(title, "%.2g, absolute", ldexp(most, -24));
+    else
+        print_figure(title, "%.2f ulp, at %.9g", most, (double)at);
     return most;
 }
 
@@ -61,32 +67,21 @@ static vfloat wide_erf(vfloat x) { return vf_erf(x); }
 static void bounds_of_functions(void **state) {
     (void)state;
     const long double near_root = ldexpl(1.0L, -3);
-    printf("sin\n");
-    assert_true(worst(wide_sin, sinl, -8192.0, 8192.0, false, near_root) <= 4.0);
-    assert_true(worst(wide_sin, sinl, 1e-30, 0.7, true, 0.0L) <= 2.0);
-    printf("cos\n");
-    assert_true(worst(wide_cos, cosl, -8192.0, 8192.0, false, near_root) <= 4.0);
-    printf("tan\n");
-    assert_true(worst(wide_tan, tanl, -1.5, 1.5, false, 0.0L) <= 4.0);
-    printf("exp\n");
-    assert_true(worst(wide_exp, expl, -87.0, 88.7, false, 0.0L) <= 2.0);
-    printf("exp2\n");
-    assert_true(worst(wide_exp2, exp2l, -125.0, 127.9, false, 0.0L) <= 2.0);
-    printf("log\n");
-    assert_true(worst(wide_log, logl, 1e-45, 3e38, true, 0.0L) <= 2.0);
-    assert_true(worst(wide_log, logl, 0.5, 2.0, false, 0.0L) <= 2.0);
-    printf("log2\n");
-    assert_true(worst(wide_log2, log2l, 1e-45, 3e38, true, 0.0L) <= 1.0);
-    assert_true(worst(wide_log2, log2l, 0.5, 2.0, false, 0.0L) <= 1.0);
-    printf("acos\n");
-    assert_true(worst(wide_acos, acosl, -1.0, 1.0, false, 0.0L) <= 3.0);
-    printf("asin\n");
-    assert_true(worst(wide_asin, asinl, -1.0, 1.0, false, 0.0L) <= 3.0);
-    printf("atan\n");
-    assert_true(worst(wide_atan, atanl, 1e-20, 1e20, true, 0.0L) <= 3.0);
-    assert_true(worst(wide_atan, atanl, -3.0, 3.0, false, 0.0L) <= 3.0);
-    printf("erf (absolute, in ulps of 1)\n");
-    assert_true(worst(wide_erf, erfl, -5.0, 5.0, false, 0.75L) <= 12.0);
+    assert_true(worst("sin", wide_sin, sinl, -8192.0, 8192.0, false, near_root) <= 4.0);
+    assert_true(worst("sin", wide_sin, sinl, 1e-30, 0.7, true, 0.0L) <= 2.0);
+    assert_true(worst("cos", wide_cos, cosl, -8192.0, 8192.0, false, near_root) <= 4.0);
+    assert_true(worst("tan", wide_tan, tanl, -1.5, 1.5, false, 0.0L) <= 4.0);
+    assert_true(worst("exp", wide_exp, expl, -87.0, 88.7, false, 0.0L) <= 2.0);
+    assert_true(worst("exp2", wide_exp2, exp2l, -125.0, 127.9, false, 0.0L) <= 2.0);
+    assert_true(worst("log", wide_log, logl, 1e-45, 3e38, true, 0.0L) <= 2.0);
+    assert_true(worst("log", wide_log, logl, 0.5, 2.0, false, 0.0L) <= 2.0);
+    assert_true(worst("log2", wide_log2, log2l, 1e-45, 3e38, true, 0.0L) <= 1.0);
+    assert_true(worst("log2", wide_log2, log2l, 0.5, 2.0, false, 0.0L) <= 1.0);
+    assert_true(worst("acos", wide_acos, acosl, -1.0, 1.0, false, 0.0L) <= 3.0);
+    assert_true(worst("asin", wide_asin, asinl, -1.0, 1.0, false, 0.0L) <= 3.0);
+    assert_true(worst("atan", wide_atan, atanl, 1e-20, 1e20, true, 0.0L) <= 3.0);
+    assert_true(worst("atan", wide_atan, atanl, -3.0, 3.0, false, 0.0L) <= 3.0);
+    assert_true(worst("erf", wide_erf, erfl, -5.0, 5.0, false, 0.75L) <= 12.0);
 }
 
 static void power(void **state) {
@@ -110,7 +105,7 @@ static void power(void **state) {
                 most = fmax(most, ulps(r[k], want, 0.0L));
         }
     }
-    printf("pow: worst %.2f ulp\n", most);
+    print_figure("pow", "%.2f ulp", most);
     assert_true(most <= 4.0);
     assert_true(vf_get(vf_pow(vf_set(0.0f), vf_set(2.2f)), 0) == 0.0f);
     assert_true(vf_get(vf_pow(vf_set(0.0f), vf_set(0.0f)), 0) == 1.0f);
@@ -146,8 +141,9 @@ static void angles(void **state) {
             most_inverse = fmax(most_inverse, fabs((double)e[k] - (double)t[k] * 0.998));
         }
     }
-    printf("atan2: worst %.2f ulp, sin of turns %.2f ulp, erf(erfinv) off by %.2g\n", most,
-           most_turns, most_inverse);
+    print_figure("atan2", "%.2f ulp", most);
+    print_figure("sine of turns", "%.2f ulp", most_turns);
+    print_figure("erf of its inverse", "off by %.2g", most_inverse);
     assert_true(most <= 4.0);
     assert_true(most_turns <= 4.0);
     assert_true(most_inverse <= 2e-6);
@@ -173,7 +169,7 @@ static void frames_are_orthonormal(void **state) {
             for (int lane = 0; lane < TRC_WIDTH; lane++)
                 most = fmax(most, fabs((double)vf_get(errors[k], lane)));
     }
-    printf("frames off by %.2g\n", most);
+    print_figure("frames around a normal", "off by %.2g", most);
     assert_true(most < 1e-6);
 }
 

@@ -1,0 +1,93 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""The table of stability: figures that tests print (figures.h), from CTest's report.
+
+    stability.py REPORT.xml --out TABLE.md
+
+One row for each thing that was measured. What all instruction sets give alike stands once; rays and their
+misses are added up.
+"""
+
+import argparse
+import re
+import sys
+import xml.etree.ElementTree as ElementTree
+
+MARK = "figure | "
+MISSES = re.compile(r"(\d+) misses of (\d+) rays")
+ULPS = re.compile(r"([\d.]+) ulp")
+
+
+def figures(report):
+    """(what, value, name of the test) of each figure in a JUnit file."""
+    for case in ElementTree.parse(report).getroot().iter("testcase"):
+        for line in (case.findtext("system-out") or "").splitlines():
+            if line.startswith(MARK):
+                what, _, value = line[len(MARK):].partition(" | ")
+                yield what.strip(), value.strip(), case.get("name")
+
+
+def rows(found):
+    """(what, value, tests) with each thing once.
+
+    >>> rows([("a", "0 misses of 10 rays", "t.sse42"), ("a", "1 misses of 5 rays", "t.avx2"),
+    ...       ("b", "2.5 ulp", "u.sse42"), ("b", "2.5 ulp", "u.avx2"), ("b", "3 ulp", "u.scalar")])
+    [('a', '1 misses of 15 rays', 't: avx2, sse42'), ('b', '2.5 ulp (avx2, sse42); 3 ulp (scalar)', 'u')]
+    """
+    by_what = {}
+    for what, value, test in found:
+        by_what.setdefault(what, []).append((value, test))
+    return [(what, *_joined(entries)) for what, entries in by_what.items()]
+
+
+def _joined(entries):
+    stem = entries[0][1].rpartition(".")[0] or entries[0][1]
+    variants = {}
+    for value, test in entries:
+        variants.setdefault(value, set()).add(test.rpartition(".")[2])
+    matches = [MISSES.fullmatch(value) for value, _ in entries]
+    if all(matches):
+        missed, count = (sum(int(match[i]) for match in matches) for i in (1, 2))
+        names = ", ".join(sorted(set().union(*variants.values())))
+        return f"{missed} misses of {count} rays", f"{stem}: {names}"
+    if len(variants) == 1:
+        return entries[0][0], stem
+    return "; ".join(f"{value} ({', '.join(sorted(tests))})" for value, tests in variants.items()), stem
+
+
+def summary(table):
+    """What README quotes."""
+    missed = count = cases = 0
+    for _what, value, _tests in table:
+        match = MISSES.fullmatch(value)
+        if match:
+            missed, count, cases = missed + int(match[1]), count + int(match[2]), cases + 1
+    ulps = [float(number) for _what, value, _tests in table for number in ULPS.findall(value)]
+    parts = [f"{missed} misses of {count:,} rays that must hit, in {cases} cases: closed surfaces met at "
+             "their vertices and edges, at rest and in motion, needles, sizes from 1e-38 to 1e18, far from "
+             "the origin"]
+    if ulps:
+        parts.append(f"functions of the kernels are at most {max(ulps):.1f} ulp off long arithmetic")
+    return ". ".join(part[0].upper() + part[1:] for part in parts) + "."
+
+
+def document(table):
+    """The table with its summary, Markdown."""
+    lines = [summary(table), "", "| measured | result | tests |", "|---|---|---|"]
+    return "\n".join(lines + [f"| {what} | {value} | {tests} |" for what, value, tests in table]) + "\n"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("report")
+    parser.add_argument("--out", required=True)
+    options = parser.parse_args()
+    table = rows(figures(options.report))
+    if not table:
+        sys.exit("no test printed a figure")
+    with open(options.out, "w", encoding="utf-8") as file:
+        file.write(document(table))
+
+
+if __name__ == "__main__":
+    main()
