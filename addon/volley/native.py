@@ -121,7 +121,8 @@ class _LightDesc(_Struct):
 class _WorldDesc(_Struct):
     _fields_ = [("struct_size", _u32), ("use_sampling", _u32), ("material", _u64),
                 ("visibility", _u32), ("map_resolution", _u32), ("ao_distance", _f32),
-                ("ao_factor", _f32), ("ao_method", _u32), ("light_group", _u32)]
+                ("ao_factor", _f32), ("ao_method", _u32), ("light_group", _u32),
+                ("sun_direction", _f32 * 3), ("sun_angle", _f32)]
 
 
 class _CameraDesc(_Struct):

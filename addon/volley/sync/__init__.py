@@ -139,8 +139,8 @@ class SceneSync:
     def _sync_world(self, source):
         scene = source.depsgraph.scene_eval
         shown = scene.world if source.depsgraph.view_layer_eval.use_sky else None
-        material_id = self._materials.world_id(shown) if shown else 0
-        fields = world.describe(shown, material_id, scene.volley, source.light_groups)
+        material_id, sun = self._materials.world_id(shown) if shown else (0, None)
+        fields = world.describe(shown, material_id, sun, scene.volley, source.light_groups)
         if fields != self._world:
             self.scene.set_world(**fields)
         self._world = fields

@@ -69,6 +69,20 @@ class Images:
             self._scene.destroy_image(known[1])
         return self._entries[key][1]
 
+    def id_of_table(self, name, make, *arguments):
+        """The library's image of a table (height, width, 3) of scene-linear colours, make(*arguments)."""
+        key = (name, arguments)
+        self._asked[0].add(key)
+        self._seen.add(key)
+        if key not in self._entries:
+            table = make(*arguments)
+            pixels = np.ones(table.shape[:2] + (4,), np.float32)
+            pixels[..., :3] = table
+            created = self._scene.create_image(
+                pixels=pixels, alpha_mode=native.ALPHA_CHANNEL_PACKED, is_srgb=False)
+            self._entries[key] = (None, created)
+        return self._entries[key][1]
+
     def end(self):
         """Free what nothing asked for since begin."""
         for key in [key for key in self._entries if key not in self._seen]:
