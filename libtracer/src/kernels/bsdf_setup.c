@@ -404,7 +404,8 @@ static struct trc_lobe *add_dielectric(struct setup *c, enum trc_lobe_kind kind,
  * glass. */
 static void add_multi_glass(struct setup *c, vvec3 weight, vvec3 reflected, vvec3 refracted,
                             vvec3 n, vfloat alpha, vfloat eta) {
-    const vfloat rough = vf_clamp(alpha, 1e-4f, 1.0f);
+    /* As rough as the lobes will be: a filtered one keeps its energy too. */
+    const vfloat rough = vf_max(vf_clamp(alpha, 1e-4f, 1.0f), c->filter_alpha);
     const vfloat kept = trc_glass_albedo(v3_dot(n, c->s->wo), rough, eta);
     const vvec3 w = v3_scale(weight, vf_rcp(vf_max(kept, vf_set(0.1f))));
     struct trc_lobe *lobe = add_dielectric(c, TRC_LOBE_REFLECT, v3_mul(w, reflected), n, rough, eta,
