@@ -125,6 +125,10 @@ class Walker:
         """The library's id of an image node's image, 0 for a missing one."""
         return self._images.id_of(node) if self._images else 0
 
+    def tiles_of(self, node):
+        """The tiles of an image node's tiled image: (column, row, library's id) of each."""
+        return self._images.tiles_of(node) if self._images else []
+
     def table_image(self, name, make, *arguments):
         """The library's id of a table of colours, make(*arguments)."""
         return self._images.id_of_table(name, make, *arguments) if self._images else 0

@@ -9,6 +9,7 @@ import os
 import tempfile
 import zlib
 
+import bpy
 import numpy as np
 
 from .. import native
@@ -18,6 +19,8 @@ _ALPHA_MODES = {'STRAIGHT': native.ALPHA_STRAIGHT, 'PREMUL': native.ALPHA_PREMUL
 _UNTOUCHED_SPACES = ("Non-Color", "Raw")  # data in the sense of OpenColorIO
 _ANIMATED_SOURCES = {'SEQUENCE', 'MOVIE'}
 _DATA_SPACES = _UNTOUCHED_SPACES + ("Linear", "scene_linear")
+
+_FIRST_TILE, _TILES_PER_ROW = 1001, 10  # UDIM
 
 
 class Images:
@@ -51,7 +54,24 @@ class Images:
         image = node.image
         if image is None:
             return 0
-        path = _file_path(image, node.image_user)
+        return self._id_of_path(image, _file_path(image, node.image_user))
+
+    def tiles_of(self, node):
+        """The tiles of a tiled image: (column, row, library's image) of each."""
+        image = node.image
+        numbers = [tile.number for tile in image.tiles]
+        found = []
+        for number in numbers:
+            path = _tile_path(image, number)
+            if path or number == numbers[0]:
+                row, column = divmod(number - _FIRST_TILE, _TILES_PER_ROW)
+                found.append((column, row, self._id_of_path(image, path)))
+        if len(found) < len(numbers):
+            self._warnings.add(f"Image '{image.name}': tiles without a file are shown as missing")
+        return found
+
+    def _id_of_path(self, image, path):
+        """The library's image of a file of an image, or of its pixels where path is ""."""
         key = (image.name_full, path)
         keys, is_animated = self._asked
         keys.add(key)
@@ -118,8 +138,6 @@ class Images:
         if pixels is None:
             self._warnings.add(f"Image '{image.name}': cannot be read, magenta is used")
             return 0
-        if image.source == 'TILED':
-            self._warnings.add(f"Image '{image.name}': of its tiles only the first is used")
         return self._scene.create_image(
             pixels=pixels, alpha_mode=_pixel_alpha_mode(image),
             is_srgb=is_srgb and not image.is_float)
@@ -181,6 +199,17 @@ def _file_path(image, image_user):
         return ""
     path = image.filepath_from_user(image_user=image_user)
     return os.path.abspath(path) if path and os.path.isfile(path) else ""
+
+
+def _tile_path(image, number):
+    """The absolute path of a tile's file, "" where there is none to read."""
+    if image.packed_file is not None or image.is_dirty:
+        return ""
+    row, column = divmod(number - _FIRST_TILE, _TILES_PER_ROW)
+    path = image.filepath_raw.replace("<UDIM>", str(number))
+    path = path.replace("<UVTILE>", f"u{column + 1}_v{row + 1}")
+    path = os.path.abspath(bpy.path.abspath(path, library=image.library))
+    return path if os.path.isfile(path) else ""
 
 
 def _is_packed(image):
