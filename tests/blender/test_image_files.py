@@ -69,12 +69,40 @@ def inside_tiles():
     return _both()
 
 
-def _close(ours, theirs):
-    assert theirs.std() > 0.1
-    assert (np.abs(ours - theirs) > 1e-3).any(axis=-1).mean() <= 0.005
+def _close(ours, theirs, tolerance=1e-3):
+    assert theirs.std() > 0.03
+    assert (np.abs(ours - theirs) > tolerance).any(axis=-1).mean() <= 0.005
 
 
 def test_tiles(blender):
     ours, theirs = blender.run(inside_tiles)
     _close(ours, theirs)
     assert "tiles" not in blender.output
+
+
+def inside_limit():
+    """[Volley's, Cycles'] of noise as it is and where Simplify makes a quarter of its side."""
+    import os
+    import tempfile
+    import bpy
+    path = os.path.join(tempfile.mkdtemp(prefix="volley_"), "large.png")
+
+    def image():
+        made = bpy.data.images.new("Noise", 512, 512)
+        pixels = np.ones((512, 512, 4), np.float32)
+        pixels[..., :3] = np.random.default_rng(1).uniform(0.0, 1.0, (512, 512, 3))
+        made.pixels.foreach_set(pixels.reshape(-1))
+        made.filepath_raw, made.file_format = path, 'PNG'
+        made.save()
+        return bpy.data.images.load(path)
+    _stage(image)
+    scene = bpy.context.scene
+    pairs = [_both()]
+    scene.render.use_simplify, scene.cycles.texture_limit_render = True, '128'
+    return pairs + [_both()]
+
+
+def test_limit(blender):
+    (full, _), (ours, theirs) = blender.run(inside_limit)
+    assert full.std() > 2.0 * theirs.std()  # noise that is averaged
+    _close(ours, theirs, 0.02)

@@ -12,7 +12,7 @@ import bpy
 
 from .. import native
 from ..log import Warnings
-from . import camera, instance, light, mesh, motion, strands, visibility, world
+from . import camera, image, instance, light, mesh, motion, strands, visibility, world
 from .changes import Changes
 from .image import Images
 from .material import Materials
@@ -65,7 +65,7 @@ class SceneSync:
         the frame."""
         if shutter is None and self._update_part(source):
             return
-        self._images.begin(source.changes)
+        self._images.begin(source.changes, _size_limit(source))
         self._materials.begin(source.changes, source.aovs)
         self._meshes.begin()
         self._sync_materials(source)
@@ -94,7 +94,7 @@ class SceneSync:
         if not all(touched):
             return False
         self._shown = None  # until all is done
-        self._images.begin(changes)
+        self._images.begin(changes, _size_limit(source))
         names = self._materials.attribute_names()
         if not self._materials.change(source.depsgraph, changes):
             return False
@@ -195,6 +195,11 @@ class _Shown:
         is_silent = evaluated.type in self._SILENT_TYPES or (
             evaluated.type == 'EMPTY' and evaluated.instance_type == 'NONE')
         return self.IRRELEVANT if is_silent else None
+
+
+def _size_limit(source):
+    """The longest side (pixels) of images, 0 for any."""
+    return image.size_limit(source.depsgraph.scene_eval, source.v3d is None)
 
 
 def _material_ids(materials, each, view_layer):

@@ -13,6 +13,7 @@ import bpy
 import numpy as np
 
 from .. import native
+from ..compat import cycles
 
 _ALPHA_MODES = {'STRAIGHT': native.ALPHA_STRAIGHT, 'PREMUL': native.ALPHA_PREMULTIPLIED,
                 'CHANNEL_PACKED': native.ALPHA_CHANNEL_PACKED, 'NONE': native.ALPHA_NONE}
@@ -31,13 +32,15 @@ class Images:
         self._entries = {}  # key -> (signature, id)
         self._seen = set()
         self._look_again = True
+        self._limit = 0
         self._asked = set(), False
 
-    def begin(self, changes):
+    def begin(self, changes, limit=0):
         """Start a sync: nothing has been asked for yet. Unless changes names images, those known are
-        taken as they are."""
+        taken as they are. limit: pixels a side, 0 for none."""
         self._seen = set()
-        self._look_again = changes.full or changes.all_materials
+        self._look_again = changes.full or changes.all_materials or limit != self._limit
+        self._limit = limit
 
     def take_asked(self):
         """The keys asked for since the last call, for :meth:`keep`, and whether one of the images may
@@ -81,7 +84,7 @@ class Images:
             self._seen.add(key)
             return known[1]
         self._seen.add(key)
-        signature = _signature(image, path)
+        signature = _signature(image, path) + (self._limit,)
         if known and known[0] == signature:
             return known[1]
         self._entries[key] = (signature, self._create(image, path))
@@ -127,7 +130,7 @@ class Images:
         """The image as the library reads it, 0 where it cannot."""
         try:
             return self._scene.create_image(
-                path=path, is_srgb=is_srgb, alpha_mode=_alpha_mode(image))
+                path=path, is_srgb=is_srgb, alpha_mode=_alpha_mode(image), max_side=self._limit)
         except native.TracerError as error:
             if error.status not in (native.ERROR_UNSUPPORTED, native.ERROR_IMAGE):
                 raise
@@ -140,7 +143,7 @@ class Images:
             return 0
         return self._scene.create_image(
             pixels=pixels, alpha_mode=_pixel_alpha_mode(image),
-            is_srgb=is_srgb and not image.is_float)
+            is_srgb=is_srgb and not image.is_float, max_side=self._limit)
 
     def _is_srgb(self, image):
         name = image.colorspace_settings.name
@@ -148,6 +151,12 @@ class Images:
             self._warnings.add(f"Image '{image.name}': colour space {name} is not supported, sRGB is used")
             return True
         return name == "sRGB"
+
+
+def size_limit(scene, is_final):
+    """The longest side (pixels) that Simplify allows an image, 0 for any."""
+    limit = cycles(scene, "texture_limit_render" if is_final else "texture_limit", 'OFF')
+    return int(limit) if scene.render.use_simplify and limit != 'OFF' else 0
 
 
 def read_pixels(image):
