@@ -338,13 +338,21 @@ class _Walk:
             item.motion_keys = motion.key_count(each.object, each.parent if each.is_instance else None)
             item.transforms *= item.motion_keys
         if source not in self._owners:
-            data = make()
-            self._owners[source] = None if data is None else item.key
-            if data is not None:
-                self._sync._meshes.put(item.key, source, data, self._names)
+            self._owners[source] = item.key if self._put_made(item, source, make) else None
         item.mesh_key = self._owners[source]
         if item.mesh_key is not None:
             self.items[item.key] = item
+
+    def _put_made(self, item, source, make):
+        """Have the mesh of an item in the library; False where there is nothing to show."""
+        changes, meshes = self._source.changes, self._sync._meshes
+        is_same = not changes.full and item.owner not in changes.objects
+        if is_same and meshes.reuse(item.key, source, self._names):
+            return True
+        data = make()
+        if data is not None:
+            meshes.put(item.key, source, data, self._names)
+        return data is not None
 
     def _mesh_key(self, item, blender_object):
         """The key of the mesh the item shows, which is read now if no other item showed it before."""

@@ -43,6 +43,7 @@ class FlatTree:
         self.color_names = set()  # "" is the active colour attribute
         self.needs_generated = False  # coordinates of the undeformed mesh
         self.sun = None           # sky_texture.Sun that the tree shows
+        self.follows_objects = False  # it reads where other objects are
 
     def signature(self):
         """Equal for trees that mean the same."""

@@ -137,7 +137,8 @@ class Materials:
         entry.signature, entry.name = signature, name
         entry.uv_names, entry.color_names = flat.uv_names, flat.color_names
         entry.needs_generated, entry.sun = flat.needs_generated, flat.sun
-        entry.images, entry.is_animated = self._images.take_asked()
+        entry.images, is_animated = self._images.take_asked()
+        entry.is_animated = is_animated or flat.follows_objects
 
     def _send(self, entry, key, flat, values):
         """Create or change it in the library; a refused one becomes the default material."""
@@ -165,7 +166,8 @@ class Entry:
         self.name = ""  # in mattes
         self.uv_names, self.color_names = set(), set()
         self.needs_generated, self.sun = False, None
-        self.images, self.is_animated = set(), False  # those it reads; whether time changes them
+        self.images = set()  # those it reads
+        self.is_animated = False  # whether what it reads may be another in the next sync
 
 
 def _flags(material):

@@ -44,7 +44,7 @@ _VECTOR_MATH = ('ADD', 'SUBTRACT', 'MULTIPLY', 'DIVIDE', 'MULTIPLY_ADD', 'CROSS_
                 'MODULO', 'WRAP', 'FACEFORWARD', 'REFRACT')
 VECTOR_SUBTRACT, VECTOR_MULTIPLY_ADD, VECTOR_DOT, VECTOR_NORMALIZE = 1, 4, 8, 12
 VECTOR_MINIMUM, VECTOR_MAXIMUM, _VECTOR_FLOOR = 14, 15, 16
-_MATH_SUBTRACT, _MATH_MULTIPLY, _MATH_MULTIPLY_ADD, _MATH_COMPARE = 1, 2, 4, 16
+_MATH_ADD, _MATH_SUBTRACT, _MATH_MULTIPLY, _MATH_MULTIPLY_ADD, _MATH_COMPARE = 0, 1, 2, 4, 16
 
 _INTERPOLATIONS = {'Linear': 0, 'Closest': 1, 'Cubic': 2, 'Smart': 2}
 _EXTENSIONS = {'REPEAT': 0, 'EXTEND': 1, 'CLIP': 2, 'MIRROR': 3}
@@ -437,16 +437,28 @@ def _uv_map(walker, node, _sockets):
 def _texture_coordinate(walker, node, _sockets):
     if node.from_instancer:
         walker.warn("Texture Coordinate: From Instancer is not supported, the object's own are used")
-    if node.object is not None:
-        walker.warn("Texture Coordinate: another object's coordinates are not supported, the "
-                    "object's own are used")
     linked = {s.identifier for s in node.outputs if s.is_linked}
     if "UV" in linked:
         walker.flat.uv_names.add("")
     walker.flat.needs_generated |= "Generated" in linked
     index = walker.emit(TEXTURE_COORDINATE, ())
-    return _outputs(walker, index, tuple((name, 'v') for name in (
+    outputs = _outputs(walker, index, tuple((name, 'v') for name in (
         "Generated", "Normal", "UV", "Object", "Camera", "Window", "Reflection")))
+    if node.object is not None and "Object" in linked:
+        outputs["Object"] = _place_in(walker, node.object)
+    return outputs
+
+
+def _place_in(walker, blender_object):
+    """The shading point in another object's coordinates."""
+    walker.flat.follows_objects = True
+    position = Value('v', walker.emit(GEOMETRY, ()), 0)
+    zero = _constant('v', 0.0), _constant('f', 0.0)
+    parts = []
+    for row in blender_object.matrix_world.inverted_safe()[:3]:
+        dot = walker.emit(VECTOR_MATH, (position, _constant('v', *row[:3])) + zero, VECTOR_DOT)
+        parts.append(_number(walker, _MATH_ADD, Value('f', dot, 1), _constant('f', row[3])))
+    return Value('v', walker.emit(COMBINE, parts), 0)
 
 
 def _color_attribute(walker, node, _sockets):
