@@ -43,6 +43,11 @@ def cycles(data, name, default):
     return getattr(getattr(data, "cycles", None), name, default)
 
 
+def cycles_curves(scene, name, default):
+    """A setting of Cycles' curves where they exist, else default."""
+    return getattr(getattr(scene, "cycles_curves", None), name, default)
+
+
 def motion_position(scene):
     """Where the shutter interval lies: 'START', 'CENTER' or 'END'."""
     own = getattr(scene.render, "motion_blur_position", None)

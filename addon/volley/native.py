@@ -121,7 +121,8 @@ class _LightDesc(_Struct):
 class _WorldDesc(_Struct):
     _fields_ = [("struct_size", _u32), ("use_sampling", _u32), ("material", _u64),
                 ("visibility", _u32), ("map_resolution", _u32), ("ao_distance", _f32),
-                ("ao_factor", _f32), ("ao_method", _u32), ("light_group", _u32)]
+                ("ao_factor", _f32), ("ao_method", _u32), ("light_group", _u32),
+                ("sun_direction", _f32 * 3), ("sun_angle", _f32)]
 
 
 class _CameraDesc(_Struct):
@@ -150,7 +151,7 @@ class _MaterialDesc(_Struct):
 class _ImageDesc(_Struct):
     _fields_ = [("struct_size", _u32), ("width", _u32), ("height", _u32), ("alpha_mode", _u32),
                 ("is_srgb", _u32), ("is_float", _u32), ("pixels", _ptr), ("pixel_bytes", _u64),
-                ("path", _str)]
+                ("path", _str), ("max_side", _u32), ("reserved", _u32)]
 
 
 class _SceneDesc(_Struct):
@@ -526,10 +527,10 @@ class Scene:
             surface=surface, **values)
         return desc, (keep, structs, inputs)
 
-    def create_image(self, pixels=None, path=None, alpha_mode=ALPHA_STRAIGHT, is_srgb=False):
+    def create_image(self, pixels=None, path=None, alpha_mode=ALPHA_STRAIGHT, is_srgb=False, max_side=0):
         """An image from a file (absolute path) or from pixels (height, width, 4), float32 or uint8,
-        bottom row first."""
-        desc = _ImageDesc(alpha_mode=alpha_mode, is_srgb=int(is_srgb), path=_text(path))
+        bottom row first; max_side: pixels, to which a larger one is halved, 0 for none."""
+        desc = _ImageDesc(alpha_mode=alpha_mode, is_srgb=int(is_srgb), path=_text(path), max_side=max_side)
         if pixels is not None:
             pixels = np.ascontiguousarray(pixels)
             desc.height, desc.width = pixels.shape[:2]

@@ -125,6 +125,18 @@ for _kind in ("AXIS_ANGLE", "X_AXIS", "Y_AXIS", "Z_AXIS", "EULER_XYZ"):
 for _operation in ("SINE", "COSINE", "TANGENT", "SNAP", "MODULO", "WRAP", "FACEFORWARD", "REFRACT"):
     _add(f"vector math {_operation}", "ShaderNodeVectorMath", ("Vector",), {"operation": _operation},
          Vector='vector')
+
+
+def _other_object(node):
+    """Point a Texture Coordinate node at an object that is moved, turned and scaled."""
+    import bpy
+    import scenes
+    node.object = bpy.data.objects.get("Other") or scenes.link("Other", None)
+    node.object.location, node.object.rotation_euler = (0.3, 0.2, -0.5), (0.4, 0.7, -0.2)
+    node.object.scale = (3.0, 5.0, 4.0)
+
+
+_add("coordinates of another object", "ShaderNodeTexCoord", ("Object",), {"object": _other_object})
 _add("camera data", "ShaderNodeCameraData", ("View Vector", "View Z Depth", "View Distance"))
 _add("wireframe", "ShaderNodeWireframe", ("Fac",), Size=0.3)
 _add("light falloff", "ShaderNodeLightFalloff", ("Quadratic", "Linear", "Constant"), Strength=0.1,

@@ -612,6 +612,10 @@ static void worlds(void **state) {
     REFUSE_WORLD(ARGUMENT, desc.ao_factor = -1.0f);
     REFUSE_WORLD(ARGUMENT, desc.ao_factor = 1.0f; desc.ao_distance = 0.0f);
     REFUSE_WORLD(ARGUMENT, desc.ao_distance = NAN);
+    REFUSE_WORLD(ARGUMENT, desc.sun_angle = NAN);
+    REFUSE_WORLD(ARGUMENT, desc.sun_angle = 4.0f);
+    REFUSE_WORLD(ARGUMENT, desc.sun_angle = 0.01f); /* in no direction */
+    REFUSE_WORLD(ARGUMENT, desc.sun_angle = 0.01f; desc.sun_direction[0] = INFINITY);
     REFUSE_WORLD(LARGE, desc.light_group = TRC_MAX_LIGHT_GROUPS + 1);
     REFUSE_WORLD(ARGUMENT, desc.ao_factor = 1.0f; desc.ao_distance = NAN);
 }

@@ -119,6 +119,50 @@ static void test_refused_pixels(void **state) {
     refused(&desc, TRC_ERROR_TOO_LARGE);
 }
 
+static void test_limits(void **state) {
+    (void)state;
+    uint8_t bytes[5 * 4 * 4];
+    float numbers[5 * 4 * 4];
+    for (int i = 0; i < 5 * 4 * 4; i++) {
+        bytes[i] = (uint8_t)(3 * i);
+        numbers[i] = 0.5f * (float)i;
+    }
+    for (int is_float = 0; is_float < 2; is_float++) {
+        trc_image_desc desc = pixels_desc(5, 4, is_float ? (void *)numbers : bytes, is_float);
+        desc.alpha_mode = TRC_ALPHA_CHANNEL_PACKED;
+        desc.max_side = 5;
+        struct trc_image *image = loaded(&desc);
+        assert_int_equal(image->levels[0].width, 5);
+        trc_image_release(image);
+        desc.max_side = 4;
+        image = loaded(&desc);
+        assert_int_equal(image->levels[0].width, 2);
+        assert_int_equal(image->levels[0].height, 2);
+        assert_int_equal(image->bytes, is_float ? 64 : 16);
+        for (int y = 0; y < 2; y++)
+            for (int x = 0; x < 2; x++)
+                for (int c = 0; c < 4; c++) {
+                    /* The mean of a linear function over a block is that of its corners. */
+                    const double mean = 4 * (5 * (2 * y + 0.5) + 2 * x + 0.5) + c;
+                    const int at = 4 * (2 * y + x) + c;
+                    if (is_float)
+                        assert_true(fabs((double)((float *)image->levels[0].texels)[at] -
+                                         0.5 * mean) < 1e-5);
+                    else
+                        assert_true(fabs(((uint8_t *)image->levels[0].texels)[at] - 3 * mean) <=
+                                    0.5);
+                }
+        trc_image_release(image);
+        desc.max_side = 1;
+        image = loaded(&desc); /* 4 halvings would leave nothing of one side */
+        assert_int_equal(image->levels[0].width * image->levels[0].height, 1);
+        trc_image_release(image);
+        trc_memory_fail_at(2, false);
+        refused(&desc, TRC_ERROR_OUT_OF_MEMORY);
+        trc_memory_fail_at(-1, false);
+    }
+}
+
 static void test_holders(void **state) {
     (void)state;
     static const uint8_t pixels[4];
@@ -436,6 +480,7 @@ int main(void) {
         cmocka_unit_test(test_bytes),
         cmocka_unit_test(test_floats),
         cmocka_unit_test(test_refused_pixels),
+        cmocka_unit_test(test_limits),
         cmocka_unit_test(test_holders),
         cmocka_unit_test(test_memory_failures),
 #ifdef TRC_WITH_OIIO

@@ -12,7 +12,7 @@ import bpy
 
 from .. import native
 from ..log import Warnings
-from . import camera, instance, light, mesh, motion, visibility, world
+from . import camera, image, instance, light, mesh, motion, strands, visibility, world
 from .changes import Changes
 from .image import Images
 from .material import Materials
@@ -65,7 +65,7 @@ class SceneSync:
         the frame."""
         if shutter is None and self._update_part(source):
             return
-        self._images.begin(source.changes)
+        self._images.begin(source.changes, _size_limit(source))
         self._materials.begin(source.changes, source.aovs)
         self._meshes.begin()
         self._sync_materials(source)
@@ -94,7 +94,7 @@ class SceneSync:
         if not all(touched):
             return False
         self._shown = None  # until all is done
-        self._images.begin(changes)
+        self._images.begin(changes, _size_limit(source))
         names = self._materials.attribute_names()
         if not self._materials.change(source.depsgraph, changes):
             return False
@@ -141,8 +141,8 @@ class SceneSync:
     def _sync_world(self, source):
         scene = source.depsgraph.scene_eval
         shown = scene.world if source.depsgraph.view_layer_eval.use_sky else None
-        material_id = self._materials.world_id(shown) if shown else 0
-        fields = world.describe(shown, material_id, scene.volley, source.light_groups)
+        material_id, sun = self._materials.world_id(shown) if shown else (0, None)
+        fields = world.describe(shown, material_id, sun, scene.volley, source.light_groups)
         if fields != self._world:
             self.scene.set_world(**fields)
         self._world = fields
@@ -199,6 +199,11 @@ class _Shown:
         return self.IRRELEVANT if is_silent else None
 
 
+def _size_limit(source):
+    """The longest side (pixels) of images, 0 for any."""
+    return image.size_limit(source.depsgraph.scene_eval, source.v3d is None)
+
+
 def _material_ids(materials, each, view_layer):
     """Library ids of an instance's material slots."""
     slots = [slot.material for slot in each.object.material_slots]
@@ -227,13 +232,19 @@ class _Walk:
 
     def run(self):
         """Find what is there now."""
-        for each in self._shown_instances():
+        for each in self._instances():
             if each.is_instance:
                 self.tied.update(instance.names_of(each))
+            if each.show_particles and self._view_layer.use_strand:
+                self._add_hair(each)
+            if not each.show_self:
+                continue
             if instance.is_light(each):
                 self._add_light(each)
             elif instance.has_mesh(each) and self._view_layer.use_solid:
                 self._add_mesh_instance(each)
+            elif strands.has_strands(each) and self._view_layer.use_strand:
+                self._add_strands(each)
 
     def follow_motion(self, camera_keys):
         """Look at every moving thing at its other times."""
@@ -242,7 +253,8 @@ class _Walk:
         for fraction in motion.fractions_of(counts):
             self._source.engine.frame_set(*self._shutter.frame_at(fraction))
             camera_keys.look(fraction)
-            for each in self._shown_instances():
+            for each in self._instances():
+                self._move_hair(each, fraction)
                 item = self.items.get(instance.key_of(each))
                 if item is not None:
                     self._look_again(item, each, fraction)
@@ -252,11 +264,12 @@ class _Walk:
         for key, (pointer, data, shapes) in self._deforming.items():
             self._sync._meshes.put(key, pointer, data, self._names, shapes)
 
-    def _shown_instances(self):
+    def _instances(self):
+        """Those that take part, by themselves or by their particles."""
         for number, each in enumerate(self._source.depsgraph.object_instances):
             if number % _BREAK_INTERVAL == 0 and self._source.is_cancelled():
                 raise Cancelled()
-            if instance.is_shown(each, self._source.v3d):
+            if instance.is_in_view(each, self._source.v3d):
                 yield each
 
     def _describe(self, each):
@@ -282,6 +295,66 @@ class _Walk:
         item.mesh_key = self._mesh_key(item, blender_object)
         if item.mesh_key is not None:
             self.items[item.key] = item
+
+    def _add_hair(self, each):
+        """The hair of an object's particle systems, each a mesh of one material."""
+        blender_object = each.object
+        is_final = self._source.v3d is None
+        for number, system in strands.hair_systems(blender_object, is_final):
+            self.tied.add(blender_object.name_full)  # only a walk sees what its hair does
+
+            def make(system=system):
+                real = blender_object.original.evaluated_get(self._source.depsgraph)
+                return strands.extract_hair(real, system, real.matrix_world.inverted_safe(), is_final,
+                                            self._wants_hair_info())
+            item = self._describe(each)
+            item.key = instance.hair_key(each, number)
+            materials = _material_ids(self._sync._materials, each, self._view_layer)
+            slot = min(max(system.settings.material, 1), len(materials)) - 1
+            item.materials = materials[slot:slot + 1] if materials else ()
+            self._add_made(each, item, (blender_object.name_full, number), make)
+
+    def _move_hair(self, each, fraction):
+        """Hair goes where its object goes."""
+        for number in range(len(each.object.particle_systems)):
+            item = self.items.get(instance.hair_key(each, number))
+            index = None if item is None else motion.key_index(fraction, item.motion_keys)
+            if index is not None:
+                item.transforms[index] = rows12(each.matrix_world)
+
+    def _add_strands(self, each):
+        """A Curves or Point Cloud object."""
+        data = each.object.data
+        item = self._describe(each)
+        item.materials = _material_ids(self._sync._materials, each, self._view_layer)[:1]
+        self.tied.add(each.object.name_full)
+        self._add_made(each, item, data.as_pointer(),
+                       lambda: strands.extract_object(data, self._wants_hair_info()))
+
+    def _wants_hair_info(self):
+        return strands.HAIR_ATTRIBUTE in self._names[1]
+
+    def _add_made(self, each, item, source, make):
+        """An item whose mesh is made by make() unless another item of the same source has it."""
+        if self._shutter is not None:
+            item.motion_keys = motion.key_count(each.object, each.parent if each.is_instance else None)
+            item.transforms *= item.motion_keys
+        if source not in self._owners:
+            self._owners[source] = item.key if self._put_made(item, source, make) else None
+        item.mesh_key = self._owners[source]
+        if item.mesh_key is not None:
+            self.items[item.key] = item
+
+    def _put_made(self, item, source, make):
+        """Have the mesh of an item in the library; False where there is nothing to show."""
+        changes, meshes = self._source.changes, self._sync._meshes
+        is_same = not changes.full and item.owner not in changes.objects
+        if is_same and meshes.reuse(item.key, source, self._names):
+            return True
+        data = make()
+        if data is not None:
+            meshes.put(item.key, source, data, self._names)
+        return data is not None
 
     def _mesh_key(self, item, blender_object):
         """The key of the mesh the item shows, which is read now if no other item showed it before."""

@@ -7,15 +7,16 @@ Functions as in ``textures.py``: of the walker, the node and its ``Sockets``.
 import numpy as np
 
 from ..compat import TRANSFORMS_NORMALS
+from .strands import HAIR_ATTRIBUTE
 from .values import CONSTANT, DEFAULT, Value
 
 # TRC_NODE_*
 CURVES, FLOAT_CURVE, BLACKBODY, WAVELENGTH, VECTOR_TRANSFORM, VECTOR_ROTATE, CAMERA_DATA, \
     WIREFRAME = range(104, 112)
-_MATH, _LIGHT_PATH, _GEOMETRY, _SEPARATE, _COMBINE, _MAP_RANGE = 71, 74, 75, 82, 83, 84
+_COLOR_ATTRIBUTE, _MATH, _LIGHT_PATH, _GEOMETRY, _SEPARATE, _COMBINE, _MAP_RANGE = 67, 71, 74, 75, 82, 83, 84
 
 # TRC_MATH_*
-_ADD, _SUBTRACT, _MULTIPLY, _DIVIDE, _MULTIPLY_ADD, _FLOOR = 0, 1, 2, 3, 4, 20
+_ADD, _SUBTRACT, _MULTIPLY, _DIVIDE, _MULTIPLY_ADD, _GREATER_THAN, _FLOOR = 0, 1, 2, 3, 4, 14, 20
 _CLAMP_RESULT = 256
 _RAY_LENGTH = 7  # output of the Light Path node
 _TABLE_SIZE = 256
@@ -180,6 +181,20 @@ def _bevel(walker, _node, sockets):
     return {"Normal": normal}
 
 
+def _hair_info(walker, node, _sockets):
+    """What the meshes of strands bring as an attribute; 0 on all others."""
+    if node.outputs["Tangent Normal"].is_linked:
+        walker.warn("Curves Info: Tangent Normal is not supported, 0 is used")
+    walker.flat.color_names.add(HAIR_ATTRIBUTE)
+    index = walker.emit(_COLOR_ATTRIBUTE, (), name=HAIR_ATTRIBUTE)
+    parts = walker.emit(_SEPARATE, (Value('c', index, 0),))
+    intercept, length, thickness = (Value('f', parts, i) for i in range(3))
+    is_strand = _number(walker, _GREATER_THAN, length, _constant('f', 0.0))
+    random = _number(walker, _MULTIPLY, Value('f', index, 1), is_strand)
+    return {"Is Strand": is_strand, "Intercept": intercept, "Length": length, "Thickness": thickness,
+            "Tangent Normal": _constant('v', 0.0), "Random": random}
+
+
 def _particle_info(walker, node, _sockets):
     walker.warn("Particle Info is not supported, 0 is used")
     return {s.identifier: _constant('v' if s.type == 'VECTOR' else 'f') for s in node.outputs}
@@ -193,4 +208,5 @@ CONVERTERS = {
     "ShaderNodeCameraData": _camera_data, "ShaderNodeWireframe": _wireframe,
     "ShaderNodeLightFalloff": _light_falloff, "ShaderNodeAmbientOcclusion": _ambient_occlusion,
     "ShaderNodeBevel": _bevel, "ShaderNodeParticleInfo": _particle_info,
+    "ShaderNodeHairInfo": _hair_info,
 }

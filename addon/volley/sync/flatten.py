@@ -42,18 +42,20 @@ class FlatTree:
         self.uv_names = set()     # "" is the default UV map
         self.color_names = set()  # "" is the active colour attribute
         self.needs_generated = False  # coordinates of the undeformed mesh
+        self.sun = None           # sky_texture.Sun that the tree shows
+        self.follows_objects = False  # it reads where other objects are
 
     def signature(self):
         """Equal for trees that mean the same."""
         return self.surface, tuple(node.signature() for node in self.nodes)
 
 
-def flatten(tree, label, warnings, image_of=None, aovs=None):
+def flatten(tree, label, warnings, images=None, aovs=None):
     """The surface of a material or world tree as a FlatTree.
 
-    label names the owner in messages; image_of(node) gives the library's id of an image node's image,
-    0 for a missing one; aovs: {name: (type, number)} of those that are asked for."""
-    walker = Walker(label, warnings, image_of)
+    label names the owner in messages; images: image.Images, without which all are missing; aovs:
+    {name: (type, number)} of those that are asked for."""
+    walker = Walker(label, warnings, images)
     output = tree.get_output_node('CYCLES')
     if output is None:
         return walker.flat
@@ -108,17 +110,29 @@ def _emission(flat, index):
 class Walker:
     """Walks one tree. A path is the tuple of group nodes that were entered on the way."""
 
-    def __init__(self, label, warnings, image_of=None):
+    def __init__(self, label, warnings, images=None):
         self.flat = FlatTree()
         self.label = label
-        self.image_of = image_of or (lambda node: 0)
         self._warnings = warnings
+        self._images = images
         self._done = {}       # (path names, node name) -> {output identifier: Value}
         self._active = set()  # the nodes being walked, to notice loops
 
     def warn(self, text):
         """Add a message about this tree."""
         self._warnings.add(f"{self.label}: {text}")
+
+    def image_of(self, node):
+        """The library's id of an image node's image, 0 for a missing one."""
+        return self._images.id_of(node) if self._images else 0
+
+    def tiles_of(self, node):
+        """The tiles of an image node's tiled image: (column, row, library's id) of each."""
+        return self._images.tiles_of(node) if self._images else []
+
+    def table_image(self, name, make, *arguments):
+        """The library's id of a table of colours, make(*arguments)."""
+        return self._images.id_of_table(name, make, *arguments) if self._images else 0
 
     def emit(self, node_type, values, mode=0, image=0, name="", table=None):
         """Append a node; values: its inputs as Values in the library's order. Returns its index."""

@@ -9,15 +9,19 @@ import os
 import tempfile
 import zlib
 
+import bpy
 import numpy as np
 
 from .. import native
+from ..compat import cycles
 
 _ALPHA_MODES = {'STRAIGHT': native.ALPHA_STRAIGHT, 'PREMUL': native.ALPHA_PREMULTIPLIED,
                 'CHANNEL_PACKED': native.ALPHA_CHANNEL_PACKED, 'NONE': native.ALPHA_NONE}
 _UNTOUCHED_SPACES = ("Non-Color", "Raw")  # data in the sense of OpenColorIO
 _ANIMATED_SOURCES = {'SEQUENCE', 'MOVIE'}
 _DATA_SPACES = _UNTOUCHED_SPACES + ("Linear", "scene_linear")
+
+_FIRST_TILE, _TILES_PER_ROW = 1001, 10  # UDIM
 
 
 class Images:
@@ -28,13 +32,15 @@ class Images:
         self._entries = {}  # key -> (signature, id)
         self._seen = set()
         self._look_again = True
+        self._limit = 0
         self._asked = set(), False
 
-    def begin(self, changes):
+    def begin(self, changes, limit=0):
         """Start a sync: nothing has been asked for yet. Unless changes names images, those known are
-        taken as they are."""
+        taken as they are. limit: pixels a side, 0 for none."""
         self._seen = set()
-        self._look_again = changes.full or changes.all_materials
+        self._look_again = changes.full or changes.all_materials or limit != self._limit
+        self._limit = limit
 
     def take_asked(self):
         """The keys asked for since the last call, for :meth:`keep`, and whether one of the images may
@@ -51,7 +57,24 @@ class Images:
         image = node.image
         if image is None:
             return 0
-        path = _file_path(image, node.image_user)
+        return self._id_of_path(image, _file_path(image, node.image_user))
+
+    def tiles_of(self, node):
+        """The tiles of a tiled image: (column, row, library's image) of each."""
+        image = node.image
+        numbers = [tile.number for tile in image.tiles]
+        found = []
+        for number in numbers:
+            path = _tile_path(image, number)
+            if path or number == numbers[0]:
+                row, column = divmod(number - _FIRST_TILE, _TILES_PER_ROW)
+                found.append((column, row, self._id_of_path(image, path)))
+        if len(found) < len(numbers):
+            self._warnings.add(f"Image '{image.name}': tiles without a file are shown as missing")
+        return found
+
+    def _id_of_path(self, image, path):
+        """The library's image of a file of an image, or of its pixels where path is ""."""
         key = (image.name_full, path)
         keys, is_animated = self._asked
         keys.add(key)
@@ -61,12 +84,26 @@ class Images:
             self._seen.add(key)
             return known[1]
         self._seen.add(key)
-        signature = _signature(image, path)
+        signature = _signature(image, path) + (self._limit,)
         if known and known[0] == signature:
             return known[1]
         self._entries[key] = (signature, self._create(image, path))
         if known and known[1]:
             self._scene.destroy_image(known[1])
+        return self._entries[key][1]
+
+    def id_of_table(self, name, make, *arguments):
+        """The library's image of a table (height, width, 3) of scene-linear colours, make(*arguments)."""
+        key = (name, arguments)
+        self._asked[0].add(key)
+        self._seen.add(key)
+        if key not in self._entries:
+            table = make(*arguments)
+            pixels = np.ones(table.shape[:2] + (4,), np.float32)
+            pixels[..., :3] = table
+            created = self._scene.create_image(
+                pixels=pixels, alpha_mode=native.ALPHA_CHANNEL_PACKED, is_srgb=False)
+            self._entries[key] = (None, created)
         return self._entries[key][1]
 
     def end(self):
@@ -93,7 +130,7 @@ class Images:
         """The image as the library reads it, 0 where it cannot."""
         try:
             return self._scene.create_image(
-                path=path, is_srgb=is_srgb, alpha_mode=_alpha_mode(image))
+                path=path, is_srgb=is_srgb, alpha_mode=_alpha_mode(image), max_side=self._limit)
         except native.TracerError as error:
             if error.status not in (native.ERROR_UNSUPPORTED, native.ERROR_IMAGE):
                 raise
@@ -104,11 +141,9 @@ class Images:
         if pixels is None:
             self._warnings.add(f"Image '{image.name}': cannot be read, magenta is used")
             return 0
-        if image.source == 'TILED':
-            self._warnings.add(f"Image '{image.name}': of its tiles only the first is used")
         return self._scene.create_image(
             pixels=pixels, alpha_mode=_pixel_alpha_mode(image),
-            is_srgb=is_srgb and not image.is_float)
+            is_srgb=is_srgb and not image.is_float, max_side=self._limit)
 
     def _is_srgb(self, image):
         name = image.colorspace_settings.name
@@ -116,6 +151,12 @@ class Images:
             self._warnings.add(f"Image '{image.name}': colour space {name} is not supported, sRGB is used")
             return True
         return name == "sRGB"
+
+
+def size_limit(scene, is_final):
+    """The longest side (pixels) that Simplify allows an image, 0 for any."""
+    limit = cycles(scene, "texture_limit_render" if is_final else "texture_limit", 'OFF')
+    return int(limit) if scene.render.use_simplify and limit != 'OFF' else 0
 
 
 def read_pixels(image):
@@ -167,6 +208,17 @@ def _file_path(image, image_user):
         return ""
     path = image.filepath_from_user(image_user=image_user)
     return os.path.abspath(path) if path and os.path.isfile(path) else ""
+
+
+def _tile_path(image, number):
+    """The absolute path of a tile's file, "" where there is none to read."""
+    if image.packed_file is not None or image.is_dirty:
+        return ""
+    row, column = divmod(number - _FIRST_TILE, _TILES_PER_ROW)
+    path = image.filepath_raw.replace("<UDIM>", str(number))
+    path = path.replace("<UVTILE>", f"u{column + 1}_v{row + 1}")
+    path = os.path.abspath(bpy.path.abspath(path, library=image.library))
+    return path if os.path.isfile(path) else ""
 
 
 def _is_packed(image):

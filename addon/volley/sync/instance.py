@@ -52,16 +52,24 @@ def key_of(instance):
 class Plain:
     """An object on its own, in the form of the depsgraph's instances."""
 
-    is_instance, parent, show_self = False, None, True
+    is_instance, parent, show_self, show_particles = False, None, True, True
 
     def __init__(self, evaluated):
         self.object, self.matrix_world = evaluated, evaluated.matrix_world
 
 
+def hair_key(instance, number):
+    """The key of the hair of one of the object's particle systems."""
+    return key_of(instance) + ("hair", number)
+
+
 def is_shown(instance, v3d=None):
-    """Whether the instance takes part: instancers may hide themselves, viewports have local views."""
-    if not instance.show_self:
-        return False
+    """Whether the instance takes part itself: instancers may be hidden."""
+    return instance.show_self and is_in_view(instance, v3d)
+
+
+def is_in_view(instance, v3d=None):
+    """Whether its object and particles may be seen: viewports have local views."""
     if v3d is None:
         return True
     owner = instance.parent if instance.is_instance and instance.parent else instance.object
@@ -110,6 +118,11 @@ def _hash_pair(x, y):
     a = ((a ^ c) - rotate(c, 4)) & mask
     b = ((b ^ a) - rotate(a, 14)) & mask
     return ((c ^ b) - rotate(b, 24)) & mask
+
+
+def hash_numbers(numbers):
+    """The number of Cycles for each of many strands, 32 bits."""
+    return np.array([_hash_pair(int(number), 0) for number in numbers], np.float64)
 
 
 def _uppermost(blender_object):

@@ -84,7 +84,7 @@ class Materials:
         return self._entries[_HOLDOUT_KEY].id
 
     def world_id(self, world):
-        """A world's surface as a material."""
+        """A world's surface as a material, and the sky_texture.Sun that it shows or None."""
         key = ("world", world.name_full)
         label = f"World '{world.name}'"
         if uses_nodes(world):
@@ -92,7 +92,8 @@ class Materials:
         else:
             flat = _background(world.color)
         self._update(key, flat)
-        return self._entries[key].id
+        entry = self._entries[key]
+        return entry.id, entry.sun
 
     def attribute_names(self):
         """The UV maps and colour attributes that the materials of this sync read, two sets, and whether
@@ -118,7 +119,7 @@ class Materials:
         return _plain_surface(material)
 
     def _flatten(self, tree, label):
-        return flatten.flatten(tree, label, self._warnings, self._images.id_of, self._aovs)
+        return flatten.flatten(tree, label, self._warnings, self._images, self._aovs)
 
     def names(self):
         """The names in mattes."""
@@ -135,8 +136,9 @@ class Materials:
             self._send(entry, key, flat, values)
         entry.signature, entry.name = signature, name
         entry.uv_names, entry.color_names = flat.uv_names, flat.color_names
-        entry.needs_generated = flat.needs_generated
-        entry.images, entry.is_animated = self._images.take_asked()
+        entry.needs_generated, entry.sun = flat.needs_generated, flat.sun
+        entry.images, is_animated = self._images.take_asked()
+        entry.is_animated = is_animated or flat.follows_objects
 
     def _send(self, entry, key, flat, values):
         """Create or change it in the library; a refused one becomes the default material."""
@@ -163,8 +165,9 @@ class Entry:
         self.signature = None
         self.name = ""  # in mattes
         self.uv_names, self.color_names = set(), set()
-        self.needs_generated = False
-        self.images, self.is_animated = set(), False  # those it reads; whether time changes them
+        self.needs_generated, self.sun = False, None
+        self.images = set()  # those it reads
+        self.is_animated = False  # whether what it reads may be another in the next sync
 
 
 def _flags(material):

@@ -43,8 +43,8 @@ _VECTOR_MATH = ('ADD', 'SUBTRACT', 'MULTIPLY', 'DIVIDE', 'MULTIPLY_ADD', 'CROSS_
                 'MINIMUM', 'MAXIMUM', 'FLOOR', 'CEIL', 'FRACTION', 'SINE', 'COSINE', 'TANGENT', 'SNAP',
                 'MODULO', 'WRAP', 'FACEFORWARD', 'REFRACT')
 VECTOR_SUBTRACT, VECTOR_MULTIPLY_ADD, VECTOR_DOT, VECTOR_NORMALIZE = 1, 4, 8, 12
-VECTOR_MINIMUM, VECTOR_MAXIMUM = 14, 15
-_MATH_SUBTRACT, _MATH_MULTIPLY, _MATH_MULTIPLY_ADD = 1, 2, 4
+VECTOR_MINIMUM, VECTOR_MAXIMUM, _VECTOR_FLOOR = 14, 15, 16
+_MATH_ADD, _MATH_SUBTRACT, _MATH_MULTIPLY, _MATH_MULTIPLY_ADD, _MATH_COMPARE = 0, 1, 2, 4, 16
 
 _INTERPOLATIONS = {'Linear': 0, 'Closest': 1, 'Cubic': 2, 'Smart': 2}
 _EXTENSIONS = {'REPEAT': 0, 'EXTEND': 1, 'CLIP': 2, 'MIRROR': 3}
@@ -394,8 +394,30 @@ def _image(walker, node, sockets):
         walker.flat.uv_names.add("")
     mode = (_INTERPOLATIONS.get(node.interpolation, 0) | _EXTENSIONS.get(node.extension, 0) << 2
             | _PROJECTIONS.get(node.projection, 0) << 4)
+    if node.image is not None and node.image.source == 'TILED' and node.projection == 'FLAT':
+        return _tiles(walker, walker.tiles_of(node), vector, mode)
     index = walker.emit(IMAGE, (vector,), mode, image=walker.image_of(node))
     return _outputs(walker, index, (("Color", 'c'), ("Alpha", 'f')))
+
+
+def _tiles(walker, tiles, vector, mode):
+    """Each tile of a tiled image in its own unit square, magenta beyond all."""
+    if vector.node == DEFAULT:
+        vector = Value('v', walker.emit(UV_MAP, (), name=""), 0)
+    floor = _vector(walker, _VECTOR_FLOOR, vector)
+    place = _vector(walker, VECTOR_SUBTRACT, vector, floor)
+    parts = walker.emit(SEPARATE, (floor,))
+    color, alpha = _constant('c', 1.0, 0.0, 1.0), _constant('f', 1.0)
+    half = _constant('f', 0.5)
+    for column, row, image in tiles:
+        is_column, is_row = (_number(walker, _MATH_COMPARE, Value('f', parts, i), _constant('f', number), half)
+                             for i, number in enumerate((float(column), float(row))))
+        is_here = _number(walker, _MATH_MULTIPLY, is_column, is_row)
+        index = walker.emit(IMAGE, (place,), mode, image=image)
+        color = Value('c', walker.emit(MIX_COLOR, (is_here, color, Value('c', index, 0))), 0)
+        step = _number(walker, _MATH_SUBTRACT, Value('f', index, 1), alpha)
+        alpha = _number(walker, _MATH_MULTIPLY_ADD, step, is_here, alpha)
+    return {"Color": color, "Alpha": alpha}
 
 
 def _environment(walker, node, sockets):
@@ -415,16 +437,28 @@ def _uv_map(walker, node, _sockets):
 def _texture_coordinate(walker, node, _sockets):
     if node.from_instancer:
         walker.warn("Texture Coordinate: From Instancer is not supported, the object's own are used")
-    if node.object is not None:
-        walker.warn("Texture Coordinate: another object's coordinates are not supported, the "
-                    "object's own are used")
     linked = {s.identifier for s in node.outputs if s.is_linked}
     if "UV" in linked:
         walker.flat.uv_names.add("")
     walker.flat.needs_generated |= "Generated" in linked
     index = walker.emit(TEXTURE_COORDINATE, ())
-    return _outputs(walker, index, tuple((name, 'v') for name in (
+    outputs = _outputs(walker, index, tuple((name, 'v') for name in (
         "Generated", "Normal", "UV", "Object", "Camera", "Window", "Reflection")))
+    if node.object is not None and "Object" in linked:
+        outputs["Object"] = _place_in(walker, node.object)
+    return outputs
+
+
+def _place_in(walker, blender_object):
+    """The shading point in another object's coordinates."""
+    walker.flat.follows_objects = True
+    position = Value('v', walker.emit(GEOMETRY, ()), 0)
+    zero = _constant('v', 0.0), _constant('f', 0.0)
+    parts = []
+    for row in blender_object.matrix_world.inverted_safe()[:3]:
+        dot = walker.emit(VECTOR_MATH, (position, _constant('v', *row[:3])) + zero, VECTOR_DOT)
+        parts.append(_number(walker, _MATH_ADD, Value('f', dot, 1), _constant('f', row[3])))
+    return Value('v', walker.emit(COMBINE, parts), 0)
 
 
 def _color_attribute(walker, node, _sockets):

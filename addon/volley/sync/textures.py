@@ -6,6 +6,7 @@ None for a setting that is not supported. Sockets that 3.4 lacks (lacunarity, of
 values that its textures imply.
 """
 
+from .sky_texture import sky_texture
 from .values import CONSTANT, DEFAULT, Value
 
 # TRC_NODE_*
@@ -133,4 +134,5 @@ TEXTURES = {
     "ShaderNodeTexNoise": _noise, "ShaderNodeTexMusgrave": _musgrave, "ShaderNodeTexVoronoi": _voronoi,
     "ShaderNodeTexWave": _wave, "ShaderNodeTexGradient": _gradient,
     "ShaderNodeTexWhiteNoise": _white_noise, "ShaderNodeTexMagic": _magic, "ShaderNodeTexBrick": _brick,
+    "ShaderNodeTexSky": sky_texture,
 }

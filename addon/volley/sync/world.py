@@ -11,9 +11,9 @@ LEAST_AO_DISTANCE = 1e-6  # m; Blender's slider goes down to 0
 MIST_EXPONENTS = {'QUADRATIC': 2.0, 'LINEAR': 1.0, 'INVERSE_QUADRATIC': 0.5}
 
 
-def describe(world, material_id, settings, light_groups):
-    """The fields of trc_world_desc; settings: ``scene.volley``; light_groups: {name: number}. Without a
-    world all is black."""
+def describe(world, material_id, sun, settings, light_groups):
+    """The fields of trc_world_desc; sun: sky_texture.Sun or None; settings: ``scene.volley``; light_groups:
+    {name: number}. Without a world all is black."""
     fields = {"material": material_id, "visibility": native.VISIBLE_ALL, "use_sampling": 0,
               "map_resolution": 0, "ao_factor": 0.0, "ao_distance": DEFAULT_AO_DISTANCE}
     if world is None:
@@ -23,6 +23,8 @@ def describe(world, material_id, settings, light_groups):
     if settings.use_ambient_occlusion:
         fields["ao_factor"] = world.light_settings.ao_factor
         fields["ao_method"] = native.AO_METHODS[settings.ao_method]
+    if sun is not None:
+        fields["sun_direction"], fields["sun_angle"] = sun
     method = cycles(world, "sampling_method", 'AUTOMATIC')
     fields["visibility"] = world_visibility(world)
     fields["use_sampling"] = int(method != 'NONE')

@@ -64,6 +64,11 @@ typedef struct trc_world_desc {
     float ao_factor;         /* 0: off */
     uint32_t ao_method;      /* TRC_AO_* */
     uint32_t light_group;    /* 0..TRC_MAX_LIGHT_GROUPS */
+    /* A small, bright disc that the material shows, such as the sun of a sky: it is sampled by
+     * itself instead of through the map. Its direction, and its diameter in radians, 0..pi; 0:
+     * none. */
+    float sun_direction[3];
+    float sun_angle;
 } trc_world_desc;
 
 TRC_API trc_status trc_scene_set_world(trc_scene scene, const trc_world_desc *desc);

@@ -370,6 +370,9 @@ typedef struct trc_image_desc {
     const void *pixels;   /* RGBA, bottom row first, float or uint8; NULL with a path */
     uint64_t pixel_bytes; /* size of that buffer, checked */
     const char *path;     /* file read by OpenImageIO at once; NULL with pixels */
+    uint32_t max_side; /* a larger image is halved until no side is longer or one is a single pixel;
+                          0: no limit */
+    uint32_t reserved;
 } trc_image_desc;
 
 /* TRC_ERROR_IMAGE for a file that cannot be read: the caller may go on with image 0 (magenta). */

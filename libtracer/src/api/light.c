@@ -74,6 +74,12 @@ static trc_status check_world(const trc_world_desc *desc) {
     TRC_TRY(trc_check_count(desc->map_resolution, 0, MAX_MAP_RESOLUTION, "map_resolution"));
     TRC_TRY(trc_check_enum(desc->ao_method, TRC_AO_REPLACE + 1, "ao_method"));
     TRC_TRY(trc_check_count(desc->light_group, 0, TRC_MAX_LIGHT_GROUPS, "light_group"));
+    TRC_TRY(trc_check_float(desc->sun_angle, 0.0f, 3.1415927f, "sun_angle"));
+    if (desc->sun_angle > 0.0f) {
+        const float *d = desc->sun_direction;
+        const float square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+        TRC_TRY(trc_check_float(square, FLT_MIN, FLT_MAX, "square of sun_direction"));
+    }
     TRC_TRY(trc_check_float(desc->ao_factor, 0.0f, FLT_MAX, "ao_factor"));
     return trc_check_float(desc->ao_distance, desc->ao_factor > 0.0f ? FLT_MIN : 0.0f, FLT_MAX,
                            "ao_distance");

@@ -211,6 +211,72 @@ static void finish(struct trc_image *image, uint32_t alpha_mode, uint32_t channe
     }
 }
 
+/* ---- limits ---- */
+
+/* Means of the channels of count texels in a row of width texels, from a block of step by step. A
+ * macro, as it is the same for three types of number. */
+#define DEFINE_SHRINK(name, type, load, store)                                                \
+    static void name(const type *from, uint32_t row, uint32_t step, type *to, uint32_t width, \
+                     uint32_t height) {                                                       \
+        const float share = 1.0f / ((float)step * (float)step);                               \
+        for (uint32_t y = 0; y < height; y++)                                                 \
+            for (uint32_t x = 0; x < width; x++, to += 4)                                     \
+                for (uint32_t c = 0; c < 4; c++) {                                            \
+                    float sum = 0.0f;                                                         \
+                    for (uint64_t j = 0; j < step; j++)                                       \
+                        for (uint64_t i = 0; i < step; i++) {                                 \
+                            const uint64_t texel = (y * step + j) * row + x * step + i;       \
+                            sum += load(from[4 * texel + c]);                                 \
+                        }                                                                     \
+                    to[c] = store(sum * share);                                               \
+                }                                                                             \
+    }
+#define WHOLE_TO_FLOAT(v) ((float)(v))
+#define BYTE_OF(v) ((uint8_t)((v) + 0.5f))
+#define WORD_OF(v) ((uint16_t)((v) + 0.5f))
+#define AS_IT_IS(v) (v)
+DEFINE_SHRINK(shrink_u8, uint8_t, WHOLE_TO_FLOAT, BYTE_OF)
+DEFINE_SHRINK(shrink_u16, uint16_t, WHOLE_TO_FLOAT, WORD_OF)
+DEFINE_SHRINK(shrink_f16, uint16_t, half_to_float, float_to_half)
+DEFINE_SHRINK(shrink_f32, float, AS_IT_IS, AS_IT_IS)
+
+/* Halves an image, in the encoding it is stored in, as often as max_side asks for. What a block
+ * does not fill at the upper and right edge is left out. */
+static trc_status limit_size(struct trc_image *image, uint32_t max_side) {
+    struct trc_image_level *level = &image->levels[0];
+    const uint32_t longest = level->width > level->height ? level->width : level->height;
+    const uint32_t shortest = level->width < level->height ? level->width : level->height;
+    uint32_t step = 1;
+    while (longest / step > max_side && shortest / step > 1)
+        step *= 2;
+    if (!max_side || step == 1)
+        return TRC_OK;
+    const uint32_t width = level->width / step, height = level->height / step;
+    const uint64_t bytes = (uint64_t)width * height * texel_bytes[image->format];
+    void *texels = trc_alloc((uint64_t)width * height, texel_bytes[image->format]);
+    if (!texels)
+        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for an image of %" PRIu64 " bytes",
+                        bytes);
+    switch (image->format) {
+    case TRC_TEXEL_U8:
+        shrink_u8(level->texels, level->width, step, texels, width, height);
+        break;
+    case TRC_TEXEL_U16:
+        shrink_u16(level->texels, level->width, step, texels, width, height);
+        break;
+    case TRC_TEXEL_F16:
+        shrink_f16(level->texels, level->width, step, texels, width, height);
+        break;
+    case TRC_TEXEL_F32:
+        shrink_f32(level->texels, level->width, step, texels, width, height);
+        break;
+    }
+    trc_free(level->texels);
+    *level = (struct trc_image_level){width, height, texels};
+    image->bytes = bytes;
+    return TRC_OK;
+}
+
 /* ---- sources ---- */
 
 static trc_status load_pixels(const trc_image_desc *desc, struct trc_image **image_out) {
@@ -269,7 +335,13 @@ trc_status trc_image_load(const trc_image_desc *desc, struct trc_image **image_o
     if ((desc->path != NULL) == (desc->pixels != NULL)) {
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "an image needs either pixels or a path");
     }
-    if (desc->path)
-        return load_file(desc, image_out);
-    return load_pixels(desc, image_out);
+    struct trc_image *image = NULL;
+    TRC_TRY(desc->path ? load_file(desc, &image) : load_pixels(desc, &image));
+    const trc_status status = limit_size(image, desc->max_side);
+    if (status != TRC_OK) {
+        trc_image_release(image);
+        return status;
+    }
+    *image_out = image;
+    return TRC_OK;
 }

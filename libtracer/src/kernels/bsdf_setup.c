@@ -399,19 +399,31 @@ static struct trc_lobe *add_dielectric(struct setup *c, enum trc_lobe_kind kind,
     return lobe;
 }
 
+/* Chance of reflection where both lobes have the factor of the micro-normal: near its part of the
+ * light, or else the few samples of the brighter lobe have large weights, which clamping cuts off.
+ */
+static vfloat reflected_chance(vfloat cos_o, vfloat alpha, vfloat eta) {
+    return vf_clamp(trc_glass_reflected_share(cos_o, alpha, eta), 0.05f, 0.95f);
+}
+
 /* Multiple-scattering glass: both lobes with the factor of the micro-normal, scaled so that they
  * keep all energy together. f0: colour of the reflection at normal incidence, white for plain
  * glass. */
 static void add_multi_glass(struct setup *c, vvec3 weight, vvec3 reflected, vvec3 refracted,
                             vvec3 n, vfloat alpha, vfloat eta) {
-    const vfloat rough = vf_clamp(alpha, 1e-4f, 1.0f);
+    /* As rough as the lobes will be: a filtered one keeps its energy too. */
+    const vfloat rough = vf_max(vf_clamp(alpha, 1e-4f, 1.0f), c->filter_alpha);
     const vfloat kept = trc_glass_albedo(v3_dot(n, c->s->wo), rough, eta);
-    const vvec3 w = v3_scale(weight, vf_rcp(vf_max(kept, vf_set(0.1f))));
+    const vfloat f = reflected_chance(v3_dot(n, c->s->wo), rough, eta);
+    /* What does not get away is coloured again at every further bounce: a geometric series. */
+    const vvec3 again = v3_scale(v3_lerp(refracted, reflected, f), vf_one() - kept);
+    const vfloat least = vf_set(0.1f), one = vf_one();
+    const vvec3 gain =
+        v3(vf_rcp(vf_max(one - again.x, least)), vf_rcp(vf_max(one - again.y, least)),
+           vf_rcp(vf_max(one - again.z, least)));
+    const vvec3 w = v3_mul(weight, gain);
     struct trc_lobe *lobe = add_dielectric(c, TRC_LOBE_REFLECT, v3_mul(w, reflected), n, rough, eta,
                                            TRC_DISTRIBUTION_GGX);
-    /* Micro-normals may reflect or refract where the macro normal does not: neither chance goes to
-     * 0. */
-    const vfloat f = vf_clamp(trc_fresnel_dielectric(v3_dot(n, c->s->wo), eta), 0.1f, 0.9f);
     if (lobe) {
         lobe->fresnel = TRC_FRESNEL_DIELECTRIC;
         lobe->mix_weight = lobe->mix_weight * f;
@@ -434,9 +446,7 @@ static void add_correlated_glass(struct setup *c, vvec3 reflected, vvec3 refract
         reflected = v3_scale(reflected, vf_rcp(kept));
         refracted = v3_scale(refracted, vf_rcp(kept));
     }
-    /* Micro-normals may reflect or refract where the macro normal does not: neither chance goes to
-     * 0. */
-    const vfloat f = vf_clamp(trc_fresnel_dielectric(cos_o, eta), 0.1f, 0.9f);
+    const vfloat f = reflected_chance(cos_o, vf_max(alpha, c->filter_alpha), eta);
     struct trc_lobe *lobe = add_dielectric(c, TRC_LOBE_REFLECT, reflected, n, alpha, eta, mode);
     if (lobe) {
         lobe->fresnel = TRC_FRESNEL_BLEND;
@@ -466,8 +476,8 @@ static void add_glass(struct setup *c, const struct trc_leaf *leaf, vfloat weigh
         return;
     }
     if (leaf->mode == TRC_DISTRIBUTION_MULTI_GGX) {
-        const vvec3 white = v3_splat(vf_one());
-        add_multi_glass(c, tint, white, white, n, alpha, eta);
+        const vvec3 color = v3_saturate(colour(c, leaf, 0));
+        add_multi_glass(c, v3_splat(weight), color, color, n, alpha, eta);
         return;
     }
     const vfloat f = trc_fresnel_dielectric(v3_dot(n, c->s->wo), eta);

@@ -440,11 +440,41 @@ static inline vvec3 trc_map_sample(const struct trc_world_map *map, vfloat u1, v
     return v3(sine * c, sine * s, cosine);
 }
 
+/* Chance of sampling the sun of the world: none where all of it is below the surface. */
+TRC_INLINE vfloat trc_world_sun_chance(const struct trc_world_sun *sun, vvec3 n, vmask has_n) {
+    const vfloat cosine = v3_dot(n, v3_set(sun->direction));
+    const vmask below = vm_and(has_n, vf_lt(cosine, vf_set(-sun->sine)));
+    return vf_select(below, vf_zero(), vf_set(sun->share));
+}
+/* Of its places, taken evenly on a disk that touches the sphere at its middle. */
+TRC_INLINE vfloat trc_world_sun_density(const struct trc_world_sun *sun, vvec3 wi) {
+    const vvec3 middle = v3_set(sun->direction), off = v3_sub(wi, middle);
+    const vfloat c = v3_dot(wi, middle);
+    const vfloat inv_area = vf_set(1.0f / (TRC_PI * sun->tangent * sun->tangent));
+    return vf_where(vf_lt(v3_dot(off, off), vf_set(sun->square_chord)),
+                    inv_area * vf_rcp(c * c * c));
+}
+TRC_INLINE vvec3 trc_world_sun_sample(const struct trc_world_sun *sun, vfloat u1, vfloat u2) {
+    const vvec3 middle = v3_set(sun->direction);
+    vvec3 a, b;
+    v3_frame(middle, &a, &b);
+    vfloat x, y;
+    trc_warp_disk(u1, u2, &x, &y);
+    const vvec3 off = v3_add(v3_scale(a, x), v3_scale(b, y));
+    return v3_normalize(v3_mad(off, vf_set(sun->tangent), middle));
+}
+
 /* Without a map: by cosine above n, or over the sphere. */
 TRC_INLINE vfloat trc_world_density(const struct trc_light_table *t, vvec3 n, vmask has_n, vvec3 wi,
                                     vmask m) {
-    if (t->map)
-        return trc_map_density(t->map, wi, m);
+    if (t->map) {
+        const vfloat density = trc_map_density(t->map, wi, m);
+        if (!(t->map->sun.share > 0.0f))
+            return density;
+        const vfloat chance = trc_world_sun_chance(&t->map->sun, n, has_n);
+        const vfloat sun_density = trc_world_sun_density(&t->map->sun, wi);
+        return density + chance * (sun_density - density);
+    }
     const vfloat cosine = vf_max(v3_dot(n, wi), vf_zero()) * vf_set(TRC_INV_PI);
     return vf_select(has_n, cosine, vf_set(0.25f * TRC_INV_PI));
 }
@@ -453,6 +483,16 @@ TRC_INLINE struct trc_place trc_world_sample(const struct trc_light_table *t, vv
     struct trc_place s;
     s.distance = vf_set(TRC_FAR);
     s.radiance = v3_zero();
+    if (t->map && t->map->sun.share > 0.0f) {
+        const vfloat chance = trc_world_sun_chance(&t->map->sun, n, has_n);
+        const vmask is_sun = vf_lt(u1, chance);
+        const vfloat rest = vf_divide(u1 - chance, vf_one() - chance);
+        u1 = vf_min(vf_select(is_sun, vf_divide(u1, chance), rest), vf_set(0x1.fffffep-1f));
+        const vvec3 to_sun = trc_world_sun_sample(&t->map->sun, u1, u2);
+        s.wi = v3_select(is_sun, to_sun, trc_map_sample(t->map, u1, u2, m, &s.pdf));
+        s.pdf = trc_world_density(t, n, has_n, s.wi, m);
+        return s;
+    }
     if (t->map) {
         s.wi = trc_map_sample(t->map, u1, u2, m, &s.pdf);
         return s;

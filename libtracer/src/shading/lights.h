@@ -79,6 +79,15 @@ struct trc_light_bound {
     int32_t unused[2];
 };
 
+/* The disc of trc_world_desc, which is sampled beside the cells of the map. */
+struct trc_world_sun {
+    float direction[3]; /* unit */
+    float sine;         /* of its radius */
+    float tangent;      /* of its radius */
+    float square_chord; /* from its middle to its rim on the unit sphere */
+    float share;        /* of the light samples where it is above the surface; 0: no sun */
+};
+
 /* Importance map of the world: cells of equal angle, v = 0 at +Z. */
 struct trc_world_map {
     atomic_uint refs;
@@ -87,6 +96,7 @@ struct trc_world_map {
     float *marginal;  /* height + 1 */
     float *density;   /* width * height: value over the mean, per unit square */
     float average[3]; /* mean radiance over the sphere */
+    struct trc_world_sun sun;
 };
 
 /* Up to so many lights with a place the chances of all are computed at each point. */
@@ -127,9 +137,9 @@ struct trc_light_table {
 
 /* Builds the table and sets instance.first_light. Reads snapshot->meshes, instances, materials,
  * images and world, which must be complete; calls trc_kernels_current()->world_evaluate for a world
- * that is not constant. world: use_sampling and map_resolution are read, NULL stands for 1 and 0.
- * Ownership of *out goes to the caller. TRC_ERROR_OUT_OF_MEMORY leaves nothing behind. Cost: linear
- * in lights, n log n with a tree; a map takes some 50 ms. */
+ * that is not constant. world: use_sampling, map_resolution and the sun are read, NULL stands for
+ * 1, 0 and none. Ownership of *out goes to the caller. TRC_ERROR_OUT_OF_MEMORY leaves nothing
+ * behind. Cost: linear in lights, n log n with a tree; a map takes some 50 ms. */
 trc_status trc_light_table_create(const struct trc_snapshot *snapshot, const trc_light_desc *lights,
                                   uint32_t light_count, const trc_world_desc *world,
                                   struct trc_light_table **out);
@@ -148,7 +158,7 @@ uint64_t trc_light_table_triangle_count(const struct trc_light_table *table);
 trc_status trc_light_tree_build(struct trc_light_table *table, struct trc_light_bound *leaves,
                                 uint32_t count, uint32_t cut_max);
 trc_status trc_world_map_create(const struct trc_snapshot *snapshot, uint32_t width,
-                                struct trc_world_map **out);
+                                const trc_world_desc *world, struct trc_world_map **out);
 void trc_world_map_release(struct trc_world_map *map);
 
 #endif

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Images of several files and limited ones against Cycles'."""
+
+import numpy as np
+
+SIZE = 48
+
+
+def _tile(path, width, seed):
+    """Write a smooth picture of random colours."""
+    import bpy
+    image = bpy.data.images.new("Tile", width, width)
+    rows = np.linspace(0.0, 1.0, width)
+    random = np.random.default_rng(seed).uniform(0.1, 0.9, (2, 3))
+    pixels = np.ones((width, width, 4), np.float32)
+    pixels[..., :3] = random[0] + 0.4 * (rows[:, None, None] - rows[None, :, None]) * random[1]
+    image.pixels.foreach_set(pixels.clip(0.0, 1.0).reshape(-1))
+    image.filepath_raw, image.file_format = path, 'PNG'
+    image.save()
+    bpy.data.images.remove(image)
+
+
+def _stage(image):
+    """A wall that shows an image over UVs from 0.02 to 1.98; one sharp sample a pixel."""
+    import bpy
+    import scenes
+    scene = scenes.empty(size=(SIZE, SIZE), samples=1)
+    scenes.camera(type='ORTHO', ortho_scale=2.0)
+    scene.volley.pixel_filter_type, scene.volley.filter_width = 'BOX', 0.01
+    scene.cycles.pixel_filter_type, scene.cycles.filter_width = 'BOX', 0.01
+    wall = scenes.wall(material=scenes.emitter((1.0, 1.0, 1.0)))
+    for uv in wall.data.uv_layers[0].data:
+        uv.uv = (1.96 * uv.uv[0] + 0.02, 1.96 * uv.uv[1] + 0.02)
+    tree = wall.data.materials[0].node_tree
+    node = tree.nodes.new("ShaderNodeTexImage")
+    node.image = image()
+    emission = next(n for n in tree.nodes if n.type == 'EMISSION')
+    tree.links.new(node.outputs["Color"], emission.inputs["Color"])
+    return wall
+
+
+def _both():
+    import scenes
+    pictures = []
+    for engine in ('VOLLEY', 'CYCLES'):
+        scenes.set_engine(engine, 1)
+        pictures.append(scenes.render()[..., :3])
+    return pictures
+
+
+def inside_tiles():
+    """Three of four tiles, of different sizes, by UDIM numbers."""
+    import os
+    import tempfile
+    import bpy
+    folder = tempfile.mkdtemp(prefix="volley_")
+
+    def image():
+        for number, width in ((1001, 64), (1002, 32), (1012, 128)):
+            _tile(os.path.join(folder, f"t.{number}.png"), width, number)
+        made = bpy.data.images.load(os.path.join(folder, "t.1001.png"))
+        made.source = 'TILED'
+        for number in (1002, 1012):
+            if made.tiles.get(number) is None:
+                made.tiles.new(number)
+        made.filepath = os.path.join(folder, "t.<UDIM>.png")
+        return made
+    _stage(image)
+    return _both()
+
+
+def _close(ours, theirs, tolerance=1e-3):
+    assert theirs.std() > 0.03
+    assert (np.abs(ours - theirs) > tolerance).any(axis=-1).mean() <= 0.005
+
+
+def test_tiles(blender):
+    ours, theirs = blender.run(inside_tiles)
+    _close(ours, theirs)
+    assert "tiles" not in blender.output
+
+
+def inside_limit():
+    """[Volley's, Cycles'] of noise as it is and where Simplify makes a quarter of its side."""
+    import os
+    import tempfile
+    import bpy
+    path = os.path.join(tempfile.mkdtemp(prefix="volley_"), "large.png")
+
+    def image():
+        made = bpy.data.images.new("Noise", 512, 512)
+        pixels = np.ones((512, 512, 4), np.float32)
+        pixels[..., :3] = np.random.default_rng(1).uniform(0.0, 1.0, (512, 512, 3))
+        made.pixels.foreach_set(pixels.reshape(-1))
+        made.filepath_raw, made.file_format = path, 'PNG'
+        made.save()
+        return bpy.data.images.load(path)
+    _stage(image)
+    scene = bpy.context.scene
+    pairs = [_both()]
+    scene.render.use_simplify, scene.cycles.texture_limit_render = True, '128'
+    return pairs + [_both()]
+
+
+def test_limit(blender):
+    (full, _), (ours, theirs) = blender.run(inside_limit)
+    assert full.std() > 2.0 * theirs.std()  # noise that is averaged
+    _close(ours, theirs, 0.02)
