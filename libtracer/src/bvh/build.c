@@ -248,12 +248,15 @@ static uint32_t arena_node(struct arena *a) {
     return a->node_count++;
 }
 
-/* Splits r in two unless it is better, and possible, to leave it a leaf. */
+static bool is_cancelled(const struct builder *b) { return b->cancel && *b->cancel; }
+
+/* Splits r in two unless it is better, and possible, to leave it a leaf. A build that is cancelled
+ * splits no more: what it has made is thrown away. */
 static bool range_divide(struct builder *b, const struct range *r, uint32_t level,
                          struct range *left, struct range *right) {
     const uint32_t count = r->end - r->begin;
     const bool must = count > b->leaf_size;
-    if (count < 2 || (!must && (float)count <= NODE_COST))
+    if (count < 2 || (!must && (float)count <= NODE_COST) || is_cancelled(b))
         return false;
     if (level >= MEDIAN_LEVEL) {
         if (must)
@@ -310,7 +313,7 @@ static int range_open(struct builder *b, const struct range *r, uint32_t level,
 static uint32_t build_range(struct builder *b, struct arena *a, const struct range *r,
                             uint32_t level, bool tasks) {
     struct range child[TRC_NODE_WIDTH];
-    if (a->failed || b->failed || (b->cancel && *b->cancel))
+    if (a->failed || b->failed || is_cancelled(b))
         return TRC_REF_EMPTY;
     const int count = range_open(b, r, level, child);
     if (count == 1)
@@ -354,7 +357,7 @@ static trc_status join(struct builder *b, struct arena *top, uint32_t root,
         node_count += b->tasks[i].arena.node_count;
         failed = failed || b->tasks[i].arena.failed;
     }
-    if (b->cancel && *b->cancel)
+    if (is_cancelled(b))
         return trc_fail(TRC_ERROR_CANCELLED, "the build was cancelled");
     if (failed)
         return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for a tree");

@@ -57,6 +57,7 @@ struct ref_block {
 };
 struct ref_job {
     const struct trc_part *parts;
+    const atomic_uint *cancel; /* may be NULL */
     struct trc_ref *refs;
     struct ref_block *blocks;
 };
@@ -65,6 +66,8 @@ static void block_task(void *context, uint32_t index, uint32_t worker) {
     (void)worker;
     const struct ref_job *job = context;
     struct ref_block *block = &job->blocks[index];
+    if (job->cancel && *job->cancel)
+        return;
     for (uint32_t t = block->begin; t < block->end; t++) {
         struct trc_ref *ref = &job->refs[block->at + block->count];
         if (!triangle_ref(&job->parts[block->part], t, ref))
@@ -75,9 +78,10 @@ static void block_task(void *context, uint32_t index, uint32_t worker) {
     }
 }
 
-/* The valid triangles of all parts, in order; UINT32_MAX without memory. */
-static uint32_t refs_collect(const struct trc_part *parts, uint32_t part_count,
-                             struct trc_pool *pool, struct trc_ref *refs) {
+/* The valid triangles of all parts, in order; UINT32_MAX without memory. Cancelled, it is some of
+ * them: the build that follows looks again. */
+static uint32_t refs_collect(const struct create_job *c, const struct trc_part *parts,
+                             uint32_t part_count, struct trc_ref *refs) {
     uint32_t block_count = 0, at = 0;
     for (uint32_t i = 0; i < part_count; i++)
         block_count += (parts[i].mesh->triangle_count + BLOCK_TRIANGLES - 1) / BLOCK_TRIANGLES;
@@ -92,8 +96,8 @@ static uint32_t refs_collect(const struct trc_part *parts, uint32_t part_count,
             *block = (struct ref_block){.part = i, .begin = t, .end = t + size, .at = at};
             at += size;
         }
-    struct ref_job job = {parts, refs, blocks};
-    trc_pool_run(pool, block_count, block_task, &job);
+    struct ref_job job = {parts, c->options->cancel, refs, blocks};
+    trc_pool_run(c->pool, block_count, block_task, &job);
     uint32_t count = 0;
     for (uint32_t i = 0; i < block_count; i++) {
         if (count != blocks[i].at)
@@ -117,7 +121,7 @@ static trc_status tree_build(struct create_job *job, const struct trc_part *part
     if (!refs)
         return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory to build a tree of %llu triangles",
                         (unsigned long long)total);
-    const uint32_t count = refs_collect(parts, part_count, job->pool, refs);
+    const uint32_t count = refs_collect(job, parts, part_count, refs);
     if (count == UINT32_MAX) {
         trc_free(refs);
         return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory to build a tree of %llu triangles",
@@ -127,7 +131,8 @@ static trc_status tree_build(struct create_job *job, const struct trc_part *part
     trc_status status =
         trc_topology_build(refs, count, TRC_NODE_WIDTH, job->pool, job->options->cancel, &topology);
     if (status == TRC_OK) {
-        status = trc_tree_fill(&topology, refs, count, parts, key_count, job->pool, tree);
+        status = trc_tree_fill(&topology, refs, count, parts, key_count, job->pool,
+                               job->options->cancel, tree);
         trc_topology_destroy(&topology);
     }
     trc_free(refs);
@@ -212,7 +217,8 @@ static trc_status blas_obtain(struct create_job *job, uint32_t mesh_index,
     const float growth = job->options->keeps_grown ? REBUILD_GROWTH_AT_ONCE : REBUILD_GROWTH;
     /* A skipped triangle may have become valid and the other way round: then the shape is stale. */
     if (from && from->tree.skipped_count == 0) {
-        status = trc_tree_refit(&from->tree, &part, mesh->key_count, job->pool, &blas->tree);
+        status = trc_tree_refit(&from->tree, &part, mesh->key_count, job->pool,
+                                job->options->cancel, &blas->tree);
         blas->tree.triangle_count = from->tree.triangle_count;
         blas->built_cost = from->built_cost;
         done = status == TRC_OK && blas->tree.extent <= COORDINATE_LIMIT &&

@@ -95,6 +95,7 @@ struct fill_job {
     const struct trc_ref *refs; /* by slot; NULL: the slots are there, all of parts[0] */
     const struct trc_part *parts;
     struct trc_tree *tree;
+    const atomic_uint *cancel;        /* may be NULL */
     uint8_t *pending;                 /* per node: its box waits for nodes of other tasks */
     double *area_sums;                /* per task: areas of the boxes that it set */
     atomic_bool transparent, spoiled; /* spoiled: a coordinate is not finite */
@@ -263,6 +264,8 @@ static void nodes_bound(struct trc_tree *tree, uint32_t node) {
         }
 }
 
+static bool is_cancelled(const struct fill_job *job) { return job->cancel && *job->cancel; }
+
 /* A run of nodes, backwards: children come after their parents, mostly in the same run. */
 static void fill_task(void *context, uint32_t index, uint32_t worker) {
     (void)worker;
@@ -271,6 +274,8 @@ static void fill_task(void *context, uint32_t index, uint32_t worker) {
     const uint32_t begin = index * NODES_PER_TASK, left = tree->node_count - begin;
     const uint32_t end = begin + (left < NODES_PER_TASK ? left : NODES_PER_TASK);
     double sum = 0.0;
+    if (is_cancelled(job))
+        return;
     for (uint32_t n = end; n-- > begin;) {
         const uint32_t *children = trc_node_children(tree, n);
         leaves_fill(job, n);
@@ -300,10 +305,12 @@ static void root_leaf_fill(struct fill_job *job) {
 }
 
 /* Leaves and most nodes by all threads, then the nodes above them; all keys in one pass. */
-static void nodes_fill(struct fill_job *job, uint32_t task_count, struct trc_pool *pool) {
+static trc_status nodes_fill(struct fill_job *job, uint32_t task_count, struct trc_pool *pool) {
     struct trc_tree *tree = job->tree;
     double sum = 0.0;
     trc_pool_run(pool, task_count, fill_task, job);
+    if (is_cancelled(job))
+        return trc_fail(TRC_ERROR_CANCELLED, "the build was cancelled");
     for (uint32_t i = 0; i < task_count; i++)
         sum += job->area_sums[i];
     for (uint32_t n = tree->node_count; n-- > 0;)
@@ -317,6 +324,9 @@ static void nodes_fill(struct fill_job *job, uint32_t task_count, struct trc_poo
         bounds_grow(tree, lower, upper);
     }
     tree_finish(tree, sum);
+    if (job->spoiled)
+        tree->extent = INFINITY;
+    return TRC_OK;
 }
 
 static trc_status tree_fill(struct fill_job *job, struct trc_pool *pool) {
@@ -324,24 +334,23 @@ static trc_status tree_fill(struct fill_job *job, struct trc_pool *pool) {
     const uint32_t task_count = (tree->node_count + NODES_PER_TASK - 1) / NODES_PER_TASK;
     job->pending = trc_alloc(tree->node_count ? tree->node_count : 1, sizeof *job->pending);
     job->area_sums = trc_alloc(task_count ? task_count : 1, sizeof *job->area_sums);
-    const bool enough = job->pending && job->area_sums;
+    trc_status status = TRC_OK;
     empty_bounds(tree->lower, tree->upper);
-    if (enough && is_leaf(tree->root))
+    if (!job->pending || !job->area_sums)
+        status = trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory to fill a tree of %u nodes",
+                          tree->node_count);
+    if (status == TRC_OK && is_leaf(tree->root))
         root_leaf_fill(job);
-    if (enough)
-        nodes_fill(job, task_count, pool);
-    if (job->spoiled)
-        tree->extent = INFINITY;
+    if (status == TRC_OK)
+        status = nodes_fill(job, task_count, pool);
     trc_free(job->pending);
     trc_free(job->area_sums);
-    return enough ? TRC_OK
-                  : trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory to fill a tree of %u nodes",
-                             tree->node_count);
+    return status;
 }
 
 trc_status trc_tree_fill(const struct trc_topology *topology, const struct trc_ref *refs,
                          uint32_t count, const struct trc_part *parts, uint32_t key_count,
-                         struct trc_pool *pool, struct trc_tree *tree) {
+                         struct trc_pool *pool, const atomic_uint *cancel, struct trc_tree *tree) {
     const trc_status status = tree_alloc(tree, topology->node_count, count, key_count, false);
     if (status != TRC_OK)
         return status;
@@ -349,7 +358,7 @@ trc_status trc_tree_fill(const struct trc_topology *topology, const struct trc_r
         memcpy(tree->nodes + n * tree->node_stride, topology->children[n],
                sizeof topology->children[n]);
     tree->root = topology->root;
-    struct fill_job job = {.refs = refs, .parts = parts, .tree = tree};
+    struct fill_job job = {.refs = refs, .parts = parts, .tree = tree, .cancel = cancel};
     const trc_status filled = tree_fill(&job, pool);
     tree->has_transparent = job.transparent;
     if (filled != TRC_OK)
@@ -358,7 +367,8 @@ trc_status trc_tree_fill(const struct trc_topology *topology, const struct trc_r
 }
 
 trc_status trc_tree_refit(const struct trc_tree *from, const struct trc_part *part,
-                          uint32_t key_count, struct trc_pool *pool, struct trc_tree *tree) {
+                          uint32_t key_count, struct trc_pool *pool, const atomic_uint *cancel,
+                          struct trc_tree *tree) {
     const trc_status status =
         tree_alloc(tree, from->node_count, from->slot_count, key_count, false);
     if (status != TRC_OK)
@@ -370,7 +380,7 @@ trc_status trc_tree_refit(const struct trc_tree *from, const struct trc_part *pa
         memcpy(tree->slots, from->slots, from->slot_count * sizeof *tree->slots);
     tree->root = from->root;
     tree->has_transparent = from->has_transparent;
-    struct fill_job job = {.parts = part, .tree = tree};
+    struct fill_job job = {.parts = part, .tree = tree, .cancel = cancel};
     const trc_status filled = tree_fill(&job, pool);
     if (filled != TRC_OK)
         trc_tree_destroy(tree);

@@ -155,12 +155,13 @@ void trc_part_triangle(const struct trc_part *part, uint32_t triangle, uint32_t 
 /* A tree of that shape over count refs, with its vertices, bounds and SAH cost. */
 trc_status trc_tree_fill(const struct trc_topology *topology, const struct trc_ref *refs,
                          uint32_t count, const struct trc_part *parts, uint32_t key_count,
-                         struct trc_pool *pool, struct trc_tree *tree);
+                         struct trc_pool *pool, const atomic_uint *cancel, struct trc_tree *tree);
 
 /* The same tree with other positions of the same topology: a copy of *from, refilled and bounded.
  * Its extent is infinite if a position is not finite. */
 trc_status trc_tree_refit(const struct trc_tree *from, const struct trc_part *part,
-                          uint32_t key_count, struct trc_pool *pool, struct trc_tree *tree);
+                          uint32_t key_count, struct trc_pool *pool, const atomic_uint *cancel,
+                          struct trc_tree *tree);
 
 /* A TLAS: slot i stands for items[refs[i].primitive], whose world box is its ref's. */
 trc_status trc_tree_fill_top(const struct trc_topology *topology, const struct trc_ref *refs,
