@@ -66,9 +66,10 @@ def configuration_style(name, names):
 
 
 def seed_interval(point, measure):
-    """How far the interval of the mean reaches below and above it."""
+    """How far the interval of the mean reaches below and above it. The means of equal seeds may differ
+    in their last bit, and lie outside of their own interval."""
     made = estimates.mean_with_interval(point["seeds"][measure])
-    return made["mean"] - made["interval"][0], made["interval"][1] - made["mean"]
+    return max(made["mean"] - made["interval"][0], 0.0), max(made["interval"][1] - made["mean"], 0.0)
 
 
 def draw_curves(name, scene, path):

@@ -59,12 +59,11 @@ QUICK = Scope(
 MEDIUM = Scope(
     name="medium", minutes=35,
     scenes=EFFECTS + JOINED, sampler_scenes=("gallery",), samples=(1, 4, 16, 64, 256),
-    time_samples=(1, 4, 16, 64), seeds=5, reference_samples=1024, reference_seeds=3,
-    light_samples=(1, 4), repeats=3, times_scale=3,
+    time_samples=(1, 4, 16, 64), seeds=3, reference_samples=512, reference_seeds=3,
+    light_samples=(1, 4), repeats=3, times_scale=2,
     classic_scenes=("classic", "classic_soft"), classic_width=320,
     kernel_scenes=("conference", "pool_hall", "character"),
-    kernel_arguments=("--order", "auto", "--repeats", "5", "--tiles", "8",
-                      "--samples", "8"),
+    kernel_arguments=("--order", "auto", "--repeats", "3", "--tiles", "8"),
     stages=("conference", "pool_hall", "character"), frame_edge=1024, eyes=2, frame_repeats=3,
     distribution_samples=8, counted_edge=128,
     largest_triangles=4_000_000, largest_lights=10_000, largest_instances=100_000)
