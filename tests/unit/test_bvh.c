@@ -5,6 +5,7 @@
 #include "bvh/tree.h"
 #include "core/core.h"
 #include "figures.h"
+#include "threads/pool.h"
 
 static const float unit_lower[3] = {-1, -1, -1}, unit_upper[3] = {1, 1, 1}, origin[3] = {0, 0, 0};
 
@@ -362,6 +363,36 @@ static void trees_do_not_depend_on_threads(void **state) {
     query_world_free(&world);
 }
 
+/* ---- cancelling ---- */
+
+/* Filling and refitting a tree, told beforehand to stop, say so and keep no memory. */
+static void fills_and_refits_are_cancelled(void **state) {
+    (void)state;
+    struct query_world world;
+    struct query_scene scene;
+    struct rng rng = rng_seed(7);
+    struct trc_pool *pool = NULL;
+    const atomic_uint cancel = 1;
+    query_world_init(&world);
+    mesh_add_soup(query_world_object(&world), &rng, 20000, unit_lower, unit_upper, 0.02f);
+    assert_ok(query_scene_create(&world, false, 1, &scene));
+    assert_int_equal(trc_pool_create(1, &pool), TRC_OK); /* threads free memory as they start */
+    const struct trc_snapshot *snapshot = query_scene_snapshot(scene.scene);
+    const struct trc_tree *from = &snapshot->bvh->blas[0]->tree;
+    const struct trc_part part = {.mesh = snapshot->meshes[0]};
+    const uint64_t held = trc_memory_bytes();
+    struct trc_tree tree;
+    assert_int_equal(trc_tree_refit(from, &part, 1, pool, &cancel, &tree), TRC_ERROR_CANCELLED);
+    struct trc_ref ref = {.upper = {1.0f, 1.0f, 1.0f}};
+    const struct trc_topology leaf = {.root = trc_leaf_ref(0, 1)};
+    assert_int_equal(trc_tree_fill(&leaf, &ref, 1, &part, 1, pool, &cancel, &tree),
+                     TRC_ERROR_CANCELLED);
+    assert_int_equal(trc_memory_bytes(), held);
+    trc_pool_destroy(pool);
+    query_scene_destroy(&scene);
+    query_world_free(&world);
+}
+
 /* ---- the check itself ---- */
 
 /* What is done to a tree; each is undone by restoring its bytes. */
@@ -461,6 +492,7 @@ int main(void) {
         cmocka_unit_test(one_million_identical_centroids),
         cmocka_unit_test(geometric_series_stays_within_the_stack),
         cmocka_unit_test(trees_do_not_depend_on_threads),
+        cmocka_unit_test(fills_and_refits_are_cancelled),
         cmocka_unit_test(check_finds_damage),
     };
     return cmocka_run_group_tests_name("bvh", tests, NULL, NULL);

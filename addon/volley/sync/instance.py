@@ -103,7 +103,7 @@ def _name_random(name):
 
 
 def _hash_pair(x, y):
-    """Bob Jenkins, "lookup3" (2006), final mixing of two 32-bit words."""
+    """Bob Jenkins, "lookup3" (2006), final mixing of two 32-bit words, or arrays of them in 64 bits."""
     mask = 0xFFFFFFFF
 
     def rotate(value, bits):
@@ -122,7 +122,7 @@ def _hash_pair(x, y):
 
 def hash_numbers(numbers):
     """The number of Cycles for each of many strands, 32 bits."""
-    return np.array([_hash_pair(int(number), 0) for number in numbers], np.float64)
+    return _hash_pair(np.asarray(numbers, np.int64), 0).astype(np.float64)
 
 
 def _uppermost(blender_object):

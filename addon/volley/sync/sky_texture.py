@@ -30,6 +30,11 @@ _HOSEK_SCALE = 0.16
 Sun = namedtuple("Sun", "direction angle")
 
 
+def _number(value):
+    """A Value as it is, a number as a constant one."""
+    return value if isinstance(value, Value) else Value('f', CONSTANT, 0, (float(value), 0.0, 0.0))
+
+
 class _Formula:
     """Appends nodes that compute with Values and numbers."""
 
@@ -38,8 +43,7 @@ class _Formula:
 
     def number(self, operation, *values):
         """A MATH node's result."""
-        values = [value if isinstance(value, Value) else Value('f', CONSTANT, 0, (float(value), 0.0, 0.0))
-                  for value in values + (0.0,) * (3 - len(values))]
+        values = [_number(value) for value in values + (0.0,) * (3 - len(values))]
         return Value('f', self._walker.emit(_MATH, values, operation), 0)
 
     def vector(self, operation, *values):
@@ -62,9 +66,7 @@ class _Formula:
 
     def combine(self, x, y, z):
         """A vector of three numbers."""
-        values = [value if isinstance(value, Value) else Value('f', CONSTANT, 0, (float(value), 0.0, 0.0))
-                  for value in (x, y, z)]
-        return Value('v', self._walker.emit(_COMBINE, values), 0)
+        return Value('v', self._walker.emit(_COMBINE, [_number(value) for value in (x, y, z)]), 0)
 
     def spread(self, number):
         """A number in all components."""
@@ -126,9 +128,13 @@ def _preetham(formula, node, direction):
     return color
 
 
+def _altitude(node):
+    """Metres above the sea: as in Cycles, the viewer is kept inside the atmosphere."""
+    return min(max(node.altitude, 1.0), 59999.0)
+
+
 def _nishita(walker, formula, node, direction):
-    # Cycles keeps the viewer inside the atmosphere.
-    altitude = min(max(node.altitude, 1.0), 59999.0)
+    altitude = _altitude(node)
     amounts = node.air_density, node.dust_density, node.ozone_density
     image = walker.table_image("sky", sky.nishita_table, node.sun_elevation, altitude, amounts)
     x, y, z = formula.parts(direction)
@@ -155,8 +161,7 @@ def _sun_disc(walker, formula, node, direction, elevation, color):
     height, turn, size = node.sun_elevation, node.sun_rotation, node.sun_size
     sun = (math.cos(height) * math.sin(turn), math.cos(height) * math.cos(turn), math.sin(height))
     walker.flat.sun = Sun(sun, size)
-    altitude = min(max(node.altitude, 1.0), 59999.0)
-    low, high = sky.sun_colors(height, size, altitude, (node.air_density, node.dust_density))
+    low, high = sky.sun_colors(height, size, _altitude(node), (node.air_density, node.dust_density))
     bottom, top = max(height - 0.5 * size, 0.0), height + 0.5 * size
     part = formula.number(_DIVIDE, formula.number(_SUBTRACT, elevation, bottom), top - bottom)
     shown = formula.vector(_V_MULTIPLY_ADD, formula.spread(part), high - low, low)

@@ -7,8 +7,8 @@
  * number of threads, so the tree does not either.
  *
  * Without gain: triangles cut before the build at spatial median planes (Karras and Aila, "Fast
- * Parallel Construction of High-Quality Bounding Volume Hierarchies", 2013) make the generated
- * scenes' cost 10 to 29 % higher for 5 to 90 % more refs. */
+ * Parallel Construction of High-Quality Bounding Volume Hierarchies", 2013) make the cost of
+ * the generated conference room 10 to 29 % higher for 5 to 90 % more refs. */
 #include <float.h>
 #include <string.h>
 

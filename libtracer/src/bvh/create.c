@@ -8,11 +8,10 @@
 #include "bvh/part.h"
 #include "bvh/tree.h"
 #include "core/core.h"
+#include "scene/mesh.h"
 #include "shading/material.h"
 #include "threads/pool.h"
 
-/* Coordinates above it (or not finite) skip their triangle: squares of differences stay finite. */
-#define COORDINATE_LIMIT 1.8e18f
 /* A refitted tree whose SAH cost has grown by this factor is rebuilt. */
 #define REBUILD_GROWTH 1.4f
 /* The same where the caller builds such trees apart: beyond it a build costs less than the rays. */
@@ -33,7 +32,7 @@ struct create_job {
 static bool triangle_ref(const struct trc_part *part, uint32_t triangle, struct trc_ref *ref) {
     const uint32_t *index = part->mesh->indices + 3 * (size_t)triangle;
     const uint32_t key_count = part->mesh->key_count;
-    const f4 share = f4_set(1.0f / (float)key_count), limit = f4_set(COORDINATE_LIMIT);
+    const f4 share = f4_set(1.0f / (float)key_count), limit = f4_set(TRC_MAX_COORDINATE);
     f4 lower = f4_set(0.0f), upper = f4_set(0.0f);
     for (uint32_t key = 0; key < key_count; key++) {
         f4 p[3];
@@ -221,7 +220,7 @@ static trc_status blas_obtain(struct create_job *job, uint32_t mesh_index,
                                 job->options->cancel, &blas->tree);
         blas->tree.triangle_count = from->tree.triangle_count;
         blas->built_cost = from->built_cost;
-        done = status == TRC_OK && blas->tree.extent <= COORDINATE_LIMIT &&
+        done = status == TRC_OK && blas->tree.extent <= TRC_MAX_COORDINATE &&
                blas->tree.sah_cost <= growth * from->built_cost;
         if (done)
             job->stats->refitted_count++;

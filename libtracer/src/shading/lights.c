@@ -43,9 +43,7 @@ static float normalize(float a[3], float x, float y, float z) {
     a[2] = z;
     return 0.0f;
 }
-static float brightness(const float c[3]) {
-    return fabsf(0.2126729f * c[0] + 0.7151522f * c[1] + 0.0721750f * c[2]);
-}
+static float brightness(const float c[3]) { return fabsf(trc_luminance(c)); }
 
 /* ---- lamps ---- */
 

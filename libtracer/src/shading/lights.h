@@ -79,6 +79,11 @@ struct trc_light_bound {
     int32_t unused[2];
 };
 
+/* Of a scene-linear colour. */
+static inline float trc_luminance(const float c[3]) {
+    return 0.2126729f * c[0] + 0.7151522f * c[1] + 0.0721750f * c[2];
+}
+
 /* The disc of trc_world_desc, which is sampled beside the cells of the map. */
 struct trc_world_sun {
     float direction[3]; /* unit */

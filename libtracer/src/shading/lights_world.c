@@ -27,10 +27,6 @@ static void cell_direction(float u, float v, float d[3]) {
     d[2] = cosf(theta);
 }
 
-static float luminance(const float c[3]) {
-    return 0.2126729f * c[0] + 0.7151522f * c[1] + 0.0721750f * c[2];
-}
-
 static bool is_on_sun(const struct trc_world_sun *sun, const float d[3]) {
     float square = 0.0f;
     for (int i = 0; i < 3; i++)
@@ -84,7 +80,7 @@ static void weigh_sun(const struct trc_snapshot *s, struct trc_world_map *map) {
     float mean[3] = {0};
     for (int k = 0; k < 3 * SUN_RINGS * SUN_TURNS; k++)
         mean[k % 3] += fmaxf(radiance[k], 0.0f) * (part / (SUN_RINGS * SUN_TURNS));
-    const float light = luminance(mean), sky = luminance(map->average);
+    const float light = trc_luminance(mean), sky = trc_luminance(map->average);
     if (!(light > 0.0f && light < 1e30f))
         return;
     sun->share = fminf(light / (light + sky), MOST_SUN_SHARE);
@@ -113,7 +109,7 @@ static void measure_row(const struct trc_snapshot *s, struct trc_world_map *map,
         float mean = 0.0f;
         for (uint32_t k = 0; k < per_cell; k++) {
             const float *c = radiance + 3 * ((size_t)x * per_cell + k);
-            const float light = luminance(c);
+            const float light = trc_luminance(c);
             mean += light > 0.0f && light < 1e30f ? light / (float)per_cell : 0.0f;
             for (int i = 0; i < 3; i++)
                 total[i] += c[i] > 0.0f && c[i] < 1e30f ? (double)(c[i] * weight) : 0.0;
