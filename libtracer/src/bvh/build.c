@@ -12,8 +12,8 @@
 #include <float.h>
 #include <string.h>
 
-#include "bvh/box.h"
 #include "bvh/tree.h"
+#include "core/box.h"
 #include "core/core.h"
 #include "threads/pool.h"
 

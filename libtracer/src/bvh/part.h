@@ -2,8 +2,8 @@
 #ifndef TRACER_BVH_PART_H
 #define TRACER_BVH_PART_H
 
-#include "bvh/box.h"
 #include "bvh/tree.h"
+#include "core/box.h"
 
 /* Corners of all triangles at a key: meshes at rest have the same ones at every key. */
 static inline const float *trc_part_positions(const struct trc_part *part, uint32_t key) {

@@ -154,6 +154,19 @@ static const struct trc_light_table *same_world(const struct trc_scene_state *sc
     return former->snapshot.lights;
 }
 
+/* Whether some surface scatters what light samples bring: ideal lobes and what shines do not. */
+static bool is_scattering(const struct trc_snapshot *s) {
+    const uint32_t scatters =
+        TRC_MATERIAL_HAS_DIFFUSE | TRC_MATERIAL_HAS_TRANSLUCENT | TRC_MATERIAL_HAS_GLOSSY;
+    for (uint32_t i = 0; i < s->instance_count; i++) {
+        const struct trc_instance *instance = &s->instances[i];
+        for (uint32_t m = 0; m < instance->material_count; m++)
+            if (s->materials[instance->materials[m]]->has & scatters)
+                return true;
+    }
+    return false;
+}
+
 static trc_status build_lights(const struct trc_scene_state *scene,
                                const struct trc_snapshot_block *former,
                                struct trc_snapshot_block *block) {
@@ -166,9 +179,15 @@ static trc_status build_lights(const struct trc_scene_state *scene,
         descs[count++] = *(const trc_light_desc *)store->slots[i].object;
     }
     struct trc_light_table *lights;
-    const trc_status status = trc_light_table_create_like(
-        same_world(scene, former, block), &block->snapshot, descs, count,
-        scene->world.struct_size ? &scene->world : NULL, &lights);
+    const struct trc_light_options options = {
+        .lights = descs,
+        .light_count = count,
+        .is_sampled = is_scattering(&block->snapshot),
+        .world = scene->world.struct_size ? &scene->world : NULL,
+        .previous = same_world(scene, former, block),
+        .pool = scene->pool,
+    };
+    const trc_status status = trc_light_table_create(&block->snapshot, &options, &lights);
     trc_free(descs);
     if (status != TRC_OK)
         return status;

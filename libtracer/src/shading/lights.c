@@ -332,8 +332,10 @@ static bool world_shines(const struct trc_snapshot *s) {
 /* Width of the map when the caller leaves it open. */
 #define MAP_WIDTH 1024u
 
-static trc_status add_world(struct trc_light_table *table, const struct trc_light_table *previous,
-                            const struct trc_snapshot *s, const trc_world_desc *world) {
+static trc_status add_world(struct trc_light_table *table, const struct trc_snapshot *s,
+                            const struct trc_light_options *options) {
+    const struct trc_light_table *previous = options->previous;
+    const trc_world_desc *world = options->world;
     if (table->world_light == UINT32_MAX)
         return TRC_OK;
     table->kinds |= 1u << TRC_KIND_WORLD;
@@ -348,7 +350,8 @@ static trc_status add_world(struct trc_light_table *table, const struct trc_ligh
             const uint32_t wanted =
                 world && world->map_resolution ? world->map_resolution : MAP_WIDTH;
             const uint32_t width = wanted < 16 ? 16 : wanted > 8192 ? 8192 : wanted;
-            const trc_status status = trc_world_map_create(s, width, world, &table->map);
+            const trc_status status =
+                trc_world_map_create(s, width, world, options->pool, &table->map);
             if (status != TRC_OK)
                 return status;
         }
@@ -382,15 +385,15 @@ static void list_seen(struct trc_light_table *table) {
     table->group_seen[TRC_MAX_LIGHT_GROUPS + 1] = count;
 }
 
-static void add_lamps(struct trc_light_table *table, const trc_light_desc *descs, uint32_t count,
+static void add_lamps(struct trc_light_table *table, const struct trc_light_options *options,
                       struct trc_light_bound *bounds, uint32_t *bound_count) {
-    for (uint32_t i = 0; i < count; i++) {
+    for (uint32_t i = 0; i < options->light_count; i++) {
         struct trc_lamp *lamp = &table->lamps[table->lamp_count];
-        if (!make_lamp(lamp, &descs[i]))
+        if (!make_lamp(lamp, &options->lights[i]))
             continue;
         const uint32_t number = table->lamp_count++;
         table->kinds |= 1u << lamp->kind;
-        if (!(lamp->visibility & RECEIVERS))
+        if (!options->is_sampled || !(lamp->visibility & RECEIVERS))
             continue;
         table->hides |= (lamp->visibility & RECEIVERS) != RECEIVERS;
         if (lamp->kind == TRC_KIND_SUN) {
@@ -405,7 +408,7 @@ static void add_lamps(struct trc_light_table *table, const trc_light_desc *descs
 
 /* Chooses between list and tree, and enters lights with their candidates. Takes over bounds. */
 static trc_status set_bounds(struct trc_light_table *table, struct trc_light_bound *bounds,
-                             uint32_t count) {
+                             uint32_t count, struct trc_pool *pool) {
     const size_t lights = (size_t)table->first_triangle + table->triangle_count;
     trc_status status = TRC_OK;
     table->single = count + table->distant_count == 1;
@@ -425,8 +428,9 @@ static trc_status set_bounds(struct trc_light_table *table, struct trc_light_bou
         }
     } else {
         const uint32_t distant = table->distant_count;
-        status = trc_light_tree_build(
-            table, bounds, count, distant < TRC_LIGHT_CUT_MAX ? TRC_LIGHT_CUT_MAX - distant : 1);
+        status = trc_light_tree_build(table, bounds, count,
+                                      distant < TRC_LIGHT_CUT_MAX ? TRC_LIGHT_CUT_MAX - distant : 1,
+                                      pool);
         trc_free(bounds);
     }
     for (uint32_t i = 0; i < table->distant_count; i++)
@@ -454,26 +458,26 @@ static trc_status allocate(struct trc_light_table *table, uint32_t lamps, uint64
                     lamps, (unsigned long long)triangles);
 }
 
-static trc_status fill(struct trc_light_table *table, const struct trc_light_table *previous,
-                       const struct trc_snapshot *s, const trc_light_desc *lights,
-                       uint32_t light_count, const trc_world_desc *world) {
+static trc_status fill(struct trc_light_table *table, const struct trc_snapshot *s,
+                       const struct trc_light_options *options) {
+    const bool is_sampled = options->is_sampled;
     struct trc_light_bound *bounds = NULL;
-    trc_status status =
-        allocate(table, light_count, count_triangles(s), s->instance_count, &bounds);
+    trc_status status = allocate(table, options->light_count, is_sampled ? count_triangles(s) : 0,
+                                 s->instance_count, &bounds);
     if (status != TRC_OK)
         return status;
     uint32_t bound_count = 0;
-    add_lamps(table, lights, light_count, bounds, &bound_count);
+    add_lamps(table, options, bounds, &bound_count);
     list_seen(table);
     table->world_visibility = world_sample_visibility(&s->world);
-    table->world_light = world_shines(s) ? table->lamp_count : UINT32_MAX;
+    table->world_light = is_sampled && world_shines(s) ? table->lamp_count : UINT32_MAX;
     table->first_triangle = table->lamp_count + (table->world_light != UINT32_MAX);
     for (uint32_t i = 0; i < s->instance_count; i++) {
         s->instances[i].first_light = UINT32_MAX;
-        if (instance_may_shine(s, &s->instances[i]))
+        if (is_sampled && instance_may_shine(s, &s->instances[i]))
             add_triangles(table, s, i, bounds, &bound_count);
     }
-    status = add_world(table, previous, s, world);
+    status = add_world(table, s, options);
     if (status != TRC_OK) {
         trc_free(bounds);
         return status;
@@ -484,29 +488,22 @@ static trc_status fill(struct trc_light_table *table, const struct trc_light_tab
     table->world_apart = table->world_light != UINT32_MAX && others;
     if (table->world_apart)
         table->distant_count--;
-    return set_bounds(table, bounds, bound_count);
+    return set_bounds(table, bounds, bound_count, options->pool);
 }
 
-trc_status trc_light_table_create_like(const struct trc_light_table *previous,
-                                       const struct trc_snapshot *snapshot,
-                                       const trc_light_desc *lights, uint32_t light_count,
-                                       const trc_world_desc *world, struct trc_light_table **out) {
+trc_status trc_light_table_create(const struct trc_snapshot *snapshot,
+                                  const struct trc_light_options *options,
+                                  struct trc_light_table **out) {
     struct trc_light_table *table = trc_alloc_zeroed(1, sizeof *table);
     if (!table)
         return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for the light table");
-    const trc_status status = fill(table, previous, snapshot, lights, light_count, world);
+    const trc_status status = fill(table, snapshot, options);
     if (status != TRC_OK) {
         trc_light_table_destroy(table);
         return status;
     }
     *out = table;
     return TRC_OK;
-}
-
-trc_status trc_light_table_create(const struct trc_snapshot *snapshot, const trc_light_desc *lights,
-                                  uint32_t light_count, const trc_world_desc *world,
-                                  struct trc_light_table **out) {
-    return trc_light_table_create_like(NULL, snapshot, lights, light_count, world, out);
 }
 
 void trc_light_table_destroy(struct trc_light_table *table) {

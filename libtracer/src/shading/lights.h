@@ -140,20 +140,27 @@ struct trc_light_table {
     uint32_t world_visibility;    /* of its light samples */
 };
 
+struct trc_light_options {
+    const trc_light_desc *lights;
+    uint32_t light_count;
+    bool is_sampled; /* false: nothing in the scene scatters what light samples bring, so lamps are
+                        seen alone and there is nothing to choose from */
+    const trc_world_desc *world; /* use_sampling, map_resolution and the sun are read; NULL stands
+                                    for 1, 0 and none */
+    const struct trc_light_table
+        *previous; /* of an earlier snapshot whose world, materials and
+                      images are the same: its map is shared; may be NULL */
+    struct trc_pool *pool;
+};
+
 /* Builds the table and sets instance.first_light. Reads snapshot->meshes, instances, materials,
  * images and world, which must be complete; calls trc_kernels_current()->world_evaluate for a world
- * that is not constant. world: use_sampling, map_resolution and the sun are read, NULL stands for
- * 1, 0 and none. Ownership of *out goes to the caller. TRC_ERROR_OUT_OF_MEMORY leaves nothing
- * behind. Cost: linear in lights, n log n with a tree; a map takes some 50 ms. */
-trc_status trc_light_table_create(const struct trc_snapshot *snapshot, const trc_light_desc *lights,
-                                  uint32_t light_count, const trc_world_desc *world,
+ * that is not constant. Ownership of *out goes to the caller. TRC_ERROR_OUT_OF_MEMORY leaves
+ * nothing behind. Cost: linear in lights, n log n with a tree, over all threads; a map evaluates
+ * the world 4 times per cell. */
+trc_status trc_light_table_create(const struct trc_snapshot *snapshot,
+                                  const struct trc_light_options *options,
                                   struct trc_light_table **out);
-/* The same, sharing the world's map with previous (may be NULL): the table of an earlier snapshot
- * whose world, materials and images are the same. */
-trc_status trc_light_table_create_like(const struct trc_light_table *previous,
-                                       const struct trc_snapshot *snapshot,
-                                       const trc_light_desc *lights, uint32_t light_count,
-                                       const trc_world_desc *world, struct trc_light_table **out);
 /* NULL is fine. */
 void trc_light_table_destroy(struct trc_light_table *table);
 /* Emissive triangles that are sampled as lights. */
@@ -161,9 +168,10 @@ uint64_t trc_light_table_triangle_count(const struct trc_light_table *table);
 
 /* Parts of the above, for shading/lights*.c. */
 trc_status trc_light_tree_build(struct trc_light_table *table, struct trc_light_bound *leaves,
-                                uint32_t count, uint32_t cut_max);
+                                uint32_t count, uint32_t cut_max, struct trc_pool *pool);
 trc_status trc_world_map_create(const struct trc_snapshot *snapshot, uint32_t width,
-                                const trc_world_desc *world, struct trc_world_map **out);
+                                const trc_world_desc *world, struct trc_pool *pool,
+                                struct trc_world_map **out);
 void trc_world_map_release(struct trc_world_map *map);
 
 #endif

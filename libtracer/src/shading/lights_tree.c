@@ -4,8 +4,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/box.h"
 #include "core/core.h"
 #include "shading/lights.h"
+#include "threads/pool.h"
 
 #define PI 3.14159265358979f
 #define BIN_COUNT 12
@@ -14,78 +16,81 @@
 /* Larger sets are split without regard to orientation, which costs most of the time and says little
  * there. */
 #define ORIENTED_COUNT_MAX 4096u
+/* Rounding must not lose a direction: cosines of united cones are lowered by so much. */
+#define CONE_SLACK 1e-4f
+/* Sets of more lights than SERIAL_COUNT_MAX are split until there are TASK_MAX for the threads. */
+#define SERIAL_COUNT_MAX 2048u
+#define TASK_MAX 32u
 
-/* What a set of lights is bounded by. */
+/* What a set of lights is bounded by. A cone of all directions has cos_o -1. */
 struct cluster {
-    float lower[3], upper[3];
-    float axis[3], cos_o, cos_e, intensity;
+    struct box box;
+    f4 axis;
+    float cos_o, sin_o, cos_e, intensity;
     int32_t two_sided;
     uint32_t count;
 };
 
-static struct cluster empty_cluster(void) {
-    struct cluster c;
-    memset(&c, 0, sizeof c);
-    for (int i = 0; i < 3; i++) {
-        c.lower[i] = INFINITY;
-        c.upper[i] = -INFINITY;
-    }
-    return c;
+static float dot(f4 a, f4 b) {
+    const f4 c = a * b;
+    return c[0] + c[1] + c[2];
+}
+/* fminf and fmaxf are calls. */
+static float least(float a, float b) { return a < b ? a : b; }
+static float most(float a, float b) { return a > b ? a : b; }
+static float sine(float cosine) { return sqrtf(most(1.0f - cosine * cosine, 0.0f)); }
+
+static struct cluster empty_cluster(void) { return (struct cluster){.box = box_empty()}; }
+
+static void shine_everywhere(struct cluster *c) {
+    c->cos_o = -1.0f;
+    c->sin_o = 0.0f;
+    c->two_sided = 0;
 }
 
-static float clamp_cos(float x) { return x < -1.0f ? -1.0f : x > 1.0f ? 1.0f : x; }
-
-/* Smallest cone that holds two cones (Conty Estevez and Kulla, supplement). */
+/* Smallest cone that holds two cones (Conty Estevez and Kulla, supplement). Angles are added by
+ * their sines and cosines; a cone that would reach beyond the opposite of the wide cone's axis
+ * becomes all directions. */
 static void unite_cones(struct cluster *a, const struct cluster *b) {
-    if (a->cos_o <= -1.0f || b->cos_o <= -1.0f) {
-        a->cos_o = -1.0f;
-        a->two_sided = 0;
+    if (a->two_sided != b->two_sided || a->cos_o <= -1.0f || b->cos_o <= -1.0f) {
+        shine_everywhere(a);
         return;
     }
-    float other[3];
-    memcpy(other, b->axis, sizeof other);
-    float d = a->axis[0] * other[0] + a->axis[1] * other[1] + a->axis[2] * other[2];
-    if (a->two_sided != b->two_sided) {
-        a->cos_o = -1.0f;
-        a->two_sided = 0;
-    }
+    f4 other = b->axis;
+    float d = dot(a->axis, other);
     if (a->two_sided && d < 0.0f) {
         d = -d;
-        for (int i = 0; i < 3; i++)
-            other[i] = -other[i];
+        other = -other;
     }
-    const float wide = fmaxf(acosf(a->cos_o), acosf(b->cos_o));
-    const float narrow = fminf(acosf(a->cos_o), acosf(b->cos_o));
+    d = least(most(d, -1.0f), 1.0f);
+    const float s = sine(d);
     const bool a_is_wide = a->cos_o <= b->cos_o;
-    const float between = acosf(clamp_cos(d));
-    if (fminf(between + narrow, PI) <= wide) {
-        if (!a_is_wide)
-            memcpy(a->axis, other, sizeof other);
-        a->cos_o = fminf(a->cos_o, b->cos_o);
+    const struct cluster *wide = a_is_wide ? a : b, *narrow = a_is_wide ? b : a;
+    const f4 from = a_is_wide ? a->axis : other, to = a_is_wide ? other : a->axis;
+    const float cos_w = wide->cos_o, sin_w = wide->sin_o;
+    /* From the axis of the wide cone to the far rim of the narrow one. */
+    const float cos_far = d * narrow->cos_o - s * narrow->sin_o;
+    const float sin_far = s * narrow->cos_o + d * narrow->sin_o;
+    if (sin_far < 0.0f || (s < 1e-6f && d < 0.0f)) {
+        shine_everywhere(a);
         return;
     }
-    const float united = 0.5f * (wide + narrow + between);
-    if (united >= PI || between < 1e-6f) {
-        a->cos_o = united >= PI ? -1.0f : cosf(united);
+    a->axis = from;
+    a->cos_o = cos_w;
+    a->sin_o = sin_w;
+    if (cos_far >= cos_w || s < 1e-6f)
         return;
-    }
-    /* Turns the axis of the wide cone towards the other. */
-    const float *from = a_is_wide ? a->axis : other, *to = a_is_wide ? other : a->axis;
-    const float turn = united - wide;
-    const float k1 = sinf(between - turn) / sinf(between), k2 = sinf(turn) / sinf(between);
-    float axis[3], size = 0.0f;
-    for (int i = 0; i < 3; i++) {
-        axis[i] = from[i] * k1 + to[i] * k2;
-        size += axis[i] * axis[i];
-    }
-    if (!(size > 1e-12f)) {
-        a->cos_o = -1.0f;
-        return;
-    }
-    for (int i = 0; i < 3; i++)
-        a->axis[i] = axis[i] / sqrtf(size);
-    /* Rounding must not lose a direction. */
-    a->cos_o = fmaxf(cosf(united) - 1e-4f, -1.0f);
+    /* Half of the angle between both rims. */
+    const float cos_rims = cos_w * cos_far - sin_w * sin_far;
+    const float sin_rims = sin_w * cos_far + cos_w * sin_far;
+    const float cos_u = copysignf(sqrtf(most(0.5f + 0.5f * cos_rims, 0.0f)), sin_rims);
+    const float sin_u = sqrtf(most(0.5f - 0.5f * cos_rims, 0.0f));
+    /* The axis turns by what the half angle has grown. */
+    const float cos_t = cos_u * cos_w + sin_u * sin_w, sin_t = sin_u * cos_w - cos_u * sin_w;
+    const f4 axis = from * f4_set(cos_t - sin_t * d / s) + to * f4_set(sin_t / s);
+    a->axis = axis / f4_set(sqrtf(dot(axis, axis)));
+    a->cos_o = most(cos_u - CONE_SLACK, -1.0f);
+    a->sin_o = sine(a->cos_o);
 }
 
 static void unite(struct cluster *a, const struct cluster *b) {
@@ -95,68 +100,68 @@ static void unite(struct cluster *a, const struct cluster *b) {
         *a = *b;
         return;
     }
-    for (int i = 0; i < 3; i++) {
-        a->lower[i] = fminf(a->lower[i], b->lower[i]);
-        a->upper[i] = fmaxf(a->upper[i], b->upper[i]);
-    }
+    box_grow(&a->box, b->box);
     unite_cones(a, b);
-    a->cos_e = fminf(a->cos_e, b->cos_e);
+    a->cos_e = least(a->cos_e, b->cos_e);
     a->intensity += b->intensity;
     a->count += b->count;
 }
 
 static struct cluster leaf_cluster(const struct trc_light_bound *b, bool is_oriented) {
-    struct cluster c = empty_cluster();
-    for (int i = 0; i < 3; i++) {
-        c.lower[i] = b->center[i] - b->radius;
-        c.upper[i] = b->center[i] + b->radius;
-    }
-    memcpy(c.axis, b->axis, sizeof c.axis);
-    c.cos_o = is_oriented ? b->cos_o : -1.0f;
-    c.cos_e = b->cos_e;
-    c.intensity = b->intensity;
-    c.two_sided = is_oriented ? b->two_sided : 0;
-    c.count = 1;
+    const f4 center = f4_load3(b->center), radius = f4_set(b->radius);
+    struct cluster c = {.box = {center - radius, center + radius},
+                        .axis = f4_load3(b->axis),
+                        .cos_o = b->cos_o,
+                        .sin_o = b->sin_o,
+                        .cos_e = b->cos_e,
+                        .intensity = b->intensity,
+                        .two_sided = b->two_sided,
+                        .count = 1};
+    if (!is_oriented)
+        shine_everywhere(&c);
     return c;
+}
+
+/* acos to 7e-5 (Abramowitz and Stegun 1964, 4.4.45), close enough to compare costs. */
+static float angle_of(float cosine) {
+    const float x = least(fabsf(cosine), 1.0f);
+    const float angle =
+        sqrtf(1.0f - x) * (1.5707288f + x * (-0.2121144f + x * (0.0742610f - x * 0.0187293f)));
+    return cosine < 0.0f ? PI - angle : angle;
 }
 
 /* Measure of the directions a cluster shines in, times its area and intensity. */
 static float cluster_cost(const struct cluster *c) {
-    if (c->count == 0)
-        return 0.0f;
-    const float o = acosf(clamp_cos(c->cos_o)), e = acosf(clamp_cos(c->cos_e));
-    const float w = fminf(o + e, PI);
-    const float so = sinf(o);
-    const float omega = 2.0f * PI * (1.0f - c->cos_o) +
-                        0.5f * PI * (2.0f * w * so - cosf(o - 2.0f * w) - 2.0f * o * so + c->cos_o);
-    float d[3];
-    for (int i = 0; i < 3; i++)
-        d[i] = c->upper[i] - c->lower[i];
-    const float area = d[0] * d[1] + d[1] * d[2] + d[2] * d[0];
-    return c->intensity * omega * area;
+    const float cos_o = c->cos_o, sin_o = c->sin_o, cos_e = c->cos_e;
+    float beyond; /* what shines beyond the cone */
+    if (cos_o <= -cos_e) {
+        beyond = 2.0f * (PI - angle_of(cos_o)) * sin_o;
+    } else {
+        const float cos_2e = 2.0f * cos_e * cos_e - 1.0f, sin_2e = 2.0f * cos_e * sine(cos_e);
+        beyond = 2.0f * angle_of(cos_e) * sin_o - (cos_o * cos_2e - sin_o * sin_2e) + cos_o;
+    }
+    const float omega = 2.0f * PI * (1.0f - cos_o) + 0.5f * PI * beyond;
+    return c->intensity * omega * box_area(c->box);
 }
 
-struct builder {
-    struct trc_light_table *table;
-    struct trc_light_bound *leaves;
-    uint32_t node_count;
-};
-
 static void set_node(struct trc_light_bound *node, const struct cluster *c) {
-    float half[3];
-    for (int i = 0; i < 3; i++) {
-        node->center[i] = 0.5f * (c->lower[i] + c->upper[i]);
-        half[i] = c->upper[i] - node->center[i];
-    }
-    node->radius = sqrtf(half[0] * half[0] + half[1] * half[1] + half[2] * half[2]);
-    memcpy(node->axis, c->axis, sizeof node->axis);
+    const f4 center = f4_set(0.5f) * (c->box.lower + c->box.upper), half = c->box.upper - center;
+    f4_store3(node->center, center);
+    node->radius = sqrtf(dot(half, half));
+    f4_store3(node->axis, c->axis);
     node->cos_o = c->cos_o;
-    node->sin_o = sqrtf(fmaxf(1.0f - c->cos_o * c->cos_o, 0.0f));
+    node->sin_o = c->sin_o;
     node->cos_e = c->cos_e;
     node->intensity = c->intensity;
     node->two_sided = c->two_sided;
     node->light = -1;
 }
+
+/* Where a set is cut: leaves in bins below the border go to the first child. */
+struct cut {
+    int axis, border;
+    float low, scale;
+};
 
 /* Bin of a leaf along an axis. */
 static int bin_of(const struct trc_light_bound *b, int axis, float low, float scale) {
@@ -164,56 +169,57 @@ static int bin_of(const struct trc_light_bound *b, int axis, float low, float sc
     return bin < 0 ? 0 : bin >= BIN_COUNT ? BIN_COUNT - 1 : bin;
 }
 
-static void center_range(const struct trc_light_bound *leaves, uint32_t count, float low[3],
-                         float high[3]) {
-    for (int i = 0; i < 3; i++) {
-        low[i] = INFINITY;
-        high[i] = -INFINITY;
-        for (uint32_t k = 0; k < count; k++) {
-            low[i] = fminf(low[i], leaves[k].center[i]);
-            high[i] = fmaxf(high[i], leaves[k].center[i]);
+static struct box center_range(const struct trc_light_bound *leaves, uint32_t count) {
+    struct box range = box_empty();
+    for (uint32_t k = 0; k < count; k++)
+        box_add(&range, f4_load3(leaves[k].center));
+    return range;
+}
+
+/* Cheapest border between the bins of an axis; costs are multiplied by factor. */
+static void sweep_bins(const struct cluster bins[BIN_COUNT], float factor, float *best,
+                       struct cut *cut, struct cut here) {
+    float right_cost[BIN_COUNT];
+    struct cluster right = empty_cluster(), left = empty_cluster();
+    for (int i = BIN_COUNT - 1; i > 0; i--) {
+        unite(&right, &bins[i]);
+        right_cost[i] = right.count && bins[i - 1].count ? cluster_cost(&right) : INFINITY;
+    }
+    for (int i = 1; i < BIN_COUNT; i++) {
+        unite(&left, &bins[i - 1]);
+        if (!(right_cost[i] < INFINITY))
+            continue; /* nothing beyond, or the same sets as before */
+        const float cost = (cluster_cost(&left) + right_cost[i]) * factor;
+        if (cost < *best) {
+            *best = cost;
+            *cut = here;
+            cut->border = i;
         }
     }
 }
 
 /* Best bin border by the heuristic; false when all centres coincide. */
-static bool best_split(const struct trc_light_bound *leaves, uint32_t count, int *axis_out,
-                       int *border_out, float *low_out, float *scale_out) {
-    float low[3], high[3];
-    center_range(leaves, count, low, high);
-    const float longest = fmaxf(high[0] - low[0], fmaxf(high[1] - low[1], high[2] - low[2]));
+static bool best_cut(const struct trc_light_bound *leaves, uint32_t count, struct cut *cut) {
+    const struct box range = center_range(leaves, count);
+    const f4 extent = box_size(range);
+    const float longest = most(extent[0], most(extent[1], extent[2]));
+    f4 scale;
+    struct cluster bins[3][BIN_COUNT];
+    for (int axis = 0; axis < 3; axis++) {
+        scale[axis] = extent[axis] > 0.0f ? BIN_COUNT / extent[axis] : 0.0f;
+        for (int i = 0; i < BIN_COUNT; i++)
+            bins[axis][i] = empty_cluster();
+    }
+    for (uint32_t k = 0; k < count; k++) {
+        const struct cluster c = leaf_cluster(&leaves[k], count <= ORIENTED_COUNT_MAX);
+        for (int axis = 0; axis < 3; axis++)
+            unite(&bins[axis][bin_of(&leaves[k], axis, range.lower[axis], scale[axis])], &c);
+    }
     float best = INFINITY;
     for (int axis = 0; axis < 3; axis++) {
-        const float extent = high[axis] - low[axis];
-        if (!(extent > 0.0f))
-            continue;
-        const float scale = BIN_COUNT / extent;
-        struct cluster bins[BIN_COUNT], right[BIN_COUNT];
-        for (int i = 0; i < BIN_COUNT; i++)
-            bins[i] = empty_cluster();
-        for (uint32_t k = 0; k < count; k++) {
-            const struct cluster c = leaf_cluster(&leaves[k], count <= ORIENTED_COUNT_MAX);
-            unite(&bins[bin_of(&leaves[k], axis, low[axis], scale)], &c);
-        }
-        right[BIN_COUNT - 1] = bins[BIN_COUNT - 1];
-        for (int i = BIN_COUNT - 2; i > 0; i--) {
-            right[i] = bins[i];
-            unite(&right[i], &right[i + 1]);
-        }
-        struct cluster left = empty_cluster();
-        for (int i = 1; i < BIN_COUNT; i++) {
-            unite(&left, &bins[i - 1]);
-            if (left.count == 0 || right[i].count == 0)
-                continue;
-            const float cost = (cluster_cost(&left) + cluster_cost(&right[i])) * (longest / extent);
-            if (cost < best) {
-                best = cost;
-                *axis_out = axis;
-                *border_out = i;
-                *low_out = low[axis];
-                *scale_out = scale;
-            }
-        }
+        if (extent[axis] > 0.0f)
+            sweep_bins(bins[axis], longest / extent[axis], &best, cut,
+                       (struct cut){axis, 0, range.lower[axis], scale[axis]});
     }
     return best < INFINITY;
 }
@@ -229,11 +235,10 @@ static int compare_y(const void *a, const void *b) { return compare_axis(a, b, 1
 static int compare_z(const void *a, const void *b) { return compare_axis(a, b, 2); }
 
 static uint32_t split_middle(struct trc_light_bound *leaves, uint32_t count) {
-    float low[3], high[3];
-    center_range(leaves, count, low, high);
+    const f4 extent = box_size(center_range(leaves, count));
     int axis = 0;
     for (int i = 1; i < 3; i++)
-        if (high[i] - low[i] > high[axis] - low[axis])
+        if (extent[i] > extent[axis])
             axis = i;
     qsort(leaves, count, sizeof *leaves, axis == 0 ? compare_x : axis == 1 ? compare_y : compare_z);
     return count / 2;
@@ -241,14 +246,15 @@ static uint32_t split_middle(struct trc_light_bound *leaves, uint32_t count) {
 
 /* Leaves up to the returned count go to the first child. */
 static uint32_t split(struct trc_light_bound *leaves, uint32_t count, uint32_t depth) {
-    int axis, border;
-    float low, scale;
+    struct cut cut;
+    if (count == 2)
+        return 1;
     const uint32_t levels = 32u - (uint32_t)__builtin_clz(count - 1u);
-    if (depth + levels >= DEPTH_MAX || !best_split(leaves, count, &axis, &border, &low, &scale))
+    if (depth + levels >= DEPTH_MAX || !best_cut(leaves, count, &cut))
         return split_middle(leaves, count);
     uint32_t first = 0, last = count;
     while (first < last) {
-        if (bin_of(&leaves[first], axis, low, scale) < border) {
+        if (bin_of(&leaves[first], cut.axis, cut.low, cut.scale) < cut.border) {
             first++;
         } else {
             const struct trc_light_bound other = leaves[--last];
@@ -259,20 +265,74 @@ static uint32_t split(struct trc_light_bound *leaves, uint32_t count, uint32_t d
     return first > 0 && first < count ? first : split_middle(leaves, count);
 }
 
+/* A subtree: what it covers, and what it was found to be bounded by. A set of n lights has 2 n - 1
+ * nodes, so the numbers of a subtree's nodes are known before it is built. */
+struct subtree {
+    uint32_t number, first, count, depth;
+    struct cluster cluster;
+};
+
+struct builder {
+    struct trc_light_table *table;
+    struct trc_light_bound *leaves;
+    struct subtree tasks[TASK_MAX];
+    uint32_t task_count;
+};
+
+static struct subtree divide(const struct builder *b, struct subtree *t) {
+    const uint32_t left = split(b->leaves + t->first, t->count, t->depth);
+    const struct subtree second = {t->number + 2 * left, t->first + left, t->count - left,
+                                   t->depth + 1, empty_cluster()};
+    b->table->bounds[t->number].child = (int32_t)second.number;
+    *t = (struct subtree){t->number + 1, t->first, left, t->depth + 1, empty_cluster()};
+    return second;
+}
+
 /* Recursion is at most 32 deep. */
-static struct cluster build_node(struct builder *b, uint32_t first, uint32_t count,
-                                 uint32_t depth) {
-    const uint32_t number = b->node_count++;
-    struct trc_light_bound *node = &b->table->bounds[number];
-    if (count == 1) {
-        *node = b->leaves[first];
+static struct cluster build_subtree(const struct builder *b, struct subtree t) {
+    struct trc_light_bound *node = &b->table->bounds[t.number];
+    if (t.count == 1) {
+        *node = b->leaves[t.first];
         node->child = -1;
         return leaf_cluster(node, true);
     }
-    const uint32_t left = split(b->leaves + first, count, depth);
-    struct cluster c = build_node(b, first, left, depth + 1);
-    node->child = (int32_t)b->node_count;
-    const struct cluster right = build_node(b, first + left, count - left, depth + 1);
+    const struct subtree second = divide(b, &t);
+    struct cluster c = build_subtree(b, t);
+    const struct cluster right = build_subtree(b, second);
+    unite(&c, &right);
+    set_node(node, &c);
+    return c;
+}
+
+static void build_task(void *context, uint32_t index, uint32_t worker) {
+    struct builder *b = context;
+    (void)worker;
+    b->tasks[index].cluster = build_subtree(b, b->tasks[index]);
+}
+
+/* Splits the largest set, again and again. */
+static void make_tasks(struct builder *b, uint32_t count) {
+    b->tasks[0] = (struct subtree){0, 0, count, 0, empty_cluster()};
+    b->task_count = 1;
+    while (b->task_count < TASK_MAX) {
+        uint32_t largest = 0;
+        for (uint32_t i = 1; i < b->task_count; i++)
+            if (b->tasks[i].count > b->tasks[largest].count)
+                largest = i;
+        if (b->tasks[largest].count <= SERIAL_COUNT_MAX)
+            return;
+        b->tasks[b->task_count++] = divide(b, &b->tasks[largest]);
+    }
+}
+
+/* Bounds the nodes above the tasks. Recursion is at most TASK_MAX deep. */
+static struct cluster bound_top(const struct builder *b, uint32_t number) {
+    for (uint32_t i = 0; i < b->task_count; i++)
+        if (b->tasks[i].number == number)
+            return b->tasks[i].cluster;
+    struct trc_light_bound *node = &b->table->bounds[number];
+    struct cluster c = bound_top(b, number + 1);
+    const struct cluster right = bound_top(b, (uint32_t)node->child);
     unite(&c, &right);
     set_node(node, &c);
     return c;
@@ -284,17 +344,17 @@ static struct cluster build_node(struct builder *b, uint32_t first, uint32_t cou
 
 /* Opens nodes that are strong, first where lights are far apart, until there are cut_max. */
 static void choose_cut(struct trc_light_table *table, uint32_t cut_max) {
-    const float least = table->bounds[0].intensity * LEAST_PART;
+    const float floor = table->bounds[0].intensity * LEAST_PART;
     table->cut[0] = 0;
     table->cut_count = 1;
     while (table->cut_count < cut_max) {
         int best = -1;
-        float most = -1.0f;
+        float best_gain = -1.0f;
         for (uint32_t i = 0; i < table->cut_count; i++) {
             const struct trc_light_bound *b = &table->bounds[table->cut[i]];
             const float gain = b->intensity * b->radius * b->radius;
-            if (b->child >= 0 && b->intensity > least && gain > most) {
-                most = gain;
+            if (b->child >= 0 && b->intensity > floor && gain > best_gain) {
+                best_gain = gain;
                 best = (int)i;
             }
         }
@@ -320,15 +380,17 @@ static void enter_lights(struct trc_light_table *table, uint32_t node, uint32_t 
 }
 
 trc_status trc_light_tree_build(struct trc_light_table *table, struct trc_light_bound *leaves,
-                                uint32_t count, uint32_t cut_max) {
+                                uint32_t count, uint32_t cut_max, struct trc_pool *pool) {
     const size_t lights = (size_t)table->first_triangle + table->triangle_count;
     table->bounds = trc_alloc_zeroed(2 * (size_t)count, sizeof *table->bounds);
     table->trails = trc_alloc_zeroed(lights, sizeof *table->trails);
     if (!table->bounds || !table->trails)
         return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for the tree of %u lights", count);
-    struct builder b = {table, leaves, 0};
-    build_node(&b, 0, count, 0);
-    table->bound_count = b.node_count;
+    struct builder b = {.table = table, .leaves = leaves};
+    make_tasks(&b, count);
+    trc_pool_run(pool, b.task_count, build_task, &b);
+    bound_top(&b, 0);
+    table->bound_count = 2 * count - 1;
     choose_cut(table, cut_max);
     for (uint32_t i = 0; i < table->cut_count; i++)
         enter_lights(table, table->cut[i], i, 0, 0);

@@ -5,6 +5,7 @@
 #include "core/core.h"
 #include "kernels/kernels.h"
 #include "shading/lights.h"
+#include "threads/pool.h"
 
 #define PI 3.14159265358979f
 
@@ -18,14 +19,6 @@
 
 /* Share of the mean that every cell gets: what the samples missed must not be impossible. */
 #define LEAST_SHARE 0.05f
-
-/* Same mapping as kernels/light_world.c: u by azimuth from +X, v by angle from +Z. */
-static void cell_direction(float u, float v, float d[3]) {
-    const float phi = 2.0f * PI * u, theta = PI * v;
-    d[0] = sinf(theta) * cosf(phi);
-    d[1] = sinf(theta) * sinf(phi);
-    d[2] = cosf(theta);
-}
 
 static bool is_on_sun(const struct trc_world_sun *sun, const float d[3]) {
     float square = 0.0f;
@@ -88,35 +81,78 @@ static void weigh_sun(const struct trc_snapshot *s, struct trc_world_map *map) {
         map->average[i] += mean[i];
 }
 
-/* Brightness of each cell of a row, the largest of its samples leaning on their mean, times sin
- * theta. */
-static void measure_row(const struct trc_snapshot *s, struct trc_world_map *map, uint32_t row,
-                        float *directions, float *radiance, double total[4]) {
-    const uint32_t per_cell = SUBSAMPLES * SUBSAMPLES;
-    for (uint32_t x = 0; x < map->width; x++)
-        for (uint32_t k = 0; k < per_cell; k++) {
-            const float du = ((float)(k % SUBSAMPLES) + 0.5f) / SUBSAMPLES;
-            const float dv = ((float)(k / SUBSAMPLES) + 0.5f) / SUBSAMPLES;
-            cell_direction(((float)x + du) / (float)map->width,
-                           ((float)row + dv) / (float)map->height,
-                           directions + 3 * ((size_t)x * per_cell + k));
+/* What is measured, row by row on all threads. */
+struct measuring {
+    const struct trc_snapshot *snapshot;
+    struct trc_world_map *map;
+    float *turns;      /* cos and sin of the azimuth of every column of samples */
+    float *samples;    /* per thread: the directions of a row's samples, and their radiance */
+    double (*sums)[3]; /* per row: radiance times the sine of its samples */
+};
+
+#define SAMPLES_PER_CELL (SUBSAMPLES * SUBSAMPLES)
+
+/* Same mapping as kernels/light_world.c: u by azimuth from +X, v by angle from +Z. */
+static void set_directions(const struct measuring *m, uint32_t row, float *directions) {
+    const uint32_t columns = m->map->width * SUBSAMPLES;
+    for (uint32_t k = 0; k < SUBSAMPLES; k++) {
+        const float v = ((float)row + ((float)k + 0.5f) / SUBSAMPLES) / (float)m->map->height;
+        const float sin_theta = sinf(PI * v), cos_theta = cosf(PI * v);
+        for (uint32_t x = 0; x < columns; x++, directions += 3) {
+            directions[0] = sin_theta * m->turns[2 * x];
+            directions[1] = sin_theta * m->turns[2 * x + 1];
+            directions[2] = cos_theta;
         }
-    trc_kernels_current()->world_evaluate(s, directions, radiance, map->width * per_cell);
+    }
+}
+
+static float sample_weight(const struct trc_world_map *map, uint32_t row) {
+    return sinf(PI * ((float)row + 0.5f) / (float)map->height);
+}
+
+/* Mean brightness of each cell of a row, times sin theta. */
+static void measure_row(void *context, uint32_t row, uint32_t worker) {
+    const struct measuring *m = context;
+    struct trc_world_map *map = m->map;
+    const uint32_t count = map->width * SAMPLES_PER_CELL, columns = map->width * SUBSAMPLES;
+    float *directions = m->samples + 6 * (size_t)count * worker;
+    float *radiance = directions + 3 * (size_t)count;
+    set_directions(m, row, directions);
+    trc_kernels_current()->world_evaluate(m->snapshot, directions, radiance, count);
     if (map->sun.square_chord > 0.0f)
-        leave_out_sun(&map->sun, directions, radiance, map->width * per_cell);
-    const float weight = sinf(PI * ((float)row + 0.5f) / (float)map->height);
+        leave_out_sun(&map->sun, directions, radiance, count);
+    const float weight = sample_weight(map, row);
     for (uint32_t x = 0; x < map->width; x++) {
         float mean = 0.0f;
-        for (uint32_t k = 0; k < per_cell; k++) {
-            const float *c = radiance + 3 * ((size_t)x * per_cell + k);
+        for (uint32_t k = 0; k < SAMPLES_PER_CELL; k++) {
+            const uint32_t at = k / SUBSAMPLES * columns + x * SUBSAMPLES + k % SUBSAMPLES;
+            const float *c = radiance + 3 * (size_t)at;
             const float light = trc_luminance(c);
-            mean += light > 0.0f && light < 1e30f ? light / (float)per_cell : 0.0f;
+            mean += light > 0.0f && light < 1e30f ? light / SAMPLES_PER_CELL : 0.0f;
             for (int i = 0; i < 3; i++)
-                total[i] += c[i] > 0.0f && c[i] < 1e30f ? (double)(c[i] * weight) : 0.0;
+                m->sums[row][i] += c[i] > 0.0f && c[i] < 1e30f ? (double)(c[i] * weight) : 0.0;
         }
-        total[3] += (double)per_cell * (double)weight;
         map->density[(size_t)row * map->width + x] = mean * weight;
     }
+}
+
+static void measure(struct measuring *m, struct trc_pool *pool) {
+    struct trc_world_map *map = m->map;
+    const uint32_t columns = map->width * SUBSAMPLES;
+    for (uint32_t x = 0; x < columns; x++) {
+        const float phi = 2.0f * PI * ((float)x + 0.5f) / (float)columns;
+        m->turns[2 * x] = cosf(phi);
+        m->turns[2 * x + 1] = sinf(phi);
+    }
+    trc_pool_run(pool, map->height, measure_row, m);
+    double total[3] = {0}, weight = 0.0;
+    for (uint32_t y = 0; y < map->height; y++) {
+        for (int i = 0; i < 3; i++)
+            total[i] += m->sums[y][i];
+        weight += (double)(map->width * SAMPLES_PER_CELL) * (double)sample_weight(map, y);
+    }
+    for (int i = 0; i < 3; i++)
+        map->average[i] = (float)(total[i] / weight);
 }
 
 /* Running sums, each row's from 0 to 1; values become multiples of the mean. */
@@ -150,41 +186,47 @@ static void accumulate(struct trc_world_map *map) {
         map->density[i] *= scale;
 }
 
-trc_status trc_world_map_create(const struct trc_snapshot *snapshot, uint32_t width,
-                                const trc_world_desc *world, struct trc_world_map **out) {
-    const uint32_t height = width / 2;
+static struct trc_world_map *create_map(uint32_t width, const trc_world_desc *world) {
     struct trc_world_map *map = trc_alloc_zeroed(1, sizeof *map);
-    const size_t samples = (size_t)width * SUBSAMPLES * SUBSAMPLES;
-    float *directions = trc_alloc(samples, 3 * sizeof(float));
-    float *radiance = trc_alloc(samples, 3 * sizeof(float));
-    if (map) {
-        atomic_init(&map->refs, 1);
-        map->width = width;
-        map->height = height;
-        set_sun(&map->sun, world);
-        map->rows = trc_alloc((size_t)(width + 1) * height, sizeof(float));
-        map->marginal = trc_alloc((size_t)height + 1, sizeof(float));
-        map->density = trc_alloc((size_t)width * height, sizeof(float));
-    }
-    const bool has_all =
-        map && directions && radiance && map->rows && map->marginal && map->density;
+    if (!map)
+        return NULL;
+    atomic_init(&map->refs, 1);
+    map->width = width;
+    map->height = width / 2;
+    set_sun(&map->sun, world);
+    map->rows = trc_alloc((size_t)(width + 1) * map->height, sizeof(float));
+    map->marginal = trc_alloc((size_t)map->height + 1, sizeof(float));
+    map->density = trc_alloc((size_t)width * map->height, sizeof(float));
+    if (map->rows && map->marginal && map->density)
+        return map;
+    trc_world_map_release(map);
+    return NULL;
+}
+
+trc_status trc_world_map_create(const struct trc_snapshot *snapshot, uint32_t width,
+                                const trc_world_desc *world, struct trc_pool *pool,
+                                struct trc_world_map **out) {
+    const size_t samples = (size_t)width * SAMPLES_PER_CELL * trc_pool_thread_count(pool);
+    struct trc_world_map *map = create_map(width, world);
+    struct measuring m = {.snapshot = snapshot,
+                          .map = map,
+                          .turns = trc_alloc((size_t)width * SUBSAMPLES, 2 * sizeof(float)),
+                          .samples = trc_alloc(samples, 6 * sizeof(float)),
+                          .sums = trc_alloc_zeroed(width / 2, sizeof *m.sums)};
+    const bool has_all = map && m.turns && m.samples && m.sums;
     if (has_all) {
-        double total[4] = {0};
-        for (uint32_t y = 0; y < height; y++)
-            measure_row(snapshot, map, y, directions, radiance, total);
-        for (int i = 0; i < 3; i++)
-            map->average[i] = (float)(total[i] / total[3]);
+        measure(&m, pool);
         if (map->sun.square_chord > 0.0f)
             weigh_sun(snapshot, map);
         accumulate(map);
         *out = map;
     }
-    trc_free(directions);
-    trc_free(radiance);
+    trc_free(m.turns);
+    trc_free(m.samples);
+    trc_free(m.sums);
     if (has_all)
         return TRC_OK;
-    if (map)
-        trc_world_map_release(map);
+    trc_world_map_release(map);
     return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for the importance map of the world");
 }
 

@@ -10,6 +10,7 @@
 #include "kernels/light_select.h"
 #include "kernels/wide_math.h"
 #include "shading/lights.h"
+#include "threads/pool.h"
 #include "wide_test.h"
 
 #define SAMPLES (1 << 18)
@@ -73,9 +74,18 @@ static void scene_triangle(struct scene *s, const float corners[9], uint16_t mat
     s->mesh.vertex_count = 3 * s->mesh.triangle_count;
     s->snapshot.instance_count = 1;
 }
-static void scene_commit(struct scene *s, const trc_light_desc *lights, uint32_t count) {
-    assert_int_equal(trc_light_table_create(&s->snapshot, lights, count, NULL, &s->table), TRC_OK);
+static void scene_commit_as(struct scene *s, const trc_light_desc *lights, uint32_t count,
+                            bool is_sampled) {
+    struct trc_pool *pool;
+    assert_int_equal(trc_pool_create(2, &pool), TRC_OK);
+    const struct trc_light_options options = {
+        .lights = lights, .light_count = count, .is_sampled = is_sampled, .pool = pool};
+    assert_int_equal(trc_light_table_create(&s->snapshot, &options, &s->table), TRC_OK);
+    trc_pool_destroy(pool);
     s->snapshot.lights = s->table;
+}
+static void scene_commit(struct scene *s, const trc_light_desc *lights, uint32_t count) {
+    scene_commit_as(s, lights, count, true);
 }
 static void scene_end(struct scene *s) { trc_light_table_destroy(s->table); }
 
@@ -632,17 +642,42 @@ static void dark_tables(void **state) {
     trc_light_table_destroy(NULL);
 }
 
+/* Where nothing scatters, lamps are seen and nothing is chosen from. */
+static void lights_that_are_not_sampled(void **state) {
+    (void)state;
+    static double corners[MESH_TRIANGLES][3][3];
+    static struct scene s;
+    cloud(&s, 100, corners);
+    s.snapshot.world.material = 1;
+    s.snapshot.world.radiance[0] = 1.0f;
+    const trc_light_desc d = lamp(TRC_LIGHT_AREA, 0, 0, 1);
+    scene_commit_as(&s, &d, 1, false);
+    assert_int_equal((int)s.table->lamp_count, 1);
+    assert_int_equal((int)s.table->group_seen[TRC_MAX_LIGHT_GROUPS + 1], 1);
+    assert_int_equal((int)s.table->triangle_count, 0);
+    assert_true(s.instance.first_light == UINT32_MAX && s.table->world_light == UINT32_MAX);
+    const struct trc_surface r = receiver(&s, 0, 0, 0);
+    struct trc_light_sample l;
+    TRC_KERNEL(trc_light_sample)(&r, r.n, vf_set(0.5f), vf_set(0.5f), vf_set(0.5f), &l);
+    assert_false(vm_any(l.valid));
+    scene_end(&s);
+}
+
 static void allocation_failures(void **state) {
     (void)state;
     static double corners[MESH_TRIANGLES][3][3];
     static struct scene s;
     cloud(&s, 100, corners);
     const trc_light_desc d = lamp(TRC_LIGHT_POINT, 0, 0, 1);
+    struct trc_pool *pool; /* of one thread: threads free memory as they start */
+    assert_int_equal(trc_pool_create(1, &pool), TRC_OK);
+    const struct trc_light_options options = {
+        .lights = &d, .light_count = 1, .is_sampled = true, .pool = pool};
     const uint64_t before = trc_memory_bytes();
     for (int64_t n = 0;; n++) {
         trc_memory_fail_at(n, false);
         struct trc_light_table *table = NULL;
-        const trc_status status = trc_light_table_create(&s.snapshot, &d, 1, NULL, &table);
+        const trc_status status = trc_light_table_create(&s.snapshot, &options, &table);
         trc_memory_fail_at(-1, false);
         if (status == TRC_OK) {
             assert_true(n > 5);
@@ -654,6 +689,7 @@ static void allocation_failures(void **state) {
         assert_true(trc_memory_bytes() == before);
     }
     assert_true(trc_memory_bytes() == before);
+    trc_pool_destroy(pool);
 }
 
 int main(void) {
@@ -670,6 +706,7 @@ int main(void) {
         cmocka_unit_test(moving_triangles),
         cmocka_unit_test(hidden_lamps),
         cmocka_unit_test(dark_tables),
+        cmocka_unit_test(lights_that_are_not_sampled),
         cmocka_unit_test(allocation_failures),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

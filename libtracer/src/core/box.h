@@ -1,6 +1,6 @@
 /* Points and boxes as builders hold them: four floats at once, lane 3 is 0. */
-#ifndef TRACER_BVH_BOX_H
-#define TRACER_BVH_BOX_H
+#ifndef TRACER_CORE_BOX_H
+#define TRACER_CORE_BOX_H
 
 #include <float.h>
 #include <stdbool.h>
