@@ -35,4 +35,58 @@ FIXTURE_INLINE trc_scene fixture_scene(void) {
     return scene;
 }
 
+/* ---- for closed forms: level squares seen from above ---- */
+
+/* Two triangles; a, b, c, d counter-clockwise as seen from the front. */
+FIXTURE_INLINE trc_id fixture_quad(trc_scene scene, const float corners[12], trc_id material) {
+    static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
+    trc_id mesh = 0, instance = 0;
+    trc_mesh_desc desc = default_mesh_desc();
+    desc.vertex_count = 4;
+    desc.triangle_count = 2;
+    desc.positions = corners;
+    desc.position_count = 12;
+    desc.indices = indices;
+    desc.index_count = 6;
+    assert_int_equal(trc_mesh_create(scene, &desc, &mesh), TRC_OK);
+    trc_instance_desc instance_desc = default_instance_desc(mesh);
+    instance_desc.materials = &material;
+    instance_desc.material_count = 1;
+    assert_int_equal(trc_instance_create(scene, &instance_desc, &instance), TRC_OK);
+    return instance;
+}
+
+/* A horizontal square around the origin. */
+FIXTURE_INLINE trc_id fixture_level(trc_scene scene, float half, float z, trc_id material) {
+    const float corners[12] = {-half, -half, z, half, -half, z, half, half, z, -half, half, z};
+    return fixture_quad(scene, corners, material);
+}
+
+FIXTURE_INLINE trc_id fixture_material(trc_scene scene, uint32_t type, float value) {
+    struct default_material m;
+    trc_id id = 0;
+    default_material_init(&m, type);
+    for (int c = 0; c < 3; c++)
+        m.inputs[0].value[c] = value;
+    if (type == TRC_NODE_DIFFUSE)
+        m.inputs[1].value[0] = 0.0f; /* Lambert */
+    assert_int_equal(trc_material_create(scene, &m.desc, &id), TRC_OK);
+    return id;
+}
+
+/* A camera 1 m up that looks straight down at x from 0 to 4 m, in parallel rays. */
+FIXTURE_INLINE trc_scene fixture_level_view(void) {
+    static const float transform[12] = {1, 0, 0, 2, 0, 1, 0, 0, 0, 0, 1, 1};
+    static const float window[4] = {-2.0f, 2.0f, -0.5f, 0.5f};
+    trc_scene scene = 0;
+    const trc_scene_desc scene_desc = default_scene_desc();
+    trc_camera_desc camera = default_camera_desc();
+    camera.type = TRC_CAMERA_ORTHOGRAPHIC;
+    camera.transforms = transform;
+    camera.windows = window;
+    assert_int_equal(trc_scene_create(&scene_desc, &scene), TRC_OK);
+    assert_int_equal(trc_scene_set_camera(scene, &camera), TRC_OK);
+    return scene;
+}
+
 #endif

@@ -9,58 +9,6 @@
 
 enum { WIDTH = 16, HEIGHT = 4, FRAME = WIDTH * HEIGHT, SAMPLES = 1024 };
 
-/* Two triangles; a, b, c, d counter-clockwise as seen from the front. */
-static trc_id add_quad(trc_scene scene, const float corners[12], trc_id material) {
-    static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
-    trc_id mesh = 0, instance = 0;
-    trc_mesh_desc desc = default_mesh_desc();
-    desc.vertex_count = 4;
-    desc.triangle_count = 2;
-    desc.positions = corners;
-    desc.position_count = 12;
-    desc.indices = indices;
-    desc.index_count = 6;
-    assert_int_equal(trc_mesh_create(scene, &desc, &mesh), TRC_OK);
-    trc_instance_desc instance_desc = default_instance_desc(mesh);
-    instance_desc.materials = &material;
-    instance_desc.material_count = 1;
-    assert_int_equal(trc_instance_create(scene, &instance_desc, &instance), TRC_OK);
-    return instance;
-}
-
-/* A horizontal square around the origin. */
-static trc_id add_level(trc_scene scene, float half, float z, trc_id material) {
-    const float corners[12] = {-half, -half, z, half, -half, z, half, half, z, -half, half, z};
-    return add_quad(scene, corners, material);
-}
-
-static trc_id add_material(trc_scene scene, uint32_t type, float value) {
-    struct default_material m;
-    trc_id id = 0;
-    default_material_init(&m, type);
-    for (int c = 0; c < 3; c++)
-        m.inputs[0].value[c] = value;
-    if (type == TRC_NODE_DIFFUSE)
-        m.inputs[1].value[0] = 0.0f; /* Lambert */
-    assert_int_equal(trc_material_create(scene, &m.desc, &id), TRC_OK);
-    return id;
-}
-
-/* A camera 1 m up that looks straight down at x from 0 to 4 m, in parallel rays. */
-static trc_scene open_scene(void) {
-    static const float transform[12] = {1, 0, 0, 2, 0, 1, 0, 0, 0, 0, 1, 1};
-    static const float window[4] = {-2.0f, 2.0f, -0.5f, 0.5f};
-    trc_scene scene = 0;
-    const trc_scene_desc scene_desc = default_scene_desc();
-    trc_camera_desc camera = default_camera_desc();
-    camera.type = TRC_CAMERA_ORTHOGRAPHIC;
-    camera.transforms = transform;
-    camera.windows = window;
-    assert_int_equal(trc_scene_create(&scene_desc, &scene), TRC_OK);
-    assert_int_equal(trc_scene_set_camera(scene, &camera), TRC_OK);
-    return scene;
-}
-
 struct setting {
     float distance, factor;
     uint32_t method, light_samples;
@@ -104,9 +52,9 @@ static void expect_all(const double column[WIDTH], double value, double toleranc
 /* Nothing above: every ray is free, and there is no noise at all. */
 static void plane(void **state) {
     (void)state;
-    const trc_scene scene = open_scene();
+    const trc_scene scene = fixture_level_view();
     double column[WIDTH];
-    add_level(scene, 100.0f, 0.0f, add_material(scene, TRC_NODE_DIFFUSE, 0.5f));
+    fixture_level(scene, 100.0f, 0.0f, fixture_material(scene, TRC_NODE_DIFFUSE, 0.5f));
     draw(scene, &(struct setting){.distance = 1e20f, .factor = 0.7f}, 0, column);
     expect_all(column, 0.5 * 0.7, 1e-6);
     draw(scene, &(struct setting){.distance = 3.0f, .factor = 2.0f, .light_samples = 4}, 0, column);
@@ -120,11 +68,11 @@ static void plane(void **state) {
  * d, 1 - (h / d)^2 of them by the cosine. */
 static void ceiling(void **state) {
     (void)state;
-    const trc_scene scene = open_scene();
-    const trc_id grey = add_material(scene, TRC_NODE_DIFFUSE, (float)ALBEDO);
-    const trc_id sky = add_material(scene, TRC_NODE_BACKGROUND, 0.25f);
-    add_level(scene, 1000.0f, 0.0f, grey);
-    add_level(scene, 1000.0f, 1.5f, grey);
+    const trc_scene scene = fixture_level_view();
+    const trc_id grey = fixture_material(scene, TRC_NODE_DIFFUSE, (float)ALBEDO);
+    const trc_id sky = fixture_material(scene, TRC_NODE_BACKGROUND, 0.25f);
+    fixture_level(scene, 1000.0f, 0.0f, grey);
+    fixture_level(scene, 1000.0f, 1.5f, grey);
     for (uint32_t method = 0; method < 2; method++)
         for (uint32_t lights = 1; lights <= 4; lights *= 4)
             for (int i = 0; i < 4; i++) {
@@ -145,12 +93,12 @@ static void ceiling(void **state) {
  * of the hemisphere by the cosine, so half of it in the corner. */
 static void corner(void **state) {
     (void)state;
-    const trc_scene scene = open_scene();
-    const trc_id grey = add_material(scene, TRC_NODE_DIFFUSE, (float)ALBEDO);
+    const trc_scene scene = fixture_level_view();
+    const trc_id grey = fixture_material(scene, TRC_NODE_DIFFUSE, (float)ALBEDO);
     const float wall[12] = {0, -40.0f, 0, 0, 40.0f, 0, 0, 40.0f, 3, 0, -40.0f, 3};
     double column[WIDTH];
-    add_level(scene, 40.0f, 0.0f, grey);
-    add_quad(scene, wall, grey);
+    fixture_level(scene, 40.0f, 0.0f, grey);
+    fixture_quad(scene, wall, grey);
     draw(scene, &(struct setting){.distance = 1e20f, .factor = 1.0f}, 0, column);
     double most = 0.0;
     for (int x = 0; x < WIDTH; x++) {
@@ -177,7 +125,7 @@ static void corner(void **state) {
 /* Nothing comes in where the distance is longer than the box; a mirror shows the same light. */
 static void box(void **state) {
     (void)state;
-    const trc_scene scene = open_scene();
+    const trc_scene scene = fixture_level_view();
     const float above[12] = {5, 0, 0, 0, 0, 5, 0, 0, 0, 0, 5, 4};
     trc_id mesh = 0, instance = 0;
     trc_mesh_desc mesh_desc = default_mesh_desc();
@@ -195,7 +143,7 @@ static void box(void **state) {
 
 static void mirror(void **state) {
     (void)state;
-    const trc_scene scene = open_scene();
+    const trc_scene scene = fixture_level_view();
     const trc_node node = {
         .type = TRC_NODE_GLOSSY, .input_count = 6, .mode = TRC_DISTRIBUTION_SHARP};
     const trc_node_input inputs[6] = {{.node = -1, .value = {1, 1, 1}},
@@ -212,8 +160,8 @@ static void mirror(void **state) {
     trc_id material = 0;
     double column[WIDTH];
     assert_int_equal(trc_material_create(scene, &sharp, &material), TRC_OK);
-    add_level(scene, 1000.0f, 0.0f, material);
-    add_level(scene, 1000.0f, 1.5f, add_material(scene, TRC_NODE_DIFFUSE, 0.5f));
+    fixture_level(scene, 1000.0f, 0.0f, material);
+    fixture_level(scene, 1000.0f, 1.5f, fixture_material(scene, TRC_NODE_DIFFUSE, 0.5f));
     draw(scene, &(struct setting){.distance = 3.0f, .factor = 1.0f}, 0, column);
     expect_all(column, 0.5 * 0.25, 2e-3);
     assert_int_equal(trc_scene_destroy(scene), TRC_OK);
@@ -222,9 +170,9 @@ static void mirror(void **state) {
 /* The pass of direct diffuse light has it, divided by the colour. */
 static void passes(void **state) {
     (void)state;
-    const trc_scene scene = open_scene();
+    const trc_scene scene = fixture_level_view();
     double column[WIDTH];
-    add_level(scene, 100.0f, 0.0f, add_material(scene, TRC_NODE_DIFFUSE, 0.5f));
+    fixture_level(scene, 100.0f, 0.0f, fixture_material(scene, TRC_NODE_DIFFUSE, 0.5f));
     const struct setting s = {.distance = 3.0f, .factor = 0.7f};
     draw(scene, &s, TRC_PASS_DIFFUSE_DIRECT, column);
     expect_all(column, 0.7, 1e-6);
@@ -234,10 +182,10 @@ static void passes(void **state) {
 /* The pass of its own is the free part alone, whatever the surface is and with the effect off. */
 static void own_pass(void **state) {
     (void)state;
-    const trc_scene scene = open_scene();
+    const trc_scene scene = fixture_level_view();
     double column[WIDTH];
-    add_level(scene, 1000.0f, 0.0f, add_material(scene, TRC_NODE_EMISSION, 0.5f));
-    add_level(scene, 1000.0f, 1.5f, 0);
+    fixture_level(scene, 1000.0f, 0.0f, fixture_material(scene, TRC_NODE_EMISSION, 0.5f));
+    fixture_level(scene, 1000.0f, 1.5f, 0);
     draw(scene, &(struct setting){.distance = 3.0f}, TRC_PASS_AMBIENT_OCCLUSION, column);
     expect_all(column, 0.25, 5e-3);
     draw(scene, &(struct setting){.distance = 3.0f}, TRC_PASS_COMBINED, column);
@@ -249,12 +197,12 @@ static void own_pass(void **state) {
  * picture is the sum. */
 static void replaced(void **state) {
     (void)state;
-    const trc_scene scene = open_scene();
+    const trc_scene scene = fixture_level_view();
     double both[WIDTH], lamp[WIDTH];
     trc_id light = 0;
     const trc_light_desc light_desc = default_light_desc();
-    const trc_id sky = add_material(scene, TRC_NODE_BACKGROUND, 0.25f);
-    add_level(scene, 1000.0f, 0.0f, add_material(scene, TRC_NODE_DIFFUSE, 0.5f));
+    const trc_id sky = fixture_material(scene, TRC_NODE_BACKGROUND, 0.25f);
+    fixture_level(scene, 1000.0f, 0.0f, fixture_material(scene, TRC_NODE_DIFFUSE, 0.5f));
     assert_int_equal(trc_light_create(scene, &light_desc, &light), TRC_OK);
     draw(scene, &(struct setting){.distance = 3.0f, .light_samples = 8}, 0, lamp);
     draw(scene, &(struct setting){3.0f, 0.6f, TRC_AO_REPLACE, 8, sky}, 0, both);

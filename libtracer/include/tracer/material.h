@@ -336,8 +336,10 @@ typedef struct trc_material_desc {
 } trc_material_desc;
 
 enum {
-    TRC_MATERIAL_SAMPLE_EMISSION = 1, /* sample its emissive triangles as lights ("multiple
-                                         importance sample") */
+    /* Sample its emissive triangles as lights ("multiple importance sample"). Off: glossy rays
+     * alone find them, unless some surface of the scene has diffuse or translucent lobes, which
+     * only samples light. */
+    TRC_MATERIAL_SAMPLE_EMISSION = 1,
     TRC_MATERIAL_TRANSPARENT_SHADOW =
         2, /* shadow rays see its transparency; else it is opaque to them */
     /* Lobes are chosen by their weights at camera hits too, as in Cycles 4; else each at least one

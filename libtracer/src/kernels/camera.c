@@ -1,50 +1,9 @@
-/* Camera rays: pixel filter, lens, shutter.
- *
- * Samples of a pixel are drawn from the pixel filter's shape, so that a pixel is a plain mean
- * (Ernst, Stamminger and Greiner, "Filter Importance Sampling", 2006; Cycles does the same, so
- * images agree). The lens is a disk by the concentric map of Shirley and Chiu, 1997, or a regular
- * polygon. */
+/* Camera rays: pixel filter, lens, shutter. The lens is a disk by the concentric map of Shirley and
+ * Chiu, 1997, or a regular polygon. */
 #include "kernels/mesh_fetch.h"
 #include "kernels/tile.h"
 #include "kernels/wide_math.h"
-
-static double filter_value(uint32_t filter, double x, double width) {
-    const double pi = 3.14159265358979323846;
-    if (filter == TRC_FILTER_GAUSSIAN) {
-        const double v = 6.0 * x / width;
-        return exp(-2.0 * v * v);
-    }
-    if (filter == TRC_FILTER_BLACKMAN_HARRIS) {
-        const double v = 2.0 * pi * (x / width + 0.5);
-        return 0.35875 - 0.48829 * cos(v) + 0.14128 * cos(2.0 * v) - 0.01168 * cos(3.0 * v);
-    }
-    return 1.0;
-}
-
-void TRC_KERNEL(trc_filter_table)(uint32_t filter, float width, float table[TRC_FILTER_TABLE]) {
-    enum { STEPS = 2 * TRC_FILTER_TABLE };
-    /* Support of the filters in widths, as Cycles has it. */
-    const double support = filter == TRC_FILTER_GAUSSIAN          ? 3.0
-                           : filter == TRC_FILTER_BLACKMAN_HARRIS ? 2.0
-                                                                  : 1.0;
-    const double half = 0.5 * support * (double)width;
-    const double full = 2.0 * half, step = full / STEPS;
-    double total = 0.0, sum = 0.0;
-    for (int i = 0; i < STEPS; i++)
-        total += filter_value(filter, -half + (i + 0.5) * step, full);
-    int filled = 0;
-    for (int i = 0; i < STEPS && filled < TRC_FILTER_TABLE; i++) {
-        const double value = filter_value(filter, -half + (i + 0.5) * step, full);
-        for (; filled < TRC_FILTER_TABLE; filled++) {
-            const double target = total * filled / (TRC_FILTER_TABLE - 1);
-            if (target > sum + value && i < STEPS - 1)
-                break;
-            const double f = value > 0.0 ? (target - sum) / value : 0.0;
-            table[filled] = (float)(-half + (i + (f < 1.0 ? f : 1.0)) * step);
-        }
-        sum += value;
-    }
-}
+#include "sampling/filter.h"
 
 /* Linear look-up of an inverse distribution of n values at u in [0, 1). */
 TRC_INLINE vfloat table_lookup(const float *table, uint32_t n, vfloat u, vmask m) {
@@ -120,9 +79,9 @@ void TRC_KERNEL(trc_camera_rays)(struct trc_tile *t) {
         vfloat f[2];
         TRC_KERNEL(trc_samples)(sampler, pixel, index, TRC_DIM_FILTER_X, 2, 0, 1, f);
         const vfloat px = vi_to_float((vint)(pixel & vu_set(0xffffu))) + vf_set(0.5f) +
-                          table_lookup(t->filter, TRC_FILTER_TABLE, f[0], active);
+                          table_lookup(t->job->filter_table, TRC_FILTER_TABLE, f[0], active);
         const vfloat py = vi_to_float((vint)(pixel >> 16)) + vf_set(0.5f) +
-                          table_lookup(t->filter, TRC_FILTER_TABLE, f[1], active);
+                          table_lookup(t->job->filter_table, TRC_FILTER_TABLE, f[1], active);
         vfloat time = vf_set(0.5f);
         if (camera->has_motion) {
             time = TRC_KERNEL(trc_sample)(sampler, pixel, index, TRC_DIM_TIME);

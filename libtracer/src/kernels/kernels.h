@@ -23,6 +23,7 @@ struct trc_tile_job {
     const struct trc_snapshot *snapshot;
     const trc_render_desc *desc;   /* resolved: no 0-means-chosen values left */
     const uint32_t *sampler_table; /* sampling/sobol.h */
+    const float *filter_table;     /* sampling/filter.h */
     struct trc_film *film;
     struct trc_adaptive *adaptive; /* NULL: every pixel gets every sample */
     uint32_t x, y, width, height;  /* in the crop, pixels */

@@ -214,12 +214,14 @@ vvec3 TRC_KERNEL(trc_world_radiance)(const struct trc_snapshot *snapshot, vvec3 
     if (!vm_any(m))
         return v3_zero();
     const vvec3 radiance = TRC_KERNEL(trc_world_shade)(snapshot, wi, path, m);
-    const vmask weighed = vm_andnot(m, vf_lt(bsdf_pdf, vf_zero()));
+    const vmask alone =
+        vi_eq((vint)(path & vu_set(TRC_PATH_WORLD_ALONE)), vi_set(TRC_PATH_WORLD_ALONE));
+    const vmask weighed = vm_andnot(m, vm_or(alone, vf_lt(bsdf_pdf, vf_zero())));
     if (t->world_light == UINT32_MAX || !vm_any(weighed))
         return v3_where(m, radiance);
     const struct trc_receiver receiver = trc_receiver_make(p_from, n_from);
     const vfloat density = trc_world_density(t, n_from, receiver.has_n, wi, weighed);
     const vfloat chance = trc_light_chance(t, &receiver, vi_set((int32_t)t->world_light), weighed);
     const vfloat weight = ray_weight(bsdf_pdf, density * chance, light_sample_count);
-    return v3_where(m, v3_scale(radiance, weight));
+    return v3_where(m, v3_scale(radiance, vf_select(weighed, weight, vf_one())));
 }

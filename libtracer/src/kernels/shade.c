@@ -27,6 +27,7 @@ struct arrival {
         chance; /* that a continuation ray is sent: densities of its directions have it in them */
     vuint slot, path, depths, pixel, sample;
     uint32_t slots[TRC_WIDTH];
+    bool world_alone; /* rays that go on find the world better than light samples of it would */
 };
 
 /* Shadow rays end this much before the light, as a fraction of the way: mesh lights must not shade
@@ -373,7 +374,11 @@ static void direct_light(struct trc_tile *t, const struct arrival *a, const stru
     const uint32_t dimension = TRC_DIM_BOUNCE + t->generation * TRC_DIMS_PER_BOUNCE;
     const uint32_t most = t->generation == 0 ? t->desc->light_samples : 1;
     const vfloat count = light_count(t, a->depths);
-    const bool world_apart = t->snapshot->lights->world_apart;
+    const struct trc_light_table *lights = t->snapshot->lights;
+    const bool world_apart = lights->world_apart && !a->world_alone;
+    const bool is_only_world = lights->world_light != UINT32_MAX && !lights->world_apart;
+    if (lights->cut_count + lights->distant_count == 0 || (is_only_world && a->world_alone))
+        return;
     if (t->shadows.count + most * (world_apart ? 2 : 1) * TRC_WIDTH > TRC_SHADOW_QUEUE)
         TRC_KERNEL(trc_shadow_flush)(t);
     for (uint32_t l = 0; l < most; l++) {
@@ -529,7 +534,8 @@ static void ray_push(struct trc_tile *t, const struct arrival *a, const struct t
     kind = kind | (vuint)vi_select(ideal, vi_set(TRC_PATH_SINGULAR), vi_set(0));
     kind = kind | (vuint)vi_select(b->diffuse, vi_set(TRC_VISIBLE_DIFFUSE), vi_set(0));
     kind = kind | (vuint)vi_select(first, (vint)own, (vint)category);
-    kind = kind | (a->path & vu_set(TRC_PATH_DATA_DONE | TRC_PATH_TOLD));
+    kind = kind | (a->path & vu_set(TRC_PATH_DATA_DONE | TRC_PATH_TOLD)) |
+           vu_set(a->world_alone ? TRC_PATH_WORLD_ALONE : 0);
     vuint path = (vuint)vi_select(straight, (vint)a->path, (vint)kind);
     path = path | (vuint)vi_select(over, vi_set(TRC_PATH_LAST), vi_set(0));
 
@@ -694,6 +700,8 @@ static void shade_group(struct trc_tile *t, uint32_t material, vint index, vmask
     a.chance = roulette_chance(t, &a, &lobes);
     const bool lets_through = m->has & (TRC_MATERIAL_HAS_REFRACTION | TRC_MATERIAL_HAS_TRANSLUCENT);
     a.receive_n = lets_through ? v3_zero() : s.n;
+    /* A lobe's own density fits an even world. Matt lobes send no rays. */
+    a.world_alone = t->snapshot->world.is_constant && !(m->has & TRC_MATERIAL_IS_MATT);
     if (m->has & TRC_MATERIAL_HAS_HOLDOUT)
         holdout(t, &a, &lobes, active);
     if (t->extra_passes)
@@ -716,12 +724,11 @@ static void shade_group(struct trc_tile *t, uint32_t material, vint index, vmask
         continue_straight(t, &a, &s, &lobes, material, vm_and(active, last));
     if (!vm_any(on))
         return;
-    if (m->has &
-        (TRC_MATERIAL_HAS_DIFFUSE | TRC_MATERIAL_HAS_TRANSLUCENT | TRC_MATERIAL_HAS_GLOSSY)) {
+    if (m->has & TRC_MATERIAL_SCATTERS) {
         lobes.below_horizon = s.smooth;
         direct_light(t, &a, &s, &lobes, on);
         if ((t->snapshot->features & TRC_FEATURE_AMBIENT_OCCLUSION) &&
-            (m->has & (TRC_MATERIAL_HAS_DIFFUSE | TRC_MATERIAL_HAS_TRANSLUCENT)))
+            (m->has & TRC_MATERIAL_IS_MATT))
             ambient_light(t, &a, &s, &lobes, on);
         lobes.below_horizon = vm_none();
     }

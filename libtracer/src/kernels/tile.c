@@ -90,7 +90,6 @@ static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc, void *
         *words[i] = carve(&c, queue);
     t->order = carve(&c, batch);
     t->bins = carve(&c, (TRC_BINS + 1) * sizeof *t->bins);
-    t->filter = carve(&c, TRC_FILTER_TABLE * sizeof(float));
     return c.used;
 }
 
@@ -527,7 +526,6 @@ void TRC_KERNEL(trc_tile_render)(struct trc_tile_job *job) {
         job->desc->packet_size < TRC_PACKET_SIZE ? job->desc->packet_size : TRC_PACKET_SIZE;
     t->clock = &job->counts.seconds_other;
     t->clock_start = trc_seconds();
-    TRC_KERNEL(trc_filter_table)(job->desc->filter, job->desc->filter_width, t->filter);
     for (uint32_t s = job->sample_begin; s < job->sample_end && !*job->cancel;) {
         const uint32_t end =
             job->sample_end - s > SAMPLES_PER_BATCH ? s + SAMPLES_PER_BATCH : job->sample_end;

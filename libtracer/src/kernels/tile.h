@@ -16,7 +16,6 @@
 #define TRC_BATCH 1024
 /* Shadow rays that wait at most: flushed when a group of hits might not fit any more. */
 #define TRC_SHADOW_QUEUE 4096
-#define TRC_FILTER_TABLE 1024
 
 /* Bits of a ray's path word above those of kernels/surface.h. */
 enum {
@@ -122,7 +121,6 @@ struct trc_tile {
     struct trc_shadow_store shadows;
     uint32_t *order;       /* of the rays of a step */
     uint32_t *keys, *bins; /* scratch of sorts: TRC_BATCH or TRC_SHADOW_QUEUE, bins */
-    float *filter;         /* inverse distribution of the pixel filter, TRC_FILTER_TABLE */
     struct trc_packet packet;
     struct trc_packet_hits packet_hits;
 };
@@ -173,9 +171,6 @@ void TRC_KERNEL(trc_tile_render)(struct trc_tile_job *job);
 
 /* Camera rays of the samples' slots, into the empty stack; also their times. (kernels/camera.c) */
 void TRC_KERNEL(trc_camera_rays)(struct trc_tile *t);
-
-/* Inverse of the filter's distribution over its half width. (kernels/camera.c) */
-void TRC_KERNEL(trc_filter_table)(uint32_t filter, float width, float table[TRC_FILTER_TABLE]);
 
 /* Shades the hits of t->work, sorted by material, and what missed. (kernels/shade.c) */
 void TRC_KERNEL(trc_shade_batch)(struct trc_tile *t);

@@ -12,6 +12,7 @@
 #include "core/core.h"
 #include "kernels/kernels.h"
 #include "render/schedule.h"
+#include "sampling/filter.h"
 #include "sampling/sobol.h"
 #include "scene/commit.h"
 #include "threads/thread.h"
@@ -35,6 +36,7 @@ struct trc_render_state {
     struct trc_adaptive adaptive; /* without pixels: off */
     struct trc_schedule schedule;
     uint32_t *sampler_table;
+    float filter_table[TRC_FILTER_TABLE];
     uint32_t worker_count, started_count;
     struct worker *workers;
     atomic_uint cancel;
@@ -139,6 +141,7 @@ static bool render_samples(struct trc_render_state *render, const struct trc_til
         .snapshot = render->snapshot,
         .desc = &render->desc,
         .sampler_table = render->sampler_table,
+        .filter_table = render->filter_table,
         .film = &render->film,
         .adaptive = render->adaptive.pixels ? &render->adaptive : NULL,
         .x = area->x,
@@ -262,6 +265,7 @@ static trc_status take_memory(struct trc_render_state *render) {
     TRC_TRY(trc_schedule_create(desc, &render->schedule));
     const struct trc_schedule *schedule = &render->schedule;
     TRC_TRY(trc_sobol_table_create(&render->sampler_table));
+    trc_filter_table_fill(desc->filter, desc->filter_width, render->filter_table);
     /* More threads than tiles would only wait. */
     render->worker_count =
         desc->thread_count < schedule->tile_count ? desc->thread_count : schedule->tile_count;

@@ -154,17 +154,15 @@ static const struct trc_light_table *same_world(const struct trc_scene_state *sc
     return former->snapshot.lights;
 }
 
-/* Whether some surface scatters what light samples bring: ideal lobes and what shines do not. */
-static bool is_scattering(const struct trc_snapshot *s) {
-    const uint32_t scatters =
-        TRC_MATERIAL_HAS_DIFFUSE | TRC_MATERIAL_HAS_TRANSLUCENT | TRC_MATERIAL_HAS_GLOSSY;
+/* What light samples are taken for: the lobes of all surfaces. */
+static uint32_t find_scattering(const struct trc_snapshot *s) {
+    uint32_t has = 0;
     for (uint32_t i = 0; i < s->instance_count; i++) {
         const struct trc_instance *instance = &s->instances[i];
         for (uint32_t m = 0; m < instance->material_count; m++)
-            if (s->materials[instance->materials[m]]->has & scatters)
-                return true;
+            has |= s->materials[instance->materials[m]]->has;
     }
-    return false;
+    return has & TRC_MATERIAL_SCATTERS;
 }
 
 static trc_status build_lights(const struct trc_scene_state *scene,
@@ -182,7 +180,7 @@ static trc_status build_lights(const struct trc_scene_state *scene,
     const struct trc_light_options options = {
         .lights = descs,
         .light_count = count,
-        .is_sampled = is_scattering(&block->snapshot),
+        .scatters = find_scattering(&block->snapshot),
         .world = scene->world.struct_size ? &scene->world : NULL,
         .previous = same_world(scene, former, block),
         .pool = scene->pool,

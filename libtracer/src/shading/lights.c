@@ -208,19 +208,22 @@ static const struct trc_material *material_of(const struct trc_snapshot *s,
 }
 
 /* Whether a material's triangles are lights. Cycles samples those only whose "multiple importance
- * sample" is on, and finds the others with diffuse rays; there are none here, so all are
- * sampled. */
-static bool is_emissive(const struct trc_material *m) {
-    if (!m || !(m->has & TRC_MATERIAL_HAS_EMISSION))
+ * sample" is on, and finds the others by rays. Matt lobes send none here: where there are some, all
+ * are sampled. */
+static bool is_light(const struct trc_material *m, uint32_t scatters) {
+    if (!m || !scatters || !(m->has & TRC_MATERIAL_HAS_EMISSION))
+        return false;
+    if (!(scatters & TRC_MATERIAL_IS_MATT) && !(m->flags & TRC_MATERIAL_SAMPLE_EMISSION))
         return false;
     return (m->has & TRC_MATERIAL_EMISSION_VARIES) || brightness(m->emission) > 0.0f;
 }
 
-static bool instance_may_shine(const struct trc_snapshot *s, const struct trc_instance *instance) {
+static bool has_lights(const struct trc_snapshot *s, const struct trc_instance *instance,
+                       uint32_t scatters) {
     if (!(instance->visibility & RECEIVERS))
         return false;
     for (uint32_t i = 0; i < instance->material_count; i++)
-        if (is_emissive(s->materials[instance->materials[i]]))
+        if (is_light(s->materials[instance->materials[i]], scatters))
             return true;
     return false;
 }
@@ -266,15 +269,15 @@ static bool world_triangle(const struct trc_instance *instance, const struct trc
 }
 
 static void add_triangles(struct trc_light_table *table, const struct trc_snapshot *s,
-                          uint32_t instance_number, struct trc_light_bound *bounds,
-                          uint32_t *bound_count) {
+                          uint32_t instance_number, uint32_t scatters,
+                          struct trc_light_bound *bounds, uint32_t *bound_count) {
     struct trc_instance *instance = &s->instances[instance_number];
     const struct trc_mesh *mesh = s->meshes[instance->mesh];
     const uint32_t before = table->triangle_count;
     for (uint32_t i = 0; i < mesh->triangle_count; i++) {
         uint32_t number;
         const struct trc_material *m = material_of(s, instance, mesh, i, &number);
-        if (!is_emissive(m))
+        if (!is_light(m, scatters))
             continue;
         struct trc_light_triangle *t = &table->triangles[table->triangle_count];
         float lower[3], upper[3];
@@ -305,10 +308,10 @@ static void add_triangles(struct trc_light_table *table, const struct trc_snapsh
 }
 
 /* Upper limit of the emissive triangles. */
-static uint64_t count_triangles(const struct trc_snapshot *s) {
+static uint64_t count_triangles(const struct trc_snapshot *s, uint32_t scatters) {
     uint64_t count = 0;
     for (uint32_t i = 0; i < s->instance_count; i++)
-        if (instance_may_shine(s, &s->instances[i]))
+        if (has_lights(s, &s->instances[i], scatters))
             count += s->meshes[s->instances[i].mesh]->triangle_count;
     return count;
 }
@@ -322,8 +325,10 @@ static uint32_t world_sample_visibility(const struct trc_world *w) {
     return replaced ? w->visibility & ~(uint32_t)TRC_VISIBLE_DIFFUSE : w->visibility;
 }
 
-static bool world_shines(const struct trc_snapshot *s) {
+static bool world_is_light(const struct trc_snapshot *s, uint32_t scatters) {
     const struct trc_world *w = &s->world;
+    if (!scatters || (w->is_constant && !(scatters & TRC_MATERIAL_IS_MATT)))
+        return false;
     if (w->material == UINT32_MAX || !(w->visibility & RECEIVERS))
         return false;
     return !w->is_constant || brightness(w->radiance) > 0.0f;
@@ -393,7 +398,7 @@ static void add_lamps(struct trc_light_table *table, const struct trc_light_opti
             continue;
         const uint32_t number = table->lamp_count++;
         table->kinds |= 1u << lamp->kind;
-        if (!options->is_sampled || !(lamp->visibility & RECEIVERS))
+        if (!options->scatters || !(lamp->visibility & RECEIVERS))
             continue;
         table->hides |= (lamp->visibility & RECEIVERS) != RECEIVERS;
         if (lamp->kind == TRC_KIND_SUN) {
@@ -460,9 +465,9 @@ static trc_status allocate(struct trc_light_table *table, uint32_t lamps, uint64
 
 static trc_status fill(struct trc_light_table *table, const struct trc_snapshot *s,
                        const struct trc_light_options *options) {
-    const bool is_sampled = options->is_sampled;
+    const uint32_t scatters = options->scatters;
     struct trc_light_bound *bounds = NULL;
-    trc_status status = allocate(table, options->light_count, is_sampled ? count_triangles(s) : 0,
+    trc_status status = allocate(table, options->light_count, count_triangles(s, scatters),
                                  s->instance_count, &bounds);
     if (status != TRC_OK)
         return status;
@@ -470,12 +475,12 @@ static trc_status fill(struct trc_light_table *table, const struct trc_snapshot 
     add_lamps(table, options, bounds, &bound_count);
     list_seen(table);
     table->world_visibility = world_sample_visibility(&s->world);
-    table->world_light = is_sampled && world_shines(s) ? table->lamp_count : UINT32_MAX;
+    table->world_light = world_is_light(s, scatters) ? table->lamp_count : UINT32_MAX;
     table->first_triangle = table->lamp_count + (table->world_light != UINT32_MAX);
     for (uint32_t i = 0; i < s->instance_count; i++) {
         s->instances[i].first_light = UINT32_MAX;
-        if (is_sampled && instance_may_shine(s, &s->instances[i]))
-            add_triangles(table, s, i, bounds, &bound_count);
+        if (has_lights(s, &s->instances[i], scatters))
+            add_triangles(table, s, i, scatters, bounds, &bound_count);
     }
     status = add_world(table, s, options);
     if (status != TRC_OK) {

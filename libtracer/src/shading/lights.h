@@ -143,8 +143,9 @@ struct trc_light_table {
 struct trc_light_options {
     const trc_light_desc *lights;
     uint32_t light_count;
-    bool is_sampled; /* false: nothing in the scene scatters what light samples bring, so lamps are
-                        seen alone and there is nothing to choose from */
+    uint32_t scatters; /* TRC_MATERIAL_HAS_* of all surfaces, of TRC_MATERIAL_SCATTERS. 0: lamps are
+                          seen alone and there is nothing to choose from. Without what is matt, a
+                          constant world and emission that is not to be sampled are left to rays */
     const trc_world_desc *world; /* use_sampling, map_resolution and the sun are read; NULL stands
                                     for 1, 0 and none */
     const struct trc_light_table

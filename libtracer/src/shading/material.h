@@ -61,7 +61,11 @@ enum {
     TRC_MATERIAL_HAS_TRANSLUCENT = 1 << 8,
     TRC_MATERIAL_HAS_HOLDOUT = 1 << 9,
     TRC_MATERIAL_EMISSION_VARIES = 1 << 10, /* emission depends on the program */
-    TRC_MATERIAL_READS_LIGHT_PATH = 1 << 11
+    TRC_MATERIAL_READS_LIGHT_PATH = 1 << 11,
+    /* Lobes that no ray is continued for: only samples of lights bring them light. */
+    TRC_MATERIAL_IS_MATT = TRC_MATERIAL_HAS_DIFFUSE | TRC_MATERIAL_HAS_TRANSLUCENT,
+    /* All lobes that light samples light. */
+    TRC_MATERIAL_SCATTERS = TRC_MATERIAL_IS_MATT | TRC_MATERIAL_HAS_GLOSSY
 };
 
 struct trc_material {

@@ -9,6 +9,7 @@
 #include "kernels/kernels.h"
 #include "query_scene.h"
 #include "render/render.h"
+#include "sampling/filter.h"
 #include "sampling/sobol.h"
 
 /* As the renderer has them: render/schedule.c and render/render.c. */
@@ -59,7 +60,9 @@ static void tile_render(struct trc_tile_job job, uint32_t x, uint32_t y, struct 
 static trc_status eye_render(const struct frame_scene *scene, const trc_render_desc *desc,
                              const uint32_t *table, struct frame_result *out) {
     struct trc_film film;
+    float filter_table[TRC_FILTER_TABLE];
     const atomic_uint cancel = 0;
+    trc_filter_table_fill(desc->filter, desc->filter_width, filter_table);
     const trc_status status = trc_film_create(desc, &film);
     if (status != TRC_OK)
         return status;
@@ -67,6 +70,7 @@ static trc_status eye_render(const struct frame_scene *scene, const trc_render_d
         .snapshot = query_scene_snapshot(scene->scene),
         .desc = desc,
         .sampler_table = table,
+        .filter_table = filter_table,
         .film = &film,
         .memory = buffer_alloc(1, trc_kernels_counted.tile_memory_bytes(desc)),
         .cancel = &cancel};

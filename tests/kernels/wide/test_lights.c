@@ -75,17 +75,17 @@ static void scene_triangle(struct scene *s, const float corners[9], uint16_t mat
     s->snapshot.instance_count = 1;
 }
 static void scene_commit_as(struct scene *s, const trc_light_desc *lights, uint32_t count,
-                            bool is_sampled) {
+                            uint32_t scatters) {
     struct trc_pool *pool;
     assert_int_equal(trc_pool_create(2, &pool), TRC_OK);
     const struct trc_light_options options = {
-        .lights = lights, .light_count = count, .is_sampled = is_sampled, .pool = pool};
+        .lights = lights, .light_count = count, .scatters = scatters, .pool = pool};
     assert_int_equal(trc_light_table_create(&s->snapshot, &options, &s->table), TRC_OK);
     trc_pool_destroy(pool);
     s->snapshot.lights = s->table;
 }
 static void scene_commit(struct scene *s, const trc_light_desc *lights, uint32_t count) {
-    scene_commit_as(s, lights, count, true);
+    scene_commit_as(s, lights, count, TRC_MATERIAL_SCATTERS);
 }
 static void scene_end(struct scene *s) { trc_light_table_destroy(s->table); }
 
@@ -651,7 +651,7 @@ static void lights_that_are_not_sampled(void **state) {
     s.snapshot.world.material = 1;
     s.snapshot.world.radiance[0] = 1.0f;
     const trc_light_desc d = lamp(TRC_LIGHT_AREA, 0, 0, 1);
-    scene_commit_as(&s, &d, 1, false);
+    scene_commit_as(&s, &d, 1, 0);
     assert_int_equal((int)s.table->lamp_count, 1);
     assert_int_equal((int)s.table->group_seen[TRC_MAX_LIGHT_GROUPS + 1], 1);
     assert_int_equal((int)s.table->triangle_count, 0);
@@ -672,7 +672,7 @@ static void allocation_failures(void **state) {
     struct trc_pool *pool; /* of one thread: threads free memory as they start */
     assert_int_equal(trc_pool_create(1, &pool), TRC_OK);
     const struct trc_light_options options = {
-        .lights = &d, .light_count = 1, .is_sampled = true, .pool = pool};
+        .lights = &d, .light_count = 1, .scatters = TRC_MATERIAL_SCATTERS, .pool = pool};
     const uint64_t before = trc_memory_bytes();
     for (int64_t n = 0;; n++) {
         trc_memory_fail_at(n, false);
