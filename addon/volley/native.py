@@ -107,7 +107,7 @@ class _InstanceDesc(_Struct):
                 ("materials", _ptr), ("material_count", _u32), ("visibility", _u32),
                 ("pass_index", _i32), ("random", _f32), ("color", _f32 * 4),
                 ("cryptomatte_object", _f32), ("cryptomatte_asset", _f32), ("light_group", _u32),
-                ("reserved", _u32)]
+                ("value_count", _u32), ("values", _ptr)]
 
 
 class _LightDesc(_Struct):
@@ -155,7 +155,8 @@ class _ImageDesc(_Struct):
 
 
 class _SceneDesc(_Struct):
-    _fields_ = [("struct_size", _u32), ("thread_count", _u32), ("is_final", _u32), ("reserved", _u32)]
+    _fields_ = [("struct_size", _u32), ("thread_count", _u32), ("is_final", _u32),
+                ("image_megabytes", _u32)]
 
 
 class _SceneStats(_Struct):
@@ -356,9 +357,10 @@ def cryptomatte_id(name):
 class Scene:
     """A scene of the library. Ids are plain integers; 0 stands for "none"."""
 
-    def __init__(self, is_final=True, thread_count=0):
+    def __init__(self, is_final=True, thread_count=0, image_megabytes=0):
         handle = _u64()
-        desc = _SceneDesc(thread_count=thread_count, is_final=int(is_final))
+        desc = _SceneDesc(thread_count=thread_count, is_final=int(is_final),
+                          image_megabytes=image_megabytes)
         _call("trc_scene_create", ctypes.byref(desc), ctypes.byref(handle))
         self._handle = handle.value
         self.revision = 0  # rises with every edit: equal numbers mean nothing to commit
@@ -442,7 +444,7 @@ class Scene:
     def update_instance(self, instance, **values):
         """mesh: id; transforms (keys, 12) float32; materials: ids by slot; visibility; pass_index;
         random [0, 1); color: four floats; cryptomatte_object and cryptomatte_asset: ids; light_group: of
-        its emission, 0 for none."""
+        its emission, 0 for none; values: numbers that its materials ask for."""
         desc, keep = self._instance_desc(**values)
         self._edit("trc_instance_update", instance, ctypes.byref(desc))
 
@@ -452,16 +454,17 @@ class Scene:
     @staticmethod
     def _instance_desc(mesh, transforms, materials=(), visibility=VISIBLE_ALL, pass_index=0,
                        random=0.0, color=(1.0, 1.0, 1.0, 1.0), cryptomatte_object=0.0,
-                       cryptomatte_asset=0.0, light_group=0):
+                       cryptomatte_asset=0.0, light_group=0, values=()):
         transforms = _array(transforms, np.float32).reshape(-1, 12)
         ids = np.array(materials, dtype=np.uint64)
+        numbers = np.array(values, dtype=np.float32)
         desc = _InstanceDesc(
             key_count=len(transforms), mesh=mesh, transforms=_address(transforms),
             materials=_address(ids), material_count=len(ids), visibility=visibility,
             pass_index=pass_index, random=random, color=tuple(color),
             cryptomatte_object=cryptomatte_object, cryptomatte_asset=cryptomatte_asset,
-            light_group=light_group)
-        return desc, (transforms, ids)
+            light_group=light_group, values=_address(numbers), value_count=len(numbers))
+        return desc, (transforms, ids, numbers)
 
     # Lights, world, camera
 

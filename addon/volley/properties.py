@@ -152,6 +152,11 @@ class VolleySceneSettings(bpy.types.PropertyGroup):
     packet_size: EnumProperty(
         name="Packet Size", items=PACKET_ITEMS, default='AUTO', description="Rays in a packet",
         update=_changed)
+    texture_memory: IntProperty(
+        name="Texture Limit", default=0, min=0, soft_max=65536, max=0xFFFFFF,
+        description="Most memory for images, MiB: where more are used, the largest are shown at half their "
+                    "size, again and again. 0 for no limit; taken by renders and views that start",
+        update=_changed)
 
     film_exposure: FloatProperty(
         name="Exposure", default=1.0, min=0.0, soft_max=10.0, description="Factor on all light",

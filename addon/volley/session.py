@@ -84,10 +84,11 @@ class Session:
 
     def _open(self, scene, keep):
         """The library's scene: the one kept from the last frame, or a new one."""
-        settings = (keep, thread_count(scene.render))
+        settings = (keep, thread_count(scene.render), scene.volley.texture_memory)
         if self._sync is None or self._sync_settings != settings:
             self.free()
-            self._sync = SceneSync(is_final=True, thread_count=settings[1], will_resync=keep)
+            self._sync = SceneSync(is_final=True, thread_count=settings[1], will_resync=keep,
+                                   image_megabytes=settings[2])
             self._sync_settings = settings
 
     def _synchronise(self, engine, depsgraph, frame, shutter, view_names):

@@ -240,6 +240,14 @@ class VOLLEY_RENDER_PT_performance_threads(_VolleyPanel, Panel):
         column.prop(render, "threads")
 
 
+class VOLLEY_RENDER_PT_performance_memory(_VolleyPanel, Panel):
+    bl_label = "Memory"
+    bl_parent_id = "VOLLEY_RENDER_PT_performance"
+
+    def draw(self, context):
+        _column(self).prop(context.scene.volley, "texture_memory")
+
+
 class VOLLEY_RENDER_PT_performance_packets(_VolleyPanel, Panel):
     bl_label = "Packets"
     bl_parent_id = "VOLLEY_RENDER_PT_performance"

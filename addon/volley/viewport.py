@@ -87,8 +87,9 @@ class Viewport:
         if self._build is not None and not self._end_build(NAP_SECONDS if may_wait else 0.0):
             return False
         if self._sync is None:
-            self._sync = SceneSync(is_final=False, thread_count=thread_count(depsgraph.scene_eval.render),
-                                   will_resync=True)
+            scene = depsgraph.scene_eval
+            self._sync = SceneSync(is_final=False, thread_count=thread_count(scene.render),
+                                   will_resync=True, image_megabytes=scene.volley.texture_memory)
         visibility = _visibility_of(context.space_data)
         if visibility != self._visibility:  # Blender tells no engine of these
             self._changes, self._visibility = Changes.everything(), visibility

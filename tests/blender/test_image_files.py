@@ -80,22 +80,25 @@ def test_tiles(blender):
     assert "tiles" not in blender.output
 
 
-def inside_limit():
-    """[Volley's, Cycles'] of noise as it is and where Simplify makes a quarter of its side."""
+def _noise_file(width):
+    """An image from a file of noise."""
     import os
     import tempfile
     import bpy
     path = os.path.join(tempfile.mkdtemp(prefix="volley_"), "large.png")
+    made = bpy.data.images.new("Noise", width, width)
+    pixels = np.ones((width, width, 4), np.float32)
+    pixels[..., :3] = np.random.default_rng(1).uniform(0.0, 1.0, (width, width, 3))
+    made.pixels.foreach_set(pixels.reshape(-1))
+    made.filepath_raw, made.file_format = path, 'PNG'
+    made.save()
+    return bpy.data.images.load(path)
 
-    def image():
-        made = bpy.data.images.new("Noise", 512, 512)
-        pixels = np.ones((512, 512, 4), np.float32)
-        pixels[..., :3] = np.random.default_rng(1).uniform(0.0, 1.0, (512, 512, 3))
-        made.pixels.foreach_set(pixels.reshape(-1))
-        made.filepath_raw, made.file_format = path, 'PNG'
-        made.save()
-        return bpy.data.images.load(path)
-    _stage(image)
+
+def inside_limit():
+    """[Volley's, Cycles'] of noise as it is and where Simplify makes a quarter of its side."""
+    import bpy
+    _stage(lambda: _noise_file(512))
     scene = bpy.context.scene
     pairs = [_both()]
     scene.render.use_simplify, scene.cycles.texture_limit_render = True, '128'
@@ -106,3 +109,22 @@ def test_limit(blender):
     (full, _), (ours, theirs) = blender.run(inside_limit)
     assert full.std() > 2.0 * theirs.std()  # noise that is averaged
     _close(ours, theirs, 0.02)
+
+
+def inside_memory():
+    """Volley's of noise of 4 MiB within 1 MiB, Cycles' of half its side."""
+    import bpy
+    import scenes
+    _stage(lambda: _noise_file(1024))
+    scene = bpy.context.scene
+    scene.volley.texture_memory = 1
+    scenes.set_engine('VOLLEY', 1)
+    ours = scenes.render()[..., :3]
+    scene.render.use_simplify, scene.cycles.texture_limit_render = True, '512'
+    scenes.set_engine('CYCLES', 1)
+    return ours, scenes.render()[..., :3]
+
+
+def test_memory(blender):
+    _close(*blender.run(inside_memory), 0.02)
+    assert "1 images are shown smaller, to keep all within 1 MiB" in blender.output

@@ -163,6 +163,44 @@ static void test_limits(void **state) {
     }
 }
 
+static uint64_t committed_bytes(trc_scene scene, char *warnings, size_t capacity) {
+    trc_scene_stats stats = {.struct_size = sizeof stats};
+    assert_int_equal(trc_scene_commit(scene), TRC_OK);
+    assert_int_equal(trc_scene_get_stats(scene, &stats), TRC_OK);
+    assert_int_equal(trc_scene_get_warnings(scene, warnings, capacity, NULL), TRC_OK);
+    return stats.image_bytes;
+}
+
+/* Images of 256 KiB in a scene that allows 1 MiB: the fifth makes two of them smaller, the sixth a
+ * third. Where there is no memory for a smaller one the image is refused and all others stay. */
+static void test_scene_limit(void **state) {
+    (void)state;
+    static uint8_t pixels[256 * 256 * 4];
+    char warnings[200];
+    const trc_scene_desc scene_desc = {
+        .struct_size = sizeof scene_desc, .thread_count = 1, .image_megabytes = 1};
+    const trc_image_desc desc = pixels_desc(256, 256, pixels, false);
+    trc_scene scene = 0;
+    trc_id id = 0;
+    assert_int_equal(trc_scene_create(&scene_desc, &scene), TRC_OK);
+    for (int i = 0; i < 4; i++)
+        assert_int_equal(trc_image_create(scene, &desc, &id), TRC_OK);
+    assert_int_equal(committed_bytes(scene, warnings, sizeof warnings), 4 << 18);
+    assert_string_equal(warnings, "");
+    for (int64_t n = 2; n < 4; n++) {
+        trc_memory_fail_at(n, false);
+        assert_int_equal(trc_image_create(scene, &desc, &id), TRC_ERROR_OUT_OF_MEMORY);
+        trc_memory_fail_at(-1, false);
+        assert_int_equal(committed_bytes(scene, warnings, sizeof warnings), 4 << 18);
+    }
+    assert_int_equal(trc_image_create(scene, &desc, &id), TRC_OK);
+    assert_int_equal(committed_bytes(scene, warnings, sizeof warnings), (3 << 18) + (2 << 16));
+    assert_non_null(strstr(warnings, "2 images are shown smaller"));
+    assert_int_equal(trc_image_create(scene, &desc, &id), TRC_OK);
+    assert_int_equal(committed_bytes(scene, warnings, sizeof warnings), (3 << 18) + (3 << 16));
+    assert_int_equal(trc_scene_destroy(scene), TRC_OK);
+}
+
 static void test_holders(void **state) {
     (void)state;
     static const uint8_t pixels[4];
@@ -481,6 +519,7 @@ int main(void) {
         cmocka_unit_test(test_floats),
         cmocka_unit_test(test_refused_pixels),
         cmocka_unit_test(test_limits),
+        cmocka_unit_test(test_scene_limit),
         cmocka_unit_test(test_holders),
         cmocka_unit_test(test_memory_failures),
 #ifdef TRC_WITH_OIIO

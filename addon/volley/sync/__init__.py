@@ -44,8 +44,8 @@ class Source:
 class SceneSync:
     """One scene of the library and what it was last told."""
 
-    def __init__(self, is_final, thread_count, will_resync):
-        self.scene = native.Scene(is_final, thread_count)
+    def __init__(self, is_final, thread_count, will_resync, image_megabytes=0):
+        self.scene = native.Scene(is_final, thread_count, image_megabytes)
         self.warnings = Warnings()
         self._images = Images(self.scene, self.warnings)
         self._materials = Materials(self.scene, self._images, self.warnings)
@@ -117,19 +117,28 @@ class SceneSync:
             fields = light.describe(each.object, item, self.warnings)
             return fields is not None and self._lights.change(item.key, fields)
         known = shown.items[instance.key_of(each)]
-        if name in source.changes.geometry:
-            data = each.object.data
-            is_pose = name not in source.changes.topology and mesh.is_posable(each.object)
-            is_known = mesh.keeps_topology(each.object) \
-                and each.object.original.data.name_full not in source.changes.meshes
-            if shown.users[known.mesh_key] != 1 or not is_pose or not self._meshes.pose(
-                    known.mesh_key, data.as_pointer(), data, is_known):
-                return False
+        if name in source.changes.geometry and not self._change_mesh(each, known, shown, source):
+            return False
         item = instance.describe(each, view_layer, source.light_groups)
         item.mesh_key = known.mesh_key
         item.materials = _material_ids(self._materials, each, view_layer)
         self._instances.change(item, self._meshes.id_of(item.mesh_key))
+        self._meshes.free_retired()
         return True
+
+    def _change_mesh(self, each, known, shown, source):
+        """Send the mesh of one object, of a pose the places of its vertices alone; False where others
+        show it too or it has no faces now."""
+        if shown.users[known.mesh_key] != 1:
+            return False
+        changes, blender_object = source.changes, each.object
+        data, pointer = blender_object.data, blender_object.data.as_pointer()
+        if known.owner not in changes.topology and mesh.is_posable(blender_object):
+            is_known = mesh.keeps_topology(blender_object) \
+                and blender_object.original.data.name_full not in changes.meshes
+            if self._meshes.pose(known.mesh_key, pointer, data, is_known):
+                return True
+        return _Walk(self, source, None).read_mesh(known, blender_object, pointer)
 
     def _sync_materials(self, source):
         """Flatten the materials first: they say which attributes the meshes must bring."""
@@ -220,7 +229,7 @@ class _Walk:
     def __init__(self, sync, source, shutter):
         self._sync, self._source, self._shutter = sync, source, shutter
         self._view_layer = source.depsgraph.view_layer_eval
-        uv_names, color_names, needs_generated = sync._materials.attribute_names()
+        uv_names, color_names, needs_generated, self._needs_instancer = sync._materials.attribute_names()
         if source.needs_uv:
             uv_names.add("")
         self._names = frozenset(uv_names), frozenset(color_names), needs_generated
@@ -292,6 +301,8 @@ class _Walk:
             parent = each.parent if each.is_instance else None
             item.motion_keys = motion.key_count(blender_object, parent)
             item.transforms *= item.motion_keys
+        if self._needs_instancer and each.is_instance:
+            item.values = instance.instancer_values(each, self._source.depsgraph.scene_eval)
         item.mesh_key = self._mesh_key(item, blender_object)
         if item.mesh_key is not None:
             self.items[item.key] = item
@@ -362,10 +373,12 @@ class _Walk:
         pointer = data.as_pointer()
         if pointer in self._owners:
             return self._owners[pointer]
-        self._owners[pointer] = item.key if self._read_mesh(item, blender_object, pointer) else None
+        self._owners[pointer] = item.key if self.read_mesh(item, blender_object, pointer) else None
         return self._owners[pointer]
 
-    def _read_mesh(self, item, blender_object, pointer):
+    def read_mesh(self, item, blender_object, pointer):
+        """Have the mesh of an item in the library, or wait for its shapes; False where there is nothing
+        to show."""
         meshes = self._sync._meshes
         is_changed = self._source.changes.geometry_of(item.owner)
         if not is_changed and meshes.reuse(item.key, pointer, self._names):

@@ -7,6 +7,7 @@ Functions as in ``textures.py``: of the walker, the node and its ``Sockets``.
 import numpy as np
 
 from ..compat import TRANSFORMS_NORMALS
+from .instance import VALUES_LOCATION, VALUES_PARTICLE, VALUES_SPIN, VALUES_VELOCITY
 from .strands import HAIR_ATTRIBUTE
 from .values import CONSTANT, DEFAULT, Value
 
@@ -14,6 +15,7 @@ from .values import CONSTANT, DEFAULT, Value
 CURVES, FLOAT_CURVE, BLACKBODY, WAVELENGTH, VECTOR_TRANSFORM, VECTOR_ROTATE, CAMERA_DATA, \
     WIREFRAME = range(104, 112)
 _COLOR_ATTRIBUTE, _MATH, _LIGHT_PATH, _GEOMETRY, _SEPARATE, _COMBINE, _MAP_RANGE = 67, 71, 74, 75, 82, 83, 84
+_INSTANCE_VALUES = 90
 
 # TRC_MATH_*
 _ADD, _SUBTRACT, _MULTIPLY, _DIVIDE, _MULTIPLY_ADD, _GREATER_THAN, _FLOOR = 0, 1, 2, 3, 4, 14, 20
@@ -195,9 +197,22 @@ def _hair_info(walker, node, _sockets):
             "Tangent Normal": _constant('v', 0.0), "Random": random}
 
 
+def instance_value(walker, kind, first):
+    """One or three of the numbers of instance.instancer_values, which are 0 in an object of its own."""
+    walker.flat.needs_instancer = True
+    index = walker.emit(_INSTANCE_VALUES, (), first)
+    return Value('v', index, 0) if kind == 'v' else Value(
+        'f', walker.emit(_SEPARATE, (Value('c', index, 0),)), 0)
+
+
 def _particle_info(walker, node, _sockets):
-    walker.warn("Particle Info is not supported, 0 is used")
-    return {s.identifier: _constant('v' if s.type == 'VECTOR' else 'f') for s in node.outputs}
+    outputs = {name: instance_value(walker, 'f', VALUES_PARTICLE + i) for i, name in enumerate(
+        ("Index", "Random", "Age", "Lifetime", "Size")) if node.outputs[name].is_linked}
+    for name, first in (("Location", VALUES_LOCATION), ("Velocity", VALUES_VELOCITY),
+                        ("Angular Velocity", VALUES_SPIN)):
+        if node.outputs[name].is_linked:
+            outputs[name] = instance_value(walker, 'v', first)
+    return outputs
 
 
 CONVERTERS = {

@@ -42,6 +42,7 @@ class FlatTree:
         self.uv_names = set()     # "" is the default UV map
         self.color_names = set()  # "" is the active colour attribute
         self.needs_generated = False  # coordinates of the undeformed mesh
+        self.needs_instancer = False  # what made the instance, see instance.instancer_values
         self.sun = None           # sky_texture.Sun that the tree shows
         self.follows_objects = False  # it reads where other objects are
 

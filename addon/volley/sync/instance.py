@@ -13,6 +13,7 @@ import numpy as np
 
 from .. import native
 from . import motion, visibility
+from .hashing import HASH_MAX, hash_name, hash_pair
 from .matrix import rows12
 
 
@@ -32,6 +33,7 @@ class Item:
     random: float = 0.0
     color: tuple = (1.0, 1.0, 1.0, 1.0)
     light_group: int = 0       # from 1 on, 0 for none
+    values: tuple = ()         # see instancer_values
     light: dict = None         # fields of a light instead of a mesh
     motion_keys: int = 1       # how many the object asks for
     deforms: bool = False      # whether the mesh may change its shape in time
@@ -84,45 +86,14 @@ def names_of(instance):
 
 def random_of(instance):
     """Object Info's Random, [0, 1), the number Cycles has for the same instance."""
-    number = instance.random_id & 0xFFFFFFFF if instance.is_instance \
+    number = instance.random_id & HASH_MAX if instance.is_instance \
         else _name_random(instance.object.name)
-    return min(number / 0xFFFFFFFF, 1.0 - 2.0 ** -24)
-
-
-def _hash_name(name):
-    """A 32-bit polynomial hash of the name's bytes, base 37."""
-    value = 0
-    for byte in name.encode("utf-8"):
-        value = (value * 37 + byte) & 0xFFFFFFFF
-    return value
+    return min(number / HASH_MAX, 1.0 - 2.0 ** -24)
 
 
 @functools.lru_cache(maxsize=1 << 16)  # a walk asks for every object
 def _name_random(name):
-    return _hash_pair(_hash_name(name), 0)
-
-
-def _hash_pair(x, y):
-    """Bob Jenkins, "lookup3" (2006), final mixing of two 32-bit words, or arrays of them in 64 bits."""
-    mask = 0xFFFFFFFF
-
-    def rotate(value, bits):
-        return ((value << bits) | (value >> (32 - bits))) & mask
-
-    a = b = c = (0xDEADBEEF + (2 << 2) + 13) & mask
-    a, b = (a + x) & mask, (b + y) & mask
-    c = ((c ^ b) - rotate(b, 14)) & mask
-    a = ((a ^ c) - rotate(c, 11)) & mask
-    b = ((b ^ a) - rotate(a, 25)) & mask
-    c = ((c ^ b) - rotate(b, 16)) & mask
-    a = ((a ^ c) - rotate(c, 4)) & mask
-    b = ((b ^ a) - rotate(a, 14)) & mask
-    return ((c ^ b) - rotate(b, 24)) & mask
-
-
-def hash_numbers(numbers):
-    """The number of Cycles for each of many strands, 32 bits."""
-    return _hash_pair(np.asarray(numbers, np.int64), 0).astype(np.float64)
+    return hash_pair(hash_name(name), 0)
 
 
 def _uppermost(blender_object):
@@ -142,6 +113,27 @@ def describe(instance, view_layer, light_groups):
         pass_index=blender_object.pass_index, random=random_of(instance),
         color=tuple(blender_object.color),
         light_group=light_groups.get(blender_object.lightgroup, 0))
+
+
+# Where the numbers of instancer_values begin.
+VALUES_PARTICLE, VALUES_LOCATION, VALUES_VELOCITY, VALUES_SPIN, VALUES_GENERATED, VALUES_UV = 0, 5, 8, 11, 14, 17
+
+
+def instancer_values(instance, scene):
+    """What made an instance: its particle's index, random number, age, lifetime (frames) and size, its
+    location, velocity and angular velocity, the Generated (halved, as in Cycles) and the UV coordinates
+    of its place; 0 what there is not. Child particles have nothing, as in Cycles."""
+    values = np.zeros(19, np.float32)
+    values[VALUES_GENERATED:VALUES_UV] = 0.5 * np.array(instance.orco) - 0.5
+    values[VALUES_UV:] = instance.uv
+    system, number = instance.particle_system, instance.persistent_id[0]
+    if system is not None and 0 <= number < len(system.particles):
+        particle = system.particles[number]
+        age = scene.frame_current_final - particle.birth_time
+        values[:VALUES_GENERATED] = (
+            number, hash_pair(number, 0) / HASH_MAX, age, particle.lifetime, particle.size,
+            *particle.location, *particle.velocity, *particle.angular_velocity)
+    return tuple(np.nan_to_num(values).tolist())
 
 
 def has_mesh(instance):
@@ -208,13 +200,14 @@ class Instances:
     def _update_one(self, item, mesh_id):
         transforms = motion.follow_turns(collapse(item.transforms))
         signature = (mesh_id, transforms.tobytes(), item.materials, item.visibility, item.pass_index,
-                     item.random, item.color, item.name, item.asset, item.light_group)
+                     item.random, item.color, item.name, item.asset, item.light_group, item.values)
         entry = self._entries.get(item.key)
         if entry is not None and entry.signature == signature:
             return
         values = {"mesh": mesh_id, "transforms": transforms, "materials": item.materials,
                   "visibility": item.visibility, "pass_index": item.pass_index,
                   "random": item.random, "color": item.color, "light_group": item.light_group,
+                  "values": item.values,
                   "cryptomatte_object": native.cryptomatte_id(item.name),
                   "cryptomatte_asset": native.cryptomatte_id(item.asset)}
         if entry is None:

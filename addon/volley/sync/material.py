@@ -97,13 +97,14 @@ class Materials:
 
     def attribute_names(self):
         """The UV maps and colour attributes that the materials of this sync read, two sets, and whether
-        one reads Generated coordinates."""
-        uv_names, color_names, needs_generated = set(), set(), False
+        one reads Generated coordinates, and one what made the instance."""
+        uv_names, color_names, needs_generated, needs_instancer = set(), set(), False, False
         for key in self._seen:
             uv_names |= self._entries[key].uv_names
             color_names |= self._entries[key].color_names
             needs_generated |= self._entries[key].needs_generated
-        return uv_names, color_names, needs_generated
+            needs_instancer |= self._entries[key].needs_instancer
+        return uv_names, color_names, needs_generated, needs_instancer
 
     def end(self):
         """Free what nothing asked for since begin; call when no instance uses it any more."""
@@ -137,6 +138,7 @@ class Materials:
         entry.signature, entry.name = signature, name
         entry.uv_names, entry.color_names = flat.uv_names, flat.color_names
         entry.needs_generated, entry.sun = flat.needs_generated, flat.sun
+        entry.needs_instancer = flat.needs_instancer
         entry.images, is_animated = self._images.take_asked()
         entry.is_animated = is_animated or flat.follows_objects
 
@@ -166,6 +168,7 @@ class Entry:
         self.name = ""  # in mattes
         self.uv_names, self.color_names = set(), set()
         self.needs_generated, self.sun = False, None
+        self.needs_instancer = False
         self.images = set()  # those it reads
         self.is_animated = False  # whether what it reads may be another in the next sync
 

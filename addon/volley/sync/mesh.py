@@ -14,6 +14,7 @@ import bpy
 import numpy as np
 
 from .. import native
+from . import derived
 
 _HAS_UNDEFORMED = "undeformed_co" in bpy.types.MeshVertex.bl_rna.properties
 # Blender's interface holds corners' vertices and triangles for unsigned; reading them as signed takes some
@@ -266,7 +267,11 @@ def _colors(mesh, names, loops):
     found = []
     for name in sorted(names):
         source = name or _active_color_name(mesh)
-        values = _attribute_values(mesh, source, loops) if source else None
+        values = None
+        if source in _DERIVED:
+            values = _widen(_DERIVED[source](mesh)[:, None])[_corner_vertices(mesh)[loops.of_triangles]]
+        elif source:
+            values = _attribute_values(mesh, source, loops)
         if values is not None:
             found.append((name, values))
     return found
@@ -278,6 +283,15 @@ def _active_color_name(mesh):
     index = colors.render_color_index
     return colors[index].name if 0 <= index < len(colors) else ""
 
+
+def _edges(mesh):
+    return _read(mesh.edges, "vertices", (len(mesh.edges), 2), _INDEX_TYPE)
+
+
+_DERIVED = {  # attributes that Blender does not have: (vertices,) float32 of a mesh
+    derived.POINTINESS: lambda mesh: derived.pointiness(
+        read_positions(mesh), _vertex_normals(mesh), _edges(mesh)),
+    derived.ISLAND: lambda mesh: derived.island_numbers(len(mesh.vertices), _edges(mesh))}
 
 _WIDTHS = {'FLOAT_COLOR': ("color", 4), 'BYTE_COLOR': ("color", 4), 'FLOAT_VECTOR': ("vector", 3),
            'FLOAT2': ("vector", 2), 'FLOAT': ("value", 1), 'INT': ("value", 1)}
@@ -469,7 +483,12 @@ class Meshes:
 
     def end(self):
         """Free what this sync did not see; call after the instances were updated."""
-        unused = [key for key in self._entries if key not in self._seen]
-        for mesh_id in self._retired + [self._entries.pop(key).id for key in unused]:
+        for key in [key for key in self._entries if key not in self._seen]:
+            self._retired.append(self._entries.pop(key).id)
+        self.free_retired()
+
+    def free_retired(self):
+        """Free the meshes that others took the place of; call after their instances were updated."""
+        for mesh_id in self._retired:
             self._scene.destroy_mesh(mesh_id)
         self._retired = []

@@ -11,7 +11,9 @@ from collections import namedtuple
 import numpy as np
 
 from ..compat import HAS_CORRELATED_MICROFACETS, KEEPS_DIFFUSE_ENERGY, RAMP_STEPS
-from .converters import CONVERTERS
+from .converters import CONVERTERS, instance_value
+from .derived import ISLAND, POINTINESS
+from .instance import VALUES_GENERATED, VALUES_UV
 from .textures import TEXTURES
 from .values import CONSTANT, DEFAULT, Value
 
@@ -156,10 +158,6 @@ _SPECS = {
             "Is Camera Ray", "Is Shadow Ray", "Is Diffuse Ray", "Is Glossy Ray", "Is Singular Ray",
             "Is Reflection Ray", "Is Transmission Ray", "Ray Length", "Ray Depth", "Diffuse Depth",
             "Glossy Depth", "Transparent Depth", "Transmission Depth"))),
-    "ShaderNodeNewGeometry": Spec(
-        GEOMETRY, (), (("Position", 'v'), ("Normal", 'v'), ("Tangent", 'v'), ("True Normal", 'v'),
-                       ("Incoming", 'v'), ("Parametric", 'v'), ("Backfacing", 'f'),
-                       ("Pointiness", 'f'), ("Random Per Island", 'f'))),
     "ShaderNodeInvert": Spec(INVERT, (('f', "Fac"), ('c', "Color")), (("Color", 'c'),)),
     "ShaderNodeGamma": Spec(GAMMA, (('c', "Color"), ('f', "Gamma")), (("Color", 'c'),)),
     "ShaderNodeHueSaturation": Spec(
@@ -427,16 +425,27 @@ def _environment(walker, node, sockets):
     return _outputs(walker, index, (("Color", 'c'),))
 
 
+def _geometry(walker, node, sockets):
+    _note_generated(walker, node, GEOMETRY, ())
+    outputs = _outputs(walker, walker.emit(GEOMETRY, ()), (
+        ("Position", 'v'), ("Normal", 'v'), ("Tangent", 'v'), ("True Normal", 'v'), ("Incoming", 'v'),
+        ("Parametric", 'v'), ("Backfacing", 'f')))
+    for output, attribute in (("Pointiness", POINTINESS), ("Random Per Island", ISLAND)):
+        if node.outputs[output].is_linked:
+            walker.flat.color_names.add(attribute)
+            index = walker.emit(COLOR_ATTRIBUTE, (), name=attribute)
+            outputs[output] = Value('f', walker.emit(SEPARATE, (Value('c', index, 0),)), 0)
+    return outputs
+
+
 def _uv_map(walker, node, _sockets):
     if node.from_instancer:
-        return None
+        return {"UV": instance_value(walker, 'v', VALUES_UV)}
     walker.flat.uv_names.add(node.uv_map)
     return _outputs(walker, walker.emit(UV_MAP, (), name=node.uv_map), (("UV", 'v'),))
 
 
 def _texture_coordinate(walker, node, _sockets):
-    if node.from_instancer:
-        walker.warn("Texture Coordinate: From Instancer is not supported, the object's own are used")
     linked = {s.identifier for s in node.outputs if s.is_linked}
     if "UV" in linked:
         walker.flat.uv_names.add("")
@@ -446,6 +455,9 @@ def _texture_coordinate(walker, node, _sockets):
         "Generated", "Normal", "UV", "Object", "Camera", "Window", "Reflection")))
     if node.object is not None and "Object" in linked:
         outputs["Object"] = _place_in(walker, node.object)
+    if node.from_instancer:
+        outputs["Generated"] = instance_value(walker, 'v', VALUES_GENERATED)
+        outputs["UV"] = instance_value(walker, 'v', VALUES_UV)
     return outputs
 
 
@@ -544,7 +556,7 @@ _SPECIAL = {
     "ShaderNodeBsdfPrincipled": _principled, "ShaderNodeBsdfSheen": _sheen,
     "ShaderNodeBsdfMetallic": _metallic,
     "ShaderNodeValue": _value, "ShaderNodeRGB": _rgb,
-    "ShaderNodeNormal": _normal, "ShaderNodeTexImage": _image,
+    "ShaderNodeNewGeometry": _geometry, "ShaderNodeNormal": _normal, "ShaderNodeTexImage": _image,
     "ShaderNodeTexEnvironment": _environment, "ShaderNodeUVMap": _uv_map,
     "ShaderNodeTexCoord": _texture_coordinate, "ShaderNodeVertexColor": _color_attribute,
     "ShaderNodeAttribute": _attribute, "ShaderNodeNormalMap": _normal_map,

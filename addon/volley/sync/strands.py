@@ -14,7 +14,7 @@ import numpy as np
 
 from .. import native
 from ..compat import cycles_curves
-from .instance import hash_numbers
+from .hashing import HASH_MAX, hash_numbers
 from .mesh import MeshData
 
 HAIR_ATTRIBUTE = ".hair"  # (intercept, length, thickness, random) of the Hair Info node
@@ -203,7 +203,7 @@ def _hair_info(places, radii, numbers):
     info = np.empty(radii.shape + (4,))
     info[..., 0], info[..., 2] = fractions, 2.0 * radii
     info[..., 1] = lengths[:, None]
-    info[..., 3] = (hash_numbers(numbers) / 0xFFFFFFFF)[:, None]
+    info[..., 3] = (hash_numbers(numbers) / HASH_MAX)[:, None]
     return info.reshape(-1, 4)
 
 

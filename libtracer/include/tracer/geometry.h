@@ -71,6 +71,8 @@ enum {
     TRC_VISIBLE_ALL = 31
 };
 
+#define TRC_MAX_INSTANCE_VALUES 64
+
 typedef struct trc_instance_desc {
     uint32_t struct_size;
     uint32_t key_count; /* transforms, 1..TRC_MAX_KEYS, evenly spaced over [0, 1] */
@@ -86,7 +88,8 @@ typedef struct trc_instance_desc {
     float cryptomatte_object, cryptomatte_asset; /* trc_cryptomatte_id of its name and of its
                                                     asset's name; 0: in no matte */
     uint32_t light_group;                        /* of its emission, 0..TRC_MAX_LIGHT_GROUPS */
-    uint32_t reserved;
+    uint32_t value_count;                        /* 0..TRC_MAX_INSTANCE_VALUES */
+    const float *values;                         /* for TRC_NODE_INSTANCE_VALUES */
 } trc_instance_desc;
 
 TRC_API trc_status trc_instance_create(trc_scene scene, const trc_instance_desc *desc,

@@ -87,6 +87,8 @@ enum {
                                   f random */
     TRC_NODE_VECTOR_MATH = 88, /* c a, c b, c c, f scale -> c vector, f value; mode: TRC_VECTOR_* */
     TRC_NODE_RGB_TO_BW = 89,   /* c color -> f */
+    TRC_NODE_INSTANCE_VALUES = 90, /* -> c, three of the values of the instance; mode: number of the
+                                      first. Those it does not have are 0 */
 
     /* procedural textures; vectors default to Generated */
     TRC_NODE_NOISE = 96,        /* c vector, f w, f scale, f detail, f roughness, f lacunarity,

@@ -240,23 +240,17 @@ DEFINE_SHRINK(shrink_u16, uint16_t, WHOLE_TO_FLOAT, WORD_OF)
 DEFINE_SHRINK(shrink_f16, uint16_t, half_to_float, float_to_half)
 DEFINE_SHRINK(shrink_f32, float, AS_IT_IS, AS_IT_IS)
 
-/* Halves an image, in the encoding it is stored in, as often as max_side asks for. What a block
- * does not fill at the upper and right edge is left out. */
-static trc_status limit_size(struct trc_image *image, uint32_t max_side) {
-    struct trc_image_level *level = &image->levels[0];
-    const uint32_t longest = level->width > level->height ? level->width : level->height;
-    const uint32_t shortest = level->width < level->height ? level->width : level->height;
-    uint32_t step = 1;
-    while (longest / step > max_side && shortest / step > 1)
-        step *= 2;
-    if (!max_side || step == 1)
-        return TRC_OK;
+/* The first level of an image by blocks of step by step texels, in the encoding it is stored in.
+ * What a block does not fill at the upper and right edge is left out. */
+static trc_status shrink(const struct trc_image *image, uint32_t step,
+                         struct trc_image_level *out) {
+    const struct trc_image_level *level = &image->levels[0];
     const uint32_t width = level->width / step, height = level->height / step;
-    const uint64_t bytes = (uint64_t)width * height * texel_bytes[image->format];
     void *texels = trc_alloc((uint64_t)width * height, texel_bytes[image->format]);
-    if (!texels)
+    if (!texels) {
         return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for an image of %" PRIu64 " bytes",
-                        bytes);
+                        (uint64_t)width * height * texel_bytes[image->format]);
+    }
     switch (image->format) {
     case TRC_TEXEL_U8:
         shrink_u8(level->texels, level->width, step, texels, width, height);
@@ -271,9 +265,57 @@ static trc_status limit_size(struct trc_image *image, uint32_t max_side) {
         shrink_f32(level->texels, level->width, step, texels, width, height);
         break;
     }
+    *out = (struct trc_image_level){width, height, texels};
+    return TRC_OK;
+}
+
+static uint64_t level_bytes(const struct trc_image *image) {
+    return (uint64_t)image->levels[0].width * image->levels[0].height * texel_bytes[image->format];
+}
+
+static uint32_t shorter_side(const struct trc_image_level *level) {
+    return level->width < level->height ? level->width : level->height;
+}
+
+/* Halves an image as often as max_side asks for. */
+static trc_status limit_size(struct trc_image *image, uint32_t max_side) {
+    struct trc_image_level *level = &image->levels[0];
+    const uint32_t longest = level->width > level->height ? level->width : level->height;
+    uint32_t step = 1;
+    while (longest / step > max_side && shorter_side(level) / step > 1)
+        step *= 2;
+    if (!max_side || step == 1)
+        return TRC_OK;
+    struct trc_image_level smaller;
+    TRC_TRY(shrink(image, step, &smaller));
     trc_free(level->texels);
-    *level = (struct trc_image_level){width, height, texels};
-    image->bytes = bytes;
+    *level = smaller;
+    image->bytes = level_bytes(image);
+    return TRC_OK;
+}
+
+bool trc_image_can_halve(const struct trc_image *image) {
+    return shorter_side(&image->levels[0]) > 1;
+}
+
+trc_status trc_image_halve(const struct trc_image *image, struct trc_image **half_out) {
+    struct trc_image *half = trc_alloc_zeroed(1, sizeof *half);
+    if (!half)
+        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for an image");
+    const trc_status status = shrink(image, 2, &half->levels[0]);
+    if (status != TRC_OK) {
+        trc_free(half);
+        return status;
+    }
+    atomic_init(&half->refs, 1);
+    half->format = image->format;
+    half->is_srgb = image->is_srgb;
+    half->is_associated = image->is_associated;
+    half->level_count = 1;
+    half->is_halved = true;
+    half->bytes = level_bytes(half);
+    half->bad_texel_count = image->bad_texel_count;
+    *half_out = half;
     return TRC_OK;
 }
 

@@ -8,6 +8,7 @@
 #define TRACER_IMAGE_IMAGE_H
 
 #include <stdatomic.h>
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "tracer/tracer.h"
@@ -39,6 +40,7 @@ struct trc_image {
     uint32_t is_associated; /* colours are multiplied by alpha: divided when alpha is used too */
     uint32_t level_count;   /* 1: smaller levels come with mip-mapping */
     struct trc_image_level levels[TRC_IMAGE_MAX_LEVELS];
+    bool is_halved;           /* to fit the scene's limit: worth a warning */
     uint64_t bytes;           /* of the texels */
     uint64_t bad_texel_count; /* were NaN or infinite, and are 0 now: worth a warning */
 };
@@ -47,6 +49,11 @@ struct trc_image {
  * STRUCT_SIZE, TOO_LARGE, OUT_OF_MEMORY, IMAGE (unreadable file), UNSUPPORTED (a path in a build
  * without OpenImageIO). One holder: the caller. */
 trc_status trc_image_load(const trc_image_desc *desc, struct trc_image **image_out);
+
+/* A new image of half the size, of which the caller is the holder; whether it can be: a side of one
+ * texel stays. OUT_OF_MEMORY. */
+bool trc_image_can_halve(const struct trc_image *image);
+trc_status trc_image_halve(const struct trc_image *image, struct trc_image **half_out);
 
 /* NULL is fine for all three. The last release frees. */
 struct trc_image *trc_image_retain(struct trc_image *image);

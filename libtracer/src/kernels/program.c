@@ -166,6 +166,9 @@ static void run_at_surface(const struct trc_surface *s, const struct trc_instruc
     case TRC_OP_OBJECT_RANDOM:
         out[0] = object_number(s, 5);
         break;
+    case TRC_OP_INSTANCE_VALUES:
+        op_instance_values(s, i->mode, out);
+        break;
     case TRC_OP_FRESNEL:
         out[0] = op_fresnel(s, in[0], v3_read(in + 1));
         break;

@@ -378,6 +378,16 @@ static vfloat object_number(const struct trc_surface *s, int which) {
     return out;
 }
 
+static void op_instance_values(const struct trc_surface *s, uint32_t first, vfloat out[3]) {
+    for (uint32_t c = 0; c < 3; c++)
+        out[c] = vf_zero();
+    struct lane_group g = groups_begin(s);
+    while (groups_next(s, &g)) {
+        for (uint32_t c = 0; g.instance && c < 3 && first + c < g.instance->value_count; c++)
+            out[c] = vf_select(g.lanes, vf_set(g.instance->values[first + c]), out[c]);
+    }
+}
+
 /* ---- the ray ---- */
 
 TRC_INLINE vfloat path_bit(const struct trc_surface *s, uint32_t bit) {

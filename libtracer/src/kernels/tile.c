@@ -308,10 +308,10 @@ static void film_add_passes(struct trc_tile *t, uint32_t slot, size_t pixel, boo
             const double value = (double)t->samples.pass[pass][k][slot];
             if (!isfinite(value))
                 continue;
-            if (!trc_film_is_first_sample(pass))
-                sum[k] += value;
-            else if (first)
+            if (first)
                 sum[k] = value;
+            else if (!trc_film_is_first_sample(pass))
+                sum[k] += value;
         }
     }
 }
@@ -321,8 +321,12 @@ static void film_add_passes(struct trc_tile *t, uint32_t slot, size_t pixel, boo
 static void film_add_run(struct trc_tile *t, uint32_t begin, uint32_t end, size_t pixel) {
     struct trc_film *film = t->job->film;
     double *combined = film->sums[TRC_PASS_COMBINED] + 4 * pixel;
-    double sum[4] = {combined[0], combined[1], combined[2], combined[3]};
-    uint32_t count = film->sample_counts[pixel];
+    double sum[4] = {0.0, 0.0, 0.0, 0.0};
+    /* A pixel's first sample reads nothing: fresh memory that is read before it is written costs
+     * each page a second fault, a third of a picture of one sample. */
+    uint32_t count = t->samples.index[begin] ? film->sample_counts[pixel] : 0;
+    if (count)
+        memcpy(sum, combined, sizeof sum);
     for (uint32_t slot = begin; slot < end; slot++) {
         if (!is_finite_sample(t, slot)) {
             t->job->counts.dropped_samples++;

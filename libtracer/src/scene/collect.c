@@ -66,30 +66,34 @@ trc_status trc_collect_meshes(struct trc_scene_state *scene, struct trc_snapshot
 struct instance_data {
     struct trc_affine *transforms; /* for each instance its keys, then their inverses */
     uint32_t *materials;
+    float *values;
 };
 
 static void destroy_instance_data(void *object) {
     struct instance_data *data = object;
     trc_free(data->transforms);
     trc_free(data->materials);
+    trc_free(data->values);
     trc_free(data);
 }
 
 static trc_status create_instance_data(const struct trc_store *store,
                                        struct trc_shared **shared_out) {
-    size_t transforms = 0, materials = 0;
+    size_t transforms = 0, materials = 0, values = 0;
     for (uint32_t i = trc_store_first(store); i != TRC_STORE_END; i = trc_store_next(store, i)) {
         const struct trc_scene_instance *source = store->slots[i].object;
         transforms += (size_t)2 * source->key_count;
         materials += source->material_count ? source->material_count : 1;
+        values += source->value_count;
     }
     struct instance_data *data = trc_alloc_zeroed(1, sizeof *data);
     if (!data)
         return no_memory();
     data->transforms = trc_alloc(transforms, sizeof *data->transforms);
     data->materials = trc_alloc(materials, sizeof *data->materials);
+    data->values = trc_alloc(values, sizeof *data->values);
     struct trc_shared *shared = NULL;
-    if (data->transforms && data->materials)
+    if (data->transforms && data->materials && data->values)
         shared = trc_shared_create(data, destroy_instance_data);
     if (!shared) {
         destroy_instance_data(data);
@@ -139,6 +143,7 @@ static uint64_t fill_instances(const struct trc_scene_state *scene,
     const struct trc_store *store = &scene->instances;
     struct trc_affine *transforms = data->transforms;
     uint32_t *materials = data->materials;
+    float *values = data->values;
     uint64_t hidden = 0;
     for (uint32_t i = trc_store_first(store); i != TRC_STORE_END; i = trc_store_next(store, i)) {
         const struct trc_scene_instance *source = store->slots[i].object;
@@ -150,6 +155,8 @@ static uint64_t fill_instances(const struct trc_scene_state *scene,
             .visibility = source->visibility,
             .material_count = material_count,
             .materials = materials,
+            .value_count = source->value_count,
+            .values = values,
             .pass_index = source->pass_index,
             .random = source->random,
             .cryptomatte_object = source->cryptomatte_object,
@@ -166,6 +173,8 @@ static uint64_t fill_instances(const struct trc_scene_state *scene,
         hidden += !instance->visibility && source->visibility;
         transforms += (size_t)2 * source->key_count;
         materials += material_count;
+        memcpy(values, source->values, source->value_count * sizeof *values);
+        values += source->value_count;
     }
     return hidden;
 }

@@ -184,6 +184,7 @@ static trc_status build_lights(const struct trc_scene_state *scene,
         .world = scene->world.struct_size ? &scene->world : NULL,
         .previous = same_world(scene, former, block),
         .pool = scene->pool,
+        .cancel = &scene->cancel,
     };
     const trc_status status = trc_light_table_create(&block->snapshot, &options, &lights);
     trc_free(descs);
@@ -216,10 +217,11 @@ static trc_status collect_lights(const struct trc_scene_state *scene,
 
 /* ---- the whole ---- */
 
-static void warn_of_images(struct trc_snapshot_block *block) {
+static void warn_of_images(const struct trc_scene_state *scene, struct trc_snapshot_block *block) {
     const struct trc_snapshot *s = &block->snapshot;
-    uint64_t images = 0, texels = 0;
+    uint64_t images = 0, texels = 0, halved = 0;
     for (uint32_t i = 0; i < s->image_count; i++) {
+        halved += s->images[i] && s->images[i]->is_halved;
         if (s->images[i] && s->images[i]->bad_texel_count) {
             images++;
             texels += s->images[i]->bad_texel_count;
@@ -229,6 +231,10 @@ static void warn_of_images(struct trc_snapshot_block *block) {
         trc_warn(block,
                  "%" PRIu64 " texels in %" PRIu64 " images are not finite and count as black",
                  texels, images);
+    }
+    if (halved) {
+        trc_warn(block, "%" PRIu64 " images are shown smaller, to keep all within %" PRIu64 " MiB",
+                 halved, scene->image_bytes_max >> 20);
     }
 }
 
@@ -253,7 +259,7 @@ static void finish_stats(const struct trc_scene_state *scene, struct trc_snapsho
         trc_warn(block, "%" PRIu64 " instances are hidden: their transform is singular",
                  stats->skipped_instance_count);
     }
-    warn_of_images(block);
+    warn_of_images(scene, block);
 }
 
 static trc_status check_cancel(const struct trc_scene_state *scene) {

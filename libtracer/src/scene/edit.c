@@ -82,8 +82,9 @@ static trc_status make_instance(const struct trc_scene_state *scene, const trc_i
     }
     const size_t transform_bytes = desc->key_count * sizeof(struct trc_affine);
     const size_t material_bytes = desc->material_count * sizeof(trc_id);
+    const size_t value_bytes = desc->value_count * sizeof(float);
     struct trc_scene_instance *instance =
-        trc_alloc(1, sizeof *instance + transform_bytes + material_bytes);
+        trc_alloc(1, sizeof *instance + transform_bytes + material_bytes + value_bytes);
     if (!instance)
         return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for an instance");
     struct trc_affine *transforms = (struct trc_affine *)(instance + 1);
@@ -91,12 +92,17 @@ static trc_status make_instance(const struct trc_scene_state *scene, const trc_i
     memcpy(transforms, desc->transforms, transform_bytes);
     if (material_bytes)
         memcpy(materials, desc->materials, material_bytes);
+    float *values = (float *)(materials + desc->material_count);
+    if (value_bytes)
+        memcpy(values, desc->values, value_bytes);
     *instance = (struct trc_scene_instance){
         .mesh = desc->mesh,
         .key_count = desc->key_count,
         .material_count = desc->material_count,
         .transforms = transforms,
         .materials = materials,
+        .value_count = desc->value_count,
+        .values = values,
         .visibility = desc->visibility,
         .pass_index = desc->pass_index,
         .random = desc->random,

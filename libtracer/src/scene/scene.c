@@ -43,6 +43,7 @@ trc_status trc_scene_state_create(const trc_scene_desc *desc, struct trc_scene_s
     }
     scene->thread_count = desc->thread_count;
     scene->is_final = desc->is_final != 0;
+    scene->image_bytes_max = (uint64_t)desc->image_megabytes << 20;
     scene->changed = TRC_CHANGED_ALL;
     atomic_init(&scene->cancel, 0);
     init_stores(scene);

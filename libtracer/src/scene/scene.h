@@ -33,13 +33,15 @@ struct trc_scene_mesh {
     uint32_t index;             /* in the snapshot under construction */
 };
 
-/* One block: the keys stand behind the struct, then the ids. */
+/* One block: the keys stand behind the struct, then the ids, then the values. */
 struct trc_scene_instance {
     trc_id mesh;
     uint32_t key_count;
     uint32_t material_count;
     const struct trc_affine *transforms; /* key_count */
     const trc_id *materials;             /* material_count; 0: default */
+    uint32_t value_count;
+    const float *values;
     uint32_t visibility;
     int32_t pass_index;
     float random;
@@ -51,7 +53,8 @@ struct trc_scene_instance {
 struct trc_scene_state {
     uint32_t thread_count;
     bool is_final;
-    pthread_mutex_t lock; /* all but the next three */
+    uint64_t image_bytes_max; /* 0: no limit */
+    pthread_mutex_t lock;     /* all but the next three */
     pthread_mutex_t cancel_lock;
     bool committing;    /* under cancel_lock */
     atomic_uint cancel; /* read by the workers of a commit */

@@ -68,6 +68,30 @@ trc_status trc_scene_make_default_material(struct trc_scene_state *scene) {
     return compile(scene, &desc, &scene->default_material);
 }
 
+/* Halves the largest images until all fit, or none can be halved any more. */
+static trc_status fit_images(struct trc_scene_state *scene) {
+    struct trc_store *images = &scene->images;
+    while (scene->image_bytes_max) {
+        struct trc_store_slot *largest = NULL;
+        uint64_t bytes = 0;
+        for (uint32_t i = trc_store_first(images); i != TRC_STORE_END;
+             i = trc_store_next(images, i)) {
+            struct trc_store_slot *slot = &images->slots[i];
+            bytes += trc_image_bytes(slot->object);
+            if (trc_image_can_halve(slot->object) &&
+                (!largest || trc_image_bytes(slot->object) > trc_image_bytes(largest->object)))
+                largest = slot;
+        }
+        if (bytes <= scene->image_bytes_max || !largest)
+            break;
+        struct trc_image *half;
+        TRC_TRY(trc_image_halve(largest->object, &half));
+        trc_image_release(largest->object);
+        largest->object = half;
+    }
+    return TRC_OK;
+}
+
 trc_status trc_scene_add_image(struct trc_scene_state *scene, const trc_image_desc *desc,
                                trc_id *id) {
     struct trc_image *image;
@@ -78,7 +102,10 @@ trc_status trc_scene_add_image(struct trc_scene_state *scene, const trc_image_de
         return status;
     }
     scene->changed |= TRC_CHANGED_IMAGES;
-    return TRC_OK;
+    const trc_status fit = fit_images(scene);
+    if (fit != TRC_OK)
+        (void)trc_scene_remove_image(scene, *id);
+    return fit;
 }
 
 trc_status trc_scene_remove_image(struct trc_scene_state *scene, trc_id id) {

@@ -55,6 +55,8 @@ struct trc_instance {
     uint32_t visibility;                      /* TRC_VISIBLE_* */
     uint32_t material_count;                  /* >= 1 */
     const uint32_t *materials;                /* into snapshot materials, per slot */
+    uint32_t value_count;
+    const float *values; /* for TRC_OP_INSTANCE_VALUES */
     int32_t pass_index;
     float random;
     float color[4];

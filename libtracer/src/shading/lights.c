@@ -13,6 +13,8 @@
 #include "shading/material.h"
 
 #define PI 3.14159265358979f
+/* Triangles between two looks at whether the commit is cancelled. */
+#define POLL_INTERVAL 16384u
 #define RECEIVERS (TRC_VISIBLE_DIFFUSE | TRC_VISIBLE_GLOSSY | TRC_VISIBLE_TRANSMISSION)
 
 _Static_assert(sizeof(struct trc_lamp) == 4 * TRC_LAMP_WORDS, "read by gathers");
@@ -269,15 +271,17 @@ static bool world_triangle(const struct trc_instance *instance, const struct trc
 }
 
 static void add_triangles(struct trc_light_table *table, const struct trc_snapshot *s,
-                          uint32_t instance_number, uint32_t scatters,
+                          uint32_t instance_number, const struct trc_light_options *options,
                           struct trc_light_bound *bounds, uint32_t *bound_count) {
     struct trc_instance *instance = &s->instances[instance_number];
     const struct trc_mesh *mesh = s->meshes[instance->mesh];
     const uint32_t before = table->triangle_count;
     for (uint32_t i = 0; i < mesh->triangle_count; i++) {
+        if (i % POLL_INTERVAL == 0 && trc_lights_are_cancelled(options))
+            return; /* set_bounds says so */
         uint32_t number;
         const struct trc_material *m = material_of(s, instance, mesh, i, &number);
-        if (!is_light(m, scatters))
+        if (!is_light(m, options->scatters))
             continue;
         struct trc_light_triangle *t = &table->triangles[table->triangle_count];
         float lower[3], upper[3];
@@ -355,8 +359,7 @@ static trc_status add_world(struct trc_light_table *table, const struct trc_snap
             const uint32_t wanted =
                 world && world->map_resolution ? world->map_resolution : MAP_WIDTH;
             const uint32_t width = wanted < 16 ? 16 : wanted > 8192 ? 8192 : wanted;
-            const trc_status status =
-                trc_world_map_create(s, width, world, options->pool, &table->map);
+            const trc_status status = trc_world_map_create(s, width, options, &table->map);
             if (status != TRC_OK)
                 return status;
         }
@@ -413,9 +416,13 @@ static void add_lamps(struct trc_light_table *table, const struct trc_light_opti
 
 /* Chooses between list and tree, and enters lights with their candidates. Takes over bounds. */
 static trc_status set_bounds(struct trc_light_table *table, struct trc_light_bound *bounds,
-                             uint32_t count, struct trc_pool *pool) {
+                             uint32_t count, const struct trc_light_options *options) {
     const size_t lights = (size_t)table->first_triangle + table->triangle_count;
     trc_status status = TRC_OK;
+    if (trc_lights_are_cancelled(options)) {
+        trc_free(bounds);
+        return trc_fail(TRC_ERROR_CANCELLED, "the commit was cancelled");
+    }
     table->single = count + table->distant_count == 1;
     table->candidates = trc_alloc(lights ? lights : 1, sizeof *table->candidates);
     if (!table->candidates) {
@@ -435,7 +442,7 @@ static trc_status set_bounds(struct trc_light_table *table, struct trc_light_bou
         const uint32_t distant = table->distant_count;
         status = trc_light_tree_build(table, bounds, count,
                                       distant < TRC_LIGHT_CUT_MAX ? TRC_LIGHT_CUT_MAX - distant : 1,
-                                      pool);
+                                      options);
         trc_free(bounds);
     }
     for (uint32_t i = 0; i < table->distant_count; i++)
@@ -480,7 +487,7 @@ static trc_status fill(struct trc_light_table *table, const struct trc_snapshot 
     for (uint32_t i = 0; i < s->instance_count; i++) {
         s->instances[i].first_light = UINT32_MAX;
         if (has_lights(s, &s->instances[i], scatters))
-            add_triangles(table, s, i, scatters, bounds, &bound_count);
+            add_triangles(table, s, i, options, bounds, &bound_count);
     }
     status = add_world(table, s, options);
     if (status != TRC_OK) {
@@ -493,7 +500,7 @@ static trc_status fill(struct trc_light_table *table, const struct trc_snapshot 
     table->world_apart = table->world_light != UINT32_MAX && others;
     if (table->world_apart)
         table->distant_count--;
-    return set_bounds(table, bounds, bound_count, options->pool);
+    return set_bounds(table, bounds, bound_count, options);
 }
 
 trc_status trc_light_table_create(const struct trc_snapshot *snapshot,

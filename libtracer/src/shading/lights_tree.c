@@ -273,6 +273,7 @@ struct subtree {
 };
 
 struct builder {
+    const struct trc_light_options *options;
     struct trc_light_table *table;
     struct trc_light_bound *leaves;
     struct subtree tasks[TASK_MAX];
@@ -307,7 +308,8 @@ static struct cluster build_subtree(const struct builder *b, struct subtree t) {
 static void build_task(void *context, uint32_t index, uint32_t worker) {
     struct builder *b = context;
     (void)worker;
-    b->tasks[index].cluster = build_subtree(b, b->tasks[index]);
+    if (!trc_lights_are_cancelled(b->options))
+        b->tasks[index].cluster = build_subtree(b, b->tasks[index]);
 }
 
 /* Splits the largest set, again and again. */
@@ -319,7 +321,7 @@ static void make_tasks(struct builder *b, uint32_t count) {
         for (uint32_t i = 1; i < b->task_count; i++)
             if (b->tasks[i].count > b->tasks[largest].count)
                 largest = i;
-        if (b->tasks[largest].count <= SERIAL_COUNT_MAX)
+        if (b->tasks[largest].count <= SERIAL_COUNT_MAX || trc_lights_are_cancelled(b->options))
             return;
         b->tasks[b->task_count++] = divide(b, &b->tasks[largest]);
     }
@@ -380,15 +382,18 @@ static void enter_lights(struct trc_light_table *table, uint32_t node, uint32_t 
 }
 
 trc_status trc_light_tree_build(struct trc_light_table *table, struct trc_light_bound *leaves,
-                                uint32_t count, uint32_t cut_max, struct trc_pool *pool) {
+                                uint32_t count, uint32_t cut_max,
+                                const struct trc_light_options *options) {
     const size_t lights = (size_t)table->first_triangle + table->triangle_count;
     table->bounds = trc_alloc_zeroed(2 * (size_t)count, sizeof *table->bounds);
     table->trails = trc_alloc_zeroed(lights, sizeof *table->trails);
     if (!table->bounds || !table->trails)
         return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for the tree of %u lights", count);
-    struct builder b = {.table = table, .leaves = leaves};
+    struct builder b = {.options = options, .table = table, .leaves = leaves};
     make_tasks(&b, count);
-    trc_pool_run(pool, b.task_count, build_task, &b);
+    trc_pool_run(options->pool, b.task_count, build_task, &b);
+    if (trc_lights_are_cancelled(options))
+        return trc_fail(TRC_ERROR_CANCELLED, "the commit was cancelled");
     bound_top(&b, 0);
     table->bound_count = 2 * count - 1;
     choose_cut(table, cut_max);

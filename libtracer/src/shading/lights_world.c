@@ -83,6 +83,7 @@ static void weigh_sun(const struct trc_snapshot *s, struct trc_world_map *map) {
 
 /* What is measured, row by row on all threads. */
 struct measuring {
+    const struct trc_light_options *options;
     const struct trc_snapshot *snapshot;
     struct trc_world_map *map;
     float *turns;      /* cos and sin of the azimuth of every column of samples */
@@ -114,6 +115,8 @@ static float sample_weight(const struct trc_world_map *map, uint32_t row) {
 static void measure_row(void *context, uint32_t row, uint32_t worker) {
     const struct measuring *m = context;
     struct trc_world_map *map = m->map;
+    if (trc_lights_are_cancelled(m->options))
+        return;
     const uint32_t count = map->width * SAMPLES_PER_CELL, columns = map->width * SUBSAMPLES;
     float *directions = m->samples + 6 * (size_t)count * worker;
     float *radiance = directions + 3 * (size_t)count;
@@ -136,7 +139,7 @@ static void measure_row(void *context, uint32_t row, uint32_t worker) {
     }
 }
 
-static void measure(struct measuring *m, struct trc_pool *pool) {
+static void measure(struct measuring *m) {
     struct trc_world_map *map = m->map;
     const uint32_t columns = map->width * SUBSAMPLES;
     for (uint32_t x = 0; x < columns; x++) {
@@ -144,7 +147,7 @@ static void measure(struct measuring *m, struct trc_pool *pool) {
         m->turns[2 * x] = cosf(phi);
         m->turns[2 * x + 1] = sinf(phi);
     }
-    trc_pool_run(pool, map->height, measure_row, m);
+    trc_pool_run(m->options->pool, map->height, measure_row, m);
     double total[3] = {0}, weight = 0.0;
     for (uint32_t y = 0; y < map->height; y++) {
         for (int i = 0; i < 3; i++)
@@ -204,30 +207,36 @@ static struct trc_world_map *create_map(uint32_t width, const trc_world_desc *wo
 }
 
 trc_status trc_world_map_create(const struct trc_snapshot *snapshot, uint32_t width,
-                                const trc_world_desc *world, struct trc_pool *pool,
+                                const struct trc_light_options *options,
                                 struct trc_world_map **out) {
-    const size_t samples = (size_t)width * SAMPLES_PER_CELL * trc_pool_thread_count(pool);
-    struct trc_world_map *map = create_map(width, world);
-    struct measuring m = {.snapshot = snapshot,
+    const size_t samples = (size_t)width * SAMPLES_PER_CELL * trc_pool_thread_count(options->pool);
+    struct trc_world_map *map = create_map(width, options->world);
+    struct measuring m = {.options = options,
+                          .snapshot = snapshot,
                           .map = map,
                           .turns = trc_alloc((size_t)width * SUBSAMPLES, 2 * sizeof(float)),
                           .samples = trc_alloc(samples, 6 * sizeof(float)),
                           .sums = trc_alloc_zeroed(width / 2, sizeof *m.sums)};
-    const bool has_all = map && m.turns && m.samples && m.sums;
-    if (has_all) {
-        measure(&m, pool);
-        if (map->sun.square_chord > 0.0f)
-            weigh_sun(snapshot, map);
-        accumulate(map);
-        *out = map;
+    trc_status status = TRC_OK;
+    if (!map || !m.turns || !m.samples || !m.sums)
+        status = trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for the importance map of the world");
+    if (status == TRC_OK) {
+        measure(&m);
+        if (trc_lights_are_cancelled(options))
+            status = trc_fail(TRC_ERROR_CANCELLED, "the commit was cancelled");
     }
     trc_free(m.turns);
     trc_free(m.samples);
     trc_free(m.sums);
-    if (has_all)
-        return TRC_OK;
-    trc_world_map_release(map);
-    return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for the importance map of the world");
+    if (status != TRC_OK) {
+        trc_world_map_release(map);
+        return status;
+    }
+    if (map->sun.square_chord > 0.0f)
+        weigh_sun(snapshot, map);
+    accumulate(map);
+    *out = map;
+    return TRC_OK;
 }
 
 void trc_world_map_release(struct trc_world_map *map) {

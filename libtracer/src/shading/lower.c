@@ -362,6 +362,8 @@ static trc_status lower_node(const struct lowering *l) {
         return lower_geometry(l);
     case TRC_NODE_OBJECT_INFO:
         return lower_object_info(l);
+    case TRC_NODE_INSTANCE_VALUES:
+        return op(b, TRC_OP_INSTANCE_VALUES, mode, NULL, l->out);
     case TRC_NODE_LIGHT_PATH:
         for (uint32_t i = 0; i < TRC_PATH_OUTPUTS; i++) {
             TRC_TRY(op(b, TRC_OP_LIGHT_PATH, i, NULL, l->out + i));

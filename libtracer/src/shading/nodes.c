@@ -58,6 +58,7 @@ static const struct trc_node_info infos[] = {
     {TRC_NODE_OBJECT_INFO, "Object Info", "", "", "vcffff"},
     {TRC_NODE_VECTOR_MATH, "Vector Math", "cccf", "a b c scale", "vf"},
     {TRC_NODE_RGB_TO_BW, "RGB to BW", "c", "color", "f"},
+    {TRC_NODE_INSTANCE_VALUES, "Instance Values", "", "", "c"},
 
     {TRC_NODE_NOISE, "Noise", "gffffffff",
      "vector w scale detail roughness lacunarity offset gain distortion", "fc"},
@@ -127,6 +128,8 @@ bool trc_node_mode_is_valid(uint32_t type, uint32_t mode) {
         return mode < 64 && (mode & TRC_IMAGE_MODE_INTERPOLATION) <= TRC_IMAGE_CUBIC;
     case TRC_NODE_ENVIRONMENT:
         return (mode & ~(3u | 1u << 4)) == 0 && (mode & 3u) <= TRC_IMAGE_CUBIC;
+    case TRC_NODE_INSTANCE_VALUES:
+        return mode < TRC_MAX_INSTANCE_VALUES;
     case TRC_NODE_MAPPING:
         return mode <= 3;
     case TRC_NODE_MIX_COLOR:

@@ -47,6 +47,7 @@
     X(OBJECT_COLOR, 0, 4, 0) /* RGBA */                                                     \
     X(OBJECT_INDEX, 0, 1, 0)                                                                \
     X(OBJECT_RANDOM, 0, 1, 0)                                                               \
+    X(INSTANCE_VALUES, 0, 3, 0) /* mode: number of the first */                             \
     /* inputs and the point */                                                              \
     X(FRESNEL, 4, 1, 0)       /* ior, normal */                                             \
     X(LAYER_FRESNEL, 4, 1, 0) /* blend, normal */                                           \

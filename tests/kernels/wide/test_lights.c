@@ -663,6 +663,31 @@ static void lights_that_are_not_sampled(void **state) {
     scene_end(&s);
 }
 
+/* A commit that is cancelled leaves no table, whatever part of it hears that. */
+static void cancelled(void **state) {
+    (void)state;
+    static double corners[MESH_TRIANGLES][3][3];
+    static struct scene s;
+    const atomic_uint cancel = 1;
+    struct trc_pool *pool;
+    assert_int_equal(trc_pool_create(1, &pool), TRC_OK);
+    const struct trc_light_options options = {
+        .scatters = TRC_MATERIAL_SCATTERS, .pool = pool, .cancel = &cancel};
+    cloud(&s, 100, corners);
+    const uint64_t before = trc_memory_bytes();
+    struct trc_light_table *table = NULL;
+    assert_int_equal(trc_light_table_create(&s.snapshot, &options, &table), TRC_ERROR_CANCELLED);
+    struct trc_world_map *map = NULL;
+    assert_int_equal(trc_world_map_create(&s.snapshot, 64, &options, &map), TRC_ERROR_CANCELLED);
+    struct trc_light_table tree = {.triangle_count = 100};
+    static struct trc_light_bound leaves[100];
+    assert_int_equal(trc_light_tree_build(&tree, leaves, 100, 8, &options), TRC_ERROR_CANCELLED);
+    trc_free(tree.bounds);
+    trc_free(tree.trails);
+    assert_true(!table && !map && trc_memory_bytes() == before);
+    trc_pool_destroy(pool);
+}
+
 static void allocation_failures(void **state) {
     (void)state;
     static double corners[MESH_TRIANGLES][3][3];
@@ -707,6 +732,7 @@ int main(void) {
         cmocka_unit_test(hidden_lamps),
         cmocka_unit_test(dark_tables),
         cmocka_unit_test(lights_that_are_not_sampled),
+        cmocka_unit_test(cancelled),
         cmocka_unit_test(allocation_failures),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
