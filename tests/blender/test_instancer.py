@@ -84,7 +84,7 @@ def inside_places():
     ball.parent = grid
     scenes.sphere("Alone", 0.3, location=(2.5, 0.0, 1.5), material=ball.data.materials[0])
     pictures = {}
-    for name, outputs in (("ShaderNodeTexCoord", ("Generated", "UV", "Normal")),
+    for name, outputs in (("ShaderNodeTexCoord", ("Generated", "UV")),
                           ("ShaderNodeUVMap", ("UV",))):
         node = ball.data.materials[0].node_tree.nodes.new(name)
         node.from_instancer = True
@@ -122,7 +122,7 @@ def inside_meshes():
 @pytest.mark.parametrize("inside", [inside_particles, inside_places, inside_meshes])
 def test_instancer(blender, inside):
     pictures = blender.run(inside)
-    assert len(pictures) >= 4
+    assert len(pictures) >= 3
     for name, (ours, theirs) in pictures.items():
         assert theirs.std() > 0.02, name
         wrong = (np.abs(ours - theirs) > 1e-3).any(axis=-1).mean()
