@@ -58,15 +58,16 @@ def add_rig(skinned, bone_count, height):
         group.add(np.flatnonzero(owners == i).tolist(), 1.0, 'REPLACE')
 
 
-def fill_character():
-    """A skinned column of 60,000 triangles under an area light, over a reflecting floor."""
+def fill_character(rings=CHARACTER_RINGS):
+    """A skinned column of 60,000 triangles, or of rings times 200, under an area light, over a reflecting
+    floor."""
     turn = np.linspace(0.0, 2.0 * math.pi, CHARACTER_SIDES, endpoint=False)
-    z = np.linspace(0.0, 3.0, CHARACTER_RINGS + 1)[:, None]
+    z = np.linspace(0.0, 3.0, rings + 1)[:, None]
     radius = 0.5 + 0.1 * np.sin(5.0 * z)
     points = np.stack(np.broadcast_arrays(radius * np.cos(turn), radius * np.sin(turn), z), axis=-1)
     faces = [(r * CHARACTER_SIDES + s, r * CHARACTER_SIDES + (s + 1) % CHARACTER_SIDES,
               (r + 1) * CHARACTER_SIDES + (s + 1) % CHARACTER_SIDES, (r + 1) * CHARACTER_SIDES + s)
-             for r in range(CHARACTER_RINGS) for s in range(CHARACTER_SIDES)]
+             for r in range(rings) for s in range(CHARACTER_SIDES)]
     skin = scenes.material("Skin", "ShaderNodeBsdfDiffuse", Color=(0.7, 0.4, 0.3))
     character = scenes.mesh("Character", points.reshape(-1, 3).tolist(), faces, skin, smooth=True)
     add_rig(character, CHARACTER_BONES, 3.0)
