@@ -59,7 +59,28 @@ def inside_hair():
     for name in ("Intercept", "Random", "Is Strand"):
         tree.links.new(info.outputs[name], emission.inputs["Color"])
         pictures[name] = _both()
+    _paint(ball.data)
+    for kind, layer, name, output in (("ShaderNodeUVMap", "uv_map", "Second", "UV"),
+                                      ("ShaderNodeVertexColor", "layer_name", "Second Color", "Color")):
+        node = tree.nodes.new(kind)
+        setattr(node, layer, name)
+        tree.links.new(node.outputs[output], emission.inputs["Color"])
+        pictures[f"{output} of the roots"] = _both()
+        hair.child_type = 'NONE'
+        pictures[f"{output} of the roots without children"] = _both()
+        hair.child_type = 'SIMPLE'
     return pictures
+
+
+def _paint(mesh):
+    """Two UV maps and two colours, of which the second run with the place."""
+    corners = np.array([mesh.vertices[loop.vertex_index].co for loop in mesh.loops]) / 1.6 + 0.5
+    for name, scale in (("First", 0.0), ("Second", 1.0)):
+        layer = mesh.uv_layers.new(name=name)
+        layer.data.foreach_set("uv", (scale * corners[:, ::2]).astype(np.float32).reshape(-1))
+        colors = mesh.color_attributes.new(f"{name} Color", 'BYTE_COLOR', 'CORNER')
+        rgba = np.concatenate((scale * corners, np.ones((len(corners), 1))), axis=1)
+        colors.data.foreach_set("color", rgba.astype(np.float32).reshape(-1))
 
 
 def inside_points():

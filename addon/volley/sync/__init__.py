@@ -311,17 +311,17 @@ class _Walk:
         """The hair of an object's particle systems, each a mesh of one material."""
         blender_object = each.object
         is_final = self._source.v3d is None
-        for number, system in strands.hair_systems(blender_object, is_final):
+        for number, modifier in strands.hair_systems(blender_object, is_final):
             self.tied.add(blender_object.name_full)  # only a walk sees what its hair does
 
-            def make(system=system):
+            def make(modifier=modifier):
                 real = blender_object.original.evaluated_get(self._source.depsgraph)
-                return strands.extract_hair(real, system, real.matrix_world.inverted_safe(), is_final,
-                                            self._wants_hair_info())
+                return strands.extract_hair(real, modifier, real.matrix_world.inverted_safe(), is_final,
+                                            *self._names[:2])
             item = self._describe(each)
             item.key = instance.hair_key(each, number)
             materials = _material_ids(self._sync._materials, each, self._view_layer)
-            slot = min(max(system.settings.material, 1), len(materials)) - 1
+            slot = min(max(modifier.particle_system.settings.material, 1), len(materials)) - 1
             item.materials = materials[slot:slot + 1] if materials else ()
             self._add_made(each, item, (blender_object.name_full, number), make)
 

@@ -247,13 +247,16 @@ def _vertex_normals(mesh):
 
 def _uv_maps(mesh, names, loops):
     """The named UV maps, the default one first and under its own name."""
-    if not names or not mesh.uv_layers:
-        return []
-    default = next((layer for layer in mesh.uv_layers if layer.active_render), mesh.uv_layers[0])
-    wanted = [layer for layer in mesh.uv_layers if layer.name in names and layer != default]
-    # The library's default is the first of its width, so it goes along whenever any map does.
     return [(layer.name, _uv_values(layer, len(mesh.loops))[loops.of_triangles])
-            for layer in [default] + wanted]
+            for _, layer in wanted_uv_layers(mesh, names)]
+
+
+def wanted_uv_layers(mesh, names):
+    """(number, layer) of the named UV maps, the default one first: the library's default is the first of
+    its width, so it goes along whenever any map does."""
+    layers = list(enumerate(mesh.uv_layers)) if names else []
+    layers.sort(key=lambda pair: not pair[1].active_render)
+    return layers[:1] + [pair for pair in layers[1:] if pair[1].name in names]
 
 
 def _uv_values(layer, corner_count):
@@ -266,7 +269,7 @@ def _colors(mesh, names, loops):
     """The named attributes as colours per triangle corner; "" is the active colour attribute."""
     found = []
     for name in sorted(names):
-        source = name or _active_color_name(mesh)
+        source = name or active_color_name(mesh)
         values = None
         if source in _DERIVED:
             values = _widen(_DERIVED[source](mesh)[:, None])[_corner_vertices(mesh)[loops.of_triangles]]
@@ -277,7 +280,7 @@ def _colors(mesh, names, loops):
     return found
 
 
-def _active_color_name(mesh):
+def active_color_name(mesh):
     """The colour attribute that renders, "" without one."""
     colors = mesh.color_attributes
     index = colors.render_color_index

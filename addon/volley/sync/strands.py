@@ -15,7 +15,7 @@ import numpy as np
 from .. import native
 from ..compat import cycles_curves
 from .hashing import HASH_MAX, hash_numbers
-from .mesh import MeshData
+from .mesh import MeshData, active_color_name, wanted_uv_layers
 
 HAIR_ATTRIBUTE = ".hair"  # (intercept, length, thickness, random) of the Hair Info node
 
@@ -27,14 +27,14 @@ _SHORTEST = 1e-12            # m; keys of a strand that are closer are one
 
 
 def hair_systems(blender_object, is_final):
-    """The (number, particle system) pairs of an evaluated object that show hair as paths."""
+    """The (number, modifier) pairs of an evaluated object's particle systems that show hair as paths."""
     modifiers = [m for m in blender_object.modifiers if m.type == 'PARTICLE_SYSTEM']
     for number, modifier in enumerate(modifiers):
         system = modifier.particle_system
         settings = system.settings if system is not None else None
         is_on = modifier.show_render if is_final else modifier.show_viewport
         if settings is not None and is_on and settings.type == 'HAIR' and settings.render_type == 'PATH':
-            yield number, system
+            yield number, modifier
 
 
 def has_strands(instance):
@@ -45,19 +45,20 @@ def has_strands(instance):
 _DATA_TYPES = tuple(getattr(bpy.types, name) for name in ("Curves", "PointCloud") if hasattr(bpy.types, name))
 
 
-def extract_hair(blender_object, system, to_local, is_final, wants_info):
-    """A hair particle system of an evaluated object as MeshData, None without a strand; to_local: the
-    inverse of the object's matrix, as particles are in the world."""
+def extract_hair(blender_object, modifier, to_local, is_final, uv_names, color_names):
+    """The hair of an evaluated object's modifier as MeshData, None without a strand; to_local: the inverse
+    of the object's matrix, as particles are in the world. A strand has the UVs and the colours of its
+    root."""
+    system = modifier.particle_system
     settings = system.settings
     steps = (1 << (settings.render_step if is_final else settings.display_step)) + 1
     if settings.kink == 'SPIRAL':
         steps += settings.kink_extra_steps
     parent_count, child_count = len(system.particles), len(system.child_particles)
     first = parent_count if child_count and not settings.use_parent_particles else 0
-    place = system.co_hair
+    place, strands = system.co_hair, range(first, parent_count + child_count)
     keys = np.array([place(blender_object, particle_no=number, step=step)
-                     for number in range(first, parent_count + child_count)
-                     for step in range(steps)], np.float64).reshape(-1, steps, 3)
+                     for number in strands for step in range(steps)], np.float64).reshape(-1, steps, 3)
     if len(keys) == 0:
         return None
     matrix = np.array(to_local)
@@ -65,7 +66,39 @@ def extract_hair(blender_object, system, to_local, is_final, wants_info):
     groups = []
     for strand_keys, numbers in _of_distinct_keys(keys, np.arange(len(keys))):
         groups.append(_Group(strand_keys, _hair_radii(settings, strand_keys), numbers))
-    return _tubes(groups, wants_info)
+    roots = _root_values(blender_object.data, modifier, strands, uv_names, color_names)
+    return _tubes(groups, HAIR_ATTRIBUTE in color_names, roots)
+
+
+def _root_values(mesh, modifier, strands, uv_names, color_names):
+    """(name, (strands, 2 or 4)) of each UV map and colour attribute that is asked for, as meshes have
+    them: the default map first."""
+    found = []
+    for number, layer in wanted_uv_layers(mesh, uv_names):
+        values = _at_roots(modifier.particle_system.uv_on_emitter, modifier, strands, uv_no=number)
+        found.append((layer.name, values))
+    colors = mesh.vertex_colors
+    for name in sorted(color_names):
+        source = name or active_color_name(mesh)
+        number = colors.find(source)
+        if number >= 0:
+            values = np.ones((len(strands), 4), np.float32)
+            values[:, :3] = _linear(_at_roots(modifier.particle_system.mcol_on_emitter, modifier, strands,
+                                              vcol_no=number))
+            found.append((name, values))
+    return found
+
+
+def _linear(values):
+    """sRGB-encoded colours, which is how Blender tells those of roots, as scene-linear ones."""
+    return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
+
+
+def _at_roots(read, modifier, strands, **layer):
+    """What read says of each strand's root. Of children it is told any particle, and their number."""
+    particles = modifier.particle_system.particles
+    return np.array([read(modifier, particle=particles[number if number < len(particles) else 0],
+                          particle_no=number, **layer) for number in strands], np.float32)
 
 
 def extract_object(data, wants_info):
@@ -167,13 +200,13 @@ def _subdivided(values, pieces):
     return np.concatenate((out.reshape(shape[0], -1, shape[2]), values[:, -1:]), axis=1)
 
 
-def _tubes(groups, wants_info):
-    """Strands as MeshData."""
+def _tubes(groups, wants_info, roots=()):
+    """Strands as MeshData. roots: (name, (all strands, n)) attributes that each strand has one value of."""
     segment_count = sum(group.segment_count() for group in groups)
     if segment_count == 0:
         return None
     pieces, sides = _resolution(segment_count)
-    positions, normals, indices, info = [], [], [], []
+    positions, normals, indices, info, along = [], [], [], [], [[] for _ in roots]
     base = 0
     for group in groups:
         places = _subdivided(group.keys, pieces)
@@ -186,8 +219,11 @@ def _tubes(groups, wants_info):
         indices.append(faces + base)
         if wants_info:
             info.append(np.repeat(_hair_info(places, radii, group.numbers), sides, axis=0)[faces.reshape(-1)])
+        for parts, (_, values) in zip(along, roots):
+            parts.append(np.repeat(values[group.numbers], rings * sides, axis=0)[faces.reshape(-1)])
         base += strands * rings * sides
     attributes = [(HAIR_ATTRIBUTE, np.concatenate(info).astype(np.float32))] if wants_info else []
+    attributes = [(name, np.concatenate(parts)) for parts, (name, _) in zip(along, roots)] + attributes
     return _smooth(np.concatenate(positions), np.concatenate(normals), np.concatenate(indices), attributes)
 
 
