@@ -152,8 +152,11 @@ trc_status trc_film_create(const trc_render_desc *desc, struct trc_film *film) {
                             .matte_count = matte_count(desc)};
     TRC_TRY(trc_film_check_budget(made.width, made.height, pixel_bytes(desc, made.matte_count)));
     const size_t pixels = (size_t)made.width * made.height;
-    made.sample_counts = trc_alloc_zeroed(pixels, sizeof *made.sample_counts);
+    /* Tiles read the counts before they write them, and the sums only where there is a count. */
+    made.sample_counts = trc_alloc(pixels, sizeof *made.sample_counts);
     bool ok = made.sample_counts != NULL;
+    if (ok)
+        memset(made.sample_counts, 0, pixels * sizeof *made.sample_counts);
     for (uint32_t pass = 0; ok && pass < TRC_SUM_COUNT; pass++) {
         if (!trc_film_has_sums(desc, pass))
             continue;

@@ -322,9 +322,9 @@ static void film_add_run(struct trc_tile *t, uint32_t begin, uint32_t end, size_
     struct trc_film *film = t->job->film;
     double *combined = film->sums[TRC_PASS_COMBINED] + 4 * pixel;
     double sum[4] = {0.0, 0.0, 0.0, 0.0};
-    /* A pixel's first sample reads nothing: fresh memory that is read before it is written costs
+    /* A pixel's first sample reads no sums: fresh memory that is read before it is written costs
      * each page a second fault, a third of a picture of one sample. */
-    uint32_t count = t->samples.index[begin] ? film->sample_counts[pixel] : 0;
+    uint32_t count = film->sample_counts[pixel];
     if (count)
         memcpy(sum, combined, sizeof sum);
     for (uint32_t slot = begin; slot < end; slot++) {
