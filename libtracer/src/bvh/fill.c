@@ -92,7 +92,11 @@ void trc_tree_destroy(struct trc_tree *tree) {
 }
 
 struct fill_job {
-    const struct trc_ref *refs; /* by slot; NULL: the slots are there, all of parts[0] */
+    /* What stands where: as in a tree that is refitted, all of parts[0], or by a topology, with
+     * refs by slot. */
+    const struct trc_tree *from;
+    const struct trc_topology *topology;
+    const struct trc_ref *refs;
     const struct trc_part *parts;
     struct trc_tree *tree;
     const atomic_uint *cancel;        /* may be NULL */
@@ -109,8 +113,10 @@ static bool part_is_transparent(const struct trc_part *part, uint32_t triangle) 
 }
 
 static const struct trc_part *slot_fill(struct fill_job *job, uint32_t slot) {
-    if (!job->refs)
+    if (job->from) {
+        job->tree->slots[slot] = job->from->slots[slot];
         return job->parts;
+    }
     const struct trc_ref *ref = &job->refs[slot];
     const struct trc_part *part = &job->parts[ref->part];
     const bool transparent = part_is_transparent(part, ref->primitive);
@@ -228,6 +234,18 @@ static void tree_finish(struct trc_tree *tree, double area_sum) {
 static bool is_leaf(uint32_t ref) { return ref != TRC_REF_EMPTY && (ref & TRC_REF_LEAF); }
 static bool is_node(uint32_t ref) { return !(ref & TRC_REF_LEAF); } /* the empty one has it too */
 
+/* A node's references to its children: copied as its boxes are filled, so that its memory is met
+ * once, and by all threads. */
+static void header_fill(struct fill_job *job, uint32_t n) {
+    struct trc_tree *tree = job->tree;
+    if (job->from)
+        memcpy(tree->nodes + n * tree->node_stride, job->from->nodes + n * job->from->node_stride,
+               TRC_NODE_HEADER_BYTES);
+    else
+        memcpy(tree->nodes + n * tree->node_stride, job->topology->children[n],
+               sizeof job->topology->children[n]);
+}
+
 /* The leaves of a node, and the boxes of those and of no children. */
 static void leaves_fill(struct fill_job *job, uint32_t node) {
     struct trc_tree *tree = job->tree;
@@ -278,6 +296,7 @@ static void fill_task(void *context, uint32_t index, uint32_t worker) {
         return;
     for (uint32_t n = end; n-- > begin;) {
         const uint32_t *children = trc_node_children(tree, n);
+        header_fill(job, n);
         leaves_fill(job, n);
         job->pending[n] = false;
         for (int i = 0; i < TRC_NODE_WIDTH; i++)
@@ -354,11 +373,9 @@ trc_status trc_tree_fill(const struct trc_topology *topology, const struct trc_r
     const trc_status status = tree_alloc(tree, topology->node_count, count, key_count, false);
     if (status != TRC_OK)
         return status;
-    for (uint32_t n = 0; n < topology->node_count; n++)
-        memcpy(tree->nodes + n * tree->node_stride, topology->children[n],
-               sizeof topology->children[n]);
     tree->root = topology->root;
-    struct fill_job job = {.refs = refs, .parts = parts, .tree = tree, .cancel = cancel};
+    struct fill_job job = {
+        .topology = topology, .refs = refs, .parts = parts, .tree = tree, .cancel = cancel};
     const trc_status filled = tree_fill(&job, pool);
     tree->has_transparent = job.transparent;
     if (filled != TRC_OK)
@@ -373,14 +390,9 @@ trc_status trc_tree_refit(const struct trc_tree *from, const struct trc_part *pa
         tree_alloc(tree, from->node_count, from->slot_count, key_count, false);
     if (status != TRC_OK)
         return status;
-    for (uint32_t n = 0; n < from->node_count; n++)
-        memcpy(tree->nodes + n * tree->node_stride, from->nodes + n * from->node_stride,
-               TRC_NODE_HEADER_BYTES);
-    if (from->slot_count)
-        memcpy(tree->slots, from->slots, from->slot_count * sizeof *tree->slots);
     tree->root = from->root;
     tree->has_transparent = from->has_transparent;
-    struct fill_job job = {.parts = part, .tree = tree, .cancel = cancel};
+    struct fill_job job = {.from = from, .parts = part, .tree = tree, .cancel = cancel};
     const trc_status filled = tree_fill(&job, pool);
     if (filled != TRC_OK)
         trc_tree_destroy(tree);
