@@ -13,11 +13,7 @@ MEAN_TOLERANCE = 0.01
 def _both(samples):
     """The current scene by both engines."""
     import scenes
-    pictures = []
-    for engine in ('VOLLEY', 'CYCLES'):
-        scenes.set_engine(engine, samples)
-        pictures.append(scenes.render())
-    return pictures
+    return scenes.by_both(samples)
 
 
 def _walls():

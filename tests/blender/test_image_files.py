@@ -26,8 +26,7 @@ def _stage(image):
     import scenes
     scene = scenes.empty(size=(SIZE, SIZE), samples=1)
     scenes.camera(type='ORTHO', ortho_scale=2.0)
-    scene.volley.pixel_filter_type, scene.volley.filter_width = 'BOX', 0.01
-    scene.cycles.pixel_filter_type, scene.cycles.filter_width = 'BOX', 0.01
+    scenes.sharpen()
     wall = scenes.wall(material=scenes.emitter((1.0, 1.0, 1.0)))
     for uv in wall.data.uv_layers[0].data:
         uv.uv = (1.96 * uv.uv[0] + 0.02, 1.96 * uv.uv[1] + 0.02)
@@ -41,11 +40,7 @@ def _stage(image):
 
 def _both():
     import scenes
-    pictures = []
-    for engine in ('VOLLEY', 'CYCLES'):
-        scenes.set_engine(engine, 1)
-        pictures.append(scenes.render()[..., :3])
-    return pictures
+    return [picture[..., :3] for picture in scenes.by_both(1)]
 
 
 def inside_tiles():

@@ -15,18 +15,13 @@ def _stage():
     import scenes
     scene = scenes.empty(size=SIZE, samples=1)
     scenes.camera(location=(0.0, -7.0, 0.0))
-    scene.volley.pixel_filter_type, scene.volley.filter_width = 'BOX', 0.01
-    scene.cycles.pixel_filter_type, scene.cycles.filter_width = 'BOX', 0.01
+    scenes.sharpen()
     return scene
 
 
 def _both():
     import scenes
-    pictures = []
-    for engine in ('VOLLEY', 'CYCLES'):
-        scenes.set_engine(engine, 1)
-        pictures.append(scenes.render()[..., :3])
-    return pictures
+    return [picture[..., :3] for picture in scenes.by_both(1)]
 
 
 def _show(material, node, output, scale):

@@ -46,8 +46,7 @@ def inside_skies():
     import scenes
     scene = scenes.empty(size=(64, 48), samples=1)
     scenes.camera(rotation=(math.radians(105.0), 0.0, 0.0), angle=math.radians(120.0))
-    scene.volley.pixel_filter_type, scene.volley.filter_width = 'BOX', 0.01
-    scene.cycles.pixel_filter_type, scene.cycles.filter_width = 'BOX', 0.01
+    scenes.sharpen()
     pictures = {}
     for name, settings in SKIES.items():
         _sky(**settings)

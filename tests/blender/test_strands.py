@@ -11,11 +11,7 @@ SAMPLES = 64
 
 def _both(samples=SAMPLES):
     import scenes
-    pictures = []
-    for engine in ('VOLLEY', 'CYCLES'):
-        scenes.set_engine(engine, samples)
-        pictures.append(scenes.render()[..., :3])
-    return pictures
+    return [picture[..., :3] for picture in scenes.by_both(samples)]
 
 
 def _haired(**settings):

@@ -146,6 +146,21 @@ def render():
     return load(path)
 
 
+def by_both(samples):
+    """The scene as it is by Volley and by Cycles: two pictures."""
+    pictures = []
+    for engine in ('VOLLEY', 'CYCLES'):
+        set_engine(engine, samples)
+        pictures.append(render())
+    return pictures
+
+
+def sharpen():
+    """Let every sample of both engines fall into the middle of its pixel."""
+    for settings in (bpy.context.scene.volley, bpy.context.scene.cycles):
+        settings.pixel_filter_type, settings.filter_width = 'BOX', 0.01
+
+
 def load(path):
     """A picture file's pixels."""
     image = bpy.data.images.load(path, check_existing=False)

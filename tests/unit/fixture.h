@@ -35,6 +35,16 @@ FIXTURE_INLINE trc_scene fixture_scene(void) {
     return scene;
 }
 
+/* Renders the committed scene; a pass of it, float_count numbers. */
+FIXTURE_INLINE void fixture_draw(trc_scene scene, const trc_render_desc *desc, uint32_t pass,
+                                 float *pixels, uint64_t float_count) {
+    trc_render render = 0;
+    assert_int_equal(trc_render_start(scene, desc, &render), TRC_OK);
+    assert_int_equal(trc_render_wait(render, -1.0), TRC_OK);
+    assert_int_equal(trc_render_read(render, pass, pixels, float_count), TRC_OK);
+    assert_int_equal(trc_render_destroy(render), TRC_OK);
+}
+
 /* ---- for closed forms: level squares seen from above ---- */
 
 /* Two triangles; a, b, c, d counter-clockwise as seen from the front. */

@@ -28,13 +28,9 @@ static void draw(trc_scene scene, const struct setting *s, uint32_t pass, double
     desc.filter_width = 1.0f;
     desc.light_samples = s->light_samples;
     desc.passes = UINT64_C(1) << pass;
-    trc_render render = 0;
     float pixels[4 * FRAME];
     const uint32_t channels = trc_pass_channels(pass);
-    assert_int_equal(trc_render_start(scene, &desc, &render), TRC_OK);
-    assert_int_equal(trc_render_wait(render, -1.0), TRC_OK);
-    assert_int_equal(trc_render_read(render, pass, pixels, channels * FRAME), TRC_OK);
-    assert_int_equal(trc_render_destroy(render), TRC_OK);
+    fixture_draw(scene, &desc, pass, pixels, channels * FRAME);
     for (int x = 0; x < WIDTH; x++) {
         column[x] = 0.0;
         for (int y = 0; y < HEIGHT; y++)

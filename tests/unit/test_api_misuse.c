@@ -498,6 +498,11 @@ static void instances(void **state) {
     REFUSE_INSTANCE(ARGUMENT, desc.visibility = 32);
     REFUSE_INSTANCE(ARGUMENT, desc.random = NAN);
     REFUSE_INSTANCE(ARGUMENT, desc.color[2] = INFINITY);
+    const float bad_values[] = {1.0f, NAN};
+    REFUSE_INSTANCE(ARGUMENT, desc.value_count = 1);
+    REFUSE_INSTANCE(ARGUMENT, desc.values = bad_values; desc.value_count = 2);
+    REFUSE_INSTANCE(LARGE, desc.values = bad_values;
+                    desc.value_count = TRC_MAX_INSTANCE_VALUES + 1);
     assert_true(id == UNTOUCHED);
     /* Transforms that are no transforms hide the instance. */
     const float values[] = {NAN, INFINITY, 3e38f, 1e-45f};

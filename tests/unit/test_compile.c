@@ -510,6 +510,10 @@ static void test_refused_inputs(void **state) {
     refused(TRC_ERROR_INVALID_ARGUMENT, "(roughness)", "not earlier");
 
     graph_clear();
+    add(TRC_NODE_INSTANCE_VALUES, TRC_MAX_INSTANCE_VALUES, 0, NULL);
+    refused(TRC_ERROR_INVALID_ARGUMENT, "node 0 (Instance Values)", "mode");
+
+    graph_clear();
     const int32_t info = add(TRC_NODE_OBJECT_INFO, 0, 0, NULL),
                   diffuse = add_diffuse(color(1, 1, 1));
     *input_of(diffuse, 0) = link_to(info, 6);

@@ -6,11 +6,7 @@ enum { WIDTH = 64, HEIGHT = 48, FRAME = WIDTH * HEIGHT };
 static void draw(trc_scene scene, uint32_t samples, uint32_t light_samples, float *pixels) {
     trc_render_desc desc = default_render_desc(WIDTH, HEIGHT, samples);
     desc.light_samples = light_samples;
-    trc_render render = 0;
-    assert_int_equal(trc_render_start(scene, &desc, &render), TRC_OK);
-    assert_int_equal(trc_render_wait(render, -1.0), TRC_OK);
-    assert_int_equal(trc_render_read(render, TRC_PASS_COMBINED, pixels, 4 * FRAME), TRC_OK);
-    assert_int_equal(trc_render_destroy(render), TRC_OK);
+    fixture_draw(scene, &desc, TRC_PASS_COMBINED, pixels, 4 * FRAME);
 }
 
 /* The picture does not depend on how its light samples are spread over its samples: the means of
@@ -50,11 +46,7 @@ static void passes_change_nothing(void **state) {
     desc.cryptomattes = 1;
     desc.cryptomatte_depth = 2;
     desc.aov_value_count = desc.light_group_count = 1;
-    trc_render render = 0;
-    assert_int_equal(trc_render_start(scene, &desc, &render), TRC_OK);
-    assert_int_equal(trc_render_wait(render, -1.0), TRC_OK);
-    assert_int_equal(trc_render_read(render, TRC_PASS_COMBINED, with, 4 * FRAME), TRC_OK);
-    assert_int_equal(trc_render_destroy(render), TRC_OK);
+    fixture_draw(scene, &desc, TRC_PASS_COMBINED, with, 4 * FRAME);
     assert_memory_equal(with, without, sizeof with);
     assert_int_equal(trc_scene_destroy(scene), TRC_OK);
 }

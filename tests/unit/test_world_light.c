@@ -34,12 +34,8 @@ static trc_id add_emission(trc_scene scene, float strength, uint32_t flags) {
 
 static void draw(trc_scene scene, uint32_t samples, float *pixels) {
     const trc_render_desc desc = default_render_desc(WIDTH, HEIGHT, samples);
-    trc_render render = 0;
     assert_int_equal(trc_scene_commit(scene), TRC_OK);
-    assert_int_equal(trc_render_start(scene, &desc, &render), TRC_OK);
-    assert_int_equal(trc_render_wait(render, -1.0), TRC_OK);
-    assert_int_equal(trc_render_read(render, TRC_PASS_COMBINED, pixels, 4 * FRAME), TRC_OK);
-    assert_int_equal(trc_render_destroy(render), TRC_OK);
+    fixture_draw(scene, &desc, TRC_PASS_COMBINED, pixels, 4 * FRAME);
 }
 
 static double mean(const float *pixels) {

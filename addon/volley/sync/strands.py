@@ -223,7 +223,8 @@ def _tubes(groups, wants_info, roots=()):
             parts.append(np.repeat(values[group.numbers], rings * sides, axis=0)[faces.reshape(-1)])
         base += strands * rings * sides
     attributes = [(HAIR_ATTRIBUTE, np.concatenate(info).astype(np.float32))] if wants_info else []
-    attributes = [(name, np.concatenate(parts)) for parts, (name, _) in zip(along, roots)] + attributes
+    found = [(name, np.concatenate(parts)) for parts, (name, _) in zip(along, roots)]
+    attributes = found[:native.MAX_ATTRIBUTES - len(attributes)] + attributes
     return _smooth(np.concatenate(positions), np.concatenate(normals), np.concatenate(indices), attributes)
 
 

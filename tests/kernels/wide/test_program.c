@@ -311,10 +311,13 @@ static void build_scene(struct world_of_test *w) {
         w->to_object[1 + k] =
             (struct trc_affine){{1, 0, 0, -2.0f * (float)k, 0, 1, 0, 0, 0, 0, 1, 0}};
     }
+    static const float values[] = {11, 12, 13};
     w->instances[0] = (struct trc_instance){.mesh = 0,
                                             .key_count = 1,
                                             .object_to_world = w->to_world,
                                             .world_to_object = w->to_object,
+                                            .value_count = 3,
+                                            .values = values,
                                             .pass_index = 3,
                                             .random = .25f,
                                             .color = {.1f, .2f, .3f, .4f}};
@@ -380,6 +383,8 @@ static const struct expectation expectations[] = {
     {TRC_OP_OBJECT_COLOR, 0, 0, {0}, {{.1f, .2f, .3f, .4f}, {.5f, .6f, .7f, .8f}, {0}}},
     {TRC_OP_OBJECT_INDEX, 0, 0, {0}, {{3}, {4}, {0}}},
     {TRC_OP_OBJECT_RANDOM, 0, 0, {0}, {{.25f}, {.75f}, {0}}},
+    {TRC_OP_INSTANCE_VALUES, 1, 0, {0}, {{12, 13, 0}, {0}, {0}}},
+    {TRC_OP_INSTANCE_VALUES, 3, 0, {0}, {{0}, {0}, {0}}},
     {TRC_OP_CAMERA_POSITION, 0, 0, {0}, {{7, 19, 20}, {7, 19, 20}, {8, 21, -30}}},
     {TRC_OP_WINDOW, 0, 0, {0}, {{.85f, 2.4f}, {.85f, 2.4f}, {.5f - 8.0f / 30, .5f - 1.4f}}},
     {TRC_OP_REFLECTION, 0, 0, {0}, {{-.6f, 0, .8f}, {-.6f, 0, .8f}, {.6f, 0, .8f}}},
