@@ -13,8 +13,8 @@
 #define BIN_COUNT 12
 /* Turns are kept in 32 bits: where an uneven split could need more, the count is halved. */
 #define DEPTH_MAX 31u
-/* Larger sets are split without regard to orientation, which costs most of the time and says little
- * there. */
+/* Larger sets are split without regard to orientation: with it a picture of 200,000 lights takes a
+ * tenth longer and has the same error. */
 #define ORIENTED_COUNT_MAX 4096u
 /* Rounding must not lose a direction: cosines of united cones are lowered by so much. */
 #define CONE_SLACK 1e-4f
