@@ -61,17 +61,71 @@ TRC_INLINE vfloat trc_safe_inverse(vfloat d) {
     return vf_set(1.0f) / vf_select(tiny, vf_copysign(vf_set(TRC_TINY_DIRECTION), d), d);
 }
 
-/* Shear, inverses and beam of the rays in mask, all of dominant axis z and that side, against a
- * tree. False: none can reach the tree. */
-TRC_INLINE bool trc_group_setup(struct trc_group *g, const struct trc_packet *p,
-                                const struct trc_tree *tree, uint64_t mask, int z, int side) {
-    struct trc_beam *b = &g->beam;
-    b->axis = (struct trc_shear){(z + 1) % 3, (z + 2) % 3, z};
-    b->side = side;
-    b->sign = side ? -1.0f : 1.0f;
-    const int au = b->axis.u, av = b->axis.v;
-    const vfloat sign = vf_set(b->sign), inf = vf_set(INFINITY);
-    vfloat z_near = inf, z_far = -inf, far_origin = vf_set(0.0f);
+/* The beam's cross-section at its near and its far plane, or over all rays of a group. */
+struct trc_beam_ends {
+    float u_low[2], u_high[2], v_low[2], v_high[2];
+};
+
+/* Of rays with one origin: sheared from it, so the extreme shears are the hull. */
+TRC_INLINE void trc_ends_of_origin(struct trc_group *g, const float plane[2],
+                                   struct trc_beam_ends *e) {
+    for (int end = 0; end < 2; end++) {
+        const float dz = plane[end] - g->origin[2];
+        const float u0 = g->origin[0] + dz * g->su_min, u1 = g->origin[0] + dz * g->su_max,
+                    v0 = g->origin[1] + dz * g->sv_min, v1 = g->origin[1] + dz * g->sv_max;
+        e->u_low[end] = f_min(u0, u1);
+        e->u_high[end] = f_max(u0, u1);
+        e->v_low[end] = f_min(v0, v1);
+        e->v_high[end] = f_max(v0, v1);
+    }
+}
+
+TRC_INLINE void trc_ends_of_rays(const struct trc_group *g, const struct trc_packet *p,
+                                 uint64_t mask, const float plane[2], struct trc_beam_ends *e) {
+    const struct trc_shear axis = g->beam.axis;
+    const vfloat inf = vf_set(INFINITY);
+    vfloat u_low[2] = {inf, inf}, u_high[2] = {-inf, -inf}, v_low[2] = {inf, inf},
+           v_high[2] = {-inf, -inf};
+    for (int c = 0; c < TRC_PACKET_CHUNKS; c++) {
+        const uint32_t bits = trc_chunk_bits(mask, c);
+        if (!bits)
+            continue;
+        const int i = c * TRC_WIDTH;
+        const vmask m = vm_from_bits(bits);
+        const vfloat oz = vf_load(&p->o[axis.z][i]);
+        const vfloat su = vf_load(&g->su[i]), sv = vf_load(&g->sv[i]);
+        for (int end = 0; end < 2; end++) {
+            const vfloat dz = vf_set(plane[end]) - oz;
+            const vfloat u = vf_load(&p->o[axis.u][i]) + dz * su;
+            const vfloat v = vf_load(&p->o[axis.v][i]) + dz * sv;
+            u_low[end] = vf_min_where(m, u_low[end], u);
+            u_high[end] = vf_max_where(m, u_high[end], u);
+            v_low[end] = vf_min_where(m, v_low[end], v);
+            v_high[end] = vf_max_where(m, v_high[end], v);
+        }
+    }
+    for (int end = 0; end < 2; end++) {
+        e->u_low[end] = vf_lanes_min(u_low[end]);
+        e->u_high[end] = vf_lanes_max(u_high[end]);
+        e->v_low[end] = vf_lanes_min(v_low[end]);
+        e->v_high[end] = vf_lanes_max(v_high[end]);
+    }
+}
+
+/* What the rays of a group reach along their dominant axis, mirrored, and how far from 0 they
+ * start. */
+struct trc_group_reach {
+    float z_near, z_far, origin;
+};
+
+/* Shear and inverses of the rays in mask; of packets of one origin the range of shears. */
+TRC_INLINE struct trc_group_reach trc_group_rays(struct trc_group *g, const struct trc_packet *p,
+                                                 uint64_t mask) {
+    const int au = g->beam.axis.u, av = g->beam.axis.v, z = g->beam.axis.z;
+    const bool common = p->common_origin;
+    const vfloat sign = vf_set(g->beam.sign), inf = vf_set(INFINITY);
+    vfloat z_near = inf, z_far = -inf, origin = vf_set(0.0f);
+    vfloat su_min = inf, su_max = -inf, sv_min = inf, sv_max = -inf;
     for (int c = 0; c < TRC_PACKET_CHUNKS; c++) {
         const uint32_t bits = trc_chunk_bits(mask, c);
         if (!bits)
@@ -82,10 +136,10 @@ TRC_INLINE bool trc_group_setup(struct trc_group *g, const struct trc_packet *p,
                      dz = vf_load(&p->d[z][i]);
         const vfloat ou = vf_load(&p->o[au][i]), ov = vf_load(&p->o[av][i]),
                      oz = vf_load(&p->o[z][i]);
-        const vfloat sz = vf_set(1.0f) / dz;
+        const vfloat sz = vf_set(1.0f) / dz, su = du * sz, sv = dv * sz;
         vf_store(&g->sz[i], sz);
-        vf_store(&g->su[i], du * sz);
-        vf_store(&g->sv[i], dv * sz);
+        vf_store(&g->su[i], su);
+        vf_store(&g->sv[i], sv);
         const vfloat inv_u = trc_safe_inverse(du), inv_v = trc_safe_inverse(dv);
         vf_store(&g->inv[au][i], inv_u);
         vf_store(&g->inv[av][i], inv_v);
@@ -93,72 +147,74 @@ TRC_INLINE bool trc_group_setup(struct trc_group *g, const struct trc_packet *p,
         vf_store(&g->shift[au][i], -ou * inv_u);
         vf_store(&g->shift[av][i], -ov * inv_v);
         vf_store(&g->shift[z][i], -oz * sz);
-        z_near = vf_min(z_near, vf_select(m, sign * (oz + vf_load(&p->tmin[i]) * dz), inf));
-        z_far = vf_max(z_far, vf_select(m, sign * (oz + vf_load(&p->t[i]) * dz), -inf));
-        const vfloat o = vf_max(vf_abs(ou), vf_max(vf_abs(ov), vf_abs(oz)));
-        far_origin = vf_max(far_origin, vf_select(m, o, vf_set(0.0f)));
-    }
-    b->slack = TRC_SLACK * (vf_lanes_max(far_origin) + tree->extent) + TRC_LEAST_SLACK;
-    const float low = side ? -tree->upper[z] : tree->lower[z];
-    const float high = side ? -tree->lower[z] : tree->upper[z];
-    b->z0 = f_max(vf_lanes_min(z_near), low) - b->slack;
-    b->z1 = f_min(vf_lanes_max(z_far), high) + b->slack;
-    if (!(b->z0 <= b->z1))
-        return false;
-    vfloat u_low[2] = {inf, inf}, u_high[2] = {-inf, -inf}, v_low[2] = {inf, inf},
-           v_high[2] = {-inf, -inf};
-    vfloat shear[4] = {inf, -inf, inf, -inf};
-    const vfloat plane[2] = {sign * b->z0, sign * b->z1};
-    for (int c = 0; c < TRC_PACKET_CHUNKS; c++) {
-        const uint32_t bits = trc_chunk_bits(mask, c);
-        if (!bits)
-            continue;
-        const int i = c * TRC_WIDTH;
-        const vmask m = vm_from_bits(bits);
-        const vfloat oz = vf_load(&p->o[z][i]);
-        const vfloat su = vf_load(&g->su[i]), sv = vf_load(&g->sv[i]);
-        shear[0] = vf_min(shear[0], vf_select(m, su, inf));
-        shear[1] = vf_max(shear[1], vf_select(m, su, -inf));
-        shear[2] = vf_min(shear[2], vf_select(m, sv, inf));
-        shear[3] = vf_max(shear[3], vf_select(m, sv, -inf));
-        for (int end = 0; end < 2; end++) {
-            const vfloat dz = plane[end] - oz;
-            const vfloat u = vf_load(&p->o[au][i]) + dz * su;
-            const vfloat v = vf_load(&p->o[av][i]) + dz * sv;
-            u_low[end] = vf_min(u_low[end], vf_select(m, u, inf));
-            u_high[end] = vf_max(u_high[end], vf_select(m, u, -inf));
-            v_low[end] = vf_min(v_low[end], vf_select(m, v, inf));
-            v_high[end] = vf_max(v_high[end], vf_select(m, v, -inf));
+        z_near = vf_min_where(m, z_near, sign * (oz + vf_load(&p->tmin[i]) * dz));
+        z_far = vf_max_where(m, z_far, sign * (oz + vf_load(&p->t[i]) * dz));
+        if (common) {
+            su_min = vf_min_where(m, su_min, su);
+            su_max = vf_max_where(m, su_max, su);
+            sv_min = vf_min_where(m, sv_min, sv);
+            sv_max = vf_max_where(m, sv_max, sv);
+        } else {
+            origin = vf_max_where(m, origin, vf_max(vf_abs(ou), vf_max(vf_abs(ov), vf_abs(oz))));
         }
     }
-    if (p->common_origin) {
-        const int first = __builtin_ctzll(mask);
-        g->origin[0] = p->o[au][first];
-        g->origin[1] = p->o[av][first];
-        g->origin[2] = p->o[z][first];
-        g->su_min = vf_lanes_min(shear[0]);
-        g->su_max = vf_lanes_max(shear[1]);
-        g->sv_min = vf_lanes_min(shear[2]);
-        g->sv_max = vf_lanes_max(shear[3]);
+    struct trc_group_reach reach = {.z_near = vf_lanes_min(z_near), .z_far = vf_lanes_max(z_far)};
+    if (!common) {
+        reach.origin = vf_lanes_max(origin);
+        return reach;
     }
+    const int first = __builtin_ctzll(mask);
+    g->origin[0] = p->o[au][first];
+    g->origin[1] = p->o[av][first];
+    g->origin[2] = p->o[z][first];
+    g->su_min = vf_lanes_min(su_min);
+    g->su_max = vf_lanes_max(su_max);
+    g->sv_min = vf_lanes_min(sv_min);
+    g->sv_max = vf_lanes_max(sv_max);
+    reach.origin = f_max(fabsf(g->origin[0]), f_max(fabsf(g->origin[1]), fabsf(g->origin[2])));
+    return reach;
+}
+
+/* Shear, inverses and beam of the rays in mask, all of dominant axis z and that side, against a
+ * tree. False: none can reach the tree. */
+TRC_INLINE bool trc_group_setup(struct trc_group *g, const struct trc_packet *p,
+                                const struct trc_tree *tree, uint64_t mask, int z, int side) {
+    struct trc_beam *b = &g->beam;
+    b->axis = (struct trc_shear){(z + 1) % 3, (z + 2) % 3, z};
+    b->side = side;
+    b->sign = side ? -1.0f : 1.0f;
+    const struct trc_group_reach reach = trc_group_rays(g, p, mask);
+    b->slack = TRC_SLACK * (reach.origin + tree->extent) + TRC_LEAST_SLACK;
+    const float low = side ? -tree->upper[z] : tree->lower[z];
+    const float high = side ? -tree->lower[z] : tree->upper[z];
+    b->z0 = f_max(reach.z_near, low) - b->slack;
+    b->z1 = f_min(reach.z_far, high) + b->slack;
+    if (!(b->z0 <= b->z1))
+        return false;
+    const float plane[2] = {b->sign * b->z0, b->sign * b->z1};
+    struct trc_beam_ends e;
+    if (p->common_origin)
+        trc_ends_of_origin(g, plane, &e);
+    else
+        trc_ends_of_rays(g, p, mask, plane, &e);
     const float length = b->z1 - b->z0;
     /* In a beam no longer than its slack, rounding would be most of a slope. */
     const bool is_short = length < f_max(b->slack, TRC_SHORT_BEAM);
     const float per_z = is_short ? 0.0f : 1.0f / length;
     if (is_short) { /* one range over both planes */
-        u_low[0] = vf_min(u_low[0], u_low[1]);
-        u_high[0] = vf_max(u_high[0], u_high[1]);
-        v_low[0] = vf_min(v_low[0], v_low[1]);
-        v_high[0] = vf_max(v_high[0], v_high[1]);
+        e.u_low[0] = f_min(e.u_low[0], e.u_low[1]);
+        e.u_high[0] = f_max(e.u_high[0], e.u_high[1]);
+        e.v_low[0] = f_min(e.v_low[0], e.v_low[1]);
+        e.v_high[0] = f_max(e.v_high[0], e.v_high[1]);
     }
-    b->u_min = vf_lanes_min(u_low[0]) - b->slack;
-    b->u_max = vf_lanes_max(u_high[0]) + b->slack;
-    b->v_min = vf_lanes_min(v_low[0]) - b->slack;
-    b->v_max = vf_lanes_max(v_high[0]) + b->slack;
-    b->u_min_slope = (vf_lanes_min(u_low[1]) - b->slack - b->u_min) * per_z;
-    b->u_max_slope = (vf_lanes_max(u_high[1]) + b->slack - b->u_max) * per_z;
-    b->v_min_slope = (vf_lanes_min(v_low[1]) - b->slack - b->v_min) * per_z;
-    b->v_max_slope = (vf_lanes_max(v_high[1]) + b->slack - b->v_max) * per_z;
+    b->u_min = e.u_low[0] - b->slack;
+    b->u_max = e.u_high[0] + b->slack;
+    b->v_min = e.v_low[0] - b->slack;
+    b->v_max = e.v_high[0] + b->slack;
+    b->u_min_slope = (e.u_low[1] - b->slack - b->u_min) * per_z;
+    b->u_max_slope = (e.u_high[1] + b->slack - b->u_max) * per_z;
+    b->v_min_slope = (e.v_low[1] - b->slack - b->v_min) * per_z;
+    b->v_max_slope = (e.v_high[1] + b->slack - b->v_max) * per_z;
     b->u_mid = 0.5f * (b->u_min + b->u_max);
     b->v_mid = 0.5f * (b->v_min + b->v_max);
     b->u_half = 0.5f * (b->u_max - b->u_min);

@@ -264,6 +264,21 @@ TRC_INLINE vfloat vf_max(vfloat a, vfloat b) {
     return vf_select(vf_gt(a, b), a, b);
 #endif
 }
+/* a, and in the lanes of m the least or most of a and b. */
+TRC_INLINE vfloat vf_min_where(vmask m, vfloat a, vfloat b) {
+#if TRC_WIDTH == 16
+    return _mm512_mask_min_ps(a, m, a, b);
+#else
+    return vf_select(m, vf_min(a, b), a);
+#endif
+}
+TRC_INLINE vfloat vf_max_where(vmask m, vfloat a, vfloat b) {
+#if TRC_WIDTH == 16
+    return _mm512_mask_max_ps(a, m, a, b);
+#else
+    return vf_select(m, vf_max(a, b), a);
+#endif
+}
 TRC_INLINE vfloat vf_clamp(vfloat a, float low, float high) {
     return vf_min(vf_max(a, vf_set(low)), vf_set(high));
 }
@@ -327,6 +342,14 @@ TRC_INLINE float vf_lanes_min(vfloat a) {
     return a;
 #elif TRC_WIDTH == 16
     return _mm512_reduce_min_ps(a);
+#elif defined(__SSE__)
+#if TRC_WIDTH == 8
+    const __m128 four = _mm_min_ps(_mm256_castps256_ps128(a), _mm256_extractf128_ps(a, 1));
+#else
+    const __m128 four = a;
+#endif
+    const __m128 two = _mm_min_ps(four, _mm_movehl_ps(four, four));
+    return _mm_cvtss_f32(_mm_min_ss(two, _mm_shuffle_ps(two, two, 1)));
 #else
     float r = a[0];
     for (int i = 1; i < TRC_WIDTH; i++)

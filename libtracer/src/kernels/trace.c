@@ -43,7 +43,6 @@ struct walk {
     struct trc_group *group;
 };
 
-static void walk_packet(struct walk *w, uint64_t mask, bool any);
 static void item_packet(struct walk *w, const struct trc_item *item, uint64_t mask, bool any);
 
 /* ---- bounds, static or moving ---- */
@@ -563,38 +562,45 @@ static void walk_segments(struct walk *w, uint64_t mask, bool any) {
     }
 }
 
+/* The rays of w's group through w's tree. */
+static void walk_group(struct walk *w, uint64_t mask, bool any) {
+    if (w->tree->key_count > 1)
+        walk_segments(w, mask, any);
+    else
+        (any ? walk_any : walk_closest)(w, mask);
+}
+
 /* Splits the rays by dominant axis and side and walks each group. */
 static void walk_packet(struct walk *w, uint64_t mask, bool any) {
     const struct trc_packet *p = w->packet;
     struct trc_group group;
-    uint64_t groups[6] = {0};
+    uint64_t x = 0, y = 0, down[3] = {0};
     if (w->tree->root == TRC_REF_EMPTY)
         return;
     for (int c = 0; c < TRC_PACKET_CHUNKS; c++) {
-        const uint32_t bits = trc_chunk_bits(mask, c);
-        if (!bits)
+        if (!trc_chunk_bits(mask, c))
             continue;
         const int i = c * TRC_WIDTH;
         const vfloat dx = vf_load(&p->d[0][i]), dy = vf_load(&p->d[1][i]),
                      dz = vf_load(&p->d[2][i]);
         const vfloat ax = vf_abs(dx), ay = vf_abs(dy), az = vf_abs(dz), zero = vf_set(0.0f);
-        const uint32_t x = bits & vm_bits(vm_and(vf_ge(ax, ay), vf_ge(ax, az)));
-        const uint32_t y = bits & ~x & vm_bits(vf_ge(ay, az)), z = bits & ~x & ~y;
-        const uint32_t nx = vm_bits(vf_lt(dx, zero)), ny = vm_bits(vf_lt(dy, zero)),
-                       nz = vm_bits(vf_lt(dz, zero));
-        const uint32_t split[6] = {x & ~nx, x & nx, y & ~ny, y & ny, z & ~nz, z & nz};
-        for (int k = 0; k < 6; k++)
-            groups[k] |= (uint64_t)split[k] << i;
+        x |= (uint64_t)vm_bits(vm_and(vf_ge(ax, ay), vf_ge(ax, az))) << i;
+        y |= (uint64_t)vm_bits(vf_ge(ay, az)) << i;
+        down[0] |= (uint64_t)vm_bits(vf_lt(dx, zero)) << i;
+        down[1] |= (uint64_t)vm_bits(vf_lt(dy, zero)) << i;
+        down[2] |= (uint64_t)vm_bits(vf_lt(dz, zero)) << i;
     }
+    const uint64_t dominant[3] = {mask & x, mask & ~x & y, mask & ~x & ~y};
     struct trc_group *const outer = w->group;
     w->group = &group;
-    for (int k = 0; k < 6; k++) {
-        if (!groups[k] || !trc_group_setup(&group, p, w->tree, groups[k], k >> 1, k & 1))
+    for (int axis = 0; axis < 3; axis++) {
+        if (!dominant[axis])
             continue;
-        if (w->tree->key_count > 1)
-            walk_segments(w, groups[k], any);
-        else
-            (any ? walk_any : walk_closest)(w, groups[k]);
+        for (int side = 0; side < 2; side++) {
+            const uint64_t rays = dominant[axis] & (side ? down[axis] : ~down[axis]);
+            if (rays && trc_group_setup(&group, p, w->tree, rays, axis, side))
+                walk_group(w, rays, any);
+        }
     }
     w->group = outer;
 }
@@ -655,26 +661,35 @@ static void packet_transform(const struct trc_instance *instance, const struct t
     out->common_origin = p->common_origin && instance->key_count < 2;
 }
 
+/* The rays of mask through w's tree as w's instance has it. */
+static void walk_instance(struct walk *w, uint64_t mask, bool any) {
+    struct trc_packet *const world = w->packet;
+    struct trc_packet local;
+    packet_transform(&w->snapshot->instances[w->instance], world, mask, &local);
+    w->packet = &local;
+    walk_packet(w, mask, any);
+    for (int c = 0; c < TRC_PACKET_CHUNKS && !any; c++) {
+        const uint32_t bits = trc_chunk_bits(mask, c);
+        const int i = c * TRC_WIDTH;
+        if (bits)
+            vf_store(&world->t[i],
+                     vf_select(vm_from_bits(bits), vf_load(&local.t[i]), vf_load(&world->t[i])));
+    }
+}
+
 static void item_packet(struct walk *w, const struct trc_item *item, uint64_t mask, bool any) {
     if (!(item->visibility & w->packet->visibility))
         return;
     const struct walk outer = *w;
-    struct trc_packet local;
     w->tree = item->tree;
     w->instance = item->instance;
-    if (item->instance != TRC_NO_HIT) {
-        packet_transform(&w->snapshot->instances[item->instance], outer.packet, mask, &local);
-        w->packet = &local;
+    if (item->instance == TRC_NO_HIT) { /* in world space, within the TLAS: the same beam */
+        const float z1 = w->group->beam.z1;
+        walk_group(w, mask, any);
+        w->group->beam.z1 = z1;
+    } else {
+        walk_instance(w, mask, any);
     }
-    walk_packet(w, mask, any);
-    if (item->instance != TRC_NO_HIT && !any)
-        for (int c = 0; c < TRC_PACKET_CHUNKS; c++) {
-            const uint32_t bits = trc_chunk_bits(mask, c);
-            const int i = c * TRC_WIDTH;
-            if (bits)
-                vf_store(&outer.packet->t[i], vf_select(vm_from_bits(bits), vf_load(&local.t[i]),
-                                                        vf_load(&outer.packet->t[i])));
-        }
     const uint64_t occluded = w->occluded;
     *w = outer;
     w->occluded = occluded;
