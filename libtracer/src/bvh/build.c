@@ -1,201 +1,25 @@
-/* Shape of a tree: binned SAH.
+/* Shape of a tree: where ranges are split (bvh/split.h), and where they stay leaves.
  *
- * Ingo Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies", 2007, for the
- * binning; nodes are opened to eight children by splitting the child of the largest area, as in
- * Wald, Benthin and Boulos, "Getting Rid of Packets", 2008. The upper part of the tree is made by
- * one thread that leaves subtrees of TASK_SIZE refs or less as tasks; sizes do not depend on the
- * number of threads, so the tree does not either.
+ * Nodes are opened to eight children by splitting the child of the largest area, as in Ingo Wald,
+ * Carsten Benthin, Solomon Boulos, "Getting Rid of Packets", 2008. The upper part of the tree is
+ * made by one thread, all of them at work on each split; subtrees of TRC_SHARED_RANGE refs or less
+ * are tasks. Sizes do not depend on the number of threads, so the tree does not either.
  *
  * Without gain: triangles cut before the build at spatial median planes (Karras and Aila, "Fast
  * Parallel Construction of High-Quality Bounding Volume Hierarchies", 2013) make the cost of
  * the generated conference room 10 to 29 % higher for 5 to 90 % more refs. */
-#include <float.h>
 #include <string.h>
 
-#include "bvh/tree.h"
-#include "core/box.h"
+#include "bvh/split.h"
 #include "core/core.h"
 #include "threads/pool.h"
 
-/* Bins per axis: 16 loses about 1 % of SAH cost against 32 and builds a third faster; where refs
- * are few, half as many are as good, and a quarter where a leaf would do. */
-#define BIN_COUNT 16
-#define FEW_REFS 24
-#define FEW_BINS 8
-#define LEAF_BINS 4
-/* Largest subtree that is one task. */
-#define TASK_SIZE 8192
 /* Cost of visiting a node against one triangle of a leaf. A leaf is one block whatever its count,
  * and packets cull its triangles in one step, so leaves may be full. */
 #define NODE_COST 3.0f
 /* From this level (of 8-wide nodes) on, ranges are halved whatever the SAH says: 2^28 refs are
  * exhausted within TRC_MAX_LEVELS. */
 #define MEDIAN_LEVEL 32
-
-/* Four floats of a ref, of which lane 3 is one of its integers: never used as a number. */
-static inline f4 ref_corner(const struct trc_ref *r, size_t offset) {
-    i4 v;
-    memcpy(&v, (const char *)r + offset, sizeof v);
-    return (f4)(v & (i4){-1, -1, -1, 0});
-}
-static inline f4 ref_lower(const struct trc_ref *r) {
-    return ref_corner(r, offsetof(struct trc_ref, lower));
-}
-static inline f4 ref_upper(const struct trc_ref *r) {
-    return ref_corner(r, offsetof(struct trc_ref, upper));
-}
-
-/* Twice the middle of its box. */
-static inline f4 ref_centroid(const struct trc_ref *r) { return ref_lower(r) + ref_upper(r); }
-
-/* A range of refs that becomes a child. */
-struct range {
-    uint32_t begin, end;
-    struct box bounds, centroids; /* centroids: of lower + upper */
-};
-
-struct split {
-    int axis; /* -1: none found */
-    int bin;  /* refs of bins < bin go left */
-    int bin_count;
-    float cost;       /* sum of area * count of both sides */
-    f4 origin, scale; /* bin = (centroid - origin) * scale, at most last_bin */
-    f4 last_bin;
-    struct box left, right;
-};
-
-static struct range range_measure(const struct trc_ref *refs, uint32_t begin, uint32_t end) {
-    struct range r = {begin, end, box_empty(), box_empty()};
-    for (uint32_t i = begin; i < end; i++) {
-        box_grow(&r.bounds, (struct box){ref_lower(&refs[i]), ref_upper(&refs[i])});
-        box_add(&r.centroids, ref_centroid(&refs[i]));
-    }
-    return r;
-}
-
-static inline i4 bin_of(const struct split *s, const struct trc_ref *r) {
-    const f4 x = (ref_centroid(r) - s->origin) * s->scale;
-    return __builtin_convertvector(f4_min(f4_max(x, (f4){0.0f, 0.0f, 0.0f, 0.0f}), s->last_bin),
-                                   i4);
-}
-
-static inline bool is_left(const struct split *s, const struct trc_ref *r) {
-    return bin_of(s, r)[s->axis] < s->bin;
-}
-
-struct bins {
-    struct box box[3][BIN_COUNT];
-    uint32_t count[3][BIN_COUNT];
-};
-
-static void bins_fill(const struct trc_ref *refs, const struct range *r, const struct split *s,
-                      struct bins *bins) {
-    const struct box empty = box_empty();
-    memset(bins->count, 0, sizeof bins->count);
-    for (int axis = 0; axis < 3; axis++)
-        for (int i = 0; i < s->bin_count; i++)
-            bins->box[axis][i] = empty;
-    for (uint32_t i = r->begin; i < r->end; i++) {
-        const i4 b = bin_of(s, &refs[i]);
-        const struct box box = {ref_lower(&refs[i]), ref_upper(&refs[i])};
-        for (int axis = 0; axis < 3; axis++) {
-            box_grow(&bins->box[axis][b[axis]], box);
-            bins->count[axis][b[axis]]++;
-        }
-    }
-}
-
-/* Sweeps the bins of one axis from both ends, keeping the cheapest plane. */
-static void bins_sweep(const struct bins *bins, int axis, struct split *s) {
-    f4 left_size[BIN_COUNT], right_size[BIN_COUNT]; /* of the boxes beside the plane below a bin */
-    float left_count[BIN_COUNT], right_count[BIN_COUNT];
-    struct box left = box_empty(), right = box_empty();
-    uint32_t before = 0, after = 0;
-    for (int i = 0, k = s->bin_count - 1; k >= 0; i++, k--) {
-        left_size[i] = box_size(left);
-        left_count[i] = (float)before;
-        box_grow(&left, bins->box[axis][i]);
-        before += bins->count[axis][i];
-        box_grow(&right, bins->box[axis][k]);
-        after += bins->count[axis][k];
-        right_size[k] = box_size(right);
-        right_count[k] = (float)after;
-    }
-    for (int i = 0; i < s->bin_count; i += 4) {
-        f4 left_counts, right_counts;
-        memcpy(&left_counts, left_count + i, sizeof left_counts);
-        memcpy(&right_counts, right_count + i, sizeof right_counts);
-        const f4 cost =
-            box_areas(left_size + i) * left_counts + box_areas(right_size + i) * right_counts;
-        const i4 better = (cost < f4_set(s->cost)) & (left_counts > 0.0f) & (right_counts > 0.0f);
-        for (int k = 0; i4_any(better) && k < 4; k++) {
-            if (!better[k] || cost[k] >= s->cost)
-                continue;
-            s->cost = cost[k];
-            s->axis = axis;
-            s->bin = i + k;
-        }
-    }
-}
-
-static int bin_count(uint32_t ref_count) {
-    if (ref_count <= TRC_NODE_WIDTH)
-        return LEAF_BINS;
-    return ref_count <= FEW_REFS ? FEW_BINS : BIN_COUNT;
-}
-
-static struct split split_find(const struct trc_ref *refs, const struct range *r) {
-    struct split s = {.axis = -1, .bin = 0, .cost = FLT_MAX};
-    s.bin_count = bin_count(r->end - r->begin);
-    const float last = (float)(s.bin_count - 1);
-    s.last_bin = (f4){last, last, last, last};
-    const f4 size = r->centroids.upper - r->centroids.lower;
-    s.origin = r->centroids.lower;
-    for (int axis = 0; axis < 3; axis++) {
-        /* A little below the count so that the last centroid falls into the last bin; flat axes all
-         * go to bin 0 and offer no plane. */
-        const float scale = (float)s.bin_count * 0.9999f / size[axis];
-        s.scale[axis] = size[axis] > 0.0f && scale < FLT_MAX ? scale : 0.0f;
-    }
-    struct bins bins;
-    bins_fill(refs, r, &s, &bins);
-    for (int axis = 0; axis < 3; axis++)
-        if (s.scale[axis] > 0.0f)
-            bins_sweep(&bins, axis, &s);
-    if (s.axis < 0)
-        return s;
-    s.left = s.right = box_empty();
-    for (int i = 0; i < s.bin_count; i++)
-        box_grow(i < s.bin ? &s.left : &s.right, bins.box[s.axis][i]);
-    return s;
-}
-
-/* Moves the refs left of the plane to the front and measures both sides' centroids on the way. */
-static void split_apply(struct trc_ref *refs, const struct range *r, const struct split *s,
-                        struct range *left, struct range *right) {
-    uint32_t i = r->begin, j = r->end;
-    struct box before = box_empty(), after = box_empty();
-    for (;;) {
-        for (; i < j && is_left(s, &refs[i]); i++)
-            box_add(&before, ref_centroid(&refs[i]));
-        for (; i < j && !is_left(s, &refs[j - 1]); j--)
-            box_add(&after, ref_centroid(&refs[j - 1]));
-        if (i >= j)
-            break;
-        const struct trc_ref swap = refs[i];
-        refs[i] = refs[j - 1];
-        refs[j - 1] = swap;
-    }
-    *left = (struct range){r->begin, i, s->left, before};
-    *right = (struct range){i, r->end, s->right, after};
-}
-
-static void split_middle(const struct trc_ref *refs, const struct range *r, struct range *left,
-                         struct range *right) {
-    const uint32_t middle = r->begin + (r->end - r->begin) / 2;
-    *left = range_measure(refs, r->begin, middle);
-    *right = range_measure(refs, middle, r->end);
-}
 
 /* A growing part of the tree. */
 struct arena {
@@ -205,7 +29,7 @@ struct arena {
 };
 
 struct task {
-    struct range range;
+    struct trc_range range;
     uint32_t parent, slot; /* where in the upper part its root goes */
     uint32_t level;
     uint32_t root;
@@ -216,7 +40,8 @@ struct builder {
     struct trc_ref *refs;
     uint32_t leaf_size;
     const atomic_uint *cancel;
-    struct task *tasks; /* filled while the upper part is made */
+    struct trc_split_blocks *blocks; /* for the upper part */
+    struct task *tasks;              /* filled while the upper part is made */
     uint32_t task_count, task_capacity;
     bool failed;
 };
@@ -252,34 +77,37 @@ static bool is_cancelled(const struct builder *b) { return b->cancel && *b->canc
 
 /* Splits r in two unless it is better, and possible, to leave it a leaf. A build that is cancelled
  * splits no more: what it has made is thrown away. */
-static bool range_divide(struct builder *b, const struct range *r, uint32_t level,
-                         struct range *left, struct range *right) {
+static bool range_divide(struct builder *b, const struct trc_range *r, uint32_t level,
+                         struct trc_range *left, struct trc_range *right) {
     const uint32_t count = r->end - r->begin;
     const bool must = count > b->leaf_size;
     if (count < 2 || (!must && (float)count <= NODE_COST) || is_cancelled(b))
         return false;
     if (level >= MEDIAN_LEVEL) {
         if (must)
-            split_middle(b->refs, r, left, right);
+            trc_split_middle(b->refs, r, left, right);
         return must;
     }
-    const struct split s = split_find(b->refs, r);
+    const bool shared = count > TRC_SHARED_RANGE;
+    const struct trc_split s =
+        shared ? trc_split_shared_find(b->blocks, r) : trc_split_find(b->refs, r);
     const float area = box_area(r->bounds);
     if (!must && !(s.axis >= 0 && s.cost + area * NODE_COST < area * (float)count))
         return false;
-    if (s.axis < 0) {
-        split_middle(b->refs, r, left, right);
-        return true;
-    }
-    split_apply(b->refs, r, &s, left, right);
+    if (s.axis < 0)
+        trc_split_middle(b->refs, r, left, right);
+    else if (shared)
+        trc_split_shared_apply(b->blocks, r, &s, left, right);
+    else
+        trc_split_apply(b->refs, r, &s, left, right);
     return true;
 }
 
 /* Opens r into up to eight ranges, the largest area first, then the most refs; 1 when r stays a
  * leaf.
  */
-static int range_open(struct builder *b, const struct range *r, uint32_t level,
-                      struct range out[TRC_NODE_WIDTH]) {
+static int range_open(struct builder *b, const struct trc_range *r, uint32_t level,
+                      struct trc_range out[TRC_NODE_WIDTH]) {
     int count = 1;
     bool closed[TRC_NODE_WIDTH] = {false};
     out[0] = *r;
@@ -297,7 +125,7 @@ static int range_open(struct builder *b, const struct range *r, uint32_t level,
         }
         if (best < 0)
             break;
-        struct range left, right;
+        struct trc_range left, right;
         if (!range_divide(b, &out[best], level, &left, &right)) {
             closed[best] = true;
             continue;
@@ -310,9 +138,9 @@ static int range_open(struct builder *b, const struct range *r, uint32_t level,
 
 /* Builds r into the arena, depth first; in the upper part (tasks true) small ranges become tasks.
  */
-static uint32_t build_range(struct builder *b, struct arena *a, const struct range *r,
+static uint32_t build_range(struct builder *b, struct arena *a, const struct trc_range *r,
                             uint32_t level, bool tasks) {
-    struct range child[TRC_NODE_WIDTH];
+    struct trc_range child[TRC_NODE_WIDTH];
     if (a->failed || b->failed || is_cancelled(b))
         return TRC_REF_EMPTY;
     const int count = range_open(b, r, level, child);
@@ -322,7 +150,7 @@ static uint32_t build_range(struct builder *b, struct arena *a, const struct ran
     if (a->failed)
         return TRC_REF_EMPTY;
     for (int i = 0; i < count; i++) {
-        if (tasks && child[i].end - child[i].begin <= TASK_SIZE) {
+        if (tasks && child[i].end - child[i].begin <= TRC_SHARED_RANGE) {
             if (b->task_count == b->task_capacity) {
                 void *array = b->tasks;
                 if (!grow(&array, &b->task_capacity, sizeof *b->tasks)) {
@@ -394,8 +222,11 @@ trc_status trc_topology_build(struct trc_ref *refs, uint32_t count, uint32_t lea
     if (count > TRC_REF_INDEX_MASK)
         return trc_fail(TRC_ERROR_TOO_LARGE, "%u primitives in one tree, at most %u", count,
                         TRC_REF_INDEX_MASK);
-    const struct range all = range_measure(refs, 0, count);
-    const uint32_t root = build_range(&b, &top, &all, 0, count > TASK_SIZE);
+    const bool shared = count > TRC_SHARED_RANGE;
+    if (shared && !(b.blocks = trc_split_blocks_create(refs, count, pool, cancel)))
+        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory to build over %u primitives", count);
+    const struct trc_range all = trc_range_measure(refs, 0, count);
+    const uint32_t root = build_range(&b, &top, &all, 0, shared);
     if (!top.failed && !b.failed)
         trc_pool_run(pool, b.task_count, task_run, &b);
     const trc_status status = join(&b, &top, root, out);
@@ -403,6 +234,7 @@ trc_status trc_topology_build(struct trc_ref *refs, uint32_t count, uint32_t lea
         trc_free(b.tasks[i].arena.children);
     trc_free(b.tasks);
     trc_free(top.children);
+    trc_split_blocks_destroy(b.blocks);
     return status;
 }
 
