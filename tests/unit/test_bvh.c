@@ -2,7 +2,7 @@
  * posed, and the check finds trees that do not. */
 #include "query_test.h"
 
-#include "bvh/tree.h"
+#include "bvh/split.h"
 #include "core/core.h"
 #include "figures.h"
 #include "threads/pool.h"
@@ -31,6 +31,77 @@ static void expect_good_world(const char *name, struct query_world *world) {
         query_scene_destroy(&scene);
     }
     query_world_free(world);
+}
+
+/* ---- splits ---- */
+
+static int compare_primitives(const void *a, const void *b) {
+    const uint32_t x = ((const struct trc_ref *)a)->primitive,
+                   y = ((const struct trc_ref *)b)->primitive;
+    return (x > y) - (x < y);
+}
+
+static void expect_box(struct box a, struct box b) {
+    for (int axis = 0; axis < 3; axis++) {
+        assert_true(a.lower[axis] == b.lower[axis]);
+        assert_true(a.upper[axis] == b.upper[axis]);
+    }
+}
+
+static void expect_range(const struct trc_range *a, const struct trc_range *b) {
+    assert_int_equal(a->begin, b->begin);
+    assert_int_equal(a->end, b->end);
+    expect_box(a->bounds, b->bounds);
+    expect_box(a->centroids, b->centroids);
+}
+
+/* By one thread and by all of them: the same plane, the same refs on either side, their boxes as
+ * measured. */
+static void shared_splits_are_the_same(void **state) {
+    (void)state;
+    static const uint32_t counts[] = {2, 2047, 2048, 2049, 10000, 131072, 200001};
+    for (size_t k = 0; k < sizeof counts / sizeof *counts; k++) {
+        const uint32_t count = counts[k];
+        const size_t bytes = count * sizeof(struct trc_ref);
+        struct trc_ref *refs = malloc(bytes), *shared = malloc(bytes);
+        struct trc_pool *pool;
+        struct rng rng = rng_seed(k);
+        for (uint32_t i = 0; i < count; i++) {
+            refs[i] = (struct trc_ref){.primitive = i};
+            for (int axis = 0; axis < 3; axis++) {
+                refs[i].lower[axis] = rng_range(&rng, -1.0f, 1.0f);
+                refs[i].upper[axis] = refs[i].lower[axis] + rng_unit(&rng) * rng_unit(&rng);
+            }
+        }
+        memcpy(shared, refs, bytes);
+        assert_int_equal(trc_pool_create(3, &pool), TRC_OK);
+        struct trc_split_blocks *blocks = trc_split_blocks_create(shared, count, pool, NULL);
+        assert_non_null(blocks);
+        const struct trc_range all = trc_range_measure(refs, 0, count);
+        const struct trc_split s = trc_split_find(refs, &all),
+                               other = trc_split_shared_find(blocks, &all);
+        assert_true(s.axis >= 0 && s.axis == other.axis && s.bin == other.bin);
+        assert_true(s.cost == other.cost);
+        struct trc_range left, right, shared_left, shared_right;
+        trc_split_apply(refs, &all, &s, &left, &right);
+        trc_split_shared_apply(blocks, &all, &other, &shared_left, &shared_right);
+        expect_range(&left, &shared_left);
+        expect_range(&right, &shared_right);
+        assert_true(left.end > 0 && left.end < count);
+        for (uint32_t i = 1; i < count; i++) /* sides keep their order */
+            assert_true(i == left.end || shared[i - 1].primitive < shared[i].primitive);
+        qsort(refs, left.end, sizeof *refs, compare_primitives);
+        qsort(refs + left.end, count - left.end, sizeof *refs, compare_primitives);
+        assert_memory_equal(refs, shared, bytes);
+        struct trc_range measured = trc_range_measure(refs, left.begin, left.end);
+        expect_range(&left, &measured);
+        measured = trc_range_measure(refs, right.begin, right.end);
+        expect_range(&right, &measured);
+        trc_split_blocks_destroy(blocks);
+        trc_pool_destroy(pool);
+        free(shared);
+        free(refs);
+    }
 }
 
 /* ---- what trees are built from ---- */
@@ -482,6 +553,7 @@ static void check_finds_damage(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(shared_splits_are_the_same),
         cmocka_unit_test(any_number_of_triangles),
         cmocka_unit_test(shapes_and_instances),
         cmocka_unit_test(moving_meshes),
