@@ -159,6 +159,7 @@ enum ray_word {
     WORD_TFAR = 8,
     WORD_MASK = 9,
     RAY_WORDS = 12,
+    WORD_NORMAL = 12,
     WORD_U = 15,
     WORD_V = 16,
     WORD_TRIANGLE = 17,
@@ -224,6 +225,8 @@ static void store(const struct contestant *c, const struct ray_list *list, uint3
         hits->distance[begin + i] = block[WORD_TFAR * w].f;
         hits->u[begin + i] = block[WORD_U * w].f;
         hits->v[begin + i] = block[WORD_V * w].f;
+        for (uint32_t k = 0; k < 3; k++)
+            hits->normal[k][begin + i] = block[(WORD_NORMAL + k) * w].f;
     }
 }
 

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "accuracy.h"
 #include "check.h"
 #include "options.h"
 #include "report.h"
@@ -169,6 +170,8 @@ static bool measure_scene(const struct bench *b) {
 
 static bool run(struct bench *b) {
     bool good = true;
+    if (b->options.accuracy)
+        return accuracy_measure(&b->options, b->json);
     for (uint32_t i = 0; i < b->options.scene_count && good; i++) {
         char message[512];
         const char *name = b->options.scenes[i];

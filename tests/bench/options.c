@@ -151,6 +151,10 @@ static bool set_counts(struct options *o, const char *text) {
     (void)text;
     return o->counts = true;
 }
+static bool set_accuracy(struct options *o, const char *text) {
+    (void)text;
+    return o->accuracy = true;
+}
 static bool set_check(struct options *o, const char *text) {
     (void)text;
     return o->check = true;
@@ -177,6 +181,8 @@ static const struct {
     {"--no-embree", NULL, "do not run Embree", set_no_embree},
     {"--no-builds", NULL, "do not measure builds and refits", set_no_builds},
     {"--counts", NULL, "also count box and triangle tests and live rays", set_counts},
+    {"--accuracy", NULL, "how exact hits at vertices and edges are; measures nothing else",
+     set_accuracy},
     {"--check", NULL, "compare hits with brute force and measure nothing", set_check},
     {"--json", "FILE", "also write one JSON object per row", set_json},
 };

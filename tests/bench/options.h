@@ -26,8 +26,9 @@ struct options {
     bool streamed;    /* rays and results of a whole set in memory, not of one batch in cache */
     bool embree;
     bool builds;
-    bool counts; /* steps of traversal */
-    bool check;  /* hits against brute force, nothing is measured */
+    bool counts;   /* steps of traversal */
+    bool accuracy; /* of hits beside Embree's, on meshes of its own; no speed */
+    bool check;    /* hits against brute force, nothing is measured */
     const char *json;
 };
 

@@ -6,79 +6,13 @@
  * and prints how many rays missed. Rays without a miss bound the rate of misses at 3 / rays (95 %).
  *
  * TRACER_TEST_RAYS sets the number of rays of each case. */
+#include "aim.h"
 #include "figures.h"
 #include "query_test.h"
 
 #define USUAL_RAYS 48000
 /* Rays of one query. */
 #define BATCH 16384
-
-/* What rays are aimed at. */
-enum { AIM_VERTICES, AIM_EDGES, AIM_BOTH };
-
-struct watertight_case {
-    const char *name;
-    const struct query_world *world; /* the closed mesh is number 0, its instance the first */
-    uint32_t aim;
-    bool moves;
-    float inside[3]; /* of the mesh at every time: origins are near it */
-    float reach;     /* how near */
-};
-
-/* Position of a vertex at a time, as exactly as a float can be. */
-static void vertex_at(const struct mesh *mesh, uint32_t vertex, float time, float p[3]) {
-    const float *a = mesh->positions + 3 * (size_t)vertex, *b = a;
-    double f = 0.0;
-    if (mesh->key_count > 1) {
-        const double x = (double)time * (mesh->key_count - 1);
-        const uint32_t key = x < mesh->key_count - 1 ? (uint32_t)x : mesh->key_count - 2;
-        f = x - key;
-        a = mesh_key(mesh, key) + 3 * (size_t)vertex;
-        b = mesh_key(mesh, key + 1) + 3 * (size_t)vertex;
-    }
-    for (int axis = 0; axis < 3; axis++)
-        p[axis] = (float)((1.0 - f) * a[axis] + f * b[axis]);
-}
-
-/* A vertex, or the middle of an edge, of a random triangle. */
-static void target_of(const struct watertight_case *c, struct rng *rng, float time, float p[3]) {
-    const struct mesh *mesh = &c->world->meshes[0];
-    const uint32_t *index = mesh->indices + 3 * (size_t)rng_below(rng, mesh->triangle_count);
-    const uint32_t corner = rng_below(rng, 3);
-    vertex_at(mesh, index[corner], time, p);
-    if (c->aim == AIM_VERTICES || (c->aim == AIM_BOTH && (rng_bits(rng) & 1)))
-        return;
-    float q[3];
-    vertex_at(mesh, index[(corner + 1) % 3], time, q);
-    for (int axis = 0; axis < 3; axis++)
-        p[axis] = 0.5f * (p[axis] + q[axis]);
-}
-
-static void origin_of(const struct watertight_case *c, struct rng *rng, float o[3]) {
-    for (int axis = 0; axis < 3; axis++)
-        o[axis] = c->inside[axis] + rng_range(rng, -c->reach, c->reach);
-}
-
-/* Fills a batch: packets of one origin and packets of many take turns, and so do packets of one
- * moment, of a short interval and of all times. */
-static void make_batch(const struct watertight_case *c, struct rng *rng, uint32_t count,
-                       struct ray_set *rays) {
-    float o[3] = {0}, target[3], begin = 0.0f, length = 0.0f;
-    ray_set_clear(rays);
-    for (uint32_t i = 0; i < count; i++) {
-        const uint32_t packet = i / 64;
-        if (i % 64 == 0) {
-            origin_of(c, rng, o);
-            begin = rng_unit(rng);
-            length = packet % 3 == 0 ? 0.0f : packet % 3 == 1 ? 1.0f / 16.0f : 1.0f;
-        } else if (packet & 1) {
-            origin_of(c, rng, o);
-        }
-        const float time = fminf(1.0f, (length < 1.0f ? begin : 0.0f) + length * rng_unit(rng));
-        target_of(c, rng, c->moves ? time : 0.0f, target);
-        ray_set_aim(rays, o, target, c->moves ? time : 0.0f);
-    }
-}
 
 /* Misses of a batch, closest and any hit. */
 static uint64_t batch_misses(const struct ray_set *rays, const struct hit_set *hits) {
@@ -93,7 +27,7 @@ static uint64_t batch_misses(const struct ray_set *rays, const struct hit_set *h
 }
 
 /* Misses of count rays against one scene. */
-static uint64_t count_misses(const struct watertight_case *c, trc_scene scene, uint32_t count,
+static uint64_t count_misses(const struct aim *aim, trc_scene scene, uint32_t count,
                              uint32_t packet_size, uint64_t seed) {
     struct rng rng = rng_seed(seed);
     struct ray_set rays;
@@ -103,7 +37,8 @@ static uint64_t count_misses(const struct watertight_case *c, trc_scene scene, u
     hit_set_init(&hits, BATCH);
     for (uint32_t done = 0; done < count; done += hits.count) {
         hits.count = count - done < BATCH ? count - done : BATCH;
-        make_batch(c, &rng, hits.count, &rays);
+        ray_set_clear(&rays);
+        aim_rays(aim, &rng, hits.count, &rays);
         assert_ok(hit_set_query(&hits, scene, &rays, packet_size));
         misses += batch_misses(&rays, &hits);
     }
@@ -113,17 +48,18 @@ static uint64_t count_misses(const struct watertight_case *c, trc_scene scene, u
 }
 
 /* Three parts of the rays in packets of 64, 16 and 1; joined and instanced trees share them. */
-static void expect_closed(const struct watertight_case *c) {
+static void expect_closed(const char *name, const struct query_world *world,
+                          const struct aim *aim) {
     static const uint32_t sizes[] = {64, 16, 1};
     const uint32_t all = query_test_rays(USUAL_RAYS), count = (all + 5) / 6;
     uint64_t misses = 0;
     for (int is_final = 0; is_final < 2; is_final++) {
-        struct query_scene scene = query_test_scene(c->world, is_final);
+        struct query_scene scene = query_test_scene(world, is_final);
         for (uint32_t i = 0; i < 3; i++)
-            misses += count_misses(c, scene.scene, count, sizes[i], 2 * i + (uint32_t)is_final);
+            misses += count_misses(aim, scene.scene, count, sizes[i], 2 * i + (uint32_t)is_final);
         query_scene_destroy(&scene);
     }
-    print_misses(c->name, misses, 6ull * count);
+    print_misses(name, misses, 6ull * count);
     assert_int_equal(misses, 0);
 }
 
@@ -134,16 +70,11 @@ static void expect_closed_mesh(const char *name, void (*fill)(struct mesh *mesh)
     struct query_world world;
     query_world_init(&world);
     fill(query_world_object(&world));
-    for (uint32_t aim = AIM_VERTICES; aim <= AIM_EDGES; aim++) {
+    for (uint32_t at = AIM_VERTICES; at <= AIM_EDGES; at++) {
         char title[64];
-        struct watertight_case c = {.name = title,
-                                    .world = &world,
-                                    .aim = aim,
-                                    .moves = world.meshes[0].key_count > 1,
-                                    .reach = reach};
-        memcpy(c.inside, inside, sizeof c.inside);
-        (void)snprintf(title, sizeof title, "%s, %s", name, aims[aim]);
-        expect_closed(&c);
+        const struct aim aim = {&world.meshes[0], at, {inside[0], inside[1], inside[2]}, reach};
+        (void)snprintf(title, sizeof title, "%s, %s", name, aims[at]);
+        expect_closed(title, &world, &aim);
     }
     query_world_free(&world);
 }
@@ -208,11 +139,9 @@ static void extreme_sizes(void **state) {
         struct query_world world;
         query_world_init(&world);
         mesh_add_uv_sphere(query_world_object(&world), origin, sizes[i].radius, 24, 32);
-        const struct watertight_case c = {.name = sizes[i].name,
-                                          .world = &world,
-                                          .aim = AIM_BOTH,
-                                          .reach = 0.3f * sizes[i].radius};
-        expect_closed(&c);
+        const struct aim aim = {
+            .mesh = &world.meshes[0], .at = AIM_BOTH, .reach = 0.3f * sizes[i].radius};
+        expect_closed(sizes[i].name, &world, &aim);
         query_world_free(&world);
     }
 }
@@ -277,11 +206,11 @@ static void instances(void **state) {
         mesh_transform(&aimed.meshes[0], 0, transform);
         memcpy(traced.instances[0].transforms[0], transform, sizeof transform);
         struct query_scene scene = query_test_scene(&traced, false);
-        struct watertight_case c = {.world = &aimed, .aim = AIM_BOTH};
-        memcpy(c.inside, offset, sizeof offset);
-        c.reach = 0.1f * fminf(fabsf(scales[i][0]), fabsf(scales[i][1]));
+        struct aim aim = {.mesh = &aimed.meshes[0], .at = AIM_BOTH};
+        memcpy(aim.inside, offset, sizeof offset);
+        aim.reach = 0.1f * fminf(fabsf(scales[i][0]), fabsf(scales[i][1]));
         const uint32_t count = query_test_rays(USUAL_RAYS);
-        const uint64_t misses = count_misses(&c, scene.scene, count, 64, 9);
+        const uint64_t misses = count_misses(&aim, scene.scene, count, 64, 9);
         (void)snprintf(title, sizeof title, "instance scaled by %g %g %g", scales[i][0],
                        scales[i][1], scales[i][2]);
         print_misses(title, misses, count);
@@ -372,11 +301,10 @@ static void two_meshes(void **state) {
     }
     uint64_t misses = 0;
     const uint32_t count = query_test_rays(USUAL_RAYS) / 2;
-    const struct watertight_case c = {
-        .world = &whole, .aim = AIM_BOTH, .moves = true, .reach = 0.5f};
+    const struct aim aim = {.mesh = &whole.meshes[0], .at = AIM_BOTH, .reach = 0.5f};
     for (int is_final = 0; is_final < 2; is_final++) {
         struct query_scene scene = query_test_scene(&parts, is_final);
-        misses += count_misses(&c, scene.scene, count, 64, 11 + (uint32_t)is_final);
+        misses += count_misses(&aim, scene.scene, count, 64, 11 + (uint32_t)is_final);
         query_scene_destroy(&scene);
     }
     print_misses("20: static beside moving, two meshes", misses, 2 * count);
@@ -408,7 +336,7 @@ static void through_the_origin(void **state) {
     const uint32_t count = query_test_rays(USUAL_RAYS);
     query_world_init(&world);
     fill_passing(query_world_object(&world));
-    const struct watertight_case c = {.world = &world, .aim = AIM_BOTH, .moves = true};
+    const struct aim aim = {.mesh = &world.meshes[0], .at = AIM_BOTH};
     struct query_scene scene = query_test_scene(&world, false);
     ray_set_init(&rays);
     for (uint32_t i = 0; i < count; i++) {
@@ -417,7 +345,7 @@ static void through_the_origin(void **state) {
         const double f = time, step = 2e6 * f - 1e6;
         for (int axis = 0; axis < 3; axis++)
             o[axis] = (float)(axis == 2 ? -step : step);
-        target_of(&c, &rng, time, target);
+        aim_target(&aim, &rng, time, target);
         ray_set_aim(&rays, o, target, time);
     }
     hit_set_init(&hits, count);
@@ -442,7 +370,7 @@ static void joins_of_segments(void **state) {
     static const float times[] = {0.0f, 0.25f, 0.5f, 0.75f, 1.0f, -1.0f, 2.0f, -0.0f};
     query_world_init(&world);
     fill_all(query_world_object(&world));
-    const struct watertight_case c = {.world = &world, .aim = AIM_BOTH, .moves = true};
+    const struct aim aim = {.mesh = &world.meshes[0], .at = AIM_BOTH};
     struct query_scene scene = query_test_scene(&world, false);
     ray_set_init(&rays);
     for (uint32_t i = 0; i < count; i++) {
@@ -450,7 +378,7 @@ static void joins_of_segments(void **state) {
         const uint32_t side = rng_below(&rng, 3);
         const float time = side == 0 ? join : nextafterf(join, side == 1 ? -INFINITY : INFINITY);
         float target[3];
-        target_of(&c, &rng, fminf(fmaxf(time, 0.0f), 1.0f), target);
+        aim_target(&aim, &rng, fminf(fmaxf(time, 0.0f), 1.0f), target);
         ray_set_aim(&rays, small_step, target, time);
     }
     hit_set_init(&hits, count);
@@ -489,7 +417,7 @@ static void collapse_and_inversion(void **state) {
     uint64_t misses = 0;
     query_world_init(&world);
     fill_inverting(query_world_object(&world));
-    const struct watertight_case c = {.world = &world, .aim = AIM_BOTH, .moves = true};
+    const struct aim aim = {.mesh = &world.meshes[0], .at = AIM_BOTH};
     struct query_scene scene = query_test_scene(&world, false);
     ray_set_init(&rays);
     for (uint32_t i = 0; i < count; i++) {
@@ -498,7 +426,7 @@ static void collapse_and_inversion(void **state) {
                            : near == 1 ? nextafterf(0.5f, rng_bits(&rng) & 1 ? 0.0f : 1.0f)
                                        : rng_unit(&rng);
         float target[3];
-        target_of(&c, &rng, near == 0 ? 0.0f : time, target);
+        aim_target(&aim, &rng, near == 0 ? 0.0f : time, target);
         ray_set_aim(&rays, origin, target, time);
     }
     hit_set_init(&hits, count);

@@ -117,18 +117,22 @@ static void hit_set_clear(struct hit_set *hits) {
         memset(hits->normal[axis], 0, bytes);
 }
 
+trc_hits hit_set_view(const struct hit_set *hits) {
+    return (trc_hits){.struct_size = sizeof(trc_hits),
+                      .instance = hits->instance,
+                      .triangle = hits->triangle,
+                      .distance = hits->distance,
+                      .u = hits->u,
+                      .v = hits->v,
+                      .normal_x = hits->normal[0],
+                      .normal_y = hits->normal[1],
+                      .normal_z = hits->normal[2]};
+}
+
 trc_status hit_set_query(struct hit_set *hits, trc_scene scene, const struct ray_set *rays,
                          uint32_t packet_size) {
     const trc_rays view = ray_set_view(rays, 0, rays->count);
-    const trc_hits out = {.struct_size = sizeof(trc_hits),
-                          .instance = hits->instance,
-                          .triangle = hits->triangle,
-                          .distance = hits->distance,
-                          .u = hits->u,
-                          .v = hits->v,
-                          .normal_x = hits->normal[0],
-                          .normal_y = hits->normal[1],
-                          .normal_z = hits->normal[2]};
+    const trc_hits out = hit_set_view(hits);
     hit_set_clear(hits);
     const trc_status status = trc_query_closest(scene, &view, packet_size, &out);
     if (status != TRC_OK)

@@ -41,6 +41,9 @@ trc_rays ray_set_view(const struct ray_set *rays, uint32_t first, uint32_t count
 void hit_set_init(struct hit_set *hits, uint32_t count);
 void hit_set_free(struct hit_set *hits);
 
+/* The arrays of nearest hits as the query's argument. */
+trc_hits hit_set_view(const struct hit_set *hits);
+
 /* Both queries for all rays. Where a ray misses, all fields but instance are 0. */
 trc_status hit_set_query(struct hit_set *hits, trc_scene scene, const struct ray_set *rays,
                          uint32_t packet_size);

@@ -36,6 +36,12 @@
 TRC_T_ERROR(trc_t_error, vfloat, vf_set)
 TRC_T_ERROR(trc_t_error8, f8, f8_set)
 
+/* Distances whose bound is more than one part in so many are computed in double, as are those that
+ * may not count: needles, whose barycentrics lose what their length has over their width. At 64
+ * they are off by 1,100 ulps at most, at 1 by 64,000 (1e6 times as long as wide), for .3 % more
+ * instructions; at 8192 by 6, but for 25 % more. */
+#define TRC_IMPRECISE 64.0f
+
 /* What the test needs of a ray: axes u, v, z with z dominant. */
 struct trc_shear {
     int u, v, z;
@@ -168,9 +174,10 @@ TRC_INLINE vmask trc_triangle_test(const struct trc_triangle_lanes *p, vfloat ou
     const vfloat z = vf_max(vf_abs(az), vf_max(vf_abs(bz), vf_abs(cz)));
     const vfloat e = vf_max(vf_abs(e0), vf_max(vf_abs(e1), vf_abs(e2)));
     const vfloat bound = trc_t_error(x, y, z, e, vf_abs(inv)) * vf_abs(sz);
-    const vmask too_near = vm_and(vf_gt(*t, tmin), vf_le(vf_abs(*t), bound));
+    const vmask imprecise =
+        vm_and(vf_gt(*t, tmin), vf_le(vf_abs(*t), vf_set(TRC_IMPRECISE) * bound));
     const vmask near_edge = vf_le(nearest, vf_set(TRC_TINY_EDGE));
-    vmask doubtful = vm_and(hit, vm_or(near_edge, too_near));
+    vmask doubtful = vm_and(hit, vm_or(near_edge, imprecise));
     if (__builtin_expect(vm_any(doubtful), 0)) {
         const vmask behind =
             vm_and(vf_ge(tmin, zero), trc_flat_behind(p, ou, ov, su * sz, sv * sz));
@@ -236,8 +243,9 @@ TRC_INLINE uint32_t trc_triangle8_test(const struct trc_triangle8 *p, float ou, 
     const f8 z = f8_max(f8_abs(az), f8_max(f8_abs(bz), f8_abs(cz)));
     const f8 e = f8_max(f8_abs(e0), f8_max(f8_abs(e1), f8_abs(e2)));
     const f8 bound = trc_t_error8(x, y, z, e, f8_abs(inv)) * f8_set(fabsf(sz));
-    const uint32_t too_near = ~f8_le(*t, f8_set(tmin)) & f8_le(f8_abs(*t), bound);
-    uint32_t doubtful = hit & (f8_le(nearest, f8_set(TRC_TINY_EDGE)) | too_near);
+    const uint32_t imprecise =
+        ~f8_le(*t, f8_set(tmin)) & f8_le(f8_abs(*t), f8_set(TRC_IMPRECISE) * bound);
+    uint32_t doubtful = hit & (f8_le(nearest, f8_set(TRC_TINY_EDGE)) | imprecise);
     if (__builtin_expect(doubtful != 0, 0) && tmin >= 0.0f) {
         const uint32_t behind = doubtful & trc_flat_behind8(p, ou, ov, su * sz, sv * sz);
         hit &= ~behind;

@@ -10,11 +10,13 @@ ALL_THREADS = ("--threads", "all", "--kinds", "primary", "--order", "auto", "--m
 
 
 def measure(options, scope):
-    """Rows of tracer_bench: "build" and "rays", on one thread and, some of them, on all."""
+    """Rows of tracer_bench: "build" and "rays", on one thread and, some of them, on all, and
+    "accuracy"."""
     scenes = [word for name in scope.kernel_scenes for word in ("--scene", name)]
     program = programs.tool(options, "tracer_bench")
     one = programs.run_json([program, *scenes, "--threads", 1, *scope.kernel_arguments])
-    return one + programs.run_json([program, *scenes, *scope.kernel_arguments, *ALL_THREADS])
+    rows = one + programs.run_json([program, *scenes, *scope.kernel_arguments, *ALL_THREADS])
+    return rows + programs.run_json([program, "--accuracy"]) if scope.accuracy else rows
 
 
 def races(rows):
@@ -33,6 +35,15 @@ def label(row):
 def builds(rows):
     """The rows of builds and refits."""
     return [row for row in rows if row["row"] == "build"]
+
+
+def accuracy(rows):
+    """{(mesh, instruction set, tracer): its rows}, one of each mode."""
+    groups = {}
+    for row in rows:
+        if row["row"] == "accuracy":
+            groups.setdefault((row["mesh"], row["isa"], row["tracer"]), []).append(row)
+    return groups
 
 
 def error_shares(row, use):

@@ -32,6 +32,7 @@ class Scope:
     # Kernels against Embree: arguments of tracer_bench.
     kernel_scenes: tuple
     kernel_arguments: tuple
+    accuracy: bool          # of hits at vertices and edges
     # Whole frames of frame_bench.
     stages: tuple
     frame_edge: int
@@ -52,6 +53,7 @@ QUICK = Scope(
     kernel_scenes=("character",),
     kernel_arguments=("--order", "auto", "--motion", "still", "--repeats", "3", "--tiles", "8",
                       "--size", "512"),
+    accuracy=False,
     stages=("character",), frame_edge=256, eyes=2, frame_repeats=3,
     distribution_samples=4, counted_edge=64,
     largest_triangles=100_000, largest_lights=100, largest_instances=1000)
@@ -59,11 +61,11 @@ QUICK = Scope(
 MEDIUM = Scope(
     name="medium", minutes=35,
     scenes=EFFECTS + JOINED, sampler_scenes=("gallery",), samples=(1, 4, 16, 64, 256),
-    time_samples=(1, 4, 16, 64), seeds=3, reference_samples=512, reference_seeds=3,
+    time_samples=(1, 4, 16, 64), seeds=10, reference_samples=1024, reference_seeds=4,
     light_samples=(1, 4), repeats=3, times_scale=2,
     classic_scenes=("classic", "classic_soft"), classic_width=320,
     kernel_scenes=("conference", "pool_hall", "character"),
-    kernel_arguments=("--order", "auto", "--repeats", "3", "--tiles", "8"),
+    kernel_arguments=("--order", "auto", "--repeats", "3", "--tiles", "8"), accuracy=True,
     stages=("conference", "pool_hall", "character"), frame_edge=1024, eyes=2, frame_repeats=3,
     distribution_samples=8, counted_edge=128,
     largest_triangles=4_000_000, largest_lights=10_000, largest_instances=100_000)
@@ -76,7 +78,7 @@ FULL = Scope(
     times_scale=3,
     classic_scenes=("classic", "classic_soft"), classic_width=640,
     kernel_scenes=("conference", "pool_hall", "character"),
-    kernel_arguments=("--repeats", "9"),
+    kernel_arguments=("--repeats", "9"), accuracy=True,
     stages=("conference", "pool_hall", "character"), frame_edge=1024, eyes=4, frame_repeats=5,
     distribution_samples=64, counted_edge=512,
     largest_triangles=20_000_000, largest_lights=10_000, largest_instances=1_000_000)
