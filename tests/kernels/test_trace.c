@@ -4,6 +4,7 @@
  * one (a tree per mesh). For both: packets of every size give the same bits, scalar kernels give
  * the bits of the instruction set under test, occlusion is what the closest hit implies, and the
  * oracle in double precision finds nothing wrong. */
+#include "aim.h"
 #include "figures.h"
 #include "query_test.h"
 
@@ -309,6 +310,53 @@ static void closed_shapes(void **state) {
     check_world("grid", &world, true);
 }
 
+/* Barycentrics of a needle are not worth much in float; its distance must be. */
+#define NEEDLE_ULPS 4096.0
+static void distances_on_needles(void **state) {
+    (void)state;
+    static const float aspects[] = {1e2f, 1e3f, 1e4f, 1e5f, 1e6f};
+    static const float axis[3] = {1, 2, 3}, scale[3] = {1, 1, 1};
+    for (size_t i = 0; i < sizeof aspects / sizeof *aspects; i++) {
+        struct query_world world;
+        struct rng rng = rng_seed(4);
+        struct ray_set rays;
+        struct hit_set hits;
+        struct brute_list exact = {0};
+        float turn[12];
+        double most = 0.0;
+        char title[64];
+        query_transform(axis, 1.0f, scale, origin, turn); /* no coordinate is a round number */
+        query_world_init(&world);
+        mesh_add_needle_fan(query_world_object(&world), 64, 1.0f, aspects[i]);
+        mesh_transform(&world.meshes[0], 0, turn);
+        const struct aim aim = {.mesh = &world.meshes[0], .at = AIM_EDGES, .reach = 0.3f};
+        ray_set_init(&rays);
+        aim_rays(&aim, &rng, query_test_rays(USUAL_RAYS), &rays);
+        hit_set_init(&hits, rays.count);
+        struct query_scene scene = query_test_scene(&world, true);
+        assert_ok(hit_set_query(&hits, scene.scene, &rays, i % 2 ? 64 : 1));
+        for (uint32_t ray = 0; ray < rays.count; ray++) {
+            uint32_t k = 0;
+            brute_collect(&world, &rays, ray, &exact);
+            while (k < exact.count && exact.candidates[k].triangle != hits.triangle[ray])
+                k++;
+            assert_true(k < exact.count && hits.instance[ray] == 0);
+            const float rounded = (float)exact.candidates[k].distance;
+            const double ulp = (double)nextafterf(rounded, INFINITY) - rounded;
+            most = fmax(most, fabs(hits.distance[ray] - exact.candidates[k].distance) / ulp);
+        }
+        (void)snprintf(title, sizeof title, "4: distance on needles, %g times as long as wide",
+                       (double)aspects[i]);
+        print_figure(title, "at most %.0f ulps off", most);
+        assert_true(most < NEEDLE_ULPS);
+        brute_list_free(&exact);
+        hit_set_free(&hits);
+        ray_set_free(&rays);
+        query_scene_destroy(&scene);
+        query_world_free(&world);
+    }
+}
+
 /* Rotated, scaled unevenly, mirrored, moved far; several instances of one mesh, some meshes alone.
  */
 static void add_instances(struct query_world *world, struct rng *rng, uint32_t mesh,
@@ -431,6 +479,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(soups),
         cmocka_unit_test(closed_shapes),
+        cmocka_unit_test(distances_on_needles),
         cmocka_unit_test(instances),
         cmocka_unit_test(moving_meshes),
         cmocka_unit_test(moving_instances),
