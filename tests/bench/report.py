@@ -14,7 +14,7 @@ import time
 
 import compare_cycles
 from reporting import (blender_costs, curves, document, frames, gate, kernels, machine, plots, povray,
-                       readme, scope as scopes)
+                       readme, repeated, scope as scopes)
 
 
 def parse_arguments(arguments):
@@ -24,6 +24,8 @@ def parse_arguments(arguments):
     parser.add_argument("--full", action="store_const", const="full", dest="scope")
     parser.add_argument("--out", type=pathlib.Path, help="folder of the report (BUILD/report)")
     parser.add_argument("--draw", action="store_true", help="draw from the JSON that is there")
+    parser.add_argument("--again", type=pathlib.Path, metavar="DIR",
+                        help="put a second run's report beside this one; for --draw")
     parser.add_argument("--baseline", action="store_true", help="write the baseline of the gate")
     parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS),
                         help="measure these alone; the others stay as they are")
@@ -81,6 +83,10 @@ def main(arguments=None):
     options = parse_arguments(arguments)
     if not options.draw:
         measure(options)
+    if options.again:
+        second = document.load(options.again)
+        write(options.out / "data" / "again.json",
+              {"date": second["machine"]["date"], "spreads": repeated.spreads(second)})
     results = document.load(options.out)
     plots.draw(results, options.out)
     document.write(results, options.out)

@@ -3,7 +3,7 @@
 
 import json
 
-from . import error_sections, frame_sections, scope as scopes
+from . import error_sections, frame_sections, repeated, scope as scopes
 from .tables import table
 
 
@@ -37,6 +37,8 @@ def text(results, out):
         parts.append(frame_sections.growth(results["frames"]))
     if results.get("blender"):
         parts.append(frame_sections.blender(results["blender"]))
+    if results.get("again"):
+        parts.append(repeated.section(results))
     parts.append(pictures(out))
     return "\n\n".join(part for part in parts if part) + "\n"
 

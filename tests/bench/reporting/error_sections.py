@@ -18,7 +18,7 @@ def headline_lines(results):
     if results.get("curves"):
         lines.append(equal_error_line(results["curves"]))
     if results.get("kernels"):
-        lines.append(kernel_line(results["kernels"]))
+        lines += [kernel_line(results["kernels"]), accuracy_line(results["kernels"])]
     if results.get("povray"):
         lines.append(povray_line(results["povray"]))
     return [line for line in lines if line]
@@ -52,6 +52,24 @@ def kernel_line(rows):
             + "; ".join(parts) + ".")
 
 
+def miss_rates(rows):
+    """{tracer: misses per million of each mesh, instruction set and mode}."""
+    rates = {}
+    for (_mesh, _isa, tracer), modes in kernels.accuracy(rows).items():
+        rates.setdefault(tracer, []).extend(1e6 * mode["misses"] / mode["rays"] for mode in modes)
+    return rates
+
+
+def accuracy_line(rows):
+    """Rays lost at vertices and edges."""
+    rates = miss_rates(rows)
+    parts = [f"{tracer} {digits(min(values))} to {digits(max(values))}" if max(values)
+             else f"{tracer} 0" for tracer, values in rates.items()]
+    return ("Of a million rays at vertices and edges of closed meshes are lost: "
+            + ", ".join(parts).replace("embree", "Embree").replace("volley", "Volley") + "."
+            if parts else "")
+
+
 def povray_line(scenes):
     """Ratios of time at about the same error."""
     made = [povray_ratio(scene) for scene in scenes.values()]
@@ -62,12 +80,16 @@ def povray_line(scenes):
     return f"POV-Ray takes {span} times as long as Volley for the same error."
 
 
+# Distances so many times farther off than the peer's are a loss.
+LOST_DISTANCE = 1.5
+
 # Losing cases ------------------------------------------------------------------------------------
 
 def losing_cases(results):
     """Everything in which Volley is behind, the worst of each comparison first."""
     lines = [*losing_curves(results.get("curves", {})), *losing_kernels(results.get("kernels", [])),
-             *losing_builds(results.get("kernels", [])), *losing_povray(results.get("povray", {}))]
+             *losing_builds(results.get("kernels", [])),
+             *losing_distances(results.get("kernels", [])), *losing_povray(results.get("povray", {}))]
     if not lines:
         return "## Where Volley loses\n\nNowhere in what was measured."
     return "## Where Volley loses\n\n" + "\n".join(f"- {line}" for line in lines)
@@ -111,6 +133,20 @@ def losing_builds(rows):
         if peer_bytes and row["bytes_per_triangle"] > peer_bytes:
             lines.append(f"memory of {name}: {row['bytes_per_triangle']:.0f} bytes per triangle, "
                          f"Embree's {peer_bytes:.0f}")
+    return lines
+
+
+def losing_distances(rows):
+    """Meshes on which Embree's robust mode has the more exact distances."""
+    lines = []
+    for (mesh, isa, tracer), modes in kernels.accuracy(rows).items():
+        robust = kernels.accuracy(rows).get((mesh, isa, "embree robust"))
+        if tracer != "volley" or not robust:
+            continue
+        own, peer = (max(mode["distance_most_ulps"] for mode in each) for each in (modes, robust))
+        if own > LOST_DISTANCE * peer:
+            lines.append(f"distances on {mesh}, {isa}: at most **{digits(own)}** ulps off, Embree's "
+                         f"robust mode {digits(peer)}")
     return lines
 
 
