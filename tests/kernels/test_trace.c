@@ -310,8 +310,9 @@ static void closed_shapes(void **state) {
     check_world("grid", &world, true);
 }
 
-/* Barycentrics of a needle are not worth much in float; its distance must be. */
-#define NEEDLE_ULPS 4096.0
+/* Barycentrics of a needle are not worth much in float; its distance must be: of millions of rays
+ * the worst was off by 2.4e-4 of it. */
+#define NEEDLE_ERROR 5e-4
 static void distances_on_needles(void **state) {
     (void)state;
     static const float aspects[] = {1e2f, 1e3f, 1e4f, 1e5f, 1e6f};
@@ -341,14 +342,12 @@ static void distances_on_needles(void **state) {
             while (k < exact.count && exact.candidates[k].triangle != hits.triangle[ray])
                 k++;
             assert_true(k < exact.count && hits.instance[ray] == 0);
-            const float rounded = (float)exact.candidates[k].distance;
-            const double ulp = (double)nextafterf(rounded, INFINITY) - rounded;
-            most = fmax(most, fabs(hits.distance[ray] - exact.candidates[k].distance) / ulp);
+            most = fmax(most, fabs(hits.distance[ray] / exact.candidates[k].distance - 1.0));
         }
         (void)snprintf(title, sizeof title, "4: distance on needles, %g times as long as wide",
                        (double)aspects[i]);
-        print_figure(title, "at most %.0f ulps off", most);
-        assert_true(most < NEEDLE_ULPS);
+        print_figure(title, "at most %.1e of it off", most);
+        assert_true(most < NEEDLE_ERROR);
         brute_list_free(&exact);
         hit_set_free(&hits);
         ray_set_free(&rays);

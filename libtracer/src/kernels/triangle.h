@@ -38,7 +38,7 @@ TRC_T_ERROR(trc_t_error8, f8, f8_set)
 
 /* Distances whose bound is more than one part in so many are computed in double, as are those that
  * may not count: needles, whose barycentrics lose what their length has over their width. At 64
- * they are off by 1,100 ulps at most, at 1 by 64,000 (1e6 times as long as wide), for .3 % more
+ * they are off by 2,000 ulps at most, at 1 by 64,000 (1e6 times as long as wide), for .3 % more
  * instructions; at 8192 by 6, but for 25 % more. */
 #define TRC_IMPRECISE 64.0f
 

@@ -63,8 +63,8 @@ def miss_rates(rows):
 def accuracy_line(rows):
     """Rays lost at vertices and edges."""
     rates = miss_rates(rows)
-    parts = [f"{tracer} {digits(min(values))} to {digits(max(values))}" if max(values)
-             else f"{tracer} 0" for tracer, values in rates.items()]
+    parts = [f"{tracer} {min(values):,.0f} to {max(values):,.0f}" if max(values) else f"{tracer} 0"
+             for tracer, values in rates.items()]
     return ("Of a million rays at vertices and edges of closed meshes are lost: "
             + ", ".join(parts).replace("embree", "Embree").replace("volley", "Volley") + "."
             if parts else "")
@@ -240,14 +240,14 @@ def kernels_beside_embree(rows):
 
 def accuracy_row(mesh, isa, tracer, modes):
     """A row of what one tracer's modes make of one mesh."""
-    def span(values):
-        low, high = digits(min(values)), digits(max(values))
+    def span(values, text=digits):
+        low, high = text(min(values)), text(max(values))
         return low if low == high else f"{low}–{high}"
 
     rays = modes[0]["rays"]
     misses = [1e6 * mode["misses"] / mode["rays"] for mode in modes]
     return [mesh, isa, tracer, f"{rays:,}",
-            span(misses) if any(misses) else f"0 (< {digits(3e6 / rays, 2)})",
+            span(misses, "{:,.0f}".format) if any(misses) else f"0 (< {digits(3e6 / rays, 2)})",
             span([mode["distance_most_ulps"] for mode in modes]),
             span([mode["distance_mean_ulps"] for mode in modes]),
             span([mode["normal_most_half_ulps"] for mode in modes])]

@@ -11,7 +11,7 @@ SAMPLERS = ("SOBOL", "SUDOKU", "JITTER", "INDEPENDENT", "BLUE_NOISE")
 @dataclass(frozen=True)
 class Scope:
     """Numbers of scenes, samples, seeds and repeats of a mode; ``minutes`` is about what it takes on
-    two quiet cores, estimated for medium and full."""
+    two quiet cores, estimated for full."""
 
     name: str
     minutes: int
@@ -59,7 +59,7 @@ QUICK = Scope(
     largest_triangles=100_000, largest_lights=100, largest_instances=1000)
 
 MEDIUM = Scope(
-    name="medium", minutes=35,
+    name="medium", minutes=50,
     scenes=EFFECTS + JOINED, sampler_scenes=("gallery",), samples=(1, 4, 16, 64, 256),
     time_samples=(1, 4, 16, 64), seeds=10, reference_samples=1024, reference_seeds=4,
     light_samples=(1, 4), repeats=3, times_scale=2,
