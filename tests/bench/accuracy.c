@@ -9,6 +9,7 @@
 #include "core/fpstate.h"
 #include "embree.h"
 #include "kernels/kernels.h"
+#include "kernels/packet.h"
 #include "query_scene.h"
 #include "race.h"
 #include "scene/snapshot.h"
@@ -16,7 +17,7 @@
 /* Rays of one list, and lists of each mesh. */
 #define LIST_RAYS 65536
 #define LIST_COUNT 8
-#define PACKET_RAYS 64
+#define NEEDLES 512
 
 static const float near_center[3] = {0, 0, 0}, far_center[3] = {148376, 1234, -223423};
 
@@ -24,16 +25,8 @@ static void fill_sphere(struct mesh *mesh) { mesh_add_uv_sphere(mesh, near_cente
 static void fill_far_sphere(struct mesh *mesh) {
     mesh_add_uv_sphere(mesh, far_center, 100.0f, 48, 64);
 }
-/* Turned, so that no coordinate is a round number. */
-static void fill_needles(struct mesh *mesh, float aspect) {
-    static const float axis[3] = {1, 2, 3}, scale[3] = {1, 1, 1}, offset[3] = {0, 0, 0};
-    float turn[12];
-    query_transform(axis, 1.0f, scale, offset, turn);
-    mesh_add_needle_fan(mesh, 512, 1.0f, aspect);
-    mesh_transform(mesh, 0, turn);
-}
-static void fill_thin_needles(struct mesh *mesh) { fill_needles(mesh, 1e4f); }
-static void fill_thinnest_needles(struct mesh *mesh) { fill_needles(mesh, 1e6f); }
+static void fill_thin_needles(struct mesh *mesh) { query_turned_needles(mesh, NEEDLES, 1e4f); }
+static void fill_thinnest_needles(struct mesh *mesh) { query_turned_needles(mesh, NEEDLES, 1e6f); }
 
 static const struct hard_mesh {
     const char *name;
@@ -110,16 +103,16 @@ static void list_open(struct ray_list *list) {
     memset(list, 0, sizeof *list);
     ray_set_init(&list->rays);
     list->batch_count = LIST_RAYS / RAY_BATCH;
-    list->packet_count = list->packet_capacity = LIST_RAYS / PACKET_RAYS;
+    list->packet_count = list->packet_capacity = LIST_RAYS / TRC_PACKET_SIZE;
     list->batch_begin = buffer_alloc(list->batch_count + 1, sizeof *list->batch_begin);
     list->batch_packet = buffer_alloc(list->batch_count + 1, sizeof *list->batch_packet);
     list->packet_begin = buffer_alloc(list->packet_count + 1, sizeof *list->packet_begin);
     for (uint32_t i = 0; i <= list->batch_count; i++) {
         list->batch_begin[i] = i * RAY_BATCH;
-        list->batch_packet[i] = i * RAY_BATCH / PACKET_RAYS;
+        list->batch_packet[i] = i * RAY_BATCH / TRC_PACKET_SIZE;
     }
     for (uint32_t i = 0; i <= list->packet_count; i++)
-        list->packet_begin[i] = i * PACKET_RAYS;
+        list->packet_begin[i] = i * TRC_PACKET_SIZE;
 }
 
 /* ---- contestants ---- */
@@ -159,7 +152,7 @@ static void ways_run(struct ways *w, const struct mesh *mesh, const struct ray_l
     for (uint32_t i = 0; i < 2; i++) {
         const trc_hits out = hit_set_view(hits);
         const uint64_t fp_state = trc_fp_enter();
-        w->kernels->query_closest(w->snapshot, &rays, &out, 0, rays.count, i ? 1 : PACKET_RAYS);
+        w->kernels->query_closest(w->snapshot, &rays, &out, 0, rays.count, i ? 1 : TRC_PACKET_SIZE);
         trc_fp_leave(fp_state);
         accuracy_add(&w->accuracy[i], mesh, &list->rays, hits);
     }

@@ -53,11 +53,14 @@ def measure(options):
     """Measure all parts into DIR/data."""
     data = options.out / "data"
     data.mkdir(parents=True, exist_ok=True)
-    write(data / "machine.json", machine.describe(options, options.scope))
+    described = machine.describe(options, options.scope)
+    described["parts"] = machine.read_parts(data / "machine.json")
     for name in options.parts:
         print(f"== {name}", flush=True)
         start = time.perf_counter()
         write(data / f"{name}.json", PARTS[name](options))
+        described["parts"][name] = {key: described[key] for key in ("date", "commit")}
+        write(data / "machine.json", described)
         print(f"   {time.perf_counter() - start:.0f} s", flush=True)
 
 

@@ -65,7 +65,26 @@ def inside_hair():
         hair.child_type = 'NONE'
         pictures[f"{output} of the roots without children"] = _both()
         hair.child_type = 'SIMPLE'
+    _name_more_layers_than_meshes_have(ball.data)
+    tree.links.new(info.outputs["Intercept"], emission.inputs["Color"])
+    pictures["Intercept beside nine layers"] = _both()
     return pictures
+
+
+def _name_more_layers_than_meshes_have(mesh):
+    """The ball's material reads nine colours more, and takes none of each."""
+    tree = mesh.materials[0].node_tree
+    emission = next(node for node in tree.nodes if node.type == 'EMISSION')
+    before = tree.nodes.new("ShaderNodeRGB").outputs[0]
+    for i in range(9):
+        mesh.color_attributes.new(f"Layer {i}", 'BYTE_COLOR', 'CORNER')
+        color, add = tree.nodes.new("ShaderNodeVertexColor"), tree.nodes.new("ShaderNodeVectorMath")
+        color.layer_name, add.operation = f"Layer {i}", 'MULTIPLY_ADD'
+        add.inputs[1].default_value = (0.0, 0.0, 0.0)
+        tree.links.new(color.outputs["Color"], add.inputs[0])
+        tree.links.new(before, add.inputs[2])
+        before = add.outputs[0]
+    tree.links.new(before, emission.inputs["Color"])
 
 
 def _paint(mesh):

@@ -316,20 +316,16 @@ static void closed_shapes(void **state) {
 static void distances_on_needles(void **state) {
     (void)state;
     static const float aspects[] = {1e2f, 1e3f, 1e4f, 1e5f, 1e6f};
-    static const float axis[3] = {1, 2, 3}, scale[3] = {1, 1, 1};
     for (size_t i = 0; i < sizeof aspects / sizeof *aspects; i++) {
         struct query_world world;
         struct rng rng = rng_seed(4);
         struct ray_set rays;
         struct hit_set hits;
         struct brute_list exact = {0};
-        float turn[12];
         double most = 0.0;
         char title[64];
-        query_transform(axis, 1.0f, scale, origin, turn); /* no coordinate is a round number */
         query_world_init(&world);
-        mesh_add_needle_fan(query_world_object(&world), 64, 1.0f, aspects[i]);
-        mesh_transform(&world.meshes[0], 0, turn);
+        query_turned_needles(query_world_object(&world), 64, aspects[i]);
         const struct aim aim = {.mesh = &world.meshes[0], .at = AIM_EDGES, .reach = 0.3f};
         ray_set_init(&rays);
         aim_rays(&aim, &rng, query_test_rays(USUAL_RAYS), &rays);

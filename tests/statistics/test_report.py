@@ -12,11 +12,13 @@ import pytest
 TESTS = pathlib.Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(TESTS / "support"), str(TESTS / "bench")]
 import flip  # noqa: E402  (the folders are on the path only now)
-from reporting import curves, estimates, frames, gate, readme  # noqa: E402
+from reporting import (curves, error_sections, estimates, frames, gate, machine,  # noqa: E402
+                       readme)
 
 
 @pytest.mark.parametrize("module", ["flip", "error_time", "stability", "reporting.estimates", "reporting.frames",
-                                    "reporting.gate", "reporting.readme", "reporting.tables"])
+                                    "reporting.gate", "reporting.readme", "reporting.repeated",
+                                    "reporting.tables"])
 def test_examples_in_comments(module):
     result = doctest.testmod(importlib.import_module(module))
     assert result.attempted and not result.failed
@@ -111,6 +113,43 @@ def test_headline_puts_the_worst_scene_first():
     for scene in scenes.values():
         scene["comparison"] = curves.compare_configurations(scene)
     assert [name for name, _ratios in curves.headline_rows(scenes)] == ["slow", "fast"]
+
+
+# Accuracy ----------------------------------------------------------------------------------------
+
+def accuracy_rows(**misses):
+    """Rows of tracer_bench of one mesh: {tracer: misses of each of its modes}."""
+    distances = {"volley": 90.0, "embree_default": 5.0, "embree_robust": 6.0}
+    return [{"row": "accuracy", "mesh": "ball", "isa": "avx2", "tracer": tracer.replace("_", " "),
+             "mode": str(mode), "rays": 1_000_000, "misses": count,
+             "distance_most_ulps": distances[tracer], "distance_mean_ulps": 0.5,
+             "normal_most_half_ulps": 1.0}
+            for tracer, counts in misses.items() for mode, count in enumerate(counts)]
+
+
+def test_headline_tells_lost_rays():
+    rows = accuracy_rows(volley=[0, 0], embree_default=[1500, 20000], embree_robust=[0, 7])
+    assert error_sections.accuracy_line(rows) == (
+        "Of a million rays at vertices and edges of closed meshes are lost: Volley 0, "
+        "Embree default 1,500 to 20,000, Embree robust 0 to 7.")
+    rows[0]["misses"] = 3
+    assert "Volley 0 to 3," in error_sections.accuracy_line(rows)
+    assert error_sections.accuracy_line([]) == ""
+
+
+def test_less_exact_distances_are_a_loss():
+    rows = accuracy_rows(volley=[0], embree_robust=[0])
+    (line,) = error_sections.losing_distances(rows)
+    assert "**90.0** ulps" in line and "6.00" in line
+    rows[0]["distance_most_ulps"] = 8.0
+    assert not error_sections.losing_distances(rows)
+
+
+def test_parts_keep_what_they_were_measured_with(tmp_path):
+    path = tmp_path / "machine.json"
+    assert machine.read_parts(path) == {}
+    path.write_text('{"parts": {"frames": {"date": "then", "commit": "a"}}}', encoding="utf-8")
+    assert machine.read_parts(path)["frames"]["commit"] == "a"
 
 
 # FLIP --------------------------------------------------------------------------------------------

@@ -128,3 +128,11 @@ void query_transform(const float axis[3], float radians, const float scale[3],
         transform_out[4 * row + 3] = offset[row];
     }
 }
+
+void query_turned_needles(struct mesh *mesh, uint32_t count, float aspect) {
+    static const float axis[3] = {1, 2, 3}, scale[3] = {1, 1, 1}, offset[3] = {0, 0, 0};
+    float turn[12];
+    query_transform(axis, 1.0f, scale, offset, turn);
+    mesh_add_needle_fan(mesh, count, 1.0f, aspect);
+    mesh_transform(mesh, 0, turn);
+}

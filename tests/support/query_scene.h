@@ -55,6 +55,10 @@ struct trc_snapshot;
 /* The snapshot in force: valid until the next commit. */
 struct trc_snapshot *query_scene_snapshot(trc_scene scene);
 
+/* mesh_add_needle_fan about the origin, turned so that no coordinate is a round number, into an
+ * empty mesh. */
+void query_turned_needles(struct mesh *mesh, uint32_t count, float aspect);
+
 /* The 3x4 matrix of a rotation by radians about axis (any length but 0), times scale, then moved by
  * offset. */
 void query_transform(const float axis[3], float radians, const float scale[3],

@@ -220,9 +220,10 @@ struct trc_split_blocks {
     struct trc_ref *refs, *spare; /* spare: as many */
     struct trc_pool *pool;
     const atomic_uint *cancel; /* may be NULL */
-    const struct trc_range *range;
+    /* Of the last search, and of what follows it: */
     const struct trc_split *split;
-    uint32_t block_size;
+    uint32_t begin, end;
+    uint32_t block_size, block_count;
     struct split_block block[MOST_BLOCKS];
 };
 
@@ -250,24 +251,25 @@ void trc_split_blocks_destroy(struct trc_split_blocks *blocks) {
 }
 
 static uint32_t block_begin(const struct trc_split_blocks *b, uint32_t block) {
-    return b->range->begin + block * b->block_size;
+    return b->begin + block * b->block_size;
 }
 static uint32_t block_end(const struct trc_split_blocks *b, uint32_t block) {
     const uint32_t end = block_begin(b, block) + b->block_size;
-    return end < b->range->end ? end : b->range->end;
+    return end < b->end ? end : b->end;
 }
 
-static void blocks_run(struct trc_split_blocks *b, const struct trc_range *r,
-                       const struct trc_split *s, void (*task)(void *, uint32_t, uint32_t)) {
+static void blocks_cut(struct trc_split_blocks *b, const struct trc_range *r) {
     const uint32_t count = r->end - r->begin, share = (count + MOST_BLOCKS - 1) / MOST_BLOCKS;
-    b->range = r;
-    b->split = s;
+    b->begin = r->begin;
+    b->end = r->end;
     b->block_size = share > LEAST_BLOCK ? share : LEAST_BLOCK;
-    trc_pool_run(b->pool, (count + b->block_size - 1) / b->block_size, task, b);
+    b->block_count = (count + b->block_size - 1) / b->block_size;
 }
 
-static uint32_t block_count(const struct trc_split_blocks *b) {
-    return (b->range->end - b->range->begin + b->block_size - 1) / b->block_size;
+static void blocks_run(struct trc_split_blocks *b, const struct trc_split *s,
+                       void (*task)(void *, uint32_t, uint32_t)) {
+    b->split = s;
+    trc_pool_run(b->pool, b->block_count, task, b);
 }
 
 static bool is_cancelled(const struct trc_split_blocks *b) { return b->cancel && *b->cancel; }
@@ -280,9 +282,9 @@ static void fill_block(void *context, uint32_t index, uint32_t worker) {
               &b->block[index].bins);
 }
 
-static void bins_add(struct bins *to, const struct bins *from, int count) {
-    for (int axis = 0; axis < 3; axis++)
-        for (int i = 0; i < count; i++) {
+static void bins_add(struct bins *to, const struct bins *from, const struct trc_split *s) {
+    for (int axis = s->first_axis; axis < s->end_axis; axis++)
+        for (int i = 0; i < s->bin_count; i++) {
             box_grow(&to->box[axis][i], from->box[axis][i]);
             to->count[axis][i] += from->count[axis][i];
         }
@@ -290,10 +292,12 @@ static void bins_add(struct bins *to, const struct bins *from, int count) {
 
 struct trc_split trc_split_shared_find(struct trc_split_blocks *blocks, const struct trc_range *r) {
     struct trc_split s = split_begin(r);
-    blocks_run(blocks, r, &s, fill_block);
-    struct bins all = blocks->block[0].bins;
-    for (uint32_t i = 1; i < block_count(blocks); i++)
-        bins_add(&all, &blocks->block[i].bins, s.bin_count);
+    struct bins all;
+    blocks_cut(blocks, r);
+    blocks_run(blocks, &s, fill_block);
+    bins_clear(&all, &s);
+    for (uint32_t i = 0; i < blocks->block_count; i++)
+        bins_add(&all, &blocks->block[i].bins, &s);
     split_choose(&s, &all);
     return s;
 }
@@ -326,7 +330,7 @@ static void return_block(void *context, uint32_t index, uint32_t worker) {
 void trc_split_shared_apply(struct trc_split_blocks *blocks, const struct trc_range *r,
                             const struct trc_split *s, struct trc_range *left,
                             struct trc_range *right) {
-    const uint32_t count = block_count(blocks);
+    const uint32_t count = blocks->block_count;
     uint32_t at = r->begin;
     for (uint32_t i = 0; i < count; i++) {
         blocks->block[i].left_at = at;
@@ -340,8 +344,8 @@ void trc_split_shared_apply(struct trc_split_blocks *blocks, const struct trc_ra
         at += block_end(blocks, i) - block_begin(blocks, i) - (next - blocks->block[i].left_at);
         blocks->block[i].before = blocks->block[i].after = box_empty();
     }
-    blocks_run(blocks, r, s, move_block);
-    blocks_run(blocks, r, s, return_block);
+    blocks_run(blocks, s, move_block);
+    blocks_run(blocks, s, return_block);
     *left = (struct trc_range){r->begin, middle, s->left, box_empty()};
     *right = (struct trc_range){middle, r->end, s->right, box_empty()};
     for (uint32_t i = 0; i < count; i++) {

@@ -47,7 +47,6 @@ def head(machine):
     """What it was measured with."""
     scope = scopes.SCOPES[machine["scope"]]
     rows = [
-        ["date", machine["date"]],
         ["scope", f"{scope.name}: {scope.seeds} seeds, {scope.samples[0]} to {scope.samples[-1]} "
                   f"samples, {scope.repeats} repeats of times"],
         ["machine", f"{machine['cpu']}, {machine['processors']} logical processors, "
@@ -56,7 +55,8 @@ def head(machine):
         ["system", machine["system"]],
         ["compiler", machine["compiler"]],
         ["instruction set", machine["isa"]],
-        ["Volley", machine["commit"]],
+        ["Volley", ", ".join(f"{part} {made['commit']} ({made['date']})"
+                             for part, made in machine["parts"].items())],
         ["against", ", ".join(filter(None, (
             f"{machine['blender']} with Cycles",
             machine["embree"] and f"Embree {machine['embree']}",

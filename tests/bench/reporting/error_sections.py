@@ -138,9 +138,9 @@ def losing_builds(rows):
 
 def losing_distances(rows):
     """Meshes on which Embree's robust mode has the more exact distances."""
-    lines = []
-    for (mesh, isa, tracer), modes in kernels.accuracy(rows).items():
-        robust = kernels.accuracy(rows).get((mesh, isa, "embree robust"))
+    lines, groups = [], kernels.accuracy(rows)
+    for (mesh, isa, tracer), modes in groups.items():
+        robust = groups.get((mesh, isa, "embree robust"))
         if tracer != "volley" or not robust:
             continue
         own, peer = (max(mode["distance_most_ulps"] for mode in each) for each in (modes, robust))

@@ -2,6 +2,7 @@
 """What a report was measured with: machine, compiler, versions, date."""
 
 import datetime
+import json
 import os
 import pathlib
 import platform
@@ -28,6 +29,11 @@ def describe(options, scope):
         "povray": package_version("povray"),
         "commit": first_line(["git", "-C", str(PROJECT), "rev-parse", "--short=12", "HEAD"]),
     }
+
+
+def read_parts(path):
+    """{part: {"date", "commit"}} of a report that is there: what its other parts were measured with."""
+    return json.loads(path.read_text(encoding="utf-8")).get("parts", {}) if path.exists() else {}
 
 
 def first_line(command):

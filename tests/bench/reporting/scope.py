@@ -11,7 +11,7 @@ SAMPLERS = ("SOBOL", "SUDOKU", "JITTER", "INDEPENDENT", "BLUE_NOISE")
 @dataclass(frozen=True)
 class Scope:
     """Numbers of scenes, samples, seeds and repeats of a mode; ``minutes`` is about what it takes on
-    two quiet cores, estimated for full."""
+    two quiet cores, estimated for full, and for medium where no pictures of errors are kept."""
 
     name: str
     minutes: int
