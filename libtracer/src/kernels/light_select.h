@@ -69,6 +69,13 @@ TRC_INLINE enum trc_bound_shape trc_shape_of(const struct trc_light_bound *b) {
     return b->cos_o >= 1.0f && b->cos_e == 0.0f ? TRC_BOUND_HEMISPHERE : TRC_BOUND_CONE;
 }
 
+/* Most that nearness counts, over 1 / squared radius. With 1, as in the paper, a point close to a
+ * shining mesh takes half of its samples away from the nearest lights at each level of the tree, so
+ * that those are found by few samples of great weight: where a ball of 960 triangles, or a ring of
+ * 20,000, stands on a floor, 10 to 20 times the squared error at 64 samples. Of 4, 8, 16, 64, and
+ * of limits that grow with the number of levels, 8 has the least. */
+#define TRC_NEAR_FADE 8.0f
+
 /* Part of the light may be within 90 degrees of an axis iff cos a + sin b > 0, a the angle of its
  * centre, b its half angle; the sum also stands for the cosine of the nearest part, without
  * roots. */
@@ -85,7 +92,8 @@ TRC_INLINE vfloat trc_bound_importance(const struct trc_wide_bound *b, const str
         sin_b = b->radius * inverse;
         within = vf_ge(sin_b, vf_one());
         sin_b = vf_min(sin_b, vf_one());
-        fade = vf_min(fade, vf_rcp(vf_max(b->radius * b->radius, vf_set(1e-20f))));
+        const vfloat r2 = vf_max(b->radius * b->radius, vf_set(1e-20f));
+        fade = vf_min(fade, vf_set(TRC_NEAR_FADE) * vf_rcp(r2));
     }
     vfloat cos_light = vf_one();
     vmask reaches = vm_all_set();

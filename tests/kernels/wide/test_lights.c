@@ -556,6 +556,49 @@ static void chances_match(void **state) {
     }
 }
 
+/* A point close below a ball: no light is found by so few samples that one of them outweighs what
+ * all give. */
+static void nearest_lights_are_found(void **state) {
+    (void)state;
+    enum { RINGS = 12, SEGMENTS = 24 };
+    static double corners[MESH_TRIANGLES][3][3];
+    static struct scene s;
+    scene_begin(&s);
+    scene_emit(&s, 1, 1, 1);
+    for (int i = 0; i < 2 * RINGS * SEGMENTS; i++) {
+        const int ring = i / (2 * SEGMENTS), segment = i / 2 % SEGMENTS, upper = i % 2;
+        const int rings[3] = {ring, ring + 1, ring + upper};
+        const int segments[3] = {segment, segment + !upper, segment + 1};
+        float c[9];
+        for (int k = 0; k < 3; k++) {
+            const double theta = M_PI * rings[k] / RINGS, phi = 2 * M_PI * segments[k] / SEGMENTS;
+            corners[i][k][0] = sin(theta) * cos(phi) + 0.03;
+            corners[i][k][1] = sin(theta) * sin(phi) + 0.05;
+            corners[i][k][2] = 1.02 - cos(theta);
+        }
+        for (int k = 0; k < 9; k++)
+            c[k] = (float)corners[i][k / 3][k % 3];
+        scene_triangle(&s, c, 0);
+    }
+    scene_commit(&s, NULL, 0);
+    assert_non_null(s.table->trails);
+    const struct trc_surface r = receiver(&s, 0, 0, 0);
+    const struct trc_receiver who = trc_receiver_make(r.p, r.n);
+    double sum = 0.0, most = 0.0;
+    for (uint32_t k = 0; k < s.table->triangle_count; k++) {
+        const int light = (int)(s.table->first_triangle + k);
+        const double gives = polygon(corners[s.table->triangles[k].triangle], 3);
+        const double chance =
+            (double)vf_get(trc_light_chance(s.table, &who, vi_set(light), vm_all_set()), 0);
+        sum += gives;
+        most = fmax(most, gives / fmax(chance, 1e-30));
+    }
+    printf("  %u triangles: a sample gives at most %.1f times what all do\n",
+           s.table->triangle_count, most / sum);
+    assert_true(most < 20.0 * sum);
+    scene_end(&s);
+}
+
 static void moving_triangles(void **state) {
     (void)state;
     static struct scene s;
@@ -728,6 +771,7 @@ int main(void) {
         cmocka_unit_test(densities_integrate_to_one),
         cmocka_unit_test(many_triangles),
         cmocka_unit_test(chances_match),
+        cmocka_unit_test(nearest_lights_are_found),
         cmocka_unit_test(moving_triangles),
         cmocka_unit_test(hidden_lamps),
         cmocka_unit_test(dark_tables),
