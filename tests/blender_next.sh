@@ -3,11 +3,13 @@
 # is built and tested as a user of Debian 13 would.
 #
 #   bash tests/blender_next.sh [--fast] [--report XML] [PYTEST ARGUMENT]...
+#   bash tests/blender_next.sh --curves DIR
 #
 # Runs all Blender tests if no argument says which; --fast leaves out what a change of Blender's version
-# hardly touches (see SLOW); --report writes JUnit XML. Needs root, a Debian
-# mirror and 2.5 GB; the folder is $XDG_CACHE_HOME/volley/trixie and stays, so that the next run
-# takes only the build and the tests. Nothing is mounted. Exit code 77: it cannot be set up here, with
+# hardly touches (see SLOW); --report writes JUnit XML. --curves measures error against time there
+# instead, and leaves its JSON in DIR. Needs root, a Debian mirror and 2.5 GB; the folder is
+# $XDG_CACHE_HOME/volley/trixie and stays, so that the next run takes only the build and the tests.
+# Nothing is mounted. Exit code 77: it cannot be set up here, with
 # the reason as the last line; else pytest's.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -104,24 +106,38 @@ run_tests() {
         --junit-xml build/pytest.xml "$@"
 }
 
+measure_curves() {
+    local out=$1
+    say "Error against time in $(inside blender --version 2>/dev/null | head -n 1)"
+    inside sh -c 'cd /volley && exec python3 tests/bench/report.py --next --measure \
+        --parts curves --out build/report'
+    mkdir -p "$out"
+    cp "$ROOT"/volley/build/report/data/*.json "$out"
+}
+
 # What takes long for what it says of Blender's version.
 SLOW="test_whitted or test_means_are_those_of_cycles"
 
 main() {
-    local report="" status=0 arguments=()
+    local report="" curves="" status=0 arguments=()
     while [ $# -gt 0 ]; do
         case $1 in
             --fast) arguments+=(-k "not ($SLOW)"); shift ;;
             --report) report=${2:?--report needs a file}; shift 2 ;;
+            --curves) curves=${2:?--curves needs a folder}; shift 2 ;;
             *) break ;;
         esac
     done
-    [ $# -gt 0 ] || set -- tests/blender
+    [ -n "$curves" ] || [ $# -gt 0 ] || set -- tests/blender
     [ "$(id -u)" -eq 0 ] || skip "changing into its folder needs root"
     [ -d "$ROOT" ] || make_root
     install_packages
     copy_sources
     build
+    if [ -n "$curves" ]; then
+        measure_curves "$curves"
+        exit
+    fi
     rm -f "$ROOT/volley/build/pytest.xml"
     run_tests "${arguments[@]}" "$@" || status=$?
     [ -z "$report" ] || cp "$ROOT/volley/build/pytest.xml" "$report" || true

@@ -13,7 +13,7 @@ import sys
 import time
 
 import compare_cycles
-from reporting import (blender_costs, curves, document, frames, gate, kernels, machine, plots, povray,
+from reporting import (blender_costs, curves, curves_next, document, frames, gate, kernels, machine, povray,
                        readme, repeated, scope as scopes)
 
 
@@ -22,8 +22,11 @@ def parse_arguments(arguments):
     parser = argparse.ArgumentParser(prog="report.sh", description=__doc__.split("\n")[0])
     parser.add_argument("--quick", action="store_const", const="quick", dest="scope")
     parser.add_argument("--full", action="store_const", const="full", dest="scope")
+    parser.add_argument("--next", action="store_const", const="next", dest="scope",
+                        help="as tests/blender_next.sh calls it")
     parser.add_argument("--out", type=pathlib.Path, help="folder of the report (BUILD/report)")
     parser.add_argument("--draw", action="store_true", help="draw from the JSON that is there")
+    parser.add_argument("--measure", action="store_true", help="draw nothing; needs no matplotlib")
     parser.add_argument("--again", type=pathlib.Path, metavar="DIR",
                         help="put a second run's report beside this one; for --draw")
     parser.add_argument("--baseline", action="store_true", help="write the baseline of the gate")
@@ -46,6 +49,7 @@ PARTS = {
     "blender": lambda options: blender_costs.measure(options, options.scope),
     "povray": lambda options: povray.measure(options, options.scope, options.out / "pictures"),
     "curves": lambda options: curves.measure(options, options.scope, options.out / "pictures"),
+    "curves_next": lambda options: curves_next.measure(options.scope),
 }
 
 
@@ -81,11 +85,9 @@ def rounded(value):
     return value
 
 
-def main(arguments=None):
-    """Measure, draw, and in the quick scope look for losses."""
-    options = parse_arguments(arguments)
-    if not options.draw:
-        measure(options)
+def draw(options):
+    """Plots and text from the JSON that is there, which is returned."""
+    from reporting import plots  # matplotlib is for this alone
     if options.again:
         second = document.load(options.again)
         write(options.out / "data" / "again.json",
@@ -96,6 +98,17 @@ def main(arguments=None):
     print(f"report: {options.out / 'report.md'}")
     if options.out.resolve() == readme.COMMITTED:
         readme.write()
+    return results
+
+
+def main(arguments=None):
+    """Measure, draw, and in the quick scope look for losses."""
+    options = parse_arguments(arguments)
+    if not options.draw:
+        measure(options)
+    if options.measure:
+        return 0
+    results = draw(options)
     if options.baseline:
         gate.write_baseline(results)
         return 0

@@ -20,10 +20,13 @@ def write(results, out):
 
 def text(results, out):
     """The whole report."""
-    parts = [head(results["machine"]), error_sections.headline(results),
+    parts = [head(results), error_sections.headline(results),
              error_sections.losing_cases(results)]
     if results.get("curves"):
         parts.append(error_sections.equal_error(results["curves"]))
+    if results.get("curves_next"):
+        parts.append(error_sections.equal_error_next(results["curves_next"]))
+    if results.get("curves"):
         parts.append(error_sections.curves_and_bias(results["curves"]))
     if results.get("kernels"):
         parts.append(error_sections.kernels_beside_embree(results["kernels"]))
@@ -43,8 +46,9 @@ def text(results, out):
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
-def head(machine):
+def head(results):
     """What it was measured with."""
+    machine, next_blender = results["machine"], results.get("curves_next", {}).get("blender")
     scope = scopes.SCOPES[machine["scope"]]
     rows = [
         ["scope", f"{scope.name}: {scope.seeds} seeds, {scope.samples[0]} to {scope.samples[-1]} "
@@ -59,6 +63,7 @@ def head(machine):
                              for part, made in machine["parts"].items())],
         ["against", ", ".join(filter(None, (
             f"{machine['blender']} with Cycles",
+            next_blender and f"{next_blender} with Cycles",
             machine["embree"] and f"Embree {machine['embree']}",
             machine["povray"] and f"POV-Ray {machine['povray']}")))],
     ]

@@ -17,6 +17,9 @@ def headline_lines(results):
     lines = []
     if results.get("curves"):
         lines.append(equal_error_line(results["curves"]))
+    if results.get("curves_next"):
+        made = results["curves_next"]
+        lines.append(equal_error_line(made["scenes"], f"Cycles of {made['blender']}"))
     if results.get("kernels"):
         lines += [kernel_line(results["kernels"]), accuracy_line(results["kernels"])]
     if results.get("povray"):
@@ -24,14 +27,14 @@ def headline_lines(results):
     return [line for line in lines if line]
 
 
-def equal_error_line(scenes):
+def equal_error_line(scenes, cycles="Cycles"):
     """Median, least and most of the times at equal error."""
     ratios = [entry["mse"]["ratio"] for _name, entry in curves.headline_rows(scenes) if entry["mse"]]
     if not ratios:
         return ""
     lost = sum(value < 1.0 for value in ratios)
     middle = estimates.spread(ratios)["median"]
-    return (f"Cycles takes {digits(middle, 2)} times as long as Volley for the same error (median of "
+    return (f"{cycles} takes {digits(middle, 2)} times as long as Volley for the same error (median of "
             f"{len(ratios)} scenes; {digits(min(ratios), 2)} to {digits(max(ratios), 2)}; Volley is "
             f"slower in {lost}).")
 
@@ -87,7 +90,9 @@ LOST_DISTANCE = 1.5
 
 def losing_cases(results):
     """Everything in which Volley is behind, the worst of each comparison first."""
-    lines = [*losing_curves(results.get("curves", {})), *losing_kernels(results.get("kernels", [])),
+    made = results.get("curves_next") or {"blender": "", "scenes": {}}
+    lines = [*losing_curves(results.get("curves", {})),
+             *losing_curves(made["scenes"], f" of {made['blender']}"), *losing_kernels(results.get("kernels", [])),
              *losing_builds(results.get("kernels", [])),
              *losing_distances(results.get("kernels", [])), *losing_povray(results.get("povray", {}))]
     if not lines:
@@ -95,15 +100,15 @@ def losing_cases(results):
     return "## Where Volley loses\n\n" + "\n".join(f"- {line}" for line in lines)
 
 
-def losing_curves(scenes):
+def losing_curves(scenes, of_blender=""):
     """Scenes and measures in which Cycles reaches an error sooner."""
     lost = []
     for name, scene in scenes.items():
         for measure in curves.MEASURES:
             made = scene["comparison"][curves.DEFAULT].get(f"time_ratio_{measure}")
             if made and made["ratio"] < 1.0:
-                lost.append((made["ratio"], f"{words(name)}: time of Cycles over Volley's at equal "
-                                            f"{curves.MEASURES[measure]} {ratio(made)}"))
+                lost.append((made["ratio"], f"{words(name)}: time of Cycles{of_blender} over Volley's at "
+                                            f"equal {curves.MEASURES[measure]} {ratio(made)}"))
     return [line for _ratio, line in sorted(lost)]
 
 
@@ -159,7 +164,7 @@ def losing_povray(scenes):
 
 # Cycles ------------------------------------------------------------------------------------------
 
-def equal_error(scenes):
+def equal_error_table(scenes):
     """Time at equal error for every scene and configuration."""
     rows = []
     for name, _ratios in curves.headline_rows(scenes):
@@ -170,12 +175,23 @@ def equal_error(scenes):
             rows.append([words(name), configuration.replace("volley ", ""),
                          *(ratio(entry[f"time_ratio_{measure}"]) for measure in curves.MEASURES),
                          digits(slope["slope"])])
+    return table(["scene", "Volley", *curves.MEASURES.values(), "slope of MSE"], rows)
+
+
+def equal_error(scenes):
+    """What Cycles' time is divided by Volley's at equal error."""
     return ("## Time to equal error: Cycles over Volley\n\n"
             "Each figure is a geometric mean over the errors that both curves reach. `l4` has four "
             "shadow rays at each point that the camera sees. Both engines run inside Blender, times "
             "are those of F12 with synchronising and saving.\n\n"
-            "![Time to equal error](plots/time-to-equal-error.svg)\n\n"
-            + table(["scene", "Volley", *curves.MEASURES.values(), "slope of MSE"], rows))
+            "![Time to equal error](plots/time-to-equal-error.svg)\n\n" + equal_error_table(scenes))
+
+
+def equal_error_next(made):
+    """The same in the next Blender."""
+    return (f"### In {made['blender']}\n\n"
+            "Both engines in Debian 13's Blender, the library of its compiler, on the same machine, with "
+            "references by its own Cycles.\n\n" + equal_error_table(made["scenes"]))
 
 
 def curves_and_bias(scenes):

@@ -10,17 +10,27 @@ from .tables import digits, table
 def spreads(results):
     """{part: {name: [ratio, low, high]}} of a run: what it says of time at equal error and of rays per
     second, and how sure it is. A ratio of rates may be that of any two of their repeats."""
-    found = {"time at equal error": {}, "rays per second": {}}
-    for scene, result in results.get("curves", {}).items():
-        for name, entry in result["comparison"].items():
-            made = entry.get("time_ratio_mse") if name != curves.BASE else None
-            if made:
-                found["time at equal error"][f"{scene}, {name}"] = [made["ratio"], *made["interval"]]
+    found = {"time at equal error": curve_spreads(results.get("curves", {}))}
+    if results.get("curves_next"):
+        made = results["curves_next"]
+        found[f"time at equal error, {made['blender']}"] = curve_spreads(made["scenes"])
+    found["rays per second"] = {}
     for row in kernels.races(results.get("kernels", [])):
         own, peer = row["volley_mrays_s"], row["embree_default"]
         best = peer[peer["best"]]
         found["rays per second"][f"{kernels.label(row)}, {row['isa']} x{row['threads']}"] = [
             peer["ratio"], own["min"] / best["max"], own["max"] / best["min"]]
+    return found
+
+
+def curve_spreads(scenes):
+    """{name: [ratio, low, high]} of time at equal MSE."""
+    found = {}
+    for scene, result in scenes.items():
+        for name, entry in result["comparison"].items():
+            made = entry.get("time_ratio_mse") if name != curves.BASE else None
+            if made:
+                found[f"{scene}, {name}"] = [made["ratio"], *made["interval"]]
     return found
 
 
