@@ -5,10 +5,9 @@ import traceback
 
 import bpy
 
-from . import native, passes
+from . import native, passes, viewport, writes
 from .log import logger
 from .session import Session
-from .viewport import Viewport
 
 
 class VolleyRenderEngine(bpy.types.RenderEngine):
@@ -46,7 +45,8 @@ class VolleyRenderEngine(bpy.types.RenderEngine):
         """Render one view layer of the depsgraph's scene."""
         if self._session is None:
             self._session = Session()
-        self._guard(self._session.render, self, depsgraph)
+        with writes.render_call():
+            self._guard(self._session.render, self, depsgraph)
 
     def update_render_passes(self, scene=None, renderlayer=None):
         """Name the passes of a view layer, for the compositor."""
@@ -56,15 +56,17 @@ class VolleyRenderEngine(bpy.types.RenderEngine):
 
     def view_update(self, context, depsgraph):
         """The scene changed."""
-        self._guard(self._get_viewport().update, self, context, depsgraph)
+        with writes.draw_call(viewport.redraw):
+            self._guard(self._get_viewport().update, self, context, depsgraph)
 
     def view_draw(self, context, depsgraph):
         """Draw what there is."""
-        self._guard(self._get_viewport().draw, self, context, depsgraph)
+        with writes.draw_call(viewport.redraw):
+            self._guard(self._get_viewport().draw, self, context, depsgraph)
 
     def _get_viewport(self):
         if self._viewport is None:
-            self._viewport = Viewport()
+            self._viewport = viewport.Viewport()
         return self._viewport
 
     # Errors

@@ -18,7 +18,7 @@ import gpu
 import numpy as np
 from gpu_extras.presets import draw_texture_2d
 
-from . import native, passes
+from . import native, passes, writes
 from .session import render_fields, status_text, thread_count
 from .sync import SceneSync, Source, camera
 from .sync.changes import Changes
@@ -70,7 +70,7 @@ class Viewport:
         """Copy what was marked, start a build or a render where one is due, draw the latest picture."""
         if self._is_freed:
             return
-        may_wait = _may_wait()
+        may_wait = not writes.is_rendering()  # which may wait for this draw
         is_current = self._synchronise(engine, context, depsgraph, may_wait)
         if is_current:
             self._pictures.follow(self._sync, context, depsgraph)
@@ -125,21 +125,15 @@ class Viewport:
                 engine.report({'WARNING'}, message)
 
 
-def _may_wait():
-    """Whether a draw may wait: not beside F12 or a preview. Blender forbids Python to write to its data
-    while an engine draws, by one switch for all threads; a render that starts within a draw finds it set,
-    and leaves it so for good when it ends."""
-    return not any(bpy.app.is_job_running(kind) for kind in ('RENDER', 'RENDER_PREVIEW'))
-
-
 def _redraw_later():
     """Redraw rendered views when there may be more to show, and leave the processor to the render until
     then. No engine is kept for it: it could be gone."""
-    if not bpy.app.timers.is_registered(_redraw):
-        bpy.app.timers.register(_redraw, first_interval=DRAW_SECONDS)
+    if not bpy.app.timers.is_registered(redraw):
+        bpy.app.timers.register(redraw, first_interval=DRAW_SECONDS)
 
 
-def _redraw():
+def redraw():
+    """Have all rendered views drawn once more, on Blender's own thread."""
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == 'VIEW_3D' and area.spaces.active.shading.type == 'RENDERED':

@@ -379,3 +379,54 @@ def test_panels_draw_and_previews_render(window):
     # Blender itself leaves memory of previews behind at exit, with its own engines too.
     output = window.output.replace("Error: Not freed memory", "")
     assert "Traceback" not in output and "rror" not in output
+
+
+def inside_render_that_begins_within_a_draw():
+    """Writes from a timer after a render that began while the viewport was being drawn; whether it did
+    begin there."""
+    import time
+    import bpy
+    import scenes
+    from volley import session, viewport
+    yield 0.1
+    scene = scenes.empty(size=(64, 48), samples=4)
+    scenes.camera((0.0, -9.0, 0.0))
+    yield DRAW_SECONDS
+    window, area, space = _view()
+    bpy.context.preferences.view.render_display_type = 'NONE'
+    space.shading.type = 'RENDERED'
+    scene.volley.preview_samples = 1
+    yield from _settled()
+    region = next(region for region in area.regions if region.type == 'WINDOW')
+    drawing, was_within = [False], [False]
+    draw, render = viewport.Viewport.draw, session.Session.render
+
+    def slow_draw(self, *arguments):
+        drawing[0] = True
+        draw(self, *arguments)
+        time.sleep(1.5)
+        drawing[0] = False
+
+    def slow_render(self, *arguments):
+        was_within[0] |= drawing[0]
+        while drawing[0]:
+            time.sleep(0.1)
+        render(self, *arguments)
+
+    bpy.app.handlers.render_pre.append(lambda *_: time.sleep(1.0))
+    viewport.Viewport.draw, session.Session.render = slow_draw, slow_render
+    with bpy.context.temp_override(window=window):
+        bpy.ops.render.render('INVOKE_DEFAULT')
+    yield 0.3
+    region.tag_redraw()
+    for _ in range(LONGEST_DRAWS):
+        yield 0.1
+        if not bpy.app.is_job_running('RENDER'):
+            break
+    yield 3.0 * DRAW_SECONDS
+    scene.volley.samples = 5  # fails where writing is forbidden
+    return was_within[0]
+
+
+def test_scripts_may_write_after_a_render_that_begins_within_a_draw(window):
+    assert window.run_in_window(inside_render_that_begins_within_a_draw, timeout=60)

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Keeps Blender from forbidding scripts to write for good.
+
+While an engine is in a call, Blender forbids Python to write to its data: by one switch for all threads,
+which every call sets, and puts back as it found it. Calls of two threads that do not end in the reverse
+order of their begin can leave it set: a render that begins within a draw of the viewport and ends after
+it, say; from then on timers and handlers of all add-ons fail. So a render that found the switch set ends
+within a call that did not, a draw that is made for it; one that did not ends after all that began
+meanwhile. What is kept here is guarded by Python's own lock.
+"""
+
+import contextlib
+import time
+
+import bpy
+
+_LONGEST_SECONDS = 1.0  # that a call waits for others; then the switch may stay set
+_NAP_SECONDS = 0.001
+_WATCH_SECONDS = 0.05   # between two looks for renders that wait for a draw
+
+
+class _Call:
+    """One of Blender's calls of an engine, in progress."""
+
+    def __init__(self, found_set):
+        self.found_set = found_set
+        self.waits_for_draw = False
+
+
+class _Switch:
+    """Blender's switch, as far as the calls of this engine go."""
+
+    is_set = False
+    calls = []
+    redraw = None  # the viewport's
+
+
+@contextlib.contextmanager
+def render_call():
+    """Around a final render or a preview, on the thread that Blender renders on."""
+    call = _begin()
+    try:
+        yield
+    finally:
+        call.waits_for_draw = call.found_set
+        _wait_until(lambda: _may_end(call))
+        _end(call)
+
+
+@contextlib.contextmanager
+def draw_call(redraw):
+    """Around a call of the viewport, on Blender's own thread. redraw() has it drawn once more."""
+    call = _begin()
+    try:
+        yield
+    finally:
+        if any(other.found_set for other in _Switch.calls) and not bpy.app.timers.is_registered(_redraw_awaited):
+            _Switch.redraw = redraw
+            bpy.app.timers.register(_redraw_awaited, first_interval=_WATCH_SECONDS)
+        if not call.found_set:
+            _wait_until(lambda: not _draw_is_awaited())
+        _end(call)
+
+
+def is_rendering():
+    """Whether F12 or a preview is under way, which may have to wait for a draw."""
+    return any(bpy.app.is_job_running(kind) for kind in ('RENDER', 'RENDER_PREVIEW'))
+
+
+def _begin():
+    call = _Call(_Switch.is_set)
+    _Switch.calls.append(call)
+    _Switch.is_set = True
+    return call
+
+
+def _end(call):
+    _Switch.calls.remove(call)
+    _Switch.is_set = call.found_set
+
+
+def _may_end(call):
+    others = [other.found_set for other in _Switch.calls if other is not call]
+    return not all(others) if call.found_set else not any(others)
+
+
+def _draw_is_awaited():
+    return any(call.waits_for_draw for call in _Switch.calls)
+
+
+def _wait_until(is_true):
+    end = time.monotonic() + _LONGEST_SECONDS
+    while not is_true() and time.monotonic() < end:
+        time.sleep(_NAP_SECONDS)
+
+
+def _redraw_awaited():
+    if _draw_is_awaited():
+        _Switch.redraw()
+    return _WATCH_SECONDS if is_rendering() else None
