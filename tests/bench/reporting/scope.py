@@ -61,7 +61,7 @@ QUICK = Scope(
     largest_triangles=100_000, largest_lights=100, largest_instances=1000)
 
 MEDIUM = Scope(
-    name="medium", minutes=80,
+    name="medium", minutes=60,
     scenes=EFFECTS + JOINED, sampler_scenes=("gallery",), samples=(1, 4, 16, 64, 256, 1024),
     time_samples=(1, 4, 16, 64), seeds=10, reference_samples=1024, reference_seeds=4,
     light_samples=(1, 4), repeats=3, times_scale=2, next_blender=True,
@@ -70,7 +70,7 @@ MEDIUM = Scope(
     kernel_arguments=("--order", "auto", "--repeats", "3", "--tiles", "8"), accuracy=True,
     stages=("conference", "pool_hall", "character"), frame_edge=1024, eyes=2, frame_repeats=3,
     distribution_samples=8, counted_edge=128,
-    largest_triangles=4_000_000, largest_lights=10_000, largest_instances=100_000)
+    largest_triangles=20_000_000, largest_lights=10_000, largest_instances=1_000_000)
 
 FULL = Scope(
     name="full", minutes=480,
