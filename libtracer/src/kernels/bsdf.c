@@ -200,21 +200,42 @@ TRC_INLINE struct half_vector half_of(const struct trc_lobe *lobe, vvec3 m, vvec
     return h;
 }
 
-TRC_INLINE vvec3 fresnel_of(const struct trc_lobe *lobe, vfloat cos_m) {
-    if (lobe->fresnel == TRC_FRESNEL_BLEND) {
-        const vvec3 f = v3_lerp(lobe->f0, lobe->f90, trc_fresnel_blend(cos_m, lobe->ior));
-        return lobe->kind == TRC_LOBE_REFRACT ? v3_sub(v3_splat(vf_one()), f) : f;
-    }
+/* Reflected part of what meets a micro-normal. */
+TRC_INLINE vvec3 reflectance_of(const struct trc_lobe *lobe, vfloat cos_m) {
+    if (lobe->fresnel == TRC_FRESNEL_BLEND)
+        return v3_lerp(lobe->f0, lobe->f90, trc_fresnel_blend(cos_m, lobe->ior));
     if (lobe->fresnel == TRC_FRESNEL_F82) {
         const vfloat rest = vf_saturate(vf_one() - cos_m), power = trc_schlick_weight(cos_m);
         const vvec3 schlick = v3_lerp(lobe->f0, v3_splat(vf_one()), power);
         return v3_saturate(v3_sub(schlick, v3_scale(lobe->f90, cos_m * power * rest)));
     }
-    if (lobe->fresnel == TRC_FRESNEL_DIELECTRIC) {
-        const vfloat f = trc_fresnel_dielectric(cos_m, lobe->ior);
-        return v3_splat(lobe->kind == TRC_LOBE_REFRACT ? vf_one() - f : f);
-    }
+    if (lobe->fresnel == TRC_FRESNEL_DIELECTRIC)
+        return v3_splat(trc_fresnel_dielectric(cos_m, lobe->ior));
     return v3_splat(vf_one());
+}
+/* The part that the lobe has of it. */
+TRC_INLINE vvec3 fresnel_of(const struct trc_lobe *lobe, vfloat cos_m) {
+    const vvec3 f = reflectance_of(lobe, cos_m);
+    const bool is_rest = lobe->kind == TRC_LOBE_REFRACT && lobe->fresnel != TRC_FRESNEL_NONE;
+    return is_rest ? v3_sub(v3_splat(vf_one()), f) : f;
+}
+
+/* Chance that a micro-normal of paired lobes reflects. */
+TRC_INLINE vfloat pair_chance(const struct trc_lobe *lobe, vfloat cos_m) {
+    const vfloat f = v3_average(reflectance_of(lobe, cos_m));
+    return f / (f + (vf_one() - f) * lobe->pair_tint);
+}
+/* Densities of a lobe as those of its pair: this half is chosen in half of all cases, and then the
+ * micro-normal has the say. */
+TRC_INLINE void weigh_pair(const struct trc_lobe *lobe, vfloat cos_m, struct lobe_value *r) {
+    if (!vm_any(lobe->paired))
+        return;
+    const vfloat reflects = pair_chance(lobe, cos_m);
+    const vfloat own = lobe->kind == TRC_LOBE_REFRACT ? vf_one() - reflects : reflects;
+    const vfloat factor = vf_select(lobe->paired, own + own, vf_one());
+    r->pdf = r->pdf * factor;
+    r->claim = r->claim * factor;
+    r->pick = r->pick * factor;
 }
 
 /* D of GGX or Beckmann, masking of wi. */
@@ -306,6 +327,7 @@ TRC_INLINE struct lobe_value reflect_value(const struct trc_lobe *lobe, vvec3 wo
         r.value = v3_mul(v3_scale(lobe->weight, f), fresnel_of(lobe, cos_h));
     }
     r.pick = r.claim;
+    weigh_pair(lobe, cos_h, &r);
     return r;
 }
 
@@ -337,6 +359,7 @@ TRC_INLINE struct lobe_value refract_value(const struct trc_lobe *lobe, vvec3 wo
     r.value = v3_where(m, r.value);
     r.pdf = vf_where(m, r.pdf);
     r.claim = r.pick = vf_where(m, r.claim);
+    weigh_pair(lobe, cos_ho, &r);
     return r;
 }
 
@@ -456,12 +479,13 @@ static vvec3 toon_direction(const struct trc_lobe *lobe, vvec3 wo, vfloat u1, vf
     return wi;
 }
 
-/* A direction of the lobe's density. Lanes leave *alive where total reflection leaves none, or
- * where it is on the wrong side: other lobes may have a density there, but it was not theirs that
- * was sampled. */
+/* A direction of the lobe's density; of paired lobes, u_pair decides which. Lanes leave *alive
+ * where total reflection leaves none, or where it is on the wrong side: other lobes may have a
+ * density there, but it was not theirs that was sampled. *crosses: lanes that are transmitted. */
 static vvec3 rough_direction(const struct trc_lobe *lobe, const struct trc_surface *s, vfloat u1,
-                             vfloat u2, vmask *alive) {
+                             vfloat u2, vfloat u_pair, vmask *alive, vmask *crosses) {
     vvec3 a, b;
+    *crosses = lobe->kind == TRC_LOBE_REFLECT ? vm_none() : *alive;
     if (lobe->kind == TRC_LOBE_TRANSLUCENT) {
         const vvec3 n = v3_neg(lobe->n);
         v3_frame(n, &a, &b);
@@ -491,20 +515,27 @@ static vvec3 rough_direction(const struct trc_lobe *lobe, const struct trc_surfa
     } else if (lobe->distribution == TRC_LOBE_ASHIKHMIN) {
         m = trc_ashikhmin_sample(ax, ay, u1, u2);
     } else {
-        const bool reflects = lobe->kind == TRC_LOBE_REFLECT;
-        m = trc_ggx_sample(wo, ax, ay, reflects ? trc_ggx_bound(lobe->cos_o, ax, ay) : vf_one(), u,
-                           u2);
+        vfloat bound = vf_one();
+        if (lobe->kind == TRC_LOBE_REFLECT)
+            bound = vf_select(lobe->paired, bound, trc_ggx_bound(lobe->cos_o, ax, ay));
+        m = trc_ggx_sample(wo, ax, ay, bound, u, u2);
+    }
+    if (vm_any(lobe->paired)) {
+        const vmask up = vf_lt(u_pair, pair_chance(lobe, v3_dot(wo, m)));
+        *crosses = vm_select(lobe->paired, vm_andnot(*alive, up), *crosses);
     }
     vvec3 wi = v3_reflect(wo, m);
-    if (lobe->kind == TRC_LOBE_REFRACT) {
-        *alive = vm_and(*alive, trc_refract(wo, m, lobe->ior, &wi));
-        *alive = vm_and(*alive, vf_lt(wi.z, vf_zero()));
-    } else {
-        const vmask seen = vm_or(spread, vf_gt(v3_dot(wo, m), vf_zero()));
-        if (vm_any(spread))
-            wi = v3_select(spread, trc_warp_cosine(u, u2), wi);
-        *alive = vm_and(*alive, vm_and(seen, vf_gt(wi.z, vf_zero())));
+    vmask seen = vm_or(spread, vf_gt(v3_dot(wo, m), vf_zero()));
+    if (vm_any(spread))
+        wi = v3_select(spread, trc_warp_cosine(u, u2), wi);
+    seen = vm_and(seen, vf_gt(wi.z, vf_zero()));
+    if (vm_any(*crosses)) {
+        vvec3 bent;
+        const vmask passes = trc_refract(wo, m, lobe->ior, &bent);
+        seen = vm_select(*crosses, vm_and(passes, vf_lt(bent.z, vf_zero())), seen);
+        wi = v3_select(*crosses, bent, wi);
     }
+    *alive = vm_and(*alive, seen);
     return v3_from_frame(wi, a, b, lobe->n);
 }
 
@@ -551,28 +582,30 @@ void TRC_KERNEL(trc_bsdf_sample)(const struct trc_lobes *l, const struct trc_sur
         vmask m = vm_and(waiting, vf_gt(lobe->sample_weight, vf_zero()));
         if (i != last)
             m = vm_and(m, vf_lt(rest, lobe->sample_weight));
+        const vfloat u_pair = vf_divide(rest, lobe->sample_weight);
         rest = rest - lobe->sample_weight;
         waiting = vm_andnot(waiting, m);
         if (!vm_any(m))
             continue;
-        const bool crosses = lobe->kind != TRC_LOBE_REFLECT && lobe->kind != TRC_LOBE_TRANSPARENT;
-        if (crosses)
-            out->transmitted = vm_or(out->transmitted, m);
+        const vmask exact = vm_and(m, lobe->ideal), spread = vm_andnot(m, lobe->ideal);
+        if (lobe->kind != TRC_LOBE_REFLECT && lobe->kind != TRC_LOBE_TRANSPARENT)
+            out->transmitted = vm_or(out->transmitted, exact);
         if (lobe->kind == TRC_LOBE_TRANSLUCENT) {
             out->diffuse = vm_or(out->diffuse, m);
             out->alpha_min = vf_select(m, vf_one(), out->alpha_min);
         } else if (lobe->kind != TRC_LOBE_TRANSPARENT) {
             out->alpha_min = vf_select(m, vf_sqrt(lobe->alpha_x * lobe->alpha_y), out->alpha_min);
         }
-        const vmask exact = vm_and(m, lobe->ideal), spread = vm_andnot(m, lobe->ideal);
         if (vm_any(exact))
             take_ideal(lobe, s, exact, lobe->sample_weight / l->continue_weight, out);
         if (vm_any(spread)) {
-            vmask alive = spread, above, below;
-            const vvec3 wi = v3_normalize(rough_direction(lobe, s, u1, u2, &alive));
+            vmask alive = spread, crosses, above, below;
+            const vvec3 wi =
+                v3_normalize(rough_direction(lobe, s, u1, u2, u_pair, &alive, &crosses));
             sides(l, s, wi, alive, &above, &below);
             out->wi = v3_select(spread, wi, out->wi);
-            rough = vm_or(rough, crosses ? below : above);
+            out->transmitted = vm_or(out->transmitted, crosses);
+            rough = vm_or(rough, vm_select(crosses, below, above));
         }
     }
     if (vm_any(rough))

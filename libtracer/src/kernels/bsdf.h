@@ -77,6 +77,9 @@ struct trc_lobe {
     vfloat cos_o;         /* n . wo */
     vfloat g1_o;          /* masking of wo */
     vfloat pdf_scale;     /* density of a sampled direction over D of its half vector */
+    vmask paired;         /* lanes of glass in which the sampled micro-normal decides between this
+                             lobe and its other half, each of which has half of the chance */
+    vfloat pair_tint;     /* mean colour of refraction over that of reflection, paired lanes */
     vvec3 multi_weight;   /* MULTI_GGX: what the lobe of the missing energy is scaled by */
     vfloat multi_chance;  /* and how often it is sampled, by cosine */
     vfloat albedo_scale;  /* what Cycles leaves of the weight where it tells the albedo */

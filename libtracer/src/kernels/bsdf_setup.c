@@ -158,7 +158,7 @@ static struct trc_lobe *add_lobe(struct setup *c, enum trc_lobe_kind kind, vvec3
     lobe->correlated = false;
     lobe->albedo_scale = vf_one();
     lobe->anisotropic = false;
-    lobe->ideal = vm_none();
+    lobe->ideal = lobe->paired = vm_none();
     lobe->weight = v3_where(counts, w);
     lobe->mix_weight = vf_where(counts, mean);
     lobe->sample_weight = vf_zero();

@@ -216,6 +216,9 @@ TRC_INLINE vmask vm_first(int32_t n) { return vi_lt(vi_lane(), vi_set(n)); }
 
 /* ---- selection: lanes of a where m, else of b ---- */
 
+TRC_INLINE vmask vm_select(vmask m, vmask a, vmask b) {
+    return vm_or(vm_and(m, a), vm_andnot(b, m));
+}
 TRC_INLINE vfloat vf_select(vmask m, vfloat a, vfloat b) {
 #if TRC_WIDTH == 1
     return m ? a : b;

@@ -566,6 +566,39 @@ static void ideal_glass_splits_energy(void **state) {
             }
 }
 
+/* Paths within glass meet dozens of surfaces: no sample may gain much at one, also where a part of
+ * the micro-normals reflects totally. */
+static void glass_weights_are_steady(void **state) {
+    (void)state;
+    const uint32_t later = TRC_DISTRIBUTION_MULTI_GGX | TRC_DISTRIBUTION_CORRELATED;
+    double most = 0.0;
+    for (int i = 0; i < 2; i++)
+        for (int back = 0; back < 2; back++) {
+            const float r = i ? 0.3f : 0.15f;
+            struct model models[] = {glass(later, r, 1.45f, back),
+                                     glass(TRC_DISTRIBUTION_MULTI_GGX, r, 1.45f, back),
+                                     layered_glass(TRC_DISTRIBUTION_MULTI_GGX, r, back)};
+            for (size_t k = 0; k < sizeof models / sizeof models[0]; k++)
+                for (double c = 0.05; c <= 1.0; c += 0.05) {
+                    struct trc_surface s;
+                    struct trc_lobes l;
+                    prepare(&models[k], direction(c, 0.3), &s, &l);
+                    struct rng random = rng_seed(3);
+                    for (int n = 0; n < (1 << 12); n += TRC_WIDTH) {
+                        struct trc_bsdf_sample b;
+                        const vfloat u0 = test_wide_uniform(&random);
+                        const vfloat u1 = test_wide_uniform(&random);
+                        TRC_KERNEL(trc_bsdf_sample)(&l, &s, u0, u1, test_wide_uniform(&random), &b);
+                        for (int lane = 0; lane < TRC_WIDTH; lane++)
+                            if ((vm_bits(b.valid) >> lane) & 1u)
+                                most = fmax(most, (double)vf_get(b.weight.x, lane));
+                    }
+                }
+        }
+    printf("  weight of a sample of white glass at most %.3f\n", most);
+    assert_true(most < 1.35);
+}
+
 static void rough_goes_over_into_ideal(void **state) {
     (void)state;
     for (int k = 0; k < 4; k++) {
@@ -750,17 +783,12 @@ int main(void) {
     if (!test_cpu_can())
         return 77;
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(sampling_matches_density),
-        cmocka_unit_test(weights_match_values),
-        cmocka_unit_test(furnace_is_white),
-        cmocka_unit_test(diffuse_albedos),
-        cmocka_unit_test(ideal_glass_splits_energy),
-        cmocka_unit_test(rough_goes_over_into_ideal),
-        cmocka_unit_test(lobes_are_reciprocal),
-        cmocka_unit_test(values_match_formulas),
-        cmocka_unit_test(extremes_stay_finite),
-        cmocka_unit_test(nothing_shines_through),
-        cmocka_unit_test(factor_beyond),
+        cmocka_unit_test(sampling_matches_density),   cmocka_unit_test(weights_match_values),
+        cmocka_unit_test(furnace_is_white),           cmocka_unit_test(diffuse_albedos),
+        cmocka_unit_test(ideal_glass_splits_energy),  cmocka_unit_test(glass_weights_are_steady),
+        cmocka_unit_test(rough_goes_over_into_ideal), cmocka_unit_test(lobes_are_reciprocal),
+        cmocka_unit_test(values_match_formulas),      cmocka_unit_test(extremes_stay_finite),
+        cmocka_unit_test(nothing_shines_through),     cmocka_unit_test(factor_beyond),
         cmocka_unit_test(light_weights_drop_out),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
