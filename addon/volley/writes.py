@@ -54,9 +54,8 @@ def draw_call(redraw):
     try:
         yield
     finally:
-        if any(other.found_set for other in _Switch.calls) and not bpy.app.timers.is_registered(_redraw_awaited):
-            _Switch.redraw = redraw
-            bpy.app.timers.register(_redraw_awaited, first_interval=_WATCH_SECONDS)
+        if any(other.found_set for other in _Switch.calls):
+            _watch(redraw)
         if not call.found_set:
             _wait_until(lambda: not _draw_is_awaited())
         _end(call)
@@ -92,6 +91,13 @@ def _wait_until(is_true):
     end = time.monotonic() + _LONGEST_SECONDS
     while not is_true() and time.monotonic() < end:
         time.sleep(_NAP_SECONDS)
+
+
+def _watch(redraw):
+    """Have a draw made for any render that began within this one and comes to wait for it."""
+    _Switch.redraw = redraw
+    if not bpy.app.timers.is_registered(_redraw_awaited):
+        bpy.app.timers.register(_redraw_awaited, first_interval=_WATCH_SECONDS)
 
 
 def _redraw_awaited():
