@@ -479,11 +479,12 @@ static vvec3 toon_direction(const struct trc_lobe *lobe, vvec3 wo, vfloat u1, vf
     return wi;
 }
 
-/* A direction of the lobe's density; of paired lobes, u_pair decides which. Lanes leave *alive
- * where total reflection leaves none, or where it is on the wrong side: other lobes may have a
- * density there, but it was not theirs that was sampled. *crosses: lanes that are transmitted. */
+/* A direction of the lobe's density. chosen_at, evenly below its sample_weight, decides between
+ * paired lobes. Lanes leave *alive where total reflection leaves none, or where it is on the wrong
+ * side: other lobes may have a density there, but it was not theirs that was sampled. *crosses:
+ * lanes that are transmitted. */
 static vvec3 rough_direction(const struct trc_lobe *lobe, const struct trc_surface *s, vfloat u1,
-                             vfloat u2, vfloat u_pair, vmask *alive, vmask *crosses) {
+                             vfloat u2, vfloat chosen_at, vmask *alive, vmask *crosses) {
     vvec3 a, b;
     *crosses = lobe->kind == TRC_LOBE_REFLECT ? vm_none() : *alive;
     if (lobe->kind == TRC_LOBE_TRANSLUCENT) {
@@ -521,7 +522,8 @@ static vvec3 rough_direction(const struct trc_lobe *lobe, const struct trc_surfa
         m = trc_ggx_sample(wo, ax, ay, bound, u, u2);
     }
     if (vm_any(lobe->paired)) {
-        const vmask up = vf_lt(u_pair, pair_chance(lobe, v3_dot(wo, m)));
+        const vfloat chance = pair_chance(lobe, v3_dot(wo, m));
+        const vmask up = vf_lt(chosen_at, chance * lobe->sample_weight);
         *crosses = vm_select(lobe->paired, vm_andnot(*alive, up), *crosses);
     }
     vvec3 wi = v3_reflect(wo, m);
@@ -582,7 +584,7 @@ void TRC_KERNEL(trc_bsdf_sample)(const struct trc_lobes *l, const struct trc_sur
         vmask m = vm_and(waiting, vf_gt(lobe->sample_weight, vf_zero()));
         if (i != last)
             m = vm_and(m, vf_lt(rest, lobe->sample_weight));
-        const vfloat u_pair = vf_divide(rest, lobe->sample_weight);
+        const vfloat chosen_at = rest;
         rest = rest - lobe->sample_weight;
         waiting = vm_andnot(waiting, m);
         if (!vm_any(m))
@@ -601,7 +603,7 @@ void TRC_KERNEL(trc_bsdf_sample)(const struct trc_lobes *l, const struct trc_sur
         if (vm_any(spread)) {
             vmask alive = spread, crosses, above, below;
             const vvec3 wi =
-                v3_normalize(rough_direction(lobe, s, u1, u2, u_pair, &alive, &crosses));
+                v3_normalize(rough_direction(lobe, s, u1, u2, chosen_at, &alive, &crosses));
             sides(l, s, wi, alive, &above, &below);
             out->wi = v3_select(spread, wi, out->wi);
             out->transmitted = vm_or(out->transmitted, crosses);

@@ -582,6 +582,65 @@ static const float trc_correlated_glass_energy[TRC_GLASS_ENERGY_COUNT] = {
     0.9989f, 0.9701f, 0.9187f, 0.8645f, 0.8144f, 0.7717f, 0.7369f, 0.7101f,
     0.6909f, 0.6788f, 0.6732f, 0.6737f, 0.6797f, 0.6910f, 0.7074f, 0.7277f,
 };
+/* Which part of trc_glass_energy is reflected: what colours light that scatters more than once, where
+ * the factor of the macro normal is far off (rough glass from inside). Axes as there, with fewer
+ * points. */
+#define TRC_GLASS_SHARE_SLICES 5
+#define TRC_GLASS_SHARE_ROWS 5
+#define TRC_GLASS_SHARE_COLUMNS 9
+static const float trc_glass_share[2 * TRC_GLASS_SHARE_SLICES * TRC_GLASS_SHARE_ROWS *
+                                   TRC_GLASS_SHARE_COLUMNS] = {
+    0.99f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f,
+    0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f,
+    0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f,
+    0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f,
+    0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f,
+    1.00f, 1.00f, 1.00f, 1.00f, 1.00f, 0.11f, 0.01f, 0.00f, 0.00f,
+    1.00f, 1.00f, 0.98f, 0.97f, 0.91f, 0.22f, 0.01f, 0.00f, 0.00f,
+    1.00f, 0.99f, 0.90f, 0.71f, 0.44f, 0.16f, 0.02f, 0.00f, 0.00f,
+    1.00f, 0.98f, 0.72f, 0.37f, 0.16f, 0.06f, 0.01f, 0.00f, 0.00f,
+    1.00f, 0.93f, 0.48f, 0.17f, 0.06f, 0.02f, 0.00f, 0.00f, 0.00f,
+    1.00f, 1.00f, 1.00f, 1.00f, 1.00f, 1.00f, 1.00f, 0.04f, 0.02f,
+    1.00f, 1.00f, 1.00f, 0.99f, 0.99f, 0.99f, 0.91f, 0.06f, 0.02f,
+    1.00f, 1.00f, 0.98f, 0.95f, 0.90f, 0.82f, 0.59f, 0.15f, 0.02f,
+    1.00f, 1.00f, 0.97f, 0.87f, 0.71f, 0.51f, 0.31f, 0.12f, 0.01f,
+    1.00f, 1.00f, 0.93f, 0.73f, 0.47f, 0.27f, 0.14f, 0.06f, 0.01f,
+    1.00f, 1.00f, 1.00f, 1.00f, 1.00f, 1.00f, 1.00f, 1.00f, 0.08f,
+    1.00f, 1.00f, 1.00f, 1.00f, 1.00f, 1.00f, 0.99f, 0.95f, 0.09f,
+    1.00f, 1.00f, 0.99f, 0.98f, 0.97f, 0.95f, 0.92f, 0.73f, 0.13f,
+    1.00f, 1.00f, 0.99f, 0.96f, 0.90f, 0.82f, 0.72f, 0.55f, 0.21f,
+    1.00f, 1.00f, 0.98f, 0.92f, 0.79f, 0.63f, 0.48f, 0.37f, 0.25f,
+    1.00f, 1.00f, 1.00f, 1.00f, 1.00f, 1.00f, 1.00f, 1.00f, 0.25f,
+    1.00f, 1.00f, 1.00f, 1.00f, 1.00f, 1.00f, 1.00f, 1.00f, 0.27f,
+    1.00f, 1.00f, 1.00f, 0.99f, 0.99f, 0.99f, 0.98f, 0.96f, 0.46f,
+    1.00f, 1.00f, 1.00f, 0.98f, 0.96f, 0.95f, 0.93f, 0.88f, 0.68f,
+    1.00f, 1.00f, 0.99f, 0.97f, 0.92f, 0.88f, 0.84f, 0.80f, 0.76f,
+    0.13f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f,
+    0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f,
+    0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f,
+    0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f,
+    0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f,
+    0.95f, 0.83f, 0.48f, 0.20f, 0.06f, 0.02f, 0.00f, 0.00f, 0.00f,
+    0.31f, 0.30f, 0.25f, 0.14f, 0.06f, 0.02f, 0.00f, 0.00f, 0.00f,
+    0.11f, 0.10f, 0.07f, 0.04f, 0.02f, 0.01f, 0.00f, 0.00f, 0.00f,
+    0.08f, 0.06f, 0.04f, 0.02f, 0.01f, 0.00f, 0.00f, 0.00f, 0.00f,
+    0.07f, 0.05f, 0.02f, 0.01f, 0.00f, 0.00f, 0.00f, 0.00f, 0.00f,
+    0.97f, 0.90f, 0.67f, 0.41f, 0.21f, 0.09f, 0.04f, 0.02f, 0.02f,
+    0.45f, 0.45f, 0.42f, 0.31f, 0.18f, 0.09f, 0.04f, 0.02f, 0.02f,
+    0.19f, 0.18f, 0.16f, 0.12f, 0.09f, 0.06f, 0.03f, 0.02f, 0.01f,
+    0.13f, 0.12f, 0.09f, 0.07f, 0.05f, 0.03f, 0.02f, 0.01f, 0.01f,
+    0.12f, 0.11f, 0.08f, 0.05f, 0.03f, 0.02f, 0.01f, 0.01f, 0.01f,
+    0.97f, 0.92f, 0.71f, 0.49f, 0.30f, 0.18f, 0.11f, 0.09f, 0.08f,
+    0.51f, 0.52f, 0.49f, 0.40f, 0.27f, 0.18f, 0.11f, 0.09f, 0.08f,
+    0.25f, 0.25f, 0.23f, 0.20f, 0.16f, 0.13f, 0.10f, 0.08f, 0.07f,
+    0.19f, 0.18f, 0.16f, 0.14f, 0.11f, 0.09f, 0.07f, 0.06f, 0.05f,
+    0.19f, 0.18f, 0.16f, 0.12f, 0.09f, 0.07f, 0.05f, 0.04f, 0.03f,
+    0.97f, 0.90f, 0.68f, 0.48f, 0.36f, 0.29f, 0.26f, 0.25f, 0.25f,
+    0.53f, 0.53f, 0.49f, 0.42f, 0.34f, 0.29f, 0.26f, 0.25f, 0.25f,
+    0.34f, 0.33f, 0.32f, 0.30f, 0.27f, 0.25f, 0.24f, 0.23f, 0.23f,
+    0.31f, 0.31f, 0.29f, 0.27f, 0.24f, 0.22f, 0.20f, 0.18f, 0.18f,
+    0.34f, 0.33f, 0.31f, 0.27f, 0.23f, 0.19f, 0.16f, 0.13f, 0.11f,
+};
 /* How far the albedo of reflection at a dielectric, over that without a Fresnel factor, is from F0
  * to 1. Slices go by sqrt((ior - 1) / (ior + 1)) from 0 to TRC_SHARE_REACH, an ior of 4.6. */
 #define TRC_SHARE_SLICES 6
@@ -710,6 +769,10 @@ TRC_INLINE vfloat trc_glass_albedo(vfloat cos_theta, vfloat alpha, vfloat ior) {
 TRC_INLINE vfloat trc_correlated_glass_albedo(vfloat cos_theta, vfloat alpha, vfloat ior) {
     return trc_glass_lookup(trc_correlated_glass_energy, TRC_GLASS_ENERGY_SLICES,
                             TRC_GLASS_ENERGY_ROWS, TRC_GLASS_ENERGY_COLUMNS, cos_theta, alpha, ior);
+}
+TRC_INLINE vfloat trc_glass_reflected_share(vfloat cos_theta, vfloat alpha, vfloat ior) {
+    return trc_glass_lookup(trc_glass_share, TRC_GLASS_SHARE_SLICES, TRC_GLASS_SHARE_ROWS,
+                            TRC_GLASS_SHARE_COLUMNS, cos_theta, alpha, ior);
 }
 TRC_INLINE vfloat trc_dielectric_share(vfloat cos_theta, vfloat alpha, vfloat ior) {
     vfloat x, y, z;

@@ -22,8 +22,8 @@ static struct trc_lobe *add_dielectric(struct setup *c, enum trc_lobe_kind kind,
 /* Chances of two lobes that have the factor of the micro-normal, f that of the normal. Where both
  * are rough they share micro-normals, each of which reflects as often as it should
  * (kernels/bsdf.c): with chances by the normal, a path within glass gained or lost weight at every
- * bounce, and after 30 few paths had most of the light (20 times the squared error at 256 samples).
- */
+ * bounce, and after 30 of them a few paths carried most of the light (15 times the squared error at
+ * 256 samples). */
 static void share_chances(struct trc_lobe *reflect, struct trc_lobe *refract, vfloat f) {
     if (reflect)
         reflect->mix_weight = reflect->mix_weight * f;
@@ -49,9 +49,10 @@ static void add_multi_glass(struct setup *c, vvec3 weight, vvec3 reflected, vvec
     /* As rough as the lobes will be: a filtered one keeps its energy too. */
     const vfloat rough = vf_max(vf_clamp(alpha, 1e-4f, 1.0f), c->filter_alpha);
     const vfloat kept = trc_glass_albedo(v3_dot(n, c->s->wo), rough, eta);
-    const vfloat f = trc_fresnel_dielectric(v3_dot(n, c->s->wo), eta);
     /* What does not get away is coloured again at every further bounce: a geometric series. */
-    const vvec3 again = v3_scale(v3_lerp(refracted, reflected, f), vf_one() - kept);
+    const vfloat share = trc_glass_reflected_share(v3_dot(n, c->s->wo), rough, eta);
+    const vvec3 colors = v3_lerp(refracted, reflected, vf_clamp(share, 0.05f, 0.95f));
+    const vvec3 again = v3_scale(colors, vf_one() - kept);
     const vfloat least = vf_set(0.1f), one = vf_one();
     const vvec3 gain =
         v3(vf_rcp(vf_max(one - again.x, least)), vf_rcp(vf_max(one - again.y, least)),
@@ -65,7 +66,7 @@ static void add_multi_glass(struct setup *c, vvec3 weight, vvec3 reflected, vvec
                                               eta, TRC_DISTRIBUTION_GGX);
     if (refract)
         refract->fresnel = TRC_FRESNEL_DIELECTRIC;
-    share_chances(reflect, refract, f);
+    share_chances(reflect, refract, trc_fresnel_dielectric(v3_dot(n, c->s->wo), eta));
 }
 
 /* The factor of the micro-normal goes from f0 to 1; kept: what single scattering keeps. */
