@@ -1,14 +1,15 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""The table of stability: figures that tests print (figures.h), from CTest's report.
+"""The table of stability: figures that tests print (figures.h), from CTest's report and from logs.
 
-    stability.py REPORT.xml --out TABLE.md
+    stability.py REPORT.xml [TEST.log ...] --out TABLE.md
 
-One row for each thing that was measured. What all instruction sets give alike stands once; rays and their
-misses are added up.
+A log is what one test printed, its name the test's. One row for each thing that was measured. What all
+instruction sets give alike stands once; rays and their misses are added up.
 """
 
 import argparse
+import pathlib
 import re
 import sys
 import xml.etree.ElementTree as ElementTree
@@ -18,13 +19,23 @@ MISSES = re.compile(r"(\d+) misses of (\d+) rays")
 ULPS = re.compile(r"([\d.]+) ulp")
 
 
-def figures(report):
-    """(what, value, name of the test) of each figure in a JUnit file."""
+def outputs(report):
+    """(name of a test, what it printed) of a JUnit file or of a log."""
+    if report.suffix != ".xml":
+        yield report.stem, report.read_text(encoding="utf-8")
+        return
     for case in ElementTree.parse(report).getroot().iter("testcase"):
-        for line in (case.findtext("system-out") or "").splitlines():
-            if line.startswith(MARK):
-                what, _, value = line[len(MARK):].partition(" | ")
-                yield what.strip(), value.strip(), case.get("name")
+        yield case.get("name"), case.findtext("system-out") or ""
+
+
+def figures(reports):
+    """(what, value, name of the test) of each figure."""
+    for report in reports:
+        for name, output in outputs(report):
+            for line in output.splitlines():
+                if line.startswith(MARK):
+                    what, _, value = line[len(MARK):].partition(" | ")
+                    yield what.strip(), value.strip(), name
 
 
 def rows(found):
@@ -79,10 +90,10 @@ def document(table):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("report")
+    parser.add_argument("reports", nargs="+", type=pathlib.Path)
     parser.add_argument("--out", required=True)
     options = parser.parse_args()
-    table = rows(figures(options.report))
+    table = rows(figures(options.reports))
     if not table:
         sys.exit("no test printed a figure")
     with open(options.out, "w", encoding="utf-8") as file:
