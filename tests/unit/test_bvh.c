@@ -2,6 +2,7 @@
  * posed, and the check finds trees that do not. */
 #include "query_test.h"
 
+#include "bvh/cluster.h"
 #include "bvh/split.h"
 #include "core/core.h"
 #include "figures.h"
@@ -33,11 +34,68 @@ static void expect_good_world(const char *name, struct query_world *world) {
     query_world_free(world);
 }
 
+/* ---- clusters ---- */
+
+static void clusters_are_what_has_a_box_in_common(void **state) {
+    (void)state;
+    struct trc_ref refs[8];
+    for (uint32_t k = 0; k < 4; k++) { /* two unit squares in a row */
+        const float x = (float)(k / 2);
+        refs[k] = (struct trc_ref){{x, 0, 0}, 0, {x + 1, 1, 0}, 10 + k};
+    }
+    assert_true(trc_cluster_join(&refs[0], &refs[1])); /* the halves of a square */
+    assert_int_equal(trc_ref_first(&refs[0]), 10);
+    assert_int_equal(trc_ref_count(&refs[0]), 2);
+    assert_false(trc_cluster_join(&refs[0], &refs[2])); /* two squares: as large as the sum */
+    assert_int_equal(trc_ref_count(&refs[0]), 2);
+    assert_true(refs[0].upper[0] == 1.0f);
+    for (int k = 0; k < 8; k++) /* all in one place */
+        refs[k] = (struct trc_ref){{0, 0, 0}, 0, {1, 1, 0.25f * (float)k}, (uint32_t)k};
+    for (uint32_t k = 1; k < 4; k++)
+        assert_true(trc_cluster_join(&refs[0], &refs[k]));
+    assert_int_equal(trc_ref_count(&refs[0]), 4);
+    assert_true(refs[0].upper[2] == 0.75f);
+    assert_false(trc_cluster_join(&refs[0], &refs[4])); /* enough */
+    assert_false(trc_cluster_join(&refs[4], &refs[6])); /* not side by side in the mesh */
+    refs[6].part = 1;
+    assert_false(trc_cluster_join(&refs[5], &refs[6]));
+}
+
+/* Each triangle of the refs once, in the leaf that had its ref. */
+static void clusters_open_into_slots(void **state) {
+    (void)state;
+    struct trc_ref refs[] = {{.primitive = 5 | TRC_REF_NEXT}, /* 5, 6 */
+                             {.part = 1, .primitive = 9},
+                             {.primitive = 7 | 3 * TRC_REF_NEXT}, /* 7 to 10 */
+                             {.part = 2, .primitive = 0}};
+    uint32_t nodes[2][TRC_NODE_WIDTH];
+    for (int i = 0; i < TRC_NODE_WIDTH; i++)
+        nodes[0][i] = nodes[1][i] = TRC_REF_EMPTY;
+    nodes[0][0] = trc_leaf_ref(2, 2);
+    nodes[0][1] = 1;
+    nodes[1][4] = trc_leaf_ref(0, 1);
+    nodes[1][5] = trc_leaf_ref(1, 1);
+    struct trc_topology topology = {.node_count = 2, .children = nodes};
+    static const struct trc_part_triangle expected[] = {{0, 7}, {0, 8}, {0, 9}, {0, 10},
+                                                        {2, 0}, {0, 5}, {0, 6}, {1, 9}};
+    struct trc_part_triangle triangles[8];
+    trc_clusters_open(&topology, refs, triangles);
+    assert_memory_equal(triangles, expected, sizeof expected);
+    assert_int_equal(nodes[0][0], trc_leaf_ref(0, 5));
+    assert_int_equal(nodes[0][1], 1);
+    assert_int_equal(nodes[1][4], trc_leaf_ref(5, 2));
+    assert_int_equal(nodes[1][5], trc_leaf_ref(7, 1));
+    assert_int_equal(nodes[1][0], TRC_REF_EMPTY);
+    topology = (struct trc_topology){.root = trc_leaf_ref(0, 2)};
+    trc_clusters_open(&topology, refs, triangles);
+    assert_int_equal(topology.root, trc_leaf_ref(0, 3));
+    assert_memory_equal(triangles, expected + 5, 3 * sizeof *expected);
+}
+
 /* ---- splits ---- */
 
 static int compare_primitives(const void *a, const void *b) {
-    const uint32_t x = ((const struct trc_ref *)a)->primitive,
-                   y = ((const struct trc_ref *)b)->primitive;
+    const uint32_t x = trc_ref_first(a), y = trc_ref_first(b);
     return (x > y) - (x < y);
 }
 
@@ -51,6 +109,7 @@ static void expect_box(struct box a, struct box b) {
 static void expect_range(const struct trc_range *a, const struct trc_range *b) {
     assert_int_equal(a->begin, b->begin);
     assert_int_equal(a->end, b->end);
+    assert_int_equal(a->triangles, b->triangles);
     expect_box(a->bounds, b->bounds);
     expect_box(a->centroids, b->centroids);
 }
@@ -67,7 +126,7 @@ static void shared_splits_are_the_same(void **state) {
         struct trc_pool *pool;
         struct rng rng = rng_seed(k);
         for (uint32_t i = 0; i < count; i++) {
-            refs[i] = (struct trc_ref){.primitive = i};
+            refs[i] = (struct trc_ref){.primitive = i | rng_below(&rng, 4) * TRC_REF_NEXT};
             for (int axis = 0; axis < 3; axis++) {
                 refs[i].lower[axis] = rng_range(&rng, -1.0f, 1.0f);
                 refs[i].upper[axis] = refs[i].lower[axis] + rng_unit(&rng) * rng_unit(&rng);
@@ -89,7 +148,7 @@ static void shared_splits_are_the_same(void **state) {
         expect_range(&right, &shared_right);
         assert_true(left.end > 0 && left.end < count);
         for (uint32_t i = 1; i < count; i++) /* sides keep their order */
-            assert_true(i == left.end || shared[i - 1].primitive < shared[i].primitive);
+            assert_true(i == left.end || trc_ref_first(&shared[i - 1]) < trc_ref_first(&shared[i]));
         qsort(refs, left.end, sizeof *refs, compare_primitives);
         qsort(refs + left.end, count - left.end, sizeof *refs, compare_primitives);
         assert_memory_equal(refs, shared, bytes);
@@ -454,9 +513,9 @@ static void fills_and_refits_are_cancelled(void **state) {
     const uint64_t held = trc_memory_bytes();
     struct trc_tree tree;
     assert_int_equal(trc_tree_refit(from, &part, 1, pool, &cancel, &tree), TRC_ERROR_CANCELLED);
-    struct trc_ref ref = {.upper = {1.0f, 1.0f, 1.0f}};
+    const struct trc_part_triangle triangle = {0, 0};
     const struct trc_topology leaf = {.root = trc_leaf_ref(0, 1)};
-    assert_int_equal(trc_tree_fill(&leaf, &ref, 1, &part, 1, pool, &cancel, &tree),
+    assert_int_equal(trc_tree_fill(&leaf, &triangle, 1, &part, 1, pool, &cancel, &tree),
                      TRC_ERROR_CANCELLED);
     assert_int_equal(trc_memory_bytes(), held);
     trc_pool_destroy(pool);
@@ -553,6 +612,8 @@ static void check_finds_damage(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(clusters_are_what_has_a_box_in_common),
+        cmocka_unit_test(clusters_open_into_slots),
         cmocka_unit_test(shared_splits_are_the_same),
         cmocka_unit_test(any_number_of_triangles),
         cmocka_unit_test(shapes_and_instances),

@@ -79,16 +79,16 @@ static bool is_cancelled(const struct builder *b) { return b->cancel && *b->canc
  * splits no more: what it has made is thrown away. */
 static bool range_divide(struct builder *b, const struct trc_range *r, uint32_t level,
                          struct trc_range *left, struct trc_range *right) {
-    const uint32_t count = r->end - r->begin;
+    const uint32_t refs = r->end - r->begin, count = r->triangles;
     const bool must = count > b->leaf_size;
-    if (count < 2 || (!must && (float)count <= NODE_COST) || is_cancelled(b))
+    if (refs < 2 || (!must && (float)count <= NODE_COST) || is_cancelled(b))
         return false;
     if (level >= MEDIAN_LEVEL) {
         if (must)
             trc_split_middle(b->refs, r, left, right);
         return must;
     }
-    const bool shared = count > TRC_SHARED_RANGE;
+    const bool shared = refs > TRC_SHARED_RANGE;
     const struct trc_split s =
         shared ? trc_split_shared_find(b->blocks, r) : trc_split_find(b->refs, r);
     const float area = box_area(r->bounds);

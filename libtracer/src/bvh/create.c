@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "bvh/bvh.h"
+#include "bvh/cluster.h"
 #include "bvh/part.h"
 #include "bvh/tree.h"
 #include "core/core.h"
@@ -52,7 +53,8 @@ static bool triangle_ref(const struct trc_part *part, uint32_t triangle, struct 
 #define BLOCK_TRIANGLES 8192
 struct ref_block {
     uint32_t part, begin, end; /* triangles */
-    uint32_t at, count;        /* where its refs start, and how many are valid */
+    uint32_t at, count;        /* where its refs start, and how many there are */
+    uint32_t triangles;        /* of those refs: the valid ones */
 };
 struct ref_job {
     const struct trc_part *parts;
@@ -73,14 +75,17 @@ static void block_task(void *context, uint32_t index, uint32_t worker) {
             continue;
         ref->part = block->part;
         ref->primitive = t;
-        block->count++;
+        block->triangles++;
+        if (!block->count || !trc_cluster_join(ref - 1, ref))
+            block->count++;
     }
 }
 
-/* The valid triangles of all parts, in order; UINT32_MAX without memory. Cancelled, it is some of
- * them: the build that follows looks again. */
+/* Refs to the valid triangles of all parts, in order, clustered; their number, UINT32_MAX without
+ * memory. Cancelled, it is some of them: the build that follows looks again. */
 static uint32_t refs_collect(const struct create_job *c, const struct trc_part *parts,
-                             uint32_t part_count, struct trc_ref *refs) {
+                             uint32_t part_count, struct trc_ref *refs,
+                             uint32_t *triangle_count_out) {
     uint32_t block_count = 0, at = 0;
     for (uint32_t i = 0; i < part_count; i++)
         block_count += (parts[i].mesh->triangle_count + BLOCK_TRIANGLES - 1) / BLOCK_TRIANGLES;
@@ -98,10 +103,12 @@ static uint32_t refs_collect(const struct create_job *c, const struct trc_part *
     struct ref_job job = {parts, c->options->cancel, refs, blocks};
     trc_pool_run(c->pool, block_count, block_task, &job);
     uint32_t count = 0;
+    *triangle_count_out = 0;
     for (uint32_t i = 0; i < block_count; i++) {
         if (count != blocks[i].at)
             memmove(refs + count, refs + blocks[i].at, blocks[i].count * sizeof *refs);
         count += blocks[i].count;
+        *triangle_count_out += blocks[i].triangles;
     }
     trc_free(blocks);
     return count;
@@ -120,8 +127,11 @@ static trc_status tree_build(struct create_job *job, const struct trc_part *part
     if (!refs)
         return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory to build a tree of %llu triangles",
                         (unsigned long long)total);
-    const uint32_t count = refs_collect(job, parts, part_count, refs);
-    if (count == UINT32_MAX) {
+    uint32_t triangle_count;
+    const uint32_t count = refs_collect(job, parts, part_count, refs, &triangle_count);
+    struct trc_part_triangle *triangles = trc_alloc(total ? total : 1, sizeof *triangles);
+    if (count == UINT32_MAX || !triangles) {
+        trc_free(triangles);
         trc_free(refs);
         return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory to build a tree of %llu triangles",
                         (unsigned long long)total);
@@ -130,15 +140,17 @@ static trc_status tree_build(struct create_job *job, const struct trc_part *part
     trc_status status =
         trc_topology_build(refs, count, TRC_NODE_WIDTH, job->pool, job->options->cancel, &topology);
     if (status == TRC_OK) {
-        status = trc_tree_fill(&topology, refs, count, parts, key_count, job->pool,
+        trc_clusters_open(&topology, refs, triangles);
+        status = trc_tree_fill(&topology, triangles, triangle_count, parts, key_count, job->pool,
                                job->options->cancel, tree);
         trc_topology_destroy(&topology);
     }
+    trc_free(triangles);
     trc_free(refs);
     if (status != TRC_OK)
         return status;
-    tree->triangle_count = count;
-    tree->skipped_count = total - count;
+    tree->triangle_count = triangle_count;
+    tree->skipped_count = total - triangle_count;
     job->stats->built_count++;
     return TRC_OK;
 }

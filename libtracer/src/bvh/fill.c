@@ -93,10 +93,10 @@ void trc_tree_destroy(struct trc_tree *tree) {
 
 struct fill_job {
     /* What stands where: as in a tree that is refitted, all of parts[0], or by a topology, with
-     * refs by slot. */
+     * triangles by slot. */
     const struct trc_tree *from;
     const struct trc_topology *topology;
-    const struct trc_ref *refs;
+    const struct trc_part_triangle *triangles;
     const struct trc_part *parts;
     struct trc_tree *tree;
     const atomic_uint *cancel;        /* may be NULL */
@@ -117,13 +117,13 @@ static const struct trc_part *slot_fill(struct fill_job *job, uint32_t slot) {
         job->tree->slots[slot] = job->from->slots[slot];
         return job->parts;
     }
-    const struct trc_ref *ref = &job->refs[slot];
-    const struct trc_part *part = &job->parts[ref->part];
-    const bool transparent = part_is_transparent(part, ref->primitive);
+    const uint32_t triangle = job->triangles[slot].triangle;
+    const struct trc_part *part = &job->parts[job->triangles[slot].part];
+    const bool transparent = part_is_transparent(part, triangle);
     if (transparent)
         atomic_store_explicit(&job->transparent, true, memory_order_relaxed);
-    job->tree->slots[slot] = (struct trc_slot){
-        part->instance | (transparent ? TRC_SLOT_TRANSPARENT : 0u), ref->primitive};
+    job->tree->slots[slot] =
+        (struct trc_slot){part->instance | (transparent ? TRC_SLOT_TRANSPARENT : 0u), triangle};
     return part;
 }
 
@@ -231,9 +231,6 @@ static void tree_finish(struct trc_tree *tree, double area_sum) {
     tree->sah_cost = root_area > 0.0f ? (float)(area_sum / root_area) : 0.0f;
 }
 
-static bool is_leaf(uint32_t ref) { return ref != TRC_REF_EMPTY && (ref & TRC_REF_LEAF); }
-static bool is_node(uint32_t ref) { return !(ref & TRC_REF_LEAF); } /* the empty one has it too */
-
 /* A node's references to its children: copied as its boxes are filled, so that its memory is met
  * once, and by all threads. */
 static void header_fill(struct fill_job *job, uint32_t n) {
@@ -252,21 +249,21 @@ static void leaves_fill(struct fill_job *job, uint32_t node) {
     const uint32_t *children = trc_node_children(tree, node);
     struct source sources[TRC_NODE_WIDTH * LOAD_SLOTS], *end = sources;
     for (uint32_t i = 0; i < TRC_NODE_WIDTH; i++)
-        if (is_leaf(children[i]))
+        if (trc_is_leaf(children[i]))
             end = leaf_gather(job, children[i], end);
     const struct source *at = sources;
     for (uint32_t i = 0; i < TRC_NODE_WIDTH; i++) {
         float lower[3], upper[3];
-        if (is_node(children[i]))
+        if (trc_is_node(children[i]))
             continue;
         for (uint32_t key = 0; key < tree->key_count; key++) {
-            if (is_leaf(children[i]) && !leaf_fill(tree, children[i], key, at, lower, upper))
+            if (trc_is_leaf(children[i]) && !leaf_fill(tree, children[i], key, at, lower, upper))
                 atomic_store_explicit(&job->spoiled, true, memory_order_relaxed);
             if (children[i] == TRC_REF_EMPTY)
                 empty_bounds(lower, upper);
             child_store(tree, node, i, key, lower, upper);
         }
-        if (is_leaf(children[i]))
+        if (trc_is_leaf(children[i]))
             at += trc_leaf_count(children[i]);
     }
 }
@@ -275,7 +272,7 @@ static void leaves_fill(struct fill_job *job, uint32_t node) {
 static void nodes_bound(struct trc_tree *tree, uint32_t node) {
     const uint32_t *children = trc_node_children(tree, node);
     for (uint32_t i = 0; i < TRC_NODE_WIDTH; i++)
-        for (uint32_t key = 0; is_node(children[i]) && key < tree->key_count; key++) {
+        for (uint32_t key = 0; trc_is_node(children[i]) && key < tree->key_count; key++) {
             float lower[3], upper[3];
             node_bounds(tree, children[i], key, lower, upper);
             child_store(tree, node, i, key, lower, upper);
@@ -300,7 +297,7 @@ static void fill_task(void *context, uint32_t index, uint32_t worker) {
         leaves_fill(job, n);
         job->pending[n] = false;
         for (int i = 0; i < TRC_NODE_WIDTH; i++)
-            if (is_node(children[i]) && (children[i] >= end || job->pending[children[i]]))
+            if (trc_is_node(children[i]) && (children[i] >= end || job->pending[children[i]]))
                 job->pending[n] = true;
         if (job->pending[n])
             continue;
@@ -337,7 +334,7 @@ static trc_status nodes_fill(struct fill_job *job, uint32_t task_count, struct t
             nodes_bound(tree, n);
             sum += children_area(tree, n);
         }
-    for (uint32_t key = 0; is_node(tree->root) && key < tree->key_count; key++) {
+    for (uint32_t key = 0; trc_is_node(tree->root) && key < tree->key_count; key++) {
         float lower[3], upper[3];
         node_bounds(tree, tree->root, key, lower, upper);
         bounds_grow(tree, lower, upper);
@@ -358,7 +355,7 @@ static trc_status tree_fill(struct fill_job *job, struct trc_pool *pool) {
     if (!job->pending || !job->area_sums)
         status = trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory to fill a tree of %u nodes",
                           tree->node_count);
-    if (status == TRC_OK && is_leaf(tree->root))
+    if (status == TRC_OK && trc_is_leaf(tree->root))
         root_leaf_fill(job);
     if (status == TRC_OK)
         status = nodes_fill(job, task_count, pool);
@@ -367,15 +364,19 @@ static trc_status tree_fill(struct fill_job *job, struct trc_pool *pool) {
     return status;
 }
 
-trc_status trc_tree_fill(const struct trc_topology *topology, const struct trc_ref *refs,
-                         uint32_t count, const struct trc_part *parts, uint32_t key_count,
-                         struct trc_pool *pool, const atomic_uint *cancel, struct trc_tree *tree) {
+trc_status trc_tree_fill(const struct trc_topology *topology,
+                         const struct trc_part_triangle *triangles, uint32_t count,
+                         const struct trc_part *parts, uint32_t key_count, struct trc_pool *pool,
+                         const atomic_uint *cancel, struct trc_tree *tree) {
     const trc_status status = tree_alloc(tree, topology->node_count, count, key_count, false);
     if (status != TRC_OK)
         return status;
     tree->root = topology->root;
-    struct fill_job job = {
-        .topology = topology, .refs = refs, .parts = parts, .tree = tree, .cancel = cancel};
+    struct fill_job job = {.topology = topology,
+                           .triangles = triangles,
+                           .parts = parts,
+                           .tree = tree,
+                           .cancel = cancel};
     const trc_status filled = tree_fill(&job, pool);
     tree->has_transparent = job.transparent;
     if (filled != TRC_OK)
@@ -414,11 +415,11 @@ trc_status trc_tree_fill_top(const struct trc_topology *topology, const struct t
         for (uint32_t i = 0; i < TRC_NODE_WIDTH; i++) {
             float lower[3], upper[3];
             const uint32_t ref = children[i];
-            if (is_leaf(ref)) {
+            if (trc_is_leaf(ref)) {
                 const struct trc_ref *r = &refs[trc_leaf_first(ref)];
                 memcpy(lower, r->lower, sizeof lower);
                 memcpy(upper, r->upper, sizeof upper);
-            } else if (is_node(ref)) {
+            } else if (trc_is_node(ref)) {
                 node_bounds(tree, ref, 0, lower, upper);
             } else {
                 empty_bounds(lower, upper);

@@ -31,8 +31,9 @@ static inline f4 ref_upper(const struct trc_ref *r) {
 static inline f4 ref_centroid(const struct trc_ref *r) { return ref_lower(r) + ref_upper(r); }
 
 struct trc_range trc_range_measure(const struct trc_ref *refs, uint32_t begin, uint32_t end) {
-    struct trc_range r = {begin, end, box_empty(), box_empty()};
+    struct trc_range r = {begin, end, 0, box_empty(), box_empty()};
     for (uint32_t i = begin; i < end; i++) {
+        r.triangles += trc_ref_count(&refs[i]);
         box_grow(&r.bounds, (struct box){ref_lower(&refs[i]), ref_upper(&refs[i])});
         box_add(&r.centroids, ref_centroid(&refs[i]));
     }
@@ -54,10 +55,16 @@ static inline bool is_left(const struct trc_split *s, const struct trc_ref *r) {
     return place_of(s, r, s->axis) < (float)s->bin;
 }
 
+/* Refs in the upper half, their triangles in the lower one: both are counted in one step. */
+typedef uint64_t tally;
+static inline tally tally_of(const struct trc_ref *r) { return (1ull << 32) + trc_ref_count(r); }
+static inline uint32_t tally_refs(tally t) { return (uint32_t)(t >> 32); }
+static inline uint32_t tally_triangles(tally t) { return (uint32_t)t; }
+
 /* Of the axes that the split looks at. */
 struct bins {
     struct box box[3][BIN_COUNT];
-    uint32_t count[3][BIN_COUNT];
+    tally count[3][BIN_COUNT];
 };
 
 static void bins_clear(struct bins *bins, const struct trc_split *s) {
@@ -69,9 +76,9 @@ static void bins_clear(struct bins *bins, const struct trc_split *s) {
     }
 }
 
-static inline void bins_put(struct bins *bins, int axis, int bin, struct box box) {
+static inline void bins_put(struct bins *bins, int axis, int bin, struct box box, tally count) {
     box_grow(&bins->box[axis][bin], box);
-    bins->count[axis][bin]++;
+    bins->count[axis][bin] += count;
 }
 
 static void bins_fill(const struct trc_ref *refs, uint32_t begin, uint32_t end,
@@ -83,15 +90,16 @@ static void bins_fill(const struct trc_ref *refs, uint32_t begin, uint32_t end,
             const float place = place_of(s, &refs[i], axis), last = s->last_bin[0];
             const float bin = place < last ? place : last;
             bins_put(bins, axis, bin > 0.0f ? (int)bin : 0,
-                     (struct box){ref_lower(&refs[i]), ref_upper(&refs[i])});
+                     (struct box){ref_lower(&refs[i]), ref_upper(&refs[i])}, tally_of(&refs[i]));
         }
         return;
     }
     for (uint32_t i = begin; i < end; i++) {
         const i4 b = bin_of(s, &refs[i]);
         const struct box box = {ref_lower(&refs[i]), ref_upper(&refs[i])};
+        const tally count = tally_of(&refs[i]);
         for (int axis = 0; axis < 3; axis++)
-            bins_put(bins, axis, b[axis], box);
+            bins_put(bins, axis, b[axis], box, count);
     }
 }
 
@@ -105,9 +113,9 @@ static void bins_sweep(const struct bins *bins, int axis, struct trc_split *s) {
         left_size[i] = box_size(left);
         left_count[i] = (float)before;
         box_grow(&left, bins->box[axis][i]);
-        before += bins->count[axis][i];
+        before += tally_triangles(bins->count[axis][i]);
         box_grow(&right, bins->box[axis][k]);
-        after += bins->count[axis][k];
+        after += tally_triangles(bins->count[axis][k]);
         right_size[k] = box_size(right);
         right_count[k] = (float)after;
     }
@@ -128,16 +136,16 @@ static void bins_sweep(const struct bins *bins, int axis, struct trc_split *s) {
     }
 }
 
-static int bin_count(uint32_t ref_count) {
-    if (ref_count <= TRC_NODE_WIDTH)
+static int bin_count(uint32_t triangles) {
+    if (triangles <= TRC_NODE_WIDTH)
         return LEAF_BINS;
-    return ref_count <= FEW_REFS ? FEW_BINS : BIN_COUNT;
+    return triangles <= FEW_REFS ? FEW_BINS : BIN_COUNT;
 }
 
 /* The bins of a range, before it has a plane. */
 static struct trc_split split_begin(const struct trc_range *r) {
     struct trc_split s = {.axis = -1, .bin = 0, .cost = FLT_MAX};
-    s.bin_count = bin_count(r->end - r->begin);
+    s.bin_count = bin_count(r->triangles);
     s.last_bin = f4_set((float)(s.bin_count - 1));
     const f4 size = r->centroids.upper - r->centroids.lower;
     s.origin = r->centroids.lower;
@@ -164,8 +172,13 @@ static void split_choose(struct trc_split *s, const struct bins *bins) {
     if (s->axis < 0)
         return;
     s->left = s->right = box_empty();
-    for (int i = 0; i < s->bin_count; i++)
-        box_grow(i < s->bin ? &s->left : &s->right, bins->box[s->axis][i]);
+    s->left_triangles = s->right_triangles = 0;
+    for (int i = 0; i < s->bin_count; i++) {
+        const bool is_before = i < s->bin;
+        box_grow(is_before ? &s->left : &s->right, bins->box[s->axis][i]);
+        *(is_before ? &s->left_triangles : &s->right_triangles) +=
+            tally_triangles(bins->count[s->axis][i]);
+    }
 }
 
 struct trc_split trc_split_find(const struct trc_ref *refs, const struct trc_range *r) {
@@ -192,8 +205,8 @@ void trc_split_apply(struct trc_ref *refs, const struct trc_range *r, const stru
         refs[i] = refs[j - 1];
         refs[j - 1] = swap;
     }
-    *left = (struct trc_range){r->begin, i, s->left, before};
-    *right = (struct trc_range){i, r->end, s->right, after};
+    *left = (struct trc_range){r->begin, i, s->left_triangles, s->left, before};
+    *right = (struct trc_range){i, r->end, s->right_triangles, s->right, after};
 }
 
 void trc_split_middle(const struct trc_ref *refs, const struct trc_range *r, struct trc_range *left,
@@ -335,7 +348,7 @@ void trc_split_shared_apply(struct trc_split_blocks *blocks, const struct trc_ra
     for (uint32_t i = 0; i < count; i++) {
         blocks->block[i].left_at = at;
         for (int bin = 0; bin < s->bin; bin++)
-            at += blocks->block[i].bins.count[s->axis][bin];
+            at += tally_refs(blocks->block[i].bins.count[s->axis][bin]);
     }
     const uint32_t middle = at;
     for (uint32_t i = 0; i < count; i++) {
@@ -346,8 +359,8 @@ void trc_split_shared_apply(struct trc_split_blocks *blocks, const struct trc_ra
     }
     blocks_run(blocks, s, move_block);
     blocks_run(blocks, s, return_block);
-    *left = (struct trc_range){r->begin, middle, s->left, box_empty()};
-    *right = (struct trc_range){middle, r->end, s->right, box_empty()};
+    *left = (struct trc_range){r->begin, middle, s->left_triangles, s->left, box_empty()};
+    *right = (struct trc_range){middle, r->end, s->right_triangles, s->right, box_empty()};
     for (uint32_t i = 0; i < count; i++) {
         box_grow(&left->centroids, blocks->block[i].before);
         box_grow(&right->centroids, blocks->block[i].after);

@@ -11,6 +11,7 @@
 /* A range of refs that becomes a child. */
 struct trc_range {
     uint32_t begin, end;
+    uint32_t triangles;           /* of its refs */
     struct box bounds, centroids; /* centroids: of lower + upper */
 };
 
@@ -19,10 +20,11 @@ struct trc_split {
     int bin;  /* refs of bins < bin go left */
     int bin_count;
     int first_axis, end_axis; /* those that are looked at */
-    float cost;               /* sum of area * count of both sides */
+    float cost;               /* sum of area * triangles of both sides */
     f4 origin, scale;         /* bin = (centroid - origin) * scale, at most last_bin */
     f4 last_bin;
     struct box left, right;
+    uint32_t left_triangles, right_triangles;
 };
 
 struct trc_range trc_range_measure(const struct trc_ref *refs, uint32_t begin, uint32_t end);

@@ -100,6 +100,11 @@ static inline const float *trc_node_bounds(const struct trc_tree *t, uint32_t no
     return (const float *)(t->nodes + (size_t)node * t->node_stride + TRC_NODE_HEADER_BYTES +
                            (size_t)key * TRC_NODE_KEY_BYTES);
 }
+static inline bool trc_is_leaf(uint32_t ref) {
+    return ref != TRC_REF_EMPTY && (ref & TRC_REF_LEAF);
+}
+/* The empty one is neither. */
+static inline bool trc_is_node(uint32_t ref) { return !(ref & TRC_REF_LEAF); }
 static inline uint32_t trc_leaf_first(uint32_t ref) { return ref & TRC_REF_INDEX_MASK; }
 static inline uint32_t trc_leaf_count(uint32_t ref) { return ((ref >> 28) & 7u) + 1u; }
 static inline uint32_t trc_leaf_ref(uint32_t first, uint32_t count) {
@@ -120,7 +125,21 @@ struct trc_ref {
     float lower[3];
     uint32_t part; /* index of the part, see below; TLAS: unused */
     float upper[3];
-    uint32_t primitive; /* triangle of the part's mesh; TLAS: item */
+    /* First triangle of the part's mesh, and in bits 28-31 how many follow it (bvh/cluster.h);
+     * TLAS: item. */
+    uint32_t primitive;
+};
+#define TRC_REF_NEXT 0x10000000u
+static inline uint32_t trc_ref_first(const struct trc_ref *r) {
+    return r->primitive & (TRC_REF_NEXT - 1);
+}
+static inline uint32_t trc_ref_count(const struct trc_ref *r) {
+    return r->primitive / TRC_REF_NEXT + 1;
+}
+
+/* What stands in a slot. */
+struct trc_part_triangle {
+    uint32_t part, triangle;
 };
 
 /* A mesh as it stands in a tree. */
@@ -132,7 +151,7 @@ struct trc_part {
     uint32_t slot_count;
 };
 
-/* Shape of the tree over refs (reordered: slot i is ref i): nodes without bounds. */
+/* Shape of the tree over refs (reordered: leaves are ranges of them): nodes without bounds. */
 struct trc_topology {
     uint32_t node_count;
     uint32_t root;
@@ -140,8 +159,8 @@ struct trc_topology {
 };
 
 /* Binned SAH (Wald, "On fast construction of SAH-based bounding volume hierarchies", 2007), opened
- * to 8 children by largest area. leaf_size: most refs of a leaf, 1..8. Same result for any thread
- * count. */
+ * to 8 children by largest area. leaf_size: most triangles of a leaf, 1..8. Same result for any
+ * thread count. */
 trc_status trc_topology_build(struct trc_ref *refs, uint32_t count, uint32_t leaf_size,
                               struct trc_pool *pool, const atomic_uint *cancel,
                               struct trc_topology *out);
@@ -152,10 +171,12 @@ void trc_topology_destroy(struct trc_topology *topology);
 void trc_part_triangle(const struct trc_part *part, uint32_t triangle, uint32_t key,
                        float out[3][3]);
 
-/* A tree of that shape over count refs, with its vertices, bounds and SAH cost. */
-trc_status trc_tree_fill(const struct trc_topology *topology, const struct trc_ref *refs,
-                         uint32_t count, const struct trc_part *parts, uint32_t key_count,
-                         struct trc_pool *pool, const atomic_uint *cancel, struct trc_tree *tree);
+/* A tree of that shape, whose leaves are ranges of count slots, with its vertices, bounds and SAH
+ * cost. */
+trc_status trc_tree_fill(const struct trc_topology *topology,
+                         const struct trc_part_triangle *triangles, uint32_t count,
+                         const struct trc_part *parts, uint32_t key_count, struct trc_pool *pool,
+                         const atomic_uint *cancel, struct trc_tree *tree);
 
 /* The same tree with other positions of the same topology: a copy of *from, refilled and bounded.
  * Its extent is infinite if a position is not finite. */
