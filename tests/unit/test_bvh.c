@@ -61,35 +61,16 @@ static void clusters_are_what_has_a_box_in_common(void **state) {
     assert_false(trc_cluster_join(&refs[5], &refs[6]));
 }
 
-/* Each triangle of the refs once, in the leaf that had its ref. */
 static void clusters_open_into_slots(void **state) {
     (void)state;
-    struct trc_ref refs[] = {{.primitive = 5 | TRC_REF_NEXT}, /* 5, 6 */
-                             {.part = 1, .primitive = 9},
-                             {.primitive = 7 | 3 * TRC_REF_NEXT}, /* 7 to 10 */
-                             {.part = 2, .primitive = 0}};
-    uint32_t nodes[2][TRC_NODE_WIDTH];
-    for (int i = 0; i < TRC_NODE_WIDTH; i++)
-        nodes[0][i] = nodes[1][i] = TRC_REF_EMPTY;
-    nodes[0][0] = trc_leaf_ref(2, 2);
-    nodes[0][1] = 1;
-    nodes[1][4] = trc_leaf_ref(0, 1);
-    nodes[1][5] = trc_leaf_ref(1, 1);
-    struct trc_topology topology = {.node_count = 2, .children = nodes};
-    static const struct trc_part_triangle expected[] = {{0, 7}, {0, 8}, {0, 9}, {0, 10},
-                                                        {2, 0}, {0, 5}, {0, 6}, {1, 9}};
-    struct trc_part_triangle triangles[8];
-    trc_clusters_open(&topology, refs, triangles);
+    const struct trc_ref refs[] = {{.primitive = 5 | TRC_REF_NEXT}, /* 5, 6 */
+                                   {.part = 1, .primitive = 9},
+                                   {.primitive = 7 | 3 * TRC_REF_NEXT}}; /* 7 to 10 */
+    static const struct trc_part_triangle expected[] = {{0, 5}, {0, 6}, {1, 9}, {0, 7},
+                                                        {0, 8}, {0, 9}, {0, 10}};
+    struct trc_part_triangle triangles[7];
+    trc_clusters_open(refs, 3, triangles);
     assert_memory_equal(triangles, expected, sizeof expected);
-    assert_int_equal(nodes[0][0], trc_leaf_ref(0, 5));
-    assert_int_equal(nodes[0][1], 1);
-    assert_int_equal(nodes[1][4], trc_leaf_ref(5, 2));
-    assert_int_equal(nodes[1][5], trc_leaf_ref(7, 1));
-    assert_int_equal(nodes[1][0], TRC_REF_EMPTY);
-    topology = (struct trc_topology){.root = trc_leaf_ref(0, 2)};
-    trc_clusters_open(&topology, refs, triangles);
-    assert_int_equal(topology.root, trc_leaf_ref(0, 3));
-    assert_memory_equal(triangles, expected + 5, 3 * sizeof *expected);
 }
 
 /* ---- splits ---- */
@@ -109,6 +90,7 @@ static void expect_box(struct box a, struct box b) {
 static void expect_range(const struct trc_range *a, const struct trc_range *b) {
     assert_int_equal(a->begin, b->begin);
     assert_int_equal(a->end, b->end);
+    assert_int_equal(a->first_slot, b->first_slot);
     assert_int_equal(a->triangles, b->triangles);
     expect_box(a->bounds, b->bounds);
     expect_box(a->centroids, b->centroids);
@@ -136,7 +118,9 @@ static void shared_splits_are_the_same(void **state) {
         assert_int_equal(trc_pool_create(3, &pool), TRC_OK);
         struct trc_split_blocks *blocks = trc_split_blocks_create(shared, count, pool, NULL);
         assert_non_null(blocks);
-        const struct trc_range all = trc_range_measure(refs, 0, count);
+        const struct trc_range all = trc_range_measure(refs, 0, count, 0),
+                               all_shared = trc_split_shared_measure(blocks, count);
+        expect_range(&all, &all_shared);
         const struct trc_split s = trc_split_find(refs, &all),
                                other = trc_split_shared_find(blocks, &all);
         assert_true(s.axis >= 0 && s.axis == other.axis && s.bin == other.bin);
@@ -152,9 +136,9 @@ static void shared_splits_are_the_same(void **state) {
         qsort(refs, left.end, sizeof *refs, compare_primitives);
         qsort(refs + left.end, count - left.end, sizeof *refs, compare_primitives);
         assert_memory_equal(refs, shared, bytes);
-        struct trc_range measured = trc_range_measure(refs, left.begin, left.end);
+        struct trc_range measured = trc_range_measure(refs, left.begin, left.end, 0);
         expect_range(&left, &measured);
-        measured = trc_range_measure(refs, right.begin, right.end);
+        measured = trc_range_measure(refs, right.begin, right.end, left.triangles);
         expect_range(&right, &measured);
         trc_split_blocks_destroy(blocks);
         trc_pool_destroy(pool);

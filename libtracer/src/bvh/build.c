@@ -145,7 +145,7 @@ static uint32_t build_range(struct builder *b, struct arena *a, const struct trc
         return TRC_REF_EMPTY;
     const int count = range_open(b, r, level, child);
     if (count == 1)
-        return trc_leaf_ref(r->begin, r->end - r->begin);
+        return trc_leaf_ref(r->first_slot, r->triangles);
     const uint32_t node = arena_node(a);
     if (a->failed)
         return TRC_REF_EMPTY;
@@ -225,7 +225,8 @@ trc_status trc_topology_build(struct trc_ref *refs, uint32_t count, uint32_t lea
     const bool shared = count > TRC_SHARED_RANGE;
     if (shared && !(b.blocks = trc_split_blocks_create(refs, count, pool, cancel)))
         return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory to build over %u primitives", count);
-    const struct trc_range all = trc_range_measure(refs, 0, count);
+    const struct trc_range all =
+        shared ? trc_split_shared_measure(b.blocks, count) : trc_range_measure(refs, 0, count, 0);
     const uint32_t root = build_range(&b, &top, &all, 0, shared);
     if (!top.failed && !b.failed)
         trc_pool_run(pool, b.task_count, task_run, &b);

@@ -27,28 +27,10 @@ bool trc_cluster_join(struct trc_ref *former, const struct trc_ref *next) {
     return true;
 }
 
-/* Appends the triangles of a leaf's refs; its reference by slots. */
-static uint32_t leaf_open(uint32_t leaf, const struct trc_ref *refs, uint32_t *slot_in_out,
-                          struct trc_part_triangle *triangles_out) {
-    const struct trc_ref *ref = refs + trc_leaf_first(leaf), *end = ref + trc_leaf_count(leaf);
-    const uint32_t first = *slot_in_out;
-    uint32_t slot = first;
-    for (; ref < end; ref++)
-        for (uint32_t i = 0; i < trc_ref_count(ref); i++)
-            triangles_out[slot++] = (struct trc_part_triangle){ref->part, trc_ref_first(ref) + i};
-    *slot_in_out = slot;
-    return trc_leaf_ref(first, slot - first);
-}
-
-void trc_clusters_open(struct trc_topology *topology, const struct trc_ref *refs,
+void trc_clusters_open(const struct trc_ref *refs, uint32_t count,
                        struct trc_part_triangle *triangles_out) {
-    uint32_t slot = 0;
-    if (trc_is_leaf(topology->root))
-        topology->root = leaf_open(topology->root, refs, &slot, triangles_out);
-    for (uint32_t node = 0; node < topology->node_count; node++)
-        for (int i = 0; i < TRC_NODE_WIDTH; i++) {
-            uint32_t *child = &topology->children[node][i];
-            if (trc_is_leaf(*child))
-                *child = leaf_open(*child, refs, &slot, triangles_out);
-        }
+    for (uint32_t i = 0; i < count; i++)
+        for (uint32_t k = 0; k < trc_ref_count(&refs[i]); k++)
+            *triangles_out++ =
+                (struct trc_part_triangle){refs[i].part, trc_ref_first(&refs[i]) + k};
 }

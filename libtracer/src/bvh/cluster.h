@@ -13,9 +13,8 @@
  * good as both apart. */
 bool trc_cluster_join(struct trc_ref *former, const struct trc_ref *next);
 
-/* Leaves of a topology, ranges of refs so far, become ranges of slots, in the order of the nodes.
- * triangles_out: by slot. */
-void trc_clusters_open(struct trc_topology *topology, const struct trc_ref *refs,
+/* The triangles of count refs in order: what stands in the slots of a tree over them. */
+void trc_clusters_open(const struct trc_ref *refs, uint32_t count,
                        struct trc_part_triangle *triangles_out);
 
 #endif

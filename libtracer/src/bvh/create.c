@@ -140,7 +140,7 @@ static trc_status tree_build(struct create_job *job, const struct trc_part *part
     trc_status status =
         trc_topology_build(refs, count, TRC_NODE_WIDTH, job->pool, job->options->cancel, &topology);
     if (status == TRC_OK) {
-        trc_clusters_open(&topology, refs, triangles);
+        trc_clusters_open(refs, count, triangles);
         status = trc_tree_fill(&topology, triangles, triangle_count, parts, key_count, job->pool,
                                job->options->cancel, tree);
         trc_topology_destroy(&topology);

@@ -30,8 +30,9 @@ static inline f4 ref_upper(const struct trc_ref *r) {
 /* Twice the middle of its box. */
 static inline f4 ref_centroid(const struct trc_ref *r) { return ref_lower(r) + ref_upper(r); }
 
-struct trc_range trc_range_measure(const struct trc_ref *refs, uint32_t begin, uint32_t end) {
-    struct trc_range r = {begin, end, 0, box_empty(), box_empty()};
+struct trc_range trc_range_measure(const struct trc_ref *refs, uint32_t begin, uint32_t end,
+                                   uint32_t first_slot) {
+    struct trc_range r = {begin, end, first_slot, 0, box_empty(), box_empty()};
     for (uint32_t i = begin; i < end; i++) {
         r.triangles += trc_ref_count(&refs[i]);
         box_grow(&r.bounds, (struct box){ref_lower(&refs[i]), ref_upper(&refs[i])});
@@ -189,6 +190,17 @@ struct trc_split trc_split_find(const struct trc_ref *refs, const struct trc_ran
     return s;
 }
 
+/* Both sides of a plane, refs from middle on being the right ones; their centroids are not known.
+ */
+static void range_divide(const struct trc_range *r, const struct trc_split *s, uint32_t middle,
+                         struct trc_range *left, struct trc_range *right) {
+    *left = (struct trc_range){r->begin,          middle,  r->first_slot,
+                               s->left_triangles, s->left, box_empty()};
+    *right = (struct trc_range){
+        middle,   r->end,     r->first_slot + s->left_triangles, s->right_triangles,
+        s->right, box_empty()};
+}
+
 /* Measures both sides' centroids on the way. */
 void trc_split_apply(struct trc_ref *refs, const struct trc_range *r, const struct trc_split *s,
                      struct trc_range *left, struct trc_range *right) {
@@ -205,15 +217,16 @@ void trc_split_apply(struct trc_ref *refs, const struct trc_range *r, const stru
         refs[i] = refs[j - 1];
         refs[j - 1] = swap;
     }
-    *left = (struct trc_range){r->begin, i, s->left_triangles, s->left, before};
-    *right = (struct trc_range){i, r->end, s->right_triangles, s->right, after};
+    range_divide(r, s, i, left, right);
+    left->centroids = before;
+    right->centroids = after;
 }
 
 void trc_split_middle(const struct trc_ref *refs, const struct trc_range *r, struct trc_range *left,
                       struct trc_range *right) {
     const uint32_t middle = r->begin + (r->end - r->begin) / 2;
-    *left = trc_range_measure(refs, r->begin, middle);
-    *right = trc_range_measure(refs, middle, r->end);
+    *left = trc_range_measure(refs, r->begin, middle, r->first_slot);
+    *right = trc_range_measure(refs, middle, r->end, r->first_slot + left->triangles);
 }
 
 /* ---- by all threads ---- */
@@ -224,6 +237,7 @@ void trc_split_middle(const struct trc_ref *refs, const struct trc_range *r, str
 #define LEAST_BLOCK 2048
 
 struct split_block {
+    struct trc_range range; /* as measured */
     struct bins bins;
     uint32_t left_at, right_at; /* where its refs of either side go */
     struct box before, after;   /* centroids of either side */
@@ -271,10 +285,10 @@ static uint32_t block_end(const struct trc_split_blocks *b, uint32_t block) {
     return end < b->end ? end : b->end;
 }
 
-static void blocks_cut(struct trc_split_blocks *b, const struct trc_range *r) {
-    const uint32_t count = r->end - r->begin, share = (count + MOST_BLOCKS - 1) / MOST_BLOCKS;
-    b->begin = r->begin;
-    b->end = r->end;
+static void blocks_cut(struct trc_split_blocks *b, uint32_t begin, uint32_t end) {
+    const uint32_t count = end - begin, share = (count + MOST_BLOCKS - 1) / MOST_BLOCKS;
+    b->begin = begin;
+    b->end = end;
     b->block_size = share > LEAST_BLOCK ? share : LEAST_BLOCK;
     b->block_count = (count + b->block_size - 1) / b->block_size;
 }
@@ -286,6 +300,25 @@ static void blocks_run(struct trc_split_blocks *b, const struct trc_split *s,
 }
 
 static bool is_cancelled(const struct trc_split_blocks *b) { return b->cancel && *b->cancel; }
+
+static void measure_block(void *context, uint32_t index, uint32_t worker) {
+    struct trc_split_blocks *b = context;
+    (void)worker;
+    b->block[index].range =
+        trc_range_measure(b->refs, block_begin(b, index), block_end(b, index), 0);
+}
+
+struct trc_range trc_split_shared_measure(struct trc_split_blocks *blocks, uint32_t count) {
+    struct trc_range all = {0, count, 0, 0, box_empty(), box_empty()};
+    blocks_cut(blocks, 0, count);
+    blocks_run(blocks, NULL, measure_block);
+    for (uint32_t i = 0; i < blocks->block_count; i++) {
+        all.triangles += blocks->block[i].range.triangles;
+        box_grow(&all.bounds, blocks->block[i].range.bounds);
+        box_grow(&all.centroids, blocks->block[i].range.centroids);
+    }
+    return all;
+}
 
 static void fill_block(void *context, uint32_t index, uint32_t worker) {
     struct trc_split_blocks *b = context;
@@ -306,7 +339,7 @@ static void bins_add(struct bins *to, const struct bins *from, const struct trc_
 struct trc_split trc_split_shared_find(struct trc_split_blocks *blocks, const struct trc_range *r) {
     struct trc_split s = split_begin(r);
     struct bins all;
-    blocks_cut(blocks, r);
+    blocks_cut(blocks, r->begin, r->end);
     blocks_run(blocks, &s, fill_block);
     bins_clear(&all, &s);
     for (uint32_t i = 0; i < blocks->block_count; i++)
@@ -359,8 +392,7 @@ void trc_split_shared_apply(struct trc_split_blocks *blocks, const struct trc_ra
     }
     blocks_run(blocks, s, move_block);
     blocks_run(blocks, s, return_block);
-    *left = (struct trc_range){r->begin, middle, s->left_triangles, s->left, box_empty()};
-    *right = (struct trc_range){middle, r->end, s->right_triangles, s->right, box_empty()};
+    range_divide(r, s, middle, left, right);
     for (uint32_t i = 0; i < count; i++) {
         box_grow(&left->centroids, blocks->block[i].before);
         box_grow(&right->centroids, blocks->block[i].after);

@@ -11,6 +11,7 @@
 /* A range of refs that becomes a child. */
 struct trc_range {
     uint32_t begin, end;
+    uint32_t first_slot;          /* triangles of all refs before */
     uint32_t triangles;           /* of its refs */
     struct box bounds, centroids; /* centroids: of lower + upper */
 };
@@ -27,7 +28,8 @@ struct trc_split {
     uint32_t left_triangles, right_triangles;
 };
 
-struct trc_range trc_range_measure(const struct trc_ref *refs, uint32_t begin, uint32_t end);
+struct trc_range trc_range_measure(const struct trc_ref *refs, uint32_t begin, uint32_t end,
+                                   uint32_t first_slot);
 
 /* The cheapest plane; no two refs may stand on different sides of any. */
 struct trc_split trc_split_find(const struct trc_ref *refs, const struct trc_range *r);
@@ -51,6 +53,9 @@ struct trc_split_blocks;
 struct trc_split_blocks *trc_split_blocks_create(struct trc_ref *refs, uint32_t count,
                                                  struct trc_pool *pool, const atomic_uint *cancel);
 void trc_split_blocks_destroy(struct trc_split_blocks *blocks);
+
+/* All refs from the first on, as trc_range_measure does. */
+struct trc_range trc_split_shared_measure(struct trc_split_blocks *blocks, uint32_t count);
 
 /* The same split as trc_split_find's. trc_split_shared_apply is then to be called for it, if any,
  * before the next search; it keeps the refs of a side in their order. Cancelled, both leave the

@@ -151,7 +151,8 @@ struct trc_part {
     uint32_t slot_count;
 };
 
-/* Shape of the tree over refs (reordered: leaves are ranges of them): nodes without bounds. */
+/* Shape of the tree over refs (reordered: slots are their triangles, in order): nodes without
+ * bounds. */
 struct trc_topology {
     uint32_t node_count;
     uint32_t root;
