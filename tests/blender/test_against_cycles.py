@@ -449,17 +449,6 @@ _LATER_MATERIALS = {
 _MATERIALS.update(_LATER_MATERIALS)
 
 
-def _has(node_type, inputs):
-    """Whether this Blender has such a node with these sockets."""
-    import bpy
-    if not hasattr(bpy.types, node_type):
-        return False
-    tree = bpy.data.node_groups.new("Asked", "ShaderNodeTree")
-    sockets = tree.nodes.new(node_type).inputs.keys()
-    bpy.data.node_groups.remove(tree)
-    return all(name in sockets for name in inputs)
-
-
 def inside_light(names):
     """Channel means of both engines for each kind of light and each material."""
     import bpy
@@ -470,7 +459,7 @@ def inside_light(names):
         _, ball = _stage()
         if name in _MATERIALS:
             node_type, inputs, *settings = _MATERIALS[name]
-            if not _has(node_type, inputs):
+            if not scenes.has_node(node_type, inputs):
                 continue
             tried = scenes.material("Tried", node_type,
                                     **{k.replace(" ", "_"): v for k, v in inputs.items()})

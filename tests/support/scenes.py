@@ -116,6 +116,16 @@ def light(kind='AREA', location=(0.0, -4.0, 4.0), rotation=(math.pi / 4, 0.0, 0.
     return made
 
 
+def has_node(node_type, inputs=()):
+    """Whether this Blender has such a shader node, with inputs of these names."""
+    if not hasattr(bpy.types, node_type):
+        return False
+    tree = bpy.data.node_groups.new("Asked", "ShaderNodeTree")
+    sockets = tree.nodes.new(node_type).inputs.keys()
+    bpy.data.node_groups.remove(tree)
+    return all(name in sockets for name in inputs)
+
+
 def material(name, node_type, **inputs):
     """A material of one shader node; keywords are its inputs with underscores for spaces."""
     made = bpy.data.materials.new(name)

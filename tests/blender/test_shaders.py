@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every shader over a grid of its parameters beside Cycles with diffuse bounces 0: balls side by side under
+an area light and an even world. Means within 1 %, and no part of a ball that several seeds find off by as
+much. The table of all goes to results/shaders.txt of the build."""
+
+import itertools
+import os
+
+import numpy as np
+import pytest
+
+import compare
+
+GRID = 6           # balls along each side of a picture
+CELL_PX = 24       # pixels along each side of a ball's cell
+TILE_PX = 8        # parts of a cell that are tested for bias
+SEEDS = (11, 12, 13, 14, 15, 16)
+SAMPLES = 96       # of each seed
+TOLERANCE = 0.01      # relative to the mean of the ball
+SIGNIFICANCE = 0.01
+
+# name: (node, inputs, settings)
+CASES = {}
+
+# What is known to differ more: (largest error of the mean, of a tile, why).
+_MULTIPLE = "light that scatters more than once comes from a table here, from random walks in Cycles 3.4"
+_COAT = "Cycles 3.4 samples its coat by GGX but weighs the samples as GTR1; by lamps alone both agree"
+KNOWN = {
+    "glossy roughness 0.8 distribution ASHIKHMIN_SHIRLEY":
+        (0.02, 0.025, "Cycles keeps rays that go below the faces at the outline; inside it both agree"),
+    "glossy roughness 0.8 distribution MULTI_GGX": (0.025, 0.06, _MULTIPLE),
+    "glass roughness 0.5 ior 1.45": (0.025, 0.05, _MULTIPLE),
+    "principled clearcoat roughness 0.03": (0.015, 0.03, _COAT),
+    "principled clearcoat roughness 0.5": (0.01, 0.015, _COAT),
+}
+
+
+def _add(kind, node, inputs=None, settings=None, **varied):
+    """A case for each combination of the values; capitals are inputs, the rest settings of the node."""
+    for values in itertools.product(*varied.values()):
+        own = dict(zip(varied, values))
+        name = " ".join([kind] + [f"{key.replace('_', ' ').lower()} {value}" for key, value in own.items()])
+        CASES[name] = (
+            node,
+            {**(inputs or {}), **{key.replace("_", " "): value for key, value in own.items() if key[0].isupper()}},
+            {**(settings or {}), **{key: value for key, value in own.items() if not key[0].isupper()}})
+
+
+_GOLD, _PALE = (0.9, 0.7, 0.5), (0.9, 0.95, 1.0)
+_PRINCIPLED = "ShaderNodeBsdfPrincipled"
+_add("diffuse", "ShaderNodeBsdfDiffuse", {"Color": _GOLD}, Roughness=(0.0, 0.3, 1.0))
+_add("glossy", "ShaderNodeBsdfGlossy", {"Color": _GOLD}, Roughness=(0.1, 0.35, 0.8),
+     distribution=('GGX', 'BECKMANN', 'ASHIKHMIN_SHIRLEY', 'MULTI_GGX'))
+_add("mirror", "ShaderNodeBsdfGlossy", {"Color": _GOLD}, {"distribution": 'SHARP'})
+for _node in ("ShaderNodeBsdfAnisotropic", "ShaderNodeBsdfGlossy"):  # one node from 4.0 on
+    _add(f"{_node[14:].lower()} brushed", _node, {"Color": _GOLD, "Roughness": 0.4}, {"distribution": 'GGX'},
+         Anisotropy=(-0.6, 0.7), Rotation=(0.0, 0.2))
+_add("glass", "ShaderNodeBsdfGlass", {"Color": _PALE}, Roughness=(0.0, 0.15, 0.5), IOR=(1.1, 1.45, 2.2),
+     distribution=('GGX', 'BECKMANN'))
+_add("glass", "ShaderNodeBsdfGlass", {"Color": _PALE}, {"distribution": 'MULTI_GGX'}, Roughness=(0.15, 0.5),
+     IOR=(1.45,))
+_add("refraction", "ShaderNodeBsdfRefraction", {"Color": _PALE}, Roughness=(0.0, 0.3), IOR=(0.8, 1.45),
+     distribution=('GGX', 'BECKMANN'))
+_add("transparent", "ShaderNodeBsdfTransparent", Color=((0.0, 0.0, 0.0), (0.5, 0.7, 0.9)))
+_add("translucent", "ShaderNodeBsdfTranslucent", Color=((0.5, 0.7, 0.9),))
+_add("velvet", "ShaderNodeBsdfVelvet", {"Color": _GOLD}, Sigma=(0.1, 0.4, 1.0))
+_add("sheen", "ShaderNodeBsdfSheen", {"Color": _GOLD}, Roughness=(0.1, 0.5, 1.0))
+_add("toon", "ShaderNodeBsdfToon", {"Color": _GOLD, "Smooth": 0.0}, Size=(0.2, 0.5, 0.9),
+     component=('DIFFUSE', 'GLOSSY'))
+_add("emission", "ShaderNodeEmission", {"Color": _GOLD}, Strength=(0.1, 2.0))
+_add("principled", _PRINCIPLED, {"Base Color": _GOLD}, Metallic=(0.0, 0.5, 1.0), Roughness=(0.1, 0.5, 1.0))
+_add("principled", _PRINCIPLED, {"Base Color": _GOLD, "Roughness": 0.3}, Specular=(0.0, 1.0),
+     Specular_Tint=(0.0, 1.0))
+_add("principled brushed", _PRINCIPLED, {"Base Color": _GOLD, "Roughness": 0.4, "Metallic": 1.0},
+     Anisotropic=(0.4, 0.9), Anisotropic_Rotation=(0.0, 0.3))
+_add("principled", _PRINCIPLED, {"Base Color": _GOLD, "Sheen": 1.0}, Sheen_Tint=(0.0, 1.0))
+_add("principled", _PRINCIPLED, {"Base Color": _GOLD, "Clearcoat": 1.0}, Clearcoat_Roughness=(0.03, 0.5))
+_add("principled", _PRINCIPLED, {"Base Color": _PALE, "Roughness": 0.2}, Transmission=(0.5, 1.0),
+     IOR=(1.2, 1.6))
+_add("principled", _PRINCIPLED, {"Base Color": _GOLD}, Alpha=(0.0, 0.4))
+_add("principled", _PRINCIPLED, {"Base Color": _GOLD, "Emission": (0.2, 0.5, 0.9)}, Emission_Strength=(0.5,))
+# From 4.0 on.
+_add("principled", _PRINCIPLED, {"Base Color": _GOLD, "Roughness": 0.3}, Specular_IOR_Level=(0.0, 1.0),
+     Specular_Tint=((1.0, 1.0, 1.0), (1.0, 0.4, 0.2)), IOR=(1.2, 2.0))
+_add("principled", _PRINCIPLED, {"Base Color": _GOLD, "Sheen Weight": 1.0}, Sheen_Roughness=(0.2, 0.8))
+_add("principled", _PRINCIPLED, {"Base Color": _GOLD, "Coat Weight": 1.0}, Coat_Roughness=(0.03, 0.5),
+     Coat_Tint=((1.0, 1.0, 1.0), (0.3, 0.8, 0.9)), Coat_IOR=(1.3, 2.0))
+_add("principled", _PRINCIPLED, {"Base Color": _PALE}, Transmission_Weight=(0.5, 1.0), IOR=(1.2, 1.6),
+     Roughness=(0.0, 0.3))
+_add("principled", _PRINCIPLED, {"Base Color": _GOLD}, Diffuse_Roughness=(0.3, 1.0))
+_add("metallic", "ShaderNodeBsdfMetallic", {"Base Color": _GOLD, "Edge Tint": (0.5, 0.7, 0.9)},
+     {"fresnel_type": 'F82'}, Roughness=(0.1, 0.4, 0.9), Anisotropy=(0.0, 0.6))
+
+
+# Inside Blender ------------------------------------------------------------------------------------
+
+def _stage():
+    import bpy
+    import scenes
+    side = GRID * CELL_PX
+    scene = scenes.empty(size=(side, side))
+    scenes.camera(location=(0.0, -20.0, 0.0), type='ORTHO', ortho_scale=float(GRID))
+    scenes.light('AREA', location=(-6.0, -9.0, 8.0), rotation=(0.9, 0.0, -0.6), energy=1500.0, size=4.0)
+    scene.world.color = (0.35, 0.4, 0.5)
+    bpy.context.scene.volley.clamp_indirect = 0.0
+    bpy.context.scene.cycles.sample_clamp_indirect = 0.0
+
+
+def _ball(number, name, case):
+    """A ball of that shader in its cell; False where this Blender lacks it or one of its settings."""
+    import scenes
+    node_type, inputs, settings = case
+    if not scenes.has_node(node_type, inputs):
+        return False
+    material = scenes.material(name, node_type, **{key.replace(" ", "_"): value for key, value in inputs.items()})
+    shader = next(node for node in material.node_tree.nodes if node.bl_idname == node_type)
+    try:
+        for key, value in settings.items():
+            setattr(shader, key, value)
+    except (AttributeError, TypeError):  # a distribution that came or went
+        return False
+    x, z = number % GRID, number // GRID
+    scenes.sphere(name, 0.42, (x - 0.5 * (GRID - 1), 0.0, z - 0.5 * (GRID - 1)), material)
+    return True
+
+
+def inside_balls():
+    """{case: (pictures by Volley, pictures by Cycles)}, one for each seed."""
+    import bpy
+    import scenes
+    waiting, cells = list(CASES.items()), {}
+    while waiting:
+        _stage()
+        shown = []
+        while waiting and len(shown) < GRID * GRID:
+            name, case = waiting.pop(0)
+            if _ball(len(shown), name, case):
+                shown.append(name)
+        pictures = {}
+        for engine in ('VOLLEY', 'CYCLES'):
+            scenes.set_engine(engine, SAMPLES)
+            for seed in SEEDS:
+                bpy.context.scene.volley.seed = bpy.context.scene.cycles.seed = seed
+                pictures.setdefault(engine, []).append(scenes.render()[..., :3])
+        for number, name in enumerate(shown):
+            x, y = number % GRID * CELL_PX, number // GRID * CELL_PX
+            cells[name] = [np.array([picture[y:y + CELL_PX, x:x + CELL_PX] for picture in pictures[engine]])
+                           for engine in ('VOLLEY', 'CYCLES')]
+    return cells
+
+
+# Comparison ----------------------------------------------------------------------------------------
+
+def _errors(ours, theirs):
+    """Error of the mean, and of the worst tile that the seeds agree on; relative to the ball's mean."""
+    scale = theirs.mean()
+    mean = np.abs(ours.mean(axis=(0, 1, 2)) - theirs.mean(axis=(0, 1, 2))).max() / scale
+    tiles = [np.array([compare.tile_means(picture, TILE_PX) for picture in side]) for side in (ours, theirs)]
+    chance = compare.welch_p_values(*tiles)
+    off = np.abs(tiles[0].mean(axis=0) - tiles[1].mean(axis=0)) / scale
+    return mean, np.where(chance < SIGNIFICANCE / chance.size, off, 0.0).max()
+
+
+@pytest.fixture(scope="module")
+def errors(blender_of_module):
+    """The errors of all cases, from one Blender, and their table."""
+    found = {name: _errors(*pair) for name, pair in blender_of_module.run(inside_balls, timeout=900).items()}
+    lines = [f"{'shader':75} {'mean error':>10} {'biased tile':>11}"]
+    lines += [f"{name:75} {mean:10.3%} {tile:11.3%}  {KNOWN.get(name, ('',))[-1]}".rstrip()
+              for name, (mean, tile) in found.items()]
+    folder = os.path.join(os.environ.get("VOLLEY_BUILD", ""), "results")
+    if os.path.isdir(folder):
+        with open(os.path.join(folder, "shaders.txt"), "w", encoding="utf-8") as file:
+            file.write("\n".join(lines) + "\n")
+    return found
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_against_cycles(errors, name):
+    if name not in errors:
+        pytest.skip("this Blender has no such shader")
+    mean, tile = errors[name]
+    largest_mean, largest_tile, _why = KNOWN.get(name, (TOLERANCE, TOLERANCE, ""))
+    assert mean < largest_mean
+    assert tile < largest_tile
