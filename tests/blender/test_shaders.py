@@ -4,12 +4,11 @@ an area light and an even world. Means within 1 %, and no part of a ball that se
 much. The table of all goes to results/shaders.txt of the build."""
 
 import itertools
-import os
 
+import blender as blender_support
+import compare
 import numpy as np
 import pytest
-
-import compare
 
 GRID = 6           # balls along each side of a picture
 CELL_PX = 24       # pixels along each side of a ball's cell
@@ -17,7 +16,6 @@ TILE_PX = 8        # parts of a cell that are tested for bias
 SEEDS = (11, 12, 13, 14, 15, 16)
 SAMPLES = 96       # of each seed
 TOLERANCE = 0.01      # relative to the mean of the ball
-SIGNIFICANCE = 0.01
 
 # name: (node, inputs, settings)
 CASES = {}
@@ -151,27 +149,15 @@ def inside_balls():
 
 # Comparison ----------------------------------------------------------------------------------------
 
-def _errors(ours, theirs):
-    """Error of the mean, and of the worst tile that the seeds agree on; relative to the ball's mean."""
-    scale = theirs.mean()
-    mean = np.abs(ours.mean(axis=(0, 1, 2)) - theirs.mean(axis=(0, 1, 2))).max() / scale
-    tiles = [np.array([compare.tile_means(picture, TILE_PX) for picture in side]) for side in (ours, theirs)]
-    chance = compare.welch_p_values(*tiles)
-    off = np.abs(tiles[0].mean(axis=0) - tiles[1].mean(axis=0)) / scale
-    return mean, np.where(chance < SIGNIFICANCE / chance.size, off, 0.0).max()
-
-
 @pytest.fixture(scope="module")
 def errors(blender_of_module):
     """The errors of all cases, from one Blender, and their table."""
-    found = {name: _errors(*pair) for name, pair in blender_of_module.run(inside_balls, timeout=900).items()}
+    pictures = blender_of_module.run(inside_balls, timeout=900)
+    found = {name: compare.agreed_errors(*pair, TILE_PX) for name, pair in pictures.items()}
     lines = [f"{'shader':75} {'mean error':>10} {'biased tile':>11}"]
     lines += [f"{name:75} {mean:10.3%} {tile:11.3%}  {KNOWN.get(name, ('',))[-1]}".rstrip()
               for name, (mean, tile) in found.items()]
-    folder = os.path.join(os.environ.get("VOLLEY_BUILD", ""), "results")
-    if os.path.isdir(folder):
-        with open(os.path.join(folder, "shaders.txt"), "w", encoding="utf-8") as file:
-            file.write("\n".join(lines) + "\n")
+    blender_support.write_result("shaders.txt", lines)
     return found
 
 

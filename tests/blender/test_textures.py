@@ -2,8 +2,7 @@
 """Every procedural texture and value node beside Cycles: each wired to Emission on a panel of
 its own, one sample for each pixel. The table of all errors goes to results/textures.txt of the build."""
 
-import os
-
+import blender as blender_support
 import numpy as np
 import pytest
 
@@ -282,10 +281,7 @@ def pictures(blender_of_module):
         error = np.abs(ours - theirs)
         lines.append(f"{name:40} {output:10} {theirs.mean():9.4f} {error.mean():10.2e} "
                      f"{error.max():9.2e} {_beyond(ours, theirs):8.3%}")
-    folder = os.path.join(os.environ.get("VOLLEY_BUILD", ""), "results")
-    if os.path.isdir(folder):
-        with open(os.path.join(folder, "textures.txt"), "w", encoding="utf-8") as file:
-            file.write("\n".join(lines) + "\n")
+    blender_support.write_result("textures.txt", lines)
     return found
 
 

@@ -35,6 +35,14 @@ def user_scripts():
     return os.environ.get("BLENDER_USER_SCRIPTS") or os.path.join(REPOSITORY, "build", "blender")
 
 
+def write_result(name, lines):
+    """Keep a table among the results of the build that is tested, where there is one."""
+    folder = os.path.join(os.environ.get("VOLLEY_BUILD", ""), "results")
+    if os.path.isdir(folder):
+        with open(os.path.join(folder, name), "w", encoding="utf-8") as file:
+            file.write("\n".join(lines) + "\n")
+
+
 class Blender:
     """Starts Blender in a folder of its own; ``output`` is what the last run wrote."""
 
