@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Data passes against Cycles' passes of the same name."""
 
+import itertools
+
+import blender as blender_support
+import compare
 import numpy as np
 import pytest
 
@@ -54,6 +58,97 @@ def _agree(ours, theirs, channels=3, mean=0.01, share=0.05, step=0.05):
     assert np.abs(ours.mean(axis=(0, 1)) - theirs.mean(axis=(0, 1))).max() < mean * scale
     apart = np.abs(ours - theirs).max(axis=-1) > step * scale
     assert apart.mean() < share, f"{apart.mean():.3%} of the pixels differ"
+
+
+# Data, light and colours ---------------------------------------------------------------------------
+
+# Old and new names of what a pixel's first sample says, of means, and of light with its colour.
+_FIRST_PASSES = ("Depth", "Position", ("IndexOB", "Object Index"), ("IndexMA", "Material Index"))
+_SURFACE_PASSES = ("Normal", "UV")
+_MEAN_PASSES = ("Combined", ("Emit", "Emission"), ("Env", "Environment"))
+_LIGHT_PASSES = {
+    ("DiffCol", "Diffuse Color"): (("DiffDir", "Diffuse Direct"), ("DiffInd", "Diffuse Indirect")),
+    ("GlossCol", "Glossy Color"): (("GlossDir", "Glossy Direct"), ("GlossInd", "Glossy Indirect")),
+    ("TransCol", "Transmission Color"): (("TransDir", "Transmission Direct"),
+                                         ("TransInd", "Transmission Indirect"))}
+# Of means. Beside a gloss Cycles lets some light through to the diffuse lobe too, with a bounce that it
+# should not have.
+LIGHT_TOLERANCE = {"DiffInd": 0.03}
+LEAST_COLOR = 0.02  # below it, light over colour is one noise over another
+SUM_TOLERANCE = 1e-4
+
+
+def _name_of(names):
+    """What this Blender calls a pass."""
+    from volley.compat import HAS_LONG_PASS_NAMES
+    return names if isinstance(names, str) else names[HAS_LONG_PASS_NAMES]
+
+
+def inside_gallery():
+    """What every kind of light and surface gives: pairs of pictures of passes by their short names."""
+    import bpy
+    import scenes
+    from volley import passes
+    scene = _scene()
+    scene.world.color = (0.4, 0.5, 0.7)
+    scenes.light('AREA', location=(2.0, -3.0, 4.0), rotation=(0.8, 0.0, 0.5), energy=300.0, size=1.5)
+    scenes.sphere("Glass", 0.7, (-2.4, -1.0, -0.2), scenes.material(
+        "Glass", "ShaderNodeBsdfGlass", Color=(0.9, 0.95, 1.0), Roughness=0.1, IOR=1.45))
+    scenes.sphere("Plastic", 0.6, (2.3, -1.0, -0.4), scenes.material(
+        "Plastic", "ShaderNodeBsdfPrincipled", Base_Color=(0.8, 0.3, 0.2), Roughness=0.3))
+    scenes.sphere("Leaf", 0.5, (0.0, -2.0, -1.0), scenes.material(
+        "Leaf", "ShaderNodeBsdfTranslucent", Color=(0.3, 0.7, 0.2)))
+    scenes.wall("Sign", 0.8, -1.5, (1.4, 1.1), scenes.emitter((2.0, 1.0, 0.5)))
+    bpy.data.objects["Back"].scale = (0.3, 1.0, 1.0)  # the world beside it
+    for number, thing in enumerate(bpy.data.objects):
+        thing.pass_index = number + 1
+        for slot in thing.material_slots:
+            slot.material.pass_index = 2 * number + 1
+    layer = bpy.context.view_layer
+    for entry in passes.PASSES:
+        if "." not in entry.setting:
+            setattr(layer, entry.setting, True)
+    scene.volley.clamp_indirect = scene.cycles.sample_clamp_indirect = 0.0
+    shown = [*_MEAN_PASSES, *_LIGHT_PASSES, *itertools.chain(*_LIGHT_PASSES.values())]
+    names = {_name_of(names): names if isinstance(names, str) else names[0] for names in shown}
+    pairs = _both(list(names), 8 * SAMPLES)
+    bpy.data.objects["Veil"].hide_render = True  # a sample goes through it or not by chance
+    surface = {_name_of(names): names if isinstance(names, str) else names[0]
+               for names in (*_FIRST_PASSES, *_SURFACE_PASSES)}
+    pairs.update(_both(list(surface), SAMPLES))
+    names.update(surface)
+    return {names[name]: [picture[..., :3] for picture in pair] for name, pair in pairs.items()}
+
+
+def test_gallery(blender):
+    pairs = blender.run(inside_gallery, timeout=300)
+    lines = [f"{'pass':9} {'mean':>9} {'mean error':>10} {'blocks or pixels':>16}"]
+
+    def compare_means(name, ours, theirs):
+        means = [picture.mean(axis=(0, 1)) for picture in (ours, theirs)]
+        blocks = [compare.tile_means(picture) for picture in (ours, theirs)]
+        error = np.abs(means[0] - means[1]).max() / max(np.abs(means[1]).max(), 1e-6)
+        apart = np.abs(blocks[0] - blocks[1]).max() / max(np.abs(blocks[1]).max(), 1e-6)
+        lines.append(f"{name:9} {means[1].mean():9.3g} {error:10.2e} {apart:16.3%}")
+        assert error < LIGHT_TOLERANCE.get(name, 0.01) and apart < 0.06, lines[-1]
+
+    for name in ("Depth", "Position", "IndexOB", "IndexMA"):
+        ours, theirs = pairs[name]
+        apart = (np.abs(ours - theirs) > 0.05 * np.abs(theirs).max()).any(axis=-1).mean()
+        lines.append(f"{name:9} {theirs.mean():9.3g} {'':10} {apart:16.3%}")
+        _agree(ours, theirs)
+    for name in (*_SURFACE_PASSES, "Combined", "Emit", "Env"):
+        compare_means(name, *pairs[name])
+    for (color, _), light in _LIGHT_PASSES.items():
+        compare_means(color, *pairs[color])
+        seen = pairs[color][1].min(axis=-1, keepdims=True) > LEAST_COLOR
+        for name, _ in light:
+            compare_means(name, *(picture * seen for picture in pairs[name]))
+    blender_support.write_result("passes.txt", lines)
+    light = sum((pairs[direct][0] + pairs[indirect][0]) * pairs[color][0]
+                for (color, _), ((direct, _), (indirect, _)) in _LIGHT_PASSES.items())
+    assert pairs["Combined"][0] == pytest.approx(light + pairs["Emit"][0] + pairs["Env"][0], abs=SUM_TOLERANCE)
+    assert all(pairs[name][1].any() for name in pairs if name != "TransDir")  # all is to be seen
 
 
 # Mist ---------------------------------------------------------------------------------------------

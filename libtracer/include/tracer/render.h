@@ -34,7 +34,7 @@ enum {
     TRC_PASS_DEPTH = 1,          /* 1: distance as Cycles: along the view axis for perspective and
                                     orthographic; 1e10 on a miss; first sample */
     TRC_PASS_NORMAL = 2,         /* 3: world shading normal */
-    TRC_PASS_POSITION = 3,       /* 3 */
+    TRC_PASS_POSITION = 3,       /* 3: of the first sample, as the depth */
     TRC_PASS_UV = 4,             /* 3: u, v, 1 on a hit */
     TRC_PASS_OBJECT_INDEX = 5,   /* 1: first sample */
     TRC_PASS_MATERIAL_INDEX = 6, /* 1: first sample */

@@ -75,7 +75,7 @@ uint32_t trc_film_channels(uint32_t pass) {
 }
 
 bool trc_film_is_first_sample(uint32_t pass) {
-    return pass == TRC_PASS_DEPTH || pass == TRC_PASS_OBJECT_INDEX ||
+    return pass == TRC_PASS_DEPTH || pass == TRC_PASS_POSITION || pass == TRC_PASS_OBJECT_INDEX ||
            pass == TRC_PASS_MATERIAL_INDEX;
 }
 

@@ -116,13 +116,11 @@ static vvec3 emission_add(struct trc_tile *t, const struct arrival *a, vmask act
         const float rgb[3] = {lanes[0][i], lanes[1][i], lanes[2][i]};
         trc_sample_add(t, a->slots[i], rgb);
         const uint32_t category = path[i] >> TRC_PATH_CATEGORY_SHIFT & 3u;
-        if (category == 0)
+        if (category == TRC_CATEGORY_CAMERA)
             trc_pass_add(t, camera_pass, a->slots[i], rgb);
         else if (t->light_passes)
-            trc_pass_add(t,
-                         (category == 1 ? TRC_PASS_GLOSSY_DIRECT : TRC_PASS_TRANSMISSION_DIRECT) +
-                             (depths[i] > 1 ? 1 : 0),
-                         a->slots[i], rgb);
+            trc_pass_add(t, trc_category_pass(category) + (depths[i] > 1 ? 1 : 0), a->slots[i],
+                         rgb);
     }
     return c;
 }
@@ -526,14 +524,17 @@ static void ray_push(struct trc_tile *t, const struct arrival *a, const struct t
                     (vint)depth_of(depths, TRC_DEPTH_TRANSPARENT_SHIFT))));
     /* Straight on: the same ray. Else a new kind, in the category of the first bounce. */
     const vuint category = a->path & vu_set(3u << TRC_PATH_CATEGORY_SHIFT);
-    const vmask first = vi_eq((vint)category, vi_set(0));
-    const vuint own = (vuint)vi_select(b->transmitted, vi_set(2 << TRC_PATH_CATEGORY_SHIFT),
-                                       vi_set(1 << TRC_PATH_CATEGORY_SHIFT));
+    const vmask first =
+        vi_eq((vint)category, vi_set(TRC_CATEGORY_CAMERA << TRC_PATH_CATEGORY_SHIFT));
+    const vint own = vi_select(b->diffuse, vi_set(TRC_CATEGORY_DIFFUSE),
+                               vi_select(b->transmitted, vi_set(TRC_CATEGORY_TRANSMISSION),
+                                         vi_set(TRC_CATEGORY_GLOSSY)))
+                     << TRC_PATH_CATEGORY_SHIFT;
     vuint kind = (vuint)vi_select(b->transmitted, vi_set(TRC_VISIBLE_TRANSMISSION),
                                   vi_set(TRC_VISIBLE_GLOSSY | TRC_PATH_REFLECTED));
     kind = kind | (vuint)vi_select(ideal, vi_set(TRC_PATH_SINGULAR), vi_set(0));
     kind = kind | (vuint)vi_select(b->diffuse, vi_set(TRC_VISIBLE_DIFFUSE), vi_set(0));
-    kind = kind | (vuint)vi_select(first, (vint)own, (vint)category);
+    kind = kind | (vuint)vi_select(first, own, (vint)category);
     kind = kind | (a->path & vu_set(TRC_PATH_DATA_DONE | TRC_PATH_TOLD)) |
            vu_set(a->world_alone ? TRC_PATH_WORLD_ALONE : 0);
     vuint path = (vuint)vi_select(straight, (vint)a->path, (vint)kind);

@@ -130,9 +130,9 @@ static void passes_add(struct trc_tile *t, uint32_t ray) {
                                        TRC_PASS_TRANSMISSION_DIRECT};
     const struct trc_shadow_store *q = &t->shadows;
     const uint32_t slot = q->slot[ray], category = q->path[ray] >> TRC_PATH_CATEGORY_SHIFT & 3u;
-    if (category) {
+    if (category != TRC_CATEGORY_CAMERA) {
         const float rgb[3] = {q->radiance[0][ray], q->radiance[1][ray], q->radiance[2][ray]};
-        trc_pass_add(t, direct[category] + 1, slot, rgb);
+        trc_pass_add(t, trc_category_pass(category) + 1, slot, rgb);
         return;
     }
     for (int k = 0; k < 3; k++) {

@@ -19,11 +19,19 @@
 
 /* Bits of a ray's path word above those of kernels/surface.h. */
 enum {
-    TRC_PATH_CATEGORY_SHIFT = 12, /* 0 camera, 1 glossy, 2 transmission: by the first bounce */
+    TRC_PATH_CATEGORY_SHIFT = 12, /* TRC_CATEGORY_* */
     TRC_PATH_LAST = 1 << 14,      /* only emission counts at the next surface */
     TRC_PATH_DATA_DONE = 1 << 15, /* data passes of the sample are written */
     TRC_PATH_TOLD = 1 << 16,      /* and the denoising passes of this way of it */
     TRC_PATH_OCCLUSION = 1 << 17  /* shadow rays: of the pass of ambient occlusion, no light */
+};
+
+/* What a path's first bounce was; diffuse: through a translucent surface. */
+enum {
+    TRC_CATEGORY_CAMERA, /* there was none */
+    TRC_CATEGORY_GLOSSY,
+    TRC_CATEGORY_TRANSMISSION,
+    TRC_CATEGORY_DIFFUSE
 };
 
 /* A ray's four depth counters, 8 bits each, saturating by the limits on desc. */
@@ -197,6 +205,13 @@ TRC_INLINE size_t trc_film_pixel(const struct trc_tile *t, uint32_t slot) {
     const uint32_t x = (t->samples.pixel[slot] & 0xffffu) - t->desc->crop_x;
     const uint32_t y = (t->samples.pixel[slot] >> 16) - t->desc->crop_y;
     return (size_t)y * t->job->film->width + x;
+}
+
+/* The pass of direct light of a path that bounced; that of indirect light is the next. */
+TRC_INLINE uint32_t trc_category_pass(uint32_t category) {
+    return category == TRC_CATEGORY_GLOSSY         ? TRC_PASS_GLOSSY_DIRECT
+           : category == TRC_CATEGORY_TRANSMISSION ? TRC_PASS_TRANSMISSION_DIRECT
+                                                   : TRC_PASS_DIFFUSE_DIRECT;
 }
 
 /* Adds light that reached a sample to its radiance and passes. kind: 0 diffuse, 1 glossy, 2
