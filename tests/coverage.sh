@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Which lines and branches of the library the tests in C run through, by hand: it takes long.
+# Which lines and branches of the library the tests run through, in C and in Blender where it is: by hand, it
+# takes long.
 #
 #   bash tests/coverage.sh [CTEST ARGUMENTS]      such as -R '^unit|scalar'
 #
@@ -19,6 +20,12 @@ cmake --build build-coverage
 find build-coverage -name '*.gcda' -delete
 # Tests of many rays prove nothing more here.
 TRACER_TEST_RAYS=2000 ctest --test-dir build-coverage --output-on-failure -j "$(nproc)" "$@"
+if command -v blender >/dev/null; then
+    source tests/find_python.sh
+    # A test that fails here, say since it had to wait too long, still runs through lines.
+    BLENDER_USER_SCRIPTS=$PWD/build-coverage/blender VOLLEY_BUILD=$PWD/build-coverage \
+        "$(find_python numpy pytest)" -m pytest -q -p no:cacheprovider --rootdir tests tests/blender || true
+fi
 report=(gcovr --root . --filter libtracer/ --exclude-throw-branches --exclude-unreachable-branches
     --object-directory build-coverage)
 "${report[@]}" --txt build-coverage/coverage.txt
