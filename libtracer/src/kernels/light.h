@@ -61,9 +61,9 @@ void TRC_KERNEL(trc_light_sample_prepared)(const struct trc_surface *s,
 vfloat TRC_KERNEL(trc_light_chosen)(const struct trc_surface *s, vvec3 n,
                                     const struct trc_light_sample *sample, vmask m);
 
-/* Visibility bits (TRC_VISIBLE_*) of the light each lane chose; all bits in lanes that chose none.
- * When the scene's lights hide from nothing, the caller can skip it: trc_light_table.hides is
- * false. */
+/* Visibility bits (TRC_VISIBLE_*, UNBLOCKED) of the light each lane chose; all bits in lanes that
+ * chose none. When the scene's lights hide from nothing, the caller can skip it:
+ * trc_light_table.hides is false. */
 vuint TRC_KERNEL(trc_light_visibility)(const struct trc_snapshot *snapshot,
                                        const struct trc_light_sample *sample);
 

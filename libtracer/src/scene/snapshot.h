@@ -47,12 +47,20 @@ struct trc_affine {
     float m[12];
 };
 
+/* Bits of visibility beside TRC_VISIBLE_*. Unblocked rays carry the light that would be there if
+ * shadow catchers were alone with it (kernels/catcher.c). Those that see an instance's kinds of
+ * rays are shifted, so that one test of a traversal is for both. */
+enum {
+    TRC_VISIBLE_UNBLOCKED = 1 << 5, /* of rays, and of instances and lights they meet at all */
+    TRC_UNBLOCKED_SHIFT = 8         /* from the kinds of rays to those of unblocked ones */
+};
+
 struct trc_instance {
     uint32_t mesh; /* into snapshot meshes */
     uint32_t key_count;
     const struct trc_affine *object_to_world; /* key_count */
     const struct trc_affine *world_to_object; /* key_count, inverse of each key */
-    uint32_t visibility;                      /* TRC_VISIBLE_* */
+    uint32_t visibility;                      /* TRC_VISIBLE_*; of catchers more, see above */
     uint32_t material_count;                  /* >= 1 */
     const uint32_t *materials;                /* into snapshot materials, per slot */
     uint32_t value_count;
