@@ -216,11 +216,13 @@ vfloat TRC_KERNEL(trc_light_chosen)(const struct trc_surface *s, vvec3 n,
 }
 
 vuint TRC_KERNEL(trc_light_visibility)(const struct trc_snapshot *snapshot,
-                                       const struct trc_light_sample *sample) {
+                                       const struct trc_light_sample *sample, vuint path) {
     if (!snapshot->lights->hides)
-        return vu_set(TRC_VISIBLE_ALL | TRC_VISIBLE_UNBLOCKED);
+        return vu_set(TRC_VISIBLE_ALL);
     const vmask chosen = vm_not(vi_lt(sample->light, vi_set(0)));
-    return visibility_of(snapshot, sample->light, chosen);
+    const vuint bits = visibility_of(snapshot, sample->light, chosen);
+    const vint hidden = (vint)(path & ~bits & vu_set(TRC_VISIBLE_UNBLOCKED));
+    return (vuint)vi_select(vi_eq(hidden, vi_set(0)), (vint)bits, vi_set(0));
 }
 
 /* A continuation ray towards wi is a glossy one above the surface and a transmitted one below. */

@@ -284,7 +284,7 @@ static vmask light_contribute(const struct trc_tile *t, const struct arrival *a,
     struct trc_bsdf_value f;
     TRC_KERNEL(trc_bsdf_eval)(lobes, s, l->wi, active, &f);
     const vfloat one = vf_set(1.0f), zero = vf_set(0.0f);
-    const vuint seen = TRC_KERNEL(trc_light_visibility)(t->snapshot, l);
+    const vuint seen = TRC_KERNEL(trc_light_visibility)(t->snapshot, l, a->path);
     const vmask alone = vm_or(l->delta, l->no_mis);
     vfloat mis, mis_diffuse = one;
     if (t->desc->integrator == TRC_INTEGRATOR_DISTRIBUTION) {
@@ -309,9 +309,6 @@ static vmask light_contribute(const struct trc_tile *t, const struct arrival *a,
 #undef SEEN
     const vvec3 sum = v3_add(out->diffuse, v3_add(out->glossy, out->transmission));
     const vfloat size = v3_max(sum);
-    if (t->catchers)
-        active = vm_and(active,
-                        vi_eq((vint)(a->path & ~seen & vu_set(TRC_VISIBLE_UNBLOCKED)), vi_set(0)));
     return vm_and(active, vm_and(vf_gt(size, zero), vf_lt(size, vf_set(3e38f))));
 }
 

@@ -47,12 +47,12 @@ struct trc_affine {
     float m[12];
 };
 
-/* Bits of visibility beside TRC_VISIBLE_*. Unblocked rays carry the light that would be there if
- * shadow catchers were alone with it (kernels/catcher.c). Those that see an instance's kinds of
- * rays are shifted, so that one test of a traversal is for both. */
+/* Visibility beside TRC_VISIBLE_*. Unblocked rays find the light that would be there if nothing but
+ * shadow catchers could be in its way (kernels/catcher.c). */
 enum {
-    TRC_VISIBLE_UNBLOCKED = 1 << 5, /* of rays, and of instances and lights they meet at all */
-    TRC_UNBLOCKED_SHIFT = 8         /* from the kinds of rays to those of unblocked ones */
+    TRC_VISIBLE_UNBLOCKED = 1 << 5, /* of such rays, of shadow catchers, of lights they find */
+    TRC_UNBLOCKED_SHIFT = 8 /* shadow catchers have their TRC_VISIBLE_* here once more, so that one
+                               test of a traversal tells which unblocked rays meet them */
 };
 
 struct trc_instance {
