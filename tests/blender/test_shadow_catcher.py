@@ -169,8 +169,9 @@ def test_passes(blender):
     assert (without[..., :3] == 1.0).all()
     covers = np.stack([each["Combined"][..., 3] for each in (ours, theirs)])
     inner, outer = covers.min(axis=0) == 1.0, covers.max(axis=0) == 0.0
-    for name in ("Combined_sky", "DiffDir"):  # not of catchers
-        assert (ours[name][outer][..., :3] == 0.0).all() and (theirs[name][outer][..., :3] == 0.0).all()
+    assert (theirs["DiffDir"][outer][..., :3] == 0.0).all()
+    for name in ("Combined_sky", "DiffDir"):  # not of catchers; groups were till 3.4 (T103403)
+        assert (ours[name][outer][..., :3] == 0.0).all()
         assert ours[name][inner].mean() == pytest.approx(theirs[name][inner].mean(), rel=5e-3)
     depths = np.stack([each["Depth"][..., 0] for each in (ours, theirs)])
     near = depths.max(axis=0) < 20.0
