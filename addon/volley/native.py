@@ -41,12 +41,13 @@ NORMALS_NONE, NORMALS_VERTEX, NORMALS_CORNER = 0, 1, 2
 
 VISIBLE_CAMERA, VISIBLE_DIFFUSE, VISIBLE_GLOSSY, VISIBLE_TRANSMISSION, VISIBLE_SHADOW = 1, 2, 4, 8, 16
 VISIBLE_ALL = 31
+INSTANCE_SHADOW_CATCHER = 1
 
 CAMERA_PERSPECTIVE, CAMERA_ORTHOGRAPHIC = 0, 1
 
 LIGHT_TYPES = {'POINT': 0, 'SPOT': 1, 'SUN': 2, 'AREA': 3}
 AREA_RECTANGLE, AREA_ELLIPSE = 0, 1
-LIGHT_SPHERE, LIGHT_EVEN_CONE = 1, 2
+LIGHT_SPHERE, LIGHT_EVEN_CONE, LIGHT_SYNTHETIC = 1, 2, 4
 
 INTEGRATORS = {'RAYCAST': 0, 'WHITTED': 1, 'DISTRIBUTION': 2}
 SAMPLERS = {'SOBOL': 0, 'SUDOKU': 1, 'JITTER': 2, 'INDEPENDENT': 3, 'BLUE_NOISE': 4}
@@ -68,7 +69,8 @@ STATE_RUNNING, STATE_DONE, STATE_CANCELLED, STATE_FAILED = 0, 1, 2, 3
 FEATURE_NAMES = (
     "depth of field", "camera motion", "object motion", "deformation", "instances", "specular", "glossy",
     "refraction", "transparency", "textures", "node programs", "lights", "area lights",
-    "emissive meshes", "environment", "environment image", "ray visibility", "ambient occlusion")
+    "emissive meshes", "environment", "environment image", "ray visibility", "ambient occlusion",
+    "shadow catchers")
 
 # Descriptors -----------------------------------------------------------------------------------
 # A pointer is declared as c_void_p: numpy gives addresses as integers, and what the library reads is
@@ -107,7 +109,7 @@ class _InstanceDesc(_Struct):
                 ("materials", _ptr), ("material_count", _u32), ("visibility", _u32),
                 ("pass_index", _i32), ("random", _f32), ("color", _f32 * 4),
                 ("cryptomatte_object", _f32), ("cryptomatte_asset", _f32), ("light_group", _u32),
-                ("value_count", _u32), ("values", _ptr)]
+                ("flags", _u32), ("reserved", _u32), ("value_count", _u32), ("values", _ptr)]
 
 
 class _LightDesc(_Struct):
@@ -444,7 +446,7 @@ class Scene:
     def update_instance(self, instance, **values):
         """mesh: id; transforms (keys, 12) float32; materials: ids by slot; visibility; pass_index;
         random [0, 1); color: four floats; cryptomatte_object and cryptomatte_asset: ids; light_group: of
-        its emission, 0 for none; values: numbers that its materials ask for."""
+        its emission, 0 for none; flags: INSTANCE_*; values: numbers that its materials ask for."""
         desc, keep = self._instance_desc(**values)
         self._edit("trc_instance_update", instance, ctypes.byref(desc))
 
@@ -454,7 +456,7 @@ class Scene:
     @staticmethod
     def _instance_desc(mesh, transforms, materials=(), visibility=VISIBLE_ALL, pass_index=0,
                        random=0.0, color=(1.0, 1.0, 1.0, 1.0), cryptomatte_object=0.0,
-                       cryptomatte_asset=0.0, light_group=0, values=()):
+                       cryptomatte_asset=0.0, light_group=0, flags=0, values=()):
         transforms = _array(transforms, np.float32).reshape(-1, 12)
         ids = np.array(materials, dtype=np.uint64)
         numbers = np.array(values, dtype=np.float32)
@@ -463,7 +465,7 @@ class Scene:
             materials=_address(ids), material_count=len(ids), visibility=visibility,
             pass_index=pass_index, random=random, color=tuple(color),
             cryptomatte_object=cryptomatte_object, cryptomatte_asset=cryptomatte_asset,
-            light_group=light_group, values=_address(numbers), value_count=len(numbers))
+            light_group=light_group, flags=flags, values=_address(numbers), value_count=len(numbers))
         return desc, (transforms, ids, numbers)
 
     # Lights, world, camera

@@ -33,6 +33,7 @@ PASSES = (
     Pass(8, ("Env", "Environment"), "RGB", 'COLOR', "use_pass_environment"),
     Pass(24, ("AO", "Ambient Occlusion"), "RGB", 'COLOR', "use_pass_ambient_occlusion"),
     Pass(25, ("Shadow", "Shadow"), "RGB", 'COLOR', "use_pass_shadow"),
+    Pass(26, ("Shadow Catcher", "Shadow Catcher"), "RGB", 'COLOR', "volley.use_pass_shadow_catcher"),
     Pass(19, ("Mist", "Mist"), "Z", 'VALUE', "use_pass_mist"),
     Pass(20, ("Denoising Albedo", "Denoising Albedo"), "RGB", 'COLOR', "volley.denoising_store_passes"),
     Pass(21, ("Denoising Normal", "Denoising Normal"), "XYZ", 'VECTOR', "volley.denoising_store_passes"),

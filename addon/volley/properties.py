@@ -175,6 +175,10 @@ class VolleyViewLayerSettings(bpy.types.PropertyGroup):
     use_pass_sample_count: BoolProperty(
         name="Sample Count", default=False, description="Deliver the number of samples of each pixel",
         update=_changed)
+    use_pass_shadow_catcher: BoolProperty(
+        name="Shadow Catcher", default=False,
+        description="Deliver what shadow catchers leave of the light, to multiply the footage by, and "
+        "Combined without their shadows", update=_changed)
     denoising_store_passes: BoolProperty(
         name="Denoising Data", default=False,
         description="Deliver albedo, normal and depth for the compositor's Denoise node",

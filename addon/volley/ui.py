@@ -340,6 +340,7 @@ class VOLLEY_VIEWLAYER_PT_passes_light(_PassesPanel, Panel):
         column.prop(view_layer, "use_pass_environment")
         column.prop(view_layer, "use_pass_ambient_occlusion", text="Ambient Occlusion")
         _prop_if_present(column, view_layer, "use_pass_shadow", text="Shadow")
+        column.prop(view_layer.volley, "use_pass_shadow_catcher")
 
 
 class VOLLEY_VIEWLAYER_PT_passes_cryptomatte(_PassesPanel, Panel):
@@ -430,8 +431,11 @@ class VOLLEY_OBJECT_PT_visibility(_ObjectPanel, Panel):
         column = layout.column(heading="Show In")
         column.prop(active, "hide_viewport", text="Viewports", invert_checkbox=True, toggle=False)
         column.prop(active, "hide_render", text="Renders", invert_checkbox=True, toggle=False)
+        column = layout.column(heading="Mask")
+        if _has_shape(active) or active.type == 'LIGHT':
+            column.prop(active, "is_shadow_catcher")
         if _has_shape(active):
-            layout.column(heading="Mask").prop(active, "is_holdout")
+            column.prop(active, "is_holdout")
 
 
 class VOLLEY_OBJECT_PT_ray_visibility(_SeenObjectPanel, Panel):

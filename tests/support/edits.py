@@ -187,6 +187,11 @@ def holdout(_random):
     ball.is_holdout = not ball.is_holdout
 
 
+def shadow_catcher(_random):
+    ball = bpy.data.objects["Ball"]
+    ball.is_shadow_catcher = not ball.is_shadow_catcher
+
+
 def slot(random):
     each = _some_mesh(random)
     if each.material_slots:
@@ -225,4 +230,4 @@ def override(random):
 
 ALL = (pose, transform, move_instancer, move_light, light_energy, light_kind, material, node_link,
        node_group, image, world, settings, film_transparent, frame, add, duplicate, delete, hide,
-       ray_visibility, holdout, slot, vertices, shading, modifier, override)
+       ray_visibility, holdout, shadow_catcher, slot, vertices, shading, modifier, override)

@@ -47,8 +47,9 @@ FIXTURE_INLINE void fixture_draw(trc_scene scene, const trc_render_desc *desc, u
 
 /* ---- for closed forms: level squares seen from above ---- */
 
-/* Two triangles; a, b, c, d counter-clockwise as seen from the front. */
-FIXTURE_INLINE trc_id fixture_quad(trc_scene scene, const float corners[12], trc_id material) {
+/* Two triangles; a, b, c, d counter-clockwise as seen from the front. flags: TRC_INSTANCE_*. */
+FIXTURE_INLINE trc_id fixture_flagged_quad(trc_scene scene, const float corners[12],
+                                           trc_id material, uint32_t flags) {
     static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
     trc_id mesh = 0, instance = 0;
     trc_mesh_desc desc = default_mesh_desc();
@@ -62,8 +63,13 @@ FIXTURE_INLINE trc_id fixture_quad(trc_scene scene, const float corners[12], trc
     trc_instance_desc instance_desc = default_instance_desc(mesh);
     instance_desc.materials = &material;
     instance_desc.material_count = 1;
+    instance_desc.flags = flags;
     assert_int_equal(trc_instance_create(scene, &instance_desc, &instance), TRC_OK);
     return instance;
+}
+
+FIXTURE_INLINE trc_id fixture_quad(trc_scene scene, const float corners[12], trc_id material) {
+    return fixture_flagged_quad(scene, corners, material, 0);
 }
 
 /* A horizontal square around the origin. */

@@ -103,6 +103,7 @@ static void create_objects(struct session *s) {
     memcpy(aside, identity_transform, sizeof aside);
     aside[3] = 3.0f;
     instance.transforms = aside;
+    instance.flags = TRC_INSTANCE_SHADOW_CATCHER;
     STEP_OUT(s->second, trc_instance_create(s->scene, &instance, &s->second));
     STEP(trc_instance_update(s->scene, s->second, &instance));
     STEP_OUT(s->light, trc_light_create(s->scene, &light, &s->light));

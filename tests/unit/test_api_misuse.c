@@ -496,6 +496,7 @@ static void instances(void **state) {
     REFUSE_INSTANCE(LARGE, desc.material_count = UINT32_MAX);
     REFUSE_INSTANCE(HANDLE, desc.materials = stale_materials; desc.material_count = 2);
     REFUSE_INSTANCE(ARGUMENT, desc.visibility = 32);
+    REFUSE_INSTANCE(ARGUMENT, desc.flags = 2);
     REFUSE_INSTANCE(ARGUMENT, desc.random = NAN);
     REFUSE_INSTANCE(ARGUMENT, desc.color[2] = INFINITY);
     const float bad_values[] = {1.0f, NAN};
@@ -546,7 +547,7 @@ static void lights(void **state) {
     REFUSE_LIGHT(desc.spread = NAN);
     REFUSE_LIGHT(desc.type = TRC_LIGHT_SPOT; desc.spot_angle = 0.0f);
     REFUSE_LIGHT(desc.type = TRC_LIGHT_SPOT; desc.spot_blend = 1.5f);
-    REFUSE_LIGHT(desc.flags = 2 * TRC_LIGHT_EVEN_CONE);
+    REFUSE_LIGHT(desc.flags = 2 * TRC_LIGHT_SYNTHETIC);
     REFUSE_LIGHT(desc.visibility = 32);
     REFUSE_LIGHT(desc.cast_shadow = 2);
     REFUSE_LIGHT(desc.use_mis = 7);

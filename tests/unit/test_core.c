@@ -517,7 +517,7 @@ static void pass_channels(void **state) {
         assert_in_range(trc_pass_channels(pass), 1, 4);
         total += trc_pass_channels(pass);
     }
-    assert_int_equal(total, 68);
+    assert_int_equal(total, 71);
     assert_int_equal(trc_pass_channels(TRC_PASS_COMBINED), 4);
     assert_int_equal(trc_pass_channels(TRC_PASS_DEPTH), 1);
     assert_int_equal(trc_pass_channels(TRC_PASS_COUNT), 0);

@@ -292,9 +292,6 @@ class _Walk:
 
     def _add_mesh_instance(self, each):
         blender_object = each.object
-        if blender_object.is_shadow_catcher:
-            self._sync.warnings.add(f"Object '{blender_object.name}': shadow catchers are not "
-                                    "supported, it is shown as any other object")
         item = self._describe(each)
         item.materials = _material_ids(self._sync._materials, each, self._view_layer)
         if self._shutter is not None:

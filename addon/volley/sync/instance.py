@@ -33,6 +33,7 @@ class Item:
     random: float = 0.0
     color: tuple = (1.0, 1.0, 1.0, 1.0)
     light_group: int = 0       # from 1 on, 0 for none
+    flags: int = 0             # INSTANCE_*
     values: tuple = ()         # see instancer_values
     light: dict = None         # fields of a light instead of a mesh
     motion_keys: int = 1       # how many the object asks for
@@ -112,7 +113,8 @@ def describe(instance, view_layer, light_groups):
         visibility=visibility.instance_visibility(instance, view_layer),
         pass_index=blender_object.pass_index, random=random_of(instance),
         color=tuple(blender_object.color),
-        light_group=light_groups.get(blender_object.lightgroup, 0))
+        light_group=light_groups.get(blender_object.lightgroup, 0),
+        flags=native.INSTANCE_SHADOW_CATCHER * visibility.is_shadow_catcher(instance, view_layer))
 
 
 # Where the numbers of instancer_values begin.
@@ -200,14 +202,15 @@ class Instances:
     def _update_one(self, item, mesh_id):
         transforms = motion.follow_turns(collapse(item.transforms))
         signature = (mesh_id, transforms.tobytes(), item.materials, item.visibility, item.pass_index,
-                     item.random, item.color, item.name, item.asset, item.light_group, item.values)
+                     item.random, item.color, item.name, item.asset, item.light_group, item.flags,
+                     item.values)
         entry = self._entries.get(item.key)
         if entry is not None and entry.signature == signature:
             return
         values = {"mesh": mesh_id, "transforms": transforms, "materials": item.materials,
                   "visibility": item.visibility, "pass_index": item.pass_index,
                   "random": item.random, "color": item.color, "light_group": item.light_group,
-                  "values": item.values,
+                  "flags": item.flags, "values": item.values,
                   "cryptomatte_object": native.cryptomatte_id(item.name),
                   "cryptomatte_asset": native.cryptomatte_id(item.asset)}
         if entry is None:

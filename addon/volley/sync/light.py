@@ -37,6 +37,8 @@ def describe(light_object, item, warnings):
         "use_mis": int(cycles(light, "use_multiple_importance_sampling", True)),
     }
     fields.update(_SHAPES[light.type](light))
+    if not light_object.is_shadow_catcher:
+        fields["flags"] = fields.get("flags", 0) | native.LIGHT_SYNTHETIC
     return fields
 
 

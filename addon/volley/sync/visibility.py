@@ -48,3 +48,10 @@ def is_holdout(instance, view_layer):
     """Whether the instance punches a hole into the picture."""
     owner = instance.parent if instance.is_instance and instance.parent else instance.object
     return instance.object.is_holdout or owner.holdout_get(view_layer=view_layer)
+
+
+def is_shadow_catcher(instance, view_layer):
+    """Whether the instance stands for something of the footage; holes are no part of that."""
+    is_instanced = instance.is_instance and instance.parent and instance.parent.is_shadow_catcher
+    return bool(instance.object.is_shadow_catcher or is_instanced) \
+        and not is_holdout(instance, view_layer)

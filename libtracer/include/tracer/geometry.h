@@ -71,6 +71,13 @@ enum {
     TRC_VISIBLE_ALL = 31
 };
 
+/* A shadow catcher stands for something of the footage behind the picture. Where the camera sees
+ * it, also through what is transparent, it does not show itself: TRC_PASS_COMBINED is covered by
+ * the part of its light that other instances take from it, and TRC_PASS_SHADOW_CATCHER has that
+ * light by channel. Other rays meet it as any instance. Emission of instances that are none does
+ * not light it as footage. */
+enum { TRC_INSTANCE_SHADOW_CATCHER = 1 };
+
 #define TRC_MAX_INSTANCE_VALUES 64
 
 typedef struct trc_instance_desc {
@@ -88,6 +95,8 @@ typedef struct trc_instance_desc {
     float cryptomatte_object, cryptomatte_asset; /* trc_cryptomatte_id of its name and of its
                                                     asset's name; 0: in no matte */
     uint32_t light_group;                        /* of its emission, 0..TRC_MAX_LIGHT_GROUPS */
+    uint32_t flags;                              /* TRC_INSTANCE_* */
+    uint32_t reserved;                           /* 0 */
     uint32_t value_count;                        /* 0..TRC_MAX_INSTANCE_VALUES */
     const float *values;                         /* for TRC_NODE_INSTANCE_VALUES */
 } trc_instance_desc;

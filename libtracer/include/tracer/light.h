@@ -9,10 +9,12 @@ TRC_BEGIN_DECLS
 enum { TRC_LIGHT_POINT = 0, TRC_LIGHT_SPOT = 1, TRC_LIGHT_SUN = 2, TRC_LIGHT_AREA = 3 };
 enum { TRC_AREA_RECTANGLE = 0, TRC_AREA_ELLIPSE = 1 };
 enum {
-    TRC_LIGHT_SPHERE = 1,   /* point, spot: a sphere; else a disk that faces the lit point, as in
-                               Blender before 4.0 and, from 4.1 on, with Soft Falloff */
-    TRC_LIGHT_EVEN_CONE = 2 /* spot: as bright all over its cone; else times the cosine to its axis,
-                               as in Blender before 4.0 */
+    TRC_LIGHT_SPHERE = 1,    /* point, spot: a sphere; else a disk that faces the lit point, as in
+                                Blender before 4.0 and, from 4.1 on, with Soft Falloff */
+    TRC_LIGHT_EVEN_CONE = 2, /* spot: as bright all over its cone; else times the cosine to its
+                                axis, as in Blender before 4.0 */
+    TRC_LIGHT_SYNTHETIC = 4  /* not a light of the footage that shadow catchers stand for: what
+                                blocks it casts no shadow there */
 };
 
 /* Strengths are Blender's: watts for point, spot and area, W/m^2 for the sun, times color. A light
@@ -34,7 +36,7 @@ typedef struct trc_light_desc {
     uint32_t cast_shadow; /* 0: shines through everything */
     uint32_t use_mis;     /* reflected and refracted rays see it ("multiple importance") */
     uint32_t light_group; /* 0..TRC_MAX_LIGHT_GROUPS */
-    uint32_t flags;       /* TRC_LIGHT_SPHERE, TRC_LIGHT_EVEN_CONE */
+    uint32_t flags;       /* TRC_LIGHT_SPHERE and the like */
 } trc_light_desc;
 
 TRC_API trc_status trc_light_create(trc_scene scene, const trc_light_desc *desc, trc_id *light_out);

@@ -30,12 +30,14 @@ enum { TRC_FILTER_BOX = 0, TRC_FILTER_GAUSSIAN = 1, TRC_FILTER_BLACKMAN_HARRIS =
 
 /* Passes and their channels. */
 enum {
-    TRC_PASS_COMBINED = 0,       /* 4: premultiplied RGBA */
-    TRC_PASS_DEPTH = 1,          /* 1: distance as Cycles: along the view axis for perspective and
-                                    orthographic; 1e10 on a miss; first sample */
-    TRC_PASS_NORMAL = 2,         /* 3: world shading normal */
-    TRC_PASS_POSITION = 3,       /* 3: of the first sample, as the depth */
-    TRC_PASS_UV = 4,             /* 3: u, v, 1 on a hit */
+    TRC_PASS_COMBINED = 0, /* 4: premultiplied RGBA. Shadow catchers are black in it, covering as
+                              much as they lose of their light by the mean of its channels;
+                              where the film is not transparent, on the background */
+    TRC_PASS_DEPTH = 1,    /* 1: distance as Cycles: along the view axis for perspective and
+                              orthographic; 1e10 on a miss; first sample */
+    TRC_PASS_NORMAL = 2,   /* 3: world shading normal */
+    TRC_PASS_POSITION = 3, /* 3: of the first sample, as the depth */
+    TRC_PASS_UV = 4,       /* 3: u, v, 1 on a hit */
     TRC_PASS_OBJECT_INDEX = 5,   /* 1: first sample */
     TRC_PASS_MATERIAL_INDEX = 6, /* 1: first sample */
     TRC_PASS_EMISSION = 7,       /* 3 */
@@ -68,7 +70,11 @@ enum {
                              applies with an ao_factor of 0, too; by what is seen of it */
     TRC_PASS_SHADOW = 25, /* 3: Cycles' Shadow up to 3.4: the part of all lamps, each of equal
                              weight, that a surface sees of those that light it */
-    TRC_PASS_COUNT = 26
+    TRC_PASS_SHADOW_CATCHER =
+        26, /* 3: what shadow catchers leave of the footage's light by channel, which it is to be
+               multiplied by before Combined goes over it; 1 where there are none. Combined is
+               without their shadows then */
+    TRC_PASS_COUNT = 27
 };
 
 /* What the AOV nodes of materials and the world write, by the numbers of their modes: 1 channel,

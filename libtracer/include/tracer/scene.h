@@ -52,7 +52,8 @@ enum {
     TRC_FEATURE_ENVIRONMENT = 1 << 14, /* the world is not black */
     TRC_FEATURE_ENVIRONMENT_IMAGE = 1 << 15,
     TRC_FEATURE_VISIBILITY = 1 << 16, /* some instance is hidden from some rays */
-    TRC_FEATURE_AMBIENT_OCCLUSION = 1 << 17
+    TRC_FEATURE_AMBIENT_OCCLUSION = 1 << 17,
+    TRC_FEATURE_SHADOW_CATCHERS = 1 << 18
 };
 
 typedef struct trc_scene_stats {

@@ -34,7 +34,7 @@ static trc_status check_light(const trc_light_desc *desc) {
     TRC_TRY(trc_check_enum(desc->cast_shadow, 2, "cast_shadow"));
     TRC_TRY(trc_check_enum(desc->use_mis, 2, "use_mis"));
     TRC_TRY(trc_check_count(desc->light_group, 0, TRC_MAX_LIGHT_GROUPS, "light_group"));
-    return trc_check_enum(desc->flags, 2 * TRC_LIGHT_EVEN_CONE, "flags");
+    return trc_check_enum(desc->flags, 2 * TRC_LIGHT_SYNTHETIC, "flags");
 }
 
 trc_status trc_light_create(trc_scene scene, const trc_light_desc *desc, trc_id *light_out) {

@@ -3,6 +3,7 @@
 
 #include <float.h>
 #include <inttypes.h>
+#include <math.h>
 #include <stdbool.h>
 #include <string.h>
 #include <unistd.h>
@@ -58,6 +59,7 @@ uint32_t trc_pass_channels(uint32_t pass) {
         [TRC_PASS_VECTOR] = 4,
         [TRC_PASS_AMBIENT_OCCLUSION] = 3,
         [TRC_PASS_SHADOW] = 3,
+        [TRC_PASS_SHADOW_CATCHER] = 3,
     };
     if (is_cryptomatte(pass))
         return TRC_MATTE_CHANNELS;
@@ -104,7 +106,8 @@ bool trc_film_has_sums(const trc_render_desc *desc, uint32_t pass) {
         return pass - TRC_PASS_AOV_COLOR(0) < desc->aov_color_count;
     if (is_light_group(pass))
         return pass - TRC_PASS_LIGHT_GROUP(0) < desc->light_group_count;
-    return pass < TRC_PASS_COUNT && pass != TRC_PASS_SAMPLE_COUNT && (desc->passes >> pass & 1);
+    const bool is_sum = pass != TRC_PASS_SAMPLE_COUNT && pass != TRC_PASS_SHADOW_CATCHER;
+    return pass < TRC_PASS_COUNT && is_sum && (desc->passes >> pass & 1);
 }
 
 /* Memory of the machine, or as good as none of a limit if the system does not say. */
@@ -149,6 +152,8 @@ trc_status trc_film_create(const trc_render_desc *desc, struct trc_film *film) {
     struct trc_film made = {.width = desc->crop_width,
                             .height = desc->crop_height,
                             .shows_counts = desc->passes >> TRC_PASS_SAMPLE_COUNT & 1,
+                            .shows_shadows = desc->passes >> TRC_PASS_SHADOW_CATCHER & 1,
+                            .is_transparent = desc->film_transparent,
                             .matte_count = matte_count(desc)};
     TRC_TRY(trc_film_check_budget(made.width, made.height, pixel_bytes(desc, made.matte_count)));
     const size_t pixels = (size_t)made.width * made.height;
@@ -177,7 +182,15 @@ trc_status trc_film_create(const trc_render_desc *desc, struct trc_film *film) {
     return TRC_OK;
 }
 
+trc_status trc_film_add_catchers(struct trc_film *film) {
+    TRC_TRY(trc_film_check_budget(film->width, film->height, sizeof *film->caught));
+    film->caught = trc_alloc_zeroed((size_t)film->width * film->height, sizeof *film->caught);
+    return film->caught ? TRC_OK
+                        : trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for shadow catchers");
+}
+
 void trc_film_destroy(struct trc_film *film) {
+    trc_free(film->caught);
     for (uint32_t pass = 0; pass < TRC_SUM_COUNT; pass++)
         trc_free(film->sums[pass]);
     for (uint32_t kind = 0; kind < TRC_CRYPTOMATTE_KINDS; kind++)
@@ -216,6 +229,8 @@ uint32_t trc_film_color_pass(uint32_t pass) {
 static bool has_pass(const struct trc_film *film, uint32_t pass) {
     if (pass == TRC_PASS_SAMPLE_COUNT)
         return film->shows_counts;
+    if (pass == TRC_PASS_SHADOW_CATCHER)
+        return film->shows_shadows;
     if (!is_cryptomatte(pass))
         return film->sums[pass] != NULL;
     const uint32_t number = pass - TRC_PASS_CRYPTOMATTE(0, 0), layer = number % MAX_LAYERS;
@@ -266,6 +281,53 @@ static void read_sums(const struct trc_film *film, uint32_t pass, float exposure
     }
 }
 
+/* ---- shadow catchers ---- */
+
+/* What is left of the footage's light where catchers stand for it; 1 where they have no light. */
+static void remains_of(const struct trc_caught *caught, double remains[3]) {
+    for (int c = 0; c < 3; c++) {
+        const double unblocked = load_sum(&caught->unblocked[c]);
+        remains[c] = unblocked != 0.0 ? load_sum(&caught->blocked[c]) / unblocked : 1.0;
+    }
+}
+
+/* What the footage is to be multiplied by: a pixel's mean over what the picture does not cover. */
+static void read_shadows(const struct trc_film *film, float *out) {
+    const uint64_t pixels = (uint64_t)film->width * film->height;
+    for (uint64_t i = 0; i < pixels; i++) {
+        double remains[3] = {1.0, 1.0, 1.0}, part = 0.0;
+        if (film->caught) {
+            const uint32_t count = __atomic_load_n(&film->sample_counts[i], __ATOMIC_RELAXED);
+            const double open = count - load_sum(&film->sums[TRC_PASS_COMBINED][4 * i + 3]);
+            remains_of(&film->caught[i], remains);
+            part = open > 0.0 ? fmin(load_sum(&film->caught[i].coverage) / open, 1.0) : 0.0;
+        }
+        for (int c = 0; c < 3; c++)
+            out[3 * i + c] = to_float(1.0 + part * (remains[c] - 1.0));
+    }
+}
+
+/* Adds to the picture what catchers do to it: cover it, as grey as a shadow can be by alpha alone,
+ * or where the world is shown, let it through in part. */
+static void add_shadows(const struct trc_film *film, float exposure, float *combined) {
+    const uint64_t pixels = (uint64_t)film->width * film->height;
+    for (uint64_t i = 0; i < pixels; i++) {
+        const struct trc_caught *caught = &film->caught[i];
+        const uint32_t count = __atomic_load_n(&film->sample_counts[i], __ATOMIC_RELAXED);
+        const double part = count ? load_sum(&caught->coverage) / count : 0.0;
+        if (!(part > 0.0))
+            continue;
+        double remains[3];
+        remains_of(caught, remains);
+        const double light = fmin(fmax((remains[0] + remains[1] + remains[2]) / 3.0, 0.0), 1.0);
+        float *pixel = combined + 4 * i;
+        pixel[3] = to_float(pixel[3] + part * (film->is_transparent ? 1.0 - light : 1.0));
+        for (int c = 0; c < 3; c++)
+            pixel[c] =
+                to_float(pixel[c] + load_sum(&caught->background[c]) / count * light * exposure);
+    }
+}
+
 trc_status trc_film_read(const struct trc_film *film, uint32_t pass, float exposure, float *out,
                          uint64_t float_count) {
     const uint32_t channels = trc_pass_channels(pass);
@@ -278,7 +340,11 @@ trc_status trc_film_read(const struct trc_film *film, uint32_t pass, float expos
                             sizeof(float), sizeof(float), "pixels_out"));
     if (is_cryptomatte(pass))
         read_mattes(film, pass, out);
+    else if (pass == TRC_PASS_SHADOW_CATCHER)
+        read_shadows(film, out);
     else
         read_sums(film, pass, exposure, out);
+    if (pass == TRC_PASS_COMBINED && film->caught && !film->shows_shadows)
+        add_shadows(film, exposure, out);
     return TRC_OK;
 }

@@ -15,6 +15,16 @@
 /* Passes that are sums have numbers below this. */
 #define TRC_SUM_COUNT TRC_PASS_LIGHT_GROUP(TRC_MAX_LIGHT_GROUPS)
 
+/* What a pixel's shadow catchers got, sums over its samples. Blocked over unblocked light is the
+ * ratio by which the footage darkens: of the sums, as ratios of samples would have a mean of their
+ * own. */
+struct trc_caught {
+    double blocked[3], unblocked[3]; /* light as it is, and with nothing but catchers in its way */
+    double background[3];            /* radiance that the world shows behind them; 0 where the film
+                                        is transparent */
+    double coverage;                 /* how much of the footage the catchers stand for */
+};
+
 struct trc_film {
     uint32_t width, height;      /* of the crop */
     double *sums[TRC_SUM_COUNT]; /* by pass: trc_film_channels * width * height, or NULL; bottom row
@@ -23,6 +33,9 @@ struct trc_film {
     uint32_t matte_count;                            /* places of a pixel's table; 0: no mattes */
     uint32_t *sample_counts;                         /* width * height */
     bool shows_counts;                               /* they are a pass */
+    struct trc_caught *caught; /* width * height, or NULL: the scene has no shadow catchers */
+    bool shows_shadows;        /* their shadows are a pass, so Combined is without them */
+    bool is_transparent;       /* trc_render_desc.film_transparent */
 };
 
 /* TRC_ERROR_TOO_LARGE unless so many bytes for every pixel fit into the machine's memory: a system
@@ -44,6 +57,10 @@ bool trc_film_is_first_sample(uint32_t pass);
 /* Takes the memory of the passes and mattes that desc asks for, zeroed; desc is resolved.
  * TRC_ERROR_TOO_LARGE or OUT_OF_MEMORY. */
 trc_status trc_film_create(const trc_render_desc *desc, struct trc_film *film);
+
+/* Takes the memory for shadow catchers. TRC_ERROR_TOO_LARGE or OUT_OF_MEMORY. */
+trc_status trc_film_add_catchers(struct trc_film *film);
+
 void trc_film_destroy(struct trc_film *film);
 
 /* The colour pass that goes with a diffuse, glossy or transmission pass, TRC_PASS_COMBINED for

@@ -28,16 +28,16 @@ struct trc_tile_job {
     struct trc_adaptive *adaptive; /* NULL: every pixel gets every sample */
     uint32_t x, y, width, height;  /* in the crop, pixels */
     uint32_t sample_begin, sample_end;
-    void *memory;              /* tile_memory_bytes(desc) bytes, 64-byte aligned, one thread's */
-    const atomic_uint *cancel; /* non-zero: return soon, the tile's pixels keep whole samples */
+    void *memory;                  /* tile_memory_bytes(...) bytes, 64-byte aligned, one thread's */
+    const atomic_uint *cancel;     /* non-zero: return soon, the tile's pixels keep whole samples */
     struct trc_tile_counts counts; /* added to */
 };
 
 struct trc_kernels {
     uint32_t isa;   /* TRC_ISA_* */
     uint32_t width; /* lanes */
-    /* Bytes of scratch memory a tile job needs. */
-    size_t (*tile_memory_bytes)(const trc_render_desc *desc);
+    /* Bytes of scratch memory a tile job needs; catchers: the scene has shadow catchers. */
+    size_t (*tile_memory_bytes)(const trc_render_desc *desc, bool catchers);
     /* Renders a job; never fails. The thread's floating-point state must be the default. */
     void (*tile_render)(struct trc_tile_job *job);
     /* trc_query_*: arguments already validated; chunk [begin, end) of the arrays. packet_size

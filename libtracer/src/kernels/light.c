@@ -191,7 +191,7 @@ static void sample_world(const struct draw *d, vmask m) {
 /* Bits of the lights in lanes m, all elsewhere. */
 static vuint visibility_of(const struct trc_snapshot *scene, vint light, vmask m) {
     const struct trc_light_table *t = scene->lights;
-    vuint bits = vu_set(TRC_VISIBLE_ALL);
+    vuint bits = vu_set(TRC_VISIBLE_ALL | TRC_VISIBLE_UNBLOCKED);
     const vmask lamp = vm_and(m, vi_lt(light, vi_set((int32_t)t->lamp_count)));
     if (vm_any(lamp)) {
         const vuint word = vu_gather(&t->lamps->visibility, light * vi_set(TRC_LAMP_WORDS), lamp);
@@ -216,11 +216,13 @@ vfloat TRC_KERNEL(trc_light_chosen)(const struct trc_surface *s, vvec3 n,
 }
 
 vuint TRC_KERNEL(trc_light_visibility)(const struct trc_snapshot *snapshot,
-                                       const struct trc_light_sample *sample) {
+                                       const struct trc_light_sample *sample, vuint path) {
     if (!snapshot->lights->hides)
         return vu_set(TRC_VISIBLE_ALL);
     const vmask chosen = vm_not(vi_lt(sample->light, vi_set(0)));
-    return visibility_of(snapshot, sample->light, chosen);
+    const vuint bits = visibility_of(snapshot, sample->light, chosen);
+    const vint hidden = (vint)(path & ~bits & vu_set(TRC_VISIBLE_UNBLOCKED));
+    return (vuint)vi_select(vi_eq(hidden, vi_set(0)), (vint)bits, vi_set(0));
 }
 
 /* A continuation ray towards wi is a glossy one above the surface and a transmitted one below. */

@@ -61,11 +61,11 @@ void TRC_KERNEL(trc_light_sample_prepared)(const struct trc_surface *s,
 vfloat TRC_KERNEL(trc_light_chosen)(const struct trc_surface *s, vvec3 n,
                                     const struct trc_light_sample *sample, vmask m);
 
-/* Visibility bits (TRC_VISIBLE_*) of the light each lane chose; all bits in lanes that chose none.
- * When the scene's lights hide from nothing, the caller can skip it: trc_light_table.hides is
- * false. */
+/* Visibility bits (TRC_VISIBLE_*) of the light each lane chose, none where unblocked rays, by their
+ * path, are not to have it; all bits in lanes that chose none. When the scene's lights hide from
+ * nothing, the caller can skip it: trc_light_table.hides is false. */
 vuint TRC_KERNEL(trc_light_visibility)(const struct trc_snapshot *snapshot,
-                                       const struct trc_light_sample *sample);
+                                       const struct trc_light_sample *sample, vuint path);
 
 /* Light seen directly by rays that were traced from p in direction wi over (tmin, tmax] (tmax
  * TRC_FAR for a miss): area, point, spot with extent; with tmax == TRC_FAR also the sun. Lights do

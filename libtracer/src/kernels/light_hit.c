@@ -13,10 +13,11 @@ TRC_INLINE vfloat ray_weight(vfloat pb, vfloat pl, vfloat count) {
     return vf_select(vf_lt(pb, vf_zero()), vf_one(), w);
 }
 
-/* Lanes that an object of these visibility bits hides from, as Cycles tests lights: diffuse and
- * transmitted rays by their bit, glossy ones only when reflected. */
+/* Lanes that an object of these visibility bits hides from, as Cycles tests lights: diffuse,
+ * transmitted and unblocked rays by their bit, glossy ones only when reflected. */
 TRC_INLINE vmask hidden_from(uint32_t visibility, vuint path) {
-    uint32_t hides = ~visibility & (TRC_VISIBLE_DIFFUSE | TRC_VISIBLE_TRANSMISSION);
+    uint32_t hides =
+        ~visibility & (TRC_VISIBLE_DIFFUSE | TRC_VISIBLE_TRANSMISSION | TRC_VISIBLE_UNBLOCKED);
     vmask hidden = vm_none();
     if (hides)
         hidden = vm_not(vi_eq((vint)(path & vu_set(hides)), vi_set(0)));

@@ -210,6 +210,21 @@ static void shade_rays(struct trc_tile *t) {
     }
 }
 
+/* Splits rays at shadow catchers; where the background is shown, what of it is behind them too. */
+static void catch_shadows(struct trc_tile *t) {
+    uint32_t i = t->work.count;
+    TRC_KERNEL(trc_catcher_split)(t);
+    for (; i < t->work.count && !t->desc->film_transparent; i += TRC_WIDTH) {
+        struct arrival a;
+        const vmask active = vm_first((int32_t)(t->work.count - i));
+        arrival_load(t, vi_set((int32_t)i) + vi_lane(), active, &a);
+        const vuint sample = trc_sample_of(a.slot);
+        const vuint row = vu_set(TRC_ROW_BACKGROUND * TRC_CATCHER_BATCH);
+        vu_store(a.slots, sample + row);
+        shade_misses(t, &a, active);
+    }
+}
+
 /* ---- direct light ---- */
 
 /* Origin of a ray that leaves s towards w: moved along the geometric normal out of the box of the
@@ -267,7 +282,7 @@ static vmask light_contribute(const struct trc_tile *t, const struct arrival *a,
     struct trc_bsdf_value f;
     TRC_KERNEL(trc_bsdf_eval)(lobes, s, l->wi, active, &f);
     const vfloat one = vf_set(1.0f), zero = vf_set(0.0f);
-    const vuint seen = TRC_KERNEL(trc_light_visibility)(t->snapshot, l);
+    const vuint seen = TRC_KERNEL(trc_light_visibility)(t->snapshot, l, a->path);
     const vmask alone = vm_or(l->delta, l->no_mis);
     vfloat mis, mis_diffuse = one;
     if (t->desc->integrator == TRC_INTEGRATOR_DISTRIBUTION) {
@@ -481,6 +496,10 @@ static void occlusion_pass(struct trc_tile *t, const struct arrival *a, const st
     active = vm_and(active, vf_gt(v3_max(r.diffuse), vf_set(0.0f)));
     struct arrival own = *a;
     own.path = a->path | vu_set(TRC_PATH_OCCLUSION);
+    if (t->catchers) {
+        own.slot = trc_sample_of(a->slot);
+        active = vm_andnot(active, trc_is_unblocked(a->path));
+    }
     if (vm_any(active))
         shadow_push(t, &own, s, &sample, &r, trc_direction_cell(sample.wi), active);
 }
@@ -535,7 +554,7 @@ static void ray_push(struct trc_tile *t, const struct arrival *a, const struct t
     kind = kind | (vuint)vi_select(ideal, vi_set(TRC_PATH_SINGULAR), vi_set(0));
     kind = kind | (vuint)vi_select(b->diffuse, vi_set(TRC_VISIBLE_DIFFUSE), vi_set(0));
     kind = kind | (vuint)vi_select(first, own, (vint)category);
-    kind = kind | (a->path & vu_set(TRC_PATH_DATA_DONE | TRC_PATH_TOLD)) |
+    kind = kind | (a->path & vu_set(TRC_PATH_DATA_DONE | TRC_PATH_TOLD | TRC_VISIBLE_UNBLOCKED)) |
            vu_set(a->world_alone ? TRC_PATH_WORLD_ALONE : 0);
     vuint path = (vuint)vi_select(straight, (vint)a->path, (vint)kind);
     path = path | (vuint)vi_select(over, vi_set(TRC_PATH_LAST), vi_set(0));
@@ -686,6 +705,22 @@ static void surface_group_add(struct trc_tile *t, const struct arrival *a,
     group_add(t, a, active, light, groups);
 }
 
+/* Of a way that a shadow catcher split, the half that goes on as ever writes the sample's data. */
+static vuint data_passes(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
+                         const struct trc_material *m, const struct trc_registers *regs,
+                         const struct trc_lobes *lobes) {
+    const vfloat length = a->t - a->tmin;
+    if (!t->catchers)
+        return TRC_KERNEL(trc_data_passes)(t, s, m, regs, lobes, a->found_weight, a->beyond, length,
+                                           a->slots);
+    struct trc_surface seen = *s;
+    uint32_t samples[TRC_WIDTH];
+    seen.active = vm_andnot(s->active, trc_is_unblocked(a->path));
+    vu_store(samples, trc_sample_of(a->slot));
+    return TRC_KERNEL(trc_data_passes)(t, &seen, m, regs, lobes, a->found_weight, a->beyond, length,
+                                       samples);
+}
+
 static void shade_group(struct trc_tile *t, uint32_t material, vint index, vmask active) {
     const struct trc_material *m = t->snapshot->materials[material];
     struct arrival a;
@@ -706,8 +741,7 @@ static void shade_group(struct trc_tile *t, uint32_t material, vint index, vmask
     if (m->has & TRC_MATERIAL_HAS_HOLDOUT)
         holdout(t, &a, &lobes, active);
     if (t->extra_passes)
-        a.path = TRC_KERNEL(trc_data_passes)(t, &s, m, &regs, &lobes, a.found_weight, a.beyond,
-                                             a.t - a.tmin, a.slots);
+        a.path = data_passes(t, &a, &s, m, &regs, &lobes);
     if (m->has & TRC_MATERIAL_HAS_EMISSION) {
         const vmask lit = vm_and(active, vf_gt(v3_max(lobes.emission), vf_set(0.0f)));
         if (vm_any(lit)) {
@@ -747,6 +781,8 @@ void TRC_KERNEL(trc_shade_batch)(struct trc_tile *t) {
     if (t->snapshot->features & (TRC_FEATURE_LIGHTS | TRC_FEATURE_ENVIRONMENT) ||
         t->desc->film_transparent)
         shade_rays(t);
+    if (t->catchers)
+        catch_shadows(t);
     /* Hits by material; those that missed have the last key. */
     uint32_t keys_count = t->snapshot->material_count + 1;
     if (keys_count > TRC_BINS)

@@ -7,7 +7,8 @@
 #include "kernels/tile.h"
 #include "kernels/wide_math.h"
 
-static void packet_load(struct trc_tile *t, const uint32_t *order, uint32_t count) {
+static void packet_load(struct trc_tile *t, const uint32_t *order, uint32_t count,
+                        uint32_t visibility) {
     const struct trc_shadow_store *q = &t->shadows;
     struct trc_packet *p = &t->packet;
     p->active = 0;
@@ -26,7 +27,7 @@ static void packet_load(struct trc_tile *t, const uint32_t *order, uint32_t coun
         /* Lights that cast no shadow have a negative reach: not traced, never occluded. */
         p->active |= (uint64_t)(vm_bits(vm_and(m, vf_gt(tmax, vf_set(0.0f))))) << i;
     }
-    p->visibility = TRC_VISIBLE_SHADOW;
+    p->visibility = visibility;
     p->common_origin = false;
     p->skip_transparent = t->snapshot->features & TRC_FEATURE_TRANSPARENCY;
 }
@@ -171,22 +172,16 @@ static void groups_add(struct trc_tile *t) {
     }
 }
 
-void TRC_KERNEL(trc_shadow_flush)(struct trc_tile *t) {
-    struct trc_shadow_store *q = &t->shadows;
-    if (!q->count)
-        return;
+/* Traces the rays [begin, end) of the order, which see what has that visibility, and takes from
+ * what they carry what does not arrive. */
+static void rays_trace(struct trc_tile *t, uint32_t begin, uint32_t end, uint32_t visibility) {
+    const struct trc_shadow_store *q = &t->shadows;
     const bool transparent = t->snapshot->features & TRC_FEATURE_TRANSPARENCY;
-    TRC_KERNEL(trc_clock_trace)(t);
-    for (uint32_t i = 0; i < q->count; i++)
-        t->keys[i] = q->target[i] < TRC_BINS ? q->target[i] : TRC_BINS - 1;
-    TRC_KERNEL(trc_tile_sort)(t, t->keys, q->count, q->order);
-    memset(q->order + q->count, 0, TRC_PACKET_SIZE * sizeof *q->order);
-    for (uint32_t begin = 0; begin < q->count; begin += t->packet_size) {
-        const uint32_t count =
-            q->count - begin < t->packet_size ? q->count - begin : t->packet_size;
+    for (; begin < end; begin += t->packet_size) {
+        const uint32_t count = end - begin < t->packet_size ? end - begin : t->packet_size;
         const uint32_t *order = q->order + begin;
         float factor[3][TRC_PACKET_SIZE];
-        packet_load(t, order, count);
+        packet_load(t, order, count, visibility);
         uint64_t blocked = TRC_KERNEL(trc_trace_occluded)(t->snapshot, &t->packet);
         const uint64_t traced = t->packet.active;
         t->job->counts.rays_shadow += (uint64_t)__builtin_popcountll(traced);
@@ -202,6 +197,36 @@ void TRC_KERNEL(trc_shadow_flush)(struct trc_tile *t) {
         for (; blocked; blocked &= blocked - 1)
             light_scale(t, order[__builtin_ctzll(blocked)], 0.0f, 0.0f, 0.0f);
     }
+}
+
+/* Moves unblocked rays behind the others, each kind in its order. Returns how many others there
+ * are. */
+static uint32_t unblocked_last(struct trc_tile *t) {
+    struct trc_shadow_store *q = &t->shadows;
+    uint32_t others = 0, unblocked = 0;
+    for (uint32_t i = 0; i < q->count; i++) {
+        const uint32_t ray = q->order[i];
+        if (q->path[ray] & TRC_VISIBLE_UNBLOCKED)
+            t->keys[unblocked++] = ray;
+        else
+            q->order[others++] = ray;
+    }
+    memcpy(q->order + others, t->keys, unblocked * sizeof *q->order);
+    return others;
+}
+
+void TRC_KERNEL(trc_shadow_flush)(struct trc_tile *t) {
+    struct trc_shadow_store *q = &t->shadows;
+    if (!q->count)
+        return;
+    TRC_KERNEL(trc_clock_trace)(t);
+    for (uint32_t i = 0; i < q->count; i++)
+        t->keys[i] = q->target[i] < TRC_BINS ? q->target[i] : TRC_BINS - 1;
+    TRC_KERNEL(trc_tile_sort)(t, t->keys, q->count, q->order);
+    memset(q->order + q->count, 0, TRC_PACKET_SIZE * sizeof *q->order);
+    const uint32_t blocked = t->catchers ? unblocked_last(t) : q->count;
+    rays_trace(t, 0, blocked, TRC_VISIBLE_SHADOW);
+    rays_trace(t, blocked, q->count, TRC_VISIBLE_SHADOW << TRC_UNBLOCKED_SHIFT);
     if (t->occlusion_passes)
         occlusion_add(t);
     if (t->desc->light_group_count)

@@ -6,7 +6,8 @@
 #include "scene/snapshot.h"
 #include "shading/material.h"
 
-/* What kind of ray arrived, for Light Path and for visibility: TRC_VISIBLE_* in the low bits. */
+/* What kind of ray arrived, for Light Path and for visibility: TRC_VISIBLE_* and UNBLOCKED in the
+ * low bits. */
 enum {
     TRC_PATH_SINGULAR = 1 << 8,                /* last bounce was ideal */
     TRC_PATH_REFLECTED = 1 << 9,               /* last bounce was a reflection */

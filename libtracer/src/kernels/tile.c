@@ -48,9 +48,15 @@ static bool wants_light_passes(const trc_render_desc *desc) {
     return desc->passes >> TRC_PASS_DIFFUSE_DIRECT & 0x1ff;
 }
 
-static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc, void *memory) {
+/* Entries of columns: of samples, and of the rays of a step. */
+static uint32_t column_entries(bool catchers) {
+    return catchers ? TRC_CATCHER_ROWS * TRC_CATCHER_BATCH : TRC_BATCH;
+}
+
+static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc, bool catchers,
+                         void *memory) {
     struct carver c = {memory, 0};
-    const size_t batch = (TRC_BATCH + TRC_WIDTH) * sizeof(float);
+    const size_t batch = (column_entries(catchers) + TRC_WIDTH) * sizeof(float);
     const size_t queue = (TRC_SHADOW_QUEUE + TRC_PACKET_SIZE) * sizeof(float);
     carve_rays(&c, &t->stack, stack_capacity(desc));
     carve_rays(&c, &t->work, stack_capacity(desc));
@@ -93,10 +99,10 @@ static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc, void *
     return c.used;
 }
 
-size_t TRC_KERNEL(trc_tile_memory_bytes)(const trc_render_desc *desc) {
+size_t TRC_KERNEL(trc_tile_memory_bytes)(const trc_render_desc *desc, bool catchers) {
     struct trc_tile t;
     memset(&t, 0, sizeof t);
-    return sizeof t + 64 + tile_carve(&t, desc, NULL);
+    return sizeof t + 64 + tile_carve(&t, desc, catchers, NULL);
 }
 
 /* ---- sorting ---- */
@@ -136,18 +142,23 @@ uint32_t TRC_KERNEL(trc_hit_material)(const struct trc_snapshot *snapshot, uint3
 
 /* Rays of one packet share their visibility; beyond that the assembly decides (Boulos et al. 2007,
  * section 3.3). Keys are what rays of a packet share; runs break packets where the key changes. */
+#define RAY_KIND (TRC_VISIBLE_ALL | TRC_VISIBLE_UNBLOCKED)
+#define RAY_KIND_BITS 6
+static bool all_see_the_same(const struct trc_tile *t) {
+    return !(t->snapshot->features & (TRC_FEATURE_VISIBILITY | TRC_FEATURE_SHADOW_CATCHERS));
+}
 static uint32_t assembly_key(const struct trc_tile *t, uint32_t ray) {
     const struct trc_ray_store *r = &t->work;
-    const uint32_t kind = r->w[TRC_RAY_PATH][ray] & TRC_VISIBLE_ALL;
+    const uint32_t kind = r->w[TRC_RAY_PATH][ray] & RAY_KIND;
     switch (t->desc->assembly) {
     case TRC_ASSEMBLY_BLIND:
-        return t->snapshot->features & TRC_FEATURE_VISIBILITY ? kind : 0;
+        return all_see_the_same(t) ? 0 : kind;
     case TRC_ASSEMBLY_GROUPS:
-        return kind | (r->w[TRC_RAY_PARENT][ray] & 127u) << 5;
+        return kind | (r->w[TRC_RAY_PARENT][ray] & 63u) << RAY_KIND_BITS;
     case TRC_ASSEMBLY_OCTANTS:
-        return kind | (uint32_t)(r->f[TRC_RAY_DX][ray] < 0.0f) << 5 |
-               (uint32_t)(r->f[TRC_RAY_DY][ray] < 0.0f) << 6 |
-               (uint32_t)(r->f[TRC_RAY_DZ][ray] < 0.0f) << 7;
+        return kind | (uint32_t)(r->f[TRC_RAY_DX][ray] < 0.0f) << RAY_KIND_BITS |
+               (uint32_t)(r->f[TRC_RAY_DY][ray] < 0.0f) << (RAY_KIND_BITS + 1) |
+               (uint32_t)(r->f[TRC_RAY_DZ][ray] < 0.0f) << (RAY_KIND_BITS + 2);
     default:
         return kind;
     }
@@ -157,13 +168,14 @@ static uint32_t assembly_key(const struct trc_tile *t, uint32_t ray) {
 static void keys_by_direction(struct trc_tile *t) {
     const struct trc_ray_store *r = &t->work;
     for (uint32_t i = 0; i < r->count; i += TRC_WIDTH) {
-        const vuint kind = vu_load(r->w[TRC_RAY_PATH] + i) & vu_set(TRC_VISIBLE_ALL);
+        const vuint kind = vu_load(r->w[TRC_RAY_PATH] + i) & vu_set(RAY_KIND);
         const vvec3 d = v3(vf_load(r->f[TRC_RAY_DX] + i), vf_load(r->f[TRC_RAY_DY] + i),
                            vf_load(r->f[TRC_RAY_DZ] + i));
         const vuint cell = kind * vu_set(TRC_DIRECTION_CELLS) + trc_direction_cell(d);
         const vmask camera =
             vi_eq((vint)(kind & vu_set(TRC_VISIBLE_CAMERA)), vi_set(TRC_VISIBLE_CAMERA));
-        vi_store((int32_t *)t->keys + i, vi_select(camera, vi_set(0), (vint)cell));
+        const vuint straight = (kind & vu_set(TRC_VISIBLE_UNBLOCKED)) * vu_set(TRC_DIRECTION_CELLS);
+        vi_store((int32_t *)t->keys + i, vi_select(camera, (vint)straight, (vint)cell));
     }
 }
 
@@ -191,10 +203,11 @@ static void packet_trace(struct trc_tile *t, const uint32_t *order, uint32_t cou
     }
     const uint32_t path = r->w[TRC_RAY_PATH][order[0]];
     p->active = count < TRC_PACKET_SIZE ? (1ull << count) - 1 : ~0ull;
-    p->visibility =
-        t->desc->assembly == TRC_ASSEMBLY_BLIND && !(t->snapshot->features & TRC_FEATURE_VISIBILITY)
-            ? TRC_VISIBLE_ALL
-            : path & TRC_VISIBLE_ALL;
+    p->visibility = t->desc->assembly == TRC_ASSEMBLY_BLIND && all_see_the_same(t)
+                        ? TRC_VISIBLE_ALL
+                        : path & TRC_VISIBLE_ALL;
+    if (path & TRC_VISIBLE_UNBLOCKED)
+        p->visibility <<= TRC_UNBLOCKED_SHIFT;
     p->common_origin = (path & TRC_VISIBLE_CAMERA) && t->camera_common;
     p->skip_transparent = false;
     memset(h->instance, 0xff, count * sizeof *h->instance);
@@ -274,7 +287,7 @@ static void stack_take(struct trc_tile *t) {
 #define LAST_GENERATION 200
 
 static void samples_clear(struct trc_tile *t) {
-    const size_t bytes = TRC_BATCH * sizeof(float);
+    const size_t bytes = column_entries(t->catchers) * sizeof(float);
     for (int k = 0; k < 3; k++)
         memset(t->samples.radiance[k], 0, bytes);
     memset(t->samples.transparency, 0, bytes);
@@ -298,6 +311,29 @@ TRC_INLINE bool is_finite_sample(const struct trc_tile *t, uint32_t slot) {
                     t->samples.radiance[2][slot]);
 }
 
+/* Adds what shadow catchers of a sample got to its pixel, if it is finite. */
+static void film_add_caught(struct trc_tile *t, uint32_t sample, size_t pixel) {
+    const uint32_t blocked = sample + TRC_ROW_BLOCKED * TRC_CATCHER_BATCH;
+    const uint32_t unblocked = sample + TRC_ROW_UNBLOCKED * TRC_CATCHER_BATCH;
+    const uint32_t background = sample + TRC_ROW_BACKGROUND * TRC_CATCHER_BATCH;
+    if (!is_finite_sample(t, blocked) || !is_finite_sample(t, unblocked) ||
+        !is_finite_sample(t, background)) {
+        t->job->counts.dropped_samples++;
+        return;
+    }
+    struct trc_caught *sum = &t->job->film->caught[pixel];
+    double *environment = t->job->film->sums[TRC_PASS_ENVIRONMENT];
+    for (int c = 0; c < 3; c++) {
+        const double behind = (double)t->samples.radiance[c][background];
+        sum->blocked[c] += (double)t->samples.radiance[c][blocked];
+        sum->unblocked[c] += (double)t->samples.radiance[c][unblocked];
+        sum->background[c] += behind;
+        if (environment)
+            environment[3 * pixel + (size_t)c] += behind;
+    }
+    sum->coverage -= (double)t->samples.transparency[blocked];
+}
+
 /* Adds a sample's passes to its pixel. */
 static void film_add_passes(struct trc_tile *t, uint32_t slot, size_t pixel, bool first) {
     for (uint32_t i = 0; i < t->samples.pass_count; i++) {
@@ -314,6 +350,8 @@ static void film_add_passes(struct trc_tile *t, uint32_t slot, size_t pixel, boo
                 sum[k] += value;
         }
     }
+    if (t->catchers)
+        film_add_caught(t, slot, pixel);
 }
 
 /* Adds the samples [begin, end), of one pixel, to it, in their order. Those that are not finite are
@@ -366,13 +404,27 @@ static void film_add_adaptive(struct trc_tile *t) {
         struct trc_adaptive_pixel *p = &t->job->adaptive->pixels[pixel];
         for (int c = 0; c < 3; c++)
             p->sum[c] += (double)t->samples.radiance[c][slot];
+        /* A catcher's light is as noisy as the shadow on it. */
+        for (int c = 0; t->catchers && c < 3; c++)
+            p->sum[c] += (double)t->samples.radiance[c][slot + TRC_ROW_BLOCKED * TRC_CATCHER_BATCH];
         if (p->reasons & TRC_PIXEL_COUNTS)
             film_add_run(t, slot, slot + 1, pixel);
     }
 }
 
+/* Rows of a catcher's light belong to the pixels of the first. */
+static void samples_repeat(struct trc_tile *t) {
+    uint32_t *const columns[] = {t->samples.pixel, t->samples.index};
+    for (int k = 0; k < 2; k++)
+        for (uint32_t row = 1; row < TRC_CATCHER_ROWS; row++)
+            memcpy(columns[k] + row * TRC_CATCHER_BATCH, columns[k],
+                   TRC_CATCHER_BATCH * sizeof *columns[k]);
+}
+
 static void batch_render(struct trc_tile *t) {
     samples_clear(t);
+    if (t->catchers)
+        samples_repeat(t);
     TRC_KERNEL(trc_camera_rays)(t);
     t->generation = 0;
     while (t->stack.count) {
@@ -497,11 +549,12 @@ static void batch_flush(struct trc_tile *t, enum sharing sharing) {
 /* The samples [begin, end) of the tile's pixels. */
 static void samples_render(struct trc_tile *t, uint32_t begin, uint32_t end) {
     const struct trc_tile_job *job = t->job;
+    const uint32_t most = t->catchers ? TRC_CATCHER_BATCH : TRC_BATCH;
     const enum sharing sharing = sharing_of(t, end - begin);
     t->samples.count = 0;
     for (uint32_t y = 0; y < job->height; y += SQUARE)
         for (uint32_t x = 0; x < job->width; x += SQUARE) {
-            if (t->samples.count + square_pixels(t, x, y) * (end - begin) > TRC_BATCH)
+            if (t->samples.count + square_pixels(t, x, y) * (end - begin) > most)
                 batch_flush(t, sharing);
             square_append(t, x, y, begin, end);
         }
@@ -512,13 +565,14 @@ void TRC_KERNEL(trc_tile_render)(struct trc_tile_job *job) {
     char *memory = job->memory;
     struct trc_tile *t = (struct trc_tile *)memory;
     memset(t, 0, sizeof *t);
-    tile_carve(t, job->desc, memory + ((sizeof *t + 63) & ~(size_t)63));
+    t->catchers = job->snapshot->features & TRC_FEATURE_SHADOW_CATCHERS;
+    tile_carve(t, job->desc, t->catchers, memory + ((sizeof *t + 63) & ~(size_t)63));
     t->job = job;
     t->snapshot = job->snapshot;
     t->desc = job->desc;
     t->sampler = (struct trc_sampler){job->desc->sampler, job->desc->seed, job->desc->sample_count,
                                       job->sampler_table};
-    t->extra_passes = t->samples.pass_count || job->desc->cryptomattes;
+    t->extra_passes = t->samples.pass_count || job->desc->cryptomattes || t->catchers;
     t->light_passes = wants_light_passes(job->desc);
     t->occlusion_passes = t->samples.pass[TRC_PASS_AMBIENT_OCCLUSION][0] || t->shadows.lamp[0];
     t->object_motion =
@@ -530,9 +584,9 @@ void TRC_KERNEL(trc_tile_render)(struct trc_tile_job *job) {
         job->desc->packet_size < TRC_PACKET_SIZE ? job->desc->packet_size : TRC_PACKET_SIZE;
     t->clock = &job->counts.seconds_other;
     t->clock_start = trc_seconds();
+    const uint32_t most = t->catchers ? SAMPLES_PER_BATCH / 2 : SAMPLES_PER_BATCH;
     for (uint32_t s = job->sample_begin; s < job->sample_end && !*job->cancel;) {
-        const uint32_t end =
-            job->sample_end - s > SAMPLES_PER_BATCH ? s + SAMPLES_PER_BATCH : job->sample_end;
+        const uint32_t end = job->sample_end - s > most ? s + most : job->sample_end;
         samples_render(t, s, end);
         s = end;
     }

@@ -23,7 +23,8 @@ enum {
     TRC_PATH_LAST = 1 << 14,      /* only emission counts at the next surface */
     TRC_PATH_DATA_DONE = 1 << 15, /* data passes of the sample are written */
     TRC_PATH_TOLD = 1 << 16,      /* and the denoising passes of this way of it */
-    TRC_PATH_OCCLUSION = 1 << 17  /* shadow rays: of the pass of ambient occlusion, no light */
+    TRC_PATH_OCCLUSION = 1 << 17, /* shadow rays: of the pass of ambient occlusion, no light */
+    TRC_PATH_CAUGHT = 1 << 18     /* the camera sees this way through a shadow catcher */
 };
 
 /* What a path's first bounce was; diffuse: through a translucent surface. */
@@ -82,7 +83,18 @@ struct trc_hit_store {
     uint32_t *instance, *triangle, *material;
 };
 
-/* Samples of the batch, by slot. */
+/* With shadow catchers a batch holds half as many samples, as each may be two rays, and the columns
+ * of samples have four rows of them (kernels/catcher.c). */
+#define TRC_CATCHER_BATCH (TRC_BATCH / 2)
+enum trc_sample_row {
+    TRC_ROW_PICTURE, /* all but what is behind a catcher's surface; the only row without catchers */
+    TRC_ROW_BLOCKED, /* the catcher's light as it is; transparency: minus its coverage */
+    TRC_ROW_UNBLOCKED, /* and with nothing but catchers in its way */
+    TRC_ROW_BACKGROUND /* what the world shows behind it */
+};
+#define TRC_CATCHER_ROWS 4
+
+/* Samples of the batch, by slot: row * TRC_CATCHER_BATCH + number. */
 struct trc_sample_store {
     uint32_t count;
     uint32_t *pixel; /* x | y << 16 in the full frame */
@@ -115,7 +127,8 @@ struct trc_tile {
     const struct trc_snapshot *snapshot;
     const trc_render_desc *desc;
     struct trc_sampler sampler;
-    bool extra_passes;          /* more than Combined, or mattes */
+    bool catchers;              /* the scene has shadow catchers */
+    bool extra_passes;          /* more than Combined, or mattes, or shadow catchers */
     bool light_passes;          /* some pass wants light by kind */
     bool occlusion_passes;      /* some pass wants what shadow rays find, not light */
     bool object_motion;         /* rays need times */
@@ -174,11 +187,24 @@ uint32_t TRC_KERNEL(trc_hit_material)(const struct trc_snapshot *snapshot, uint3
 void TRC_KERNEL(trc_clock_trace)(struct trc_tile *t);
 void TRC_KERNEL(trc_clock_shade)(struct trc_tile *t);
 
-size_t TRC_KERNEL(trc_tile_memory_bytes)(const trc_render_desc *desc);
+size_t TRC_KERNEL(trc_tile_memory_bytes)(const trc_render_desc *desc, bool catchers);
 void TRC_KERNEL(trc_tile_render)(struct trc_tile_job *job);
 
 /* Camera rays of the samples' slots, into the empty stack; also their times. (kernels/camera.c) */
 void TRC_KERNEL(trc_camera_rays)(struct trc_tile *t);
+
+/* Splits the rays of t->work that see a shadow catcher; appends their other halves.
+ * (kernels/catcher.c) */
+void TRC_KERNEL(trc_catcher_split)(struct trc_tile *t);
+
+/* Which rays carry light without what blocks it. */
+TRC_INLINE vmask trc_is_unblocked(vuint path) {
+    const vint unblocked = vi_set(TRC_VISIBLE_UNBLOCKED);
+    return vi_eq((vint)path & unblocked, unblocked);
+}
+
+/* A slot's sample, whatever its row; of scenes with shadow catchers. */
+TRC_INLINE vuint trc_sample_of(vuint slot) { return slot & vu_set(TRC_CATCHER_BATCH - 1); }
 
 /* Shades the hits of t->work, sorted by material, and what missed. (kernels/shade.c) */
 void TRC_KERNEL(trc_shade_batch)(struct trc_tile *t);

@@ -138,6 +138,13 @@ static void place(struct trc_instance *instance, const struct trc_scene_instance
     instance->flips = trc_affine_flips(&transforms[0]);
 }
 
+/* What sees an instance; an unblocked ray sees catchers alone. */
+static uint32_t visibility_of(const struct trc_scene_instance *source) {
+    if (!(source->flags & TRC_INSTANCE_SHADOW_CATCHER) || !source->visibility)
+        return source->visibility;
+    return source->visibility | source->visibility << TRC_UNBLOCKED_SHIFT | TRC_VISIBLE_UNBLOCKED;
+}
+
 static uint64_t fill_instances(const struct trc_scene_state *scene,
                                const struct instance_data *data, struct trc_snapshot *s) {
     const struct trc_store *store = &scene->instances;
@@ -152,7 +159,7 @@ static uint64_t fill_instances(const struct trc_scene_state *scene,
         const uint32_t material_count = source->material_count ? source->material_count : 1;
         *instance = (struct trc_instance){
             .mesh = mesh->index,
-            .visibility = source->visibility,
+            .visibility = visibility_of(source),
             .material_count = material_count,
             .materials = materials,
             .value_count = source->value_count,
@@ -215,7 +222,7 @@ void trc_collect_view(const struct trc_scene_state *scene, struct trc_snapshot_b
     const uint32_t index = trc_scene_material_index(scene, desc->material);
     s->world = (struct trc_world){
         .material = index ? index : UINT32_MAX,
-        .visibility = desc->visibility,
+        .visibility = desc->visibility | TRC_VISIBLE_UNBLOCKED,
         .is_constant = 1,
         .ao_distance = desc->ao_distance,
         .ao_factor = desc->ao_factor,

@@ -109,6 +109,7 @@ static trc_status make_instance(const struct trc_scene_state *scene, const trc_i
         .cryptomatte_object = desc->cryptomatte_object,
         .cryptomatte_asset = desc->cryptomatte_asset,
         .light_group = desc->light_group,
+        .flags = desc->flags,
     };
     memcpy(instance->color, desc->color, sizeof instance->color);
     *instance_out = instance;

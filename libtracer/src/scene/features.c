@@ -32,10 +32,12 @@ static uint32_t instance_features(const struct trc_snapshot *s) {
     uint32_t features = 0;
     for (uint32_t i = 0; i < s->instance_count; i++) {
         const struct trc_instance *instance = &s->instances[i];
-        if (instance->visibility != TRC_VISIBLE_ALL)
+        if ((instance->visibility & TRC_VISIBLE_ALL) != TRC_VISIBLE_ALL)
             features |= TRC_FEATURE_VISIBILITY;
         if (!instance->visibility)
             continue;
+        if (instance->visibility & TRC_VISIBLE_UNBLOCKED)
+            features |= TRC_FEATURE_SHADOW_CATCHERS;
         if (instance->key_count > 1)
             features |= TRC_FEATURE_OBJECT_MOTION;
         if (s->meshes[instance->mesh]->key_count > 1)

@@ -48,6 +48,7 @@ struct trc_scene_instance {
     float color[4];
     float cryptomatte_object, cryptomatte_asset;
     uint32_t light_group; /* of its emission, from 1 on; 0: none */
+    uint32_t flags;       /* TRC_INSTANCE_* */
 };
 
 struct trc_scene_state {

@@ -47,12 +47,20 @@ struct trc_affine {
     float m[12];
 };
 
+/* Visibility beside TRC_VISIBLE_*. Unblocked rays find the light that would be there if nothing but
+ * shadow catchers could be in its way (kernels/catcher.c). */
+enum {
+    TRC_VISIBLE_UNBLOCKED = 1 << 5, /* of such rays, of shadow catchers, of lights they find */
+    TRC_UNBLOCKED_SHIFT = 8 /* shadow catchers have their TRC_VISIBLE_* here once more, so that one
+                               test of a traversal tells which unblocked rays meet them */
+};
+
 struct trc_instance {
     uint32_t mesh; /* into snapshot meshes */
     uint32_t key_count;
     const struct trc_affine *object_to_world; /* key_count */
     const struct trc_affine *world_to_object; /* key_count, inverse of each key */
-    uint32_t visibility;                      /* TRC_VISIBLE_* */
+    uint32_t visibility;                      /* TRC_VISIBLE_*; of catchers more, see above */
     uint32_t material_count;                  /* >= 1 */
     const uint32_t *materials;                /* into snapshot materials, per slot */
     uint32_t value_count;

@@ -128,6 +128,8 @@ static bool make_lamp(struct trc_lamp *lamp, const trc_light_desc *desc) {
         lamp->position[i] = m[4 * i + 3];
     lamp->kind = TRC_KIND_POINT;
     lamp->visibility = desc->visibility | TRC_VISIBLE_SHADOW;
+    if (!(desc->flags & TRC_LIGHT_SYNTHETIC))
+        lamp->visibility |= TRC_VISIBLE_UNBLOCKED;
     lamp->group = desc->light_group;
     lamp->flags =
         (desc->use_mis ? TRC_LAMP_MIS : 0) | (desc->cast_shadow ? TRC_LAMP_CASTS_SHADOW : 0);
@@ -308,7 +310,9 @@ static void add_triangles(struct trc_light_table *table, const struct trc_snapsh
         return;
     instance->first_light = table->first_triangle + before;
     table->kinds |= 1u << TRC_KIND_TRIANGLE;
-    table->hides |= (instance->visibility & RECEIVERS) != RECEIVERS;
+    const bool catchers = s->features & TRC_FEATURE_SHADOW_CATCHERS;
+    const uint32_t all = RECEIVERS | (catchers ? TRC_VISIBLE_UNBLOCKED : 0u);
+    table->hides |= (instance->visibility & all) != all;
 }
 
 /* Upper limit of the emissive triangles. */
@@ -403,7 +407,8 @@ static void add_lamps(struct trc_light_table *table, const struct trc_light_opti
         table->kinds |= 1u << lamp->kind;
         if (!options->scatters || !(lamp->visibility & RECEIVERS))
             continue;
-        table->hides |= (lamp->visibility & RECEIVERS) != RECEIVERS;
+        const uint32_t all = RECEIVERS | TRC_VISIBLE_UNBLOCKED;
+        table->hides |= (lamp->visibility & all) != all;
         if (lamp->kind == TRC_KIND_SUN) {
             table->distant[table->distant_count] = number;
             table->distant_irradiance[table->distant_count++] =

@@ -46,7 +46,7 @@ struct trc_lamp {
     float spread_scale; /* area: factor that keeps the power */
     float inv_area;
     int32_t kind, flags;
-    uint32_t visibility; /* TRC_VISIBLE_* */
+    uint32_t visibility; /* TRC_VISIBLE_*, UNBLOCKED too */
     uint32_t group;      /* light group; 0: none */
     float unused[6];
 };
@@ -115,8 +115,9 @@ struct trc_light_table {
     uint32_t world_light;    /* number of the world as a light, or UINT32_MAX */
     uint32_t first_triangle; /* number of the first emissive triangle */
     uint32_t kinds;          /* 1 << kind of every light present */
-    bool hides;              /* some light is not visible to all of diffuse, glossy, transmission */
-    bool single;             /* there is exactly one light (world apart: besides it) */
+    bool hides;       /* some light is not visible to all of diffuse, glossy, transmission, or
+                         not of the footage behind shadow catchers */
+    bool single;      /* there is exactly one light (world apart: besides it) */
     bool world_apart; /* the world is sampled beside the other lights, not chosen among them */
     bool moves;       /* some emissive triangle moves */
     bool varies;      /* some has emission by program */

@@ -72,7 +72,7 @@ static trc_status eye_render(const struct frame_scene *scene, const trc_render_d
         .sampler_table = table,
         .filter_table = filter_table,
         .film = &film,
-        .memory = buffer_alloc(1, trc_kernels_counted.tile_memory_bytes(desc)),
+        .memory = buffer_alloc(1, trc_kernels_counted.tile_memory_bytes(desc, false)),
         .cancel = &cancel};
     const uint64_t fp_state = trc_fp_enter();
     for (uint32_t y = 0; y < desc->crop_height; y += TILE_SIDE)
