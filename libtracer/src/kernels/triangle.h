@@ -62,6 +62,11 @@ static double trc_plane_error(const float a[3], const float b[3], const float c[
     return (double)TRC_GAMMA(8) * (mean[2] + slope * (fmax(mean[0], mean[1]) + mean[2]));
 }
 
+/* Where all vertices are on one side of the origin, along z, so is the hit, however steep the
+ * plane: nearest is sure to be beyond what moves the vertices. Else the inner sides of a spike
+ * would be lost. */
+#define TRC_Z_ERROR TRC_GAMMA(8)
+
 /* One ray against one triangle whose sheared coordinates are given (a: vertex 0: x, y, z relative
  * to the origin, x and y sheared); edge functions in double. False for a miss. */
 static __attribute__((noinline)) bool trc_triangle_exact(const float a[3], const float b[3],
@@ -81,7 +86,9 @@ static __attribute__((noinline)) bool trc_triangle_exact(const float a[3], const
     *v = (float)w[2];
     const double distance = (w[0] * a[2] + w[1] * b[2] + w[2] * c[2]) * sz;
     *t = (float)distance;
-    return fabs(distance) > trc_plane_error(a, b, c, w, det) * fabs((double)sz);
+    const float low = f_min(a[2], f_min(b[2], c[2])), high = f_max(a[2], f_max(b[2], c[2]));
+    return fabs(distance) > trc_plane_error(a, b, c, w, det) * fabs((double)sz) ||
+           f_max(low, -high) > TRC_Z_ERROR * f_max(high, -low);
 }
 
 #if TRC_WIDTH > 1
@@ -125,9 +132,13 @@ static __attribute__((noinline)) vmask trc_triangle_exact_lanes(const vfloat *co
     *t = __builtin_convertvector(distance, vfloat);
     *u = __builtin_convertvector(w[1], vfloat);
     *v = __builtin_convertvector(w[2], vfloat);
-    const trc_vlong hit =
-        inside & (det != 0.0) & (trc_vd_abs(distance) > error * trc_vd_abs(scale));
-    return vi_lt(__builtin_convertvector(hit, vint), vi_set(0));
+    const vfloat low = vf_min(corner[2], vf_min(corner[5], corner[8]));
+    const vfloat high = vf_max(corner[2], vf_max(corner[5], corner[8]));
+    const vmask sure = vf_gt(vf_max(low, -high), vf_set(TRC_Z_ERROR) * vf_max(high, -low));
+    const trc_vlong cuts = inside & (det != 0.0);
+    const trc_vlong apart = trc_vd_abs(distance) > error * trc_vd_abs(scale);
+    const vmask hit = vi_lt(__builtin_convertvector(cuts, vint), vi_set(0));
+    return vm_and(hit, vm_or(sure, vi_lt(__builtin_convertvector(apart, vint), vi_set(0))));
 }
 #endif
 
