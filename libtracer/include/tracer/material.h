@@ -96,10 +96,12 @@ enum {
                                    - 1 in bits 0-1, TRC_FRACTAL_* from bit TRC_NOISE_TYPE_SHIFT */
     TRC_NODE_MUSGRAVE = 97,     /* c vector, f w, f scale, f detail, f dimension, f lacunarity,
                                    f offset, f gain -> f; mode as NOISE, without FBM_UNIT */
-    TRC_NODE_VORONOI = 98,      /* c vector, f w, f scale, f smoothness, f exponent, f randomness ->
-                                   f distance, c color, c position, f w, f radius; mode: dimensions - 1
-                                   in bits 0-1, metric and TRC_VORONOI_* feature from bits
-                                   TRC_VORONOI_METRIC_SHIFT and TRC_VORONOI_FEATURE_SHIFT */
+    TRC_NODE_VORONOI = 98,      /* c vector, f w, f scale, f smoothness, f exponent, f randomness,
+                                   f detail, f roughness, f lacunarity -> f distance, c color,
+                                   c position, f w, f radius; mode: dimensions - 1 in bits 0-1, metric
+                                   and TRC_VORONOI_* feature from bits TRC_VORONOI_METRIC_SHIFT and
+                                   TRC_VORONOI_FEATURE_SHIFT, TRC_VORONOI_NORMALIZE. The radius has
+                                   no octaves */
     TRC_NODE_WAVE = 99,         /* c vector, f scale, f distortion, f detail, f detail_scale,
                                    f detail_roughness, f phase -> f; mode: profile in bits 0-1,
                                    TRC_WAVE_RINGS, from bit TRC_WAVE_DIRECTION_SHIFT 0-2 X, Y, Z,
@@ -164,7 +166,8 @@ enum { /* features */
        TRC_VORONOI_SMOOTH_F1,
        TRC_VORONOI_DISTANCE_TO_EDGE,
        TRC_VORONOI_N_SPHERE_RADIUS,
-       TRC_VORONOI_FEATURE_SHIFT = 4
+       TRC_VORONOI_FEATURE_SHIFT = 4,
+       TRC_VORONOI_NORMALIZE = 1 << 7 /* distance and color to about [0, 1] */
 };
 
 enum {
