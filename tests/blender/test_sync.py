@@ -210,7 +210,7 @@ def test_a_second_sync_sends_only_what_differs(blender):
 
 
 def inside_motion(position):
-    """A cube that moves 10 m a frame and grows by a shape key, and a mesh built face by face."""
+    """A cube that moves 10 m a frame and grows by a shape key, a mesh built face by face and its points."""
     import bpy
     import numpy as np
     import scenes
@@ -230,8 +230,11 @@ def inside_motion(position):
         cube.location.x = value * 20.0
         cube.keyframe_insert("location", frame=frame)
     built = scenes.sphere("Built")
-    modifier = built.modifiers.new("Build", 'BUILD')
-    modifier.frame_start, modifier.frame_duration = 0, 4
+    dotted = scenes.sphere("Dotted")
+    for changing in (built, dotted):
+        modifier = changing.modifiers.new("Build", 'BUILD')
+        modifier.frame_start, modifier.frame_duration = 0, 4
+    scenes.geometry_nodes(dotted, "GeometryNodeMeshToPoints")
     for action in bpy.data.actions:
         for curve in action.fcurves:
             for point in curve.keyframe_points:
@@ -286,7 +289,8 @@ def test_motion_keys_follow_the_shutter(blender, position, start):
     assert deforming == pytest.approx([-1.0 - (t - 1.0) * 4.0 for t in times], abs=1e-3)
     assert found["camera_z"] == pytest.approx([(t - 1.0) for t in times[::2]], abs=1e-3)
     assert found["shutter"] == 0.5 and found["frame"] == 2.0
-    assert [w for w in found["warnings"] if "Built" in w and "topology" in w]
+    for name in ("Built", "Dotted"):
+        assert [w for w in found["warnings"] if name in w and "topology" in w]
 
 
 def inside_attributes():

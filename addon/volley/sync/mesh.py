@@ -354,18 +354,33 @@ def is_posable(blender_object):
         modifier.type in _POSING_MODIFIERS for modifier in original.modifiers)
 
 
-class MeshMotion:
-    """The shapes of one deforming mesh over the shutter, one slot per motion key."""
+class KeyedShapes:
+    """Shapes of a mesh over the shutter, one slot per motion key."""
 
-    def __init__(self, mesh, data, key_count):
-        self._topology = Topology(mesh)
+    def __init__(self, data, key_count):
         self._data = data
-        self._corners = None
-        if data.normal_kind == native.NORMALS_CORNER:
-            self._corners = _LazyLoops(mesh, len(data.indices)).of_triangles
         self.positions = [data.positions] * key_count
         self.normals = [data.normals] * key_count
         self.is_dropped = False
+
+    def keys(self):
+        """positions and normals, (keys, ...) each; one key when nothing moves or motion is dropped."""
+        base = self._data
+        still = all(np.array_equal(p, base.positions) for p in self.positions)
+        if self.is_dropped or still:
+            return base.positions[None], None if base.normals is None else base.normals[None]
+        return np.stack(self.positions), None if base.normals is None else np.stack(self.normals)
+
+
+class MeshMotion(KeyedShapes):
+    """The shapes of one deforming mesh of Blender's."""
+
+    def __init__(self, mesh, data, key_count):
+        super().__init__(data, key_count)
+        self._topology = Topology(mesh)
+        self._corners = None
+        if data.normal_kind == native.NORMALS_CORNER:
+            self._corners = _LazyLoops(mesh, len(data.indices)).of_triangles
 
     def set_key(self, index, mesh):
         """Take the mesh's shape as that key; False (and no motion) when its topology is another."""
@@ -378,14 +393,6 @@ class MeshMotion:
         elif self._data.normal_kind == native.NORMALS_VERTEX:
             self.normals[index] = np.array(_vertex_normals(mesh))
         return True
-
-    def keys(self):
-        """positions and normals, (keys, ...) each; one key when nothing moves or motion is dropped."""
-        base = self._data
-        still = all(np.array_equal(p, base.positions) for p in self.positions)
-        if self.is_dropped or still:
-            return base.positions[None], None if base.normals is None else base.normals[None]
-        return np.stack(self.positions), None if base.normals is None else np.stack(self.normals)
 
 
 class MeshEntry:
