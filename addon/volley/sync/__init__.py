@@ -117,6 +117,9 @@ class SceneSync:
             fields = light.describe(each.object, item, self.warnings)
             return fields is not None and self._lights.change(item.key, fields)
         known = shown.items[instance.key_of(each)]
+        made_of = filter(None, _materials_of(each.object, view_layer))
+        if not self._meshes.brings(known.mesh_key, self._materials.tangents_read_by(made_of)):
+            return False
         if name in source.changes.geometry and not self._change_mesh(each, known, shown, source):
             return False
         item = instance.describe(each, view_layer, source.light_groups)
@@ -215,12 +218,16 @@ def _size_limit(source):
 
 def _material_ids(materials, each, view_layer):
     """Library ids of an instance's material slots."""
-    slots = [slot.material for slot in each.object.material_slots]
     if visibility.is_holdout(each, view_layer):
         return (materials.holdout_id(),)
+    return tuple(materials.id_of(material) for material in _materials_of(each.object, view_layer))
+
+
+def _materials_of(blender_object, view_layer):
+    """What an object is made of, slot by slot, None where a slot is empty."""
     if view_layer.material_override is not None:
-        return (materials.id_of(view_layer.material_override),)
-    return tuple(materials.id_of(material) for material in slots)
+        return [view_layer.material_override]
+    return [slot.material for slot in blender_object.material_slots]
 
 
 @dataclass
@@ -229,6 +236,7 @@ class _Deforming:
 
     pointer: int
     data: mesh.MeshData
+    names: tuple
     shapes: mesh.KeyedShapes
     read: object
 
@@ -239,10 +247,12 @@ class _Walk:
     def __init__(self, sync, source, shutter):
         self._sync, self._source, self._shutter = sync, source, shutter
         self._view_layer = source.depsgraph.view_layer_eval
-        uv_names, color_names, needs_generated, self._needs_instancer = sync._materials.attribute_names()
+        uv_names, color_names, needs_generated, self._needs_instancer, self._tangent_readers = \
+            sync._materials.attribute_names()
         if source.needs_uv:
             uv_names.add("")
         self._names = frozenset(uv_names), frozenset(color_names), needs_generated
+        self._tangents = None  # pointer of a mesh -> the tangents that its objects' materials read
         self._owners = {}     # pointer of a mesh -> key of its owner, within this walk
         self._deforming = {}  # owner key -> _Deforming
         self.items = {}       # key -> Item with a mesh
@@ -281,7 +291,7 @@ class _Walk:
     def send_deforming(self):
         """Send the meshes that waited for their motion keys."""
         for key, waiting in self._deforming.items():
-            self._sync._meshes.put(key, waiting.pointer, waiting.data, self._names, waiting.shapes)
+            self._sync._meshes.put(key, waiting.pointer, waiting.data, waiting.names, waiting.shapes)
 
     def _instances(self):
         """Those that take part, by themselves or by their particles."""
@@ -371,7 +381,7 @@ class _Walk:
         solid, data = made
         if item.motion_keys > 1 and motion.may_deform(each.object) and made_of.may_move(each):
             shapes = tubes.StrandMotion(solid, shape, data, item.motion_keys)
-            self._deforming[item.key] = _Deforming(source, data, shapes, made_of.read)
+            self._deforming[item.key] = _Deforming(source, data, self._names, shapes, made_of.read)
         else:
             meshes.put(item.key, source, data, self._names)
         return True
@@ -390,22 +400,44 @@ class _Walk:
         to show."""
         meshes = self._sync._meshes
         is_changed = self._source.changes.geometry_of(item.owner)
-        if not is_changed and meshes.reuse(item.key, pointer, self._names):
+        names = self._names_of(pointer)
+        if not is_changed and meshes.reuse(item.key, pointer, names):
             return True
         slot_count = max(len(blender_object.material_slots), len(blender_object.data.materials))
-        data = mesh.extract(blender_object.data, *self._names[:2], slot_count)
+        data = mesh.extract(blender_object.data, *names[:2], slot_count)
         if data is None:
             return False
-        if self._names[2]:
+        if names[2]:
             data.generated = mesh.generated_coordinates(blender_object, data.positions)
         if meshes.will_resync and mesh.is_posable(blender_object):
             data.poses = mesh.Topology(blender_object.data)
         if item.motion_keys > 1 and motion.may_deform(blender_object):
             shapes = mesh.MeshMotion(blender_object.data, data, item.motion_keys)
-            self._deforming[item.key] = _Deforming(pointer, data, shapes, lambda each: each.object.data)
+            self._deforming[item.key] = _Deforming(pointer, data, names, shapes,
+                                                   lambda each: each.object.data)
         else:
-            meshes.put(item.key, pointer, data, self._names)
+            meshes.put(item.key, pointer, data, names)
         return True
+
+    def _names_of(self, pointer):
+        """What a mesh brings: tangents only where they are read, as they take longest to make."""
+        if not self._tangent_readers:
+            return self._names
+        if self._tangents is None:
+            self._tangents = self._find_tangents()
+        uv_names, color_names, needs_generated = self._names
+        every = set().union(*self._tangent_readers.values())
+        return uv_names, color_names - (every - self._tangents.get(pointer, every)), needs_generated
+
+    def _find_tangents(self):
+        """{pointer of a mesh: names of the tangents that the materials of its objects read}"""
+        found = {}
+        for each in self._source.depsgraph.objects:
+            if each.data is not None:
+                names = found.setdefault(each.data.as_pointer(), set())
+                for material in filter(None, _materials_of(each, self._view_layer)):
+                    names |= self._tangent_readers.get(material.name_full, set())
+        return found
 
     def _look_again(self, item, each, fraction):
         index = motion.key_index(fraction, item.motion_keys)

@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 
 from .. import native
-from . import derived
+from . import derived, tangents
 
 _HAS_UNDEFORMED = "undeformed_co" in bpy.types.MeshVertex.bl_rna.properties
 # Blender's interface holds corners' vertices and triangles for unsigned; reading them as signed takes some
@@ -59,7 +59,7 @@ def extract(mesh, uv_names=(), color_names=(), material_count=1):
     if material_count > 1:
         data.material_index = _material_index(mesh, loops)
     read_normals(mesh, data, loops)
-    data.attributes = (_uv_maps(mesh, uv_names, loops) + _colors(mesh, color_names, loops))
+    data.attributes = _uv_maps(mesh, uv_names, loops) + _colors(mesh, data, color_names, loops)
     del data.attributes[native.MAX_ATTRIBUTES:]
     return data
 
@@ -265,13 +265,43 @@ def _uv_values(layer, corner_count):
     return _read(layer.data, "uv", (corner_count, 2), np.float32)
 
 
-def _colors(mesh, names, loops):
-    """The named attributes as colours per triangle corner; "" is the active colour attribute."""
-    found = []
+def _tangent_layers(mesh, names):
+    """The UV maps whose tangents are among the names, by those."""
+    if not tangents.names_among(names):
+        return {}
+    layers = [(layer.name, layer) for layer in mesh.uv_layers]
+    layers += [("", layer) for layer in mesh.uv_layers if layer.active_render]
+    return {tangents.attribute_name(name): layer for name, layer in layers}
+
+
+def _tangents(mesh, data, layer, loops):
+    """What tangents.of_corners says of a UV map."""
+    uvs = _uv_values(layer, len(mesh.loops))[loops.of_triangles].reshape(-1, 3, 2)
+    return tangents.of_corners(data.positions[data.indices], _normals_of_corners(data), uvs)
+
+
+def _normals_of_corners(data):
+    """(triangles, 3, 3) normals that a mesh is shaded with."""
+    if data.normal_kind == native.NORMALS_CORNER:
+        return data.normals.reshape(-1, 3, 3)
+    flat = np.repeat(tangents.face_normals(data.positions[data.indices])[:, None], 3, axis=1)
+    if data.normals is None:
+        return flat
+    return np.where(data.smooth[:, None, None], data.normals[data.indices], flat)
+
+
+def _colors(mesh, data, names, loops):
+    """The named attributes as colours per triangle corner; "" is the active colour attribute. It comes
+    first, black where there is none, as the first is the library's default."""
+    found, layers = [], _tangent_layers(mesh, names)
     for name in sorted(names):
         source = name or active_color_name(mesh)
         values = None
-        if source in _DERIVED:
+        if not source and len(names) > 1:
+            values = np.zeros((3 * len(data.indices), 4), np.float32)
+        elif name in layers:
+            values = _tangents(mesh, data, layers[name], loops)
+        elif source in _DERIVED:
             values = _widen(_DERIVED[source](mesh)[:, None])[_corner_vertices(mesh)[loops.of_triangles]]
         elif source:
             values = _attribute_values(mesh, source, loops)
@@ -482,6 +512,10 @@ class Meshes:
             self._retired.append(self._entries[key].id)
         self._entries[key] = entry
         return entry
+
+    def brings(self, key, color_names):
+        """Whether a mesh was read with those attributes."""
+        return color_names <= self._entries[key].names[1]
 
     def id_of(self, key):
         """Library id of one mesh."""

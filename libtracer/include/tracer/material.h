@@ -68,11 +68,15 @@ enum {
                                    transparent depth, transmission depth */
     TRC_NODE_GEOMETRY = 75,     /* -> c position, c normal, c tangent, c true_normal, c incoming,
                                    c parametric, f backfacing, f pointiness, f random_per_island */
-    TRC_NODE_NORMAL_MAP = 76, /* f strength, c color -> c normal; mode 0 tangent, 1 object, 2 world,
-                                 3 and 4 object and world with Y and Z turned around (Blender's own
-                                 baked maps); name: UV map */
-    TRC_NODE_INVERT = 77,     /* f factor, c color -> c */
-    TRC_NODE_GAMMA = 78,      /* c color, f gamma -> c */
+    TRC_NODE_NORMAL_MAP =
+        76,               /* f strength, c color -> c normal; mode 0 tangent, 1 object, 2 world,
+                             3 and 4 object and world with Y and Z turned around (Blender's own
+                             baked maps); name: UV map, whose tangents are those of each triangle
+                             by itself, or an attribute of width 4 with tangents at the corners:
+                             a, b, 1 or -1, 0 for the direction a (p1 - p0) + b (p2 - p0), made
+                             perpendicular to the corner's normal, and the handedness */
+    TRC_NODE_INVERT = 77, /* f factor, c color -> c */
+    TRC_NODE_GAMMA = 78,  /* c color, f gamma -> c */
     TRC_NODE_HUE_SATURATION = 79,  /* f hue, f saturation, f value, f factor, c color -> c */
     TRC_NODE_BRIGHT_CONTRAST = 80, /* c color, f bright, f contrast -> c */
     TRC_NODE_COLOR_RAMP = 81,      /* f factor -> c color, f alpha; table: 256 RGBA values;
@@ -131,11 +135,15 @@ enum {
                                      TRC_ROTATE_* | 8 to turn the other way */
     TRC_NODE_CAMERA_DATA = 110,   /* -> c view_vector, f view_z_depth, f view_distance */
     TRC_NODE_WIREFRAME = 111,     /* f size (m, world) -> f */
+    TRC_NODE_TANGENT = 114, /* -> c; mode: TRC_TANGENT_*; name, if of a UV map: as NORMAL_MAP */
 
     /* outputs besides the surface: no node has to lead to them; mode: number of the AOV */
     TRC_NODE_AOV_VALUE = 112, /* f value */
     TRC_NODE_AOV_COLOR = 113  /* c color */
 };
+
+/* Around an axis of the object (Generated coordinates), or where U of a UV map grows. */
+enum { TRC_TANGENT_Z = 0, TRC_TANGENT_X, TRC_TANGENT_Y, TRC_TANGENT_UV };
 
 enum { TRC_SPACE_WORLD = 0, TRC_SPACE_OBJECT, TRC_SPACE_CAMERA };
 

@@ -84,6 +84,7 @@ static const struct trc_node_info infos[] = {
     {TRC_NODE_VECTOR_ROTATE, "Vector Rotate", "cccfc", "vector center axis angle rotation", "v"},
     {TRC_NODE_CAMERA_DATA, "Camera Data", "", "", "vff"},
     {TRC_NODE_WIREFRAME, "Wireframe", "f", "size", "f"},
+    {TRC_NODE_TANGENT, "Tangent", "", "", "v"},
 
     {TRC_NODE_AOV_VALUE, "AOV Value", "f", "value", ""},
     {TRC_NODE_AOV_COLOR, "AOV Color", "c", "color", ""},
@@ -172,6 +173,8 @@ bool trc_node_mode_is_valid(uint32_t type, uint32_t mode) {
                mode >> 4 <= 3;
     case TRC_NODE_VECTOR_ROTATE:
         return (mode & ~8u) <= TRC_ROTATE_EULER;
+    case TRC_NODE_TANGENT:
+        return mode <= TRC_TANGENT_UV;
     case TRC_NODE_AOV_VALUE:
     case TRC_NODE_AOV_COLOR:
         return mode < TRC_MAX_AOVS;

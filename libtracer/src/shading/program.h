@@ -29,7 +29,7 @@
     X(NORMAL, 0, 3, 0) /* shading normal */                                                 \
     X(TRUE_NORMAL, 0, 3, 0)                                                                 \
     X(INCOMING, 0, 3, 0)                                                                    \
-    X(TANGENT, 0, 3, 0) /* around the object's Z axis */                                    \
+    X(TANGENT, 0, 3, 0) /* mode: TRC_TANGENT_*; resource: name */                           \
     X(PARAMETRIC, 0, 2, 0)                                                                  \
     X(BACKFACING, 0, 1, 0)                                                                  \
     /* texture coordinates */                                                               \
