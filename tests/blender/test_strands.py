@@ -202,6 +202,59 @@ def inside_moving_hair():
     return pictures
 
 
+def _attribute(data, name, kind, domain, values):
+    """A new attribute of values (items, n)."""
+    made = data.attributes.new(name, kind, domain)
+    field = {'FLOAT': "value", 'FLOAT_COLOR': "color"}.get(kind, "vector")
+    made.data.foreach_set(field, np.asarray(values, np.float32).reshape(-1))
+
+
+def _shown(material, kind, output, **settings):
+    """Pictures of what a node of that kind gives, as emission."""
+    tree = material.node_tree
+    emission = next((n for n in tree.nodes if n.type == 'EMISSION'), None) or \
+        tree.nodes.new("ShaderNodeEmission")
+    node = tree.nodes.new(kind)
+    for name, value in settings.items():
+        setattr(node, name, value)
+    tree.links.new(node.outputs[output], emission.inputs["Color"])
+    tree.links.new(emission.outputs[0], tree.nodes["Material Output"].inputs["Surface"])
+    return _both()
+
+
+def inside_attributes():
+    """What curves and points carry, read by nodes."""
+    import bpy
+    import scenes
+    scenes.empty(size=(64, 48))
+    scenes.camera(location=(0.0, -7.0, 0.0))
+    scenes.wall("Back", 20.0, 4.0, material=scenes.emitter((0.3, 0.3, 0.4), "Grey"))
+    grey = scenes.material("White", "ShaderNodeBsdfDiffuse", Color=(0.8, 0.8, 0.8))
+    random = np.random.default_rng(5)
+    pictures = {}
+    made = _curves(grey)
+    if made is not None:
+        data = made.data
+        _attribute(data, "surface_uv_coordinate", 'FLOAT2', 'CURVE', random.random((12, 2)))
+        _attribute(data, "other_uv", 'FLOAT2', 'CURVE', random.random((12, 2)))
+        _attribute(data, "tint", 'FLOAT_COLOR', 'POINT', random.random((60, 4)))
+        _attribute(data, "weight", 'FLOAT', 'CURVE', random.random((12, 1)))
+        pictures["default UV"] = _shown(grey, "ShaderNodeUVMap", "UV")
+        for name in ("surface_uv_coordinate", "other_uv"):
+            pictures[name] = _shown(grey, "ShaderNodeUVMap", "UV", uv_map=name)
+        pictures["texture coordinate"] = _shown(grey, "ShaderNodeTexCoord", "UV")
+        pictures["tint"] = _shown(grey, "ShaderNodeAttribute", "Color", attribute_name="tint")
+        pictures["tint's vector"] = _shown(grey, "ShaderNodeAttribute", "Vector", attribute_name="tint")
+        pictures["weight"] = _shown(grey, "ShaderNodeAttribute", "Fac", attribute_name="weight")
+        pictures["color"] = _shown(grey, "ShaderNodeVertexColor", "Color", layer_name="tint")
+        bpy.data.objects.remove(made)
+    made = _cloud(grey)
+    count = len(made.data.vertices)
+    _attribute(made.data, "tint", 'FLOAT_COLOR', 'POINT', random.random((count, 4)))
+    pictures["points' tint"] = _shown(grey, "ShaderNodeAttribute", "Color", attribute_name="tint")
+    return pictures
+
+
 def _drift(owner):
     """Move the points of an object in time, each by its own place, in its modifier of nodes or a new one."""
     import scenes
@@ -255,6 +308,10 @@ def _agree(pictures):
 
 def test_hair(blender):
     _agree(blender.run(inside_hair))
+
+
+def test_attributes(blender):
+    _agree(blender.run(inside_attributes))
 
 
 def test_moving_hair(blender):

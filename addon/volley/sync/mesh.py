@@ -335,12 +335,9 @@ def _attribute_values(mesh, name, loops):
     if name in mesh.uv_layers:
         return _widen(_uv_values(mesh.uv_layers[name], len(mesh.loops)))[loops.of_triangles]
     attribute = mesh.attributes.get(name)
-    if attribute is None or attribute.data_type not in _WIDTHS:
+    values = None if attribute is None else attribute_colors(attribute)
+    if values is None:
         return None
-    field_name, width = _WIDTHS[attribute.data_type]
-    dtype = np.int32 if attribute.data_type == 'INT' else np.float32
-    values = _read(attribute.data, field_name, (len(attribute.data), width), dtype)
-    values = _widen(values.astype(np.float32, copy=False))
     if attribute.domain == 'CORNER':
         return values[loops.of_triangles]
     if attribute.domain == 'POINT':
@@ -348,6 +345,16 @@ def _attribute_values(mesh, name, loops):
     if attribute.domain == 'FACE':
         return values[np.repeat(loops.polygons, 3)]
     return None
+
+
+def attribute_colors(attribute):
+    """(items, 4) float32 of an attribute of any domain, None if it is of an odd type."""
+    if attribute.data_type not in _WIDTHS:
+        return None
+    field_name, width = _WIDTHS[attribute.data_type]
+    dtype = np.int32 if attribute.data_type == 'INT' else np.float32
+    values = _read(attribute.data, field_name, (len(attribute.data), width), dtype)
+    return _widen(values.astype(np.float32, copy=False))
 
 
 def _widen(values):

@@ -6,7 +6,7 @@ import numpy as np
 
 from .. import native
 from . import tubes
-from .mesh import active_color_name, wanted_uv_layers
+from .mesh import active_color_name, attribute_colors, wanted_uv_layers
 
 HAIR_ATTRIBUTE = ".hair"  # (intercept, length, thickness, random) of the Hair Info node
 
@@ -103,14 +103,16 @@ class Object:
         data.curves.foreach_get("points_length", lengths)
         return tubes.Strands(positions, _values(data, "radius", "value", 1, _DEFAULT_RADIUS)[:, 0], lengths)
 
-    def solid(self, _instance, strands):
+    def solid(self, instance, strands):
         """The tubes or balls of what was read and their MeshData, None without a face."""
+        values = _object_values(instance.object.data, *self._names)
         if strands.lengths is not None:
-            return _tubes(tubes.Tubes(strands), strands, (), self._names)
+            return _tubes(tubes.Tubes(strands), strands, values, self._names)
         if len(strands.positions) == 0:
             return None
         balls = tubes.Balls(strands)
-        return balls, tubes.mesh_of(balls, strands)
+        values = [(name, balls.spread(each)) for name, each, _ in values]
+        return balls, tubes.mesh_of(balls, strands, values[:native.MAX_ATTRIBUTES])
 
 
 def _has_force(blender_object):
@@ -126,22 +128,22 @@ def _shown_strands(system):
 
 
 def _tubes(solid, strands, values, names):
-    """Tubes and their MeshData with values of strands as attributes, None without a face."""
+    """Tubes and their MeshData with values of strands or their keys as attributes, None without a face."""
     if solid.is_empty:
         return None
-    values = [(name, solid.spread(each)) for name, each in values]
+    values = [(name, solid.spread(each, of_keys)) for name, each, of_keys in values]
     if HAIR_ATTRIBUTE in names[1]:
         values = values[:native.MAX_ATTRIBUTES - 1] + [(HAIR_ATTRIBUTE, solid.info(strands))]
     return solid, tubes.mesh_of(solid, strands, values[:native.MAX_ATTRIBUTES])
 
 
 def _root_values(mesh, modifier, strands, uv_names, color_names):
-    """(name, (strands, 2 or 4)) of each UV map and colour attribute that is asked for, as meshes have
+    """(name, (strands, 2 or 4), False) of each UV map and colour attribute that is asked for, as meshes have
     them: the default map first."""
     found = []
     for number, layer in wanted_uv_layers(mesh, uv_names):
         values = _at_roots(modifier.particle_system.uv_on_emitter, modifier, strands, uv_no=number)
-        found.append((layer.name, values))
+        found.append((layer.name, values, False))
     colors = mesh.vertex_colors
     for name in sorted(color_names):
         source = name or active_color_name(mesh)
@@ -150,7 +152,25 @@ def _root_values(mesh, modifier, strands, uv_names, color_names):
             values = np.ones((len(strands), 4), np.float32)
             values[:, :3] = _linear(_at_roots(modifier.particle_system.mcol_on_emitter, modifier, strands,
                                               vcol_no=number))
-            found.append((name, values))
+            found.append((name, values, False))
+    return found
+
+
+def _object_values(data, uv_names, color_names):
+    """(name, (strands or keys, 2 or 4), whether of keys) of each attribute that is asked for. The first
+    of two numbers is the default UV map, as Cycles has it."""
+    found = []
+    maps = [each for each in data.attributes if each.data_type == 'FLOAT2'] if uv_names else []
+    for number, attribute in enumerate(maps):
+        if number == 0 or attribute.name in uv_names:
+            values = np.empty((len(attribute.data), 2), np.float32)
+            attribute.data.foreach_get("vector", values.reshape(-1))
+            found.append((attribute.name, values, attribute.domain == 'POINT'))
+    for name in sorted(color_names):
+        attribute = data.attributes.get(name)
+        values = None if attribute is None else attribute_colors(attribute)
+        if values is not None and all(name != known for known, _, _ in found):
+            found.append((name, values, attribute.domain == 'POINT'))
     return found
 
 

@@ -138,10 +138,17 @@ class Tubes:
     def _rings(self, group):
         return (group.index.shape[1] - 1) * self._pieces + 1
 
-    def spread(self, values):
-        """(vertices, n) of values that each strand has one of."""
-        return np.concatenate([np.repeat(values[group.numbers], self._rings(group) * self._sides, axis=0)
-                               for group in self._groups])
+    def spread(self, values, of_keys):
+        """(vertices, n) of values that each strand has one of or, on straight lines between them, each
+        key."""
+        found = []
+        for group in self._groups:
+            if of_keys:
+                of_rings = _between(values[group.index], self._pieces).reshape(-1, values.shape[1])
+                found.append(np.repeat(of_rings, self._sides, axis=0))
+            else:
+                found.append(np.repeat(values[group.numbers], self._rings(group) * self._sides, axis=0))
+        return np.concatenate(found)
 
     def info(self, strands):
         """(vertices, 4): what HAIR_ATTRIBUTE holds."""
@@ -155,6 +162,13 @@ class Tubes:
             info[..., 3] = (hash_numbers(group.numbers) / HASH_MAX)[:, None]
             found.append(np.repeat(info.reshape(-1, 4), self._sides, axis=0))
         return np.concatenate(found).astype(np.float32)
+
+
+def _between(values, pieces):
+    """(strands, rings, n) of values of keys, on straight lines with that many pieces from one to the next."""
+    parts = (np.arange(pieces, dtype=np.float32) / pieces)[:, None]
+    lines = values[:, :-1, None] * (1.0 - parts) + values[:, 1:, None] * parts
+    return np.concatenate((lines.reshape(len(values), -1, values.shape[2]), values[:, -1:]), axis=1)
 
 
 def _unit(vectors, fallback):
@@ -217,6 +231,10 @@ class Balls:
         positions = points.positions[:, None] + self._normals * radii[:, None, None]
         normals = np.tile(self._normals, (self._count, 1))
         return positions.reshape(-1, 3).astype(np.float32), normals.astype(np.float32)
+
+    def spread(self, values):
+        """(vertices, n) of values that each point has one of."""
+        return np.repeat(values, len(self._normals), axis=0)
 
     def faces(self):
         """(triangles, 3) uint32 indices of vertices."""
