@@ -55,6 +55,7 @@ def inside_hair():
     for name in ("Intercept", "Random", "Is Strand"):
         tree.links.new(info.outputs[name], emission.inputs["Color"])
         pictures[name] = _both()
+    pictures["Tangent Normal"] = _shown(bpy.data.materials["Hair"], "ShaderNodeHairInfo", "Tangent Normal")
     _paint(ball.data)
     for kind, layer, name, output in (("ShaderNodeUVMap", "uv_map", "Second", "UV"),
                                       ("ShaderNodeVertexColor", "layer_name", "Second Color", "Color")):
@@ -210,14 +211,17 @@ def _attribute(data, name, kind, domain, values):
 
 
 def _shown(material, kind, output, **settings):
-    """Pictures of what a node of that kind gives, as emission."""
+    """Pictures of what a node of that kind gives, -1 to 1, as emission."""
     tree = material.node_tree
     emission = next((n for n in tree.nodes if n.type == 'EMISSION'), None) or \
         tree.nodes.new("ShaderNodeEmission")
-    node = tree.nodes.new(kind)
+    node, positive = tree.nodes.new(kind), tree.nodes.new("ShaderNodeVectorMath")
     for name, value in settings.items():
         setattr(node, name, value)
-    tree.links.new(node.outputs[output], emission.inputs["Color"])
+    positive.operation = 'MULTIPLY_ADD'
+    positive.inputs[1].default_value = positive.inputs[2].default_value = (0.5, 0.5, 0.5)
+    tree.links.new(node.outputs[output], positive.inputs[0])
+    tree.links.new(positive.outputs[0], emission.inputs["Color"])
     tree.links.new(emission.outputs[0], tree.nodes["Material Output"].inputs["Surface"])
     return _both()
 

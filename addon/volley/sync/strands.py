@@ -9,6 +9,7 @@ from . import tubes
 from .mesh import active_color_name, attribute_colors, wanted_uv_layers
 
 HAIR_ATTRIBUTE = ".hair"  # (intercept, length, thickness, random) of the Hair Info node
+DIRECTION_ATTRIBUTE = ".strand"  # (x, y, z) along the strand, unit, and 1
 
 _DEFAULT_RADIUS = 0.005      # m; Cycles' of curves without the attribute
 _DEFAULT_POINT_RADIUS = 0.01
@@ -132,9 +133,9 @@ def _tubes(solid, strands, values, names):
     if solid.is_empty:
         return None
     values = [(name, solid.spread(each, of_keys)) for name, each, of_keys in values]
-    if HAIR_ATTRIBUTE in names[1]:
-        values = values[:native.MAX_ATTRIBUTES - 1] + [(HAIR_ATTRIBUTE, solid.info(strands))]
-    return solid, tubes.mesh_of(solid, strands, values[:native.MAX_ATTRIBUTES])
+    own = [(name, tell(strands)) for name, tell in (
+        (HAIR_ATTRIBUTE, solid.info), (DIRECTION_ATTRIBUTE, solid.directions)) if name in names[1]]
+    return solid, tubes.mesh_of(solid, strands, values[:native.MAX_ATTRIBUTES - len(own)] + own)
 
 
 def _root_values(mesh, modifier, strands, uv_names, color_names):

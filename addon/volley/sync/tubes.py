@@ -151,7 +151,7 @@ class Tubes:
         return np.concatenate(found)
 
     def info(self, strands):
-        """(vertices, 4): what HAIR_ATTRIBUTE holds."""
+        """(vertices, 4): what strands.HAIR_ATTRIBUTE holds."""
         found = []
         for group in self._groups:
             places, radii = self._splines(group, strands)
@@ -161,6 +161,15 @@ class Tubes:
             info[..., 1] = lengths[:, None]
             info[..., 3] = (hash_numbers(group.numbers) / HASH_MAX)[:, None]
             found.append(np.repeat(info.reshape(-1, 4), self._sides, axis=0))
+        return np.concatenate(found).astype(np.float32)
+
+
+    def directions(self, strands):
+        """(vertices, 4): what strands.DIRECTION_ATTRIBUTE holds."""
+        found = []
+        for group in self._groups:
+            along = _tangents(self._splines(group, strands)[0]).reshape(-1, 3)
+            found.append(np.repeat(np.concatenate((along, np.ones((len(along), 1))), axis=1), self._sides, axis=0))
         return np.concatenate(found).astype(np.float32)
 
 
@@ -176,10 +185,15 @@ def _unit(vectors, fallback):
     return np.where(length > _SHORTEST, vectors / np.maximum(length, _SHORTEST), fallback)
 
 
+def _tangents(places):
+    """Unit vectors along splines, (strands, rings, 3)."""
+    return _unit(np.gradient(places, axis=1), np.array((0.0, 0.0, 1.0)))
+
+
 def _frames(places, start):
     """Unit vectors across splines, (strands, rings, 3) twice; the first at the roots as near as it can be to
     start, where that is given."""
-    tangents = _unit(np.gradient(places, axis=1), np.array((0.0, 0.0, 1.0)))
+    tangents = _tangents(places)
     across = np.empty_like(tangents)
     last = start
     if last is None:
