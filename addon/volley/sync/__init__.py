@@ -353,10 +353,10 @@ class _Walk:
         item = self._describe(each)
         item.materials = _material_ids(self._sync._materials, each, self._view_layer)[:1]
         self.tied.add(each.object.name_full)
-        self._add_made(each, item, each.object.data.as_pointer(), strands.Object(self._names[:2]))
+        self._add_made(each, item, each.object.data.as_pointer(), strands.StrandObject(self._names[:2]))
 
     def _add_made(self, each, item, source, made_of):
-        """An item of strands or points (strands.Hair or strands.Object) whose mesh is made unless another
+        """An item of strands or points (strands.Hair or strands.StrandObject) whose mesh is made unless another
         item of the same source has it."""
         if self._shutter is not None:
             item.motion_keys = motion.key_count(each.object, each.parent if each.is_instance else None)

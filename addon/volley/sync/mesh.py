@@ -522,7 +522,8 @@ class Meshes:
 
     def brings(self, key, color_names):
         """Whether a mesh was read with those attributes."""
-        return color_names <= self._entries[key].names[1]
+        entry = self._entries.get(key)
+        return entry is not None and color_names <= entry.names[1]
 
     def id_of(self, key):
         """Library id of one mesh."""

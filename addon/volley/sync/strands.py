@@ -82,7 +82,7 @@ class Hair:
         return _tubes(tubes.Tubes(strands, joins_keys=True), strands, roots, self._names)
 
 
-class Object:
+class StrandObject:
     """A Curves or Point Cloud object, at any time; names: as Hair's."""
 
     def __init__(self, names):
