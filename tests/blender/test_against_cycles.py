@@ -382,23 +382,27 @@ def _stage():
 def _shine(kind):
     import math
     import scenes
-    if kind == 'WORLD':
+    if kind in {'WORLD', 'PORTAL'}:
         import bpy
         bpy.context.scene.world.color = (0.5, 0.6, 0.8)
-        return
+        if kind == 'WORLD':
+            return
     settings = {
         'POINT': {"energy": 500.0, "shadow_soft_size": 0.5},
         'SPOT': {"energy": 900.0, "shadow_soft_size": 0.2, "spot_size": 1.2, "spot_blend": 0.4},
         'SUN': {"energy": 3.0, "angle": 0.2},
         'RECTANGLE': {"energy": 300.0, "shape": 'RECTANGLE', "size": 2.0, "size_y": 0.5},
         'ELLIPSE': {"energy": 300.0, "shape": 'ELLIPSE', "size": 2.0, "size_y": 0.7, "spread": 1.5},
+        'PORTAL': {"energy": 300.0, "size": 3.0},
     }[kind]
     blender_kind = kind if kind in {'POINT', 'SPOT', 'SUN'} else 'AREA'
     made = scenes.light(blender_kind, location=(2.0, -2.0, 4.0), **settings)
     made.rotation_euler = (math.atan2(math.hypot(2, 2), 3.2), 0.0, math.pi / 4)
+    if kind == 'PORTAL':
+        made.data.cycles.is_portal = True
 
 
-_LIGHTS = ('POINT', 'SPOT', 'SUN', 'RECTANGLE', 'ELLIPSE', 'WORLD')
+_LIGHTS = ('POINT', 'SPOT', 'SUN', 'RECTANGLE', 'ELLIPSE', 'WORLD', 'PORTAL')
 
 _MATERIALS = {
     "glossy": ("ShaderNodeBsdfGlossy", {"Color": (0.9, 0.7, 0.5), "Roughness": 0.3}),

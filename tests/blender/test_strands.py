@@ -55,6 +55,7 @@ def inside_hair():
     for name in ("Intercept", "Random", "Is Strand"):
         tree.links.new(info.outputs[name], emission.inputs["Color"])
         pictures[name] = _both()
+    pictures["Tangent Normal"] = _shown(bpy.data.materials["Hair"], "ShaderNodeHairInfo", "Tangent Normal")
     _paint(ball.data)
     for kind, layer, name, output in (("ShaderNodeUVMap", "uv_map", "Second", "UV"),
                                       ("ShaderNodeVertexColor", "layer_name", "Second Color", "Color")):
@@ -108,33 +109,192 @@ def inside_points():
     scenes.wall("Back", 20.0, 4.0, material=scenes.emitter((0.3, 0.3, 0.4), "Grey"))
     grey = scenes.material("White", "ShaderNodeBsdfDiffuse", Color=(0.8, 0.8, 0.8))
     pictures = {}
-    data = bpy.data.hair_curves.new("Curves")
-    if hasattr(data, "add_curves"):
-        data.add_curves([5] * 12)
-        random = np.random.default_rng(3)
-        places = np.cumsum(random.uniform(-0.5, 0.7, (12, 5, 3)), axis=1) + (-0.5, 0.0, -1.2)
-        data.position_data.foreach_set("vector", places.astype(np.float32).reshape(-1))
-        radius = data.attributes.get("radius") or data.attributes.new("radius", 'FLOAT', 'POINT')
-        radius.data.foreach_set("value", np.linspace(0.12, 0.02, 60).astype(np.float32))
-        data.materials.append(grey)
-        made = scenes.link("Curves", data)
+    made = _curves(grey)
+    if made is not None:
         pictures["curves"] = _both()
         bpy.data.objects.remove(made)
-    made = scenes.sphere("Cloud", 1.5, material=grey)
-    group = bpy.data.node_groups.new("Points", 'GeometryNodeTree')
-    if hasattr(group, "interface"):
-        group.interface.new_socket("Geometry", in_out='INPUT', socket_type='NodeSocketGeometry')
-        group.interface.new_socket("Geometry", in_out='OUTPUT', socket_type='NodeSocketGeometry')
+    _cloud(grey)
+    pictures["points"] = _both()
+    return pictures
+
+
+def _curves(material):
+    """Curves of five points each, None where this Blender cannot make them."""
+    import bpy
+    import scenes
+    data = bpy.data.hair_curves.new("Curves")
+    if not hasattr(data, "add_curves"):
+        return None
+    data.add_curves([5] * 12)
+    random = np.random.default_rng(3)
+    places = np.cumsum(random.uniform(-0.5, 0.7, (12, 5, 3)), axis=1) + (-0.5, 0.0, -1.2)
+    data.position_data.foreach_set("vector", places.astype(np.float32).reshape(-1))
+    radius = data.attributes.get("radius") or data.attributes.new("radius", 'FLOAT', 'POINT')
+    radius.data.foreach_set("value", np.linspace(0.12, 0.02, 60).astype(np.float32))
+    data.materials.append(material)
+    return scenes.link("Curves", data)
+
+
+def _cloud(material):
+    """A point at each vertex of a ball."""
+    import scenes
+    made = scenes.sphere("Cloud", 1.5, material=material)
+    nodes = scenes.geometry_nodes(made, "GeometryNodeMeshToPoints", "GeometryNodeSetMaterial")
+    nodes[0].inputs["Radius"].default_value = 0.12
+    nodes[1].inputs["Material"].default_value = material
+    return made
+
+
+def _stage():
+    """A lit scene with a wall, whose frame 1 is blurred over a whole frame."""
+    import scenes
+    scene = scenes.empty(size=(64, 48))
+    scenes.camera(location=(0.0, -7.0, 0.0))
+    scenes.light('SUN', energy=3.0, angle=0.2, rotation=(0.9, 0.3, 0.2))
+    scenes.wall("Back", 20.0, 4.0, material=scenes.emitter((0.3, 0.3, 0.4), "Grey"))
+    scene.render.use_motion_blur, scene.render.motion_blur_shutter = True, 1.0
+    scene.frame_set(1)
+    return scene
+
+
+def _keyed(owner, path, values, frames=(0, 2)):
+    """Make a property go through values in straight lines."""
+    for frame, value in zip(frames, values):
+        setattr(owner, path, value)
+        owner.keyframe_insert(path, frame=frame)
+    for curve in owner.id_data.animation_data.action.fcurves:
+        for point in curve.keyframe_points:
+            point.interpolation = 'LINEAR'
+
+
+def inside_moving_hair():
+    """Hair that goes with its skin, turns with it, changes itself, and hair that may not be blurred."""
+    import bpy
+    scene = _stage()
+    ball, hair = _haired()
+    pictures = {}
+    ball.shape_key_add(name="Basis")
+    key = ball.shape_key_add(name="Aside")
+    for point in key.data:
+        point.co.x += 1.2
+        point.co.z *= 1.4
+    key.slider_min = -1.0
+    _keyed(key, "value", (-0.5, 1.0))
+    pictures["with the skin"] = _both()
+    hair.child_type, hair.rendered_child_count = 'SIMPLE', 3
+    pictures["children with the skin"] = _both()
+    ball.cycles.use_deform_motion = False
+    pictures["without deformation blur"] = _both()
+    ball.cycles.use_deform_motion = True
+    ball.data.shape_keys.animation_data_clear()
+    key.value = 0.0
+    twist = ball.modifiers.new("Bend", 'SIMPLE_DEFORM')
+    bpy.context.view_layer.objects.active = ball
+    bpy.ops.object.modifier_move_to_index(modifier=twist.name, index=0)
+    twist.deform_method, twist.deform_axis = 'TWIST', 'Y'
+    _keyed(twist, "angle", (-1.5, 2.5))
+    ball.cycles.motion_steps = 3
+    pictures["with a twist"] = _both()
+    ball.modifiers.remove(twist)
+    ball.animation_data_clear()
+    hair.kink, hair.kink_frequency = 'WAVE', 2.0
+    _keyed(hair, "kink_amplitude", (0.0, 0.8))
+    pictures["its waves"] = _both()
+    return pictures
+
+
+def _attribute(data, name, kind, domain, values):
+    """A new attribute of values (items, n)."""
+    made = data.attributes.new(name, kind, domain)
+    field = {'FLOAT': "value", 'FLOAT_COLOR': "color"}.get(kind, "vector")
+    made.data.foreach_set(field, np.asarray(values, np.float32).reshape(-1))
+
+
+def _shown(material, kind, output, **settings):
+    """Pictures of what a node of that kind gives, -1 to 1, as emission."""
+    tree = material.node_tree
+    emission = next((n for n in tree.nodes if n.type == 'EMISSION'), None) or \
+        tree.nodes.new("ShaderNodeEmission")
+    node, positive = tree.nodes.new(kind), tree.nodes.new("ShaderNodeVectorMath")
+    for name, value in settings.items():
+        setattr(node, name, value)
+    positive.operation = 'MULTIPLY_ADD'
+    positive.inputs[1].default_value = positive.inputs[2].default_value = (0.5, 0.5, 0.5)
+    tree.links.new(node.outputs[output], positive.inputs[0])
+    tree.links.new(positive.outputs[0], emission.inputs["Color"])
+    tree.links.new(emission.outputs[0], tree.nodes["Material Output"].inputs["Surface"])
+    return _both()
+
+
+def inside_attributes():
+    """What curves and points carry, read by nodes."""
+    import bpy
+    import scenes
+    scenes.empty(size=(64, 48))
+    scenes.camera(location=(0.0, -7.0, 0.0))
+    scenes.wall("Back", 20.0, 4.0, material=scenes.emitter((0.3, 0.3, 0.4), "Grey"))
+    grey = scenes.material("White", "ShaderNodeBsdfDiffuse", Color=(0.8, 0.8, 0.8))
+    random = np.random.default_rng(5)
+    pictures = {}
+    made = _curves(grey)
+    if made is not None:
+        data = made.data
+        _attribute(data, "surface_uv_coordinate", 'FLOAT2', 'CURVE', random.random((12, 2)))
+        _attribute(data, "other_uv", 'FLOAT2', 'CURVE', random.random((12, 2)))
+        _attribute(data, "tint", 'FLOAT_COLOR', 'POINT', random.random((60, 4)))
+        _attribute(data, "weight", 'FLOAT', 'CURVE', random.random((12, 1)))
+        pictures["default UV"] = _shown(grey, "ShaderNodeUVMap", "UV")
+        for name in ("surface_uv_coordinate", "other_uv"):
+            pictures[name] = _shown(grey, "ShaderNodeUVMap", "UV", uv_map=name)
+        pictures["texture coordinate"] = _shown(grey, "ShaderNodeTexCoord", "UV")
+        pictures["tint"] = _shown(grey, "ShaderNodeAttribute", "Color", attribute_name="tint")
+        pictures["tint's vector"] = _shown(grey, "ShaderNodeAttribute", "Vector", attribute_name="tint")
+        pictures["weight"] = _shown(grey, "ShaderNodeAttribute", "Fac", attribute_name="weight")
+        pictures["color"] = _shown(grey, "ShaderNodeVertexColor", "Color", layer_name="tint")
+        bpy.data.objects.remove(made)
+    made = _cloud(grey)
+    count = len(made.data.vertices)
+    _attribute(made.data, "tint", 'FLOAT_COLOR', 'POINT', random.random((count, 4)))
+    pictures["points' tint"] = _shown(grey, "ShaderNodeAttribute", "Color", attribute_name="tint")
+    return pictures
+
+
+def _drift(owner):
+    """Move the points of an object in time, each by its own place, in its modifier of nodes or a new one."""
+    import scenes
+    if owner.modifiers:
+        tree = owner.modifiers[0].node_group
+        last = next(node for node in tree.nodes if node.type == 'GROUP_OUTPUT').inputs[0]
+        node = tree.nodes.new("GeometryNodeSetPosition")
+        tree.links.new(last.links[0].from_socket, node.inputs["Geometry"])
+        tree.links.new(node.outputs[0], last)
     else:
-        group.inputs.new('NodeSocketGeometry', "Geometry")
-        group.outputs.new('NodeSocketGeometry', "Geometry")
-    nodes = [group.nodes.new(kind) for kind in (
-        "NodeGroupInput", "GeometryNodeMeshToPoints", "GeometryNodeSetMaterial", "NodeGroupOutput")]
-    nodes[1].inputs["Radius"].default_value = 0.12
-    nodes[2].inputs["Material"].default_value = grey
-    for a, b in zip(nodes, nodes[1:]):
-        group.links.new(a.outputs[0], b.inputs[0])
-    made.modifiers.new("Points", 'NODES').node_group = group
+        node, = scenes.geometry_nodes(owner, "GeometryNodeSetPosition")
+        tree = owner.modifiers[0].node_group
+    time, place = tree.nodes.new("GeometryNodeInputSceneTime"), tree.nodes.new("GeometryNodeInputPosition")
+    since, way = tree.nodes.new("ShaderNodeMath"), tree.nodes.new("ShaderNodeVectorMath")
+    since.operation, way.operation = 'SUBTRACT', 'SCALE'
+    since.inputs[1].default_value = 0.8
+    tree.links.new(time.outputs["Frame"], since.inputs[0])
+    tree.links.new(place.outputs[0], way.inputs[0])
+    tree.links.new(since.outputs[0], way.inputs["Scale"])
+    tree.links.new(way.outputs[0], node.inputs["Offset"])
+
+
+def inside_moving_points():
+    """Curves and points that nodes move."""
+    import bpy
+    import scenes
+    _stage()
+    grey = scenes.material("White", "ShaderNodeBsdfDiffuse", Color=(0.8, 0.8, 0.8))
+    pictures = {}
+    made = _curves(grey)
+    if made is not None:
+        _drift(made)
+        pictures["curves"] = _both()
+        bpy.data.objects.remove(made)
+    made = _cloud(grey)
+    _drift(made)
     pictures["points"] = _both()
     return pictures
 
@@ -152,6 +312,21 @@ def _agree(pictures):
 
 def test_hair(blender):
     _agree(blender.run(inside_hair))
+
+
+def test_attributes(blender):
+    _agree(blender.run(inside_attributes))
+
+
+def test_moving_hair(blender):
+    pictures = blender.run(inside_moving_hair)
+    _agree(pictures)
+    assert np.abs(np.diff([pictures["children with the skin"][1], pictures["without deformation blur"][1]],
+                          axis=0)).max() > 0.1, "nothing is blurred"
+
+
+def test_moving_curves_and_points(blender):
+    _agree(blender.run(inside_moving_points))
 
 
 def test_curves_and_points(blender):

@@ -210,7 +210,7 @@ def test_a_second_sync_sends_only_what_differs(blender):
 
 
 def inside_motion(position):
-    """A cube that moves 10 m a frame and grows by a shape key, and a mesh built face by face."""
+    """A cube that moves 10 m a frame and grows by a shape key, a mesh built face by face and its points."""
     import bpy
     import numpy as np
     import scenes
@@ -230,8 +230,11 @@ def inside_motion(position):
         cube.location.x = value * 20.0
         cube.keyframe_insert("location", frame=frame)
     built = scenes.sphere("Built")
-    modifier = built.modifiers.new("Build", 'BUILD')
-    modifier.frame_start, modifier.frame_duration = 0, 4
+    dotted = scenes.sphere("Dotted")
+    for changing in (built, dotted):
+        modifier = changing.modifiers.new("Build", 'BUILD')
+        modifier.frame_start, modifier.frame_duration = 0, 4
+    scenes.geometry_nodes(dotted, "GeometryNodeMeshToPoints")
     for action in bpy.data.actions:
         for curve in action.fcurves:
             for point in curve.keyframe_points:
@@ -286,7 +289,51 @@ def test_motion_keys_follow_the_shutter(blender, position, start):
     assert deforming == pytest.approx([-1.0 - (t - 1.0) * 4.0 for t in times], abs=1e-3)
     assert found["camera_z"] == pytest.approx([(t - 1.0) for t in times[::2]], abs=1e-3)
     assert found["shutter"] == 0.5 and found["frame"] == 2.0
-    assert [w for w in found["warnings"] if "Built" in w and "topology" in w]
+    for name in ("Built", "Dotted"):
+        assert [w for w in found["warnings"] if name in w and "topology" in w]
+
+
+def inside_tangents():
+    """Which of two walls bring tangents (width 4): of plain and normal-mapped materials, and after
+    edits."""
+    import bpy
+    import scenes
+    from volley.sync.changes import Changes
+    scenes.empty()
+    plain, mapped = scenes.emitter((1, 1, 1), "Plain"), scenes.emitter((1, 1, 1), "Mapped")
+    walls = [scenes.wall("Left", material=plain), scenes.wall("Right", 3.0, material=mapped)]
+    for wall in walls:
+        wall.data.uv_layers.new()
+    sync, told, found = None, None, {}
+
+    def map_normals(material):
+        tree = material.node_tree
+        node = tree.nodes.new("ShaderNodeNormalMap")
+        tree.links.new(node.outputs[0], tree.nodes["Emission"].inputs["Color"])
+
+    def look(name, *touched):
+        nonlocal sync, told
+        changes = Changes() if touched else None
+        for each in touched:
+            getattr(changes, "objects" if each in bpy.data.objects.values() else "materials").add(each.name)
+        sync, told = _sync(changes, sync)
+        # Their width tells walls apart.
+        found[name] = sorted((int(arguments[0][0][:, 0].max()), [v.shape[1] for _, v in arguments[6]])
+                             for arguments, _ in told.all("create_mesh"))
+
+    look("none")
+    map_normals(mapped)
+    look("one", mapped)
+    map_normals(plain)
+    look("both", plain)
+    return found
+
+
+def test_tangents_are_made_where_they_are_read(blender):
+    found = blender.run(inside_tangents)
+    assert found["none"] == [(1, []), (1, [])]
+    assert found["one"] == [(1, [4])]
+    assert found["both"] == [(1, [4])]
 
 
 def inside_attributes():

@@ -48,11 +48,27 @@ for _dimensions in ("1D", "2D", "3D", "4D"):
         _add(f"voronoi {_dimensions} {_feature}", "ShaderNodeTexVoronoi", _outputs,
              {"voronoi_dimensions": _dimensions, "feature": _feature}, Scale=2.5, Smoothness=0.7,
              Randomness=0.9, **_place)
+        if _feature != "N_SPHERE_RADIUS":
+            for _unit in (False, True):
+                _add(f"voronoi {_dimensions} {_feature}, octaves{' to 1' * _unit}", "ShaderNodeTexVoronoi",
+                     _outputs, {"voronoi_dimensions": _dimensions, "feature": _feature, "normalize": _unit},
+                     Scale=1.5, Detail=2.4, Roughness=0.6, Lacunarity=2.3, Smoothness=0.7, Randomness=0.9,
+                     **_place)
 for _metric in ("MANHATTAN", "CHEBYCHEV", "MINKOWSKI"):
     for _feature in ("F1", "F2", "SMOOTH_F1"):
         _add(f"voronoi {_metric} {_feature}", "ShaderNodeTexVoronoi", ("Distance", "Color"),
              {"distance": _metric, "feature": _feature}, Vector='vector', Scale=2.5, Exponent=1.7,
              Smoothness=0.4, Randomness=1.0)
+        _add(f"voronoi {_metric} {_feature} to 1", "ShaderNodeTexVoronoi", ("Distance", "Color"),
+             {"distance": _metric, "feature": _feature, "normalize": True}, Vector='vector', Scale=2.5,
+             Detail=1.0, Exponent=1.7, Smoothness=0.4, Randomness=0.8)
+for _feature in ("F1", "DISTANCE_TO_EDGE"):
+    for _name, _range in (("Detail", (-1.0, 3.0)), ("Roughness", (-0.2, 1.2)), ("Lacunarity", (0.2, 2.5))):
+        _add(f"voronoi {_feature}, {_name} varies", "ShaderNodeTexVoronoi", ("Distance",),
+             {"feature": _feature, "normalize": True}, Vector='vector', Scale=1.5,
+             **{"Detail": 3.0, "Roughness": 0.5, "Lacunarity": 2.0, _name: _range})
+_add("voronoi F1, no lacunarity", "ShaderNodeTexVoronoi", ("Distance",), {"normalize": False},
+     Vector='vector', Scale=1.5, Detail=2.0, Lacunarity=0.0)
 for _profile in ("SIN", "SAW", "TRI"):
     for _direction in ("X", "Y", "Z", "DIAGONAL"):
         _add(f"wave {_profile} bands {_direction}", "ShaderNodeTexWave", ("Color", "Fac"),
@@ -244,11 +260,18 @@ def _build(tree, center, case, output):
     tree.links.new(next(s for s in node.outputs if s.name == output and s.enabled), shown.inputs[0])
 
 
+def _is_known(node_type, properties):
+    """Whether this Blender has the node and its properties."""
+    import bpy
+    node = getattr(bpy.types, node_type, None)
+    return node is not None and all(callable(value) or key in node.bl_rna.properties
+                                    for key, value in properties.items())
+
+
 def inside_cases(names):
     """{(case, output): (picture by Volley, picture by Cycles)}."""
-    import bpy
     import scenes
-    known = [name for name in names if hasattr(bpy.types, CASES[name][0])]
+    known = [name for name in names if _is_known(*CASES[name][:2])]
     shown = [(name, output) for name in known for output in CASES[name][3]]
     pictures = {}
     for start in range(0, len(shown), GRID * GRID):

@@ -148,6 +148,22 @@ def emitter(color, name="Emitter", strength=1.0):
     return material(name, "ShaderNodeEmission", Color=color, Strength=strength)
 
 
+def geometry_nodes(owner, *kinds):
+    """A new modifier of nodes that follow each other: the nodes."""
+    group = bpy.data.node_groups.new("Nodes", 'GeometryNodeTree')
+    if hasattr(group, "interface"):
+        group.interface.new_socket("Geometry", in_out='INPUT', socket_type='NodeSocketGeometry')
+        group.interface.new_socket("Geometry", in_out='OUTPUT', socket_type='NodeSocketGeometry')
+    else:
+        group.inputs.new('NodeSocketGeometry', "Geometry")
+        group.outputs.new('NodeSocketGeometry', "Geometry")
+    nodes = [group.nodes.new(kind) for kind in ("NodeGroupInput", *kinds, "NodeGroupOutput")]
+    for a, b in zip(nodes, nodes[1:]):
+        group.links.new(a.outputs[0], b.inputs[0])
+    owner.modifiers.new("Nodes", 'NODES').node_group = group
+    return nodes[1:-1]
+
+
 def render():
     """Render the scene as F12 does; its Combined picture."""
     path = os.path.join(tempfile.mkdtemp(prefix="volley_"), "picture.exr")

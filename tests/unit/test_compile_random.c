@@ -32,7 +32,7 @@ static const struct {
     {TRC_NODE_MAPPING, 4, "cccc"},
     {TRC_NODE_RGB_TO_BW, 1, "c"},
     {TRC_NODE_NOISE, 6 << TRC_NOISE_TYPE_SHIFT, "cffffffff"},
-    {TRC_NODE_VORONOI, 5 << TRC_VORONOI_FEATURE_SHIFT, "cfffff"},
+    {TRC_NODE_VORONOI, 5 << TRC_VORONOI_FEATURE_SHIFT, "cffffffff"},
     {TRC_NODE_WAVE, 2, "cffffff"},
     {TRC_NODE_GRADIENT, 7, "c"},
     {TRC_NODE_MAGIC, 11, "cff"},

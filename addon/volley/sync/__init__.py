@@ -12,7 +12,7 @@ import bpy
 
 from .. import native
 from ..log import Warnings
-from . import camera, image, instance, light, mesh, motion, strands, visibility, world
+from . import camera, image, instance, light, mesh, motion, strands, tubes, visibility, world
 from .changes import Changes
 from .image import Images
 from .material import Materials
@@ -117,6 +117,9 @@ class SceneSync:
             fields = light.describe(each.object, item, self.warnings)
             return fields is not None and self._lights.change(item.key, fields)
         known = shown.items[instance.key_of(each)]
+        made_of = filter(None, _materials_of(each.object, view_layer))
+        if not self._meshes.brings(known.mesh_key, self._materials.tangents_read_by(made_of)):
+            return False
         if name in source.changes.geometry and not self._change_mesh(each, known, shown, source):
             return False
         item = instance.describe(each, view_layer, source.light_groups)
@@ -215,12 +218,27 @@ def _size_limit(source):
 
 def _material_ids(materials, each, view_layer):
     """Library ids of an instance's material slots."""
-    slots = [slot.material for slot in each.object.material_slots]
     if visibility.is_holdout(each, view_layer):
         return (materials.holdout_id(),)
+    return tuple(materials.id_of(material) for material in _materials_of(each.object, view_layer))
+
+
+def _materials_of(blender_object, view_layer):
+    """What an object is made of, slot by slot, None where a slot is empty."""
     if view_layer.material_override is not None:
-        return (materials.id_of(view_layer.material_override),)
-    return tuple(materials.id_of(material) for material in slots)
+        return [view_layer.material_override]
+    return [slot.material for slot in blender_object.material_slots]
+
+
+@dataclass
+class _Deforming:
+    """A mesh that waits for its other shapes. read: of an instance at one time, what its shapes take."""
+
+    pointer: int
+    data: mesh.MeshData
+    names: tuple
+    shapes: mesh.KeyedShapes
+    read: object
 
 
 class _Walk:
@@ -229,12 +247,14 @@ class _Walk:
     def __init__(self, sync, source, shutter):
         self._sync, self._source, self._shutter = sync, source, shutter
         self._view_layer = source.depsgraph.view_layer_eval
-        uv_names, color_names, needs_generated, self._needs_instancer = sync._materials.attribute_names()
+        uv_names, color_names, needs_generated, self._needs_instancer, self._tangent_readers = \
+            sync._materials.attribute_names()
         if source.needs_uv:
             uv_names.add("")
         self._names = frozenset(uv_names), frozenset(color_names), needs_generated
+        self._tangents = None  # pointer of a mesh -> the tangents that its objects' materials read
         self._owners = {}     # pointer of a mesh -> key of its owner, within this walk
-        self._deforming = {}  # owner key -> (pointer, MeshData, MeshMotion)
+        self._deforming = {}  # owner key -> _Deforming
         self.items = {}       # key -> Item with a mesh
         self.lights = {}      # key -> fields of a light
         self.tied = set()     # names of objects that are instanced or make instances
@@ -270,8 +290,8 @@ class _Walk:
 
     def send_deforming(self):
         """Send the meshes that waited for their motion keys."""
-        for key, (pointer, data, shapes) in self._deforming.items():
-            self._sync._meshes.put(key, pointer, data, self._names, shapes)
+        for key, waiting in self._deforming.items():
+            self._sync._meshes.put(key, waiting.pointer, waiting.data, waiting.names, waiting.shapes)
 
     def _instances(self):
         """Those that take part, by themselves or by their particles."""
@@ -310,59 +330,58 @@ class _Walk:
         is_final = self._source.v3d is None
         for number, modifier in strands.hair_systems(blender_object, is_final):
             self.tied.add(blender_object.name_full)  # only a walk sees what its hair does
-
-            def make(modifier=modifier):
-                real = blender_object.original.evaluated_get(self._source.depsgraph)
-                return strands.extract_hair(real, modifier, real.matrix_world.inverted_safe(), is_final,
-                                            *self._names[:2])
             item = self._describe(each)
             item.key = instance.hair_key(each, number)
             materials = _material_ids(self._sync._materials, each, self._view_layer)
             slot = min(max(modifier.particle_system.settings.material, 1), len(materials)) - 1
             item.materials = materials[slot:slot + 1] if materials else ()
-            self._add_made(each, item, (blender_object.name_full, number), make)
+            hair = strands.Hair(number, self._source.depsgraph, is_final, self._names[:2])
+            self._add_made(each, item, (blender_object.name_full, number), hair)
 
     def _move_hair(self, each, fraction):
-        """Hair goes where its object goes."""
+        """Hair goes where its object goes, and by itself."""
         for number in range(len(each.object.particle_systems)):
             item = self.items.get(instance.hair_key(each, number))
-            index = None if item is None else motion.key_index(fraction, item.motion_keys)
-            if index is not None:
-                item.transforms[index] = rows12(each.matrix_world)
+            if item is not None:
+                self._look_again(item, each, fraction)
 
     def _add_strands(self, each):
         """A Curves or Point Cloud object."""
-        data = each.object.data
         item = self._describe(each)
         item.materials = _material_ids(self._sync._materials, each, self._view_layer)[:1]
         self.tied.add(each.object.name_full)
-        self._add_made(each, item, data.as_pointer(),
-                       lambda: strands.extract_object(data, self._wants_hair_info()))
+        self._add_made(each, item, each.object.data.as_pointer(), strands.StrandObject(self._names[:2]))
 
-    def _wants_hair_info(self):
-        return strands.HAIR_ATTRIBUTE in self._names[1]
-
-    def _add_made(self, each, item, source, make):
-        """An item whose mesh is made by make() unless another item of the same source has it."""
+    def _add_made(self, each, item, source, made_of):
+        """An item of strands or points (strands.Hair or strands.StrandObject) whose mesh is made unless another
+        item of the same source has it."""
         if self._shutter is not None:
             item.motion_keys = motion.key_count(each.object, each.parent if each.is_instance else None)
             item.transforms *= item.motion_keys
         if source not in self._owners:
-            self._owners[source] = item.key if self._put_made(item, source, make) else None
+            self._owners[source] = item.key if self._put_made(each, item, source, made_of) else None
         item.mesh_key = self._owners[source]
         if item.mesh_key is not None:
             self.items[item.key] = item
 
-    def _put_made(self, item, source, make):
-        """Have the mesh of an item in the library; False where there is nothing to show."""
+    def _put_made(self, each, item, source, made_of):
+        """Have the mesh of an item in the library, or wait for its shapes; False where there is nothing to
+        show."""
         changes, meshes = self._source.changes, self._sync._meshes
         is_same = not changes.full and item.owner not in changes.objects
         if is_same and meshes.reuse(item.key, source, self._names):
             return True
-        data = make()
-        if data is not None:
+        shape = made_of.read(each)
+        made = None if shape is None else made_of.solid(each, shape)
+        if made is None:
+            return False
+        solid, data = made
+        if item.motion_keys > 1 and motion.may_deform(each.object) and made_of.may_move(each):
+            shapes = tubes.StrandMotion(solid, shape, data, item.motion_keys)
+            self._deforming[item.key] = _Deforming(source, data, self._names, shapes, made_of.read)
+        else:
             meshes.put(item.key, source, data, self._names)
-        return data is not None
+        return True
 
     def _mesh_key(self, item, blender_object):
         """The key of the mesh the item shows, which is read now if no other item showed it before."""
@@ -378,22 +397,44 @@ class _Walk:
         to show."""
         meshes = self._sync._meshes
         is_changed = self._source.changes.geometry_of(item.owner)
-        if not is_changed and meshes.reuse(item.key, pointer, self._names):
+        names = self._names_of(pointer)
+        if not is_changed and meshes.reuse(item.key, pointer, names):
             return True
         slot_count = max(len(blender_object.material_slots), len(blender_object.data.materials))
-        data = mesh.extract(blender_object.data, *self._names[:2], slot_count)
+        data = mesh.extract(blender_object.data, *names[:2], slot_count)
         if data is None:
             return False
-        if self._names[2]:
+        if names[2]:
             data.generated = mesh.generated_coordinates(blender_object, data.positions)
         if meshes.will_resync and mesh.is_posable(blender_object):
             data.poses = mesh.Topology(blender_object.data)
         if item.motion_keys > 1 and motion.may_deform(blender_object):
             shapes = mesh.MeshMotion(blender_object.data, data, item.motion_keys)
-            self._deforming[item.key] = (pointer, data, shapes)
+            self._deforming[item.key] = _Deforming(pointer, data, names, shapes,
+                                                   lambda each: each.object.data)
         else:
-            meshes.put(item.key, pointer, data, self._names)
+            meshes.put(item.key, pointer, data, names)
         return True
+
+    def _names_of(self, pointer):
+        """What a mesh brings: tangents only where they are read, as they take longest to make."""
+        if not self._tangent_readers:
+            return self._names
+        if self._tangents is None:
+            self._tangents = self._find_tangents()
+        uv_names, color_names, needs_generated = self._names
+        every = set().union(*self._tangent_readers.values())
+        return uv_names, color_names - (every - self._tangents.get(pointer, every)), needs_generated
+
+    def _find_tangents(self):
+        """{pointer of a mesh: names of the tangents that the materials of its objects read}"""
+        found = {}
+        for each in self._source.depsgraph.objects:
+            if each.data is not None:
+                names = found.setdefault(each.data.as_pointer(), set())
+                for material in filter(None, _materials_of(each, self._view_layer)):
+                    names |= self._tangent_readers.get(material.name_full, set())
+        return found
 
     def _look_again(self, item, each, fraction):
         index = motion.key_index(fraction, item.motion_keys)
@@ -401,8 +442,8 @@ class _Walk:
             return
         item.transforms[index] = rows12(each.matrix_world)
         waiting = self._deforming.get(item.key)
-        if waiting is None or waiting[2].is_dropped:
+        if waiting is None or waiting.shapes.is_dropped:
             return
-        if not waiting[2].set_key(index, each.object.data):
+        if not waiting.shapes.set_key(index, waiting.read(each)):
             self._sync.warnings.add(
                 f"Object '{each.object.name}': its topology changes in time, no deformation blur")

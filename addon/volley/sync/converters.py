@@ -8,19 +8,22 @@ import numpy as np
 
 from ..compat import TRANSFORMS_NORMALS
 from .instance import VALUES_LOCATION, VALUES_PARTICLE, VALUES_SPIN, VALUES_VELOCITY
-from .strands import HAIR_ATTRIBUTE
+from .strands import DIRECTION_ATTRIBUTE, HAIR_ATTRIBUTE
 from .values import CONSTANT, DEFAULT, Value
 
 # TRC_NODE_*
 CURVES, FLOAT_CURVE, BLACKBODY, WAVELENGTH, VECTOR_TRANSFORM, VECTOR_ROTATE, CAMERA_DATA, \
     WIREFRAME = range(104, 112)
 _COLOR_ATTRIBUTE, _MATH, _LIGHT_PATH, _GEOMETRY, _SEPARATE, _COMBINE, _MAP_RANGE = 67, 71, 74, 75, 82, 83, 84
-_INSTANCE_VALUES = 90
+_VECTOR_MATH, _INSTANCE_VALUES = 88, 90
 
 # TRC_MATH_*
 _ADD, _SUBTRACT, _MULTIPLY, _DIVIDE, _MULTIPLY_ADD, _GREATER_THAN, _FLOOR = 0, 1, 2, 3, 4, 14, 20
 _CLAMP_RESULT = 256
+_PROJECT, _SCALE, _NORMALIZE = 6, 11, 12  # TRC_VECTOR_*; subtraction as TRC_MATH_*
 _RAY_LENGTH = 7  # output of the Light Path node
+_INCOMING = 4    # of the Geometry node
+_OBJECT_TO_WORLD = 1 | 0 << 2 | 1 << 4  # mode of VECTOR_TRANSFORM: TRC_SPACE_* and a vector
 _TABLE_SIZE = 256
 
 _SPACES = ('WORLD', 'OBJECT', 'CAMERA')
@@ -37,6 +40,12 @@ def _number(walker, operation, *values, clamped=False):
     values = [v if isinstance(v, Value) else _constant('f', v) for v in values]
     values += [_constant('f', 0.0)] * (3 - len(values))
     return Value('f', walker.emit(_MATH, values, operation | (_CLAMP_RESULT if clamped else 0)), 0)
+
+
+def _vector(walker, operation, a, b=None, scale=None):
+    """The vector of a Vector Math node."""
+    values = (a, b or _constant('v', 0.0), _constant('v', 0.0), scale or _constant('f', 1.0))
+    return Value('v', walker.emit(_VECTOR_MATH, values, operation), 0)
 
 
 # Curves --------------------------------------------------------------------------------------------
@@ -183,18 +192,28 @@ def _bevel(walker, _node, sockets):
     return {"Normal": normal}
 
 
+def _tangent_normal(walker):
+    """The normal across a strand that looks at the viewer most; 0 on what is no strand."""
+    walker.flat.color_names.add(DIRECTION_ATTRIBUTE)
+    strand = walker.emit(_COLOR_ATTRIBUTE, (), name=DIRECTION_ATTRIBUTE)
+    along = Value('v', walker.emit(VECTOR_TRANSFORM, (Value('v', strand, 0),), _OBJECT_TO_WORLD), 0)
+    incoming = Value('v', walker.emit(_GEOMETRY, ()), _INCOMING)
+    across = _vector(walker, _SUBTRACT, incoming, _vector(walker, _PROJECT, incoming, along))
+    return _vector(walker, _SCALE, _vector(walker, _NORMALIZE, across), scale=Value('f', strand, 1))
+
+
 def _hair_info(walker, node, _sockets):
-    """What the meshes of strands bring as an attribute; 0 on all others."""
-    if node.outputs["Tangent Normal"].is_linked:
-        walker.warn("Curves Info: Tangent Normal is not supported, 0 is used")
+    """What the meshes of strands bring as attributes; 0 on all others."""
     walker.flat.color_names.add(HAIR_ATTRIBUTE)
     index = walker.emit(_COLOR_ATTRIBUTE, (), name=HAIR_ATTRIBUTE)
     parts = walker.emit(_SEPARATE, (Value('c', index, 0),))
     intercept, length, thickness = (Value('f', parts, i) for i in range(3))
     is_strand = _number(walker, _GREATER_THAN, length, _constant('f', 0.0))
     random = _number(walker, _MULTIPLY, Value('f', index, 1), is_strand)
+    is_read = node.outputs["Tangent Normal"].is_linked
+    tangent_normal = _tangent_normal(walker) if is_read else _constant('v', 0.0)
     return {"Is Strand": is_strand, "Intercept": intercept, "Length": length, "Thickness": thickness,
-            "Tangent Normal": _constant('v', 0.0), "Random": random}
+            "Tangent Normal": tangent_normal, "Random": random}
 
 
 def instance_value(walker, kind, first):

@@ -21,8 +21,7 @@ def describe(light_object, item, warnings):
         warnings.add(f"Light '{light.name}': type {light.type} is not supported, it is left out")
         return None
     if light.type == 'AREA' and cycles(light, "is_portal", False):
-        warnings.add(f"Light '{light.name}': portals are not supported, it is left out")
-        return None
+        return None  # of itself dark: it tells Cycles' sampling where the world shines in
     factor = _node_color(light, warnings)
     fields = {
         "type": native.LIGHT_TYPES[light.type],

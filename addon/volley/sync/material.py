@@ -5,7 +5,7 @@ import bpy
 
 from .. import native
 from ..compat import CHOOSES_LOBES_PLAINLY, cycles, uses_nodes
-from . import flatten, nodes
+from . import flatten, nodes, tangents
 from .changes import Changes
 from .values import CONSTANT, DEFAULT, Value
 
@@ -96,15 +96,24 @@ class Materials:
         return entry.id, entry.sun
 
     def attribute_names(self):
-        """The UV maps and colour attributes that the materials of this sync read, two sets, and whether
-        one reads Generated coordinates, and one what made the instance."""
+        """The UV maps and colour attributes that the materials of this sync read, two sets, whether one
+        reads Generated coordinates, and one what made the instance, and {name: attributes of tangents}
+        of the materials that read those."""
         uv_names, color_names, needs_generated, needs_instancer = set(), set(), False, False
+        tangent_readers = {}
         for key in self._seen:
+            of_tangents = tangents.names_among(self._entries[key].color_names)
+            if of_tangents:
+                tangent_readers[key] = of_tangents
             uv_names |= self._entries[key].uv_names
             color_names |= self._entries[key].color_names
             needs_generated |= self._entries[key].needs_generated
             needs_instancer |= self._entries[key].needs_instancer
-        return uv_names, color_names, needs_generated, needs_instancer
+        return uv_names, color_names, needs_generated, needs_instancer, tangent_readers
+
+    def tangents_read_by(self, materials):
+        """The attributes of tangents that some of Blender's materials of this sync read."""
+        return tangents.names_among(set().union(*(self.entry_of(each).color_names for each in materials)))
 
     def end(self):
         """Free what nothing asked for since begin; call when no instance uses it any more."""

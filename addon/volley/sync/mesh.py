@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 
 from .. import native
-from . import derived
+from . import derived, tangents
 
 _HAS_UNDEFORMED = "undeformed_co" in bpy.types.MeshVertex.bl_rna.properties
 # Blender's interface holds corners' vertices and triangles for unsigned; reading them as signed takes some
@@ -59,7 +59,7 @@ def extract(mesh, uv_names=(), color_names=(), material_count=1):
     if material_count > 1:
         data.material_index = _material_index(mesh, loops)
     read_normals(mesh, data, loops)
-    data.attributes = (_uv_maps(mesh, uv_names, loops) + _colors(mesh, color_names, loops))
+    data.attributes = _uv_maps(mesh, uv_names, loops) + _colors(mesh, data, color_names, loops)
     del data.attributes[native.MAX_ATTRIBUTES:]
     return data
 
@@ -265,13 +265,43 @@ def _uv_values(layer, corner_count):
     return _read(layer.data, "uv", (corner_count, 2), np.float32)
 
 
-def _colors(mesh, names, loops):
-    """The named attributes as colours per triangle corner; "" is the active colour attribute."""
-    found = []
+def _tangent_layers(mesh, names):
+    """The UV maps whose tangents are among the names, by those."""
+    if not tangents.names_among(names):
+        return {}
+    layers = [(layer.name, layer) for layer in mesh.uv_layers]
+    layers += [("", layer) for layer in mesh.uv_layers if layer.active_render]
+    return {tangents.attribute_name(name): layer for name, layer in layers}
+
+
+def _tangents(mesh, data, layer, loops):
+    """What tangents.of_corners says of a UV map."""
+    uvs = _uv_values(layer, len(mesh.loops))[loops.of_triangles].reshape(-1, 3, 2)
+    return tangents.of_corners(data.positions[data.indices], _normals_of_corners(data), uvs)
+
+
+def _normals_of_corners(data):
+    """(triangles, 3, 3) normals that a mesh is shaded with."""
+    if data.normal_kind == native.NORMALS_CORNER:
+        return data.normals.reshape(-1, 3, 3)
+    flat = np.repeat(tangents.face_normals(data.positions[data.indices])[:, None], 3, axis=1)
+    if data.normals is None:
+        return flat
+    return np.where(data.smooth[:, None, None], data.normals[data.indices], flat)
+
+
+def _colors(mesh, data, names, loops):
+    """The named attributes as colours per triangle corner; "" is the active colour attribute. It comes
+    first, black where there is none, as the first is the library's default."""
+    found, layers = [], _tangent_layers(mesh, names)
     for name in sorted(names):
         source = name or active_color_name(mesh)
         values = None
-        if source in _DERIVED:
+        if not source and len(names) > 1:
+            values = np.zeros((3 * len(data.indices), 4), np.float32)
+        elif name in layers:
+            values = _tangents(mesh, data, layers[name], loops)
+        elif source in _DERIVED:
             values = _widen(_DERIVED[source](mesh)[:, None])[_corner_vertices(mesh)[loops.of_triangles]]
         elif source:
             values = _attribute_values(mesh, source, loops)
@@ -305,12 +335,9 @@ def _attribute_values(mesh, name, loops):
     if name in mesh.uv_layers:
         return _widen(_uv_values(mesh.uv_layers[name], len(mesh.loops)))[loops.of_triangles]
     attribute = mesh.attributes.get(name)
-    if attribute is None or attribute.data_type not in _WIDTHS:
+    values = None if attribute is None else attribute_colors(attribute)
+    if values is None:
         return None
-    field_name, width = _WIDTHS[attribute.data_type]
-    dtype = np.int32 if attribute.data_type == 'INT' else np.float32
-    values = _read(attribute.data, field_name, (len(attribute.data), width), dtype)
-    values = _widen(values.astype(np.float32, copy=False))
     if attribute.domain == 'CORNER':
         return values[loops.of_triangles]
     if attribute.domain == 'POINT':
@@ -318,6 +345,16 @@ def _attribute_values(mesh, name, loops):
     if attribute.domain == 'FACE':
         return values[np.repeat(loops.polygons, 3)]
     return None
+
+
+def attribute_colors(attribute):
+    """(items, 4) float32 of an attribute of any domain, None if it is of an odd type."""
+    if attribute.data_type not in _WIDTHS:
+        return None
+    field_name, width = _WIDTHS[attribute.data_type]
+    dtype = np.int32 if attribute.data_type == 'INT' else np.float32
+    values = _read(attribute.data, field_name, (len(attribute.data), width), dtype)
+    return _widen(values.astype(np.float32, copy=False))
 
 
 def _widen(values):
@@ -354,18 +391,33 @@ def is_posable(blender_object):
         modifier.type in _POSING_MODIFIERS for modifier in original.modifiers)
 
 
-class MeshMotion:
-    """The shapes of one deforming mesh over the shutter, one slot per motion key."""
+class KeyedShapes:
+    """Shapes of a mesh over the shutter, one slot per motion key."""
 
-    def __init__(self, mesh, data, key_count):
-        self._topology = Topology(mesh)
+    def __init__(self, data, key_count):
         self._data = data
-        self._corners = None
-        if data.normal_kind == native.NORMALS_CORNER:
-            self._corners = _LazyLoops(mesh, len(data.indices)).of_triangles
         self.positions = [data.positions] * key_count
         self.normals = [data.normals] * key_count
         self.is_dropped = False
+
+    def keys(self):
+        """positions and normals, (keys, ...) each; one key when nothing moves or motion is dropped."""
+        base = self._data
+        still = all(np.array_equal(p, base.positions) for p in self.positions)
+        if self.is_dropped or still:
+            return base.positions[None], None if base.normals is None else base.normals[None]
+        return np.stack(self.positions), None if base.normals is None else np.stack(self.normals)
+
+
+class MeshMotion(KeyedShapes):
+    """The shapes of one deforming mesh of Blender's."""
+
+    def __init__(self, mesh, data, key_count):
+        super().__init__(data, key_count)
+        self._topology = Topology(mesh)
+        self._corners = None
+        if data.normal_kind == native.NORMALS_CORNER:
+            self._corners = _LazyLoops(mesh, len(data.indices)).of_triangles
 
     def set_key(self, index, mesh):
         """Take the mesh's shape as that key; False (and no motion) when its topology is another."""
@@ -378,14 +430,6 @@ class MeshMotion:
         elif self._data.normal_kind == native.NORMALS_VERTEX:
             self.normals[index] = np.array(_vertex_normals(mesh))
         return True
-
-    def keys(self):
-        """positions and normals, (keys, ...) each; one key when nothing moves or motion is dropped."""
-        base = self._data
-        still = all(np.array_equal(p, base.positions) for p in self.positions)
-        if self.is_dropped or still:
-            return base.positions[None], None if base.normals is None else base.normals[None]
-        return np.stack(self.positions), None if base.normals is None else np.stack(self.normals)
 
 
 class MeshEntry:
@@ -475,6 +519,11 @@ class Meshes:
             self._retired.append(self._entries[key].id)
         self._entries[key] = entry
         return entry
+
+    def brings(self, key, color_names):
+        """Whether a mesh was read with those attributes."""
+        entry = self._entries.get(key)
+        return entry is not None and color_names <= entry.names[1]
 
     def id_of(self, key):
         """Library id of one mesh."""

@@ -11,6 +11,7 @@ from collections import namedtuple
 import numpy as np
 
 from ..compat import HAS_CORRELATED_MICROFACETS, KEEPS_DIFFUSE_ENERGY, RAMP_STEPS
+from . import tangents
 from .converters import CONVERTERS, instance_value
 from .derived import ISLAND, POINTINESS
 from .instance import VALUES_GENERATED, VALUES_UV
@@ -25,7 +26,8 @@ from .values import CONSTANT, DEFAULT, Value
  COLOR_RAMP, SEPARATE, COMBINE, MAP_RANGE, CLAMP, CHECKER, OBJECT_INFO, VECTOR_MATH,
  RGB_TO_BW) = range(64, 90)
 
-AOV_VALUE, AOV_COLOR = 112, 113
+AOV_VALUE, AOV_COLOR, TANGENT = 112, 113, 114
+_TANGENT_AXES, _TANGENT_UV = ('Z', 'X', 'Y'), 3
 
 _DISTRIBUTIONS = {'GGX': 0, 'MULTI_GGX': 1, 'BECKMANN': 2, 'SHARP': 3, 'ASHIKHMIN_SHIRLEY': 4}
 _CORRELATED = 16 if HAS_CORRELATED_MICROFACETS else 0
@@ -493,11 +495,26 @@ def _attribute(walker, node, _sockets):
 
 def _normal_map(walker, node, sockets):
     space = ('TANGENT', 'OBJECT', 'WORLD', 'BLENDER_OBJECT', 'BLENDER_WORLD').index(node.space)
-    if space == 0:
-        walker.flat.uv_names.add(node.uv_map)
+    name = _tangents_of(walker, node) if space == 0 else ""
     index = walker.emit(NORMAL_MAP, (sockets.get('f', "Strength"), sockets.get('c', "Color")), space,
-                        name=node.uv_map)
+                        name=name)
     return _outputs(walker, index, (("Normal", 'v'),))
+
+
+def _tangents_of(walker, node):
+    """The attribute with the tangents of a node's UV map."""
+    name = tangents.attribute_name(node.uv_map)
+    walker.flat.color_names.add(name)
+    return name
+
+
+def _tangent(walker, node, _sockets):
+    mode, name = _TANGENT_AXES.index(node.axis), ""
+    if node.direction_type == 'UV_MAP':
+        mode, name = _TANGENT_UV, _tangents_of(walker, node)
+    else:
+        walker.flat.needs_generated = True
+    return _outputs(walker, walker.emit(TANGENT, (), mode, name=name), (("Tangent", 'v'),))
 
 
 def _color_ramp(walker, node, sockets):
@@ -560,5 +577,6 @@ _SPECIAL = {
     "ShaderNodeTexEnvironment": _environment, "ShaderNodeUVMap": _uv_map,
     "ShaderNodeTexCoord": _texture_coordinate, "ShaderNodeVertexColor": _color_attribute,
     "ShaderNodeAttribute": _attribute, "ShaderNodeNormalMap": _normal_map,
+    "ShaderNodeTangent": _tangent,
     "ShaderNodeValToRGB": _color_ramp, "ShaderNodeMix": _mix,
 }

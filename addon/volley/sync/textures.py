@@ -18,6 +18,7 @@ _FRACTALS = {'FBM': _FBM, 'MULTIFRACTAL': 2, 'HETERO_TERRAIN': 3, 'HYBRID_MULTIF
              'RIDGED_MULTIFRACTAL': 5}
 _METRICS = ('EUCLIDEAN', 'MANHATTAN', 'CHEBYCHEV', 'MINKOWSKI')
 _FEATURES = ('F1', 'F2', 'SMOOTH_F1', 'DISTANCE_TO_EDGE', 'N_SPHERE_RADIUS')
+_VORONOI_NORMALIZE = 1 << 7
 _PROFILES = ('SIN', 'SAW', 'TRI')
 _BANDS = ('X', 'Y', 'Z', 'DIAGONAL')
 _RINGS = ('X', 'Y', 'Z', 'SPHERICAL')
@@ -71,13 +72,13 @@ def _voronoi(walker, node, sockets):
     dimensions, vector, w = _place(node, sockets)
     if node.feature not in _FEATURES or node.distance not in _METRICS:
         return None
-    detail = _number(sockets, "Detail", 0.0)
-    if detail.node != CONSTANT or detail.constant[0] > 0.0 or getattr(node, "normalize", False):
-        walker.warn("Voronoi Texture: detail and normalisation are not supported, one plain octave is "
-                    "used")
     values = [vector, w] + [sockets.get('f', name) for name in (
         "Scale", "Smoothness", "Exponent", "Randomness")]
+    values += [_number(sockets, "Detail", 0.0), _number(sockets, "Roughness", 0.0),
+               _number(sockets, "Lacunarity", 2.0)]
     mode = dimensions | _METRICS.index(node.distance) << 2 | _FEATURES.index(node.feature) << 4
+    if getattr(node, "normalize", False):
+        mode |= _VORONOI_NORMALIZE
     index = walker.emit(VORONOI, values, mode)
     return {"Distance": Value('f', index, 0), "Color": Value('c', index, 1),
             "Position": Value('v', index, 2), "W": Value('f', index, 3), "Radius": Value('f', index, 4)}

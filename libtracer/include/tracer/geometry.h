@@ -15,8 +15,8 @@ enum { TRC_NORMALS_NONE = 0, TRC_NORMALS_VERTEX = 1, TRC_NORMALS_CORNER = 2 };
 /* A named array with one value per triangle corner, in triangle order. */
 typedef struct trc_corner_attribute {
     uint32_t struct_size;
-    uint32_t width;       /* floats per corner: 2 (UV map) or 4 (colour, scene-linear RGBA) */
-    const char *name;     /* UTF-8, up to 63 bytes; not NULL */
+    uint32_t width;   /* floats per corner: 2 (UV map) or 4 (colour, scene-linear RGBA; tangents) */
+    const char *name; /* UTF-8, up to 63 bytes; not NULL */
     const float *values;  /* width * 3 * triangle_count floats */
     uint64_t value_count; /* number of floats, checked */
 } trc_corner_attribute;

@@ -68,11 +68,15 @@ enum {
                                    transparent depth, transmission depth */
     TRC_NODE_GEOMETRY = 75,     /* -> c position, c normal, c tangent, c true_normal, c incoming,
                                    c parametric, f backfacing, f pointiness, f random_per_island */
-    TRC_NODE_NORMAL_MAP = 76, /* f strength, c color -> c normal; mode 0 tangent, 1 object, 2 world,
-                                 3 and 4 object and world with Y and Z turned around (Blender's own
-                                 baked maps); name: UV map */
-    TRC_NODE_INVERT = 77,     /* f factor, c color -> c */
-    TRC_NODE_GAMMA = 78,      /* c color, f gamma -> c */
+    TRC_NODE_NORMAL_MAP =
+        76,               /* f strength, c color -> c normal; mode 0 tangent, 1 object, 2 world,
+                             3 and 4 object and world with Y and Z turned around (Blender's own
+                             baked maps); name: UV map, whose tangents are those of each triangle
+                             by itself, or an attribute of width 4 with tangents at the corners:
+                             a, b, 1 or -1, 0 for the direction a (p1 - p0) + b (p2 - p0), made
+                             perpendicular to the corner's normal, and the handedness */
+    TRC_NODE_INVERT = 77, /* f factor, c color -> c */
+    TRC_NODE_GAMMA = 78,  /* c color, f gamma -> c */
     TRC_NODE_HUE_SATURATION = 79,  /* f hue, f saturation, f value, f factor, c color -> c */
     TRC_NODE_BRIGHT_CONTRAST = 80, /* c color, f bright, f contrast -> c */
     TRC_NODE_COLOR_RAMP = 81,      /* f factor -> c color, f alpha; table: 256 RGBA values;
@@ -96,10 +100,12 @@ enum {
                                    - 1 in bits 0-1, TRC_FRACTAL_* from bit TRC_NOISE_TYPE_SHIFT */
     TRC_NODE_MUSGRAVE = 97,     /* c vector, f w, f scale, f detail, f dimension, f lacunarity,
                                    f offset, f gain -> f; mode as NOISE, without FBM_UNIT */
-    TRC_NODE_VORONOI = 98,      /* c vector, f w, f scale, f smoothness, f exponent, f randomness ->
-                                   f distance, c color, c position, f w, f radius; mode: dimensions - 1
-                                   in bits 0-1, metric and TRC_VORONOI_* feature from bits
-                                   TRC_VORONOI_METRIC_SHIFT and TRC_VORONOI_FEATURE_SHIFT */
+    TRC_NODE_VORONOI = 98,      /* c vector, f w, f scale, f smoothness, f exponent, f randomness,
+                                   f detail, f roughness, f lacunarity -> f distance, c color,
+                                   c position, f w, f radius; mode: dimensions - 1 in bits 0-1, metric
+                                   and TRC_VORONOI_* feature from bits TRC_VORONOI_METRIC_SHIFT and
+                                   TRC_VORONOI_FEATURE_SHIFT, TRC_VORONOI_NORMALIZE. The radius has
+                                   no octaves */
     TRC_NODE_WAVE = 99,         /* c vector, f scale, f distortion, f detail, f detail_scale,
                                    f detail_roughness, f phase -> f; mode: profile in bits 0-1,
                                    TRC_WAVE_RINGS, from bit TRC_WAVE_DIRECTION_SHIFT 0-2 X, Y, Z,
@@ -129,11 +135,15 @@ enum {
                                      TRC_ROTATE_* | 8 to turn the other way */
     TRC_NODE_CAMERA_DATA = 110,   /* -> c view_vector, f view_z_depth, f view_distance */
     TRC_NODE_WIREFRAME = 111,     /* f size (m, world) -> f */
+    TRC_NODE_TANGENT = 114, /* -> c; mode: TRC_TANGENT_*; name, if of a UV map: as NORMAL_MAP */
 
     /* outputs besides the surface: no node has to lead to them; mode: number of the AOV */
     TRC_NODE_AOV_VALUE = 112, /* f value */
     TRC_NODE_AOV_COLOR = 113  /* c color */
 };
+
+/* Around an axis of the object (Generated coordinates), or where U of a UV map grows. */
+enum { TRC_TANGENT_Z = 0, TRC_TANGENT_X, TRC_TANGENT_Y, TRC_TANGENT_UV };
 
 enum { TRC_SPACE_WORLD = 0, TRC_SPACE_OBJECT, TRC_SPACE_CAMERA };
 
@@ -164,7 +174,8 @@ enum { /* features */
        TRC_VORONOI_SMOOTH_F1,
        TRC_VORONOI_DISTANCE_TO_EDGE,
        TRC_VORONOI_N_SPHERE_RADIUS,
-       TRC_VORONOI_FEATURE_SHIFT = 4
+       TRC_VORONOI_FEATURE_SHIFT = 4,
+       TRC_VORONOI_NORMALIZE = 1 << 7 /* distance and color to about [0, 1] */
 };
 
 enum {

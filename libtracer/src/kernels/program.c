@@ -117,7 +117,7 @@ static void run_at_surface(const struct trc_surface *s, const struct trc_instruc
         v3_write(out, s->wo);
         break;
     case TRC_OP_TANGENT:
-        v3_write(out, op_tangent(s));
+        v3_write(out, op_tangent(s, i->mode, i->resource));
         break;
     case TRC_OP_PARAMETRIC:
         out[0] = vf_one() - s->u - s->v;

@@ -211,24 +211,6 @@ static vvec3 op_object_normal(const struct trc_surface *s) {
     return out;
 }
 
-/* Around the Z axis of the Generated coordinates, along the surface. */
-static vvec3 op_tangent(const struct trc_surface *s) {
-    vvec3 out = v3_zero();
-    struct lane_group g = groups_begin(s);
-    while (groups_next(s, &g)) {
-        if (!g.instance)
-            continue;
-        const vvec3 p = generated_of_group(s, &g);
-        const vfloat half = vf_set(0.5f);
-        struct trc_wide_affine a;
-        trc_load_affine(g.instance, s->time, &a);
-        const vvec3 around = normal_to_world(&a, v3(half - p.y, p.x - half, vf_zero()));
-        const vvec3 t = v3_cross(s->n, v3_normalize(v3_cross(around, s->n)));
-        out = v3_select(g.lanes, t, out);
-    }
-    return out;
-}
-
 /* The camera at the middle of the shutter, looking along +Z as in Cycles. Without a camera it
  * stands at the origin. */
 static void load_camera_to_world(const struct trc_snapshot *snapshot, struct trc_wide_affine *m) {

@@ -1,4 +1,4 @@
-/* The Normal Map node. */
+/* The Normal Map and Tangent nodes. */
 #ifndef TRACER_KERNELS_PROGRAM_NORMAL_H
 #define TRACER_KERNELS_PROGRAM_NORMAL_H
 
@@ -59,9 +59,27 @@ static vvec3 triangle_tangent(const struct trc_attribute *uv, vint triangle, con
     return v3_select(vf_ne(area, vf_zero()), t, fallback);
 }
 
+/* Directions of growing U at the corners, of any length, and the sign of the UV area: as the
+ * attribute says or, of a UV map, those of the triangle alone. */
+static void corner_tangents(const struct trc_attribute *a, vint triangle, const vvec3 p[3],
+                            vmask lanes, vvec3 t[3], vfloat *sign) {
+    if (a->width == 2) {
+        t[0] = t[1] = t[2] = triangle_tangent(a, triangle, p, lanes, sign);
+        return;
+    }
+    const vvec3 e1 = v3_sub(p[1], p[0]), e2 = v3_sub(p[2], p[0]);
+    vfloat along1[3], along2[3], signs[3];
+    attribute_corners(a, 0, triangle, lanes, along1);
+    attribute_corners(a, 1, triangle, lanes, along2);
+    attribute_corners(a, 2, triangle, lanes, signs);
+    for (int k = 0; k < 3; k++)
+        t[k] = v3_mad(e1, along1[k], v3_scale(e2, along2[k]));
+    *sign = signs[0];
+}
+
 /* Interpolated normal and tangent, not normalised, of one object's lanes in object space. */
 static void tangent_frame(const struct trc_surface *s, const struct lane_group *g,
-                          const struct trc_attribute *uv, vvec3 *normal, vvec3 *tangent,
+                          const struct trc_attribute *a, vvec3 *normal, vvec3 *tangent,
                           vfloat *sign) {
     const struct trc_mesh *mesh = g->mesh;
     const vvec3 w = corner_weights(s);
@@ -70,7 +88,8 @@ static void tangent_frame(const struct trc_surface *s, const struct lane_group *
     trc_load_indices(mesh, s->triangle, g->lanes, index);
     trc_load_vectors(mesh->positions, index, mesh->vertex_count, mesh->key_count, s->time, g->lanes,
                      &p);
-    const vvec3 t = triangle_tangent(uv, s->triangle, p.corner, g->lanes, sign);
+    vvec3 along[3];
+    corner_tangents(a, s->triangle, p.corner, g->lanes, along, sign);
     const vmask smooth = load_normals(s, g, index, &n);
     if (vm_any(vm_andnot(g->lanes, smooth))) {
         const vvec3 flat = v3_normalize(
@@ -78,9 +97,9 @@ static void tangent_frame(const struct trc_surface *s, const struct lane_group *
         for (int k = 0; k < 3; k++)
             n.corner[k] = v3_select(smooth, n.corner[k], flat);
     }
-    vvec3 along[3];
     for (int k = 0; k < 3; k++) {
-        along[k] = v3_normalize(v3_sub(t, v3_scale(n.corner[k], v3_dot(n.corner[k], t))));
+        const vfloat across = v3_dot(n.corner[k], along[k]);
+        along[k] = v3_normalize(v3_sub(along[k], v3_scale(n.corner[k], across)));
     }
     *normal = corners_mix(w, n.corner);
     *tangent = corners_mix(w, along);
@@ -89,23 +108,23 @@ static void tangent_frame(const struct trc_surface *s, const struct lane_group *
 /* The mapped normal of one object's lanes, world space, on the side of the winding; c in [-1, 1].
  */
 static vvec3 normal_of_group(const struct trc_surface *s, const struct lane_group *g, uint32_t mode,
-                             const struct trc_attribute *uv, vvec3 c) {
+                             const struct trc_attribute *a, vvec3 c) {
     if (mode == NORMAL_MAP_WORLD || mode == NORMAL_MAP_BLENDER_WORLD)
         return v3_normalize(c);
     vvec3 n = c;
     if (mode == NORMAL_MAP_TANGENT) {
         vvec3 normal, tangent;
         vfloat sign;
-        tangent_frame(s, g, uv, &normal, &tangent, &sign);
+        tangent_frame(s, g, a, &normal, &tangent, &sign);
         const vvec3 bitangent = v3_scale(v3_cross(normal, tangent), sign);
         n = v3_mad(tangent, c.x, v3_mad(bitangent, c.y, v3_scale(normal, c.z)));
     }
-    struct trc_wide_affine a;
-    trc_load_affine(g->instance, s->time, &a);
-    return normal_to_world(&a, n);
+    struct trc_wide_affine m;
+    trc_load_affine(g->instance, s->time, &m);
+    return normal_to_world(&m, n);
 }
 
-/* The shading normal stays where there is no such UV map. */
+/* The shading normal stays where there is no such attribute. */
 static vvec3 op_normal_map(const struct trc_surface *s, uint32_t mode, uint32_t name,
                            vfloat strength, vvec3 color) {
     const vfloat half = vf_set(0.5f), two = vf_set(2.0f);
@@ -118,10 +137,10 @@ static vvec3 op_normal_map(const struct trc_surface *s, uint32_t mode, uint32_t 
     while (groups_next(s, &g)) {
         if (!g.instance)
             continue;
-        const struct trc_attribute *uv = mesh_attribute(g.mesh, name, 2);
-        if (mode == NORMAL_MAP_TANGENT && !uv)
+        const struct trc_attribute *a = mesh_attribute(g.mesh, name, 2);
+        if (mode == NORMAL_MAP_TANGENT && !a)
             continue;
-        vvec3 n = normal_of_group(s, &g, mode, uv, c);
+        vvec3 n = normal_of_group(s, &g, mode, a, c);
         n = v3_select(s->backfacing, v3_neg(n), n);
         if (!vm_all(full)) {
             const vvec3 moved = v3_mad(v3_sub(n, s->n), vf_max(strength, vf_zero()), s->n);
@@ -129,6 +148,46 @@ static vvec3 op_normal_map(const struct trc_surface *s, uint32_t mode, uint32_t 
         }
         n = v3_select(vf_gt(v3_dot(n, n), vf_zero()), n, s->n);
         out = v3_select(g.lanes, n, out);
+    }
+    return out;
+}
+
+/* Around an axis of the Generated coordinates, object space. */
+static vvec3 tangent_around(const struct trc_surface *s, const struct lane_group *g,
+                            uint32_t mode) {
+    const vvec3 half = v3_splat(vf_set(0.5f)), p = v3_sub(generated_of_group(s, g), half);
+    switch (mode) {
+    case TRC_TANGENT_X:
+        return v3(vf_zero(), -p.z, p.y);
+    case TRC_TANGENT_Y:
+        return v3(-p.z, vf_zero(), p.x);
+    default:
+        return v3(-p.y, p.x, vf_zero());
+    }
+}
+
+/* Along the surface; 0 where there is no such attribute. */
+static vvec3 op_tangent(const struct trc_surface *s, uint32_t mode, uint32_t name) {
+    vvec3 out = v3_zero();
+    struct lane_group g = groups_begin(s);
+    while (groups_next(s, &g)) {
+        if (!g.instance)
+            continue;
+        vvec3 normal, along;
+        vfloat sign;
+        if (mode == TRC_TANGENT_UV) {
+            const struct trc_attribute *a = mesh_attribute(g.mesh, name, 2);
+            if (!a)
+                continue;
+            tangent_frame(s, &g, a, &normal, &along, &sign);
+        } else {
+            along = tangent_around(s, &g, mode);
+        }
+        struct trc_wide_affine m;
+        trc_load_affine(g.instance, s->time, &m);
+        const vvec3 world = normal_to_world(&m, along);
+        const vvec3 t = v3_cross(s->n, v3_normalize(v3_cross(world, s->n)));
+        out = v3_select(g.lanes, t, out);
     }
     return out;
 }

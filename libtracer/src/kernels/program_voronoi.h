@@ -2,7 +2,7 @@
  *
  * S. Worley, "A Cellular Texture Basis Function" (1996); the smooth minimum and the distance to the
  * edge after I. Quilez, "Smooth Voronoi" (2014) and "Voronoi Edges" (2012). Points, order of search
- * and limits as in Cycles 3.4. */
+ * and limits as in Cycles 3.4, octaves and what their sums are divided by as in Cycles 4.3. */
 #ifndef TRACER_KERNELS_PROGRAM_VORONOI_H
 #define TRACER_KERNELS_PROGRAM_VORONOI_H
 
@@ -222,50 +222,155 @@ static vfloat voronoi_radius(const struct voronoi *v) {
     return best * vf_set(0.5f);
 }
 
+/* ---- octaves ---- */
+
+/* What one octave or several give: a distance and, unless to an edge, colour and position. */
+struct voronoi_value {
+    vfloat distance, at[TRC_MAX_DIMENSIONS];
+    vvec3 color;
+};
+
+/* octaves after the first: whole ones, and a last one that counts by the rest. */
+struct voronoi_detail {
+    vfloat detail, roughness, lacunarity;
+};
+
+static void voronoi_enter(struct voronoi *v, const vfloat *place, vfloat scale) {
+    for (int i = 0; i < v->dims; i++) {
+        const vfloat p = place[i] * scale;
+        v->cell[i] = vf_floor(p);
+        v->local[i] = p - v->cell[i];
+    }
+}
+
+/* One octave of any feature but the radius, around the place that v was made to enter. */
+static void voronoi_octave(const struct voronoi *v, uint32_t feature, vfloat smoothness,
+                           bool has_color, struct voronoi_value *out) {
+    struct voronoi_point first, second;
+    out->color = v3_zero();
+    switch (feature) {
+    case TRC_VORONOI_DISTANCE_TO_EDGE:
+        voronoi_nothing(&first);
+        first.distance = voronoi_edge(v);
+        break;
+    case TRC_VORONOI_F2:
+        voronoi_nearest(v, &second, &first);
+        break;
+    case TRC_VORONOI_SMOOTH_F1:
+        voronoi_smooth(v, smoothness, has_color, &first, &out->color);
+        break;
+    default:
+        voronoi_nearest(v, &first, NULL);
+        break;
+    }
+    if (has_color && (feature == TRC_VORONOI_F1 || feature == TRC_VORONOI_F2))
+        out->color = voronoi_color(v, first.offset);
+    out->distance = first.distance;
+    for (int i = 0; i < v->dims; i++)
+        out->at[i] = first.at[i] + v->cell[i];
+}
+
+/* The farthest that a feature's first octave is taken to be, for normalisation. */
+static vfloat voronoi_reach(const struct voronoi *v, uint32_t feature) {
+    const vfloat half = vf_set(0.5f), side = half + half * v->randomness;
+    vfloat origin[TRC_MAX_DIMENSIONS], corner[TRC_MAX_DIMENSIONS];
+    if (feature == TRC_VORONOI_DISTANCE_TO_EDGE)
+        return side;
+    for (int i = 0; i < v->dims; i++) {
+        origin[i] = vf_zero();
+        corner[i] = side;
+    }
+    const vfloat farthest = voronoi_distance(v, origin, corner);
+    return feature == TRC_VORONOI_F2 ? farthest + farthest : farthest;
+}
+
+/* Adds weight times a, which may be infinite elsewhere, in these lanes. */
+TRC_INLINE void voronoi_add(vmask m, vfloat weight, vfloat a, vfloat *sum) {
+    *sum = vf_select(m, *sum + weight * a, *sum);
+}
+
+/* Octaves, each finer by the lacunarity and fainter by the roughness. Distances and colours add up;
+ * positions, and edges where an octave's are nearer, go over to the octave's by its weight. */
+static void voronoi_fractal(struct voronoi *v, uint32_t mode, vfloat smoothness,
+                            const struct voronoi_detail *d, const vfloat *place,
+                            struct voronoi_value *sum) {
+    const uint32_t feature = (mode >> TRC_VORONOI_FEATURE_SHIFT) & 7u;
+    const bool has_color = !(mode & TRC_MODE_NO_COLOR);
+    const bool is_edge = feature == TRC_VORONOI_DISTANCE_TO_EDGE;
+    const bool normalizes = mode & TRC_VORONOI_NORMALIZE;
+    const vfloat reach = normalizes ? voronoi_reach(v, feature) : vf_one();
+    const vfloat whole = vf_floor(d->detail), rest = d->detail - whole;
+    vfloat amplitude = vf_one(), scale = vf_one(), most = is_edge ? reach : vf_one();
+    voronoi_enter(v, place, scale);
+    voronoi_octave(v, feature, smoothness, has_color, sum);
+    for (float number = 1.0f; number < TRC_MAX_OCTAVES; number++) {
+        const vfloat behind = vf_set(number) - whole; /* the last whole octave by so many */
+        const vmask full = vf_le(behind, vf_zero());
+        const vmask counts = vm_or(full, vm_and(vf_eq(behind, vf_one()), vf_gt(rest, vf_zero())));
+        if (!vm_any(counts))
+            break;
+        struct voronoi_value octave;
+        amplitude = amplitude * d->roughness;
+        scale = scale * d->lacunarity;
+        const vfloat weight = vf_select(full, amplitude, amplitude * rest);
+        voronoi_enter(v, place, scale);
+        voronoi_octave(v, feature, smoothness, has_color, &octave);
+        if (is_edge) {
+            const vfloat nearest = vf_min(sum->distance, vf_divide(octave.distance, scale));
+            voronoi_add(counts, weight, nearest - sum->distance, &sum->distance);
+            voronoi_add(counts, weight, vf_divide(reach, scale) - most, &most);
+            continue;
+        }
+        voronoi_add(counts, weight, octave.distance, &sum->distance);
+        voronoi_add(counts, weight, vf_one(), &most);
+        if (has_color)
+            sum->color = v3_select(counts, v3_mad(octave.color, weight, sum->color), sum->color);
+        for (int i = 0; i < v->dims; i++)
+            voronoi_add(counts, weight, vf_divide(octave.at[i], scale) - sum->at[i], &sum->at[i]);
+    }
+    if (!normalizes)
+        return;
+    sum->color = v3_scale(sum->color, vf_rcp(most));
+    sum->distance = sum->distance / (is_edge ? most : most * reach);
+}
+
 /* ---- the texture ---- */
 
-/* vector, w, smoothness, exponent, randomness -> distance, colour, position, w, radius */
+/* vector, w, smoothness, exponent, randomness, detail, roughness, lacunarity -> distance, colour,
+ * position, w, radius */
 static void op_voronoi(uint32_t mode, const vfloat *in, vfloat *out) {
     struct voronoi v = {.dims = (int)(mode & 3u) + 1,
                         .metric = (mode >> TRC_VORONOI_METRIC_SHIFT) & 3u,
                         .exponent = in[5],
                         .randomness = vf_saturate(in[6])};
     const uint32_t feature = (mode >> TRC_VORONOI_FEATURE_SHIFT) & 7u;
-    const bool has_color = !(mode & TRC_MODE_NO_COLOR);
+    const vfloat zero = vf_zero();
     vfloat place[TRC_MAX_DIMENSIONS];
-    struct voronoi_point first, second;
-    vvec3 color = v3_zero();
+    struct voronoi_value value;
     noise_place(v.dims, in, in[3], place);
-    for (int i = 0; i < v.dims; i++) {
-        v.cell[i] = vf_floor(place[i]);
-        v.local[i] = place[i] - v.cell[i];
-    }
     for (int i = 0; i < 9; i++)
-        out[i] = vf_zero();
-    switch (feature) {
-    case TRC_VORONOI_DISTANCE_TO_EDGE:
-        out[0] = voronoi_edge(&v);
-        return;
-    case TRC_VORONOI_N_SPHERE_RADIUS:
+        out[i] = zero;
+    if (feature == TRC_VORONOI_N_SPHERE_RADIUS) {
+        voronoi_enter(&v, place, vf_one());
         out[8] = voronoi_radius(&v);
         return;
-    case TRC_VORONOI_F2:
-        voronoi_nearest(&v, &second, &first);
-        break;
-    case TRC_VORONOI_SMOOTH_F1:
-        voronoi_smooth(&v, vf_clamp(in[4] * vf_set(0.5f), 0.0f, 0.5f), has_color, &first, &color);
-        break;
-    default:
-        voronoi_nearest(&v, &first, NULL);
-        break;
     }
-    if (has_color && feature != TRC_VORONOI_SMOOTH_F1)
-        color = voronoi_color(&v, first.offset);
-    out[0] = first.distance;
-    v3_write(out + 1, color);
+    /* Octaves of no weight are left out, and edges infinitely far. */
+    vmask has_octaves = vf_gt(in[8], zero);
+    if (feature == TRC_VORONOI_DISTANCE_TO_EDGE)
+        has_octaves = vm_and(has_octaves, vf_ne(in[9], zero));
+    const struct voronoi_detail detail = {
+        .detail = vf_where(has_octaves, vf_clamp(in[7], 0.0f, TRC_MAX_OCTAVES - 1.0f)),
+        .roughness = vf_saturate(in[8]),
+        .lacunarity = in[9]};
+    voronoi_fractal(&v, mode, vf_clamp(in[4] * vf_set(0.5f), 0.0f, 0.5f), &detail, place, &value);
+    out[0] = value.distance;
+    if (feature == TRC_VORONOI_DISTANCE_TO_EDGE)
+        return;
+    v3_write(out + 1, value.color);
     for (int i = 0; i < v.dims; i++) {
         const int component = v.dims == 1 || i == 3 ? 7 : 4 + i;
-        out[component] = first.at[i] + v.cell[i];
+        out[component] = value.at[i];
     }
 }
 

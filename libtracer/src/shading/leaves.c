@@ -64,7 +64,7 @@ static trc_status fill_tangent(struct trc_build *b, uint32_t type, struct trc_op
     }
     if (in[tangent].reg != -2 || trc_is_value(in[anisotropy], 0.0f))
         return TRC_OK;
-    return trc_build_op(b, TRC_OP_TANGENT, 0, TRC_NO_RESOURCE, NULL, in + tangent);
+    return trc_build_op(b, TRC_OP_TANGENT, TRC_TANGENT_Z, TRC_NO_RESOURCE, NULL, in + tangent);
 }
 
 static trc_status add_leaf(struct trc_build *b, const trc_node *node, struct trc_operand weight) {

@@ -356,6 +356,8 @@ static trc_status lower_node(const struct lowering *l) {
         return lower_named(l, TRC_OP_COLOR_ATTRIBUTE, 0);
     case TRC_NODE_NORMAL_MAP:
         return lower_named(l, TRC_OP_NORMAL_MAP, mode);
+    case TRC_NODE_TANGENT:
+        return lower_named(l, TRC_OP_TANGENT, mode);
     case TRC_NODE_TEXTURE_COORDINATE:
         return lower_texture_coordinate(l);
     case TRC_NODE_GEOMETRY:

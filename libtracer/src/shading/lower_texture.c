@@ -92,12 +92,12 @@ static trc_status build_musgrave(struct trc_build *b, uint32_t mode, const struc
     return TRC_OK;
 }
 
-/* in: vector, w, scale, smoothness, exponent, randomness */
+/* in: vector, w, scale, smoothness, exponent, randomness, detail, roughness, lacunarity */
 static trc_status build_voronoi(struct trc_build *b, uint32_t mode, const struct trc_operand *in,
                                 struct trc_operand *out) {
-    struct trc_operand to[7];
+    struct trc_operand to[10];
     TRC_TRY(place(b, (mode & 3u) + 1, in, in[3], in[4], to));
-    memcpy(to + 4, in + 5, 3 * sizeof *to);
+    memcpy(to + 4, in + 5, 6 * sizeof *to);
     TRC_TRY(op(b, TRC_OP_VORONOI, mode, to, out));
     TRC_TRY(scaled(b, TRC_VECTOR_DIVIDE, out + 4, in[4], out + 4));
     return calculate(b, TRC_MATH_DIVIDE, out[7], in[4], out + 7);

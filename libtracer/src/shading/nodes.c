@@ -64,8 +64,8 @@ static const struct trc_node_info infos[] = {
      "vector w scale detail roughness lacunarity offset gain distortion", "fc"},
     {TRC_NODE_MUSGRAVE, "Musgrave", "gfffffff",
      "vector w scale detail dimension lacunarity offset gain", "f"},
-    {TRC_NODE_VORONOI, "Voronoi", "gfffff", "vector w scale smoothness exponent randomness",
-     "fcvff"},
+    {TRC_NODE_VORONOI, "Voronoi", "gffffffff",
+     "vector w scale smoothness exponent randomness detail roughness lacunarity", "fcvff"},
     {TRC_NODE_WAVE, "Wave", "gffffff",
      "vector scale distortion detail detail_scale detail_roughness phase", "f"},
     {TRC_NODE_GRADIENT, "Gradient", "g", "vector", "f"},
@@ -84,6 +84,7 @@ static const struct trc_node_info infos[] = {
     {TRC_NODE_VECTOR_ROTATE, "Vector Rotate", "cccfc", "vector center axis angle rotation", "v"},
     {TRC_NODE_CAMERA_DATA, "Camera Data", "", "", "vff"},
     {TRC_NODE_WIREFRAME, "Wireframe", "f", "size", "f"},
+    {TRC_NODE_TANGENT, "Tangent", "", "", "v"},
 
     {TRC_NODE_AOV_VALUE, "AOV Value", "f", "value", ""},
     {TRC_NODE_AOV_COLOR, "AOV Color", "c", "color", ""},
@@ -155,7 +156,8 @@ bool trc_node_mode_is_valid(uint32_t type, uint32_t mode) {
         return mode >> TRC_NOISE_TYPE_SHIFT <= TRC_FRACTAL_RIDGED_MULTIFRACTAL &&
                mode >> TRC_NOISE_TYPE_SHIFT != TRC_FRACTAL_FBM_UNIT;
     case TRC_NODE_VORONOI:
-        return mode >> TRC_VORONOI_FEATURE_SHIFT <= TRC_VORONOI_N_SPHERE_RADIUS;
+        return (mode & ~(uint32_t)TRC_VORONOI_NORMALIZE) >> TRC_VORONOI_FEATURE_SHIFT <=
+               TRC_VORONOI_N_SPHERE_RADIUS;
     case TRC_NODE_WAVE:
         return mode >> (TRC_WAVE_DIRECTION_SHIFT + 2) == 0 &&
                (mode & TRC_WAVE_PROFILE) <= TRC_WAVE_TRIANGLE;
@@ -171,6 +173,8 @@ bool trc_node_mode_is_valid(uint32_t type, uint32_t mode) {
                mode >> 4 <= 3;
     case TRC_NODE_VECTOR_ROTATE:
         return (mode & ~8u) <= TRC_ROTATE_EULER;
+    case TRC_NODE_TANGENT:
+        return mode <= TRC_TANGENT_UV;
     case TRC_NODE_AOV_VALUE:
     case TRC_NODE_AOV_COLOR:
         return mode < TRC_MAX_AOVS;

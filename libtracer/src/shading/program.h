@@ -29,7 +29,7 @@
     X(NORMAL, 0, 3, 0) /* shading normal */                                                 \
     X(TRUE_NORMAL, 0, 3, 0)                                                                 \
     X(INCOMING, 0, 3, 0)                                                                    \
-    X(TANGENT, 0, 3, 0) /* around the object's Z axis */                                    \
+    X(TANGENT, 0, 3, 0) /* mode: TRC_TANGENT_*; resource: name */                           \
     X(PARAMETRIC, 0, 2, 0)                                                                  \
     X(BACKFACING, 0, 1, 0)                                                                  \
     /* texture coordinates */                                                               \
@@ -65,9 +65,10 @@
      * mode: dimensions - 1, TRC_FRACTAL_* << TRC_NOISE_TYPE_SHIFT */                       \
     X(NOISE, 10, 4, 1)                                                                      \
     X(WHITE_NOISE, 4, 4, 1) /* vector, w -> value, color; mode: dimensions - 1 */           \
-    /* vector, w, smoothness, exponent, randomness -> distance, color, position, w,         \
-     * radius; mode: dimensions - 1, metric, feature */                                     \
-    X(VORONOI, 7, 9, 1)                                                                     \
+    /* vector, w, smoothness, exponent, randomness, detail, roughness, lacunarity ->        \
+     * distance, color, position, w, radius; mode: dimensions - 1, metric, feature,         \
+     * TRC_VORONOI_NORMALIZE */                                                             \
+    X(VORONOI, 10, 9, 1)                                                                    \
     X(GRADIENT, 3, 1, 1) /* vector; mode: TRC_GRADIENT_* */                                 \
     X(WAVE, 8, 1, 1)     /* vector, distortion, detail scale, octaves, roughness, phase */  \
     X(MAGIC, 5, 3, 1)    /* vector, scale, distortion; mode: depth */                       \

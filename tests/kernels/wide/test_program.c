@@ -121,7 +121,8 @@ static uint32_t last_mode(uint32_t op) {
     case TRC_OP_WHITE_NOISE:
         return 3;
     case TRC_OP_VORONOI:
-        return (TRC_VORONOI_N_SPHERE_RADIUS << TRC_VORONOI_FEATURE_SHIFT) + 15;
+        return TRC_VORONOI_NORMALIZE + (TRC_VORONOI_N_SPHERE_RADIUS << TRC_VORONOI_FEATURE_SHIFT) +
+               15;
     case TRC_OP_GRADIENT:
         return TRC_GRADIENT_SPHERICAL;
     case TRC_OP_WAVE:
@@ -240,12 +241,12 @@ static void test_axis_rotation(void **state) {
 
 /* ---- a scene of two meshes ---- */
 
-enum { NAME_UV = 5, NAME_COLOR = 6, NAME_OTHER = 7 };
+enum { NAME_UV = 5, NAME_COLOR = 6, NAME_OTHER = 7, NAME_TANGENT = 8 };
 
 struct world_of_test {
     float positions[2][2][9]; /* mesh, key: one triangle each, the second moves */
     uint32_t indices[3];
-    float uv[6], other[6], color[12];
+    float uv[6], other[6], color[12], tangents[12];
     float normals[9];
     uint8_t smooth;
     struct trc_mesh mesh[2];
@@ -280,6 +281,10 @@ static void build_meshes(struct world_of_test *w) {
         w->other[k] = (float)k;
     for (int k = 0; k < 12; k++)
         w->color[k] = 0.1f * (float)k;
+    for (int k = 0; k < 3; k++) { /* along Y, left-handed */
+        w->tangents[4 * k + 1] = 2;
+        w->tangents[4 * k + 2] = -1;
+    }
     w->smooth = 1;
     for (int i = 0; i < 2; i++) {
         w->mesh[i] = (struct trc_mesh){
@@ -288,10 +293,11 @@ static void build_meshes(struct world_of_test *w) {
             .triangle_count = 1,
             .positions = w->positions[i][0],
             .indices = w->indices,
-            .attribute_count = i ? 0 : 3,
+            .attribute_count = i ? 0 : 4,
             .attributes = {{NAME_UV, 2, w->uv},
                            {NAME_OTHER, 2, w->other},
-                           {NAME_COLOR, 4, w->color}},
+                           {NAME_COLOR, 4, w->color},
+                           {NAME_TANGENT, 4, w->tangents}},
             .default_uv = i ? -1 : 0,
             .bounds_lower = {0, 0, 0},
             .bounds_upper = {2, 4, 0},
@@ -409,6 +415,8 @@ static const struct expectation expectations[] = {
     {TRC_OP_NORMAL_MAP, 0, TRC_NO_RESOURCE, {1, .5f, 1, .5f}, {{0, 1, 0}, {0, 0, 1}, {0, 0, 1}}},
     {TRC_OP_NORMAL_MAP, 0, NAME_UV, {1, .5f, .5f, 1}, {{0, 0, 1}, {0, 0, 1}, {0, 0, 1}}},
     {TRC_OP_NORMAL_MAP, 0, NAME_UV, {.5f, 1, .5f, .5f}, {{H, 0, H}, {0, 0, 1}, {0, 0, 1}}},
+    {TRC_OP_NORMAL_MAP, 0, NAME_TANGENT, {1, 1, .5f, .5f}, {{-1, 0, 0}, {0, 0, 1}, {0, 0, 1}}},
+    {TRC_OP_NORMAL_MAP, 0, NAME_TANGENT, {1, .5f, 1, .5f}, {{0, 1, 0}, {0, 0, 1}, {0, 0, 1}}},
     {TRC_OP_NORMAL_MAP, 1, 0, {1, 1, .5f, .5f}, {{0, 1, 0}, {1, 0, 0}, {0, 0, 1}}},
     {TRC_OP_NORMAL_MAP, 2, 0, {1, 1, .5f, .5f}, {{1, 0, 0}, {1, 0, 0}, {0, 0, 1}}},
     {TRC_OP_TRANSFORM,
@@ -446,7 +454,9 @@ static const struct expectation expectations[] = {
     {TRC_OP_WIREFRAME, 0, 0, {1.3f}, {{0}, {0}, {0}}},
     {TRC_OP_WIREFRAME, 0, 0, {1.5f}, {{1}, {0}, {0}}},
     /* (-(y - .5), x - .5, 0) of Generated is (0, -.25, 0), which a quarter turn makes +X */
-    {TRC_OP_TANGENT, 0, 0, {0}, {{1, 0, 0}, {0, -1, 0}, {0, 0, 0}}},
+    {TRC_OP_TANGENT, TRC_TANGENT_Z, 0, {0}, {{1, 0, 0}, {0, -1, 0}, {0, 0, 0}}},
+    {TRC_OP_TANGENT, TRC_TANGENT_UV, NAME_UV, {0}, {{1, 0, 0}, {0, 0, 0}, {0, 0, 0}}},
+    {TRC_OP_TANGENT, TRC_TANGENT_UV, NAME_TANGENT, {0}, {{-1, 0, 0}, {0, 0, 0}, {0, 0, 0}}},
 };
 
 static void check_expectation(const struct expectation *e, const struct trc_surface *s) {
