@@ -3,6 +3,7 @@
 
 Plain and packed files are read by the library itself. Generated, painted and movie images, and files
 the library cannot read, come from Blender's pixels. A missing image is 0, which renders magenta.
+Colours are converted to scene-linear ones by the library, with Blender's OpenColorIO configuration.
 """
 
 import os
@@ -17,9 +18,8 @@ from ..compat import cycles
 
 _ALPHA_MODES = {'STRAIGHT': native.ALPHA_STRAIGHT, 'PREMUL': native.ALPHA_PREMULTIPLIED,
                 'CHANNEL_PACKED': native.ALPHA_CHANNEL_PACKED, 'NONE': native.ALPHA_NONE}
-_UNTOUCHED_SPACES = ("Non-Color", "Raw")  # data in the sense of OpenColorIO
 _ANIMATED_SOURCES = {'SEQUENCE', 'MOVIE'}
-_DATA_SPACES = _UNTOUCHED_SPACES + ("Linear", "scene_linear")
+_CANNOT = (native.ERROR_UNSUPPORTED, native.ERROR_IMAGE)
 
 _FIRST_TILE, _TILES_PER_ROW = 1001, 10  # UDIM
 
@@ -114,43 +114,41 @@ class Images:
                 self._scene.destroy_image(image_id)
 
     def _create(self, image, path):
-        is_srgb = self._is_srgb(image)
         created = 0
         if path:
-            created = self._from_file(image, path, is_srgb)
+            created = self._from_file(image, path)
         elif _is_packed(image):
             with tempfile.TemporaryDirectory() as folder:
                 path = os.path.join(folder, os.path.basename(image.filepath) or image.name)
                 with open(path, "wb") as file:
                     file.write(image.packed_file.data)
-                created = self._from_file(image, path, is_srgb)
-        return created or self._from_pixels(image, is_srgb)
+                created = self._from_file(image, path)
+        return created or self._from_pixels(image)
 
-    def _from_file(self, image, path, is_srgb):
+    def _from_file(self, image, path):
         """The image as the library reads it, 0 where it cannot."""
         try:
             return self._scene.create_image(
-                path=path, is_srgb=is_srgb, alpha_mode=_alpha_mode(image), max_side=self._limit)
+                path=path, alpha_mode=_alpha_mode(image), max_side=self._limit, **_encoding(image))
         except native.TracerError as error:
-            if error.status not in (native.ERROR_UNSUPPORTED, native.ERROR_IMAGE):
+            if error.status not in _CANNOT:
                 raise
             return 0
 
-    def _from_pixels(self, image, is_srgb):
+    def _from_pixels(self, image):
         pixels = read_pixels(image)
         if pixels is None:
             self._warnings.add(f"Image '{image.name}': cannot be read, magenta is used")
             return 0
-        return self._scene.create_image(
-            pixels=pixels, alpha_mode=_pixel_alpha_mode(image),
-            is_srgb=is_srgb and not image.is_float, max_side=self._limit)
-
-    def _is_srgb(self, image):
-        name = image.colorspace_settings.name
-        if name != "sRGB" and not name.startswith(_DATA_SPACES):
-            self._warnings.add(f"Image '{image.name}': colour space {name} is not supported, sRGB is used")
-            return True
-        return name == "sRGB"
+        values = {"pixels": pixels, "alpha_mode": _pixel_alpha_mode(image), "max_side": self._limit}
+        try:
+            return self._scene.create_image(**values, **({} if image.is_float else _encoding(image)))
+        except native.TracerError as error:
+            if error.status not in _CANNOT:
+                raise
+            self._warnings.add(f"Image '{image.name}': colour space {image.colorspace_settings.name} "
+                               "cannot be converted, sRGB is used")
+            return self._scene.create_image(**values, is_srgb=True)
 
 
 def size_limit(scene, is_final):
@@ -187,11 +185,31 @@ def _to_rgba(pixels):
     return rgba
 
 
+def _encoding(image):
+    """How the colours of an image's file or bytes are stored, as keywords of create_image."""
+    space = image.colorspace_settings.name
+    if space == "sRGB":
+        return {"is_srgb": True}
+    return {} if _is_data(image) else {"color_space": (_color_config(), space)}
+
+
+def _is_data(image):
+    settings = image.colorspace_settings
+    return settings.is_data or settings.name == "Raw"  # 3.4 has two names, and knows one of them
+
+
+def _color_config():
+    """The OpenColorIO configuration that Blender has read."""
+    folders = (bpy.utils.user_resource('DATAFILES', path="colormanagement"),
+               bpy.utils.system_resource('DATAFILES', path="colormanagement"))
+    paths = [os.path.join(folder, "config.ocio") for folder in folders]
+    return os.environ.get("OCIO") or next(filter(os.path.isfile, paths), paths[-1])
+
+
 def _alpha_mode(image):
     """What an image file's alpha means. As in Cycles, data is not multiplied by it."""
     mode = _ALPHA_MODES.get(image.alpha_mode, native.ALPHA_STRAIGHT)
-    is_data = image.colorspace_settings.name in _UNTOUCHED_SPACES
-    return native.ALPHA_CHANNEL_PACKED if is_data and mode != native.ALPHA_NONE else mode
+    return native.ALPHA_CHANNEL_PACKED if _is_data(image) and mode != native.ALPHA_NONE else mode
 
 
 def _pixel_alpha_mode(image):

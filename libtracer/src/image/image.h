@@ -2,7 +2,8 @@
  *
  * As in Cycles, what is stored is what the file or the caller gave: sRGB-encoded bytes stay encoded
  * and are decoded after filtering, and colours of images with alpha are multiplied by it before
- * filtering (in their encoding). Rows run from the bottom (v = 0) upwards, texels are RGBA.
+ * filtering (in their encoding). Other encodings and colour spaces are converted to scene-linear
+ * floats. Rows run from the bottom (v = 0) upwards, texels are RGBA.
  * Immutable once created; the count of holders is atomic. */
 #ifndef TRACER_IMAGE_IMAGE_H
 #define TRACER_IMAGE_IMAGE_H
@@ -46,8 +47,8 @@ struct trc_image {
 };
 
 /* Copies the pixels or reads the file of a descriptor, which is checked in full. INVALID_ARGUMENT,
- * STRUCT_SIZE, TOO_LARGE, OUT_OF_MEMORY, IMAGE (unreadable file), UNSUPPORTED (a path in a build
- * without OpenImageIO). One holder: the caller. */
+ * STRUCT_SIZE, TOO_LARGE, OUT_OF_MEMORY, IMAGE (unreadable file, unknown colour space), UNSUPPORTED
+ * (a path or a colour space in a build without OpenImageIO). One holder: the caller. */
 trc_status trc_image_load(const trc_image_desc *desc, struct trc_image **image_out);
 
 /* A new image of half the size, of which the caller is the holder; whether it can be: a side of one
