@@ -202,6 +202,84 @@ static void test_scene_limit(void **state) {
     assert_int_equal(trc_scene_destroy(scene), TRC_OK);
 }
 
+/* ---- levels ---- */
+
+#define LEVEL_SIDE 64
+
+static float level_value(const struct trc_image *image, uint32_t level, uint64_t channel) {
+    const void *texels = image->levels[level].texels;
+    return image->level_format == TRC_TEXEL_F32
+               ? ((const float *)texels)[channel]
+               : trc_half_to_float(((const uint16_t *)texels)[channel]);
+}
+
+/* The mean light of lookups between sRGB-encoded texels that are black and white by turns. */
+static double checker_light(void) {
+    const int steps = 64;
+    double sum = 0;
+    for (int j = 0; j < steps; j++)
+        for (int i = 0; i < steps; i++) {
+            const double s = (i + .5) / steps, t = (j + .5) / steps;
+            const double x = s * (1 - t) + (1 - s) * t;
+            sum += x < .04045 ? x / 12.92 : pow((x + .055) / 1.055, 2.4);
+        }
+    return sum / (steps * steps);
+}
+
+static void test_levels(void **state) {
+    (void)state;
+    static uint8_t bytes[LEVEL_SIDE * LEVEL_SIDE * 4];
+    static float numbers[LEVEL_SIDE * LEVEL_SIDE * 4];
+    for (int i = 0; i < LEVEL_SIDE * LEVEL_SIDE; i++)
+        for (int c = 0; c < 4; c++) {
+            const int x = i % LEVEL_SIDE, y = i / LEVEL_SIDE;
+            bytes[4 * i + c] = c == 3 || (x + y) % 2 ? UINT8_MAX : 0;
+            numbers[4 * i + c] = c == 3 ? 1.0f : (float)(x + c * y);
+        }
+    for (int is_srgb = 0; is_srgb < 2; is_srgb++) {
+        trc_image_desc desc = pixels_desc(LEVEL_SIDE, LEVEL_SIDE, bytes, false);
+        desc.is_mip_mapped = 1;
+        desc.is_srgb = (uint32_t)is_srgb;
+        struct trc_image *image = loaded(&desc);
+        assert_int_equal(image->level_count, 3);
+        assert_int_equal(image->levels[1].width, 16);
+        assert_int_equal(image->levels[2].height, 8);
+        assert_int_equal(image->bytes, 64 * 64 * 4 + (16 * 16 + 8 * 8) * 8);
+        for (uint64_t i = 0; i < 8 * 8; i++) {
+            const double inner = level_value(image, 1, 4 * (16 * (i / 8 + 4) + i % 8 + 4));
+            assert_true(fabs(inner - (is_srgb ? checker_light() : .5)) < 5e-3);
+            assert_true(level_value(image, 2, 4 * i + 3) == 1.0f);
+        }
+        trc_image_release(image);
+    }
+    trc_image_desc desc = pixels_desc(LEVEL_SIDE, LEVEL_SIDE, numbers, true);
+    desc.is_mip_mapped = 1;
+    struct trc_image *image = loaded(&desc);
+    for (uint64_t i = 0; i < 8 * 8; i++)
+        for (uint64_t c = 0; c < 3; c++) { /* the mean of a linear function is that of the middle */
+            const double x = 8 * (double)(i % 8) + 3.5, y = 8 * (double)(i / 8) + 3.5;
+            assert_true(fabs(level_value(image, 2, 4 * i + c) - (x + (double)c * y)) < 1e-3);
+        }
+    trc_image_release(image);
+    for (int64_t n = 2; n < 4; n++) {
+        trc_memory_fail_at(n, false);
+        refused(&desc, TRC_ERROR_OUT_OF_MEMORY);
+        trc_memory_fail_at(-1, false);
+    }
+    bytes[7] = 254; /* a texel that is not opaque */
+    desc = pixels_desc(LEVEL_SIDE, LEVEL_SIDE, bytes, false);
+    desc.is_mip_mapped = 1;
+    image = loaded(&desc);
+    assert_int_equal(image->level_count, 1);
+    trc_image_release(image);
+    desc.alpha_mode = TRC_ALPHA_NONE;
+    desc.height = LEVEL_SIDE - 2; /* blocks do not fill it */
+    desc.pixel_bytes = (uint64_t)desc.width * desc.height * 4;
+    image = loaded(&desc);
+    assert_int_equal(image->level_count, 1);
+    trc_image_release(image);
+}
+
 static void test_holders(void **state) {
     (void)state;
     static const uint8_t pixels[4];
@@ -650,6 +728,7 @@ int main(void) {
         cmocka_unit_test(test_refused_pixels),
         cmocka_unit_test(test_limits),
         cmocka_unit_test(test_scene_limit),
+        cmocka_unit_test(test_levels),
         cmocka_unit_test(test_holders),
         cmocka_unit_test(test_memory_failures),
 #ifdef TRC_WITH_OIIO

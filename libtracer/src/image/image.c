@@ -9,6 +9,7 @@
 #include "core/checks.h"
 #include "core/core.h"
 #include "image/convert.h"
+#include "image/levels.h"
 #include "image/oiio.h"
 #include "image/texel.h"
 
@@ -257,8 +258,9 @@ static trc_status shrink(const struct trc_image *image, uint32_t step,
     return TRC_OK;
 }
 
-static uint64_t level_bytes(const struct trc_image *image) {
-    return (uint64_t)image->levels[0].width * image->levels[0].height * trc_texel_bytes(image->format);
+static uint64_t whole_bytes(const struct trc_image *image) {
+    return (uint64_t)image->levels[0].width * image->levels[0].height *
+           trc_texel_bytes(image->format);
 }
 
 static uint32_t shorter_side(const struct trc_image_level *level) {
@@ -278,7 +280,7 @@ static trc_status limit_size(struct trc_image *image, uint32_t max_side) {
     TRC_TRY(shrink(image, step, &smaller));
     trc_free(level->texels);
     *level = smaller;
-    image->bytes = level_bytes(image);
+    image->bytes = whole_bytes(image);
     return TRC_OK;
 }
 
@@ -301,8 +303,15 @@ trc_status trc_image_halve(const struct trc_image *image, struct trc_image **hal
     half->is_associated = image->is_associated;
     half->level_count = 1;
     half->is_halved = true;
-    half->bytes = level_bytes(half);
+    half->bytes = whole_bytes(half);
     half->bad_texel_count = image->bad_texel_count;
+    if (image->level_count > 1) {
+        const trc_status levels = trc_image_make_levels(half);
+        if (levels != TRC_OK) {
+            trc_image_release(half);
+            return levels;
+        }
+    }
     *half_out = half;
     return TRC_OK;
 }
@@ -378,7 +387,9 @@ trc_status trc_image_load(const trc_image_desc *desc, struct trc_image **image_o
     }
     struct trc_image *image = NULL;
     TRC_TRY(desc->path ? load_file(desc, &image) : load_pixels(desc, &image));
-    const trc_status status = limit_size(image, desc->max_side);
+    trc_status status = limit_size(image, desc->max_side);
+    if (status == TRC_OK && desc->is_mip_mapped)
+        status = trc_image_make_levels(image);
     if (status != TRC_OK) {
         trc_image_release(image);
         return status;

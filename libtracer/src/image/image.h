@@ -39,10 +39,11 @@ struct trc_image {
     enum trc_texel format;
     uint32_t is_srgb;       /* colours are sRGB-encoded: to be decoded after filtering */
     uint32_t is_associated; /* colours are multiplied by alpha: divided when alpha is used too */
-    uint32_t level_count;   /* 1: smaller levels come with mip-mapping */
+    uint32_t level_count;   /* 1: only itself; smaller ones: image/levels.h */
+    enum trc_texel level_format; /* of those: linear light */
     struct trc_image_level levels[TRC_IMAGE_MAX_LEVELS];
     bool is_halved;           /* to fit the scene's limit: worth a warning */
-    uint64_t bytes;           /* of the texels */
+    uint64_t bytes;           /* of the texels of all levels */
     uint64_t bad_texel_count; /* were NaN or infinite, and are 0 now: worth a warning */
 };
 
