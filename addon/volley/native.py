@@ -153,7 +153,8 @@ class _MaterialDesc(_Struct):
 class _ImageDesc(_Struct):
     _fields_ = [("struct_size", _u32), ("width", _u32), ("height", _u32), ("alpha_mode", _u32),
                 ("is_srgb", _u32), ("is_float", _u32), ("pixels", _ptr), ("pixel_bytes", _u64),
-                ("path", _str), ("max_side", _u32), ("reserved", _u32)]
+                ("path", _str), ("color_config", _str), ("color_space", _str), ("max_side", _u32),
+                ("is_mip_mapped", _u32)]
 
 
 class _SceneDesc(_Struct):
@@ -532,10 +533,15 @@ class Scene:
             surface=surface, **values)
         return desc, (keep, structs, inputs)
 
-    def create_image(self, pixels=None, path=None, alpha_mode=ALPHA_STRAIGHT, is_srgb=False, max_side=0):
+    def create_image(self, pixels=None, path=None, alpha_mode=ALPHA_STRAIGHT, is_srgb=False,
+                     color_space=(None, None), max_side=0, is_mip_mapped=False):
         """An image from a file (absolute path) or from pixels (height, width, 4), float32 or uint8,
-        bottom row first; max_side: pixels, to which a larger one is halved, 0 for none."""
-        desc = _ImageDesc(alpha_mode=alpha_mode, is_srgb=int(is_srgb), path=_text(path), max_side=max_side)
+        bottom row first; color_space: a configuration of OpenColorIO and a name in it; max_side: pixels,
+        to which a larger one is halved, 0 for none; is_mip_mapped: with smaller levels for minification."""
+        config, space = map(_text, color_space)
+        desc = _ImageDesc(alpha_mode=alpha_mode, is_srgb=int(is_srgb), path=_text(path),
+                          color_config=config, color_space=space, max_side=max_side,
+                          is_mip_mapped=int(is_mip_mapped))
         if pixels is not None:
             pixels = np.ascontiguousarray(pixels)
             desc.height, desc.width = pixels.shape[:2]

@@ -38,9 +38,9 @@ def _stage(image):
     return wall
 
 
-def _both():
+def _both(samples=1):
     import scenes
-    return [picture[..., :3] for picture in scenes.by_both(1)]
+    return [picture[..., :3] for picture in scenes.by_both(samples)]
 
 
 def inside_tiles():
@@ -107,12 +107,12 @@ def test_limit(blender):
 
 
 def inside_memory():
-    """Noise of 4 MiB within 1 MiB, and at half its side by Simplify."""
+    """Noise of 4 MiB and its levels within 2 MiB, and at half its side by Simplify."""
     import bpy
     import scenes
     _stage(lambda: _noise_file(1024))
     scene = bpy.context.scene
-    scene.volley.texture_memory = 1
+    scene.volley.texture_memory = 2
     limited = scenes.render()
     scene.volley.texture_memory = 0
     full = scenes.render()
@@ -123,4 +123,34 @@ def inside_memory():
 def test_memory(blender):
     limited, full, simplified = blender.run(inside_memory)
     assert (limited == simplified).all() and not (limited == full).all()
-    assert "1 images are shown smaller, to keep all within 1 MiB" in blender.output
+    assert "1 images are shown smaller, to keep all within 2 MiB" in blender.output
+
+
+def inside_minified():
+    """[Volley's, Cycles'] of noise of which a pixel has hundreds of texels, seen at a slant and in a
+    rough mirror: by 4 samples and by many."""
+    import scenes
+    import bpy
+    wall = _stage(lambda: _noise_file(2048))
+    wall.rotation_euler = (0.0, 0.0, 0.7)
+    mirror = scenes.mesh("Mirror", [(-3, -3, -1), (3, -3, -1), (3, 3, -1), (-3, 3, -1)], [(0, 1, 2, 3)])
+    mirror.data.materials.append(
+        scenes.material("Rough", "ShaderNodeBsdfGlossy", Color=(0.9, 0.9, 0.9), Roughness=0.4))
+    camera = bpy.context.scene.camera
+    camera.data.type, camera.data.lens = 'PERSP', 60.0
+    camera.location, camera.rotation_euler = (0.0, -6.0, 1.5), (1.3, 0.0, 0.0)
+    for settings in (bpy.context.scene.volley, bpy.context.scene.cycles):
+        settings.pixel_filter_type, settings.filter_width = 'BLACKMAN_HARRIS', 1.5
+    return _both(4), _both(4096)
+
+
+def _variance(pictures, reference):
+    return [((picture - reference) ** 2).mean() for picture in pictures]
+
+
+def test_minified(blender):
+    few, (ours, theirs) = blender.run(inside_minified)
+    assert abs(ours.mean() / theirs.mean() - 1.0) < 1e-3
+    assert np.abs(ours - theirs).max() < 0.03 and np.abs(ours - theirs).mean() < 3e-3
+    own, cycles = _variance(few, theirs)
+    assert own < 0.5 * cycles

@@ -113,7 +113,8 @@ static void test_equal_nodes_are_shared(void **state) {
     struct trc_material *m = compiled();
     assert_int_equal(count_op(m, TRC_OP_UV), 1);
     assert_int_equal(count_op(m, TRC_OP_IMAGE), 2);
-    assert_int_equal(m->instruction_count, 5);
+    assert_int_equal(count_op(m, TRC_OP_UV_DENSITY), 1);
+    assert_int_equal(m->instruction_count, 6);
     assert_int_equal(m->has, TRC_MATERIAL_HAS_DIFFUSE | TRC_MATERIAL_HAS_PROGRAM |
                                  TRC_MATERIAL_HAS_TEXTURE);
     trc_material_release(m);

@@ -14,6 +14,7 @@
 
 #include "core/core.h"
 #include "image/image.h"
+#include "image/texel.h"
 
 static trc_image_desc pixels_desc(uint32_t width, uint32_t height, const void *pixels,
                                   bool is_float) {
@@ -199,6 +200,84 @@ static void test_scene_limit(void **state) {
     assert_int_equal(trc_image_create(scene, &desc, &id), TRC_OK);
     assert_int_equal(committed_bytes(scene, warnings, sizeof warnings), (3 << 18) + (3 << 16));
     assert_int_equal(trc_scene_destroy(scene), TRC_OK);
+}
+
+/* ---- levels ---- */
+
+#define LEVEL_SIDE 64
+
+static float level_value(const struct trc_image *image, uint32_t level, uint64_t channel) {
+    const void *texels = image->levels[level].texels;
+    return image->level_format == TRC_TEXEL_F32
+               ? ((const float *)texels)[channel]
+               : trc_half_to_float(((const uint16_t *)texels)[channel]);
+}
+
+/* The mean light of lookups between sRGB-encoded texels that are black and white by turns. */
+static double checker_light(void) {
+    const int steps = 64;
+    double sum = 0;
+    for (int j = 0; j < steps; j++)
+        for (int i = 0; i < steps; i++) {
+            const double s = (i + .5) / steps, t = (j + .5) / steps;
+            const double x = s * (1 - t) + (1 - s) * t;
+            sum += x < .04045 ? x / 12.92 : pow((x + .055) / 1.055, 2.4);
+        }
+    return sum / (steps * steps);
+}
+
+static void test_levels(void **state) {
+    (void)state;
+    static uint8_t bytes[LEVEL_SIDE * LEVEL_SIDE * 4];
+    static float numbers[LEVEL_SIDE * LEVEL_SIDE * 4];
+    for (int i = 0; i < LEVEL_SIDE * LEVEL_SIDE; i++)
+        for (int c = 0; c < 4; c++) {
+            const int x = i % LEVEL_SIDE, y = i / LEVEL_SIDE;
+            bytes[4 * i + c] = c == 3 || (x + y) % 2 ? UINT8_MAX : 0;
+            numbers[4 * i + c] = c == 3 ? 1.0f : (float)(x + c * y);
+        }
+    for (int is_srgb = 0; is_srgb < 2; is_srgb++) {
+        trc_image_desc desc = pixels_desc(LEVEL_SIDE, LEVEL_SIDE, bytes, false);
+        desc.is_mip_mapped = 1;
+        desc.is_srgb = (uint32_t)is_srgb;
+        struct trc_image *image = loaded(&desc);
+        assert_int_equal(image->level_count, 3);
+        assert_int_equal(image->levels[1].width, 16);
+        assert_int_equal(image->levels[2].height, 8);
+        assert_int_equal(image->bytes, 64 * 64 * 4 + (16 * 16 + 8 * 8) * 8);
+        for (uint64_t i = 0; i < 8 * 8; i++) {
+            const double inner = level_value(image, 1, 4 * (16 * (i / 8 + 4) + i % 8 + 4));
+            assert_true(fabs(inner - (is_srgb ? checker_light() : .5)) < 5e-3);
+            assert_true(level_value(image, 2, 4 * i + 3) == 1.0f);
+        }
+        trc_image_release(image);
+    }
+    trc_image_desc desc = pixels_desc(LEVEL_SIDE, LEVEL_SIDE, numbers, true);
+    desc.is_mip_mapped = 1;
+    struct trc_image *image = loaded(&desc);
+    for (uint64_t i = 0; i < 8 * 8; i++)
+        for (uint64_t c = 0; c < 3; c++) { /* the mean of a linear function is that of the middle */
+            const double x = 8 * (double)(i % 8) + 3.5, y = 8 * (double)(i / 8) + 3.5;
+            assert_true(fabs(level_value(image, 2, 4 * i + c) - (x + (double)c * y)) < 1e-3);
+        }
+    trc_image_release(image);
+    for (int64_t n = 2; n < 4; n++) {
+        trc_memory_fail_at(n, false);
+        refused(&desc, TRC_ERROR_OUT_OF_MEMORY);
+        trc_memory_fail_at(-1, false);
+    }
+    bytes[7] = 254; /* a texel that is not opaque */
+    desc = pixels_desc(LEVEL_SIDE, LEVEL_SIDE, bytes, false);
+    desc.is_mip_mapped = 1;
+    image = loaded(&desc);
+    assert_int_equal(image->level_count, 1);
+    trc_image_release(image);
+    desc.alpha_mode = TRC_ALPHA_NONE;
+    desc.height = LEVEL_SIDE - 2; /* blocks do not fill it */
+    desc.pixel_bytes = (uint64_t)desc.width * desc.height * 4;
+    image = loaded(&desc);
+    assert_int_equal(image->level_count, 1);
+    trc_image_release(image);
 }
 
 static void test_holders(void **state) {
@@ -501,7 +580,136 @@ static void test_files_without_memory(void **state) {
     remove(path);
 }
 
+/* ---- colour spaces ---- */
+
+/* Beside scene-linear: a space that is twice as bright, and one that is encoded as a square root. */
+static const char color_config[] =
+    "ocio_profile_version: 1\n"
+    "roles: {scene_linear: linear, default: linear}\n"
+    "displays:\n"
+    "  d:\n"
+    "    - !<View> {name: v, colorspace: linear}\n"
+    "colorspaces:\n"
+    "  - !<ColorSpace> {name: linear}\n"
+    "  - !<ColorSpace>\n"
+    "    name: bright\n"
+    "    to_reference: !<MatrixTransform> {matrix: [.5,0,0,0, 0,.5,0,0, 0,0,.5,0, 0,0,0,1]}\n"
+    "  - !<ColorSpace>\n"
+    "    name: root\n"
+    "    to_reference: !<ExponentTransform> {value: [2, 2, 2, 1]}\n";
+
+static trc_image_desc color_desc(const void *pixels, bool is_float, const char *space) {
+    trc_image_desc desc = pixels_desc(1, 1, pixels, is_float);
+    desc.color_config = path;
+    desc.color_space = space;
+    return desc;
+}
+
+static void test_color_of_bytes(void **state) {
+    (void)state;
+    static const uint8_t pixel[4] = {255, 204, 51, 128};
+    static const struct {
+        const char *space;
+        uint32_t alpha_mode;
+        float expected[4];
+    } cases[] = {
+        {"bright", TRC_ALPHA_CHANNEL_PACKED, {.5f, .4f, .1f, .502f}},
+        {"root", TRC_ALPHA_NONE, {1, .64f, .04f, 1}},
+        {"root", TRC_ALPHA_STRAIGHT, {.502f, .3213f, .02008f, .502f}},
+        {"bright", TRC_ALPHA_PREMULTIPLIED, {.5f, .4f, .1f, .502f}},
+        {"root", TRC_ALPHA_PREMULTIPLIED, {1.992f, 1.275f, .0797f, .502f}},
+    };
+    write_file("config.ocio", color_config, sizeof color_config - 1);
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        trc_image_desc desc = color_desc(pixel, false, cases[i].space);
+        desc.alpha_mode = cases[i].alpha_mode;
+        struct trc_image *image = loaded(&desc);
+        assert_int_equal(image->format, TRC_TEXEL_F16);
+        assert_int_equal(image->bytes, 8);
+        assert_int_equal(image->is_associated, cases[i].alpha_mode <= TRC_ALPHA_PREMULTIPLIED);
+        for (int c = 0; c < 4; c++) {
+            const float value = trc_half_to_float(((uint16_t *)image->levels[0].texels)[c]);
+            assert_true(fabsf(value - cases[i].expected[c]) <= 2e-3f * cases[i].expected[c]);
+        }
+        trc_image_release(image);
+    }
+    const trc_image_desc desc = color_desc(pixel, false, "linear");
+    struct trc_image *image = loaded(&desc);
+    assert_int_equal(image->format, TRC_TEXEL_U8);
+    trc_image_release(image);
+    remove(path);
+}
+
+static void test_color_of_floats(void **state) {
+    (void)state;
+    static const float pixel[4] = {3, .5f, .25f, 1};
+    static const float huge[4] = {3e38f, 0, 0, 1};
+    write_file("config.ocio", color_config, sizeof color_config - 1);
+    trc_image_desc desc = color_desc(pixel, true, "root");
+    struct trc_image *image = loaded(&desc);
+    const float *texel = image->levels[0].texels;
+    assert_int_equal(image->format, TRC_TEXEL_F32);
+    assert_true(fabsf(texel[0] - 9) < 1e-4f && fabsf(texel[1] - .25f) < 1e-5f && texel[3] == 1);
+    trc_image_release(image);
+    desc.pixels = huge;
+    image = loaded(&desc);
+    texel = image->levels[0].texels;
+    assert_true(texel[0] == 0 && texel[3] == 0 && image->bad_texel_count == 1);
+    trc_image_release(image);
+    remove(path);
+}
+
+static void test_color_of_grey_files(void **state) {
+    (void)state;
+    struct sample f = {.name = "grey.pgm"};
+    char image_path[sizeof path];
+    put(&f, "P5\n1 1\n255\n\x33", 12);
+    write_file(f.name, f.bytes, f.size);
+    memcpy(image_path, path, sizeof path);
+    write_file("config.ocio", color_config, sizeof color_config - 1);
+    const trc_image_desc desc = {.struct_size = sizeof desc,
+                                 .path = image_path,
+                                 .color_config = path,
+                                 .color_space = "root"};
+    struct trc_image *image = loaded(&desc);
+    const uint16_t *texel = image->levels[0].texels;
+    assert_true(fabsf(trc_half_to_float(texel[0]) - .04f) < 5e-5f);
+    assert_true(texel[1] == texel[0] && texel[2] == texel[0] && texel[3] == TRC_HALF_ONE);
+    trc_image_release(image);
+    remove(image_path);
+    remove(path);
+}
+
+static void test_refused_colors(void **state) {
+    (void)state;
+    static const uint8_t pixel[4] = {1, 2, 3, 4};
+    write_file("config.ocio", color_config, sizeof color_config - 1);
+    trc_image_desc desc = color_desc(pixel, false, "no such space");
+    refused(&desc, TRC_ERROR_IMAGE);
+    assert_non_null(strstr(trc_last_message(), "no such space"));
+    desc.color_space = "root";
+    trc_memory_fail_at(2, false);
+    refused(&desc, TRC_ERROR_OUT_OF_MEMORY);
+    trc_memory_fail_at(-1, false);
+    desc.is_srgb = 1;
+    refused(&desc, TRC_ERROR_INVALID_ARGUMENT);
+    desc.is_srgb = 0;
+    desc.color_config = NULL;
+    refused(&desc, TRC_ERROR_INVALID_ARGUMENT);
+    desc.color_config = "/nonexistent/config.ocio";
+    refused(&desc, TRC_ERROR_IMAGE);
+    remove(path);
+}
+
 #else
+
+static void test_no_colors(void **state) {
+    (void)state;
+    static const uint8_t pixel[4];
+    trc_image_desc desc = pixels_desc(1, 1, pixel, false);
+    desc.color_config = desc.color_space = "x";
+    refused(&desc, TRC_ERROR_UNSUPPORTED);
+}
 
 static void test_no_files(void **state) {
     (void)state;
@@ -520,6 +728,7 @@ int main(void) {
         cmocka_unit_test(test_refused_pixels),
         cmocka_unit_test(test_limits),
         cmocka_unit_test(test_scene_limit),
+        cmocka_unit_test(test_levels),
         cmocka_unit_test(test_holders),
         cmocka_unit_test(test_memory_failures),
 #ifdef TRC_WITH_OIIO
@@ -532,7 +741,12 @@ int main(void) {
         cmocka_unit_test(test_claimed_sizes),
         cmocka_unit_test(test_missing_files),
         cmocka_unit_test(test_files_without_memory),
+        cmocka_unit_test(test_color_of_bytes),
+        cmocka_unit_test(test_color_of_floats),
+        cmocka_unit_test(test_color_of_grey_files),
+        cmocka_unit_test(test_refused_colors),
 #else
+        cmocka_unit_test(test_no_colors),
         cmocka_unit_test(test_no_files),
 #endif
     };

@@ -3,6 +3,7 @@
 
 Plain and packed files are read by the library itself. Generated, painted and movie images, and files
 the library cannot read, come from Blender's pixels. A missing image is 0, which renders magenta.
+Colours are converted to scene-linear ones by the library, with Blender's OpenColorIO configuration.
 """
 
 import os
@@ -17,9 +18,8 @@ from ..compat import cycles
 
 _ALPHA_MODES = {'STRAIGHT': native.ALPHA_STRAIGHT, 'PREMUL': native.ALPHA_PREMULTIPLIED,
                 'CHANNEL_PACKED': native.ALPHA_CHANNEL_PACKED, 'NONE': native.ALPHA_NONE}
-_UNTOUCHED_SPACES = ("Non-Color", "Raw")  # data in the sense of OpenColorIO
 _ANIMATED_SOURCES = {'SEQUENCE', 'MOVIE'}
-_DATA_SPACES = _UNTOUCHED_SPACES + ("Linear", "scene_linear")
+_CANNOT = (native.ERROR_UNSUPPORTED, native.ERROR_IMAGE)
 
 _FIRST_TILE, _TILES_PER_ROW = 1001, 10  # UDIM
 
@@ -57,7 +57,7 @@ class Images:
         image = node.image
         if image is None:
             return 0
-        return self._id_of_path(image, _file_path(image, node.image_user))
+        return self._id_of_path(image, _file_path(image, node.image_user), _is_mip_mapped(node))
 
     def tiles_of(self, node):
         """The tiles of a tiled image: (column, row, library's image) of each."""
@@ -68,14 +68,14 @@ class Images:
             path = _tile_path(image, number)
             if path or number == numbers[0]:
                 row, column = divmod(number - _FIRST_TILE, _TILES_PER_ROW)
-                found.append((column, row, self._id_of_path(image, path)))
+                found.append((column, row, self._id_of_path(image, path, False)))
         if len(found) < len(numbers):
             self._warnings.add(f"Image '{image.name}': tiles without a file are shown as missing")
         return found
 
-    def _id_of_path(self, image, path):
+    def _id_of_path(self, image, path, is_mip_mapped):
         """The library's image of a file of an image, or of its pixels where path is ""."""
-        key = (image.name_full, path)
+        key = (image.name_full, path, is_mip_mapped)
         keys, is_animated = self._asked
         keys.add(key)
         self._asked = keys, is_animated or image.source in _ANIMATED_SOURCES
@@ -87,7 +87,7 @@ class Images:
         signature = _signature(image, path) + (self._limit,)
         if known and known[0] == signature:
             return known[1]
-        self._entries[key] = (signature, self._create(image, path))
+        self._entries[key] = (signature, self._create(image, path, is_mip_mapped))
         if known and known[1]:
             self._scene.destroy_image(known[1])
         return self._entries[key][1]
@@ -113,44 +113,43 @@ class Images:
             if image_id:
                 self._scene.destroy_image(image_id)
 
-    def _create(self, image, path):
-        is_srgb = self._is_srgb(image)
+    def _create(self, image, path, is_mip_mapped):
+        values = {"max_side": self._limit, "is_mip_mapped": is_mip_mapped}
         created = 0
         if path:
-            created = self._from_file(image, path, is_srgb)
+            created = self._from_file(image, path, values)
         elif _is_packed(image):
             with tempfile.TemporaryDirectory() as folder:
                 path = os.path.join(folder, os.path.basename(image.filepath) or image.name)
                 with open(path, "wb") as file:
                     file.write(image.packed_file.data)
-                created = self._from_file(image, path, is_srgb)
-        return created or self._from_pixels(image, is_srgb)
+                created = self._from_file(image, path, values)
+        return created or self._from_pixels(image, values)
 
-    def _from_file(self, image, path, is_srgb):
+    def _from_file(self, image, path, values):
         """The image as the library reads it, 0 where it cannot."""
         try:
             return self._scene.create_image(
-                path=path, is_srgb=is_srgb, alpha_mode=_alpha_mode(image), max_side=self._limit)
+                path=path, alpha_mode=_alpha_mode(image), **_encoding(image), **values)
         except native.TracerError as error:
-            if error.status not in (native.ERROR_UNSUPPORTED, native.ERROR_IMAGE):
+            if error.status not in _CANNOT:
                 raise
             return 0
 
-    def _from_pixels(self, image, is_srgb):
+    def _from_pixels(self, image, values):
         pixels = read_pixels(image)
         if pixels is None:
             self._warnings.add(f"Image '{image.name}': cannot be read, magenta is used")
             return 0
-        return self._scene.create_image(
-            pixels=pixels, alpha_mode=_pixel_alpha_mode(image),
-            is_srgb=is_srgb and not image.is_float, max_side=self._limit)
-
-    def _is_srgb(self, image):
-        name = image.colorspace_settings.name
-        if name != "sRGB" and not name.startswith(_DATA_SPACES):
-            self._warnings.add(f"Image '{image.name}': colour space {name} is not supported, sRGB is used")
-            return True
-        return name == "sRGB"
+        values = dict(values, pixels=pixels, alpha_mode=_pixel_alpha_mode(image))
+        try:
+            return self._scene.create_image(**values, **({} if image.is_float else _encoding(image)))
+        except native.TracerError as error:
+            if error.status not in _CANNOT:
+                raise
+            self._warnings.add(f"Image '{image.name}': colour space {image.colorspace_settings.name} "
+                               "cannot be converted, sRGB is used")
+            return self._scene.create_image(**values, is_srgb=True)
 
 
 def size_limit(scene, is_final):
@@ -187,11 +186,36 @@ def _to_rgba(pixels):
     return rgba
 
 
+def _encoding(image):
+    """How the colours of an image's file or bytes are stored, as keywords of create_image."""
+    space = image.colorspace_settings.name
+    if space == "sRGB":
+        return {"is_srgb": True}
+    return {} if _is_data(image) else {"color_space": (_color_config(), space)}
+
+
+def _is_data(image):
+    settings = image.colorspace_settings
+    return settings.is_data or settings.name == "Raw"  # 3.4 has two names, and knows one of them
+
+
+def _color_config():
+    """The OpenColorIO configuration that Blender has read."""
+    folders = (bpy.utils.user_resource('DATAFILES', path="colormanagement"),
+               bpy.utils.system_resource('DATAFILES', path="colormanagement"))
+    paths = [os.path.join(folder, "config.ocio") for folder in folders]
+    return os.environ.get("OCIO") or next(filter(os.path.isfile, paths), paths[-1])
+
+
+def _is_mip_mapped(node):
+    """Whether lookups of an image node may stand for several texels, for the library to choose."""
+    return node.type == 'TEX_IMAGE' and node.projection == 'FLAT' and node.interpolation != 'Closest'
+
+
 def _alpha_mode(image):
     """What an image file's alpha means. As in Cycles, data is not multiplied by it."""
     mode = _ALPHA_MODES.get(image.alpha_mode, native.ALPHA_STRAIGHT)
-    is_data = image.colorspace_settings.name in _UNTOUCHED_SPACES
-    return native.ALPHA_CHANNEL_PACKED if is_data and mode != native.ALPHA_NONE else mode
+    return native.ALPHA_CHANNEL_PACKED if _is_data(image) and mode != native.ALPHA_NONE else mode
 
 
 def _pixel_alpha_mode(image):

@@ -86,6 +86,7 @@ static trc_status check_image(const trc_image_desc *desc) {
     TRC_TRY(trc_check_struct(desc, sizeof *desc, "trc_image_desc"));
     TRC_TRY(trc_check_enum(desc->alpha_mode, 4, "alpha_mode"));
     TRC_TRY(trc_check_enum(desc->is_srgb, 2, "is_srgb"));
+    TRC_TRY(trc_check_enum(desc->is_mip_mapped, 2, "is_mip_mapped"));
     if (!desc->path == !desc->pixels) {
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "an image needs either pixels or a path");
     }

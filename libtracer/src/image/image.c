@@ -8,14 +8,10 @@
 
 #include "core/checks.h"
 #include "core/core.h"
+#include "image/convert.h"
+#include "image/levels.h"
 #include "image/oiio.h"
-
-static const uint8_t texel_bytes[] = {
-    [TRC_TEXEL_U8] = 4, [TRC_TEXEL_U16] = 8, [TRC_TEXEL_F16] = 8, [TRC_TEXEL_F32] = 16};
-
-/* 1.0 as a half float, and what all infinities and NaN have set. */
-#define HALF_ONE 0x3c00u
-#define HALF_EXPONENT 0x7c00u
+#include "image/texel.h"
 
 /* ---- life ---- */
 
@@ -43,7 +39,7 @@ uint64_t trc_image_bytes(const struct trc_image *image) { return image ? image->
 /* An image of one level with texels still to be filled. */
 static trc_status image_create(uint32_t width, uint32_t height, enum trc_texel format,
                                const trc_image_desc *desc, struct trc_image **image_out) {
-    const uint64_t texels = (uint64_t)width * height, bytes = texels * texel_bytes[format];
+    const uint64_t texels = (uint64_t)width * height, bytes = texels * trc_texel_bytes(format);
     if (width > TRC_IMAGE_MAX_SIDE || height > TRC_IMAGE_MAX_SIDE ||
         texels > TRC_IMAGE_MAX_TEXELS || bytes > TRC_IMAGE_MAX_BYTES) {
         return trc_fail(TRC_ERROR_TOO_LARGE,
@@ -53,7 +49,7 @@ static trc_status image_create(uint32_t width, uint32_t height, enum trc_texel f
                         (uint64_t)TRC_IMAGE_MAX_BYTES);
     }
     struct trc_image *image = trc_alloc_zeroed(1, sizeof *image);
-    void *block = trc_alloc_zeroed(texels, texel_bytes[format]);
+    void *block = trc_alloc_zeroed(texels, trc_texel_bytes(format));
     if (!image || !block) {
         trc_free(image);
         trc_free(block);
@@ -99,7 +95,7 @@ static void spread_channels(struct trc_image *image, uint64_t count, uint32_t ch
         spread_u16(texels, count, channels, UINT16_MAX);
         break;
     case TRC_TEXEL_F16:
-        spread_u16(texels, count, channels, HALF_ONE);
+        spread_u16(texels, count, channels, TRC_HALF_ONE);
         break;
     case TRC_TEXEL_F32:
         spread_f32(texels, count, channels, 1.0f);
@@ -107,40 +103,25 @@ static void spread_channels(struct trc_image *image, uint64_t count, uint32_t ch
     }
 }
 
-static float half_to_float(uint16_t half) {
-    const uint32_t bits = (uint32_t)(half & 0x7fffu) << 13;
-    float value;
-    memcpy(&value, &bits, sizeof value);
-    value *= 0x1p112f;
-    return half & 0x8000u ? -value : value;
-}
-
-/* To the nearest half float; infinite above the largest. */
-static uint16_t float_to_half(float value) {
-    const float scaled = fminf(fabsf(value), 65536.0f) * 0x1p-112f;
-    uint32_t bits;
-    memcpy(&bits, &scaled, sizeof bits);
-    bits += 0x0fffu + ((bits >> 13) & 1u); /* ties to even */
-    return (uint16_t)(bits >> 13 | (signbit(value) ? 0x8000u : 0u));
-}
-
-/* Texels with a NaN or an infinity become 0, as in Cycles: other channels alone would have a
- * strange hue. */
+/* Texels of floats with a NaN or an infinity become 0, as in Cycles: other channels alone would
+ * have a strange hue. */
 static void drop_bad_texels(struct trc_image *image, uint64_t count) {
+    if (image->format != TRC_TEXEL_F16 && image->format != TRC_TEXEL_F32)
+        return;
     uint16_t *h = image->levels[0].texels;
     float *f = image->levels[0].texels;
     for (uint64_t i = 0; i < count; i++) {
         bool is_bad = false;
         for (int c = 0; c < 4; c++) {
             is_bad |= image->format == TRC_TEXEL_F16
-                          ? (h[4 * i + c] & HALF_EXPONENT) == HALF_EXPONENT
+                          ? (h[4 * i + c] & TRC_HALF_EXPONENT) == TRC_HALF_EXPONENT
                           : !isfinite(f[4 * i + c]);
         }
         if (!is_bad)
             continue;
         image->bad_texel_count++;
-        memset((char *)image->levels[0].texels + i * texel_bytes[image->format], 0,
-               texel_bytes[image->format]);
+        memset((char *)image->levels[0].texels + i * trc_texel_bytes(image->format), 0,
+               trc_texel_bytes(image->format));
     }
 }
 
@@ -157,7 +138,7 @@ static void set_opaque(struct trc_image *image, uint64_t count) {
             h[4 * i + 3] = UINT16_MAX;
             break;
         case TRC_TEXEL_F16:
-            h[4 * i + 3] = HALF_ONE;
+            h[4 * i + 3] = TRC_HALF_ONE;
             break;
         case TRC_TEXEL_F32:
             f[4 * i + 3] = 1.0f;
@@ -181,7 +162,7 @@ static void multiply_by_alpha(struct trc_image *image, uint64_t count) {
                 h[c] = (uint16_t)((uint32_t)h[c] * h[3] / UINT16_MAX);
                 break;
             case TRC_TEXEL_F16:
-                h[c] = float_to_half(half_to_float(h[c]) * half_to_float(h[3]));
+                h[c] = trc_float_to_half(trc_half_to_float(h[c]) * trc_half_to_float(h[3]));
                 break;
             case TRC_TEXEL_F32:
                 f[c] *= f[3];
@@ -191,24 +172,32 @@ static void multiply_by_alpha(struct trc_image *image, uint64_t count) {
     }
 }
 
-/* What is left to do when the channels are there. */
-static void finish(struct trc_image *image, uint32_t alpha_mode, uint32_t channels,
-                   bool is_unassociated) {
+/* What is left to do when the channels are there; the image is to be freed if it fails. */
+static trc_status finish(struct trc_image *image, const trc_image_desc *desc, uint32_t channels,
+                         bool is_unassociated) {
     const uint64_t count = (uint64_t)image->levels[0].width * image->levels[0].height;
     const bool has_alpha = channels == 2 || channels == 4;
-    const bool is_float = image->format == TRC_TEXEL_F16 || image->format == TRC_TEXEL_F32;
     spread_channels(image, count, channels);
-    if (is_float)
-        drop_bad_texels(image, count);
-    if (has_alpha && alpha_mode == TRC_ALPHA_NONE)
+    drop_bad_texels(image, count);
+    if (has_alpha && desc->alpha_mode == TRC_ALPHA_NONE)
         set_opaque(image, count);
-    image->is_associated =
-        has_alpha && (alpha_mode == TRC_ALPHA_STRAIGHT || alpha_mode == TRC_ALPHA_PREMULTIPLIED);
+    image->is_associated = has_alpha && (desc->alpha_mode == TRC_ALPHA_STRAIGHT ||
+                                         desc->alpha_mode == TRC_ALPHA_PREMULTIPLIED);
+    if (desc->color_space) {
+        const struct trc_color_source source = {
+            .config = desc->color_config,
+            .space = desc->color_space,
+            .is_grey = channels == 1,
+            .is_multiplied = image->is_associated && !is_unassociated,
+        };
+        TRC_TRY(trc_image_to_scene_linear(image, &source));
+        drop_bad_texels(image, count);
+    }
     if (image->is_associated && is_unassociated) {
         multiply_by_alpha(image, count);
-        if (is_float)
-            drop_bad_texels(image, count); /* products may overflow */
+        drop_bad_texels(image, count); /* products may overflow */
     }
+    return TRC_OK;
 }
 
 /* ---- limits ---- */
@@ -237,7 +226,7 @@ static void finish(struct trc_image *image, uint32_t alpha_mode, uint32_t channe
 #define AS_IT_IS(v) (v)
 DEFINE_SHRINK(shrink_u8, uint8_t, WHOLE_TO_FLOAT, BYTE_OF)
 DEFINE_SHRINK(shrink_u16, uint16_t, WHOLE_TO_FLOAT, WORD_OF)
-DEFINE_SHRINK(shrink_f16, uint16_t, half_to_float, float_to_half)
+DEFINE_SHRINK(shrink_f16, uint16_t, trc_half_to_float, trc_float_to_half)
 DEFINE_SHRINK(shrink_f32, float, AS_IT_IS, AS_IT_IS)
 
 /* The first level of an image by blocks of step by step texels, in the encoding it is stored in.
@@ -246,10 +235,10 @@ static trc_status shrink(const struct trc_image *image, uint32_t step,
                          struct trc_image_level *out) {
     const struct trc_image_level *level = &image->levels[0];
     const uint32_t width = level->width / step, height = level->height / step;
-    void *texels = trc_alloc((uint64_t)width * height, texel_bytes[image->format]);
+    void *texels = trc_alloc((uint64_t)width * height, trc_texel_bytes(image->format));
     if (!texels) {
         return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for an image of %" PRIu64 " bytes",
-                        (uint64_t)width * height * texel_bytes[image->format]);
+                        (uint64_t)width * height * trc_texel_bytes(image->format));
     }
     switch (image->format) {
     case TRC_TEXEL_U8:
@@ -269,8 +258,9 @@ static trc_status shrink(const struct trc_image *image, uint32_t step,
     return TRC_OK;
 }
 
-static uint64_t level_bytes(const struct trc_image *image) {
-    return (uint64_t)image->levels[0].width * image->levels[0].height * texel_bytes[image->format];
+static uint64_t whole_bytes(const struct trc_image *image) {
+    return (uint64_t)image->levels[0].width * image->levels[0].height *
+           trc_texel_bytes(image->format);
 }
 
 static uint32_t shorter_side(const struct trc_image_level *level) {
@@ -290,7 +280,7 @@ static trc_status limit_size(struct trc_image *image, uint32_t max_side) {
     TRC_TRY(shrink(image, step, &smaller));
     trc_free(level->texels);
     *level = smaller;
-    image->bytes = level_bytes(image);
+    image->bytes = whole_bytes(image);
     return TRC_OK;
 }
 
@@ -313,8 +303,15 @@ trc_status trc_image_halve(const struct trc_image *image, struct trc_image **hal
     half->is_associated = image->is_associated;
     half->level_count = 1;
     half->is_halved = true;
-    half->bytes = level_bytes(half);
+    half->bytes = whole_bytes(half);
     half->bad_texel_count = image->bad_texel_count;
+    if (image->level_count > 1) {
+        const trc_status levels = trc_image_make_levels(half);
+        if (levels != TRC_OK) {
+            trc_image_release(half);
+            return levels;
+        }
+    }
     *half_out = half;
     return TRC_OK;
 }
@@ -330,11 +327,17 @@ static trc_status load_pixels(const trc_image_desc *desc, struct trc_image **ima
     }
     TRC_TRY(trc_check_count(desc->width, 1, TRC_IMAGE_MAX_SIDE, "width"));
     TRC_TRY(trc_check_count(desc->height, 1, TRC_IMAGE_MAX_SIDE, "height"));
-    const uint64_t bytes = (uint64_t)desc->width * desc->height * texel_bytes[format];
+    const uint64_t bytes = (uint64_t)desc->width * desc->height * trc_texel_bytes(format);
     TRC_TRY(trc_check_array(desc->pixels, desc->pixel_bytes, bytes, 1, element, "pixels"));
-    TRC_TRY(image_create(desc->width, desc->height, format, desc, image_out));
-    memcpy((*image_out)->levels[0].texels, desc->pixels, bytes);
-    finish(*image_out, desc->alpha_mode, 4, desc->alpha_mode == TRC_ALPHA_STRAIGHT);
+    struct trc_image *image;
+    TRC_TRY(image_create(desc->width, desc->height, format, desc, &image));
+    memcpy(image->levels[0].texels, desc->pixels, bytes);
+    const trc_status status = finish(image, desc, 4, desc->alpha_mode == TRC_ALPHA_STRAIGHT);
+    if (status != TRC_OK) {
+        trc_image_release(image);
+        return status;
+    }
+    *image_out = image;
     return TRC_OK;
 }
 
@@ -343,14 +346,15 @@ static trc_status read_file(struct trc_oiio *file, const struct trc_file_info *i
                             const trc_image_desc *desc, struct trc_image **image_out) {
     struct trc_image *image;
     TRC_TRY(image_create(info->width, info->height, (enum trc_texel)info->format, desc, &image));
-    const uint64_t texel = texel_bytes[info->format];
-    const trc_status status =
+    const uint64_t texel = trc_texel_bytes(info->format);
+    trc_status status =
         trc_oiio_read(file, image->levels[0].texels, image->bytes, texel, texel * info->width);
+    if (status == TRC_OK)
+        status = finish(image, desc, info->channels, info->is_unassociated);
     if (status != TRC_OK) {
         trc_image_release(image);
         return status;
     }
-    finish(image, desc->alpha_mode, info->channels, info->is_unassociated);
     *image_out = image;
     return TRC_OK;
 }
@@ -377,9 +381,15 @@ trc_status trc_image_load(const trc_image_desc *desc, struct trc_image **image_o
     if ((desc->path != NULL) == (desc->pixels != NULL)) {
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "an image needs either pixels or a path");
     }
+    if (desc->color_space && (!desc->color_config || desc->is_srgb)) {
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT,
+                        "a colour space needs a configuration, and is not sRGB");
+    }
     struct trc_image *image = NULL;
     TRC_TRY(desc->path ? load_file(desc, &image) : load_pixels(desc, &image));
-    const trc_status status = limit_size(image, desc->max_side);
+    trc_status status = limit_size(image, desc->max_side);
+    if (status == TRC_OK && desc->is_mip_mapped)
+        status = trc_image_make_levels(image);
     if (status != TRC_OK) {
         trc_image_release(image);
         return status;

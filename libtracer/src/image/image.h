@@ -2,7 +2,8 @@
  *
  * As in Cycles, what is stored is what the file or the caller gave: sRGB-encoded bytes stay encoded
  * and are decoded after filtering, and colours of images with alpha are multiplied by it before
- * filtering (in their encoding). Rows run from the bottom (v = 0) upwards, texels are RGBA.
+ * filtering (in their encoding). Other encodings and colour spaces are converted to scene-linear
+ * floats. Rows run from the bottom (v = 0) upwards, texels are RGBA.
  * Immutable once created; the count of holders is atomic. */
 #ifndef TRACER_IMAGE_IMAGE_H
 #define TRACER_IMAGE_IMAGE_H
@@ -38,16 +39,17 @@ struct trc_image {
     enum trc_texel format;
     uint32_t is_srgb;       /* colours are sRGB-encoded: to be decoded after filtering */
     uint32_t is_associated; /* colours are multiplied by alpha: divided when alpha is used too */
-    uint32_t level_count;   /* 1: smaller levels come with mip-mapping */
+    uint32_t level_count;   /* 1: only itself; smaller ones: image/levels.h */
+    enum trc_texel level_format; /* of those: linear light */
     struct trc_image_level levels[TRC_IMAGE_MAX_LEVELS];
     bool is_halved;           /* to fit the scene's limit: worth a warning */
-    uint64_t bytes;           /* of the texels */
+    uint64_t bytes;           /* of the texels of all levels */
     uint64_t bad_texel_count; /* were NaN or infinite, and are 0 now: worth a warning */
 };
 
 /* Copies the pixels or reads the file of a descriptor, which is checked in full. INVALID_ARGUMENT,
- * STRUCT_SIZE, TOO_LARGE, OUT_OF_MEMORY, IMAGE (unreadable file), UNSUPPORTED (a path in a build
- * without OpenImageIO). One holder: the caller. */
+ * STRUCT_SIZE, TOO_LARGE, OUT_OF_MEMORY, IMAGE (unreadable file, unknown colour space), UNSUPPORTED
+ * (a path or a colour space in a build without OpenImageIO). One holder: the caller. */
 trc_status trc_image_load(const trc_image_desc *desc, struct trc_image **image_out);
 
 /* A new image of half the size, of which the caller is the holder; whether it can be: a side of one

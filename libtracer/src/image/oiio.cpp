@@ -2,14 +2,11 @@
 #include "image/oiio.h"
 
 #include <memory>
-#include <new>
 #include <string>
 
 #include <OpenImageIO/imageio.h>
 
-extern "C" {
-#include "core/core.h"
-}
+#include "image/guarded.h"
 
 // As in image/image.h, which C++ cannot read: its counts are C atomics.
 enum { TEXEL_U8, TEXEL_U16, TEXEL_F16, TEXEL_F32 };
@@ -22,18 +19,7 @@ struct trc_oiio {
 
 namespace {
 
-// Runs a function and turns what it throws into a status.
-template <typename Function> trc_status guarded(const char *path, Function function) {
-    try {
-        return function();
-    } catch (const std::bad_alloc &) {
-        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory to read the image %s", path);
-    } catch (const std::exception &error) {
-        return trc_fail(TRC_ERROR_IMAGE, "cannot read the image %s: %s", path, error.what());
-    } catch (...) {
-        return trc_fail(TRC_ERROR_IMAGE, "cannot read the image %s", path);
-    }
-}
+const char task[] = "cannot read the image";
 
 // The widest of the file's channels decides.
 uint32_t format_of(const OIIO::ImageSpec &spec) {
@@ -90,14 +76,14 @@ OIIO::TypeDesc type_of(uint32_t format) {
 }
 
 trc_status fail_open(const char *path, const std::string &reason) {
-    return trc_fail(TRC_ERROR_IMAGE, "cannot read the image %s: %s", path, reason.c_str());
+    return trc_fail(TRC_ERROR_IMAGE, "%s %s: %s", task, path, reason.c_str());
 }
 
 } // namespace
 
 extern "C" trc_status trc_oiio_open(const char *path, trc_oiio **file_out,
                                     trc_file_info *info_out) {
-    return guarded(path, [&]() -> trc_status {
+    return guarded(task, path, [&]() -> trc_status {
         std::unique_ptr<trc_oiio> file(new trc_oiio());
         file->path = path;
         // Alpha is left as it is in the file: it is multiplied later, as the alpha mode says.
@@ -124,7 +110,7 @@ extern "C" trc_status trc_oiio_open(const char *path, trc_oiio **file_out,
 
 extern "C" trc_status trc_oiio_read(trc_oiio *file, void *texels, uint64_t capacity,
                                     uint64_t texel_bytes, uint64_t row_bytes) {
-    return guarded(file->path.c_str(), [&]() -> trc_status {
+    return guarded(task, file->path.c_str(), [&]() -> trc_status {
         const trc_file_info &info = file->info;
         if (texel_bytes * info.width > row_bytes || row_bytes * info.height > capacity)
             return fail_open(file->path.c_str(), "the buffer is too small");
@@ -141,7 +127,7 @@ extern "C" trc_status trc_oiio_read(trc_oiio *file, void *texels, uint64_t capac
 extern "C" void trc_oiio_close(trc_oiio *file) {
     if (!file)
         return;
-    guarded("", [&]() -> trc_status {
+    guarded(task, "", [&]() -> trc_status {
         delete file;
         return TRC_OK;
     });

@@ -133,7 +133,6 @@ static void evaluate_emission(const struct draw *d, vint index, vfloat u, vfloat
     e.time = d->s->time;
     e.wo = v3_neg(d->out->wi);
     e.ray_length = d->out->distance;
-    e.footprint = d->s->footprint;
     e.raster_x = d->s->raster_x;
     e.raster_y = d->s->raster_y;
     e.active = m;

@@ -147,6 +147,9 @@ static void run_at_surface(const struct trc_surface *s, const struct trc_instruc
     case TRC_OP_UV:
         op_uv(s, i->resource, out);
         break;
+    case TRC_OP_UV_DENSITY:
+        out[0] = op_uv_density(s, i->resource);
+        break;
     case TRC_OP_COLOR_ATTRIBUTE:
         op_color_attribute(s, i->resource, out);
         break;
@@ -188,7 +191,8 @@ static void run_at_surface(const struct trc_surface *s, const struct trc_instruc
         out[0] = op_wireframe(s, in[0]);
         break;
     case TRC_OP_IMAGE:
-        texture_lookup(image_of(s, i->resource), i->mode, in[0], in[1], s->active, out);
+        texture_lookup(image_of(s, i->resource), i->mode, in[0], in[1], in[2] * s->footprint,
+                       s->active, out);
         break;
     case TRC_OP_IMAGE_BOX:
         op_image_box(s, image_of(s, i->resource), i->mode, v3_read(in), out);

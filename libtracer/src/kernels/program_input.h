@@ -131,6 +131,41 @@ static void op_uv(const struct trc_surface *s, uint32_t name, vfloat *out) {
     }
 }
 
+/* The smaller singular value of the map from the triangle to its UVs: what they change by per metre
+ * in the direction in which they change least. */
+static vfloat op_uv_density(const struct trc_surface *s, uint32_t name) {
+    vfloat out = vf_zero();
+    struct lane_group g = groups_begin(s);
+    while (groups_next(s, &g)) {
+        const struct trc_attribute *a = g.mesh ? mesh_attribute(g.mesh, name, 2) : NULL;
+        if (!a || !trc_mesh_in_reach(g.mesh))
+            continue;
+        struct trc_corners p;
+        struct trc_wide_affine m;
+        vint index[3];
+        vfloat u[3], v[3];
+        trc_load_indices(g.mesh, s->triangle, g.lanes, index);
+        trc_load_vectors(g.mesh->positions, index, g.mesh->vertex_count, g.mesh->key_count, s->time,
+                         g.lanes, &p);
+        trc_load_affine(g.instance, s->time, &m);
+        attribute_corners(a, 0, s->triangle, g.lanes, u);
+        attribute_corners(a, 1, s->triangle, g.lanes, v);
+        const vvec3 e1 = trc_transform_vector(&m, v3_sub(p.corner[1], p.corner[0]));
+        const vvec3 e2 = trc_transform_vector(&m, v3_sub(p.corner[2], p.corner[0]));
+        const vfloat u1 = u[1] - u[0], u2 = u[2] - u[0], v1 = v[1] - v[0], v2 = v[2] - v[0];
+        const vfloat e11 = v3_dot(e1, e1), e12 = v3_dot(e1, e2), e22 = v3_dot(e2, e2);
+        /* Trace and determinant of the map times its transpose, times that of the edges. */
+        const vfloat area2 = e11 * e22 - e12 * e12, uv_area = u1 * v2 - u2 * v1;
+        const vfloat trace = (u1 * u1 + v1 * v1) * e22 - vf_set(2.0f) * (u1 * u2 + v1 * v2) * e12 +
+                             (u2 * u2 + v2 * v2) * e11;
+        const vfloat determinant = uv_area * uv_area * area2;
+        const vfloat root = vf_safe_sqrt(trace * trace - vf_set(4.0f) * determinant);
+        const vfloat least = vf_divide(vf_set(2.0f) * uv_area * uv_area, trace + root);
+        out = vf_select(vm_and(g.lanes, vf_lt(least, vf_set(INFINITY))), vf_safe_sqrt(least), out);
+    }
+    return out;
+}
+
 /* Black and transparent where the mesh does not have it. */
 static void op_color_attribute(const struct trc_surface *s, uint32_t name, vfloat *out) {
     const vvec3 w = corner_weights(s);

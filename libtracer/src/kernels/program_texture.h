@@ -58,7 +58,7 @@ static void op_image_box(const struct trc_surface *s, const struct trc_image *im
     u = vf_select(is_y, vf_select(vf_gt(n.y, zero), one - co.x, co.x), u);
     u = vf_select(is_z, vf_select(vf_gt(n.z, zero), one - co.y, co.y), u);
     v = vf_select(vm_andnot(is_z, is_x), co.x, v);
-    texture_lookup(image, mode, u, v, s->active, out);
+    texture_lookup(image, mode, u, v, vf_zero(), s->active, out);
 }
 
 /* vector, color 1, color 2, scale -> color, factor */

@@ -647,7 +647,19 @@ static void continue_rays(struct trc_tile *t, const struct arrival *a, const str
 
 /* ---- a group of one material ---- */
 
-static void surface_setup(struct trc_tile *t, const struct arrival *a, struct trc_surface *s) {
+/* Width of the beam that one sample stands for where its ray arrives: of the camera's rays a share of
+ * the pixel, of those that rough lobes have sent a share of their directions (Suykens and Willems,
+ * "Path Differentials and Applications", 2001). Ideal bounces may focus: 0. */
+static vfloat beam_width(const struct trc_tile *t, const struct arrival *a) {
+    const vfloat solid = vf_divide(vf_set(1.0f / (float)t->desc->sample_count), a->pdf);
+    const vmask camera =
+        vi_eq((vint)(a->path & vu_set(TRC_VISIBLE_CAMERA)), vi_set(TRC_VISIBLE_CAMERA));
+    const vfloat bounced = vf_where(vf_gt(a->pdf, vf_set(0.0f)), a->t * vf_safe_sqrt(solid));
+    return vf_select(camera, vf_set(t->beam_width) + a->t * vf_set(t->beam_spread), bounced);
+}
+
+static void surface_setup(struct trc_tile *t, const struct arrival *a, bool has_texture,
+                          struct trc_surface *s) {
     s->snapshot = t->snapshot;
     s->active = a->active;
     s->instance = (vint)word_column(t->hits.instance, a);
@@ -663,7 +675,7 @@ static void surface_setup(struct trc_tile *t, const struct arrival *a, struct tr
     s->glossy_depth = (vint)depth_of(a->depths, TRC_DEPTH_GLOSSY_SHIFT);
     s->transmission_depth = (vint)depth_of(a->depths, TRC_DEPTH_TRANSMISSION_SHIFT);
     s->transparent_depth = (vint)depth_of(a->depths, TRC_DEPTH_TRANSPARENT_SHIFT);
-    s->footprint = vf_set(0.0f);
+    s->footprint = has_texture ? beam_width(t, a) : vf_set(0.0f);
     s->raster_x = (vi_to_float((vint)(a->pixel & vu_set(0xffffu))) + vf_set(0.5f)) *
                   vf_set(1.0f / (float)t->desc->width);
     s->raster_y = (vi_to_float((vint)(a->pixel >> 16)) + vf_set(0.5f)) *
@@ -729,7 +741,7 @@ static void shade_group(struct trc_tile *t, uint32_t material, vint index, vmask
     struct trc_lobes lobes;
     arrival_load(t, index, active, &a);
     arrival_load_samples(t, &a);
-    surface_setup(t, &a, &s);
+    surface_setup(t, &a, m->has & TRC_MATERIAL_HAS_TEXTURE, &s);
     if (m->instruction_count)
         TRC_KERNEL(trc_program_run)(m, &s, &regs);
     TRC_KERNEL(trc_lobes_setup)(m, &s, &regs, filter_alpha(t, &a), &lobes);

@@ -2,12 +2,12 @@
  *
  * Filters and extensions are those of Cycles 3.4: B-spline weights for cubic, texels outside a
  * clipped image count as transparent black, sRGB is decoded after filtering. Coordinates may be
- * huge or not finite: NaN reads as 0. Only level 0 is read; a later choice of level by footprint
- * belongs in texture_lookup, the filters take any level. */
+ * huge or not finite: NaN reads as 0. Cycles has no smaller levels: here one is read where its texels
+ * are no wider than what one sample stands for, so that pictures go to the same limit. */
 #ifndef TRACER_KERNELS_TEXTURE_H
 #define TRACER_KERNELS_TEXTURE_H
 
-#include "image/image.h"
+#include "image/levels.h"
 #include "kernels/wide_math.h"
 #include "shading/program.h"
 
@@ -25,10 +25,10 @@ TRC_INLINE void half_unpack(vuint word, vfloat *low, vfloat *high) {
 }
 
 /* RGBA of the texels with these numbers, without the scale of integer formats; 0 outside lanes. */
-TRC_INLINE void texel_load(const struct trc_image *image, const void *texels, vint index,
-                           vmask lanes, vfloat out[4]) {
+TRC_INLINE void texel_load(enum trc_texel format, const void *texels, vint index, vmask lanes,
+                           vfloat out[4]) {
     const uint32_t *words = texels;
-    switch (image->format) {
+    switch (format) {
     case TRC_TEXEL_U8: {
         const vuint t = vu_gather(words, index, lanes), byte = vu_set(0xffu);
         out[0] = vi_to_float((vint)(t & byte));
@@ -134,7 +134,7 @@ TRC_INLINE void axis_prepare(vfloat u, uint32_t size, uint32_t extension, int ta
 }
 
 /* Sum over the texels of a filter, without the scale of integer formats. */
-TRC_INLINE void filter_sum(const struct trc_image *image, const struct trc_image_level *level,
+TRC_INLINE void filter_sum(enum trc_texel format, const struct trc_image_level *level,
                            uint32_t extension, int taps, vfloat u, vfloat v, vmask lanes,
                            vfloat sum[4]) {
     struct axis_taps x, y;
@@ -148,7 +148,7 @@ TRC_INLINE void filter_sum(const struct trc_image *image, const struct trc_image
         for (int i = 0; i < taps; i++) {
             vfloat texel[4];
             const vfloat weight = y.weight[j] * x.weight[i];
-            texel_load(image, level->texels, row + x.index[i], vm_and(row_lanes, x.inside[i]),
+            texel_load(format, level->texels, row + x.index[i], vm_and(row_lanes, x.inside[i]),
                        texel);
             for (int c = 0; c < 4; c++)
                 sum[c] = sum[c] + weight * texel[c];
@@ -180,25 +180,20 @@ TRC_INLINE vfloat srgb_decode(vfloat x) {
     return vf_select(vf_lt(x, vf_set(0.04045f)), low, vf_pow(base, vf_set(2.4f)));
 }
 
-/* RGBA of an image; NULL is magenta. mode: as TRC_OP_IMAGE. */
-static void texture_lookup(const struct trc_image *image, uint32_t mode, vfloat u, vfloat v,
-                           vmask lanes, vfloat out[4]) {
-    if (!image) {
-        out[0] = out[2] = out[3] = vf_one();
-        out[1] = vf_zero();
-        return;
-    }
+/* RGBA of an image itself. mode: as TRC_OP_IMAGE. */
+static void whole_lookup(const struct trc_image *image, uint32_t mode, vfloat u, vfloat v,
+                         vmask lanes, vfloat out[4]) {
     const struct trc_image_level *level = &image->levels[0];
     const uint32_t extension = mode & TRC_IMAGE_MODE_EXTENSION;
     switch (mode & TRC_IMAGE_MODE_INTERPOLATION) {
     case TRC_IMAGE_CLOSEST:
-        filter_sum(image, level, extension, 1, u, v, lanes, out);
+        filter_sum(image->format, level, extension, 1, u, v, lanes, out);
         break;
     case TRC_IMAGE_CUBIC:
-        filter_sum(image, level, extension, 4, u, v, lanes, out);
+        filter_sum(image->format, level, extension, 4, u, v, lanes, out);
         break;
     default:
-        filter_sum(image, level, extension, 2, u, v, lanes, out);
+        filter_sum(image->format, level, extension, 2, u, v, lanes, out);
         break;
     }
     const bool is_integer = image->format == TRC_TEXEL_U8 || image->format == TRC_TEXEL_U16;
@@ -217,6 +212,45 @@ static void texture_lookup(const struct trc_image *image, uint32_t mode, vfloat 
         return;
     for (int c = 0; c < 3; c++)
         out[c] = is_integer ? srgb_decode_unit(out[c]) : srgb_decode(out[c]);
+}
+
+/* The smallest level whose texels are no wider than width, in units of the image's shorter side. */
+TRC_INLINE vint level_of(const struct trc_image *image, vfloat width) {
+    const struct trc_image_level *whole = &image->levels[0];
+    const uint32_t side = whole->width < whole->height ? whole->width : whole->height;
+    const vint log2 = (vint)((vuint)vf_as_int(width * vf_set((float)side)) >> 23) - vi_set(127);
+    const vint level = log2 - vi_set(TRC_LEVEL_FIRST_LOG2 - 1);
+    const vint last = vi_set((int32_t)image->level_count - 1), zero = vi_set(0);
+    return vi_select(vi_lt(level, zero), zero, vi_select(vi_lt(last, level), last, level));
+}
+
+/* RGBA of an image; NULL is magenta. width: what a lookup stands for, in units of the coordinates,
+ * >= 0. Smaller levels are interpolated linearly, level by level of the lanes. */
+static void texture_lookup(const struct trc_image *image, uint32_t mode, vfloat u, vfloat v,
+                           vfloat width, vmask lanes, vfloat out[4]) {
+    if (!image) {
+        out[0] = out[2] = out[3] = vf_one();
+        out[1] = vf_zero();
+        return;
+    }
+    if (image->level_count == 1) {
+        whole_lookup(image, mode, u, v, lanes, out);
+        return;
+    }
+    const vint level = level_of(image, width);
+    for (uint32_t rest = vm_bits(lanes); rest;) {
+        const int32_t number = vi_get(level, __builtin_ctz(rest));
+        const vmask own = vm_and(vi_eq(level, vi_set(number)), vm_from_bits(rest));
+        vfloat found[4];
+        if (number)
+            filter_sum(image->level_format, &image->levels[number], mode & TRC_IMAGE_MODE_EXTENSION,
+                       2, u, v, own, found);
+        else
+            whole_lookup(image, mode, u, v, own, found);
+        for (int c = 0; c < 4; c++)
+            out[c] = vf_select(own, found[c], out[c]);
+        rest &= ~vm_bits(own);
+    }
 }
 
 #endif

@@ -561,6 +561,21 @@ static void samples_render(struct trc_tile *t, uint32_t begin, uint32_t end) {
     batch_flush(t, sharing);
 }
 
+/* The beam of a camera sample: the narrowest of the frame, in a corner. */
+static void beam_setup(struct trc_tile *t) {
+    const struct trc_camera *c = &t->snapshot->camera;
+    const float *w = c->windows[0];
+    const float x = fmaxf(fabsf(w[0]), fabsf(w[1])), y = fmaxf(fabsf(w[2]), fabsf(w[3]));
+    const float pixel = fminf(fabsf(w[1] - w[0]) / (float)t->desc->width,
+                              fabsf(w[3] - w[2]) / (float)t->desc->height);
+    const float sample =
+        pixel * fminf(t->desc->filter_width, 1.0f) / sqrtf((float)t->desc->sample_count);
+    if (c->type == TRC_CAMERA_ORTHOGRAPHIC)
+        t->beam_width = sample;
+    else
+        t->beam_spread = sample / (1.0f + x * x + y * y);
+}
+
 void TRC_KERNEL(trc_tile_render)(struct trc_tile_job *job) {
     char *memory = job->memory;
     struct trc_tile *t = (struct trc_tile *)memory;
@@ -582,6 +597,7 @@ void TRC_KERNEL(trc_tile_render)(struct trc_tile_job *job) {
                        job->snapshot->camera.type == TRC_CAMERA_PERSPECTIVE;
     t->packet_size =
         job->desc->packet_size < TRC_PACKET_SIZE ? job->desc->packet_size : TRC_PACKET_SIZE;
+    beam_setup(t);
     t->clock = &job->counts.seconds_other;
     t->clock_start = trc_seconds();
     const uint32_t most = t->catchers ? SAMPLES_PER_BATCH / 2 : SAMPLES_PER_BATCH;

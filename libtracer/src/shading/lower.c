@@ -1,4 +1,5 @@
 /* Value nodes to operations. */
+#include <math.h>
 #include <string.h>
 
 #include "core/checks.h"
@@ -158,15 +159,59 @@ static trc_status lower_object_info(const struct lowering *l) {
     return op(l->b, TRC_OP_OBJECT_RANDOM, 0, NULL, l->out + 9);
 }
 
+/* The operation whose first outputs two operands are; NULL unless it is of that kind. */
+static const struct trc_build_op *source_of(const struct trc_build *b, uint32_t code,
+                                            const struct trc_operand *pair) {
+    for (uint32_t i = 0; i < b->op_count; i++) {
+        const struct trc_build_op *o = &b->ops[i];
+        if (o->op == code && pair[0].reg == (int32_t)o->first_value &&
+            pair[1].reg == (int32_t)o->first_value + 1)
+            return o;
+    }
+    return NULL;
+}
+
+/* What a mapping scales its U and V by at least; 0 unless it is constant and turns them about the
+ * third axis alone. in: of TRC_OP_MAPPING. */
+static float least_scale(uint32_t mode, const struct trc_operand *in) {
+    static const int zero_rows[4] = {11, 14, 15, 16};
+    const bool is_product = mode == 0 || mode == 2; /* point and vector; the others divide */
+    for (int i = 6; i < TRC_OP_MAX_INPUTS; i++)
+        if (!trc_is_constant(in[i]) || !is_product)
+            return 0.0f;
+    for (int i = 0; i < 4; i++)
+        if (in[zero_rows[i]].value != 0.0f)
+            return 0.0f;
+    return fminf(fabsf(in[6].value), fabsf(in[7].value));
+}
+
+/* The least that a UV map's coordinates, mapped or not, change by per metre of the surface; 0, for
+ * which lookups read no smaller levels, where they come from elsewhere. */
+static trc_status density_of(const struct lowering *l, const struct trc_operand *uv,
+                             struct trc_operand *out) {
+    const struct trc_build_op *mapping = source_of(l->b, TRC_OP_MAPPING, uv);
+    const struct trc_operand *in = mapping ? l->b->inputs + mapping->first_input : uv;
+    const struct trc_build_op *map = source_of(l->b, TRC_OP_UV, in);
+    const float scale = mapping ? least_scale(mapping->mode, in) : 1.0f;
+    *out = trc_constant(0.0f);
+    if (!map || scale == 0.0f)
+        return TRC_OK;
+    TRC_TRY(trc_build_op(l->b, TRC_OP_UV_DENSITY, 0, map->resource, NULL, out));
+    return trc_build_math(l->b, TRC_MATH_MULTIPLY, *out, trc_constant(scale), trc_constant(0.0f),
+                          out);
+}
+
 static trc_status lower_image(const struct lowering *l) {
     const uint32_t projection = l->node->mode >> 4, mode = l->node->mode & 15u;
     const uint32_t image = image_of(l);
-    struct trc_operand uv[2] = {l->in[0], l->in[1]};
+    struct trc_operand uv[3] = {l->in[0], l->in[1], trc_constant(0.0f)};
     if (projection == 1)
         return trc_build_op(l->b, TRC_OP_IMAGE_BOX, mode, image, l->in, l->out);
     if (projection) {
         const uint32_t wrap = projection == 2 ? TRC_PROJECT_SPHERE : TRC_PROJECT_TUBE;
         TRC_TRY(op(l->b, TRC_OP_PROJECT, wrap, l->in, uv));
+    } else if ((mode & TRC_IMAGE_MODE_INTERPOLATION) != TRC_IMAGE_CLOSEST) {
+        TRC_TRY(density_of(l, uv, uv + 2));
     }
     return trc_build_op(l->b, TRC_OP_IMAGE, mode, image, uv, l->out);
 }
@@ -174,7 +219,8 @@ static trc_status lower_image(const struct lowering *l) {
 static trc_status lower_environment(const struct lowering *l) {
     const bool is_ball = l->node->mode >> 4;
     const uint32_t mode = (l->node->mode & TRC_IMAGE_MODE_INTERPOLATION) | TRC_IMAGE_REPEAT;
-    struct trc_operand uv[2], rgba[4];
+    struct trc_operand uv[3], rgba[4];
+    uv[2] = trc_constant(0.0f);
     TRC_TRY(op(l->b, TRC_OP_PROJECT,
                is_ball ? TRC_PROJECT_MIRROR_BALL : TRC_PROJECT_EQUIRECTANGULAR, l->in, uv));
     TRC_TRY(trc_build_op(l->b, TRC_OP_IMAGE, mode, image_of(l), uv, rgba));

@@ -41,6 +41,7 @@
     X(REFLECTION, 0, 3, 0)                                                                  \
     X(UV, 0, 2, 0)              /* resource: name */                                        \
     X(COLOR_ATTRIBUTE, 0, 4, 0) /* resource: name; RGBA */                                  \
+    X(UV_DENSITY, 0, 1, 0)      /* resource: name; least change of UVs per metre */         \
     /* the ray and the object */                                                            \
     X(LIGHT_PATH, 0, 1, 0) /* mode: number of the Light Path node's output */               \
     X(OBJECT_LOCATION, 0, 3, 0)                                                             \
@@ -56,7 +57,8 @@
     X(TRANSFORM, 3, 3, 0)     /* vector; mode: TRC_TRANSFORM_* */                           \
     X(WIREFRAME, 1, 1, 0)     /* size */                                                    \
     /* textures */                                                                          \
-    X(IMAGE, 2, 4, 0)     /* u, v; mode: TRC_IMAGE_MODE_*; resource: image; RGBA */         \
+    X(IMAGE, 3, 4, 0)     /* u, v, density of these or 0; mode: TRC_IMAGE_MODE_*;           \
+                             resource: image; RGBA */                                       \
     X(IMAGE_BOX, 3, 4, 0) /* vector; the same */                                            \
     X(PROJECT, 3, 2, 1)   /* vector -> u, v; mode: TRC_PROJECT_* */                         \
     X(CHECKER, 10, 4, 1)  /* vector, color 1, color 2, scale -> color, factor */            \

@@ -189,6 +189,51 @@ static void test_colors_of_images(void **state) {
     trc_image_release(scene.images[0]);
 }
 
+/* Each lane reads the level whose texels are no wider than what its lookup stands for. Levels of a
+ * constant image would not differ, so each is painted in a number of its own. */
+static void test_levels(void **state) {
+    (void)state;
+    static float texels[128 * 128 * 4];
+    for (size_t i = 0; i < sizeof texels / sizeof *texels; i++)
+        texels[i] = 1.0f;
+    const trc_image_desc desc = {.struct_size = sizeof desc,
+                                 .width = 128,
+                                 .height = 128,
+                                 .is_float = 1,
+                                 .pixels = texels,
+                                 .pixel_bytes = sizeof texels,
+                                 .is_mip_mapped = 1};
+    struct image_scene scene;
+    image_scene_init(&scene, &desc);
+    struct trc_image *image = scene.images[0];
+    assert_int_equal(image->level_count, 4); /* 128, 32, 16, 8 */
+    for (uint32_t l = 0; l < image->level_count; l++)
+        for (uint64_t i = 0; i < 4ull * image->levels[l].width * image->levels[l].height; i++)
+            ((float *)image->levels[l].texels)[i] = (float)l;
+    /* In texels of the image. */
+    static const float widths[] = {0, 1e-20f, 3.99f, 4, 7.99f, 8, 15.9f, 16, 31.9f, 1e6f, INFINITY};
+    static const float expected[] = {0, 0, 0, 1, 1, 2, 2, 3, 3, 3, 3};
+    const uint32_t count = sizeof widths / sizeof *widths;
+    static struct trc_registers regs;
+    for (uint32_t mode = 0; mode <= TRC_IMAGE_CUBIC; mode += TRC_IMAGE_CUBIC) {
+        struct single p;
+        single_init(&p, TRC_OP_IMAGE, mode, 0);
+        for (uint32_t first = 0; first < count; first++) {
+            float lanes[TRC_WIDTH];
+            for (uint32_t l = 0; l < TRC_WIDTH; l++)
+                lanes[l] = widths[(first + l) % count] / 128.0f;
+            regs.r[0] = regs.r[1] = vf_set(.3f);
+            regs.r[2] = vf_load(lanes);
+            scene.surface.footprint = vf_set(1.0f);
+            TRC_KERNEL(trc_program_run)(&p.material, &scene.surface, &regs);
+            for (uint32_t l = 0; l < TRC_WIDTH; l++)
+                assert_true(fabsf(vf_get(regs.r[OUT], (int)l) - expected[(first + l) % count]) <
+                            1e-6f);
+        }
+    }
+    trc_image_release(image);
+}
+
 static void check_projection(uint32_t mode, float x, float y, float z, float u, float v) {
     static struct trc_registers regs;
     struct single p;
@@ -226,6 +271,7 @@ int main(void) {
         cmocka_unit_test(test_filters),
         cmocka_unit_test(test_wild_coordinates),
         cmocka_unit_test(test_colors_of_images),
+        cmocka_unit_test(test_levels),
         cmocka_unit_test(test_projections),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Images in every colour space of Blender's configuration, from files and from pixels, beside Cycles."""
+
+import os
+
+import numpy as np
+import pytest
+
+GRID, SIZE = 5, 24  # panels along each side of a picture, pixels and texels along each side of a panel
+
+# name: (file format and channels, or None for Blender's own pixels; bits; alpha mode)
+SOURCES = {
+    "bytes": (('PNG', 'RGB'), 8, 'STRAIGHT'),
+    "words": (('PNG', 'RGB'), 16, 'STRAIGHT'),
+    "half floats": (('OPEN_EXR', 'RGB'), 16, 'STRAIGHT'),
+    "floats": (('OPEN_EXR', 'RGB'), 32, 'STRAIGHT'),
+    "grey bytes": (('PNG', 'BW'), 8, 'STRAIGHT'),
+    "painted bytes": (None, 8, 'STRAIGHT'),
+    "painted floats": (None, 32, 'STRAIGHT'),
+    "transparent bytes": (('PNG', 'RGBA'), 8, 'STRAIGHT'),
+    "transparent words": (('PNG', 'RGBA'), 16, 'STRAIGHT'),
+    "transparent floats": (('OPEN_EXR', 'RGBA'), 32, 'STRAIGHT'),
+    "transparent painted bytes": (None, 8, 'STRAIGHT'),
+    "channel-packed bytes": (('PNG', 'RGBA'), 8, 'CHANNEL_PACKED'),
+}
+# Errors relative to a pixel's largest channel where that is above 1: the mean, the largest. Both engines
+# keep half floats, Cycles rounded towards 0. It rounds painted bytes so before it converts them too, and
+# transparent ones when it multiplies by alpha and divides again, which steep spaces magnify.
+MEAN_TOLERANCE, TOLERANCE, ROUNDED_TOLERANCE, STEEP_TOLERANCE = 1e-3, 1e-3, 3e-3, 4e-2
+ROUNDED = {"painted bytes", "transparent bytes", "transparent words", "transparent painted bytes"}
+LINEAR = ("Linear", "ACES", "XYZ", "Non-Color", "Raw", "sRGB")  # or as near to it as matters here
+
+
+def _pixels(seed, is_opaque, is_float):
+    """Colours from black to white, of every hue, and alpha up to 1, as Blender stores both. No alpha is
+    0: Cycles has there what black becomes, which is a grey in "AgX Log"."""
+    rows = np.linspace(0.0, 1.0, SIZE, dtype=np.float32)
+    pixels = np.ones((SIZE, SIZE, 4), np.float32)
+    pixels[..., :3] = rows[:, None, None] * np.random.default_rng(seed).uniform(0.0, 1.0, (1, SIZE, 3))
+    pixels[:, 0, :3] = rows[:, None]
+    if not is_opaque:
+        pixels[..., 3] = rows[None, ::-1].clip(0.02)
+    if is_float:
+        pixels[..., :3] *= pixels[..., 3:]
+    return pixels
+
+
+def _image(source, space, folder):
+    import bpy
+    kind, bits, alpha_mode = SOURCES[source]
+    is_float, is_opaque = kind is not None or bits == 32, not source.startswith(("transparent", "channel"))
+    made = bpy.data.images.new(space, SIZE, SIZE, alpha=True, float_buffer=is_float)
+    made.colorspace_settings.name = "Non-Color" if kind else space
+    made.pixels.foreach_set(_pixels(len(space), is_opaque, is_float).reshape(-1))
+    made.update()
+    if kind:
+        path = os.path.join(folder, f"{space}.{'png' if kind[0] == 'PNG' else 'exr'}")
+        settings = bpy.context.scene.render.image_settings
+        settings.file_format, settings.color_mode = kind
+        settings.color_depth = str(bits)
+        made.save_render(path)
+        made = bpy.data.images.load(path)
+        made.colorspace_settings.name = space
+    made.alpha_mode = alpha_mode
+    return made
+
+
+def _show(number, image):
+    """A panel that shines with an image, a texel in each pixel."""
+    import scenes
+    center = (number % GRID - 0.5 * (GRID - 1), number // GRID - 0.5 * (GRID - 1))
+    wall = scenes.wall(f"Wall{number}", 1.0, center=center, material=scenes.emitter((1.0, 1.0, 1.0)))
+    tree = wall.data.materials[0].node_tree
+    node = tree.nodes.new("ShaderNodeTexImage")
+    node.image, node.interpolation = image, 'Closest'
+    emission = next(n for n in tree.nodes if n.type == 'EMISSION')
+    tree.links.new(node.outputs["Color"], emission.inputs["Color"])
+
+
+def inside(source):
+    """{colour space: [picture by Volley, by Cycles]} of an image in each."""
+    import tempfile
+    import scenes
+    scene = scenes.empty(size=(GRID * SIZE, GRID * SIZE), samples=1)
+    scenes.camera(type='ORTHO', ortho_scale=GRID)
+    scenes.sharpen()
+    image_type = type(scene.render.image_settings.linear_colorspace_settings).bl_rna
+    spaces = [item.name for item in image_type.properties["name"].enum_items]
+    folder = tempfile.mkdtemp(prefix="volley_")
+    for number, space in enumerate(spaces):
+        _show(number, _image(source, space, folder))
+    scene.render.image_settings.file_format, scene.render.image_settings.color_depth = 'OPEN_EXR', '32'
+    pictures = [picture[..., :3] for picture in scenes.by_both(1)]
+    found = {}
+    for number, space in enumerate(spaces):
+        x, y = number % GRID * SIZE, number // GRID * SIZE
+        found[space] = [picture[y:y + SIZE, x:x + SIZE] for picture in pictures]
+    return found
+
+
+def _tolerance(source, space):
+    if source not in ROUNDED:
+        return TOLERANCE
+    return ROUNDED_TOLERANCE if space.startswith(LINEAR) else STEEP_TOLERANCE
+
+
+@pytest.mark.parametrize("source", SOURCES)
+def test_against_cycles(blender, source):
+    found = blender.run(inside, source)
+    assert "colour space" not in blender.output
+    for space, (ours, theirs) in found.items():
+        if source.startswith("channel-packed") and not space.startswith(LINEAR):
+            continue  # Cycles divides these colours by an alpha that they are not multiplied by
+        assert theirs.std() > 0.02, space
+        error = np.abs(ours - theirs) / np.maximum(theirs.max(axis=-1, keepdims=True), 1.0)
+        print(f"{space:30} {error.mean():.1e} {error.max():.1e}")
+        assert error.mean() <= MEAN_TOLERANCE and error.max() <= _tolerance(source, space), space
