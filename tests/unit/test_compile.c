@@ -120,6 +120,31 @@ static void test_equal_nodes_are_shared(void **state) {
     trc_material_release(m);
 }
 
+/* Whether an image that is looked up at mapped UVs reads smaller levels. */
+static bool mapped_image_has_density(uint32_t mode, float scale, float tilt) {
+    graph_clear();
+    const int32_t map = add(TRC_NODE_UV_MAP, 0, 0, NULL);
+    graph.nodes[map].name = "map";
+    const int32_t mapping = ADD(TRC_NODE_MAPPING, mode, link_to(map, 0), color(.1f, .2f, 0),
+                                color(tilt, 0, .7f), color(scale, 2, 1));
+    const int32_t node = ADD(TRC_NODE_IMAGE, 0, link_to(mapping, 0));
+    graph.nodes[node].image = 3;
+    add_diffuse(link_to(node, 0));
+    struct trc_material *m = compiled();
+    const bool found = count_op(m, TRC_OP_UV_DENSITY);
+    trc_material_release(m);
+    return found;
+}
+
+static void test_density_of_mapped_images(void **state) {
+    (void)state;
+    assert_true(mapped_image_has_density(0, 3, 0));
+    assert_true(mapped_image_has_density(2, -1, 0));
+    assert_false(mapped_image_has_density(1, 3, 0)); /* divides */
+    assert_false(mapped_image_has_density(0, 0, 0));
+    assert_false(mapped_image_has_density(0, 3, .5f)); /* foreshortens */
+}
+
 static void test_unreached_nodes_are_dropped(void **state) {
     (void)state;
     graph_clear();
@@ -647,6 +672,7 @@ int main(void) {
         cmocka_unit_test(test_folding),
         cmocka_unit_test(test_conversions),
         cmocka_unit_test(test_equal_nodes_are_shared),
+        cmocka_unit_test(test_density_of_mapped_images),
         cmocka_unit_test(test_unreached_nodes_are_dropped),
         cmocka_unit_test(test_alpha_of_images),
         cmocka_unit_test(test_unknown_images),

@@ -582,7 +582,8 @@ static void test_files_without_memory(void **state) {
 
 /* ---- colour spaces ---- */
 
-/* Beside scene-linear: a space that is twice as bright, and one that is encoded as a square root. */
+/* Beside scene-linear: a space that is twice as bright, and one that is encoded as a square root.
+ */
 static const char color_config[] =
     "ocio_profile_version: 1\n"
     "roles: {scene_linear: linear, default: linear}\n"
@@ -746,8 +747,7 @@ int main(void) {
         cmocka_unit_test(test_color_of_grey_files),
         cmocka_unit_test(test_refused_colors),
 #else
-        cmocka_unit_test(test_no_colors),
-        cmocka_unit_test(test_no_files),
+        cmocka_unit_test(test_no_colors),      cmocka_unit_test(test_no_files),
 #endif
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

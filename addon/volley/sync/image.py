@@ -208,8 +208,10 @@ def _color_config():
 
 
 def _is_mip_mapped(node):
-    """Whether lookups of an image node may stand for several texels, for the library to choose."""
-    return node.type == 'TEX_IMAGE' and node.projection == 'FLAT' and node.interpolation != 'Closest'
+    """Whether lookups of an image node may stand for several texels. Shading is not linear in data,
+    such as normals and roughness: their means would shine otherwise."""
+    return (node.type == 'TEX_IMAGE' and node.projection == 'FLAT' and node.interpolation != 'Closest'
+            and not _is_data(node.image))
 
 
 def _alpha_mode(image):

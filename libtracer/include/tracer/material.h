@@ -385,10 +385,11 @@ typedef struct trc_image_desc {
     const void *pixels;   /* RGBA, bottom row first, float or uint8; NULL with a path */
     uint64_t pixel_bytes; /* size of that buffer, checked */
     const char *path;     /* file read by OpenImageIO at once; NULL with pixels */
-    const char *color_config; /* OpenColorIO configuration, a file; read if there is a color_space */
-    const char *color_space;  /* of the pixels, in the configuration: colours are converted to its
-                                 role scene_linear at once, and bytes become half floats unless
-                                 that changes nothing. NULL: as is_srgb says, which is 0 otherwise */
+    const char
+        *color_config;       /* OpenColorIO configuration, a file; read if there is a color_space */
+    const char *color_space; /* of the pixels, in the configuration: colours are converted to its
+                                role scene_linear at once, and bytes become half floats unless
+                                that changes nothing. NULL: as is_srgb says, which is 0 otherwise */
     uint32_t max_side; /* a larger image is halved until no side is longer or one is a single pixel;
                           0: no limit */
     /* 1: smaller levels are kept for IMAGE nodes that read a UV map and interpolate, where a sample
@@ -397,9 +398,9 @@ typedef struct trc_image_desc {
     uint32_t is_mip_mapped;
 } trc_image_desc;
 
-/* TRC_ERROR_IMAGE for a file that cannot be read, or colours that cannot be converted: the caller may
- * go on with image 0 (magenta). TRC_ERROR_UNSUPPORTED for a path or a color_space in a build without
- * OpenImageIO. */
+/* TRC_ERROR_IMAGE for a file that cannot be read, or colours that cannot be converted: the caller
+ * may go on with image 0 (magenta). TRC_ERROR_UNSUPPORTED for a path or a color_space in a build
+ * without OpenImageIO. */
 TRC_API trc_status trc_image_create(trc_scene scene, const trc_image_desc *desc, trc_id *image_out);
 TRC_API trc_status trc_image_destroy(trc_scene scene, trc_id image);
 

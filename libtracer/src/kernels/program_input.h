@@ -135,6 +135,8 @@ static void op_uv(const struct trc_surface *s, uint32_t name, vfloat *out) {
  * in the direction in which they change least. */
 static vfloat op_uv_density(const struct trc_surface *s, uint32_t name) {
     vfloat out = vf_zero();
+    if (!vm_any(vm_and(s->active, vf_gt(s->footprint, vf_zero()))))
+        return out; /* lookups stand for points */
     struct lane_group g = groups_begin(s);
     while (groups_next(s, &g)) {
         const struct trc_attribute *a = g.mesh ? mesh_attribute(g.mesh, name, 2) : NULL;

@@ -647,9 +647,9 @@ static void continue_rays(struct trc_tile *t, const struct arrival *a, const str
 
 /* ---- a group of one material ---- */
 
-/* Width of the beam that one sample stands for where its ray arrives: of the camera's rays a share of
- * the pixel, of those that rough lobes have sent a share of their directions (Suykens and Willems,
- * "Path Differentials and Applications", 2001). Ideal bounces may focus: 0. */
+/* Width of the beam that one sample stands for where its ray arrives: of the camera's rays a share
+ * of the pixel, of those that rough lobes have sent a share of their directions (Suykens and
+ * Willems, "Path Differentials and Applications", 2001). Ideal bounces may focus: 0. */
 static vfloat beam_width(const struct trc_tile *t, const struct arrival *a) {
     const vfloat solid = vf_divide(vf_set(1.0f / (float)t->desc->sample_count), a->pdf);
     const vmask camera =

@@ -2,8 +2,8 @@
  *
  * Filters and extensions are those of Cycles 3.4: B-spline weights for cubic, texels outside a
  * clipped image count as transparent black, sRGB is decoded after filtering. Coordinates may be
- * huge or not finite: NaN reads as 0. Cycles has no smaller levels: here one is read where its texels
- * are no wider than what one sample stands for, so that pictures go to the same limit. */
+ * huge or not finite: NaN reads as 0. Cycles has no smaller levels: here one is read where its
+ * texels are no wider than what one sample stands for, so that pictures go to the same limit. */
 #ifndef TRACER_KERNELS_TEXTURE_H
 #define TRACER_KERNELS_TEXTURE_H
 

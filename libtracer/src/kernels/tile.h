@@ -134,7 +134,8 @@ struct trc_tile {
     bool object_motion;         /* rays need times */
     bool camera_common;         /* camera rays start at one point */
     uint32_t packet_size;       /* 1..TRC_PACKET_SIZE */
-    float beam_width, beam_spread; /* of a camera sample: metres, and metres per metre */
+    float beam_width;           /* of a camera sample where it starts, metres */
+    float beam_spread;          /* and what it widens by per metre */
     double *clock, clock_start; /* the stage whose time is running */
     uint32_t generation;        /* bounces the rays of this step have behind them */
     struct trc_ray_store stack, work;

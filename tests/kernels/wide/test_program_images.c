@@ -268,10 +268,8 @@ int main(void) {
     if (!test_cpu_can())
         return 77;
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_filters),
-        cmocka_unit_test(test_wild_coordinates),
-        cmocka_unit_test(test_colors_of_images),
-        cmocka_unit_test(test_levels),
+        cmocka_unit_test(test_filters),          cmocka_unit_test(test_wild_coordinates),
+        cmocka_unit_test(test_colors_of_images), cmocka_unit_test(test_levels),
         cmocka_unit_test(test_projections),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
