@@ -192,8 +192,8 @@ struct trc_split trc_split_find(const struct trc_ref *refs, const struct trc_ran
 
 /* Both sides of a plane, refs from middle on being the right ones; their centroids are not known.
  */
-static void range_divide(const struct trc_range *r, const struct trc_split *s, uint32_t middle,
-                         struct trc_range *left, struct trc_range *right) {
+static void range_sides(const struct trc_range *r, const struct trc_split *s, uint32_t middle,
+                        struct trc_range *left, struct trc_range *right) {
     *left = (struct trc_range){r->begin,          middle,  r->first_slot,
                                s->left_triangles, s->left, box_empty()};
     *right = (struct trc_range){
@@ -217,7 +217,7 @@ void trc_split_apply(struct trc_ref *refs, const struct trc_range *r, const stru
         refs[i] = refs[j - 1];
         refs[j - 1] = swap;
     }
-    range_divide(r, s, i, left, right);
+    range_sides(r, s, i, left, right);
     left->centroids = before;
     right->centroids = after;
 }
@@ -392,7 +392,7 @@ void trc_split_shared_apply(struct trc_split_blocks *blocks, const struct trc_ra
     }
     blocks_run(blocks, s, move_block);
     blocks_run(blocks, s, return_block);
-    range_divide(r, s, middle, left, right);
+    range_sides(r, s, middle, left, right);
     for (uint32_t i = 0; i < count; i++) {
         box_grow(&left->centroids, blocks->block[i].before);
         box_grow(&right->centroids, blocks->block[i].after);
