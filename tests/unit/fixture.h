@@ -90,6 +90,27 @@ FIXTURE_INLINE trc_id fixture_material(trc_scene scene, uint32_t type, float val
     return id;
 }
 
+/* A glossy surface of that grey; roughness 0: a mirror. */
+FIXTURE_INLINE trc_id fixture_glossy(trc_scene scene, float value, float roughness) {
+    const trc_node_input inputs[6] = {{.node = -1, .value = {value, value, value}},
+                                      {.node = -1, .value = {roughness}},
+                                      {.node = -1},
+                                      {.node = -1},
+                                      {.node = -2},
+                                      {.node = -2}};
+    const trc_node node = {.type = TRC_NODE_GLOSSY,
+                           .mode = roughness > 0.0f ? TRC_DISTRIBUTION_GGX : TRC_DISTRIBUTION_SHARP,
+                           .input_count = 6};
+    const trc_material_desc desc = {.struct_size = sizeof desc,
+                                    .node_count = 1,
+                                    .nodes = &node,
+                                    .inputs = inputs,
+                                    .input_count = 6};
+    trc_id id = 0;
+    assert_int_equal(trc_material_create(scene, &desc, &id), TRC_OK);
+    return id;
+}
+
 /* A camera 1 m up that looks straight down at x from 0 to 4 m, in parallel rays. */
 FIXTURE_INLINE trc_scene fixture_level_view(void) {
     static const float transform[12] = {1, 0, 0, 2, 0, 1, 0, 0, 0, 0, 1, 1};

@@ -140,23 +140,8 @@ static void box(void **state) {
 static void mirror(void **state) {
     (void)state;
     const trc_scene scene = fixture_level_view();
-    const trc_node node = {
-        .type = TRC_NODE_GLOSSY, .input_count = 6, .mode = TRC_DISTRIBUTION_SHARP};
-    const trc_node_input inputs[6] = {{.node = -1, .value = {1, 1, 1}},
-                                      {.node = -1},
-                                      {.node = -1},
-                                      {.node = -1},
-                                      {.node = -2},
-                                      {.node = -2}};
-    const trc_material_desc sharp = {.struct_size = sizeof sharp,
-                                     .node_count = 1,
-                                     .nodes = &node,
-                                     .inputs = inputs,
-                                     .input_count = 6};
-    trc_id material = 0;
     double column[WIDTH];
-    assert_int_equal(trc_material_create(scene, &sharp, &material), TRC_OK);
-    fixture_level(scene, 1000.0f, 0.0f, material);
+    fixture_level(scene, 1000.0f, 0.0f, fixture_glossy(scene, 1.0f, 0.0f));
     fixture_level(scene, 1000.0f, 1.5f, fixture_material(scene, TRC_NODE_DIFFUSE, 0.5f));
     draw(scene, &(struct setting){.distance = 3.0f, .factor = 1.0f}, 0, column);
     expect_all(column, 0.5 * 0.25, 2e-3);

@@ -29,24 +29,6 @@ static void add_strip(trc_scene scene, float from, float to, float z, trc_id mat
     fixture_flagged_quad(scene, corners, material, flags);
 }
 
-static trc_id glossy(trc_scene scene) {
-    const trc_node node = {.type = TRC_NODE_GLOSSY, .input_count = 6, .mode = TRC_DISTRIBUTION_GGX};
-    const trc_node_input inputs[6] = {{.node = -1, .value = {0.8f, 0.8f, 0.8f}},
-                                      {.node = -1, .value = {0.4f}},
-                                      {.node = -1},
-                                      {.node = -1},
-                                      {.node = -2},
-                                      {.node = -2}};
-    const trc_material_desc desc = {.struct_size = sizeof desc,
-                                    .node_count = 1,
-                                    .nodes = &node,
-                                    .inputs = inputs,
-                                    .input_count = 6};
-    trc_id id = 0;
-    assert_int_equal(trc_material_create(scene, &desc, &id), TRC_OK);
-    return id;
-}
-
 static void add_sun(trc_scene scene, float red, float green, float blue, uint32_t cast_shadow,
                     uint32_t flags) {
     trc_id id = 0;
@@ -96,7 +78,7 @@ static void lit(void **state) {
     const trc_scene scene = fixture_level_view();
     const trc_light_desc area = default_light_desc();
     trc_id light = 0;
-    add_strip(scene, -9, 9, 0, glossy(scene), CATCHER);
+    add_strip(scene, -9, 9, 0, fixture_glossy(scene, 0.8f, 0.4f), CATCHER);
     add_strip(scene, 1, 2, 0.3f, fixture_material(scene, TRC_NODE_DIFFUSE, 0.5f), CATCHER);
     assert_int_equal(trc_light_create(scene, &area, &light), TRC_OK);
     set_world(scene, 0.5f, TRC_VISIBLE_ALL);

@@ -4,24 +4,6 @@
 
 enum { WIDTH = 16, HEIGHT = 4, FRAME = WIDTH * HEIGHT };
 
-static trc_id add_glossy(trc_scene scene, float roughness) {
-    const trc_node_input inputs[6] = {{.node = -1, .value = {0.5f, 0.5f, 0.5f}},
-                                      {.node = -1, .value = {roughness}},
-                                      {.node = -1},
-                                      {.node = -1},
-                                      {.node = -2},
-                                      {.node = -2}};
-    const trc_node node = {.type = TRC_NODE_GLOSSY, .mode = TRC_DISTRIBUTION_GGX, .input_count = 6};
-    const trc_material_desc desc = {.struct_size = sizeof desc,
-                                    .node_count = 1,
-                                    .nodes = &node,
-                                    .inputs = inputs,
-                                    .input_count = 6};
-    trc_id id = 0;
-    assert_int_equal(trc_material_create(scene, &desc, &id), TRC_OK);
-    return id;
-}
-
 static trc_id add_emission(trc_scene scene, float strength, uint32_t flags) {
     struct default_material m;
     trc_id id = 0;
@@ -60,7 +42,7 @@ static void even_world(void **state) {
     const trc_world_desc world =
         default_world_desc(fixture_material(scene, TRC_NODE_BACKGROUND, 0.6f));
     assert_int_equal(trc_scene_set_world(scene, &world), TRC_OK);
-    fixture_level(scene, 100.0f, 0.0f, add_glossy(scene, 0.3f));
+    fixture_level(scene, 100.0f, 0.0f, fixture_glossy(scene, 0.5f, 0.3f));
     draw(scene, 64, alone);
     /* Half of the world, but for what a rough lobe loses below the horizon and by shadowing. */
     assert_true(mean(alone) > 0.28 && mean(alone) < 0.3001);
@@ -83,7 +65,7 @@ static void emission_by_choice(void **state) {
     double means[3];
     for (int i = 0; i < 3; i++) {
         const trc_scene scene = fixture_level_view();
-        fixture_level(scene, 100.0f, 0.0f, add_glossy(scene, 0.5f));
+        fixture_level(scene, 100.0f, 0.0f, fixture_glossy(scene, 0.5f, 0.5f));
         fixture_level(scene, 3.0f, 2.0f,
                       add_emission(scene, 2.0f, i == 0 ? TRC_MATERIAL_SAMPLE_EMISSION : 0));
         if (i == 2)
