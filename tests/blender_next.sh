@@ -82,12 +82,15 @@ install_packages() {
         >"$log" 2>&1 || { tail -n 5 "$log"; skip "its packages cannot be installed, see $log"; }
 }
 
-# The sources as they are here, next to the build that stays; times are kept for ninja.
+# The sources as they are here, next to the build that stays. Times are kept for ninja, unless the build is
+# of another working tree: its objects may be younger than sources that differ.
 copy_sources() {
-    local target=$ROOT/volley sources=(CMakeLists.txt LICENSE .cmake addon libtracer tests examples)
+    local target=$ROOT/volley sources=(CMakeLists.txt LICENSE .cmake addon libtracer tests examples) times=()
     mkdir -p "$target"
     (cd "$target" && rm -rf "${sources[@]}")
-    tar -c --exclude=__pycache__ "${sources[@]}" | tar -x -C "$target"
+    [ "$(cat "$target/working_tree" 2>/dev/null)" = "$PWD" ] || times=(--touch)
+    tar -c --exclude=__pycache__ "${sources[@]}" | tar -x "${times[@]}" -C "$target"
+    printf '%s' "$PWD" >"$target/working_tree"
 }
 
 build() {
