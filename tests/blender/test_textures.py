@@ -137,9 +137,80 @@ for _kind in ("AXIS_ANGLE", "X_AXIS", "Y_AXIS", "Z_AXIS", "EULER_XYZ"):
         _add(f"vector rotate {_kind}{' inverted' * _invert}", "ShaderNodeVectorRotate", ("Vector",),
              {"rotation_type": _kind, "invert": _invert}, Vector='vector', Center=(0.3, 0.2, -0.1),
              Axis=(0.2, -1.0, 0.7), Angle=0.8, Rotation=(0.3, -0.5, 1.1))
-for _operation in ("SINE", "COSINE", "TANGENT", "SNAP", "MODULO", "WRAP", "FACEFORWARD", "REFRACT"):
-    _add(f"vector math {_operation}", "ShaderNodeVectorMath", ("Vector",), {"operation": _operation},
-         Vector='vector')
+for _operation in ("ADD", "SUBTRACT", "MULTIPLY", "DIVIDE", "MULTIPLY_ADD", "CROSS_PRODUCT", "PROJECT",
+                   "REFLECT", "REFRACT", "FACEFORWARD", "DOT_PRODUCT", "DISTANCE", "LENGTH", "SCALE",
+                   "NORMALIZE", "ABSOLUTE", "MINIMUM", "MAXIMUM", "FLOOR", "CEIL", "FRACTION", "MODULO",
+                   "WRAP", "SNAP", "SINE", "COSINE", "TANGENT"):
+    _add(f"vector math {_operation}", "ShaderNodeVectorMath",
+         ("Value",) if _operation in ("DOT_PRODUCT", "DISTANCE", "LENGTH") else ("Vector",),
+         {"operation": _operation}, Vector='vector')
+for _operation in ("ADD", "SUBTRACT", "MULTIPLY", "DIVIDE", "MULTIPLY_ADD", "POWER", "LOGARITHM", "SQRT",
+                   "INVERSE_SQRT", "ABSOLUTE", "EXPONENT", "MINIMUM", "MAXIMUM", "LESS_THAN", "GREATER_THAN",
+                   "SIGN", "COMPARE", "SMOOTH_MIN", "SMOOTH_MAX", "ROUND", "FLOOR", "CEIL", "TRUNC", "FRACT",
+                   "MODULO", "FLOORED_MODULO", "WRAP", "SNAP", "PINGPONG", "SINE", "COSINE", "TANGENT",
+                   "ARCSINE", "ARCCOSINE", "ARCTANGENT", "ARCTAN2", "SINH", "COSH", "TANH", "RADIANS",
+                   "DEGREES"):
+    # Values that are neither ties nor poles nor below the emission's reach.
+    _add(f"math {_operation}", "ShaderNodeMath", ("Value",), {"operation": _operation},
+         Value=(-0.03, 0.05) if _operation == "DEGREES" else (-1.31, 1.43))
+_add("math POWER clamped", "ShaderNodeMath", ("Value",), {"operation": 'POWER', "use_clamp": True},
+     Value=(-0.3, 2.7))
+_BLENDS = ("MIX", "DARKEN", "MULTIPLY", "BURN", "LIGHTEN", "SCREEN", "DODGE", "ADD", "OVERLAY", "SOFT_LIGHT",
+           "LINEAR_LIGHT", "DIFFERENCE", "EXCLUSION", "SUBTRACT", "DIVIDE", "HUE", "SATURATION", "COLOR",
+           "VALUE")
+for _blend in _BLENDS:
+    _add(f"mix {_blend}", "ShaderNodeMix", ("Result",), {"data_type": 'RGBA', "blend_type": _blend},
+         Factor=0.6, A='color', B=(0.7, 0.3, 0.5))
+    _add(f"mix {_blend}, the second varies", "ShaderNodeMixRGB", ("Color",),
+         {"blend_type": _blend, "use_clamp": True}, Fac=0.8, Color1=(0.7, 0.3, 0.5), Color2='color')
+for _clamp in (False, True):
+    _end = ", factor clamped" * _clamp
+    _add(f"mix numbers{_end}", "ShaderNodeMix", ("Result",), {"data_type": 'FLOAT', "clamp_factor": _clamp},
+         Factor=(-0.5, 1.5), A=0.2, B=0.9)
+    _add(f"mix vectors{_end}", "ShaderNodeMix", ("Result",), {"data_type": 'VECTOR', "clamp_factor": _clamp},
+         Factor=(-0.5, 1.5), A=(0.1, 0.5, 0.9), B='vector')
+_add("mix vectors by vectors", "ShaderNodeMix", ("Result",),
+     {"data_type": 'VECTOR', "factor_mode": 'NON_UNIFORM'}, Factor='color', A=(0.1, 0.5, 0.9), B='vector')
+_add("invert", "ShaderNodeInvert", ("Color",), Fac=0.7, Color='color')
+_add("gamma", "ShaderNodeGamma", ("Color",), Gamma=1.7, Color='color')
+_add("hue, saturation, value", "ShaderNodeHueSaturation", ("Color",), Hue=0.3, Saturation=1.4, Value=0.8, Fac=0.9,
+     Color='color')
+_add("bright, contrast", "ShaderNodeBrightContrast", ("Color",), Bright=0.1, Contrast=0.4, Color='color')
+_add("RGB to BW", "ShaderNodeRGBToBW", ("Val",), Color='color')
+_add("clamp", "ShaderNodeClamp", ("Result",), {"clamp_type": 'MINMAX'}, Value=(-0.5, 1.5), Min=0.1, Max=0.8)
+_add("clamp, ends exchanged", "ShaderNodeClamp", ("Result",), {"clamp_type": 'RANGE'}, Value=(-0.5, 1.5),
+     Min=0.8, Max=0.1)
+for _kind in ("POINT", "TEXTURE", "VECTOR", "NORMAL"):
+    _add(f"mapping {_kind}", "ShaderNodeMapping", ("Vector",), {"vector_type": _kind}, Vector='vector',
+         Location=(0.2, -0.3, 0.4), Rotation=(0.5, 0.6, 0.7), Scale=(1.5, 0.5, -2.0))
+_add("checker", "ShaderNodeTexChecker", ("Color", "Fac"), Vector='vector', Scale=1.7, Color1=(0.8, 0.5, 0.2),
+     Color2=(0.1, 0.3, 0.6))
+_add("normal", "ShaderNodeNormal", ("Normal", "Dot"), Normal='vector')
+_add("separate XYZ", "ShaderNodeSeparateXYZ", ("X", "Y", "Z"), Vector='vector')
+_add("combine XYZ", "ShaderNodeCombineXYZ", ("Vector",), X=(0.0, 1.0), Y=0.3, Z=(1.0, 0.0))
+
+
+def _ramp(interpolation, mode='RGB', hue='NEAR'):
+    """Give a Color Ramp four colours, and how it goes from one to the next."""
+    def set_up(node):
+        ramp = node.color_ramp
+        ramp.color_mode, ramp.hue_interpolation = mode, hue
+        if mode == 'RGB':
+            ramp.interpolation = interpolation
+        ramp.elements[0].color, ramp.elements[1].color = (0.9, 0.2, 0.1, 1.0), (0.2, 0.3, 0.9, 0.5)
+        ramp.elements.new(0.3).color = (0.1, 0.8, 0.3, 0.2)
+        ramp.elements.new(0.6).color = (0.7, 0.7, 0.1, 0.9)
+    return set_up
+
+
+for _interpolation in ("EASE", "CARDINAL", "LINEAR", "B_SPLINE", "CONSTANT"):
+    _add(f"ramp {_interpolation}", "ShaderNodeValToRGB", ("Color", "Alpha"), {"ramp": _ramp(_interpolation)},
+         Fac=(-0.2, 1.2))
+for _mode, _hue in (("HSV", "NEAR"), ("HSV", "CW"), ("HSL", "FAR"), ("HSL", "CCW")):
+    _add(f"ramp {_mode} {_hue}", "ShaderNodeValToRGB", ("Color",), {"ramp": _ramp("", _mode, _hue)},
+         Fac=(0.0, 1.0))
+_add("fresnel", "ShaderNodeFresnel", ("Fac",), IOR=(1.1, 2.5))
+_add("layer weight", "ShaderNodeLayerWeight", ("Fresnel",), Blend=(0.1, 0.9))
 
 
 def _other_object(node):
@@ -230,6 +301,10 @@ def _feed(tree, kind, center):
     return ramp.outputs[0]
 
 
+_OTHER_INPUTS = {"ShaderNodeVectorMath": ((0.3, -0.4, 0.5), (0.1, 0.9, -0.2), 0.7),
+                 "ShaderNodeMath": (0.7, 0.3)}
+
+
 def _build(tree, center, case, output):
     """The node of a case, shown by an emission of its output, halved and raised by 2 for neither
     engine's clamping to matter."""
@@ -244,9 +319,9 @@ def _build(tree, center, case, output):
             value(node)
         else:
             setattr(node, key, value)
-    if node_type == "ShaderNodeVectorMath":  # inputs of one name
-        for socket, value in zip(node.inputs[1:], ((0.3, -0.4, 0.5), (0.1, 0.9, -0.2), 0.7)):
-            socket.default_value = value
+    # Inputs of one name:
+    for socket, value in zip(node.inputs[1:], _OTHER_INPUTS.get(node_type, ())):
+        socket.default_value = value
     for key, value in inputs.items():
         socket = next((s for s in node.inputs if s.name == key and s.enabled), None)
         if socket is None:  # not in this mode
@@ -264,8 +339,13 @@ def _is_known(node_type, properties):
     """Whether this Blender has the node and its properties."""
     import bpy
     node = getattr(bpy.types, node_type, None)
-    return node is not None and all(callable(value) or key in node.bl_rna.properties
+    return node is not None and all(callable(value) or _has(node.bl_rna.properties.get(key), value)
                                     for key, value in properties.items())
+
+
+def _has(setting, value):
+    """Whether a property is there and takes the value."""
+    return setting is not None and (setting.type != 'ENUM' or value in setting.enum_items.keys())
 
 
 def inside_cases(names):
