@@ -19,6 +19,9 @@ AREA_LIGHT_POWER = 4.0 / math.pi if bpy.app.version >= (4, 0, 0) else 1.0
 # A spot's cone became evenly bright in 4.0; before, it was times the cosine to its axis.
 SPOT_IS_EVEN = bpy.app.version >= (4, 0, 0)
 
+# A sun is as bright all over its disc; seen in 4.3, not in 3.4.
+SUN_IS_EVEN = bpy.app.version >= (4, 1, 0)
+
 # Cycles of 4.0 has other microfacets: one height for masking and shadowing, glass by the micro-normal.
 HAS_CORRELATED_MICROFACETS = bpy.app.version >= (4, 0, 0)
 
@@ -28,7 +31,7 @@ CHOOSES_LOBES_PLAINLY = bpy.app.version >= (4, 0, 0)
 # Rough diffuse surfaces keep their energy from 4.3 on.
 KEEPS_DIFFUSE_ENERGY = bpy.app.version >= (4, 3, 0)
 
-# Cycles' tables of colour ramps have 257 entries instead of 256, which moves constant steps.
+# Cycles' tables of colour ramps have 257 entries instead of 256.
 RAMP_STEPS = 256 if bpy.app.version >= (4, 0, 0) else 255
 
 # Its table of shutter times starts half an entry later (measured, 4.3).

@@ -61,6 +61,7 @@ def inside_pictures():
     pictures = {}
     for name, (kind, settings) in CASES.items():
         scene = scenes.empty(size=SIZE)
+        scenes.independent_seeds()
         scenes.camera(location=(0.0, -7.0, 3.0), rotation=(1.25, 0.0, 0.0))
         grey = scenes.material("Grey", "ShaderNodeBsdfDiffuse", Color=(0.6, 0.6, 0.6))
         scenes.mesh("Floor", [(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0)], [(0, 1, 2, 3)], grey)

@@ -7,7 +7,7 @@
 
 #define MOST_NODES 16
 #define MOST_INPUTS (MOST_NODES * TRC_MAX_NODE_INPUTS)
-#define TABLE_FLOATS (256 * 4)
+#define TABLE_FLOATS (TRC_RAMP_SIZE * 4)
 #define TYPES 128
 
 struct list {

@@ -61,6 +61,13 @@ def link(name, data):
     return made
 
 
+def independent_seeds():
+    """Have Cycles choose samples whose errors are others with every seed: those of its tables are alike."""
+    cycles = bpy.context.scene.cycles
+    if 'SOBOL_BURLEY' in cycles.bl_rna.properties["sampling_pattern"].enum_items:
+        cycles.sampling_pattern = 'SOBOL_BURLEY'
+
+
 def camera(location=(0.0, -6.0, 0.0), rotation=(math.pi / 2, 0.0, 0.0), **settings):
     """The scene's camera; by default it looks along +Y from 6 m before the origin."""
     made = link("Camera", bpy.data.cameras.new("Camera"))

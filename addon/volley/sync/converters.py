@@ -24,7 +24,7 @@ _PROJECT, _SCALE, _NORMALIZE = 6, 11, 12  # TRC_VECTOR_*; subtraction as TRC_MAT
 _RAY_LENGTH = 7  # output of the Light Path node
 _INCOMING = 4    # of the Geometry node
 _OBJECT_TO_WORLD = 1 | 0 << 2 | 1 << 4  # mode of VECTOR_TRANSFORM: TRC_SPACE_* and a vector
-_TABLE_SIZE = 256
+_TABLE_SIZE = 257
 
 _SPACES = ('WORLD', 'OBJECT', 'CAMERA')
 _TRANSFORMS = {'POINT': 0, 'VECTOR': 1, 'NORMAL': 3 if TRANSFORMS_NORMALS else 2}

@@ -8,7 +8,7 @@ linked to textures. Anything else is named in the warnings and its unlinked part
 import math
 
 from .. import native
-from ..compat import AREA_LIGHT_POWER, SPOT_IS_EVEN, casts_shadow, cycles, is_ball, uses_nodes
+from ..compat import AREA_LIGHT_POWER, SPOT_IS_EVEN, SUN_IS_EVEN, casts_shadow, cycles, is_ball, uses_nodes
 from . import flatten
 from .visibility import light_visibility
 
@@ -60,7 +60,7 @@ def _spot(light):
 
 
 def _sun(light):
-    return {"angle": light.angle}
+    return {"angle": light.angle, "flags": native.LIGHT_EVEN_CONE if SUN_IS_EVEN else 0}
 
 
 def _area(light):

@@ -55,7 +55,7 @@ _EXTENSIONS = {'REPEAT': 0, 'EXTEND': 1, 'CLIP': 2, 'MIRROR': 3}
 _PROJECTIONS = {'FLAT': 0, 'BOX': 1, 'SPHERE': 2, 'TUBE': 3}
 _CLAMP_RESULT = 256
 _ANISOTROPIC = {GLOSSY: (2, 5), PRINCIPLED: (7, 21), LAYERED_PRINCIPLED: (9, 11)}  # anisotropy, tangent
-RAMP_SIZE = 256
+RAMP_SIZE = 257
 
 # inputs: (kind, socket identifiers by preference...); outputs: (socket identifier, kind) in the
 # library's order; mode(node): mode bits or None where the node is set to something unsupported.
@@ -98,9 +98,10 @@ def _color_mode(node):
 
 
 def _math_mode(node):
-    if node.operation not in _MATH:
+    operation = 'WRAP' if node.operation == 'FLOORED_MODULO' else node.operation
+    if operation not in _MATH:
         return None
-    return _MATH.index(node.operation) | (_CLAMP_RESULT if node.use_clamp else 0)
+    return _MATH.index(operation) | (_CLAMP_RESULT if node.use_clamp else 0)
 
 
 def _vector_math_mode(node):
@@ -147,8 +148,6 @@ _SPECS = {
         (("Vector", 'v'),), lambda node: ('POINT', 'TEXTURE', 'VECTOR', 'NORMAL').index(node.vector_type)),
     "ShaderNodeMixRGB": Spec(
         MIX_COLOR, (('f', "Fac"), ('c', "Color1"), ('c', "Color2")), (("Color", 'c'),), _mix_rgb_mode),
-    "ShaderNodeMath": Spec(
-        MATH, (('f', "Value"), ('f', "Value_001"), ('f', "Value_002")), (("Value", 'f'),), _math_mode),
     "ShaderNodeVectorMath": Spec(
         VECTOR_MATH, (('v', "Vector"), ('v', "Vector_001"), ('v', "Vector_002"), ('f', "Scale")),
         (("Vector", 'v'), ("Value", 'f')), _vector_math_mode),
@@ -493,6 +492,16 @@ def _attribute(walker, node, _sockets):
     return outputs
 
 
+def _math(walker, node, sockets):
+    mode = _math_mode(node)
+    if mode is None:
+        return None
+    values = [sockets.get('f', name) for name in ("Value", "Value_001", "Value_002")]
+    if node.operation == 'FLOORED_MODULO':  # the range to wrap into begins at 0
+        values[2] = _constant('f', 0.0)
+    return _outputs(walker, walker.emit(MATH, values, mode), (("Value", 'f'),))
+
+
 def _normal_map(walker, node, sockets):
     space = ('TANGENT', 'OBJECT', 'WORLD', 'BLENDER_OBJECT', 'BLENDER_WORLD').index(node.space)
     name = _tangents_of(walker, node) if space == 0 else ""
@@ -520,10 +529,9 @@ def _tangent(walker, node, _sockets):
 def _color_ramp(walker, node, sockets):
     ramp, factor, steps = node.color_ramp, sockets.get('f', "Fac"), RAMP_SIZE - 1
     is_constant = ramp.interpolation == 'CONSTANT'
-    if is_constant and RAMP_STEPS != steps:  # the library's table without the last of Cycles' entries
+    if RAMP_STEPS != steps:  # Cycles' entries at the start of the library's table
         factor = _number(walker, _MATH_MULTIPLY, factor, _constant('f', RAMP_STEPS / steps))
-        steps = RAMP_STEPS
-    table = np.array([ramp.evaluate(i / steps) for i in range(RAMP_SIZE)], np.float32)
+    table = np.array([ramp.evaluate(min(i / RAMP_STEPS, 1.0)) for i in range(RAMP_SIZE)], np.float32)
     index = walker.emit(COLOR_RAMP, (factor,), mode=int(is_constant), table=table)
     return _outputs(walker, index, (("Color", 'c'), ("Alpha", 'f')))
 
@@ -577,6 +585,6 @@ _SPECIAL = {
     "ShaderNodeTexEnvironment": _environment, "ShaderNodeUVMap": _uv_map,
     "ShaderNodeTexCoord": _texture_coordinate, "ShaderNodeVertexColor": _color_attribute,
     "ShaderNodeAttribute": _attribute, "ShaderNodeNormalMap": _normal_map,
-    "ShaderNodeTangent": _tangent,
+    "ShaderNodeMath": _math, "ShaderNodeTangent": _tangent,
     "ShaderNodeValToRGB": _color_ramp, "ShaderNodeMix": _mix,
 }

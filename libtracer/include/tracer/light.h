@@ -12,7 +12,9 @@ enum {
     TRC_LIGHT_SPHERE = 1,    /* point, spot: a sphere; else a disk that faces the lit point, as in
                                 Blender before 4.0 and, from 4.1 on, with Soft Falloff */
     TRC_LIGHT_EVEN_CONE = 2, /* spot: as bright all over its cone; else times the cosine to its
-                                axis, as in Blender before 4.0 */
+                                axis, as in Blender before 4.0. Sun: the same radiance all over its
+                                disc, strength the irradiance; else more at the rim and less in all,
+                                as in Blender 3 */
     TRC_LIGHT_SYNTHETIC = 4  /* not a light of the footage that shadow catchers stand for: what
                                 blocks it casts no shadow there */
 };

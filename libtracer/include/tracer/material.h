@@ -79,7 +79,7 @@ enum {
     TRC_NODE_GAMMA = 78,  /* c color, f gamma -> c */
     TRC_NODE_HUE_SATURATION = 79,  /* f hue, f saturation, f value, f factor, c color -> c */
     TRC_NODE_BRIGHT_CONTRAST = 80, /* c color, f bright, f contrast -> c */
-    TRC_NODE_COLOR_RAMP = 81,      /* f factor -> c color, f alpha; table: 256 RGBA values;
+    TRC_NODE_COLOR_RAMP = 81,      /* f factor -> c color, f alpha; table: 257 RGBA values;
                                       mode 0 linear between them, 1 constant */
     TRC_NODE_SEPARATE = 82,        /* c -> f, f, f; mode 0 RGB, 1 HSV, 2 HSL, 3 XYZ */
     TRC_NODE_COMBINE = 83,         /* f, f, f -> c; mode as SEPARATE */
@@ -120,7 +120,7 @@ enum {
                              in bits 0-6, squashed from bit TRC_BRICK_SQUASH_SHIFT, 0: never */
 
     /* the rest */
-    TRC_NODE_CURVES = 104, /* f factor, c color, f low, f high -> c; table: 256 RGBA values, each
+    TRC_NODE_CURVES = 104, /* f factor, c color, f low, f high -> c; table: 257 RGBA values, each
                               channel by its own, over low to high; mode 1: straight on beyond */
     TRC_NODE_FLOAT_CURVE = 105, /* f factor, f value, f low, f high -> f; table: as CURVES, R is
                                    read; mode as CURVES */

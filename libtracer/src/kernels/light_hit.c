@@ -73,7 +73,8 @@ static vfloat meet_lamp(const struct trc_lamp *lamp, vvec3 p, vvec3 wi, vfloat *
         const vfloat c = v3_dot(l.position, wi);
         const vmask hit = vf_ge(c, l.cos_cone);
         *pdf = trc_sun_density(&l, vf_max(c, vf_set(1e-3f)));
-        *radiance = v3_scale(l.radiance, *pdf / l.inv_area);
+        if (!(lamp->flags & TRC_LAMP_EVEN_CONE))
+            *radiance = v3_scale(l.radiance, *pdf / l.inv_area);
         return vf_select(hit, vf_set(TRC_FAR), vf_set(INFINITY));
     }
     vfloat u, v;

@@ -152,7 +152,8 @@ TRC_INLINE struct trc_place trc_sun_sample(const struct trc_wide_lamp *l, vfloat
     s.distance = vf_set(TRC_FAR);
     const vfloat c = v3_dot(l->position, s.wi), spread = vf_rcp(c * c * c);
     const vmask delta = vf_eq(l->half_u, vf_zero());
-    s.radiance = v3_scale(l->radiance, vf_select(delta, vf_one(), spread));
+    const vmask even = vm_or(delta, trc_lamp_has(l, TRC_LAMP_EVEN_CONE));
+    s.radiance = v3_scale(l->radiance, vf_select(even, vf_one(), spread));
     s.pdf = vf_select(delta, vf_one(), l->inv_area * spread);
     return s;
 }

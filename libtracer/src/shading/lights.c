@@ -3,7 +3,8 @@
  * Units, as measured on and read from Cycles 3.4: a point or spot of P watts has the intensity P /
  * (4 pi) and, with a radius r, is a disk that faces whoever looks, of radiance P / (4 pi^2 r^2); an
  * area light has the radiance P / (4 area); a sun of strength S and half angle h is a disk at
- * distance 1 of radius tan h and radiance S / (pi tan^2 h cos^3 theta). */
+ * distance 1 of radius tan h and radiance S / (pi tan^2 h cos^3 theta). Of Cycles 4.3: a sun's cone
+ * has the radiance S / (pi sin^2 h) all over. */
 #include "shading/lights.h"
 
 #include <math.h>
@@ -82,6 +83,10 @@ static void make_sun(struct trc_lamp *lamp, const trc_light_desc *desc) {
     lamp->cos_cone = cosf(half);
     lamp->inv_area = r > 0.0f ? 1.0f / (PI * r * r) : 1.0f;
     set_radiance(lamp, desc, lamp->inv_area);
+    if (r > 0.0f && (desc->flags & TRC_LIGHT_EVEN_CONE)) {
+        lamp->flags |= TRC_LAMP_EVEN_CONE;
+        set_radiance(lamp, desc, 1.0f / (PI * sinf(half) * sinf(half)));
+    }
     for (int i = 0; i < 3; i++)
         lamp->position[i] = -lamp->normal[i];
     if (r == 0.0f)

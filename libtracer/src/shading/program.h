@@ -19,7 +19,7 @@
 #define TRC_NO_RESOURCE UINT32_MAX
 
 /* Entries (RGBA) of a colour ramp's table. */
-#define TRC_RAMP_SIZE 256u
+#define TRC_RAMP_SIZE 257u
 
 /* X(name, inputs, outputs, is_pure): pure ones depend on inputs, mode and table only. Outputs are
  * three floats of a vector or colour unless the list of values says otherwise. */
