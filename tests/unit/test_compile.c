@@ -592,7 +592,7 @@ static void test_refused_tables(void **state) {
     refused(TRC_ERROR_INVALID_ARGUMENT, "(Color Ramp)", "table");
     graph.nodes[ramp].table = table;
     graph.nodes[ramp].table_count = 4 * TRC_RAMP_SIZE - 4;
-    refused(TRC_ERROR_INVALID_ARGUMENT, "(Color Ramp)", "1020");
+    refused(TRC_ERROR_INVALID_ARGUMENT, "(Color Ramp)", "1024 floats");
     graph.nodes[ramp].table_count = 4 * TRC_RAMP_SIZE;
     trc_material_release(compiled());
     table[17] = NAN;
