@@ -130,7 +130,7 @@ def test_gallery(blender):
         error = np.abs(means[0] - means[1]).max() / max(np.abs(means[1]).max(), 1e-6)
         apart = np.abs(blocks[0] - blocks[1]).max() / max(np.abs(blocks[1]).max(), 1e-6)
         lines.append(f"{name:9} {means[1].mean():9.3g} {error:10.2e} {apart:16.3%}")
-        assert error < LIGHT_TOLERANCE.get(name, 0.01) and apart < 0.06, lines[-1]
+        assert error < LIGHT_TOLERANCE.get(name, 0.01) and apart < 0.1, lines[-1]
 
     for name in ("Depth", "Position", "IndexOB", "IndexMA"):
         ours, theirs = pairs[name]
