@@ -72,8 +72,8 @@ _LIGHT_PASSES = {
     ("TransCol", "Transmission Color"): (("TransDir", "Transmission Direct"),
                                          ("TransInd", "Transmission Indirect"))}
 # Of means. Beside a gloss Cycles lets some light through to the diffuse lobe too, with a bounce that it
-# should not have.
-LIGHT_TOLERANCE = {"DiffInd": 0.03}
+# should not have; lamps seen in mirrors through glass are rare and bright.
+LIGHT_TOLERANCE = {"DiffInd": 0.03, "GlossInd": 0.1}
 LEAST_COLOR = 0.02  # below it, light over colour is one noise over another
 SUM_TOLERANCE = 1e-4
 
