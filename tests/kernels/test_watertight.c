@@ -458,15 +458,48 @@ static void collapse_and_inversion(void **state) {
 }
 
 /* One vertex moves 1e4 times as far as the rest. */
+#define FAR_VERTEX 100
 static void fill_one_far(struct mesh *mesh) {
     sphere_in_motion(mesh, 2, no_step, 0.0f, 1.0001f);
     for (int axis = 0; axis < 3; axis++)
-        mesh_key(mesh, 1)[3 * 100 + axis] *= 1e4f;
+        mesh_key(mesh, 1)[3 * FAR_VERTEX + axis] *= 1e4f;
 }
 
 static void one_vertex_far(void **state) {
     (void)state;
     expect_closed_mesh("24: one vertex moves 1e4 times the rest", fill_one_far, origin, 0.3f);
+}
+
+/* Rays within the spike that this vertex pulls, at its tip: they meet its inner sides, whose planes
+ * are so steep that rounding could move the hit behind the ray's origin, though no corner is. */
+static void inside_a_spike(void **state) {
+    (void)state;
+    struct query_world world;
+    struct rng rng = rng_seed(25);
+    struct ray_set rays;
+    struct hit_set hits;
+    const uint32_t count = query_test_rays(USUAL_RAYS);
+    query_world_init(&world);
+    fill_one_far(query_world_object(&world));
+    struct query_scene scene = query_test_scene(&world, false);
+    ray_set_init(&rays);
+    for (uint32_t i = 0; i < count; i++) {
+        const float time = rng_unit(&rng);
+        float o[3], tip[3];
+        aim_vertex(&world.meshes[0], FAR_VERTEX, time, tip);
+        for (int axis = 0; axis < 3; axis++)
+            o[axis] = rng_range(&rng, -0.3f, 0.3f);
+        ray_set_aim(&rays, o, tip, time);
+    }
+    hit_set_init(&hits, count);
+    assert_ok(hit_set_query(&hits, scene.scene, &rays, 64));
+    const uint64_t misses = batch_misses(&rays, &hits);
+    print_misses("24: inside its spike", misses, count);
+    assert_int_equal(misses, 0);
+    hit_set_free(&hits);
+    ray_set_free(&rays);
+    query_scene_destroy(&scene);
+    query_world_free(&world);
 }
 
 int main(void) {
@@ -484,6 +517,7 @@ int main(void) {
         cmocka_unit_test(joins_of_segments),
         cmocka_unit_test(collapse_and_inversion),
         cmocka_unit_test(one_vertex_far),
+        cmocka_unit_test(inside_a_spike),
     };
     if (!query_test_isa())
         return QUERY_TEST_SKIPPED;

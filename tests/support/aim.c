@@ -5,7 +5,7 @@
 
 #define PACKET_RAYS 64
 
-static void vertex_at(const struct mesh *mesh, uint32_t vertex, float time, float p[3]) {
+void aim_vertex(const struct mesh *mesh, uint32_t vertex, float time, float out[3]) {
     const float *a = mesh->positions + 3 * (size_t)vertex, *b = a;
     double f = 0.0;
     if (mesh->key_count > 1) {
@@ -16,18 +16,18 @@ static void vertex_at(const struct mesh *mesh, uint32_t vertex, float time, floa
         b = mesh_key(mesh, key + 1) + 3 * (size_t)vertex;
     }
     for (int axis = 0; axis < 3; axis++)
-        p[axis] = (float)((1.0 - f) * a[axis] + f * b[axis]);
+        out[axis] = (float)((1.0 - f) * a[axis] + f * b[axis]);
 }
 
 void aim_target(const struct aim *aim, struct rng *rng, float time, float target_out[3]) {
     const struct mesh *mesh = aim->mesh;
     const uint32_t *index = mesh->indices + 3 * (size_t)rng_below(rng, mesh->triangle_count);
     const uint32_t corner = rng_below(rng, 3);
-    vertex_at(mesh, index[corner], time, target_out);
+    aim_vertex(mesh, index[corner], time, target_out);
     if (aim->at == AIM_VERTICES || (aim->at == AIM_BOTH && (rng_bits(rng) & 1)))
         return;
     float q[3];
-    vertex_at(mesh, index[(corner + 1) % 3], time, q);
+    aim_vertex(mesh, index[(corner + 1) % 3], time, q);
     for (int axis = 0; axis < 3; axis++)
         target_out[axis] = 0.5f * (target_out[axis] + q[axis]);
 }

@@ -16,6 +16,9 @@ struct aim {
     float reach;     /* how near */
 };
 
+/* A vertex of a mesh at that time, as exactly as floats can be. */
+void aim_vertex(const struct mesh *mesh, uint32_t vertex, float time, float out[3]);
+
 /* A vertex, or the middle of an edge, of a random triangle at that time, as exactly as floats can
  * be. */
 void aim_target(const struct aim *aim, struct rng *rng, float time, float target_out[3]);

@@ -163,7 +163,6 @@ class Tubes:
             found.append(np.repeat(info.reshape(-1, 4), self._sides, axis=0))
         return np.concatenate(found).astype(np.float32)
 
-
     def directions(self, strands):
         """(vertices, 4): what strands.DIRECTION_ATTRIBUTE holds."""
         found = []

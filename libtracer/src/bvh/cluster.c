@@ -1,3 +1,4 @@
+/* Clusters of triangles: see cluster.h. */
 #include "bvh/cluster.h"
 
 #include "core/box.h"

@@ -231,6 +231,9 @@ static void tree_finish(struct trc_tree *tree, double area_sum) {
     tree->sah_cost = root_area > 0.0f ? (float)(area_sum / root_area) : 0.0f;
 }
 
+static bool is_leaf(uint32_t ref) { return ref != TRC_REF_EMPTY && (ref & TRC_REF_LEAF); }
+static bool is_node(uint32_t ref) { return !(ref & TRC_REF_LEAF); } /* the empty one has it too */
+
 /* A node's references to its children: copied as its boxes are filled, so that its memory is met
  * once, and by all threads. */
 static void header_fill(struct fill_job *job, uint32_t n) {
@@ -249,21 +252,21 @@ static void leaves_fill(struct fill_job *job, uint32_t node) {
     const uint32_t *children = trc_node_children(tree, node);
     struct source sources[TRC_NODE_WIDTH * LOAD_SLOTS], *end = sources;
     for (uint32_t i = 0; i < TRC_NODE_WIDTH; i++)
-        if (trc_is_leaf(children[i]))
+        if (is_leaf(children[i]))
             end = leaf_gather(job, children[i], end);
     const struct source *at = sources;
     for (uint32_t i = 0; i < TRC_NODE_WIDTH; i++) {
         float lower[3], upper[3];
-        if (trc_is_node(children[i]))
+        if (is_node(children[i]))
             continue;
         for (uint32_t key = 0; key < tree->key_count; key++) {
-            if (trc_is_leaf(children[i]) && !leaf_fill(tree, children[i], key, at, lower, upper))
+            if (is_leaf(children[i]) && !leaf_fill(tree, children[i], key, at, lower, upper))
                 atomic_store_explicit(&job->spoiled, true, memory_order_relaxed);
             if (children[i] == TRC_REF_EMPTY)
                 empty_bounds(lower, upper);
             child_store(tree, node, i, key, lower, upper);
         }
-        if (trc_is_leaf(children[i]))
+        if (is_leaf(children[i]))
             at += trc_leaf_count(children[i]);
     }
 }
@@ -272,7 +275,7 @@ static void leaves_fill(struct fill_job *job, uint32_t node) {
 static void nodes_bound(struct trc_tree *tree, uint32_t node) {
     const uint32_t *children = trc_node_children(tree, node);
     for (uint32_t i = 0; i < TRC_NODE_WIDTH; i++)
-        for (uint32_t key = 0; trc_is_node(children[i]) && key < tree->key_count; key++) {
+        for (uint32_t key = 0; is_node(children[i]) && key < tree->key_count; key++) {
             float lower[3], upper[3];
             node_bounds(tree, children[i], key, lower, upper);
             child_store(tree, node, i, key, lower, upper);
@@ -297,7 +300,7 @@ static void fill_task(void *context, uint32_t index, uint32_t worker) {
         leaves_fill(job, n);
         job->pending[n] = false;
         for (int i = 0; i < TRC_NODE_WIDTH; i++)
-            if (trc_is_node(children[i]) && (children[i] >= end || job->pending[children[i]]))
+            if (is_node(children[i]) && (children[i] >= end || job->pending[children[i]]))
                 job->pending[n] = true;
         if (job->pending[n])
             continue;
@@ -334,7 +337,7 @@ static trc_status nodes_fill(struct fill_job *job, uint32_t task_count, struct t
             nodes_bound(tree, n);
             sum += children_area(tree, n);
         }
-    for (uint32_t key = 0; trc_is_node(tree->root) && key < tree->key_count; key++) {
+    for (uint32_t key = 0; is_node(tree->root) && key < tree->key_count; key++) {
         float lower[3], upper[3];
         node_bounds(tree, tree->root, key, lower, upper);
         bounds_grow(tree, lower, upper);
@@ -355,7 +358,7 @@ static trc_status tree_fill(struct fill_job *job, struct trc_pool *pool) {
     if (!job->pending || !job->area_sums)
         status = trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory to fill a tree of %u nodes",
                           tree->node_count);
-    if (status == TRC_OK && trc_is_leaf(tree->root))
+    if (status == TRC_OK && is_leaf(tree->root))
         root_leaf_fill(job);
     if (status == TRC_OK)
         status = nodes_fill(job, task_count, pool);
@@ -415,11 +418,11 @@ trc_status trc_tree_fill_top(const struct trc_topology *topology, const struct t
         for (uint32_t i = 0; i < TRC_NODE_WIDTH; i++) {
             float lower[3], upper[3];
             const uint32_t ref = children[i];
-            if (trc_is_leaf(ref)) {
+            if (is_leaf(ref)) {
                 const struct trc_ref *r = &refs[trc_leaf_first(ref)];
                 memcpy(lower, r->lower, sizeof lower);
                 memcpy(upper, r->upper, sizeof upper);
-            } else if (trc_is_node(ref)) {
+            } else if (is_node(ref)) {
                 node_bounds(tree, ref, 0, lower, upper);
             } else {
                 empty_bounds(lower, upper);

@@ -100,11 +100,6 @@ static inline const float *trc_node_bounds(const struct trc_tree *t, uint32_t no
     return (const float *)(t->nodes + (size_t)node * t->node_stride + TRC_NODE_HEADER_BYTES +
                            (size_t)key * TRC_NODE_KEY_BYTES);
 }
-static inline bool trc_is_leaf(uint32_t ref) {
-    return ref != TRC_REF_EMPTY && (ref & TRC_REF_LEAF);
-}
-/* The empty one is neither. */
-static inline bool trc_is_node(uint32_t ref) { return !(ref & TRC_REF_LEAF); }
 static inline uint32_t trc_leaf_first(uint32_t ref) { return ref & TRC_REF_INDEX_MASK; }
 static inline uint32_t trc_leaf_count(uint32_t ref) { return ((ref >> 28) & 7u) + 1u; }
 static inline uint32_t trc_leaf_ref(uint32_t first, uint32_t count) {
