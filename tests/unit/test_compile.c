@@ -116,7 +116,19 @@ static void test_equal_nodes_are_shared(void **state) {
     assert_int_equal(count_op(m, TRC_OP_UV_DENSITY), 1);
     assert_int_equal(m->instruction_count, 6);
     assert_int_equal(m->has, TRC_MATERIAL_HAS_DIFFUSE | TRC_MATERIAL_HAS_PROGRAM |
-                                 TRC_MATERIAL_HAS_TEXTURE);
+                                 TRC_MATERIAL_HAS_TEXTURE | TRC_MATERIAL_READS_FOOTPRINT);
+    trc_material_release(m);
+}
+
+/* One of 90 to 99 has no levels, whose choice then costs nothing. */
+static void test_images_without_levels(void **state) {
+    (void)state;
+    graph_clear();
+    add_diffuse(link_to(add_image(95, "map"), 0));
+    struct trc_material *m = compiled();
+    assert_int_equal(count_op(m, TRC_OP_IMAGE), 1);
+    assert_int_equal(count_op(m, TRC_OP_UV_DENSITY), 0);
+    assert_int_equal(m->has & TRC_MATERIAL_READS_FOOTPRINT, 0);
     trc_material_release(m);
 }
 
@@ -603,7 +615,7 @@ static void test_refused_tables(void **state) {
 static void test_refused_descriptors(void **state) {
     (void)state;
     struct trc_material *m = NULL;
-    const struct trc_compile_context context = {names, index_of_image, NULL};
+    const struct trc_compile_context context = {names, index_of_image, has_levels, NULL};
     trc_material_desc desc = {.struct_size = sizeof desc, .surface = -1};
     assert_int_equal(trc_material_compile(NULL, &context, &m), TRC_ERROR_INVALID_ARGUMENT);
     desc.struct_size = 4;
@@ -672,6 +684,7 @@ int main(void) {
         cmocka_unit_test(test_folding),
         cmocka_unit_test(test_conversions),
         cmocka_unit_test(test_equal_nodes_are_shared),
+        cmocka_unit_test(test_images_without_levels),
         cmocka_unit_test(test_density_of_mapped_images),
         cmocka_unit_test(test_unreached_nodes_are_dropped),
         cmocka_unit_test(test_alpha_of_images),

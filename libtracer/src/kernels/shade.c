@@ -658,7 +658,7 @@ static vfloat beam_width(const struct trc_tile *t, const struct arrival *a) {
     return vf_select(camera, vf_set(t->beam_width) + a->t * vf_set(t->beam_spread), bounced);
 }
 
-static void surface_setup(struct trc_tile *t, const struct arrival *a, bool has_texture,
+static void surface_setup(struct trc_tile *t, const struct arrival *a, bool has_footprint,
                           struct trc_surface *s) {
     s->snapshot = t->snapshot;
     s->active = a->active;
@@ -675,7 +675,7 @@ static void surface_setup(struct trc_tile *t, const struct arrival *a, bool has_
     s->glossy_depth = (vint)depth_of(a->depths, TRC_DEPTH_GLOSSY_SHIFT);
     s->transmission_depth = (vint)depth_of(a->depths, TRC_DEPTH_TRANSMISSION_SHIFT);
     s->transparent_depth = (vint)depth_of(a->depths, TRC_DEPTH_TRANSPARENT_SHIFT);
-    s->footprint = has_texture ? beam_width(t, a) : vf_set(0.0f);
+    s->footprint = has_footprint ? beam_width(t, a) : vf_set(0.0f);
     s->raster_x = (vi_to_float((vint)(a->pixel & vu_set(0xffffu))) + vf_set(0.5f)) *
                   vf_set(1.0f / (float)t->desc->width);
     s->raster_y = (vi_to_float((vint)(a->pixel >> 16)) + vf_set(0.5f)) *
@@ -741,7 +741,7 @@ static void shade_group(struct trc_tile *t, uint32_t material, vint index, vmask
     struct trc_lobes lobes;
     arrival_load(t, index, active, &a);
     arrival_load_samples(t, &a);
-    surface_setup(t, &a, m->has & TRC_MATERIAL_HAS_TEXTURE, &s);
+    surface_setup(t, &a, m->has & TRC_MATERIAL_READS_FOOTPRINT, &s);
     if (m->instruction_count)
         TRC_KERNEL(trc_program_run)(m, &s, &regs);
     TRC_KERNEL(trc_lobes_setup)(m, &s, &regs, filter_alpha(t, &a), &lobes);

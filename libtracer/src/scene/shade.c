@@ -9,9 +9,15 @@ static uint32_t image_index(const void *images, trc_id image) {
     return trc_store_get(images, image) ? trc_store_slot_of(image) : UINT32_MAX;
 }
 
+static bool image_has_levels(const void *images, trc_id image) {
+    const struct trc_image *found = trc_store_get(images, image);
+    return found && found->level_count > 1;
+}
+
 static trc_status compile(const struct trc_scene_state *scene, const trc_material_desc *desc,
                           struct trc_material **material_out) {
-    const struct trc_compile_context context = {scene->names, image_index, &scene->images};
+    const struct trc_compile_context context = {scene->names, image_index, image_has_levels,
+                                                &scene->images};
     return trc_material_compile(desc, &context, material_out);
 }
 

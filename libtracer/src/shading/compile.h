@@ -17,7 +17,9 @@ struct trc_compile_context {
      * render magenta, as do positions that are NULL or beyond the end when rendering. NULL: none.
      */
     uint32_t (*image_index)(const void *images, trc_id image);
-    const void *images; /* first argument of image_index */
+    /* Whether it has smaller levels, so that lookups are worth a footprint. NULL: none has. */
+    bool (*image_has_levels)(const void *images, trc_id image);
+    const void *images; /* first argument of both */
 };
 
 /* One holder: the caller. INVALID_ARGUMENT names the node and the input; TOO_LARGE (counts of the

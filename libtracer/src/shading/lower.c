@@ -159,6 +159,11 @@ static trc_status lower_object_info(const struct lowering *l) {
     return op(l->b, TRC_OP_OBJECT_RANDOM, 0, NULL, l->out + 9);
 }
 
+static bool has_levels(const struct lowering *l) {
+    const struct trc_compile_context *context = l->b->context;
+    return context->image_has_levels && context->image_has_levels(context->images, l->node->image);
+}
+
 /* The operation whose first outputs two operands are; NULL unless it is of that kind. */
 static const struct trc_build_op *source_of(const struct trc_build *b, uint32_t code,
                                             const struct trc_operand *pair) {
@@ -210,7 +215,7 @@ static trc_status lower_image(const struct lowering *l) {
     if (projection) {
         const uint32_t wrap = projection == 2 ? TRC_PROJECT_SPHERE : TRC_PROJECT_TUBE;
         TRC_TRY(op(l->b, TRC_OP_PROJECT, wrap, l->in, uv));
-    } else if ((mode & TRC_IMAGE_MODE_INTERPOLATION) != TRC_IMAGE_CLOSEST) {
+    } else if ((mode & TRC_IMAGE_MODE_INTERPOLATION) != TRC_IMAGE_CLOSEST && has_levels(l)) {
         TRC_TRY(density_of(l, uv, uv + 2));
     }
     return trc_build_op(l->b, TRC_OP_IMAGE, mode, image, uv, l->out);

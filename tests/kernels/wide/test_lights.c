@@ -232,6 +232,9 @@ static void lamps_have_cycles_units(void **state) {
     sun.angle = 2.0943951f;
     e.value = one_lamp(sun, &e.error);
     expect("sun, 120 degrees", e, 3.0 * 0.509295 / 0.763921);
+    sun.flags = TRC_LIGHT_EVEN_CONE; /* strength is the irradiance */
+    e.value = one_lamp(sun, &e.error);
+    expect("even sun, 120 degrees", e, 3.0);
     trc_light_desc area = lamp(TRC_LIGHT_AREA, 0, 0, 4);
     e.value = one_lamp(area, &e.error);
     expect("area", e, 0.3898 / to_plane);
