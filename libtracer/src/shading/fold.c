@@ -123,7 +123,8 @@ static trc_status append(struct trc_build *b, uint32_t hash, uint32_t op, uint32
         return trc_fail(TRC_ERROR_TOO_LARGE, "the material needs more than %u operations", MAX_OPS);
     }
     TRC_TRY(trc_build_reserve((void **)&b->ops, &b->op_capacity, b->op_count + 1, sizeof *b->ops));
-    TRC_TRY(trc_build_reserve((void **)&b->inputs, &b->input_capacity, b->input_count + count,
+    /* One more: inputs of an operation that has none are a place in the array, too. */
+    TRC_TRY(trc_build_reserve((void **)&b->inputs, &b->input_capacity, b->input_count + count + 1,
                               sizeof *b->inputs));
     b->ops[b->op_count] = (struct trc_build_op){
         .op = (uint16_t)op,
