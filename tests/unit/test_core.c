@@ -104,6 +104,22 @@ static void memory_is_aligned_and_counted(void **state) {
     trc_free(NULL);
 }
 
+/* In large pages: any size, all of it to write and to free. */
+static void large_blocks(void **state) {
+    (void)state;
+    const uint64_t before = trc_memory_bytes();
+    for (size_t bytes = (size_t)1 << 20; bytes < (size_t)1 << 25; bytes = 2 * bytes + 4093) {
+        char *block = trc_alloc_large(bytes, 1);
+        assert_non_null(block);
+        assert_int_equal((uintptr_t)block % 64, 0);
+        assert_int_equal(trc_memory_bytes() - before, bytes);
+        memset(block, 0x5a, bytes);
+        trc_free(block);
+    }
+    assert_int_equal(trc_memory_bytes(), before);
+    assert_null(trc_alloc_large(SIZE_MAX, 2));
+}
+
 static void memory_sizes_do_not_wrap(void **state) {
     (void)state;
     assert_null(trc_alloc(SIZE_MAX, 2));
@@ -572,6 +588,7 @@ int main(void) {
         cmocka_unit_test(message_is_per_thread),
         cmocka_unit_test(sizes_and_versions),
         cmocka_unit_test(memory_is_aligned_and_counted),
+        cmocka_unit_test(large_blocks),
         cmocka_unit_test(memory_sizes_do_not_wrap),
         cmocka_unit_test(memory_fails_when_told),
         cmocka_unit_test(products_are_checked),

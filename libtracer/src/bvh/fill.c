@@ -64,10 +64,10 @@ static trc_status tree_alloc(struct trc_tree *tree, uint32_t node_count, uint32_
                               .root = TRC_REF_EMPTY,
                               .is_top = is_top};
     tree->node_stride = TRC_NODE_HEADER_BYTES + (size_t)key_count * TRC_NODE_KEY_BYTES;
-    tree->nodes = trc_alloc(node_count ? node_count : 1, tree->node_stride);
+    tree->nodes = trc_alloc_large(node_count ? node_count : 1, tree->node_stride);
     const size_t floats = (size_t)slot_count * key_count * TRC_TRIANGLE_FLOATS;
     if (!is_top) {
-        tree->vertices = trc_alloc(floats + LOAD_SLOTS, sizeof *tree->vertices);
+        tree->vertices = trc_alloc_large(floats + LOAD_SLOTS, sizeof *tree->vertices);
         tree->slots = trc_alloc(slot_count ? slot_count : 1, sizeof *tree->slots);
     }
     if (!tree->nodes || (!is_top && (!tree->vertices || !tree->slots))) {

@@ -1,12 +1,19 @@
 /* Memory of the library: every block is 64-byte aligned, counted, and can be made to fail. */
+#define _DEFAULT_SOURCE /* madvise */
+
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
+#ifdef __linux__
+#include <sys/mman.h>
+#endif
 
 #include "core/core.h"
 
 /* A cache line, and the widest vector register. */
 #define ALIGNMENT 64
+/* Of x86 and arm64. */
+#define LARGE_PAGE ((size_t)2 << 20)
 
 /* Stands directly before a block. */
 struct header {
@@ -45,28 +52,40 @@ static void count_block(size_t bytes) {
     }
 }
 
-static void *allocate(size_t count, size_t size, bool zeroed) {
+static void *allocate(size_t count, size_t size, size_t alignment, bool zeroed) {
     if (trc_memory_should_fail())
         return NULL;
-    if (size && count > (PTRDIFF_MAX - 2 * ALIGNMENT) / size)
+    if (size && count > (PTRDIFF_MAX - 2 * LARGE_PAGE) / size)
         return NULL;
     const size_t bytes = count * size;
-    const size_t total = bytes + sizeof(struct header) + ALIGNMENT - 1;
+    const size_t total = bytes + sizeof(struct header) + alignment - 1;
     /* calloc leaves untouched pages of a large film to the system. */
     char *base = zeroed ? calloc(1, total) : malloc(total);
     if (!base)
         return NULL;
     const uintptr_t first = (uintptr_t)base + sizeof(struct header);
-    char *block = base + sizeof(struct header) + (-first & (ALIGNMENT - 1));
+    char *block = base + sizeof(struct header) + (-first & (alignment - 1));
     const struct header header = {base, bytes};
     memcpy(block - sizeof header, &header, sizeof header);
     count_block(bytes);
     return block;
 }
 
-void *trc_alloc(size_t count, size_t size) { return allocate(count, size, false); }
+void *trc_alloc(size_t count, size_t size) { return allocate(count, size, ALIGNMENT, false); }
 
-void *trc_alloc_zeroed(size_t count, size_t size) { return allocate(count, size, true); }
+void *trc_alloc_zeroed(size_t count, size_t size) { return allocate(count, size, ALIGNMENT, true); }
+
+void *trc_alloc_large(size_t count, size_t size) {
+#ifdef MADV_HUGEPAGE
+    if (size && count >= LARGE_PAGE / size) {
+        void *block = allocate(count, size, LARGE_PAGE, false);
+        if (block)
+            madvise(block, count * size, MADV_HUGEPAGE); /* a wish: small pages do, too */
+        return block;
+    }
+#endif
+    return allocate(count, size, ALIGNMENT, false);
+}
 
 void trc_free(void *block) {
     if (!block)

@@ -16,6 +16,9 @@ trc_status trc_fail(trc_status status, const char *format, ...)
  * for overflow. trc_free(NULL) is fine. Freed blocks must come from here. */
 void *trc_alloc(size_t count, size_t size);
 void *trc_alloc_zeroed(size_t count, size_t size);
+/* The same in large pages, where there are any, for what is read all over for long: each is cleared
+ * whole when it is met first. */
+void *trc_alloc_large(size_t count, size_t size);
 void trc_free(void *block);
 
 /* Bytes in use now and at most. */
