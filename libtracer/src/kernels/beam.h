@@ -275,9 +275,9 @@ TRC_INLINE void trc_beam_corners_set(const struct trc_beam *b, int corner, f8 u,
  * z: compared by their boxes and by the sides of the triangle's edges, for either winding. An edge
  * in motion has a quadratic edge function: its ends, and a quarter of its square term, bound it.
  * Rounding of the corners, 16 half-ulps of M at most (slopes are below 1.1, products below 3 M), is
- * within another slack on the rectangle. */
+ * within another slack on the rectangle. edges: false to compare boxes alone. */
 TRC_INLINE uint32_t trc_beam_triangles(const struct trc_beam *b, const struct trc_beam_corners *c,
-                                       const struct trc_beam_corners *later) {
+                                       const struct trc_beam_corners *later, bool edges) {
     f8 z_low = f8_min(c->z[0], f8_min(c->z[1], c->z[2]));
     f8 z_high = f8_max(c->z[0], f8_max(c->z[1], c->z[2]));
     f8 u_low = f8_min(c->u[0], f8_min(c->u[1], c->u[2]));
@@ -303,8 +303,8 @@ TRC_INLINE uint32_t trc_beam_triangles(const struct trc_beam *b, const struct tr
         slack;
     const uint32_t boxes = f8_le(from, to) & f8_le(u_low, u_half) & f8_le(-u_half, u_high) &
                            f8_le(v_low, v_half) & f8_le(-v_half, v_high);
-    if (!boxes)
-        return 0;
+    if (!boxes || !edges)
+        return boxes;
     const f8 rounding = f8_set(TRC_EDGE_ROUNDING);
     const f8 u_reach = f8_madd(rounding, f8_max(f8_abs(u_low), f8_abs(u_high)) + u_half, u_half);
     const f8 v_reach = f8_madd(rounding, f8_max(f8_abs(v_low), f8_abs(v_high)) + v_half, v_half);

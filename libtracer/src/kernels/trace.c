@@ -2,7 +2,7 @@
  *
  * Boulos et al. 2007: general packets against a BVH, first an interval cull of the whole packet,
  * then the first active ray. Departures, each by measurement: 8-wide nodes; the interval test is a
- * beam (kernels/beam.h) against eight children in one step; the first live ray, then all, are tried
+ * beam (kernels/beam.h) against eight children in one step, as the first live ray is; all are tried
  * only when a child is taken from the stack, against distances as they are by then; a 64-bit mask
  * instead of a first active index; packets are split by dominant axis and its side; rays that are
  * few go on alone, eight boxes or eight triangles at a time. Hits do not depend on any of it:
@@ -23,13 +23,19 @@
 #define SINGLE_COMMON 4
 #define SINGLE_MIXED 8
 
-/* A subtree to visit. Its box comes with it, so that its parent is read once: lower and upper plane
- * along u and v, near and far one along z, wider by the slack; of moving trees, hulled over the
- * group's interval of time. */
+/* A node whose children wait, so that it is read once: their boxes, wider by the slack; of moving
+ * trees, hulled over the group's interval of time. */
+struct opened {
+    float planes[6][TRC_NODE_WIDTH]; /* low and high along u, v; near and far along z */
+    float z[TRC_NODE_WIDTH];         /* nearest mirrored z */
+    uint64_t mask;                   /* rays that reached it */
+    uint32_t first;                  /* bits of the children that the first of those meets */
+} __attribute__((aligned(64)));
+
+/* A subtree to visit: a child of an opened node. */
 struct entry {
-    uint64_t mask;
-    float box[6];
     uint32_t ref;
+    uint16_t level, child; /* level: of the opened node */
 };
 
 struct walk {
@@ -67,27 +73,16 @@ TRC_INLINE void boxes_load(const struct walk *w, uint32_t node, bool motion, f8 
     }
 }
 
-/* Rays of mask whose own slabs meet the box. In narrow beams, while boxes take all rays or none,
- * the first one is tried alone: when it hits, the others are not looked at. */
-TRC_INLINE uint64_t box_rays(const struct walk *w, const float box[6], uint64_t mask,
-                             bool *together) {
+/* Rays of mask whose own slabs meet the box of the node's child. together: whether boxes still take
+ * all rays of a narrow beam or none. */
+TRC_INLINE uint64_t box_rays(const struct walk *w, const struct opened *node, int child,
+                             uint64_t mask, bool *together) {
     const struct trc_packet *p = w->packet;
     const struct trc_group *g = w->group;
     const int u = g->beam.axis.u, v = g->beam.axis.v, z = g->beam.axis.z;
-    if (*together) {
-        TRC_COUNT(box_rays, 1);
-        const int i = __builtin_ctzll(mask);
-        const float u0 = box[0] * g->inv[u][i] + g->shift[u][i],
-                    u1 = box[1] * g->inv[u][i] + g->shift[u][i],
-                    v0 = box[2] * g->inv[v][i] + g->shift[v][i],
-                    v1 = box[3] * g->inv[v][i] + g->shift[v][i],
-                    z0 = box[4] * g->inv[z][i] + g->shift[z][i],
-                    z1 = box[5] * g->inv[z][i] + g->shift[z][i];
-        const float near = f_max(f_max(p->tmin[i], z0), f_max(f_min(u0, u1), f_min(v0, v1)));
-        const float far = f_min(f_min(p->t[i], z1), f_min(f_max(u0, u1), f_max(v0, v1)));
-        if (near <= far)
-            return mask;
-    }
+    float box[6];
+    for (int plane = 0; plane < 6; plane++)
+        box[plane] = node->planes[plane][child];
     TRC_COUNT(box_rays, __builtin_popcountll(mask));
     uint64_t live = 0;
     for (int c = 0; c < TRC_PACKET_CHUNKS; c++) {
@@ -137,7 +132,7 @@ TRC_INLINE void leaf_corners(const struct walk *w, const float *v, uint32_t coun
 
 /* Beam cull of the leaf's triangles. */
 TRC_INLINE uint32_t leaf_candidates(const struct walk *w, f8 v[3][3], f8 later[3][3],
-                                    uint32_t count, bool motion) {
+                                    uint32_t count, bool motion, bool edges) {
     const struct trc_beam *b = &w->group->beam;
     struct trc_beam_corners begin, end;
     for (int corner = 0; corner < 3; corner++) {
@@ -146,7 +141,7 @@ TRC_INLINE uint32_t leaf_candidates(const struct walk *w, f8 v[3][3], f8 later[3
             trc_beam_corners_set(b, corner, later[corner][0], later[corner][1], later[corner][2],
                                  &end);
     }
-    return trc_beam_triangles(b, &begin, motion ? &end : NULL) & ((1u << count) - 1u);
+    return trc_beam_triangles(b, &begin, motion ? &end : NULL, edges) & ((1u << count) - 1u);
 }
 
 /* Broadcasts the triangle of v's first slot, or interpolates it for each ray of chunk i. */
@@ -212,7 +207,8 @@ TRC_INLINE bool leaf_packet(struct walk *w, uint32_t ref, uint64_t mask, bool an
     f8 corners[3][3], later[3][3];
     bool found = false;
     leaf_corners(w, vertices, count, motion, corners, later);
-    uint32_t slots = leaf_candidates(w, corners, later, count, motion);
+    /* The filter has the edges, closer. */
+    uint32_t slots = leaf_candidates(w, corners, later, count, motion, !filter);
     if (slots && filter)
         slots = trc_edge_filter_setup(g, corners, slots, &edges);
     for (; slots; slots &= slots - 1) {
@@ -410,6 +406,18 @@ TRC_INLINE uint32_t single_push(const uint32_t *children, f8 near, uint32_t bits
     return stack[top - 1].ref;
 }
 
+/* Pushes all children but the first in any order, and returns that one: to any hit, misses see all.
+ */
+TRC_INLINE uint32_t single_push_any(const uint32_t *children, uint32_t bits,
+                                    struct single_entry *stack, int *top_in_out) {
+    const uint32_t next = children[__builtin_ctz(bits)];
+    int top = *top_in_out;
+    for (bits &= bits - 1; bits; bits &= bits - 1)
+        stack[top++].ref = children[__builtin_ctz(bits)];
+    *top_in_out = top;
+    return next;
+}
+
 /* Walks one ray through the subtree at ref. True: occluded. */
 TRC_INLINE bool single_walk(struct walk *w, uint32_t ref, int ray, bool any, bool motion) {
     struct single_entry stack[TRC_STACK_SIZE];
@@ -423,7 +431,9 @@ TRC_INLINE bool single_walk(struct walk *w, uint32_t ref, int ray, bool any, boo
             const uint32_t bits = node_single(w, ref, &r, w->packet->t[ray], motion, &near);
             if (!bits)
                 goto pop;
-            ref = single_push(trc_node_children(w->tree, ref), near, bits, stack, &top);
+            const uint32_t *children = trc_node_children(w->tree, ref);
+            ref = any ? single_push_any(children, bits, stack, &top)
+                      : single_push(children, near, bits, stack, &top);
         }
         if (w->tree->is_top) {
             item_packet(w, &w->tree->items[trc_leaf_first(ref)], 1ull << ray, any);
@@ -437,53 +447,77 @@ TRC_INLINE bool single_walk(struct walk *w, uint32_t ref, int ray, bool any, boo
             if (top == 0)
                 return false;
             ref = stack[--top].ref;
-        } while (stack[top].near > w->packet->t[ray]);
+        } while (!any && stack[top].near > w->packet->t[ray]);
     }
 }
 
 /* ---- the packet's walk ---- */
 
-/* Pushes the children the beam may touch, the nearest on top. */
-TRC_INLINE int children_push(const struct walk *w, uint32_t node, uint64_t mask, bool motion,
-                             struct entry *stack, int top) {
+/* Bits of the children whose planes, in the order of struct opened, one ray meets. */
+TRC_INLINE uint32_t planes_ray(const struct walk *w, const f8 planes[6], int ray) {
+    const struct trc_packet *p = w->packet;
+    const struct trc_group *g = w->group;
+    const int axes[3] = {g->beam.axis.u, g->beam.axis.v, g->beam.axis.z};
+    f8 at[6];
+    for (int plane = 0; plane < 6; plane++)
+        at[plane] = f8_madd(planes[plane], f8_set(g->inv[axes[plane / 2]][ray]),
+                            f8_set(g->shift[axes[plane / 2]][ray]));
+    const f8 near = f8_max(f8_max(f8_set(p->tmin[ray]), at[4]),
+                           f8_max(f8_min(at[0], at[1]), f8_min(at[2], at[3])));
+    const f8 far = f8_min(f8_min(f8_set(p->t[ray]), at[5]),
+                          f8_min(f8_max(at[0], at[1]), f8_max(at[2], at[3])));
+    return f8_le(near, far);
+}
+
+/* Opens a node: pushes the children the beam may touch, the nearest on top. */
+TRC_INLINE int node_open(const struct walk *w, uint32_t node, uint64_t mask, bool motion,
+                         uint16_t level, struct opened *o, struct entry *stack, int top) {
     const struct trc_beam *b = &w->group->beam;
     f8 lower[3], upper[3], key;
     boxes_load(w, node, motion, lower, upper);
     uint32_t bits = trc_beam_test(b, lower, upper, &key);
     if (!bits)
         return top;
-    const uint32_t *children = trc_node_children(w->tree, node);
     const f8 slack = f8_set(b->slack);
     const f8 z_low = lower[b->axis.z] - slack, z_high = upper[b->axis.z] + slack;
-    float planes[6][TRC_NODE_WIDTH], z[TRC_NODE_WIDTH];
-    f8_store(planes[0], lower[b->axis.u] - slack);
-    f8_store(planes[1], upper[b->axis.u] + slack);
-    f8_store(planes[2], lower[b->axis.v] - slack);
-    f8_store(planes[3], upper[b->axis.v] + slack);
-    f8_store(planes[4], b->side ? z_high : z_low);
-    f8_store(planes[5], b->side ? z_low : z_high);
-    f8_store(z, key);
-    uint8_t order[TRC_NODE_WIDTH];
-    int count = 0;
+    const f8 planes[6] = {lower[b->axis.u] - slack, upper[b->axis.u] + slack,
+                          lower[b->axis.v] - slack, upper[b->axis.v] + slack,
+                          b->side ? z_high : z_low, b->side ? z_low : z_high};
+    for (int plane = 0; plane < 6; plane++)
+        f8_store(o->planes[plane], planes[plane]);
+    f8_store(o->z, key);
+    o->mask = mask;
+    o->first = planes_ray(w, planes, __builtin_ctzll(mask));
+    TRC_COUNT(box_rays, __builtin_popcount(bits));
+    const uint32_t *children = trc_node_children(w->tree, node);
+    const int bottom = top;
     for (; bits; bits &= bits - 1) {
         const int child = __builtin_ctz(bits);
-        int at = count++;
-        for (; at > 0 && z[order[at - 1]] < z[child]; at--)
-            order[at] = order[at - 1];
-        order[at] = (uint8_t)child;
-    }
-    for (int i = 0; i < count; i++) {
-        struct entry *e = &stack[top++];
-        e->mask = mask;
-        e->ref = children[order[i]];
-        for (int k = 0; k < 6; k++)
-            e->box[k] = planes[k][order[i]];
+        int at = top++;
+        for (; at > bottom && o->z[stack[at - 1].child] < o->z[child]; at--)
+            stack[at] = stack[at - 1];
+        stack[at] = (struct entry){children[child], level, (uint16_t)child};
     }
     return top;
 }
 
+/* The live rays that visit a child of an opened node. In narrow beams, while boxes take all rays or
+ * none, the others are not looked at when the first one meets the box and hits have not come to lie
+ * before it. */
+TRC_INLINE uint64_t child_rays(const struct walk *w, const struct opened *node, int child, bool any,
+                               bool *together) {
+    const uint64_t live = any ? node->mask & ~w->occluded : node->mask;
+    const uint64_t first = node->mask & -node->mask;
+    if (*together && (node->first >> child & 1u) && (live & first) &&
+        node->z[child] <= w->group->beam.z1)
+        return live;
+    return live ? box_rays(w, node, child, live, together) : 0;
+}
+
 TRC_INLINE void packet_walk(struct walk *w, uint64_t mask, bool any, bool motion) {
     struct entry stack[TRC_STACK_SIZE];
+    struct opened opened[TRC_MAX_LEVELS + 1]; /* on the way to ref */
+    uint16_t level = 0;
     const int few = w->packet->common_origin ? SINGLE_COMMON : SINGLE_MIXED;
     const uint64_t all = mask;
     bool together = w->group->beam.is_narrow;
@@ -502,7 +536,7 @@ TRC_INLINE void packet_walk(struct walk *w, uint64_t mask, bool any, bool motion
             TRC_COUNT(visit_rays, __builtin_popcountll(live));
             if (!(ref & TRC_REF_LEAF)) {
                 TRC_COUNT(nodes, 1);
-                top = children_push(w, ref, live, motion, stack, top);
+                top = node_open(w, ref, live, motion, level, &opened[level], stack, top);
             } else if (w->tree->is_top) {
                 item_packet(w, &w->tree->items[trc_leaf_first(ref)], live, any);
                 if (!any)
@@ -516,9 +550,8 @@ TRC_INLINE void packet_walk(struct walk *w, uint64_t mask, bool any, bool motion
                 return;
             const struct entry *at = &stack[--top];
             ref = at->ref;
-            live = any ? at->mask & ~w->occluded : at->mask;
-            if (live)
-                live = box_rays(w, at->box, live, &together);
+            level = (uint16_t)(at->level + 1);
+            live = child_rays(w, &opened[at->level], at->child, any, &together);
         } while (!live);
     }
 }
