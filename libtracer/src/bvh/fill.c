@@ -88,6 +88,8 @@ void trc_tree_destroy(struct trc_tree *tree) {
     trc_free(tree->nodes);
     trc_free(tree->vertices);
     trc_free(tree->slots);
+    if (tree->slot_vertices && atomic_fetch_sub(&tree->slot_vertices->refs, 1) == 1)
+        trc_free(tree->slot_vertices);
     *tree = (struct trc_tree){.root = TRC_REF_EMPTY};
 }
 
@@ -99,10 +101,12 @@ struct fill_job {
     const struct trc_part_triangle *triangles;
     const struct trc_part *parts;
     struct trc_tree *tree;
-    const atomic_uint *cancel;        /* may be NULL */
-    uint8_t *pending;                 /* per node: its box waits for nodes of other tasks */
-    double *area_sums;                /* per task: areas of the boxes that it set */
-    atomic_bool transparent, spoiled; /* spoiled: a coordinate is not finite */
+    const struct trc_slot_vertices *known; /* or NULL: asked of the mesh */
+    struct trc_slot_vertices *learnt;      /* or NULL: not kept */
+    const atomic_uint *cancel;             /* may be NULL */
+    uint8_t *pending;                      /* per node: its box waits for nodes of other tasks */
+    double *area_sums;                     /* per task: areas of the boxes that it set */
+    atomic_bool transparent, spoiled;      /* spoiled: a coordinate is not finite */
 };
 
 static bool part_is_transparent(const struct trc_part *part, uint32_t triangle) {
@@ -139,8 +143,12 @@ static struct source *leaf_gather(struct fill_job *job, uint32_t ref, struct sou
     for (uint32_t slot = first; slot < first + count; slot++, at++) {
         at->part = slot_fill(job, slot);
         const struct trc_mesh *mesh = at->part->mesh;
-        memcpy(at->index, mesh->indices + 3 * (size_t)job->tree->slots[slot].triangle,
-               sizeof at->index);
+        const uint32_t *index = job->known
+                                    ? job->known->index[slot]
+                                    : mesh->indices + 3 * (size_t)job->tree->slots[slot].triangle;
+        memcpy(at->index, index, sizeof at->index);
+        if (job->learnt)
+            memcpy(job->learnt->index[slot], index, sizeof at->index);
         for (int v = 0; v < 3; v++)
             __builtin_prefetch(mesh->positions + 3 * (size_t)at->index[v]);
     }
@@ -387,6 +395,13 @@ trc_status trc_tree_fill(const struct trc_topology *topology,
     return filled;
 }
 
+static struct trc_slot_vertices *slot_vertices_alloc(uint32_t count) {
+    struct trc_slot_vertices *v = trc_alloc(sizeof *v + count * sizeof v->index[0], 1);
+    if (v)
+        atomic_init(&v->refs, 1);
+    return v;
+}
+
 trc_status trc_tree_refit(const struct trc_tree *from, const struct trc_part *part,
                           uint32_t key_count, struct trc_pool *pool, const atomic_uint *cancel,
                           struct trc_tree *tree) {
@@ -396,7 +411,15 @@ trc_status trc_tree_refit(const struct trc_tree *from, const struct trc_part *pa
         return status;
     tree->root = from->root;
     tree->has_transparent = from->has_transparent;
-    struct fill_job job = {.from = from, .parts = part, .tree = tree, .cancel = cancel};
+    struct fill_job job = {
+        .from = from, .parts = part, .tree = tree, .known = from->slot_vertices, .cancel = cancel};
+    tree->slot_vertices = from->slot_vertices;
+    if (tree->slot_vertices)
+        atomic_fetch_add(&tree->slot_vertices->refs, 1);
+    else /* without memory for it, the next refit asks the mesh again */
+        tree->slot_vertices = job.learnt = slot_vertices_alloc(from->slot_count);
+    if (tree->slot_vertices)
+        tree->bytes += from->slot_count * (uint64_t)sizeof tree->slot_vertices->index[0];
     const trc_status filled = tree_fill(&job, pool);
     if (filled != TRC_OK)
         trc_tree_destroy(tree);

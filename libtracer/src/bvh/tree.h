@@ -57,15 +57,23 @@ struct trc_item {
     uint32_t visibility; /* TRC_VISIBLE_* */
 };
 
+/* Vertices of the triangle in each slot, in the order in which refits meet them: asked of the mesh,
+ * they are a third of a refit's time. */
+struct trc_slot_vertices {
+    atomic_uint refs;
+    uint32_t index[][3];
+};
+
 struct trc_tree {
     uint32_t key_count;
     uint32_t node_count, slot_count;
     uint32_t root; /* reference; TRC_REF_EMPTY for no triangles */
     size_t node_stride;
-    uint8_t *nodes;               /* node_count * node_stride, 64-byte aligned */
-    float *vertices;              /* slot_count * key_count * 9, and a load beyond */
-    struct trc_slot *slots;       /* slot_count; TLAS: NULL, as vertices are */
-    const struct trc_item *items; /* TLAS only, by slot */
+    uint8_t *nodes;                          /* node_count * node_stride, 64-byte aligned */
+    float *vertices;                         /* slot_count * key_count * 9, and a load beyond */
+    struct trc_slot *slots;                  /* slot_count; TLAS: NULL, as vertices are */
+    struct trc_slot_vertices *slot_vertices; /* shared by refits of one tree; or NULL */
+    const struct trc_item *items;            /* TLAS only, by slot */
     bool is_top;
     bool has_transparent;     /* some slot has TRC_SLOT_TRANSPARENT */
     float lower[3], upper[3]; /* over all keys; lower > upper when empty */
