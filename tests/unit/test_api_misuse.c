@@ -374,6 +374,8 @@ static void mesh_normals(void **state) {
                 desc.normal_count = 24);
     REFUSE_MESH(ARGUMENT, desc.normals = MISALIGNED(float); desc.normal_kind = TRC_NORMALS_VERTEX;
                 desc.normal_count = 24);
+    REFUSE_MESH(LARGE, desc.normal_kind = TRC_NORMALS_CORNER; desc.triangle_count = 1u << 29;
+                desc.index_count = 3u << 29); /* nothing is read before that */
     /* Zero and NaN normals are replaced. */
     normals[5] = NAN;
     trc_mesh_desc desc = default_mesh_desc();
@@ -414,6 +416,10 @@ static void mesh_attributes(void **state) {
     REFUSE_ATTRIBUTE(ARGUMENT, bad.values = MISALIGNED(float));
     REFUSE_ATTRIBUTE(ARGUMENT, bad.value_count = 71);
     REFUSE_ATTRIBUTE(LARGE, bad.value_count = UINT64_MAX);
+    bad = good;
+    bad.width = 4;
+    REFUSE_MESH(LARGE, desc.attributes = &bad; desc.attribute_count = 1;
+                desc.triangle_count = 1u << 28; desc.index_count = 3u << 28);
     values[3] = NAN; /* becomes 0 */
     trc_mesh_desc desc = default_mesh_desc();
     desc.attributes = &good;
@@ -499,6 +505,9 @@ static void instances(void **state) {
     REFUSE_INSTANCE(ARGUMENT, desc.flags = 2);
     REFUSE_INSTANCE(ARGUMENT, desc.random = NAN);
     REFUSE_INSTANCE(ARGUMENT, desc.color[2] = INFINITY);
+    REFUSE_INSTANCE(ARGUMENT, desc.cryptomatte_object = NAN);
+    REFUSE_INSTANCE(ARGUMENT, desc.cryptomatte_asset = -INFINITY);
+    REFUSE_INSTANCE(LARGE, desc.light_group = TRC_MAX_LIGHT_GROUPS + 1);
     const float bad_values[] = {1.0f, NAN};
     REFUSE_INSTANCE(ARGUMENT, desc.value_count = 1);
     REFUSE_INSTANCE(ARGUMENT, desc.values = bad_values; desc.value_count = 2);
@@ -526,13 +535,14 @@ static void lights(void **state) {
     const trc_light_desc good = default_light_desc();
     trc_id id = UNTOUCHED, light = 0;
     assert_int_equal(trc_light_create(scene, &good, &light), TRC_OK);
-#define REFUSE_LIGHT(change)                                      \
-    do {                                                          \
-        trc_light_desc desc = good;                               \
-        change;                                                   \
-        REFUSED(ARGUMENT, trc_light_create(scene, &desc, &id));   \
-        REFUSED(ARGUMENT, trc_light_update(scene, light, &desc)); \
+#define REFUSE_LIGHT_AS(status, change)                         \
+    do {                                                        \
+        trc_light_desc desc = good;                             \
+        change;                                                 \
+        REFUSED(status, trc_light_create(scene, &desc, &id));   \
+        REFUSED(status, trc_light_update(scene, light, &desc)); \
     } while (0)
+#define REFUSE_LIGHT(change) REFUSE_LIGHT_AS(ARGUMENT, change)
     REFUSE_LIGHT(desc.type = 4);
     REFUSE_LIGHT(desc.transform[7] = NAN);
     REFUSE_LIGHT(desc.color[0] = INFINITY);
@@ -551,13 +561,15 @@ static void lights(void **state) {
     REFUSE_LIGHT(desc.visibility = 32);
     REFUSE_LIGHT(desc.cast_shadow = 2);
     REFUSE_LIGHT(desc.use_mis = 7);
+    REFUSE_LIGHT_AS(LARGE, desc.light_group = TRC_MAX_LIGHT_GROUPS + 1);
     assert_true(id == UNTOUCHED);
 }
 
 static void cameras(void **state) {
     (void)state;
     const float singular[12] = {0}, nan[12] = {NAN, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
-    const float empty[4] = {0, 0, -1, 1}, infinite[4] = {-INFINITY, 1, -1, 1};
+    const float empty[4] = {0, 0, -1, 1}, flat[4] = {-1, 1, 1, 1};
+    const float infinite[4] = {-INFINITY, 1, -1, 1};
     const float curve[3] = {1, -1, 1}, nan_curve[2] = {NAN, 1}, dark[3] = {0, 0, 0};
 #define REFUSE_CAMERA(status, change)                        \
     do {                                                     \
@@ -574,6 +586,7 @@ static void cameras(void **state) {
     REFUSE_CAMERA(ARGUMENT, desc.transforms = MISALIGNED(float));
     REFUSE_CAMERA(ARGUMENT, desc.windows = NULL);
     REFUSE_CAMERA(ARGUMENT, desc.windows = empty);
+    REFUSE_CAMERA(ARGUMENT, desc.windows = flat);
     REFUSE_CAMERA(ARGUMENT, desc.windows = infinite);
     REFUSE_CAMERA(ARGUMENT, desc.window_key_count = 0);
     REFUSE_CAMERA(ARGUMENT, desc.window_key_count = 2);
@@ -669,9 +682,12 @@ static void images(void **state) {
     } while (0)
     REFUSE_IMAGE(ARGUMENT, desc.width = 0);
     REFUSE_IMAGE(LARGE, desc.width = 65537);
+    REFUSE_IMAGE(ARGUMENT, desc.height = 0);
+    REFUSE_IMAGE(LARGE, desc.height = 65537);
     REFUSE_IMAGE(LARGE, desc.width = 65536; desc.height = 65536);
     REFUSE_IMAGE(ARGUMENT, desc.alpha_mode = 4);
     REFUSE_IMAGE(ARGUMENT, desc.is_srgb = 2);
+    REFUSE_IMAGE(ARGUMENT, desc.is_mip_mapped = 2);
     REFUSE_IMAGE(ARGUMENT, desc.is_float = 2);
     REFUSE_IMAGE(ARGUMENT, desc.pixels = NULL);
     REFUSE_IMAGE(ARGUMENT, desc.pixel_bytes--);

@@ -32,14 +32,29 @@ static void message_is_formatted_and_cut(void **state) {
     (void)state;
     assert_int_equal(trc_fail(TRC_ERROR_TOO_LARGE, "%d of %s", 3, "four"), TRC_ERROR_TOO_LARGE);
     assert_string_equal(trc_last_message(), "3 of four");
-    /* 300 characters of 2 bytes: 511 is odd, so the cut falls within one. */
     char text[601] = {0};
-    for (int i = 0; i < 300; i++)
-        memcpy(text + 2 * i, "\xc3\xa4", 2);
+    memset(text, 'x', 600);
     (void)trc_fail(TRC_ERROR_IMAGE, "%s", text);
-    assert_int_equal(strlen(trc_last_message()), 510);
-    (void)trc_fail(TRC_ERROR_IMAGE, "x%s", text);
     assert_int_equal(strlen(trc_last_message()), 511);
+}
+
+/* Text of characters of each length, cut everywhere within one: what is left ends with a whole one.
+ */
+static void cut_messages_are_utf8(void **state) {
+    (void)state;
+    static const char *const characters[] = {"x", "\xc3\xa4", "\xe2\x82\xac", "\xf0\x9f\x98\x80",
+                                             "\x80" /* of no character: left as it is */};
+    char text[1024];
+    for (int c = 0; c < 5; c++) {
+        const size_t bytes = strlen(characters[c]);
+        for (size_t before = 0; before < 4; before++) {
+            memset(text, 'a', before);
+            for (size_t i = 0; i < 600 / bytes; i++)
+                memcpy(text + before + i * bytes, characters[c], bytes + 1);
+            (void)trc_fail(TRC_ERROR_IMAGE, "%s", text);
+            assert_int_equal(strlen(trc_last_message()), before + (511 - before) / bytes * bytes);
+        }
+    }
 }
 
 static void *other_thread_message(void *context) {
@@ -585,6 +600,7 @@ static void affine_inverts_what_it_can(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(message_is_formatted_and_cut),
+        cmocka_unit_test(cut_messages_are_utf8),
         cmocka_unit_test(message_is_per_thread),
         cmocka_unit_test(sizes_and_versions),
         cmocka_unit_test(memory_is_aligned_and_counted),
