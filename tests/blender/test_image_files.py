@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Images of several files and limited ones against Cycles'."""
+"""Images of several files, limited ones and projected ones against Cycles'."""
 
 import numpy as np
 
@@ -62,6 +62,33 @@ def inside_tiles():
         return made
     _stage(image)
     return _both()
+
+
+def inside_projections():
+    """A turned sphere that shows an image in every projection over its generated coordinates."""
+    import os
+    import tempfile
+    import bpy
+    import scenes
+    path = os.path.join(tempfile.mkdtemp(prefix="volley_"), "image.png")
+    _tile(path, 32, 3)
+    scenes.empty(size=(2 * SIZE, 2 * SIZE), samples=1)
+    scenes.camera(type='ORTHO', ortho_scale=2.2)
+    scenes.sharpen()
+    ball = scenes.sphere(material=scenes.emitter((1.0, 1.0, 1.0)))
+    ball.rotation_euler = (0.5, 0.3, 0.7)
+    tree = ball.data.materials[0].node_tree
+    node, place = tree.nodes.new("ShaderNodeTexImage"), tree.nodes.new("ShaderNodeTexCoord")
+    node.image = bpy.data.images.load(path)
+    emission = next(n for n in tree.nodes if n.type == 'EMISSION')
+    tree.links.new(place.outputs["Generated"], node.inputs["Vector"])
+    tree.links.new(node.outputs["Color"], emission.inputs["Color"])
+    pictures = {}
+    for projection, blend in (('FLAT', 0.0), ('BOX', 0.0), ('BOX', 0.4), ('BOX', 1.0), ('SPHERE', 0.0),
+                              ('TUBE', 0.0)):
+        node.projection, node.projection_blend = projection, blend
+        pictures[projection, blend] = _both()
+    return pictures
 
 
 def _close(ours, theirs, tolerance=1e-3):
@@ -154,3 +181,10 @@ def test_minified(blender):
     assert np.abs(ours - theirs).max() < 0.03 and np.abs(ours - theirs).mean() < 3e-3
     own, cycles = _variance(few, theirs)
     assert own < 0.5 * cycles
+
+
+def test_projections(blender):
+    pictures = blender.run(inside_projections)
+    for ours, theirs in pictures.values():
+        _close(ours, theirs, 2e-3)
+    assert np.abs(pictures['BOX', 0.4][1] - pictures['BOX', 0.0][1]).max() > 0.02

@@ -41,16 +41,19 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     const trc_scene scene = stage_scene();
     trc_id image = 0, material = 0;
     (void)trc_image_create(scene, &desc, &image);
-    const trc_node_input inputs[] = {{.node = 0}, {.node = 1}, {.node = -1, .value = {1.0f}}};
+    const trc_node_input inputs[] = {{.node = 0},
+                                     {.node = -1, .value = {bytes_float(&b)}},
+                                     {.node = 1},
+                                     {.node = -1, .value = {1.0f}}};
     const trc_node nodes[] = {
         {.type = TRC_NODE_TEXTURE_COORDINATE},
-        {.type = TRC_NODE_IMAGE, .mode = mode, .input_count = 1, .image = image},
-        {.type = TRC_NODE_EMISSION, .first_input = 1, .input_count = 2}};
+        {.type = TRC_NODE_IMAGE, .mode = mode, .input_count = 2, .image = image},
+        {.type = TRC_NODE_EMISSION, .first_input = 2, .input_count = 2}};
     const trc_material_desc shader = {.struct_size = sizeof shader,
                                       .node_count = 3,
                                       .nodes = nodes,
                                       .inputs = inputs,
-                                      .input_count = 3,
+                                      .input_count = 4,
                                       .surface = 2,
                                       .flags = TRC_MATERIAL_SAMPLE_EMISSION};
     (void)trc_material_create(scene, &shader, &material);

@@ -71,14 +71,15 @@ static trc_mesh_desc rich_mesh(void) {
 static void create_textured(struct session *s) {
     const trc_node nodes[3] = {
         {.type = TRC_NODE_UV_MAP, .name = "UVMap"},
-        {.type = TRC_NODE_IMAGE, .first_input = 0, .input_count = 1, .image = s->image},
-        {.type = TRC_NODE_DIFFUSE, .first_input = 1, .input_count = 3}};
-    const trc_node_input inputs[4] = {{.node = 0}, {.node = 1}, {.node = -1}, {.node = -2}};
+        {.type = TRC_NODE_IMAGE, .first_input = 0, .input_count = 2, .image = s->image},
+        {.type = TRC_NODE_DIFFUSE, .first_input = 2, .input_count = 3}};
+    const trc_node_input inputs[5] = {
+        {.node = 0}, {.node = -1}, {.node = 1}, {.node = -1}, {.node = -2}};
     const trc_material_desc desc = {.struct_size = sizeof desc,
                                     .node_count = 3,
                                     .nodes = nodes,
                                     .inputs = inputs,
-                                    .input_count = 4,
+                                    .input_count = 5,
                                     .surface = 2};
     STEP_OUT(s->material, trc_material_create(s->scene, &desc, &s->material));
     STEP(trc_material_update(s->scene, s->material, &desc));

@@ -89,7 +89,7 @@ static void test_conversions(void **state) {
 static int32_t add_image(trc_id image, const char *uv) {
     const int32_t map = add(TRC_NODE_UV_MAP, 0, 0, NULL);
     graph.nodes[map].name = uv;
-    const int32_t node = ADD(TRC_NODE_IMAGE, TRC_IMAGE_EXTEND, link_to(map, 0));
+    const int32_t node = ADD(TRC_NODE_IMAGE, TRC_IMAGE_EXTEND, link_to(map, 0), value(0));
     graph.nodes[node].image = image;
     return node;
 }
@@ -139,7 +139,7 @@ static bool mapped_image_has_density(uint32_t mode, float scale, float tilt) {
     graph.nodes[map].name = "map";
     const int32_t mapping = ADD(TRC_NODE_MAPPING, mode, link_to(map, 0), color(.1f, .2f, 0),
                                 color(tilt, 0, .7f), color(scale, 2, 1));
-    const int32_t node = ADD(TRC_NODE_IMAGE, 0, link_to(mapping, 0));
+    const int32_t node = ADD(TRC_NODE_IMAGE, 0, link_to(mapping, 0), value(0));
     graph.nodes[node].image = 3;
     add_diffuse(link_to(node, 0));
     struct trc_material *m = compiled();

@@ -395,7 +395,8 @@ def _image(walker, node, sockets):
             | _PROJECTIONS.get(node.projection, 0) << 4)
     if node.image is not None and node.image.source == 'TILED' and node.projection == 'FLAT':
         return _tiles(walker, walker.tiles_of(node), vector, mode)
-    index = walker.emit(IMAGE, (vector,), mode, image=walker.image_of(node))
+    blend = _constant('f', node.projection_blend)
+    index = walker.emit(IMAGE, (vector, blend), mode, image=walker.image_of(node))
     return _outputs(walker, index, (("Color", 'c'), ("Alpha", 'f')))
 
 
@@ -407,12 +408,12 @@ def _tiles(walker, tiles, vector, mode):
     place = _vector(walker, VECTOR_SUBTRACT, vector, floor)
     parts = walker.emit(SEPARATE, (floor,))
     color, alpha = _constant('c', 1.0, 0.0, 1.0), _constant('f', 1.0)
-    half = _constant('f', 0.5)
+    half, no_blend = _constant('f', 0.5), _constant('f', 0.0)
     for column, row, image in tiles:
         is_column, is_row = (_number(walker, _MATH_COMPARE, Value('f', parts, i), _constant('f', number), half)
                              for i, number in enumerate((float(column), float(row))))
         is_here = _number(walker, _MATH_MULTIPLY, is_column, is_row)
-        index = walker.emit(IMAGE, (place,), mode, image=image)
+        index = walker.emit(IMAGE, (place, no_blend), mode, image=image)
         color = Value('c', walker.emit(MIX_COLOR, (is_here, color, Value('c', index, 0))), 0)
         step = _number(walker, _MATH_SUBTRACT, Value('f', index, 1), alpha)
         alpha = _number(walker, _MATH_MULTIPLY_ADD, step, is_here, alpha)

@@ -49,8 +49,9 @@ enum {
     TRC_NODE_SHEEN = 16, /* c color, f roughness, c normal: the microfibres of Blender 4.0 */
 
     /* values */
-    TRC_NODE_IMAGE = 64, /* c vector -> c color, f alpha; image, interpolation in mode bits 0-1,
-                            extension in bits 2-3, projection in bits 4-5 */
+    TRC_NODE_IMAGE = 64, /* c vector, f blend -> c color, f alpha; image, interpolation in mode bits
+                            0-1, extension in bits 2-3, projection in bits 4-5: flat, box (blend:
+                            how far its sides run into each other, 0 to 1), sphere, tube */
     TRC_NODE_ENVIRONMENT = 65, /* c vector -> c color; image; mode: interpolation bits 0-1, bit 4: 0
                                   equirectangular, 1 mirror ball */
     TRC_NODE_UV_MAP = 66,      /* -> c uv; name: the attribute, "" for the default map */

@@ -195,7 +195,7 @@ static void run_at_surface(const struct trc_surface *s, const struct trc_instruc
                        s->active, out);
         break;
     case TRC_OP_IMAGE_BOX:
-        op_image_box(s, image_of(s, i->resource), i->mode, v3_read(in), out);
+        op_image_box(s, image_of(s, i->resource), i->mode, v3_read(in), in[3], out);
         break;
     default:
         break;

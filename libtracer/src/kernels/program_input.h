@@ -450,7 +450,8 @@ static vfloat op_light_path(const struct trc_surface *s, uint32_t mode) {
     case TRC_PATH_IS_DIFFUSE:
         return path_bit(s, TRC_VISIBLE_DIFFUSE);
     case TRC_PATH_IS_GLOSSY:
-        return path_bit(s, TRC_VISIBLE_GLOSSY);
+        /* As in Cycles also what was refracted, unlike for visibility. */
+        return path_bit(s, TRC_VISIBLE_GLOSSY | TRC_VISIBLE_TRANSMISSION);
     case TRC_PATH_IS_SINGULAR:
         return path_bit(s, TRC_PATH_SINGULAR);
     case TRC_PATH_IS_REFLECTION:

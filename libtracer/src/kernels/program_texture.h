@@ -45,20 +45,78 @@ static void op_project(uint32_t mode, vvec3 d, vfloat *out) {
     out[1] = vf_where(valid, one - vf_acos(z) * vf_set(TRC_INV_PI));
 }
 
-/* Box projection without blending: the side that the object-space normal faces most. */
-static void op_image_box(const struct trc_surface *s, const struct trc_image *image, uint32_t mode,
-                         vvec3 co, vfloat *out) {
-    const vvec3 n = op_object_normal(s), a = v3_abs(n);
+/* Where the sides of a box that face along an axis show an image, seen without mirroring. */
+static void box_side(vvec3 co, vvec3 n, int axis, vfloat *u, vfloat *v) {
     const vfloat zero = vf_zero(), one = vf_one();
-    const vmask is_x = vm_and(vf_gt(a.x, a.y), vf_gt(a.x, a.z));
-    const vmask is_y = vm_and(vf_gt(a.y, a.x), vf_gt(a.y, a.z));
-    const vmask is_z = vm_and(vf_gt(a.z, a.x), vf_gt(a.z, a.y));
-    /* Ties go to X, as in Cycles. */
-    vfloat u = vf_select(vf_lt(n.x, zero), one - co.y, co.y), v = co.z;
-    u = vf_select(is_y, vf_select(vf_gt(n.y, zero), one - co.x, co.x), u);
-    u = vf_select(is_z, vf_select(vf_gt(n.z, zero), one - co.y, co.y), u);
-    v = vf_select(vm_andnot(is_z, is_x), co.x, v);
-    texture_lookup(image, mode, u, v, vf_zero(), s->active, out);
+    if (axis == 0) {
+        *u = vf_select(vf_lt(n.x, zero), one - co.y, co.y);
+        *v = co.z;
+    } else if (axis == 1) {
+        *u = vf_select(vf_gt(n.y, zero), one - co.x, co.x);
+        *v = co.z;
+    } else {
+        *u = vf_select(vf_gt(n.z, zero), one - co.y, co.y);
+        *v = co.x;
+    }
+}
+
+/* How much of each pair of sides a normal with components a sees, as in Cycles: in the middle of a
+ * side that alone, towards an edge two and towards a corner three; blend (above 0) is how much of
+ * the way is mixed. */
+static void box_weights(const vfloat a[3], vfloat blend, vfloat w[3]) {
+    const vfloat zero = vf_zero(), one = vf_one(), half = vf_set(0.5f);
+    const vfloat limit = half * (one + blend), sum = a[0] + a[1] + a[2];
+    vmask left = vm_all_set();
+    for (int k = 0; k < 3; k++) /* towards a corner */
+        w[k] = ((vf_set(2.0f) - limit) * (a[k] / sum) + limit - one) / blend;
+    for (int k = 0; k < 3; k++) { /* one alone */
+        const int p = (k + 1) % 3, q = (k + 2) % 3;
+        const vmask alone = vm_and(
+            left, vm_and(vf_gt(a[k], limit * (a[k] + a[p])), vf_gt(a[k], limit * (a[k] + a[q]))));
+        w[k] = vf_select(alone, one, w[k]);
+        w[p] = vf_select(alone, zero, w[p]);
+        w[q] = vf_select(alone, zero, w[q]);
+        left = vm_andnot(left, alone);
+    }
+    for (int k = 0; k < 3; k++) { /* two, where k is far */
+        const int p = (k + 1) % 3, q = (k + 2) % 3;
+        const vmask pair = vm_and(left, vf_lt(a[k], (one - limit) * (a[p] + a[q])));
+        const vfloat share = vf_saturate((a[p] / (a[p] + a[q]) - half * (one - blend)) / blend);
+        w[k] = vf_select(pair, zero, w[k]);
+        w[p] = vf_select(pair, share, w[p]);
+        w[q] = vf_select(pair, one - share, w[q]);
+        left = vm_andnot(left, pair);
+    }
+}
+
+/* Box projection by the object-space normal. Without blend the side that it faces most; ties go to
+ * X, as in Cycles. */
+static void op_image_box(const struct trc_surface *s, const struct trc_image *image, uint32_t mode,
+                         vvec3 co, vfloat blend, vfloat *out) {
+    const vvec3 n = op_object_normal(s), a = v3_abs(n);
+    const vfloat zero = vf_zero();
+    vfloat u[3], v[3];
+    for (int axis = 0; axis < 3; axis++)
+        box_side(co, n, axis, &u[axis], &v[axis]);
+    if (!vm_any(vf_gt(blend, zero))) {
+        const vmask is_y = vm_and(vf_gt(a.y, a.x), vf_gt(a.y, a.z));
+        const vmask is_z = vm_and(vf_gt(a.z, a.x), vf_gt(a.z, a.y));
+        texture_lookup(image, mode, vf_select(is_z, u[2], vf_select(is_y, u[1], u[0])),
+                       vf_select(is_z, v[2], vf_select(is_y, v[1], v[0])), zero, s->active, out);
+        return;
+    }
+    vfloat w[3], side[4];
+    box_weights((vfloat[3]){a.x, a.y, a.z}, blend, w);
+    for (int c = 0; c < 4; c++)
+        out[c] = zero;
+    for (int axis = 0; axis < 3; axis++) {
+        const vmask seen = vm_and(s->active, vf_gt(w[axis], zero));
+        if (!vm_any(seen))
+            continue;
+        texture_lookup(image, mode, u[axis], v[axis], zero, seen, side);
+        for (int c = 0; c < 4; c++)
+            out[c] = out[c] + vf_select(seen, w[axis] * side[c], zero);
+    }
 }
 
 /* vector, color 1, color 2, scale -> color, factor */

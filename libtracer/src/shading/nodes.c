@@ -31,7 +31,7 @@ static const struct trc_node_info infos[] = {
      "s"},
     {TRC_NODE_SHEEN, "Sheen", "cfn", "color roughness normal", "s"},
 
-    {TRC_NODE_IMAGE, "Image", "u", "vector", "cf"},
+    {TRC_NODE_IMAGE, "Image", "uf", "vector blend", "cf"},
     {TRC_NODE_ENVIRONMENT, "Environment", "p", "vector", "c"},
     {TRC_NODE_UV_MAP, "UV Map", "", "", "v"},
     {TRC_NODE_COLOR_ATTRIBUTE, "Color Attribute", "", "", "cf"},

@@ -59,7 +59,7 @@
     /* textures */                                                                          \
     X(IMAGE, 3, 4, 0)     /* u, v, density of these or 0; mode: TRC_IMAGE_MODE_*;           \
                              resource: image; RGBA */                                       \
-    X(IMAGE_BOX, 3, 4, 0) /* vector; the same */                                            \
+    X(IMAGE_BOX, 4, 4, 0) /* vector, blend; the same */                                     \
     X(PROJECT, 3, 2, 1)   /* vector -> u, v; mode: TRC_PROJECT_* */                         \
     X(CHECKER, 10, 4, 1)  /* vector, color 1, color 2, scale -> color, factor */            \
     /* procedural textures; TRC_MODE_NO_COLOR */                                            \

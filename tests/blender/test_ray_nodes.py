@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What nodes say of the ray that asks and of the surface it met, beside Cycles."""
+
+import numpy as np
+import pytest
+
+SIZE = 64
+LIGHT_PATH = ("Is Camera Ray", "Is Diffuse Ray", "Is Glossy Ray", "Is Singular Ray", "Is Reflection Ray",
+              "Is Transmission Ray", "Ray Length", "Ray Depth", "Diffuse Depth", "Glossy Depth",
+              "Transparent Depth", "Transmission Depth")
+GEOMETRY = ("Position", "Normal", "True Normal", "Incoming", "Parametric", "Backfacing")
+
+
+# Inside Blender ------------------------------------------------------------------------------------
+
+def _shines(material, node_type):
+    """Give a material an emission alone, of outputs of a new node: the node, a way to choose one."""
+    tree = material.node_tree
+    tree.nodes.clear()
+    node, shown = tree.nodes.new(node_type), tree.nodes.new("ShaderNodeVectorMath")
+    emission, output = tree.nodes.new("ShaderNodeEmission"), tree.nodes.new("ShaderNodeOutputMaterial")
+    shown.operation = 'MULTIPLY_ADD'
+    shown.inputs[1].default_value, shown.inputs[2].default_value = (0.25,) * 3, (1.0,) * 3  # above 0
+    tree.links.new(shown.outputs[0], emission.inputs["Color"])
+    tree.links.new(emission.outputs[0], output.inputs["Surface"])
+    return lambda name: tree.links.new(node.outputs[name], shown.inputs[0])
+
+
+def _pictures(choose, names):
+    import scenes
+    found = {}
+    for name in names:
+        choose(name)
+        found[name] = [(picture[..., :3] - 1.0) * 4.0 for picture in scenes.by_both(1)]
+    return found
+
+
+def inside_light_path():
+    """Walls that shine with what they are told of a ray, seen past a mirror, a panel that refracts, one
+    that is transparent, a mirror behind that one, and directly."""
+    import bpy
+    import scenes
+    scenes.empty(size=(5 * SIZE, SIZE), samples=1)
+    scenes.camera(type='ORTHO', ortho_scale=10.0)
+    scenes.sharpen()
+    material = scenes.emitter((1.0, 1.0, 1.0))
+    for name, y in (("Behind", 3.0), ("Before", -9.0)):
+        scenes.wall(name, size=60.0, y=y, material=material)
+    kinds = {"mirror": ("ShaderNodeBsdfGlossy", {"Roughness": 0.0}),
+             "refraction": ("ShaderNodeBsdfRefraction", {"Roughness": 0.0, "IOR": 1.3}),
+             "transparent": ("ShaderNodeBsdfTransparent", {})}
+    for i, (kind, y) in enumerate((("mirror", 0.0), ("refraction", 0.0), ("transparent", 0.0),
+                                   ("mirror", 1.0))):
+        node_type, inputs = kinds[kind]
+        made = scenes.wall(f"Panel{i}", y=y, center=(2.0 * min(i, 3) - 4.0, 0.0),
+                           material=scenes.material(f"{kind}{i}", node_type, Color=(1.0, 1.0, 1.0, 1.0),
+                                                    **inputs))
+        made.rotation_euler.z = 0.2
+    veil = scenes.wall("Veil", y=-1.0, center=(2.0, 0.0), material=bpy.data.materials["transparent2"])
+    veil.rotation_euler.x = 0.3
+    return _pictures(_shines(material, "ShaderNodeLightPath"), LIGHT_PATH)
+
+
+def inside_shadows():
+    """A floor under a panel that only shadow rays do not see, and under one that only they see."""
+    import scenes
+    pictures = []
+    for first in ("ShaderNodeBsdfTransparent", "ShaderNodeBsdfDiffuse"):
+        scenes.empty(size=(SIZE, SIZE), samples=16)
+        scenes.camera(type='ORTHO', ortho_scale=4.0)
+        scenes.sharpen()
+        scenes.light('POINT', location=(0.0, -4.0, 0.0), energy=300.0, shadow_soft_size=0.0)
+        scenes.wall(size=5.0, y=1.0, material=scenes.material("Floor", "ShaderNodeBsdfDiffuse"))
+        material = scenes.material("Panel", "ShaderNodeBsdfDiffuse", Color=(0.8, 0.3, 0.2, 1.0))
+        tree = material.node_tree
+        diffuse = next(n for n in tree.nodes if n.type == 'BSDF_DIFFUSE')
+        clear, mix = tree.nodes.new("ShaderNodeBsdfTransparent"), tree.nodes.new("ShaderNodeMixShader")
+        path = tree.nodes.new("ShaderNodeLightPath")
+        output = next(n for n in tree.nodes if n.type == 'OUTPUT_MATERIAL')
+        order = (diffuse, clear) if first == "ShaderNodeBsdfDiffuse" else (clear, diffuse)
+        tree.links.new(path.outputs["Is Shadow Ray"], mix.inputs[0])
+        for socket, node in zip((mix.inputs[1], mix.inputs[2]), order):
+            tree.links.new(node.outputs[0], socket)
+        tree.links.new(mix.outputs[0], output.inputs["Surface"])
+        scenes.wall("Panel", size=1.0, y=-1.0, material=material)
+        pictures.append([picture[..., :3] for picture in scenes.by_both(16)])
+    return pictures
+
+
+def inside_geometry():
+    """A smooth bowl, turned, moved and scaled, from both sides, shining with what it is told of itself."""
+    import scenes
+    scenes.empty(size=(2 * SIZE, SIZE), samples=1)
+    scenes.camera(type='ORTHO', ortho_scale=5.0)
+    scenes.sharpen()
+    material = scenes.emitter((1.0, 1.0, 1.0))
+    for name, x, turn in (("Inner", -1.25, 0.3), ("Outer", 1.25, 2.8)):
+        made = scenes.sphere(name, location=(x, 0.0, 0.0), material=material)
+        bowl = made.data
+        import bmesh
+        mesh = bmesh.new()
+        mesh.from_mesh(bowl)
+        bmesh.ops.delete(mesh, geom=[v for v in mesh.verts if v.co.y < -0.1], context='VERTS')
+        mesh.to_mesh(bowl)
+        mesh.free()
+        made.rotation_euler = (0.2, 0.1, turn)
+        made.scale = (1.1, 1.1, 1.1)
+    return _pictures(_shines(material, "ShaderNodeNewGeometry"), GEOMETRY)
+
+
+# Comparison ----------------------------------------------------------------------------------------
+
+def _beyond(ours, theirs, tolerance=1e-3):
+    """The share of pixels that are off by more; edges of what moves a pixel may fall on either side."""
+    limit = tolerance * np.maximum(np.abs(theirs), 1.0)
+    return (np.abs(ours - theirs) > limit).any(axis=-1).mean()
+
+
+@pytest.fixture(scope="module")
+def light_path(blender_of_module):
+    return blender_of_module.run(inside_light_path)
+
+
+@pytest.mark.parametrize("name", LIGHT_PATH)
+def test_light_path(light_path, name):
+    ours, theirs = light_path[name]
+    assert _beyond(ours, theirs) <= 0.005
+    if "Diffuse" not in name:  # where nothing bounces off what is matt
+        assert np.ptp(theirs) > 0.5, "all rays are alike"
+
+
+@pytest.fixture(scope="module")
+def geometry(blender_of_module):
+    return blender_of_module.run(inside_geometry)
+
+
+@pytest.mark.parametrize("name", GEOMETRY)
+def test_geometry(geometry, name):
+    ours, theirs = geometry[name]
+    # Parametric changes most from pixel to pixel, and Cycles samples all of one.
+    assert _beyond(ours, theirs, 5e-3 if name == "Parametric" else 1e-3) <= 0.02
+    assert np.ptp(theirs) > 0.5
+
+
+def test_shadow_rays(blender):
+    for ours, theirs in blender.run(inside_shadows):
+        assert _beyond(ours, theirs, 5e-3) <= 0.04  # pixels at the shadow's edge, as wide as Cycles' box
+        assert np.ptp(theirs) > 0.05
