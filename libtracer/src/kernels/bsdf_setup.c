@@ -93,40 +93,11 @@ static vvec3 leaf_normal(struct setup *c, const struct trc_leaf *leaf, uint32_t 
     return c->default_n;
 }
 
-/* Blender's tangent when no UV map is given: around the z axis of the object's Generated box, made
- * orthogonal to the shading normal. One lane at a time: anisotropy without a tangent is rare. */
-static vvec3 default_tangent(const struct trc_surface *s) {
-    const struct trc_snapshot *scene = s->snapshot;
-    float t[3][TRC_WIDTH];
-    memset(t, 0, sizeof t);
-    for (int lane = 0; lane < TRC_WIDTH; lane++) {
-        const int32_t number_of = vi_get(s->instance, lane);
-        if (!((vm_bits(s->active) >> lane) & 1u) || number_of < 0)
-            continue;
-        const struct trc_instance *instance = &scene->instances[number_of];
-        const struct trc_mesh *mesh = scene->meshes[instance->mesh];
-        const uint32_t *corner = mesh->indices + 3 * (size_t)vi_get(s->triangle, lane);
-        const float u = vf_get(s->u, lane), v = vf_get(s->v, lane), w = 1.0f - u - v;
-        float generated[2];
-        for (int axis = 0; axis < 2; axis++) {
-            const float at = w * mesh->positions[3 * (size_t)corner[0] + (size_t)axis] +
-                             u * mesh->positions[3 * (size_t)corner[1] + (size_t)axis] +
-                             v * mesh->positions[3 * (size_t)corner[2] + (size_t)axis];
-            const float size = mesh->bounds_upper[axis] - mesh->bounds_lower[axis];
-            generated[axis] = size > 0.0f ? (at - mesh->bounds_lower[axis]) / size - 0.5f : 0.0f;
-        }
-        const float *inverse = instance->world_to_object[0].m;
-        for (int row = 0; row < 3; row++)
-            t[row][lane] = inverse[row] * -generated[1] + inverse[4 + row] * generated[0];
-    }
-    const vvec3 around = v3(vf_load(t[0]), vf_load(t[1]), vf_load(t[2]));
-    return v3_cross(s->n, v3_normalize(v3_cross(around, s->n)));
-}
-
-/* The leaf's tangent, turned about n by rotation (in turns), then orthogonal to n. */
+/* The tangent of an anisotropic leaf, turned about n by rotation (in turns), then orthogonal to n.
+ */
 static vvec3 leaf_tangent(const struct setup *c, const struct trc_leaf *leaf, uint32_t at, vvec3 n,
                           vfloat rotation) {
-    const vvec3 t = is_unlinked(c, leaf, at) ? default_tangent(c->s) : colour(c, leaf, at);
+    const vvec3 t = colour(c, leaf, at);
     vfloat sine, cosine;
     vf_sincos_turns(rotation, &sine, &cosine);
     const vvec3 along = v3_scale(n, v3_dot(n, t) * (vf_one() - cosine));
