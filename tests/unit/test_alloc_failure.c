@@ -7,6 +7,7 @@
 #include <stdlib.h>
 
 #include "core/core.h"
+#include "meshes.h"
 
 #define UNTOUCHED UINT64_C(0x1234567812345678)
 
@@ -112,12 +113,21 @@ static void create_objects(struct session *s) {
 
 static void set_view(struct session *s) {
     static const float curve[3] = {0, 1, 0};
-    struct default_material background;
-    default_material_init(&background, TRC_NODE_BACKGROUND);
+    /* A sky that differs by direction: its importance is mapped. */
+    const trc_node nodes[2] = {{.type = TRC_NODE_TEXTURE_COORDINATE},
+                               {.type = TRC_NODE_BACKGROUND, .input_count = 2}};
+    const trc_node_input inputs[2] = {{.node = 0}, {.node = -1, .value = {1.0f}}};
+    const trc_material_desc background = {.struct_size = sizeof background,
+                                          .node_count = 2,
+                                          .nodes = nodes,
+                                          .inputs = inputs,
+                                          .input_count = 2,
+                                          .surface = 1};
     trc_id material = 0;
-    STEP_OUT(material, trc_material_create(s->scene, &background.desc, &material));
+    STEP_OUT(material, trc_material_create(s->scene, &background, &material));
     trc_world_desc world = default_world_desc(material);
     world.use_sampling = 1;
+    world.map_resolution = 16;
     STEP(trc_scene_set_world(s->scene, &world));
     trc_camera_desc camera = default_camera_desc();
     camera.shutter_time = 0.5f;
@@ -301,6 +311,50 @@ static void handles_without_memory(void **state) {
     assert_int_equal(trc_scene_destroy(shown), TRC_OK);
 }
 
+/* A mesh of so many triangles that all threads build its tree, posed, refitted and built anew. */
+static void large_trees_without_memory(void **state) {
+    (void)state;
+    struct mesh grid;
+    mesh_init(&grid);
+    mesh_add_grid(&grid, (float[3]){-1, -1, 0}, (float[3]){2, 0, 0}, (float[3]){0, 2, 0}, 100, 100);
+    const uint64_t floats = 3 * (uint64_t)grid.vertex_count;
+    float *lifted = malloc(floats * sizeof *lifted);
+    assert_non_null(lifted);
+    for (uint64_t i = 0; i < floats; i++)
+        lifted[i] = grid.positions[i] + (i % 3 == 2 ? 0.01f : 0.0f);
+    trc_mesh_desc desc = default_mesh_desc();
+    desc.vertex_count = grid.vertex_count;
+    desc.triangle_count = grid.triangle_count;
+    desc.positions = grid.positions;
+    desc.position_count = floats;
+    desc.indices = grid.indices;
+    desc.index_count = 3 * (uint64_t)grid.triangle_count;
+    for (uint32_t is_final = 0; is_final < 2; is_final++) {
+        bool pending = false;
+        for (int64_t n = 0; !pending; n++) {
+            const uint64_t before = trc_memory_bytes();
+            trc_scene_desc scene_desc = default_scene_desc();
+            scene_desc.is_final = is_final;
+            struct session s = {0};
+            STEP_OUT(s.scene, trc_scene_create(&scene_desc, &s.scene));
+            STEP_OUT(s.mesh, trc_mesh_create(s.scene, &desc, &s.mesh));
+            const trc_instance_desc instance = default_instance_desc(s.mesh);
+            STEP_OUT(s.instance, trc_instance_create(s.scene, &instance, &s.instance));
+            trc_memory_fail_at(n, false);
+            STEP(trc_scene_commit(s.scene));
+            STEP(trc_mesh_update(s.scene, s.mesh, 1, lifted, floats, NULL, 0));
+            STEP(trc_scene_commit(s.scene));
+            STEP(trc_mesh_update(s.scene, s.mesh, 1, grid.positions, floats, NULL, 0));
+            STEP(trc_scene_commit(s.scene));
+            pending = is_pending(n);
+            STEP(trc_scene_destroy(s.scene));
+            assert_int_equal(trc_memory_bytes(), before);
+        }
+    }
+    free(lifted);
+    mesh_free(&grid);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(each_operation_fails_once),
@@ -308,6 +362,7 @@ int main(void) {
         cmocka_unit_test(each_operation_of_a_final_frame_fails_once),
         cmocka_unit_test(renders_go_on_with_fewer_threads),
         cmocka_unit_test(handles_without_memory),
+        cmocka_unit_test(large_trees_without_memory),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
