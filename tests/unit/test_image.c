@@ -467,6 +467,45 @@ static void test_16_bits(void **state) {
     remove(path);
 }
 
+/* Smaller levels, and a smaller image, of 16 bits: means of a linear function. */
+static void test_16_bits_made_smaller(void **state) {
+    (void)state;
+    static const char head[] = "P6\n64 64\n65535\n";
+    static uint8_t bytes[sizeof head - 1 + (size_t)LEVEL_SIDE * LEVEL_SIDE * 6];
+    memcpy(bytes, head, sizeof head - 1);
+    for (int i = 0; i < LEVEL_SIDE * LEVEL_SIDE; i++)
+        for (int c = 0; c < 3; c++) { /* words, the high byte first, the top row first */
+            const int x = i % LEVEL_SIDE, y = LEVEL_SIDE - 1 - i / LEVEL_SIDE;
+            const int value = 500 * x + 100 * (c + 1) * y;
+            bytes[(int)sizeof head - 1 + 6 * i + 2 * c] = (uint8_t)(value >> 8);
+            bytes[(int)sizeof head - 1 + 6 * i + 2 * c + 1] = (uint8_t)value;
+        }
+    write_file("e.ppm", bytes, sizeof bytes);
+    trc_image_desc desc = file_desc();
+    desc.is_mip_mapped = 1;
+    struct trc_image *image = loaded(&desc);
+    assert_int_equal(image->format, TRC_TEXEL_U16);
+    assert_int_equal(image->level_count, 3);
+    desc.max_side = LEVEL_SIDE / 2;
+    desc.is_mip_mapped = 0;
+    struct trc_image *half = loaded(&desc);
+    assert_int_equal(half->levels[0].width, LEVEL_SIDE / 2);
+    const uint16_t *texels = half->levels[0].texels;
+    for (int i = 0; i < 8 * 8; i++)
+        for (int c = 0; c < 3; c++) {
+            const double x = 8 * (i % 8) + 3.5, y = 8 * (double)(i / 8) + 3.5;
+            const double mean = (500 * x + 100 * (c + 1) * y) / UINT16_MAX;
+            assert_true(fabs(level_value(image, 2, (uint64_t)(4 * i + c)) - mean) < 1e-3 * mean);
+            const double near =
+                500 * (2 * (i % 8) + .5) + 100 * (c + 1) * (2 * (double)(i / 8) + .5);
+            const int at = 4 * (LEVEL_SIDE / 2 * (i / 8) + i % 8) + c;
+            assert_true(fabs(texels[at] - near) <= 1.5);
+        }
+    trc_image_release(image);
+    trc_image_release(half);
+    remove(path);
+}
+
 static void test_exr(void **state) {
     (void)state;
     static const uint16_t expected[12] = {0x3c00, 0x4000, 0x4400, 0x3c00};
@@ -735,6 +774,7 @@ int main(void) {
 #ifdef TRC_WITH_OIIO
         cmocka_unit_test(test_targa),
         cmocka_unit_test(test_16_bits),
+        cmocka_unit_test(test_16_bits_made_smaller),
         cmocka_unit_test(test_exr),
         cmocka_unit_test(test_hdr),
         cmocka_unit_test(test_truncated_files),
