@@ -145,7 +145,7 @@ def _nishita(walker, formula, node, direction):
     turns = formula.number(_DIVIDE, formula.number(_ARCTAN2, x, y), 2.0 * math.pi)
     turns = formula.number(_ADD, turns, 0.5 - node.sun_rotation / (2.0 * math.pi))
     place = formula.combine(formula.number(_FRACT, turns), row, 0.0)
-    color = Value('v', walker.emit(_IMAGE, (place,), _IMAGE_EXTEND, image=image), 0)
+    color = Value('v', walker.emit(_IMAGE, (place, _number(0.0)), _IMAGE_EXTEND, image=image), 0)
     # Below the horizon its colours fade out.
     fade = formula.number(_MULTIPLY_ADD, formula.number(_MINIMUM, z, 0.0), 2.5, 1.0)
     fade = formula.number(_MAXIMUM, fade, 0.0)
