@@ -31,7 +31,7 @@ struct opened {
     float planes[6][TRC_NODE_WIDTH]; /* low and high along u, v; near and far along z */
     float z[TRC_NODE_WIDTH];         /* nearest mirrored z */
     uint64_t mask;                   /* rays that reached it */
-    uint32_t first;                  /* bits of the children that the first of those meets */
+    uint32_t first; /* bits of the children that the first of those meets; wide beams: none */
 } __attribute__((aligned(64)));
 
 /* A subtree to visit: a child of an opened node. */
@@ -489,8 +489,11 @@ TRC_INLINE int node_open(const struct walk *w, uint32_t node, uint64_t mask, boo
         f8_store(o->planes[plane], planes[plane]);
     f8_store(o->z, key);
     o->mask = mask;
-    o->first = planes_ray(w, planes, __builtin_ctzll(mask));
-    TRC_COUNT(box_rays, __builtin_popcount(bits));
+    o->first = 0;
+    if (b->is_narrow) {
+        TRC_COUNT(box_rays, __builtin_popcount(bits));
+        o->first = planes_ray(w, planes, __builtin_ctzll(mask));
+    }
     const uint32_t *children = trc_node_children(w->tree, node);
     const int bottom = top;
     for (; bits; bits &= bits - 1) {
