@@ -31,7 +31,7 @@ PACKET_ITEMS = (
     ('4', "2 x 2", "4 rays in a packet"),
     ('16', "4 x 4", "16 rays in a packet"),
     ('64', "8 x 8", "64 rays in a packet"),
-    ('256', "16 x 16", "256 rays in a row, traced 64 at a time: the same as 8 x 8"),
+    ('256', "16 x 16", "256 rays in a packet where they stay together, 64 elsewhere"),
 )
 SAMPLER_ITEMS = (
     ('SOBOL', "Sobol", "Joint Owen-scrambled Sobol sequence"),

@@ -9,9 +9,10 @@
 #include "buffers.h"
 #include "volley.h"
 
-static struct trace_counts counts; /* of the trace that runs */
-#define TRC_COUNT(what, amount) (counts.what += (uint64_t)(amount))
+#define TRC_COUNT(what, amount) (counted_steps.what += (uint64_t)(amount))
 #include "kernels/trace.c"
+
+struct trace_counts counted_steps;
 
 struct trace_counts counted_trace(const struct trc_snapshot *snapshot,
                                   const struct ray_list *list) {
@@ -20,11 +21,11 @@ struct trace_counts counted_trace(const struct trc_snapshot *snapshot,
     const struct volley volley = {snapshot, &kernels};
     const struct contestant c = volley_contestant(&volley);
     void *memory = buffer_alloc(1, c.calls->batch_bytes(&c, list));
-    counts = (struct trace_counts){0};
+    counted_steps = (struct trace_counts){0};
     for (uint32_t batch = 0; batch < list->batch_count; batch++) {
         c.calls->load(&c, list, batch, memory);
         c.calls->trace(&c, list, batch, memory);
     }
     free(memory);
-    return counts;
+    return counted_steps;
 }

@@ -6,6 +6,9 @@
 #include "contestant.h"
 #include "trace_counts.h"
 
+/* Of the trace that runs. */
+extern struct trace_counts counted_steps;
+
 /* Traces a list on the calling thread and counts. Not for several threads at once. */
 struct trace_counts counted_trace(const struct trc_snapshot *snapshot, const struct ray_list *list);
 

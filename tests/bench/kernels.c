@@ -4,10 +4,11 @@
 
 #include "kernels/kernels.h"
 
-#define DECLARE(isa)                                                               \
-    void trc_trace_closest_##isa(const struct trc_snapshot *, struct trc_packet *, \
-                                 struct trc_packet_hits *);                        \
-    uint64_t trc_trace_occluded_##isa(const struct trc_snapshot *, struct trc_packet *);
+#define DECLARE(isa)                                                                          \
+    void trc_trace_closest_##isa(const struct trc_snapshot *, struct trc_packet *,            \
+                                 struct trc_packet_hits *, uint32_t);                         \
+    void trc_trace_occluded_##isa(const struct trc_snapshot *, struct trc_packet *, uint32_t, \
+                                  uint64_t *);
 #define ENTRY(isa) \
     { trc_trace_closest_##isa, trc_trace_occluded_##isa }
 

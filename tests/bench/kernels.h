@@ -7,9 +7,10 @@
 #include "kernels/packet.h"
 
 struct packet_kernels {
-    void (*closest)(const struct trc_snapshot *snapshot, struct trc_packet *packet,
-                    struct trc_packet_hits *hits);
-    uint64_t (*occluded)(const struct trc_snapshot *snapshot, struct trc_packet *packet);
+    void (*closest)(const struct trc_snapshot *snapshot, struct trc_packet *packets,
+                    struct trc_packet_hits *hits, uint32_t packet_count);
+    void (*occluded)(const struct trc_snapshot *snapshot, struct trc_packet *packets,
+                     uint32_t packet_count, uint64_t *occluded);
 };
 
 /* NULL where the build or the CPU lacks that instruction set. */

@@ -164,13 +164,16 @@ static uint32_t sample_cell(const struct maker *m, const struct sample *s) {
 
 /* ---- the list ---- */
 
-static void packet_open(struct ray_list *list) {
+static void packet_open(struct ray_list *list, uint32_t key) {
     if (list->packet_count + 1 >= list->packet_capacity) {
         const uint32_t capacity = list->packet_capacity ? 2 * list->packet_capacity : 1024;
         list->packet_begin = buffer_grow(list->packet_begin, list->packet_count * sizeof(uint32_t),
                                          capacity, sizeof(uint32_t));
+        list->packet_key = buffer_grow(list->packet_key, list->packet_count * sizeof(uint32_t),
+                                       capacity, sizeof(uint32_t));
         list->packet_capacity = capacity;
     }
+    list->packet_key[list->packet_count] = key;
     list->packet_begin[list->packet_count++] = list->rays.count;
 }
 
@@ -186,7 +189,7 @@ static void batch_append(struct maker *m, bool breaks) {
     for (uint32_t i = 0; i < m->ray_count; i++) {
         const struct ray *r = &m->rays[i];
         if (filled == TRC_PACKET_SIZE || (breaks && i && r->key != m->rays[i - 1].key)) {
-            packet_open(list);
+            packet_open(list, r->key);
             filled = 0;
         }
         ray_set_add(&list->rays, r->o, r->d, 0.0f, r->tmax, r->time);
@@ -317,7 +320,7 @@ static void packet_trace(struct maker *m, uint32_t begin, uint32_t count) {
         p->t[i] = r->tmax;
         p->time[i] = r->time;
     }
-    m->kernels->closest(m->snapshot, p, &m->hits);
+    m->kernels->closest(m->snapshot, p, &m->hits, 1);
 }
 
 /* False where lane i met nothing, or a triangle without area. */
@@ -425,6 +428,9 @@ static bool is_occlusion(enum ray_kind kind) {
     return kind == RAY_POINT_SHADOW || kind == RAY_AREA_SHADOW || kind == RAY_HEMISPHERE_SHORT;
 }
 
+/* Kinds whose packets the renderer takes four at a time. */
+static bool stays_together(enum ray_kind kind) { return kind <= RAY_REFRACTION; }
+
 /* No batch has fewer samples than a square of pixels. */
 static uint32_t most_batches(const struct options *options) {
     const uint32_t squares = TILE_SIDE * TILE_SIDE / (SQUARE * SQUARE);
@@ -443,7 +449,10 @@ void ray_list_make(struct ray_list *list, enum ray_kind kind, enum ray_order ord
     *list = (struct ray_list){.kind = kind,
                               .order = order,
                               .any = is_occlusion(kind),
-                              .common_origin = kind == RAY_PRIMARY};
+                              .common_origin = kind == RAY_PRIMARY,
+                              .bundle = getenv("BUNDLE")       ? (uint32_t)atoi(getenv("BUNDLE"))
+                                        : stays_together(kind) ? TRC_BUNDLE
+                                                               : 1};
     ray_set_init(&list->rays);
     list->batch_begin = buffer_alloc(most_batches(options) + 1, sizeof(uint32_t));
     list->batch_packet = buffer_alloc(most_batches(options) + 1, sizeof(uint32_t));
@@ -457,7 +466,7 @@ void ray_list_make(struct ray_list *list, enum ray_kind kind, enum ray_order ord
                         .lens = kind == RAY_LENS};
     for (uint32_t tile = 0; tile < options->tiles; tile++)
         tile_make(m, tile);
-    packet_open(list); /* the end, which is no packet */
+    packet_open(list, 0); /* the end, which is no packet */
     list->packet_count--;
     list->batch_begin[list->batch_count] = list->rays.count;
     list->batch_packet[list->batch_count] = list->packet_count;
@@ -470,5 +479,6 @@ void ray_list_free(struct ray_list *list) {
     free(list->batch_begin);
     free(list->batch_packet);
     free(list->packet_begin);
+    free(list->packet_key);
     *list = (struct ray_list){0};
 }

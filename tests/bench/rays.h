@@ -41,12 +41,14 @@ struct ray_list {
     enum ray_order order;
     bool any;           /* occlusion, not the nearest hit */
     bool common_origin; /* of each packet's rays */
+    uint32_t bundle;    /* most packets that go through the tree together */
     struct ray_set rays;
     /* Batches follow each other, and so do the packets of a batch: first ray of each, and one more
      * at the end. A packet never holds rays of two batches. */
     uint32_t batch_count, packet_count, packet_capacity;
     uint32_t *batch_begin, *packet_begin;
     uint32_t *batch_packet; /* first packet of each batch, and one more at the end */
+    uint32_t *packet_key;   /* of each packet's first ray: packets that go together share it */
 };
 
 /* Rays of one batch at most. */

@@ -6,7 +6,7 @@
 #define ULP 0x1p-23
 #define EXTENT 10.0f /* of the wall: rays pass through it, however steep */
 
-static const uint32_t packet_sizes[] = {1, 4, 64};
+static const uint32_t packet_sizes[] = {1, 4, 64, 256};
 
 /* A wall in the plane where the axis has the value of height, which moves to height + travel. */
 struct wall {

@@ -32,8 +32,8 @@ typedef struct trc_hits {
     float *normal_x, *normal_y, *normal_z; /* geometric, world, not normalised, by winding */
 } trc_hits;
 
-/* Rays are taken in packets of packet_size neighbours: 1, 4, 16, 64 or 256; 0 chooses. 256 means
- * 64, the most that are traced together. */
+/* Rays are taken in packets of packet_size neighbours: 1, 4, 16, 64 or 256; 0 chooses. 256 is
+ * for rays that mostly meet the same triangles. */
 TRC_API trc_status trc_query_closest(trc_scene scene, const trc_rays *rays, uint32_t packet_size,
                                      const trc_hits *hits_out);
 

@@ -121,8 +121,8 @@ typedef struct trc_render_desc {
     float filter_glossy;      /* Cycles' Filter Glossy; 0 off */
     float clamp_direct, clamp_indirect; /* as Cycles; 0 off */
     uint32_t assembly;
-    uint32_t packet_size; /* 4, 16, 64 or 256; 0 chooses. 256 is the paper's largest; rays are
-                             traced 64 at a time all the same, so it means 64 */
+    uint32_t packet_size; /* 4, 16, 64 or 256; 0 chooses. 256, the paper's largest: where rays stay
+                             together (camera, ideal bounces, one light), and 64 elsewhere */
     uint32_t sampler;
     uint32_t seed;
     uint32_t filter;           /* TRC_FILTER_* */

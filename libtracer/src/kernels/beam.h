@@ -17,7 +17,7 @@
 #define TRACER_KERNELS_BEAM_H
 
 #include "bvh/tree.h"
-#include "kernels/packet.h"
+#include "kernels/live.h"
 #include "kernels/triangle.h"
 
 #define TRC_SLACK 2.4e-6f
@@ -41,12 +41,17 @@ struct trc_beam {
     bool is_narrow; /* rays mostly meet the same boxes */
 };
 
-/* Everything a traversal derives from a packet for one group of its rays. */
-struct trc_group {
-    struct trc_beam beam;
+/* What a traversal derives from each ray of a packet. */
+struct trc_sheared {
     float su[TRC_PACKET_SIZE], sv[TRC_PACKET_SIZE], sz[TRC_PACKET_SIZE]; /* shear; sz = 1 / dz */
     float inv[3][TRC_PACKET_SIZE], shift[3][TRC_PACKET_SIZE];            /* 1 / d, -o / d: finite */
     float f[TRC_PACKET_SIZE]; /* moving trees: position between the keys */
+} __attribute__((aligned(64)));
+
+/* Everything a traversal derives from the packets of a walk for one group of their rays. */
+struct trc_group {
+    struct trc_beam beam;
+    struct trc_sheared of[TRC_WALK_PACKETS];
     float f_min, f_max;
     /* Packets of one origin: it, and the range of shears, in the order u, v, z. */
     float origin[3], su_min, su_max, sv_min, sv_max;
@@ -80,20 +85,23 @@ TRC_INLINE void trc_ends_of_origin(struct trc_group *g, const float plane[2],
     }
 }
 
-TRC_INLINE void trc_ends_of_rays(const struct trc_group *g, const struct trc_packet *p,
-                                 uint64_t mask, const float plane[2], struct trc_beam_ends *e) {
+TRC_INLINE void trc_ends_of_rays(const struct trc_group *g, const struct trc_packet *packets,
+                                 const struct trc_live *mask, const float plane[2],
+                                 struct trc_beam_ends *e) {
     const struct trc_shear axis = g->beam.axis;
     const vfloat inf = vf_set(INFINITY);
     vfloat u_low[2] = {inf, inf}, u_high[2] = {-inf, -inf}, v_low[2] = {inf, inf},
            v_high[2] = {-inf, -inf};
-    for (int c = 0; c < TRC_PACKET_CHUNKS; c++) {
-        const uint32_t bits = trc_chunk_bits(mask, c);
+    for (int c = 0; c < TRC_WALK_CHUNKS; c++) {
+        const uint32_t bits = trc_live_bits(mask, c);
         if (!bits)
             continue;
-        const int i = c * TRC_WIDTH;
+        const struct trc_packet *p = &packets[c / TRC_PACKET_CHUNKS];
+        const struct trc_sheared *r = &g->of[c / TRC_PACKET_CHUNKS];
+        const int i = c % TRC_PACKET_CHUNKS * TRC_WIDTH;
         const vmask m = vm_from_bits(bits);
         const vfloat oz = vf_load(&p->o[axis.z][i]);
-        const vfloat su = vf_load(&g->su[i]), sv = vf_load(&g->sv[i]);
+        const vfloat su = vf_load(&r->su[i]), sv = vf_load(&r->sv[i]);
         for (int end = 0; end < 2; end++) {
             const vfloat dz = vf_set(plane[end]) - oz;
             const vfloat u = vf_load(&p->o[axis.u][i]) + dz * su;
@@ -119,34 +127,37 @@ struct trc_group_reach {
 };
 
 /* Shear and inverses of the rays in mask; of packets of one origin the range of shears. */
-TRC_INLINE struct trc_group_reach trc_group_rays(struct trc_group *g, const struct trc_packet *p,
-                                                 uint64_t mask) {
+TRC_INLINE struct trc_group_reach trc_group_rays(struct trc_group *g,
+                                                 const struct trc_packet *packets,
+                                                 const struct trc_live *mask) {
     const int au = g->beam.axis.u, av = g->beam.axis.v, z = g->beam.axis.z;
-    const bool common = p->common_origin;
+    const bool common = packets->common_origin;
     const vfloat sign = vf_set(g->beam.sign), inf = vf_set(INFINITY);
     vfloat z_near = inf, z_far = -inf, origin = vf_set(0.0f);
     vfloat su_min = inf, su_max = -inf, sv_min = inf, sv_max = -inf;
-    for (int c = 0; c < TRC_PACKET_CHUNKS; c++) {
-        const uint32_t bits = trc_chunk_bits(mask, c);
+    for (int c = 0; c < TRC_WALK_CHUNKS; c++) {
+        const uint32_t bits = trc_live_bits(mask, c);
         if (!bits)
             continue;
-        const int i = c * TRC_WIDTH;
+        const struct trc_packet *p = &packets[c / TRC_PACKET_CHUNKS];
+        struct trc_sheared *r = &g->of[c / TRC_PACKET_CHUNKS];
+        const int i = c % TRC_PACKET_CHUNKS * TRC_WIDTH;
         const vmask m = vm_from_bits(bits);
         const vfloat du = vf_load(&p->d[au][i]), dv = vf_load(&p->d[av][i]),
                      dz = vf_load(&p->d[z][i]);
         const vfloat ou = vf_load(&p->o[au][i]), ov = vf_load(&p->o[av][i]),
                      oz = vf_load(&p->o[z][i]);
         const vfloat sz = vf_set(1.0f) / dz, su = du * sz, sv = dv * sz;
-        vf_store(&g->sz[i], sz);
-        vf_store(&g->su[i], su);
-        vf_store(&g->sv[i], sv);
+        vf_store(&r->sz[i], sz);
+        vf_store(&r->su[i], su);
+        vf_store(&r->sv[i], sv);
         const vfloat inv_u = trc_safe_inverse(du), inv_v = trc_safe_inverse(dv);
-        vf_store(&g->inv[au][i], inv_u);
-        vf_store(&g->inv[av][i], inv_v);
-        vf_store(&g->inv[z][i], sz);
-        vf_store(&g->shift[au][i], -ou * inv_u);
-        vf_store(&g->shift[av][i], -ov * inv_v);
-        vf_store(&g->shift[z][i], -oz * sz);
+        vf_store(&r->inv[au][i], inv_u);
+        vf_store(&r->inv[av][i], inv_v);
+        vf_store(&r->inv[z][i], sz);
+        vf_store(&r->shift[au][i], -ou * inv_u);
+        vf_store(&r->shift[av][i], -ov * inv_v);
+        vf_store(&r->shift[z][i], -oz * sz);
         z_near = vf_min_where(m, z_near, sign * (oz + vf_load(&p->tmin[i]) * dz));
         z_far = vf_max_where(m, z_far, sign * (oz + vf_load(&p->t[i]) * dz));
         if (common) {
@@ -163,7 +174,8 @@ TRC_INLINE struct trc_group_reach trc_group_rays(struct trc_group *g, const stru
         reach.origin = vf_lanes_max(origin);
         return reach;
     }
-    const int first = __builtin_ctzll(mask);
+    const int k = trc_live_first(mask), first = __builtin_ctzll(mask->of[k]);
+    const struct trc_packet *p = &packets[k];
     g->origin[0] = p->o[au][first];
     g->origin[1] = p->o[av][first];
     g->origin[2] = p->o[z][first];
@@ -177,13 +189,14 @@ TRC_INLINE struct trc_group_reach trc_group_rays(struct trc_group *g, const stru
 
 /* Shear, inverses and beam of the rays in mask, all of dominant axis z and that side, against a
  * tree. False: none can reach the tree. */
-TRC_INLINE bool trc_group_setup(struct trc_group *g, const struct trc_packet *p,
-                                const struct trc_tree *tree, uint64_t mask, int z, int side) {
+TRC_INLINE bool trc_group_setup(struct trc_group *g, const struct trc_packet *packets,
+                                const struct trc_tree *tree, const struct trc_live *mask, int z,
+                                int side) {
     struct trc_beam *b = &g->beam;
     b->axis = (struct trc_shear){(z + 1) % 3, (z + 2) % 3, z};
     b->side = side;
     b->sign = side ? -1.0f : 1.0f;
-    const struct trc_group_reach reach = trc_group_rays(g, p, mask);
+    const struct trc_group_reach reach = trc_group_rays(g, packets, mask);
     b->slack = TRC_SLACK * (reach.origin + tree->extent) + TRC_LEAST_SLACK;
     const float low = side ? -tree->upper[z] : tree->lower[z];
     const float high = side ? -tree->lower[z] : tree->upper[z];
@@ -193,10 +206,10 @@ TRC_INLINE bool trc_group_setup(struct trc_group *g, const struct trc_packet *p,
         return false;
     const float plane[2] = {b->sign * b->z0, b->sign * b->z1};
     struct trc_beam_ends e;
-    if (p->common_origin)
+    if (packets->common_origin)
         trc_ends_of_origin(g, plane, &e);
     else
-        trc_ends_of_rays(g, p, mask, plane, &e);
+        trc_ends_of_rays(g, packets, mask, plane, &e);
     const float length = b->z1 - b->z0;
     /* In a beam no longer than its slack, rounding would be most of a slope. */
     const bool is_short = length < f_max(b->slack, TRC_SHORT_BEAM);

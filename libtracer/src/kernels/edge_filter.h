@@ -68,8 +68,8 @@ TRC_INLINE uint32_t trc_edge_filter_setup(const struct trc_group *g, f8 v[3][3],
 
 /* Lanes of chunk i that may pass the triangle in slot. */
 TRC_INLINE uint32_t trc_edge_filter_lanes(const struct trc_edge_filter *e,
-                                          const struct trc_group *g, int slot, int i) {
-    const vfloat su = vf_load(&g->su[i]), sv = vf_load(&g->sv[i]);
+                                          const struct trc_sheared *r, int slot, int i) {
+    const vfloat su = vf_load(&r->su[i]), sv = vf_load(&r->sv[i]);
     vfloat value[3];
     for (int k = 0; k < 3; k++)
         value[k] = vf_madd(vf_set(e->n[k][0][slot]), su,

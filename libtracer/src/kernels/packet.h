@@ -40,16 +40,23 @@ TRC_INLINE uint32_t trc_chunk_bits(uint64_t mask, int c) {
 #endif
 }
 
+/* Packets of a bundle at most. */
+#define TRC_BUNDLE 4
+
 struct trc_bvh;
 struct trc_snapshot;
 
+/* A bundle: 1 to TRC_BUNDLE packets that go through the tree together, so that nodes and leaves
+ * are met once. They agree in all but their rays; common_origin is of the rays of all. Where
+ * packets part ways, a bundle costs more than each alone. */
+
 /* Nearest hit of each active ray in (tmin, t]; among equal distances the lowest (instance,
  * triangle). */
-void TRC_KERNEL(trc_trace_closest)(const struct trc_snapshot *snapshot, struct trc_packet *packet,
-                                   struct trc_packet_hits *hits);
+void TRC_KERNEL(trc_trace_closest)(const struct trc_snapshot *snapshot, struct trc_packet *packets,
+                                   struct trc_packet_hits *hits, uint32_t packet_count);
 
-/* Active rays with anything in (tmin, t), as a mask. t is left as it was. */
-uint64_t TRC_KERNEL(trc_trace_occluded)(const struct trc_snapshot *snapshot,
-                                        struct trc_packet *packet);
+/* Active rays with anything in (tmin, t): a mask for each packet. t is left as it was. */
+void TRC_KERNEL(trc_trace_occluded)(const struct trc_snapshot *snapshot, struct trc_packet *packets,
+                                    uint32_t packet_count, uint64_t *occluded);
 
 #endif

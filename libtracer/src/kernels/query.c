@@ -35,21 +35,51 @@ static bool ray_load(const trc_rays *rays, uint64_t from, int lane, struct trc_p
     return true;
 }
 
-static void packet_load(const trc_rays *rays, uint64_t begin, uint32_t count, struct trc_packet *p,
-                        int power[TRC_PACKET_SIZE]) {
-    p->active = 0;
-    p->common_origin = true;
-    for (uint32_t i = 0; i < count; i++)
-        if (ray_load(rays, begin + i, (int)i, p, &power[i]))
-            p->active |= 1ull << i;
-    const int first = p->active ? __builtin_ctzll(p->active) : 0;
-    for (uint64_t m = p->active; m && p->common_origin; m &= m - 1) {
-        const int i = __builtin_ctzll(m);
-        for (int k = 0; k < 3; k++)
-            p->common_origin = p->common_origin && p->o[k][i] == p->o[k][first];
+/* Rays on their way through packets, by 64. */
+struct load {
+    uint32_t count, packet_count;
+    struct trc_packet packets[TRC_BUNDLE];
+    struct trc_packet_hits hits[TRC_BUNDLE];
+    int power[TRC_BUNDLE * TRC_PACKET_SIZE];
+};
+
+/* Whether all active rays start where the first of them does. */
+static bool has_common_origin(const struct load *l) {
+    const struct trc_packet *first = NULL;
+    int lane = 0;
+    for (uint32_t k = 0; k < l->packet_count; k++) {
+        const struct trc_packet *p = &l->packets[k];
+        for (uint64_t m = p->active; m; m &= m - 1) {
+            const int i = __builtin_ctzll(m);
+            if (!first) {
+                first = p;
+                lane = i;
+            }
+            for (int axis = 0; axis < 3; axis++)
+                if (p->o[axis][i] != first->o[axis][lane])
+                    return false;
+        }
     }
-    p->visibility = rays->visibility;
-    p->skip_transparent = false;
+    return true;
+}
+
+static void rays_load(const trc_rays *rays, uint64_t begin, uint32_t count, struct load *l) {
+    l->count = count;
+    l->packet_count = (count + TRC_PACKET_SIZE - 1) / TRC_PACKET_SIZE;
+    for (uint32_t k = 0; k < l->packet_count; k++) {
+        l->packets[k].active = 0;
+        l->packets[k].visibility = rays->visibility;
+        l->packets[k].skip_transparent = false;
+    }
+    for (uint32_t i = 0; i < count; i++) {
+        struct trc_packet *p = &l->packets[i / TRC_PACKET_SIZE];
+        const int lane = (int)(i % TRC_PACKET_SIZE);
+        if (ray_load(rays, begin + i, lane, p, &l->power[i]))
+            p->active |= 1ull << lane;
+    }
+    const bool common = has_common_origin(l);
+    for (uint32_t k = 0; k < l->packet_count; k++)
+        l->packets[k].common_origin = common;
 }
 
 static void hit_store(const struct trc_snapshot *snapshot, const trc_hits *out, uint64_t to,
@@ -108,18 +138,16 @@ void TRC_KERNEL(trc_query_normal)(const struct trc_snapshot *snapshot, uint32_t 
 void TRC_KERNEL(trc_query_closest_rays)(const struct trc_snapshot *snapshot, const trc_rays *rays,
                                         const trc_hits *hits, uint64_t begin, uint64_t end,
                                         uint32_t packet_size) {
-    struct trc_packet p;
-    struct trc_packet_hits h;
-    int power[TRC_PACKET_SIZE];
-    const uint32_t size = packet_size < TRC_PACKET_SIZE ? packet_size : TRC_PACKET_SIZE;
-    for (uint64_t at = begin; at < end; at += size) {
-        const uint32_t count = end - at < size ? (uint32_t)(end - at) : size;
-        packet_load(rays, at, count, &p, power);
-        memset(h.instance, 0xff, sizeof h.instance);
-        TRC_KERNEL(trc_trace_closest)(snapshot, &p, &h);
-        for (uint32_t i = 0; i < count; i++) {
-            if ((p.active >> i & 1u) && h.instance[i] != TRC_NO_HIT)
-                hit_store(snapshot, hits, at + i, &p, &h, i, power[i]);
+    struct load l;
+    for (uint64_t at = begin; at < end; at += packet_size) {
+        rays_load(rays, at, end - at < packet_size ? (uint32_t)(end - at) : packet_size, &l);
+        for (uint32_t k = 0; k < l.packet_count; k++)
+            memset(l.hits[k].instance, 0xff, sizeof l.hits[k].instance);
+        TRC_KERNEL(trc_trace_closest)(snapshot, l.packets, l.hits, l.packet_count);
+        for (uint32_t i = 0; i < l.count; i++) {
+            const uint32_t k = i / TRC_PACKET_SIZE, lane = i % TRC_PACKET_SIZE;
+            if ((l.packets[k].active >> lane & 1u) && l.hits[k].instance[lane] != TRC_NO_HIT)
+                hit_store(snapshot, hits, at + i, &l.packets[k], &l.hits[k], lane, l.power[i]);
             else
                 hits->instance[at + i] = TRC_NO_HIT;
         }
@@ -129,14 +157,12 @@ void TRC_KERNEL(trc_query_closest_rays)(const struct trc_snapshot *snapshot, con
 void TRC_KERNEL(trc_query_occluded_rays)(const struct trc_snapshot *snapshot, const trc_rays *rays,
                                          uint8_t *occluded, uint64_t begin, uint64_t end,
                                          uint32_t packet_size) {
-    struct trc_packet p;
-    int power[TRC_PACKET_SIZE];
-    const uint32_t size = packet_size < TRC_PACKET_SIZE ? packet_size : TRC_PACKET_SIZE;
-    for (uint64_t at = begin; at < end; at += size) {
-        const uint32_t count = end - at < size ? (uint32_t)(end - at) : size;
-        packet_load(rays, at, count, &p, power);
-        const uint64_t blocked = TRC_KERNEL(trc_trace_occluded)(snapshot, &p);
-        for (uint32_t i = 0; i < count; i++)
-            occluded[at + i] = (uint8_t)(blocked >> i & 1u);
+    struct load l;
+    uint64_t blocked[TRC_BUNDLE];
+    for (uint64_t at = begin; at < end; at += packet_size) {
+        rays_load(rays, at, end - at < packet_size ? (uint32_t)(end - at) : packet_size, &l);
+        TRC_KERNEL(trc_trace_occluded)(snapshot, l.packets, l.packet_count, blocked);
+        for (uint32_t i = 0; i < l.count; i++)
+            occluded[at + i] = (uint8_t)(blocked[i / TRC_PACKET_SIZE] >> i % TRC_PACKET_SIZE & 1u);
     }
 }

@@ -7,10 +7,9 @@
 #include "kernels/tile.h"
 #include "kernels/wide_math.h"
 
-static void packet_load(struct trc_tile *t, const uint32_t *order, uint32_t count,
-                        uint32_t visibility) {
+static void packet_load(const struct trc_tile *t, const uint32_t *order, uint32_t count,
+                        uint32_t visibility, struct trc_packet *p) {
     const struct trc_shadow_store *q = &t->shadows;
-    struct trc_packet *p = &t->packet;
     p->active = 0;
     for (uint32_t i = 0; i < count; i += TRC_WIDTH) {
         const vmask m = vm_first((int32_t)(count - i));
@@ -79,17 +78,17 @@ static vvec3 surface_transparency(struct trc_tile *t, const struct trc_packet *p
     return through;
 }
 
-/* Walks the packet's rays from surface to surface; factor: what of their light arrives. Returns the
+/* Walks a packet's rays from surface to surface; factor: what of their light arrives. Returns the
  * rays that are blocked after all. */
-static uint64_t transparency(struct trc_tile *t, float factor[3][TRC_PACKET_SIZE]) {
-    struct trc_packet *p = &t->packet;
-    struct trc_packet_hits *hits = &t->packet_hits;
+static uint64_t transparency(struct trc_tile *t, struct trc_packet *p,
+                             float factor[3][TRC_PACKET_SIZE]) {
+    struct trc_packet_hits *hits = t->packet_hits;
     float reach[TRC_PACKET_SIZE];
     uint64_t blocked = 0;
     memcpy(reach, p->t, sizeof reach);
     for (uint32_t depth = 0; p->active; depth++) {
         memset(hits->instance, 0xff, sizeof hits->instance);
-        TRC_KERNEL(trc_trace_closest)(t->snapshot, p, hits);
+        TRC_KERNEL(trc_trace_closest)(t->snapshot, p, hits, 1);
         uint64_t next = 0;
         for (int c = 0; c < TRC_PACKET_CHUNKS; c++) {
             const int i = c * TRC_WIDTH;
@@ -172,30 +171,44 @@ static void groups_add(struct trc_tile *t) {
     }
 }
 
-/* Traces the rays [begin, end) of the order, which see what has that visibility, and takes from
- * what they carry what does not arrive. */
+/* Takes from what a packet's rays carry what does not arrive; blocked: by what is opaque. */
+static void packet_take(struct trc_tile *t, struct trc_packet *p, const uint32_t *order,
+                        uint32_t count, uint64_t blocked) {
+    t->job->counts.rays_shadow += (uint64_t)__builtin_popcountll(p->active);
+    if (t->snapshot->features & TRC_FEATURE_TRANSPARENCY) {
+        float factor[3][TRC_PACKET_SIZE];
+        for (int k = 0; k < 3; k++)
+            for (int i = 0; i < TRC_PACKET_SIZE; i++)
+                factor[k][i] = 1.0f;
+        p->active &= ~blocked;
+        blocked |= transparency(t, p, factor);
+        for (uint32_t i = 0; i < count; i++)
+            light_scale(t, order[i], factor[0][i], factor[1][i], factor[2][i]);
+    }
+    for (; blocked; blocked &= blocked - 1)
+        light_scale(t, order[__builtin_ctzll(blocked)], 0.0f, 0.0f, 0.0f);
+}
+
+/* Traces the rays [begin, end) of the order, which see what has that visibility, in bundles of
+ * packets that go to one place of a light. */
 static void rays_trace(struct trc_tile *t, uint32_t begin, uint32_t end, uint32_t visibility) {
     const struct trc_shadow_store *q = &t->shadows;
-    const bool transparent = t->snapshot->features & TRC_FEATURE_TRANSPARENCY;
-    for (; begin < end; begin += t->packet_size) {
-        const uint32_t count = end - begin < t->packet_size ? end - begin : t->packet_size;
+    while (begin < end) {
         const uint32_t *order = q->order + begin;
-        float factor[3][TRC_PACKET_SIZE];
-        packet_load(t, order, count, visibility);
-        uint64_t blocked = TRC_KERNEL(trc_trace_occluded)(t->snapshot, &t->packet);
-        const uint64_t traced = t->packet.active;
-        t->job->counts.rays_shadow += (uint64_t)__builtin_popcountll(traced);
-        if (transparent) {
-            for (int k = 0; k < 3; k++)
-                for (int i = 0; i < TRC_PACKET_SIZE; i++)
-                    factor[k][i] = 1.0f;
-            t->packet.active = traced & ~blocked;
-            blocked |= transparency(t, factor);
-            for (uint32_t i = 0; i < count; i++)
-                light_scale(t, order[i], factor[0][i], factor[1][i], factor[2][i]);
-        }
-        for (; blocked; blocked &= blocked - 1)
-            light_scale(t, order[__builtin_ctzll(blocked)], 0.0f, 0.0f, 0.0f);
+        uint32_t packets = 0, taken = 0, counts[TRC_BUNDLE];
+        do {
+            const uint32_t left = end - begin - taken;
+            const uint32_t count = left < t->packet_size ? left : t->packet_size;
+            packet_load(t, order + taken, count, visibility, &t->packets[packets]);
+            counts[packets++] = count;
+            taken += count;
+        } while (packets < t->bundle && begin + taken < end &&
+                 q->target[order[taken]] == q->target[order[0]]);
+        uint64_t blocked[TRC_BUNDLE];
+        TRC_KERNEL(trc_trace_occluded)(t->snapshot, t->packets, packets, blocked);
+        for (uint32_t k = 0; k < packets; order += counts[k++])
+            packet_take(t, &t->packets[k], order, counts[k], blocked[k]);
+        begin += taken;
     }
 }
 

@@ -179,10 +179,9 @@ static void keys_by_direction(struct trc_tile *t) {
     }
 }
 
-static void packet_trace(struct trc_tile *t, const uint32_t *order, uint32_t count) {
+static void packet_load(struct trc_tile *t, const uint32_t *order, uint32_t count,
+                        struct trc_packet *p, struct trc_packet_hits *h) {
     const struct trc_ray_store *r = &t->work;
-    struct trc_packet *p = &t->packet;
-    struct trc_packet_hits *h = &t->packet_hits;
     float *const to[] = {p->o[0], p->o[1], p->o[2], p->d[0], p->d[1],
                          p->d[2], p->tmin, p->t,    p->time};
     static const int from[] = {TRC_RAY_OX, TRC_RAY_OY,   TRC_RAY_OZ,   TRC_RAY_DX,  TRC_RAY_DY,
@@ -211,7 +210,10 @@ static void packet_trace(struct trc_tile *t, const uint32_t *order, uint32_t cou
     p->common_origin = (path & TRC_VISIBLE_CAMERA) && t->camera_common;
     p->skip_transparent = false;
     memset(h->instance, 0xff, count * sizeof *h->instance);
-    TRC_KERNEL(trc_trace_closest)(t->snapshot, p, h);
+}
+
+static void hits_store(struct trc_tile *t, const uint32_t *order, uint32_t count,
+                       const struct trc_packet *p, const struct trc_packet_hits *h) {
     for (uint32_t i = 0; i < count; i++) {
         const uint32_t ray = order[i];
         t->hits.t[ray] = p->t[i];
@@ -239,6 +241,37 @@ static void count_rays(struct trc_tile *t) {
     }
 }
 
+/* Packets of t->order, each from begin to end. */
+struct bundle {
+    uint32_t count;
+    uint32_t begin[TRC_BUNDLE], end[TRC_BUNDLE];
+};
+
+/* Whether rays of this one's kind mostly meet the same nodes as their neighbours: not once they
+ * have been scattered. */
+static bool stays_together(const struct trc_tile *t, uint32_t ray) {
+    return (t->work.w[TRC_RAY_PATH][ray] & TRC_VISIBLE_CAMERA) ||
+           t->work.f[TRC_RAY_PDF][ray] < 0.0f;
+}
+
+/* Whether the packet that begins there goes with those of the bundle. */
+static bool bundle_takes(const struct trc_tile *t, const struct bundle *b, uint32_t begin) {
+    const uint32_t first = t->order[b->begin[0]], ray = t->order[begin];
+    return b->count < t->bundle && t->keys[first] == t->keys[ray] && stays_together(t, first) &&
+           stays_together(t, ray);
+}
+
+static void bundle_trace(struct trc_tile *t, struct bundle *b) {
+    for (uint32_t k = 0; k < b->count; k++)
+        packet_load(t, t->order + b->begin[k], b->end[k] - b->begin[k], &t->packets[k],
+                    &t->packet_hits[k]);
+    TRC_KERNEL(trc_trace_closest)(t->snapshot, t->packets, t->packet_hits, b->count);
+    for (uint32_t k = 0; k < b->count; k++)
+        hits_store(t, t->order + b->begin[k], b->end[k] - b->begin[k], &t->packets[k],
+                   &t->packet_hits[k]);
+    b->count = 0;
+}
+
 static void trace_batch(struct trc_tile *t) {
     const uint32_t count = t->work.count;
     const bool runs = t->desc->assembly == TRC_ASSEMBLY_RUNS;
@@ -248,6 +281,7 @@ static void trace_batch(struct trc_tile *t) {
     else
         for (uint32_t i = 0; i < count; i++)
             t->keys[i] = assembly_key(t, i);
+    struct bundle bundle = {0};
     TRC_KERNEL(trc_tile_sort)(t, t->keys, count, t->order);
     for (uint32_t begin = 0; begin < count;) {
         const uint32_t key = t->keys[t->order[begin]];
@@ -256,9 +290,14 @@ static void trace_batch(struct trc_tile *t) {
                (!runs || t->work.w[TRC_RAY_PARENT][t->order[end]] ==
                              t->work.w[TRC_RAY_PARENT][t->order[begin]]))
             end++;
-        packet_trace(t, t->order + begin, end - begin);
+        if (bundle.count && !bundle_takes(t, &bundle, begin))
+            bundle_trace(t, &bundle);
+        bundle.begin[bundle.count] = begin;
+        bundle.end[bundle.count++] = end;
         begin = end;
     }
+    if (bundle.count)
+        bundle_trace(t, &bundle);
     count_rays(t);
 }
 
@@ -597,6 +636,7 @@ void TRC_KERNEL(trc_tile_render)(struct trc_tile_job *job) {
                        job->snapshot->camera.type == TRC_CAMERA_PERSPECTIVE;
     t->packet_size =
         job->desc->packet_size < TRC_PACKET_SIZE ? job->desc->packet_size : TRC_PACKET_SIZE;
+    t->bundle = job->desc->packet_size / t->packet_size;
     beam_setup(t);
     t->clock = &job->counts.seconds_other;
     t->clock_start = trc_seconds();

@@ -134,6 +134,7 @@ struct trc_tile {
     bool object_motion;         /* rays need times */
     bool camera_common;         /* camera rays start at one point */
     uint32_t packet_size;       /* 1..TRC_PACKET_SIZE */
+    uint32_t bundle;            /* packets of a bundle at most, where rays stay together */
     float beam_width;           /* of a camera sample where it starts, metres */
     float beam_spread;          /* and what it widens by per metre */
     double *clock, clock_start; /* the stage whose time is running */
@@ -144,8 +145,8 @@ struct trc_tile {
     struct trc_shadow_store shadows;
     uint32_t *order;       /* of the rays of a step */
     uint32_t *keys, *bins; /* scratch of sorts: TRC_BATCH or TRC_SHADOW_QUEUE, bins */
-    struct trc_packet packet;
-    struct trc_packet_hits packet_hits;
+    struct trc_packet packets[TRC_BUNDLE];
+    struct trc_packet_hits packet_hits[TRC_BUNDLE];
 };
 
 /* Rays that share their dominant axis and its side share a beam (kernels/trace.c): six cells of

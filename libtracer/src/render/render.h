@@ -11,7 +11,7 @@
 
 /* Shadow rays per camera hit where the caller leaves the choice: many pixel samples do the rest. */
 #define TRC_DEFAULT_LIGHT_SAMPLES 1
-#define TRC_DEFAULT_PACKET_SIZE 64
+#define TRC_DEFAULT_PACKET_SIZE 256
 
 /* Deepest path there is. Limits above it ("none") mean this: a path must end, and kernels count the
  * depths of a ray in 8 bits each. */

@@ -22,6 +22,6 @@ extern struct trace_counts frame_tests[RAY_CLASSES];
 enum ray_class frame_tests_class(uint32_t visibility);
 
 #define TRC_COUNT(what, amount) \
-    (frame_tests[frame_tests_class(w->packet->visibility)].what += (uint64_t)(amount))
+    (frame_tests[frame_tests_class(w->packets->visibility)].what += (uint64_t)(amount))
 
 #endif
