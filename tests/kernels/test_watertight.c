@@ -49,19 +49,19 @@ static uint64_t count_misses(const struct aim *aim, trc_scene scene, uint32_t co
     return misses;
 }
 
-/* Three parts of the rays in packets of 64, 16 and 1; joined and instanced trees share them. */
+/* Four parts of the rays in packets of 256, 64, 16 and 1; joined and instanced trees share them. */
 static void expect_closed(const char *name, const struct query_world *world, const struct aim *aim,
                           uint32_t rays) {
-    static const uint32_t sizes[] = {64, 16, 1};
-    const uint32_t count = (rays + 5) / 6;
+    static const uint32_t sizes[] = {256, 64, 16, 1};
+    const uint32_t count = (rays + 7) / 8;
     uint64_t misses = 0;
     for (int is_final = 0; is_final < 2; is_final++) {
         struct query_scene scene = query_test_scene(world, is_final);
-        for (uint32_t i = 0; i < 3; i++)
+        for (uint32_t i = 0; i < 4; i++)
             misses += count_misses(aim, scene.scene, count, sizes[i], 2 * i + (uint32_t)is_final);
         query_scene_destroy(&scene);
     }
-    print_misses(name, misses, 6ull * count);
+    print_misses(name, misses, 8ull * count);
     assert_int_equal(misses, 0);
 }
 

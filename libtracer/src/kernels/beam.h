@@ -53,6 +53,7 @@ struct trc_group {
     struct trc_beam beam;
     struct trc_sheared of[TRC_WALK_PACKETS];
     float f_min, f_max;
+    float z_origin; /* how far along z an origin is from the beam's near plane, at most */
     /* Packets of one origin: it, and the range of shears, in the order u, v, z. */
     float origin[3], su_min, su_max, sv_min, sv_max;
 } __attribute__((aligned(64)));
@@ -124,6 +125,7 @@ TRC_INLINE void trc_ends_of_rays(const struct trc_group *g, const struct trc_pac
  * start. */
 struct trc_group_reach {
     float z_near, z_far, origin;
+    float z_origin_low, z_origin_high; /* mirrored */
 };
 
 /* Shear and inverses of the rays in mask; of packets of one origin the range of shears. */
@@ -134,6 +136,7 @@ TRC_INLINE struct trc_group_reach trc_group_rays(struct trc_group *g,
     const bool common = packets->common_origin;
     const vfloat sign = vf_set(g->beam.sign), inf = vf_set(INFINITY);
     vfloat z_near = inf, z_far = -inf, origin = vf_set(0.0f);
+    vfloat z_origin_low = inf, z_origin_high = -inf;
     vfloat su_min = inf, su_max = -inf, sv_min = inf, sv_max = -inf;
     for (int c = 0; c < TRC_WALK_CHUNKS; c++) {
         const uint32_t bits = trc_live_bits(mask, c);
@@ -167,11 +170,15 @@ TRC_INLINE struct trc_group_reach trc_group_rays(struct trc_group *g,
             sv_max = vf_max_where(m, sv_max, sv);
         } else {
             origin = vf_max_where(m, origin, vf_max(vf_abs(ou), vf_max(vf_abs(ov), vf_abs(oz))));
+            z_origin_low = vf_min_where(m, z_origin_low, sign * oz);
+            z_origin_high = vf_max_where(m, z_origin_high, sign * oz);
         }
     }
     struct trc_group_reach reach = {.z_near = vf_lanes_min(z_near), .z_far = vf_lanes_max(z_far)};
     if (!common) {
         reach.origin = vf_lanes_max(origin);
+        reach.z_origin_low = vf_lanes_min(z_origin_low);
+        reach.z_origin_high = vf_lanes_max(z_origin_high);
         return reach;
     }
     const int k = trc_live_first(mask), first = __builtin_ctzll(mask->of[k]);
@@ -184,6 +191,7 @@ TRC_INLINE struct trc_group_reach trc_group_rays(struct trc_group *g,
     g->sv_min = vf_lanes_min(sv_min);
     g->sv_max = vf_lanes_max(sv_max);
     reach.origin = f_max(fabsf(g->origin[0]), f_max(fabsf(g->origin[1]), fabsf(g->origin[2])));
+    reach.z_origin_low = reach.z_origin_high = g->beam.sign * g->origin[2];
     return reach;
 }
 
@@ -204,6 +212,8 @@ TRC_INLINE bool trc_group_setup(struct trc_group *g, const struct trc_packet *pa
     b->z1 = f_min(reach.z_far, high) + b->slack;
     if (!(b->z0 <= b->z1))
         return false;
+    g->z_origin =
+        b->slack + f_max(fabsf(reach.z_origin_low - b->z0), fabsf(reach.z_origin_high - b->z0));
     const float plane[2] = {b->sign * b->z0, b->sign * b->z1};
     struct trc_beam_ends e;
     if (packets->common_origin)
@@ -288,9 +298,13 @@ TRC_INLINE void trc_beam_corners_set(const struct trc_beam *b, int corner, f8 u,
  * z: compared by their boxes and by the sides of the triangle's edges, for either winding. An edge
  * in motion has a quadratic edge function: its ends, and a quarter of its square term, bound it.
  * Rounding of the corners, 16 half-ulps of M at most (slopes are below 1.1, products below 3 M), is
- * within another slack on the rectangle. edges: false to compare boxes alone. */
-TRC_INLINE uint32_t trc_beam_triangles(const struct trc_beam *b, const struct trc_beam_corners *c,
-                                       const struct trc_beam_corners *later, bool edges) {
+ * within another slack on the rectangle. edges: false to compare boxes alone. t_error_out: see
+ * trc_triangle_test; a vertex is no farther from a ray than from the middle and that from the ray.
+ */
+TRC_INLINE uint32_t trc_beam_triangles(const struct trc_group *g, const struct trc_beam_corners *c,
+                                       const struct trc_beam_corners *later, bool edges,
+                                       f8 *t_error_out) {
+    const struct trc_beam *b = &g->beam;
     f8 z_low = f8_min(c->z[0], f8_min(c->z[1], c->z[2]));
     f8 z_high = f8_max(c->z[0], f8_max(c->z[1], c->z[2]));
     f8 u_low = f8_min(c->u[0], f8_min(c->u[1], c->u[2]));
@@ -316,6 +330,9 @@ TRC_INLINE uint32_t trc_beam_triangles(const struct trc_beam *b, const struct tr
         slack;
     const uint32_t boxes = f8_le(from, to) & f8_le(u_low, u_half) & f8_le(-u_half, u_high) &
                            f8_le(v_low, v_half) & f8_le(-v_half, v_high);
+    *t_error_out = trc_t_error_most(f8_max(f8_abs(u_low), f8_abs(u_high)) + u_half,
+                                    f8_max(f8_abs(v_low), f8_abs(v_high)) + v_half,
+                                    f8_max(f8_abs(z_low), f8_abs(z_high)) + f8_set(g->z_origin));
     if (!boxes || !edges)
         return boxes;
     const f8 rounding = f8_set(TRC_EDGE_ROUNDING);

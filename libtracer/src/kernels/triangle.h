@@ -36,6 +36,20 @@
 TRC_T_ERROR(trc_t_error, vfloat, vf_set)
 TRC_T_ERROR(trc_t_error8, f8, f8_set)
 
+/* At least trc_t_error over |inv| of all rays to whom a triangle's x, y, z are at most so much:
+ * edge functions are at most 2 x y then. 1.001: both are rounded. */
+TRC_INLINE f8 trc_t_error_most(f8 x, f8 y, f8 z) {
+    const f8 xy = x * y;
+    const f8 edges = f8_set(4.0f * TRC_GAMMA(3) + 2.0f * TRC_GAMMA(2) + 4.0f * TRC_GAMMA(5)) * xy +
+                     f8_set(2.0f * TRC_GAMMA(5)) * z * (x + y);
+    return f8_set(3.0f * 1.001f) * z * edges;
+}
+/* Below it products may have underflowed: then it says nothing. */
+#define TRC_LEAST_T_ERROR 1e-30f
+TRC_INLINE float trc_t_error_usable(float most) {
+    return most >= TRC_LEAST_T_ERROR ? most : INFINITY;
+}
+
 /* Distances whose bound is more than one part in so many are computed in double, as are those that
  * may not count: needles, whose barycentrics lose what their length has over their width. At 64
  * they are off by 2,000 ulps at most, at 1 by 64,000 (1e6 times as long as wide), for .3 % more
@@ -159,10 +173,11 @@ TRC_INLINE vmask trc_flat_behind(const struct trc_triangle_lanes *p, vfloat ou, 
                  vm_and(flat_v, vf_le((p->v[0][1] - ov) * vf_copysign(one, dv), zero)));
 }
 
-/* Lanes of active whose ray passes through the triangle at distance *t; also barycentrics. */
+/* Lanes of active whose ray passes through the triangle at distance *t; also barycentrics. t_error:
+ * at least trc_t_error over |inv| of all rays, so that most need not compute their own. */
 TRC_INLINE vmask trc_triangle_test(const struct trc_triangle_lanes *p, vfloat ou, vfloat ov,
                                    vfloat oz, vfloat su, vfloat sv, vfloat sz, vfloat tmin,
-                                   vmask active, vfloat *t, vfloat *u, vfloat *v) {
+                                   float t_error, vmask active, vfloat *t, vfloat *u, vfloat *v) {
     const vfloat az = p->v[0][2] - oz, bz = p->v[1][2] - oz, cz = p->v[2][2] - oz;
     const vfloat ax = (p->v[0][0] - ou) - su * az, ay = (p->v[0][1] - ov) - sv * az;
     const vfloat bx = (p->v[1][0] - ou) - su * bz, by = (p->v[1][1] - ov) - sv * bz;
@@ -179,7 +194,13 @@ TRC_INLINE vmask trc_triangle_test(const struct trc_triangle_lanes *p, vfloat ou
     *u = e1 * inv;
     *v = e2 * inv;
     *t = (e0 * inv * az + *u * bz + *v * cz) * sz;
-    const vfloat nearest = vf_min(vf_abs(e0), vf_min(vf_abs(e1), vf_abs(e2)));
+    /* Of hits: the least |edge function|. */
+    const vmask near_edge = vf_le(vf_max(least, -most), vf_set(TRC_TINY_EDGE));
+    const vmask surely_precise =
+        vf_gt(vf_abs(*t), vf_set(TRC_IMPRECISE * t_error) * vf_abs(inv) * vf_abs(sz));
+    const vmask maybe = vm_or(near_edge, vm_andnot(vf_gt(*t, tmin), surely_precise));
+    if (!vm_any(vm_and(hit, maybe)))
+        return hit;
     const vfloat x = vf_max(vf_abs(ax), vf_max(vf_abs(bx), vf_abs(cx)));
     const vfloat y = vf_max(vf_abs(ay), vf_max(vf_abs(by), vf_abs(cy)));
     const vfloat z = vf_max(vf_abs(az), vf_max(vf_abs(bz), vf_abs(cz)));
@@ -187,7 +208,6 @@ TRC_INLINE vmask trc_triangle_test(const struct trc_triangle_lanes *p, vfloat ou
     const vfloat bound = trc_t_error(x, y, z, e, vf_abs(inv)) * vf_abs(sz);
     const vmask imprecise =
         vm_and(vf_gt(*t, tmin), vf_le(vf_abs(*t), vf_set(TRC_IMPRECISE) * bound));
-    const vmask near_edge = vf_le(nearest, vf_set(TRC_TINY_EDGE));
     vmask doubtful = vm_and(hit, vm_or(near_edge, imprecise));
     if (__builtin_expect(vm_any(doubtful), 0)) {
         const vmask behind =
