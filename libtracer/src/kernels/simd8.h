@@ -53,6 +53,21 @@ TRC_INLINE uint32_t f8_le(f8 a, f8 b) {
 #endif
 }
 
+/* One bit per lane that is not 0. */
+TRC_INLINE uint32_t i8_nonzero(i8x a) {
+#if defined(__AVX512VL__)
+    return _mm256_test_epi32_mask((__m256i)a, (__m256i)a);
+#elif defined(__AVX2__)
+    const __m256i zero = _mm256_cmpeq_epi32((__m256i)a, _mm256_setzero_si256());
+    return ~(uint32_t)_mm256_movemask_ps((__m256)zero) & 0xffu;
+#else
+    uint32_t bits = 0;
+    for (int i = 0; i < 8; i++)
+        bits |= (uint32_t)(a[i] != 0) << i;
+    return bits;
+#endif
+}
+
 TRC_INLINE f8 f8_abs(f8 a) {
     const i8x m = {0x7fffffff, 0x7fffffff, 0x7fffffff, 0x7fffffff,
                    0x7fffffff, 0x7fffffff, 0x7fffffff, 0x7fffffff};

@@ -1,14 +1,19 @@
-/* Traversal: packets at the top, single rays where a packet has thinned out.
+/* Traversal: packets at the top, streams of few rays where a packet has thinned out.
  *
  * Boulos et al. 2007: general packets against a BVH, first an interval cull of the whole packet,
  * then the first active ray. Departures, each by measurement: 8-wide nodes; the interval test is a
  * beam (kernels/beam.h) against eight children in one step, as the first live ray is; all are tried
  * only when a child is taken from the stack, against distances as they are by then; a 64-bit mask
- * instead of a first active index; packets are split by dominant axis and its side; rays that are
- * few go on alone, eight boxes or eight triangles at a time. Tried: boxes as one origin sees them,
- * rectangles of slopes, cost a ray four comparisons but let in a third more nodes, and with the
- * silhouette's corners cut save no time. Hits do not depend on any of it:
- * candidates are tested by kernels/triangle.h and compared by distance, then by number. */
+ * instead of a first active index; packets are split by dominant axis and its side; four packets
+ * that stay together share one walk, for which this file is compiled twice (TRC_WALK_PACKETS); rays
+ * that are few go on as a stream, each against eight boxes or eight triangles at a time. Hits do
+ * not depend on any of it: candidates are tested by kernels/triangle.h and compared by distance,
+ * then by number.
+ *
+ * Tried: boxes as one origin sees them, rectangles of slopes, cost a ray four comparisons but let
+ * in a third more nodes, and with the silhouette's corners cut save no time; vertices less the
+ * common origin of a packet, computed once for a triangle, cost more in registers than they save.
+ */
 #ifndef TRACER_KERNELS_WALK_H
 #define TRACER_KERNELS_WALK_H
 
@@ -24,9 +29,12 @@
 #define TRC_COUNT(what, amount) ((void)0)
 #endif
 
-/* Live rays at or below which they go on alone: rays of one origin stay together longer. */
-#define SINGLE_COMMON 4
-#define SINGLE_MIXED 8
+/* Rays of a stream at most, and live rays at or below which packets end in one. By tracer_bench:
+ * rays alone are up to 1.3 times as slow, at four of one origin or eight of many; lanes that are
+ * half empty cost more than streams, more so where they are fewer. */
+#define STREAM_SIZE 32
+#define STREAM_ANY STREAM_SIZE
+#define STREAM_CLOSEST (TRC_WIDTH < 16 ? STREAM_SIZE : 24)
 
 /* A node whose children wait, so that it is read once: their boxes, wider by the slack; of moving
  * trees, hulled over the group's interval of time. */
@@ -320,7 +328,7 @@ static void beam_shorten(struct walk *w, const struct trc_live *mask) {
     b->z1 = f_min(b->z1, vf_lanes_max(far) + b->slack);
 }
 
-/* ---- single rays ---- */
+/* ---- leaves, one ray ---- */
 
 /* One ray's tests against a leaf. True: occluded (any only). */
 TRC_INLINE bool leaf_single(struct walk *w, uint32_t ref, int k, int ray, bool any, bool motion) {
@@ -374,133 +382,172 @@ TRC_INLINE bool leaf_single(struct walk *w, uint32_t ref, int k, int ray, bool a
     return false;
 }
 
-struct single_entry {
-    uint32_t ref;
-    float near;
+/* ---- streams ---- */
+
+/* Few rays on their way together: a node is met once for all of them, each against its eight boxes,
+ * which cost as much as they would alone, but no order of their own, no stack and no wrong guess of
+ * a branch (V. Fuetterer et al., "Efficient Ray Tracing Through Aligned SIMD Computations and
+ * Masked Stack", 2015). Rays share their dominant axis: near boxes come first for all. */
+struct stream {
+    float inv[3][STREAM_SIZE], shift[3][STREAM_SIZE]; /* 1 / d, -o / d */
+    float tmin[STREAM_SIZE], t[STREAM_SIZE];
+    float f[STREAM_SIZE];      /* moving trees: position between the keys */
+    uint16_t ray[STREAM_SIZE]; /* packet * TRC_PACKET_SIZE + its number there */
+    uint32_t alive;            /* any only: bits of those that are not occluded */
 };
 
-/* One ray as the box test wants it: for each axis which plane is met first, and -origin / direction
- * with the origin moved so that boxes are wider by the slack. */
-struct single_ray {
-    f8 inv[3], near_shift[3], far_shift[3];
-    int first[3], last[3]; /* floats from the node's bounds to the planes of the axis */
-    f8 tmin, f;            /* f: moving trees: place between the keys */
+/* A subtree to visit. */
+struct stream_entry {
+    uint32_t ref, rays; /* rays: bits, into the stream */
+    float z;            /* closest only: of its box, the nearest mirrored one */
 };
 
-TRC_INLINE void single_setup(const struct walk *w, int k, int ray, bool motion,
-                             struct single_ray *r) {
-    const struct trc_packet *p = &w->packets[k];
-    const struct trc_sheared *g = &w->group->of[k];
-    const float slack = w->group->beam.slack;
-    for (int axis = 0; axis < 3; axis++) {
-        const float inv = g->inv[axis][ray], o = p->o[axis][ray];
-        const bool down = inv < 0.0f;
-        const float widen = down ? -slack : slack;
-        r->inv[axis] = f8_set(inv);
-        r->near_shift[axis] = f8_set(-(o + widen) * inv);
-        r->far_shift[axis] = f8_set(-(o - widen) * inv);
-        r->first[axis] = 16 * axis + (down ? 8 : 0);
-        r->last[axis] = 16 * axis + (down ? 0 : 8);
-    }
-    r->tmin = f8_set(p->tmin[ray]);
-    r->f = f8_set(motion ? g->f[ray] : 0.0f);
+TRC_INLINE void stream_setup(const struct walk *w, const struct trc_live *live, bool motion,
+                             struct stream *s) {
+    int n = 0;
+    for (int k = 0; k < TRC_WALK_PACKETS; k++)
+        for (uint64_t m = live->of[k]; m; m &= m - 1, n++) {
+            const struct trc_packet *p = &w->packets[k];
+            const struct trc_sheared *g = &w->group->of[k];
+            const int i = __builtin_ctzll(m);
+            for (int axis = 0; axis < 3; axis++) {
+                s->inv[axis][n] = g->inv[axis][i];
+                s->shift[axis][n] = g->shift[axis][i];
+            }
+            s->tmin[n] = p->tmin[i];
+            s->t[n] = p->t[i];
+            s->f[n] = motion ? g->f[i] : 0.0f;
+            s->ray[n] = (uint16_t)(k * TRC_PACKET_SIZE + i);
+        }
+    s->alive = (uint32_t)((1ull << n) - 1);
 }
 
-/* Bits of the children the ray meets before t, and its entry distances. */
-TRC_INLINE uint32_t node_single(const struct walk *w, uint32_t node, const struct single_ray *r,
-                                float t, bool motion, f8 *near_out) {
+/* For each child of a node the rays that meet its box; returns the bits of children with any. */
+TRC_INLINE uint32_t stream_node(const struct walk *w, uint32_t node, const struct stream *s,
+                                uint32_t rays, bool motion, uint32_t met[TRC_NODE_WIDTH]) {
     const float *b = trc_node_bounds(w->tree, node, w->key);
     const float *e = b + (motion ? TRC_NODE_KEY_BYTES / sizeof(float) : 0);
-    f8 near = r->tmin, far = f8_set(t);
+    const f8 slack = f8_set(w->group->beam.slack);
+    f8 low[3], high[3];
     for (int axis = 0; axis < 3; axis++) {
-        f8 first = f8_load(b + r->first[axis]), last = f8_load(b + r->last[axis]);
-        if (motion) {
-            first = first + r->f * (f8_load(e + r->first[axis]) - first);
-            last = last + r->f * (f8_load(e + r->last[axis]) - last);
-        }
-        near = f8_max(near, f8_madd(first, r->inv[axis], r->near_shift[axis]));
-        far = f8_min(far, f8_madd(last, r->inv[axis], r->far_shift[axis]));
+        low[axis] = f8_load(b + 16 * axis) - slack;
+        high[axis] = f8_load(b + 16 * axis + 8) + slack;
     }
-    *near_out = near;
-    return f8_le(near, far);
+    i8x children, all = {0};
+    for (; rays; rays &= rays - 1) {
+        const int i = __builtin_ctz(rays);
+        f8 near = f8_set(s->tmin[i]), far = f8_set(s->t[i]);
+        for (int axis = 0; axis < 3; axis++) {
+            f8 l = low[axis], h = high[axis];
+            if (motion) {
+                const f8 f = f8_set(s->f[i]);
+                l += f * (f8_load(e + 16 * axis) - f8_load(b + 16 * axis));
+                h += f * (f8_load(e + 16 * axis + 8) - f8_load(b + 16 * axis + 8));
+            }
+            const f8 inv = f8_set(s->inv[axis][i]), shift = f8_set(s->shift[axis][i]);
+            l = f8_madd(l, inv, shift);
+            h = f8_madd(h, inv, shift);
+            near = f8_max(near, f8_min(l, h));
+            far = f8_min(far, f8_max(l, h));
+        }
+        all |= (i8x)(near <= far) & (int32_t)(1u << i);
+    }
+    memcpy(&children, trc_node_children(w->tree, node), sizeof children);
+    all &= children != (int32_t)TRC_REF_EMPTY; /* inverted boxes are met, too */
+    memcpy(met, &all, sizeof all);
+    return i8_nonzero(all);
 }
 
-/* Pushes all children but the nearest, the farthest first, and returns the nearest. */
-TRC_INLINE uint32_t single_push(const uint32_t *children, f8 near, uint32_t bits,
-                                struct single_entry *stack, int *top_in_out) {
-    float distance[TRC_NODE_WIDTH];
-    f8_store(distance, near);
-    const int a = __builtin_ctz(bits);
-    bits &= bits - 1;
-    if (!bits)
-        return children[a];
-    const int b = __builtin_ctz(bits);
-    bits &= bits - 1;
-    int top = *top_in_out;
-    if (!bits) { /* mostly two */
-        const bool a_first = distance[a] <= distance[b];
-        const int next = a_first ? a : b, later = a_first ? b : a;
-        stack[top] = (struct single_entry){children[later], distance[later]};
-        *top_in_out = top + 1;
-        return children[next];
-    }
+#define CACHE_LINE 64
+#define NODE_LINES ((TRC_NODE_HEADER_BYTES + TRC_NODE_KEY_BYTES) / CACHE_LINE)
+#define LEAF_LINES 2 /* a leaf is of three triangles, mostly */
+/* Asks for the memory of what waits on a stack. */
+TRC_INLINE void ref_prefetch(const struct walk *w, uint32_t ref, bool any) {
+    const bool is_leaf = ref & TRC_REF_LEAF;
+    const char *at = is_leaf ? (const char *)trc_leaf_vertices(w->tree, ref, w->key)
+                             : (const char *)trc_node_children(w->tree, ref);
+    for (int line = 0; line < (is_leaf ? LEAF_LINES : NODE_LINES); line++)
+        __builtin_prefetch(at + line * CACHE_LINE);
+    if (is_leaf && !any)
+        __builtin_prefetch(w->tree->slots + trc_leaf_first(ref));
+}
+
+/* Pushes the children that are met: to the closest hit the nearest on top, to any in any order. */
+TRC_INLINE int stream_push(const struct walk *w, uint32_t node, uint32_t bits,
+                           const uint32_t met[TRC_NODE_WIDTH], bool any, struct stream_entry *stack,
+                           int top) {
+    const uint32_t *children = trc_node_children(w->tree, node);
+    const struct trc_beam *b = &w->group->beam;
+    const float *z = trc_node_bounds(w->tree, node, w->key) + 16 * b->axis.z + 8 * b->side;
     const int bottom = top;
-    stack[top++] = (struct single_entry){children[a], distance[a]};
-    for (bits |= 1u << b; bits; bits &= bits - 1) {
+    for (; bits; bits &= bits - 1) {
         const int child = __builtin_ctz(bits);
+        const struct stream_entry entry = {children[child], met[child], b->sign * z[child]};
         int at = top++;
-        for (; at > bottom && stack[at - 1].near < distance[child]; at--)
+        ref_prefetch(w, entry.ref, any);
+        for (; !any && at > bottom && stack[at - 1].z < entry.z; at--)
             stack[at] = stack[at - 1];
-        stack[at] = (struct single_entry){children[child], distance[child]};
+        stack[at] = entry;
     }
-    *top_in_out = top - 1;
-    return stack[top - 1].ref;
+    return top;
 }
 
-/* Pushes all children but the first in any order, and returns that one: to any hit, misses see all.
- */
-TRC_INLINE uint32_t single_push_any(const uint32_t *children, uint32_t bits,
-                                    struct single_entry *stack, int *top_in_out) {
-    const uint32_t next = children[__builtin_ctz(bits)];
-    int top = *top_in_out;
-    for (bits &= bits - 1; bits; bits &= bits - 1)
-        stack[top++].ref = children[__builtin_ctz(bits)];
-    *top_in_out = top;
-    return next;
+/* A TLAS's leaf: on as packets. */
+TRC_INLINE void stream_item(struct walk *w, uint32_t ref, struct stream *s, uint32_t rays,
+                            bool any) {
+    struct trc_live live = {{0}};
+    for (uint32_t m = rays; m; m &= m - 1) {
+        const uint32_t ray = s->ray[__builtin_ctz(m)];
+        live.of[ray / TRC_PACKET_SIZE] |= 1ull << ray % TRC_PACKET_SIZE;
+    }
+    item_packet(w, &w->tree->items[trc_leaf_first(ref)], live, any);
+    for (uint32_t m = rays; m; m &= m - 1) {
+        const int i = __builtin_ctz(m);
+        const uint32_t k = s->ray[i] / TRC_PACKET_SIZE, ray = s->ray[i] % TRC_PACKET_SIZE;
+        if (any && (w->occluded.of[k] >> ray & 1u))
+            s->alive &= ~(1u << i);
+        s->t[i] = w->packets[k].t[ray];
+    }
 }
 
-/* Walks one ray of packet k through the subtree at ref. True: occluded. */
-TRC_INLINE bool single_walk(struct walk *w, uint32_t ref, int k, int ray, bool any, bool motion) {
-    struct single_entry stack[TRC_STACK_SIZE];
-    struct single_ray r;
+TRC_INLINE void stream_leaf(struct walk *w, uint32_t ref, struct stream *s, uint32_t rays, bool any,
+                            bool motion) {
+    for (; rays; rays &= rays - 1) {
+        const int i = __builtin_ctz(rays);
+        const int k = s->ray[i] / TRC_PACKET_SIZE, ray = s->ray[i] % TRC_PACKET_SIZE;
+        if (leaf_single(w, ref, k, ray, any, motion)) {
+            w->occluded.of[k] |= 1ull << ray;
+            s->alive &= ~(1u << i);
+        }
+        if (!any)
+            s->t[i] = w->packets[k].t[ray];
+    }
+}
+
+/* Walks live rays, at most STREAM_SIZE, through the subtree at ref. */
+TRC_INLINE void stream_walk(struct walk *w, uint32_t ref, const struct trc_live *live, bool any,
+                            bool motion) {
+    struct stream_entry stack[TRC_STACK_SIZE];
+    struct stream s;
     int top = 0;
-    single_setup(w, k, ray, motion, &r);
-    for (;;) {
-        while (!(ref & TRC_REF_LEAF)) {
-            f8 near;
-            TRC_COUNT(single_nodes, 1);
-            const uint32_t bits = node_single(w, ref, &r, w->packets[k].t[ray], motion, &near);
-            if (!bits)
-                goto pop;
-            const uint32_t *children = trc_node_children(w->tree, ref);
-            ref = any ? single_push_any(children, bits, stack, &top)
-                      : single_push(children, near, bits, stack, &top);
+    stream_setup(w, live, motion, &s);
+    for (uint32_t rays = s.alive;;) {
+        if (!(ref & TRC_REF_LEAF)) {
+            uint32_t met[TRC_NODE_WIDTH];
+            TRC_COUNT(single_nodes, __builtin_popcount(rays));
+            const uint32_t bits = stream_node(w, ref, &s, rays, motion, met);
+            top = stream_push(w, ref, bits, met, any, stack, top);
+        } else if (w->tree->is_top) {
+            stream_item(w, ref, &s, rays, any);
+        } else {
+            stream_leaf(w, ref, &s, rays, any, motion);
         }
-        if (w->tree->is_top) {
-            struct trc_live alone = {{0}};
-            alone.of[k] = 1ull << ray;
-            item_packet(w, &w->tree->items[trc_leaf_first(ref)], alone, any);
-            if (any && (w->occluded.of[k] >> ray & 1u))
-                return true;
-        } else if (leaf_single(w, ref, k, ray, any, motion)) {
-            return true;
-        }
-    pop:
         do {
             if (top == 0)
-                return false;
+                return;
             ref = stack[--top].ref;
-        } while (!any && stack[top].near > w->packets[k].t[ray]);
+            rays = any ? stack[top].rays & s.alive : stack[top].rays;
+        } while (!rays);
     }
 }
 
@@ -580,20 +627,15 @@ TRC_INLINE void packet_walk(struct walk *w, struct trc_live mask, bool any, bool
     struct entry stack[TRC_STACK_SIZE];
     struct opened opened[TRC_MAX_LEVELS + 1]; /* on the way to ref */
     uint16_t level = 0;
-    const int few = w->packets->common_origin ? SINGLE_COMMON : SINGLE_MIXED;
     bool together = w->group->beam.is_narrow;
     struct trc_live live = mask;
     uint32_t ref = w->tree->root;
     int top = 0;
     for (;;) {
         const int count = trc_live_count(&live);
-        if (count <= few) {
-            while (trc_live_any(&live)) {
-                const int k = trc_live_first(&live), ray = __builtin_ctzll(live.of[k]);
-                live.of[k] &= live.of[k] - 1;
-                if (single_walk(w, ref, k, ray, any, motion) && any)
-                    w->occluded.of[k] |= 1ull << ray;
-            }
+        if (count <= (any ? STREAM_ANY : STREAM_CLOSEST)) {
+            if (count)
+                stream_walk(w, ref, &live, any, motion);
         } else {
             TRC_COUNT(visits, 1);
             TRC_COUNT(visit_rays, count);
