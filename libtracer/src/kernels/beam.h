@@ -38,6 +38,7 @@ struct trc_beam {
     float u_min_slope, u_max_slope, v_min_slope, v_max_slope; /* per z */
     /* The same as middle and half width. */
     float u_mid, v_mid, u_half, v_half, u_mid_slope, v_mid_slope, u_half_slope, v_half_slope;
+    bool converges; /* narrower at z1 than at z0 */
     bool is_narrow; /* rays mostly meet the same boxes */
 };
 
@@ -248,6 +249,7 @@ TRC_INLINE bool trc_group_setup(struct trc_group *g, const struct trc_packet *pa
     b->v_half_slope = 0.5f * (b->v_max_slope - b->v_min_slope);
     const float widest = f_max(f_max(b->u_half, b->u_half + length * b->u_half_slope),
                                f_max(b->v_half, b->v_half + length * b->v_half_slope));
+    b->converges = b->u_half_slope + b->v_half_slope < 0.0f;
     b->is_narrow = widest < TRC_NARROW_BEAM * length;
     return true;
 }

@@ -40,7 +40,7 @@
  * trees, hulled over the group's interval of time. */
 struct opened {
     float planes[6][TRC_NODE_WIDTH]; /* low and high along u, v; near and far along z */
-    float z[TRC_NODE_WIDTH];         /* nearest mirrored z */
+    float order[TRC_NODE_WIDTH];     /* least first; of closest hits, nearest mirrored z */
     struct trc_live mask;            /* rays that reached it */
     uint32_t first; /* bits of the children that the first of those meets; wide beams: none */
 } __attribute__((aligned(64)));
@@ -570,8 +570,9 @@ TRC_INLINE uint32_t planes_ray(const struct walk *w, const f8 planes[6], int k, 
     return f8_le(near, far);
 }
 
-/* Opens a node: pushes the children the beam may touch, the nearest on top. */
-TRC_INLINE int node_open(const struct walk *w, uint32_t node, const struct trc_live *mask,
+/* Opens a node: pushes the children the beam may touch, the nearest on top; to any hit, those first
+ * where the beam is narrowest, since what is there blocks most rays. */
+TRC_INLINE int node_open(const struct walk *w, uint32_t node, const struct trc_live *mask, bool any,
                          bool motion, uint16_t level, struct opened *o, struct entry *stack,
                          int top) {
     const struct trc_beam *b = &w->group->beam;
@@ -587,7 +588,7 @@ TRC_INLINE int node_open(const struct walk *w, uint32_t node, const struct trc_l
                           b->side ? z_high : z_low, b->side ? z_low : z_high};
     for (int plane = 0; plane < 6; plane++)
         f8_store(o->planes[plane], planes[plane]);
-    f8_store(o->z, key);
+    f8_store(o->order, any && b->converges ? -key : key);
     o->mask = *mask;
     o->first = 0;
     if (b->is_narrow) {
@@ -600,7 +601,7 @@ TRC_INLINE int node_open(const struct walk *w, uint32_t node, const struct trc_l
     for (; bits; bits &= bits - 1) {
         const int child = __builtin_ctz(bits);
         int at = top++;
-        for (; at > bottom && o->z[stack[at - 1].child] < o->z[child]; at--)
+        for (; at > bottom && o->order[stack[at - 1].child] < o->order[child]; at--)
             stack[at] = stack[at - 1];
         stack[at] = (struct entry){children[child], level, (uint16_t)child};
     }
@@ -618,7 +619,7 @@ TRC_INLINE struct trc_live child_rays(const struct walk *w, const struct opened 
     for (int j = 0; any && j < TRC_WALK_PACKETS; j++)
         live.of[j] &= ~w->occluded.of[j];
     if (*together && (node->first >> child & 1u) && (live.of[k] & first) &&
-        node->z[child] <= w->group->beam.z1)
+        (any || node->order[child] <= w->group->beam.z1))
         return live;
     return trc_live_any(&live) ? box_rays(w, node, child, &live, together) : live;
 }
@@ -641,7 +642,7 @@ TRC_INLINE void packet_walk(struct walk *w, struct trc_live mask, bool any, bool
             TRC_COUNT(visit_rays, count);
             if (!(ref & TRC_REF_LEAF)) {
                 TRC_COUNT(nodes, 1);
-                top = node_open(w, ref, &live, motion, level, &opened[level], stack, top);
+                top = node_open(w, ref, &live, any, motion, level, &opened[level], stack, top);
             } else if (w->tree->is_top) {
                 item_packet(w, &w->tree->items[trc_leaf_first(ref)], live, any);
                 if (!any)
