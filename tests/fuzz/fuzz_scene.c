@@ -67,7 +67,8 @@ static trc_render_desc read_render(struct bytes *b) {
     desc.clamp_direct = bytes_float(b);
     desc.clamp_indirect = bytes_float(b);
     desc.assembly = bytes_below(b, 8);
-    desc.packet_size = bytes_byte(b);
+    static const uint32_t sizes[] = {0, 4, 16, 64, 256, 5};
+    desc.packet_size = sizes[bytes_below(b, sizeof sizes / sizeof *sizes)];
     desc.sampler = bytes_below(b, 6);
     desc.seed = bytes_byte(b);
     desc.filter = bytes_below(b, 4);

@@ -512,7 +512,7 @@ static void fills_and_refits_are_cancelled(void **state) {
 /* What is done to a tree; each is undone by restoring its bytes. */
 static void damage(struct trc_tree *tree, int kind) {
     uint32_t *root = (uint32_t *)tree->nodes;
-    struct trc_slot *slots = tree->slots;
+    struct trc_slot *slots = tree->slots->slots;
     float *bounds = (float *)(tree->nodes + TRC_NODE_HEADER_BYTES);
     switch (kind) {
     case 0:
@@ -570,7 +570,7 @@ static void check_finds_damage(void **state) {
     uint8_t *node = malloc(node_bytes);
     assert_non_null(node);
     memcpy(node, tree->nodes, node_bytes);
-    const struct trc_slot slot = tree->slots[0];
+    const struct trc_slot slot = tree->slots->slots[0];
     const float coordinate = tree->vertices[3];
     for (int kind = 0; kind < 12; kind++) {
         char message[256] = "";
@@ -580,7 +580,7 @@ static void check_finds_damage(void **state) {
         assert_true(strlen(message) > 0);
         assert_false(trc_bvh_check(snapshot->bvh, snapshot, NULL, 0));
         memcpy(tree->nodes, node, node_bytes);
-        tree->slots[0] = slot;
+        tree->slots->slots[0] = slot;
         tree->vertices[3] = coordinate;
         expect_good(scene.scene, "mended");
     }

@@ -73,9 +73,9 @@ static void child_box(const struct trc_tree *tree, uint32_t node, uint32_t child
 /* The part of a used slot, or NULL with a message. */
 static const struct trc_part *slot_part(struct tree_check *t, uint32_t slot) {
     const struct trc_snapshot *s = t->checker->snapshot;
-    const uint32_t word = t->tree->slots[slot].instance;
+    const uint32_t word = t->tree->slots->slots[slot].instance;
     const uint32_t instance = word & TRC_SLOT_INSTANCE_MASK;
-    const uint32_t triangle = t->tree->slots[slot].triangle;
+    const uint32_t triangle = t->tree->slots->slots[slot].triangle;
     const struct trc_part *part = NULL;
     if (!t->is_joined && instance == 0)
         part = t->parts;
@@ -128,7 +128,7 @@ static bool check_leaf(struct tree_check *t, uint32_t ref) {
         const struct trc_part *part = slot_part(t, first + i);
         if (!part)
             return false;
-        const uint32_t triangle = t->tree->slots[first + i].triangle;
+        const uint32_t triangle = t->tree->slots->slots[first + i].triangle;
         uint8_t *seen = &t->seen[t->first[part - t->parts] + triangle];
         if (*seen)
             return complain(t->checker, "%s: triangle %u is in two leaves", t->name, triangle);

@@ -25,7 +25,7 @@ static inline bool is_surely_bent(f4 a, f4 b, f4 c) {
 }
 
 /* Whether a triangle's corners, by double arithmetic, lie on a line. */
-static bool is_on_a_line(const float *a, const float *b, const float *c) {
+static bool is_on_a_line(f4 a, f4 b, f4 c) {
     double p[3], q[3];
     for (int i = 0; i < 3; i++) {
         p[i] = (double)b[i] - a[i];
@@ -38,12 +38,12 @@ static bool is_on_a_line(const float *a, const float *b, const float *c) {
 static inline void triangle_load(const struct trc_part *part, const uint32_t index[3], uint32_t key,
                                  f4 out[3]) {
     const float *all = trc_part_positions(part, key);
-    const float *p[3] = {all + 3 * (size_t)index[0], all + 3 * (size_t)index[1],
-                         all + 3 * (size_t)index[2]};
-    for (int v = 0; v < 3; v++)
+    f4 p[3];
+    for (int v = 0; v < 3; v++) {
+        p[v] = f4_load3_padded(all + 3 * (size_t)index[v]);
         out[v] = trc_part_point(part, p[v]);
-    if (part->mesh->key_count == 1 &&
-        !is_surely_bent(f4_load3(p[0]), f4_load3(p[1]), f4_load3(p[2])) &&
+    }
+    if (part->mesh->key_count == 1 && !is_surely_bent(p[0], p[1], p[2]) &&
         is_on_a_line(p[0], p[1], p[2]))
         out[1] = out[2] = out[0];
 }
@@ -56,8 +56,16 @@ void trc_part_triangle(const struct trc_part *part, uint32_t triangle, uint32_t 
         f4_store3(out[v], corner[v]);
 }
 
+static struct trc_slot_block *slots_alloc(uint32_t count) {
+    struct trc_slot_block *block = trc_alloc(sizeof *block + count * sizeof block->slots[0], 1);
+    if (block)
+        atomic_init(&block->refs, 1);
+    return block;
+}
+
+/* slots: to share, or NULL for new ones. */
 static trc_status tree_alloc(struct trc_tree *tree, uint32_t node_count, uint32_t slot_count,
-                             uint32_t key_count, bool is_top) {
+                             uint32_t key_count, bool is_top, struct trc_slot_block *slots) {
     *tree = (struct trc_tree){.key_count = key_count,
                               .node_count = node_count,
                               .slot_count = slot_count,
@@ -68,7 +76,9 @@ static trc_status tree_alloc(struct trc_tree *tree, uint32_t node_count, uint32_
     const size_t floats = (size_t)slot_count * key_count * TRC_TRIANGLE_FLOATS;
     if (!is_top) {
         tree->vertices = trc_alloc_large(floats + LOAD_SLOTS, sizeof *tree->vertices);
-        tree->slots = trc_alloc(slot_count ? slot_count : 1, sizeof *tree->slots);
+        tree->slots = slots ? slots : slots_alloc(slot_count);
+        if (slots)
+            atomic_fetch_add(&slots->refs, 1);
     }
     if (!tree->nodes || (!is_top && (!tree->vertices || !tree->slots))) {
         trc_tree_destroy(tree);
@@ -79,7 +89,7 @@ static trc_status tree_alloc(struct trc_tree *tree, uint32_t node_count, uint32_
     if (!is_top) {
         memset(tree->vertices + floats, 0, LOAD_SLOTS * sizeof *tree->vertices);
         tree->bytes += (floats + LOAD_SLOTS) * sizeof *tree->vertices +
-                       slot_count * (uint64_t)sizeof *tree->slots;
+                       slot_count * (uint64_t)sizeof tree->slots->slots[0];
     }
     return TRC_OK;
 }
@@ -87,7 +97,8 @@ static trc_status tree_alloc(struct trc_tree *tree, uint32_t node_count, uint32_
 void trc_tree_destroy(struct trc_tree *tree) {
     trc_free(tree->nodes);
     trc_free(tree->vertices);
-    trc_free(tree->slots);
+    if (tree->slots && atomic_fetch_sub(&tree->slots->refs, 1) == 1)
+        trc_free(tree->slots);
     if (tree->slot_vertices && atomic_fetch_sub(&tree->slot_vertices->refs, 1) == 1)
         trc_free(tree->slot_vertices);
     *tree = (struct trc_tree){.root = TRC_REF_EMPTY};
@@ -116,54 +127,51 @@ static bool part_is_transparent(const struct trc_part *part, uint32_t triangle) 
     return part->transparent[slot < part->slot_count ? slot : part->slot_count - 1] != 0;
 }
 
-static const struct trc_part *slot_fill(struct fill_job *job, uint32_t slot) {
-    if (job->from) {
-        job->tree->slots[slot] = job->from->slots[slot];
-        return job->parts;
-    }
+/* What stands in the slot of a new tree. */
+static void slot_fill(struct fill_job *job, uint32_t slot) {
     const uint32_t triangle = job->triangles[slot].triangle;
     const struct trc_part *part = &job->parts[job->triangles[slot].part];
     const bool transparent = part_is_transparent(part, triangle);
     if (transparent)
         atomic_store_explicit(&job->transparent, true, memory_order_relaxed);
-    job->tree->slots[slot] =
+    job->tree->slots->slots[slot] =
         (struct trc_slot){part->instance | (transparent ? TRC_SLOT_TRANSPARENT : 0u), triangle};
+}
+
+/* The slot's part, and the three vertices of its triangle there. */
+static inline const struct trc_part *slot_source(const struct fill_job *job, uint32_t slot,
+                                                 const uint32_t **index_out) {
+    const struct trc_part *part = job->from ? job->parts : &job->parts[job->triangles[slot].part];
+    *index_out = job->known
+                     ? job->known->index[slot]
+                     : part->mesh->indices + 3 * (size_t)job->tree->slots->slots[slot].triangle;
     return part;
 }
 
-/* A triangle on its way into a leaf. */
-struct source {
-    const struct trc_part *part;
-    uint32_t index[3];
-};
-
-/* What the leaf is made of; asks for the vertices, since each is a miss of the cache. */
-static struct source *leaf_gather(struct fill_job *job, uint32_t ref, struct source *at) {
+/* What does not depend on the key: what a new tree's slots stand for, what a refit learns of them.
+ */
+static void leaf_prepare(struct fill_job *job, uint32_t ref) {
     const uint32_t first = trc_leaf_first(ref), count = trc_leaf_count(ref);
-    for (uint32_t slot = first; slot < first + count; slot++, at++) {
-        at->part = slot_fill(job, slot);
-        const struct trc_mesh *mesh = at->part->mesh;
-        const uint32_t *index = job->known
-                                    ? job->known->index[slot]
-                                    : mesh->indices + 3 * (size_t)job->tree->slots[slot].triangle;
-        memcpy(at->index, index, sizeof at->index);
-        if (job->learnt)
-            memcpy(job->learnt->index[slot], index, sizeof at->index);
-        for (int v = 0; v < 3; v++)
-            __builtin_prefetch(mesh->positions + 3 * (size_t)at->index[v]);
+    for (uint32_t slot = first; !job->from && slot < first + count; slot++)
+        slot_fill(job, slot);
+    for (uint32_t slot = first; job->learnt && slot < first + count; slot++) {
+        const uint32_t *index;
+        (void)slot_source(job, slot, &index);
+        memcpy(job->learnt->index[slot], index, sizeof job->learnt->index[slot]);
     }
-    return at;
 }
 
 /* Fills the leaf at a key; its box. False if a coordinate is not finite: the box ignores NaN. */
-static bool leaf_fill(struct trc_tree *tree, uint32_t ref, uint32_t key,
-                      const struct source *sources, float lower_out[3], float upper_out[3]) {
-    const uint32_t count = trc_leaf_count(ref);
-    float *v = trc_leaf_vertices(tree, ref, key);
+static bool leaf_fill(const struct fill_job *job, uint32_t ref, uint32_t key, float lower_out[3],
+                      float upper_out[3]) {
+    const uint32_t first = trc_leaf_first(ref), count = trc_leaf_count(ref);
+    float *v = trc_leaf_vertices(job->tree, ref, key);
     f4 lower = f4_set(INFINITY), upper = f4_set(-INFINITY), sum = f4_set(0.0f);
-    for (uint32_t slot = 0; slot < count; slot++, v++) {
+    for (uint32_t slot = first; slot < first + count; slot++, v++) {
+        const uint32_t *index;
+        const struct trc_part *part = slot_source(job, slot, &index);
         f4 p[3];
-        triangle_load(sources[slot].part, sources[slot].index, key, p);
+        triangle_load(part, index, key, p);
         lower = f4_min(f4_min(p[0], f4_min(p[1], p[2])), lower);
         upper = f4_max(f4_max(p[0], f4_max(p[1], p[2])), upper);
         sum += p[0] + p[1] + p[2];
@@ -258,24 +266,19 @@ static void header_fill(struct fill_job *job, uint32_t n) {
 static void leaves_fill(struct fill_job *job, uint32_t node) {
     struct trc_tree *tree = job->tree;
     const uint32_t *children = trc_node_children(tree, node);
-    struct source sources[TRC_NODE_WIDTH * LOAD_SLOTS], *end = sources;
-    for (uint32_t i = 0; i < TRC_NODE_WIDTH; i++)
-        if (is_leaf(children[i]))
-            end = leaf_gather(job, children[i], end);
-    const struct source *at = sources;
     for (uint32_t i = 0; i < TRC_NODE_WIDTH; i++) {
         float lower[3], upper[3];
         if (is_node(children[i]))
             continue;
+        if (is_leaf(children[i]))
+            leaf_prepare(job, children[i]);
         for (uint32_t key = 0; key < tree->key_count; key++) {
-            if (is_leaf(children[i]) && !leaf_fill(tree, children[i], key, at, lower, upper))
+            if (is_leaf(children[i]) && !leaf_fill(job, children[i], key, lower, upper))
                 atomic_store_explicit(&job->spoiled, true, memory_order_relaxed);
             if (children[i] == TRC_REF_EMPTY)
                 empty_bounds(lower, upper);
             child_store(tree, node, i, key, lower, upper);
         }
-        if (is_leaf(children[i]))
-            at += trc_leaf_count(children[i]);
     }
 }
 
@@ -292,7 +295,8 @@ static void nodes_bound(struct trc_tree *tree, uint32_t node) {
 
 static bool is_cancelled(const struct fill_job *job) { return job->cancel && *job->cancel; }
 
-/* A run of nodes, backwards: children come after their parents, mostly in the same run. */
+/* A run of nodes: leaves forwards, as they lie in memory; boxes backwards, since children come
+ * after their parents, mostly in the same run. */
 static void fill_task(void *context, uint32_t index, uint32_t worker) {
     (void)worker;
     struct fill_job *job = context;
@@ -302,10 +306,12 @@ static void fill_task(void *context, uint32_t index, uint32_t worker) {
     double sum = 0.0;
     if (is_cancelled(job))
         return;
-    for (uint32_t n = end; n-- > begin;) {
-        const uint32_t *children = trc_node_children(tree, n);
+    for (uint32_t n = begin; n < end; n++) {
         header_fill(job, n);
         leaves_fill(job, n);
+    }
+    for (uint32_t n = end; n-- > begin;) {
+        const uint32_t *children = trc_node_children(tree, n);
         job->pending[n] = false;
         for (int i = 0; i < TRC_NODE_WIDTH; i++)
             if (is_node(children[i]) && (children[i] >= end || job->pending[children[i]]))
@@ -321,11 +327,10 @@ static void fill_task(void *context, uint32_t index, uint32_t worker) {
 /* A tree that is one leaf. */
 static void root_leaf_fill(struct fill_job *job) {
     struct trc_tree *tree = job->tree;
-    struct source sources[LOAD_SLOTS];
     float lower[3], upper[3];
-    leaf_gather(job, tree->root, sources);
+    leaf_prepare(job, tree->root);
     for (uint32_t key = 0; key < tree->key_count; key++) {
-        if (!leaf_fill(tree, tree->root, key, sources, lower, upper))
+        if (!leaf_fill(job, tree->root, key, lower, upper))
             job->spoiled = true;
         bounds_grow(tree, lower, upper);
     }
@@ -379,7 +384,7 @@ trc_status trc_tree_fill(const struct trc_topology *topology,
                          const struct trc_part_triangle *triangles, uint32_t count,
                          const struct trc_part *parts, uint32_t key_count, struct trc_pool *pool,
                          const atomic_uint *cancel, struct trc_tree *tree) {
-    const trc_status status = tree_alloc(tree, topology->node_count, count, key_count, false);
+    const trc_status status = tree_alloc(tree, topology->node_count, count, key_count, false, NULL);
     if (status != TRC_OK)
         return status;
     tree->root = topology->root;
@@ -406,7 +411,7 @@ trc_status trc_tree_refit(const struct trc_tree *from, const struct trc_part *pa
                           uint32_t key_count, struct trc_pool *pool, const atomic_uint *cancel,
                           struct trc_tree *tree) {
     const trc_status status =
-        tree_alloc(tree, from->node_count, from->slot_count, key_count, false);
+        tree_alloc(tree, from->node_count, from->slot_count, key_count, false, from->slots);
     if (status != TRC_OK)
         return status;
     tree->root = from->root;
@@ -429,7 +434,7 @@ trc_status trc_tree_refit(const struct trc_tree *from, const struct trc_part *pa
 trc_status trc_tree_fill_top(const struct trc_topology *topology, const struct trc_ref *refs,
                              uint32_t count, const struct trc_item *items,
                              struct trc_item *items_out, struct trc_tree *tree) {
-    const trc_status status = tree_alloc(tree, topology->node_count, count, 1, true);
+    const trc_status status = tree_alloc(tree, topology->node_count, count, 1, true, NULL);
     if (status != TRC_OK)
         return status;
     for (uint32_t slot = 0; slot < count; slot++)

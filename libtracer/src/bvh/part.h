@@ -12,9 +12,9 @@ static inline const float *trc_part_positions(const struct trc_part *part, uint3
 }
 
 /* One of those positions in the tree's space. */
-static inline f4 trc_part_point(const struct trc_part *part, const float p[3]) {
+static inline f4 trc_part_point(const struct trc_part *part, f4 p) {
     if (!part->transform)
-        return f4_load3(p);
+        return p;
     const float *m = part->transform->m;
     const f4 x = {m[0], m[4], m[8], 0.0f}, y = {m[1], m[5], m[9], 0.0f};
     const f4 z = {m[2], m[6], m[10], 0.0f}, w = {m[3], m[7], m[11], 0.0f};
@@ -26,7 +26,7 @@ static inline void trc_part_corners(const struct trc_part *part, const uint32_t 
                                     uint32_t key, f4 corner[3]) {
     const float *positions = trc_part_positions(part, key);
     for (int v = 0; v < 3; v++)
-        corner[v] = trc_part_point(part, positions + 3 * (size_t)index[v]);
+        corner[v] = trc_part_point(part, f4_load3_padded(positions + 3 * (size_t)index[v]));
 }
 
 #endif

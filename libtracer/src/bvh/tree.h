@@ -57,6 +57,12 @@ struct trc_item {
     uint32_t visibility; /* TRC_VISIBLE_* */
 };
 
+/* The slots of a tree and its refits. */
+struct trc_slot_block {
+    atomic_uint refs;
+    struct trc_slot slots[];
+};
+
 /* Vertices of the triangle in each slot, in the order in which refits meet them: without it, when
  * they are asked of the mesh, a refit takes a fifth longer. */
 struct trc_slot_vertices {
@@ -71,7 +77,7 @@ struct trc_tree {
     size_t node_stride;
     uint8_t *nodes;                          /* node_count * node_stride, 64-byte aligned */
     float *vertices;                         /* slot_count * key_count * 9, and a load beyond */
-    struct trc_slot *slots;                  /* slot_count; TLAS: NULL, as vertices are */
+    struct trc_slot_block *slots;            /* slot_count; TLAS: NULL, as vertices are */
     struct trc_slot_vertices *slot_vertices; /* shared by refits of one tree; or NULL */
     const struct trc_item *items;            /* TLAS only, by slot */
     bool is_top;
@@ -109,6 +115,9 @@ static inline const float *trc_node_bounds(const struct trc_tree *t, uint32_t no
                            (size_t)key * TRC_NODE_KEY_BYTES);
 }
 static inline uint32_t trc_leaf_first(uint32_t ref) { return ref & TRC_REF_INDEX_MASK; }
+static inline const struct trc_slot *trc_leaf_slots(const struct trc_tree *t, uint32_t ref) {
+    return t->slots->slots + trc_leaf_first(ref);
+}
 static inline uint32_t trc_leaf_count(uint32_t ref) { return ((ref >> 28) & 7u) + 1u; }
 static inline uint32_t trc_leaf_ref(uint32_t first, uint32_t count) {
     return TRC_REF_LEAF | (count - 1) << 28 | first;

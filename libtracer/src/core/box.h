@@ -38,6 +38,13 @@ static inline f4 f4_abs(f4 a) {
 static inline f4 f4_yzx(f4 a) { return __builtin_shufflevector(a, a, 1, 2, 0, 3); }
 
 static inline f4 f4_load3(const float p[3]) { return (f4){p[0], p[1], p[2], 0.0f}; }
+/* The same where a fourth float can be read. */
+static inline f4 f4_load3_padded(const float p[4]) {
+    const i4 three = {-1, -1, -1, 0};
+    f4 a;
+    memcpy(&a, p, sizeof a);
+    return (f4)((i4)a & three);
+}
 static inline void f4_store3(float p[3], f4 a) { memcpy(p, &a, 3 * sizeof *p); }
 
 struct box {

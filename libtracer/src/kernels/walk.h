@@ -280,7 +280,7 @@ TRC_INLINE bool leaf_packet(struct walk *w, uint32_t ref, struct trc_live mask, 
     const struct trc_group *g = w->group;
     struct leaf leaf = {.vertices = trc_leaf_vertices(w->tree, ref, w->key),
                         .count = trc_leaf_count(ref),
-                        .ids = w->tree->slots + trc_leaf_first(ref),
+                        .ids = trc_leaf_slots(w->tree, ref),
                         .filter = !motion && trc_edge_filter_applies(w->packets, g)};
     f8 corners[3][3], later[3][3];
     uint64_t found = 0;
@@ -335,7 +335,7 @@ TRC_INLINE bool leaf_single(struct walk *w, uint32_t ref, int k, int ray, bool a
     struct trc_packet *p = &w->packets[k];
     const struct trc_sheared *g = &w->group->of[k];
     const uint32_t count = trc_leaf_count(ref);
-    const struct trc_slot *ids = w->tree->slots + trc_leaf_first(ref);
+    const struct trc_slot *ids = trc_leaf_slots(w->tree, ref);
     const struct trc_shear axis = w->group->beam.axis;
     const int order[3] = {axis.u, axis.v, axis.z};
     const float *v = trc_leaf_vertices(w->tree, ref, w->key);
@@ -469,7 +469,7 @@ TRC_INLINE void ref_prefetch(const struct walk *w, uint32_t ref, bool any) {
     for (int line = 0; line < (is_leaf ? LEAF_LINES : NODE_LINES); line++)
         __builtin_prefetch(at + line * CACHE_LINE);
     if (is_leaf && !any)
-        __builtin_prefetch(w->tree->slots + trc_leaf_first(ref));
+        __builtin_prefetch(trc_leaf_slots(w->tree, ref));
 }
 
 /* Pushes the children that are met: to the closest hit the nearest on top, to any in any order. */

@@ -237,7 +237,7 @@ static trc_status create_pose(struct trc_mesh_topology *topology, uint32_t verte
     mesh->vertex_count = vertex_count;
     mesh->triangle_count = triangle_count;
     mesh->key_count = key_count;
-    mesh->positions = trc_alloc(per_key * key_count, sizeof(float));
+    mesh->positions = trc_alloc(per_key * key_count + 1, sizeof(float));
     bool ok = mesh->positions != NULL;
     /* Without smooth triangles nothing reads vertex normals. */
     if (ok && (kind == TRC_NORMALS_CORNER || (kind == TRC_NORMALS_VERTEX && mesh->smooth))) {

@@ -28,7 +28,7 @@ struct trc_mesh {
     atomic_uint refs;
     uint32_t key_count;
     uint32_t vertex_count, triangle_count;
-    float *positions;      /* 3 * vertex_count * key_count */
+    float *positions;      /* 3 * vertex_count * key_count, and one unset beyond: f4_load3_padded */
     uint32_t *indices;     /* 3 * triangle_count */
     float *vertex_normals; /* 3 * vertex_count * key_count or NULL */
     float *corner_normals; /* 9 * triangle_count * key_count or NULL; rules over vertex_normals */
