@@ -461,9 +461,11 @@ TRC_INLINE uint32_t stream_node(const struct walk *w, uint32_t node, const struc
 #define CACHE_LINE 64
 #define NODE_LINES ((TRC_NODE_HEADER_BYTES + TRC_NODE_KEY_BYTES) / CACHE_LINE)
 #define LEAF_LINES 2 /* a leaf is of three triangles, mostly */
-/* Asks for the memory of what waits on a stack. */
+/* Asks for the memory of what waits on a stack; a TLAS is small. */
 TRC_INLINE void ref_prefetch(const struct walk *w, uint32_t ref, bool any) {
     const bool is_leaf = ref & TRC_REF_LEAF;
+    if (w->tree->is_top)
+        return;
     const char *at = is_leaf ? (const char *)trc_leaf_vertices(w->tree, ref, w->key)
                              : (const char *)trc_node_children(w->tree, ref);
     for (int line = 0; line < (is_leaf ? LEAF_LINES : NODE_LINES); line++)
