@@ -34,12 +34,14 @@ struct trc_beam {
     float sign; /* 1 or -1 */
     float slack;
     float z0, z1; /* near and far plane, mirrored z; z1 shrinks as hits are found */
+    float length; /* between the planes at first */
     float u_min, u_max, v_min, v_max;                         /* at z0 */
     float u_min_slope, u_max_slope, v_min_slope, v_max_slope; /* per z */
     /* The same as middle and half width. */
     float u_mid, v_mid, u_half, v_half, u_mid_slope, v_mid_slope, u_half_slope, v_half_slope;
-    bool converges; /* narrower at z1 than at z0 */
-    bool is_narrow; /* rays mostly meet the same boxes */
+    float u_spread, v_spread; /* most that a ray's distance from the middle changes per z */
+    bool converges;           /* narrower at z1 than at z0 */
+    bool is_narrow;           /* rays mostly meet the same boxes */
 };
 
 /* What a traversal derives from each ray of a packet. */
@@ -221,7 +223,7 @@ TRC_INLINE bool trc_group_setup(struct trc_group *g, const struct trc_packet *pa
         trc_ends_of_origin(g, plane, &e);
     else
         trc_ends_of_rays(g, packets, mask, plane, &e);
-    const float length = b->z1 - b->z0;
+    const float length = b->length = b->z1 - b->z0;
     /* In a beam no longer than its slack, rounding would be most of a slope. */
     const bool is_short = length < f_max(b->slack, TRC_SHORT_BEAM);
     const float per_z = is_short ? 0.0f : 1.0f / length;
@@ -247,8 +249,11 @@ TRC_INLINE bool trc_group_setup(struct trc_group *g, const struct trc_packet *pa
     b->v_mid_slope = 0.5f * (b->v_min_slope + b->v_max_slope);
     b->u_half_slope = 0.5f * (b->u_max_slope - b->u_min_slope);
     b->v_half_slope = 0.5f * (b->v_max_slope - b->v_min_slope);
-    const float widest = f_max(f_max(b->u_half, b->u_half + length * b->u_half_slope),
-                               f_max(b->v_half, b->v_half + length * b->v_half_slope));
+    const float u_end = b->u_half + length * b->u_half_slope,
+                v_end = b->v_half + length * b->v_half_slope;
+    b->u_spread = is_short ? INFINITY : (b->u_half + u_end) * per_z;
+    b->v_spread = is_short ? INFINITY : (b->v_half + v_end) * per_z;
+    const float widest = f_max(f_max(b->u_half, u_end), f_max(b->v_half, v_end));
     b->converges = b->u_half_slope + b->v_half_slope < 0.0f;
     b->is_narrow = widest < TRC_NARROW_BEAM * length;
     return true;
@@ -292,6 +297,21 @@ TRC_INLINE void trc_beam_corners_set(const struct trc_beam *b, int corner, f8 u,
 #define TRC_EDGE_ROUNDING 1e-6f
 #define TRC_EDGE_LEAST 1e-36f
 
+/* What trc_triangle_test takes as t_error, for triangles in that range of z whose corners are so
+ * far from the beam's middle: a vertex is no farther from a ray than from the middle and that from
+ * the ray. Beyond the planes rays cross the beam's sides, at most by its spread. */
+TRC_INLINE f8 trc_beam_t_error(const struct trc_group *g, f8 z_low, f8 z_high, f8 u, f8 v) {
+    const struct trc_beam *b = &g->beam;
+    const f8 zero = f8_set(0.0f), length = f8_set(b->length), slack = f8_set(b->slack);
+    const f8 u_widest = f8_set(f_max(b->u_half, b->u_half + b->length * b->u_half_slope));
+    const f8 v_widest = f8_set(f_max(b->v_half, b->v_half + b->length * b->v_half_slope));
+    const f8 beyond = f8_max(zero, f8_max(z_high - length, -z_low));
+    const f8 x = u + slack + f8_madd(beyond, f8_set(b->u_spread), u_widest);
+    const f8 y = v + slack + f8_madd(beyond, f8_set(b->v_spread), v_widest);
+    const f8 z = f8_max(f8_abs(z_low), f8_abs(z_high)) + f8_set(g->z_origin);
+    return trc_t_error_most(x, y, z);
+}
+
 /* Bits of the triangles that some ray of the beam may hit. later: where the corners are at the end
  * of the group's interval of time (linear between), or NULL.
  *
@@ -301,8 +321,7 @@ TRC_INLINE void trc_beam_corners_set(const struct trc_beam *b, int corner, f8 u,
  * in motion has a quadratic edge function: its ends, and a quarter of its square term, bound it.
  * Rounding of the corners, 16 half-ulps of M at most (slopes are below 1.1, products below 3 M), is
  * within another slack on the rectangle. edges: false to compare boxes alone. t_error_out: see
- * trc_triangle_test; a vertex is no farther from a ray than from the middle and that from the ray.
- */
+ * trc_beam_t_error. */
 TRC_INLINE uint32_t trc_beam_triangles(const struct trc_group *g, const struct trc_beam_corners *c,
                                        const struct trc_beam_corners *later, bool edges,
                                        f8 *t_error_out) {
@@ -332,9 +351,8 @@ TRC_INLINE uint32_t trc_beam_triangles(const struct trc_group *g, const struct t
         slack;
     const uint32_t boxes = f8_le(from, to) & f8_le(u_low, u_half) & f8_le(-u_half, u_high) &
                            f8_le(v_low, v_half) & f8_le(-v_half, v_high);
-    *t_error_out = trc_t_error_most(f8_max(f8_abs(u_low), f8_abs(u_high)) + u_half,
-                                    f8_max(f8_abs(v_low), f8_abs(v_high)) + v_half,
-                                    f8_max(f8_abs(z_low), f8_abs(z_high)) + f8_set(g->z_origin));
+    *t_error_out = trc_beam_t_error(g, z_low, z_high, f8_max(f8_abs(u_low), f8_abs(u_high)),
+                                    f8_max(f8_abs(v_low), f8_abs(v_high)));
     if (!boxes || !edges)
         return boxes;
     const f8 rounding = f8_set(TRC_EDGE_ROUNDING);
