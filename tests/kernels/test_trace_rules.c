@@ -755,6 +755,43 @@ static void host_state_is_kept(void **state) {
 #endif
 }
 
+/* Needles from just before the ends of a packet's rays to far beyond, where these would be wide
+ * apart: what of them is computed in double does not depend on who shares the packet. */
+#define NEEDLES 4096
+static void needles_reach_beyond_packets(void **state) {
+    (void)state;
+    for (int is_common = 0; is_common < 2; is_common++) {
+        struct trial t;
+        struct rng rng = rng_seed(6);
+        trial_init(&t);
+        struct mesh *mesh = query_world_object(&t.world);
+        for (uint32_t i = 0; i < NEEDLES; i++) {
+            const float x = rng_range(&rng, -0.3f, 0.3f), y = rng_range(&rng, -0.3f, 0.3f);
+            const float width = exp2f(rng_range(&rng, -14.0f, -2.0f));
+            const float far = exp2f(rng_range(&rng, 2.0f, 12.0f));
+            const float turn_x = rng_range(&rng, -0.3f, 0.3f),
+                        turn_y = rng_range(&rng, -0.3f, 0.3f);
+            const float corners[9] = {x,   y, 1.0f,      far * turn_x, far * turn_y,
+                                      far, x, y + width, 1.0f};
+            const float b = 0.01f / far, c = rng_range(&rng, 0.0f, 0.9f);
+            const float z = 1.0f + b * (far - 1.0f);
+            add_corners(mesh, corners);
+            ray_set_add(
+                &t.rays, origin,
+                (float[3]){x + b * (far * turn_x - x), y + b * (far * turn_y - y) + c * width, z},
+                0.0f, 1.01f, 0.0f);
+            for (int k = 0; k < 2 && !is_common; k++)
+                t.rays.origin[k][i] = rng_range(&rng, -1e-3f, 1e-3f);
+        }
+        run(&t, true);
+        uint32_t hits = 0;
+        for (uint32_t i = 0; i < NEEDLES; i++)
+            hits += t.hits.instance[i] != TRC_NO_HIT;
+        assert_true(hits > NEEDLES / 4);
+        trial_free(&t);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(intervals_are_half_open),
@@ -769,6 +806,7 @@ int main(void) {
         cmocka_unit_test(origins_on_boxes),
         cmocka_unit_test(instances_hide_from_rays),
         cmocka_unit_test(times_are_clamped),
+        cmocka_unit_test(needles_reach_beyond_packets),
         cmocka_unit_test(scales),
         cmocka_unit_test(many_scales_in_one_scene),
         cmocka_unit_test(far_origins_give_numbers),
