@@ -1,4 +1,4 @@
-/* The packet kernels with counters of the steps of traversal: libtracer/src/kernels/trace.c,
+/* The packet kernels with counters of the steps of traversal: libtracer/src/kernels/walk.h,
  * compiled once more. */
 #ifndef TRACER_BENCH_COUNTED_H
 #define TRACER_BENCH_COUNTED_H

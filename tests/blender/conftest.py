@@ -3,11 +3,20 @@
 
 import os
 import sys
+import tempfile
 
 import pytest
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "support"))
 import blender as blender_support  # noqa: E402  (found by the line above)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _temporary_files():
+    """What Blenders leave in the folder of temporary files goes when the tests end."""
+    with tempfile.TemporaryDirectory(prefix="volley_") as folder, pytest.MonkeyPatch.context() as patch:
+        patch.setenv("TMPDIR", folder)
+        yield
 
 
 def _blender(folder):

@@ -149,7 +149,7 @@ struct trc_tile {
     struct trc_packet_hits packet_hits[TRC_BUNDLE];
 };
 
-/* Rays that share their dominant axis and its side share a beam (kernels/trace.c): six cells of
+/* Rays that share their dominant axis and its side share a beam (kernels/walk.h): six cells of
  * directions, below TRC_DIRECTION_CELLS. */
 #define TRC_DIRECTION_CELLS 16u
 TRC_INLINE vuint trc_direction_cell(vvec3 d) {
