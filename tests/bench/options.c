@@ -126,6 +126,9 @@ static bool set_size(struct options *o, const char *text) {
 static bool set_samples(struct options *o, const char *text) {
     return parse_number(text, 1, 4096, &o->samples);
 }
+static bool set_bundle(struct options *o, const char *text) {
+    return parse_number(text, 1, TRC_BUNDLE, &o->bundle);
+}
 static bool set_tiles(struct options *o, const char *text) {
     return parse_number(text, 1, 65536, &o->tiles);
 }
@@ -175,6 +178,8 @@ static const struct {
     {"--repeats", "N", "measured repeats, after one that warms up (5)", set_repeats},
     {"--size", "N", "edge of the square frame, pixels (1024)", set_size},
     {"--samples", "N", "samples per pixel (16)", set_samples},
+    {"--bundle", "N", "packets that go together at most, where the renderer has them do so (4)",
+     set_bundle},
     {"--tiles", "N", "tiles of 32x32 pixels that are traced, over four cameras (16)", set_tiles},
     {"--streamed", NULL, "rays and results pass through memory (default: stay in cache)",
      set_streamed},
@@ -219,7 +224,7 @@ static void print_help(void) {
         "to the instruction set of the kernels beside it. The ratio is to its fastest mode.\n"
         "Counts are per ray: 'beams' tests of a packet against the boxes of a node, 'boxes' of a\n"
         "packet's rays against one box, 'triangles' against one triangle, 'alone' nodes and\n"
-        "leaves that single rays visit; 'live' is the mean of live rays where a packet goes.\n"
+        "leaves that few rays meet one by one; 'live' is the mean of live rays where packets go.\n"
         "Embree cannot refit trees of moving meshes: it builds them anew.\n");
 }
 
@@ -231,6 +236,7 @@ static void set_defaults(struct options *o) {
                           .size = 1024,
                           .samples = 16,
                           .tiles = 16,
+                          .bundle = TRC_BUNDLE,
                           .embree = true,
                           .builds = true};
     o->isas[o->isa_count++] = trc_isa();

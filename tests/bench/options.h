@@ -23,6 +23,7 @@ struct options {
     uint32_t size;    /* of the square frame, pixels */
     uint32_t samples; /* per pixel */
     uint32_t tiles;   /* of the frame that are traced */
+    uint32_t bundle;  /* packets that go through the tree together at most */
     bool streamed;    /* rays and results of a whole set in memory, not of one batch in cache */
     bool embree;
     bool builds;

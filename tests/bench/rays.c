@@ -428,7 +428,7 @@ static bool is_occlusion(enum ray_kind kind) {
     return kind == RAY_POINT_SHADOW || kind == RAY_AREA_SHADOW || kind == RAY_HEMISPHERE_SHORT;
 }
 
-/* Kinds whose packets the renderer takes four at a time. */
+/* Kinds whose packets the renderer takes several at a time. */
 static bool stays_together(enum ray_kind kind) { return kind <= RAY_REFRACTION; }
 
 /* No batch has fewer samples than a square of pixels. */
@@ -450,9 +450,7 @@ void ray_list_make(struct ray_list *list, enum ray_kind kind, enum ray_order ord
                               .order = order,
                               .any = is_occlusion(kind),
                               .common_origin = kind == RAY_PRIMARY,
-                              .bundle = getenv("BUNDLE")       ? (uint32_t)atoi(getenv("BUNDLE"))
-                                        : stays_together(kind) ? TRC_BUNDLE
-                                                               : 1};
+                              .bundle = stays_together(kind) ? options->bundle : 1};
     ray_set_init(&list->rays);
     list->batch_begin = buffer_alloc(most_batches(options) + 1, sizeof(uint32_t));
     list->batch_packet = buffer_alloc(most_batches(options) + 1, sizeof(uint32_t));

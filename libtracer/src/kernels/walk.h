@@ -637,8 +637,7 @@ TRC_INLINE void packet_walk(struct walk *w, struct trc_live mask, bool any, bool
     for (;;) {
         const int count = trc_live_count(&live);
         if (count <= (any ? STREAM_ANY : STREAM_CLOSEST)) {
-            if (count)
-                stream_walk(w, ref, &live, any, motion);
+            stream_walk(w, ref, &live, any, motion);
         } else {
             TRC_COUNT(visits, 1);
             TRC_COUNT(visit_rays, count);
