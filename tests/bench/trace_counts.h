@@ -1,4 +1,4 @@
-/* Steps of traversal, by the names that TRC_COUNT has in libtracer/src/kernels/walk.h. */
+/* Steps of traversal, by the names that TRC_COUNT has in libtracer/src/kernels/walk*.h. */
 #ifndef TRACER_BENCH_TRACE_COUNTS_H
 #define TRACER_BENCH_TRACE_COUNTS_H
 

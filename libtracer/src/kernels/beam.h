@@ -39,6 +39,7 @@ struct trc_beam {
     float u_min_slope, u_max_slope, v_min_slope, v_max_slope; /* per z */
     /* The same as middle and half width. */
     float u_mid, v_mid, u_half, v_half, u_mid_slope, v_mid_slope, u_half_slope, v_half_slope;
+    float u_widest, v_widest; /* largest half width between the planes */
     float u_spread, v_spread; /* most that a ray's distance from the middle changes per z */
     bool converges;           /* narrower at z1 than at z0 */
     bool is_narrow;           /* rays mostly meet the same boxes */
@@ -253,9 +254,10 @@ TRC_INLINE bool trc_group_setup(struct trc_group *g, const struct trc_packet *pa
                 v_end = b->v_half + length * b->v_half_slope;
     b->u_spread = is_short ? INFINITY : (b->u_half + u_end) * per_z;
     b->v_spread = is_short ? INFINITY : (b->v_half + v_end) * per_z;
-    const float widest = f_max(f_max(b->u_half, u_end), f_max(b->v_half, v_end));
+    b->u_widest = f_max(b->u_half, u_end);
+    b->v_widest = f_max(b->v_half, v_end);
     b->converges = b->u_half_slope + b->v_half_slope < 0.0f;
-    b->is_narrow = widest < TRC_NARROW_BEAM * length;
+    b->is_narrow = f_max(b->u_widest, b->v_widest) < TRC_NARROW_BEAM * length;
     return true;
 }
 
@@ -303,11 +305,9 @@ TRC_INLINE void trc_beam_corners_set(const struct trc_beam *b, int corner, f8 u,
 TRC_INLINE f8 trc_beam_t_error(const struct trc_group *g, f8 z_low, f8 z_high, f8 u, f8 v) {
     const struct trc_beam *b = &g->beam;
     const f8 zero = f8_set(0.0f), length = f8_set(b->length), slack = f8_set(b->slack);
-    const f8 u_widest = f8_set(f_max(b->u_half, b->u_half + b->length * b->u_half_slope));
-    const f8 v_widest = f8_set(f_max(b->v_half, b->v_half + b->length * b->v_half_slope));
     const f8 beyond = f8_max(zero, f8_max(z_high - length, -z_low));
-    const f8 x = u + slack + f8_madd(beyond, f8_set(b->u_spread), u_widest);
-    const f8 y = v + slack + f8_madd(beyond, f8_set(b->v_spread), v_widest);
+    const f8 x = u + slack + f8_madd(beyond, f8_set(b->u_spread), f8_set(b->u_widest));
+    const f8 y = v + slack + f8_madd(beyond, f8_set(b->v_spread), f8_set(b->v_widest));
     const f8 z = f8_max(f8_abs(z_low), f8_abs(z_high)) + f8_set(g->z_origin);
     return trc_t_error_most(x, y, z);
 }
