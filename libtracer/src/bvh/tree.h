@@ -1,9 +1,10 @@
 /* The memory of a tree: 8-wide nodes and leaves of 1 to 8 triangles, with bounds and vertices at
  * every motion key.
  *
- * A node is TRC_NODE_HEADER_BYTES of header (8 child references) followed, for each key, by 48
- * floats: for each axis 8 lower bounds, then 8 upper ones. Unused children have inverted infinite
- * bounds. Nodes stand before their children, so that a backward walk refits.
+ * A node is 8 child references followed, for each key, by 48 floats: for each axis 8 lower bounds,
+ * then 8 upper ones. It lies in four cache lines, in motion in seven, whether it begins with one or
+ * in the middle of one. Unused children have inverted infinite bounds. Nodes stand before their
+ * children, so that a backward walk refits.
  *
  * Triangles stand in slots, those of a leaf side by side: its reference has the first and the
  * count. A leaf of n has, for each key, 9 n floats: vertex by axis by slot, without gaps between
@@ -23,7 +24,7 @@
 #include "scene/snapshot.h"
 
 #define TRC_NODE_WIDTH 8
-#define TRC_NODE_HEADER_BYTES 64
+#define TRC_NODE_CHILDREN_BYTES 32
 #define TRC_NODE_KEY_BYTES 192
 #define TRC_TRIANGLE_FLOATS 9
 
@@ -57,9 +58,13 @@ struct trc_item {
     uint32_t visibility; /* TRC_VISIBLE_* */
 };
 
-/* The slots of a tree and its refits. */
+/* What a tree and its refits share: the slots, and memory of a tree of theirs that is no more. The
+ * next refit takes it, since new memory costs it a sixth of its time. */
 struct trc_slot_block {
     atomic_uint refs;
+    uint32_t key_count; /* of trees whose memory is kept */
+    _Atomic(uint8_t *) spare_nodes;
+    _Atomic(float *) spare_vertices;
     struct trc_slot slots[];
 };
 
@@ -75,7 +80,7 @@ struct trc_tree {
     uint32_t node_count, slot_count;
     uint32_t root; /* reference; TRC_REF_EMPTY for no triangles */
     size_t node_stride;
-    uint8_t *nodes;                          /* node_count * node_stride, 64-byte aligned */
+    uint8_t *nodes;                          /* node_count * node_stride, 32-byte aligned */
     float *vertices;                         /* slot_count * key_count * 9, and a load beyond */
     struct trc_slot_block *slots;            /* slot_count; TLAS: NULL, as vertices are */
     struct trc_slot_vertices *slot_vertices; /* shared by refits of one tree; or NULL */
@@ -111,7 +116,7 @@ static inline const uint32_t *trc_node_children(const struct trc_tree *t, uint32
 }
 /* 48 floats: [axis][lower, upper][child]. */
 static inline const float *trc_node_bounds(const struct trc_tree *t, uint32_t node, uint32_t key) {
-    return (const float *)(t->nodes + (size_t)node * t->node_stride + TRC_NODE_HEADER_BYTES +
+    return (const float *)(t->nodes + (size_t)node * t->node_stride + TRC_NODE_CHILDREN_BYTES +
                            (size_t)key * TRC_NODE_KEY_BYTES);
 }
 static inline uint32_t trc_leaf_first(uint32_t ref) { return ref & TRC_REF_INDEX_MASK; }

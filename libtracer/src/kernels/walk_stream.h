@@ -90,7 +90,7 @@ TRC_INLINE uint32_t stream_node(const struct walk *w, uint32_t node, const struc
 }
 
 #define CACHE_LINE 64
-#define NODE_LINES ((TRC_NODE_HEADER_BYTES + TRC_NODE_KEY_BYTES) / CACHE_LINE)
+#define NODE_LINES ((TRC_NODE_CHILDREN_BYTES + TRC_NODE_KEY_BYTES + CACHE_LINE - 1) / CACHE_LINE)
 #define LEAF_LINES 2 /* a leaf is of three triangles, mostly */
 /* Asks for the memory of what waits on a stack; a TLAS is small. */
 TRC_INLINE void ref_prefetch(const struct walk *w, uint32_t ref, bool any) {

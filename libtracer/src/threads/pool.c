@@ -20,10 +20,10 @@ struct trc_pool {
     uint32_t started_count; /* threads that run, at most thread_count - 1 */
     struct worker *workers;
     pthread_mutex_t lock;
-    pthread_cond_t wake; /* a run has begun, or the end */
-    pthread_cond_t done; /* the last worker has left a run */
-    uint64_t run;        /* number of the current run */
-    uint32_t busy;       /* workers that have not left the current run */
+    pthread_cond_t wake;      /* a run has begun, or the end */
+    pthread_cond_t done;      /* the last worker has left a run */
+    atomic_uint_fast64_t run; /* number of the current run; changes under the lock */
+    atomic_uint busy;         /* workers that have not left the current run */
     bool stop;
     void (*task)(void *context, uint32_t index, uint32_t worker);
     void *context;
@@ -40,23 +40,50 @@ static void work(struct trc_pool *pool, uint32_t number) {
     }
 }
 
+/* Looks at most so often, some 20 microseconds long, before a thread goes to sleep: a build hands
+ * out a hundred short runs, and to be woken takes as long. */
+#define LOOKS 1000
+static void look_away(void) {
+#if defined(__x86_64__)
+    __builtin_ia32_pause();
+#endif
+}
+
+/* Waits for a run after the one seen; false at the end. */
+static bool run_await(struct trc_pool *pool, uint64_t *seen) {
+    for (int i = 0; i < LOOKS && atomic_load(&pool->run) == *seen; i++)
+        look_away();
+    pthread_mutex_lock(&pool->lock);
+    while (!pool->stop && pool->run == *seen)
+        pthread_cond_wait(&pool->wake, &pool->lock);
+    *seen = pool->run;
+    const bool goes_on = !pool->stop;
+    pthread_mutex_unlock(&pool->lock);
+    return goes_on;
+}
+
 static void worker_main(void *argument) {
     const struct worker *worker = argument;
     struct trc_pool *pool = worker->pool;
     uint64_t seen = 0;
-    pthread_mutex_lock(&pool->lock);
-    for (;;) {
-        while (!pool->stop && pool->run == seen)
-            pthread_cond_wait(&pool->wake, &pool->lock);
-        if (pool->stop)
-            break;
-        seen = pool->run;
-        pthread_mutex_unlock(&pool->lock);
+    while (run_await(pool, &seen)) {
         work(pool, worker->number);
+        if (atomic_fetch_sub(&pool->busy, 1) != 1)
+            continue;
         pthread_mutex_lock(&pool->lock);
-        if (--pool->busy == 0)
-            pthread_cond_signal(&pool->done);
+        pthread_cond_signal(&pool->done);
+        pthread_mutex_unlock(&pool->lock);
     }
+}
+
+static void workers_await(struct trc_pool *pool) {
+    for (int i = 0; i < LOOKS && atomic_load(&pool->busy); i++)
+        look_away();
+    if (!atomic_load(&pool->busy))
+        return;
+    pthread_mutex_lock(&pool->lock);
+    while (pool->busy)
+        pthread_cond_wait(&pool->done, &pool->lock);
     pthread_mutex_unlock(&pool->lock);
 }
 
@@ -160,9 +187,6 @@ void trc_pool_run(struct trc_pool *pool, uint32_t count,
     pthread_cond_broadcast(&pool->wake);
     pthread_mutex_unlock(&pool->lock);
     work(pool, 0);
-    pthread_mutex_lock(&pool->lock);
-    while (pool->busy)
-        pthread_cond_wait(&pool->done, &pool->lock);
-    pthread_mutex_unlock(&pool->lock);
+    workers_await(pool);
     trc_fp_leave(former);
 }
