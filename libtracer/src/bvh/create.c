@@ -123,13 +123,13 @@ static trc_status tree_build(struct create_job *job, const struct trc_part *part
     if (total > TRC_REF_INDEX_MASK)
         return trc_fail(TRC_ERROR_TOO_LARGE, "%llu triangles in one tree, at most %u",
                         (unsigned long long)total, TRC_REF_INDEX_MASK);
-    struct trc_ref *refs = trc_alloc_large(total ? total : 1, sizeof *refs);
+    struct trc_ref *refs = trc_alloc(total ? total : 1, sizeof *refs);
     if (!refs)
         return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory to build a tree of %llu triangles",
                         (unsigned long long)total);
     uint32_t triangle_count;
     const uint32_t count = refs_collect(job, parts, part_count, refs, &triangle_count);
-    struct trc_part_triangle *triangles = trc_alloc_large(total ? total : 1, sizeof *triangles);
+    struct trc_part_triangle *triangles = trc_alloc(total ? total : 1, sizeof *triangles);
     if (count == UINT32_MAX || !triangles) {
         trc_free(triangles);
         trc_free(refs);

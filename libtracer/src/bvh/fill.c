@@ -56,50 +56,11 @@ void trc_part_triangle(const struct trc_part *part, uint32_t triangle, uint32_t 
         f4_store3(out[v], corner[v]);
 }
 
-static struct trc_slot_block *slots_alloc(uint32_t count, uint32_t key_count) {
-    struct trc_slot_block *block =
-        trc_alloc_large(sizeof *block + count * sizeof block->slots[0], 1);
-    if (!block)
-        return NULL;
-    atomic_init(&block->refs, 1);
-    atomic_init(&block->spare_nodes, NULL);
-    atomic_init(&block->spare_vertices, NULL);
-    block->key_count = key_count;
+static struct trc_slot_block *slots_alloc(uint32_t count) {
+    struct trc_slot_block *block = trc_alloc(sizeof *block + count * sizeof block->slots[0], 1);
+    if (block)
+        atomic_init(&block->refs, 1);
     return block;
-}
-
-/* Nodes and vertices of a tree: what a former one of the same slots left, or new ones. */
-static void memory_take(struct trc_tree *tree, size_t node_count, size_t floats) {
-    struct trc_slot_block *block = tree->slots;
-    if (block && block->key_count == tree->key_count) {
-        tree->nodes = atomic_exchange(&block->spare_nodes, NULL);
-        tree->vertices = atomic_exchange(&block->spare_vertices, NULL);
-    }
-    if (!tree->nodes)
-        tree->nodes = trc_alloc_large(node_count, tree->node_stride);
-    if (!tree->vertices && floats)
-        tree->vertices = trc_alloc_large(floats, sizeof *tree->vertices);
-}
-
-/* Leaves them to the next refit, unless another tree has. */
-static void memory_leave(struct trc_tree *tree) {
-    struct trc_slot_block *block = tree->slots;
-    uint8_t *nodes = NULL;
-    float *vertices = NULL;
-    if (!block || block->key_count != tree->key_count)
-        return;
-    if (atomic_compare_exchange_strong(&block->spare_nodes, &nodes, tree->nodes))
-        tree->nodes = NULL;
-    if (atomic_compare_exchange_strong(&block->spare_vertices, &vertices, tree->vertices))
-        tree->vertices = NULL;
-}
-
-static void slots_release(struct trc_slot_block *block) {
-    if (!block || atomic_fetch_sub(&block->refs, 1) != 1)
-        return;
-    trc_free(atomic_load(&block->spare_nodes));
-    trc_free(atomic_load(&block->spare_vertices));
-    trc_free(block);
 }
 
 /* slots: to share, or NULL for new ones. */
@@ -111,12 +72,14 @@ static trc_status tree_alloc(struct trc_tree *tree, uint32_t node_count, uint32_
                               .root = TRC_REF_EMPTY,
                               .is_top = is_top};
     tree->node_stride = TRC_NODE_CHILDREN_BYTES + (size_t)key_count * TRC_NODE_KEY_BYTES;
+    tree->nodes = trc_alloc_large(node_count ? node_count : 1, tree->node_stride);
     const size_t floats = (size_t)slot_count * key_count * TRC_TRIANGLE_FLOATS;
-    if (!is_top)
-        tree->slots = slots ? slots : slots_alloc(slot_count, key_count);
-    if (slots)
-        atomic_fetch_add(&slots->refs, 1);
-    memory_take(tree, node_count ? node_count : 1, is_top ? 0 : floats + LOAD_SLOTS);
+    if (!is_top) {
+        tree->vertices = trc_alloc_large(floats + LOAD_SLOTS, sizeof *tree->vertices);
+        tree->slots = slots ? slots : slots_alloc(slot_count);
+        if (slots)
+            atomic_fetch_add(&slots->refs, 1);
+    }
     if (!tree->nodes || (!is_top && (!tree->vertices || !tree->slots))) {
         trc_tree_destroy(tree);
         return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for a tree of %u nodes and %u slots",
@@ -132,10 +95,10 @@ static trc_status tree_alloc(struct trc_tree *tree, uint32_t node_count, uint32_
 }
 
 void trc_tree_destroy(struct trc_tree *tree) {
-    memory_leave(tree);
     trc_free(tree->nodes);
     trc_free(tree->vertices);
-    slots_release(tree->slots);
+    if (tree->slots && atomic_fetch_sub(&tree->slots->refs, 1) == 1)
+        trc_free(tree->slots);
     if (tree->slot_vertices && atomic_fetch_sub(&tree->slot_vertices->refs, 1) == 1)
         trc_free(tree->slot_vertices);
     *tree = (struct trc_tree){.root = TRC_REF_EMPTY};
@@ -327,7 +290,10 @@ static void nodes_bound(struct trc_tree *tree, uint32_t node) {
 
 static bool is_cancelled(const struct fill_job *job) { return job->cancel && *job->cancel; }
 
-/* A run of nodes: leaves forwards, as they lie in memory; boxes backwards, since children come
+/* Without gain: new nodes and vertices in the memory of a former pose (new pages are warm in the
+ * cache as the system clears them, memory left is not); large pages for what builds hold meanwhile.
+ *
+ * A run of nodes: leaves forwards, as they lie in memory; boxes backwards, since children come
  * after their parents, mostly in the same run. */
 static void fill_task(void *context, uint32_t index, uint32_t worker) {
     (void)worker;
@@ -433,7 +399,7 @@ trc_status trc_tree_fill(const struct trc_topology *topology,
 }
 
 static struct trc_slot_vertices *slot_vertices_alloc(uint32_t count) {
-    struct trc_slot_vertices *v = trc_alloc_large(sizeof *v + count * sizeof v->index[0], 1);
+    struct trc_slot_vertices *v = trc_alloc(sizeof *v + count * sizeof v->index[0], 1);
     if (v)
         atomic_init(&v->refs, 1);
     return v;

@@ -257,7 +257,7 @@ struct trc_split_blocks {
 struct trc_split_blocks *trc_split_blocks_create(struct trc_ref *refs, uint32_t count,
                                                  struct trc_pool *pool, const atomic_uint *cancel) {
     struct trc_split_blocks *b = trc_alloc(1, sizeof *b);
-    struct trc_ref *spare = trc_alloc_large(count, sizeof *spare);
+    struct trc_ref *spare = trc_alloc(count, sizeof *spare);
     if (!b || !spare) {
         trc_free(b);
         trc_free(spare);

@@ -58,13 +58,9 @@ struct trc_item {
     uint32_t visibility; /* TRC_VISIBLE_* */
 };
 
-/* What a tree and its refits share: the slots, and memory of a tree of theirs that is no more. The
- * next refit takes it, since new memory costs it a sixth of its time. */
+/* The slots of a tree and its refits. */
 struct trc_slot_block {
     atomic_uint refs;
-    uint32_t key_count; /* of trees whose memory is kept */
-    _Atomic(uint8_t *) spare_nodes;
-    _Atomic(float *) spare_vertices;
     struct trc_slot slots[];
 };
 
