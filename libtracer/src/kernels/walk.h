@@ -13,8 +13,10 @@
  * Tried: boxes as one origin sees them, rectangles of slopes, cost a ray four comparisons but let
  * in a third more nodes, and with the silhouette's corners cut save no time; vertices less the
  * common origin of a packet, computed once for a triangle, cost more in registers than they save;
- * bundles of 8 packets are up to 6 % slower, of 16 up to 16; prefetching for packets, skipping a
- * stream's leaves behind its hits, and visiting what was prefetched longest ago change nothing. */
+ * bundles of 8 packets are up to 6 % slower, of 16 up to 16; a beam for every 16 rays of a bundle,
+ * all tested at once, spares primary rays 95 % of the box tests and no time; prefetching for
+ * packets, skipping a stream's leaves behind its hits, and visiting what was prefetched longest ago
+ * change nothing. */
 #ifndef TRACER_KERNELS_WALK_H
 #define TRACER_KERNELS_WALK_H
 
