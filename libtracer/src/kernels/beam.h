@@ -299,17 +299,18 @@ TRC_INLINE void trc_beam_corners_set(const struct trc_beam *b, int corner, f8 u,
 #define TRC_EDGE_ROUNDING 1e-6f
 #define TRC_EDGE_LEAST 1e-36f
 
-/* What trc_triangle_test takes as t_error, for triangles in that range of z whose corners are so
- * far from the beam's middle: a vertex is no farther from a ray than from the middle and that from
- * the ray. Beyond the planes rays cross the beam's sides, at most by its spread. */
-TRC_INLINE f8 trc_beam_t_error(const struct trc_group *g, f8 z_low, f8 z_high, f8 u, f8 v) {
+/* What trc_triangle_test knows beforehand of triangles in that range of z whose corners are so far
+ * from the beam's middle: a vertex is no farther from a ray than from the middle and that from the
+ * ray. Beyond the planes rays cross the beam's sides, at most by its spread. */
+TRC_INLINE struct trc_precision8 trc_beam_precision(const struct trc_group *g, f8 z_low, f8 z_high,
+                                                    f8 u, f8 v) {
     const struct trc_beam *b = &g->beam;
     const f8 zero = f8_set(0.0f), length = f8_set(b->length), slack = f8_set(b->slack);
     const f8 beyond = f8_max(zero, f8_max(z_high - length, -z_low));
     const f8 x = u + slack + f8_madd(beyond, f8_set(b->u_spread), f8_set(b->u_widest));
     const f8 y = v + slack + f8_madd(beyond, f8_set(b->v_spread), f8_set(b->v_widest));
     const f8 z = f8_max(f8_abs(z_low), f8_abs(z_high)) + f8_set(g->z_origin);
-    return trc_t_error_most(x, y, z);
+    return trc_precision_most(x, y, z, z_high - z_low + slack);
 }
 
 /* Bits of the triangles that some ray of the beam may hit. later: where the corners are at the end
@@ -320,11 +321,11 @@ TRC_INLINE f8 trc_beam_t_error(const struct trc_group *g, f8 z_low, f8 z_high, f
  * z: compared by their boxes and by the sides of the triangle's edges, for either winding. An edge
  * in motion has a quadratic edge function: its ends, and a quarter of its square term, bound it.
  * Rounding of the corners, 16 half-ulps of M at most (slopes are below 1.1, products below 3 M), is
- * within another slack on the rectangle. edges: false to compare boxes alone. t_error_out: see
- * trc_beam_t_error. */
+ * within another slack on the rectangle. edges: false to compare boxes alone. precision_out: see
+ * trc_beam_precision. */
 TRC_INLINE uint32_t trc_beam_triangles(const struct trc_group *g, const struct trc_beam_corners *c,
                                        const struct trc_beam_corners *later, bool edges,
-                                       f8 *t_error_out) {
+                                       struct trc_precision8 *precision_out) {
     const struct trc_beam *b = &g->beam;
     f8 z_low = f8_min(c->z[0], f8_min(c->z[1], c->z[2]));
     f8 z_high = f8_max(c->z[0], f8_max(c->z[1], c->z[2]));
@@ -351,8 +352,8 @@ TRC_INLINE uint32_t trc_beam_triangles(const struct trc_group *g, const struct t
         slack;
     const uint32_t boxes = f8_le(from, to) & f8_le(u_low, u_half) & f8_le(-u_half, u_high) &
                            f8_le(v_low, v_half) & f8_le(-v_half, v_high);
-    *t_error_out = trc_beam_t_error(g, z_low, z_high, f8_max(f8_abs(u_low), f8_abs(u_high)),
-                                    f8_max(f8_abs(v_low), f8_abs(v_high)));
+    *precision_out = trc_beam_precision(g, z_low, z_high, f8_max(f8_abs(u_low), f8_abs(u_high)),
+                                        f8_max(f8_abs(v_low), f8_abs(v_high)));
     if (!boxes || !edges)
         return boxes;
     const f8 rounding = f8_set(TRC_EDGE_ROUNDING);

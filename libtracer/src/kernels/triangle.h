@@ -18,43 +18,70 @@
 /* Below it products may have lost bits to underflow, and 1 / det may overflow. */
 #define TRC_TINY_EDGE 1e-36f
 
-/* Bound of the error of t, after M. Pharr, W. Jakob, G. Humphreys, "Physically Based Rendering",
- * 3rd ed. 2016, section 3.9.6, in half-ulps: z 3, sheared x and y 5 of x + z, edge functions 2 of x
- * y and what x and y carry, the sum 3. A ray that leaves a surface starts outside the box of its
- * point's error; nothing nearer than this bound can be told from that surface, so it does not
- * count. */
+/* Bounds of rounding errors, after M. Pharr, W. Jakob, G. Humphreys, "Physically Based Rendering",
+ * 3rd ed. 2016, section 3.9.6, in half-ulps: z 1, sheared x and y 5 of x + z, edge functions 2 of
+ * x y and what x and y carry. Their section multiplies the edge functions' errors by z; but those
+ * of a hit have one sign, and weights that sum up to 1 carry them on only as far as the vertices'
+ * depths differ: t is off by no more than that, and by the 10 half-ulps of z of sum, quotient,
+ * products, and scale. */
 #define TRC_GAMMA(n) ((n)*0x1p-24f / (1.0f - (n)*0x1p-24f))
-#define TRC_T_ERROR(name, type, set)                                                      \
-    TRC_INLINE type name(type x, type y, type z, type e, type inv) {                      \
+/* Largest |x|, |y|, |z| of the sheared vertices, 1 / |det|: the errors of the three edge functions
+ * over |det|, which are those of the barycentrics. */
+#define TRC_WEIGHT_ERROR(name, type, set)                                                 \
+    TRC_INLINE type name(type x, type y, type z, type inv) {                              \
         const type xi = x * inv, zi = z * inv; /* first, so that nothing overflows */     \
         const type dxi = set(TRC_GAMMA(5)) * (xi + zi), dy = set(TRC_GAMMA(5)) * (y + z); \
-        const type de = set(2.0f) * (set(TRC_GAMMA(2)) * xi * y + dy * xi + dxi * y);     \
-        return set(3.0f) * (set(2.0f * TRC_GAMMA(3)) * (e * inv) + de) * z;               \
+        return set(6.0f) * (set(TRC_GAMMA(2)) * xi * y + dy * xi + dxi * y);              \
     }
-/* Largest |x|, |y|, |z| of the sheared vertices, largest |edge function|, 1 / |det|: the bound over
- * sz. */
-TRC_T_ERROR(trc_t_error, vfloat, vf_set)
-TRC_T_ERROR(trc_t_error8, f8, f8_set)
+TRC_WEIGHT_ERROR(trc_weight_error, vfloat, vf_set)
+TRC_WEIGHT_ERROR(trc_weight_error8, f8, f8_set)
 
-/* At least trc_t_error over |inv| of all rays to whom a triangle's x, y, z are at most so much:
- * edge functions are at most 2 x y then. 1.001: both are rounded. */
-TRC_INLINE f8 trc_t_error_most(f8 x, f8 y, f8 z) {
-    const f8 xy = x * y;
-    const f8 edges = f8_set(4.0f * TRC_GAMMA(3) + 2.0f * TRC_GAMMA(2) + 4.0f * TRC_GAMMA(5)) * xy +
-                     f8_set(2.0f * TRC_GAMMA(5)) * z * (x + y);
-    return f8_set(3.0f * 1.001f) * z * edges;
+/* Hits that are computed in double: those whose barycentrics are off by more than that, needles,
+ * whose edge functions lose what their length has over their width; and those whose distance is, by
+ * more than one part in so many, such as of the surface that a ray leaves. A ray that leaves a
+ * surface starts outside the box of its point's error; nothing nearer than the plane's error can be
+ * told from that surface, so it does not count.
+ *
+ * At 512 distances on needles 1e4 times as long as wide are off by 287 ulps at most, for no time;
+ * at 2048 by 57 and at 8192 by 14, but primary rays among many take a seventh and a quarter longer.
+ * The products' share of the error alone, which is what double does away with, times 32768, makes
+ * 57 for 1 to 4 % of the time. */
+#define TRC_WEIGHT_IMPRECISE (1.0f / 64.0f)
+#define TRC_T_IMPRECISE 512.0f
+/* Errors of higher order, of weights as precise as that. */
+#define TRC_WEIGHT_ORDERS 1.1f
+/* Largest |z|, its range, error of the barycentrics: the distance over sz up to which it is
+ * imprecise. */
+#define TRC_T_DOUBT(name, type, set)                                             \
+    TRC_INLINE type name(type z, type range, type weight_error) {                \
+        return set(TRC_T_IMPRECISE * TRC_WEIGHT_ORDERS) * weight_error * range + \
+               set(TRC_T_IMPRECISE * TRC_GAMMA(10)) * z;                         \
+    }
+TRC_T_DOUBT(trc_t_doubt, vfloat, vf_set)
+TRC_T_DOUBT(trc_t_doubt8, f8, f8_set)
+
+/* Of eight triangles, as far as all rays of a beam may see them: what these bounds are at most. */
+struct trc_precision8 {
+    f8 weight_error; /* over |inv| */
+    f8 z, range;
+};
+/* 1.001: both this and a ray's own are rounded. */
+TRC_INLINE struct trc_precision8 trc_precision_most(f8 x, f8 y, f8 z, f8 range) {
+    const f8 error = f8_set(1.001f * 6.0f * (TRC_GAMMA(2) + 2.0f * TRC_GAMMA(5))) * x * y +
+                     f8_set(1.001f * 6.0f * TRC_GAMMA(5)) * z * (x + y);
+    return (struct trc_precision8){error, z, range};
 }
+/* One of them, for lanes. */
+struct trc_precision {
+    float weight_error, z, range;
+};
 /* Below it products may have underflowed: then it says nothing. */
-#define TRC_LEAST_T_ERROR 1e-30f
-TRC_INLINE float trc_t_error_usable(float most) {
-    return most >= TRC_LEAST_T_ERROR ? most : INFINITY;
+#define TRC_LEAST_WEIGHT_ERROR 1e-30f
+TRC_INLINE struct trc_precision trc_precision_of(const struct trc_precision8 *p, int i) {
+    return (struct trc_precision){p->weight_error[i] >= TRC_LEAST_WEIGHT_ERROR ? p->weight_error[i]
+                                                                               : INFINITY,
+                                  p->z[i], p->range[i]};
 }
-
-/* Distances whose bound is more than one part in so many are computed in double, as are those that
- * may not count: needles, whose barycentrics lose what their length has over their width. At 64
- * they are off by 2,000 ulps at most, at 1 by 64,000 (1e6 times as long as wide), for .3 % more
- * instructions; at 8192 by 6, but for 25 % more. */
-#define TRC_IMPRECISE 64.0f
 
 /* What the test needs of a ray: axes u, v, z with z dominant. */
 struct trc_shear {
@@ -173,11 +200,12 @@ TRC_INLINE vmask trc_flat_behind(const struct trc_triangle_lanes *p, vfloat ou, 
                  vm_and(flat_v, vf_le((p->v[0][1] - ov) * vf_copysign(one, dv), zero)));
 }
 
-/* Lanes of active whose ray passes through the triangle at distance *t; also barycentrics. t_error:
- * at least trc_t_error over |inv| of all rays, so that most need not compute their own. */
+/* Lanes of active whose ray passes through the triangle at distance *t; also barycentrics. most: of
+ * all rays, so that few need to compute their own bounds. */
 TRC_INLINE vmask trc_triangle_test(const struct trc_triangle_lanes *p, vfloat ou, vfloat ov,
                                    vfloat oz, vfloat su, vfloat sv, vfloat sz, vfloat tmin,
-                                   float t_error, vmask active, vfloat *t, vfloat *u, vfloat *v) {
+                                   const struct trc_precision *most, vmask active, vfloat *t,
+                                   vfloat *u, vfloat *v) {
     const vfloat az = p->v[0][2] - oz, bz = p->v[1][2] - oz, cz = p->v[2][2] - oz;
     const vfloat ax = (p->v[0][0] - ou) - su * az, ay = (p->v[0][1] - ov) - sv * az;
     const vfloat bx = (p->v[1][0] - ou) - su * bz, by = (p->v[1][1] - ov) - sv * bz;
@@ -186,8 +214,8 @@ TRC_INLINE vmask trc_triangle_test(const struct trc_triangle_lanes *p, vfloat ou
     const vfloat e1 = ax * cy - ay * cx;
     const vfloat e2 = bx * ay - by * ax;
     const vfloat zero = vf_set(0.0f);
-    const vfloat least = vf_min(e0, vf_min(e1, e2)), most = vf_max(e0, vf_max(e1, e2));
-    vmask hit = vm_and(active, vm_or(vf_ge(least, zero), vf_le(most, zero)));
+    const vfloat low = vf_min(e0, vf_min(e1, e2)), high = vf_max(e0, vf_max(e1, e2));
+    vmask hit = vm_and(active, vm_or(vf_ge(low, zero), vf_le(high, zero)));
     if (!vm_any(hit))
         return hit;
     const vfloat inv = vf_set(1.0f) / (e0 + e1 + e2);
@@ -195,19 +223,23 @@ TRC_INLINE vmask trc_triangle_test(const struct trc_triangle_lanes *p, vfloat ou
     *v = e2 * inv;
     *t = (e0 * inv * az + *u * bz + *v * cz) * sz;
     /* Of hits: the least |edge function|. */
-    const vmask near_edge = vf_le(vf_max(least, -most), vf_set(TRC_TINY_EDGE));
-    const vmask surely_precise =
-        vf_gt(vf_abs(*t), vf_set(TRC_IMPRECISE * t_error) * vf_abs(inv) * vf_abs(sz));
+    const vmask near_edge = vf_le(vf_max(low, -high), vf_set(TRC_TINY_EDGE));
+    const vfloat inv_size = vf_abs(inv), sz_size = vf_abs(sz), t_size = vf_abs(*t);
+    const vfloat error_most = vf_set(most->weight_error) * inv_size;
+    const vfloat doubt_most = trc_t_doubt(vf_set(most->z), vf_set(most->range), error_most);
+    const vmask surely_precise = vm_and(vf_le(error_most, vf_set(TRC_WEIGHT_IMPRECISE)),
+                                        vf_gt(t_size, doubt_most * sz_size));
     const vmask maybe = vm_or(near_edge, vm_andnot(vf_gt(*t, tmin), surely_precise));
     if (!vm_any(vm_and(hit, maybe)))
         return hit;
     const vfloat x = vf_max(vf_abs(ax), vf_max(vf_abs(bx), vf_abs(cx)));
     const vfloat y = vf_max(vf_abs(ay), vf_max(vf_abs(by), vf_abs(cy)));
-    const vfloat z = vf_max(vf_abs(az), vf_max(vf_abs(bz), vf_abs(cz)));
-    const vfloat e = vf_max(vf_abs(e0), vf_max(vf_abs(e1), vf_abs(e2)));
-    const vfloat bound = trc_t_error(x, y, z, e, vf_abs(inv)) * vf_abs(sz);
-    const vmask imprecise =
-        vm_and(vf_gt(*t, tmin), vf_le(vf_abs(*t), vf_set(TRC_IMPRECISE) * bound));
+    const vfloat z_low = vf_min(az, vf_min(bz, cz)), z_high = vf_max(az, vf_max(bz, cz));
+    const vfloat z = vf_max(vf_abs(z_low), vf_abs(z_high));
+    const vfloat error = trc_weight_error(x, y, z, inv_size);
+    const vmask precise = vm_and(vf_le(error, vf_set(TRC_WEIGHT_IMPRECISE)),
+                                 vf_gt(t_size, trc_t_doubt(z, z_high - z_low, error) * sz_size));
+    const vmask imprecise = vm_andnot(vf_gt(*t, tmin), precise);
     vmask doubtful = vm_and(hit, vm_or(near_edge, imprecise));
     if (__builtin_expect(vm_any(doubtful), 0)) {
         const vmask behind =
@@ -271,11 +303,12 @@ TRC_INLINE uint32_t trc_triangle8_test(const struct trc_triangle8 *p, float ou, 
     const f8 nearest = f8_min(f8_abs(e0), f8_min(f8_abs(e1), f8_abs(e2)));
     const f8 x = f8_max(f8_abs(ax), f8_max(f8_abs(bx), f8_abs(cx)));
     const f8 y = f8_max(f8_abs(ay), f8_max(f8_abs(by), f8_abs(cy)));
-    const f8 z = f8_max(f8_abs(az), f8_max(f8_abs(bz), f8_abs(cz)));
-    const f8 e = f8_max(f8_abs(e0), f8_max(f8_abs(e1), f8_abs(e2)));
-    const f8 bound = trc_t_error8(x, y, z, e, f8_abs(inv)) * f8_set(fabsf(sz));
-    const uint32_t imprecise =
-        ~f8_le(*t, f8_set(tmin)) & f8_le(f8_abs(*t), f8_set(TRC_IMPRECISE) * bound);
+    const f8 z_low = f8_min(az, f8_min(bz, cz)), z_high = f8_max(az, f8_max(bz, cz));
+    const f8 z = f8_max(f8_abs(z_low), f8_abs(z_high));
+    const f8 error = trc_weight_error8(x, y, z, f8_abs(inv));
+    const f8 doubt = trc_t_doubt8(z, z_high - z_low, error) * f8_set(fabsf(sz));
+    const uint32_t precise = f8_le(error, f8_set(TRC_WEIGHT_IMPRECISE)) & ~f8_le(f8_abs(*t), doubt);
+    const uint32_t imprecise = ~f8_le(*t, f8_set(tmin)) & ~precise;
     uint32_t doubtful = hit & (f8_le(nearest, f8_set(TRC_TINY_EDGE)) | imprecise);
     if (__builtin_expect(doubtful != 0, 0) && tmin >= 0.0f) {
         const uint32_t behind = doubtful & trc_flat_behind8(p, ou, ov, su * sz, sv * sz);

@@ -47,7 +47,8 @@ TRC_INLINE void leaf_corners(const struct walk *w, const float *v, uint32_t coun
 
 /* Beam cull of the leaf's triangles. */
 TRC_INLINE uint32_t leaf_candidates(const struct walk *w, f8 v[3][3], f8 later[3][3],
-                                    uint32_t count, bool motion, bool edges, f8 *t_error_out) {
+                                    uint32_t count, bool motion, bool edges,
+                                    struct trc_precision8 *precision_out) {
     const struct trc_beam *b = &w->group->beam;
     struct trc_beam_corners begin, end;
     for (int corner = 0; corner < 3; corner++) {
@@ -56,7 +57,7 @@ TRC_INLINE uint32_t leaf_candidates(const struct walk *w, f8 v[3][3], f8 later[3
             trc_beam_corners_set(b, corner, later[corner][0], later[corner][1], later[corner][2],
                                  &end);
     }
-    return trc_beam_triangles(w->group, &begin, motion ? &end : NULL, edges, t_error_out) &
+    return trc_beam_triangles(w->group, &begin, motion ? &end : NULL, edges, precision_out) &
            ((1u << count) - 1u);
 }
 
@@ -116,8 +117,8 @@ struct leaf {
     const float *vertices; /* of all its triangles */
     uint32_t count;
     const struct trc_slot *ids;
-    f8 t_error;  /* see trc_triangle_test */
-    bool filter; /* edges is set: rays of one origin, at rest */
+    struct trc_precision8 precision; /* see trc_triangle_test */
+    bool filter;                     /* edges is set: rays of one origin, at rest */
     struct trc_edge_filter edges;
 };
 
@@ -129,7 +130,7 @@ TRC_INLINE uint64_t slot_packet(struct walk *w, const struct leaf *leaf, int slo
     const struct trc_packet *p = &w->packets[k];
     const struct trc_sheared *g = &w->group->of[k];
     const struct trc_shear axis = w->group->beam.axis;
-    const float t_error = trc_t_error_usable(leaf->t_error[slot]);
+    const struct trc_precision most = trc_precision_of(&leaf->precision, slot);
     uint64_t found = 0;
     for (int c = 0; c < TRC_PACKET_CHUNKS; c++) {
         uint32_t bits = trc_chunk_bits(mask, c);
@@ -148,7 +149,7 @@ TRC_INLINE uint64_t slot_packet(struct walk *w, const struct leaf *leaf, int slo
         vmask hit = trc_triangle_test(tri, vf_load(&p->o[axis.u][i]), vf_load(&p->o[axis.v][i]),
                                       vf_load(&p->o[axis.z][i]), vf_load(&g->su[i]),
                                       vf_load(&g->sv[i]), vf_load(&g->sz[i]), vf_load(&p->tmin[i]),
-                                      t_error, vm_from_bits(bits), &t, &bu, &bv);
+                                      &most, vm_from_bits(bits), &t, &bu, &bv);
         if (!vm_any(hit))
             continue;
         if (any) {
@@ -174,7 +175,7 @@ TRC_INLINE bool leaf_packet(struct walk *w, uint32_t ref, struct trc_live mask, 
     leaf_corners(w, leaf.vertices, leaf.count, motion, corners, later);
     /* The filter has the edges, closer. */
     uint32_t slots =
-        leaf_candidates(w, corners, later, leaf.count, motion, !leaf.filter, &leaf.t_error);
+        leaf_candidates(w, corners, later, leaf.count, motion, !leaf.filter, &leaf.precision);
     if (slots && leaf.filter)
         slots = trc_edge_filter_setup(g, corners, slots, &leaf.edges);
     for (; slots; slots &= slots - 1) {
