@@ -200,30 +200,48 @@ TRC_INLINE vmask trc_flat_behind(const struct trc_triangle_lanes *p, vfloat ou, 
                  vm_and(flat_v, vf_le((p->v[0][1] - ov) * vf_copysign(one, dv), zero)));
 }
 
+/* A triangle moved to the origins of the lanes' rays and sheared: coordinates by vertex, and edge
+ * functions by the vertex opposite. */
+struct trc_triangle_sheared {
+    vfloat x[3], y[3], z[3], e[3];
+    vfloat low, high; /* of the edge functions */
+};
+
+/* Lanes whose ray passes through the triangle's edges. */
+TRC_INLINE vmask trc_triangle_edges(const struct trc_triangle_lanes *p, vfloat ou, vfloat ov,
+                                    vfloat oz, vfloat su, vfloat sv,
+                                    struct trc_triangle_sheared *s) {
+    for (int k = 0; k < 3; k++) {
+        s->z[k] = p->v[k][2] - oz;
+        s->x[k] = (p->v[k][0] - ou) - su * s->z[k];
+        s->y[k] = (p->v[k][1] - ov) - sv * s->z[k];
+    }
+    for (int k = 0; k < 3; k++) {
+        const int b = (k + 1) % 3, c = (k + 2) % 3;
+        s->e[k] = s->x[c] * s->y[b] - s->y[c] * s->x[b];
+    }
+    const vfloat zero = vf_set(0.0f);
+    s->low = vf_min(s->e[0], vf_min(s->e[1], s->e[2]));
+    s->high = vf_max(s->e[0], vf_max(s->e[1], s->e[2]));
+    return vm_or(vf_ge(s->low, zero), vf_le(s->high, zero));
+}
+
 /* Lanes of active whose ray passes through the triangle at distance *t; also barycentrics. most: of
  * all rays, so that few need to compute their own bounds. */
 TRC_INLINE vmask trc_triangle_test(const struct trc_triangle_lanes *p, vfloat ou, vfloat ov,
                                    vfloat oz, vfloat su, vfloat sv, vfloat sz, vfloat tmin,
                                    const struct trc_precision *most, vmask active, vfloat *t,
                                    vfloat *u, vfloat *v) {
-    const vfloat az = p->v[0][2] - oz, bz = p->v[1][2] - oz, cz = p->v[2][2] - oz;
-    const vfloat ax = (p->v[0][0] - ou) - su * az, ay = (p->v[0][1] - ov) - sv * az;
-    const vfloat bx = (p->v[1][0] - ou) - su * bz, by = (p->v[1][1] - ov) - sv * bz;
-    const vfloat cx = (p->v[2][0] - ou) - su * cz, cy = (p->v[2][1] - ov) - sv * cz;
-    const vfloat e0 = cx * by - cy * bx;
-    const vfloat e1 = ax * cy - ay * cx;
-    const vfloat e2 = bx * ay - by * ax;
-    const vfloat zero = vf_set(0.0f);
-    const vfloat low = vf_min(e0, vf_min(e1, e2)), high = vf_max(e0, vf_max(e1, e2));
-    vmask hit = vm_and(active, vm_or(vf_ge(low, zero), vf_le(high, zero)));
+    struct trc_triangle_sheared s;
+    vmask hit = vm_and(active, trc_triangle_edges(p, ou, ov, oz, su, sv, &s));
     if (!vm_any(hit))
         return hit;
-    const vfloat inv = vf_set(1.0f) / (e0 + e1 + e2);
-    *u = e1 * inv;
-    *v = e2 * inv;
-    *t = (e0 * inv * az + *u * bz + *v * cz) * sz;
+    const vfloat inv = vf_set(1.0f) / (s.e[0] + s.e[1] + s.e[2]);
+    *u = s.e[1] * inv;
+    *v = s.e[2] * inv;
+    *t = (s.e[0] * inv * s.z[0] + *u * s.z[1] + *v * s.z[2]) * sz;
     /* Of hits: the least |edge function|. */
-    const vmask near_edge = vf_le(vf_max(low, -high), vf_set(TRC_TINY_EDGE));
+    const vmask near_edge = vf_le(vf_max(s.low, -s.high), vf_set(TRC_TINY_EDGE));
     const vfloat inv_size = vf_abs(inv), sz_size = vf_abs(sz), t_size = vf_abs(*t);
     const vfloat error_most = vf_set(most->weight_error) * inv_size;
     const vfloat doubt_most = trc_t_doubt(vf_set(most->z), vf_set(most->range), error_most);
@@ -232,9 +250,10 @@ TRC_INLINE vmask trc_triangle_test(const struct trc_triangle_lanes *p, vfloat ou
     const vmask maybe = vm_or(near_edge, vm_andnot(vf_gt(*t, tmin), surely_precise));
     if (!vm_any(vm_and(hit, maybe)))
         return hit;
-    const vfloat x = vf_max(vf_abs(ax), vf_max(vf_abs(bx), vf_abs(cx)));
-    const vfloat y = vf_max(vf_abs(ay), vf_max(vf_abs(by), vf_abs(cy)));
-    const vfloat z_low = vf_min(az, vf_min(bz, cz)), z_high = vf_max(az, vf_max(bz, cz));
+    const vfloat x = vf_max(vf_abs(s.x[0]), vf_max(vf_abs(s.x[1]), vf_abs(s.x[2])));
+    const vfloat y = vf_max(vf_abs(s.y[0]), vf_max(vf_abs(s.y[1]), vf_abs(s.y[2])));
+    const vfloat z_low = vf_min(s.z[0], vf_min(s.z[1], s.z[2])),
+                 z_high = vf_max(s.z[0], vf_max(s.z[1], s.z[2]));
     const vfloat z = vf_max(vf_abs(z_low), vf_abs(z_high));
     const vfloat error = trc_weight_error(x, y, z, inv_size);
     const vmask precise = vm_and(vf_le(error, vf_set(TRC_WEIGHT_IMPRECISE)),
@@ -243,13 +262,14 @@ TRC_INLINE vmask trc_triangle_test(const struct trc_triangle_lanes *p, vfloat ou
     vmask doubtful = vm_and(hit, vm_or(near_edge, imprecise));
     if (__builtin_expect(vm_any(doubtful), 0)) {
         const vmask behind =
-            vm_and(vf_ge(tmin, zero), trc_flat_behind(p, ou, ov, su * sz, sv * sz));
+            vm_and(vf_ge(tmin, vf_set(0.0f)), trc_flat_behind(p, ou, ov, su * sz, sv * sz));
         hit = vm_andnot(hit, vm_and(doubtful, behind));
         doubtful = vm_andnot(doubtful, behind);
         if (!vm_any(doubtful))
             return hit;
 #if TRC_WIDTH > 1
-        const vfloat corner[9] = {ax, ay, az, bx, by, bz, cx, cy, cz};
+        const vfloat corner[9] = {s.x[0], s.y[0], s.z[0], s.x[1], s.y[1],
+                                  s.z[1], s.x[2], s.y[2], s.z[2]};
         vfloat exact_t, exact_u, exact_v;
         const vmask exact = trc_triangle_exact_lanes(corner, sz, &exact_t, &exact_u, &exact_v);
         hit = vm_andnot(hit, vm_andnot(doubtful, exact));
@@ -257,7 +277,8 @@ TRC_INLINE vmask trc_triangle_test(const struct trc_triangle_lanes *p, vfloat ou
         *u = vf_select(doubtful, exact_u, *u);
         *v = vf_select(doubtful, exact_v, *v);
 #else
-        const float a[3] = {ax, ay, az}, b[3] = {bx, by, bz}, c[3] = {cx, cy, cz};
+        const float a[3] = {s.x[0], s.y[0], s.z[0]}, b[3] = {s.x[1], s.y[1], s.z[1]},
+                    c[3] = {s.x[2], s.y[2], s.z[2]};
         if (!trc_triangle_exact(a, b, c, sz, t, u, v))
             hit = vm_none();
 #endif

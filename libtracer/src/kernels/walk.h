@@ -72,11 +72,7 @@ TRC_INLINE uint64_t box_packet(const struct walk *w, const struct opened *node, 
         box[plane] = node->planes[plane][child];
     TRC_COUNT(box_rays, __builtin_popcountll(mask));
     uint64_t live = 0;
-    for (int c = 0; c < TRC_PACKET_CHUNKS; c++) {
-        const uint32_t bits = trc_chunk_bits(mask, c);
-        if (!bits)
-            continue;
-        const int i = c * TRC_WIDTH;
+    for (int i = 0; i < TRC_PACKET_SIZE; i += TRC_WIDTH) {
         const vfloat u_inv = vf_load(&g->inv[u][i]), u_shift = vf_load(&g->shift[u][i]),
                      v_inv = vf_load(&g->inv[v][i]), v_shift = vf_load(&g->shift[v][i]),
                      z_inv = vf_load(&g->inv[z][i]), z_shift = vf_load(&g->shift[z][i]);
@@ -90,9 +86,9 @@ TRC_INLINE uint64_t box_packet(const struct walk *w, const struct opened *node, 
             vf_max(vf_max(vf_load(&p->tmin[i]), z0), vf_max(vf_min(u0, u1), vf_min(v0, v1)));
         const vfloat far =
             vf_min(vf_min(vf_load(&p->t[i]), z1), vf_min(vf_max(u0, u1), vf_max(v0, v1)));
-        live |= (uint64_t)(vm_bits(vf_le(near, far)) & bits) << i;
+        live |= (uint64_t)vm_bits(vf_le(near, far)) << i;
     }
-    return live;
+    return live & mask;
 }
 
 /* Rays of mask that meet the box of the node's child. together: whether boxes still take all rays
