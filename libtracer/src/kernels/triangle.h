@@ -226,6 +226,26 @@ TRC_INLINE vmask trc_triangle_edges(const struct trc_triangle_lanes *p, vfloat o
     return vm_or(vf_ge(s->low, zero), vf_le(s->high, zero));
 }
 
+/* Lanes whose ray may pass through the triangle's edges, by fewer operations: trc_triangle_edges
+ * has none beside. weight_error: of trc_precision, three times what an edge function is off by at
+ * most; two of them lie between both forms. */
+TRC_INLINE vmask trc_triangle_near(const struct trc_triangle_lanes *p, vfloat ou, vfloat ov,
+                                   vfloat oz, vfloat su, vfloat sv, float weight_error) {
+    vfloat x[3], y[3], e[3];
+    for (int k = 0; k < 3; k++) {
+        const vfloat z = p->v[k][2] - oz;
+        x[k] = vf_madd(-su, z, p->v[k][0] - ou);
+        y[k] = vf_madd(-sv, z, p->v[k][1] - ov);
+    }
+    for (int k = 0; k < 3; k++) {
+        const int b = (k + 1) % 3, c = (k + 2) % 3;
+        e[k] = vf_madd(x[c], y[b], -(y[c] * x[b]));
+    }
+    const vfloat margin = vf_set(weight_error);
+    return vm_or(vf_ge(vf_min(e[0], vf_min(e[1], e[2])), -margin),
+                 vf_le(vf_max(e[0], vf_max(e[1], e[2])), margin));
+}
+
 /* Lanes of active whose ray passes through the triangle at distance *t; also barycentrics. most: of
  * all rays, so that few need to compute their own bounds. */
 TRC_INLINE vmask trc_triangle_test(const struct trc_triangle_lanes *p, vfloat ou, vfloat ov,
