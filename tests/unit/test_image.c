@@ -1,5 +1,5 @@
 /* Images: what pixels become, what is refused, and files that are damaged in every way. */
-#define _XOPEN_SOURCE 700 /* P_tmpdir */
+#define _XOPEN_SOURCE 700 /* image_file.h: P_tmpdir */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -15,6 +15,7 @@
 #include "core/core.h"
 #include "image/image.h"
 #include "image/texel.h"
+#include "image_file.h"
 
 static trc_image_desc pixels_desc(uint32_t width, uint32_t height, const void *pixels,
                                   bool is_float) {
@@ -311,20 +312,9 @@ static void test_memory_failures(void **state) {
 
 /* ---- files ---- */
 
-static char path[256];
-
 static trc_image_desc file_desc(void) {
     return (trc_image_desc){
         .struct_size = sizeof(trc_image_desc), .alpha_mode = TRC_ALPHA_STRAIGHT, .path = path};
-}
-
-static void write_file(const char *name, const void *bytes, size_t size) {
-    const char *folder = getenv("TMPDIR");
-    snprintf(path, sizeof path, "%s/trc_test_image_%s", folder ? folder : P_tmpdir, name);
-    FILE *file = fopen(path, "wb");
-    assert_non_null(file);
-    assert_int_equal(fwrite(bytes, 1, size, file), size);
-    assert_int_equal(fclose(file), 0);
 }
 
 #ifdef TRC_WITH_OIIO
@@ -431,8 +421,31 @@ static struct sample make_hdr(void) {
     return f;
 }
 
+/* 2 x 1 of DirectDraw's, not compressed, with 8 bits of alpha. */
+static struct sample make_dds(void) {
+    struct sample f = {.name = "e.dds"};
+    enum { HEADER = 124, RESERVED = 11, FORMAT = 32 };
+    static const uint32_t format[] = {FORMAT, 0x41, 0, 32, 0xff0000, 0xff00, 0xff, 0xff000000};
+    static const uint8_t bgra[8] = {30, 20, 10, 255, 60, 50, 40, 128};
+    put(&f, "DDS ", 4);
+    put32(&f, HEADER);
+    put32(&f, 0x100f); /* height, width, pitch, format, and what it can do, are said */
+    put32(&f, 1);
+    put32(&f, 2);
+    put32(&f, sizeof bgra);
+    for (int i = 0; i < 2 + RESERVED; i++)
+        put32(&f, 0);
+    for (size_t i = 0; i < sizeof format / sizeof *format; i++)
+        put32(&f, format[i]);
+    put32(&f, 0x1000); /* a texture */
+    for (int i = 0; i < 4; i++)
+        put32(&f, 0);
+    put(&f, bgra, sizeof bgra);
+    return f;
+}
+
 typedef struct sample (*sample_maker)(void);
-static const sample_maker makers[] = {make_targa, make_pnm, make_exr, make_hdr};
+static const sample_maker makers[] = {make_targa, make_pnm, make_exr, make_hdr, make_dds};
 #define SAMPLES (sizeof makers / sizeof *makers)
 
 static void test_targa(void **state) {
@@ -446,6 +459,20 @@ static void test_targa(void **state) {
     assert_int_equal(image->format, TRC_TEXEL_U8);
     assert_int_equal(image->is_associated, 1);
     assert_memory_equal(image->levels[0].texels, expected, 16); /* the bottom row first */
+    trc_image_release(image);
+    remove(path);
+}
+
+/* Files of games say nothing of their alpha: colours are not multiplied, as in Blender. */
+static void test_dds(void **state) {
+    (void)state;
+    static const uint8_t expected[8] = {10, 20, 30, 255, 20, 25, 30, 128};
+    const struct sample f = make_dds();
+    write_file(f.name, f.bytes, f.size);
+    const trc_image_desc desc = file_desc();
+    struct trc_image *image = loaded(&desc);
+    assert_int_equal(image->format, TRC_TEXEL_U8);
+    assert_memory_equal(image->levels[0].texels, expected, 8);
     trc_image_release(image);
     remove(path);
 }
@@ -621,23 +648,6 @@ static void test_files_without_memory(void **state) {
 
 /* ---- colour spaces ---- */
 
-/* Beside scene-linear: a space that is twice as bright, and one that is encoded as a square root.
- */
-static const char color_config[] =
-    "ocio_profile_version: 1\n"
-    "roles: {scene_linear: linear, default: linear}\n"
-    "displays:\n"
-    "  d:\n"
-    "    - !<View> {name: v, colorspace: linear}\n"
-    "colorspaces:\n"
-    "  - !<ColorSpace> {name: linear}\n"
-    "  - !<ColorSpace>\n"
-    "    name: bright\n"
-    "    to_reference: !<MatrixTransform> {matrix: [.5,0,0,0, 0,.5,0,0, 0,0,.5,0, 0,0,0,1]}\n"
-    "  - !<ColorSpace>\n"
-    "    name: root\n"
-    "    to_reference: !<ExponentTransform> {value: [2, 2, 2, 1]}\n";
-
 static trc_image_desc color_desc(const void *pixels, bool is_float, const char *space) {
     trc_image_desc desc = pixels_desc(1, 1, pixels, is_float);
     desc.color_config = path;
@@ -773,6 +783,7 @@ int main(void) {
         cmocka_unit_test(test_memory_failures),
 #ifdef TRC_WITH_OIIO
         cmocka_unit_test(test_targa),
+        cmocka_unit_test(test_dds),
         cmocka_unit_test(test_16_bits),
         cmocka_unit_test(test_16_bits_made_smaller),
         cmocka_unit_test(test_exr),

@@ -1,6 +1,6 @@
 /* Image files of every type of sample and number of channels: what their texels become by each
  * alpha mode, and when made smaller. The files are TIFF, which has them all, written here. */
-#define _XOPEN_SOURCE 700 /* P_tmpdir */
+#define _XOPEN_SOURCE 700 /* image_file.h: P_tmpdir */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -17,6 +17,7 @@
 #include "image/image.h"
 #include "image/oiio.h"
 #include "image/texel.h"
+#include "image_file.h"
 
 #ifdef TRC_WITH_OIIO
 
@@ -42,8 +43,6 @@ static const struct type {
     {"floats", 32, FLOAT, TRC_TEXEL_F32, 1.0f, 1e-6f},
 };
 #define TYPES (sizeof types / sizeof *types)
-
-static char path[256];
 
 struct file {
     uint8_t bytes[2048];
@@ -115,12 +114,7 @@ static struct file make_tiff(const struct type *type, uint32_t channels) {
 
 static void write_tiff(const struct type *type, uint32_t channels) {
     const struct file tiff = make_tiff(type, channels);
-    const char *folder = getenv("TMPDIR");
-    snprintf(path, sizeof path, "%s/trc_test_image_types.tif", folder ? folder : P_tmpdir);
-    FILE *file = fopen(path, "wb");
-    assert_non_null(file);
-    assert_int_equal(fwrite(tiff.bytes, 1, tiff.size, file), tiff.size);
-    assert_int_equal(fclose(file), 0);
+    write_file("types.tif", tiff.bytes, tiff.size);
 }
 
 /* A channel of the image's largest level, as part of 1. */
@@ -214,6 +208,41 @@ static void every_type_and_number_of_channels(void **state) {
     remove(path);
 }
 
+/* From a space encoded as a square root: what is written of it, squared; numbers below 1 become
+ * half floats. */
+static void colors_of_every_type(void **state) {
+    (void)state;
+    char image_path[sizeof path];
+    for (size_t i = 0; i < TYPES; i++)
+        for (uint32_t channels = 1; channels <= 4; channels++) {
+            write_tiff(&types[i], channels);
+            memcpy(image_path, path, sizeof path);
+            write_file("types.ocio", color_config, sizeof color_config - 1);
+            const trc_image_desc desc = {.struct_size = sizeof desc,
+                                         .alpha_mode = TRC_ALPHA_CHANNEL_PACKED,
+                                         .path = image_path,
+                                         .color_config = path,
+                                         .color_space = "root"};
+            struct trc_image *image = NULL;
+            if (trc_image_load(&desc, &image) != TRC_OK)
+                fail_msg("%s, %u channels: %s", types[i].name, channels, trc_last_message());
+            assert_int_equal(image->format, types[i].bits == 32 ? TRC_TEXEL_F32 : TRC_TEXEL_F16);
+            for (int texel = 0; texel < WIDTH * HEIGHT; texel++) {
+                float expected[4];
+                expected_texel(texel % WIDTH, texel / WIDTH, channels, TRC_ALPHA_CHANNEL_PACKED,
+                               expected);
+                for (int c = 0; c < 4; c++)
+                    expect_near(&types[i], channels, TRC_ALPHA_CHANNEL_PACKED,
+                                texel_value(image, 4 * texel + c),
+                                c < 3 ? expected[c] * expected[c] : expected[c],
+                                2.0f * types[i].error + 1e-3f);
+            }
+            trc_image_release(image);
+            remove(path);
+            remove(image_path);
+        }
+}
+
 /* Rows that do not fit in the buffer, or texels in a row: nothing is written. */
 static void buffers_too_small(void **state) {
     (void)state;
@@ -239,6 +268,10 @@ static void every_type_and_number_of_channels(void **state) {
     (void)state;
     skip();
 }
+static void colors_of_every_type(void **state) {
+    (void)state;
+    skip();
+}
 static void buffers_too_small(void **state) {
     (void)state;
     skip();
@@ -249,6 +282,7 @@ static void buffers_too_small(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_type_and_number_of_channels),
+        cmocka_unit_test(colors_of_every_type),
         cmocka_unit_test(buffers_too_small),
     };
     return cmocka_run_group_tests_name("image types", tests, NULL, NULL);

@@ -1,0 +1,37 @@
+/* Files that tests of images write, and a configuration of colour spaces. */
+#ifndef TRACER_UNIT_IMAGE_FILE_H
+#define TRACER_UNIT_IMAGE_FILE_H
+
+#include <stdio.h>
+#include <stdlib.h>
+
+/* Of the file written last: the test removes it. */
+static char path[256];
+
+static void write_file(const char *name, const void *bytes, size_t size) {
+    const char *folder = getenv("TMPDIR");
+    snprintf(path, sizeof path, "%s/trc_test_image_%s", folder ? folder : P_tmpdir, name);
+    FILE *file = fopen(path, "wb");
+    assert_non_null(file);
+    assert_int_equal(fwrite(bytes, 1, size, file), size);
+    assert_int_equal(fclose(file), 0);
+}
+
+/* Beside scene-linear: a space that is twice as bright, and one that is encoded as a square root.
+ */
+static const char color_config[] =
+    "ocio_profile_version: 1\n"
+    "roles: {scene_linear: linear, default: linear}\n"
+    "displays:\n"
+    "  d:\n"
+    "    - !<View> {name: v, colorspace: linear}\n"
+    "colorspaces:\n"
+    "  - !<ColorSpace> {name: linear}\n"
+    "  - !<ColorSpace>\n"
+    "    name: bright\n"
+    "    to_reference: !<MatrixTransform> {matrix: [.5,0,0,0, 0,.5,0,0, 0,0,.5,0, 0,0,0,1]}\n"
+    "  - !<ColorSpace>\n"
+    "    name: root\n"
+    "    to_reference: !<ExponentTransform> {value: [2, 2, 2, 1]}\n";
+
+#endif
