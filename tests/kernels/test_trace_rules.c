@@ -1,97 +1,12 @@
 /* What the ray queries promise, rule by rule: intervals, ties, triangles and rays that do not
- * count, rays on planes and boxes, numbers at the ends of their range. */
-#include "query_test.h"
+ * count, rays on planes and boxes. Numbers at the ends of their range: test_trace_numbers.c. */
+#include "trial.h"
 
 #if defined(__SSE__)
 #include <xmmintrin.h>
 #endif
 
-static const uint32_t packet_sizes[] = {1, 4, 16, 64, 256};
-#define PACKET_SIZES (sizeof packet_sizes / sizeof *packet_sizes)
-
-static const float unit_lower[3] = {-1, -1, -1}, unit_upper[3] = {1, 1, 1}, origin[3] = {0, 0, 0};
-
-/* A world with its rays and, after run, the hits of the last query. */
-struct trial {
-    struct query_world world;
-    struct ray_set rays;
-    struct hit_set hits;
-};
-
-static void trial_init(struct trial *t) {
-    query_world_init(&t->world);
-    ray_set_init(&t->rays);
-    t->hits = (struct hit_set){0};
-}
-
-static void trial_free(struct trial *t) {
-    query_world_free(&t->world);
-    ray_set_free(&t->rays);
-    hit_set_free(&t->hits);
-}
-
-static void add_ray(struct trial *t, float ox, float oy, float oz, float dx, float dy, float dz) {
-    const float o[3] = {ox, oy, oz}, d[3] = {dx, dy, dz};
-    ray_set_add_simple(&t->rays, o, d);
-}
-
-/* Queries an existing scene with every packet size: all the same bits. */
-static void query(struct trial *t, trc_scene scene) {
-    struct hit_set other;
-    hit_set_free(&t->hits);
-    hit_set_init(&t->hits, t->rays.count);
-    hit_set_init(&other, t->rays.count);
-    assert_ok(hit_set_query(&t->hits, scene, &t->rays, packet_sizes[0]));
-    for (size_t i = 1; i < PACKET_SIZES; i++) {
-        assert_ok(hit_set_query(&other, scene, &t->rays, packet_sizes[i]));
-        const uint32_t ray = hit_set_difference(&t->hits, &other);
-        if (ray == UINT32_MAX)
-            continue;
-        hit_set_print(&t->hits, &t->rays, ray);
-        hit_set_print(&other, &t->rays, ray);
-        fail_msg("packets of 1 and of %u differ at ray %u", packet_sizes[i], ray);
-    }
-    hit_set_free(&other);
-}
-
-static void run(struct trial *t, bool is_final) {
-    struct query_scene scene = query_test_scene(&t->world, is_final);
-    query(t, scene.scene);
-    query_scene_destroy(&scene);
-}
-
-static void expect_hit(const struct trial *t, uint32_t ray, uint32_t instance, uint32_t triangle,
-                       float distance) {
-    if (t->hits.instance[ray] != instance || t->hits.triangle[ray] != triangle ||
-        t->hits.distance[ray] != distance) {
-        hit_set_print(&t->hits, &t->rays, ray);
-        fail_msg("ray %u: %u/%u at %a expected", ray, instance, triangle, distance);
-    }
-}
-
-static void expect_miss(const struct trial *t, uint32_t ray) {
-    if (t->hits.instance[ray] == TRC_NO_HIT && !t->hits.occluded[ray])
-        return;
-    hit_set_print(&t->hits, &t->rays, ray);
-    fail_msg("ray %u: a miss expected", ray);
-}
-
-/* Where arithmetic is exact, the oracle's nearest hit is the answer, bit for bit. */
-static void expect_exact(const struct trial *t, const char *name) {
-    struct brute_list list = {0};
-    for (uint32_t i = 0; i < t->rays.count; i++) {
-        brute_collect(&t->world, &t->rays, i, &list);
-        const struct brute_candidate *best = brute_nearest(&list, &t->rays, i);
-        if (best ? t->hits.instance[i] == best->instance && t->hits.triangle[i] == best->triangle &&
-                       t->hits.distance[i] == (float)best->distance && t->hits.occluded[i]
-                 : t->hits.instance[i] == TRC_NO_HIT && !t->hits.occluded[i])
-            continue;
-        hit_set_print(&t->hits, &t->rays, i);
-        brute_list_print(&list);
-        fail_msg("%s: ray %u", name, i);
-    }
-    brute_list_free(&list);
-}
+static const float unit_lower[3] = {-1, -1, -1}, unit_upper[3] = {1, 1, 1};
 
 /* A right triangle in the plane z = height that covers the origin. */
 static void add_floor(struct mesh *mesh, float height) {
@@ -230,13 +145,6 @@ static void lowest_number_wins(void **state) {
 }
 
 /* ---- triangles that do not count ---- */
-
-static void add_corners(struct mesh *mesh, const float p[9]) {
-    const uint32_t first = mesh->vertex_count;
-    for (int k = 0; k < 3; k++)
-        mesh_add_vertex(mesh, p[3 * k], p[3 * k + 1], p[3 * k + 2]);
-    mesh_add_triangle(mesh, first, first + 1, first + 2);
-}
 
 /* Duplicate vertices, no extent, vertices on a line: never hit, wherever rays aim. */
 static void degenerate_triangles_are_never_hit(void **state) {
@@ -578,147 +486,7 @@ static void times_are_clamped(void **state) {
     }
 }
 
-/* ---- numbers at the ends of their range ---- */
-
-/* A sphere at a scale, from inside, from outside and from very far, against the oracle. */
-static void scales(void **state) {
-    (void)state;
-    static const float radii[] = {1e-38f, 1e-30f, 1e-20f, 1e-10f, 1e10f, 1e18f};
-    for (size_t s = 0; s < sizeof radii / sizeof *radii; s++) {
-        struct trial t;
-        struct rng rng = rng_seed(s);
-        struct brute_list list = {0};
-        const float r = radii[s], lower[3] = {-r, -r, -r}, upper[3] = {r, r, r};
-        trial_init(&t);
-        mesh_add_icosphere(query_world_object(&t.world), origin, r, 2);
-        mesh_add_soup(query_world_object(&t.world), &rng, 50, lower, upper, 0.2f * r);
-        float o[3] = {0};
-        for (int i = 0; i < 64 * 30; i++) {
-            float d[3];
-            if (i % 64 == 0) {
-                rng_direction(&rng, o);
-                const float far = i / 64 % 3 == 0 ? 0.4f : i / 64 % 3 == 1 ? 1.5f : 1000.0f;
-                for (int axis = 0; axis < 3; axis++)
-                    o[axis] *= far * r;
-            }
-            rng_direction(&rng, d);
-            for (int axis = 0; axis < 3; axis++)
-                d[axis] = 0.7f * r * d[axis] - o[axis];
-            ray_set_add_simple(&t.rays, o, d);
-        }
-        for (int is_final = 0; is_final < 2; is_final++) {
-            run(&t, is_final);
-            for (uint32_t i = 0; i < t.rays.count; i++) {
-                brute_collect(&t.world, &t.rays, i, &list);
-                if (brute_judge_closest(&list, &t.rays, i, &t.hits) != BRUTE_DIFFERS &&
-                    brute_judge_occluded(&list, &t.rays, i, &t.hits) != BRUTE_DIFFERS)
-                    continue;
-                hit_set_print(&t.hits, &t.rays, i);
-                brute_list_print(&list);
-                fail_msg("radius %g: wrong at ray %u", (double)r, i);
-            }
-        }
-        brute_list_free(&list);
-        trial_free(&t);
-    }
-}
-
-/* Objects of sizes 1e-6 to 1e6 in one scene, each seen from near and from far. */
-static void many_scales_in_one_scene(void **state) {
-    (void)state;
-    struct trial t;
-    struct rng rng = rng_seed(14);
-    struct brute_list list = {0};
-    trial_init(&t);
-    struct mesh *mesh = query_world_object(&t.world);
-    for (int e = -6; e <= 6; e++) {
-        const float r = powf(10.0f, (float)e), at[3] = {2.0f * r, -r, 0.5f * r};
-        mesh_add_uv_sphere(mesh, at, 0.5f * r, 8, 12);
-    }
-    for (int i = 0; i < 4000; i++) {
-        const float r = powf(10.0f, (float)(i / 64 % 13 - 6));
-        float o[3], target[3];
-        const float away = rng_bits(&rng) & 1 ? 1.0f : 100.0f;
-        for (int axis = 0; axis < 3; axis++) {
-            o[axis] = away * r * rng_range(&rng, -1.0f, 1.0f);
-            target[axis] = r * rng_range(&rng, -0.4f, 0.4f) + r * (axis == 0 ? 2.0f : -0.5f);
-        }
-        ray_set_aim(&t.rays, o, target, 0.0f);
-    }
-    run(&t, true);
-    for (uint32_t i = 0; i < t.rays.count; i++) {
-        brute_collect(&t.world, &t.rays, i, &list);
-        if (brute_judge_closest(&list, &t.rays, i, &t.hits) != BRUTE_DIFFERS)
-            continue;
-        hit_set_print(&t.hits, &t.rays, i);
-        brute_list_print(&list);
-        fail_msg("wrong at ray %u", i);
-    }
-    brute_list_free(&list);
-    trial_free(&t);
-}
-
-/* Origins beyond the range of coordinates: no NaN, no crash; what is reported is finite. */
-static void far_origins_give_numbers(void **state) {
-    (void)state;
-    struct trial t;
-    struct rng rng = rng_seed(13);
-    trial_init(&t);
-    mesh_add_icosphere(query_world_object(&t.world), origin, 1e18f, 2);
-    mesh_add_box(query_world_object(&t.world), unit_lower, unit_upper);
-    for (int i = 0; i < 6400; i++) {
-        const float size = powf(10.0f, 18.0f + 20.0f * rng_unit(&rng));
-        float o[3], d[3];
-        rng_direction(&rng, o);
-        for (int axis = 0; axis < 3; axis++) {
-            o[axis] *= size;
-            d[axis] = -o[axis] * 1e-3f;
-        }
-        ray_set_add_simple(&t.rays, o, d);
-    }
-    run(&t, false);
-    for (uint32_t i = 0; i < t.rays.count; i++) {
-        if (t.hits.instance[i] == TRC_NO_HIT)
-            continue;
-        assert_true(isfinite(t.hits.distance[i]) && t.hits.distance[i] > 0.0f);
-        assert_true(t.hits.u[i] >= 0.0f && t.hits.u[i] <= 1.0f);
-        assert_true(t.hits.v[i] >= 0.0f && t.hits.v[i] <= 1.0f);
-    }
-    trial_free(&t);
-}
-
-/* Instances scaled by extreme factors: directions in object space are as extreme. */
-static void extreme_instances(void **state) {
-    (void)state;
-    static const float factors[] = {1e-15f, 1e-12f, 1e-9f, 1e-6f, 1e6f, 1e9f, 1e12f, 1e15f};
-    for (size_t s = 0; s < sizeof factors / sizeof *factors; s++) {
-        struct trial t;
-        struct rng rng = rng_seed(38);
-        const float f = factors[s], scale[3] = {f, f, f}, axis[3] = {1, -1, 2};
-        uint32_t misses = 0;
-        trial_init(&t);
-        mesh_add_uv_sphere(query_world_object(&t.world), origin, 1.0f, 24, 32);
-        query_transform(axis, 0.7f, scale, origin, t.world.instances[0].transforms[0]);
-        for (int i = 0; i < 64 * 100; i++) {
-            float d[3], o[3];
-            rng_direction(&rng, d);
-            for (int k = 0; k < 3; k++)
-                o[k] = i / 64 & 1 ? f * rng_range(&rng, -0.5f, 0.5f) : 0.0f;
-            ray_set_add_simple(&t.rays, o, d);
-        }
-        run(&t, false);
-        for (uint32_t i = 0; i < t.rays.count; i++) {
-            if (t.hits.instance[i] == 0 && t.hits.occluded[i])
-                continue;
-            if (!misses++)
-                hit_set_print(&t.hits, &t.rays, i);
-        }
-        if (misses)
-            print_message("scaled by %g: %u misses\n", (double)f, misses);
-        assert_int_equal(misses, 0);
-        trial_free(&t);
-    }
-}
+/* ---- the host ---- */
 
 /* The caller's floating-point state neither changes nor matters. */
 static void host_state_is_kept(void **state) {
@@ -755,43 +523,6 @@ static void host_state_is_kept(void **state) {
 #endif
 }
 
-/* Needles from just before the ends of a packet's rays to far beyond, where these would be wide
- * apart: what of them is computed in double does not depend on who shares the packet. */
-#define NEEDLES 4096
-static void needles_reach_beyond_packets(void **state) {
-    (void)state;
-    for (int is_common = 0; is_common < 2; is_common++) {
-        struct trial t;
-        struct rng rng = rng_seed(6);
-        trial_init(&t);
-        struct mesh *mesh = query_world_object(&t.world);
-        for (uint32_t i = 0; i < NEEDLES; i++) {
-            const float x = rng_range(&rng, -0.3f, 0.3f), y = rng_range(&rng, -0.3f, 0.3f);
-            const float width = exp2f(rng_range(&rng, -14.0f, -2.0f));
-            const float far = exp2f(rng_range(&rng, 2.0f, 12.0f));
-            const float turn_x = rng_range(&rng, -0.3f, 0.3f),
-                        turn_y = rng_range(&rng, -0.3f, 0.3f);
-            const float corners[9] = {x,   y, 1.0f,      far * turn_x, far * turn_y,
-                                      far, x, y + width, 1.0f};
-            const float b = 0.01f / far, c = rng_range(&rng, 0.0f, 0.9f);
-            const float z = 1.0f + b * (far - 1.0f);
-            add_corners(mesh, corners);
-            ray_set_add(
-                &t.rays, origin,
-                (float[3]){x + b * (far * turn_x - x), y + b * (far * turn_y - y) + c * width, z},
-                0.0f, 1.01f, 0.0f);
-            for (int k = 0; k < 2 && !is_common; k++)
-                t.rays.origin[k][i] = rng_range(&rng, -1e-3f, 1e-3f);
-        }
-        run(&t, true);
-        uint32_t hits = 0;
-        for (uint32_t i = 0; i < NEEDLES; i++)
-            hits += t.hits.instance[i] != TRC_NO_HIT;
-        assert_true(hits > NEEDLES / 4);
-        trial_free(&t);
-    }
-}
-
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(intervals_are_half_open),
@@ -806,11 +537,6 @@ int main(void) {
         cmocka_unit_test(origins_on_boxes),
         cmocka_unit_test(instances_hide_from_rays),
         cmocka_unit_test(times_are_clamped),
-        cmocka_unit_test(needles_reach_beyond_packets),
-        cmocka_unit_test(scales),
-        cmocka_unit_test(many_scales_in_one_scene),
-        cmocka_unit_test(far_origins_give_numbers),
-        cmocka_unit_test(extreme_instances),
         cmocka_unit_test(host_state_is_kept),
     };
     if (!query_test_isa())
