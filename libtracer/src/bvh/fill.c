@@ -1,4 +1,7 @@
-/* Memory of a tree: vertices into leaves, bounds into nodes, refit. */
+/* Memory of a tree: vertices into leaves, bounds into nodes, refit.
+ *
+ * Without gain: a pose in the memory of a former one (new pages are warm in the cache as the system
+ * clears them, memory left is not); large pages for what builds hold meanwhile. */
 #include <float.h>
 #include <math.h>
 #include <string.h>
@@ -290,10 +293,7 @@ static void nodes_bound(struct trc_tree *tree, uint32_t node) {
 
 static bool is_cancelled(const struct fill_job *job) { return job->cancel && *job->cancel; }
 
-/* Without gain: new nodes and vertices in the memory of a former pose (new pages are warm in the
- * cache as the system clears them, memory left is not); large pages for what builds hold meanwhile.
- *
- * A run of nodes: leaves forwards, as they lie in memory; boxes backwards, since children come
+/* A run of nodes: leaves forwards, as they lie in memory; boxes backwards, since children come
  * after their parents, mostly in the same run. */
 static void fill_task(void *context, uint32_t index, uint32_t worker) {
     (void)worker;
