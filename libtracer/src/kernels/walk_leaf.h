@@ -130,16 +130,18 @@ TRC_INLINE uint64_t slot_edges(const struct walk *w, const struct leaf *leaf, in
     const struct trc_shear axis = w->group->beam.axis;
     const float weight_error = trc_precision_of(&leaf->precision, slot).weight_error;
     uint64_t pass = 0;
+    if (leaf->filter) {
+        for (int i = 0; i < TRC_PACKET_SIZE; i += TRC_WIDTH)
+            pass |= (uint64_t)trc_edge_filter_lanes(&leaf->edges, g, slot, i) << i;
+        return pass & mask;
+    }
     for (int i = 0; i < TRC_PACKET_SIZE; i += TRC_WIDTH) {
         if (motion)
             lanes_load(w, leaf->vertices + slot, leaf->count, true, k, i, tri);
-        const uint32_t bits =
-            leaf->filter
-                ? trc_edge_filter_lanes(&leaf->edges, g, slot, i)
-                : vm_bits(trc_triangle_near(tri, vf_load(&p->o[axis.u][i]),
-                                            vf_load(&p->o[axis.v][i]), vf_load(&p->o[axis.z][i]),
-                                            vf_load(&g->su[i]), vf_load(&g->sv[i]), weight_error));
-        pass |= (uint64_t)bits << i;
+        const vmask near = trc_triangle_near(tri, vf_load(&p->o[axis.u][i]),
+                                             vf_load(&p->o[axis.v][i]), vf_load(&p->o[axis.z][i]),
+                                             vf_load(&g->su[i]), vf_load(&g->sv[i]), weight_error);
+        pass |= (uint64_t)vm_bits(near) << i;
     }
     return pass & mask;
 }
