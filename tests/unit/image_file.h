@@ -1,9 +1,12 @@
-/* Files that tests of images write, and a configuration of colour spaces. */
+/* Files that tests of images write and load, and a configuration of colour spaces. Needs cmocka. */
 #ifndef TRACER_UNIT_IMAGE_FILE_H
 #define TRACER_UNIT_IMAGE_FILE_H
 
 #include <stdio.h>
 #include <stdlib.h>
+
+#include "core/core.h"
+#include "image/image.h"
 
 /* Of the file written last: the test removes it. */
 static char path[256];
@@ -15,6 +18,15 @@ static void write_file(const char *name, const void *bytes, size_t size) {
     assert_non_null(file);
     assert_int_equal(fwrite(bytes, 1, size, file), size);
     assert_int_equal(fclose(file), 0);
+}
+
+/* An image that must load. */
+static struct trc_image *loaded(const trc_image_desc *desc) {
+    struct trc_image *image = NULL;
+    const trc_status status = trc_image_load(desc, &image);
+    if (status != TRC_OK)
+        fail_msg("status %d: %s", status, trc_last_message());
+    return image;
 }
 
 /* Beside scene-linear: a space that is twice as bright, and one that is encoded as a square root.

@@ -28,14 +28,6 @@ static trc_image_desc pixels_desc(uint32_t width, uint32_t height, const void *p
                             .pixel_bytes = (uint64_t)width * height * (is_float ? 16 : 4)};
 }
 
-static struct trc_image *loaded(const trc_image_desc *desc) {
-    struct trc_image *image = NULL;
-    const trc_status status = trc_image_load(desc, &image);
-    if (status != TRC_OK)
-        fail_msg("status %d: %s", status, trc_last_message());
-    return image;
-}
-
 static void refused(const trc_image_desc *desc, trc_status expected) {
     struct trc_image *image = NULL;
     const uint64_t bytes = trc_memory_bytes();

@@ -17,9 +17,10 @@
 #include "image/image.h"
 #include "image/oiio.h"
 #include "image/texel.h"
-#include "image_file.h"
 
 #ifdef TRC_WITH_OIIO
+
+#include "image_file.h"
 
 #define WIDTH 6
 #define HEIGHT 4
@@ -148,9 +149,7 @@ static struct trc_image *load(const struct type *type, uint32_t channels, uint32
                               uint32_t max_side) {
     const trc_image_desc desc = {
         .struct_size = sizeof desc, .alpha_mode = alpha_mode, .path = path, .max_side = max_side};
-    struct trc_image *image = NULL;
-    if (trc_image_load(&desc, &image) != TRC_OK)
-        fail_msg("%s, %u channels: %s", type->name, channels, trc_last_message());
+    struct trc_image *image = loaded(&desc);
     assert_int_equal(image->format, type->texel);
     assert_int_equal(image->is_associated,
                      channels % 2 == 0 && alpha_mode < TRC_ALPHA_CHANNEL_PACKED);
@@ -223,9 +222,7 @@ static void colors_of_every_type(void **state) {
                                          .path = image_path,
                                          .color_config = path,
                                          .color_space = "root"};
-            struct trc_image *image = NULL;
-            if (trc_image_load(&desc, &image) != TRC_OK)
-                fail_msg("%s, %u channels: %s", types[i].name, channels, trc_last_message());
+            struct trc_image *image = loaded(&desc);
             assert_int_equal(image->format, types[i].bits == 32 ? TRC_TEXEL_F32 : TRC_TEXEL_F16);
             for (int texel = 0; texel < WIDTH * HEIGHT; texel++) {
                 float expected[4];

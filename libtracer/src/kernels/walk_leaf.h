@@ -124,11 +124,11 @@ struct leaf {
  * chunks, live or not, and all packets before the first test: to branch by masks that are still in
  * the making costs more than it spares (primary rays 5 to 17 %, others up to 12). */
 TRC_INLINE uint64_t slot_edges(const struct walk *w, const struct leaf *leaf, int slot,
-                               struct trc_triangle_lanes *tri, int k, uint64_t mask, bool motion) {
+                               const struct trc_precision *most, struct trc_triangle_lanes *tri,
+                               int k, uint64_t mask, bool motion) {
     const struct trc_packet *p = &w->packets[k];
     const struct trc_sheared *g = &w->group->of[k];
     const struct trc_shear axis = w->group->beam.axis;
-    const float weight_error = trc_precision_of(&leaf->precision, slot).weight_error;
     uint64_t pass = 0;
     if (leaf->filter) {
         for (int i = 0; i < TRC_PACKET_SIZE; i += TRC_WIDTH)
@@ -138,9 +138,9 @@ TRC_INLINE uint64_t slot_edges(const struct walk *w, const struct leaf *leaf, in
     for (int i = 0; i < TRC_PACKET_SIZE; i += TRC_WIDTH) {
         if (motion)
             lanes_load(w, leaf->vertices + slot, leaf->count, true, k, i, tri);
-        const vmask near = trc_triangle_near(tri, vf_load(&p->o[axis.u][i]),
-                                             vf_load(&p->o[axis.v][i]), vf_load(&p->o[axis.z][i]),
-                                             vf_load(&g->su[i]), vf_load(&g->sv[i]), weight_error);
+        const vmask near = trc_triangle_near(
+            tri, vf_load(&p->o[axis.u][i]), vf_load(&p->o[axis.v][i]), vf_load(&p->o[axis.z][i]),
+            vf_load(&g->su[i]), vf_load(&g->sv[i]), most->weight_error);
         pass |= (uint64_t)vm_bits(near) << i;
     }
     return pass & mask;
@@ -149,12 +149,11 @@ TRC_INLINE uint64_t slot_edges(const struct walk *w, const struct leaf *leaf, in
 /* Tests the triangle in a slot, loaded into tri where it is at rest, against the rays of packet k
  * in mask; those that it hits or, of closest hits, whose hit it became. */
 TRC_INLINE uint64_t slot_packet(struct walk *w, const struct leaf *leaf, int slot,
-                                struct trc_triangle_lanes *tri, int k, uint64_t mask, bool any,
-                                bool motion) {
+                                const struct trc_precision *most, struct trc_triangle_lanes *tri,
+                                int k, uint64_t mask, bool any, bool motion) {
     const struct trc_packet *p = &w->packets[k];
     const struct trc_sheared *g = &w->group->of[k];
     const struct trc_shear axis = w->group->beam.axis;
-    const struct trc_precision most = trc_precision_of(&leaf->precision, slot);
     uint64_t found = 0;
     for (int c = 0; c < TRC_PACKET_CHUNKS; c++) {
         const uint32_t bits = trc_chunk_bits(mask, c);
@@ -168,7 +167,7 @@ TRC_INLINE uint64_t slot_packet(struct walk *w, const struct leaf *leaf, int slo
         vmask hit = trc_triangle_test(tri, vf_load(&p->o[axis.u][i]), vf_load(&p->o[axis.v][i]),
                                       vf_load(&p->o[axis.z][i]), vf_load(&g->su[i]),
                                       vf_load(&g->sv[i]), vf_load(&g->sz[i]), vf_load(&p->tmin[i]),
-                                      &most, vm_from_bits(bits), &t, &bu, &bv);
+                                      most, vm_from_bits(bits), &t, &bu, &bv);
         if (!vm_any(hit))
             continue;
         if (any) {
@@ -201,17 +200,19 @@ TRC_INLINE bool leaf_packet(struct walk *w, uint32_t ref, struct trc_live mask, 
         const int slot = __builtin_ctz(slots);
         if (any && w->packets->skip_transparent && (leaf.ids[slot].instance & TRC_SLOT_TRANSPARENT))
             continue;
+        const struct trc_precision most = trc_precision_of(&leaf.precision, slot);
         struct trc_triangle_lanes tri;
         if (!motion)
             lanes_load(w, leaf.vertices + slot, leaf.count, false, 0, 0, &tri);
         struct trc_live pass = mask;
         for (int k = 0; k < TRC_WALK_PACKETS; k++)
             if (mask.of[k])
-                pass.of[k] = slot_edges(w, &leaf, slot, &tri, k, mask.of[k], motion);
+                pass.of[k] = slot_edges(w, &leaf, slot, &most, &tri, k, mask.of[k], motion);
         for (int k = 0; k < TRC_WALK_PACKETS; k++) {
             if (!pass.of[k])
                 continue;
-            const uint64_t hit = slot_packet(w, &leaf, slot, &tri, k, pass.of[k], any, motion);
+            const uint64_t hit =
+                slot_packet(w, &leaf, slot, &most, &tri, k, pass.of[k], any, motion);
             found |= hit;
             if (any) {
                 w->occluded.of[k] |= hit;
