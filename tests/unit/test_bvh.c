@@ -75,11 +75,6 @@ static void clusters_open_into_slots(void **state) {
 
 /* ---- splits ---- */
 
-static int compare_primitives(const void *a, const void *b) {
-    const uint32_t x = trc_ref_first(a), y = trc_ref_first(b);
-    return (x > y) - (x < y);
-}
-
 static void expect_box(struct box a, struct box b) {
     for (int axis = 0; axis < 3; axis++) {
         assert_true(a.lower[axis] == b.lower[axis]);
@@ -88,62 +83,112 @@ static void expect_box(struct box a, struct box b) {
 }
 
 static void expect_range(const struct trc_range *a, const struct trc_range *b) {
-    assert_int_equal(a->begin, b->begin);
-    assert_int_equal(a->end, b->end);
+    assert_int_equal(a->count, b->count);
     assert_int_equal(a->first_slot, b->first_slot);
     assert_int_equal(a->triangles, b->triangles);
     expect_box(a->bounds, b->bounds);
     expect_box(a->centroids, b->centroids);
 }
 
-/* By one thread and by all of them: the same plane, the same refs on either side, their boxes as
- * measured. */
+/* What a split says of one of its sides is what its refs say. */
+static void expect_measured(const struct trc_range *r) {
+    struct trc_range measured = *r;
+    trc_range_measure(&measured);
+    expect_range(r, &measured);
+}
+
+/* count random refs in the first half of memory of their own, in order. */
+static struct trc_range random_range(uint32_t count, uint64_t seed) {
+    struct trc_ref *refs = malloc(2 * count * sizeof *refs);
+    struct trc_range r = {.refs = refs, .spare = refs + count, .count = count};
+    struct rng rng = rng_seed(seed);
+    for (uint32_t i = 0; i < count; i++) {
+        refs[i] = (struct trc_ref){.primitive = i | rng_below(&rng, 4) * TRC_REF_NEXT};
+        for (int axis = 0; axis < 3; axis++) {
+            refs[i].lower[axis] = rng_range(&rng, -1.0f, 1.0f);
+            refs[i].upper[axis] = refs[i].lower[axis] + rng_unit(&rng) * rng_unit(&rng);
+        }
+    }
+    trc_range_measure(&r);
+    return r;
+}
+
+static bool is_in_order(const struct trc_range *r) {
+    for (uint32_t i = 1; i < r->count; i++)
+        if (trc_ref_first(&r->refs[i - 1]) >= trc_ref_first(&r->refs[i]))
+            return false;
+    return true;
+}
+
+/* By one thread and by all of them: the same plane, the same refs on either side in their order,
+ * their boxes as measured. */
 static void shared_splits_are_the_same(void **state) {
     (void)state;
-    static const uint32_t counts[] = {2, 2047, 2048, 2049, 10000, 131072, 200001};
+    static const uint32_t counts[] = {9, 2047, 2048, 2049, 10000, 131072, 200001};
     for (size_t k = 0; k < sizeof counts / sizeof *counts; k++) {
-        const uint32_t count = counts[k];
-        const size_t bytes = count * sizeof(struct trc_ref);
-        struct trc_ref *refs = malloc(bytes), *shared = malloc(bytes);
+        const struct trc_range all = random_range(counts[k], k),
+                               shared = random_range(counts[k], k);
         struct trc_pool *pool;
-        struct rng rng = rng_seed(k);
-        for (uint32_t i = 0; i < count; i++) {
-            refs[i] = (struct trc_ref){.primitive = i | rng_below(&rng, 4) * TRC_REF_NEXT};
-            for (int axis = 0; axis < 3; axis++) {
-                refs[i].lower[axis] = rng_range(&rng, -1.0f, 1.0f);
-                refs[i].upper[axis] = refs[i].lower[axis] + rng_unit(&rng) * rng_unit(&rng);
-            }
-        }
-        memcpy(shared, refs, bytes);
         assert_int_equal(trc_pool_create(3, &pool), TRC_OK);
-        struct trc_split_blocks *blocks = trc_split_blocks_create(shared, count, pool, NULL);
+        struct trc_split_blocks *blocks = trc_split_blocks_create(pool, NULL);
         assert_non_null(blocks);
-        const struct trc_range all = trc_range_measure(refs, 0, count, 0),
-                               all_shared = trc_split_shared_measure(blocks, count);
-        expect_range(&all, &all_shared);
-        const struct trc_split s = trc_split_find(refs, &all),
-                               other = trc_split_shared_find(blocks, &all);
+        const struct trc_split s = trc_split_find(&all),
+                               other = trc_split_shared_find(blocks, &shared);
         assert_true(s.axis >= 0 && s.axis == other.axis && s.bin == other.bin);
         assert_true(s.cost == other.cost);
         struct trc_range left, right, shared_left, shared_right;
-        trc_split_apply(refs, &all, &s, &left, &right);
-        trc_split_shared_apply(blocks, &all, &other, &shared_left, &shared_right);
+        trc_split_apply(&all, &s, &left, &right);
+        trc_split_shared_apply(blocks, &shared, &other, &shared_left, &shared_right);
         expect_range(&left, &shared_left);
         expect_range(&right, &shared_right);
-        assert_true(left.end > 0 && left.end < count);
-        for (uint32_t i = 1; i < count; i++) /* sides keep their order */
-            assert_true(i == left.end || trc_ref_first(&shared[i - 1]) < trc_ref_first(&shared[i]));
-        qsort(refs, left.end, sizeof *refs, compare_primitives);
-        qsort(refs + left.end, count - left.end, sizeof *refs, compare_primitives);
-        assert_memory_equal(refs, shared, bytes);
-        struct trc_range measured = trc_range_measure(refs, left.begin, left.end, 0);
-        expect_range(&left, &measured);
-        measured = trc_range_measure(refs, right.begin, right.end, left.triangles);
-        expect_range(&right, &measured);
+        assert_true(left.count > 0 && right.count > 0 && left.count + right.count == counts[k]);
+        assert_true(is_in_order(&left) && is_in_order(&right));
+        assert_ptr_equal(left.refs, all.spare);
+        assert_memory_equal(all.spare, shared.spare, counts[k] * sizeof *all.spare);
+        expect_measured(&left);
+        expect_measured(&right);
         trc_split_blocks_destroy(blocks);
         trc_pool_destroy(pool);
-        free(shared);
-        free(refs);
+        free(shared.refs);
+        free(all.refs);
+    }
+}
+
+/* Cost of a split of sorted refs before the given one. */
+static float cost_before(const struct trc_range *r, uint32_t at) {
+    struct trc_range left = *r, right = *r;
+    left.count = at;
+    right.refs += at;
+    right.count -= at;
+    trc_range_measure(&left);
+    trc_range_measure(&right);
+    return box_area(left.bounds) * (float)left.triangles +
+           box_area(right.bounds) * (float)right.triangles;
+}
+
+/* Up to eight triangles: the cheapest of all planes along the longest axis. */
+static void few_refs_split_at_the_best(void **state) {
+    (void)state;
+    for (uint64_t seed = 0; seed < 2000; seed++) {
+        struct trc_range all = random_range(2 + (uint32_t)(seed % 7), seed), left, right;
+        for (uint32_t i = 0; i < all.count; i++)
+            all.refs[i].primitive %= TRC_REF_NEXT; /* one triangle each */
+        trc_range_measure(&all);
+        const struct trc_split s = trc_split_find(&all);
+        trc_split_apply(&all, &s, &left, &right);
+        assert_true(s.axis >= 0 && left.count > 0 && right.count > 0);
+        assert_int_equal(left.count + right.count, all.count);
+        expect_measured(&left);
+        expect_measured(&right);
+        for (uint32_t i = 1; i < all.count; i++)
+            assert_true(s.cost <= cost_before(&all, i));
+        assert_true(s.cost == cost_before(&all, left.count));
+        const f4 size = all.centroids.upper - all.centroids.lower;
+        int axis = 0;
+        for (int i = 1; i < 3; i++)
+            axis = size[i] > size[axis] ? i : axis;
+        assert_true(left.centroids.upper[axis] <= right.centroids.lower[axis]);
+        free(all.refs);
     }
 }
 
@@ -601,6 +646,7 @@ int main(void) {
         cmocka_unit_test(clusters_are_what_has_a_box_in_common),
         cmocka_unit_test(clusters_open_into_slots),
         cmocka_unit_test(shared_splits_are_the_same),
+        cmocka_unit_test(few_refs_split_at_the_best),
         cmocka_unit_test(any_number_of_triangles),
         cmocka_unit_test(shapes_and_instances),
         cmocka_unit_test(moving_meshes),

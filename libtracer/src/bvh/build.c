@@ -10,6 +10,7 @@
  * the generated conference room 10 to 29 % higher for 5 to 90 % more refs. */
 #include <string.h>
 
+#include "bvh/cluster.h"
 #include "bvh/split.h"
 #include "core/core.h"
 #include "threads/pool.h"
@@ -37,11 +38,11 @@ struct task {
 };
 
 struct builder {
-    struct trc_ref *refs;
     uint32_t leaf_size;
     const atomic_uint *cancel;
-    struct trc_split_blocks *blocks; /* for the upper part */
-    struct task *tasks;              /* filled while the upper part is made */
+    struct trc_part_triangle *triangles; /* by slot */
+    struct trc_split_blocks *blocks;     /* for the upper part */
+    struct task *tasks;                  /* filled while the upper part is made */
     uint32_t task_count, task_capacity;
     bool failed;
 };
@@ -79,45 +80,42 @@ static bool is_cancelled(const struct builder *b) { return b->cancel && *b->canc
  * splits no more: what it has made is thrown away. */
 static bool range_divide(struct builder *b, const struct trc_range *r, uint32_t level,
                          struct trc_range *left, struct trc_range *right) {
-    const uint32_t refs = r->end - r->begin, count = r->triangles;
+    const uint32_t count = r->triangles;
     const bool must = count > b->leaf_size;
-    if (refs < 2 || (!must && (float)count <= NODE_COST) || is_cancelled(b))
+    if (r->count < 2 || (!must && (float)count <= NODE_COST) || is_cancelled(b))
         return false;
     if (level >= MEDIAN_LEVEL) {
         if (must)
-            trc_split_middle(b->refs, r, left, right);
+            trc_split_middle(r, left, right);
         return must;
     }
-    const bool shared = refs > TRC_SHARED_RANGE;
-    const struct trc_split s =
-        shared ? trc_split_shared_find(b->blocks, r) : trc_split_find(b->refs, r);
+    const bool shared = r->count > TRC_SHARED_RANGE;
+    const struct trc_split s = shared ? trc_split_shared_find(b->blocks, r) : trc_split_find(r);
     const float area = box_area(r->bounds);
     if (!must && !(s.axis >= 0 && s.cost + area * NODE_COST < area * (float)count))
         return false;
     if (s.axis < 0)
-        trc_split_middle(b->refs, r, left, right);
+        trc_split_middle(r, left, right);
     else if (shared)
         trc_split_shared_apply(b->blocks, r, &s, left, right);
     else
-        trc_split_apply(b->refs, r, &s, left, right);
+        trc_split_apply(r, &s, left, right);
     return true;
 }
 
 /* Opens r into up to eight ranges, the largest area first, then the most refs; 1 when r stays a
- * leaf.
- */
+ * leaf. closed: those that stay leaves; the others are yet to be asked. */
 static int range_open(struct builder *b, const struct trc_range *r, uint32_t level,
-                      struct trc_range out[TRC_NODE_WIDTH]) {
+                      struct trc_range out[TRC_NODE_WIDTH], bool closed[TRC_NODE_WIDTH]) {
     int count = 1;
-    bool closed[TRC_NODE_WIDTH] = {false};
+    memset(closed, 0, TRC_NODE_WIDTH * sizeof *closed);
     out[0] = *r;
     while (count < TRC_NODE_WIDTH) {
         int best = -1;
         float best_area = -1.0f;
         for (int i = 0; i < count; i++) {
             const float area = closed[i] ? -1.0f : box_area(out[i].bounds);
-            const bool ties = best >= 0 && area == best_area &&
-                              out[i].end - out[i].begin > out[best].end - out[best].begin;
+            const bool ties = best >= 0 && area == best_area && out[i].count > out[best].count;
             if (area > best_area || ties) {
                 best_area = area;
                 best = i;
@@ -136,21 +134,32 @@ static int range_open(struct builder *b, const struct trc_range *r, uint32_t lev
     return count;
 }
 
+/* Cancelled, refs may be in any state. */
+static uint32_t build_leaf(const struct builder *b, const struct trc_range *r) {
+    if (is_cancelled(b))
+        return TRC_REF_EMPTY;
+    trc_clusters_open(r->refs, r->count, b->triangles + r->first_slot);
+    return trc_leaf_ref(r->first_slot, r->triangles);
+}
+
 /* Builds r into the arena, depth first; in the upper part (tasks true) small ranges become tasks.
  */
 static uint32_t build_range(struct builder *b, struct arena *a, const struct trc_range *r,
                             uint32_t level, bool tasks) {
     struct trc_range child[TRC_NODE_WIDTH];
+    bool closed[TRC_NODE_WIDTH];
     if (a->failed || b->failed || is_cancelled(b))
         return TRC_REF_EMPTY;
-    const int count = range_open(b, r, level, child);
+    const int count = range_open(b, r, level, child, closed);
     if (count == 1)
-        return trc_leaf_ref(r->first_slot, r->triangles);
+        return build_leaf(b, r);
     const uint32_t node = arena_node(a);
     if (a->failed)
         return TRC_REF_EMPTY;
     for (int i = 0; i < count; i++) {
-        if (tasks && child[i].end - child[i].begin <= TRC_SHARED_RANGE) {
+        if (closed[i]) {
+            a->children[node][i] = build_leaf(b, &child[i]);
+        } else if (tasks && child[i].count <= TRC_SHARED_RANGE) {
             if (b->task_count == b->task_capacity) {
                 void *array = b->tasks;
                 if (!grow(&array, &b->task_capacity, sizeof *b->tasks)) {
@@ -211,23 +220,22 @@ static trc_status join(struct builder *b, struct arena *top, uint32_t root,
     return TRC_OK;
 }
 
-trc_status trc_topology_build(struct trc_ref *refs, uint32_t count, uint32_t leaf_size,
+trc_status trc_topology_build(const struct trc_range *all, uint32_t leaf_size,
                               struct trc_pool *pool, const atomic_uint *cancel,
-                              struct trc_topology *out) {
-    struct builder b = {.refs = refs, .leaf_size = leaf_size, .cancel = cancel};
+                              struct trc_part_triangle *triangles_out, struct trc_topology *out) {
+    struct builder b = {.leaf_size = leaf_size, .cancel = cancel, .triangles = triangles_out};
     struct arena top = {0};
     *out = (struct trc_topology){.root = TRC_REF_EMPTY};
-    if (count == 0)
+    if (all->count == 0)
         return TRC_OK;
-    if (count > TRC_REF_INDEX_MASK)
-        return trc_fail(TRC_ERROR_TOO_LARGE, "%u primitives in one tree, at most %u", count,
-                        TRC_REF_INDEX_MASK);
-    const bool shared = count > TRC_SHARED_RANGE;
-    if (shared && !(b.blocks = trc_split_blocks_create(refs, count, pool, cancel)))
-        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory to build over %u primitives", count);
-    const struct trc_range all =
-        shared ? trc_split_shared_measure(b.blocks, count) : trc_range_measure(refs, 0, count, 0);
-    const uint32_t root = build_range(&b, &top, &all, 0, shared);
+    if (all->triangles > TRC_REF_INDEX_MASK)
+        return trc_fail(TRC_ERROR_TOO_LARGE, "%u primitives in one tree, at most %u",
+                        all->triangles, TRC_REF_INDEX_MASK);
+    const bool shared = all->count > TRC_SHARED_RANGE;
+    if (shared && !(b.blocks = trc_split_blocks_create(pool, cancel)))
+        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory to build over %u primitives",
+                        all->triangles);
+    const uint32_t root = build_range(&b, &top, all, 0, shared);
     if (!top.failed && !b.failed)
         trc_pool_run(pool, b.task_count, task_run, &b);
     const trc_status status = join(&b, &top, root, out);

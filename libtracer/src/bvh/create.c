@@ -5,9 +5,10 @@
 #include <string.h>
 
 #include "bvh/bvh.h"
-#include "bvh/cluster.h"
-#include "bvh/part.h"
+#include "bvh/refs.h"
+#include "bvh/split.h"
 #include "bvh/tree.h"
+#include "core/box.h"
 #include "core/core.h"
 #include "scene/mesh.h"
 #include "shading/material.h"
@@ -29,91 +30,6 @@ struct create_job {
     uint32_t *first_slot; /* per instance */
 };
 
-/* Box of a triangle, the mean over its keys; false where a corner is not valid at some key. */
-static bool triangle_ref(const struct trc_part *part, uint32_t triangle, struct trc_ref *ref) {
-    const uint32_t *index = part->mesh->indices + 3 * (size_t)triangle;
-    const uint32_t key_count = part->mesh->key_count;
-    const f4 share = f4_set(1.0f / (float)key_count), limit = f4_set(TRC_MAX_COORDINATE);
-    f4 lower = f4_set(0.0f), upper = f4_set(0.0f);
-    for (uint32_t key = 0; key < key_count; key++) {
-        f4 p[3];
-        trc_part_corners(part, index, key, p);
-        /* False for what is not a number. */
-        if (!i4_all((f4_abs(p[0]) <= limit) & (f4_abs(p[1]) <= limit) & (f4_abs(p[2]) <= limit)))
-            return false;
-        lower += f4_min(p[0], f4_min(p[1], p[2])) * share;
-        upper += f4_max(p[0], f4_max(p[1], p[2])) * share;
-    }
-    f4_store3(ref->lower, lower);
-    f4_store3(ref->upper, upper);
-    return true;
-}
-
-/* Triangles of a part that one task measures. */
-#define BLOCK_TRIANGLES 8192
-struct ref_block {
-    uint32_t part, begin, end; /* triangles */
-    uint32_t at, count;        /* where its refs start, and how many there are */
-    uint32_t triangles;        /* of those refs: the valid ones */
-};
-struct ref_job {
-    const struct trc_part *parts;
-    const atomic_uint *cancel; /* may be NULL */
-    struct trc_ref *refs;
-    struct ref_block *blocks;
-};
-
-static void block_task(void *context, uint32_t index, uint32_t worker) {
-    (void)worker;
-    const struct ref_job *job = context;
-    struct ref_block *block = &job->blocks[index];
-    if (job->cancel && *job->cancel)
-        return;
-    for (uint32_t t = block->begin; t < block->end; t++) {
-        struct trc_ref *ref = &job->refs[block->at + block->count];
-        if (!triangle_ref(&job->parts[block->part], t, ref))
-            continue;
-        ref->part = block->part;
-        ref->primitive = t;
-        block->triangles++;
-        if (!block->count || !trc_cluster_join(ref - 1, ref))
-            block->count++;
-    }
-}
-
-/* Refs to the valid triangles of all parts, in order, clustered; their number, UINT32_MAX without
- * memory. Cancelled, it is some of them: the build that follows looks again. */
-static uint32_t refs_collect(const struct create_job *c, const struct trc_part *parts,
-                             uint32_t part_count, struct trc_ref *refs,
-                             uint32_t *triangle_count_out) {
-    uint32_t block_count = 0, at = 0;
-    for (uint32_t i = 0; i < part_count; i++)
-        block_count += (parts[i].mesh->triangle_count + BLOCK_TRIANGLES - 1) / BLOCK_TRIANGLES;
-    struct ref_block *blocks = trc_alloc_zeroed(block_count ? block_count : 1, sizeof *blocks);
-    if (!blocks)
-        return UINT32_MAX;
-    struct ref_block *block = blocks;
-    for (uint32_t i = 0; i < part_count; i++)
-        for (uint32_t t = 0; t < parts[i].mesh->triangle_count; t += BLOCK_TRIANGLES, block++) {
-            const uint32_t left = parts[i].mesh->triangle_count - t;
-            const uint32_t size = left < BLOCK_TRIANGLES ? left : BLOCK_TRIANGLES;
-            *block = (struct ref_block){.part = i, .begin = t, .end = t + size, .at = at};
-            at += size;
-        }
-    struct ref_job job = {parts, c->options->cancel, refs, blocks};
-    trc_pool_run(c->pool, block_count, block_task, &job);
-    uint32_t count = 0;
-    *triangle_count_out = 0;
-    for (uint32_t i = 0; i < block_count; i++) {
-        if (count != blocks[i].at)
-            memmove(refs + count, refs + blocks[i].at, blocks[i].count * sizeof *refs);
-        count += blocks[i].count;
-        *triangle_count_out += blocks[i].triangles;
-    }
-    trc_free(blocks);
-    return count;
-}
-
 /* One tree over parts of one key count. */
 static trc_status tree_build(struct create_job *job, const struct trc_part *parts,
                              uint32_t part_count, uint32_t key_count, struct trc_tree *tree) {
@@ -123,34 +39,29 @@ static trc_status tree_build(struct create_job *job, const struct trc_part *part
     if (total > TRC_REF_INDEX_MASK)
         return trc_fail(TRC_ERROR_TOO_LARGE, "%llu triangles in one tree, at most %u",
                         (unsigned long long)total, TRC_REF_INDEX_MASK);
-    struct trc_ref *refs = trc_alloc(total ? total : 1, sizeof *refs);
-    if (!refs)
-        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory to build a tree of %llu triangles",
-                        (unsigned long long)total);
-    uint32_t triangle_count;
-    const uint32_t count = refs_collect(job, parts, part_count, refs, &triangle_count);
-    struct trc_part_triangle *triangles = trc_alloc(total ? total : 1, sizeof *triangles);
-    if (count == UINT32_MAX || !triangles) {
-        trc_free(triangles);
-        trc_free(refs);
-        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory to build a tree of %llu triangles",
-                        (unsigned long long)total);
-    }
-    struct trc_topology topology;
+    struct trc_ref *memory = NULL;
+    struct trc_range all;
     trc_status status =
-        trc_topology_build(refs, count, TRC_NODE_WIDTH, job->pool, job->options->cancel, &topology);
+        trc_refs_collect(parts, part_count, total, job->pool, job->options->cancel, &memory, &all);
+    struct trc_part_triangle *triangles = trc_alloc(total ? total : 1, sizeof *triangles);
+    if (status == TRC_OK && !triangles)
+        status = trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory to build a tree of %llu triangles",
+                          (unsigned long long)total);
+    struct trc_topology topology;
+    if (status == TRC_OK)
+        status = trc_topology_build(&all, TRC_NODE_WIDTH, job->pool, job->options->cancel,
+                                    triangles, &topology);
     if (status == TRC_OK) {
-        trc_clusters_open(refs, count, triangles);
-        status = trc_tree_fill(&topology, triangles, triangle_count, parts, key_count, job->pool,
+        status = trc_tree_fill(&topology, triangles, all.triangles, parts, key_count, job->pool,
                                job->options->cancel, tree);
         trc_topology_destroy(&topology);
     }
     trc_free(triangles);
-    trc_free(refs);
+    trc_free(memory);
     if (status != TRC_OK)
         return status;
-    tree->triangle_count = triangle_count;
-    tree->skipped_count = total - triangle_count;
+    tree->triangle_count = all.triangles;
+    tree->skipped_count = total - all.triangles;
     job->stats->built_count++;
     return TRC_OK;
 }
@@ -323,12 +234,8 @@ static trc_status joined_build(struct create_job *job) {
 
 /* World box of a box under all keys of an instance. M(t) p(t) is a convex combination of the keys'
  * images of points of the box, so the hull of the images of its corners holds it at all times. */
-static void instance_bounds(const struct trc_instance *instance, const struct trc_tree *tree,
-                            float lower[3], float upper[3]) {
-    for (int i = 0; i < 3; i++) {
-        lower[i] = INFINITY;
-        upper[i] = -INFINITY;
-    }
+static struct box instance_box(const struct trc_instance *instance, const struct trc_tree *tree) {
+    float lower[3] = {INFINITY, INFINITY, INFINITY}, upper[3] = {-INFINITY, -INFINITY, -INFINITY};
     for (uint32_t key = 0; key < instance->key_count; key++)
         for (int corner = 0; corner < 8; corner++) {
             const float *m = instance->object_to_world[key].m;
@@ -342,16 +249,15 @@ static void instance_bounds(const struct trc_instance *instance, const struct tr
                 upper[i] = fmaxf(upper[i], nextafterf((float)x, INFINITY));
             }
         }
+    return (struct box){f4_load3(lower), f4_load3(upper)};
 }
 
-static uint32_t items_collect(struct create_job *job, struct trc_item *items,
-                              struct trc_ref *refs) {
+static uint32_t items_collect(struct create_job *job, struct trc_item *items, struct box *boxes) {
     const struct trc_snapshot *s = job->snapshot;
     uint32_t count = 0;
     if (job->bvh->joined.root != TRC_REF_EMPTY) {
         items[0] = (struct trc_item){&job->bvh->joined, TRC_NO_HIT, TRC_VISIBLE_ALL};
-        memcpy(refs[0].lower, job->bvh->joined.lower, sizeof refs[0].lower);
-        memcpy(refs[0].upper, job->bvh->joined.upper, sizeof refs[0].upper);
+        boxes[0] = (struct box){f4_load3(job->bvh->joined.lower), f4_load3(job->bvh->joined.upper)};
         count = 1;
     }
     for (uint32_t i = 0; i < s->instance_count; i++) {
@@ -362,52 +268,70 @@ static uint32_t items_collect(struct create_job *job, struct trc_item *items,
         if (tree->root == TRC_REF_EMPTY)
             continue;
         items[count] = (struct trc_item){tree, i, instance->visibility};
-        instance_bounds(instance, tree, refs[count].lower, refs[count].upper);
+        boxes[count] = instance_box(instance, tree);
         count++;
     }
-    for (uint32_t i = 0; i < count; i++) {
-        refs[i].part = 0;
-        refs[i].primitive = i;
-    }
     return count;
+}
+
+/* The tree over count items. */
+static trc_status items_build(struct create_job *job, const struct trc_item *items,
+                              const struct box *boxes, uint32_t count) {
+    struct trc_bvh *bvh = job->bvh;
+    struct trc_ref *refs = trc_alloc(2 * ((size_t)count + 1), sizeof *refs);
+    struct trc_part_triangle *order = trc_alloc((size_t)count + 1, sizeof *order);
+    struct trc_range all = {.refs = refs, .spare = refs + count, .count = count};
+    struct trc_topology topology;
+    trc_status status = TRC_OK;
+    if (!refs || !order)
+        status = trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for %u instances", count);
+    for (uint32_t i = 0; i < count && status == TRC_OK; i++) {
+        refs[i] = (struct trc_ref){.primitive = i};
+        f4_store3(refs[i].lower, boxes[i].lower);
+        f4_store3(refs[i].upper, boxes[i].upper);
+    }
+    if (status == TRC_OK) {
+        trc_range_measure(&all);
+        status = trc_topology_build(&all, 1, job->pool, job->options->cancel, order, &topology);
+    }
+    if (status == TRC_OK) {
+        status = trc_tree_fill_top(&topology, order, count, items, boxes, bvh->items, &bvh->top);
+        trc_topology_destroy(&topology);
+    }
+    trc_free(order);
+    trc_free(refs);
+    if (status != TRC_OK)
+        return status;
+    for (int axis = 0; axis < 3; axis++) {
+        bvh->top.lower[axis] = count ? all.bounds.lower[axis] : INFINITY;
+        bvh->top.upper[axis] = count ? all.bounds.upper[axis] : -INFINITY;
+        if (count)
+            bvh->top.extent = fmaxf(
+                bvh->top.extent, fmaxf(fabsf(bvh->top.lower[axis]), fabsf(bvh->top.upper[axis])));
+    }
+    return TRC_OK;
 }
 
 static trc_status top_build(struct create_job *job) {
     struct trc_bvh *bvh = job->bvh;
     const uint32_t capacity = job->snapshot->instance_count + 1;
     struct trc_item *items = trc_alloc(capacity, sizeof *items);
-    struct trc_ref *refs = trc_alloc(capacity, sizeof *refs);
+    struct box *boxes = trc_alloc(capacity, sizeof *boxes);
     bvh->items = trc_alloc(capacity, sizeof *bvh->items);
     trc_status status = TRC_OK;
-    if (!items || !refs || !bvh->items)
+    if (!items || !boxes || !bvh->items)
         status = trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for %u instances", capacity - 1);
     if (status == TRC_OK) {
-        const uint32_t count = items_collect(job, items, refs);
+        const uint32_t count = items_collect(job, items, boxes);
         if (count == 1 && items[0].instance == TRC_NO_HIT) {
             bvh->tree = &bvh->joined;
         } else {
-            struct trc_topology topology;
-            status = trc_topology_build(refs, count, 1, job->pool, job->options->cancel, &topology);
-            if (status == TRC_OK) {
-                status = trc_tree_fill_top(&topology, refs, count, items, bvh->items, &bvh->top);
-                trc_topology_destroy(&topology);
-            }
-            for (int axis = 0; axis < 3; axis++) {
-                bvh->top.lower[axis] = INFINITY;
-                bvh->top.upper[axis] = -INFINITY;
-                for (uint32_t i = 0; i < count; i++) {
-                    bvh->top.lower[axis] = fminf(bvh->top.lower[axis], refs[i].lower[axis]);
-                    bvh->top.upper[axis] = fmaxf(bvh->top.upper[axis], refs[i].upper[axis]);
-                }
-                if (count)
-                    bvh->top.extent = fmaxf(bvh->top.extent, fmaxf(fabsf(bvh->top.lower[axis]),
-                                                                   fabsf(bvh->top.upper[axis])));
-            }
+            status = items_build(job, items, boxes, count);
             bvh->tree = &bvh->top;
         }
     }
     trc_free(items);
-    trc_free(refs);
+    trc_free(boxes);
     return status;
 }
 

@@ -429,14 +429,15 @@ trc_status trc_tree_refit(const struct trc_tree *from, const struct trc_part *pa
     return filled;
 }
 
-trc_status trc_tree_fill_top(const struct trc_topology *topology, const struct trc_ref *refs,
-                             uint32_t count, const struct trc_item *items,
+trc_status trc_tree_fill_top(const struct trc_topology *topology,
+                             const struct trc_part_triangle *order, uint32_t count,
+                             const struct trc_item *items, const struct box *boxes,
                              struct trc_item *items_out, struct trc_tree *tree) {
     const trc_status status = tree_alloc(tree, topology->node_count, count, 1, true, NULL);
     if (status != TRC_OK)
         return status;
     for (uint32_t slot = 0; slot < count; slot++)
-        items_out[slot] = items[refs[slot].primitive];
+        items_out[slot] = items[order[slot].triangle];
     tree->items = items_out;
     for (uint32_t n = tree->node_count; n-- > 0;) {
         uint32_t *children = (uint32_t *)trc_node_children(tree, n);
@@ -445,9 +446,9 @@ trc_status trc_tree_fill_top(const struct trc_topology *topology, const struct t
             float lower[3], upper[3];
             const uint32_t ref = children[i];
             if (is_leaf(ref)) {
-                const struct trc_ref *r = &refs[trc_leaf_first(ref)];
-                memcpy(lower, r->lower, sizeof lower);
-                memcpy(upper, r->upper, sizeof upper);
+                const struct box *box = &boxes[order[trc_leaf_first(ref)].triangle];
+                f4_store3(lower, box->lower);
+                f4_store3(upper, box->upper);
             } else if (is_node(ref)) {
                 node_bounds(tree, ref, 0, lower, upper);
             } else {

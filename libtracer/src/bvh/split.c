@@ -6,13 +6,12 @@
 #include "core/core.h"
 #include "threads/pool.h"
 
-/* Bins per axis: 16 loses about 1 % of SAH cost against 32 and builds a third faster; where refs
- * are few, half as many are as good, and where a leaf would do, a quarter, of the longest axis
- * alone (for all few refs, that costs 3 %). */
+/* Bins per axis: 16 loses about 1 % of SAH cost against 32 and builds a third faster; where
+ * triangles are few, half as many are as good. What might stay a leaf is sorted instead, along the
+ * longest axis alone (for all few triangles, that costs 3 %). */
 #define BIN_COUNT 16
-#define FEW_REFS 24
+#define FEW_TRIANGLES 24
 #define FEW_BINS 8
-#define LEAF_BINS 4
 
 /* Four floats of a ref, of which lane 3 is one of its integers: never used as a number. */
 static inline f4 ref_corner(const struct trc_ref *r, size_t offset) {
@@ -27,18 +26,21 @@ static inline f4 ref_upper(const struct trc_ref *r) {
     return ref_corner(r, offsetof(struct trc_ref, upper));
 }
 
+static inline struct box ref_box(const struct trc_ref *r) {
+    return (struct box){ref_lower(r), ref_upper(r)};
+}
+
 /* Twice the middle of its box. */
 static inline f4 ref_centroid(const struct trc_ref *r) { return ref_lower(r) + ref_upper(r); }
 
-struct trc_range trc_range_measure(const struct trc_ref *refs, uint32_t begin, uint32_t end,
-                                   uint32_t first_slot) {
-    struct trc_range r = {begin, end, first_slot, 0, box_empty(), box_empty()};
-    for (uint32_t i = begin; i < end; i++) {
-        r.triangles += trc_ref_count(&refs[i]);
-        box_grow(&r.bounds, (struct box){ref_lower(&refs[i]), ref_upper(&refs[i])});
-        box_add(&r.centroids, ref_centroid(&refs[i]));
+void trc_range_measure(struct trc_range *r) {
+    r->triangles = 0;
+    r->bounds = r->centroids = box_empty();
+    for (uint32_t i = 0; i < r->count; i++) {
+        r->triangles += trc_ref_count(&r->refs[i]);
+        box_grow(&r->bounds, ref_box(&r->refs[i]));
+        box_add(&r->centroids, ref_centroid(&r->refs[i]));
     }
-    return r;
 }
 
 static inline i4 bin_of(const struct trc_split *s, const struct trc_ref *r) {
@@ -52,17 +54,12 @@ static inline float place_of(const struct trc_split *s, const struct trc_ref *r,
     return (r->lower[axis] + r->upper[axis] - s->origin[axis]) * s->scale[axis];
 }
 
-static inline bool is_left(const struct trc_split *s, const struct trc_ref *r) {
-    return place_of(s, r, s->axis) < (float)s->bin;
-}
-
 /* Refs in the upper half, their triangles in the lower one: both are counted in one step. */
 typedef uint64_t tally;
 static inline tally tally_of(const struct trc_ref *r) { return (1ull << 32) + trc_ref_count(r); }
 static inline uint32_t tally_refs(tally t) { return (uint32_t)(t >> 32); }
 static inline uint32_t tally_triangles(tally t) { return (uint32_t)t; }
 
-/* Of the axes that the split looks at. */
 struct bins {
     struct box box[3][BIN_COUNT];
     tally count[3][BIN_COUNT];
@@ -70,37 +67,24 @@ struct bins {
 
 static void bins_clear(struct bins *bins, const struct trc_split *s) {
     const struct box empty = box_empty();
-    for (int axis = s->first_axis; axis < s->end_axis; axis++) {
+    for (int axis = 0; axis < 3; axis++) {
         memset(bins->count[axis], 0, sizeof bins->count[axis]);
         for (int i = 0; i < s->bin_count; i++)
             bins->box[axis][i] = empty;
     }
 }
 
-static inline void bins_put(struct bins *bins, int axis, int bin, struct box box, tally count) {
-    box_grow(&bins->box[axis][bin], box);
-    bins->count[axis][bin] += count;
-}
-
-static void bins_fill(const struct trc_ref *refs, uint32_t begin, uint32_t end,
-                      const struct trc_split *s, struct bins *bins) {
+static void bins_fill(const struct trc_ref *refs, uint32_t count, const struct trc_split *s,
+                      struct bins *bins) {
     bins_clear(bins, s);
-    if (s->end_axis - s->first_axis == 1) {
-        const int axis = s->first_axis;
-        for (uint32_t i = begin; i < end; i++) {
-            const float place = place_of(s, &refs[i], axis), last = s->last_bin[0];
-            const float bin = place < last ? place : last;
-            bins_put(bins, axis, bin > 0.0f ? (int)bin : 0,
-                     (struct box){ref_lower(&refs[i]), ref_upper(&refs[i])}, tally_of(&refs[i]));
-        }
-        return;
-    }
-    for (uint32_t i = begin; i < end; i++) {
+    for (uint32_t i = 0; i < count; i++) {
         const i4 b = bin_of(s, &refs[i]);
-        const struct box box = {ref_lower(&refs[i]), ref_upper(&refs[i])};
-        const tally count = tally_of(&refs[i]);
-        for (int axis = 0; axis < 3; axis++)
-            bins_put(bins, axis, b[axis], box, count);
+        const struct box box = ref_box(&refs[i]);
+        const tally counted = tally_of(&refs[i]);
+        for (int axis = 0; axis < 3; axis++) {
+            box_grow(&bins->box[axis][b[axis]], box);
+            bins->count[axis][b[axis]] += counted;
+        }
     }
 }
 
@@ -137,96 +121,153 @@ static void bins_sweep(const struct bins *bins, int axis, struct trc_split *s) {
     }
 }
 
-static int bin_count(uint32_t triangles) {
-    if (triangles <= TRC_NODE_WIDTH)
-        return LEAF_BINS;
-    return triangles <= FEW_REFS ? FEW_BINS : BIN_COUNT;
-}
-
 /* The bins of a range, before it has a plane. */
 static struct trc_split split_begin(const struct trc_range *r) {
     struct trc_split s = {.axis = -1, .bin = 0, .cost = FLT_MAX};
-    s.bin_count = bin_count(r->triangles);
+    s.bin_count = r->triangles <= FEW_TRIANGLES ? FEW_BINS : BIN_COUNT;
     s.last_bin = f4_set((float)(s.bin_count - 1));
-    const f4 size = r->centroids.upper - r->centroids.lower;
     s.origin = r->centroids.lower;
-    s.end_axis = 3;
-    if (s.bin_count == LEAF_BINS) {
-        s.first_axis = size[0] >= size[1] ? 0 : 1;
-        s.first_axis = size[s.first_axis] >= size[2] ? s.first_axis : 2;
-        s.end_axis = s.first_axis + 1;
-    }
-    for (int axis = s.first_axis; axis < s.end_axis; axis++) {
+    for (int axis = 0; axis < 3; axis++) {
         /* A little below the count so that the last centroid falls into the last bin; flat axes all
          * go to bin 0 and offer no plane. */
-        const float scale = (float)s.bin_count * 0.9999f / size[axis];
-        s.scale[axis] = size[axis] > 0.0f && scale < FLT_MAX ? scale : 0.0f;
+        const float size = r->centroids.upper[axis] - r->centroids.lower[axis];
+        const float scale = (float)s.bin_count * 0.9999f / size;
+        s.scale[axis] = size > 0.0f && scale < FLT_MAX ? scale : 0.0f;
     }
     return s;
 }
 
 /* Its cheapest plane. */
 static void split_choose(struct trc_split *s, const struct bins *bins) {
-    for (int axis = s->first_axis; axis < s->end_axis; axis++)
+    tally before = 0;
+    for (int axis = 0; axis < 3; axis++)
         if (s->scale[axis] > 0.0f)
             bins_sweep(bins, axis, s);
     if (s->axis < 0)
         return;
     s->left = s->right = box_empty();
-    s->left_triangles = s->right_triangles = 0;
-    for (int i = 0; i < s->bin_count; i++) {
-        const bool is_before = i < s->bin;
-        box_grow(is_before ? &s->left : &s->right, bins->box[s->axis][i]);
-        *(is_before ? &s->left_triangles : &s->right_triangles) +=
-            tally_triangles(bins->count[s->axis][i]);
+    for (int i = 0; i < s->bin; i++) {
+        box_grow(&s->left, bins->box[s->axis][i]);
+        before += bins->count[s->axis][i];
+    }
+    for (int i = s->bin; i < s->bin_count; i++)
+        box_grow(&s->right, bins->box[s->axis][i]);
+    s->left_count = tally_refs(before);
+    s->left_triangles = tally_triangles(before);
+}
+
+/* The refs of a range that may stay a leaf, put in order along the axis on which they lie farthest
+ * apart. */
+static void few_sort(const struct trc_range *r) {
+    struct trc_ref *refs = r->refs;
+    const f4 size = r->centroids.upper - r->centroids.lower;
+    const int xy = size[0] >= size[1] ? 0 : 1, axis = size[xy] >= size[2] ? xy : 2;
+    for (uint32_t i = 1; i < r->count; i++) {
+        const struct trc_ref ref = refs[i];
+        const float at = ref.lower[axis] + ref.upper[axis];
+        uint32_t k = i;
+        for (; k > 0 && refs[k - 1].lower[axis] + refs[k - 1].upper[axis] > at; k--)
+            refs[k] = refs[k - 1];
+        refs[k] = ref;
     }
 }
 
-struct trc_split trc_split_find(const struct trc_ref *refs, const struct trc_range *r) {
+/* Every plane between sorted refs. */
+static struct trc_split few_find(const struct trc_range *r) {
+    struct trc_split s = {.axis = -1, .cost = FLT_MAX, .is_sorted = true};
+    struct box right[TRC_NODE_WIDTH], left = box_empty(), rest = box_empty();
+    uint32_t before = 0;
+    few_sort(r);
+    for (uint32_t i = r->count; i-- > 1;) {
+        box_grow(&rest, ref_box(&r->refs[i]));
+        right[i] = rest;
+    }
+    for (uint32_t i = 1; i < r->count; i++) {
+        box_grow(&left, ref_box(&r->refs[i - 1]));
+        before += trc_ref_count(&r->refs[i - 1]);
+        const float cost =
+            box_area(left) * (float)before + box_area(right[i]) * (float)(r->triangles - before);
+        if (cost >= s.cost)
+            continue;
+        s.cost = cost;
+        s.axis = 0;
+        s.left_count = i;
+        s.left_triangles = before;
+        s.left = left;
+        s.right = right[i];
+    }
+    return s;
+}
+
+struct trc_split trc_split_find(const struct trc_range *r) {
+    if (r->triangles <= TRC_NODE_WIDTH)
+        return few_find(r);
     struct trc_split s = split_begin(r);
     struct bins bins;
-    bins_fill(refs, r->begin, r->end, &s, &bins);
+    bins_fill(r->refs, r->count, &s, &bins);
     split_choose(&s, &bins);
     return s;
 }
 
-/* Both sides of a plane, refs from middle on being the right ones; their centroids are not known.
- */
-static void range_sides(const struct trc_range *r, const struct trc_split *s, uint32_t middle,
-                        struct trc_range *left, struct trc_range *right) {
-    *left = (struct trc_range){r->begin,          middle,  r->first_slot,
-                               s->left_triangles, s->left, box_empty()};
-    *right = (struct trc_range){
-        middle,   r->end,     r->first_slot + s->left_triangles, s->right_triangles,
-        s->right, box_empty()};
+/* The range's parts, the left one of so many refs and triangles; not measured. */
+static void range_part(const struct trc_range *r, struct trc_ref *refs, struct trc_ref *spare,
+                       uint32_t left_count, uint32_t left_triangles, struct trc_range *left,
+                       struct trc_range *right) {
+    *left = (struct trc_range){.refs = refs,
+                               .spare = spare,
+                               .count = left_count,
+                               .first_slot = r->first_slot,
+                               .triangles = left_triangles};
+    *right = (struct trc_range){.refs = refs + left_count,
+                                .spare = spare + left_count,
+                                .count = r->count - left_count,
+                                .first_slot = r->first_slot + left_triangles,
+                                .triangles = r->triangles - left_triangles};
 }
 
-/* Measures both sides' centroids on the way. */
-void trc_split_apply(struct trc_ref *refs, const struct trc_range *r, const struct trc_split *s,
-                     struct trc_range *left, struct trc_range *right) {
-    uint32_t i = r->begin, j = r->end;
+/* Moves count refs to where those of either side go next; grows the boxes of their centroids. No
+ * branch depends on a ref: half of them would be mispredicted. */
+static void refs_part(const struct trc_ref *refs, uint32_t count, const struct trc_split *s,
+                      struct trc_ref *left, struct trc_ref *right, struct box *left_centroids,
+                      struct box *right_centroids) {
     struct box before = box_empty(), after = box_empty();
-    for (;;) {
-        for (; i < j && is_left(s, &refs[i]); i++)
-            box_add(&before, ref_centroid(&refs[i]));
-        for (; i < j && !is_left(s, &refs[j - 1]); j--)
-            box_add(&after, ref_centroid(&refs[j - 1]));
-        if (i >= j)
-            break;
-        const struct trc_ref swap = refs[i];
-        refs[i] = refs[j - 1];
-        refs[j - 1] = swap;
+    const f4 bin = f4_set((float)s->bin);
+    for (uint32_t i = 0; i < count; i++) {
+        const f4 centroid = ref_centroid(&refs[i]);
+        const i4 is_left = f4_set(place_of(s, &refs[i], s->axis)) < bin;
+        /* A centroid of the other side is not a number: boxes ignore it. */
+        box_add_number(&before, (f4)((i4)centroid | ~is_left));
+        box_add_number(&after, (f4)((i4)centroid | is_left));
+        *(is_left[0] ? left : right) = refs[i];
+        left -= is_left[0];
+        right += 1 + is_left[0];
     }
-    range_sides(r, s, i, left, right);
-    left->centroids = before;
-    right->centroids = after;
+    *left_centroids = before;
+    *right_centroids = after;
 }
 
-void trc_split_middle(const struct trc_ref *refs, const struct trc_range *r, struct trc_range *left,
-                      struct trc_range *right) {
-    const uint32_t middle = r->begin + (r->end - r->begin) / 2;
-    *left = trc_range_measure(refs, r->begin, middle, r->first_slot);
-    *right = trc_range_measure(refs, middle, r->end, r->first_slot + left->triangles);
+void trc_split_apply(const struct trc_range *r, const struct trc_split *s, struct trc_range *left,
+                     struct trc_range *right) {
+    if (s->is_sorted) {
+        range_part(r, r->refs, r->spare, s->left_count, s->left_triangles, left, right);
+        trc_range_measure(left);
+        trc_range_measure(right);
+        return;
+    }
+    range_part(r, r->spare, r->refs, s->left_count, s->left_triangles, left, right);
+    left->bounds = s->left;
+    right->bounds = s->right;
+    refs_part(r->refs, r->count, s, left->refs, right->refs, &left->centroids, &right->centroids);
+}
+
+void trc_split_middle(const struct trc_range *r, struct trc_range *left, struct trc_range *right) {
+    const uint32_t middle = r->count / 2;
+    uint32_t before = 0;
+    for (uint32_t i = 0; i < middle; i++)
+        before += trc_ref_count(&r->refs[i]);
+    range_part(r, r->refs, r->spare, middle, before, left, right);
+    trc_range_measure(left);
+    trc_range_measure(right);
 }
 
 /* ---- by all threads ---- */
@@ -237,99 +278,61 @@ void trc_split_middle(const struct trc_ref *refs, const struct trc_range *r, str
 #define LEAST_BLOCK 2048
 
 struct split_block {
-    struct trc_range range; /* as measured */
     struct bins bins;
-    uint32_t left_at, right_at; /* where its refs of either side go */
-    struct box before, after;   /* centroids of either side */
+    struct trc_ref *left, *right; /* where its refs of either side go */
+    struct box before, after;     /* centroids of either side */
 };
 
 struct trc_split_blocks {
-    struct trc_ref *refs, *spare; /* spare: as many */
     struct trc_pool *pool;
     const atomic_uint *cancel; /* may be NULL */
     /* Of the last search, and of what follows it: */
+    const struct trc_range *range;
     const struct trc_split *split;
-    uint32_t begin, end;
     uint32_t block_size, block_count;
     struct split_block block[MOST_BLOCKS];
 };
 
-struct trc_split_blocks *trc_split_blocks_create(struct trc_ref *refs, uint32_t count,
-                                                 struct trc_pool *pool, const atomic_uint *cancel) {
+struct trc_split_blocks *trc_split_blocks_create(struct trc_pool *pool, const atomic_uint *cancel) {
     struct trc_split_blocks *b = trc_alloc(1, sizeof *b);
-    struct trc_ref *spare = trc_alloc(count, sizeof *spare);
-    if (!b || !spare) {
-        trc_free(b);
-        trc_free(spare);
+    if (!b)
         return NULL;
-    }
-    b->refs = refs;
-    b->spare = spare;
     b->pool = pool;
     b->cancel = cancel;
     return b;
 }
 
-void trc_split_blocks_destroy(struct trc_split_blocks *blocks) {
-    if (!blocks)
-        return;
-    trc_free(blocks->spare);
-    trc_free(blocks);
-}
+void trc_split_blocks_destroy(struct trc_split_blocks *blocks) { trc_free(blocks); }
 
-static uint32_t block_begin(const struct trc_split_blocks *b, uint32_t block) {
-    return b->begin + block * b->block_size;
+static struct trc_ref *block_refs(const struct trc_split_blocks *b, uint32_t block) {
+    return b->range->refs + block * b->block_size;
 }
-static uint32_t block_end(const struct trc_split_blocks *b, uint32_t block) {
-    const uint32_t end = block_begin(b, block) + b->block_size;
-    return end < b->end ? end : b->end;
-}
-
-static void blocks_cut(struct trc_split_blocks *b, uint32_t begin, uint32_t end) {
-    const uint32_t count = end - begin, share = (count + MOST_BLOCKS - 1) / MOST_BLOCKS;
-    b->begin = begin;
-    b->end = end;
-    b->block_size = share > LEAST_BLOCK ? share : LEAST_BLOCK;
-    b->block_count = (count + b->block_size - 1) / b->block_size;
-}
-
-static void blocks_run(struct trc_split_blocks *b, const struct trc_split *s,
-                       void (*task)(void *, uint32_t, uint32_t)) {
-    b->split = s;
-    trc_pool_run(b->pool, b->block_count, task, b);
+static uint32_t block_length(const struct trc_split_blocks *b, uint32_t block) {
+    const uint32_t left = b->range->count - block * b->block_size;
+    return left < b->block_size ? left : b->block_size;
 }
 
 static bool is_cancelled(const struct trc_split_blocks *b) { return b->cancel && *b->cancel; }
 
-static void measure_block(void *context, uint32_t index, uint32_t worker) {
-    struct trc_split_blocks *b = context;
-    (void)worker;
-    b->block[index].range =
-        trc_range_measure(b->refs, block_begin(b, index), block_end(b, index), 0);
-}
-
-struct trc_range trc_split_shared_measure(struct trc_split_blocks *blocks, uint32_t count) {
-    struct trc_range all = {0, count, 0, 0, box_empty(), box_empty()};
-    blocks_cut(blocks, 0, count);
-    blocks_run(blocks, NULL, measure_block);
-    for (uint32_t i = 0; i < blocks->block_count; i++) {
-        all.triangles += blocks->block[i].range.triangles;
-        box_grow(&all.bounds, blocks->block[i].range.bounds);
-        box_grow(&all.centroids, blocks->block[i].range.centroids);
-    }
-    return all;
+static void blocks_run(struct trc_split_blocks *b, const struct trc_range *r,
+                       const struct trc_split *s, void (*task)(void *, uint32_t, uint32_t)) {
+    const uint32_t share = (r->count + MOST_BLOCKS - 1) / MOST_BLOCKS;
+    b->range = r;
+    b->split = s;
+    b->block_size = share > LEAST_BLOCK ? share : LEAST_BLOCK;
+    b->block_count = (r->count + b->block_size - 1) / b->block_size;
+    trc_pool_run(b->pool, b->block_count, task, b);
 }
 
 static void fill_block(void *context, uint32_t index, uint32_t worker) {
     struct trc_split_blocks *b = context;
     (void)worker;
-    const uint32_t begin = block_begin(b, index);
-    bins_fill(b->refs, begin, is_cancelled(b) ? begin : block_end(b, index), b->split,
+    bins_fill(block_refs(b, index), is_cancelled(b) ? 0 : block_length(b, index), b->split,
               &b->block[index].bins);
 }
 
 static void bins_add(struct bins *to, const struct bins *from, const struct trc_split *s) {
-    for (int axis = s->first_axis; axis < s->end_axis; axis++)
+    for (int axis = 0; axis < 3; axis++)
         for (int i = 0; i < s->bin_count; i++) {
             box_grow(&to->box[axis][i], from->box[axis][i]);
             to->count[axis][i] += from->count[axis][i];
@@ -339,8 +342,7 @@ static void bins_add(struct bins *to, const struct bins *from, const struct trc_
 struct trc_split trc_split_shared_find(struct trc_split_blocks *blocks, const struct trc_range *r) {
     struct trc_split s = split_begin(r);
     struct bins all;
-    blocks_cut(blocks, r->begin, r->end);
-    blocks_run(blocks, &s, fill_block);
+    blocks_run(blocks, r, &s, fill_block);
     bins_clear(&all, &s);
     for (uint32_t i = 0; i < blocks->block_count; i++)
         bins_add(&all, &blocks->block[i].bins, &s);
@@ -348,52 +350,36 @@ struct trc_split trc_split_shared_find(struct trc_split_blocks *blocks, const st
     return s;
 }
 
-static void move_block(void *context, uint32_t index, uint32_t worker) {
+static void part_block(void *context, uint32_t index, uint32_t worker) {
     struct trc_split_blocks *b = context;
     struct split_block *block = &b->block[index];
-    struct trc_ref *to[2] = {b->spare + block->right_at, b->spare + block->left_at};
-    struct box centroids[2] = {box_empty(), box_empty()};
-    (void)worker;
-    if (is_cancelled(b))
-        return;
-    for (uint32_t i = block_begin(b, index); i < block_end(b, index); i++) {
-        const bool left = is_left(b->split, &b->refs[i]);
-        box_add(&centroids[left], ref_centroid(&b->refs[i]));
-        *to[left]++ = b->refs[i];
-    }
-    block->before = centroids[1];
-    block->after = centroids[0];
-}
-
-static void return_block(void *context, uint32_t index, uint32_t worker) {
-    struct trc_split_blocks *b = context;
-    const uint32_t begin = block_begin(b, index);
     (void)worker;
     if (!is_cancelled(b))
-        memcpy(b->refs + begin, b->spare + begin, (block_end(b, index) - begin) * sizeof *b->refs);
+        refs_part(block_refs(b, index), block_length(b, index), b->split, block->left, block->right,
+                  &block->before, &block->after);
 }
 
 void trc_split_shared_apply(struct trc_split_blocks *blocks, const struct trc_range *r,
                             const struct trc_split *s, struct trc_range *left,
                             struct trc_range *right) {
-    const uint32_t count = blocks->block_count;
-    uint32_t at = r->begin;
-    for (uint32_t i = 0; i < count; i++) {
-        blocks->block[i].left_at = at;
+    range_part(r, r->spare, r->refs, s->left_count, s->left_triangles, left, right);
+    left->bounds = s->left;
+    right->bounds = s->right;
+    struct trc_ref *next_left = left->refs, *next_right = right->refs;
+    for (uint32_t i = 0; i < blocks->block_count; i++) {
+        struct split_block *block = &blocks->block[i];
+        uint32_t before = 0;
         for (int bin = 0; bin < s->bin; bin++)
-            at += tally_refs(blocks->block[i].bins.count[s->axis][bin]);
+            before += tally_refs(block->bins.count[s->axis][bin]);
+        block->left = next_left;
+        block->right = next_right;
+        block->before = block->after = box_empty();
+        next_left += before;
+        next_right += block_length(blocks, i) - before;
     }
-    const uint32_t middle = at;
-    for (uint32_t i = 0; i < count; i++) {
-        const uint32_t next = i + 1 < count ? blocks->block[i + 1].left_at : middle;
-        blocks->block[i].right_at = at;
-        at += block_end(blocks, i) - block_begin(blocks, i) - (next - blocks->block[i].left_at);
-        blocks->block[i].before = blocks->block[i].after = box_empty();
-    }
-    blocks_run(blocks, s, move_block);
-    blocks_run(blocks, s, return_block);
-    range_sides(r, s, middle, left, right);
-    for (uint32_t i = 0; i < count; i++) {
+    blocks_run(blocks, r, s, part_block);
+    left->centroids = right->centroids = box_empty();
+    for (uint32_t i = 0; i < blocks->block_count; i++) {
         box_grow(&left->centroids, blocks->block[i].before);
         box_grow(&right->centroids, blocks->block[i].after);
     }

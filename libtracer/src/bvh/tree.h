@@ -44,6 +44,7 @@
 #define TRC_MAX_LEVELS 48
 #define TRC_STACK_SIZE (TRC_MAX_LEVELS * (TRC_NODE_WIDTH - 1) + 1)
 
+struct box; /* core/box.h */
 struct trc_tree;
 
 struct trc_slot {
@@ -150,7 +151,7 @@ static inline uint32_t trc_ref_count(const struct trc_ref *r) {
     return r->primitive / TRC_REF_NEXT + 1;
 }
 
-/* What stands in a slot. */
+/* What stands in a slot; TLAS: triangle is the item. */
 struct trc_part_triangle {
     uint32_t part, triangle;
 };
@@ -164,20 +165,22 @@ struct trc_part {
     uint32_t slot_count;
 };
 
-/* Shape of the tree over refs (reordered: slots are their triangles, in order): nodes without
- * bounds. */
+/* Shape of a tree: nodes without bounds. */
 struct trc_topology {
     uint32_t node_count;
     uint32_t root;
     uint32_t (*children)[TRC_NODE_WIDTH]; /* node_count */
 };
 
+struct trc_range; /* bvh/split.h */
+
 /* Binned SAH (Wald, "On fast construction of SAH-based bounding volume hierarchies", 2007), opened
- * to 8 children by largest area. leaf_size: most triangles of a leaf, 1..8. Same result for any
- * thread count. */
-trc_status trc_topology_build(struct trc_ref *refs, uint32_t count, uint32_t leaf_size,
+ * to 8 children by largest area, over measured refs, which are used up: triangles_out gets what
+ * stands in the slots. leaf_size: most triangles of a leaf, 1..8. Same result for any thread count.
+ * OUT_OF_MEMORY, TOO_LARGE or CANCELLED. */
+trc_status trc_topology_build(const struct trc_range *all, uint32_t leaf_size,
                               struct trc_pool *pool, const atomic_uint *cancel,
-                              struct trc_topology *out);
+                              struct trc_part_triangle *triangles_out, struct trc_topology *out);
 void trc_topology_destroy(struct trc_topology *topology);
 
 /* A triangle at a key, as a leaf holds it: corners on a line (of meshes at rest) become one point,
@@ -198,9 +201,10 @@ trc_status trc_tree_refit(const struct trc_tree *from, const struct trc_part *pa
                           uint32_t key_count, struct trc_pool *pool, const atomic_uint *cancel,
                           struct trc_tree *tree);
 
-/* A TLAS: slot i stands for items[refs[i].primitive], whose world box is its ref's. */
-trc_status trc_tree_fill_top(const struct trc_topology *topology, const struct trc_ref *refs,
-                             uint32_t count, const struct trc_item *items,
+/* A TLAS over count items with their world boxes; order: the item of each slot. */
+trc_status trc_tree_fill_top(const struct trc_topology *topology,
+                             const struct trc_part_triangle *order, uint32_t count,
+                             const struct trc_item *items, const struct box *boxes,
                              struct trc_item *items_out, struct trc_tree *tree);
 
 void trc_tree_destroy(struct trc_tree *tree);

@@ -59,6 +59,11 @@ static inline void box_grow(struct box *b, struct box o) {
     b->upper = f4_max(b->upper, o.upper);
 }
 static inline void box_add(struct box *b, f4 point) { box_grow(b, (struct box){point, point}); }
+/* The same; a lane that is not a number changes nothing. */
+static inline void box_add_number(struct box *b, f4 point) {
+    b->lower = f4_min(point, b->lower);
+    b->upper = f4_max(point, b->upper);
+}
 /* Lengths of the edges; 0 for an empty box. */
 static inline f4 box_size(struct box b) { return f4_max(b.upper - b.lower, f4_set(0.0f)); }
 /* Half the surface; 0 for an empty box. */
