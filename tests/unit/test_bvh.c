@@ -6,6 +6,7 @@
 #include "bvh/split.h"
 #include "core/core.h"
 #include "figures.h"
+#include "kernels/kernels.h"
 #include "threads/pool.h"
 
 static const float unit_lower[3] = {-1, -1, -1}, unit_upper[3] = {1, 1, 1}, origin[3] = {0, 0, 0};
@@ -120,38 +121,44 @@ static bool is_in_order(const struct trc_range *r) {
     return true;
 }
 
-/* By one thread and by all of them: the same plane, the same refs on either side in their order,
- * their boxes as measured. */
-static void shared_splits_are_the_same(void **state) {
+/* By one thread, scalar, and by all of them on an instruction set: the same plane, the same refs on
+ * either side in their order, their boxes as measured. */
+static void expect_same_splits(uint32_t count, uint64_t seed, const struct trc_kernels *kernels) {
+    const struct trc_kernels *scalar = trc_kernels_get(TRC_ISA_SCALAR);
+    const struct trc_range all = random_range(count, seed), shared = random_range(count, seed);
+    struct trc_pool *pool;
+    assert_int_equal(trc_pool_create(3, &pool), TRC_OK);
+    struct trc_split_blocks *blocks = malloc(sizeof *blocks);
+    *blocks = (struct trc_split_blocks){.pool = pool};
+    struct trc_split s, other;
+    scalar->split_find(NULL, &all, &s);
+    kernels->split_find(blocks, &shared, &other);
+    assert_true(s.axis >= 0 && s.axis == other.axis && s.bin == other.bin);
+    assert_true(s.cost == other.cost);
+    struct trc_range left, right, shared_left, shared_right;
+    scalar->split_apply(NULL, &all, &s, &left, &right);
+    kernels->split_apply(blocks, &shared, &other, &shared_left, &shared_right);
+    expect_range(&left, &shared_left);
+    expect_range(&right, &shared_right);
+    assert_true(left.count > 0 && right.count > 0 && left.count + right.count == count);
+    assert_true(is_in_order(&left) && is_in_order(&right));
+    assert_ptr_equal(left.refs, all.spare);
+    assert_memory_equal(all.spare, shared.spare, count * sizeof *all.spare);
+    expect_measured(&left);
+    expect_measured(&right);
+    free(blocks);
+    trc_pool_destroy(pool);
+    free(shared.refs);
+    free(all.refs);
+}
+
+static void splits_are_the_same(void **state) {
     (void)state;
-    static const uint32_t counts[] = {9, 2047, 2048, 2049, 10000, 131072, 200001};
-    for (size_t k = 0; k < sizeof counts / sizeof *counts; k++) {
-        const struct trc_range all = random_range(counts[k], k),
-                               shared = random_range(counts[k], k);
-        struct trc_pool *pool;
-        assert_int_equal(trc_pool_create(3, &pool), TRC_OK);
-        struct trc_split_blocks *blocks = trc_split_blocks_create(pool, NULL);
-        assert_non_null(blocks);
-        const struct trc_split s = trc_split_find(&all),
-                               other = trc_split_shared_find(blocks, &shared);
-        assert_true(s.axis >= 0 && s.axis == other.axis && s.bin == other.bin);
-        assert_true(s.cost == other.cost);
-        struct trc_range left, right, shared_left, shared_right;
-        trc_split_apply(&all, &s, &left, &right);
-        trc_split_shared_apply(blocks, &shared, &other, &shared_left, &shared_right);
-        expect_range(&left, &shared_left);
-        expect_range(&right, &shared_right);
-        assert_true(left.count > 0 && right.count > 0 && left.count + right.count == counts[k]);
-        assert_true(is_in_order(&left) && is_in_order(&right));
-        assert_ptr_equal(left.refs, all.spare);
-        assert_memory_equal(all.spare, shared.spare, counts[k] * sizeof *all.spare);
-        expect_measured(&left);
-        expect_measured(&right);
-        trc_split_blocks_destroy(blocks);
-        trc_pool_destroy(pool);
-        free(shared.refs);
-        free(all.refs);
-    }
+    static const uint32_t counts[] = {9, 30, 255, 256, 2047, 2048, 2049, 10000, 131072, 200001};
+    for (size_t k = 0; k < sizeof counts / sizeof *counts; k++)
+        for (uint32_t isa = TRC_ISA_SCALAR; isa <= TRC_ISA_NEON; isa++)
+            if (trc_kernels_get(isa))
+                expect_same_splits(counts[k], k, trc_kernels_get(isa));
 }
 
 /* Cost of a split of sorted refs before the given one. */
@@ -169,13 +176,15 @@ static float cost_before(const struct trc_range *r, uint32_t at) {
 /* Up to eight triangles: the cheapest of all planes along the longest axis. */
 static void few_refs_split_at_the_best(void **state) {
     (void)state;
+    const struct trc_kernels *kernels = trc_kernels_current();
     for (uint64_t seed = 0; seed < 2000; seed++) {
         struct trc_range all = random_range(2 + (uint32_t)(seed % 7), seed), left, right;
         for (uint32_t i = 0; i < all.count; i++)
             all.refs[i].primitive %= TRC_REF_NEXT; /* one triangle each */
         trc_range_measure(&all);
-        const struct trc_split s = trc_split_find(&all);
-        trc_split_apply(&all, &s, &left, &right);
+        struct trc_split s;
+        kernels->split_find(NULL, &all, &s);
+        kernels->split_apply(NULL, &all, &s, &left, &right);
         assert_true(s.axis >= 0 && left.count > 0 && right.count > 0);
         assert_int_equal(left.count + right.count, all.count);
         expect_measured(&left);
@@ -645,7 +654,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(clusters_are_what_has_a_box_in_common),
         cmocka_unit_test(clusters_open_into_slots),
-        cmocka_unit_test(shared_splits_are_the_same),
+        cmocka_unit_test(splits_are_the_same),
         cmocka_unit_test(few_refs_split_at_the_best),
         cmocka_unit_test(any_number_of_triangles),
         cmocka_unit_test(shapes_and_instances),

@@ -1,4 +1,4 @@
-/* Shape of a tree: where ranges are split (bvh/split.h), and where they stay leaves.
+/* Shape of a tree: where ranges are split (kernels/split.c), and where they stay leaves.
  *
  * Nodes are opened to eight children by splitting the child of the largest area, as in Ingo Wald,
  * Carsten Benthin, Solomon Boulos, "Getting Rid of Packets", 2008. The upper part of the tree is
@@ -13,6 +13,7 @@
 #include "bvh/cluster.h"
 #include "bvh/split.h"
 #include "core/core.h"
+#include "kernels/kernels.h"
 #include "threads/pool.h"
 
 /* Cost of visiting a node against one triangle of a leaf. A leaf is one block whatever its count,
@@ -38,6 +39,7 @@ struct task {
 };
 
 struct builder {
+    const struct trc_kernels *kernels;
     uint32_t leaf_size;
     const atomic_uint *cancel;
     struct trc_part_triangle *triangles; /* by slot */
@@ -76,6 +78,17 @@ static uint32_t arena_node(struct arena *a) {
 
 static bool is_cancelled(const struct builder *b) { return b->cancel && *b->cancel; }
 
+/* Halves by number, where no plane will do. */
+static void range_halve(const struct trc_range *r, struct trc_range *left,
+                        struct trc_range *right) {
+    uint32_t before = 0;
+    for (uint32_t i = 0; i < r->count / 2; i++)
+        before += trc_ref_count(&r->refs[i]);
+    trc_range_part(r, r->refs, r->spare, r->count / 2, before, left, right);
+    trc_range_measure(left);
+    trc_range_measure(right);
+}
+
 /* Splits r in two unless it is better, and possible, to leave it a leaf. A build that is cancelled
  * splits no more: what it has made is thrown away. */
 static bool range_divide(struct builder *b, const struct trc_range *r, uint32_t level,
@@ -86,20 +99,19 @@ static bool range_divide(struct builder *b, const struct trc_range *r, uint32_t 
         return false;
     if (level >= MEDIAN_LEVEL) {
         if (must)
-            trc_split_middle(r, left, right);
+            range_halve(r, left, right);
         return must;
     }
-    const bool shared = r->count > TRC_SHARED_RANGE;
-    const struct trc_split s = shared ? trc_split_shared_find(b->blocks, r) : trc_split_find(r);
+    struct trc_split_blocks *blocks = r->count > TRC_SHARED_RANGE ? b->blocks : NULL;
+    struct trc_split s;
+    b->kernels->split_find(blocks, r, &s);
     const float area = box_area(r->bounds);
     if (!must && !(s.axis >= 0 && s.cost + area * NODE_COST < area * (float)count))
         return false;
     if (s.axis < 0)
-        trc_split_middle(r, left, right);
-    else if (shared)
-        trc_split_shared_apply(b->blocks, r, &s, left, right);
+        range_halve(r, left, right);
     else
-        trc_split_apply(r, &s, left, right);
+        b->kernels->split_apply(blocks, r, &s, left, right);
     return true;
 }
 
@@ -108,28 +120,27 @@ static bool range_divide(struct builder *b, const struct trc_range *r, uint32_t 
 static int range_open(struct builder *b, const struct trc_range *r, uint32_t level,
                       struct trc_range out[TRC_NODE_WIDTH], bool closed[TRC_NODE_WIDTH]) {
     int count = 1;
+    float area[TRC_NODE_WIDTH]; /* -1: of those that are closed */
     memset(closed, 0, TRC_NODE_WIDTH * sizeof *closed);
     out[0] = *r;
+    area[0] = box_area(r->bounds);
     while (count < TRC_NODE_WIDTH) {
-        int best = -1;
-        float best_area = -1.0f;
-        for (int i = 0; i < count; i++) {
-            const float area = closed[i] ? -1.0f : box_area(out[i].bounds);
-            const bool ties = best >= 0 && area == best_area && out[i].count > out[best].count;
-            if (area > best_area || ties) {
-                best_area = area;
+        int best = 0;
+        for (int i = 1; i < count; i++)
+            if (area[i] > area[best] || (area[i] == area[best] && out[i].count > out[best].count))
                 best = i;
-            }
-        }
-        if (best < 0)
+        if (area[best] < 0.0f)
             break;
         struct trc_range left, right;
-        if (!range_divide(b, &out[best], level, &left, &right)) {
-            closed[best] = true;
+        closed[best] = !range_divide(b, &out[best], level, &left, &right);
+        if (closed[best]) {
+            area[best] = -1.0f;
             continue;
         }
         out[best] = left;
-        out[count++] = right;
+        out[count] = right;
+        area[best] = box_area(left.bounds);
+        area[count++] = box_area(right.bounds);
     }
     return count;
 }
@@ -223,7 +234,10 @@ static trc_status join(struct builder *b, struct arena *top, uint32_t root,
 trc_status trc_topology_build(const struct trc_range *all, uint32_t leaf_size,
                               struct trc_pool *pool, const atomic_uint *cancel,
                               struct trc_part_triangle *triangles_out, struct trc_topology *out) {
-    struct builder b = {.leaf_size = leaf_size, .cancel = cancel, .triangles = triangles_out};
+    struct builder b = {.kernels = trc_kernels_current(),
+                        .leaf_size = leaf_size,
+                        .cancel = cancel,
+                        .triangles = triangles_out};
     struct arena top = {0};
     *out = (struct trc_topology){.root = TRC_REF_EMPTY};
     if (all->count == 0)
@@ -232,9 +246,13 @@ trc_status trc_topology_build(const struct trc_range *all, uint32_t leaf_size,
         return trc_fail(TRC_ERROR_TOO_LARGE, "%u primitives in one tree, at most %u",
                         all->triangles, TRC_REF_INDEX_MASK);
     const bool shared = all->count > TRC_SHARED_RANGE;
-    if (shared && !(b.blocks = trc_split_blocks_create(pool, cancel)))
-        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory to build over %u primitives",
-                        all->triangles);
+    if (shared) {
+        b.blocks = trc_alloc(1, sizeof *b.blocks);
+        if (!b.blocks)
+            return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory to build over %u primitives",
+                            all->triangles);
+        *b.blocks = (struct trc_split_blocks){.pool = pool, .cancel = cancel};
+    }
     const uint32_t root = build_range(&b, &top, all, 0, shared);
     if (!top.failed && !b.failed)
         trc_pool_run(pool, b.task_count, task_run, &b);
@@ -243,7 +261,7 @@ trc_status trc_topology_build(const struct trc_range *all, uint32_t leaf_size,
         trc_free(b.tasks[i].arena.children);
     trc_free(b.tasks);
     trc_free(top.children);
-    trc_split_blocks_destroy(b.blocks);
+    trc_free(b.blocks);
     return status;
 }
 

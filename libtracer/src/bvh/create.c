@@ -5,8 +5,8 @@
 #include <string.h>
 
 #include "bvh/bvh.h"
+#include "bvh/range.h"
 #include "bvh/refs.h"
-#include "bvh/split.h"
 #include "bvh/tree.h"
 #include "core/box.h"
 #include "core/core.h"

@@ -2,7 +2,7 @@
 #ifndef TRACER_BVH_REFS_H
 #define TRACER_BVH_REFS_H
 
-#include "bvh/split.h"
+#include "bvh/range.h"
 
 /* Refs to the valid triangles of all parts, triangle_count with the others, in order, clustered
  * (bvh/cluster.h) and measured, by all threads. *memory_out, where they and their spare memory

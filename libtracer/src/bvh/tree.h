@@ -172,7 +172,7 @@ struct trc_topology {
     uint32_t (*children)[TRC_NODE_WIDTH]; /* node_count */
 };
 
-struct trc_range; /* bvh/split.h */
+struct trc_range; /* bvh/range.h */
 
 /* Binned SAH (Wald, "On fast construction of SAH-based bounding volume hierarchies", 2007), opened
  * to 8 children by largest area, over measured refs, which are used up: triangles_out gets what

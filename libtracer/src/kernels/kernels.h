@@ -11,6 +11,10 @@
 #include "scene/snapshot.h"
 #include "tracer/tracer.h"
 
+struct trc_range; /* bvh/range.h */
+struct trc_split; /* bvh/split.h */
+struct trc_split_blocks;
+
 /* Counts of one tile, summed by the renderer. */
 struct trc_tile_counts {
     uint64_t rays_camera, rays_shadow, rays_reflection, rays_refraction;
@@ -50,6 +54,16 @@ struct trc_kernels {
      * importance maps at commit. */
     void (*world_evaluate)(const struct trc_snapshot *snapshot, const float *directions,
                            float *radiance, uint32_t count);
+    /* Builds: the cheapest plane of a range, or axis -1 if no plane parts its refs. Every
+     * instruction set finds the same. May sort the refs. blocks: to be found by all threads; NULL:
+     * by this one. */
+    void (*split_find)(struct trc_split_blocks *blocks, const struct trc_range *r,
+                       struct trc_split *out);
+    /* Both sides of that plane, their refs in the range's order, in its spare memory; its refs'
+     * memory is spare then. With blocks: those of the last search; cancelled, both leave refs in
+     * any state. */
+    void (*split_apply)(struct trc_split_blocks *blocks, const struct trc_range *r,
+                        const struct trc_split *s, struct trc_range *left, struct trc_range *right);
 };
 
 /* The table of an instruction set that this build and CPU have, else NULL (cpu/dispatch.c). Tables

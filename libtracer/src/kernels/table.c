@@ -2,6 +2,7 @@
 #include "kernels/kernels.h"
 
 #include "kernels/query.h"
+#include "kernels/split.h"
 #include "kernels/tile.h"
 #include "kernels/world.h"
 
@@ -22,4 +23,6 @@ const struct trc_kernels TRC_KERNEL(trc_kernels) = {
     .query_closest = TRC_KERNEL(trc_query_closest_rays),
     .query_occluded = TRC_KERNEL(trc_query_occluded_rays),
     .world_evaluate = TRC_KERNEL(trc_world_evaluate),
+    .split_find = TRC_KERNEL(trc_split_find),
+    .split_apply = TRC_KERNEL(trc_split_apply),
 };
