@@ -221,9 +221,9 @@ static struct trc_split split_begin(const struct trc_range *r) {
     return s;
 }
 
-/* The refs of a range that may stay a leaf, put in order along the axis on which they lie farthest
- * apart. */
-static void few_sort(const struct trc_range *r) {
+/* Puts the refs of a range that may stay a leaf in order along the axis on which they lie farthest
+ * apart, and gives that axis. */
+static int few_sort(const struct trc_range *r) {
     struct trc_ref *refs = r->refs;
     const f4 size = r->centroids.upper - r->centroids.lower;
     const int xy = size[0] >= size[1] ? 0 : 1, axis = size[xy] >= size[2] ? xy : 2;
@@ -235,14 +235,15 @@ static void few_sort(const struct trc_range *r) {
             refs[k] = refs[k - 1];
         refs[k] = ref;
     }
+    return axis;
 }
 
-/* Every plane between sorted refs. */
+/* The cheapest of all planes between sorted refs. */
 static struct trc_split few_find(const struct trc_range *r) {
     struct trc_split s = {.axis = -1, .cost = FLT_MAX, .is_sorted = true};
     struct box right[TRC_NODE_WIDTH], left = box_empty(), rest = box_empty();
     uint32_t before = 0;
-    few_sort(r);
+    const int axis = few_sort(r);
     for (uint32_t i = r->count; i-- > 1;) {
         box_grow(&rest, trc_ref_box(&r->refs[i]));
         right[i] = rest;
@@ -252,10 +253,10 @@ static struct trc_split few_find(const struct trc_range *r) {
         before += trc_ref_count(&r->refs[i - 1]);
         const float cost =
             box_area(left) * (float)before + box_area(right[i]) * (float)(r->triangles - before);
-        if (cost >= s.cost)
+        if (!(cost < s.cost))
             continue;
         s.cost = cost;
-        s.axis = 0;
+        s.axis = axis;
         s.left_count = i;
         s.left_triangles = before;
         s.left = left;
@@ -266,6 +267,7 @@ static struct trc_split few_find(const struct trc_range *r) {
 
 /* ---- by all threads ---- */
 
+/* Refs of a block at least. */
 #define LEAST_BLOCK 2048
 
 static struct trc_ref *block_refs(const struct trc_split_blocks *b, uint32_t block) {
