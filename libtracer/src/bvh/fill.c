@@ -13,7 +13,7 @@
 
 /* Nodes whose leaves one task fills: large enough that handing out tasks costs nothing. */
 #define NODES_PER_TASK 256
-/* Refits fetch what they know of slots so far ahead: 3 to 5 % faster. */
+/* Refits fetch what they know of slots so far ahead: 2 to 3 % faster. */
 #define PREFETCH_SLOTS 32
 /* Kernels load this many slots from wherever a leaf begins. */
 #define LOAD_SLOTS 8
