@@ -8,6 +8,7 @@
  * power heuristic). */
 #include "kernels/arrival.h"
 #include "kernels/light.h"
+#include "kernels/spawn.h"
 #include "kernels/wide_math.h"
 #include "shading/lights.h"
 
@@ -155,25 +156,6 @@ static void catch_shadows(struct trc_tile *t) {
 
 /* ---- direct light ---- */
 
-/* Origin of a ray that leaves s towards w: moved along the geometric normal out of the box of the
- * position's rounding error, then each coordinate to the next float (Pharr, Jakob, Humphreys,
- * "Physically Based Rendering", 3rd ed. 2016, section 3.9). */
-TRC_INLINE vfloat away(vfloat x, vfloat offset) {
-    const vfloat moved = x + offset;
-    /* One float further in the direction of the offset: the bits of a float count upwards with its
-     * magnitude. */
-    const vint bits = vf_as_int(moved);
-    const vmask up = vm_not(vf_lt(moved * offset, vf_set(0.0f)));
-    const vint next = bits + vi_select(up, vi_set(1), vi_set(-1));
-    return vf_select(vm_or(vf_eq(offset, vf_set(0.0f)), vf_eq(moved, vf_set(0.0f))), moved,
-                     vi_as_float(next));
-}
-TRC_INLINE vvec3 spawn_origin(const struct trc_surface *s, vmask outside) {
-    const vfloat reach = vf_abs(s->ng.x) * s->p_error.x + vf_abs(s->ng.y) * s->p_error.y +
-                         vf_abs(s->ng.z) * s->p_error.z;
-    const vvec3 offset = v3_scale(s->ng, vf_select(outside, reach, -reach));
-    return v3(away(s->p.x, offset.x), away(s->p.y, offset.y), away(s->p.z, offset.z));
-}
 TRC_INLINE vmask goes_out(const struct trc_surface *s, vvec3 w) {
     return vf_ge(v3_dot(w, s->ng), vf_set(0.0f));
 }
@@ -186,7 +168,7 @@ TRC_INLINE vvec3 shadow_origin(const struct trc_surface *s, vvec3 w) {
     const vfloat zero = vf_set(0.0f), one = vf_set(1.0f);
     const vfloat cos_n = v3_dot(w, s->n), cos_g = v3_dot(w, s->ng);
     const vmask outside = vf_ge(cos_n, zero);
-    const vvec3 o = spawn_origin(s, outside);
+    const vvec3 o = trc_spawn_origin(s, outside);
     if (!vm_any(s->smooth))
         return o;
     const vfloat scale = vf_set(1.0f / TERMINATOR_COSINE);
@@ -441,7 +423,7 @@ static void ray_push(struct trc_tile *t, const struct arrival *a, const struct t
     const trc_render_desc *desc = t->desc;
     const vmask straight = b->transparent;
     const vvec3 w = v3_select(straight, a->d, b->wi);
-    const vvec3 o = v3_select(straight, a->o, spawn_origin(s, goes_out(s, b->wi)));
+    const vvec3 o = v3_select(straight, a->o, trc_spawn_origin(s, goes_out(s, b->wi)));
     const vvec3 n = v3_select(straight, a->n_from, a->receive_n);
     const vvec3 weight = v3_mul(v3_select(straight, a->found_weight, a->weight), b->weight);
     const vfloat beyond = vf_select(straight, a->beyond, b->beyond);

@@ -1,0 +1,177 @@
+/* Rays that leave a surface: they do not meet it again, and begin no farther off than they must.
+ *
+ * Hard case 27: triangles of .01 to 100 units, up to a million units from the origin, rays from
+ * along the normal to 1e-6 from grazing. The offset is compared with the bound of M. Pharr, W.
+ * Jakob and G. Humphreys, "Physically Based Rendering", 3rd ed. 2016, sections 3.9.4 and 3.9.5. */
+#include "wide_test.h"
+
+#include "figures.h"
+#include "kernels/spawn.h"
+#include "kernels/wide_math.h"
+#include "query_test.h"
+
+#define TRIANGLES 512
+#define ROUNDS 16 /* rays of each triangle for each angle */
+#define GAMMA(n) ((n)*0x1p-24 / (1.0 - (n)*0x1p-24))
+
+/* A triangle of about that size, that far from the origin, whose corners are not on a line. */
+static void add_triangle(struct mesh *mesh, struct rng *rng, float size, float distance) {
+    float center[3], p[3][3];
+    double normal[3];
+    do {
+        rng_direction(rng, center);
+        for (int v = 0; v < 3; v++)
+            for (int i = 0; i < 3; i++)
+                p[v][i] = distance * center[i] + size * rng_range(rng, -0.5f, 0.5f);
+        for (int i = 0; i < 3; i++) {
+            const int j = (i + 1) % 3, k = (i + 2) % 3;
+            normal[i] = ((double)p[1][j] - p[0][j]) * ((double)p[2][k] - p[0][k]) -
+                        ((double)p[1][k] - p[0][k]) * ((double)p[2][j] - p[0][j]);
+        }
+    } while (normal[0] == 0.0 && normal[1] == 0.0 && normal[2] == 0.0);
+    for (int v = 0; v < 3; v++)
+        mesh_add_vertex(mesh, p[v][0], p[v][1], p[v][2]);
+    const uint32_t first = mesh->vertex_count - 3;
+    mesh_add_triangle(mesh, first, first + 1, first + 2);
+}
+
+/* Surfaces of TRC_WIDTH triangles from first on, at random places, seen from random sides. */
+static struct trc_surface surfaces(const struct trc_snapshot *snapshot, uint32_t first,
+                                   struct rng *rng) {
+    struct trc_surface s;
+    float u[TRC_WIDTH], v[TRC_WIDTH];
+    int32_t triangle[TRC_WIDTH];
+    memset(&s, 0, sizeof s);
+    for (uint32_t k = 0; k < TRC_WIDTH; k++) {
+        triangle[k] = (int32_t)(first + k);
+        u[k] = rng_unit(rng);
+        v[k] = rng_unit(rng) * (1.0f - u[k]);
+    }
+    s.snapshot = snapshot;
+    s.active = vm_all_set();
+    s.triangle = vi_load(triangle);
+    s.u = vf_load(u);
+    s.v = vf_load(v);
+    s.wo = trc_warp_sphere(test_wide_uniform(rng), test_wide_uniform(rng));
+    TRC_KERNEL(trc_surface_fetch)(&s);
+    return s;
+}
+
+/* Directions at that cosine to the normal, to either side. */
+static vvec3 leaving(const struct trc_surface *s, float cosine, struct rng *rng) {
+    const vvec3 any = trc_warp_sphere(test_wide_uniform(rng), test_wide_uniform(rng));
+    const vfloat sign =
+        vf_select(vf_lt(test_wide_uniform(rng), vf_set(0.5f)), vf_one(), vf_set(-1.0f));
+    const vvec3 along = v3_normalize(v3_sub(any, v3_scale(s->ng, v3_dot(any, s->ng))));
+    return v3_add(v3_scale(s->ng, sign * vf_set(cosine)),
+                  v3_scale(along, vf_set(sqrtf(1.0f - cosine * cosine))));
+}
+
+/* The largest offsets, ours and those of the book. */
+struct offsets {
+    double ours, book;
+};
+
+/* The book's has gamma(7) for what interpolates the corners, and gamma(3) for the products of the
+ * matrix, which is the identity here. */
+static void offsets_add(struct offsets *largest, const struct mesh *mesh,
+                        const struct trc_surface *s, int lane) {
+    const int32_t triangle = vi_get(s->triangle, lane);
+    const double u = vf_get(s->u, lane), v = vf_get(s->v, lane);
+    const vfloat p[3] = {s->p.x, s->p.y, s->p.z}, ng[3] = {s->ng.x, s->ng.y, s->ng.z};
+    const vfloat error[3] = {s->p_error.x, s->p_error.y, s->p_error.z};
+    double ours = 0.0, book = 0.0;
+    for (int i = 0; i < 3; i++) {
+        const float *corner = mesh->positions + 9 * (size_t)triangle + i;
+        const double sum = (1.0 - u - v) * fabs((double)corner[0]) + u * fabs((double)corner[3]) +
+                           v * fabs((double)corner[6]);
+        const double n = fabs((double)vf_get(ng[i], lane));
+        ours += n * (double)vf_get(error[i], lane);
+        book +=
+            n * ((GAMMA(3) + 1.0) * GAMMA(7) * sum + GAMMA(3) * fabs((double)vf_get(p[i], lane)));
+    }
+    largest->ours = fmax(largest->ours, ours);
+    largest->book = fmax(largest->book, book);
+}
+
+/* Rays of all triangles at that cosine. */
+static void spawn_all(const struct mesh *mesh, const struct trc_snapshot *snapshot, float cosine,
+                      struct rng *rng, struct ray_set *rays, struct offsets *largest) {
+    for (uint32_t first = 0; first < TRIANGLES; first += TRC_WIDTH) {
+        const struct trc_surface s = surfaces(snapshot, first, rng);
+        const vvec3 w = leaving(&s, cosine, rng);
+        const vvec3 o = trc_spawn_origin(&s, vf_ge(v3_dot(w, s.ng), vf_zero()));
+        for (int k = 0; k < TRC_WIDTH; k++) {
+            const float origin[3] = {vf_get(o.x, k), vf_get(o.y, k), vf_get(o.z, k)};
+            const float direction[3] = {vf_get(w.x, k), vf_get(w.y, k), vf_get(w.z, k)};
+            ray_set_add_simple(rays, origin, direction);
+            offsets_add(largest, mesh, &s, k);
+        }
+    }
+}
+
+/* Ray i left triangle i % TRIANGLES. */
+static uint64_t count_self_hits(trc_scene scene, const struct ray_set *rays) {
+    struct hit_set hits;
+    uint64_t count = 0;
+    hit_set_init(&hits, rays->count);
+    assert_ok(hit_set_query(&hits, scene, rays, 64));
+    for (uint32_t i = 0; i < rays->count; i++)
+        count += hits.instance[i] != TRC_NO_HIT && hits.triangle[i] == i % TRIANGLES;
+    hit_set_free(&hits);
+    return count;
+}
+
+/* One scene: its rays and self-hits are added, the largest offset over the book's is returned. */
+static double leave_all(float size, float distance, bool is_final, struct rng *rng,
+                        uint64_t *self_hits, uint64_t *total) {
+    static const float cosines[] = {1e-6f, 1e-3f, 0.1f, 1.0f};
+    struct query_world world;
+    struct ray_set rays;
+    struct offsets largest = {0.0, 0.0};
+    query_world_init(&world);
+    struct mesh *mesh = query_world_object(&world);
+    for (uint32_t t = 0; t < TRIANGLES; t++)
+        add_triangle(mesh, rng, size, distance);
+    struct query_scene scene = query_test_scene(&world, is_final);
+    ray_set_init(&rays);
+    for (int k = 0; k < 4 * ROUNDS; k++)
+        spawn_all(mesh, query_scene_snapshot(scene.scene), cosines[k % 4], rng, &rays, &largest);
+    *self_hits += count_self_hits(scene.scene, &rays);
+    *total += rays.count;
+    ray_set_free(&rays);
+    query_scene_destroy(&scene);
+    query_world_free(&world);
+    return largest.ours / largest.book;
+}
+
+/* Far from the origin offsets are .9 of the book's; where a triangle is as large as its distance,
+ * edges are longer than corners are far, and what is interpolated along them costs more. */
+static void surfaces_are_left(void **state) {
+    (void)state;
+    static const float sizes[] = {0.01f, 1.0f, 100.0f}, distances[] = {0.0f, 1e2f, 1e4f, 1e6f};
+    struct rng rng = rng_seed(27);
+    uint64_t self_hits = 0, total = 0;
+    double far_share = 0.0, near_share = 0.0;
+    for (int i = 0; i < 24; i++) {
+        const float size = sizes[i % 3], distance = distances[i / 3 % 4];
+        const double share = leave_all(size, distance, i >= 12, &rng, &self_hits, &total);
+        double *worst = distance >= 10.0f * size ? &far_share : &near_share;
+        *worst = fmax(*worst, share);
+    }
+    print_figure("27: rays that leave a surface", "%llu self-hits of %llu rays",
+                 (unsigned long long)self_hits, (unsigned long long)total);
+    print_figure("27: their offsets",
+                 "at most %.2f of pbrt's, %.2f where a triangle is at the origin", far_share,
+                 near_share);
+    assert_int_equal(self_hits, 0);
+    assert_true(far_share < 0.95);
+    assert_true(near_share < 1.6);
+}
+
+int main(void) {
+    if (!test_cpu_can())
+        return 77;
+    const struct CMUnitTest tests[] = {cmocka_unit_test(surfaces_are_left)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
