@@ -221,7 +221,8 @@ static void near_sheets_are_met(void **state) {
         query_scene_destroy(&scene);
         query_world_free(&world);
     }
-    print_misses("28: a sheet ten floats above another", missed, total);
+    print_figure("28: a sheet ten floats above another", "not met by %llu of %llu rays",
+                 (unsigned long long)missed, (unsigned long long)total);
     assert_int_equal(missed, 0);
 }
 
