@@ -17,7 +17,7 @@ struct trc_split {
     float cost;       /* sum of area * triangles of both sides */
     f4 origin, scale; /* bin = (centroid - origin) * scale, at most last_bin */
     f4 last_bin;
-    struct box left, right;
+    struct box left, right; /* of both sides; not set where refs are sorted */
     uint32_t left_count, left_triangles;
 };
 

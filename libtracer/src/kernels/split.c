@@ -259,8 +259,6 @@ static struct trc_split few_find(const struct trc_range *r) {
         s.axis = axis;
         s.left_count = i;
         s.left_triangles = before;
-        s.left = left;
-        s.right = right[i];
     }
     return s;
 }
