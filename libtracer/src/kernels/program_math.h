@@ -189,7 +189,6 @@ TRC_INLINE vvec3 v3_min(vvec3 a, vvec3 b) {
 TRC_INLINE vvec3 v3_max_each(vvec3 a, vvec3 b) {
     return v3(vf_max(a.x, b.x), vf_max(a.y, b.y), vf_max(a.z, b.z));
 }
-TRC_INLINE vvec3 v3_abs(vvec3 a) { return v3(vf_abs(a.x), vf_abs(a.y), vf_abs(a.z)); }
 TRC_INLINE vvec3 v3_floor(vvec3 a) { return v3(vf_floor(a.x), vf_floor(a.y), vf_floor(a.z)); }
 
 /* Along b; 0 where b is 0. */

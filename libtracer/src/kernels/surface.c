@@ -7,7 +7,7 @@
 struct raw_hit {
     struct trc_corners p, n; /* object space; n only where smooth */
     struct trc_wide_affine m;
-    vmask smooth, flips;
+    vmask smooth, flips, identity;
 };
 
 /* ---- loading ---- */
@@ -22,6 +22,7 @@ static void load_uniform(const struct trc_surface *s, const struct trc_instance 
                      &out->p);
     trc_load_affine(instance, s->time, &out->m);
     out->flips = instance->flips ? vm_all_set() : vm_none();
+    out->identity = instance->is_identity ? vm_all_set() : vm_none();
     out->smooth = vm_none();
     if (mesh->corner_normals) {
         const vint corner = s->triangle * vi_set(3);
@@ -46,8 +47,10 @@ static void load_uniform(const struct trc_surface *s, const struct trc_instance 
         out->smooth = vm_none();
 }
 
-/* One lane: 9 positions, 9 normals, 12 elements. Returns 1 for smooth, 2 for a mirrored
- * instance. */
+/* What load_lane says of a lane. */
+enum { LANE_SMOOTH = 1, LANE_FLIPS = 2, LANE_IDENTITY = 4 };
+
+/* One lane: 9 positions, 9 normals, 12 elements. Returns LANE_* together. */
 static uint32_t load_lane(const struct trc_surface *s, int lane, float p[9], float n[9],
                           float m[12]) {
     const struct trc_instance *instance = &s->snapshot->instances[vi_get(s->instance, lane)];
@@ -57,19 +60,20 @@ static uint32_t load_lane(const struct trc_surface *s, int lane, float p[9], flo
     const float time = vf_get(s->time, lane);
     trc_corner_at(mesh->positions, index, mesh->vertex_count, mesh->key_count, time, p);
     trc_affine_at(instance, time, m);
-    const uint32_t flips = instance->flips ? 2u : 0u;
+    const uint32_t flags =
+        (instance->flips ? LANE_FLIPS : 0u) | (instance->is_identity ? LANE_IDENTITY : 0u);
     if (mesh->smooth ? !mesh->smooth[triangle] : !mesh->corner_normals)
-        return flips;
+        return flags;
     if (mesh->corner_normals) {
         const uint32_t corners[3] = {3 * triangle, 3 * triangle + 1, 3 * triangle + 2};
         trc_corner_at(mesh->corner_normals, corners, 3 * mesh->triangle_count, mesh->key_count,
                       time, n);
-        return flips | 1u;
+        return flags | LANE_SMOOTH;
     }
     if (!mesh->vertex_normals)
-        return flips;
+        return flags;
     trc_corner_at(mesh->vertex_normals, index, mesh->vertex_count, mesh->key_count, time, n);
-    return flips | 1u;
+    return flags | LANE_SMOOTH;
 }
 
 static void load_mixed(const struct trc_surface *s, struct raw_hit *out) {
@@ -77,12 +81,13 @@ static void load_mixed(const struct trc_surface *s, struct raw_hit *out) {
     memset(p, 0, sizeof p);
     memset(n, 0, sizeof n);
     memset(m, 0, sizeof m);
-    uint32_t smooth = 0, flips = 0;
+    uint32_t smooth = 0, flips = 0, identity = 0;
     for (uint32_t lanes = vm_bits(s->active); lanes; lanes &= lanes - 1) {
         const int lane = __builtin_ctz(lanes);
         const uint32_t flags = load_lane(s, lane, p + 9 * lane, n + 9 * lane, m + 12 * lane);
-        smooth |= (flags & 1u) << lane;
-        flips |= (flags >> 1) << lane;
+        smooth |= (uint32_t)((flags & LANE_SMOOTH) != 0) << lane;
+        flips |= (uint32_t)((flags & LANE_FLIPS) != 0) << lane;
+        identity |= (uint32_t)((flags & LANE_IDENTITY) != 0) << lane;
     }
     out->p = trc_corners_of(p);
     out->n = trc_corners_of(n);
@@ -92,49 +97,48 @@ static void load_mixed(const struct trc_surface *s, struct raw_hit *out) {
     out->m.origin = v3(trc_column_of(m, 12, 3), trc_column_of(m, 12, 7), trc_column_of(m, 12, 11));
     out->smooth = vm_from_bits(smooth);
     out->flips = vm_from_bits(flips);
+    out->identity = vm_from_bits(identity);
 }
 
 /* ---- arithmetic ---- */
 
-/* Object position v0 + u e1 + v e2, and a bound of how far it is from the plane of the float
- * corners, in the manner of M. Pharr, W. Jakob and G. Humphreys, "Physically Based Rendering", 3.9
- * and 6.8: with e = 2^-24, gamma(n) = n e / (1 - n e).
+/* Object position v0 + (u e1 + v e2), and a bound of how far it is from the plane of the float
+ * corners, by the magnitudes of what is rounded (M. Pharr, W. Jakob and G. Humphreys, "Physically
+ * Based Rendering", 3.9 and 6.8, bound each step by those of the corners). In half-ulps, e = 2^-24:
+ * each edge 1 of itself and its product 1, their sum 1 of itself, the position 1 of itself. That
+ * the barycentrics are rounded does not matter, any u, v give a point of the plane.
  *
- * e1, e2 are rounded differences (1 e each); a product adds 1 e, the two sums at most 2 e to each
- * of their terms: the u and v terms carry gamma(4), v0 gamma(2). That the barycentrics are rounded
- * does not matter, any u, v give a point of the plane. The world point M p adds, per axis, gamma(3)
- * of |M||p| and gamma(1) of the translation in the sum (one product, at most three sums), and
- * carries the object bound through |M| with its own rounding, gamma(3) of it, which the last digit
- * below covers. Trees over world-space meshes are built from corners M v that were rounded
- * themselves: gamma(4) of |M||v| + |t|, and the hit is on the triangle of those; hence gamma(3) +
- * gamma(4) on the world terms. */
-#define GAMMA(n) ((n)*0x1p-24f / (1.0f - (n)*0x1p-24f))
+ * An identity adds nothing. The world point M p + t adds 3 of q = |M| |p|, for one product and the
+ * first two sums, and 1 of itself. A ray that starts there is off by 5 q once it is taken to object
+ * space (walk.h); or the tree is in world space, and its corners M v + t are off by at most 4 |M|
+ * |v| + |t|. With Q = |M| (|v0| + u |e1| + v |e2|), not less than q or the weighted mean of |M|
+ * |v|, both are within 5 Q + |t|: 8 Q, 1 of the world point, 1 of t in all. */
+#define ERROR_STEPS(n) vf_set((n)*0x1.0001p-24f) /* a last digit for what is of higher order */
+
+/* What rounding adds on the way from object to world and back. */
+static vvec3 transform_error(const struct trc_wide_affine *m, vvec3 object_error, vvec3 reach,
+                             vvec3 p) {
+    const vvec3 all = v3_add(object_error, v3_scale(reach, ERROR_STEPS(8)));
+    const vvec3 *c = m->column;
+    const vvec3 rest = v3_scale(v3_add(v3_abs(p), v3_abs(m->origin)), ERROR_STEPS(1));
+    return v3_mad(v3_abs(c[0]), all.x,
+                  v3_mad(v3_abs(c[1]), all.y, v3_mad(v3_abs(c[2]), all.z, rest)));
+}
 
 static void set_position(struct trc_surface *s, const struct raw_hit *h, vvec3 e1, vvec3 e2) {
     const vvec3 v0 = h->p.corner[0];
-    const vvec3 u1 = v3_scale(e1, s->u), v2 = v3_scale(e2, s->v);
-    const vvec3 p = v3_add(v3_add(v0, u1), v2);
-    const vfloat g4 = vf_set(GAMMA(4)), g2 = vf_set(GAMMA(2)), g7 = vf_set(GAMMA(7) * 1.000001f);
-    const vvec3 bound = v3(g2 * vf_abs(v0.x) + g4 * (vf_abs(u1.x) + vf_abs(v2.x)),
-                           g2 * vf_abs(v0.y) + g4 * (vf_abs(u1.y) + vf_abs(v2.y)),
-                           g2 * vf_abs(v0.z) + g4 * (vf_abs(u1.z) + vf_abs(v2.z)));
-    s->p = trc_transform_point(&h->m, p);
-    /* |M| (bound + g7 |p|) + g7 |t| */
-    const vvec3 reach =
-        v3(bound.x + g7 * vf_abs(p.x), bound.y + g7 * vf_abs(p.y), bound.z + g7 * vf_abs(p.z));
-    const vvec3 *c = h->m.column;
-    s->p_error = v3(vf_abs(c[0].x) * reach.x + vf_abs(c[1].x) * reach.y + vf_abs(c[2].x) * reach.z +
-                        g7 * vf_abs(h->m.origin.x),
-                    vf_abs(c[0].y) * reach.x + vf_abs(c[1].y) * reach.y + vf_abs(c[2].y) * reach.z +
-                        g7 * vf_abs(h->m.origin.y),
-                    vf_abs(c[0].z) * reach.x + vf_abs(c[1].z) * reach.y + vf_abs(c[2].z) * reach.z +
-                        g7 * vf_abs(h->m.origin.z));
+    const vvec3 u1 = v3_scale(e1, s->u), v2 = v3_scale(e2, s->v), way = v3_add(u1, v2);
+    const vvec3 p = v3_add(v0, way);
+    const vvec3 edges = v3_add(v3_abs(u1), v3_abs(v2));
+    const vvec3 error = v3_add(v3_scale(edges, ERROR_STEPS(2)),
+                               v3_scale(v3_add(v3_abs(way), v3_abs(p)), ERROR_STEPS(1)));
+    s->p = v3_select(h->identity, p, trc_transform_point(&h->m, p));
+    s->p_error = v3_select(h->identity, error,
+                           transform_error(&h->m, error, v3_add(v3_abs(v0), edges), s->p));
 }
 
 /* a over its largest component: cross products of what comes out neither overflow nor vanish. */
-static vvec3 scaled_to_one(vvec3 a) {
-    return v3_scale(a, vf_divide(vf_one(), v3_max(v3(vf_abs(a.x), vf_abs(a.y), vf_abs(a.z)))));
-}
+static vvec3 scaled_to_one(vvec3 a) { return v3_scale(a, vf_divide(vf_one(), v3_max(v3_abs(a)))); }
 
 /* A normal goes by the inverse transpose, which is the matrix of cofactors over the determinant;
  * its columns are cross products of the columns of M. Only the sign of the determinant matters
@@ -143,8 +147,7 @@ static vvec3 transform_normal(const struct trc_wide_affine *m, vvec3 n) {
     vvec3 c[3];
     vfloat most = vf_zero();
     for (int k = 0; k < 3; k++)
-        most = vf_max(most, v3_max(v3(vf_abs(m->column[k].x), vf_abs(m->column[k].y),
-                                      vf_abs(m->column[k].z))));
+        most = vf_max(most, v3_max(v3_abs(m->column[k])));
     for (int k = 0; k < 3; k++)
         c[k] = v3_scale(m->column[k], vf_divide(vf_one(), most));
     return v3_mad(v3_cross(c[1], c[2]), n.x,

@@ -38,9 +38,7 @@ TRC_WEIGHT_ERROR(trc_weight_error8, f8, f8_set)
 
 /* Hits that are computed in double: those whose barycentrics are off by more than that, needles,
  * whose edge functions lose what their length has over their width; and those whose distance is, by
- * more than one part in so many, such as of the surface that a ray leaves. A ray that leaves a
- * surface starts outside the box of its point's error; nothing nearer than the plane's error can be
- * told from that surface, so it does not count.
+ * more than one part in so many, such as of the surface that a ray leaves.
  *
  * At 512 distances on needles 1e4 times as long as wide are off by 287 ulps at most, for no time;
  * at 2048 by 57 and at 8192 by 14, but primary rays among many take a seventh and a quarter longer.
@@ -88,31 +86,26 @@ struct trc_shear {
     int u, v, z;
 };
 
-/* How far rounding of the sheared vertices can move the triangle's plane where the ray meets it:
- * each vertex by 8 half-ulps of its lengths, sideways ones times the slope of the plane; inside the
- * triangle that is the mean of the vertices' errors by the barycentrics w, however thin it is. */
-static double trc_plane_error(const float a[3], const float b[3], const float c[3],
-                              const double w[3], double det) {
-    const double p[3] = {(double)b[0] - a[0], (double)b[1] - a[1], (double)b[2] - a[2]};
-    const double q[3] = {(double)c[0] - a[0], (double)c[1] - a[1], (double)c[2] - a[2]};
-    const double slope =
-        (fabs(p[1] * q[2] - p[2] * q[1]) + fabs(p[2] * q[0] - p[0] * q[2])) / fabs(det);
-    double mean[3]; /* of the lengths */
-    for (int k = 0; k < 3; k++)
-        mean[k] = w[0] * fabs((double)a[k]) + w[1] * fabs((double)b[k]) + w[2] * fabs((double)c[k]);
-    return (double)TRC_GAMMA(8) * (mean[2] + slope * (fmax(mean[0], mean[1]) + mean[2]));
-}
-
 /* Where all vertices are on one side of the origin, along z, so is the hit, however steep the
  * plane: nearest is sure to be beyond what moves the vertices. Else the inner sides of a spike
  * would be lost. */
 #define TRC_Z_ERROR TRC_GAMMA(8)
 
-/* One ray against one triangle whose sheared coordinates are given (a: vertex 0: x, y, z relative
- * to the origin, x and y sheared); edge functions in double. False for a miss. */
-static __attribute__((noinline)) bool trc_triangle_exact(const float a[3], const float b[3],
-                                                         const float c[3], float sz, float *t,
+/* A ray and one triangle: [vertex][axis u, v, z] as they are, and moved to the ray's origin and
+ * sheared. */
+struct trc_doubtful {
+    float ou, ov, oz, su, sv, sz;
+    float v[3][3], sheared[3][3];
+};
+
+/* One ray against one triangle in double. Edge functions are those of the sheared vertices, so that
+ * meshes stay closed; the distance is that to the plane of the vertices as they are, to 1e-14 of
+ * their distances: a ray that leaves a surface starts outside the box of its point's error, and
+ * what it leaves is behind it, what is one float ahead of it is not. Where the two disagree, at the
+ * edges of steep planes, the distance stays within that of the vertices. False for a miss. */
+static __attribute__((noinline)) bool trc_triangle_exact(const struct trc_doubtful *d, float *t,
                                                          float *u, float *v) {
+    const float *a = d->sheared[0], *b = d->sheared[1], *c = d->sheared[2];
     const double e0 = (double)c[0] * b[1] - (double)c[1] * b[0];
     const double e1 = (double)a[0] * c[1] - (double)a[1] * c[0];
     const double e2 = (double)b[0] * a[1] - (double)b[1] * a[0];
@@ -121,67 +114,31 @@ static __attribute__((noinline)) bool trc_triangle_exact(const float a[3], const
     const double det = e0 + e1 + e2;
     if (!inside || det == 0.0)
         return false;
-    const double inv = 1.0 / det;
-    const double w[3] = {e0 * inv, e1 * inv, e2 * inv};
-    *u = (float)w[1];
-    *v = (float)w[2];
-    const double distance = (w[0] * a[2] + w[1] * b[2] + w[2] * c[2]) * sz;
-    *t = (float)distance;
-    const float low = f_min(a[2], f_min(b[2], c[2])), high = f_max(a[2], f_max(b[2], c[2]));
-    return fabs(distance) > trc_plane_error(a, b, c, w, det) * fabs((double)sz) ||
-           f_max(low, -high) > TRC_Z_ERROR * f_max(high, -low);
-}
-
-#if TRC_WIDTH > 1
-/* The same for lanes side by side: a packet that leaves a surface asks it of that surface's
- * triangle in every lane. a, b, c: sheared coordinates as above. */
-typedef double trc_vdouble __attribute__((vector_size(8 * TRC_WIDTH)));
-typedef int64_t trc_vlong __attribute__((vector_size(8 * TRC_WIDTH)));
-TRC_INLINE trc_vdouble trc_vd_abs(trc_vdouble x) { return (trc_vdouble)((trc_vlong)x & INT64_MAX); }
-TRC_INLINE trc_vdouble trc_vd_max(trc_vdouble a, trc_vdouble b) {
-    const trc_vlong over = a > b;
-    return (trc_vdouble)((over & (trc_vlong)a) | (~over & (trc_vlong)b));
-}
-
-static __attribute__((noinline)) vmask trc_triangle_exact_lanes(const vfloat *corner, vfloat sz,
-                                                                vfloat *t, vfloat *u, vfloat *v) {
-    trc_vdouble p[3][3];
-    for (int k = 0; k < 3; k++)
-        for (int axis = 0; axis < 3; axis++)
-            p[k][axis] = __builtin_convertvector(corner[3 * k + axis], trc_vdouble);
-    const trc_vdouble *a = p[0], *b = p[1], *c = p[2];
-    const trc_vdouble e0 = c[0] * b[1] - c[1] * b[0];
-    const trc_vdouble e1 = a[0] * c[1] - a[1] * c[0];
-    const trc_vdouble e2 = b[0] * a[1] - b[1] * a[0];
-    const trc_vdouble det = e0 + e1 + e2, inv = 1.0 / det;
-    const trc_vlong inside =
-        ((e0 >= 0.0) & (e1 >= 0.0) & (e2 >= 0.0)) | ((e0 <= 0.0) & (e1 <= 0.0) & (e2 <= 0.0));
-    const trc_vdouble w[3] = {e0 * inv, e1 * inv, e2 * inv};
-    const trc_vdouble scale = __builtin_convertvector(sz, trc_vdouble);
-    const trc_vdouble distance = (w[0] * a[2] + w[1] * b[2] + w[2] * c[2]) * scale;
-    trc_vdouble q[3], r[3], mean[3];
+    double p[3], q[3], way[3];
+    const float o[3] = {d->ou, d->ov, d->oz};
     for (int k = 0; k < 3; k++) {
-        q[k] = b[k] - a[k];
-        r[k] = c[k] - a[k];
-        mean[k] = w[0] * trc_vd_abs(a[k]) + w[1] * trc_vd_abs(b[k]) + w[2] * trc_vd_abs(c[k]);
+        p[k] = (double)d->v[1][k] - d->v[0][k];
+        q[k] = (double)d->v[2][k] - d->v[0][k];
+        way[k] = (double)d->v[0][k] - o[k];
     }
-    const trc_vdouble slope =
-        (trc_vd_abs(q[1] * r[2] - q[2] * r[1]) + trc_vd_abs(q[2] * r[0] - q[0] * r[2])) /
-        trc_vd_abs(det);
-    const trc_vdouble error =
-        (double)TRC_GAMMA(8) * (mean[2] + slope * (trc_vd_max(mean[0], mean[1]) + mean[2]));
-    *t = __builtin_convertvector(distance, vfloat);
-    *u = __builtin_convertvector(w[1], vfloat);
-    *v = __builtin_convertvector(w[2], vfloat);
-    const vfloat low = vf_min(corner[2], vf_min(corner[5], corner[8]));
-    const vfloat high = vf_max(corner[2], vf_max(corner[5], corner[8]));
-    const vmask sure = vf_gt(vf_max(low, -high), vf_set(TRC_Z_ERROR) * vf_max(high, -low));
-    const trc_vlong cuts = inside & (det != 0.0);
-    const trc_vlong apart = trc_vd_abs(distance) > error * trc_vd_abs(scale);
-    const vmask hit = vi_lt(__builtin_convertvector(cuts, vint), vi_set(0));
-    return vm_and(hit, vm_or(sure, vi_lt(__builtin_convertvector(apart, vint), vi_set(0))));
+    const double n[3] = {p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2],
+                         p[0] * q[1] - p[1] * q[0]};
+    const double scale = (double)d->sz, low = (double)f_min(a[2], f_min(b[2], c[2])),
+                 high = (double)f_max(a[2], f_max(b[2], c[2]));
+    const bool sure = fmax(low, -high) > (double)TRC_Z_ERROR * fmax(high, -low);
+    const double nearest = fmin(low * scale, high * scale),
+                 farthest = fmax(low * scale, high * scale);
+    const double least = sure ? nearest : fmin(nearest, 0.0);
+    double distance = (n[0] * way[0] + n[1] * way[1] + n[2] * way[2]) /
+                      (n[0] * (double)d->su + n[1] * (double)d->sv + n[2]) * scale;
+    /* In this order NaN stays: the ray is in the triangle's plane. */
+    distance = farthest < distance ? farthest : distance;
+    distance = distance < least ? least : distance;
+    *t = (float)distance;
+    *u = (float)(e1 / det);
+    *v = (float)(e2 / det);
+    return distance == distance;
 }
-#endif
 
 /* Vertex coordinates of one triangle for the lanes: broadcast (static) or per ray (moving). */
 struct trc_triangle_lanes {
@@ -206,6 +163,66 @@ struct trc_triangle_sheared {
     vfloat x[3], y[3], z[3], e[3];
     vfloat low, high; /* of the edge functions */
 };
+
+#if TRC_WIDTH > 1
+/* trc_triangle_exact for lanes side by side: a packet that leaves a surface asks it of that
+ * surface's triangle in every lane. */
+typedef double trc_vdouble __attribute__((vector_size(8 * TRC_WIDTH)));
+typedef int64_t trc_vlong __attribute__((vector_size(8 * TRC_WIDTH)));
+TRC_INLINE trc_vdouble trc_vd_of(vfloat x) { return __builtin_convertvector(x, trc_vdouble); }
+TRC_INLINE trc_vdouble trc_vd_select(trc_vlong m, trc_vdouble a, trc_vdouble b) {
+    return (trc_vdouble)((m & (trc_vlong)a) | (~m & (trc_vlong)b));
+}
+/* The second where either is NaN. */
+TRC_INLINE trc_vdouble trc_vd_min(trc_vdouble a, trc_vdouble b) {
+    return trc_vd_select(a < b, a, b);
+}
+TRC_INLINE trc_vdouble trc_vd_max(trc_vdouble a, trc_vdouble b) {
+    return trc_vd_select(a > b, a, b);
+}
+
+static __attribute__((noinline)) vmask trc_triangle_exact_lanes(
+    const struct trc_triangle_lanes *tri, const struct trc_triangle_sheared *s, const vfloat o[3],
+    vfloat su, vfloat sv, vfloat sz, vfloat *t, vfloat *u, vfloat *v) {
+    trc_vdouble x[3], y[3];
+    for (int k = 0; k < 3; k++) {
+        x[k] = trc_vd_of(s->x[k]);
+        y[k] = trc_vd_of(s->y[k]);
+    }
+    const trc_vdouble e0 = x[2] * y[1] - y[2] * x[1], e1 = x[0] * y[2] - y[0] * x[2],
+                      e2 = x[1] * y[0] - y[1] * x[0];
+    const trc_vdouble det = e0 + e1 + e2;
+    const trc_vlong inside =
+        ((e0 >= 0.0) & (e1 >= 0.0) & (e2 >= 0.0)) | ((e0 <= 0.0) & (e1 <= 0.0) & (e2 <= 0.0));
+    trc_vdouble p[3], q[3], way[3];
+    for (int k = 0; k < 3; k++) {
+        const trc_vdouble first = trc_vd_of(tri->v[0][k]);
+        p[k] = trc_vd_of(tri->v[1][k]) - first;
+        q[k] = trc_vd_of(tri->v[2][k]) - first;
+        way[k] = first - trc_vd_of(o[k]);
+    }
+    const trc_vdouble n[3] = {p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2],
+                              p[0] * q[1] - p[1] * q[0]};
+    const trc_vdouble scale = trc_vd_of(sz);
+    const vfloat low = vf_min(s->z[0], vf_min(s->z[1], s->z[2])),
+                 high = vf_max(s->z[0], vf_max(s->z[1], s->z[2]));
+    const trc_vdouble begin = trc_vd_of(low) * scale, end = trc_vd_of(high) * scale;
+    const trc_vdouble nearest = trc_vd_min(begin, end), farthest = trc_vd_max(begin, end);
+    const trc_vdouble zero = {0.0};
+    const trc_vlong sure = trc_vd_max(trc_vd_of(low), -trc_vd_of(high)) >
+                           (double)TRC_Z_ERROR * trc_vd_max(trc_vd_of(high), -trc_vd_of(low));
+    const trc_vdouble least = trc_vd_select(sure, nearest, trc_vd_min(nearest, zero));
+    trc_vdouble distance = (n[0] * way[0] + n[1] * way[1] + n[2] * way[2]) /
+                           (n[0] * trc_vd_of(su) + n[1] * trc_vd_of(sv) + n[2]) * scale;
+    distance = trc_vd_min(farthest, distance);
+    distance = trc_vd_max(least, distance);
+    *t = __builtin_convertvector(distance, vfloat);
+    *u = __builtin_convertvector(e1 / det, vfloat);
+    *v = __builtin_convertvector(e2 / det, vfloat);
+    const trc_vlong cuts = inside & (det != 0.0) & (distance == distance);
+    return vi_lt(__builtin_convertvector(cuts, vint), vi_set(0));
+}
+#endif
 
 /* Lanes whose ray passes through the triangle's edges. */
 TRC_INLINE vmask trc_triangle_edges(const struct trc_triangle_lanes *p, vfloat ou, vfloat ov,
@@ -267,8 +284,7 @@ TRC_INLINE vmask trc_triangle_test(const struct trc_triangle_lanes *p, vfloat ou
     const vfloat doubt_most = trc_t_doubt(vf_set(most->z), vf_set(most->range), error_most);
     const vmask surely_precise = vm_and(vf_le(error_most, vf_set(TRC_WEIGHT_IMPRECISE)),
                                         vf_gt(t_size, doubt_most * sz_size));
-    const vmask maybe = vm_or(near_edge, vm_andnot(vf_gt(*t, tmin), surely_precise));
-    if (!vm_any(vm_and(hit, maybe)))
+    if (!vm_any(vm_and(hit, vm_or(near_edge, vm_not(surely_precise)))))
         return hit;
     const vfloat x = vf_max(vf_abs(s.x[0]), vf_max(vf_abs(s.x[1]), vf_abs(s.x[2])));
     const vfloat y = vf_max(vf_abs(s.y[0]), vf_max(vf_abs(s.y[1]), vf_abs(s.y[2])));
@@ -278,8 +294,7 @@ TRC_INLINE vmask trc_triangle_test(const struct trc_triangle_lanes *p, vfloat ou
     const vfloat error = trc_weight_error(x, y, z, inv_size);
     const vmask precise = vm_and(vf_le(error, vf_set(TRC_WEIGHT_IMPRECISE)),
                                  vf_gt(t_size, trc_t_doubt(z, z_high - z_low, error) * sz_size));
-    const vmask imprecise = vm_andnot(vf_gt(*t, tmin), precise);
-    vmask doubtful = vm_and(hit, vm_or(near_edge, imprecise));
+    vmask doubtful = vm_and(hit, vm_or(near_edge, vm_not(precise)));
     if (__builtin_expect(vm_any(doubtful), 0)) {
         const vmask behind =
             vm_and(vf_ge(tmin, vf_set(0.0f)), trc_flat_behind(p, ou, ov, su * sz, sv * sz));
@@ -288,18 +303,24 @@ TRC_INLINE vmask trc_triangle_test(const struct trc_triangle_lanes *p, vfloat ou
         if (!vm_any(doubtful))
             return hit;
 #if TRC_WIDTH > 1
-        const vfloat corner[9] = {s.x[0], s.y[0], s.z[0], s.x[1], s.y[1],
-                                  s.z[1], s.x[2], s.y[2], s.z[2]};
+        const vfloat o[3] = {ou, ov, oz};
         vfloat exact_t, exact_u, exact_v;
-        const vmask exact = trc_triangle_exact_lanes(corner, sz, &exact_t, &exact_u, &exact_v);
+        const vmask exact =
+            trc_triangle_exact_lanes(p, &s, o, su, sv, sz, &exact_t, &exact_u, &exact_v);
         hit = vm_andnot(hit, vm_andnot(doubtful, exact));
         *t = vf_select(doubtful, exact_t, *t);
         *u = vf_select(doubtful, exact_u, *u);
         *v = vf_select(doubtful, exact_v, *v);
 #else
-        const float a[3] = {s.x[0], s.y[0], s.z[0]}, b[3] = {s.x[1], s.y[1], s.z[1]},
-                    c[3] = {s.x[2], s.y[2], s.z[2]};
-        if (!trc_triangle_exact(a, b, c, sz, t, u, v))
+        struct trc_doubtful d = {.ou = ou, .ov = ov, .oz = oz, .su = su, .sv = sv, .sz = sz};
+        for (int k = 0; k < 3; k++) {
+            d.sheared[k][0] = s.x[k];
+            d.sheared[k][1] = s.y[k];
+            d.sheared[k][2] = s.z[k];
+            for (int axis = 0; axis < 3; axis++)
+                d.v[k][axis] = p->v[k][axis];
+        }
+        if (!trc_triangle_exact(&d, t, u, v))
             hit = vm_none();
 #endif
     }
@@ -349,8 +370,7 @@ TRC_INLINE uint32_t trc_triangle8_test(const struct trc_triangle8 *p, float ou, 
     const f8 error = trc_weight_error8(x, y, z, f8_abs(inv));
     const f8 doubt = trc_t_doubt8(z, z_high - z_low, error) * f8_set(fabsf(sz));
     const uint32_t precise = f8_le(error, f8_set(TRC_WEIGHT_IMPRECISE)) & ~f8_le(f8_abs(*t), doubt);
-    const uint32_t imprecise = ~f8_le(*t, f8_set(tmin)) & ~precise;
-    uint32_t doubtful = hit & (f8_le(nearest, f8_set(TRC_TINY_EDGE)) | imprecise);
+    uint32_t doubtful = hit & (f8_le(nearest, f8_set(TRC_TINY_EDGE)) | ~precise);
     if (__builtin_expect(doubtful != 0, 0) && tmin >= 0.0f) {
         const uint32_t behind = doubtful & trc_flat_behind8(p, ou, ov, su * sz, sv * sz);
         hit &= ~behind;
@@ -358,10 +378,19 @@ TRC_INLINE uint32_t trc_triangle8_test(const struct trc_triangle8 *p, float ou, 
     }
     for (; __builtin_expect(doubtful != 0, 0); doubtful &= doubtful - 1) {
         const int i = __builtin_ctz(doubtful);
-        const float a[3] = {ax[i], ay[i], az[i]}, b[3] = {bx[i], by[i], bz[i]};
-        const float c[3] = {cx[i], cy[i], cz[i]};
+        struct trc_doubtful d = {
+            .ou = ou,
+            .ov = ov,
+            .oz = oz,
+            .su = su,
+            .sv = sv,
+            .sz = sz,
+            .sheared = {{ax[i], ay[i], az[i]}, {bx[i], by[i], bz[i]}, {cx[i], cy[i], cz[i]}}};
+        for (int k = 0; k < 3; k++)
+            for (int axis = 0; axis < 3; axis++)
+                d.v[k][axis] = p->v[k][axis][i];
         float rt, ru, rv;
-        if (trc_triangle_exact(a, b, c, sz, &rt, &ru, &rv)) {
+        if (trc_triangle_exact(&d, &rt, &ru, &rv)) {
             (*t)[i] = rt;
             (*u)[i] = ru;
             (*v)[i] = rv;

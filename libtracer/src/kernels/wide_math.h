@@ -41,6 +41,7 @@ TRC_INLINE vfloat vf_round(vfloat a) {
 TRC_INLINE vvec3 v3_where(vmask m, vvec3 a) {
     return v3(vf_where(m, a.x), vf_where(m, a.y), vf_where(m, a.z));
 }
+TRC_INLINE vvec3 v3_abs(vvec3 a) { return v3(vf_abs(a.x), vf_abs(a.y), vf_abs(a.z)); }
 TRC_INLINE vvec3 v3_mad(vvec3 a, vfloat s, vvec3 b) {
     return v3(a.x * s + b.x, a.y * s + b.y, a.z * s + b.z);
 }

@@ -28,6 +28,15 @@ static void cross(const double a[3], const double b[3], double out[3]) {
     out[2] = a[0] * b[1] - a[1] * b[0];
 }
 
+const struct trc_affine trc_affine_identity = {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
+
+bool trc_affine_is_identity(const struct trc_affine *a) {
+    bool same = true;
+    for (int i = 0; i < 12; i++)
+        same = same && a->m[i] == trc_affine_identity.m[i]; /* -0, too */
+    return same;
+}
+
 static double dot(const double a[3], const double b[3]) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }

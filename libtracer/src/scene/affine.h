@@ -6,6 +6,11 @@
 
 #include "scene/snapshot.h"
 
+extern const struct trc_affine trc_affine_identity;
+
+/* Whether it leaves every point where it is. */
+bool trc_affine_is_identity(const struct trc_affine *a);
+
 /* Whether the transform can be undone in floats; then *inverse_out is its inverse. Not finite or
  * singular ones cannot, and leave the output alone. */
 bool trc_affine_invert(const struct trc_affine *a, struct trc_affine *inverse_out);

@@ -118,7 +118,6 @@ static uint32_t distinct_keys(const struct trc_scene_instance *source) {
  * place, as places are what queries report, but no ray sees it. */
 static void place(struct trc_instance *instance, const struct trc_scene_instance *source,
                   struct trc_affine *transforms) {
-    static const struct trc_affine identity = {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
     const uint32_t key_count = distinct_keys(source);
     struct trc_affine *inverses = transforms + key_count;
     instance->key_count = key_count;
@@ -130,12 +129,13 @@ static void place(struct trc_instance *instance, const struct trc_scene_instance
         usable = trc_affine_invert(&transforms[key], &inverses[key]);
     }
     if (!usable) {
-        transforms[0] = transforms[1] = identity;
+        transforms[0] = transforms[1] = trc_affine_identity;
         instance->world_to_object = transforms + 1;
         instance->key_count = 1;
         instance->visibility = 0;
     }
     instance->flips = trc_affine_flips(&transforms[0]);
+    instance->is_identity = instance->key_count == 1 && trc_affine_is_identity(&transforms[0]);
 }
 
 /* What sees an instance; an unblocked ray sees catchers alone. */
