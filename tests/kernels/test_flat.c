@@ -1,6 +1,7 @@
 /* Rays that start just before, on and behind axis-aligned triangles, the floors and walls of most
  * scenes, against exact arithmetic: a ray that leaves a wall never meets it again, one that starts
  * before it does, however near. */
+#include "figures.h"
 #include "query_test.h"
 
 #define EXTENT 10.0f /* of the wall: rays pass through it, however steep */
@@ -66,7 +67,8 @@ static double distance_of(const struct ray_set *rays, uint32_t ray, const struct
 /* What is off by more than that is computed in double (TRC_T_IMPRECISE of triangle.h). */
 #define T_PRECISION (1.0 / 512.0)
 
-static void check_wall(const struct wall *wall, uint32_t seed, float tmin) {
+/* Returns how many rays were right. */
+static uint64_t check_wall(const struct wall *wall, uint32_t seed, float tmin) {
     struct query_world world;
     struct ray_set rays;
     struct hit_set hits;
@@ -101,29 +103,32 @@ static void check_wall(const struct wall *wall, uint32_t seed, float tmin) {
     query_scene_destroy(&scene);
     ray_set_free(&rays);
     query_world_free(&world);
+    return count;
 }
 
 /* Heights and travels with few bits: see add_ray. */
-static void walls(float tmin) {
+static void walls(float tmin, const char *what) {
     static const float heights[] = {0.0f, 1.0f, -3.0f, 0.40625f}, travels[] = {0.0f, 2.0f, -0.5f};
     uint32_t seed = 0;
+    uint64_t total = 0;
     for (int axis = 0; axis < 3; axis++)
         for (size_t h = 0; h < sizeof heights / sizeof *heights; h++)
             for (size_t t = 0; t < sizeof travels / sizeof *travels; t++) {
                 const struct wall wall = {axis, heights[h], travels[t]};
-                check_wall(&wall, ++seed, tmin);
+                total += check_wall(&wall, ++seed, tmin);
             }
+    print_right(what, total);
 }
 
 static void rays_ahead(void **state) {
     (void)state;
-    walls(0.0f);
+    walls(0.0f, "27, 28: origins a float to half a unit before, on and behind walls");
 }
 
 /* A ray that starts before its origin meets what is behind it. */
 static void rays_both_ways(void **state) {
     (void)state;
-    walls(-INFINITY);
+    walls(-INFINITY, "rays that begin before their origins there");
 }
 
 int main(void) {

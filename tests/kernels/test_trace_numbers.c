@@ -1,5 +1,6 @@
 /* Ray queries with numbers at the ends of their range: scales, far origins, extreme instances,
  * needles. */
+#include "figures.h"
 #include "trial.h"
 
 static const float unit_lower[3] = {-1, -1, -1}, unit_upper[3] = {1, 1, 1};
@@ -8,6 +9,7 @@ static const float unit_lower[3] = {-1, -1, -1}, unit_upper[3] = {1, 1, 1};
 static void scales(void **state) {
     (void)state;
     static const float radii[] = {1e-38f, 1e-30f, 1e-20f, 1e-10f, 1e10f, 1e18f};
+    uint64_t total = 0;
     for (size_t s = 0; s < sizeof radii / sizeof *radii; s++) {
         struct trial t;
         struct rng rng = rng_seed(s);
@@ -41,10 +43,12 @@ static void scales(void **state) {
                 brute_list_print(&list);
                 fail_msg("radius %g: wrong at ray %u", (double)r, i);
             }
+            total += t.rays.count;
         }
         brute_list_free(&list);
         trial_free(&t);
     }
+    print_right("12, 13: spheres of radius 1e-38 to 1e18", total);
 }
 
 /* Objects of sizes 1e-6 to 1e6 in one scene, each seen from near and from far. */
@@ -78,6 +82,7 @@ static void many_scales_in_one_scene(void **state) {
         brute_list_print(&list);
         fail_msg("wrong at ray %u", i);
     }
+    print_right("14: sizes from 1e-6 to 1e6 in one scene", t.rays.count);
     brute_list_free(&list);
     trial_free(&t);
 }
@@ -108,6 +113,7 @@ static void far_origins_give_numbers(void **state) {
         assert_true(t.hits.u[i] >= 0.0f && t.hits.u[i] <= 1.0f);
         assert_true(t.hits.v[i] >= 0.0f && t.hits.v[i] <= 1.0f);
     }
+    print_right("13: origins up to 1e38 away, all finite", t.rays.count);
     trial_free(&t);
 }
 
@@ -115,6 +121,7 @@ static void far_origins_give_numbers(void **state) {
 static void extreme_instances(void **state) {
     (void)state;
     static const float factors[] = {1e-15f, 1e-12f, 1e-9f, 1e-6f, 1e6f, 1e9f, 1e12f, 1e15f};
+    uint64_t total = 0;
     for (size_t s = 0; s < sizeof factors / sizeof *factors; s++) {
         struct trial t;
         struct rng rng = rng_seed(38);
@@ -140,8 +147,10 @@ static void extreme_instances(void **state) {
         if (misses)
             print_message("scaled by %g: %u misses\n", (double)f, misses);
         assert_int_equal(misses, 0);
+        total += t.rays.count;
         trial_free(&t);
     }
+    print_right("38: instances scaled by 1e-15 to 1e15", total);
 }
 
 /* Needles from just before the ends of a packet's rays to far beyond, where these would be wide

@@ -109,12 +109,25 @@ static void fill_box(struct mesh *mesh) {
     mesh_add_box(mesh, lower, upper);
 }
 
+/* Each face a grid, so that boxes of the tree have no thickness. */
+static void fill_grids(struct mesh *mesh) {
+    for (int axis = 0; axis < 3; axis++)
+        for (int side = 0; side < 2; side++) {
+            float at[3] = {-1, -1, -1}, u[3] = {0, 0, 0}, v[3] = {0, 0, 0};
+            at[axis] = side ? 1.0f : -1.0f;
+            u[(axis + 1) % 3] = 2.0f;
+            v[(axis + 2) % 3] = 2.0f;
+            mesh_add_grid(mesh, at, u, v, 16, 16);
+        }
+}
+
 static void spheres(void **state) {
     (void)state;
     expect_closed_mesh("1, 2: sphere", fill_sphere, origin, 0.5f);
     expect_closed_mesh("1, 2: sphere, its centre", fill_sphere, origin, 0.0f);
     expect_closed_mesh("1, 2: icosphere", fill_icosphere, origin, 0.5f);
     expect_closed_mesh("1, 2: box", fill_box, origin, 0.99f);
+    expect_closed_mesh("10: box of grids", fill_grids, origin, 0.99f);
 }
 
 static void far_spheres(void **state) {

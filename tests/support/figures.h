@@ -22,4 +22,9 @@ static inline void print_misses(const char *what, uint64_t misses, uint64_t coun
     print_figure(what, "%" PRIu64 " misses of %" PRIu64 " rays", misses, count);
 }
 
+/* Of count rays or more, each judged: a test that finds one wrong fails before it comes here. */
+static inline void print_right(const char *what, uint64_t count) {
+    print_figure(what, "0 wrong of %" PRIu64 " rays", count);
+}
+
 #endif

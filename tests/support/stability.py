@@ -39,16 +39,25 @@ def figures(reports):
 
 
 def rows(found):
-    """(what, value, tests) with each thing once.
+    """(what, value, tests) with each thing once, numbered cases first.
 
     >>> rows([("a", "0 misses of 10 rays", "t.sse42"), ("a", "1 misses of 5 rays", "t.avx2"),
     ...       ("b", "2.5 ulp", "u.sse42"), ("b", "2.5 ulp", "u.avx2"), ("b", "3 ulp", "u.scalar")])
     [('a', '1 misses of 15 rays', 't: avx2, sse42'), ('b', '2.5 ulp (avx2, sse42); 3 ulp (scalar)', 'u')]
+    >>> [row[0] for row in rows([("x", "1", "t.a"), ("10: y", "1", "t.a"), ("8, 9: z", "1", "t.a")])]
+    ['8, 9: z', '10: y', 'x']
     """
     by_what = {}
     for what, value, test in found:
         by_what.setdefault(what, []).append((value, test))
-    return [(what, *_joined(entries)) for what, entries in by_what.items()]
+    ordered = sorted(by_what.items(), key=lambda item: _case(item[0]))
+    return [(what, *_joined(entries)) for what, entries in ordered]
+
+
+def _case(what):
+    """The number a name begins with; infinity: none."""
+    number = re.match(r"\d+(?=[,:])", what)
+    return int(number[0]) if number else float("inf")
 
 
 def _joined(entries):

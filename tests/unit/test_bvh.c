@@ -495,10 +495,10 @@ static void ladder(const char *name, uint32_t rung_size, uint32_t foot, float to
 
 static void geometric_series_stays_within_the_stack(void **state) {
     (void)state;
-    ladder("one triangle a rung", 1, 100, 1e15f);
-    ladder("eight triangles a rung", 8, 1000, 1e15f);
-    ladder("100 triangles a rung", 100, 1000, 1e15f);
-    ladder("100 triangles a rung, a million at the foot", 100, 1000000, 1e14f);
+    ladder("18: one triangle a rung", 1, 100, 1e15f);
+    ladder("18: eight triangles a rung", 8, 1000, 1e15f);
+    ladder("18: 100 triangles a rung", 100, 1000, 1e15f);
+    ladder("18: 100 triangles a rung, a million at the foot", 100, 1000000, 1e14f);
 }
 
 /* ---- determinism ---- */
