@@ -190,6 +190,116 @@ static void needles_reach_beyond_packets(void **state) {
     }
 }
 
+/* ---- bit patterns ---- */
+
+/* A float of random bits whose exponent is one of so many from exponent on. */
+static float random_slice(struct rng *rng, int exponent, uint32_t count) {
+    const uint32_t bits = rng_bits(rng);
+    const uint32_t power = (uint32_t)(exponent + 127) + rng_below(rng, count);
+    const uint32_t all = (bits & 0x807fffffu) | power << 23;
+    float value;
+    memcpy(&value, &all, sizeof value);
+    return value;
+}
+
+/* Corners and origins of random bits in a slice of the exponents, some of them denormal, against
+ * the oracle. */
+static void slices_of_bits(void **state) {
+    (void)state;
+    static const int exponents[] = {-127, -100, -60, -20, -4, 0, 20, 50};
+    const uint32_t powers = 8; /* of a slice */
+    struct brute_list list = {0};
+    uint64_t total = 0, hits = 0;
+    for (size_t s = 0; s < sizeof exponents / sizeof *exponents; s++) {
+        struct trial t;
+        struct rng rng = rng_seed(100 + s);
+        trial_init(&t);
+        struct mesh *mesh = query_world_object(&t.world);
+        for (int i = 0; i < 60; i++) {
+            float p[9];
+            for (int k = 0; k < 9; k++)
+                p[k] = random_slice(&rng, exponents[s], powers);
+            add_corners(mesh, p);
+        }
+        for (int i = 0; i < 2000; i++) {
+            const float *p = mesh->positions + 9 * (size_t)rng_below(&rng, mesh->triangle_count);
+            const float u = rng_unit(&rng), v = (1.0f - u) * rng_unit(&rng);
+            float o[3], target[3];
+            for (int k = 0; k < 3; k++) {
+                o[k] = random_slice(&rng, exponents[s], powers);
+                target[k] = p[k] + u * (p[3 + k] - p[k]) + v * (p[6 + k] - p[k]);
+            }
+            ray_set_aim(&t.rays, o, target, 0.0f);
+        }
+        for (int is_final = 0; is_final < 2; is_final++) {
+            run(&t, is_final);
+            for (uint32_t i = 0; i < t.rays.count; i++) {
+                brute_collect(&t.world, &t.rays, i, &list);
+                hits += t.hits.instance[i] != TRC_NO_HIT;
+                if (brute_judge_closest(&list, &t.rays, i, &t.hits) != BRUTE_DIFFERS &&
+                    brute_judge_occluded(&list, &t.rays, i, &t.hits) != BRUTE_DIFFERS)
+                    continue;
+                hit_set_print(&t.hits, &t.rays, i);
+                brute_list_print(&list);
+                fail_msg("exponents from %d: wrong at ray %u", exponents[s], i);
+            }
+            total += t.rays.count;
+        }
+        trial_free(&t);
+    }
+    brute_list_free(&list);
+    print_right("corners and origins of random bits, in slices of 8 exponents", total);
+    assert_true(hits > total / 2);
+}
+
+/* Powers of two, from denormals on, of origins within the range of coordinates. */
+#define ORIGIN_POWERS (127 + 60)
+
+/* Corners, transforms and directions of any bits at all: nothing falls, packets agree, what is hit
+ * has numbers. */
+static void any_bits(void **state) {
+    (void)state;
+    struct rng rng = rng_seed(200);
+    uint64_t total = 0;
+    for (int trial = 0; trial < 40; trial++) {
+        struct trial t;
+        trial_init(&t);
+        struct mesh *mesh = query_world_object(&t.world);
+        for (int i = 0; i < 100; i++) {
+            float p[9];
+            for (int k = 0; k < 9; k++)
+                p[k] = random_slice(&rng, -127, 256);
+            add_corners(mesh, p);
+        }
+        for (int k = 0; k < 12 && trial & 1; k++)
+            t.world.instances[0].transforms[0][k] = random_slice(&rng, -127, 256);
+        for (int i = 0; i < 640; i++) {
+            float o[3], d[3];
+            for (int k = 0; k < 3; k++) {
+                o[k] = random_slice(&rng, -127, ORIGIN_POWERS);
+                d[k] = random_slice(&rng, -127, 256);
+            }
+            ray_set_add(&t.rays, o, d, random_slice(&rng, -127, 256), random_slice(&rng, -127, 256),
+                        rng_unit(&rng));
+        }
+        for (int is_final = 0; is_final < 2; is_final++) {
+            run(&t, is_final);
+            for (uint32_t i = 0; i < t.rays.count; i++) {
+                const float u = t.hits.u[i], v = t.hits.v[i];
+                if (t.hits.instance[i] == TRC_NO_HIT ||
+                    (isfinite(t.hits.distance[i]) && u >= 0.0f && u <= 1.0f && v >= 0.0f &&
+                     v <= 1.0f))
+                    continue;
+                hit_set_print(&t.hits, &t.rays, i);
+                fail_msg("trial %d: wrong at ray %u", trial, i);
+            }
+            total += t.rays.count;
+        }
+        trial_free(&t);
+    }
+    print_right("corners, transforms and rays of any bits: all finite, packets agree", total);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(scales),
@@ -197,6 +307,8 @@ int main(void) {
         cmocka_unit_test(far_origins_give_numbers),
         cmocka_unit_test(extreme_instances),
         cmocka_unit_test(needles_reach_beyond_packets),
+        cmocka_unit_test(slices_of_bits),
+        cmocka_unit_test(any_bits),
     };
     if (!query_test_isa())
         return QUERY_TEST_SKIPPED;

@@ -80,7 +80,8 @@ TRC_INLINE uint32_t slot_instance(const struct walk *w, struct trc_slot slot) {
     return w->instance == TRC_NO_HIT ? slot.instance & TRC_SLOT_INSTANCE_MASK : w->instance;
 }
 
-/* Keeps hits that are nearer than the ray's, or as near with a lower number. */
+/* Keeps hits that are nearer than the ray's, or as near with a lower number. What is infinitely far
+ * is none: distances of extreme directions overflow. */
 TRC_INLINE uint32_t hits_keep(const struct walk *w, int k, int i, vmask hit, vfloat t, vfloat u,
                               vfloat v, struct trc_slot slot) {
     struct trc_packet *p = &w->packets[k];
@@ -95,7 +96,7 @@ TRC_INLINE uint32_t hits_keep(const struct walk *w, int k, int i, vmask hit, vfl
             const int l = i + __builtin_ctz(ties);
             const bool lower = instance < h->instance[l] ||
                                (instance == h->instance[l] && triangle < h->triangle[l]);
-            if (lower && p->t[l] > p->tmin[l])
+            if (lower && p->t[l] > p->tmin[l] && p->t[l] < INFINITY)
                 bits |= ties & -ties;
         }
         keep = vm_from_bits(bits);
@@ -266,7 +267,7 @@ TRC_INLINE bool leaf_single(struct walk *w, uint32_t ref, int k, int ray, bool a
         struct trc_packet_hits *h = &w->hits[k];
         const bool lower = instance < h->instance[ray] ||
                            (instance == h->instance[ray] && triangle < h->triangle[ray]);
-        if (distance < p->t[ray] || (distance == p->t[ray] && lower)) {
+        if (distance < p->t[ray] || (distance == p->t[ray] && lower && distance < INFINITY)) {
             p->t[ray] = distance;
             h->u[ray] = bu[slot];
             h->v[ray] = bv[slot];
