@@ -1,0 +1,100 @@
+/* What tests of whole pictures share: scenes of few objects seen from above, rendered through the
+ * public API. Needs cmocka. */
+#ifndef TRACER_TESTS_PICTURE_TEST_H
+#define TRACER_TESTS_PICTURE_TEST_H
+
+#include "query_test.h"
+
+#include "default_descs.h"
+
+#define PICTURE_TEST_INLINE static inline __attribute__((unused))
+
+#define PI 3.14159265358979
+
+/* Of the default camera, which looks down on the origin: x is right, y is up. */
+#define CAMERA_HEIGHT 6.0f
+
+PICTURE_TEST_INLINE trc_scene scene_create(void) {
+    const trc_scene_desc desc = default_scene_desc();
+    trc_scene scene = 0;
+    assert_ok(trc_scene_create(&desc, &scene));
+    return scene;
+}
+
+/* A material of one node with a colour and a number (diffuse: roughness, emission and background:
+ * strength). */
+PICTURE_TEST_INLINE trc_id add_material(trc_scene scene, uint32_t type, const float color[3],
+                                        float number) {
+    struct default_material m;
+    trc_id id = 0;
+    default_material_init(&m, type);
+    memcpy(m.inputs[0].value, color, sizeof m.inputs[0].value);
+    m.inputs[1].value[0] = number;
+    assert_ok(trc_material_create(scene, &m.desc, &id));
+    return id;
+}
+
+/* One instance of a mesh, where the mesh is. */
+PICTURE_TEST_INLINE void add_mesh(trc_scene scene, const trc_mesh_desc *mesh, trc_id material) {
+    trc_id mesh_id = 0, instance_id = 0;
+    assert_ok(trc_mesh_create(scene, mesh, &mesh_id));
+    trc_instance_desc instance = default_instance_desc(mesh_id);
+    instance.materials = &material;
+    instance.material_count = 1;
+    assert_ok(trc_instance_create(scene, &instance, &instance_id));
+}
+
+/* A quadrangle a b c d, split along a c; counter-clockwise as seen from the front. */
+PICTURE_TEST_INLINE void add_quad(trc_scene scene, const float corners[12], trc_id material) {
+    static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
+    trc_mesh_desc mesh = default_mesh_desc();
+    mesh.vertex_count = 4;
+    mesh.triangle_count = 2;
+    mesh.positions = corners;
+    mesh.position_count = 12;
+    mesh.indices = indices;
+    mesh.index_count = 6;
+    add_mesh(scene, &mesh, material);
+}
+
+/* A square of edge 2 * half around (x, y, z), facing up. */
+PICTURE_TEST_INLINE void add_square(trc_scene scene, float x, float y, float z, float half,
+                                    trc_id material) {
+    const float corners[12] = {x - half, y - half, z, x + half, y - half, z,
+                               x + half, y + half, z, x - half, y + half, z};
+    add_quad(scene, corners, material);
+}
+
+/* A camera whose picture spans left, right, bottom, top at distance 1. */
+PICTURE_TEST_INLINE trc_camera_desc camera_desc(const float window[4]) {
+    trc_camera_desc desc = default_camera_desc();
+    desc.windows = window;
+    desc.focus_distance = CAMERA_HEIGHT;
+    return desc;
+}
+
+/* A square picture seen through narrow pixels, so that each shows one point of the scene. */
+PICTURE_TEST_INLINE trc_render_desc render_desc(uint32_t size, uint32_t samples) {
+    trc_render_desc desc = default_render_desc(size, size, samples);
+    desc.filter = TRC_FILTER_BOX;
+    desc.filter_width = 0.01f;
+    return desc;
+}
+
+/* Renders the committed scene; pixels: RGBA, lowest row first. Every sample must be finite. Returns
+ * what has been done. */
+PICTURE_TEST_INLINE trc_render_progress render(trc_scene scene, const trc_render_desc *desc,
+                                               float *pixels) {
+    trc_render_progress progress = {.struct_size = sizeof progress};
+    trc_render id = 0;
+    assert_ok(trc_render_start(scene, desc, &id));
+    assert_ok(trc_render_wait(id, INFINITY));
+    assert_ok(
+        trc_render_read(id, TRC_PASS_COMBINED, pixels, (uint64_t)4 * desc->width * desc->height));
+    assert_ok(trc_render_poll(id, &progress));
+    assert_ok(trc_render_destroy(id));
+    assert_true(progress.dropped_samples == 0);
+    return progress;
+}
+
+#endif
