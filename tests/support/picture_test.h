@@ -34,6 +34,31 @@ PICTURE_TEST_INLINE trc_id add_material(trc_scene scene, uint32_t type, const fl
     return id;
 }
 
+/* Shows a vector, an output of the node given, as colour: scale * vector + .5. type: EMISSION or
+ * BACKGROUND. */
+PICTURE_TEST_INLINE trc_id add_vector_shader(trc_scene scene, uint32_t type, uint32_t vector_node,
+                                             float scale) {
+    const trc_node_input inputs[] = {{.node = 0, .output = 0},
+                                     {.node = -1, .value = {scale, scale, scale}},
+                                     {.node = -1, .value = {0.5f, 0.5f, 0.5f}},
+                                     {.node = -1},
+                                     {.node = 1, .output = 0},
+                                     {.node = -1, .value = {1.0f}}};
+    const trc_node nodes[] = {
+        {.type = vector_node},
+        {.type = TRC_NODE_VECTOR_MATH, .mode = TRC_VECTOR_MULTIPLY_ADD, .input_count = 4},
+        {.type = type, .first_input = 4, .input_count = 2}};
+    const trc_material_desc desc = {.struct_size = sizeof desc,
+                                    .node_count = 3,
+                                    .nodes = nodes,
+                                    .inputs = inputs,
+                                    .input_count = 6,
+                                    .surface = 2};
+    trc_id id = 0;
+    assert_ok(trc_material_create(scene, &desc, &id));
+    return id;
+}
+
 /* One instance of a mesh, where the mesh is. */
 PICTURE_TEST_INLINE void add_mesh(trc_scene scene, const trc_mesh_desc *mesh, trc_id material) {
     trc_id mesh_id = 0, instance_id = 0;
@@ -71,6 +96,12 @@ PICTURE_TEST_INLINE trc_camera_desc camera_desc(const float window[4]) {
     desc.windows = window;
     desc.focus_distance = CAMERA_HEIGHT;
     return desc;
+}
+
+/* The scene as the camera has it from now on. */
+PICTURE_TEST_INLINE void set_camera(trc_scene scene, const trc_camera_desc *camera) {
+    assert_ok(trc_scene_set_camera(scene, camera));
+    assert_ok(trc_scene_commit(scene));
 }
 
 /* A square picture seen through narrow pixels, so that each shows one point of the scene. */
