@@ -7,8 +7,6 @@
 #include "figures.h"
 #include "picture_test.h"
 
-#include <math.h>
-
 /* Of the light, above the camera, which sees nothing but the floor. */
 #define LIGHT_Z 8.0f
 #define ALBEDO 0.5
