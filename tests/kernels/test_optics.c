@@ -315,10 +315,10 @@ static void furnace_of_balls(void **state) {
     print_figure("35: nested balls of glass, furnace", "off by at most %.1e", worst);
 }
 
-/* Slabs that share a face. A ray meets one of two coincident surfaces and leaves it beyond both:
- * the other one is not there for it, so that out of the upper slab it comes into the lower one as
- * if that were air. Light goes through them as through three planes as long as it is steep, and not
- * at all beyond the critical angle, of 42 degrees in front of them; none of it is lost. */
+/* Slabs that share a face. A ray meets one of two coincident surfaces, by rounding, and leaves it
+ * beyond both: the other one is not there for it. Mostly it comes out of the upper slab into the
+ * lower one as if that were air. Light goes through them as through three planes while it is steep,
+ * and hardly beyond the critical angle, of 42 degrees in front of them; none of it is lost. */
 static void coincident_faces(void **state) {
     (void)state;
     static const struct stack touching = {
