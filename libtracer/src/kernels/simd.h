@@ -398,6 +398,21 @@ TRC_INLINE vint vi_gather(const int32_t *base, vint index, vmask m) {
 TRC_INLINE vuint vu_gather(const uint32_t *base, vint index, vmask m) {
     return (vuint)vi_gather((const int32_t *)base, index, m);
 }
+/* base[index] in the low half and base[index + 1] in the high half, of every lane. */
+TRC_INLINE vuint vu_gather_pair(const uint16_t *base, vint index) {
+#if TRC_WIDTH == 16
+    return (vuint)_mm512_i32gather_epi32((__m512i)index, base, 2);
+#elif TRC_WIDTH == 8 && defined(__AVX2__)
+    return (vuint)_mm256_i32gather_epi32((const int *)base, (__m256i)index, 2);
+#elif TRC_WIDTH == 1
+    return base[index] | (uint32_t)base[index + 1] << 16;
+#else
+    vuint r = vu_set(0);
+    for (int i = 0; i < TRC_WIDTH; i++)
+        r[i] = base[index[i]] | (uint32_t)base[index[i] + 1] << 16;
+    return r;
+#endif
+}
 
 /* ---- lanes ---- */
 
