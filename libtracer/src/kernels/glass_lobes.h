@@ -113,11 +113,13 @@ static void add_glass(struct setup *c, const struct trc_leaf *leaf, vfloat weigh
         add_multi_glass(c, v3_splat(weight), color, color, n, alpha, eta);
         return;
     }
-    const vfloat f = trc_fresnel_dielectric(v3_dot(n, c->s->wo), eta);
+    /* The part of a lobe too light to be kept goes to the other. Cycles refracts at least 1e-4, for
+     * the sake of its caustics, and so gives that much more than it gets. */
+    const vfloat least = vf_set(WEIGHT_CUTOFF);
+    vfloat f = trc_fresnel_dielectric(v3_dot(n, c->s->wo), eta);
+    f = vf_where(vf_ge(f, least), vf_select(vf_lt(vf_one() - f, least), vf_one(), f));
     add_dielectric(c, TRC_LOBE_REFLECT, v3_scale(tint, f), n, alpha, eta, leaf->mode);
-    /* Cycles never lets the refracted part vanish altogether. */
-    const vfloat through = vf_max(vf_one() - f, vf_set(1e-4f));
-    add_dielectric(c, TRC_LOBE_REFRACT, v3_scale(tint, through), n, alpha, eta, leaf->mode);
+    add_dielectric(c, TRC_LOBE_REFRACT, v3_scale(tint, vf_one() - f), n, alpha, eta, leaf->mode);
 }
 
 static void add_refraction(struct setup *c, const struct trc_leaf *leaf, vfloat weight) {
