@@ -209,7 +209,9 @@ static void finish_microfacets(const struct setup *c, struct trc_lobe *lobe, boo
     if (lobe->kind == TRC_LOBE_REFRACT)
         lobe->ideal = vm_or(lobe->ideal, vf_lt(vf_abs(lobe->ior - vf_one()), vf_set(1e-4f)));
     const vfloat cos_o = vf_max(v3_dot(lobe->n, c->s->wo), vf_set(1e-6f));
-    lobe->cos_o = v3_dot(lobe->n, c->s->wo);
+    /* Densities and values have to agree about it. */
+    lobe->cos_o =
+        vf_select(vf_gt(v3_dot(lobe->n, c->s->wo), vf_zero()), cos_o, v3_dot(lobe->n, c->s->wo));
     vfloat tan2 = ax * ax * (vf_one() - cos_o * cos_o) / (cos_o * cos_o);
     if (lobe->anisotropic) {
         const vfloat x = v3_dot(lobe->tangent, c->s->wo) * ax;

@@ -233,6 +233,7 @@ static vvec3 direction(double cos_theta, double phi) {
 #define COLUMNS 24
 #define FINE 32
 #define SAMPLES (1 << 19)
+#define EXTREME_SAMPLES (1 << 16)
 
 struct histogram {
     double count[ROWS][COLUMNS], lost;
@@ -250,11 +251,11 @@ static void cell_of(float x, float y, float z, int *row, int *column) {
     *column = *column >= COLUMNS ? COLUMNS - 1 : *column;
 }
 
-static void draw_samples(const struct trc_lobes *l, const struct trc_surface *s,
+static void draw_samples(const struct trc_lobes *l, const struct trc_surface *s, int count,
                          struct histogram *h) {
     struct rng random = rng_seed(1);
     memset(h, 0, sizeof *h);
-    for (int i = 0; i < SAMPLES; i += TRC_WIDTH) {
+    for (int i = 0; i < count; i += TRC_WIDTH) {
         struct trc_bsdf_sample b;
         const vfloat u0 = test_wide_uniform(&random), u1 = test_wide_uniform(&random);
         TRC_KERNEL(trc_bsdf_sample)(l, s, u0, u1, test_wide_uniform(&random), &b);
@@ -316,7 +317,7 @@ static struct result check_sampling(struct model *m, double cos_o, double phi_o,
     struct trc_lobes l;
     prepare(m, direction(cos_o, phi_o), &s, &l);
     struct histogram h;
-    draw_samples(&l, &s, &h);
+    draw_samples(&l, &s, SAMPLES, &h);
     struct result r = {0};
     double pooled_count = 0, pooled_expected = 0;
     for (int i = 0; i < ROWS; i++)
@@ -453,7 +454,7 @@ static double albedo(struct model *m, double cos_o) {
     struct trc_lobes l;
     prepare(m, direction(cos_o, 0.3), &s, &l);
     struct histogram h;
-    draw_samples(&l, &s, &h);
+    draw_samples(&l, &s, SAMPLES, &h);
     return h.weight / SAMPLES;
 }
 
@@ -556,12 +557,12 @@ static void add_furnace(struct model *m, double cos_o, double roughness, bool gr
 static void furnace_is_white(void **state) {
     (void)state;
     const uint32_t multi = TRC_DISTRIBUTION_MULTI_GGX, later = multi | TRC_DISTRIBUTION_CORRELATED;
-    const double cosines[] = {1.0, 0.85, 0.65, 0.45, 0.25, 0.1, 0.05};
-    const float roughnesses[] = {0.1f, 0.2f, 0.35f, 0.55f, 0.75f, 0.9f, 1.0f};
+    const double cosines[] = {1.0, 0.8, 0.5, 0.25, 0.1, 0.05};
+    const float roughnesses[] = {0.1f, 0.2f, 0.35f, 0.6f, 0.85f, 1.0f};
     const float iors[] = {1.1f, 1.45f, 1.5f, 2.4f};
     double of_glossy = 0.0, of_metal = 0.0, of_glass = 0.0, half_width = 0.0;
-    for (int k = 0; k < 7; k++)
-        for (int j = 0; j < 7; j++) {
+    for (int k = 0; k < 6; k++)
+        for (int j = 0; j < 6; j++) {
             const float r = roughnesses[j];
             const double c = cosines[k];
             struct model reflecting[] = {glossy(multi, r, 0.0f), glossy(later, r, 0.0f)};
@@ -618,14 +619,15 @@ static void diffuse_albedos(void **state) {
     set(&all, 8, 0.0f);
     set(&all, 10, 0.5f);
     set3(&all, 0, 1, 1, 1);
+    double worst = 0.0;
     for (double c = 0.1; c <= 1.0; c += 0.3) {
-        assert_true(fabs(diffuse_albedo(&lambert, c) - 1.0) < 2e-3);
+        worst = fmax(worst, fabs(diffuse_albedo(&lambert, c) - 1.0));
         assert_true(diffuse_albedo(&rough, c) < 1.01);
         printf("cos %.1f: Oren-Nayar %.3f, Principled diffuse %.3f\n", c, diffuse_albedo(&rough, c),
                diffuse_albedo(&all, c));
         struct model whole = rough;
         whole.material.leaves[0].mode = 1;
-        assert_true(fabs(diffuse_albedo(&whole, c) - 1.0) < 3e-3);
+        worst = fmax(worst, fabs(diffuse_albedo(&whole, c) - 1.0));
         /* A linear map of a cosine lobe keeps its integral. */
         struct model fibres = diffuse(0.4f);
         fibres.material.leaves[0].type = TRC_NODE_SHEEN;
@@ -637,39 +639,74 @@ static void diffuse_albedos(void **state) {
         assert_true(kept > 1e-3 && kept < 1.0);
         assert_true(fabs(diffuse_albedo(&fibres, c) / kept - 1.0) < 0.01);
     }
+    print_figure("39: white furnace, diffuse", "off by at most %.4f", worst);
+    assert_true(worst <= 0.002);
 }
 
 /* ---- ideal lobes ---- */
 
+/* What ideal glass reflects and refracts of light from a direction. */
+static double ideal_sum(float ior, bool back, double c) {
+    struct model m = glass(TRC_DISTRIBUTION_SHARP, 0.0f, ior, back);
+    struct trc_surface s;
+    struct trc_lobes l;
+    prepare(&m, direction(c, 1.0), &s, &l);
+    double sum = 0.0;
+    for (int k = 0; k < l.count; k++) {
+        struct trc_bsdf_sample b;
+        TRC_KERNEL(trc_bsdf_ideal)(&l, k, &s, &b);
+        if (!vm_any(b.valid))
+            continue;
+        sum += (double)vf_get(b.weight.x, 0);
+        /* Snell: the tangential parts scale by the index. */
+        const double eta = back ? 1.0 / (double)ior : (double)ior;
+        const double x = (double)vf_get(b.wi.x, 0), y = (double)vf_get(b.wi.y, 0);
+        const double scale = vm_any(b.transmitted) ? 1.0 / eta : 1.0;
+        const double sine = sqrt(1.0 - c * c) * scale;
+        assert_true(fabs(hypot(x, y) - sine) < 2e-6);
+        /* 1 - cos^2 times the square of a large index has lost digits. */
+        const double allowed = ior > 100.0f ? 1e-5 : 1e-6;
+        assert_true(fabs((double)vf_get(v3_length(b.wi), 0) - 1.0) < allowed);
+    }
+    return sum;
+}
+
 static void ideal_glass_splits_energy(void **state) {
     (void)state;
     const float iors[] = {1.001f, 1.2f, 1.5f, 2.5f, 4.0f};
+    double worst = 0.0;
     for (int i = 0; i < 5; i++)
         for (int back = 0; back < 2; back++)
-            for (double c = 1e-3; c <= 1.0; c += 0.0333) {
-                struct model m = glass(TRC_DISTRIBUTION_SHARP, 0.0f, iors[i], back);
-                struct trc_surface s;
-                struct trc_lobes l;
-                prepare(&m, direction(c, 1.0), &s, &l);
-                double sum = 0.0;
-                for (int k = 0; k < l.count; k++) {
-                    struct trc_bsdf_sample b;
-                    TRC_KERNEL(trc_bsdf_ideal)(&l, k, &s, &b);
-                    if (!vm_any(b.valid))
-                        continue;
-                    sum += (double)vf_get(b.weight.x, 0);
-                    /* Snell: the tangential parts scale by the index. */
-                    const double eta = back ? 1.0 / (double)iors[i] : (double)iors[i];
-                    const double x = (double)vf_get(b.wi.x, 0), y = (double)vf_get(b.wi.y, 0);
-                    const double scale = vm_any(b.transmitted) ? 1.0 / eta : 1.0;
-                    const double sine = sqrt(1.0 - c * c) * scale;
-                    assert_true(fabs(hypot(x, y) - sine) < 2e-6);
-                    assert_true(fabs((double)vf_get(v3_length(b.wi), 0) - 1.0) < 1e-6);
-                }
-                /* Cycles never drops refraction altogether: 1e-4 at total reflection, which the ray
-                 * then does not take. */
-                assert_true(fabs(sum - 1.0) < 1e-5);
+            for (double c = 1e-3; c <= 1.0; c += 0.0333)
+                worst = fmax(worst, fabs(ideal_sum(iors[i], back, c) - 1.0));
+    print_figure("39: white furnace, ideal glass", "off by at most %.1e", worst);
+    assert_true(worst < 1e-6);
+}
+
+/* On both sides, at the critical angle and one ulp of its cosine beside it. */
+static void glass_at_the_critical_angle(void **state) {
+    (void)state;
+    const float iors[] = {1.0f, 1.0000001f, 1.1f, 1.45f, 1.5f, 2.4f, 1e3f, 1e6f};
+    double worst = 0.0;
+    for (size_t i = 0; i < sizeof iors / sizeof iors[0]; i++) {
+        const double inverse = 1.0 / (double)iors[i];
+        const float critical = (float)sqrt((1.0 - inverse) * (1.0 + inverse));
+        const float cosines[] = {nextafterf(critical, 0.0f), critical, nextafterf(critical, 2.0f)};
+        for (int k = 0; k < 3; k++)
+            for (int back = 0; back < 2; back++) {
+                if (cosines[k] <= 0.0f || cosines[k] > 1.0f)
+                    continue;
+                const double sum = ideal_sum(iors[i], back, (double)cosines[k]);
+                if (!(fabs(sum - 1.0) <= 1e-6))
+                    printf("ior %.7g, back %d, cos %.9g: %.8f\n", (double)iors[i], back,
+                           (double)cosines[k], sum);
+                assert_true(isfinite(sum));
+                worst = fmax(worst, fabs(sum - 1.0));
             }
+    }
+    print_figure("33: refraction at the critical angle +-1 ulp", "energy off by at most %.1e",
+                 worst);
+    assert_true(worst <= 1e-6);
 }
 
 /* Paths within glass meet dozens of surfaces: no sample may gain much at one, also where a part of
@@ -707,13 +744,16 @@ static void glass_weights_are_steady(void **state) {
 
 static void rough_goes_over_into_ideal(void **state) {
     (void)state;
+    double worst = 0.0;
     for (int k = 0; k < 4; k++) {
         const float roughnesses[] = {0.0f, 1e-4f, 0.02f, 0.05f};
         struct model m = glossy(TRC_DISTRIBUTION_GGX, roughnesses[k], 0.0f);
         const double a = albedo(&m, 0.6);
         printf("roughness %g: %.5f\n", (double)roughnesses[k], a);
-        assert_true(fabs(a - 1.0) < 1e-3);
+        worst = fmax(worst, fabs(a - 1.0));
     }
+    print_figure("32: roughness to 0", "energy off the mirror's by at most %.5f", worst);
+    assert_true(worst < 1e-3);
 }
 
 /* ---- reciprocity and values ---- */
@@ -792,6 +832,7 @@ static void extremes_stay_finite(void **state) {
     (void)state;
     const double cosines[] = {1.0, 1e-2, 1e-4, 1e-7};
     const float roughnesses[] = {0.0f, 1e-7f, 1e-4f, 0.018f, 1.0f};
+    double most = 0.0;
     for (int k = 0; k < 4; k++)
         for (int j = 0; j < 5; j++) {
             const float r = roughnesses[j];
@@ -809,7 +850,8 @@ static void extremes_stay_finite(void **state) {
                 struct trc_lobes l;
                 struct histogram h;
                 prepare(&models[i], direction(cosines[k], 2.0), &s, &l);
-                draw_samples(&l, &s, &h); /* asserts */
+                draw_samples(&l, &s, EXTREME_SAMPLES, &h); /* asserts */
+                most = fmax(most, h.weight / EXTREME_SAMPLES);
                 for (int n = 0; n < 64; n++) {
                     struct trc_bsdf_value v;
                     TRC_KERNEL(trc_bsdf_eval)
@@ -819,10 +861,15 @@ static void extremes_stay_finite(void **state) {
                 }
             }
         }
+    print_figure("31: lobes at roughness 0 to 1, cos to 1e-7",
+                 "chi-square passes %d of %d, energy at most %.3f", chi_passes, chi_tests, most);
+    /* Of white lobes; the most is that of an index beyond the tables'. */
+    assert_true(most < 1.1);
 }
 
 static void nothing_shines_through(void **state) {
     (void)state;
+    int count = 0, below = 0;
     struct model models[] = {diffuse(0.0f), glossy(TRC_DISTRIBUTION_GGX, 0.6f, 0.0f),
                              principled("")};
     for (size_t i = 0; i < 3; i++)
@@ -838,13 +885,17 @@ static void nothing_shines_through(void **state) {
             struct trc_bsdf_value v;
             TRC_KERNEL(trc_bsdf_eval)
             (&l, &s, direction(-0.05 - 0.009 * n, 0.06 * n), vm_all_set(), &v);
-            assert_true(vf_get(v3_max(v.diffuse) + v3_max(v.glossy), 0) == 0.0f);
+            count++;
+            below += vf_get(v3_max(v.diffuse) + v3_max(v.glossy), 0) != 0.0f;
             struct trc_bsdf_sample b;
             TRC_KERNEL(trc_bsdf_sample)
             (&l, &s, vf_set(0.5f), vf_set(0.01f * (float)n), vf_set(0.9f), &b);
-            if (vm_any(b.valid))
-                assert_true(vf_get(b.wi.z, 0) > 0.0f);
+            count++;
+            below += vm_any(b.valid) && vf_get(b.wi.z, 0) <= 0.0f;
         }
+    print_figure("37: shading normal against geometric normal",
+                 "%d of %d samples and evaluations below the surface", below, count);
+    assert_int_equal(below, 0);
 }
 
 /* Without lobes that end there is nothing to make up for; with them the factor is Cycles' share. */
@@ -889,12 +940,19 @@ int main(void) {
     if (!test_cpu_can())
         return 77;
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(sampling_matches_density),   cmocka_unit_test(weights_match_values),
-        cmocka_unit_test(furnace_is_white),           cmocka_unit_test(diffuse_albedos),
-        cmocka_unit_test(ideal_glass_splits_energy),  cmocka_unit_test(glass_weights_are_steady),
-        cmocka_unit_test(rough_goes_over_into_ideal), cmocka_unit_test(lobes_are_reciprocal),
-        cmocka_unit_test(values_match_formulas),      cmocka_unit_test(extremes_stay_finite),
-        cmocka_unit_test(nothing_shines_through),     cmocka_unit_test(factor_beyond),
+        cmocka_unit_test(sampling_matches_density),
+        cmocka_unit_test(weights_match_values),
+        cmocka_unit_test(furnace_is_white),
+        cmocka_unit_test(diffuse_albedos),
+        cmocka_unit_test(ideal_glass_splits_energy),
+        cmocka_unit_test(glass_at_the_critical_angle),
+        cmocka_unit_test(glass_weights_are_steady),
+        cmocka_unit_test(rough_goes_over_into_ideal),
+        cmocka_unit_test(lobes_are_reciprocal),
+        cmocka_unit_test(values_match_formulas),
+        cmocka_unit_test(extremes_stay_finite),
+        cmocka_unit_test(nothing_shines_through),
+        cmocka_unit_test(factor_beyond),
         cmocka_unit_test(light_weights_drop_out),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
