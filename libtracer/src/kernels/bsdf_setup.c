@@ -10,6 +10,8 @@
 
 /* Lobes whose mean weight is below it are dropped, lane by lane (Cycles' closure cut-off). */
 #define WEIGHT_CUTOFF 1e-5f
+/* Indices that close to 1 do not refract. */
+#define NO_REFRACTION 1e-4f
 /* First hit: a lobe gets at least this share of the samples (Cycles 3.4's defensive sampling). */
 #define DEFENSIVE_SHARE 0.125f
 
@@ -207,7 +209,8 @@ static void finish_microfacets(const struct setup *c, struct trc_lobe *lobe, boo
                       ? vf_le(vf_max(ax, ay), vf_set(1e-4f))
                       : vf_le(ax * ay, vf_set(TRC_SINGULAR_ALPHA2));
     if (lobe->kind == TRC_LOBE_REFRACT)
-        lobe->ideal = vm_or(lobe->ideal, vf_lt(vf_abs(lobe->ior - vf_one()), vf_set(1e-4f)));
+        lobe->ideal =
+            vm_or(lobe->ideal, vf_lt(vf_abs(lobe->ior - vf_one()), vf_set(NO_REFRACTION)));
     const vfloat cos_o = vf_max(v3_dot(lobe->n, c->s->wo), vf_set(1e-6f));
     /* Densities and values have to agree about it. */
     lobe->cos_o =

@@ -42,13 +42,20 @@ static void share_chances(struct trc_lobe *reflect, struct trc_lobe *refract, vf
     reflect->pair_tint = refract->pair_tint = vf_divide(refracted, reflected);
 }
 
+/* What single scattering keeps; all where finish_microfacets makes refraction ideal, for the index
+ * is that of what is around. */
+static vfloat kept_by_glass(vfloat albedo, vfloat eta) {
+    const vmask is_nothing = vf_lt(vf_abs(eta - vf_one()), vf_set(NO_REFRACTION));
+    return vf_select(is_nothing, vf_one(), albedo);
+}
+
 /* Multiple-scattering glass: both lobes with the factor of the micro-normal, scaled so that they
  * keep all energy together. reflected, refracted: colours of the lobes. */
 static void add_multi_glass(struct setup *c, vvec3 weight, vvec3 reflected, vvec3 refracted,
                             vvec3 n, vfloat alpha, vfloat eta) {
     /* As rough as the lobes will be: a filtered one keeps its energy too. */
     const vfloat rough = vf_max(vf_clamp(alpha, 1e-4f, 1.0f), c->filter_alpha);
-    const vfloat kept = trc_glass_albedo(v3_dot(n, c->s->wo), rough, eta);
+    const vfloat kept = kept_by_glass(trc_glass_albedo(v3_dot(n, c->s->wo), rough, eta), eta);
     /* What does not get away is coloured again at every further bounce: a geometric series. */
     const vfloat share = trc_glass_reflected_share(v3_dot(n, c->s->wo), rough, eta);
     const vvec3 colors = v3_lerp(refracted, reflected, vf_clamp(share, 0.05f, 0.95f));
@@ -84,7 +91,8 @@ static void add_correlated_glass(struct setup *c, vvec3 reflected, vvec3 refract
     const vfloat cos_o = v3_dot(n, c->s->wo);
     vfloat kept = vf_one();
     if (distribution_of(mode) == TRC_LOBE_MULTI_GGX) {
-        kept = vf_max(trc_correlated_glass_albedo(cos_o, alpha, eta), vf_set(0.1f));
+        kept = kept_by_glass(trc_correlated_glass_albedo(cos_o, alpha, eta), eta);
+        kept = vf_max(kept, vf_set(0.1f));
         reflected = v3_scale(reflected, vf_rcp(kept));
         refracted = v3_scale(refracted, vf_rcp(kept));
     }
