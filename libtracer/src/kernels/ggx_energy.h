@@ -61,6 +61,12 @@ TRC_INLINE vfloat trc_ggx_mean_albedo(vfloat alpha) {
     return trc_grid_row(trc_ggx_energy_mean, row, y);
 }
 
+/* What an albedo of glass rises by at most from an index of 3 to an infinite one; by the one of 7
+ * it has. */
+#define TRC_GLASS_ENERGY_RISE 0.06f
+/* A roughness of 0.1. */
+#define TRC_GLASS_ROUGH_ALPHA 0.01f
+
 /* Of one of the tables of glass. */
 TRC_INLINE vfloat trc_glass_energy_lookup(const uint16_t *table, vfloat cos_theta, vfloat alpha,
                                           vfloat ior) {
@@ -93,7 +99,13 @@ TRC_INLINE vfloat trc_glass_energy_lookup(const uint16_t *table, vfloat cos_thet
     const vfloat e0 = d1 - d0, e1 = d2 - d1;
     const vfloat parts =
         value[0] + z * (d0 + z1 * vf_set(0.5f) * (e0 + z2 * vf_set(1.0f / 3.0f) * (e1 - e0)));
-    return vf_min(parts * vf_set(1.0f / 65535.0f), vf_one());
+    const vfloat further = vf_clamp(vf_abs(depth) - vf_set(TRC_GLASS_ENERGY_REACH), 0.0f, 0.25f);
+    const vfloat rise = vf_one() + further * vf_set(4.0f * TRC_GLASS_ENERGY_RISE);
+    const vfloat energy = vf_min(parts * rise * vf_set(1.0f / 65535.0f), vf_one());
+    /* Rays from inside that graze smooth glass: their columns miss the valley, which is below a cos
+     * of 0.05 by then. To put less back than what is missing is safe. */
+    const vfloat rough = vf_saturate(alpha * vf_set(1.0f / TRC_GLASS_ROUGH_ALPHA));
+    return vf_select(inside, vf_one() - (vf_one() - energy) * rough, energy);
 }
 TRC_INLINE vfloat trc_glass_albedo(vfloat cos_theta, vfloat alpha, vfloat ior) {
     return trc_glass_energy_lookup(trc_glass_energy, cos_theta, alpha, ior);
