@@ -448,8 +448,8 @@ static void cage(void **state) {
 }
 
 /* Where faces are not along the axes, what hits one of them nearer to an edge than the rounding
- * error of the point may be beyond the other face there, and the ray that leaves it is outside: less
- * than one of a million bounces. */
+ * error of the point may be beyond the other face there, and the ray that leaves it is outside:
+ * less than one of a million bounces. */
 static void turned_cage(void **state) {
     (void)state;
     static float pixels[4 * CAGE_PX * CAGE_PX];
