@@ -1,7 +1,7 @@
 /* Energy that single scattering on a GGX surface keeps, for the two models that put the rest back.
  *
  * Tables are integrals of the models in microfacet.h (tests/support/energy_tables.py);
- * tests/kernels/wide/test_bsdf.c checks them through the white furnace. Rows go by sqrt(alpha).
+ * tests/kernels/wide/test_furnace.c checks them. Rows go by sqrt(alpha).
  * Columns of reflection, and of glass from outside, go by sqrt(cos / (cos + sqrt(alpha) sin)) of
  * theta_o: what is masked depends on alpha tan(theta_o), and this follows it half way, so that the
  * valley at grazing angles runs along a column. From inside, where the critical angle is another

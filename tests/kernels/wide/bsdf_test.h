@@ -1,0 +1,313 @@
+/* What tests of lobes share: materials of one leaf, a point that they shade, samples counted and
+ * densities integrated by cells of directions. Needs cmocka. */
+#ifndef TRACER_TESTS_BSDF_TEST_H
+#define TRACER_TESTS_BSDF_TEST_H
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "kernels/bsdf.h"
+#include "kernels/wide_math.h"
+#include "shading/build.h"
+#include "wide_test.h"
+
+#define OPERANDS 40
+
+/* ---- materials of one leaf ---- */
+
+struct model {
+    const char *name;
+    struct trc_material material;
+    struct trc_operand operands[OPERANDS];
+    bool back; /* seen from the back */
+};
+
+static inline struct trc_operand constant(float value) { return (struct trc_operand){-1, value}; }
+
+static inline void begin(struct model *m, const char *name, uint32_t type, uint32_t mode,
+                         uint32_t count) {
+    memset(m, 0, sizeof *m);
+    m->name = name;
+    m->material.leaf_count = 1;
+    m->material.leaves[0] = (struct trc_leaf){type, mode, {-1, 1.0f}, 0, count};
+    for (uint32_t i = 0; i < OPERANDS; i++)
+        m->operands[i] = constant(0.0f);
+}
+static inline void set(struct model *m, uint32_t at, float a) { m->operands[at] = constant(a); }
+static inline void set3(struct model *m, uint32_t at, float a, float b, float c) {
+    set(m, at, a);
+    set(m, at + 1, b);
+    set(m, at + 2, c);
+}
+static inline void unlink_vector(struct model *m, uint32_t at) {
+    for (uint32_t i = 0; i < 3; i++)
+        m->operands[at + i] = (struct trc_operand){-2, 0.0f};
+}
+/* The material points into the model: after the model has its final place. */
+static const struct trc_material *material_of(struct model *m) {
+    m->material.operands = m->operands;
+    m->material.operand_count = OPERANDS;
+    return &m->material;
+}
+
+static inline struct model diffuse(float roughness) {
+    struct model m;
+    begin(&m, roughness > 0 ? "Oren-Nayar" : "Lambert", TRC_NODE_DIFFUSE, 0, 7);
+    set3(&m, 0, 1, 1, 1);
+    set(&m, 3, roughness);
+    unlink_vector(&m, 4);
+    return m;
+}
+static inline struct model translucent(void) {
+    struct model m;
+    begin(&m, "translucent", TRC_NODE_TRANSLUCENT, 0, 6);
+    set3(&m, 0, 1, 1, 1);
+    unlink_vector(&m, 3);
+    return m;
+}
+static inline struct model glossy(uint32_t mode, float roughness, float anisotropy) {
+    struct model m;
+    begin(&m, "glossy", TRC_NODE_GLOSSY, mode, 12);
+    set3(&m, 0, 1, 1, 1);
+    set(&m, 3, roughness);
+    set(&m, 4, anisotropy);
+    set(&m, 5, 0.1f);
+    unlink_vector(&m, 6);
+    set3(&m, 9, 1, 0, 0);
+    return m;
+}
+static inline struct model glass(uint32_t mode, float roughness, float ior, bool back) {
+    struct model m;
+    begin(&m, "glass", TRC_NODE_GLASS, mode, 8);
+    set3(&m, 0, 1, 1, 1);
+    set(&m, 3, roughness);
+    set(&m, 4, ior);
+    unlink_vector(&m, 5);
+    m.back = back;
+    return m;
+}
+static inline struct model refraction(uint32_t mode, float roughness, float ior) {
+    struct model m = glass(mode, roughness, ior, false);
+    m.material.leaves[0].type = TRC_NODE_REFRACTION;
+    m.name = "refraction";
+    return m;
+}
+/* Defaults of the node. */
+static inline struct model principled(const char *name) {
+    struct model m;
+    begin(&m, name, TRC_NODE_PRINCIPLED, TRC_DISTRIBUTION_GGX, 34);
+    set3(&m, 0, 0.8f, 0.8f, 0.8f);
+    set(&m, 8, 0.5f);
+    set(&m, 10, 0.5f);
+    set(&m, 14, 0.5f);
+    set(&m, 16, 0.03f);
+    set(&m, 17, 1.45f);
+    set(&m, 23, 1.0f);
+    set(&m, 24, 1.0f);
+    unlink_vector(&m, 25);
+    unlink_vector(&m, 28);
+    set3(&m, 31, 1, 0, 0);
+    return m;
+}
+static inline struct model principled_metal(uint32_t mode, float roughness) {
+    struct model m = principled("Principled metal");
+    m.material.leaves[0].mode = mode;
+    set3(&m, 0, 1, 1, 1);
+    set(&m, 7, 1.0f);
+    set(&m, 10, roughness);
+    set(&m, 11, 0.6f);
+    return m;
+}
+static inline struct model principled_glass(uint32_t mode, float roughness, bool back) {
+    struct model m = principled("Principled glass");
+    m.material.leaves[0].mode = mode;
+    set3(&m, 0, 1, 1, 1);
+    set(&m, 10, roughness);
+    set(&m, 18, 1.0f);
+    set(&m, 19, 0.2f);
+    m.back = back;
+    return m;
+}
+static inline struct model principled_all(void) {
+    struct model m = principled("Principled, everything");
+    set3(&m, 0, 0.8f, 0.5f, 0.3f);
+    set(&m, 3, 0.2f);
+    set3(&m, 4, 0.9f, 0.3f, 0.2f);
+    set(&m, 7, 0.3f);
+    set(&m, 9, 0.4f);
+    set(&m, 11, 0.5f);
+    set(&m, 13, 0.7f);
+    set(&m, 15, 0.8f);
+    set(&m, 16, 0.3f);
+    set(&m, 18, 0.4f);
+    return m;
+}
+/* Principled of Blender 4 with every layer, or white metal, or white glass. */
+static inline struct model layered(const char *name, uint32_t mode, float roughness) {
+    struct model m;
+    begin(&m, name, TRC_NODE_LAYERED_PRINCIPLED, mode, 39);
+    set3(&m, 0, 1, 1, 1);
+    set(&m, TRC_LAYERED_ROUGHNESS, roughness);
+    set(&m, TRC_LAYERED_IOR, 1.5f);
+    set(&m, TRC_LAYERED_ALPHA, 1.0f);
+    unlink_vector(&m, TRC_LAYERED_NORMAL);
+    set(&m, TRC_LAYERED_SPECULAR_LEVEL, 0.5f);
+    set3(&m, TRC_LAYERED_SPECULAR_TINT, 1, 1, 1);
+    set3(&m, TRC_LAYERED_TANGENT, 1, 0, 0);
+    set(&m, TRC_LAYERED_COAT_ROUGHNESS, 0.3f);
+    set(&m, TRC_LAYERED_COAT_IOR, 1.5f);
+    set3(&m, TRC_LAYERED_COAT_TINT, 1, 1, 1);
+    unlink_vector(&m, TRC_LAYERED_COAT_NORMAL);
+    set(&m, TRC_LAYERED_SHEEN_ROUGHNESS, 0.5f);
+    set3(&m, TRC_LAYERED_SHEEN_TINT, 1, 1, 1);
+    return m;
+}
+static inline struct model layered_metal(uint32_t mode, float roughness) {
+    struct model m = layered("layered metal", mode, roughness);
+    set(&m, TRC_LAYERED_METALLIC, 1.0f);
+    return m;
+}
+static inline struct model layered_glass(uint32_t mode, float roughness, bool back) {
+    struct model m = layered("layered glass", mode, roughness);
+    set(&m, TRC_LAYERED_TRANSMISSION, 1.0f);
+    m.back = back;
+    return m;
+}
+static inline struct model layered_all(void) {
+    struct model m = layered("all layers", TRC_DISTRIBUTION_MULTI_GGX, 0.6f);
+    set(&m, TRC_LAYERED_METALLIC, 0.3f);
+    set(&m, TRC_LAYERED_TRANSMISSION, 0.4f);
+    set(&m, TRC_LAYERED_COAT, 0.7f);
+    set(&m, TRC_LAYERED_SHEEN, 0.8f);
+    set(&m, TRC_LAYERED_DIFFUSE_ROUGHNESS, 0.5f);
+    set(&m, TRC_LAYERED_ANISOTROPY, 0.4f);
+    set3(&m, TRC_LAYERED_COAT_TINT, 0.9f, 0.5f, 0.7f);
+    return m;
+}
+
+static inline struct model toon(uint32_t mode, float size, float smooth) {
+    struct model m;
+    begin(&m, mode ? "glossy toon" : "toon", TRC_NODE_TOON, mode, 8);
+    set3(&m, 0, 1, 1, 1);
+    set(&m, 3, size);
+    set(&m, 4, smooth);
+    unlink_vector(&m, 5);
+    return m;
+}
+static inline struct model clearcoat(float roughness) {
+    struct model m = principled("clearcoat");
+    set3(&m, 0, 0, 0, 0);
+    set(&m, 8, 0.0f);
+    set(&m, 15, 1.0f);
+    set(&m, 16, roughness);
+    return m;
+}
+
+/* ---- a shading point ---- */
+
+static inline vvec3 wide(double x, double y, double z) {
+    return v3(vf_set((float)x), vf_set((float)y), vf_set((float)z));
+}
+
+static inline void point(struct trc_surface *s, vvec3 wo, const struct model *m) {
+    memset(s, 0, sizeof *s);
+    s->active = vm_all_set();
+    s->instance = vi_set(-1);
+    s->ng = s->n = wide(0, 0, 1);
+    s->wo = wo;
+    s->backfacing = m->back ? vm_all_set() : vm_none();
+    s->depth = vi_set(1);
+}
+static inline void prepare(struct model *m, vvec3 wo, struct trc_surface *s, struct trc_lobes *l) {
+    struct trc_registers regs;
+    memset(&regs, 0, sizeof regs);
+    point(s, wo, m);
+    TRC_KERNEL(trc_lobes_setup)(material_of(m), s, &regs, vf_zero(), l);
+}
+static inline vvec3 direction(double cos_theta, double phi) {
+    const double r = sqrt(fmax(0.0, 1.0 - cos_theta * cos_theta));
+    return wide(r * cos(phi), r * sin(phi), cos_theta);
+}
+
+/* ---- sampling against density ---- */
+
+#define ROWS 16
+#define COLUMNS 24
+#define FINE 32
+#define SAMPLES (1 << 19)
+
+struct histogram {
+    double count[ROWS][COLUMNS], lost;
+    double weight, weight2;
+};
+
+/* Cell of a direction: rows of equal cos(theta) over the sphere. */
+static inline void cell_of(float x, float y, float z, int *row, int *column) {
+    double phi = atan2((double)y, (double)x);
+    if (phi < 0)
+        phi += 2 * M_PI;
+    *row = (int)((1.0 - (double)z) * 0.5 * ROWS);
+    *column = (int)(phi / (2 * M_PI) * COLUMNS);
+    *row = *row < 0 ? 0 : *row >= ROWS ? ROWS - 1 : *row;
+    *column = *column >= COLUMNS ? COLUMNS - 1 : *column;
+}
+
+static inline void draw_samples(const struct trc_lobes *l, const struct trc_surface *s, int count,
+                                struct histogram *h) {
+    struct rng random = rng_seed(1);
+    memset(h, 0, sizeof *h);
+    for (int i = 0; i < count; i += TRC_WIDTH) {
+        struct trc_bsdf_sample b;
+        const vfloat u0 = test_wide_uniform(&random), u1 = test_wide_uniform(&random);
+        TRC_KERNEL(trc_bsdf_sample)(l, s, u0, u1, test_wide_uniform(&random), &b);
+        for (int k = 0; k < TRC_WIDTH; k++) {
+            const float pdf = vf_get(b.pdf, k), w = vf_get(b.weight.x, k);
+            assert_true(isfinite(w) && w >= 0.0f && isfinite(pdf) && pdf >= 0.0f);
+            const bool valid = (vm_bits(b.valid) >> k) & 1u;
+            if (valid) {
+                h->weight += (double)w;
+                h->weight2 += (double)w * (double)w;
+            }
+            if (pdf == 0.0f) {
+                h->lost += 1.0;
+                continue;
+            }
+            int row, column;
+            cell_of(vf_get(b.wi.x, k), vf_get(b.wi.y, k), vf_get(b.wi.z, k), &row, &column);
+            h->count[row][column] += 1.0;
+        }
+    }
+}
+
+/* Integrals of density and value over one cell by the midpoint rule, FINE x FINE directions, finer
+ * where asked. */
+static inline void integrate_cell(const struct trc_lobes *l, const struct trc_surface *s, int row,
+                                  int column, int fine, double *density, double *value) {
+    *density = *value = 0.0;
+    for (int i = 0; i < fine; i++)
+        for (int j = 0; j < fine; j += TRC_WIDTH) {
+            float x[TRC_WIDTH], y[TRC_WIDTH], z[TRC_WIDTH];
+            for (int k = 0; k < TRC_WIDTH; k++) {
+                const double c = 1.0 - 2.0 * (row + (i + 0.5) / fine) / ROWS;
+                const double phi = 2 * M_PI * (column + (j + k + 0.5) / fine) / COLUMNS;
+                const double r = sqrt(1.0 - c * c);
+                x[k] = (float)(r * cos(phi));
+                y[k] = (float)(r * sin(phi));
+                z[k] = (float)c;
+            }
+            struct trc_bsdf_value v;
+            TRC_KERNEL(trc_bsdf_eval)
+            (l, s, v3(vf_load(x), vf_load(y), vf_load(z)), vm_all_set(), &v);
+            for (int k = 0; k < TRC_WIDTH; k++) {
+                *density += (double)vf_get(v.pdf, k);
+                *value += (double)(vf_get(v.diffuse.x, k) + vf_get(v.glossy.x, k) +
+                                   vf_get(v.transmission.x, k));
+            }
+        }
+    const double area = 4 * M_PI / (ROWS * COLUMNS) / ((double)fine * fine);
+    *density *= area;
+    *value *= area;
+}
+
+#endif

@@ -1,0 +1,337 @@
+/* The energy of lobes: what they give of what they get, in a white furnace and beside the ideal. */
+#include "bsdf_test.h"
+#include "figures.h"
+
+/* ---- energy ---- */
+
+static double albedo(struct model *m, double cos_o) {
+    struct trc_surface s;
+    struct trc_lobes l;
+    prepare(m, direction(cos_o, 0.3), &s, &l);
+    struct histogram h;
+    draw_samples(&l, &s, SAMPLES, &h);
+    return h.weight / SAMPLES;
+}
+
+#define STARTS 16 /* of sequences */
+
+struct furnace {
+    double mean, half_width; /* the mean is in between with 99 % */
+};
+
+/* Density of directions whose cosine is the square of an even number. */
+static double grazing_density(double cosine) { return 1.0 / (4.0 * M_PI * sqrt(cosine)); }
+
+/* What a direction by that density adds beside the samples of a lobe (balance heuristic). */
+static double grazing_light(const struct trc_lobes *l, const struct trc_surface *s,
+                            float u[3][TRC_WIDTH]) {
+    float x[TRC_WIDTH], y[TRC_WIDTH], z[TRC_WIDTH];
+    for (int k = 0; k < TRC_WIDTH; k++) {
+        const double c = fmax((double)u[0][k] * (double)u[0][k], 1e-12);
+        const double r = sqrt(1.0 - c * c), phi = 2.0 * M_PI * (double)u[1][k];
+        x[k] = (float)(r * cos(phi));
+        y[k] = (float)(r * sin(phi));
+        z[k] = (float)c;
+    }
+    struct trc_bsdf_value v;
+    TRC_KERNEL(trc_bsdf_eval)(l, s, v3(vf_load(x), vf_load(y), vf_load(z)), vm_all_set(), &v);
+    double sum = 0.0;
+    for (int k = 0; k < TRC_WIDTH; k++)
+        sum += (double)vf_get(v.glossy.x, k) /
+               ((double)vf_get(v.pdf, k) + grazing_density((double)z[k]));
+    return sum;
+}
+
+/* Mean weight of samples by M. Roberts' sequence for three dimensions (2018) from a start. grazing:
+ * with further directions for lobes that reflect only, of which those that scatter more than once
+ * weigh much at grazing angles. */
+static double mean_weight(const struct trc_lobes *l, const struct trc_surface *s, double at[3],
+                          int points, bool grazing) {
+    const double step[3] = {0.8191725133961645, 0.6710436067037893, 0.5497004779019703};
+    double sum = 0.0;
+    for (int i = 0; i < points; i += TRC_WIDTH) {
+        float u[3][TRC_WIDTH];
+        for (int k = 0; k < TRC_WIDTH; k++)
+            for (int d = 0; d < 3; d++) {
+                u[d][k] = fminf((float)at[d], 0.99999994f);
+                at[d] += step[d];
+                at[d] -= floor(at[d]);
+            }
+        struct trc_bsdf_sample b;
+        TRC_KERNEL(trc_bsdf_sample)(l, s, vf_load(u[0]), vf_load(u[1]), vf_load(u[2]), &b);
+        for (int k = 0; k < TRC_WIDTH; k++) {
+            if (!((vm_bits(b.valid) >> k) & 1u))
+                continue;
+            const double pdf = (double)vf_get(b.pdf, k);
+            const double other =
+                grazing ? grazing_density(fmax((double)vf_get(b.wi.z, k), 1e-12)) : 0.0;
+            sum += (double)vf_get(b.weight.x, k) * (pdf / (pdf + other));
+        }
+        if (grazing)
+            sum += grazing_light(l, s, u);
+    }
+    return sum / points;
+}
+
+/* The error is known from that of random starts; as many points as it takes. */
+static struct furnace furnace(struct model *m, double cos_o, double wanted, bool grazing) {
+    const double quantile = 2.947; /* Student's t, 15 degrees */
+    struct trc_surface s;
+    struct trc_lobes l;
+    prepare(m, direction(cos_o, 0.3), &s, &l);
+    struct furnace f = {0.0, 1.0};
+    for (int points = 1 << 10; f.half_width > wanted && points <= 1 << 19; points *= 2) {
+        struct rng random = rng_seed(1);
+        double sum = 0.0, sum2 = 0.0;
+        for (int k = 0; k < STARTS; k++) {
+            double at[3];
+            for (int d = 0; d < 3; d++)
+                at[d] = (double)rng_unit(&random);
+            const double mean = mean_weight(&l, &s, at, points, grazing);
+            sum += mean;
+            sum2 += mean * mean;
+        }
+        f.mean = sum / STARTS;
+        f.half_width = quantile * sqrt(fmax(sum2 / STARTS - f.mean * f.mean, 0.0) / (STARTS - 1));
+    }
+    return f;
+}
+
+/* Adds what a lobe is off to the kind's worst. */
+static void add_furnace(struct model *m, double cos_o, double roughness, bool grazing,
+                        double *worst, double *half_width) {
+    const struct furnace f = furnace(m, cos_o, 0.0005, grazing);
+    *half_width = fmax(*half_width, f.half_width);
+    const double off = fabs(f.mean - 1.0);
+    if (off > 0.002)
+        printf("%s, cos %.2f, roughness %.2f: %.4f +- %.4f\n", m->name, cos_o, roughness, f.mean,
+               f.half_width);
+    *worst = fmax(*worst, off);
+}
+
+static void furnace_is_white(void **state) {
+    (void)state;
+    const uint32_t multi = TRC_DISTRIBUTION_MULTI_GGX, later = multi | TRC_DISTRIBUTION_CORRELATED;
+    const double cosines[] = {1.0, 0.8, 0.5, 0.25, 0.1, 0.05};
+    const float roughnesses[] = {0.1f, 0.2f, 0.35f, 0.6f, 0.85f, 1.0f};
+    const float iors[] = {1.1f, 1.45f, 1.5f, 2.4f};
+    double of_glossy = 0.0, of_metal = 0.0, of_glass = 0.0, half_width = 0.0;
+    for (int k = 0; k < 6; k++)
+        for (int j = 0; j < 6; j++) {
+            const float r = roughnesses[j];
+            const double c = cosines[k];
+            struct model reflecting[] = {glossy(multi, r, 0.0f), glossy(later, r, 0.0f)};
+            struct model metals[] = {principled_metal(multi, r), layered_metal(multi, r)};
+            set(&metals[0], 11, 0.0f);
+            for (int i = 0; i < 2; i++) {
+                add_furnace(&reflecting[i], c, (double)r, true, &of_glossy, &half_width);
+                add_furnace(&metals[i], c, (double)r, true, &of_metal, &half_width);
+            }
+            for (int i = 0; i < 8; i++) {
+                const float ior = iors[i / 2];
+                const bool back = i % 2;
+                /* Indices that are rare at every other angle. */
+                if ((k + j) % 2 && (ior < 1.4f || ior > 2.0f))
+                    continue;
+                struct model clear[] = {glass(multi, r, ior, back), glass(later, r, ior, back)};
+                for (int n = 0; n < 2; n++)
+                    add_furnace(&clear[n], c, (double)r, false, &of_glass, &half_width);
+            }
+            struct model layer = layered_glass(multi, r, (k + j) % 2);
+            add_furnace(&layer, c, (double)r, false, &of_glass, &half_width);
+            /* Nothing may give more than it gets. */
+            struct model single[] = {glossy(TRC_DISTRIBUTION_GGX, r, 0.0f),
+                                     glossy(TRC_DISTRIBUTION_BECKMANN, r, 0.3f),
+                                     glass(TRC_DISTRIBUTION_GGX, r, 1.45f, true),
+                                     principled_metal(TRC_DISTRIBUTION_GGX, r), clearcoat(r)};
+            for (size_t i = 0; i < sizeof single / sizeof single[0]; i++)
+                assert_true(furnace(&single[i], c, 0.002, false).mean < 1.006);
+        }
+    print_figure("39: white furnace, glossy", "off by at most %.4f", of_glossy);
+    print_figure("39: white furnace, metal", "off by at most %.4f", of_metal);
+    print_figure("39: white furnace, glass", "off by at most %.4f", of_glass);
+    printf("99 %% half-width at most %.5f\n", half_width);
+    assert_true(of_glossy <= 0.002 && of_metal <= 0.002 && of_glass <= 0.002);
+    assert_true(half_width <= 0.0005);
+}
+
+static double diffuse_albedo(struct model *m, double cos_o) {
+    struct trc_surface s;
+    struct trc_lobes l;
+    prepare(m, direction(cos_o, 0.3), &s, &l);
+    double sum = 0.0;
+    for (int i = 0; i < ROWS; i++)
+        for (int j = 0; j < COLUMNS; j++) {
+            double density, value;
+            integrate_cell(&l, &s, i, j, 16, &density, &value);
+            sum += value;
+        }
+    return sum;
+}
+static void diffuse_albedos(void **state) {
+    (void)state;
+    struct model lambert = diffuse(0.0f), rough = diffuse(0.8f), all = principled("");
+    set(&all, 8, 0.0f);
+    set(&all, 10, 0.5f);
+    set3(&all, 0, 1, 1, 1);
+    double worst = 0.0;
+    for (double c = 0.1; c <= 1.0; c += 0.3) {
+        worst = fmax(worst, fabs(diffuse_albedo(&lambert, c) - 1.0));
+        assert_true(diffuse_albedo(&rough, c) < 1.01);
+        printf("cos %.1f: Oren-Nayar %.3f, Principled diffuse %.3f\n", c, diffuse_albedo(&rough, c),
+               diffuse_albedo(&all, c));
+        struct model whole = rough;
+        whole.material.leaves[0].mode = 1;
+        worst = fmax(worst, fabs(diffuse_albedo(&whole, c) - 1.0));
+        /* A linear map of a cosine lobe keeps its integral. */
+        struct model fibres = diffuse(0.4f);
+        fibres.material.leaves[0].type = TRC_NODE_SHEEN;
+        struct trc_surface s;
+        struct trc_lobes l;
+        prepare(&fibres, direction(c, 0.3), &s, &l);
+        const double kept = (double)vf_get(l.lobe[0].weight.x, 0);
+        printf("cos %.1f: fibre sheen keeps %.4f\n", c, kept);
+        assert_true(kept > 1e-3 && kept < 1.0);
+        assert_true(fabs(diffuse_albedo(&fibres, c) / kept - 1.0) < 0.01);
+    }
+    print_figure("39: white furnace, diffuse", "off by at most %.4f", worst);
+    assert_true(worst <= 0.002);
+}
+
+/* ---- ideal lobes ---- */
+
+/* What ideal glass reflects and refracts of light from a direction. */
+static double ideal_sum(struct model m, float ior, double c) {
+    const bool back = m.back;
+    struct trc_surface s;
+    struct trc_lobes l;
+    prepare(&m, direction(c, 1.0), &s, &l);
+    double sum = 0.0;
+    for (int k = 0; k < l.count; k++) {
+        struct trc_bsdf_sample b;
+        TRC_KERNEL(trc_bsdf_ideal)(&l, k, &s, &b);
+        if (!vm_any(b.valid))
+            continue;
+        sum += (double)vf_get(b.weight.x, 0);
+        /* Snell: the tangential parts scale by the index. */
+        const double eta = back ? 1.0 / (double)ior : (double)ior;
+        const double x = (double)vf_get(b.wi.x, 0), y = (double)vf_get(b.wi.y, 0);
+        const double scale = vm_any(b.transmitted) ? 1.0 / eta : 1.0;
+        const double sine = sqrt(1.0 - c * c) * scale;
+        assert_true(fabs(hypot(x, y) - sine) < 2e-6);
+        /* 1 - cos^2 times the square of a large index has lost digits. */
+        const double allowed = ior > 100.0f ? 1e-5 : 1e-6;
+        assert_true(fabs((double)vf_get(v3_length(b.wi), 0) - 1.0) < allowed);
+    }
+    return sum;
+}
+
+static struct model ideal_glass(float ior, bool back) {
+    return glass(TRC_DISTRIBUTION_SHARP, 0.0f, ior, back);
+}
+
+static void ideal_glass_splits_energy(void **state) {
+    (void)state;
+    const float iors[] = {1.001f, 1.2f, 1.5f, 2.5f, 4.0f};
+    double worst = 0.0;
+    for (int i = 0; i < 5; i++)
+        for (int back = 0; back < 2; back++)
+            for (double c = 1e-3; c <= 1.0; c += 0.0333)
+                worst = fmax(worst, fabs(ideal_sum(ideal_glass(iors[i], back), iors[i], c) - 1.0));
+    /* Rough glass of an index that does not refract. */
+    for (int back = 0; back < 2; back++)
+        for (double c = 1e-3; c <= 1.0; c += 0.0333) {
+            const uint32_t multi = TRC_DISTRIBUTION_MULTI_GGX;
+            const struct model plain = glass(multi, 0.8f, 1.0f, back);
+            const struct model later = glass(multi | TRC_DISTRIBUTION_CORRELATED, 0.8f, 1.0f, back);
+            worst = fmax(worst, fabs(ideal_sum(plain, 1.0f, c) - 1.0));
+            worst = fmax(worst, fabs(ideal_sum(later, 1.0f, c) - 1.0));
+        }
+    print_figure("39: white furnace, ideal glass", "off by at most %.1e", worst);
+    assert_true(worst < 1e-6);
+}
+
+/* On both sides, at the critical angle and one ulp of its cosine beside it. */
+static void glass_at_the_critical_angle(void **state) {
+    (void)state;
+    const float iors[] = {1.0f, 1.0000001f, 1.1f, 1.45f, 1.5f, 2.4f, 1e3f, 1e6f};
+    double worst = 0.0;
+    for (size_t i = 0; i < sizeof iors / sizeof iors[0]; i++) {
+        const double inverse = 1.0 / (double)iors[i];
+        const float critical = (float)sqrt((1.0 - inverse) * (1.0 + inverse));
+        const float cosines[] = {nextafterf(critical, 0.0f), critical, nextafterf(critical, 2.0f)};
+        for (int k = 0; k < 3; k++)
+            for (int back = 0; back < 2; back++) {
+                if (cosines[k] <= 0.0f || cosines[k] > 1.0f)
+                    continue;
+                const double sum =
+                    ideal_sum(ideal_glass(iors[i], back), iors[i], (double)cosines[k]);
+                if (!(fabs(sum - 1.0) <= 1e-6))
+                    printf("ior %.7g, back %d, cos %.9g: %.8f\n", (double)iors[i], back,
+                           (double)cosines[k], sum);
+                assert_true(isfinite(sum));
+                worst = fmax(worst, fabs(sum - 1.0));
+            }
+    }
+    print_figure("33: refraction at the critical angle +-1 ulp", "energy off by at most %.1e",
+                 worst);
+    assert_true(worst <= 1e-6);
+}
+
+/* Paths within glass meet dozens of surfaces: no sample may gain much at one, also where a part of
+ * the micro-normals reflects totally. */
+static void glass_weights_are_steady(void **state) {
+    (void)state;
+    const uint32_t later = TRC_DISTRIBUTION_MULTI_GGX | TRC_DISTRIBUTION_CORRELATED;
+    double most = 0.0;
+    for (int i = 0; i < 2; i++)
+        for (int back = 0; back < 2; back++) {
+            const float r = i ? 0.3f : 0.15f;
+            struct model models[] = {glass(later, r, 1.45f, back),
+                                     glass(TRC_DISTRIBUTION_MULTI_GGX, r, 1.45f, back),
+                                     layered_glass(TRC_DISTRIBUTION_MULTI_GGX, r, back)};
+            for (size_t k = 0; k < sizeof models / sizeof models[0]; k++)
+                for (double c = 0.05; c <= 1.0; c += 0.05) {
+                    struct trc_surface s;
+                    struct trc_lobes l;
+                    prepare(&models[k], direction(c, 0.3), &s, &l);
+                    struct rng random = rng_seed(3);
+                    for (int n = 0; n < (1 << 12); n += TRC_WIDTH) {
+                        struct trc_bsdf_sample b;
+                        const vfloat u0 = test_wide_uniform(&random);
+                        const vfloat u1 = test_wide_uniform(&random);
+                        TRC_KERNEL(trc_bsdf_sample)(&l, &s, u0, u1, test_wide_uniform(&random), &b);
+                        for (int lane = 0; lane < TRC_WIDTH; lane++)
+                            if ((vm_bits(b.valid) >> lane) & 1u)
+                                most = fmax(most, (double)vf_get(b.weight.x, lane));
+                    }
+                }
+        }
+    printf("  weight of a sample of white glass at most %.3f\n", most);
+    assert_true(most < 1.35);
+}
+
+static void rough_goes_over_into_ideal(void **state) {
+    (void)state;
+    double worst = 0.0;
+    for (int k = 0; k < 4; k++) {
+        const float roughnesses[] = {0.0f, 1e-4f, 0.02f, 0.05f};
+        struct model m = glossy(TRC_DISTRIBUTION_GGX, roughnesses[k], 0.0f);
+        const double a = albedo(&m, 0.6);
+        printf("roughness %g: %.5f\n", (double)roughnesses[k], a);
+        worst = fmax(worst, fabs(a - 1.0));
+    }
+    print_figure("32: roughness to 0", "energy off the mirror's by at most %.5f", worst);
+    assert_true(worst < 1e-3);
+}
+
+int main(void) {
+    if (!test_cpu_can())
+        return 77;
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(furnace_is_white),          cmocka_unit_test(diffuse_albedos),
+        cmocka_unit_test(ideal_glass_splits_energy), cmocka_unit_test(glass_at_the_critical_angle),
+        cmocka_unit_test(glass_weights_are_steady),  cmocka_unit_test(rough_goes_over_into_ideal),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
