@@ -15,7 +15,8 @@ import sys
 import xml.etree.ElementTree as ElementTree
 
 MARK = "figure | "
-MISSES = re.compile(r"(\d+) misses of (\d+) rays")
+COUNTED = re.compile(r"(\d+) (misses|self-hits|wrong) of (\d+) rays")
+FURNACE = re.compile(r"39: .* \| off by at most ([\d.e-]+)")
 ULPS = re.compile(r"([\d.]+) ulp")
 
 
@@ -65,27 +66,41 @@ def _joined(entries):
     variants = {}
     for value, test in entries:
         variants.setdefault(value, set()).add(test.rpartition(".")[2])
-    matches = [MISSES.fullmatch(value) for value, _ in entries]
+    matches = [COUNTED.fullmatch(value) for value, _ in entries]
     if all(matches):
-        missed, count = (sum(int(match[i]) for match in matches) for i in (1, 2))
+        found, count = (sum(int(match[i]) for match in matches) for i in (1, 3))
         names = ", ".join(sorted(set().union(*variants.values())))
-        return f"{missed} misses of {count} rays", f"{stem}: {names}"
+        return f"{found} {matches[0][2]} of {count} rays", f"{stem}: {names}"
     if len(variants) == 1:
         return entries[0][0], stem
     return "; ".join(f"{value} ({', '.join(sorted(tests))})" for value, tests in variants.items()), stem
 
 
+def _counted(table, word):
+    """How many of how many rays, in how many rows."""
+    matches = [COUNTED.fullmatch(value) for _what, value, _tests in table]
+    chosen = [match for match in matches if match and match[2] == word]
+    return sum(int(match[1]) for match in chosen), sum(int(match[3]) for match in chosen), len(chosen)
+
+
 def summary(table):
-    """What README quotes."""
-    missed = count = cases = 0
-    for _what, value, _tests in table:
-        match = MISSES.fullmatch(value)
-        if match:
-            missed, count, cases = missed + int(match[1]), count + int(match[2]), cases + 1
-    ulps = [float(number) for _what, value, _tests in table for number in ULPS.findall(value)]
+    """What README quotes.
+
+    >>> summary([("1: a", "0 misses of 2000 rays", "t"), ("27: b", "0 self-hits of 1000 rays", "u"),
+    ...          ("39: c", "off by at most 0.0005", "v"), ("39: d", "off by at most 3e-08", "v")])[-100:]
+    'self-hits of 1,000 rays that leave surfaces. White furnaces are within 0.0005 for lobes of any kind.'
+    """
+    missed, count, cases = _counted(table, "misses")
     parts = [f"{missed} misses of {count:,} rays that must hit, in {cases} cases: closed surfaces met at "
              "their vertices and edges, at rest and in motion, needles, sizes from 1e-38 to 1e18, far from "
              "the origin"]
+    left, leaving, _ = _counted(table, "self-hits")
+    if leaving:
+        parts.append(f"{left} self-hits of {leaving:,} rays that leave surfaces")
+    furnaces = [match[1] for what, value, _tests in table if (match := FURNACE.match(f"{what} | {value}"))]
+    if furnaces:
+        parts.append(f"white furnaces are within {max(furnaces, key=float)} for lobes of any kind")
+    ulps = [float(number) for _what, value, _tests in table for number in ULPS.findall(value)]
     if ulps:
         parts.append(f"functions of the kernels are at most {max(ulps):.1f} ulp off long arithmetic")
     return ". ".join(part[0].upper() + part[1:] for part in parts) + "."
