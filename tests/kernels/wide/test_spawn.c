@@ -195,7 +195,8 @@ static void place(struct query_instance *instance, uint32_t key_count, const flo
     }
 }
 
-/* Rays that leave an instance of a mesh; another one keeps them out of world space. */
+/* Rays that leave an instance of a mesh, both of so many keys; another one keeps them out of world
+ * space. */
 static void leave_instance(const float scale[3], float distance, uint32_t key_count,
                            struct rng *rng, uint64_t *self_hits, uint64_t *total) {
     struct query_world world;
@@ -205,6 +206,9 @@ static void leave_instance(const float scale[3], float distance, uint32_t key_co
     struct mesh *mesh = query_world_mesh(&world);
     for (uint32_t t = 0; t < TRIANGLES; t++)
         add_triangle(mesh, rng, 0.5f, 1.0f);
+    mesh_set_keys(mesh, key_count);
+    for (uint32_t i = 0; i < 3 * mesh->vertex_count * (key_count - 1); i++)
+        mesh_key(mesh, 1)[i] += rng_range(rng, -0.1f, 0.1f);
     for (int k = 0; k < 2; k++)
         place(query_world_instance(&world, 0), key_count, scale, distance, rng);
     struct query_scene scene = query_test_scene(&world, false);
