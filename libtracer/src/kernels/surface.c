@@ -110,9 +110,9 @@ static void load_mixed(const struct trc_surface *s, struct raw_hit *out) {
  *
  * An identity adds nothing. The world point M p + t adds 3 of q = |M| |p|, for one product and the
  * first two sums, and 1 of itself. A ray that starts there is off by 5 q once it is taken to object
- * space (walk.h); or the tree is in world space, and its corners M v + t are off by at most 4 |M|
- * |v| + |t|. With Q = |M| (|v0| + u |e1| + v |e2|), not less than q or the weighted mean of |M|
- * |v|, both are within 5 Q + |t|: 8 Q, 1 of the world point, 1 of t in all. */
+ * space (object_rays.h); or the tree is in world space, and its corners M v + t are off by at most
+ * 4 |M| |v| + |t|. With Q = |M| (|v0| + u |e1| + v |e2|), not less than q or the weighted mean of
+ * |M| |v|, both are within 5 Q + |t|: 8 Q, 1 of the world point, 1 of t in all. */
 #define ERROR_STEPS(n) vf_set((n)*0x1.0001p-24f) /* a last digit for what is of higher order */
 
 /* What rounding adds on the way from object to world and back. */
