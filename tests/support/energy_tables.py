@@ -26,6 +26,7 @@ HEADER, TABLES = SHADING / "ggx_energy_tables.h", SHADING / "ggx_energy_tables.c
 HEIGHTS, AZIMUTHS = 160, 80  # off by some 1e-4 at most, at a blurred critical angle
 LEAST_COS, LEAST_ALPHA = 1e-6, 1e-4  # in place of 0, where the albedo only has a limit
 BESIDE_ONE = 1e-5  # of the slice of ior 1: a surface yet
+DEEPEST = 0.9995  # an index of 4000
 BESIDE_SHARE = 1e-3  # the same where the limit is a step at grazing angles
 WHOLE = 65535
 
@@ -114,7 +115,8 @@ def columns(count, spread=None):
 
 
 def index_of(depth):
-    """The index whose (ior - 1) / (ior + 1) is depth."""
+    """The index whose (ior - 1) / (ior + 1) is depth; a large one in place of an infinite one."""
+    depth = min(depth, DEEPEST)
     return (1 + depth) / (1 - depth)
 
 
@@ -152,11 +154,11 @@ def reflection(sizes):
 
 def glass(sizes):
     """Both tables, from inside and then from outside."""
-    reach, count = sizes["TRC_GLASS_ENERGY_REACH"], sizes["TRC_GLASS_ENERGY_COLUMNS"]
+    count = sizes["TRC_GLASS_ENERGY_COLUMNS"]
     found = []
     for inside in (True, False):
         for w in steps(sizes["TRC_GLASS_ENERGY_INSIDE" if inside else "TRC_GLASS_ENERGY_OUTSIDE"]):
-            ior = max(index_of(reach * w ** (8 / 3)), 1 + BESIDE_ONE)
+            ior = max(index_of(w ** (8 / 3)), 1 + BESIDE_ONE)
             eta = 1 / ior if inside else ior
             found.append([[albedos(a, c, eta)[1:3] for c in columns(count, None if inside else np.sqrt(a))]
                           for a in rows(sizes["TRC_GLASS_ENERGY_ROWS"])])
@@ -165,7 +167,7 @@ def glass(sizes):
 
 
 def glass_share(sizes):
-    reach, count = sizes["TRC_GLASS_ENERGY_REACH"], sizes["TRC_GLASS_SHARE_COLUMNS"]
+    reach, count = sizes["TRC_GLASS_SHARE_REACH"], sizes["TRC_GLASS_SHARE_COLUMNS"]
     found = []
     for inside in (True, False):
         for w in steps(sizes["TRC_GLASS_SHARE_SLICES"]):

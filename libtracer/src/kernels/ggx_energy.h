@@ -6,7 +6,7 @@
  * theta_o: what is masked depends on alpha tan(theta_o), and this follows it half way, so that the
  * valley at grazing angles runs along a column. From inside, where the critical angle is another
  * valley, they go by sqrt(cos). Slices of glass go by the power 3/8 of |ior - 1| / (ior + 1) from 0
- * to TRC_GLASS_ENERGY_REACH, first those of rays from inside (ior < 1), then from outside.
+ * to 1, an infinite index, first those of rays from inside (ior < 1), then from outside.
  * Interpolation is linear, by cubics across slices. For roughness and cos from 0.1 and 0.05 it is
  * off by at most 0.001 of reflection and of glass from outside, 0.0025 from inside.
  *
@@ -61,9 +61,6 @@ TRC_INLINE vfloat trc_ggx_mean_albedo(vfloat alpha) {
     return trc_grid_row(trc_ggx_energy_mean, row, y);
 }
 
-/* What an albedo of glass rises by at most from an index of 3 to an infinite one; by the one of 7
- * it has. */
-#define TRC_GLASS_ENERGY_RISE 0.06f
 /* A roughness of 0.1. */
 #define TRC_GLASS_ROUGH_ALPHA 0.01f
 
@@ -79,7 +76,7 @@ TRC_INLINE vfloat trc_glass_energy_lookup(const uint16_t *table, vfloat cos_thet
     const vint column = trc_grid_cell(across, columns, &x);
     const vint row = trc_grid_cell(root, TRC_GLASS_ENERGY_ROWS, &y);
     /* The first of the four slices that the cubic runs through, and where between them. */
-    const vfloat part = vf_saturate(vf_abs(depth) * vf_set(1.0f / TRC_GLASS_ENERGY_REACH));
+    const vfloat part = vf_saturate(vf_abs(depth));
     const vfloat slices = vf_select(inside, vf_set((float)TRC_GLASS_ENERGY_INSIDE),
                                     vf_set((float)TRC_GLASS_ENERGY_OUTSIDE));
     const vfloat place = vf_sqrt(vf_sqrt(part * vf_sqrt(part))) * (slices - vf_one());
@@ -99,13 +96,11 @@ TRC_INLINE vfloat trc_glass_energy_lookup(const uint16_t *table, vfloat cos_thet
     const vfloat e0 = d1 - d0, e1 = d2 - d1;
     const vfloat parts =
         value[0] + z * (d0 + z1 * vf_set(0.5f) * (e0 + z2 * vf_set(1.0f / 3.0f) * (e1 - e0)));
-    const vfloat further = vf_clamp(vf_abs(depth) - vf_set(TRC_GLASS_ENERGY_REACH), 0.0f, 0.25f);
-    const vfloat rise = vf_one() + further * vf_set(4.0f * TRC_GLASS_ENERGY_RISE);
-    const vfloat energy = vf_min(parts * rise * vf_set(1.0f / 65535.0f), vf_one());
-    /* Rays from inside that graze smooth glass: their columns miss the valley, which is below a cos
-     * of 0.05 by then. To put less back than what is missing is safe. */
+    const vfloat energy = vf_min(parts * vf_set(1.0f / 65535.0f), vf_one());
+    /* Where smooth glass is grazed, below a cos of 0.05, columns miss the valley. To put less back
+     * than what is missing is safe. */
     const vfloat rough = vf_saturate(alpha * vf_set(1.0f / TRC_GLASS_ROUGH_ALPHA));
-    return vf_select(inside, vf_one() - (vf_one() - energy) * rough, energy);
+    return vf_one() - (vf_one() - energy) * rough;
 }
 TRC_INLINE vfloat trc_glass_albedo(vfloat cos_theta, vfloat alpha, vfloat ior) {
     return trc_glass_energy_lookup(trc_glass_energy, cos_theta, alpha, ior);
@@ -118,7 +113,7 @@ TRC_INLINE vfloat trc_glass_reflected_share(vfloat cos_theta, vfloat alpha, vflo
     const int columns = TRC_GLASS_SHARE_COLUMNS;
     vfloat x, y, z;
     const vfloat depth = (ior - vf_one()) / (ior + vf_one());
-    const vfloat part = vf_abs(depth) * vf_set(1.0f / TRC_GLASS_ENERGY_REACH);
+    const vfloat part = vf_abs(depth) * vf_set(1.0f / TRC_GLASS_SHARE_REACH);
     const vint column = trc_grid_cell(vf_safe_sqrt(cos_theta), columns, &x);
     const vint row = trc_grid_cell(vf_safe_sqrt(alpha), rows, &y);
     vint slice = trc_grid_cell(vf_safe_sqrt(part), slices, &z);

@@ -9,17 +9,17 @@
 #define TRC_GGX_ENERGY_SIZE 48
 #define TRC_GGX_ENERGY_MEANS 189 /* four to a row */
 /* From inside, where the critical angle moves with the index, more slices are needed. */
-#define TRC_GLASS_ENERGY_INSIDE 20
-#define TRC_GLASS_ENERGY_OUTSIDE 8
+#define TRC_GLASS_ENERGY_INSIDE 26
+#define TRC_GLASS_ENERGY_OUTSIDE 11
 #define TRC_GLASS_ENERGY_ROWS 32
 #define TRC_GLASS_ENERGY_COLUMNS 36
-#define TRC_GLASS_ENERGY_REACH 0.5f /* an ior of 3 or 1/3 */
 #define TRC_GLASS_ENERGY_COUNT                              \
     ((TRC_GLASS_ENERGY_INSIDE + TRC_GLASS_ENERGY_OUTSIDE) * \
      (TRC_GLASS_ENERGY_ROWS * TRC_GLASS_ENERGY_COLUMNS))
 #define TRC_GLASS_SHARE_SLICES 5 /* for each side of the surface */
 #define TRC_GLASS_SHARE_ROWS 5
 #define TRC_GLASS_SHARE_COLUMNS 9
+#define TRC_GLASS_SHARE_REACH 0.5f /* an ior of 3 or 1/3 */
 #define TRC_SHARE_SLICES 6
 #define TRC_SHARE_ROWS 8
 #define TRC_SHARE_COLUMNS 12

@@ -226,6 +226,7 @@ static void extremes_stay_finite(void **state) {
     (void)state;
     const double cosines[] = {1.0, 1e-2, 1e-4, 1e-7};
     const float roughnesses[] = {0.0f, 1e-7f, 1e-4f, 0.018f, 0.05f, 1.0f};
+    const uint32_t later = TRC_DISTRIBUTION_MULTI_GGX | TRC_DISTRIBUTION_CORRELATED;
     double most = 0.0;
     for (int k = 0; k < 4; k++)
         for (int j = 0; j < 6; j++) {
@@ -236,6 +237,9 @@ static void extremes_stay_finite(void **state) {
                                      glossy(TRC_DISTRIBUTION_MULTI_GGX, r, 0.0f),
                                      glass(TRC_DISTRIBUTION_GGX, r, 1.0f, true),
                                      glass(TRC_DISTRIBUTION_MULTI_GGX, r, 8.0f, true),
+                                     glass(TRC_DISTRIBUTION_MULTI_GGX, r, 8.0f, false),
+                                     glass(later, r, 8.0f, true),
+                                     glass(later, r, 8.0f, false),
                                      glass(TRC_DISTRIBUTION_MULTI_GGX, r, 1.5f, true),
                                      glass(TRC_DISTRIBUTION_BECKMANN, r, 1.0000001f, false),
                                      principled_all(),
