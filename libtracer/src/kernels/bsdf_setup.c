@@ -487,7 +487,7 @@ static void principled_glass(struct setup *c, const struct trc_leaf *leaf, vvec3
                         v3_saturate(base), n, alpha, eta);
         return;
     }
-    const vfloat f = trc_fresnel_dielectric(v3_dot(n, c->s->wo), eta);
+    const vfloat f = reflected_part(trc_fresnel_dielectric(v3_dot(n, c->s->wo), eta));
     struct trc_lobe *lobe = add_dielectric(c, TRC_LOBE_REFLECT, v3_scale(glass, f), n, alpha, eta,
                                            TRC_DISTRIBUTION_GGX);
     if (lobe)
@@ -496,7 +496,7 @@ static void principled_glass(struct setup *c, const struct trc_leaf *leaf, vvec3
     if (leaf->mode != TRC_DISTRIBUTION_MULTI_GGX)
         through = vf_one() -
                   (vf_one() - roughness) * (vf_one() - number(c, leaf, P_TRANSMISSION_ROUGHNESS));
-    const vvec3 weight = v3_scale(v3_mul(base, glass), vf_max(vf_one() - f, vf_set(1e-4f)));
+    const vvec3 weight = v3_scale(v3_mul(base, glass), vf_one() - f);
     add_dielectric(c, TRC_LOBE_REFRACT, weight, n, through * through, eta, TRC_DISTRIBUTION_GGX);
 }
 

@@ -106,6 +106,13 @@ static void add_correlated_glass(struct setup *c, vvec3 reflected, vvec3 refract
     share_chances(reflect, refract, v3_average(v3_lerp(f0, v3_splat(vf_one()), blend)));
 }
 
+/* Of a Fresnel factor what is reflected: the part of a lobe too light to be kept goes to the other.
+ * Cycles refracts at least 1e-4, and so gives that much more than it gets. */
+static vfloat reflected_part(vfloat f) {
+    const vfloat least = vf_set(WEIGHT_CUTOFF);
+    return vf_where(vf_ge(f, least), vf_select(vf_lt(vf_one() - f, least), vf_one(), f));
+}
+
 static void add_glass(struct setup *c, const struct trc_leaf *leaf, vfloat weight) {
     const vvec3 tint = v3_scale(colour(c, leaf, 0), weight);
     const vvec3 n = leaf_normal(c, leaf, 5);
@@ -121,11 +128,7 @@ static void add_glass(struct setup *c, const struct trc_leaf *leaf, vfloat weigh
         add_multi_glass(c, v3_splat(weight), color, color, n, alpha, eta);
         return;
     }
-    /* The part of a lobe too light to be kept goes to the other. Cycles refracts at least 1e-4, for
-     * the sake of its caustics, and so gives that much more than it gets. */
-    const vfloat least = vf_set(WEIGHT_CUTOFF);
-    vfloat f = trc_fresnel_dielectric(v3_dot(n, c->s->wo), eta);
-    f = vf_where(vf_ge(f, least), vf_select(vf_lt(vf_one() - f, least), vf_one(), f));
+    const vfloat f = reflected_part(trc_fresnel_dielectric(v3_dot(n, c->s->wo), eta));
     add_dielectric(c, TRC_LOBE_REFLECT, v3_scale(tint, f), n, alpha, eta, leaf->mode);
     add_dielectric(c, TRC_LOBE_REFRACT, v3_scale(tint, vf_one() - f), n, alpha, eta, leaf->mode);
 }

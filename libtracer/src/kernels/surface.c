@@ -132,9 +132,13 @@ static void set_position(struct trc_surface *s, const struct raw_hit *h, vvec3 e
     const vvec3 edges = v3_add(v3_abs(u1), v3_abs(v2));
     const vvec3 error = v3_add(v3_scale(edges, ERROR_STEPS(2)),
                                v3_scale(v3_add(v3_abs(way), v3_abs(p)), ERROR_STEPS(1)));
+    s->p = p;
+    s->p_error = error;
+    if (!vm_any(vm_andnot(s->active, h->identity)))
+        return;
+    const vvec3 reach = v3_add(v3_abs(v0), edges);
     s->p = v3_select(h->identity, p, trc_transform_point(&h->m, p));
-    s->p_error = v3_select(h->identity, error,
-                           transform_error(&h->m, error, v3_add(v3_abs(v0), edges), s->p));
+    s->p_error = v3_select(h->identity, error, transform_error(&h->m, error, reach, s->p));
 }
 
 /* a over its largest component: cross products of what comes out neither overflow nor vanish. */
