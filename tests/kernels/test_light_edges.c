@@ -96,7 +96,7 @@ static void add_roof(trc_scene scene, float right, float z) {
 
 static void add_wall(trc_scene scene, float top) {
     const float corners[12] = {0, -9, 0, 0, 9, 0, 0, 9, top, 0, -9, top};
-    add_quad(scene, corners, add_black(scene));
+    fixture_quad(scene, corners, add_black(scene));
 }
 
 static void point_at_an_edge(void **state) {

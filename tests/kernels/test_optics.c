@@ -40,7 +40,7 @@ static void add_shape(trc_scene scene, struct mesh *shape, trc_id material) {
     desc.position_count = 3 * shape->vertex_count;
     desc.indices = shape->indices;
     desc.index_count = 3 * shape->triangle_count;
-    add_mesh(scene, &desc, material);
+    fixture_mesh(scene, &desc, material, 0);
     mesh_free(shape);
 }
 
@@ -283,7 +283,7 @@ static void furnace_from_within(void **state) {
     for (int g = 0; g < INTEGRATORS; g++) {
         const trc_scene scene = scene_create();
         const trc_mesh_desc cube = default_mesh_desc();
-        add_mesh(scene, &cube, add_dielectric(scene, TRC_NODE_GLASS, 1.5f));
+        fixture_mesh(scene, &cube, add_dielectric(scene, TRC_NODE_GLASS, 1.5f), 0);
         worst =
             fmax(worst, expect_white(scene, &camera, integrators[g], 1024, integrator_names[g]));
     }

@@ -5,7 +5,7 @@
 
 #include "query_test.h"
 
-#include "default_descs.h"
+#include "fixture.h"
 
 #define PICTURE_TEST_INLINE static inline __attribute__((unused))
 
@@ -59,35 +59,12 @@ PICTURE_TEST_INLINE trc_id add_vector_shader(trc_scene scene, uint32_t type, uin
     return id;
 }
 
-/* One instance of a mesh, where the mesh is. */
-PICTURE_TEST_INLINE void add_mesh(trc_scene scene, const trc_mesh_desc *mesh, trc_id material) {
-    trc_id mesh_id = 0, instance_id = 0;
-    assert_ok(trc_mesh_create(scene, mesh, &mesh_id));
-    trc_instance_desc instance = default_instance_desc(mesh_id);
-    instance.materials = &material;
-    instance.material_count = 1;
-    assert_ok(trc_instance_create(scene, &instance, &instance_id));
-}
-
-/* A quadrangle a b c d, split along a c; counter-clockwise as seen from the front. */
-PICTURE_TEST_INLINE void add_quad(trc_scene scene, const float corners[12], trc_id material) {
-    static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
-    trc_mesh_desc mesh = default_mesh_desc();
-    mesh.vertex_count = 4;
-    mesh.triangle_count = 2;
-    mesh.positions = corners;
-    mesh.position_count = 12;
-    mesh.indices = indices;
-    mesh.index_count = 6;
-    add_mesh(scene, &mesh, material);
-}
-
 /* A square of edge 2 * half around (x, y, z), facing up. */
 PICTURE_TEST_INLINE void add_square(trc_scene scene, float x, float y, float z, float half,
                                     trc_id material) {
     const float corners[12] = {x - half, y - half, z, x + half, y - half, z,
                                x + half, y + half, z, x - half, y + half, z};
-    add_quad(scene, corners, material);
+    fixture_quad(scene, corners, material);
 }
 
 /* A camera whose picture spans left, right, bottom, top at distance 1. */

@@ -1,6 +1,6 @@
-/* A small scene that uses every kind of object, for the unit tests. */
-#ifndef TRACER_TESTS_UNIT_FIXTURE_H
-#define TRACER_TESTS_UNIT_FIXTURE_H
+/* A small scene that uses every kind of object, and parts of others, for tests. Needs cmocka. */
+#ifndef TRACER_TESTS_FIXTURE_H
+#define TRACER_TESTS_FIXTURE_H
 
 /* What cmocka.h needs, in its order. */
 #include <setjmp.h>
@@ -47,11 +47,23 @@ FIXTURE_INLINE void fixture_draw(trc_scene scene, const trc_render_desc *desc, u
 
 /* ---- for closed forms: level squares seen from above ---- */
 
-/* Two triangles; a, b, c, d counter-clockwise as seen from the front. flags: TRC_INSTANCE_*. */
+/* An instance of a mesh, where the mesh is. flags: TRC_INSTANCE_*. */
+FIXTURE_INLINE trc_id fixture_mesh(trc_scene scene, const trc_mesh_desc *desc, trc_id material,
+                                   uint32_t flags) {
+    trc_id mesh = 0, instance = 0;
+    assert_int_equal(trc_mesh_create(scene, desc, &mesh), TRC_OK);
+    trc_instance_desc instance_desc = default_instance_desc(mesh);
+    instance_desc.materials = &material;
+    instance_desc.material_count = 1;
+    instance_desc.flags = flags;
+    assert_int_equal(trc_instance_create(scene, &instance_desc, &instance), TRC_OK);
+    return instance;
+}
+
+/* Two triangles; a, b, c, d counter-clockwise as seen from the front. */
 FIXTURE_INLINE trc_id fixture_flagged_quad(trc_scene scene, const float corners[12],
                                            trc_id material, uint32_t flags) {
     static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
-    trc_id mesh = 0, instance = 0;
     trc_mesh_desc desc = default_mesh_desc();
     desc.vertex_count = 4;
     desc.triangle_count = 2;
@@ -59,13 +71,7 @@ FIXTURE_INLINE trc_id fixture_flagged_quad(trc_scene scene, const float corners[
     desc.position_count = 12;
     desc.indices = indices;
     desc.index_count = 6;
-    assert_int_equal(trc_mesh_create(scene, &desc, &mesh), TRC_OK);
-    trc_instance_desc instance_desc = default_instance_desc(mesh);
-    instance_desc.materials = &material;
-    instance_desc.material_count = 1;
-    instance_desc.flags = flags;
-    assert_int_equal(trc_instance_create(scene, &instance_desc, &instance), TRC_OK);
-    return instance;
+    return fixture_mesh(scene, &desc, material, flags);
 }
 
 FIXTURE_INLINE trc_id fixture_quad(trc_scene scene, const float corners[12], trc_id material) {
