@@ -16,7 +16,8 @@ struct arrival {
     vvec3 weight;       /* of light and rays that scatter here: found_weight * beyond */
     vfloat beyond;      /* kernels/bsdf.h, trc_bsdf_sample */
     vvec3 receive_n;    /* normal as kernels/light.h wants it of the surface hit */
-    vfloat t, tmin, time, pdf, min_pdf;
+    vfloat t, tmin;     /* of what coincides with the surface that the ray left: 0 or below */
+    vfloat time, pdf, min_pdf;
     vfloat
         chance; /* that a continuation ray is sent: densities of its directions have it in them */
     vuint slot, path, depths, pixel, sample;
@@ -56,6 +57,9 @@ static void arrival_load(const struct trc_tile *t, vint index, vmask active, str
     a->t = column(t->hits.t, a);
     vu_store(a->slots, a->slot);
 }
+
+/* Lengths of the lanes' rays. */
+TRC_INLINE vfloat arrival_length(const struct arrival *a) { return vf_max(a->t, vf_set(0.0f)); }
 
 /* The lanes' pixels and sample numbers, for those that shade. */
 static void arrival_load_samples(const struct trc_tile *t, struct arrival *a) {

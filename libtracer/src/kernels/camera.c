@@ -129,6 +129,8 @@ void TRC_KERNEL(trc_camera_rays)(struct trc_tile *t) {
                  vu_set(TRC_VISIBLE_CAMERA | TRC_PATH_TRANSPARENT_BACKGROUND));
         vu_store(out->w[TRC_RAY_DEPTHS] + i, vu_set(0));
         vu_store(out->w[TRC_RAY_PARENT] + i, vu_set(0));
+        if (t->looks_back)
+            vu_store(out->w[TRC_RAY_LEFT] + i, vu_set(TRC_NO_HIT));
     }
     out->count = t->samples.count;
 }

@@ -23,7 +23,7 @@ static uint32_t duplicate(struct trc_tile *t, uint32_t ray) {
     const uint32_t other = r->count++;
     for (int k = 0; k < TRC_RAY_FLOATS; k++)
         r->f[k][other] = r->f[k][ray];
-    for (int k = 0; k < TRC_RAY_WORDS; k++)
+    for (int k = 0; k < r->word_count; k++)
         r->w[k][other] = r->w[k][ray];
     float *const floats[] = {h->t, h->u, h->v};
     uint32_t *const words[] = {h->instance, h->triangle, h->material};

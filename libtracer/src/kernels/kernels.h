@@ -41,7 +41,7 @@ struct trc_kernels {
     uint32_t isa;   /* TRC_ISA_* */
     uint32_t width; /* lanes */
     /* Bytes of scratch memory a tile job needs; catchers: the scene has shadow catchers. */
-    size_t (*tile_memory_bytes)(const trc_render_desc *desc, bool catchers);
+    size_t (*tile_memory_bytes)(const trc_render_desc *desc, uint32_t features);
     /* Renders a job; never fails. The thread's floating-point state must be the default. */
     void (*tile_render)(struct trc_tile_job *job);
     /* trc_query_*: arguments already validated; chunk [begin, end) of the arrays. packet_size

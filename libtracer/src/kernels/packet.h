@@ -55,6 +55,12 @@ struct trc_snapshot;
 void TRC_KERNEL(trc_trace_closest)(const struct trc_snapshot *snapshot, struct trc_packet *packets,
                                    struct trc_packet_hits *hits, uint32_t packet_count);
 
+/* The same of one packet whose rays may start below 0, but meet nothing of the instances that they
+ * left at or before it. (kernels/trace_back.c) */
+void TRC_KERNEL(trc_trace_looking_back)(const struct trc_snapshot *snapshot,
+                                        struct trc_packet *packet, struct trc_packet_hits *hits,
+                                        const uint32_t left[TRC_PACKET_SIZE]);
+
 /* Active rays with anything in (tmin, t): a mask for each packet. t is left as it was. */
 void TRC_KERNEL(trc_trace_occluded)(const struct trc_snapshot *snapshot, struct trc_packet *packets,
                                     uint32_t packet_count, uint64_t *occluded);

@@ -107,8 +107,8 @@ static void shade_misses(struct trc_tile *t, const struct arrival *a, vmask miss
 static vvec3 pass_lamps(struct trc_tile *t, const struct arrival *a, vfloat end, uint32_t group) {
     vvec3 c = v3_zero();
     TRC_KERNEL(trc_light_hit)
-    (t->snapshot, a->o, a->n_from, a->d, a->tmin, end, a->pdf, light_count_before(t, a->depths),
-     a->path, group, a->active, &c);
+    (t->snapshot, a->o, a->n_from, a->d, vf_max(a->tmin, vf_set(0.0f)), end, a->pdf,
+     light_count_before(t, a->depths), a->path, group, a->active, &c);
     const vmask seen = vm_and(a->active, vf_gt(v3_max(c), vf_set(0.0f)));
     return v3_where(seen, emission_add(t, a, seen, c, TRC_PASS_EMISSION));
 }
@@ -427,7 +427,8 @@ static void ray_push(struct trc_tile *t, const struct arrival *a, const struct t
     const vvec3 n = v3_select(straight, a->n_from, a->receive_n);
     const vvec3 weight = v3_mul(v3_select(straight, a->found_weight, a->weight), b->weight);
     const vfloat beyond = vf_select(straight, a->beyond, b->beyond);
-    const vfloat tmin = vf_select(straight, a->t, vf_set(0.0f));
+    const vfloat back = t->looks_back ? trc_spawn_look_back(s, o, b->wi, a->t) : vf_set(0.0f);
+    const vfloat tmin = vf_select(straight, a->t, back);
     const vfloat old_far = column(t->work.f[TRC_RAY_TMAX], a);
     const vfloat tmax = vf_select(straight, old_far, vf_set(INFINITY));
     const vmask ideal = vm_or(b->singular, vf_le(b->pdf, vf_set(0.0f)));
@@ -479,6 +480,11 @@ static void ray_push(struct trc_tile *t, const struct arrival *a, const struct t
     vu_compress(out->w[TRC_RAY_PATH] + out->count, path, bits);
     vu_compress(out->w[TRC_RAY_DEPTHS] + out->count, depths, bits);
     vu_compress(out->w[TRC_RAY_PARENT] + out->count, vu_set(material), bits);
+    if (t->looks_back) {
+        const vuint left = word_column(t->work.w[TRC_RAY_LEFT], a);
+        vu_compress(out->w[TRC_RAY_LEFT] + out->count,
+                    (vuint)vi_select(straight, (vint)left, s->instance), bits);
+    }
     out->count += (uint32_t)__builtin_popcount(bits);
 }
 
@@ -561,11 +567,12 @@ static void continue_rays(struct trc_tile *t, const struct arrival *a, const str
  * of the pixel, of those that rough lobes have sent a share of their directions (Suykens and
  * Willems, "Path Differentials and Applications", 2001). Ideal bounces may focus: 0. */
 static vfloat beam_width(const struct trc_tile *t, const struct arrival *a) {
+    const vfloat length = arrival_length(a);
     const vfloat solid = vf_divide(vf_set(1.0f / (float)t->desc->sample_count), a->pdf);
     const vmask camera =
         vi_eq((vint)(a->path & vu_set(TRC_VISIBLE_CAMERA)), vi_set(TRC_VISIBLE_CAMERA));
-    const vfloat bounced = vf_where(vf_gt(a->pdf, vf_set(0.0f)), a->t * vf_safe_sqrt(solid));
-    return vf_select(camera, vf_set(t->beam_width) + a->t * vf_set(t->beam_spread), bounced);
+    const vfloat bounced = vf_where(vf_gt(a->pdf, vf_set(0.0f)), length * vf_safe_sqrt(solid));
+    return vf_select(camera, vf_set(t->beam_width) + length * vf_set(t->beam_spread), bounced);
 }
 
 static void surface_setup(struct trc_tile *t, const struct arrival *a, bool has_footprint,
@@ -578,7 +585,7 @@ static void surface_setup(struct trc_tile *t, const struct arrival *a, bool has_
     s->v = column(t->hits.v, a);
     s->time = a->time;
     s->wo = v3_neg(a->d);
-    s->ray_length = a->t;
+    s->ray_length = arrival_length(a);
     s->path = a->path;
     s->depth = (vint)depth_of(a->depths, TRC_DEPTH_ALL_SHIFT);
     s->diffuse_depth = vi_set(0);
@@ -631,7 +638,7 @@ static void surface_group_add(struct trc_tile *t, const struct arrival *a,
 static vuint data_passes(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
                          const struct trc_material *m, const struct trc_registers *regs,
                          const struct trc_lobes *lobes) {
-    const vfloat length = a->t - a->tmin;
+    const vfloat length = vf_max(a->t - vf_max(a->tmin, vf_set(0.0f)), vf_set(0.0f));
     if (!t->catchers)
         return TRC_KERNEL(trc_data_passes)(t, s, m, regs, lobes, a->found_weight, a->beyond, length,
                                            a->slots);

@@ -35,12 +35,14 @@ static uint32_t stack_capacity(const trc_render_desc *desc) {
     return desc->integrator == TRC_INTEGRATOR_WHITTED ? TRC_BATCH * 8 : TRC_BATCH;
 }
 
-static void carve_rays(struct carver *c, struct trc_ray_store *r, uint32_t capacity) {
+static void carve_rays(struct carver *c, struct trc_ray_store *r, uint32_t capacity,
+                       bool look_back) {
     r->capacity = capacity;
     r->count = 0;
+    r->word_count = look_back ? TRC_RAY_WORDS : TRC_RAY_LEFT;
     for (int i = 0; i < TRC_RAY_FLOATS; i++)
         r->f[i] = carve(c, (capacity + TRC_WIDTH) * sizeof(float));
-    for (int i = 0; i < TRC_RAY_WORDS; i++)
+    for (int i = 0; i < r->word_count; i++)
         r->w[i] = carve(c, (capacity + TRC_WIDTH) * sizeof(uint32_t));
 }
 
@@ -53,13 +55,16 @@ static uint32_t column_entries(bool catchers) {
     return catchers ? TRC_CATCHER_ROWS * TRC_CATCHER_BATCH : TRC_BATCH;
 }
 
-static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc, bool catchers,
+/* Also sets what of the features decides about memory. */
+static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc, uint32_t features,
                          void *memory) {
     struct carver c = {memory, 0};
+    const bool catchers = t->catchers = features & TRC_FEATURE_SHADOW_CATCHERS;
+    t->looks_back = features & TRC_FEATURE_REFRACTION;
     const size_t batch = (column_entries(catchers) + TRC_WIDTH) * sizeof(float);
     const size_t queue = (TRC_SHADOW_QUEUE + TRC_PACKET_SIZE) * sizeof(float);
-    carve_rays(&c, &t->stack, stack_capacity(desc));
-    carve_rays(&c, &t->work, stack_capacity(desc));
+    carve_rays(&c, &t->stack, stack_capacity(desc), t->looks_back);
+    carve_rays(&c, &t->work, stack_capacity(desc), t->looks_back);
     float **const hit_floats[] = {&t->hits.t, &t->hits.u, &t->hits.v};
     for (int i = 0; i < 3; i++)
         *hit_floats[i] = carve(&c, batch);
@@ -99,10 +104,10 @@ static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc, bool c
     return c.used;
 }
 
-size_t TRC_KERNEL(trc_tile_memory_bytes)(const trc_render_desc *desc, bool catchers) {
+size_t TRC_KERNEL(trc_tile_memory_bytes)(const trc_render_desc *desc, uint32_t features) {
     struct trc_tile t;
     memset(&t, 0, sizeof t);
-    return sizeof t + 64 + tile_carve(&t, desc, catchers, NULL);
+    return sizeof t + 64 + tile_carve(&t, desc, features, NULL);
 }
 
 /* ---- sorting ---- */
@@ -261,11 +266,32 @@ static bool bundle_takes(const struct trc_tile *t, const struct bundle *b, uint3
            stays_together(t, ray);
 }
 
+/* Traces a packet on its own if some of its rays look back. */
+static bool looked_back(struct trc_tile *t, const uint32_t *order, uint32_t count,
+                        struct trc_packet *p, struct trc_packet_hits *h) {
+    uint32_t left[TRC_PACKET_SIZE];
+    bool looks = false;
+    for (uint32_t i = 0; i < count; i++)
+        looks |= p->tmin[i] < 0.0f;
+    if (!looks)
+        return false;
+    for (uint32_t i = 0; i < TRC_PACKET_SIZE; i++)
+        left[i] = i < count ? t->work.w[TRC_RAY_LEFT][order[i]] : TRC_NO_HIT;
+    TRC_KERNEL(trc_trace_looking_back)(t->snapshot, p, h, left);
+    p->active = 0;
+    return true;
+}
+
 static void bundle_trace(struct trc_tile *t, struct bundle *b) {
-    for (uint32_t k = 0; k < b->count; k++)
-        packet_load(t, t->order + b->begin[k], b->end[k] - b->begin[k], &t->packets[k],
-                    &t->packet_hits[k]);
-    TRC_KERNEL(trc_trace_closest)(t->snapshot, t->packets, t->packet_hits, b->count);
+    uint32_t left = 0;
+    for (uint32_t k = 0; k < b->count; k++) {
+        const uint32_t *order = t->order + b->begin[k], count = b->end[k] - b->begin[k];
+        packet_load(t, order, count, &t->packets[k], &t->packet_hits[k]);
+        left += !(t->looks_back && t->generation > 0 &&
+                  looked_back(t, order, count, &t->packets[k], &t->packet_hits[k]));
+    }
+    if (left)
+        TRC_KERNEL(trc_trace_closest)(t->snapshot, t->packets, t->packet_hits, b->count);
     for (uint32_t k = 0; k < b->count; k++)
         hits_store(t, t->order + b->begin[k], b->end[k] - b->begin[k], &t->packets[k],
                    &t->packet_hits[k]);
@@ -316,7 +342,7 @@ static void stack_take(struct trc_tile *t) {
     const uint32_t first = from->count - TRC_BATCH;
     for (int i = 0; i < TRC_RAY_FLOATS; i++)
         memcpy(to->f[i], from->f[i] + first, TRC_BATCH * sizeof(float));
-    for (int i = 0; i < TRC_RAY_WORDS; i++)
+    for (int i = 0; i < from->word_count; i++)
         memcpy(to->w[i], from->w[i] + first, TRC_BATCH * sizeof(uint32_t));
     to->count = TRC_BATCH;
     from->count = first;
@@ -619,8 +645,7 @@ void TRC_KERNEL(trc_tile_render)(struct trc_tile_job *job) {
     char *memory = job->memory;
     struct trc_tile *t = (struct trc_tile *)memory;
     memset(t, 0, sizeof *t);
-    t->catchers = job->snapshot->features & TRC_FEATURE_SHADOW_CATCHERS;
-    tile_carve(t, job->desc, t->catchers, memory + ((sizeof *t + 63) & ~(size_t)63));
+    tile_carve(t, job->desc, job->snapshot->features, memory + ((sizeof *t + 63) & ~(size_t)63));
     t->job = job;
     t->snapshot = job->snapshot;
     t->desc = job->desc;

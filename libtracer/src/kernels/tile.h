@@ -69,6 +69,7 @@ enum trc_ray_word {
     TRC_RAY_PATH,
     TRC_RAY_DEPTHS,
     TRC_RAY_PARENT, /* material it left: key of runs and groups */
+    TRC_RAY_LEFT,   /* instance it left; of scenes in which rays look back: kernels/spawn.h */
     TRC_RAY_WORDS
 };
 
@@ -76,6 +77,7 @@ struct trc_ray_store {
     uint32_t capacity, count;
     float *f[TRC_RAY_FLOATS];
     uint32_t *w[TRC_RAY_WORDS];
+    int word_count; /* without TRC_RAY_LEFT where no ray looks back */
 };
 
 struct trc_hit_store {
@@ -132,6 +134,7 @@ struct trc_tile {
     bool light_passes;          /* some pass wants light by kind */
     bool occlusion_passes;      /* some pass wants what shadow rays find, not light */
     bool object_motion;         /* rays need times */
+    bool looks_back;            /* rays go through surfaces: kernels/spawn.h */
     bool camera_common;         /* camera rays start at one point */
     uint32_t packet_size;       /* 1..TRC_PACKET_SIZE */
     uint32_t bundle;            /* packets of a bundle at most, where rays stay together */
@@ -190,7 +193,7 @@ uint32_t TRC_KERNEL(trc_hit_material)(const struct trc_snapshot *snapshot, uint3
 void TRC_KERNEL(trc_clock_trace)(struct trc_tile *t);
 void TRC_KERNEL(trc_clock_shade)(struct trc_tile *t);
 
-size_t TRC_KERNEL(trc_tile_memory_bytes)(const trc_render_desc *desc, bool catchers);
+size_t TRC_KERNEL(trc_tile_memory_bytes)(const trc_render_desc *desc, uint32_t features);
 void TRC_KERNEL(trc_tile_render)(struct trc_tile_job *job);
 
 /* Camera rays of the samples' slots, into the empty stack; also their times. (kernels/camera.c) */

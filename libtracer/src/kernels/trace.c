@@ -8,7 +8,7 @@ void TRC_KERNEL(trc_trace_closest)(const struct trc_snapshot *snapshot, struct t
     if (packet_count > 1)
         TRC_KERNEL(trc_bundle_closest)(snapshot, packets, hits, packet_count);
     else
-        walk_run(snapshot, packets, hits, packet_count, false);
+        walk_run(snapshot, packets, hits, NULL, packet_count, false);
 }
 
 void TRC_KERNEL(trc_trace_occluded)(const struct trc_snapshot *snapshot, struct trc_packet *packets,
@@ -16,5 +16,5 @@ void TRC_KERNEL(trc_trace_occluded)(const struct trc_snapshot *snapshot, struct 
     if (packet_count > 1)
         TRC_KERNEL(trc_bundle_occluded)(snapshot, packets, packet_count, occluded);
     else
-        occluded[0] = walk_run(snapshot, packets, NULL, packet_count, true).of[0];
+        occluded[0] = walk_run(snapshot, packets, NULL, NULL, packet_count, true).of[0];
 }

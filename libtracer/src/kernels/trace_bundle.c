@@ -7,12 +7,12 @@
 
 void TRC_KERNEL(trc_bundle_closest)(const struct trc_snapshot *snapshot, struct trc_packet *packets,
                                     struct trc_packet_hits *hits, uint32_t packet_count) {
-    walk_run(snapshot, packets, hits, packet_count, false);
+    walk_run(snapshot, packets, hits, NULL, packet_count, false);
 }
 
 void TRC_KERNEL(trc_bundle_occluded)(const struct trc_snapshot *snapshot,
                                      struct trc_packet *packets, uint32_t packet_count,
                                      uint64_t *occluded) {
-    const struct trc_live found = walk_run(snapshot, packets, NULL, packet_count, true);
+    const struct trc_live found = walk_run(snapshot, packets, NULL, NULL, packet_count, true);
     memcpy(occluded, found.of, packet_count * sizeof *occluded);
 }

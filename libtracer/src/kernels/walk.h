@@ -381,12 +381,14 @@ static void item_packet(struct walk *w, const struct trc_item *item, struct trc_
 /* Traces the active rays of the packets. Returns the mask of those of each that are occluded, or
  * none of closest hits. */
 static struct trc_live walk_run(const struct trc_snapshot *snapshot, struct trc_packet *packets,
-                                struct trc_packet_hits *hits, uint32_t count, bool any) {
+                                struct trc_packet_hits *hits, const uint32_t *left, uint32_t count,
+                                bool any) {
     struct trc_live active = {{0}};
     struct walk w = {.snapshot = snapshot,
                      .tree = snapshot->bvh->tree,
                      .packets = packets,
                      .hits = hits,
+                     .left = left,
                      .instance = TRC_NO_HIT};
     for (uint32_t k = 0; k < count; k++)
         active.of[k] = packets[k].active;

@@ -13,6 +13,13 @@
 #define TRC_COUNT(what, amount) ((void)0)
 #endif
 
+/* Whether rays look back (kernels/spawn.h): with a tmin of 0 or below, they must not meet the
+ * instance that they left at or before 0. The walk is compiled once more for them: asked of every
+ * packet, it costs the others 4 to 9 % of their time. */
+#ifndef TRC_WALK_LOOKS_BACK
+#define TRC_WALK_LOOKS_BACK 0
+#endif
+
 struct walk {
     const struct trc_snapshot *snapshot;
     const struct trc_tree *tree;
@@ -22,6 +29,7 @@ struct walk {
     uint32_t instance;            /* of the tree; TRC_NO_HIT: leaves say */
     uint32_t key;                 /* moving trees: first key of the segment */
     struct trc_group *group;
+    const uint32_t *left; /* looking back: the instances that the packet's rays left */
 };
 
 /* ---- packets ---- */
@@ -80,15 +88,42 @@ TRC_INLINE uint32_t slot_instance(const struct walk *w, struct trc_slot slot) {
     return w->instance == TRC_NO_HIT ? slot.instance & TRC_SLOT_INSTANCE_MASK : w->instance;
 }
 
+/* How far hits of a slot must be ahead, of a chunk of rays and of one. */
+TRC_INLINE vfloat least_distances(const struct walk *w, int k, int i, const struct trc_slot *slot) {
+    const vfloat tmin = vf_load(&w->packets[k].tmin[i]);
+    if (!TRC_WALK_LOOKS_BACK)
+        return tmin;
+    const vint instance = vi_set((int32_t)slot_instance(w, *slot));
+    return vf_select(vi_eq(vi_load((const int32_t *)w->left + i), instance),
+                     vf_max(tmin, vf_set(0.0f)), tmin);
+}
+TRC_INLINE float least_distance(const struct walk *w, int k, int ray, const struct trc_slot *slot) {
+    const float tmin = w->packets[k].tmin[ray];
+    if (!TRC_WALK_LOOKS_BACK || w->left[ray] != slot_instance(w, *slot))
+        return tmin;
+    return f_max(tmin, 0.0f);
+}
+
+/* From such a distance on those of triangles are to be precise: floats may put what a ray looks
+ * back for too far behind it. */
+TRC_INLINE vfloat precise_beyond(vfloat least) {
+    if (!TRC_WALK_LOOKS_BACK)
+        return least;
+    return vf_select(vf_lt(least, vf_set(0.0f)), vf_set(-INFINITY), least);
+}
+TRC_INLINE float precise_beyond_one(float least) {
+    return TRC_WALK_LOOKS_BACK && least < 0.0f ? -INFINITY : least;
+}
+
 /* Keeps hits that are nearer than the ray's, or as near with a lower number. What is infinitely far
  * is none: distances of extreme directions overflow. */
 TRC_INLINE uint32_t hits_keep(const struct walk *w, int k, int i, vmask hit, vfloat t, vfloat u,
-                              vfloat v, struct trc_slot slot) {
+                              vfloat v, const struct trc_slot *slot) {
     struct trc_packet *p = &w->packets[k];
     struct trc_packet_hits *h = &w->hits[k];
-    const uint32_t instance = slot_instance(w, slot), triangle = slot.triangle;
+    const uint32_t instance = slot_instance(w, *slot), triangle = slot->triangle;
     const vfloat best = vf_load(&p->t[i]);
-    vmask keep = vm_and(hit, vm_and(vf_lt(t, best), vf_gt(t, vf_load(&p->tmin[i]))));
+    vmask keep = vm_and(hit, vm_and(vf_lt(t, best), vf_gt(t, least_distances(w, k, i, slot))));
     uint32_t ties = vm_bits(vm_and(hit, vf_eq(t, best)));
     if (__builtin_expect(ties != 0, 0)) {
         uint32_t bits = vm_bits(keep);
@@ -96,7 +131,7 @@ TRC_INLINE uint32_t hits_keep(const struct walk *w, int k, int i, vmask hit, vfl
             const int l = i + __builtin_ctz(ties);
             const bool lower = instance < h->instance[l] ||
                                (instance == h->instance[l] && triangle < h->triangle[l]);
-            if (lower && p->t[l] > p->tmin[l] && p->t[l] < INFINITY)
+            if (lower && p->t[l] > least_distance(w, k, l, slot) && p->t[l] < INFINITY)
                 bits |= ties & -ties;
         }
         keep = vm_from_bits(bits);
@@ -167,7 +202,8 @@ TRC_INLINE uint64_t slot_packet(struct walk *w, const struct leaf *leaf, int slo
         vfloat t, bu, bv;
         vmask hit = trc_triangle_test(tri, vf_load(&p->o[axis.u][i]), vf_load(&p->o[axis.v][i]),
                                       vf_load(&p->o[axis.z][i]), vf_load(&g->su[i]),
-                                      vf_load(&g->sv[i]), vf_load(&g->sz[i]), vf_load(&p->tmin[i]),
+                                      vf_load(&g->sv[i]), vf_load(&g->sz[i]),
+                                      precise_beyond(least_distances(w, k, i, &leaf->ids[slot])),
                                       most, vm_from_bits(bits), &t, &bu, &bv);
         if (!vm_any(hit))
             continue;
@@ -175,7 +211,7 @@ TRC_INLINE uint64_t slot_packet(struct walk *w, const struct leaf *leaf, int slo
             hit = vm_and(hit, vm_and(vf_gt(t, vf_load(&p->tmin[i])), vf_lt(t, vf_load(&p->t[i]))));
             found |= (uint64_t)vm_bits(hit) << i;
         } else {
-            found |= (uint64_t)hits_keep(w, k, i, hit, t, bu, bv, leaf->ids[slot]) << i;
+            found |= (uint64_t)hits_keep(w, k, i, hit, t, bu, bv, &leaf->ids[slot]) << i;
         }
     }
     return found;
@@ -249,13 +285,13 @@ TRC_INLINE bool leaf_single(struct walk *w, uint32_t ref, int k, int ray, bool a
     f8 t, bu, bv;
     TRC_COUNT(single_leaves, 1);
     TRC_COUNT(single_triangles, count);
-    uint32_t hit = trc_triangle8_test(&tri, p->o[axis.u][ray], p->o[axis.v][ray], p->o[axis.z][ray],
-                                      g->su[ray], g->sv[ray], g->sz[ray], p->tmin[ray],
-                                      (1u << count) - 1u, &t, &bu, &bv);
+    uint32_t hit = trc_triangle8_test(
+        &tri, p->o[axis.u][ray], p->o[axis.v][ray], p->o[axis.z][ray], g->su[ray], g->sv[ray],
+        g->sz[ray], precise_beyond_one(p->tmin[ray]), (1u << count) - 1u, &t, &bu, &bv);
     for (; hit; hit &= hit - 1) {
         const int slot = __builtin_ctz(hit);
         const float distance = t[slot];
-        if (!(distance > p->tmin[ray]))
+        if (!(distance > least_distance(w, k, ray, &ids[slot])))
             continue;
         if (any) {
             if (distance < p->t[ray] &&

@@ -259,9 +259,9 @@ fail:
 
 static trc_status take_memory(struct trc_render_state *render) {
     const trc_render_desc *desc = &render->desc;
-    const bool catchers = render->snapshot->features & TRC_FEATURE_SHADOW_CATCHERS;
+    const uint32_t features = render->snapshot->features;
     TRC_TRY(trc_film_create(desc, &render->film));
-    if (catchers)
+    if (features & TRC_FEATURE_SHADOW_CATCHERS)
         TRC_TRY(trc_film_add_catchers(&render->film));
     if (desc->noise_threshold > 0.0f)
         TRC_TRY(trc_adaptive_create(desc, &render->adaptive));
@@ -276,7 +276,7 @@ static trc_status take_memory(struct trc_render_state *render) {
     render->batch_tiles = trc_alloc_zeroed(schedule->batch_count, sizeof(uint32_t));
     render->workers = trc_alloc_zeroed(render->worker_count, sizeof *render->workers);
     bool ok = render->tile_batches && render->batch_tiles && render->workers;
-    const size_t memory_bytes = render->kernels->tile_memory_bytes(desc, catchers);
+    const size_t memory_bytes = render->kernels->tile_memory_bytes(desc, features);
     for (uint32_t i = 0; ok && i < render->worker_count; i++) {
         render->workers[i].render = render;
         render->workers[i].memory = trc_alloc(memory_bytes, 1);
