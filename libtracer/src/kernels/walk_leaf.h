@@ -111,8 +111,15 @@ TRC_INLINE vfloat precise_beyond(vfloat least) {
         return least;
     return vf_select(vf_lt(least, vf_set(0.0f)), vf_set(-INFINITY), least);
 }
-TRC_INLINE float precise_beyond_one(float least) {
-    return TRC_WALK_LOOKS_BACK && least < 0.0f ? -INFINITY : least;
+TRC_INLINE float leaf_precise_beyond(const struct walk *w, int k, int ray,
+                                     const struct trc_slot *slots, uint32_t count) {
+    const float tmin = w->packets[k].tmin[ray];
+    if (!TRC_WALK_LOOKS_BACK || tmin >= 0.0f)
+        return tmin;
+    bool others = false;
+    for (uint32_t slot = 0; slot < count; slot++)
+        others |= slot_instance(w, slots[slot]) != w->left[ray];
+    return others ? -INFINITY : 0.0f;
 }
 
 /* Keeps hits that are nearer than the ray's, or as near with a lower number. What is infinitely far
@@ -287,7 +294,7 @@ TRC_INLINE bool leaf_single(struct walk *w, uint32_t ref, int k, int ray, bool a
     TRC_COUNT(single_triangles, count);
     uint32_t hit = trc_triangle8_test(
         &tri, p->o[axis.u][ray], p->o[axis.v][ray], p->o[axis.z][ray], g->su[ray], g->sv[ray],
-        g->sz[ray], precise_beyond_one(p->tmin[ray]), (1u << count) - 1u, &t, &bu, &bv);
+        g->sz[ray], leaf_precise_beyond(w, k, ray, ids, count), (1u << count) - 1u, &t, &bu, &bv);
     for (; hit; hit &= hit - 1) {
         const int slot = __builtin_ctz(hit);
         const float distance = t[slot];
