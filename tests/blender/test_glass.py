@@ -54,3 +54,29 @@ def test_against_cycles(means, distribution, roughness):
         assert theirs * (1.0 - 1.5 * TOLERANCE) < ours < WORLD * (1.0 + TOLERANCE)
     else:
         assert ours == pytest.approx(theirs, rel=TOLERANCE)
+
+
+def block_on_a_floor():
+    """(mean seen straight down through the block, mean of the floor beside it) by Volley, by Cycles"""
+    import bpy
+    import scenes
+    scenes.empty(size=(SIZE, SIZE))
+    scenes.camera(location=(0.0, 0.0, 8.0), rotation=(0.0, 0.0, 0.0))
+    bpy.context.scene.world.color = (WORLD,) * 3
+    grey = scenes.material("Grey", "ShaderNodeBsdfDiffuse", Color=(0.5, 0.5, 0.5))
+    scenes.mesh("Floor", [(-20, -20, 0), (20, -20, 0), (20, 20, 0), (-20, 20, 0)], [(0, 1, 2, 3)], grey)
+    bpy.ops.mesh.primitive_cube_add(size=2.0, location=(0.0, 0.0, 1.0), rotation=(0.0, 0.0, 0.6))
+    bpy.context.object.data.materials.append(
+        scenes.material("Glass", "ShaderNodeBsdfGlass", Color=(1.0, 1.0, 1.0), Roughness=0.0, IOR=1.45))
+    middle = slice(SIZE // 2 - 3, SIZE // 2 + 3)
+    seen = [(float(picture[middle, middle, :3].mean()), float(picture[:3, :, :3].mean()))
+            for picture in scenes.by_both(SAMPLES)]
+    return seen
+
+
+def test_floor_below_a_block(blender):
+    """Light does not come through glass to the floor that it stands on, so the floor is dark there."""
+    ours, theirs = blender.run(block_on_a_floor)
+    assert ours[1] == pytest.approx(theirs[1], rel=TOLERANCE)
+    # The upper face mirrors the sky; where the lower one is met before the floor, it does so, too.
+    assert theirs[0] * (1.0 - TOLERANCE) < ours[0] < theirs[0] * (2.0 + TOLERANCE) < 0.5 * ours[1]
