@@ -16,8 +16,8 @@ struct arrival {
     vvec3 weight;       /* of light and rays that scatter here: found_weight * beyond */
     vfloat beyond;      /* kernels/bsdf.h, trc_bsdf_sample */
     vvec3 receive_n;    /* normal as kernels/light.h wants it of the surface hit */
-    vfloat t, tmin;     /* of what coincides with the surface that the ray left: 0 or below */
-    vfloat time, pdf, min_pdf;
+    vfloat t;           /* 0 or below: what coincides with the surface that the ray left */
+    vfloat tmin, time, pdf, min_pdf;
     vfloat
         chance; /* that a continuation ray is sent: densities of its directions have it in them */
     vuint slot, path, depths, pixel, sample;

@@ -40,7 +40,7 @@ struct trc_tile_job {
 struct trc_kernels {
     uint32_t isa;   /* TRC_ISA_* */
     uint32_t width; /* lanes */
-    /* Bytes of scratch memory a tile job needs; catchers: the scene has shadow catchers. */
+    /* Bytes of scratch memory a tile job needs; features: the scene's, TRC_FEATURE_*. */
     size_t (*tile_memory_bytes)(const trc_render_desc *desc, uint32_t features);
     /* Renders a job; never fails. The thread's floating-point state must be the default. */
     void (*tile_render)(struct trc_tile_job *job);

@@ -55,8 +55,8 @@ struct trc_snapshot;
 void TRC_KERNEL(trc_trace_closest)(const struct trc_snapshot *snapshot, struct trc_packet *packets,
                                    struct trc_packet_hits *hits, uint32_t packet_count);
 
-/* The same of one packet whose rays may start below 0, but meet nothing of the instances that they
- * left at or before it. (kernels/trace_back.c) */
+/* The same of one packet whose rays may have a tmin below 0, but meet nothing at or before 0 of the
+ * instances that they left. (kernels/trace_back.c) */
 void TRC_KERNEL(trc_trace_looking_back)(const struct trc_snapshot *snapshot,
                                         struct trc_packet *packet, struct trc_packet_hits *hits,
                                         const uint32_t left[TRC_PACKET_SIZE]);

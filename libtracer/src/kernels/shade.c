@@ -106,6 +106,7 @@ static void shade_misses(struct trc_tile *t, const struct arrival *a, vmask miss
 /* Lamps of a light group, or of all, that the rays pass on their way to end. */
 static vvec3 pass_lamps(struct trc_tile *t, const struct arrival *a, vfloat end, uint32_t group) {
     vvec3 c = v3_zero();
+    /* It is surfaces alone that rays look back for. */
     TRC_KERNEL(trc_light_hit)
     (t->snapshot, a->o, a->n_from, a->d, vf_max(a->tmin, vf_set(0.0f)), end, a->pdf,
      light_count_before(t, a->depths), a->path, group, a->active, &c);

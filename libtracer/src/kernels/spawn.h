@@ -3,7 +3,6 @@
 #define TRACER_KERNELS_SPAWN_H
 
 #include "kernels/surface.h"
-#include "kernels/wide_math.h"
 
 /* One float further in the direction of the offset than x + offset: the bits of a float count
  * upwards with its magnitude. */
@@ -32,6 +31,9 @@ TRC_INLINE vvec3 trc_spawn_origin(const struct trc_surface *s, vmask outside) {
               trc_spawn_away(s->p.z, offset.z));
 }
 
+/* Cosine from which rays do not look back all the way: what they met would be somewhere else. */
+#define TRC_GRAZING 1e-3f
+
 /* How far a ray that leaves s from o in direction w looks back for surfaces of other instances that
  * coincide with s, 0 or below: a glass on a table, ice in water. Which of them a ray meets first is
  * left to rounding, and it starts beyond them all. It met s at a distance t from where it last
@@ -43,17 +45,16 @@ TRC_INLINE vvec3 trc_spawn_origin(const struct trc_surface *s, vmask outside) {
 TRC_INLINE vfloat trc_spawn_look_back(const struct trc_surface *s, vvec3 o, vvec3 w, vfloat t) {
     const vfloat zero = vf_set(0.0f), two = vf_set(2.0f);
     const vfloat cosine = v3_dot(w, s->ng);
-    /* What the origin was moved by, and both surfaces' errors; none on planes through the origin.
-     */
+    /* What the origin was moved by and both surfaces' errors: 0 on planes through the world's. */
     const vfloat moved = vf_abs(v3_dot(v3_sub(o, s->p), s->ng));
     const vfloat depth = vf_max(vf_madd(two, trc_spawn_reach(s), moved), vf_set(1e-30f));
-    const vfloat behind = vf_divide(-depth, vf_abs(cosine));
+    const vfloat behind = -depth / vf_max(vf_abs(cosine), vf_set(TRC_GRAZING));
     const vmask through = vf_lt(cosine, zero);
     const vmask alone = vf_gt(t * v3_dot(s->wo, s->ng), two * depth);
     const vmask looks = vm_or(vm_and(through, alone), vm_andnot(vf_le(t, zero), through));
     /* Not as far as where the ray came from. */
     const vfloat most = vf_select(through, vf_set(-0.5f) * t, behind);
-    return vf_where(looks, vf_max(behind, most));
+    return vf_select(looks, vf_max(behind, most), zero);
 }
 
 #endif

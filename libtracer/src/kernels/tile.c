@@ -283,14 +283,14 @@ static bool looked_back(struct trc_tile *t, const uint32_t *order, uint32_t coun
 }
 
 static void bundle_trace(struct trc_tile *t, struct bundle *b) {
-    uint32_t left = 0;
+    uint32_t together = 0;
     for (uint32_t k = 0; k < b->count; k++) {
         const uint32_t *order = t->order + b->begin[k], count = b->end[k] - b->begin[k];
         packet_load(t, order, count, &t->packets[k], &t->packet_hits[k]);
-        left += !(t->looks_back && t->generation > 0 &&
-                  looked_back(t, order, count, &t->packets[k], &t->packet_hits[k]));
+        together += !(t->looks_back && t->generation > 0 &&
+                      looked_back(t, order, count, &t->packets[k], &t->packet_hits[k]));
     }
-    if (left)
+    if (together)
         TRC_KERNEL(trc_trace_closest)(t->snapshot, t->packets, t->packet_hits, b->count);
     for (uint32_t k = 0; k < b->count; k++)
         hits_store(t, t->order + b->begin[k], b->end[k] - b->begin[k], &t->packets[k],
