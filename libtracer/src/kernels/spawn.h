@@ -47,7 +47,7 @@ TRC_INLINE vfloat trc_spawn_look_back(const struct trc_surface *s, vvec3 o, vvec
     const vfloat cosine = v3_dot(w, s->ng);
     /* What the origin was moved by and both surfaces' errors: 0 on planes through the world's. */
     const vfloat moved = vf_abs(v3_dot(v3_sub(o, s->p), s->ng));
-    const vfloat depth = vf_max(vf_madd(two, trc_spawn_reach(s), moved), vf_set(1e-30f));
+    const vfloat depth = vf_max(two * trc_spawn_reach(s) + moved, vf_set(1e-30f));
     const vfloat behind = -depth / vf_max(vf_abs(cosine), vf_set(TRC_GRAZING));
     const vmask through = vf_lt(cosine, zero);
     const vmask alone = vf_gt(t * v3_dot(s->wo, s->ng), two * depth);
