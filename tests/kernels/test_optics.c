@@ -41,13 +41,7 @@ static void add_shape_at(trc_scene scene, struct mesh *shape, const float transf
     desc.position_count = 3 * shape->vertex_count;
     desc.indices = shape->indices;
     desc.index_count = 3 * shape->triangle_count;
-    trc_id mesh = 0, instance = 0;
-    assert_ok(trc_mesh_create(scene, &desc, &mesh));
-    trc_instance_desc instance_desc = default_instance_desc(mesh);
-    instance_desc.transforms = transform;
-    instance_desc.materials = &material;
-    instance_desc.material_count = 1;
-    assert_ok(trc_instance_create(scene, &instance_desc, &instance));
+    fixture_mesh_at(scene, &desc, transform, material, 0);
     mesh_free(shape);
 }
 

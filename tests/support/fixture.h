@@ -47,17 +47,23 @@ FIXTURE_INLINE void fixture_draw(trc_scene scene, const trc_render_desc *desc, u
 
 /* ---- for closed forms: level squares seen from above ---- */
 
-/* An instance of a mesh, where the mesh is. flags: TRC_INSTANCE_*. */
-FIXTURE_INLINE trc_id fixture_mesh(trc_scene scene, const trc_mesh_desc *desc, trc_id material,
-                                   uint32_t flags) {
+/* An instance of a mesh, moved by a transform, or where the mesh is. flags: TRC_INSTANCE_*. */
+FIXTURE_INLINE trc_id fixture_mesh_at(trc_scene scene, const trc_mesh_desc *desc,
+                                      const float transform[12], trc_id material, uint32_t flags) {
     trc_id mesh = 0, instance = 0;
     assert_int_equal(trc_mesh_create(scene, desc, &mesh), TRC_OK);
     trc_instance_desc instance_desc = default_instance_desc(mesh);
+    instance_desc.transforms = transform;
     instance_desc.materials = &material;
     instance_desc.material_count = 1;
     instance_desc.flags = flags;
     assert_int_equal(trc_instance_create(scene, &instance_desc, &instance), TRC_OK);
     return instance;
+}
+
+FIXTURE_INLINE trc_id fixture_mesh(trc_scene scene, const trc_mesh_desc *desc, trc_id material,
+                                   uint32_t flags) {
+    return fixture_mesh_at(scene, desc, identity_transform, material, flags);
 }
 
 /* Two triangles; a, b, c, d counter-clockwise as seen from the front. */
