@@ -21,12 +21,20 @@ static inline f4 trc_part_point(const struct trc_part *part, f4 p) {
     return x * f4_set(p[0]) + y * f4_set(p[1]) + z * f4_set(p[2]) + w;
 }
 
-/* The corners of the triangle with those vertices. */
-static inline void trc_part_corners(const struct trc_part *part, const uint32_t index[3],
-                                    uint32_t key, f4 corner[3]) {
+/* The corners of the triangle with those vertices, in the part's space. */
+static inline void trc_part_corners_unplaced(const struct trc_part *part, const uint32_t index[3],
+                                             uint32_t key, f4 corner[3]) {
     const float *positions = trc_part_positions(part, key);
     for (int v = 0; v < 3; v++)
-        corner[v] = trc_part_point(part, f4_load3_padded(positions + 3 * (size_t)index[v]));
+        corner[v] = f4_load3_padded(positions + 3 * (size_t)index[v]);
+}
+
+/* The same in the tree's. */
+static inline void trc_part_corners(const struct trc_part *part, const uint32_t index[3],
+                                    uint32_t key, f4 corner[3]) {
+    trc_part_corners_unplaced(part, index, key, corner);
+    for (int v = 0; v < 3; v++)
+        corner[v] = trc_part_point(part, corner[v]);
 }
 
 #endif

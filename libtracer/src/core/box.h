@@ -37,16 +37,31 @@ static inline f4 f4_abs(f4 a) {
 /* Lanes y, z, x. */
 static inline f4 f4_yzx(f4 a) { return __builtin_shufflevector(a, a, 1, 2, 0, 3); }
 
+static inline f4 f4_load4(const float p[4]) {
+    f4 a;
+    memcpy(&a, p, sizeof a);
+    return a;
+}
 static inline f4 f4_load3(const float p[3]) { return (f4){p[0], p[1], p[2], 0.0f}; }
 /* The same where a fourth float can be read. */
 static inline f4 f4_load3_padded(const float p[4]) {
     const i4 three = {-1, -1, -1, 0};
-    f4 a;
-    memcpy(&a, p, sizeof a);
-    return (f4)((i4)a & three);
+    return (f4)((i4)f4_load4(p) & three);
 }
+static inline void f4_store4(float p[4], f4 a) { memcpy(p, &a, sizeof a); }
 static inline void f4_store3(float p[3], f4 a) { memcpy(p, &a, 3 * sizeof *p); }
 
+/* Rows to columns. */
+static inline void f4_transpose(f4 rows[4]) {
+    const f4 a = __builtin_shufflevector(rows[0], rows[1], 0, 4, 1, 5),
+             b = __builtin_shufflevector(rows[2], rows[3], 0, 4, 1, 5),
+             c = __builtin_shufflevector(rows[0], rows[1], 2, 6, 3, 7),
+             d = __builtin_shufflevector(rows[2], rows[3], 2, 6, 3, 7);
+    rows[0] = __builtin_shufflevector(a, b, 0, 1, 4, 5);
+    rows[1] = __builtin_shufflevector(a, b, 2, 3, 6, 7);
+    rows[2] = __builtin_shufflevector(c, d, 0, 1, 4, 5);
+    rows[3] = __builtin_shufflevector(c, d, 2, 3, 6, 7);
+}
 struct box {
     f4 lower, upper;
 };
@@ -63,6 +78,14 @@ static inline void box_add(struct box *b, f4 point) { box_grow(b, (struct box){p
 static inline void box_add_number(struct box *b, f4 point) {
     b->lower = f4_min(point, b->lower);
     b->upper = f4_max(point, b->upper);
+}
+/* Around four boxes side by side in the lanes, by axis. */
+static inline struct box box_around4(const f4 lower[3], const f4 upper[3]) {
+    f4 l[4] = {lower[0], lower[1], lower[2]}, u[4] = {upper[0], upper[1], upper[2]};
+    f4_transpose(l);
+    f4_transpose(u);
+    return (struct box){f4_min(f4_min(l[0], l[1]), f4_min(l[2], l[3])),
+                        f4_max(f4_max(u[0], u[1]), f4_max(u[2], u[3]))};
 }
 /* Lengths of the edges; 0 for an empty box. */
 static inline f4 box_size(struct box b) { return f4_max(b.upper - b.lower, f4_set(0.0f)); }
