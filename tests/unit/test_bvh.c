@@ -169,8 +169,9 @@ static float cost_before(const struct trc_range *r, uint32_t at) {
     right.count -= at;
     trc_range_measure(&left);
     trc_range_measure(&right);
-    return box_area(left.bounds) * (float)left.triangles +
-           box_area(right.bounds) * (float)right.triangles;
+    const float margin = trc_range_margin(r);
+    return box_area_wider(left.bounds, margin) * (float)left.triangles +
+           box_area_wider(right.bounds, margin) * (float)right.triangles;
 }
 
 /* Up to eight triangles: the cheapest of all planes along the longest axis. */
@@ -199,6 +200,32 @@ static void few_refs_split_at_the_best(void **state) {
         assert_true(left.centroids.upper[axis] <= right.centroids.lower[axis]);
         free(all.refs);
     }
+}
+
+/* A flat grid has the same area however it is cut: across its longer side. */
+static void flat_ranges_are_cut_into_squares(void **state) {
+    (void)state;
+    static const uint32_t sides[][2] = {{3, 1}, {1, 3}, {96, 32}, {32, 96}, {200, 180}, {180, 200}};
+    for (size_t k = 0; k < sizeof sides / sizeof *sides; k++)
+        for (int flat = 0; flat < 3; flat++) {
+            const uint32_t columns = sides[k][0], rows = sides[k][1], count = columns * rows;
+            const int u = (flat + 1) % 3, v = (flat + 2) % 3;
+            struct trc_range all = random_range(count, k);
+            for (uint32_t i = 0; i < count; i++) {
+                struct trc_ref *ref = &all.refs[i];
+                memset(ref, 0, sizeof *ref);
+                ref->primitive = i;
+                ref->lower[u] = (float)(i % columns);
+                ref->lower[v] = (float)(i / columns);
+                ref->upper[u] = ref->lower[u] + 1.0f;
+                ref->upper[v] = ref->lower[v] + 1.0f;
+            }
+            trc_range_measure(&all);
+            struct trc_split s;
+            trc_kernels_current()->split_find(NULL, &all, &s);
+            assert_int_equal(s.axis, columns > rows ? u : v);
+            free(all.refs);
+        }
 }
 
 /* ---- what trees are built from ---- */
@@ -656,6 +683,7 @@ int main(void) {
         cmocka_unit_test(clusters_open_into_slots),
         cmocka_unit_test(splits_are_the_same),
         cmocka_unit_test(few_refs_split_at_the_best),
+        cmocka_unit_test(flat_ranges_are_cut_into_squares),
         cmocka_unit_test(any_number_of_triangles),
         cmocka_unit_test(shapes_and_instances),
         cmocka_unit_test(moving_meshes),

@@ -18,7 +18,7 @@
 
 /* Cost of visiting a node against one triangle of a leaf. A leaf is one block whatever its count,
  * and packets cull its triangles in one step, so leaves may be full. */
-#define NODE_COST 3.0f
+#define NODE_COST 4.0f
 /* From this level (of 8-wide nodes) on, ranges are halved whatever the SAH says: 2^28 refs are
  * exhausted within TRC_MAX_LEVELS. */
 #define MEDIAN_LEVEL 32
@@ -105,7 +105,7 @@ static bool range_divide(struct builder *b, const struct trc_range *r, uint32_t 
     struct trc_split_blocks *blocks = r->count > TRC_SHARED_RANGE ? b->blocks : NULL;
     struct trc_split s;
     b->kernels->split_find(blocks, r, &s);
-    const float area = box_area(r->bounds);
+    const float area = box_area_wider(r->bounds, trc_range_margin(r));
     if (!must && !(s.axis >= 0 && s.cost + area * NODE_COST < area * (float)count))
         return false;
     if (s.axis < 0)
@@ -120,10 +120,11 @@ static bool range_divide(struct builder *b, const struct trc_range *r, uint32_t 
 static int range_open(struct builder *b, const struct trc_range *r, uint32_t level,
                       struct trc_range out[TRC_NODE_WIDTH], bool closed[TRC_NODE_WIDTH]) {
     int count = 1;
+    const float margin = trc_range_margin(r);
     float area[TRC_NODE_WIDTH]; /* -1: of those that are closed */
     memset(closed, 0, TRC_NODE_WIDTH * sizeof *closed);
     out[0] = *r;
-    area[0] = box_area(r->bounds);
+    area[0] = box_area_wider(r->bounds, margin);
     while (count < TRC_NODE_WIDTH) {
         int best = 0;
         for (int i = 1; i < count; i++)
@@ -139,8 +140,8 @@ static int range_open(struct builder *b, const struct trc_range *r, uint32_t lev
         }
         out[best] = left;
         out[count] = right;
-        area[best] = box_area(left.bounds);
-        area[count++] = box_area(right.bounds);
+        area[best] = box_area_wider(left.bounds, margin);
+        area[count++] = box_area_wider(right.bounds, margin);
     }
     return count;
 }

@@ -13,6 +13,19 @@ struct trc_range {
     struct box bounds, centroids; /* centroids: of lower + upper */
 };
 
+/* Boxes within a range count as longer by this part of its longest edge: packets meet a box if one
+ * as much wider as they are is met by their middle, and boxes smaller than a packet spare nothing.
+ * So of flat ranges, which have the same area however they are cut, squares come out, not strips.
+ * Rays are 1 % faster in the mean of six scenes, and there are a quarter fewer nodes. 0.03 to 0.3
+ * are as good; a part of the whole tree's edge (0.0005 to 0.002) is, too, but would be too much for
+ * what is small in a large scene. */
+#define TRC_RANGE_MARGIN 0.1f
+static inline float trc_range_margin(const struct trc_range *r) {
+    const f4 size = box_size(r->bounds);
+    const float yz = size[1] > size[2] ? size[1] : size[2];
+    return TRC_RANGE_MARGIN * (size[0] > yz ? size[0] : yz);
+}
+
 /* What its refs say: triangles and both boxes. */
 static inline void trc_range_measure(struct trc_range *r) {
     r->triangles = 0;

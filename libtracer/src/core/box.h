@@ -89,11 +89,14 @@ static inline struct box box_around4(const f4 lower[3], const f4 upper[3]) {
 }
 /* Lengths of the edges; 0 for an empty box. */
 static inline f4 box_size(struct box b) { return f4_max(b.upper - b.lower, f4_set(0.0f)); }
-/* Half the surface; 0 for an empty box. */
-static inline float box_area(struct box b) {
-    const f4 d = box_size(b), face = d * f4_yzx(d);
+/* Half the surface of a box that is longer by margin along each axis; of an empty one, as of a
+ * point. */
+static inline float box_area_wider(struct box b, float margin) {
+    const f4 d = box_size(b) + f4_set(margin), face = d * f4_yzx(d);
     return face[0] + face[1] + face[2];
 }
+/* Half the surface; 0 for an empty box. */
+static inline float box_area(struct box b) { return box_area_wider(b, 0.0f); }
 /* The same of four boxes by their sizes. */
 static inline f4 box_areas(const f4 size[4]) {
     const f4 xy0 = __builtin_shufflevector(size[0], size[1], 0, 4, 1, 5),

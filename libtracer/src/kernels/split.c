@@ -11,10 +11,14 @@
 #include "kernels/simd8.h"
 #include "threads/pool.h"
 
-/* Where triangles are few, half as many bins are as good. What might stay a leaf is sorted instead,
- * along the longest axis alone (for all few triangles, that costs 3 %). */
+/* Where triangles are few, fewer bins are as good. What might stay a leaf is sorted instead, along
+ * the longest axis alone (for all few triangles, that costs 3 %). Where they are many, more bins
+ * cost nothing, and rays are 1 % faster in the mean of six scenes: single kinds of rays by -28 to
+ * 24 %, as the first planes are drawn elsewhere. */
 #define FEW_TRIANGLES 24
 #define FEW_BINS 8
+#define MANY_TRIANGLES 4096
+#define SOME_BINS 16
 
 /* Refs from which every other one is counted into bins of its own: neighbours in a mesh mostly fall
  * into one bin, and would wait for each other's store (builds +3 %). */
@@ -130,19 +134,19 @@ static void bins_fill(const struct trc_ref *refs, uint32_t count, const struct t
 }
 
 /* Sweeps the bins of one axis from both ends, keeping the cheapest plane. */
-static void bins_sweep(const struct trc_bins *bins, int axis, struct trc_split *s) {
+static void bins_sweep(const struct trc_bins *bins, int axis, float margin, struct trc_split *s) {
     f4 left_size[TRC_BIN_COUNT], right_size[TRC_BIN_COUNT]; /* of both sides of the plane below */
     float left_count[TRC_BIN_COUNT], right_count[TRC_BIN_COUNT];
     bounds left = bounds_empty(), right = bounds_empty();
     uint32_t before = 0, after = 0;
     for (int i = 0, k = s->bin_count - 1; k >= 0; i++, k--) {
-        left_size[i] = bounds_size(left);
+        left_size[i] = bounds_size(left) + f4_set(margin);
         left_count[i] = (float)before;
         left = bounds_min(left, bounds_load(&bins->box[axis][i]));
         before += count_triangles(bins->count[axis][i]);
         right = bounds_min(right, bounds_load(&bins->box[axis][k]));
         after += count_triangles(bins->count[axis][k]);
-        right_size[k] = bounds_size(right);
+        right_size[k] = bounds_size(right) + f4_set(margin);
         right_count[k] = (float)after;
     }
     for (int i = 0; i < s->bin_count; i += 4) {
@@ -163,10 +167,10 @@ static void bins_sweep(const struct trc_bins *bins, int axis, struct trc_split *
 }
 
 /* Its cheapest plane. */
-static void bins_choose(const struct trc_bins *bins, struct trc_split *s) {
+static void bins_choose(const struct trc_bins *bins, float margin, struct trc_split *s) {
     for (int axis = 0; axis < 3; axis++)
         if (s->scale[axis] > 0.0f)
-            bins_sweep(bins, axis, s);
+            bins_sweep(bins, axis, margin, s);
     if (s->axis < 0)
         return;
     bounds left = bounds_empty(), right = bounds_empty();
@@ -208,7 +212,9 @@ static void refs_part(const struct trc_ref *refs, uint32_t count, const struct t
 /* The bins of a range, before it has a plane. */
 static struct trc_split split_begin(const struct trc_range *r) {
     struct trc_split s = {.axis = -1, .bin = 0, .cost = FLT_MAX};
-    s.bin_count = r->triangles <= FEW_TRIANGLES ? FEW_BINS : TRC_BIN_COUNT;
+    s.bin_count = r->triangles <= FEW_TRIANGLES    ? FEW_BINS
+                  : r->triangles <= MANY_TRIANGLES ? SOME_BINS
+                                                   : TRC_BIN_COUNT;
     s.last_bin = f4_set((float)(s.bin_count - 1));
     s.origin = r->centroids.lower;
     for (int axis = 0; axis < 3; axis++) {
@@ -243,6 +249,7 @@ static struct trc_split few_find(const struct trc_range *r) {
     struct trc_split s = {.axis = -1, .cost = FLT_MAX, .is_sorted = true};
     struct box right[TRC_NODE_WIDTH], left = box_empty(), rest = box_empty();
     uint32_t before = 0;
+    const float margin = trc_range_margin(r);
     const int axis = few_sort(r);
     for (uint32_t i = r->count; i-- > 1;) {
         box_grow(&rest, trc_ref_box(&r->refs[i]));
@@ -251,8 +258,8 @@ static struct trc_split few_find(const struct trc_range *r) {
     for (uint32_t i = 1; i < r->count; i++) {
         box_grow(&left, trc_ref_box(&r->refs[i - 1]));
         before += trc_ref_count(&r->refs[i - 1]);
-        const float cost =
-            box_area(left) * (float)before + box_area(right[i]) * (float)(r->triangles - before);
+        const float cost = box_area_wider(left, margin) * (float)before +
+                           box_area_wider(right[i], margin) * (float)(r->triangles - before);
         if (!(cost < s.cost))
             continue;
         s.cost = cost;
@@ -350,7 +357,7 @@ void TRC_KERNEL(trc_split_find)(struct trc_split_blocks *blocks, const struct tr
         blocks_fill(blocks, r, out, &bins);
     else
         bins_fill(r->refs, r->count, out, &bins);
-    bins_choose(&bins, out);
+    bins_choose(&bins, trc_range_margin(r), out);
 }
 
 void TRC_KERNEL(trc_split_apply)(struct trc_split_blocks *blocks, const struct trc_range *r,
