@@ -2,6 +2,7 @@
  * posed, and the check finds trees that do not. */
 #include "query_test.h"
 
+#include "bvh/binary.h"
 #include "bvh/cluster.h"
 #include "bvh/split.h"
 #include "core/core.h"
@@ -226,6 +227,86 @@ static void flat_ranges_are_cut_into_squares(void **state) {
             assert_int_equal(s.axis, columns > rows ? u : v);
             free(all.refs);
         }
+}
+
+/* ---- binary trees ---- */
+
+#define BINARY_NODES 12
+
+/* A tree of so many inner nodes, of any shape; parents are no smaller than their children. */
+static uint32_t binary_random(struct rng *rng, struct trc_binary_node *nodes, float *areas,
+                              uint32_t count, uint32_t *next, float area) {
+    if (count == 0)
+        return trc_leaf_ref(rng_below(rng, 1000), 1 + rng_below(rng, 8));
+    const uint32_t left_count = rng_below(rng, count);
+    const uint32_t left = binary_random(rng, nodes, areas, left_count, next, area * rng_unit(rng));
+    const uint32_t right =
+        binary_random(rng, nodes, areas, count - 1 - left_count, next, area * rng_unit(rng));
+    nodes[*next] = trc_binary_node(nodes, left, right, area);
+    areas[*next] = area;
+    return (*next)++;
+}
+
+/* What a node is to the one that stays above it: children, if those that stay are these bits. */
+static uint32_t children_of_side(const struct trc_binary_node *nodes, uint32_t node,
+                                 uint32_t stays) {
+    if ((node & TRC_REF_LEAF) || (stays >> node & 1u))
+        return 1;
+    return children_of_side(nodes, nodes[node].left, stays) +
+           children_of_side(nodes, nodes[node].right, stays);
+}
+
+/* The least sum of areas of all choices of nodes that stay, the last one among them. */
+static float least_of_all(const struct trc_binary_node *nodes, const float *areas, uint32_t count) {
+    float least = INFINITY;
+    for (uint32_t stays = 1u << (count - 1); stays < 1u << count; stays++) {
+        float sum = 0.0f;
+        bool fits = true;
+        for (uint32_t i = 0; i < count && fits; i++) {
+            if (!(stays >> i & 1u))
+                continue;
+            sum += areas[i];
+            fits = children_of_side(nodes, nodes[i].left, stays) +
+                       children_of_side(nodes, nodes[i].right, stays) <=
+                   TRC_NODE_WIDTH;
+        }
+        if (fits && sum < least)
+            least = sum;
+    }
+    return least;
+}
+
+/* Sum of the areas of the wide nodes from there down; adds how many leaves they have. */
+static float collapsed(const struct trc_binary_node *nodes, const float *areas, uint32_t node,
+                       uint32_t *leaves) {
+    uint32_t children[TRC_NODE_WIDTH];
+    float sum = areas[node];
+    const int count = trc_binary_children(nodes, node, children);
+    assert_in_range(count, 2, TRC_NODE_WIDTH);
+    for (int i = 0; i < count; i++)
+        if (children[i] & TRC_REF_LEAF)
+            ++*leaves;
+        else
+            sum += collapsed(nodes, areas, children[i], leaves);
+    return sum;
+}
+
+/* Trees of up to twelve inner nodes, against every choice there is. */
+static void wide_nodes_cost_the_least(void **state) {
+    (void)state;
+    struct rng rng = rng_seed(23);
+    for (int tree = 0; tree < 300; tree++) {
+        struct trc_binary_node nodes[BINARY_NODES];
+        float areas[BINARY_NODES];
+        const uint32_t count = 1 + rng_below(&rng, BINARY_NODES);
+        uint32_t next = 0, leaves = 0;
+        const float area = tree % 10 ? 1.0f : 0.0f; /* of triangles in one place: none */
+        const uint32_t root = binary_random(&rng, nodes, areas, count, &next, area);
+        const float sum = collapsed(nodes, areas, root, &leaves);
+        assert_int_equal(leaves, count + 1);
+        assert_float_equal(sum, least_of_all(nodes, areas, count), 1e-5f);
+        assert_float_equal(sum, nodes[root].cost[0], 1e-5f);
+    }
 }
 
 /* ---- what trees are built from ---- */
@@ -488,9 +569,9 @@ static void one_million_identical_centroids(void **state) {
 
 /* Rungs of a ladder, each a sixteenth of the one before; at its foot copies of one triangle. The
  * sheets are flat in x and long in z, so that areas shrink with y alone and stay far from
- * underflow. A rung's triangles have more area than all that is below it: each level of the tree
- * opens them, and peels off no more than one rung. What is left when splits are forced to the
- * middle can only be halved. */
+ * underflow. A rung's triangles have more area than all that is below it: each level of the binary
+ * tree peels off no more than one rung. What is left when splits are forced to the middle can only
+ * be halved. */
 static void ladder(const char *name, uint32_t rung_size, uint32_t foot, float top) {
     struct query_world world;
     struct query_scene scene;
@@ -684,6 +765,7 @@ int main(void) {
         cmocka_unit_test(splits_are_the_same),
         cmocka_unit_test(few_refs_split_at_the_best),
         cmocka_unit_test(flat_ranges_are_cut_into_squares),
+        cmocka_unit_test(wide_nodes_cost_the_least),
         cmocka_unit_test(any_number_of_triangles),
         cmocka_unit_test(shapes_and_instances),
         cmocka_unit_test(moving_meshes),

@@ -1,13 +1,15 @@
-/* Shape of a tree: where ranges are split (kernels/split.c), and where they stay leaves.
+/* Shape of a tree: where ranges are split (kernels/split.c), where they stay leaves, and which of
+ * the nodes so made stay (bvh/binary.h).
  *
- * Nodes are opened to eight children by splitting the child of the largest area, as in Ingo Wald,
- * Carsten Benthin, Solomon Boulos, "Getting Rid of Packets", 2008. The upper part of the tree is
- * made by one thread, all of them at work on each split; subtrees of TRC_SHARED_RANGE refs or less
- * are tasks. Sizes do not depend on the number of threads, so the tree does not either.
+ * The upper part of the binary tree is made by one thread, all of them at work on each split;
+ * subtrees of TRC_SHARED_RANGE refs or less are tasks, and so are the wide nodes that stand for
+ * them. Sizes do not depend on the number of threads, so the tree does not either.
  *
- * Without gain: triangles cut before the build at spatial median planes (Karras and Aila, "Fast
- * Parallel Construction of High-Quality Bounding Volume Hierarchies", 2013) make the cost of
- * the generated conference room 10 to 29 % higher for 5 to 90 % more refs. */
+ * Splitting the child of the largest area until there are eight, as in Ingo Wald, Carsten Benthin,
+ * Solomon Boulos, "Getting Rid of Packets", 2008, makes half as many nodes again, and rays 2 %
+ * slower. Triangles cut before the build at spatial median planes (Karras and Aila, "Fast Parallel
+ * Construction of High-Quality Bounding Volume Hierarchies", 2013) make the cost of the generated
+ * conference room 10 to 29 % higher for 5 to 90 % more refs. */
 #include <string.h>
 
 #include "bvh/binary.h"
@@ -20,9 +22,6 @@
 /* Cost of visiting a node against one triangle of a leaf. A leaf is one block whatever its count,
  * and packets cull its triangles in one step, so leaves may be full. */
 #define NODE_COST 4.0f
-/* From this level (of 8-wide nodes) on, ranges are halved whatever the SAH says: 2^28 refs are
- * exhausted within TRC_MAX_LEVELS. */
-#define MEDIAN_LEVEL 32
 
 /* A growing part of the tree. */
 struct arena {
@@ -31,10 +30,24 @@ struct arena {
     bool failed;
 };
 
+/* A small range, and the binary tree over it. */
 struct task {
     struct trc_range range;
-    uint32_t parent, slot; /* where in the upper part its root goes */
     uint32_t level;
+    uint32_t next, root; /* where in nodes the next one goes; the root */
+};
+
+/* A split of the upper part. Its sides: forks, or tasks with FORK_TASK. */
+struct fork {
+    uint32_t left, right;
+    float area;
+};
+#define FORK_TASK 0x80000000u
+
+/* A binary tree whose wide nodes are made apart. */
+struct piece {
+    uint32_t node;         /* its root */
+    uint32_t parent, slot; /* where in the upper part its wide root goes */
     uint32_t root;
     struct arena arena;
 };
@@ -45,8 +58,14 @@ struct builder {
     const atomic_uint *cancel;
     struct trc_part_triangle *triangles; /* by slot */
     struct trc_split_blocks *blocks;     /* for the upper part */
-    struct task *tasks;                  /* filled while the upper part is made */
+    struct task *tasks;
     uint32_t task_count, task_capacity;
+    struct fork *forks; /* children before parents */
+    uint32_t fork_count, fork_capacity;
+    struct trc_binary_node *nodes; /* one for each ref of the tasks, then one for each fork */
+    uint32_t first_fork;           /* in nodes */
+    struct piece *pieces;
+    uint32_t piece_count, piece_capacity;
     bool failed;
 };
 
@@ -90,6 +109,12 @@ static void range_halve(const struct trc_range *r, struct trc_range *left,
     trc_range_measure(right);
 }
 
+/* Whether halving is all that keeps a range's subtree within the levels there may be. */
+static bool is_deep(const struct trc_range *r, uint32_t level) {
+    const uint32_t halvings = 32 - (uint32_t)__builtin_clz(r->count - 1);
+    return level + halvings >= TRC_MAX_LEVELS - 1;
+}
+
 /* Splits r in two unless it is better, and possible, to leave it a leaf. A build that is cancelled
  * splits no more: what it has made is thrown away. */
 static bool range_divide(struct builder *b, const struct trc_range *r, uint32_t level,
@@ -98,7 +123,7 @@ static bool range_divide(struct builder *b, const struct trc_range *r, uint32_t 
     const bool must = count > b->leaf_size;
     if (r->count < 2 || (!must && (float)count <= NODE_COST) || is_cancelled(b))
         return false;
-    if (level >= MEDIAN_LEVEL) {
+    if (is_deep(r, level)) {
         if (must)
             range_halve(r, left, right);
         return must;
@@ -116,37 +141,6 @@ static bool range_divide(struct builder *b, const struct trc_range *r, uint32_t 
     return true;
 }
 
-/* Opens r into up to eight ranges, the largest area first, then the most refs; 1 when r stays a
- * leaf. closed: those that stay leaves; the others are yet to be asked. */
-static int range_open(struct builder *b, const struct trc_range *r, uint32_t level,
-                      struct trc_range out[TRC_NODE_WIDTH], bool closed[TRC_NODE_WIDTH]) {
-    int count = 1;
-    const float margin = trc_range_margin(r);
-    float area[TRC_NODE_WIDTH]; /* -1: of those that are closed */
-    memset(closed, 0, TRC_NODE_WIDTH * sizeof *closed);
-    out[0] = *r;
-    area[0] = box_area_wider(r->bounds, margin);
-    while (count < TRC_NODE_WIDTH) {
-        int best = 0;
-        for (int i = 1; i < count; i++)
-            if (area[i] > area[best] || (area[i] == area[best] && out[i].count > out[best].count))
-                best = i;
-        if (area[best] < 0.0f)
-            break;
-        struct trc_range left, right;
-        closed[best] = !range_divide(b, &out[best], level, &left, &right);
-        if (closed[best]) {
-            area[best] = -1.0f;
-            continue;
-        }
-        out[best] = left;
-        out[count] = right;
-        area[best] = box_area_wider(left.bounds, margin);
-        area[count++] = box_area_wider(right.bounds, margin);
-    }
-    return count;
-}
-
 /* Cancelled, refs may be in any state. */
 static uint32_t build_leaf(const struct builder *b, const struct trc_range *r) {
     if (is_cancelled(b))
@@ -155,98 +149,121 @@ static uint32_t build_leaf(const struct builder *b, const struct trc_range *r) {
     return trc_leaf_ref(r->first_slot, r->triangles);
 }
 
-/* A binary tree over r; its root. Levels count as if none were left out. */
-static uint32_t binary_build(struct builder *b, struct trc_binary *binary,
-                             const struct trc_range *r, uint32_t level) {
+/* Makes room for one more; false, and nothing has changed, where the build has failed. */
+static bool has_room(struct builder *b, void **array, uint32_t count, uint32_t *capacity,
+                     size_t size) {
+    if (!b->failed && count == *capacity)
+        b->failed = !grow(array, capacity, size);
+    return !b->failed;
+}
+
+/* The upper part over r, down to what are tasks; the side of a fork that it is. */
+static uint32_t upper_build(struct builder *b, const struct trc_range *r, uint32_t level) {
+    struct trc_range left, right;
+    void *array;
+    if (b->failed || is_cancelled(b))
+        return FORK_TASK;
+    if (r->count <= TRC_SHARED_RANGE || !range_divide(b, r, level, &left, &right)) {
+        array = b->tasks;
+        if (!has_room(b, &array, b->task_count, &b->task_capacity, sizeof *b->tasks))
+            return FORK_TASK;
+        b->tasks = array;
+        b->tasks[b->task_count] = (struct task){.range = *r, .level = level};
+        return FORK_TASK | b->task_count++;
+    }
+    const uint32_t l = upper_build(b, &left, level + 1), k = upper_build(b, &right, level + 1);
+    array = b->forks;
+    if (!has_room(b, &array, b->fork_count, &b->fork_capacity, sizeof *b->forks))
+        return FORK_TASK;
+    b->forks = array;
+    b->forks[b->fork_count] = (struct fork){l, k, box_area(r->bounds)};
+    return b->fork_count++;
+}
+
+/* The binary tree over r, children first; its root. */
+static uint32_t task_build(struct builder *b, struct task *t, const struct trc_range *r,
+                           uint32_t level) {
     struct trc_range left, right;
     if (!range_divide(b, r, level, &left, &right))
-        return trc_binary_add_leaf(binary, build_leaf(b, r));
-    const uint32_t l = binary_build(b, binary, &left, level + 1),
-                   k = binary_build(b, binary, &right, level + 1);
-    return trc_binary_add_node(binary, l, k, box_area(r->bounds));
-}
-
-/* The wide node that stands for one of a binary tree, and those below it. */
-static uint32_t binary_collapse(struct arena *a, const struct trc_binary *binary, uint32_t root) {
-    uint32_t child[TRC_NODE_WIDTH];
-    if (binary->nodes[root].ref != TRC_REF_EMPTY)
-        return binary->nodes[root].ref;
-    const uint32_t node = arena_node(a);
-    if (a->failed)
-        return TRC_REF_EMPTY;
-    const int count = trc_binary_children(binary, root, child);
-    for (int i = 0; i < count; i++) {
-        const uint32_t ref = binary_collapse(a, binary, child[i]);
-        a->children[node][i] = ref; /* a->children may have moved meanwhile */
-    }
-    return node;
-}
-
-static uint32_t build_small(struct builder *b, struct arena *a, const struct trc_range *r,
-                            uint32_t level) {
-    struct trc_binary binary = {.nodes = trc_alloc(2 * (size_t)r->count, sizeof *binary.nodes)};
-    if (!binary.nodes) {
-        a->failed = true;
-        return TRC_REF_EMPTY;
-    }
-    const uint32_t root = binary_build(b, &binary, r, level);
-    const uint32_t ref = binary_collapse(a, &binary, root);
-    trc_free(binary.nodes);
-    return ref;
-}
-
-/* Builds r into the arena, depth first; in the upper part (tasks true) small ranges become tasks.
- */
-static uint32_t build_range(struct builder *b, struct arena *a, const struct trc_range *r,
-                            uint32_t level, bool tasks) {
-    struct trc_range child[TRC_NODE_WIDTH];
-    bool closed[TRC_NODE_WIDTH];
-    if (a->failed || b->failed || is_cancelled(b))
-        return TRC_REF_EMPTY;
-    const int count = range_open(b, r, level, child, closed);
-    if (count == 1)
         return build_leaf(b, r);
-    const uint32_t node = arena_node(a);
-    if (a->failed)
-        return TRC_REF_EMPTY;
-    for (int i = 0; i < count; i++) {
-        if (closed[i]) {
-            a->children[node][i] = build_leaf(b, &child[i]);
-        } else if (tasks && child[i].count <= TRC_SHARED_RANGE) {
-            if (b->task_count == b->task_capacity) {
-                void *array = b->tasks;
-                if (!grow(&array, &b->task_capacity, sizeof *b->tasks)) {
-                    b->failed = true;
-                    return TRC_REF_EMPTY;
-                }
-                b->tasks = array;
-            }
-            b->tasks[b->task_count++] = (struct task){
-                .range = child[i], .parent = node, .slot = (uint32_t)i, .level = level + 1};
-        } else {
-            const uint32_t ref = build_range(b, a, &child[i], level + 1, tasks);
-            a->children[node][i] = ref; /* a->children may have moved meanwhile */
-        }
-    }
-    return node;
+    const uint32_t l = task_build(b, t, &left, level + 1), k = task_build(b, t, &right, level + 1);
+    b->nodes[t->next] = trc_binary_node(b->nodes, l, k, box_area(r->bounds));
+    return t->next++;
 }
 
 static void task_run(void *context, uint32_t index, uint32_t worker) {
     (void)worker;
     struct builder *b = context;
     struct task *t = &b->tasks[index];
-    t->root = t->level < MEDIAN_LEVEL ? build_small(b, &t->arena, &t->range, t->level)
-                                      : build_range(b, &t->arena, &t->range, t->level, false);
+    t->root = task_build(b, t, &t->range, t->level);
 }
 
-/* Appends the tasks' parts to the upper part. */
+/* Where in nodes a side of a fork stands. */
+static uint32_t side_node(const struct builder *b, uint32_t side) {
+    return side & FORK_TASK ? b->tasks[side & ~FORK_TASK].root : b->first_fork + side;
+}
+
+/* The binary tree; false without memory. */
+static bool binary_build(struct builder *b, struct trc_pool *pool, uint32_t ref_count) {
+    uint32_t next = 0;
+    b->first_fork = ref_count;
+    b->nodes = trc_alloc((size_t)b->first_fork + b->fork_count, sizeof *b->nodes);
+    if (!b->nodes)
+        return false;
+    for (uint32_t i = 0; i < b->task_count; i++) {
+        b->tasks[i].next = next;
+        next += b->tasks[i].range.count;
+    }
+    trc_pool_run(pool, b->task_count, task_run, b);
+    for (uint32_t i = 0; i < b->fork_count; i++) {
+        const struct fork *f = &b->forks[i];
+        b->nodes[b->first_fork + i] =
+            trc_binary_node(b->nodes, side_node(b, f->left), side_node(b, f->right), f->area);
+    }
+    return true;
+}
+
+/* The wide node that stands for a binary one, and those below it, depth first. Those below forks
+ * are left to pieces. */
+static uint32_t collapse(struct builder *b, struct arena *a, uint32_t binary) {
+    uint32_t child[TRC_NODE_WIDTH];
+    if (binary & TRC_REF_LEAF)
+        return binary;
+    const uint32_t node = arena_node(a);
+    if (a->failed)
+        return TRC_REF_EMPTY;
+    const int count = trc_binary_children(b->nodes, binary, child);
+    for (int i = 0; i < count; i++) {
+        if (binary >= b->first_fork && child[i] < b->first_fork) {
+            void *array = b->pieces;
+            if (!has_room(b, &array, b->piece_count, &b->piece_capacity, sizeof *b->pieces))
+                return TRC_REF_EMPTY;
+            b->pieces = array;
+            b->pieces[b->piece_count++] =
+                (struct piece){.node = child[i], .parent = node, .slot = (uint32_t)i};
+            continue;
+        }
+        const uint32_t ref = collapse(b, a, child[i]);
+        a->children[node][i] = ref; /* a->children may have moved meanwhile */
+    }
+    return node;
+}
+
+static void piece_run(void *context, uint32_t index, uint32_t worker) {
+    (void)worker;
+    struct builder *b = context;
+    struct piece *p = &b->pieces[index];
+    p->root = collapse(b, &p->arena, p->node);
+}
+
+/* Appends the pieces to the upper part. */
 static trc_status join(struct builder *b, struct arena *top, uint32_t root,
                        struct trc_topology *out) {
     uint32_t node_count = top->node_count;
     bool failed = top->failed || b->failed;
-    for (uint32_t i = 0; i < b->task_count; i++) {
-        node_count += b->tasks[i].arena.node_count;
-        failed = failed || b->tasks[i].arena.failed;
+    for (uint32_t i = 0; i < b->piece_count; i++) {
+        node_count += b->pieces[i].arena.node_count;
+        failed = failed || b->pieces[i].arena.failed;
     }
     if (is_cancelled(b))
         return trc_fail(TRC_ERROR_CANCELLED, "the build was cancelled");
@@ -261,15 +278,15 @@ static trc_status join(struct builder *b, struct arena *top, uint32_t root,
     if (top->node_count)
         memcpy(out->children, top->children, top->node_count * sizeof *out->children);
     uint32_t node = top->node_count;
-    for (uint32_t i = 0; i < b->task_count; i++) {
-        const struct task *t = &b->tasks[i];
-        for (uint32_t n = 0; n < t->arena.node_count; n++)
+    for (uint32_t i = 0; i < b->piece_count; i++) {
+        const struct piece *p = &b->pieces[i];
+        for (uint32_t n = 0; n < p->arena.node_count; n++)
             for (int c = 0; c < TRC_NODE_WIDTH; c++) {
-                const uint32_t ref = t->arena.children[n][c];
+                const uint32_t ref = p->arena.children[n][c];
                 out->children[node + n][c] = (ref & TRC_REF_LEAF) ? ref : ref + node;
             }
-        out->children[t->parent][t->slot] = (t->root & TRC_REF_LEAF) ? t->root : t->root + node;
-        node += t->arena.node_count;
+        out->children[p->parent][p->slot] = (p->root & TRC_REF_LEAF) ? p->root : p->root + node;
+        node += p->arena.node_count;
     }
     return TRC_OK;
 }
@@ -288,20 +305,26 @@ trc_status trc_topology_build(const struct trc_range *all, uint32_t leaf_size,
     if (all->triangles > TRC_REF_INDEX_MASK)
         return trc_fail(TRC_ERROR_TOO_LARGE, "%u primitives in one tree, at most %u",
                         all->triangles, TRC_REF_INDEX_MASK);
-    const bool shared = all->count > TRC_SHARED_RANGE;
-    if (shared) {
+    if (all->count > TRC_SHARED_RANGE) {
         b.blocks = trc_alloc(1, sizeof *b.blocks);
         if (!b.blocks)
             return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory to build over %u primitives",
                             all->triangles);
         *b.blocks = (struct trc_split_blocks){.pool = pool, .cancel = cancel};
     }
-    const uint32_t root = shared ? build_range(&b, &top, all, 0, true) : build_small(&b, &top, all, 0);
-    if (!top.failed && !b.failed)
-        trc_pool_run(pool, b.task_count, task_run, &b);
+    const uint32_t side = upper_build(&b, all, 0);
+    uint32_t root = TRC_REF_EMPTY;
+    b.failed = b.failed || is_cancelled(&b) || !binary_build(&b, pool, all->count);
+    if (!b.failed) {
+        root = collapse(&b, &top, side_node(&b, side));
+        trc_pool_run(pool, b.piece_count, piece_run, &b);
+    }
     const trc_status status = join(&b, &top, root, out);
-    for (uint32_t i = 0; i < b.task_count; i++)
-        trc_free(b.tasks[i].arena.children);
+    for (uint32_t i = 0; i < b.piece_count; i++)
+        trc_free(b.pieces[i].arena.children);
+    trc_free(b.pieces);
+    trc_free(b.nodes);
+    trc_free(b.forks);
     trc_free(b.tasks);
     trc_free(top.children);
     trc_free(b.blocks);
