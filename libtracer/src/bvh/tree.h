@@ -39,8 +39,8 @@
 #define TRC_SLOT_TRANSPARENT 0x80000000u
 #define TRC_SLOT_INSTANCE_MASK 0x7fffffffu
 
-/* Deepest level a builder makes: binary splits are forced to the middle well before it. A traversal
- * pushes at most 7 entries a level. */
+/* Deepest level a builder makes: splits are forced to the middle where the levels left would not do
+ * otherwise. A traversal pushes at most 7 entries a level. */
 #define TRC_MAX_LEVELS 48
 #define TRC_STACK_SIZE (TRC_MAX_LEVELS * (TRC_NODE_WIDTH - 1) + 1)
 
@@ -174,10 +174,10 @@ struct trc_topology {
 
 struct trc_range; /* bvh/range.h */
 
-/* Binned SAH (Wald, "On fast construction of SAH-based bounding volume hierarchies", 2007), opened
- * to 8 children by largest area, over measured refs, which are used up: triangles_out gets what
- * stands in the slots. leaf_size: most triangles of a leaf, 1..8. Same result for any thread count.
- * OUT_OF_MEMORY, TOO_LARGE or CANCELLED. */
+/* Binned SAH (Wald, "On fast construction of SAH-based bounding volume hierarchies", 2007) over
+ * measured refs, which are used up, as 8-wide nodes of the least cost (bvh/binary.h): triangles_out
+ * gets what stands in the slots. leaf_size: most triangles of a leaf, 1..8. Same result for any
+ * thread count. OUT_OF_MEMORY, TOO_LARGE or CANCELLED. */
 trc_status trc_topology_build(const struct trc_range *all, uint32_t leaf_size,
                               struct trc_pool *pool, const atomic_uint *cancel,
                               struct trc_part_triangle *triangles_out, struct trc_topology *out);
