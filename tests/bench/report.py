@@ -63,7 +63,7 @@ def measure(options):
         print(f"== {name}", flush=True)
         start = time.perf_counter()
         write(data / f"{name}.json", PARTS[name](options))
-        described["parts"][name] = {key: described[key] for key in ("date", "commit")}
+        described["parts"][name] = machine.of_part(described)
         write(data / "machine.json", described)
         print(f"   {time.perf_counter() - start:.0f} s", flush=True)
 

@@ -12,8 +12,8 @@ import pytest
 TESTS = pathlib.Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(TESTS / "support"), str(TESTS / "bench")]
 import flip  # noqa: E402  (the folders are on the path only now)
-from reporting import (curves, error_sections, estimates, frames, gate, machine,  # noqa: E402
-                       readme, repeated)
+from reporting import (curves, document, error_sections, estimates, frames, gate,  # noqa: E402
+                       machine, readme, repeated)
 
 
 @pytest.mark.parametrize("module", ["flip", "error_time", "stability", "reporting.estimates", "reporting.frames",
@@ -168,6 +168,16 @@ def test_parts_keep_what_they_were_measured_with(tmp_path):
     assert machine.read_parts(path) == {}
     path.write_text('{"parts": {"frames": {"date": "then", "commit": "a"}}}', encoding="utf-8")
     assert machine.read_parts(path)["frames"]["commit"] == "a"
+
+
+def test_parts_of_two_machines_are_told_apart():
+    old = machine.of_part({"date": "2026-01-01", "commit": "a", "cpu": "One", "processors": 2})
+    new = machine.of_part({"date": "2026-01-02", "commit": "b", "cpu": "Two", "processors": 4})
+    assert machine.names({"parts": {"frames": old, "blender": old, "kernels": new}}) == [
+        "Two, 4 logical processors", "One, 2 logical processors"]
+    assert document.where(new, {"parts": {"kernels": new}}) == ""
+    assert document.where(old, {"parts": {"frames": old, "kernels": new}}) == (
+        ", One, 2 logical processors")
 
 
 # FLIP --------------------------------------------------------------------------------------------

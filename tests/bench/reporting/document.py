@@ -4,6 +4,7 @@
 import json
 
 from . import error_sections, frame_sections, repeated, scope as scopes
+from .machine import names
 from .tables import table
 
 
@@ -46,6 +47,11 @@ def text(results, out):
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
+def where(made, described):
+    """The machine of a part, where not all were measured on one."""
+    return f", {made['machine']}" if len(names(described)) > 1 else ""
+
+
 def head(results):
     """What it was measured with."""
     machine, next_blender = results["machine"], results.get("curves_next", {}).get("blender")
@@ -53,13 +59,12 @@ def head(results):
     rows = [
         ["scope", f"{scope.name}: {scope.seeds} seeds, {scope.samples[0]} to {scope.samples[-1]} "
                   f"samples, {scope.repeats} repeats of times"],
-        ["machine", f"{machine['cpu']}, {machine['processors']} logical processors, "
-                    f"{machine['memory_gib']} GiB"],
+        ["machine", f"{'; '.join(names(machine))}; {machine['memory_gib']} GiB"],
         ["load before", str(machine["load_before"])],
         ["system", machine["system"]],
         ["compiler", machine["compiler"]],
         ["instruction set", machine["isa"]],
-        ["Volley", ", ".join(f"{part} {made['commit']} ({made['date']})"
+        ["Volley", ", ".join(f"{part} {made['commit']} ({made['date']}{where(made, machine)})"
                              for part, made in machine["parts"].items())],
         ["against", ", ".join(filter(None, (
             f"{machine['blender']} with Cycles",

@@ -31,8 +31,24 @@ def describe(options, scope):
     }
 
 
+def of_part(described):
+    """What is kept of a part's head: parts may be measured at different times and places."""
+    return {**{key: described[key] for key in ("date", "commit")}, "machine": name_of(described)}
+
+
+def name_of(described):
+    """A machine in a few words."""
+    return f"{described['cpu']}, {described['processors']} logical processors"
+
+
+def names(described):
+    """The machines that the parts of a report were measured on, each once, the latest first."""
+    parts = sorted(described["parts"].values(), key=lambda part: part["date"], reverse=True)
+    return list(dict.fromkeys(part["machine"] for part in parts))
+
+
 def read_parts(path):
-    """{part: {"date", "commit"}} of a report that is there: what its other parts were measured with."""
+    """{part: of_part()} of a report that is there: what its other parts were measured with."""
     return json.loads(path.read_text(encoding="utf-8")).get("parts", {}) if path.exists() else {}
 
 
@@ -51,13 +67,16 @@ def package_version(package):
 
 
 def cpu_name():
-    """The processor as the kernel names it."""
+    """The processor as the kernel names it; a name without a number says its family and model."""
     try:
         text = pathlib.Path("/proc/cpuinfo").read_text(encoding="utf-8")
     except OSError:
         text = ""
-    found = re.search(r"^model name\s*:\s*(.+)$", text, re.MULTILINE)
-    return found.group(1).strip() if found else platform.machine()
+    fields = dict(re.findall(r"^(model name|cpu family|model)\s*:\s*(.+?)\s*$", text, re.MULTILINE))
+    name = fields.get("model name", platform.machine())
+    if re.search(r"\d", name) or "cpu family" not in fields:
+        return name
+    return f"{name} (family {fields['cpu family']}, model {fields['model']})"
 
 
 def system_name():

@@ -14,6 +14,7 @@ BENCH = pathlib.Path(__file__).resolve().parents[1]
 for folder in (BENCH, BENCH.parent / "support"):
     sys.path.insert(0, str(folder))
 from reporting import document, error_sections  # noqa: E402  (the folders are on the path only now)
+from reporting.machine import names  # noqa: E402
 
 PROJECT = BENCH.parents[1]
 COMMITTED = BENCH / "report"
@@ -30,7 +31,7 @@ def headline(report=COMMITTED):
         return "No full report has been committed yet."
     machine = results["machine"]
     lines = [f"- {line}" for line in error_sections.headline_lines(results)]
-    lines += ["", f"Measured on {machine['cpu']}, {machine['processors']} logical processors, "
+    lines += ["", f"Measured on {' and '.join(names(machine))}, "
                   f"{machine['isa']}, {machine['date'][:10]}, by `bash tests/bench/report.sh`; all of "
                   "it, losing cases first: [the report](tests/bench/report/report.md)."]
     for name, title in PLOTS.items():
