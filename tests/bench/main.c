@@ -179,6 +179,8 @@ static bool run(struct bench *b) {
             fprintf(stderr, "tracer_bench: no generated scene has that name: %s\n", message);
             return false;
         }
+        if (b->options.turn)
+            bench_scene_turn(&b->scene, b->options.turn);
         good = b->options.check ? check_scene(&b->scene, &b->options) : measure_scene(b);
         bench_scene_free(&b->scene);
     }

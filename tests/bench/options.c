@@ -107,6 +107,9 @@ static bool set_threads(struct options *o, const char *text) {
     return !bad;
 }
 
+static bool set_turn(struct options *o, const char *text) {
+    return parse_number(text, 0, 359, &o->turn);
+}
 static bool set_kinds(struct options *o, const char *text) {
     return parse_names(text, ray_kind_names, RAY_KIND_COUNT, &o->kinds);
 }
@@ -169,6 +172,7 @@ static const struct {
 } table[] = {
     {"--scene", "NAME|FILE.obj", "a generated scene or a file, may be repeated (conference)",
      set_scene},
+    {"--turn", "DEGREES", "turns scenes and cameras about the vertical (0)", set_turn},
     {"--isa", "LIST", "instruction sets or 'all' (the best of this CPU, and avx2 beside avx512)",
      set_isa},
     {"--threads", "LIST", "thread counts, numbers or 'all' (1,all)", set_threads},

@@ -16,6 +16,7 @@ struct options {
     uint32_t isa_count;
     uint32_t threads[OPTIONS_THREADS]; /* counts, 1 or more */
     uint32_t thread_count;
+    uint32_t turn;    /* of all scenes about the vertical, degrees */
     uint32_t kinds;   /* bits of enum ray_kind */
     uint32_t orders;  /* bits of enum ray_order */
     uint32_t motions; /* bit 0: still, bit 1: moving */

@@ -134,6 +134,31 @@ bool bench_scene_load(const char *name, struct bench_scene *scene, char *message
     return true;
 }
 
+static void points_turn(float *points, size_t count, float radians) {
+    const float c = cosf(radians), s = sinf(radians);
+    for (float *p = points; p < points + 3 * count; p += 3) {
+        const float x = p[0], y = p[1];
+        p[0] = c * x - s * y;
+        p[1] = s * x + c * y;
+    }
+}
+
+static void mesh_turn(struct mesh *mesh, float radians) {
+    points_turn(mesh->positions, (size_t)mesh->vertex_count * mesh->key_count, radians);
+}
+
+void bench_scene_turn(struct bench_scene *scene, uint32_t degrees) {
+    const float radians = (float)degrees * 3.14159265f / 180.0f;
+    const size_t length = strlen(scene->name);
+    mesh_turn(&scene->stage.mesh, radians);
+    for (int moving = 0; moving < 2; moving++)
+        mesh_turn(&scene->worlds[moving].meshes[0], radians);
+    points_turn(scene->stage.eyes[0], STAGE_EYES, radians);
+    points_turn(scene->stage.targets[0], STAGE_EYES, radians);
+    points_turn(scene->stage.light, 1, radians);
+    (void)snprintf(scene->name + length, sizeof scene->name - length, " turned");
+}
+
 void bench_scene_free(struct bench_scene *scene) {
     for (int moving = 0; moving < 2; moving++)
         query_world_free(&scene->worlds[moving]);

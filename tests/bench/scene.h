@@ -19,6 +19,9 @@ struct bench_scene {
  * period; what else is turned about the vertical, the more the higher. False: message says why, and
  * nothing is to be freed. */
 bool bench_scene_load(const char *name, struct bench_scene *scene, char *message, size_t capacity);
+/* Turns all of it about the vertical through the origin: the same rays, but walls that do not
+ * follow the axes. Its name says so. */
+void bench_scene_turn(struct bench_scene *scene, uint32_t degrees);
 void bench_scene_free(struct bench_scene *scene);
 
 #endif

@@ -293,6 +293,18 @@ static void soups(void **state) {
     }
 }
 
+/* Long strips that slant among small triangles: final scenes clip them. */
+static void slanting_strips(void **state) {
+    (void)state;
+    struct query_world world;
+    struct rng rng = rng_seed(8);
+    query_world_init(&world);
+    struct mesh *mesh = query_world_object(&world);
+    mesh_add_soup(mesh, &rng, 2500, unit_lower, unit_upper, 0.05f);
+    mesh_add_strips(mesh, &rng, 30, 2.0f, 0.02f);
+    check_world("slanting strips", &world, true);
+}
+
 static void closed_shapes(void **state) {
     (void)state;
     struct query_world world;
@@ -473,6 +485,7 @@ static void mixed_world(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(soups),
+        cmocka_unit_test(slanting_strips),
         cmocka_unit_test(closed_shapes),
         cmocka_unit_test(distances_on_needles),
         cmocka_unit_test(instances),

@@ -7,6 +7,7 @@
  *
  * TRACER_TEST_RAYS sets the number of rays of each case; tests/watertight.sh sends ten million. */
 #include "aim.h"
+#include "bvh/tree.h"
 #include "figures.h"
 #include "query_test.h"
 
@@ -143,6 +144,33 @@ static void needles_and_valence(void **state) {
     const uint32_t rays = query_test_rays(USUAL_RAYS) / VALENCE_RAYS_DIVISOR;
     expect_closed_rays("5: valence 10,000", fill_valence, origin, 0.3f, rays);
     expect_closed_rays("5: valence 10,000, flat", fill_flat_valence, origin, 3e-4f, rays);
+}
+
+/* A long thin pyramid that slants: final scenes cut its triangles, for which the triangles of a
+ * small sphere beside it make room. */
+static void clipped_needles(void **state) {
+    (void)state;
+    static const float beside[3] = {0.5f, -0.5f, 0.5f}, axis[3] = {1, 2, 3}, scale[3] = {1, 1, 1};
+    static const char *const aims[] = {"vertices", "edges"};
+    struct query_world world;
+    float turn[12];
+    query_world_init(&world);
+    struct mesh *mesh = query_world_object(&world);
+    mesh_add_even_bipyramid(mesh, 16, 0.02f, 1.0f);
+    query_transform(axis, 1.0f, scale, origin, turn);
+    mesh_transform(mesh, 0, turn);
+    mesh_add_icosphere(query_world_object(&world), beside, 0.01f, 4);
+    struct query_scene scene = query_test_scene(&world, true);
+    const struct trc_tree *tree = query_scene_snapshot(scene.scene)->bvh->tree;
+    assert_true(tree->slot_count > tree->triangle_count + 100);
+    query_scene_destroy(&scene);
+    for (uint32_t at = AIM_VERTICES; at <= AIM_EDGES; at++) {
+        char title[64];
+        const struct aim aim = {.mesh = &world.meshes[0], .at = at, .reach = 0.005f};
+        (void)snprintf(title, sizeof title, "4: clipped needles, %s", aims[at]);
+        expect_closed(title, &world, &aim, query_test_rays(USUAL_RAYS));
+    }
+    query_world_free(&world);
 }
 
 /* Scaled to where products underflow and where they nearly overflow. */
@@ -520,6 +548,7 @@ int main(void) {
         cmocka_unit_test(spheres),
         cmocka_unit_test(far_spheres),
         cmocka_unit_test(needles_and_valence),
+        cmocka_unit_test(clipped_needles),
         cmocka_unit_test(extreme_sizes),
         cmocka_unit_test(seen_from_far),
         cmocka_unit_test(instances),

@@ -269,6 +269,21 @@ void mesh_add_soup(struct mesh *mesh, struct rng *rng, uint32_t count, const flo
     }
 }
 
+void mesh_add_strips(struct mesh *mesh, struct rng *rng, uint32_t count, float length,
+                     float width) {
+    for (uint32_t i = 0; i < count; i++) {
+        float corner[3], along[3], aside[3];
+        rng_direction(rng, along);
+        rng_direction(rng, aside);
+        for (int axis = 0; axis < 3; axis++) {
+            along[axis] *= length;
+            aside[axis] *= width;
+            corner[axis] = -0.5f * (along[axis] + aside[axis]);
+        }
+        mesh_add_grid(mesh, corner, along, aside, 1, 1);
+    }
+}
+
 void mesh_bounds(const struct mesh *mesh, float lower[3], float upper[3]) {
     for (int axis = 0; axis < 3; axis++) {
         lower[axis] = INFINITY;

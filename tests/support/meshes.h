@@ -71,6 +71,9 @@ void mesh_add_grid(struct mesh *mesh, const float origin[3], const float edge_u[
 /* count unconnected triangles: centres in the box, corners within size of them. */
 void mesh_add_soup(struct mesh *mesh, struct rng *rng, uint32_t count, const float lower[3],
                    const float upper[3], float size);
+/* count strips of two triangles about the origin in any direction: parallelograms of that length
+ * and at most that width. */
+void mesh_add_strips(struct mesh *mesh, struct rng *rng, uint32_t count, float length, float width);
 
 /* Bounds over all keys; lower > upper for a mesh without vertices. */
 void mesh_bounds(const struct mesh *mesh, float lower[3], float upper[3]);

@@ -663,7 +663,7 @@ static void fills_and_refits_are_cancelled(void **state) {
     assert_int_equal(trc_tree_refit(from, &part, 1, pool, &cancel, &tree), TRC_ERROR_CANCELLED);
     const struct trc_part_triangle triangle = {0, 0};
     const struct trc_topology leaf = {.root = trc_leaf_ref(0, 1)};
-    assert_int_equal(trc_tree_fill(&leaf, &triangle, 1, &part, 1, pool, &cancel, &tree),
+    assert_int_equal(trc_tree_fill(&leaf, &triangle, NULL, 1, &part, 1, pool, &cancel, &tree),
                      TRC_ERROR_CANCELLED);
     assert_int_equal(trc_memory_bytes(), held);
     trc_pool_destroy(pool);

@@ -7,9 +7,10 @@
  *
  * Splitting the child of the largest area until there are eight, as in Ingo Wald, Carsten Benthin,
  * Solomon Boulos, "Getting Rid of Packets", 2008, makes half as many nodes again, and rays 2 %
- * slower. Triangles cut before the build at spatial median planes (Karras and Aila, "Fast Parallel
- * Construction of High-Quality Bounding Volume Hierarchies", 2013) make the cost of the generated
- * conference room 10 to 29 % higher for 5 to 90 % more refs. */
+ * slower. Nodes taken out of the binary tree and put back where they cost least (Jiri Bittner,
+ * Michal Hapala, Vlastimil Havran, "Fast Insertion-Based Optimization of Bounding Volume
+ * Hierarchies", 2013) make its inner nodes a tenth smaller, and rays 0.7 % faster in the mean (-12
+ * to +12); leaves chosen by what the whole wide tree costs make them 1 to 4 % slower. */
 #include <string.h>
 
 #include "bvh/binary.h"
@@ -57,6 +58,7 @@ struct builder {
     uint32_t leaf_size;
     const atomic_uint *cancel;
     struct trc_part_triangle *triangles; /* by slot */
+    struct box *boxes;                   /* of clipped leaves, by their first slot, or NULL */
     struct trc_split_blocks *blocks;     /* for the upper part */
     struct task *tasks;
     uint32_t task_count, task_capacity;
@@ -141,11 +143,22 @@ static bool range_divide(struct builder *b, const struct trc_range *r, uint32_t 
     return true;
 }
 
+static bool is_clipped(const struct trc_range *r) {
+    uint32_t parts = 0;
+    for (uint32_t i = 0; i < r->count; i++)
+        parts |= r->refs[i].part;
+    return parts & TRC_PART_CLIPPED;
+}
+
 /* Cancelled, refs may be in any state. */
 static uint32_t build_leaf(const struct builder *b, const struct trc_range *r) {
     if (is_cancelled(b))
         return TRC_REF_EMPTY;
     trc_clusters_open(r->refs, r->count, b->triangles + r->first_slot);
+    if (b->boxes && is_clipped(r)) {
+        b->boxes[r->first_slot] = r->bounds;
+        b->triangles[r->first_slot].part |= TRC_PART_CLIPPED;
+    }
     return trc_leaf_ref(r->first_slot, r->triangles);
 }
 
@@ -293,11 +306,13 @@ static trc_status join(struct builder *b, struct arena *top, uint32_t root,
 
 trc_status trc_topology_build(const struct trc_range *all, uint32_t leaf_size,
                               struct trc_pool *pool, const atomic_uint *cancel,
-                              struct trc_part_triangle *triangles_out, struct trc_topology *out) {
+                              struct trc_part_triangle *triangles_out, struct box *boxes_out,
+                              struct trc_topology *out) {
     struct builder b = {.kernels = trc_kernels_current(),
                         .leaf_size = leaf_size,
                         .cancel = cancel,
-                        .triangles = triangles_out};
+                        .triangles = triangles_out,
+                        .boxes = boxes_out};
     struct arena top = {0};
     *out = (struct trc_topology){.root = TRC_REF_EMPTY};
     if (all->count == 0)

@@ -2,9 +2,10 @@
  *
  * What traversal relies on: references in range, every node and slot reached once and nodes after
  * their parents (so there is no cycle), no path longer than the stack allows, boxes that hold what
- * is below them at every key, leaves that hold their triangles' vertices as the mesh and the
- * transform give them. Containment between keys follows up to rounding, as boxes and vertices are
- * interpolated by the same formula; kernels/beam.h allows for the rounding. */
+ * is below them at every key, or, of clipped triangles, boxes that do so together, leaves that hold
+ * their triangles' vertices as the mesh and the transform give them. Containment between keys
+ * follows up to rounding, as boxes and vertices are interpolated by the same formula;
+ * kernels/beam.h allows for the rounding. */
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -34,6 +35,7 @@ struct tree_check {
     uint8_t *nodes, *slots; /* reached */
     uint8_t *seen;          /* triangles found in leaves */
     uint64_t seen_count;
+    uint64_t *covered; /* trees with pieces: points of each triangle in the boxes of its leaves */
     bool transparent;
 };
 
@@ -122,6 +124,46 @@ static bool check_vertices(struct tree_check *t, uint32_t ref, uint32_t i,
     return true;
 }
 
+/* Points of a triangle, of a grid over it, that are looked for in the boxes of its leaves. */
+#define POINTS_PER_EDGE 8
+#define POINT_COUNT ((POINTS_PER_EDGE + 1) * (POINTS_PER_EDGE + 2) / 2)
+#define ALL_POINTS ((1ull << POINT_COUNT) - 1)
+
+/* Which of them a leaf's box has. */
+static uint64_t points_within(const float corner[3][3], const float lower[3],
+                              const float upper[3]) {
+    uint64_t bits = 0, bit = 1;
+    for (int i = 0; i <= POINTS_PER_EDGE; i++)
+        for (int j = 0; i + j <= POINTS_PER_EDGE; j++, bit <<= 1) {
+            const int weight[3] = {i, j, POINTS_PER_EDGE - i - j};
+            float p[3];
+            for (int axis = 0; axis < 3; axis++) {
+                double x = 0.0;
+                for (int v = 0; v < 3; v++)
+                    x += (double)corner[v][axis] * weight[v];
+                p[axis] = (float)(x / POINTS_PER_EDGE);
+            }
+            if (box_holds(lower, upper, p, p))
+                bits |= bit;
+        }
+    return bits;
+}
+
+/* Marks what a leaf's box has of its triangles. */
+static void points_cover(struct tree_check *t, uint32_t ref, const float lower[3],
+                         const float upper[3]) {
+    const uint32_t count = trc_leaf_count(ref);
+    const float *v = trc_leaf_vertices(t->tree, ref, 0);
+    for (uint32_t i = 0; i < count; i++) {
+        const struct trc_slot slot = trc_leaf_slots(t->tree, ref)[i];
+        const uint64_t part = t->is_joined ? slot.instance & TRC_SLOT_INSTANCE_MASK : 0;
+        float corner[3][3];
+        for (uint32_t k = 0; k < 9; k++)
+            corner[k / 3][k % 3] = v[k * count + i];
+        t->covered[t->first[part] + slot.triangle] |= points_within(corner, lower, upper);
+    }
+}
+
 static bool check_leaf(struct tree_check *t, uint32_t ref) {
     const uint32_t first = trc_leaf_first(ref), count = trc_leaf_count(ref);
     for (uint32_t i = 0; i < count; i++) {
@@ -130,10 +172,10 @@ static bool check_leaf(struct tree_check *t, uint32_t ref) {
             return false;
         const uint32_t triangle = t->tree->slots->slots[first + i].triangle;
         uint8_t *seen = &t->seen[t->first[part - t->parts] + triangle];
-        if (*seen)
+        if (*seen && !t->tree->has_pieces)
             return complain(t->checker, "%s: triangle %u is in two leaves", t->name, triangle);
+        t->seen_count += !*seen;
         *seen = 1;
-        t->seen_count++;
         if (!check_vertices(t, ref, i, part, triangle))
             return false;
     }
@@ -248,6 +290,10 @@ static bool check_box(struct tree_check *t, uint32_t ref, uint32_t key, const fl
     float low[3], high[3];
     if ((ref & TRC_REF_LEAF) && t->tree->is_top)
         return check_item_box(t, index, lower, upper);
+    if ((ref & TRC_REF_LEAF) && t->tree->has_pieces) {
+        points_cover(t, ref, lower, upper);
+        return true;
+    }
     if (ref & TRC_REF_LEAF) {
         leaf_box(t->tree, ref, key, low, high);
         if (box_holds(lower, upper, low, high))
@@ -351,8 +397,12 @@ static bool check_absent(struct tree_check *t, uint32_t part_count) {
     for (uint32_t i = 0; i < part_count; i++) {
         const struct trc_part *part = &t->parts[i];
         for (uint32_t k = 0; part->mesh && k < part->mesh->triangle_count; k++) {
-            if (t->seen[t->first[i] + k])
+            if (t->seen[t->first[i] + k]) {
+                if (t->covered && t->covered[t->first[i] + k] != ALL_POINTS)
+                    return complain(t->checker, "%s: triangle %u sticks out of its boxes", t->name,
+                                    k);
                 continue;
+            }
             absent++;
             if (triangle_is_valid(part, k, t->tree->key_count))
                 return complain(t->checker, "%s: triangle %u is in no leaf", t->name, k);
@@ -380,13 +430,15 @@ static bool check_tree(struct tree_check *t, uint32_t part_count, uint64_t *firs
     t->nodes = trc_alloc_zeroed(t->tree->node_count, 1);
     t->slots = trc_alloc_zeroed(t->tree->slot_count, 1);
     t->seen = trc_alloc_zeroed(total, 1);
-    bool good = t->nodes && t->slots && t->seen;
+    t->covered = t->tree->has_pieces ? trc_alloc_zeroed(total, sizeof *t->covered) : NULL;
+    bool good = t->nodes && t->slots && t->seen && (t->covered || !t->tree->has_pieces);
     if (!good)
         complain(t->checker, "no memory to check a tree");
     good = good && check_shape(t) && (t->tree->is_top || check_absent(t, part_count));
     trc_free(t->nodes);
     trc_free(t->slots);
     trc_free(t->seen);
+    trc_free(t->covered);
     return good;
 }
 

@@ -28,6 +28,6 @@ void trc_clusters_open(const struct trc_ref *refs, uint32_t count,
                        struct trc_part_triangle *triangles_out) {
     for (uint32_t i = 0; i < count; i++)
         for (uint32_t k = 0; k < trc_ref_count(&refs[i]); k++)
-            *triangles_out++ =
-                (struct trc_part_triangle){refs[i].part, trc_ref_first(&refs[i]) + k};
+            *triangles_out++ = (struct trc_part_triangle){refs[i].part & TRC_PART_INDEX_MASK,
+                                                          trc_ref_first(&refs[i]) + k};
 }

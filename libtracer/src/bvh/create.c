@@ -39,29 +39,37 @@ static trc_status tree_build(struct create_job *job, const struct trc_part *part
     if (total > TRC_REF_INDEX_MASK)
         return trc_fail(TRC_ERROR_TOO_LARGE, "%llu triangles in one tree, at most %u",
                         (unsigned long long)total, TRC_REF_INDEX_MASK);
-    struct trc_ref *memory = NULL;
-    struct trc_range all;
+    struct trc_refs refs = {0};
+    const bool clips = job->options->is_final && key_count == 1;
     trc_status status =
-        trc_refs_collect(parts, part_count, total, job->pool, job->options->cancel, &memory, &all);
-    struct trc_part_triangle *triangles = trc_alloc(total ? total : 1, sizeof *triangles);
-    if (status == TRC_OK && !triangles)
-        status = trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory to build a tree of %llu triangles",
-                          (unsigned long long)total);
+        trc_refs_collect(parts, part_count, total, clips, job->pool, job->options->cancel, &refs);
+    const uint32_t slot_count = refs.all.triangles;
+    struct trc_part_triangle *triangles = NULL;
+    struct box *boxes = NULL;
+    if (status == TRC_OK) {
+        triangles = trc_alloc(slot_count ? slot_count : 1, sizeof *triangles);
+        boxes = refs.is_clipped ? trc_alloc(slot_count, sizeof *boxes) : NULL;
+        if (!triangles || (refs.is_clipped && !boxes))
+            status =
+                trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory to build a tree of %llu triangles",
+                         (unsigned long long)total);
+    }
     struct trc_topology topology;
     if (status == TRC_OK)
-        status = trc_topology_build(&all, TRC_NODE_WIDTH, job->pool, job->options->cancel,
-                                    triangles, &topology);
+        status = trc_topology_build(&refs.all, TRC_NODE_WIDTH, job->pool, job->options->cancel,
+                                    triangles, boxes, &topology);
     if (status == TRC_OK) {
-        status = trc_tree_fill(&topology, triangles, all.triangles, parts, key_count, job->pool,
+        status = trc_tree_fill(&topology, triangles, boxes, slot_count, parts, key_count, job->pool,
                                job->options->cancel, tree);
         trc_topology_destroy(&topology);
     }
+    trc_free(boxes);
     trc_free(triangles);
-    trc_free(memory);
+    trc_free(refs.memory);
     if (status != TRC_OK)
         return status;
-    tree->triangle_count = all.triangles;
-    tree->skipped_count = total - all.triangles;
+    tree->triangle_count = refs.triangle_count;
+    tree->skipped_count = total - refs.triangle_count;
     job->stats->built_count++;
     return TRC_OK;
 }
@@ -292,7 +300,8 @@ static trc_status items_build(struct create_job *job, const struct trc_item *ite
     }
     if (status == TRC_OK) {
         trc_range_measure(&all);
-        status = trc_topology_build(&all, 1, job->pool, job->options->cancel, order, &topology);
+        status =
+            trc_topology_build(&all, 1, job->pool, job->options->cancel, order, NULL, &topology);
     }
     if (status == TRC_OK) {
         status = trc_tree_fill_top(&topology, order, count, items, boxes, bvh->items, &bvh->top);

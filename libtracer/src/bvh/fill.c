@@ -85,6 +85,7 @@ struct fill_job {
     const struct trc_tree *from;
     const struct trc_topology *topology;
     const struct trc_part_triangle *triangles;
+    const struct box *boxes; /* of clipped leaves, by their first slot, or NULL */
     const struct trc_part *parts;
     struct trc_tree *tree;
     const struct trc_slot_vertices *known; /* or NULL: asked of the mesh */
@@ -102,10 +103,15 @@ static bool part_is_transparent(const struct trc_part *part, uint32_t triangle) 
     return part->transparent[slot < part->slot_count ? slot : part->slot_count - 1] != 0;
 }
 
+/* The part of what stands in the slot of a new tree. */
+static inline const struct trc_part *slot_part(const struct fill_job *job, uint32_t slot) {
+    return &job->parts[job->triangles[slot].part & TRC_PART_INDEX_MASK];
+}
+
 /* What stands in the slot of a new tree. */
 static void slot_fill(struct fill_job *job, uint32_t slot) {
     const uint32_t triangle = job->triangles[slot].triangle;
-    const struct trc_part *part = &job->parts[job->triangles[slot].part];
+    const struct trc_part *part = slot_part(job, slot);
     const bool transparent = part_is_transparent(part, triangle);
     if (transparent)
         atomic_store_explicit(&job->transparent, true, memory_order_relaxed);
@@ -116,7 +122,7 @@ static void slot_fill(struct fill_job *job, uint32_t slot) {
 /* The slot's part, and the three vertices of its triangle there. */
 static inline const struct trc_part *slot_source(const struct fill_job *job, uint32_t slot,
                                                  const uint32_t **index_out) {
-    const struct trc_part *part = job->from ? job->parts : &job->parts[job->triangles[slot].part];
+    const struct trc_part *part = job->from ? job->parts : slot_part(job, slot);
     *index_out = job->known
                      ? job->known->index[slot]
                      : part->mesh->indices + 3 * (size_t)job->tree->slots->slots[slot].triangle;
@@ -204,7 +210,9 @@ static bool leaf_fill(const struct fill_job *job, uint32_t ref, uint32_t key, fl
         if (i == last)
             break;
     }
-    const struct box box = box_around4(lower, upper);
+    struct box box = box_around4(lower, upper);
+    if (job->boxes && (job->triangles[first].part & TRC_PART_CLIPPED))
+        box = box_common(box, job->boxes[first]);
     f4_store3(lower_out, box.lower);
     f4_store3(upper_out, box.upper);
     return i4_all(f4_abs(sum) < f4_set(INFINITY));
@@ -405,15 +413,17 @@ static trc_status tree_fill(struct fill_job *job, struct trc_pool *pool) {
 }
 
 trc_status trc_tree_fill(const struct trc_topology *topology,
-                         const struct trc_part_triangle *triangles, uint32_t count,
-                         const struct trc_part *parts, uint32_t key_count, struct trc_pool *pool,
-                         const atomic_uint *cancel, struct trc_tree *tree) {
+                         const struct trc_part_triangle *triangles, const struct box *boxes,
+                         uint32_t count, const struct trc_part *parts, uint32_t key_count,
+                         struct trc_pool *pool, const atomic_uint *cancel, struct trc_tree *tree) {
     const trc_status status = tree_alloc(tree, topology->node_count, count, key_count, false, NULL);
     if (status != TRC_OK)
         return status;
     tree->root = topology->root;
+    tree->has_pieces = boxes != NULL;
     struct fill_job job = {.topology = topology,
                            .triangles = triangles,
+                           .boxes = boxes,
                            .parts = parts,
                            .tree = tree,
                            .cancel = cancel};
@@ -440,6 +450,7 @@ trc_status trc_tree_refit(const struct trc_tree *from, const struct trc_part *pa
         return status;
     tree->root = from->root;
     tree->has_transparent = from->has_transparent;
+    tree->has_pieces = from->has_pieces;
     struct fill_job job = {
         .from = from, .parts = part, .tree = tree, .known = from->slot_vertices, .cancel = cancel};
     tree->slot_vertices = from->slot_vertices;

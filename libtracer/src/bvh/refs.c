@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "bvh/clip.h"
 #include "bvh/cluster.h"
 #include "bvh/part.h"
 #include "core/core.h"
@@ -32,15 +33,20 @@ static bool triangle_ref(const struct trc_part *part, uint32_t triangle, struct 
 /* Triangles of a part that one task measures. */
 #define BLOCK_TRIANGLES 8192
 struct ref_block {
-    uint32_t part, begin, end; /* triangles */
-    struct trc_range range;    /* its refs, from where they would be if no triangles were joined */
-    struct trc_ref *to;        /* where they stand in the end */
+    uint32_t part, begin, end;  /* triangles */
+    struct trc_range range;     /* its refs, from where they would be if none were joined */
+    uint32_t pieces, triangles; /* its refs when clipped, and their triangles */
+    bool is_clipped;
+    struct trc_ref *to; /* where they stand in the end */
 };
 struct ref_job {
     const struct trc_part *parts;
     const atomic_uint *cancel; /* may be NULL */
     struct ref_block *blocks;
+    struct trc_clip clip;
 };
+/* Of so many triangles one more may come from clipping. */
+#define TRIANGLES_PER_PIECE 8
 
 static void collect_task(void *context, uint32_t index, uint32_t worker) {
     (void)worker;
@@ -62,11 +68,60 @@ static void collect_task(void *context, uint32_t index, uint32_t worker) {
     trc_range_measure(&block->range);
 }
 
+static bool is_cancelled(const struct ref_job *job) { return job->cancel && *job->cancel; }
+
+static bool is_large(const struct ref_job *job, const struct trc_ref *ref) {
+    return box_area(trc_ref_box(ref)) > job->clip.least_area;
+}
+
+/* Counts what a block comes to when it is clipped. */
+static void clip_count_task(void *context, uint32_t index, uint32_t worker) {
+    (void)worker;
+    const struct ref_job *job = context;
+    struct ref_block *block = &job->blocks[index];
+    const struct trc_range *r = &block->range;
+    block->pieces = r->count;
+    block->triangles = r->triangles;
+    for (uint32_t i = 0; i < r->count && !is_cancelled(job); i++) {
+        uint32_t triangles;
+        if (!is_large(job, &r->refs[i]))
+            continue;
+        block->pieces +=
+            trc_ref_clip(&job->parts[block->part], &r->refs[i], &job->clip, NULL, &triangles) - 1;
+        block->triangles += triangles - trc_ref_count(&r->refs[i]);
+    }
+    block->is_clipped = block->pieces > r->count;
+}
+
+/* Moves a block to where it stands in the end, clipped if it is to be. */
 static void gather_task(void *context, uint32_t index, uint32_t worker) {
     (void)worker;
     const struct ref_job *job = context;
     const struct ref_block *block = &job->blocks[index];
-    memcpy(block->to, block->range.refs, block->range.count * sizeof *block->to);
+    const struct trc_range *r = &block->range;
+    struct trc_ref *to = block->to;
+    uint32_t triangles;
+    if (!block->is_clipped)
+        memcpy(to, r->refs, r->count * sizeof *to);
+    for (uint32_t i = 0; i < r->count && block->is_clipped; i++)
+        if (is_large(job, &r->refs[i]))
+            to += trc_ref_clip(&job->parts[block->part], &r->refs[i], &job->clip, to, &triangles);
+        else
+            *to++ = r->refs[i];
+}
+
+/* Chooses what is clipped: all that is large, or of too many such refs the largest. */
+static void clip_choose(struct ref_job *job, uint32_t block_count, uint64_t room,
+                        struct trc_pool *pool) {
+    job->clip.least_area = TRC_CLIP_LEAST_SHARE * box_area(job->clip.bounds);
+    for (;; job->clip.least_area *= 2.0f) {
+        uint64_t more = 0;
+        trc_pool_run(pool, block_count, clip_count_task, job);
+        for (uint32_t i = 0; i < block_count; i++)
+            more += job->blocks[i].triangles - job->blocks[i].range.triangles;
+        if (more <= room)
+            return;
+    }
 }
 
 /* The blocks of all parts, their refs from *refs on; NULL without memory. */
@@ -89,12 +144,22 @@ static struct ref_block *blocks_create(const struct trc_part *parts, uint32_t pa
     return blocks;
 }
 
+/* Box of the centroids of refs that have been clipped. */
+static struct box centroids_of(const struct trc_ref *refs, uint32_t count) {
+    struct trc_range r = {.refs = (struct trc_ref *)refs, .count = count};
+    trc_range_measure(&r);
+    return r.centroids;
+}
+
 trc_status trc_refs_collect(const struct trc_part *parts, uint32_t part_count,
-                            uint64_t triangle_count, struct trc_pool *pool,
-                            const atomic_uint *cancel, struct trc_ref **memory_out,
-                            struct trc_range *all_out) {
+                            uint64_t triangle_count, bool clips, struct trc_pool *pool,
+                            const atomic_uint *cancel, struct trc_refs *out) {
+    const uint64_t most = TRC_REF_INDEX_MASK - triangle_count,
+                   wanted = clips ? triangle_count / TRIANGLES_PER_PIECE : 0,
+                   room = wanted < most ? wanted : most;
+    const uint64_t capacity = triangle_count + room;
     uint32_t block_count;
-    struct trc_ref *memory = trc_alloc(2 * (triangle_count + 1), sizeof *memory);
+    struct trc_ref *memory = trc_alloc(2 * (capacity + 1), sizeof *memory);
     struct ref_block *blocks =
         memory ? blocks_create(parts, part_count, memory, &block_count) : NULL;
     if (!blocks) {
@@ -102,25 +167,38 @@ trc_status trc_refs_collect(const struct trc_part *parts, uint32_t part_count,
         return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory to build a tree of %llu triangles",
                         (unsigned long long)triangle_count);
     }
-    struct ref_job job = {parts, cancel, blocks};
-    struct trc_range all = {.refs = memory + triangle_count,
-                            .spare = memory,
-                            .bounds = box_empty(),
-                            .centroids = box_empty()};
+    struct ref_job job = {.parts = parts, .cancel = cancel, .blocks = blocks};
+    *out = (struct trc_refs){.memory = memory};
+    struct trc_range *all = &out->all;
+    *all = (struct trc_range){.refs = memory + capacity,
+                              .spare = memory,
+                              .bounds = box_empty(),
+                              .centroids = box_empty()};
     trc_pool_run(pool, block_count, collect_task, &job);
     for (uint32_t i = 0; i < block_count; i++) {
-        const struct trc_range *r = &blocks[i].range;
-        blocks[i].to = all.refs + all.count;
-        all.count += r->count;
-        all.triangles += r->triangles;
-        if (r->count == 0) /* not measured, where it was cancelled */
-            continue;
-        box_grow(&all.bounds, r->bounds);
-        box_grow(&all.centroids, r->centroids);
+        struct ref_block *b = &blocks[i];
+        b->pieces = b->range.count;
+        b->triangles = b->range.triangles;
+        out->triangle_count += b->triangles;
+        if (b->range.count > 0) /* else not measured, where it was cancelled */
+            box_grow(&all->bounds, b->range.bounds);
+    }
+    if (room > 0) {
+        job.clip.bounds = all->bounds;
+        clip_choose(&job, block_count, room, pool);
+    }
+    for (uint32_t i = 0; i < block_count; i++) {
+        blocks[i].to = all->refs + all->count;
+        all->count += blocks[i].pieces;
+        all->triangles += blocks[i].triangles;
+        out->is_clipped = out->is_clipped || blocks[i].is_clipped;
     }
     trc_pool_run(pool, block_count, gather_task, &job);
+    for (uint32_t i = 0; i < block_count; i++)
+        if (blocks[i].is_clipped)
+            box_grow(&all->centroids, centroids_of(blocks[i].to, blocks[i].pieces));
+        else if (blocks[i].range.count > 0)
+            box_grow(&all->centroids, blocks[i].range.centroids);
     trc_free(blocks);
-    *memory_out = memory;
-    *all_out = all;
     return TRC_OK;
 }

@@ -84,6 +84,7 @@ struct trc_tree {
     const struct trc_item *items;            /* TLAS only, by slot */
     bool is_top;
     bool has_transparent;     /* some slot has TRC_SLOT_TRANSPARENT */
+    bool has_pieces;          /* a triangle may stand in several leaves (bvh/clip.h) */
     float lower[3], upper[3]; /* over all keys; lower > upper when empty */
     float extent;             /* largest |coordinate| of the bounds: scale of rounding errors */
     uint64_t triangle_count, skipped_count;
@@ -137,7 +138,7 @@ struct trc_pool;
 /* One primitive for the builder: its box (of a moving one: the mean over the keys). */
 struct trc_ref {
     float lower[3];
-    uint32_t part; /* index of the part, see below; TLAS: unused */
+    uint32_t part; /* index of the part, see below, and TRC_PART_CLIPPED; TLAS: unused */
     float upper[3];
     /* First triangle of the part's mesh, and in bits 28-31 how many follow it (bvh/cluster.h);
      * TLAS: item. */
@@ -151,7 +152,12 @@ static inline uint32_t trc_ref_count(const struct trc_ref *r) {
     return r->primitive / TRC_REF_NEXT + 1;
 }
 
-/* What stands in a slot; TLAS: triangle is the item. */
+/* In the place of a part: what stands there has a smaller box than its triangles (bvh/clip.h). */
+#define TRC_PART_CLIPPED 0x80000000u
+#define TRC_PART_INDEX_MASK 0x7fffffffu
+
+/* What stands in a slot; TLAS: triangle is the item. The first slot of a clipped leaf has
+ * TRC_PART_CLIPPED. */
 struct trc_part_triangle {
     uint32_t part, triangle;
 };
@@ -176,11 +182,13 @@ struct trc_range; /* bvh/range.h */
 
 /* Binned SAH (Wald, "On fast construction of SAH-based bounding volume hierarchies", 2007) over
  * measured refs, which are used up, as 8-wide nodes of the least cost (bvh/binary.h): triangles_out
- * gets what stands in the slots. leaf_size: most triangles of a leaf, 1..8. Same result for any
- * thread count. OUT_OF_MEMORY, TOO_LARGE or CANCELLED. */
+ * gets what stands in the slots, boxes_out at the first slots of clipped leaves their boxes (NULL
+ * where no ref is clipped). leaf_size: most triangles of a leaf, 1..8. Same result for any thread
+ * count. OUT_OF_MEMORY, TOO_LARGE or CANCELLED. */
 trc_status trc_topology_build(const struct trc_range *all, uint32_t leaf_size,
                               struct trc_pool *pool, const atomic_uint *cancel,
-                              struct trc_part_triangle *triangles_out, struct trc_topology *out);
+                              struct trc_part_triangle *triangles_out, struct box *boxes_out,
+                              struct trc_topology *out);
 void trc_topology_destroy(struct trc_topology *topology);
 
 /* A triangle at a key, as a leaf holds it: corners on a line (of meshes at rest) become one point,
@@ -189,11 +197,12 @@ void trc_part_triangle(const struct trc_part *part, uint32_t triangle, uint32_t 
                        float out[3][3]);
 
 /* A tree of that shape, whose leaves are ranges of count slots, with its vertices, bounds and SAH
- * cost. */
+ * cost. boxes: at the first slots of clipped leaves what they do not reach beyond, since what their
+ * triangles have there stands in other leaves, or NULL. */
 trc_status trc_tree_fill(const struct trc_topology *topology,
-                         const struct trc_part_triangle *triangles, uint32_t count,
-                         const struct trc_part *parts, uint32_t key_count, struct trc_pool *pool,
-                         const atomic_uint *cancel, struct trc_tree *tree);
+                         const struct trc_part_triangle *triangles, const struct box *boxes,
+                         uint32_t count, const struct trc_part *parts, uint32_t key_count,
+                         struct trc_pool *pool, const atomic_uint *cancel, struct trc_tree *tree);
 
 /* The same tree with other positions of the same topology: a copy of *from, refilled and bounded.
  * Its extent is infinite if a position is not finite. */

@@ -87,6 +87,10 @@ static inline struct box box_around4(const f4 lower[3], const f4 upper[3]) {
     return (struct box){f4_min(f4_min(l[0], l[1]), f4_min(l[2], l[3])),
                         f4_max(f4_max(u[0], u[1]), f4_max(u[2], u[3]))};
 }
+/* What both have in common. */
+static inline struct box box_common(struct box a, struct box b) {
+    return (struct box){f4_max(a.lower, b.lower), f4_min(a.upper, b.upper)};
+}
 /* Lengths of the edges; 0 for an empty box. */
 static inline f4 box_size(struct box b) { return f4_max(b.upper - b.lower, f4_set(0.0f)); }
 /* Half the surface of a box that is longer by margin along each axis; of an empty one, as of a

@@ -1,0 +1,43 @@
+/* Early split clipping: one ref as several, each to what lies of its triangles in a part of its
+ * box.
+ *
+ * Long triangles that slant have boxes of many times their area, which no split of whole triangles
+ * makes smaller. After Manfred Ernst, Günther Greiner, "Early Split Clipping for Bounding Volume
+ * Hierarchies", 2007, who cut whatever has a large box; here it must be mostly empty, too. Planes
+ * are those of grids over the tree, so that neighbours are cut alike: Tero Karras, Timo Aila, "Fast
+ * Parallel Construction of High-Quality Bounding Volume Hierarchies", 2013.
+ *
+ * A conference room of 331,179 triangles that is turned by 37 degrees gets 0.4 % more of them and
+ * an SAH cost of 7.8 instead of 11.0; its rays are 9 % faster in the mean (3 to 16), those of
+ * generated rooms 4 % (-5 to 13). Upright it gets 0.02 % more, and nothing changes. Spatial splits
+ * within the build (Martin Stich, Heiko Friedrich, Andreas Dietrich, "Spatial Splits in Bounding
+ * Volume Hierarchies", 2009) do less for more: turned about two axes 11.8, where this comes to 9.5
+ * and the room had 14.8, and upright they save 2 % or cost 3 % of the SAH cost. */
+#ifndef TRACER_BVH_CLIP_H
+#define TRACER_BVH_CLIP_H
+
+#include "bvh/tree.h"
+#include "core/box.h"
+
+/* What is to be cut: refs of a tree with those bounds whose boxes are larger (half the surface). */
+struct trc_clip {
+    struct box bounds;
+    float least_area;
+};
+
+/* Boxes of less than this part of the tree's stay whole. With a third of it rays of upright scenes
+ * are 2 % slower, and of turned ones no faster. */
+#define TRC_CLIP_LEAST_SHARE 3e-3f
+
+/* Pieces of a ref at most. */
+#define TRC_CLIP_MOST_PIECES 256
+
+/* Cuts a ref to triangles of the part: pieces_out, unless it is NULL, gets those that stand for it,
+ * itself where it stays whole. Each point of its triangles is in the box of a piece that has that
+ * triangle. Returns how many there are, at least 1; *triangles_out: the triangles of all together.
+ */
+uint32_t trc_ref_clip(const struct trc_part *part, const struct trc_ref *ref,
+                      const struct trc_clip *clip, struct trc_ref *pieces_out,
+                      uint32_t *triangles_out);
+
+#endif
