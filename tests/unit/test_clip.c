@@ -6,6 +6,7 @@
 #include "bvh/part.h"
 #include "bvh/ref.h"
 #include "bvh/tree.h"
+#include "core/core.h"
 #include "figures.h"
 #include "rng.h"
 
@@ -257,6 +258,31 @@ static void the_check_finds_lost_pieces(void **state) {
     query_world_free(&world);
 }
 
+/* Whichever allocation fails, a build says so and keeps no memory. */
+static void clipped_builds_fail_cleanly(void **state) {
+    (void)state;
+    struct query_world world;
+    struct query_scene scene;
+    strips_world(&world, 20000, 40);
+    assert_ok(query_scene_create(&world, true, 1, &scene)); /* what stays is taken here */
+    query_scene_destroy(&scene);
+    const uint64_t before = trc_memory_bytes();
+    trc_status status = TRC_ERROR_OUT_OF_MEMORY;
+    int64_t n = 0;
+    for (; status != TRC_OK && n < 1000; n++) {
+        trc_memory_fail_at(n, false);
+        status = query_scene_create(&world, true, 1, &scene);
+        trc_memory_fail_at(-1, false);
+        if (status == TRC_OK)
+            query_scene_destroy(&scene);
+        else
+            assert_int_equal(status, TRC_ERROR_OUT_OF_MEMORY);
+        assert_int_equal(trc_memory_bytes(), before);
+    }
+    assert_in_range(n, 20, 999);
+    query_world_free(&world);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(pieces_hold_all_points),
@@ -264,6 +290,7 @@ int main(void) {
         cmocka_unit_test(full_and_small_boxes_stay_whole),
         cmocka_unit_test(final_trees_are_clipped),
         cmocka_unit_test(the_check_finds_lost_pieces),
+        cmocka_unit_test(clipped_builds_fail_cleanly),
     };
     return cmocka_run_group_tests_name("clip", tests, NULL, NULL);
 }

@@ -1,6 +1,8 @@
 /* Refs to the triangles of parts: see refs.h. */
 #include "bvh/refs.h"
 
+#include <float.h>
+#include <math.h>
 #include <string.h>
 
 #include "bvh/clip.h"
@@ -74,23 +76,23 @@ static bool is_large(const struct ref_job *job, const struct trc_ref *ref) {
     return box_area(trc_ref_box(ref)) > job->clip.least_area;
 }
 
-/* Counts what a block comes to when it is clipped. */
+/* Counts what a block comes to when it is clipped; cancelled, it stays as it is. */
 static void clip_count_task(void *context, uint32_t index, uint32_t worker) {
     (void)worker;
     const struct ref_job *job = context;
     struct ref_block *block = &job->blocks[index];
     const struct trc_range *r = &block->range;
-    block->pieces = r->count;
-    block->triangles = r->triangles;
+    uint32_t pieces = 0, triangles = 0;
     for (uint32_t i = 0; i < r->count && !is_cancelled(job); i++) {
-        uint32_t triangles;
-        if (!is_large(job, &r->refs[i]))
-            continue;
-        block->pieces +=
-            trc_ref_clip(&job->parts[block->part], &r->refs[i], &job->clip, NULL, &triangles) - 1;
-        block->triangles += triangles - trc_ref_count(&r->refs[i]);
+        uint32_t count = trc_ref_count(&r->refs[i]);
+        pieces += is_large(job, &r->refs[i]) ? trc_ref_clip(&job->parts[block->part], &r->refs[i],
+                                                            &job->clip, NULL, &count)
+                                             : 1;
+        triangles += count;
     }
-    block->is_clipped = block->pieces > r->count;
+    block->is_clipped = pieces > r->count && !is_cancelled(job);
+    block->pieces = block->is_clipped ? pieces : r->count;
+    block->triangles = block->is_clipped ? triangles : r->triangles;
 }
 
 /* Moves a block to where it stands in the end, clipped if it is to be. */
@@ -113,7 +115,8 @@ static void gather_task(void *context, uint32_t index, uint32_t worker) {
 /* Chooses what is clipped: all that is large, or of too many such refs the largest. */
 static void clip_choose(struct ref_job *job, uint32_t block_count, uint64_t room,
                         struct trc_pool *pool) {
-    job->clip.least_area = TRC_CLIP_LEAST_SHARE * box_area(job->clip.bounds);
+    /* Areas that underflow would not be told from 0. */
+    job->clip.least_area = fmaxf(TRC_CLIP_LEAST_SHARE * box_area(job->clip.bounds), FLT_MIN);
     for (;; job->clip.least_area *= 2.0f) {
         uint64_t more = 0;
         trc_pool_run(pool, block_count, clip_count_task, job);
