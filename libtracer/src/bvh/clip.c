@@ -120,12 +120,6 @@ static bool piece_cut(const struct trc_part *part, const struct trc_ref *ref, st
     return true;
 }
 
-static int longest_axis(struct box b) {
-    const f4 d = box_size(b);
-    const int xy = d[0] >= d[1] ? 0 : 1;
-    return d[xy] >= d[2] ? xy : 2;
-}
-
 /* Where a box is cut: at a plane of the coarsest grid that has one well within it. */
 static float grid_plane(const struct trc_clip *clip, struct box b, int axis) {
     const float origin = clip->bounds.lower[axis], length = b.upper[axis] - b.lower[axis];
@@ -149,7 +143,7 @@ static uint32_t piece_divide(const struct trc_part *part, const struct trc_clip 
     const float area = box_area(box);
     if (area <= clip->least_area || area <= EMPTY_RATIO * p->area || p->area == 0.0f)
         return 0;
-    const int axis = longest_axis(box);
+    const int axis = f4_largest_axis(box_size(box));
     const float plane = grid_plane(clip, box, axis);
     if (!(plane > box.lower[axis] && plane < box.upper[axis]))
         return 0;

@@ -93,6 +93,11 @@ static inline struct box box_common(struct box a, struct box b) {
 }
 /* Lengths of the edges; 0 for an empty box. */
 static inline f4 box_size(struct box b) { return f4_max(b.upper - b.lower, f4_set(0.0f)); }
+/* The axis of the largest of three sizes. */
+static inline int f4_largest_axis(f4 size) {
+    const int xy = size[0] >= size[1] ? 0 : 1;
+    return size[xy] >= size[2] ? xy : 2;
+}
 /* Half the surface of a box that is longer by margin along each axis; of an empty one, as of a
  * point. */
 static inline float box_area_wider(struct box b, float margin) {

@@ -231,8 +231,7 @@ static struct trc_split split_begin(const struct trc_range *r) {
  * apart, and gives that axis. */
 static int few_sort(const struct trc_range *r) {
     struct trc_ref *refs = r->refs;
-    const f4 size = r->centroids.upper - r->centroids.lower;
-    const int xy = size[0] >= size[1] ? 0 : 1, axis = size[xy] >= size[2] ? xy : 2;
+    const int axis = f4_largest_axis(r->centroids.upper - r->centroids.lower);
     for (uint32_t i = 1; i < r->count; i++) {
         const struct trc_ref ref = refs[i];
         const float at = ref.lower[axis] + ref.upper[axis];
