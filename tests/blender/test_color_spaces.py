@@ -115,3 +115,27 @@ def test_against_cycles(blender, source):
         error = np.abs(ours - theirs) / np.maximum(theirs.max(axis=-1, keepdims=True), 1.0)
         print(f"{space:30} {error.mean():.1e} {error.max():.1e}")
         assert error.mean() <= MEAN_TOLERANCE and error.max() <= _tolerance(source, space), space
+
+
+def inside_linear(folder):
+    """What is found to be the scene-linear space: of Blender's configuration, of others."""
+    import bpy
+    from volley.sync import image
+    found = {"blender": image._scene_linear(image._color_config())}
+    for name, text in {"quoted": 'roles:\n  scene_linear: "ACES - cg"  # working space\n',
+                       "plain": "roles:\n  default_float: a\n  scene_linear: lin_ap1\n",
+                       "none": "roles:\n  default_float: a\n"}.items():
+        path = os.path.join(folder, f"{name}.ocio")
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(text)
+        found[name] = image._scene_linear(path)
+    found["missing"] = image._scene_linear(os.path.join(folder, "missing.ocio"))
+    made = bpy.data.images.new("Floats", 4, 4, float_buffer=True)
+    return found, made.colorspace_settings.name, image._encoding(made)
+
+
+def test_scene_linear_images_need_no_configuration(blender, tmp_path):
+    found, floats, encoding = blender.run(inside_linear, str(tmp_path))
+    assert found == {"blender": floats, "quoted": "ACES - cg", "plain": "lin_ap1", "none": None,
+                     "missing": None}
+    assert encoding == {}

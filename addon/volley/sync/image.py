@@ -6,7 +6,9 @@ the library cannot read, come from Blender's pixels. A missing image is 0, which
 Colours are converted to scene-linear ones by the library, with Blender's OpenColorIO configuration.
 """
 
+import functools
 import os
+import re
 import tempfile
 import zlib
 
@@ -191,7 +193,10 @@ def _encoding(image):
     space = image.colorspace_settings.name
     if space == "sRGB":
         return {"is_srgb": True}
-    return {} if _is_data(image) else {"color_space": (_color_config(), space)}
+    config = _color_config()
+    if _is_data(image) or space == _scene_linear(config):
+        return {}
+    return {"color_space": (config, space)}
 
 
 def _is_data(image):
@@ -205,6 +210,18 @@ def _color_config():
                bpy.utils.system_resource('DATAFILES', path="colormanagement"))
     paths = [os.path.join(folder, "config.ocio") for folder in folders]
     return os.environ.get("OCIO") or next(filter(os.path.isfile, paths), paths[-1])
+
+
+@functools.lru_cache(maxsize=None)
+def _scene_linear(config):
+    """The name of the scene-linear space in a configuration, None where it does not say: to let the
+    library find out that there is nothing to convert takes up to 0.3 s in Blender 4.3."""
+    try:
+        with open(config, encoding="utf-8") as file:
+            role = re.search(r"^ *scene_linear: *([^\n#]*[^\s#])", file.read(), re.MULTILINE)
+    except (OSError, UnicodeDecodeError):
+        return None
+    return role and role[1].strip("'\"")
 
 
 def _is_mip_mapped(node):
