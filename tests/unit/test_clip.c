@@ -186,8 +186,9 @@ static void strips_world(struct query_world *world, uint32_t small, uint32_t str
     static const float lower[3] = {-1, -1, -1}, upper[3] = {1, 1, 1};
     struct rng rng = rng_seed(5);
     query_world_init(world);
-    mesh_add_soup(query_world_object(world), &rng, small, lower, upper, 0.02f);
-    mesh_add_strips(query_world_object(world), &rng, strips, 2.0f, 0.01f);
+    struct mesh *mesh = query_world_object(world);
+    mesh_add_soup(mesh, &rng, small, lower, upper, 0.02f);
+    mesh_add_strips(mesh, &rng, strips, 2.0f, 0.01f);
 }
 
 static const struct trc_tree *joined_tree(const struct query_scene *scene) {
@@ -196,36 +197,49 @@ static const struct trc_tree *joined_tree(const struct query_scene *scene) {
     return bvh->tree;
 }
 
-/* Final scenes cut what slants; others do not. Fewer boxes are met by chance, for a few more
- * triangles, and any number of threads makes the same tree. */
+/* Final scenes cut what slants, unless there is no room for pieces; others do not. Boxes are met by
+ * chance less often, and any number of threads makes the same tree. */
 static void final_trees_are_clipped(void **state) {
     (void)state;
-    struct query_world world;
+    struct query_world world, full;
+    struct query_scene again;
     strips_world(&world, 20000, 40);
-    const struct query_scene scene = query_test_scene(&world, true);
+    strips_world(&full, 0, 40);
+    struct query_scene scene = query_test_scene(&world, true),
+                       quick = query_test_scene(&world, false),
+                       uncut = query_test_scene(&full, true);
     const struct trc_tree *tree = joined_tree(&scene);
+    const struct trc_tree *whole = &query_scene_snapshot(quick.scene)->bvh->blas[0]->tree;
     assert_int_equal(tree->triangle_count, 20080);
     assert_in_range(tree->slot_count, 20500, 20080 + 20080 / 8);
-    struct query_scene again;
+    assert_int_equal(whole->slot_count, 20080);
+    assert_int_equal(joined_tree(&uncut)->slot_count, 80);
+    print_figure("strips", "SAH cost %.1f with %u slots, %.1f without pieces", tree->sah_cost,
+                 tree->slot_count, whole->sah_cost);
+    assert_true(tree->sah_cost < 0.8f * whole->sah_cost);
     assert_ok(query_scene_create(&world, true, 4, &again));
     assert_int_equal(joined_tree(&again)->slot_count, tree->slot_count);
     assert_memory_equal(joined_tree(&again)->nodes, tree->nodes,
                         tree->node_count * tree->node_stride);
-    struct query_scene quick = query_test_scene(&world, false);
-    const struct trc_bvh *bvh = query_scene_snapshot(quick.scene)->bvh;
-    for (uint32_t mesh = 0; mesh < 2; mesh++)
-        assert_int_equal(bvh->blas[mesh]->tree.slot_count, bvh->blas[mesh]->tree.triangle_count);
-    query_scene_destroy(&quick);
-    /* The same triangles without room for pieces. */
-    struct query_world full;
-    strips_world(&full, 0, 40);
-    const struct query_scene uncut = query_test_scene(&full, true);
-    assert_int_equal(joined_tree(&uncut)->slot_count, 80);
-    print_figure("strips", "SAH cost %.1f with %u slots", tree->sah_cost, tree->slot_count);
     query_scene_destroy(&again);
-    query_scene_destroy((struct query_scene *)&uncut);
-    query_scene_destroy((struct query_scene *)&scene);
+    query_scene_destroy(&uncut);
+    query_scene_destroy(&quick);
+    query_scene_destroy(&scene);
     query_world_free(&full);
+    query_world_free(&world);
+}
+
+/* A mesh of several instances has a tree of its own, which its poses refit: it is not clipped. */
+static void trees_that_are_refitted_are_not(void **state) {
+    (void)state;
+    struct query_world world;
+    strips_world(&world, 20000, 40);
+    query_world_instance(&world, 0);
+    struct query_scene scene = query_test_scene(&world, true);
+    const struct trc_tree *tree = &query_scene_snapshot(scene.scene)->bvh->blas[0]->tree;
+    assert_int_equal(tree->slot_count, 20080);
+    assert_false(tree->has_pieces);
+    query_scene_destroy(&scene);
     query_world_free(&world);
 }
 
@@ -289,6 +303,7 @@ int main(void) {
         cmocka_unit_test(pieces_are_smaller),
         cmocka_unit_test(full_and_small_boxes_stay_whole),
         cmocka_unit_test(final_trees_are_clipped),
+        cmocka_unit_test(trees_that_are_refitted_are_not),
         cmocka_unit_test(the_check_finds_lost_pieces),
         cmocka_unit_test(clipped_builds_fail_cleanly),
     };

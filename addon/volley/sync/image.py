@@ -193,10 +193,10 @@ def _encoding(image):
     space = image.colorspace_settings.name
     if space == "sRGB":
         return {"is_srgb": True}
-    config = _color_config()
-    if _is_data(image) or space == _scene_linear(config):
+    if _is_data(image):
         return {}
-    return {"color_space": (config, space)}
+    config = _color_config()
+    return {} if space == _scene_linear(config) else {"color_space": (config, space)}
 
 
 def _is_data(image):
@@ -212,7 +212,7 @@ def _color_config():
     return os.environ.get("OCIO") or next(filter(os.path.isfile, paths), paths[-1])
 
 
-@functools.lru_cache(maxsize=None)
+@functools.cache
 def _scene_linear(config):
     """The name of the scene-linear space in a configuration, None where it does not say: to let the
     library find out that there is nothing to convert takes up to 0.3 s in Blender 4.3."""

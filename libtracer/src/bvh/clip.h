@@ -1,6 +1,9 @@
 /* Early split clipping: one ref as several, each to what lies of its triangles in a part of its
  * box.
  *
+ * For the tree that joins what is at rest in final frames: others stand in the space of their mesh,
+ * whose walls mostly follow the axes, and are refitted.
+ *
  * Long triangles that slant have boxes of many times their area, which no split of whole triangles
  * makes smaller. After Manfred Ernst, Günther Greiner, "Early Split Clipping for Bounding Volume
  * Hierarchies", 2007, who cut whatever has a large box; here it must be mostly empty, too. Planes

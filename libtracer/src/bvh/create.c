@@ -30,9 +30,11 @@ struct create_job {
     uint32_t *first_slot; /* per instance */
 };
 
-/* One tree over parts of one key count. */
+/* One tree over parts of one key count. clips: they are at rest, and it is never refitted, which
+ * would bound pieces by whole triangles. */
 static trc_status tree_build(struct create_job *job, const struct trc_part *parts,
-                             uint32_t part_count, uint32_t key_count, struct trc_tree *tree) {
+                             uint32_t part_count, uint32_t key_count, bool clips,
+                             struct trc_tree *tree) {
     uint64_t total = 0;
     for (uint32_t i = 0; i < part_count; i++)
         total += parts[i].mesh->triangle_count;
@@ -40,7 +42,6 @@ static trc_status tree_build(struct create_job *job, const struct trc_part *part
         return trc_fail(TRC_ERROR_TOO_LARGE, "%llu triangles in one tree, at most %u",
                         (unsigned long long)total, TRC_REF_INDEX_MASK);
     struct trc_refs refs = {0};
-    const bool clips = job->options->is_final && key_count == 1;
     trc_status status =
         trc_refs_collect(parts, part_count, total, clips, job->pool, job->options->cancel, &refs);
     const uint32_t slot_count = refs.all.triangles;
@@ -159,7 +160,7 @@ static trc_status blas_obtain(struct create_job *job, uint32_t mesh_index,
             trc_tree_destroy(&blas->tree);
     }
     if (!done && status == TRC_OK) {
-        status = tree_build(job, &part, 1, mesh->key_count, &blas->tree);
+        status = tree_build(job, &part, 1, mesh->key_count, false, &blas->tree);
         blas->built_cost = blas->tree.sah_cost;
     }
     trc_free(slots);
@@ -186,7 +187,7 @@ trc_status trc_blas_build(const struct trc_mesh *mesh, struct trc_pool *pool,
     const struct trc_bvh_options options = {.cancel = cancel};
     struct create_job job = {.options = &options, .pool = pool, .stats = &stats};
     const struct trc_part part = {.mesh = mesh};
-    const trc_status status = tree_build(&job, &part, 1, mesh->key_count, &blas->tree);
+    const trc_status status = tree_build(&job, &part, 1, mesh->key_count, false, &blas->tree);
     if (status != TRC_OK) {
         trc_blas_release(blas);
         return status;
@@ -235,7 +236,7 @@ static trc_status joined_build(struct create_job *job) {
             parts[n++] = (struct trc_part){
                 s->meshes[s->instances[i].mesh], i, s->instances[i].object_to_world,
                 job->transparent + job->first_slot[i], s->instances[i].material_count};
-    const trc_status status = tree_build(job, parts, count, 1, &job->bvh->joined);
+    const trc_status status = tree_build(job, parts, count, 1, true, &job->bvh->joined);
     trc_free(parts);
     return status;
 }

@@ -450,7 +450,6 @@ trc_status trc_tree_refit(const struct trc_tree *from, const struct trc_part *pa
         return status;
     tree->root = from->root;
     tree->has_transparent = from->has_transparent;
-    tree->has_pieces = from->has_pieces;
     struct fill_job job = {
         .from = from, .parts = part, .tree = tree, .known = from->slot_vertices, .cancel = cancel};
     tree->slot_vertices = from->slot_vertices;

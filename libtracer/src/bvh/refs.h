@@ -4,6 +4,7 @@
 
 #include "bvh/range.h"
 
+/* What a tree is built over, and how much it is. */
 struct trc_refs {
     struct trc_ref *memory;  /* of refs and their spare memory */
     struct trc_range all;    /* triangles: those in several refs once for each */
@@ -12,9 +13,9 @@ struct trc_refs {
 };
 
 /* Refs to the valid triangles of all parts, triangle_count with the others, in order, clustered
- * (bvh/cluster.h), clipped where they should be (bvh/clip.h: of triangles at rest; an eighth more
- * at most) and measured, by all threads. out->memory is the caller's to free; on an error there is
- * none. Cancelled, it is some of them: the build that follows looks again. OUT_OF_MEMORY. */
+ * (bvh/cluster.h), clipped where they should be (bvh/clip.h: an eighth more triangles at most) and
+ * measured, by all threads. out->memory is the caller's to free; on an error there is none.
+ * Cancelled, it is some of them: the build that follows looks again. OUT_OF_MEMORY. */
 trc_status trc_refs_collect(const struct trc_part *parts, uint32_t part_count,
                             uint64_t triangle_count, bool clips, struct trc_pool *pool,
                             const atomic_uint *cancel, struct trc_refs *out);
