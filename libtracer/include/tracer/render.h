@@ -119,7 +119,9 @@ typedef struct trc_render_desc {
     float attenuation_cutoff; /* a ray whose throughput is below is not traced; Distribution decides
                                  by chance instead, unbiased, and does not read it */
     float filter_glossy;      /* Cycles' Filter Glossy; 0 off */
-    float clamp_direct, clamp_indirect; /* as Cycles; 0 off */
+    /* As Cycles: largest mean of the channels of one contribution to a sample; 0 off. Passes of
+     * light are clamped with Combined, that of ambient occlusion as direct light. */
+    float clamp_direct, clamp_indirect;
     uint32_t assembly;
     uint32_t packet_size; /* 4, 16, 64 or 256; 0 chooses. 256, the paper's largest: where rays stay
                              together (camera, ideal bounces, one light), and 64 elsewhere */

@@ -77,6 +77,13 @@ void TRC_KERNEL(trc_light_hit)(const struct trc_snapshot *snapshot, vvec3 p, vve
                                vfloat tmin, vfloat tmax, vfloat bsdf_pdf, vfloat light_sample_count,
                                vuint path, uint32_t group, vmask active, vvec3 *radiance);
 
+/* The same under Cycles' clamps: what each lamp gives to a path of that weight is scaled down to
+ * the limit (kernels/clamp.h). */
+void TRC_KERNEL(trc_light_hit_clamped)(const struct trc_snapshot *snapshot, vvec3 p, vvec3 n,
+                                       vvec3 wi, vfloat tmin, vfloat tmax, vfloat bsdf_pdf,
+                                       vfloat light_sample_count, vuint path, uint32_t group,
+                                       vvec3 weight, vfloat limit, vmask active, vvec3 *radiance);
+
 /* The light group of a light, 0 for none. Numbers after the last light are ambient occlusion, which
  * belongs to the world where it replaces its light. */
 uint32_t TRC_KERNEL(trc_light_group)(const struct trc_snapshot *snapshot, uint32_t light);

@@ -1,4 +1,5 @@
 /* Lights that continuation and camera rays find by themselves, and the weights of that. */
+#include "kernels/clamp.h"
 #include "kernels/light.h"
 #include "kernels/light_select.h"
 #include "kernels/light_shape.h"
@@ -93,9 +94,17 @@ static vfloat meet_lamp(const struct trc_lamp *lamp, vvec3 p, vvec3 wi, vfloat *
     return vf_select(hit, t, vf_set(INFINITY));
 }
 
-void TRC_KERNEL(trc_light_hit)(const struct trc_snapshot *snapshot, vvec3 p, vvec3 n, vvec3 wi,
-                               vfloat tmin, vfloat tmax, vfloat bsdf_pdf, vfloat light_sample_count,
-                               vuint path, uint32_t group, vmask active, vvec3 *radiance) {
+/* Under which clamp lamps are seen. */
+struct lamp_clamp {
+    vvec3 weight; /* of the path */
+    vfloat limit;
+};
+
+/* clamp: NULL for none. */
+TRC_INLINE void lamps_meet(const struct trc_snapshot *snapshot, vvec3 p, vvec3 n, vvec3 wi,
+                           vfloat tmin, vfloat tmax, vfloat bsdf_pdf, vfloat light_sample_count,
+                           vuint path, uint32_t group, const struct lamp_clamp *clamp, vmask active,
+                           vvec3 *radiance) {
     const struct trc_light_table *t = snapshot->lights;
     const bool all = group == TRC_ALL_GROUPS;
     const uint32_t end = t->group_seen[all ? TRC_MAX_LIGHT_GROUPS + 1 : group + 1];
@@ -122,8 +131,27 @@ void TRC_KERNEL(trc_light_hit)(const struct trc_snapshot *snapshot, vvec3 p, vve
             const vfloat chance = trc_light_chance(t, &receiver, vi_set((int32_t)number), weighed);
             weight = ray_weight(bsdf_pdf, pdf * chance, light_sample_count);
         }
+        if (clamp)
+            weight = weight *
+                     trc_clamp_factor(v3_mul(clamp->weight, v3_scale(light, weight)), clamp->limit);
         *radiance = v3_add(*radiance, v3_where(hit, v3_scale(light, weight)));
     }
+}
+
+void TRC_KERNEL(trc_light_hit)(const struct trc_snapshot *snapshot, vvec3 p, vvec3 n, vvec3 wi,
+                               vfloat tmin, vfloat tmax, vfloat bsdf_pdf, vfloat light_sample_count,
+                               vuint path, uint32_t group, vmask active, vvec3 *radiance) {
+    lamps_meet(snapshot, p, n, wi, tmin, tmax, bsdf_pdf, light_sample_count, path, group, NULL,
+               active, radiance);
+}
+
+void TRC_KERNEL(trc_light_hit_clamped)(const struct trc_snapshot *snapshot, vvec3 p, vvec3 n,
+                                       vvec3 wi, vfloat tmin, vfloat tmax, vfloat bsdf_pdf,
+                                       vfloat light_sample_count, vuint path, uint32_t group,
+                                       vvec3 weight, vfloat limit, vmask active, vvec3 *radiance) {
+    const struct lamp_clamp clamp = {weight, limit};
+    lamps_meet(snapshot, p, n, wi, tmin, tmax, bsdf_pdf, light_sample_count, path, group, &clamp,
+               active, radiance);
 }
 
 uint32_t TRC_KERNEL(trc_light_group)(const struct trc_snapshot *snapshot, uint32_t light) {

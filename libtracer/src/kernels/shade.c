@@ -7,6 +7,7 @@
  * join light samples and continuation rays by multiple importance sampling (Veach and Guibas 1995,
  * power heuristic). */
 #include "kernels/arrival.h"
+#include "kernels/clamp.h"
 #include "kernels/light.h"
 #include "kernels/spawn.h"
 #include "kernels/wide_math.h"
@@ -16,26 +17,17 @@
  * themselves, whatever the rounding of both ends. */
 #define SHADOW_END (1.0f - 2e-5f)
 
-/* Cycles' clamps: the sum of the channels of one contribution. */
-TRC_INLINE vvec3 clamp_radiance(vvec3 c, float limit) {
-    if (limit <= 0.0f)
-        return c;
-    const vfloat sum = vf_abs(c.x) + vf_abs(c.y) + vf_abs(c.z);
-    const vmask over = vf_gt(sum, vf_set(limit));
-    return v3_select(over, v3_scale(c, vf_set(limit) / vf_select(over, sum, vf_set(1.0f))), c);
+/* The limit of what rays find by themselves: what one bounce shows is direct light. */
+static vfloat found_limit(const struct trc_tile *t, const struct arrival *a) {
+    const vint depth = (vint)depth_of(a->depths, TRC_DEPTH_ALL_SHIFT);
+    return trc_clamp_limit(t->desc, vi_lt(depth, vi_set(2)));
 }
 
-/* Emission or background found by rays: to the samples, and to the pass its depth says.
- * camera_pass: what camera rays see it as. Returns what is added. */
-static vvec3 emission_add(struct trc_tile *t, const struct arrival *a, vmask active, vvec3 radiance,
-                          uint32_t camera_pass) {
-    if (!vm_any(active))
-        return v3_zero();
-    vvec3 c = v3_mul(a->found_weight, radiance);
+/* Light found by rays, weighted and clamped: to the samples, and to the pass its depth says.
+ * camera_pass: what camera rays see it as. */
+static void found_add(struct trc_tile *t, const struct arrival *a, vmask active, vvec3 c,
+                      uint32_t camera_pass) {
     const vuint depth = depth_of(a->depths, TRC_DEPTH_ALL_SHIFT);
-    if (t->desc->clamp_indirect > 0.0f || t->desc->clamp_direct > 0.0f)
-        c = v3_select(vi_lt((vint)depth, vi_set(2)), clamp_radiance(c, t->desc->clamp_direct),
-                      clamp_radiance(c, t->desc->clamp_indirect));
     float lanes[3][TRC_WIDTH];
     uint32_t depths[TRC_WIDTH], path[TRC_WIDTH];
     vf_store(lanes[0], c.x), vf_store(lanes[1], c.y), vf_store(lanes[2], c.z);
@@ -51,6 +43,17 @@ static vvec3 emission_add(struct trc_tile *t, const struct arrival *a, vmask act
             trc_pass_add(t, trc_category_pass(category) + (depths[i] > 1 ? 1 : 0), a->slots[i],
                          rgb);
     }
+}
+
+/* Emission or background found by rays. Returns what is added. */
+static vvec3 emission_add(struct trc_tile *t, const struct arrival *a, vmask active, vvec3 radiance,
+                          uint32_t camera_pass) {
+    if (!vm_any(active))
+        return v3_zero();
+    vvec3 c = v3_mul(a->found_weight, radiance);
+    if (trc_clamps(t->desc))
+        c = v3_scale(c, trc_clamp_factor(c, found_limit(t, a)));
+    found_add(t, a, active, c, camera_pass);
     return c;
 }
 
@@ -107,11 +110,23 @@ static void shade_misses(struct trc_tile *t, const struct arrival *a, vmask miss
 static vvec3 pass_lamps(struct trc_tile *t, const struct arrival *a, vfloat end, uint32_t group) {
     vvec3 c = v3_zero();
     /* It is surfaces alone that rays look back for. */
-    TRC_KERNEL(trc_light_hit)
-    (t->snapshot, a->o, a->n_from, a->d, vf_max(a->tmin, vf_set(0.0f)), end, a->pdf,
-     light_count_before(t, a->depths), a->path, group, a->active, &c);
+    const vfloat tmin = vf_max(a->tmin, vf_set(0.0f));
+    const vfloat count = light_count_before(t, a->depths);
+    if (trc_clamps(t->desc)) {
+        TRC_KERNEL(trc_light_hit_clamped)
+        (t->snapshot, a->o, a->n_from, a->d, tmin, end, a->pdf, count, a->path, group,
+         a->found_weight, found_limit(t, a), a->active, &c);
+    } else {
+        TRC_KERNEL(trc_light_hit)
+        (t->snapshot, a->o, a->n_from, a->d, tmin, end, a->pdf, count, a->path, group, a->active,
+         &c);
+    }
     const vmask seen = vm_and(a->active, vf_gt(v3_max(c), vf_set(0.0f)));
-    return v3_where(seen, emission_add(t, a, seen, c, TRC_PASS_EMISSION));
+    if (!vm_any(seen))
+        return v3_zero();
+    c = v3_where(seen, v3_mul(a->found_weight, c));
+    found_add(t, a, seen, c, TRC_PASS_EMISSION);
+    return c;
 }
 
 /* Lights that rays pass on their way, in the order of t->work. */
@@ -156,6 +171,11 @@ static void catch_shadows(struct trc_tile *t) {
 }
 
 /* ---- direct light ---- */
+
+/* Lanes that have not bounced yet. */
+TRC_INLINE vmask sees_directly(vuint depths) {
+    return vi_eq((vint)depth_of(depths, TRC_DEPTH_ALL_SHIFT), vi_set(0));
+}
 
 TRC_INLINE vmask goes_out(const struct trc_surface *s, vvec3 w) {
     return vf_ge(v3_dot(w, s->ng), vf_set(0.0f));
@@ -232,12 +252,8 @@ static void shadow_push(struct trc_tile *t, const struct arrival *a, const struc
                                 v3_select(far, v3_zero(), v3_sub(s->p, o)));
     const vfloat tmax = vf_select(vm_not(l->casts_shadow), vf_set(-1.0f),
                                   vf_select(far, vf_set(INFINITY), vf_set(SHADOW_END)));
-    const float limit = t->desc->clamp_direct;
-    vvec3 sum = v3_add(r->diffuse, v3_add(r->glossy, r->transmission));
+    const vvec3 sum = v3_add(r->diffuse, v3_add(r->glossy, r->transmission));
     const vuint depth = depth_of(a->depths, TRC_DEPTH_ALL_SHIFT);
-    if (limit > 0.0f || t->desc->clamp_indirect > 0.0f)
-        sum = v3_select(vi_lt((vint)depth, vi_set(1)), clamp_radiance(sum, limit),
-                        clamp_radiance(sum, t->desc->clamp_indirect));
     const vuint target_key = (vuint)l->light * vu_set(TRC_DIRECTION_CELLS) + cell;
     const vfloat values[] = {o.x,  o.y,     o.z,   target.x, target.y, target.z,
                              tmax, a->time, sum.x, sum.y,    sum.z};
@@ -293,11 +309,11 @@ static void sample_use(struct trc_tile *t, const struct arrival *a, const struct
         shadow_push(t, a, s, sample, &r, cell, lit);
 }
 
-static void direct_light(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
-                         const struct trc_lobes *lobes, vmask active) {
+/* Takes most samples for each of the lanes. */
+static void light_samples(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
+                          const struct trc_lobes *lobes, uint32_t most, vmask active) {
     const uint32_t dimension = TRC_DIM_BOUNCE + t->generation * TRC_DIMS_PER_BOUNCE;
-    const uint32_t most = t->generation == 0 ? t->desc->light_samples : 1;
-    const vfloat count = light_count(t, a->depths);
+    const vfloat count = vf_set((float)most);
     const struct trc_light_table *lights = t->snapshot->lights;
     const bool world_apart = lights->world_apart && !a->world_alone;
     const bool is_only_world = lights->world_light != UINT32_MAX && !lights->world_apart;
@@ -308,27 +324,45 @@ static void direct_light(struct trc_tile *t, const struct arrival *a, const stru
     for (uint32_t l = 0; l < most; l++) {
         vfloat u[3];
         TRC_KERNEL(trc_samples)(&t->sampler, a->pixel, a->sample, dimension, 3, l, most, u);
-        const vmask wanted = vm_and(active, vf_lt(vf_set((float)l), count));
         struct trc_light_sample sample;
         TRC_KERNEL(trc_light_sample)(s, a->receive_n, u[0], u[1], u[2], &sample);
         const vuint cell =
             trc_light_cell(u[1], u[2], vf_select(sample.delta, vf_set(INFINITY), sample.density));
-        sample_use(t, a, s, lobes, &sample, count, cell, wanted);
+        sample_use(t, a, s, lobes, &sample, count, cell, active);
         if (world_apart) {
             TRC_KERNEL(trc_light_sample_world)(s, a->receive_n, u[1], u[2], &sample);
-            sample_use(t, a, s, lobes, &sample, count, trc_direction_cell(sample.wi), wanted);
+            sample_use(t, a, s, lobes, &sample, count, trc_direction_cell(sample.wi), active);
         }
     }
+}
+
+/* The lanes that the camera sees, through transparent surfaces too, take as many samples as the
+ * settings say, those behind a bounce one. */
+static void direct_light(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
+                         const struct trc_lobes *lobes, vmask active) {
+    const vmask seen = vm_and(active, sees_directly(a->depths));
+    const vmask bounced = vm_andnot(active, seen);
+    if (vm_any(seen))
+        light_samples(t, a, s, lobes, t->desc->light_samples, seen);
+    if (vm_any(bounced))
+        light_samples(t, a, s, lobes, 1, bounced);
 }
 
 /* ---- ambient occlusion ---- */
 
 /* White light on diffuse lobes, whatever the direction. */
-static vvec3 ambient_white(const struct trc_lobes *lobes, vvec3 albedo) {
+static vvec3 ambient_white(const struct trc_tile *t, const struct arrival *a,
+                           const struct trc_lobes *lobes, vvec3 albedo) {
     const vfloat one = vf_set(1.0f);
     const vvec3 through = TRC_KERNEL(trc_lobes_transparency)(lobes);
-    return v3_mul(albedo, v3(one - vf_min(through.x, one), one - vf_min(through.y, one),
-                             one - vf_min(through.z, one)));
+    const vvec3 alpha = v3(one - vf_min(through.x, one), one - vf_min(through.y, one),
+                           one - vf_min(through.z, one));
+    const vvec3 white = v3_mul(albedo, alpha);
+    if (!trc_clamps(t->desc))
+        return white;
+    /* Before the colour of the surface is in it, as in Cycles. */
+    const vfloat limit = trc_clamp_limit(t->desc, sees_directly(a->depths));
+    return v3_scale(white, trc_clamp_factor(v3_mul(a->weight, alpha), limit));
 }
 
 /* The world's light on diffuse lobes from wi, drawn by the cosine to n. */
@@ -345,18 +379,20 @@ static vvec3 ambient_world(const struct trc_tile *t, const struct trc_surface *s
 
 /* Sends the rays of ambient occlusion along with the shadow rays. Diffuse lobes are not continued,
  * so the numbers of the continuation ray are free for them. */
-static void ambient_light(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
-                          const struct trc_lobes *lobes, vmask active) {
+static void ambient_samples(struct trc_tile *t, const struct arrival *a,
+                            const struct trc_surface *s, const struct trc_lobes *lobes,
+                            uint32_t most, vmask active) {
     const struct trc_world *world = &t->snapshot->world;
     const struct trc_light_table *lights = t->snapshot->lights;
     const uint32_t dimension =
         TRC_DIM_BOUNCE + t->generation * TRC_DIMS_PER_BOUNCE + TRC_DIM_BSDF_X;
-    const uint32_t most = t->generation == 0 ? t->desc->light_samples : 1;
-    const vfloat count = light_count(t, a->depths);
     vvec3 n, x, y;
     const vvec3 albedo = TRC_KERNEL(trc_lobes_diffuse)(lobes, s, &n);
-    const vvec3 white = ambient_white(lobes, albedo);
-    const vvec3 weight = v3_scale(a->weight, vf_set(world->ao_factor) / count);
+    const bool adds = world->ao_method == TRC_AO_ADD;
+    const vvec3 white = ambient_white(t, a, lobes, albedo);
+    const vvec3 weight = v3_scale(a->weight, vf_set(world->ao_factor / (float)most));
+    struct arrival own = *a;
+    own.path = a->path | vu_set(adds ? TRC_PATH_CLAMPED : 0);
     v3_frame(n, &x, &y);
     if (t->shadows.count + most * TRC_WIDTH > TRC_SHADOW_QUEUE)
         TRC_KERNEL(trc_shadow_flush)(t);
@@ -370,15 +406,24 @@ static void ambient_light(struct trc_tile *t, const struct arrival *a, const str
             .distance = vf_set(world->ao_distance),
             .casts_shadow = vm_all_set(),
             .light = vi_set(number)};
-        vmask lit = vm_and(active, vf_lt(vf_set((float)l), count));
-        const vvec3 light =
-            world->ao_method == TRC_AO_ADD ? white : ambient_world(t, s, lobes, n, sample.wi, lit);
+        const vvec3 light = adds ? white : ambient_world(t, s, lobes, n, sample.wi, active);
         const struct light_result r = {.diffuse = v3_mul(weight, light)};
         const vfloat size = v3_max(r.diffuse);
-        lit = vm_and(lit, vm_and(vf_gt(size, vf_set(0.0f)), vf_lt(size, vf_set(3e38f))));
+        const vmask lit =
+            vm_and(active, vm_and(vf_gt(size, vf_set(0.0f)), vf_lt(size, vf_set(3e38f))));
         if (vm_any(lit))
-            shadow_push(t, a, s, &sample, &r, trc_direction_cell(sample.wi), lit);
+            shadow_push(t, &own, s, &sample, &r, trc_direction_cell(sample.wi), lit);
     }
+}
+
+static void ambient_light(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
+                          const struct trc_lobes *lobes, vmask active) {
+    const vmask seen = vm_and(active, sees_directly(a->depths));
+    const vmask bounced = vm_andnot(active, seen);
+    if (vm_any(seen))
+        ambient_samples(t, a, s, lobes, t->desc->light_samples, seen);
+    if (vm_any(bounced))
+        ambient_samples(t, a, s, lobes, 1, bounced);
 }
 
 /* One ray for each lane that the camera sees, also through what is transparent, for the pass. */

@@ -3,6 +3,7 @@
  * Boulos et al. 2007, section 3.3: shadow rays are assembled apart from others. Rays of a packet go
  * from neighbouring points to the same part of the same light. Where materials let shadow rays
  * through, packets that nothing opaque blocks are walked from surface to surface. */
+#include "kernels/clamp.h"
 #include "kernels/light.h"
 #include "kernels/tile.h"
 #include "kernels/wide_math.h"
@@ -124,6 +125,28 @@ static void light_scale(struct trc_tile *t, uint32_t ray, float r, float g, floa
             q->scaled[k + c][ray] *= factor[c];
 }
 
+/* Clamps what of the rays' light has arrived; the parts of a ray by one factor. All light samples
+ * of a hit share its limit. */
+static void light_clamp(struct trc_tile *t) {
+    const struct trc_shadow_store *q = &t->shadows;
+    const vint exempt = vi_set(TRC_PATH_CLAMPED), single = vi_set(TRC_PATH_OCCLUSION);
+    const vfloat one = vf_set(1.0f), share = vf_set(1.0f / (float)t->desc->light_samples);
+    for (uint32_t i = 0; i < q->count; i += TRC_WIDTH) {
+        const vmask is_direct = vi_eq(vi_load((const int32_t *)q->depth + i), vi_set(0));
+        const vint path = vi_load((const int32_t *)q->path + i);
+        const vmask shared = vm_and(is_direct, vi_eq(path & single, vi_set(0)));
+        const vfloat limit = trc_clamp_limit(t->desc, is_direct) * vf_select(shared, share, one);
+        const vvec3 light = v3(vf_load(q->radiance[0] + i), vf_load(q->radiance[1] + i),
+                               vf_load(q->radiance[2] + i));
+        const vfloat factor =
+            vf_select(vi_eq(path & exempt, exempt), one, trc_clamp_factor(light, limit));
+        for (int k = 0; k < 3; k++)
+            vf_store(q->radiance[k] + i, vf_load(q->radiance[k] + i) * factor);
+        for (int k = 0; t->light_passes && k < 9; k++)
+            vf_store(q->split[k] + i, vf_load(q->split[k] + i) * factor);
+    }
+}
+
 /* Adds what a ray carries to the passes of light by kind. */
 static void passes_add(struct trc_tile *t, uint32_t ray) {
     static const uint32_t direct[3] = {TRC_PASS_DIFFUSE_DIRECT, TRC_PASS_GLOSSY_DIRECT,
@@ -240,6 +263,8 @@ void TRC_KERNEL(trc_shadow_flush)(struct trc_tile *t) {
     const uint32_t blocked = t->catchers ? unblocked_last(t) : q->count;
     rays_trace(t, 0, blocked, TRC_VISIBLE_SHADOW);
     rays_trace(t, blocked, q->count, TRC_VISIBLE_SHADOW << TRC_UNBLOCKED_SHIFT);
+    if (trc_clamps(t->desc))
+        light_clamp(t);
     if (t->occlusion_passes)
         occlusion_add(t);
     if (t->desc->light_group_count)

@@ -24,7 +24,8 @@ enum {
     TRC_PATH_DATA_DONE = 1 << 15, /* data passes of the sample are written */
     TRC_PATH_TOLD = 1 << 16,      /* and the denoising passes of this way of it */
     TRC_PATH_OCCLUSION = 1 << 17, /* shadow rays: of the pass of ambient occlusion, no light */
-    TRC_PATH_CAUGHT = 1 << 18     /* the camera sees this way through a shadow catcher */
+    TRC_PATH_CAUGHT = 1 << 18,    /* the camera sees this way through a shadow catcher */
+    TRC_PATH_CLAMPED = 1 << 19    /* shadow rays: what they carry is clamped already */
 };
 
 /* What a path's first bounce was; diffuse: through a translucent surface. */
