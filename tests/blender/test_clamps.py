@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Clamped light in all passes against Cycles'."""
+
+import blender as blender_support
+import compare
+import numpy as np
+import pytest
+
+SAMPLES = 256
+# (direct, indirect): off, either, both; below 1 the pass of ambient occlusion is clamped, too.
+CLAMPS = ((0.0, 0.0), (0.3, 0.0), (0.0, 0.1), (1.0, 0.2), (0.5, 0.5))
+# Old and new names of passes with the settings that ask for them.
+PASSES = {("Combined", "Combined"): None, ("AO", "Ambient Occlusion"): "ambient_occlusion",
+          ("Shadow", None): "shadow", ("Emit", "Emission"): "emit", ("Env", "Environment"): "environment",
+          ("DiffDir", "Diffuse Direct"): "diffuse_direct",
+          ("DiffInd", "Diffuse Indirect"): "diffuse_indirect",
+          ("DiffCol", "Diffuse Color"): "diffuse_color",
+          ("GlossDir", "Glossy Direct"): "glossy_direct",
+          ("GlossInd", "Glossy Indirect"): "glossy_indirect",
+          ("GlossCol", "Glossy Color"): "glossy_color"}
+GROUPS = {"Combined_key": "key", "Combined_sky": "sky", "Combined_sign": "sign"}
+# Of the largest mean of a channel. The first is of the whole picture, the second of blocks of 8 by 8
+# pixels, where edges of shadows and reflections fall between other samples.
+MEAN_TOLERANCE = 0.01
+BLOCK_TOLERANCE = {"GlossDir": 0.2, "GlossInd": 0.4}
+USUAL_BLOCK_TOLERANCE = 0.1
+SUM_TOLERANCE = 1e-4
+
+
+def _scene():
+    """A floor, a ball that mirrors it, a rough one, a coloured veil that throws a shadow, under a sun; a sky
+    and a sign that only the camera sees, so that no choice between lights is in the contributions."""
+    import bpy
+    import scenes
+    scene = scenes.empty(size=(96, 64))
+    scenes.camera(location=(0.5, -7.0, 1.0), rotation=(np.pi / 2 - 0.15, 0.0, 0.1))
+    floor = scenes.wall("Floor", 12.0, material=scenes.material(
+        "Floor", "ShaderNodeBsdfDiffuse", Color=(0.7, 0.5, 0.3)))
+    floor.rotation_euler.x, floor.location.z = -np.pi / 2, -1.0
+    scenes.sphere("Mirror", 1.0, (-1.6, 0.0, 0.0), material=scenes.material(
+        "Mirror", "ShaderNodeBsdfGlossy", Color=(0.9, 0.8, 0.7), Roughness=0.0))
+    scenes.sphere("Metal", 0.9, (1.8, 1.0, 0.2), material=scenes.material(
+        "Metal", "ShaderNodeBsdfGlossy", Color=(0.5, 0.7, 0.9), Roughness=0.4))
+    scenes.wall("Veil", 1.5, -2.0, (0.3, 0.4), scenes.material(
+        "Veil", "ShaderNodeBsdfTransparent", Color=(0.3, 0.9, 0.5)))
+    glow = scenes.wall("Sign", 0.8, -1.5, (1.2, 1.0), scenes.emitter((2.0, 1.0, 0.5)))
+    sun = scenes.light('SUN', rotation=(0.7, 0.2, 0.0), angle=0.0, energy=6.0)
+    scene.world.color = (0.4, 0.6, 0.9)
+    scene.world.cycles.sampling_method = 'NONE'
+    for owner in (scene.world.cycles_visibility, glow):
+        prefix = "visible_" if owner == glow else ""
+        for kind in ("diffuse", "glossy", "transmission"):
+            setattr(owner, prefix + kind, False)
+    glow.visible_shadow = False
+    for owner, group in ((sun, "key"), (scene.world, "sky"), (glow, "sign")):
+        bpy.ops.scene.view_layer_add_lightgroup(name=group)
+        owner.lightgroup = group
+    return scene
+
+
+def inside_clamps():
+    """Pairs of pictures of passes by their short names, for each pair of limits."""
+    import bpy
+    import scenes
+    from volley.compat import HAS_LONG_PASS_NAMES
+    scene, layer = _scene(), bpy.context.view_layer
+    names = {group: group for group in GROUPS}
+    for (short, long), setting in PASSES.items():
+        if setting is not None and hasattr(layer, f"use_pass_{setting}"):
+            setattr(layer, f"use_pass_{setting}", True)
+        name = long if HAS_LONG_PASS_NAMES else short
+        if name is not None:
+            names[name] = short
+    clamped = {}
+    for direct, indirect in CLAMPS:
+        pictures = []
+        for engine in ('VOLLEY', 'CYCLES'):
+            scenes.set_engine(engine, SAMPLES)
+            scene.volley.clamp_direct = scene.cycles.sample_clamp_direct = direct
+            scene.volley.clamp_indirect = scene.cycles.sample_clamp_indirect = indirect
+            pictures.append(scenes.render_passes(list(names)))
+        clamped[direct, indirect] = {short: [picture[name][..., :3] for picture in pictures]
+                                     for name, short in names.items()}
+    return clamped
+
+
+def _with_color(pairs):
+    """The same with light as it is in Combined, not over the colour, which may be next to nothing."""
+    return {name: [light * color for light, color in zip(pair, pairs[name[:-3] + "Col"])]
+            if name.endswith(("Dir", "Ind")) else pair for name, pair in pairs.items()}
+
+
+def _errors(ours, theirs):
+    """Of the picture's mean and of the means of blocks, as parts of the picture's largest mean."""
+    means, blocks = ([measure(picture) for picture in (ours, theirs)]
+                     for measure in (compare.channel_means, compare.tile_means))
+    scale = max(np.abs(means[1]).max(), 1e-6)
+    return np.abs(means[0] - means[1]).max() / scale, np.abs(blocks[0] - blocks[1]).max() / scale
+
+
+def test_clamps(blender):
+    clamped = {clamp: _with_color(pairs)
+               for clamp, pairs in blender.run(inside_clamps, timeout=300).items()}
+    lines = [f"{'direct':>6} {'indirect':>8} {'pass':13} {'mean':>9} {'mean error':>10} {'of blocks':>10}"]
+    for (direct, indirect), pairs in clamped.items():
+        for name, (ours, theirs) in pairs.items():
+            error, apart = _errors(ours, theirs)
+            lines.append(f"{direct:6g} {indirect:8g} {name:13} {theirs.mean():9.3g} {error:10.2e} {apart:10.2e}")
+    blender_support.write_result("clamps.txt", lines)
+    for pairs in clamped.values():
+        for name, pair in pairs.items():
+            error, apart = _errors(*pair)
+            assert error < MEAN_TOLERANCE and apart < BLOCK_TOLERANCE.get(name, USUAL_BLOCK_TOLERANCE), name
+        ours = {name: pair[0] for name, pair in pairs.items()}
+        by_kind = ours["Emit"] + ours["Env"] + sum(
+            ours[f"{kind}{way}"] for kind in ("Diff", "Gloss") for way in ("Dir", "Ind"))
+        assert ours["Combined"] == pytest.approx(by_kind, abs=SUM_TOLERANCE)
+        assert ours["Combined"] == pytest.approx(sum(ours[group] for group in GROUPS), abs=SUM_TOLERANCE)
+    free = clamped[0.0, 0.0]
+    for clamp in CLAMPS[1:]:  # each takes light
+        assert clamped[clamp]["Combined"][1].mean() < 0.95 * free["Combined"][1].mean()
+
+
+def inside_catcher():
+    """A floor that catches the shadow of a ball, by both engines under each limit."""
+    import scenes
+    scene = scenes.empty(size=(72, 54))
+    scene.render.film_transparent = True
+    scenes.camera((0.0, -6.0, 2.5), (1.187, 0.0, 0.0))
+    floor = scenes.wall("Floor", 12.0, material=scenes.material(
+        "Floor", "ShaderNodeBsdfDiffuse", Color=(0.8, 0.6, 0.4)))
+    floor.rotation_euler.x, floor.is_shadow_catcher = -np.pi / 2, True
+    scenes.sphere("Ball", 0.8, (0.0, 0.0, 0.8), scenes.material(
+        "Red", "ShaderNodeBsdfDiffuse", Color=(0.8, 0.1, 0.1)))
+    scenes.light('SUN', (0.0, 0.0, 4.0), (0.7, 0.35, 0.0), energy=4.0, angle=0.3)
+    pairs = {}
+    for direct in (0.0, 0.3):
+        scene.volley.clamp_direct = scene.cycles.sample_clamp_direct = direct
+        pairs[direct] = scenes.by_both(SAMPLES)
+    return pairs
+
+
+def test_catcher(blender):
+    pairs = blender.run(inside_catcher)
+    for ours, theirs in pairs.values():
+        assert theirs[..., 3].max() > 0.9
+        assert np.abs(ours.mean(axis=(0, 1)) - theirs.mean(axis=(0, 1))).max() < 2e-3
+        assert (np.abs(ours - theirs).max(axis=-1) > 0.05).mean() < 0.01
+    assert pairs[0.3][1][..., 0].max() < 0.8 * pairs[0.0][1][..., 0].max()
