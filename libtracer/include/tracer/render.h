@@ -182,8 +182,10 @@ TRC_API trc_status trc_render_wait(trc_render render, double timeout_seconds);
 /* Asks a render to stop; does not wait. Idempotent; what is finished stays readable. */
 TRC_API trc_status trc_render_cancel(trc_render render);
 
-/* Copies one pass of the crop, bottom row first, channels interleaved, float32. At any time; pixels
- * without samples are 0. float_count must be crop width * height * channels. */
+/* Copies one pass of the crop, bottom row first, channels interleaved, float32. At any time: of
+ * tiles that are being rendered each shows the means of all samples of some moment, so that nothing
+ * is too bright or too dark; pixels without samples are 0. float_count must be crop width * height
+ * * channels. */
 TRC_API trc_status trc_render_read(trc_render render, uint32_t pass, float *pixels_out,
                                    uint64_t float_count);
 

@@ -33,10 +33,19 @@ static inline void trc_matte_add(struct trc_matte *mattes, uint32_t count, float
     }
 }
 
+/* Copies a table of count places into one that may be read meanwhile. */
+static inline void trc_mattes_store(struct trc_matte *to, const struct trc_matte *from,
+                                    uint32_t count) {
+    for (uint32_t i = 0; i < count && from[i].id != 0.0f; i++) {
+        __atomic_store(&to[i].id, &from[i].id, __ATOMIC_RELAXED);
+        __atomic_store(&to[i].weight, &from[i].weight, __ATOMIC_RELAXED);
+    }
+}
+
 /* One layer of a pixel: ranks 2 * layer and the next of the table of count places, the largest
  * weights first and the smaller bits of the id where they are equal. Coverage is the weight over
  * samples, cut to [0, 1]. count <= TRC_MAX_CRYPTOMATTE_DEPTH + TRC_SPARE_MATTES. The table may be
- * written meanwhile. */
+ * written meanwhile: then what comes out is of no use, but no harm is done. */
 void trc_mattes_read(const struct trc_matte *mattes, uint32_t count, uint32_t layer,
                      uint32_t samples, float out[TRC_MATTE_CHANNELS]);
 

@@ -183,12 +183,12 @@ static bool is_counted(const struct trc_tile *t, size_t pixel) {
     return !a || (a->pixels[pixel].reasons & TRC_PIXEL_COUNTS);
 }
 
-/* What the surfaces cover goes to the film at once, as a sample may meet any number of them. Whole
- * holdouts are in no matte, as in Cycles. */
+/* What the surfaces cover goes to the pixel's table at once, as a sample may meet any number of
+ * them. Whole holdouts are in no matte, as in Cycles. */
 static void add_mattes(struct trc_tile *t, const struct trc_surface *s,
                        const struct trc_material *m, const struct trc_lobes *lobes, vvec3 seen,
                        const uint32_t *slots, vmask active) {
-    const struct trc_film *film = t->job->film;
+    const uint32_t places = t->job->film->matte_count;
     float weight[TRC_WIDTH];
     if (m->has & TRC_MATERIAL_HAS_HOLDOUT)
         active = vm_and(active, vf_lt(lobes->holdout, vf_set(1.0f)));
@@ -201,13 +201,13 @@ static void add_mattes(struct trc_tile *t, const struct trc_surface *s,
             [TRC_CRYPTOMATTE_MATERIAL] = m->cryptomatte,
             [TRC_CRYPTOMATTE_ASSET] = instance->cryptomatte_asset,
         };
-        const size_t pixel = trc_film_pixel(t, slots[i]);
-        if (!(weight[i] > 0.0f && weight[i] < INFINITY) || !is_counted(t, pixel))
+        if (!(weight[i] > 0.0f && weight[i] < INFINITY) ||
+            !is_counted(t, trc_film_pixel(t, slots[i])))
             continue;
+        const size_t first = trc_tile_pixel(t, slots[i]) * places;
         for (int k = 0; k < TRC_CRYPTOMATTE_KINDS; k++)
-            if (film->mattes[k] && ids[k] != 0.0f)
-                trc_matte_add(film->mattes[k] + pixel * film->matte_count, film->matte_count,
-                              ids[k], weight[i]);
+            if (t->mattes[k] && ids[k] != 0.0f)
+                trc_matte_add(t->mattes[k] + first, places, ids[k], weight[i]);
     }
 }
 

@@ -2,6 +2,7 @@
 #include "kernels/tile.h"
 
 #include "core/core.h"
+#include "film/sequence.h"
 #include "kernels/wide_math.h"
 
 /* ---- clocks: one reading per stage and step ---- */
@@ -82,6 +83,10 @@ static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc, uint32
         for (uint32_t k = 0; k < trc_film_channels(pass); k++)
             t->samples.pass[pass][k] = carve(&c, batch);
     }
+    const size_t places = (size_t)trc_film_matte_count(desc) * TRC_TILE_SIZE * TRC_TILE_SIZE;
+    for (uint32_t k = 0; k < TRC_CRYPTOMATTE_KINDS; k++)
+        if (desc->cryptomattes >> k & 1)
+            t->mattes[k] = carve(&c, places * sizeof *t->mattes[k]);
     struct trc_shadow_store *q = &t->shadows;
     for (int i = 0; i < 3; i++) {
         q->o[i] = carve(&c, queue);
@@ -390,13 +395,13 @@ static void film_add_caught(struct trc_tile *t, uint32_t sample, size_t pixel) {
     double *environment = t->job->film->sums[TRC_PASS_ENVIRONMENT];
     for (int c = 0; c < 3; c++) {
         const double behind = (double)t->samples.radiance[c][background];
-        sum->blocked[c] += (double)t->samples.radiance[c][blocked];
-        sum->unblocked[c] += (double)t->samples.radiance[c][unblocked];
-        sum->background[c] += behind;
+        trc_sum_add(&sum->blocked[c], (double)t->samples.radiance[c][blocked]);
+        trc_sum_add(&sum->unblocked[c], (double)t->samples.radiance[c][unblocked]);
+        trc_sum_add(&sum->background[c], behind);
         if (environment)
-            environment[3 * pixel + (size_t)c] += behind;
+            trc_sum_add(&environment[3 * pixel + (size_t)c], behind);
     }
-    sum->coverage -= (double)t->samples.transparency[blocked];
+    trc_sum_add(&sum->coverage, -(double)t->samples.transparency[blocked]);
 }
 
 /* Adds a sample's passes to its pixel. */
@@ -410,9 +415,9 @@ static void film_add_passes(struct trc_tile *t, uint32_t slot, size_t pixel, boo
             if (!isfinite(value))
                 continue;
             if (first)
-                sum[k] = value;
+                trc_sum_store(&sum[k], value);
             else if (!trc_film_is_first_sample(pass))
-                sum[k] += value;
+                trc_sum_add(&sum[k], value);
         }
     }
     if (t->catchers)
@@ -442,8 +447,14 @@ static void film_add_run(struct trc_tile *t, uint32_t begin, uint32_t end, size_
             film_add_passes(t, slot, pixel, count == 0);
         count++;
     }
-    memcpy(combined, sum, sizeof sum);
-    film->sample_counts[pixel] = count;
+    for (int c = 0; c < 4; c++)
+        trc_sum_store(&combined[c], sum[c]);
+    __atomic_store_n(&film->sample_counts[pixel], count, __ATOMIC_RELAXED);
+    const size_t mattes = trc_tile_pixel(t, begin) * film->matte_count;
+    for (int k = 0; film->matte_count && k < TRC_CRYPTOMATTE_KINDS; k++)
+        if (t->mattes[k])
+            trc_mattes_store(film->mattes[k] + pixel * film->matte_count, t->mattes[k] + mattes,
+                             film->matte_count);
 }
 
 /* Adds the batch's samples to the film in the order of their slots. */
@@ -503,10 +514,13 @@ static void batch_render(struct trc_tile *t) {
             t->generation++;
     }
     clock_other(t);
+    atomic_uint *sequence = trc_film_sequence(t->job->film, t->job->x, t->job->y);
+    trc_sequence_write_begin(sequence);
     if (t->job->adaptive)
         film_add_adaptive(t);
     else
         film_add(t);
+    trc_sequence_write_end(sequence);
 }
 
 /* ---- the tile ---- */
@@ -641,6 +655,22 @@ static void beam_setup(struct trc_tile *t) {
         t->beam_spread = sample / (1.0f + x * x + y * y);
 }
 
+/* The tables of mattes as the film has them. */
+static void mattes_load(struct trc_tile *t) {
+    const struct trc_tile_job *job = t->job;
+    const struct trc_film *film = job->film;
+    const size_t places = film->matte_count, row = job->width * places;
+    for (int k = 0; k < TRC_CRYPTOMATTE_KINDS; k++)
+        for (uint32_t y = 0; t->mattes[k] && y < job->height; y++) {
+            struct trc_matte *to = t->mattes[k] + y * TRC_TILE_SIZE * places;
+            const size_t pixel = (size_t)(job->y + y) * film->width + job->x;
+            if (job->sample_begin == 0) /* fresh memory is not read: film_add_run */
+                memset(to, 0, row * sizeof *to);
+            else
+                memcpy(to, film->mattes[k] + pixel * places, row * sizeof *to);
+        }
+}
+
 void TRC_KERNEL(trc_tile_render)(struct trc_tile_job *job) {
     char *memory = job->memory;
     struct trc_tile *t = (struct trc_tile *)memory;
@@ -663,6 +693,7 @@ void TRC_KERNEL(trc_tile_render)(struct trc_tile_job *job) {
         job->desc->packet_size < TRC_PACKET_SIZE ? job->desc->packet_size : TRC_PACKET_SIZE;
     t->bundle = job->desc->packet_size / t->packet_size;
     beam_setup(t);
+    mattes_load(t);
     t->clock = &job->counts.seconds_other;
     t->clock_start = trc_seconds();
     const uint32_t most = t->catchers ? SAMPLES_PER_BATCH / 2 : SAMPLES_PER_BATCH;

@@ -147,6 +147,9 @@ struct trc_tile {
     struct trc_hit_store hits;
     struct trc_sample_store samples;
     struct trc_shadow_store shadows;
+    /* Tables of the tile's pixels (trc_film.matte_count places each, rows of TRC_TILE_SIZE): those
+     * of the film with the samples in flight. NULL: not asked for. */
+    struct trc_matte *mattes[TRC_CRYPTOMATTE_KINDS];
     uint32_t *order;       /* of the rays of a step */
     uint32_t *keys, *bins; /* scratch of sorts: TRC_BATCH or TRC_SHADOW_QUEUE, bins */
     struct trc_packet packets[TRC_BUNDLE];
@@ -238,6 +241,13 @@ TRC_INLINE size_t trc_film_pixel(const struct trc_tile *t, uint32_t slot) {
     const uint32_t x = (t->samples.pixel[slot] & 0xffffu) - t->desc->crop_x;
     const uint32_t y = (t->samples.pixel[slot] >> 16) - t->desc->crop_y;
     return (size_t)y * t->job->film->width + x;
+}
+
+/* And in the tile. */
+TRC_INLINE size_t trc_tile_pixel(const struct trc_tile *t, uint32_t slot) {
+    const uint32_t x = (t->samples.pixel[slot] & 0xffffu) - t->desc->crop_x - t->job->x;
+    const uint32_t y = (t->samples.pixel[slot] >> 16) - t->desc->crop_y - t->job->y;
+    return (size_t)y * TRC_TILE_SIZE + x;
 }
 
 /* The pass of direct light of a path that bounced; that of indirect light is the next. */

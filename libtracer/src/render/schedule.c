@@ -69,8 +69,8 @@ trc_status trc_schedule_create(const trc_render_desc *desc, struct trc_schedule 
     struct trc_schedule made = {
         .width = desc->crop_width,
         .height = desc->crop_height,
-        .tiles_x = (desc->crop_width + TRC_TILE_SIZE - 1) / TRC_TILE_SIZE,
-        .tiles_y = (desc->crop_height + TRC_TILE_SIZE - 1) / TRC_TILE_SIZE,
+        .tiles_x = trc_film_tiles(desc->crop_width),
+        .tiles_y = trc_film_tiles(desc->crop_height),
         .sample_count = desc->sample_count,
         .batch_count = count_batches(desc),
         .progressive = desc->progressive != 0,

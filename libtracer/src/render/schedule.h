@@ -10,12 +10,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "film/film.h"
 #include "tracer/render.h"
-
-/* Pixels of a tile's side. 1024 pixels fill packets of 256 with one sample and still sort into
- * useful groups by material; sums of all passes of a tile (49 doubles a pixel at most) stay in a
- * second-level cache; a small preview still has tiles for all threads. */
-#define TRC_TILE_SIZE 32
 
 struct trc_schedule {
     uint32_t width, height; /* of the crop */

@@ -1,0 +1,221 @@
+/* What a film shows of its sums. Tile by tile, as tiles may be written meanwhile (film/sequence.h).
+ */
+#define _POSIX_C_SOURCE 200809L
+#include <float.h>
+#include <inttypes.h>
+#include <math.h>
+#include <sched.h>
+#include <string.h>
+
+#include "core/checks.h"
+#include "core/core.h"
+#include "film/film.h"
+#include "film/sequence.h"
+
+/* Numbers of layers that TRC_PASS_CRYPTOMATTE keeps for each kind. */
+#define MAX_LAYERS (TRC_MAX_CRYPTOMATTE_DEPTH / TRC_LAYER_RANKS)
+
+/* Writing a batch of samples takes some ten microseconds, unless the system stops the thread. */
+#define LOOKS_BEFORE_YIELDING 1000
+
+/* What is read, to where: channels of the film's pixels. */
+struct reading {
+    const struct trc_film *film;
+    uint32_t pass, channels;
+    float exposure;
+    float *out;
+};
+
+/* Pixels [first, end) of a row, of one tile. */
+struct row {
+    uint64_t first, end;
+};
+
+/* Passes that are radiance: exposure scales them. */
+static bool is_light(uint32_t pass) {
+    switch (pass) {
+    case TRC_PASS_COMBINED:
+    case TRC_PASS_EMISSION:
+    case TRC_PASS_ENVIRONMENT:
+    case TRC_PASS_DIFFUSE_DIRECT:
+    case TRC_PASS_DIFFUSE_INDIRECT:
+    case TRC_PASS_GLOSSY_DIRECT:
+    case TRC_PASS_GLOSSY_INDIRECT:
+    case TRC_PASS_TRANSMISSION_DIRECT:
+    case TRC_PASS_TRANSMISSION_INDIRECT:
+        return true;
+    default:
+        return trc_film_is_light_group(pass);
+    }
+}
+
+static float to_float(double value) {
+    if (!(value > -FLT_MAX))
+        return value <= -FLT_MAX ? -FLT_MAX : 0.0f; /* NaN: 0 */
+    return value < FLT_MAX ? (float)value : FLT_MAX;
+}
+
+static uint32_t load_count(const struct trc_film *film, uint64_t pixel) {
+    return __atomic_load_n(&film->sample_counts[pixel], __ATOMIC_RELAXED);
+}
+
+/* The sums that a light pass is divided by, as Cycles divides it: the colour of its kind; NULL:
+ * none. */
+static const double *divisor_of(const struct trc_film *film, uint32_t pass) {
+    const uint32_t color = trc_film_color_pass(pass);
+    return color != TRC_PASS_COMBINED && color != pass ? film->sums[color] : NULL;
+}
+
+static bool has_pass(const struct trc_film *film, uint32_t pass) {
+    if (pass == TRC_PASS_SAMPLE_COUNT)
+        return film->shows_counts;
+    if (pass == TRC_PASS_SHADOW_CATCHER)
+        return film->shows_shadows;
+    if (!trc_film_is_cryptomatte(pass))
+        return film->sums[pass] != NULL;
+    const uint32_t number = pass - TRC_PASS_CRYPTOMATTE(0, 0), layer = number % MAX_LAYERS;
+    return film->mattes[number / MAX_LAYERS] &&
+           layer * TRC_LAYER_RANKS + TRC_SPARE_MATTES < film->matte_count;
+}
+
+/* ---- rows ---- */
+
+static void read_mattes(const struct reading *r, struct row row) {
+    const struct trc_film *film = r->film;
+    const uint32_t number = r->pass - TRC_PASS_CRYPTOMATTE(0, 0);
+    const struct trc_matte *mattes = film->mattes[number / MAX_LAYERS];
+    for (uint64_t i = row.first; i < row.end; i++)
+        trc_mattes_read(mattes + i * film->matte_count, film->matte_count, number % MAX_LAYERS,
+                        load_count(film, i), r->out + i * TRC_MATTE_CHANNELS);
+}
+
+/* Passes that are sums or values of samples. */
+static void read_sums(const struct reading *r, struct row row) {
+    const uint32_t pass = r->pass, channels = r->channels;
+    const double *sums = r->film->sums[pass], *divisor = divisor_of(r->film, pass);
+    const double light = is_light(pass) ? r->exposure : 1.0;
+    const bool first_sample = trc_film_is_first_sample(pass);
+    const uint32_t stride = trc_film_channels(pass);
+    for (uint64_t i = row.first; i < row.end; i++) {
+        const uint32_t count = load_count(r->film, i);
+        float *pixel = r->out + i * channels;
+        if (pass == TRC_PASS_SAMPLE_COUNT) {
+            pixel[0] = (float)count;
+            continue;
+        }
+        double weight = first_sample ? 1.0 : count;
+        if (pass == TRC_PASS_VECTOR)
+            weight = trc_sum_load(&sums[i * stride + channels]);
+        const double factor = count && weight > 0.0 ? 1.0 / weight : 0.0;
+        for (uint32_t c = 0; c < channels; c++) {
+            const bool is_alpha = pass == TRC_PASS_COMBINED && c == 3;
+            double value = trc_sum_load(&sums[i * stride + c]);
+            if (divisor) {
+                /* Both are sums of the same samples: the counts cancel. */
+                const double by = trc_sum_load(&divisor[i * channels + c]);
+                value = by != 0.0 ? value / by * count : 0.0;
+            }
+            pixel[c] = count ? to_float(value * factor * (is_alpha ? 1.0 : light)) : 0.0f;
+        }
+    }
+}
+
+/* What is left of the footage's light where catchers stand for it; 1 where they have no light. */
+static void remains_of(const struct trc_caught *caught, double remains[3]) {
+    for (int c = 0; c < 3; c++) {
+        const double unblocked = trc_sum_load(&caught->unblocked[c]);
+        remains[c] = unblocked != 0.0 ? trc_sum_load(&caught->blocked[c]) / unblocked : 1.0;
+    }
+}
+
+/* What the footage is to be multiplied by: a pixel's mean over what the picture does not cover. */
+static void read_shadows(const struct reading *r, struct row row) {
+    const struct trc_film *film = r->film;
+    for (uint64_t i = row.first; i < row.end; i++) {
+        double remains[3] = {1.0, 1.0, 1.0}, part = 0.0;
+        if (film->caught) {
+            const double open =
+                load_count(film, i) - trc_sum_load(&film->sums[TRC_PASS_COMBINED][4 * i + 3]);
+            remains_of(&film->caught[i], remains);
+            part = open > 0.0 ? fmin(trc_sum_load(&film->caught[i].coverage) / open, 1.0) : 0.0;
+        }
+        for (int c = 0; c < 3; c++)
+            r->out[3 * i + c] = to_float(1.0 + part * (remains[c] - 1.0));
+    }
+}
+
+/* Adds to the picture what catchers do to it: cover it, as grey as a shadow can be by alpha alone,
+ * or where the world is shown, let it through in part. */
+static void add_shadows(const struct reading *r, struct row row) {
+    const struct trc_film *film = r->film;
+    for (uint64_t i = row.first; i < row.end; i++) {
+        const struct trc_caught *caught = &film->caught[i];
+        const uint32_t count = load_count(film, i);
+        const double part = count ? trc_sum_load(&caught->coverage) / count : 0.0;
+        if (!(part > 0.0))
+            continue;
+        double remains[3];
+        remains_of(caught, remains);
+        const double light = fmin(fmax((remains[0] + remains[1] + remains[2]) / 3.0, 0.0), 1.0);
+        float *pixel = r->out + 4 * i;
+        pixel[3] = to_float(pixel[3] + part * (film->is_transparent ? 1.0 - light : 1.0));
+        for (int c = 0; c < 3; c++)
+            pixel[c] = to_float(pixel[c] +
+                                trc_sum_load(&caught->background[c]) / count * light * r->exposure);
+    }
+}
+
+static void read_row(const struct reading *r, struct row row) {
+    const struct trc_film *film = r->film;
+    if (trc_film_is_cryptomatte(r->pass))
+        read_mattes(r, row);
+    else if (r->pass == TRC_PASS_SHADOW_CATCHER)
+        read_shadows(r, row);
+    else
+        read_sums(r, row);
+    if (r->pass == TRC_PASS_COMBINED && film->caught && !film->shows_shadows)
+        add_shadows(r, row);
+}
+
+/* ---- tiles ---- */
+
+static unsigned await_writer(const atomic_uint *sequence) {
+    unsigned number;
+    for (uint32_t looks = 0; !trc_sequence_read_begin(sequence, &number); looks++)
+        if (looks >= LOOKS_BEFORE_YIELDING)
+            sched_yield();
+    return number;
+}
+
+static void read_tile(const struct reading *r, uint32_t tile_x, uint32_t tile_y) {
+    const struct trc_film *film = r->film;
+    const uint32_t x = tile_x * TRC_TILE_SIZE, y = tile_y * TRC_TILE_SIZE;
+    const uint32_t width = film->width - x < TRC_TILE_SIZE ? film->width - x : TRC_TILE_SIZE;
+    const uint32_t height = film->height - y < TRC_TILE_SIZE ? film->height - y : TRC_TILE_SIZE;
+    const atomic_uint *sequence = trc_film_sequence(film, x, y);
+    unsigned number;
+    do {
+        number = await_writer(sequence);
+        for (uint32_t j = y; j < y + height; j++) {
+            const uint64_t first = (uint64_t)j * film->width + x;
+            read_row(r, (struct row){first, first + width});
+        }
+    } while (!trc_sequence_is_whole(sequence, number));
+}
+
+trc_status trc_film_read(const struct trc_film *film, uint32_t pass, float exposure, float *out,
+                         uint64_t float_count) {
+    const uint32_t channels = trc_pass_channels(pass);
+    if (!channels)
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "there is no pass %" PRIu32, pass);
+    if (!has_pass(film, pass)) {
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "pass %" PRIu32 " was not asked for", pass);
+    }
+    TRC_TRY(trc_check_array(out, float_count, (uint64_t)film->width * film->height * channels,
+                            sizeof(float), sizeof(float), "pixels_out"));
+    const struct reading reading = {film, pass, channels, exposure, out};
+    for (uint32_t y = 0; y < trc_film_tiles(film->height); y++)
+        for (uint32_t x = 0; x < trc_film_tiles(film->width); x++)
+            read_tile(&reading, x, y);
+    return TRC_OK;
+}
