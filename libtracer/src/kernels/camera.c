@@ -73,6 +73,7 @@ void TRC_KERNEL(trc_camera_rays)(struct trc_tile *t) {
     struct trc_ray_store *out = &t->stack;
     const bool lens = camera->aperture_radius > 0.0f;
     const bool orthographic = camera->type == TRC_CAMERA_ORTHOGRAPHIC;
+    trc_rays_reserve(out, t->samples.count);
     for (uint32_t i = 0; i < t->samples.count; i += TRC_WIDTH) {
         const vmask active = vm_first((int32_t)(t->samples.count - i));
         const vuint pixel = vu_load(t->samples.pixel + i), index = vu_load(t->samples.index + i);
@@ -132,5 +133,5 @@ void TRC_KERNEL(trc_camera_rays)(struct trc_tile *t) {
         if (t->looks_back)
             vu_store(out->w[TRC_RAY_LEFT] + i, vu_set(TRC_NO_HIT));
     }
-    out->count = t->samples.count;
+    trc_rays_add(out, t->samples.count);
 }

@@ -18,13 +18,8 @@ static bool is_caught(const struct trc_tile *t, uint32_t ray) {
 
 /* Appends a ray with its hit once more. */
 static uint32_t duplicate(struct trc_tile *t, uint32_t ray) {
-    struct trc_ray_store *r = &t->work;
     struct trc_hit_store *h = &t->hits;
-    const uint32_t other = r->count++;
-    for (int k = 0; k < TRC_RAY_FLOATS; k++)
-        r->f[k][other] = r->f[k][ray];
-    for (int k = 0; k < r->word_count; k++)
-        r->w[k][other] = r->w[k][ray];
+    const uint32_t other = trc_rays_duplicate(&t->work, ray);
     float *const floats[] = {h->t, h->u, h->v};
     uint32_t *const words[] = {h->instance, h->triangle, h->material};
     for (int k = 0; k < 3; k++) {
@@ -37,6 +32,7 @@ static uint32_t duplicate(struct trc_tile *t, uint32_t ray) {
 void TRC_KERNEL(trc_catcher_split)(struct trc_tile *t) {
     struct trc_ray_store *r = &t->work;
     const uint32_t count = r->count;
+    trc_rays_reserve(r, r->capacity - count);
     for (uint32_t ray = 0; ray < count; ray++) {
         if (!is_caught(t, ray))
             continue;

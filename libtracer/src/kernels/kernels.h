@@ -40,8 +40,9 @@ struct trc_tile_job {
 struct trc_kernels {
     uint32_t isa;   /* TRC_ISA_* */
     uint32_t width; /* lanes */
-    /* Bytes of scratch memory a tile job needs; features: the scene's, TRC_FEATURE_*. */
-    size_t (*tile_memory_bytes)(const trc_render_desc *desc, uint32_t features);
+    /* Bytes of scratch memory a tile job needs; desc is resolved. Read of the scene are its
+     * features and how many rays a hit may send. */
+    size_t (*tile_memory_bytes)(const trc_render_desc *desc, const struct trc_snapshot *snapshot);
     /* Renders a job; never fails. The thread's floating-point state must be the default. */
     void (*tile_render)(struct trc_tile_job *job);
     /* trc_query_*: arguments already validated; chunk [begin, end) of the arrays. packet_size

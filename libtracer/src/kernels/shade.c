@@ -253,32 +253,29 @@ static void shadow_push(struct trc_tile *t, const struct arrival *a, const struc
     const vfloat tmax = vf_select(vm_not(l->casts_shadow), vf_set(-1.0f),
                                   vf_select(far, vf_set(INFINITY), vf_set(SHADOW_END)));
     const vvec3 sum = v3_add(r->diffuse, v3_add(r->glossy, r->transmission));
-    const vuint depth = depth_of(a->depths, TRC_DEPTH_ALL_SHIFT);
-    const vuint target_key = (vuint)l->light * vu_set(TRC_DIRECTION_CELLS) + cell;
-    const vfloat values[] = {o.x,  o.y,     o.z,   target.x, target.y, target.z,
-                             tmax, a->time, sum.x, sum.y,    sum.z};
+    const struct trc_shadow_rays rays = {
+        .o = {o.x, o.y, o.z},
+        .d = {target.x, target.y, target.z},
+        .tmax = tmax,
+        .time = a->time,
+        .radiance = {sum.x, sum.y, sum.z},
+        .slot = a->slot,
+        .path = a->path,
+        .target = (vuint)l->light * vu_set(TRC_DIRECTION_CELLS) + cell,
+        .depth = depth_of(a->depths, TRC_DEPTH_ALL_SHIFT),
+    };
     struct trc_shadow_store *q = &t->shadows;
-    float *const columns[] = {q->o[0],        q->o[1],        q->o[2],       q->d[0],
-                              q->d[1],        q->d[2],        q->tmax,       q->time,
-                              q->radiance[0], q->radiance[1], q->radiance[2]};
-    const uint32_t bits = vm_bits(active);
-    for (int k = 0; k < 11; k++)
-        vf_compress(columns[k] + q->count, values[k], bits);
-    vu_compress(q->slot + q->count, a->slot, bits);
-    vu_compress(q->path + q->count, a->path, bits);
-    vu_compress(q->target + q->count, target_key, bits);
-    vu_compress(q->depth + q->count, depth, bits);
+    const uint32_t bits = vm_bits(active), at = trc_shadows_append(q, &rays, bits);
     if (t->light_passes) {
         const vvec3 parts[3] = {r->diffuse, r->glossy, r->transmission};
         for (int k = 0; k < 3; k++) {
-            vf_compress(q->split[3 * k] + q->count, parts[k].x, bits);
-            vf_compress(q->split[3 * k + 1] + q->count, parts[k].y, bits);
-            vf_compress(q->split[3 * k + 2] + q->count, parts[k].z, bits);
+            vf_compress(q->split[3 * k] + at, parts[k].x, bits);
+            vf_compress(q->split[3 * k + 1] + at, parts[k].y, bits);
+            vf_compress(q->split[3 * k + 2] + at, parts[k].z, bits);
         }
     }
     for (int k = 0; q->lamp[0] && k < 3; k++)
-        vf_compress(q->lamp[k] + q->count, r->lamp, bits);
-    q->count += (uint32_t)__builtin_popcount(bits);
+        vf_compress(q->lamp[k] + at, r->lamp, bits);
 }
 
 /* What the lanes' light samples are in the Shadow pass if nothing is in the way: lamps count
@@ -319,8 +316,7 @@ static void light_samples(struct trc_tile *t, const struct arrival *a, const str
     const bool is_only_world = lights->world_light != UINT32_MAX && !lights->world_apart;
     if (lights->cut_count + lights->distant_count == 0 || (is_only_world && a->world_alone))
         return;
-    if (t->shadows.count + most * (world_apart ? 2 : 1) * TRC_WIDTH > TRC_SHADOW_QUEUE)
-        TRC_KERNEL(trc_shadow_flush)(t);
+    trc_shadow_reserve(t, most * (world_apart ? 2 : 1));
     for (uint32_t l = 0; l < most; l++) {
         vfloat u[3];
         TRC_KERNEL(trc_samples)(&t->sampler, a->pixel, a->sample, dimension, 3, l, most, u);
@@ -394,8 +390,7 @@ static void ambient_samples(struct trc_tile *t, const struct arrival *a,
     struct arrival own = *a;
     own.path = a->path | vu_set(adds ? TRC_PATH_CLAMPED : 0);
     v3_frame(n, &x, &y);
-    if (t->shadows.count + most * TRC_WIDTH > TRC_SHADOW_QUEUE)
-        TRC_KERNEL(trc_shadow_flush)(t);
+    trc_shadow_reserve(t, most);
     /* Packets of their own: numbered after all lights. */
     const int32_t number = (int32_t)(lights->first_triangle + lights->triangle_count);
     for (uint32_t l = 0; l < most; l++) {
@@ -431,8 +426,7 @@ static void occlusion_pass(struct trc_tile *t, const struct arrival *a, const st
                            const struct trc_lobes *lobes, vmask active) {
     const vint camera = vi_set(TRC_VISIBLE_CAMERA);
     active = vm_and(active, vi_eq((vint)a->path & camera, camera));
-    if (t->shadows.count + TRC_WIDTH > TRC_SHADOW_QUEUE)
-        TRC_KERNEL(trc_shadow_flush)(t);
+    trc_shadow_reserve(t, 1);
     vvec3 n, x, y;
     vfloat u[2];
     TRC_KERNEL(trc_lobes_diffuse)(lobes, s, &n);
@@ -465,7 +459,6 @@ static void occlusion_pass(struct trc_tile *t, const struct arrival *a, const st
 /* Pushes the lanes' rays. direction, weight factor, pdf (< 0: ideal). */
 static void ray_push(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
                      const struct trc_bsdf_sample *b, uint32_t material, vmask active) {
-    struct trc_ray_store *out = &t->stack;
     const trc_render_desc *desc = t->desc;
     const vmask straight = b->transparent;
     const vvec3 w = v3_select(straight, a->d, b->wi);
@@ -519,19 +512,12 @@ static void ray_push(struct trc_tile *t, const struct arrival *a, const struct t
     const vfloat values[TRC_RAY_FLOATS] = {o.x,  o.y,     o.z,     w.x,      w.y,      w.z,
                                            tmin, tmax,    a->time, weight.x, weight.y, weight.z,
                                            pdf,  min_pdf, n.x,     n.y,      n.z,      beyond};
-    const uint32_t bits = vm_bits(active);
-    for (int k = 0; k < TRC_RAY_FLOATS; k++)
-        vf_compress(out->f[k] + out->count, values[k], bits);
-    vu_compress(out->w[TRC_RAY_SLOT] + out->count, a->slot, bits);
-    vu_compress(out->w[TRC_RAY_PATH] + out->count, path, bits);
-    vu_compress(out->w[TRC_RAY_DEPTHS] + out->count, depths, bits);
-    vu_compress(out->w[TRC_RAY_PARENT] + out->count, vu_set(material), bits);
-    if (t->looks_back) {
-        const vuint left = word_column(t->work.w[TRC_RAY_LEFT], a);
-        vu_compress(out->w[TRC_RAY_LEFT] + out->count,
-                    (vuint)vi_select(straight, (vint)left, s->instance), bits);
-    }
-    out->count += (uint32_t)__builtin_popcount(bits);
+    vuint left = vu_set(0);
+    if (t->looks_back)
+        left =
+            (vuint)vi_select(straight, (vint)word_column(t->work.w[TRC_RAY_LEFT], a), s->instance);
+    const vuint words[TRC_RAY_WORDS] = {a->slot, path, depths, vu_set(material), left};
+    trc_rays_append(&t->stack, values, words, vm_bits(active));
 }
 
 /* Lanes whose rays are worth tracing: Whitted prunes its tree where a ray would add next to nothing
@@ -582,8 +568,7 @@ static void continue_straight(struct trc_tile *t, const struct arrival *a,
 static void continue_rays(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
                           const struct trc_lobes *lobes, uint32_t material, vmask active) {
     struct trc_bsdf_sample b;
-    const bool room = t->stack.count + (uint32_t)lobes->count * TRC_WIDTH <= t->stack.capacity;
-    if (t->desc->integrator == TRC_INTEGRATOR_WHITTED && room) {
+    if (t->desc->integrator == TRC_INTEGRATOR_WHITTED) {
         for (int i = 0; i < lobes->count; i++) {
             TRC_KERNEL(trc_bsdf_ideal)(lobes, i, s, &b);
             const vmask go = attenuate(t, a, &b, vm_and(active, b.valid));
@@ -758,6 +743,7 @@ void TRC_KERNEL(trc_shade_batch)(struct trc_tile *t) {
         shade_rays(t);
     if (t->catchers)
         catch_shadows(t);
+    trc_rays_reserve(&t->stack, t->work.count * t->hit_branches);
     /* Hits by material; those that missed have the last key. */
     uint32_t keys_count = t->snapshot->material_count + 1;
     if (keys_count > TRC_BINS)

@@ -1,6 +1,8 @@
 /* A tile from camera rays to film. See kernels/tile.h for the way of working. */
 #include "kernels/tile.h"
 
+#include <assert.h>
+
 #include "core/core.h"
 #include "film/sequence.h"
 #include "kernels/wide_math.h"
@@ -19,34 +21,6 @@ static void clock_other(struct trc_tile *t) { clock_to(t, &t->job->counts.second
 
 /* ---- memory ---- */
 
-/* Hands out consecutive 64-byte aligned pieces of a block; with a NULL block it only measures. */
-struct carver {
-    char *base;
-    size_t used;
-};
-static void *carve(struct carver *c, size_t bytes) {
-    void *p = c->base ? c->base + c->used : NULL;
-    c->used += (bytes + 63) & ~(size_t)63;
-    return p;
-}
-
-static uint32_t stack_capacity(const trc_render_desc *desc) {
-    /* Whitted: each step takes up to a batch and leaves several rays for each; when room is short
-     * it follows one lobe, so any capacity works. */
-    return desc->integrator == TRC_INTEGRATOR_WHITTED ? TRC_BATCH * 8 : TRC_BATCH;
-}
-
-static void carve_rays(struct carver *c, struct trc_ray_store *r, uint32_t capacity,
-                       bool look_back) {
-    r->capacity = capacity;
-    r->count = 0;
-    r->word_count = look_back ? TRC_RAY_WORDS : TRC_RAY_LEFT;
-    for (int i = 0; i < TRC_RAY_FLOATS; i++)
-        r->f[i] = carve(c, (capacity + TRC_WIDTH) * sizeof(float));
-    for (int i = 0; i < r->word_count; i++)
-        r->w[i] = carve(c, (capacity + TRC_WIDTH) * sizeof(uint32_t));
-}
-
 static bool wants_light_passes(const trc_render_desc *desc) {
     return desc->passes >> TRC_PASS_DIFFUSE_DIRECT & 0x1ff;
 }
@@ -56,63 +30,78 @@ static uint32_t column_entries(bool catchers) {
     return catchers ? TRC_CATCHER_ROWS * TRC_CATCHER_BATCH : TRC_BATCH;
 }
 
-/* Also sets what of the features decides about memory. */
-static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc, uint32_t features,
-                         void *memory) {
-    struct carver c = {memory, 0};
+/* Rays that a hit sends on at most. */
+static uint32_t count_branches(const trc_render_desc *desc, const struct trc_snapshot *snapshot) {
+    if (desc->integrator != TRC_INTEGRATOR_WHITTED)
+        return 1;
+    return snapshot->branch_count < TRC_MAX_LOBES ? snapshot->branch_count : TRC_MAX_LOBES;
+}
+
+/* Also sets what of the scene decides about memory. */
+static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc,
+                         const struct trc_snapshot *snapshot, void *memory) {
+    struct trc_carver c = {.base = memory};
+    const uint32_t features = snapshot->features;
     const bool catchers = t->catchers = features & TRC_FEATURE_SHADOW_CATCHERS;
     t->looks_back = features & TRC_FEATURE_REFRACTION;
+    t->hit_branches = count_branches(desc, snapshot);
+    /* Whitted's rays may meet a catcher, which splits them before they branch. Of other integrators a
+     * sample has two rays at most, and a batch of them half as many samples. */
+    const bool splits = catchers && desc->integrator == TRC_INTEGRATOR_WHITTED;
+    t->ray_room = trc_ray_room_of(desc, t->hit_branches * (splits ? 2 : 1));
     const size_t batch = (column_entries(catchers) + TRC_WIDTH) * sizeof(float);
     const size_t queue = (TRC_SHADOW_QUEUE + TRC_PACKET_SIZE) * sizeof(float);
-    carve_rays(&c, &t->stack, stack_capacity(desc), t->looks_back);
-    carve_rays(&c, &t->work, stack_capacity(desc), t->looks_back);
+    trc_rays_carve(&c, &t->stack, t->ray_room.capacity, t->looks_back);
+    trc_rays_carve(&c, &t->work, t->ray_room.capacity, t->looks_back);
     float **const hit_floats[] = {&t->hits.t, &t->hits.u, &t->hits.v};
     for (int i = 0; i < 3; i++)
-        *hit_floats[i] = carve(&c, batch);
+        *hit_floats[i] = trc_carve(&c, batch);
     uint32_t **const hit_words[] = {&t->hits.instance, &t->hits.triangle, &t->hits.material,
                                     &t->samples.pixel, &t->samples.index};
     for (int i = 0; i < 5; i++)
-        *hit_words[i] = carve(&c, batch);
+        *hit_words[i] = trc_carve(&c, batch);
     for (int i = 0; i < 3; i++)
-        t->samples.radiance[i] = carve(&c, batch);
-    t->samples.transparency = carve(&c, batch);
+        t->samples.radiance[i] = trc_carve(&c, batch);
+    t->samples.transparency = trc_carve(&c, batch);
     for (uint32_t pass = 1; pass < TRC_SUM_COUNT; pass++) {
         if (!trc_film_has_sums(desc, pass))
             continue;
         t->samples.passes[t->samples.pass_count++] = (uint8_t)pass;
         for (uint32_t k = 0; k < trc_film_channels(pass); k++)
-            t->samples.pass[pass][k] = carve(&c, batch);
+            t->samples.pass[pass][k] = trc_carve(&c, batch);
     }
     const size_t places = (size_t)trc_film_matte_count(desc) * TRC_TILE_SIZE * TRC_TILE_SIZE;
     for (uint32_t k = 0; k < TRC_CRYPTOMATTE_KINDS; k++)
         if (desc->cryptomattes >> k & 1)
-            t->mattes[k] = carve(&c, places * sizeof *t->mattes[k]);
+            t->mattes[k] = trc_carve(&c, places * sizeof *t->mattes[k]);
     struct trc_shadow_store *q = &t->shadows;
     for (int i = 0; i < 3; i++) {
-        q->o[i] = carve(&c, queue);
-        q->d[i] = carve(&c, queue);
-        q->radiance[i] = q->scaled[q->scaled_count++] = carve(&c, queue);
+        q->o[i] = trc_carve(&c, queue);
+        q->d[i] = trc_carve(&c, queue);
+        q->radiance[i] = q->scaled[q->scaled_count++] = trc_carve(&c, queue);
     }
-    q->tmax = carve(&c, queue);
-    q->time = carve(&c, queue);
+    q->tmax = trc_carve(&c, queue);
+    q->time = trc_carve(&c, queue);
     if (wants_light_passes(desc))
         for (int i = 0; i < 9; i++)
-            q->split[i] = q->scaled[q->scaled_count++] = carve(&c, queue);
+            q->split[i] = q->scaled[q->scaled_count++] = trc_carve(&c, queue);
     if (desc->passes >> TRC_PASS_SHADOW & 1)
         for (int i = 0; i < 3; i++)
-            q->lamp[i] = q->scaled[q->scaled_count++] = carve(&c, queue);
+            q->lamp[i] = q->scaled[q->scaled_count++] = trc_carve(&c, queue);
     uint32_t **const words[] = {&q->slot, &q->path, &q->target, &q->depth, &q->order, &t->keys};
     for (int i = 0; i < 6; i++)
-        *words[i] = carve(&c, queue);
-    t->order = carve(&c, batch);
-    t->bins = carve(&c, (TRC_BINS + 1) * sizeof *t->bins);
+        *words[i] = trc_carve(&c, queue);
+    t->order = trc_carve(&c, batch);
+    t->bins = trc_carve(&c, (TRC_BINS + 1) * sizeof *t->bins);
+    t->carver = c;
     return c.used;
 }
 
-size_t TRC_KERNEL(trc_tile_memory_bytes)(const trc_render_desc *desc, uint32_t features) {
+size_t TRC_KERNEL(trc_tile_memory_bytes)(const trc_render_desc *desc,
+                                         const struct trc_snapshot *snapshot) {
     struct trc_tile t;
     memset(&t, 0, sizeof t);
-    return sizeof t + 64 + tile_carve(&t, desc, features, NULL);
+    return sizeof t + TRC_CARVER_ALIGNMENT + tile_carve(&t, desc, snapshot, NULL);
 }
 
 /* ---- sorting ---- */
@@ -334,25 +323,6 @@ static void trace_batch(struct trc_tile *t) {
 
 /* ---- a batch of samples ---- */
 
-/* Takes up to TRC_BATCH rays from the top of the stack. */
-static void stack_take(struct trc_tile *t) {
-    struct trc_ray_store *from = &t->stack, *to = &t->work;
-    if (from->count <= TRC_BATCH) {
-        const struct trc_ray_store swap = *from;
-        *from = *to;
-        *to = swap;
-        from->count = 0;
-        return;
-    }
-    const uint32_t first = from->count - TRC_BATCH;
-    for (int i = 0; i < TRC_RAY_FLOATS; i++)
-        memcpy(to->f[i], from->f[i] + first, TRC_BATCH * sizeof(float));
-    for (int i = 0; i < from->word_count; i++)
-        memcpy(to->w[i], from->w[i] + first, TRC_BATCH * sizeof(uint32_t));
-    to->count = TRC_BATCH;
-    from->count = first;
-}
-
 /* Deeper steps than this share their sample dimensions: their light is faint. */
 #define LAST_GENERATION 200
 
@@ -504,7 +474,7 @@ static void batch_render(struct trc_tile *t) {
     TRC_KERNEL(trc_camera_rays)(t);
     t->generation = 0;
     while (t->stack.count) {
-        stack_take(t);
+        trc_rays_take(&t->stack, &t->work, trc_rays_step(&t->stack, &t->ray_room));
         TRC_KERNEL(trc_clock_trace)(t);
         trace_batch(t);
         TRC_KERNEL(trc_clock_shade)(t);
@@ -675,7 +645,8 @@ void TRC_KERNEL(trc_tile_render)(struct trc_tile_job *job) {
     char *memory = job->memory;
     struct trc_tile *t = (struct trc_tile *)memory;
     memset(t, 0, sizeof *t);
-    tile_carve(t, job->desc, job->snapshot->features, memory + ((sizeof *t + 63) & ~(size_t)63));
+    const size_t align = TRC_CARVER_ALIGNMENT - 1;
+    tile_carve(t, job->desc, job->snapshot, memory + ((sizeof *t + align) & ~align));
     t->job = job;
     t->snapshot = job->snapshot;
     t->desc = job->desc;
@@ -702,5 +673,6 @@ void TRC_KERNEL(trc_tile_render)(struct trc_tile_job *job) {
         samples_render(t, s, end);
         s = end;
     }
+    assert(trc_carver_check(&t->carver));
     clock_other(t);
 }

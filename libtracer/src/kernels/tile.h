@@ -10,12 +10,9 @@
 #include "kernels/bsdf.h"
 #include "kernels/kernels.h"
 #include "kernels/packet.h"
+#include "kernels/ray_stack.h"
 #include "kernels/sampler.h"
-
-/* Rays of one step: 16 packets; their state stays in L2. */
-#define TRC_BATCH 1024
-/* Shadow rays that wait at most: flushed when a group of hits might not fit any more. */
-#define TRC_SHADOW_QUEUE 4096
+#include "kernels/shadow_queue.h"
 
 /* Bits of a ray's path word above those of kernels/surface.h. */
 enum {
@@ -42,43 +39,6 @@ enum {
     TRC_DEPTH_GLOSSY_SHIFT = 8,
     TRC_DEPTH_TRANSMISSION_SHIFT = 16,
     TRC_DEPTH_TRANSPARENT_SHIFT = 24
-};
-
-enum trc_ray_float {
-    TRC_RAY_OX,
-    TRC_RAY_OY,
-    TRC_RAY_OZ,
-    TRC_RAY_DX,
-    TRC_RAY_DY,
-    TRC_RAY_DZ,
-    TRC_RAY_TMIN,
-    TRC_RAY_TMAX,
-    TRC_RAY_TIME,
-    TRC_RAY_WEIGHT_R,
-    TRC_RAY_WEIGHT_G,
-    TRC_RAY_WEIGHT_B,
-    TRC_RAY_PDF,     /* of the bounce, solid angle; -1: camera or ideal, no MIS */
-    TRC_RAY_MIN_PDF, /* smallest so far, for Filter Glossy */
-    TRC_RAY_NX,
-    TRC_RAY_NY,
-    TRC_RAY_NZ,     /* normal where it left, as kernels/light.h wants it */
-    TRC_RAY_BEYOND, /* factor on everything behind the next surface: kernels/bsdf.h */
-    TRC_RAY_FLOATS
-};
-enum trc_ray_word {
-    TRC_RAY_SLOT, /* sample of the batch */
-    TRC_RAY_PATH,
-    TRC_RAY_DEPTHS,
-    TRC_RAY_PARENT, /* material it left: key of runs and groups */
-    TRC_RAY_LEFT,   /* instance it left; of scenes in which rays look back: kernels/spawn.h */
-    TRC_RAY_WORDS
-};
-
-struct trc_ray_store {
-    uint32_t capacity, count;
-    float *f[TRC_RAY_FLOATS];
-    uint32_t *w[TRC_RAY_WORDS];
-    int word_count; /* without TRC_RAY_LEFT where no ray looks back */
 };
 
 struct trc_hit_store {
@@ -110,21 +70,6 @@ struct trc_sample_store {
     uint32_t pass_count;
 };
 
-/* Radiance, its three parts, and what the Shadow pass gets. */
-#define TRC_SCALED_COLUMNS (3 + 9 + 3)
-
-/* Shadow rays; target: the light's number and cell, what packets are sorted by. */
-struct trc_shadow_store {
-    uint32_t count;
-    float *o[3], *d[3], *tmax, *time, *radiance[3];
-    float *split[9]; /* diffuse, glossy, transmission parts, or NULL: no light passes */
-    float *lamp[3];  /* for the Shadow pass, or NULL */
-    float *scaled[TRC_SCALED_COLUMNS]; /* those that what is in the way takes from, RGB by RGB */
-    uint32_t scaled_count;
-    uint32_t *slot, *path, *target, *depth;
-    uint32_t *order; /* own: the queue may be flushed while hits are shaded in t->order */
-};
-
 struct trc_tile {
     struct trc_tile_job *job;
     const struct trc_snapshot *snapshot;
@@ -143,6 +88,9 @@ struct trc_tile {
     float beam_spread;          /* and what it widens by per metre */
     double *clock, clock_start; /* the stage whose time is running */
     uint32_t generation;        /* bounces the rays of this step have behind them */
+    struct trc_carver carver;   /* of the memory behind this */
+    uint32_t hit_branches;      /* rays that a hit sends on at most */
+    struct trc_ray_room ray_room;
     struct trc_ray_store stack, work;
     struct trc_hit_store hits;
     struct trc_sample_store samples;
@@ -197,7 +145,8 @@ uint32_t TRC_KERNEL(trc_hit_material)(const struct trc_snapshot *snapshot, uint3
 void TRC_KERNEL(trc_clock_trace)(struct trc_tile *t);
 void TRC_KERNEL(trc_clock_shade)(struct trc_tile *t);
 
-size_t TRC_KERNEL(trc_tile_memory_bytes)(const trc_render_desc *desc, uint32_t features);
+size_t TRC_KERNEL(trc_tile_memory_bytes)(const trc_render_desc *desc,
+                                         const struct trc_snapshot *snapshot);
 void TRC_KERNEL(trc_tile_render)(struct trc_tile_job *job);
 
 /* Camera rays of the samples' slots, into the empty stack; also their times. (kernels/camera.c) */
@@ -235,6 +184,14 @@ void TRC_KERNEL(trc_world_aovs)(struct trc_tile *t, vvec3 d, vuint path, vvec3 w
 
 /* Traces and empties the shadow queue. (kernels/shadow.c) */
 void TRC_KERNEL(trc_shadow_flush)(struct trc_tile *t);
+
+/* Makes room in the queue for so many shadow rays of each lane of a group. */
+TRC_INLINE void trc_shadow_reserve(struct trc_tile *t, uint32_t per_lane) {
+    const uint32_t count = per_lane * TRC_WIDTH;
+    if (t->shadows.count + count > TRC_SHADOW_QUEUE)
+        TRC_KERNEL(trc_shadow_flush)(t);
+    t->shadows.reserved_end = t->shadows.count + count;
+}
 
 /* A sample's pixel in the film. */
 TRC_INLINE size_t trc_film_pixel(const struct trc_tile *t, uint32_t slot) {

@@ -276,7 +276,7 @@ static trc_status take_memory(struct trc_render_state *render) {
     render->batch_tiles = trc_alloc_zeroed(schedule->batch_count, sizeof(uint32_t));
     render->workers = trc_alloc_zeroed(render->worker_count, sizeof *render->workers);
     bool ok = render->tile_batches && render->batch_tiles && render->workers;
-    const size_t memory_bytes = render->kernels->tile_memory_bytes(desc, features);
+    const size_t memory_bytes = render->kernels->tile_memory_bytes(desc, render->snapshot);
     for (uint32_t i = 0; ok && i < render->worker_count; i++) {
         render->workers[i].render = render;
         render->workers[i].memory = trc_alloc(memory_bytes, 1);

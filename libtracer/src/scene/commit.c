@@ -277,6 +277,7 @@ static trc_status fill_block(struct trc_scene_state *scene, const struct trc_sna
     TRC_TRY(trc_collect_instances(scene, former, block));
     trc_collect_view(scene, block);
     s->features = trc_find_features(scene, s);
+    s->branch_count = trc_find_branches(s);
     TRC_TRY(check_cancel(scene));
     TRC_TRY(collect_bvh(scene, former, block));
     TRC_TRY(check_cancel(scene));

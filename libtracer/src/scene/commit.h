@@ -55,6 +55,9 @@ void trc_collect_view(const struct trc_scene_state *scene, struct trc_snapshot_b
 /* What the scene uses, from all other fields of the snapshot and its lights. */
 uint32_t trc_find_features(const struct trc_scene_state *scene, const struct trc_snapshot *s);
 
+/* Rays that a hit sends on at most, >= 1. */
+uint32_t trc_find_branches(const struct trc_snapshot *s);
+
 /* Fills counts, features and bytes of stats; times, trees and lights are the caller's. */
 void trc_count_stats(const struct trc_scene_state *scene, struct trc_snapshot *s);
 

@@ -100,6 +100,18 @@ static uint32_t view_features(const struct trc_snapshot *s) {
     return features;
 }
 
+uint32_t trc_find_branches(const struct trc_snapshot *s) {
+    uint32_t count = 1;
+    for (uint32_t i = 0; i < s->instance_count; i++) {
+        const struct trc_instance *instance = &s->instances[i];
+        for (uint32_t m = 0; m < instance->material_count; m++) {
+            const uint32_t own = s->materials[instance->materials[m]]->branch_count;
+            count = own > count ? own : count;
+        }
+    }
+    return count;
+}
+
 uint32_t trc_find_features(const struct trc_scene_state *scene, const struct trc_snapshot *s) {
     return instance_features(s) | light_features(scene) | view_features(s) |
            (is_instanced(scene) ? (uint32_t)TRC_FEATURE_INSTANCES : 0u);

@@ -99,7 +99,8 @@ struct trc_world {
 
 struct trc_snapshot {
     atomic_uint refs;
-    uint32_t features; /* TRC_FEATURE_* */
+    uint32_t features;     /* TRC_FEATURE_* */
+    uint32_t branch_count; /* rays that a hit sends on at most, if all lobes are followed; >= 1 */
     uint32_t mesh_count, instance_count, material_count, image_count;
     struct trc_mesh **meshes;
     struct trc_instance *instances;

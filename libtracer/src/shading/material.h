@@ -74,7 +74,8 @@ struct trc_material {
     uint32_t has;   /* TRC_MATERIAL_HAS_* */
     uint32_t flags; /* TRC_MATERIAL_* of the public header */
     int32_t pass_index;
-    float cryptomatte; /* id of its name */
+    float cryptomatte;     /* id of its name */
+    uint32_t branch_count; /* rays that a hit sends on at most, if all lobes are followed */
     uint32_t leaf_count, operand_count, instruction_count, register_count, table_count;
     struct trc_leaf leaves[TRC_MAX_LEAVES];
     uint32_t aov_count;

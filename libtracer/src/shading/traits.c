@@ -140,6 +140,28 @@ static uint32_t leaf_bits(const struct trc_leaf *leaf, const struct trc_operand 
     }
 }
 
+/* Lobes of a leaf that rays are continued for, transparency apart: kernels/bsdf_setup.c. */
+static uint32_t leaf_branches(const struct trc_leaf *leaf, const struct trc_operand *in) {
+    const uint32_t reflection = 1, glass = 2; /* which reflects and refracts */
+    switch (leaf->type) {
+    case TRC_NODE_TOON:
+    case TRC_NODE_GLOSSY:
+    case TRC_NODE_REFRACTION:
+        return 1;
+    case TRC_NODE_GLASS:
+        return glass;
+    case TRC_NODE_PRINCIPLED:
+        return reflection + (may_exceed(in[TRC_PRINCIPLED_TRANSMISSION], 0.0f) ? glass : 0) +
+               (may_exceed(in[TRC_PRINCIPLED_CLEARCOAT], 0.0f) ? 1 : 0);
+    case TRC_NODE_LAYERED_PRINCIPLED:
+        return reflection + (may_exceed(in[TRC_LAYERED_METALLIC], 0.0f) ? 1 : 0) +
+               (may_exceed(in[TRC_LAYERED_TRANSMISSION], 0.0f) ? glass : 0) +
+               (may_exceed(in[TRC_LAYERED_COAT], 0.0f) ? 1 : 0);
+    default:
+        return 0;
+    }
+}
+
 /* ---- emission ---- */
 
 /* Colour, strength and the factor above them of a leaf that emits, in operands. */
@@ -197,8 +219,11 @@ void trc_build_traits(const struct trc_build *b, struct trc_material *m) {
         const struct trc_leaf *leaf = &b->leaves[i];
         const struct trc_operand *in = b->leaf_operands + leaf->first_operand;
         m->has |= leaf_bits(leaf, in);
+        m->branch_count += leaf_branches(leaf, in);
         add_emission(leaf, in, m);
     }
+    if (m->has & TRC_MATERIAL_HAS_TRANSPARENCY)
+        m->branch_count++; /* all of it is one lobe */
     for (uint32_t i = 0; i < b->op_count; i++) {
         const struct trc_build_op *o = &b->ops[i];
         if (!o->is_live)

@@ -66,13 +66,14 @@ static trc_status eye_render(const struct frame_scene *scene, const trc_render_d
     const trc_status status = trc_film_create(desc, &film);
     if (status != TRC_OK)
         return status;
+    const struct trc_snapshot *snapshot = query_scene_snapshot(scene->scene);
     const struct trc_tile_job job = {
-        .snapshot = query_scene_snapshot(scene->scene),
+        .snapshot = snapshot,
         .desc = desc,
         .sampler_table = table,
         .filter_table = filter_table,
         .film = &film,
-        .memory = buffer_alloc(1, trc_kernels_counted.tile_memory_bytes(desc, false)),
+        .memory = buffer_alloc(1, trc_kernels_counted.tile_memory_bytes(desc, snapshot)),
         .cancel = &cancel};
     const uint64_t fp_state = trc_fp_enter();
     for (uint32_t y = 0; y < desc->crop_height; y += TILE_SIDE)
