@@ -23,7 +23,7 @@ typedef struct trc_camera_desc {
     float clip_start, clip_end;   /* metres along the view axis, 0 < start < end */
     float aperture_radius;        /* metres; 0: pinhole */
     float focus_distance;         /* metres along the view axis, > 0 */
-    float blade_rotation;         /* radians */
+    float blade_rotation;         /* radians from +X to +Y, of the middle of an edge */
     float aperture_ratio;         /* anamorphic, > 0, 1 round */
     float shutter_time;           /* in frames; 0: no motion, time is 0.5 for all rays */
     uint32_t shutter_curve_count; /* 0: box; else samples of the shutter's opening over [0, 1] */

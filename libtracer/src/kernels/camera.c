@@ -35,10 +35,10 @@ TRC_INLINE void lens_point(const struct trc_camera *camera, vfloat u, vfloat v, 
         const vfloat w = vf_sqrt(scaled - corner);
         const float half = 3.14159265358979f / corners;
         /* Weights of the corners at +half and -half of the triangle's axis; the centre has the
-         * rest. */
+         * rest. The first triangle's axis is what is turned, as in Cycles. */
         const vfloat a = v * w, b = (one - v) * w;
         const vfloat lx = (a + b) * vf_set(cosf(half)), ly = (a - b) * vf_set(sinf(half));
-        const vfloat angle = corner * vf_set(2.0f * half) + vf_set(half + camera->blade_rotation);
+        const vfloat angle = corner * vf_set(2.0f * half) + vf_set(camera->blade_rotation);
         const vfloat c = vf_cos(angle), sn = vf_sin(angle);
         *x = c * lx - sn * ly;
         *y = sn * lx + c * ly;
