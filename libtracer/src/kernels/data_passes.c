@@ -41,20 +41,25 @@ static void add_lanes(struct trc_tile *t, uint32_t pass, vvec3 value, const uint
 }
 
 /* The camera in the middle of the shutter. */
-static const float *camera_matrix(const struct trc_tile *t) {
+static void camera_matrix(const struct trc_tile *t, float m[12]) {
     const struct trc_camera *c = &t->snapshot->camera;
-    return c->camera_to_world[c->key_count / 2].m;
+    const float *before = c->camera_to_world[(c->key_count - 1) / 2].m;
+    const float *after = c->camera_to_world[c->key_count / 2].m;
+    for (int k = 0; k < 12; k++)
+        m[k] = before[k] + 0.5f * (after[k] - before[k]);
 }
 
 /* From the camera's origin to the points. */
 static vvec3 from_camera(const struct trc_tile *t, vvec3 p) {
-    const float *m = camera_matrix(t);
+    float m[12];
+    camera_matrix(t, m);
     return v3_sub(p, v3(vf_set(m[3]), vf_set(m[7]), vf_set(m[11])));
 }
 
 /* Distance along the view axis. */
 static vfloat axial_distance(const struct trc_tile *t, vvec3 p) {
-    const float *m = camera_matrix(t); /* column 2: backwards along the axis */
+    float m[12]; /* column 2: backwards along the axis */
+    camera_matrix(t, m);
     return vf_set(0.0f) - v3_dot(from_camera(t, p), v3(vf_set(m[2]), vf_set(m[6]), vf_set(m[10])));
 }
 
@@ -266,7 +271,8 @@ static vuint add_features(struct trc_tile *t, const struct trc_surface *s,
     struct trc_denoising_features f;
     TRC_KERNEL(trc_lobes_features)(lobes, s, &f);
     const vfloat zero = vf_set(0.0f);
-    const float *camera = camera_matrix(t);
+    float camera[12];
+    camera_matrix(t, camera);
     const vfloat way = v3_average(weight) * length;
     add_lanes(t, TRC_PASS_DENOISING_DEPTH, v3(way, zero, zero), slots, on);
     const vmask told = vm_and(on, f.is_told);
