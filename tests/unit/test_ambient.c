@@ -118,6 +118,32 @@ static void corner(void **state) {
     assert_int_equal(trc_scene_destroy(scene), TRC_OK);
 }
 
+/* What is behind something clear is still the camera's first hit: it has as many rays as light
+ * samples. Arithmetic alone: no ray is blocked. */
+static void behind_glass(void **state) {
+    (void)state;
+    const trc_scene scene = fixture_level_view();
+    const trc_node_input clear[] = {{.node = -1, .value = {1, 1, 1}}};
+    const trc_node node = {.type = TRC_NODE_TRANSPARENT, .input_count = 1};
+    const trc_material_desc desc = {.struct_size = sizeof desc,
+                                    .node_count = 1,
+                                    .nodes = &node,
+                                    .inputs = clear,
+                                    .input_count = 1,
+                                    .flags = TRC_MATERIAL_TRANSPARENT_SHADOW};
+    trc_id glass = 0;
+    double column[WIDTH];
+    assert_int_equal(trc_material_create(scene, &desc, &glass), TRC_OK);
+    fixture_level(scene, 100.0f, 0.0f, fixture_material(scene, TRC_NODE_DIFFUSE, 0.5f));
+    fixture_level(scene, 100.0f, 0.5f, glass);
+    for (uint32_t lights = 1; lights <= 4; lights *= 4) {
+        draw(scene, &(struct setting){.distance = 3.0f, .factor = 0.7f, .light_samples = lights}, 0,
+             column);
+        expect_all(column, 0.5 * 0.7, 1e-6);
+    }
+    assert_int_equal(trc_scene_destroy(scene), TRC_OK);
+}
+
 /* Nothing comes in where the distance is longer than the box; a mirror shows the same light. */
 static void box(void **state) {
     (void)state;
@@ -194,9 +220,9 @@ static void replaced(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(plane),    cmocka_unit_test(ceiling),
-                                       cmocka_unit_test(corner),   cmocka_unit_test(box),
-                                       cmocka_unit_test(mirror),   cmocka_unit_test(passes),
-                                       cmocka_unit_test(own_pass), cmocka_unit_test(replaced)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(plane),    cmocka_unit_test(ceiling),  cmocka_unit_test(corner),
+        cmocka_unit_test(box),      cmocka_unit_test(mirror),   cmocka_unit_test(passes),
+        cmocka_unit_test(own_pass), cmocka_unit_test(replaced), cmocka_unit_test(behind_glass)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -306,20 +306,20 @@ static void sample_use(struct trc_tile *t, const struct arrival *a, const struct
         shadow_push(t, a, s, sample, &r, cell, lit);
 }
 
-/* Takes most samples for each of the lanes. */
+/* sample_count: of each lane. */
 static void light_samples(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
-                          const struct trc_lobes *lobes, uint32_t most, vmask active) {
+                          const struct trc_lobes *lobes, uint32_t sample_count, vmask active) {
     const uint32_t dimension = TRC_DIM_BOUNCE + t->generation * TRC_DIMS_PER_BOUNCE;
-    const vfloat count = vf_set((float)most);
+    const vfloat count = vf_set((float)sample_count);
     const struct trc_light_table *lights = t->snapshot->lights;
     const bool world_apart = lights->world_apart && !a->world_alone;
     const bool is_only_world = lights->world_light != UINT32_MAX && !lights->world_apart;
     if (lights->cut_count + lights->distant_count == 0 || (is_only_world && a->world_alone))
         return;
-    trc_shadow_reserve(t, most * (world_apart ? 2 : 1));
-    for (uint32_t l = 0; l < most; l++) {
+    trc_shadow_reserve(t, sample_count * (world_apart ? 2 : 1));
+    for (uint32_t l = 0; l < sample_count; l++) {
         vfloat u[3];
-        TRC_KERNEL(trc_samples)(&t->sampler, a->pixel, a->sample, dimension, 3, l, most, u);
+        TRC_KERNEL(trc_samples)(&t->sampler, a->pixel, a->sample, dimension, 3, l, sample_count, u);
         struct trc_light_sample sample;
         TRC_KERNEL(trc_light_sample)(s, a->receive_n, u[0], u[1], u[2], &sample);
         const vuint cell =
@@ -336,10 +336,11 @@ static void light_samples(struct trc_tile *t, const struct arrival *a, const str
  * settings say, those behind a bounce one. */
 static void direct_light(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
                          const struct trc_lobes *lobes, vmask active) {
-    const vmask seen = vm_and(active, sees_directly(a->depths));
+    const uint32_t many = t->desc->light_samples;
+    const vmask seen = many > 1 ? vm_and(active, sees_directly(a->depths)) : vm_none();
     const vmask bounced = vm_andnot(active, seen);
     if (vm_any(seen))
-        light_samples(t, a, s, lobes, t->desc->light_samples, seen);
+        light_samples(t, a, s, lobes, many, seen);
     if (vm_any(bounced))
         light_samples(t, a, s, lobes, 1, bounced);
 }
@@ -377,7 +378,7 @@ static vvec3 ambient_world(const struct trc_tile *t, const struct trc_surface *s
  * so the numbers of the continuation ray are free for them. */
 static void ambient_samples(struct trc_tile *t, const struct arrival *a,
                             const struct trc_surface *s, const struct trc_lobes *lobes,
-                            uint32_t most, vmask active) {
+                            uint32_t sample_count, vmask active) {
     const struct trc_world *world = &t->snapshot->world;
     const struct trc_light_table *lights = t->snapshot->lights;
     const uint32_t dimension =
@@ -386,16 +387,16 @@ static void ambient_samples(struct trc_tile *t, const struct arrival *a,
     const vvec3 albedo = TRC_KERNEL(trc_lobes_diffuse)(lobes, s, &n);
     const bool adds = world->ao_method == TRC_AO_ADD;
     const vvec3 white = ambient_white(t, a, lobes, albedo);
-    const vvec3 weight = v3_scale(a->weight, vf_set(world->ao_factor / (float)most));
+    const vvec3 weight = v3_scale(a->weight, vf_set(world->ao_factor / (float)sample_count));
     struct arrival own = *a;
     own.path = a->path | vu_set(adds ? TRC_PATH_CLAMPED : 0);
     v3_frame(n, &x, &y);
-    trc_shadow_reserve(t, most);
+    trc_shadow_reserve(t, sample_count);
     /* Packets of their own: numbered after all lights. */
     const int32_t number = (int32_t)(lights->first_triangle + lights->triangle_count);
-    for (uint32_t l = 0; l < most; l++) {
+    for (uint32_t l = 0; l < sample_count; l++) {
         vfloat u[2];
-        TRC_KERNEL(trc_samples)(&t->sampler, a->pixel, a->sample, dimension, 2, l, most, u);
+        TRC_KERNEL(trc_samples)(&t->sampler, a->pixel, a->sample, dimension, 2, l, sample_count, u);
         const struct trc_light_sample sample = {
             .wi = v3_from_frame(trc_warp_cosine(u[0], u[1]), x, y, n),
             .distance = vf_set(world->ao_distance),
@@ -413,10 +414,11 @@ static void ambient_samples(struct trc_tile *t, const struct arrival *a,
 
 static void ambient_light(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
                           const struct trc_lobes *lobes, vmask active) {
-    const vmask seen = vm_and(active, sees_directly(a->depths));
+    const uint32_t many = t->desc->light_samples;
+    const vmask seen = many > 1 ? vm_and(active, sees_directly(a->depths)) : vm_none();
     const vmask bounced = vm_andnot(active, seen);
     if (vm_any(seen))
-        ambient_samples(t, a, s, lobes, t->desc->light_samples, seen);
+        ambient_samples(t, a, s, lobes, many, seen);
     if (vm_any(bounced))
         ambient_samples(t, a, s, lobes, 1, bounced);
 }

@@ -1,0 +1,196 @@
+/* Rough gloss lit by what has extent, beside integrals in double: light samples and continuation
+ * rays share the light, whatever their numbers. */
+#include "figures.h"
+#include "picture_test.h"
+
+/* The picture: a strip of the floor z = 0 about the origin, seen from straight above in parallel
+ * rays. */
+enum { SIDE = 16, FRAME = SIDE * SIDE, SAMPLES = 256 };
+#define HALF 0.1
+
+#define ROUGHNESS 0.5
+#define ALPHA (ROUGHNESS * ROUGHNESS)
+
+/* What shines on it: a square beside the view, or a sky that shows its directions. */
+static const double square_from[2] = {0.15, -0.4}, square_to[2] = {0.95, 0.4}, square_height = 1.0;
+
+enum source { LAMP, MESH, SKY, SOURCES };
+static const char *const source_names[] = {"lamp", "mesh", "sky"};
+
+/* ---- the integral ---- */
+
+/* GGX with separable masking seen from the normal, times the cosine: Walter et al. 2007, equations
+ * 20, 33 and 34. */
+static double gloss(double alpha, const double i[3]) {
+    const double cos_h2 = 0.5 * (1.0 + i[2]), a2 = alpha * alpha;
+    const double tan_h2 = (1.0 - cos_h2) / cos_h2, tan_i2 = (1.0 - i[2] * i[2]) / (i[2] * i[2]);
+    const double d = a2 / (PI * cos_h2 * cos_h2 * (a2 + tan_h2) * (a2 + tan_h2));
+    return d * 2.0 / (1.0 + sqrt(1.0 + a2 * tan_i2)) / 4.0;
+}
+
+/* Of unit radiance from the square at a point of the floor. Quadratures are off by less than 1e-4
+ * of their values. */
+static double square_light(double x, double y) {
+    enum { STEPS = 48 };
+    double sum = 0.0;
+    const double size[2] = {square_to[0] - square_from[0], square_to[1] - square_from[1]};
+    for (int a = 0; a < STEPS; a++)
+        for (int b = 0; b < STEPS; b++) {
+            const double dx = square_from[0] + (a + 0.5) / STEPS * size[0] - x;
+            const double dy = square_from[1] + (b + 0.5) / STEPS * size[1] - y;
+            const double r2 = dx * dx + dy * dy + square_height * square_height, r = sqrt(r2);
+            const double i[3] = {dx / r, dy / r, square_height / r};
+            sum += gloss(ALPHA, i) * i[2] / r2;
+        }
+    return sum * size[0] * size[1] / (STEPS * STEPS);
+}
+
+/* Of a sky whose radiance is 1 + z, by the cosine z to the zenith. */
+static double sky_light(void) {
+    enum { STEPS = 1 << 14 };
+    double sum = 0.0;
+    for (int k = 0; k < STEPS; k++) {
+        const double z = (k + 0.5) / STEPS, i[3] = {sqrt(1.0 - z * z), 0.0, z};
+        sum += gloss(ALPHA, i) * (1.0 + z);
+    }
+    return sum * 2.0 * PI / STEPS;
+}
+
+/* ---- the picture ---- */
+
+/* A background of radiance 1 + z of the direction. */
+static void set_sky(trc_scene scene) {
+    const trc_id sky =
+        add_vector_shader(scene, TRC_NODE_BACKGROUND, TRC_NODE_TEXTURE_COORDINATE, 0.5f);
+    const trc_world_desc world = default_world_desc(sky);
+    assert_ok(trc_scene_set_world(scene, &world));
+}
+
+static void add_source(trc_scene scene, enum source source) {
+    const float from[2] = {(float)square_from[0], (float)square_from[1]};
+    const float to[2] = {(float)square_to[0], (float)square_to[1]}, z = (float)square_height;
+    if (source == SKY) {
+        set_sky(scene);
+    } else if (source == MESH) {
+        const float color[3] = {1, 1, 1};
+        /* Clockwise from above: it faces the floor. */
+        const float corners[12] = {from[0], from[1], z, from[0], to[1],   z,
+                                   to[0],   to[1],   z, to[0],   from[1], z};
+        fixture_quad(scene, corners, add_material(scene, TRC_NODE_EMISSION, color, 1.0f));
+    } else {
+        trc_light_desc desc = default_light_desc();
+        trc_id id = 0;
+        desc.size_x = to[0] - from[0];
+        desc.size_y = to[1] - from[1];
+        desc.transform[3] = 0.5f * (from[0] + to[0]);
+        desc.transform[7] = 0.5f * (from[1] + to[1]);
+        desc.transform[11] = z;
+        /* A watt of an area light is a radiance of 1 / (4 area): Blender's units. */
+        desc.strength = 4.0f * desc.size_x * desc.size_y;
+        assert_ok(trc_light_create(scene, &desc, &id));
+    }
+}
+
+static trc_id add_clear(trc_scene scene) {
+    const trc_node_input inputs[] = {{.node = -1, .value = {1, 1, 1}}};
+    const trc_node node = {.type = TRC_NODE_TRANSPARENT, .input_count = 1};
+    const trc_material_desc desc = {.struct_size = sizeof desc,
+                                    .node_count = 1,
+                                    .nodes = &node,
+                                    .inputs = inputs,
+                                    .input_count = 1,
+                                    .flags = TRC_MATERIAL_TRANSPARENT_SHADOW};
+    trc_id id = 0;
+    assert_ok(trc_material_create(scene, &desc, &id));
+    return id;
+}
+
+static trc_scene floor_scene(enum source source, float value, bool is_behind_glass) {
+    static const float transform[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 3};
+    static const float window[4] = {-(float)HALF, (float)HALF, -(float)HALF, (float)HALF};
+    const trc_scene scene = scene_create();
+    trc_camera_desc camera = default_camera_desc();
+    camera.type = TRC_CAMERA_ORTHOGRAPHIC;
+    camera.transforms = transform;
+    camera.windows = window;
+    assert_ok(trc_scene_set_camera(scene, &camera));
+    fixture_level(scene, 1.0f, 0.0f, fixture_glossy(scene, value, (float)ROUGHNESS));
+    add_source(scene, source);
+    /* In the camera's way alone: what comes from the square passes below. */
+    if (is_behind_glass)
+        fixture_level(scene, (float)HALF + 0.02f, 2.0f, add_clear(scene));
+    assert_ok(trc_scene_commit(scene));
+    return scene;
+}
+
+struct result {
+    double ratio, error; /* of picture and integral, and its standard error by the pixels */
+};
+
+static struct result compare(trc_scene scene, enum source source, double value,
+                             uint32_t light_samples) {
+    static float pixels[4 * FRAME];
+    trc_render_desc desc = render_desc(SIDE, SAMPLES);
+    desc.light_samples = light_samples;
+    render(scene, &desc, pixels);
+    const double sky = source == SKY ? sky_light() : 0.0;
+    double sum = 0.0, sum2 = 0.0;
+    for (int p = 0; p < FRAME; p++) {
+        const double x = HALF * ((p % SIDE + 0.5) * 2.0 / SIDE - 1.0);
+        const double y = HALF * ((p / SIDE + 0.5) * 2.0 / SIDE - 1.0);
+        /* The sky's colours are halves of 1 + the direction: blue is z. */
+        const double want = value * (source == SKY ? 0.5 * sky : square_light(x, y));
+        const double ratio = (double)pixels[4 * p + 2] / want;
+        sum += ratio;
+        sum2 += ratio * ratio;
+    }
+    const double mean = sum / FRAME;
+    return (struct result){mean, sqrt(fmax(sum2 / FRAME - mean * mean, 0.0) / (FRAME - 1))};
+}
+
+/* Five standard errors, which must be less than what a fault of weights does: at 4 samples in 16,
+ * where densities are alike, weights that do not add up are several per cent off. 2e-4: of the
+ * integral. */
+static void expect_light(const char *what, enum source source, float value, bool is_behind_glass) {
+    static const uint32_t counts[] = {1, 4, 16};
+    const trc_scene scene = floor_scene(source, value, is_behind_glass);
+    for (int k = 0; k < 3; k++) {
+        const struct result r = compare(scene, source, (double)value, counts[k]);
+        printf("  %s, %s, %u light samples: %.4f +- %.4f of the integral\n", what,
+               source_names[source], counts[k], r.ratio, r.error);
+        assert_true(r.error < 2e-3);
+        assert_true(fabs(r.ratio - 1.0) <= 5.0 * r.error + 2e-4);
+    }
+    assert_ok(trc_scene_destroy(scene));
+}
+
+static void weights_count_light_samples(void **state) {
+    (void)state;
+    for (enum source source = LAMP; source < SOURCES; source++)
+        expect_light("seen directly", source, 1.0f, false);
+}
+
+/* A weak lobe's rays are sent now and then, which is in their density too. */
+static void weights_count_rays_not_sent(void **state) {
+    (void)state;
+    for (enum source source = LAMP; source < SOURCES; source++)
+        expect_light("weak", source, 0.05f, false);
+}
+
+/* What is behind something clear is still the camera's first hit. */
+static void weights_pass_transparency(void **state) {
+    (void)state;
+    for (enum source source = LAMP; source < SOURCES; source++)
+        expect_light("behind clear glass", source, 1.0f, true);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(weights_count_light_samples),
+        cmocka_unit_test(weights_count_rays_not_sent),
+        cmocka_unit_test(weights_pass_transparency),
+    };
+    if (!query_test_isa())
+        return QUERY_TEST_SKIPPED;
+    return cmocka_run_group_tests_name("gloss", tests, NULL, NULL);
+}
