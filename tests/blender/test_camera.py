@@ -3,6 +3,7 @@
 
 import itertools
 
+import numpy as np
 import pytest
 
 
@@ -119,3 +120,150 @@ def test_depth_of_field(blender):
     assert aimed == pytest.approx(9.0, abs=1e-4)  # along the axis, not to the point
     assert ortho_radius == pytest.approx(0.25)
     assert off == 0.0
+
+
+# A camera that its parent shears -------------------------------------------------------------------
+
+def _sheared_camera():
+    """Walls before a camera that is turned under a parent of uneven scale."""
+    import math
+    import bpy
+    import scenes
+    scene = scenes.empty(size=(72, 48))
+    made = scenes.camera(location=(0.0, 0.0, 0.0), rotation=(math.pi / 2 - 0.3, 0.2, -0.4))
+    parent = scenes.link("Parent", None)
+    parent.location, parent.rotation_euler = (0.0, -6.0, 0.0), (0.2, 0.5, 0.3)
+    parent.scale = (1.0, 2.5, 0.6)
+    made.parent = parent
+    made.data.clip_start, made.data.clip_end, made.data.ortho_scale = 4.0, 12.0, 6.0
+    scenes.wall("Red", 2.0, 0.0, (-1.0, 0.0), scenes.emitter((1.0, 0.1, 0.05), "Red"))
+    scenes.wall("Green", 2.0, 2.0, (1.2, 0.5), scenes.emitter((0.1, 0.8, 0.2), "Green"))
+    scenes.wall("Blue", 19.0, 5.0, (0.5, -0.6), scenes.emitter((0.05, 0.2, 0.9), "Blue"))
+    mist = scene.world.mist_settings
+    mist.start, mist.depth = 2.0, 12.0
+    bpy.context.view_layer.update()
+    axes = made.matrix_world.to_3x3().normalized()
+    assert abs(axes.col[0].dot(axes.col[1])) > 0.1
+    return scene, made, parent
+
+
+def _swing(scene, made, parent):
+    """Camera and parent move around frame 2, so that the shear and the sizes change."""
+    for frame, sign in ((0, -1.0), (4, 1.0)):
+        parent.scale.y, parent.location.x = 2.5 + 0.8 * sign, 0.6 * sign
+        made.rotation_euler.y = 0.2 + 0.2 * sign
+        for owner, path in ((parent, "scale"), (parent, "location"), (made, "rotation_euler")):
+            owner.keyframe_insert(path, frame=frame)
+    scene.frame_set(2)
+
+
+def _blurred(scene, samples):
+    """Our picture with the camera's blur over a frame, and the mean of Cycles' without it, evenly in that
+    time: its own blur of a sheared camera shows something else."""
+    import scenes
+    render, moments = scene.render, 32
+    render.use_motion_blur, render.motion_blur_shutter = True, 1.0
+    scenes.set_engine('VOLLEY', moments * samples // 4)
+    ours = scenes.render()
+    render.use_motion_blur = False
+    scenes.set_engine('CYCLES', samples // 4)
+    stills = []
+    for moment in range(moments):
+        frame = 1.5 + (moment + 0.5) / moments
+        scene.frame_set(int(frame), subframe=frame % 1.0)
+        scene.cycles.seed = moment
+        stills.append(scenes.render())
+    scene.frame_set(2)
+    return ours, np.mean(stills, axis=0)
+
+
+def inside_sheared(kind, samples):
+    """The passes of both engines for a camera that is still, one that moves, and pictures with blur of
+    its motion and of its lens."""
+    import bpy
+    import scenes
+    scene, made, parent = _sheared_camera()
+    made.data.type = kind
+    layer = scene.view_layers[0]
+    layer.use_pass_z = layer.use_pass_mist = layer.use_pass_vector = True
+    ray_length = scenes.material("Length", "ShaderNodeEmission", Strength=0.1)
+    tree = ray_length.node_tree
+    tree.links.new(tree.nodes.new("ShaderNodeLightPath").outputs["Ray Length"],
+                   tree.nodes["Emission"].inputs["Color"])
+    names = ["Combined", "Depth", "Mist", "Vector"]
+    found = {}
+
+    def look(name, names, samples):
+        found[name] = []
+        for engine in ('VOLLEY', 'CYCLES'):
+            scenes.set_engine(engine, samples)
+            found[name].append(scenes.render_passes(names))
+
+    filters = [(settings, settings.pixel_filter_type, settings.filter_width)
+               for settings in (scene.volley, scene.cycles)]
+    scenes.sharpen()
+    look("still", names, samples)
+    layer.material_override = ray_length
+    look("ray length", ["Combined"], samples)
+    layer.material_override = None
+    _swing(scene, made, parent)
+    look("moving", names, samples)
+    moved = bpy.data.objects["Blue"]
+    moved.rotation_euler.x = 0.4
+    look("turned", ["Depth"], samples)
+    moved.rotation_euler.x = 0.0
+    for settings, kind_of_filter, width in filters:
+        settings.pixel_filter_type, settings.filter_width = kind_of_filter, width
+    found["blurred"] = [{"Combined": picture} for picture in _blurred(scene, samples)]
+    if kind == 'PERSP':
+        dof = made.data.dof
+        dof.use_dof, dof.aperture_fstop, dof.focus_distance = True, 0.08, 6.0
+        dof.aperture_blades, dof.aperture_ratio = 5, 1.5
+        look("lens", ["Combined"], 8 * samples)
+    return found
+
+
+def _blocks(picture, size=8):
+    """Means over blocks of so many pixels a side."""
+    height, width, channels = picture.shape
+    return picture.reshape(height // size, size, width // size, size, channels).mean(axis=(1, 3))
+
+
+def _even_pixels(picture, reach=0.3):
+    """Whether a picture is about the same all over the pixels next to each."""
+    values = picture[..., :3]
+    even = np.ones(values.shape[:2], bool)
+    for axis in (0, 1):
+        steps = np.abs(np.diff(values, axis=axis)).max(axis=-1) < reach
+        for place in (np.s_[:-1], np.s_[1:]):
+            index = [np.s_[:], np.s_[:]]
+            index[axis] = place
+            even[tuple(index)] &= steps
+    return even
+
+
+# An edge of contrast 1 through a block of 8 by 8 pixels: 8 shares of 256 samples on each side, six
+# standard deviations of the difference of their means.
+EDGE_NOISE = 6.0 * 2.0 ** 0.5 * 0.5 * (8.0 / 256.0) ** 0.5 / 64.0
+
+
+@pytest.mark.parametrize("kind", ('PERSP', 'ORTHO'))
+def test_sheared_cameras_are_those_of_cycles(blender, kind):
+    found = blender.run(inside_sheared, kind, 32, timeout=300)
+    for name, (ours, theirs) in found.items():
+        even = _even_pixels(found["moving" if name == "moving" else "still"][1]["Combined"])
+        for each in ours:
+            a, b = ours[each], theirs[each]
+            seen = even & (np.abs(b).max(axis=-1) < 1e9)  # Depth of what is clipped
+            error = np.abs(a - b)
+            blocks = np.abs(_blocks(a) - _blocks(b)).max()
+            print(f"{kind} {name} {each}: means {a[seen].mean():.5f} {b[seen].mean():.5f}, "
+                  f"pixels {np.median(error):.2g} {error[seen].max():.2g}, blocks {blocks:.2g}")
+            if name in ("blurred", "lens"):
+                assert blocks < EDGE_NOISE, (name, each)
+                continue
+            assert seen.mean() > 0.5, (name, each)
+            # Samples lie up to a hundredth of a pixel apart.
+            assert error[seen].max() < (0.02 if each == "Vector" else 2e-3), (name, each)
+            if each == "Vector" and name == "moving":
+                assert np.abs(b[seen][..., :2]).mean() > 0.5

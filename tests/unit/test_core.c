@@ -560,7 +560,7 @@ static void pass_channels(void **state) {
 static void affine_inverts_what_it_can(void **state) {
     (void)state;
     const struct trc_affine a = {{2, 1, 0, 5, 0, -3, 0.5f, 6, 0.25f, 0, 4, -7}};
-    struct trc_affine inverse, rigid;
+    struct trc_affine inverse;
     assert_true(trc_affine_invert(&a, &inverse));
     assert_true(trc_affine_flips(&a));
     for (int row = 0; row < 3; row++) {
@@ -583,18 +583,41 @@ static void affine_inverts_what_it_can(void **state) {
     assert_false(trc_affine_invert(&thin, &inverse));
     assert_false(trc_affine_invert(&nan, &inverse));
     assert_false(trc_affine_invert(&inf, &inverse));
-    assert_false(trc_affine_make_rigid(&flat, &rigid));
-    assert_true(trc_affine_make_rigid(&a, &rigid));
+}
+
+static float cosine(const struct trc_affine *a, int i, int j) {
+    float dot = 0.0f;
+    for (int row = 0; row < 3; row++)
+        dot += a->m[4 * row + i] * a->m[4 * row + j];
+    return dot;
+}
+
+static void affine_loses_its_scale(void **state) {
+    (void)state;
+    const struct trc_affine flat = {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0}};
+    const struct trc_affine sheared = {{2, 1, 0, 5, 0, -3, 0.5f, 6, 0.25f, 0, 4, -7}};
+    const struct trc_affine turned = {
+        {0.6f, 1.6f, 0, 5, -0.8f, 1.2f, 0, 6, 0, 0, -0.5f, -7}}; /* mirrored, scaled 1, 2, .5 */
+    struct trc_affine unit = flat;
+    float volume = -1.0f;
+    assert_false(trc_affine_make_unit(&flat, &unit, &volume));
+    assert_true(volume == -1.0f && unit.m[0] == 1.0f);
+    assert_true(trc_affine_make_unit(&sheared, &unit, &volume));
     for (int i = 0; i < 3; i++) {
-        for (int j = 0; j < 3; j++) {
-            float dot = 0;
-            for (int row = 0; row < 3; row++)
-                dot += rigid.m[4 * row + i] * rigid.m[4 * row + j];
-            assert_true(fabsf(dot - (i == j)) < 1e-6f);
+        assert_true(fabsf(cosine(&unit, i, i) - 1.0f) < 1e-6f);
+        for (int row = 0; row < 3; row++) { /* the direction that it had */
+            const float length = sqrtf(cosine(&sheared, i, i));
+            assert_true(fabsf(unit.m[4 * row + i] * length - sheared.m[4 * row + i]) < 1e-5f);
         }
     }
-    assert_true(trc_affine_flips(&rigid)); /* a mirrored camera stays mirrored */
-    assert_true(rigid.m[3] == 5.0f && rigid.m[7] == 6.0f && rigid.m[11] == -7.0f);
+    assert_true(volume > 0.1f && volume < 0.99f);
+    assert_true(trc_affine_flips(&unit)); /* a mirrored camera stays mirrored */
+    assert_true(unit.m[3] == 5.0f && unit.m[7] == 6.0f && unit.m[11] == -7.0f);
+    assert_true(trc_affine_make_unit(&turned, &unit, &volume));
+    assert_true(volume == 1.0f && trc_affine_flips(&unit));
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            assert_true(fabsf(cosine(&unit, i, j) - (float)(i == j)) < 1e-6f);
 }
 
 int main(void) {
@@ -623,6 +646,7 @@ int main(void) {
         cmocka_unit_test(film_refuses_what_the_machine_has_not),
         cmocka_unit_test(pass_channels),
         cmocka_unit_test(affine_inverts_what_it_can),
+        cmocka_unit_test(affine_loses_its_scale),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

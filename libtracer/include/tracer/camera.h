@@ -17,15 +17,17 @@ typedef struct trc_camera_desc {
     uint32_t type;
     uint32_t key_count;      /* 1..TRC_MAX_KEYS evenly spaced over the shutter */
     uint32_t blade_count;    /* 0..2: round aperture */
-    const float *transforms; /* camera to world, 12 floats per key; scale is ignored by removal */
+    const float *transforms; /* camera to world, 12 floats per key: the axes' lengths are ignored,
+                                their directions count, shear and all; refused if singular */
     const float *windows; /* left, right, bottom, top per key (zoom blur), or one key's 4 floats */
-    uint32_t window_key_count;    /* 1 or key_count */
-    float clip_start, clip_end;   /* metres along the view axis, 0 < start < end */
-    float aperture_radius;        /* metres; 0: pinhole */
-    float focus_distance;         /* metres along the view axis, > 0 */
-    float blade_rotation;         /* radians from +X to +Y, of the middle of an edge */
-    float aperture_ratio;         /* anamorphic, > 0, 1 round */
-    float shutter_time;           /* in frames; 0: no motion, time is 0.5 for all rays */
+    uint32_t window_key_count;  /* 1 or key_count */
+    float clip_start, clip_end; /* metres along the view axis, 0 < start < end; of a sheared camera
+                                   in its own space */
+    float aperture_radius;      /* metres; 0: pinhole */
+    float focus_distance;       /* metres along the view axis, > 0 */
+    float blade_rotation;       /* radians from +X to +Y, of the middle of an edge */
+    float aperture_ratio;       /* anamorphic, > 0, 1 round */
+    float shutter_time;         /* in frames; 0: no motion, time is 0.5 for all rays */
     uint32_t shutter_curve_count; /* 0: box; else samples of the shutter's opening over [0, 1] */
     const float *shutter_curve;
 } trc_camera_desc;

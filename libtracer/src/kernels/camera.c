@@ -74,6 +74,7 @@ void TRC_KERNEL(trc_camera_rays)(struct trc_tile *t) {
     const bool lens = camera->aperture_radius > 0.0f;
     const bool orthographic = camera->type == TRC_CAMERA_ORTHOGRAPHIC;
     trc_rays_reserve(out, t->samples.count);
+    const bool sheared = camera->axes_volume < 1.0f;
     for (uint32_t i = 0; i < t->samples.count; i += TRC_WIDTH) {
         const vmask active = vm_first((int32_t)(t->samples.count - i));
         const vuint pixel = vu_load(t->samples.pixel + i), index = vu_load(t->samples.index + i);
@@ -108,13 +109,19 @@ void TRC_KERNEL(trc_camera_rays)(struct trc_tile *t) {
             d = v3_sub(focus, o);
         }
         d = v3_normalize(d);
-        const vfloat per_z = -one / d.z; /* ray length per unit along the view axis */
+        /* Ray length per unit along the view axis; a sheared camera clips by lengths in its own
+         * space, as Cycles does. */
+        const vfloat per_z = -one / d.z;
+        vvec3 way = v3(m[0] * d.x + m[1] * d.y + m[2] * d.z, m[4] * d.x + m[5] * d.y + m[6] * d.z,
+                       m[8] * d.x + m[9] * d.y + m[10] * d.z);
+        if (sheared)
+            way = v3_normalize(way);
         vf_store(out->f[TRC_RAY_OX] + i, m[0] * o.x + m[1] * o.y + m[2] * o.z + m[3]);
         vf_store(out->f[TRC_RAY_OY] + i, m[4] * o.x + m[5] * o.y + m[6] * o.z + m[7]);
         vf_store(out->f[TRC_RAY_OZ] + i, m[8] * o.x + m[9] * o.y + m[10] * o.z + m[11]);
-        vf_store(out->f[TRC_RAY_DX] + i, m[0] * d.x + m[1] * d.y + m[2] * d.z);
-        vf_store(out->f[TRC_RAY_DY] + i, m[4] * d.x + m[5] * d.y + m[6] * d.z);
-        vf_store(out->f[TRC_RAY_DZ] + i, m[8] * d.x + m[9] * d.y + m[10] * d.z);
+        vf_store(out->f[TRC_RAY_DX] + i, way.x);
+        vf_store(out->f[TRC_RAY_DY] + i, way.y);
+        vf_store(out->f[TRC_RAY_DZ] + i, way.z);
         vf_store(out->f[TRC_RAY_TMIN] + i, vf_set(camera->clip_start) * per_z);
         vf_store(out->f[TRC_RAY_TMAX] + i, vf_set(camera->clip_end) * per_z);
         vf_store(out->f[TRC_RAY_TIME] + i, time);

@@ -40,8 +40,13 @@ static void add_lanes(struct trc_tile *t, uint32_t pass, vvec3 value, const uint
     }
 }
 
-/* The camera in the middle of the shutter. */
-static void camera_matrix(const struct trc_tile *t, float m[12]) {
+/* From the world to the camera, as it stands in the middle of the shutter. */
+static const float *world_to_camera(const struct trc_tile *t) {
+    return t->snapshot->camera.world_to_camera[1].m;
+}
+
+/* The same the other way round. */
+static void camera_to_world(const struct trc_tile *t, float m[12]) {
     const struct trc_camera *c = &t->snapshot->camera;
     const float *before = c->camera_to_world[(c->key_count - 1) / 2].m;
     const float *after = c->camera_to_world[c->key_count / 2].m;
@@ -52,15 +57,14 @@ static void camera_matrix(const struct trc_tile *t, float m[12]) {
 /* From the camera's origin to the points. */
 static vvec3 from_camera(const struct trc_tile *t, vvec3 p) {
     float m[12];
-    camera_matrix(t, m);
+    camera_to_world(t, m);
     return v3_sub(p, v3(vf_set(m[3]), vf_set(m[7]), vf_set(m[11])));
 }
 
-/* Distance along the view axis. */
-static vfloat axial_distance(const struct trc_tile *t, vvec3 p) {
-    float m[12]; /* column 2: backwards along the axis */
-    camera_matrix(t, m);
-    return vf_set(0.0f) - v3_dot(from_camera(t, p), v3(vf_set(m[2]), vf_set(m[6]), vf_set(m[10])));
+/* Along the camera's -Z, in its own space: of a sheared camera no distance in the world. */
+static vfloat depth_of(const struct trc_tile *t, vvec3 p) {
+    const float *m = world_to_camera(t);
+    return vf_set(0.0f) - v3_dot(from_camera(t, p), v3(vf_set(m[8]), vf_set(m[9]), vf_set(m[10])));
 }
 
 /* ---- of the first surface ---- */
@@ -78,20 +82,23 @@ static void point_at(const struct trc_instance *instance, const struct trc_mesh 
                m[4 * k + 3];
 }
 
-/* Where the camera of a time sees a point, in pixels from the lower left corner. */
-static void raster_at(const struct trc_tile *t, const float p[3], float time, float raster[2]) {
+/* Where the camera sees a point at the start (moment 0), in the middle (1) or at the end (2) of the
+ * shutter, in pixels from the lower left corner. */
+static void raster_at(const struct trc_tile *t, const float p[3], int moment, float raster[2]) {
     const struct trc_camera *c = &t->snapshot->camera;
+    const float time = 0.5f * (float)moment, *m = c->world_to_camera[moment].m;
     uint32_t key;
-    float f, m[12], window[4], at[3];
+    float f, window[4], way[3], at[3];
     trc_key_at(time, c->key_count, &key, &f);
     const uint32_t next = key + (c->key_count > 1);
-    for (int k = 0; k < 12; k++)
-        m[k] = c->camera_to_world[key].m[k] +
-               f * (c->camera_to_world[next].m[k] - c->camera_to_world[key].m[k]);
     for (int k = 0; k < 4; k++)
         window[k] = c->windows[key][k] + f * (c->windows[next][k] - c->windows[key][k]);
-    for (int k = 0; k < 3; k++) /* the matrix is rigid */
-        at[k] = m[k] * (p[0] - m[3]) + m[4 + k] * (p[1] - m[7]) + m[8 + k] * (p[2] - m[11]);
+    for (int k = 0; k < 3; k++) { /* far from the origin more exact than the inverse's own way */
+        const float a = c->camera_to_world[key].m[4 * k + 3];
+        way[k] = p[k] - (a + f * (c->camera_to_world[next].m[4 * k + 3] - a));
+    }
+    for (int k = 0; k < 3; k++)
+        at[k] = m[4 * k] * way[0] + m[4 * k + 1] * way[1] + m[4 * k + 2] * way[2];
     const float scale = c->type == TRC_CAMERA_ORTHOGRAPHIC ? 1.0f : -1.0f / at[2];
     const float size[2] = {(float)t->desc->width, (float)t->desc->height};
     for (int k = 0; k < 2; k++)
@@ -107,7 +114,7 @@ static void store_motion(struct trc_tile *t, const struct trc_instance *instance
     for (int k = 0; k < 3; k++) {
         const float time = 0.5f * (float)k;
         point_at(instance, mesh, mesh->indices + 3 * (size_t)triangle, u, v, time, p);
-        raster_at(t, p, time, raster[k]);
+        raster_at(t, p, k, raster[k]);
     }
     const float motion[4] = {raster[0][0] - raster[1][0], raster[0][1] - raster[1][1],
                              raster[1][0] - raster[2][0], raster[1][1] - raster[2][1]};
@@ -121,7 +128,7 @@ static void store_motion(struct trc_tile *t, const struct trc_instance *instance
 static void first_surface(struct trc_tile *t, const struct trc_surface *s,
                           const struct trc_material *m, const uint32_t *slots, vmask write) {
     float z[TRC_WIDTH], n[3][TRC_WIDTH], p[3][TRC_WIDTH], uv[2][TRC_WIDTH];
-    vf_store(z, axial_distance(t, s->p));
+    vf_store(z, depth_of(t, s->p));
     vf_store(n[0], s->n.x), vf_store(n[1], s->n.y), vf_store(n[2], s->n.z);
     vf_store(p[0], s->p.x), vf_store(p[1], s->p.y), vf_store(p[2], s->p.z);
     vf_store(uv[0], s->u), vf_store(uv[1], s->v);
@@ -168,8 +175,11 @@ static void add_mist(struct trc_tile *t, const struct trc_surface *s, vvec3 seen
         return;
     const trc_render_desc *d = t->desc;
     const vvec3 way = from_camera(t, s->p);
+    float m[12];
+    camera_to_world(t, m);
+    const vvec3 axis = v3(vf_set(m[2]), vf_set(m[6]), vf_set(m[10]));
     const vfloat distance = t->snapshot->camera.type == TRC_CAMERA_ORTHOGRAPHIC
-                                ? vf_abs(axial_distance(t, s->p))
+                                ? vf_abs(v3_dot(way, axis))
                                 : vf_sqrt(v3_dot(way, way));
     const vfloat inv_depth = vf_set(d->mist_depth > 0.0f ? 1.0f / d->mist_depth : 0.0f);
     const vfloat zero = vf_set(0.0f), one = vf_set(1.0f);
@@ -271,8 +281,7 @@ static vuint add_features(struct trc_tile *t, const struct trc_surface *s,
     struct trc_denoising_features f;
     TRC_KERNEL(trc_lobes_features)(lobes, s, &f);
     const vfloat zero = vf_set(0.0f);
-    float camera[12];
-    camera_matrix(t, camera);
+    const float *camera = world_to_camera(t);
     const vfloat way = v3_average(weight) * length;
     add_lanes(t, TRC_PASS_DENOISING_DEPTH, v3(way, zero, zero), slots, on);
     const vmask told = vm_and(on, f.is_told);
@@ -280,8 +289,9 @@ static vuint add_features(struct trc_tile *t, const struct trc_surface *s,
     if (t->samples.pass[TRC_PASS_DENOISING_NORMAL][0]) {
         float n[3][TRC_WIDTH];
         for (int k = 0; k < 3; k++) {
-            const vfloat along = v3_dot(
-                f.normal, v3(vf_set(camera[k]), vf_set(camera[4 + k]), vf_set(camera[8 + k])));
+            const float *row = camera + 4 * k;
+            const vfloat along =
+                v3_dot(f.normal, v3(vf_set(row[0]), vf_set(row[1]), vf_set(row[2])));
             vf_store(n[k], k == 2 ? zero - along : along);
         }
         for (uint32_t bits = vm_bits(told); bits; bits &= bits - 1) {

@@ -41,17 +41,16 @@ TRC_INLINE vvec3 trc_transform_vector(const struct trc_wide_affine *m, vvec3 v) 
               m->column[0].z * v.x + m->column[1].z * v.y + m->column[2].z * v.z);
 }
 
-/* The matrix of one instance; elements are interpolated between keys. */
-TRC_INLINE void trc_load_affine(const struct trc_instance *instance, vfloat time,
-                                struct trc_wide_affine *m) {
-    const struct trc_affine *keys = instance->object_to_world;
+/* The matrix of key_count keys at the lanes' times: elements are interpolated. */
+TRC_INLINE void trc_load_keys(const struct trc_affine *keys, uint32_t key_count, vfloat time,
+                              struct trc_wide_affine *m) {
     vfloat e[12];
-    if (instance->key_count < 2) {
+    if (key_count < 2) {
         for (int i = 0; i < 12; i++)
             e[i] = vf_set(keys[0].m[i]);
     } else {
         vfloat f;
-        const vint at = trc_wide_key(time, instance->key_count, &f) * vi_set(12);
+        const vint at = trc_wide_key(time, key_count, &f) * vi_set(12);
         for (int i = 0; i < 12; i++)
             e[i] = trc_between(vf_gather(keys[0].m + i, at, vm_all_set()),
                                vf_gather(keys[1].m + i, at, vm_all_set()), f);
@@ -59,6 +58,10 @@ TRC_INLINE void trc_load_affine(const struct trc_instance *instance, vfloat time
     for (int i = 0; i < 3; i++)
         m->column[i] = v3(e[i], e[4 + i], e[8 + i]);
     m->origin = v3(e[3], e[7], e[11]);
+}
+TRC_INLINE void trc_load_affine(const struct trc_instance *instance, vfloat time,
+                                struct trc_wide_affine *m) {
+    trc_load_keys(instance->object_to_world, instance->key_count, time, m);
 }
 
 /* 9 floats per lane from an array of 3-vectors by 3 indices (in vectors); stride vectors between

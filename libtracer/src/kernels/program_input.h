@@ -421,23 +421,11 @@ static vfloat op_ray_length(const struct trc_surface *s) {
         vi_eq((vint)(s->path & vu_set(TRC_VISIBLE_CAMERA)), vi_set(TRC_VISIBLE_CAMERA));
     if (!s->snapshot->has_camera || !vm_any(seen))
         return s->ray_length;
-    /* Backwards along the view axis, at the lanes' times. */
-    vvec3 axis = v3(vf_set(camera->camera_to_world->m[2]), vf_set(camera->camera_to_world->m[6]),
-                    vf_set(camera->camera_to_world->m[10]));
-    if (camera->key_count > 1) {
-        float at[3 * TRC_WIDTH];
-        for (int lane = 0; lane < TRC_WIDTH; lane++) {
-            uint32_t key;
-            float f;
-            trc_key_at(vf_get(s->time, lane), camera->key_count, &key, &f);
-            const float *a = camera->camera_to_world[key].m,
-                        *b = camera->camera_to_world[key + 1].m;
-            for (int k = 0; k < 3; k++)
-                at[k * TRC_WIDTH + lane] = a[4 * k + 2] + f * (b[4 * k + 2] - a[4 * k + 2]);
-        }
-        axis = v3(vf_load(at), vf_load(at + TRC_WIDTH), vf_load(at + 2 * TRC_WIDTH));
-    }
-    const vfloat near = vf_divide(vf_set(camera->clip_start), v3_dot(s->wo, axis));
+    struct trc_wide_affine to_world, to_camera;
+    trc_load_keys(camera->camera_to_world, camera->key_count, s->time, &to_world);
+    affine_inverse(&to_world, &to_camera);
+    const vvec3 back = v3_normalize(trc_transform_vector(&to_camera, s->wo));
+    const vfloat near = vf_divide(vf_set(camera->clip_start), back.z);
     return vf_select(seen, s->ray_length - near, s->ray_length);
 }
 

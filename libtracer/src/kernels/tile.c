@@ -610,15 +610,16 @@ static void samples_render(struct trc_tile *t, uint32_t begin, uint32_t end) {
     batch_flush(t, sharing);
 }
 
-/* The beam of a camera sample: the narrowest of the frame, in a corner. */
+/* The beam of a camera sample: the narrowest of the frame, in a corner. The shear of a camera
+ * narrows it by no more than its axes' volume. */
 static void beam_setup(struct trc_tile *t) {
     const struct trc_camera *c = &t->snapshot->camera;
     const float *w = c->windows[0];
     const float x = fmaxf(fabsf(w[0]), fabsf(w[1])), y = fmaxf(fabsf(w[2]), fabsf(w[3]));
     const float pixel = fminf(fabsf(w[1] - w[0]) / (float)t->desc->width,
                               fabsf(w[3] - w[2]) / (float)t->desc->height);
-    const float sample =
-        pixel * fminf(t->desc->filter_width, 1.0f) / sqrtf((float)t->desc->sample_count);
+    const float sample = c->axes_volume * pixel * fminf(t->desc->filter_width, 1.0f) /
+                         sqrtf((float)t->desc->sample_count);
     if (c->type == TRC_CAMERA_ORTHOGRAPHIC)
         t->beam_width = sample;
     else

@@ -7,6 +7,10 @@
  * one plane but for rounding. Scale alone does not lower it. */
 #define SINGULAR_RATIO 1e-12
 
+/* Cosine between two axes below which they are perpendicular but for what products of rotations in
+ * floats leave. Of a picture of 1,000 pixels it moves the corners by a hundredth of one. */
+#define SHEAR_MIN 1e-5
+
 struct columns {
     double x[3], y[3], z[3], origin[3];
 };
@@ -90,21 +94,31 @@ static void subtract_along(double v[3], const double unit[3]) {
         v[i] -= s * unit[i];
 }
 
-bool trc_affine_make_rigid(const struct trc_affine *a, struct trc_affine *rigid_out) {
+static void normalize(double v[3]) { scale(v, 1.0 / sqrt(dot(v, v))); }
+
+bool trc_affine_make_unit(const struct trc_affine *a, struct trc_affine *unit_out,
+                          float *volume_out) {
     struct columns c = columns_of(a);
     if (determinant(&c) == 0.0 || !isfinite(dot(c.origin, c.origin)))
         return false;
-    scale(c.z, 1.0 / sqrt(dot(c.z, c.z)));
-    subtract_along(c.y, c.z);
-    scale(c.y, 1.0 / sqrt(dot(c.y, c.y)));
-    subtract_along(c.x, c.z);
-    subtract_along(c.x, c.y);
-    scale(c.x, 1.0 / sqrt(dot(c.x, c.x)));
+    normalize(c.x);
+    normalize(c.y);
+    normalize(c.z);
+    const double shear = fmax(fabs(dot(c.x, c.y)), fmax(fabs(dot(c.y, c.z)), fabs(dot(c.z, c.x))));
+    *volume_out = (float)fabs(determinant(&c));
+    if (shear < SHEAR_MIN) {
+        *volume_out = 1.0f;
+        subtract_along(c.y, c.z);
+        normalize(c.y);
+        subtract_along(c.x, c.z);
+        subtract_along(c.x, c.y);
+        normalize(c.x);
+    }
     for (int row = 0; row < 3; row++) {
-        rigid_out->m[4 * row] = (float)c.x[row];
-        rigid_out->m[4 * row + 1] = (float)c.y[row];
-        rigid_out->m[4 * row + 2] = (float)c.z[row];
-        rigid_out->m[4 * row + 3] = (float)c.origin[row];
+        unit_out->m[4 * row] = (float)c.x[row];
+        unit_out->m[4 * row + 1] = (float)c.y[row];
+        unit_out->m[4 * row + 2] = (float)c.z[row];
+        unit_out->m[4 * row + 3] = (float)c.origin[row];
     }
     return true;
 }

@@ -18,8 +18,10 @@ bool trc_affine_invert(const struct trc_affine *a, struct trc_affine *inverse_ou
 /* Sign of the determinant of the linear part: true for a mirror. */
 bool trc_affine_flips(const struct trc_affine *a);
 
-/* Scale and shear taken out: Z keeps its direction, Y its plane with Z, X its side, so a mirrored
- * camera stays mirrored. False (output untouched) if the transform is not finite or singular. */
-bool trc_affine_make_rigid(const struct trc_affine *a, struct trc_affine *rigid_out);
+/* Scale taken out: the axes become unit vectors and keep their directions, shear and mirroring.
+ * *volume_out is that of the solid that they span, in (0, 1]: 1 where they are perpendicular. False
+ * (outputs untouched) if the transform is not finite or singular. */
+bool trc_affine_make_unit(const struct trc_affine *a, struct trc_affine *unit_out,
+                          float *volume_out);
 
 #endif

@@ -85,9 +85,31 @@ static void merge_equal_keys(struct trc_camera *camera) {
     camera->key_count = 1;
 }
 
+/* Where the way between two keys passes a singular matrix, as of two that look opposite ways, the
+ * key before it stands for it. */
+static trc_status invert_keys(struct trc_camera *camera) {
+    const struct trc_affine *keys = camera->camera_to_world;
+    for (int i = 0; i < 3; i++) {
+        uint32_t key;
+        float f;
+        trc_key_at(0.5f * (float)i, camera->key_count, &key, &f);
+        const float *a = keys[key].m, *b = keys[key + (camera->key_count > 1)].m;
+        struct trc_affine between;
+        for (int k = 0; k < 12; k++)
+            between.m[k] = a[k] + f * (b[k] - a[k]);
+        if (!trc_affine_invert(&between, &camera->world_to_camera[i]) &&
+            !trc_affine_invert(&keys[key], &camera->world_to_camera[i])) {
+            return trc_fail(TRC_ERROR_INVALID_ARGUMENT,
+                            "the camera's transform at key %u cannot be inverted", key);
+        }
+    }
+    return TRC_OK;
+}
+
 static trc_status fill_camera(struct trc_camera *camera, const trc_camera_desc *desc) {
     copy_settings(camera, desc);
     camera->key_count = desc->key_count;
+    camera->axes_volume = 1.0f;
     camera->camera_to_world = trc_alloc(desc->key_count, sizeof *camera->camera_to_world);
     camera->windows = trc_alloc(desc->key_count, sizeof *camera->windows);
     if (!camera->camera_to_world || !camera->windows) {
@@ -95,16 +117,19 @@ static trc_status fill_camera(struct trc_camera *camera, const trc_camera_desc *
     }
     for (uint32_t key = 0; key < desc->key_count; key++) {
         struct trc_affine given;
+        float volume;
         memcpy(given.m, desc->transforms + (size_t)12 * key, sizeof given.m);
-        if (!trc_affine_make_rigid(&given, &camera->camera_to_world[key])) {
+        if (!trc_affine_make_unit(&given, &camera->camera_to_world[key], &volume)) {
             return trc_fail(TRC_ERROR_INVALID_ARGUMENT,
                             "the camera's transform at key %u is singular or not finite", key);
         }
+        camera->axes_volume = fminf(camera->axes_volume, volume);
         memcpy(camera->windows[key],
                desc->windows + (desc->window_key_count > 1 ? (size_t)4 * key : 0),
                sizeof camera->windows[key]);
     }
     merge_equal_keys(camera);
+    TRC_TRY(invert_keys(camera));
     return make_shutter(desc->shutter_curve, desc->shutter_curve_count,
                         &camera->shutter_cdf_inverse);
 }

@@ -78,8 +78,10 @@ struct trc_instance {
 struct trc_camera {
     uint32_t type;
     uint32_t key_count;
-    struct trc_affine *camera_to_world; /* key_count, rigid */
-    float (*windows)[4];                /* key_count: left, right, bottom, top */
+    struct trc_affine *camera_to_world;   /* key_count, axes of unit length */
+    float (*windows)[4];                  /* key_count: left, right, bottom, top */
+    struct trc_affine world_to_camera[3]; /* at the start, middle and end of the shutter */
+    float axes_volume; /* the smallest of all keys' (scene/affine.h); 1: nothing is sheared */
     float clip_start, clip_end;
     float aperture_radius, focus_distance, blade_rotation, aperture_ratio;
     uint32_t blade_count;
