@@ -260,7 +260,8 @@ def test_sheared_cameras_are_those_of_cycles(blender, kind):
             print(f"{kind} {name} {each}: means {a[seen].mean():.5f} {b[seen].mean():.5f}, "
                   f"pixels {np.median(error):.2g} {error[seen].max():.2g}, blocks {blocks:.2g}")
             if name in ("blurred", "lens"):
-                assert blocks < EDGE_NOISE, (name, each)
+                # The 32 moments of stills are steps as large as noise.
+                assert blocks < (2.0 if name == "blurred" else 1.0) * EDGE_NOISE, (name, each)
                 continue
             assert seen.mean() > 0.5, (name, each)
             # Samples lie up to a hundredth of a pixel apart.
