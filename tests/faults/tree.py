@@ -39,9 +39,12 @@ class FaultError(Exception):
 
 
 def faults():
-    """The list, each a dictionary as faults.toml describes it."""
+    """The list, each a dictionary as faults.toml describes it; tests are filled in from its area."""
     with open(LIST, "rb") as file:
-        return tomllib.load(file)["fault"]
+        table = tomllib.load(file)
+    for fault in table["fault"]:
+        fault.setdefault("tests", table["areas"][fault["area"]])
+    return table["fault"]
 
 
 _SPACE = r"(?:\s|\\\n)*"  # a continued line of Python is white space, too
@@ -72,7 +75,7 @@ def place_of(fault, texts):
 def _switched(fault, part, is_python):
     number, to = fault["number"], fault["to"]
     if is_python:
-        return f"({to} if _VOLLEY_FAULT == {number} else ({part}))"
+        return f"(({to}) if _VOLLEY_FAULT == {number} else ({part}))"
     if part.rstrip().endswith((";", "}")):
         return f"if (trc_fault_on == {number}) {{ {to} }} else {{ {part} }}"
     return f"(trc_fault_on == {number} ? ({to}) : ({part}))"

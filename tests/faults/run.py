@@ -1,0 +1,252 @@
+#!/usr/bin/env python3
+"""A mutation run, by hand: which faults of faults.toml does no test notice?
+
+    python3 tests/faults/run.py [-j 2] [--only 17,18] [--survivors] [--widest] [--check] [--out build-faults]
+
+Makes a copy of the sources that holds all faults (tree.py) in OUT/tree, builds it once in OUT/build, and
+runs the tests of that copy with one fault on at a time, those that cover its place first, until one fails.
+That one has to pass without the fault, else it does not count. A fault that nothing notices has seen
+every test in C, on every instruction set (--widest: on the widest alone), and the Python files of its area;
+of faults in the add-on those files alone. A crash or a time-out counts as noticed and is said as such.
+
+Results are in OUT/results.json and, as a table, OUT/results.md. Faults that have one are left out unless
+named by --only or, if nothing noticed them, by --survivors. --check runs everything with no fault on. All of
+it takes some three hours of two cores."""
+
+import argparse
+import concurrent.futures
+import importlib.util
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import xml.etree.ElementTree as xml
+from pathlib import Path
+
+import tree
+
+CTEST_SECONDS = 400    # of one test in C; the slowest takes 70 alone
+PYTEST_SECONDS = 900   # of one file in Python; the slowest takes 120 alone
+WIDTHS = ("avx512", "avx2", "sse42", "neon", "scalar")  # instruction sets, the widest first
+
+
+class Tests:
+    """The tests of the build of the copy, run with one fault on or none (0)."""
+
+    def __init__(self, out):
+        self.tree, self.build = out / "tree", out / "build"
+        listed = subprocess.run(["ctest", "--test-dir", self.build, "--show-only=json-v1"], check=True,
+                                capture_output=True, text=True).stdout
+        self.c_names = [test["name"] for test in json.loads(listed)["tests"]]
+        self.python_files = sorted(path.name for folder in ("blender", "statistics")
+                                   for path in (self.tree / "tests" / folder).glob("test_*.py"))
+        self.isas = [isa for isa in WIDTHS if any(name.endswith("." + isa) for name in self.c_names)
+                     and self._runs(isa)]
+
+    def _runs(self, isa):
+        probe = next(name for name in self.c_names if name.endswith("." + isa))
+        return "Skipped" not in self._ctest(0, [probe])[1]
+
+    def in_c(self, base=None, isa=None):
+        """Names of the tests in C of a name without instruction set, or all; of one set and those of none."""
+        def fits(name):
+            own = name.rpartition(".")[2] if name.rpartition(".")[2] in WIDTHS else None
+            plain = name.removesuffix("." + own) if own else name
+            is_named = base is None or plain == base or plain.startswith(base + ".")
+            return is_named and (own is None or own == isa)
+        return [name for name in self.c_names if fits(name)]
+
+    def _environment(self, fault):
+        return {**os.environ, "VOLLEY_FAULT": str(fault), "VOLLEY_BUILD": str(self.build),
+                "BLENDER_USER_SCRIPTS": str(self.build / "blender"),
+                "PYTHONPATH": str(self.tree / "tests/support")}
+
+    def _ctest(self, fault, names):
+        pattern = "^(" + "|".join(map(re.escape, names)) + ")$"
+        done = subprocess.run(
+            ["nice", "ctest", "--test-dir", self.build, "-R", pattern, "--stop-on-failure", "--timeout",
+             str(CTEST_SECONDS)], env=self._environment(fault), capture_output=True, text=True)
+        return done.returncode == 0, done.stdout
+
+    def c_failure(self, fault, names):
+        """(test, how it failed) of the first in order that fails, None if all pass."""
+        for name in names:  # in the order of the list, which is ctest's only with one at a time
+            passed, output = self._ctest(fault, [name])
+            if not passed:
+                how = re.search(r"\*\*\*(\w+)", output)
+                return name, how[1].lower() if how else "failed"
+        return None
+
+    def python_failure(self, fault, file, test=None):
+        """(test, how it failed) of the first of a file that fails, None if all pass."""
+        path = next((self.tree / "tests").glob(f"*/{file}"))
+        with tempfile.TemporaryDirectory() as folder:
+            report = Path(folder) / "report.xml"
+            command = ["nice", sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "--rootdir",
+                       "tests", "--junit-xml", report, f"{path}::{test}" if test else path]
+            try:
+                subprocess.run(command, cwd=self.tree, env=self._environment(fault), capture_output=True,
+                               timeout=PYTEST_SECONDS)
+            except subprocess.TimeoutExpired:
+                return file, "time-out"
+            if not report.is_file():
+                raise RuntimeError(f"pytest could not run {path}")
+            for case in xml.parse(report).iter("testcase"):
+                trouble = case.find("failure")
+                if trouble is None:
+                    trouble = case.find("error")
+                if trouble is not None:
+                    return f"{file}::{case.get('name')}", _how(trouble)
+        return None
+
+
+def _how(trouble):
+    """How a test in Python failed, in a word."""
+    text = (trouble.get("message") or "") + (trouble.text or "")
+    if "TimeoutExpired" in text or "timed out" in text:
+        return "time-out"
+    return "crash" if re.search(r"ended with -\d+|Segmentation fault", text) else "failed"
+
+
+def build(out):
+    """Make the copy and build it."""
+    tree.make(out / "tree")
+    with open(out / "build.log", "w") as log:
+        for command in (["cmake", "-G", "Ninja", "-C", out / "tree/.cmake/release.cmake", "-S", out / "tree",
+                         "-B", out / "build"], ["nice", "cmake", "--build", out / "build"]):
+            if subprocess.run(command, stdout=log, stderr=subprocess.STDOUT).returncode:
+                sys.exit(f"the copy cannot be built: see {out / 'build.log'}")
+
+
+class Run:
+    """What is run for each fault."""
+
+    def __init__(self, tests, widest):
+        self._tests, self._isas = tests, tests.isas[:1] if widest else tests.isas
+
+    def _steps(self, fault):
+        """Functions of a fault's number that give a failure or None, likeliest first."""
+        tests, widest, steps, done = self._tests, self._tests.isas[0], [], set()
+
+        def in_c(names):
+            for name in names:
+                if name not in done:
+                    done.add(name)
+                    steps.append(lambda number, name=name: tests.c_failure(number, [name]))
+
+        is_c = not fault["file"].endswith(".py")
+        for name in fault["tests"]:
+            if name.endswith(".py"):
+                continue
+            known = tests.in_c(name, widest)
+            if not known:
+                raise tree.FaultError(f"fault {fault['number']}: there is no test {name}")
+            in_c(known)
+        if is_c:  # those of no instruction set are fast
+            in_c(name for name in tests.in_c(isa=widest) if name not in done)
+        for name in fault["tests"]:
+            if name.endswith(".py"):
+                steps.append(lambda number, name=name: tests.python_failure(number, name))
+        for isa in self._isas[1:] if is_c else ():
+            in_c(tests.in_c(isa=isa))
+        return steps
+
+    def _passes_without(self, test):
+        if ".py" in test:
+            file, _, name = test.partition("::")
+            return self._tests.python_failure(0, file, name or None) is None
+        return self._tests.c_failure(0, [test]) is None
+
+    def of(self, fault):
+        """The result of one fault."""
+        start = time.monotonic()
+        result = {"number": fault["number"], "what": fault["what"], "area": fault["area"],
+                  "file": fault["file"], "by": None, "how": "SURVIVED", "doubtful": []}
+        for step in self._steps(fault):
+            failure = step(fault["number"])
+            if failure is None:
+                continue
+            if self._passes_without(failure[0]):
+                result["by"], result["how"] = failure
+                break
+            result["doubtful"].append(failure[0])
+        result["seconds"] = round(time.monotonic() - start)
+        return result
+
+    def check(self):
+        """Everything with no fault on; what fails."""
+        failures = [self._tests.c_failure(0, [name]) for name in self._tests.c_names]
+        failures += [self._tests.python_failure(0, file) for file in self._tests.python_files]
+        return [failure for failure in failures if failure]
+
+
+def write_table(path, results, struck):
+    """Counts by area, survivors, and the whole list."""
+    areas = {}
+    for result in results:
+        areas.setdefault(result["area"], []).append(result["by"] is not None)
+    caught = sum(map(sum, areas.values()))
+    lines = [f"{caught} of {len(results)} faults caught ({100.0 * caught / max(len(results), 1):.1f} %), "
+             f"{len(struck)} struck out.", "", "| area | faults | caught |", "|---|---|---|"]
+    lines += [f"| {area} | {len(each)} | {sum(each)} |" for area, each in areas.items()]
+    lines += ["", "| | fault | caught by | how | seconds |", "|---|---|---|---|---|"]
+    lines += [f"| {r['number']} | {r['what']} ({r['file']}) | {r['by'] or 'SURVIVED'} | {r['how']} | {r['seconds']} |"
+              for r in sorted(results, key=lambda r: (r["by"] is not None, r["number"]))]
+    lines += [f"| {f['number']} | {f['what']} ({f['file']}) | struck out | {f['equivalent']} | |" for f in struck]
+    path.write_text("\n".join(lines) + "\n")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("-j", type=int, default=2, metavar="N", help="faults at once")
+    parser.add_argument("--only", default="", metavar="N,N", help="these faults alone")
+    parser.add_argument("--survivors", action="store_true", help="those that nothing noticed yet, again")
+    parser.add_argument("--widest", action="store_true", help="tests in C on the widest instruction set alone")
+    parser.add_argument("--check", action="store_true", help="run all tests with no fault on")
+    parser.add_argument("--out", type=Path, default=tree.ROOT / "build-faults", metavar="DIR")
+    arguments = parser.parse_args()
+    if not all(map(importlib.util.find_spec, ("pytest", "numpy"))):
+        parser.error("start it with a Python that has pytest and numpy, such as /usr/bin/python3")
+    out = arguments.out.resolve()
+    out.mkdir(parents=True, exist_ok=True)
+    build(out)
+    run = Run(Tests(out), arguments.widest)
+    if arguments.check:
+        failures = run.check()
+        print("\n".join(f"{name}: {how}" for name, how in failures) or "all tests pass without a fault")
+        sys.exit(bool(failures))
+
+    store = out / "results.json"
+    results = {r["number"]: r for r in json.loads(store.read_text())} if store.is_file() else {}
+    listed = tree.faults()
+    struck = [fault for fault in listed if "equivalent" in fault]
+    live = [fault for fault in listed if "equivalent" not in fault]
+    results = {number: r for number, r in results.items() if number in {f["number"] for f in live}}
+    named = {int(number) for number in arguments.only.split(",") if number}
+    survivors = {number for number, r in results.items() if r["by"] is None} if arguments.survivors else set()
+    todo = [f for f in live if f["number"] in named | survivors
+            or not named and not arguments.survivors and f["number"] not in results]
+    lock = threading.Lock()
+
+    def one(fault):
+        result = run.of(fault)
+        with lock:
+            results[fault["number"]] = result
+            ordered = [results[number] for number in sorted(results)]
+            store.write_text(json.dumps(ordered, indent=1))
+            write_table(out / "results.md", ordered, struck)
+            print(f"{fault['number']:4} {result['seconds']:5} s  {result['by'] or 'SURVIVED'} "
+                  f"({result['how']}): {fault['what']}", flush=True)
+
+    with concurrent.futures.ThreadPoolExecutor(max(arguments.j, 1)) as pool:
+        for done in [pool.submit(one, fault) for fault in todo]:
+            done.result()
+    print((out / "results.md").read_text().splitlines()[0])
+
+
+if __name__ == "__main__":
+    main()
