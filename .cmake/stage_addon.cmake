@@ -1,4 +1,5 @@
-# Makes STAGE a copy of the add-on in SOURCE plus lib/libtracer.so (LIBRARY) and LICENSE.
+# Makes STAGE a copy of the add-on in SOURCE plus lib/libtracer.so (LIBRARY), lib/tracer_reader (READER,
+# unless that is empty) and LICENSE.
 #
 # Only what differs is written, and by renaming: a Blender that has the old library loaded keeps it.
 # Files that left SOURCE leave STAGE too. Python's __pycache__ folders are left alone.
@@ -25,7 +26,7 @@ list(FILTER staged EXCLUDE REGEX "__pycache__")
 
 foreach(name IN LISTS staged)
     if(NOT name IN_LIST sources AND NOT name STREQUAL "lib/libtracer.so"
-            AND NOT name STREQUAL "LICENSE")
+            AND NOT name STREQUAL "LICENSE" AND NOT (READER AND name STREQUAL "lib/tracer_reader"))
         file(REMOVE "${STAGE}/${name}")
     endif()
 endforeach()
@@ -34,3 +35,6 @@ foreach(name IN LISTS sources)
 endforeach()
 stage("${LICENSE}" "${STAGE}/LICENSE")
 stage("${LIBRARY}" "${STAGE}/lib/libtracer.so")
+if(READER)
+    stage("${READER}" "${STAGE}/lib/tracer_reader")
+endif()

@@ -51,10 +51,11 @@ enum {
     TRC_ERROR_IMAGE = 10       /* an image file is missing, damaged or too large */
 };
 
-/* Generation-checked names of objects. 0 is never a valid one. A scene or render handle is unique
- * in the process; an id is unique in its scene. */
+/* Generation-checked names of objects. 0 is never a valid one. A scene, render or reader handle is
+ * unique in the process; an id is unique in its scene. */
 typedef uint64_t trc_scene;
 typedef uint64_t trc_render;
+typedef uint64_t trc_reader;
 typedef uint64_t trc_id;
 
 /* Instruction sets the kernels are built for, in rising order. */

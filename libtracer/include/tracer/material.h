@@ -385,7 +385,7 @@ typedef struct trc_image_desc {
     uint32_t is_float;    /* pixels are float (else uint8); ignored with a path */
     const void *pixels;   /* RGBA, bottom row first, float or uint8; NULL with a path */
     uint64_t pixel_bytes; /* size of that buffer, checked */
-    const char *path;     /* file read by OpenImageIO at once; NULL with pixels */
+    const char *path;     /* file, read at once (see reader.h); NULL with pixels */
     const char
         *color_config;       /* OpenColorIO configuration, a file; read if there is a color_space */
     const char *color_space; /* of the pixels, in the configuration: colours are converted to its
@@ -400,8 +400,9 @@ typedef struct trc_image_desc {
 } trc_image_desc;
 
 /* TRC_ERROR_IMAGE for a file that cannot be read, or colours that cannot be converted: the caller
- * may go on with image 0 (magenta). TRC_ERROR_UNSUPPORTED for a path or a color_space in a build
- * without OpenImageIO. */
+ * may go on with image 0 (magenta). TRC_ERROR_TOO_LARGE also for a file that claims more pixels than
+ * one of its size can have. TRC_ERROR_UNSUPPORTED for a file in no known format, and for a path or a
+ * color_space where the reader's program is absent (a build without OpenImageIO) or does not run. */
 TRC_API trc_status trc_image_create(trc_scene scene, const trc_image_desc *desc, trc_id *image_out);
 TRC_API trc_status trc_image_destroy(trc_scene scene, trc_id image);
 

@@ -18,6 +18,7 @@ typedef struct trc_scene_desc {
     uint32_t image_megabytes; /* 2^20 bytes that images may take: when one more does not fit, the
                                  largest are halved, again and again, and a warning says so.
                                  0: no limit */
+    trc_reader reader;        /* of image files, held by the scene; 0: one of its own */
 } trc_scene_desc;
 
 TRC_API trc_status trc_scene_create(const trc_scene_desc *desc, trc_scene *scene_out);

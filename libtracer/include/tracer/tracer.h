@@ -16,6 +16,7 @@
 #include "tracer/light.h"
 #include "tracer/material.h"
 #include "tracer/query.h"
+#include "tracer/reader.h"
 #include "tracer/render.h"
 #include "tracer/scene.h"
 #include "tracer/version.h"

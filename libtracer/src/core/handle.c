@@ -87,7 +87,7 @@ trc_status trc_handle_create(enum trc_handle_kind kind, void *object, uint64_t *
 }
 
 static const char *kind_name(enum trc_handle_kind kind) {
-    return kind == TRC_HANDLE_SCENE ? "scene" : "render";
+    return kind == TRC_HANDLE_SCENE ? "scene" : kind == TRC_HANDLE_RENDER ? "render" : "reader";
 }
 
 trc_status trc_handle_acquire(uint64_t handle, enum trc_handle_kind kind, void **object_out) {

@@ -1,4 +1,4 @@
-/* The registry of scenes and renders: the one mutable state of the process besides the instruction
+/* The registry of scenes, renders and readers: the one mutable state of the process besides the instruction
  * set and the memory counters. A handle is a slot and a generation, so stale and foreign values are
  * told apart from living ones. An object that is in use is pinned; removing waits for the pins. */
 #ifndef TRACER_CORE_HANDLE_H
@@ -8,7 +8,7 @@
 
 #include "tracer/base.h"
 
-enum trc_handle_kind { TRC_HANDLE_SCENE = 1, TRC_HANDLE_RENDER = 2 };
+enum trc_handle_kind { TRC_HANDLE_SCENE = 1, TRC_HANDLE_RENDER = 2, TRC_HANDLE_READER = 3 };
 
 /* Makes object known. On failure (OUT_OF_MEMORY) handle_out is untouched. */
 trc_status trc_handle_create(enum trc_handle_kind kind, void *object, uint64_t *handle_out);

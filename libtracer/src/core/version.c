@@ -35,6 +35,7 @@ uint32_t trc_struct_size(const char *name) {
         ENTRY(trc_render_progress),
         ENTRY(trc_scene_desc),
         ENTRY(trc_scene_stats),
+        ENTRY(trc_reader_desc),
     };
 #undef ENTRY
     if (!name)

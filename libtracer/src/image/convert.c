@@ -5,13 +5,8 @@
 
 #include "core/checks.h"
 #include "core/core.h"
-#include "image/color.h"
+#include "image/reader.h"
 #include "image/texel.h"
-
-#ifdef TRC_WITH_OIIO
-
-/* Texels that are converted at once, on the stack. */
-#define BATCH 512
 
 /* Bytes and words are rounded to half floats, as Cycles reads them: what that loses shows where a
  * transform is steep. */
@@ -62,82 +57,82 @@ static void scale_by_alpha(float *rgba, uint32_t count, bool divide) {
     }
 }
 
-static trc_status convert_batch(const struct trc_color_transform *transform,
-                                const struct trc_color_source *source, float *rgba,
-                                uint32_t count) {
-    if (source->is_multiplied)
+/* An image on its way to texels of another format, or in place. */
+struct conversion {
+    struct trc_image *image;
+    const struct trc_color_source *source;
+    enum trc_texel format;
+    char *texels; /* NULL before there are any */
+};
+
+static trc_status begin(void *context) {
+    struct conversion *c = context;
+    const struct trc_image_level *level = &c->image->levels[0];
+    const uint64_t count = (uint64_t)level->width * level->height;
+    const uint64_t bytes = count * trc_texel_bytes(c->format);
+    if (bytes == c->image->bytes) {
+        c->texels = level->texels;
+        return TRC_OK;
+    }
+    TRC_TRY(trc_image_check_size(level->width, level->height, c->format, ""));
+    c->texels = trc_alloc(count, trc_texel_bytes(c->format));
+    return c->texels ? TRC_OK
+                     : trc_fail(TRC_ERROR_OUT_OF_MEMORY,
+                                "no memory for an image of %" PRIu64 " bytes", bytes);
+}
+
+static void load(void *context, uint64_t first, uint32_t count, float *rgba) {
+    const struct conversion *c = context;
+    const enum trc_texel format = c->image->format;
+    load_texels(format, (const char *)c->image->levels[0].texels + first * trc_texel_bytes(format),
+                count, rgba);
+    if (c->source->is_multiplied)
         scale_by_alpha(rgba, count, true);
-    TRC_TRY(trc_color_apply(transform, rgba, count));
-    for (uint32_t i = 0; source->is_grey && i < count; i++) {
+}
+
+/* Texels that are stored on the way, on the stack. */
+#define BATCH 512
+
+static void store_batch(const struct conversion *c, uint64_t first, uint32_t count,
+                        const float *colors) {
+    float rgba[4 * BATCH];
+    memcpy(rgba, colors, 4 * count * sizeof *rgba);
+    for (uint32_t i = 0; c->source->is_grey && i < count; i++) {
         float *t = rgba + 4 * (size_t)i;
         t[0] = t[1] = t[2] = (t[0] + t[1] + t[2]) * (1.0f / 3.0f);
     }
-    if (source->is_multiplied)
+    if (c->source->is_multiplied)
         scale_by_alpha(rgba, count, false);
-    return TRC_OK;
+    store_texels(c->format, rgba, count, c->texels + first * trc_texel_bytes(c->format));
 }
 
-/* All texels, to texels of another format, or in place. */
-static trc_status convert(const struct trc_image *image,
-                          const struct trc_color_transform *transform,
-                          const struct trc_color_source *source, enum trc_texel format,
-                          char *texels) {
-    const struct trc_image_level *level = &image->levels[0];
-    const uint64_t count = (uint64_t)level->width * level->height;
-    for (uint64_t first = 0; first < count; first += BATCH) {
-        const uint32_t batch = count - first < BATCH ? (uint32_t)(count - first) : BATCH;
-        float rgba[4 * BATCH];
-        load_texels(image->format,
-                    (const char *)level->texels + first * trc_texel_bytes(image->format), batch,
-                    rgba);
-        TRC_TRY(convert_batch(transform, source, rgba, batch));
-        store_texels(format, rgba, batch, texels + first * trc_texel_bytes(format));
-    }
-    return TRC_OK;
+static void store(void *context, uint64_t first, uint32_t count, const float *rgba) {
+    for (uint32_t done = 0; done < count; done += BATCH)
+        store_batch(context, first + done, count - done < BATCH ? count - done : BATCH,
+                    rgba + 4 * (size_t)done);
 }
 
-static trc_status convert_level(struct trc_image *image,
-                                const struct trc_color_transform *transform,
-                                const struct trc_color_source *source) {
+trc_status trc_image_to_scene_linear(struct trc_image *image, const struct trc_image_source *from,
+                                     const struct trc_color_source *source) {
     struct trc_image_level *level = &image->levels[0];
-    const uint64_t count = (uint64_t)level->width * level->height;
-    const enum trc_texel format = image->format == TRC_TEXEL_F32 ? TRC_TEXEL_F32 : TRC_TEXEL_F16;
-    const uint64_t bytes = count * trc_texel_bytes(format);
-    void *texels = level->texels;
-    if (bytes != image->bytes) {
-        if (bytes > TRC_IMAGE_MAX_BYTES)
-            return trc_fail(TRC_ERROR_TOO_LARGE, "an image of %" PRIu64 " bytes is too large",
-                            bytes);
-        texels = trc_alloc(count, trc_texel_bytes(format));
-        if (!texels)
-            return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for an image of %" PRIu64 " bytes",
-                            bytes);
-    }
-    const trc_status status = convert(image, transform, source, format, texels);
-    if (texels != level->texels)
+    struct conversion conversion = {
+        .image = image,
+        .source = source,
+        .format = image->format == TRC_TEXEL_F32 ? TRC_TEXEL_F32 : TRC_TEXEL_F16};
+    const struct trc_color_batches batches = {.context = &conversion,
+                                              .cancel = from->cancel,
+                                              .count = (uint64_t)level->width * level->height,
+                                              .begin = begin,
+                                              .load = load,
+                                              .store = store};
+    const trc_status status =
+        trc_image_reader_convert(from->reader, source->config, source->space, &batches);
+    if (!conversion.texels)
+        return status;
+    if (conversion.texels != level->texels)
         trc_free(level->texels);
-    level->texels = texels;
-    image->format = format;
-    image->bytes = bytes;
+    level->texels = conversion.texels;
+    image->format = conversion.format;
+    image->bytes = batches.count * trc_texel_bytes(conversion.format);
     return status;
 }
-
-trc_status trc_image_to_scene_linear(struct trc_image *image,
-                                     const struct trc_color_source *source) {
-    struct trc_color_transform *transform;
-    TRC_TRY(trc_color_open(source->config, source->space, &transform));
-    const trc_status status = transform ? convert_level(image, transform, source) : TRC_OK;
-    trc_color_close(transform);
-    return status;
-}
-
-#else
-
-trc_status trc_image_to_scene_linear(struct trc_image *image,
-                                     const struct trc_color_source *source) {
-    (void)image;
-    return trc_fail(TRC_ERROR_UNSUPPORTED,
-                    "this build cannot convert colour spaces (no OpenImageIO): %s", source->space);
-}
-
-#endif

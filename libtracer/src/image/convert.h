@@ -15,9 +15,9 @@ struct trc_color_source {
 
 /* Converts the first level of an image, the only one. As in Cycles, bytes and words become half
  * floats, unless the space is scene-linear, and grey stays grey: the mean of what the three
- * channels become. Texels may be NaN or infinite after. IMAGE (see trc_color_open), UNSUPPORTED (a
- * build without OpenImageIO), OUT_OF_MEMORY; the image is to be freed then. */
-trc_status trc_image_to_scene_linear(struct trc_image *image,
+ * channels become. Texels may be NaN or infinite after. As trc_image_reader_convert; the image is
+ * to be freed if it fails. */
+trc_status trc_image_to_scene_linear(struct trc_image *image, const struct trc_image_source *from,
                                      const struct trc_color_source *source);
 
 #endif

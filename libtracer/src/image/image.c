@@ -10,7 +10,7 @@
 #include "core/core.h"
 #include "image/convert.h"
 #include "image/levels.h"
-#include "image/oiio.h"
+#include "image/reader.h"
 #include "image/texel.h"
 
 /* ---- life ---- */
@@ -36,18 +36,25 @@ void trc_image_release(struct trc_image *image) {
 
 uint64_t trc_image_bytes(const struct trc_image *image) { return image ? image->bytes : 0; }
 
+trc_status trc_image_check_size(uint32_t width, uint32_t height, uint32_t format,
+                                const char *name) {
+    const uint64_t texels = (uint64_t)width * height;
+    /* Sides of 32 bits have too many texels before these have too many bytes for 64. */
+    if (width <= TRC_IMAGE_MAX_SIDE && height <= TRC_IMAGE_MAX_SIDE &&
+        texels <= TRC_IMAGE_MAX_TEXELS && texels * trc_texel_bytes(format) <= TRC_IMAGE_MAX_BYTES)
+        return TRC_OK;
+    return trc_fail(TRC_ERROR_TOO_LARGE,
+                    "an image%s%s of %" PRIu32 " x %" PRIu32
+                    " pixels is too large: at most %u per side, %u in all, %" PRIu64 " bytes",
+                    name[0] ? " " : "", name, width, height, TRC_IMAGE_MAX_SIDE,
+                    TRC_IMAGE_MAX_TEXELS, (uint64_t)TRC_IMAGE_MAX_BYTES);
+}
+
 /* An image of one level with texels still to be filled. */
 static trc_status image_create(uint32_t width, uint32_t height, enum trc_texel format,
                                const trc_image_desc *desc, struct trc_image **image_out) {
     const uint64_t texels = (uint64_t)width * height, bytes = texels * trc_texel_bytes(format);
-    if (width > TRC_IMAGE_MAX_SIDE || height > TRC_IMAGE_MAX_SIDE ||
-        texels > TRC_IMAGE_MAX_TEXELS || bytes > TRC_IMAGE_MAX_BYTES) {
-        return trc_fail(TRC_ERROR_TOO_LARGE,
-                        "an image of %" PRIu32 " x %" PRIu32 " pixels, %" PRIu64
-                        " bytes, is too large: at most %u per side, %u in all, %" PRIu64 " bytes",
-                        width, height, bytes, TRC_IMAGE_MAX_SIDE, TRC_IMAGE_MAX_TEXELS,
-                        (uint64_t)TRC_IMAGE_MAX_BYTES);
-    }
+    TRC_TRY(trc_image_check_size(width, height, format, ""));
     struct trc_image *image = trc_alloc_zeroed(1, sizeof *image);
     void *block = trc_alloc_zeroed(texels, trc_texel_bytes(format));
     if (!image || !block) {
@@ -68,37 +75,54 @@ static trc_status image_create(uint32_t width, uint32_t height, enum trc_texel f
 
 /* ---- texels ---- */
 
-/* Grey, grey with alpha and RGB, whose channels stand at the start of each texel, to RGBA. one: 1.0
- * of the format. A macro, as it is the same for three types of number. */
-#define DEFINE_SPREAD(name, type)                                            \
-    static void name(type *t, uint64_t count, uint32_t channels, type one) { \
-        for (uint64_t i = 0; i < count; i++, t += 4) {                       \
-            if (channels < 4)                                                \
-                t[3] = channels == 2 ? t[1] : one;                           \
-            if (channels < 3)                                                \
-                t[1] = t[2] = t[0];                                          \
-        }                                                                    \
+/* Grey, grey with alpha, RGB or RGBA, side by side, to RGBA. one: 1.0 of the format. A macro, as it
+ * is the same for three types of number. */
+#define DEFINE_SPREAD(name, type)                                                                 \
+    static void name(const type *from, type *to, uint64_t count, uint32_t channels, type one) {   \
+        switch (channels) {                                                                       \
+        case 1:                                                                                   \
+            for (uint64_t i = 0; i < count; i++, to += 4) {                                       \
+                to[0] = to[1] = to[2] = from[i];                                                  \
+                to[3] = one;                                                                      \
+            }                                                                                     \
+            break;                                                                                \
+        case 2:                                                                                   \
+            for (uint64_t i = 0; i < count; i++, to += 4) {                                       \
+                to[0] = to[1] = to[2] = from[2 * i];                                              \
+                to[3] = from[2 * i + 1];                                                          \
+            }                                                                                     \
+            break;                                                                                \
+        case 3:                                                                                   \
+            for (uint64_t i = 0; i < count; i++, to += 4) {                                       \
+                to[0] = from[3 * i];                                                              \
+                to[1] = from[3 * i + 1];                                                          \
+                to[2] = from[3 * i + 2];                                                          \
+                to[3] = one;                                                                      \
+            }                                                                                     \
+            break;                                                                                \
+        default:                                                                                  \
+            memcpy(to, from, 4 * count * sizeof *to);                                             \
+            break;                                                                                \
+        }                                                                                         \
     }
 DEFINE_SPREAD(spread_u8, uint8_t)
 DEFINE_SPREAD(spread_u16, uint16_t)
 DEFINE_SPREAD(spread_f32, float)
 
-static void spread_channels(struct trc_image *image, uint64_t count, uint32_t channels) {
-    void *texels = image->levels[0].texels;
-    if (channels == 4)
-        return;
-    switch (image->format) {
+static void spread(enum trc_texel format, const void *from, void *to, uint64_t count,
+                   uint32_t channels) {
+    switch (format) {
     case TRC_TEXEL_U8:
-        spread_u8(texels, count, channels, UINT8_MAX);
+        spread_u8(from, to, count, channels, UINT8_MAX);
         break;
     case TRC_TEXEL_U16:
-        spread_u16(texels, count, channels, UINT16_MAX);
+        spread_u16(from, to, count, channels, UINT16_MAX);
         break;
     case TRC_TEXEL_F16:
-        spread_u16(texels, count, channels, TRC_HALF_ONE);
+        spread_u16(from, to, count, channels, TRC_HALF_ONE);
         break;
     case TRC_TEXEL_F32:
-        spread_f32(texels, count, channels, 1.0f);
+        spread_f32(from, to, count, channels, 1.0f);
         break;
     }
 }
@@ -172,12 +196,13 @@ static void multiply_by_alpha(struct trc_image *image, uint64_t count) {
     }
 }
 
-/* What is left to do when the channels are there; the image is to be freed if it fails. */
-static trc_status finish(struct trc_image *image, const trc_image_desc *desc, uint32_t channels,
+/* What is left to do when the texels are there; the image is to be freed if it fails. channels: of
+ * what they come from. */
+static trc_status finish(struct trc_image *image, const trc_image_desc *desc,
+                         const struct trc_image_source *from, uint32_t channels,
                          bool is_unassociated) {
     const uint64_t count = (uint64_t)image->levels[0].width * image->levels[0].height;
     const bool has_alpha = channels == 2 || channels == 4;
-    spread_channels(image, count, channels);
     drop_bad_texels(image, count);
     if (has_alpha && desc->alpha_mode == TRC_ALPHA_NONE)
         set_opaque(image, count);
@@ -190,7 +215,7 @@ static trc_status finish(struct trc_image *image, const trc_image_desc *desc, ui
             .is_grey = channels == 1,
             .is_multiplied = image->is_associated && !is_unassociated,
         };
-        TRC_TRY(trc_image_to_scene_linear(image, &source));
+        TRC_TRY(trc_image_to_scene_linear(image, from, &source));
         drop_bad_texels(image, count);
     }
     if (image->is_associated && is_unassociated) {
@@ -318,7 +343,8 @@ trc_status trc_image_halve(const struct trc_image *image, struct trc_image **hal
 
 /* ---- sources ---- */
 
-static trc_status load_pixels(const trc_image_desc *desc, struct trc_image **image_out) {
+static trc_status load_pixels(const trc_image_desc *desc, const struct trc_image_source *source,
+                              struct trc_image **image_out) {
     const enum trc_texel format = desc->is_float ? TRC_TEXEL_F32 : TRC_TEXEL_U8;
     const size_t element = desc->is_float ? sizeof(float) : 1;
     if (!desc->width || !desc->height) {
@@ -332,7 +358,7 @@ static trc_status load_pixels(const trc_image_desc *desc, struct trc_image **ima
     struct trc_image *image;
     TRC_TRY(image_create(desc->width, desc->height, format, desc, &image));
     memcpy(image->levels[0].texels, desc->pixels, bytes);
-    const trc_status status = finish(image, desc, 4, desc->alpha_mode == TRC_ALPHA_STRAIGHT);
+    const trc_status status = finish(image, desc, source, 4, desc->alpha_mode == TRC_ALPHA_STRAIGHT);
     if (status != TRC_OK) {
         trc_image_release(image);
         return status;
@@ -341,41 +367,53 @@ static trc_status load_pixels(const trc_image_desc *desc, struct trc_image **ima
     return TRC_OK;
 }
 
-#ifdef TRC_WITH_OIIO
-static trc_status read_file(struct trc_oiio *file, const struct trc_file_info *info,
-                            const trc_image_desc *desc, struct trc_image **image_out) {
-    struct trc_image *image;
-    TRC_TRY(image_create(info->width, info->height, (enum trc_texel)info->format, desc, &image));
-    const uint64_t texel = trc_texel_bytes(info->format);
-    trc_status status =
-        trc_oiio_read(file, image->levels[0].texels, image->bytes, texel, texel * info->width);
-    if (status == TRC_OK)
-        status = finish(image, desc, info->channels, info->is_unassociated);
-    if (status != TRC_OK) {
-        trc_image_release(image);
-        return status;
-    }
-    *image_out = image;
-    return TRC_OK;
-}
-
-static trc_status load_file(const trc_image_desc *desc, struct trc_image **image_out) {
-    struct trc_oiio *file;
+/* A file that is being read. */
+struct file {
+    const trc_image_desc *desc;
     struct trc_file_info info;
-    TRC_TRY(trc_oiio_open(desc->path, &file, &info));
-    const trc_status status = read_file(file, &info, desc, image_out);
-    trc_oiio_close(file);
-    return status;
-}
-#else
-static trc_status load_file(const trc_image_desc *desc, struct trc_image **image_out) {
-    (void)image_out;
-    return trc_fail(TRC_ERROR_UNSUPPORTED,
-                    "this build cannot read image files (no OpenImageIO): %s", desc->path);
-}
-#endif
+    struct trc_image *image; /* NULL before there is a size */
+};
 
-trc_status trc_image_load(const trc_image_desc *desc, struct trc_image **image_out) {
+static trc_status begin_file(void *context, const struct trc_file_info *info) {
+    struct file *file = context;
+    trc_image_release(file->image);
+    file->image = NULL;
+    file->info = *info;
+    return image_create(info->width, info->height, (enum trc_texel)info->format, file->desc,
+                        &file->image);
+}
+
+/* Files have the top row first. */
+static void take_rows(void *context, uint32_t first, uint32_t count, const void *pixels) {
+    const struct file *file = context;
+    const struct trc_image_level *level = &file->image->levels[0];
+    const enum trc_texel format = file->image->format;
+    const uint64_t texel = trc_texel_bytes(format), row = texel * level->width;
+    const uint64_t from = row / 4 * file->info.channels;
+    for (uint32_t i = 0; i < count; i++) {
+        char *to = (char *)level->texels + row * (level->height - 1 - first - i);
+        spread(format, (const char *)pixels + i * from, to, level->width, file->info.channels);
+    }
+}
+
+static trc_status load_file(const trc_image_desc *desc, const struct trc_image_source *source,
+                            struct trc_image **image_out) {
+    struct file file = {.desc = desc};
+    const struct trc_file_taker taker = {
+        .context = &file, .cancel = source->cancel, .begin = begin_file, .rows = take_rows};
+    trc_status status = trc_image_reader_read(source->reader, desc->path, &taker);
+    if (status == TRC_OK)
+        status = finish(file.image, desc, source, file.info.channels, file.info.is_unassociated);
+    if (status != TRC_OK) {
+        trc_image_release(file.image);
+        return status;
+    }
+    *image_out = file.image;
+    return TRC_OK;
+}
+
+trc_status trc_image_load(const trc_image_desc *desc, const struct trc_image_source *source,
+                          struct trc_image **image_out) {
     TRC_TRY(trc_check_struct(desc, sizeof *desc, "trc_image_desc"));
     TRC_TRY(trc_check_enum(desc->alpha_mode, TRC_ALPHA_NONE + 1, "alpha_mode"));
     if ((desc->path != NULL) == (desc->pixels != NULL)) {
@@ -386,7 +424,7 @@ trc_status trc_image_load(const trc_image_desc *desc, struct trc_image **image_o
                         "a colour space needs a configuration, and is not sRGB");
     }
     struct trc_image *image = NULL;
-    TRC_TRY(desc->path ? load_file(desc, &image) : load_pixels(desc, &image));
+    TRC_TRY(desc->path ? load_file(desc, source, &image) : load_pixels(desc, source, &image));
     trc_status status = limit_size(image, desc->max_side);
     if (status == TRC_OK && desc->is_mip_mapped)
         status = trc_image_make_levels(image);

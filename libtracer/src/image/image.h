@@ -12,6 +12,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "image/texel_format.h"
 #include "tracer/tracer.h"
 
 #define TRC_IMAGE_MAX_SIDE 65536u
@@ -20,14 +21,6 @@
 #define TRC_IMAGE_MAX_BYTES (((uint64_t)1 << 33) - 4)
 /* 65536 halved down to 1. */
 #define TRC_IMAGE_MAX_LEVELS 17
-
-/* How one texel is stored. */
-enum trc_texel {
-    TRC_TEXEL_U8,  /* 4 bytes, value / 255 */
-    TRC_TEXEL_U16, /* 8 bytes, value / 65535 */
-    TRC_TEXEL_F16, /* 8 bytes, finite */
-    TRC_TEXEL_F32  /* 16 bytes, finite */
-};
 
 struct trc_image_level {
     uint32_t width, height;
@@ -47,10 +40,25 @@ struct trc_image {
     uint64_t bad_texel_count; /* were NaN or infinite, and are 0 now: worth a warning */
 };
 
+struct trc_image_reader;
+
+/* Where images come from: reader reads files and converts colours; cancel is NULL, or not 0 to give
+ * up. */
+struct trc_image_source {
+    struct trc_image_reader *reader;
+    const atomic_uint *cancel;
+};
+
 /* Copies the pixels or reads the file of a descriptor, which is checked in full. INVALID_ARGUMENT,
  * STRUCT_SIZE, TOO_LARGE, OUT_OF_MEMORY, IMAGE (unreadable file, unknown colour space), UNSUPPORTED
- * (a path or a colour space in a build without OpenImageIO). One holder: the caller. */
-trc_status trc_image_load(const trc_image_desc *desc, struct trc_image **image_out);
+ * (a path or a colour space where no program reads them), CANCELLED. One holder: the caller. */
+trc_status trc_image_load(const trc_image_desc *desc, const struct trc_image_source *source,
+                          struct trc_image **image_out);
+
+/* TOO_LARGE for an image of such a size and enum trc_texel, with a message that names it. name: ""
+ * or the path of a file. */
+trc_status trc_image_check_size(uint32_t width, uint32_t height, uint32_t format,
+                                const char *name);
 
 /* A new image of half the size, of which the caller is the holder; whether it can be: a side of one
  * texel stays. OUT_OF_MEMORY. */

@@ -10,6 +10,7 @@
 #include "core/fpstate.h"
 #include "core/handle.h"
 #include "image/image.h"
+#include "image/reader.h"
 #include "scene/commit.h"
 #include "scene/mesh.h"
 #include "shading/compile.h"
@@ -26,6 +27,17 @@ static void init_stores(struct trc_scene_state *scene) {
     trc_store_init(&scene->materials, TRC_STORE_MATERIAL, false, seed);
     trc_store_init(&scene->images, TRC_STORE_IMAGE, true, seed);
     trc_store_init(&scene->lights, TRC_STORE_LIGHT, false, seed);
+}
+
+/* The reader of a handle, or one of the scene's own. */
+static trc_status take_reader(trc_reader handle, struct trc_image_reader **reader_out) {
+    if (!handle)
+        return trc_image_reader_create(NULL, reader_out);
+    void *object;
+    TRC_TRY(trc_handle_acquire(handle, TRC_HANDLE_READER, &object));
+    *reader_out = trc_image_reader_retain(object);
+    trc_handle_release(handle);
+    return TRC_OK;
 }
 
 trc_status trc_scene_state_create(const trc_scene_desc *desc, struct trc_scene_state **scene_out) {
@@ -49,6 +61,8 @@ trc_status trc_scene_state_create(const trc_scene_desc *desc, struct trc_scene_s
     init_stores(scene);
     scene->names = trc_names_create();
     trc_status status = scene->names ? trc_scene_make_default_material(scene) : no_memory();
+    if (status == TRC_OK)
+        status = take_reader(desc->reader, &scene->reader);
     if (status != TRC_OK) {
         trc_scene_state_destroy(scene);
         return status;
@@ -85,6 +99,7 @@ void trc_scene_state_destroy(struct trc_scene_state *scene) {
     destroy_all(&scene->images, destroy_image);
     trc_material_release(scene->default_material);
     trc_names_destroy(scene->names);
+    trc_image_reader_release(scene->reader);
     pthread_mutex_destroy(&scene->cancel_lock);
     pthread_mutex_destroy(&scene->lock);
     trc_free(scene);

@@ -12,7 +12,8 @@
 #include "scene/snapshot.h"
 #include "scene/store.h"
 
-struct trc_pool; /* threads/pool.h */
+struct trc_pool;         /* threads/pool.h */
+struct trc_image_reader; /* image/reader.h */
 
 /* What has changed since the last successful commit. */
 enum {
@@ -59,6 +60,7 @@ struct trc_scene_state {
     pthread_mutex_t cancel_lock;
     bool committing;    /* under cancel_lock */
     atomic_uint cancel; /* read by the workers of a commit */
+    struct trc_image_reader *reader; /* held */
     struct trc_names *names;
     struct trc_store meshes, instances, materials, images, lights;
     struct trc_material *default_material;
@@ -70,7 +72,7 @@ struct trc_scene_state {
     struct trc_rebuild *rebuild;   /* under way or ready to be taken, or NULL */
 };
 
-/* OUT_OF_MEMORY. */
+/* OUT_OF_MEMORY, INVALID_HANDLE. */
 trc_status trc_scene_state_create(const trc_scene_desc *desc, struct trc_scene_state **scene_out);
 /* Nobody else may use the scene any more. Snapshots live on with those who hold them. */
 void trc_scene_state_destroy(struct trc_scene_state *scene);

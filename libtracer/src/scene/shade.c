@@ -74,44 +74,84 @@ trc_status trc_scene_make_default_material(struct trc_scene_state *scene) {
     return compile(scene, &desc, &scene->default_material);
 }
 
-/* Halves the largest images until all fit, or none can be halved any more. */
+/* The image of a slot, as it will be: halved ones replace those that are there at the end. */
+static struct trc_image *fitted(const struct trc_store *images, struct trc_image *const *halves,
+                                uint32_t slot) {
+    return halves[slot] ? halves[slot] : images->slots[slot].object;
+}
+
+/* The slot of the largest image that can be halved, TRC_STORE_END if none can; what all take. */
+static uint32_t find_largest(const struct trc_store *images, struct trc_image *const *halves,
+                             uint64_t *bytes_out) {
+    uint32_t largest = TRC_STORE_END;
+    uint64_t bytes = 0, most = 0;
+    for (uint32_t i = trc_store_first(images); i != TRC_STORE_END; i = trc_store_next(images, i)) {
+        const struct trc_image *image = fitted(images, halves, i);
+        bytes += trc_image_bytes(image);
+        if (trc_image_can_halve(image) && trc_image_bytes(image) > most) {
+            largest = i;
+            most = trc_image_bytes(image);
+        }
+    }
+    *bytes_out = bytes;
+    return largest;
+}
+
+/* Halves the largest images until all fit, or none can be halved any more, into halves by slot. */
+static trc_status halve_images(const struct trc_store *images, uint64_t bytes_max,
+                               struct trc_image **halves) {
+    for (;;) {
+        uint64_t bytes;
+        const uint32_t largest = find_largest(images, halves, &bytes);
+        if (bytes <= bytes_max || largest == TRC_STORE_END)
+            return TRC_OK;
+        struct trc_image *half;
+        TRC_TRY(trc_image_halve(fitted(images, halves, largest), &half));
+        trc_image_release(halves[largest]);
+        halves[largest] = half;
+    }
+}
+
+/* Makes all images fit, or leaves all as they are. */
 static trc_status fit_images(struct trc_scene_state *scene) {
     struct trc_store *images = &scene->images;
-    while (scene->image_bytes_max) {
-        struct trc_store_slot *largest = NULL;
-        uint64_t bytes = 0;
-        for (uint32_t i = trc_store_first(images); i != TRC_STORE_END;
-             i = trc_store_next(images, i)) {
-            struct trc_store_slot *slot = &images->slots[i];
-            bytes += trc_image_bytes(slot->object);
-            if (trc_image_can_halve(slot->object) &&
-                (!largest || trc_image_bytes(slot->object) > trc_image_bytes(largest->object)))
-                largest = slot;
+    if (!scene->image_bytes_max)
+        return TRC_OK;
+    struct trc_image **halves = trc_alloc_zeroed(images->slot_count, sizeof *halves);
+    if (!halves)
+        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for smaller images");
+    const trc_status status = halve_images(images, scene->image_bytes_max, halves);
+    for (uint32_t i = 0; i < images->slot_count; i++) {
+        if (halves[i] && status == TRC_OK) {
+            trc_image_release(images->slots[i].object);
+            images->slots[i].object = halves[i];
+        } else {
+            trc_image_release(halves[i]);
         }
-        if (bytes <= scene->image_bytes_max || !largest)
-            break;
-        struct trc_image *half;
-        TRC_TRY(trc_image_halve(largest->object, &half));
-        trc_image_release(largest->object);
-        largest->object = half;
     }
-    return TRC_OK;
+    trc_free(halves);
+    return status;
 }
 
 trc_status trc_scene_add_image(struct trc_scene_state *scene, const trc_image_desc *desc,
                                trc_id *id) {
     struct trc_image *image;
-    TRC_TRY(trc_image_load(desc, &image));
-    const trc_status status = trc_store_add(&scene->images, image, id);
+    const struct trc_image_source source = {.reader = scene->reader};
+    TRC_TRY(trc_image_load(desc, &source, &image));
+    trc_id added;
+    const trc_status status = trc_store_add(&scene->images, image, &added);
     if (status != TRC_OK) {
         trc_image_release(image);
         return status;
     }
-    scene->changed |= TRC_CHANGED_IMAGES;
     const trc_status fit = fit_images(scene);
-    if (fit != TRC_OK)
-        (void)trc_scene_remove_image(scene, *id);
-    return fit;
+    if (fit != TRC_OK) {
+        (void)trc_scene_remove_image(scene, added);
+        return fit;
+    }
+    scene->changed |= TRC_CHANGED_IMAGES;
+    *id = added;
+    return TRC_OK;
 }
 
 trc_status trc_scene_remove_image(struct trc_scene_state *scene, trc_id id) {

@@ -1,0 +1,48 @@
+// The program that reads images for the library: nothing else links OpenImageIO. It is started with
+// a stream to the library and makes processes, each of which serves requests (image/protocol.h) one
+// by one until it is ended, by whatever.
+#include <algorithm>
+#include <string>
+#include <thread>
+
+#include <OpenImageIO/imageio.h>
+
+#include "colors.h"
+#include "files.h"
+#include "reply.h"
+#include "system.h"
+
+namespace {
+
+// Blocks of an EXR file that are decoded at once: more than a slot holds are of no use.
+const int max_threads = 8;
+
+void serve(connection *to) {
+    try {
+        Colors colors;
+        trc_reader_request request;
+        while (connection_receive(to, &request, sizeof request, true) &&
+               request.magic == TRC_READER_MAGIC) {
+            if (request.kind == TRC_READER_FILE)
+                serve_file(*to, request);
+            else if (request.kind == TRC_READER_COLORS)
+                colors.serve_space(*to, request);
+            else if (request.kind == TRC_READER_APPLY)
+                colors.serve_apply(*to, request);
+        }
+    } catch (const Gone &) {
+    }
+}
+
+} // namespace
+
+int main() {
+    system_prepare();
+    // Several files are read at once by several processes, which need no threads for that.
+    OIIO::attribute("threads", 1);
+    const int processors = int(std::thread::hardware_concurrency());
+    OIIO::attribute("exr_threads", std::max(1, std::min(processors, max_threads)));
+    // All that does not depend on a file is done before processes are made.
+    (void)OIIO::get_string_attribute("input_format_list");
+    return system_launch(serve);
+}
