@@ -33,9 +33,11 @@ ERROR_OUT_OF_MEMORY = 5
 ERROR_CANCELLED = 8
 ERROR_UNSUPPORTED = 9
 ERROR_IMAGE = 10
+ERROR_FORMAT = 11
 STATUS_NAMES = (
     "ok", "invalid argument", "invalid handle", "wrong structure size", "too large", "out of memory",
-    "no thread", "scene not committed", "cancelled", "not supported by this build", "unreadable image")
+    "no thread", "scene not committed", "cancelled", "not supported by this build", "unreadable image",
+    "unknown image format")
 
 NORMALS_NONE, NORMALS_VERTEX, NORMALS_CORNER = 0, 1, 2
 
@@ -159,7 +161,11 @@ class _ImageDesc(_Struct):
 
 class _SceneDesc(_Struct):
     _fields_ = [("struct_size", _u32), ("thread_count", _u32), ("is_final", _u32),
-                ("image_megabytes", _u32)]
+                ("image_megabytes", _u32), ("reader", _u64)]
+
+
+class _ReaderDesc(_Struct):
+    _fields_ = [("struct_size", _u32), ("reserved", _u32), ("program", _str)]
 
 
 class _SceneStats(_Struct):
@@ -207,6 +213,7 @@ _STRUCTS = {
     "trc_instance_desc": _InstanceDesc, "trc_light_desc": _LightDesc, "trc_world_desc": _WorldDesc,
     "trc_camera_desc": _CameraDesc, "trc_node_input": _NodeInput, "trc_node": _Node,
     "trc_material_desc": _MaterialDesc, "trc_image_desc": _ImageDesc, "trc_scene_desc": _SceneDesc,
+    "trc_reader_desc": _ReaderDesc,
     "trc_scene_stats": _SceneStats, "trc_render_desc": _RenderDesc,
     "trc_render_progress": _RenderProgress}
 
@@ -214,6 +221,8 @@ _FUNCTIONS = {  # name: (result, arguments); a status result is checked by _call
     "trc_version_string": (_str, ()), "trc_last_message": (_str, ()), "trc_isa": (_u32, ()),
     "trc_isa_name": (_str, (_u32,)), "trc_pass_channels": (_u32, (_u32,)),
     "trc_cryptomatte_id": (_f32, (_str,)),
+    "trc_reader_create": (_i32, (_ptr, _ptr)), "trc_reader_start": (_i32, (_u64,)),
+    "trc_reader_destroy": (_i32, (_u64,)),
     "trc_scene_create": (_i32, (_ptr, _ptr)), "trc_scene_destroy": (_i32, (_u64,)),
     "trc_scene_commit": (_i32, (_u64,)), "trc_scene_cancel": (_i32, (_u64,)),
     "trc_scene_get_stats": (_i32, (_u64, _ptr)),
@@ -246,6 +255,7 @@ class TracerError(Exception):
 
 _library = None
 _load_error = "libtracer has not been loaded"
+_reader = 0  # of image files, for all scenes: its program is started once and not for each frame
 
 
 def library_path():
@@ -256,7 +266,7 @@ def library_path():
 
 def load(path=None):
     """Load the library; True on success. On failure ``load_error()`` says why, nothing is raised."""
-    global _library, _load_error
+    global _library, _load_error, _reader
     if _library is not None:
         return True
     path = path or library_path()
@@ -270,14 +280,40 @@ def load(path=None):
         _load_error = f"libtracer cannot be used ({path}): {error}"
         return False
     _library, _load_error = library, ""
+    try:
+        _reader = _create_reader()
+    except TracerError:  # out of memory: each scene has one of its own
+        _reader = 0
     return True
+
+
+def _create_reader():
+    """A reader of image files. What unpacks an archive may have made its program a plain file."""
+    program = os.path.join(os.path.dirname(library_path()), "tracer_reader")
+    if os.path.isfile(program) and not os.access(program, os.X_OK):
+        try:
+            os.chmod(program, os.stat(program).st_mode | 0o111)
+        except OSError:
+            pass  # the library says that it cannot be started
+    handle, desc = _u64(), _ReaderDesc()
+    _call("trc_reader_create", ctypes.byref(desc), ctypes.byref(handle))
+    return handle.value
+
+
+def start_reader():
+    """Let the program that reads image files load its libraries while others work. Returns at once."""
+    if _reader:
+        _call("trc_reader_start", _reader)
 
 
 def unload():
     """Forget the library; on Windows also free the file, which could not be replaced otherwise."""
-    global _library, _load_error
+    global _library, _load_error, _reader
     library, _library = _library, None
+    reader, _reader = _reader, 0
     _load_error = "libtracer has been unloaded"
+    if library is not None and reader:
+        library.trc_reader_destroy(reader)
     if library is not None and sys.platform == "win32":
         import _ctypes
         _ctypes.FreeLibrary(library._handle)
@@ -363,7 +399,7 @@ class Scene:
     def __init__(self, is_final=True, thread_count=0, image_megabytes=0):
         handle = _u64()
         desc = _SceneDesc(thread_count=thread_count, is_final=int(is_final),
-                          image_megabytes=image_megabytes)
+                          image_megabytes=image_megabytes, reader=_reader)
         _call("trc_scene_create", ctypes.byref(desc), ctypes.byref(handle))
         self._handle = handle.value
         self.revision = 0  # rises with every edit: equal numbers mean nothing to commit
@@ -538,8 +574,8 @@ class Scene:
         """An image from a file (absolute path) or from pixels (height, width, 4), float32 or uint8,
         bottom row first; color_space: a configuration of OpenColorIO and a name in it; max_side: pixels,
         to which a larger one is halved, 0 for none; is_mip_mapped: with smaller levels for minification."""
-        config, space = map(_text, color_space)
-        desc = _ImageDesc(alpha_mode=alpha_mode, is_srgb=int(is_srgb), path=_text(path),
+        config, space = color_space[0] and os.fsencode(color_space[0]), _text(color_space[1])
+        desc = _ImageDesc(alpha_mode=alpha_mode, is_srgb=int(is_srgb), path=path and os.fsencode(path),
                           color_config=config, color_space=space, max_side=max_side,
                           is_mip_mapped=int(is_mip_mapped))
         if pixels is not None:

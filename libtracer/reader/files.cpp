@@ -83,7 +83,7 @@ std::unique_ptr<OIIO::ImageInput> open_input(const char *path) {
     config.attribute("oiio:UnassociatedAlpha", 1);
     std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create(path, false, &config);
     if (!input)
-        throw Failure(TRC_ERROR_UNSUPPORTED, OIIO::geterror());
+        throw Failure(TRC_ERROR_FORMAT, OIIO::geterror());
     if (input->open(path, spec, config))
         return input;
     const std::string reason = input->geterror();

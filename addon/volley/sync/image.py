@@ -2,7 +2,8 @@
 """Images: files by their path, everything else by its pixels.
 
 Plain and packed files are read by the library itself. Generated, painted and movie images, and files
-the library cannot read, come from Blender's pixels. A missing image is 0, which renders magenta.
+in formats that the library does not know, come from Blender's pixels. An image that is missing, damaged,
+too large or whatever else is 0, which renders magenta, with one warning; it never costs the render.
 Colours are converted to scene-linear ones by the library, with Blender's OpenColorIO configuration.
 """
 
@@ -21,7 +22,7 @@ from ..compat import cycles
 _ALPHA_MODES = {'STRAIGHT': native.ALPHA_STRAIGHT, 'PREMUL': native.ALPHA_PREMULTIPLIED,
                 'CHANNEL_PACKED': native.ALPHA_CHANNEL_PACKED, 'NONE': native.ALPHA_NONE}
 _ANIMATED_SOURCES = {'SEQUENCE', 'MOVIE'}
-_CANNOT = (native.ERROR_UNSUPPORTED, native.ERROR_IMAGE)
+_MAX_NUMBERS = (1 << 31) - 1  # of pixels that Blender's Python can count
 
 _FIRST_TILE, _TILES_PER_ROW = 1001, 10  # UDIM
 
@@ -117,26 +118,31 @@ class Images:
 
     def _create(self, image, path, is_mip_mapped):
         values = {"max_side": self._limit, "is_mip_mapped": is_mip_mapped}
-        created = 0
-        if path:
-            created = self._from_file(image, path, values)
-        elif _is_packed(image):
-            with tempfile.TemporaryDirectory() as folder:
-                path = os.path.join(folder, os.path.basename(image.filepath) or image.name)
-                with open(path, "wb") as file:
-                    file.write(image.packed_file.data)
-                created = self._from_file(image, path, values)
-        return created or self._from_pixels(image, values)
+        try:
+            if path:
+                return self._from_file(image, path, values)
+            if _is_packed(image):
+                with tempfile.TemporaryDirectory() as folder:
+                    path = os.path.join(folder, os.path.basename(image.filepath) or image.name)
+                    with open(path, "wb") as file:
+                        file.write(image.packed_file.data)
+                    return self._from_file(image, path, values)
+            return self._from_pixels(image, values)
+        except (native.TracerError, OSError, MemoryError) as error:
+            self._warnings.add(f"Image '{image.name}': {error or 'no memory'}; magenta is used")
+            return 0
 
     def _from_file(self, image, path, values):
-        """The image as the library reads it, 0 where it cannot."""
+        """The image as the library reads it, or as Blender does where the library cannot."""
+        values = dict(values, alpha_mode=_alpha_mode(image))
         try:
-            return self._scene.create_image(
-                path=path, alpha_mode=_alpha_mode(image), **_encoding(image), **values)
+            return self._in_its_space(image, dict(values, path=path))
         except native.TracerError as error:
-            if error.status not in _CANNOT:
+            if error.status == native.ERROR_UNSUPPORTED:
+                self._warnings.add(f"{error}; Blender reads them")
+            elif error.status != native.ERROR_FORMAT:
                 raise
-            return 0
+        return self._from_pixels(image, values)
 
     def _from_pixels(self, image, values):
         pixels = read_pixels(image)
@@ -144,14 +150,25 @@ class Images:
             self._warnings.add(f"Image '{image.name}': cannot be read, magenta is used")
             return 0
         values = dict(values, pixels=pixels, alpha_mode=_pixel_alpha_mode(image))
+        return self._scene.create_image(**values) if image.is_float else self._in_its_space(image, values)
+
+    def _in_its_space(self, image, values):
+        """The image with its colours converted, as sRGB where that cannot be."""
+        encoding = _encoding(image)
         try:
-            return self._scene.create_image(**values, **({} if image.is_float else _encoding(image)))
+            return self._scene.create_image(**values, **encoding)
         except native.TracerError as error:
-            if error.status not in _CANNOT:
+            cannot = error.status in (native.ERROR_IMAGE, native.ERROR_UNSUPPORTED)
+            if not cannot or "color_space" not in encoding:
                 raise
-            self._warnings.add(f"Image '{image.name}': colour space {image.colorspace_settings.name} "
-                               "cannot be converted, sRGB is used")
-            return self._scene.create_image(**values, is_srgb=True)
+            failure = error
+        try:
+            created = self._scene.create_image(**values, is_srgb=True)
+        except native.TracerError:
+            raise failure from None  # of the file itself
+        self._warnings.add(f"Image '{image.name}': colour space {image.colorspace_settings.name} "
+                           "cannot be converted, sRGB is used")
+        return created
 
 
 def size_limit(scene, is_final):
@@ -164,7 +181,7 @@ def read_pixels(image):
     """An image's pixels from Blender, (height, width, 4) float32, or uint8 for an 8-bit image, bottom
     row first; None when it has none. Bytes are in the image's own colour space, floats are linear."""
     width, height = image.size
-    if width == 0 or height == 0 or image.channels == 0:
+    if not 0 < width * height * image.channels <= _MAX_NUMBERS:  # Blender raises a SystemError above
         return None
     pixels = np.empty(len(image.pixels), np.float32)
     image.pixels.foreach_get(pixels)
@@ -273,7 +290,10 @@ def _signature(image, path):
     """Equal while the image's pixels and their meaning are."""
     meaning = (image.colorspace_settings.name, image.alpha_mode, path)
     if path:
-        status = os.stat(path)
+        try:
+            status = os.stat(path)
+        except OSError:  # gone since
+            return meaning + (None,)
         return meaning + (status.st_mtime_ns, status.st_size)
     if _is_packed(image):
         return meaning + (zlib.crc32(image.packed_file.data),)

@@ -48,7 +48,8 @@ enum {
     TRC_ERROR_NOT_COMMITTED = 7, /* the scene has no committed snapshot yet */
     TRC_ERROR_CANCELLED = 8,
     TRC_ERROR_UNSUPPORTED = 9, /* this build or this CPU cannot do it */
-    TRC_ERROR_IMAGE = 10       /* an image file is missing, damaged or too large */
+    TRC_ERROR_IMAGE = 10,      /* an image file is missing or damaged */
+    TRC_ERROR_FORMAT = 11      /* an image file is in no format that can be read */
 };
 
 /* Generation-checked names of objects. 0 is never a valid one. A scene, render or reader handle is

@@ -57,7 +57,7 @@ struct trc_reader_answer {
     uint32_t width, height, channels, format, is_unassociated;
     uint32_t slot, row_count; /* ROWS: without gaps from the start of a slot */
     uint32_t is_identity;     /* DONE after COLORS: the transform changes nothing */
-    int32_t status;           /* FAILED: IMAGE, OUT_OF_MEMORY, TOO_LARGE or UNSUPPORTED */
+    int32_t status;           /* FAILED: IMAGE, FORMAT, OUT_OF_MEMORY or TOO_LARGE */
     char text[TRC_READER_TEXT_BYTES]; /* FAILED: the reason, UTF-8, terminated */
 };
 

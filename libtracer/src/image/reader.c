@@ -235,7 +235,7 @@ static trc_status fail_answer(struct call *call, struct trc_reader_answer *answe
     case TRC_ERROR_IMAGE:
     case TRC_ERROR_TOO_LARGE:
     case TRC_ERROR_OUT_OF_MEMORY:
-    case TRC_ERROR_UNSUPPORTED:
+    case TRC_ERROR_FORMAT:
         clean_text(answer->text, sizeof answer->text);
         return trc_fail(answer->status, "%s %s: %s", call->task, call->object, answer->text);
     default:

@@ -51,9 +51,9 @@ struct trc_file_taker {
 };
 
 /* Reads the first picture of a file. IMAGE with the reason for a file that cannot be read, whatever
- * it did; TOO_LARGE, also for one that is small and claims to be huge; OUT_OF_MEMORY; UNSUPPORTED
- * for a file that is in no known format, and where there is no program that reads images or it does
- * not run; CANCELLED; what begin returns. */
+ * it did; TOO_LARGE, also for one that is small and claims to be huge; OUT_OF_MEMORY; FORMAT for
+ * a file in no known format; UNSUPPORTED where there is no program that reads images or it does not
+ * run; CANCELLED; what begin returns. */
 trc_status trc_image_reader_read(struct trc_image_reader *reader, const char *path,
                                  const struct trc_file_taker *taker);
 
