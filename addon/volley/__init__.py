@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Volley: packet-based Whitted and distribution ray tracing for Blender. Registration only."""
 
+import sys
+
 bl_info = {
     "name": "Volley",
     "author": "The Volley authors",
@@ -12,23 +14,31 @@ bl_info = {
 }
 
 
-def _modules():
-    """The modules that register something, in order."""
-    from . import engine, log, preferences, properties, ui
-    return log, preferences, properties, engine, ui
+
+def _forget_submodules():
+    """Have the modules of this package imported anew. Where a newer version is installed in a running
+    Blender, it reloads this file alone."""
+    for name in [name for name in sys.modules if name.startswith(f"{__name__}.")]:
+        del sys.modules[name]
+        globals().pop(name[len(__name__) + 1:], None)
+
+
+_forget_submodules()
+_registered = globals().get("_registered", [])  # modules, in order; kept where this file is reloaded
 
 
 def register():
     """Load the native library and register everything; a load error is shown in the preferences."""
-    from . import native
+    from . import engine, log, native, preferences, properties, ui
     native.load()
-    for module in _modules():
+    for module in (log, preferences, properties, engine, ui):
         module.register()
+        _registered.append(module)
 
 
 def unregister():
-    """The reverse, so that the library's file can be replaced."""
+    """The reverse, so that the files can be replaced."""
+    while _registered:
+        _registered.pop().unregister()
     from . import native
-    for module in reversed(_modules()):
-        module.unregister()
     native.unload()

@@ -5,9 +5,11 @@ import traceback
 
 import bpy
 
-from . import native, passes, viewport, writes
+from . import jobs, native, passes, viewport, writes
 from .log import logger
 from .session import Session
+
+_RETRY_SECONDS = 0.5  # between two attempts to unregister during a render that cannot be waited for
 
 
 class VolleyRenderEngine(bpy.types.RenderEngine):
@@ -31,6 +33,7 @@ class VolleyRenderEngine(bpy.types.RenderEngine):
         self._viewport = None
 
     def __del__(self):
+        jobs.forget(self)
         self._free()
         parent_del = getattr(super(), "__del__", None)
         if parent_del is not None:
@@ -39,28 +42,38 @@ class VolleyRenderEngine(bpy.types.RenderEngine):
     # Final renders and previews
 
     def update(self, data, depsgraph):
-        """Nothing to do before render(): everything is read there, under one roof."""
+        """Everything is read in render(), under one roof; but a job has begun."""
+        with jobs.call(self, is_final=not self.is_preview):
+            pass
 
     def render(self, depsgraph):
         """Render one view layer of the depsgraph's scene."""
         if self._session is None:
             self._session = Session()
-        with writes.render_call():
-            self._guard(self._session.render, self, depsgraph)
+        with jobs.call(self, is_final=not self.is_preview), writes.render_call():
+            if not jobs.refusal():
+                self._guard(self._session.render, self, depsgraph)
+            if jobs.refusal():
+                self._fail(jobs.refusal())
 
     def update_render_passes(self, scene=None, renderlayer=None):
         """Name the passes of a view layer, for the compositor."""
-        passes.register_passes(self, scene, renderlayer)
+        with jobs.call(self, is_final=False):
+            passes.register_passes(self, scene, renderlayer)
 
     # Viewport
 
     def view_update(self, context, depsgraph):
         """The scene changed."""
+        if jobs.refusal():
+            return
         with writes.draw_call(viewport.redraw):
             self._guard(self._get_viewport().update, self, context, depsgraph)
 
     def view_draw(self, context, depsgraph):
         """Draw what there is."""
+        if jobs.refusal():
+            return
         with writes.draw_call(viewport.redraw):
             self._guard(self._get_viewport().draw, self, context, depsgraph)
 
@@ -72,7 +85,8 @@ class VolleyRenderEngine(bpy.types.RenderEngine):
     # Errors
 
     def _guard(self, function, *arguments):
-        """Run a call; whatever goes wrong becomes Blender's error message."""
+        """Run a call; whatever goes wrong becomes Blender's error message, unless Blender has freed the
+        engine meanwhile."""
         try:
             function(*arguments)
         except native.TracerError as error:
@@ -81,7 +95,10 @@ class VolleyRenderEngine(bpy.types.RenderEngine):
             self._fail("out of memory")
         except Exception as error:  # a defect of ours must not take Blender's render job down
             logger.debug("%s", traceback.format_exc())
-            self._fail(f"internal error: {type(error).__name__}: {error}")
+            if self._is_gone():
+                self._free()
+                return
+            self._fail(jobs.refusal() or f"internal error: {type(error).__name__}: {error}")
 
     def _fail(self, message):
         self._free()
@@ -90,6 +107,13 @@ class VolleyRenderEngine(bpy.types.RenderEngine):
         if bpy.app.background:
             logger.error(message)
 
+    def _is_gone(self):
+        """Whether Blender has freed what this object stands for."""
+        try:
+            return self.is_preview is None
+        except ReferenceError:
+            return True
+
     def _free(self):
         # Instances that Blender only asked for passes, or whose __init__ it skipped, have nothing.
         for name in ("_session", "_viewport"):
@@ -97,10 +121,42 @@ class VolleyRenderEngine(bpy.types.RenderEngine):
             if state is not None:
                 state.free()
 
+    # Life of the class
+
+    @classmethod
+    def leave(cls, seconds=jobs.LONGEST_SECONDS):
+        """Have Blender forget the class; whether it did. Not while a render uses it that does not end
+        within the time, such as one that this is called by: then nothing is rendered any more."""
+        if not jobs.end(seconds):
+            return False
+        bpy.utils.unregister_class(cls)
+        return True
+
+
+def _registered():
+    """The class of this engine that Blender knows, which may be of modules reloaded since, or None."""
+    return next((cls for cls in bpy.types.RenderEngine.__subclasses__()
+                 if cls.__name__ == VolleyRenderEngine.__name__ and "bl_rna" in vars(cls)), None)
+
+
+def _leave_later():
+    if not VolleyRenderEngine.leave(0.0):
+        return _RETRY_SECONDS
+    native.unload()
+    return None
+
 
 def register():
-    bpy.utils.register_class(VolleyRenderEngine)
+    if bpy.app.timers.is_registered(_leave_later):
+        bpy.app.timers.unregister(_leave_later)
+    before = _registered()
+    if before not in (None, VolleyRenderEngine) and not before.leave():
+        raise RuntimeError("a render of Volley is under way: enable the add-on when it has ended")
+    jobs.allow()
+    if before is not VolleyRenderEngine:
+        bpy.utils.register_class(VolleyRenderEngine)
 
 
 def unregister():
-    bpy.utils.unregister_class(VolleyRenderEngine)
+    if not VolleyRenderEngine.leave():
+        bpy.app.timers.register(_leave_later, first_interval=_RETRY_SECONDS, persistent=True)

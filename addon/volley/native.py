@@ -256,6 +256,7 @@ class TracerError(Exception):
 _library = None
 _load_error = "libtracer has not been loaded"
 _reader = 0  # of image files, for all scenes: its program is started once and not for each frame
+_owners = set()  # ids of the Scenes and Renders whose handles are alive
 
 
 def library_path():
@@ -307,16 +308,18 @@ def start_reader():
 
 
 def unload():
-    """Forget the library; on Windows also free the file, which could not be replaced otherwise."""
+    """Free the library, so that its file can be replaced and loaded anew. It stays while a handle is alive,
+    as its threads may be at work."""
     global _library, _load_error, _reader
-    library, _library = _library, None
-    reader, _reader = _reader, 0
+    if _library is None or _owners:
+        return
+    if _reader:
+        _library.trc_reader_destroy(_reader)
+        _reader = 0
+    handle, _library = _library._handle, None
     _load_error = "libtracer has been unloaded"
-    if library is not None and reader:
-        library.trc_reader_destroy(reader)
-    if library is not None and sys.platform == "win32":
-        import _ctypes
-        _ctypes.FreeLibrary(library._handle)
+    import _ctypes
+    (_ctypes.FreeLibrary if sys.platform == "win32" else _ctypes.dlclose)(handle)
 
 
 def load_error():
@@ -402,13 +405,15 @@ class Scene:
                           image_megabytes=image_megabytes, reader=_reader)
         _call("trc_scene_create", ctypes.byref(desc), ctypes.byref(handle))
         self._handle = handle.value
+        _owners.add(id(self))
         self.revision = 0  # rises with every edit: equal numbers mean nothing to commit
 
     def destroy(self):
         """Free everything; renders already started are not disturbed. May be called twice."""
         handle, self._handle = self._handle, 0
-        if handle and _library is not None:
+        if handle:
             _library.trc_scene_destroy(handle)
+            _owners.discard(id(self))
 
     def commit(self):
         """Build what changed and publish it to renders started afterwards."""
@@ -612,6 +617,7 @@ class Render:
 
     def __init__(self, handle, size):
         self._handle = handle
+        _owners.add(id(self))
         self.size = size
 
     def poll(self):
@@ -637,5 +643,6 @@ class Render:
     def destroy(self):
         """Cancel, wait and free. May be called twice."""
         handle, self._handle = self._handle, 0
-        if handle and _library is not None:
+        if handle:
             _library.trc_render_destroy(handle)
+            _owners.discard(id(self))

@@ -5,12 +5,12 @@ Nothing of Blender is kept between calls. With persistent data the library's sce
 frame sends only what differs.
 """
 
-import threading
 import time
 
 import bpy
 
-from . import cryptomatte, native, passes
+from . import cryptomatte, jobs, native, passes
+from .commit import Commit
 from .compat import motion_position
 from .log import logger
 from .sync import Cancelled, SceneSync, Source, camera, motion, world
@@ -96,7 +96,8 @@ class Session:
         engine.update_stats("", "Synchronizing")
         scene = depsgraph.scene_eval
         now = motion.split_frame(scene.frame_current_final)
-        source = Source(depsgraph, Changes.everything(), engine=engine, is_cancelled=engine.test_break,
+        source = Source(depsgraph, Changes.everything(), engine=engine,
+                        is_cancelled=lambda: jobs.is_cancelled(engine),
                         needs_uv=depsgraph.view_layer_eval.use_pass_uv,
                         aovs=passes.aov_numbers(depsgraph.view_layer_eval),
                         light_groups=passes.light_group_numbers(depsgraph.view_layer_eval))
@@ -115,26 +116,14 @@ class Session:
     def _commit(self, engine):
         """Build on another thread, so that Esc is heard meanwhile."""
         engine.update_stats("", "Building")
-        failure = []
-
-        def work():
-            try:
-                self._sync.scene.commit()
-            except native.TracerError as error:
-                failure.append(error)
-
-        worker = threading.Thread(target=work, name="volley commit")
-        worker.start()
-        cancelled = False
-        while worker.is_alive():
-            worker.join(POLL_SECONDS)
-            if not cancelled and engine.test_break():
-                cancelled = True
-                self._sync.scene.cancel()
-        if cancelled or (failure and failure[0].status == native.ERROR_CANCELLED):
-            raise Cancelled()
-        if failure:
-            raise failure[0]
+        commit = Commit(self._sync.scene)
+        try:
+            while not commit.is_done(POLL_SECONDS):
+                if jobs.is_cancelled(engine):
+                    raise Cancelled()
+        finally:
+            commit.cancel()
+        commit.check()
 
     def _report_warnings(self, engine):
         for message in self._sync.warnings.take() + self._sync.scene.warnings():
@@ -194,7 +183,7 @@ class _Run:
         try:
             while not is_done:
                 render.wait(POLL_SECONDS)
-                if engine.test_break():
+                if jobs.is_cancelled(engine):
                     render.cancel()
                     render.wait(-1.0)
                 progress = render.poll()

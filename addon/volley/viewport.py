@@ -10,7 +10,6 @@ no other waits. The film is drawn as a scene-linear texture, which Blender turns
 """
 
 import math
-import threading
 import time
 
 import bpy
@@ -19,6 +18,7 @@ import numpy as np
 from gpu_extras.presets import draw_texture_2d
 
 from . import native, passes, writes
+from .commit import Commit
 from .session import render_fields, status_text, thread_count
 from .sync import SceneSync, Source, camera
 from .sync.changes import Changes
@@ -40,7 +40,7 @@ class Viewport:
         self._sync = None
         self._changes = Changes.everything()  # not yet copied
         self._visibility = None  # what of the view decides which objects it shows
-        self._build = None
+        self._commit = None
         self._built_revision = -1
         self._pictures = _Pictures()
         self._reported = set()   # warnings are shown once, not at every edit
@@ -51,10 +51,10 @@ class Viewport:
         self._is_freed = True
         self._changes, self._built_revision = Changes.everything(), -1
         self._pictures.stop()
-        build, self._build = self._build, None
+        commit, self._commit = self._commit, None
         sync, self._sync = self._sync, None
-        if build is not None:
-            build.cancel()
+        if commit is not None:
+            commit.cancel()
         if sync is not None:
             sync.destroy()
 
@@ -84,7 +84,7 @@ class Viewport:
 
     def _synchronise(self, engine, context, depsgraph, may_wait):
         """Bring the library's scene up to date; whether it is."""
-        if self._build is not None and not self._end_build(NAP_SECONDS if may_wait else 0.0):
+        if self._commit is not None and not self._end_commit(NAP_SECONDS if may_wait else 0.0):
             return False
         if self._sync is None:
             scene = depsgraph.scene_eval
@@ -105,17 +105,16 @@ class Viewport:
         if self._sync.scene.revision == self._built_revision:
             return True
         self._pictures.stop()
-        self._build = _Build(self._sync.scene)
-        return self._end_build(FRAME_SECONDS if may_wait else 0.0)
+        self._commit = Commit(self._sync.scene)
+        return self._end_commit(FRAME_SECONDS if may_wait else 0.0)
 
-    def _end_build(self, seconds):
-        """Note a build that has ended, after waiting for it that long; False while it runs."""
-        if not self._build.is_done(seconds):
+    def _end_commit(self, seconds):
+        """Note a commit that has ended, after waiting for it that long; False while it runs."""
+        if not self._commit.is_done(seconds):
             return False
-        build, self._build = self._build, None
-        if build.failure is not None:
-            raise build.failure
-        self._built_revision = build.revision
+        commit, self._commit = self._commit, None
+        commit.check()
+        self._built_revision = commit.revision
         return True
 
     def _report(self, engine, messages):
@@ -138,32 +137,6 @@ def redraw():
         for area in window.screen.areas:
             if area.type == 'VIEW_3D' and area.spaces.active.shading.type == 'RENDERED':
                 area.tag_redraw()
-
-
-class _Build:
-    """A commit on another thread, so that Blender goes on meanwhile."""
-
-    def __init__(self, scene):
-        self._scene = scene
-        self.revision, self.failure = scene.revision, None
-        self._thread = threading.Thread(target=self._work, name="volley commit")
-        self._thread.start()
-
-    def _work(self):
-        try:
-            self._scene.commit()
-        except native.TracerError as error:
-            self.failure = error
-
-    def is_done(self, seconds):
-        """Whether it has ended, after waiting for it that long."""
-        self._thread.join(seconds)
-        return not self._thread.is_alive()
-
-    def cancel(self):
-        """Stop it and wait; it looks often."""
-        while not self.is_done(NAP_SECONDS):
-            self._scene.cancel()
 
 
 class _Pictures:
