@@ -288,7 +288,7 @@ def inside_generated():
     pairs = {"posed": _both(FILM_SAMPLES)}
     depsgraph = bpy.context.evaluated_depsgraph_get()
     evaluated = column.evaluated_get(depsgraph)
-    viewport = mesh.generated_coordinates(evaluated, mesh.read_positions(evaluated.data))
+    viewport = mesh.generated_coordinates(evaluated, evaluated.data, mesh.read_positions(evaluated.data))
     column.data.use_auto_texspace = False
     column.data.texspace_size = (0.5, 1.0, 3.0)
     pairs["own space"] = _both(FILM_SAMPLES)

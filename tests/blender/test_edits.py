@@ -4,64 +4,17 @@
 import pytest
 
 
-class _Follower:
-    """Follows the scene as a viewport does, by the depsgraph's updates."""
-
-    def __init__(self):
-        import bpy
-        from volley.sync import SceneSync
-        from volley.sync.changes import Changes
-        self._sync = SceneSync(is_final=False, thread_count=0, will_resync=True)
-        self._changes = Changes.everything()
-        bpy.app.handlers.depsgraph_update_post.append(self._mark)
-        bpy.app.handlers.frame_change_post.append(self._mark)
-
-    def _mark(self, _scene, depsgraph):
-        from volley.sync.changes import Changes
-        self._changes.merge(Changes.of_depsgraph(depsgraph))
-
-    def picture(self):
-        from volley.sync.changes import Changes
-        changes, self._changes = self._changes, Changes()
-        return _picture(self._sync, changes)
-
-
-def _picture(sync, changes):
-    """Bring a sync up to date and render what it holds."""
-    import bpy
-    from volley import passes
-    from volley.session import render_fields
-    from volley.sync import Source, camera
-    from volley.sync.matrix import rows12
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    if changes.any():
-        sync.update(Source(depsgraph, changes))
-    scene = depsgraph.scene_eval
-    frame = camera.frame_of(scene.render)
-    lens = camera.lens_of(scene.camera, sync.warnings)
-    sync.set_camera(camera.CameraKeys(lens, [rows12(scene.camera.matrix_world)],
-                                      [camera.window(lens, frame)]))
-    sync.scene.commit()
-    crop = (0, 0, frame.width, frame.height)
-    fields = render_fields(scene, frame, crop, [passes.COMBINED])
-    fields.update(sample_count=8)
-    render = sync.scene.start_render(**fields)
-    render.wait(-1.0)
-    pixels = passes.read_combined(render)
-    render.destroy()
-    return pixels
-
-
 def inside_random_edits(seed, count):
     import random
     import bpy
     import edits
     import numpy as np
+    from follower import Follower, picture
     from volley.sync import SceneSync
     from volley.sync.changes import Changes
     edits.make_scene()
     random = random.Random(seed)
-    follower = _Follower()
+    follower = Follower()
     follower.picture()
     worst, former, changed_count = [], None, 0
     for number in range(count):
@@ -72,7 +25,7 @@ def inside_random_edits(seed, count):
             continue
         followed = follower.picture()
         fresh_sync = SceneSync(is_final=False, thread_count=0, will_resync=False)
-        fresh = _picture(fresh_sync, Changes.everything())
+        fresh = picture(fresh_sync, Changes.everything())
         fresh_sync.destroy()
         changed_count += former is None or not np.array_equal(former, fresh)
         former = fresh

@@ -135,12 +135,13 @@ class SceneSync:
         if shown.users[known.mesh_key] != 1:
             return False
         changes, blender_object = source.changes, each.object
-        data, pointer = blender_object.data, blender_object.data.as_pointer()
+        pointer = blender_object.data.as_pointer()
         if known.owner not in changes.topology and mesh.is_posable(blender_object):
             is_known = mesh.keeps_topology(blender_object) \
                 and blender_object.original.data.name_full not in changes.meshes
-            if self._meshes.pose(known.mesh_key, pointer, data, is_known):
-                return True
+            with mesh.shown_mesh(blender_object) as shape:
+                if self._meshes.pose(known.mesh_key, pointer, shape, is_known):
+                    return True
         return _Walk(self, source, None).read_mesh(known, blender_object, pointer)
 
     def _sync_materials(self, source):
@@ -400,21 +401,33 @@ class _Walk:
         names = self._names_of(pointer)
         if not is_changed and meshes.reuse(item.key, pointer, names):
             return True
-        slot_count = max(len(blender_object.material_slots), len(blender_object.data.materials))
-        data = mesh.extract(blender_object.data, *names[:2], slot_count)
+        with mesh.shown_mesh(blender_object) as shape:
+            data, shapes = self._extract(item, blender_object, shape, names)
         if data is None:
             return False
-        if names[2]:
-            data.generated = mesh.generated_coordinates(blender_object, data.positions)
-        if meshes.will_resync and mesh.is_posable(blender_object):
-            data.poses = mesh.Topology(blender_object.data)
-        if item.motion_keys > 1 and motion.may_deform(blender_object):
-            shapes = mesh.MeshMotion(blender_object.data, data, item.motion_keys)
-            self._deforming[item.key] = _Deforming(pointer, data, names, shapes,
-                                                   lambda each: each.object.data)
+        if shapes is not None:
+            self._deforming[item.key] = _Deforming(pointer, data, names, shapes, lambda each: each.object)
         else:
             meshes.put(item.key, pointer, data, names)
         return True
+
+    def _extract(self, item, blender_object, shape, names):
+        """The mesh that an object shows as MeshData, None where it has no face, and as mesh.MeshMotion
+        where it has to wait for its shapes, else None."""
+        if mesh.is_sculpted_multires(blender_object):
+            self._sync.warnings.add(f"Object '{blender_object.name}': while it is sculpted, the mesh below its "
+                                    "multiresolution is shown")
+        slot_count = max(len(blender_object.material_slots), len(shape.materials))
+        data = mesh.extract(shape, *names[:2], slot_count)
+        if data is None:
+            return None, None
+        if names[2]:
+            data.generated = mesh.generated_coordinates(blender_object, shape, data.positions)
+        if self._sync._meshes.will_resync and mesh.is_posable(blender_object):
+            data.poses = mesh.Topology(shape)
+        if item.motion_keys > 1 and motion.may_deform(blender_object):
+            return data, mesh.MeshMotion(shape, data, item.motion_keys)
+        return data, None
 
     def _names_of(self, pointer):
         """What a mesh brings: tangents only where they are read, as they take longest to make."""

@@ -7,6 +7,7 @@ memory is looked at instead, if it proves to be laid out as expected. Curves, te
 reach this module as the meshes they evaluate to.
 """
 
+import contextlib
 import zlib
 from dataclasses import dataclass, field
 
@@ -46,6 +47,29 @@ class MeshData:
                 tuple(name for name, _ in self.attributes), sums)
 
 
+@contextlib.contextmanager
+def shown_mesh(blender_object):
+    """The mesh that an evaluated object shows, as long as the context lasts. In Edit Mode its own has no
+    attributes and often no vertices, as edits are kept elsewhere: a copy has all. While its
+    multiresolution is sculpted, there is nothing but the mesh below it."""
+    data = blender_object.data
+    if data.is_editmode:
+        try:
+            yield blender_object.to_mesh()
+        finally:
+            blender_object.to_mesh_clear()
+    elif is_sculpted_multires(blender_object):
+        yield blender_object.original.data
+    else:
+        yield data
+
+
+def is_sculpted_multires(blender_object):
+    """Whether Blender keeps the shape of an evaluated mesh object to itself."""
+    return blender_object.mode == 'SCULPT' and not blender_object.data.vertices and any(
+        modifier.type == 'MULTIRES' for modifier in blender_object.modifiers)
+
+
 def extract(mesh, uv_names=(), color_names=(), material_count=1):
     """A Blender mesh as MeshData, None when it has no triangle. Only the named attributes are taken;
     with one material, slots are left out."""
@@ -73,10 +97,10 @@ def read_positions(mesh):
     return _read(mesh.vertices, "co", (count, 3), np.float32)
 
 
-def generated_coordinates(blender_object, positions):
-    """(vertices, 3) float32 of an evaluated object: its undeformed mesh in the mesh's texture space,
-    as Cycles has it. None where that is the bounding box of positions, the library's default."""
-    mesh = blender_object.data
+def generated_coordinates(blender_object, mesh, positions):
+    """(vertices, 3) float32 of an evaluated object and the mesh that it shows: its undeformed mesh in the
+    mesh's texture space, as Cycles has it. None where that is the bounding box of positions, the library's
+    default."""
     undeformed = positions
     if _HAS_UNDEFORMED:
         undeformed = _read(mesh.vertices, "undeformed_co", positions.shape, np.float32)
@@ -419,8 +443,13 @@ class MeshMotion(KeyedShapes):
         if data.normal_kind == native.NORMALS_CORNER:
             self._corners = _LazyLoops(mesh, len(data.indices)).of_triangles
 
-    def set_key(self, index, mesh):
-        """Take the mesh's shape as that key; False (and no motion) when its topology is another."""
+    def set_key(self, index, blender_object):
+        """Take the shape of an evaluated object as that key; False (and no motion) when its topology is
+        another."""
+        with shown_mesh(blender_object) as mesh:
+            return self._set_key(index, mesh)
+
+    def _set_key(self, index, mesh):
         if not self._topology.is_of(mesh):
             self.is_dropped = True
             return False
