@@ -253,6 +253,18 @@ static inline void cell_of(float x, float y, float z, int *row, int *column) {
     *column = *column >= COLUMNS ? COLUMNS - 1 : *column;
 }
 
+/* The next TRC_WIDTH points of M. Roberts' sequence for three dimensions (2018) after at, which is
+ * its start and then its last point. */
+static inline void next_points(double at[3], float u[3][TRC_WIDTH]) {
+    const double step[3] = {0.8191725133961645, 0.6710436067037893, 0.5497004779019703};
+    for (int k = 0; k < TRC_WIDTH; k++)
+        for (int d = 0; d < 3; d++) {
+            u[d][k] = fminf((float)at[d], 0.99999994f);
+            at[d] += step[d];
+            at[d] -= floor(at[d]);
+        }
+}
+
 static inline void draw_samples(const struct trc_lobes *l, const struct trc_surface *s, int count,
                                 struct histogram *h) {
     struct rng random = rng_seed(1);

@@ -42,21 +42,15 @@ static double grazing_light(const struct trc_lobes *l, const struct trc_surface 
     return sum;
 }
 
-/* Mean weight of samples by M. Roberts' sequence for three dimensions (2018) from a start. grazing:
- * with further directions for lobes that reflect only, of which those that scatter more than once
- * weigh much at grazing angles. */
+/* Mean weight of samples by the sequence of points from a start. grazing: with further directions
+ * for lobes that reflect only, of which those that scatter more than once weigh much at grazing
+ * angles. */
 static double mean_weight(const struct trc_lobes *l, const struct trc_surface *s, double at[3],
                           int points, bool grazing) {
-    const double step[3] = {0.8191725133961645, 0.6710436067037893, 0.5497004779019703};
     double sum = 0.0;
     for (int i = 0; i < points; i += TRC_WIDTH) {
         float u[3][TRC_WIDTH];
-        for (int k = 0; k < TRC_WIDTH; k++)
-            for (int d = 0; d < 3; d++) {
-                u[d][k] = fminf((float)at[d], 0.99999994f);
-                at[d] += step[d];
-                at[d] -= floor(at[d]);
-            }
+        next_points(at, u);
         struct trc_bsdf_sample b;
         TRC_KERNEL(trc_bsdf_sample)(l, s, vf_load(u[0]), vf_load(u[1]), vf_load(u[2]), &b);
         for (int k = 0; k < TRC_WIDTH; k++) {
