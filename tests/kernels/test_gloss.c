@@ -1,5 +1,5 @@
-/* Rough gloss lit by what has extent, beside integrals in double: light samples and continuation
- * rays share the light, whatever their numbers. */
+/* Rough gloss beside integrals in double: light samples and continuation rays share the light of
+ * what has extent, whatever their numbers; Filter Glossy. */
 #include "figures.h"
 #include "picture_test.h"
 
@@ -19,13 +19,25 @@ static const char *const source_names[] = {"lamp", "mesh", "sky"};
 
 /* ---- the integral ---- */
 
-/* GGX with separable masking seen from the normal, times the cosine: Walter et al. 2007, equations
- * 20, 33 and 34. */
-static double gloss(double alpha, const double i[3]) {
-    const double cos_h2 = 0.5 * (1.0 + i[2]), a2 = alpha * alpha;
-    const double tan_h2 = (1.0 - cos_h2) / cos_h2, tan_i2 = (1.0 - i[2] * i[2]) / (i[2] * i[2]);
+static double masking(double alpha2, double cosine) {
+    return 2.0 / (1.0 + sqrt(1.0 + alpha2 * (1.0 / (cosine * cosine) - 1.0)));
+}
+
+/* GGX with separable masking about z, from i to o, times the cosine of i: Walter et al. 2007,
+ * equations 20, 33 and 34. */
+static double gloss_towards(double alpha, const double o[3], const double i[3]) {
+    double size2 = 0.0;
+    for (int k = 0; k < 3; k++)
+        size2 += (o[k] + i[k]) * (o[k] + i[k]);
+    const double cos_h2 = (o[2] + i[2]) * (o[2] + i[2]) / size2, a2 = alpha * alpha;
+    const double tan_h2 = (1.0 - cos_h2) / cos_h2;
     const double d = a2 / (PI * cos_h2 * cos_h2 * (a2 + tan_h2) * (a2 + tan_h2));
-    return d * 2.0 / (1.0 + sqrt(1.0 + a2 * tan_i2)) / 4.0;
+    return d * masking(a2, o[2]) * masking(a2, i[2]) / (4.0 * o[2]);
+}
+
+static double gloss(double alpha, const double i[3]) {
+    static const double up[3] = {0, 0, 1};
+    return gloss_towards(alpha, up, i);
 }
 
 /* Of unit radiance from the square at a point of the floor. Quadratures are off by less than 1e-4
@@ -184,11 +196,104 @@ static void weights_pass_transparency(void **state) {
         expect_light("behind clear glass", source, 1.0f, true);
 }
 
+/* ---- Filter Glossy ---- */
+
+/* A floor that reflects evenly into a cone about the mirror direction, which is a density that
+ * needs no model; above, behind the camera, a ceiling of sharp gloss, lit by a point that the
+ * floor's cone misses. */
+#define CONE_ANGLE (PI / 6.0)
+#define CEILING_ROUGHNESS 0.4
+static const double point_at[3] = {0.6, 0.0, 0.05};
+
+static trc_scene toon_and_ceiling(void) {
+    static const float transform[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0.5f};
+    static const float window[4] = {-0.001f, 0.001f, -0.001f, 0.001f};
+    const trc_node_input inputs[] = {{.node = -1, .value = {1, 1, 1}},
+                                     {.node = -1, .value = {(float)(CONE_ANGLE * 2.0 / PI)}},
+                                     {.node = -1},
+                                     {.node = -2}};
+    const trc_node toon = {.type = TRC_NODE_TOON, .mode = 1, .input_count = 4};
+    const trc_material_desc toon_desc = {.struct_size = sizeof toon_desc,
+                                         .node_count = 1,
+                                         .nodes = &toon,
+                                         .inputs = inputs,
+                                         .input_count = 4};
+    const trc_scene scene = scene_create();
+    trc_id material = 0, light = 0;
+    trc_camera_desc camera = default_camera_desc();
+    camera.type = TRC_CAMERA_ORTHOGRAPHIC;
+    camera.transforms = transform;
+    camera.windows = window;
+    assert_ok(trc_scene_set_camera(scene, &camera));
+    assert_ok(trc_material_create(scene, &toon_desc, &material));
+    fixture_level(scene, 0.5f, 0.0f, material);
+    fixture_level(scene, 2.0f, 1.0f, fixture_glossy(scene, 1.0f, (float)CEILING_ROUGHNESS));
+    trc_light_desc desc = default_light_desc();
+    desc.type = TRC_LIGHT_POINT;
+    for (int k = 0; k < 3; k++)
+        desc.transform[4 * k + 3] = (float)point_at[k];
+    desc.strength = (float)(4.0 * PI); /* an irradiance of 1 at a metre */
+    assert_ok(trc_light_create(scene, &desc, &light));
+    assert_ok(trc_scene_commit(scene));
+    return scene;
+}
+
+/* Light from the ceiling, if it is as rough as that, by way of the floor: the mean over the
+ * cone. */
+static double filtered_light(double alpha) {
+    enum { STEPS = 256 };
+    double sum = 0.0;
+    for (int a = 0; a < STEPS; a++)
+        for (int b = 0; b < STEPS; b++) {
+            const double c = 1.0 - (a + 0.5) / STEPS * (1.0 - cos(CONE_ANGLE));
+            const double phi = 2.0 * PI * (b + 0.5) / STEPS, s = sqrt(1.0 - c * c);
+            /* Seen from the ceiling, z downwards. */
+            const double o[3] = {-s * cos(phi), -s * sin(phi), c};
+            double i[3] = {point_at[0] + o[0] / c, point_at[1] + o[1] / c, 1.0 - point_at[2]};
+            const double r2 = i[0] * i[0] + i[1] * i[1] + i[2] * i[2];
+            for (int k = 0; k < 3; k++)
+                i[k] /= sqrt(r2);
+            sum += gloss_towards(alpha, o, i) / r2;
+        }
+    return sum / (STEPS * STEPS);
+}
+
+/* As in Cycles: after a bounce of density p, alpha is at least sqrt(1 - p / filter) / 2. */
+static void filter_glossy(void **state) {
+    (void)state;
+    static const float filters[] = {0.0f, 0.5f, 1.5f, 3.0f, 10.0f};
+    static float pixels[4 * FRAME];
+    const trc_scene scene = toon_and_ceiling();
+    const double density = 1.0 / (2.0 * PI * (1.0 - cos(CONE_ANGLE)));
+    for (size_t n = 0; n < sizeof filters / sizeof *filters; n++) {
+        trc_render_desc desc = render_desc(SIDE, SAMPLES);
+        desc.filter_glossy = filters[n];
+        desc.max_depth = 1;
+        render(scene, &desc, pixels);
+        const double rest = filters[n] > 0.0f ? 1.0 - density / (double)filters[n] : 0.0;
+        const double least = 0.5 * sqrt(fmax(rest, 0.0));
+        const double want = filtered_light(fmax(least, CEILING_ROUGHNESS * CEILING_ROUGHNESS));
+        double sum = 0.0, sum2 = 0.0;
+        for (int p = 0; p < FRAME; p++) {
+            sum += (double)pixels[4 * p] / FRAME;
+            sum2 += (double)pixels[4 * p] * (double)pixels[4 * p] / FRAME;
+        }
+        /* Five standard errors by the pixels; 2e-4: of the integral. */
+        const double error = sqrt(fmax(sum2 - sum * sum, 0.0) / (FRAME - 1));
+        printf("  filter %.1f: %.5f +- %.5f, %.5f expected\n", (double)filters[n], sum, error,
+               want);
+        assert_true(error < 2e-3 * want);
+        assert_true(fabs(sum - want) <= 5.0 * error + 2e-4 * want);
+    }
+    assert_ok(trc_scene_destroy(scene));
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(weights_count_light_samples),
         cmocka_unit_test(weights_count_rays_not_sent),
         cmocka_unit_test(weights_pass_transparency),
+        cmocka_unit_test(filter_glossy),
     };
     if (!query_test_isa())
         return QUERY_TEST_SKIPPED;
