@@ -1,5 +1,5 @@
-/* Surfaces at hits: positions within their error bounds, normals, sides, motion; lanes of one
- * instance and of many give the same bits. */
+/* Surfaces at hits: positions within their error bounds, normals, sides, motion, the curved surface
+ * above; lanes of one instance and of many give the same bits. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -9,8 +9,8 @@
 #include "kernels/wide_math.h"
 #include "wide_test.h"
 
-#define MESHES 4
-#define INSTANCES 12
+#define MESHES 5
+#define INSTANCES 15
 #define TRIANGLES 32
 #define KEYS 3
 
@@ -29,17 +29,18 @@ static struct scene scene;
 static float around_zero(struct rng *r) { return rng_unit(r) - 0.5f; }
 
 /* Mesh 0 static and flat, 1 with smooth vertex normals, 2 moving with corner normals, 3 far from
- * the origin. Instances: identity, others with scale and shear, mirrored, moving. */
+ * the origin, 4 moving with vertex normals. Vertices are in another order than corners. Instances:
+ * the identity, said and not said to be it, others with scale and shear, mirrored, moving. */
 static void build(void) {
     struct rng r = rng_seed(1);
     memset(&scene, 0, sizeof scene);
     for (uint32_t i = 0; i < 3 * TRIANGLES; i++)
-        scene.indices[i] = i;
+        scene.indices[i] = (7 * i + 5) % (3 * TRIANGLES);
     for (uint32_t i = 0; i < TRIANGLES; i++)
         scene.smooth[i] = i % 2;
     for (int m = 0; m < MESHES; m++) {
         struct trc_mesh *mesh = &scene.mesh[m];
-        mesh->key_count = m == 2 ? KEYS : 1;
+        mesh->key_count = m == 2 || m == 4 ? KEYS : 1;
         mesh->vertex_count = 3 * TRIANGLES;
         mesh->triangle_count = TRIANGLES;
         mesh->positions = scene.positions[m];
@@ -48,7 +49,7 @@ static void build(void) {
             scene.positions[m][i] = 4.0f * around_zero(&r) + (m == 3 ? 1e5f : 0.0f);
             scene.normals[m][i] = around_zero(&r);
         }
-        if (m == 1 || m == 3) {
+        if (m == 1 || m >= 3) {
             mesh->vertex_normals = scene.normals[m];
             mesh->smooth = scene.smooth;
         }
@@ -59,14 +60,15 @@ static void build(void) {
     for (int i = 0; i < INSTANCES; i++) {
         struct trc_instance *instance = &scene.instance[i];
         instance->mesh = (uint32_t)i % MESHES;
-        instance->key_count = i >= 8 ? KEYS : 1;
+        instance->key_count = i >= 10 ? KEYS : 1;
+        instance->is_identity = i < 3;
         instance->object_to_world = scene.to_world[i];
         for (int k = 0; k < KEYS; k++)
             for (int e = 0; e < 12; e++)
                 scene.to_world[i][k].m[e] =
                     (e % 5 == 0 ? 1.0f : 0.0f) +
-                    (i < 4 ? 0.0f : (e % 4 == 3 ? 5.0f : 0.8f)) * around_zero(&r);
-        if (i == 6) /* a mirror */
+                    (i < MESHES ? 0.0f : (e % 4 == 3 ? 5.0f : 0.8f)) * around_zero(&r);
+        if (i == 6 || i == 8) /* mirrors */
             for (int e = 0; e < 12; e += 4)
                 scene.to_world[i][0].m[e] = -scene.to_world[i][0].m[e];
         const float *m = scene.to_world[i][0].m;
@@ -83,7 +85,7 @@ static void build(void) {
 /* One hit in long double from the same float keys: corners and matrix are rounded as the library
  * does. */
 struct truth {
-    long double p[3], ng[3], n[3];
+    long double p[3], ng[3], n[3], bulge[3];
     bool smooth;
 };
 static void cross(const long double a[3], const long double b[3], long double out[3]) {
@@ -105,6 +107,25 @@ static float between(const float *keys, uint32_t key_count, size_t stride, size_
     const float a = keys[stride * key + at];
     return a + f * (keys[stride * (key + 1) + at] - a);
 }
+/* Above each edge a parabola of height wa wb (na - nb) . (pa - pb), weights wa and wb of its ends;
+ * all along the interpolated normal, in object space. */
+static void set_bulge(struct truth *t, long double p[3][3], long double n[3][3],
+                      long double column[3][3], long double u, long double v) {
+    const long double weight[3] = {1 - u - v, u, v};
+    long double height = 0, along[3];
+    for (int k = 0; k < 3; k++) {
+        const int next = (k + 1) % 3;
+        long double bend = 0;
+        for (int i = 0; i < 3; i++)
+            bend += (n[next][i] - n[k][i]) * (p[next][i] - p[k][i]);
+        height += weight[k] * weight[next] * bend;
+    }
+    for (int i = 0; i < 3; i++)
+        along[i] = weight[0] * n[0][i] + weight[1] * n[1][i] + weight[2] * n[2][i];
+    for (int i = 0; i < 3; i++)
+        t->bulge[i] =
+            height * (column[0][i] * along[0] + column[1][i] * along[1] + column[2][i] * along[2]);
+}
 static struct truth exact(int instance_number, int triangle, float u, float v, float time) {
     const struct trc_instance *instance = &scene.instance[instance_number];
     const struct trc_mesh *mesh = scene.meshes[instance->mesh];
@@ -115,11 +136,13 @@ static struct truth exact(int instance_number, int triangle, float u, float v, f
             (long double)between(instance->object_to_world[0].m, instance->key_count, 12, i, time);
     for (size_t k = 0; k < 3; k++)
         for (size_t i = 0; i < 3; i++) {
-            const size_t at = 9 * (size_t)triangle + 3 * k + i;
+            const size_t corner = 3 * (size_t)triangle + k, at = 3 * scene.indices[corner] + i;
             c[k][i] = (long double)between(mesh->positions, mesh->key_count, stride, at, time);
-            const float *normals = mesh->corner_normals ? mesh->corner_normals : scene.normals[1];
-            n[k][i] = (long double)between(mesh->vertex_normals ? mesh->vertex_normals : normals,
-                                           mesh->key_count, stride, at, time);
+            const float *normals = mesh->vertex_normals ? mesh->vertex_normals : scene.normals[1];
+            n[k][i] = (long double)(mesh->corner_normals
+                                        ? between(mesh->corner_normals, mesh->key_count, stride,
+                                                  3 * corner + i, time)
+                                        : between(normals, mesh->key_count, stride, at, time));
         }
     for (int k = 0; k < 3; k++)
         for (int i = 0; i < 3; i++)
@@ -147,6 +170,7 @@ static struct truth exact(int instance_number, int triangle, float u, float v, f
     }
     normalize(t.n);
     (void)det;
+    set_bulge(&t, c, n, column, a, b);
     for (int i = 0; i < 3; i++) {
         t.ng[i] *= instance->flips ? -1 : 1;
         t.n[i] *= instance->flips ? -1 : 1;
@@ -185,11 +209,32 @@ static struct trc_surface fetch(const struct hits *h, vvec3 wo) {
     return s;
 }
 
+/* How far the bulge of a lane is off, as a part of its size. */
+static double bulge_error(const struct trc_surface *s, int lane, const struct truth *t, bool back) {
+    const vfloat found[3] = {s->bulge.x, s->bulge.y, s->bulge.z};
+    long double size = 0, above = 0;
+    double off = 0.0;
+    for (int i = 0; i < 3; i++) {
+        size += t->bulge[i] * t->bulge[i];
+        above += t->bulge[i] * t->ng[i] * (back ? -1 : 1);
+    }
+    size = sqrtl(size);
+    /* Where it is nearly within the triangle, or cancels itself, rounding decides. */
+    if (fabsl(above) < 1e-3L * size || size < 1e-3L)
+        return 0.0;
+    const bool is_seen = t->smooth && above > 0;
+    for (int i = 0; i < 3; i++)
+        off =
+            fmax(off, fabs((double)vf_get(found[i], lane) - (is_seen ? (double)t->bulge[i] : 0.0)));
+    return off / (double)size;
+}
+
 static void agrees_with_exact_arithmetic(void **state) {
     (void)state;
     build();
     struct rng r = rng_seed(2);
-    double worst = 0.0, worst_normal = 0.0;
+    double worst = 0.0, worst_normal = 0.0, worst_bulge = 0.0;
+    int bulges[2] = {0};
     for (int n = 0; n < 4000; n++) {
         const struct hits h = random_hits(&r, n % 2);
         const vvec3 wo = trc_warp_sphere(test_wide_uniform(&r), test_wide_uniform(&r));
@@ -218,10 +263,16 @@ static void agrees_with_exact_arithmetic(void **state) {
                 worst_normal = fmax(worst_normal, fabs((double)ng[i] - sign * (double)t.ng[i]));
                 worst_normal = fmax(worst_normal, fabs((double)sn[i] - sign * (double)want[i]));
             }
+            worst_bulge = fmax(worst_bulge, bulge_error(&s, k, &t, back));
+            bulges[back] += vf_get(v3_max(v3_abs(s.bulge)), k) > 0.0f;
         }
     }
     print_figure("hit points", "off by %.2f of their bound", worst);
     print_figure("normals at hits", "off by %.2g", worst_normal);
+    print_figure("curved surfaces above hits", "off by %.2g of their size", worst_bulge);
+    /* Random normals bend a surface to either side: a quarter of all have a bulge. */
+    assert_true(bulges[0] > 300 * TRC_WIDTH && bulges[1] > 300 * TRC_WIDTH);
+    assert_true(worst_bulge < 1e-4);
     assert_true(worst_normal < 1e-4);
     assert_true(worst > 0.05);
 }
@@ -269,9 +320,10 @@ static void identity_is_exact(void **state) {
                 h.u[k] = h.v[k] = 0.0f;
             }
             const struct trc_surface s = fetch(&h, v3(vf_zero(), vf_zero(), vf_one()));
-            assert_true(vf_get(s.p.x, 0) == scene.positions[0][9 * t]);
-            assert_true(vf_get(s.p.y, 0) == scene.positions[0][9 * t + 1]);
-            assert_true(vf_get(s.p.z, 0) == scene.positions[0][9 * t + 2]);
+            const float *vertex = scene.positions[0] + 3 * scene.indices[3 * t];
+            assert_true(vf_get(s.p.x, 0) == vertex[0]);
+            assert_true(vf_get(s.p.y, 0) == vertex[1]);
+            assert_true(vf_get(s.p.z, 0) == vertex[2]);
         }
 }
 
@@ -286,7 +338,9 @@ static void odd_triangles(void **state) {
             const float corners[3][9] = {{0, 0, 0, a, 0, 0, 0, a, 0},
                                          {0, 0, 0, a, a, a, 2 * a, 2 * a, 2 * a},
                                          {a, a, a, a, a, a, a, a, a}};
-            memcpy(scene.positions[0], corners[kind], sizeof corners[kind]);
+            for (int k = 0; k < 3; k++)
+                memcpy(scene.positions[0] + 3 * scene.indices[k], corners[kind] + 3 * k,
+                       3 * sizeof(float));
             struct hits h;
             memset(&h, 0, sizeof h);
             for (int k = 0; k < TRC_WIDTH; k++)
@@ -299,6 +353,48 @@ static void odd_triangles(void **state) {
         }
 }
 
+/* A triangle of the unit sphere: at the middle of an edge the bulge is twice the height of the arc
+ * above it. It is the same surface whichever way normals and winding turn, and is there for those
+ * on its convex side alone, whether that is the triangle's front or its back. */
+static void bulges_are_on_the_convex_side(void **state) {
+    (void)state;
+    const float angle = 0.1f, near = cosf(angle), far = sinf(angle);
+    const float corners[3][3] = {{-far, 0, near}, {far, 0, near}, {0, far, near}};
+    for (int kind = 0; kind < 8; kind++) {
+        const bool is_inward = kind & 1, is_below = kind & 2, is_mirrored = kind & 4;
+        build();
+        for (int k = 0; k < 3; k++) {
+            /* The second corner of those that face inwards is the third. */
+            const uint32_t vertex = scene.indices[is_inward ? (3 - k) % 3 : k];
+            for (int i = 0; i < 3; i++) {
+                scene.positions[1][3 * vertex + (uint32_t)i] = corners[k][i];
+                scene.normals[1][3 * vertex + (uint32_t)i] =
+                    is_inward ? -corners[k][i] : corners[k][i];
+            }
+        }
+        scene.smooth[0] = 1;
+        struct trc_instance *instance = &scene.instance[1];
+        instance->is_identity = !is_mirrored;
+        instance->flips = is_mirrored;
+        scene.to_world[1][0].m[0] = is_mirrored ? -1.0f : 1.0f;
+        struct hits h;
+        memset(&h, 0, sizeof h);
+        for (int k = 0; k < TRC_WIDTH; k++) {
+            h.instance[k] = 1;
+            /* The middle of the edge between the first two of the corners above. */
+            h.u[k] = is_inward ? 0.0f : 0.5f;
+            h.v[k] = is_inward ? 0.5f : 0.0f;
+        }
+        const struct trc_surface s = fetch(&h, v3(vf_zero(), vf_zero(), vf_set(is_below ? -1 : 1)));
+        assert_true(((vm_bits(s.backfacing) & 1u) != 0) == (is_inward != is_below));
+        /* Of small angles: the parabola is cos (1 + cos) / 2 as high, with 0.1 that is 0.0075 less.
+         */
+        const float height = is_below ? 0.0f : 2.0f * (1.0f - near);
+        assert_true(fabsf(vf_get(s.bulge.z, 0) - height) <= 0.01f * height + 1e-9f);
+        assert_true(fabsf(vf_get(s.bulge.x, 0)) + fabsf(vf_get(s.bulge.y, 0)) < 1e-7f);
+    }
+}
+
 int main(void) {
     if (!test_cpu_can())
         return 77;
@@ -307,6 +403,7 @@ int main(void) {
         cmocka_unit_test(lanes_do_not_matter),
         cmocka_unit_test(identity_is_exact),
         cmocka_unit_test(odd_triangles),
+        cmocka_unit_test(bulges_are_on_the_convex_side),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
