@@ -1,17 +1,20 @@
 #!/usr/bin/env python3
 """A mutation run, by hand: which faults of faults.toml does no test notice?
 
-    python3 tests/faults/run.py [-j 2] [--only 17,18] [--survivors] [--widest] [--check] [--out build-faults]
+    /usr/bin/python3 tests/faults/run.py [-j 2] [--only 17,18] [--survivors] [--widest] [--check]
+                                         [--out build-faults]
 
 Makes a copy of the sources that holds all faults (tree.py) in OUT/tree, builds it once in OUT/build, and
 runs the tests of that copy with one fault on at a time, those that cover its place first, until one fails.
-That one has to pass without the fault, else it does not count. A fault that nothing notices has seen
-every test in C, on every instruction set (--widest: on the widest alone), and the Python files of its area;
-of faults in the add-on those files alone. A crash or a time-out counts as noticed and is said as such.
+That one has to pass without the fault, else it does not count. First all tests run with no fault on, which
+says what each reaches (OUT/reach.json; --check does it again, after changes): a test that does not reach the
+place of a fault cannot notice it and is left out. A fault that nothing notices has seen every test in C that
+reaches it, on every instruction set (--widest: on the widest alone), and the Python files of its area; of
+faults in the add-on those files alone. A crash or a time-out counts as noticed and is said as such.
 
 Results are in OUT/results.json and, as a table, OUT/results.md. Faults that have one are left out unless
-named by --only or, if nothing noticed them, by --survivors. --check runs everything with no fault on. All of
-it takes some three hours of two cores."""
+named by --only or, if nothing noticed them, by --survivors. All of it takes some two hours of two quiet
+cores."""
 
 import argparse
 import concurrent.futures
@@ -49,7 +52,7 @@ class Tests:
 
     def _runs(self, isa):
         probe = next(name for name in self.c_names if name.endswith("." + isa))
-        return "Skipped" not in self._ctest(0, [probe])[1]
+        return "Skipped" not in self._ctest(0, probe)[1]
 
     def in_c(self, base=None, isa=None):
         """Names of the tests in C of a name without instruction set, or all; of one set and those of none."""
@@ -61,33 +64,42 @@ class Tests:
         return [name for name in self.c_names if fits(name)]
 
     def _environment(self, fault):
-        return {**os.environ, "VOLLEY_FAULT": str(fault), "VOLLEY_BUILD": str(self.build),
+        """Of a fault's number, or of the file that is to hold what is reached."""
+        chosen = {"VOLLEY_FAULT": str(fault)} if isinstance(fault, int) else {"VOLLEY_FAULT_NOTES": str(fault)}
+        return {**os.environ, **chosen, "VOLLEY_BUILD": str(self.build),
                 "BLENDER_USER_SCRIPTS": str(self.build / "blender"),
                 "PYTHONPATH": str(self.tree / "tests/support")}
 
-    def _ctest(self, fault, names):
-        pattern = "^(" + "|".join(map(re.escape, names)) + ")$"
+    def _ctest(self, fault, name):
         done = subprocess.run(
-            ["nice", "ctest", "--test-dir", self.build, "-R", pattern, "--stop-on-failure", "--timeout",
+            ["nice", "ctest", "--test-dir", self.build, "-R", f"^{re.escape(name)}$", "--timeout",
              str(CTEST_SECONDS)], env=self._environment(fault), capture_output=True, text=True)
         return done.returncode == 0, done.stdout
 
-    def c_failure(self, fault, names):
-        """(test, how it failed) of the first in order that fails, None if all pass."""
-        for name in names:  # in the order of the list, which is ctest's only with one at a time
-            passed, output = self._ctest(fault, [name])
-            if not passed:
-                how = re.search(r"\*\*\*(\w+)", output)
-                return name, how[1].lower() if how else "failed"
-        return None
+    def c_failure(self, fault, name):
+        """(test, how it failed), None if it passes."""
+        passed, output = self._ctest(fault, name)
+        if passed:
+            return None
+        how = re.search(r"\*\*\*(\w+)", output)
+        return name, how[1].lower() if how else "failed"
+
+    def failure(self, fault, test):
+        """(test, how it failed) of a test or the first of a file, None if all pass; fault: see _environment."""
+        if ".py" not in test:
+            return self.c_failure(fault, test)
+        file, _, name = test.partition("::")
+        return self.python_failure(fault, file, name or None)
 
     def python_failure(self, fault, file, test=None):
         """(test, how it failed) of the first of a file that fails, None if all pass."""
         path = next((self.tree / "tests").glob(f"*/{file}"))
         with tempfile.TemporaryDirectory() as folder:
             report = Path(folder) / "report.xml"
-            command = ["nice", sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "--rootdir",
-                       "tests", "--junit-xml", report, f"{path}::{test}" if test else path]
+            command = ["nice", sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--rootdir", "tests",
+                       "--junit-xml", report, f"{path}::{test}" if test else path]
+            if isinstance(fault, int):
+                command.append("-x")
             try:
                 subprocess.run(command, cwd=self.tree, env=self._environment(fault), capture_output=True,
                                timeout=PYTEST_SECONDS)
@@ -123,65 +135,75 @@ def build(out):
 
 
 class Run:
-    """What is run for each fault."""
+    """What is run for each fault. reach: {test: {"seconds", "reaches": numbers, "fails": how or None}}"""
 
-    def __init__(self, tests, widest):
-        self._tests, self._isas = tests, tests.isas[:1] if widest else tests.isas
+    def __init__(self, tests, reach, widest):
+        self._tests, self._reach = tests, reach
+        self._isas = tests.isas[:1] if widest else tests.isas
 
     def _steps(self, fault):
-        """Functions of a fault's number that give a failure or None, likeliest first."""
-        tests, widest, steps, done = self._tests, self._tests.isas[0], [], set()
+        """The tests of a fault, likeliest first."""
+        tests, steps = self._tests, []
 
-        def in_c(names):
-            for name in names:
-                if name not in done:
-                    done.add(name)
-                    steps.append(lambda number, name=name: tests.c_failure(number, [name]))
+        def add(names):
+            steps.extend(name for name in sorted(names, key=lambda name: self._reach[name]["seconds"])
+                         if name not in steps and not self._reach[name]["fails"]
+                         and fault["number"] in self._reach[name]["reaches"])
 
-        is_c = not fault["file"].endswith(".py")
+        for name in fault["tests"]:
+            if not name.endswith(".py"):
+                add(tests.in_c(name, tests.isas[0]))
+        if not fault["file"].endswith(".py"):
+            add(tests.in_c(isa=tests.isas[0]))
         for name in fault["tests"]:
             if name.endswith(".py"):
-                continue
-            known = tests.in_c(name, widest)
-            if not known:
-                raise tree.FaultError(f"fault {fault['number']}: there is no test {name}")
-            in_c(known)
-        if is_c:  # those of no instruction set are fast
-            in_c(name for name in tests.in_c(isa=widest) if name not in done)
-        for name in fault["tests"]:
-            if name.endswith(".py"):
-                steps.append(lambda number, name=name: tests.python_failure(number, name))
-        for isa in self._isas[1:] if is_c else ():
-            in_c(tests.in_c(isa=isa))
+                add([name])
+        for isa in self._isas[1:] if not fault["file"].endswith(".py") else ():
+            add(tests.in_c(isa=isa))
         return steps
-
-    def _passes_without(self, test):
-        if ".py" in test:
-            file, _, name = test.partition("::")
-            return self._tests.python_failure(0, file, name or None) is None
-        return self._tests.c_failure(0, [test]) is None
 
     def of(self, fault):
         """The result of one fault."""
         start = time.monotonic()
-        result = {"number": fault["number"], "what": fault["what"], "area": fault["area"],
-                  "file": fault["file"], "by": None, "how": "SURVIVED", "doubtful": []}
-        for step in self._steps(fault):
-            failure = step(fault["number"])
+        steps = self._steps(fault)
+        result = {"number": fault["number"], "what": fault["what"], "area": fault["area"], "file": fault["file"],
+                  "by": None, "how": f"passes {len(steps)} tests" if steps else "reached by no test", "doubtful": []}
+        for step in steps:
+            failure = self._tests.failure(fault["number"], step)
             if failure is None:
                 continue
-            if self._passes_without(failure[0]):
+            if self._tests.failure(0, failure[0]) is None:
                 result["by"], result["how"] = failure
                 break
             result["doubtful"].append(failure[0])
         result["seconds"] = round(time.monotonic() - start)
         return result
 
-    def check(self):
-        """Everything with no fault on; what fails."""
-        failures = [self._tests.c_failure(0, [name]) for name in self._tests.c_names]
-        failures += [self._tests.python_failure(0, file) for file in self._tests.python_files]
-        return [failure for failure in failures if failure]
+
+def look(tests, name):
+    """What one test reaches with no fault on."""
+    start = time.monotonic()
+    with tempfile.TemporaryDirectory() as folder:
+        notes = Path(folder) / "notes"
+        failure = tests.failure(notes, name)
+        reached = sorted(set(map(int, notes.read_text().split()))) if notes.is_file() else []
+    return {"seconds": round(time.monotonic() - start, 1), "reaches": reached,
+            "fails": failure and ": ".join(failure)}
+
+
+def find_reach(tests, store, again, workers):
+    """What all tests reach; those that are known are left out unless again."""
+    names = tests.python_files + tests.c_names
+    known = json.loads(store.read_text()) if store.is_file() and not again else {}
+    reach = {name: known[name] for name in names if name in known}
+    with concurrent.futures.ThreadPoolExecutor(workers) as pool:
+        looks = {pool.submit(look, tests, name): name for name in names if name not in reach}
+        for done in concurrent.futures.as_completed(looks):
+            reach[looks[done]] = done.result()
+            store.write_text(json.dumps(reach))
+            if done.result()["fails"]:
+                print(f"without a fault: {done.result()['fails']}", flush=True)
+    return reach
 
 
 def write_table(path, results, struck):
@@ -214,12 +236,14 @@ def main():
     out = arguments.out.resolve()
     out.mkdir(parents=True, exist_ok=True)
     build(out)
-    run = Run(Tests(out), arguments.widest)
+    tests = Tests(out)
+    reach = find_reach(tests, out / "reach.json", arguments.check, max(arguments.j, 1))
     if arguments.check:
-        failures = run.check()
-        print("\n".join(f"{name}: {how}" for name, how in failures) or "all tests pass without a fault")
+        failures = [each["fails"] for each in reach.values() if each["fails"]]
+        print("\n".join(failures) or "all tests pass without a fault")
         sys.exit(bool(failures))
 
+    run = Run(tests, reach, arguments.widest)
     store = out / "results.json"
     results = {r["number"]: r for r in json.loads(store.read_text())} if store.is_file() else {}
     listed = tree.faults()

@@ -1,8 +1,10 @@
 """A copy of the sources that holds every fault of faults.toml, chosen at run time by VOLLEY_FAULT.
 
 Product sources stay as they are. In the copy each fragment stands as a choice between itself and the
-fault, made by one global number: C sources see it as trc_fault_on, which a forced header declares in
-every source, Python modules as _VOLLEY_FAULT. Without the variable the copy behaves as the product.
+fault, by a function that C sources have from a forced header and Python modules from a module beside them.
+Without the variable the copy behaves as the product. With VOLLEY_FAULT_NOTES, a file, it appends to that
+the number of each fault whose place is reached, once for each process: a test that does not reach a place
+cannot notice what is wrong there.
 """
 
 import ast
@@ -14,24 +16,74 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 LIST = Path(__file__).with_name("faults.toml")
 COPIED = ("addon", "examples", "libtracer", "tests", ".cmake", "CMakeLists.txt", "LICENSE", "README.md")
-PRODUCT = ("libtracer/src", "addon/volley")
+LIBRARY, ADDON = "libtracer/src", "addon/volley"
 
-HEADER = """/* Forced into every source: the fault that is on, 0 for none. */
+HEADER = """/* Forced into every source. */
+#ifndef VOLLEY_FAULT_H
+#define VOLLEY_FAULT_H
 #ifdef __cplusplus
-extern "C"
-#else
-extern
+extern "C" {
 #endif
-__attribute__((visibility("hidden"))) int trc_fault_on;
+/* By number: 0 off, 1 on, 2 off and to be noted when reached. */
+extern __attribute__((visibility("hidden"))) unsigned char trc_fault_state[];
+__attribute__((visibility("hidden"))) int trc_fault_look(int number);
+#ifdef __cplusplus
+}
+#endif
+static inline __attribute__((always_inline)) int trc_fault(int number) {
+    return __builtin_expect(trc_fault_state[number], 0) ? trc_fault_look(number) : 0;
+}
+#endif
 """
-SOURCE = """#include <stdlib.h>
-int trc_fault_on;
+SOURCE = """#define _POSIX_C_SOURCE 200809L
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#define MOST_FAULTS 4096
+unsigned char trc_fault_state[MOST_FAULTS];
+
 __attribute__((constructor)) static void choose(void) {
     const char *number = getenv("VOLLEY_FAULT");
-    trc_fault_on = number ? atoi(number) : 0;
+    if (getenv("VOLLEY_FAULT_NOTES"))
+        memset(trc_fault_state, 2, MOST_FAULTS);
+    if (number && atoi(number) > 0 && atoi(number) < MOST_FAULTS)
+        trc_fault_state[atoi(number)] = 1;
+}
+
+int trc_fault_look(int number) {
+    if (trc_fault_state[number] != 2)
+        return trc_fault_state[number];
+    trc_fault_state[number] = 0;
+    char line[16];
+    const char *path = getenv("VOLLEY_FAULT_NOTES");
+    const int size = snprintf(line, sizeof line, "%d\\n", number);
+    const int file = path ? open(path, O_WRONLY | O_APPEND | O_CREAT, 0666) : -1;
+    if (file >= 0) {
+        if (write(file, line, (size_t)size) != size)
+            abort();
+        close(file);
+    }
+    return 0;
 }
 """
-PYTHON = 'import os as _os\n_VOLLEY_FAULT = int(_os.environ.get("VOLLEY_FAULT") or 0)\n'
+MODULE = '''"""Which fault is on; notes which are reached."""
+import os
+
+_ON = int(os.environ.get("VOLLEY_FAULT") or 0)
+_NOTES = os.environ.get("VOLLEY_FAULT_NOTES")
+_noted = set()
+
+
+def fault(number):
+    if _NOTES and number not in _noted:
+        _noted.add(number)
+        with open(_NOTES, "a") as file:
+            file.write(f"{number}\\n")
+    return number == _ON
+'''
 
 
 class FaultError(Exception):
@@ -75,19 +127,20 @@ def place_of(fault, texts):
 def _switched(fault, part, is_python):
     number, to = fault["number"], fault["to"]
     if is_python:
-        return f"(({to}) if _VOLLEY_FAULT == {number} else ({part}))"
+        return f"(({to}) if _fault({number}) else ({part}))"
     if part.rstrip().endswith((";", "}")):
-        return f"if (trc_fault_on == {number}) {{ {to} }} else {{ {part} }}"
-    return f"(trc_fault_on == {number} ? ({to}) : ({part}))"
+        return f"if (trc_fault({number})) {{ {to} }} else {{ {part} }}"
+    return f"(trc_fault({number}) ? ({to}) : ({part}))"
 
 
-def _with_number(text):
-    """A Python module that knows the number: behind its docstring."""
+def _with_import(text, path):
+    """A Python module that can choose: the import stands behind its docstring."""
     first = ast.parse(text).body[0]
     is_docstring = isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant)
     lines = text.splitlines(keepends=True)
     end = first.end_lineno if is_docstring else 0
-    return "".join(lines[:end]) + "\n" + PYTHON + "".join(lines[end:])
+    depth = len(path.relative_to(ROOT / ADDON).parts)
+    return "".join(lines[:end]) + f"\nfrom {'.' * depth}fault import fault as _fault\n" + "".join(lines[end:])
 
 
 def planted(texts):
@@ -105,7 +158,7 @@ def planted(texts):
                 raise FaultError(f"fault {fault['number']} overlaps another")
             former = begin
             text = text[:begin] + _switched(fault, text[begin:end], is_python) + text[end:]
-        result[path] = _with_number(text) if is_python else text
+        result[path] = _with_import(text, path) if is_python else text
     return result
 
 
@@ -122,8 +175,13 @@ def make(target):
     sources = [path for name in names for path in ([name] if name.is_file() else name.rglob("*"))
                if path.is_file() and "__pycache__" not in path.parts]
     texts = {path: path.read_text() for path in sources if path.suffix in {".c", ".h", ".cpp", ".py"}
-             and any(path.is_relative_to(ROOT / folder) for folder in PRODUCT)}
+             and any(path.is_relative_to(ROOT / folder) for folder in (LIBRARY, ADDON))}
     changed = planted(texts)
+    header = target / LIBRARY / "core/fault.h"
+    made = {header: HEADER, target / LIBRARY / "core/fault.c": SOURCE, target / ADDON / "fault.py": MODULE}
+    options = "add_library(tracer_options INTERFACE)"
+    changed[ROOT / "CMakeLists.txt"] = (ROOT / "CMakeLists.txt").read_text().replace(
+        options, f'{options}\ntarget_compile_options(tracer_options INTERFACE "SHELL:-include {header}")', 1)
     wanted = {target / path.relative_to(ROOT) for path in sources}
     for path in sources:
         copy = target / path.relative_to(ROOT)
@@ -133,13 +191,8 @@ def make(target):
             copy.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(path, copy)
             shutil.copymode(path, copy)
-    header, source = target / "libtracer/src/core/fault.h", target / "libtracer/src/core/fault.c"
-    _write(header, HEADER)
-    _write(source, SOURCE)
-    build = (ROOT / "CMakeLists.txt").read_text()
-    _write(target / "CMakeLists.txt", build.replace(
-        "add_library(tracer_options INTERFACE)",
-        f'add_library(tracer_options INTERFACE)\ntarget_compile_options(tracer_options INTERFACE "SHELL:-include {header}")', 1))
+    for path, text in made.items():
+        _write(path, text)
     for path in target.rglob("*"):
-        if path.is_file() and path not in wanted | {header, source} and "__pycache__" not in path.parts:
+        if path.is_file() and path not in wanted and path not in made and "__pycache__" not in path.parts:
             path.unlink()
