@@ -30,7 +30,7 @@ def describe(light_object, item, warnings):
         "strength": light.energy * 2.0 ** getattr(light, "exposure", 0.0) *
         (AREA_LIGHT_POWER if light.type == 'AREA' else 1.0),
         "spread": math.pi, "spot_angle": math.pi,
-        "visibility": light_visibility(light_object) & item.visibility,
+        "visibility": light_visibility(light_object),
         "light_group": item.light_group,
         "cast_shadow": int(casts_shadow(light)),
         "use_mis": int(cycles(light, "use_multiple_importance_sampling", True)),

@@ -19,7 +19,7 @@ def object_visibility(blender_object):
 
 
 def light_visibility(light_object):
-    """VISIBLE_* bits of a light; shadow rays do not apply."""
+    """VISIBLE_* bits of a light, its own also where it is instanced; shadow rays do not apply."""
     return object_visibility(light_object) | native.VISIBLE_SHADOW
 
 
