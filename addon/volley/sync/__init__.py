@@ -142,7 +142,7 @@ class SceneSync:
             with mesh.shown_mesh(blender_object) as shape:
                 if self._meshes.pose(known.mesh_key, pointer, shape, is_known):
                     return True
-        return _Walk(self, source, None).read_mesh(known, blender_object, pointer)
+        return _Walk(self, source, None).read_mesh(known, each, pointer)
 
     def _sync_materials(self, source):
         """Flatten the materials first: they say which attributes the meshes must bring."""
@@ -217,11 +217,15 @@ def _size_limit(source):
     return image.size_limit(source.depsgraph.scene_eval, source.v3d is None)
 
 
-def _material_ids(materials, each, view_layer):
-    """Library ids of an instance's material slots."""
-    if visibility.is_holdout(each, view_layer):
-        return (materials.holdout_id(),)
-    return tuple(materials.id_of(material) for material in _materials_of(each.object, view_layer))
+def _dress(item, materials, each, view_layer):
+    """Note the library's ids of an instance's material slots, and of a hole in their place."""
+    item.hole = materials.holdout_id() if visibility.is_holdout(each, view_layer) else 0
+    item.materials = tuple(materials.id_of(material) for material in _materials_of(each.object, view_layer))
+
+
+def _maker_of(each):
+    """What makes an instance, None for an object that stands for itself."""
+    return each.parent if each.is_instance else None
 
 
 def _materials_of(blender_object, view_layer):
@@ -314,14 +318,13 @@ class _Walk:
     def _add_mesh_instance(self, each):
         blender_object = each.object
         item = self._describe(each)
-        item.materials = _material_ids(self._sync._materials, each, self._view_layer)
+        _dress(item, self._sync._materials, each, self._view_layer)
         if self._shutter is not None:
-            parent = each.parent if each.is_instance else None
-            item.motion_keys = motion.key_count(blender_object, parent)
+            item.motion_keys = motion.key_count(blender_object, _maker_of(each))
             item.transforms *= item.motion_keys
         if self._needs_instancer and each.is_instance:
             item.values = instance.instancer_values(each, self._source.depsgraph.scene_eval)
-        item.mesh_key = self._mesh_key(item, blender_object)
+        item.mesh_key = self._mesh_key(item, each)
         if item.mesh_key is not None:
             self.items[item.key] = item
 
@@ -357,7 +360,7 @@ class _Walk:
         """An item of strands or points (strands.Hair or strands.StrandObject) whose mesh is made unless another
         item of the same source has it."""
         if self._shutter is not None:
-            item.motion_keys = motion.key_count(each.object, each.parent if each.is_instance else None)
+            item.motion_keys = motion.key_count(each.object, _maker_of(each))
             item.transforms *= item.motion_keys
         if source not in self._owners:
             self._owners[source] = item.key if self._put_made(each, item, source, made_of) else None
@@ -377,32 +380,31 @@ class _Walk:
         if made is None:
             return False
         solid, data = made
-        if item.motion_keys > 1 and motion.may_deform(each.object) and made_of.may_move(each):
+        if item.motion_keys > 1 and motion.may_deform(each.object, _maker_of(each)) and made_of.may_move(each):
             shapes = tubes.StrandMotion(solid, shape, data, item.motion_keys)
             self._deforming[item.key] = _Deforming(source, data, self._names, shapes, made_of.read)
         else:
             meshes.put(item.key, source, data, self._names)
         return True
 
-    def _mesh_key(self, item, blender_object):
+    def _mesh_key(self, item, each):
         """The key of the mesh the item shows, which is read now if no other item showed it before."""
-        data = blender_object.data
-        pointer = data.as_pointer()
+        pointer = each.object.data.as_pointer()
         if pointer in self._owners:
             return self._owners[pointer]
-        self._owners[pointer] = item.key if self.read_mesh(item, blender_object, pointer) else None
+        self._owners[pointer] = item.key if self.read_mesh(item, each, pointer) else None
         return self._owners[pointer]
 
-    def read_mesh(self, item, blender_object, pointer):
+    def read_mesh(self, item, each, pointer):
         """Have the mesh of an item in the library, or wait for its shapes; False where there is nothing
         to show."""
-        meshes = self._sync._meshes
+        meshes, blender_object = self._sync._meshes, each.object
         is_changed = self._source.changes.geometry_of(item.owner)
         names = self._names_of(pointer)
         if not is_changed and meshes.reuse(item.key, pointer, names):
             return True
         with mesh.shown_mesh(blender_object) as shape:
-            data, shapes = self._extract(item, blender_object, shape, names)
+            data, shapes = self._extract(item, each, shape, names)
         if data is None:
             return False
         if shapes is not None:
@@ -411,9 +413,10 @@ class _Walk:
             meshes.put(item.key, pointer, data, names)
         return True
 
-    def _extract(self, item, blender_object, shape, names):
-        """The mesh that an object shows as MeshData, None where it has no face, and as mesh.MeshMotion
+    def _extract(self, item, each, shape, names):
+        """The mesh that an instance shows as MeshData, None where it has no face, and as mesh.MeshMotion
         where it has to wait for its shapes, else None."""
+        blender_object = each.object
         if mesh.is_sculpted_multires(blender_object):
             self._sync.warnings.add(f"Object '{blender_object.name}': while it is sculpted, the mesh below its "
                                     "multiresolution is shown")
@@ -425,7 +428,7 @@ class _Walk:
             data.generated = mesh.generated_coordinates(blender_object, shape, data.positions)
         if self._sync._meshes.will_resync and mesh.is_posable(blender_object):
             data.poses = mesh.Topology(shape)
-        if item.motion_keys > 1 and motion.may_deform(blender_object):
+        if item.motion_keys > 1 and motion.may_deform(blender_object, _maker_of(each)):
             return data, mesh.MeshMotion(shape, data, item.motion_keys)
         return data, None
 

@@ -95,19 +95,23 @@ def _opening(samples):
     return np.diff(edges).astype(np.float32)
 
 
+def _chain(blender_object, parent):
+    return [blender_object] + ([parent] if parent is not None else [])
+
+
 def key_count(blender_object, parent=None):
     """How many times to look at an object (1: not moving); an instancer's setting counts too."""
-    chain = [blender_object] + ([parent] if parent is not None else [])
+    chain = _chain(blender_object, parent)
     if not all(cycles(each, "use_motion_blur", True) for each in chain):
         return 1
     steps = max(cycles(each, "motion_steps", 1) for each in chain)
     return min((2 << (steps - 1)) + 1, native.MAX_KEYS)
 
 
-def may_deform(blender_object):
+def may_deform(blender_object, parent=None):
     """Whether an object's mesh may change its shape in time: modifiers, shape keys, or a mesh that is
-    made anew on each frame."""
-    if not cycles(blender_object, "use_deform_motion", True):
+    made anew on each frame; an instancer's setting counts too."""
+    if not all(cycles(each, "use_deform_motion", True) for each in _chain(blender_object, parent)):
         return False
     original = blender_object.original or blender_object
     if original.type != 'MESH':
