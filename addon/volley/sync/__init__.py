@@ -124,7 +124,7 @@ class SceneSync:
             return False
         item = instance.describe(each, view_layer, source.light_groups)
         item.mesh_key = known.mesh_key
-        item.materials = _material_ids(self._materials, each, view_layer)
+        _dress(item, self._materials, each, view_layer)
         self._instances.change(item, self._meshes.id_of(item.mesh_key))
         self._meshes.free_retired()
         return True
@@ -336,9 +336,9 @@ class _Walk:
             self.tied.add(blender_object.name_full)  # only a walk sees what its hair does
             item = self._describe(each)
             item.key = instance.hair_key(each, number)
-            materials = _material_ids(self._sync._materials, each, self._view_layer)
-            slot = min(max(modifier.particle_system.settings.material, 1), len(materials)) - 1
-            item.materials = materials[slot:slot + 1] if materials else ()
+            _dress(item, self._sync._materials, each, self._view_layer)
+            slot = max(min(modifier.particle_system.settings.material, len(item.materials)), 1) - 1
+            item.materials = item.materials[slot:slot + 1]
             hair = strands.Hair(number, self._source.depsgraph, is_final, self._names[:2])
             self._add_made(each, item, (blender_object.name_full, number), hair)
 
@@ -352,7 +352,8 @@ class _Walk:
     def _add_strands(self, each):
         """A Curves or Point Cloud object."""
         item = self._describe(each)
-        item.materials = _material_ids(self._sync._materials, each, self._view_layer)[:1]
+        _dress(item, self._sync._materials, each, self._view_layer)
+        item.materials = item.materials[:1]
         self.tied.add(each.object.name_full)
         self._add_made(each, item, each.object.data.as_pointer(), strands.StrandObject(self._names[:2]))
 

@@ -28,6 +28,7 @@ class Item:
     transforms: list           # 12 floats for each motion key
     mesh_key: tuple = None     # the key of the item that owns the mesh
     materials: tuple = ()
+    hole: int = 0              # the material that the camera sees in place of them, 0 for none
     visibility: int = 0
     pass_index: int = 0
     random: float = 0.0
@@ -150,9 +151,9 @@ def is_light(instance):
 
 @dataclass
 class InstanceEntry:
-    """An instance in the library."""
+    """An instance in the library; a holdout is two, for the camera and for all other rays."""
 
-    id: int
+    ids: tuple
     mesh_id: int
     signature: tuple
     name: str
@@ -183,7 +184,8 @@ class Instances:
                     raise
                 self.warnings.add(f"Object '{item.owner}': {error}; it is left out")
         for key in [key for key in self._entries if key not in seen]:
-            self.scene.destroy_instance(self._entries.pop(key).id)
+            for instance_id in self._entries.pop(key).ids:
+                self.scene.destroy_instance(instance_id)
 
     def change(self, item, mesh_id):
         """Bring one of them up to date; one that the library refuses goes on as it was."""
@@ -201,24 +203,34 @@ class Instances:
 
     def _update_one(self, item, mesh_id):
         transforms = motion.follow_turns(collapse(item.transforms))
-        signature = (mesh_id, transforms.tobytes(), item.materials, item.visibility, item.pass_index,
-                     item.random, item.color, item.name, item.asset, item.light_group, item.flags,
-                     item.values)
+        signature = (mesh_id, transforms.tobytes(), item.materials, item.hole, item.visibility,
+                     item.pass_index, item.random, item.color, item.name, item.asset, item.light_group,
+                     item.flags, item.values)
         entry = self._entries.get(item.key)
         if entry is not None and entry.signature == signature:
             return
-        values = {"mesh": mesh_id, "transforms": transforms, "materials": item.materials,
-                  "visibility": item.visibility, "pass_index": item.pass_index,
+        values = {"mesh": mesh_id, "transforms": transforms, "pass_index": item.pass_index,
                   "random": item.random, "color": item.color, "light_group": item.light_group,
                   "flags": item.flags, "values": item.values,
                   "cryptomatte_object": native.cryptomatte_id(item.name),
                   "cryptomatte_asset": native.cryptomatte_id(item.asset)}
-        if entry is None:
-            instance_id = self.scene.create_instance(**values)
-        else:
-            instance_id = entry.id
-            self.scene.update_instance(instance_id, **values)
-        self._entries[item.key] = InstanceEntry(instance_id, mesh_id, signature, item.name, item.asset)
+        parts = _parts(item)
+        ids = list(entry.ids) if entry is not None else []
+        while len(ids) > len(parts):
+            self.scene.destroy_instance(ids.pop())
+        for instance_id, part in zip(ids, parts):
+            self.scene.update_instance(instance_id, **values, **part)
+        for part in parts[len(ids):]:
+            ids.append(self.scene.create_instance(**values, **part))
+        self._entries[item.key] = InstanceEntry(tuple(ids), mesh_id, signature, item.name, item.asset)
+
+
+def _parts(item):
+    """What rays see of an item: all the same, or the camera a hole where others see what it is made of."""
+    if not item.hole:
+        return [{"materials": item.materials, "visibility": item.visibility}]
+    return [{"materials": (item.hole,), "visibility": item.visibility & native.VISIBLE_CAMERA},
+            {"materials": item.materials, "visibility": item.visibility & ~native.VISIBLE_CAMERA}]
 
 
 def collapse(arrays):

@@ -39,15 +39,15 @@ def instance_visibility(instance, view_layer):
     if parent is not None:
         mask &= object_visibility(parent)
     owner = parent or blender_object
-    if owner.indirect_only_get(view_layer=view_layer):
+    if owner.indirect_only_get(view_layer=view_layer) and not is_holdout(instance, view_layer):
         mask &= ~native.VISIBLE_CAMERA
     return mask
 
 
 def is_holdout(instance, view_layer):
-    """Whether the instance punches a hole into the picture."""
+    """Whether the instance punches a hole into the picture: as what makes it says, if something does."""
     owner = instance.parent if instance.is_instance and instance.parent else instance.object
-    return instance.object.is_holdout or owner.holdout_get(view_layer=view_layer)
+    return owner.holdout_get(view_layer=view_layer)
 
 
 def is_shadow_catcher(instance, view_layer):
