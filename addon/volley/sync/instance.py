@@ -73,11 +73,11 @@ def is_shown(instance, v3d=None):
 
 
 def is_in_view(instance, v3d=None):
-    """Whether its object and particles may be seen: viewports have local views."""
+    """Whether its object and particles may be seen: viewports have local views, which show instances with
+    what makes them, and hide types of objects, which hides instances by their own."""
     if v3d is None:
         return True
-    owner = instance.parent if instance.is_instance and instance.parent else instance.object
-    return owner.visible_in_viewport_get(v3d)
+    return instance.object.visible_in_viewport_get(v3d)
 
 
 def names_of(instance):
