@@ -33,6 +33,7 @@ import numpy as np
 TILE_PX = 8
 DIFFERENCE_GAIN = 8.0
 RELATIVE_FLOOR = 0.01
+NOISE_ERRORS = 5.0  # of a difference that is noise: exceeded once in 1.7 million, for some thousand tiles
 ROUNDING = 2e-5  # of a sum of a thousand floats, relative
 
 EXR_MAGIC = 20000630
@@ -139,9 +140,18 @@ def tile_means(image, tile_px=TILE_PX):
     row_starts = np.arange(0, image.shape[0], tile_px)
     column_starts = np.arange(0, image.shape[1], tile_px)
     sums = np.add.reduceat(np.add.reduceat(image, row_starts, axis=0), column_starts, axis=1)
-    heights = np.diff(np.append(row_starts, image.shape[0]))
-    widths = np.diff(np.append(column_starts, image.shape[1]))
-    return sums / (heights[:, None, None] * widths[None, :, None])
+    return sums / tile_sizes(image, tile_px)
+
+
+def tile_sizes(image, tile_px=TILE_PX):
+    """Pixels in each tile, shape (rows, columns, 1).
+
+    >>> tile_sizes(np.zeros((1, 6, 1)), 4).ravel()
+    array([4, 2])
+    """
+    height, width = np.shape(image)[:2]
+    heights, widths = (np.diff(np.append(np.arange(0, size, tile_px), size)) for size in (height, width))
+    return heights[:, None, None] * widths[None, :, None]
 
 
 def welch_p_values(samples_a, samples_b):
@@ -268,6 +278,34 @@ def agreed_errors(images_a, images_b, tile_px=TILE_PX, significance=0.01):
     off = np.where(p < significance / p.size, np.abs(a.mean(axis=0) - b.mean(axis=0)), 0.0)
     biased = np.where(mean_p < significance / mean_p.size, mean_off, 0.0)
     return float(mean_off.max() / scale), float(biased.max() / scale), float(off.max() / scale)
+
+
+def unexplained(seeds_a, seeds_b, tile_px=TILE_PX, errors=NOISE_ERRORS):
+    """How far two sets of seeds are apart by more than noise explains: the largest excess in the mean of a
+    channel, and in the mean of a tile and channel.
+
+    What noise explains is so many standard errors of the difference. They come from the variance of each
+    pixel between seeds, taken as independent of its neighbours', so that few seeds do: samplers
+    that spread their errors over neighbours have less noise than that.
+
+    >>> generator = np.random.default_rng(1)
+    >>> a, b = generator.normal(1.0, 0.1, (2, 4, 16, 16, 3))
+    >>> unexplained(a, b)
+    (0.0, 0.0)
+    >>> a[:, :8, :8] += 0.1
+    >>> [round(value, 2) for value in unexplained(a, b)]
+    [0.01, 0.06]
+    """
+    require_same_shape([*seeds_a, *seeds_b])
+    a, b = (np.asarray(side, np.float64) for side in (seeds_a, seeds_b))
+    variance = a.var(axis=0, ddof=1) / len(a) + b.var(axis=0, ddof=1) / len(b)
+    difference = a.mean(axis=0) - b.mean(axis=0)
+
+    def largest(size):
+        noise = errors * np.sqrt(tile_means(variance, size) / tile_sizes(difference, size))
+        return float((np.abs(tile_means(difference, size)) - noise).max().clip(0.0))
+
+    return largest(max(difference.shape)), largest(tile_px)
 
 
 # Pictures --------------------------------------------------------------------------------------

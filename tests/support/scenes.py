@@ -12,6 +12,8 @@ import bpy
 import numpy as np
 
 
+SEEDS = (1, 2, 3, 4)  # of pictures whose noise is measured
+
 # Sockets of Principled that 4.0 renamed.
 _RENAMED_SOCKETS = {"Specular": "Specular IOR Level", "Sheen": "Sheen Weight"}
 
@@ -123,14 +125,23 @@ def light(kind='AREA', location=(0.0, -4.0, 4.0), rotation=(math.pi / 4, 0.0, 0.
     return made
 
 
-def has_node(node_type, inputs=()):
-    """Whether this Blender has such a shader node, with inputs of these names."""
-    if not hasattr(bpy.types, node_type):
-        return False
+def has_node(node_type, inputs=(), settings=None):
+    """Whether this Blender makes such a shader node, be it under the name of another that took its place,
+    with inputs of these names and settings that take these values."""
     tree = bpy.data.node_groups.new("Asked", "ShaderNodeTree")
-    sockets = tree.nodes.new(node_type).inputs.keys()
-    bpy.data.node_groups.remove(tree)
-    return all(name in sockets for name in inputs)
+    try:
+        node = tree.nodes.new(node_type)
+        return all(name in node.inputs for name in inputs) and all(
+            _takes(node.bl_rna.properties.get(name), value) for name, value in (settings or {}).items())
+    except RuntimeError:  # no such type
+        return False
+    finally:
+        bpy.data.node_groups.remove(tree)
+
+
+def _takes(setting, value):
+    """Whether a property is there and takes the value."""
+    return setting is not None and (setting.type != 'ENUM' or value in setting.enum_items.keys())
 
 
 def material(name, node_type, **inputs):
@@ -148,6 +159,11 @@ def material(name, node_type, **inputs):
         socket.default_value = (*value, 1.0) if is_color and len(value) == 3 else value
     tree.links.new(node.outputs[0], output.inputs["Surface"])
     return made
+
+
+def shader_of(made):
+    """The node that a material's surface is linked to."""
+    return made.node_tree.nodes["Material Output"].inputs["Surface"].links[0].from_node
 
 
 def emitter(color, name="Emitter", strength=1.0):
@@ -186,6 +202,22 @@ def by_both(samples):
         set_engine(engine, samples)
         pictures.append(render())
     return pictures
+
+
+def seeds_by_both(samples, seeds=SEEDS):
+    """The scene as it is by Volley and by Cycles, of so many samples, shared out among seeds: two arrays
+    (seeds, height, width, 4), whose spread is their noise (see compare.unexplained)."""
+    scene, pictures = bpy.context.scene, []
+    for engine in ('VOLLEY', 'CYCLES'):
+        set_engine(engine, samples // len(seeds))
+        if engine == 'CYCLES':
+            independent_seeds()
+        settings = scene.volley if engine == 'VOLLEY' else scene.cycles
+        pictures.append([])
+        for seed in seeds:
+            settings.seed = seed
+            pictures[-1].append(render())
+    return [np.array(side) for side in pictures]
 
 
 def sharpen():

@@ -1,0 +1,284 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which rays see what: the switches of objects and of what makes instances of them, holdouts, motion blur
+of instances, each in a column of its own beside Cycles."""
+
+import math
+
+import compare
+import pytest
+
+COLUMNS = 6
+SPACING = 2.0   # m between columns
+COLUMN_PX = 16
+SAMPLES = 64
+SWITCHES = ("visible_camera", "visible_diffuse", "visible_glossy", "visible_transmission", "visible_shadow")
+ROUNDING = 1e-6  # all else is noise, measured on the seeds
+
+
+# Inside Blender ------------------------------------------------------------------------------------
+
+def _column(number):
+    return (number - 0.5 * (COLUMNS - 1)) * SPACING
+
+
+def _room():
+    """A mirror that shows what floats behind it over a matt floor in the sun, and a pane before the upper
+    half of that: every kind of ray meets it."""
+    import scenes
+    scene = scenes.empty(size=(COLUMNS * COLUMN_PX, 48))
+    # Aside, so that no edge runs through the middles of pixels.
+    scenes.camera(location=(0.013, -10.0, 7.031), rotation=(math.radians(60), 0.0, 0.0), type='ORTHO',
+                  ortho_scale=COLUMNS * SPACING)
+    matt = scenes.material("Matt", "ShaderNodeBsdfDiffuse", Color=(0.7, 0.7, 0.7))
+    mirror = scenes.material("Mirror", "ShaderNodeBsdfGlossy", Color=(0.9, 0.9, 0.9), Roughness=0.0)
+    glass = scenes.material("Pane", "ShaderNodeBsdfRefraction", Color=(0.7, 0.9, 0.8), Roughness=0.0, IOR=1.1)
+    for name, near, far, material in (("Mirror", -3.5, -1.5, mirror), ("Floor", -1.5, 4.0, matt)):
+        scenes.mesh(name, [(-7, near, 0), (7, near, 0), (7, far, 0), (-7, far, 0)], [(0, 1, 2, 3)], material)
+    pane = scenes.mesh("Pane", [(-7, -1, 1.9), (7, -1, 1.9), (7, -1, 3), (-7, -1, 3)], [(0, 1, 2, 3)], glass)
+    pane.visible_shadow = False
+    scenes.light('SUN', energy=1.0, angle=0.0, rotation=(0.4, 0.1, 0.0))
+    return scene
+
+
+def _ball(number, shines=True):
+    """A ball that is to float over a column."""
+    import scenes
+    material = scenes.emitter((1.0, 0.6, 0.3), strength=2.0) if shines else \
+        scenes.material("Dull", "ShaderNodeBsdfDiffuse", Color=(0.3, 0.6, 1.0))
+    return scenes.sphere(f"Ball{number}", 0.4, (0.0, 0.0, 1.3), material)
+
+
+def _lamp(kind):
+    """A light that is to float over a column, seen by all rays."""
+    import scenes
+    made = scenes.light(kind, (0.0, 0.0, 1.3), (0.0, 0.0, 0.0), energy=60.0)
+    made.data.shadow_soft_size = 0.4
+    for switch in SWITCHES:
+        setattr(made, switch, True)
+    return made
+
+
+def _instancer(number, *members):
+    """An empty over a column that shows an own collection of these objects, which are nowhere else."""
+    import bpy
+    import scenes
+    collection = bpy.data.collections.new(f"Source{number}")
+    for member in members:
+        bpy.context.scene.collection.objects.unlink(member)
+        collection.objects.link(member)
+    made = scenes.link(f"Instancer{number}", None)
+    made.instance_type, made.instance_collection = 'COLLECTION', collection
+    made.location.x = _column(number)
+    return made
+
+
+def _pictures():
+    import scenes
+    return scenes.seeds_by_both(SAMPLES)
+
+
+def inside_switches(kind):
+    """Balls or lights whose own switches, or those of their instancer, are off one after the other; the
+    last column has all."""
+    import scenes
+    pictures = {}
+    for where in ("own", "instancer"):
+        _room()
+        for number in range(COLUMNS):
+            switch = SWITCHES[number] if number < len(SWITCHES) else ""
+            # Light from within what casts no shadow has another weight in Cycles' sum of its samplings.
+            member = _ball(number, switch != "visible_shadow") if kind == 'MESH' else _lamp(kind)
+            instancer = _instancer(number, member)
+            if switch:
+                setattr(member if where == "own" else instancer, switch, False)
+        pictures[where] = _pictures()
+    return pictures
+
+
+def inside_makers():
+    """Balls that several kinds of makers show, which rays of two kinds do not see: as a maker's switches
+    and as the ball's."""
+    pictures = {}
+    for switches in (("visible_camera", "visible_glossy"), ("visible_diffuse", "visible_shadow")):
+        for where in ("own", "maker"):
+            _room()
+            for number, make in enumerate((_instancer, _faces, _vertices, _particles, _nodes)):
+                ball = _ball(number, False)
+                maker = make(number, ball)
+                for switch in switches:
+                    setattr(ball if where == "own" else maker, switch, False)
+            pictures[f"{switches} of the {where}"] = _pictures()
+    return pictures
+
+
+def _triangle(number):
+    """A small dark triangle over a column that makes instances of something."""
+    import scenes
+    made = scenes.mesh(f"Maker{number}", [(-0.2, 0.1, 1.3), (0.2, 0.1, 1.3), (0.0, 0.1, 1.7)], [(0, 1, 2)],
+                       scenes.emitter((0.1, 0.1, 0.1), "Dark"))
+    made.location.x = _column(number)
+    return made
+
+
+def _faces(number, ball):
+    maker = _triangle(number)
+    maker.instance_type, ball.parent, ball.location.z = 'FACES', maker, 0.0
+    maker.show_instancer_for_render = False
+    return maker
+
+
+def _vertices(number, ball):
+    maker = _triangle(number)
+    maker.instance_type, ball.parent, ball.location.z = 'VERTS', maker, -0.2
+    ball.scale = (0.6, 0.6, 0.6)
+    return maker
+
+
+def _particles(number, ball):
+    maker = _triangle(number)
+    maker.modifiers.new("Balls", 'PARTICLE_SYSTEM')
+    settings = maker.particle_systems[0].settings
+    settings.type, settings.count, settings.use_advanced_hair = 'HAIR', 2, True
+    settings.render_type, settings.instance_object, settings.particle_size = 'OBJECT', ball, 0.15
+    ball.location = (0.0, 0.0, -50.0)
+    return maker
+
+
+def _nodes(number, ball):
+    import scenes
+    maker = _triangle(number)
+    instance, = scenes.geometry_nodes(maker, "GeometryNodeInstanceOnPoints")
+    tree = maker.modifiers[0].node_group
+    info = tree.nodes.new("GeometryNodeObjectInfo")
+    info.inputs["Object"].default_value, info.inputs["As Instance"].default_value = ball, True
+    tree.links.new(info.outputs["Geometry"], instance.inputs["Instance"])
+    instance.inputs["Scale"].default_value = (0.6, 0.6, 0.6)
+    ball.location = (0.0, 0.0, -50.0)
+    return maker
+
+
+def inside_holes():
+    """Holdouts and objects that are only indirectly visible, of themselves, of their instancers and of
+    collections; with and without a transparent film."""
+    import bpy
+    import scenes
+    scene = _room()
+    scene.render.film_transparent = True
+    layer = bpy.context.view_layer.layer_collection
+
+    def collected(thing, **settings):
+        collection = bpy.data.collections.new("Of " + thing.name)
+        scene.collection.children.link(collection)
+        scene.collection.objects.unlink(thing)
+        collection.objects.link(thing)
+        for name, value in settings.items():
+            setattr(layer.children[collection.name], name, value)
+
+    balls = [_ball(number, False) for number in range(COLUMNS)]
+    _instancer(0, balls[0])
+    balls[0].is_holdout = True
+    _instancer(1, balls[1]).is_holdout = True
+    collected(_instancer(2, balls[2]), holdout=True)
+    collected(_instancer(3, balls[3]), indirect_only=True)
+    collected(_instancer(4, balls[4]), indirect_only=True, holdout=True)
+    _instancer(5, balls[5])
+    pictures = {"transparent film": _pictures()}
+    scene.render.film_transparent = False
+    pictures["film"] = _pictures()
+    return pictures
+
+
+def inside_hidden():
+    """What is not to be rendered: a member, an instancer, their collections, a maker without itself."""
+    import bpy
+    _room()
+    balls = [_ball(number, False) for number in range(COLUMNS)]
+    balls[0].hide_render = True
+    _instancer(0, balls[0])
+    _instancer(1, balls[1]).hide_render = True
+    _instancer(2, balls[2]).instance_collection.hide_render = True
+    balls[3].hide_viewport = True
+    _instancer(3, balls[3])
+    _instancer(4, balls[4]).hide_viewport = True
+    _vertices(5, balls[5]).show_instancer_for_render = False
+    balls[5].hide_set(True)
+    return {"hidden": _pictures()}
+
+
+def inside_motion():
+    """Moving instances whose blur is off or of other steps, by themselves or by their instancers, and
+    members that deform; turning fast, so that steps are to be seen."""
+    import bpy
+    import scenes
+    scene = scenes.empty(size=(COLUMNS * COLUMN_PX, 48))
+    scenes.camera(location=(0.0, -10.0, 1.0), type='ORTHO', ortho_scale=COLUMNS * SPACING)
+    pictures = {}
+    for kind in ("moving", "deforming"):
+        for number in range(COLUMNS):
+            bar = scenes.mesh(f"Bar{number}", [(-0.8, 0, -0.1), (0.8, 0, -0.1), (0.8, 0, 0.2), (-0.8, 0, 0.2)],
+                              [(0, 1, 2, 3)], scenes.emitter((1.0, 0.6, 0.3)))
+            instancer = _instancer(number, bar)
+            instancer.location.z = 1.0
+            owner = (bar, instancer)[number % 2]
+            if number // 2 == 0:
+                owner.cycles.use_motion_blur = False
+            elif number // 2 == 1:
+                owner.cycles.use_deform_motion = False
+            else:
+                owner.cycles.motion_steps = 3
+            moving = instancer
+            if kind == "deforming":
+                moving = bar.shape_key_add(name="Basis") and bar.shape_key_add(name="Up")
+                for point in moving.data:
+                    point.co.z += 2.0 * point.co.x
+            for frame, value in ((0, -1.2), (1, 0.0), (2, 1.7)):
+                if kind == "deforming":
+                    moving.value = 0.5 + 0.4 * value
+                    moving.keyframe_insert("value", frame=frame)
+                else:
+                    moving.rotation_euler.y = value
+                    moving.keyframe_insert("rotation_euler", frame=frame)
+        scene.frame_set(1)
+        scene.render.use_motion_blur, scene.render.motion_blur_shutter = True, 1.5
+        pictures[kind] = scenes.seeds_by_both(4 * SAMPLES)
+        for thing in list(bpy.data.objects):
+            if thing.type != 'CAMERA':
+                bpy.data.objects.remove(thing)
+    return pictures
+
+
+def inside_camera():
+    """A moving camera whose own blur is off, and of more steps."""
+    import scenes
+    scene = scenes.empty(size=(96, 48))
+    made = scenes.camera()
+    scenes.wall("Wall", 2.0, material=scenes.emitter((1.0, 0.6, 0.3)))
+    for frame, value in ((0, -0.4), (1, 0.1), (2, 0.2)):
+        made.rotation_euler = (math.pi / 2 + 0.2 * value * value, value, 0.0)
+        made.keyframe_insert("rotation_euler", frame=frame)
+    scene.frame_set(1)
+    scene.render.use_motion_blur, scene.render.motion_blur_shutter = True, 1.5
+    pictures = {}
+    made.cycles.motion_steps = 3
+    pictures["three steps"] = scenes.seeds_by_both(4 * SAMPLES)
+    made.cycles.use_motion_blur = False
+    pictures["off"] = scenes.seeds_by_both(SAMPLES)
+    return pictures
+
+
+# Comparison ----------------------------------------------------------------------------------------
+
+def _agree(pictures):
+    for name, (ours, theirs) in pictures.items():
+        assert theirs.std() > 0.05, f"{name}: the picture shows nothing"
+        assert max(compare.unexplained(ours, theirs)) < ROUNDING, name
+
+
+@pytest.mark.parametrize("kind", ['MESH', 'POINT', 'AREA'])
+def test_switches(blender, kind):
+    _agree(blender.run(inside_switches, kind))
+
+
+@pytest.mark.parametrize("inside", [inside_makers, inside_holes, inside_hidden, inside_motion, inside_camera])
+def test_pictures(blender, inside):
+    _agree(blender.run(inside))
