@@ -463,13 +463,13 @@ def inside_light(names):
         _, ball = _stage()
         if name in _MATERIALS:
             node_type, inputs, *settings = _MATERIALS[name]
-            if not scenes.has_node(node_type, inputs):
+            settings = settings[0] if settings else {}
+            if not scenes.has_node(node_type, inputs, settings):
                 continue
             tried = scenes.material("Tried", node_type,
                                     **{k.replace(" ", "_"): v for k, v in inputs.items()})
-            shader = next(n for n in tried.node_tree.nodes if n.bl_idname == node_type)
-            for key, value in (settings[0] if settings else {}).items():
-                setattr(shader, key, value)
+            for key, value in settings.items():
+                setattr(scenes.shader_of(tried), key, value)
             ball.data.materials[0] = tried
             _shine('RECTANGLE')
             _shine('WORLD')

@@ -28,7 +28,7 @@ _SHEEN = "Cycles' fit, at the outline"
 _COAT = "Cycles 3.4 samples its coat by GGX but weighs the samples as GTR1; by lamps alone both agree"
 KNOWN = {
     "glossy roughness 0.8 distribution ASHIKHMIN_SHIRLEY":
-        (0.02, 0.025, "Cycles keeps rays that go below the faces at the outline; inside it both agree"),
+        (0.02, 0.035, "Cycles keeps rays that go below the faces at the outline; inside it both agree"),
     "glossy roughness 0.8 distribution MULTI_GGX": (0.025, 0.06, _MULTIPLE),
     "glass roughness 0.5 ior 1.45": (0.03, 0.07, _MULTIPLE),
     "glass roughness 0.5 ior 2.2 distribution BECKMANN":
@@ -58,9 +58,9 @@ _add("diffuse", "ShaderNodeBsdfDiffuse", {"Color": _GOLD}, Roughness=(0.0, 0.3, 
 _add("glossy", "ShaderNodeBsdfGlossy", {"Color": _GOLD}, Roughness=(0.1, 0.35, 0.8),
      distribution=('GGX', 'BECKMANN', 'ASHIKHMIN_SHIRLEY', 'MULTI_GGX'))
 _add("mirror", "ShaderNodeBsdfGlossy", {"Color": _GOLD}, {"distribution": 'SHARP'})
-for _node in ("ShaderNodeBsdfAnisotropic", "ShaderNodeBsdfGlossy"):  # one node from 4.0 on
-    _add(f"{_node[14:].lower()} brushed", _node, {"Color": _GOLD, "Roughness": 0.4}, {"distribution": 'GGX'},
-         Anisotropy=(-0.6, 0.7), Rotation=(0.0, 0.2))
+# A node of its own before 4.0, which has its sockets on Glossy.
+_add("glossy brushed", "ShaderNodeBsdfAnisotropic", {"Color": _GOLD, "Roughness": 0.4},
+     {"distribution": 'GGX'}, Anisotropy=(-0.6, 0.7), Rotation=(0.0, 0.2))
 _add("glass", "ShaderNodeBsdfGlass", {"Color": _PALE}, Roughness=(0.0, 0.15, 0.5), IOR=(1.1, 1.45, 2.2),
      distribution=('GGX', 'BECKMANN'))
 _add("glass", "ShaderNodeBsdfGlass", {"Color": _PALE}, {"distribution": 'MULTI_GGX'}, Roughness=(0.15, 0.5),
@@ -86,6 +86,8 @@ _add("principled", _PRINCIPLED, {"Base Color": _PALE, "Roughness": 0.2}, Transmi
 _add("principled", _PRINCIPLED, {"Base Color": _GOLD}, Alpha=(0.0, 0.4))
 _add("principled", _PRINCIPLED, {"Base Color": _GOLD, "Emission": (0.2, 0.5, 0.9)}, Emission_Strength=(0.5,))
 # From 4.0 on.
+_add("principled", _PRINCIPLED, {"Base Color": _GOLD, "Emission Color": (0.2, 0.5, 0.9)},
+     Emission_Strength=(0.25,))
 _add("principled", _PRINCIPLED, {"Base Color": _GOLD, "Roughness": 0.3}, Specular_IOR_Level=(0.0, 1.0),
      Specular_Tint=((1.0, 1.0, 1.0), (1.0, 0.4, 0.2)), IOR=(1.2, 2.0))
 _add("principled", _PRINCIPLED, {"Base Color": _GOLD, "Sheen Weight": 1.0}, Sheen_Roughness=(0.2, 0.8))
@@ -117,15 +119,11 @@ def _ball(number, name, case):
     """A ball of that shader in its cell; False where this Blender lacks it or one of its settings."""
     import scenes
     node_type, inputs, settings = case
-    if not scenes.has_node(node_type, inputs):
+    if not scenes.has_node(node_type, inputs, settings):
         return False
     material = scenes.material(name, node_type, **{key.replace(" ", "_"): value for key, value in inputs.items()})
-    shader = next(node for node in material.node_tree.nodes if node.bl_idname == node_type)
-    try:
-        for key, value in settings.items():
-            setattr(shader, key, value)
-    except (AttributeError, TypeError):  # a distribution that came or went
-        return False
+    for key, value in settings.items():
+        setattr(scenes.shader_of(material), key, value)
     x, z = number % GRID, number // GRID
     away = DEPTH * ((3 * x + 5 * z) % GRID)  # from its neighbours, which it would show
     scenes.sphere(name, 0.42, (x - 0.5 * (GRID - 1), away, z - 0.5 * (GRID - 1)), material)

@@ -39,6 +39,9 @@ for _dimensions in ("1D", "2D", "3D", "4D"):
         _add(f"musgrave {_dimensions} {_kind}", "ShaderNodeTexMusgrave", ("Fac",),
              {"musgrave_dimensions": _dimensions, "musgrave_type": _kind}, Scale=2.0, Detail=3.4,
              Dimension=0.7, Lacunarity=2.2, **_place)
+        _add(f"noise {_dimensions} type {_kind}", "ShaderNodeTexNoise", ("Fac", "Color"),
+             {**_key, "noise_type": _kind, "normalize": False}, Scale=2.0, Detail=3.4, Roughness=0.6,
+             Lacunarity=2.2, Offset=0.3, Gain=1.4, Distortion=0.2, **_place)
     for _feature, _outputs in (
             ("F1", ("Distance", "Color", "Position")), ("F2", ("Distance", "Color", "Position")),
             ("SMOOTH_F1", ("Distance", "Color", "Position")), ("DISTANCE_TO_EDGE", ("Distance",)),
@@ -336,16 +339,10 @@ def _build(tree, center, case, output):
 
 
 def _is_known(node_type, properties):
-    """Whether this Blender has the node and its properties."""
-    import bpy
-    node = getattr(bpy.types, node_type, None)
-    return node is not None and all(callable(value) or _has(node.bl_rna.properties.get(key), value)
-                                    for key, value in properties.items())
-
-
-def _has(setting, value):
-    """Whether a property is there and takes the value."""
-    return setting is not None and (setting.type != 'ENUM' or value in setting.enum_items.keys())
+    """Whether this Blender has the node and its properties; what is called is none."""
+    import scenes
+    return scenes.has_node(node_type, settings={key: value for key, value in properties.items()
+                                                if not callable(value)})
 
 
 def inside_cases(names):

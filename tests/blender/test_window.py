@@ -1,21 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The rendered viewport, panels and previews in a window on a virtual display."""
 
-import shutil
-
 import numpy as np
 import pytest
 
 DRAW_SECONDS = 0.5
 LONGEST_DRAWS = 60  # until a view must have come to rest, on a busy machine too
-
-
-@pytest.fixture
-def window(blender):
-    """A Blender that can open a window."""
-    if shutil.which("xvfb-run") is None:
-        pytest.skip("no xvfb-run found")
-    return blender
 
 
 def _view():

@@ -9,8 +9,10 @@ too). An exception inside, a crash or a time-out fails the test with Blender's o
     BLENDER_USER_SCRIPTS  the user-scripts folder of the build, else build/blender
 """
 
+import functools
 import os
 import pickle
+import re
 import shutil
 import subprocess
 import sys
@@ -28,6 +30,19 @@ class BlenderError(AssertionError):
 def executable():
     """The Blender to test with, None if there is none."""
     return shutil.which(os.environ.get("VOLLEY_BLENDER", "blender"))
+
+
+@functools.lru_cache(maxsize=None)
+def version():
+    """Major and minor number of the Blender to test with."""
+    output = subprocess.run([executable(), "--version"], stdin=subprocess.DEVNULL, text=True,
+                            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=True).stdout
+    return tuple(int(number) for number in re.search(r"Blender (\d+)\.(\d+)", output).groups())
+
+
+def has_display():
+    """Whether windows can be opened on a virtual display."""
+    return shutil.which("xvfb-run") is not None
 
 
 def user_scripts():

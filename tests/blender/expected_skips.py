@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which tests a version of Blender cannot run, and why. The run holds to it: a test that skips without
+being listed fails, and so does a listed one that does not skip (see conftest.py).
+
+Patterns are those of fnmatch with brackets as they are, on "file::test"; since (included) and before are
+versions of Blender, None without an end.
+"""
+
+import fnmatch
+from collections import namedtuple
+
+Skip = namedtuple("Skip", "pattern since before why")
+
+_LIGHT = "test_against_cycles.py::test_light"
+_SHADER = "test_shaders.py::test_against_cycles"
+_TEXTURE = "test_textures.py::test_against_cycles"
+_MERGED = "Musgrave became a part of Noise, whose own cases have its types"
+_OCTAVES = "Voronoi has octaves since 4.0"
+_VELVET = "the Velvet shader gave way to Sheen"
+_SHEEN = "the Sheen shader came with 4.0"
+_METALLIC = "the Metallic shader came with 4.3"
+_PRINCIPLED = "Principled has other inputs since 4.0; those of each have cases of their own"
+
+SKIPS = (
+    # Blender 3
+    *(Skip(f"{_TEXTURE}[voronoi {kind}]", None, (4, 0), _OCTAVES) for kind in (
+        "*, octaves", "* to 1", "* varies", "F1, no lacunarity")),
+    Skip(f"{_TEXTURE}[math FLOORED_MODULO]", None, (4, 0), "the operation came with 4.0"),
+    Skip(f"{_TEXTURE}[mix EXCLUSION*]", None, (4, 0), "the blend mode came with 4.0"),
+    Skip(f"{_TEXTURE}[noise * type *]", None, (4, 1), "the types were the Musgrave texture's"),
+    Skip(f"{_SHADER}[sheen *]", None, (4, 0), _SHEEN),
+    Skip(f"{_LIGHT}[sheen]", None, (4, 0), _SHEEN),
+    Skip(f"{_SHADER}[metallic *]", None, (4, 3), _METALLIC),
+    Skip(f"{_LIGHT}[metallic]", None, (4, 3), _METALLIC),
+    Skip(f"{_LIGHT}[conductor]", None, (4, 3), _METALLIC),
+    *(Skip(f"{_SHADER}[principled {kind} *]", None, (4, 0), _PRINCIPLED) for kind in (
+        "specular ior level", "sheen roughness", "coat roughness", "transmission weight")),
+    Skip(f"{_SHADER}[principled emission strength 0.25]", None, (4, 0), _PRINCIPLED),
+    *(Skip(f"{_LIGHT}[{kind}]", None, (4, 0), _PRINCIPLED) for kind in (
+        "layers", "specular tint", "large ior", "rough metal", "brushed metal", "coat", "rough coat",
+        "velvety", "coated emission")),
+    Skip(f"{_SHADER}[principled diffuse roughness *]", None, (4, 3), "the input came with 4.3"),
+    Skip(f"{_LIGHT}[rough base]", None, (4, 3), "the input came with 4.3"),
+    # Blender 4
+    Skip(f"{_TEXTURE}[musgrave *]", (4, 1), None, _MERGED),
+    Skip(f"{_SHADER}[velvet *]", (4, 0), None, _VELVET),
+    Skip(f"{_LIGHT}[velvet]", (4, 0), None, _VELVET),
+    Skip(f"{_SHADER}[mirror]", (4, 0), None, "Sharp went; a roughness of 0 is the same and has a case"),
+    *(Skip(f"{_SHADER}[principled {kind} *]", (4, 0), None, _PRINCIPLED) for kind in (
+        "specular 0.0", "specular 1.0", "sheen tint", "clearcoat roughness", "transmission 0.5",
+        "transmission 1.0")),
+    Skip(f"{_SHADER}[principled emission strength 0.5]", (4, 0), None, _PRINCIPLED),
+)
+
+
+def reason(name, version):
+    """Why a version, as (major, minor), skips the test of that name, None if it must run."""
+    for skip in SKIPS:
+        if is_of(skip, version) and matches(skip, name):
+            return skip.why
+    return None
+
+
+def is_of(skip, version):
+    """Whether an entry is about a version."""
+    return (skip.since is None or version >= skip.since) and (skip.before is None or version < skip.before)
+
+
+def matches(skip, name):
+    """Whether an entry is about the test of that name."""
+    return fnmatch.fnmatchcase(name, skip.pattern.replace("[", "[[]"))
