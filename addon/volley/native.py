@@ -238,6 +238,7 @@ _FUNCTIONS = {  # name: (result, arguments); a status result is checked by _call
     "trc_material_create": (_i32, (_u64, _ptr, _ptr)),
     "trc_material_update": (_i32, (_u64, _u64, _ptr)), "trc_material_destroy": (_i32, (_u64, _u64)),
     "trc_image_create": (_i32, (_u64, _ptr, _ptr)), "trc_image_destroy": (_i32, (_u64, _u64)),
+    "trc_image_expect": (_i32, (_u64, _ptr)),
     "trc_render_start": (_i32, (_u64, _ptr, _ptr)), "trc_render_poll": (_i32, (_u64, _ptr)),
     "trc_render_wait": (_i32, (_u64, _f64)), "trc_render_cancel": (_i32, (_u64,)),
     "trc_render_read": (_i32, (_u64, _u32, _ptr, _u64)), "trc_render_destroy": (_i32, (_u64,))}
@@ -574,11 +575,23 @@ class Scene:
             surface=surface, **values)
         return desc, (keep, structs, inputs)
 
-    def create_image(self, pixels=None, path=None, alpha_mode=ALPHA_STRAIGHT, is_srgb=False,
-                     color_space=(None, None), max_side=0, is_mip_mapped=False):
-        """An image from a file (absolute path) or from pixels (height, width, 4), float32 or uint8,
-        bottom row first; color_space: a configuration of OpenColorIO and a name in it; max_side: pixels,
-        to which a larger one is halved, 0 for none; is_mip_mapped: with smaller levels for minification."""
+    def create_image(self, **values):
+        """An image from a file or from pixels (height, width, 4), float32 or uint8, bottom row first; other
+        keywords as :meth:`_image_desc`."""
+        desc, keep = self._image_desc(**values)
+        return self._create("trc_image_create", desc)
+
+    def expect_image(self, **values):
+        """Read the file of an image ahead, beside others: :meth:`create_image` with equal keywords, before
+        the next commit, takes it from there."""
+        desc, keep = self._image_desc(**values)
+        _call("trc_image_expect", self._handle, ctypes.byref(desc))
+
+    @staticmethod
+    def _image_desc(pixels=None, path=None, alpha_mode=ALPHA_STRAIGHT, is_srgb=False,
+                    color_space=(None, None), max_side=0, is_mip_mapped=False):
+        """path: absolute; color_space: a configuration of OpenColorIO and a name in it; max_side: pixels, to
+        which a larger one is halved, 0 for none; is_mip_mapped: with smaller levels for minification."""
         config, space = color_space[0] and os.fsencode(color_space[0]), _text(color_space[1])
         desc = _ImageDesc(alpha_mode=alpha_mode, is_srgb=int(is_srgb), path=path and os.fsencode(path),
                           color_config=config, color_space=space, max_side=max_side,
@@ -588,7 +601,7 @@ class Scene:
             desc.height, desc.width = pixels.shape[:2]
             desc.is_float = int(pixels.dtype == np.float32)
             desc.pixels, desc.pixel_bytes = _address(pixels), pixels.nbytes
-        return self._create("trc_image_create", desc)
+        return desc, pixels
 
     def destroy_image(self, image):
         self._edit("trc_image_destroy", image)

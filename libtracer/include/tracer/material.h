@@ -405,6 +405,12 @@ typedef struct trc_image_desc {
  * path or a color_space where the reader's program is absent (a build without OpenImageIO) or does
  * not run. */
 TRC_API trc_status trc_image_create(trc_scene scene, const trc_image_desc *desc, trc_id *image_out);
+
+/* Reads the file of a descriptor ahead, beside others and beside other work: trc_image_create with
+ * an equal descriptor takes it from there, before the next commit, which drops what was not taken.
+ * Nothing else comes of it, and it reports no file that cannot be read. */
+TRC_API trc_status trc_image_expect(trc_scene scene, const trc_image_desc *desc);
+
 TRC_API trc_status trc_image_destroy(trc_scene scene, trc_id image);
 
 TRC_END_DECLS

@@ -96,6 +96,18 @@ static trc_status check_image(const trc_image_desc *desc) {
     return check_pixels(desc);
 }
 
+trc_status trc_image_expect(trc_scene scene, const trc_image_desc *desc) {
+    struct trc_scene_access access;
+    TRC_TRY(trc_scene_enter(scene, &access));
+    trc_status status = check_image(desc);
+    if (status == TRC_OK && !desc->path)
+        status = trc_fail(TRC_ERROR_INVALID_ARGUMENT, "an image that is read ahead needs a path");
+    if (status == TRC_OK)
+        trc_scene_expect_image(access.scene, desc);
+    trc_scene_leave(&access);
+    return status;
+}
+
 trc_status trc_image_create(trc_scene scene, const trc_image_desc *desc, trc_id *image_out) {
     struct trc_scene_access access;
     TRC_TRY(trc_scene_enter(scene, &access));

@@ -11,6 +11,7 @@
 #include "core/checks.h"
 #include "core/core.h"
 #include "image/image.h"
+#include "image/prefetch.h"
 #include "scene/mesh.h"
 #include "scene/rebuild.h"
 #include "scene/scene.h"
@@ -311,6 +312,8 @@ static void publish(struct trc_scene_state *scene, struct trc_snapshot_block *bl
 
 static trc_status commit(struct trc_scene_state *scene) {
     const double start = trc_seconds();
+    trc_prefetch_destroy(scene->prefetch); /* what was not asked for by now will not be */
+    scene->prefetch = NULL;
     if (!scene->pool)
         TRC_TRY(trc_pool_create(scene->thread_count, &scene->pool));
     struct trc_snapshot_block *block = trc_alloc_zeroed(1, sizeof *block);

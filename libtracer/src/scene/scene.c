@@ -10,6 +10,7 @@
 #include "core/fpstate.h"
 #include "core/handle.h"
 #include "image/image.h"
+#include "image/prefetch.h"
 #include "image/reader.h"
 #include "scene/commit.h"
 #include "scene/mesh.h"
@@ -88,6 +89,7 @@ static void destroy_all(struct trc_store *store, void (*destroy)(void *object)) 
 }
 
 void trc_scene_state_destroy(struct trc_scene_state *scene) {
+    trc_prefetch_destroy(scene->prefetch);
     trc_rebuild_destroy(scene->rebuild);
     trc_pool_destroy(scene->pool);
     trc_snapshot_release(scene->snapshot);

@@ -14,6 +14,7 @@
 
 struct trc_pool;         /* threads/pool.h */
 struct trc_image_reader; /* image/reader.h */
+struct trc_prefetch;     /* image/prefetch.h */
 
 /* What has changed since the last successful commit. */
 enum {
@@ -61,6 +62,7 @@ struct trc_scene_state {
     bool committing;    /* under cancel_lock */
     atomic_uint cancel; /* read by the workers of a commit */
     struct trc_image_reader *reader; /* held */
+    struct trc_prefetch *prefetch;   /* of images before the next commit, or NULL */
     struct trc_names *names;
     struct trc_store meshes, instances, materials, images, lights;
     struct trc_material *default_material;
@@ -110,6 +112,8 @@ trc_status trc_scene_make_default_material(struct trc_scene_state *scene);
 
 trc_status trc_scene_add_image(struct trc_scene_state *scene, const trc_image_desc *desc,
                                trc_id *id);
+/* Reads an image with a path ahead: a wish, which nothing comes of without memory. */
+void trc_scene_expect_image(struct trc_scene_state *scene, const trc_image_desc *desc);
 trc_status trc_scene_remove_image(struct trc_scene_state *scene, trc_id id);
 
 trc_status trc_scene_add_light(struct trc_scene_state *scene, const trc_light_desc *desc,

@@ -2,6 +2,7 @@
 #include "core/checks.h"
 #include "core/core.h"
 #include "image/image.h"
+#include "image/prefetch.h"
 #include "scene/scene.h"
 #include "shading/compile.h"
 
@@ -133,11 +134,28 @@ static trc_status fit_images(struct trc_scene_state *scene) {
     return status;
 }
 
+void trc_scene_expect_image(struct trc_scene_state *scene, const trc_image_desc *desc) {
+    if (!scene->prefetch && trc_prefetch_create(scene->reader, scene->image_bytes_max,
+                                                &scene->prefetch) != TRC_OK)
+        return;
+    trc_prefetch_add(scene->prefetch, desc);
+}
+
+/* An image that has been read ahead, or is read now. */
+static trc_status get_image(const struct trc_scene_state *scene, const trc_image_desc *desc,
+                            struct trc_image **image_out) {
+    const struct trc_image_source source = {.reader = scene->reader};
+    trc_status status;
+    if (desc->path && scene->prefetch &&
+        trc_prefetch_take(scene->prefetch, desc, &status, image_out))
+        return status;
+    return trc_image_load(desc, &source, image_out);
+}
+
 trc_status trc_scene_add_image(struct trc_scene_state *scene, const trc_image_desc *desc,
                                trc_id *id) {
     struct trc_image *image;
-    const struct trc_image_source source = {.reader = scene->reader};
-    TRC_TRY(trc_image_load(desc, &source, &image));
+    TRC_TRY(get_image(scene, desc, &image));
     trc_id added;
     const trc_status status = trc_store_add(&scene->images, image, &added);
     if (status != TRC_OK) {
