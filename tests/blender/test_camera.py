@@ -220,7 +220,7 @@ def inside_sheared(kind, samples):
         dof.use_dof, dof.aperture_fstop, dof.focus_distance = True, 0.08, 6.0
         dof.aperture_blades, dof.aperture_ratio = 5, 1.5
         look("lens", ["Combined"], 8 * samples)
-    return found
+    return found, bpy.app.version
 
 
 def _blocks(picture, size=8):
@@ -249,7 +249,7 @@ EDGE_NOISE = 6.0 * 2.0 ** 0.5 * 0.5 * (8.0 / 256.0) ** 0.5 / 64.0
 
 @pytest.mark.parametrize("kind", ('PERSP', 'ORTHO'))
 def test_sheared_cameras_are_those_of_cycles(blender, kind):
-    found = blender.run(inside_sheared, kind, 32, timeout=300)
+    found, version = blender.run(inside_sheared, kind, 32, timeout=300)
     for name, (ours, theirs) in found.items():
         even = _even_pixels(found["moving" if name == "moving" else "still"][1]["Combined"])
         for each in ours:
@@ -263,6 +263,8 @@ def test_sheared_cameras_are_those_of_cycles(blender, kind):
                 # The 32 moments of stills are steps as large as noise.
                 assert blocks < (2.0 if name == "blurred" else 1.0) * EDGE_NOISE, (name, each)
                 continue
+            if each == "Vector" and kind == 'ORTHO' and version >= (4, 0, 0):
+                continue  # Cycles' is noise then, with any orthographic camera that turns
             assert seen.mean() > 0.5, (name, each)
             # Samples lie up to a hundredth of a pixel apart.
             assert error[seen].max() < (0.02 if each == "Vector" else 2e-3), (name, each)

@@ -95,12 +95,12 @@ class SceneSync:
             return False
         self._shown = None  # until all is done
         self._images.begin(changes, _size_limit(source))
-        names = self._materials.attribute_names()
+        names, volumes = self._materials.attribute_names(), self._materials.volume_names()
         if not self._materials.change(source.depsgraph, changes):
             return False
         if changes.world:
             self._sync_world(source)
-        if self._materials.attribute_names() != names:
+        if self._materials.attribute_names() != names or self._materials.volume_names() != volumes:
             return False
         for each in touched:
             if each is not shown.IRRELEVANT and not self._change_object(each, shown, source):
@@ -117,6 +117,8 @@ class SceneSync:
             fields = light.describe(each.object, item, self.warnings)
             return fields is not None and self._lights.change(item.key, fields)
         known = shown.items[instance.key_of(each)]
+        if _is_volume(self._materials, each, view_layer):
+            return False
         made_of = filter(None, _materials_of(each.object, view_layer))
         if not self._meshes.brings(known.mesh_key, self._materials.tangents_read_by(made_of)):
             return False
@@ -179,7 +181,7 @@ class _Shown:
     IRRELEVANT = object()  # an object that is no part of the picture
 
     # These never show anything and never make instances.
-    _SILENT_TYPES = {'ARMATURE', 'CAMERA', 'LATTICE', 'SPEAKER', 'LIGHT_PROBE'}
+    _SILENT_TYPES = {'ARMATURE', 'CAMERA', 'LATTICE', 'SPEAKER', 'LIGHT_PROBE', 'VOLUME'}
 
     def __init__(self, walk, source):
         self.items, self._lights, self._tied = walk.items, walk.lights, walk.tied
@@ -235,6 +237,13 @@ def _materials_of(blender_object, view_layer):
     return [slot.material for slot in blender_object.material_slots]
 
 
+def _is_volume(materials, each, view_layer):
+    """Whether an instance is nothing but the bounds of a volume. No ray may meet it: those that pass many
+    would be seen through too often."""
+    made_of = _materials_of(each.object, view_layer)
+    return bool(made_of) and all(map(materials.is_volume, made_of))
+
+
 @dataclass
 class _Deforming:
     """A mesh that waits for its other shapes. read: of an instance at one time, what its shapes take."""
@@ -263,6 +272,7 @@ class _Walk:
         self.items = {}       # key -> Item with a mesh
         self.lights = {}      # key -> fields of a light
         self.tied = set()     # names of objects that are instanced or make instances
+        self._volumes = set()  # names of objects of volumes
 
     def run(self):
         """Find what is there now."""
@@ -279,6 +289,16 @@ class _Walk:
                 self._add_mesh_instance(each)
             elif strands.has_strands(each) and self._view_layer.use_strand:
                 self._add_strands(each)
+            elif isinstance(each.object.data, bpy.types.Volume):
+                self._volumes.add(each.object.name)
+        self._warn_of_volumes()
+
+    def _warn_of_volumes(self):
+        """One warning of all volumes that are left out."""
+        if self._volumes:
+            first, more = min(self._volumes), len(self._volumes) - 1
+            also = f" and {more} more" if more else ""
+            self._sync.warnings.add(f"Volumes are not supported: object '{first}'{also} is left out")
 
     def follow_motion(self, camera_keys):
         """Look at every moving thing at its other times."""
@@ -317,6 +337,8 @@ class _Walk:
 
     def _add_mesh_instance(self, each):
         blender_object = each.object
+        if _is_volume(self._sync._materials, each, self._view_layer):
+            return
         item = self._describe(each)
         _dress(item, self._sync._materials, each, self._view_layer)
         if self._shutter is not None:

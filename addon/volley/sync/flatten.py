@@ -45,6 +45,7 @@ class FlatTree:
         self.needs_instancer = False  # what made the instance, see instance.instancer_values
         self.sun = None           # sky_texture.Sun that the tree shows
         self.follows_objects = False  # it reads where other objects are
+        self.has_volume = False   # something is linked to the output's Volume
 
     def signature(self):
         """Equal for trees that mean the same."""
@@ -62,7 +63,7 @@ def flatten(tree, label, warnings, images=None, aovs=None):
         return walker.flat
     sockets = {socket.identifier: socket for socket in output.inputs}
     for name in ("Volume", "Displacement"):
-        if name in sockets and sockets[name].is_linked:
+        if name in sockets and walker.is_linked(sockets[name]):
             warnings.add(f"{label}: {name.lower()} is not supported and is left out")
     try:
         value = walker.input_value(sockets["Surface"], ())
@@ -73,6 +74,7 @@ def flatten(tree, label, warnings, images=None, aovs=None):
         return FlatTree()
     if value.kind == 's' and value.node >= 0:
         walker.flat.surface = value.node
+    walker.flat.has_volume = "Volume" in sockets and walker.is_linked(sockets["Volume"])
     return walker.flat
 
 

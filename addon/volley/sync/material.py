@@ -40,8 +40,12 @@ class Materials:
         if key not in self._seen and not self._keep(key):
             label = f"Material '{material.name}'"
             flat = self.flatten(material, label)
+            is_volume = flat.surface < 0 and flat.has_volume
+            if is_volume:  # nothing but the bounds of what is left out
+                _let_through(flat)
             self._update(key, flat, material.name, pass_index=material.pass_index,
-                         flags=_flags(material))
+                         flags=_flags(material, is_volume))
+            self._entries[key].is_volume = is_volume
         return self._entries[key]
 
     def knows(self, name):
@@ -128,6 +132,14 @@ class Materials:
             return self._flatten(material.node_tree, label)
         return _plain_surface(material)
 
+    def is_volume(self, material):
+        """Whether an evaluated material is of a volume alone: what has no other is not there."""
+        return material is not None and self.entry_of(material).is_volume
+
+    def volume_names(self):
+        """The names of such materials of this sync."""
+        return {key for key in self._seen if self._entries[key].is_volume}
+
     def _flatten(self, tree, label):
         return flatten.flatten(tree, label, self._warnings, self._images, self._aovs)
 
@@ -178,12 +190,14 @@ class Entry:
         self.uv_names, self.color_names = set(), set()
         self.needs_generated, self.sun = False, None
         self.needs_instancer = False
+        self.is_volume = False  # see Materials.is_volume
         self.images = set()  # those it reads
         self.is_animated = False  # whether what it reads may be another in the next sync
 
 
-def _flags(material):
-    flags = native.MATERIAL_TRANSPARENT_SHADOW if _has_transparent_shadow(material) else 0
+def _flags(material, is_volume):
+    has_transparent_shadow = is_volume or _has_transparent_shadow(material)
+    flags = native.MATERIAL_TRANSPARENT_SHADOW if has_transparent_shadow else 0
     flags |= native.MATERIAL_PLAIN_CHOICE if CHOOSES_LOBES_PLAINLY else 0
     if cycles(material, "sample_as_light", cycles(material, "emission_sampling", 'AUTO') != 'NONE'):
         flags |= native.MATERIAL_SAMPLE_EMISSION
@@ -193,6 +207,13 @@ def _flags(material):
 def _has_transparent_shadow(material):
     """The switch moved from Cycles' settings to the material itself in 4.2."""
     return getattr(material, "use_transparent_shadow", cycles(material, "use_transparent_shadow", True))
+
+
+def _let_through(flat):
+    """Make a tree without a surface one that lets all light through."""
+    white = CONSTANT, 0, (1.0, 1.0, 1.0)
+    flat.nodes.append(flatten.FlatNode(nodes.TRANSPARENT, [white]))
+    flat.surface = len(flat.nodes) - 1
 
 
 def _plain_surface(material):
