@@ -389,7 +389,7 @@ def _aov(tree, name, source, path="Value"):
 
 def _aov_scene():
     """Values and colours of nodes that the surface needs, and of others, in a group too; seen through
-    a clear veil with an AOV of its own, and in the world."""
+    a tinted veil with an AOV of its own, and in the world."""
     import bpy
     import scenes
     scene = _scene()
@@ -413,7 +413,7 @@ def _aov_scene():
     _aov(group, "facing", weight.outputs["Facing"])
     tree.nodes.new("ShaderNodeGroup").node_tree = group
     bpy.data.objects["Veil"].data.materials[0] = clear = scenes.material(
-        "Clear", "ShaderNodeBsdfTransparent", Color=(1.0, 1.0, 1.0))
+        "Clear", "ShaderNodeBsdfTransparent", Color=(0.9, 0.8, 0.7))
     blue = clear.node_tree.nodes.new("ShaderNodeRGB")
     blue.outputs[0].default_value = (0.0, 0.2, 0.7, 1.0)
     _aov(clear.node_tree, "tint", blue.outputs[0], "Color")

@@ -79,8 +79,7 @@ enum {
 
 /* What the AOV nodes of materials and the world write, by the numbers of their modes: 1 channel,
  * and 4 of which the last is 1. Of each sample the values at the first surface that is not mostly
- * seen through, and as in Cycles at those before it, added up; those behind something transparent
- * by what it lets through. */
+ * seen through, and as in Cycles at those before it, added up, whatever these let through. */
 #define TRC_MAX_AOVS 16 /* of each of the two */
 #define TRC_PASS_AOV_VALUE(number) (64u + (number))
 #define TRC_PASS_AOV_COLOR(number) (80u + (number))

@@ -233,9 +233,9 @@ static vmask is_not_done(vuint path) {
     return vi_eq((vint)path & vi_set(TRC_PATH_DATA_DONE), vi_set(0));
 }
 
+/* As Cycles, which takes nothing from what is behind something transparent. */
 static void add_aovs(struct trc_tile *t, const struct trc_material *m,
-                     const struct trc_registers *regs, vfloat weight, const uint32_t *slots,
-                     vmask active) {
+                     const struct trc_registers *regs, const uint32_t *slots, vmask active) {
     for (uint32_t a = 0; a < m->aov_count; a++) {
         float *const *out = t->samples.pass[m->aovs[a].pass];
         const uint32_t channels = trc_pass_channels(m->aovs[a].pass);
@@ -244,7 +244,7 @@ static void add_aovs(struct trc_tile *t, const struct trc_material *m,
             continue;
         for (uint32_t k = 0; k < channels; k++) {
             const struct trc_operand *o = &m->operands[m->aovs[a].first_operand];
-            vf_store(lanes[k], k < 3 ? trc_operand_value(o + k, regs) * weight : weight);
+            vf_store(lanes[k], k < 3 ? trc_operand_value(o + k, regs) : vf_set(1.0f));
         }
         for (uint32_t bits = vm_bits(active); bits; bits &= bits - 1) {
             const int i = __builtin_ctz(bits);
@@ -254,7 +254,7 @@ static void add_aovs(struct trc_tile *t, const struct trc_material *m,
     }
 }
 
-void TRC_KERNEL(trc_world_aovs)(struct trc_tile *t, vvec3 d, vuint path, vvec3 weight,
+void TRC_KERNEL(trc_world_aovs)(struct trc_tile *t, vvec3 d, vuint path,
                                 const uint32_t slots[TRC_WIDTH], vmask active) {
     const vint straight = vi_set(TRC_PATH_TRANSPARENT_BACKGROUND);
     active = vm_and(active, vm_and(vi_eq((vint)path & straight, straight), is_not_done(path)));
@@ -262,7 +262,7 @@ void TRC_KERNEL(trc_world_aovs)(struct trc_tile *t, vvec3 d, vuint path, vvec3 w
         return;
     struct trc_registers regs;
     const struct trc_material *m = TRC_KERNEL(trc_world_run)(t->snapshot, d, path, active, &regs);
-    add_aovs(t, m, &regs, v3_average(weight), slots, active);
+    add_aovs(t, m, &regs, slots, active);
 }
 
 /* ---- for denoisers: of the first rough surface, through mirrors and glass too ----
@@ -324,7 +324,7 @@ vuint TRC_KERNEL(trc_data_passes)(struct trc_tile *t, const struct trc_surface *
         add_mattes(t, s, m, lobes, v3_mul(weight, alpha), slots, on);
     vmask first = vm_and(on, is_not_done(s->path));
     if (m->aov_count)
-        add_aovs(t, m, regs, v3_average(weight), slots, first);
+        add_aovs(t, m, regs, slots, first);
     if (m->has & TRC_MATERIAL_HAS_TRANSPARENCY)
         first = vm_and(first, vf_ge(v3_average(alpha), vf_set(ALPHA_THRESHOLD)));
     if (!vm_any(first))

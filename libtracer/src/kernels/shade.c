@@ -103,7 +103,7 @@ static void shade_misses(struct trc_tile *t, const struct arrival *a, vmask miss
         one_group_add(t, a, missed, added, t->snapshot->world.light_group);
     const uint32_t material = t->snapshot->world.material;
     if (material != UINT32_MAX && t->snapshot->materials[material]->aov_count)
-        TRC_KERNEL(trc_world_aovs)(t, a->d, a->path, a->found_weight, a->slots, missed);
+        TRC_KERNEL(trc_world_aovs)(t, a->d, a->path, a->slots, missed);
 }
 
 /* Lamps of a light group, or of all, that the rays pass on their way to end. */

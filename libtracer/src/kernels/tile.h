@@ -177,9 +177,9 @@ vuint TRC_KERNEL(trc_data_passes)(struct trc_tile *t, const struct trc_surface *
                                   const struct trc_lobes *lobes, vvec3 found_weight, vfloat beyond,
                                   vfloat length, const uint32_t slots[TRC_WIDTH]);
 
-/* What the world's material gives to AOVs where rays in direction d with that weight leave the
- * scene; path: their words. (kernels/data_passes.c) */
-void TRC_KERNEL(trc_world_aovs)(struct trc_tile *t, vvec3 d, vuint path, vvec3 weight,
+/* What the world's material gives to AOVs where rays in direction d leave the scene; path: their
+ * words. (kernels/data_passes.c) */
+void TRC_KERNEL(trc_world_aovs)(struct trc_tile *t, vvec3 d, vuint path,
                                 const uint32_t slots[TRC_WIDTH], vmask active);
 
 /* Traces and empties the shadow queue. (kernels/shadow.c) */

@@ -1,0 +1,314 @@
+/* Passes of what lies behind something partly transparent, and of light in groups, beside sums by
+ * hand. */
+#include "node_list.h"
+#include "picture_test.h"
+
+/* Columns of pixels of 0.25 m, from x = 0 on, seen from 1 m above in parallel rays. */
+enum { WIDTH = 16, HEIGHT = 4, FRAME = WIDTH * HEIGHT };
+
+static trc_id add_nodes(trc_scene scene, const struct node_list *list, uint32_t surface) {
+    const trc_material_desc desc = node_list_material(list, surface);
+    trc_id id = 0;
+    assert_ok(trc_material_create(scene, &desc, &id));
+    return id;
+}
+
+static uint32_t add_emission(struct node_list *list, float r, float g, float b) {
+    return NODE_ADD(list, TRC_NODE_EMISSION, 0, node_color(r, g, b), node_number(1.0f));
+}
+
+static void expect(const char *what, const float *found, const double *want, int channels,
+                   double allowed) {
+    for (int k = 0; k < channels; k++)
+        if (!(fabs((double)found[k] - want[k]) <= allowed))
+            fail_msg("%s: channel %d is %.6f, not %.6f", what, k, (double)found[k], want[k]);
+}
+
+/* Renders a pass of every pixel with so many samples. */
+static void draw(trc_scene scene, uint32_t pass, uint32_t samples, uint32_t transparent,
+                 float *pixels) {
+    trc_render_desc desc = default_render_desc(WIDTH, HEIGHT, samples);
+    desc.filter = TRC_FILTER_BOX;
+    desc.filter_width = 0.01f;
+    desc.film_transparent = transparent;
+    desc.passes = pass < 64 ? UINT64_C(1) << pass : 0;
+    desc.aov_value_count = desc.aov_color_count = 2;
+    desc.light_group_count = 4;
+    fixture_draw(scene, &desc, pass, pixels, (uint64_t)trc_pass_channels(pass) * FRAME);
+}
+
+/* ---- behind something partly transparent ---- */
+
+/* A veil at half the camera's height: emission, and transparency of that share and tint. */
+static const float veil_light[3] = {0.1f, 0.2f, 0.3f}, veil_tint[3] = {0.4f, 0.8f, 1.0f};
+
+static void add_veil(trc_scene scene, float clear) {
+    struct node_list list = {0};
+    const uint32_t light = add_emission(&list, veil_light[0], veil_light[1], veil_light[2]);
+    const uint32_t glass = NODE_ADD(&list, TRC_NODE_TRANSPARENT, 0,
+                                    node_color(veil_tint[0], veil_tint[1], veil_tint[2]));
+    const uint32_t mix = NODE_ADD(&list, TRC_NODE_MIX_SHADER, 0, node_number(clear),
+                                  node_link(light, 0), node_link(glass, 0));
+    NODE_ADD(&list, TRC_NODE_AOV_COLOR, 1, node_color(0.1f, 0.2f, 0.4f));
+    NODE_ADD(&list, TRC_NODE_AOV_VALUE, 0, node_number(3.0f));
+    fixture_level(scene, 10.0f, 0.5f, add_nodes(scene, &list, mix));
+}
+
+/* An opaque square or a sky, both with AOVs. */
+static uint32_t add_aovs(struct node_list *list, uint32_t type) {
+    const uint32_t light = NODE_ADD(list, type, 0, node_color(0.3f, 0.3f, 0.3f), node_number(1.0f));
+    NODE_ADD(list, TRC_NODE_AOV_COLOR, 1, node_color(0.5f, 0.25f, 1.0f));
+    NODE_ADD(list, TRC_NODE_AOV_VALUE, 0, node_number(2.0f));
+    return light;
+}
+
+/* As Cycles 3.4 and 4.3 render the same: all values up to the first surface that is not mostly seen
+ * through, added up, and 1 for each in the last channel. */
+static void aovs_behind_a_veil(void **state) {
+    (void)state;
+    static const double both[4] = {0.6, 0.45, 1.4, 2.0}, veil[4] = {0.1, 0.2, 0.4, 1.0};
+    static const double both_value[1] = {5.0}, veil_value[1] = {3.0};
+    for (int is_sky = 0; is_sky < 2; is_sky++)
+        for (int is_dense = 0; is_dense < 2; is_dense++) {
+            const trc_scene scene = fixture_level_view();
+            struct node_list list = {0};
+            add_veil(scene, is_dense ? 0.3f : 0.75f);
+            const trc_id behind = add_nodes(
+                scene, &list, add_aovs(&list, is_sky ? TRC_NODE_BACKGROUND : TRC_NODE_EMISSION));
+            if (is_sky) {
+                const trc_world_desc world = default_world_desc(behind);
+                assert_ok(trc_scene_set_world(scene, &world));
+            } else {
+                fixture_level(scene, 10.0f, 0.0f, behind);
+            }
+            assert_ok(trc_scene_commit(scene));
+            float color[4 * FRAME], value[FRAME];
+            draw(scene, TRC_PASS_AOV_COLOR(1), 4, 0, color);
+            draw(scene, TRC_PASS_AOV_VALUE(0), 4, 0, value);
+            for (int p = 0; p < FRAME; p++) {
+                expect("colour", color + 4 * p, is_dense ? veil : both, 4, 1e-6);
+                expect("value", value + p, is_dense ? veil_value : both_value, 1, 1e-6);
+            }
+            assert_ok(trc_scene_destroy(scene));
+        }
+}
+
+/* A holdout takes from the film what the veil lets be seen of it, also in part; what a mirror shows
+ * of it is black and covers. */
+static void holdouts_behind_a_veil(void **state) {
+    (void)state;
+    const double clear = 0.75;
+    for (int kind = 0; kind < 3; kind++)
+        for (uint32_t transparent = 0; transparent < 2; transparent++) {
+            const double part = kind == 1 ? 0.6 : 1.0; /* of the surface that is a holdout */
+            const trc_scene scene = fixture_level_view();
+            struct node_list list = {0};
+            const uint32_t light = add_emission(&list, 0.3f, 0.3f, 0.3f);
+            const uint32_t hole = NODE_ADD(&list, TRC_NODE_HOLDOUT, 0, node_standard());
+            list.nodes[hole].input_count = 0;
+            const uint32_t mix = NODE_ADD(&list, TRC_NODE_MIX_SHADER, 0, node_number((float)part),
+                                          node_link(light, 0), node_link(hole, 0));
+            const trc_id material = add_nodes(scene, &list, mix);
+            add_veil(scene, (float)clear);
+            if (kind == 2) {
+                fixture_level(scene, 10.0f, 0.0f, fixture_glossy(scene, 1.0f, 0.0f));
+                fixture_level(scene, 10.0f, 2.0f, material);
+            } else {
+                fixture_level(scene, 10.0f, 0.0f, material);
+            }
+            assert_ok(trc_scene_commit(scene));
+            float pixels[4 * FRAME];
+            double want[4], seen = 0.0;
+            draw(scene, TRC_PASS_COMBINED, 4, transparent, pixels);
+            for (int c = 0; c < 3; c++) {
+                const double through = clear * (double)veil_tint[c];
+                seen += through / 3.0;
+                want[c] = (1.0 - clear) * (double)veil_light[c] + through * (1.0 - part) * 0.3;
+                /* The mirror's ray meets the veil twice more, both times as something that
+                 * shines. */
+                if (kind == 2)
+                    want[c] += through * (1.0 - clear) * (double)veil_light[c];
+            }
+            want[3] = kind == 2 ? 1.0 : 1.0 - seen * part;
+            for (int p = 0; p < FRAME; p++)
+                expect("holdout", pixels + 4 * p, want, 4, 1e-6);
+            assert_ok(trc_scene_destroy(scene));
+        }
+}
+
+/* ---- light in groups ---- */
+
+enum { GROUPS = 4 };
+
+/* The light of column x of strips, and its group, 0 for none: all have one material, the brightness
+ * is of the colour of the instance. */
+static double strip_light(int x) { return 0.25 + 0.125 * (x % 8); }
+static uint32_t strip_group(int x) { return (uint32_t)(7 * x / 2) % (GROUPS + 1); }
+
+static void add_strip(trc_scene scene, trc_id material, int x, float z) {
+    static const uint32_t up[6] = {0, 1, 2, 0, 2, 3};
+    const float left = 0.25f * (float)x, right = left + 0.25f;
+    const float corners[12] = {left, -5, z, right, -5, z, right, 5, z, left, 5, z};
+    const float light = (float)strip_light(x);
+    trc_mesh_desc mesh_desc = default_mesh_desc();
+    trc_id mesh = 0, instance = 0;
+    mesh_desc.vertex_count = 4;
+    mesh_desc.triangle_count = 2;
+    mesh_desc.positions = corners;
+    mesh_desc.position_count = 12;
+    mesh_desc.indices = up;
+    mesh_desc.index_count = 6;
+    assert_ok(trc_mesh_create(scene, &mesh_desc, &mesh));
+    trc_instance_desc desc = default_instance_desc(mesh);
+    desc.materials = &material;
+    desc.material_count = 1;
+    desc.light_group = strip_group(x);
+    for (int c = 0; c < 3; c++)
+        desc.color[c] = light;
+    assert_ok(trc_instance_create(scene, &desc, &instance));
+}
+
+static trc_id add_colored_light(trc_scene scene) {
+    struct node_list list = {0};
+    const uint32_t info = node_add(&list, TRC_NODE_OBJECT_INFO, 0, 0, NULL);
+    const uint32_t light =
+        NODE_ADD(&list, TRC_NODE_EMISSION, 0, node_link(info, 1), node_number(1.0f));
+    return add_nodes(scene, &list, light);
+}
+
+/* Emission that the camera sees, directly or in a mirror, is in its own instance's group, whatever
+ * its neighbours in a packet are in. */
+static void emission_is_in_its_instances_group(void **state) {
+    (void)state;
+    for (int is_mirrored = 0; is_mirrored < 2; is_mirrored++) {
+        const trc_scene scene = fixture_level_view();
+        const trc_id material = add_colored_light(scene);
+        for (int x = 0; x < WIDTH; x++)
+            add_strip(scene, material, x, is_mirrored ? 2.0f : 0.0f);
+        if (is_mirrored)
+            fixture_level(scene, 10.0f, 0.0f, fixture_glossy(scene, 1.0f, 0.0f));
+        assert_ok(trc_scene_commit(scene));
+        for (uint32_t group = 1; group <= GROUPS; group++) {
+            float pixels[3 * FRAME];
+            draw(scene, TRC_PASS_LIGHT_GROUP(group - 1), 4, 0, pixels);
+            for (int p = 0; p < FRAME; p++) {
+                const int x = p % WIDTH;
+                const double light = strip_group(x) == group ? strip_light(x) : 0.0;
+                const double want[3] = {light, light, light};
+                expect("group", pixels + 3 * p, want, 3, 1e-6);
+            }
+        }
+        assert_ok(trc_scene_destroy(scene));
+    }
+}
+
+struct mean {
+    double value, error;
+};
+
+/* Mean of a pass's first channel over the picture and its standard error by the pixels. */
+static struct mean mean_of(trc_scene scene, uint32_t pass) {
+    static float pixels[4 * FRAME];
+    double sum = 0.0, sum2 = 0.0;
+    const uint32_t channels = trc_pass_channels(pass);
+    draw(scene, pass, 256, 0, pixels);
+    for (uint32_t p = 0; p < FRAME; p++) {
+        const double value = (double)pixels[channels * p];
+        sum += value / FRAME;
+        sum2 += value * value / FRAME;
+    }
+    return (struct mean){sum, sqrt(fmax(sum2 - sum * sum, 0.0) / (FRAME - 1))};
+}
+
+/* Five standard errors. */
+static void expect_mean(const char *what, struct mean m, double want) {
+    printf("  %s: %.5f +- %.5f, %.5f expected\n", what, m.value, m.error, want);
+    assert_true(m.error < 0.02 * fmax(want, 1e-3));
+    assert_true(fabs(m.value - want) <= 5.0 * m.error + 1e-6);
+}
+
+/* A white floor under a sun of group 1, a large light on high of group 2, a world of group 3 and
+ * ambient occlusion, which adds light of no group or replaces the world's in its. */
+#define SUN 0.5
+#define SKY 0.25
+#define AMBIENT 0.4
+
+static trc_scene lit_floor(uint32_t method) {
+    const trc_scene scene = fixture_level_view();
+    trc_light_desc light = default_light_desc();
+    trc_id id = 0;
+    fixture_level(scene, 100.0f, 0.0f, fixture_material(scene, TRC_NODE_DIFFUSE, 1.0f));
+    light.type = TRC_LIGHT_SUN;
+    light.strength = (float)SUN;
+    light.light_group = 1;
+    assert_ok(trc_light_create(scene, &light, &id));
+    /* Emission of a mesh, as large as half of the sky by the cosine: a disk seen at 45 degrees. */
+    struct mesh disk;
+    mesh_init(&disk);
+    const uint32_t corners = 256;
+    const uint32_t center = mesh_add_vertex(&disk, 2.0f, 0.0f, 1000.0f);
+    for (uint32_t k = 0; k < corners; k++)
+        mesh_add_vertex(&disk, 2.0f + 1000.0f * cosf(2.0f * (float)PI * (float)k / corners),
+                        1000.0f * sinf(2.0f * (float)PI * (float)k / corners), 1000.0f);
+    for (uint32_t k = 0; k < corners; k++)
+        mesh_add_triangle(&disk, center, 1 + (k + 1) % corners, 1 + k);
+    trc_mesh_desc mesh_desc = default_mesh_desc();
+    mesh_desc.vertex_count = disk.vertex_count;
+    mesh_desc.triangle_count = disk.triangle_count;
+    mesh_desc.positions = disk.positions;
+    mesh_desc.position_count = 3 * disk.vertex_count;
+    mesh_desc.indices = disk.indices;
+    mesh_desc.index_count = 3 * disk.triangle_count;
+    trc_id mesh = 0, instance = 0;
+    assert_ok(trc_mesh_create(scene, &mesh_desc, &mesh));
+    const trc_id shining = fixture_material(scene, TRC_NODE_EMISSION, 0.5f);
+    trc_instance_desc desc = default_instance_desc(mesh);
+    desc.materials = &shining;
+    desc.material_count = 1;
+    desc.light_group = 2;
+    desc.visibility = TRC_VISIBLE_ALL & ~(uint32_t)TRC_VISIBLE_SHADOW; /* nothing is in its shade */
+    assert_ok(trc_instance_create(scene, &desc, &instance));
+    mesh_free(&disk);
+    trc_world_desc world =
+        default_world_desc(fixture_material(scene, TRC_NODE_BACKGROUND, (float)SKY));
+    world.light_group = 3;
+    world.ao_distance = 10.0f;
+    world.ao_factor = (float)AMBIENT;
+    world.ao_method = method;
+    assert_ok(trc_scene_set_world(scene, &world));
+    assert_ok(trc_scene_commit(scene));
+    return scene;
+}
+
+static void groups_share_out_light_samples(void **state) {
+    (void)state;
+    for (uint32_t method = TRC_AO_ADD; method <= TRC_AO_REPLACE; method++) {
+        const trc_scene scene = lit_floor(method);
+        /* What a white floor sends back of so much. The disk is a polygon: less than 1e-4 less of
+         * it. */
+        const double sun = SUN / PI, disk = 0.5 * 0.5;
+        const double sky = method == TRC_AO_ADD ? SKY : AMBIENT * SKY;
+        const double ambient = method == TRC_AO_ADD ? AMBIENT : 0.0;
+        expect_mean("sun", mean_of(scene, TRC_PASS_LIGHT_GROUP(0)), sun);
+        expect_mean("disk", mean_of(scene, TRC_PASS_LIGHT_GROUP(1)), disk);
+        expect_mean("sky", mean_of(scene, TRC_PASS_LIGHT_GROUP(2)), sky);
+        expect_mean("all", mean_of(scene, TRC_PASS_COMBINED), sun + disk + sky + ambient);
+        static float none[3 * FRAME];
+        draw(scene, TRC_PASS_LIGHT_GROUP(3), 4, 0, none);
+        for (int i = 0; i < 3 * FRAME; i++)
+            assert_true(none[i] == 0.0f);
+        assert_ok(trc_scene_destroy(scene));
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(aovs_behind_a_veil),
+        cmocka_unit_test(holdouts_behind_a_veil),
+        cmocka_unit_test(emission_is_in_its_instances_group),
+        cmocka_unit_test(groups_share_out_light_samples),
+    };
+    if (!query_test_isa())
+        return QUERY_TEST_SKIPPED;
+    return cmocka_run_group_tests_name("passes", tests, NULL, NULL);
+}
