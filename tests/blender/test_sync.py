@@ -392,7 +392,8 @@ def inside_hidden_flags():
 
 
 def test_holdout_and_indirect_only(blender):
-    assert blender.run(inside_hidden_flags) == [(30, False), (31, False), (31, True)]
+    # A hole is two instances, one for the camera and one for all other rays.
+    assert blender.run(inside_hidden_flags) == [(1, True), (30, False), (30, False), (31, False)]
 
 
 def inside_edit_costs():

@@ -24,8 +24,8 @@ def inside_soak(cycle_count):
     import time
     import bpy
     import edits
+    import escape
     import scenes
-    from volley import engine
     yield 0.1
     scene = scenes.empty(size=(160, 90), samples=64)
     yield 0.5
@@ -45,32 +45,26 @@ def inside_soak(cycle_count):
     region = next(region for region in area.regions if region.type == 'WINDOW')
     view = {"window": window, "area": area, "region": region}
     area.spaces.active.shading.type = 'RENDERED'
-    dice, deadline, cancelled, rows = random.Random(1), [0.0], [0], []
+    dice, deadline, pressed, cancelled, rows = random.Random(1), [0.0], [False], 0, []
 
-    def test_break(self):
-        is_due = time.monotonic() > deadline[0]
-        return is_due or bpy.types.RenderEngine.test_break(self)
+    def is_pressed():
+        pressed[0] |= time.monotonic() > deadline[0]
+        return pressed[0]
 
-    engine.VolleyRenderEngine.test_break = test_break
-    live = engine.Session.render
-
-    def render(self, *arguments):
-        deadline[0] = time.monotonic() + dice.uniform(0.0, CANCEL_SECONDS)
-        live(self, *arguments)
-        cancelled[0] += time.monotonic() > deadline[0]
-
-    engine.Session.render = render
+    escape.watch(is_pressed)
     begin = time.monotonic()
     for cycle in range(cycle_count):
         yield from _edit(dice.choice((edits.pose, edits.transform, edits.material,
                                       edits.light_energy)), dice)
+        pressed[0], deadline[0] = False, time.monotonic() + dice.uniform(0.0, CANCEL_SECONDS)
         bpy.ops.render.render()
+        cancelled += pressed[0]
         yield DRAW_SECONDS
         if cycle % UNDO_CYCLES == UNDO_CYCLES - 1:
             yield from _undo_storm(bpy, edits, dice, view)
         rows.append((time.monotonic() - begin, _resident_mib()))
         print(f"cycle {cycle}: {rows[-1][0]:.1f} s, {rows[-1][1]:.1f} MiB", flush=True)
-    return rows, cancelled[0]
+    return rows, cancelled
 
 
 def _edit(edit, dice):
