@@ -7,6 +7,7 @@
 
 #include "core/core.h"
 #include "image/image.h"
+#include "image/reader.h"
 
 /* Of the file written last: the test removes it. */
 static char path[256];
@@ -20,10 +21,41 @@ static void write_file(const char *name, const void *bytes, size_t size) {
     assert_int_equal(fclose(file), 0);
 }
 
+#ifndef TRC_READER_PROGRAM
+#define TRC_READER_PROGRAM NULL /* a build without OpenImageIO */
+#endif
+
+/* Reads the files of all tests of the program, once there is one to read. */
+static struct trc_image_reader *file_reader;
+static uint64_t bytes_before_reader;
+
+static const struct trc_image_source *file_source(void) {
+    static struct trc_image_source source;
+    if (!file_reader) {
+        bytes_before_reader = trc_memory_bytes();
+        assert_int_equal(trc_image_reader_create(TRC_READER_PROGRAM, &file_reader), TRC_OK);
+    }
+    source.reader = file_reader;
+    return &source;
+}
+
+/* Where an image with those fields comes from: pixels in no colour space need no reader. */
+static const struct trc_image_source *source_of(const trc_image_desc *desc) {
+    static const struct trc_image_source none;
+    return desc->path || desc->color_space ? file_source() : &none;
+}
+
+/* Group teardown: nothing of what files took is left. */
+static int release_reader(void **state) {
+    (void)state;
+    trc_image_reader_release(file_reader);
+    return file_reader && trc_memory_bytes() != bytes_before_reader;
+}
+
 /* An image that must load. */
 static struct trc_image *loaded(const trc_image_desc *desc) {
     struct trc_image *image = NULL;
-    const trc_status status = trc_image_load(desc, &image);
+    const trc_status status = trc_image_load(desc, source_of(desc), &image);
     if (status != TRC_OK)
         fail_msg("status %d: %s", status, trc_last_message());
     return image;
