@@ -34,7 +34,7 @@ class VolleyRenderEngine(bpy.types.RenderEngine):
 
     def __del__(self):
         jobs.forget(self)
-        self._free()
+        _free(self)
         parent_del = getattr(super(), "__del__", None)
         if parent_del is not None:
             parent_del()
@@ -43,14 +43,14 @@ class VolleyRenderEngine(bpy.types.RenderEngine):
 
     def update(self, data, depsgraph):
         """Everything is read in render(), under one roof; but a job has begun."""
-        with jobs.call(self, is_final=not self.is_preview):
+        with jobs.call(self):
             pass
 
     def render(self, depsgraph):
         """Render one view layer of the depsgraph's scene."""
         if self._session is None:
             self._session = Session()
-        with jobs.call(self, is_final=not self.is_preview), writes.render_call():
+        with jobs.call(self), writes.render_call():
             if not jobs.refusal():
                 self._guard(self._session.render, self, depsgraph)
             if jobs.refusal():
@@ -58,7 +58,7 @@ class VolleyRenderEngine(bpy.types.RenderEngine):
 
     def update_render_passes(self, scene=None, renderlayer=None):
         """Name the passes of a view layer, for the compositor."""
-        with jobs.call(self, is_final=False):
+        with jobs.call(self, is_query=True):
             passes.register_passes(self, scene, renderlayer)
 
     # Viewport
@@ -95,31 +95,17 @@ class VolleyRenderEngine(bpy.types.RenderEngine):
             self._fail("out of memory")
         except Exception as error:  # a defect of ours must not take Blender's render job down
             logger.debug("%s", traceback.format_exc())
-            if self._is_gone():
-                self._free()
+            if _is_gone(self):
+                _free(self)
                 return
             self._fail(jobs.refusal() or f"internal error: {type(error).__name__}: {error}")
 
     def _fail(self, message):
-        self._free()
+        _free(self)
         self.error_set(f"Volley: {message}")
         self.report({'ERROR'}, f"Volley: {message}")
         if bpy.app.background:
             logger.error(message)
-
-    def _is_gone(self):
-        """Whether Blender has freed what this object stands for."""
-        try:
-            return self.is_preview is None
-        except ReferenceError:
-            return True
-
-    def _free(self):
-        # Instances that Blender only asked for passes, or whose __init__ it skipped, have nothing.
-        for name in ("_session", "_viewport"):
-            state = self.__dict__.get(name) if hasattr(self, "__dict__") else None
-            if state is not None:
-                state.free()
 
     # Life of the class
 
@@ -130,6 +116,22 @@ class VolleyRenderEngine(bpy.types.RenderEngine):
         if not jobs.end(seconds):
             return False
         bpy.utils.unregister_class(cls)
+        return True
+
+
+def _free(engine):
+    """Free what it holds of the library; possible, too, after Blender has freed the engine."""
+    # Instances that Blender only asked for passes, or whose __init__ it skipped, have nothing.
+    own = object.__getattribute__(engine, "__dict__")
+    for state in filter(None, (own.get("_session"), own.get("_viewport"))):
+        state.free()
+
+
+def _is_gone(engine):
+    """Whether Blender has freed what the object stands for, which then has no attributes."""
+    try:
+        return engine.is_preview is None
+    except ReferenceError:
         return True
 
 

@@ -4,8 +4,8 @@
 When a script unregisters the class of an engine, Blender frees the engines of all classes, those of a
 running job, too, and the job goes on with freed memory. So the jobs end first: their renders stop as if
 Esc were pressed and report an error, by which Blender ends a job after the frame it is at. Then it has to
-let go of the engines: to free one that it made for a preview or to ask for passes, and to say of a final
-render that it has ended, as each frame may have another engine and persistent data keeps one.
+let go of the engines: to free those of previews, and to say of a final render that it has ended, as each
+frame may have another engine and persistent data keeps one.
 
 All this happens before this engine is unregistered and before any add-on that has another is disabled:
 "Reload Scripts" disables Cycles first. What is kept here is guarded by Python's own lock.
@@ -30,19 +30,23 @@ class _Jobs:
     """What Blender does with engines of this class."""
 
     refusal = ""          # why nothing is rendered now
-    engines = set()       # ids of those made for a preview or to ask for passes
+    previews = set()      # ids of the engines made for one
     threads = []          # of the calls in progress
     render_thread = None  # of the final render under way, from its first engine to its end
     said = set()          # warnings of that render
 
 
 @contextlib.contextmanager
-def call(engine, is_final):
-    """Around a call that Blender makes of an engine; is_final: for a final render."""
-    if is_final:
-        _note_render()
+def call(engine, is_query=False):
+    """Around a call that Blender makes of an engine; is_query: only to ask for its passes, which a job does
+    before it renders."""
+    if is_query:
+        if threading.current_thread() is not threading.main_thread() and _is_job_running():
+            _note_render()
+    elif engine.is_preview:
+        _Jobs.previews.add(id(engine))
     else:
-        _Jobs.engines.add(id(engine))
+        _note_render()
     _Jobs.threads.append(threading.get_ident())
     try:
         yield
@@ -62,7 +66,7 @@ def _note_render():
 
 def forget(engine):
     """Blender frees an engine."""
-    _Jobs.engines.discard(id(engine))
+    _Jobs.previews.discard(id(engine))
 
 
 def is_cancelled(engine):
@@ -129,13 +133,17 @@ def _have_ended(reason, seconds):
 
 
 def _is_busy():
-    return bool(_Jobs.threads or _Jobs.engines or _renders())
+    return bool(_Jobs.threads or _Jobs.previews or _renders())
 
 
 def _renders():
     """Whether a final render is under way: until Blender says that it ended, where it runs a job."""
     return _Jobs.render_thread is not None and (
-        _Jobs.render_thread == threading.main_thread().ident or bpy.app.is_job_running('RENDER'))
+        _Jobs.render_thread == threading.main_thread().ident or _is_job_running())
+
+
+def _is_job_running():
+    return bpy.app.is_job_running('RENDER')
 
 
 def _is_own():
