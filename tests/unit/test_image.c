@@ -794,5 +794,5 @@ int main(void) {
         cmocka_unit_test(test_no_colors),      cmocka_unit_test(test_no_files),
 #endif
     };
-    return cmocka_run_group_tests(tests, NULL, release_reader);
+    return cmocka_run_group_tests(tests, note_memory, release_reader);
 }

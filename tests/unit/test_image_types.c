@@ -257,7 +257,7 @@ int main(void) {
         cmocka_unit_test(colors_of_every_type),
     };
 #ifdef TRC_WITH_OIIO
-    return cmocka_run_group_tests_name("image types", tests, NULL, release_reader);
+    return cmocka_run_group_tests_name("image types", tests, note_memory, release_reader);
 #else
     return cmocka_run_group_tests_name("image types", tests, NULL, NULL);
 #endif
