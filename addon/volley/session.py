@@ -123,7 +123,12 @@ class Session:
                     raise Cancelled()
         finally:
             commit.cancel()
-        commit.check()
+        try:
+            commit.check()
+        except native.TracerError as error:
+            if error.status == native.ERROR_CANCELLED:
+                raise Cancelled() from error
+            raise
 
     def _report_warnings(self, engine):
         for message in self._sync.warnings.take() + self._sync.scene.warnings():
