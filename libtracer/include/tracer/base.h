@@ -88,8 +88,11 @@ TRC_API uint32_t trc_struct_size(const char *name);
  * library was first used. */
 TRC_API uint32_t trc_isa(void);
 
-/* Chooses a lower instruction set for scenes committed and renders started afterwards; TRC_ISA_AUTO
- * returns to the best. TRC_ERROR_UNSUPPORTED if this CPU or build lacks it. */
+/* Chooses a lower instruction set for commits, renders and queries that start afterwards, of all
+ * scenes; TRC_ISA_AUTO returns to the best. Snapshots serve every set: trees have the same bits
+ * whichever builds or refits them, so hits are the same, and commits go on from what another set
+ * has built. A picture's bits may depend on the set that renders it, not on the one that committed
+ * its scene. TRC_ERROR_UNSUPPORTED if this CPU or build lacks it. */
 TRC_API trc_status trc_set_isa(uint32_t isa);
 
 /* "avx512" etc.; "unknown" for a value that is not an ISA. */

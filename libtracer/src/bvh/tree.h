@@ -12,6 +12,9 @@
  * whatever the count and ignore the lanes beyond it; after the last leaf there is room for that.
  * What a hit needs to know of a slot is kept apart.
  *
+ * All of that is the same for every instruction set, whatever its width, to the bit: trees serve
+ * each of them.
+ *
  * A TLAS has the same nodes; its leaves have no vertices: each is one entry of items. */
 #ifndef TRACER_BVH_TREE_H
 #define TRACER_BVH_TREE_H

@@ -116,12 +116,10 @@ static trc_status build_bvh(struct trc_scene_state *scene, const struct trc_snap
     return TRC_OK;
 }
 
-/* Trees made for another instruction set are left behind, not refitted. */
+/* Trees are alike for all instruction sets: one that another has made is as good. */
 static trc_status collect_bvh(struct trc_scene_state *scene,
                               const struct trc_snapshot_block *former,
                               struct trc_snapshot_block *block) {
-    if (former && former->isa != block->isa)
-        former = NULL;
     const bool still = !(scene->changed & (TRC_CHANGED_MESHES | TRC_CHANGED_INSTANCES));
     if (former && still && transparency_is_equal(&former->snapshot, &block->snapshot)) {
         block->bvh = trc_shared_retain(former->bvh);
@@ -320,7 +318,6 @@ static trc_status commit(struct trc_scene_state *scene) {
     if (!block)
         return no_memory();
     atomic_init(&block->snapshot.refs, 1);
-    block->isa = trc_isa();
     const struct trc_snapshot_block *former =
         scene->snapshot ? trc_snapshot_block_of(scene->snapshot) : NULL;
     const trc_status status = fill_block(scene, former, block);

@@ -29,7 +29,6 @@ struct trc_snapshot_block {
     struct trc_shared *lights;
     struct trc_shared *camera;
     struct trc_bvh_build_stats build; /* of the trees, when they were built */
-    uint32_t isa;                     /* in force at the commit */
     bool takes_rebuild;               /* its trees start from the scene's rebuilt one */
     char warnings[TRC_WARNING_BYTES];
 };
