@@ -280,7 +280,7 @@ TRC_INLINE vuint permute_bits(vuint i, vuint seed, uint32_t bits) {
     const uint32_t half = bits / 2 + 1;
     for (int round = 0; round < 3; round++) {
         i = (i + seed) & mask;
-        i = (i * ((seed << 1) | vu_set(0x2c1b3c6du | 1u))) & mask;
+        i = (i * ((seed ^ vu_set(0x2c1b3c6du)) | vu_set(1u))) & mask;
         i ^= i >> half;
         seed = vu_hash(seed + vu_set(0x9e3779b9u));
     }

@@ -1,4 +1,5 @@
-/* Sample sequences: stratification, independence of lanes, bounds of the error they give. */
+/* Sample sequences: stratification, independence of lanes and of dimensions, bounds of the error
+ * they give. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -211,10 +212,174 @@ static void lanes_do_not_matter(void **state) {
     }
 }
 
+/* Dimensions of ten hits, and samples of as many pixels as are looked at: blocks, tiles and keys of
+ * their own. */
+#define DEEP_DIMENSIONS (TRC_DIM_BOUNCE + 10 * TRC_DIMS_PER_BOUNCE)
+enum { DEEP_SAMPLES = 64, DEEP_PIXELS = 64, DEEP_CELLS = 4 };
+
+static float deep[DEEP_DIMENSIONS][DEEP_PIXELS][DEEP_SAMPLES];
+
+static void fill_deep(uint32_t kind) {
+    const struct trc_sampler s = sampler(kind, DEEP_SAMPLES);
+    struct rng random = rng_seed(11);
+    for (uint32_t p = 0; p < DEEP_PIXELS; p++) {
+        const uint32_t x = rng_below(&random, 1 << 14), y = rng_below(&random, 1 << 14);
+        for (uint32_t d = 0; d < DEEP_DIMENSIONS; d++)
+            numbers(&s, pixel_at(x, y), d, DEEP_SAMPLES, deep[d][p]);
+    }
+}
+
+/* Chi-square of the points of one pixel in two dimensions, in cells of 4 x 4. */
+static double cells_chi2(const float *x, const float *y) {
+    int cells[DEEP_CELLS * DEEP_CELLS] = {0};
+    const double expected = (double)DEEP_SAMPLES / (DEEP_CELLS * DEEP_CELLS);
+    double sum = 0.0;
+    for (int i = 0; i < DEEP_SAMPLES; i++)
+        cells[(int)(x[i] * DEEP_CELLS) + DEEP_CELLS * (int)(y[i] * DEEP_CELLS)]++;
+    for (int k = 0; k < DEEP_CELLS * DEEP_CELLS; k++)
+        sum += (cells[k] - expected) * (cells[k] - expected) / expected;
+    return sum;
+}
+
+/* The joint sequence, or the deeper hits that share a shuffled one. */
+static uint32_t padding_group(uint32_t dimension) {
+    return dimension < TRC_JOINT_DIMENSIONS
+               ? 0
+               : (dimension - TRC_DIM_BOUNCE) / (TRC_JOINT_DIMENSIONS - TRC_DIM_BOUNCE);
+}
+
+/* What independent points would have: means over the pixels, of chi-square by cells and of the
+ * correlation, and deviations of the first. */
+struct pair_bounds {
+    double chi2, chi2_deviation;
+};
+
+/* Numbers on their own have 15 degrees of freedom, and those that are stratified in each dimension
+ * 9, times n / (n - 1). Groups go through Sobol's points in orders that are nested in each other's
+ * blocks: digits of the first place then agree over blocks of 2 points and those of the second over
+ * 4, the others not at all, so that of nine products of digits one has four times the variance of
+ * random points, four have twice that, and four none. */
+static struct pair_bounds pair_bounds(uint32_t kind) {
+    const double stratified = 9.0 * DEEP_SAMPLES / (DEEP_SAMPLES - 1.0);
+    if (kind == TRC_SAMPLER_INDEPENDENT)
+        return (struct pair_bounds){15.0, sqrt(2.0 * 15.0)};
+    if (kind == TRC_SAMPLER_JITTER)
+        return (struct pair_bounds){stratified, sqrt(2.0 * stratified)};
+    return (struct pair_bounds){4.0 + 4.0 * 2.0, sqrt(2.0 * (4.0 * 4.0 + 4.0 * 2.0 * 2.0))};
+}
+
+/* Chi-square by cells and correlation of two dimensions, over all pixels. */
+static void measure_pair(uint32_t a, uint32_t b, double *chi2, double *r) {
+    *chi2 = *r = 0.0;
+    for (uint32_t p = 0; p < DEEP_PIXELS; p++) {
+        *chi2 += cells_chi2(deep[a][p], deep[b][p]) / DEEP_PIXELS;
+        for (uint32_t i = 0; i < DEEP_SAMPLES; i++)
+            *r += 12.0 * ((double)deep[a][p][i] - 0.5) * ((double)deep[b][p][i] - 0.5);
+    }
+    *r /= (double)DEEP_SAMPLES * DEEP_PIXELS;
+}
+
+/* Any two dimensions, of one padding group or of two: in a pixel they are spread as evenly together
+ * as independent numbers would be, and over all pixels they do not go together. If two groups took
+ * the points in one order, each pixel's would lie in a few cells: a chi-square of 192. Bounds are
+ * of six deviations, as there are 2,080 pairs; a correlation's is 1 / sqrt(n P), and 1.14 times
+ * that with nested orders. */
+static void deep_dimensions_are_independent(void **state) {
+    (void)state;
+    for (size_t k = 0; k < 5; k++) {
+        const struct pair_bounds bounds = pair_bounds(kinds[k]);
+        const double allowed_chi2 =
+            bounds.chi2 + 6.0 * bounds.chi2_deviation / sqrt((double)DEEP_PIXELS);
+        const double allowed_r = 6.0 * 1.14 / sqrt((double)DEEP_SAMPLES * DEEP_PIXELS);
+        const bool is_sobol = kinds[k] != TRC_SAMPLER_JITTER && kinds[k] != TRC_SAMPLER_INDEPENDENT;
+        double worst_chi2 = 0.0, worst_r = 0.0;
+        int failures = 0;
+        fill_deep(kinds[k]);
+        for (uint32_t a = 0; a < DEEP_DIMENSIONS; a++)
+            for (uint32_t b = a + 1; b < DEEP_DIMENSIONS; b++) {
+                double chi2, r;
+                measure_pair(a, b, &chi2, &r);
+                worst_r = fmax(worst_r, fabs(r));
+                bool is_even = fabs(r) <= allowed_r;
+                if (is_sobol && padding_group(a) == padding_group(b)) {
+                    /* Joe and Kuo's numbers: 64 points of any two of the rows that are used fill
+                     * quarters evenly, and half of all cells at least. */
+                    for (uint32_t bits = 0; bits <= 2; bits++)
+                        is_even = is_even &&
+                                  fills_boxes(deep[a][0], deep[b][0], DEEP_SAMPLES, bits, 2 - bits);
+                    is_even = is_even && chi2 <= (double)DEEP_SAMPLES;
+                } else {
+                    is_even = is_even && chi2 <= allowed_chi2;
+                    worst_chi2 = fmax(worst_chi2, chi2);
+                }
+                if (!is_even && failures++ < 8)
+                    printf("  %s, dimensions %u and %u: chi-square %.1f, correlation %.3f\n",
+                           names[k], a, b, chi2, r);
+            }
+        printf("  %-12s chi-square at most %.1f of %.1f, correlation %.3f of %.3f\n", names[k],
+               worst_chi2, allowed_chi2, worst_r, allowed_r);
+        assert_int_equal(failures, 0);
+    }
+}
+
+/* The same where pixels have one sample each, so that no order tells groups apart: over pixels, 15
+ * degrees of freedom. */
+static void single_samples_are_independent(void **state) {
+    (void)state;
+    enum { PIXELS = DEEP_PIXELS * DEEP_SAMPLES };
+    for (size_t k = 0; k < 5; k++) {
+        const struct trc_sampler s = sampler(kinds[k], 1);
+        struct rng random = rng_seed(12);
+        for (uint32_t i = 0; i < PIXELS; i += TRC_WIDTH) {
+            uint32_t pixel[TRC_WIDTH];
+            for (int n = 0; n < TRC_WIDTH; n++)
+                pixel[n] = pixel_at(rng_below(&random, 1 << 14), rng_below(&random, 1 << 14));
+            for (uint32_t d = 0; d < DEEP_DIMENSIONS; d++)
+                vf_store(&deep[d][0][0] + i,
+                         TRC_KERNEL(trc_sample)(&s, vu_load(pixel), vu_set(0), d));
+        }
+        double worst_chi2 = 0.0, worst_r = 0.0;
+        for (uint32_t a = 0; a < DEEP_DIMENSIONS; a++)
+            for (uint32_t b = a + 1; b < DEEP_DIMENSIONS; b++) {
+                double chi2, r;
+                measure_pair(a, b, &chi2, &r);
+                worst_r = fmax(worst_r, fabs(r));
+                worst_chi2 = fmax(worst_chi2, chi2);
+            }
+        printf("  %-12s chi-square at most %.1f, correlation %.3f\n", names[k], worst_chi2,
+               worst_r);
+        assert_true(worst_chi2 <= 15.0 + 6.0 * sqrt(2.0 * 15.0 / DEEP_PIXELS));
+        assert_true(worst_r <= 6.0 / sqrt((double)PIXELS));
+    }
+}
+
+/* A long sequence fills as many boxes as it has points, through all rows of the table. */
+static void long_sequences_are_stratified(void **state) {
+    (void)state;
+    enum { BITS = 2 * TRC_SOBOL_POINT_BITS + 1 };
+    static uint64_t boxes[1 << (BITS - 6)];
+    const struct trc_sampler s = sampler(TRC_SAMPLER_SOBOL, 1u << BITS);
+    static const uint32_t dimensions[] = {TRC_DIM_FILTER_X, TRC_JOINT_DIMENSIONS - 1,
+                                          TRC_DIM_BOUNCE + 5 * TRC_DIMS_PER_BOUNCE};
+    for (size_t d = 0; d < 3; d++) {
+        memset(boxes, 0, sizeof boxes);
+        for (uint32_t i = 0; i < 1u << BITS; i += TRC_WIDTH) {
+            const vfloat u = TRC_KERNEL(trc_sample)(&s, vu_set(pixel_at(4, 4)),
+                                                    (vuint)vi_lane() + vu_set(i), dimensions[d]);
+            for (int k = 0; k < TRC_WIDTH; k++) {
+                const uint32_t box = (uint32_t)(vf_get(u, k) * (float)(1u << BITS));
+                boxes[box / 64] |= 1ull << box % 64;
+            }
+        }
+        for (size_t i = 0; i < sizeof boxes / sizeof *boxes; i++)
+            assert_true(boxes[i] == ~0ull);
+    }
+}
+
 /* The same on every instruction set: sums of a few numbers, as the scalar build gave them. */
 static void widths_agree(void **state) {
     (void)state;
-    static const uint32_t expected[5] = {0xc4ac4916u, 0x0e225077u, 0x921dd762u, 0x207255b9u,
+    static const uint32_t expected[5] = {0xc4ac4916u, 0x0e225077u, 0x71e006c5u, 0x207255b9u,
                                          0x1a12e8ffu};
     bool sums_match = true;
     for (size_t k = 0; k < 5; k++) {
@@ -324,6 +489,9 @@ int main(void) {
         cmocka_unit_test(jitter_fills_its_grid),
         cmocka_unit_test(sudoku_covers_tiles),
         cmocka_unit_test(lanes_do_not_matter),
+        cmocka_unit_test(deep_dimensions_are_independent),
+        cmocka_unit_test(single_samples_are_independent),
+        cmocka_unit_test(long_sequences_are_stratified),
         cmocka_unit_test(widths_agree),
         cmocka_unit_test(errors_are_small),
         cmocka_unit_test(blue_noise_is_blue),
