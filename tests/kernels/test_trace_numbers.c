@@ -3,6 +3,14 @@
 #include "figures.h"
 #include "trial.h"
 
+/* Of the last query. */
+static uint32_t hit_count(const struct trial *t) {
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < t->rays.count; i++)
+        count += t->hits.instance[i] != TRC_NO_HIT;
+    return count;
+}
+
 static const float unit_lower[3] = {-1, -1, -1}, unit_upper[3] = {1, 1, 1};
 
 /* A sphere at a scale, from inside, from outside and from very far, against the oracle. */
@@ -44,6 +52,8 @@ static void scales(void **state) {
                 fail_msg("radius %g: wrong at ray %u", (double)r, i);
             }
             total += t.rays.count;
+            /* All of them are aimed at the inside of the sphere. */
+            assert_int_equal(hit_count(&t), t.rays.count);
         }
         brute_list_free(&list);
         trial_free(&t);
@@ -82,6 +92,8 @@ static void many_scales_in_one_scene(void **state) {
         brute_list_print(&list);
         fail_msg("wrong at ray %u", i);
     }
+    /* Targets are spread over boxes a few times as wide as the spheres: one in ten was hit. */
+    assert_true(hit_count(&t) > t.rays.count / 20);
     print_right("14: sizes from 1e-6 to 1e6 in one scene", t.rays.count);
     brute_list_free(&list);
     trial_free(&t);
@@ -113,6 +125,9 @@ static void far_origins_give_numbers(void **state) {
         assert_true(t.hits.u[i] >= 0.0f && t.hits.u[i] <= 1.0f);
         assert_true(t.hits.v[i] >= 0.0f && t.hits.v[i] <= 1.0f);
     }
+    /* Those that start within the range of coordinates have numbers that arithmetic can hold: two
+     * fifths of all were hit. */
+    assert_true(hit_count(&t) > t.rays.count / 4);
     print_right("13: origins up to 1e38 away, all finite", t.rays.count);
     trial_free(&t);
 }
@@ -182,10 +197,7 @@ static void needles_reach_beyond_packets(void **state) {
                 t.rays.origin[k][i] = rng_range(&rng, -1e-3f, 1e-3f);
         }
         run(&t, true);
-        uint32_t hits = 0;
-        for (uint32_t i = 0; i < NEEDLES; i++)
-            hits += t.hits.instance[i] != TRC_NO_HIT;
-        assert_true(hits > NEEDLES / 4);
+        assert_true(hit_count(&t) > NEEDLES / 4);
         trial_free(&t);
     }
 }
@@ -260,7 +272,7 @@ static void slices_of_bits(void **state) {
 static void any_bits(void **state) {
     (void)state;
     struct rng rng = rng_seed(200);
-    uint64_t total = 0;
+    uint64_t total = 0, hits = 0;
     for (int trial = 0; trial < 40; trial++) {
         struct trial t;
         trial_init(&t);
@@ -293,10 +305,13 @@ static void any_bits(void **state) {
                 hit_set_print(&t.hits, &t.rays, i);
                 fail_msg("trial %d: wrong at ray %u", trial, i);
             }
+            hits += hit_count(&t);
             total += t.rays.count;
         }
         trial_free(&t);
     }
+    /* A triangle of any bits is mostly as large as all there is: one ray in fourteen hit one. */
+    assert_true(hits > total / 30);
     print_right("corners, transforms and rays of any bits: all finite, packets agree", total);
 }
 
