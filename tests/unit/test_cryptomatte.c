@@ -78,6 +78,36 @@ static void ranks_are_sorted(void **state) {
     }
 }
 
+static float id_of(uint32_t bits) {
+    float id;
+    memcpy(&id, &bits, sizeof id);
+    return id;
+}
+
+/* Ids of equal weight stand by their bits, whichever came first: as floats some are negative and
+ * the order would be another. */
+static void ties_stand_by_bits(void **state) {
+    (void)state;
+    enum { IDS = 4, ORDERS = 24 };
+    static const uint32_t ids[IDS] = {0x00800001u, 0x3f800000u, 0x80800000u, 0xc0000000u};
+    for (uint32_t order = 0; order < ORDERS; order++) {
+        struct trc_matte mattes[IDS + 1] = {{0}};
+        uint32_t left[IDS] = {ids[0], ids[1], ids[2], ids[3]};
+        trc_matte_add(mattes, IDS + 1, 5.0f, 3.0f); /* the largest of all */
+        for (uint32_t k = 0, digits = order; k < IDS; digits /= IDS - k, k++) {
+            const uint32_t pick = k + digits % (IDS - k), bits = left[pick];
+            left[pick] = left[k];
+            trc_matte_add(mattes, IDS + 1, id_of(bits), 2.0f);
+        }
+        float out[3][4];
+        for (uint32_t layer = 0; layer < 3; layer++)
+            trc_mattes_read(mattes, IDS + 1, layer, 12, out[layer]);
+        assert_true(out[0][0] == 5.0f && out[0][1] == 0.25f);
+        for (uint32_t k = 0; k < IDS; k++)
+            assert_int_equal(bits_of(out[(k + 1) / 2][2 * ((k + 1) % 2)]), ids[k]);
+    }
+}
+
 static void full_tables_keep_what_they_have(void **state) {
     (void)state;
     struct trc_matte mattes[2] = {{0}};
@@ -212,6 +242,7 @@ int main(void) {
         cmocka_unit_test(ids_are_the_hashes_of_names),
         cmocka_unit_test(ids_are_normal_floats),
         cmocka_unit_test(ranks_are_sorted),
+        cmocka_unit_test(ties_stand_by_bits),
         cmocka_unit_test(full_tables_keep_what_they_have),
         cmocka_unit_test(mattes_cover_what_is_seen),
     };
