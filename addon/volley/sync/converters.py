@@ -93,16 +93,20 @@ def _wavelength(walker, _node, sockets):
 # Ranges --------------------------------------------------------------------------------------------
 
 def _ranged(walker, node, value, source, target, steps):
-    """A number from a source range to a target range."""
-    if node.interpolation_type == 'LINEAR':
-        mode = _CLAMP_RESULT if node.clamp else 0
+    """A number from a source range to a target range.
+
+    As in Cycles an empty source gives 0 for numbers, clamped where the node clamps, and the target's
+    start for vectors."""
+    mode = _CLAMP_RESULT if node.clamp else 0
+    is_number = getattr(node, "data_type", 'FLOAT') == 'FLOAT'
+    if node.interpolation_type == 'LINEAR' and is_number:
         return Value('f', walker.emit(_MAP_RANGE, (value, *source, *target), mode), 0)
-    unit = (_constant('f', 0.0), _constant('f', 1.0))
-    t = Value('f', walker.emit(_MAP_RANGE, (value, *source, *unit), 0), 0)
+    zero, one = _constant('f', 0.0), _constant('f', 1.0)
+    t = Value('f', walker.emit(_MAP_RANGE, (value, *source, zero, one), 0), 0)
     if node.interpolation_type == 'STEPPED':
         whole = _number(walker, _FLOOR, _number(walker, _MULTIPLY, t, _number(walker, _ADD, steps, 1.0)))
         t = _number(walker, _DIVIDE, whole, steps)
-    else:
+    elif node.interpolation_type != 'LINEAR':
         t = _number(walker, _ADD, t, 0.0, clamped=True)
         square = _number(walker, _MULTIPLY, t, t)
         if node.interpolation_type == 'SMOOTHSTEP':
@@ -111,8 +115,10 @@ def _ranged(walker, node, value, source, target, steps):
             inner = _number(walker, _MULTIPLY_ADD, t, 6.0, -15.0)
             inner = _number(walker, _MULTIPLY_ADD, t, inner, 10.0)
             t = _number(walker, _MULTIPLY, _number(walker, _MULTIPLY, square, t), inner)
-    mode = _CLAMP_RESULT if node.clamp and node.interpolation_type == 'STEPPED' else 0
-    return Value('f', walker.emit(_MAP_RANGE, (t, *unit, *target), mode), 0)
+    length = one
+    if is_number:  # 0 where the source is empty, and so is the range that t is in
+        length = Value('f', walker.emit(_MAP_RANGE, (source[1], *source, zero, one), 0), 0)
+    return Value('f', walker.emit(_MAP_RANGE, (t, zero, length, *target), mode), 0)
 
 
 def _map_range(walker, node, sockets):
