@@ -162,16 +162,15 @@ void check_read(const File &file, bool is_read) {
 
 void read_scanlines(const File &file, Rows &rows) {
     const OIIO::ImageSpec &spec = file.spec;
-    const int strip =
-        std::max(1, spec.get_int_attribute("tiff:RowsPerStrip", strip_rows));
+    const int strip = std::max(1, spec.get_int_attribute("tiff:RowsPerStrip", strip_rows));
     int most = rows.capacity();
     if (most > strip)
         most -= most % strip;
     for (int y = 0; y < spec.height;) {
         const int count = std::min(most, spec.height - y), first = spec.y + y;
-        check_read(file, file.input->read_scanlines(0, 0, first, first + count, spec.z, 0,
-                                                    file.channels, type_of(file.format),
-                                                    rows.slot()));
+        check_read(file,
+                   file.input->read_scanlines(0, 0, first, first + count, spec.z, 0, file.channels,
+                                              type_of(file.format), rows.slot()));
         rows.send(count);
         y += count;
     }

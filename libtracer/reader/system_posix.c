@@ -42,8 +42,7 @@ void system_prepare(void) {
         return;
 #endif
     const long limit = sysconf(_SC_OPEN_MAX);
-    for (int i = FIRST_FOREIGN_DESCRIPTOR;
-         i < (limit > 0 ? limit : DESCRIPTORS_WITHOUT_LIMIT); i++)
+    for (int i = FIRST_FOREIGN_DESCRIPTOR; i < (limit > 0 ? limit : DESCRIPTORS_WITHOUT_LIMIT); i++)
         close(i);
 }
 
@@ -61,8 +60,7 @@ static bool receive_all(int stream, void *bytes, size_t size) {
 
 static bool send_all(int stream, const void *bytes, size_t size) {
     for (size_t count = 0; count < size;) {
-        const ssize_t sent =
-            send(stream, (const char *)bytes + count, size - count, MSG_NOSIGNAL);
+        const ssize_t sent = send(stream, (const char *)bytes + count, size - count, MSG_NOSIGNAL);
         if (sent < 0 && errno != EINTR)
             return false;
         count += sent > 0 ? (size_t)sent : 0;
@@ -153,8 +151,7 @@ static bool receive_request(struct trc_launch_request *request, int descriptors[
     } while (got < 0 && errno == EINTR);
     descriptors[0] = descriptors[1] = -1;
     const struct cmsghdr *header = got > 0 ? CMSG_FIRSTHDR(&message) : NULL;
-    if (header && header->cmsg_type == SCM_RIGHTS &&
-        header->cmsg_len == CMSG_LEN(2 * sizeof(int)))
+    if (header && header->cmsg_type == SCM_RIGHTS && header->cmsg_len == CMSG_LEN(2 * sizeof(int)))
         memcpy(descriptors, CMSG_DATA(header), 2 * sizeof(int));
     if (got <= 0)
         return false;

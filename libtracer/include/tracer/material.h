@@ -400,10 +400,10 @@ typedef struct trc_image_desc {
 } trc_image_desc;
 
 /* TRC_ERROR_IMAGE for a file that cannot be read, or colours that cannot be converted: the caller
- * may go on with image 0 (magenta). TRC_ERROR_TOO_LARGE also for a file that claims more pixels than
- * one of its size can have, TRC_ERROR_FORMAT for one in no known format. TRC_ERROR_UNSUPPORTED for a
- * path or a color_space where the reader's program is absent (a build without OpenImageIO) or does
- * not run. */
+ * may go on with image 0 (magenta). TRC_ERROR_TOO_LARGE also for a file that claims more pixels
+ * than one of its size can have, TRC_ERROR_FORMAT for one in no known format. TRC_ERROR_UNSUPPORTED
+ * for a path or a color_space where the reader's program is absent (a build without OpenImageIO) or
+ * does not run. */
 TRC_API trc_status trc_image_create(trc_scene scene, const trc_image_desc *desc, trc_id *image_out);
 
 /* Reads the file of a descriptor ahead, beside others and beside other work: trc_image_create with

@@ -5,8 +5,8 @@
  * end, costs that file alone (TRC_ERROR_IMAGE), never the host. Pixels come through shared memory.
  * The program is started when a file or a colour space is first asked for, which takes a quarter of
  * a second, and ends with the reader, with the host, or when nothing was asked of it for two
- * minutes; then it is started again. The host's signals, descriptors, environment and working folder
- * stay untouched, and no signal handler is needed.
+ * minutes; then it is started again. The host's signals, descriptors, environment and working
+ * folder stay untouched, and no signal handler is needed.
  *
  * A reader serves any number of scenes. A scene that is given none has one of its own. */
 #ifndef TRACER_READER_H

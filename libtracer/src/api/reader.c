@@ -1,7 +1,7 @@
 /* Public calls on readers of image files. */
+#include "image/reader.h"
 #include "core/checks.h"
 #include "core/handle.h"
-#include "image/reader.h"
 #include "tracer/tracer.h"
 
 trc_status trc_reader_create(const trc_reader_desc *desc, trc_reader *reader_out) {

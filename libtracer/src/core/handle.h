@@ -1,6 +1,7 @@
-/* The registry of scenes, renders and readers: the one mutable state of the process besides the instruction
- * set and the memory counters. A handle is a slot and a generation, so stale and foreign values are
- * told apart from living ones. An object that is in use is pinned; removing waits for the pins. */
+/* The registry of scenes, renders and readers: the one mutable state of the process besides the
+ * instruction set and the memory counters. A handle is a slot and a generation, so stale and
+ * foreign values are told apart from living ones. An object that is in use is pinned; removing
+ * waits for the pins. */
 #ifndef TRACER_CORE_HANDLE_H
 #define TRACER_CORE_HANDLE_H
 

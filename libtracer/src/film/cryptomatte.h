@@ -37,8 +37,9 @@ static inline void trc_matte_add(struct trc_matte *mattes, uint32_t count, float
 static inline void trc_mattes_store(struct trc_matte *to, const struct trc_matte *from,
                                     uint32_t count) {
     for (uint32_t i = 0; i < count && from[i].id != 0.0f; i++) {
-        __atomic_store(&to[i].id, &from[i].id, __ATOMIC_RELAXED);
-        __atomic_store(&to[i].weight, &from[i].weight, __ATOMIC_RELAXED);
+        struct trc_matte matte = from[i];
+        __atomic_store(&to[i].id, &matte.id, __ATOMIC_RELAXED);
+        __atomic_store(&to[i].weight, &matte.weight, __ATOMIC_RELAXED);
     }
 }
 

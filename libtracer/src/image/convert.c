@@ -115,10 +115,10 @@ static void store(void *context, uint64_t first, uint32_t count, const float *rg
 trc_status trc_image_to_scene_linear(struct trc_image *image, const struct trc_image_source *from,
                                      const struct trc_color_source *source) {
     struct trc_image_level *level = &image->levels[0];
-    struct conversion conversion = {
-        .image = image,
-        .source = source,
-        .format = image->format == TRC_TEXEL_F32 ? TRC_TEXEL_F32 : TRC_TEXEL_F16};
+    struct conversion conversion = {.image = image,
+                                    .source = source,
+                                    .format = image->format == TRC_TEXEL_F32 ? TRC_TEXEL_F32
+                                                                             : TRC_TEXEL_F16};
     const struct trc_color_batches batches = {.context = &conversion,
                                               .cancel = from->cancel,
                                               .count = (uint64_t)level->width * level->height,

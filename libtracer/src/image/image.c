@@ -77,33 +77,33 @@ static trc_status image_create(uint32_t width, uint32_t height, enum trc_texel f
 
 /* Grey, grey with alpha, RGB or RGBA, side by side, to RGBA. one: 1.0 of the format. A macro, as it
  * is the same for three types of number. */
-#define DEFINE_SPREAD(name, type)                                                                 \
-    static void name(const type *from, type *to, uint64_t count, uint32_t channels, type one) {   \
-        switch (channels) {                                                                       \
-        case 1:                                                                                   \
-            for (uint64_t i = 0; i < count; i++, to += 4) {                                       \
-                to[0] = to[1] = to[2] = from[i];                                                  \
-                to[3] = one;                                                                      \
-            }                                                                                     \
-            break;                                                                                \
-        case 2:                                                                                   \
-            for (uint64_t i = 0; i < count; i++, to += 4) {                                       \
-                to[0] = to[1] = to[2] = from[2 * i];                                              \
-                to[3] = from[2 * i + 1];                                                          \
-            }                                                                                     \
-            break;                                                                                \
-        case 3:                                                                                   \
-            for (uint64_t i = 0; i < count; i++, to += 4) {                                       \
-                to[0] = from[3 * i];                                                              \
-                to[1] = from[3 * i + 1];                                                          \
-                to[2] = from[3 * i + 2];                                                          \
-                to[3] = one;                                                                      \
-            }                                                                                     \
-            break;                                                                                \
-        default:                                                                                  \
-            memcpy(to, from, 4 * count * sizeof *to);                                             \
-            break;                                                                                \
-        }                                                                                         \
+#define DEFINE_SPREAD(name, type)                                                               \
+    static void name(const type *from, type *to, uint64_t count, uint32_t channels, type one) { \
+        switch (channels) {                                                                     \
+        case 1:                                                                                 \
+            for (uint64_t i = 0; i < count; i++, to += 4) {                                     \
+                to[0] = to[1] = to[2] = from[i];                                                \
+                to[3] = one;                                                                    \
+            }                                                                                   \
+            break;                                                                              \
+        case 2:                                                                                 \
+            for (uint64_t i = 0; i < count; i++, to += 4) {                                     \
+                to[0] = to[1] = to[2] = from[2 * i];                                            \
+                to[3] = from[2 * i + 1];                                                        \
+            }                                                                                   \
+            break;                                                                              \
+        case 3:                                                                                 \
+            for (uint64_t i = 0; i < count; i++, to += 4) {                                     \
+                to[0] = from[3 * i];                                                            \
+                to[1] = from[3 * i + 1];                                                        \
+                to[2] = from[3 * i + 2];                                                        \
+                to[3] = one;                                                                    \
+            }                                                                                   \
+            break;                                                                              \
+        default:                                                                                \
+            memcpy(to, from, 4 * count * sizeof *to);                                           \
+            break;                                                                              \
+        }                                                                                       \
     }
 DEFINE_SPREAD(spread_u8, uint8_t)
 DEFINE_SPREAD(spread_u16, uint16_t)
@@ -358,7 +358,8 @@ static trc_status load_pixels(const trc_image_desc *desc, const struct trc_image
     struct trc_image *image;
     TRC_TRY(image_create(desc->width, desc->height, format, desc, &image));
     memcpy(image->levels[0].texels, desc->pixels, bytes);
-    const trc_status status = finish(image, desc, source, 4, desc->alpha_mode == TRC_ALPHA_STRAIGHT);
+    const trc_status status =
+        finish(image, desc, source, 4, desc->alpha_mode == TRC_ALPHA_STRAIGHT);
     if (status != TRC_OK) {
         trc_image_release(image);
         return status;

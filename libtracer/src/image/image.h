@@ -57,8 +57,7 @@ trc_status trc_image_load(const trc_image_desc *desc, const struct trc_image_sou
 
 /* TOO_LARGE for an image of such a size and enum trc_texel, with a message that names it. name: ""
  * or the path of a file. */
-trc_status trc_image_check_size(uint32_t width, uint32_t height, uint32_t format,
-                                const char *name);
+trc_status trc_image_check_size(uint32_t width, uint32_t height, uint32_t format, const char *name);
 
 /* A new image of half the size, of which the caller is the holder; whether it can be: a side of one
  * texel stays. OUT_OF_MEMORY. */

@@ -203,8 +203,7 @@ bool trc_prefetch_take(struct trc_prefetch *prefetch, const trc_image_desc *desc
         job->image = NULL;
     }
     if (is_done)
-        *status_out =
-            job->status == TRC_OK ? TRC_OK : trc_fail(job->status, "%s", job->message);
+        *status_out = job->status == TRC_OK ? TRC_OK : trc_fail(job->status, "%s", job->message);
     job_destroy(job);
     return is_done;
 }

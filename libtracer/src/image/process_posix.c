@@ -149,7 +149,8 @@ static int describe_child(posix_spawn_file_actions_t *actions, posix_spawnattr_t
     int error = posix_spawn_file_actions_addopen(actions, STDIN_FILENO, "/dev/null", O_RDWR, 0);
     error = error ? error : posix_spawn_file_actions_adddup2(actions, STDIN_FILENO, STDOUT_FILENO);
     error = error ? error : posix_spawn_file_actions_adddup2(actions, STDIN_FILENO, STDERR_FILENO);
-    error = error ? error : posix_spawn_file_actions_adddup2(actions, stream, TRC_LAUNCH_DESCRIPTOR);
+    error =
+        error ? error : posix_spawn_file_actions_adddup2(actions, stream, TRC_LAUNCH_DESCRIPTOR);
     error = error ? error : posix_spawnattr_setsigmask(attributes, &none);
     error = error ? error : posix_spawnattr_setsigdefault(attributes, &all);
     error = error ? error : posix_spawnattr_setpgroup(attributes, 0);
@@ -252,10 +253,10 @@ static const char *ask_launcher(struct trc_launcher *launcher,
     if (trc_launcher_is_sound(launcher) &&
         send_message(launcher->stream, &message, sizeof *request))
         received = receive_bytes(launcher->stream, answer, sizeof *answer, seconds);
-    const char *reason = received == TRC_RECEIVED_ENDED           ? "it has ended"
-                         : received == TRC_RECEIVED_LATE          ? "it does not answer"
+    const char *reason = received == TRC_RECEIVED_ENDED      ? "it has ended"
+                         : received == TRC_RECEIVED_LATE     ? "it does not answer"
                          : answer->magic != TRC_LAUNCH_MAGIC ? "it answers nonsense"
-                                                                  : NULL;
+                                                             : NULL;
     if (reason)
         atomic_store(&launcher->is_sound, false);
     pthread_mutex_unlock(&launcher->lock);
@@ -273,8 +274,7 @@ static int create_shared(size_t bytes) {
     do {
         error = posix_fallocate(block, 0, (off_t)bytes);
     } while (error == EINTR);
-    if (error ||
-        fcntl(block, F_ADD_SEALS, F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_SEAL)) {
+    if (error || fcntl(block, F_ADD_SEALS, F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_SEAL)) {
         close(block);
         return -1;
     }
@@ -306,8 +306,7 @@ static bool create_ends(size_t shared_bytes, struct ends *ends, void **shared_ou
     ends->given[1] = create_shared(shared_bytes);
     void *shared = MAP_FAILED;
     if (ends->given[1] >= 0)
-        shared =
-            mmap(NULL, shared_bytes, PROT_READ | PROT_WRITE, MAP_SHARED, ends->given[1], 0);
+        shared = mmap(NULL, shared_bytes, PROT_READ | PROT_WRITE, MAP_SHARED, ends->given[1], 0);
     if (shared == MAP_FAILED) {
         close_ends(ends);
         return false;

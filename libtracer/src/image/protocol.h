@@ -24,12 +24,7 @@
 #define TRC_READER_COLORS_MAX ((uint32_t)1 << 15)
 #define TRC_READER_TEXT_BYTES 256u
 
-enum {
-    TRC_READER_FILE = 1,
-    TRC_READER_TAKEN,
-    TRC_READER_COLORS,
-    TRC_READER_APPLY
-};
+enum { TRC_READER_FILE = 1, TRC_READER_TAKEN, TRC_READER_COLORS, TRC_READER_APPLY };
 
 struct trc_reader_request {
     uint32_t magic, kind;
@@ -44,20 +39,15 @@ struct trc_reader_request {
     uint32_t slot, count; /* APPLY: RGBA colours from the start of a slot */
 };
 
-enum {
-    TRC_READER_INFO = 1,
-    TRC_READER_ROWS,
-    TRC_READER_DONE,
-    TRC_READER_FAILED
-};
+enum { TRC_READER_INFO = 1, TRC_READER_ROWS, TRC_READER_DONE, TRC_READER_FAILED };
 
 struct trc_reader_answer {
     uint32_t magic, kind;
     /* INFO: as struct trc_file_info has them. */
     uint32_t width, height, channels, format, is_unassociated;
-    uint32_t slot, row_count; /* ROWS: without gaps from the start of a slot */
-    uint32_t is_identity;     /* DONE after COLORS: the transform changes nothing */
-    int32_t status;           /* FAILED: IMAGE, FORMAT, OUT_OF_MEMORY or TOO_LARGE */
+    uint32_t slot, row_count;         /* ROWS: without gaps from the start of a slot */
+    uint32_t is_identity;             /* DONE after COLORS: the transform changes nothing */
+    int32_t status;                   /* FAILED: IMAGE, FORMAT, OUT_OF_MEMORY or TOO_LARGE */
     char text[TRC_READER_TEXT_BYTES]; /* FAILED: the reason, UTF-8, terminated */
 };
 

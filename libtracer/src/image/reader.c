@@ -46,8 +46,8 @@ struct trc_image_reader {
     double patience;
     pthread_mutex_t lock; /* what follows */
     struct trc_launcher *launcher;
-    bool has_run;     /* a launcher has made a process */
-    bool is_unusable; /* it never did, and is not tried again */
+    bool has_run;              /* a launcher has made a process */
+    bool is_unusable;          /* it never did, and is not tried again */
     char reason[REASON_BYTES]; /* why */
     struct trc_process *idle[MAX_IDLE];
     uint32_t idle_count;
@@ -325,15 +325,14 @@ static trc_status check_info(struct call *call, const struct file_call *file,
         answer->is_unassociated > 1 || !answer->width || !answer->height)
         return lost(call, LOSS_NONSENSE);
     TRC_TRY(trc_image_check_size(answer->width, answer->height, answer->format, call->object));
-    const uint64_t bytes = (uint64_t)answer->width * answer->height * answer->channels *
-                           channel_bytes[answer->format];
+    const uint64_t bytes =
+        (uint64_t)answer->width * answer->height * answer->channels * channel_bytes[answer->format];
     return bytes <= pixel_bytes_max(file) ? TRC_OK : lost(call, LOSS_NONSENSE);
 }
 
 static trc_status take_rows(struct call *call, const struct file_call *file,
                             const struct trc_file_info *info) {
-    const uint64_t row_bytes =
-        (uint64_t)info->width * info->channels * channel_bytes[info->format];
+    const uint64_t row_bytes = (uint64_t)info->width * info->channels * channel_bytes[info->format];
     const char *shared = trc_process_shared(call->process);
     uint32_t slot = 0;
     for (uint32_t row = 0; row < info->height; slot = !slot) {
@@ -384,11 +383,11 @@ trc_status trc_image_reader_read(struct trc_image_reader *reader, const char *pa
     char *absolute;
     TRC_TRY(trc_file_look(path, &absolute, &file.file_bytes));
     file.path = absolute;
-    struct call call = {
-        .task = "cannot read the image",
-        .object = path,
-        .cancel = taker->cancel,
-        .patience = reader->patience + (double)file.file_bytes / PATIENCE_BYTES_PER_SECOND};
+    struct call call = {.task = "cannot read the image",
+                        .object = path,
+                        .cancel = taker->cancel,
+                        .patience =
+                            reader->patience + (double)file.file_bytes / PATIENCE_BYTES_PER_SECOND};
     trc_status status;
     if (strlen(absolute) >= TRC_READER_SLOT_BYTES)
         status = trc_fail(TRC_ERROR_IMAGE, "the path of an image is too long");

@@ -45,8 +45,8 @@ static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc,
     const bool catchers = t->catchers = features & TRC_FEATURE_SHADOW_CATCHERS;
     t->looks_back = features & TRC_FEATURE_REFRACTION;
     t->hit_branches = count_branches(desc, snapshot);
-    /* Whitted's rays may meet a catcher, which splits them before they branch. Of other integrators a
-     * sample has two rays at most, and a batch of them half as many samples. */
+    /* Whitted's rays may meet a catcher, which splits them before they branch. Of other integrators
+     * a sample has two rays at most, and a batch of them half as many samples. */
     const bool splits = catchers && desc->integrator == TRC_INTEGRATOR_WHITTED;
     t->ray_room = trc_ray_room_of(desc, t->hit_branches * (splits ? 2 : 1));
     const size_t batch = (column_entries(catchers) + TRC_WIDTH) * sizeof(float);

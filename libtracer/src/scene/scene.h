@@ -59,8 +59,8 @@ struct trc_scene_state {
     uint64_t image_bytes_max; /* 0: no limit */
     pthread_mutex_t lock;     /* all but the next three */
     pthread_mutex_t cancel_lock;
-    bool committing;    /* under cancel_lock */
-    atomic_uint cancel; /* read by the workers of a commit */
+    bool committing;                 /* under cancel_lock */
+    atomic_uint cancel;              /* read by the workers of a commit */
     struct trc_image_reader *reader; /* held */
     struct trc_prefetch *prefetch;   /* of images before the next commit, or NULL */
     struct trc_names *names;

@@ -135,8 +135,8 @@ static trc_status fit_images(struct trc_scene_state *scene) {
 }
 
 void trc_scene_expect_image(struct trc_scene_state *scene, const trc_image_desc *desc) {
-    if (!scene->prefetch && trc_prefetch_create(scene->reader, scene->image_bytes_max,
-                                                &scene->prefetch) != TRC_OK)
+    if (!scene->prefetch &&
+        trc_prefetch_create(scene->reader, scene->image_bytes_max, &scene->prefetch) != TRC_OK)
         return;
     trc_prefetch_add(scene->prefetch, desc);
 }
