@@ -153,8 +153,10 @@ typedef struct trc_render_desc {
     uint32_t light_group_count;                /* passes, 0..TRC_MAX_LIGHT_GROUPS */
 } trc_render_desc;
 
-/* Starts rendering the scene's current snapshot in threads of the library. Memory is checked and
- * taken before anything starts. A missing camera is INVALID_ARGUMENT. */
+/* Starts rendering the scene's current snapshot in threads of the library. All memory of the frame
+ * is taken before anything starts, and before the first of it is taken, the sum is checked against
+ * what the machine, its container (control groups) and a limit of address space (RLIMIT_AS) leave:
+ * TOO_LARGE. A missing camera is INVALID_ARGUMENT. */
 TRC_API trc_status trc_render_start(trc_scene scene, const trc_render_desc *desc,
                                     trc_render *render_out);
 

@@ -25,6 +25,11 @@ void trc_free(void *block);
 uint64_t trc_memory_bytes(void);
 uint64_t trc_memory_peak_bytes(void);
 
+/* Bytes that may be taken besides: what is left of the machine's memory, or of a container's,
+ * beside the library's own, and of a limit of address space beside all of the process. Some system
+ * calls: for what is large. */
+uint64_t trc_memory_left_bytes(void);
+
 /* Test hook: the n-th allocation or thread creation from now fails (0: the next), and each later
  * one too if all is true; negative n switches it off. */
 void trc_memory_fail_at(int64_t n, bool all);

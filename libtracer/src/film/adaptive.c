@@ -30,7 +30,6 @@ trc_status trc_adaptive_create(const trc_render_desc *desc, struct trc_adaptive 
     };
     const float error = THRESHOLD_SCALE * desc->noise_threshold;
     made.error2 = error * error;
-    TRC_TRY(trc_film_check_budget(made.width, made.height, sizeof *made.pixels));
     const size_t count = (size_t)made.width * made.height;
     made.pixels = trc_alloc_zeroed(count, sizeof *made.pixels);
     if (!made.pixels)

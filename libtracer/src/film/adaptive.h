@@ -48,7 +48,7 @@ struct trc_adaptive {
 /* min_samples of a descriptor: rounded up to a power of two, chosen by the threshold where 0. */
 uint32_t trc_adaptive_min_samples(float noise_threshold, uint32_t min_samples);
 
-/* Takes the memory; desc is resolved, with a noise threshold. TOO_LARGE or OUT_OF_MEMORY. */
+/* Takes the memory; desc is resolved, with a noise threshold. OUT_OF_MEMORY. */
 trc_status trc_adaptive_create(const trc_render_desc *desc, struct trc_adaptive *adaptive);
 void trc_adaptive_destroy(struct trc_adaptive *adaptive);
 

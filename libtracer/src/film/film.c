@@ -1,10 +1,8 @@
-#define _POSIX_C_SOURCE 200809L
 #include "film/film.h"
 
 #include <inttypes.h>
 #include <stdbool.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "core/checks.h"
 #include "core/core.h"
@@ -84,42 +82,34 @@ bool trc_film_has_sums(const trc_render_desc *desc, uint32_t pass) {
     return pass < TRC_PASS_COUNT && is_sum && (desc->passes >> pass & 1);
 }
 
-/* Memory of the machine, or as good as none of a limit if the system does not say. */
-static uint64_t physical_bytes(void) {
-    const long pages = sysconf(_SC_PHYS_PAGES), page_bytes = sysconf(_SC_PAGESIZE);
-    if (pages <= 0 || page_bytes <= 0)
-        return UINT64_MAX / 2;
-    return (uint64_t)pages * (uint64_t)page_bytes;
-}
-
-trc_status trc_film_check_budget(uint32_t width, uint32_t height, uint64_t pixel_bytes) {
+trc_status trc_film_check_budget(uint32_t width, uint32_t height, uint64_t pixel_bytes,
+                                 uint64_t other_bytes) {
     uint64_t bytes = 0;
     const bool fits =
         trc_multiply_u64((uint64_t)width * height, pixel_bytes, &bytes) && bytes <= PTRDIFF_MAX;
-    const uint64_t used = trc_memory_bytes(), physical = physical_bytes();
-    if (!fits || used > physical || bytes > physical - used) {
+    const uint64_t needed = bytes + other_bytes, left = trc_memory_left_bytes();
+    if (!fits || needed > left) {
         return trc_fail(TRC_ERROR_TOO_LARGE,
                         "%" PRIu32 " x %" PRIu32 " pixels with these settings need %" PRIu64
-                        " MiB, the machine has %" PRIu64 " MiB in all",
-                        width, height, bytes >> 20, physical >> 20);
+                        " MiB, there are %" PRIu64 " MiB left",
+                        width, height, needed >> 20, left >> 20);
     }
     return TRC_OK;
-}
-
-/* Bytes of a pixel. */
-static uint64_t pixel_bytes(const trc_render_desc *desc, uint32_t matte_count) {
-    uint64_t bytes = sizeof(uint32_t); /* its sample count */
-    for (uint32_t pass = 0; pass < TRC_SUM_COUNT; pass++) {
-        if (trc_film_has_sums(desc, pass))
-            bytes += trc_film_channels(pass) * sizeof(double);
-    }
-    return bytes + (uint64_t)__builtin_popcount(desc->cryptomattes) * matte_count *
-                       sizeof(struct trc_matte);
 }
 
 uint32_t trc_film_matte_count(const trc_render_desc *desc) {
     const uint32_t layers = (desc->cryptomatte_depth + TRC_LAYER_RANKS - 1) / TRC_LAYER_RANKS;
     return desc->cryptomattes ? layers * TRC_LAYER_RANKS + TRC_SPARE_MATTES : 0;
+}
+
+uint64_t trc_film_pixel_bytes(const trc_render_desc *desc) {
+    uint64_t bytes = sizeof(uint32_t); /* its sample count */
+    for (uint32_t pass = 0; pass < TRC_SUM_COUNT; pass++) {
+        if (trc_film_has_sums(desc, pass))
+            bytes += trc_film_channels(pass) * sizeof(double);
+    }
+    return bytes + (uint64_t)__builtin_popcount(desc->cryptomattes) * trc_film_matte_count(desc) *
+                       sizeof(struct trc_matte);
 }
 
 static size_t tile_count(const struct trc_film *film) {
@@ -133,7 +123,7 @@ trc_status trc_film_create(const trc_render_desc *desc, struct trc_film *film) {
                             .shows_shadows = desc->passes >> TRC_PASS_SHADOW_CATCHER & 1,
                             .is_transparent = desc->film_transparent,
                             .matte_count = trc_film_matte_count(desc)};
-    TRC_TRY(trc_film_check_budget(made.width, made.height, pixel_bytes(desc, made.matte_count)));
+    TRC_TRY(trc_film_check_budget(made.width, made.height, trc_film_pixel_bytes(desc), 0));
     const size_t pixels = (size_t)made.width * made.height;
     /* Tiles read the counts before they write them, and the sums only where there is a count. */
     made.sample_counts = trc_alloc(pixels, sizeof *made.sample_counts);
@@ -164,7 +154,6 @@ trc_status trc_film_create(const trc_render_desc *desc, struct trc_film *film) {
 }
 
 trc_status trc_film_add_catchers(struct trc_film *film) {
-    TRC_TRY(trc_film_check_budget(film->width, film->height, sizeof *film->caught));
     film->caught = trc_alloc_zeroed((size_t)film->width * film->height, sizeof *film->caught);
     return film->caught ? TRC_OK
                         : trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for shadow catchers");

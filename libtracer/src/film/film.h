@@ -57,9 +57,14 @@ static inline atomic_uint *trc_film_sequence(const struct trc_film *film, uint32
     return &film->sequences[row * trc_film_tiles(film->width) + x / TRC_TILE_SIZE];
 }
 
-/* TRC_ERROR_TOO_LARGE unless so many bytes for every pixel fit into the machine's memory: a system
- * that overcommits would grant more than there is and kill the host later. pixel_bytes < 1 KiB. */
-trc_status trc_film_check_budget(uint32_t width, uint32_t height, uint64_t pixel_bytes);
+/* TRC_ERROR_TOO_LARGE unless so many bytes for every pixel, and others, can be had
+ * (trc_memory_left_bytes): a system that overcommits would grant more than there is and kill the
+ * host later. pixel_bytes < 1 KiB, other_bytes < 2^60. */
+trc_status trc_film_check_budget(uint32_t width, uint32_t height, uint64_t pixel_bytes,
+                                 uint64_t other_bytes);
+
+/* Bytes that trc_film_create takes for each pixel. */
+uint64_t trc_film_pixel_bytes(const trc_render_desc *desc);
 
 /* Whether the film has sums of a pass: it is asked for by the resolved desc, and by more than the
  * counts of samples. */
@@ -89,7 +94,7 @@ bool trc_film_is_first_sample(uint32_t pass);
  * TRC_ERROR_TOO_LARGE or OUT_OF_MEMORY. */
 trc_status trc_film_create(const trc_render_desc *desc, struct trc_film *film);
 
-/* Takes the memory for shadow catchers. TRC_ERROR_TOO_LARGE or OUT_OF_MEMORY. */
+/* Takes the memory for shadow catchers. TRC_ERROR_OUT_OF_MEMORY. */
 trc_status trc_film_add_catchers(struct trc_film *film);
 
 void trc_film_destroy(struct trc_film *film);

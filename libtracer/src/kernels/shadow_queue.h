@@ -6,11 +6,16 @@
 
 #include <assert.h>
 
+#include "core/carver.h"
+#include "kernels/packet.h"
 #include "kernels/simd.h"
 
 /* Rays that wait at most: more than one group of hits may send, 2 * 64 for each lane. */
 #define TRC_SHADOW_QUEUE 4096
 _Static_assert(TRC_SHADOW_QUEUE >= 2 * 64 * TRC_WIDTH, "an empty queue has room for a group");
+
+/* Entries of a column: the last packet is loaded whole. */
+#define TRC_SHADOW_COLUMN (TRC_SHADOW_QUEUE + TRC_PACKET_SIZE)
 
 /* Radiance, its three parts, and what the Shadow pass gets. */
 #define TRC_SCALED_COLUMNS (3 + 9 + 3)
@@ -27,6 +32,26 @@ struct trc_shadow_store {
     uint32_t *slot, *path, *target, *depth;
     uint32_t *order; /* own: the queue may be flushed while hits are shaded in t->order */
 };
+
+/* splits, lamps: with the columns of light passes, of the Shadow pass. */
+TRC_INLINE void trc_shadows_carve(struct trc_carver *c, struct trc_shadow_store *q, bool splits,
+                                  bool lamps) {
+    const size_t column = TRC_SHADOW_COLUMN * sizeof(float);
+    for (int i = 0; i < 3; i++) {
+        q->o[i] = trc_carve(c, column);
+        q->d[i] = trc_carve(c, column);
+        q->radiance[i] = q->scaled[q->scaled_count++] = trc_carve(c, column);
+    }
+    q->tmax = trc_carve(c, column);
+    q->time = trc_carve(c, column);
+    for (int i = 0; splits && i < 9; i++)
+        q->split[i] = q->scaled[q->scaled_count++] = trc_carve(c, column);
+    for (int i = 0; lamps && i < 3; i++)
+        q->lamp[i] = q->scaled[q->scaled_count++] = trc_carve(c, column);
+    uint32_t **const words[] = {&q->slot, &q->path, &q->target, &q->depth, &q->order};
+    for (int i = 0; i < 5; i++)
+        *words[i] = trc_carve(c, column);
+}
 
 /* What a ray has in every queue. */
 struct trc_shadow_rays {

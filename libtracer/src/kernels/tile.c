@@ -37,6 +37,20 @@ static uint32_t count_branches(const trc_render_desc *desc, const struct trc_sna
     return snapshot->branch_count < TRC_MAX_LOBES ? snapshot->branch_count : TRC_MAX_LOBES;
 }
 
+static void sums_carve(struct trc_carver *c, struct trc_sample_store *s,
+                       const trc_render_desc *desc, size_t column_bytes) {
+    for (int i = 0; i < 3; i++)
+        s->radiance[i] = trc_carve(c, column_bytes);
+    s->transparency = trc_carve(c, column_bytes);
+    for (uint32_t pass = 1; pass < TRC_SUM_COUNT; pass++) {
+        if (!trc_film_has_sums(desc, pass))
+            continue;
+        s->passes[s->pass_count++] = (uint8_t)pass;
+        for (uint32_t k = 0; k < trc_film_channels(pass); k++)
+            s->pass[pass][k] = trc_carve(c, column_bytes);
+    }
+}
+
 /* Also sets what of the scene decides about memory. */
 static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc,
                          const struct trc_snapshot *snapshot, void *memory) {
@@ -50,7 +64,6 @@ static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc,
     const bool splits = catchers && desc->integrator == TRC_INTEGRATOR_WHITTED;
     t->ray_room = trc_ray_room_of(desc, t->hit_branches * (splits ? 2 : 1));
     const size_t batch = (column_entries(catchers) + TRC_WIDTH) * sizeof(float);
-    const size_t queue = (TRC_SHADOW_QUEUE + TRC_PACKET_SIZE) * sizeof(float);
     trc_rays_carve(&c, &t->stack, t->ray_room.capacity, t->looks_back);
     trc_rays_carve(&c, &t->work, t->ray_room.capacity, t->looks_back);
     float **const hit_floats[] = {&t->hits.t, &t->hits.u, &t->hits.v};
@@ -60,37 +73,14 @@ static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc,
                                     &t->samples.pixel, &t->samples.index};
     for (int i = 0; i < 5; i++)
         *hit_words[i] = trc_carve(&c, batch);
-    for (int i = 0; i < 3; i++)
-        t->samples.radiance[i] = trc_carve(&c, batch);
-    t->samples.transparency = trc_carve(&c, batch);
-    for (uint32_t pass = 1; pass < TRC_SUM_COUNT; pass++) {
-        if (!trc_film_has_sums(desc, pass))
-            continue;
-        t->samples.passes[t->samples.pass_count++] = (uint8_t)pass;
-        for (uint32_t k = 0; k < trc_film_channels(pass); k++)
-            t->samples.pass[pass][k] = trc_carve(&c, batch);
-    }
+    sums_carve(&c, &t->samples, desc, batch);
     const size_t places = (size_t)trc_film_matte_count(desc) * TRC_TILE_SIZE * TRC_TILE_SIZE;
     for (uint32_t k = 0; k < TRC_CRYPTOMATTE_KINDS; k++)
         if (desc->cryptomattes >> k & 1)
             t->mattes[k] = trc_carve(&c, places * sizeof *t->mattes[k]);
-    struct trc_shadow_store *q = &t->shadows;
-    for (int i = 0; i < 3; i++) {
-        q->o[i] = trc_carve(&c, queue);
-        q->d[i] = trc_carve(&c, queue);
-        q->radiance[i] = q->scaled[q->scaled_count++] = trc_carve(&c, queue);
-    }
-    q->tmax = trc_carve(&c, queue);
-    q->time = trc_carve(&c, queue);
-    if (wants_light_passes(desc))
-        for (int i = 0; i < 9; i++)
-            q->split[i] = q->scaled[q->scaled_count++] = trc_carve(&c, queue);
-    if (desc->passes >> TRC_PASS_SHADOW & 1)
-        for (int i = 0; i < 3; i++)
-            q->lamp[i] = q->scaled[q->scaled_count++] = trc_carve(&c, queue);
-    uint32_t **const words[] = {&q->slot, &q->path, &q->target, &q->depth, &q->order, &t->keys};
-    for (int i = 0; i < 6; i++)
-        *words[i] = trc_carve(&c, queue);
+    trc_shadows_carve(&c, &t->shadows, wants_light_passes(desc),
+                      desc->passes >> TRC_PASS_SHADOW & 1);
+    t->keys = trc_carve(&c, TRC_SHADOW_COLUMN * sizeof *t->keys);
     t->order = trc_carve(&c, batch);
     t->bins = trc_carve(&c, (TRC_BINS + 1) * sizeof *t->bins);
     t->carver = c;

@@ -99,7 +99,7 @@ struct trc_tile {
      * of the film with the samples in flight. NULL: not asked for. */
     struct trc_matte *mattes[TRC_CRYPTOMATTE_KINDS];
     uint32_t *order;       /* of the rays of a step */
-    uint32_t *keys, *bins; /* scratch of sorts: TRC_BATCH or TRC_SHADOW_QUEUE, bins */
+    uint32_t *keys, *bins; /* scratch of sorts: TRC_SHADOW_COLUMN, bins */
     struct trc_packet packets[TRC_BUNDLE];
     struct trc_packet_hits packet_hits[TRC_BUNDLE];
 };

@@ -257,9 +257,28 @@ fail:
     return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "the system has no resources for a render");
 }
 
+/* Whether all parts of a frame can be had at once, before the first is taken. */
+static trc_status check_memory(const trc_render_desc *desc, const struct trc_snapshot *snapshot,
+                               uint64_t worker_bytes) {
+    uint64_t pixel_bytes = trc_film_pixel_bytes(desc);
+    if (snapshot->features & TRC_FEATURE_SHADOW_CATCHERS)
+        pixel_bytes += sizeof(struct trc_caught);
+    if (desc->noise_threshold > 0.0f)
+        pixel_bytes += sizeof(struct trc_adaptive_pixel);
+    const uint64_t tiles =
+        (uint64_t)trc_film_tiles(desc->crop_width) * trc_film_tiles(desc->crop_height);
+    const uint64_t workers = desc->thread_count < tiles ? desc->thread_count : tiles;
+    /* A tile has its place in the order, its batches and a number in the film. */
+    return trc_film_check_budget(desc->crop_width, desc->crop_height, pixel_bytes,
+                                 workers * worker_bytes + tiles * 3 * sizeof(uint32_t) +
+                                     TRC_SOBOL_TABLE_BYTES);
+}
+
 static trc_status take_memory(struct trc_render_state *render) {
     const trc_render_desc *desc = &render->desc;
     const uint32_t features = render->snapshot->features;
+    const size_t memory_bytes = render->kernels->tile_memory_bytes(desc, render->snapshot);
+    TRC_TRY(check_memory(desc, render->snapshot, memory_bytes));
     TRC_TRY(trc_film_create(desc, &render->film));
     if (features & TRC_FEATURE_SHADOW_CATCHERS)
         TRC_TRY(trc_film_add_catchers(&render->film));
@@ -276,7 +295,6 @@ static trc_status take_memory(struct trc_render_state *render) {
     render->batch_tiles = trc_alloc_zeroed(schedule->batch_count, sizeof(uint32_t));
     render->workers = trc_alloc_zeroed(render->worker_count, sizeof *render->workers);
     bool ok = render->tile_batches && render->batch_tiles && render->workers;
-    const size_t memory_bytes = render->kernels->tile_memory_bytes(desc, render->snapshot);
     for (uint32_t i = 0; ok && i < render->worker_count; i++) {
         render->workers[i].render = render;
         render->workers[i].memory = trc_alloc(memory_bytes, 1);

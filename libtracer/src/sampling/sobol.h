@@ -26,6 +26,9 @@ static inline uint32_t trc_sobol_offset(uint32_t level, uint32_t dimension) {
     return (level * TRC_SOBOL_DIMENSIONS + dimension) * TRC_SOBOL_POINTS;
 }
 
+#define TRC_SOBOL_TABLE_BYTES \
+    (sizeof(uint32_t) * TRC_SOBOL_LEVELS * TRC_SOBOL_DIMENSIONS * TRC_SOBOL_POINTS)
+
 /* The table, 204 KiB of which most renders touch the first third; to be freed by trc_free.
  * Immutable: threads share it. Takes about 50 microseconds. TRC_ERROR_OUT_OF_MEMORY leaves
  * *table_out as it is. */
