@@ -103,9 +103,7 @@ class VolleyRenderEngine(bpy.types.RenderEngine):
     def _fail(self, message):
         _free(self)
         self.error_set(f"Volley: {message}")
-        self.report({'ERROR'}, f"Volley: {message}")
-        if bpy.app.background:
-            logger.error(message)
+        self.report({'ERROR'}, f"Volley: {message}")  # on the console, too, when there is no window
 
     # Life of the class
 

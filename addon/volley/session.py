@@ -173,7 +173,7 @@ class _Run:
 
     def __init__(self, engine, sync, render, sample_count):
         self._engine, self._render, self._sample_count = engine, render, sample_count
-        self._features = ", ".join(sync.scene.features())
+        self._features = sync.scene.features()
         self._next_picture = time.monotonic() + FIRST_PICTURE_SECONDS
         self._shown_version = 0
         self._next_status = 0.0
@@ -199,6 +199,8 @@ class _Run:
             if progress.state == native.STATE_FAILED:
                 raise native.TracerError(native.ERROR_OUT_OF_MEMORY, "the render failed")
             passes.write(render, layer, entries)
+            logger.debug("%d rays in %.3f s; the scene has: %s", progress.ray_count, progress.seconds,
+                         ", ".join(self._features))
         finally:
             engine.end_result(result)
 
@@ -208,7 +210,7 @@ class _Run:
             return
         self._next_status = now + STATUS_SECONDS
         self._engine.update_progress(progress.fraction)
-        self._engine.update_stats("", status_text(progress, self._sample_count, self._features))
+        self._engine.update_stats("", status_text(progress, self._sample_count))
         self._engine.update_memory_stats(memory_used=progress.memory_bytes / MEGA,
                                          memory_peak=progress.peak_memory_bytes / MEGA)
 
@@ -224,24 +226,33 @@ class _Run:
         self._next_picture = now + max(PICTURE_SECONDS, PICTURE_COST * cost)
 
 
-def status_text(progress, sample_count, features):
-    """The line Blender shows while it renders."""
-    parts = [f"Sample {progress.samples_done}/{sample_count}"]
-    if progress.seconds > 0.0:
-        parts.append(f"{progress.ray_count / progress.seconds * 1e-6:.1f} Mrays/s")
-    parts.append(f"Mem {progress.memory_bytes / MEGA:.1f}M, "
-                 f"Peak {progress.peak_memory_bytes / MEGA:.1f}M")
-    if features:
-        parts.append(features)
-    return " | ".join(parts)
+def status_text(progress, sample_count):
+    """What is to be said of a running render, in the words of Cycles."""
+    samples = f"Sample {progress.samples_done}/{sample_count}"
+    if progress.state != native.STATE_RUNNING or not 0.0 < progress.fraction < 1.0:
+        return samples
+    remaining = progress.seconds * (1.0 / progress.fraction - 1.0)
+    return f"Remaining:{timecode(remaining)} | {samples}"
+
+
+def timecode(seconds):
+    """A time as Blender writes it: minutes, seconds and hundredths, with hours where there are any."""
+    hundredths = round(seconds * 100.0)
+    minutes, seconds = divmod(hundredths // 100, 60)
+    hours, minutes = divmod(minutes, 60)
+    text = f"{minutes:02d}:{seconds:02d}.{hundredths % 100:02d}"
+    return f"{hours:02d}:{text}" if hours else text
 
 
 def report_warning(engine, message):
-    """A warning where the user sees it: in Blender's reports, and on the console when there is no
-    window to show them in."""
-    engine.report({'WARNING'}, message)
+    """A warning where the user sees it, once in a render job: in Blender's reports, or on the console
+    when there is no window to show them in."""
+    if not jobs.is_new(engine, message):
+        return
     if bpy.app.background:
         logger.warning(message)
+    else:
+        engine.report({'WARNING'}, message)
 
 
 def thread_count(render):

@@ -6,6 +6,7 @@ shown where that add-on is enabled.
 """
 
 import bpy
+from bl_ui.properties_grease_pencil_common import GreasePencilSimplifyPanel
 from bpy.types import Panel
 
 from . import passes
@@ -16,14 +17,15 @@ ENGINE = 'VOLLEY'
 # Panels of other engines whose content holds here as it is; not every version has each.
 _SHARED_PANELS = {
     "DATA_PT_camera_dof", "DATA_PT_camera_dof_aperture", "DATA_PT_preview", "MATERIAL_PT_preview",
-    "EEVEE_MATERIAL_PT_context_material", "TEXTURE_PT_preview", "RENDER_PT_simplify",
+    "EEVEE_MATERIAL_PT_context_material", "TEXTURE_PT_preview",
     "VIEW3D_PT_shading_lighting",
 }
 # Panels made for Blender's internal engine that show what this one does not have, or has itself.
 _LEFT_OUT_PANELS = {
     "DATA_PT_area", "DATA_PT_falloff_curve", "DATA_PT_light", "DATA_PT_spot", "NODE_DATA_PT_light",
     "NODE_DATA_PT_spot", "OBJECT_PT_visibility", "VIEWLAYER_PT_filter", "VIEWLAYER_PT_layer_passes",
-    "RENDER_PT_post_processing",
+    "RENDER_PT_post_processing", "RENDER_PT_simplify", "RENDER_PT_simplify_viewport",
+    "RENDER_PT_simplify_render", "RENDER_PT_simplify_greasepencil",
 }
 
 
@@ -163,6 +165,51 @@ class VOLLEY_RENDER_PT_ambient_occlusion(_VolleyPanel, Panel):
             column = layout.column(align=True)
             column.prop(scene.world.light_settings, "ao_factor", text="AO Factor")
             column.prop(scene.world.light_settings, "distance", text="AO Distance")
+
+
+class VOLLEY_RENDER_PT_simplify(_VolleyPanel, Panel):
+    """Blender's own would stand above all panels of this add-on."""
+
+    bl_label = "Simplify"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw_header(self, context):
+        self.layout.prop(context.scene.render, "use_simplify", text="")
+
+    def draw(self, context):
+        pass
+
+
+def _draw_simplify(panel, scene, suffix=""):
+    """Limits of detail; suffix: "_render" for those of final renders."""
+    layout = _column(panel)
+    layout.active = scene.render.use_simplify
+    column = layout.column()
+    column.prop(scene.render, f"simplify_subdivision{suffix}", text="Max Subdivision")
+    column.prop(scene.render, f"simplify_child_particles{suffix}", text="Child Particles")
+    _prop_if_present(column, getattr(scene, "cycles", None), f"texture_limit{suffix}", text="Texture Limit")
+
+
+class VOLLEY_RENDER_PT_simplify_viewport(_VolleyPanel, Panel):
+    bl_label = "Viewport"
+    bl_parent_id = "VOLLEY_RENDER_PT_simplify"
+
+    def draw(self, context):
+        _draw_simplify(self, context.scene)
+
+
+class VOLLEY_RENDER_PT_simplify_render(_VolleyPanel, Panel):
+    bl_label = "Render"
+    bl_parent_id = "VOLLEY_RENDER_PT_simplify"
+
+    def draw(self, context):
+        _draw_simplify(self, context.scene, "_render")
+
+
+class VOLLEY_RENDER_PT_simplify_greasepencil(_VolleyPanel, GreasePencilSimplifyPanel, Panel):
+    bl_label = "Grease Pencil"
+    bl_parent_id = "VOLLEY_RENDER_PT_simplify"
+    bl_options = {'DEFAULT_CLOSED'}
 
 
 class VOLLEY_RENDER_PT_motion_blur(_VolleyPanel, Panel):
@@ -501,13 +548,13 @@ class _MaterialPanel(_VolleyPanel):
         return super().poll(context) and not context.material.grease_pencil
 
 
-def _draw_surface(panel, data, use_nodes_text):
+def _draw_surface(panel, data):
     """The surface part of a node tree, as the Properties editor shows it."""
     layout = panel.layout
-    layout.use_property_split = True
     if hasattr(data, "use_nodes") and (not data.use_nodes or data.node_tree is None):
-        layout.prop(data, "use_nodes", text=use_nodes_text, icon='NODETREE', toggle=True)
+        layout.prop(data, "use_nodes", icon='NODETREE', toggle=True)  # nameless where properties are split
         return False
+    layout.use_property_split = True
     tree = data.node_tree
     output = tree.get_output_node('CYCLES') if tree is not None else None
     surface = output.inputs.get("Surface") if output is not None else None
@@ -580,10 +627,9 @@ class VOLLEY_LIGHT_PT_beam_shape(_LightPanel, Panel):
 
 class VOLLEY_LIGHT_PT_nodes(_LightPanel, Panel):
     bl_label = "Nodes"
-    bl_options = {'DEFAULT_CLOSED'}
 
     def draw(self, context):
-        _draw_surface(self, context.light, "Use Nodes")
+        _draw_surface(self, context.light)
 
 
 class VOLLEY_WORLD_PT_preview(_WorldPanel, Panel):
@@ -598,8 +644,24 @@ class VOLLEY_WORLD_PT_surface(_WorldPanel, Panel):
     bl_label = "Surface"
 
     def draw(self, context):
-        if not _draw_surface(self, context.world, "Use Nodes"):
+        if not _draw_surface(self, context.world):
             self.layout.prop(context.world, "color")
+
+
+class VOLLEY_WORLD_PT_mist(_WorldPanel, Panel):
+    bl_label = "Mist Pass"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and any(layer.use_pass_mist for layer in context.scene.view_layers)
+
+    def draw(self, context):
+        layout, settings = _column(self), context.world.mist_settings
+        column = layout.column(align=True)
+        column.prop(settings, "start")
+        column.prop(settings, "depth")
+        layout.prop(settings, "falloff")
 
 
 class VOLLEY_WORLD_PT_ray_visibility(_WorldPanel, Panel):
@@ -643,7 +705,7 @@ class VOLLEY_MATERIAL_PT_surface(_MaterialPanel, Panel):
     bl_label = "Surface"
 
     def draw(self, context):
-        if not _draw_surface(self, context.material, "Use Nodes"):
+        if not _draw_surface(self, context.material):
             self.layout.prop(context.material, "diffuse_color")
 
 

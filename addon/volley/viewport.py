@@ -19,7 +19,7 @@ from gpu_extras.presets import draw_texture_2d
 
 from . import native, passes, writes
 from .commit import Commit
-from .session import render_fields, status_text, thread_count
+from .session import render_fields, status_text, thread_count, timecode
 from .sync import SceneSync, Source, camera
 from .sync.changes import Changes
 
@@ -155,8 +155,7 @@ class _Pictures:
         self._progress = None
         self._status = ""
         self._samples = 0
-        self._features = ""
-        self._started, self._first_seconds = 0.0, 0.0
+        self._started = 0.0
         self._patience = 0.0    # how long the next draw waits
         self._pixel_seconds = PIXEL_SECONDS  # of one sample of one pixel, as last measured
 
@@ -182,8 +181,7 @@ class _Pictures:
             return
         self.stop()
         self._wanted, self._fields = wanted, fields
-        self._features = ", ".join(sync.scene.features())
-        self._started, self._first_seconds = time.monotonic(), 0.0
+        self._started = time.monotonic()
         self._patience = FRAME_SECONDS
         size = scene.render.preview_pixel_size
         least = 1 if size == 'AUTO' else int(size)
@@ -236,8 +234,8 @@ class _Pictures:
             self._version, self._next_read = progress.version, now + DRAW_SECONDS
             pixels = passes.read_combined(self._render)
             self._texture, self._place = _texture_of(pixels), self._next_place
-            self._status = status_text(progress, self._samples, self._features)
-            self._first_seconds = self._first_seconds or now - self._started
+            total = self._fields["sample_count"]
+            self._status = f"Time:{timecode(now - self._started)} | {status_text(progress, total)}"
             if not self._is_last:
                 self._pixel_seconds = progress.seconds / (pixels.shape[0] * pixels.shape[1])
         if not self._is_last and not is_running:
@@ -256,8 +254,7 @@ class _Pictures:
         draw_texture_2d(self._texture, (x, y), width, height)
         engine.unbind_display_space_shader()
         gpu.state.blend_set('NONE')
-        rate = f"{1.0 / self._first_seconds:.0f} fps | " if self._first_seconds > 0.0 else ""
-        engine.update_stats("", rate + self._status)
+        engine.update_stats("", self._status)
 
 
 def first_divisor(seconds):

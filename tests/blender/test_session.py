@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a render job says, and what becomes of a commit that fails."""
+
+
+def inside_warnings():
+    """An animation of two view layers with something to warn of, then a single frame."""
+    import bpy
+    import scenes
+    scene = scenes.empty(samples=1)
+    scenes.camera().data.type = 'PANO'
+    scene.view_layers.new("Second")
+    scene.frame_end = 3
+    scene.render.filepath = bpy.app.tempdir + "frame"
+    bpy.ops.render.render(animation=True)
+    print("-- again", flush=True)
+    bpy.ops.render.render()
+
+
+def test_a_job_says_a_warning_once(blender):
+    blender.run(inside_warnings)
+    assert blender.output.count("panoramic projection is not supported") == 2  # one for each job
+
+
+def inside_failure():
+    """A render that fails; what its caller is told."""
+    import bpy
+    import scenes
+    from volley import native
+    scenes.empty(samples=1)
+    scenes.camera()
+
+    def fail(*_, **__):
+        raise native.TracerError(1, "it is broken")
+
+    native.Scene.start_render = fail
+    try:
+        bpy.ops.render.render()
+    except RuntimeError as error:
+        return str(error)
+
+
+def test_an_error_is_said_once(blender):
+    assert "Volley: it is broken" in blender.run(inside_failure)
+    assert blender.output.count("it is broken") == 1
+
+
+def inside_failing_commit():
+    """With persistent data, the second commit fails; what the render says, and a viewport."""
+    import bpy
+    import scenes
+    from volley import commit, native, viewport
+    scene = scenes.empty(samples=1)
+    scenes.camera()
+    scene.render.use_persistent_data = True
+    scenes.render()
+
+    class Failing:
+        revision = 1
+
+        def commit(self):
+            raise MemoryError
+
+    native.Scene.commit = Failing.commit
+    messages = []
+    try:
+        bpy.ops.render.render()
+    except RuntimeError as error:
+        messages.append(str(error))
+    view = viewport.Viewport()
+    view._commit = commit.Commit(Failing())
+    try:
+        view._end_commit(10.0)
+    except MemoryError:
+        messages.append("memory")
+    return messages
+
+
+def test_a_commit_that_fails_in_any_way_fails_the_render(blender):
+    render, view = blender.run(inside_failing_commit)
+    assert "Volley: out of memory" in render and view == "memory"

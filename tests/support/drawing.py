@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Draws menus and panels inside Blender without a window: what they would show is noted."""
+
+
+class Layout:
+    """Stands for a layout: notes nodes that are offered and properties that are shown, takes every other
+    call. Layouts made of it share its notes."""
+
+    def __init__(self, notes=None):
+        self.nodes, self.properties = notes or ([], {})
+        self.operator_context = 'INVOKE_DEFAULT'
+        self.use_property_split = False
+
+    def operator(self, name, **_):
+        button = _Button()
+        if name == "node.add_node":
+            self.nodes.append(button)
+        return button
+
+    def prop(self, _data, name, **options):
+        self.properties[name] = {"is_split": self.use_property_split, **options}
+
+    def __getattr__(self, name):
+        return lambda *_, **__: Layout((self.nodes, self.properties))
+
+
+class _Button:
+    """An operator's properties."""
+
+    type = ""
+
+    def __init__(self):
+        self.settings = self
+
+    def add(self):
+        return _Button()
+
+
+class Context:
+    """Blender's context, but for what is given here."""
+
+    def __init__(self, **values):
+        self.__dict__.update(values)
+
+    def __getattr__(self, name):
+        import bpy
+        return getattr(bpy.context, name)
+
+
+class Instance:
+    """An instance of a menu's or panel's class, which only Blender can make."""
+
+    def __init__(self, cls):
+        self._cls, self.layout = cls, Layout()
+
+    def __getattr__(self, name):
+        return getattr(self._cls, name)
+
+
+def draw(cls, context):
+    """The layout after the class has drawn."""
+    shown = Instance(cls)
+    cls.draw(shown, context)
+    return shown.layout
