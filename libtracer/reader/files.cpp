@@ -2,6 +2,7 @@
 #include "files.h"
 
 #include <algorithm>
+#include <cctype>
 #include <memory>
 #include <string>
 #include <vector>
@@ -76,24 +77,33 @@ OIIO::TypeDesc type_of(trc_texel format) {
     }
 }
 
-// By the extension of its name, or, where that is wrong, by what is in it.
-std::unique_ptr<OIIO::ImageInput> open_input(const char *path) {
+// Whether the format of files with such a name is known.
+bool is_format_known(const std::string &path) {
+    const size_t dot = path.find_last_of("./");
+    if (dot == std::string::npos || path[dot] == '/')
+        return false;
+    std::string name = path.substr(dot + 1);
+    std::transform(name.begin(), name.end(), name.begin(),
+                   [](unsigned char c) { return std::tolower(c); });
+    // format:name,name;format:name
+    std::string known = OIIO::get_string_attribute("extension_list");
+    std::replace_if(
+        known.begin(), known.end(), [](char c) { return c == ':' || c == ';'; }, ',');
+    return ("," + known + ",").find("," + name + ",") != std::string::npos;
+}
+
+// By what is in the file, whatever its name is.
+std::unique_ptr<OIIO::ImageInput> open_input(const std::string &path) {
     // Alpha is left as it is in the file: it is multiplied later, as the alpha mode says.
-    OIIO::ImageSpec config, spec;
+    OIIO::ImageSpec config;
     config.attribute("oiio:UnassociatedAlpha", 1);
-    std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create(path, false, &config);
+    std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create(path, true, &config);
     if (!input)
-        throw Failure(TRC_ERROR_FORMAT, OIIO::geterror());
-    if (input->open(path, spec, config))
-        return input;
-    const std::string reason = input->geterror();
-    input = OIIO::ImageInput::create(path, true, &config);
-    if (!input)
-        throw Failure(TRC_ERROR_IMAGE, reason);
+        throw Failure(is_format_known(path) ? TRC_ERROR_IMAGE : TRC_ERROR_FORMAT, OIIO::geterror());
     return input;
 }
 
-File open_file(const char *path) {
+File open_file(const std::string &path) {
     File file;
     file.input = open_input(path);
     file.spec = file.input->spec();
@@ -212,7 +222,7 @@ void serve_file(connection &to, const trc_reader_request &request) {
     guarded(to, [&]() {
         const std::string path(to.shared, request.text_bytes[0] - 1);
         system_limit_memory(request.memory_bytes);
-        const File file = open_file(path.c_str());
+        const File file = open_file(path);
         check_size(file, request);
         send_info(to, file);
         system_limit_memory(

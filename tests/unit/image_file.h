@@ -21,49 +21,38 @@ static void write_file(const char *name, const void *bytes, size_t size) {
     assert_int_equal(fclose(file), 0);
 }
 
-#ifndef TRC_READER_PROGRAM
-#define TRC_READER_PROGRAM NULL /* a build without OpenImageIO */
-#endif
+/* What reads the files; a group's set-up makes it. */
+static struct trc_image_source source;
 
-/* Reads the files of all tests of the program, once there is one to read. */
-static struct trc_image_reader *file_reader;
-static uint64_t bytes_at_start;
-
-static const struct trc_image_source *file_source(void) {
-    static struct trc_image_source source;
-    if (!file_reader)
-        assert_int_equal(trc_image_reader_create(TRC_READER_PROGRAM, &file_reader), TRC_OK);
-    source.reader = file_reader;
-    return &source;
-}
-
-/* Where an image with those fields comes from: pixels in no colour space need no reader. */
-static const struct trc_image_source *source_of(const trc_image_desc *desc) {
-    static const struct trc_image_source none;
-    return desc->path || desc->color_space ? file_source() : &none;
-}
-
-/* Group set-up and teardown: nothing of what the tests took is left, but for the table of handles,
- * which stays from the first scene on. */
-static int note_memory(void **state) {
+static int set_up_reader(void **state) {
     (void)state;
-    const trc_scene_desc desc = {.struct_size = sizeof desc, .thread_count = 1};
-    trc_scene scene = 0;
-    if (trc_scene_create(&desc, &scene) != TRC_OK || trc_scene_destroy(scene) != TRC_OK)
-        return 1;
-    bytes_at_start = trc_memory_bytes();
+#ifdef TRC_TEST_READER
+    const char *program = TRC_TEST_READER;
+#else
+    const char *program = "/nonexistent/reader";
+#endif
+    if (trc_image_reader_create(program, &source.reader) != TRC_OK)
+        return -1;
+    trc_image_reader_start(source.reader);
     return 0;
 }
-static int release_reader(void **state) {
+
+static int tear_down_reader(void **state) {
     (void)state;
-    trc_image_reader_release(file_reader);
-    return trc_memory_bytes() != bytes_at_start;
+    trc_image_reader_release(source.reader);
+    return 0;
+}
+
+/* Memory that is in use, without processes that wait for the next file. */
+static inline uint64_t memory_of_images(void) {
+    trc_image_reader_rest(source.reader);
+    return trc_memory_bytes();
 }
 
 /* An image that must load. */
 static struct trc_image *loaded(const trc_image_desc *desc) {
     struct trc_image *image = NULL;
-    const trc_status status = trc_image_load(desc, source_of(desc), &image);
+    const trc_status status = trc_image_load(desc, &source, &image);
     if (status != TRC_OK)
         fail_msg("status %d: %s", status, trc_last_message());
     return image;

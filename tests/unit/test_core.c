@@ -93,6 +93,7 @@ static void sizes_and_versions(void **state) {
     assert_int_equal(trc_struct_size("trc_render_progress"), sizeof(trc_render_progress));
     assert_int_equal(trc_struct_size("trc_scene_desc"), sizeof(trc_scene_desc));
     assert_int_equal(trc_struct_size("trc_scene_stats"), sizeof(trc_scene_stats));
+    assert_int_equal(trc_struct_size("trc_reader_desc"), sizeof(trc_reader_desc));
     assert_int_equal(trc_struct_size("trc_nothing"), 0);
     assert_int_equal(trc_struct_size(NULL), 0);
 }

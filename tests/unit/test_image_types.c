@@ -17,9 +17,9 @@
 #include "image/image.h"
 #include "image/texel.h"
 
-#ifdef TRC_WITH_OIIO
-
 #include "image_file.h"
+
+#ifdef TRC_TEST_READER
 
 #define WIDTH 6
 #define HEIGHT 4
@@ -249,6 +249,7 @@ static void colors_of_every_type(void **state) {
     (void)state;
     skip();
 }
+
 #endif
 
 int main(void) {
@@ -256,9 +257,5 @@ int main(void) {
         cmocka_unit_test(every_type_and_number_of_channels),
         cmocka_unit_test(colors_of_every_type),
     };
-#ifdef TRC_WITH_OIIO
-    return cmocka_run_group_tests_name("image types", tests, note_memory, release_reader);
-#else
-    return cmocka_run_group_tests_name("image types", tests, NULL, NULL);
-#endif
+    return cmocka_run_group_tests_name("image types", tests, set_up_reader, tear_down_reader);
 }

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import bpy
 
 from .. import native
+from ..compat import uses_nodes
 from ..log import Warnings
 from . import camera, image, instance, light, mesh, motion, strands, tubes, visibility, world
 from .changes import Changes
@@ -45,6 +46,8 @@ class SceneSync:
     """One scene of the library and what it was last told."""
 
     def __init__(self, is_final, thread_count, will_resync, image_megabytes=0):
+        if image.has_files():
+            native.start_reader()
         self.scene = native.Scene(is_final, thread_count, image_megabytes)
         self.warnings = Warnings()
         self._images = Images(self.scene, self.warnings)
@@ -147,15 +150,20 @@ class SceneSync:
         return _Walk(self, source, None).read_mesh(known, each, pointer)
 
     def _sync_materials(self, source):
-        """Flatten the materials first: they say which attributes the meshes must bring."""
+        """Flatten the materials first: they say which attributes the meshes must bring. Their images, and
+        the world's, are read meanwhile."""
         override = source.depsgraph.view_layer_eval.material_override
-        for data in source.depsgraph.ids:
-            if isinstance(data, bpy.types.Material) and override in (None, data):
-                self._materials.entry_of(data)
+        shown = [data for data in source.depsgraph.ids
+                 if isinstance(data, bpy.types.Material) and override in (None, data)]
+        readers = [data for data in (*shown, _shown_world(source))
+                   if data is not None and uses_nodes(data) and not self._materials.is_kept(data)]
+        self._images.expect(data.node_tree for data in readers)
+        for data in shown:
+            self._materials.entry_of(data)
 
     def _sync_world(self, source):
         scene = source.depsgraph.scene_eval
-        shown = scene.world if source.depsgraph.view_layer_eval.use_sky else None
+        shown = _shown_world(source)
         material_id, sun = self._materials.world_id(shown) if shown else (0, None)
         fields = world.describe(shown, material_id, sun, scene.volley, source.light_groups)
         if fields != self._world:
@@ -212,6 +220,12 @@ class _Shown:
         is_silent = evaluated.type in self._SILENT_TYPES or (
             evaluated.type == 'EMPTY' and evaluated.instance_type == 'NONE')
         return self.IRRELEVANT if is_silent else None
+
+
+def _shown_world(source):
+    """The world that is seen, or None."""
+    depsgraph = source.depsgraph
+    return depsgraph.scene_eval.world if depsgraph.view_layer_eval.use_sky else None
 
 
 def _size_limit(source):

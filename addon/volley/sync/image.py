@@ -22,6 +22,8 @@ from ..compat import cycles
 _ALPHA_MODES = {'STRAIGHT': native.ALPHA_STRAIGHT, 'PREMUL': native.ALPHA_PREMULTIPLIED,
                 'CHANNEL_PACKED': native.ALPHA_CHANNEL_PACKED, 'NONE': native.ALPHA_NONE}
 _ANIMATED_SOURCES = {'SEQUENCE', 'MOVIE'}
+_FILE_SOURCES = {'FILE', 'SEQUENCE', 'TILED'}
+_IMAGE_NODES = {'TEX_IMAGE', 'TEX_ENVIRONMENT'}
 _MAX_NUMBERS = (1 << 31) - 1  # of pixels that Blender's Python can count
 
 _FIRST_TILE, _TILES_PER_ROW = 1001, 10  # UDIM
@@ -55,6 +57,22 @@ class Images:
         """Keep images for whoever has asked for them in a former sync and has not changed."""
         self._seen |= keys
 
+    def expect(self, trees):
+        """Have the library read the files of the image nodes of trees, side by side, before they are asked
+        for: nodes that lead nowhere are few."""
+        for node in _image_nodes(trees):
+            image = node.image
+            if image.source == 'TILED' and node.type == 'TEX_IMAGE' and node.projection == 'FLAT':
+                for _, path in _tile_paths(image):
+                    self._expect_path(image, path, False)
+            else:
+                self._expect_path(image, _file_path(image, node.image_user), _is_mip_mapped(node))
+
+    def _expect_path(self, image, path, is_mip_mapped):
+        known = self._entries.get((image.name_full, path, is_mip_mapped))
+        if path and not (known and known[0] == self._signature(image, path)):
+            self._scene.expect_image(**self._file_values(image, path, is_mip_mapped), **_encoding(image))
+
     def id_of(self, node):
         """The library's image of an image or environment texture node, 0 for a missing one."""
         image = node.image
@@ -65,14 +83,13 @@ class Images:
     def tiles_of(self, node):
         """The tiles of a tiled image: (column, row, library's image) of each."""
         image = node.image
-        numbers = [tile.number for tile in image.tiles]
+        paths = _tile_paths(image)
         found = []
-        for number in numbers:
-            path = _tile_path(image, number)
-            if path or number == numbers[0]:
+        for number, path in paths:
+            if path or number == paths[0][0]:
                 row, column = divmod(number - _FIRST_TILE, _TILES_PER_ROW)
                 found.append((column, row, self._id_of_path(image, path, False)))
-        if len(found) < len(numbers):
+        if len(found) < len(paths):
             self._warnings.add(f"Image '{image.name}': tiles without a file are shown as missing")
         return found
 
@@ -87,13 +104,21 @@ class Images:
             self._seen.add(key)
             return known[1]
         self._seen.add(key)
-        signature = _signature(image, path) + (self._limit,)
+        signature = self._signature(image, path)
         if known and known[0] == signature:
             return known[1]
         self._entries[key] = (signature, self._create(image, path, is_mip_mapped))
         if known and known[1]:
             self._scene.destroy_image(known[1])
         return self._entries[key][1]
+
+    def _signature(self, image, path):
+        return _signature(image, path) + (self._limit,)
+
+    def _file_values(self, image, path, is_mip_mapped):
+        """A file as keywords of create_image, but for its colour space."""
+        return {"path": path, "alpha_mode": _alpha_mode(image), "max_side": self._limit,
+                "is_mip_mapped": is_mip_mapped}
 
     def id_of_table(self, name, make, *arguments):
         """The library's image of a table (height, width, 3) of scene-linear colours, make(*arguments)."""
@@ -117,39 +142,38 @@ class Images:
                 self._scene.destroy_image(image_id)
 
     def _create(self, image, path, is_mip_mapped):
-        values = {"max_side": self._limit, "is_mip_mapped": is_mip_mapped}
         try:
             if path:
-                return self._from_file(image, path, values)
+                return self._from_file(image, path, is_mip_mapped)
             if _is_packed(image):
                 with tempfile.TemporaryDirectory() as folder:
                     path = os.path.join(folder, os.path.basename(image.filepath) or image.name)
                     with open(path, "wb") as file:
                         file.write(image.packed_file.data)
-                    return self._from_file(image, path, values)
-            return self._from_pixels(image, values)
+                    return self._from_file(image, path, is_mip_mapped)
+            return self._from_pixels(image, is_mip_mapped)
         except (native.TracerError, OSError, MemoryError) as error:
             self._warnings.add(f"Image '{image.name}': {error or 'no memory'}; magenta is used")
             return 0
 
-    def _from_file(self, image, path, values):
+    def _from_file(self, image, path, is_mip_mapped):
         """The image as the library reads it, or as Blender does where the library cannot."""
-        values = dict(values, alpha_mode=_alpha_mode(image))
         try:
-            return self._in_its_space(image, dict(values, path=path))
+            return self._in_its_space(image, self._file_values(image, path, is_mip_mapped))
         except native.TracerError as error:
             if error.status == native.ERROR_UNSUPPORTED:
                 self._warnings.add(f"{error}; Blender reads them")
             elif error.status != native.ERROR_FORMAT:
                 raise
-        return self._from_pixels(image, values)
+        return self._from_pixels(image, is_mip_mapped)
 
-    def _from_pixels(self, image, values):
+    def _from_pixels(self, image, is_mip_mapped):
         pixels = read_pixels(image)
         if pixels is None:
             self._warnings.add(f"Image '{image.name}': cannot be read, magenta is used")
             return 0
-        values = dict(values, pixels=pixels, alpha_mode=_pixel_alpha_mode(image))
+        values = {"pixels": pixels, "alpha_mode": _pixel_alpha_mode(image), "max_side": self._limit,
+                  "is_mip_mapped": is_mip_mapped}
         return self._scene.create_image(**values) if image.is_float else self._in_its_space(image, values)
 
     def _in_its_space(self, image, values):
@@ -279,6 +303,32 @@ def _tile_path(image, number):
     path = path.replace("<UVTILE>", f"u{column + 1}_v{row + 1}")
     path = os.path.abspath(bpy.path.abspath(path, library=image.library))
     return path if os.path.isfile(path) else ""
+
+
+def _tile_paths(image):
+    """(number, path as of _tile_path) of each tile of an image."""
+    return [(tile.number, _tile_path(image, tile.number)) for tile in image.tiles]
+
+
+def _image_nodes(trees):
+    """The nodes of trees and of the groups in them that show an image."""
+    seen, waiting = set(), list(trees)
+    while waiting:
+        tree = waiting.pop()
+        if tree is None or tree.as_pointer() in seen:
+            continue
+        seen.add(tree.as_pointer())
+        for node in tree.nodes:
+            if node.type == 'GROUP':
+                waiting.append(node.node_tree)
+            elif node.type in _IMAGE_NODES and not node.mute and node.image is not None:
+                if any(output.is_linked for output in node.outputs):
+                    yield node
+
+
+def has_files():
+    """Whether there is a file among Blender's images that could be read."""
+    return any(image.users and image.source in _FILE_SOURCES for image in bpy.data.images)
 
 
 def _is_packed(image):

@@ -66,10 +66,17 @@ class Materials:
                 self.entry_of(material.evaluated_get(depsgraph))
         return True
 
+    def is_kept(self, material):
+        """Whether an evaluated material is in the library and has not changed."""
+        return self._is_kept(material.name_full)
+
+    def _is_kept(self, key):
+        entry = self._entries.get(key)
+        return entry is not None and not entry.is_animated and not self._changes.material_of(key)
+
     def _keep(self, key):
         """Take a material as it is in the library, if it is there and has not changed."""
-        entry = self._entries.get(key)
-        if entry is None or entry.is_animated or self._changes.material_of(key):
+        if not self._is_kept(key):
             return False
         self._hold(key)
         return True

@@ -82,6 +82,13 @@ struct trc_image_reader *trc_image_reader_retain(struct trc_image_reader *reader
     return reader;
 }
 
+void trc_image_reader_rest(struct trc_image_reader *reader) {
+    pthread_mutex_lock(&reader->lock);
+    while (reader->idle_count)
+        (void)trc_process_destroy(reader->idle[--reader->idle_count]);
+    pthread_mutex_unlock(&reader->lock);
+}
+
 void trc_image_reader_release(struct trc_image_reader *reader) {
     if (!reader || atomic_fetch_sub_explicit(&reader->refs, 1, memory_order_acq_rel) != 1)
         return;

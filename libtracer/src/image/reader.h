@@ -27,6 +27,9 @@ void trc_image_reader_release(struct trc_image_reader *reader);
 /* Starts the program unless it runs, and does not wait for it: what is asked for next will. */
 void trc_image_reader_start(struct trc_image_reader *reader);
 
+/* Ends the processes that wait for the next call; the program stays. */
+void trc_image_reader_rest(struct trc_image_reader *reader);
+
 /* Seconds that a process may take for each step without a sign of progress; files get a second more
  * for each megabyte. For tests. */
 void trc_image_reader_set_patience(struct trc_image_reader *reader, double seconds);

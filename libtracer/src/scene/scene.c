@@ -101,6 +101,8 @@ void trc_scene_state_destroy(struct trc_scene_state *scene) {
     destroy_all(&scene->images, destroy_image);
     trc_material_release(scene->default_material);
     trc_names_destroy(scene->names);
+    if (scene->reader)
+        trc_image_reader_rest(scene->reader);
     trc_image_reader_release(scene->reader);
     pthread_mutex_destroy(&scene->cancel_lock);
     pthread_mutex_destroy(&scene->lock);
