@@ -733,9 +733,11 @@ static void test_refused_colors(void **state) {
     refused(&desc, TRC_ERROR_IMAGE);
     assert_non_null(strstr(trc_last_message(), "no such space"));
     desc.color_space = "root";
-    trc_memory_fail_at(2, false);
-    refused(&desc, TRC_ERROR_OUT_OF_MEMORY);
-    trc_memory_fail_at(-1, false);
+    for (int64_t n = 0; n < 2; n++) {
+        trc_memory_fail_at(n, false);
+        refused(&desc, TRC_ERROR_OUT_OF_MEMORY);
+        trc_memory_fail_at(-1, false);
+    }
     desc.is_srgb = 1;
     refused(&desc, TRC_ERROR_INVALID_ARGUMENT);
     desc.is_srgb = 0;

@@ -66,7 +66,8 @@ static void image_scene_init(struct image_scene *scene, const trc_image_desc *de
     *scene =
         (struct image_scene){.snapshot = {.image_count = 2, .images = scene->images},
                              .surface = {.snapshot = &scene->snapshot, .active = vm_all_set()}};
-    assert_int_equal(trc_image_load(desc, &(struct trc_image_source){0}, &scene->images[0]), TRC_OK);
+    assert_int_equal(trc_image_load(desc, &(struct trc_image_source){0}, &scene->images[0]),
+                     TRC_OK);
 }
 
 /* Every filter and extension on images of several sizes against double. */
