@@ -7,7 +7,6 @@ or no virtual display is a failure, unless VOLLEY_WITHOUT says that this machine
 """
 
 import os
-import shutil
 import sys
 import tempfile
 
@@ -38,14 +37,6 @@ def blender(tmp_path):
 @pytest.fixture
 def window(blender):
     """A Blender that can open a window."""
-    return blender
-
-
-@pytest.fixture
-def window(blender):
-    """A Blender that can open a window."""
-    if shutil.which("xvfb-run") is None:
-        pytest.skip("no xvfb-run found")
     return blender
 
 

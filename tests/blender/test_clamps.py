@@ -69,6 +69,8 @@ def inside_clamps():
         if setting is not None and hasattr(layer, f"use_pass_{setting}"):
             setattr(layer, f"use_pass_{setting}", True)
         name = long if HAS_LONG_PASS_NAMES else short
+        if short == "Shadow" and bpy.app.version >= (4, 0, 0):  # Cycles has none any more
+            continue
         if name is not None:
             names[name] = short
     clamped = {}
