@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a render job says, and what becomes of a commit that fails."""
 
+import blender as blender_support
+
 
 def inside_warnings():
     """An animation of two view layers with something to warn of, then a single frame."""
@@ -41,7 +43,9 @@ def inside_failure():
 
 def test_an_error_is_said_once(blender):
     assert "Volley: it is broken" in blender.run(inside_failure)
-    assert blender.output.count("it is broken") == 1
+    # Blender 4 prints what an engine's error is on its own, too.
+    times = 1 if blender_support.version() < (4, 0) else 2
+    assert blender.output.count("it is broken") == times
 
 
 def inside_failing_commit():
