@@ -153,7 +153,7 @@ static void check_render(struct session *s, uint32_t progressive) {
     STEP(trc_render_wait(render, -1.0));
     trc_render_progress progress = {.struct_size = sizeof progress};
     STEP(trc_render_poll(render, &progress));
-    assert_int_equal(progress.state, 1);
+    assert_int_equal(progress.state, TRC_PROGRESS_DONE);
     static float pixels[WIDTH * HEIGHT * 4];
     STEP(trc_render_read(render, TRC_PASS_COMBINED, pixels, WIDTH * HEIGHT * 4));
     for (int i = 0; i < WIDTH * HEIGHT * 4; i++)
@@ -268,7 +268,7 @@ static void renders_go_on_with_fewer_threads(void **state) {
         trc_render_progress progress = {.struct_size = sizeof progress};
         assert_int_equal(trc_render_wait(render, -1.0), TRC_OK);
         assert_int_equal(trc_render_poll(render, &progress), TRC_OK);
-        assert_int_equal(progress.state, 1);
+        assert_int_equal(progress.state, TRC_PROGRESS_DONE);
         assert_int_equal(progress.samples_done, 1);
         assert_int_equal(trc_render_destroy(render), TRC_OK);
     }

@@ -184,7 +184,7 @@ static void hammer(trc_scene scene, const trc_render_desc *desc, const uint32_t 
             snprintf(name, sizeof name, "pass %u", passes[k]);
             expect_ones(pixels, channels * SMALL * SMALL, name);
         }
-    } while (progress.state == 0);
+    } while (progress.state == TRC_PROGRESS_RUNNING);
     assert_int_equal(trc_render_destroy(render), TRC_OK);
 }
 

@@ -418,7 +418,7 @@ static float *render_image(trc_scene scene, const trc_render_desc *desc) {
     assert_int_equal(trc_render_start(scene, desc, &render), TRC_OK);
     assert_int_equal(trc_render_wait(render, -1.0), TRC_OK);
     assert_int_equal(trc_render_poll(render, &progress), TRC_OK);
-    assert_int_equal(progress.state, 1);
+    assert_int_equal(progress.state, TRC_PROGRESS_DONE);
     assert_true(progress.fraction == 1.0f);
     assert_int_equal(progress.samples_done, desc->sample_count);
     assert_int_equal(progress.tiles_done, progress.tile_count);
@@ -481,7 +481,7 @@ static void cancelled_renders_keep_what_they_have(void **state) {
     do {
         assert_int_equal(trc_render_wait(render, 0.002), TRC_OK);
         assert_int_equal(trc_render_poll(render, &progress), TRC_OK);
-        assert_int_equal(progress.state, 0);
+        assert_int_equal(progress.state, TRC_PROGRESS_RUNNING);
     } while (progress.samples_done < 1);
     assert_int_equal(trc_render_cancel(render), TRC_OK);
     assert_int_equal(trc_render_cancel(render), TRC_OK);
@@ -489,7 +489,7 @@ static void cancelled_renders_keep_what_they_have(void **state) {
     assert_int_equal(trc_render_wait(render, -1.0), TRC_OK);
     assert_true(trc_seconds() - start < 5.0);
     assert_int_equal(trc_render_poll(render, &progress), TRC_OK);
-    assert_int_equal(progress.state, 2);
+    assert_int_equal(progress.state, TRC_PROGRESS_CANCELLED);
     assert_true(progress.fraction > 0.0f && progress.fraction < 1.0f);
     const double seconds = progress.seconds;
     static float pixels[256 * 256 * 4];

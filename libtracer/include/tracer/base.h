@@ -37,7 +37,7 @@
 TRC_BEGIN_DECLS
 
 typedef int32_t trc_status;
-enum {
+enum trc_status_code {
     TRC_OK = 0,
     TRC_ERROR_INVALID_ARGUMENT = 1, /* a value is out of its documented range */
     TRC_ERROR_INVALID_HANDLE = 2,   /* null, stale, foreign or already destroyed */
@@ -60,7 +60,7 @@ typedef uint64_t trc_reader;
 typedef uint64_t trc_id;
 
 /* Instruction sets the kernels are built for, in rising order. */
-enum {
+enum trc_isa_id {
     TRC_ISA_AUTO = 0,
     TRC_ISA_SCALAR = 1,
     TRC_ISA_SSE42 = 2,

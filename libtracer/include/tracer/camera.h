@@ -7,7 +7,7 @@
 
 TRC_BEGIN_DECLS
 
-enum { TRC_CAMERA_PERSPECTIVE = 0, TRC_CAMERA_ORTHOGRAPHIC = 1 };
+enum trc_camera_type { TRC_CAMERA_PERSPECTIVE = 0, TRC_CAMERA_ORTHOGRAPHIC = 1 };
 
 /* The camera looks along its -Z with +Y up. The view window is given on the plane at distance 1
  * (perspective) or in metres (orthographic), for the FULL frame of trc_render_desc; sensor fit,

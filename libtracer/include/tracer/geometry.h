@@ -10,7 +10,7 @@ TRC_BEGIN_DECLS
 #define TRC_MAX_KEYS 33
 #define TRC_MAX_ATTRIBUTES 8
 
-enum { TRC_NORMALS_NONE = 0, TRC_NORMALS_VERTEX = 1, TRC_NORMALS_CORNER = 2 };
+enum trc_normals_layout { TRC_NORMALS_NONE = 0, TRC_NORMALS_VERTEX = 1, TRC_NORMALS_CORNER = 2 };
 
 /* A named array with one value per triangle corner, in triangle order. */
 typedef struct trc_corner_attribute {
@@ -62,7 +62,7 @@ TRC_API trc_status trc_mesh_update(trc_scene scene, trc_id mesh, uint32_t key_co
 TRC_API trc_status trc_mesh_destroy(trc_scene scene, trc_id mesh);
 
 /* Which rays see an instance or a light. */
-enum {
+enum trc_visible_rays {
     TRC_VISIBLE_CAMERA = 1,
     TRC_VISIBLE_DIFFUSE = 2,
     TRC_VISIBLE_GLOSSY = 4,
@@ -76,7 +76,7 @@ enum {
  * the part of its light that other instances take from it, and TRC_PASS_SHADOW_CATCHER has that
  * light by channel. Other rays meet it as any instance. Emission of instances that are none does
  * not light it as footage. */
-enum { TRC_INSTANCE_SHADOW_CATCHER = 1 };
+enum trc_instance_flags { TRC_INSTANCE_SHADOW_CATCHER = 1 };
 
 #define TRC_MAX_INSTANCE_VALUES 64
 

@@ -6,9 +6,14 @@
 
 TRC_BEGIN_DECLS
 
-enum { TRC_LIGHT_POINT = 0, TRC_LIGHT_SPOT = 1, TRC_LIGHT_SUN = 2, TRC_LIGHT_AREA = 3 };
-enum { TRC_AREA_RECTANGLE = 0, TRC_AREA_ELLIPSE = 1 };
-enum {
+enum trc_light_type {
+    TRC_LIGHT_POINT = 0,
+    TRC_LIGHT_SPOT = 1,
+    TRC_LIGHT_SUN = 2,
+    TRC_LIGHT_AREA = 3
+};
+enum trc_area_shape { TRC_AREA_RECTANGLE = 0, TRC_AREA_ELLIPSE = 1 };
+enum trc_light_flags {
     TRC_LIGHT_SPHERE = 1,    /* point, spot: a sphere; else a disk that faces the lit point, as in
                                 Blender before 4.0 and, from 4.1 on, with Soft Falloff */
     TRC_LIGHT_EVEN_CONE = 2, /* spot: as bright all over its cone; else times the cosine to its
@@ -49,7 +54,7 @@ TRC_API trc_status trc_light_destroy(trc_scene scene, trc_id light);
  * diffuse lobes, as many as light samples, by the cosine; light comes from those that meet nothing
  * within ao_distance. Shadow rays as any: transparent materials let them through. In the light
  * passes it is direct diffuse light. */
-enum {
+enum trc_ao_method {
     TRC_AO_ADD = 0,    /* white light of radiance ao_factor, besides all other light. As in Cycles,
                           what    is partly transparent gets it times its opacity once more */
     TRC_AO_REPLACE = 1 /* the world's own light on diffuse lobes, times ao_factor, in place of its

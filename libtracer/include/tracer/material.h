@@ -16,7 +16,7 @@ TRC_BEGIN_DECLS
 
 /* Inputs of each type in order, with their kind: c colour or vector (3 floats), f float, s shader.
  * Outputs in order after "->". */
-enum {
+enum trc_node_type {
     /* shaders (one output, the closure) */
     TRC_NODE_DIFFUSE = 1,    /* c color, f roughness, c normal; mode: 1 keeps the energy of rough
                                 surfaces, as Blender 4.3 and later */
@@ -144,42 +144,50 @@ enum {
 };
 
 /* Around an axis of the object (Generated coordinates), or where U of a UV map grows. */
-enum { TRC_TANGENT_Z = 0, TRC_TANGENT_X, TRC_TANGENT_Y, TRC_TANGENT_UV };
+enum trc_tangent_source { TRC_TANGENT_Z = 0, TRC_TANGENT_X, TRC_TANGENT_Y, TRC_TANGENT_UV };
 
-enum { TRC_SPACE_WORLD = 0, TRC_SPACE_OBJECT, TRC_SPACE_CAMERA };
+enum trc_space_id { TRC_SPACE_WORLD = 0, TRC_SPACE_OBJECT, TRC_SPACE_CAMERA };
 
 /* Radians; EULER reads rotation (XYZ), the others angle; AXIS_ANGLE axis too. */
-enum { TRC_ROTATE_AXIS_ANGLE = 0, TRC_ROTATE_X, TRC_ROTATE_Y, TRC_ROTATE_Z, TRC_ROTATE_EULER };
+enum trc_rotate_mode {
+    TRC_ROTATE_AXIS_ANGLE = 0,
+    TRC_ROTATE_X,
+    TRC_ROTATE_Y,
+    TRC_ROTATE_Z,
+    TRC_ROTATE_EULER
+};
 
 /* Fractals of gradient noise. FBM_UNIT is fractal Brownian motion scaled to [0, 1]. */
-enum {
+enum trc_fractal_type {
     TRC_FRACTAL_FBM_UNIT = 0,
     TRC_FRACTAL_FBM,
     TRC_FRACTAL_MULTIFRACTAL,
     TRC_FRACTAL_HETERO_TERRAIN,
     TRC_FRACTAL_HYBRID_MULTIFRACTAL,
-    TRC_FRACTAL_RIDGED_MULTIFRACTAL,
-    TRC_NOISE_TYPE_SHIFT = 2
+    TRC_FRACTAL_RIDGED_MULTIFRACTAL
+};
+enum trc_noise_mode { TRC_NOISE_TYPE_SHIFT = 2 };
+
+enum trc_voronoi_metric {
+    TRC_VORONOI_EUCLIDEAN = 0,
+    TRC_VORONOI_MANHATTAN,
+    TRC_VORONOI_CHEBYCHEV,
+    TRC_VORONOI_MINKOWSKI
+};
+enum trc_voronoi_feature {
+    TRC_VORONOI_F1 = 0,
+    TRC_VORONOI_F2,
+    TRC_VORONOI_SMOOTH_F1,
+    TRC_VORONOI_DISTANCE_TO_EDGE,
+    TRC_VORONOI_N_SPHERE_RADIUS
+};
+enum trc_voronoi_mode {
+    TRC_VORONOI_METRIC_SHIFT = 2,
+    TRC_VORONOI_FEATURE_SHIFT = 4,
+    TRC_VORONOI_NORMALIZE = 1 << 7 /* distance and color to about [0, 1] */
 };
 
-enum { /* metrics */
-       TRC_VORONOI_EUCLIDEAN = 0,
-       TRC_VORONOI_MANHATTAN,
-       TRC_VORONOI_CHEBYCHEV,
-       TRC_VORONOI_MINKOWSKI,
-       TRC_VORONOI_METRIC_SHIFT = 2
-};
-enum { /* features */
-       TRC_VORONOI_F1 = 0,
-       TRC_VORONOI_F2,
-       TRC_VORONOI_SMOOTH_F1,
-       TRC_VORONOI_DISTANCE_TO_EDGE,
-       TRC_VORONOI_N_SPHERE_RADIUS,
-       TRC_VORONOI_FEATURE_SHIFT = 4,
-       TRC_VORONOI_NORMALIZE = 1 << 7 /* distance and color to about [0, 1] */
-};
-
-enum {
+enum trc_wave_mode {
     TRC_WAVE_SINE = 0,
     TRC_WAVE_SAW,
     TRC_WAVE_TRIANGLE,
@@ -188,7 +196,7 @@ enum {
     TRC_WAVE_DIRECTION_SHIFT = 3
 };
 
-enum {
+enum trc_gradient_type {
     TRC_GRADIENT_LINEAR = 0,
     TRC_GRADIENT_QUADRATIC,
     TRC_GRADIENT_EASING,
@@ -198,10 +206,10 @@ enum {
     TRC_GRADIENT_SPHERICAL
 };
 
-enum { TRC_BRICK_SQUASH_SHIFT = 7 };
+enum trc_brick_mode { TRC_BRICK_SQUASH_SHIFT = 7 };
 
 /* Microfacet distributions. SHARP ignores roughness. */
-enum {
+enum trc_distribution_type {
     TRC_DISTRIBUTION_GGX = 0,
     TRC_DISTRIBUTION_MULTI_GGX = 1,
     TRC_DISTRIBUTION_BECKMANN = 2,
@@ -212,7 +220,7 @@ enum {
     TRC_DISTRIBUTION_CORRELATED = 16
 };
 
-enum {
+enum trc_blend_mode {
     TRC_BLEND_MIX = 0,
     TRC_BLEND_DARKEN,
     TRC_BLEND_MULTIPLY,
@@ -234,7 +242,7 @@ enum {
     TRC_BLEND_EXCLUSION
 };
 
-enum {
+enum trc_math_operation {
     TRC_MATH_ADD = 0,
     TRC_MATH_SUBTRACT,
     TRC_MATH_MULTIPLY,
@@ -277,7 +285,7 @@ enum {
     TRC_MATH_DEGREES
 };
 
-enum {
+enum trc_vector_operation {
     TRC_VECTOR_ADD = 0,
     TRC_VECTOR_SUBTRACT,
     TRC_VECTOR_MULTIPLY,
@@ -308,7 +316,7 @@ enum {
 };
 
 /* Mode bits of TRC_NODE_IMAGE. */
-enum {
+enum trc_image_mode {
     TRC_IMAGE_LINEAR = 0,
     TRC_IMAGE_CLOSEST = 1,
     TRC_IMAGE_CUBIC = 2,
@@ -318,8 +326,15 @@ enum {
     TRC_IMAGE_MIRROR = 3 << 2
 };
 
+/* What an input takes that is linked to no node. */
+enum trc_input_source {
+    TRC_INPUT_CONSTANT = -1, /* its value */
+    TRC_INPUT_DEFAULT = -2   /* "c normal", "c tangent", a texture's "c vector": what Blender gives
+                                an unlinked socket; other inputs refuse it */
+};
+
 typedef struct trc_node_input {
-    int32_t node;    /* index of an earlier node, or -1: the constant */
+    int32_t node;    /* index of an earlier node, or TRC_INPUT_* */
     uint32_t output; /* number of that node's output */
     float value[3];  /* the constant; a float input reads value[0]. An unlinked "c normal", "c
                         tangent"  or texture "c vector" input takes its default when node is -2 */
@@ -349,7 +364,7 @@ typedef struct trc_material_desc {
     uint32_t reserved;
 } trc_material_desc;
 
-enum {
+enum trc_material_flags {
     /* Sample its emissive triangles as lights ("multiple importance sample"). Off: glossy rays
      * alone find them, unless some surface of the scene has diffuse or translucent lobes, which
      * only samples light. */
@@ -370,7 +385,7 @@ TRC_API trc_status trc_material_update(trc_scene scene, trc_id material,
 /* Instances that still use it fall back to the default material. */
 TRC_API trc_status trc_material_destroy(trc_scene scene, trc_id material);
 
-enum {
+enum trc_alpha_mode {
     TRC_ALPHA_STRAIGHT = 0,
     TRC_ALPHA_PREMULTIPLIED = 1,
     TRC_ALPHA_CHANNEL_PACKED = 2,

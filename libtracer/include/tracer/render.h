@@ -6,9 +6,13 @@
 
 TRC_BEGIN_DECLS
 
-enum { TRC_INTEGRATOR_RAYCAST = 0, TRC_INTEGRATOR_WHITTED = 1, TRC_INTEGRATOR_DISTRIBUTION = 2 };
+enum trc_integrator_type {
+    TRC_INTEGRATOR_RAYCAST = 0,
+    TRC_INTEGRATOR_WHITTED = 1,
+    TRC_INTEGRATOR_DISTRIBUTION = 2
+};
 
-enum {
+enum trc_sampler_type {
     TRC_SAMPLER_SOBOL = 0,  /* joint Owen-scrambled Sobol */
     TRC_SAMPLER_SUDOKU = 1, /* the paper's interleaved tile */
     TRC_SAMPLER_JITTER = 2, /* stratified */
@@ -16,7 +20,7 @@ enum {
     TRC_SAMPLER_BLUE_NOISE = 4 /* Sobol with blue-noise ordering over the screen, for previews */
 };
 
-enum {
+enum trc_assembly_type {
     TRC_ASSEMBLY_AUTO = 0,
     TRC_ASSEMBLY_TYPES,
     TRC_ASSEMBLY_RUNS,
@@ -26,10 +30,14 @@ enum {
     TRC_ASSEMBLY_NONE
 };
 
-enum { TRC_FILTER_BOX = 0, TRC_FILTER_GAUSSIAN = 1, TRC_FILTER_BLACKMAN_HARRIS = 2 };
+enum trc_filter_type {
+    TRC_FILTER_BOX = 0,
+    TRC_FILTER_GAUSSIAN = 1,
+    TRC_FILTER_BLACKMAN_HARRIS = 2
+};
 
 /* Passes and their channels. */
-enum {
+enum trc_pass_id {
     TRC_PASS_COMBINED = 0, /* 4: premultiplied RGBA. Shadow catchers are black in it, covering as
                               much as they lose of their light by the mean of its channels;
                               where the film is not transparent, on the background */
@@ -77,27 +85,43 @@ enum {
     TRC_PASS_COUNT = 27
 };
 
+/* Passes of which a render has as many as it asks for: the numbers of the first ones. */
+enum trc_pass_range {
+    TRC_PASS_FIRST_AOV_VALUE = 64,
+    TRC_PASS_FIRST_AOV_COLOR = 80,
+    TRC_PASS_FIRST_LIGHT_GROUP = 96,
+    TRC_PASS_FIRST_CRYPTOMATTE = 128
+};
+
 /* What the AOV nodes of materials and the world write, by the numbers of their modes: 1 channel,
  * and 4 of which the last is 1. Of each sample the values at the first surface that is not mostly
  * seen through, and as in Cycles at those before it, added up, whatever these let through. */
 #define TRC_MAX_AOVS 16 /* of each of the two */
-#define TRC_PASS_AOV_VALUE(number) (64u + (number))
-#define TRC_PASS_AOV_COLOR(number) (80u + (number))
+#define TRC_PASS_AOV_VALUE(number) ((uint32_t)TRC_PASS_FIRST_AOV_VALUE + (number))
+#define TRC_PASS_AOV_COLOR(number) ((uint32_t)TRC_PASS_FIRST_AOV_COLOR + (number))
 
 /* Light of one light group each: 3 channels. What is in no group is only in Combined. */
-#define TRC_PASS_LIGHT_GROUP(number) (96u + (number)) /* of group number + 1 */
+#define TRC_PASS_LIGHT_GROUP(number) \
+    ((uint32_t)TRC_PASS_FIRST_LIGHT_GROUP + (number)) /* of group number + 1 */
 
 /* Cryptomatte: which objects, materials or assets (an object's uppermost parent) cover a pixel, and
  * how much of it (J. Friedman, A. Jones, "Fully Automatic ID Mattes with Support for Motion Blur
  * and Transparency", SIGGRAPH 2015 posters; Psyop's specification 1.2.0). Ranks are pairs of an id
  * and its coverage, largest first, two of them in the 4 channels of a layer. What is partly
  * transparent shares the coverage with what is behind it. */
-enum { TRC_CRYPTOMATTE_OBJECT = 0, TRC_CRYPTOMATTE_MATERIAL, TRC_CRYPTOMATTE_ASSET };
+enum trc_cryptomatte_kind {
+    TRC_CRYPTOMATTE_OBJECT = 0,
+    TRC_CRYPTOMATTE_MATERIAL,
+    TRC_CRYPTOMATTE_ASSET
+};
 #define TRC_CRYPTOMATTE_KINDS 3
-#define TRC_MAX_CRYPTOMATTE_DEPTH 16 /* ranks */
+#define TRC_CRYPTOMATTE_LAYER_RANKS 2
+#define TRC_MAX_CRYPTOMATTE_LAYERS 8 /* of each kind */
+#define TRC_MAX_CRYPTOMATTE_DEPTH (TRC_CRYPTOMATTE_LAYER_RANKS * TRC_MAX_CRYPTOMATTE_LAYERS)
 
 /* The number of a Cryptomatte layer for trc_render_read. */
-#define TRC_PASS_CRYPTOMATTE(kind, layer) (128u + 8u * (kind) + (layer))
+#define TRC_PASS_CRYPTOMATTE(kind, layer) \
+    ((uint32_t)TRC_PASS_FIRST_CRYPTOMATTE + TRC_MAX_CRYPTOMATTE_LAYERS * (kind) + (layer))
 
 /* The id of a name: its bytes' MurmurHash3_x86_32 with seed 0 (A. Appleby, public domain) as the
  * bits of a float, the exponent kept off the ends so that it is finite and normal. name: UTF-8,
@@ -160,9 +184,15 @@ typedef struct trc_render_desc {
 TRC_API trc_status trc_render_start(trc_scene scene, const trc_render_desc *desc,
                                     trc_render *render_out);
 
+enum trc_progress_state {
+    TRC_PROGRESS_RUNNING = 0,
+    TRC_PROGRESS_DONE = 1,
+    TRC_PROGRESS_CANCELLED = 2
+};
+
 typedef struct trc_render_progress {
     uint32_t struct_size;
-    uint32_t state;        /* 0 running, 1 done, 2 cancelled, 3 failed (see message) */
+    uint32_t state;        /* TRC_PROGRESS_* */
     float fraction;        /* [0, 1] of the samples; those that adaptive sampling spares are done */
     uint32_t samples_done; /* lowest count over all pixels, as if every pixel took them all */
     double seconds;        /* since the start, stands still at the end */

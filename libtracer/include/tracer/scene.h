@@ -35,7 +35,7 @@ TRC_API trc_status trc_scene_commit(trc_scene scene);
 TRC_API trc_status trc_scene_cancel(trc_scene scene);
 
 /* What a committed scene uses; what is not listed costs nothing. */
-enum {
+enum trc_feature_flags {
     TRC_FEATURE_LENS = 1 << 0,
     TRC_FEATURE_CAMERA_MOTION = 1 << 1,
     TRC_FEATURE_OBJECT_MOTION = 1 << 2,

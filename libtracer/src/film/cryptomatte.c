@@ -72,8 +72,8 @@ void trc_mattes_read(const struct trc_matte *mattes, uint32_t count, uint32_t la
         ranked[k] = m;
     }
     memset(out, 0, TRC_MATTE_CHANNELS * sizeof *out);
-    for (uint32_t i = 0; samples && i < TRC_LAYER_RANKS; i++) {
-        const uint32_t rank = TRC_LAYER_RANKS * layer + i;
+    for (uint32_t i = 0; samples && i < TRC_CRYPTOMATTE_LAYER_RANKS; i++) {
+        const uint32_t rank = TRC_CRYPTOMATTE_LAYER_RANKS * layer + i;
         if (rank >= used)
             break;
         const float coverage = ranked[rank].weight / (float)samples;

@@ -19,9 +19,8 @@ struct trc_matte {
 /* Places beyond the ranks that are read. */
 #define TRC_SPARE_MATTES 2
 
-/* Channels of a layer, and its ranks. */
+/* Channels of a layer. */
 #define TRC_MATTE_CHANNELS 4
-#define TRC_LAYER_RANKS 2
 
 static inline void trc_matte_add(struct trc_matte *mattes, uint32_t count, float id, float weight) {
     for (uint32_t i = 0; i < count; i++) {

@@ -98,8 +98,9 @@ trc_status trc_film_check_budget(uint32_t width, uint32_t height, uint64_t pixel
 }
 
 uint32_t trc_film_matte_count(const trc_render_desc *desc) {
-    const uint32_t layers = (desc->cryptomatte_depth + TRC_LAYER_RANKS - 1) / TRC_LAYER_RANKS;
-    return desc->cryptomattes ? layers * TRC_LAYER_RANKS + TRC_SPARE_MATTES : 0;
+    const uint32_t layers =
+        (desc->cryptomatte_depth + TRC_CRYPTOMATTE_LAYER_RANKS - 1) / TRC_CRYPTOMATTE_LAYER_RANKS;
+    return desc->cryptomattes ? layers * TRC_CRYPTOMATTE_LAYER_RANKS + TRC_SPARE_MATTES : 0;
 }
 
 uint64_t trc_film_pixel_bytes(const trc_render_desc *desc) {

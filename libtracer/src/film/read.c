@@ -12,9 +12,6 @@
 #include "film/film.h"
 #include "film/sequence.h"
 
-/* Numbers of layers that TRC_PASS_CRYPTOMATTE keeps for each kind. */
-#define MAX_LAYERS (TRC_MAX_CRYPTOMATTE_DEPTH / TRC_LAYER_RANKS)
-
 /* Writing a batch of samples takes some ten microseconds, unless the system stops the thread. */
 #define LOOKS_BEFORE_YIELDING 1000
 
@@ -73,9 +70,10 @@ static bool has_pass(const struct trc_film *film, uint32_t pass) {
         return film->shows_shadows;
     if (!trc_film_is_cryptomatte(pass))
         return film->sums[pass] != NULL;
-    const uint32_t number = pass - TRC_PASS_CRYPTOMATTE(0, 0), layer = number % MAX_LAYERS;
-    return film->mattes[number / MAX_LAYERS] &&
-           layer * TRC_LAYER_RANKS + TRC_SPARE_MATTES < film->matte_count;
+    const uint32_t number = pass - TRC_PASS_CRYPTOMATTE(0, 0),
+                   layer = number % TRC_MAX_CRYPTOMATTE_LAYERS;
+    return film->mattes[number / TRC_MAX_CRYPTOMATTE_LAYERS] &&
+           layer * TRC_CRYPTOMATTE_LAYER_RANKS + TRC_SPARE_MATTES < film->matte_count;
 }
 
 /* ---- rows ---- */
@@ -83,10 +81,11 @@ static bool has_pass(const struct trc_film *film, uint32_t pass) {
 static void read_mattes(const struct reading *r, struct row row) {
     const struct trc_film *film = r->film;
     const uint32_t number = r->pass - TRC_PASS_CRYPTOMATTE(0, 0);
-    const struct trc_matte *mattes = film->mattes[number / MAX_LAYERS];
+    const struct trc_matte *mattes = film->mattes[number / TRC_MAX_CRYPTOMATTE_LAYERS];
     for (uint64_t i = row.first; i < row.end; i++)
-        trc_mattes_read(mattes + i * film->matte_count, film->matte_count, number % MAX_LAYERS,
-                        load_count(film, i), r->out + i * TRC_MATTE_CHANNELS);
+        trc_mattes_read(mattes + i * film->matte_count, film->matte_count,
+                        number % TRC_MAX_CRYPTOMATTE_LAYERS, load_count(film, i),
+                        r->out + i * TRC_MATTE_CHANNELS);
 }
 
 /* Passes that are sums or values of samples. */

@@ -20,8 +20,6 @@
 /* Most samples of one call of a kernel: progress of a long tile shows after each. */
 #define SAMPLES_PER_JOB 16
 
-enum { STATE_RUNNING = 0, STATE_DONE = 1, STATE_CANCELLED = 2 };
-
 struct worker {
     struct trc_render_state *render;
     pthread_t thread;
@@ -202,7 +200,7 @@ static void leave(struct trc_render_state *render) {
     pthread_mutex_lock(&render->lock);
     if (--render->running_count == 0) {
         const bool complete = render->tiles_done == render->schedule.tile_count;
-        render->state = complete ? STATE_DONE : STATE_CANCELLED;
+        render->state = complete ? TRC_PROGRESS_DONE : TRC_PROGRESS_CANCELLED;
         render->time_end = trc_seconds();
         pthread_cond_broadcast(&render->ended);
     }
@@ -406,7 +404,7 @@ void trc_render_state_wait(struct trc_render_state *render, double timeout_secon
     const struct timespec deadline = deadline_in(limited ? timeout_seconds : 0.0);
     int error = 0;
     pthread_mutex_lock(&render->lock);
-    while (render->state == STATE_RUNNING && error != ETIMEDOUT) {
+    while (render->state == TRC_PROGRESS_RUNNING && error != ETIMEDOUT) {
         if (limited)
             error = pthread_cond_timedwait(&render->ended, &render->lock, &deadline);
         else
@@ -424,7 +422,8 @@ void trc_render_state_poll(struct trc_render_state *render, trc_render_progress 
     p.state = render->state;
     p.fraction = (float)((double)render->pixel_samples_done / pixel_samples);
     p.samples_done = trc_schedule_batch_begin(schedule, render->lowest_batch);
-    p.seconds = (p.state == STATE_RUNNING ? trc_seconds() : render->time_end) - render->time_start;
+    p.seconds =
+        (p.state == TRC_PROGRESS_RUNNING ? trc_seconds() : render->time_end) - render->time_start;
     p.rays_camera = render->counts.rays_camera;
     p.rays_shadow = render->counts.rays_shadow;
     p.rays_reflection = render->counts.rays_reflection;
