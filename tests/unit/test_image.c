@@ -16,6 +16,8 @@
 #include "image/image.h"
 #include "image/texel.h"
 #include "image_file.h"
+#include "query_scene.h"
+#include "scene/snapshot.h"
 
 static trc_image_desc pixels_desc(uint32_t width, uint32_t height, const void *pixels,
                                   bool is_float) {
@@ -193,6 +195,86 @@ static void test_scene_limit(void **state) {
     assert_int_equal(trc_image_create(scene, &desc, &id), TRC_OK);
     assert_int_equal(committed_bytes(scene, warnings, sizeof warnings), (3 << 18) + (3 << 16));
     assert_int_equal(trc_scene_destroy(scene), TRC_OK);
+}
+
+enum { KEPT = 3, KEPT_SIDE = 256 };
+
+/* The images of a scene as the last commit has them, of which the caller is a holder. */
+static void hold_images(trc_scene scene, struct trc_image *images[KEPT]) {
+    assert_int_equal(trc_scene_commit(scene), TRC_OK);
+    const struct trc_snapshot *snapshot = query_scene_snapshot(scene);
+    assert_int_equal(snapshot->image_count, KEPT);
+    for (int i = 0; i < KEPT; i++)
+        images[i] = trc_image_retain(snapshot->images[i]);
+}
+
+static void check_kept(trc_scene scene, struct trc_image *const before[KEPT],
+                       const uint8_t *pixels) {
+    struct trc_image *images[KEPT];
+    hold_images(scene, images);
+    for (int i = 0; i < KEPT; i++) {
+        assert_ptr_equal(images[i], before[i]);
+        assert_int_equal(images[i]->levels[0].width, KEPT_SIDE);
+        assert_int_equal(images[i]->level_count, 5);
+        assert_false(images[i]->is_halved);
+        assert_memory_equal(images[i]->levels[0].texels, pixels, 4 * KEPT_SIDE * KEPT_SIDE);
+        trc_image_release(images[i]);
+    }
+}
+
+/* The images that have been halved are shown with the next commit that succeeds. */
+static void check_kept_until_commit(trc_scene scene, struct trc_image *const before[KEPT]) {
+    char warnings[200];
+    for (int64_t n = 0; n < 4; n++) {
+        trc_memory_fail_at(n, false);
+        assert_int_equal(trc_scene_commit(scene), TRC_ERROR_OUT_OF_MEMORY);
+        trc_memory_fail_at(-1, false);
+        for (int i = 0; i < KEPT; i++)
+            assert_ptr_equal(query_scene_snapshot(scene)->images[i], before[i]);
+    }
+    assert_int_equal(committed_bytes(scene, warnings, sizeof warnings),
+                     16 * TRC_IMAGE_MAX_SIDE + 4 * KEPT);
+    assert_non_null(strstr(warnings, "3 images are shown smaller"));
+}
+
+/* An image that cannot be halved leaves room for nothing else: all others are halved down to a
+ * texel. Wherever memory fails on the way, all images and levels are the former ones, and with
+ * memory enough the same call succeeds. */
+static void test_scene_limit_without_memory(void **state) {
+    (void)state;
+    static uint8_t pixels[4 * KEPT_SIDE * KEPT_SIDE];
+    static float column[TRC_IMAGE_MAX_SIDE * 4];
+    for (uint32_t i = 0; i < sizeof pixels; i++)
+        pixels[i] = i % 4 == 3 ? UINT8_MAX : (uint8_t)(i * 2654435761u >> 24);
+    const trc_scene_desc scene_desc = {
+        .struct_size = sizeof scene_desc, .thread_count = 1, .image_megabytes = 1};
+    trc_image_desc desc = pixels_desc(KEPT_SIDE, KEPT_SIDE, pixels, false);
+    desc.is_mip_mapped = 1;
+    trc_scene scene = 0;
+    trc_id id = 0;
+    struct trc_image *before[KEPT];
+    assert_int_equal(trc_scene_create(&scene_desc, &scene), TRC_OK);
+    for (int i = 0; i < KEPT; i++)
+        assert_int_equal(trc_image_create(scene, &desc, &id), TRC_OK);
+    hold_images(scene, before);
+    const trc_image_desc large = pixels_desc(1, TRC_IMAGE_MAX_SIDE, column, true);
+    const uint64_t bytes = trc_memory_bytes();
+    int64_t refused_count = 0;
+    for (;; refused_count++) {
+        trc_memory_fail_at(refused_count, false);
+        const trc_status status = trc_image_create(scene, &large, &id);
+        trc_memory_fail_at(-1, false);
+        if (status == TRC_OK)
+            break;
+        assert_int_equal(status, TRC_ERROR_OUT_OF_MEMORY);
+        check_kept(scene, before, pixels);
+        assert_true(trc_memory_bytes() == bytes);
+    }
+    assert_true(refused_count > 3 * 2 * KEPT); /* several halvings of each, of several blocks */
+    check_kept_until_commit(scene, before);
+    assert_int_equal(trc_scene_destroy(scene), TRC_OK);
+    for (int i = 0; i < KEPT; i++)
+        trc_image_release(before[i]);
 }
 
 /* ---- levels ---- */
@@ -775,6 +857,7 @@ int main(void) {
         cmocka_unit_test(test_refused_pixels),
         cmocka_unit_test(test_limits),
         cmocka_unit_test(test_scene_limit),
+        cmocka_unit_test(test_scene_limit_without_memory),
         cmocka_unit_test(test_levels),
         cmocka_unit_test(test_holders),
         cmocka_unit_test(test_memory_failures),
@@ -795,7 +878,7 @@ int main(void) {
         cmocka_unit_test(test_color_of_grey_files),
         cmocka_unit_test(test_refused_colors),
 #else
-        cmocka_unit_test(test_no_colors),      cmocka_unit_test(test_no_files),
+        cmocka_unit_test(test_no_colors),       cmocka_unit_test(test_no_files),
 #endif
     };
     return cmocka_run_group_tests(tests, set_up_reader, tear_down_reader);

@@ -164,7 +164,8 @@ trc_status trc_scene_add_image(struct trc_scene_state *scene, const trc_image_de
     }
     const trc_status fit = fit_images(scene);
     if (fit != TRC_OK) {
-        (void)trc_scene_remove_image(scene, added);
+        trc_store_take_back(&scene->images, added);
+        trc_image_release(image);
         return fit;
     }
     scene->changed |= TRC_CHANGED_IMAGES;

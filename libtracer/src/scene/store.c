@@ -116,4 +116,10 @@ void trc_store_remove(struct trc_store *store, trc_id id) {
     store->free_slot = i;
 }
 
+void trc_store_take_back(struct trc_store *store, trc_id id) {
+    trc_store_remove(store, id);
+    if (store->keeps_slots)
+        store->slot_count--; /* only the last one can have been added last */
+}
+
 uint32_t trc_store_slot_of(trc_id id) { return (uint32_t)id - 1; }

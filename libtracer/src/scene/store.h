@@ -55,6 +55,9 @@ void *trc_store_get(const struct trc_store *store, trc_id id);
 /* The id must be alive. */
 void trc_store_remove(struct trc_store *store, trc_id id);
 
+/* Undoes the last trc_store_add, whose id nobody was given: no slot is used up. */
+void trc_store_take_back(struct trc_store *store, trc_id id);
+
 /* Slot number of a living id; slot_count bounds it. */
 uint32_t trc_store_slot_of(trc_id id);
 
