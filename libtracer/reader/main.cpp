@@ -2,6 +2,7 @@
 // a stream to the library and makes processes, each of which serves requests (image/protocol.h) one
 // by one until it is ended, by whatever.
 #include <algorithm>
+#include <memory>
 #include <string>
 #include <thread>
 
@@ -34,6 +35,17 @@ void serve(connection *to) {
     }
 }
 
+// Files that their own format's reader refuses are tried with all others, of which one reads a
+// large dictionary first. Readers that start threads must not be tried here: processes would miss
+// them.
+void prepare_readers() {
+    OIIO::ImageSpec spec;
+    const std::unique_ptr<OIIO::ImageInput> dicom = OIIO::ImageInput::create("dicom");
+    if (dicom)
+        (void)dicom->open("/dev/null", spec);
+    (void)OIIO::geterror();
+}
+
 } // namespace
 
 int main() {
@@ -44,5 +56,6 @@ int main() {
     OIIO::attribute("exr_threads", std::max(1, std::min(processors, max_threads)));
     // All that does not depend on a file is done before processes are made.
     (void)OIIO::get_string_attribute("input_format_list");
+    prepare_readers();
     return system_launch(serve);
 }
