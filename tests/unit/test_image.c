@@ -647,12 +647,17 @@ static void load_damaged(void) {
     trc_image_release(image);
 }
 
+/* Each damaged file costs a process. Here are enough of them to see that every one is answered for
+ * and nothing stays; tests/damaged.py has thousands, of every format. */
+#define TRUNCATION_STEP 5
+#define CORRUPTIONS 30
+
 static void test_truncated_files(void **state) {
     (void)state;
     const uint64_t bytes = memory_of_images();
     for (size_t k = 0; k < SAMPLES; k++) {
         const struct sample f = makers[k]();
-        for (size_t size = 0; size < f.size; size++) {
+        for (size_t size = k; size < f.size; size += TRUNCATION_STEP) {
             write_file(f.name, f.bytes, size);
             load_damaged();
         }
@@ -661,13 +666,12 @@ static void test_truncated_files(void **state) {
     assert_true(memory_of_images() == bytes);
 }
 
-/* Thousands, of every format: tests/damaged.py. */
 static void test_corrupt_files(void **state) {
     (void)state;
     const uint64_t bytes = memory_of_images();
     uint32_t random = 1;
     for (size_t k = 0; k < SAMPLES; k++) {
-        for (int round = 0; round < 100; round++) {
+        for (int round = 0; round < CORRUPTIONS; round++) {
             struct sample f = makers[k]();
             for (int change = 0; change < 3; change++) {
                 random = random * 1664525u + 1013904223u;
