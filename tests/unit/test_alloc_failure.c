@@ -194,6 +194,10 @@ static void run_session(uint32_t is_final) {
     const trc_light_desc light = default_light_desc();
     STEP(trc_mesh_update(s.scene, s.mesh, 1, cube_positions, 24, NULL, 0));
     STEP(trc_light_update(s.scene, s.light, &light));
+    static const float flat[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0};
+    trc_instance_desc second = default_instance_desc(s.mesh);
+    second.transforms = flat;
+    STEP(trc_instance_update(s.scene, s.second, &second));
     STEP(trc_scene_commit(s.scene));
     check_render(&s, 1);
     STEP(trc_instance_destroy(s.scene, s.second));

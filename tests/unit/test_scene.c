@@ -354,7 +354,7 @@ static void singular_instances_are_hidden_and_counted(void **state) {
     mesh_desc.position_count = 48;
     assert_int_equal(trc_mesh_create(scene, &mesh_desc, &mesh), TRC_OK);
     trc_instance_desc desc = default_instance_desc(mesh);
-    float transform[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0};
+    float transform[12] = {1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
     desc.transforms = transform;
     assert_int_equal(trc_instance_create(scene, &desc, &instance), TRC_OK);
     assert_int_equal(trc_scene_commit(scene), TRC_OK);
@@ -366,15 +366,45 @@ static void singular_instances_are_hidden_and_counted(void **state) {
     char text[256];
     uint64_t size = 0;
     assert_int_equal(trc_scene_get_warnings(scene, text, sizeof text, &size), TRC_OK);
-    assert_non_null(strstr(text, "singular"));
+    assert_non_null(strstr(text, "a line or a point"));
     assert_int_equal(size, strlen(text) + 1);
     assert_int_equal(trc_scene_get_warnings(scene, text, 5, NULL), TRC_OK);
     assert_int_equal(strlen(text), 4);
+    transform[5] = 1.0f; /* flat */
+    assert_int_equal(trc_instance_update(scene, instance, &desc), TRC_OK);
+    assert_int_equal(trc_scene_commit(scene), TRC_OK);
+    assert_int_equal(stats_of(scene).skipped_instance_count, 0);
+    assert_int_equal(snapshot_of(scene)->instances[1].visibility, TRC_VISIBLE_ALL);
+    assert_true(snapshot_of(scene)->instances[1].is_thin);
     transform[10] = -2.0f;
     assert_int_equal(trc_instance_update(scene, instance, &desc), TRC_OK);
     assert_int_equal(trc_scene_commit(scene), TRC_OK);
     assert_int_equal(stats_of(scene).skipped_instance_count, 0);
     assert_int_equal(snapshot_of(scene)->instances[1].flips, 1);
+    assert_false(snapshot_of(scene)->instances[1].is_thin);
+    assert_int_equal(trc_scene_destroy(scene), TRC_OK);
+}
+
+/* Trees of flat instances are kept as those of meshes are, and built anew when theirs move. */
+static void trees_of_flat_instances_are_kept(void **state) {
+    (void)state;
+    const trc_scene scene = fixture_scene();
+    trc_id mesh = 0, flat[2];
+    const trc_mesh_desc mesh_desc = default_mesh_desc();
+    assert_int_equal(trc_mesh_create(scene, &mesh_desc, &mesh), TRC_OK);
+    trc_instance_desc desc = default_instance_desc(mesh);
+    float transform[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0};
+    desc.transforms = transform;
+    for (int i = 0; i < 2; i++)
+        assert_int_equal(trc_instance_create(scene, &desc, &flat[i]), TRC_OK);
+    assert_int_equal(trc_scene_commit(scene), TRC_OK);
+    assert_true(stats_of(scene).built_count >= 2);
+    for (int moved = 0; moved < 2; moved++) {
+        transform[3] = (float)moved;
+        assert_int_equal(trc_instance_update(scene, flat[1], &desc), TRC_OK);
+        assert_int_equal(trc_scene_commit(scene), TRC_OK);
+        assert_int_equal(stats_of(scene).built_count, moved);
+    }
     assert_int_equal(trc_scene_destroy(scene), TRC_OK);
 }
 
@@ -638,6 +668,7 @@ int main(void) {
         cmocka_unit_test(instruction_sets_may_change),
         cmocka_unit_test(bad_texels_are_named),
         cmocka_unit_test(singular_instances_are_hidden_and_counted),
+        cmocka_unit_test(trees_of_flat_instances_are_kept),
         cmocka_unit_test(destroyed_materials_leave_the_default),
         cmocka_unit_test(image_does_not_depend_on_threads),
         cmocka_unit_test(cancelled_renders_keep_what_they_have),

@@ -21,7 +21,7 @@ _PIECE_SAMPLES = 8  # of the opening in each piece of Cycles' table: its steps s
 _CENTER_OFFSETS = {'START': 0.5, 'CENTER': 0.0, 'END': -0.5}  # in shutter times
 CENTER = 0.5
 _MAX_TURN = math.radians(4.0)  # between two keys: what turns shrinks by at most 0.06 % halfway
-_SINGULAR = 1e-6               # smallest share of its size in any direction that a matrix needs
+_SINGULAR = 1e-6               # smallest share of its size that a matrix needs in two directions
 
 
 @dataclass
@@ -144,8 +144,11 @@ def follow_turns(transforms):
     if np.abs(np.diff(linear, axis=0)).max(initial=0.0) < math.sin(_MAX_TURN) * _smallest_axis(linear):
         return transforms
     u, sizes, v = np.linalg.svd(linear)
-    if sizes.min() <= sizes.max() * _SINGULAR:
+    least = sizes.max() * _SINGULAR
+    if sizes[:, 1].min() <= least:
         return transforms
+    flat = sizes[:, 2] <= least  # either side of what is flat may be its front: the one that only turns
+    u[flat, :, 2] *= np.sign(np.linalg.det(u @ v))[flat, None]
     rotations = u @ v
     rotations *= np.sign(np.linalg.det(rotations))[:, None, None]
     stretches = rotations.transpose(0, 2, 1) @ linear

@@ -84,8 +84,9 @@ typedef struct trc_instance_desc {
     uint32_t struct_size;
     uint32_t key_count; /* transforms, 1..TRC_MAX_KEYS, evenly spaced over [0, 1] */
     trc_id mesh;
-    const float *transforms; /* 12 floats per key, see base.h; a singular one hides the instance
-                                and is counted in trc_scene_stats */
+    const float *transforms; /* 12 floats per key, see base.h; what they flatten is shown flat;
+                                where all keys make it a line or a point, or one is not finite, the
+                                instance is hidden and counted in trc_scene_stats */
     const trc_id *materials; /* material of each slot; 0: the default grey diffuse */
     uint32_t material_count; /* a triangle's slot beyond the last uses the last; 0: default */
     uint32_t visibility;     /* TRC_VISIBLE_* */

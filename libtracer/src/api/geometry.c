@@ -112,8 +112,7 @@ trc_status trc_mesh_destroy(trc_scene scene, trc_id mesh) {
 /* Most material slots of an instance: a triangle's slot has 16 bits. */
 #define MAX_SLOTS 65536
 
-/* Transforms are checked at commit: one that is not finite hides the instance like a singular one.
- */
+/* Transforms are checked at commit: one that is not finite hides the instance. */
 static trc_status check_instance(const trc_instance_desc *desc) {
     TRC_TRY(trc_check_struct(desc, sizeof *desc, "trc_instance_desc"));
     TRC_TRY(trc_check_count(desc->key_count, 1, TRC_MAX_KEYS, "key_count"));

@@ -13,6 +13,7 @@
 
 #include "bvh/bvh.h"
 #include "bvh/part.h"
+#include "bvh/thin.h"
 #include "bvh/tree.h"
 #include "core/core.h"
 #include "scene/mesh.h"
@@ -198,6 +199,14 @@ static void leaf_box(const struct trc_tree *tree, uint32_t ref, uint32_t key, fl
     }
 }
 
+/* The tree of an instance, NULL where only the joined one has it. */
+static const struct trc_blas *blas_of(const struct checker *c, uint32_t number) {
+    const struct trc_instance *instance = &c->snapshot->instances[number];
+    if (!instance->is_thin)
+        return c->bvh->blas[instance->mesh];
+    return c->bvh->thin && c->bvh->thin[number] ? &c->bvh->thin[number]->blas : NULL;
+}
+
 /* ---- items of a top tree ---- */
 
 /* Box of the images of the tree's corners at every key: in double, so that it is no wider than it
@@ -205,7 +214,7 @@ static void leaf_box(const struct trc_tree *tree, uint32_t ref, uint32_t key, fl
 static void item_box(const struct trc_snapshot *s, const struct trc_item *item, double lower[3],
                      double upper[3]) {
     static const struct trc_affine identity = {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
-    const bool placed = item->instance != TRC_NO_HIT;
+    const bool placed = item->instance != TRC_NO_HIT && !s->instances[item->instance].is_thin;
     const uint32_t key_count = placed ? s->instances[item->instance].key_count : 1;
     for (int axis = 0; axis < 3; axis++) {
         lower[axis] = INFINITY;
@@ -251,7 +260,7 @@ static bool check_item(struct checker *c, const struct trc_item *item, uint8_t *
         return complain(c, "an item stands for instance %u of %u", item->instance,
                         s->instance_count);
     const struct trc_instance *instance = &s->instances[item->instance];
-    const struct trc_blas *blas = c->bvh->blas[instance->mesh];
+    const struct trc_blas *blas = blas_of(c, item->instance);
     if (!blas || item->tree != &blas->tree)
         return complain(c, "the item of instance %u has another tree", item->instance);
     if (item->visibility != instance->visibility)
@@ -456,13 +465,35 @@ static bool check_blas(struct checker *c, uint32_t mesh) {
     return check_tree(&t, 1, &first);
 }
 
+static bool check_thin(struct checker *c, uint32_t number) {
+    const struct trc_instance *instance = &c->snapshot->instances[number];
+    const struct trc_thin *thin = c->bvh->thin[number];
+    const struct trc_mesh *mesh = c->snapshot->meshes[instance->mesh];
+    struct trc_mesh placed;
+    char name[32];
+    uint64_t first;
+    if (!instance->is_thin || !trc_thin_is_of(thin, instance, mesh))
+        return complain(c, "the tree of thin instance %u is of another", number);
+    if (trc_thin_mesh(instance, mesh, &placed) != TRC_OK)
+        return complain(c, "no memory to check a tree");
+    (void)snprintf(name, sizeof name, "instance %u", number);
+    const struct trc_part part = {.mesh = &placed};
+    struct tree_check t = {.checker = c, .name = name, .tree = &thin->blas.tree, .parts = &part};
+    const bool good =
+        thin->blas.tree.key_count == placed.key_count
+            ? check_tree(&t, 1, &first)
+            : complain(c, "%s: the tree has %u keys", name, thin->blas.tree.key_count);
+    trc_free(placed.positions);
+    return good;
+}
+
 /* An instance without an item is invisible, has an empty tree, or is joined; only static ones are
  * joined, and their mesh is nobody else's. */
 static bool is_joined(const struct checker *c, uint32_t i, const uint8_t *placed) {
     const struct trc_instance *instance = &c->snapshot->instances[i];
     if (placed[i] || instance->visibility != TRC_VISIBLE_ALL)
         return false;
-    return !c->bvh->blas[instance->mesh];
+    return !blas_of(c, i);
 }
 
 static bool check_joined(struct checker *c, const uint8_t *placed) {
@@ -474,7 +505,7 @@ static bool check_joined(struct checker *c, const uint8_t *placed) {
         complain(c, "no memory to check a tree");
     for (uint32_t i = 0; good && i < s->instance_count; i++) {
         const struct trc_instance *instance = &s->instances[i];
-        const struct trc_blas *blas = c->bvh->blas[instance->mesh];
+        const struct trc_blas *blas = blas_of(c, i);
         if (is_joined(c, i, placed))
             parts[i] = (struct trc_part){.mesh = s->meshes[instance->mesh],
                                          .transform = instance->object_to_world};
@@ -515,6 +546,12 @@ bool trc_bvh_check(const struct trc_bvh *bvh, const struct trc_snapshot *snapsho
                         snapshot->mesh_count);
     for (uint32_t i = 0; i < bvh->blas_count; i++)
         if (bvh->blas[i] && !check_blas(&c, i))
+            return false;
+    if (bvh->thin && bvh->thin_count != snapshot->instance_count)
+        return complain(&c, "trees for %u instances, there are %u", bvh->thin_count,
+                        snapshot->instance_count);
+    for (uint32_t i = 0; i < bvh->thin_count; i++)
+        if (bvh->thin[i] && !check_thin(&c, i))
             return false;
     uint8_t *placed = trc_alloc_zeroed(snapshot->instance_count, 1);
     if (!placed)

@@ -7,8 +7,10 @@
 #include "bvh/bvh.h"
 #include "bvh/range.h"
 #include "bvh/refs.h"
+#include "bvh/thin.h"
 #include "bvh/tree.h"
 #include "core/box.h"
+#include "core/checks.h"
 #include "core/core.h"
 #include "scene/mesh.h"
 #include "shading/material.h"
@@ -171,6 +173,58 @@ static trc_status blas_obtain(struct create_job *job, uint32_t mesh_index,
     return status;
 }
 
+/* ---- thin instances ---- */
+
+/* The tree that the instance of that number had before, if nothing about it has changed. */
+static struct trc_thin *thin_previous(const struct create_job *job, uint32_t number,
+                                      const struct trc_bvh *previous, const uint8_t *slots) {
+    const struct trc_instance *instance = &job->snapshot->instances[number];
+    if (!previous || !previous->thin || number >= previous->thin_count)
+        return NULL;
+    struct trc_thin *thin = previous->thin[number];
+    if (!thin || !trc_thin_is_of(thin, instance, job->snapshot->meshes[instance->mesh]) ||
+        !slots_match(&thin->blas.tree, slots, instance->material_count))
+        return NULL;
+    atomic_fetch_add(&thin->blas.refs, 1);
+    return thin;
+}
+
+static trc_status thin_build(struct create_job *job, uint32_t number, const uint8_t *slots,
+                             struct trc_thin **thin_out) {
+    const struct trc_instance *instance = &job->snapshot->instances[number];
+    const struct trc_mesh *mesh = job->snapshot->meshes[instance->mesh];
+    struct trc_mesh placed;
+    TRC_TRY(trc_thin_mesh(instance, mesh, &placed));
+    struct trc_thin *thin = trc_thin_create(instance, mesh);
+    trc_status status = TRC_OK;
+    if (!thin)
+        status = trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for a tree");
+    const struct trc_part part = {&placed, 0, NULL, slots, instance->material_count};
+    if (thin)
+        status = tree_build(job, &part, 1, placed.key_count, false, &thin->blas.tree);
+    trc_free(placed.positions);
+    if (status == TRC_OK)
+        *thin_out = thin;
+    else if (thin)
+        trc_blas_release(&thin->blas);
+    return status;
+}
+
+/* The tree of an instance that is not joined. */
+static trc_status thin_obtain(struct create_job *job, uint32_t number,
+                              const struct trc_bvh *previous) {
+    struct trc_bvh *bvh = job->bvh;
+    if (!bvh->thin) {
+        bvh->thin_count = job->snapshot->instance_count;
+        bvh->thin = trc_alloc_zeroed(bvh->thin_count, sizeof(struct trc_thin *));
+        if (!bvh->thin)
+            return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for the trees");
+    }
+    const uint8_t *slots = job->transparent + job->first_slot[number];
+    bvh->thin[number] = thin_previous(job, number, previous, slots);
+    return bvh->thin[number] ? TRC_OK : thin_build(job, number, slots, &bvh->thin[number]);
+}
+
 bool trc_bvh_has_grown(const struct trc_bvh *bvh, uint32_t mesh) {
     const struct trc_blas *blas = bvh->blas[mesh];
     return blas && blas->tree.sah_cost > REBUILD_GROWTH * blas->built_cost;
@@ -273,11 +327,14 @@ static uint32_t items_collect(struct create_job *job, struct trc_item *items, st
         const struct trc_instance *instance = &s->instances[i];
         if (job->joined[i] || !instance->visibility)
             continue;
-        const struct trc_tree *tree = &job->bvh->blas[instance->mesh]->tree;
+        const struct trc_tree *tree = instance->is_thin ? &job->bvh->thin[i]->blas.tree
+                                                        : &job->bvh->blas[instance->mesh]->tree;
         if (tree->root == TRC_REF_EMPTY)
             continue;
         items[count] = (struct trc_item){tree, i, instance->visibility};
-        boxes[count] = instance_box(instance, tree);
+        boxes[count] = instance->is_thin
+                           ? (struct box){f4_load3(tree->lower), f4_load3(tree->upper)}
+                           : instance_box(instance, tree);
         count++;
     }
     return count;
@@ -373,9 +430,15 @@ static trc_status trees_build(struct create_job *job, const struct trc_bvh *prev
         join_select(job);
         status = joined_build(job);
     }
-    for (uint32_t i = 0; i < s->instance_count && status == TRC_OK; i++)
-        if (!job->joined[i] && !job->bvh->blas[s->instances[i].mesh])
-            status = blas_obtain(job, s->instances[i].mesh, previous, replaced);
+    for (uint32_t i = 0; i < s->instance_count && status == TRC_OK; i++) {
+        const struct trc_instance *instance = &s->instances[i];
+        if (job->joined[i])
+            continue;
+        if (instance->is_thin)
+            status = thin_obtain(job, i, previous);
+        else if (!job->bvh->blas[instance->mesh])
+            status = blas_obtain(job, instance->mesh, previous, replaced);
+    }
     if (status == TRC_OK)
         status = top_build(job);
     trc_free(job->joined);
@@ -384,14 +447,20 @@ static trc_status trees_build(struct create_job *job, const struct trc_bvh *prev
     return status;
 }
 
+static void stats_add(const struct trc_tree *tree, struct trc_bvh_build_stats *stats) {
+    stats->bytes += tree->bytes;
+    stats->skipped_triangles += tree->skipped_count;
+}
+
 static void stats_collect(const struct trc_bvh *bvh, struct trc_bvh_build_stats *stats) {
-    stats->bytes = bvh->top.bytes + bvh->joined.bytes;
-    stats->skipped_triangles = bvh->joined.skipped_count;
+    stats->bytes = bvh->top.bytes;
+    stats_add(&bvh->joined, stats);
     for (uint32_t i = 0; i < bvh->blas_count; i++)
-        if (bvh->blas[i]) {
-            stats->bytes += bvh->blas[i]->tree.bytes;
-            stats->skipped_triangles += bvh->blas[i]->tree.skipped_count;
-        }
+        if (bvh->blas[i])
+            stats_add(&bvh->blas[i]->tree, stats);
+    for (uint32_t i = 0; i < bvh->thin_count; i++)
+        if (bvh->thin[i])
+            stats_add(&bvh->thin[i]->blas.tree, stats);
     memcpy(stats->bounds_lower, bvh->tree->lower, sizeof stats->bounds_lower);
     memcpy(stats->bounds_upper, bvh->tree->upper, sizeof stats->bounds_upper);
 }
@@ -428,9 +497,13 @@ void trc_bvh_destroy(struct trc_bvh *bvh) {
         return;
     for (uint32_t i = 0; bvh->blas && i < bvh->blas_count; i++)
         trc_blas_release(bvh->blas[i]);
+    for (uint32_t i = 0; bvh->thin && i < bvh->thin_count; i++)
+        if (bvh->thin[i])
+            trc_blas_release(&bvh->thin[i]->blas);
     trc_tree_destroy(&bvh->top);
     trc_tree_destroy(&bvh->joined);
     trc_free(bvh->items);
     trc_free(bvh->blas);
+    trc_free(bvh->thin);
     trc_free(bvh);
 }

@@ -104,12 +104,22 @@ struct trc_blas {
     struct trc_tree tree;
 };
 
+/* The tree of a thin instance, in world space. */
+struct trc_thin {
+    struct trc_blas blas; /* first: it is released as one */
+    uint32_t key_count;   /* of the instance, whose transforms follow */
+    struct trc_affine transforms[];
+};
+
 struct trc_bvh {
     const struct trc_tree *tree; /* the TLAS, or the joined tree when it is all there is */
     struct trc_tree top, joined;
     struct trc_item *items;
     struct trc_blas **blas; /* per snapshot mesh, NULL where only the joined tree has it */
     uint32_t blas_count;
+    struct trc_thin **thin; /* per snapshot instance, NULL where it is not thin or is joined; NULL
+                               where none has one */
+    uint32_t thin_count;
 };
 
 static inline const uint32_t *trc_node_children(const struct trc_tree *t, uint32_t node) {

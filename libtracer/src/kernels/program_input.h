@@ -46,6 +46,22 @@ static void affine_inverse(const struct trc_wide_affine *a, struct trc_wide_affi
     out->origin = v3_neg(trc_transform_vector(out, a->origin));
 }
 
+/* In place of the inverse of a matrix that is flat at a lane's time: between those of the keys. */
+static void mend_inverse(const struct trc_instance *instance, const struct trc_wide_affine *a,
+                         vfloat time, struct trc_wide_affine *m) {
+    struct trc_wide_affine between;
+    trc_load_keys(instance->world_to_object, instance->key_count, time, &between);
+    const vvec3 *c = a->column;
+    const vvec3 cofactors = v3_cross(c[1], c[2]);
+    const vfloat volume = vf_abs(v3_dot(c[0], cofactors));
+    const vfloat most = v3_dot(v3_abs(c[0]), v3_abs(cofactors));
+    /* A few digits more than the sum of three products leaves: 2^-20. */
+    const vmask flat = vf_le(volume, most * vf_set(0x1p-20f));
+    for (int k = 0; k < 3; k++)
+        m->column[k] = v3_select(flat, between.column[k], m->column[k]);
+    m->origin = v3_select(flat, between.origin, m->origin);
+}
+
 /* The inverse of an instance's matrix at the lanes' times. */
 static void load_world_to_object(const struct lane_group *g, vfloat time,
                                  struct trc_wide_affine *m) {
@@ -59,6 +75,8 @@ static void load_world_to_object(const struct lane_group *g, vfloat time,
     struct trc_wide_affine a;
     trc_load_affine(g->instance, time, &a);
     affine_inverse(&a, m);
+    if (g->instance->is_thin)
+        mend_inverse(g->instance, &a, time, m);
 }
 
 /* By the transposed matrix, unit: a normal from world to object space. */

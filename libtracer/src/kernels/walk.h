@@ -340,7 +340,8 @@ static void walk_packets(struct walk *w, struct trc_live mask, bool any) {
 
 /* The rays of mask through w's tree as w's instance has it. */
 static void walk_instance(struct walk *w, struct trc_live mask, bool any) {
-    if (w->snapshot->instances[w->instance].is_identity) {
+    const struct trc_instance *instance = &w->snapshot->instances[w->instance];
+    if (instance->is_identity | instance->is_thin) { /* the tree is in world space */
         walk_packets(w, mask, any);
         return;
     }
@@ -348,8 +349,7 @@ static void walk_instance(struct walk *w, struct trc_live mask, bool any) {
     struct trc_packet local[TRC_WALK_PACKETS];
     for (int k = 0; k < TRC_WALK_PACKETS; k++)
         if (mask.of[k] || k == 0) /* the first says what holds for all */
-            trc_packet_to_object(&w->snapshot->instances[w->instance], &world[k], mask.of[k],
-                                 &local[k]);
+            trc_packet_to_object(instance, &world[k], mask.of[k], &local[k]);
     w->packets = local;
     walk_packets(w, mask, any);
     for (int c = 0; c < TRC_WALK_CHUNKS && !any; c++) {

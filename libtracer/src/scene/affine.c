@@ -7,6 +7,17 @@
  * one plane but for rounding. Scale alone does not lower it. */
 #define SINGULAR_RATIO 1e-12
 
+/* Below this ratio a ray's direction is off by more than a 16,000th after it went through the
+ * inverse in floats: 2^-24 over the ratio. */
+#define THIN_RATIO 1e-3
+
+/* The same of the shortest column to the longest, far from where squares overflow. */
+#define THIN_LENGTHS 1e-6
+
+/* Below this ratio of volume to edges, what is left of the third dimension is rounding of floats:
+ * they have 24 bits, and products of a few matrices lose some. */
+#define FLAT_RATIO 1e-6
+
 /* Cosine between two axes below which they are perpendicular but for what products of rotations in
  * floats leave. Of a picture of 1,000 pixels it moves the corners by a hundredth of one. */
 #define SHEAR_MIN 1e-5
@@ -41,8 +52,31 @@ bool trc_affine_is_identity(const struct trc_affine *a) {
     return same;
 }
 
+bool trc_affine_is_finite(const struct trc_affine *a) {
+    bool finite = true;
+    for (int i = 0; i < 12; i++)
+        finite = finite && isfinite(a->m[i]);
+    return finite;
+}
+
 static double dot(const double a[3], const double b[3]) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static void scale(double v[3], double s) {
+    for (int i = 0; i < 3; i++)
+        v[i] *= s;
+}
+
+static double length_of(const double v[3]) { return sqrt(dot(v, v)); }
+
+/* Volume between the columns over the product of their lengths, 0 where one has none; NaN where
+ * something is not finite. */
+static double volume_ratio(const struct columns *c) {
+    double n[3];
+    cross(c->y, c->z, n);
+    const double lengths = length_of(c->x) * length_of(c->y) * length_of(c->z);
+    return lengths == 0.0 ? 0.0 : fabs(dot(c->x, n)) / lengths;
 }
 
 /* Determinant, or 0 if it is not worth the name. */
@@ -54,22 +88,21 @@ static double determinant(const struct columns *c) {
     return fabs(volume) > SINGULAR_RATIO * lengths && isfinite(volume) ? volume : 0.0;
 }
 
-bool trc_affine_invert(const struct trc_affine *a, struct trc_affine *inverse_out) {
-    const struct columns c = columns_of(a);
-    const double volume = determinant(&c);
-    if (volume == 0.0 || !isfinite(dot(c.origin, c.origin)))
+static bool invert(const struct columns *c, struct trc_affine *inverse_out) {
+    const double volume = determinant(c);
+    if (volume == 0.0 || !isfinite(dot(c->origin, c->origin)))
         return false;
     double rows[3][3];
-    cross(c.y, c.z, rows[0]);
-    cross(c.z, c.x, rows[1]);
-    cross(c.x, c.y, rows[2]);
+    cross(c->y, c->z, rows[0]);
+    cross(c->z, c->x, rows[1]);
+    cross(c->x, c->y, rows[2]);
     struct trc_affine inverse;
     bool usable = true;
     for (int row = 0; row < 3; row++) {
         for (int column = 0; column < 3; column++) {
             inverse.m[4 * row + column] = (float)(rows[row][column] / volume);
         }
-        inverse.m[4 * row + 3] = (float)(-dot(rows[row], c.origin) / volume);
+        inverse.m[4 * row + 3] = (float)(-dot(rows[row], c->origin) / volume);
     }
     for (int i = 0; i < 12; i++)
         usable = usable && isfinite(inverse.m[i]);
@@ -78,14 +111,69 @@ bool trc_affine_invert(const struct trc_affine *a, struct trc_affine *inverse_ou
     return usable;
 }
 
+bool trc_affine_invert(const struct trc_affine *a, struct trc_affine *inverse_out) {
+    const struct columns c = columns_of(a);
+    return invert(&c, inverse_out);
+}
+
+bool trc_affine_is_thin(const struct trc_affine *a) {
+    const struct columns c = columns_of(a);
+    const double x = length_of(c.x), y = length_of(c.y), z = length_of(c.z);
+    return volume_ratio(&c) < THIN_RATIO ||
+           fmin(x, fmin(y, z)) < THIN_LENGTHS * fmax(x, fmax(y, z));
+}
+
+/* The longest cross product of two of three vectors, unit, from those of lengths at most 1. False
+ * where they all lie on a line. */
+static bool widest_normal(const double *const v[3], double normal_out[3]) {
+    double most = SINGULAR_RATIO;
+    bool found = false;
+    for (int i = 0; i < 3; i++) {
+        double n[3];
+        cross(v[(i + 1) % 3], v[(i + 2) % 3], n);
+        const double length = length_of(n);
+        if (!(length > most))
+            continue;
+        most = length;
+        found = true;
+        memcpy(normal_out, n, sizeof n);
+    }
+    if (found)
+        scale(normal_out, 1.0 / most);
+    return found;
+}
+
+/* Makes the direction that is lost that of the plane's normal, stretched by size. */
+static bool add_depth(struct columns *c, double size) {
+    double *const columns[3] = {c->x, c->y, c->z};
+    double rows[3][3], normal[3], lost[3];
+    for (int row = 0; row < 3; row++)
+        for (int column = 0; column < 3; column++)
+            rows[row][column] = columns[column][row] / size;
+    struct columns unit = *c;
+    scale(unit.x, 1.0 / size);
+    scale(unit.y, 1.0 / size);
+    scale(unit.z, 1.0 / size);
+    if (!widest_normal((const double *const[]){unit.x, unit.y, unit.z}, normal) ||
+        !widest_normal((const double *const[]){rows[0], rows[1], rows[2]}, lost))
+        return false;
+    for (int row = 0; row < 3; row++)
+        for (int column = 0; column < 3; column++)
+            columns[column][row] += size * normal[row] * lost[column];
+    return true;
+}
+
+bool trc_affine_invert_thin(const struct trc_affine *a, struct trc_affine *inverse_out) {
+    struct columns c = columns_of(a);
+    const double size = fmax(length_of(c.x), fmax(length_of(c.y), length_of(c.z)));
+    if (volume_ratio(&c) >= FLAT_RATIO && trc_affine_invert(a, inverse_out))
+        return true;
+    return size > 0.0 && isfinite(size) && add_depth(&c, size) && invert(&c, inverse_out);
+}
+
 bool trc_affine_flips(const struct trc_affine *a) {
     const struct columns c = columns_of(a);
     return determinant(&c) < 0.0;
-}
-
-static void scale(double v[3], double s) {
-    for (int i = 0; i < 3; i++)
-        v[i] *= s;
 }
 
 static void subtract_along(double v[3], const double unit[3]) {

@@ -114,8 +114,27 @@ static uint32_t distinct_keys(const struct trc_scene_instance *source) {
     return 1;
 }
 
-/* Fills transforms and inverses. A transform that cannot be undone hides the instance: it keeps its
- * place, as places are what queries report, but no ray sees it. */
+/* Fills the inverses of an instance's keys and tells whether one is thin. False where nothing would
+ * be seen: none of them spans a plane, or one cannot be used at all. */
+static bool invert_keys(struct trc_instance *instance, struct trc_affine *inverses) {
+    bool shown = false;
+    for (uint32_t key = 0; key < instance->key_count; key++) {
+        const struct trc_affine *to_world = &instance->object_to_world[key];
+        const bool thin = trc_affine_is_thin(to_world);
+        const bool inverted = thin ? trc_affine_invert_thin(to_world, &inverses[key])
+                                   : trc_affine_invert(to_world, &inverses[key]);
+        if (!inverted && !trc_affine_is_finite(to_world))
+            return false;
+        if (!inverted)
+            inverses[key] = trc_affine_identity;
+        shown = shown || inverted;
+        instance->is_thin = instance->is_thin || !inverted || thin;
+    }
+    return shown;
+}
+
+/* Fills transforms and inverses. A transform that maps all to a line or a point hides the instance:
+ * it keeps its place, as places are what queries report, but no ray sees it. */
 static void place(struct trc_instance *instance, const struct trc_scene_instance *source,
                   struct trc_affine *transforms) {
     const uint32_t key_count = distinct_keys(source);
@@ -123,16 +142,13 @@ static void place(struct trc_instance *instance, const struct trc_scene_instance
     instance->key_count = key_count;
     instance->object_to_world = transforms;
     instance->world_to_object = inverses;
-    bool usable = true;
-    for (uint32_t key = 0; key < key_count && usable; key++) {
-        transforms[key] = source->transforms[key];
-        usable = trc_affine_invert(&transforms[key], &inverses[key]);
-    }
-    if (!usable) {
+    memcpy(transforms, source->transforms, key_count * sizeof *transforms);
+    if (!invert_keys(instance, inverses)) {
         transforms[0] = transforms[1] = trc_affine_identity;
         instance->world_to_object = transforms + 1;
         instance->key_count = 1;
         instance->visibility = 0;
+        instance->is_thin = 0;
     }
     instance->flips = trc_affine_flips(&transforms[0]);
     instance->is_identity = instance->key_count == 1 && trc_affine_is_identity(&transforms[0]);

@@ -255,8 +255,11 @@ static void finish_stats(const struct trc_scene_state *scene, struct trc_snapsho
                  stats->skipped_triangle_count);
     }
     if (stats->skipped_instance_count) {
-        trc_warn(block, "%" PRIu64 " instances are hidden: their transform is singular",
-                 stats->skipped_instance_count);
+        trc_warn(
+            block,
+            "%" PRIu64
+            " instances are hidden: their transform makes them a line or a point, or is not finite",
+            stats->skipped_instance_count);
     }
     warn_of_images(scene, block);
 }

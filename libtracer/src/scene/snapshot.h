@@ -59,7 +59,8 @@ struct trc_instance {
     uint32_t mesh; /* into snapshot meshes */
     uint32_t key_count;
     const struct trc_affine *object_to_world; /* key_count */
-    const struct trc_affine *world_to_object; /* key_count, inverse of each key */
+    const struct trc_affine *world_to_object; /* key_count, inverse of each key; of one that
+                                                 has none see trc_affine_invert_thin */
     uint32_t visibility;                      /* TRC_VISIBLE_*; of catchers more, see above */
     uint32_t material_count;                  /* >= 1 */
     const uint32_t *materials;                /* into snapshot materials, per slot */
@@ -73,6 +74,8 @@ struct trc_instance {
     uint32_t first_light; /* first emissive-triangle light of this instance or UINT32_MAX */
     uint32_t flips;       /* 1: negative determinant at key 0 */
     uint32_t is_identity; /* 1: one key, which changes no point */
+    uint32_t is_thin; /* 1: some key's transform is (scene/affine.h); rays meet a tree of its own
+                         in world space */
 };
 
 struct trc_camera {
