@@ -22,6 +22,11 @@ from .matrix import rows12
 _BREAK_INTERVAL = 32  # instances between two looks at whether the user pressed Esc
 
 
+# Properties of light linking, what they are called, and what their objects do without.
+_LINKS = (("receiver_collection", "Light linking", "lights everything"),
+          ("blocker_collection", "Shadow linking", "is blocked by everything"))
+
+
 class Cancelled(Exception):
     """The user stopped the sync."""
 
@@ -224,8 +229,11 @@ class _Shown:
 
 def _shown_world(source):
     """The world that is seen, or None."""
-    depsgraph = source.depsgraph
-    return depsgraph.scene_eval.world if depsgraph.view_layer_eval.use_sky else None
+    depsgraph, view_layer = source.depsgraph, source.depsgraph.view_layer_eval
+    if not view_layer.use_sky:
+        return None
+    override = getattr(view_layer, "world_override", None)  # from 4.3 on
+    return depsgraph.scene_eval.world if override is None else override.evaluated_get(depsgraph)
 
 
 def _size_limit(source):
@@ -287,6 +295,7 @@ class _Walk:
         self.lights = {}      # key -> fields of a light
         self.tied = set()     # names of objects that are instanced or make instances
         self._volumes = set()  # names of objects of volumes
+        self._linked = {}      # property of light linking -> names of objects that use it
 
     def run(self):
         """Find what is there now."""
@@ -297,6 +306,8 @@ class _Walk:
                 self._add_hair(each)
             if not each.show_self:
                 continue
+            for name in visibility.light_links(each.object):
+                self._linked.setdefault(name, set()).add(each.object.name)
             if instance.is_light(each):
                 self._add_light(each)
             elif instance.has_mesh(each) and self._view_layer.use_solid:
@@ -305,14 +316,16 @@ class _Walk:
                 self._add_strands(each)
             elif isinstance(each.object.data, bpy.types.Volume):
                 self._volumes.add(each.object.name)
-        self._warn_of_volumes()
+        self._warn_of("Volumes are not supported", self._volumes, "is left out")
+        for name, what, does in _LINKS:
+            self._warn_of(f"{what} is not supported", self._linked.get(name), does)
 
-    def _warn_of_volumes(self):
-        """One warning of all volumes that are left out."""
-        if self._volumes:
-            first, more = min(self._volumes), len(self._volumes) - 1
+    def _warn_of(self, text, names, does):
+        """One warning of all objects of those names, if there are any."""
+        if names:
+            first, more = min(names), len(names) - 1
             also = f" and {more} more" if more else ""
-            self._sync.warnings.add(f"Volumes are not supported: object '{first}'{also} is left out")
+            self._sync.warnings.add(f"{text}: object '{first}'{also} {does}")
 
     def follow_motion(self, camera_keys):
         """Look at every moving thing at its other times."""

@@ -142,6 +142,8 @@ class Images:
                 self._scene.destroy_image(image_id)
 
     def _create(self, image, path, is_mip_mapped):
+        if image.source == 'MOVIE':
+            self._warnings.add(f"Image '{image.name}': movies are not played, one frame is used")
         try:
             if path:
                 return self._from_file(image, path, is_mip_mapped)

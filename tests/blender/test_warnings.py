@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What Volley leaves out of a scene is said once; and worlds of view layers, which it does not leave out."""
+
+import numpy as np
+import pytest
+
+
+def _listen():
+    """The list that warnings of renders go to from now on."""
+    import volley.session
+    told = []
+    volley.session.report_warning = lambda _engine, message: told.append(message)
+    return told
+
+
+def inside_movie():
+    """Two walls with one movie, another without, rendered at two frames: the warnings of each render, and
+    the pictures."""
+    import bpy
+    import scenes
+    scene = scenes.empty(size=(32, 32))
+    scenes.camera()
+    settings = scene.render.image_settings
+    settings.file_format = 'AVI_JPEG' if bpy.app.version < (4, 0, 0) else 'FFMPEG'
+    scene.frame_end = 3
+    scene.render.filepath = bpy.app.tempdir + "movie"
+    wall = scenes.wall("Wall", 9.0, 0.0, material=scenes.emitter((0.2, 0.5, 0.8)))
+    bpy.ops.render.render(animation=True)
+    path = scene.render.frame_path(frame=1)
+    settings.file_format = 'OPEN_EXR'
+    image = bpy.data.images.load(path)
+    image.name = "Movie"
+    assert image.source == 'MOVIE'
+    material = scenes.material("Screen", "ShaderNodeEmission")
+    node = material.node_tree.nodes.new("ShaderNodeTexImage")
+    node.image = image
+    material.node_tree.links.new(node.outputs[0], material.node_tree.nodes["Emission"].inputs["Color"])
+    wall.data.materials[0] = material
+    scenes.wall("Other", 1.0, -1.0, material=material)
+    told, found = _listen(), []
+    for frame in (1, 2):
+        scene.frame_set(frame)
+        told.clear()
+        picture = scenes.render()
+        found.append((list(told), picture[16, 16, :3].tolist()))
+    return found
+
+
+def test_movies_are_not_played(blender):
+    for told, color in blender.run(inside_movie):
+        assert told == ["Image 'Movie': movies are not played, one frame is used"]
+        assert color[2] > 0.4 and color[0] < 0.4  # a frame of it, not magenta
+
+
+def inside_links():
+    """The warnings of a scene without links of lights, with those of one object, and with more."""
+    import bpy
+    import scenes
+    scenes.empty(size=(16, 16))
+    scenes.camera()
+    wall = scenes.wall("Wall", 2.0, 0.0)
+    lights = [scenes.light('SUN'), scenes.light('POINT'), wall]
+    group = bpy.data.collections.new("Group")
+    told, found = _listen(), []
+
+    def look():
+        told.clear()
+        scenes.render()
+        found.append(list(told))
+
+    look()
+    lights[0].light_linking.receiver_collection = group
+    look()
+    for each in lights:
+        each.light_linking.receiver_collection = group
+    lights[1].light_linking.blocker_collection = group
+    look()
+    lights[1].hide_render = True
+    look()
+    return [each.name for each in lights], found
+
+
+def test_links_of_lights_are_left_out(blender):
+    import blender as blender_support
+    if blender_support.version() < (4, 0):
+        pytest.skip("lights have no links")
+    names, found = blender.run(inside_links)
+    one = f"Light linking is not supported: object '{names[0]}' lights everything"
+    more = one.replace("' l", "' and 2 more l")
+    assert found == [[], [one], [more, f"Shadow linking is not supported: object '{names[1]}' is blocked by "
+                                 "everything"], [one.replace("' l", "' and 1 more l")]]
+
+
+def inside_override():
+    """Pictures by both engines of two view layers, one with a world of its own, and the warnings."""
+    import bpy
+    import scenes
+    scene = scenes.empty(size=(16, 16))
+    scenes.camera()
+    scenes.wall("Wall", 1.0, 0.0, material=scenes.material("Grey", "ShaderNodeBsdfDiffuse"))
+    scene.world.color = (0.1, 0.2, 0.4)
+    own = bpy.data.worlds.new("Own")
+    own.color = (0.5, 0.3, 0.1)
+    told = _listen()
+    pairs = {}
+    scene.view_layers[0].use = True
+    for name, world in (("scene", None), ("own", own), ("scene again", None)):
+        scene.view_layers[0].world_override = world
+        pairs[name] = scenes.by_both(64)
+    return pairs, told
+
+
+def test_worlds_of_view_layers(blender):
+    import blender as blender_support
+    if blender_support.version() < (4, 3):
+        pytest.skip("view layers have no worlds of their own")
+    pairs, told = blender.run(inside_override)
+    assert told == []
+    assert pairs["own"][1][0, 0, 0] > 0.4  # Cycles shows it
+    for name, (ours, theirs) in pairs.items():
+        assert np.abs(ours - theirs)[..., :3].max() < 0.05, name
+        assert ours[0, 0, :3] == pytest.approx(theirs[0, 0, :3], rel=1e-4), name
