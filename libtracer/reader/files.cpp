@@ -9,7 +9,7 @@
 
 #include <OpenImageIO/imageio.h>
 
-#include "image/texel_format.h"
+#include "model/texel_format.h"
 #include "reply.h"
 
 namespace {

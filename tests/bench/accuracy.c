@@ -8,11 +8,11 @@
 #include "buffers.h"
 #include "core/fpstate.h"
 #include "embree.h"
-#include "kernels/kernels.h"
-#include "kernels/packet.h"
+#include "kernels/trace/packet.h"
+#include "model/kernels.h"
+#include "model/snapshot.h"
 #include "query_scene.h"
 #include "race.h"
-#include "scene/snapshot.h"
 
 /* Rays of one list, and lists of each mesh. */
 #define LIST_RAYS 65536

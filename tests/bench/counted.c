@@ -10,7 +10,7 @@
 #include "volley.h"
 
 #define TRC_COUNT(what, amount) (counted_steps.what += (uint64_t)(amount))
-#include "kernels/trace.c"
+#include "kernels/trace/trace.c"
 
 struct trace_counts counted_steps;
 

@@ -5,4 +5,4 @@
 #include "counted.h"
 
 #define TRC_COUNT(what, amount) (counted_steps.what += (uint64_t)(amount))
-#include "kernels/trace_bundle.c"
+#include "kernels/trace/trace_bundle.c"

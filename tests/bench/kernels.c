@@ -2,7 +2,7 @@
 
 #include <stddef.h>
 
-#include "kernels/kernels.h"
+#include "model/kernels.h"
 
 #define DECLARE(isa)                                                                          \
     void trc_trace_closest_##isa(const struct trc_snapshot *, struct trc_packet *,            \

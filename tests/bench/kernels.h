@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-#include "kernels/packet.h"
+#include "kernels/trace/packet.h"
 
 struct packet_kernels {
     void (*closest)(const struct trc_snapshot *snapshot, struct trc_packet *packets,

@@ -6,9 +6,9 @@
 
 #include "accuracy.h"
 #include "check.h"
+#include "core/pool.h"
 #include "options.h"
 #include "report.h"
-#include "threads/pool.h"
 #include "volley.h"
 
 struct bench {

@@ -4,10 +4,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/thread.h"
 #include "kernels.h"
 #include "rate.h"
 #include "rays.h"
-#include "threads/thread.h"
 
 /* ---- parts of arguments ---- */
 

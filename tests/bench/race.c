@@ -5,7 +5,7 @@
 
 #include "buffers.h"
 #include "core/core.h"
-#include "threads/pool.h"
+#include "core/pool.h"
 
 /* Relative: float distances along different ways of computing them agree far better. */
 #define SAME_DISTANCE 1e-4f

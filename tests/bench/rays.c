@@ -7,11 +7,11 @@
 
 #include "buffers.h"
 #include "core/core.h"
-#include "kernels/query.h"
-#include "kernels/sampler.h"
-#include "kernels/tile.h"
-#include "kernels/wide_math.h"
-#include "sampling/sobol.h"
+#include "kernels/simd/wide_math.h"
+#include "kernels/tile/sampler.h"
+#include "kernels/tile/tile.h"
+#include "kernels/trace/query.h"
+#include "model/sobol.h"
 
 const char *const ray_kind_names[RAY_KIND_COUNT] = {
     "primary",    "lens",   "point_shadow",     "area_shadow",    "mirror",
@@ -105,7 +105,7 @@ static void direction_about(const float n[3], float z, float turn, float out[3])
 /* ---- samples of the camera ---- */
 
 static float sample_number(const struct maker *m, const struct sample *s, uint32_t dimension) {
-    return TRC_KERNEL(trc_sample)(&m->sampler, s->pixel, s->index, dimension);
+    return trc_sample(&m->sampler, s->pixel, s->index, dimension);
 }
 
 static void camera_set(struct maker *m, float place) {
@@ -151,8 +151,8 @@ static void camera_ray(const struct maker *m, const struct sample *s, struct ray
     r->key = 0;
 }
 
-/* The cell of time or lens that AUTO sorts camera samples by: kernels/tile.c, samples_order; lenses
- * are wide here. */
+/* The cell of time or lens that AUTO sorts camera samples by: kernels/tile/tile.c, samples_order;
+ * lenses are wide here. */
 static uint32_t sample_cell(const struct maker *m, const struct sample *s) {
     if (m->moving)
         return (uint32_t)(sample_number(m, s, TRC_DIM_TIME) * SHARED_CELLS);
@@ -332,8 +332,7 @@ static bool meeting_at(const struct maker *m, uint32_t ray, uint32_t i, struct m
     at->time = r->time;
     memcpy(at->d, r->d, sizeof at->d);
     add_scaled(r->o, m->packet.t[i], r->d, at->p);
-    TRC_KERNEL(trc_query_normal)
-    (m->snapshot, m->hits.instance[i], m->hits.triangle[i], r->time, at->n);
+    trc_query_normal(m->snapshot, m->hits.instance[i], m->hits.triangle[i], r->time, at->n);
     const float length = sqrtf(dot(at->n, at->n)), side = dot(at->n, r->d) > 0.0f ? -1.0f : 1.0f;
     for (int k = 0; k < 3; k++)
         at->n[k] *= side / length;
@@ -395,7 +394,8 @@ static void square_append(struct maker *m, const struct rectangle *tile, uint32_
     }
 }
 
-/* A range of a tile's samples, at most SAMPLES_PER_BATCH, in squares as kernels/tile.c walks it. */
+/* A range of a tile's samples, at most SAMPLES_PER_BATCH, in squares as kernels/tile/tile.c walks
+ * it. */
 static void samples_make(struct maker *m, const struct rectangle *tile, uint32_t begin,
                          uint32_t end) {
     const bool cells =

@@ -7,11 +7,11 @@
 
 An albedo is the mean, over the micro-normals visible from a direction, of what single scattering
 lets get away: F times shadowing towards the reflected direction, 1 - F times that towards the refracted one.
-Distribution, masking and Fresnel factor are those of kernels/microfacet.h: GGX, 1 / (1 + Lambda) per
+Distribution, masking and Fresnel factor are those of kernels/lobe/microfacet.h: GGX, 1 / (1 + Lambda) per
 direction where masking is separable, (1 + Lambda_o) / (1 + Lambda_o + Lambda_i) where it goes by height.
 Visible normals are a cap of the sphere of stretched directions (Dupuy and Benyoub 2023) whose height is
 integrated by Gauss and Legendre, whose azimuth by the midpoint rule. Points of the tables lie where
-kernels/ggx_energy.h says.
+kernels/lobe/ggx_energy.h says.
 """
 
 import argparse
@@ -220,7 +220,7 @@ def read_tables():
 
 def as_source(tables):
     lines = ["/* Written by tests/support/energy_tables.py, which says how: change that, not this. */",
-             '#include "shading/ggx_energy_tables.h"', "", "/* clang-format off */"]
+             '#include "model/ggx_energy_tables.h"', "", "/* clang-format off */"]
     for name, values in tables.items():
         whole = "energy" in name and "mean" not in name
         form, kind, line = ("%d", "uint16_t", 16) if whole else ("%.4ff", "float", 12)

@@ -17,9 +17,9 @@
 
 #include "brute.h"
 #include "bvh/bvh.h"
+#include "model/snapshot.h"
 #include "query_scene.h"
 #include "ray_set.h"
-#include "scene/snapshot.h"
 #include "tracer/tracer.h"
 
 #define QUERY_TEST_INLINE static inline __attribute__((unused))

@@ -16,9 +16,9 @@
 #include <string.h>
 
 #include "core/core.h"
-#include "kernels/surface.h"
+#include "kernels/program/program.h"
+#include "model/program.h"
 #include "shading/compile.h"
-#include "shading/program.h"
 
 #define GRAPH_INLINE static inline __attribute__((unused))
 

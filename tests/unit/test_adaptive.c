@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "film/adaptive.h"
+#include "model/adaptive.h"
 #include "rng.h"
 
 /* ---- the decisions, on samples whose mean is known ---- */

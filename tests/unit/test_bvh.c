@@ -4,11 +4,11 @@
 
 #include "bvh/binary.h"
 #include "bvh/cluster.h"
-#include "bvh/split.h"
 #include "core/core.h"
+#include "core/pool.h"
 #include "figures.h"
-#include "kernels/kernels.h"
-#include "threads/pool.h"
+#include "model/kernels.h"
+#include "model/split.h"
 
 static const float unit_lower[3] = {-1, -1, -1}, unit_upper[3] = {1, 1, 1}, origin[3] = {0, 0, 0};
 

@@ -4,10 +4,10 @@
 
 #include "bvh/clip.h"
 #include "bvh/part.h"
-#include "bvh/ref.h"
 #include "bvh/tree.h"
 #include "core/core.h"
 #include "figures.h"
+#include "model/ref.h"
 #include "rng.h"
 
 /* ---- one ref ---- */

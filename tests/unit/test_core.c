@@ -15,16 +15,16 @@
 #include "core/core.h"
 #include "core/fpstate.h"
 #include "core/handle.h"
+#include "core/pool.h"
+#include "core/thread.h"
 #include "film/film.h"
-#include "kernels/kernels.h"
+#include "model/kernels.h"
+#include "model/names.h"
 #include "render/schedule.h"
 #include "scene/affine.h"
 #include "scene/mesh.h"
-#include "scene/names.h"
 #include "scene/scene.h"
 #include "scene/store.h"
-#include "threads/pool.h"
-#include "threads/thread.h"
 
 /* ---- status ---- */
 

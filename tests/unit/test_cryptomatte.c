@@ -1,5 +1,5 @@
 /* Cryptomatte: ids of names, tables of mattes, and mattes of a rendered scene. */
-#include "film/cryptomatte.h"
+#include "model/cryptomatte.h"
 
 #include "fixture.h"
 #include "rng.h"

@@ -8,7 +8,7 @@
 #include "fixture.h"
 
 #include "film/film.h"
-#include "film/sequence.h"
+#include "model/sequence.h"
 
 enum { WIDTH = 80, HEIGHT = 72, FRAME = WIDTH * HEIGHT };
 

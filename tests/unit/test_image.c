@@ -14,10 +14,10 @@
 
 #include "core/core.h"
 #include "image/image.h"
-#include "image/texel.h"
 #include "image_file.h"
+#include "model/snapshot.h"
+#include "model/texel.h"
 #include "query_scene.h"
-#include "scene/snapshot.h"
 
 static trc_image_desc pixels_desc(uint32_t width, uint32_t height, const void *pixels,
                                   bool is_float) {

@@ -15,7 +15,7 @@
 
 #include "core/core.h"
 #include "image/image.h"
-#include "image/texel.h"
+#include "model/texel.h"
 
 #include "image_file.h"
 

@@ -13,7 +13,7 @@
 
 #include "core/carver.h"
 #include "core/core.h"
-#include "film/sequence.h"
+#include "model/sequence.h"
 
 #define MIB (UINT64_C(1) << 20)
 

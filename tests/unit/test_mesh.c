@@ -4,9 +4,9 @@
 #include <stdatomic.h>
 #include <stdbool.h>
 
+#include "core/pool.h"
+#include "model/names.h"
 #include "scene/mesh.h"
-#include "scene/names.h"
-#include "threads/pool.h"
 
 static void normals_are_weighted_by_angle(void **state) {
     (void)state;

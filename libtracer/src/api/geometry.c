@@ -3,7 +3,7 @@
 
 #include "core/checks.h"
 #include "core/core.h"
-#include "scene/names.h"
+#include "model/names.h"
 #include "scene/scene.h"
 #include "tracer/tracer.h"
 

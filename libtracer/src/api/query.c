@@ -2,7 +2,7 @@
 #include "core/checks.h"
 #include "core/core.h"
 #include "core/fpstate.h"
-#include "kernels/kernels.h"
+#include "model/kernels.h"
 #include "scene/commit.h"
 #include "scene/scene.h"
 #include "tracer/tracer.h"

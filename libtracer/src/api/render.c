@@ -6,9 +6,9 @@
 #include "core/core.h"
 #include "core/fpstate.h"
 #include "core/handle.h"
+#include "core/thread.h"
 #include "render/render.h"
 #include "scene/scene.h"
-#include "threads/thread.h"
 #include "tracer/tracer.h"
 
 /* Limits of the public header. */

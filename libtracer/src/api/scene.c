@@ -5,9 +5,9 @@
 #include "core/core.h"
 #include "core/fpstate.h"
 #include "core/handle.h"
+#include "core/thread.h"
 #include "scene/commit.h"
 #include "scene/scene.h"
-#include "threads/thread.h"
 #include "tracer/tracer.h"
 
 trc_status trc_scene_create(const trc_scene_desc *desc, trc_scene *scene_out) {

@@ -1,5 +1,5 @@
-/* Shape of a tree: where ranges are split (kernels/split.c), where they stay leaves, and which of
- * the nodes so made stay (bvh/binary.h).
+/* Shape of a tree: where ranges are split (kernels/trace/split.c), where they stay leaves, and
+ * which of the nodes so made stay (bvh/binary.h).
  *
  * The upper part of the binary tree is made by one thread, all of them at work on each split;
  * subtrees of TRC_SHARED_RANGE refs or less are tasks, and so are the wide nodes that stand for
@@ -15,10 +15,10 @@
 
 #include "bvh/binary.h"
 #include "bvh/cluster.h"
-#include "bvh/split.h"
 #include "core/core.h"
-#include "kernels/kernels.h"
-#include "threads/pool.h"
+#include "core/pool.h"
+#include "model/kernels.h"
+#include "model/split.h"
 
 /* Cost of visiting a node against one triangle of a leaf. A leaf is one block whatever its count,
  * and packets cull its triangles in one step, so leaves may be full. */

@@ -6,9 +6,9 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "scene/snapshot.h"
+#include "model/snapshot.h"
 
-struct trc_pool; /* threads/pool.h */
+struct trc_pool; /* core/pool.h */
 
 /* The trees of a snapshot: BLASes and the TLAS over instances. */
 struct trc_bvh;

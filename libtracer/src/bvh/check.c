@@ -5,7 +5,7 @@
  * is below them at every key, or, of clipped triangles, boxes that do so together, leaves that hold
  * their triangles' vertices as the mesh and the transform give them. Containment between keys
  * follows up to rounding, as boxes and vertices are interpolated by the same formula;
- * kernels/beam.h allows for the rounding. */
+ * kernels/trace/beam.h allows for the rounding. */
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -16,7 +16,6 @@
 #include "bvh/thin.h"
 #include "bvh/tree.h"
 #include "core/core.h"
-#include "scene/mesh.h"
 
 struct checker {
     const struct trc_bvh *bvh;

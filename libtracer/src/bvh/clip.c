@@ -4,7 +4,7 @@
 #include <math.h>
 
 #include "bvh/part.h"
-#include "bvh/ref.h"
+#include "model/ref.h"
 
 /* Boxes are cut while they have so much more area than the triangles in them, seen along the axes:
  * upright, half a rectangle has 2, and stays whole. */

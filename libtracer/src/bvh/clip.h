@@ -38,7 +38,7 @@ struct trc_clip {
 /* Cuts a ref to triangles of the part: pieces_out, unless it is NULL, gets those that stand for it,
  * itself where it stays whole. Each point of its triangles is in the box of a piece that has that
  * triangle; a hit that rounding puts beyond it is as near to that box as to a whole triangle's, and
- * kernels allow for that (kernels/beam.h). Returns how many pieces there are, at least 1;
+ * kernels allow for that (kernels/trace/beam.h). Returns how many pieces there are, at least 1;
  * *triangles_out: the triangles of all together. */
 uint32_t trc_ref_clip(const struct trc_part *part, const struct trc_ref *ref,
                       const struct trc_clip *clip, struct trc_ref *pieces_out,

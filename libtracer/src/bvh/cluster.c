@@ -1,7 +1,7 @@
 /* Clusters of triangles: see cluster.h. */
 #include "bvh/cluster.h"
 
-#include "bvh/ref.h"
+#include "model/ref.h"
 
 #define MOST_TRIANGLES 4
 /* Largest area of a cluster's box over the sum of both. Two halves of a quad have .5; at 1, two

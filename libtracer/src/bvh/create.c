@@ -5,16 +5,15 @@
 #include <string.h>
 
 #include "bvh/bvh.h"
-#include "bvh/range.h"
 #include "bvh/refs.h"
 #include "bvh/thin.h"
 #include "bvh/tree.h"
 #include "core/box.h"
 #include "core/checks.h"
 #include "core/core.h"
-#include "scene/mesh.h"
-#include "shading/material.h"
-#include "threads/pool.h"
+#include "core/pool.h"
+#include "model/material.h"
+#include "model/range.h"
 
 /* A refitted tree whose SAH cost has grown by this factor is rebuilt. */
 #define REBUILD_GROWTH 1.4f

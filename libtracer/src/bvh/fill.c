@@ -9,7 +9,7 @@
 #include "bvh/tree.h"
 #include "bvh/triangles4.h"
 #include "core/core.h"
-#include "threads/pool.h"
+#include "core/pool.h"
 
 /* Nodes whose leaves one task fills: large enough that handing out tasks costs nothing. */
 #define NODES_PER_TASK 256

@@ -9,8 +9,7 @@
 #include "bvh/cluster.h"
 #include "bvh/part.h"
 #include "core/core.h"
-#include "scene/mesh.h"
-#include "threads/pool.h"
+#include "core/pool.h"
 
 /* Box of a triangle, the mean over its keys; false where a corner is not valid at some key. */
 static bool triangle_ref(const struct trc_part *part, uint32_t triangle, struct trc_ref *ref) {

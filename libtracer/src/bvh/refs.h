@@ -2,7 +2,7 @@
 #ifndef TRACER_BVH_REFS_H
 #define TRACER_BVH_REFS_H
 
-#include "bvh/range.h"
+#include "bvh/tree.h"
 
 /* What a tree is built over, and how much it is. */
 struct trc_refs {

@@ -1,4 +1,5 @@
-/* What a film shows of its sums. Tile by tile, as tiles may be written meanwhile (film/sequence.h).
+/* What a film shows of its sums. Tile by tile, as tiles may be written meanwhile
+ * (model/sequence.h).
  */
 #define _POSIX_C_SOURCE 200809L
 #include <float.h>
@@ -10,7 +11,7 @@
 #include "core/checks.h"
 #include "core/core.h"
 #include "film/film.h"
-#include "film/sequence.h"
+#include "model/sequence.h"
 
 /* Writing a batch of samples takes some ten microseconds, unless the system stops the thread. */
 #define LOOKS_BEFORE_YIELDING 1000

@@ -6,7 +6,7 @@
 #include "core/checks.h"
 #include "core/core.h"
 #include "image/reader.h"
-#include "image/texel.h"
+#include "model/texel.h"
 
 /* Bytes and words are rounded to half floats, as Cycles reads them: what that loses shows where a
  * transform is steep. */

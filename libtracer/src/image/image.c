@@ -11,7 +11,7 @@
 #include "image/convert.h"
 #include "image/levels.h"
 #include "image/reader.h"
-#include "image/texel.h"
+#include "model/texel.h"
 
 /* ---- life ---- */
 

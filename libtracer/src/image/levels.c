@@ -5,7 +5,7 @@
 
 #include "core/checks.h"
 #include "core/core.h"
-#include "image/texel.h"
+#include "model/texel.h"
 
 #define BLOCK (1 << TRC_LEVEL_FIRST_LOG2)
 #define BLOCK_SHARE (1.0f / (BLOCK * BLOCK))

@@ -6,12 +6,6 @@
 
 #include "image/image.h"
 
-/* Level 1 has a quarter of the sides and each one beyond half of those before it: half the sides
- * would cost four times the memory for what gains least. */
-#define TRC_LEVEL_FIRST_LOG2 2
-/* No side is shorter: by then an image costs no cache misses and has little left to average. */
-#define TRC_LEVEL_MIN_SIDE 8u
-
 /* Adds levels to an image of one, as long as blocks of texels fill it. None to an image with
  * transparency, whose colours mean something only with their own alpha, and none to sRGB-encoded
  * numbers other than bytes, which are rare. OUT_OF_MEMORY; the image is to be freed then. */

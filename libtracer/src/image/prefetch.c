@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "core/core.h"
-#include "threads/thread.h"
+#include "core/thread.h"
 
 /* Files that are read at once: more wait for the disk and take memory. */
 #define MAX_THREADS 8

@@ -12,7 +12,7 @@
 #include "image/image.h"
 #include "image/process.h"
 #include "image/protocol.h"
-#include "image/texel.h"
+#include "model/texel.h"
 
 #define PROGRAM "tracer_reader"
 

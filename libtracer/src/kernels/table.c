@@ -1,10 +1,11 @@
-/* This instruction set's entry in the dispatch (cpu/dispatch.c). */
-#include "kernels/kernels.h"
+/* This instruction set's entry in the dispatch (model/kernels.c). */
+#include "model/kernels.h"
 
-#include "kernels/query.h"
-#include "kernels/split.h"
-#include "kernels/tile.h"
-#include "kernels/world.h"
+#include "kernels/light/world.h"
+#include "kernels/program/program.h"
+#include "kernels/tile/tile.h"
+#include "kernels/trace/query.h"
+#include "kernels/trace/split.h"
 
 #define TRC_ISA_NUMBER_scalar TRC_ISA_SCALAR
 #define TRC_ISA_NUMBER_sse42 TRC_ISA_SSE42
@@ -23,6 +24,9 @@ const struct trc_kernels TRC_KERNEL(trc_kernels) = {
     .query_closest = TRC_KERNEL(trc_query_closest_rays),
     .query_occluded = TRC_KERNEL(trc_query_occluded_rays),
     .world_evaluate = TRC_KERNEL(trc_world_evaluate),
+#if TRC_WIDTH == 1
+    .program_fold = TRC_KERNEL(trc_program_fold),
+#endif
     .split_find = TRC_KERNEL(trc_split_find),
     .split_apply = TRC_KERNEL(trc_split_apply),
 };

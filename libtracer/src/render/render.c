@@ -10,12 +10,12 @@
 
 #include "core/checks.h"
 #include "core/core.h"
-#include "kernels/kernels.h"
+#include "core/thread.h"
+#include "model/filter.h"
+#include "model/kernels.h"
+#include "model/sobol.h"
 #include "render/schedule.h"
-#include "sampling/filter.h"
-#include "sampling/sobol.h"
 #include "scene/commit.h"
-#include "threads/thread.h"
 
 /* Most samples of one call of a kernel: progress of a long tile shows after each. */
 #define SAMPLES_PER_JOB 16

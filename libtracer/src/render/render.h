@@ -6,7 +6,7 @@
 #ifndef TRACER_RENDER_RENDER_H
 #define TRACER_RENDER_RENDER_H
 
-#include "scene/snapshot.h"
+#include "model/snapshot.h"
 #include "tracer/render.h"
 
 /* Shadow rays per camera hit where the caller leaves the choice: many pixel samples do the rest. */

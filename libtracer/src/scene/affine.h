@@ -4,7 +4,7 @@
 
 #include <stdbool.h>
 
-#include "scene/snapshot.h"
+#include "model/snapshot.h"
 
 extern const struct trc_affine trc_affine_identity;
 

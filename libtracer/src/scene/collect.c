@@ -4,12 +4,12 @@
 #include "core/checks.h"
 #include "core/core.h"
 #include "image/image.h"
+#include "model/material.h"
 #include "scene/affine.h"
 #include "scene/commit.h"
 #include "scene/mesh.h"
 #include "scene/scene.h"
 #include "shading/compile.h"
-#include "shading/material.h"
 
 static trc_status no_memory(void) {
     return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for the scene");

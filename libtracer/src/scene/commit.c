@@ -10,15 +10,15 @@
 
 #include "core/checks.h"
 #include "core/core.h"
+#include "core/pool.h"
 #include "image/image.h"
 #include "image/prefetch.h"
+#include "model/material.h"
 #include "scene/mesh.h"
 #include "scene/rebuild.h"
 #include "scene/scene.h"
 #include "shading/compile.h"
 #include "shading/lights.h"
-#include "shading/material.h"
-#include "threads/pool.h"
 
 static trc_status no_memory(void) {
     return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for the scene");

@@ -5,8 +5,8 @@
 #include <stdbool.h>
 
 #include "bvh/bvh.h"
+#include "model/snapshot.h"
 #include "scene/shared.h"
-#include "scene/snapshot.h"
 
 struct trc_scene_state; /* scene/scene.h */
 

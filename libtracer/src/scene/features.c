@@ -4,10 +4,10 @@
 #include <string.h>
 
 #include "image/image.h"
+#include "model/material.h"
 #include "scene/commit.h"
 #include "scene/mesh.h"
 #include "scene/scene.h"
-#include "shading/material.h"
 
 static uint32_t material_features(uint32_t has) {
     static const uint32_t pairs[][2] = {

@@ -3,21 +3,10 @@
 #ifndef TRACER_SCENE_MESH_H
 #define TRACER_SCENE_MESH_H
 
-#include "scene/names.h"
-#include "scene/snapshot.h"
+#include "model/names.h"
+#include "model/snapshot.h"
 
-struct trc_pool; /* threads/pool.h */
-
-/* Coordinates beyond this, or not finite, take their triangles out of the scene: sums and
- * differences of what remains stay far from overflow, and so do the squares in a triangle test
- * (1.8e18^2 = 3.2e36). */
-#define TRC_MAX_COORDINATE 1.8e18f
-
-/* Whether all three coordinates are finite and within the limit. */
-static inline int trc_point_is_valid(const float p[3]) {
-    const float m = TRC_MAX_COORDINATE; /* a NaN fails every comparison */
-    return p[0] >= -m && p[0] <= m && p[1] >= -m && p[1] <= m && p[2] >= -m && p[2] <= m;
-}
+struct trc_pool; /* core/pool.h */
 
 /* Copies a descriptor whose counts and pointers are checked (api/geometry.c). Indices are checked
  * here. Keys that are all equal become one. Normals that are not finite or zero are replaced, so

@@ -5,8 +5,8 @@
 #include <string.h>
 
 #include "core/core.h"
+#include "core/pool.h"
 #include "scene/mesh.h"
-#include "threads/pool.h"
 
 /* Triangles or vertices of one task: some 100 microseconds of work. */
 #define CHUNK 4096u

@@ -4,10 +4,10 @@
 #include <stdatomic.h>
 
 #include "core/core.h"
+#include "core/pool.h"
+#include "core/thread.h"
 #include "scene/mesh.h"
 #include "scene/scene.h"
-#include "threads/pool.h"
-#include "threads/thread.h"
 
 struct trc_rebuild {
     struct trc_mesh *geometry; /* held: the pose that the tree is built for */

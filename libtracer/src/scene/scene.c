@@ -9,13 +9,13 @@
 #include "core/core.h"
 #include "core/fpstate.h"
 #include "core/handle.h"
+#include "core/pool.h"
 #include "image/image.h"
 #include "image/prefetch.h"
 #include "image/reader.h"
 #include "scene/commit.h"
 #include "scene/mesh.h"
 #include "shading/compile.h"
-#include "threads/pool.h"
 
 static trc_status no_memory(void) {
     return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for a scene");

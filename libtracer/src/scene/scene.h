@@ -7,12 +7,12 @@
 #include <stdatomic.h>
 #include <stdbool.h>
 
-#include "scene/names.h"
+#include "model/names.h"
+#include "model/snapshot.h"
 #include "scene/shared.h"
-#include "scene/snapshot.h"
 #include "scene/store.h"
 
-struct trc_pool;         /* threads/pool.h */
+struct trc_pool;         /* core/pool.h */
 struct trc_image_reader; /* image/reader.h */
 struct trc_prefetch;     /* image/prefetch.h */
 

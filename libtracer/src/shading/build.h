@@ -4,9 +4,9 @@
 
 #include <stdbool.h>
 
+#include "model/material.h"
+#include "model/program.h"
 #include "shading/compile.h"
-#include "shading/material.h"
-#include "shading/program.h"
 
 /* ---- what is known of node types (shading/nodes.c) ---- */
 
@@ -35,50 +35,6 @@ static inline bool trc_kind_is_float(char kind) { return kind == 'f'; }
 static inline uint32_t trc_kind_floats(char kind) {
     return kind == 's' ? 0 : trc_kind_is_float(kind) ? 1 : 3;
 }
-
-/* Where the inputs of leaves stand among their operands, in floats. The colour comes first. */
-enum {
-    TRC_EMISSION_STRENGTH = 3,
-    TRC_ROUGHNESS = 3, /* of the simple shaders */
-    TRC_GLOSSY_ANISOTROPY = 4,
-    TRC_GLOSSY_TANGENT = 9,
-    TRC_PRINCIPLED_SUBSURFACE = 3,
-    TRC_PRINCIPLED_METALLIC = 7,
-    TRC_PRINCIPLED_SPECULAR = 8,
-    TRC_PRINCIPLED_ROUGHNESS = 10,
-    TRC_PRINCIPLED_ANISOTROPY = 11,
-    TRC_PRINCIPLED_SHEEN = 13,
-    TRC_PRINCIPLED_CLEARCOAT = 15,
-    TRC_PRINCIPLED_CLEARCOAT_ROUGHNESS = 16,
-    TRC_PRINCIPLED_TRANSMISSION = 18,
-    TRC_PRINCIPLED_TRANSMISSION_ROUGHNESS = 19,
-    TRC_PRINCIPLED_EMISSION = 20,
-    TRC_PRINCIPLED_EMISSION_STRENGTH = 23,
-    TRC_PRINCIPLED_ALPHA = 24,
-    TRC_PRINCIPLED_TANGENT = 31,
-    TRC_LAYERED_METALLIC = 3,
-    TRC_LAYERED_ROUGHNESS = 4,
-    TRC_LAYERED_IOR = 5,
-    TRC_LAYERED_ALPHA = 6,
-    TRC_LAYERED_NORMAL = 7,
-    TRC_LAYERED_DIFFUSE_ROUGHNESS = 10,
-    TRC_LAYERED_SPECULAR_LEVEL = 11,
-    TRC_LAYERED_SPECULAR_TINT = 12,
-    TRC_LAYERED_ANISOTROPY = 15,
-    TRC_LAYERED_ROTATION = 16,
-    TRC_LAYERED_TANGENT = 17,
-    TRC_LAYERED_TRANSMISSION = 20,
-    TRC_LAYERED_COAT = 21,
-    TRC_LAYERED_COAT_ROUGHNESS = 22,
-    TRC_LAYERED_COAT_IOR = 23,
-    TRC_LAYERED_COAT_TINT = 24,
-    TRC_LAYERED_COAT_NORMAL = 27,
-    TRC_LAYERED_SHEEN = 30,
-    TRC_LAYERED_SHEEN_ROUGHNESS = 31,
-    TRC_LAYERED_SHEEN_TINT = 32,
-    TRC_LAYERED_EMISSION = 35,
-    TRC_LAYERED_EMISSION_STRENGTH = 38
-};
 
 /* Every node of the descriptor, reached or not (shading/validate.c). */
 trc_status trc_material_validate(const trc_material_desc *desc);

@@ -1,4 +1,4 @@
-/* From the public node list to a material that kernels run: shading/material.h.
+/* From the public node list to a material that kernels run: model/material.h.
  *
  * In order: every node is checked (shading/validate.c); value nodes become operations on floats,
  * which are folded where their inputs are constants, by running the operation itself on the scalar
@@ -8,8 +8,8 @@
 #ifndef TRACER_SHADING_COMPILE_H
 #define TRACER_SHADING_COMPILE_H
 
-#include "scene/names.h"
-#include "shading/material.h"
+#include "model/material.h"
+#include "model/names.h"
 
 struct trc_compile_context {
     struct trc_names *names; /* attribute names are interned here */

@@ -4,6 +4,7 @@
 
 #include "core/checks.h"
 #include "core/core.h"
+#include "model/kernels.h"
 #include "shading/build.h"
 
 /* Far above what fits into registers, far below what would overflow a count. */
@@ -51,7 +52,8 @@ static void fold(const struct trc_build *b, uint32_t op, uint32_t mode, uint32_t
     float in[TRC_OP_MAX_INPUTS] = {0}, out[TRC_OP_MAX_OUTPUTS] = {0};
     for (uint32_t i = 0; i < op_infos[op].inputs; i++)
         in[i] = inputs[i].value;
-    trc_program_fold_scalar(op, mode, trc_op_has_table(op) ? b->tables + resource : NULL, in, out);
+    trc_kernels_get(TRC_ISA_SCALAR)
+        ->program_fold(op, mode, trc_op_has_table(op) ? b->tables + resource : NULL, in, out);
     for (uint32_t i = 0; i < op_infos[op].outputs; i++)
         outputs[i] = trc_constant(out[i]);
 }

@@ -11,7 +11,7 @@
 #include <string.h>
 
 #include "core/core.h"
-#include "shading/material.h"
+#include "model/material.h"
 
 #define PI 3.14159265358979f
 /* Triangles between two looks at whether the commit is cancelled. */

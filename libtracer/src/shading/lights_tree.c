@@ -6,8 +6,8 @@
 
 #include "core/box.h"
 #include "core/core.h"
+#include "core/pool.h"
 #include "shading/lights.h"
-#include "threads/pool.h"
 
 #define PI 3.14159265358979f
 #define BIN_COUNT 12
@@ -341,7 +341,7 @@ static struct cluster bound_top(const struct builder *b, uint32_t number) {
 }
 
 /* Parts of the whole below which a node of the cut stays closed: each gets one of the 16 shares of
- * kernels/light_select.h at least. */
+ * kernels/light/select.h at least. */
 #define LEAST_PART (1.0f / 16.0f)
 
 /* Opens nodes that are strong, first where lights are far apart, until there are cut_max. */

@@ -3,9 +3,9 @@
 #include <string.h>
 
 #include "core/core.h"
-#include "kernels/kernels.h"
+#include "core/pool.h"
+#include "model/kernels.h"
 #include "shading/lights.h"
-#include "threads/pool.h"
 
 #define PI 3.14159265358979f
 

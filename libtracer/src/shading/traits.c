@@ -5,8 +5,8 @@
 
 /* The cut-off of weights in Cycles. */
 #define WEIGHT_CUTOFF 1e-5f
-/* Microfacets of alpha^2 at or below it are ideal: TRC_SINGULAR_ALPHA2 of kernels/bsdf.h. alpha is
- * the square of roughness. */
+/* Microfacets of alpha^2 at or below it are ideal: TRC_SINGULAR_ALPHA2 of kernels/lobe/bsdf.h.
+ * alpha is the square of roughness. */
 #define SINGULAR_ALPHA2 1e-7f
 /* Some more than rounding may cost, so that a flag is never missing. */
 #define MARGIN 1.001f
@@ -140,7 +140,7 @@ static uint32_t leaf_bits(const struct trc_leaf *leaf, const struct trc_operand 
     }
 }
 
-/* Lobes of a leaf that rays are continued for, transparency apart: kernels/bsdf_setup.c. */
+/* Lobes of a leaf that rays are continued for, transparency apart: kernels/lobe/bsdf_setup.c. */
 static uint32_t leaf_branches(const struct trc_leaf *leaf, const struct trc_operand *in) {
     const uint32_t reflection = 1, glass = 2; /* which reflects and refracts */
     switch (leaf->type) {

@@ -6,11 +6,11 @@
 #include "buffers.h"
 #include "core/core.h"
 #include "core/fpstate.h"
-#include "kernels/kernels.h"
+#include "model/filter.h"
+#include "model/kernels.h"
+#include "model/sobol.h"
 #include "query_scene.h"
 #include "render/render.h"
-#include "sampling/filter.h"
-#include "sampling/sobol.h"
 
 /* As the renderer has them: render/schedule.c and render/render.c. */
 #define TILE_SIDE 32

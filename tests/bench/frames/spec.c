@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/thread.h"
 #include "stages.h"
-#include "threads/thread.h"
 #include "tracer/tracer.h"
 
 /* The paper gives no number; this one leaves as many rays per pixel as its tables imply. */

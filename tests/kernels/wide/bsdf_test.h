@@ -7,8 +7,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "kernels/bsdf.h"
-#include "kernels/wide_math.h"
+#include "kernels/lobe/bsdf.h"
+#include "kernels/simd/wide_math.h"
 #include "shading/build.h"
 #include "wide_test.h"
 
@@ -223,7 +223,7 @@ static inline void prepare(struct model *m, vvec3 wo, struct trc_surface *s, str
     struct trc_registers regs;
     memset(&regs, 0, sizeof regs);
     point(s, wo, m);
-    TRC_KERNEL(trc_lobes_setup)(material_of(m), s, &regs, vf_zero(), l);
+    trc_lobes_setup(material_of(m), s, &regs, vf_zero(), l);
 }
 static inline vvec3 direction(double cos_theta, double phi) {
     const double r = sqrt(fmax(0.0, 1.0 - cos_theta * cos_theta));
@@ -272,7 +272,7 @@ static inline void draw_samples(const struct trc_lobes *l, const struct trc_surf
     for (int i = 0; i < count; i += TRC_WIDTH) {
         struct trc_bsdf_sample b;
         const vfloat u0 = test_wide_uniform(&random), u1 = test_wide_uniform(&random);
-        TRC_KERNEL(trc_bsdf_sample)(l, s, u0, u1, test_wide_uniform(&random), &b);
+        trc_bsdf_sample(l, s, u0, u1, test_wide_uniform(&random), &b);
         for (int k = 0; k < TRC_WIDTH; k++) {
             const float pdf = vf_get(b.pdf, k), w = vf_get(b.weight.x, k);
             assert_true(isfinite(w) && w >= 0.0f && isfinite(pdf) && pdf >= 0.0f);
@@ -309,8 +309,7 @@ static inline void integrate_cell(const struct trc_lobes *l, const struct trc_su
                 z[k] = (float)c;
             }
             struct trc_bsdf_value v;
-            TRC_KERNEL(trc_bsdf_eval)
-            (l, s, v3(vf_load(x), vf_load(y), vf_load(z)), vm_all_set(), &v);
+            trc_bsdf_eval(l, s, v3(vf_load(x), vf_load(y), vf_load(z)), vm_all_set(), &v);
             for (int k = 0; k < TRC_WIDTH; k++) {
                 *density += (double)vf_get(v.pdf, k);
                 *value += (double)(vf_get(v.diffuse.x, k) + vf_get(v.glossy.x, k) +

@@ -5,7 +5,7 @@
 
 #include <math.h>
 
-#include "shading/program.h"
+#include "model/program.h"
 
 /* An output that the case does not have. */
 #define CASE_ANY NAN

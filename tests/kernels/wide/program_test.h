@@ -7,9 +7,9 @@
 #include <math.h>
 #include <string.h>
 
-#include "kernels/surface.h"
-#include "kernels/wide_math.h"
-#include "shading/program.h"
+#include "kernels/program/program.h"
+#include "kernels/simd/wide_math.h"
+#include "model/program.h"
 
 #define PROGRAM_INLINE static inline __attribute__((unused))
 

@@ -167,7 +167,7 @@ static void lobes_are_reciprocal(void **state) {
                 struct trc_lobes l;
                 struct trc_bsdf_value v;
                 prepare(&models[i], k ? b : a, &s, &l);
-                TRC_KERNEL(trc_bsdf_eval)(&l, &s, k ? a : b, vm_all_set(), &v);
+                trc_bsdf_eval(&l, &s, k ? a : b, vm_all_set(), &v);
                 f[k] = (vf_get(v.diffuse.x, 0) + vf_get(v.glossy.x, 0)) / (float)(k ? c1 : c2);
             }
             assert_true(fabsf(f[0] - f[1]) <= 2e-4f * fmaxf(f[0], f[1]) + 1e-6f);
@@ -208,7 +208,7 @@ static void values_match_formulas(void **state) {
             struct trc_lobes l;
             struct trc_bsdf_value v;
             prepare(&m, wide(o[0], o[1], o[2]), &s, &l);
-            TRC_KERNEL(trc_bsdf_eval)(&l, &s, wide(i[0], i[1], i[2]), vm_all_set(), &v);
+            trc_bsdf_eval(&l, &s, wide(i[0], i[1], i[2]), vm_all_set(), &v);
             const double want = ggx_reference((double)(roughnesses[k] * roughnesses[k]), o, i);
             assert_true(fabs((double)vf_get(v.glossy.y, 0) - want) <= 2e-3 * want + 1e-7);
         }
@@ -253,8 +253,7 @@ static void extremes_stay_finite(void **state) {
                 most = fmax(most, least_energy(&h, EXTREME_SAMPLES));
                 for (int n = 0; n < 64; n++) {
                     struct trc_bsdf_value v;
-                    TRC_KERNEL(trc_bsdf_eval)
-                    (&l, &s, direction(1.0 - n / 31.5, n), vm_all_set(), &v);
+                    trc_bsdf_eval(&l, &s, direction(1.0 - n / 31.5, n), vm_all_set(), &v);
                     assert_true(isfinite(vf_get(v.diffuse.x + v.glossy.x + v.transmission.x, 0)));
                     assert_true(vf_get(v.pdf, 0) >= 0.0f && isfinite(vf_get(v.pdf, 0)));
                 }
@@ -280,15 +279,13 @@ static void nothing_shines_through(void **state) {
             point(&s, direction(0.4, 0.0), &models[i]);
             /* A shading normal 50 degrees off the geometric one. */
             s.n = direction(cos(0.87), 0.06 * n);
-            TRC_KERNEL(trc_lobes_setup)(material_of(&models[i]), &s, &regs, vf_zero(), &l);
+            trc_lobes_setup(material_of(&models[i]), &s, &regs, vf_zero(), &l);
             struct trc_bsdf_value v;
-            TRC_KERNEL(trc_bsdf_eval)
-            (&l, &s, direction(-0.05 - 0.009 * n, 0.06 * n), vm_all_set(), &v);
+            trc_bsdf_eval(&l, &s, direction(-0.05 - 0.009 * n, 0.06 * n), vm_all_set(), &v);
             count++;
             below += vf_get(v3_max(v.diffuse) + v3_max(v.glossy), 0) != 0.0f;
             struct trc_bsdf_sample b;
-            TRC_KERNEL(trc_bsdf_sample)
-            (&l, &s, vf_set(0.5f), vf_set(0.01f * (float)n), vf_set(0.9f), &b);
+            trc_bsdf_sample(&l, &s, vf_set(0.5f), vf_set(0.01f * (float)n), vf_set(0.9f), &b);
             count++;
             below += vm_any(b.valid) && vf_get(b.wi.z, 0) <= 0.0f;
         }
@@ -305,17 +302,17 @@ static void factor_beyond(void **state) {
     struct trc_lobes l;
     struct trc_bsdf_sample b;
     prepare(&pure, direction(0.7, 0.0), &s, &l);
-    TRC_KERNEL(trc_bsdf_sample)(&l, &s, vf_set(0.5f), vf_set(0.3f), vf_set(0.4f), &b);
+    trc_bsdf_sample(&l, &s, vf_set(0.5f), vf_set(0.3f), vf_set(0.4f), &b);
     assert_true(fabsf(vf_get(b.beyond, 0) - 1.0f) < 1e-6f);
     prepare(&mixed, direction(0.7, 0.0), &s, &l);
-    TRC_KERNEL(trc_bsdf_sample)(&l, &s, vf_set(0.5f), vf_set(0.3f), vf_set(0.4f), &b);
+    trc_bsdf_sample(&l, &s, vf_set(0.5f), vf_set(0.3f), vf_set(0.4f), &b);
     assert_true(vf_get(b.beyond, 0) > 0.0f && vf_get(b.beyond, 0) < 1.0f);
     const double share = (double)vf_get(l.continue_weight / l.mix_weight, 0);
     struct trc_lobes first;
     s.depth = vi_set(0);
     struct trc_registers regs;
     memset(&regs, 0, sizeof regs);
-    TRC_KERNEL(trc_lobes_setup)(material_of(&mixed), &s, &regs, vf_zero(), &first);
+    trc_lobes_setup(material_of(&mixed), &s, &regs, vf_zero(), &first);
     const double defended = (double)vf_get(first.continue_weight / first.mix_weight, 0);
     printf("share of the reflection: %.3f, at the first hit %.3f\n", share, defended);
     assert_true(share < 0.125 && defended > share);

@@ -34,7 +34,7 @@ static double grazing_light(const struct trc_lobes *l, const struct trc_surface 
         z[k] = (float)c;
     }
     struct trc_bsdf_value v;
-    TRC_KERNEL(trc_bsdf_eval)(l, s, v3(vf_load(x), vf_load(y), vf_load(z)), vm_all_set(), &v);
+    trc_bsdf_eval(l, s, v3(vf_load(x), vf_load(y), vf_load(z)), vm_all_set(), &v);
     double sum = 0.0;
     for (int k = 0; k < TRC_WIDTH; k++)
         sum += (double)vf_get(v.glossy.x, k) /
@@ -52,7 +52,7 @@ static double mean_weight(const struct trc_lobes *l, const struct trc_surface *s
         float u[3][TRC_WIDTH];
         next_points(at, u);
         struct trc_bsdf_sample b;
-        TRC_KERNEL(trc_bsdf_sample)(l, s, vf_load(u[0]), vf_load(u[1]), vf_load(u[2]), &b);
+        trc_bsdf_sample(l, s, vf_load(u[0]), vf_load(u[1]), vf_load(u[2]), &b);
         for (int k = 0; k < TRC_WIDTH; k++) {
             if (!((vm_bits(b.valid) >> k) & 1u))
                 continue;
@@ -203,7 +203,7 @@ static double ideal_sum(struct model m, float ior, double c) {
     double sum = 0.0;
     for (int k = 0; k < l.count; k++) {
         struct trc_bsdf_sample b;
-        TRC_KERNEL(trc_bsdf_ideal)(&l, k, &s, &b);
+        trc_bsdf_ideal(&l, k, &s, &b);
         if (!vm_any(b.valid))
             continue;
         sum += (double)vf_get(b.weight.x, 0);
@@ -294,7 +294,7 @@ static void glass_weights_are_steady(void **state) {
                         struct trc_bsdf_sample b;
                         const vfloat u0 = test_wide_uniform(&random);
                         const vfloat u1 = test_wide_uniform(&random);
-                        TRC_KERNEL(trc_bsdf_sample)(&l, &s, u0, u1, test_wide_uniform(&random), &b);
+                        trc_bsdf_sample(&l, &s, u0, u1, test_wide_uniform(&random), &b);
                         for (int lane = 0; lane < TRC_WIDTH; lane++)
                             if ((vm_bits(b.valid) >> lane) & 1u)
                                 most = fmax(most, (double)vf_get(b.weight.x, lane));

@@ -6,11 +6,11 @@
 #include <string.h>
 
 #include "core/core.h"
-#include "kernels/light.h"
-#include "kernels/light_select.h"
-#include "kernels/wide_math.h"
+#include "core/pool.h"
+#include "kernels/light/light.h"
+#include "kernels/light/select.h"
+#include "kernels/simd/wide_math.h"
 #include "shading/lights.h"
-#include "threads/pool.h"
 #include "wide_test.h"
 
 #define SAMPLES (1 << 18)
@@ -137,10 +137,10 @@ static struct estimate irradiance(const struct trc_surface *s) {
         struct trc_light_sample l;
         const vfloat u0 = test_wide_uniform(&random), u1 = test_wide_uniform(&random);
         const vfloat u2 = test_wide_uniform(&random);
-        TRC_KERNEL(trc_light_sample)(s, s->n, u0, u1, u2, &l);
+        trc_light_sample(s, s->n, u0, u1, u2, &l);
         vfloat e = lit_by(s, &l);
         if (s->snapshot->lights->world_apart) {
-            TRC_KERNEL(trc_light_sample_world)(s, s->n, u1, u2, &l);
+            trc_light_sample_world(s, s->n, u1, u2, &l);
             e = e + lit_by(s, &l);
         }
         for (int k = 0; k < TRC_WIDTH; k++) {
@@ -359,14 +359,14 @@ static void rays_agree_with_samples(void **state) {
             v3(test_wide_uniform(&random), test_wide_uniform(&random), test_wide_uniform(&random));
         struct trc_light_sample l;
         const vfloat u0 = test_wide_uniform(&random), u1 = test_wide_uniform(&random);
-        TRC_KERNEL(trc_light_sample)(&r, r.n, u0, u1, test_wide_uniform(&random), &l);
+        trc_light_sample(&r, r.n, u0, u1, test_wide_uniform(&random), &l);
         const vfloat pb = vf_set(0.7f);
         vvec3 radiance = v3_zero();
         const vfloat far =
             vf_select(vf_ge(l.distance, vf_set(TRC_FAR)), l.distance, l.distance * vf_set(1.001f));
-        TRC_KERNEL(trc_light_hit)
-        (&s.snapshot, r.p, r.n, l.wi, vf_zero(), far, pb, vf_one(),
-         vu_set(TRC_VISIBLE_GLOSSY | TRC_PATH_REFLECTED), TRC_ALL_GROUPS, l.valid, &radiance);
+        trc_light_hit(&s.snapshot, r.p, r.n, l.wi, vf_zero(), far, pb, vf_one(),
+                      vu_set(TRC_VISIBLE_GLOSSY | TRC_PATH_REFLECTED), TRC_ALL_GROUPS, l.valid,
+                      &radiance);
         for (int k = 0; k < TRC_WIDTH; k++) {
             if (!((vm_bits(l.valid) >> k) & 1u))
                 continue;
@@ -429,12 +429,10 @@ static void densities_integrate_to_one(void **state) {
                 const vvec3 wi = trc_warp_cone(vf_set((float)cos_cone), u1, u2);
                 vvec3 weighed = v3_zero(), whole = v3_zero();
                 const vuint path = vu_set(TRC_VISIBLE_GLOSSY | TRC_PATH_REFLECTED);
-                TRC_KERNEL(trc_light_hit)
-                (&s.snapshot, r.p, r.n, wi, vf_zero(), vf_set(TRC_FAR), vf_one(), vf_one(), path,
-                 TRC_ALL_GROUPS, vm_all_set(), &weighed);
-                TRC_KERNEL(trc_light_hit)
-                (&s.snapshot, r.p, r.n, wi, vf_zero(), vf_set(TRC_FAR), vf_set(-1.0f), vf_one(),
-                 path, TRC_ALL_GROUPS, vm_all_set(), &whole);
+                trc_light_hit(&s.snapshot, r.p, r.n, wi, vf_zero(), vf_set(TRC_FAR), vf_one(),
+                              vf_one(), path, TRC_ALL_GROUPS, vm_all_set(), &weighed);
+                trc_light_hit(&s.snapshot, r.p, r.n, wi, vf_zero(), vf_set(TRC_FAR), vf_set(-1.0f),
+                              vf_one(), path, TRC_ALL_GROUPS, vm_all_set(), &whole);
                 for (int k = 0; k < TRC_WIDTH; k++)
                     if (vf_get(weighed.y, k) > 0.0f)
                         sum += implied_pdf((double)vf_get(weighed.y, k), (double)vf_get(whole.y, k),
@@ -515,7 +513,7 @@ static void chances_match(void **state) {
         for (int n = 0; n < SAMPLES; n += TRC_WIDTH) {
             struct trc_light_sample l;
             const vfloat u0 = test_wide_uniform(&random), u1 = test_wide_uniform(&random);
-            TRC_KERNEL(trc_light_sample)(&r, r.n, u0, u1, test_wide_uniform(&random), &l);
+            trc_light_sample(&r, r.n, u0, u1, test_wide_uniform(&random), &l);
             struct trc_surface e = receiver(&s, 0, 0, 0);
             const uint32_t first = s.table->first_triangle;
             e.active = vm_andnot(l.valid, vi_lt(l.light, vi_set((int32_t)first)));
@@ -524,8 +522,7 @@ static void chances_match(void **state) {
                                    e.active);
             e.p = v3_mad(l.wi, l.distance, r.p);
             e.wo = v3_neg(l.wi);
-            const vfloat w =
-                TRC_KERNEL(trc_light_triangle_weight)(&e, r.p, r.n, vf_one(), vf_one());
+            const vfloat w = trc_light_triangle_weight(&e, r.p, r.n, vf_one(), vf_one());
             for (int k = 0; k < TRC_WIDTH; k++) {
                 if (vi_get(l.light, k) >= 0)
                     count[vi_get(l.light, k)]++;
@@ -657,15 +654,13 @@ static void hidden_lamps(void **state) {
         scene_begin(&s);
         scene_commit(&s, &d, 1);
         vvec3 radiance = v3_zero();
-        TRC_KERNEL(trc_light_hit)
-        (&s.snapshot, v3_zero(), v3_zero(), up, vf_zero(), vf_set(5.0f), vf_set(-1.0f), vf_one(),
-         vu_set(cases[i].path), TRC_ALL_GROUPS, vm_all_set(), &radiance);
+        trc_light_hit(&s.snapshot, v3_zero(), v3_zero(), up, vf_zero(), vf_set(5.0f), vf_set(-1.0f),
+                      vf_one(), vu_set(cases[i].path), TRC_ALL_GROUPS, vm_all_set(), &radiance);
         const float want = cases[i].seen ? 25.0f : 0.0f;
         assert_true(fabsf(vf_get(radiance.x, 0) - want) < 1e-3f);
         /* Rays that pass do not end at lamps; those that stop before do not see them. */
-        TRC_KERNEL(trc_light_hit)
-        (&s.snapshot, v3_zero(), v3_zero(), up, vf_zero(), vf_set(1.9f), vf_set(-1.0f), vf_one(),
-         vu_set(cases[i].path), TRC_ALL_GROUPS, vm_all_set(), &radiance);
+        trc_light_hit(&s.snapshot, v3_zero(), v3_zero(), up, vf_zero(), vf_set(1.9f), vf_set(-1.0f),
+                      vf_one(), vu_set(cases[i].path), TRC_ALL_GROUPS, vm_all_set(), &radiance);
         assert_true(fabsf(vf_get(radiance.x, 0) - want) < 1e-3f);
         scene_end(&s);
     }
@@ -682,7 +677,7 @@ static void dark_tables(void **state) {
     assert_int_equal((int)s.table->lamp_count, 0);
     const struct trc_surface r = receiver(&s, 0, 0, 0);
     struct trc_light_sample l;
-    TRC_KERNEL(trc_light_sample)(&r, r.n, vf_set(0.5f), vf_set(0.5f), vf_set(0.5f), &l);
+    trc_light_sample(&r, r.n, vf_set(0.5f), vf_set(0.5f), vf_set(0.5f), &l);
     assert_false(vm_any(l.valid));
     scene_end(&s);
     trc_light_table_destroy(NULL);
@@ -704,7 +699,7 @@ static void lights_that_are_not_sampled(void **state) {
     assert_true(s.instance.first_light == UINT32_MAX && s.table->world_light == UINT32_MAX);
     const struct trc_surface r = receiver(&s, 0, 0, 0);
     struct trc_light_sample l;
-    TRC_KERNEL(trc_light_sample)(&r, r.n, vf_set(0.5f), vf_set(0.5f), vf_set(0.5f), &l);
+    trc_light_sample(&r, r.n, vf_set(0.5f), vf_set(0.5f), vf_set(0.5f), &l);
     assert_false(vm_any(l.valid));
     scene_end(&s);
 }

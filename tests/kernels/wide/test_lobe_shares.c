@@ -115,7 +115,7 @@ static void add_start(const struct trc_lobes *l, const struct trc_surface *s, do
         float u[3][TRC_WIDTH];
         struct trc_bsdf_sample b;
         next_points(at, u);
-        TRC_KERNEL(trc_bsdf_sample)(l, s, vf_load(u[0]), vf_load(u[1]), vf_load(u[2]), &b);
+        trc_bsdf_sample(l, s, vf_load(u[0]), vf_load(u[1]), vf_load(u[2]), &b);
         for (int k = 0; k < TRC_WIDTH; k++) {
             if (vm_bits(b.valid) >> k & 1u)
                 sums[vf_get(b.wi.z, k) < 0.0f] += (double)vf_get(b.weight.x, k) / POINTS;

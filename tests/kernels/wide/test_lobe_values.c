@@ -272,7 +272,7 @@ static void values_match_formulas(void **state) {
             draw(&random, 0.05, 1.0, o);
             draw(&random, cases[n].is_below ? -1.0 : 0.05, cases[n].is_below ? -0.05 : 1.0, i);
             prepare(&m, wide_of(o), &s, &l);
-            TRC_KERNEL(trc_bsdf_eval)(&l, &s, wide_of(i), vm_all_set(), &v);
+            trc_bsdf_eval(&l, &s, wide_of(i), vm_all_set(), &v);
             const double want = cases[n].formula(o, i), found = part_of(&v, cases[n].part);
             /* Single precision through some tens of operations; below 0.01, beside that. */
             worst = fmax(worst, fabs(found - want) / (want + 1e-2));
@@ -304,7 +304,7 @@ static void bent_normals_fade_at_the_terminator(void **state) {
         struct trc_lobes l;
         struct trc_bsdf_value v;
         prepare(&m, wide_of(o), &s, &l);
-        TRC_KERNEL(trc_bsdf_eval)(&l, &s, wide_of(i), vm_all_set(), &v);
+        trc_bsdf_eval(&l, &s, wide_of(i), vm_all_set(), &v);
         const double g = i[2] / (dot(n, i) * n[2]);
         const double fade = g >= 1.0 ? 1.0 : g + g * g - g * g * g;
         const double want = dot(n, i) / M_PI * fade;
@@ -334,8 +334,8 @@ static void rays_carry_the_share_of_continued_lobes(void **state) {
         draw(&random, 0.1, 1.0, o);
         prepare(&m, wide_of(o), &s, &l);
         assert_int_equal(l.count, 2);
-        TRC_KERNEL(trc_bsdf_sample)
-        (&l, &s, vf_set(0.5f), vf_set(rng_unit(&random)), vf_set(rng_unit(&random)), &b);
+        trc_bsdf_sample(&l, &s, vf_set(0.5f), vf_set(rng_unit(&random)), vf_set(rng_unit(&random)),
+                        &b);
         if (!(vm_bits(b.valid) & 1u))
             continue;
         const double i[3] = {(double)vf_get(b.wi.x, 0), (double)vf_get(b.wi.y, 0),

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "figures.h"
-#include "kernels/object_rays.h"
+#include "kernels/trace/object_rays.h"
 #include "scene/affine.h"
 #include "wide_test.h"
 

@@ -4,7 +4,8 @@
 
 #include <stdio.h>
 
-#include "kernels/world.h"
+#include "kernels/light/world.h"
+#include "model/kernels.h"
 #include "program_cases.h"
 
 /* ---- one operation at a time ---- */
@@ -44,7 +45,7 @@ static void case_inputs(const struct program_case *c, float in[TRC_OP_MAX_INPUTS
     }
     memcpy(in, c->in, 6 * sizeof *in);
     memcpy(in + 6, c->in + 9, 3 * sizeof *in);
-    trc_program_fold_scalar(TRC_OP_ROTATION, 0, NULL, c->in + 6, in + 9);
+    trc_kernels_get(TRC_ISA_SCALAR)->program_fold(TRC_OP_ROTATION, 0, NULL, c->in + 6, in + 9);
 }
 
 static void test_against_cycles(void **state) {
@@ -70,7 +71,7 @@ static void test_against_cycles(void **state) {
             }
             for (int k = 0; k < TRC_OP_MAX_INPUTS; k++)
                 regs.r[k] = vf_load(lanes[k]);
-            TRC_KERNEL(trc_program_run)(&p.material, NULL, &regs);
+            trc_program_run(&p.material, NULL, &regs);
             for (int l = 0; l < TRC_WIDTH; l++) {
                 const struct program_case *c = &program_cases[numbers[(start + l) % count]];
                 const int outputs = op_output_counts[c->op] < 3 ? op_output_counts[c->op] : 3;
@@ -172,12 +173,12 @@ static void test_against_scalar(void **state) {
                         lanes[k][l] = any_number(&r);
                     regs.r[k] = vf_load(lanes[k]);
                 }
-                TRC_KERNEL(trc_program_run)(&p.material, NULL, &regs);
+                trc_program_run(&p.material, NULL, &regs);
                 for (int l = 0; l < TRC_WIDTH; l++) {
                     float in[TRC_OP_MAX_INPUTS], out[TRC_OP_MAX_OUTPUTS];
                     for (int k = 0; k < TRC_OP_MAX_INPUTS; k++)
                         in[k] = lanes[k][l];
-                    trc_program_fold_scalar(op, mode, table, in, out);
+                    trc_kernels_get(TRC_ISA_SCALAR)->program_fold(op, mode, table, in, out);
                     for (int k = 0; k < op_output_counts[op]; k++) {
                         const float value = vf_get(regs.r[OUT + k], l);
                         if (same_bits_or_nan(value, out[k]))
@@ -200,7 +201,7 @@ static void test_outputs_over_inputs(void **state) {
     p.instruction.out = 0;
     for (int k = 0; k < TRC_OP_MAX_INPUTS; k++)
         regs.r[k] = vf_set((float)k);
-    TRC_KERNEL(trc_program_run)(&p.material, NULL, &regs);
+    trc_program_run(&p.material, NULL, &regs);
     const float expected[3] = {1 * 5 - 2 * 4, 2 * 3 - 0 * 5, 0 * 4 - 1 * 3};
     for (int k = 0; k < 3; k++) {
         for (int l = 0; l < TRC_WIDTH; l++)
@@ -218,9 +219,10 @@ static void test_curves(void **state) {
     for (int i = 0; i < 5; i++) {
         const float in[3] = {at[i], 2, 4};
         float out;
-        trc_program_fold_scalar(TRC_OP_CURVE, 0, table, in, &out);
+        trc_kernels_get(TRC_ISA_SCALAR)->program_fold(TRC_OP_CURVE, 0, table, in, &out);
         assert_true(is_near(out, flat[i], 1e-6f));
-        trc_program_fold_scalar(TRC_OP_CURVE, TRC_CURVE_EXTRAPOLATE, table, in, &out);
+        trc_kernels_get(TRC_ISA_SCALAR)
+            ->program_fold(TRC_OP_CURVE, TRC_CURVE_EXTRAPOLATE, table, in, &out);
         assert_true(is_near(out, straight[i], 1e-5f));
     }
 }
@@ -231,10 +233,10 @@ static void test_axis_rotation(void **state) {
     static const float around[4] = {5, 5, 5, 2.0943951f}, nothing[4] = {0, 0, 0, 1};
     static const float expected[9] = {0, 0, 1, 1, 0, 0, 0, 1, 0};
     float rows[9];
-    trc_program_fold_scalar(TRC_OP_AXIS_ROTATION, 0, NULL, around, rows);
+    trc_kernels_get(TRC_ISA_SCALAR)->program_fold(TRC_OP_AXIS_ROTATION, 0, NULL, around, rows);
     for (int i = 0; i < 9; i++)
         assert_true(is_near(rows[i], expected[i], 1e-6f));
-    trc_program_fold_scalar(TRC_OP_AXIS_ROTATION, 0, NULL, nothing, rows);
+    trc_kernels_get(TRC_ISA_SCALAR)->program_fold(TRC_OP_AXIS_ROTATION, 0, NULL, nothing, rows);
     for (int i = 0; i < 9; i++)
         assert_true(rows[i] == (i % 4 == 0 ? 1.0f : 0.0f));
 }
@@ -465,7 +467,7 @@ static void check_expectation(const struct expectation *e, const struct trc_surf
     single_init(&p, e->op, e->mode, e->resource);
     for (int k = 0; k < 4; k++)
         regs.r[k] = vf_set(e->in[k]);
-    TRC_KERNEL(trc_program_run)(&p.material, s, &regs);
+    trc_program_run(&p.material, s, &regs);
     for (int l = 0; l < TRC_WIDTH; l++) {
         const int32_t instance = vi_get(s->instance, l);
         const float *expected = e->out[instance < 0 ? 2 : instance];
@@ -506,7 +508,7 @@ static void test_inactive_lanes(void **state) {
         single_init(&p, expectations[i].op, expectations[i].mode, expectations[i].resource);
         for (int k = 0; k < 4; k++)
             regs.r[k] = vf_set(expectations[i].in[k]);
-        TRC_KERNEL(trc_program_run)(&p.material, &s, &regs);
+        trc_program_run(&p.material, &s, &regs);
         assert_true(is_near(vf_get(regs.r[OUT], 0), expectations[i].out[0][0], 1e-5f));
     }
 }
@@ -526,7 +528,7 @@ static void test_smooth_normal_map(void **state) {
     single_init(&p, TRC_OP_NORMAL_MAP, 0, TRC_NO_RESOURCE);
     for (int k = 0; k < 4; k++)
         regs.r[k] = vf_set(k == 0 || k == 3 ? 1.0f : .5f);
-    TRC_KERNEL(trc_program_run)(&p.material, &s, &regs);
+    trc_program_run(&p.material, &s, &regs);
     double n[3] = {0, 0, 0};
     for (int k = 0; k < 3; k++) {
         const double x = .25 * k, length = sqrt(2 * x * x + 1),
@@ -569,7 +571,7 @@ static void test_world(void **state) {
     struct rng r = rng_seed(3);
     for (int i = 0; i < 3 * COUNT; i++)
         directions[i] = rng_unit(&r) + .1f;
-    TRC_KERNEL(trc_world_evaluate)(&snapshot, directions, radiance, COUNT);
+    trc_world_evaluate(&snapshot, directions, radiance, COUNT);
     for (int i = 0; i < COUNT; i++) {
         const float *d = directions + 3 * i;
         const float length = sqrtf(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
@@ -579,12 +581,12 @@ static void test_world(void **state) {
     snapshot.world.is_constant = 1;
     snapshot.world.radiance[1] = 5;
     const vvec3 up = v3(vf_zero(), vf_zero(), vf_one());
-    vvec3 c = TRC_KERNEL(trc_world_shade)(&snapshot, up, vu_set(0), vm_from_bits(1));
+    vvec3 c = trc_world_shade(&snapshot, up, vu_set(0), vm_from_bits(1));
     assert_true(vf_get(c.y, 0) == 5.0f && vf_get(c.x, 0) == 0.0f);
     if (TRC_WIDTH > 1)
         assert_true(vf_get(c.y, TRC_WIDTH - 1) == 0.0f);
     snapshot.world.material = UINT32_MAX;
-    c = TRC_KERNEL(trc_world_shade)(&snapshot, up, vu_set(0), vm_all_set());
+    c = trc_world_shade(&snapshot, up, vu_set(0), vm_all_set());
     assert_true(vf_get(c.y, 0) == 0.0f);
 }
 

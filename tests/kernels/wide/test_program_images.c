@@ -93,7 +93,7 @@ static void check_lookups(int width, int height, struct rng *r) {
         for (int round = 0; round < 20; round++) {
             regs.r[0] = test_wide_uniform(r) * vf_set(5) - vf_set(2);
             regs.r[1] = test_wide_uniform(r) * vf_set(5) - vf_set(2);
-            TRC_KERNEL(trc_program_run)(&p.material, &scene.surface, &regs);
+            trc_program_run(&p.material, &scene.surface, &regs);
             for (int l = 0; l < TRC_WIDTH; l++) {
                 for (int c = 0; c < 4; c++) {
                     const float u = vf_get(regs.r[0], l), v = vf_get(regs.r[1], l);
@@ -140,7 +140,7 @@ static void test_wild_coordinates(void **state) {
             for (size_t j = 0; j < sizeof wild / sizeof *wild; j++) {
                 regs.r[0] = vf_set(wild[i]);
                 regs.r[1] = vf_set(wild[j]);
-                TRC_KERNEL(trc_program_run)(&p.material, &scene.surface, &regs);
+                trc_program_run(&p.material, &scene.surface, &regs);
                 const float value = vf_get(regs.r[OUT], 0);
                 assert_true(value >= 0.0f && value <= 1.00001f);
                 if ((mode & TRC_IMAGE_MODE_EXTENSION) != TRC_IMAGE_CLIP)
@@ -170,7 +170,7 @@ static void test_colors_of_images(void **state) {
     for (int alpha = 0; alpha < 2; alpha++) {
         struct single p;
         single_init(&p, TRC_OP_IMAGE, TRC_IMAGE_EXTEND | (alpha ? TRC_IMAGE_MODE_ALPHA : 0), 0);
-        TRC_KERNEL(trc_program_run)(&p.material, &scene.surface, &regs);
+        trc_program_run(&p.material, &scene.surface, &regs);
         /* bytes of the second texel times 51 / 255, rounded down: 0, 40, 20 */
         const double encoded[3] = {.5, 20.0 / 255, 74.0 / 255}, a = .5 + .5 * 51 / 255;
         for (int c = 0; c < 3; c++) {
@@ -183,7 +183,7 @@ static void test_colors_of_images(void **state) {
     for (uint32_t i = 1; i < 4; i++) { /* destroyed, beyond the end, never there */
         struct single p;
         single_init(&p, TRC_OP_IMAGE, 0, i == 3 ? TRC_NO_RESOURCE : i);
-        TRC_KERNEL(trc_program_run)(&p.material, &scene.surface, &regs);
+        trc_program_run(&p.material, &scene.surface, &regs);
         for (int c = 0; c < 4; c++)
             assert_true(vf_get(regs.r[OUT + c], 0) == (c == 1 ? 0.0f : 1.0f));
     }
@@ -226,7 +226,7 @@ static void test_levels(void **state) {
             regs.r[0] = regs.r[1] = vf_set(.3f);
             regs.r[2] = vf_load(lanes);
             scene.surface.footprint = vf_set(1.0f);
-            TRC_KERNEL(trc_program_run)(&p.material, &scene.surface, &regs);
+            trc_program_run(&p.material, &scene.surface, &regs);
             for (uint32_t l = 0; l < TRC_WIDTH; l++)
                 assert_true(fabsf(vf_get(regs.r[OUT], (int)l) - expected[(first + l) % count]) <
                             1e-6f);
@@ -242,7 +242,7 @@ static void check_projection(uint32_t mode, float x, float y, float z, float u, 
     regs.r[0] = vf_set(x);
     regs.r[1] = vf_set(y);
     regs.r[2] = vf_set(z);
-    TRC_KERNEL(trc_program_run)(&p.material, NULL, &regs);
+    trc_program_run(&p.material, NULL, &regs);
     if (!is_near(vf_get(regs.r[OUT], 0), u, 1e-6f) ||
         !is_near(vf_get(regs.r[OUT + 1], 0), v, 1e-6f)) {
         fail_msg("projection %u of (%g, %g, %g): (%.9g, %.9g), not (%.9g, %.9g)", mode, x, y, z,

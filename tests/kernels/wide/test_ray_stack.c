@@ -6,7 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "kernels/ray_stack.h"
+#include "kernels/tile/ray_stack.h"
 
 struct stacks {
     void *memory;

@@ -6,9 +6,9 @@
 #include <string.h>
 
 #include "core/core.h"
-#include "kernels/sampler.h"
-#include "kernels/wide_math.h"
-#include "sampling/sobol.h"
+#include "kernels/simd/wide_math.h"
+#include "kernels/tile/sampler.h"
+#include "model/sobol.h"
 #include "tracer/tracer.h"
 #include "wide_test.h"
 
@@ -37,8 +37,7 @@ static uint32_t pixel_at(uint32_t x, uint32_t y) { return x | y << 16; }
 static void numbers(const struct trc_sampler *s, uint32_t pixel, uint32_t dimension, uint32_t count,
                     float *out) {
     for (uint32_t i = 0; i < count; i += TRC_WIDTH) {
-        const vfloat u =
-            TRC_KERNEL(trc_sample)(s, vu_set(pixel), (vuint)vi_lane() + vu_set(i), dimension);
+        const vfloat u = trc_sample(s, vu_set(pixel), (vuint)vi_lane() + vu_set(i), dimension);
         for (uint32_t k = 0; k < TRC_WIDTH && i + k < count; k++) {
             out[i + k] = vf_get(u, (int)k);
             assert_true(out[i + k] >= 0.0f && out[i + k] < 1.0f);
@@ -102,7 +101,7 @@ static void split_samples_are_stratified(void **state) {
             for (uint32_t l = 0; l < 8; l++) {
                 const vuint pixel = vu_set(pixel_at(8, 2)), index = vu_set(i);
                 vfloat u[2];
-                TRC_KERNEL(trc_samples)(&s, pixel, index, d, 2, l, 8, u);
+                trc_samples(&s, pixel, index, d, 2, l, 8, u);
                 x[8 * i + l] = vf_get(u[0], 0);
                 y[8 * i + l] = vf_get(u[1], 0);
             }
@@ -162,7 +161,7 @@ static void sudoku_covers_tiles(void **state) {
             for (uint32_t y = 0; y < 8; y++)
                 for (uint32_t x = 0; x < 8; x++) {
                     const vuint pixel = vu_set(pixel_at(16 + x, 24 + y));
-                    const float u = vf_get(TRC_KERNEL(trc_sample)(&s, pixel, vu_set(i), d), 0);
+                    const float u = vf_get(trc_sample(&s, pixel, vu_set(i), d), 0);
                     const uint32_t fine = (uint32_t)(u * (float)count * 64.0f);
                     if (x + y == 0)
                         stratum = fine / 64;
@@ -201,11 +200,10 @@ static void lanes_do_not_matter(void **state) {
             }
             const uint32_t d = rng_bits(&random) % 40, dims = 1 + rng_bits(&random) % 3;
             vfloat u[3];
-            TRC_KERNEL(trc_samples)(&s, vu_load(pixel), vu_load(index), d, dims, 0, 1, u);
+            trc_samples(&s, vu_load(pixel), vu_load(index), d, dims, 0, 1, u);
             for (uint32_t j = 0; j < dims; j++)
                 for (int i = 0; i < TRC_WIDTH; i++) {
-                    const vfloat one =
-                        TRC_KERNEL(trc_sample)(&s, vu_set(pixel[i]), vu_set(index[i]), d + j);
+                    const vfloat one = trc_sample(&s, vu_set(pixel[i]), vu_set(index[i]), d + j);
                     assert_true(vf_get(u[j], i) == vf_get(one, 0));
                 }
         }
@@ -335,8 +333,7 @@ static void single_samples_are_independent(void **state) {
             for (int n = 0; n < TRC_WIDTH; n++)
                 pixel[n] = pixel_at(rng_below(&random, 1 << 14), rng_below(&random, 1 << 14));
             for (uint32_t d = 0; d < DEEP_DIMENSIONS; d++)
-                vf_store(&deep[d][0][0] + i,
-                         TRC_KERNEL(trc_sample)(&s, vu_load(pixel), vu_set(0), d));
+                vf_store(&deep[d][0][0] + i, trc_sample(&s, vu_load(pixel), vu_set(0), d));
         }
         double worst_chi2 = 0.0, worst_r = 0.0;
         for (uint32_t a = 0; a < DEEP_DIMENSIONS; a++)
@@ -364,8 +361,8 @@ static void long_sequences_are_stratified(void **state) {
     for (size_t d = 0; d < 3; d++) {
         memset(boxes, 0, sizeof boxes);
         for (uint32_t i = 0; i < 1u << BITS; i += TRC_WIDTH) {
-            const vfloat u = TRC_KERNEL(trc_sample)(&s, vu_set(pixel_at(4, 4)),
-                                                    (vuint)vi_lane() + vu_set(i), dimensions[d]);
+            const vfloat u =
+                trc_sample(&s, vu_set(pixel_at(4, 4)), (vuint)vi_lane() + vu_set(i), dimensions[d]);
             for (int k = 0; k < TRC_WIDTH; k++) {
                 const uint32_t box = (uint32_t)(vf_get(u, k) * (float)(1u << BITS));
                 boxes[box / 64] |= 1ull << box % 64;
@@ -389,7 +386,7 @@ static void widths_agree(void **state) {
             for (uint32_t i = 0; i < 4096; i += 64)
                 for (uint32_t j = 0; j < 64; j += TRC_WIDTH) {
                     const vuint lane = (vuint)vi_lane() + vu_set(i + j);
-                    const vfloat u = TRC_KERNEL(trc_sample)(&s, lane * vu_set(40503u), lane, d);
+                    const vfloat u = trc_sample(&s, lane * vu_set(40503u), lane, d);
                     for (int n = 0; n < TRC_WIDTH; n++) {
                         const float f = vf_get(u, n);
                         uint32_t bits;
@@ -415,7 +412,7 @@ static double error_of(uint32_t kind, uint32_t count, uint32_t dimensions, bool 
         for (uint32_t i = 0; i < count; i++) {
             vfloat f = vf_one(), line = vf_zero();
             for (uint32_t d = 0; d < dimensions; d++) {
-                const vfloat u = TRC_KERNEL(trc_sample)(&s, at, vu_set(i), base + d);
+                const vfloat u = trc_sample(&s, at, vu_set(i), base + d);
                 f = f * (vf_set(0.5f) + u);
                 line = line + u;
             }
@@ -455,8 +452,7 @@ static void blue_noise_is_blue(void **state) {
         for (uint32_t y = 0; y < 128; y++)
             for (uint32_t x = 0; x < 128; x += TRC_WIDTH) {
                 const vuint at = ((vuint)vi_lane() + vu_set(x)) | vu_set(y << 16);
-                vf_store(&image[y][x],
-                         TRC_KERNEL(trc_sample)(&s, at, vu_set(0), TRC_DIM_BOUNCE + 1));
+                vf_store(&image[y][x], trc_sample(&s, at, vu_set(0), TRC_DIM_BOUNCE + 1));
             }
         for (int y = 0; y < 128; y += 4)
             for (int x = 0; x < 128; x += 4) {

@@ -6,9 +6,9 @@
 #include "wide_test.h"
 
 #include "figures.h"
-#include "kernels/kernels.h"
-#include "kernels/spawn.h"
-#include "kernels/wide_math.h"
+#include "kernels/simd/wide_math.h"
+#include "kernels/trace/spawn.h"
+#include "model/kernels.h"
 #include "query_test.h"
 
 extern const struct trc_kernels TRC_KERNEL(trc_kernels);
@@ -58,7 +58,7 @@ static struct trc_surface surfaces(const struct trc_snapshot *snapshot, uint32_t
     s.u = vf_load(u);
     s.v = vf_load(v);
     s.wo = trc_warp_sphere(test_wide_uniform(rng), test_wide_uniform(rng));
-    TRC_KERNEL(trc_surface_fetch)(&s);
+    trc_surface_fetch(&s);
     return s;
 }
 
@@ -281,7 +281,7 @@ static void leave_outwards(const struct trc_snapshot *snapshot, float cosine, st
                            struct ray_set *rays) {
     struct trc_surface s = surfaces(snapshot, 0, 0, rng);
     s.u = s.v = vf_set(0.3f);
-    TRC_KERNEL(trc_surface_fetch)(&s);
+    trc_surface_fetch(&s);
     const vvec3 w = leaving(&s, cosine, rng);
     const vmask inwards = vf_lt(v3_dot(w, s.ng) * v3_dot(s.p, s.ng), vf_zero());
     const vvec3 turned = v3_sub(w, v3_scale(s.ng, vf_set(2.0f) * v3_dot(w, s.ng)));

@@ -5,8 +5,8 @@
 #include <string.h>
 
 #include "figures.h"
-#include "kernels/surface.h"
-#include "kernels/wide_math.h"
+#include "kernels/simd/wide_math.h"
+#include "kernels/trace/surface.h"
 #include "wide_test.h"
 
 #define MESHES 5
@@ -205,7 +205,7 @@ static struct trc_surface fetch(const struct hits *h, vvec3 wo) {
     s.v = vf_load(h->v);
     s.time = vf_load(h->time);
     s.wo = wo;
-    TRC_KERNEL(trc_surface_fetch)(&s);
+    trc_surface_fetch(&s);
     return s;
 }
 

@@ -3,7 +3,7 @@
 #include <stdio.h>
 
 #include "figures.h"
-#include "kernels/wide_math.h"
+#include "kernels/simd/wide_math.h"
 #include "wide_test.h"
 
 #define POINTS (1 << 20)

@@ -10,7 +10,7 @@
 
 #include <cmocka.h>
 
-#include "kernels/simd.h"
+#include "kernels/simd/simd.h"
 #include "rng.h"
 
 /* Whether this CPU runs the instruction set of the program. */

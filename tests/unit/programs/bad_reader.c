@@ -10,7 +10,7 @@
 
 #include "bad_reader.h"
 #include "image/protocol.h"
-#include "image/texel_format.h"
+#include "model/texel_format.h"
 #include "system.h"
 #include "tracer/base.h"
 

@@ -1,0 +1,255 @@
+/* Lights that continuation and camera rays find by themselves, and the weights of that. */
+#include "kernels/light/clamp.h"
+#include "kernels/light/light.h"
+#include "kernels/light/select.h"
+#include "kernels/light/shape.h"
+#include "kernels/light/world.h"
+
+/* Power heuristic (E. Veach, "Robust Monte Carlo Methods for Light Transport Simulation", 1997) for
+ * the ray, one of them, against count light samples of density pl. Negative pb: no light sample
+ * could have been. */
+TRC_INLINE vfloat ray_weight(vfloat pb, vfloat pl, vfloat count) {
+    const vfloat b2 = pb * pb, l = pl * count, l2 = l * l;
+    const vfloat w = vf_divide(b2, b2 + l2);
+    return vf_select(vf_lt(pb, vf_zero()), vf_one(), w);
+}
+
+/* Lanes that an object of these visibility bits hides from, as Cycles tests lights: diffuse,
+ * transmitted and unblocked rays by their bit, glossy ones only when reflected. */
+TRC_INLINE vmask hidden_from(uint32_t visibility, vuint path) {
+    uint32_t hides =
+        ~visibility & (TRC_VISIBLE_DIFFUSE | TRC_VISIBLE_TRANSMISSION | TRC_VISIBLE_UNBLOCKED);
+    vmask hidden = vm_none();
+    if (hides)
+        hidden = vm_not(vi_eq((vint)(path & vu_set(hides)), vi_set(0)));
+    if (!(visibility & TRC_VISIBLE_GLOSSY)) {
+        const vuint both = vu_set(TRC_VISIBLE_GLOSSY | TRC_PATH_REFLECTED);
+        hidden = vm_or(hidden, vi_eq((vint)(path & both), (vint)both));
+    }
+    return hidden;
+}
+TRC_INLINE vmask is_camera_ray(vuint path) {
+    return vi_eq((vint)(path & vu_set(TRC_VISIBLE_CAMERA)), vi_set(TRC_VISIBLE_CAMERA));
+}
+/* Of the lanes in active, those that may see the lamp. Camera rays see lamps that are visible to
+ * them; suns in addition need multiple importance. */
+static vmask lamp_viewers(const struct trc_lamp *lamp, vuint path, vmask active) {
+    const vmask camera = is_camera_ray(path);
+    const bool mis = lamp->flags & TRC_LAMP_MIS;
+    if (!mis && (lamp->kind == TRC_KIND_SUN || !(lamp->visibility & TRC_VISIBLE_CAMERA)))
+        return vm_none();
+    vmask viewers = vm_andnot(active, hidden_from(lamp->visibility, path));
+    if (!(lamp->visibility & TRC_VISIBLE_CAMERA))
+        viewers = vm_andnot(viewers, camera);
+    if (!mis)
+        viewers = vm_and(viewers, camera);
+    return viewers;
+}
+
+/* Lanes whose ray comes within the sphere about the lamp: most lamps are missed by all. */
+TRC_INLINE vmask near_lamp(const struct trc_lamp *lamp, vvec3 p, vvec3 wi) {
+    if (lamp->kind == TRC_KIND_SUN)
+        return vf_ge(v3_dot(v3_set(lamp->position), wi), vf_set(lamp->cos_cone));
+    const vvec3 to = v3_sub(v3_set(lamp->position), p);
+    const vfloat along = v3_dot(to, wi);
+    const float r2 = lamp->half_u * lamp->half_u + lamp->half_v * lamp->half_v;
+    /* Rounding of the difference grows with the squared distance. */
+    const vfloat d2 = v3_dot(to, to), slack = d2 * vf_set(1e-5f) + vf_set(1.001f * r2);
+    return vf_le(d2 - along * along, slack);
+}
+
+/* Distance to the lamp along the ray, infinite where it is missed; density of sampling that place,
+ * radiance. */
+static vfloat meet_lamp(const struct trc_lamp *lamp, vvec3 p, vvec3 wi, vfloat *pdf,
+                        vvec3 *radiance) {
+    const struct trc_wide_lamp l = trc_lamp_broadcast(lamp);
+    *radiance = l.radiance;
+    if (lamp->kind == TRC_KIND_POINT || lamp->kind == TRC_KIND_SPOT) {
+        const vfloat t = trc_point_hit(&l, p, wi, pdf);
+        if (lamp->kind == TRC_KIND_SPOT)
+            *radiance = v3_scale(l.radiance, trc_spot_factor(&l, wi));
+        return t;
+    }
+    if (lamp->kind == TRC_KIND_SUN) {
+        const vfloat c = v3_dot(l.position, wi);
+        const vmask hit = vf_ge(c, l.cos_cone);
+        *pdf = trc_sun_density(&l, vf_max(c, vf_set(1e-3f)));
+        if (!(lamp->flags & TRC_LAMP_EVEN_CONE))
+            *radiance = v3_scale(l.radiance, *pdf / l.inv_area);
+        return vf_select(hit, vf_set(TRC_FAR), vf_set(INFINITY));
+    }
+    vfloat u, v;
+    const vfloat t = trc_area_hit(&l, p, wi, &u, &v);
+    const vmask round = vf_le(u * u + v * v, vf_one());
+    const vmask square = vm_and(vf_le(vf_abs(u), vf_one()), vf_le(vf_abs(v), vf_one()));
+    const bool is_ellipse = lamp->kind == TRC_KIND_ELLIPSE;
+    const vmask hit = is_ellipse ? round : square;
+    if (!vm_any(vm_and(hit, vf_lt(t, vf_set(INFINITY)))))
+        return vf_set(INFINITY);
+    *radiance = v3_scale(l.radiance, trc_spread_factor(&l, wi));
+    const struct trc_view_rectangle r = trc_rectangle_view(&l, p);
+    const struct trc_spherical_rectangle q = trc_rectangle_angles(&r, is_ellipse);
+    const vvec3 to = v3_scale(wi, t);
+    *pdf = trc_area_density(&l, &r, &q, is_ellipse, v3_dot(to, l.axis_u), v3_dot(to, l.axis_v));
+    return vf_select(hit, t, vf_set(INFINITY));
+}
+
+/* Under which clamp lamps are seen. */
+struct lamp_clamp {
+    vvec3 weight; /* of the path */
+    vfloat limit;
+};
+
+/* clamp: NULL for none. */
+TRC_INLINE void lamps_meet(const struct trc_snapshot *snapshot, vvec3 p, vvec3 n, vvec3 wi,
+                           vfloat tmin, vfloat tmax, vfloat bsdf_pdf, vfloat light_sample_count,
+                           vuint path, uint32_t group, const struct lamp_clamp *clamp, vmask active,
+                           vvec3 *radiance) {
+    const struct trc_light_table *t = snapshot->lights;
+    const bool all = group == TRC_ALL_GROUPS;
+    const uint32_t end = t->group_seen[all ? TRC_MAX_LIGHT_GROUPS + 1 : group + 1];
+    const struct trc_receiver receiver = trc_receiver_make(p, n);
+    for (uint32_t i = all ? 0 : t->group_seen[group]; i < end; i++) {
+        const uint32_t number = t->seen[i];
+        const struct trc_lamp *lamp = &t->lamps[number];
+        vmask viewers = vm_and(active, near_lamp(lamp, p, wi));
+        if (!vm_any(viewers))
+            continue;
+        viewers = lamp_viewers(lamp, path, viewers);
+        if (!vm_any(viewers))
+            continue;
+        vfloat pdf = vf_zero();
+        vvec3 light;
+        const vfloat distance = meet_lamp(lamp, p, wi, &pdf, &light);
+        vmask hit = vm_and(viewers, vm_and(vf_gt(distance, tmin), vf_le(distance, tmax)));
+        hit = vm_and(hit, vf_lt(distance, vf_set(INFINITY)));
+        if (!vm_any(hit))
+            continue;
+        vfloat weight = vf_one();
+        const vmask weighed = vm_andnot(hit, vf_lt(bsdf_pdf, vf_zero()));
+        if (vm_any(weighed)) {
+            const vfloat chance = trc_light_chance(t, &receiver, vi_set((int32_t)number), weighed);
+            weight = ray_weight(bsdf_pdf, pdf * chance, light_sample_count);
+        }
+        if (clamp)
+            weight = weight *
+                     trc_clamp_factor(v3_mul(clamp->weight, v3_scale(light, weight)), clamp->limit);
+        *radiance = v3_add(*radiance, v3_where(hit, v3_scale(light, weight)));
+    }
+}
+
+void trc_light_hit(const struct trc_snapshot *snapshot, vvec3 p, vvec3 n, vvec3 wi, vfloat tmin,
+                   vfloat tmax, vfloat bsdf_pdf, vfloat light_sample_count, vuint path,
+                   uint32_t group, vmask active, vvec3 *radiance) {
+    lamps_meet(snapshot, p, n, wi, tmin, tmax, bsdf_pdf, light_sample_count, path, group, NULL,
+               active, radiance);
+}
+
+void trc_light_hit_clamped(const struct trc_snapshot *snapshot, vvec3 p, vvec3 n, vvec3 wi,
+                           vfloat tmin, vfloat tmax, vfloat bsdf_pdf, vfloat light_sample_count,
+                           vuint path, uint32_t group, vvec3 weight, vfloat limit, vmask active,
+                           vvec3 *radiance) {
+    const struct lamp_clamp clamp = {weight, limit};
+    lamps_meet(snapshot, p, n, wi, tmin, tmax, bsdf_pdf, light_sample_count, path, group, &clamp,
+               active, radiance);
+}
+
+uint32_t trc_light_group(const struct trc_snapshot *snapshot, uint32_t light) {
+    const struct trc_light_table *t = snapshot->lights;
+    const struct trc_world *world = &snapshot->world;
+    if (light < t->lamp_count)
+        return t->lamps[light].group;
+    if (light == t->world_light)
+        return world->light_group;
+    if (light - t->first_triangle < t->triangle_count)
+        return snapshot->instances[t->triangles[light - t->first_triangle].instance].light_group;
+    return world->ao_method == TRC_AO_REPLACE ? world->light_group : 0;
+}
+
+/* Numbers of the triangles as lights, -1 for those that are none. Lights of an instance are in the
+ * order of its triangles: usually all of them are lights, else a search finds the place. */
+static vint triangle_lights(const struct trc_surface *s, vmask m) {
+    const struct trc_light_table *t = s->snapshot->lights;
+    vint light = vi_set(-1);
+    for (uint32_t lanes = vm_bits(m); lanes; lanes &= lanes - 1) {
+        const int lane = __builtin_ctz(lanes);
+        const uint32_t number = (uint32_t)vi_get(s->instance, lane);
+        const struct trc_instance *instance = &s->snapshot->instances[number];
+        if (instance->first_light == UINT32_MAX)
+            continue;
+        const int32_t wanted = vi_get(s->triangle, lane);
+        uint32_t first = instance->first_light - t->first_triangle;
+        uint32_t count = t->instance_triangles[number];
+        if ((uint32_t)wanted < count && t->triangles[first + (uint32_t)wanted].triangle == wanted) {
+            first += (uint32_t)wanted;
+        } else {
+            while (count > 1) {
+                const uint32_t half = count / 2;
+                if (t->triangles[first + half].triangle <= wanted)
+                    first += half;
+                count -= half;
+            }
+        }
+        if (t->triangles[first].triangle == wanted)
+            light = vi_select(vm_from_bits(1u << lane),
+                              vi_set((int32_t)(first + t->first_triangle)), light);
+    }
+    return light;
+}
+
+/* World corners of the surface's triangles. */
+static struct trc_corners surface_corners(const struct trc_surface *s, vmask m) {
+    float p[TRC_WIDTH * 9];
+    memset(p, 0, sizeof p);
+    for (uint32_t lanes = vm_bits(m); lanes; lanes &= lanes - 1) {
+        const int lane = __builtin_ctz(lanes);
+        trc_world_corners_at(s->snapshot, (uint32_t)vi_get(s->instance, lane),
+                             (uint32_t)vi_get(s->triangle, lane), vf_get(s->time, lane),
+                             p + 9 * lane);
+    }
+    return trc_corners_of(p);
+}
+
+vfloat trc_light_triangle_weight(const struct trc_surface *s, vvec3 p_from, vvec3 n_from,
+                                 vfloat bsdf_pdf, vfloat light_sample_count) {
+    const struct trc_light_table *t = s->snapshot->lights;
+    vmask m = vm_andnot(s->active, vf_lt(bsdf_pdf, vf_zero()));
+    if (!t->triangle_count || !vm_any(m))
+        return vf_one();
+    const vint light = triangle_lights(s, m);
+    m = vm_andnot(m, vi_lt(light, vi_set(0)));
+    if (!vm_any(m))
+        return vf_one();
+    const struct trc_receiver receiver = trc_receiver_make(p_from, n_from);
+    const struct trc_corners corners = surface_corners(s, m);
+    const struct trc_view_triangle view = trc_triangle_view(&corners, p_from);
+    const vfloat distance = v3_length(v3_sub(s->p, p_from));
+    const vfloat pdf = trc_triangle_density(&view, s->wo, distance);
+    const vfloat chance = trc_light_chance(t, &receiver, light, m);
+    return vf_select(m, ray_weight(bsdf_pdf, pdf * chance, light_sample_count), vf_one());
+}
+
+vvec3 trc_world_radiance(const struct trc_snapshot *snapshot, vvec3 p_from, vvec3 n_from, vvec3 wi,
+                         vfloat bsdf_pdf, vfloat light_sample_count, vuint path, vmask active) {
+    const struct trc_light_table *t = snapshot->lights;
+    vmask m = active;
+    const uint32_t visibility = snapshot->world.visibility;
+    if ((visibility & TRC_VISIBLE_ALL) != TRC_VISIBLE_ALL) {
+        m = vm_andnot(m, hidden_from(visibility, path));
+        if (!(visibility & TRC_VISIBLE_CAMERA))
+            m = vm_andnot(m, is_camera_ray(path));
+    }
+    if (!vm_any(m))
+        return v3_zero();
+    const vvec3 radiance = trc_world_shade(snapshot, wi, path, m);
+    const vmask alone =
+        vi_eq((vint)(path & vu_set(TRC_PATH_WORLD_ALONE)), vi_set(TRC_PATH_WORLD_ALONE));
+    const vmask weighed = vm_andnot(m, vm_or(alone, vf_lt(bsdf_pdf, vf_zero())));
+    if (t->world_light == UINT32_MAX || !vm_any(weighed))
+        return v3_where(m, radiance);
+    const struct trc_receiver receiver = trc_receiver_make(p_from, n_from);
+    const vfloat density = trc_world_density(t, n_from, receiver.has_n, wi, weighed);
+    const vfloat chance = trc_light_chance(t, &receiver, vi_set((int32_t)t->world_light), weighed);
+    const vfloat weight = ray_weight(bsdf_pdf, density * chance, light_sample_count);
+    return v3_where(m, v3_scale(radiance, vf_select(weighed, weight, vf_one())));
+}

@@ -1,0 +1,321 @@
+/* Light samples: a light for every point, a place on it, the radiance it sends. */
+#include "kernels/light/light.h"
+
+#include "kernels/light/select.h"
+#include "kernels/light/shape.h"
+#include "kernels/light/world.h"
+#include "kernels/lobe/bsdf.h"
+
+/* Everything of one call. */
+struct draw {
+    const struct trc_snapshot *scene;
+    const struct trc_light_table *table;
+    const struct trc_surface *s;
+    struct trc_receiver receiver;
+    vfloat u1, u2, chance;
+    vint light;
+    struct trc_light_sample *out;
+};
+
+/* Enters a place in lanes m. */
+static void set_place(const struct draw *d, const struct trc_place *place, vmask m) {
+    struct trc_light_sample *out = d->out;
+    out->wi = v3_select(m, place->wi, out->wi);
+    out->distance = vf_select(m, place->distance, out->distance);
+    out->radiance = v3_select(m, place->radiance, out->radiance);
+    out->density = vf_select(m, place->pdf, out->density);
+    out->pdf = vf_select(m, place->pdf * d->chance, out->pdf);
+}
+
+/* ---- lamps ---- */
+
+TRC_INLINE vmask is_kind(const struct trc_wide_lamp *l, enum trc_light_kind kind) {
+    return vi_eq(l->kind, vi_set((int32_t)kind));
+}
+
+static void sample_lamps(const struct draw *d, const struct trc_wide_lamp *l, uint32_t kinds,
+                         vmask m) {
+    const vvec3 p = d->s->p;
+    if (kinds & (1u << TRC_KIND_POINT | 1u << TRC_KIND_SPOT)) {
+        const vmask spot = vm_and(m, is_kind(l, TRC_KIND_SPOT));
+        const vmask lanes = vm_or(spot, vm_and(m, is_kind(l, TRC_KIND_POINT)));
+        if (vm_any(lanes)) {
+            struct trc_place place = trc_point_sample(l, p, d->u1, d->u2);
+            if (vm_any(spot))
+                place.radiance = v3_select(
+                    spot, v3_scale(place.radiance, trc_spot_factor(l, place.wi)), place.radiance);
+            set_place(d, &place, lanes);
+        }
+    }
+    if (kinds & 1u << TRC_KIND_SUN) {
+        const vmask lanes = vm_and(m, is_kind(l, TRC_KIND_SUN));
+        if (vm_any(lanes)) {
+            const struct trc_place place = trc_sun_sample(l, d->u1, d->u2);
+            set_place(d, &place, lanes);
+        }
+    }
+    if (kinds & 1u << TRC_KIND_RECTANGLE) {
+        const vmask lanes = vm_and(m, is_kind(l, TRC_KIND_RECTANGLE));
+        if (vm_any(lanes)) {
+            const struct trc_place place = trc_area_sample(l, false, p, d->u1, d->u2);
+            set_place(d, &place, lanes);
+        }
+    }
+    if (kinds & 1u << TRC_KIND_ELLIPSE) {
+        const vmask lanes = vm_and(m, is_kind(l, TRC_KIND_ELLIPSE));
+        if (vm_any(lanes)) {
+            const struct trc_place place = trc_area_sample(l, true, p, d->u1, d->u2);
+            set_place(d, &place, lanes);
+        }
+    }
+}
+
+/* Lanes whose bits are set in a word. */
+TRC_INLINE vmask has_bit(vint word, int32_t bit) { return vi_eq(word & vi_set(bit), vi_set(bit)); }
+
+/* Lamps that lanes chose are taken one by one while there are few of them: their data is broadcast
+ * then and only their own shape is computed. */
+#define SEPARATE_LAMPS 3
+
+static void mark_flags(const struct draw *d, vint flags, vmask m) {
+    struct trc_light_sample *out = d->out;
+    out->delta = vm_or(out->delta, vm_and(m, has_bit(flags, TRC_LAMP_DELTA)));
+    out->no_mis = vm_or(out->no_mis, vm_andnot(m, has_bit(flags, TRC_LAMP_MIS)));
+    out->casts_shadow =
+        vm_andnot(out->casts_shadow, vm_andnot(m, has_bit(flags, TRC_LAMP_CASTS_SHADOW)));
+}
+
+static void sample_chosen_lamps(const struct draw *d, vmask m) {
+    const struct trc_light_table *t = d->table;
+    struct trc_wide_lamp l;
+    for (int i = 0; i < SEPARATE_LAMPS; i++) {
+        const int32_t number = vi_get(d->light, __builtin_ctz(vm_bits(m)));
+        const vmask same = vm_and(m, vi_eq(d->light, vi_set(number)));
+        l = trc_lamp_broadcast(&t->lamps[number]);
+        sample_lamps(d, &l, 1u << t->lamps[number].kind, same);
+        mark_flags(d, l.flags, same);
+        m = vm_andnot(m, same);
+        if (!vm_any(m))
+            return;
+    }
+    l = trc_lamp_gather(t->lamps, d->light, m);
+    sample_lamps(d, &l, t->kinds, m);
+    mark_flags(d, l.flags, m);
+}
+
+/* ---- triangles ---- */
+
+/* World corners of the triangles at the lanes' times. */
+static struct trc_corners moving_corners(const struct draw *d, vint index, vmask m) {
+    float p[TRC_WIDTH * 9];
+    memset(p, 0, sizeof p);
+    for (uint32_t lanes = vm_bits(m); lanes; lanes &= lanes - 1) {
+        const int lane = __builtin_ctz(lanes);
+        const struct trc_light_triangle *t = &d->table->triangles[vi_get(index, lane)];
+        trc_world_corners_at(d->scene, t->instance, t->triangle, vf_get(d->s->time, lane),
+                             p + 9 * lane);
+    }
+    return trc_corners_of(p);
+}
+
+/* Emission that a program computes: the surface at the sampled place, one material after the
+ * other. */
+static void evaluate_emission(const struct draw *d, vint index, vfloat u, vfloat v, vmask m) {
+    const struct trc_light_triangle *all = d->table->triangles;
+    const vint at = index * vi_set(TRC_TRIANGLE_WORDS);
+    struct trc_surface e;
+    memset(&e, 0, sizeof e);
+    e.snapshot = d->scene;
+    e.instance = vi_gather(&all->instance, at, m);
+    e.triangle = vi_gather(&all->triangle, at, m);
+    e.u = u;
+    e.v = v;
+    e.time = d->s->time;
+    e.wo = v3_neg(d->out->wi);
+    e.ray_length = d->out->distance;
+    e.raster_x = d->s->raster_x;
+    e.raster_y = d->s->raster_y;
+    e.active = m;
+    trc_surface_fetch(&e);
+    const vint material = vi_gather((const int32_t *)&all->material, at, m);
+    for (vmask left = m; vm_any(left);) {
+        const int32_t number = vi_get(material, __builtin_ctz(vm_bits(left)));
+        e.active = vm_and(left, vi_eq(material, vi_set(number)));
+        left = vm_andnot(left, e.active);
+        const struct trc_material *program = d->scene->materials[number];
+        struct trc_registers registers;
+        if (program->instruction_count)
+            trc_program_run(program, &e, &registers);
+        const vvec3 emission = trc_lobes_emission(program, &registers);
+        d->out->radiance = v3_select(e.active, emission, d->out->radiance);
+    }
+}
+
+static void sample_triangles(const struct draw *d, vmask m) {
+    const struct trc_light_table *t = d->table;
+    const float *base = (const float *)t->triangles;
+    const vint index = d->light - vi_set((int32_t)t->first_triangle);
+    const vint at = index * vi_set(TRC_TRIANGLE_WORDS);
+    struct trc_corners c;
+    for (int k = 0; k < 3; k++)
+        c.corner[k] = v3_gather(base + 3 * k, at, m);
+    const vint flags = vi_gather((const int32_t *)&t->triangles->flags, at, m);
+    const vmask moves = t->moves ? vm_and(m, has_bit(flags, TRC_TRIANGLE_MOVES)) : vm_none();
+    if (vm_any(moves)) {
+        const struct trc_corners now = moving_corners(d, index, moves);
+        for (int k = 0; k < 3; k++)
+            c.corner[k] = v3_select(moves, now.corner[k], c.corner[k]);
+    }
+    vfloat u, v;
+    struct trc_place place = trc_triangle_sample(&c, d->s->p, d->u1, d->u2, &u, &v);
+    place.radiance = v3_gather(base + 9, at, m);
+    set_place(d, &place, m);
+    const vmask varies = t->varies ? vm_and(m, has_bit(flags, TRC_TRIANGLE_VARIES)) : vm_none();
+    if (vm_any(varies))
+        evaluate_emission(d, index, u, v, varies);
+}
+
+/* ---- world ---- */
+
+static void sample_world(const struct draw *d, vmask m) {
+    struct trc_place place =
+        trc_world_sample(d->table, d->receiver.n, d->receiver.has_n, d->u1, d->u2, m);
+    /* No kind of ray: Cycles evaluates light samples without any either. */
+    place.radiance = trc_world_shade(d->scene, place.wi, vu_set(0), m);
+    set_place(d, &place, m);
+}
+
+/* ---- visibility ---- */
+
+/* Bits of the lights in lanes m, all elsewhere. */
+static vuint visibility_of(const struct trc_snapshot *scene, vint light, vmask m) {
+    const struct trc_light_table *t = scene->lights;
+    vuint bits = vu_set(TRC_VISIBLE_ALL | TRC_VISIBLE_UNBLOCKED);
+    const vmask lamp = vm_and(m, vi_lt(light, vi_set((int32_t)t->lamp_count)));
+    if (vm_any(lamp)) {
+        const vuint word = vu_gather(&t->lamps->visibility, light * vi_set(TRC_LAMP_WORDS), lamp);
+        bits = (vuint)vi_select(lamp, (vint)word, (vint)bits);
+    }
+    const vmask world = vm_and(m, vi_eq(light, vi_set((int32_t)t->world_light)));
+    bits = (vuint)vi_select(world, vi_set((int32_t)t->world_visibility), (vint)bits);
+    const vmask triangle = vm_andnot(m, vi_lt(light, vi_set((int32_t)t->first_triangle)));
+    for (uint32_t lanes = vm_bits(triangle); lanes; lanes &= lanes - 1) {
+        const int lane = __builtin_ctz(lanes);
+        const uint32_t index = (uint32_t)vi_get(light, lane) - t->first_triangle;
+        const uint32_t word = scene->instances[t->triangles[index].instance].visibility;
+        bits = (vuint)vi_select(vm_from_bits(1u << lane), vi_set((int32_t)word), (vint)bits);
+    }
+    return bits;
+}
+
+vfloat trc_light_chosen(const struct trc_surface *s, vvec3 n, const struct trc_light_sample *sample,
+                        vmask m) {
+    const struct trc_receiver receiver = trc_receiver_make(s->p, n);
+    return trc_light_chance(s->snapshot->lights, &receiver, sample->light, m);
+}
+
+vuint trc_light_visibility(const struct trc_snapshot *snapshot,
+                           const struct trc_light_sample *sample, vuint path) {
+    if (!snapshot->lights->hides)
+        return vu_set(TRC_VISIBLE_ALL);
+    const vmask chosen = vm_not(vi_lt(sample->light, vi_set(0)));
+    const vuint bits = visibility_of(snapshot, sample->light, chosen);
+    const vint hidden = (vint)(path & ~bits & vu_set(TRC_VISIBLE_UNBLOCKED));
+    return (vuint)vi_select(vi_eq(hidden, vi_set(0)), (vint)bits, vi_set(0));
+}
+
+/* A continuation ray towards wi is a glossy one above the surface and a transmitted one below. */
+static void mark_hidden(const struct draw *d, vmask m) {
+    const vuint bits = visibility_of(d->scene, d->light, m);
+    const vmask above = vf_gt(v3_dot(d->s->ng, d->out->wi), vf_zero());
+    const vint wanted =
+        vi_select(above, vi_set(TRC_VISIBLE_GLOSSY), vi_set(TRC_VISIBLE_TRANSMISSION));
+    const vmask unseen = vi_eq((vint)bits & wanted, vi_set(0));
+    d->out->no_mis = vm_or(d->out->no_mis, vm_and(m, unseen));
+}
+
+/* ---- interface ---- */
+
+static void clear_sample(struct trc_light_sample *out) {
+    out->wi = v3(vf_zero(), vf_zero(), vf_one());
+    out->distance = vf_set(TRC_FAR);
+    out->radiance = v3_zero();
+    out->density = out->pdf = vf_zero();
+    out->valid = out->delta = out->no_mis = vm_none();
+    out->casts_shadow = vm_all_set();
+    out->light = vi_set(-1);
+}
+
+/* What all kinds of lights have in common, after a place was set in lanes m. */
+static void finish_sample(const struct draw *d, vmask m) {
+    struct trc_light_sample *out = d->out;
+    if (d->table->hides)
+        mark_hidden(d, m);
+    const vvec3 r = out->radiance;
+    const vfloat most = vf_max(vf_max(vf_abs(r.x), vf_abs(r.y)), vf_abs(r.z));
+    const vmask finite = vm_and(vf_gt(out->pdf, vf_zero()), vf_lt(out->pdf, vf_set(INFINITY)));
+    out->valid = vm_and(m, vm_and(finite, vf_gt(most, vf_zero())));
+}
+
+/* The only light of a scene. */
+TRC_INLINE int32_t single_light(const struct trc_light_table *t) {
+    return t->bound_count ? t->bounds[0].light : (int32_t)t->distant[0];
+}
+
+void trc_light_prepare(const struct trc_surface *s, vvec3 n, struct trc_light_choices *out) {
+    out->p = s->p;
+    out->n = n;
+    trc_candidates_weigh(s->snapshot->lights, out);
+}
+
+void trc_light_sample(const struct trc_surface *s, vvec3 n, vfloat u_select, vfloat u1, vfloat u2,
+                      struct trc_light_sample *out) {
+    struct trc_light_choices choices;
+    trc_light_prepare(s, n, &choices);
+    trc_light_sample_prepared(s, &choices, u_select, u1, u2, out);
+}
+
+void trc_light_sample_world(const struct trc_surface *s, vvec3 n, vfloat u1, vfloat u2,
+                            struct trc_light_sample *out) {
+    const struct trc_snapshot *scene = s->snapshot;
+    const struct trc_light_table *t = scene->lights;
+    clear_sample(out);
+    out->light = vi_select(s->active, vi_set((int32_t)t->world_light), out->light);
+    const struct draw d = {scene,    t,          s,  trc_receiver_make(s->p, n), u1, u2,
+                           vf_one(), out->light, out};
+    sample_world(&d, s->active);
+    finish_sample(&d, s->active);
+}
+
+void trc_light_sample_prepared(const struct trc_surface *s, const struct trc_light_choices *choices,
+                               vfloat u_select, vfloat u1, vfloat u2,
+                               struct trc_light_sample *out) {
+    const struct trc_snapshot *scene = s->snapshot;
+    const struct trc_light_table *t = scene->lights;
+    clear_sample(out);
+    struct draw d = {scene,    t,          s,  trc_receiver_make(s->p, choices->n), u1, u2,
+                     vf_one(), vi_set(-1), out};
+    if (t->single)
+        d.light = vi_select(s->active, vi_set(single_light(t)), d.light);
+    else if (trc_candidate_count(t) > 0)
+        d.light = trc_light_choose(t, choices, &d.receiver, u_select, s->active, &d.chance);
+    const vmask chosen = vm_andnot(s->active, vi_lt(d.light, vi_set(0)));
+    if (!vm_any(chosen))
+        return;
+    out->light = vi_select(chosen, d.light, out->light);
+    const vmask lamps = vm_and(chosen, vi_lt(d.light, vi_set((int32_t)t->lamp_count)));
+    if (vm_any(lamps))
+        sample_chosen_lamps(&d, lamps);
+    if (t->kinds & 1u << TRC_KIND_WORLD) {
+        const vmask world = vm_and(chosen, vi_eq(d.light, vi_set((int32_t)t->world_light)));
+        if (vm_any(world))
+            sample_world(&d, world);
+    }
+    if (t->triangle_count) {
+        const vmask triangles =
+            vm_andnot(chosen, vi_lt(d.light, vi_set((int32_t)t->first_triangle)));
+        if (vm_any(triangles))
+            sample_triangles(&d, triangles);
+    }
+    finish_sample(&d, chosen);
+}

@@ -1,0 +1,100 @@
+/* Light sampling for TRC_WIDTH points at once. Tables are built by shading/lights.c.
+ *
+ * Numbers of lights: lamps of the scene first, then the world if it shines, then emissive
+ * triangles.
+ *
+ * What n means below: the shading normal (s->n) of a point that scatters to its upper side only, or
+ * the zero vector for one whose material lets light through (translucent, refracting lobes). Lights
+ * wholly below n are not chosen. The same n must be passed when a light is sampled and when a
+ * continuation ray of the same point asks for the weights. */
+#ifndef TRACER_KERNELS_LIGHT_LIGHT_H
+#define TRACER_KERNELS_LIGHT_LIGHT_H
+
+#include "kernels/simd/simd.h"
+#include "kernels/trace/surface.h"
+
+struct trc_light_sample {
+    vvec3 wi;        /* unit, from the point to the light */
+    vfloat distance; /* to the point on the light; TRC_FAR for the sun and the world */
+    vvec3 radiance;  /* emitted towards the point, before division by pdf; intensity form for
+                        delta lights so that contribution = radiance * f * cos / pdf */
+    vfloat density;  /* of the place, per solid angle; 1 for delta lights */
+    vfloat pdf;      /* density, times the chance of having chosen this light */
+    vmask valid;     /* pdf > 0 and radiance > 0 */
+    vmask delta;     /* point light or sun without extent: no MIS */
+    vmask no_mis;    /* continuation rays towards wi do not see this light: weight 1 */
+    vmask casts_shadow;
+    vint light; /* number for sorting shadow rays; emissive triangles and world included */
+};
+
+#define TRC_FAR 1e30f
+#define TRC_ALL_GROUPS UINT32_MAX
+
+/* Chooses a light by u_select (importance for the point) and a place on it by u1, u2, for the lanes
+ * in s->active. Lights that are hidden from diffuse, glossy and transmission alike are not chosen;
+ * for one that is hidden from some of them, trc_light_visibility tells which parts of the BSDF to
+ * leave out. */
+void trc_light_sample(const struct trc_surface *s, vvec3 n, vfloat u_select, vfloat u1, vfloat u2,
+                      struct trc_light_sample *out);
+
+/* The same for the world alone, where trc_light_table.world_apart says that trc_light_sample leaves
+ * it out. */
+void trc_light_sample_world(const struct trc_surface *s, vvec3 n, vfloat u1, vfloat u2,
+                            struct trc_light_sample *out);
+
+/* The same in two steps, for several samples of one point: what each light may give is computed
+ * once. Up to TRC_LIGHT_CHOICES_KEPT lights are remembered, further ones are computed at each
+ * sample. */
+#define TRC_LIGHT_CHOICES_KEPT 48
+struct trc_light_choices {
+    vvec3 p, n;
+    vfloat sum;
+    vfloat kept[TRC_LIGHT_CHOICES_KEPT];
+};
+void trc_light_prepare(const struct trc_surface *s, vvec3 n, struct trc_light_choices *out);
+void trc_light_sample_prepared(const struct trc_surface *s, const struct trc_light_choices *choices,
+                               vfloat u_select, vfloat u1, vfloat u2, struct trc_light_sample *out);
+
+/* The chances with which the lanes of m chose their lights. */
+vfloat trc_light_chosen(const struct trc_surface *s, vvec3 n, const struct trc_light_sample *sample,
+                        vmask m);
+
+/* Visibility bits (TRC_VISIBLE_*) of the light each lane chose, none where unblocked rays, by their
+ * path, are not to have it; all bits in lanes that chose none. When the scene's lights hide from
+ * nothing, the caller can skip it: trc_light_table.hides is false. */
+vuint trc_light_visibility(const struct trc_snapshot *snapshot,
+                           const struct trc_light_sample *sample, vuint path);
+
+/* Light seen directly by rays that were traced from p in direction wi over (tmin, tmax] (tmax
+ * TRC_FAR for a miss): area, point, spot with extent; with tmax == TRC_FAR also the sun. Lights do
+ * not occlude. bsdf_pdf: density of the bounce (solid angle); < 0 for camera rays and ideal bounces
+ * (no MIS). n: see above, of the point at p. path: TRC_VISIBLE_* | TRC_PATH_*. light_sample_count:
+ * L of the point, for the weights. group: only lamps of that light group, or TRC_ALL_GROUPS. Adds
+ * to radiance what the rays see, MIS-weighted (power heuristic). */
+void trc_light_hit(const struct trc_snapshot *snapshot, vvec3 p, vvec3 n, vvec3 wi, vfloat tmin,
+                   vfloat tmax, vfloat bsdf_pdf, vfloat light_sample_count, vuint path,
+                   uint32_t group, vmask active, vvec3 *radiance);
+
+/* The same under Cycles' clamps: what each lamp gives to a path of that weight is scaled down to
+ * the limit (kernels/light/clamp.h). */
+void trc_light_hit_clamped(const struct trc_snapshot *snapshot, vvec3 p, vvec3 n, vvec3 wi,
+                           vfloat tmin, vfloat tmax, vfloat bsdf_pdf, vfloat light_sample_count,
+                           vuint path, uint32_t group, vvec3 weight, vfloat limit, vmask active,
+                           vvec3 *radiance);
+
+/* The light group of a light, 0 for none. Numbers after the last light are ambient occlusion, which
+ * belongs to the world where it replaces its light. */
+uint32_t trc_light_group(const struct trc_snapshot *snapshot, uint32_t light);
+
+/* MIS weight of emission found on triangle lights by such rays: s is the emissive surface,
+ * p_from/n_from the point the ray left. 1 where the triangle is not sampled as a light or bsdf_pdf
+ * < 0. */
+vfloat trc_light_triangle_weight(const struct trc_surface *s, vvec3 p_from, vvec3 n_from,
+                                 vfloat bsdf_pdf, vfloat light_sample_count);
+
+/* Radiance of the world in direction wi, MIS-weighted in the same way; 0 where the world is hidden
+ * from rays of that path. */
+vvec3 trc_world_radiance(const struct trc_snapshot *snapshot, vvec3 p_from, vvec3 n_from, vvec3 wi,
+                         vfloat bsdf_pdf, vfloat light_sample_count, vuint path, vmask active);
+
+#endif

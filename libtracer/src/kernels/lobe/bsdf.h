@@ -1,0 +1,181 @@
+/* Lobes of a shading point: set up from a material's leaves, evaluated, sampled. TRC_WIDTH points
+ * at once, all of one material, so the kinds of lobes are uniform and their parameters are not.
+ *
+ * The formulas are those of Cycles in Blender 3.4, and of 4.3 for the nodes and modes that stand
+ * for it; where a lobe departs from it, bsdf.c says so. */
+#ifndef TRACER_KERNELS_LOBE_BSDF_H
+#define TRACER_KERNELS_LOBE_BSDF_H
+
+#include "kernels/program/program.h"
+#include "kernels/simd/simd.h"
+
+#define TRC_MAX_LOBES 24
+
+enum trc_lobe_kind {
+    TRC_LOBE_DIFFUSE,     /* see TRC_DIFFUSE_* */
+    TRC_LOBE_SHEEN,       /* see TRC_SHEEN_*; counts as diffuse */
+    TRC_LOBE_TRANSLUCENT, /* counts as diffuse in passes and for light visibility, as in Cycles */
+    TRC_LOBE_REFLECT,     /* microfacet reflection or ideal mirror */
+    TRC_LOBE_REFRACT,     /* microfacet refraction or ideal */
+    TRC_LOBE_TRANSPARENT  /* straight through */
+};
+
+/* trc_lobe.distribution of TRC_LOBE_DIFFUSE ... */
+enum {
+    TRC_DIFFUSE_LAMBERT,
+    TRC_DIFFUSE_OREN_NAYAR,
+    TRC_DIFFUSE_PRINCIPLED,
+    TRC_DIFFUSE_VELVET,
+    TRC_DIFFUSE_TOON,
+    TRC_DIFFUSE_ENERGY_OREN_NAYAR /* what scatters more than once is kept */
+};
+/* ... of TRC_LOBE_SHEEN ... */
+enum {
+    TRC_SHEEN_SCHLICK, /* Principled of 3.4 */
+    TRC_SHEEN_FIBRES   /* of 4.0 */
+};
+/* ... and of microfacets. MULTI_GGX: GGX with height-correlated masking and the energy of the
+ * single scattering restored, in place of Cycles' random walk. */
+enum {
+    TRC_LOBE_GGX,
+    TRC_LOBE_GTR1,
+    TRC_LOBE_BECKMANN,
+    TRC_LOBE_ASHIKHMIN,
+    TRC_LOBE_MULTI_GGX,
+    TRC_LOBE_TOON /* no microfacets: a cone about the mirror direction */
+};
+
+/* trc_lobe.fresnel: what multiplies the weight at a microfacet. */
+enum {
+    TRC_FRESNEL_NONE,      /* 1 (glass has the factor of the macro normal in its weight) */
+    TRC_FRESNEL_BLEND,     /* f0 to f90 as the dielectric of index ior goes from F(0) to 1; 1 minus
+                              it for refraction */
+    TRC_FRESNEL_F82,       /* Schlick's from f0 to 1, less f90 * cos * (1 - cos)^6 */
+    TRC_FRESNEL_DIELECTRIC /* F of ior for reflection, 1 - F for refraction */
+};
+
+/* Lanes where alpha_x * alpha_y is at or below it are ideal (Cycles 3.4 uses the same bound). */
+#define TRC_SINGULAR_ALPHA2 1e-7f
+
+struct trc_lobe {
+    enum trc_lobe_kind kind;
+    uint32_t distribution;
+    uint32_t fresnel;
+    bool correlated;  /* microfacets mask and shadow by one height, as in Cycles 4 */
+    bool anisotropic; /* tangent is set and alpha_x may differ from alpha_y */
+    vmask ideal;      /* lanes that scatter into one direction only */
+    vvec3 weight;     /* throughput colour, >= 0; 0 in lanes that do not have the lobe */
+    vvec3 n;          /* the lobe's normal */
+    vvec3 tangent;    /* unit, orthogonal to n, anisotropic lobes only; bitangent is n x tangent */
+    vfloat alpha_x, alpha_y;
+    vfloat ior;       /* refraction: relative index, transmitted over incident side */
+    vfloat roughness; /* Oren-Nayar sigma; Principled's roughness; velvet: 1 / sigma^2 */
+    /* Toon, f0: angle of full light, angle of its fading, cosine of both. Fibres, f0: the two
+     * coefficients of their transform. Oren-Nayar that keeps energy, f0: factor of the part that
+     * scatters more than once. */
+    vvec3 f0, f90;
+    vfloat cos_o;         /* n . wo */
+    vfloat g1_o;          /* masking of wo */
+    vfloat pdf_scale;     /* density of a sampled direction over D of its half vector */
+    vmask paired;         /* lanes of glass in which the sampled micro-normal decides between this
+                             lobe and its other half, each of which has half of the chance */
+    vfloat pair_tint;     /* mean colour of refraction over that of reflection, paired lanes */
+    vvec3 multi_weight;   /* MULTI_GGX: what the lobe of the missing energy is scaled by */
+    vfloat multi_chance;  /* and how often it is sampled, by cosine */
+    vfloat albedo_scale;  /* what Cycles leaves of the weight where it tells the albedo */
+    vfloat mix_weight;    /* Cycles' sample weight, of every lobe */
+    vfloat sample_weight; /* chance in proportion, 0 for lobes that are not continued */
+};
+
+struct trc_lobes {
+    int count;
+    uint32_t kinds; /* 1 << kind of every lobe */
+    struct trc_lobe lobe[TRC_MAX_LOBES];
+    vvec3 emission;         /* radiance towards wo */
+    vfloat holdout;         /* weight of holdout leaves */
+    vfloat mix_weight;      /* sum over the lobes */
+    vfloat continue_weight; /* sum of sample_weight */
+    /* Lanes where light from below the geometric surface may reach reflecting lobes;
+     * trc_lobes_setup sets none: nothing shines through. Direct light sets it for smooth surfaces,
+     * as its shadow rays start off the flat triangle. */
+    vmask below_horizon;
+};
+
+/* From a material's leaves and the registers its program left. filter_alpha: lower bound on alpha
+ * (Filter Glossy), 0 for none. Unit: weights include mix factors and alpha.
+ * (kernels/lobe/bsdf_setup.c) */
+void trc_lobes_setup(const struct trc_material *m, const struct trc_surface *s,
+                     const struct trc_registers *regs, vfloat filter_alpha, struct trc_lobes *out);
+
+/* Emission of the leaves alone: what a light sample or a world lookup needs. */
+vvec3 trc_lobes_emission(const struct trc_material *m, const struct trc_registers *regs);
+
+/* Value times cosine towards wi, split as the passes want it, without ideal lobes; pdf is the
+ * density of trc_bsdf_sample for wi over the lobes that are continued (solid angle, 0 for
+ * diffuse-only). Lanes outside active are 0. Where light samples and continuation rays share the
+ * work, the weight of a light sample (p_l^2 / (p_l^2 + pdf^2)) goes to all three parts, diffuse
+ * included: the weight of a sampled ray carries all three too. */
+struct trc_bsdf_value {
+    vvec3 diffuse, glossy, transmission;
+    vfloat pdf;
+};
+void trc_bsdf_eval(const struct trc_lobes *l, const struct trc_surface *s, vvec3 wi, vmask active,
+                   struct trc_bsdf_value *out);
+
+/* One continuation ray per lane: the lobe by u_lobe in proportion to sample_weight, the direction
+ * by u1, u2. Diffuse and sheen lobes are never continued; transparent and translucent are.
+ *
+ * Two throughputs. weight is for the emission, lamps and world that the ray itself finds (through
+ * transparent surfaces too), with MIS against light samples: unbiased. Everything behind the next
+ * surface gets weight * beyond. beyond differs from 1 only where a rough lobe shares its direction
+ * with lobes that are not continued: Cycles picks one lobe, diffuse ones included, and weights the
+ * pick by the densities of all of them (balance heuristic); with diffuse bounces 0 the picks of
+ * diffuse lobes then end, so the others carry S(wi) / P(wi), S the densities of continued lobes and
+ * P of all. A picture without that factor would be "right" and differ from Cycles' by several per
+ * cent on rough Principled materials. */
+struct trc_bsdf_sample {
+    vvec3 wi;      /* unit */
+    vvec3 weight;  /* value * cos / pdf, over all lobes for rough ones, for this lobe if ideal */
+    vfloat beyond; /* 1 for ideal and transparent ones */
+    vfloat pdf;    /* as in trc_bsdf_eval; 0 where ideal or transparent */
+    vmask valid;   /* the ray is worth tracing */
+    vmask singular, transparent,
+        transmitted;  /* transmitted: to the other side, incl. translucent */
+    vmask diffuse;    /* the lobe was translucent: a diffuse transmission ray */
+    vfloat alpha_min; /* sqrt(alpha_x * alpha_y) of the lobe, for Filter Glossy; 1 if translucent */
+};
+void trc_bsdf_sample(const struct trc_lobes *l, const struct trc_surface *s, vfloat u_lobe,
+                     vfloat u1, vfloat u2, struct trc_bsdf_sample *out);
+
+/* Whitted: the same for lobe number i alone (weight not divided by a choice; rough lobes are taken
+ * along their ideal direction). valid is none for lobes that are not continued. */
+void trc_bsdf_ideal(const struct trc_lobes *l, int i, const struct trc_surface *s,
+                    struct trc_bsdf_sample *out);
+
+/* Albedo of the lobes for the colour passes: diffuse, glossy, transmission. As Cycles: the weights,
+ * without what a Fresnel factor or masking takes; of correlated lobes with the Fresnel factor. */
+void trc_bsdf_albedo(const struct trc_lobes *l, const struct trc_surface *s, vvec3 albedo_out[3]);
+
+/* What a denoiser is told of a surface, as Cycles chooses it: the mean normal of the lobes by their
+ * mix_weight, and the albedo, Fresnel factors included, of those too rough to show another surface.
+ * is_told: lanes where rough lobes are more than a quarter of all, or where there are none at all;
+ * elsewhere the denoiser is told of what is seen through or mirrored. */
+struct trc_denoising_features {
+    vvec3 normal, albedo;
+    vmask is_told;
+};
+void trc_lobes_features(const struct trc_lobes *l, const struct trc_surface *s,
+                        struct trc_denoising_features *out);
+
+/* What ambient light meets: the weights of diffuse lobes, translucent ones too, and the mean of
+ * their normals, the shading normal without any. */
+vvec3 trc_lobes_diffuse(const struct trc_lobes *l, const struct trc_surface *s, vvec3 *normal_out);
+
+/* Albedo of the single-scattering part of an energy-keeping Oren-Nayar lobe. (kernels/lobe/bsdf.c)
+ */
+vfloat trc_oren_nayar_albedo(vfloat sigma, vfloat cosine);
+
+/* Sum of transparent weights: what a shadow ray or the film's alpha sees through. */
+vvec3 trc_lobes_transparency(const struct trc_lobes *l);
+
+#endif

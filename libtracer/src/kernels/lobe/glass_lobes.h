@@ -1,0 +1,142 @@
+/* Glass: the lobes that reflect and refract, and how they share the light. A part of bsdf_setup.c.
+ */
+#ifndef TRACER_KERNELS_LOBE_GLASS_LOBES_H
+#define TRACER_KERNELS_LOBE_GLASS_LOBES_H
+
+/* One of the two lobes of glass. */
+static struct trc_lobe *add_dielectric(struct setup *c, enum trc_lobe_kind kind, vvec3 weight,
+                                       vvec3 n, vfloat alpha, vfloat eta, uint32_t mode) {
+    struct trc_lobe *lobe = add_lobe(c, kind, weight);
+    if (!lobe)
+        return NULL;
+    const uint32_t distribution = distribution_of(mode);
+    lobe->distribution = distribution == TRC_LOBE_BECKMANN ? TRC_LOBE_BECKMANN : TRC_LOBE_GGX;
+    lobe->correlated = mode & TRC_DISTRIBUTION_CORRELATED;
+    lobe->n = n;
+    lobe->alpha_x = lobe->alpha_y = alpha;
+    lobe->ior = eta;
+    finish_microfacets(c, lobe, is_sharp(mode));
+    return lobe;
+}
+
+/* Chances of two lobes that have the factor of the micro-normal, f that of the normal. Where both
+ * are rough they share micro-normals, each of which reflects as often as it should
+ * (kernels/lobe/bsdf.c): with chances by the normal, a path within glass gained or lost weight at
+ * every bounce, and after 30 of them a few paths carried most of the light (15 times the squared
+ * error at 256 samples). */
+static void share_chances(struct trc_lobe *reflect, struct trc_lobe *refract, vfloat f) {
+    if (reflect)
+        reflect->mix_weight = reflect->mix_weight * f;
+    if (refract)
+        refract->mix_weight = refract->mix_weight * (vf_one() - f);
+    if (!reflect || !refract)
+        return;
+    const vfloat reflected = v3_average(reflect->weight), refracted = v3_average(refract->weight);
+    const vmask both = vm_and(vf_gt(reflected, vf_zero()), vf_gt(refracted, vf_zero()));
+    const vmask paired = vm_andnot(both, vm_or(reflect->ideal, refract->ideal));
+    const vfloat half = vf_set(0.5f) * (reflect->mix_weight + refract->mix_weight);
+    reflect->mix_weight = vf_select(paired, half, reflect->mix_weight);
+    refract->mix_weight = vf_select(paired, half, refract->mix_weight);
+    reflect->pdf_scale = vf_select(paired, refract->pdf_scale, reflect->pdf_scale);
+    reflect->paired = refract->paired = paired;
+    reflect->pair_tint = refract->pair_tint = vf_divide(refracted, reflected);
+}
+
+/* What single scattering keeps; all where finish_microfacets makes refraction ideal, for the index
+ * is that of what is around. */
+static vfloat kept_by_glass(vfloat albedo, vfloat eta) {
+    const vmask is_nothing = vf_lt(vf_abs(eta - vf_one()), vf_set(NO_REFRACTION));
+    return vf_select(is_nothing, vf_one(), albedo);
+}
+
+/* Multiple-scattering glass: both lobes with the factor of the micro-normal, scaled so that they
+ * keep all energy together. reflected, refracted: colours of the lobes. */
+static void add_multi_glass(struct setup *c, vvec3 weight, vvec3 reflected, vvec3 refracted,
+                            vvec3 n, vfloat alpha, vfloat eta) {
+    /* As rough as the lobes will be: a filtered one keeps its energy too. */
+    const vfloat rough = vf_max(vf_clamp(alpha, 1e-4f, 1.0f), c->filter_alpha);
+    const vfloat kept = kept_by_glass(trc_glass_albedo(v3_dot(n, c->s->wo), rough, eta), eta);
+    /* What does not get away is coloured again at every further bounce: a geometric series. */
+    const vfloat share = trc_glass_reflected_share(v3_dot(n, c->s->wo), rough, eta);
+    const vvec3 colors = v3_lerp(refracted, reflected, vf_clamp(share, 0.05f, 0.95f));
+    const vvec3 again = v3_scale(colors, vf_one() - kept);
+    const vfloat least = vf_set(0.1f), one = vf_one();
+    const vvec3 gain =
+        v3(vf_rcp(vf_max(one - again.x, least)), vf_rcp(vf_max(one - again.y, least)),
+           vf_rcp(vf_max(one - again.z, least)));
+    const vvec3 w = v3_mul(weight, gain);
+    struct trc_lobe *reflect = add_dielectric(c, TRC_LOBE_REFLECT, v3_mul(w, reflected), n, rough,
+                                              eta, TRC_DISTRIBUTION_GGX);
+    if (reflect)
+        reflect->fresnel = TRC_FRESNEL_DIELECTRIC;
+    struct trc_lobe *refract = add_dielectric(c, TRC_LOBE_REFRACT, v3_mul(w, refracted), n, rough,
+                                              eta, TRC_DISTRIBUTION_GGX);
+    if (refract)
+        refract->fresnel = TRC_FRESNEL_DIELECTRIC;
+    share_chances(reflect, refract, trc_fresnel_dielectric(v3_dot(n, c->s->wo), eta));
+}
+
+/* The factor of the micro-normal goes from f0 to 1; kept: what single scattering keeps. */
+static void blend_dielectric(struct trc_lobe *lobe, vvec3 f0, vfloat kept) {
+    lobe->fresnel = TRC_FRESNEL_BLEND;
+    lobe->f0 = f0;
+    lobe->f90 = v3_splat(vf_one());
+    lobe->albedo_scale = kept;
+    lobe->mix_weight = lobe->mix_weight * kept;
+}
+
+/* Glass of Cycles 4: both lobes with the factor of the micro-normal, which goes from f0 to 1. */
+static void add_correlated_glass(struct setup *c, vvec3 reflected, vvec3 refracted, vvec3 f0,
+                                 vvec3 n, vfloat alpha, vfloat eta, uint32_t mode) {
+    const vfloat cos_o = v3_dot(n, c->s->wo);
+    vfloat kept = vf_one();
+    if (distribution_of(mode) == TRC_LOBE_MULTI_GGX) {
+        kept = kept_by_glass(trc_correlated_glass_albedo(cos_o, alpha, eta), eta);
+        kept = vf_max(kept, vf_set(0.1f));
+        reflected = v3_scale(reflected, vf_rcp(kept));
+        refracted = v3_scale(refracted, vf_rcp(kept));
+    }
+    struct trc_lobe *reflect = add_dielectric(c, TRC_LOBE_REFLECT, reflected, n, alpha, eta, mode);
+    if (reflect)
+        blend_dielectric(reflect, f0, kept);
+    struct trc_lobe *refract = add_dielectric(c, TRC_LOBE_REFRACT, refracted, n, alpha, eta, mode);
+    if (refract)
+        blend_dielectric(refract, f0, kept);
+    const vfloat blend = vf_saturate(trc_fresnel_blend(cos_o, eta));
+    share_chances(reflect, refract, v3_average(v3_lerp(f0, v3_splat(vf_one()), blend)));
+}
+
+/* Of a Fresnel factor what is reflected: the part of a lobe too light to be kept goes to the other.
+ * Cycles refracts at least 1e-4, and so gives that much more than it gets. */
+static vfloat reflected_part(vfloat f) {
+    const vfloat least = vf_set(WEIGHT_CUTOFF);
+    return vf_where(vf_ge(f, least), vf_select(vf_lt(vf_one() - f, least), vf_one(), f));
+}
+
+static void add_glass(struct setup *c, const struct trc_leaf *leaf, vfloat weight) {
+    const vvec3 tint = v3_scale(colour(c, leaf, 0), weight);
+    const vvec3 n = leaf_normal(c, leaf, 5);
+    const vfloat alpha = vf_square(number(c, leaf, 3));
+    const vfloat eta = relative_ior(c, number(c, leaf, 4));
+    if (leaf->mode & TRC_DISTRIBUTION_CORRELATED) {
+        add_correlated_glass(c, tint, tint, v3_splat(trc_fresnel_normal(eta)), n,
+                             vf_saturate(alpha), eta, leaf->mode);
+        return;
+    }
+    if (leaf->mode == TRC_DISTRIBUTION_MULTI_GGX) {
+        const vvec3 color = v3_saturate(colour(c, leaf, 0));
+        add_multi_glass(c, v3_splat(weight), color, color, n, alpha, eta);
+        return;
+    }
+    const vfloat f = reflected_part(trc_fresnel_dielectric(v3_dot(n, c->s->wo), eta));
+    add_dielectric(c, TRC_LOBE_REFLECT, v3_scale(tint, f), n, alpha, eta, leaf->mode);
+    add_dielectric(c, TRC_LOBE_REFRACT, v3_scale(tint, vf_one() - f), n, alpha, eta, leaf->mode);
+}
+
+static void add_refraction(struct setup *c, const struct trc_leaf *leaf, vfloat weight) {
+    add_dielectric(c, TRC_LOBE_REFRACT, v3_scale(colour(c, leaf, 0), weight),
+                   leaf_normal(c, leaf, 5), vf_square(number(c, leaf, 3)),
+                   relative_ior(c, number(c, leaf, 4)), leaf->mode);
+}
+
+#endif

@@ -1,0 +1,508 @@
+/* Operations that read the shading point, its object, its mesh and the camera.
+ *
+ * Lanes may be on different objects: what belongs to an object is done once for each object among
+ * the lanes, with the others masked off. Hits come sorted, so mostly there is one. Meanings are
+ * those of Cycles 3.4. Departures: Generated coordinates and tangents come from the mesh as it is
+ * rendered, not from its undeformed shape; tangents of normal maps are made from the triangle's own
+ * UVs, projected to the normal of each corner as MikkTSpace does but not averaged between
+ * triangles. */
+#ifndef TRACER_KERNELS_PROGRAM_INPUT_H
+#define TRACER_KERNELS_PROGRAM_INPUT_H
+
+#include "kernels/program/math.h"
+#include "kernels/trace/mesh_fetch.h"
+#include "kernels/trace/surface.h"
+
+/* ---- objects among the lanes ---- */
+
+struct lane_group {
+    uint32_t rest; /* lanes still to come */
+    vmask lanes;
+    const struct trc_instance *instance; /* NULL: the world */
+    const struct trc_mesh *mesh;
+};
+
+TRC_INLINE struct lane_group groups_begin(const struct trc_surface *s) {
+    return (struct lane_group){.rest = vm_bits(s->active)};
+}
+TRC_INLINE bool groups_next(const struct trc_surface *s, struct lane_group *g) {
+    if (!g->rest)
+        return false;
+    const int32_t id = vi_get(s->instance, __builtin_ctz(g->rest));
+    g->lanes = vm_and(vi_eq(s->instance, vi_set(id)), vm_from_bits(g->rest));
+    g->rest &= ~vm_bits(g->lanes);
+    g->instance = id >= 0 ? &s->snapshot->instances[id] : NULL;
+    g->mesh = g->instance ? s->snapshot->meshes[g->instance->mesh] : NULL;
+    return true;
+}
+
+static void affine_inverse(const struct trc_wide_affine *a, struct trc_wide_affine *out) {
+    const vvec3 *c = a->column;
+    const vvec3 r0 = v3_cross(c[1], c[2]), r1 = v3_cross(c[2], c[0]), r2 = v3_cross(c[0], c[1]);
+    const vfloat scale = vf_divide(vf_one(), v3_dot(c[0], r0)); /* rows of the inverse */
+    out->column[0] = v3_scale(v3(r0.x, r1.x, r2.x), scale);
+    out->column[1] = v3_scale(v3(r0.y, r1.y, r2.y), scale);
+    out->column[2] = v3_scale(v3(r0.z, r1.z, r2.z), scale);
+    out->origin = v3_neg(trc_transform_vector(out, a->origin));
+}
+
+/* In place of the inverse of a matrix that is flat at a lane's time: between those of the keys. */
+static void mend_inverse(const struct trc_instance *instance, const struct trc_wide_affine *a,
+                         vfloat time, struct trc_wide_affine *m) {
+    struct trc_wide_affine between;
+    trc_load_keys(instance->world_to_object, instance->key_count, time, &between);
+    const vvec3 *c = a->column;
+    const vvec3 cofactors = v3_cross(c[1], c[2]);
+    const vfloat volume = vf_abs(v3_dot(c[0], cofactors));
+    const vfloat most = v3_dot(v3_abs(c[0]), v3_abs(cofactors));
+    /* A few digits more than the sum of three products leaves: 2^-20. */
+    const vmask flat = vf_le(volume, most * vf_set(0x1p-20f));
+    for (int k = 0; k < 3; k++)
+        m->column[k] = v3_select(flat, between.column[k], m->column[k]);
+    m->origin = v3_select(flat, between.origin, m->origin);
+}
+
+/* The inverse of an instance's matrix at the lanes' times. */
+static void load_world_to_object(const struct lane_group *g, vfloat time,
+                                 struct trc_wide_affine *m) {
+    if (g->instance->key_count < 2) {
+        const float *e = g->instance->world_to_object->m;
+        for (int i = 0; i < 3; i++)
+            m->column[i] = v3(vf_set(e[i]), vf_set(e[4 + i]), vf_set(e[8 + i]));
+        m->origin = v3(vf_set(e[3]), vf_set(e[7]), vf_set(e[11]));
+        return;
+    }
+    struct trc_wide_affine a;
+    trc_load_affine(g->instance, time, &a);
+    affine_inverse(&a, m);
+    if (g->instance->is_thin)
+        mend_inverse(g->instance, &a, time, m);
+}
+
+/* By the transposed matrix, unit: a normal from world to object space. */
+static vvec3 normal_to_object(const struct trc_wide_affine *object_to_world, vvec3 n) {
+    const vvec3 *c = object_to_world->column;
+    return v3_normalize(v3(v3_dot(c[0], n), v3_dot(c[1], n), v3_dot(c[2], n)));
+}
+/* By the inverse transposed matrix, unit: a normal from object to world space. Columns are scaled
+ * first, so that their products neither overflow nor vanish. */
+static vvec3 normal_to_world(const struct trc_wide_affine *object_to_world, vvec3 n) {
+    vvec3 c[3];
+    vfloat most = vf_zero();
+    for (int k = 0; k < 3; k++)
+        most = vf_max(most, v3_max(v3_abs(object_to_world->column[k])));
+    for (int k = 0; k < 3; k++) {
+        c[k] = v3_scale(object_to_world->column[k], vf_divide(vf_one(), most));
+    }
+    const vvec3 x = v3_cross(c[1], c[2]), y = v3_cross(c[2], c[0]), z = v3_cross(c[0], c[1]);
+    const vvec3 sum = v3_mad(x, n.x, v3_mad(y, n.y, v3_scale(z, n.z)));
+    const vfloat determinant = v3_dot(c[0], x);
+    return v3_scale(v3_normalize(sum), vf_copysign(vf_one(), determinant));
+}
+
+/* ---- the triangle ---- */
+
+/* Weights of the corners. */
+TRC_INLINE vvec3 corner_weights(const struct trc_surface *s) {
+    return v3(vf_one() - s->u - s->v, s->u, s->v);
+}
+TRC_INLINE vvec3 corners_mix(vvec3 weights, const vvec3 c[3]) {
+    return v3_mad(c[2], weights.z, v3_mad(c[1], weights.y, v3_scale(c[0], weights.x)));
+}
+
+/* Attribute of a name; TRC_NO_RESOURCE: the default UV map or, for width 4, the first colour. */
+static const struct trc_attribute *mesh_attribute(const struct trc_mesh *mesh, uint32_t name,
+                                                  uint32_t width) {
+    if (name == TRC_NO_RESOURCE && width == 2) {
+        return mesh->default_uv >= 0 ? &mesh->attributes[mesh->default_uv] : NULL;
+    }
+    for (uint32_t i = 0; i < mesh->attribute_count; i++) {
+        const struct trc_attribute *a = &mesh->attributes[i];
+        if (name == TRC_NO_RESOURCE ? a->width == width : a->name == name)
+            return a;
+    }
+    return NULL;
+}
+
+/* Component c of an attribute at the three corners. */
+TRC_INLINE void attribute_corners(const struct trc_attribute *a, uint32_t c, vint triangle,
+                                  vmask lanes, vfloat out[3]) {
+    const vint first = triangle * vi_set((int32_t)(3 * a->width));
+    for (uint32_t k = 0; k < 3; k++)
+        out[k] = vf_gather(a->values + k * a->width + c, first, lanes);
+}
+
+/* ---- attributes ---- */
+
+static void op_uv(const struct trc_surface *s, uint32_t name, vfloat *out) {
+    const vvec3 w = corner_weights(s);
+    out[0] = out[1] = vf_zero();
+    struct lane_group g = groups_begin(s);
+    while (groups_next(s, &g)) {
+        const struct trc_attribute *a = g.mesh ? mesh_attribute(g.mesh, name, 2) : NULL;
+        for (uint32_t c = 0; a && c < 2; c++) {
+            vfloat corner[3];
+            attribute_corners(a, c, s->triangle, g.lanes, corner);
+            const vfloat value = corner[1] * w.y + corner[2] * w.z + corner[0] * w.x;
+            out[c] = vf_select(g.lanes, value, out[c]);
+        }
+    }
+}
+
+/* The smaller singular value of the map from the triangle to its UVs: what they change by per metre
+ * in the direction in which they change least. */
+static vfloat op_uv_density(const struct trc_surface *s, uint32_t name) {
+    vfloat out = vf_zero();
+    if (!vm_any(vm_and(s->active, vf_gt(s->footprint, vf_zero()))))
+        return out; /* lookups stand for points */
+    struct lane_group g = groups_begin(s);
+    while (groups_next(s, &g)) {
+        const struct trc_attribute *a = g.mesh ? mesh_attribute(g.mesh, name, 2) : NULL;
+        if (!a || !trc_mesh_in_reach(g.mesh))
+            continue;
+        struct trc_corners p;
+        struct trc_wide_affine m;
+        vint index[3];
+        vfloat u[3], v[3];
+        trc_load_indices(g.mesh, s->triangle, g.lanes, index);
+        trc_load_vectors(g.mesh->positions, index, g.mesh->vertex_count, g.mesh->key_count, s->time,
+                         g.lanes, &p);
+        trc_load_affine(g.instance, s->time, &m);
+        attribute_corners(a, 0, s->triangle, g.lanes, u);
+        attribute_corners(a, 1, s->triangle, g.lanes, v);
+        const vvec3 e1 = trc_transform_vector(&m, v3_sub(p.corner[1], p.corner[0]));
+        const vvec3 e2 = trc_transform_vector(&m, v3_sub(p.corner[2], p.corner[0]));
+        const vfloat u1 = u[1] - u[0], u2 = u[2] - u[0], v1 = v[1] - v[0], v2 = v[2] - v[0];
+        const vfloat e11 = v3_dot(e1, e1), e12 = v3_dot(e1, e2), e22 = v3_dot(e2, e2);
+        /* Trace and determinant of the map times its transpose, times that of the edges. */
+        const vfloat area2 = e11 * e22 - e12 * e12, uv_area = u1 * v2 - u2 * v1;
+        const vfloat trace = (u1 * u1 + v1 * v1) * e22 - vf_set(2.0f) * (u1 * u2 + v1 * v2) * e12 +
+                             (u2 * u2 + v2 * v2) * e11;
+        const vfloat determinant = uv_area * uv_area * area2;
+        const vfloat root = vf_safe_sqrt(trace * trace - vf_set(4.0f) * determinant);
+        const vfloat least = vf_divide(vf_set(2.0f) * uv_area * uv_area, trace + root);
+        out = vf_select(vm_and(g.lanes, vf_lt(least, vf_set(INFINITY))), vf_safe_sqrt(least), out);
+    }
+    return out;
+}
+
+/* Black and transparent where the mesh does not have it. */
+static void op_color_attribute(const struct trc_surface *s, uint32_t name, vfloat *out) {
+    const vvec3 w = corner_weights(s);
+    for (int c = 0; c < 4; c++)
+        out[c] = vf_zero();
+    struct lane_group g = groups_begin(s);
+    while (groups_next(s, &g)) {
+        const struct trc_attribute *a = g.mesh ? mesh_attribute(g.mesh, name, 4) : NULL;
+        for (uint32_t c = 0; a && c < a->width; c++) {
+            vfloat corner[3];
+            attribute_corners(a, c, s->triangle, g.lanes, corner);
+            const vfloat value = corner[1] * w.y + corner[2] * w.z + corner[0] * w.x;
+            out[c] = vf_select(g.lanes, value, out[c]);
+        }
+        if (a && a->width < 4)
+            out[3] = vf_select(g.lanes, vf_one(), out[3]);
+    }
+}
+
+/* ---- texture coordinates ---- */
+
+/* Without coordinates of the mesh's own, Blender's default texture space: the bounding box becomes
+ * the unit cube; a flat side becomes 0.5. */
+static vvec3 generated_of_group(const struct trc_surface *s, const struct lane_group *g) {
+    const struct trc_mesh *mesh = g->mesh;
+    vint index[3];
+    struct trc_corners c;
+    trc_load_indices(mesh, s->triangle, g->lanes, index);
+    const float *values = mesh->generated ? mesh->generated : mesh->positions;
+    trc_load_vectors(values, index, mesh->vertex_count, 1, s->time, g->lanes, &c);
+    const vvec3 p = corners_mix(corner_weights(s), c.corner);
+    if (mesh->generated)
+        return p;
+    const vfloat co[3] = {p.x, p.y, p.z};
+    vfloat out[3];
+    for (int axis = 0; axis < 3; axis++) {
+        const float low = mesh->bounds_lower[axis], high = mesh->bounds_upper[axis];
+        const float half = 0.5f * (high - low), center = 0.5f * (low + high);
+        const float scale = half == 0.0f ? 0.5f : 0.5f / (half < 1e-5f ? 1e-5f : half);
+        out[axis] = co[axis] * vf_set(scale) - vf_set(center * scale - 0.5f);
+    }
+    return v3_read(out);
+}
+
+static vvec3 op_generated(const struct trc_surface *s) {
+    vvec3 out = s->p; /* the world: the direction */
+    struct lane_group g = groups_begin(s);
+    while (groups_next(s, &g)) {
+        if (g.mesh)
+            out = v3_select(g.lanes, generated_of_group(s, &g), out);
+    }
+    return out;
+}
+
+static vvec3 op_object_position(const struct trc_surface *s) {
+    vvec3 out = s->p;
+    struct lane_group g = groups_begin(s);
+    while (groups_next(s, &g)) {
+        if (!g.instance)
+            continue;
+        struct trc_wide_affine a;
+        load_world_to_object(&g, s->time, &a);
+        out = v3_select(g.lanes, trc_transform_point(&a, s->p), out);
+    }
+    return out;
+}
+
+static vvec3 op_object_normal(const struct trc_surface *s) {
+    vvec3 out = s->n;
+    struct lane_group g = groups_begin(s);
+    while (groups_next(s, &g)) {
+        if (!g.instance)
+            continue;
+        struct trc_wide_affine a;
+        trc_load_affine(g.instance, s->time, &a);
+        out = v3_select(g.lanes, normal_to_object(&a, s->n), out);
+    }
+    return out;
+}
+
+/* The camera at the middle of the shutter, looking along +Z as in Cycles. Without a camera it
+ * stands at the origin. */
+static void load_camera_to_world(const struct trc_snapshot *snapshot, struct trc_wide_affine *m) {
+    const struct trc_camera *camera = &snapshot->camera;
+    uint32_t key = 0;
+    float f = 0.0f, e[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+    if (snapshot->has_camera) {
+        trc_key_at(0.5f, camera->key_count, &key, &f);
+        const float *a = camera->camera_to_world[key].m;
+        const float *b = camera->camera_to_world[key + (camera->key_count > 1)].m;
+        for (int i = 0; i < 12; i++)
+            e[i] = a[i] + f * (b[i] - a[i]);
+    }
+    for (int i = 0; i < 3; i++)
+        m->column[i] = v3(vf_set(e[i]), vf_set(e[4 + i]), vf_set(e[8 + i]));
+    m->column[2] = v3_neg(m->column[2]);
+    m->origin = v3(vf_set(e[3]), vf_set(e[7]), vf_set(e[11]));
+}
+
+static void load_world_to_camera(const struct trc_snapshot *snapshot, struct trc_wide_affine *m) {
+    struct trc_wide_affine to_world;
+    load_camera_to_world(snapshot, &to_world);
+    affine_inverse(&to_world, m);
+}
+
+/* Lanes in the world have a direction for a position: it is seen from the camera's place. */
+static vvec3 op_camera_position(const struct trc_surface *s) {
+    struct trc_wide_affine a;
+    load_world_to_camera(s->snapshot, &a);
+    const vmask world = vi_lt(s->instance, vi_set(0));
+    return v3_select(world, trc_transform_vector(&a, s->p), trc_transform_point(&a, s->p));
+}
+
+static void op_window(const struct trc_surface *s, vfloat *out) {
+    const struct trc_camera *camera = &s->snapshot->camera;
+    out[0] = out[1] = vf_zero();
+    if (!s->snapshot->has_camera)
+        return;
+    uint32_t key;
+    float f;
+    trc_key_at(0.5f, camera->key_count, &key, &f);
+    const uint32_t next = key + (camera->key_count > 1);
+    float window[4];
+    for (int i = 0; i < 4; i++) {
+        window[i] =
+            camera->windows[key][i] + f * (camera->windows[next][i] - camera->windows[key][i]);
+    }
+    const vvec3 p = op_camera_position(s);
+    const bool perspective = camera->type == TRC_CAMERA_PERSPECTIVE;
+    const vfloat x = perspective ? vf_divide(p.x, p.z) : p.x;
+    const vfloat y = perspective ? vf_divide(p.y, p.z) : p.y;
+    out[0] = (x - vf_set(window[0])) * vf_set(1.0f / (window[1] - window[0]));
+    out[1] = (y - vf_set(window[2])) * vf_set(1.0f / (window[3] - window[2]));
+}
+
+/* A point, vector or normal from one space to another. In the world there is no object space. */
+static vvec3 op_transform(const struct trc_surface *s, uint32_t mode, vvec3 v) {
+    const uint32_t way = mode & 3u;
+    const bool is_point = mode & TRC_TRANSFORM_POINT;
+    struct trc_wide_affine a;
+    if (way == TRC_TRANSFORM_WORLD_TO_CAMERA || way == TRC_TRANSFORM_CAMERA_TO_WORLD) {
+        if (way == TRC_TRANSFORM_WORLD_TO_CAMERA)
+            load_world_to_camera(s->snapshot, &a);
+        else
+            load_camera_to_world(s->snapshot, &a);
+        return is_point ? trc_transform_point(&a, v) : trc_transform_vector(&a, v);
+    }
+    vvec3 out = v;
+    struct lane_group g = groups_begin(s);
+    while (groups_next(s, &g)) {
+        if (!g.instance)
+            continue;
+        if (way == TRC_TRANSFORM_WORLD_TO_OBJECT)
+            load_world_to_object(&g, s->time, &a);
+        else
+            trc_load_affine(g.instance, s->time, &a);
+        vvec3 moved;
+        if (mode & TRC_TRANSFORM_NORMAL)
+            moved = normal_to_world(&a, v);
+        else
+            moved = is_point ? trc_transform_point(&a, v) : trc_transform_vector(&a, v);
+        out = v3_select(g.lanes, moved, out);
+    }
+    return out;
+}
+
+/* 1 within half the size of an edge of the triangle, both in world space. */
+static vfloat op_wireframe(const struct trc_surface *s, vfloat size) {
+    const vfloat reach2 = vf_square(size * vf_set(0.5f));
+    vmask out = vm_none();
+    struct lane_group g = groups_begin(s);
+    while (groups_next(s, &g)) {
+        if (!g.mesh)
+            continue;
+        vint index[3];
+        struct trc_corners c;
+        struct trc_wide_affine a;
+        trc_load_indices(g.mesh, s->triangle, g.lanes, index);
+        trc_load_vectors(g.mesh->positions, index, g.mesh->vertex_count, g.mesh->key_count, s->time,
+                         g.lanes, &c);
+        trc_load_affine(g.instance, s->time, &a);
+        for (int k = 0; k < 3; k++)
+            c.corner[k] = trc_transform_point(&a, c.corner[k]);
+        for (int k = 0; k < 3; k++) {
+            const vvec3 edge = v3_sub(c.corner[k], c.corner[(k + 2) % 3]);
+            const vvec3 across = v3_cross(edge, v3_sub(s->p, c.corner[k]));
+            const vmask near = vf_lt(v3_dot(across, across), v3_dot(edge, edge) * reach2);
+            out = vm_or(out, vm_and(g.lanes, near));
+        }
+    }
+    return vf_truth(out);
+}
+
+TRC_INLINE vvec3 op_reflection(const struct trc_surface *s) {
+    const vmask world = vi_lt(s->instance, vi_set(0));
+    const vvec3 mirrored = v3_sub(v3_scale(s->n, vf_set(2.0f) * v3_dot(s->n, s->wo)), s->wo);
+    return v3_select(world, s->wo, mirrored);
+}
+
+/* ---- the object ---- */
+
+static vvec3 op_object_location(const struct trc_surface *s) {
+    vvec3 out = v3_zero();
+    struct lane_group g = groups_begin(s);
+    while (groups_next(s, &g)) {
+        if (!g.instance)
+            continue;
+        struct trc_wide_affine a;
+        trc_load_affine(g.instance, s->time, &a);
+        out = v3_select(g.lanes, a.origin, out);
+    }
+    return out;
+}
+
+/* A number of each lane's object; 0 in the world. which: 0-3 colour, 4 index, 5 random. */
+static vfloat object_number(const struct trc_surface *s, int which) {
+    vfloat out = vf_zero();
+    struct lane_group g = groups_begin(s);
+    while (groups_next(s, &g)) {
+        if (!g.instance)
+            continue;
+        const float value = which < 4    ? g.instance->color[which]
+                            : which == 4 ? (float)g.instance->pass_index
+                                         : g.instance->random;
+        out = vf_select(g.lanes, vf_set(value), out);
+    }
+    return out;
+}
+
+static void op_instance_values(const struct trc_surface *s, uint32_t first, vfloat out[3]) {
+    for (uint32_t c = 0; c < 3; c++)
+        out[c] = vf_zero();
+    struct lane_group g = groups_begin(s);
+    while (groups_next(s, &g)) {
+        for (uint32_t c = 0; g.instance && c < 3 && first + c < g.instance->value_count; c++)
+            out[c] = vf_select(g.lanes, vf_set(g.instance->values[first + c]), out[c]);
+    }
+}
+
+/* ---- the ray ---- */
+
+TRC_INLINE vfloat path_bit(const struct trc_surface *s, uint32_t bit) {
+    const vint masked = (vint)(s->path & vu_set(bit));
+    return vf_truth(vm_not(vi_eq(masked, vi_set(0))));
+}
+
+/* Cycles' camera rays start at the near clip, ours at the camera. */
+static vfloat op_ray_length(const struct trc_surface *s) {
+    const struct trc_camera *camera = &s->snapshot->camera;
+    const vmask seen =
+        vi_eq((vint)(s->path & vu_set(TRC_VISIBLE_CAMERA)), vi_set(TRC_VISIBLE_CAMERA));
+    if (!s->snapshot->has_camera || !vm_any(seen))
+        return s->ray_length;
+    struct trc_wide_affine to_world, to_camera;
+    trc_load_keys(camera->camera_to_world, camera->key_count, s->time, &to_world);
+    affine_inverse(&to_world, &to_camera);
+    const vvec3 back = v3_normalize(trc_transform_vector(&to_camera, s->wo));
+    const vfloat near = vf_divide(vf_set(camera->clip_start), back.z);
+    return vf_select(seen, s->ray_length - near, s->ray_length);
+}
+
+static vfloat op_light_path(const struct trc_surface *s, uint32_t mode) {
+    switch (mode) {
+    case TRC_PATH_IS_CAMERA:
+        return path_bit(s, TRC_VISIBLE_CAMERA);
+    case TRC_PATH_IS_SHADOW:
+        return path_bit(s, TRC_VISIBLE_SHADOW);
+    case TRC_PATH_IS_DIFFUSE:
+        return path_bit(s, TRC_VISIBLE_DIFFUSE);
+    case TRC_PATH_IS_GLOSSY:
+        /* As in Cycles also what was refracted, unlike for visibility. */
+        return path_bit(s, TRC_VISIBLE_GLOSSY | TRC_VISIBLE_TRANSMISSION);
+    case TRC_PATH_IS_SINGULAR:
+        return path_bit(s, TRC_PATH_SINGULAR);
+    case TRC_PATH_IS_REFLECTION:
+        return path_bit(s, TRC_PATH_REFLECTED);
+    case TRC_PATH_IS_TRANSMISSION:
+        return path_bit(s, TRC_VISIBLE_TRANSMISSION);
+    case TRC_PATH_RAY_LENGTH:
+        return op_ray_length(s);
+    case TRC_PATH_DEPTH:
+        return vi_to_float(s->depth);
+    case TRC_PATH_DIFFUSE_DEPTH:
+        return vi_to_float(s->diffuse_depth);
+    case TRC_PATH_GLOSSY_DEPTH:
+        return vi_to_float(s->glossy_depth);
+    case TRC_PATH_TRANSPARENT_DEPTH:
+        return vi_to_float(s->transparent_depth);
+    case TRC_PATH_TRANSMISSION_DEPTH:
+        return vi_to_float(s->transmission_depth);
+    default:
+        return vf_zero();
+    }
+}
+
+/* Reflectance of a smooth dielectric of relative index eta. */
+static vfloat fresnel_dielectric(vfloat cosine, vfloat eta) {
+    const vfloat one = vf_one(), c = vf_abs(cosine), square = eta * eta - one + c * c;
+    const vmask passes = vf_gt(square, vf_zero());
+    const vfloat g = vf_sqrt(vf_select(passes, square, one));
+    const vfloat a = (g - c) / (g + c), b = (c * (g + c) - one) / (c * (g - c) + one);
+    return vf_select(passes, vf_set(0.5f) * a * a * (one + b * b), one);
+}
+
+TRC_INLINE vfloat op_fresnel(const struct trc_surface *s, vfloat ior, vvec3 n) {
+    const vfloat eta = vf_max(ior, vf_set(1e-5f));
+    return fresnel_dielectric(v3_dot(s->wo, n), vf_select(s->backfacing, vf_rcp(eta), eta));
+}
+TRC_INLINE vfloat op_layer_fresnel(const struct trc_surface *s, vfloat blend, vvec3 n) {
+    const vfloat eta = vf_max(vf_one() - blend, vf_set(1e-5f));
+    return fresnel_dielectric(v3_dot(s->wo, n), vf_select(s->backfacing, eta, vf_rcp(eta)));
+}
+TRC_INLINE vfloat op_layer_facing(const struct trc_surface *s, vfloat blend, vvec3 n) {
+    const vfloat half = vf_set(0.5f), b = vf_clamp(blend, 0.0f, 1.0f - 1e-5f);
+    const vfloat exponent = vf_select(vf_lt(b, half), b + b, half / (vf_one() - b));
+    const vfloat facing = vf_abs(v3_dot(s->wo, n));
+    return vf_one() - vf_select(vf_eq(blend, half), facing, vf_pow(facing, exponent));
+}
+
+#endif

@@ -1,0 +1,224 @@
+/* Runs material programs on TRC_WIDTH shading points, and single operations on constants. */
+#include "kernels/program/program.h"
+
+#include "kernels/program/color.h"
+#include "kernels/program/input.h"
+#include "kernels/program/math.h"
+#include "kernels/program/normal.h"
+#include "kernels/program/procedural.h"
+#include "kernels/program/table.h"
+#include "kernels/program/texture.h"
+
+/* Operations that depend on inputs alone. Long because it is the list of them; true if op is one.
+ */
+static bool run_pure(uint32_t op, uint32_t mode, const float *table, const vfloat *in,
+                     vfloat *out) {
+    switch (op) {
+    case TRC_OP_MATH:
+        out[0] = op_math(mode, in[0], in[1], in[2]);
+        return true;
+    case TRC_OP_CLAMP:
+        out[0] = op_clamp(mode, in[0], in[1], in[2]);
+        return true;
+    case TRC_OP_MAP_RANGE:
+        out[0] = op_map_range(in);
+        return true;
+    case TRC_OP_VECTOR_MATH:
+        v3_write(out, op_vector_math(mode, v3_read(in), v3_read(in + 3), v3_read(in + 6), in[9]));
+        return true;
+    case TRC_OP_VECTOR_MEASURE:
+        out[0] = op_vector_measure(mode, v3_read(in), v3_read(in + 3));
+        return true;
+    case TRC_OP_ROTATION:
+        op_rotation(in, out);
+        return true;
+    case TRC_OP_AXIS_ROTATION:
+        op_axis_rotation(v3_read(in), in[3], out);
+        return true;
+    case TRC_OP_CURVE:
+        out[0] = op_curve(mode, table, in);
+        return true;
+    case TRC_OP_BLACKBODY:
+        v3_write(out, op_blackbody(in[0]));
+        return true;
+    case TRC_OP_WAVELENGTH:
+        v3_write(out, op_wavelength(in[0]));
+        return true;
+    case TRC_OP_MAPPING:
+        v3_write(out, op_mapping(mode, in));
+        return true;
+    case TRC_OP_MIX:
+        v3_write(out, op_mix(mode, in[0], v3_read(in + 1), v3_read(in + 4)));
+        return true;
+    case TRC_OP_SATURATE:
+        v3_write(out, v3_saturate(v3_read(in)));
+        return true;
+    case TRC_OP_LUMINANCE:
+        out[0] = v3_luminance(v3_read(in));
+        return true;
+    case TRC_OP_AVERAGE:
+        out[0] = v3_average(v3_read(in));
+        return true;
+    case TRC_OP_INVERT:
+        v3_write(out, op_invert(in[0], v3_read(in + 1)));
+        return true;
+    case TRC_OP_GAMMA:
+        v3_write(out, op_gamma(v3_read(in), in[3]));
+        return true;
+    case TRC_OP_HUE_SATURATION:
+        v3_write(out, op_hue_saturation(in[0], in[1], in[2], in[3], v3_read(in + 4)));
+        return true;
+    case TRC_OP_BRIGHT_CONTRAST:
+        v3_write(out, op_bright_contrast(v3_read(in), in[3], in[4]));
+        return true;
+    case TRC_OP_RAMP:
+        op_ramp(mode, table, in[0], out);
+        return true;
+    case TRC_OP_SEPARATE:
+        v3_write(out, op_separate(mode, v3_read(in)));
+        return true;
+    case TRC_OP_COMBINE:
+        v3_write(out, op_combine(mode, v3_read(in)));
+        return true;
+    case TRC_OP_PROJECT:
+        op_project(mode, v3_read(in), out);
+        return true;
+    case TRC_OP_CHECKER:
+        op_checker(in, out);
+        return true;
+    case TRC_OP_NOISE:
+    case TRC_OP_WHITE_NOISE:
+    case TRC_OP_VORONOI:
+    case TRC_OP_GRADIENT:
+    case TRC_OP_WAVE:
+    case TRC_OP_MAGIC:
+    case TRC_OP_BRICK:
+        trc_program_procedural(op, mode, in, out);
+        return true;
+    default:
+        return false;
+    }
+}
+
+/* Operations that read the shading point. Long because it is the list of them. */
+static void run_at_surface(const struct trc_surface *s, const struct trc_instruction *i,
+                           const vfloat *in, vfloat *out) {
+    switch (i->op) {
+    case TRC_OP_POSITION:
+        v3_write(out, s->p);
+        break;
+    case TRC_OP_NORMAL:
+        v3_write(out, s->n);
+        break;
+    case TRC_OP_TRUE_NORMAL:
+        v3_write(out, s->ng);
+        break;
+    case TRC_OP_INCOMING:
+        v3_write(out, s->wo);
+        break;
+    case TRC_OP_TANGENT:
+        v3_write(out, op_tangent(s, i->mode, i->resource));
+        break;
+    case TRC_OP_PARAMETRIC:
+        out[0] = vf_one() - s->u - s->v;
+        out[1] = s->u;
+        break;
+    case TRC_OP_BACKFACING:
+        out[0] = vf_truth(s->backfacing);
+        break;
+    case TRC_OP_GENERATED:
+        v3_write(out, op_generated(s));
+        break;
+    case TRC_OP_OBJECT_NORMAL:
+        v3_write(out, op_object_normal(s));
+        break;
+    case TRC_OP_OBJECT_POSITION:
+        v3_write(out, op_object_position(s));
+        break;
+    case TRC_OP_CAMERA_POSITION:
+        v3_write(out, op_camera_position(s));
+        break;
+    case TRC_OP_WINDOW:
+        op_window(s, out);
+        break;
+    case TRC_OP_REFLECTION:
+        v3_write(out, op_reflection(s));
+        break;
+    case TRC_OP_UV:
+        op_uv(s, i->resource, out);
+        break;
+    case TRC_OP_UV_DENSITY:
+        out[0] = op_uv_density(s, i->resource);
+        break;
+    case TRC_OP_COLOR_ATTRIBUTE:
+        op_color_attribute(s, i->resource, out);
+        break;
+    case TRC_OP_LIGHT_PATH:
+        out[0] = op_light_path(s, i->mode);
+        break;
+    case TRC_OP_OBJECT_LOCATION:
+        v3_write(out, op_object_location(s));
+        break;
+    case TRC_OP_OBJECT_COLOR:
+        for (int c = 0; c < 4; c++)
+            out[c] = object_number(s, c);
+        break;
+    case TRC_OP_OBJECT_INDEX:
+        out[0] = object_number(s, 4);
+        break;
+    case TRC_OP_OBJECT_RANDOM:
+        out[0] = object_number(s, 5);
+        break;
+    case TRC_OP_INSTANCE_VALUES:
+        op_instance_values(s, i->mode, out);
+        break;
+    case TRC_OP_FRESNEL:
+        out[0] = op_fresnel(s, in[0], v3_read(in + 1));
+        break;
+    case TRC_OP_LAYER_FRESNEL:
+        out[0] = op_layer_fresnel(s, in[0], v3_read(in + 1));
+        break;
+    case TRC_OP_LAYER_FACING:
+        out[0] = op_layer_facing(s, in[0], v3_read(in + 1));
+        break;
+    case TRC_OP_NORMAL_MAP:
+        v3_write(out, op_normal_map(s, i->mode, i->resource, in[0], v3_read(in + 1)));
+        break;
+    case TRC_OP_TRANSFORM:
+        v3_write(out, op_transform(s, i->mode, v3_read(in)));
+        break;
+    case TRC_OP_WIREFRAME:
+        out[0] = op_wireframe(s, in[0]);
+        break;
+    case TRC_OP_IMAGE:
+        texture_lookup(image_of(s, i->resource), i->mode, in[0], in[1], in[2] * s->footprint,
+                       s->active, out);
+        break;
+    case TRC_OP_IMAGE_BOX:
+        op_image_box(s, image_of(s, i->resource), i->mode, v3_read(in), in[3], out);
+        break;
+    default:
+        break;
+    }
+}
+
+void trc_program_run(const struct trc_material *m, const struct trc_surface *s,
+                     struct trc_registers *regs) {
+    for (uint32_t k = 0; k < m->instruction_count; k++) {
+        const struct trc_instruction *i = &m->instructions[k];
+        const struct trc_operand *operands = &m->operands[i->first_input];
+        vfloat in[TRC_OP_MAX_INPUTS]; /* copies: outputs may take the place of inputs */
+        for (uint32_t n = 0; n < i->input_count; n++)
+            in[n] = trc_operand_value(&operands[n], regs);
+        vfloat *out = &regs->r[i->out];
+        const float *table = trc_op_has_table(i->op) ? m->tables + i->resource : NULL;
+        if (!run_pure(i->op, i->mode, table, in, out))
+            run_at_surface(s, i, in, out);
+    }
+}
+
+#if TRC_WIDTH == 1
+void trc_program_fold(uint32_t op, uint32_t mode, const float *table, const float *in, float *out) {
+    run_pure(op, mode, table, in, out);
+}
+#endif

@@ -1,0 +1,77 @@
+/* Eight floats, whatever the kernel's width: one child or one triangle per lane. */
+#ifndef TRACER_KERNELS_SIMD_SIMD8_H
+#define TRACER_KERNELS_SIMD_SIMD8_H
+
+#include "kernels/simd/simd.h"
+
+typedef float f8 __attribute__((vector_size(32)));
+typedef int32_t i8x __attribute__((vector_size(32)));
+
+TRC_INLINE f8 f8_set(float a) { return (f8){a, a, a, a, a, a, a, a}; }
+TRC_INLINE f8 f8_load(const float *p) {
+    f8 v;
+    memcpy(&v, p, sizeof v);
+    return v;
+}
+TRC_INLINE void f8_store(float *p, f8 v) { memcpy(p, &v, sizeof v); }
+
+#if defined(__AVX__)
+TRC_INLINE f8 f8_min(f8 a, f8 b) { return (f8)_mm256_min_ps((__m256)a, (__m256)b); }
+TRC_INLINE f8 f8_max(f8 a, f8 b) { return (f8)_mm256_max_ps((__m256)a, (__m256)b); }
+#else
+TRC_INLINE f8 f8_min(f8 a, f8 b) {
+    const i8x m = a < b;
+    return (f8)(((i8x)a & m) | ((i8x)b & ~m));
+}
+TRC_INLINE f8 f8_max(f8 a, f8 b) {
+    const i8x m = a > b;
+    return (f8)(((i8x)a & m) | ((i8x)b & ~m));
+}
+#endif
+
+/* a * b + c, fused where the hardware can: only for culls whose slack covers either rounding. */
+TRC_INLINE f8 f8_madd(f8 a, f8 b, f8 c) {
+#if defined(__FMA__)
+    return (f8)_mm256_fmadd_ps((__m256)a, (__m256)b, (__m256)c);
+#else
+    return a * b + c;
+#endif
+}
+
+/* One bit per lane where a <= b (not for NaN). */
+TRC_INLINE uint32_t f8_le(f8 a, f8 b) {
+#if defined(__AVX512VL__)
+    return _mm256_cmp_ps_mask((__m256)a, (__m256)b, _CMP_LE_OQ);
+#elif defined(__AVX__)
+    return (uint32_t)_mm256_movemask_ps(_mm256_cmp_ps((__m256)a, (__m256)b, _CMP_LE_OQ));
+#else
+    const i8x m = a <= b;
+    uint32_t bits = 0;
+    for (int i = 0; i < 8; i++)
+        bits |= (uint32_t)(m[i] & 1) << i;
+    return bits;
+#endif
+}
+
+/* One bit per lane that is not 0. */
+TRC_INLINE uint32_t i8_nonzero(i8x a) {
+#if defined(__AVX512VL__)
+    return _mm256_test_epi32_mask((__m256i)a, (__m256i)a);
+#elif defined(__AVX2__)
+    const __m256i zero = _mm256_cmpeq_epi32((__m256i)a, _mm256_setzero_si256());
+    return ~(uint32_t)_mm256_movemask_ps((__m256)zero) & 0xffu;
+#else
+    uint32_t bits = 0;
+    for (int i = 0; i < 8; i++)
+        bits |= (uint32_t)(a[i] != 0) << i;
+    return bits;
+#endif
+}
+
+TRC_INLINE f8 f8_abs(f8 a) {
+    const i8x m = {0x7fffffff, 0x7fffffff, 0x7fffffff, 0x7fffffff,
+                   0x7fffffff, 0x7fffffff, 0x7fffffff, 0x7fffffff};
+    return (f8)((i8x)a & m);
+}
+
+#endif

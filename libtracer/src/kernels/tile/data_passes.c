@@ -1,0 +1,334 @@
+/* Passes of what the camera sees, apart from light.
+ *
+ * Two kinds, as in Cycles: those of the first surface that is not mostly seen through (depth,
+ * normal, indices ...), and those that add up over all surfaces on the straight way through
+ * transparency, each by what it lets be seen of itself (colours, mist, mattes). */
+#include "kernels/light/world.h"
+#include "kernels/simd/wide_math.h"
+#include "kernels/tile/tile.h"
+#include "kernels/trace/mesh_fetch.h"
+
+/* Cycles' default of the view layer's Alpha Threshold. */
+#define ALPHA_THRESHOLD 0.5f
+
+#define DENOISING_PASSES                                                     \
+    (1ull << TRC_PASS_DENOISING_ALBEDO | 1ull << TRC_PASS_DENOISING_NORMAL | \
+     1ull << TRC_PASS_DENOISING_DEPTH)
+
+static void store_vector(struct trc_tile *t, uint32_t pass, uint32_t slot, float x, float y,
+                         float z) {
+    float *const *p = t->samples.pass[pass];
+    if (p[0])
+        p[0][slot] = x;
+    if (p[1])
+        p[1][slot] = y;
+    if (p[2])
+        p[2][slot] = z;
+}
+
+/* Adds the lanes' vectors to a pass, if it is asked for. */
+static void add_lanes(struct trc_tile *t, uint32_t pass, vvec3 value, const uint32_t *slots,
+                      vmask active) {
+    if (!t->samples.pass[pass][0])
+        return;
+    float lanes[3][TRC_WIDTH];
+    vf_store(lanes[0], value.x), vf_store(lanes[1], value.y), vf_store(lanes[2], value.z);
+    for (uint32_t bits = vm_bits(active); bits; bits &= bits - 1) {
+        const int i = __builtin_ctz(bits);
+        const float v[3] = {lanes[0][i], lanes[1][i], lanes[2][i]};
+        trc_pass_add(t, pass, slots[i], v);
+    }
+}
+
+/* From the world to the camera, as it stands in the middle of the shutter. */
+static const float *world_to_camera(const struct trc_tile *t) {
+    return t->snapshot->camera.world_to_camera[1].m;
+}
+
+/* The same the other way round. */
+static void camera_to_world(const struct trc_tile *t, float m[12]) {
+    const struct trc_camera *c = &t->snapshot->camera;
+    const float *before = c->camera_to_world[(c->key_count - 1) / 2].m;
+    const float *after = c->camera_to_world[c->key_count / 2].m;
+    for (int k = 0; k < 12; k++)
+        m[k] = before[k] + 0.5f * (after[k] - before[k]);
+}
+
+/* From the camera's origin to the points. */
+static vvec3 from_camera(const struct trc_tile *t, vvec3 p) {
+    float m[12];
+    camera_to_world(t, m);
+    return v3_sub(p, v3(vf_set(m[3]), vf_set(m[7]), vf_set(m[11])));
+}
+
+/* Along the camera's -Z, in its own space: of a sheared camera no distance in the world. */
+static vfloat depth_of(const struct trc_tile *t, vvec3 p) {
+    const float *m = world_to_camera(t);
+    return vf_set(0.0f) - v3_dot(from_camera(t, p), v3(vf_set(m[8]), vf_set(m[9]), vf_set(m[10])));
+}
+
+/* ---- of the first surface ---- */
+
+/* Where a point of a triangle is in the world at a time. */
+static void point_at(const struct trc_instance *instance, const struct trc_mesh *mesh,
+                     const uint32_t index[3], float u, float v, float time, float p[3]) {
+    float c[9], m[12], object[3];
+    trc_corner_at(mesh->positions, index, mesh->vertex_count, mesh->key_count, time, c);
+    trc_affine_at(instance, time, m);
+    for (int k = 0; k < 3; k++)
+        object[k] = (1.0f - u - v) * c[k] + u * c[3 + k] + v * c[6 + k];
+    for (int k = 0; k < 3; k++)
+        p[k] = m[4 * k] * object[0] + m[4 * k + 1] * object[1] + m[4 * k + 2] * object[2] +
+               m[4 * k + 3];
+}
+
+/* Where the camera sees a point at the start (moment 0), in the middle (1) or at the end (2) of the
+ * shutter, in pixels from the lower left corner. */
+static void raster_at(const struct trc_tile *t, const float p[3], int moment, float raster[2]) {
+    const struct trc_camera *c = &t->snapshot->camera;
+    const float time = 0.5f * (float)moment, *m = c->world_to_camera[moment].m;
+    uint32_t key;
+    float f, window[4], way[3], at[3];
+    trc_key_at(time, c->key_count, &key, &f);
+    const uint32_t next = key + (c->key_count > 1);
+    for (int k = 0; k < 4; k++)
+        window[k] = c->windows[key][k] + f * (c->windows[next][k] - c->windows[key][k]);
+    for (int k = 0; k < 3; k++) { /* far from the origin more exact than the inverse's own way */
+        const float a = c->camera_to_world[key].m[4 * k + 3];
+        way[k] = p[k] - (a + f * (c->camera_to_world[next].m[4 * k + 3] - a));
+    }
+    for (int k = 0; k < 3; k++)
+        at[k] = m[4 * k] * way[0] + m[4 * k + 1] * way[1] + m[4 * k + 2] * way[2];
+    const float scale = c->type == TRC_CAMERA_ORTHOGRAPHIC ? 1.0f : -1.0f / at[2];
+    const float size[2] = {(float)t->desc->width, (float)t->desc->height};
+    for (int k = 0; k < 2; k++)
+        raster[k] = (at[k] * scale - window[2 * k]) / (window[2 * k + 1] - window[2 * k]) * size[k];
+}
+
+/* Not counted where the camera does not see the point at all three times. */
+static void store_motion(struct trc_tile *t, const struct trc_instance *instance,
+                         const struct trc_mesh *mesh, uint32_t triangle, float u, float v,
+                         uint32_t slot) {
+    float *const *out = t->samples.pass[TRC_PASS_VECTOR];
+    float raster[3][2], p[3];
+    for (int k = 0; k < 3; k++) {
+        const float time = 0.5f * (float)k;
+        point_at(instance, mesh, mesh->indices + 3 * (size_t)triangle, u, v, time, p);
+        raster_at(t, p, k, raster[k]);
+    }
+    const float motion[4] = {raster[0][0] - raster[1][0], raster[0][1] - raster[1][1],
+                             raster[1][0] - raster[2][0], raster[1][1] - raster[2][1]};
+    if (!isfinite(motion[0] + motion[1] + motion[2] + motion[3]))
+        return;
+    for (int k = 0; k < 4; k++)
+        out[k][slot] = motion[k];
+    out[4][slot] = 1.0f;
+}
+
+static void first_surface(struct trc_tile *t, const struct trc_surface *s,
+                          const struct trc_material *m, const uint32_t *slots, vmask write) {
+    float z[TRC_WIDTH], n[3][TRC_WIDTH], p[3][TRC_WIDTH], uv[2][TRC_WIDTH];
+    vf_store(z, depth_of(t, s->p));
+    vf_store(n[0], s->n.x), vf_store(n[1], s->n.y), vf_store(n[2], s->n.z);
+    vf_store(p[0], s->p.x), vf_store(p[1], s->p.y), vf_store(p[2], s->p.z);
+    vf_store(uv[0], s->u), vf_store(uv[1], s->v);
+    for (uint32_t bits = vm_bits(write); bits; bits &= bits - 1) {
+        const int i = __builtin_ctz(bits);
+        const uint32_t slot = slots[i];
+        const struct trc_instance *instance = &t->snapshot->instances[vi_get(s->instance, i)];
+        const struct trc_mesh *mesh = t->snapshot->meshes[instance->mesh];
+        store_vector(t, TRC_PASS_DEPTH, slot, z[i], 0.0f, 0.0f);
+        store_vector(t, TRC_PASS_NORMAL, slot, n[0][i], n[1][i], n[2][i]);
+        store_vector(t, TRC_PASS_POSITION, slot, p[0][i], p[1][i], p[2][i]);
+        store_vector(t, TRC_PASS_OBJECT_INDEX, slot, (float)instance->pass_index, 0.0f, 0.0f);
+        store_vector(t, TRC_PASS_MATERIAL_INDEX, slot, (float)m->pass_index, 0.0f, 0.0f);
+        if (t->samples.pass[TRC_PASS_VECTOR][0])
+            store_motion(t, instance, mesh, (uint32_t)vi_get(s->triangle, i), uv[0][i], uv[1][i],
+                         slot);
+        if (mesh->default_uv >= 0 && t->samples.pass[TRC_PASS_UV][0]) {
+            const float *c =
+                mesh->attributes[mesh->default_uv].values + 6 * (size_t)vi_get(s->triangle, i);
+            const float u = uv[0][i], v = uv[1][i], w = 1.0f - u - v;
+            store_vector(t, TRC_PASS_UV, slot, w * c[0] + u * c[2] + v * c[4],
+                         w * c[1] + u * c[3] + v * c[5], 1.0f);
+        }
+    }
+}
+
+/* ---- of all surfaces on the way ---- */
+
+static void add_colors(struct trc_tile *t, const struct trc_surface *s,
+                       const struct trc_lobes *lobes, vvec3 weight, const uint32_t *slots,
+                       vmask active) {
+    static const uint32_t pass[3] = {TRC_PASS_DIFFUSE_COLOR, TRC_PASS_GLOSSY_COLOR,
+                                     TRC_PASS_TRANSMISSION_COLOR};
+    vvec3 albedo[3];
+    trc_bsdf_albedo(lobes, s, albedo);
+    for (int k = 0; k < 3; k++)
+        add_lanes(t, pass[k], v3_mul(weight, albedo[k]), slots, active);
+}
+
+/* Takes what is seen before the mist from the pass, which starts at 1. */
+static void add_mist(struct trc_tile *t, const struct trc_surface *s, vvec3 seen,
+                     const uint32_t *slots, vmask active) {
+    if (!t->samples.pass[TRC_PASS_MIST][0])
+        return;
+    const trc_render_desc *d = t->desc;
+    const vvec3 way = from_camera(t, s->p);
+    float m[12];
+    camera_to_world(t, m);
+    const vvec3 axis = v3(vf_set(m[2]), vf_set(m[6]), vf_set(m[10]));
+    const vfloat distance = t->snapshot->camera.type == TRC_CAMERA_ORTHOGRAPHIC
+                                ? vf_abs(v3_dot(way, axis))
+                                : vf_sqrt(v3_dot(way, way));
+    const vfloat inv_depth = vf_set(d->mist_depth > 0.0f ? 1.0f / d->mist_depth : 0.0f);
+    const vfloat zero = vf_set(0.0f), one = vf_set(1.0f);
+    const vfloat depth = vf_min(vf_max((distance - vf_set(d->mist_start)) * inv_depth, zero), one);
+    const vfloat mist = d->mist_falloff == 1.0f ? depth : vf_pow(depth, vf_set(d->mist_falloff));
+    const vfloat clear = (mist - one) * v3_average(seen);
+    add_lanes(t, TRC_PASS_MIST, v3(clear, zero, zero), slots, active);
+}
+
+/* ---- mattes ---- */
+
+/* Whether a sample counts towards the film. With adaptive sampling some are taken for their error
+ * alone. */
+static bool is_counted(const struct trc_tile *t, size_t pixel) {
+    const struct trc_adaptive *a = t->job->adaptive;
+    return !a || (a->pixels[pixel].reasons & TRC_PIXEL_COUNTS);
+}
+
+/* What the surfaces cover goes to the pixel's table at once, as a sample may meet any number of
+ * them. Whole holdouts are in no matte, as in Cycles. */
+static void add_mattes(struct trc_tile *t, const struct trc_surface *s,
+                       const struct trc_material *m, const struct trc_lobes *lobes, vvec3 seen,
+                       const uint32_t *slots, vmask active) {
+    const uint32_t places = t->job->film->matte_count;
+    float weight[TRC_WIDTH];
+    if (m->has & TRC_MATERIAL_HAS_HOLDOUT)
+        active = vm_and(active, vf_lt(lobes->holdout, vf_set(1.0f)));
+    vf_store(weight, v3_average(seen));
+    for (uint32_t bits = vm_bits(active); bits; bits &= bits - 1) {
+        const int i = __builtin_ctz(bits);
+        const struct trc_instance *instance = &t->snapshot->instances[vi_get(s->instance, i)];
+        const float ids[TRC_CRYPTOMATTE_KINDS] = {
+            [TRC_CRYPTOMATTE_OBJECT] = instance->cryptomatte_object,
+            [TRC_CRYPTOMATTE_MATERIAL] = m->cryptomatte,
+            [TRC_CRYPTOMATTE_ASSET] = instance->cryptomatte_asset,
+        };
+        if (!(weight[i] > 0.0f && weight[i] < INFINITY) ||
+            !is_counted(t, trc_film_pixel(t, slots[i])))
+            continue;
+        const size_t first = trc_tile_pixel(t, slots[i]) * places;
+        for (int k = 0; k < TRC_CRYPTOMATTE_KINDS; k++)
+            if (t->mattes[k] && ids[k] != 0.0f)
+                trc_matte_add(t->mattes[k] + first, places, ids[k], weight[i]);
+    }
+}
+
+/* ---- AOVs ---- */
+
+/* Until the first surface that is not mostly seen through, that one too. */
+static vmask is_not_done(vuint path) {
+    return vi_eq((vint)path & vi_set(TRC_PATH_DATA_DONE), vi_set(0));
+}
+
+/* As Cycles, which takes nothing from what is behind something transparent. */
+static void add_aovs(struct trc_tile *t, const struct trc_material *m,
+                     const struct trc_registers *regs, const uint32_t *slots, vmask active) {
+    for (uint32_t a = 0; a < m->aov_count; a++) {
+        float *const *out = t->samples.pass[m->aovs[a].pass];
+        const uint32_t channels = trc_pass_channels(m->aovs[a].pass);
+        float lanes[4][TRC_WIDTH];
+        if (!out[0])
+            continue;
+        for (uint32_t k = 0; k < channels; k++) {
+            const struct trc_operand *o = &m->operands[m->aovs[a].first_operand];
+            vf_store(lanes[k], k < 3 ? trc_operand_value(o + k, regs) : vf_set(1.0f));
+        }
+        for (uint32_t bits = vm_bits(active); bits; bits &= bits - 1) {
+            const int i = __builtin_ctz(bits);
+            for (uint32_t k = 0; k < channels; k++)
+                out[k][slots[i]] += lanes[k][i];
+        }
+    }
+}
+
+void trc_world_aovs(struct trc_tile *t, vvec3 d, vuint path, const uint32_t slots[TRC_WIDTH],
+                    vmask active) {
+    const vint straight = vi_set(TRC_PATH_TRANSPARENT_BACKGROUND);
+    active = vm_and(active, vm_and(vi_eq((vint)path & straight, straight), is_not_done(path)));
+    if (!vm_any(active))
+        return;
+    struct trc_registers regs;
+    const struct trc_material *m = trc_world_run(t->snapshot, d, path, active, &regs);
+    add_aovs(t, m, &regs, slots, active);
+}
+
+/* ---- for denoisers: of the first rough surface, through mirrors and glass too ----
+ *
+ * As Cycles, but for surfaces that are not told of and yet have diffuse lobes: with diffuse bounces
+ * 0 it loses the paths that pick those, and with them a part of what lies behind. */
+
+/* Writes the mean normal once, in the camera's space (x right, y up, z forward), whichever way of
+ * the sample comes first; the others add up by their throughput. Returns the new path words. */
+static vuint add_features(struct trc_tile *t, const struct trc_surface *s,
+                          const struct trc_lobes *lobes, vvec3 weight, vfloat length,
+                          const uint32_t *slots) {
+    const vmask on = vm_and(s->active, vi_eq((vint)s->path & vi_set(TRC_PATH_TOLD), vi_set(0)));
+    if (!vm_any(on))
+        return s->path;
+    struct trc_denoising_features f;
+    trc_lobes_features(lobes, s, &f);
+    const vfloat zero = vf_set(0.0f);
+    const float *camera = world_to_camera(t);
+    const vfloat way = v3_average(weight) * length;
+    add_lanes(t, TRC_PASS_DENOISING_DEPTH, v3(way, zero, zero), slots, on);
+    const vmask told = vm_and(on, f.is_told);
+    add_lanes(t, TRC_PASS_DENOISING_ALBEDO, v3_mul(weight, f.albedo), slots, told);
+    if (t->samples.pass[TRC_PASS_DENOISING_NORMAL][0]) {
+        float n[3][TRC_WIDTH];
+        for (int k = 0; k < 3; k++) {
+            const float *row = camera + 4 * k;
+            const vfloat along =
+                v3_dot(f.normal, v3(vf_set(row[0]), vf_set(row[1]), vf_set(row[2])));
+            vf_store(n[k], k == 2 ? zero - along : along);
+        }
+        for (uint32_t bits = vm_bits(told); bits; bits &= bits - 1) {
+            const int i = __builtin_ctz(bits);
+            float *const *p = t->samples.pass[TRC_PASS_DENOISING_NORMAL];
+            if (p[0][slots[i]] == 0.0f && p[1][slots[i]] == 0.0f && p[2][slots[i]] == 0.0f)
+                store_vector(t, TRC_PASS_DENOISING_NORMAL, slots[i], n[0][i], n[1][i], n[2][i]);
+        }
+    }
+    return (vuint)vi_select(told, (vint)s->path | vi_set(TRC_PATH_TOLD), (vint)s->path);
+}
+
+vuint trc_data_passes(struct trc_tile *t, const struct trc_surface *s, const struct trc_material *m,
+                      const struct trc_registers *regs, const struct trc_lobes *lobes,
+                      vvec3 found_weight, vfloat beyond, vfloat length,
+                      const uint32_t slots[TRC_WIDTH]) {
+    const vuint path = t->desc->passes & DENOISING_PASSES
+                           ? add_features(t, s, lobes, found_weight, length, slots)
+                           : s->path;
+    const vint straight = vi_set(TRC_PATH_TRANSPARENT_BACKGROUND);
+    const vmask on = vm_and(s->active, vi_eq((vint)s->path & straight, straight));
+    if (!vm_any(on))
+        return path;
+    const vvec3 weight = v3_scale(found_weight, beyond);
+    const vvec3 one = v3(vf_set(1.0f), vf_set(1.0f), vf_set(1.0f));
+    const vvec3 alpha = v3_sub(one, trc_lobes_transparency(lobes));
+    add_colors(t, s, lobes, weight, slots, on);
+    add_mist(t, s, v3_mul(weight, alpha), slots, on);
+    if (t->desc->cryptomattes)
+        add_mattes(t, s, m, lobes, v3_mul(weight, alpha), slots, on);
+    vmask first = vm_and(on, is_not_done(s->path));
+    if (m->aov_count)
+        add_aovs(t, m, regs, slots, first);
+    if (m->has & TRC_MATERIAL_HAS_TRANSPARENCY)
+        first = vm_and(first, vf_ge(v3_average(alpha), vf_set(ALPHA_THRESHOLD)));
+    if (!vm_any(first))
+        return path;
+    first_surface(t, s, m, slots, first);
+    return (vuint)vi_select(first, (vint)path | vi_set(TRC_PATH_DATA_DONE), (vint)path);
+}

@@ -1,0 +1,82 @@
+/* Shadow rays that wait to be traced as full packets. Whoever adds some reserves room for them
+ * first, for which the queue is flushed (kernels/tile/shadow.c); append asserts in debug builds
+ * that no more come. */
+#ifndef TRACER_KERNELS_TILE_SHADOW_QUEUE_H
+#define TRACER_KERNELS_TILE_SHADOW_QUEUE_H
+
+#include <assert.h>
+
+#include "core/carver.h"
+#include "kernels/simd/simd.h"
+#include "kernels/trace/packet.h"
+
+/* Rays that wait at most: more than one group of hits may send, 2 * 64 for each lane. */
+#define TRC_SHADOW_QUEUE 4096
+_Static_assert(TRC_SHADOW_QUEUE >= 2 * 64 * TRC_WIDTH, "an empty queue has room for a group");
+
+/* Entries of a column: the last packet is loaded whole. */
+#define TRC_SHADOW_COLUMN (TRC_SHADOW_QUEUE + TRC_PACKET_SIZE)
+
+/* Radiance, its three parts, and what the Shadow pass gets. */
+#define TRC_SCALED_COLUMNS (3 + 9 + 3)
+
+/* target: the light's number and cell, what packets are sorted by. */
+struct trc_shadow_store {
+    uint32_t count;
+    uint32_t reserved_end; /* most rays there may be until the next reserve */
+    float *o[3], *d[3], *tmax, *time, *radiance[3];
+    float *split[9]; /* diffuse, glossy, transmission parts, or NULL: no light passes */
+    float *lamp[3];  /* for the Shadow pass, or NULL */
+    float *scaled[TRC_SCALED_COLUMNS]; /* those that what is in the way takes from, RGB by RGB */
+    uint32_t scaled_count;
+    uint32_t *slot, *path, *target, *depth;
+    uint32_t *order; /* own: the queue may be flushed while hits are shaded in t->order */
+};
+
+/* splits, lamps: with the columns of light passes, of the Shadow pass. */
+TRC_INLINE void trc_shadows_carve(struct trc_carver *c, struct trc_shadow_store *q, bool splits,
+                                  bool lamps) {
+    const size_t column = TRC_SHADOW_COLUMN * sizeof(float);
+    for (int i = 0; i < 3; i++) {
+        q->o[i] = trc_carve(c, column);
+        q->d[i] = trc_carve(c, column);
+        q->radiance[i] = q->scaled[q->scaled_count++] = trc_carve(c, column);
+    }
+    q->tmax = trc_carve(c, column);
+    q->time = trc_carve(c, column);
+    for (int i = 0; splits && i < 9; i++)
+        q->split[i] = q->scaled[q->scaled_count++] = trc_carve(c, column);
+    for (int i = 0; lamps && i < 3; i++)
+        q->lamp[i] = q->scaled[q->scaled_count++] = trc_carve(c, column);
+    uint32_t **const words[] = {&q->slot, &q->path, &q->target, &q->depth, &q->order};
+    for (int i = 0; i < 5; i++)
+        *words[i] = trc_carve(c, column);
+}
+
+/* What a ray has in every queue. */
+struct trc_shadow_rays {
+    vfloat o[3], d[3], tmax, time, radiance[3];
+    vuint slot, path, target, depth;
+};
+
+/* Counts the lanes' rays in; where they stand. The caller fills the columns of passes. */
+TRC_INLINE uint32_t trc_shadows_append(struct trc_shadow_store *q, const struct trc_shadow_rays *s,
+                                       uint32_t bits) {
+    const uint32_t at = q->count, count = (uint32_t)__builtin_popcount(bits);
+    assert(count <= q->reserved_end - q->count);
+    for (int k = 0; k < 3; k++) {
+        vf_compress(q->o[k] + at, s->o[k], bits);
+        vf_compress(q->d[k] + at, s->d[k], bits);
+        vf_compress(q->radiance[k] + at, s->radiance[k], bits);
+    }
+    vf_compress(q->tmax + at, s->tmax, bits);
+    vf_compress(q->time + at, s->time, bits);
+    vu_compress(q->slot + at, s->slot, bits);
+    vu_compress(q->path + at, s->path, bits);
+    vu_compress(q->target + at, s->target, bits);
+    vu_compress(q->depth + at, s->depth, bits);
+    q->count += count;
+    return at;
+}
+
+#endif

@@ -1,0 +1,221 @@
+/* The surface at a hit: position with the bound of its error, normals, sides. */
+#include "kernels/trace/surface.h"
+
+#include "kernels/trace/mesh_fetch.h"
+
+/* What is read from the scene, before arithmetic. */
+struct raw_hit {
+    struct trc_corners p, n; /* object space; n only where smooth */
+    struct trc_wide_affine m;
+    vmask smooth, flips, identity;
+};
+
+/* ---- loading ---- */
+
+/* All lanes hit one instance: gathers from its mesh, its matrix by broadcast. */
+static void load_uniform(const struct trc_surface *s, const struct trc_instance *instance,
+                         const struct trc_mesh *mesh, struct raw_hit *out) {
+    const vmask m = s->active;
+    vint index[3];
+    trc_load_indices(mesh, s->triangle, m, index);
+    trc_load_vectors(mesh->positions, index, mesh->vertex_count, mesh->key_count, s->time, m,
+                     &out->p);
+    trc_load_affine(instance, s->time, &out->m);
+    out->flips = instance->flips ? vm_all_set() : vm_none();
+    out->identity = instance->is_identity ? vm_all_set() : vm_none();
+    out->smooth = vm_none();
+    if (mesh->corner_normals) {
+        const vint corner = s->triangle * vi_set(3);
+        const vint corners[3] = {corner, corner + vi_set(1), corner + vi_set(2)};
+        trc_load_vectors(mesh->corner_normals, corners, 3 * mesh->triangle_count, mesh->key_count,
+                         s->time, m, &out->n);
+    }
+    if (mesh->smooth) {
+        uint32_t bits = 0;
+        for (uint32_t lanes = vm_bits(m); lanes; lanes &= lanes - 1) {
+            const int lane = __builtin_ctz(lanes);
+            bits |= (uint32_t)(mesh->smooth[vi_get(s->triangle, lane)] != 0) << lane;
+        }
+        out->smooth = vm_from_bits(bits);
+    } else if (mesh->corner_normals) {
+        out->smooth = m;
+    }
+    if (!mesh->corner_normals && mesh->vertex_normals && vm_any(out->smooth))
+        trc_load_vectors(mesh->vertex_normals, index, mesh->vertex_count, mesh->key_count, s->time,
+                         m, &out->n);
+    else if (!mesh->corner_normals)
+        out->smooth = vm_none();
+}
+
+/* What load_lane says of a lane. */
+enum { LANE_SMOOTH = 1, LANE_FLIPS = 2, LANE_IDENTITY = 4 };
+
+/* One lane: 9 positions, 9 normals, 12 elements. Returns LANE_* together. */
+static uint32_t load_lane(const struct trc_surface *s, int lane, float p[9], float n[9],
+                          float m[12]) {
+    const struct trc_instance *instance = &s->snapshot->instances[vi_get(s->instance, lane)];
+    const struct trc_mesh *mesh = s->snapshot->meshes[instance->mesh];
+    const uint32_t triangle = (uint32_t)vi_get(s->triangle, lane);
+    const uint32_t *index = mesh->indices + 3 * (size_t)triangle;
+    const float time = vf_get(s->time, lane);
+    trc_corner_at(mesh->positions, index, mesh->vertex_count, mesh->key_count, time, p);
+    trc_affine_at(instance, time, m);
+    const uint32_t flags =
+        (instance->flips ? LANE_FLIPS : 0u) | (instance->is_identity ? LANE_IDENTITY : 0u);
+    if (mesh->smooth ? !mesh->smooth[triangle] : !mesh->corner_normals)
+        return flags;
+    if (mesh->corner_normals) {
+        const uint32_t corners[3] = {3 * triangle, 3 * triangle + 1, 3 * triangle + 2};
+        trc_corner_at(mesh->corner_normals, corners, 3 * mesh->triangle_count, mesh->key_count,
+                      time, n);
+        return flags | LANE_SMOOTH;
+    }
+    if (!mesh->vertex_normals)
+        return flags;
+    trc_corner_at(mesh->vertex_normals, index, mesh->vertex_count, mesh->key_count, time, n);
+    return flags | LANE_SMOOTH;
+}
+
+static void load_mixed(const struct trc_surface *s, struct raw_hit *out) {
+    float p[TRC_WIDTH * 9], n[TRC_WIDTH * 9], m[TRC_WIDTH * 12];
+    memset(p, 0, sizeof p);
+    memset(n, 0, sizeof n);
+    memset(m, 0, sizeof m);
+    uint32_t smooth = 0, flips = 0, identity = 0;
+    for (uint32_t lanes = vm_bits(s->active); lanes; lanes &= lanes - 1) {
+        const int lane = __builtin_ctz(lanes);
+        const uint32_t flags = load_lane(s, lane, p + 9 * lane, n + 9 * lane, m + 12 * lane);
+        smooth |= (uint32_t)((flags & LANE_SMOOTH) != 0) << lane;
+        flips |= (uint32_t)((flags & LANE_FLIPS) != 0) << lane;
+        identity |= (uint32_t)((flags & LANE_IDENTITY) != 0) << lane;
+    }
+    out->p = trc_corners_of(p);
+    out->n = trc_corners_of(n);
+    for (int k = 0; k < 3; k++)
+        out->m.column[k] =
+            v3(trc_column_of(m, 12, k), trc_column_of(m, 12, 4 + k), trc_column_of(m, 12, 8 + k));
+    out->m.origin = v3(trc_column_of(m, 12, 3), trc_column_of(m, 12, 7), trc_column_of(m, 12, 11));
+    out->smooth = vm_from_bits(smooth);
+    out->flips = vm_from_bits(flips);
+    out->identity = vm_from_bits(identity);
+}
+
+/* ---- arithmetic ---- */
+
+/* Object position v0 + (u e1 + v e2), and a bound of how far it is from the plane of the float
+ * corners, by the magnitudes of what is rounded (M. Pharr, W. Jakob and G. Humphreys, "Physically
+ * Based Rendering", 3.9 and 6.8, bound each step by those of the corners). In half-ulps, e = 2^-24:
+ * each edge 1 of itself and its product 1, their sum 1 of itself, the position 1 of itself. That
+ * the barycentrics are rounded does not matter, any u, v give a point of the plane.
+ *
+ * An identity adds nothing. The world point M p + t adds 3 of q = |M| |p|, for one product and the
+ * first two sums, and 1 of itself. A ray that starts there is off by 5 q once it is taken to object
+ * space (object_rays.h); or the tree is in world space, and its corners M v + t are off by at most
+ * 4 |M| |v| + |t|. With Q = |M| (|v0| + u |e1| + v |e2|), not less than q or the weighted mean of
+ * |M| |v|, both are within 5 Q + |t|: 8 Q, 1 of the world point, 1 of t in all. */
+#define ERROR_STEPS(n) vf_set((n)*0x1.0001p-24f) /* a last digit for what is of higher order */
+
+/* What rounding adds on the way from object to world and back. */
+static vvec3 transform_error(const struct trc_wide_affine *m, vvec3 object_error, vvec3 reach,
+                             vvec3 p) {
+    const vvec3 all = v3_add(object_error, v3_scale(reach, ERROR_STEPS(8)));
+    const vvec3 *c = m->column;
+    const vvec3 rest = v3_scale(v3_add(v3_abs(p), v3_abs(m->origin)), ERROR_STEPS(1));
+    return v3_mad(v3_abs(c[0]), all.x,
+                  v3_mad(v3_abs(c[1]), all.y, v3_mad(v3_abs(c[2]), all.z, rest)));
+}
+
+static void set_position(struct trc_surface *s, const struct raw_hit *h, vvec3 e1, vvec3 e2) {
+    const vvec3 v0 = h->p.corner[0];
+    const vvec3 u1 = v3_scale(e1, s->u), v2 = v3_scale(e2, s->v), way = v3_add(u1, v2);
+    const vvec3 p = v3_add(v0, way);
+    const vvec3 edges = v3_add(v3_abs(u1), v3_abs(v2));
+    const vvec3 error = v3_add(v3_scale(edges, ERROR_STEPS(2)),
+                               v3_scale(v3_add(v3_abs(way), v3_abs(p)), ERROR_STEPS(1)));
+    s->p = p;
+    s->p_error = error;
+    if (!vm_any(vm_andnot(s->active, h->identity)))
+        return;
+    const vvec3 reach = v3_add(v3_abs(v0), edges);
+    s->p = v3_select(h->identity, p, trc_transform_point(&h->m, p));
+    s->p_error = v3_select(h->identity, error, transform_error(&h->m, error, reach, s->p));
+}
+
+/* a over its largest component: cross products of what comes out neither overflow nor vanish. */
+static vvec3 scaled_to_one(vvec3 a) { return v3_scale(a, vf_divide(vf_one(), v3_max(v3_abs(a)))); }
+
+/* A normal goes by the inverse transpose, which is the matrix of cofactors over the determinant;
+ * its columns are cross products of the columns of M. Only the sign of the determinant matters
+ * here. */
+static vvec3 transform_normal(const struct trc_wide_affine *m, vvec3 n) {
+    vvec3 c[3];
+    vfloat most = vf_zero();
+    for (int k = 0; k < 3; k++)
+        most = vf_max(most, v3_max(v3_abs(m->column[k])));
+    for (int k = 0; k < 3; k++)
+        c[k] = v3_scale(m->column[k], vf_divide(vf_one(), most));
+    return v3_mad(v3_cross(c[1], c[2]), n.x,
+                  v3_mad(v3_cross(c[2], c[0]), n.y, v3_scale(v3_cross(c[0], c[1]), n.z)));
+}
+
+/* The curved surface above the triangle: along each edge a parabola whose height, weights wa and wb
+ * of its ends, is wa wb (na - nb) . (pa - pb), the sum of the three along the interpolated normal.
+ * Twice the height of the arc that has the normals at its ends, so that it clears its neighbours
+ * (J. Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems II, 2021, has tangent planes in
+ * place of parabolas). Object space. */
+static vvec3 bulge_of(const struct trc_surface *s, const struct raw_hit *h, vvec3 e1, vvec3 e2,
+                      vvec3 n) {
+    const vvec3 *c = h->n.corner;
+    const vfloat w = vf_one() - s->u - s->v;
+    const vfloat k01 = v3_dot(v3_sub(c[1], c[0]), e1), k02 = v3_dot(v3_sub(c[2], c[0]), e2),
+                 k12 = v3_dot(v3_sub(c[2], c[1]), v3_sub(e2, e1));
+    return v3_scale(n, w * (s->u * k01 + s->v * k02) + s->u * s->v * k12);
+}
+
+static void set_normals(struct trc_surface *s, const struct raw_hit *h, vvec3 e1, vvec3 e2) {
+    /* The winding as the object has it: a mirroring matrix turns the world cross product over. */
+    const vvec3 w1 = scaled_to_one(trc_transform_vector(&h->m, e1));
+    const vvec3 w2 = scaled_to_one(trc_transform_vector(&h->m, e2));
+    const vfloat sign = vf_select(h->flips, vf_set(-1.0f), vf_one());
+    vvec3 ng = v3_normalize(v3_cross(w1, w2));
+    /* A sliver whose cross product vanished gets any unit vector. */
+    const vmask flat = vf_eq(v3_dot(ng, ng), vf_zero());
+    if (vm_any(vm_and(flat, s->active)))
+        ng = v3_select(flat, s->wo, ng);
+    ng = v3_scale(ng, sign);
+    vvec3 n = ng;
+    s->smooth = vm_none();
+    s->bulge = v3_zero();
+    s->backfacing = vf_lt(v3_dot(ng, s->wo), vf_zero());
+    const vfloat side = vf_select(s->backfacing, vf_set(-1.0f), vf_one());
+    if (vm_any(h->smooth)) {
+        const vfloat w = vf_one() - s->u - s->v;
+        vvec3 sum =
+            v3_mad(h->n.corner[0], w, v3_mad(h->n.corner[1], s->u, v3_scale(h->n.corner[2], s->v)));
+        const vvec3 bulge = trc_transform_vector(&h->m, bulge_of(s, h, e1, e2, sum));
+        sum = v3_normalize(v3_scale(transform_normal(&h->m, sum), sign));
+        s->smooth = vm_and(h->smooth, vf_gt(v3_dot(sum, sum), vf_set(0.5f)));
+        n = v3_select(s->smooth, sum, ng);
+        const vmask above = vf_gt(v3_dot(bulge, ng) * side, vf_zero());
+        s->bulge = v3_where(vm_and(s->smooth, above), bulge);
+    }
+    s->ng = v3_scale(ng, side);
+    s->n = v3_scale(n, side);
+}
+
+void trc_surface_fetch(struct trc_surface *s) {
+    if (!vm_any(s->active))
+        return;
+    struct raw_hit h;
+    const int32_t uniform = trc_uniform_instance(s->instance, s->active);
+    const struct trc_instance *instance = uniform >= 0 ? &s->snapshot->instances[uniform] : NULL;
+    const struct trc_mesh *mesh = instance ? s->snapshot->meshes[instance->mesh] : NULL;
+    if (mesh && trc_mesh_in_reach(mesh))
+        load_uniform(s, instance, mesh, &h);
+    else
+        load_mixed(s, &h);
+    const vvec3 e1 = v3_sub(h.p.corner[1], h.p.corner[0]);
+    const vvec3 e2 = v3_sub(h.p.corner[2], h.p.corner[0]);
+    set_position(s, &h, e1, e2);
+    set_normals(s, &h, e1, e2);
+}

@@ -1,0 +1,44 @@
+/* Shading points: TRC_WIDTH of them side by side, and the registers of a material's program. */
+#ifndef TRACER_KERNELS_TRACE_SURFACE_H
+#define TRACER_KERNELS_TRACE_SURFACE_H
+
+#include "kernels/simd/simd.h"
+#include "model/material.h"
+#include "model/snapshot.h"
+
+/* What kind of ray arrived, for Light Path and for visibility: TRC_VISIBLE_* and UNBLOCKED in the
+ * low bits. */
+enum {
+    TRC_PATH_SINGULAR = 1 << 8,                /* last bounce was ideal */
+    TRC_PATH_REFLECTED = 1 << 9,               /* last bounce was a reflection */
+    TRC_PATH_TRANSPARENT_BACKGROUND = 1 << 10, /* only ideal straight-through so far: film alpha */
+    TRC_PATH_WORLD_ALONE = 1 << 11 /* no light sample of the world was taken at the last bounce */
+};
+
+struct trc_surface {
+    const struct trc_snapshot *snapshot;
+    vmask active;
+    vint instance, triangle; /* of the lanes in active; -1 for world lookups */
+    vfloat u, v;             /* barycentrics, see query.h */
+    vfloat time;
+    vvec3 p;          /* world position */
+    vvec3 p_error;    /* bound of its rounding error per axis, world */
+    vvec3 ng;         /* geometric normal, unit, on the side of wo */
+    vvec3 n;          /* shading normal, unit, on the side of wo as Cycles has it */
+    vvec3 wo;         /* unit, towards where the ray came from */
+    vmask backfacing; /* the ray came from the back of the winding */
+    vmask smooth;     /* n is interpolated */
+    vvec3 bulge;      /* from p to the curved surface that the normals describe, on the side of wo;
+                         0 where that is below the triangle or where not smooth */
+    vfloat ray_length;
+    vuint path; /* TRC_VISIBLE_* | TRC_PATH_* */
+    vint depth, diffuse_depth, glossy_depth, transmission_depth, transparent_depth;
+    vfloat footprint;          /* width of the ray's cone at p, world, for texture filters */
+    vfloat raster_x, raster_y; /* window coordinates [0, 1] */
+};
+
+/* Fills p, p_error, ng, n, backfacing, smooth, bulge from instance, triangle, u, v, time, wo.
+ * (kernels/trace/surface.c) */
+void trc_surface_fetch(struct trc_surface *s);
+
+#endif

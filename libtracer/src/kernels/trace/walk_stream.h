@@ -1,0 +1,187 @@
+/* Streams: few rays on their way together. A node is met once for all of them, each against its
+ * eight boxes, which cost as much as they would alone, but order, stack and fetches are shared.
+ *
+ * Rasmus Barringer, Tomas Akenine-Moller, "Dynamic Ray Stream Traversal", 2014, keep streams from
+ * the root on; here packets end in them. Rays share their dominant axis: near boxes come first for
+ * all. */
+#ifndef TRACER_KERNELS_TRACE_WALK_STREAM_H
+#define TRACER_KERNELS_TRACE_WALK_STREAM_H
+
+#include "kernels/trace/walk_leaf.h"
+
+/* Rays of a stream at most, and live rays at or below which packets end in one. By tracer_bench:
+ * rays alone are up to 1.3 times as slow, at four of one origin or eight of many; lanes that are
+ * half empty cost more than streams, more so where they are fewer. */
+#define STREAM_SIZE 32
+#define STREAM_ANY STREAM_SIZE
+#define STREAM_CLOSEST (TRC_WIDTH < 16 ? STREAM_SIZE : 24)
+
+static void item_packet(struct walk *w, const struct trc_item *item, struct trc_live mask,
+                        bool any);
+
+struct stream {
+    float inv[3][STREAM_SIZE], shift[3][STREAM_SIZE]; /* 1 / d, -o / d */
+    float tmin[STREAM_SIZE], t[STREAM_SIZE];
+    float f[STREAM_SIZE];      /* moving trees: position between the keys */
+    uint16_t ray[STREAM_SIZE]; /* packet * TRC_PACKET_SIZE + its number there */
+    uint32_t alive;            /* any only: bits of those that are not occluded */
+};
+
+/* A subtree to visit. */
+struct stream_entry {
+    uint32_t ref, rays; /* rays: bits, into the stream */
+    float z;            /* closest only: of its box, the nearest mirrored one */
+};
+
+TRC_INLINE void stream_setup(const struct walk *w, const struct trc_live *live, bool motion,
+                             struct stream *s) {
+    int n = 0;
+    for (int k = 0; k < TRC_WALK_PACKETS; k++)
+        for (uint64_t m = live->of[k]; m; m &= m - 1, n++) {
+            const struct trc_packet *p = &w->packets[k];
+            const struct trc_sheared *g = &w->group->of[k];
+            const int i = __builtin_ctzll(m);
+            for (int axis = 0; axis < 3; axis++) {
+                s->inv[axis][n] = g->inv[axis][i];
+                s->shift[axis][n] = g->shift[axis][i];
+            }
+            s->tmin[n] = p->tmin[i];
+            s->t[n] = p->t[i];
+            s->f[n] = motion ? g->f[i] : 0.0f;
+            s->ray[n] = (uint16_t)(k * TRC_PACKET_SIZE + i);
+        }
+    s->alive = (uint32_t)((1ull << n) - 1);
+}
+
+/* For each child of a node the rays that meet its box; returns the bits of children with any. */
+TRC_INLINE uint32_t stream_node(const struct walk *w, uint32_t node, const struct stream *s,
+                                uint32_t rays, bool motion, uint32_t met[TRC_NODE_WIDTH]) {
+    const float *b = trc_node_bounds(w->tree, node, w->key);
+    const float *e = b + (motion ? TRC_NODE_KEY_BYTES / sizeof(float) : 0);
+    const f8 slack = f8_set(w->group->beam.slack);
+    f8 low[3], high[3];
+    for (int axis = 0; axis < 3; axis++) {
+        low[axis] = f8_load(b + 16 * axis) - slack;
+        high[axis] = f8_load(b + 16 * axis + 8) + slack;
+    }
+    i8x children, all = {0};
+    for (; rays; rays &= rays - 1) {
+        const int i = __builtin_ctz(rays);
+        f8 near = f8_set(s->tmin[i]), far = f8_set(s->t[i]);
+        for (int axis = 0; axis < 3; axis++) {
+            f8 l = low[axis], h = high[axis];
+            if (motion) {
+                const f8 f = f8_set(s->f[i]);
+                l += f * (f8_load(e + 16 * axis) - f8_load(b + 16 * axis));
+                h += f * (f8_load(e + 16 * axis + 8) - f8_load(b + 16 * axis + 8));
+            }
+            const f8 inv = f8_set(s->inv[axis][i]), shift = f8_set(s->shift[axis][i]);
+            l = f8_madd(l, inv, shift);
+            h = f8_madd(h, inv, shift);
+            near = f8_max(near, f8_min(l, h));
+            far = f8_min(far, f8_max(l, h));
+        }
+        all |= (i8x)(near <= far) & (int32_t)(1u << i);
+    }
+    memcpy(&children, trc_node_children(w->tree, node), sizeof children);
+    all &= children != (int32_t)TRC_REF_EMPTY; /* inverted boxes are met, too */
+    memcpy(met, &all, sizeof all);
+    return i8_nonzero(all);
+}
+
+#define CACHE_LINE 64
+#define NODE_LINES ((TRC_NODE_CHILDREN_BYTES + TRC_NODE_KEY_BYTES + CACHE_LINE - 1) / CACHE_LINE)
+#define LEAF_LINES 2 /* a leaf is of three triangles, mostly */
+/* Asks for the memory of what waits on a stack; a TLAS is small. */
+TRC_INLINE void ref_prefetch(const struct walk *w, uint32_t ref, bool any) {
+    const bool is_leaf = ref & TRC_REF_LEAF;
+    if (w->tree->is_top)
+        return;
+    const char *at = is_leaf ? (const char *)trc_leaf_vertices(w->tree, ref, w->key)
+                             : (const char *)trc_node_children(w->tree, ref);
+    for (int line = 0; line < (is_leaf ? LEAF_LINES : NODE_LINES); line++)
+        __builtin_prefetch(at + line * CACHE_LINE);
+    if (is_leaf && !any)
+        __builtin_prefetch(trc_leaf_slots(w->tree, ref));
+}
+
+/* Pushes the children that are met: to the closest hit the nearest on top, to any in any order. */
+TRC_INLINE int stream_push(const struct walk *w, uint32_t node, uint32_t bits,
+                           const uint32_t met[TRC_NODE_WIDTH], bool any, struct stream_entry *stack,
+                           int top) {
+    const uint32_t *children = trc_node_children(w->tree, node);
+    const struct trc_beam *b = &w->group->beam;
+    const float *z = trc_node_bounds(w->tree, node, w->key) + 16 * b->axis.z + 8 * b->side;
+    const int bottom = top;
+    for (; bits; bits &= bits - 1) {
+        const int child = __builtin_ctz(bits);
+        const struct stream_entry entry = {children[child], met[child], b->sign * z[child]};
+        int at = top++;
+        ref_prefetch(w, entry.ref, any);
+        for (; !any && at > bottom && stack[at - 1].z < entry.z; at--)
+            stack[at] = stack[at - 1];
+        stack[at] = entry;
+    }
+    return top;
+}
+
+/* A TLAS's leaf: on as packets. */
+TRC_INLINE void stream_item(struct walk *w, uint32_t ref, struct stream *s, uint32_t rays,
+                            bool any) {
+    struct trc_live live = {{0}};
+    for (uint32_t m = rays; m; m &= m - 1) {
+        const uint32_t ray = s->ray[__builtin_ctz(m)];
+        live.of[ray / TRC_PACKET_SIZE] |= 1ull << ray % TRC_PACKET_SIZE;
+    }
+    item_packet(w, &w->tree->items[trc_leaf_first(ref)], live, any);
+    for (uint32_t m = rays; m; m &= m - 1) {
+        const int i = __builtin_ctz(m);
+        const uint32_t k = s->ray[i] / TRC_PACKET_SIZE, ray = s->ray[i] % TRC_PACKET_SIZE;
+        if (any && (w->occluded.of[k] >> ray & 1u))
+            s->alive &= ~(1u << i);
+        s->t[i] = w->packets[k].t[ray];
+    }
+}
+
+TRC_INLINE void stream_leaf(struct walk *w, uint32_t ref, struct stream *s, uint32_t rays, bool any,
+                            bool motion) {
+    for (; rays; rays &= rays - 1) {
+        const int i = __builtin_ctz(rays);
+        const int k = s->ray[i] / TRC_PACKET_SIZE, ray = s->ray[i] % TRC_PACKET_SIZE;
+        if (leaf_single(w, ref, k, ray, any, motion)) {
+            w->occluded.of[k] |= 1ull << ray;
+            s->alive &= ~(1u << i);
+        }
+        if (!any)
+            s->t[i] = w->packets[k].t[ray];
+    }
+}
+
+/* Walks live rays, at most STREAM_SIZE, through the subtree at ref. */
+TRC_INLINE void stream_walk(struct walk *w, uint32_t ref, const struct trc_live *live, bool any,
+                            bool motion) {
+    struct stream_entry stack[TRC_STACK_SIZE];
+    struct stream s;
+    int top = 0;
+    stream_setup(w, live, motion, &s);
+    for (uint32_t rays = s.alive;;) {
+        if (!(ref & TRC_REF_LEAF)) {
+            uint32_t met[TRC_NODE_WIDTH];
+            TRC_COUNT(single_nodes, __builtin_popcount(rays));
+            const uint32_t bits = stream_node(w, ref, &s, rays, motion, met);
+            top = stream_push(w, ref, bits, met, any, stack, top);
+        } else if (w->tree->is_top) {
+            stream_item(w, ref, &s, rays, any);
+        } else {
+            stream_leaf(w, ref, &s, rays, any, motion);
+        }
+        do {
+            if (top == 0)
+                return;
+            ref = stack[--top].ref;
+            rays = any ? stack[top].rays & s.alive : stack[top].rays;
+        } while (!rays);
+    }
+}
+
+#endif

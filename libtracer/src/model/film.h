@@ -1,0 +1,88 @@
+/* The film: sums of samples per pixel and pass, written by tiles, read at any time.
+ *
+ * A pixel belongs to one tile and a tile to one thread, so sums need no locks and their order is
+ * fixed. A tile's batches of samples appear whole: model/sequence.h. Sums are doubles: 1e9 samples
+ * over 1e8 of dynamic range keep a relative error below 1e-6.
+ */
+#ifndef TRACER_MODEL_FILM_H
+#define TRACER_MODEL_FILM_H
+
+#include <stdatomic.h>
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "model/cryptomatte.h"
+#include "tracer/render.h"
+
+/* Passes that are sums have numbers below this. */
+#define TRC_SUM_COUNT TRC_PASS_LIGHT_GROUP(TRC_MAX_LIGHT_GROUPS)
+
+/* Pixels of a tile's side. 1024 pixels fill packets of 256 with one sample and still sort into
+ * useful groups by material; sums of all passes of a tile (49 doubles a pixel at most) stay in a
+ * second-level cache; a small preview still has tiles for all threads. */
+#define TRC_TILE_SIZE 32
+
+/* Tiles along a side of so many pixels. */
+static inline uint32_t trc_film_tiles(uint32_t pixels) {
+    return (uint32_t)(((uint64_t)pixels + TRC_TILE_SIZE - 1) / TRC_TILE_SIZE);
+}
+
+/* What a pixel's shadow catchers got, sums over its samples. Blocked over unblocked light is the
+ * ratio by which the footage darkens: of the sums, as ratios of samples would have a mean of their
+ * own. */
+struct trc_caught {
+    double blocked[3], unblocked[3]; /* light as it is, and with nothing but catchers in its way */
+    double background[3];            /* radiance that the world shows behind them; 0 where the film
+                                        is transparent */
+    double coverage;                 /* how much of the footage the catchers stand for */
+};
+
+struct trc_film {
+    uint32_t width, height;      /* of the crop */
+    double *sums[TRC_SUM_COUNT]; /* by pass: trc_film_channels * width * height, or NULL; bottom row
+                                    first. "First sample" passes hold the value itself */
+    struct trc_matte *mattes[TRC_CRYPTOMATTE_KINDS]; /* matte_count * width * height, or NULL */
+    uint32_t matte_count;                            /* places of a pixel's table; 0: no mattes */
+    uint32_t *sample_counts;                         /* width * height */
+    atomic_uint *sequences;    /* of the tiles: odd while one is written (model/sequence.h) */
+    bool shows_counts;         /* they are a pass */
+    struct trc_caught *caught; /* width * height, or NULL: the scene has no shadow catchers */
+    bool shows_shadows;        /* their shadows are a pass, so Combined is without them */
+    bool is_transparent;       /* trc_render_desc.film_transparent */
+};
+
+/* The sequence number of the tile that has the pixel. */
+static inline atomic_uint *trc_film_sequence(const struct trc_film *film, uint32_t x, uint32_t y) {
+    const size_t row = y / TRC_TILE_SIZE;
+    return &film->sequences[row * trc_film_tiles(film->width) + x / TRC_TILE_SIZE];
+}
+
+/* Whether the film has sums of a pass: it is asked for by the resolved desc, and by more than the
+ * counts of samples. */
+bool trc_film_has_sums(const trc_render_desc *desc, uint32_t pass);
+
+/* Sums of a pass for each pixel: its channels, and for the Vector pass the number of samples that
+ * hit something, as it is their mean. */
+#define TRC_MAX_FILM_CHANNELS 5
+uint32_t trc_film_channels(uint32_t pass);
+
+/* Whether a pass is a layer of mattes, the light of a group. */
+static inline bool trc_film_is_cryptomatte(uint32_t pass) {
+    return pass >= TRC_PASS_CRYPTOMATTE(0, 0) &&
+           pass < TRC_PASS_CRYPTOMATTE(TRC_CRYPTOMATTE_KINDS, 0);
+}
+static inline bool trc_film_is_light_group(uint32_t pass) {
+    return pass >= TRC_PASS_LIGHT_GROUP(0) && pass < TRC_PASS_LIGHT_GROUP(TRC_MAX_LIGHT_GROUPS);
+}
+
+/* Whether a pass holds the value of a pixel's first sample, not a sum. */
+bool trc_film_is_first_sample(uint32_t pass);
+
+/* Places of a pixel's table of mattes; 0: none are asked for. */
+uint32_t trc_film_matte_count(const trc_render_desc *desc);
+
+/* The colour pass that goes with a diffuse, glossy or transmission pass, TRC_PASS_COMBINED for
+ * others: light passes are divided by it when read, so whoever asks for one asks for it too. */
+uint32_t trc_film_color_pass(uint32_t pass);
+
+#endif

@@ -1,0 +1,81 @@
+/* The table of kernels of one instruction set, and the jobs they take. */
+#ifndef TRACER_MODEL_KERNELS_H
+#define TRACER_MODEL_KERNELS_H
+
+#include <stdatomic.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "model/adaptive.h"
+#include "model/film.h"
+#include "model/snapshot.h"
+#include "tracer/tracer.h"
+
+struct trc_range; /* model/range.h */
+struct trc_split; /* model/split.h */
+struct trc_split_blocks;
+
+/* Counts of one tile, summed by the renderer. */
+struct trc_tile_counts {
+    uint64_t rays_camera, rays_shadow, rays_reflection, rays_refraction;
+    uint64_t dropped_samples;
+    double seconds_trace, seconds_shade, seconds_other;
+};
+
+/* A rectangle of the crop and a range of its samples, for one thread. */
+struct trc_tile_job {
+    const struct trc_snapshot *snapshot;
+    const trc_render_desc *desc;   /* resolved: no 0-means-chosen values left */
+    const uint32_t *sampler_table; /* model/sobol.h */
+    const float *filter_table;     /* model/filter.h */
+    struct trc_film *film;
+    struct trc_adaptive *adaptive; /* NULL: every pixel gets every sample */
+    uint32_t x, y, width, height;  /* in the crop, pixels */
+    uint32_t sample_begin, sample_end;
+    void *memory;                  /* tile_memory_bytes(...) bytes, 64-byte aligned, one thread's */
+    const atomic_uint *cancel;     /* non-zero: return soon, the tile's pixels keep whole samples */
+    struct trc_tile_counts counts; /* added to */
+};
+
+struct trc_kernels {
+    uint32_t isa;   /* TRC_ISA_* */
+    uint32_t width; /* lanes */
+    /* Bytes of scratch memory a tile job needs; desc is resolved. Read of the scene are its
+     * features and how many rays a hit may send. */
+    size_t (*tile_memory_bytes)(const trc_render_desc *desc, const struct trc_snapshot *snapshot);
+    /* Renders a job; never fails. The thread's floating-point state must be the default. */
+    void (*tile_render)(struct trc_tile_job *job);
+    /* trc_query_*: arguments already validated; chunk [begin, end) of the arrays. packet_size
+     * resolved. */
+    void (*query_closest)(const struct trc_snapshot *snapshot, const trc_rays *rays,
+                          const trc_hits *hits, uint64_t begin, uint64_t end, uint32_t packet_size);
+    void (*query_occluded)(const struct trc_snapshot *snapshot, const trc_rays *rays,
+                           uint8_t *occluded, uint64_t begin, uint64_t end, uint32_t packet_size);
+    /* Radiance of a world material for count directions (3 floats each) into 3 floats each: fills
+     * importance maps at commit. */
+    void (*world_evaluate)(const struct trc_snapshot *snapshot, const float *directions,
+                           float *radiance, uint32_t count);
+    /* One pure operation of a program (model/program.h): out gets its outputs. table: if
+     * trc_op_has_table. Of the one-lane kernels alone, NULL in others. */
+    void (*program_fold)(uint32_t op, uint32_t mode, const float *table, const float *in,
+                         float *out);
+    /* Builds: the cheapest plane of a range, or axis -1 if no plane parts its refs. Every
+     * instruction set finds the same. May sort the refs. blocks: to be found by all threads; NULL:
+     * by this one. */
+    void (*split_find)(struct trc_split_blocks *blocks, const struct trc_range *r,
+                       struct trc_split *out);
+    /* Both sides of that plane, their refs in the range's order, in its spare memory; its refs'
+     * memory is spare then. With blocks: those of the last search; cancelled, both leave refs in
+     * any state. */
+    void (*split_apply)(struct trc_split_blocks *blocks, const struct trc_range *r,
+                        const struct trc_split *s, struct trc_range *left, struct trc_range *right);
+};
+
+/* The table of an instruction set that this build and CPU have, else NULL. Tables are
+ * constants named trc_kernels_scalar, _sse42, _avx2, _avx512, _neon (kernels/table.c). */
+const struct trc_kernels *trc_kernels_get(uint32_t isa);
+
+/* The table in force: trc_set_isa, TRACER_ISA, CPU. Never NULL. */
+const struct trc_kernels *trc_kernels_current(void);
+
+#endif

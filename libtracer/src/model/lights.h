@@ -1,0 +1,144 @@
+/* The lights of a committed scene: what kernels/light/ read.
+ *
+ * Lamps, the world and emissive triangles, their strengths turned into radiance as Cycles 3.4 does,
+ * and what chooses among them: a list of suns and world, and for lights with a place either a list
+ * or, when there are many, a tree (A. Conty Estevez and C. Kulla, "Importance Sampling of Many
+ * Lights with Adaptive Tree Splitting", 2018). Immutable once created; threads share it. */
+#ifndef TRACER_MODEL_LIGHTS_H
+#define TRACER_MODEL_LIGHTS_H
+
+#include <stdatomic.h>
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "model/snapshot.h"
+
+enum trc_light_kind {
+    TRC_KIND_POINT,
+    TRC_KIND_SPOT,
+    TRC_KIND_SUN,
+    TRC_KIND_RECTANGLE,
+    TRC_KIND_ELLIPSE,
+    TRC_KIND_WORLD,
+    TRC_KIND_TRIANGLE
+};
+
+enum {
+    TRC_LAMP_DELTA = 1, /* no extent: continuation rays never meet it */
+    TRC_LAMP_MIS = 2,   /* continuation rays see it */
+    TRC_LAMP_CASTS_SHADOW = 4,
+    TRC_LAMP_SPHERE = 8,    /* TRC_LIGHT_SPHERE */
+    TRC_LAMP_EVEN_CONE = 16 /* TRC_LIGHT_EVEN_CONE */
+};
+
+/* A lamp: 32 words, read by gathers of TRC_LAMP_WORDS stride. Positions in world space. */
+#define TRC_LAMP_WORDS 32
+struct trc_lamp {
+    float position[3];          /* centre; of a sun the unit direction towards it */
+    float axis_u[3], axis_v[3]; /* area: unit */
+    float normal[3];            /* the way spot and area shine, unit */
+    float radiance[3]; /* towards a point that sees it head-on; delta: intensity, sun irradiance */
+    float half_u,
+        half_v;         /* area: half sizes; point, spot: radius; sun: tangent of the half angle */
+    float cos_cone;     /* spot: of the half angle; sun: of its angular radius */
+    float inv_smooth;   /* spot: 1 / width of the soft edge in cosine, 0 for a hard one */
+    float tan_spread;   /* area: cotangent of half the spread, 0 for no limit */
+    float spread_scale; /* area: factor that keeps the power */
+    float inv_area;
+    int32_t kind, flags;
+    uint32_t visibility; /* TRC_VISIBLE_*, UNBLOCKED too */
+    uint32_t group;      /* light group; 0: none */
+    float unused[6];
+};
+
+/* An emissive triangle. */
+#define TRC_TRIANGLE_WORDS 16
+struct trc_light_triangle {
+    float v0[3], v1[3], v2[3]; /* world corners; of a moving one at key 0 */
+    float emission[3];         /* constant, or an estimate where varies */
+    int32_t instance, triangle;
+    uint32_t material; /* into snapshot materials */
+    uint32_t flags;    /* TRC_TRIANGLE_* */
+};
+enum {
+    TRC_TRIANGLE_MOVES = 1, /* its corners depend on time */
+    TRC_TRIANGLE_VARIES = 2 /* its emission is the material's program at the point */
+};
+
+/* Bounds of one light or of a subtree: a sphere, a cone of normals, the intensity inside. */
+#define TRC_BOUND_WORDS 16
+struct trc_light_bound {
+    float center[3], radius;
+    float axis[3];      /* mean direction of emission */
+    float cos_o, sin_o; /* spread of the normals about the axis */
+    float cos_e;        /* emission beyond the normals' cone; cos of the angle */
+    float intensity;    /* on the axis, W / sr */
+    int32_t two_sided;  /* the axis counts in both directions */
+    int32_t child; /* inner node: index of the second child, the first is the next node; leaf: -1 */
+    int32_t light; /* leaf: number of the light */
+    int32_t unused[2];
+};
+
+/* Of a scene-linear colour. */
+static inline float trc_luminance(const float c[3]) {
+    return 0.2126729f * c[0] + 0.7151522f * c[1] + 0.0721750f * c[2];
+}
+
+/* The disc of trc_world_desc, which is sampled beside the cells of the map. */
+struct trc_world_sun {
+    float direction[3]; /* unit */
+    float sine;         /* of its radius */
+    float tangent;      /* of its radius */
+    float square_chord; /* from its middle to its rim on the unit sphere */
+    float share;        /* of the light samples where it is above the surface; 0: no sun */
+};
+
+/* Importance map of the world: cells of equal angle, v = 0 at +Z. */
+struct trc_world_map {
+    atomic_uint refs;
+    uint32_t width, height;
+    float *rows;      /* (width + 1) * height: running sums of each row, 0 to 1 */
+    float *marginal;  /* height + 1 */
+    float *density;   /* width * height: value over the mean, per unit square */
+    float average[3]; /* mean radiance over the sphere */
+    struct trc_world_sun sun;
+};
+
+/* Up to so many lights with a place the chances of all are computed at each point. */
+#define TRC_LIGHT_LIST_MAX 32
+/* With more there is a tree, and what is computed at each point are the chances of so many of its
+ * nodes, suns included. */
+#define TRC_LIGHT_CUT_MAX 8
+
+struct trc_light_table {
+    uint32_t lamp_count, triangle_count;
+    uint32_t world_light;    /* number of the world as a light, or UINT32_MAX */
+    uint32_t first_triangle; /* number of the first emissive triangle */
+    uint32_t kinds;          /* 1 << kind of every light present */
+    bool hides;       /* some light is not visible to all of diffuse, glossy, transmission, or
+                         not of the footage behind shadow catchers */
+    bool single;      /* there is exactly one light (world apart: besides it) */
+    bool world_apart; /* the world is sampled beside the other lights, not chosen among them */
+    bool moves;       /* some emissive triangle moves */
+    bool varies;      /* some has emission by program */
+    struct trc_lamp *lamps;
+    struct trc_light_triangle *triangles;
+    /* Chosen among: bounds in a list, or a tree of which bounds[0] is the root. Candidates are the
+     * list or a cut through the tree, as indices of bounds, then what is distant. */
+    struct trc_light_bound *bounds;
+    uint32_t bound_count;
+    uint32_t cut[TRC_LIGHT_LIST_MAX], cut_count;
+    uint32_t *candidates; /* per light: the candidate it belongs to; UINT32_MAX: never chosen */
+    uint32_t *trails;     /* tree: per light, the turns from its candidate on, first in bit 0, 1 the
+                             second child */
+    uint32_t *distant;    /* numbers of suns, and the world unless apart */
+    float *distant_irradiance;
+    uint32_t distant_count;
+    uint32_t *seen;                                /* lamps that rays can meet, by light group */
+    uint32_t group_seen[TRC_MAX_LIGHT_GROUPS + 2]; /* the first of each group, and their number */
+    uint32_t *instance_triangles; /* per instance: how many of its triangles are lights */
+    struct trc_world_map *map;    /* NULL: cosine or uniform sampling */
+    uint32_t world_visibility;    /* of its light samples */
+};
+
+#endif

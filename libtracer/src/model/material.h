@@ -1,0 +1,138 @@
+/* A compiled material: a list of shader leaves and the program that computes their inputs.
+ *
+ * Compiled by shading/compile.c from the public node list: mix and add shaders become weights of
+ * leaves, constants are folded, equal nodes merged, unreached ones dropped. An input is an operand:
+ * a constant, or a register of the program. A material of constants has no program. */
+#ifndef TRACER_MODEL_MATERIAL_H
+#define TRACER_MODEL_MATERIAL_H
+
+#include <stdatomic.h>
+#include <stdint.h>
+
+#include "tracer/tracer.h"
+
+#define TRC_MAX_LEAVES 16
+#define TRC_MAX_REGISTERS 256
+
+/* One float: a constant, or what the program left in a register. */
+struct trc_operand {
+    int32_t
+        reg; /* -1: constant. -2: unlinked normal, tangent or vector: the default of its place */
+    float value;
+};
+
+/* One shader node that the output reaches, with the factor of the mix nodes above it. */
+struct trc_leaf {
+    uint32_t type;             /* TRC_NODE_DIFFUSE ... TRC_NODE_PRINCIPLED */
+    uint32_t mode;             /* distribution */
+    struct trc_operand weight; /* product of mix factors, [0, 1] or more for added shaders */
+    uint32_t first_operand;    /* the node's inputs in order, 3 operands for a colour or vector */
+    uint32_t operand_count;
+};
+
+/* Where the inputs of leaves stand among their operands, in floats. The colour comes first. */
+enum {
+    TRC_EMISSION_STRENGTH = 3,
+    TRC_ROUGHNESS = 3, /* of the simple shaders */
+    TRC_GLOSSY_ANISOTROPY = 4,
+    TRC_GLOSSY_TANGENT = 9,
+    TRC_PRINCIPLED_SUBSURFACE = 3,
+    TRC_PRINCIPLED_METALLIC = 7,
+    TRC_PRINCIPLED_SPECULAR = 8,
+    TRC_PRINCIPLED_ROUGHNESS = 10,
+    TRC_PRINCIPLED_ANISOTROPY = 11,
+    TRC_PRINCIPLED_SHEEN = 13,
+    TRC_PRINCIPLED_CLEARCOAT = 15,
+    TRC_PRINCIPLED_CLEARCOAT_ROUGHNESS = 16,
+    TRC_PRINCIPLED_TRANSMISSION = 18,
+    TRC_PRINCIPLED_TRANSMISSION_ROUGHNESS = 19,
+    TRC_PRINCIPLED_EMISSION = 20,
+    TRC_PRINCIPLED_EMISSION_STRENGTH = 23,
+    TRC_PRINCIPLED_ALPHA = 24,
+    TRC_PRINCIPLED_TANGENT = 31,
+    TRC_LAYERED_METALLIC = 3,
+    TRC_LAYERED_ROUGHNESS = 4,
+    TRC_LAYERED_IOR = 5,
+    TRC_LAYERED_ALPHA = 6,
+    TRC_LAYERED_NORMAL = 7,
+    TRC_LAYERED_DIFFUSE_ROUGHNESS = 10,
+    TRC_LAYERED_SPECULAR_LEVEL = 11,
+    TRC_LAYERED_SPECULAR_TINT = 12,
+    TRC_LAYERED_ANISOTROPY = 15,
+    TRC_LAYERED_ROTATION = 16,
+    TRC_LAYERED_TANGENT = 17,
+    TRC_LAYERED_TRANSMISSION = 20,
+    TRC_LAYERED_COAT = 21,
+    TRC_LAYERED_COAT_ROUGHNESS = 22,
+    TRC_LAYERED_COAT_IOR = 23,
+    TRC_LAYERED_COAT_TINT = 24,
+    TRC_LAYERED_COAT_NORMAL = 27,
+    TRC_LAYERED_SHEEN = 30,
+    TRC_LAYERED_SHEEN_ROUGHNESS = 31,
+    TRC_LAYERED_SHEEN_TINT = 32,
+    TRC_LAYERED_EMISSION = 35,
+    TRC_LAYERED_EMISSION_STRENGTH = 38
+};
+
+/* A value besides the surface that a pass shows. */
+#define TRC_MAX_AOV_OUTPUTS 32
+struct trc_aov_output {
+    uint32_t pass;          /* TRC_PASS_AOV_* */
+    uint32_t first_operand; /* one for a value, three for a colour */
+};
+
+/* One step of a program on registers of TRC_WIDTH floats. Opcodes and their meaning of fields are
+ * private to shading/compile.c and kernels/program/program.c (model/program.h). */
+struct trc_instruction {
+    uint16_t op;
+    uint16_t mode;
+    uint16_t out; /* first register written */
+    uint16_t input_count;
+    uint32_t first_input; /* into operands */
+    uint32_t resource;    /* image, attribute name or table offset */
+};
+
+/* What the leaves may do, over all values of their inputs: decides code paths and features. */
+enum {
+    TRC_MATERIAL_HAS_DIFFUSE = 1 << 0,
+    TRC_MATERIAL_HAS_SPECULAR = 1 << 1, /* ideal lobes */
+    TRC_MATERIAL_HAS_GLOSSY = 1 << 2,   /* rough lobes */
+    TRC_MATERIAL_HAS_REFRACTION = 1 << 3,
+    TRC_MATERIAL_HAS_TRANSPARENCY = 1 << 4, /* transparent leaf or alpha below 1 */
+    TRC_MATERIAL_HAS_EMISSION = 1 << 5,
+    TRC_MATERIAL_HAS_PROGRAM = 1 << 6,
+    TRC_MATERIAL_HAS_TEXTURE = 1 << 7,
+    TRC_MATERIAL_HAS_TRANSLUCENT = 1 << 8,
+    TRC_MATERIAL_HAS_HOLDOUT = 1 << 9,
+    TRC_MATERIAL_EMISSION_VARIES = 1 << 10, /* emission depends on the program */
+    TRC_MATERIAL_READS_LIGHT_PATH = 1 << 11,
+    TRC_MATERIAL_READS_FOOTPRINT = 1 << 12, /* an image has smaller levels */
+    /* Lobes that no ray is continued for: only samples of lights bring them light. */
+    TRC_MATERIAL_IS_MATT = TRC_MATERIAL_HAS_DIFFUSE | TRC_MATERIAL_HAS_TRANSLUCENT,
+    /* All lobes that light samples light. */
+    TRC_MATERIAL_SCATTERS = TRC_MATERIAL_IS_MATT | TRC_MATERIAL_HAS_GLOSSY
+};
+
+struct trc_material {
+    atomic_uint refs;
+    uint32_t has;   /* TRC_MATERIAL_HAS_* */
+    uint32_t flags; /* TRC_MATERIAL_* of the public header */
+    int32_t pass_index;
+    float cryptomatte;     /* id of its name */
+    uint32_t branch_count; /* rays that a hit sends on at most, if all lobes are followed */
+    uint32_t leaf_count, operand_count, instruction_count, register_count, table_count;
+    struct trc_leaf leaves[TRC_MAX_LEAVES];
+    uint32_t aov_count;
+    struct trc_aov_output *aovs; /* NULL: none */
+    struct trc_operand *operands;
+    struct trc_instruction *instructions;
+    float *tables;
+    float emission[3]; /* constant emission; a mean estimate when it varies */
+};
+
+/* Whether shadow rays may pass it. */
+static inline uint8_t trc_material_shadows_transparent(const struct trc_material *m) {
+    return (m->has & TRC_MATERIAL_HAS_TRANSPARENCY) && (m->flags & TRC_MATERIAL_TRANSPARENT_SHADOW);
+}
+
+#endif

@@ -1,0 +1,151 @@
+/* The committed scene: everything that kernels read, immutable once published.
+ *
+ * Built by commit (scene/commit.c), reference-counted, kept alive by renders and queries. What did
+ * not change between two commits is shared between their snapshots. No pointers back to the
+ * editable scene. */
+#ifndef TRACER_MODEL_SNAPSHOT_H
+#define TRACER_MODEL_SNAPSHOT_H
+
+#include <stdatomic.h>
+#include <stdint.h>
+
+#include "tracer/tracer.h"
+
+struct trc_bvh;         /* bvh/bvh.h */
+struct trc_material;    /* model/material.h */
+struct trc_light_table; /* shading/lights.h */
+struct trc_image;       /* image/image.h */
+
+/* One attribute per triangle corner. */
+struct trc_attribute {
+    uint32_t name;  /* index of the name in the snapshot's name table (trc_names) */
+    uint32_t width; /* 2 or 4 */
+    float *values;  /* width * 3 * triangle_count */
+};
+
+/* Geometry of a mesh, shared and immutable; refs counts the holders. */
+struct trc_mesh {
+    atomic_uint refs;
+    uint32_t key_count;
+    uint32_t vertex_count, triangle_count;
+    float *positions;      /* 3 * vertex_count * key_count, and one unset beyond: f4_load3_padded */
+    uint32_t *indices;     /* 3 * triangle_count */
+    float *vertex_normals; /* 3 * vertex_count * key_count or NULL */
+    float *corner_normals; /* 9 * triangle_count * key_count or NULL; rules over vertex_normals */
+    uint8_t *smooth;       /* per triangle, or NULL: none smooth (corner normals: all) */
+    uint16_t *material_index; /* per triangle, or NULL: all 0 */
+    uint32_t attribute_count;
+    struct trc_attribute attributes[TRC_MAX_ATTRIBUTES];
+    float *generated;   /* 3 * vertex_count or NULL */
+    int32_t default_uv; /* index of the first attribute of width 2, or -1 */
+    float bounds_lower[3],
+        bounds_upper[3]; /* object space, all keys: Generated coordinates use key 0 */
+};
+
+/* Coordinates beyond this, or not finite, take their triangles out of the scene: sums and
+ * differences of what remains stay far from overflow, and so do the squares in a triangle test
+ * (1.8e18^2 = 3.2e36). */
+#define TRC_MAX_COORDINATE 1.8e18f
+
+/* Whether all three coordinates are finite and within the limit. */
+static inline int trc_point_is_valid(const float p[3]) {
+    const float m = TRC_MAX_COORDINATE; /* a NaN fails every comparison */
+    return p[0] >= -m && p[0] <= m && p[1] >= -m && p[1] <= m && p[2] >= -m && p[2] <= m;
+}
+
+/* A 3x4 matrix, rows. */
+struct trc_affine {
+    float m[12];
+};
+
+/* Visibility beside TRC_VISIBLE_*. Unblocked rays find the light that would be there if nothing but
+ * shadow catchers could be in its way (kernels/tile/catcher.c). */
+enum {
+    TRC_VISIBLE_UNBLOCKED = 1 << 5, /* of such rays, of shadow catchers, of lights they find */
+    TRC_UNBLOCKED_SHIFT = 8 /* shadow catchers have their TRC_VISIBLE_* here once more, so that one
+                               test of a traversal tells which unblocked rays meet them */
+};
+
+struct trc_instance {
+    uint32_t mesh; /* into snapshot meshes */
+    uint32_t key_count;
+    const struct trc_affine *object_to_world; /* key_count */
+    const struct trc_affine *world_to_object; /* key_count, inverse of each key; of one that
+                                                 has none see trc_affine_invert_thin */
+    uint32_t visibility;                      /* TRC_VISIBLE_*; of catchers more, see above */
+    uint32_t material_count;                  /* >= 1 */
+    const uint32_t *materials;                /* into snapshot materials, per slot */
+    uint32_t value_count;
+    const float *values; /* for TRC_OP_INSTANCE_VALUES */
+    int32_t pass_index;
+    float random;
+    float color[4];
+    float cryptomatte_object, cryptomatte_asset;
+    uint32_t light_group; /* of its emission, from 1 on; 0: none */
+    uint32_t first_light; /* first emissive-triangle light of this instance or UINT32_MAX */
+    uint32_t flips;       /* 1: negative determinant at key 0 */
+    uint32_t is_identity; /* 1: one key, which changes no point */
+    uint32_t is_thin; /* 1: some key's transform is (scene/affine.h); rays meet a tree of its own
+                         in world space */
+};
+
+struct trc_camera {
+    uint32_t type;
+    uint32_t key_count;
+    struct trc_affine *camera_to_world;   /* key_count, axes of unit length */
+    float (*windows)[4];                  /* key_count: left, right, bottom, top */
+    struct trc_affine world_to_camera[3]; /* at the start, middle and end of the shutter */
+    float axes_volume; /* the smallest of all keys' (scene/affine.h); 1: nothing is sheared */
+    float clip_start, clip_end;
+    float aperture_radius, focus_distance, blade_rotation, aperture_ratio;
+    uint32_t blade_count;
+    float *shutter_cdf_inverse; /* 256 values of time, or NULL: identity */
+    uint32_t has_motion;        /* shutter open: rays carry a time */
+};
+
+struct trc_world {
+    uint32_t material; /* into snapshot materials, or UINT32_MAX: black */
+    uint32_t visibility;
+    uint32_t is_constant; /* radiance below rules, no program */
+    float radiance[3];
+    float ao_distance, ao_factor;
+    uint32_t ao_method; /* TRC_AO_* */
+    uint32_t light_group;
+};
+
+struct trc_snapshot {
+    atomic_uint refs;
+    uint32_t features;     /* TRC_FEATURE_* */
+    uint32_t branch_count; /* rays that a hit sends on at most, if all lobes are followed; >= 1 */
+    uint32_t mesh_count, instance_count, material_count, image_count;
+    struct trc_mesh **meshes;
+    struct trc_instance *instances;
+    struct trc_material **materials; /* [0] is the default material */
+    struct trc_image **images;
+    const struct trc_bvh *bvh;      /* what rays are traced against; never NULL, may be empty */
+    struct trc_light_table *lights; /* never NULL */
+    struct trc_camera camera;
+    uint32_t has_camera;
+    struct trc_world world;
+    trc_scene_stats stats;
+};
+
+/* Position of an instance's transform at a time. Formula of every interpolation in the library:
+ * a + f * (b - a), so that what stands still keeps its bits beside what never had keys. Bounds
+ * built from keys contain what lies between up to rounding, which kernels/trace/beam.h allows for.
+ */
+static inline void trc_key_at(float time, uint32_t key_count, uint32_t *key, float *f) {
+    if (key_count < 2) {
+        *key = 0;
+        *f = 0.0f;
+        return;
+    }
+    const float x = (time > 0.0f ? (time < 1.0f ? time : 1.0f) : 0.0f) * (float)(key_count - 1);
+    uint32_t k = (uint32_t)x;
+    if (k > key_count - 2)
+        k = key_count - 2;
+    *key = k;
+    *f = x - (float)k;
+}
+
+#endif

@@ -1,0 +1,146 @@
+/* The memory of a tree: 8-wide nodes and leaves of 1 to 8 triangles, with bounds and vertices at
+ * every motion key.
+ *
+ * A node is 8 child references followed, for each key, by 48 floats: for each axis 8 lower bounds,
+ * then 8 upper ones. It lies in four cache lines, in motion in seven, whether it begins with one or
+ * in the middle of one. Unused children have inverted infinite bounds. Nodes stand before their
+ * children, so that a backward walk refits.
+ *
+ * Triangles stand in slots, those of a leaf side by side: its reference has the first and the
+ * count. A leaf of n has, for each key, 9 n floats: vertex by axis by slot, without gaps between
+ * leaves, since fetching leaves is a good part of an incoherent ray's time. Kernels load 8 slots
+ * whatever the count and ignore the lanes beyond it; after the last leaf there is room for that.
+ * What a hit needs to know of a slot is kept apart.
+ *
+ * All of that is the same for every instruction set, whatever its width, to the bit: trees serve
+ * each of them.
+ *
+ * A TLAS has the same nodes; its leaves have no vertices: each is one entry of items. */
+#ifndef TRACER_MODEL_TREE_H
+#define TRACER_MODEL_TREE_H
+
+#include <stdatomic.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "model/snapshot.h"
+
+#define TRC_NODE_WIDTH 8
+#define TRC_NODE_CHILDREN_BYTES 32
+#define TRC_NODE_KEY_BYTES 192
+#define TRC_TRIANGLE_FLOATS 9
+
+/* A reference: a node's index, or a leaf's first slot with TRC_REF_LEAF and its count - 1 in bits
+ * 28-30. */
+#define TRC_REF_LEAF 0x80000000u
+#define TRC_REF_INDEX_MASK 0x0fffffffu
+#define TRC_REF_EMPTY 0xffffffffu
+
+/* Instance word of a slot: the instance's index, and a bit for materials that shadow rays may
+ * see through. */
+#define TRC_SLOT_TRANSPARENT 0x80000000u
+#define TRC_SLOT_INSTANCE_MASK 0x7fffffffu
+
+/* Deepest level a builder makes: splits are forced to the middle where the levels left would not do
+ * otherwise. A traversal pushes at most 7 entries a level. */
+#define TRC_MAX_LEVELS 48
+#define TRC_STACK_SIZE (TRC_MAX_LEVELS * (TRC_NODE_WIDTH - 1) + 1)
+
+struct trc_tree;
+
+struct trc_slot {
+    uint32_t instance; /* word, see above */
+    uint32_t triangle; /* of the mesh */
+};
+
+/* What a TLAS leaf stands for. */
+struct trc_item {
+    const struct trc_tree *tree;
+    uint32_t instance; /* into the snapshot's instances; TRC_NO_HIT: the joined world-space tree */
+    uint32_t visibility; /* TRC_VISIBLE_* */
+};
+
+/* The slots of a tree and its refits. */
+struct trc_slot_block {
+    atomic_uint refs;
+    struct trc_slot slots[];
+};
+
+/* Vertices of the triangle in each slot, in the order in which refits meet them: without it, when
+ * they are asked of the mesh, a refit takes a fifth longer. */
+struct trc_slot_vertices {
+    atomic_uint refs;
+    uint32_t index[][3];
+};
+
+struct trc_tree {
+    uint32_t key_count;
+    uint32_t node_count, slot_count;
+    uint32_t root; /* reference; TRC_REF_EMPTY for no triangles */
+    size_t node_stride;
+    uint8_t *nodes;                          /* node_count * node_stride, 32-byte aligned */
+    float *vertices;                         /* slot_count * key_count * 9, and a load beyond */
+    struct trc_slot_block *slots;            /* slot_count; TLAS: NULL, as vertices are */
+    struct trc_slot_vertices *slot_vertices; /* shared by refits of one tree; or NULL */
+    const struct trc_item *items;            /* TLAS only, by slot */
+    bool is_top;
+    bool has_transparent;     /* some slot has TRC_SLOT_TRANSPARENT */
+    bool has_pieces;          /* a triangle may stand in several leaves (bvh/clip.h) */
+    float lower[3], upper[3]; /* over all keys; lower > upper when empty */
+    float extent;             /* largest |coordinate| of the bounds: scale of rounding errors */
+    uint64_t triangle_count, skipped_count;
+    float sah_cost;
+    uint64_t bytes;
+};
+
+/* A tree shared between snapshots. */
+struct trc_blas {
+    atomic_uint refs;
+    const struct trc_mesh
+        *mesh;        /* identity only: compared while the snapshot that holds it lives */
+    float built_cost; /* SAH cost when last built, to judge refits */
+    struct trc_tree tree;
+};
+
+/* The tree of a thin instance, in world space. */
+struct trc_thin {
+    struct trc_blas blas; /* first: it is released as one */
+    uint32_t key_count;   /* of the instance, whose transforms follow */
+    struct trc_affine transforms[];
+};
+
+struct trc_bvh {
+    const struct trc_tree *tree; /* the TLAS, or the joined tree when it is all there is */
+    struct trc_tree top, joined;
+    struct trc_item *items;
+    struct trc_blas **blas; /* per snapshot mesh, NULL where only the joined tree has it */
+    uint32_t blas_count;
+    struct trc_thin **thin; /* per snapshot instance, NULL where it is not thin or is joined; NULL
+                               where none has one */
+    uint32_t thin_count;
+};
+
+static inline const uint32_t *trc_node_children(const struct trc_tree *t, uint32_t node) {
+    return (const uint32_t *)(t->nodes + (size_t)node * t->node_stride);
+}
+/* 48 floats: [axis][lower, upper][child]. */
+static inline const float *trc_node_bounds(const struct trc_tree *t, uint32_t node, uint32_t key) {
+    return (const float *)(t->nodes + (size_t)node * t->node_stride + TRC_NODE_CHILDREN_BYTES +
+                           (size_t)key * TRC_NODE_KEY_BYTES);
+}
+static inline uint32_t trc_leaf_first(uint32_t ref) { return ref & TRC_REF_INDEX_MASK; }
+static inline const struct trc_slot *trc_leaf_slots(const struct trc_tree *t, uint32_t ref) {
+    return t->slots->slots + trc_leaf_first(ref);
+}
+static inline uint32_t trc_leaf_count(uint32_t ref) { return ((ref >> 28) & 7u) + 1u; }
+static inline uint32_t trc_leaf_ref(uint32_t first, uint32_t count) {
+    return TRC_REF_LEAF | (count - 1) << 28 | first;
+}
+/* 9 * count floats: [vertex][axis][slot]; the next key's follow. */
+static inline float *trc_leaf_vertices(const struct trc_tree *t, uint32_t ref, uint32_t key) {
+    return t->vertices + TRC_TRIANGLE_FLOATS * ((size_t)trc_leaf_first(ref) * t->key_count +
+                                                (size_t)key * trc_leaf_count(ref));
+}
+
+#endif
