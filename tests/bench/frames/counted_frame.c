@@ -6,6 +6,7 @@
 #include "buffers.h"
 #include "core/core.h"
 #include "core/fpstate.h"
+#include "film/film.h"
 #include "model/filter.h"
 #include "model/kernels.h"
 #include "model/sobol.h"
