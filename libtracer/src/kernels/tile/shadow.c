@@ -97,7 +97,7 @@ static uint64_t transparency(struct trc_tile *t, struct trc_packet *p,
             if (!vm_any(met))
                 continue;
             vvec3 f = v3_zero();
-            if (depth <= t->desc->max_transparent_depth)
+            if (depth < t->desc->max_transparent_depth)
                 f = surface_transparency(t, p, hits, i, met, vu_set(TRC_VISIBLE_SHADOW));
             const vfloat channel[3] = {f.x, f.y, f.z};
             for (int k = 0; k < 3; k++)

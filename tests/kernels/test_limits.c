@@ -1,0 +1,264 @@
+/* Where rays end: the camera's clipping, the limits of bounces, switches of the world, and what is
+ * reported of light that is no number; pictures beside what they are known to show. */
+#include "node_list.h"
+#include "picture_test.h"
+
+/* Pixels of the level view: columns from x = 0 to 4, seen from 1 m above in parallel rays. */
+enum { WIDTH = 16, HEIGHT = 4, FRAME = WIDTH * HEIGHT };
+
+#define LIGHT 0.7f
+
+static trc_render_desc level_desc(void) {
+    trc_render_desc desc = default_render_desc(WIDTH, HEIGHT, 4);
+    desc.filter = TRC_FILTER_BOX;
+    desc.filter_width = 0.01f;
+    return desc;
+}
+
+/* Every pixel of a pass shows that in its first channel. */
+static void expect_all(trc_scene scene, const trc_render_desc *desc, uint32_t pass, double want,
+                       double allowed) {
+    static float pixels[4 * FRAME];
+    const uint32_t channels = trc_pass_channels(pass);
+    fixture_draw(scene, desc, pass, pixels, (uint64_t)channels * FRAME);
+    for (uint32_t p = 0; p < FRAME; p++)
+        if (!(fabs((double)pixels[channels * p] - want) <= allowed))
+            fail_msg("pixel %u is %.6f, not %.6f", p, (double)pixels[channels * p], want);
+}
+
+static trc_id emission(trc_scene scene) {
+    return fixture_material(scene, TRC_NODE_EMISSION, LIGHT);
+}
+
+/* Clear panes above each other, the first at z. */
+static void add_panes(trc_scene scene, uint32_t count, float z) {
+    struct node_list list = {0};
+    NODE_ADD(&list, TRC_NODE_TRANSPARENT, 0, node_color(1.0f, 1.0f, 1.0f));
+    const trc_material_desc desc = node_list_material(&list, 0);
+    trc_id glass = 0;
+    assert_ok(trc_material_create(scene, &desc, &glass));
+    for (uint32_t k = 0; k < count; k++)
+        fixture_level(scene, 20.0f, z + 0.25f * (float)k, glass);
+}
+
+/* ---- the camera's clipping ---- */
+
+/* Of a wide view down from 6 m: what is less deep than the clip's start is not there, in the
+ * corners as in the middle, though it is farther away than that. */
+static void clipping_begins_at_a_depth(void **state) {
+    (void)state;
+    static const float window[4] = {-2.0f, 2.0f, -2.0f, 2.0f};
+    enum { SIZE = 8 };
+    for (int is_clipped = 0; is_clipped < 2; is_clipped++) {
+        const trc_scene scene = scene_create();
+        trc_camera_desc camera = camera_desc(window);
+        camera.clip_start = 3.0f;
+        fixture_level(scene, 100.0f, is_clipped ? 3.1f : 2.9f,
+                      fixture_material(scene, TRC_NODE_EMISSION, 0.25f));
+        fixture_level(scene, 100.0f, 0.0f, emission(scene));
+        set_camera(scene, &camera);
+        const trc_render_desc desc = render_desc(SIZE, 4);
+        float pixels[4 * SIZE * SIZE];
+        render(scene, &desc, pixels);
+        for (int p = 0; p < SIZE * SIZE; p++)
+            assert_float_equal(pixels[4 * p], is_clipped ? LIGHT : 0.25f, 1e-6f);
+        assert_ok(trc_scene_destroy(scene));
+    }
+}
+
+/* Whether straight ahead or through panes. */
+static void clipping_ends_behind_panes_too(void **state) {
+    (void)state;
+    for (uint32_t panes = 0; panes < 3; panes++)
+        for (int is_clipped = 0; is_clipped < 2; is_clipped++) {
+            const trc_scene scene = fixture_level_view();
+            static const float transform[12] = {1, 0, 0, 2, 0, 1, 0, 0, 0, 0, 1, 1};
+            static const float window[4] = {-2.0f, 2.0f, -0.5f, 0.5f};
+            trc_camera_desc camera = default_camera_desc();
+            camera.type = TRC_CAMERA_ORTHOGRAPHIC;
+            camera.transforms = transform;
+            camera.windows = window;
+            camera.clip_end = is_clipped ? 2.9f : 3.1f;
+            add_panes(scene, panes, 0.0f);
+            fixture_level(scene, 10.0f, -2.0f, emission(scene));
+            set_camera(scene, &camera);
+            const trc_render_desc desc = level_desc();
+            expect_all(scene, &desc, TRC_PASS_COMBINED, is_clipped ? 0.0 : (double)LIGHT, 1e-6);
+            assert_ok(trc_scene_destroy(scene));
+        }
+}
+
+/* ---- limits of bounces ---- */
+
+/* A mirror below the camera sends its rays to the left, a second one there sends them up, to a
+ * light behind panes. */
+static trc_scene two_mirrors(uint32_t panes) {
+    static const float first[12] = {-0.5f, -5, -5.0f, 4.5f,  -5, 0.0f,
+                                    4.5f,  5,  0.0f,  -0.5f, 5,  -5.0f};
+    static const float second[12] = {-11, -5, 1.0f, -4, -5, -6.0f, -4, 5, -6.0f, -11, 5, 1.0f};
+    static const float light[12] = {-20, -5, 9, -2, -5, 9, -2, 5, 9, -20, 5, 9};
+    const trc_scene scene = fixture_level_view();
+    const trc_id mirror = fixture_glossy(scene, 1.0f, 0.0f);
+    fixture_quad(scene, first, mirror);
+    fixture_quad(scene, second, mirror);
+    fixture_quad(scene, light, emission(scene));
+    for (uint32_t k = 0; k < panes; k++) {
+        struct node_list list = {0};
+        const float z = 4.0f + 0.25f * (float)k;
+        const float pane[12] = {-20, -5, z, -2, -5, z, -2, 5, z, -20, 5, z};
+        NODE_ADD(&list, TRC_NODE_TRANSPARENT, 0, node_color(1.0f, 1.0f, 1.0f));
+        const trc_material_desc desc = node_list_material(&list, 0);
+        trc_id glass = 0;
+        assert_ok(trc_material_create(scene, &desc, &glass));
+        fixture_quad(scene, pane, glass);
+    }
+    assert_ok(trc_scene_commit(scene));
+    return scene;
+}
+
+/* As in Cycles a ray that bounced more often than it may still finds the light that it meets next.
+ * So one mirror more than the limit shows a light, two do not. */
+static void glossy_bounces_are_limited(void **state) {
+    (void)state;
+    const trc_scene scene = two_mirrors(0);
+    trc_render_desc desc = level_desc();
+    desc.max_depth = 8;
+    desc.max_glossy_depth = 1;
+    expect_all(scene, &desc, TRC_PASS_COMBINED, (double)LIGHT, 1e-5);
+    desc.max_glossy_depth = 0;
+    expect_all(scene, &desc, TRC_PASS_COMBINED, 0.0, 0.0);
+    desc.max_glossy_depth = 8;
+    desc.max_transmission_depth = 0;
+    expect_all(scene, &desc, TRC_PASS_COMBINED, (double)LIGHT, 1e-5);
+    assert_ok(trc_scene_destroy(scene));
+}
+
+/* Panes that the last ray of a path passes are as many as a camera ray passes. */
+static void panes_are_limited(void **state) {
+    (void)state;
+    trc_render_desc desc = level_desc();
+    desc.max_transparent_depth = 2;
+    for (uint32_t panes = 2; panes < 5; panes++) {
+        const double want = panes <= desc.max_transparent_depth + 1 ? (double)LIGHT : 0.0;
+        const trc_scene ahead = fixture_level_view();
+        add_panes(ahead, panes, -1.0f);
+        fixture_level(ahead, 20.0f, -2.0f, emission(ahead));
+        assert_ok(trc_scene_commit(ahead));
+        expect_all(ahead, &desc, TRC_PASS_COMBINED, want, 1e-5);
+        assert_ok(trc_scene_destroy(ahead));
+        const trc_scene last = two_mirrors(panes);
+        desc.max_depth = 1;
+        expect_all(last, &desc, TRC_PASS_COMBINED, want, 1e-5);
+        assert_ok(trc_scene_destroy(last));
+    }
+}
+
+/* Shadow rays pass as many panes as the limit says: one less than the camera sees light through, as
+ * Cycles 3.4 renders it. */
+static void panes_in_shadows_are_limited(void **state) {
+    (void)state;
+    trc_render_desc desc = level_desc();
+    desc.max_transparent_depth = 2;
+    for (uint32_t panes = 1; panes < 4; panes++) {
+        const trc_scene scene = fixture_level_view();
+        trc_light_desc light = default_light_desc();
+        trc_id id = 0;
+        light.type = TRC_LIGHT_SUN;
+        light.strength = (float)PI;
+        light.use_mis = 0;
+        assert_ok(trc_light_create(scene, &light, &id));
+        fixture_level(scene, 20.0f, 0.0f, fixture_material(scene, TRC_NODE_DIFFUSE, 0.5f));
+        add_panes(scene, panes, 2.0f);
+        assert_ok(trc_scene_commit(scene));
+        const double want = panes <= desc.max_transparent_depth ? 0.5 : 0.0;
+        expect_all(scene, &desc, TRC_PASS_COMBINED, want, 1e-4);
+        assert_ok(trc_scene_destroy(scene));
+    }
+}
+
+/* ---- what is seen of world and lights ---- */
+
+static void a_world_can_hide_from_the_camera(void **state) {
+    (void)state;
+    for (int is_hidden = 0; is_hidden < 2; is_hidden++)
+        for (int is_mirrored = 0; is_mirrored < 2; is_mirrored++) {
+            const trc_scene scene = fixture_level_view();
+            trc_world_desc world =
+                default_world_desc(fixture_material(scene, TRC_NODE_BACKGROUND, LIGHT));
+            if (is_hidden)
+                world.visibility &= ~(uint32_t)TRC_VISIBLE_CAMERA;
+            assert_ok(trc_scene_set_world(scene, &world));
+            if (is_mirrored)
+                fixture_level(scene, 20.0f, 0.0f, fixture_glossy(scene, 1.0f, 0.0f));
+            assert_ok(trc_scene_commit(scene));
+            const trc_render_desc desc = level_desc();
+            const double want = is_hidden && !is_mirrored ? 0.0 : (double)LIGHT;
+            expect_all(scene, &desc, TRC_PASS_COMBINED, want, 1e-6);
+            assert_ok(trc_scene_destroy(scene));
+        }
+}
+
+/* The exposure of light is that of its groups. */
+static void groups_are_exposed(void **state) {
+    (void)state;
+    const trc_scene scene = fixture_level_view();
+    trc_world_desc world = default_world_desc(fixture_material(scene, TRC_NODE_BACKGROUND, LIGHT));
+    world.light_group = 1;
+    assert_ok(trc_scene_set_world(scene, &world));
+    assert_ok(trc_scene_commit(scene));
+    trc_render_desc desc = level_desc();
+    desc.light_group_count = 1;
+    for (int k = 0; k < 3; k++) {
+        desc.film_exposure = (float)(1 << k);
+        expect_all(scene, &desc, TRC_PASS_LIGHT_GROUP(0), (double)LIGHT * (1 << k), 1e-5);
+        expect_all(scene, &desc, TRC_PASS_COMBINED, (double)LIGHT * (1 << k), 1e-5);
+    }
+    assert_ok(trc_scene_destroy(scene));
+}
+
+/* Light that is no number is left out of the film, and its samples are counted. */
+static void samples_without_a_number_are_reported(void **state) {
+    (void)state;
+    const trc_scene scene = fixture_level_view();
+    struct node_list list = {0};
+    const uint32_t info = node_add(&list, TRC_NODE_OBJECT_INFO, 0, 0, NULL);
+    const uint32_t huge =
+        NODE_ADD(&list, TRC_NODE_VECTOR_MATH, TRC_VECTOR_MULTIPLY, node_link(info, 1),
+                 node_color(3e38f, 3e38f, 3e38f), node_number(0.0f), node_number(1.0f));
+    const uint32_t light =
+        NODE_ADD(&list, TRC_NODE_EMISSION, 0, node_link(huge, 0), node_number(3e38f));
+    const trc_material_desc material = node_list_material(&list, light);
+    trc_id id = 0;
+    assert_ok(trc_material_create(scene, &material, &id));
+    fixture_level(scene, 20.0f, 0.0f, id);
+    assert_ok(trc_scene_commit(scene));
+    const trc_render_desc desc = level_desc();
+    trc_render_progress progress = {.struct_size = sizeof progress};
+    trc_render render_id = 0;
+    float pixels[4 * FRAME];
+    assert_ok(trc_render_start(scene, &desc, &render_id));
+    assert_ok(trc_render_wait(render_id, INFINITY));
+    assert_ok(trc_render_read(render_id, TRC_PASS_COMBINED, pixels, 4 * FRAME));
+    assert_ok(trc_render_poll(render_id, &progress));
+    assert_ok(trc_render_destroy(render_id));
+    assert_int_equal(progress.dropped_samples, (uint64_t)FRAME * desc.sample_count);
+    for (int i = 0; i < 4 * FRAME; i++)
+        assert_true(isfinite(pixels[i]));
+    assert_ok(trc_scene_destroy(scene));
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(clipping_begins_at_a_depth),
+        cmocka_unit_test(clipping_ends_behind_panes_too),
+        cmocka_unit_test(glossy_bounces_are_limited),
+        cmocka_unit_test(panes_are_limited),
+        cmocka_unit_test(panes_in_shadows_are_limited),
+        cmocka_unit_test(a_world_can_hide_from_the_camera),
+        cmocka_unit_test(groups_are_exposed),
+        cmocka_unit_test(samples_without_a_number_are_reported),
+    };
+    if (!query_test_isa())
+        return QUERY_TEST_SKIPPED;
+    return cmocka_run_group_tests_name("limits", tests, NULL, NULL);
+}
