@@ -3,11 +3,11 @@
 #include "bytes.h"
 #include "stage.h"
 
-#include "shading/build.h"
+#include "model/nodes.h"
 
 #define MOST_NODES 16
 #define MOST_INPUTS (MOST_NODES * TRC_MAX_NODE_INPUTS)
-#define TABLE_FLOATS (TRC_RAMP_SIZE * 4)
+#define TABLE_FLOATS (4 * TRC_TABLE_ENTRIES)
 #define TYPES 128
 
 struct list {
@@ -21,7 +21,7 @@ struct list {
 static void read_inputs(struct bytes *b, struct list *l, trc_node *node) {
     const struct trc_node_info *info = trc_node_info_of(node->type);
     node->first_input = l->input_count;
-    node->input_count = info ? (uint32_t)strlen(info->inputs) : 0;
+    node->input_count = info ? info->input_count : 0;
     if (bytes_below(b, 32) == 0)
         node->input_count = bytes_below(b, TRC_MAX_NODE_INPUTS);
     for (uint32_t i = 0; i < node->input_count; i++) {
@@ -47,8 +47,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         if (bytes_below(&b, 4) == 0)
             node->mode |= (uint32_t)bytes_byte(&b) << 8;
         node->name = bytes_below(&b, 2) ? "UV" : NULL;
-        if (node->type == TRC_NODE_COLOR_RAMP || node->type == TRC_NODE_CURVES ||
-            node->type == TRC_NODE_FLOAT_CURVE) {
+        if (trc_node_has_table(node->type)) {
             node->table = l.table;
             node->table_count = TABLE_FLOATS;
         }

@@ -28,7 +28,7 @@ static void test_constant_material(void **state) {
         assert_true(o.reg == -1 && o.value == expected[i]);
     }
     for (int i = 6; i < 12; i++)
-        assert_int_equal(m->operands[leaf->first_operand + i].reg, -2);
+        assert_int_equal(m->operands[leaf->first_operand + i].reg, TRC_REG_DEFAULT);
     trc_material_release(m);
 }
 
@@ -206,8 +206,8 @@ static void test_unknown_images(void **state) {
 
 static void test_ramps_share_tables(void **state) {
     (void)state;
-    static float tables[3][4 * TRC_RAMP_SIZE];
-    for (uint32_t i = 0; i < 4 * TRC_RAMP_SIZE; i++) {
+    static float tables[3][4 * TRC_TABLE_ENTRIES];
+    for (uint32_t i = 0; i < 4 * TRC_TABLE_ENTRIES; i++) {
         tables[0][i] = tables[1][i] = (float)i;
         tables[2][i] = -(float)i;
     }
@@ -217,13 +217,13 @@ static void test_ramps_share_tables(void **state) {
     for (int i = 0; i < 3; i++) {
         ramp[i] = ADD(TRC_NODE_COLOR_RAMP, 0, link_to(info, i == 1 ? 3 : 5));
         graph.nodes[ramp[i]].table = tables[i];
-        graph.nodes[ramp[i]].table_count = 4 * TRC_RAMP_SIZE;
+        graph.nodes[ramp[i]].table_count = 4 * TRC_TABLE_ENTRIES;
     }
     const int32_t mix =
         ADD(TRC_NODE_MIX_COLOR, 0, link_to(ramp[2], 1), link_to(ramp[0], 0), link_to(ramp[1], 0));
     add_diffuse(link_to(mix, 0));
     struct trc_material *m = compiled();
-    assert_int_equal(m->table_count, 2 * 4 * TRC_RAMP_SIZE);
+    assert_int_equal(m->table_count, 2 * 4 * TRC_TABLE_ENTRIES);
     assert_int_equal(count_op(m, TRC_OP_RAMP), 3);
     trc_material_release(m);
 }
@@ -412,7 +412,8 @@ static void test_default_tangent(void **state) {
         graph_clear();
         *input_of(add_principled(0), 7) = value(anisotropic ? .5f : 0);
         struct trc_material *m = compiled();
-        const struct trc_operand *tangent = &m->operands[m->leaves[0].first_operand + 31];
+        const struct trc_operand *tangent =
+            &m->operands[m->leaves[0].first_operand + TRC_AT(PRINCIPLED, tangent)];
         assert_int_equal(m->instruction_count, anisotropic);
         assert_true(anisotropic ? tangent->reg >= 0 : tangent->reg == -2);
         trc_material_release(m);
@@ -598,14 +599,14 @@ static void test_refused_nodes(void **state) {
 
 static void test_refused_tables(void **state) {
     (void)state;
-    static float table[4 * TRC_RAMP_SIZE];
+    static float table[4 * TRC_TABLE_ENTRIES];
     graph_clear();
     const int32_t ramp = ADD(TRC_NODE_COLOR_RAMP, 0, value(.5f));
     refused(TRC_ERROR_INVALID_ARGUMENT, "(Color Ramp)", "table");
     graph.nodes[ramp].table = table;
-    graph.nodes[ramp].table_count = 4 * TRC_RAMP_SIZE - 4;
+    graph.nodes[ramp].table_count = 4 * TRC_TABLE_ENTRIES - 4;
     refused(TRC_ERROR_INVALID_ARGUMENT, "(Color Ramp)", "1024 floats");
-    graph.nodes[ramp].table_count = 4 * TRC_RAMP_SIZE;
+    graph.nodes[ramp].table_count = 4 * TRC_TABLE_ENTRIES;
     trc_material_release(compiled());
     table[17] = NAN;
     refused(TRC_ERROR_INVALID_ARGUMENT, "(Color Ramp)", "17");
@@ -640,12 +641,12 @@ static void test_refused_descriptors(void **state) {
 
 static void test_memory_failures(void **state) {
     (void)state;
-    static float table[4 * TRC_RAMP_SIZE];
+    static float table[4 * TRC_TABLE_ENTRIES];
     graph_clear();
     const int32_t image = add_image(3, "map");
     const int32_t ramp = ADD(TRC_NODE_COLOR_RAMP, 0, link_to(image, 1));
     graph.nodes[ramp].table = table;
-    graph.nodes[ramp].table_count = 4 * TRC_RAMP_SIZE;
+    graph.nodes[ramp].table_count = 4 * TRC_TABLE_ENTRIES;
     add_diffuse(link_to(ramp, 0));
     trc_material_release(compiled()); /* the name is known now */
     const uint64_t bytes = trc_memory_bytes();

@@ -14,141 +14,76 @@ TRC_BEGIN_DECLS
 #define TRC_MAX_NODES 4096
 #define TRC_MAX_NODE_INPUTS 32
 
-/* Inputs of each type in order, with their kind: c colour or vector (3 floats), f float, s shader.
- * Outputs in order after "->". */
 enum trc_node_type {
-    /* shaders (one output, the closure) */
-    TRC_NODE_DIFFUSE = 1,    /* c color, f roughness, c normal; mode: 1 keeps the energy of rough
-                                surfaces, as Blender 4.3 and later */
-    TRC_NODE_GLOSSY = 2,     /* c color, f roughness, f anisotropy, f rotation, c normal, c tangent;
-                                mode: TRC_DISTRIBUTION_* */
-    TRC_NODE_GLASS = 3,      /* c color, f roughness, f ior, c normal; mode: distribution */
-    TRC_NODE_REFRACTION = 4, /* c color, f roughness, f ior, c normal; mode: distribution */
-    TRC_NODE_TRANSPARENT = 5, /* c color */
-    TRC_NODE_TRANSLUCENT = 6, /* c color, c normal */
-    TRC_NODE_EMISSION = 7,    /* c color, f strength */
-    TRC_NODE_BACKGROUND = 8,  /* c color, f strength (worlds) */
-    TRC_NODE_MIX_SHADER = 9,  /* f factor, s first, s second */
-    TRC_NODE_ADD_SHADER = 10, /* s first, s second */
-    TRC_NODE_HOLDOUT = 11,    /* no input */
-    /* Principled as in 3.4; mode: distribution; inputs: c base_color, f subsurface,
-     * c subsurface_color, f metallic, f specular, f specular_tint, f roughness, f anisotropic,
-     * f anisotropic_rotation, f sheen, f sheen_tint, f clearcoat, f clearcoat_roughness, f ior,
-     * f transmission, f transmission_roughness, c emission, f emission_strength, f alpha, c normal,
-     * c clearcoat_normal, c tangent */
-    TRC_NODE_PRINCIPLED = 12,
-    TRC_NODE_VELVET = 13, /* c color, f sigma, c normal */
-    TRC_NODE_TOON = 14,   /* c color, f size, f smooth, c normal; mode: 0 diffuse, 1 glossy */
-    /* Principled of Blender 4.0 and later; mode: GGX or MULTI_GGX; inputs: c base_color, f
-     * metallic, f roughness, f ior, f alpha, c normal, f diffuse_roughness, f specular_ior_level,
-     * c specular_tint, f anisotropic, f anisotropic_rotation, c tangent, f transmission_weight,
-     * f coat_weight, f coat_roughness, f coat_ior, c coat_tint, c coat_normal, f sheen_weight,
-     * f sheen_roughness, c sheen_tint, c emission_color, f emission_strength. Subsurface scattering
-     * is the diffuse lobe, thin film is left out. */
-    TRC_NODE_LAYERED_PRINCIPLED = 15,
-    TRC_NODE_SHEEN = 16, /* c color, f roughness, c normal: the microfibres of Blender 4.0 */
-
-    /* values */
-    TRC_NODE_IMAGE = 64, /* c vector, f blend -> c color, f alpha; image, interpolation in mode bits
-                            0-1, extension in bits 2-3, projection in bits 4-5: flat, box (blend:
-                            how far its sides run into each other, 0 to 1), sphere, tube */
-    TRC_NODE_ENVIRONMENT = 65, /* c vector -> c color; image; mode: interpolation bits 0-1, bit 4: 0
-                                  equirectangular, 1 mirror ball */
-    TRC_NODE_UV_MAP = 66,      /* -> c uv; name: the attribute, "" for the default map */
-    TRC_NODE_COLOR_ATTRIBUTE = 67,    /* -> c color, f alpha; name */
-    TRC_NODE_TEXTURE_COORDINATE = 68, /* -> c generated, c normal, c uv, c object, c camera, c
-                                         window, c reflection */
-    TRC_NODE_MAPPING = 69,      /* c vector, c location, c rotation, c scale -> c; mode 0 point,
-                                   1 texture, 2 vector, 3 normal */
-    TRC_NODE_MIX_COLOR = 70,    /* f factor, c a, c b -> c; mode: TRC_BLEND_* | 256 clamp */
-    TRC_NODE_MATH = 71,         /* f a, f b, f c -> f; mode: TRC_MATH_* | 256 clamp */
-    TRC_NODE_FRESNEL = 72,      /* f ior, c normal -> f */
-    TRC_NODE_LAYER_WEIGHT = 73, /* f blend, c normal -> f fresnel, f facing */
-    TRC_NODE_LIGHT_PATH = 74,   /* -> f is camera, shadow, diffuse, glossy, singular, reflection,
-                                   transmission, ray length, ray depth, diffuse depth, glossy depth,
-                                   transparent depth, transmission depth */
-    TRC_NODE_GEOMETRY = 75,     /* -> c position, c normal, c tangent, c true_normal, c incoming,
-                                   c parametric, f backfacing, f pointiness, f random_per_island */
-    TRC_NODE_NORMAL_MAP =
-        76,               /* f strength, c color -> c normal; mode 0 tangent, 1 object, 2 world,
-                             3 and 4 object and world with Y and Z turned around (Blender's own
-                             baked maps); name: UV map, whose tangents are those of each triangle
-                             by itself, or an attribute of width 4 with tangents at the corners:
-                             a, b, 1 or -1, 0 for the direction a (p1 - p0) + b (p2 - p0), made
-                             perpendicular to the corner's normal, and the handedness */
-    TRC_NODE_INVERT = 77, /* f factor, c color -> c */
-    TRC_NODE_GAMMA = 78,  /* c color, f gamma -> c */
-    TRC_NODE_HUE_SATURATION = 79,  /* f hue, f saturation, f value, f factor, c color -> c */
-    TRC_NODE_BRIGHT_CONTRAST = 80, /* c color, f bright, f contrast -> c */
-    TRC_NODE_COLOR_RAMP = 81,      /* f factor -> c color, f alpha; table: 257 RGBA values;
-                                      mode 0 linear between them, 1 constant */
-    TRC_NODE_SEPARATE = 82,        /* c -> f, f, f; mode 0 RGB, 1 HSV, 2 HSL, 3 XYZ */
-    TRC_NODE_COMBINE = 83,         /* f, f, f -> c; mode as SEPARATE */
-    TRC_NODE_MAP_RANGE = 84,   /* f value, f from_min, f from_max, f to_min, f to_max -> f; linear;
-                                  mode bit 8: clamp */
-    TRC_NODE_CLAMP = 85,       /* f value, f min, f max -> f; mode 0 min-max, 1 range */
-    TRC_NODE_CHECKER = 86,     /* c vector, c color1, c color2, f scale -> c color, f factor */
-    TRC_NODE_OBJECT_INFO = 87, /* -> c location, c color, f alpha, f object_index, f material_index,
-                                  f random */
-    TRC_NODE_VECTOR_MATH = 88, /* c a, c b, c c, f scale -> c vector, f value; mode: TRC_VECTOR_* */
-    TRC_NODE_RGB_TO_BW = 89,   /* c color -> f */
-    TRC_NODE_INSTANCE_VALUES = 90, /* -> c, three of the values of the instance; mode: number of the
-                                      first. Those it does not have are 0 */
-
-    /* procedural textures; vectors default to Generated */
-    TRC_NODE_NOISE = 96,        /* c vector, f w, f scale, f detail, f roughness, f lacunarity,
-                                   f offset, f gain, f distortion -> f value, c color; mode: dimensions
-                                   - 1 in bits 0-1, TRC_FRACTAL_* from bit TRC_NOISE_TYPE_SHIFT */
-    TRC_NODE_MUSGRAVE = 97,     /* c vector, f w, f scale, f detail, f dimension, f lacunarity,
-                                   f offset, f gain -> f; mode as NOISE, without FBM_UNIT */
-    TRC_NODE_VORONOI = 98,      /* c vector, f w, f scale, f smoothness, f exponent, f randomness,
-                                   f detail, f roughness, f lacunarity -> f distance, c color,
-                                   c position, f w, f radius; mode: dimensions - 1 in bits 0-1, metric
-                                   and TRC_VORONOI_* feature from bits TRC_VORONOI_METRIC_SHIFT and
-                                   TRC_VORONOI_FEATURE_SHIFT, TRC_VORONOI_NORMALIZE. The radius has
-                                   no octaves */
-    TRC_NODE_WAVE = 99,         /* c vector, f scale, f distortion, f detail, f detail_scale,
-                                   f detail_roughness, f phase -> f; mode: profile in bits 0-1,
-                                   TRC_WAVE_RINGS, from bit TRC_WAVE_DIRECTION_SHIFT 0-2 X, Y, Z,
-                                   3 diagonal or spherical */
-    TRC_NODE_GRADIENT = 100,    /* c vector -> f; mode: TRC_GRADIENT_* */
-    TRC_NODE_WHITE_NOISE = 101, /* c vector, f w -> f value, c color; mode: dimensions - 1 */
-    TRC_NODE_MAGIC = 102, /* c vector, f scale, f distortion -> c color, f factor; mode: depth,
-                             0-10 */
-    TRC_NODE_BRICK = 103, /* c vector, c color1, c color2, c mortar, f scale, f mortar_size,
-                             f mortar_smooth, f bias, f brick_width, f row_height, f offset,
-                             f squash -> c color, f factor; mode: every how many rows are offset
-                             in bits 0-6, squashed from bit TRC_BRICK_SQUASH_SHIFT, 0: never */
-
-    /* the rest */
-    TRC_NODE_CURVES = 104, /* f factor, c color, f low, f high -> c; table: 257 RGBA values, each
-                              channel by its own, over low to high; mode 1: straight on beyond */
-    TRC_NODE_FLOAT_CURVE = 105, /* f factor, f value, f low, f high -> f; table: as CURVES, R is
-                                   read; mode as CURVES */
-    TRC_NODE_BLACKBODY = 106,   /* f temperature (K) -> c */
-    TRC_NODE_WAVELENGTH = 107,  /* f wavelength (nm) -> c */
-    TRC_NODE_VECTOR_TRANSFORM =
-        108,                      /* c vector -> c; mode: TRC_SPACE_* of the source in bits 0-1, of
-                                     the target in bits 2-3, bits 4-5: 0 point, 1 vector,
-                                     2 unit vector (the normal of Blender before 4.0), 3 normal:
-                                     by the inverse transpose, unit unless the spaces are one */
-    TRC_NODE_VECTOR_ROTATE = 109, /* c vector, c center, c axis, f angle, c rotation -> c; mode:
-                                     TRC_ROTATE_* | 8 to turn the other way */
-    TRC_NODE_CAMERA_DATA = 110,   /* -> c view_vector, f view_z_depth, f view_distance */
-    TRC_NODE_WIREFRAME = 111,     /* f size (m, world) -> f */
-    TRC_NODE_TANGENT = 114, /* -> c; mode: TRC_TANGENT_*; name, if of a UV map: as NORMAL_MAP */
-
-    /* outputs besides the surface: no node has to lead to them; mode: number of the AOV */
-    TRC_NODE_AOV_VALUE = 112, /* f value */
-    TRC_NODE_AOV_COLOR = 113  /* c color */
+#define TRC_NODE(name, number, label, inputs, outputs, modes) TRC_NODE_##name = number,
+#include "tracer/nodes.def"
 };
+
+/* A bit of MIX_COLOR, MATH and MAP_RANGE: the result is clamped, to [0, 1] or to the range. */
+enum trc_mode_flags { TRC_MODE_CLAMP = 1 << 8 };
+
+/* Of tables of COLOR_RAMP, CURVES and FLOAT_CURVE: RGBA values, evenly from end to end. */
+enum trc_table_size { TRC_TABLE_ENTRIES = 257 };
+
+/* KEEPS_ENERGY: that of rough surfaces, as Blender 4.3 and later. */
+enum trc_diffuse_model { TRC_DIFFUSE_LOSES_ENERGY = 0, TRC_DIFFUSE_KEEPS_ENERGY };
+
+enum trc_toon_component { TRC_TOON_DIFFUSE = 0, TRC_TOON_GLOSSY };
+
+/* How rotation, scale and location apply. TEXTURE: the inverse of POINT; VECTOR is not moved;
+ * NORMAL is divided by the scale, not moved, and made unit. */
+enum trc_mapping_type {
+    TRC_MAPPING_POINT = 0,
+    TRC_MAPPING_TEXTURE,
+    TRC_MAPPING_VECTOR,
+    TRC_MAPPING_NORMAL
+};
+
+/* Space of the map; the BLENDER ones have Y and Z turned around (Blender's own baked maps). */
+enum trc_normal_map_space {
+    TRC_NORMAL_MAP_TANGENT = 0,
+    TRC_NORMAL_MAP_OBJECT,
+    TRC_NORMAL_MAP_WORLD,
+    TRC_NORMAL_MAP_BLENDER_OBJECT,
+    TRC_NORMAL_MAP_BLENDER_WORLD
+};
+
+/* Between the entries of the table. */
+enum trc_ramp_interpolation { TRC_RAMP_LINEAR = 0, TRC_RAMP_CONSTANT };
+
+/* Beyond the ends of the table: as at the end, or straight on. */
+enum trc_curves_extension { TRC_CURVES_CONSTANT = 0, TRC_CURVES_EXTRAPOLATED };
+
+enum trc_separate_mode {
+    TRC_SEPARATE_RGB = 0,
+    TRC_SEPARATE_HSV,
+    TRC_SEPARATE_HSL,
+    TRC_SEPARATE_XYZ
+};
+
+/* RANGE: min and max in either order. */
+enum trc_clamp_type { TRC_CLAMP_MINMAX = 0, TRC_CLAMP_RANGE };
 
 /* Around an axis of the object (Generated coordinates), or where U of a UV map grows. */
 enum trc_tangent_source { TRC_TANGENT_Z = 0, TRC_TANGENT_X, TRC_TANGENT_Y, TRC_TANGENT_UV };
 
 enum trc_space_id { TRC_SPACE_WORLD = 0, TRC_SPACE_OBJECT, TRC_SPACE_CAMERA };
 
-/* Radians; EULER reads rotation (XYZ), the others angle; AXIS_ANGLE axis too. */
+/* UNIT_VECTOR: the normal of Blender before 4.0. NORMAL: by the inverse transpose, unit unless the
+ * spaces are one. */
+enum trc_transformed_type {
+    TRC_TRANSFORMED_POINT = 0,
+    TRC_TRANSFORMED_VECTOR,
+    TRC_TRANSFORMED_UNIT_VECTOR,
+    TRC_TRANSFORMED_NORMAL
+};
+enum trc_vector_transform_mode {
+    TRC_SPACE_MASK = 3,
+    TRC_SPACE_TO_SHIFT = 2,
+    TRC_TRANSFORMED_SHIFT = 4
+};
+
+/* EULER reads rotation (XYZ), the others angle; AXIS_ANGLE axis too. */
 enum trc_rotate_mode {
     TRC_ROTATE_AXIS_ANGLE = 0,
     TRC_ROTATE_X,
@@ -156,6 +91,10 @@ enum trc_rotate_mode {
     TRC_ROTATE_Z,
     TRC_ROTATE_EULER
 };
+enum trc_rotate_flags { TRC_ROTATE_INVERSE = 1 << 3 /* the other way */ };
+
+/* Mask of NOISE, MUSGRAVE, VORONOI and WHITE_NOISE: dimensions - 1. */
+enum trc_texture_mode { TRC_DIMENSIONS_MASK = 3 };
 
 /* Fractals of gradient noise. FBM_UNIT is fractal Brownian motion scaled to [0, 1]. */
 enum trc_fractal_type {
@@ -182,17 +121,20 @@ enum trc_voronoi_feature {
     TRC_VORONOI_N_SPHERE_RADIUS
 };
 enum trc_voronoi_mode {
+    TRC_VORONOI_METRIC_MASK = 3, /* after the shift */
     TRC_VORONOI_METRIC_SHIFT = 2,
+    TRC_VORONOI_FEATURE_MASK = 7, /* after the shift */
     TRC_VORONOI_FEATURE_SHIFT = 4,
     TRC_VORONOI_NORMALIZE = 1 << 7 /* distance and color to about [0, 1] */
 };
 
+enum trc_wave_profile { TRC_WAVE_SINE = 0, TRC_WAVE_SAW, TRC_WAVE_TRIANGLE };
+/* Of bands or, DIAGONAL being spherical, of rings. */
+enum trc_wave_direction { TRC_WAVE_X = 0, TRC_WAVE_Y, TRC_WAVE_Z, TRC_WAVE_DIAGONAL };
 enum trc_wave_mode {
-    TRC_WAVE_SINE = 0,
-    TRC_WAVE_SAW,
-    TRC_WAVE_TRIANGLE,
-    TRC_WAVE_PROFILE = 3, /* mask */
+    TRC_WAVE_PROFILE_MASK = 3,
     TRC_WAVE_RINGS = 1 << 2,
+    TRC_WAVE_DIRECTION_MASK = 3, /* after the shift */
     TRC_WAVE_DIRECTION_SHIFT = 3
 };
 
@@ -206,7 +148,9 @@ enum trc_gradient_type {
     TRC_GRADIENT_SPHERICAL
 };
 
-enum trc_brick_mode { TRC_BRICK_SQUASH_SHIFT = 7 };
+enum trc_magic_depth { TRC_MAGIC_MAX_DEPTH = 10 };
+
+enum trc_brick_mode { TRC_BRICK_ROWS_MASK = 127, TRC_BRICK_SQUASH_SHIFT = 7 };
 
 /* Microfacet distributions. SHARP ignores roughness. */
 enum trc_distribution_type {
@@ -315,29 +259,42 @@ enum trc_vector_operation {
     TRC_VECTOR_REFRACT /* scale: the relative index of refraction */
 };
 
-/* Mode bits of TRC_NODE_IMAGE. */
-enum trc_image_mode {
-    TRC_IMAGE_LINEAR = 0,
-    TRC_IMAGE_CLOSEST = 1,
-    TRC_IMAGE_CUBIC = 2,
+/* Mode bits of IMAGE, one of each of the three. */
+enum trc_image_interpolation { TRC_IMAGE_LINEAR = 0, TRC_IMAGE_CLOSEST = 1, TRC_IMAGE_CUBIC = 2 };
+enum trc_image_extension {
     TRC_IMAGE_REPEAT = 0 << 2,
     TRC_IMAGE_EXTEND = 1 << 2,
     TRC_IMAGE_CLIP = 2 << 2,
     TRC_IMAGE_MIRROR = 3 << 2
 };
+enum trc_image_projection {
+    TRC_IMAGE_FLAT = 0 << 4,
+    TRC_IMAGE_BOX = 1 << 4,
+    TRC_IMAGE_SPHERE = 2 << 4,
+    TRC_IMAGE_TUBE = 3 << 4
+};
+enum trc_image_mode {
+    TRC_IMAGE_INTERPOLATION_MASK = 3,
+    TRC_IMAGE_EXTENSION_MASK = 3 << 2,
+    TRC_IMAGE_PROJECTION_MASK = 3 << 4
+};
+
+enum trc_environment_projection {
+    TRC_ENVIRONMENT_EQUIRECTANGULAR = 0 << 4,
+    TRC_ENVIRONMENT_MIRROR_BALL = 1 << 4
+};
 
 /* What an input takes that is linked to no node. */
 enum trc_input_source {
     TRC_INPUT_CONSTANT = -1, /* its value */
-    TRC_INPUT_DEFAULT = -2   /* "c normal", "c tangent", a texture's "c vector": what Blender gives
-                                an unlinked socket; other inputs refuse it */
+    TRC_INPUT_DEFAULT = -2   /* what Blender gives an unlinked socket; only of the kinds that have
+                                a default (tracer/nodes.def) */
 };
 
 typedef struct trc_node_input {
     int32_t node;    /* index of an earlier node, or TRC_INPUT_* */
     uint32_t output; /* number of that node's output */
-    float value[3];  /* the constant; a float input reads value[0]. An unlinked "c normal", "c
-                        tangent"  or texture "c vector" input takes its default when node is -2 */
+    float value[3];  /* the constant; a float input reads value[0] */
 } trc_node_input;
 
 typedef struct trc_node {
@@ -347,8 +304,8 @@ typedef struct trc_node {
     uint32_t input_count; /* exactly the count of the type */
     trc_id image;         /* IMAGE, ENVIRONMENT; 0 renders magenta */
     const char *name;     /* attribute name or NULL */
-    const float *table;   /* COLOR_RAMP, CURVES, FLOAT_CURVE: table_count floats, else NULL */
-    uint64_t table_count;
+    const float *table;   /* COLOR_RAMP, CURVES, FLOAT_CURVE, else NULL */
+    uint64_t table_count; /* floats: 4 * TRC_TABLE_ENTRIES */
 } trc_node;
 
 typedef struct trc_material_desc {

@@ -14,10 +14,21 @@
 #define TRC_MAX_LEAVES 16
 #define TRC_MAX_REGISTERS 256
 
+/* Lobes whose mean weight is below it are dropped, lane by lane (Cycles' closure cut-off). */
+#define TRC_WEIGHT_CUTOFF 1e-5f
+/* Microfacets whose alpha_x * alpha_y is at or below it are ideal (Cycles 3.4 uses the same bound).
+ */
+#define TRC_SINGULAR_ALPHA2 1e-7f
+
+/* trc_operand.reg besides registers. */
+enum {
+    TRC_REG_CONSTANT = -1,
+    TRC_REG_DEFAULT = -2 /* unlinked normal, tangent or vector: the default of its place */
+};
+
 /* One float: a constant, or what the program left in a register. */
 struct trc_operand {
-    int32_t
-        reg; /* -1: constant. -2: unlinked normal, tangent or vector: the default of its place */
+    int32_t reg; /* or TRC_REG_* */
     float value;
 };
 
@@ -28,50 +39,6 @@ struct trc_leaf {
     struct trc_operand weight; /* product of mix factors, [0, 1] or more for added shaders */
     uint32_t first_operand;    /* the node's inputs in order, 3 operands for a colour or vector */
     uint32_t operand_count;
-};
-
-/* Where the inputs of leaves stand among their operands, in floats. The colour comes first. */
-enum {
-    TRC_EMISSION_STRENGTH = 3,
-    TRC_ROUGHNESS = 3, /* of the simple shaders */
-    TRC_GLOSSY_ANISOTROPY = 4,
-    TRC_GLOSSY_TANGENT = 9,
-    TRC_PRINCIPLED_SUBSURFACE = 3,
-    TRC_PRINCIPLED_METALLIC = 7,
-    TRC_PRINCIPLED_SPECULAR = 8,
-    TRC_PRINCIPLED_ROUGHNESS = 10,
-    TRC_PRINCIPLED_ANISOTROPY = 11,
-    TRC_PRINCIPLED_SHEEN = 13,
-    TRC_PRINCIPLED_CLEARCOAT = 15,
-    TRC_PRINCIPLED_CLEARCOAT_ROUGHNESS = 16,
-    TRC_PRINCIPLED_TRANSMISSION = 18,
-    TRC_PRINCIPLED_TRANSMISSION_ROUGHNESS = 19,
-    TRC_PRINCIPLED_EMISSION = 20,
-    TRC_PRINCIPLED_EMISSION_STRENGTH = 23,
-    TRC_PRINCIPLED_ALPHA = 24,
-    TRC_PRINCIPLED_TANGENT = 31,
-    TRC_LAYERED_METALLIC = 3,
-    TRC_LAYERED_ROUGHNESS = 4,
-    TRC_LAYERED_IOR = 5,
-    TRC_LAYERED_ALPHA = 6,
-    TRC_LAYERED_NORMAL = 7,
-    TRC_LAYERED_DIFFUSE_ROUGHNESS = 10,
-    TRC_LAYERED_SPECULAR_LEVEL = 11,
-    TRC_LAYERED_SPECULAR_TINT = 12,
-    TRC_LAYERED_ANISOTROPY = 15,
-    TRC_LAYERED_ROTATION = 16,
-    TRC_LAYERED_TANGENT = 17,
-    TRC_LAYERED_TRANSMISSION = 20,
-    TRC_LAYERED_COAT = 21,
-    TRC_LAYERED_COAT_ROUGHNESS = 22,
-    TRC_LAYERED_COAT_IOR = 23,
-    TRC_LAYERED_COAT_TINT = 24,
-    TRC_LAYERED_COAT_NORMAL = 27,
-    TRC_LAYERED_SHEEN = 30,
-    TRC_LAYERED_SHEEN_ROUGHNESS = 31,
-    TRC_LAYERED_SHEEN_TINT = 32,
-    TRC_LAYERED_EMISSION = 35,
-    TRC_LAYERED_EMISSION_STRENGTH = 38
 };
 
 /* A value besides the surface that a pass shows. */

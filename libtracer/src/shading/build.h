@@ -5,36 +5,9 @@
 #include <stdbool.h>
 
 #include "model/material.h"
+#include "model/nodes.h"
 #include "model/program.h"
 #include "shading/compile.h"
-
-/* ---- what is known of node types (shading/nodes.c) ---- */
-
-/* Kinds of inputs: f float, c colour or vector, s shader; with a default when node is -2: n normal,
- * t tangent (of leaves), u UV, g Generated, p position. Kinds of outputs: f float, c colour, v
- * vector, s shader. */
-struct trc_node_info {
-    uint32_t type;
-    const char *name;
-    const char *inputs;      /* one letter each */
-    const char *input_names; /* separated by spaces */
-    const char *outputs;
-};
-
-/* Kind of a node's output; Combine XYZ gives a vector, the other modes a colour. */
-char trc_node_output_kind(const trc_node *node, uint32_t output);
-
-/* NULL: unknown type. */
-const struct trc_node_info *trc_node_info_of(uint32_t type);
-bool trc_node_is_shader(uint32_t type);
-bool trc_node_is_output(uint32_t type);
-/* Whether mode is one that the type has. */
-bool trc_node_mode_is_valid(uint32_t type, uint32_t mode);
-static inline bool trc_kind_is_float(char kind) { return kind == 'f'; }
-/* Floats of an input or output. */
-static inline uint32_t trc_kind_floats(char kind) {
-    return kind == 's' ? 0 : trc_kind_is_float(kind) ? 1 : 3;
-}
 
 /* Every node of the descriptor, reached or not (shading/validate.c). */
 trc_status trc_material_validate(const trc_material_desc *desc);
@@ -78,11 +51,11 @@ struct trc_build {
 };
 
 static inline struct trc_operand trc_constant(float value) {
-    return (struct trc_operand){-1, value};
+    return (struct trc_operand){TRC_REG_CONSTANT, value};
 }
-static inline bool trc_is_constant(struct trc_operand o) { return o.reg == -1; }
+static inline bool trc_is_constant(struct trc_operand o) { return o.reg == TRC_REG_CONSTANT; }
 static inline bool trc_is_value(struct trc_operand o, float value) {
-    return o.reg == -1 && o.value == value;
+    return trc_is_constant(o) && o.value == value;
 }
 
 uint32_t trc_op_inputs(uint32_t op);
@@ -98,7 +71,7 @@ trc_status trc_build_math(struct trc_build *b, uint32_t mode, struct trc_operand
                           struct trc_operand y, struct trc_operand z, struct trc_operand *out);
 
 /* Operands of an input of a value or shader node, converted to its kind; defaults are made, but for
- * normals and tangents of shader nodes, whose operands get reg -2. (shading/lower.c) */
+ * normals and tangents of shader nodes, whose operands get TRC_REG_DEFAULT. (shading/lower.c) */
 trc_status trc_build_input(struct trc_build *b, const trc_node *node, uint32_t input,
                            struct trc_operand *out);
 /* The outputs of a procedural texture from its inputs, in floats as those of trc_build_input.

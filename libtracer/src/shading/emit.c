@@ -36,10 +36,12 @@ trc_status trc_build_mark(struct trc_build *b) {
         if (!o->is_live)
             continue;
         mark_operands(b, b->inputs + o->first_input, trc_op_inputs(o->op));
-        if ((o->op == TRC_OP_IMAGE || o->op == TRC_OP_IMAGE_BOX) && live[3]) {
+        if ((o->op == TRC_OP_IMAGE && live[TRC_OP_OUT_AT(IMAGE, alpha)]) ||
+            (o->op == TRC_OP_IMAGE_BOX && live[TRC_OP_OUT_AT(IMAGE_BOX, alpha)])) {
             o->mode |= TRC_IMAGE_MODE_ALPHA;
         }
-        if ((o->op == TRC_OP_NOISE || o->op == TRC_OP_VORONOI) && !memchr(live + 1, 1, 3))
+        if ((o->op == TRC_OP_NOISE && !memchr(live + TRC_OP_OUT_AT(NOISE, color), 1, 3)) ||
+            (o->op == TRC_OP_VORONOI && !memchr(live + TRC_OP_OUT_AT(VORONOI, color), 1, 3)))
             o->mode |= TRC_MODE_NO_COLOR;
     }
     return TRC_OK;
@@ -129,7 +131,7 @@ static struct trc_operand placed(const struct registers *r, struct trc_operand o
 
 /* Copies the table at first, unless it is there already, and says where it went. */
 static uint32_t copy_table(const struct trc_build *b, uint32_t first, struct trc_material *m) {
-    const uint32_t floats = 4 * TRC_RAMP_SIZE;
+    const uint32_t floats = 4 * TRC_TABLE_ENTRIES;
     for (uint32_t i = 0; i < m->table_count; i += floats) {
         if (memcmp(m->tables + i, b->tables + first, floats * sizeof(float)) == 0)
             return i;

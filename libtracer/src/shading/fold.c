@@ -14,10 +14,16 @@ struct op_info {
     uint8_t inputs, outputs, is_pure;
 };
 static const struct op_info op_infos[TRC_OP_COUNT] = {
-#define OP_INFO(name, inputs, outputs, is_pure) {inputs, outputs, is_pure},
-    TRC_OPS(OP_INFO)
-#undef OP_INFO
+#define TRC_OPERATION(NAME, is_pure, inputs, outputs) \
+    {TRC_OP_AT(NAME, end), TRC_OP_OUT_AT(NAME, end), is_pure},
+#include "model/operations.def"
 };
+
+#define TRC_OPERATION(NAME, is_pure, inputs, outputs)                  \
+    _Static_assert(TRC_OP_AT(NAME, end) <= TRC_OP_MAX_INPUTS &&        \
+                       TRC_OP_OUT_AT(NAME, end) <= TRC_OP_MAX_OUTPUTS, \
+                   #NAME);
+#include "model/operations.def"
 
 uint32_t trc_op_inputs(uint32_t op) { return op_infos[op].inputs; }
 uint32_t trc_op_outputs(uint32_t op) { return op_infos[op].outputs; }
@@ -61,29 +67,31 @@ static void fold(const struct trc_build *b, uint32_t op, uint32_t mode, uint32_t
 /* Operations that give one of their inputs back whatever the others are. */
 static const struct trc_operand *identity(uint32_t op, uint32_t mode,
                                           const struct trc_operand *in) {
-    if (op == TRC_OP_MIX && trc_is_constant(in[0])) {
+    const struct trc_operand *factor = in + TRC_OP_AT(MIX, factor);
+    if (op == TRC_OP_MIX && trc_is_constant(*factor)) {
         const bool through_hsv = mode == TRC_BLEND_SATURATION || mode == TRC_BLEND_VALUE;
-        if (in[0].value <= 0.0f && !through_hsv)
-            return in + 1;
-        if (in[0].value >= 1.0f && mode == TRC_BLEND_MIX)
-            return in + 4;
+        if (factor->value <= 0.0f && !through_hsv)
+            return in + TRC_OP_AT(MIX, a);
+        if (factor->value >= 1.0f && mode == TRC_BLEND_MIX)
+            return in + TRC_OP_AT(MIX, b);
     }
     if (op != TRC_OP_MATH)
         return NULL;
+    const struct trc_operand *a = in + TRC_OP_AT(MATH, a), *b = in + TRC_OP_AT(MATH, b);
     switch (mode) {
     case TRC_MATH_ADD:
-        if (trc_is_value(in[0], 0.0f))
-            return in + 1;
-        return trc_is_value(in[1], 0.0f) ? in : NULL;
+        if (trc_is_value(*a, 0.0f))
+            return b;
+        return trc_is_value(*b, 0.0f) ? a : NULL;
     case TRC_MATH_SUBTRACT:
-        return trc_is_value(in[1], 0.0f) ? in : NULL;
+        return trc_is_value(*b, 0.0f) ? a : NULL;
     case TRC_MATH_MULTIPLY:
-        if (trc_is_value(in[0], 1.0f) || trc_is_value(in[1], 0.0f))
-            return in + 1;
-        return trc_is_value(in[1], 1.0f) || trc_is_value(in[0], 0.0f) ? in : NULL;
+        if (trc_is_value(*a, 1.0f) || trc_is_value(*b, 0.0f))
+            return b;
+        return trc_is_value(*b, 1.0f) || trc_is_value(*a, 0.0f) ? a : NULL;
     case TRC_MATH_DIVIDE:
     case TRC_MATH_POWER:
-        return trc_is_value(in[1], 1.0f) ? in : NULL;
+        return trc_is_value(*b, 1.0f) ? a : NULL;
     default:
         return NULL;
     }
@@ -200,6 +208,7 @@ trc_status trc_build_math(struct trc_build *b, uint32_t mode, struct trc_operand
                           struct trc_operand y, struct trc_operand z, struct trc_operand *out) {
     const uint32_t arity = math_arity(mode);
     const struct trc_operand none = trc_constant(0.0f);
-    const struct trc_operand in[3] = {x, arity > 1 ? y : none, arity > 2 ? z : none};
+    const struct trc_operand in[TRC_OP_AT(MATH, end)] = {x, arity > 1 ? y : none,
+                                                         arity > 2 ? z : none};
     return trc_build_op(b, TRC_OP_MATH, mode, TRC_NO_RESOURCE, in, out);
 }

@@ -22,19 +22,19 @@ static trc_status give_weight(struct trc_build *b, const trc_node *node, uint32_
 static trc_status share_weight(struct trc_build *b, const trc_node *node, struct trc_operand weight,
                                struct trc_operand *weights) {
     if (node->type == TRC_NODE_ADD_SHADER) {
-        TRC_TRY(give_weight(b, node, 0, weight, weights));
-        return give_weight(b, node, 1, weight, weights);
+        TRC_TRY(give_weight(b, node, TRC_INPUT_OF(ADD_SHADER, first), weight, weights));
+        return give_weight(b, node, TRC_INPUT_OF(ADD_SHADER, second), weight, weights);
     }
     struct trc_operand factor, rest, first, second;
     const struct trc_operand zero = trc_constant(0.0f), one = trc_constant(1.0f);
-    TRC_TRY(trc_build_input(b, node, 0, &factor));
-    const struct trc_operand clamp[3] = {factor, zero, one};
-    TRC_TRY(trc_build_op(b, TRC_OP_CLAMP, 0, TRC_NO_RESOURCE, clamp, &factor));
+    TRC_TRY(trc_build_input(b, node, TRC_INPUT_OF(MIX_SHADER, factor), &factor));
+    const struct trc_operand clamp[TRC_OP_AT(CLAMP, end)] = {factor, zero, one};
+    TRC_TRY(trc_build_op(b, TRC_OP_CLAMP, TRC_CLAMP_MINMAX, TRC_NO_RESOURCE, clamp, &factor));
     TRC_TRY(trc_build_math(b, TRC_MATH_SUBTRACT, one, factor, zero, &rest));
     TRC_TRY(multiply(b, weight, rest, &first));
     TRC_TRY(multiply(b, weight, factor, &second));
-    TRC_TRY(give_weight(b, node, 1, first, weights));
-    return give_weight(b, node, 2, second, weights);
+    TRC_TRY(give_weight(b, node, TRC_INPUT_OF(MIX_SHADER, first), first, weights));
+    return give_weight(b, node, TRC_INPUT_OF(MIX_SHADER, second), second, weights);
 }
 
 static bool is_black(const struct trc_operand *color) {
@@ -44,25 +44,33 @@ static bool is_black(const struct trc_operand *color) {
 
 /* Whether a leaf of these operands neither scatters nor emits, whatever the light. */
 static bool is_nothing(uint32_t type, const struct trc_operand *in) {
-    if (type == TRC_NODE_EMISSION || type == TRC_NODE_BACKGROUND) {
-        return is_black(in) || trc_is_value(in[3], 0.0f);
+    switch (type) {
+    case TRC_NODE_EMISSION:
+        return is_black(in + TRC_AT(EMISSION, color)) ||
+               trc_is_value(in[TRC_AT(EMISSION, strength)], 0.0f);
+    case TRC_NODE_BACKGROUND:
+        return is_black(in + TRC_AT(BACKGROUND, color)) ||
+               trc_is_value(in[TRC_AT(BACKGROUND, strength)], 0.0f);
+    case TRC_NODE_TRANSPARENT:
+        return is_black(in + TRC_AT(TRANSPARENT, color));
+    default:
+        return false;
     }
-    return type == TRC_NODE_TRANSPARENT && is_black(in);
 }
 
 /* The default tangent of an anisotropic leaf is the one around the object's Z axis. */
 static trc_status fill_tangent(struct trc_build *b, uint32_t type, struct trc_operand *in) {
-    uint32_t anisotropy = TRC_GLOSSY_ANISOTROPY, tangent = TRC_GLOSSY_TANGENT;
+    uint32_t anisotropy = TRC_AT(GLOSSY, anisotropy), tangent = TRC_AT(GLOSSY, tangent);
     if (type == TRC_NODE_PRINCIPLED) {
-        anisotropy = TRC_PRINCIPLED_ANISOTROPY;
-        tangent = TRC_PRINCIPLED_TANGENT;
+        anisotropy = TRC_AT(PRINCIPLED, anisotropic);
+        tangent = TRC_AT(PRINCIPLED, tangent);
     } else if (type == TRC_NODE_LAYERED_PRINCIPLED) {
-        anisotropy = TRC_LAYERED_ANISOTROPY;
-        tangent = TRC_LAYERED_TANGENT;
+        anisotropy = TRC_AT(LAYERED_PRINCIPLED, anisotropic);
+        tangent = TRC_AT(LAYERED_PRINCIPLED, tangent);
     } else if (type != TRC_NODE_GLOSSY) {
         return TRC_OK;
     }
-    if (in[tangent].reg != -2 || trc_is_value(in[anisotropy], 0.0f))
+    if (in[tangent].reg != TRC_REG_DEFAULT || trc_is_value(in[anisotropy], 0.0f))
         return TRC_OK;
     return trc_build_op(b, TRC_OP_TANGENT, TRC_TANGENT_Z, TRC_NO_RESOURCE, NULL, in + tangent);
 }
@@ -73,11 +81,11 @@ static trc_status add_leaf(struct trc_build *b, const trc_node *node, struct trc
         return trc_fail(TRC_ERROR_TOO_LARGE, "the material mixes more than %d shaders",
                         TRC_MAX_LEAVES);
     }
-    const char *kinds = trc_node_info_of(node->type)->inputs;
+    const struct trc_slot *slots = trc_node_info_of(node->type)->inputs;
     uint32_t floats = 0;
     for (uint32_t i = 0; i < node->input_count; i++) {
         TRC_TRY(trc_build_input(b, node, i, in + floats));
-        floats += trc_kind_floats(kinds[i]);
+        floats += trc_kind_floats(slots[i].kind);
     }
     if (is_nothing(node->type, in))
         return TRC_OK;
@@ -139,7 +147,7 @@ trc_status trc_build_aovs(struct trc_build *b) {
             .pass = is_value ? TRC_PASS_AOV_VALUE(node->mode) : TRC_PASS_AOV_COLOR(node->mode),
             .first_operand = b->leaf_operand_count,
         };
-        b->leaf_operand_count += is_value ? 1 : 3;
+        b->leaf_operand_count += is_value ? TRC_AT(AOV_VALUE, end) : TRC_AT(AOV_COLOR, end);
     }
     return TRC_OK;
 }

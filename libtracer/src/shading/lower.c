@@ -6,8 +6,6 @@
 #include "core/core.h"
 #include "shading/build.h"
 
-#define CLAMP_BIT 256u
-
 /* A node on its way: its inputs in order, three operands for a colour or vector, and its outputs.
  */
 struct lowering {
@@ -23,6 +21,10 @@ static trc_status op(struct trc_build *b, uint32_t code, uint32_t mode,
     return trc_build_op(b, code, mode, TRC_NO_RESOURCE, in, out);
 }
 
+static void copy3(struct trc_operand *out, const struct trc_operand *in) {
+    memcpy(out, in, 3 * sizeof *out);
+}
+
 /* ---- inputs ---- */
 
 static uint32_t output_offset(const trc_node *node, uint32_t output) {
@@ -33,52 +35,51 @@ static uint32_t output_offset(const trc_node *node, uint32_t output) {
 }
 
 /* What an unlinked input of that kind stands for in a value node. */
-static trc_status default_input(struct trc_build *b, char kind, struct trc_operand *out) {
+static trc_status default_input(struct trc_build *b, enum trc_kind kind, struct trc_operand *out) {
     switch (kind) {
-    case 'n':
+    case TRC_KIND_NORMAL:
         return op(b, TRC_OP_NORMAL, 0, NULL, out);
-    case 'g':
+    case TRC_KIND_GENERATED:
         return op(b, TRC_OP_GENERATED, 0, NULL, out);
-    case 'p':
+    case TRC_KIND_POSITION:
         return op(b, TRC_OP_POSITION, 0, NULL, out);
-    case 'u':
-        out[2] = trc_constant(0.0f);
+    case TRC_KIND_UV:
+        out[TRC_OP_OUT_AT(UV, end)] = trc_constant(0.0f);
         return op(b, TRC_OP_UV, 0, NULL, out);
     default:
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "an input has no default");
     }
 }
 
-static trc_status linked_input(struct trc_build *b, const trc_node_input *input, char kind,
+static trc_status linked_input(struct trc_build *b, const trc_node_input *input, enum trc_kind kind,
                                struct trc_operand *out) {
     const trc_node *from = &b->desc->nodes[input->node];
-    const char given = trc_node_output_kind(from, input->output);
+    const enum trc_kind given = trc_node_output_kind(from, input->output);
     const struct trc_operand *value =
         b->outputs + b->first_output[input->node] + output_offset(from, input->output);
-    if (trc_kind_is_float(given)) {
+    if (given == TRC_KIND_FLOAT) {
         for (uint32_t i = 0; i < trc_kind_floats(kind); i++)
             out[i] = *value;
         return TRC_OK;
     }
-    if (trc_kind_is_float(kind)) {
-        return op(b, given == 'c' ? TRC_OP_LUMINANCE : TRC_OP_AVERAGE, 0, value, out);
-    }
-    memcpy(out, value, 3 * sizeof *out);
+    if (kind == TRC_KIND_FLOAT)
+        return op(b, given == TRC_KIND_COLOR ? TRC_OP_LUMINANCE : TRC_OP_AVERAGE, 0, value, out);
+    copy3(out, value);
     return TRC_OK;
 }
 
 trc_status trc_build_input(struct trc_build *b, const trc_node *node, uint32_t index,
                            struct trc_operand *out) {
     const trc_node_input *input = &b->desc->inputs[node->first_input + index];
-    const char kind = trc_node_info_of(node->type)->inputs[index];
+    const enum trc_kind kind = trc_node_info_of(node->type)->inputs[index].kind;
     const uint32_t floats = trc_kind_floats(kind);
     if (input->node >= 0)
         return linked_input(b, input, kind, out);
-    if (input->node == -2) {
+    if (input->node == TRC_INPUT_DEFAULT) {
         if (!trc_node_is_shader(node->type))
             return default_input(b, kind, out);
         for (uint32_t i = 0; i < floats; i++)
-            out[i] = (struct trc_operand){-2, 0.0f};
+            out[i] = (struct trc_operand){TRC_REG_DEFAULT, 0.0f};
         return TRC_OK;
     }
     for (uint32_t i = 0; i < floats; i++)
@@ -121,7 +122,7 @@ static trc_status table_of(const struct lowering *l, uint32_t *resource) {
 
 /* ---- nodes ---- */
 
-/* One operation for each output; float pairs get 0 as the third of their vector. */
+/* One operation for each output, from the first; float pairs get 0 as the third of their vector. */
 static trc_status lower_outputs(const struct lowering *l, const uint16_t *codes, uint32_t count) {
     struct trc_operand *out = l->out;
     for (uint32_t i = 0; i < count; i++) {
@@ -147,16 +148,17 @@ static trc_status lower_geometry(const struct lowering *l) {
                                      TRC_OP_BACKFACING};
     TRC_TRY(lower_outputs(l, codes, sizeof codes / sizeof *codes));
     /* Pointiness of a flat surface; islands are not told apart, so each object is one. */
-    l->out[19] = trc_constant(0.5f);
-    return op(l->b, TRC_OP_OBJECT_RANDOM, 0, NULL, l->out + 20);
+    l->out[TRC_OUT_AT(GEOMETRY, pointiness)] = trc_constant(0.5f);
+    return op(l->b, TRC_OP_OBJECT_RANDOM, 0, NULL,
+              l->out + TRC_OUT_AT(GEOMETRY, random_per_island));
 }
 
 static trc_status lower_object_info(const struct lowering *l) {
     static const uint16_t codes[] = {TRC_OP_OBJECT_LOCATION, TRC_OP_OBJECT_COLOR,
                                      TRC_OP_OBJECT_INDEX};
     TRC_TRY(lower_outputs(l, codes, sizeof codes / sizeof *codes));
-    l->out[8] = trc_constant((float)l->b->desc->pass_index);
-    return op(l->b, TRC_OP_OBJECT_RANDOM, 0, NULL, l->out + 9);
+    l->out[TRC_OUT_AT(OBJECT_INFO, material_index)] = trc_constant((float)l->b->desc->pass_index);
+    return op(l->b, TRC_OP_OBJECT_RANDOM, 0, NULL, l->out + TRC_OUT_AT(OBJECT_INFO, random));
 }
 
 static bool has_levels(const struct lowering *l) {
@@ -179,15 +181,19 @@ static const struct trc_build_op *source_of(const struct trc_build *b, uint32_t 
 /* What a mapping scales its U and V by at least; 0 unless it is constant and turns them about the
  * third axis alone. in: of TRC_OP_MAPPING. */
 static float least_scale(uint32_t mode, const struct trc_operand *in) {
-    static const int zero_rows[4] = {11, 14, 15, 16};
-    const bool is_product = mode == 0 || mode == 2; /* point and vector; the others divide */
-    for (int i = 6; i < TRC_OP_MAX_INPUTS; i++)
+    /* Of the matrix: what mixes Z with X and Y. */
+    static const uint32_t zeros[4] = {TRC_OP_AT(MAPPING, row0) + 2, TRC_OP_AT(MAPPING, row1) + 2,
+                                      TRC_OP_AT(MAPPING, row2), TRC_OP_AT(MAPPING, row2) + 1};
+    const uint32_t scale = TRC_OP_AT(MAPPING, scale);
+    /* The others divide by the scale. */
+    const bool is_product = mode == TRC_MAPPING_POINT || mode == TRC_MAPPING_VECTOR;
+    for (uint32_t i = scale; i < TRC_OP_AT(MAPPING, end); i++)
         if (!trc_is_constant(in[i]) || !is_product)
             return 0.0f;
     for (int i = 0; i < 4; i++)
-        if (in[zero_rows[i]].value != 0.0f)
+        if (in[zeros[i]].value != 0.0f)
             return 0.0f;
-    return fminf(fabsf(in[6].value), fabsf(in[7].value));
+    return fminf(fabsf(in[scale].value), fabsf(in[scale + 1].value));
 }
 
 /* The least that a UV map's coordinates, mapped or not, change by per metre of the surface; 0, for
@@ -207,25 +213,28 @@ static trc_status density_of(const struct lowering *l, const struct trc_operand 
 }
 
 static trc_status lower_image(const struct lowering *l) {
-    const uint32_t projection = l->node->mode >> 4, mode = l->node->mode & 15u;
-    const uint32_t image = image_of(l);
-    struct trc_operand uv[3] = {l->in[0], l->in[1], trc_constant(0.0f)};
-    if (projection == 1)
+    const uint32_t projection = l->node->mode & TRC_IMAGE_PROJECTION_MASK;
+    const uint32_t mode = l->node->mode & ~(uint32_t)TRC_IMAGE_PROJECTION_MASK;
+    const uint32_t image = image_of(l), vector = TRC_AT(IMAGE, vector);
+    struct trc_operand uv[TRC_OP_AT(IMAGE, end)] = {l->in[vector], l->in[vector + 1],
+                                                    trc_constant(0.0f)};
+    if (projection == TRC_IMAGE_BOX)
         return trc_build_op(l->b, TRC_OP_IMAGE_BOX, mode, image, l->in, l->out);
-    if (projection) {
-        const uint32_t wrap = projection == 2 ? TRC_PROJECT_SPHERE : TRC_PROJECT_TUBE;
-        TRC_TRY(op(l->b, TRC_OP_PROJECT, wrap, l->in, uv));
-    } else if ((mode & TRC_IMAGE_MODE_INTERPOLATION) != TRC_IMAGE_CLOSEST && has_levels(l)) {
-        TRC_TRY(density_of(l, uv, uv + 2));
+    if (projection != TRC_IMAGE_FLAT) {
+        const uint32_t wrap =
+            projection == TRC_IMAGE_SPHERE ? TRC_PROJECT_SPHERE : TRC_PROJECT_TUBE;
+        TRC_TRY(op(l->b, TRC_OP_PROJECT, wrap, l->in + vector, uv));
+    } else if ((mode & TRC_IMAGE_INTERPOLATION_MASK) != TRC_IMAGE_CLOSEST && has_levels(l)) {
+        TRC_TRY(density_of(l, uv, uv + TRC_OP_AT(IMAGE, density)));
     }
     return trc_build_op(l->b, TRC_OP_IMAGE, mode, image, uv, l->out);
 }
 
 static trc_status lower_environment(const struct lowering *l) {
-    const bool is_ball = l->node->mode >> 4;
-    const uint32_t mode = (l->node->mode & TRC_IMAGE_MODE_INTERPOLATION) | TRC_IMAGE_REPEAT;
-    struct trc_operand uv[3], rgba[4];
-    uv[2] = trc_constant(0.0f);
+    const bool is_ball = l->node->mode & TRC_ENVIRONMENT_MIRROR_BALL;
+    const uint32_t mode = (l->node->mode & TRC_IMAGE_INTERPOLATION_MASK) | TRC_IMAGE_REPEAT;
+    struct trc_operand uv[TRC_OP_AT(IMAGE, end)], rgba[TRC_OP_OUT_AT(IMAGE, end)];
+    uv[TRC_OP_AT(IMAGE, density)] = trc_constant(0.0f);
     TRC_TRY(op(l->b, TRC_OP_PROJECT,
                is_ball ? TRC_PROJECT_MIRROR_BALL : TRC_PROJECT_EQUIRECTANGULAR, l->in, uv));
     TRC_TRY(trc_build_op(l->b, TRC_OP_IMAGE, mode, image_of(l), uv, rgba));
@@ -237,65 +246,72 @@ static trc_status lower_named(const struct lowering *l, uint32_t code, uint32_t 
     uint32_t name;
     TRC_TRY(name_of(l, &name));
     if (code == TRC_OP_UV)
-        l->out[2] = trc_constant(0.0f);
+        l->out[TRC_OP_OUT_AT(UV, end)] = trc_constant(0.0f);
     return trc_build_op(l->b, code, mode, name, l->in, l->out);
 }
 
 static trc_status lower_mapping(const struct lowering *l) {
-    struct trc_operand in[TRC_OP_MAX_INPUTS];
-    const bool is_moved = l->node->mode < 2;
-    memcpy(in, l->in, 3 * sizeof *in);
-    for (int i = 0; i < 3; i++)
-        in[3 + i] = is_moved ? l->in[3 + i] : trc_constant(0.0f);
-    memcpy(in + 6, l->in + 9, 3 * sizeof *in);
-    TRC_TRY(op(l->b, TRC_OP_ROTATION, 0, l->in + 6, in + 9));
-    return op(l->b, TRC_OP_MAPPING, l->node->mode, in, l->out);
+    struct trc_operand in[TRC_OP_AT(MAPPING, end)];
+    const uint32_t mode = l->node->mode;
+    const bool is_moved = mode == TRC_MAPPING_POINT || mode == TRC_MAPPING_TEXTURE;
+    copy3(in + TRC_OP_AT(MAPPING, vector), l->in + TRC_AT(MAPPING, vector));
+    for (uint32_t i = 0; i < 3; i++)
+        in[TRC_OP_AT(MAPPING, location) + i] =
+            is_moved ? l->in[TRC_AT(MAPPING, location) + i] : trc_constant(0.0f);
+    copy3(in + TRC_OP_AT(MAPPING, scale), l->in + TRC_AT(MAPPING, scale));
+    TRC_TRY(op(l->b, TRC_OP_ROTATION, 0, l->in + TRC_AT(MAPPING, rotation),
+               in + TRC_OP_AT(MAPPING, row0)));
+    return op(l->b, TRC_OP_MAPPING, mode, in, l->out);
 }
 
 static trc_status lower_mix(const struct lowering *l) {
-    TRC_TRY(op(l->b, TRC_OP_MIX, l->node->mode & ~CLAMP_BIT, l->in, l->out));
-    return l->node->mode & CLAMP_BIT ? op(l->b, TRC_OP_SATURATE, 0, l->out, l->out) : TRC_OK;
+    TRC_TRY(op(l->b, TRC_OP_MIX, l->node->mode & ~(uint32_t)TRC_MODE_CLAMP, l->in, l->out));
+    return l->node->mode & TRC_MODE_CLAMP ? op(l->b, TRC_OP_SATURATE, 0, l->out, l->out) : TRC_OK;
 }
 
 static trc_status lower_math(const struct lowering *l) {
-    TRC_TRY(trc_build_math(l->b, l->node->mode & ~CLAMP_BIT, l->in[0], l->in[1], l->in[2], l->out));
-    if (!(l->node->mode & CLAMP_BIT))
+    TRC_TRY(trc_build_math(l->b, l->node->mode & ~(uint32_t)TRC_MODE_CLAMP, l->in[TRC_AT(MATH, a)],
+                           l->in[TRC_AT(MATH, b)], l->in[TRC_AT(MATH, c)], l->out));
+    if (!(l->node->mode & TRC_MODE_CLAMP))
         return TRC_OK;
-    const struct trc_operand in[3] = {l->out[0], trc_constant(0.0f), trc_constant(1.0f)};
-    return op(l->b, TRC_OP_CLAMP, 0, in, l->out);
+    const struct trc_operand in[TRC_OP_AT(CLAMP, end)] = {*l->out, trc_constant(0.0f),
+                                                          trc_constant(1.0f)};
+    return op(l->b, TRC_OP_CLAMP, TRC_CLAMP_MINMAX, in, l->out);
 }
 
 static trc_status lower_map_range(const struct lowering *l) {
     TRC_TRY(op(l->b, TRC_OP_MAP_RANGE, 0, l->in, l->out));
-    if (!(l->node->mode & CLAMP_BIT))
+    if (!(l->node->mode & TRC_MODE_CLAMP))
         return TRC_OK;
-    const struct trc_operand in[3] = {l->out[0], l->in[3], l->in[4]};
-    return op(l->b, TRC_OP_CLAMP, 1, in, l->out);
+    const struct trc_operand in[TRC_OP_AT(CLAMP, end)] = {*l->out, l->in[TRC_AT(MAP_RANGE, to_min)],
+                                                          l->in[TRC_AT(MAP_RANGE, to_max)]};
+    return op(l->b, TRC_OP_CLAMP, TRC_CLAMP_RANGE, in, l->out);
 }
 
 static trc_status lower_vector_math(const struct lowering *l) {
     const uint32_t mode = l->node->mode;
     const struct trc_operand zero = trc_constant(0.0f);
-    struct trc_operand in[TRC_OP_MAX_INPUTS];
-    for (int i = 0; i < TRC_OP_MAX_INPUTS; i++)
+    struct trc_operand in[TRC_OP_AT(VECTOR_MATH, end)];
+    for (uint32_t i = 0; i < TRC_OP_AT(VECTOR_MATH, end); i++)
         in[i] = zero;
-    memcpy(in, l->in, 3 * sizeof *in);
+    copy3(in + TRC_OP_AT(VECTOR_MATH, a), l->in + TRC_AT(VECTOR_MATH, a));
     const bool is_unary = mode == TRC_VECTOR_LENGTH || mode == TRC_VECTOR_SCALE ||
                           mode == TRC_VECTOR_NORMALIZE || mode == TRC_VECTOR_ABSOLUTE ||
                           (mode >= TRC_VECTOR_FLOOR && mode <= TRC_VECTOR_TANGENT);
     if (!is_unary)
-        memcpy(in + 3, l->in + 3, 3 * sizeof *in);
+        copy3(in + TRC_OP_AT(VECTOR_MATH, b), l->in + TRC_AT(VECTOR_MATH, b));
     if (mode == TRC_VECTOR_MULTIPLY_ADD || mode == TRC_VECTOR_WRAP ||
         mode == TRC_VECTOR_FACEFORWARD)
-        memcpy(in + 6, l->in + 6, 3 * sizeof *in);
+        copy3(in + TRC_OP_AT(VECTOR_MATH, c), l->in + TRC_AT(VECTOR_MATH, c));
     if (mode == TRC_VECTOR_SCALE || mode == TRC_VECTOR_REFRACT)
-        in[9] = l->in[9];
-    for (int i = 0; i < 4; i++)
+        in[TRC_OP_AT(VECTOR_MATH, scale)] = l->in[TRC_AT(VECTOR_MATH, scale)];
+    for (uint32_t i = 0; i < TRC_OUT_AT(VECTOR_MATH, end); i++)
         l->out[i] = zero;
+    /* Inputs a and b stand alike in both operations. */
     if (mode == TRC_VECTOR_DOT || mode == TRC_VECTOR_DISTANCE || mode == TRC_VECTOR_LENGTH) {
-        return op(l->b, TRC_OP_VECTOR_MEASURE, mode, in, l->out + 3);
+        return op(l->b, TRC_OP_VECTOR_MEASURE, mode, in, l->out + TRC_OUT_AT(VECTOR_MATH, value));
     }
-    return op(l->b, TRC_OP_VECTOR_MATH, mode, in, l->out);
+    return op(l->b, TRC_OP_VECTOR_MATH, mode, in, l->out + TRC_OUT_AT(VECTOR_MATH, vector));
 }
 
 /* Red, green, blue and X, Y, Z are what the operands are already. */
@@ -303,18 +319,25 @@ static trc_status lower_components(const struct lowering *l, uint32_t code) {
     const uint32_t mode = l->node->mode;
     if (mode != TRC_SEPARATE_RGB && mode != TRC_SEPARATE_XYZ)
         return op(l->b, code, mode, l->in, l->out);
-    memcpy(l->out, l->in, 3 * sizeof *l->in);
+    copy3(l->out, l->in);
     return TRC_OK;
 }
 
 /* Each channel by its curve, mixed with what came in by the factor. */
 static trc_status lower_curves(const struct lowering *l, uint32_t table) {
-    const uint32_t channels = l->node->type == TRC_NODE_CURVES ? 3 : 1;
-    const uint32_t mode = l->node->mode ? TRC_CURVE_EXTRAPOLATE : 0u;
-    const struct trc_operand none = trc_constant(0.0f), factor = l->in[0];
+    const bool is_color = l->node->type == TRC_NODE_CURVES;
+    const uint32_t mode = l->node->mode == TRC_CURVES_EXTRAPOLATED ? TRC_CURVE_EXTRAPOLATE : 0u;
+    const uint32_t channels = is_color ? 3 : 1;
+    const struct trc_operand none = trc_constant(0.0f);
+    const struct trc_operand factor =
+        l->in[is_color ? TRC_AT(CURVES, factor) : TRC_AT(FLOAT_CURVE, factor)];
+    const struct trc_operand low = l->in[is_color ? TRC_AT(CURVES, low) : TRC_AT(FLOAT_CURVE, low)];
+    const struct trc_operand high =
+        l->in[is_color ? TRC_AT(CURVES, high) : TRC_AT(FLOAT_CURVE, high)];
     for (uint32_t i = 0; i < channels; i++) {
-        const struct trc_operand value = l->in[1 + i];
-        const struct trc_operand in[3] = {value, l->in[1 + channels], l->in[2 + channels]};
+        const struct trc_operand value =
+            l->in[(is_color ? TRC_AT(CURVES, color) : TRC_AT(FLOAT_CURVE, value)) + i];
+        const struct trc_operand in[TRC_OP_AT(CURVE, end)] = {value, low, high};
         struct trc_operand change;
         TRC_TRY(trc_build_op(l->b, TRC_OP_CURVE, mode | i, table, in, l->out + i));
         if (trc_is_value(factor, 1.0f))
@@ -328,23 +351,24 @@ static trc_status lower_curves(const struct lowering *l, uint32_t table) {
 /* A VECTOR_MATH of two vectors. */
 static trc_status combine(struct trc_build *b, uint32_t mode, const struct trc_operand *x,
                           const struct trc_operand *y, struct trc_operand *out) {
-    struct trc_operand in[10];
-    for (int i = 0; i < 10; i++)
+    struct trc_operand in[TRC_OP_AT(VECTOR_MATH, end)];
+    for (uint32_t i = 0; i < TRC_OP_AT(VECTOR_MATH, end); i++)
         in[i] = trc_constant(0.0f);
-    memcpy(in, x, 3 * sizeof *in);
+    copy3(in + TRC_OP_AT(VECTOR_MATH, a), x);
     if (y)
-        memcpy(in + 3, y, 3 * sizeof *in);
+        copy3(in + TRC_OP_AT(VECTOR_MATH, b), y);
     return op(b, TRC_OP_VECTOR_MATH, mode, in, out);
 }
 
 /* By way of world space. */
 static trc_status lower_vector_transform(const struct lowering *l) {
-    const uint32_t from = l->node->mode & 3u, to = l->node->mode >> 2 & 3u;
-    const uint32_t type = l->node->mode >> 4;
-    const uint32_t kind = type == 0   ? (uint32_t)TRC_TRANSFORM_POINT
-                          : type == 3 ? (uint32_t)TRC_TRANSFORM_NORMAL
-                                      : 0u;
-    memcpy(l->out, l->in, 3 * sizeof *l->in);
+    const uint32_t from = l->node->mode & TRC_SPACE_MASK;
+    const uint32_t to = l->node->mode >> TRC_SPACE_TO_SHIFT & TRC_SPACE_MASK;
+    const uint32_t type = l->node->mode >> TRC_TRANSFORMED_SHIFT;
+    const uint32_t kind = type == TRC_TRANSFORMED_POINT    ? (uint32_t)TRC_TRANSFORM_POINT
+                          : type == TRC_TRANSFORMED_NORMAL ? (uint32_t)TRC_TRANSFORM_NORMAL
+                                                           : 0u;
+    copy3(l->out, l->in);
     if (from != to && from != TRC_SPACE_WORLD) {
         const uint32_t way = from == TRC_SPACE_OBJECT ? TRC_TRANSFORM_OBJECT_TO_WORLD
                                                       : TRC_TRANSFORM_CAMERA_TO_WORLD;
@@ -355,40 +379,52 @@ static trc_status lower_vector_transform(const struct lowering *l) {
             to == TRC_SPACE_OBJECT ? TRC_TRANSFORM_WORLD_TO_OBJECT : TRC_TRANSFORM_WORLD_TO_CAMERA;
         TRC_TRY(op(l->b, TRC_OP_TRANSFORM, way | kind, l->out, l->out));
     }
-    return type == 2 || (type == 3 && from != to)
+    return type == TRC_TRANSFORMED_UNIT_VECTOR || (type == TRC_TRANSFORMED_NORMAL && from != to)
                ? combine(l->b, TRC_VECTOR_NORMALIZE, l->out, NULL, l->out)
                : TRC_OK;
 }
 
-/* in: vector, center, axis, angle, rotation */
+/* By the mapping that turns a vector, about the center. */
 static trc_status lower_vector_rotate(const struct lowering *l) {
-    struct trc_operand in[TRC_OP_MAX_INPUTS], axis[4];
-    const uint32_t kind = l->node->mode & 7u;
-    const bool is_inverse = l->node->mode & 8u;
-    for (int i = 0; i < 9; i++)
-        in[i] = trc_constant(i < 6 ? 0.0f : 1.0f);
-    TRC_TRY(combine(l->b, TRC_VECTOR_SUBTRACT, l->in, l->in + 3, in));
+    struct trc_operand in[TRC_OP_AT(MAPPING, end)], axis[TRC_OP_AT(AXIS_ROTATION, end)];
+    const struct trc_operand *center = l->in + TRC_AT(VECTOR_ROTATE, center);
+    struct trc_operand *rows = in + TRC_OP_AT(MAPPING, row0);
+    const uint32_t kind = l->node->mode & ~(uint32_t)TRC_ROTATE_INVERSE;
+    for (uint32_t i = 0; i < 3; i++) {
+        in[TRC_OP_AT(MAPPING, location) + i] = trc_constant(0.0f);
+        in[TRC_OP_AT(MAPPING, scale) + i] = trc_constant(1.0f);
+    }
+    TRC_TRY(combine(l->b, TRC_VECTOR_SUBTRACT, l->in + TRC_AT(VECTOR_ROTATE, vector), center,
+                    in + TRC_OP_AT(MAPPING, vector)));
     if (kind == TRC_ROTATE_EULER) {
-        TRC_TRY(op(l->b, TRC_OP_ROTATION, 0, l->in + 10, in + 9));
+        TRC_TRY(op(l->b, TRC_OP_ROTATION, 0, l->in + TRC_AT(VECTOR_ROTATE, rotation), rows));
     } else {
         for (uint32_t i = 0; i < 3; i++)
-            axis[i] = kind ? trc_constant(i + 1 == kind ? 1.0f : 0.0f) : l->in[6 + i];
-        axis[3] = l->in[9];
-        TRC_TRY(op(l->b, TRC_OP_AXIS_ROTATION, 0, axis, in + 9));
+            axis[TRC_OP_AT(AXIS_ROTATION, axis) + i] =
+                kind == TRC_ROTATE_AXIS_ANGLE
+                    ? l->in[TRC_AT(VECTOR_ROTATE, axis) + i]
+                    : trc_constant(TRC_ROTATE_X + i == kind ? 1.0f : 0.0f);
+        axis[TRC_OP_AT(AXIS_ROTATION, angle)] = l->in[TRC_AT(VECTOR_ROTATE, angle)];
+        TRC_TRY(op(l->b, TRC_OP_AXIS_ROTATION, 0, axis, rows));
     }
-    /* Modes of Mapping: 1 turns back, 2 turns. */
-    TRC_TRY(op(l->b, TRC_OP_MAPPING, is_inverse ? 1 : 2, in, l->out));
-    return combine(l->b, TRC_VECTOR_ADD, l->out, l->in + 3, l->out);
+    /* A texture mapping turns back. */
+    const bool is_inverse = l->node->mode & TRC_ROTATE_INVERSE;
+    TRC_TRY(op(l->b, TRC_OP_MAPPING, is_inverse ? TRC_MAPPING_TEXTURE : TRC_MAPPING_VECTOR, in,
+               l->out));
+    return combine(l->b, TRC_VECTOR_ADD, l->out, center, l->out);
 }
 
 static trc_status lower_camera_data(const struct lowering *l) {
-    struct trc_operand seen[6];
+    struct trc_operand in[TRC_OP_AT(VECTOR_MEASURE, end)];
+    struct trc_operand *seen = in + TRC_OP_AT(VECTOR_MEASURE, a);
     TRC_TRY(op(l->b, TRC_OP_CAMERA_POSITION, 0, NULL, seen));
-    for (int i = 3; i < 6; i++)
-        seen[i] = trc_constant(0.0f);
-    l->out[3] = seen[2];
-    TRC_TRY(op(l->b, TRC_OP_VECTOR_MEASURE, TRC_VECTOR_LENGTH, seen, l->out + 4));
-    return combine(l->b, TRC_VECTOR_NORMALIZE, seen, NULL, l->out);
+    for (uint32_t i = 0; i < 3; i++)
+        in[TRC_OP_AT(VECTOR_MEASURE, b) + i] = trc_constant(0.0f);
+    l->out[TRC_OUT_AT(CAMERA_DATA, view_z_depth)] = seen[2];
+    TRC_TRY(op(l->b, TRC_OP_VECTOR_MEASURE, TRC_VECTOR_LENGTH, in,
+               l->out + TRC_OUT_AT(CAMERA_DATA, view_distance)));
+    return combine(l->b, TRC_VECTOR_NORMALIZE, seen, NULL,
+                   l->out + TRC_OUT_AT(CAMERA_DATA, view_vector));
 }
 
 /* Long because it is the list of node types. */
@@ -418,7 +454,7 @@ static trc_status lower_node(const struct lowering *l) {
     case TRC_NODE_INSTANCE_VALUES:
         return op(b, TRC_OP_INSTANCE_VALUES, mode, NULL, l->out);
     case TRC_NODE_LIGHT_PATH:
-        for (uint32_t i = 0; i < TRC_PATH_OUTPUTS; i++) {
+        for (uint32_t i = 0; i < TRC_OUTPUT_OF(LIGHT_PATH, end); i++) {
             TRC_TRY(op(b, TRC_OP_LIGHT_PATH, i, NULL, l->out + i));
         }
         return TRC_OK;
@@ -437,8 +473,8 @@ static trc_status lower_node(const struct lowering *l) {
     case TRC_NODE_FRESNEL:
         return op(b, TRC_OP_FRESNEL, 0, l->in, l->out);
     case TRC_NODE_LAYER_WEIGHT:
-        TRC_TRY(op(b, TRC_OP_LAYER_FRESNEL, 0, l->in, l->out));
-        return op(b, TRC_OP_LAYER_FACING, 0, l->in, l->out + 1);
+        TRC_TRY(op(b, TRC_OP_LAYER_FRESNEL, 0, l->in, l->out + TRC_OUT_AT(LAYER_WEIGHT, fresnel)));
+        return op(b, TRC_OP_LAYER_FACING, 0, l->in, l->out + TRC_OUT_AT(LAYER_WEIGHT, facing));
     case TRC_NODE_INVERT:
         return op(b, TRC_OP_INVERT, 0, l->in, l->out);
     case TRC_NODE_GAMMA:
@@ -487,7 +523,7 @@ trc_status trc_build_values(struct trc_build *b) {
     for (uint32_t i = 0; i < b->desc->node_count; i++) {
         const trc_node *node = &b->desc->nodes[i];
         b->first_output[i] = total;
-        total += output_offset(node, (uint32_t)strlen(trc_node_info_of(node->type)->outputs));
+        total += output_offset(node, trc_node_info_of(node->type)->output_count);
     }
     b->outputs = trc_alloc(total, sizeof *b->outputs);
     if (!b->outputs)
@@ -500,7 +536,7 @@ trc_status trc_build_values(struct trc_build *b) {
         uint32_t floats = 0;
         for (uint32_t k = 0; k < l.node->input_count; k++) {
             TRC_TRY(trc_build_input(b, l.node, k, l.in + floats));
-            floats += trc_kind_floats(trc_node_info_of(l.node->type)->inputs[k]);
+            floats += trc_kind_floats(trc_node_info_of(l.node->type)->inputs[k].kind);
         }
         TRC_TRY(lower_node(&l));
     }

@@ -3,11 +3,6 @@
 
 #include "shading/build.h"
 
-/* The cut-off of weights in Cycles. */
-#define WEIGHT_CUTOFF 1e-5f
-/* Microfacets of alpha^2 at or below it are ideal: TRC_SINGULAR_ALPHA2 of kernels/lobe/bsdf.h.
- * alpha is the square of roughness. */
-#define SINGULAR_ALPHA2 1e-7f
 /* Some more than rounding may cost, so that a flag is never missing. */
 #define MARGIN 1.001f
 
@@ -30,13 +25,13 @@ static bool is_constant3(const struct trc_operand *o) {
 
 /* ---- microfacets ---- */
 
-/* Ideal, rough or both, for roughness between low and high. */
+/* Ideal, rough or both, for roughness between low and high; alpha is its square. */
 static uint32_t roughness_bits(float low, float high) {
     uint32_t has = 0;
     const float l2 = low * low, h2 = high * high;
-    if (!(l2 * l2 > SINGULAR_ALPHA2 * MARGIN))
+    if (!(l2 * l2 > TRC_SINGULAR_ALPHA2 * MARGIN))
         has |= TRC_MATERIAL_HAS_SPECULAR;
-    if (!(h2 * h2 * MARGIN <= SINGULAR_ALPHA2))
+    if (!(h2 * h2 * MARGIN <= TRC_SINGULAR_ALPHA2))
         has |= TRC_MATERIAL_HAS_GLOSSY;
     return has;
 }
@@ -66,10 +61,10 @@ static uint32_t transmission_bits(uint32_t distribution, struct trc_operand roug
 /* ---- leaves ---- */
 
 static uint32_t principled_bits(uint32_t distribution, const struct trc_operand *in) {
-    const struct trc_operand metallic = in[TRC_PRINCIPLED_METALLIC];
-    const struct trc_operand transmission = in[TRC_PRINCIPLED_TRANSMISSION];
-    const struct trc_operand roughness = in[TRC_PRINCIPLED_ROUGHNESS];
-    const struct trc_operand alpha = in[TRC_PRINCIPLED_ALPHA];
+    const struct trc_operand metallic = in[TRC_AT(PRINCIPLED, metallic)];
+    const struct trc_operand transmission = in[TRC_AT(PRINCIPLED, transmission)];
+    const struct trc_operand roughness = in[TRC_AT(PRINCIPLED, roughness)];
+    const struct trc_operand alpha = in[TRC_AT(PRINCIPLED, alpha)];
     uint32_t has = may_be_below(alpha, 1.0f) ? TRC_MATERIAL_HAS_TRANSPARENCY : 0u;
     if (!may_exceed(alpha, 0.0f))
         return has;
@@ -78,36 +73,37 @@ static uint32_t principled_bits(uint32_t distribution, const struct trc_operand 
     if (not_metal && not_glass)
         has |= TRC_MATERIAL_HAS_DIFFUSE;
     if ((not_glass || may_exceed(metallic, 0.0f)) &&
-        (may_exceed(in[TRC_PRINCIPLED_SPECULAR], WEIGHT_CUTOFF) ||
-         may_exceed(metallic, WEIGHT_CUTOFF))) {
+        (may_exceed(in[TRC_AT(PRINCIPLED, specular)], TRC_WEIGHT_CUTOFF) ||
+         may_exceed(metallic, TRC_WEIGHT_CUTOFF))) {
         has |= microfacet_bits(distribution, roughness);
     }
-    if (not_metal && may_exceed(transmission, WEIGHT_CUTOFF)) {
-        has |=
-            TRC_MATERIAL_HAS_REFRACTION |
-            transmission_bits(distribution, roughness, in[TRC_PRINCIPLED_TRANSMISSION_ROUGHNESS]);
+    if (not_metal && may_exceed(transmission, TRC_WEIGHT_CUTOFF)) {
+        has |= TRC_MATERIAL_HAS_REFRACTION |
+               transmission_bits(distribution, roughness,
+                                 in[TRC_AT(PRINCIPLED, transmission_roughness)]);
     }
-    if (may_exceed(in[TRC_PRINCIPLED_CLEARCOAT], WEIGHT_CUTOFF)) {
-        has |= microfacet_bits(TRC_DISTRIBUTION_GGX, in[TRC_PRINCIPLED_CLEARCOAT_ROUGHNESS]);
+    if (may_exceed(in[TRC_AT(PRINCIPLED, clearcoat)], TRC_WEIGHT_CUTOFF)) {
+        has |= microfacet_bits(TRC_DISTRIBUTION_GGX, in[TRC_AT(PRINCIPLED, clearcoat_roughness)]);
     }
     return has;
 }
 
 static uint32_t layered_principled_bits(uint32_t distribution, const struct trc_operand *in) {
-    const struct trc_operand metallic = in[TRC_LAYERED_METALLIC];
-    const struct trc_operand transmission = in[TRC_LAYERED_TRANSMISSION];
-    const struct trc_operand alpha = in[TRC_LAYERED_ALPHA];
+    const struct trc_operand metallic = in[TRC_AT(LAYERED_PRINCIPLED, metallic)];
+    const struct trc_operand transmission = in[TRC_AT(LAYERED_PRINCIPLED, transmission_weight)];
+    const struct trc_operand alpha = in[TRC_AT(LAYERED_PRINCIPLED, alpha)];
     uint32_t has = may_be_below(alpha, 1.0f) ? TRC_MATERIAL_HAS_TRANSPARENCY : 0u;
     if (!may_exceed(alpha, 0.0f))
         return has;
-    has |= microfacet_bits(distribution, in[TRC_LAYERED_ROUGHNESS]);
+    has |= microfacet_bits(distribution, in[TRC_AT(LAYERED_PRINCIPLED, roughness)]);
     if (may_be_below(metallic, 1.0f) && may_be_below(transmission, 1.0f))
         has |= TRC_MATERIAL_HAS_DIFFUSE;
-    if (may_be_below(metallic, 1.0f) && may_exceed(transmission, WEIGHT_CUTOFF))
+    if (may_be_below(metallic, 1.0f) && may_exceed(transmission, TRC_WEIGHT_CUTOFF))
         has |= TRC_MATERIAL_HAS_REFRACTION;
-    if (may_exceed(in[TRC_LAYERED_COAT], WEIGHT_CUTOFF))
-        has |= microfacet_bits(TRC_DISTRIBUTION_GGX, in[TRC_LAYERED_COAT_ROUGHNESS]);
-    if (may_exceed(in[TRC_LAYERED_SHEEN], WEIGHT_CUTOFF))
+    if (may_exceed(in[TRC_AT(LAYERED_PRINCIPLED, coat_weight)], TRC_WEIGHT_CUTOFF))
+        has |=
+            microfacet_bits(TRC_DISTRIBUTION_GGX, in[TRC_AT(LAYERED_PRINCIPLED, coat_roughness)]);
+    if (may_exceed(in[TRC_AT(LAYERED_PRINCIPLED, sheen_weight)], TRC_WEIGHT_CUTOFF))
         has |= TRC_MATERIAL_HAS_DIFFUSE;
     return has;
 }
@@ -119,7 +115,7 @@ static uint32_t leaf_bits(const struct trc_leaf *leaf, const struct trc_operand 
     case TRC_NODE_SHEEN:
         return TRC_MATERIAL_HAS_DIFFUSE;
     case TRC_NODE_TOON:
-        return leaf->mode ? TRC_MATERIAL_HAS_GLOSSY : TRC_MATERIAL_HAS_DIFFUSE;
+        return leaf->mode == TRC_TOON_GLOSSY ? TRC_MATERIAL_HAS_GLOSSY : TRC_MATERIAL_HAS_DIFFUSE;
     case TRC_NODE_TRANSLUCENT:
         return TRC_MATERIAL_HAS_TRANSLUCENT;
     case TRC_NODE_TRANSPARENT:
@@ -127,10 +123,13 @@ static uint32_t leaf_bits(const struct trc_leaf *leaf, const struct trc_operand 
     case TRC_NODE_HOLDOUT:
         return TRC_MATERIAL_HAS_HOLDOUT;
     case TRC_NODE_GLOSSY:
-        return microfacet_bits(leaf->mode, in[TRC_ROUGHNESS]);
+        return microfacet_bits(leaf->mode, in[TRC_AT(GLOSSY, roughness)]);
     case TRC_NODE_GLASS:
+        return TRC_MATERIAL_HAS_REFRACTION |
+               microfacet_bits(leaf->mode, in[TRC_AT(GLASS, roughness)]);
     case TRC_NODE_REFRACTION:
-        return TRC_MATERIAL_HAS_REFRACTION | microfacet_bits(leaf->mode, in[TRC_ROUGHNESS]);
+        return TRC_MATERIAL_HAS_REFRACTION |
+               microfacet_bits(leaf->mode, in[TRC_AT(REFRACTION, roughness)]);
     case TRC_NODE_PRINCIPLED:
         return principled_bits(leaf->mode, in);
     case TRC_NODE_LAYERED_PRINCIPLED:
@@ -151,12 +150,12 @@ static uint32_t leaf_branches(const struct trc_leaf *leaf, const struct trc_oper
     case TRC_NODE_GLASS:
         return glass;
     case TRC_NODE_PRINCIPLED:
-        return reflection + (may_exceed(in[TRC_PRINCIPLED_TRANSMISSION], 0.0f) ? glass : 0) +
-               (may_exceed(in[TRC_PRINCIPLED_CLEARCOAT], 0.0f) ? 1 : 0);
+        return reflection + (may_exceed(in[TRC_AT(PRINCIPLED, transmission)], 0.0f) ? glass : 0) +
+               (may_exceed(in[TRC_AT(PRINCIPLED, clearcoat)], 0.0f) ? 1 : 0);
     case TRC_NODE_LAYERED_PRINCIPLED:
-        return reflection + (may_exceed(in[TRC_LAYERED_METALLIC], 0.0f) ? 1 : 0) +
-               (may_exceed(in[TRC_LAYERED_TRANSMISSION], 0.0f) ? glass : 0) +
-               (may_exceed(in[TRC_LAYERED_COAT], 0.0f) ? 1 : 0);
+        return reflection + (may_exceed(in[TRC_AT(LAYERED_PRINCIPLED, metallic)], 0.0f) ? 1 : 0) +
+               (may_exceed(in[TRC_AT(LAYERED_PRINCIPLED, transmission_weight)], 0.0f) ? glass : 0) +
+               (may_exceed(in[TRC_AT(LAYERED_PRINCIPLED, coat_weight)], 0.0f) ? 1 : 0);
     default:
         return 0;
     }
@@ -173,14 +172,20 @@ struct emitter {
 /* False: the leaf emits nothing, whatever its inputs. */
 static bool emitter_of(const struct trc_leaf *leaf, const struct trc_operand *in,
                        struct emitter *out) {
-    if (leaf->type == TRC_NODE_EMISSION || leaf->type == TRC_NODE_BACKGROUND) {
-        *out = (struct emitter){in, in[TRC_EMISSION_STRENGTH], trc_constant(1.0f)};
+    if (leaf->type == TRC_NODE_EMISSION) {
+        *out = (struct emitter){in + TRC_AT(EMISSION, color), in[TRC_AT(EMISSION, strength)],
+                                trc_constant(1.0f)};
+    } else if (leaf->type == TRC_NODE_BACKGROUND) {
+        *out = (struct emitter){in + TRC_AT(BACKGROUND, color), in[TRC_AT(BACKGROUND, strength)],
+                                trc_constant(1.0f)};
     } else if (leaf->type == TRC_NODE_PRINCIPLED) {
-        *out = (struct emitter){in + TRC_PRINCIPLED_EMISSION, in[TRC_PRINCIPLED_EMISSION_STRENGTH],
-                                in[TRC_PRINCIPLED_ALPHA]};
+        *out = (struct emitter){in + TRC_AT(PRINCIPLED, emission),
+                                in[TRC_AT(PRINCIPLED, emission_strength)],
+                                in[TRC_AT(PRINCIPLED, alpha)]};
     } else if (leaf->type == TRC_NODE_LAYERED_PRINCIPLED) {
-        *out = (struct emitter){in + TRC_LAYERED_EMISSION, in[TRC_LAYERED_EMISSION_STRENGTH],
-                                in[TRC_LAYERED_ALPHA]};
+        *out = (struct emitter){in + TRC_AT(LAYERED_PRINCIPLED, emission_color),
+                                in[TRC_AT(LAYERED_PRINCIPLED, emission_strength)],
+                                in[TRC_AT(LAYERED_PRINCIPLED, alpha)]};
     } else {
         return false;
     }

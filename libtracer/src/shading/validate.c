@@ -1,7 +1,6 @@
 /* Checks of a material's descriptor: what passes here cannot make the compiler read astray. */
 #include <inttypes.h>
 #include <math.h>
-#include <string.h>
 
 #include "core/checks.h"
 #include "core/core.h"
@@ -13,27 +12,12 @@ struct place {
     uint32_t node;
 };
 
-/* Writes the name of an input, cut to size. */
-static void input_name(const struct trc_node_info *info, uint32_t input, char *name, size_t size) {
-    const char *start = info->input_names;
-    for (uint32_t i = 0; i < input; i++) {
-        const char *space = strchr(start, ' ');
-        start = space ? space + 1 : start + strlen(start);
-    }
-    const size_t length = strcspn(start, " ");
-    const size_t copied = length < size ? length : size - 1;
-    memcpy(name, start, copied);
-    name[copied] = '\0';
-}
-
 static trc_status fail_input(const struct place *at, uint32_t input, const char *what) {
-    char name[32];
-    input_name(at->info, input, name, sizeof name);
     return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "node %" PRIu32 " (%s), input %" PRIu32 " (%s): %s",
-                    at->node, at->info->name, input, name, what);
+                    at->node, at->info->label, input, at->info->inputs[input].name, what);
 }
 
-static trc_status check_constant(const struct place *at, uint32_t index, char kind,
+static trc_status check_constant(const struct place *at, uint32_t index, enum trc_kind kind,
                                  const trc_node_input *input) {
     for (uint32_t i = 0; i < trc_kind_floats(kind); i++) {
         if (!isfinite(input->value[i]))
@@ -45,43 +29,43 @@ static trc_status check_constant(const struct place *at, uint32_t index, char ki
 static trc_status check_input(const trc_material_desc *desc, const struct place *at,
                               uint32_t index) {
     const trc_node_input *input = &desc->inputs[desc->nodes[at->node].first_input + index];
-    const char kind = at->info->inputs[index];
-    if (input->node == -1)
+    const enum trc_kind kind = at->info->inputs[index].kind;
+    if (input->node == TRC_INPUT_CONSTANT)
         return check_constant(at, index, kind, input);
-    if (input->node == -2) {
-        return strchr("fcs", kind) ? fail_input(at, index, "it has no default") : TRC_OK;
+    if (input->node == TRC_INPUT_DEFAULT) {
+        return trc_kind_has_default(kind) ? TRC_OK : fail_input(at, index, "it has no default");
     }
     if (input->node < 0 || (uint32_t)input->node >= at->node) {
         return fail_input(at, index, "it is linked to a node that is not earlier");
     }
     const struct trc_node_info *from = trc_node_info_of(desc->nodes[input->node].type);
-    if (input->output >= strlen(from->outputs)) {
+    if (input->output >= from->output_count) {
         return fail_input(at, index, "it is linked to an output that does not exist");
     }
-    if ((kind == 's') != (from->outputs[input->output] == 's')) {
+    const bool is_shader = kind == TRC_KIND_SHADER;
+    if (is_shader != (from->outputs[input->output].kind == TRC_KIND_SHADER)) {
         return fail_input(at, index,
-                          kind == 's' ? "it is linked to a value, not to a shader"
-                                      : "it is linked to a shader, not to a value");
+                          is_shader ? "it is linked to a value, not to a shader"
+                                    : "it is linked to a shader, not to a value");
     }
     return TRC_OK;
 }
 
 static trc_status check_table(const trc_node *node, const struct place *at) {
-    if (node->type != TRC_NODE_COLOR_RAMP && node->type != TRC_NODE_CURVES &&
-        node->type != TRC_NODE_FLOAT_CURVE) {
+    if (!trc_node_has_table(node->type))
         return TRC_OK;
-    }
     if (!node->table || (uintptr_t)node->table % sizeof(float) ||
-        node->table_count != 4 * TRC_RAMP_SIZE) {
+        node->table_count != 4 * TRC_TABLE_ENTRIES) {
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT,
-                        "node %" PRIu32 " (%s): the table has %" PRIu64 " floats, not %u", at->node,
-                        at->info->name, node->table ? node->table_count : 0, 4 * TRC_RAMP_SIZE);
+                        "node %" PRIu32 " (%s): the table has %" PRIu64 " floats, not %d", at->node,
+                        at->info->label, node->table ? node->table_count : 0,
+                        4 * TRC_TABLE_ENTRIES);
     }
     for (uint64_t i = 0; i < node->table_count; i++) {
         if (!isfinite(node->table[i])) {
             return trc_fail(TRC_ERROR_INVALID_ARGUMENT,
                             "node %" PRIu32 " (%s): number %" PRIu64 " of the table is not finite",
-                            at->node, at->info->name, i);
+                            at->node, at->info->label, i);
         }
     }
     return TRC_OK;
@@ -96,21 +80,21 @@ static trc_status check_node(const trc_material_desc *desc, uint32_t index) {
     }
     if (!trc_node_mode_is_valid(node->type, node->mode)) {
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT,
-                        "node %" PRIu32 " (%s) has the unknown mode %" PRIu32, index, at.info->name,
-                        node->mode);
+                        "node %" PRIu32 " (%s) has the unknown mode %" PRIu32, index,
+                        at.info->label, node->mode);
     }
-    const uint32_t count = (uint32_t)strlen(at.info->inputs);
+    const uint32_t count = at.info->input_count;
     if (node->input_count != count) {
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT,
                         "node %" PRIu32 " (%s) has %" PRIu32 " inputs, not %" PRIu32, index,
-                        at.info->name, node->input_count, count);
+                        at.info->label, node->input_count, count);
     }
     if (count &&
         (node->first_input > desc->input_count || count > desc->input_count - node->first_input)) {
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT,
                         "node %" PRIu32 " (%s): its inputs are beyond the %" PRIu32
                         " of the material",
-                        index, at.info->name, desc->input_count);
+                        index, at.info->label, desc->input_count);
     }
     for (uint32_t i = 0; i < count; i++)
         TRC_TRY(check_input(desc, &at, i));

@@ -9,7 +9,7 @@
 
 #include "kernels/lobe/bsdf.h"
 #include "kernels/simd/wide_math.h"
-#include "shading/build.h"
+#include "model/nodes.h"
 #include "wide_test.h"
 
 #define OPERANDS 40
@@ -23,14 +23,16 @@ struct model {
     bool back; /* seen from the back */
 };
 
-static inline struct trc_operand constant(float value) { return (struct trc_operand){-1, value}; }
+static inline struct trc_operand constant(float value) {
+    return (struct trc_operand){TRC_REG_CONSTANT, value};
+}
 
 static inline void begin(struct model *m, const char *name, uint32_t type, uint32_t mode,
                          uint32_t count) {
     memset(m, 0, sizeof *m);
     m->name = name;
     m->material.leaf_count = 1;
-    m->material.leaves[0] = (struct trc_leaf){type, mode, {-1, 1.0f}, 0, count};
+    m->material.leaves[0] = (struct trc_leaf){type, mode, {TRC_REG_CONSTANT, 1.0f}, 0, count};
     for (uint32_t i = 0; i < OPERANDS; i++)
         m->operands[i] = constant(0.0f);
 }
@@ -42,7 +44,7 @@ static inline void set3(struct model *m, uint32_t at, float a, float b, float c)
 }
 static inline void unlink_vector(struct model *m, uint32_t at) {
     for (uint32_t i = 0; i < 3; i++)
-        m->operands[at + i] = (struct trc_operand){-2, 0.0f};
+        m->operands[at + i] = (struct trc_operand){TRC_REG_DEFAULT, 0.0f};
 }
 /* The material points into the model: after the model has its final place. */
 static const struct trc_material *material_of(struct model *m) {
@@ -53,37 +55,37 @@ static const struct trc_material *material_of(struct model *m) {
 
 static inline struct model diffuse(float roughness) {
     struct model m;
-    begin(&m, roughness > 0 ? "Oren-Nayar" : "Lambert", TRC_NODE_DIFFUSE, 0, 7);
-    set3(&m, 0, 1, 1, 1);
-    set(&m, 3, roughness);
-    unlink_vector(&m, 4);
+    begin(&m, roughness > 0 ? "Oren-Nayar" : "Lambert", TRC_NODE_DIFFUSE, 0, TRC_AT(DIFFUSE, end));
+    set3(&m, TRC_AT(DIFFUSE, color), 1, 1, 1);
+    set(&m, TRC_AT(DIFFUSE, roughness), roughness);
+    unlink_vector(&m, TRC_AT(DIFFUSE, normal));
     return m;
 }
 static inline struct model translucent(void) {
     struct model m;
-    begin(&m, "translucent", TRC_NODE_TRANSLUCENT, 0, 6);
-    set3(&m, 0, 1, 1, 1);
-    unlink_vector(&m, 3);
+    begin(&m, "translucent", TRC_NODE_TRANSLUCENT, 0, TRC_AT(TRANSLUCENT, end));
+    set3(&m, TRC_AT(TRANSLUCENT, color), 1, 1, 1);
+    unlink_vector(&m, TRC_AT(TRANSLUCENT, normal));
     return m;
 }
 static inline struct model glossy(uint32_t mode, float roughness, float anisotropy) {
     struct model m;
-    begin(&m, "glossy", TRC_NODE_GLOSSY, mode, 12);
-    set3(&m, 0, 1, 1, 1);
-    set(&m, 3, roughness);
-    set(&m, 4, anisotropy);
-    set(&m, 5, 0.1f);
-    unlink_vector(&m, 6);
-    set3(&m, 9, 1, 0, 0);
+    begin(&m, "glossy", TRC_NODE_GLOSSY, mode, TRC_AT(GLOSSY, end));
+    set3(&m, TRC_AT(GLOSSY, color), 1, 1, 1);
+    set(&m, TRC_AT(GLOSSY, roughness), roughness);
+    set(&m, TRC_AT(GLOSSY, anisotropy), anisotropy);
+    set(&m, TRC_AT(GLOSSY, rotation), 0.1f);
+    unlink_vector(&m, TRC_AT(GLOSSY, normal));
+    set3(&m, TRC_AT(GLOSSY, tangent), 1, 0, 0);
     return m;
 }
 static inline struct model glass(uint32_t mode, float roughness, float ior, bool back) {
     struct model m;
-    begin(&m, "glass", TRC_NODE_GLASS, mode, 8);
-    set3(&m, 0, 1, 1, 1);
-    set(&m, 3, roughness);
-    set(&m, 4, ior);
-    unlink_vector(&m, 5);
+    begin(&m, "glass", TRC_NODE_GLASS, mode, TRC_AT(GLASS, end));
+    set3(&m, TRC_AT(GLASS, color), 1, 1, 1);
+    set(&m, TRC_AT(GLASS, roughness), roughness);
+    set(&m, TRC_AT(GLASS, ior), ior);
+    unlink_vector(&m, TRC_AT(GLASS, normal));
     m.back = back;
     return m;
 }
@@ -96,111 +98,111 @@ static inline struct model refraction(uint32_t mode, float roughness, float ior)
 /* Defaults of the node. */
 static inline struct model principled(const char *name) {
     struct model m;
-    begin(&m, name, TRC_NODE_PRINCIPLED, TRC_DISTRIBUTION_GGX, 34);
-    set3(&m, 0, 0.8f, 0.8f, 0.8f);
-    set(&m, 8, 0.5f);
-    set(&m, 10, 0.5f);
-    set(&m, 14, 0.5f);
-    set(&m, 16, 0.03f);
-    set(&m, 17, 1.45f);
-    set(&m, 23, 1.0f);
-    set(&m, 24, 1.0f);
-    unlink_vector(&m, 25);
-    unlink_vector(&m, 28);
-    set3(&m, 31, 1, 0, 0);
+    begin(&m, name, TRC_NODE_PRINCIPLED, TRC_DISTRIBUTION_GGX, TRC_AT(PRINCIPLED, end));
+    set3(&m, TRC_AT(PRINCIPLED, base_color), 0.8f, 0.8f, 0.8f);
+    set(&m, TRC_AT(PRINCIPLED, specular), 0.5f);
+    set(&m, TRC_AT(PRINCIPLED, roughness), 0.5f);
+    set(&m, TRC_AT(PRINCIPLED, sheen_tint), 0.5f);
+    set(&m, TRC_AT(PRINCIPLED, clearcoat_roughness), 0.03f);
+    set(&m, TRC_AT(PRINCIPLED, ior), 1.45f);
+    set(&m, TRC_AT(PRINCIPLED, emission_strength), 1.0f);
+    set(&m, TRC_AT(PRINCIPLED, alpha), 1.0f);
+    unlink_vector(&m, TRC_AT(PRINCIPLED, normal));
+    unlink_vector(&m, TRC_AT(PRINCIPLED, clearcoat_normal));
+    set3(&m, TRC_AT(PRINCIPLED, tangent), 1, 0, 0);
     return m;
 }
 static inline struct model principled_metal(uint32_t mode, float roughness) {
     struct model m = principled("Principled metal");
     m.material.leaves[0].mode = mode;
-    set3(&m, 0, 1, 1, 1);
-    set(&m, 7, 1.0f);
-    set(&m, 10, roughness);
-    set(&m, 11, 0.6f);
+    set3(&m, TRC_AT(PRINCIPLED, base_color), 1, 1, 1);
+    set(&m, TRC_AT(PRINCIPLED, metallic), 1.0f);
+    set(&m, TRC_AT(PRINCIPLED, roughness), roughness);
+    set(&m, TRC_AT(PRINCIPLED, anisotropic), 0.6f);
     return m;
 }
 static inline struct model principled_glass(uint32_t mode, float roughness, bool back) {
     struct model m = principled("Principled glass");
     m.material.leaves[0].mode = mode;
-    set3(&m, 0, 1, 1, 1);
-    set(&m, 10, roughness);
-    set(&m, 18, 1.0f);
-    set(&m, 19, 0.2f);
+    set3(&m, TRC_AT(PRINCIPLED, base_color), 1, 1, 1);
+    set(&m, TRC_AT(PRINCIPLED, roughness), roughness);
+    set(&m, TRC_AT(PRINCIPLED, transmission), 1.0f);
+    set(&m, TRC_AT(PRINCIPLED, transmission_roughness), 0.2f);
     m.back = back;
     return m;
 }
 static inline struct model principled_all(void) {
     struct model m = principled("Principled, everything");
-    set3(&m, 0, 0.8f, 0.5f, 0.3f);
-    set(&m, 3, 0.2f);
-    set3(&m, 4, 0.9f, 0.3f, 0.2f);
-    set(&m, 7, 0.3f);
-    set(&m, 9, 0.4f);
-    set(&m, 11, 0.5f);
-    set(&m, 13, 0.7f);
-    set(&m, 15, 0.8f);
-    set(&m, 16, 0.3f);
-    set(&m, 18, 0.4f);
+    set3(&m, TRC_AT(PRINCIPLED, base_color), 0.8f, 0.5f, 0.3f);
+    set(&m, TRC_AT(PRINCIPLED, subsurface), 0.2f);
+    set3(&m, TRC_AT(PRINCIPLED, subsurface_color), 0.9f, 0.3f, 0.2f);
+    set(&m, TRC_AT(PRINCIPLED, metallic), 0.3f);
+    set(&m, TRC_AT(PRINCIPLED, specular_tint), 0.4f);
+    set(&m, TRC_AT(PRINCIPLED, anisotropic), 0.5f);
+    set(&m, TRC_AT(PRINCIPLED, sheen), 0.7f);
+    set(&m, TRC_AT(PRINCIPLED, clearcoat), 0.8f);
+    set(&m, TRC_AT(PRINCIPLED, clearcoat_roughness), 0.3f);
+    set(&m, TRC_AT(PRINCIPLED, transmission), 0.4f);
     return m;
 }
 /* Principled of Blender 4 with every layer, or white metal, or white glass. */
 static inline struct model layered(const char *name, uint32_t mode, float roughness) {
     struct model m;
-    begin(&m, name, TRC_NODE_LAYERED_PRINCIPLED, mode, 39);
-    set3(&m, 0, 1, 1, 1);
-    set(&m, TRC_LAYERED_ROUGHNESS, roughness);
-    set(&m, TRC_LAYERED_IOR, 1.5f);
-    set(&m, TRC_LAYERED_ALPHA, 1.0f);
-    unlink_vector(&m, TRC_LAYERED_NORMAL);
-    set(&m, TRC_LAYERED_SPECULAR_LEVEL, 0.5f);
-    set3(&m, TRC_LAYERED_SPECULAR_TINT, 1, 1, 1);
-    set3(&m, TRC_LAYERED_TANGENT, 1, 0, 0);
-    set(&m, TRC_LAYERED_COAT_ROUGHNESS, 0.3f);
-    set(&m, TRC_LAYERED_COAT_IOR, 1.5f);
-    set3(&m, TRC_LAYERED_COAT_TINT, 1, 1, 1);
-    unlink_vector(&m, TRC_LAYERED_COAT_NORMAL);
-    set(&m, TRC_LAYERED_SHEEN_ROUGHNESS, 0.5f);
-    set3(&m, TRC_LAYERED_SHEEN_TINT, 1, 1, 1);
+    begin(&m, name, TRC_NODE_LAYERED_PRINCIPLED, mode, TRC_AT(LAYERED_PRINCIPLED, end));
+    set3(&m, TRC_AT(LAYERED_PRINCIPLED, base_color), 1, 1, 1);
+    set(&m, TRC_AT(LAYERED_PRINCIPLED, roughness), roughness);
+    set(&m, TRC_AT(LAYERED_PRINCIPLED, ior), 1.5f);
+    set(&m, TRC_AT(LAYERED_PRINCIPLED, alpha), 1.0f);
+    unlink_vector(&m, TRC_AT(LAYERED_PRINCIPLED, normal));
+    set(&m, TRC_AT(LAYERED_PRINCIPLED, specular_ior_level), 0.5f);
+    set3(&m, TRC_AT(LAYERED_PRINCIPLED, specular_tint), 1, 1, 1);
+    set3(&m, TRC_AT(LAYERED_PRINCIPLED, tangent), 1, 0, 0);
+    set(&m, TRC_AT(LAYERED_PRINCIPLED, coat_roughness), 0.3f);
+    set(&m, TRC_AT(LAYERED_PRINCIPLED, coat_ior), 1.5f);
+    set3(&m, TRC_AT(LAYERED_PRINCIPLED, coat_tint), 1, 1, 1);
+    unlink_vector(&m, TRC_AT(LAYERED_PRINCIPLED, coat_normal));
+    set(&m, TRC_AT(LAYERED_PRINCIPLED, sheen_roughness), 0.5f);
+    set3(&m, TRC_AT(LAYERED_PRINCIPLED, sheen_tint), 1, 1, 1);
     return m;
 }
 static inline struct model layered_metal(uint32_t mode, float roughness) {
     struct model m = layered("layered metal", mode, roughness);
-    set(&m, TRC_LAYERED_METALLIC, 1.0f);
+    set(&m, TRC_AT(LAYERED_PRINCIPLED, metallic), 1.0f);
     return m;
 }
 static inline struct model layered_glass(uint32_t mode, float roughness, bool back) {
     struct model m = layered("layered glass", mode, roughness);
-    set(&m, TRC_LAYERED_TRANSMISSION, 1.0f);
+    set(&m, TRC_AT(LAYERED_PRINCIPLED, transmission_weight), 1.0f);
     m.back = back;
     return m;
 }
 static inline struct model layered_all(void) {
     struct model m = layered("all layers", TRC_DISTRIBUTION_MULTI_GGX, 0.6f);
-    set(&m, TRC_LAYERED_METALLIC, 0.3f);
-    set(&m, TRC_LAYERED_TRANSMISSION, 0.4f);
-    set(&m, TRC_LAYERED_COAT, 0.7f);
-    set(&m, TRC_LAYERED_SHEEN, 0.8f);
-    set(&m, TRC_LAYERED_DIFFUSE_ROUGHNESS, 0.5f);
-    set(&m, TRC_LAYERED_ANISOTROPY, 0.4f);
-    set3(&m, TRC_LAYERED_COAT_TINT, 0.9f, 0.5f, 0.7f);
+    set(&m, TRC_AT(LAYERED_PRINCIPLED, metallic), 0.3f);
+    set(&m, TRC_AT(LAYERED_PRINCIPLED, transmission_weight), 0.4f);
+    set(&m, TRC_AT(LAYERED_PRINCIPLED, coat_weight), 0.7f);
+    set(&m, TRC_AT(LAYERED_PRINCIPLED, sheen_weight), 0.8f);
+    set(&m, TRC_AT(LAYERED_PRINCIPLED, diffuse_roughness), 0.5f);
+    set(&m, TRC_AT(LAYERED_PRINCIPLED, anisotropic), 0.4f);
+    set3(&m, TRC_AT(LAYERED_PRINCIPLED, coat_tint), 0.9f, 0.5f, 0.7f);
     return m;
 }
 
 static inline struct model toon(uint32_t mode, float size, float smooth) {
     struct model m;
-    begin(&m, mode ? "glossy toon" : "toon", TRC_NODE_TOON, mode, 8);
-    set3(&m, 0, 1, 1, 1);
-    set(&m, 3, size);
-    set(&m, 4, smooth);
-    unlink_vector(&m, 5);
+    begin(&m, mode ? "glossy toon" : "toon", TRC_NODE_TOON, mode, TRC_AT(TOON, end));
+    set3(&m, TRC_AT(TOON, color), 1, 1, 1);
+    set(&m, TRC_AT(TOON, size), size);
+    set(&m, TRC_AT(TOON, smooth), smooth);
+    unlink_vector(&m, TRC_AT(TOON, normal));
     return m;
 }
 static inline struct model clearcoat(float roughness) {
     struct model m = principled("clearcoat");
-    set3(&m, 0, 0, 0, 0);
-    set(&m, 8, 0.0f);
-    set(&m, 15, 1.0f);
-    set(&m, 16, roughness);
+    set3(&m, TRC_AT(PRINCIPLED, base_color), 0, 0, 0);
+    set(&m, TRC_AT(PRINCIPLED, specular), 0.0f);
+    set(&m, TRC_AT(PRINCIPLED, clearcoat), 1.0f);
+    set(&m, TRC_AT(PRINCIPLED, clearcoat_roughness), roughness);
     return m;
 }
 

@@ -23,19 +23,16 @@ struct single {
 #define OUT 100
 
 static const uint8_t op_input_counts[] __attribute__((unused)) = {
-#define COUNT(name, inputs, outputs, is_pure) inputs,
-    TRC_OPS(COUNT)
-#undef COUNT
+#define TRC_OPERATION(NAME, is_pure, inputs, outputs) TRC_OP_AT(NAME, end),
+#include "model/operations.def"
 };
 static const uint8_t op_output_counts[] __attribute__((unused)) = {
-#define COUNT(name, inputs, outputs, is_pure) outputs,
-    TRC_OPS(COUNT)
-#undef COUNT
+#define TRC_OPERATION(NAME, is_pure, inputs, outputs) TRC_OP_OUT_AT(NAME, end),
+#include "model/operations.def"
 };
 static const char *const op_names[] __attribute__((unused)) = {
-#define NAME(name, inputs, outputs, is_pure) #name,
-    TRC_OPS(NAME)
-#undef NAME
+#define TRC_OPERATION(NAME, is_pure, inputs, outputs) #NAME,
+#include "model/operations.def"
 };
 
 PROGRAM_INLINE void single_init(struct single *p, uint32_t op, uint32_t mode, uint32_t resource) {

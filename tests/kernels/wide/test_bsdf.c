@@ -323,10 +323,10 @@ static void light_weights_drop_out(void **state) {
     struct model m = diffuse(0.0f);
     struct trc_surface s;
     struct trc_lobes l;
-    set3(&m, 0, 1e-6f, 1e-6f, 1e-6f);
+    set3(&m, TRC_AT(DIFFUSE, color), 1e-6f, 1e-6f, 1e-6f);
     prepare(&m, direction(0.7, 0.0), &s, &l);
     assert_int_equal(l.count, 0);
-    set3(&m, 0, -1.0f, NAN, 0.5f);
+    set3(&m, TRC_AT(DIFFUSE, color), -1.0f, NAN, 0.5f);
     prepare(&m, direction(0.7, 0.0), &s, &l);
     for (int i = 0; i < l.count; i++)
         assert_true(isfinite(vf_get(v3_average(l.lobe[i].weight), 0)));

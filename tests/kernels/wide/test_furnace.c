@@ -165,9 +165,9 @@ static double diffuse_albedo(struct model *m, double cos_o) {
 static void diffuse_albedos(void **state) {
     (void)state;
     struct model lambert = diffuse(0.0f), rough = diffuse(0.8f), all = principled("");
-    set(&all, 8, 0.0f);
-    set(&all, 10, 0.5f);
-    set3(&all, 0, 1, 1, 1);
+    set(&all, TRC_AT(PRINCIPLED, specular), 0.0f);
+    set(&all, TRC_AT(PRINCIPLED, roughness), 0.5f);
+    set3(&all, TRC_AT(PRINCIPLED, base_color), 1, 1, 1);
     double worst = 0.0;
     for (double c = 0.1; c <= 1.0; c += 0.3) {
         worst = fmax(worst, fabs(diffuse_albedo(&lambert, c) - 1.0));

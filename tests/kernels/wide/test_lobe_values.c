@@ -199,7 +199,7 @@ static double refracted_out(const double o[3], const double i[3]) {
 
 static struct model brushed(uint32_t mode) {
     struct model m = glossy(mode, (float)ROUGHNESS, (float)ANISOTROPY);
-    set(&m, 5, 0.0f); /* the tangent is x */
+    set(&m, TRC_AT(GLOSSY, rotation), 0.0f); /* the tangent is x */
     return m;
 }
 static struct model velvet(void) {
@@ -210,15 +210,15 @@ static struct model velvet(void) {
 }
 static struct model burley_of(double roughness) {
     struct model m = principled("Burley");
-    set3(&m, 0, 1, 1, 1);
-    set(&m, 8, 0.0f);
-    set(&m, 10, (float)roughness);
+    set3(&m, TRC_AT(PRINCIPLED, base_color), 1, 1, 1);
+    set(&m, TRC_AT(PRINCIPLED, specular), 0.0f);
+    set(&m, TRC_AT(PRINCIPLED, roughness), (float)roughness);
     return m;
 }
 static struct model dielectric_of(void) {
     struct model m = principled("dielectric");
-    set3(&m, 0, 0, 0, 0);
-    set(&m, 10, (float)ROUGHNESS);
+    set3(&m, TRC_AT(PRINCIPLED, base_color), 0, 0, 0);
+    set(&m, TRC_AT(PRINCIPLED, roughness), (float)ROUGHNESS);
     return m;
 }
 static struct model refraction_of(bool back) {
@@ -299,7 +299,7 @@ static void bent_normals_fade_at_the_terminator(void **state) {
         if (dot(n, i) < 0.02 || c < 0.05 || 2.0 * c * n[2] - o[2] < 0.02)
             continue;
         struct model m = diffuse(0.0f);
-        set3(&m, 4, (float)n[0], (float)n[1], (float)n[2]);
+        set3(&m, TRC_AT(DIFFUSE, normal), (float)n[0], (float)n[1], (float)n[2]);
         struct trc_surface s;
         struct trc_lobes l;
         struct trc_bsdf_value v;
@@ -324,7 +324,7 @@ static void rays_carry_the_share_of_continued_lobes(void **state) {
     (void)state;
     struct model m = principled("Principled");
     struct rng random = rng_seed(33);
-    set(&m, 10, (float)ROUGHNESS);
+    set(&m, TRC_AT(PRINCIPLED, roughness), (float)ROUGHNESS);
     double lowest = 1.0, highest = 0.0;
     for (int k = 0; k < 400; k++) {
         double o[3];

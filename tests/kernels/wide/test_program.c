@@ -11,15 +11,14 @@
 /* ---- one operation at a time ---- */
 
 static const uint8_t op_is_pure[] = {
-#define COUNT(name, inputs, outputs, is_pure) is_pure,
-    TRC_OPS(COUNT)
-#undef COUNT
+#define TRC_OPERATION(NAME, is_pure, inputs, outputs) is_pure,
+#include "model/operations.def"
 };
 
-static void ramp_table(float table[4 * TRC_RAMP_SIZE]) {
+static void ramp_table(float table[4 * TRC_TABLE_ENTRIES]) {
     static const float from[4] = {.1f, .9f, .4f, 1}, to[4] = {.7f, .2f, .8f, 1};
-    for (uint32_t i = 0; i < TRC_RAMP_SIZE; i++) {
-        const float t = (float)i / (float)(TRC_RAMP_SIZE - 1);
+    for (uint32_t i = 0; i < TRC_TABLE_ENTRIES; i++) {
+        const float t = (float)i / (float)(TRC_TABLE_ENTRIES - 1);
         for (int c = 0; c < 4; c++)
             table[4 * i + c] = (1 - t) * from[c] + t * to[c];
     }
@@ -50,7 +49,7 @@ static void case_inputs(const struct program_case *c, float in[TRC_OP_MAX_INPUTS
 
 static void test_against_cycles(void **state) {
     (void)state;
-    static float table[4 * TRC_RAMP_SIZE];
+    static float table[4 * TRC_TABLE_ENTRIES];
     int failures = 0;
     ramp_table(table);
     for (size_t i = 0; i < sizeof program_cases / sizeof *program_cases; i++) {
@@ -155,7 +154,7 @@ static bool same_bits_or_nan(float a, float b) {
 /* Folding runs the scalar kernels: what it gives is what any width gives. */
 static void test_against_scalar(void **state) {
     (void)state;
-    static float table[4 * TRC_RAMP_SIZE];
+    static float table[4 * TRC_TABLE_ENTRIES];
     static struct trc_registers regs;
     struct rng r = rng_seed(7);
     ramp_table(table);
@@ -214,7 +213,7 @@ static void test_curves(void **state) {
     (void)state;
     static const float at[5] = {2, 3, 4, 1, 6}, flat[5] = {.1f, .4f, .7f, .1f, .7f},
                        straight[5] = {.1f, .4f, .7f, -.2f, 1.3f};
-    static float table[4 * TRC_RAMP_SIZE];
+    static float table[4 * TRC_TABLE_ENTRIES];
     ramp_table(table);
     for (int i = 0; i < 5; i++) {
         const float in[3] = {at[i], 2, 4};
@@ -402,11 +401,11 @@ static const struct expectation expectations[] = {
     {TRC_OP_COLOR_ATTRIBUTE, 0, NAME_COLOR, {0}, {{.5f, .6f, .7f, .8f}, {0}, {0}}},
     {TRC_OP_COLOR_ATTRIBUTE, 0, TRC_NO_RESOURCE, {0}, {{.5f, .6f, .7f, .8f}, {0}, {0}}},
     {TRC_OP_COLOR_ATTRIBUTE, 0, NAME_OTHER, {0}, {{2.5f, 3.5f, 0, 1}, {0}, {0}}},
-    {TRC_OP_LIGHT_PATH, TRC_PATH_IS_CAMERA, 0, {0}, {{0}, {0}, {0}}},
-    {TRC_OP_LIGHT_PATH, TRC_PATH_IS_GLOSSY, 0, {0}, {{1}, {1}, {1}}},
-    {TRC_OP_LIGHT_PATH, TRC_PATH_IS_SINGULAR, 0, {0}, {{1}, {1}, {1}}},
-    {TRC_OP_LIGHT_PATH, TRC_PATH_RAY_LENGTH, 0, {0}, {{7}, {7}, {7}}},
-    {TRC_OP_LIGHT_PATH, TRC_PATH_DEPTH, 0, {0}, {{2}, {2}, {2}}},
+    {TRC_OP_LIGHT_PATH, TRC_OUTPUT_OF(LIGHT_PATH, is_camera), 0, {0}, {{0}, {0}, {0}}},
+    {TRC_OP_LIGHT_PATH, TRC_OUTPUT_OF(LIGHT_PATH, is_glossy), 0, {0}, {{1}, {1}, {1}}},
+    {TRC_OP_LIGHT_PATH, TRC_OUTPUT_OF(LIGHT_PATH, is_singular), 0, {0}, {{1}, {1}, {1}}},
+    {TRC_OP_LIGHT_PATH, TRC_OUTPUT_OF(LIGHT_PATH, ray_length), 0, {0}, {{7}, {7}, {7}}},
+    {TRC_OP_LIGHT_PATH, TRC_OUTPUT_OF(LIGHT_PATH, ray_depth), 0, {0}, {{2}, {2}, {2}}},
     /* ((1.5 - 1) / (1.5 + 1))^2 at normal incidence */
     {TRC_OP_FRESNEL, 0, 0, {1.5f, .6f, 0, .8f}, {{.04f}, {.04f}, {.04f}}},
     {TRC_OP_LAYER_FACING, 0, 0, {.5f, 0, 0, 1}, {{.2f}, {.2f}, {.2f}}},

@@ -54,9 +54,6 @@ enum {
     TRC_FRESNEL_DIELECTRIC /* F of ior for reflection, 1 - F for refraction */
 };
 
-/* Lanes where alpha_x * alpha_y is at or below it are ideal (Cycles 3.4 uses the same bound). */
-#define TRC_SINGULAR_ALPHA2 1e-7f
-
 struct trc_lobe {
     enum trc_lobe_kind kind;
     uint32_t distribution;

@@ -6,9 +6,8 @@
 
 #include "kernels/lobe/ggx_energy.h"
 #include "kernels/lobe/microfacet.h"
+#include "model/nodes.h"
 
-/* Lobes whose mean weight is below it are dropped, lane by lane (Cycles' closure cut-off). */
-#define WEIGHT_CUTOFF 1e-5f
 /* Indices that close to 1 do not refract. */
 #define NO_REFRACTION 1e-4f
 /* First hit: a lobe gets at least this share of the samples (Cycles 3.4's defensive sampling). */
@@ -36,7 +35,7 @@ TRC_INLINE vvec3 colour(const struct setup *c, const struct trc_leaf *leaf, uint
     return trc_operand_vec3(input(c, leaf, at), c->regs);
 }
 TRC_INLINE bool is_unlinked(const struct setup *c, const struct trc_leaf *leaf, uint32_t at) {
-    return input(c, leaf, at)->reg == -2;
+    return input(c, leaf, at)->reg == TRC_REG_DEFAULT;
 }
 
 /* ---- normals and tangents ---- */
@@ -119,7 +118,7 @@ static struct trc_lobe *add_lobe(struct setup *c, enum trc_lobe_kind kind, vvec3
         v3(vf_max(weight.x, vf_zero()), vf_max(weight.y, vf_zero()), vf_max(weight.z, vf_zero()));
     const vfloat mean = v3_average(w);
     /* False for NaN too. */
-    const vmask counts = vm_and(c->s->active, vf_ge(mean, vf_set(WEIGHT_CUTOFF)));
+    const vmask counts = vm_and(c->s->active, vf_ge(mean, vf_set(TRC_WEIGHT_CUTOFF)));
     if (!vm_any(counts) || out->count == TRC_MAX_LOBES)
         return NULL;
     struct trc_lobe *lobe = &out->lobe[out->count++];
@@ -178,7 +177,7 @@ static void add_transparent(struct setup *c, vvec3 weight) {
         if (lobe->kind != TRC_LOBE_TRANSPARENT)
             continue;
         const vfloat mean = vf_abs(v3_average(weight));
-        const vmask counts = vm_and(c->s->active, vf_ge(mean, vf_set(WEIGHT_CUTOFF)));
+        const vmask counts = vm_and(c->s->active, vf_ge(mean, vf_set(TRC_WEIGHT_CUTOFF)));
         lobe->weight = v3_add(lobe->weight, v3_where(counts, weight));
         lobe->mix_weight = lobe->mix_weight + vf_where(counts, mean);
         return;
@@ -303,16 +302,16 @@ static bool is_sharp(uint32_t mode) {
 }
 
 static void add_glossy(struct setup *c, const struct trc_leaf *leaf, vfloat weight) {
-    const vvec3 base = colour(c, leaf, 0);
+    const vvec3 base = colour(c, leaf, TRC_AT(GLOSSY, color));
     struct trc_lobe *lobe = add_lobe(c, TRC_LOBE_REFLECT, v3_scale(base, weight));
     if (!lobe)
         return;
     lobe->distribution = distribution_of(leaf->mode);
     lobe->correlated = leaf->mode & TRC_DISTRIBUTION_CORRELATED;
-    lobe->n = leaf_normal(c, leaf, 6);
+    lobe->n = leaf_normal(c, leaf, TRC_AT(GLOSSY, normal));
     lobe->ior = vf_one();
-    const vfloat alpha = vf_square(number(c, leaf, 3));
-    const struct trc_operand *twist = input(c, leaf, 4);
+    const vfloat alpha = vf_square(number(c, leaf, TRC_AT(GLOSSY, roughness)));
+    const struct trc_operand *twist = input(c, leaf, TRC_AT(GLOSSY, anisotropy));
     lobe->alpha_x = lobe->alpha_y = alpha;
     lobe->anisotropic = twist->reg >= 0 || twist->value != 0.0f;
     if (lobe->anisotropic) {
@@ -321,7 +320,8 @@ static void add_glossy(struct setup *c, const struct trc_leaf *leaf, vfloat weig
         const vfloat less = vf_one() - vf_abs(anisotropy);
         lobe->alpha_x = vf_select(negative, alpha / less, alpha * less);
         lobe->alpha_y = vf_select(negative, alpha * less, alpha / less);
-        lobe->tangent = leaf_tangent(c, leaf, 9, lobe->n, number(c, leaf, 5));
+        lobe->tangent = leaf_tangent(c, leaf, TRC_AT(GLOSSY, tangent), lobe->n,
+                                     number(c, leaf, TRC_AT(GLOSSY, rotation)));
     }
     finish_microfacets(c, lobe, is_sharp(leaf->mode));
     if (lobe->distribution == TRC_LOBE_MULTI_GGX && lobe->correlated)
@@ -332,17 +332,17 @@ static void add_glossy(struct setup *c, const struct trc_leaf *leaf, vfloat weig
 
 /* As Cycles, which limits the cone to the hemisphere. */
 static void add_toon(struct setup *c, const struct trc_leaf *leaf, vfloat weight) {
-    const bool is_glossy = leaf->mode == 1;
+    const bool is_glossy = leaf->mode == TRC_TOON_GLOSSY;
     struct trc_lobe *lobe = add_lobe(c, is_glossy ? TRC_LOBE_REFLECT : TRC_LOBE_DIFFUSE,
-                                     v3_scale(colour(c, leaf, 0), weight));
+                                     v3_scale(colour(c, leaf, TRC_AT(TOON, color)), weight));
     if (!lobe)
         return;
     const vfloat quarter = vf_set(TRC_HALF_PI);
-    const vfloat angle = vf_saturate(number(c, leaf, 3)) * quarter;
-    const vfloat fade = vf_saturate(number(c, leaf, 4)) * quarter;
+    const vfloat angle = vf_saturate(number(c, leaf, TRC_AT(TOON, size))) * quarter;
+    const vfloat fade = vf_saturate(number(c, leaf, TRC_AT(TOON, smooth))) * quarter;
     const vfloat whole = vf_min(angle + fade, quarter);
     lobe->distribution = is_glossy ? (uint32_t)TRC_LOBE_TOON : (uint32_t)TRC_DIFFUSE_TOON;
-    lobe->n = leaf_normal(c, leaf, 5);
+    lobe->n = leaf_normal(c, leaf, TRC_AT(TOON, normal));
     lobe->cos_o = v3_dot(lobe->n, c->s->wo);
     lobe->ior = vf_one();
     lobe->f0 = v3(angle, fade, vf_cos(whole));
@@ -354,9 +354,10 @@ static void add_toon(struct setup *c, const struct trc_leaf *leaf, vfloat weight
 }
 
 static void add_velvet(struct setup *c, const struct trc_leaf *leaf, vfloat weight) {
-    const vfloat sigma = vf_max(number(c, leaf, 3), vf_set(0.01f));
-    add_diffuse(c, TRC_LOBE_DIFFUSE, TRC_DIFFUSE_VELVET, v3_scale(colour(c, leaf, 0), weight),
-                leaf_normal(c, leaf, 4), vf_rcp(sigma * sigma));
+    const vfloat sigma = vf_max(number(c, leaf, TRC_AT(VELVET, sigma)), vf_set(0.01f));
+    add_diffuse(c, TRC_LOBE_DIFFUSE, TRC_DIFFUSE_VELVET,
+                v3_scale(colour(c, leaf, TRC_AT(VELVET, color)), weight),
+                leaf_normal(c, leaf, TRC_AT(VELVET, normal)), vf_rcp(sigma * sigma));
 }
 
 /* Index seen from the side of wo. */
@@ -368,32 +369,6 @@ static vfloat relative_ior(const struct setup *c, vfloat ior) {
 #include "kernels/lobe/glass_lobes.h"
 
 /* ---- Principled ---- */
-
-/* Where the inputs of the node stand. */
-enum {
-    P_BASE = 0,
-    P_SUBSURFACE = 3,
-    P_SUBSURFACE_COLOR = 4,
-    P_METALLIC = 7,
-    P_SPECULAR = 8,
-    P_SPECULAR_TINT = 9,
-    P_ROUGHNESS = 10,
-    P_ANISOTROPIC = 11,
-    P_ROTATION = 12,
-    P_SHEEN = 13,
-    P_SHEEN_TINT = 14,
-    P_CLEARCOAT = 15,
-    P_CLEARCOAT_ROUGHNESS = 16,
-    P_IOR = 17,
-    P_TRANSMISSION = 18,
-    P_TRANSMISSION_ROUGHNESS = 19,
-    P_EMISSION = 20,
-    P_EMISSION_STRENGTH = 23,
-    P_ALPHA = 24,
-    P_NORMAL = 25,
-    P_CLEARCOAT_NORMAL = 28,
-    P_TANGENT = 31
-};
 
 /* Whether an input can differ from 0. */
 static bool may_exceed_zero(const struct setup *c, const struct trc_leaf *leaf, uint32_t at) {
@@ -424,49 +399,53 @@ static vvec3 hue_of(vvec3 base, vfloat brightness) {
 
 static void principled_diffuse(struct setup *c, const struct trc_leaf *leaf, vfloat weight, vvec3 n,
                                vfloat diffuse_weight) {
-    const vvec3 base = colour(c, leaf, P_BASE);
+    const vvec3 base = colour(c, leaf, TRC_AT(PRINCIPLED, base_color));
     vvec3 tint = base;
-    if (may_exceed_zero(c, leaf, P_SUBSURFACE))
-        tint = v3_lerp(base, colour(c, leaf, P_SUBSURFACE_COLOR), number(c, leaf, P_SUBSURFACE));
-    const vmask kept = vf_gt(diffuse_weight, vf_set(WEIGHT_CUTOFF));
+    if (may_exceed_zero(c, leaf, TRC_AT(PRINCIPLED, subsurface)))
+        tint = v3_lerp(base, colour(c, leaf, TRC_AT(PRINCIPLED, subsurface_color)),
+                       number(c, leaf, TRC_AT(PRINCIPLED, subsurface)));
+    const vmask kept = vf_gt(diffuse_weight, vf_set(TRC_WEIGHT_CUTOFF));
     const vfloat w = vf_where(kept, weight * diffuse_weight);
     add_diffuse(c, TRC_LOBE_DIFFUSE, TRC_DIFFUSE_PRINCIPLED, v3_scale(tint, w), n,
-                number(c, leaf, P_ROUGHNESS));
-    if (!may_exceed_zero(c, leaf, P_SHEEN))
+                number(c, leaf, TRC_AT(PRINCIPLED, roughness)));
+    if (!may_exceed_zero(c, leaf, TRC_AT(PRINCIPLED, sheen)))
         return;
     const vvec3 hue = hue_of(base, v3_luminance(base));
-    const vvec3 sheen = mix_white(hue, number(c, leaf, P_SHEEN_TINT));
-    add_diffuse(c, TRC_LOBE_SHEEN, TRC_SHEEN_SCHLICK, v3_scale(sheen, w * number(c, leaf, P_SHEEN)),
-                n, vf_zero());
+    const vvec3 sheen = mix_white(hue, number(c, leaf, TRC_AT(PRINCIPLED, sheen_tint)));
+    add_diffuse(c, TRC_LOBE_SHEEN, TRC_SHEEN_SCHLICK,
+                v3_scale(sheen, w * number(c, leaf, TRC_AT(PRINCIPLED, sheen))), n, vf_zero());
 }
 
 static void principled_specular(struct setup *c, const struct trc_leaf *leaf, vfloat weight,
                                 vvec3 n, vfloat metallic, vfloat specular_weight) {
-    const vfloat specular = number(c, leaf, P_SPECULAR);
-    const vfloat cutoff = vf_set(WEIGHT_CUTOFF);
+    const vfloat specular = number(c, leaf, TRC_AT(PRINCIPLED, specular));
+    const vfloat cutoff = vf_set(TRC_WEIGHT_CUTOFF);
     const vmask kept = vm_and(vf_gt(specular_weight, cutoff),
                               vm_or(vf_gt(specular, cutoff), vf_gt(metallic, cutoff)));
     struct trc_lobe *lobe =
         add_lobe(c, TRC_LOBE_REFLECT, v3_splat(vf_where(kept, weight * specular_weight)));
     if (!lobe)
         return;
-    const vfloat roughness = number(c, leaf, P_ROUGHNESS), alpha = roughness * roughness;
+    const vfloat roughness = number(c, leaf, TRC_AT(PRINCIPLED, roughness)),
+                 alpha = roughness * roughness;
     lobe->n = n;
     lobe->ior = vf_set(2.0f) / (vf_one() - vf_safe_sqrt(vf_set(0.08f) * specular)) - vf_one();
     lobe->alpha_x = lobe->alpha_y = alpha;
-    lobe->anisotropic = may_exceed_zero(c, leaf, P_ANISOTROPIC);
+    lobe->anisotropic = may_exceed_zero(c, leaf, TRC_AT(PRINCIPLED, anisotropic));
     if (lobe->anisotropic) {
-        const vfloat aspect =
-            vf_safe_sqrt(vf_one() - vf_set(0.9f) * number(c, leaf, P_ANISOTROPIC));
+        const vfloat aspect = vf_safe_sqrt(
+            vf_one() - vf_set(0.9f) * number(c, leaf, TRC_AT(PRINCIPLED, anisotropic)));
         lobe->alpha_x = alpha / aspect;
         lobe->alpha_y = alpha * aspect;
-        lobe->tangent = leaf_tangent(c, leaf, P_TANGENT, n, number(c, leaf, P_ROTATION));
+        lobe->tangent = leaf_tangent(c, leaf, TRC_AT(PRINCIPLED, tangent), n,
+                                     number(c, leaf, TRC_AT(PRINCIPLED, anisotropic_rotation)));
     }
-    const vvec3 base = colour(c, leaf, P_BASE);
+    const vvec3 base = colour(c, leaf, TRC_AT(PRINCIPLED, base_color));
     vvec3 dielectric = v3_splat(vf_set(0.08f) * specular);
-    if (may_exceed_zero(c, leaf, P_SPECULAR_TINT)) {
+    if (may_exceed_zero(c, leaf, TRC_AT(PRINCIPLED, specular_tint))) {
         const vfloat bright = vf_set(0.3f) * base.x + vf_set(0.6f) * base.y + vf_set(0.1f) * base.z;
-        const vvec3 tint = mix_white(hue_of(base, bright), number(c, leaf, P_SPECULAR_TINT));
+        const vvec3 tint =
+            mix_white(hue_of(base, bright), number(c, leaf, TRC_AT(PRINCIPLED, specular_tint)));
         dielectric = v3_mul(tint, dielectric);
     }
     const vvec3 f0 = v3_saturate(v3_lerp(dielectric, base, metallic));
@@ -482,10 +461,12 @@ static void principled_specular(struct setup *c, const struct trc_leaf *leaf, vf
 }
 
 static void principled_glass(struct setup *c, const struct trc_leaf *leaf, vvec3 glass, vvec3 n) {
-    const vvec3 base = colour(c, leaf, P_BASE);
-    const vfloat roughness = number(c, leaf, P_ROUGHNESS), alpha = roughness * roughness;
-    const vfloat eta = relative_ior(c, number(c, leaf, P_IOR));
-    const vvec3 f0 = v3_saturate(mix_white(base, number(c, leaf, P_SPECULAR_TINT)));
+    const vvec3 base = colour(c, leaf, TRC_AT(PRINCIPLED, base_color));
+    const vfloat roughness = number(c, leaf, TRC_AT(PRINCIPLED, roughness)),
+                 alpha = roughness * roughness;
+    const vfloat eta = relative_ior(c, number(c, leaf, TRC_AT(PRINCIPLED, ior)));
+    const vvec3 f0 =
+        v3_saturate(mix_white(base, number(c, leaf, TRC_AT(PRINCIPLED, specular_tint))));
     if (leaf->mode == TRC_DISTRIBUTION_MULTI_GGX &&
         vm_any(vm_and(c->s->active, vf_gt(roughness, vf_set(5e-2f))))) {
         const vfloat blend = trc_fresnel_blend(v3_dot(n, c->s->wo), eta);
@@ -500,22 +481,24 @@ static void principled_glass(struct setup *c, const struct trc_leaf *leaf, vvec3
         set_blend(c, lobe, f0, v3_splat(vf_one()));
     vfloat through = roughness;
     if (leaf->mode != TRC_DISTRIBUTION_MULTI_GGX)
-        through = vf_one() -
-                  (vf_one() - roughness) * (vf_one() - number(c, leaf, P_TRANSMISSION_ROUGHNESS));
+        through =
+            vf_one() - (vf_one() - roughness) *
+                           (vf_one() - number(c, leaf, TRC_AT(PRINCIPLED, transmission_roughness)));
     const vvec3 weight = v3_scale(v3_mul(base, glass), vf_one() - f);
     add_dielectric(c, TRC_LOBE_REFRACT, weight, n, through * through, eta, TRC_DISTRIBUTION_GGX);
 }
 
 static void principled_clearcoat(struct setup *c, const struct trc_leaf *leaf, vfloat weight) {
-    const vfloat coat = number(c, leaf, P_CLEARCOAT);
-    const vmask kept = vf_gt(coat, vf_set(WEIGHT_CUTOFF));
+    const vfloat coat = number(c, leaf, TRC_AT(PRINCIPLED, clearcoat));
+    const vmask kept = vf_gt(coat, vf_set(TRC_WEIGHT_CUTOFF));
     struct trc_lobe *lobe = add_lobe(c, TRC_LOBE_REFLECT, v3_splat(vf_where(kept, weight)));
     if (!lobe)
         return;
     lobe->distribution = TRC_LOBE_GTR1;
-    lobe->n = leaf_normal(c, leaf, P_CLEARCOAT_NORMAL);
+    lobe->n = leaf_normal(c, leaf, TRC_AT(PRINCIPLED, clearcoat_normal));
     lobe->ior = vf_set(1.5f);
-    lobe->alpha_x = lobe->alpha_y = vf_square(number(c, leaf, P_CLEARCOAT_ROUGHNESS));
+    lobe->alpha_x = lobe->alpha_y =
+        vf_square(number(c, leaf, TRC_AT(PRINCIPLED, clearcoat_roughness)));
     finish_microfacets(c, lobe, false);
     const vfloat quarter = vf_set(0.25f) * coat;
     set_blend(c, lobe, v3_splat(vf_set(0.04f) * quarter), v3_splat(quarter));
@@ -523,25 +506,27 @@ static void principled_clearcoat(struct setup *c, const struct trc_leaf *leaf, v
 
 static void add_principled(struct setup *c, const struct trc_leaf *leaf, vfloat whole) {
     vfloat weight = whole;
-    const struct trc_operand *alpha = input(c, leaf, P_ALPHA);
+    const struct trc_operand *alpha = input(c, leaf, TRC_AT(PRINCIPLED, alpha));
     if (alpha->reg >= 0 || alpha->value < 1.0f) {
         const vfloat opacity = vf_saturate(trc_operand_value(alpha, c->regs));
         weight = whole * opacity;
         add_transparent(c, v3_splat(whole - weight));
     }
-    const vvec3 n = leaf_normal(c, leaf, P_NORMAL);
-    const vfloat metallic = vf_saturate(number(c, leaf, P_METALLIC));
+    const vvec3 n = leaf_normal(c, leaf, TRC_AT(PRINCIPLED, normal));
+    const vfloat metallic = vf_saturate(number(c, leaf, TRC_AT(PRINCIPLED, metallic)));
     const vfloat transmission =
-        vf_saturate(number(c, leaf, P_TRANSMISSION)) * (vf_one() - metallic);
+        vf_saturate(number(c, leaf, TRC_AT(PRINCIPLED, transmission))) * (vf_one() - metallic);
     const vfloat diffuse_weight =
-        (vf_one() - metallic) * (vf_one() - vf_saturate(number(c, leaf, P_TRANSMISSION)));
+        (vf_one() - metallic) *
+        (vf_one() - vf_saturate(number(c, leaf, TRC_AT(PRINCIPLED, transmission))));
     principled_diffuse(c, leaf, weight, n, diffuse_weight);
-    principled_specular(c, leaf, weight, n, number(c, leaf, P_METALLIC), vf_one() - transmission);
-    if (may_exceed_zero(c, leaf, P_TRANSMISSION)) {
-        const vmask kept = vf_gt(transmission, vf_set(WEIGHT_CUTOFF));
+    principled_specular(c, leaf, weight, n, number(c, leaf, TRC_AT(PRINCIPLED, metallic)),
+                        vf_one() - transmission);
+    if (may_exceed_zero(c, leaf, TRC_AT(PRINCIPLED, transmission))) {
+        const vmask kept = vf_gt(transmission, vf_set(TRC_WEIGHT_CUTOFF));
         principled_glass(c, leaf, v3_splat(vf_where(kept, weight * transmission)), n);
     }
-    if (may_exceed_zero(c, leaf, P_CLEARCOAT))
+    if (may_exceed_zero(c, leaf, TRC_AT(PRINCIPLED, clearcoat)))
         principled_clearcoat(c, leaf, weight);
 }
 
@@ -549,23 +534,28 @@ static void add_principled(struct setup *c, const struct trc_leaf *leaf, vfloat 
 
 /* ---- interface ---- */
 
+_Static_assert(TRC_AT(EMISSION, color) == TRC_AT(BACKGROUND, color) &&
+                   TRC_AT(EMISSION, strength) == TRC_AT(BACKGROUND, strength),
+               "a background is an emission");
+
 /* Emission of one leaf, false for a leaf that cannot emit. Without a surface the layers above the
  * emission of a layered Principled are left out, as Cycles does when it samples lights. */
 static bool leaf_emission(const struct setup *c, const struct trc_leaf *leaf, vfloat weight,
                           vvec3 *emission) {
     if (leaf->type == TRC_NODE_EMISSION || leaf->type == TRC_NODE_BACKGROUND) {
-        *emission = v3_scale(colour(c, leaf, 0), number(c, leaf, 3) * weight);
+        *emission = v3_scale(colour(c, leaf, TRC_AT(EMISSION, color)),
+                             number(c, leaf, TRC_AT(EMISSION, strength)) * weight);
         return true;
     }
     if (leaf->type == TRC_NODE_LAYERED_PRINCIPLED)
         return layered_emission(c, leaf, weight, emission);
     if (leaf->type != TRC_NODE_PRINCIPLED)
         return false;
-    const struct trc_operand *strength = input(c, leaf, P_EMISSION_STRENGTH);
+    const struct trc_operand *strength = input(c, leaf, TRC_AT(PRINCIPLED, emission_strength));
     if (strength->reg < 0 && strength->value == 0.0f)
         return false;
-    const vfloat opacity = vf_saturate(number(c, leaf, P_ALPHA));
-    *emission = v3_scale(colour(c, leaf, P_EMISSION),
+    const vfloat opacity = vf_saturate(number(c, leaf, TRC_AT(PRINCIPLED, alpha)));
+    *emission = v3_scale(colour(c, leaf, TRC_AT(PRINCIPLED, emission)),
                          trc_operand_value(strength, c->regs) * weight * opacity);
     return true;
 }
@@ -573,12 +563,12 @@ static bool leaf_emission(const struct setup *c, const struct trc_leaf *leaf, vf
 static void add_leaf(struct setup *c, const struct trc_leaf *leaf, vfloat weight) {
     switch (leaf->type) {
     case TRC_NODE_DIFFUSE: {
-        const struct trc_operand *roughness = input(c, leaf, 3);
+        const struct trc_operand *roughness = input(c, leaf, TRC_AT(DIFFUSE, roughness));
         const bool is_lambert = roughness->reg < 0 && roughness->value == 0.0f;
-        const vvec3 base = colour(c, leaf, 0), tint = v3_scale(base, weight);
-        const vvec3 n = leaf_normal(c, leaf, 4);
-        const vfloat sigma = vf_saturate(number(c, leaf, 3));
-        if (leaf->mode && !is_lambert)
+        const vvec3 base = colour(c, leaf, TRC_AT(DIFFUSE, color)), tint = v3_scale(base, weight);
+        const vvec3 n = leaf_normal(c, leaf, TRC_AT(DIFFUSE, normal));
+        const vfloat sigma = vf_saturate(trc_operand_value(roughness, c->regs));
+        if (leaf->mode == TRC_DIFFUSE_KEEPS_ENERGY && !is_lambert)
             add_energy_oren_nayar(c, tint, base, n, sigma);
         else
             add_diffuse(c, TRC_LOBE_DIFFUSE,
@@ -586,8 +576,9 @@ static void add_leaf(struct setup *c, const struct trc_leaf *leaf, vfloat weight
         break;
     }
     case TRC_NODE_TRANSLUCENT:
-        add_diffuse(c, TRC_LOBE_TRANSLUCENT, 0, v3_scale(colour(c, leaf, 0), weight),
-                    leaf_normal(c, leaf, 3), vf_zero());
+        add_diffuse(c, TRC_LOBE_TRANSLUCENT, 0,
+                    v3_scale(colour(c, leaf, TRC_AT(TRANSLUCENT, color)), weight),
+                    leaf_normal(c, leaf, TRC_AT(TRANSLUCENT, normal)), vf_zero());
         break;
     case TRC_NODE_VELVET:
         add_velvet(c, leaf, weight);
@@ -605,7 +596,7 @@ static void add_leaf(struct setup *c, const struct trc_leaf *leaf, vfloat weight
         add_refraction(c, leaf, weight);
         break;
     case TRC_NODE_TRANSPARENT:
-        add_transparent(c, v3_scale(colour(c, leaf, 0), weight));
+        add_transparent(c, v3_scale(colour(c, leaf, TRC_AT(TRANSPARENT, color)), weight));
         break;
     case TRC_NODE_HOLDOUT:
         c->out->holdout = c->out->holdout + vf_where(c->s->active, weight);
@@ -617,8 +608,9 @@ static void add_leaf(struct setup *c, const struct trc_leaf *leaf, vfloat weight
         add_layered_principled(c, leaf, weight);
         break;
     case TRC_NODE_SHEEN:
-        add_fibres(c, v3_scale(colour(c, leaf, 0), weight), leaf_normal(c, leaf, 4),
-                   number(c, leaf, 3));
+        add_fibres(c, v3_scale(colour(c, leaf, TRC_AT(SHEEN, color)), weight),
+                   leaf_normal(c, leaf, TRC_AT(SHEEN, normal)),
+                   number(c, leaf, TRC_AT(SHEEN, roughness)));
         break;
     default:
         break;

@@ -109,22 +109,22 @@ static void add_correlated_glass(struct setup *c, vvec3 reflected, vvec3 refract
 /* Of a Fresnel factor what is reflected: the part of a lobe too light to be kept goes to the other.
  * Cycles refracts at least 1e-4, and so gives that much more than it gets. */
 static vfloat reflected_part(vfloat f) {
-    const vfloat least = vf_set(WEIGHT_CUTOFF);
+    const vfloat least = vf_set(TRC_WEIGHT_CUTOFF);
     return vf_where(vf_ge(f, least), vf_select(vf_lt(vf_one() - f, least), vf_one(), f));
 }
 
 static void add_glass(struct setup *c, const struct trc_leaf *leaf, vfloat weight) {
-    const vvec3 tint = v3_scale(colour(c, leaf, 0), weight);
-    const vvec3 n = leaf_normal(c, leaf, 5);
-    const vfloat alpha = vf_square(number(c, leaf, 3));
-    const vfloat eta = relative_ior(c, number(c, leaf, 4));
+    const vvec3 tint = v3_scale(colour(c, leaf, TRC_AT(GLASS, color)), weight);
+    const vvec3 n = leaf_normal(c, leaf, TRC_AT(GLASS, normal));
+    const vfloat alpha = vf_square(number(c, leaf, TRC_AT(GLASS, roughness)));
+    const vfloat eta = relative_ior(c, number(c, leaf, TRC_AT(GLASS, ior)));
     if (leaf->mode & TRC_DISTRIBUTION_CORRELATED) {
         add_correlated_glass(c, tint, tint, v3_splat(trc_fresnel_normal(eta)), n,
                              vf_saturate(alpha), eta, leaf->mode);
         return;
     }
     if (leaf->mode == TRC_DISTRIBUTION_MULTI_GGX) {
-        const vvec3 color = v3_saturate(colour(c, leaf, 0));
+        const vvec3 color = v3_saturate(colour(c, leaf, TRC_AT(GLASS, color)));
         add_multi_glass(c, v3_splat(weight), color, color, n, alpha, eta);
         return;
     }
@@ -134,9 +134,11 @@ static void add_glass(struct setup *c, const struct trc_leaf *leaf, vfloat weigh
 }
 
 static void add_refraction(struct setup *c, const struct trc_leaf *leaf, vfloat weight) {
-    add_dielectric(c, TRC_LOBE_REFRACT, v3_scale(colour(c, leaf, 0), weight),
-                   leaf_normal(c, leaf, 5), vf_square(number(c, leaf, 3)),
-                   relative_ior(c, number(c, leaf, 4)), leaf->mode);
+    add_dielectric(c, TRC_LOBE_REFRACT,
+                   v3_scale(colour(c, leaf, TRC_AT(REFRACTION, color)), weight),
+                   leaf_normal(c, leaf, TRC_AT(REFRACTION, normal)),
+                   vf_square(number(c, leaf, TRC_AT(REFRACTION, roughness))),
+                   relative_ior(c, number(c, leaf, TRC_AT(REFRACTION, ior))), leaf->mode);
 }
 
 #endif

@@ -60,13 +60,16 @@ static vfloat add_fibres(struct setup *c, vvec3 weight, vvec3 n, vfloat roughnes
 
 /* All returns are what is left for the layers below. */
 static vfloat layered_sheen(struct setup *c, const struct trc_leaf *leaf, vfloat weight) {
-    const vvec3 tint = v3_scale(colour(c, leaf, TRC_LAYERED_SHEEN_TINT),
-                                vf_max(number(c, leaf, TRC_LAYERED_SHEEN), vf_zero()));
-    const vvec3 bent = leaf_normal(c, leaf, TRC_LAYERED_COAT_NORMAL);
-    const vfloat coat = vf_saturate(number(c, leaf, TRC_LAYERED_COAT));
-    const vvec3 n = v3_normalize(v3_lerp(leaf_normal(c, leaf, TRC_LAYERED_NORMAL), bent, coat));
-    const vfloat albedo = add_fibres(c, v3_scale(tint, weight), n,
-                                     vf_saturate(number(c, leaf, TRC_LAYERED_SHEEN_ROUGHNESS)));
+    const vvec3 tint =
+        v3_scale(colour(c, leaf, TRC_AT(LAYERED_PRINCIPLED, sheen_tint)),
+                 vf_max(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, sheen_weight)), vf_zero()));
+    const vvec3 bent = leaf_normal(c, leaf, TRC_AT(LAYERED_PRINCIPLED, coat_normal));
+    const vfloat coat = vf_saturate(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, coat_weight)));
+    const vvec3 n =
+        v3_normalize(v3_lerp(leaf_normal(c, leaf, TRC_AT(LAYERED_PRINCIPLED, normal)), bent, coat));
+    const vfloat albedo =
+        add_fibres(c, v3_scale(tint, weight), n,
+                   vf_saturate(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, sheen_roughness))));
     return below(v3_scale(tint, albedo));
 }
 
@@ -75,13 +78,13 @@ static vfloat layered_sheen(struct setup *c, const struct trc_leaf *leaf, vfloat
 static vvec3 coat_tint(const struct setup *c, const struct trc_leaf *leaf, vfloat cos_o,
                        vfloat coat, vfloat ior) {
     const vvec3 white = v3_splat(vf_one());
-    if (!may_differ(c, leaf, TRC_LAYERED_COAT_TINT, 1.0f) &&
-        !may_differ(c, leaf, TRC_LAYERED_COAT_TINT + 1, 1.0f) &&
-        !may_differ(c, leaf, TRC_LAYERED_COAT_TINT + 2, 1.0f))
+    if (!may_differ(c, leaf, TRC_AT(LAYERED_PRINCIPLED, coat_tint), 1.0f) &&
+        !may_differ(c, leaf, TRC_AT(LAYERED_PRINCIPLED, coat_tint) + 1, 1.0f) &&
+        !may_differ(c, leaf, TRC_AT(LAYERED_PRINCIPLED, coat_tint) + 2, 1.0f))
         return white;
     const vfloat sine2 = (vf_one() - cos_o * cos_o) / (ior * ior), none = vf_zero();
     const vfloat depth = vf_rcp(vf_sqrt(vf_max(vf_one() - sine2, vf_set(1e-6f))));
-    const vvec3 tint = colour(c, leaf, TRC_LAYERED_COAT_TINT);
+    const vvec3 tint = colour(c, leaf, TRC_AT(LAYERED_PRINCIPLED, coat_tint));
     const vvec3 color = v3(vf_pow(vf_max(tint.x, none), depth), vf_pow(vf_max(tint.y, none), depth),
                            vf_pow(vf_max(tint.z, none), depth));
     return v3_lerp(white, color, coat);
@@ -95,9 +98,9 @@ static vvec3 coat_passes(const struct setup *c, const struct trc_leaf *leaf, vfl
 }
 
 static vvec3 layered_coat(struct setup *c, const struct trc_leaf *leaf, vfloat weight) {
-    const vfloat coat = vf_max(number(c, leaf, TRC_LAYERED_COAT), vf_zero());
-    const vfloat ior = vf_max(number(c, leaf, TRC_LAYERED_COAT_IOR), vf_one());
-    const vvec3 n = leaf_normal(c, leaf, TRC_LAYERED_COAT_NORMAL);
+    const vfloat coat = vf_max(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, coat_weight)), vf_zero());
+    const vfloat ior = vf_max(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, coat_ior)), vf_one());
+    const vvec3 n = leaf_normal(c, leaf, TRC_AT(LAYERED_PRINCIPLED, coat_normal));
     const vfloat cos_o = v3_dot(n, c->s->wo);
     struct trc_lobe *lobe = add_lobe(c, TRC_LOBE_REFLECT, v3_splat(coat * weight));
     if (lobe) {
@@ -107,7 +110,7 @@ static vvec3 layered_coat(struct setup *c, const struct trc_leaf *leaf, vfloat w
         lobe->n = n;
         lobe->ior = ior;
         lobe->alpha_x = lobe->alpha_y =
-            vf_square(vf_saturate(number(c, leaf, TRC_LAYERED_COAT_ROUGHNESS)));
+            vf_square(vf_saturate(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, coat_roughness))));
         finish_microfacets(c, lobe, false);
         lobe->mix_weight = lobe->mix_weight * trc_fresnel_dielectric(cos_o, ior);
     }
@@ -120,20 +123,23 @@ static struct trc_lobe *add_anisotropic(struct setup *c, const struct trc_leaf *
     struct trc_lobe *lobe = add_lobe(c, TRC_LOBE_REFLECT, weight);
     if (!lobe)
         return NULL;
-    const vfloat alpha = vf_square(vf_saturate(number(c, leaf, TRC_LAYERED_ROUGHNESS)));
+    const vfloat alpha =
+        vf_square(vf_saturate(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, roughness))));
     lobe->distribution = TRC_LOBE_GGX;
     lobe->correlated = true;
     lobe->n = n;
     lobe->ior = ior;
     lobe->alpha_x = lobe->alpha_y = alpha;
-    lobe->anisotropic = may_exceed_zero(c, leaf, TRC_LAYERED_ANISOTROPY);
+    lobe->anisotropic = may_exceed_zero(c, leaf, TRC_AT(LAYERED_PRINCIPLED, anisotropic));
     if (lobe->anisotropic) {
         const vfloat aspect = vf_safe_sqrt(
-            vf_one() - vf_set(0.9f) * vf_saturate(number(c, leaf, TRC_LAYERED_ANISOTROPY)));
+            vf_one() -
+            vf_set(0.9f) * vf_saturate(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, anisotropic))));
         lobe->alpha_x = alpha / aspect;
         lobe->alpha_y = alpha * aspect;
         lobe->tangent =
-            leaf_tangent(c, leaf, TRC_LAYERED_TANGENT, n, number(c, leaf, TRC_LAYERED_ROTATION));
+            leaf_tangent(c, leaf, TRC_AT(LAYERED_PRINCIPLED, tangent), n,
+                         number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, anisotropic_rotation)));
     }
     finish_microfacets(c, lobe, false);
     return lobe;
@@ -146,8 +152,9 @@ static void layered_metal(struct setup *c, const struct trc_leaf *leaf, vvec3 we
     if (!lobe)
         return;
     const vfloat one = vf_one(), power5 = vf_set(0.46266436f); /* (6 / 7)^5 */
-    const vvec3 white = v3_splat(one), f0 = v3_saturate(colour(c, leaf, 0));
-    const vvec3 edge = v3_saturate(colour(c, leaf, TRC_LAYERED_SPECULAR_TINT));
+    const vvec3 white = v3_splat(one),
+                f0 = v3_saturate(colour(c, leaf, TRC_AT(LAYERED_PRINCIPLED, base_color)));
+    const vvec3 edge = v3_saturate(colour(c, leaf, TRC_AT(LAYERED_PRINCIPLED, specular_tint)));
     const vvec3 at_edge = v3_lerp(f0, white, power5);
     lobe->fresnel = TRC_FRESNEL_F82;
     lobe->f0 = f0;
@@ -163,10 +170,12 @@ static void layered_metal(struct setup *c, const struct trc_leaf *leaf, vvec3 we
 /* The dielectric reflection; its index is the one that gives the reflectance level asks for. */
 static vfloat layered_specular(struct setup *c, const struct trc_leaf *leaf, vvec3 weight,
                                vvec3 n) {
-    const vfloat one = vf_one(), ior = vf_max(number(c, leaf, TRC_LAYERED_IOR), vf_set(1e-5f));
+    const vfloat one = vf_one(),
+                 ior = vf_max(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, ior)), vf_set(1e-5f));
     vfloat eta = ior, f0 = trc_fresnel_normal(ior);
-    if (may_differ(c, leaf, TRC_LAYERED_SPECULAR_LEVEL, 0.5f)) {
-        const vfloat level = vf_max(number(c, leaf, TRC_LAYERED_SPECULAR_LEVEL), vf_zero());
+    if (may_differ(c, leaf, TRC_AT(LAYERED_PRINCIPLED, specular_ior_level), 0.5f)) {
+        const vfloat level =
+            vf_max(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, specular_ior_level)), vf_zero());
         f0 = f0 * vf_set(2.0f) * level;
         const vfloat root = vf_sqrt(vf_clamp(f0, 0.0f, 0.99f));
         eta = (one + root) / (one - root);
@@ -178,7 +187,7 @@ static vfloat layered_specular(struct setup *c, const struct trc_leaf *leaf, vve
         return one;
     const vfloat alpha = vf_sqrt(lobe->alpha_x * lobe->alpha_y), tiny = vf_set(1e-6f);
     const vvec3 white = v3_splat(one);
-    const vvec3 tinted = v3_scale(colour(c, leaf, TRC_LAYERED_SPECULAR_TINT), f0);
+    const vvec3 tinted = v3_scale(colour(c, leaf, TRC_AT(LAYERED_PRINCIPLED, specular_tint)), f0);
     const vvec3 low =
         v3(vf_max(tinted.x, vf_zero()), vf_max(tinted.y, vf_zero()), vf_max(tinted.z, vf_zero()));
     lobe->fresnel = TRC_FRESNEL_BLEND;
@@ -199,44 +208,47 @@ static vfloat layered_specular(struct setup *c, const struct trc_leaf *leaf, vve
 }
 
 static vfloat opacity_of(const struct setup *c, const struct trc_leaf *leaf) {
-    const struct trc_operand *alpha = input(c, leaf, TRC_LAYERED_ALPHA);
+    const struct trc_operand *alpha = input(c, leaf, TRC_AT(LAYERED_PRINCIPLED, alpha));
     return alpha->reg < 0 && alpha->value >= 1.0f ? vf_one()
                                                   : vf_saturate(trc_operand_value(alpha, c->regs));
 }
 
 static void add_layered_principled(struct setup *c, const struct trc_leaf *leaf, vfloat whole) {
     vfloat weight = whole;
-    const struct trc_operand *alpha = input(c, leaf, TRC_LAYERED_ALPHA);
+    const struct trc_operand *alpha = input(c, leaf, TRC_AT(LAYERED_PRINCIPLED, alpha));
     if (alpha->reg >= 0 || alpha->value < 1.0f) {
         weight = whole * opacity_of(c, leaf);
         add_transparent(c, v3_splat(whole - weight));
     }
-    if (may_exceed_zero(c, leaf, TRC_LAYERED_SHEEN))
+    if (may_exceed_zero(c, leaf, TRC_AT(LAYERED_PRINCIPLED, sheen_weight)))
         weight = weight * layered_sheen(c, leaf, weight);
     vvec3 rest = v3_splat(weight);
-    if (may_exceed_zero(c, leaf, TRC_LAYERED_COAT))
+    if (may_exceed_zero(c, leaf, TRC_AT(LAYERED_PRINCIPLED, coat_weight)))
         rest = v3_mul(rest, layered_coat(c, leaf, weight));
-    const vvec3 n = leaf_normal(c, leaf, TRC_LAYERED_NORMAL), base = colour(c, leaf, 0);
-    if (may_exceed_zero(c, leaf, TRC_LAYERED_METALLIC)) {
-        const vfloat metallic = vf_saturate(number(c, leaf, TRC_LAYERED_METALLIC));
+    const vvec3 n = leaf_normal(c, leaf, TRC_AT(LAYERED_PRINCIPLED, normal)),
+                base = colour(c, leaf, TRC_AT(LAYERED_PRINCIPLED, base_color));
+    if (may_exceed_zero(c, leaf, TRC_AT(LAYERED_PRINCIPLED, metallic))) {
+        const vfloat metallic = vf_saturate(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, metallic)));
         layered_metal(c, leaf, v3_scale(rest, metallic), n);
         rest = v3_scale(rest, vf_one() - metallic);
     }
-    if (may_exceed_zero(c, leaf, TRC_LAYERED_TRANSMISSION)) {
-        const vfloat transmission = vf_saturate(number(c, leaf, TRC_LAYERED_TRANSMISSION));
+    if (may_exceed_zero(c, leaf, TRC_AT(LAYERED_PRINCIPLED, transmission_weight))) {
+        const vfloat transmission =
+            vf_saturate(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, transmission_weight)));
         const vvec3 glass = v3_scale(rest, transmission), clear = v3_saturate(base);
         /* In at one surface and out at another: each has the root of the colour. */
         const vvec3 tint = v3(vf_sqrt(clear.x), vf_sqrt(clear.y), vf_sqrt(clear.z));
-        const vfloat eta = relative_ior(c, number(c, leaf, TRC_LAYERED_IOR));
-        const vvec3 f0 =
-            v3_scale(colour(c, leaf, TRC_LAYERED_SPECULAR_TINT), trc_fresnel_normal(eta));
-        add_correlated_glass(c, glass, v3_mul(glass, tint), v3_saturate(f0), n,
-                             vf_square(vf_saturate(number(c, leaf, TRC_LAYERED_ROUGHNESS))), eta,
-                             leaf->mode | TRC_DISTRIBUTION_CORRELATED);
+        const vfloat eta = relative_ior(c, number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, ior)));
+        const vvec3 f0 = v3_scale(colour(c, leaf, TRC_AT(LAYERED_PRINCIPLED, specular_tint)),
+                                  trc_fresnel_normal(eta));
+        add_correlated_glass(
+            c, glass, v3_mul(glass, tint), v3_saturate(f0), n,
+            vf_square(vf_saturate(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, roughness)))), eta,
+            leaf->mode | TRC_DISTRIBUTION_CORRELATED);
         rest = v3_scale(rest, vf_one() - transmission);
     }
     rest = v3_scale(rest, layered_specular(c, leaf, rest, n));
-    const struct trc_operand *sigma = input(c, leaf, TRC_LAYERED_DIFFUSE_ROUGHNESS);
+    const struct trc_operand *sigma = input(c, leaf, TRC_AT(LAYERED_PRINCIPLED, diffuse_roughness));
     if (sigma->reg < 0 && sigma->value <= 0.0f)
         add_diffuse(c, TRC_LOBE_DIFFUSE, TRC_DIFFUSE_LAMBERT, v3_mul(base, rest), n, vf_zero());
     else
@@ -248,24 +260,28 @@ static void add_layered_principled(struct setup *c, const struct trc_leaf *leaf,
  * knows of the coat's tint only; here as seen head-on. */
 static bool layered_emission(const struct setup *c, const struct trc_leaf *leaf, vfloat weight,
                              vvec3 *emission) {
-    const struct trc_operand *strength = input(c, leaf, TRC_LAYERED_EMISSION_STRENGTH);
+    const struct trc_operand *strength =
+        input(c, leaf, TRC_AT(LAYERED_PRINCIPLED, emission_strength));
     if (strength->reg < 0 && strength->value == 0.0f)
         return false;
     vvec3 rest = v3_splat(trc_operand_value(strength, c->regs) * weight * opacity_of(c, leaf));
     const vfloat cos_o = c->s ? vf_saturate(v3_dot(c->s->n, c->s->wo)) : vf_one();
-    if (c->s && may_exceed_zero(c, leaf, TRC_LAYERED_SHEEN)) {
-        const vvec3 tint = v3_scale(colour(c, leaf, TRC_LAYERED_SHEEN_TINT),
-                                    vf_max(number(c, leaf, TRC_LAYERED_SHEEN), vf_zero()));
-        const vfloat rough = vf_clamp(number(c, leaf, TRC_LAYERED_SHEEN_ROUGHNESS), 0.01f, 1.0f);
+    if (c->s && may_exceed_zero(c, leaf, TRC_AT(LAYERED_PRINCIPLED, sheen_weight))) {
+        const vvec3 tint =
+            v3_scale(colour(c, leaf, TRC_AT(LAYERED_PRINCIPLED, sheen_tint)),
+                     vf_max(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, sheen_weight)), vf_zero()));
+        const vfloat rough =
+            vf_clamp(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, sheen_roughness)), 0.01f, 1.0f);
         rest = v3_scale(rest, below(v3_scale(tint, fibres_albedo(cos_o, rough))));
     }
-    if (may_exceed_zero(c, leaf, TRC_LAYERED_COAT)) {
-        const vfloat coat = vf_max(number(c, leaf, TRC_LAYERED_COAT), vf_zero());
-        const vfloat ior = vf_max(number(c, leaf, TRC_LAYERED_COAT_IOR), vf_one());
+    if (may_exceed_zero(c, leaf, TRC_AT(LAYERED_PRINCIPLED, coat_weight))) {
+        const vfloat coat =
+            vf_max(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, coat_weight)), vf_zero());
+        const vfloat ior = vf_max(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, coat_ior)), vf_one());
         rest = v3_mul(rest, c->s ? coat_passes(c, leaf, cos_o, coat, ior)
                                  : coat_tint(c, leaf, cos_o, coat, ior));
     }
-    *emission = v3_mul(colour(c, leaf, TRC_LAYERED_EMISSION), rest);
+    *emission = v3_mul(colour(c, leaf, TRC_AT(LAYERED_PRINCIPLED, emission_color)), rest);
     return true;
 }
 

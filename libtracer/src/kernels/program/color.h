@@ -217,12 +217,12 @@ TRC_INLINE vvec3 op_bright_contrast(vvec3 c, vfloat bright, vfloat contrast) {
     return v3(vf_max(a * c.x + b, zero), vf_max(a * c.y + b, zero), vf_max(a * c.z + b, zero));
 }
 
-/* A table of TRC_RAMP_SIZE colours over [0, 1]; mode 1: no interpolation. */
+/* A table over [0, 1]. */
 static void op_ramp(uint32_t mode, const float *table, vfloat factor, vfloat *out) {
-    const vint last = vi_set((int32_t)TRC_RAMP_SIZE - 1);
-    const vfloat x = vf_saturate(factor) * vf_set((float)(TRC_RAMP_SIZE - 1));
+    const vint last = vi_set(TRC_TABLE_ENTRIES - 1);
+    const vfloat x = vf_saturate(factor) * vf_set((float)(TRC_TABLE_ENTRIES - 1));
     const vint i = vf_to_int(x), next = vi_select(vi_lt(i, last), i + vi_set(1), last);
-    const vfloat t = mode == 1 ? vf_zero() : x - vi_to_float(i);
+    const vfloat t = mode == TRC_RAMP_CONSTANT ? vf_zero() : x - vi_to_float(i);
     const vmask all = vm_all_set();
     for (int c = 0; c < 4; c++) {
         const vfloat a = vf_gather(table + c, i << 2, all);

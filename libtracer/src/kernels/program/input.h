@@ -12,6 +12,7 @@
 #include "kernels/program/math.h"
 #include "kernels/trace/mesh_fetch.h"
 #include "kernels/trace/surface.h"
+#include "model/nodes.h"
 
 /* ---- objects among the lanes ---- */
 
@@ -323,7 +324,7 @@ static void op_window(const struct trc_surface *s, vfloat *out) {
 
 /* A point, vector or normal from one space to another. In the world there is no object space. */
 static vvec3 op_transform(const struct trc_surface *s, uint32_t mode, vvec3 v) {
-    const uint32_t way = mode & 3u;
+    const uint32_t way = mode & TRC_TRANSFORM_SPACES_MASK;
     const bool is_point = mode & TRC_TRANSFORM_POINT;
     struct trc_wide_affine a;
     if (way == TRC_TRANSFORM_WORLD_TO_CAMERA || way == TRC_TRANSFORM_CAMERA_TO_WORLD) {
@@ -400,16 +401,19 @@ static vvec3 op_object_location(const struct trc_surface *s) {
     return out;
 }
 
-/* A number of each lane's object; 0 in the world. which: 0-3 colour, 4 index, 5 random. */
+/* Numbers of an object: the components of its colour, and ... */
+enum { OBJECT_INDEX = 4, OBJECT_RANDOM };
+
+/* One of each lane's object; 0 in the world. */
 static vfloat object_number(const struct trc_surface *s, int which) {
     vfloat out = vf_zero();
     struct lane_group g = groups_begin(s);
     while (groups_next(s, &g)) {
         if (!g.instance)
             continue;
-        const float value = which < 4    ? g.instance->color[which]
-                            : which == 4 ? (float)g.instance->pass_index
-                                         : g.instance->random;
+        const float value = which < OBJECT_INDEX    ? g.instance->color[which]
+                            : which == OBJECT_INDEX ? (float)g.instance->pass_index
+                                                    : g.instance->random;
         out = vf_select(g.lanes, vf_set(value), out);
     }
     return out;
@@ -447,34 +451,34 @@ static vfloat op_ray_length(const struct trc_surface *s) {
     return vf_select(seen, s->ray_length - near, s->ray_length);
 }
 
-static vfloat op_light_path(const struct trc_surface *s, uint32_t mode) {
-    switch (mode) {
-    case TRC_PATH_IS_CAMERA:
+static vfloat op_light_path(const struct trc_surface *s, uint32_t output) {
+    switch (output) {
+    case TRC_OUTPUT_OF(LIGHT_PATH, is_camera):
         return path_bit(s, TRC_VISIBLE_CAMERA);
-    case TRC_PATH_IS_SHADOW:
+    case TRC_OUTPUT_OF(LIGHT_PATH, is_shadow):
         return path_bit(s, TRC_VISIBLE_SHADOW);
-    case TRC_PATH_IS_DIFFUSE:
+    case TRC_OUTPUT_OF(LIGHT_PATH, is_diffuse):
         return path_bit(s, TRC_VISIBLE_DIFFUSE);
-    case TRC_PATH_IS_GLOSSY:
+    case TRC_OUTPUT_OF(LIGHT_PATH, is_glossy):
         /* As in Cycles also what was refracted, unlike for visibility. */
         return path_bit(s, TRC_VISIBLE_GLOSSY | TRC_VISIBLE_TRANSMISSION);
-    case TRC_PATH_IS_SINGULAR:
+    case TRC_OUTPUT_OF(LIGHT_PATH, is_singular):
         return path_bit(s, TRC_PATH_SINGULAR);
-    case TRC_PATH_IS_REFLECTION:
+    case TRC_OUTPUT_OF(LIGHT_PATH, is_reflection):
         return path_bit(s, TRC_PATH_REFLECTED);
-    case TRC_PATH_IS_TRANSMISSION:
+    case TRC_OUTPUT_OF(LIGHT_PATH, is_transmission):
         return path_bit(s, TRC_VISIBLE_TRANSMISSION);
-    case TRC_PATH_RAY_LENGTH:
+    case TRC_OUTPUT_OF(LIGHT_PATH, ray_length):
         return op_ray_length(s);
-    case TRC_PATH_DEPTH:
+    case TRC_OUTPUT_OF(LIGHT_PATH, ray_depth):
         return vi_to_float(s->depth);
-    case TRC_PATH_DIFFUSE_DEPTH:
+    case TRC_OUTPUT_OF(LIGHT_PATH, diffuse_depth):
         return vi_to_float(s->diffuse_depth);
-    case TRC_PATH_GLOSSY_DEPTH:
+    case TRC_OUTPUT_OF(LIGHT_PATH, glossy_depth):
         return vi_to_float(s->glossy_depth);
-    case TRC_PATH_TRANSPARENT_DEPTH:
+    case TRC_OUTPUT_OF(LIGHT_PATH, transparent_depth):
         return vi_to_float(s->transparent_depth);
-    case TRC_PATH_TRANSMISSION_DEPTH:
+    case TRC_OUTPUT_OF(LIGHT_PATH, transmission_depth):
         return vi_to_float(s->transmission_depth);
     default:
         return vf_zero();

@@ -184,8 +184,8 @@ TRC_INLINE vfloat srgb_decode(vfloat x) {
 static void whole_lookup(const struct trc_image *image, uint32_t mode, vfloat u, vfloat v,
                          vmask lanes, vfloat out[4]) {
     const struct trc_image_level *level = &image->levels[0];
-    const uint32_t extension = mode & TRC_IMAGE_MODE_EXTENSION;
-    switch (mode & TRC_IMAGE_MODE_INTERPOLATION) {
+    const uint32_t extension = mode & TRC_IMAGE_EXTENSION_MASK;
+    switch (mode & TRC_IMAGE_INTERPOLATION_MASK) {
     case TRC_IMAGE_CLOSEST:
         filter_sum(image->format, level, extension, 1, u, v, lanes, out);
         break;
@@ -243,7 +243,7 @@ static void texture_lookup(const struct trc_image *image, uint32_t mode, vfloat 
         const vmask own = vm_and(vi_eq(level, vi_set(number)), vm_from_bits(rest));
         vfloat found[4];
         if (number)
-            filter_sum(image->level_format, &image->levels[number], mode & TRC_IMAGE_MODE_EXTENSION,
+            filter_sum(image->level_format, &image->levels[number], mode & TRC_IMAGE_EXTENSION_MASK,
                        2, u, v, own, found);
         else
             whole_lookup(image, mode, u, v, own, found);

@@ -166,16 +166,20 @@ static vfloat op_math(uint32_t mode, vfloat a, vfloat b, vfloat c) {
 }
 
 TRC_INLINE vfloat op_clamp(uint32_t mode, vfloat value, vfloat low, vfloat high) {
-    if (mode == 0)
+    if (mode == TRC_CLAMP_MINMAX)
         return vf_min(vf_max(value, low), high);
     return vf_min(vf_max(value, vf_min(low, high)), vf_max(low, high));
 }
 
-/* value, from_min, from_max, to_min, to_max. An empty source range gives 0. */
+/* An empty source range gives 0. */
 TRC_INLINE vfloat op_map_range(const vfloat *in) {
-    const vfloat from = in[2] - in[1];
-    const vfloat factor = (in[0] - in[1]) / from;
-    return vf_where(vf_ne(in[2], in[1]), in[3] + factor * (in[4] - in[3]));
+    const vfloat from_min = in[TRC_OP_AT(MAP_RANGE, from_min)];
+    const vfloat from_max = in[TRC_OP_AT(MAP_RANGE, from_max)];
+    const vfloat to_min = in[TRC_OP_AT(MAP_RANGE, to_min)];
+    const vfloat to_max = in[TRC_OP_AT(MAP_RANGE, to_max)];
+    const vfloat from = from_max - from_min;
+    const vfloat factor = (in[TRC_OP_AT(MAP_RANGE, value)] - from_min) / from;
+    return vf_where(vf_ne(from_max, from_min), to_min + factor * (to_max - to_min));
 }
 
 /* ---- vectors ---- */
@@ -279,14 +283,16 @@ TRC_INLINE vfloat op_vector_measure(uint32_t mode, vvec3 a, vvec3 b) {
 }
 
 /* Rotation about X, then Y, then Z. */
-static void op_rotation(const vfloat *in, vfloat *out) {
+static void op_rotation(vvec3 angles, vfloat *out) {
     vfloat sx, cx, sy, cy, sz, cz;
-    vf_sincos(in[0], &sx, &cx);
-    vf_sincos(in[1], &sy, &cy);
-    vf_sincos(in[2], &sz, &cz);
-    v3_write(out, v3(cy * cz, sy * sx * cz - cx * sz, sy * cx * cz + sx * sz));
-    v3_write(out + 3, v3(cy * sz, sy * sx * sz + cx * cz, sy * cx * sz - sx * cz));
-    v3_write(out + 6, v3(-sy, cy * sx, cy * cx));
+    vf_sincos(angles.x, &sx, &cx);
+    vf_sincos(angles.y, &sy, &cy);
+    vf_sincos(angles.z, &sz, &cz);
+    v3_write(out + TRC_OP_OUT_AT(ROTATION, row0),
+             v3(cy * cz, sy * sx * cz - cx * sz, sy * cx * cz + sx * sz));
+    v3_write(out + TRC_OP_OUT_AT(ROTATION, row1),
+             v3(cy * sz, sy * sx * sz + cx * cz, sy * cx * sz - sx * cz));
+    v3_write(out + TRC_OP_OUT_AT(ROTATION, row2), v3(-sy, cy * sx, cy * cx));
 }
 
 /* Rotation about an axis of any length; none about 0. */
@@ -297,27 +303,32 @@ static void op_axis_rotation(vvec3 axis, vfloat angle, vfloat *out) {
     const vmask valid = vf_gt(v3_dot(axis, axis), vf_zero());
     c = vf_select(valid, c, vf_one());
     const vvec3 t = v3_scale(a, vf_one() - c);
-    v3_write(out, v3(c + a.x * t.x, a.x * t.y - s * a.z, a.x * t.z + s * a.y));
-    v3_write(out + 3, v3(a.x * t.y + s * a.z, c + a.y * t.y, a.y * t.z - s * a.x));
-    v3_write(out + 6, v3(a.x * t.z - s * a.y, a.y * t.z + s * a.x, c + a.z * t.z));
+    v3_write(out + TRC_OP_OUT_AT(AXIS_ROTATION, row0),
+             v3(c + a.x * t.x, a.x * t.y - s * a.z, a.x * t.z + s * a.y));
+    v3_write(out + TRC_OP_OUT_AT(AXIS_ROTATION, row1),
+             v3(a.x * t.y + s * a.z, c + a.y * t.y, a.y * t.z - s * a.x));
+    v3_write(out + TRC_OP_OUT_AT(AXIS_ROTATION, row2),
+             v3(a.x * t.z - s * a.y, a.y * t.z + s * a.x, c + a.z * t.z));
 }
 
-/* The Mapping node: 0 point, 1 texture (the inverse), 2 vector, 3 normal. */
 static vvec3 op_mapping(uint32_t mode, const vfloat *in) {
-    vvec3 v = v3_read(in);
-    const vvec3 location = v3_read(in + 3), scale = v3_read(in + 6);
-    const vvec3 r0 = v3_read(in + 9), r1 = v3_read(in + 12), r2 = v3_read(in + 15);
-    if (mode == 1) {
+    vvec3 v = v3_read(in + TRC_OP_AT(MAPPING, vector));
+    const vvec3 location = v3_read(in + TRC_OP_AT(MAPPING, location));
+    const vvec3 scale = v3_read(in + TRC_OP_AT(MAPPING, scale));
+    const vvec3 r0 = v3_read(in + TRC_OP_AT(MAPPING, row0));
+    const vvec3 r1 = v3_read(in + TRC_OP_AT(MAPPING, row1));
+    const vvec3 r2 = v3_read(in + TRC_OP_AT(MAPPING, row2));
+    if (mode == TRC_MAPPING_TEXTURE) {
         v = v3_sub(v, location);
         v = v3(v.x * r0.x + v.y * r1.x + v.z * r2.x, v.x * r0.y + v.y * r1.y + v.z * r2.y,
                v.x * r0.z + v.y * r1.z + v.z * r2.z);
         return v3_divide(v, scale);
     }
-    v = mode == 3 ? v3_divide(v, scale) : v3_mul(v, scale);
+    v = mode == TRC_MAPPING_NORMAL ? v3_divide(v, scale) : v3_mul(v, scale);
     v = v3(v3_dot(r0, v), v3_dot(r1, v), v3_dot(r2, v));
-    if (mode == 0)
+    if (mode == TRC_MAPPING_POINT)
         return v3_add(v, location);
-    return mode == 3 ? v3_normalize(v) : v;
+    return mode == TRC_MAPPING_NORMAL ? v3_normalize(v) : v;
 }
 
 #endif

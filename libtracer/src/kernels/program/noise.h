@@ -237,43 +237,44 @@ TRC_INLINE void noise_place(int dims, const vfloat *vector, vfloat w, vfloat *p)
     p[dims == 1 ? 0 : 3] = w;
 }
 
-/* vector, w, octaves, roughness, lacunarity, offset, gain, distortion -> value, colour */
 static void op_noise(uint32_t mode, const vfloat *in, vfloat *out) {
-    const struct fractal f = {.type = (mode >> TRC_NOISE_TYPE_SHIFT) & 7u,
-                              .dims = (int)(mode & 3u) + 1,
-                              .octaves = vf_clamp(in[4], 0.0f, TRC_MAX_OCTAVES),
-                              .roughness = in[5],
-                              .lacunarity = in[6],
-                              .offset = in[7],
-                              .gain = in[8]};
+    const struct fractal f = {.type = (mode & ~TRC_MODE_NO_COLOR) >> TRC_NOISE_TYPE_SHIFT,
+                              .dims = (int)(mode & TRC_DIMENSIONS_MASK) + 1,
+                              .octaves =
+                                  vf_clamp(in[TRC_OP_AT(NOISE, octaves)], 0.0f, TRC_MAX_OCTAVES),
+                              .roughness = in[TRC_OP_AT(NOISE, roughness)],
+                              .lacunarity = in[TRC_OP_AT(NOISE, lacunarity)],
+                              .offset = in[TRC_OP_AT(NOISE, offset)],
+                              .gain = in[TRC_OP_AT(NOISE, gain)]};
+    const vfloat distortion = in[TRC_OP_AT(NOISE, distortion)];
     vfloat p[TRC_MAX_DIMENSIONS], moved[TRC_MAX_DIMENSIONS];
-    noise_place(f.dims, in, in[3], p);
-    if (vm_any(vf_ne(in[9], vf_zero()))) {
+    noise_place(f.dims, in + TRC_OP_AT(NOISE, vector), in[TRC_OP_AT(NOISE, w)], p);
+    if (vm_any(vf_ne(distortion, vf_zero()))) {
         vfloat shift[TRC_MAX_DIMENSIONS];
         for (int i = 0; i < f.dims; i++) {
             noise_moved(f.dims, p, i, moved);
-            shift[i] = noise_signed(f.dims, moved) * in[9];
+            shift[i] = noise_signed(f.dims, moved) * distortion;
         }
         for (int i = 0; i < f.dims; i++)
             p[i] = p[i] + shift[i];
     }
-    out[0] = out[1] = out[2] = out[3] = fractal_noise(&f, p);
+    vfloat *color = out + TRC_OP_OUT_AT(NOISE, color);
+    out[TRC_OP_OUT_AT(NOISE, value)] = color[0] = color[1] = color[2] = fractal_noise(&f, p);
     if (mode & TRC_MODE_NO_COLOR)
         return;
     for (int i = 0; i < 2; i++) {
         noise_moved(f.dims, p, f.dims + i, moved);
-        out[2 + i] = fractal_noise(&f, moved);
+        color[1 + i] = fractal_noise(&f, moved);
     }
 }
 
-/* vector, w -> value, colour */
 static void op_white_noise(uint32_t mode, const vfloat *in, vfloat *out) {
-    const int dims = (int)(mode & 3u) + 1;
+    const int dims = (int)(mode & TRC_DIMENSIONS_MASK) + 1;
     vfloat p[TRC_MAX_DIMENSIONS];
-    noise_place(dims, in, in[3], p);
+    noise_place(dims, in + TRC_OP_AT(WHITE_NOISE, vector), in[TRC_OP_AT(WHITE_NOISE, w)], p);
     const vvec3 color = hash_color(dims, p);
-    out[0] = color.x;
-    v3_write(out + 1, color);
+    out[TRC_OP_OUT_AT(WHITE_NOISE, value)] = color.x;
+    v3_write(out + TRC_OP_OUT_AT(WHITE_NOISE, color), color);
 }
 
 #endif

@@ -4,15 +4,6 @@
 
 #include "kernels/program/input.h"
 
-/* Modes of the node. The last two turn Y and Z around. */
-enum {
-    NORMAL_MAP_TANGENT,
-    NORMAL_MAP_OBJECT,
-    NORMAL_MAP_WORLD,
-    NORMAL_MAP_BLENDER_OBJECT,
-    NORMAL_MAP_BLENDER_WORLD
-};
-
 /* Normals at the corners in object space (unit) and the lanes that have them: those of smooth
  * triangles. */
 static vmask load_normals(const struct trc_surface *s, const struct lane_group *g,
@@ -109,10 +100,10 @@ static void tangent_frame(const struct trc_surface *s, const struct lane_group *
  */
 static vvec3 normal_of_group(const struct trc_surface *s, const struct lane_group *g, uint32_t mode,
                              const struct trc_attribute *a, vvec3 c) {
-    if (mode == NORMAL_MAP_WORLD || mode == NORMAL_MAP_BLENDER_WORLD)
+    if (mode == TRC_NORMAL_MAP_WORLD || mode == TRC_NORMAL_MAP_BLENDER_WORLD)
         return v3_normalize(c);
     vvec3 n = c;
-    if (mode == NORMAL_MAP_TANGENT) {
+    if (mode == TRC_NORMAL_MAP_TANGENT) {
         vvec3 normal, tangent;
         vfloat sign;
         tangent_frame(s, g, a, &normal, &tangent, &sign);
@@ -129,7 +120,7 @@ static vvec3 op_normal_map(const struct trc_surface *s, uint32_t mode, uint32_t 
                            vfloat strength, vvec3 color) {
     const vfloat half = vf_set(0.5f), two = vf_set(2.0f);
     vvec3 c = v3(two * (color.x - half), two * (color.y - half), two * (color.z - half));
-    if (mode >= NORMAL_MAP_BLENDER_OBJECT)
+    if (mode >= TRC_NORMAL_MAP_BLENDER_OBJECT)
         c = v3(c.x, -c.y, -c.z);
     const vmask full = vf_eq(strength, vf_one());
     vvec3 out = s->n;
@@ -138,7 +129,7 @@ static vvec3 op_normal_map(const struct trc_surface *s, uint32_t mode, uint32_t 
         if (!g.instance)
             continue;
         const struct trc_attribute *a = mesh_attribute(g.mesh, name, 2);
-        if (mode == NORMAL_MAP_TANGENT && !a)
+        if (mode == TRC_NORMAL_MAP_TANGENT && !a)
             continue;
         vvec3 n = normal_of_group(s, &g, mode, a, c);
         n = v3_select(s->backfacing, v3_neg(n), n);

@@ -43,10 +43,11 @@ static vfloat op_gradient(uint32_t mode, vvec3 p) {
 
 /* How far along the bands, or from the axis or the centre of the rings. */
 TRC_INLINE vfloat wave_place(uint32_t mode, vvec3 p) {
-    const uint32_t direction = (mode >> TRC_WAVE_DIRECTION_SHIFT) & 3u;
+    const uint32_t direction = (mode >> TRC_WAVE_DIRECTION_SHIFT) & TRC_WAVE_DIRECTION_MASK;
     const vfloat c[3] = {p.x, p.y, p.z};
     if (!(mode & TRC_WAVE_RINGS)) {
-        return direction < 3 ? c[direction] * vf_set(20.0f) : (p.x + p.y + p.z) * vf_set(10.0f);
+        return direction != TRC_WAVE_DIAGONAL ? c[direction] * vf_set(20.0f)
+                                              : (p.x + p.y + p.z) * vf_set(10.0f);
     }
     vfloat sum = vf_zero();
     for (uint32_t i = 0; i < 3; i++)
@@ -54,26 +55,29 @@ TRC_INLINE vfloat wave_place(uint32_t mode, vvec3 p) {
     return vf_sqrt(sum) * vf_set(20.0f);
 }
 
-/* vector, distortion, detail scale, octaves, roughness, phase */
 static vfloat op_wave(uint32_t mode, const vfloat *in) {
     /* The shift and the shrinking keep whole coordinates off the edges. */
     const vfloat shift = vf_set(0.000001f), shrink = vf_set(0.999999f), half = vf_set(0.5f);
     const vfloat one = vf_one(), two = vf_set(2.0f);
-    const vvec3 p =
-        v3((in[0] + shift) * shrink, (in[1] + shift) * shrink, (in[2] + shift) * shrink);
-    vfloat n = wave_place(mode, p) + in[7];
-    if (vm_any(vf_ne(in[3], vf_zero()))) {
+    const vvec3 v = v3_read(in + TRC_OP_AT(WAVE, vector));
+    const vvec3 p = v3((v.x + shift) * shrink, (v.y + shift) * shrink, (v.z + shift) * shrink);
+    const vfloat distortion = in[TRC_OP_AT(WAVE, distortion)];
+    const vmask is_bent = vf_ne(distortion, vf_zero());
+    vfloat n = wave_place(mode, p) + in[TRC_OP_AT(WAVE, phase)];
+    if (vm_any(is_bent)) {
         const struct fractal f = {.type = TRC_FRACTAL_FBM_UNIT,
                                   .dims = 3,
-                                  .octaves = vf_clamp(in[5], 0.0f, TRC_MAX_OCTAVES),
-                                  .roughness = vf_saturate(in[6]),
+                                  .octaves =
+                                      vf_clamp(in[TRC_OP_AT(WAVE, octaves)], 0.0f, TRC_MAX_OCTAVES),
+                                  .roughness = vf_saturate(in[TRC_OP_AT(WAVE, roughness)]),
                                   .lacunarity = two};
-        const vfloat place[TRC_MAX_DIMENSIONS] = {p.x * in[4], p.y * in[4], p.z * in[4]};
-        const vfloat bent = n + in[3] * (fractal_noise(&f, place) * two - one);
-        n = vf_select(vf_ne(in[3], vf_zero()), bent, n);
+        const vfloat finer = in[TRC_OP_AT(WAVE, detail_scale)];
+        const vfloat place[TRC_MAX_DIMENSIONS] = {p.x * finer, p.y * finer, p.z * finer};
+        const vfloat bent = n + distortion * (fractal_noise(&f, place) * two - one);
+        n = vf_select(is_bent, bent, n);
     }
     const vfloat turns = n / vf_set(TRC_TWO_PI);
-    switch (mode & TRC_WAVE_PROFILE) {
+    switch (mode & TRC_WAVE_PROFILE_MASK) {
     case TRC_WAVE_SINE:
         return half + half * vf_sin(n - vf_set(TRC_HALF_PI));
     case TRC_WAVE_SAW:
@@ -89,8 +93,7 @@ static vfloat op_wave(uint32_t mode, const vfloat *in) {
 struct magic_fold {
     int8_t target, is_cosine, sign, of[3];
 };
-#define MAGIC_DEPTH 10
-static const struct magic_fold magic_folds[MAGIC_DEPTH] = {
+static const struct magic_fold magic_folds[TRC_MAGIC_MAX_DEPTH] = {
     {1, 1, -1, {1, -1, 1}},  {0, 1, 1, {1, -1, -1}}, {2, 0, 1, {-1, -1, -1}},
     {0, 1, -1, {-1, 1, -1}}, {1, 0, -1, {-1, 1, 1}}, {1, 1, -1, {-1, 1, 1}},
     {0, 1, 1, {1, 1, 1}},    {2, 0, 1, {1, 1, -1}},  {0, 1, -1, {-1, -1, 1}},
@@ -103,19 +106,20 @@ TRC_INLINE vfloat magic_sum(const vfloat c[3], const int8_t of[3]) {
     return of[2] < 0 ? xy - c[2] : xy + c[2];
 }
 
-/* vector, scale, distortion; mode: how many folds */
+/* mode: how many folds */
 static vvec3 op_magic(uint32_t mode, const vfloat *in) {
     static const int8_t first[3][3] = {{1, 1, 1}, {-1, 1, -1}, {-1, -1, 1}};
-    const vfloat turn = vf_set(TRC_TWO_PI), scale = in[3], distortion = in[4];
+    const vfloat turn = vf_set(TRC_TWO_PI), scale = in[TRC_OP_AT(MAGIC, scale)];
+    const vfloat distortion = in[TRC_OP_AT(MAGIC, distortion)];
     vfloat reduced[3], c[3];
     for (int i = 0; i < 3; i++)
-        reduced[i] = math_modulo(in[i], turn);
+        reduced[i] = math_modulo(in[TRC_OP_AT(MAGIC, vector) + i], turn);
     for (int i = 0; i < 3; i++)
         c[i] = magic_sum(reduced, first[i]) * vf_set(5.0f) * scale;
     c[0] = vf_sin(c[0]);
     c[1] = vf_cos(c[1]);
     c[2] = -vf_cos(c[2]);
-    for (uint32_t k = 0; k < mode && k < MAGIC_DEPTH; k++) {
+    for (uint32_t k = 0; k < mode && k < TRC_MAGIC_MAX_DEPTH; k++) {
         const struct magic_fold *fold = &magic_folds[k];
         for (int i = 0; k == 0 && i < 3; i++)
             c[i] = c[i] * distortion;
@@ -150,28 +154,32 @@ TRC_INLINE vmask is_multiple(vint a, uint32_t n) {
 #endif
 }
 
-/* vector, mortar size, mortar smoothness, bias, brick width, row height, offset, squash -> shade of
- * the brick, share of mortar; mode: how often rows are offset, how often squashed */
 static void op_brick(uint32_t mode, const vfloat *in, vfloat *out) {
-    const uint32_t offset_every = mode & 127u,
-                   squash_every = (mode >> TRC_BRICK_SQUASH_SHIFT) & 127u;
-    const vfloat zero = vf_zero(), one = vf_one(), size = in[3], smooth = in[4], height = in[7];
-    const vint row = vf_to_int(vf_floor(in[1] / height));
-    vfloat width = in[6], shift = zero;
+    const uint32_t offset_every = mode & TRC_BRICK_ROWS_MASK;
+    const uint32_t squash_every = (mode >> TRC_BRICK_SQUASH_SHIFT) & TRC_BRICK_ROWS_MASK;
+    const vvec3 p = v3_read(in + TRC_OP_AT(BRICK, vector));
+    const vfloat zero = vf_zero(), one = vf_one();
+    const vfloat size = in[TRC_OP_AT(BRICK, mortar_size)];
+    const vfloat smooth = in[TRC_OP_AT(BRICK, mortar_smooth)];
+    const vfloat height = in[TRC_OP_AT(BRICK, row_height)];
+    const vint row = vf_to_int(vf_floor(p.y / height));
+    vfloat width = in[TRC_OP_AT(BRICK, brick_width)], shift = zero;
     if (offset_every && squash_every) {
-        width = width * vf_select(is_multiple(row, squash_every), in[9], one);
-        shift = vf_where(is_multiple(row, offset_every), width * in[8]);
+        width =
+            width * vf_select(is_multiple(row, squash_every), in[TRC_OP_AT(BRICK, squash)], one);
+        shift = vf_where(is_multiple(row, offset_every), width * in[TRC_OP_AT(BRICK, offset)]);
     }
-    const vint brick = vf_to_int(vf_floor((in[0] + shift) / width));
-    const vfloat x = in[0] + shift - width * vi_to_float(brick);
-    const vfloat y = in[1] - height * vi_to_float(row);
+    const vint brick = vf_to_int(vf_floor((p.x + shift) / width));
+    const vfloat x = p.x + shift - width * vi_to_float(brick);
+    const vfloat y = p.y - height * vi_to_float(row);
     const vuint number = ((vuint)row << 16) + ((vuint)brick & vu_set(0xffff));
-    out[0] = vf_saturate(brick_shade(number) + in[5]);
+    out[TRC_OP_OUT_AT(BRICK, shade)] =
+        vf_saturate(brick_shade(number) + in[TRC_OP_AT(BRICK, bias)]);
     const vfloat edge = vf_min(vf_min(x, y), vf_min(width - x, height - y));
     const vfloat depth = one - edge / size, t = depth / smooth;
     const vfloat soft = t * t * (vf_set(3.0f) - vf_set(2.0f) * t);
     const vmask is_soft = vm_and(vf_ne(smooth, zero), vf_lt(depth, smooth));
-    out[1] = vf_where(vf_lt(edge, size), vf_select(is_soft, soft, one));
+    out[TRC_OP_OUT_AT(BRICK, mortar)] = vf_where(vf_lt(edge, size), vf_select(is_soft, soft, one));
 }
 
 #endif

@@ -15,25 +15,32 @@ static bool run_pure(uint32_t op, uint32_t mode, const float *table, const vfloa
                      vfloat *out) {
     switch (op) {
     case TRC_OP_MATH:
-        out[0] = op_math(mode, in[0], in[1], in[2]);
+        out[0] =
+            op_math(mode, in[TRC_OP_AT(MATH, a)], in[TRC_OP_AT(MATH, b)], in[TRC_OP_AT(MATH, c)]);
         return true;
     case TRC_OP_CLAMP:
-        out[0] = op_clamp(mode, in[0], in[1], in[2]);
+        out[0] = op_clamp(mode, in[TRC_OP_AT(CLAMP, value)], in[TRC_OP_AT(CLAMP, min)],
+                          in[TRC_OP_AT(CLAMP, max)]);
         return true;
     case TRC_OP_MAP_RANGE:
         out[0] = op_map_range(in);
         return true;
     case TRC_OP_VECTOR_MATH:
-        v3_write(out, op_vector_math(mode, v3_read(in), v3_read(in + 3), v3_read(in + 6), in[9]));
+        v3_write(out, op_vector_math(mode, v3_read(in + TRC_OP_AT(VECTOR_MATH, a)),
+                                     v3_read(in + TRC_OP_AT(VECTOR_MATH, b)),
+                                     v3_read(in + TRC_OP_AT(VECTOR_MATH, c)),
+                                     in[TRC_OP_AT(VECTOR_MATH, scale)]));
         return true;
     case TRC_OP_VECTOR_MEASURE:
-        out[0] = op_vector_measure(mode, v3_read(in), v3_read(in + 3));
+        out[0] = op_vector_measure(mode, v3_read(in + TRC_OP_AT(VECTOR_MEASURE, a)),
+                                   v3_read(in + TRC_OP_AT(VECTOR_MEASURE, b)));
         return true;
     case TRC_OP_ROTATION:
-        op_rotation(in, out);
+        op_rotation(v3_read(in), out);
         return true;
     case TRC_OP_AXIS_ROTATION:
-        op_axis_rotation(v3_read(in), in[3], out);
+        op_axis_rotation(v3_read(in + TRC_OP_AT(AXIS_ROTATION, axis)),
+                         in[TRC_OP_AT(AXIS_ROTATION, angle)], out);
         return true;
     case TRC_OP_CURVE:
         out[0] = op_curve(mode, table, in);
@@ -48,7 +55,8 @@ static bool run_pure(uint32_t op, uint32_t mode, const float *table, const vfloa
         v3_write(out, op_mapping(mode, in));
         return true;
     case TRC_OP_MIX:
-        v3_write(out, op_mix(mode, in[0], v3_read(in + 1), v3_read(in + 4)));
+        v3_write(out, op_mix(mode, in[TRC_OP_AT(MIX, factor)], v3_read(in + TRC_OP_AT(MIX, a)),
+                             v3_read(in + TRC_OP_AT(MIX, b))));
         return true;
     case TRC_OP_SATURATE:
         v3_write(out, v3_saturate(v3_read(in)));
@@ -60,16 +68,23 @@ static bool run_pure(uint32_t op, uint32_t mode, const float *table, const vfloa
         out[0] = v3_average(v3_read(in));
         return true;
     case TRC_OP_INVERT:
-        v3_write(out, op_invert(in[0], v3_read(in + 1)));
+        v3_write(out,
+                 op_invert(in[TRC_OP_AT(INVERT, factor)], v3_read(in + TRC_OP_AT(INVERT, color))));
         return true;
     case TRC_OP_GAMMA:
-        v3_write(out, op_gamma(v3_read(in), in[3]));
+        v3_write(out, op_gamma(v3_read(in + TRC_OP_AT(GAMMA, color)), in[TRC_OP_AT(GAMMA, gamma)]));
         return true;
     case TRC_OP_HUE_SATURATION:
-        v3_write(out, op_hue_saturation(in[0], in[1], in[2], in[3], v3_read(in + 4)));
+        v3_write(out, op_hue_saturation(in[TRC_OP_AT(HUE_SATURATION, hue)],
+                                        in[TRC_OP_AT(HUE_SATURATION, saturation)],
+                                        in[TRC_OP_AT(HUE_SATURATION, value)],
+                                        in[TRC_OP_AT(HUE_SATURATION, factor)],
+                                        v3_read(in + TRC_OP_AT(HUE_SATURATION, color))));
         return true;
     case TRC_OP_BRIGHT_CONTRAST:
-        v3_write(out, op_bright_contrast(v3_read(in), in[3], in[4]));
+        v3_write(out, op_bright_contrast(v3_read(in + TRC_OP_AT(BRIGHT_CONTRAST, color)),
+                                         in[TRC_OP_AT(BRIGHT_CONTRAST, bright)],
+                                         in[TRC_OP_AT(BRIGHT_CONTRAST, contrast)]));
         return true;
     case TRC_OP_RAMP:
         op_ramp(mode, table, in[0], out);
@@ -120,8 +135,8 @@ static void run_at_surface(const struct trc_surface *s, const struct trc_instruc
         v3_write(out, op_tangent(s, i->mode, i->resource));
         break;
     case TRC_OP_PARAMETRIC:
-        out[0] = vf_one() - s->u - s->v;
-        out[1] = s->u;
+        out[TRC_OP_OUT_AT(PARAMETRIC, u)] = vf_one() - s->u - s->v;
+        out[TRC_OP_OUT_AT(PARAMETRIC, v)] = s->u;
         break;
     case TRC_OP_BACKFACING:
         out[0] = vf_truth(s->backfacing);
@@ -160,29 +175,33 @@ static void run_at_surface(const struct trc_surface *s, const struct trc_instruc
         v3_write(out, op_object_location(s));
         break;
     case TRC_OP_OBJECT_COLOR:
-        for (int c = 0; c < 4; c++)
+        for (int c = 0; c < OBJECT_INDEX; c++)
             out[c] = object_number(s, c);
         break;
     case TRC_OP_OBJECT_INDEX:
-        out[0] = object_number(s, 4);
+        out[0] = object_number(s, OBJECT_INDEX);
         break;
     case TRC_OP_OBJECT_RANDOM:
-        out[0] = object_number(s, 5);
+        out[0] = object_number(s, OBJECT_RANDOM);
         break;
     case TRC_OP_INSTANCE_VALUES:
         op_instance_values(s, i->mode, out);
         break;
     case TRC_OP_FRESNEL:
-        out[0] = op_fresnel(s, in[0], v3_read(in + 1));
+        out[0] =
+            op_fresnel(s, in[TRC_OP_AT(FRESNEL, ior)], v3_read(in + TRC_OP_AT(FRESNEL, normal)));
         break;
     case TRC_OP_LAYER_FRESNEL:
-        out[0] = op_layer_fresnel(s, in[0], v3_read(in + 1));
+        out[0] = op_layer_fresnel(s, in[TRC_OP_AT(LAYER_FRESNEL, blend)],
+                                  v3_read(in + TRC_OP_AT(LAYER_FRESNEL, normal)));
         break;
     case TRC_OP_LAYER_FACING:
-        out[0] = op_layer_facing(s, in[0], v3_read(in + 1));
+        out[0] = op_layer_facing(s, in[TRC_OP_AT(LAYER_FACING, blend)],
+                                 v3_read(in + TRC_OP_AT(LAYER_FACING, normal)));
         break;
     case TRC_OP_NORMAL_MAP:
-        v3_write(out, op_normal_map(s, i->mode, i->resource, in[0], v3_read(in + 1)));
+        v3_write(out, op_normal_map(s, i->mode, i->resource, in[TRC_OP_AT(NORMAL_MAP, strength)],
+                                    v3_read(in + TRC_OP_AT(NORMAL_MAP, color))));
         break;
     case TRC_OP_TRANSFORM:
         v3_write(out, op_transform(s, i->mode, v3_read(in)));
@@ -191,11 +210,14 @@ static void run_at_surface(const struct trc_surface *s, const struct trc_instruc
         out[0] = op_wireframe(s, in[0]);
         break;
     case TRC_OP_IMAGE:
-        texture_lookup(image_of(s, i->resource), i->mode, in[0], in[1], in[2] * s->footprint,
+        texture_lookup(image_of(s, i->resource), i->mode, in[TRC_OP_AT(IMAGE, u)],
+                       in[TRC_OP_AT(IMAGE, v)], in[TRC_OP_AT(IMAGE, density)] * s->footprint,
                        s->active, out);
         break;
     case TRC_OP_IMAGE_BOX:
-        op_image_box(s, image_of(s, i->resource), i->mode, v3_read(in), in[3], out);
+        op_image_box(s, image_of(s, i->resource), i->mode,
+                     v3_read(in + TRC_OP_AT(IMAGE_BOX, vector)), in[TRC_OP_AT(IMAGE_BOX, blend)],
+                     out);
         break;
     default:
         break;

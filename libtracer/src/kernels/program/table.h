@@ -7,13 +7,13 @@
 
 /* ---- curves ---- */
 
-/* value, low, high; mode: channel of the table, TRC_CURVE_EXTRAPOLATE. The table spans low to high;
- * beyond, its ends go on straight or stay. */
+/* The table spans low to high; beyond, its ends go on straight or stay. */
 static vfloat op_curve(uint32_t mode, const float *table, const vfloat *in) {
-    const int32_t steps = (int32_t)TRC_RAMP_SIZE - 1;
-    const float *channel = table + (mode & 3u);
+    const int32_t steps = TRC_TABLE_ENTRIES - 1;
+    const float *channel = table + (mode & TRC_CURVE_CHANNEL_MASK);
     const vmask all = vm_all_set();
-    const vfloat x = (in[0] - in[1]) / (in[2] - in[1]) * vf_set((float)steps);
+    const vfloat low = in[TRC_OP_AT(CURVE, low)], high = in[TRC_OP_AT(CURVE, high)];
+    const vfloat x = (in[TRC_OP_AT(CURVE, value)] - low) / (high - low) * vf_set((float)steps);
     const vfloat inside = vf_clamp(x, 0.0f, (float)steps);
     const vint i = vf_to_int(inside), before_last = vi_set(steps - 1);
     const vint start = vi_select(vi_lt(i, before_last), i, before_last);

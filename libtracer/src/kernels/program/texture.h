@@ -18,31 +18,32 @@ static void op_project(uint32_t mode, vvec3 d, vfloat *out) {
         d.y = d.y - one;
         const vfloat length = vf_set(2.0f) * vf_safe_sqrt(-half * d.y);
         const vfloat inverse = vf_select(vf_gt(length, zero), vf_rcp(length), one);
-        out[0] = half * (d.x * inverse + one);
-        out[1] = half * (d.z * inverse + one);
+        out[TRC_OP_OUT_AT(PROJECT, u)] = half * (d.x * inverse + one);
+        out[TRC_OP_OUT_AT(PROJECT, v)] = half * (d.z * inverse + one);
         return;
     }
     if (mode == TRC_PROJECT_EQUIRECTANGULAR) {
         const vfloat length = v3_length(d);
         const vmask valid = vf_gt(length, zero);
         const vfloat z = d.z / vf_select(valid, length, one);
-        out[0] = vf_where(valid, half - vf_atan2(d.y, d.x) * vf_set(0.5f * TRC_INV_PI));
-        out[1] = vf_where(valid, one - vf_acos(z) * vf_set(TRC_INV_PI));
+        out[TRC_OP_OUT_AT(PROJECT, u)] =
+            vf_where(valid, half - vf_atan2(d.y, d.x) * vf_set(0.5f * TRC_INV_PI));
+        out[TRC_OP_OUT_AT(PROJECT, v)] = vf_where(valid, one - vf_acos(z) * vf_set(TRC_INV_PI));
         return;
     }
     d = v3_scale(v3_sub(d, v3_splat(half)), vf_set(2.0f));
     const vmask sideways = vm_or(vf_ne(d.x, zero), vf_ne(d.y, zero));
     const vfloat around = vf_where(sideways, half - vf_atan2(d.x, d.y) * vf_set(0.5f * TRC_INV_PI));
     if (mode == TRC_PROJECT_TUBE) {
-        out[0] = around;
-        out[1] = vf_where(sideways, (d.z + one) * half);
+        out[TRC_OP_OUT_AT(PROJECT, u)] = around;
+        out[TRC_OP_OUT_AT(PROJECT, v)] = vf_where(sideways, (d.z + one) * half);
         return;
     }
     const vfloat length = v3_length(d);
     const vmask valid = vf_gt(length, zero);
     const vfloat z = d.z / vf_select(valid, length, one);
-    out[0] = around;
-    out[1] = vf_where(valid, one - vf_acos(z) * vf_set(TRC_INV_PI));
+    out[TRC_OP_OUT_AT(PROJECT, u)] = around;
+    out[TRC_OP_OUT_AT(PROJECT, v)] = vf_where(valid, one - vf_acos(z) * vf_set(TRC_INV_PI));
 }
 
 /* Where the sides of a box that face along an axis show an image, seen without mirroring. */
@@ -119,17 +120,19 @@ static void op_image_box(const struct trc_surface *s, const struct trc_image *im
     }
 }
 
-/* vector, color 1, color 2, scale -> color, factor */
 static void op_checker(const vfloat *in, vfloat *out) {
-    const vvec3 p = v3_scale(v3_read(in), in[9]), a = v3_read(in + 3), b = v3_read(in + 6);
+    const vvec3 p =
+        v3_scale(v3_read(in + TRC_OP_AT(CHECKER, vector)), in[TRC_OP_AT(CHECKER, scale)]);
+    const vvec3 a = v3_read(in + TRC_OP_AT(CHECKER, color1));
+    const vvec3 b = v3_read(in + TRC_OP_AT(CHECKER, color2));
     /* The shift and the shrinking keep whole coordinates off the edges. */
     const vfloat shift = vf_set(0.000001f), shrink = vf_set(0.999999f);
     const vint x = vf_to_int(vf_floor((p.x + shift) * shrink));
     const vint y = vf_to_int(vf_floor((p.y + shift) * shrink));
     const vint z = vf_to_int(vf_floor((p.z + shift) * shrink));
     const vmask first = vi_eq((x ^ y ^ z) & vi_set(1), vi_set(1));
-    v3_write(out, v3_select(first, a, b));
-    out[3] = vf_truth(first);
+    v3_write(out + TRC_OP_OUT_AT(CHECKER, color), v3_select(first, a, b));
+    out[TRC_OP_OUT_AT(CHECKER, factor)] = vf_truth(first);
 }
 
 #endif

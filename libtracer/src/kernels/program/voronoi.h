@@ -294,7 +294,7 @@ TRC_INLINE void voronoi_add(vmask m, vfloat weight, vfloat a, vfloat *sum) {
 static void voronoi_fractal(struct voronoi *v, uint32_t mode, vfloat smoothness,
                             const struct voronoi_detail *d, const vfloat *place,
                             struct voronoi_value *sum) {
-    const uint32_t feature = (mode >> TRC_VORONOI_FEATURE_SHIFT) & 7u;
+    const uint32_t feature = (mode >> TRC_VORONOI_FEATURE_SHIFT) & TRC_VORONOI_FEATURE_MASK;
     const bool has_color = !(mode & TRC_MODE_NO_COLOR);
     const bool is_edge = feature == TRC_VORONOI_DISTANCE_TO_EDGE;
     const bool normalizes = mode & TRC_VORONOI_NORMALIZE;
@@ -336,41 +336,44 @@ static void voronoi_fractal(struct voronoi *v, uint32_t mode, vfloat smoothness,
 
 /* ---- the texture ---- */
 
-/* vector, w, smoothness, exponent, randomness, detail, roughness, lacunarity -> distance, colour,
- * position, w, radius */
 static void op_voronoi(uint32_t mode, const vfloat *in, vfloat *out) {
-    struct voronoi v = {.dims = (int)(mode & 3u) + 1,
-                        .metric = (mode >> TRC_VORONOI_METRIC_SHIFT) & 3u,
-                        .exponent = in[5],
-                        .randomness = vf_saturate(in[6])};
-    const uint32_t feature = (mode >> TRC_VORONOI_FEATURE_SHIFT) & 7u;
+    struct voronoi v = {.dims = (int)(mode & TRC_DIMENSIONS_MASK) + 1,
+                        .metric = (mode >> TRC_VORONOI_METRIC_SHIFT) & TRC_VORONOI_METRIC_MASK,
+                        .exponent = in[TRC_OP_AT(VORONOI, exponent)],
+                        .randomness = vf_saturate(in[TRC_OP_AT(VORONOI, randomness)])};
+    const uint32_t feature = (mode >> TRC_VORONOI_FEATURE_SHIFT) & TRC_VORONOI_FEATURE_MASK;
+    const vfloat roughness = in[TRC_OP_AT(VORONOI, roughness)];
+    const vfloat lacunarity = in[TRC_OP_AT(VORONOI, lacunarity)];
     const vfloat zero = vf_zero();
     vfloat place[TRC_MAX_DIMENSIONS];
     struct voronoi_value value;
-    noise_place(v.dims, in, in[3], place);
-    for (int i = 0; i < 9; i++)
+    noise_place(v.dims, in + TRC_OP_AT(VORONOI, vector), in[TRC_OP_AT(VORONOI, w)], place);
+    for (uint32_t i = 0; i < TRC_OP_OUT_AT(VORONOI, end); i++)
         out[i] = zero;
     if (feature == TRC_VORONOI_N_SPHERE_RADIUS) {
         voronoi_enter(&v, place, vf_one());
-        out[8] = voronoi_radius(&v);
+        out[TRC_OP_OUT_AT(VORONOI, radius)] = voronoi_radius(&v);
         return;
     }
     /* Octaves of no weight are left out, and edges infinitely far. */
-    vmask has_octaves = vf_gt(in[8], zero);
+    vmask has_octaves = vf_gt(roughness, zero);
     if (feature == TRC_VORONOI_DISTANCE_TO_EDGE)
-        has_octaves = vm_and(has_octaves, vf_ne(in[9], zero));
+        has_octaves = vm_and(has_octaves, vf_ne(lacunarity, zero));
     const struct voronoi_detail detail = {
-        .detail = vf_where(has_octaves, vf_clamp(in[7], 0.0f, TRC_MAX_OCTAVES - 1.0f)),
-        .roughness = vf_saturate(in[8]),
-        .lacunarity = in[9]};
-    voronoi_fractal(&v, mode, vf_clamp(in[4] * vf_set(0.5f), 0.0f, 0.5f), &detail, place, &value);
-    out[0] = value.distance;
+        .detail = vf_where(has_octaves,
+                           vf_clamp(in[TRC_OP_AT(VORONOI, detail)], 0.0f, TRC_MAX_OCTAVES - 1.0f)),
+        .roughness = vf_saturate(roughness),
+        .lacunarity = lacunarity};
+    const vfloat smoothness = in[TRC_OP_AT(VORONOI, smoothness)] * vf_set(0.5f);
+    voronoi_fractal(&v, mode, vf_clamp(smoothness, 0.0f, 0.5f), &detail, place, &value);
+    out[TRC_OP_OUT_AT(VORONOI, distance)] = value.distance;
     if (feature == TRC_VORONOI_DISTANCE_TO_EDGE)
         return;
-    v3_write(out + 1, value.color);
+    v3_write(out + TRC_OP_OUT_AT(VORONOI, color), value.color);
     for (int i = 0; i < v.dims; i++) {
-        const int component = v.dims == 1 || i == 3 ? 7 : 4 + i;
-        out[component] = value.at[i];
+        const bool is_w = v.dims == 1 || i == 3;
+        out[is_w ? TRC_OP_OUT_AT(VORONOI, w) : TRC_OP_OUT_AT(VORONOI, position) + (uint32_t)i] =
+            value.at[i];
     }
 }
 
