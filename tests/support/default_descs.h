@@ -25,63 +25,49 @@ static const float above_transform[12]
     __attribute__((unused)) = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 6};
 
 DEFAULT_INLINE trc_scene_desc default_scene_desc(void) {
-    return (trc_scene_desc){.struct_size = sizeof(trc_scene_desc), .thread_count = 2};
+    trc_scene_desc desc = trc_scene_desc_default();
+    desc.thread_count = 2;
+    return desc;
 }
 
 DEFAULT_INLINE trc_mesh_desc default_mesh_desc(void) {
-    return (trc_mesh_desc){.struct_size = sizeof(trc_mesh_desc),
-                           .key_count = 1,
-                           .vertex_count = 8,
-                           .triangle_count = 12,
-                           .positions = cube_positions,
-                           .position_count = 24,
-                           .indices = cube_indices,
-                           .index_count = 36};
+    trc_mesh_desc desc = trc_mesh_desc_default();
+    desc.vertex_count = 8;
+    desc.triangle_count = 12;
+    desc.positions = cube_positions;
+    desc.position_count = 24;
+    desc.indices = cube_indices;
+    desc.index_count = 36;
+    return desc;
 }
 
 DEFAULT_INLINE trc_instance_desc default_instance_desc(trc_id mesh) {
-    return (trc_instance_desc){.struct_size = sizeof(trc_instance_desc),
-                               .key_count = 1,
-                               .mesh = mesh,
-                               .transforms = identity_transform,
-                               .visibility = TRC_VISIBLE_ALL,
-                               .color = {1, 1, 1, 1}};
+    trc_instance_desc desc = trc_instance_desc_default();
+    desc.mesh = mesh;
+    return desc;
 }
 
 DEFAULT_INLINE trc_camera_desc default_camera_desc(void) {
-    static const float window[4] = {-0.5f, 0.5f, -0.5f, 0.5f};
-    return (trc_camera_desc){.struct_size = sizeof(trc_camera_desc),
-                             .key_count = 1,
-                             .transforms = above_transform,
-                             .windows = window,
-                             .window_key_count = 1,
-                             .clip_start = 0.1f,
-                             .clip_end = 100.0f,
-                             .focus_distance = 5.0f,
-                             .aperture_ratio = 1.0f};
+    trc_camera_desc desc = trc_camera_desc_default();
+    desc.transforms = above_transform;
+    desc.clip_end = 100.0f;
+    desc.focus_distance = 5.0f;
+    return desc;
 }
 
 DEFAULT_INLINE trc_light_desc default_light_desc(void) {
-    trc_light_desc desc = {.struct_size = sizeof(trc_light_desc),
-                           .type = TRC_LIGHT_AREA,
-                           .color = {1, 1, 1},
-                           .strength = 100.0f,
-                           .size_x = 1.0f,
-                           .size_y = 1.0f,
-                           .spread = 3.14159274f,
-                           .spot_angle = 1.0f,
-                           .visibility = TRC_VISIBLE_ALL,
-                           .cast_shadow = 1,
-                           .use_mis = 1};
+    trc_light_desc desc = trc_light_desc_default();
+    desc.type = TRC_LIGHT_AREA;
+    desc.strength = 100.0f;
     memcpy(desc.transform, above_transform, sizeof desc.transform);
     return desc;
 }
 
 DEFAULT_INLINE trc_world_desc default_world_desc(trc_id material) {
-    return (trc_world_desc){.struct_size = sizeof(trc_world_desc),
-                            .material = material,
-                            .visibility = TRC_VISIBLE_ALL,
-                            .ao_distance = 10.0f};
+    trc_world_desc desc = trc_world_desc_default();
+    desc.material = material;
+    desc.use_sampling = 0;
+    return desc;
 }
 
 /* One node of constants, kept alive by the caller for the call. */
@@ -95,45 +81,42 @@ DEFAULT_INLINE void default_material_init(struct default_material *m, uint32_t t
     memset(m, 0, sizeof *m);
     const uint32_t input_count = type == TRC_NODE_DIFFUSE ? 3 : 2; /* emission, background: 2 */
     m->node = (trc_node){.type = type, .input_count = input_count};
-    m->inputs[0] = (trc_node_input){.node = -1, .value = {0.5f, 0.5f, 0.5f}};
-    m->inputs[1] = (trc_node_input){.node = -1, .value = {1.0f}};
-    m->inputs[2] = (trc_node_input){.node = -2};
-    m->desc = (trc_material_desc){.struct_size = sizeof(trc_material_desc),
-                                  .node_count = 1,
-                                  .nodes = &m->node,
-                                  .inputs = m->inputs,
-                                  .input_count = input_count,
-                                  .flags = TRC_MATERIAL_SAMPLE_EMISSION};
+    m->inputs[0] = (trc_node_input){.node = TRC_INPUT_CONSTANT, .value = {0.5f, 0.5f, 0.5f}};
+    m->inputs[1] = (trc_node_input){.node = TRC_INPUT_CONSTANT, .value = {1.0f}};
+    m->inputs[2] = (trc_node_input){.node = TRC_INPUT_DEFAULT};
+    m->desc = trc_material_desc_default();
+    m->desc.node_count = 1;
+    m->desc.nodes = &m->node;
+    m->desc.inputs = m->inputs;
+    m->desc.input_count = input_count;
+    m->desc.surface = 0;
+    m->desc.flags = TRC_MATERIAL_SAMPLE_EMISSION;
 }
 
 DEFAULT_INLINE trc_image_desc default_image_desc(void) {
     static const float pixels[16] = {1, 0, 0, 1, 0, 1, 0, 1, 0, 0, 1, 1, 1, 1, 1, 1};
-    return (trc_image_desc){.struct_size = sizeof(trc_image_desc),
-                            .width = 2,
-                            .height = 2,
-                            .is_float = 1,
-                            .pixels = pixels,
-                            .pixel_bytes = sizeof pixels};
+    trc_image_desc desc = trc_image_desc_default();
+    desc.width = 2;
+    desc.height = 2;
+    desc.is_float = 1;
+    desc.pixels = pixels;
+    desc.pixel_bytes = sizeof pixels;
+    return desc;
 }
 
 DEFAULT_INLINE trc_render_desc default_render_desc(uint32_t width, uint32_t height,
                                                    uint32_t samples) {
-    return (trc_render_desc){.struct_size = sizeof(trc_render_desc),
-                             .width = width,
-                             .height = height,
-                             .integrator = TRC_INTEGRATOR_DISTRIBUTION,
-                             .sample_count = samples,
-                             .max_depth = 4,
-                             .max_transparent_depth = 8,
-                             .max_glossy_depth = UINT32_MAX,
-                             .max_transmission_depth = UINT32_MAX,
-                             .attenuation_cutoff = 0.01f,
-                             .seed = 1,
-                             .filter_width = 1.5f,
-                             .film_exposure = 1.0f,
-                             .mist_depth = 1.0f,
-                             .mist_falloff = 1.0f,
-                             .thread_count = 2};
+    trc_render_desc desc = trc_render_desc_default();
+    desc.width = width;
+    desc.height = height;
+    desc.sample_count = samples;
+    desc.max_depth = 4;
+    desc.attenuation_cutoff = 0.01f;
+    desc.seed = 1;
+    desc.filter = TRC_FILTER_BOX;
+    desc.mist_depth = 1.0f;
+    desc.thread_count = 2;
+    return desc;
 }
 
 #endif

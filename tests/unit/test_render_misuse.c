@@ -30,7 +30,7 @@ static void render_frames(void **state) {
     REFUSE_RENDER(ARGUMENT, desc.crop_y = UINT32_MAX; desc.crop_width = 5; desc.crop_height = 5);
     REFUSE_RENDER(ARGUMENT, desc.passes = UINT64_C(1) << TRC_PASS_COUNT);
     REFUSE_RENDER(ARGUMENT, desc.cryptomattes = 1u << TRC_CRYPTOMATTE_KINDS);
-    REFUSE_RENDER(ARGUMENT, desc.cryptomattes = 1);
+    REFUSE_RENDER(ARGUMENT, desc.cryptomattes = 1; desc.cryptomatte_depth = 0);
     REFUSE_RENDER(LARGE, desc.aov_value_count = TRC_MAX_AOVS + 1);
     REFUSE_RENDER(LARGE, desc.light_group_count = TRC_MAX_LIGHT_GROUPS + 1);
     REFUSE_RENDER(LARGE, desc.aov_color_count = TRC_MAX_AOVS + 1);

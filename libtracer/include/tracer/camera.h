@@ -32,6 +32,10 @@ typedef struct trc_camera_desc {
     const float *shutter_curve;
 } trc_camera_desc;
 
+/* At the origin, looking down: perspective, as wide as high, 0.1 to 1000 m, a pinhole, no motion.
+ */
+TRC_API trc_camera_desc trc_camera_desc_default(void);
+
 TRC_API trc_status trc_scene_set_camera(trc_scene scene, const trc_camera_desc *desc);
 
 TRC_END_DECLS

@@ -21,6 +21,9 @@ typedef struct trc_corner_attribute {
     uint64_t value_count; /* number of floats, checked */
 } trc_corner_attribute;
 
+/* A UV map without values. */
+TRC_API trc_corner_attribute trc_corner_attribute_default(void);
+
 typedef struct trc_mesh_desc {
     uint32_t struct_size;
     uint32_t key_count; /* motion keys, 1..TRC_MAX_KEYS, evenly spaced over [0, 1] */
@@ -44,6 +47,9 @@ typedef struct trc_mesh_desc {
                                and in all poses; NULL: the bounding box is the unit cube */
     uint64_t generated_count; /* number of floats, checked */
 } trc_mesh_desc;
+
+/* One key of no vertices and no triangles, all flat. */
+TRC_API trc_mesh_desc trc_mesh_desc_default(void);
 
 /* Copies a mesh into the scene. Triangles with a vertex that is not finite or beyond 1.8e18 at any
  * key are skipped and counted (trc_scene_stats); an index out of range refuses the mesh, naming it.
@@ -101,6 +107,9 @@ typedef struct trc_instance_desc {
     uint32_t value_count;                        /* 0..TRC_MAX_INSTANCE_VALUES */
     const float *values;                         /* for TRC_NODE_INSTANCE_VALUES */
 } trc_instance_desc;
+
+/* Of no mesh yet: at the origin, unscaled, the default material, visible to all rays, white. */
+TRC_API trc_instance_desc trc_instance_desc_default(void);
 
 TRC_API trc_status trc_instance_create(trc_scene scene, const trc_instance_desc *desc,
                                        trc_id *instance_out);

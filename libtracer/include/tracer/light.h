@@ -46,6 +46,11 @@ typedef struct trc_light_desc {
     uint32_t flags;       /* TRC_LIGHT_SPHERE and the like */
 } trc_light_desc;
 
+/* A point light of 1 W at the origin, white, without extent, that casts shadows and that all rays
+ * see. As another type: a square of 1 m that shines to all sides of its front, a cone of pi / 4, a
+ * sun of no extent. */
+TRC_API trc_light_desc trc_light_desc_default(void);
+
 TRC_API trc_status trc_light_create(trc_scene scene, const trc_light_desc *desc, trc_id *light_out);
 TRC_API trc_status trc_light_update(trc_scene scene, trc_id light, const trc_light_desc *desc);
 TRC_API trc_status trc_light_destroy(trc_scene scene, trc_id light);
@@ -79,6 +84,9 @@ typedef struct trc_world_desc {
     float sun_direction[3];
     float sun_angle;
 } trc_world_desc;
+
+/* Black, without ambient occlusion; a material that it gets is sampled and seen by all rays. */
+TRC_API trc_world_desc trc_world_desc_default(void);
 
 TRC_API trc_status trc_scene_set_world(trc_scene scene, const trc_world_desc *desc);
 

@@ -297,6 +297,9 @@ typedef struct trc_node_input {
     float value[3];  /* the constant; a float input reads value[0] */
 } trc_node_input;
 
+/* The constant 0. */
+TRC_API trc_node_input trc_node_input_default(void);
+
 typedef struct trc_node {
     uint32_t type; /* TRC_NODE_* */
     uint32_t mode;
@@ -307,6 +310,9 @@ typedef struct trc_node {
     const float *table;   /* COLOR_RAMP, CURVES, FLOAT_CURVE, else NULL */
     uint64_t table_count; /* floats: 4 * TRC_TABLE_ENTRIES */
 } trc_node;
+
+/* A Diffuse, its inputs not yet given. */
+TRC_API trc_node trc_node_default(void);
 
 typedef struct trc_material_desc {
     uint32_t struct_size;
@@ -320,6 +326,9 @@ typedef struct trc_material_desc {
     float cryptomatte;  /* trc_cryptomatte_id of its name; 0: in no matte */
     uint32_t reserved;
 } trc_material_desc;
+
+/* Black. With nodes: emission is sampled, shadow rays see transparency. */
+TRC_API trc_material_desc trc_material_desc_default(void);
 
 enum trc_material_flags {
     /* Sample its emissive triangles as lights ("multiple importance sample"). Off: glossy rays
@@ -370,6 +379,9 @@ typedef struct trc_image_desc {
      * twelfth). With more samples per pixel lookups return to the image itself. */
     uint32_t is_mip_mapped;
 } trc_image_desc;
+
+/* Nothing yet: straight alpha, values as they are. */
+TRC_API trc_image_desc trc_image_desc_default(void);
 
 /* TRC_ERROR_IMAGE for a file that cannot be read, or colours that cannot be converted: the caller
  * may go on with image 0 (magenta). TRC_ERROR_TOO_LARGE also for a file that claims more pixels

@@ -18,6 +18,9 @@ typedef struct trc_rays {
     const float *tmin, *tmax, *time;
 } trc_rays;
 
+/* No rays, which meet what any ray does. */
+TRC_API trc_rays trc_rays_default(void);
+
 #define TRC_NO_HIT 0xffffffffu
 
 /* Arrays of count each, any may be NULL except instance. Barycentrics: hit = (1-u-v) p0 + u p1 + v
@@ -31,6 +34,9 @@ typedef struct trc_hits {
     float *distance, *u, *v;
     float *normal_x, *normal_y, *normal_z; /* geometric, world, not normalised, by winding */
 } trc_hits;
+
+/* No arrays yet. */
+TRC_API trc_hits trc_hits_default(void);
 
 /* Rays are taken in packets of packet_size neighbours: 1, 4, 16, 64 or 256; 0 chooses. 256 is
  * for rays that mostly meet the same triangles. */

@@ -22,6 +22,9 @@ typedef struct trc_reader_desc {
     const char *program; /* path of the program; NULL: tracer_reader in the library's folder */
 } trc_reader_desc;
 
+/* The program in the library's folder. */
+TRC_API trc_reader_desc trc_reader_desc_default(void);
+
 /* Starts nothing yet. A program that is absent or does not run is found out when a file is read:
  * TRC_ERROR_UNSUPPORTED with the reason, from then on for each. */
 TRC_API trc_status trc_reader_create(const trc_reader_desc *desc, trc_reader *reader_out);

@@ -177,6 +177,10 @@ typedef struct trc_render_desc {
     uint32_t light_group_count;                /* passes, 0..TRC_MAX_LIGHT_GROUPS */
 } trc_render_desc;
 
+/* No frame yet (width and height are to be set); Distribution, 16 samples, 50 bounces, a pixel
+ * filter of Blackman-Harris 1.5 pixels wide, nothing clamped or cut off, Combined alone. */
+TRC_API trc_render_desc trc_render_desc_default(void);
+
 /* Starts rendering the scene's current snapshot in threads of the library. All memory of the frame
  * is taken before anything starts, and before the first of it is taken, the sum is checked against
  * what the machine, its container (control groups) and a limit of address space (RLIMIT_AS) leave:
@@ -204,6 +208,9 @@ typedef struct trc_render_progress {
     uint32_t reserved;
     double seconds_trace, seconds_shade, seconds_other; /* summed over threads */
 } trc_render_progress;
+
+/* Zeros, for trc_render_poll. */
+TRC_API trc_render_progress trc_render_progress_default(void);
 
 TRC_API trc_status trc_render_poll(trc_render render, trc_render_progress *progress_out);
 

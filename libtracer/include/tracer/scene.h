@@ -21,6 +21,9 @@ typedef struct trc_scene_desc {
     trc_reader reader;        /* of image files, held by the scene; 0: one of its own */
 } trc_scene_desc;
 
+/* Interactive, on all processors, images without limit, a reader of its own. */
+TRC_API trc_scene_desc trc_scene_desc_default(void);
+
 TRC_API trc_status trc_scene_create(const trc_scene_desc *desc, trc_scene *scene_out);
 
 /* Renders that run on its snapshot are not disturbed. The handle and all its ids become stale. */
@@ -71,6 +74,9 @@ typedef struct trc_scene_stats {
     uint32_t built_count, refitted_count;   /* trees in the last commit */
     float bounds_lower[3], bounds_upper[3]; /* world, over the shutter; lower > upper when empty */
 } trc_scene_stats;
+
+/* Zeros, for trc_scene_get_stats. */
+TRC_API trc_scene_stats trc_scene_stats_default(void);
 
 /* Of the last commit. struct_size is set by the caller. */
 TRC_API trc_status trc_scene_get_stats(trc_scene scene, trc_scene_stats *stats_out);
