@@ -30,7 +30,7 @@ run_ctest() {
 
 run_pytest() {
     local folder folders=()
-    for folder in api statistics blender golden; do
+    for folder in api statistics blender; do
         if [ -n "$(find "tests/$folder" -name 'test_*.py' -print -quit 2>/dev/null)" ]; then
             folders+=("tests/$folder")
         fi
