@@ -16,9 +16,9 @@ _KEY_DIGITS = 7  # of the hash of a matte's name, which tells the mattes of a fi
 
 def write_manifests(engine, view_layer, names):
     """Add the manifests of a view layer's mattes to the render result; names: sets of them by
-    TRC_CRYPTOMATTE."""
+    CryptomatteKind."""
     result = engine.get_result()
-    for (kind, setting), members in zip(CRYPTOMATTES, names):
+    for (kind, setting), members in zip(CRYPTOMATTES.values(), names):
         if not getattr(view_layer, setting):
             continue
         name = f"{view_layer.name}.{kind}"

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""libtracer from Python: the one module that knows ctypes.
+"""libtracer from Python: with abi.py, which states its binary interface, all that knows ctypes.
 
-``load()`` opens the shared library beside this package (``lib/``), compares the ABI version and the
-size of every descriptor, and keeps the reason when something does not fit (``load_error()``).
+``load()`` opens the shared library beside this package (``lib/``), compares its version, values, sizes and
+offsets with those of abi.py, and keeps the reason when something does not fit (``load_error()``).
 :class:`Scene` and :class:`Render` own a handle each; arrays come and go as numpy arrays; a failed call
 raises :class:`TracerError` with the library's own message. Units and conventions are those of the
-library's headers (metres, radians, column vectors, 3x4 row-major transforms).
+library's headers (metres, radians, column vectors, 3x4 row-major transforms), and so is the default of
+each field of a descriptor.
 
 ``CDLL`` releases Python's lock during every call, so other threads run while the library builds.
 """
@@ -17,235 +18,12 @@ import sys
 
 import numpy as np
 
-ABI_VERSION = 2
-
-# Limits and enumerators of the headers ---------------------------------------------------------
-
-MAX_KEYS = 33
-MAX_ATTRIBUTES = 8
-MAX_NODES = 4096
-UNLIMITED_DEPTH = 0xFFFFFFFF
-
-OK = 0
-ERROR_INVALID_ARGUMENT = 1
-ERROR_TOO_LARGE = 4
-ERROR_OUT_OF_MEMORY = 5
-ERROR_CANCELLED = 8
-ERROR_UNSUPPORTED = 9
-ERROR_IMAGE = 10
-ERROR_FORMAT = 11
-STATUS_NAMES = (
-    "ok", "invalid argument", "invalid handle", "wrong structure size", "too large", "out of memory",
-    "no thread", "scene not committed", "cancelled", "not supported by this build", "unreadable image",
-    "unknown image format")
-
-NORMALS_NONE, NORMALS_VERTEX, NORMALS_CORNER = 0, 1, 2
-
-VISIBLE_CAMERA, VISIBLE_DIFFUSE, VISIBLE_GLOSSY, VISIBLE_TRANSMISSION, VISIBLE_SHADOW = 1, 2, 4, 8, 16
-VISIBLE_ALL = 31
-INSTANCE_SHADOW_CATCHER = 1
-
-CAMERA_PERSPECTIVE, CAMERA_ORTHOGRAPHIC = 0, 1
-
-LIGHT_TYPES = {'POINT': 0, 'SPOT': 1, 'SUN': 2, 'AREA': 3}
-AREA_RECTANGLE, AREA_ELLIPSE = 0, 1
-LIGHT_SPHERE, LIGHT_EVEN_CONE, LIGHT_SYNTHETIC = 1, 2, 4
-
-INTEGRATORS = {'RAYCAST': 0, 'WHITTED': 1, 'DISTRIBUTION': 2}
-SAMPLERS = {'SOBOL': 0, 'SUDOKU': 1, 'JITTER': 2, 'INDEPENDENT': 3, 'BLUE_NOISE': 4}
-ASSEMBLIES = {'AUTO': 0, 'TYPES': 1, 'RUNS': 2, 'GROUPS': 3, 'OCTANTS': 4, 'BLIND': 5, 'NONE': 6}
-FILTERS = {'BOX': 0, 'GAUSSIAN': 1, 'BLACKMAN_HARRIS': 2}
-
-AO_METHODS = {'ADD': 0, 'REPLACE': 1}
-
-PASS_COMBINED = 0
-
-ALPHA_STRAIGHT, ALPHA_PREMULTIPLIED, ALPHA_CHANNEL_PACKED, ALPHA_NONE = 0, 1, 2, 3
-
-MATERIAL_SAMPLE_EMISSION = 1
-MATERIAL_TRANSPARENT_SHADOW = 2
-MATERIAL_PLAIN_CHOICE = 4
-
-STATE_RUNNING, STATE_DONE, STATE_CANCELLED, STATE_FAILED = 0, 1, 2, 3
-
-FEATURE_NAMES = (
-    "depth of field", "camera motion", "object motion", "deformation", "instances", "specular", "glossy",
-    "refraction", "transparency", "textures", "node programs", "lights", "area lights",
-    "emissive meshes", "environment", "environment image", "ray visibility", "ambient occlusion",
-    "shadow catchers")
-
-# Descriptors -----------------------------------------------------------------------------------
-# A pointer is declared as c_void_p: numpy gives addresses as integers, and what the library reads is
-# copied before the call returns.
-
-_u32, _i32, _u64, _f32, _f64 = (ctypes.c_uint32, ctypes.c_int32, ctypes.c_uint64, ctypes.c_float,
-                                ctypes.c_double)
-_ptr, _str = ctypes.c_void_p, ctypes.c_char_p
-
-
-class _Struct(ctypes.Structure):
-    """A descriptor whose first field, struct_size, fills itself in."""
-
-    def __init__(self, **values):
-        super().__init__(**values)
-        if self._fields_[0][0] == "struct_size":
-            self.struct_size = ctypes.sizeof(self)
-
-
-class _CornerAttribute(_Struct):
-    _fields_ = [("struct_size", _u32), ("width", _u32), ("name", _str), ("values", _ptr),
-                ("value_count", _u64)]
-
-
-class _MeshDesc(_Struct):
-    _fields_ = [("struct_size", _u32), ("key_count", _u32), ("vertex_count", _u64),
-                ("triangle_count", _u64), ("positions", _ptr), ("position_count", _u64),
-                ("indices", _ptr), ("index_count", _u64), ("normals", _ptr), ("normal_count", _u64),
-                ("normal_kind", _u32), ("attribute_count", _u32), ("smooth", _ptr),
-                ("material_index", _ptr), ("attributes", _ptr), ("generated", _ptr),
-                ("generated_count", _u64)]
-
-
-class _InstanceDesc(_Struct):
-    _fields_ = [("struct_size", _u32), ("key_count", _u32), ("mesh", _u64), ("transforms", _ptr),
-                ("materials", _ptr), ("material_count", _u32), ("visibility", _u32),
-                ("pass_index", _i32), ("random", _f32), ("color", _f32 * 4),
-                ("cryptomatte_object", _f32), ("cryptomatte_asset", _f32), ("light_group", _u32),
-                ("flags", _u32), ("reserved", _u32), ("value_count", _u32), ("values", _ptr)]
-
-
-class _LightDesc(_Struct):
-    _fields_ = [("struct_size", _u32), ("type", _u32), ("transform", _f32 * 12), ("color", _f32 * 3),
-                ("strength", _f32), ("radius", _f32), ("angle", _f32), ("size_x", _f32),
-                ("size_y", _f32), ("area_shape", _u32), ("spread", _f32), ("spot_angle", _f32),
-                ("spot_blend", _f32), ("visibility", _u32), ("cast_shadow", _u32), ("use_mis", _u32),
-                ("light_group", _u32), ("flags", _u32)]
-
-
-class _WorldDesc(_Struct):
-    _fields_ = [("struct_size", _u32), ("use_sampling", _u32), ("material", _u64),
-                ("visibility", _u32), ("map_resolution", _u32), ("ao_distance", _f32),
-                ("ao_factor", _f32), ("ao_method", _u32), ("light_group", _u32),
-                ("sun_direction", _f32 * 3), ("sun_angle", _f32)]
-
-
-class _CameraDesc(_Struct):
-    _fields_ = [("struct_size", _u32), ("type", _u32), ("key_count", _u32), ("blade_count", _u32),
-                ("transforms", _ptr), ("windows", _ptr), ("window_key_count", _u32),
-                ("clip_start", _f32), ("clip_end", _f32), ("aperture_radius", _f32),
-                ("focus_distance", _f32), ("blade_rotation", _f32), ("aperture_ratio", _f32),
-                ("shutter_time", _f32), ("shutter_curve_count", _u32), ("shutter_curve", _ptr)]
-
-
-class _NodeInput(_Struct):
-    _fields_ = [("node", _i32), ("output", _u32), ("value", _f32 * 3)]
-
-
-class _Node(_Struct):
-    _fields_ = [("type", _u32), ("mode", _u32), ("first_input", _u32), ("input_count", _u32),
-                ("image", _u64), ("name", _str), ("table", _ptr), ("table_count", _u64)]
-
-
-class _MaterialDesc(_Struct):
-    _fields_ = [("struct_size", _u32), ("node_count", _u32), ("nodes", _ptr), ("inputs", _ptr),
-                ("input_count", _u32), ("surface", _i32), ("pass_index", _i32), ("flags", _u32),
-                ("cryptomatte", _f32), ("reserved", _u32)]
-
-
-class _ImageDesc(_Struct):
-    _fields_ = [("struct_size", _u32), ("width", _u32), ("height", _u32), ("alpha_mode", _u32),
-                ("is_srgb", _u32), ("is_float", _u32), ("pixels", _ptr), ("pixel_bytes", _u64),
-                ("path", _str), ("color_config", _str), ("color_space", _str), ("max_side", _u32),
-                ("is_mip_mapped", _u32)]
-
-
-class _SceneDesc(_Struct):
-    _fields_ = [("struct_size", _u32), ("thread_count", _u32), ("is_final", _u32),
-                ("image_megabytes", _u32), ("reader", _u64)]
-
-
-class _ReaderDesc(_Struct):
-    _fields_ = [("struct_size", _u32), ("reserved", _u32), ("program", _str)]
-
-
-class _SceneStats(_Struct):
-    _fields_ = [("struct_size", _u32), ("features", _u32), ("triangle_count", _u64),
-                ("instanced_triangle_count", _u64), ("skipped_triangle_count", _u64),
-                ("mesh_count", _u64), ("instance_count", _u64), ("skipped_instance_count", _u64),
-                ("light_count", _u64), ("material_count", _u64), ("emissive_triangle_count", _u64),
-                ("bvh_bytes", _u64), ("geometry_bytes", _u64), ("image_bytes", _u64),
-                ("build_seconds", _f64), ("commit_seconds", _f64), ("built_count", _u32),
-                ("refitted_count", _u32), ("bounds_lower", _f32 * 3), ("bounds_upper", _f32 * 3)]
-
-
-class _RenderDesc(_Struct):
-    _fields_ = [("struct_size", _u32), ("width", _u32), ("height", _u32), ("crop_x", _u32),
-                ("crop_y", _u32), ("crop_width", _u32), ("crop_height", _u32), ("integrator", _u32),
-                ("sample_count", _u32), ("light_samples", _u32), ("max_depth", _u32),
-                ("max_transparent_depth", _u32), ("max_glossy_depth", _u32),
-                ("max_transmission_depth", _u32), ("attenuation_cutoff", _f32),
-                ("filter_glossy", _f32), ("clamp_direct", _f32), ("clamp_indirect", _f32),
-                ("assembly", _u32), ("packet_size", _u32), ("sampler", _u32), ("seed", _u32),
-                ("filter", _u32), ("filter_width", _f32), ("film_transparent", _u32),
-                ("film_exposure", _f32), ("passes", _u64), ("thread_count", _u32),
-                ("progressive", _u32), ("noise_threshold", _f32), ("min_samples", _u32),
-                ("mist_start", _f32), ("mist_depth", _f32), ("mist_falloff", _f32),
-                ("cryptomattes", _u32), ("cryptomatte_depth", _u32), ("aov_value_count", _u32),
-                ("aov_color_count", _u32), ("light_group_count", _u32)]
-
-
-class _RenderProgress(_Struct):
-    _fields_ = [("struct_size", _u32), ("state", _u32), ("fraction", _f32), ("samples_done", _u32),
-                ("seconds", _f64), ("rays_camera", _u64), ("rays_shadow", _u64),
-                ("rays_reflection", _u64), ("rays_refraction", _u64), ("dropped_samples", _u64),
-                ("memory_bytes", _u64), ("peak_memory_bytes", _u64), ("tiles_done", _u32),
-                ("tile_count", _u32), ("version", _u32), ("reserved", _u32), ("seconds_trace", _f64),
-                ("seconds_shade", _f64), ("seconds_other", _f64)]
-
-    @property
-    def ray_count(self):
-        """Rays of every kind traced so far."""
-        return self.rays_camera + self.rays_shadow + self.rays_reflection + self.rays_refraction
-
-
-_STRUCTS = {
-    "trc_corner_attribute": _CornerAttribute, "trc_mesh_desc": _MeshDesc,
-    "trc_instance_desc": _InstanceDesc, "trc_light_desc": _LightDesc, "trc_world_desc": _WorldDesc,
-    "trc_camera_desc": _CameraDesc, "trc_node_input": _NodeInput, "trc_node": _Node,
-    "trc_material_desc": _MaterialDesc, "trc_image_desc": _ImageDesc, "trc_scene_desc": _SceneDesc,
-    "trc_reader_desc": _ReaderDesc,
-    "trc_scene_stats": _SceneStats, "trc_render_desc": _RenderDesc,
-    "trc_render_progress": _RenderProgress}
-
-_FUNCTIONS = {  # name: (result, arguments); a status result is checked by _call
-    "trc_version_string": (_str, ()), "trc_last_message": (_str, ()), "trc_isa": (_u32, ()),
-    "trc_isa_name": (_str, (_u32,)), "trc_pass_channels": (_u32, (_u32,)),
-    "trc_cryptomatte_id": (_f32, (_str,)),
-    "trc_reader_create": (_i32, (_ptr, _ptr)), "trc_reader_start": (_i32, (_u64,)),
-    "trc_reader_destroy": (_i32, (_u64,)),
-    "trc_scene_create": (_i32, (_ptr, _ptr)), "trc_scene_destroy": (_i32, (_u64,)),
-    "trc_scene_commit": (_i32, (_u64,)), "trc_scene_cancel": (_i32, (_u64,)),
-    "trc_scene_get_stats": (_i32, (_u64, _ptr)),
-    "trc_scene_get_warnings": (_i32, (_u64, _ptr, _u64, _ptr)),
-    "trc_scene_set_camera": (_i32, (_u64, _ptr)), "trc_scene_set_world": (_i32, (_u64, _ptr)),
-    "trc_mesh_create": (_i32, (_u64, _ptr, _ptr)),
-    "trc_mesh_update": (_i32, (_u64, _u64, _u32, _ptr, _u64, _ptr, _u64)),
-    "trc_mesh_destroy": (_i32, (_u64, _u64)),
-    "trc_instance_create": (_i32, (_u64, _ptr, _ptr)),
-    "trc_instance_update": (_i32, (_u64, _u64, _ptr)), "trc_instance_destroy": (_i32, (_u64, _u64)),
-    "trc_light_create": (_i32, (_u64, _ptr, _ptr)), "trc_light_update": (_i32, (_u64, _u64, _ptr)),
-    "trc_light_destroy": (_i32, (_u64, _u64)),
-    "trc_material_create": (_i32, (_u64, _ptr, _ptr)),
-    "trc_material_update": (_i32, (_u64, _u64, _ptr)), "trc_material_destroy": (_i32, (_u64, _u64)),
-    "trc_image_create": (_i32, (_u64, _ptr, _ptr)), "trc_image_destroy": (_i32, (_u64, _u64)),
-    "trc_image_expect": (_i32, (_u64, _ptr)),
-    "trc_render_start": (_i32, (_u64, _ptr, _ptr)), "trc_render_poll": (_i32, (_u64, _ptr)),
-    "trc_render_wait": (_i32, (_u64, _f64)), "trc_render_cancel": (_i32, (_u64,)),
-    "trc_render_read": (_i32, (_u64, _u32, _ptr, _u64)), "trc_render_destroy": (_i32, (_u64,))}
+from . import abi
+from .abi import AlphaMode, FeatureFlags, NormalsLayout, StatusCode
 
 
 class TracerError(Exception):
-    """A call of the library failed. ``status`` is its TRC_ERROR code, 0 when it could not be loaded."""
+    """A call of the library failed. ``status`` is its StatusCode, OK when it could not be loaded."""
 
     def __init__(self, status, message):
         super().__init__(message)
@@ -257,6 +35,7 @@ class TracerError(Exception):
 _library = None
 _load_error = "libtracer has not been loaded"
 _reader = 0  # of image files, for all scenes: its program is started once and not for each frame
+_defaults = {}  # class of a structure: the library's default, as bytes
 _owners = set()  # ids of the Scenes and Renders whose handles are alive
 
 
@@ -274,10 +53,10 @@ def load(path=None):
     path = path or library_path()
     try:
         library = ctypes.CDLL(path, mode=getattr(ctypes, "RTLD_LOCAL", 0))
-        _check_abi(library)
-        for name, (result, arguments) in _FUNCTIONS.items():
-            function = getattr(library, name)
-            function.restype, function.argtypes = result, arguments
+        check_abi(library)
+        _declare(library, abi.FUNCTIONS)
+        _defaults.update((structure, bytes(getattr(library, f"{name}_default")()))
+                         for name, structure in abi.STRUCTURES.items())
     except (OSError, AttributeError, TracerError) as error:
         _load_error = f"libtracer cannot be used ({path}): {error}"
         return False
@@ -297,8 +76,8 @@ def _create_reader():
             os.chmod(program, os.stat(program).st_mode | 0o111)
         except OSError:
             pass  # the library says that it cannot be started
-    handle, desc = _u64(), _ReaderDesc()
-    _call("trc_reader_create", ctypes.byref(desc), ctypes.byref(handle))
+    handle = ctypes.c_uint64()
+    _call("trc_reader_create", ctypes.byref(describe(abi.ReaderDesc)), ctypes.byref(handle))
     return handle.value
 
 
@@ -335,23 +114,43 @@ def description():
     return f"libtracer {library.trc_version_string().decode()}, {isa}"
 
 
-def _check_abi(library):
-    """Refuse a library of another interface: version first, then each descriptor's size."""
-    library.trc_abi_version.restype = _u32
+def _declare(library, names):
+    for name in names:
+        function = getattr(library, name)
+        function.restype, function.argtypes = abi.FUNCTIONS[name]
+
+
+def check_abi(library):
+    """Refuse a library of another interface: its version first, then all that abi.py states."""
+    _declare(library, ["trc_abi_version"])
     version = library.trc_abi_version()
-    if version != ABI_VERSION:
-        raise TracerError(0, f"its interface is version {version}, this add-on needs {ABI_VERSION}")
-    library.trc_struct_size.restype = _u32
-    library.trc_struct_size.argtypes = (_str,)
-    for name, struct in _STRUCTS.items():
-        size = library.trc_struct_size(name.encode())
-        if size != ctypes.sizeof(struct):
-            raise TracerError(0, f"{name} has {size} bytes, this add-on expects {ctypes.sizeof(struct)}")
+    if version != abi.ABI_VERSION:
+        raise TracerError(StatusCode.OK, f"its interface is version {version}, this add-on needs "
+                          f"{abi.ABI_VERSION}")
+    _declare(library, ["trc_abi_value"])
+    value = ctypes.c_int64()
+    for name, expected in _abi_values():
+        if library.trc_abi_value(name.encode(), ctypes.byref(value)) != StatusCode.OK:
+            raise TracerError(StatusCode.OK, f"it has no {name}, which this add-on needs")
+        if value.value != expected:
+            raise TracerError(StatusCode.OK, f"{name} is {value.value}, this add-on expects {expected}")
+
+
+def _abi_values():
+    """All that abi.py states: (name in C, number) of values, sizes of structures and offsets of fields."""
+    yield from abi.CONSTANTS.items()
+    for enumeration, prefix in abi.ENUMERATIONS.items():
+        for name, member in enumeration.__members__.items():
+            yield prefix + name, int(member)
+    for name, structure in abi.STRUCTURES.items():
+        yield name, ctypes.sizeof(structure)
+        for field, _ in structure._fields_:
+            yield f"{name}.{field}", getattr(structure, field).offset
 
 
 def _require():
     if _library is None:
-        raise TracerError(0, _load_error)
+        raise TracerError(StatusCode.OK, _load_error)
     return _library
 
 
@@ -359,10 +158,23 @@ def _call(name, *arguments):
     """Call a function that returns a status; raise on anything but TRC_OK."""
     library = _require()
     status = getattr(library, name)(*arguments)
-    if status != OK:
+    if status != StatusCode.OK:
         message = (library.trc_last_message() or b"").decode("utf-8", "replace")
-        known = STATUS_NAMES[status] if 0 <= status < len(STATUS_NAMES) else f"status {status}"
-        raise TracerError(status, message or f"{name}: {known}")
+        raise TracerError(status, message or f"{name}: status {status}")
+
+
+def describe(structure, **values):
+    """A structure of abi.py as the library's default, with these fields changed."""
+    desc = structure.from_buffer_copy(_defaults[structure])
+    for name, value in values.items():
+        setattr(desc, name, value)
+    return desc
+
+
+def ray_count(progress):
+    """Rays of every kind that a render has traced so far."""
+    return (progress.rays_camera + progress.rays_shadow + progress.rays_reflection
+            + progress.rays_refraction)
 
 
 def _array(values, dtype):
@@ -401,9 +213,10 @@ class Scene:
     """A scene of the library. Ids are plain integers; 0 stands for "none"."""
 
     def __init__(self, is_final=True, thread_count=0, image_megabytes=0):
-        handle = _u64()
-        desc = _SceneDesc(thread_count=thread_count, is_final=int(is_final),
-                          image_megabytes=image_megabytes, reader=_reader)
+        _require()
+        handle = ctypes.c_uint64()
+        desc = describe(abi.SceneDesc, thread_count=thread_count, is_final=int(is_final),
+                        image_megabytes=image_megabytes, reader=_reader)
         _call("trc_scene_create", ctypes.byref(desc), ctypes.byref(handle))
         self._handle = handle.value
         _owners.add(id(self))
@@ -426,18 +239,18 @@ class Scene:
 
     def stats(self):
         """The statistics of the last commit (fields of trc_scene_stats)."""
-        stats = _SceneStats()
+        stats = describe(abi.SceneStats)
         _call("trc_scene_get_stats", self._handle, ctypes.byref(stats))
         return stats
 
     def features(self):
         """Names of what the committed scene uses."""
         bits = self.stats().features
-        return [name for i, name in enumerate(FEATURE_NAMES) if bits >> i & 1]
+        return [feature.name.lower().replace("_", " ") for feature in FeatureFlags if bits & feature]
 
     def warnings(self):
         """Warnings of the last commit, a list of strings."""
-        size = _u64()
+        size = ctypes.c_uint64()
         _call("trc_scene_get_warnings", self._handle, None, 0, ctypes.byref(size))
         buffer = ctypes.create_string_buffer(max(1, size.value))
         _call("trc_scene_get_warnings", self._handle, buffer, len(buffer), None)
@@ -445,7 +258,7 @@ class Scene:
 
     # Meshes
 
-    def create_mesh(self, positions, indices, normals=None, normal_kind=NORMALS_NONE, smooth=None,
+    def create_mesh(self, positions, indices, normals=None, normal_kind=NormalsLayout.NONE, smooth=None,
                     material_index=None, attributes=(), generated=None):
         """A mesh. positions (keys, vertices, 3) float32; indices (triangles, 3) uint32; normals
         (keys, vertices | triangles * 3, 3); smooth (triangles,) uint8; material_index (triangles,)
@@ -455,18 +268,18 @@ class Scene:
         normals, smooth = _array(normals, np.float32), _array(smooth, np.uint8)
         material_index, generated = _array(material_index, np.uint16), _array(generated, np.float32)
         arrays = [(_text(name) or b"", _array(values, np.float32)) for name, values in attributes]
-        structs = (_CornerAttribute * max(1, len(arrays)))(*(
-            _CornerAttribute(width=values.shape[-1], name=name, values=_address(values),
-                             value_count=values.size) for name, values in arrays))
-        desc = _MeshDesc(
-            key_count=positions.shape[0], vertex_count=positions.shape[1], triangle_count=len(indices),
-            positions=_address(positions), position_count=positions.size, indices=_address(indices),
-            index_count=indices.size, normals=_address(normals),
+        structs = (abi.CornerAttribute * len(arrays))(*(
+            describe(abi.CornerAttribute, width=values.shape[-1], name=name, values=_address(values),
+                     value_count=values.size) for name, values in arrays))
+        desc = describe(
+            abi.MeshDesc, key_count=positions.shape[0], vertex_count=positions.shape[1],
+            triangle_count=len(indices), positions=_address(positions), position_count=positions.size,
+            indices=_address(indices), index_count=indices.size, normals=_address(normals),
             normal_count=0 if normals is None else normals.size,
-            normal_kind=NORMALS_NONE if normals is None else normal_kind,
+            normal_kind=NormalsLayout.NONE if normals is None else normal_kind,
             attribute_count=len(arrays), smooth=_address(smooth),
             material_index=_address(material_index),
-            attributes=ctypes.addressof(structs) if arrays else None, generated=_address(generated),
+            attributes=structs if arrays else None, generated=_address(generated),
             generated_count=0 if generated is None else generated.size)
         return self._create("trc_mesh_create", desc)
 
@@ -487,9 +300,8 @@ class Scene:
         return self._create("trc_instance_create", desc)
 
     def update_instance(self, instance, **values):
-        """mesh: id; transforms (keys, 12) float32; materials: ids by slot; visibility; pass_index;
-        random [0, 1); color: four floats; cryptomatte_object and cryptomatte_asset: ids; light_group: of
-        its emission, 0 for none; flags: INSTANCE_*; values: numbers that its materials ask for."""
+        """transforms (keys, 12) float32; materials: ids by slot; values: numbers that its materials ask for;
+        other keywords are fields of trc_instance_desc."""
         desc, keep = self._instance_desc(**values)
         self._edit("trc_instance_update", instance, ctypes.byref(desc))
 
@@ -497,35 +309,31 @@ class Scene:
         self._edit("trc_instance_destroy", instance)
 
     @staticmethod
-    def _instance_desc(mesh, transforms, materials=(), visibility=VISIBLE_ALL, pass_index=0,
-                       random=0.0, color=(1.0, 1.0, 1.0, 1.0), cryptomatte_object=0.0,
-                       cryptomatte_asset=0.0, light_group=0, flags=0, values=()):
+    def _instance_desc(transforms, materials=(), values=(), **fields):
         transforms = _array(transforms, np.float32).reshape(-1, 12)
         ids = np.array(materials, dtype=np.uint64)
         numbers = np.array(values, dtype=np.float32)
-        desc = _InstanceDesc(
-            key_count=len(transforms), mesh=mesh, transforms=_address(transforms),
-            materials=_address(ids), material_count=len(ids), visibility=visibility,
-            pass_index=pass_index, random=random, color=tuple(color),
-            cryptomatte_object=cryptomatte_object, cryptomatte_asset=cryptomatte_asset,
-            light_group=light_group, flags=flags, values=_address(numbers), value_count=len(numbers))
+        desc = describe(
+            abi.InstanceDesc, key_count=len(transforms), transforms=_address(transforms),
+            materials=_address(ids), material_count=len(ids), values=_address(numbers),
+            value_count=len(numbers), **fields)
         return desc, (transforms, ids, numbers)
 
     # Lights, world, camera
 
     def create_light(self, **values):
         """A light; keywords are the fields of trc_light_desc (transform: 12 floats)."""
-        return self._create("trc_light_create", _LightDesc(**values))
+        return self._create("trc_light_create", describe(abi.LightDesc, **values))
 
     def update_light(self, light, **values):
-        self._edit("trc_light_update", light, ctypes.byref(_LightDesc(**values)))
+        self._edit("trc_light_update", light, ctypes.byref(describe(abi.LightDesc, **values)))
 
     def destroy_light(self, light):
         self._edit("trc_light_destroy", light)
 
     def set_world(self, **values):
         """Keywords are the fields of trc_world_desc."""
-        self._edit("trc_scene_set_world", ctypes.byref(_WorldDesc(**values)))
+        self._edit("trc_scene_set_world", ctypes.byref(describe(abi.WorldDesc, **values)))
 
     def set_camera(self, transforms, windows, shutter_curve=None, **values):
         """transforms (keys, 12); windows (keys or 1, 4): left, right, bottom, top; shutter_curve:
@@ -533,9 +341,9 @@ class Scene:
         transforms = _array(transforms, np.float32).reshape(-1, 12)
         windows = _array(windows, np.float32).reshape(-1, 4)
         curve = _array(shutter_curve, np.float32)
-        desc = _CameraDesc(
-            key_count=len(transforms), transforms=_address(transforms), windows=_address(windows),
-            window_key_count=len(windows), shutter_curve=_address(curve),
+        desc = describe(
+            abi.CameraDesc, key_count=len(transforms), transforms=_address(transforms),
+            windows=_address(windows), window_key_count=len(windows), shutter_curve=_address(curve),
             shutter_curve_count=0 if curve is None else len(curve), **values)
         self._edit("trc_scene_set_camera", ctypes.byref(desc))
 
@@ -562,17 +370,17 @@ class Scene:
         for node in nodes:
             table = _array(node.table, np.float32)
             keep.append(table)
-            structs.append(_Node(
+            structs.append(abi.Node(
                 type=node.type, mode=node.mode, first_input=len(inputs), input_count=len(node.inputs),
                 image=node.image, name=_text(node.name), table=_address(table),
                 table_count=0 if table is None else table.size))
-            inputs += [_NodeInput(node=source, output=output, value=tuple(value))
+            inputs += [abi.NodeInput(node=source, output=output, value=tuple(value))
                        for source, output, value in node.inputs]
-        structs, inputs = (_Node * len(structs))(*structs), (_NodeInput * len(inputs))(*inputs)
-        desc = _MaterialDesc(
-            node_count=len(structs), nodes=ctypes.addressof(structs) if len(structs) else None,
-            inputs=ctypes.addressof(inputs) if len(inputs) else None, input_count=len(inputs),
-            surface=surface, **values)
+        structs, inputs = (abi.Node * len(structs))(*structs), (abi.NodeInput * len(inputs))(*inputs)
+        desc = describe(
+            abi.MaterialDesc, node_count=len(structs), nodes=structs if len(structs) else None,
+            inputs=inputs if len(inputs) else None, input_count=len(inputs), surface=surface,
+            **values)
         return desc, (keep, structs, inputs)
 
     def create_image(self, **values):
@@ -588,14 +396,14 @@ class Scene:
         _call("trc_image_expect", self._handle, ctypes.byref(desc))
 
     @staticmethod
-    def _image_desc(pixels=None, path=None, alpha_mode=ALPHA_STRAIGHT, is_srgb=False,
+    def _image_desc(pixels=None, path=None, alpha_mode=AlphaMode.STRAIGHT, is_srgb=False,
                     color_space=(None, None), max_side=0, is_mip_mapped=False):
         """path: absolute; color_space: a configuration of OpenColorIO and a name in it; max_side: pixels, to
         which a larger one is halved, 0 for none; is_mip_mapped: with smaller levels for minification."""
         config, space = color_space[0] and os.fsencode(color_space[0]), _text(color_space[1])
-        desc = _ImageDesc(alpha_mode=alpha_mode, is_srgb=int(is_srgb), path=path and os.fsencode(path),
-                          color_config=config, color_space=space, max_side=max_side,
-                          is_mip_mapped=int(is_mip_mapped))
+        desc = describe(abi.ImageDesc, alpha_mode=alpha_mode, is_srgb=int(is_srgb),
+                        path=path and os.fsencode(path), color_config=config, color_space=space,
+                        max_side=max_side, is_mip_mapped=int(is_mip_mapped))
         if pixels is not None:
             pixels = np.ascontiguousarray(pixels)
             desc.height, desc.width = pixels.shape[:2]
@@ -609,14 +417,14 @@ class Scene:
     def start_render(self, **values):
         """Start rendering the committed scene in the background; keywords are the fields of
         trc_render_desc. Returns a :class:`Render`."""
-        handle = _u64()
-        desc = _RenderDesc(**values)
+        handle = ctypes.c_uint64()
+        desc = describe(abi.RenderDesc, **values)
         _call("trc_render_start", self._handle, ctypes.byref(desc), ctypes.byref(handle))
         size = (desc.crop_width or desc.width, desc.crop_height or desc.height)
         return Render(handle.value, size)
 
     def _create(self, function, desc):
-        new_id = _u64()
+        new_id = ctypes.c_uint64()
         self._edit(function, ctypes.byref(desc), ctypes.byref(new_id))
         return new_id.value
 
@@ -635,7 +443,7 @@ class Render:
 
     def poll(self):
         """How far it is (fields of trc_render_progress)."""
-        progress = _RenderProgress()
+        progress = describe(abi.RenderProgress)
         _call("trc_render_poll", self._handle, ctypes.byref(progress))
         return progress
 

@@ -5,56 +5,62 @@ from collections import namedtuple
 
 import numpy as np
 
+from .abi import (CRYPTOMATTE_LAYER_RANKS, MAX_AOVS, MAX_CRYPTOMATTE_DEPTH, MAX_CRYPTOMATTE_LAYERS,
+                  MAX_LIGHT_GROUPS, CryptomatteKind, PassId, PassRange)
 from .compat import HAS_LONG_PASS_NAMES
 
-# index: TRC_PASS_*; names: before 5.0 and since; channels: one letter each; kind: as Blender's;
-# setting: path below the view layer.
+# index: a PassId, or a number from a PassRange on; names: before 5.0 and since; channels: one letter
+# each; kind: as Blender's; setting: path below the view layer.
 Pass = namedtuple("Pass", "index names channels kind setting")
 
 PASSES = (
-    Pass(0, ("Combined", "Combined"), "RGBA", 'COLOR', "use_pass_combined"),
-    Pass(1, ("Depth", "Depth"), "Z", 'VALUE', "use_pass_z"),
-    Pass(3, ("Position", "Position"), "XYZ", 'VECTOR', "use_pass_position"),
-    Pass(2, ("Normal", "Normal"), "XYZ", 'VECTOR', "use_pass_normal"),
-    Pass(23, ("Vector", "Vector"), "XYZW", 'VECTOR', "use_pass_vector"),
-    Pass(4, ("UV", "UV"), "UVA", 'VECTOR', "use_pass_uv"),
-    Pass(5, ("IndexOB", "Object Index"), "X", 'VALUE', "use_pass_object_index"),
-    Pass(6, ("IndexMA", "Material Index"), "X", 'VALUE', "use_pass_material_index"),
-    Pass(9, ("DiffDir", "Diffuse Direct"), "RGB", 'COLOR', "use_pass_diffuse_direct"),
-    Pass(10, ("DiffInd", "Diffuse Indirect"), "RGB", 'COLOR', "use_pass_diffuse_indirect"),
-    Pass(11, ("DiffCol", "Diffuse Color"), "RGB", 'COLOR', "use_pass_diffuse_color"),
-    Pass(12, ("GlossDir", "Glossy Direct"), "RGB", 'COLOR', "use_pass_glossy_direct"),
-    Pass(13, ("GlossInd", "Glossy Indirect"), "RGB", 'COLOR', "use_pass_glossy_indirect"),
-    Pass(14, ("GlossCol", "Glossy Color"), "RGB", 'COLOR', "use_pass_glossy_color"),
-    Pass(15, ("TransDir", "Transmission Direct"), "RGB", 'COLOR', "use_pass_transmission_direct"),
-    Pass(16, ("TransInd", "Transmission Indirect"), "RGB", 'COLOR', "use_pass_transmission_indirect"),
-    Pass(17, ("TransCol", "Transmission Color"), "RGB", 'COLOR', "use_pass_transmission_color"),
-    Pass(7, ("Emit", "Emission"), "RGB", 'COLOR', "use_pass_emit"),
-    Pass(8, ("Env", "Environment"), "RGB", 'COLOR', "use_pass_environment"),
-    Pass(24, ("AO", "Ambient Occlusion"), "RGB", 'COLOR', "use_pass_ambient_occlusion"),
-    Pass(25, ("Shadow", "Shadow"), "RGB", 'COLOR', "use_pass_shadow"),
-    Pass(26, ("Shadow Catcher", "Shadow Catcher"), "RGB", 'COLOR', "volley.use_pass_shadow_catcher"),
-    Pass(19, ("Mist", "Mist"), "Z", 'VALUE', "use_pass_mist"),
-    Pass(20, ("Denoising Albedo", "Denoising Albedo"), "RGB", 'COLOR', "volley.denoising_store_passes"),
-    Pass(21, ("Denoising Normal", "Denoising Normal"), "XYZ", 'VECTOR', "volley.denoising_store_passes"),
-    Pass(22, ("Denoising Depth", "Denoising Depth"), "Z", 'VALUE', "volley.denoising_store_passes"),
-    Pass(18, ("Debug Sample Count", "Debug Sample Count"), "X", 'VALUE',
+    Pass(PassId.COMBINED, ("Combined", "Combined"), "RGBA", 'COLOR', "use_pass_combined"),
+    Pass(PassId.DEPTH, ("Depth", "Depth"), "Z", 'VALUE', "use_pass_z"),
+    Pass(PassId.POSITION, ("Position", "Position"), "XYZ", 'VECTOR', "use_pass_position"),
+    Pass(PassId.NORMAL, ("Normal", "Normal"), "XYZ", 'VECTOR', "use_pass_normal"),
+    Pass(PassId.VECTOR, ("Vector", "Vector"), "XYZW", 'VECTOR', "use_pass_vector"),
+    Pass(PassId.UV, ("UV", "UV"), "UVA", 'VECTOR', "use_pass_uv"),
+    Pass(PassId.OBJECT_INDEX, ("IndexOB", "Object Index"), "X", 'VALUE', "use_pass_object_index"),
+    Pass(PassId.MATERIAL_INDEX, ("IndexMA", "Material Index"), "X", 'VALUE', "use_pass_material_index"),
+    Pass(PassId.DIFFUSE_DIRECT, ("DiffDir", "Diffuse Direct"), "RGB", 'COLOR', "use_pass_diffuse_direct"),
+    Pass(PassId.DIFFUSE_INDIRECT, ("DiffInd", "Diffuse Indirect"), "RGB", 'COLOR',
+         "use_pass_diffuse_indirect"),
+    Pass(PassId.DIFFUSE_COLOR, ("DiffCol", "Diffuse Color"), "RGB", 'COLOR', "use_pass_diffuse_color"),
+    Pass(PassId.GLOSSY_DIRECT, ("GlossDir", "Glossy Direct"), "RGB", 'COLOR', "use_pass_glossy_direct"),
+    Pass(PassId.GLOSSY_INDIRECT, ("GlossInd", "Glossy Indirect"), "RGB", 'COLOR', "use_pass_glossy_indirect"),
+    Pass(PassId.GLOSSY_COLOR, ("GlossCol", "Glossy Color"), "RGB", 'COLOR', "use_pass_glossy_color"),
+    Pass(PassId.TRANSMISSION_DIRECT, ("TransDir", "Transmission Direct"), "RGB", 'COLOR',
+         "use_pass_transmission_direct"),
+    Pass(PassId.TRANSMISSION_INDIRECT, ("TransInd", "Transmission Indirect"), "RGB", 'COLOR',
+         "use_pass_transmission_indirect"),
+    Pass(PassId.TRANSMISSION_COLOR, ("TransCol", "Transmission Color"), "RGB", 'COLOR',
+         "use_pass_transmission_color"),
+    Pass(PassId.EMISSION, ("Emit", "Emission"), "RGB", 'COLOR', "use_pass_emit"),
+    Pass(PassId.ENVIRONMENT, ("Env", "Environment"), "RGB", 'COLOR', "use_pass_environment"),
+    Pass(PassId.AMBIENT_OCCLUSION, ("AO", "Ambient Occlusion"), "RGB", 'COLOR', "use_pass_ambient_occlusion"),
+    Pass(PassId.SHADOW, ("Shadow", "Shadow"), "RGB", 'COLOR', "use_pass_shadow"),
+    Pass(PassId.SHADOW_CATCHER, ("Shadow Catcher", "Shadow Catcher"), "RGB", 'COLOR',
+         "volley.use_pass_shadow_catcher"),
+    Pass(PassId.MIST, ("Mist", "Mist"), "Z", 'VALUE', "use_pass_mist"),
+    Pass(PassId.DENOISING_ALBEDO, ("Denoising Albedo", "Denoising Albedo"), "RGB", 'COLOR',
+         "volley.denoising_store_passes"),
+    Pass(PassId.DENOISING_NORMAL, ("Denoising Normal", "Denoising Normal"), "XYZ", 'VECTOR',
+         "volley.denoising_store_passes"),
+    Pass(PassId.DENOISING_DEPTH, ("Denoising Depth", "Denoising Depth"), "Z", 'VALUE',
+         "volley.denoising_store_passes"),
+    Pass(PassId.SAMPLE_COUNT, ("Debug Sample Count", "Debug Sample Count"), "X", 'VALUE',
          "volley.use_pass_sample_count"),
 )
 COMBINED = PASSES[0]
 
-# By TRC_CRYPTOMATTE_*: name, setting of the view layer.
-CRYPTOMATTES = (("CryptoObject", "use_pass_cryptomatte_object"),
-                ("CryptoMaterial", "use_pass_cryptomatte_material"),
-                ("CryptoAsset", "use_pass_cryptomatte_asset"))
-_FIRST_CRYPTOMATTE, _MOST_LAYERS = 128, 8  # TRC_PASS_CRYPTOMATTE
-_LAYER_RANKS = 2
+# Name, setting of the view layer.
+CRYPTOMATTES = {CryptomatteKind.OBJECT: ("CryptoObject", "use_pass_cryptomatte_object"),
+                CryptomatteKind.MATERIAL: ("CryptoMaterial", "use_pass_cryptomatte_material"),
+                CryptomatteKind.ASSET: ("CryptoAsset", "use_pass_cryptomatte_asset")}
 
-# By the type of an AOV: TRC_PASS_AOV_*, channels, kind of pass.
-_AOVS = {'VALUE': (64, "X", 'VALUE'), 'COLOR': (80, "RGBA", 'COLOR')}
-_MOST_AOVS = 16
-
-_FIRST_LIGHT_GROUP, _MOST_LIGHT_GROUPS = 96, 32  # TRC_PASS_LIGHT_GROUP
+# By the type of an AOV: number of the first, channels, kind of pass.
+_AOVS = {'VALUE': (PassRange.FIRST_AOV_VALUE, "X", 'VALUE'),
+         'COLOR': (PassRange.FIRST_AOV_COLOR, "RGBA", 'COLOR')}
 
 
 def name_of(entry, long_names=HAS_LONG_PASS_NAMES):
@@ -83,7 +89,7 @@ def aov_numbers(view_layer):
     """{name: (type, number among those of its type)} of the AOVs that a view layer asks for."""
     numbers, counts = {}, dict.fromkeys(_AOVS, 0)
     for aov in view_layer.aovs:
-        if aov.is_valid and counts[aov.type] < _MOST_AOVS:
+        if aov.is_valid and counts[aov.type] < MAX_AOVS:
             numbers[aov.name] = aov.type, counts[aov.type]
             counts[aov.type] += 1
     return numbers
@@ -97,7 +103,7 @@ def _aovs(view_layer):
 
 def light_group_numbers(view_layer):
     """{name: number from 1 on} of the light groups of a view layer."""
-    names = [group.name for group in view_layer.lightgroups[:_MOST_LIGHT_GROUPS]]
+    names = [group.name for group in view_layer.lightgroups[:MAX_LIGHT_GROUPS]]
     return {name: number + 1 for number, name in enumerate(names)}
 
 
@@ -106,25 +112,25 @@ def left_out(view_layer):
     aovs = [aov.name for aov in view_layer.aovs if aov.is_valid]
     groups = [group.name for group in view_layer.lightgroups]
     kept_aovs, kept_groups = aov_numbers(view_layer), light_group_numbers(view_layer)
-    return [f"AOV '{name}': there are more than {_MOST_AOVS} of its type, it is left out"
+    return [f"AOV '{name}': there are more than {MAX_AOVS} of its type, it is left out"
             for name in aovs if name not in kept_aovs] + [
-        f"Light group '{name}': there are more than {_MOST_LIGHT_GROUPS}, it is left out"
+        f"Light group '{name}': there are more than {MAX_LIGHT_GROUPS}, it is left out"
         for name in groups if name not in kept_groups]
 
 
 def _light_groups(view_layer):
     for name, number in light_group_numbers(view_layer).items():
-        yield Pass(_FIRST_LIGHT_GROUP + number - 1, (f"Combined_{name}",) * 2, "RGB", 'COLOR',
+        yield Pass(PassRange.FIRST_LIGHT_GROUP + number - 1, (f"Combined_{name}",) * 2, "RGB", 'COLOR',
                    "lightgroups")
 
 
 def _cryptomatte_layers(view_layer):
     """Channels in small letters: so Blender's OpenEXR writer knows that they must not be changed."""
-    ranks = min(view_layer.pass_cryptomatte_depth, _LAYER_RANKS * _MOST_LAYERS)
-    for kind, (name, setting) in enumerate(CRYPTOMATTES):
+    ranks = min(view_layer.pass_cryptomatte_depth, MAX_CRYPTOMATTE_DEPTH)
+    for kind, (name, setting) in CRYPTOMATTES.items():
         if getattr(view_layer, setting):
-            for layer in range((ranks + 1) // _LAYER_RANKS):
-                index = _FIRST_CRYPTOMATTE + kind * _MOST_LAYERS + layer
+            for layer in range((ranks + 1) // CRYPTOMATTE_LAYER_RANKS):
+                index = PassRange.FIRST_CRYPTOMATTE + kind * MAX_CRYPTOMATTE_LAYERS + layer
                 yield Pass(index, (f"{name}{layer:02d}",) * 2, "rgba", 'COLOR', setting)
 
 
@@ -149,17 +155,17 @@ def without_vector(entries):
 
 def request_fields(entries):
     """The passes as fields of trc_render_desc."""
-    layers = [divmod(entry.index - _FIRST_CRYPTOMATTE, _MOST_LAYERS) for entry in entries
-              if entry.index >= _FIRST_CRYPTOMATTE]
-    aov_counts = [sum(first <= entry.index < first + _MOST_AOVS for entry in entries)
+    layers = [divmod(entry.index - PassRange.FIRST_CRYPTOMATTE, MAX_CRYPTOMATTE_LAYERS) for entry in entries
+              if entry.index >= PassRange.FIRST_CRYPTOMATTE]
+    aov_counts = [sum(first <= entry.index < first + MAX_AOVS for entry in entries)
                   for first, _, _ in _AOVS.values()]
     return {
-        "passes": sum(1 << entry.index for entry in entries if entry.index < _AOVS['VALUE'][0]),
+        "passes": sum(1 << entry.index for entry in entries if entry.index < PassId.COUNT),
         "aov_value_count": aov_counts[0], "aov_color_count": aov_counts[1],
-        "light_group_count": sum(_FIRST_LIGHT_GROUP <= entry.index < _FIRST_CRYPTOMATTE
+        "light_group_count": sum(PassRange.FIRST_LIGHT_GROUP <= entry.index < PassRange.FIRST_CRYPTOMATTE
                                  for entry in entries),
         "cryptomattes": sum(1 << kind for kind in {kind for kind, _ in layers}),
-        "cryptomatte_depth": _LAYER_RANKS * max((layer + 1 for _, layer in layers), default=0),
+        "cryptomatte_depth": CRYPTOMATTE_LAYER_RANKS * max((layer + 1 for _, layer in layers), default=0),
     }
 
 

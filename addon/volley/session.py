@@ -9,7 +9,7 @@ import time
 
 import bpy
 
-from . import cryptomatte, jobs, native, passes
+from . import abi, cryptomatte, jobs, native, passes
 from .commit import Commit
 from .compat import motion_position
 from .log import logger
@@ -126,7 +126,7 @@ class Session:
         try:
             commit.check()
         except native.TracerError as error:
-            if error.status == native.ERROR_CANCELLED:
+            if error.status == abi.StatusCode.ERROR_CANCELLED:
                 raise Cancelled() from error
             raise
 
@@ -145,7 +145,7 @@ class CameraMotion:
         self._view_names = view_names
         self.count = 1
         if engine.camera_override is None:
-            raise native.TracerError(native.ERROR_INVALID_ARGUMENT, "the scene has no camera")
+            raise native.TracerError(abi.StatusCode.ERROR_INVALID_ARGUMENT, "the scene has no camera")
         if shutter is not None:
             self.count = motion.key_count(engine.camera_override)
         self.keys = {}
@@ -192,14 +192,12 @@ class _Run:
                     render.cancel()
                     render.wait(-1.0)
                 progress = render.poll()
-                is_done = progress.state != native.STATE_RUNNING
+                is_done = progress.state != abi.ProgressState.RUNNING
                 self._show_progress(progress, is_done)
                 if not is_done:
                     self._show_picture(progress, result, layer, entries)
-            if progress.state == native.STATE_FAILED:
-                raise native.TracerError(native.ERROR_OUT_OF_MEMORY, "the render failed")
             passes.write(render, layer, entries)
-            logger.debug("%d rays in %.3f s; the scene has: %s", progress.ray_count, progress.seconds,
+            logger.debug("%d rays in %.3f s; the scene has: %s", native.ray_count(progress), progress.seconds,
                          ", ".join(self._features))
         finally:
             engine.end_result(result)
@@ -229,7 +227,7 @@ class _Run:
 def status_text(progress, sample_count):
     """What is to be said of a running render, in the words of Cycles."""
     samples = f"Sample {progress.samples_done}/{sample_count}"
-    if progress.state != native.STATE_RUNNING or not 0.0 < progress.fraction < 1.0:
+    if progress.state != abi.ProgressState.RUNNING or not 0.0 < progress.fraction < 1.0:
         return samples
     remaining = progress.seconds * (1.0 / progress.fraction - 1.0)
     return f"Remaining:{timecode(remaining)} | {samples}"
@@ -269,7 +267,7 @@ def render_fields(scene, frame, crop, entries, is_preview=False):
     return {
         "width": frame.width, "height": frame.height,
         "crop_x": crop[0], "crop_y": crop[1], "crop_width": crop[2], "crop_height": crop[3],
-        "integrator": native.INTEGRATORS[settings.integrator],
+        "integrator": abi.IntegratorType[settings.integrator],
         "sample_count": settings.preview_samples if is_preview else settings.samples,
         "light_samples": settings.light_samples,
         "max_depth": settings.max_depth, "max_transparent_depth": settings.max_transparent_depth,
@@ -277,10 +275,10 @@ def render_fields(scene, frame, crop, entries, is_preview=False):
         "max_transmission_depth": settings.max_transmission_depth,
         "attenuation_cutoff": settings.attenuation_cutoff, "filter_glossy": settings.filter_glossy,
         "clamp_direct": settings.clamp_direct, "clamp_indirect": settings.clamp_indirect,
-        "assembly": native.ASSEMBLIES[settings.assembly],
+        "assembly": abi.AssemblyType[settings.assembly],
         "packet_size": 0 if settings.packet_size == 'AUTO' else int(settings.packet_size),
-        "sampler": native.SAMPLERS[settings.sampler], "seed": seed & 0xFFFFFFFF,
-        "filter": native.FILTERS[settings.pixel_filter_type], "filter_width": settings.filter_width,
+        "sampler": abi.SamplerType[settings.sampler], "seed": seed & 0xFFFFFFFF,
+        "filter": abi.FilterType[settings.pixel_filter_type], "filter_width": settings.filter_width,
         "film_transparent": int(scene.render.film_transparent),
         "film_exposure": settings.film_exposure, **passes.request_fields(entries),
         "thread_count": thread_count(scene.render), **_adaptive_fields(settings, is_preview),

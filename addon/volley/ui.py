@@ -395,7 +395,7 @@ class VOLLEY_VIEWLAYER_PT_passes_cryptomatte(_PassesPanel, Panel):
 
     def draw(self, context):
         view_layer, layout = context.view_layer, _column(self)
-        settings = [setting for _, setting in passes.CRYPTOMATTES]
+        settings = [setting for _, setting in passes.CRYPTOMATTES.values()]
         column = layout.column()
         for setting in settings:
             column.prop(view_layer, setting, text=setting.rpartition("_")[2].title())

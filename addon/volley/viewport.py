@@ -17,7 +17,7 @@ import gpu
 import numpy as np
 from gpu_extras.presets import draw_texture_2d
 
-from . import native, passes, writes
+from . import abi, native, passes, writes
 from .commit import Commit
 from .session import render_fields, status_text, thread_count, timecode
 from .sync import SceneSync, Source, camera
@@ -173,7 +173,7 @@ class _Pictures:
                                is_preview=True)
         fields["progressive"] = 1
         if scene.volley.sampler == 'SOBOL':
-            fields["sampler"] = native.SAMPLERS['BLUE_NOISE']
+            fields["sampler"] = abi.SamplerType['BLUE_NOISE']
         wanted = (sync.scene.revision, view.signature, tuple(sorted(fields.items())),
                   scene.render.preview_pixel_size)
         if wanted == self._wanted:
@@ -226,7 +226,7 @@ class _Pictures:
             self._render.wait(self._patience)
             self._patience = NAP_SECONDS
         progress = self._progress = self._render.poll()
-        is_running = progress.state == native.STATE_RUNNING
+        is_running = progress.state == abi.ProgressState.RUNNING
         shown = min(SHOWN_SAMPLES, self._samples)
         now = time.monotonic()
         if progress.samples_done >= shown and progress.version != self._version and (

@@ -10,7 +10,6 @@ vertices have moved; a picture. The exit code is 1 where one trial of a hundred 
 """
 
 import argparse
-import importlib.util
 import os
 import pathlib
 import random
@@ -21,16 +20,16 @@ import time
 import numpy as np
 
 PROJECT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(PROJECT / "tests" / "support"))
+import addon_modules  # noqa: E402
+
 LIMIT_MS = 100.0
 
 
 def load_native():
     """The add-on's module that knows the library, without Blender."""
     build = pathlib.Path(os.environ.get("VOLLEY_BUILD", PROJECT / "build"))
-    path = build / "blender" / "addons" / "volley" / "native.py"
-    spec = importlib.util.spec_from_file_location("volley_native", path)
-    native = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(native)
+    native = addon_modules.load("native", build / "blender" / "addons" / "volley")
     if not native.load():
         sys.exit(native.load_error())
     return native
@@ -57,7 +56,7 @@ def smooth_scene(native, positions, indices):
     scene.create_instance(mesh=mesh, transforms=identity)
     camera = identity.copy()
     camera[0, 11] = 3.0
-    scene.set_camera(camera, [(-0.4, 0.4, -0.3, 0.3)], type=native.CAMERA_PERSPECTIVE, clip_start=0.1,
+    scene.set_camera(camera, [(-0.4, 0.4, -0.3, 0.3)], clip_start=0.1,
                      clip_end=100.0, focus_distance=1.0, aperture_ratio=1.0)
     return scene, mesh
 
@@ -69,7 +68,7 @@ def cancel_commit(native, scene, delay):
     def work():
         try:
             scene.commit()
-            statuses.append(native.OK)
+            statuses.append(native.StatusCode.OK)
         except native.TracerError as error:
             statuses.append(error.status)
         ends.append(time.perf_counter())
@@ -80,7 +79,7 @@ def cancel_commit(native, scene, delay):
     begin = time.perf_counter()
     scene.cancel()
     worker.join()
-    return 1e3 * max(0.0, ends[0] - begin), statuses[0] == native.ERROR_CANCELLED
+    return 1e3 * max(0.0, ends[0] - begin), statuses[0] == native.StatusCode.ERROR_CANCELLED
 
 
 def cancel_render(scene, delay):

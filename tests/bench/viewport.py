@@ -104,7 +104,6 @@ class Follower:
     """Does what a viewport does, one step after the other, and keeps the times."""
 
     def __init__(self):
-        from volley import native
         from volley.sync import SceneSync
         from volley.sync.changes import Changes
         self._changes = Changes.everything()
@@ -130,7 +129,7 @@ class Follower:
 
     def follow(self, moves_view=False):
         """Sync, commit and render a first picture: a row of the table."""
-        from volley import viewport
+        from volley import native, viewport
         from volley.sync import Source
         from volley.sync.changes import Changes
         depsgraph = bpy.context.evaluated_depsgraph_get()
@@ -153,7 +152,7 @@ class Follower:
         return {"sent": dict(self._calls), "built": stats.built_count, "refitted": stats.refitted_count,
                 "sync_ms": 1e3 * (synced - start), "commit_ms": 1e3 * (committed - synced),
                 "tree_ms": 1e3 * stats.build_seconds, "first_ms": 1e3 * (shown - committed),
-                "divisor": divisor, "picture_ms": full_ms, "rays": progress.ray_count}
+                "divisor": divisor, "picture_ms": full_ms, "rays": native.ray_count(progress)}
 
     def _look(self, depsgraph, moves_view):
         from volley.sync import camera
@@ -171,12 +170,12 @@ class Follower:
 
     def _render(self, scene, divisor=1):
         """A picture of 1 / divisor the size; what its render took."""
-        from volley import native, passes, viewport
+        from volley import abi, passes, viewport
         from volley.session import render_fields
         from volley.sync import camera
         fields = render_fields(scene, camera.frame_of(scene.render), (0, 0) + PICTURE,
                                [passes.COMBINED], is_preview=True)
-        fields.update(sample_count=1, progressive=1, sampler=native.SAMPLERS['BLUE_NOISE'])
+        fields.update(sample_count=1, progressive=1, sampler=abi.SamplerType['BLUE_NOISE'])
         render = self._sync.scene.start_render(**viewport.divided(fields, divisor))
         render.wait(-1.0)
         passes.read_combined(render)

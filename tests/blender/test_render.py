@@ -266,7 +266,7 @@ def inside_cancel():
     """Press Esc during a render that would take minutes."""
     import escape
     import scenes
-    from volley import native
+    from volley import abi, native
     scenes.empty(size=(512, 384), samples=CANCELLED_SAMPLES)
     scenes.camera()
     _emission_walls()
@@ -280,8 +280,8 @@ def inside_cancel():
     escape.watch(lambda: bool(watched) and watched[-1].press())
     picture = scenes.render()
     render, = watched
-    return (render.calls, render.progress.state == native.STATE_CANCELLED, render.progress.ray_count,
-            float(picture[..., :3].max()))
+    return (render.calls, render.progress.state == abi.ProgressState.CANCELLED,
+            native.ray_count(render.progress), float(picture[..., :3].max()))
 
 
 def test_escape_stops_at_once_and_keeps_what_is_done(blender):

@@ -214,7 +214,7 @@ def inside_motion(position):
     import bpy
     import numpy as np
     import scenes
-    from volley import native
+    from volley import abi, native
     scenes.empty()
     made = scenes.camera()
     made.keyframe_insert("location", frame=1)
@@ -254,7 +254,7 @@ def inside_motion(position):
         pass
 
     def stop(*_, **__):
-        raise native.TracerError(native.ERROR_CANCELLED, "stopped by the test")
+        raise native.TracerError(abi.StatusCode.ERROR_CANCELLED, "stopped by the test")
 
     told.commit = stop
     told.warnings = lambda: []

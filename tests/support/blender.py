@@ -9,6 +9,7 @@ too). An exception inside, a crash or a time-out fails the test with Blender's o
     BLENDER_USER_SCRIPTS  the user-scripts folder of the build, else build/blender
 """
 
+import enum
 import functools
 import os
 import pickle
@@ -119,6 +120,13 @@ class Blender:
         return process
 
 
+class _Answers(pickle.Pickler):
+    """Without the add-on's classes, which only Blender can import: its enumerators become numbers."""
+
+    def reducer_override(self, value):
+        return (int, (int(value),)) if isinstance(value, (enum.IntEnum, enum.IntFlag)) else NotImplemented
+
+
 def _answer_request(path):
     """Inside Blender: import the test's module and call its function."""
     import importlib.util
@@ -128,7 +136,7 @@ def _answer_request(path):
 
     def finish(result, error=""):
         with open(answer, "wb") as file:
-            pickle.dump((result, error), file)
+            _Answers(file).dump((result, error))
 
     sys.path[:0] = [SUPPORT, os.path.dirname(module_path)]
     try:

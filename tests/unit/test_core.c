@@ -73,29 +73,26 @@ static void message_is_per_thread(void **state) {
     assert_string_equal(trc_last_message(), "mine");
 }
 
-static void sizes_and_versions(void **state) {
+static int64_t abi_value(const char *name) {
+    int64_t value = -77;
+    assert_int_equal(trc_abi_value(name, &value), TRC_OK);
+    return value;
+}
+
+static void versions_and_values(void **state) {
     (void)state;
     assert_int_equal(trc_abi_version(), TRC_ABI_VERSION);
     assert_string_equal(trc_version_string(), "0.1.0");
-    assert_int_equal(trc_struct_size("trc_mesh_desc"), sizeof(trc_mesh_desc));
-    assert_int_equal(trc_struct_size("trc_corner_attribute"), sizeof(trc_corner_attribute));
-    assert_int_equal(trc_struct_size("trc_instance_desc"), sizeof(trc_instance_desc));
-    assert_int_equal(trc_struct_size("trc_camera_desc"), sizeof(trc_camera_desc));
-    assert_int_equal(trc_struct_size("trc_light_desc"), sizeof(trc_light_desc));
-    assert_int_equal(trc_struct_size("trc_world_desc"), sizeof(trc_world_desc));
-    assert_int_equal(trc_struct_size("trc_node"), sizeof(trc_node));
-    assert_int_equal(trc_struct_size("trc_node_input"), sizeof(trc_node_input));
-    assert_int_equal(trc_struct_size("trc_material_desc"), sizeof(trc_material_desc));
-    assert_int_equal(trc_struct_size("trc_image_desc"), sizeof(trc_image_desc));
-    assert_int_equal(trc_struct_size("trc_rays"), sizeof(trc_rays));
-    assert_int_equal(trc_struct_size("trc_hits"), sizeof(trc_hits));
-    assert_int_equal(trc_struct_size("trc_render_desc"), sizeof(trc_render_desc));
-    assert_int_equal(trc_struct_size("trc_render_progress"), sizeof(trc_render_progress));
-    assert_int_equal(trc_struct_size("trc_scene_desc"), sizeof(trc_scene_desc));
-    assert_int_equal(trc_struct_size("trc_scene_stats"), sizeof(trc_scene_stats));
-    assert_int_equal(trc_struct_size("trc_reader_desc"), sizeof(trc_reader_desc));
-    assert_int_equal(trc_struct_size("trc_nothing"), 0);
-    assert_int_equal(trc_struct_size(NULL), 0);
+    assert_int_equal(abi_value("TRC_ABI_VERSION"), TRC_ABI_VERSION);
+    assert_int_equal(abi_value("TRC_INPUT_DEFAULT"), -2);
+    assert_int_equal(abi_value("TRC_NO_HIT"), UINT32_MAX);
+    assert_int_equal(abi_value("trc_mesh_desc"), sizeof(trc_mesh_desc));
+    assert_int_equal(abi_value("trc_mesh_desc.indices"), offsetof(trc_mesh_desc, indices));
+    int64_t value = 77;
+    assert_int_equal(trc_abi_value("trc_nothing", &value), TRC_ERROR_INVALID_ARGUMENT);
+    assert_int_equal(trc_abi_value(NULL, &value), TRC_ERROR_INVALID_ARGUMENT);
+    assert_int_equal(trc_abi_value("TRC_OK", NULL), TRC_ERROR_INVALID_ARGUMENT);
+    assert_int_equal(value, 77);
 }
 
 /* ---- memory ---- */
@@ -626,7 +623,7 @@ int main(void) {
         cmocka_unit_test(message_is_formatted_and_cut),
         cmocka_unit_test(cut_messages_are_utf8),
         cmocka_unit_test(message_is_per_thread),
-        cmocka_unit_test(sizes_and_versions),
+        cmocka_unit_test(versions_and_values),
         cmocka_unit_test(memory_is_aligned_and_counted),
         cmocka_unit_test(large_blocks),
         cmocka_unit_test(memory_sizes_do_not_wrap),

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .. import native
+from .. import abi
 from . import motion
 from .matrix import rows12
 
@@ -181,7 +181,7 @@ def send(scene, keys, shutter_time=0.0, shutter_curve=None):
         windows = motion.resample(windows, len(transforms))
     scene.set_camera(
         transforms, windows, shutter_curve,
-        type=native.CAMERA_ORTHOGRAPHIC if lens.is_ortho else native.CAMERA_PERSPECTIVE,
+        type=abi.CameraType.ORTHOGRAPHIC if lens.is_ortho else abi.CameraType.PERSPECTIVE,
         blade_count=lens.blade_count, clip_start=lens.clip_start,
         clip_end=max(lens.clip_end, lens.clip_start * (1.0 + 1e-5)),
         aperture_radius=lens.aperture_radius, focus_distance=lens.focus_distance,

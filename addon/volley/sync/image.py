@@ -16,11 +16,11 @@ import zlib
 import bpy
 import numpy as np
 
-from .. import native
+from .. import abi, native
 from ..compat import cycles
 
-_ALPHA_MODES = {'STRAIGHT': native.ALPHA_STRAIGHT, 'PREMUL': native.ALPHA_PREMULTIPLIED,
-                'CHANNEL_PACKED': native.ALPHA_CHANNEL_PACKED, 'NONE': native.ALPHA_NONE}
+_ALPHA_MODES = {'STRAIGHT': abi.AlphaMode.STRAIGHT, 'PREMUL': abi.AlphaMode.PREMULTIPLIED,
+                'CHANNEL_PACKED': abi.AlphaMode.CHANNEL_PACKED, 'NONE': abi.AlphaMode.NONE}
 _ANIMATED_SOURCES = {'SEQUENCE', 'MOVIE'}
 _FILE_SOURCES = {'FILE', 'SEQUENCE', 'TILED'}
 _IMAGE_NODES = {'TEX_IMAGE', 'TEX_ENVIRONMENT'}
@@ -130,7 +130,7 @@ class Images:
             pixels = np.ones(table.shape[:2] + (4,), np.float32)
             pixels[..., :3] = table
             created = self._scene.create_image(
-                pixels=pixels, alpha_mode=native.ALPHA_CHANNEL_PACKED, is_srgb=False)
+                pixels=pixels, alpha_mode=abi.AlphaMode.CHANNEL_PACKED, is_srgb=False)
             self._entries[key] = (None, created)
         return self._entries[key][1]
 
@@ -163,9 +163,9 @@ class Images:
         try:
             return self._in_its_space(image, self._file_values(image, path, is_mip_mapped))
         except native.TracerError as error:
-            if error.status == native.ERROR_UNSUPPORTED:
+            if error.status == abi.StatusCode.ERROR_UNSUPPORTED:
                 self._warnings.add(f"{error}; Blender reads them")
-            elif error.status != native.ERROR_FORMAT:
+            elif error.status != abi.StatusCode.ERROR_FORMAT:
                 raise
         return self._from_pixels(image, is_mip_mapped)
 
@@ -184,7 +184,7 @@ class Images:
         try:
             return self._scene.create_image(**values, **encoding)
         except native.TracerError as error:
-            cannot = error.status in (native.ERROR_IMAGE, native.ERROR_UNSUPPORTED)
+            cannot = error.status in (abi.StatusCode.ERROR_IMAGE, abi.StatusCode.ERROR_UNSUPPORTED)
             if not cannot or "color_space" not in encoding:
                 raise
             failure = error
@@ -276,16 +276,16 @@ def _is_mip_mapped(node):
 
 def _alpha_mode(image):
     """What an image file's alpha means. As in Cycles, data is not multiplied by it."""
-    mode = _ALPHA_MODES.get(image.alpha_mode, native.ALPHA_STRAIGHT)
-    return native.ALPHA_CHANNEL_PACKED if _is_data(image) and mode != native.ALPHA_NONE else mode
+    mode = _ALPHA_MODES.get(image.alpha_mode, abi.AlphaMode.STRAIGHT)
+    return abi.AlphaMode.CHANNEL_PACKED if _is_data(image) and mode != abi.AlphaMode.NONE else mode
 
 
 def _pixel_alpha_mode(image):
     """Alpha of Blender's own buffers: floats are premultiplied, bytes are not."""
     mode = _alpha_mode(image)
-    if mode in (native.ALPHA_NONE, native.ALPHA_CHANNEL_PACKED):
+    if mode in (abi.AlphaMode.NONE, abi.AlphaMode.CHANNEL_PACKED):
         return mode
-    return native.ALPHA_PREMULTIPLIED if image.is_float else native.ALPHA_STRAIGHT
+    return abi.AlphaMode.PREMULTIPLIED if image.is_float else abi.AlphaMode.STRAIGHT
 
 
 def _file_path(image, image_user):

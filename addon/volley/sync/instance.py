@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import bpy
 import numpy as np
 
-from .. import native
+from .. import abi, native
 from . import motion, visibility
 from .hashing import HASH_MAX, hash_name, hash_pair
 from .matrix import rows12
@@ -115,7 +115,7 @@ def describe(instance, view_layer, light_groups):
         pass_index=blender_object.pass_index, random=random_of(instance),
         color=tuple(blender_object.color),
         light_group=light_groups.get(blender_object.lightgroup, 0),
-        flags=native.INSTANCE_SHADOW_CATCHER * visibility.is_shadow_catcher(instance, view_layer))
+        flags=int(abi.InstanceFlags.SHADOW_CATCHER) * visibility.is_shadow_catcher(instance, view_layer))
 
 
 # Where the numbers of instancer_values begin.
@@ -180,7 +180,7 @@ class Instances:
                 self._update_one(item, mesh_id)
                 seen.add(item.key)
             except native.TracerError as error:
-                if error.status != native.ERROR_INVALID_ARGUMENT:
+                if error.status != abi.StatusCode.ERROR_INVALID_ARGUMENT:
                     raise
                 self.warnings.add(f"Object '{item.owner}': {error}; it is left out")
         for key in [key for key in self._entries if key not in seen]:
@@ -192,7 +192,7 @@ class Instances:
         try:
             self._update_one(item, mesh_id)
         except native.TracerError as error:
-            if error.status != native.ERROR_INVALID_ARGUMENT:
+            if error.status != abi.StatusCode.ERROR_INVALID_ARGUMENT:
                 raise
             self.warnings.add(f"Object '{item.owner}': {error}; it stays as it was")
 
@@ -229,8 +229,8 @@ def _parts(item):
     """What rays see of an item: all the same, or the camera a hole where others see what it is made of."""
     if not item.hole:
         return [{"materials": item.materials, "visibility": item.visibility}]
-    return [{"materials": (item.hole,), "visibility": item.visibility & native.VISIBLE_CAMERA},
-            {"materials": item.materials, "visibility": item.visibility & ~native.VISIBLE_CAMERA}]
+    return [{"materials": (item.hole,), "visibility": item.visibility & abi.VisibleRays.CAMERA},
+            {"materials": item.materials, "visibility": item.visibility & ~abi.VisibleRays.CAMERA}]
 
 
 def collapse(arrays):

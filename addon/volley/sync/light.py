@@ -7,7 +7,7 @@ linked to textures. Anything else is named in the warnings and its unlinked part
 
 import math
 
-from .. import native
+from .. import abi, native
 from ..compat import AREA_LIGHT_POWER, SPOT_IS_EVEN, SUN_IS_EVEN, casts_shadow, cycles, is_ball, uses_nodes
 from . import flatten
 from .visibility import light_visibility
@@ -17,14 +17,14 @@ def describe(light_object, item, warnings):
     """The fields of trc_light_desc for an evaluated light object, described as an item too, or None for
     one that is skipped."""
     light = light_object.data
-    if light.type not in native.LIGHT_TYPES:
+    if light.type not in abi.LightType.__members__:
         warnings.add(f"Light '{light.name}': type {light.type} is not supported, it is left out")
         return None
     if light.type == 'AREA' and cycles(light, "is_portal", False):
         return None  # of itself dark: it tells Cycles' sampling where the world shines in
     factor = _node_color(light, warnings)
     fields = {
-        "type": native.LIGHT_TYPES[light.type],
+        "type": abi.LightType[light.type],
         "transform": tuple(item.transforms[0]),
         "color": tuple(c * f for c, f in zip(_color(light), factor)),
         "strength": light.energy * 2.0 ** getattr(light, "exposure", 0.0) *
@@ -37,7 +37,7 @@ def describe(light_object, item, warnings):
     }
     fields.update(_SHAPES[light.type](light))
     if not light_object.is_shadow_catcher:
-        fields["flags"] = fields.get("flags", 0) | native.LIGHT_SYNTHETIC
+        fields["flags"] = fields.get("flags", 0) | abi.LightFlags.SYNTHETIC
     return fields
 
 
@@ -50,24 +50,24 @@ def _color(light):
 
 
 def _point(light):
-    return {"radius": light.shadow_soft_size, "flags": native.LIGHT_SPHERE if is_ball(light) else 0}
+    return {"radius": light.shadow_soft_size, "flags": abi.LightFlags.SPHERE if is_ball(light) else 0}
 
 
 def _spot(light):
     fields = _point(light)
-    fields["flags"] |= native.LIGHT_EVEN_CONE if SPOT_IS_EVEN else 0
+    fields["flags"] |= abi.LightFlags.EVEN_CONE if SPOT_IS_EVEN else 0
     return {**fields, "spot_angle": light.spot_size, "spot_blend": light.spot_blend}
 
 
 def _sun(light):
-    return {"angle": light.angle, "flags": native.LIGHT_EVEN_CONE if SUN_IS_EVEN else 0}
+    return {"angle": light.angle, "flags": abi.LightFlags.EVEN_CONE if SUN_IS_EVEN else 0}
 
 
 def _area(light):
     is_square = light.shape in {'SQUARE', 'DISK'}
     return {"size_x": light.size, "size_y": light.size if is_square else light.size_y,
-            "area_shape": native.AREA_RECTANGLE if light.shape in {'SQUARE', 'RECTANGLE'}
-            else native.AREA_ELLIPSE,
+            "area_shape": abi.AreaShape.RECTANGLE if light.shape in {'SQUARE', 'RECTANGLE'}
+            else abi.AreaShape.ELLIPSE,
             "spread": min(max(getattr(light, "spread", math.pi), 1e-4), math.pi)}
 
 
@@ -95,7 +95,7 @@ class Lights:
             try:
                 self._update_one(key, fields)
             except native.TracerError as error:
-                if error.status != native.ERROR_INVALID_ARGUMENT:
+                if error.status != abi.StatusCode.ERROR_INVALID_ARGUMENT:
                     raise
                 self._warnings.add(f"Light '{key[0]}': {error}; it is left out")
                 refused.add(key)
@@ -107,7 +107,7 @@ class Lights:
         try:
             self._update_one(key, fields)
         except native.TracerError as error:
-            if error.status != native.ERROR_INVALID_ARGUMENT:
+            if error.status != abi.StatusCode.ERROR_INVALID_ARGUMENT:
                 raise
             return False
         return True

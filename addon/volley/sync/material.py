@@ -3,7 +3,7 @@
 
 import bpy
 
-from .. import native
+from .. import abi, native
 from ..compat import CHOOSES_LOBES_PLAINLY, cycles, uses_nodes
 from . import flatten, nodes, tangents
 from .changes import Changes
@@ -178,7 +178,7 @@ class Materials:
             else:
                 entry.id = self._scene.create_material(flat.nodes, flat.surface, **values)
         except native.TracerError as error:
-            if error.status not in (native.ERROR_INVALID_ARGUMENT, native.ERROR_TOO_LARGE):
+            if error.status not in (abi.StatusCode.ERROR_INVALID_ARGUMENT, abi.StatusCode.ERROR_TOO_LARGE):
                 raise
             self._warnings.add(f"Material '{key[-1] if isinstance(key, tuple) else key}': {error}; the "
                                "default material is used")
@@ -204,10 +204,10 @@ class Entry:
 
 def _flags(material, is_volume):
     has_transparent_shadow = is_volume or _has_transparent_shadow(material)
-    flags = native.MATERIAL_TRANSPARENT_SHADOW if has_transparent_shadow else 0
-    flags |= native.MATERIAL_PLAIN_CHOICE if CHOOSES_LOBES_PLAINLY else 0
+    flags = abi.MaterialFlags.TRANSPARENT_SHADOW if has_transparent_shadow else 0
+    flags |= abi.MaterialFlags.PLAIN_CHOICE if CHOOSES_LOBES_PLAINLY else 0
     if cycles(material, "sample_as_light", cycles(material, "emission_sampling", 'AUTO') != 'NONE'):
-        flags |= native.MATERIAL_SAMPLE_EMISSION
+        flags |= abi.MaterialFlags.SAMPLE_EMISSION
     return flags
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import bpy
 import numpy as np
 
-from .. import native
+from .. import abi, native
 from . import derived, tangents
 
 _HAS_UNDEFORMED = "undeformed_co" in bpy.types.MeshVertex.bl_rna.properties
@@ -30,7 +30,7 @@ class MeshData:
     positions: np.ndarray             # (vertices, 3) float32
     indices: np.ndarray               # (triangles, 3) uint32
     normals: np.ndarray = None        # (vertices | triangles * 3, 3) float32
-    normal_kind: int = native.NORMALS_NONE
+    normal_kind: int = abi.NormalsLayout.NONE
     smooth: np.ndarray = None         # (triangles,) uint8
     material_index: np.ndarray = None  # (triangles,) uint16
     attributes: list = field(default_factory=list)  # (name, (triangles * 3, 2 | 4) float32)
@@ -84,7 +84,7 @@ def extract(mesh, uv_names=(), color_names=(), material_count=1):
         data.material_index = _material_index(mesh, loops)
     read_normals(mesh, data, loops)
     data.attributes = _uv_maps(mesh, uv_names, loops) + _colors(mesh, data, color_names, loops)
-    del data.attributes[native.MAX_ATTRIBUTES:]
+    del data.attributes[abi.MAX_ATTRIBUTES:]
     return data
 
 
@@ -188,13 +188,13 @@ def read_normals(mesh, data, loops=None):
     loops = loops or _LazyLoops(mesh, len(data.indices))
     if _has_corner_normals(mesh):
         data.corners = loops.of_triangles
-        data.normals, data.normal_kind = _corner_normals(mesh)[data.corners], native.NORMALS_CORNER
+        data.normals, data.normal_kind = _corner_normals(mesh)[data.corners], abi.NormalsLayout.CORNER
         return
     smooth = _read(mesh.polygons, "use_smooth", (len(mesh.polygons),), np.bool_)
     if not smooth.any():
         return
     data.normals = np.array(_vertex_normals(mesh))
-    data.normal_kind = native.NORMALS_VERTEX
+    data.normal_kind = abi.NormalsLayout.VERTEX
     if smooth.all():
         data.smooth = np.ones(len(data.indices), np.uint8)
     else:
@@ -306,7 +306,7 @@ def _tangents(mesh, data, layer, loops):
 
 def _normals_of_corners(data):
     """(triangles, 3, 3) normals that a mesh is shaded with."""
-    if data.normal_kind == native.NORMALS_CORNER:
+    if data.normal_kind == abi.NormalsLayout.CORNER:
         return data.normals.reshape(-1, 3, 3)
     flat = np.repeat(tangents.face_normals(data.positions[data.indices])[:, None], 3, axis=1)
     if data.normals is None:
@@ -440,7 +440,7 @@ class MeshMotion(KeyedShapes):
         super().__init__(data, key_count)
         self._topology = Topology(mesh)
         self._corners = None
-        if data.normal_kind == native.NORMALS_CORNER:
+        if data.normal_kind == abi.NormalsLayout.CORNER:
             self._corners = _LazyLoops(mesh, len(data.indices)).of_triangles
 
     def set_key(self, index, blender_object):
@@ -454,9 +454,9 @@ class MeshMotion(KeyedShapes):
             self.is_dropped = True
             return False
         self.positions[index] = read_positions(mesh)
-        if self._data.normal_kind == native.NORMALS_CORNER:
+        if self._data.normal_kind == abi.NormalsLayout.CORNER:
             self.normals[index] = _corner_normals(mesh)[self._corners]
-        elif self._data.normal_kind == native.NORMALS_VERTEX:
+        elif self._data.normal_kind == abi.NormalsLayout.VERTEX:
             self.normals[index] = np.array(_vertex_normals(mesh))
         return True
 
@@ -501,7 +501,7 @@ class Meshes:
             elif entry.shape != shape:
                 self._scene.update_mesh(entry.id, positions, normals)
         except native.TracerError as error:
-            if error.status not in (native.ERROR_INVALID_ARGUMENT, native.ERROR_TOO_LARGE):
+            if error.status not in (abi.StatusCode.ERROR_INVALID_ARGUMENT, abi.StatusCode.ERROR_TOO_LARGE):
                 raise
             self._warnings.add(f"Mesh of '{key[0]}': {error}; it is left out")
             return
@@ -521,11 +521,11 @@ class Meshes:
         if not (entry.poses.has_counts_of(mesh) if is_known else entry.poses.is_of(mesh)):
             return False
         normals = None
-        if _has_corner_normals(mesh) != (entry.normal_kind == native.NORMALS_CORNER):
+        if _has_corner_normals(mesh) != (entry.normal_kind == abi.NormalsLayout.CORNER):
             return False
-        if entry.normal_kind == native.NORMALS_CORNER:
+        if entry.normal_kind == abi.NormalsLayout.CORNER:
             normals = _corner_normals(mesh)[entry.corners][None]
-        elif entry.normal_kind == native.NORMALS_VERTEX:
+        elif entry.normal_kind == abi.NormalsLayout.VERTEX:
             normals = _vertex_normals(mesh)[None]
         self._scene.update_mesh(entry.id, read_positions(mesh)[None], normals)
         entry.pointer, entry.shape = pointer, None

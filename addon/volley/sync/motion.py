@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from mathutils import Matrix, Quaternion
 
-from .. import native
+from .. import abi
 from ..compat import SHUTTER_DELAY, cycles
 
 _CURVE_SAMPLES = 256
@@ -105,7 +105,7 @@ def key_count(blender_object, parent=None):
     if not all(cycles(each, "use_motion_blur", True) for each in chain):
         return 1
     steps = max(cycles(each, "motion_steps", 1) for each in chain)
-    return min((2 << (steps - 1)) + 1, native.MAX_KEYS)
+    return min((2 << (steps - 1)) + 1, abi.MAX_KEYS)
 
 
 def may_deform(blender_object, parent=None):
@@ -154,7 +154,7 @@ def follow_turns(transforms):
     stretches = rotations.transpose(0, 2, 1) @ linear
     turns = [Matrix(a.T @ b).to_quaternion() for a, b in zip(rotations, rotations[1:])]
     largest = max(turn.angle if turn.angle <= math.pi else 2.0 * math.pi - turn.angle for turn in turns)
-    steps = min(math.ceil(largest / _MAX_TURN), (native.MAX_KEYS - 1) // (count - 1))
+    steps = min(math.ceil(largest / _MAX_TURN), (abi.MAX_KEYS - 1) // (count - 1))
     if steps < 2:
         return transforms
     parts = np.arange(steps) / steps

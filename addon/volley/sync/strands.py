@@ -4,7 +4,7 @@
 import bpy
 import numpy as np
 
-from .. import native
+from .. import abi
 from . import tubes
 from .mesh import active_color_name, attribute_colors, wanted_uv_layers
 
@@ -113,7 +113,7 @@ class StrandObject:
             return None
         balls = tubes.Balls(strands)
         values = [(name, balls.spread(each)) for name, each, _ in values]
-        return balls, tubes.mesh_of(balls, strands, values[:native.MAX_ATTRIBUTES])
+        return balls, tubes.mesh_of(balls, strands, values[:abi.MAX_ATTRIBUTES])
 
 
 def _has_force(blender_object):
@@ -135,7 +135,7 @@ def _tubes(solid, strands, values, names):
     values = [(name, solid.spread(each, of_keys)) for name, each, of_keys in values]
     own = [(name, tell(strands)) for name, tell in (
         (HAIR_ATTRIBUTE, solid.info), (DIRECTION_ATTRIBUTE, solid.directions)) if name in names[1]]
-    return solid, tubes.mesh_of(solid, strands, values[:native.MAX_ATTRIBUTES - len(own)] + own)
+    return solid, tubes.mesh_of(solid, strands, values[:abi.MAX_ATTRIBUTES - len(own)] + own)
 
 
 def _root_values(mesh, modifier, strands, uv_names, color_names):

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from .. import native
+from .. import abi
 from ..compat import cycles_curves
 from .hashing import HASH_MAX, hash_numbers
 from .mesh import KeyedShapes, MeshData
@@ -279,7 +279,7 @@ def mesh_of(solid, strands, values=()):
     positions, normals = solid.place(strands)
     indices = solid.faces()
     corners = indices.reshape(-1)
-    return MeshData(positions, indices, normals, native.NORMALS_VERTEX, np.ones(len(indices), np.uint8),
+    return MeshData(positions, indices, normals, abi.NormalsLayout.VERTEX, np.ones(len(indices), np.uint8),
                     attributes=[(name, each[corners]) for name, each in values])
 
 

@@ -3,38 +3,41 @@
 
 import bpy
 
-from .. import native
+from ..abi import VisibleRays
+
+# Plain numbers: these are put together for every object, and flags of Python's are slow at it.
+_CAMERA, _SHADOW = int(VisibleRays.CAMERA), int(VisibleRays.SHADOW)
 
 _OBJECT_BITS = (
-    ("visible_camera", native.VISIBLE_CAMERA), ("visible_diffuse", native.VISIBLE_DIFFUSE),
-    ("visible_glossy", native.VISIBLE_GLOSSY), ("visible_transmission", native.VISIBLE_TRANSMISSION),
-    ("visible_shadow", native.VISIBLE_SHADOW))
+    ("visible_camera", _CAMERA), ("visible_diffuse", int(VisibleRays.DIFFUSE)),
+    ("visible_glossy", int(VisibleRays.GLOSSY)), ("visible_transmission", int(VisibleRays.TRANSMISSION)),
+    ("visible_shadow", _SHADOW))
 
 _WORLD_BITS = (
-    ("camera", native.VISIBLE_CAMERA), ("diffuse", native.VISIBLE_DIFFUSE),
-    ("glossy", native.VISIBLE_GLOSSY), ("transmission", native.VISIBLE_TRANSMISSION))
+    ("camera", _CAMERA), ("diffuse", int(VisibleRays.DIFFUSE)), ("glossy", int(VisibleRays.GLOSSY)),
+    ("transmission", int(VisibleRays.TRANSMISSION)))
 
 
 def object_visibility(blender_object):
-    """VISIBLE_* bits of an object's own switches."""
+    """VisibleRays of an object's own switches."""
     return sum(bit for name, bit in _OBJECT_BITS if getattr(blender_object, name))
 
 
 def light_visibility(light_object):
-    """VISIBLE_* bits of a light, its own also where it is instanced; shadow rays do not apply."""
-    return object_visibility(light_object) | native.VISIBLE_SHADOW
+    """VisibleRays of a light, its own also where it is instanced; shadow rays do not apply."""
+    return object_visibility(light_object) | _SHADOW
 
 
 def world_visibility(world):
-    """VISIBLE_* bits of a world; they live with Cycles' settings."""
+    """VisibleRays of a world; they live with Cycles' settings."""
     switches = getattr(world, "cycles_visibility", None)
     if switches is None:
-        return native.VISIBLE_ALL
-    return sum(bit for name, bit in _WORLD_BITS if getattr(switches, name)) | native.VISIBLE_SHADOW
+        return VisibleRays.ALL
+    return sum(bit for name, bit in _WORLD_BITS if getattr(switches, name)) | _SHADOW
 
 
 def instance_visibility(instance, view_layer):
-    """VISIBLE_* bits of one depsgraph instance: the object's and its instancer's switches."""
+    """VisibleRays of one depsgraph instance: the object's and its instancer's switches."""
     blender_object = instance.object
     mask = object_visibility(blender_object)
     parent = instance.parent if instance.is_instance else None
@@ -42,7 +45,7 @@ def instance_visibility(instance, view_layer):
         mask &= object_visibility(parent)
     owner = parent or blender_object
     if owner.indirect_only_get(view_layer=view_layer) and not is_holdout(instance, view_layer):
-        mask &= ~native.VISIBLE_CAMERA
+        mask &= ~_CAMERA
     return mask
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The world: background, its visibility and sampling, ambient occlusion."""
 
-from .. import native
+from .. import abi
 from ..compat import cycles
 from .visibility import world_visibility
 
@@ -14,7 +14,7 @@ MIST_EXPONENTS = {'QUADRATIC': 2.0, 'LINEAR': 1.0, 'INVERSE_QUADRATIC': 0.5}
 def describe(world, material_id, sun, settings, light_groups):
     """The fields of trc_world_desc; sun: sky_texture.Sun or None; settings: ``scene.volley``; light_groups:
     {name: number}. Without a world all is black."""
-    fields = {"material": material_id, "visibility": native.VISIBLE_ALL, "use_sampling": 0,
+    fields = {"material": material_id, "visibility": abi.VisibleRays.ALL, "use_sampling": 0,
               "map_resolution": 0, "ao_factor": 0.0, "ao_distance": DEFAULT_AO_DISTANCE}
     if world is None:
         return fields
@@ -22,7 +22,7 @@ def describe(world, material_id, sun, settings, light_groups):
     fields["light_group"] = light_groups.get(world.lightgroup, 0)
     if settings.use_ambient_occlusion:
         fields["ao_factor"] = world.light_settings.ao_factor
-        fields["ao_method"] = native.AO_METHODS[settings.ao_method]
+        fields["ao_method"] = abi.AoMethod[settings.ao_method]
     if sun is not None:
         fields["sun_direction"], fields["sun_angle"] = sun
     method = cycles(world, "sampling_method", 'AUTOMATIC')

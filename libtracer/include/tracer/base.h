@@ -79,9 +79,11 @@ TRC_API const char *trc_version_string(void);
  * of the library on this thread. */
 TRC_API const char *trc_last_message(void);
 
-/* The size in bytes of the descriptor of that name ("trc_mesh_desc", ...) in this library, 0 for an
- * unknown name or NULL: lets a foreign-language binding check its own declarations. */
-TRC_API uint32_t trc_struct_size(const char *name);
+/* What the library was compiled with, so that a binding for another language can check its own
+ * declarations. name: an enumerator or a numeric macro ("TRC_LIGHT_SUN", "TRC_MAX_KEYS"); a
+ * structure, for its size in bytes ("trc_mesh_desc"); a field, for its offset
+ * ("trc_mesh_desc.indices"). TRC_ERROR_INVALID_ARGUMENT for any other. */
+TRC_API trc_status trc_abi_value(const char *name, int64_t *value_out);
 
 /* The instruction set kernels run on: the best that CPU and operating system offer, unless the
  * environment variable TRACER_ISA (scalar, sse42, avx2, avx512, neon) named a lower one when the

@@ -1,0 +1,723 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The binary interface of libtracer: constants, enumerations, structures, functions.
+
+Written by libtracer/tools/generate_abi.py from libtracer/include/tracer; meanings are there. native.py
+compares all values, sizes and offsets with those of the library that it loads.
+"""
+
+from ctypes import (POINTER, Structure, c_char_p, c_double, c_float, c_int32, c_int64, c_uint32, c_uint64,
+                    c_void_p)
+from enum import IntEnum, IntFlag
+
+MAX_LIGHT_GROUPS = 32
+MAX_KEYS = 33
+MAX_ATTRIBUTES = 8
+MAX_INSTANCE_VALUES = 64
+MAX_NODES = 4096
+MAX_NODE_INPUTS = 32
+NO_HIT = 4294967295
+MAX_AOVS = 16
+CRYPTOMATTE_KINDS = 3
+CRYPTOMATTE_LAYER_RANKS = 2
+MAX_CRYPTOMATTE_LAYERS = 8
+MAX_CRYPTOMATTE_DEPTH = 16
+VERSION_MAJOR = 0
+VERSION_MINOR = 1
+VERSION_PATCH = 0
+ABI_VERSION = 3
+
+
+class StatusCode(IntEnum):
+    OK = 0
+    ERROR_INVALID_ARGUMENT = 1
+    ERROR_INVALID_HANDLE = 2
+    ERROR_STRUCT_SIZE = 3
+    ERROR_TOO_LARGE = 4
+    ERROR_OUT_OF_MEMORY = 5
+    ERROR_NO_THREAD = 6
+    ERROR_NOT_COMMITTED = 7
+    ERROR_CANCELLED = 8
+    ERROR_UNSUPPORTED = 9
+    ERROR_IMAGE = 10
+    ERROR_FORMAT = 11
+
+
+class IsaId(IntEnum):
+    AUTO = 0
+    SCALAR = 1
+    SSE42 = 2
+    AVX2 = 3
+    AVX512 = 4
+    NEON = 5
+
+
+class CameraType(IntEnum):
+    PERSPECTIVE = 0
+    ORTHOGRAPHIC = 1
+
+
+class NormalsLayout(IntEnum):
+    NONE = 0
+    VERTEX = 1
+    CORNER = 2
+
+
+class VisibleRays(IntFlag):
+    CAMERA = 1
+    DIFFUSE = 2
+    GLOSSY = 4
+    TRANSMISSION = 8
+    SHADOW = 16
+    ALL = 31
+
+
+class InstanceFlags(IntFlag):
+    SHADOW_CATCHER = 1
+
+
+class LightType(IntEnum):
+    POINT = 0
+    SPOT = 1
+    SUN = 2
+    AREA = 3
+
+
+class AreaShape(IntEnum):
+    RECTANGLE = 0
+    ELLIPSE = 1
+
+
+class LightFlags(IntFlag):
+    SPHERE = 1
+    EVEN_CONE = 2
+    SYNTHETIC = 4
+
+
+class AoMethod(IntEnum):
+    ADD = 0
+    REPLACE = 1
+
+
+class NodeType(IntEnum):
+    DIFFUSE = 1
+    GLOSSY = 2
+    GLASS = 3
+    REFRACTION = 4
+    TRANSPARENT = 5
+    TRANSLUCENT = 6
+    EMISSION = 7
+    BACKGROUND = 8
+    MIX_SHADER = 9
+    ADD_SHADER = 10
+    HOLDOUT = 11
+    PRINCIPLED = 12
+    VELVET = 13
+    TOON = 14
+    LAYERED_PRINCIPLED = 15
+    SHEEN = 16
+    IMAGE = 64
+    ENVIRONMENT = 65
+    UV_MAP = 66
+    COLOR_ATTRIBUTE = 67
+    TEXTURE_COORDINATE = 68
+    MAPPING = 69
+    MIX_COLOR = 70
+    MATH = 71
+    FRESNEL = 72
+    LAYER_WEIGHT = 73
+    LIGHT_PATH = 74
+    GEOMETRY = 75
+    NORMAL_MAP = 76
+    INVERT = 77
+    GAMMA = 78
+    HUE_SATURATION = 79
+    BRIGHT_CONTRAST = 80
+    COLOR_RAMP = 81
+    SEPARATE = 82
+    COMBINE = 83
+    MAP_RANGE = 84
+    CLAMP = 85
+    CHECKER = 86
+    OBJECT_INFO = 87
+    VECTOR_MATH = 88
+    RGB_TO_BW = 89
+    INSTANCE_VALUES = 90
+    NOISE = 96
+    MUSGRAVE = 97
+    VORONOI = 98
+    WAVE = 99
+    GRADIENT = 100
+    WHITE_NOISE = 101
+    MAGIC = 102
+    BRICK = 103
+    CURVES = 104
+    FLOAT_CURVE = 105
+    BLACKBODY = 106
+    WAVELENGTH = 107
+    VECTOR_TRANSFORM = 108
+    VECTOR_ROTATE = 109
+    CAMERA_DATA = 110
+    WIREFRAME = 111
+    TANGENT = 114
+    AOV_VALUE = 112
+    AOV_COLOR = 113
+
+
+class TangentSource(IntEnum):
+    Z = 0
+    X = 1
+    Y = 2
+    UV = 3
+
+
+class SpaceId(IntEnum):
+    WORLD = 0
+    OBJECT = 1
+    CAMERA = 2
+
+
+class RotateMode(IntEnum):
+    AXIS_ANGLE = 0
+    X = 1
+    Y = 2
+    Z = 3
+    EULER = 4
+
+
+class FractalType(IntEnum):
+    FBM_UNIT = 0
+    FBM = 1
+    MULTIFRACTAL = 2
+    HETERO_TERRAIN = 3
+    HYBRID_MULTIFRACTAL = 4
+    RIDGED_MULTIFRACTAL = 5
+
+
+class NoiseMode(IntEnum):
+    TYPE_SHIFT = 2
+
+
+class VoronoiMetric(IntEnum):
+    EUCLIDEAN = 0
+    MANHATTAN = 1
+    CHEBYCHEV = 2
+    MINKOWSKI = 3
+
+
+class VoronoiFeature(IntEnum):
+    F1 = 0
+    F2 = 1
+    SMOOTH_F1 = 2
+    DISTANCE_TO_EDGE = 3
+    N_SPHERE_RADIUS = 4
+
+
+class VoronoiMode(IntEnum):
+    METRIC_SHIFT = 2
+    FEATURE_SHIFT = 4
+    NORMALIZE = 128
+
+
+class WaveMode(IntEnum):
+    SINE = 0
+    SAW = 1
+    TRIANGLE = 2
+    PROFILE = 3
+    RINGS = 4
+    DIRECTION_SHIFT = 3
+
+
+class GradientType(IntEnum):
+    LINEAR = 0
+    QUADRATIC = 1
+    EASING = 2
+    DIAGONAL = 3
+    RADIAL = 4
+    QUADRATIC_SPHERE = 5
+    SPHERICAL = 6
+
+
+class BrickMode(IntEnum):
+    SQUASH_SHIFT = 7
+
+
+class DistributionType(IntEnum):
+    GGX = 0
+    MULTI_GGX = 1
+    BECKMANN = 2
+    SHARP = 3
+    ASHIKHMIN = 4
+    CORRELATED = 16
+
+
+class BlendMode(IntEnum):
+    MIX = 0
+    DARKEN = 1
+    MULTIPLY = 2
+    BURN = 3
+    LIGHTEN = 4
+    SCREEN = 5
+    DODGE = 6
+    ADD = 7
+    OVERLAY = 8
+    SOFT_LIGHT = 9
+    LINEAR_LIGHT = 10
+    DIFFERENCE = 11
+    SUBTRACT = 12
+    DIVIDE = 13
+    HUE = 14
+    SATURATION = 15
+    COLOR = 16
+    VALUE = 17
+    EXCLUSION = 18
+
+
+class MathOperation(IntEnum):
+    ADD = 0
+    SUBTRACT = 1
+    MULTIPLY = 2
+    DIVIDE = 3
+    MULTIPLY_ADD = 4
+    POWER = 5
+    LOGARITHM = 6
+    SQRT = 7
+    INVERSE_SQRT = 8
+    ABSOLUTE = 9
+    EXPONENT = 10
+    MINIMUM = 11
+    MAXIMUM = 12
+    LESS_THAN = 13
+    GREATER_THAN = 14
+    SIGN = 15
+    COMPARE = 16
+    SMOOTH_MIN = 17
+    SMOOTH_MAX = 18
+    ROUND = 19
+    FLOOR = 20
+    CEIL = 21
+    TRUNC = 22
+    FRACT = 23
+    MODULO = 24
+    WRAP = 25
+    SNAP = 26
+    PINGPONG = 27
+    SINE = 28
+    COSINE = 29
+    TANGENT = 30
+    ARCSINE = 31
+    ARCCOSINE = 32
+    ARCTANGENT = 33
+    ARCTAN2 = 34
+    SINH = 35
+    COSH = 36
+    TANH = 37
+    RADIANS = 38
+    DEGREES = 39
+
+
+class VectorOperation(IntEnum):
+    ADD = 0
+    SUBTRACT = 1
+    MULTIPLY = 2
+    DIVIDE = 3
+    MULTIPLY_ADD = 4
+    CROSS = 5
+    PROJECT = 6
+    REFLECT = 7
+    DOT = 8
+    DISTANCE = 9
+    LENGTH = 10
+    SCALE = 11
+    NORMALIZE = 12
+    ABSOLUTE = 13
+    MINIMUM = 14
+    MAXIMUM = 15
+    FLOOR = 16
+    CEIL = 17
+    FRACT = 18
+    SINE = 19
+    COSINE = 20
+    TANGENT = 21
+    SNAP = 22
+    MODULO = 23
+    WRAP = 24
+    FACEFORWARD = 25
+    REFRACT = 26
+
+
+class ImageMode(IntEnum):
+    LINEAR = 0
+    CLOSEST = 1
+    CUBIC = 2
+    REPEAT = 0
+    EXTEND = 4
+    CLIP = 8
+    MIRROR = 12
+
+
+class InputSource(IntEnum):
+    CONSTANT = -1
+    DEFAULT = -2
+
+
+class MaterialFlags(IntFlag):
+    SAMPLE_EMISSION = 1
+    TRANSPARENT_SHADOW = 2
+    PLAIN_CHOICE = 4
+
+
+class AlphaMode(IntEnum):
+    STRAIGHT = 0
+    PREMULTIPLIED = 1
+    CHANNEL_PACKED = 2
+    NONE = 3
+
+
+class IntegratorType(IntEnum):
+    RAYCAST = 0
+    WHITTED = 1
+    DISTRIBUTION = 2
+
+
+class SamplerType(IntEnum):
+    SOBOL = 0
+    SUDOKU = 1
+    JITTER = 2
+    INDEPENDENT = 3
+    BLUE_NOISE = 4
+
+
+class AssemblyType(IntEnum):
+    AUTO = 0
+    TYPES = 1
+    RUNS = 2
+    GROUPS = 3
+    OCTANTS = 4
+    BLIND = 5
+    NONE = 6
+
+
+class FilterType(IntEnum):
+    BOX = 0
+    GAUSSIAN = 1
+    BLACKMAN_HARRIS = 2
+
+
+class PassId(IntEnum):
+    COMBINED = 0
+    DEPTH = 1
+    NORMAL = 2
+    POSITION = 3
+    UV = 4
+    OBJECT_INDEX = 5
+    MATERIAL_INDEX = 6
+    EMISSION = 7
+    ENVIRONMENT = 8
+    DIFFUSE_DIRECT = 9
+    DIFFUSE_INDIRECT = 10
+    DIFFUSE_COLOR = 11
+    GLOSSY_DIRECT = 12
+    GLOSSY_INDIRECT = 13
+    GLOSSY_COLOR = 14
+    TRANSMISSION_DIRECT = 15
+    TRANSMISSION_INDIRECT = 16
+    TRANSMISSION_COLOR = 17
+    SAMPLE_COUNT = 18
+    MIST = 19
+    DENOISING_ALBEDO = 20
+    DENOISING_NORMAL = 21
+    DENOISING_DEPTH = 22
+    VECTOR = 23
+    AMBIENT_OCCLUSION = 24
+    SHADOW = 25
+    SHADOW_CATCHER = 26
+    COUNT = 27
+
+
+class PassRange(IntEnum):
+    FIRST_AOV_VALUE = 64
+    FIRST_AOV_COLOR = 80
+    FIRST_LIGHT_GROUP = 96
+    FIRST_CRYPTOMATTE = 128
+
+
+class CryptomatteKind(IntEnum):
+    OBJECT = 0
+    MATERIAL = 1
+    ASSET = 2
+
+
+class ProgressState(IntEnum):
+    RUNNING = 0
+    DONE = 1
+    CANCELLED = 2
+
+
+class FeatureFlags(IntFlag):
+    LENS = 1
+    CAMERA_MOTION = 2
+    OBJECT_MOTION = 4
+    DEFORMATION = 8
+    INSTANCES = 16
+    SPECULAR = 32
+    GLOSSY = 64
+    REFRACTION = 128
+    TRANSPARENCY = 256
+    TEXTURES = 512
+    PROGRAMS = 1024
+    LIGHTS = 2048
+    AREA_LIGHTS = 4096
+    EMISSIVE_MESHES = 8192
+    ENVIRONMENT = 16384
+    ENVIRONMENT_IMAGE = 32768
+    VISIBILITY = 65536
+    AMBIENT_OCCLUSION = 131072
+    SHADOW_CATCHERS = 262144
+
+
+class CameraDesc(Structure):
+    __slots__ = ()
+    _fields_ = (("struct_size", c_uint32), ("type", c_uint32), ("key_count", c_uint32),
+                ("blade_count", c_uint32), ("transforms", c_void_p), ("windows", c_void_p),
+                ("window_key_count", c_uint32), ("clip_start", c_float), ("clip_end", c_float),
+                ("aperture_radius", c_float), ("focus_distance", c_float), ("blade_rotation", c_float),
+                ("aperture_ratio", c_float), ("shutter_time", c_float), ("shutter_curve_count", c_uint32),
+                ("shutter_curve", c_void_p))
+
+
+class CornerAttribute(Structure):
+    __slots__ = ()
+    _fields_ = (("struct_size", c_uint32), ("width", c_uint32), ("name", c_char_p), ("values", c_void_p),
+                ("value_count", c_uint64))
+
+
+class MeshDesc(Structure):
+    __slots__ = ()
+    _fields_ = (("struct_size", c_uint32), ("key_count", c_uint32), ("vertex_count", c_uint64),
+                ("triangle_count", c_uint64), ("positions", c_void_p), ("position_count", c_uint64),
+                ("indices", c_void_p), ("index_count", c_uint64), ("normals", c_void_p),
+                ("normal_count", c_uint64), ("normal_kind", c_uint32), ("attribute_count", c_uint32),
+                ("smooth", c_void_p), ("material_index", c_void_p), ("attributes", POINTER(CornerAttribute)),
+                ("generated", c_void_p), ("generated_count", c_uint64))
+
+
+class InstanceDesc(Structure):
+    __slots__ = ()
+    _fields_ = (("struct_size", c_uint32), ("key_count", c_uint32), ("mesh", c_uint64),
+                ("transforms", c_void_p), ("materials", c_void_p), ("material_count", c_uint32),
+                ("visibility", c_uint32), ("pass_index", c_int32), ("random", c_float),
+                ("color", c_float * 4), ("cryptomatte_object", c_float), ("cryptomatte_asset", c_float),
+                ("light_group", c_uint32), ("flags", c_uint32), ("reserved", c_uint32),
+                ("value_count", c_uint32), ("values", c_void_p))
+
+
+class LightDesc(Structure):
+    __slots__ = ()
+    _fields_ = (("struct_size", c_uint32), ("type", c_uint32), ("transform", c_float * 12),
+                ("color", c_float * 3), ("strength", c_float), ("radius", c_float), ("angle", c_float),
+                ("size_x", c_float), ("size_y", c_float), ("area_shape", c_uint32), ("spread", c_float),
+                ("spot_angle", c_float), ("spot_blend", c_float), ("visibility", c_uint32),
+                ("cast_shadow", c_uint32), ("use_mis", c_uint32), ("light_group", c_uint32),
+                ("flags", c_uint32))
+
+
+class WorldDesc(Structure):
+    __slots__ = ()
+    _fields_ = (("struct_size", c_uint32), ("use_sampling", c_uint32), ("material", c_uint64),
+                ("visibility", c_uint32), ("map_resolution", c_uint32), ("ao_distance", c_float),
+                ("ao_factor", c_float), ("ao_method", c_uint32), ("light_group", c_uint32),
+                ("sun_direction", c_float * 3), ("sun_angle", c_float))
+
+
+class NodeInput(Structure):
+    __slots__ = ()
+    _fields_ = (("node", c_int32), ("output", c_uint32), ("value", c_float * 3))
+
+
+class Node(Structure):
+    __slots__ = ()
+    _fields_ = (("type", c_uint32), ("mode", c_uint32), ("first_input", c_uint32), ("input_count", c_uint32),
+                ("image", c_uint64), ("name", c_char_p), ("table", c_void_p), ("table_count", c_uint64))
+
+
+class MaterialDesc(Structure):
+    __slots__ = ()
+    _fields_ = (("struct_size", c_uint32), ("node_count", c_uint32), ("nodes", POINTER(Node)),
+                ("inputs", POINTER(NodeInput)), ("input_count", c_uint32), ("surface", c_int32),
+                ("pass_index", c_int32), ("flags", c_uint32), ("cryptomatte", c_float),
+                ("reserved", c_uint32))
+
+
+class ImageDesc(Structure):
+    __slots__ = ()
+    _fields_ = (("struct_size", c_uint32), ("width", c_uint32), ("height", c_uint32),
+                ("alpha_mode", c_uint32), ("is_srgb", c_uint32), ("is_float", c_uint32),
+                ("pixels", c_void_p), ("pixel_bytes", c_uint64), ("path", c_char_p),
+                ("color_config", c_char_p), ("color_space", c_char_p), ("max_side", c_uint32),
+                ("is_mip_mapped", c_uint32))
+
+
+class Rays(Structure):
+    __slots__ = ()
+    _fields_ = (("struct_size", c_uint32), ("visibility", c_uint32), ("count", c_uint64),
+                ("origin_x", c_void_p), ("origin_y", c_void_p), ("origin_z", c_void_p),
+                ("direction_x", c_void_p), ("direction_y", c_void_p), ("direction_z", c_void_p),
+                ("tmin", c_void_p), ("tmax", c_void_p), ("time", c_void_p))
+
+
+class Hits(Structure):
+    __slots__ = ()
+    _fields_ = (("struct_size", c_uint32), ("reserved", c_uint32), ("instance", c_void_p),
+                ("triangle", c_void_p), ("distance", c_void_p), ("u", c_void_p), ("v", c_void_p),
+                ("normal_x", c_void_p), ("normal_y", c_void_p), ("normal_z", c_void_p))
+
+
+class ReaderDesc(Structure):
+    __slots__ = ()
+    _fields_ = (("struct_size", c_uint32), ("reserved", c_uint32), ("program", c_char_p))
+
+
+class RenderDesc(Structure):
+    __slots__ = ()
+    _fields_ = (("struct_size", c_uint32), ("width", c_uint32), ("height", c_uint32), ("crop_x", c_uint32),
+                ("crop_y", c_uint32), ("crop_width", c_uint32), ("crop_height", c_uint32),
+                ("integrator", c_uint32), ("sample_count", c_uint32), ("light_samples", c_uint32),
+                ("max_depth", c_uint32), ("max_transparent_depth", c_uint32), ("max_glossy_depth", c_uint32),
+                ("max_transmission_depth", c_uint32), ("attenuation_cutoff", c_float),
+                ("filter_glossy", c_float), ("clamp_direct", c_float), ("clamp_indirect", c_float),
+                ("assembly", c_uint32), ("packet_size", c_uint32), ("sampler", c_uint32), ("seed", c_uint32),
+                ("filter", c_uint32), ("filter_width", c_float), ("film_transparent", c_uint32),
+                ("film_exposure", c_float), ("passes", c_uint64), ("thread_count", c_uint32),
+                ("progressive", c_uint32), ("noise_threshold", c_float), ("min_samples", c_uint32),
+                ("mist_start", c_float), ("mist_depth", c_float), ("mist_falloff", c_float),
+                ("cryptomattes", c_uint32), ("cryptomatte_depth", c_uint32), ("aov_value_count", c_uint32),
+                ("aov_color_count", c_uint32), ("light_group_count", c_uint32))
+
+
+class RenderProgress(Structure):
+    __slots__ = ()
+    _fields_ = (("struct_size", c_uint32), ("state", c_uint32), ("fraction", c_float),
+                ("samples_done", c_uint32), ("seconds", c_double), ("rays_camera", c_uint64),
+                ("rays_shadow", c_uint64), ("rays_reflection", c_uint64), ("rays_refraction", c_uint64),
+                ("dropped_samples", c_uint64), ("memory_bytes", c_uint64), ("peak_memory_bytes", c_uint64),
+                ("tiles_done", c_uint32), ("tile_count", c_uint32), ("version", c_uint32),
+                ("reserved", c_uint32), ("seconds_trace", c_double), ("seconds_shade", c_double),
+                ("seconds_other", c_double))
+
+
+class SceneDesc(Structure):
+    __slots__ = ()
+    _fields_ = (("struct_size", c_uint32), ("thread_count", c_uint32), ("is_final", c_uint32),
+                ("image_megabytes", c_uint32), ("reader", c_uint64))
+
+
+class SceneStats(Structure):
+    __slots__ = ()
+    _fields_ = (("struct_size", c_uint32), ("features", c_uint32), ("triangle_count", c_uint64),
+                ("instanced_triangle_count", c_uint64), ("skipped_triangle_count", c_uint64),
+                ("mesh_count", c_uint64), ("instance_count", c_uint64), ("skipped_instance_count", c_uint64),
+                ("light_count", c_uint64), ("material_count", c_uint64),
+                ("emissive_triangle_count", c_uint64), ("bvh_bytes", c_uint64), ("geometry_bytes", c_uint64),
+                ("image_bytes", c_uint64), ("build_seconds", c_double), ("commit_seconds", c_double),
+                ("built_count", c_uint32), ("refitted_count", c_uint32), ("bounds_lower", c_float * 3),
+                ("bounds_upper", c_float * 3))
+
+
+# By their names in C.
+CONSTANTS = {"TRC_MAX_LIGHT_GROUPS": MAX_LIGHT_GROUPS, "TRC_MAX_KEYS": MAX_KEYS,
+             "TRC_MAX_ATTRIBUTES": MAX_ATTRIBUTES, "TRC_MAX_INSTANCE_VALUES": MAX_INSTANCE_VALUES,
+             "TRC_MAX_NODES": MAX_NODES, "TRC_MAX_NODE_INPUTS": MAX_NODE_INPUTS, "TRC_NO_HIT": NO_HIT,
+             "TRC_MAX_AOVS": MAX_AOVS, "TRC_CRYPTOMATTE_KINDS": CRYPTOMATTE_KINDS,
+             "TRC_CRYPTOMATTE_LAYER_RANKS": CRYPTOMATTE_LAYER_RANKS,
+             "TRC_MAX_CRYPTOMATTE_LAYERS": MAX_CRYPTOMATTE_LAYERS,
+             "TRC_MAX_CRYPTOMATTE_DEPTH": MAX_CRYPTOMATTE_DEPTH, "TRC_VERSION_MAJOR": VERSION_MAJOR,
+             "TRC_VERSION_MINOR": VERSION_MINOR, "TRC_VERSION_PATCH": VERSION_PATCH,
+             "TRC_ABI_VERSION": ABI_VERSION}
+
+# Enumerations, with what their members' names begin with in C.
+ENUMERATIONS = {StatusCode: "TRC_", IsaId: "TRC_ISA_", CameraType: "TRC_CAMERA_",
+                NormalsLayout: "TRC_NORMALS_", VisibleRays: "TRC_VISIBLE_", InstanceFlags: "TRC_INSTANCE_",
+                LightType: "TRC_LIGHT_", AreaShape: "TRC_AREA_", LightFlags: "TRC_LIGHT_",
+                AoMethod: "TRC_AO_", NodeType: "TRC_NODE_", TangentSource: "TRC_TANGENT_",
+                SpaceId: "TRC_SPACE_", RotateMode: "TRC_ROTATE_", FractalType: "TRC_FRACTAL_",
+                NoiseMode: "TRC_NOISE_", VoronoiMetric: "TRC_VORONOI_", VoronoiFeature: "TRC_VORONOI_",
+                VoronoiMode: "TRC_VORONOI_", WaveMode: "TRC_WAVE_", GradientType: "TRC_GRADIENT_",
+                BrickMode: "TRC_BRICK_", DistributionType: "TRC_DISTRIBUTION_", BlendMode: "TRC_BLEND_",
+                MathOperation: "TRC_MATH_", VectorOperation: "TRC_VECTOR_", ImageMode: "TRC_IMAGE_",
+                InputSource: "TRC_INPUT_", MaterialFlags: "TRC_MATERIAL_", AlphaMode: "TRC_ALPHA_",
+                IntegratorType: "TRC_INTEGRATOR_", SamplerType: "TRC_SAMPLER_",
+                AssemblyType: "TRC_ASSEMBLY_", FilterType: "TRC_FILTER_", PassId: "TRC_PASS_",
+                PassRange: "TRC_PASS_", CryptomatteKind: "TRC_CRYPTOMATTE_", ProgressState: "TRC_PROGRESS_",
+                FeatureFlags: "TRC_FEATURE_"}
+
+STRUCTURES = {"trc_camera_desc": CameraDesc, "trc_corner_attribute": CornerAttribute,
+              "trc_mesh_desc": MeshDesc, "trc_instance_desc": InstanceDesc, "trc_light_desc": LightDesc,
+              "trc_world_desc": WorldDesc, "trc_node_input": NodeInput, "trc_node": Node,
+              "trc_material_desc": MaterialDesc, "trc_image_desc": ImageDesc, "trc_rays": Rays,
+              "trc_hits": Hits, "trc_reader_desc": ReaderDesc, "trc_render_desc": RenderDesc,
+              "trc_render_progress": RenderProgress, "trc_scene_desc": SceneDesc,
+              "trc_scene_stats": SceneStats}
+
+# Result and arguments.
+FUNCTIONS = {
+    "trc_abi_version": (c_uint32, ()),
+    "trc_version_string": (c_char_p, ()),
+    "trc_last_message": (c_char_p, ()),
+    "trc_abi_value": (c_int32, (c_char_p, POINTER(c_int64))),
+    "trc_isa": (c_uint32, ()),
+    "trc_set_isa": (c_int32, (c_uint32,)),
+    "trc_isa_name": (c_char_p, (c_uint32,)),
+    "trc_camera_desc_default": (CameraDesc, ()),
+    "trc_scene_set_camera": (c_int32, (c_uint64, POINTER(CameraDesc))),
+    "trc_corner_attribute_default": (CornerAttribute, ()),
+    "trc_mesh_desc_default": (MeshDesc, ()),
+    "trc_mesh_create": (c_int32, (c_uint64, POINTER(MeshDesc), POINTER(c_uint64))),
+    "trc_mesh_update": (c_int32, (c_uint64, c_uint64, c_uint32, c_void_p, c_uint64, c_void_p, c_uint64)),
+    "trc_mesh_destroy": (c_int32, (c_uint64, c_uint64)),
+    "trc_instance_desc_default": (InstanceDesc, ()),
+    "trc_instance_create": (c_int32, (c_uint64, POINTER(InstanceDesc), POINTER(c_uint64))),
+    "trc_instance_update": (c_int32, (c_uint64, c_uint64, POINTER(InstanceDesc))),
+    "trc_instance_destroy": (c_int32, (c_uint64, c_uint64)),
+    "trc_light_desc_default": (LightDesc, ()),
+    "trc_light_create": (c_int32, (c_uint64, POINTER(LightDesc), POINTER(c_uint64))),
+    "trc_light_update": (c_int32, (c_uint64, c_uint64, POINTER(LightDesc))),
+    "trc_light_destroy": (c_int32, (c_uint64, c_uint64)),
+    "trc_world_desc_default": (WorldDesc, ()),
+    "trc_scene_set_world": (c_int32, (c_uint64, POINTER(WorldDesc))),
+    "trc_node_input_default": (NodeInput, ()),
+    "trc_node_default": (Node, ()),
+    "trc_material_desc_default": (MaterialDesc, ()),
+    "trc_material_create": (c_int32, (c_uint64, POINTER(MaterialDesc), POINTER(c_uint64))),
+    "trc_material_update": (c_int32, (c_uint64, c_uint64, POINTER(MaterialDesc))),
+    "trc_material_destroy": (c_int32, (c_uint64, c_uint64)),
+    "trc_image_desc_default": (ImageDesc, ()),
+    "trc_image_create": (c_int32, (c_uint64, POINTER(ImageDesc), POINTER(c_uint64))),
+    "trc_image_expect": (c_int32, (c_uint64, POINTER(ImageDesc))),
+    "trc_image_destroy": (c_int32, (c_uint64, c_uint64)),
+    "trc_rays_default": (Rays, ()),
+    "trc_hits_default": (Hits, ()),
+    "trc_query_closest": (c_int32, (c_uint64, POINTER(Rays), c_uint32, POINTER(Hits))),
+    "trc_query_occluded": (c_int32, (c_uint64, POINTER(Rays), c_uint32, c_void_p, c_uint64)),
+    "trc_reader_desc_default": (ReaderDesc, ()),
+    "trc_reader_create": (c_int32, (POINTER(ReaderDesc), POINTER(c_uint64))),
+    "trc_reader_start": (c_int32, (c_uint64,)),
+    "trc_reader_destroy": (c_int32, (c_uint64,)),
+    "trc_cryptomatte_id": (c_float, (c_char_p,)),
+    "trc_render_desc_default": (RenderDesc, ()),
+    "trc_render_start": (c_int32, (c_uint64, POINTER(RenderDesc), POINTER(c_uint64))),
+    "trc_render_progress_default": (RenderProgress, ()),
+    "trc_render_poll": (c_int32, (c_uint64, POINTER(RenderProgress))),
+    "trc_render_wait": (c_int32, (c_uint64, c_double)),
+    "trc_render_cancel": (c_int32, (c_uint64,)),
+    "trc_render_read": (c_int32, (c_uint64, c_uint32, c_void_p, c_uint64)),
+    "trc_pass_channels": (c_uint32, (c_uint32,)),
+    "trc_render_destroy": (c_int32, (c_uint64,)),
+    "trc_scene_desc_default": (SceneDesc, ()),
+    "trc_scene_create": (c_int32, (POINTER(SceneDesc), POINTER(c_uint64))),
+    "trc_scene_destroy": (c_int32, (c_uint64,)),
+    "trc_scene_commit": (c_int32, (c_uint64,)),
+    "trc_scene_cancel": (c_int32, (c_uint64,)),
+    "trc_scene_stats_default": (SceneStats, ()),
+    "trc_scene_get_stats": (c_int32, (c_uint64, POINTER(SceneStats))),
+    "trc_scene_get_warnings": (c_int32, (c_uint64, c_char_p, c_uint64, POINTER(c_uint64))),
+}
