@@ -6,29 +6,21 @@ Functions as in ``textures.py``: of the walker, the node and its ``Sockets``.
 
 import numpy as np
 
+from ..abi import MathOperation as Math, NodeType, RotateMode, SpaceId, VectorOperation as Vector
 from ..compat import TRANSFORMS_NORMALS
 from .instance import VALUES_LOCATION, VALUES_PARTICLE, VALUES_SPIN, VALUES_VELOCITY
 from .strands import DIRECTION_ATTRIBUTE, HAIR_ATTRIBUTE
 from .values import CONSTANT, DEFAULT, Value
 
-# TRC_NODE_*
-CURVES, FLOAT_CURVE, BLACKBODY, WAVELENGTH, VECTOR_TRANSFORM, VECTOR_ROTATE, CAMERA_DATA, \
-    WIREFRAME = range(104, 112)
-_COLOR_ATTRIBUTE, _MATH, _LIGHT_PATH, _GEOMETRY, _SEPARATE, _COMBINE, _MAP_RANGE = 67, 71, 74, 75, 82, 83, 84
-_VECTOR_MATH, _INSTANCE_VALUES = 88, 90
-
-# TRC_MATH_*
-_ADD, _SUBTRACT, _MULTIPLY, _DIVIDE, _MULTIPLY_ADD, _GREATER_THAN, _FLOOR = 0, 1, 2, 3, 4, 14, 20
 _CLAMP_RESULT = 256
-_PROJECT, _SCALE, _NORMALIZE = 6, 11, 12  # TRC_VECTOR_*; subtraction as TRC_MATH_*
 _RAY_LENGTH = 7  # output of the Light Path node
 _INCOMING = 4    # of the Geometry node
-_OBJECT_TO_WORLD = 1 | 0 << 2 | 1 << 4  # mode of VECTOR_TRANSFORM: TRC_SPACE_* and a vector
+_OBJECT_TO_WORLD = SpaceId.OBJECT | SpaceId.WORLD << 2 | 1 << 4  # mode of VECTOR_TRANSFORM, of a vector
 _TABLE_SIZE = 257
 
-_SPACES = ('WORLD', 'OBJECT', 'CAMERA')
 _TRANSFORMS = {'POINT': 0, 'VECTOR': 1, 'NORMAL': 3 if TRANSFORMS_NORMALS else 2}
-_ROTATIONS = ('AXIS_ANGLE', 'X_AXIS', 'Y_AXIS', 'Z_AXIS', 'EULER_XYZ')
+_ROTATIONS = {'AXIS_ANGLE': RotateMode.AXIS_ANGLE, 'X_AXIS': RotateMode.X, 'Y_AXIS': RotateMode.Y,
+              'Z_AXIS': RotateMode.Z, 'EULER_XYZ': RotateMode.EULER}
 
 
 def _constant(kind, *values):
@@ -39,13 +31,13 @@ def _number(walker, operation, *values, clamped=False):
     """The result of a Math node on values and plain numbers."""
     values = [v if isinstance(v, Value) else _constant('f', v) for v in values]
     values += [_constant('f', 0.0)] * (3 - len(values))
-    return Value('f', walker.emit(_MATH, values, operation | (_CLAMP_RESULT if clamped else 0)), 0)
+    return Value('f', walker.emit(NodeType.MATH, values, operation | (_CLAMP_RESULT if clamped else 0)), 0)
 
 
 def _vector(walker, operation, a, b=None, scale=None):
     """The vector of a Vector Math node."""
     values = (a, b or _constant('v', 0.0), _constant('v', 0.0), scale or _constant('f', 1.0))
-    return Value('v', walker.emit(_VECTOR_MATH, values, operation), 0)
+    return Value('v', walker.emit(NodeType.VECTOR_MATH, values, operation), 0)
 
 
 # Curves --------------------------------------------------------------------------------------------
@@ -72,22 +64,22 @@ def _color_curves(count, name):
         table, span, mode = _table(node.mapping, count)
         kind = 'c' if count == 4 else 'v'
         values = (sockets.get('f', "Fac"), sockets.get(kind, name), *span)
-        return {name: Value(kind, walker.emit(CURVES, values, mode, table=table), 0)}
+        return {name: Value(kind, walker.emit(NodeType.CURVES, values, mode, table=table), 0)}
     return translate
 
 
 def _float_curve(walker, node, sockets):
     table, span, mode = _table(node.mapping, 1)
     values = (sockets.get('f', "Factor"), sockets.get('f', "Value"), *span)
-    return {"Value": Value('f', walker.emit(FLOAT_CURVE, values, mode, table=table), 0)}
+    return {"Value": Value('f', walker.emit(NodeType.FLOAT_CURVE, values, mode, table=table), 0)}
 
 
 def _blackbody(walker, _node, sockets):
-    return {"Color": Value('c', walker.emit(BLACKBODY, (sockets.get('f', "Temperature"),)), 0)}
+    return {"Color": Value('c', walker.emit(NodeType.BLACKBODY, (sockets.get('f', "Temperature"),)), 0)}
 
 
 def _wavelength(walker, _node, sockets):
-    return {"Color": Value('c', walker.emit(WAVELENGTH, (sockets.get('f', "Wavelength"),)), 0)}
+    return {"Color": Value('c', walker.emit(NodeType.WAVELENGTH, (sockets.get('f', "Wavelength"),)), 0)}
 
 
 # Ranges --------------------------------------------------------------------------------------------
@@ -100,25 +92,26 @@ def _ranged(walker, node, value, source, target, steps):
     mode = _CLAMP_RESULT if node.clamp else 0
     is_number = getattr(node, "data_type", 'FLOAT') == 'FLOAT'
     if node.interpolation_type == 'LINEAR' and is_number:
-        return Value('f', walker.emit(_MAP_RANGE, (value, *source, *target), mode), 0)
+        return Value('f', walker.emit(NodeType.MAP_RANGE, (value, *source, *target), mode), 0)
     zero, one = _constant('f', 0.0), _constant('f', 1.0)
-    t = Value('f', walker.emit(_MAP_RANGE, (value, *source, zero, one), 0), 0)
+    t = Value('f', walker.emit(NodeType.MAP_RANGE, (value, *source, zero, one), 0), 0)
     if node.interpolation_type == 'STEPPED':
-        whole = _number(walker, _FLOOR, _number(walker, _MULTIPLY, t, _number(walker, _ADD, steps, 1.0)))
-        t = _number(walker, _DIVIDE, whole, steps)
+        count = _number(walker, Math.ADD, steps, 1.0)
+        whole = _number(walker, Math.FLOOR, _number(walker, Math.MULTIPLY, t, count))
+        t = _number(walker, Math.DIVIDE, whole, steps)
     elif node.interpolation_type != 'LINEAR':
-        t = _number(walker, _ADD, t, 0.0, clamped=True)
-        square = _number(walker, _MULTIPLY, t, t)
+        t = _number(walker, Math.ADD, t, 0.0, clamped=True)
+        square = _number(walker, Math.MULTIPLY, t, t)
         if node.interpolation_type == 'SMOOTHSTEP':
-            t = _number(walker, _MULTIPLY, square, _number(walker, _MULTIPLY_ADD, t, -2.0, 3.0))
+            t = _number(walker, Math.MULTIPLY, square, _number(walker, Math.MULTIPLY_ADD, t, -2.0, 3.0))
         else:
-            inner = _number(walker, _MULTIPLY_ADD, t, 6.0, -15.0)
-            inner = _number(walker, _MULTIPLY_ADD, t, inner, 10.0)
-            t = _number(walker, _MULTIPLY, _number(walker, _MULTIPLY, square, t), inner)
+            inner = _number(walker, Math.MULTIPLY_ADD, t, 6.0, -15.0)
+            inner = _number(walker, Math.MULTIPLY_ADD, t, inner, 10.0)
+            t = _number(walker, Math.MULTIPLY, _number(walker, Math.MULTIPLY, square, t), inner)
     length = one
     if is_number:  # 0 where the source is empty, and so is the range that t is in
-        length = Value('f', walker.emit(_MAP_RANGE, (source[1], *source, zero, one), 0), 0)
-    return Value('f', walker.emit(_MAP_RANGE, (t, zero, length, *target), mode), 0)
+        length = Value('f', walker.emit(NodeType.MAP_RANGE, (source[1], *source, zero, one), 0), 0)
+    return Value('f', walker.emit(NodeType.MAP_RANGE, (t, zero, length, *target), mode), 0)
 
 
 def _map_range(walker, node, sockets):
@@ -131,20 +124,20 @@ def _map_range(walker, node, sockets):
         return {"Result": _ranged(walker, node, value, ranges[:2], ranges[2:], steps)}
     names = ("Vector", "From_Min_FLOAT3", "From_Max_FLOAT3", "To_Min_FLOAT3", "To_Max_FLOAT3",
              "Steps_FLOAT3")
-    separate = [walker.emit(_SEPARATE, (sockets.get('v', name),)) for name in names]
+    separate = [walker.emit(NodeType.SEPARATE, (sockets.get('v', name),)) for name in names]
     parts = []
     for axis in range(3):
         value, *ranges, steps = [Value('f', index, axis) for index in separate]
         parts.append(_ranged(walker, node, value, ranges[:2], ranges[2:], steps))
-    return {"Vector": Value('v', walker.emit(_COMBINE, parts), 0)}
+    return {"Vector": Value('v', walker.emit(NodeType.COMBINE, parts), 0)}
 
 
 # Vectors -------------------------------------------------------------------------------------------
 
 def _vector_transform(walker, node, sockets):
-    mode = (_SPACES.index(node.convert_from) | _SPACES.index(node.convert_to) << 2
+    mode = (SpaceId[node.convert_from] | SpaceId[node.convert_to] << 2
             | _TRANSFORMS[node.vector_type] << 4)
-    index = walker.emit(VECTOR_TRANSFORM, (sockets.get('v', "Vector"),), mode)
+    index = walker.emit(NodeType.VECTOR_TRANSFORM, (sockets.get('v', "Vector"),), mode)
     return {"Vector": Value('v', index, 0)}
 
 
@@ -154,14 +147,14 @@ def _vector_rotate(walker, node, sockets):
         vector = _constant('v')
     values = (vector, sockets.get('v', "Center"), sockets.get('v', "Axis"), sockets.get('f', "Angle"),
               sockets.get('v', "Rotation"))
-    mode = _ROTATIONS.index(node.rotation_type) | (8 if node.invert else 0)
-    return {"Vector": Value('v', walker.emit(VECTOR_ROTATE, values, mode), 0)}
+    mode = _ROTATIONS[node.rotation_type] | (8 if node.invert else 0)
+    return {"Vector": Value('v', walker.emit(NodeType.VECTOR_ROTATE, values, mode), 0)}
 
 
 # Inputs --------------------------------------------------------------------------------------------
 
 def _camera_data(walker, _node, _sockets):
-    index = walker.emit(CAMERA_DATA, ())
+    index = walker.emit(NodeType.CAMERA_DATA, ())
     return {"View Vector": Value('v', index, 0), "View Z Depth": Value('f', index, 1),
             "View Distance": Value('f', index, 2)}
 
@@ -169,20 +162,20 @@ def _camera_data(walker, _node, _sockets):
 def _wireframe(walker, node, sockets):
     if node.use_pixel_size:
         return None
-    return {"Fac": Value('f', walker.emit(WIREFRAME, (sockets.get('f', "Size"),)), 0)}
+    return {"Fac": Value('f', walker.emit(NodeType.WIREFRAME, (sockets.get('f', "Size"),)), 0)}
 
 
 def _light_falloff(walker, _node, sockets):
     """Strength times powers of the ray's length, since light fades with its square; faint nearby where
     it is smooth."""
     strength, smooth = sockets.get('f', "Strength"), sockets.get('f', "Smooth")
-    length = Value('f', walker.emit(_LIGHT_PATH, ()), _RAY_LENGTH)
-    square = _number(walker, _MULTIPLY, length, length)
+    length = Value('f', walker.emit(NodeType.LIGHT_PATH, ()), _RAY_LENGTH)
+    square = _number(walker, Math.MULTIPLY, length, length)
     if smooth.node != CONSTANT or smooth.constant[0] > 0.0:
-        share = _number(walker, _DIVIDE, square, _number(walker, _ADD, square, smooth))
-        strength = _number(walker, _MULTIPLY, strength, share)
-    return {"Quadratic": strength, "Linear": _number(walker, _MULTIPLY, strength, length),
-            "Constant": _number(walker, _MULTIPLY, strength, square)}
+        share = _number(walker, Math.DIVIDE, square, _number(walker, Math.ADD, square, smooth))
+        strength = _number(walker, Math.MULTIPLY, strength, share)
+    return {"Quadratic": strength, "Linear": _number(walker, Math.MULTIPLY, strength, length),
+            "Constant": _number(walker, Math.MULTIPLY, strength, square)}
 
 
 def _ambient_occlusion(walker, _node, sockets):
@@ -194,28 +187,29 @@ def _bevel(walker, _node, sockets):
     walker.warn("Bevel is approximated by the normal as it is")
     normal = sockets.get('v', "Normal")
     if normal.node == DEFAULT:
-        normal = Value('v', walker.emit(_GEOMETRY, ()), 1)
+        normal = Value('v', walker.emit(NodeType.GEOMETRY, ()), 1)
     return {"Normal": normal}
 
 
 def _tangent_normal(walker):
     """The normal across a strand that looks at the viewer most; 0 on what is no strand."""
     walker.flat.color_names.add(DIRECTION_ATTRIBUTE)
-    strand = walker.emit(_COLOR_ATTRIBUTE, (), name=DIRECTION_ATTRIBUTE)
-    along = Value('v', walker.emit(VECTOR_TRANSFORM, (Value('v', strand, 0),), _OBJECT_TO_WORLD), 0)
-    incoming = Value('v', walker.emit(_GEOMETRY, ()), _INCOMING)
-    across = _vector(walker, _SUBTRACT, incoming, _vector(walker, _PROJECT, incoming, along))
-    return _vector(walker, _SCALE, _vector(walker, _NORMALIZE, across), scale=Value('f', strand, 1))
+    strand = walker.emit(NodeType.COLOR_ATTRIBUTE, (), name=DIRECTION_ATTRIBUTE)
+    along = Value('v', walker.emit(NodeType.VECTOR_TRANSFORM, (Value('v', strand, 0),), _OBJECT_TO_WORLD), 0)
+    incoming = Value('v', walker.emit(NodeType.GEOMETRY, ()), _INCOMING)
+    across = _vector(walker, Vector.SUBTRACT, incoming, _vector(walker, Vector.PROJECT, incoming, along))
+    unit = _vector(walker, Vector.NORMALIZE, across)
+    return _vector(walker, Vector.SCALE, unit, scale=Value('f', strand, 1))
 
 
 def _hair_info(walker, node, _sockets):
     """What the meshes of strands bring as attributes; 0 on all others."""
     walker.flat.color_names.add(HAIR_ATTRIBUTE)
-    index = walker.emit(_COLOR_ATTRIBUTE, (), name=HAIR_ATTRIBUTE)
-    parts = walker.emit(_SEPARATE, (Value('c', index, 0),))
+    index = walker.emit(NodeType.COLOR_ATTRIBUTE, (), name=HAIR_ATTRIBUTE)
+    parts = walker.emit(NodeType.SEPARATE, (Value('c', index, 0),))
     intercept, length, thickness = (Value('f', parts, i) for i in range(3))
-    is_strand = _number(walker, _GREATER_THAN, length, _constant('f', 0.0))
-    random = _number(walker, _MULTIPLY, Value('f', index, 1), is_strand)
+    is_strand = _number(walker, Math.GREATER_THAN, length, _constant('f', 0.0))
+    random = _number(walker, Math.MULTIPLY, Value('f', index, 1), is_strand)
     is_read = node.outputs["Tangent Normal"].is_linked
     tangent_normal = _tangent_normal(walker) if is_read else _constant('v', 0.0)
     return {"Is Strand": is_strand, "Intercept": intercept, "Length": length, "Thickness": thickness,
@@ -225,9 +219,9 @@ def _hair_info(walker, node, _sockets):
 def instance_value(walker, kind, first):
     """One or three of the numbers of instance.instancer_values, which are 0 in an object of its own."""
     walker.flat.needs_instancer = True
-    index = walker.emit(_INSTANCE_VALUES, (), first)
+    index = walker.emit(NodeType.INSTANCE_VALUES, (), first)
     return Value('v', index, 0) if kind == 'v' else Value(
-        'f', walker.emit(_SEPARATE, (Value('c', index, 0),)), 0)
+        'f', walker.emit(NodeType.SEPARATE, (Value('c', index, 0),)), 0)
 
 
 def _particle_info(walker, node, _sockets):

@@ -9,6 +9,7 @@ Fallbacks: a node that is not supported leaves the input it feeds at that socket
 that is not supported becomes a diffuse of its colour. Each is named once in the warnings.
 """
 
+from ..abi import NodeType, VectorOperation as Vector
 from ..compat import aov_name
 from . import nodes
 from .values import CONSTANT, DEFAULT, NO_SHADER, Value
@@ -94,13 +95,13 @@ def _emission(flat, index):
     """The constant emission of a shader node of a list, None if it is not constant."""
     node = flat.nodes[index]
     constants = [value for source, _, value in node.inputs if source == CONSTANT]
-    if node.type == nodes.EMISSION and len(constants) == 2:
+    if node.type == NodeType.EMISSION and len(constants) == 2:
         return tuple(component * constants[1][0] for component in constants[0])
-    if node.type in (nodes.ADD_SHADER, nodes.MIX_SHADER):
+    if node.type in (NodeType.ADD_SHADER, NodeType.MIX_SHADER):
         shaders = [source for source, _, _ in node.inputs[-2:]]
         colors = [_emission(flat, source) if source >= 0 else (0.0, 0.0, 0.0) for source in shaders]
         weights = (1.0, 1.0)
-        if node.type == nodes.MIX_SHADER:
+        if node.type == NodeType.MIX_SHADER:
             if node.inputs[0][0] != CONSTANT:
                 return None
             factor = min(max(node.inputs[0][2][0], 0.0), 1.0)
@@ -153,7 +154,7 @@ class Walker:
             elif node.type == 'OUTPUT_AOV' and aov_name(node) in aovs:
                 aov_type, number = aovs[aov_name(node)]
                 socket = node.inputs["Value" if aov_type == 'VALUE' else "Color"]
-                node_type = nodes.AOV_VALUE if aov_type == 'VALUE' else nodes.AOV_COLOR
+                node_type = NodeType.AOV_VALUE if aov_type == 'VALUE' else NodeType.AOV_COLOR
                 self.emit(node_type, (self.input_value(socket, path),), mode=number)
 
     # Inputs
@@ -249,23 +250,23 @@ class Walker:
             return Value(kind, CONSTANT, 0, (value.constant[0],) * 3)
         if value.node == DEFAULT:
             return value._replace(kind=kind)
-        return Value(kind, self.emit(nodes.COMBINE, (value, value, value)), 0)
+        return Value(kind, self.emit(NodeType.COMBINE, (value, value, value)), 0)
 
     def _to_number(self, value):
         """Luminance of a colour, mean of a vector."""
         if value.kind == 'c':
-            return Value('f', self.emit(nodes.RGB_TO_BW, (value,)), 0)
+            return Value('f', self.emit(NodeType.RGB_TO_BW, (value,)), 0)
         third = Value('v', CONSTANT, 0, (1.0 / 3.0,) * 3)
         zero = Value('v', CONSTANT, 0)
-        index = self.emit(nodes.VECTOR_MATH, (value, third, zero, Value('f', CONSTANT, 0)),
-                          mode=nodes.VECTOR_DOT)
+        index = self.emit(NodeType.VECTOR_MATH, (value, third, zero, Value('f', CONSTANT, 0)),
+                          mode=Vector.DOT)
         return Value('f', index, 1)
 
     def _as_emission(self, value):
         """A colour where a shader is expected shines with that colour."""
         color = self.convert(value, 'c')
         one = Value('f', CONSTANT, 0, (1.0, 0.0, 0.0))
-        return Value('s', self.emit(nodes.EMISSION, (color, one)), 0)
+        return Value('s', self.emit(NodeType.EMISSION, (color, one)), 0)
 
 
 def _source(socket):

@@ -4,8 +4,9 @@
 import bpy
 
 from .. import abi, native
+from ..abi import NodeType
 from ..compat import CHOOSES_LOBES_PLAINLY, cycles, uses_nodes
-from . import flatten, nodes, tangents
+from . import flatten, tangents
 from .changes import Changes
 from .values import CONSTANT, DEFAULT, Value
 
@@ -89,7 +90,7 @@ class Materials:
         """A material that punches a hole."""
         if _HOLDOUT_KEY not in self._seen:
             flat = flatten.FlatTree()
-            flat.nodes.append(flatten.FlatNode(nodes.HOLDOUT, []))
+            flat.nodes.append(flatten.FlatNode(NodeType.HOLDOUT, []))
             flat.surface = 0
             self._update(_HOLDOUT_KEY, flat)
         return self._entries[_HOLDOUT_KEY].id
@@ -219,7 +220,7 @@ def _has_transparent_shadow(material):
 def _let_through(flat):
     """Make a tree without a surface one that lets all light through."""
     white = CONSTANT, 0, (1.0, 1.0, 1.0)
-    flat.nodes.append(flatten.FlatNode(nodes.TRANSPARENT, [white]))
+    flat.nodes.append(flatten.FlatNode(NodeType.TRANSPARENT, [white]))
     flat.surface = len(flat.nodes) - 1
 
 
@@ -228,12 +229,12 @@ def _plain_surface(material):
     walker = flatten.Walker("", None)
     values = (Value('c', CONSTANT, 0, tuple(material.diffuse_color)[:3]), Value('f', CONSTANT, 0),
               Value('v', DEFAULT, 0))
-    walker.flat.surface = walker.emit(nodes.DIFFUSE, values)
+    walker.flat.surface = walker.emit(NodeType.DIFFUSE, values)
     return walker.flat
 
 
 def _background(color):
     walker = flatten.Walker("", None)
     values = (Value('c', CONSTANT, 0, tuple(color)[:3]), Value('f', CONSTANT, 0, (1.0, 0.0, 0.0)))
-    walker.flat.surface = walker.emit(nodes.BACKGROUND, values)
+    walker.flat.surface = walker.emit(NodeType.BACKGROUND, values)
     return walker.flat

@@ -10,6 +10,8 @@ from collections import namedtuple
 
 import numpy as np
 
+from ..abi import (BlendMode, DistributionType, ImageMode, MathOperation as Math, NodeType, TangentSource,
+                   VectorOperation as Vector)
 from ..compat import HAS_CORRELATED_MICROFACETS, KEEPS_DIFFUSE_ENERGY, RAMP_STEPS
 from . import tangents
 from .converters import CONVERTERS, instance_value
@@ -18,43 +20,27 @@ from .instance import VALUES_GENERATED, VALUES_UV
 from .textures import TEXTURES
 from .values import CONSTANT, DEFAULT, Value
 
-# TRC_NODE_*
-(DIFFUSE, GLOSSY, GLASS, REFRACTION, TRANSPARENT, TRANSLUCENT, EMISSION, BACKGROUND, MIX_SHADER,
- ADD_SHADER, HOLDOUT, PRINCIPLED, VELVET, TOON, LAYERED_PRINCIPLED, SHEEN) = range(1, 17)
-(IMAGE, ENVIRONMENT, UV_MAP, COLOR_ATTRIBUTE, TEXTURE_COORDINATE, MAPPING, MIX_COLOR, MATH, FRESNEL,
- LAYER_WEIGHT, LIGHT_PATH, GEOMETRY, NORMAL_MAP, INVERT, GAMMA, HUE_SATURATION, BRIGHT_CONTRAST,
- COLOR_RAMP, SEPARATE, COMBINE, MAP_RANGE, CLAMP, CHECKER, OBJECT_INFO, VECTOR_MATH,
- RGB_TO_BW) = range(64, 90)
+_TANGENT_AXES = {'X': TangentSource.X, 'Y': TangentSource.Y, 'Z': TangentSource.Z}
 
-AOV_VALUE, AOV_COLOR, TANGENT = 112, 113, 114
-_TANGENT_AXES, _TANGENT_UV = ('Z', 'X', 'Y'), 3
+_DISTRIBUTIONS = {
+    'GGX': DistributionType.GGX, 'MULTI_GGX': DistributionType.MULTI_GGX,
+    'BECKMANN': DistributionType.BECKMANN, 'SHARP': DistributionType.SHARP,
+    'ASHIKHMIN_SHIRLEY': DistributionType.ASHIKHMIN}
+_CORRELATED = DistributionType.CORRELATED if HAS_CORRELATED_MICROFACETS else 0
 
-_DISTRIBUTIONS = {'GGX': 0, 'MULTI_GGX': 1, 'BECKMANN': 2, 'SHARP': 3, 'ASHIKHMIN_SHIRLEY': 4}
-_CORRELATED = 16 if HAS_CORRELATED_MICROFACETS else 0
+_BLENDS, _MATH_OPERATIONS = BlendMode.__members__, Math.__members__
+_VECTOR_OPERATIONS = {
+    **Vector.__members__, 'CROSS_PRODUCT': Vector.CROSS,
+    'DOT_PRODUCT': Vector.DOT, 'FRACTION': Vector.FRACT}
 
-_BLENDS = ('MIX', 'DARKEN', 'MULTIPLY', 'BURN', 'LIGHTEN', 'SCREEN', 'DODGE', 'ADD', 'OVERLAY',
-           'SOFT_LIGHT', 'LINEAR_LIGHT', 'DIFFERENCE', 'SUBTRACT', 'DIVIDE', 'HUE', 'SATURATION',
-           'COLOR', 'VALUE', 'EXCLUSION')
-
-_MATH = ('ADD', 'SUBTRACT', 'MULTIPLY', 'DIVIDE', 'MULTIPLY_ADD', 'POWER', 'LOGARITHM', 'SQRT',
-         'INVERSE_SQRT', 'ABSOLUTE', 'EXPONENT', 'MINIMUM', 'MAXIMUM', 'LESS_THAN', 'GREATER_THAN',
-         'SIGN', 'COMPARE', 'SMOOTH_MIN', 'SMOOTH_MAX', 'ROUND', 'FLOOR', 'CEIL', 'TRUNC', 'FRACT',
-         'MODULO', 'WRAP', 'SNAP', 'PINGPONG', 'SINE', 'COSINE', 'TANGENT', 'ARCSINE', 'ARCCOSINE',
-         'ARCTANGENT', 'ARCTAN2', 'SINH', 'COSH', 'TANH', 'RADIANS', 'DEGREES')
-
-_VECTOR_MATH = ('ADD', 'SUBTRACT', 'MULTIPLY', 'DIVIDE', 'MULTIPLY_ADD', 'CROSS_PRODUCT', 'PROJECT',
-                'REFLECT', 'DOT_PRODUCT', 'DISTANCE', 'LENGTH', 'SCALE', 'NORMALIZE', 'ABSOLUTE',
-                'MINIMUM', 'MAXIMUM', 'FLOOR', 'CEIL', 'FRACTION', 'SINE', 'COSINE', 'TANGENT', 'SNAP',
-                'MODULO', 'WRAP', 'FACEFORWARD', 'REFRACT')
-VECTOR_SUBTRACT, VECTOR_MULTIPLY_ADD, VECTOR_DOT, VECTOR_NORMALIZE = 1, 4, 8, 12
-VECTOR_MINIMUM, VECTOR_MAXIMUM, _VECTOR_FLOOR = 14, 15, 16
-_MATH_ADD, _MATH_SUBTRACT, _MATH_MULTIPLY, _MATH_MULTIPLY_ADD, _MATH_COMPARE = 0, 1, 2, 4, 16
-
-_INTERPOLATIONS = {'Linear': 0, 'Closest': 1, 'Cubic': 2, 'Smart': 2}
-_EXTENSIONS = {'REPEAT': 0, 'EXTEND': 1, 'CLIP': 2, 'MIRROR': 3}
+_INTERPOLATIONS = {'Linear': ImageMode.LINEAR, 'Closest': ImageMode.CLOSEST, 'Cubic': ImageMode.CUBIC,
+                   'Smart': ImageMode.CUBIC}
+_EXTENSIONS = {'REPEAT': ImageMode.REPEAT, 'EXTEND': ImageMode.EXTEND, 'CLIP': ImageMode.CLIP,
+               'MIRROR': ImageMode.MIRROR}
 _PROJECTIONS = {'FLAT': 0, 'BOX': 1, 'SPHERE': 2, 'TUBE': 3}
 _CLAMP_RESULT = 256
-_ANISOTROPIC = {GLOSSY: (2, 5), PRINCIPLED: (7, 21), LAYERED_PRINCIPLED: (9, 11)}  # anisotropy, tangent
+_ANISOTROPIC = {  # anisotropy, tangent
+    NodeType.GLOSSY: (2, 5), NodeType.PRINCIPLED: (7, 21), NodeType.LAYERED_PRINCIPLED: (9, 11)}
 RAMP_SIZE = 257
 
 # inputs: (kind, socket identifiers by preference...); outputs: (socket identifier, kind) in the
@@ -99,95 +85,97 @@ def _color_mode(node):
 
 def _math_mode(node):
     operation = 'WRAP' if node.operation == 'FLOORED_MODULO' else node.operation
-    if operation not in _MATH:
+    if operation not in _MATH_OPERATIONS:
         return None
-    return _MATH.index(operation) | (_CLAMP_RESULT if node.use_clamp else 0)
+    return _MATH_OPERATIONS[operation] | (_CLAMP_RESULT if node.use_clamp else 0)
 
 
 def _vector_math_mode(node):
-    return _VECTOR_MATH.index(node.operation) if node.operation in _VECTOR_MATH else None
+    return _VECTOR_OPERATIONS.get(node.operation)
 
 
 def _mix_rgb_mode(node):
     if node.blend_type not in _BLENDS:
         return None
-    return _BLENDS.index(node.blend_type) | (_CLAMP_RESULT if node.use_clamp else 0)
+    return _BLENDS[node.blend_type] | (_CLAMP_RESULT if node.use_clamp else 0)
 
 
 _SPECS = {
     "ShaderNodeBsdfDiffuse": Spec(
-        DIFFUSE, (('c', "Color"), ('f', "Roughness"), ('v', "Normal")), _SHADER,
+        NodeType.DIFFUSE, (('c', "Color"), ('f', "Roughness"), ('v', "Normal")), _SHADER,
         lambda _node: int(KEEPS_DIFFUSE_ENERGY)),
     "ShaderNodeBsdfGlossy": Spec(
-        GLOSSY, (('c', "Color"), ('f', "Roughness"), ('f', "Anisotropy"), ('f', "Rotation"),
+        NodeType.GLOSSY, (('c', "Color"), ('f', "Roughness"), ('f', "Anisotropy"), ('f', "Rotation"),
                  ('v', "Normal"), ('v', "Tangent")), _SHADER, _microfacets),
     "ShaderNodeBsdfGlass": Spec(
-        GLASS, (('c', "Color"), ('f', "Roughness"), ('f', "IOR"), ('v', "Normal")), _SHADER,
+        NodeType.GLASS, (('c', "Color"), ('f', "Roughness"), ('f', "IOR"), ('v', "Normal")), _SHADER,
         _microfacets),
     "ShaderNodeBsdfRefraction": Spec(
-        REFRACTION, (('c', "Color"), ('f', "Roughness"), ('f', "IOR"), ('v', "Normal")), _SHADER,
+        NodeType.REFRACTION, (('c', "Color"), ('f', "Roughness"), ('f', "IOR"), ('v', "Normal")), _SHADER,
         _microfacets),
-    "ShaderNodeBsdfTransparent": Spec(TRANSPARENT, (('c', "Color"),), _SHADER),
-    "ShaderNodeBsdfTranslucent": Spec(TRANSLUCENT, (('c', "Color"), ('v', "Normal")), _SHADER),
+    "ShaderNodeBsdfTransparent": Spec(NodeType.TRANSPARENT, (('c', "Color"),), _SHADER),
+    "ShaderNodeBsdfTranslucent": Spec(NodeType.TRANSLUCENT, (('c', "Color"), ('v', "Normal")), _SHADER),
     "ShaderNodeBsdfVelvet": Spec(
-        VELVET, (('c', "Color"), ('f', "Sigma"), ('v', "Normal")), _SHADER),
+        NodeType.VELVET, (('c', "Color"), ('f', "Sigma"), ('v', "Normal")), _SHADER),
     "ShaderNodeBsdfToon": Spec(
-        TOON, (('c', "Color"), ('f', "Size"), ('f', "Smooth"), ('v', "Normal")), _SHADER,
+        NodeType.TOON, (('c', "Color"), ('f', "Size"), ('f', "Smooth"), ('v', "Normal")), _SHADER,
         lambda node: 0 if node.component == 'DIFFUSE' else 1),
     "ShaderNodeEmission": Spec(
-        EMISSION, (('c', "Color"), ('f', "Strength")), (("Emission", 's'),)),
+        NodeType.EMISSION, (('c', "Color"), ('f', "Strength")), (("Emission", 's'),)),
     "ShaderNodeBackground": Spec(
-        BACKGROUND, (('c', "Color"), ('f', "Strength")), (("Background", 's'),)),
+        NodeType.BACKGROUND, (('c', "Color"), ('f', "Strength")), (("Background", 's'),)),
     "ShaderNodeMixShader": Spec(
-        MIX_SHADER, (('f', "Fac"), ('s', "Shader"), ('s', "Shader_001")), (("Shader", 's'),)),
+        NodeType.MIX_SHADER, (('f', "Fac"), ('s', "Shader"), ('s', "Shader_001")), (("Shader", 's'),)),
     "ShaderNodeAddShader": Spec(
-        ADD_SHADER, (('s', "Shader"), ('s', "Shader_001")), (("Shader", 's'),)),
-    "ShaderNodeHoldout": Spec(HOLDOUT, (), (("Holdout", 's'),)),
+        NodeType.ADD_SHADER, (('s', "Shader"), ('s', "Shader_001")), (("Shader", 's'),)),
+    "ShaderNodeHoldout": Spec(NodeType.HOLDOUT, (), (("Holdout", 's'),)),
     "ShaderNodeMapping": Spec(
-        MAPPING, (('v', "Vector"), ('v', "Location"), ('v', "Rotation"), ('v', "Scale")),
+        NodeType.MAPPING, (('v', "Vector"), ('v', "Location"), ('v', "Rotation"), ('v', "Scale")),
         (("Vector", 'v'),), lambda node: ('POINT', 'TEXTURE', 'VECTOR', 'NORMAL').index(node.vector_type)),
     "ShaderNodeMixRGB": Spec(
-        MIX_COLOR, (('f', "Fac"), ('c', "Color1"), ('c', "Color2")), (("Color", 'c'),), _mix_rgb_mode),
+        NodeType.MIX_COLOR, (('f', "Fac"), ('c', "Color1"), ('c', "Color2")), (("Color", 'c'),),
+        _mix_rgb_mode),
     "ShaderNodeVectorMath": Spec(
-        VECTOR_MATH, (('v', "Vector"), ('v', "Vector_001"), ('v', "Vector_002"), ('f', "Scale")),
+        NodeType.VECTOR_MATH, (('v', "Vector"), ('v', "Vector_001"), ('v', "Vector_002"), ('f', "Scale")),
         (("Vector", 'v'), ("Value", 'f')), _vector_math_mode),
-    "ShaderNodeFresnel": Spec(FRESNEL, (('f', "IOR"), ('v', "Normal")), (("Fac", 'f'),)),
+    "ShaderNodeFresnel": Spec(NodeType.FRESNEL, (('f', "IOR"), ('v', "Normal")), (("Fac", 'f'),)),
     "ShaderNodeLayerWeight": Spec(
-        LAYER_WEIGHT, (('f', "Blend"), ('v', "Normal")), (("Fresnel", 'f'), ("Facing", 'f'))),
+        NodeType.LAYER_WEIGHT, (('f', "Blend"), ('v', "Normal")), (("Fresnel", 'f'), ("Facing", 'f'))),
     "ShaderNodeLightPath": Spec(
-        LIGHT_PATH, (), tuple((name, 'f') for name in (
+        NodeType.LIGHT_PATH, (), tuple((name, 'f') for name in (
             "Is Camera Ray", "Is Shadow Ray", "Is Diffuse Ray", "Is Glossy Ray", "Is Singular Ray",
             "Is Reflection Ray", "Is Transmission Ray", "Ray Length", "Ray Depth", "Diffuse Depth",
             "Glossy Depth", "Transparent Depth", "Transmission Depth"))),
-    "ShaderNodeInvert": Spec(INVERT, (('f', "Fac"), ('c', "Color")), (("Color", 'c'),)),
-    "ShaderNodeGamma": Spec(GAMMA, (('c', "Color"), ('f', "Gamma")), (("Color", 'c'),)),
+    "ShaderNodeInvert": Spec(NodeType.INVERT, (('f', "Fac"), ('c', "Color")), (("Color", 'c'),)),
+    "ShaderNodeGamma": Spec(NodeType.GAMMA, (('c', "Color"), ('f', "Gamma")), (("Color", 'c'),)),
     "ShaderNodeHueSaturation": Spec(
-        HUE_SATURATION, (('f', "Hue"), ('f', "Saturation"), ('f', "Value"), ('f', "Fac"),
+        NodeType.HUE_SATURATION, (('f', "Hue"), ('f', "Saturation"), ('f', "Value"), ('f', "Fac"),
                          ('c', "Color")), (("Color", 'c'),)),
     "ShaderNodeBrightContrast": Spec(
-        BRIGHT_CONTRAST, (('c', "Color"), ('f', "Bright"), ('f', "Contrast")), (("Color", 'c'),)),
-    "ShaderNodeSeparateXYZ": Spec(SEPARATE, (('v', "Vector"),), (("X", 'f'), ("Y", 'f'), ("Z", 'f'))),
-    "ShaderNodeSeparateRGB": Spec(SEPARATE, (('c', "Image"),), (("R", 'f'), ("G", 'f'), ("B", 'f'))),
+        NodeType.BRIGHT_CONTRAST, (('c', "Color"), ('f', "Bright"), ('f', "Contrast")), (("Color", 'c'),)),
+    "ShaderNodeSeparateXYZ": Spec(
+        NodeType.SEPARATE, (('v', "Vector"),), (("X", 'f'), ("Y", 'f'), ("Z", 'f'))),
+    "ShaderNodeSeparateRGB": Spec(NodeType.SEPARATE, (('c', "Image"),), (("R", 'f'), ("G", 'f'), ("B", 'f'))),
     "ShaderNodeSeparateColor": Spec(
-        SEPARATE, (('c', "Color"),), (("Red", 'f'), ("Green", 'f'), ("Blue", 'f')), _color_mode),
+        NodeType.SEPARATE, (('c', "Color"),), (("Red", 'f'), ("Green", 'f'), ("Blue", 'f')), _color_mode),
     "ShaderNodeSeparateHSV": Spec(
-        SEPARATE, (('c', "Color"),), (("H", 'f'), ("S", 'f'), ("V", 'f')), lambda _node: 1),
+        NodeType.SEPARATE, (('c', "Color"),), (("H", 'f'), ("S", 'f'), ("V", 'f')), lambda _node: 1),
     "ShaderNodeCombineHSV": Spec(
-        COMBINE, (('f', "H"), ('f', "S"), ('f', "V")), (("Color", 'c'),), lambda _node: 1),
-    "ShaderNodeCombineXYZ": Spec(COMBINE, (('f', "X"), ('f', "Y"), ('f', "Z")), (("Vector", 'v'),)),
-    "ShaderNodeCombineRGB": Spec(COMBINE, (('f', "R"), ('f', "G"), ('f', "B")), (("Image", 'c'),)),
+        NodeType.COMBINE, (('f', "H"), ('f', "S"), ('f', "V")), (("Color", 'c'),), lambda _node: 1),
+    "ShaderNodeCombineXYZ": Spec(NodeType.COMBINE, (('f', "X"), ('f', "Y"), ('f', "Z")), (("Vector", 'v'),)),
+    "ShaderNodeCombineRGB": Spec(NodeType.COMBINE, (('f', "R"), ('f', "G"), ('f', "B")), (("Image", 'c'),)),
     "ShaderNodeCombineColor": Spec(
-        COMBINE, (('f', "Red"), ('f', "Green"), ('f', "Blue")), (("Color", 'c'),), _color_mode),
+        NodeType.COMBINE, (('f', "Red"), ('f', "Green"), ('f', "Blue")), (("Color", 'c'),), _color_mode),
     "ShaderNodeClamp": Spec(
-        CLAMP, (('f', "Value"), ('f', "Min"), ('f', "Max")), (("Result", 'f'),),
+        NodeType.CLAMP, (('f', "Value"), ('f', "Min"), ('f', "Max")), (("Result", 'f'),),
         lambda node: 0 if node.clamp_type == 'MINMAX' else 1),
     "ShaderNodeTexChecker": Spec(
-        CHECKER, (('v', "Vector"), ('c', "Color1"), ('c', "Color2"), ('f', "Scale")),
+        NodeType.CHECKER, (('v', "Vector"), ('c', "Color1"), ('c', "Color2"), ('f', "Scale")),
         (("Color", 'c'), ("Fac", 'f'))),
     "ShaderNodeObjectInfo": Spec(
-        OBJECT_INFO, (), (("Location", 'v'), ("Color", 'c'), ("Alpha", 'f'), ("Object Index", 'f'),
+        NodeType.OBJECT_INFO, (), (("Location", 'v'), ("Color", 'c'), ("Alpha", 'f'), ("Object Index", 'f'),
                           ("Material Index", 'f'), ("Random", 'f'))),
-    "ShaderNodeRGBToBW": Spec(RGB_TO_BW, (('c', "Color"),), (("Val", 'f'),)),
+    "ShaderNodeRGBToBW": Spec(NodeType.RGB_TO_BW, (('c', "Color"),), (("Val", 'f'),)),
 }
 _SPECS["ShaderNodeBsdfAnisotropic"] = _SPECS["ShaderNodeBsdfGlossy"]
 
@@ -214,9 +202,9 @@ def translate(walker, node, path):
 
 def _note_generated(walker, node, node_type, values):
     """Ask for Generated coordinates where a node takes them unasked."""
-    if node_type == CHECKER:
+    if node_type == NodeType.CHECKER:
         is_needed = values[0].node == DEFAULT
-    elif node_type == GEOMETRY:
+    elif node_type == NodeType.GEOMETRY:
         is_needed = node.outputs["Tangent"].is_linked
     elif node_type in _ANISOTROPIC:  # around the Z axis of Generated, unless told otherwise
         anisotropy, tangent = (values[i] for i in _ANISOTROPIC[node_type])
@@ -254,8 +242,8 @@ class Sockets:
 
 def _constant(kind, x, y=None, z=None):
     if kind == 'f':
-        return Value('f', -1, 0, (x, 0.0, 0.0))
-    return Value(kind, -1, 0, (x, x if y is None else y, x if z is None else z))
+        return Value('f', CONSTANT, 0, (x, 0.0, 0.0))
+    return Value(kind, CONSTANT, 0, (x, x if y is None else y, x if z is None else z))
 
 
 def _outputs(walker, index, outputs):
@@ -265,13 +253,13 @@ def _outputs(walker, index, outputs):
 def _number(walker, operation, *values):
     """A MATH node's result as a Value."""
     values = list(values) + [_constant('f', 0.0)] * (3 - len(values))
-    return Value('f', walker.emit(MATH, values, operation), 0)
+    return Value('f', walker.emit(NodeType.MATH, values, operation), 0)
 
 
 def _vector(walker, operation, *values):
     """A VECTOR_MATH node's vector result as a Value."""
     values = list(values) + [_constant('v', 0.0)] * (3 - len(values)) + [_constant('f', 0.0)]
-    return Value('v', walker.emit(VECTOR_MATH, values, operation), 0)
+    return Value('v', walker.emit(NodeType.VECTOR_MATH, values, operation), 0)
 
 
 def _unsupported(walker, node, sockets):
@@ -284,7 +272,7 @@ def _unsupported(walker, node, sockets):
         walker.warn(f"{node.bl_label} is not supported, a diffuse of its colour is used")
         values = (sockets.get('c', "Color", "Base Color"), _constant('f', 0.0),
                   sockets.get('v', "Normal"))
-        return {shader.identifier: Value('s', walker.emit(DIFFUSE, values), 0)}
+        return {shader.identifier: Value('s', walker.emit(NodeType.DIFFUSE, values), 0)}
     if node.bl_idname in _PASSED_THROUGH:
         source, target = _PASSED_THROUGH[node.bl_idname]
         walker.warn(f"{node.bl_label} is not supported, its input {source} is passed on")
@@ -302,7 +290,7 @@ def _unsupported(walker, node, sockets):
 def _principled(walker, node, sockets):
     """Principled of 3.4, or the layers of 4.0 and later."""
     is_layered = sockets.find("Specular IOR Level") is not None
-    kind = LAYERED_PRINCIPLED if is_layered else PRINCIPLED
+    kind = NodeType.LAYERED_PRINCIPLED if is_layered else NodeType.PRINCIPLED
     inputs = _LAYERED_INPUTS if is_layered else _PRINCIPLED_INPUTS
     values = [sockets.get(kind_of_value, name) for kind_of_value, name in inputs]
     _name_missing(walker, sockets)
@@ -341,8 +329,8 @@ def _metallic(walker, node, sockets):
               sockets.get('v', "Normal"), zero, zero, edge, sockets.get('f', "Anisotropy"),
               sockets.get('f', "Rotation"), sockets.get('v', "Tangent"), zero, zero, zero, one, white,
               none, zero, zero, white, black, zero]
-    _note_generated(walker, node, LAYERED_PRINCIPLED, values)
-    return {"BSDF": Value('s', walker.emit(LAYERED_PRINCIPLED, values, _distribution(node) or 0), 0)}
+    _note_generated(walker, node, NodeType.LAYERED_PRINCIPLED, values)
+    return {"BSDF": Value('s', walker.emit(NodeType.LAYERED_PRINCIPLED, values, _distribution(node) or 0), 0)}
 
 
 _EDGE_COSINE = 1.0 / 7.0  # where the edge tint rules: 82 degrees
@@ -366,7 +354,7 @@ def _sheen(walker, node, sockets):
     """The Sheen shader of 4.0 and later; Velvet is one of its distributions."""
     values = [sockets.get(kind, name) for kind, name in (('c', "Color"), ('f', "Roughness"),
                                                          ('v', "Normal"))]
-    kind = VELVET if node.distribution == 'ASHIKHMIN' else SHEEN
+    kind = NodeType.VELVET if node.distribution == 'ASHIKHMIN' else NodeType.SHEEN
     return {"BSDF": Value('s', walker.emit(kind, values), 0)}
 
 
@@ -381,9 +369,9 @@ def _rgb(walker, node, _sockets):
 def _normal(walker, node, sockets):
     """The Normal node: a direction of its own, and the cosine of its input to it."""
     direction = _constant('v', *node.outputs[0].default_value)
-    values = (_vector(walker, VECTOR_NORMALIZE, sockets.get('v', "Normal")),
-              _vector(walker, VECTOR_NORMALIZE, direction), _constant('v', 0.0), _constant('f', 0.0))
-    dot = walker.emit(VECTOR_MATH, values, VECTOR_DOT)
+    values = (_vector(walker, Vector.NORMALIZE, sockets.get('v', "Normal")),
+              _vector(walker, Vector.NORMALIZE, direction), _constant('v', 0.0), _constant('f', 0.0))
+    dot = walker.emit(NodeType.VECTOR_MATH, values, Vector.DOT)
     return {"Normal": direction, "Dot": Value('f', dot, 1)}
 
 
@@ -391,52 +379,53 @@ def _image(walker, node, sockets):
     vector = sockets.get('v', "Vector")
     if vector.node == DEFAULT:
         walker.flat.uv_names.add("")
-    mode = (_INTERPOLATIONS.get(node.interpolation, 0) | _EXTENSIONS.get(node.extension, 0) << 2
+    mode = (_INTERPOLATIONS.get(node.interpolation, 0) | _EXTENSIONS.get(node.extension, 0)
             | _PROJECTIONS.get(node.projection, 0) << 4)
     if node.image is not None and node.image.source == 'TILED' and node.projection == 'FLAT':
         return _tiles(walker, walker.tiles_of(node), vector, mode)
     blend = _constant('f', node.projection_blend)
-    index = walker.emit(IMAGE, (vector, blend), mode, image=walker.image_of(node))
+    index = walker.emit(NodeType.IMAGE, (vector, blend), mode, image=walker.image_of(node))
     return _outputs(walker, index, (("Color", 'c'), ("Alpha", 'f')))
 
 
 def _tiles(walker, tiles, vector, mode):
     """Each tile of a tiled image in its own unit square, magenta beyond all."""
     if vector.node == DEFAULT:
-        vector = Value('v', walker.emit(UV_MAP, (), name=""), 0)
-    floor = _vector(walker, _VECTOR_FLOOR, vector)
-    place = _vector(walker, VECTOR_SUBTRACT, vector, floor)
-    parts = walker.emit(SEPARATE, (floor,))
+        vector = Value('v', walker.emit(NodeType.UV_MAP, (), name=""), 0)
+    floor = _vector(walker, Vector.FLOOR, vector)
+    place = _vector(walker, Vector.SUBTRACT, vector, floor)
+    parts = walker.emit(NodeType.SEPARATE, (floor,))
     color, alpha = _constant('c', 1.0, 0.0, 1.0), _constant('f', 1.0)
     half, no_blend = _constant('f', 0.5), _constant('f', 0.0)
     for column, row, image in tiles:
-        is_column, is_row = (_number(walker, _MATH_COMPARE, Value('f', parts, i), _constant('f', number), half)
+        is_column, is_row = (_number(walker, Math.COMPARE, Value('f', parts, i), _constant('f', number), half)
                              for i, number in enumerate((float(column), float(row))))
-        is_here = _number(walker, _MATH_MULTIPLY, is_column, is_row)
-        index = walker.emit(IMAGE, (place, no_blend), mode, image=image)
-        color = Value('c', walker.emit(MIX_COLOR, (is_here, color, Value('c', index, 0))), 0)
-        step = _number(walker, _MATH_SUBTRACT, Value('f', index, 1), alpha)
-        alpha = _number(walker, _MATH_MULTIPLY_ADD, step, is_here, alpha)
+        is_here = _number(walker, Math.MULTIPLY, is_column, is_row)
+        index = walker.emit(NodeType.IMAGE, (place, no_blend), mode, image=image)
+        color = Value('c', walker.emit(NodeType.MIX_COLOR, (is_here, color, Value('c', index, 0))), 0)
+        step = _number(walker, Math.SUBTRACT, Value('f', index, 1), alpha)
+        alpha = _number(walker, Math.MULTIPLY_ADD, step, is_here, alpha)
     return {"Color": color, "Alpha": alpha}
 
 
 def _environment(walker, node, sockets):
     mode = (_INTERPOLATIONS.get(node.interpolation, 0)
             | (16 if node.projection == 'MIRROR_BALL' else 0))
-    index = walker.emit(ENVIRONMENT, (sockets.get('v', "Vector"),), mode, image=walker.image_of(node))
+    index = walker.emit(NodeType.ENVIRONMENT, (sockets.get('v', "Vector"),), mode,
+                        image=walker.image_of(node))
     return _outputs(walker, index, (("Color", 'c'),))
 
 
 def _geometry(walker, node, sockets):
-    _note_generated(walker, node, GEOMETRY, ())
-    outputs = _outputs(walker, walker.emit(GEOMETRY, ()), (
+    _note_generated(walker, node, NodeType.GEOMETRY, ())
+    outputs = _outputs(walker, walker.emit(NodeType.GEOMETRY, ()), (
         ("Position", 'v'), ("Normal", 'v'), ("Tangent", 'v'), ("True Normal", 'v'), ("Incoming", 'v'),
         ("Parametric", 'v'), ("Backfacing", 'f')))
     for output, attribute in (("Pointiness", POINTINESS), ("Random Per Island", ISLAND)):
         if node.outputs[output].is_linked:
             walker.flat.color_names.add(attribute)
-            index = walker.emit(COLOR_ATTRIBUTE, (), name=attribute)
-            outputs[output] = Value('f', walker.emit(SEPARATE, (Value('c', index, 0),)), 0)
+            index = walker.emit(NodeType.COLOR_ATTRIBUTE, (), name=attribute)
+            outputs[output] = Value('f', walker.emit(NodeType.SEPARATE, (Value('c', index, 0),)), 0)
     return outputs
 
 
@@ -444,7 +433,7 @@ def _uv_map(walker, node, _sockets):
     if node.from_instancer:
         return {"UV": instance_value(walker, 'v', VALUES_UV)}
     walker.flat.uv_names.add(node.uv_map)
-    return _outputs(walker, walker.emit(UV_MAP, (), name=node.uv_map), (("UV", 'v'),))
+    return _outputs(walker, walker.emit(NodeType.UV_MAP, (), name=node.uv_map), (("UV", 'v'),))
 
 
 def _texture_coordinate(walker, node, _sockets):
@@ -452,7 +441,7 @@ def _texture_coordinate(walker, node, _sockets):
     if "UV" in linked:
         walker.flat.uv_names.add("")
     walker.flat.needs_generated |= "Generated" in linked
-    index = walker.emit(TEXTURE_COORDINATE, ())
+    index = walker.emit(NodeType.TEXTURE_COORDINATE, ())
     outputs = _outputs(walker, index, tuple((name, 'v') for name in (
         "Generated", "Normal", "UV", "Object", "Camera", "Window", "Reflection")))
     if node.object is not None and "Object" in linked:
@@ -466,18 +455,18 @@ def _texture_coordinate(walker, node, _sockets):
 def _place_in(walker, blender_object):
     """The shading point in another object's coordinates."""
     walker.flat.follows_objects = True
-    position = Value('v', walker.emit(GEOMETRY, ()), 0)
+    position = Value('v', walker.emit(NodeType.GEOMETRY, ()), 0)
     zero = _constant('v', 0.0), _constant('f', 0.0)
     parts = []
     for row in blender_object.matrix_world.inverted_safe()[:3]:
-        dot = walker.emit(VECTOR_MATH, (position, _constant('v', *row[:3])) + zero, VECTOR_DOT)
-        parts.append(_number(walker, _MATH_ADD, Value('f', dot, 1), _constant('f', row[3])))
-    return Value('v', walker.emit(COMBINE, parts), 0)
+        dot = walker.emit(NodeType.VECTOR_MATH, (position, _constant('v', *row[:3])) + zero, Vector.DOT)
+        parts.append(_number(walker, Math.ADD, Value('f', dot, 1), _constant('f', row[3])))
+    return Value('v', walker.emit(NodeType.COMBINE, parts), 0)
 
 
 def _color_attribute(walker, node, _sockets):
     walker.flat.color_names.add(node.layer_name)
-    index = walker.emit(COLOR_ATTRIBUTE, (), name=node.layer_name)
+    index = walker.emit(NodeType.COLOR_ATTRIBUTE, (), name=node.layer_name)
     return _outputs(walker, index, (("Color", 'c'), ("Alpha", 'f')))
 
 
@@ -486,7 +475,7 @@ def _attribute(walker, node, _sockets):
     if getattr(node, "attribute_type", 'GEOMETRY') != 'GEOMETRY' or not node.attribute_name:
         return None
     walker.flat.color_names.add(node.attribute_name)
-    index = walker.emit(COLOR_ATTRIBUTE, (), name=node.attribute_name)
+    index = walker.emit(NodeType.COLOR_ATTRIBUTE, (), name=node.attribute_name)
     outputs = _outputs(walker, index, (("Color", 'c'), ("Alpha", 'f')))
     outputs["Vector"] = outputs["Color"]._replace(kind='v')
     outputs["Fac"] = walker.convert(outputs["Vector"], 'f')
@@ -500,13 +489,13 @@ def _math(walker, node, sockets):
     values = [sockets.get('f', name) for name in ("Value", "Value_001", "Value_002")]
     if node.operation == 'FLOORED_MODULO':  # the range to wrap into begins at 0
         values[2] = _constant('f', 0.0)
-    return _outputs(walker, walker.emit(MATH, values, mode), (("Value", 'f'),))
+    return _outputs(walker, walker.emit(NodeType.MATH, values, mode), (("Value", 'f'),))
 
 
 def _normal_map(walker, node, sockets):
     space = ('TANGENT', 'OBJECT', 'WORLD', 'BLENDER_OBJECT', 'BLENDER_WORLD').index(node.space)
     name = _tangents_of(walker, node) if space == 0 else ""
-    index = walker.emit(NORMAL_MAP, (sockets.get('f', "Strength"), sockets.get('c', "Color")), space,
+    index = walker.emit(NodeType.NORMAL_MAP, (sockets.get('f', "Strength"), sockets.get('c', "Color")), space,
                         name=name)
     return _outputs(walker, index, (("Normal", 'v'),))
 
@@ -519,21 +508,21 @@ def _tangents_of(walker, node):
 
 
 def _tangent(walker, node, _sockets):
-    mode, name = _TANGENT_AXES.index(node.axis), ""
+    mode, name = _TANGENT_AXES[node.axis], ""
     if node.direction_type == 'UV_MAP':
-        mode, name = _TANGENT_UV, _tangents_of(walker, node)
+        mode, name = TangentSource.UV, _tangents_of(walker, node)
     else:
         walker.flat.needs_generated = True
-    return _outputs(walker, walker.emit(TANGENT, (), mode, name=name), (("Tangent", 'v'),))
+    return _outputs(walker, walker.emit(NodeType.TANGENT, (), mode, name=name), (("Tangent", 'v'),))
 
 
 def _color_ramp(walker, node, sockets):
     ramp, factor, steps = node.color_ramp, sockets.get('f', "Fac"), RAMP_SIZE - 1
     is_constant = ramp.interpolation == 'CONSTANT'
     if RAMP_STEPS != steps:  # Cycles' entries at the start of the library's table
-        factor = _number(walker, _MATH_MULTIPLY, factor, _constant('f', RAMP_STEPS / steps))
+        factor = _number(walker, Math.MULTIPLY, factor, _constant('f', RAMP_STEPS / steps))
     table = np.array([ramp.evaluate(min(i / RAMP_STEPS, 1.0)) for i in range(RAMP_SIZE)], np.float32)
-    index = walker.emit(COLOR_RAMP, (factor,), mode=int(is_constant), table=table)
+    index = walker.emit(NodeType.COLOR_RAMP, (factor,), mode=int(is_constant), table=table)
     return _outputs(walker, index, (("Color", 'c'), ("Alpha", 'f')))
 
 
@@ -542,30 +531,30 @@ def _mix(walker, node, sockets):
     if node.data_type == 'FLOAT':
         factor = _clamped(walker, sockets.get('f', "Factor_Float"), node.clamp_factor)
         first, second = sockets.get('f', "A_Float"), sockets.get('f', "B_Float")
-        difference = _number(walker, _MATH_SUBTRACT, second, first)
-        return {"Result_Float": _number(walker, _MATH_MULTIPLY_ADD, difference, factor, first)}
+        difference = _number(walker, Math.SUBTRACT, second, first)
+        return {"Result_Float": _number(walker, Math.MULTIPLY_ADD, difference, factor, first)}
     if node.data_type == 'VECTOR':
         return {"Result_Vector": _mix_vectors(walker, node, sockets)}
     if node.data_type != 'RGBA' or node.blend_type not in _BLENDS:
         return None
-    mode = _BLENDS.index(node.blend_type) | (_CLAMP_RESULT if node.clamp_result else 0)
+    mode = _BLENDS[node.blend_type] | (_CLAMP_RESULT if node.clamp_result else 0)
     values = (_clamped(walker, sockets.get('f', "Factor_Float"), node.clamp_factor),
               sockets.get('c', "A_Color"), sockets.get('c', "B_Color"))
-    return {"Result_Color": Value('c', walker.emit(MIX_COLOR, values, mode), 0)}
+    return {"Result_Color": Value('c', walker.emit(NodeType.MIX_COLOR, values, mode), 0)}
 
 
 def _mix_vectors(walker, node, sockets):
     if node.factor_mode == 'NON_UNIFORM':
         factor = sockets.get('v', "Factor_Vector")
         if node.clamp_factor:
-            factor = _vector(walker, VECTOR_MAXIMUM, factor, _constant('v', 0.0))
-            factor = _vector(walker, VECTOR_MINIMUM, factor, _constant('v', 1.0))
+            factor = _vector(walker, Vector.MAXIMUM, factor, _constant('v', 0.0))
+            factor = _vector(walker, Vector.MINIMUM, factor, _constant('v', 1.0))
     else:
         number = _clamped(walker, sockets.get('f', "Factor_Float"), node.clamp_factor)
         factor = walker.convert(number, 'v')
     first, second = sockets.get('v', "A_Vector"), sockets.get('v', "B_Vector")
-    difference = _vector(walker, VECTOR_SUBTRACT, second, first)
-    return _vector(walker, VECTOR_MULTIPLY_ADD, difference, factor, first)
+    difference = _vector(walker, Vector.SUBTRACT, second, first)
+    return _vector(walker, Vector.MULTIPLY_ADD, difference, factor, first)
 
 
 def _clamped(walker, value, is_clamped):
@@ -575,7 +564,7 @@ def _clamped(walker, value, is_clamped):
     if value.node == CONSTANT:
         return _constant('f', min(max(value.constant[0], 0.0), 1.0))
     values = (value, _constant('f', 0.0), _constant('f', 1.0))
-    return Value('f', walker.emit(CLAMP, values), 0)
+    return Value('f', walker.emit(NodeType.CLAMP, values), 0)
 
 
 _SPECIAL = {

@@ -11,16 +11,9 @@ from collections import namedtuple
 
 import numpy as np
 
+from ..abi import ImageMode, MathOperation as Math, NodeType, VectorOperation as Vector
 from . import sky
 from .values import CONSTANT, DEFAULT, Value
-
-# TRC_NODE_* and their modes
-_IMAGE, _TEXTURE_COORDINATE, _MATH, _SEPARATE, _COMBINE, _VECTOR_MATH = 64, 68, 71, 82, 83, 88
-_IMAGE_EXTEND = 1 << 2
-(_ADD, _SUBTRACT, _MULTIPLY, _DIVIDE, _MULTIPLY_ADD) = range(5)
-_SQRT, _EXPONENT, _MINIMUM, _MAXIMUM, _LESS_THAN = 7, 10, 11, 12, 13
-_COSINE, _ARCSINE, _ARCCOSINE, _ARCTAN2, _FRACT = 29, 31, 32, 34, 23
-_V_MULTIPLY, _V_MULTIPLY_ADD, _V_DOT, _V_DISTANCE, _V_MAXIMUM, _V_ADD = 2, 4, 8, 9, 15, 0
 
 _HORIZON = math.cos(0.5 * math.pi - 0.001)  # cosine to the zenith below which Preetham's sky stays the same
 # How bright Hosek and Wilkie's skies in Cycles are beside Preetham's (measured: 0.11 to 0.22).
@@ -44,7 +37,7 @@ class _Formula:
     def number(self, operation, *values):
         """A MATH node's result."""
         values = [_number(value) for value in values + (0.0,) * (3 - len(values))]
-        return Value('f', self._walker.emit(_MATH, values, operation), 0)
+        return Value('f', self._walker.emit(NodeType.MATH, values, operation), 0)
 
     def vector(self, operation, *values):
         """A VECTOR_MATH node's vector."""
@@ -57,16 +50,16 @@ class _Formula:
     def _vector_math(self, operation, values):
         values = [value if isinstance(value, Value) else Value('v', CONSTANT, 0, tuple(map(float, value)))
                   for value in values + ((0.0,) * 3,) * (3 - len(values))]
-        return self._walker.emit(_VECTOR_MATH, values + [Value('f', CONSTANT, 0)], operation)
+        return self._walker.emit(NodeType.VECTOR_MATH, values + [Value('f', CONSTANT, 0)], operation)
 
     def parts(self, vector):
         """A vector's components."""
-        index = self._walker.emit(_SEPARATE, (vector,))
+        index = self._walker.emit(NodeType.SEPARATE, (vector,))
         return tuple(Value('f', index, i) for i in range(3))
 
     def combine(self, x, y, z):
         """A vector of three numbers."""
-        return Value('v', self._walker.emit(_COMBINE, [_number(value) for value in (x, y, z)]), 0)
+        return Value('v', self._walker.emit(NodeType.COMBINE, [_number(value) for value in (x, y, z)]), 0)
 
     def spread(self, number):
         """A number in all components."""
@@ -75,15 +68,15 @@ class _Formula:
     def choose(self, condition, first, second):
         """first where condition is 1, second where it is 0; vectors."""
         weight = self.spread(condition)
-        rest = self.spread(self.number(_SUBTRACT, 1.0, condition))
-        return self.vector(_V_MULTIPLY_ADD, first, weight, self.vector(_V_MULTIPLY, second, rest))
+        rest = self.spread(self.number(Math.SUBTRACT, 1.0, condition))
+        return self.vector(Vector.MULTIPLY_ADD, first, weight, self.vector(Vector.MULTIPLY, second, rest))
 
 
 def sky_texture(walker, node, sockets):
     """The Sky Texture's colour."""
     direction = sockets.get('v', "Vector")
     if direction.node == DEFAULT:
-        direction = Value('v', walker.emit(_TEXTURE_COORDINATE, ()), 0)
+        direction = Value('v', walker.emit(NodeType.TEXTURE_COORDINATE, ()), 0)
     formula = _Formula(walker)
     if node.sky_type == 'NISHITA':
         color = _nishita(walker, formula, node, direction)
@@ -93,8 +86,8 @@ def sky_texture(walker, node, sockets):
         return None
     if node.sky_type == 'HOSEK_WILKIE':
         walker.warn("Sky Texture: Hosek / Wilkie is approximated by Preetham's sky, dimmed")
-        color = formula.vector(_V_MULTIPLY, color, (_HOSEK_SCALE,) * 3)
-    return {"Color": formula.vector(_V_MAXIMUM, color, (0.0,) * 3)._replace(kind='c')}
+        color = formula.vector(Vector.MULTIPLY, color, (_HOSEK_SCALE,) * 3)
+    return {"Color": formula.vector(Vector.MAXIMUM, color, (0.0,) * 3)._replace(kind='c')}
 
 
 def _preetham(formula, node, direction):
@@ -102,29 +95,30 @@ def _preetham(formula, node, direction):
     length = np.linalg.norm(sun)
     sun = sun / length if length > 0.0 else np.array((0.0, 0.0, 1.0))
     scale, (a, b, c, d, e) = sky.preetham(math.acos(np.clip(sun[2], -1.0, 1.0)), node.turbidity)
-    up = formula.number(_MAXIMUM, formula.parts(direction)[2], _HORIZON)
-    inverse = formula.spread(formula.number(_DIVIDE, 1.0, up))
-    cosine = formula.number(_MAXIMUM, formula.measure(_V_DOT, direction, sun), -1.0)
-    cosine = formula.number(_MINIMUM, cosine, 1.0)
-    angle = formula.spread(formula.number(_ARCCOSINE, cosine))
-    square = formula.spread(formula.number(_MULTIPLY, cosine, cosine))
+    up = formula.number(Math.MAXIMUM, formula.parts(direction)[2], _HORIZON)
+    inverse = formula.spread(formula.number(Math.DIVIDE, 1.0, up))
+    cosine = formula.number(Math.MAXIMUM, formula.measure(Vector.DOT, direction, sun), -1.0)
+    cosine = formula.number(Math.MINIMUM, cosine, 1.0)
+    angle = formula.spread(formula.number(Math.ARCCOSINE, cosine))
+    square = formula.spread(formula.number(Math.MULTIPLY, cosine, cosine))
 
     def exponential(vector):
-        return formula.combine(*(formula.number(_EXPONENT, part) for part in formula.parts(vector)))
+        return formula.combine(*(formula.number(Math.EXPONENT, part) for part in formula.parts(vector)))
 
     one = (1.0, 1.0, 1.0)
-    by_height = exponential(formula.vector(_V_MULTIPLY, inverse, b))
-    by_height = formula.vector(_V_MULTIPLY_ADD, by_height, a, one)
-    by_sun = exponential(formula.vector(_V_MULTIPLY, angle, d))
-    by_sun = formula.vector(_V_MULTIPLY_ADD, by_sun, c, formula.vector(_V_MULTIPLY_ADD, square, e, one))
+    by_height = exponential(formula.vector(Vector.MULTIPLY, inverse, b))
+    by_height = formula.vector(Vector.MULTIPLY_ADD, by_height, a, one)
+    by_sun = exponential(formula.vector(Vector.MULTIPLY, angle, d))
+    by_square = formula.vector(Vector.MULTIPLY_ADD, square, e, one)
+    by_sun = formula.vector(Vector.MULTIPLY_ADD, by_sun, c, by_square)
     x, y, luminance = formula.parts(formula.vector(
-        _V_MULTIPLY, formula.vector(_V_MULTIPLY, by_height, by_sun), scale))
-    per_y = formula.number(_DIVIDE, luminance, y)
-    z = formula.number(_SUBTRACT, formula.number(_SUBTRACT, 1.0, x), y)
-    xyz = (formula.number(_MULTIPLY, x, per_y), luminance, formula.number(_MULTIPLY, z, per_y))
+        Vector.MULTIPLY, formula.vector(Vector.MULTIPLY, by_height, by_sun), scale))
+    per_y = formula.number(Math.DIVIDE, luminance, y)
+    z = formula.number(Math.SUBTRACT, formula.number(Math.SUBTRACT, 1.0, x), y)
+    xyz = (formula.number(Math.MULTIPLY, x, per_y), luminance, formula.number(Math.MULTIPLY, z, per_y))
     color = (0.0, 0.0, 0.0)
     for part, column in zip(xyz, sky.XYZ_TO_RGB.T):
-        color = formula.vector(_V_MULTIPLY_ADD, formula.spread(part), column, color)
+        color = formula.vector(Vector.MULTIPLY_ADD, formula.spread(part), column, color)
     return color
 
 
@@ -138,19 +132,19 @@ def _nishita(walker, formula, node, direction):
     amounts = node.air_density, node.dust_density, node.ozone_density
     image = walker.table_image("sky", sky.nishita_table, node.sun_elevation, altitude, amounts)
     x, y, z = formula.parts(direction)
-    up = formula.number(_MINIMUM, formula.number(_MAXIMUM, z, -1.0), 1.0)
-    elevation = formula.number(_ARCSINE, up)
-    above = formula.number(_MAXIMUM, elevation, 0.0)
-    row = formula.number(_SQRT, formula.number(_DIVIDE, above, 0.5 * math.pi))
-    turns = formula.number(_DIVIDE, formula.number(_ARCTAN2, x, y), 2.0 * math.pi)
-    turns = formula.number(_ADD, turns, 0.5 - node.sun_rotation / (2.0 * math.pi))
-    place = formula.combine(formula.number(_FRACT, turns), row, 0.0)
-    color = Value('v', walker.emit(_IMAGE, (place, _number(0.0)), _IMAGE_EXTEND, image=image), 0)
+    up = formula.number(Math.MINIMUM, formula.number(Math.MAXIMUM, z, -1.0), 1.0)
+    elevation = formula.number(Math.ARCSINE, up)
+    above = formula.number(Math.MAXIMUM, elevation, 0.0)
+    row = formula.number(Math.SQRT, formula.number(Math.DIVIDE, above, 0.5 * math.pi))
+    turns = formula.number(Math.DIVIDE, formula.number(Math.ARCTAN2, x, y), 2.0 * math.pi)
+    turns = formula.number(Math.ADD, turns, 0.5 - node.sun_rotation / (2.0 * math.pi))
+    place = formula.combine(formula.number(Math.FRACT, turns), row, 0.0)
+    color = Value('v', walker.emit(NodeType.IMAGE, (place, _number(0.0)), ImageMode.EXTEND, image=image), 0)
     # Below the horizon its colours fade out.
-    fade = formula.number(_MULTIPLY_ADD, formula.number(_MINIMUM, z, 0.0), 2.5, 1.0)
-    fade = formula.number(_MAXIMUM, fade, 0.0)
-    cube = formula.number(_MULTIPLY, formula.number(_MULTIPLY, fade, fade), fade)
-    color = formula.vector(_V_MULTIPLY, color, formula.spread(cube))
+    fade = formula.number(Math.MULTIPLY_ADD, formula.number(Math.MINIMUM, z, 0.0), 2.5, 1.0)
+    fade = formula.number(Math.MAXIMUM, fade, 0.0)
+    cube = formula.number(Math.MULTIPLY, formula.number(Math.MULTIPLY, fade, fade), fade)
+    color = formula.vector(Vector.MULTIPLY, color, formula.spread(cube))
     if not node.sun_disc or node.sun_elevation + 0.5 * node.sun_size <= 0.0:
         return color
     return _sun_disc(walker, formula, node, direction, elevation, color)
@@ -163,18 +157,19 @@ def _sun_disc(walker, formula, node, direction, elevation, color):
     walker.flat.sun = Sun(sun, size)
     low, high = sky.sun_colors(height, size, _altitude(node), (node.air_density, node.dust_density))
     bottom, top = max(height - 0.5 * size, 0.0), height + 0.5 * size
-    part = formula.number(_DIVIDE, formula.number(_SUBTRACT, elevation, bottom), top - bottom)
-    shown = formula.vector(_V_MULTIPLY_ADD, formula.spread(part), high - low, low)
+    part = formula.number(Math.DIVIDE, formula.number(Math.SUBTRACT, elevation, bottom), top - bottom)
+    shown = formula.vector(Vector.MULTIPLY_ADD, formula.spread(part), high - low, low)
     # The angle by its chord, which small angles need.
-    chord = formula.measure(_V_DISTANCE, direction, sun)
-    angle = formula.number(_MULTIPLY, formula.number(_ARCSINE, formula.number(_MULTIPLY, chord, 0.5)), 2.0)
-    ratio = formula.number(_DIVIDE, angle, 0.5 * size)
-    square = formula.number(_MINIMUM, formula.number(_MULTIPLY, ratio, ratio), 1.0)
-    limb = formula.number(_SQRT, formula.number(_SUBTRACT, 1.0, square))
-    limb = formula.number(_MULTIPLY_ADD, limb, 0.6 * node.sun_intensity, 0.4 * node.sun_intensity)
-    shown = formula.vector(_V_MULTIPLY, shown, formula.spread(limb))
-    is_sun = formula.number(_LESS_THAN, ratio, 1.0)
+    chord = formula.measure(Vector.DISTANCE, direction, sun)
+    half = formula.number(Math.ARCSINE, formula.number(Math.MULTIPLY, chord, 0.5))
+    angle = formula.number(Math.MULTIPLY, half, 2.0)
+    ratio = formula.number(Math.DIVIDE, angle, 0.5 * size)
+    square = formula.number(Math.MINIMUM, formula.number(Math.MULTIPLY, ratio, ratio), 1.0)
+    limb = formula.number(Math.SQRT, formula.number(Math.SUBTRACT, 1.0, square))
+    limb = formula.number(Math.MULTIPLY_ADD, limb, 0.6 * node.sun_intensity, 0.4 * node.sun_intensity)
+    shown = formula.vector(Vector.MULTIPLY, shown, formula.spread(limb))
+    is_sun = formula.number(Math.LESS_THAN, ratio, 1.0)
     if height < 0.5 * size:
-        is_up = formula.number(_LESS_THAN, 0.0, elevation)
-        is_sun = formula.number(_MULTIPLY, is_sun, is_up)
-    return formula.choose(is_sun, formula.vector(_V_MAXIMUM, shown, (0.0,) * 3), color)
+        is_up = formula.number(Math.LESS_THAN, 0.0, elevation)
+        is_sun = formula.number(Math.MULTIPLY, is_sun, is_up)
+    return formula.choose(is_sun, formula.vector(Vector.MAXIMUM, shown, (0.0,) * 3), color)

@@ -6,23 +6,17 @@ None for a setting that is not supported. Sockets that 3.4 lacks (lacunarity, of
 values that its textures imply.
 """
 
+from ..abi import (BrickMode, FractalType, GradientType, NodeType, NoiseMode, VoronoiFeature, VoronoiMetric,
+                   VoronoiMode, WaveMode)
 from .sky_texture import sky_texture
 from .values import CONSTANT, DEFAULT, Value
 
-# TRC_NODE_*
-NOISE, MUSGRAVE, VORONOI, WAVE, GRADIENT, WHITE_NOISE, MAGIC, BRICK = range(96, 104)
-
 _DIMENSIONS = ('1D', '2D', '3D', '4D')
-_FBM_UNIT, _FBM = 0, 1
-_FRACTALS = {'FBM': _FBM, 'MULTIFRACTAL': 2, 'HETERO_TERRAIN': 3, 'HYBRID_MULTIFRACTAL': 4,
-             'RIDGED_MULTIFRACTAL': 5}
-_METRICS = ('EUCLIDEAN', 'MANHATTAN', 'CHEBYCHEV', 'MINKOWSKI')
-_FEATURES = ('F1', 'F2', 'SMOOTH_F1', 'DISTANCE_TO_EDGE', 'N_SPHERE_RADIUS')
-_VORONOI_NORMALIZE = 1 << 7
-_PROFILES = ('SIN', 'SAW', 'TRI')
+_FRACTALS = {kind: FractalType[kind] for kind in (
+    'FBM', 'MULTIFRACTAL', 'HETERO_TERRAIN', 'HYBRID_MULTIFRACTAL', 'RIDGED_MULTIFRACTAL')}
+_PROFILES = {'SIN': WaveMode.SINE, 'SAW': WaveMode.SAW, 'TRI': WaveMode.TRIANGLE}
 _BANDS = ('X', 'Y', 'Z', 'DIAGONAL')
 _RINGS = ('X', 'Y', 'Z', 'SPHERICAL')
-_GRADIENTS = ('LINEAR', 'QUADRATIC', 'EASING', 'DIAGONAL', 'RADIAL', 'QUADRATIC_SPHERE', 'SPHERICAL')
 
 
 def _number(sockets, name, default):
@@ -48,13 +42,13 @@ def _noise(walker, node, sockets):
     if kind not in _FRACTALS:
         return None
     fractal = _FRACTALS[kind]
-    if fractal == _FBM and getattr(node, "normalize", True):
-        fractal = _FBM_UNIT
+    if fractal == FractalType.FBM and getattr(node, "normalize", True):
+        fractal = FractalType.FBM_UNIT
     values = [vector, w, sockets.get('f', "Scale"), sockets.get('f', "Detail"),
               sockets.get('f', "Roughness"), _number(sockets, "Lacunarity", 2.0),
               _number(sockets, "Offset", 0.0), _number(sockets, "Gain", 1.0),
               sockets.get('f', "Distortion")]
-    index = walker.emit(NOISE, values, dimensions | fractal << 2)
+    index = walker.emit(NodeType.NOISE, values, dimensions | fractal << NoiseMode.TYPE_SHIFT)
     return {"Fac": Value('f', index, 0), "Color": Value('c', index, 1)}
 
 
@@ -64,39 +58,42 @@ def _musgrave(walker, node, sockets):
         return None
     values = [vector, w] + [sockets.get('f', name) for name in (
         "Scale", "Detail", "Dimension", "Lacunarity", "Offset", "Gain")]
-    index = walker.emit(MUSGRAVE, values, dimensions | _FRACTALS[node.musgrave_type] << 2)
+    mode = dimensions | _FRACTALS[node.musgrave_type] << NoiseMode.TYPE_SHIFT
+    index = walker.emit(NodeType.MUSGRAVE, values, mode)
     return {"Fac": Value('f', index, 0)}
 
 
 def _voronoi(walker, node, sockets):
     dimensions, vector, w = _place(node, sockets)
-    if node.feature not in _FEATURES or node.distance not in _METRICS:
+    if node.feature not in VoronoiFeature.__members__ or node.distance not in VoronoiMetric.__members__:
         return None
     values = [vector, w] + [sockets.get('f', name) for name in (
         "Scale", "Smoothness", "Exponent", "Randomness")]
     values += [_number(sockets, "Detail", 0.0), _number(sockets, "Roughness", 0.0),
                _number(sockets, "Lacunarity", 2.0)]
-    mode = dimensions | _METRICS.index(node.distance) << 2 | _FEATURES.index(node.feature) << 4
+    mode = (dimensions | VoronoiMetric[node.distance] << VoronoiMode.METRIC_SHIFT
+            | VoronoiFeature[node.feature] << VoronoiMode.FEATURE_SHIFT)
     if getattr(node, "normalize", False):
-        mode |= _VORONOI_NORMALIZE
-    index = walker.emit(VORONOI, values, mode)
+        mode |= VoronoiMode.NORMALIZE
+    index = walker.emit(NodeType.VORONOI, values, mode)
     return {"Distance": Value('f', index, 0), "Color": Value('c', index, 1),
             "Position": Value('v', index, 2), "W": Value('f', index, 3), "Radius": Value('f', index, 4)}
 
 
 def _wave(walker, node, sockets):
     if node.wave_type == 'BANDS':
-        direction = _BANDS.index(node.bands_direction) << 3
+        mode, direction = 0, _BANDS.index(node.bands_direction)
     else:
-        direction = 4 | _RINGS.index(node.rings_direction) << 3
+        mode, direction = WaveMode.RINGS, _RINGS.index(node.rings_direction)
+    mode |= _PROFILES[node.wave_profile] | direction << WaveMode.DIRECTION_SHIFT
     values = [sockets.get('v', "Vector")] + [sockets.get('f', name) for name in (
         "Scale", "Distortion", "Detail", "Detail Scale", "Detail Roughness", "Phase Offset")]
-    index = walker.emit(WAVE, values, _PROFILES.index(node.wave_profile) | direction)
+    index = walker.emit(NodeType.WAVE, values, mode)
     return _grey(walker, Value('f', index, 0))
 
 
 def _gradient(walker, node, sockets):
-    index = walker.emit(GRADIENT, [sockets.get('v', "Vector")], _GRADIENTS.index(node.gradient_type))
+    index = walker.emit(NodeType.GRADIENT, [sockets.get('v', "Vector")], GradientType[node.gradient_type])
     return _grey(walker, Value('f', index, 0))
 
 
@@ -109,13 +106,13 @@ def _white_noise(walker, node, sockets):
     dimensions, vector, w = _place(node, sockets)
     if vector.node == DEFAULT:  # unlike other textures', an unlinked vector is 0
         vector = Value('v', CONSTANT, 0)
-    index = walker.emit(WHITE_NOISE, [vector, w], dimensions)
+    index = walker.emit(NodeType.WHITE_NOISE, [vector, w], dimensions)
     return {"Value": Value('f', index, 0), "Color": Value('c', index, 1)}
 
 
 def _magic(walker, node, sockets):
     values = [sockets.get('v', "Vector"), sockets.get('f', "Scale"), sockets.get('f', "Distortion")]
-    index = walker.emit(MAGIC, values, node.turbulence_depth)
+    index = walker.emit(NodeType.MAGIC, values, node.turbulence_depth)
     return {"Color": Value('c', index, 0), "Fac": Value('f', index, 1)}
 
 
@@ -127,7 +124,8 @@ def _brick(walker, node, sockets):
     values += [sockets.get('f', name) for name in ("Scale", "Mortar Size", "Mortar Smooth", "Bias",
                                                    "Brick Width", "Row Height")]
     values += [amount(node.offset), amount(node.squash)]
-    index = walker.emit(BRICK, values, node.offset_frequency | node.squash_frequency << 7)
+    mode = node.offset_frequency | node.squash_frequency << BrickMode.SQUASH_SHIFT
+    index = walker.emit(NodeType.BRICK, values, mode)
     return {"Color": Value('c', index, 0), "Fac": Value('f', index, 1)}
 
 

@@ -3,9 +3,11 @@
 
 from collections import namedtuple
 
+from ..abi import InputSource
+
 # kind: 'f' number, 'c' colour, 'v' vector, 's' shader. node: the index of a node, whose output it is,
 # or CONSTANT (three floats; a number is the first) or DEFAULT (the library's default for the input).
 Value = namedtuple("Value", "kind node output constant", defaults=((0.0, 0.0, 0.0),))
 
-CONSTANT, DEFAULT = -1, -2
+CONSTANT, DEFAULT = InputSource.CONSTANT, InputSource.DEFAULT
 NO_SHADER = Value('s', CONSTANT, 0)
