@@ -163,6 +163,61 @@ class NodeType(IntEnum):
     AOV_COLOR = 113
 
 
+class ModeFlags(IntFlag):
+    CLAMP = 256
+
+
+class TableSize(IntEnum):
+    ENTRIES = 257
+
+
+class DiffuseModel(IntEnum):
+    LOSES_ENERGY = 0
+    KEEPS_ENERGY = 1
+
+
+class ToonComponent(IntEnum):
+    DIFFUSE = 0
+    GLOSSY = 1
+
+
+class MappingType(IntEnum):
+    POINT = 0
+    TEXTURE = 1
+    VECTOR = 2
+    NORMAL = 3
+
+
+class NormalMapSpace(IntEnum):
+    TANGENT = 0
+    OBJECT = 1
+    WORLD = 2
+    BLENDER_OBJECT = 3
+    BLENDER_WORLD = 4
+
+
+class RampInterpolation(IntEnum):
+    LINEAR = 0
+    CONSTANT = 1
+
+
+class CurvesExtension(IntEnum):
+    CONSTANT = 0
+    EXTRAPOLATED = 1
+
+
+class SeparateMode(IntEnum):
+    RGB = 0
+    HSV = 1
+    HSL = 2
+    XYZ = 3
+
+
+class ClampType(IntEnum):
+    MINMAX = 0
+    RANGE = 1
+
+
 class TangentSource(IntEnum):
     Z = 0
     X = 1
@@ -176,12 +231,33 @@ class SpaceId(IntEnum):
     CAMERA = 2
 
 
+class TransformedType(IntEnum):
+    POINT = 0
+    VECTOR = 1
+    UNIT_VECTOR = 2
+    NORMAL = 3
+
+
+class VectorTransformMode(IntEnum):
+    SPACE_MASK = 3
+    SPACE_TO_SHIFT = 2
+    TRANSFORMED_SHIFT = 4
+
+
 class RotateMode(IntEnum):
     AXIS_ANGLE = 0
     X = 1
     Y = 2
     Z = 3
     EULER = 4
+
+
+class RotateFlags(IntFlag):
+    INVERSE = 8
+
+
+class TextureMode(IntEnum):
+    DIMENSIONS_MASK = 3
 
 
 class FractalType(IntEnum):
@@ -213,17 +289,30 @@ class VoronoiFeature(IntEnum):
 
 
 class VoronoiMode(IntEnum):
+    METRIC_MASK = 3
     METRIC_SHIFT = 2
+    FEATURE_MASK = 7
     FEATURE_SHIFT = 4
     NORMALIZE = 128
 
 
-class WaveMode(IntEnum):
+class WaveProfile(IntEnum):
     SINE = 0
     SAW = 1
     TRIANGLE = 2
-    PROFILE = 3
+
+
+class WaveDirection(IntEnum):
+    X = 0
+    Y = 1
+    Z = 2
+    DIAGONAL = 3
+
+
+class WaveMode(IntEnum):
+    PROFILE_MASK = 3
     RINGS = 4
+    DIRECTION_MASK = 3
     DIRECTION_SHIFT = 3
 
 
@@ -237,7 +326,12 @@ class GradientType(IntEnum):
     SPHERICAL = 6
 
 
+class MagicDepth(IntEnum):
+    MAX_DEPTH = 10
+
+
 class BrickMode(IntEnum):
+    ROWS_MASK = 127
     SQUASH_SHIFT = 7
 
 
@@ -345,14 +439,35 @@ class VectorOperation(IntEnum):
     REFRACT = 26
 
 
-class ImageMode(IntEnum):
+class ImageInterpolation(IntEnum):
     LINEAR = 0
     CLOSEST = 1
     CUBIC = 2
+
+
+class ImageExtension(IntEnum):
     REPEAT = 0
     EXTEND = 4
     CLIP = 8
     MIRROR = 12
+
+
+class ImageProjection(IntEnum):
+    FLAT = 0
+    BOX = 16
+    SPHERE = 32
+    TUBE = 48
+
+
+class ImageMode(IntEnum):
+    INTERPOLATION_MASK = 3
+    EXTENSION_MASK = 12
+    PROJECTION_MASK = 48
+
+
+class EnvironmentProjection(IntEnum):
+    EQUIRECTANGULAR = 0
+    MIRROR_BALL = 16
 
 
 class InputSource(IntEnum):
@@ -638,17 +753,24 @@ CONSTANTS = {"TRC_MAX_LIGHT_GROUPS": MAX_LIGHT_GROUPS, "TRC_MAX_KEYS": MAX_KEYS,
 ENUMERATIONS = {StatusCode: "TRC_", IsaId: "TRC_ISA_", CameraType: "TRC_CAMERA_",
                 NormalsLayout: "TRC_NORMALS_", VisibleRays: "TRC_VISIBLE_", InstanceFlags: "TRC_INSTANCE_",
                 LightType: "TRC_LIGHT_", AreaShape: "TRC_AREA_", LightFlags: "TRC_LIGHT_",
-                AoMethod: "TRC_AO_", NodeType: "TRC_NODE_", TangentSource: "TRC_TANGENT_",
-                SpaceId: "TRC_SPACE_", RotateMode: "TRC_ROTATE_", FractalType: "TRC_FRACTAL_",
-                NoiseMode: "TRC_NOISE_", VoronoiMetric: "TRC_VORONOI_", VoronoiFeature: "TRC_VORONOI_",
-                VoronoiMode: "TRC_VORONOI_", WaveMode: "TRC_WAVE_", GradientType: "TRC_GRADIENT_",
-                BrickMode: "TRC_BRICK_", DistributionType: "TRC_DISTRIBUTION_", BlendMode: "TRC_BLEND_",
-                MathOperation: "TRC_MATH_", VectorOperation: "TRC_VECTOR_", ImageMode: "TRC_IMAGE_",
-                InputSource: "TRC_INPUT_", MaterialFlags: "TRC_MATERIAL_", AlphaMode: "TRC_ALPHA_",
-                IntegratorType: "TRC_INTEGRATOR_", SamplerType: "TRC_SAMPLER_",
-                AssemblyType: "TRC_ASSEMBLY_", FilterType: "TRC_FILTER_", PassId: "TRC_PASS_",
-                PassRange: "TRC_PASS_", CryptomatteKind: "TRC_CRYPTOMATTE_", ProgressState: "TRC_PROGRESS_",
-                FeatureFlags: "TRC_FEATURE_"}
+                AoMethod: "TRC_AO_", NodeType: "TRC_NODE_", ModeFlags: "TRC_MODE_", TableSize: "TRC_TABLE_",
+                DiffuseModel: "TRC_DIFFUSE_", ToonComponent: "TRC_TOON_", MappingType: "TRC_MAPPING_",
+                NormalMapSpace: "TRC_NORMAL_MAP_", RampInterpolation: "TRC_RAMP_",
+                CurvesExtension: "TRC_CURVES_", SeparateMode: "TRC_SEPARATE_", ClampType: "TRC_CLAMP_",
+                TangentSource: "TRC_TANGENT_", SpaceId: "TRC_SPACE_", TransformedType: "TRC_TRANSFORMED_",
+                VectorTransformMode: "TRC_", RotateMode: "TRC_ROTATE_", RotateFlags: "TRC_ROTATE_",
+                TextureMode: "TRC_", FractalType: "TRC_FRACTAL_", NoiseMode: "TRC_NOISE_",
+                VoronoiMetric: "TRC_VORONOI_", VoronoiFeature: "TRC_VORONOI_", VoronoiMode: "TRC_VORONOI_",
+                WaveProfile: "TRC_WAVE_", WaveDirection: "TRC_WAVE_", WaveMode: "TRC_WAVE_",
+                GradientType: "TRC_GRADIENT_", MagicDepth: "TRC_MAGIC_", BrickMode: "TRC_BRICK_",
+                DistributionType: "TRC_DISTRIBUTION_", BlendMode: "TRC_BLEND_", MathOperation: "TRC_MATH_",
+                VectorOperation: "TRC_VECTOR_", ImageInterpolation: "TRC_IMAGE_",
+                ImageExtension: "TRC_IMAGE_", ImageProjection: "TRC_IMAGE_", ImageMode: "TRC_IMAGE_",
+                EnvironmentProjection: "TRC_ENVIRONMENT_", InputSource: "TRC_INPUT_",
+                MaterialFlags: "TRC_MATERIAL_", AlphaMode: "TRC_ALPHA_", IntegratorType: "TRC_INTEGRATOR_",
+                SamplerType: "TRC_SAMPLER_", AssemblyType: "TRC_ASSEMBLY_", FilterType: "TRC_FILTER_",
+                PassId: "TRC_PASS_", PassRange: "TRC_PASS_", CryptomatteKind: "TRC_CRYPTOMATTE_",
+                ProgressState: "TRC_PROGRESS_", FeatureFlags: "TRC_FEATURE_"}
 
 STRUCTURES = {"trc_camera_desc": CameraDesc, "trc_corner_attribute": CornerAttribute,
               "trc_mesh_desc": MeshDesc, "trc_instance_desc": InstanceDesc, "trc_light_desc": LightDesc,
@@ -720,4 +842,227 @@ FUNCTIONS = {
     "trc_scene_stats_default": (SceneStats, ()),
     "trc_scene_get_stats": (c_int32, (c_uint64, POINTER(SceneStats))),
     "trc_scene_get_warnings": (c_int32, (c_uint64, c_char_p, c_uint64, POINTER(c_uint64))),
+}
+
+# Label, inputs and outputs of the node types: kind and name of each.
+NODES = {
+    NodeType.DIFFUSE: ("Diffuse",
+        (("COLOR", "color"), ("FLOAT", "roughness"), ("NORMAL", "normal")),
+        (("SHADER", "closure"),)),
+    NodeType.GLOSSY: ("Glossy",
+        (("COLOR", "color"), ("FLOAT", "roughness"), ("FLOAT", "anisotropy"), ("FLOAT", "rotation"),
+         ("NORMAL", "normal"), ("TANGENT", "tangent")),
+        (("SHADER", "closure"),)),
+    NodeType.GLASS: ("Glass",
+        (("COLOR", "color"), ("FLOAT", "roughness"), ("FLOAT", "ior"), ("NORMAL", "normal")),
+        (("SHADER", "closure"),)),
+    NodeType.REFRACTION: ("Refraction",
+        (("COLOR", "color"), ("FLOAT", "roughness"), ("FLOAT", "ior"), ("NORMAL", "normal")),
+        (("SHADER", "closure"),)),
+    NodeType.TRANSPARENT: ("Transparent",
+        (("COLOR", "color"),),
+        (("SHADER", "closure"),)),
+    NodeType.TRANSLUCENT: ("Translucent",
+        (("COLOR", "color"), ("NORMAL", "normal")),
+        (("SHADER", "closure"),)),
+    NodeType.EMISSION: ("Emission",
+        (("COLOR", "color"), ("FLOAT", "strength")),
+        (("SHADER", "closure"),)),
+    NodeType.BACKGROUND: ("Background",
+        (("COLOR", "color"), ("FLOAT", "strength")),
+        (("SHADER", "closure"),)),
+    NodeType.MIX_SHADER: ("Mix Shader",
+        (("FLOAT", "factor"), ("SHADER", "first"), ("SHADER", "second")),
+        (("SHADER", "closure"),)),
+    NodeType.ADD_SHADER: ("Add Shader",
+        (("SHADER", "first"), ("SHADER", "second")),
+        (("SHADER", "closure"),)),
+    NodeType.HOLDOUT: ("Holdout",
+        (),
+        (("SHADER", "closure"),)),
+    NodeType.PRINCIPLED: ("Principled",
+        (("COLOR", "base_color"), ("FLOAT", "subsurface"), ("COLOR", "subsurface_color"),
+         ("FLOAT", "metallic"), ("FLOAT", "specular"), ("FLOAT", "specular_tint"), ("FLOAT", "roughness"),
+         ("FLOAT", "anisotropic"), ("FLOAT", "anisotropic_rotation"), ("FLOAT", "sheen"),
+         ("FLOAT", "sheen_tint"), ("FLOAT", "clearcoat"), ("FLOAT", "clearcoat_roughness"), ("FLOAT", "ior"),
+         ("FLOAT", "transmission"), ("FLOAT", "transmission_roughness"), ("COLOR", "emission"),
+         ("FLOAT", "emission_strength"), ("FLOAT", "alpha"), ("NORMAL", "normal"),
+         ("NORMAL", "clearcoat_normal"), ("TANGENT", "tangent")),
+        (("SHADER", "closure"),)),
+    NodeType.VELVET: ("Velvet",
+        (("COLOR", "color"), ("FLOAT", "sigma"), ("NORMAL", "normal")),
+        (("SHADER", "closure"),)),
+    NodeType.TOON: ("Toon",
+        (("COLOR", "color"), ("FLOAT", "size"), ("FLOAT", "smooth"), ("NORMAL", "normal")),
+        (("SHADER", "closure"),)),
+    NodeType.LAYERED_PRINCIPLED: ("Principled",
+        (("COLOR", "base_color"), ("FLOAT", "metallic"), ("FLOAT", "roughness"), ("FLOAT", "ior"),
+         ("FLOAT", "alpha"), ("NORMAL", "normal"), ("FLOAT", "diffuse_roughness"),
+         ("FLOAT", "specular_ior_level"), ("COLOR", "specular_tint"), ("FLOAT", "anisotropic"),
+         ("FLOAT", "anisotropic_rotation"), ("TANGENT", "tangent"), ("FLOAT", "transmission_weight"),
+         ("FLOAT", "coat_weight"), ("FLOAT", "coat_roughness"), ("FLOAT", "coat_ior"),
+         ("COLOR", "coat_tint"), ("NORMAL", "coat_normal"), ("FLOAT", "sheen_weight"),
+         ("FLOAT", "sheen_roughness"), ("COLOR", "sheen_tint"), ("COLOR", "emission_color"),
+         ("FLOAT", "emission_strength")),
+        (("SHADER", "closure"),)),
+    NodeType.SHEEN: ("Sheen",
+        (("COLOR", "color"), ("FLOAT", "roughness"), ("NORMAL", "normal")),
+        (("SHADER", "closure"),)),
+    NodeType.IMAGE: ("Image",
+        (("UV", "vector"), ("FLOAT", "blend")),
+        (("COLOR", "color"), ("FLOAT", "alpha"))),
+    NodeType.ENVIRONMENT: ("Environment",
+        (("POSITION", "vector"),),
+        (("COLOR", "color"),)),
+    NodeType.UV_MAP: ("UV Map",
+        (),
+        (("VECTOR", "uv"),)),
+    NodeType.COLOR_ATTRIBUTE: ("Color Attribute",
+        (),
+        (("COLOR", "color"), ("FLOAT", "alpha"))),
+    NodeType.TEXTURE_COORDINATE: ("Texture Coordinate",
+        (),
+        (("VECTOR", "generated"), ("VECTOR", "normal"), ("VECTOR", "uv"), ("VECTOR", "object"),
+         ("VECTOR", "camera"), ("VECTOR", "window"), ("VECTOR", "reflection"))),
+    NodeType.MAPPING: ("Mapping",
+        (("VECTOR", "vector"), ("VECTOR", "location"), ("VECTOR", "rotation"), ("VECTOR", "scale")),
+        (("VECTOR", "vector"),)),
+    NodeType.MIX_COLOR: ("Mix Color",
+        (("FLOAT", "factor"), ("COLOR", "a"), ("COLOR", "b")),
+        (("COLOR", "color"),)),
+    NodeType.MATH: ("Math",
+        (("FLOAT", "a"), ("FLOAT", "b"), ("FLOAT", "c")),
+        (("FLOAT", "value"),)),
+    NodeType.FRESNEL: ("Fresnel",
+        (("FLOAT", "ior"), ("NORMAL", "normal")),
+        (("FLOAT", "factor"),)),
+    NodeType.LAYER_WEIGHT: ("Layer Weight",
+        (("FLOAT", "blend"), ("NORMAL", "normal")),
+        (("FLOAT", "fresnel"), ("FLOAT", "facing"))),
+    NodeType.LIGHT_PATH: ("Light Path",
+        (),
+        (("FLOAT", "is_camera"), ("FLOAT", "is_shadow"), ("FLOAT", "is_diffuse"), ("FLOAT", "is_glossy"),
+         ("FLOAT", "is_singular"), ("FLOAT", "is_reflection"), ("FLOAT", "is_transmission"),
+         ("FLOAT", "ray_length"), ("FLOAT", "ray_depth"), ("FLOAT", "diffuse_depth"),
+         ("FLOAT", "glossy_depth"), ("FLOAT", "transparent_depth"), ("FLOAT", "transmission_depth"))),
+    NodeType.GEOMETRY: ("Geometry",
+        (),
+        (("VECTOR", "position"), ("VECTOR", "normal"), ("VECTOR", "tangent"), ("VECTOR", "true_normal"),
+         ("VECTOR", "incoming"), ("VECTOR", "parametric"), ("FLOAT", "backfacing"), ("FLOAT", "pointiness"),
+         ("FLOAT", "random_per_island"))),
+    NodeType.NORMAL_MAP: ("Normal Map",
+        (("FLOAT", "strength"), ("COLOR", "color")),
+        (("VECTOR", "normal"),)),
+    NodeType.INVERT: ("Invert",
+        (("FLOAT", "factor"), ("COLOR", "color")),
+        (("COLOR", "color"),)),
+    NodeType.GAMMA: ("Gamma",
+        (("COLOR", "color"), ("FLOAT", "gamma")),
+        (("COLOR", "color"),)),
+    NodeType.HUE_SATURATION: ("Hue Saturation Value",
+        (("FLOAT", "hue"), ("FLOAT", "saturation"), ("FLOAT", "value"), ("FLOAT", "factor"),
+         ("COLOR", "color")),
+        (("COLOR", "color"),)),
+    NodeType.BRIGHT_CONTRAST: ("Bright/Contrast",
+        (("COLOR", "color"), ("FLOAT", "bright"), ("FLOAT", "contrast")),
+        (("COLOR", "color"),)),
+    NodeType.COLOR_RAMP: ("Color Ramp",
+        (("FLOAT", "factor"),),
+        (("COLOR", "color"), ("FLOAT", "alpha"))),
+    NodeType.SEPARATE: ("Separate",
+        (("COLOR", "color"),),
+        (("FLOAT", "x"), ("FLOAT", "y"), ("FLOAT", "z"))),
+    NodeType.COMBINE: ("Combine",
+        (("FLOAT", "x"), ("FLOAT", "y"), ("FLOAT", "z")),
+        (("COLOR", "color"),)),
+    NodeType.MAP_RANGE: ("Map Range",
+        (("FLOAT", "value"), ("FLOAT", "from_min"), ("FLOAT", "from_max"), ("FLOAT", "to_min"),
+         ("FLOAT", "to_max")),
+        (("FLOAT", "value"),)),
+    NodeType.CLAMP: ("Clamp",
+        (("FLOAT", "value"), ("FLOAT", "min"), ("FLOAT", "max")),
+        (("FLOAT", "value"),)),
+    NodeType.CHECKER: ("Checker",
+        (("GENERATED", "vector"), ("COLOR", "color1"), ("COLOR", "color2"), ("FLOAT", "scale")),
+        (("COLOR", "color"), ("FLOAT", "factor"))),
+    NodeType.OBJECT_INFO: ("Object Info",
+        (),
+        (("VECTOR", "location"), ("COLOR", "color"), ("FLOAT", "alpha"), ("FLOAT", "object_index"),
+         ("FLOAT", "material_index"), ("FLOAT", "random"))),
+    NodeType.VECTOR_MATH: ("Vector Math",
+        (("VECTOR", "a"), ("VECTOR", "b"), ("VECTOR", "c"), ("FLOAT", "scale")),
+        (("VECTOR", "vector"), ("FLOAT", "value"))),
+    NodeType.RGB_TO_BW: ("RGB to BW",
+        (("COLOR", "color"),),
+        (("FLOAT", "value"),)),
+    NodeType.INSTANCE_VALUES: ("Instance Values",
+        (),
+        (("COLOR", "values"),)),
+    NodeType.NOISE: ("Noise",
+        (("GENERATED", "vector"), ("FLOAT", "w"), ("FLOAT", "scale"), ("FLOAT", "detail"),
+         ("FLOAT", "roughness"), ("FLOAT", "lacunarity"), ("FLOAT", "offset"), ("FLOAT", "gain"),
+         ("FLOAT", "distortion")),
+        (("FLOAT", "value"), ("COLOR", "color"))),
+    NodeType.MUSGRAVE: ("Musgrave",
+        (("GENERATED", "vector"), ("FLOAT", "w"), ("FLOAT", "scale"), ("FLOAT", "detail"),
+         ("FLOAT", "dimension"), ("FLOAT", "lacunarity"), ("FLOAT", "offset"), ("FLOAT", "gain")),
+        (("FLOAT", "value"),)),
+    NodeType.VORONOI: ("Voronoi",
+        (("GENERATED", "vector"), ("FLOAT", "w"), ("FLOAT", "scale"), ("FLOAT", "smoothness"),
+         ("FLOAT", "exponent"), ("FLOAT", "randomness"), ("FLOAT", "detail"), ("FLOAT", "roughness"),
+         ("FLOAT", "lacunarity")),
+        (("FLOAT", "distance"), ("COLOR", "color"), ("VECTOR", "position"), ("FLOAT", "w"),
+         ("FLOAT", "radius"))),
+    NodeType.WAVE: ("Wave",
+        (("GENERATED", "vector"), ("FLOAT", "scale"), ("FLOAT", "distortion"), ("FLOAT", "detail"),
+         ("FLOAT", "detail_scale"), ("FLOAT", "detail_roughness"), ("FLOAT", "phase")),
+        (("FLOAT", "value"),)),
+    NodeType.GRADIENT: ("Gradient",
+        (("GENERATED", "vector"),),
+        (("FLOAT", "value"),)),
+    NodeType.WHITE_NOISE: ("White Noise",
+        (("GENERATED", "vector"), ("FLOAT", "w")),
+        (("FLOAT", "value"), ("COLOR", "color"))),
+    NodeType.MAGIC: ("Magic",
+        (("GENERATED", "vector"), ("FLOAT", "scale"), ("FLOAT", "distortion")),
+        (("COLOR", "color"), ("FLOAT", "factor"))),
+    NodeType.BRICK: ("Brick",
+        (("GENERATED", "vector"), ("COLOR", "color1"), ("COLOR", "color2"), ("COLOR", "mortar"),
+         ("FLOAT", "scale"), ("FLOAT", "mortar_size"), ("FLOAT", "mortar_smooth"), ("FLOAT", "bias"),
+         ("FLOAT", "brick_width"), ("FLOAT", "row_height"), ("FLOAT", "offset"), ("FLOAT", "squash")),
+        (("COLOR", "color"), ("FLOAT", "factor"))),
+    NodeType.CURVES: ("Curves",
+        (("FLOAT", "factor"), ("COLOR", "color"), ("FLOAT", "low"), ("FLOAT", "high")),
+        (("COLOR", "color"),)),
+    NodeType.FLOAT_CURVE: ("Float Curve",
+        (("FLOAT", "factor"), ("FLOAT", "value"), ("FLOAT", "low"), ("FLOAT", "high")),
+        (("FLOAT", "value"),)),
+    NodeType.BLACKBODY: ("Blackbody",
+        (("FLOAT", "temperature"),),
+        (("COLOR", "color"),)),
+    NodeType.WAVELENGTH: ("Wavelength",
+        (("FLOAT", "wavelength"),),
+        (("COLOR", "color"),)),
+    NodeType.VECTOR_TRANSFORM: ("Vector Transform",
+        (("VECTOR", "vector"),),
+        (("VECTOR", "vector"),)),
+    NodeType.VECTOR_ROTATE: ("Vector Rotate",
+        (("VECTOR", "vector"), ("VECTOR", "center"), ("VECTOR", "axis"), ("FLOAT", "angle"),
+         ("VECTOR", "rotation")),
+        (("VECTOR", "vector"),)),
+    NodeType.CAMERA_DATA: ("Camera Data",
+        (),
+        (("VECTOR", "view_vector"), ("FLOAT", "view_z_depth"), ("FLOAT", "view_distance"))),
+    NodeType.WIREFRAME: ("Wireframe",
+        (("FLOAT", "size"),),
+        (("FLOAT", "factor"),)),
+    NodeType.TANGENT: ("Tangent",
+        (),
+        (("VECTOR", "tangent"),)),
+    NodeType.AOV_VALUE: ("AOV Value",
+        (("FLOAT", "value"),),
+        ()),
+    NodeType.AOV_COLOR: ("AOV Color",
+        (("COLOR", "color"),),
+        ()),
 }

@@ -3,6 +3,8 @@
 
 #include <math.h>
 
+#include "model/nodes.h"
+
 /* ---- constants ---- */
 
 static void test_constant_material(void **state) {
@@ -179,9 +181,9 @@ static void test_alpha_of_images(void **state) {
         graph_clear();
         const int32_t image = add_image(3, "");
         const int32_t principled = add_principled(0);
-        *input_of(principled, 0) = link_to(image, 0);
+        *input_of(principled, TRC_INPUT_OF(PRINCIPLED, base_color)) = link_to(image, 0);
         if (used)
-            *input_of(principled, 18) = link_to(image, 1);
+            *input_of(principled, TRC_INPUT_OF(PRINCIPLED, alpha)) = link_to(image, 1);
         struct trc_material *m = compiled();
         assert_int_equal(count_op(m, TRC_OP_IMAGE), 1);
         const struct trc_instruction *last = &m->instructions[m->instruction_count - 1];
@@ -397,9 +399,9 @@ static void test_emission_of_principled(void **state) {
     (void)state;
     graph_clear();
     const int32_t node = add_principled(0);
-    *input_of(node, 16) = color(1, .5f, 0);
-    *input_of(node, 17) = value(4);
-    *input_of(node, 18) = value(.5f);
+    *input_of(node, TRC_INPUT_OF(PRINCIPLED, emission)) = color(1, .5f, 0);
+    *input_of(node, TRC_INPUT_OF(PRINCIPLED, emission_strength)) = value(4);
+    *input_of(node, TRC_INPUT_OF(PRINCIPLED, alpha)) = value(.5f);
     struct trc_material *m = compiled();
     assert_true(m->emission[0] == 2 && m->emission[1] == 1 && m->emission[2] == 0);
     trc_material_release(m);
@@ -410,12 +412,13 @@ static void test_default_tangent(void **state) {
     (void)state;
     for (int anisotropic = 0; anisotropic < 2; anisotropic++) {
         graph_clear();
-        *input_of(add_principled(0), 7) = value(anisotropic ? .5f : 0);
+        *input_of(add_principled(0), TRC_INPUT_OF(PRINCIPLED, anisotropic)) =
+            value(anisotropic ? .5f : 0);
         struct trc_material *m = compiled();
         const struct trc_operand *tangent =
             &m->operands[m->leaves[0].first_operand + TRC_AT(PRINCIPLED, tangent)];
         assert_int_equal(m->instruction_count, anisotropic);
-        assert_true(anisotropic ? tangent->reg >= 0 : tangent->reg == -2);
+        assert_true(anisotropic ? tangent->reg >= 0 : tangent->reg == TRC_REG_DEFAULT);
         trc_material_release(m);
     }
 }

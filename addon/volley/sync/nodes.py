@@ -10,8 +10,8 @@ from collections import namedtuple
 
 import numpy as np
 
-from ..abi import (BlendMode, DistributionType, ImageMode, MathOperation as Math, NodeType, TangentSource,
-                   VectorOperation as Vector)
+from ..abi import (BlendMode, DistributionType, ImageExtension, ImageInterpolation, MathOperation as Math, NodeType,
+                   TangentSource, VectorOperation as Vector)
 from ..compat import HAS_CORRELATED_MICROFACETS, KEEPS_DIFFUSE_ENERGY, RAMP_STEPS
 from . import tangents
 from .converters import CONVERTERS, instance_value
@@ -33,10 +33,11 @@ _VECTOR_OPERATIONS = {
     **Vector.__members__, 'CROSS_PRODUCT': Vector.CROSS,
     'DOT_PRODUCT': Vector.DOT, 'FRACTION': Vector.FRACT}
 
-_INTERPOLATIONS = {'Linear': ImageMode.LINEAR, 'Closest': ImageMode.CLOSEST, 'Cubic': ImageMode.CUBIC,
-                   'Smart': ImageMode.CUBIC}
-_EXTENSIONS = {'REPEAT': ImageMode.REPEAT, 'EXTEND': ImageMode.EXTEND, 'CLIP': ImageMode.CLIP,
-               'MIRROR': ImageMode.MIRROR}
+_INTERPOLATIONS = {
+    'Linear': ImageInterpolation.LINEAR, 'Closest': ImageInterpolation.CLOSEST,
+    'Cubic': ImageInterpolation.CUBIC, 'Smart': ImageInterpolation.CUBIC}
+_EXTENSIONS = {'REPEAT': ImageExtension.REPEAT, 'EXTEND': ImageExtension.EXTEND, 'CLIP': ImageExtension.CLIP,
+               'MIRROR': ImageExtension.MIRROR}
 _PROJECTIONS = {'FLAT': 0, 'BOX': 1, 'SPHERE': 2, 'TUBE': 3}
 _CLAMP_RESULT = 256
 _ANISOTROPIC = {  # anisotropy, tangent

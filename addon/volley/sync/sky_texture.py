@@ -11,7 +11,7 @@ from collections import namedtuple
 
 import numpy as np
 
-from ..abi import ImageMode, MathOperation as Math, NodeType, VectorOperation as Vector
+from ..abi import ImageExtension, MathOperation as Math, NodeType, VectorOperation as Vector
 from . import sky
 from .values import CONSTANT, DEFAULT, Value
 
@@ -139,7 +139,7 @@ def _nishita(walker, formula, node, direction):
     turns = formula.number(Math.DIVIDE, formula.number(Math.ARCTAN2, x, y), 2.0 * math.pi)
     turns = formula.number(Math.ADD, turns, 0.5 - node.sun_rotation / (2.0 * math.pi))
     place = formula.combine(formula.number(Math.FRACT, turns), row, 0.0)
-    color = Value('v', walker.emit(NodeType.IMAGE, (place, _number(0.0)), ImageMode.EXTEND, image=image), 0)
+    color = Value('v', walker.emit(NodeType.IMAGE, (place, _number(0.0)), ImageExtension.EXTEND, image=image), 0)
     # Below the horizon its colours fade out.
     fade = formula.number(Math.MULTIPLY_ADD, formula.number(Math.MINIMUM, z, 0.0), 2.5, 1.0)
     fade = formula.number(Math.MAXIMUM, fade, 0.0)

@@ -7,14 +7,14 @@ values that its textures imply.
 """
 
 from ..abi import (BrickMode, FractalType, GradientType, NodeType, NoiseMode, VoronoiFeature, VoronoiMetric,
-                   VoronoiMode, WaveMode)
+                   VoronoiMode, WaveMode, WaveProfile)
 from .sky_texture import sky_texture
 from .values import CONSTANT, DEFAULT, Value
 
 _DIMENSIONS = ('1D', '2D', '3D', '4D')
 _FRACTALS = {kind: FractalType[kind] for kind in (
     'FBM', 'MULTIFRACTAL', 'HETERO_TERRAIN', 'HYBRID_MULTIFRACTAL', 'RIDGED_MULTIFRACTAL')}
-_PROFILES = {'SIN': WaveMode.SINE, 'SAW': WaveMode.SAW, 'TRI': WaveMode.TRIANGLE}
+_PROFILES = {'SIN': WaveProfile.SINE, 'SAW': WaveProfile.SAW, 'TRI': WaveProfile.TRIANGLE}
 _BANDS = ('X', 'Y', 'Z', 'DIAGONAL')
 _RINGS = ('X', 'Y', 'Z', 'SPHERICAL')
 
