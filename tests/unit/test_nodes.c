@@ -16,7 +16,7 @@ struct placed {
     uint32_t number, at;
 };
 
-static void check_slots(const char *label, const struct trc_slot *slots, uint32_t count,
+static void check_slots(const char *label, const struct trc_node_slot *slots, uint32_t count,
                         const struct placed *placed, uint32_t end) {
     uint32_t floats = 0;
     for (uint32_t i = 0; i < count; i++) {
@@ -69,7 +69,7 @@ static void test_offsets_add_up(void **state) {
     NODE_SLOTS(HOLDOUT);
 }
 
-static uint32_t floats_of(const struct trc_slot *slots, uint32_t count) {
+static uint32_t floats_of(const struct trc_node_slot *slots, uint32_t count) {
     uint32_t floats = 0;
     for (uint32_t i = 0; i < count; i++)
         floats += trc_kind_floats(slots[i].kind);

@@ -3,9 +3,9 @@
 
 #define TRC_IN(kind, name) {TRC_KIND_##kind, #name},
 #define TRC_OUT(kind, name) {TRC_KIND_##kind, #name},
-#define TRC_NODE(NAME, number, label, inputs, outputs, modes)                         \
-    static const struct trc_slot inputs_of_##NAME[] = {inputs{TRC_KIND_FLOAT, NULL}}; \
-    static const struct trc_slot outputs_of_##NAME[] = {outputs{TRC_KIND_FLOAT, NULL}};
+#define TRC_NODE(NAME, number, label, inputs, outputs, modes)                              \
+    static const struct trc_node_slot inputs_of_##NAME[] = {inputs{TRC_KIND_FLOAT, NULL}}; \
+    static const struct trc_node_slot outputs_of_##NAME[] = {outputs{TRC_KIND_FLOAT, NULL}};
 #include "tracer/nodes.def"
 
 #define TRC_NODE(NAME, number, label, inputs, outputs, modes) \

@@ -29,7 +29,7 @@ static inline uint32_t trc_kind_floats(enum trc_kind kind) {
     return kind == TRC_KIND_SHADER ? 0 : kind == TRC_KIND_FLOAT ? 1 : 3;
 }
 
-struct trc_slot {
+struct trc_node_slot {
     enum trc_kind kind;
     const char *name;
 };
@@ -37,7 +37,7 @@ struct trc_slot {
 struct trc_node_info {
     const char *label; /* NULL: no such type */
     uint32_t input_count, output_count;
-    const struct trc_slot *inputs, *outputs;
+    const struct trc_node_slot *inputs, *outputs;
 };
 
 /* NULL: unknown type. */
