@@ -3,34 +3,39 @@
 
     python3 tests/support/image_corpus.py FOLDER
 
-``make`` writes the files: those of formats that oiiotool writes by it, those of the others byte by byte.
+``make`` writes the files: those of formats that OpenImageIO writes by it, those of the others byte by byte.
 ``damage`` spoils one by a random generator: the same seed, the same file.
 """
 
 import os
 import struct
-import subprocess
 import sys
 
-WIDTH, HEIGHT = 32, 24
+import numpy as np
+import OpenImageIO as oiio
 
-# Name: arguments of oiiotool between the picture and the output.
+WIDTH, HEIGHT = 32, 36  # JPEG 2000 is not written for shorter sides
+
+# Name: the type of its pixels, then attributes for OpenImageIO, of which "channels", "parts" and "tile" are
+# told otherwise.
 _WRITTEN = {
-    "bytes.bmp": "-d uint8", "bytes.dpx": "-d uint8", "words.dpx": "-d uint16", "ten.dpx": "-d uint10",
-    "floats.fits": "-d float", "colors.gif": "-d uint8", "bytes.heic": "-d uint8", "bytes.avif": "-d uint8",
-    "floats.hdr": "-d float", "alpha.ico": "--ch R,G,B,A=1.0 -d uint8", "bytes.iff": "-d uint8",
-    "bytes.jpg": "-d uint8", "grey.jpg": "--ch R -d uint8", "bytes.jp2": "-d uint8", "words.j2c": "-d uint16",
-    "zip.exr": "-d half --compression zip", "piz.exr": "-d half --compression piz",
-    "rle.exr": "-d float --compression rle", "pxr24.exr": "-d float --compression pxr24",
-    "b44.exr": "-d half --compression b44", "dwaa.exr": "-d half --compression dwaa",
-    "tiles.exr": "-d half --tile 16 16", "bytes.png": "-d uint8", "alpha.png": "--ch R,G,B,A=0.5 -d uint8",
-    "words.png": "-d uint16", "grey.png": "--ch R -d uint8", "bytes.ppm": "-d uint8", "words.pgm": "-d uint16",
-    "bits.pbm": "--ch R -d uint1", "bytes.rla": "-d uint8", "words.sgi": "-d uint16", "bytes.rgb": "-d uint8",
-    "rle.tga": "-d uint8 --compression rle", "plain.tga": "-d uint8 --compression none",
-    "lzw.tif": "-d uint8 --compression lzw", "zip.tif": "-d uint16 --compression zip",
-    "packbits.tif": "-d uint8 --compression packbits", "jpeg.tif": "-d uint8 --compression jpeg",
-    "tiles.tif": "-d half --tile 16 16", "planes.tif": "-d uint8 --planarconfig separate",
-    "bytes.webp": "-d uint8", "depth.zfile": "--ch R -d float"}
+    "bytes.bmp": "uint8", "bytes.dpx": "uint8", "words.dpx": "uint16",
+    "ten.dpx": "uint16 oiio:BitsPerSample=10", "floats.fits": "float", "colors.gif": "uint8",
+"bytes.heic": "uint8", "bytes.avif": "uint8", "floats.hdr": "float",
+    "alpha.ico": "uint8 channels=4", "bytes.iff": "uint8", "bytes.jpg": "uint8", "grey.jpg": "uint8 channels=1",
+    "bytes.jp2": "uint8", "words.jp2": "uint16", "plain.exr": "float compression=none",
+    "rle.exr": "float compression=rle", "zip.exr": "half compression=zip", "zips.exr": "float compression=zips",
+    "piz.exr": "half compression=piz", "pxr24.exr": "float compression=pxr24",
+    "b44.exr": "half compression=b44", "b44a.exr": "half compression=b44a", "dwaa.exr": "half compression=dwaa",
+    "dwab.exr": "half compression=dwab", "tiles.exr": "half tile=16", "parts.exr": "half parts=2",
+    "bytes.png": "uint8", "alpha.png": "uint8 channels=4", "words.png": "uint16", "grey.png": "uint8 channels=1",
+    "bytes.ppm": "uint8", "words.pgm": "uint16 channels=1", "bits.pbm": "uint8 channels=1 oiio:BitsPerSample=1",
+    "bytes.rla": "uint8", "words.sgi": "uint16", "rle.sgi": "uint8 compression=rle", "bytes.rgb": "uint8",
+    "rle.tga": "uint8 compression=rle", "plain.tga": "uint8 compression=none", "lzw.tif": "uint8 compression=lzw",
+    "zip.tif": "uint16 compression=zip", "packbits.tif": "uint8 compression=packbits",
+    "jpeg.tif": "uint8 compression=jpeg", "tiles.tif": "half tile=16",
+    "planes.tif": "uint8 planarconfig=separate", "floats.tif": "float compression=zip", "bytes.webp": "uint8",
+    "alpha.webp": "uint8 channels=4", "depth.zfile": "float channels=1"}
 
 
 def _color(x, y):
@@ -172,23 +177,65 @@ def _write(path, data):
     return path
 
 
+def _by_oiio(path, pixels, settings):
+    """Write pixels (height, width, 4); the list of the path, empty for a format that OpenImageIO cannot write."""
+    kind, *words = settings.split()
+    values = dict(word.split("=") for word in words)
+    channels, parts, tile = (int(values.pop(name, default)) for name, default in
+                             (("channels", 3), ("parts", 1), ("tile", 0)))
+    specs = []
+    for part in range(parts):
+        spec = oiio.ImageSpec(WIDTH, HEIGHT, channels, kind)
+        spec.tile_width = spec.tile_height = tile
+        for name, value in values.items():
+            spec.attribute(name, int(value) if value.isdigit() else value)
+        if parts > 1:
+            spec.attribute("oiio:subimagename", f"part{part}")
+        specs.append(spec)
+    output = oiio.ImageOutput.create(path)
+    if output is None or not output.open(path, tuple(specs) if parts > 1 else specs[0]):
+        return []
+    is_written = True
+    for part, spec in enumerate(specs):
+        if part:
+            is_written &= output.open(path, spec, "AppendSubimage")
+        is_written &= output.write_image(np.ascontiguousarray(pixels[..., :channels]))
+    output.close()
+    return [path] if is_written else []
+
+
 def make(folder):
-    """Write the corpus; the paths of its files. Formats that oiiotool was built without are left out."""
+    """Write the corpus; the paths of its files. Formats that OpenImageIO was built without are left out."""
     os.makedirs(folder, exist_ok=True)
-    picture = ["oiiotool", "--pattern", "fill:topleft=.1,.2,.9:topright=.9,.1,.3:bottomleft=.2,.8,.1:"
-               "bottomright=.7,.7,.7", f"{WIDTH}x{HEIGHT}", "3"]
+    pixels = np.full((HEIGHT, WIDTH, 4), 0.5, np.float32)
+    pixels[..., :3] = np.reshape(_PIXELS, (HEIGHT, WIDTH, 3)) / 255.0
     paths = [_write(os.path.join(folder, name), make_one()) for name, make_one in _BY_HAND.items()]
-    for name, arguments in _WRITTEN.items():
-        path = os.path.join(folder, name)
-        done = subprocess.run([*picture, *arguments.split(), "-o", path], stdin=subprocess.DEVNULL,
-                              stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False)
-        if done.returncode == 0 and os.path.isfile(path) and os.path.getsize(path):
-            paths.append(path)
+    for name, settings in _WRITTEN.items():
+        paths += _by_oiio(os.path.join(folder, name), pixels, settings)
     jpeg = os.path.join(folder, "bytes.jpg")
     if jpeg in paths:
         with open(jpeg, "rb") as file:
             paths.append(_write(os.path.join(folder, "frame.avi"), _movie(file.read())))
     return sorted(paths)
+
+
+# Formats and settings that change a colour by no more than a byte's rounding.
+_EXACT = {"png": "uint8", "tif": "uint16 compression=lzw", "exr": "half compression=zip",
+          "tga": "uint8 compression=rle", "bmp": "uint8", "ppm": "uint8", "hdr": "float", "sgi": "uint8"}
+
+
+def make_plain(folder, count, dice):
+    """Write files of one colour each, in several formats; [(path, colour)]."""
+    os.makedirs(folder, exist_ok=True)
+    made = []
+    for number in range(count):
+        extension = list(_EXACT)[number % len(_EXACT)]
+        color = [dice.randrange(30, 225) / 255.0 for _ in range(3)]
+        path = os.path.join(folder, f"plain{number}.{extension}")
+        pixels = np.ones((HEIGHT, WIDTH, 4), np.float32)
+        pixels[..., :3] = color
+        made += [(path, color) for path in _by_oiio(path, pixels, _EXACT[extension])]
+    return made
 
 
 _EXTREME = (0, 1, 0x7F, 0x80, 0xFF, 0x7FFF, 0x8000, 0xFFFF, 0xFFFFFF, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF)
