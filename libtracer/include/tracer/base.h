@@ -4,6 +4,11 @@
  * Rec.709 colour, right-handed coordinates with Z up, column vectors. A transform is 12 floats, the
  * three rows of a 3x4 matrix (row-major), so that p_world = M * (p_object, 1).
  *
+ * Descriptors begin with struct_size, the size of the structure that the caller was compiled with:
+ * TRC_ERROR_STRUCT_SIZE if the library's is another. trc_NAME_default() fills a whole one in, with
+ * values that are valid unless its comment says what is still to be set; pointers in it, if any,
+ * are to memory of the library that always stays.
+ *
  * Ownership: the library copies everything a descriptor points to before the call returns; nothing
  * that the caller passes is kept. What the library writes goes to memory of the caller.
  *
@@ -69,7 +74,7 @@ enum trc_isa_id {
     TRC_ISA_NEON = 5
 };
 
-/* The ABI version the library was built with: TRC_ABI_VERSION. */
+/* The ABI version the library was built with: TRC_ABI_VERSION. Compare it before any other call. */
 TRC_API uint32_t trc_abi_version(void);
 
 /* "0.1.0"; static storage. */

@@ -14,7 +14,7 @@ enum trc_normals_layout { TRC_NORMALS_NONE = 0, TRC_NORMALS_VERTEX = 1, TRC_NORM
 
 /* A named array with one value per triangle corner, in triangle order. */
 typedef struct trc_corner_attribute {
-    uint32_t struct_size;
+    uint32_t struct_size; /* of this structure; checked */
     uint32_t width;   /* floats per corner: 2 (UV map) or 4 (colour, scene-linear RGBA; tangents) */
     const char *name; /* UTF-8, up to 63 bytes; not NULL */
     const float *values;  /* width * 3 * triangle_count floats */
@@ -25,10 +25,10 @@ typedef struct trc_corner_attribute {
 TRC_API trc_corner_attribute trc_corner_attribute_default(void);
 
 typedef struct trc_mesh_desc {
-    uint32_t struct_size;
-    uint32_t key_count; /* motion keys, 1..TRC_MAX_KEYS, evenly spaced over [0, 1] */
-    uint64_t vertex_count;
-    uint64_t triangle_count;
+    uint32_t struct_size;    /* of this structure; checked */
+    uint32_t key_count;      /* motion keys, 1..TRC_MAX_KEYS, evenly spaced over [0, 1] */
+    uint64_t vertex_count;   /* 3 * vertex_count * key_count < 2^31 */
+    uint64_t triangle_count; /* 3 * triangle_count < 2^31; may be 0 */
     const float *positions;  /* 3 * vertex_count * key_count floats, key after key */
     uint64_t position_count; /* number of floats, checked */
     const uint32_t *indices; /* 3 * triangle_count */
@@ -64,7 +64,8 @@ TRC_API trc_status trc_mesh_update(trc_scene scene, trc_id mesh, uint32_t key_co
                                    const float *positions, uint64_t position_count,
                                    const float *normals, uint64_t normal_count);
 
-/* Fails with INVALID_ARGUMENT while an instance uses it. */
+/* Frees a mesh; snapshots that hold it keep it until they end. INVALID_ARGUMENT while an instance
+ * uses it. */
 TRC_API trc_status trc_mesh_destroy(trc_scene scene, trc_id mesh);
 
 /* Which rays see an instance or a light. */
@@ -87,9 +88,9 @@ enum trc_instance_flags { TRC_INSTANCE_SHADOW_CATCHER = 1 };
 #define TRC_MAX_INSTANCE_VALUES 64
 
 typedef struct trc_instance_desc {
-    uint32_t struct_size;
-    uint32_t key_count; /* transforms, 1..TRC_MAX_KEYS, evenly spaced over [0, 1] */
-    trc_id mesh;
+    uint32_t struct_size;    /* of this structure; checked */
+    uint32_t key_count;      /* transforms, 1..TRC_MAX_KEYS, evenly spaced over [0, 1] */
+    trc_id mesh;             /* of the same scene */
     const float *transforms; /* 12 floats per key, see base.h; what they flatten is shown flat;
                                 where all keys make it a line or a point, or one is not finite, the
                                 instance is hidden and counted in trc_scene_stats */
@@ -111,10 +112,18 @@ typedef struct trc_instance_desc {
 /* Of no mesh yet: at the origin, unscaled, the default material, visible to all rays, white. */
 TRC_API trc_instance_desc trc_instance_desc_default(void);
 
+/* Places a mesh in the scene from the next commit on. INVALID_HANDLE for a mesh or a material that
+ * the scene does not have, INVALID_ARGUMENT for a value out of range; transforms are judged at
+ * commit. */
 TRC_API trc_status trc_instance_create(trc_scene scene, const trc_instance_desc *desc,
                                        trc_id *instance_out);
+
+/* Replaces all that is known of an instance; errors as for create. What stays equal costs nothing
+ * at commit. */
 TRC_API trc_status trc_instance_update(trc_scene scene, trc_id instance,
                                        const trc_instance_desc *desc);
+
+/* Takes an instance out of the scene from the next commit on; its mesh and materials stay. */
 TRC_API trc_status trc_instance_destroy(trc_scene scene, trc_id instance);
 
 TRC_END_DECLS

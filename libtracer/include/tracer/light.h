@@ -27,11 +27,11 @@ enum trc_light_flags {
 /* Strengths are Blender's: watts for point, spot and area, W/m^2 for the sun, times color. A light
  * shines along its -Z; area lights span X and Y. */
 typedef struct trc_light_desc {
-    uint32_t struct_size;
-    uint32_t type;       /* TRC_LIGHT_* */
-    float transform[12]; /* light to world */
-    float color[3];      /* scene-linear, times the nodes' constant colour and strength */
-    float strength;
+    uint32_t struct_size; /* of this structure; checked */
+    uint32_t type;        /* TRC_LIGHT_* */
+    float transform[12];  /* light to world */
+    float color[3];       /* scene-linear, times the nodes' constant colour and strength */
+    float strength;       /* see above; may be negative */
     float radius;         /* point, spot: metres, >= 0 */
     float angle;          /* sun: angular diameter, radians, [0, pi] */
     float size_x, size_y; /* area: metres, full width before the transform's scale */
@@ -51,8 +51,14 @@ typedef struct trc_light_desc {
  * sun of no extent. */
 TRC_API trc_light_desc trc_light_desc_default(void);
 
+/* Adds a light from the next commit on. INVALID_ARGUMENT for a value out of range; what a type does
+ * not read must be finite. */
 TRC_API trc_status trc_light_create(trc_scene scene, const trc_light_desc *desc, trc_id *light_out);
+
+/* Replaces all that is known of a light; errors as for create. */
 TRC_API trc_status trc_light_update(trc_scene scene, trc_id light, const trc_light_desc *desc);
+
+/* Takes a light out of the scene from the next commit on. */
 TRC_API trc_status trc_light_destroy(trc_scene scene, trc_id light);
 
 /* Ambient occlusion, the Fast GI Approximation of Cycles: rays from every shading point with
@@ -69,7 +75,7 @@ enum trc_ao_method {
 };
 
 typedef struct trc_world_desc {
-    uint32_t struct_size;
+    uint32_t struct_size;    /* of this structure; checked */
     uint32_t use_sampling;   /* 1: the environment image is sampled by importance */
     trc_id material;         /* a material whose surface is BACKGROUND (or a mix); 0: black */
     uint32_t visibility;     /* TRC_VISIBLE_* */
@@ -79,15 +85,16 @@ typedef struct trc_world_desc {
     uint32_t ao_method;      /* TRC_AO_* */
     uint32_t light_group;    /* 0..TRC_MAX_LIGHT_GROUPS */
     /* A small, bright disc that the material shows, such as the sun of a sky: it is sampled by
-     * itself instead of through the map. Its direction, and its diameter in radians, 0..pi; 0:
-     * none. */
-    float sun_direction[3];
-    float sun_angle;
+     * itself instead of through the map. */
+    float sun_direction[3]; /* towards it, of any length but 0; not read without sun_angle */
+    float sun_angle;        /* its diameter in radians, 0..pi; 0: none */
 } trc_world_desc;
 
 /* Black, without ambient occlusion; a material that it gets is sampled and seen by all rays. */
 TRC_API trc_world_desc trc_world_desc_default(void);
 
+/* Replaces the scene's world, which is black at first. INVALID_HANDLE for a material that the scene
+ * does not have, INVALID_ARGUMENT for a value out of range. */
 TRC_API trc_status trc_scene_set_world(trc_scene scene, const trc_world_desc *desc);
 
 TRC_END_DECLS

@@ -301,8 +301,8 @@ typedef struct trc_node_input {
 TRC_API trc_node_input trc_node_input_default(void);
 
 typedef struct trc_node {
-    uint32_t type; /* TRC_NODE_* */
-    uint32_t mode;
+    uint32_t type;        /* TRC_NODE_* */
+    uint32_t mode;        /* of the type; 0 where it has none */
     uint32_t first_input; /* into trc_material_desc.inputs */
     uint32_t input_count; /* exactly the count of the type */
     trc_id image;         /* IMAGE, ENVIRONMENT; 0 renders magenta */
@@ -315,16 +315,16 @@ typedef struct trc_node {
 TRC_API trc_node trc_node_default(void);
 
 typedef struct trc_material_desc {
-    uint32_t struct_size;
-    uint32_t node_count; /* 0: black, opaque */
-    const trc_node *nodes;
-    const trc_node_input *inputs;
-    uint32_t input_count;
-    int32_t surface;    /* index of the shader node that is the output; -1: black */
-    int32_t pass_index; /* Material Index pass */
-    uint32_t flags;     /* TRC_MATERIAL_* */
-    float cryptomatte;  /* trc_cryptomatte_id of its name; 0: in no matte */
-    uint32_t reserved;
+    uint32_t struct_size;         /* of this structure; checked */
+    uint32_t node_count;          /* 0: black, opaque */
+    const trc_node *nodes;        /* node_count <= TRC_MAX_NODES, each after those it reads */
+    const trc_node_input *inputs; /* of all nodes, one after the other */
+    uint32_t input_count;         /* <= TRC_MAX_NODES * TRC_MAX_NODE_INPUTS */
+    int32_t surface;              /* index of the shader node that is the output; -1: black */
+    int32_t pass_index;           /* Material Index pass */
+    uint32_t flags;               /* TRC_MATERIAL_* */
+    float cryptomatte;            /* trc_cryptomatte_id of its name; 0: in no matte */
+    uint32_t reserved;            /* 0 */
 } trc_material_desc;
 
 /* Black. With nodes: emission is sampled, shadow rays see transparency. */
@@ -342,13 +342,19 @@ enum trc_material_flags {
     TRC_MATERIAL_PLAIN_CHOICE = 4
 };
 
-/* NaN or infinite constants refuse the material; out-of-range ones (roughness < 0, IOR <= 0) are
- * clamped as Cycles does. */
+/* A material from a node list, in use from the next commit on. INVALID_ARGUMENT, with the node and
+ * the input, for a list that is none: an unknown type or mode, a wrong number of inputs, a source
+ * that is no earlier node or of another kind, a constant that is NaN or infinite. Others out of
+ * range (roughness < 0, IOR <= 0) are clamped as Cycles does. */
 TRC_API trc_status trc_material_create(trc_scene scene, const trc_material_desc *desc,
                                        trc_id *material_out);
+
+/* Replaces a material where it is in use, from the next commit on; errors as for create. */
 TRC_API trc_status trc_material_update(trc_scene scene, trc_id material,
                                        const trc_material_desc *desc);
-/* Instances that still use it fall back to the default material. */
+
+/* Frees a material from the next commit on. Instances that still use it fall back to the default
+ * material, a world to black. */
 TRC_API trc_status trc_material_destroy(trc_scene scene, trc_id material);
 
 enum trc_alpha_mode {
@@ -359,7 +365,7 @@ enum trc_alpha_mode {
 };
 
 typedef struct trc_image_desc {
-    uint32_t struct_size;
+    uint32_t struct_size;   /* of this structure; checked */
     uint32_t width, height; /* pixels, 1..65536, width * height <= 2^30; 0 with a path */
     uint32_t alpha_mode;    /* TRC_ALPHA_* */
     uint32_t is_srgb;     /* 1: colour values are sRGB-encoded and are linearised, 0: as they are */
@@ -383,11 +389,11 @@ typedef struct trc_image_desc {
 /* Nothing yet: straight alpha, values as they are. */
 TRC_API trc_image_desc trc_image_desc_default(void);
 
-/* TRC_ERROR_IMAGE for a file that cannot be read, or colours that cannot be converted: the caller
- * may go on with image 0 (magenta). TRC_ERROR_TOO_LARGE also for a file that claims more pixels
- * than one of its size can have, TRC_ERROR_FORMAT for one in no known format. TRC_ERROR_UNSUPPORTED
- * for a path or a color_space where the reader's program is absent (a build without OpenImageIO) or
- * does not run. */
+/* Copies an image into the scene, or reads its file. TRC_ERROR_IMAGE for a file that cannot be
+ * read, or colours that cannot be converted: the caller may go on with image 0 (magenta).
+ * TRC_ERROR_TOO_LARGE also for a file that claims more pixels than one of its size can have,
+ * TRC_ERROR_FORMAT for one in no known format. TRC_ERROR_UNSUPPORTED for a path or a color_space
+ * where the reader's program is absent (a build without OpenImageIO) or does not run. */
 TRC_API trc_status trc_image_create(trc_scene scene, const trc_image_desc *desc, trc_id *image_out);
 
 /* Reads the file of a descriptor ahead, beside others and beside other work: trc_image_create with
@@ -395,6 +401,7 @@ TRC_API trc_status trc_image_create(trc_scene scene, const trc_image_desc *desc,
  * Nothing else comes of it, and it reports no file that cannot be read. */
 TRC_API trc_status trc_image_expect(trc_scene scene, const trc_image_desc *desc);
 
+/* Frees an image from the next commit on. Nodes that still read it render magenta. */
 TRC_API trc_status trc_image_destroy(trc_scene scene, trc_id image);
 
 TRC_END_DECLS

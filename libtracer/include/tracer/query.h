@@ -10,12 +10,13 @@ TRC_BEGIN_DECLS
  * not be unit; distances are in units of their length. A ray with a NaN, an infinite origin or
  * direction, a zero direction, or tmin > tmax hits nothing. */
 typedef struct trc_rays {
-    uint32_t struct_size;
-    uint32_t visibility; /* TRC_VISIBLE_* bits an instance must share; TRC_VISIBLE_ALL usual */
-    uint64_t count;
-    const float *origin_x, *origin_y, *origin_z;
-    const float *direction_x, *direction_y, *direction_z;
-    const float *tmin, *tmax, *time;
+    uint32_t struct_size; /* of this structure; checked */
+    uint32_t visibility;  /* TRC_VISIBLE_* bits an instance must share; TRC_VISIBLE_ALL usual */
+    uint64_t count;       /* rays; may be 0 */
+    const float *origin_x, *origin_y, *origin_z;          /* metres, world */
+    const float *direction_x, *direction_y, *direction_z; /* world, of any length */
+    const float *tmin, *tmax; /* the part of each ray that counts, in lengths of its direction */
+    const float *time;        /* over the shutter, [0, 1] */
 } trc_rays;
 
 /* No rays, which meet what any ray does. */
@@ -27,23 +28,27 @@ TRC_API trc_rays trc_rays_default(void);
  * p2. On a miss instance is TRC_NO_HIT and the rest is untouched. Of equal distances, the lowest
  * (instance, triangle) in creation order wins. */
 typedef struct trc_hits {
-    uint32_t struct_size;
-    uint32_t reserved;
-    uint32_t *instance; /* position of the instance in creation order among the living */
-    uint32_t *triangle;
-    float *distance, *u, *v;
+    uint32_t struct_size; /* of this structure; checked */
+    uint32_t reserved;    /* 0 */
+    uint32_t *instance;   /* position of the instance in creation order among the living */
+    uint32_t *triangle;   /* its number in the mesh */
+    float *distance;      /* in lengths of the direction */
+    float *u, *v;         /* barycentrics, see above */
     float *normal_x, *normal_y, *normal_z; /* geometric, world, not normalised, by winding */
 } trc_hits;
 
 /* No arrays yet. */
 TRC_API trc_hits trc_hits_default(void);
 
-/* Rays are taken in packets of packet_size neighbours: 1, 4, 16, 64 or 256; 0 chooses. 256 is
- * for rays that mostly meet the same triangles. */
+/* The first hit of each ray with the last committed snapshot, at once and on the calling thread.
+ * Rays are taken in packets of packet_size neighbours: 1, 4, 16, 64 or 256; 0 chooses. 256 is for
+ * rays that mostly meet the same triangles. The result does not depend on it. NOT_COMMITTED before
+ * the first commit; INVALID_ARGUMENT for a required array that is NULL or a misaligned one. */
 TRC_API trc_status trc_query_closest(trc_scene scene, const trc_rays *rays, uint32_t packet_size,
                                      const trc_hits *hits_out);
 
-/* occluded_out[i] = 1 if anything lies strictly within (tmin, tmax), else 0. */
+/* occluded_out[i] = 1 if anything lies strictly within (tmin, tmax), else 0. occluded_count: bytes
+ * of occluded_out, the number of rays. As trc_query_closest in all else. */
 TRC_API trc_status trc_query_occluded(trc_scene scene, const trc_rays *rays, uint32_t packet_size,
                                       uint8_t *occluded_out, uint64_t occluded_count);
 

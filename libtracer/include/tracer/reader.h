@@ -17,22 +17,24 @@
 TRC_BEGIN_DECLS
 
 typedef struct trc_reader_desc {
-    uint32_t struct_size;
-    uint32_t reserved;
-    const char *program; /* path of the program; NULL: tracer_reader in the library's folder */
+    uint32_t struct_size; /* of this structure; checked */
+    uint32_t reserved;    /* 0 */
+    const char *program;  /* path of the program; NULL: tracer_reader in the library's folder */
 } trc_reader_desc;
 
 /* The program in the library's folder. */
 TRC_API trc_reader_desc trc_reader_desc_default(void);
 
-/* Starts nothing yet. A program that is absent or does not run is found out when a file is read:
- * TRC_ERROR_UNSUPPORTED with the reason, from then on for each. */
+/* A reader, owned by the caller until trc_reader_destroy. Starts nothing yet. A program that is
+ * absent or does not run is found out when a file is read: TRC_ERROR_UNSUPPORTED with the reason,
+ * from then on for each. */
 TRC_API trc_status trc_reader_create(const trc_reader_desc *desc, trc_reader *reader_out);
 
 /* Starts the program, so that the first file need not wait for it. Returns at once. */
 TRC_API trc_status trc_reader_start(trc_reader reader);
 
-/* The program ends with the last scene that was created with the reader. */
+/* Gives up the caller's hold. The program ends with the last scene that was created with the
+ * reader. */
 TRC_API trc_status trc_reader_destroy(trc_reader reader);
 
 TRC_END_DECLS

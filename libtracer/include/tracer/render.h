@@ -20,14 +20,15 @@ enum trc_sampler_type {
     TRC_SAMPLER_BLUE_NOISE = 4 /* Sobol with blue-noise ordering over the screen, for previews */
 };
 
+/* How secondary rays are put into packets. */
 enum trc_assembly_type {
-    TRC_ASSEMBLY_AUTO = 0,
-    TRC_ASSEMBLY_TYPES,
-    TRC_ASSEMBLY_RUNS,
-    TRC_ASSEMBLY_GROUPS,
-    TRC_ASSEMBLY_OCTANTS,
-    TRC_ASSEMBLY_BLIND,
-    TRC_ASSEMBLY_NONE
+    TRC_ASSEMBLY_AUTO = 0, /* the library chooses */
+    TRC_ASSEMBLY_TYPES,    /* shadow, reflection and refraction rays apart */
+    TRC_ASSEMBLY_RUNS,     /* neighbours that hit the same material */
+    TRC_ASSEMBLY_GROUPS,   /* by material over the whole packet */
+    TRC_ASSEMBLY_OCTANTS,  /* by the signs of the direction */
+    TRC_ASSEMBLY_BLIND,    /* in the order the rays arise */
+    TRC_ASSEMBLY_NONE      /* every secondary ray alone */
 };
 
 enum trc_filter_type {
@@ -129,15 +130,15 @@ enum trc_cryptomatte_kind {
 TRC_API float trc_cryptomatte_id(const char *name);
 
 typedef struct trc_render_desc {
-    uint32_t struct_size;
+    uint32_t struct_size;             /* of this structure; checked */
     uint32_t width, height;           /* the full frame, 1..65536 each */
     uint32_t crop_x, crop_y;          /* lower left corner of the part that is rendered */
     uint32_t crop_width, crop_height; /* 0: the full frame */
-    uint32_t integrator;
-    uint32_t sample_count;  /* per pixel, 1..2^20 */
-    uint32_t light_samples; /* shadow rays per camera hit, 1..64; 0 chooses */
-    uint32_t max_depth;     /* bounces; 0: direct light only */
-    uint32_t max_transparent_depth;
+    uint32_t integrator;              /* TRC_INTEGRATOR_* */
+    uint32_t sample_count;            /* per pixel, 1..2^20 */
+    uint32_t light_samples;           /* shadow rays per camera hit, 1..64; 0 chooses */
+    uint32_t max_depth;               /* bounces; 0: direct light only */
+    uint32_t max_transparent_depth;   /* transparent surfaces that a ray passes straight */
     uint32_t max_glossy_depth, max_transmission_depth; /* further limits; UINT32_MAX none */
     float attenuation_cutoff; /* a ray whose throughput is below is not traced; Distribution decides
                                  by chance instead, unbiased, and does not read it */
@@ -145,13 +146,13 @@ typedef struct trc_render_desc {
     /* As Cycles: largest mean of the channels of one contribution to a sample; 0 off. Passes of
      * light are clamped with Combined, that of ambient occlusion as direct light. */
     float clamp_direct, clamp_indirect;
-    uint32_t assembly;
+    uint32_t assembly;    /* TRC_ASSEMBLY_* */
     uint32_t packet_size; /* 4, 16, 64 or 256; 0 chooses. 256, the paper's largest: where rays stay
                              together (camera, ideal bounces, one light), and 64 elsewhere */
-    uint32_t sampler;
-    uint32_t seed;
-    uint32_t filter;           /* TRC_FILTER_* */
-    float filter_width;        /* pixels, > 0 */
+    uint32_t sampler;     /* TRC_SAMPLER_* */
+    uint32_t seed;        /* another number gives other noise */
+    uint32_t filter;      /* TRC_FILTER_* */
+    float filter_width;   /* pixels, > 0 */
     uint32_t film_transparent; /* 1: the background adds no radiance and no alpha */
     float film_exposure;       /* factor on Combined and light passes */
     uint64_t passes;           /* bit per TRC_PASS_*, COMBINED is always there */
@@ -165,7 +166,7 @@ typedef struct trc_render_desc {
      * (with TRC_SAMPLER_SUDOKU and BLUE_NOISE, whose pixels share sequences, nearly). Counts:
      * TRC_PASS_SAMPLE_COUNT. */
     float noise_threshold;
-    uint32_t min_samples;
+    uint32_t min_samples; /* as said above; not read without noise_threshold */
     /* Of TRC_PASS_MIST, else not read: ((distance - mist_start) / mist_depth)^mist_falloff, the
      * quotient cut to [0, 1]; distance from the camera (orthographic: along its axis). */
     float mist_start, mist_depth; /* metres, >= 0; a mist_depth of 0 is no mist */
@@ -181,10 +182,11 @@ typedef struct trc_render_desc {
  * filter of Blackman-Harris 1.5 pixels wide, nothing clamped or cut off, Combined alone. */
 TRC_API trc_render_desc trc_render_desc_default(void);
 
-/* Starts rendering the scene's current snapshot in threads of the library. All memory of the frame
- * is taken before anything starts, and before the first of it is taken, the sum is checked against
- * what the machine, its container (control groups) and a limit of address space (RLIMIT_AS) leave:
- * TOO_LARGE. A missing camera is INVALID_ARGUMENT. */
+/* Starts a render, which the caller owns until trc_render_destroy: of the scene's current snapshot,
+ * in threads of the library. All memory of the frame is taken before anything starts, and before
+ * the first of it is taken, the sum is checked against what the machine, its container (control
+ * groups) and a limit of address space (RLIMIT_AS) leave: TOO_LARGE. A missing camera is
+ * INVALID_ARGUMENT. */
 TRC_API trc_status trc_render_start(trc_scene scene, const trc_render_desc *desc,
                                     trc_render *render_out);
 
@@ -195,23 +197,24 @@ enum trc_progress_state {
 };
 
 typedef struct trc_render_progress {
-    uint32_t struct_size;
+    uint32_t struct_size;  /* of this structure; checked */
     uint32_t state;        /* TRC_PROGRESS_* */
     float fraction;        /* [0, 1] of the samples; those that adaptive sampling spares are done */
     uint32_t samples_done; /* lowest count over all pixels, as if every pixel took them all */
     double seconds;        /* since the start, stands still at the end */
-    uint64_t rays_camera, rays_shadow, rays_reflection, rays_refraction;
-    uint64_t dropped_samples;                 /* not finite, left out */
-    uint64_t memory_bytes, peak_memory_bytes; /* of the library */
-    uint32_t tiles_done, tile_count;
-    uint32_t version; /* rises with every finished tile or batch: something to draw */
-    uint32_t reserved;
+    uint64_t rays_camera, rays_shadow, rays_reflection, rays_refraction; /* traced so far */
+    uint64_t dropped_samples;                                            /* not finite, left out */
+    uint64_t memory_bytes, peak_memory_bytes;                            /* of the library */
+    uint32_t tiles_done, tile_count;                                     /* finished, and in all */
+    uint32_t version;  /* rises with every finished tile or batch: something to draw */
+    uint32_t reserved; /* 0 */
     double seconds_trace, seconds_shade, seconds_other; /* summed over threads */
 } trc_render_progress;
 
 /* Zeros, for trc_render_poll. */
 TRC_API trc_render_progress trc_render_progress_default(void);
 
+/* How far a render is, at once. struct_size of progress_out is set by the caller. */
 TRC_API trc_status trc_render_poll(trc_render render, trc_render_progress *progress_out);
 
 /* Returns when the render has ended or after timeout_seconds (0: at once, < 0: no limit). */

@@ -11,7 +11,7 @@
 TRC_BEGIN_DECLS
 
 typedef struct trc_scene_desc {
-    uint32_t struct_size;
+    uint32_t struct_size;  /* of this structure; checked */
     uint32_t thread_count; /* for builds; 0: one per logical processor */
     uint32_t is_final; /* 1: final frame, best trees, static meshes of one instance are joined in
                           world space; 0: interactive, per-mesh trees that can be refitted */
@@ -24,6 +24,8 @@ typedef struct trc_scene_desc {
 /* Interactive, on all processors, images without limit, a reader of its own. */
 TRC_API trc_scene_desc trc_scene_desc_default(void);
 
+/* An empty scene, owned by the caller until trc_scene_destroy. INVALID_HANDLE for a reader that is
+ * none. */
 TRC_API trc_status trc_scene_create(const trc_scene_desc *desc, trc_scene *scene_out);
 
 /* Renders that run on its snapshot are not disturbed. The handle and all its ids become stale. */
@@ -61,17 +63,18 @@ enum trc_feature_flags {
 };
 
 typedef struct trc_scene_stats {
-    uint32_t struct_size;
-    uint32_t features;       /* TRC_FEATURE_* */
-    uint64_t triangle_count; /* in meshes, once however many instances */
-    uint64_t instanced_triangle_count;
-    uint64_t skipped_triangle_count; /* not finite or too large */
+    uint32_t struct_size;              /* of this structure; checked */
+    uint32_t features;                 /* TRC_FEATURE_* */
+    uint64_t triangle_count;           /* in meshes, once however many instances */
+    uint64_t instanced_triangle_count; /* once for each instance */
+    uint64_t skipped_triangle_count;   /* not finite or too large */
+    /* In the scene; skipped: hidden for a transform that cannot be used. */
     uint64_t mesh_count, instance_count, skipped_instance_count, light_count, material_count;
-    uint64_t emissive_triangle_count;
-    uint64_t bvh_bytes, geometry_bytes, image_bytes;
-    double build_seconds;                   /* of the last commit, trees only */
-    double commit_seconds;                  /* of the last commit, all */
-    uint32_t built_count, refitted_count;   /* trees in the last commit */
+    uint64_t emissive_triangle_count;                /* sampled as lights */
+    uint64_t bvh_bytes, geometry_bytes, image_bytes; /* memory held by trees, meshes, images */
+    double build_seconds;                            /* of the last commit, trees only */
+    double commit_seconds;                           /* of the last commit, all */
+    uint32_t built_count, refitted_count;            /* trees in the last commit */
     float bounds_lower[3], bounds_upper[3]; /* world, over the shutter; lower > upper when empty */
 } trc_scene_stats;
 
