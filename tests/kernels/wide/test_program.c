@@ -6,6 +6,7 @@
 
 #include "kernels/light/world.h"
 #include "model/kernels.h"
+#include "model/nodes.h"
 #include "program_cases.h"
 
 /* ---- one operation at a time ---- */

@@ -33,8 +33,8 @@ static double spline(int i, double t) {
 
 static double lookup_reference(const float *texels, int width, int height, uint32_t mode, double u,
                                double v, int c) {
-    const uint32_t extension = mode & TRC_IMAGE_MODE_EXTENSION,
-                   kind = mode & TRC_IMAGE_MODE_INTERPOLATION;
+    const uint32_t extension = mode & TRC_IMAGE_EXTENSION_MASK,
+                   kind = mode & TRC_IMAGE_INTERPOLATION_MASK;
     const double shift = kind == TRC_IMAGE_CLOSEST ? 0.0 : 0.5;
     const double x = u * width - shift, y = v * height - shift;
     const int ix = (int)floor(x), iy = (int)floor(y);
@@ -143,7 +143,7 @@ static void test_wild_coordinates(void **state) {
                 trc_program_run(&p.material, &scene.surface, &regs);
                 const float value = vf_get(regs.r[OUT], 0);
                 assert_true(value >= 0.0f && value <= 1.00001f);
-                if ((mode & TRC_IMAGE_MODE_EXTENSION) != TRC_IMAGE_CLIP)
+                if ((mode & TRC_IMAGE_EXTENSION_MASK) != TRC_IMAGE_CLIP)
                     assert_true(value > 0.99999f);
             }
         }
