@@ -11,6 +11,7 @@ build/blender.
 """
 
 import argparse
+import os
 import pathlib
 import statistics
 import sys
@@ -39,6 +40,7 @@ def main():
     arguments = parser.parse_args()
     whole, meshes = _files(arguments.also, IMAGES), _files(arguments.also, MESHES)
     with tempfile.TemporaryDirectory(prefix="volley_") as folder:
+        os.environ["TMPDIR"] = folder  # of what Blender leaves
         begin = time.monotonic()
         result = damaged.run(blender.Blender(folder), arguments.files, arguments.seed, SIDE, whole, meshes,
                              timeout=120 + SECONDS_PER_FILE * arguments.files)
