@@ -67,8 +67,8 @@ static void fold(const struct trc_build *b, uint32_t op, uint32_t mode, uint32_t
 /* Operations that give one of their inputs back whatever the others are. */
 static const struct trc_operand *identity(uint32_t op, uint32_t mode,
                                           const struct trc_operand *in) {
-    const struct trc_operand *factor = in + TRC_OP_AT(MIX, factor);
-    if (op == TRC_OP_MIX && trc_is_constant(*factor)) {
+    if (op == TRC_OP_MIX && trc_is_constant(in[TRC_OP_AT(MIX, factor)])) {
+        const struct trc_operand *factor = in + TRC_OP_AT(MIX, factor);
         const bool through_hsv = mode == TRC_BLEND_SATURATION || mode == TRC_BLEND_VALUE;
         if (factor->value <= 0.0f && !through_hsv)
             return in + TRC_OP_AT(MIX, a);
