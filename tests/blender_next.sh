@@ -20,7 +20,7 @@ ROOT=$CACHE/$SUITE
 # Without Xvfb: screenshots of Blender 4.3 on it are black, so tests in windows are skipped.
 PACKAGES=(
     blender gcc g++ cmake ninja-build libc6-dev libopenimageio-dev openimageio-tools
-    python3-numpy python3-pytest
+    python3-numpy python3-openimageio python3-pytest
 )
 SKIPPED=77
 
