@@ -67,11 +67,9 @@ static void arrival_load_samples(const struct trc_tile *t, struct arrival *a) {
     a->sample = vu_gather(t->samples.index, (vint)a->slot, a->active);
 }
 
-TRC_INLINE vuint depth_of(vuint depths, int shift) { return (depths >> shift) & vu_set(255u); }
-
 /* Light samples taken where the ray left: the count of one bounce before. */
 TRC_INLINE vfloat light_count_before(const struct trc_tile *t, vuint depths) {
-    return vf_select(vi_eq((vint)depth_of(depths, TRC_DEPTH_ALL_SHIFT), vi_set(1)),
+    return vf_select(vi_eq((vint)trc_depth_of(depths, TRC_DEPTH_ALL_SHIFT), vi_set(1)),
                      vf_set((float)t->desc->light_samples), vf_set(1.0f));
 }
 

@@ -19,7 +19,7 @@
 
 /* The limit of what rays find by themselves: what one bounce shows is direct light. */
 static vfloat found_limit(const struct trc_tile *t, const struct arrival *a) {
-    const vint depth = (vint)depth_of(a->depths, TRC_DEPTH_ALL_SHIFT);
+    const vint depth = (vint)trc_depth_of(a->depths, TRC_DEPTH_ALL_SHIFT);
     return trc_clamp_limit(t->desc, vi_lt(depth, vi_set(2)));
 }
 
@@ -27,7 +27,7 @@ static vfloat found_limit(const struct trc_tile *t, const struct arrival *a) {
  * camera_pass: what camera rays see it as. */
 static void found_add(struct trc_tile *t, const struct arrival *a, vmask active, vvec3 c,
                       uint32_t camera_pass) {
-    const vuint depth = depth_of(a->depths, TRC_DEPTH_ALL_SHIFT);
+    const vuint depth = trc_depth_of(a->depths, TRC_DEPTH_ALL_SHIFT);
     float lanes[3][TRC_WIDTH];
     uint32_t depths[TRC_WIDTH], path[TRC_WIDTH];
     vf_store(lanes[0], c.x), vf_store(lanes[1], c.y), vf_store(lanes[2], c.z);
@@ -171,7 +171,7 @@ static void catch_shadows(struct trc_tile *t) {
 
 /* Lanes that have not bounced yet. */
 TRC_INLINE vmask sees_directly(vuint depths) {
-    return vi_eq((vint)depth_of(depths, TRC_DEPTH_ALL_SHIFT), vi_set(0));
+    return vi_eq((vint)trc_depth_of(depths, TRC_DEPTH_ALL_SHIFT), vi_set(0));
 }
 
 TRC_INLINE vmask goes_out(const struct trc_surface *s, vvec3 w) {
@@ -260,7 +260,7 @@ static void shadow_push(struct trc_tile *t, const struct arrival *a, const struc
         .slot = a->slot,
         .path = a->path,
         .target = (vuint)l->light * vu_set(TRC_DIRECTION_CELLS) + cell,
-        .depth = depth_of(a->depths, TRC_DEPTH_ALL_SHIFT),
+        .depths = a->depths,
     };
     struct trc_shadow_store *q = &t->shadows;
     const uint32_t bits = vm_bits(active), at = trc_shadows_append(q, &rays, bits);
@@ -482,14 +482,14 @@ static void ray_push(struct trc_tile *t, const struct arrival *a, const struct t
                          vi_set(1 << TRC_DEPTH_GLOSSY_SHIFT));
     depths = depths + (vuint)vi_select(straight, vi_set(1 << TRC_DEPTH_TRANSPARENT_SHIFT),
                                        (vint)(by_kind + one));
-    const vmask over = vm_or(
-        vm_or(vi_lt(vi_set((int32_t)desc->max_depth), (vint)depth_of(depths, TRC_DEPTH_ALL_SHIFT)),
-              vi_lt(vi_set((int32_t)desc->max_glossy_depth),
-                    (vint)depth_of(depths, TRC_DEPTH_GLOSSY_SHIFT))),
-        vm_or(vi_lt(vi_set((int32_t)desc->max_transmission_depth),
-                    (vint)depth_of(depths, TRC_DEPTH_TRANSMISSION_SHIFT)),
-              vi_lt(vi_set((int32_t)desc->max_transparent_depth),
-                    (vint)depth_of(depths, TRC_DEPTH_TRANSPARENT_SHIFT))));
+    const vmask over = vm_or(vm_or(vi_lt(vi_set((int32_t)desc->max_depth),
+                                         (vint)trc_depth_of(depths, TRC_DEPTH_ALL_SHIFT)),
+                                   vi_lt(vi_set((int32_t)desc->max_glossy_depth),
+                                         (vint)trc_depth_of(depths, TRC_DEPTH_GLOSSY_SHIFT))),
+                             vm_or(vi_lt(vi_set((int32_t)desc->max_transmission_depth),
+                                         (vint)trc_depth_of(depths, TRC_DEPTH_TRANSMISSION_SHIFT)),
+                                   vi_lt(vi_set((int32_t)desc->max_transparent_depth),
+                                         (vint)trc_depth_of(depths, TRC_DEPTH_TRANSPARENT_SHIFT))));
     /* Straight on: the same ray. Else a new kind, in the category of the first bounce. */
     const vuint category = a->path & vu_set(3u << TRC_PATH_CATEGORY_SHIFT);
     const vmask first =
@@ -557,7 +557,7 @@ static void continue_straight(struct trc_tile *t, const struct arrival *a,
                                 .transmitted = vm_none(),
                                 .diffuse = vm_none(),
                                 .valid = active};
-    const vmask below = vi_lt((vint)depth_of(a->depths, TRC_DEPTH_TRANSPARENT_SHIFT),
+    const vmask below = vi_lt((vint)trc_depth_of(a->depths, TRC_DEPTH_TRANSPARENT_SHIFT),
                               vi_set((int32_t)t->desc->max_transparent_depth + 1));
     active = attenuate(t, a, &b, vm_and(active, below));
     if (vm_any(active))
@@ -617,11 +617,11 @@ static void surface_setup(struct trc_tile *t, const struct arrival *a, bool has_
     s->wo = v3_neg(a->d);
     s->ray_length = arrival_length(a);
     s->path = a->path;
-    s->depth = (vint)depth_of(a->depths, TRC_DEPTH_ALL_SHIFT);
+    s->depth = (vint)trc_depth_of(a->depths, TRC_DEPTH_ALL_SHIFT);
     s->diffuse_depth = vi_set(0);
-    s->glossy_depth = (vint)depth_of(a->depths, TRC_DEPTH_GLOSSY_SHIFT);
-    s->transmission_depth = (vint)depth_of(a->depths, TRC_DEPTH_TRANSMISSION_SHIFT);
-    s->transparent_depth = (vint)depth_of(a->depths, TRC_DEPTH_TRANSPARENT_SHIFT);
+    s->glossy_depth = (vint)trc_depth_of(a->depths, TRC_DEPTH_GLOSSY_SHIFT);
+    s->transmission_depth = (vint)trc_depth_of(a->depths, TRC_DEPTH_TRANSMISSION_SHIFT);
+    s->transparent_depth = (vint)trc_depth_of(a->depths, TRC_DEPTH_TRANSPARENT_SHIFT);
     s->footprint = has_footprint ? beam_width(t, a) : vf_set(0.0f);
     s->raster_x = (vi_to_float((vint)(a->pixel & vu_set(0xffffu))) + vf_set(0.5f)) *
                   vf_set(1.0f / (float)t->desc->width);

@@ -77,15 +77,24 @@ static vvec3 surface_transparency(struct trc_tile *t, const struct trc_packet *p
     return through;
 }
 
-/* Walks a packet's rays from surface to surface; factor: what of their light arrives. Returns the
- * rays that are blocked after all. */
-static uint64_t transparency(struct trc_tile *t, struct trc_packet *p,
+/* Lanes of the rays at order that may pass one more surface, having passed so many; those that
+ * their path came through count, too. */
+static vmask may_pass(const struct trc_tile *t, const uint32_t *order, uint32_t passed, vmask m) {
+    const vuint depths = vu_gather(t->shadows.depths, vi_load((const int32_t *)order), m);
+    const vint before = (vint)trc_depth_of(depths, TRC_DEPTH_TRANSPARENT_SHIFT);
+    return vm_and(m, vi_lt(before + vi_set((int32_t)passed),
+                           vi_set((int32_t)t->desc->max_transparent_depth)));
+}
+
+/* Walks a packet's rays, those at order, from surface to surface; factor: what of their light
+ * arrives. Returns the rays that are blocked after all. */
+static uint64_t transparency(struct trc_tile *t, struct trc_packet *p, const uint32_t *order,
                              float factor[3][TRC_PACKET_SIZE]) {
     struct trc_packet_hits *hits = t->packet_hits;
     float reach[TRC_PACKET_SIZE];
     uint64_t blocked = 0;
     memcpy(reach, p->t, sizeof reach);
-    for (uint32_t depth = 0; p->active; depth++) {
+    for (uint32_t passed = 0; p->active; passed++) {
         memset(hits->instance, 0xff, sizeof hits->instance);
         trc_trace_closest(t->snapshot, p, hits, 1);
         uint64_t next = 0;
@@ -97,8 +106,9 @@ static uint64_t transparency(struct trc_tile *t, struct trc_packet *p,
             if (!vm_any(met))
                 continue;
             vvec3 f = v3_zero();
-            if (depth < t->desc->max_transparent_depth)
-                f = surface_transparency(t, p, hits, i, met, vu_set(TRC_VISIBLE_SHADOW));
+            const vmask open = may_pass(t, order + i, passed, met);
+            if (vm_any(open))
+                f = surface_transparency(t, p, hits, i, open, vu_set(TRC_VISIBLE_SHADOW));
             const vfloat channel[3] = {f.x, f.y, f.z};
             for (int k = 0; k < 3; k++)
                 vf_store(&factor[k][i], vf_select(met, vf_load(&factor[k][i]) * channel[k],
@@ -130,7 +140,8 @@ static void light_clamp(struct trc_tile *t) {
     const vint exempt = vi_set(TRC_PATH_CLAMPED), single = vi_set(TRC_PATH_OCCLUSION);
     const vfloat one = vf_set(1.0f), share = vf_set(1.0f / (float)t->desc->light_samples);
     for (uint32_t i = 0; i < q->count; i += TRC_WIDTH) {
-        const vmask is_direct = vi_eq(vi_load((const int32_t *)q->depth + i), vi_set(0));
+        const vuint depths = (vuint)vi_load((const int32_t *)q->depths + i);
+        const vmask is_direct = vi_eq((vint)trc_depth_of(depths, TRC_DEPTH_ALL_SHIFT), vi_set(0));
         const vint path = vi_load((const int32_t *)q->path + i);
         const vmask shared = vm_and(is_direct, vi_eq(path & single, vi_set(0)));
         const vfloat limit = trc_clamp_limit(t->desc, is_direct) * vf_select(shared, share, one);
@@ -202,7 +213,7 @@ static void packet_take(struct trc_tile *t, struct trc_packet *p, const uint32_t
             for (int i = 0; i < TRC_PACKET_SIZE; i++)
                 factor[k][i] = 1.0f;
         p->active &= ~blocked;
-        blocked |= transparency(t, p, factor);
+        blocked |= transparency(t, p, order, factor);
         for (uint32_t i = 0; i < count; i++)
             light_scale(t, order[i], factor[0][i], factor[1][i], factor[2][i]);
     }

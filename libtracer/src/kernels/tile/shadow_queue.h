@@ -29,8 +29,9 @@ struct trc_shadow_store {
     float *lamp[3];  /* for the Shadow pass, or NULL */
     float *scaled[TRC_SCALED_COLUMNS]; /* those that what is in the way takes from, RGB by RGB */
     uint32_t scaled_count;
-    uint32_t *slot, *path, *target, *depth;
-    uint32_t *order; /* own: the queue may be flushed while hits are shaded in t->order */
+    uint32_t *slot, *path, *target;
+    uint32_t *depths; /* of the path, as rays have them (kernels/tile/tile.h) */
+    uint32_t *order;  /* own: the queue may be flushed while hits are shaded in t->order */
 };
 
 /* splits, lamps: with the columns of light passes, of the Shadow pass. */
@@ -48,7 +49,7 @@ TRC_INLINE void trc_shadows_carve(struct trc_carver *c, struct trc_shadow_store 
         q->split[i] = q->scaled[q->scaled_count++] = trc_carve(c, column);
     for (int i = 0; lamps && i < 3; i++)
         q->lamp[i] = q->scaled[q->scaled_count++] = trc_carve(c, column);
-    uint32_t **const words[] = {&q->slot, &q->path, &q->target, &q->depth, &q->order};
+    uint32_t **const words[] = {&q->slot, &q->path, &q->target, &q->depths, &q->order};
     for (int i = 0; i < 5; i++)
         *words[i] = trc_carve(c, column);
 }
@@ -56,7 +57,7 @@ TRC_INLINE void trc_shadows_carve(struct trc_carver *c, struct trc_shadow_store 
 /* What a ray has in every queue. */
 struct trc_shadow_rays {
     vfloat o[3], d[3], tmax, time, radiance[3];
-    vuint slot, path, target, depth;
+    vuint slot, path, target, depths;
 };
 
 /* Counts the lanes' rays in; where they stand. The caller fills the columns of passes. */
@@ -74,7 +75,7 @@ TRC_INLINE uint32_t trc_shadows_append(struct trc_shadow_store *q, const struct 
     vu_compress(q->slot + at, s->slot, bits);
     vu_compress(q->path + at, s->path, bits);
     vu_compress(q->target + at, s->target, bits);
-    vu_compress(q->depth + at, s->depth, bits);
+    vu_compress(q->depths + at, s->depths, bits);
     q->count += count;
     return at;
 }

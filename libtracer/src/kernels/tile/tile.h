@@ -40,6 +40,7 @@ enum {
     TRC_DEPTH_TRANSMISSION_SHIFT = 16,
     TRC_DEPTH_TRANSPARENT_SHIFT = 24
 };
+TRC_INLINE vuint trc_depth_of(vuint depths, int shift) { return (depths >> shift) & vu_set(255u); }
 
 struct trc_hit_store {
     float *t, *u, *v;
