@@ -547,7 +547,6 @@ static void clear_sample(struct trc_bsdf_sample *out) {
     out->beyond = vf_one();
     out->pdf = vf_zero();
     out->valid = out->singular = out->transparent = out->transmitted = out->diffuse = vm_none();
-    out->alpha_min = vf_zero();
 }
 
 /* Enters the ideal direction of a lobe in lanes m; chance: that it was chosen there. */
@@ -592,12 +591,8 @@ void trc_bsdf_sample(const struct trc_lobes *l, const struct trc_surface *s, vfl
         const vmask exact = vm_and(m, lobe->ideal), spread = vm_andnot(m, lobe->ideal);
         if (lobe->kind != TRC_LOBE_REFLECT && lobe->kind != TRC_LOBE_TRANSPARENT)
             out->transmitted = vm_or(out->transmitted, exact);
-        if (lobe->kind == TRC_LOBE_TRANSLUCENT) {
+        if (lobe->kind == TRC_LOBE_TRANSLUCENT)
             out->diffuse = vm_or(out->diffuse, m);
-            out->alpha_min = vf_select(m, vf_one(), out->alpha_min);
-        } else if (lobe->kind != TRC_LOBE_TRANSPARENT) {
-            out->alpha_min = vf_select(m, vf_sqrt(lobe->alpha_x * lobe->alpha_y), out->alpha_min);
-        }
         if (vm_any(exact))
             take_ideal(lobe, s, exact, lobe->sample_weight / l->continue_weight, out);
         if (vm_any(spread)) {
@@ -623,8 +618,6 @@ void trc_bsdf_ideal(const struct trc_lobes *l, int i, const struct trc_surface *
         return;
     if (lobe->kind == TRC_LOBE_REFRACT)
         out->transmitted = s->active;
-    if (lobe->kind != TRC_LOBE_TRANSPARENT)
-        out->alpha_min = vf_sqrt(lobe->alpha_x * lobe->alpha_y);
     take_ideal(lobe, s, s->active, vf_one(), out);
 }
 

@@ -86,7 +86,6 @@ struct trc_lobe {
 
 struct trc_lobes {
     int count;
-    uint32_t kinds; /* 1 << kind of every lobe */
     struct trc_lobe lobe[TRC_MAX_LOBES];
     vvec3 emission;         /* radiance towards wo */
     vfloat holdout;         /* weight of holdout leaves */
@@ -137,9 +136,8 @@ struct trc_bsdf_sample {
     vfloat pdf;    /* as in trc_bsdf_eval; 0 where ideal or transparent */
     vmask valid;   /* the ray is worth tracing */
     vmask singular, transparent,
-        transmitted;  /* transmitted: to the other side, incl. translucent */
-    vmask diffuse;    /* the lobe was translucent: a diffuse transmission ray */
-    vfloat alpha_min; /* sqrt(alpha_x * alpha_y) of the lobe, for Filter Glossy; 1 if translucent */
+        transmitted; /* transmitted: to the other side, incl. translucent */
+    vmask diffuse;   /* the lobe was translucent: a diffuse transmission ray */
 };
 void trc_bsdf_sample(const struct trc_lobes *l, const struct trc_surface *s, vfloat u_lobe,
                      vfloat u1, vfloat u2, struct trc_bsdf_sample *out);

@@ -122,7 +122,6 @@ static struct trc_lobe *add_lobe(struct setup *c, enum trc_lobe_kind kind, vvec3
     if (!vm_any(counts) || out->count == TRC_MAX_LOBES)
         return NULL;
     struct trc_lobe *lobe = &out->lobe[out->count++];
-    out->kinds |= 1u << kind;
     lobe->kind = kind;
     lobe->distribution = 0;
     lobe->fresnel = TRC_FRESNEL_NONE;
@@ -646,7 +645,6 @@ void trc_lobes_setup(const struct trc_material *m, const struct trc_surface *s,
                      const struct trc_registers *regs, vfloat filter_alpha, struct trc_lobes *out) {
     struct setup c = {m, s, regs, filter_alpha, v3_zero(), false, out};
     out->count = 0;
-    out->kinds = 0;
     out->emission = v3_zero();
     out->holdout = vf_zero();
     out->below_horizon = vm_none();
