@@ -16,15 +16,15 @@ struct placed {
     uint32_t number, at;
 };
 
-static void check_slots(const char *label, const struct trc_node_slot *slots, uint32_t count,
-                        const struct placed *placed, uint32_t end) {
+static void check_sockets(const char *label, const struct trc_socket *sockets, uint32_t count,
+                          const struct placed *placed, uint32_t end) {
     uint32_t floats = 0;
     for (uint32_t i = 0; i < count; i++) {
-        assert_string_equal(slots[i].name, placed[i].name);
+        assert_string_equal(sockets[i].name, placed[i].name);
         if (placed[i].number != i || placed[i].at != floats)
             fail_msg("%s: %s is number %u at %u, not %u at %u", label, placed[i].name,
                      placed[i].number, placed[i].at, i, floats);
-        floats += trc_kind_floats(slots[i].kind);
+        floats += trc_socket_floats(sockets[i].kind);
     }
     assert_int_equal(end, floats);
 }
@@ -33,11 +33,12 @@ static void check_slots(const char *label, const struct trc_node_slot *slots, ui
 static void test_offsets_add_up(void **state) {
     (void)state;
     const struct trc_node_info *info;
-#define NODE_SLOTS(NAME)                                                                      \
-    info = trc_node_info_of(TRC_NODE_##NAME);                                                 \
-    assert_non_null(info);                                                                    \
-    check_slots(#NAME, info->inputs, info->input_count, inputs_of_##NAME, TRC_AT(NAME, end)); \
-    check_slots(#NAME, info->outputs, info->output_count, outputs_of_##NAME, TRC_OUT_AT(NAME, end))
+#define NODE_SOCKETS(NAME)                                                                      \
+    info = trc_node_info_of(TRC_NODE_##NAME);                                                   \
+    assert_non_null(info);                                                                      \
+    check_sockets(#NAME, info->inputs, info->input_count, inputs_of_##NAME, TRC_AT(NAME, end)); \
+    check_sockets(#NAME, info->outputs, info->output_count, outputs_of_##NAME,                  \
+                  TRC_OUT_AT(NAME, end))
 #define INPUT(NAME, input) \
     { #input, TRC_INPUT_OF(NAME, input), TRC_AT(NAME, input) }
 #define OUTPUT(NAME, output) \
@@ -50,12 +51,12 @@ static void test_offsets_add_up(void **state) {
     const struct placed inputs_of_MIX_SHADER[] = {
         INPUT(MIX_SHADER, factor), SHADER(MIX_SHADER, first), SHADER(MIX_SHADER, second)};
     const struct placed outputs_of_MIX_SHADER[] = {CLOSURE(MIX_SHADER)};
-    NODE_SLOTS(MIX_SHADER);
+    NODE_SOCKETS(MIX_SHADER);
     const struct placed inputs_of_GLOSSY[] = {INPUT(GLOSSY, color),      INPUT(GLOSSY, roughness),
                                               INPUT(GLOSSY, anisotropy), INPUT(GLOSSY, rotation),
                                               INPUT(GLOSSY, normal),     INPUT(GLOSSY, tangent)};
     const struct placed outputs_of_GLOSSY[] = {CLOSURE(GLOSSY)};
-    NODE_SLOTS(GLOSSY);
+    NODE_SOCKETS(GLOSSY);
     const struct placed inputs_of_VORONOI[] = {
         INPUT(VORONOI, vector),     INPUT(VORONOI, w),         INPUT(VORONOI, scale),
         INPUT(VORONOI, smoothness), INPUT(VORONOI, exponent),  INPUT(VORONOI, randomness),
@@ -63,16 +64,16 @@ static void test_offsets_add_up(void **state) {
     const struct placed outputs_of_VORONOI[] = {OUTPUT(VORONOI, distance), OUTPUT(VORONOI, color),
                                                 OUTPUT(VORONOI, position), OUTPUT(VORONOI, w),
                                                 OUTPUT(VORONOI, radius)};
-    NODE_SLOTS(VORONOI);
+    NODE_SOCKETS(VORONOI);
     const struct placed inputs_of_HOLDOUT[1] = {{0}};
     const struct placed outputs_of_HOLDOUT[] = {CLOSURE(HOLDOUT)};
-    NODE_SLOTS(HOLDOUT);
+    NODE_SOCKETS(HOLDOUT);
 }
 
-static uint32_t floats_of(const struct trc_node_slot *slots, uint32_t count) {
+static uint32_t floats_of(const struct trc_socket *sockets, uint32_t count) {
     uint32_t floats = 0;
     for (uint32_t i = 0; i < count; i++)
-        floats += trc_kind_floats(slots[i].kind);
+        floats += trc_socket_floats(sockets[i].kind);
     return floats;
 }
 
@@ -86,7 +87,7 @@ static void test_all_types_add_up(void **state) {
         assert_int_equal(floats_of(info->inputs, info->input_count), TRC_AT(NAME, end));       \
         assert_int_equal(floats_of(info->outputs, info->output_count), TRC_OUT_AT(NAME, end)); \
         assert_int_equal(trc_node_is_shader(number),                                           \
-                         info->output_count && info->outputs[0].kind == TRC_KIND_SHADER);      \
+                         info->output_count && info->outputs[0].kind == TRC_SOCKET_SHADER);    \
         assert_int_equal(trc_node_is_output(number), info->output_count == 0);                 \
     }
 #include "tracer/nodes.def"

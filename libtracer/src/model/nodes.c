@@ -1,11 +1,11 @@
 /* Tables of node types. */
 #include "model/nodes.h"
 
-#define TRC_IN(kind, name) {TRC_KIND_##kind, #name},
-#define TRC_OUT(kind, name) {TRC_KIND_##kind, #name},
-#define TRC_NODE(NAME, number, label, inputs, outputs, modes)                              \
-    static const struct trc_node_slot inputs_of_##NAME[] = {inputs{TRC_KIND_FLOAT, NULL}}; \
-    static const struct trc_node_slot outputs_of_##NAME[] = {outputs{TRC_KIND_FLOAT, NULL}};
+#define TRC_IN(kind, name) {TRC_SOCKET_##kind, #name},
+#define TRC_OUT(kind, name) {TRC_SOCKET_##kind, #name},
+#define TRC_NODE(NAME, number, label, inputs, outputs, modes)                             \
+    static const struct trc_socket inputs_of_##NAME[] = {inputs{TRC_SOCKET_FLOAT, NULL}}; \
+    static const struct trc_socket outputs_of_##NAME[] = {outputs{TRC_SOCKET_FLOAT, NULL}};
 #include "tracer/nodes.def"
 
 #define TRC_NODE(NAME, number, label, inputs, outputs, modes) \
@@ -46,8 +46,8 @@ bool trc_node_mode_is_valid(uint32_t type, uint32_t mode) {
     }
 }
 
-enum trc_kind trc_node_output_kind(const trc_node *node, uint32_t output) {
+enum trc_socket_kind trc_node_output_kind(const trc_node *node, uint32_t output) {
     if (node->type == TRC_NODE_COMBINE && node->mode == TRC_SEPARATE_XYZ)
-        return TRC_KIND_VECTOR;
+        return TRC_SOCKET_VECTOR;
     return trc_node_info_of(node->type)->outputs[output].kind;
 }

@@ -6,38 +6,40 @@
 
 #include <stdbool.h>
 
-#include "model/slots.h"
+#include "model/sockets.h"
 #include "tracer/tracer.h"
 
 /* Of inputs and outputs, as tracer/nodes.def explains them. */
-enum trc_kind {
-    TRC_KIND_FLOAT,
-    TRC_KIND_COLOR,
-    TRC_KIND_VECTOR,
-    TRC_KIND_SHADER,
+enum trc_socket_kind {
+    TRC_SOCKET_FLOAT,
+    TRC_SOCKET_COLOR,
+    TRC_SOCKET_VECTOR,
+    TRC_SOCKET_SHADER,
     /* of inputs alone: with a default */
-    TRC_KIND_NORMAL,
-    TRC_KIND_TANGENT,
-    TRC_KIND_UV,
-    TRC_KIND_GENERATED,
-    TRC_KIND_POSITION
+    TRC_SOCKET_NORMAL,
+    TRC_SOCKET_TANGENT,
+    TRC_SOCKET_UV,
+    TRC_SOCKET_GENERATED,
+    TRC_SOCKET_POSITION
 };
 
-static inline bool trc_kind_has_default(enum trc_kind kind) { return kind > TRC_KIND_SHADER; }
+static inline bool trc_socket_has_default(enum trc_socket_kind kind) {
+    return kind > TRC_SOCKET_SHADER;
+}
 /* Floats of an input or output. */
-static inline uint32_t trc_kind_floats(enum trc_kind kind) {
-    return kind == TRC_KIND_SHADER ? 0 : kind == TRC_KIND_FLOAT ? 1 : 3;
+static inline uint32_t trc_socket_floats(enum trc_socket_kind kind) {
+    return kind == TRC_SOCKET_SHADER ? 0 : kind == TRC_SOCKET_FLOAT ? 1 : 3;
 }
 
-struct trc_node_slot {
-    enum trc_kind kind;
+struct trc_socket {
+    enum trc_socket_kind kind;
     const char *name;
 };
 
 struct trc_node_info {
     const char *label; /* NULL: no such type */
     uint32_t input_count, output_count;
-    const struct trc_node_slot *inputs, *outputs;
+    const struct trc_socket *inputs, *outputs;
 };
 
 /* NULL: unknown type. */
@@ -49,7 +51,7 @@ bool trc_node_has_table(uint32_t type);
 /* Whether mode is one that the type has. */
 bool trc_node_mode_is_valid(uint32_t type, uint32_t mode);
 /* Kind of a node's output; Combine XYZ gives a vector, the other modes a colour. */
-enum trc_kind trc_node_output_kind(const trc_node *node, uint32_t output);
+enum trc_socket_kind trc_node_output_kind(const trc_node *node, uint32_t output);
 
 /* ---- offsets, constants at compile time ---- */
 

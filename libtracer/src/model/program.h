@@ -10,7 +10,7 @@
 #include <stdint.h>
 
 #include "model/material.h"
-#include "model/slots.h"
+#include "model/sockets.h"
 
 /* Most inputs and outputs of an operation. */
 #define TRC_OP_MAX_INPUTS 18

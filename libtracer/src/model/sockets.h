@@ -1,8 +1,8 @@
 /* Lists of inputs and outputs (tracer/nodes.def, model/operations.def) as members of a struct, so
  * that offsetof finds them: floats as the compiler and programs lay values out, or one char each.
  */
-#ifndef TRACER_MODEL_SLOTS_H
-#define TRACER_MODEL_SLOTS_H
+#ifndef TRACER_MODEL_SOCKETS_H
+#define TRACER_MODEL_SOCKETS_H
 
 #include <stddef.h>
 #include <stdint.h>

@@ -81,11 +81,11 @@ static trc_status add_leaf(struct trc_build *b, const trc_node *node, struct trc
         return trc_fail(TRC_ERROR_TOO_LARGE, "the material mixes more than %d shaders",
                         TRC_MAX_LEAVES);
     }
-    const struct trc_node_slot *slots = trc_node_info_of(node->type)->inputs;
+    const struct trc_socket *sockets = trc_node_info_of(node->type)->inputs;
     uint32_t floats = 0;
     for (uint32_t i = 0; i < node->input_count; i++) {
         TRC_TRY(trc_build_input(b, node, i, in + floats));
-        floats += trc_kind_floats(slots[i].kind);
+        floats += trc_socket_floats(sockets[i].kind);
     }
     if (is_nothing(node->type, in))
         return TRC_OK;

@@ -30,20 +30,21 @@ static void copy3(struct trc_operand *out, const struct trc_operand *in) {
 static uint32_t output_offset(const trc_node *node, uint32_t output) {
     uint32_t offset = 0;
     for (uint32_t i = 0; i < output; i++)
-        offset += trc_kind_floats(trc_node_output_kind(node, i));
+        offset += trc_socket_floats(trc_node_output_kind(node, i));
     return offset;
 }
 
 /* What an unlinked input of that kind stands for in a value node. */
-static trc_status default_input(struct trc_build *b, enum trc_kind kind, struct trc_operand *out) {
+static trc_status default_input(struct trc_build *b, enum trc_socket_kind kind,
+                                struct trc_operand *out) {
     switch (kind) {
-    case TRC_KIND_NORMAL:
+    case TRC_SOCKET_NORMAL:
         return op(b, TRC_OP_NORMAL, 0, NULL, out);
-    case TRC_KIND_GENERATED:
+    case TRC_SOCKET_GENERATED:
         return op(b, TRC_OP_GENERATED, 0, NULL, out);
-    case TRC_KIND_POSITION:
+    case TRC_SOCKET_POSITION:
         return op(b, TRC_OP_POSITION, 0, NULL, out);
-    case TRC_KIND_UV:
+    case TRC_SOCKET_UV:
         out[TRC_OP_OUT_AT(UV, end)] = trc_constant(0.0f);
         return op(b, TRC_OP_UV, 0, NULL, out);
     default:
@@ -51,19 +52,19 @@ static trc_status default_input(struct trc_build *b, enum trc_kind kind, struct 
     }
 }
 
-static trc_status linked_input(struct trc_build *b, const trc_node_input *input, enum trc_kind kind,
-                               struct trc_operand *out) {
+static trc_status linked_input(struct trc_build *b, const trc_node_input *input,
+                               enum trc_socket_kind kind, struct trc_operand *out) {
     const trc_node *from = &b->desc->nodes[input->node];
-    const enum trc_kind given = trc_node_output_kind(from, input->output);
+    const enum trc_socket_kind given = trc_node_output_kind(from, input->output);
     const struct trc_operand *value =
         b->outputs + b->first_output[input->node] + output_offset(from, input->output);
-    if (given == TRC_KIND_FLOAT) {
-        for (uint32_t i = 0; i < trc_kind_floats(kind); i++)
+    if (given == TRC_SOCKET_FLOAT) {
+        for (uint32_t i = 0; i < trc_socket_floats(kind); i++)
             out[i] = *value;
         return TRC_OK;
     }
-    if (kind == TRC_KIND_FLOAT)
-        return op(b, given == TRC_KIND_COLOR ? TRC_OP_LUMINANCE : TRC_OP_AVERAGE, 0, value, out);
+    if (kind == TRC_SOCKET_FLOAT)
+        return op(b, given == TRC_SOCKET_COLOR ? TRC_OP_LUMINANCE : TRC_OP_AVERAGE, 0, value, out);
     copy3(out, value);
     return TRC_OK;
 }
@@ -71,8 +72,8 @@ static trc_status linked_input(struct trc_build *b, const trc_node_input *input,
 trc_status trc_build_input(struct trc_build *b, const trc_node *node, uint32_t index,
                            struct trc_operand *out) {
     const trc_node_input *input = &b->desc->inputs[node->first_input + index];
-    const enum trc_kind kind = trc_node_info_of(node->type)->inputs[index].kind;
-    const uint32_t floats = trc_kind_floats(kind);
+    const enum trc_socket_kind kind = trc_node_info_of(node->type)->inputs[index].kind;
+    const uint32_t floats = trc_socket_floats(kind);
     if (input->node >= 0)
         return linked_input(b, input, kind, out);
     if (input->node == TRC_INPUT_DEFAULT) {
@@ -536,7 +537,7 @@ trc_status trc_build_values(struct trc_build *b) {
         uint32_t floats = 0;
         for (uint32_t k = 0; k < l.node->input_count; k++) {
             TRC_TRY(trc_build_input(b, l.node, k, l.in + floats));
-            floats += trc_kind_floats(trc_node_info_of(l.node->type)->inputs[k].kind);
+            floats += trc_socket_floats(trc_node_info_of(l.node->type)->inputs[k].kind);
         }
         TRC_TRY(lower_node(&l));
     }

@@ -17,9 +17,9 @@ static trc_status fail_input(const struct place *at, uint32_t input, const char 
                     at->node, at->info->label, input, at->info->inputs[input].name, what);
 }
 
-static trc_status check_constant(const struct place *at, uint32_t index, enum trc_kind kind,
+static trc_status check_constant(const struct place *at, uint32_t index, enum trc_socket_kind kind,
                                  const trc_node_input *input) {
-    for (uint32_t i = 0; i < trc_kind_floats(kind); i++) {
+    for (uint32_t i = 0; i < trc_socket_floats(kind); i++) {
         if (!isfinite(input->value[i]))
             return fail_input(at, index, "the value is not finite");
     }
@@ -29,11 +29,11 @@ static trc_status check_constant(const struct place *at, uint32_t index, enum tr
 static trc_status check_input(const trc_material_desc *desc, const struct place *at,
                               uint32_t index) {
     const trc_node_input *input = &desc->inputs[desc->nodes[at->node].first_input + index];
-    const enum trc_kind kind = at->info->inputs[index].kind;
+    const enum trc_socket_kind kind = at->info->inputs[index].kind;
     if (input->node == TRC_INPUT_CONSTANT)
         return check_constant(at, index, kind, input);
     if (input->node == TRC_INPUT_DEFAULT) {
-        return trc_kind_has_default(kind) ? TRC_OK : fail_input(at, index, "it has no default");
+        return trc_socket_has_default(kind) ? TRC_OK : fail_input(at, index, "it has no default");
     }
     if (input->node < 0 || (uint32_t)input->node >= at->node) {
         return fail_input(at, index, "it is linked to a node that is not earlier");
@@ -42,8 +42,8 @@ static trc_status check_input(const trc_material_desc *desc, const struct place 
     if (input->output >= from->output_count) {
         return fail_input(at, index, "it is linked to an output that does not exist");
     }
-    const bool is_shader = kind == TRC_KIND_SHADER;
-    if (is_shader != (from->outputs[input->output].kind == TRC_KIND_SHADER)) {
+    const bool is_shader = kind == TRC_SOCKET_SHADER;
+    if (is_shader != (from->outputs[input->output].kind == TRC_SOCKET_SHADER)) {
         return fail_input(at, index,
                           is_shader ? "it is linked to a value, not to a shader"
                                     : "it is linked to a shader, not to a value");
