@@ -1,30 +1,25 @@
 /* Lights of every kind beside what they give in closed form, or beside the same picture without
  * light samples. */
-#include "node_list.h"
-#include "picture_test.h"
+#include "level_test.h"
 
-enum { WIDTH = 16, HEIGHT = 4, FRAME = WIDTH * HEIGHT };
-
-/* Mean of the first channel of the level view and its standard error by pictures of SEEDS seeds. */
+/* Pictures of so many seeds tell the noise. */
 enum { SEEDS = 16 };
-struct mean {
-    double value, error;
-};
 
+/* Mean of the first channel of the level view. */
 static struct mean mean_of(trc_scene scene, uint32_t samples) {
-    static float pixels[4 * FRAME];
-    trc_render_desc desc = default_render_desc(WIDTH, HEIGHT, samples);
+    static float pixels[4 * LEVEL_PIXELS];
+    trc_render_desc desc = default_render_desc(LEVEL_WIDTH, LEVEL_HEIGHT, samples);
     double sum = 0.0, sum2 = 0.0;
     for (uint32_t seed = 0; seed < SEEDS; seed++) {
         double picture = 0.0;
         desc.seed = 1 + seed;
-        fixture_draw(scene, &desc, TRC_PASS_COMBINED, pixels, (uint64_t)4 * FRAME);
-        for (int p = 0; p < FRAME; p++)
-            picture += (double)pixels[4 * p] / FRAME;
+        fixture_draw(scene, &desc, TRC_PASS_COMBINED, pixels, (uint64_t)4 * LEVEL_PIXELS);
+        for (int p = 0; p < LEVEL_PIXELS; p++)
+            picture += (double)pixels[4 * p] / LEVEL_PIXELS;
         sum += picture / SEEDS;
         sum2 += picture * picture / SEEDS;
     }
-    return (struct mean){sum, sqrt(fmax(sum2 - sum * sum, 0.0) / (SEEDS - 1))};
+    return mean_from(sum, sum2, SEEDS);
 }
 
 /* Five standard errors of both. */
@@ -34,14 +29,6 @@ static void expect_same(const char *what, struct mean found, struct mean want) {
            want.value, want.error);
     assert_true(error < 0.005 * fmax(fabs(want.value), 1e-3));
     assert_true(fabs(found.value - want.value) <= 5.0 * error + 1e-6);
-}
-
-static trc_id one_node(trc_scene scene, const struct node_list *list, uint32_t flags) {
-    trc_material_desc desc = node_list_material(list, list->node_count - 1);
-    trc_id id = 0;
-    desc.flags |= flags;
-    assert_ok(trc_material_create(scene, &desc, &id));
-    return id;
 }
 
 /* A mirror inside of a sphere of light shows its far wall everywhere: strength / (4 pi^2 r^2). */
@@ -167,7 +154,7 @@ static trc_scene striped(bool is_sampled) {
     struct node_list list = {0};
     NODE_ADD(&list, TRC_NODE_EMISSION, 0, node_color(1, 1, 1), node_number(1.0f));
     materials[0] = fixture_glossy(scene, 0.0f, 0.3f); /* matt ones would need the samples */
-    materials[1] = one_node(scene, &list, is_sampled ? TRC_MATERIAL_SAMPLE_EMISSION : 0);
+    materials[1] = level_material(scene, &list, 0, is_sampled ? TRC_MATERIAL_SAMPLE_EMISSION : 0);
     trc_instance_desc desc = default_instance_desc(mesh);
     desc.materials = materials;
     desc.material_count = 2;

@@ -1,27 +1,16 @@
 /* Where rays end: the camera's clipping, the limits of bounces, switches of the world, and what is
  * reported of light that is no number; pictures beside what they are known to show. */
-#include "node_list.h"
-#include "picture_test.h"
-
-/* Pixels of the level view: columns from x = 0 to 4, seen from 1 m above in parallel rays. */
-enum { WIDTH = 16, HEIGHT = 4, FRAME = WIDTH * HEIGHT };
+#include "level_test.h"
 
 #define LIGHT 0.7f
-
-static trc_render_desc level_desc(void) {
-    trc_render_desc desc = default_render_desc(WIDTH, HEIGHT, 4);
-    desc.filter = TRC_FILTER_BOX;
-    desc.filter_width = 0.01f;
-    return desc;
-}
 
 /* Every pixel of a pass shows that in its first channel. */
 static void expect_all(trc_scene scene, const trc_render_desc *desc, uint32_t pass, double want,
                        double allowed) {
-    static float pixels[4 * FRAME];
+    static float pixels[4 * LEVEL_PIXELS];
     const uint32_t channels = trc_pass_channels(pass);
-    fixture_draw(scene, desc, pass, pixels, (uint64_t)channels * FRAME);
-    for (uint32_t p = 0; p < FRAME; p++)
+    fixture_draw(scene, desc, pass, pixels, (uint64_t)channels * LEVEL_PIXELS);
+    for (uint32_t p = 0; p < LEVEL_PIXELS; p++)
         if (!(fabs((double)pixels[channels * p] - want) <= allowed))
             fail_msg("pixel %u is %.6f, not %.6f", p, (double)pixels[channels * p], want);
 }
@@ -30,13 +19,15 @@ static trc_id emission(trc_scene scene) {
     return fixture_material(scene, TRC_NODE_EMISSION, LIGHT);
 }
 
-/* Clear panes above each other, the first at z. */
-static void add_panes(trc_scene scene, uint32_t count, float z) {
+static trc_id clear_glass(trc_scene scene) {
     struct node_list list = {0};
     NODE_ADD(&list, TRC_NODE_TRANSPARENT, 0, node_color(1.0f, 1.0f, 1.0f));
-    const trc_material_desc desc = node_list_material(&list, 0);
-    trc_id glass = 0;
-    assert_ok(trc_material_create(scene, &desc, &glass));
+    return level_material(scene, &list, 0, 0);
+}
+
+/* Clear panes above each other, the first at z. */
+static void add_panes(trc_scene scene, uint32_t count, float z) {
+    const trc_id glass = clear_glass(scene);
     for (uint32_t k = 0; k < count; k++)
         fixture_level(scene, 20.0f, z + 0.25f * (float)k, glass);
 }
@@ -82,7 +73,7 @@ static void clipping_ends_behind_panes_too(void **state) {
             add_panes(scene, panes, 0.0f);
             fixture_level(scene, 10.0f, -2.0f, emission(scene));
             set_camera(scene, &camera);
-            const trc_render_desc desc = level_desc();
+            const trc_render_desc desc = level_desc(4);
             expect_all(scene, &desc, TRC_PASS_COMBINED, is_clipped ? 0.0 : (double)LIGHT, 1e-6);
             assert_ok(trc_scene_destroy(scene));
         }
@@ -102,16 +93,7 @@ static trc_scene two_mirrors(uint32_t panes) {
     fixture_quad(scene, first, mirror);
     fixture_quad(scene, second, mirror);
     fixture_quad(scene, light, emission(scene));
-    for (uint32_t k = 0; k < panes; k++) {
-        struct node_list list = {0};
-        const float z = 4.0f + 0.25f * (float)k;
-        const float pane[12] = {-20, -5, z, -2, -5, z, -2, 5, z, -20, 5, z};
-        NODE_ADD(&list, TRC_NODE_TRANSPARENT, 0, node_color(1.0f, 1.0f, 1.0f));
-        const trc_material_desc desc = node_list_material(&list, 0);
-        trc_id glass = 0;
-        assert_ok(trc_material_create(scene, &desc, &glass));
-        fixture_quad(scene, pane, glass);
-    }
+    add_panes(scene, panes, 4.0f);
     assert_ok(trc_scene_commit(scene));
     return scene;
 }
@@ -121,7 +103,7 @@ static trc_scene two_mirrors(uint32_t panes) {
 static void glossy_bounces_are_limited(void **state) {
     (void)state;
     const trc_scene scene = two_mirrors(0);
-    trc_render_desc desc = level_desc();
+    trc_render_desc desc = level_desc(4);
     desc.max_depth = 8;
     desc.max_glossy_depth = 1;
     expect_all(scene, &desc, TRC_PASS_COMBINED, (double)LIGHT, 1e-5);
@@ -136,7 +118,7 @@ static void glossy_bounces_are_limited(void **state) {
 /* Panes that the last ray of a path passes are as many as a camera ray passes. */
 static void panes_are_limited(void **state) {
     (void)state;
-    trc_render_desc desc = level_desc();
+    trc_render_desc desc = level_desc(4);
     desc.max_transparent_depth = 2;
     for (uint32_t panes = 2; panes < 5; panes++) {
         const double want = panes <= desc.max_transparent_depth + 1 ? (double)LIGHT : 0.0;
@@ -158,7 +140,7 @@ static void panes_are_limited(void **state) {
  * 2 and 3). Panes below the camera are in the way of both. */
 static void panes_in_shadows_are_limited(void **state) {
     (void)state;
-    trc_render_desc desc = level_desc();
+    trc_render_desc desc = level_desc(4);
     desc.max_transparent_depth = 3;
     for (uint32_t seen = 0; seen < 3; seen++)
         for (uint32_t above = 0; above < 5; above++) {
@@ -194,7 +176,7 @@ static void a_world_can_hide_from_the_camera(void **state) {
             if (is_mirrored)
                 fixture_level(scene, 20.0f, 0.0f, fixture_glossy(scene, 1.0f, 0.0f));
             assert_ok(trc_scene_commit(scene));
-            const trc_render_desc desc = level_desc();
+            const trc_render_desc desc = level_desc(4);
             const double want = is_hidden && !is_mirrored ? 0.0 : (double)LIGHT;
             expect_all(scene, &desc, TRC_PASS_COMBINED, want, 1e-6);
             assert_ok(trc_scene_destroy(scene));
@@ -209,7 +191,7 @@ static void groups_are_exposed(void **state) {
     world.light_group = 1;
     assert_ok(trc_scene_set_world(scene, &world));
     assert_ok(trc_scene_commit(scene));
-    trc_render_desc desc = level_desc();
+    trc_render_desc desc = level_desc(4);
     desc.light_group_count = 1;
     for (int k = 0; k < 3; k++) {
         desc.film_exposure = (float)(1 << k);
@@ -230,22 +212,19 @@ static void samples_without_a_number_are_reported(void **state) {
                  node_color(3e38f, 3e38f, 3e38f), node_number(0.0f), node_number(1.0f));
     const uint32_t light =
         NODE_ADD(&list, TRC_NODE_EMISSION, 0, node_link(huge, 0), node_number(3e38f));
-    const trc_material_desc material = node_list_material(&list, light);
-    trc_id id = 0;
-    assert_ok(trc_material_create(scene, &material, &id));
-    fixture_level(scene, 20.0f, 0.0f, id);
+    fixture_level(scene, 20.0f, 0.0f, level_material(scene, &list, light, 0));
     assert_ok(trc_scene_commit(scene));
-    const trc_render_desc desc = level_desc();
+    const trc_render_desc desc = level_desc(4);
     trc_render_progress progress = {.struct_size = sizeof progress};
     trc_render render_id = 0;
-    float pixels[4 * FRAME];
+    float pixels[4 * LEVEL_PIXELS];
     assert_ok(trc_render_start(scene, &desc, &render_id));
     assert_ok(trc_render_wait(render_id, INFINITY));
-    assert_ok(trc_render_read(render_id, TRC_PASS_COMBINED, pixels, 4 * FRAME));
+    assert_ok(trc_render_read(render_id, TRC_PASS_COMBINED, pixels, 4 * LEVEL_PIXELS));
     assert_ok(trc_render_poll(render_id, &progress));
     assert_ok(trc_render_destroy(render_id));
-    assert_int_equal(progress.dropped_samples, (uint64_t)FRAME * desc.sample_count);
-    for (int i = 0; i < 4 * FRAME; i++)
+    assert_int_equal(progress.dropped_samples, (uint64_t)LEVEL_PIXELS * desc.sample_count);
+    for (int i = 0; i < 4 * LEVEL_PIXELS; i++)
         assert_true(isfinite(pixels[i]));
     assert_ok(trc_scene_destroy(scene));
 }

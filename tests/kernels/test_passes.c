@@ -1,17 +1,6 @@
 /* Passes of what lies behind something partly transparent, and of light in groups, beside sums by
  * hand. */
-#include "node_list.h"
-#include "picture_test.h"
-
-/* Columns of pixels of 0.25 m, from x = 0 on, seen from 1 m above in parallel rays. */
-enum { WIDTH = 16, HEIGHT = 4, FRAME = WIDTH * HEIGHT };
-
-static trc_id add_nodes(trc_scene scene, const struct node_list *list, uint32_t surface) {
-    const trc_material_desc desc = node_list_material(list, surface);
-    trc_id id = 0;
-    assert_ok(trc_material_create(scene, &desc, &id));
-    return id;
-}
+#include "level_test.h"
 
 static uint32_t add_emission(struct node_list *list, float r, float g, float b) {
     return NODE_ADD(list, TRC_NODE_EMISSION, 0, node_color(r, g, b), node_number(1.0f));
@@ -27,14 +16,12 @@ static void expect(const char *what, const float *found, const double *want, int
 /* Renders a pass of every pixel with so many samples. */
 static void draw(trc_scene scene, uint32_t pass, uint32_t samples, uint32_t transparent,
                  float *pixels) {
-    trc_render_desc desc = default_render_desc(WIDTH, HEIGHT, samples);
-    desc.filter = TRC_FILTER_BOX;
-    desc.filter_width = 0.01f;
+    trc_render_desc desc = level_desc(samples);
     desc.film_transparent = transparent;
     desc.passes = pass < 64 ? UINT64_C(1) << pass : 0;
     desc.aov_value_count = desc.aov_color_count = 2;
     desc.light_group_count = 4;
-    fixture_draw(scene, &desc, pass, pixels, (uint64_t)trc_pass_channels(pass) * FRAME);
+    fixture_draw(scene, &desc, pass, pixels, (uint64_t)trc_pass_channels(pass) * LEVEL_PIXELS);
 }
 
 /* ---- behind something partly transparent ---- */
@@ -51,7 +38,7 @@ static void add_veil(trc_scene scene, float clear) {
                                   node_link(light, 0), node_link(glass, 0));
     NODE_ADD(&list, TRC_NODE_AOV_COLOR, 1, node_color(0.1f, 0.2f, 0.4f));
     NODE_ADD(&list, TRC_NODE_AOV_VALUE, 0, node_number(3.0f));
-    fixture_level(scene, 10.0f, 0.5f, add_nodes(scene, &list, mix));
+    fixture_level(scene, 10.0f, 0.5f, level_material(scene, &list, mix, 0));
 }
 
 /* An opaque square or a sky, both with AOVs. */
@@ -73,8 +60,8 @@ static void aovs_behind_a_veil(void **state) {
             const trc_scene scene = fixture_level_view();
             struct node_list list = {0};
             add_veil(scene, is_dense ? 0.3f : 0.75f);
-            const trc_id behind = add_nodes(
-                scene, &list, add_aovs(&list, is_sky ? TRC_NODE_BACKGROUND : TRC_NODE_EMISSION));
+            const uint32_t type = is_sky ? TRC_NODE_BACKGROUND : TRC_NODE_EMISSION;
+            const trc_id behind = level_material(scene, &list, add_aovs(&list, type), 0);
             if (is_sky) {
                 const trc_world_desc world = default_world_desc(behind);
                 assert_ok(trc_scene_set_world(scene, &world));
@@ -82,10 +69,10 @@ static void aovs_behind_a_veil(void **state) {
                 fixture_level(scene, 10.0f, 0.0f, behind);
             }
             assert_ok(trc_scene_commit(scene));
-            float color[4 * FRAME], value[FRAME];
+            float color[4 * LEVEL_PIXELS], value[LEVEL_PIXELS];
             draw(scene, TRC_PASS_AOV_COLOR(1), 4, 0, color);
             draw(scene, TRC_PASS_AOV_VALUE(0), 4, 0, value);
-            for (int p = 0; p < FRAME; p++) {
+            for (int p = 0; p < LEVEL_PIXELS; p++) {
                 expect("colour", color + 4 * p, is_dense ? veil : both, 4, 1e-6);
                 expect("value", value + p, is_dense ? veil_value : both_value, 1, 1e-6);
             }
@@ -108,7 +95,7 @@ static void holdouts_behind_a_veil(void **state) {
             list.nodes[hole].input_count = 0;
             const uint32_t mix = NODE_ADD(&list, TRC_NODE_MIX_SHADER, 0, node_number((float)part),
                                           node_link(light, 0), node_link(hole, 0));
-            const trc_id material = add_nodes(scene, &list, mix);
+            const trc_id material = level_material(scene, &list, mix, 0);
             add_veil(scene, (float)clear);
             if (kind == 2) {
                 fixture_level(scene, 10.0f, 0.0f, fixture_glossy(scene, 1.0f, 0.0f));
@@ -117,7 +104,7 @@ static void holdouts_behind_a_veil(void **state) {
                 fixture_level(scene, 10.0f, 0.0f, material);
             }
             assert_ok(trc_scene_commit(scene));
-            float pixels[4 * FRAME];
+            float pixels[4 * LEVEL_PIXELS];
             double want[4], seen = 0.0;
             draw(scene, TRC_PASS_COMBINED, 4, transparent, pixels);
             for (int c = 0; c < 3; c++) {
@@ -130,7 +117,7 @@ static void holdouts_behind_a_veil(void **state) {
                     want[c] += through * (1.0 - clear) * (double)veil_light[c];
             }
             want[3] = kind == 2 ? 1.0 : 1.0 - seen * part;
-            for (int p = 0; p < FRAME; p++)
+            for (int p = 0; p < LEVEL_PIXELS; p++)
                 expect("holdout", pixels + 4 * p, want, 4, 1e-6);
             assert_ok(trc_scene_destroy(scene));
         }
@@ -173,7 +160,7 @@ static trc_id add_colored_light(trc_scene scene) {
     const uint32_t info = node_add(&list, TRC_NODE_OBJECT_INFO, 0, 0, NULL);
     const uint32_t light =
         NODE_ADD(&list, TRC_NODE_EMISSION, 0, node_link(info, 1), node_number(1.0f));
-    return add_nodes(scene, &list, light);
+    return level_material(scene, &list, light, 0);
 }
 
 /* Emission that the camera sees, directly or in a mirror, is in its own instance's group, whatever
@@ -183,16 +170,16 @@ static void emission_is_in_its_instances_group(void **state) {
     for (int is_mirrored = 0; is_mirrored < 2; is_mirrored++) {
         const trc_scene scene = fixture_level_view();
         const trc_id material = add_colored_light(scene);
-        for (int x = 0; x < WIDTH; x++)
+        for (int x = 0; x < LEVEL_WIDTH; x++)
             add_strip(scene, material, x, is_mirrored ? 2.0f : 0.0f);
         if (is_mirrored)
             fixture_level(scene, 10.0f, 0.0f, fixture_glossy(scene, 1.0f, 0.0f));
         assert_ok(trc_scene_commit(scene));
         for (uint32_t group = 1; group <= GROUPS; group++) {
-            float pixels[3 * FRAME];
+            float pixels[3 * LEVEL_PIXELS];
             draw(scene, TRC_PASS_LIGHT_GROUP(group - 1), 4, 0, pixels);
-            for (int p = 0; p < FRAME; p++) {
-                const int x = p % WIDTH;
+            for (int p = 0; p < LEVEL_PIXELS; p++) {
+                const int x = p % LEVEL_WIDTH;
                 const double light = strip_group(x) == group ? strip_light(x) : 0.0;
                 const double want[3] = {light, light, light};
                 expect("group", pixels + 3 * p, want, 3, 1e-6);
@@ -202,22 +189,18 @@ static void emission_is_in_its_instances_group(void **state) {
     }
 }
 
-struct mean {
-    double value, error;
-};
-
 /* Mean of a pass's first channel over the picture and its standard error by the pixels. */
 static struct mean mean_of(trc_scene scene, uint32_t pass) {
-    static float pixels[4 * FRAME];
+    static float pixels[4 * LEVEL_PIXELS];
     double sum = 0.0, sum2 = 0.0;
     const uint32_t channels = trc_pass_channels(pass);
     draw(scene, pass, 256, 0, pixels);
-    for (uint32_t p = 0; p < FRAME; p++) {
+    for (uint32_t p = 0; p < LEVEL_PIXELS; p++) {
         const double value = (double)pixels[channels * p];
-        sum += value / FRAME;
-        sum2 += value * value / FRAME;
+        sum += value / LEVEL_PIXELS;
+        sum2 += value * value / LEVEL_PIXELS;
     }
-    return (struct mean){sum, sqrt(fmax(sum2 - sum * sum, 0.0) / (FRAME - 1))};
+    return mean_from(sum, sum2, LEVEL_PIXELS);
 }
 
 /* Five standard errors. */
@@ -293,9 +276,9 @@ static void groups_share_out_light_samples(void **state) {
         expect_mean("disk", mean_of(scene, TRC_PASS_LIGHT_GROUP(1)), disk);
         expect_mean("sky", mean_of(scene, TRC_PASS_LIGHT_GROUP(2)), sky);
         expect_mean("all", mean_of(scene, TRC_PASS_COMBINED), sun + disk + sky + ambient);
-        static float none[3 * FRAME];
+        static float none[3 * LEVEL_PIXELS];
         draw(scene, TRC_PASS_LIGHT_GROUP(3), 4, 0, none);
-        for (int i = 0; i < 3 * FRAME; i++)
+        for (int i = 0; i < 3 * LEVEL_PIXELS; i++)
             assert_true(none[i] == 0.0f);
         assert_ok(trc_scene_destroy(scene));
     }
