@@ -6,19 +6,24 @@ Functions as in ``textures.py``: of the walker, the node and its ``Sockets``.
 
 import numpy as np
 
-from ..abi import MathOperation as Math, NodeType, RotateMode, SpaceId, VectorOperation as Vector
+from ..abi import (CurvesExtension, MathOperation as Math, ModeFlags, NodeType, RotateFlags, RotateMode, SpaceId,
+                   TableSize, TransformedType, VectorOperation as Vector, VectorTransformMode)
 from ..compat import TRANSFORMS_NORMALS
 from .instance import VALUES_LOCATION, VALUES_PARTICLE, VALUES_SPIN, VALUES_VELOCITY
+from .node_list import output
 from .strands import DIRECTION_ATTRIBUTE, HAIR_ATTRIBUTE
 from .values import CONSTANT, DEFAULT, Value
 
-_CLAMP_RESULT = 256
-_RAY_LENGTH = 7  # output of the Light Path node
-_INCOMING = 4    # of the Geometry node
-_OBJECT_TO_WORLD = SpaceId.OBJECT | SpaceId.WORLD << 2 | 1 << 4  # mode of VECTOR_TRANSFORM, of a vector
-_TABLE_SIZE = 257
 
-_TRANSFORMS = {'POINT': 0, 'VECTOR': 1, 'NORMAL': 3 if TRANSFORMS_NORMALS else 2}
+def _transform_mode(space_from, space_to, what):
+    """Mode of VECTOR_TRANSFORM."""
+    return (space_from | space_to << VectorTransformMode.SPACE_TO_SHIFT
+            | what << VectorTransformMode.TRANSFORMED_SHIFT)
+
+
+_OBJECT_TO_WORLD = _transform_mode(SpaceId.OBJECT, SpaceId.WORLD, TransformedType.VECTOR)
+_TRANSFORMS = {'POINT': TransformedType.POINT, 'VECTOR': TransformedType.VECTOR,
+               'NORMAL': TransformedType.NORMAL if TRANSFORMS_NORMALS else TransformedType.UNIT_VECTOR}
 _ROTATIONS = {'AXIS_ANGLE': RotateMode.AXIS_ANGLE, 'X_AXIS': RotateMode.X, 'Y_AXIS': RotateMode.Y,
               'Z_AXIS': RotateMode.Z, 'EULER_XYZ': RotateMode.EULER}
 
@@ -31,7 +36,7 @@ def _number(walker, operation, *values, clamped=False):
     """The result of a Math node on values and plain numbers."""
     values = [v if isinstance(v, Value) else _constant('f', v) for v in values]
     values += [_constant('f', 0.0)] * (3 - len(values))
-    return Value('f', walker.emit(NodeType.MATH, values, operation | (_CLAMP_RESULT if clamped else 0)), 0)
+    return Value('f', walker.emit(NodeType.MATH, values, operation | (ModeFlags.CLAMP if clamped else 0)), 0)
 
 
 def _vector(walker, operation, a, b=None, scale=None):
@@ -49,14 +54,14 @@ def _table(mapping, count):
     curves = list(mapping.curves)[:count]
     low = min(curve.points[0].location[0] for curve in curves)
     high = max(curve.points[-1].location[0] for curve in curves)
-    table = np.zeros((_TABLE_SIZE, 4), np.float32)
-    for i, x in enumerate(np.linspace(low, high, _TABLE_SIZE)):
+    table = np.zeros((TableSize.ENTRIES, 4), np.float32)
+    for i, x in enumerate(np.linspace(low, high, TableSize.ENTRIES)):
         if count == 4:
             x = mapping.evaluate(curves[3], x)
         for channel, curve in enumerate(curves[:3]):
             table[i, channel] = mapping.evaluate(curve, x)
     return table.reshape(-1), (_constant('f', low), _constant('f', high)), \
-        int(mapping.extend == 'EXTRAPOLATED')
+        CurvesExtension.EXTRAPOLATED if mapping.extend == 'EXTRAPOLATED' else CurvesExtension.CONSTANT
 
 
 def _color_curves(count, name):
@@ -89,7 +94,7 @@ def _ranged(walker, node, value, source, target, steps):
 
     As in Cycles an empty source gives 0 for numbers, clamped where the node clamps, and the target's
     start for vectors."""
-    mode = _CLAMP_RESULT if node.clamp else 0
+    mode = ModeFlags.CLAMP if node.clamp else 0
     is_number = getattr(node, "data_type", 'FLOAT') == 'FLOAT'
     if node.interpolation_type == 'LINEAR' and is_number:
         return Value('f', walker.emit(NodeType.MAP_RANGE, (value, *source, *target), mode), 0)
@@ -135,8 +140,7 @@ def _map_range(walker, node, sockets):
 # Vectors -------------------------------------------------------------------------------------------
 
 def _vector_transform(walker, node, sockets):
-    mode = (SpaceId[node.convert_from] | SpaceId[node.convert_to] << 2
-            | _TRANSFORMS[node.vector_type] << 4)
+    mode = _transform_mode(SpaceId[node.convert_from], SpaceId[node.convert_to], _TRANSFORMS[node.vector_type])
     index = walker.emit(NodeType.VECTOR_TRANSFORM, (sockets.get('v', "Vector"),), mode)
     return {"Vector": Value('v', index, 0)}
 
@@ -147,7 +151,7 @@ def _vector_rotate(walker, node, sockets):
         vector = _constant('v')
     values = (vector, sockets.get('v', "Center"), sockets.get('v', "Axis"), sockets.get('f', "Angle"),
               sockets.get('v', "Rotation"))
-    mode = _ROTATIONS[node.rotation_type] | (8 if node.invert else 0)
+    mode = _ROTATIONS[node.rotation_type] | (RotateFlags.INVERSE if node.invert else 0)
     return {"Vector": Value('v', walker.emit(NodeType.VECTOR_ROTATE, values, mode), 0)}
 
 
@@ -169,7 +173,7 @@ def _light_falloff(walker, _node, sockets):
     """Strength times powers of the ray's length, since light fades with its square; faint nearby where
     it is smooth."""
     strength, smooth = sockets.get('f', "Strength"), sockets.get('f', "Smooth")
-    length = Value('f', walker.emit(NodeType.LIGHT_PATH, ()), _RAY_LENGTH)
+    length = output(walker.emit(NodeType.LIGHT_PATH, ()), NodeType.LIGHT_PATH, "ray_length")
     square = _number(walker, Math.MULTIPLY, length, length)
     if smooth.node != CONSTANT or smooth.constant[0] > 0.0:
         share = _number(walker, Math.DIVIDE, square, _number(walker, Math.ADD, square, smooth))
@@ -187,7 +191,7 @@ def _bevel(walker, _node, sockets):
     walker.warn("Bevel is approximated by the normal as it is")
     normal = sockets.get('v', "Normal")
     if normal.node == DEFAULT:
-        normal = Value('v', walker.emit(NodeType.GEOMETRY, ()), 1)
+        normal = output(walker.emit(NodeType.GEOMETRY, ()), NodeType.GEOMETRY, "normal")
     return {"Normal": normal}
 
 
@@ -196,7 +200,7 @@ def _tangent_normal(walker):
     walker.flat.color_names.add(DIRECTION_ATTRIBUTE)
     strand = walker.emit(NodeType.COLOR_ATTRIBUTE, (), name=DIRECTION_ATTRIBUTE)
     along = Value('v', walker.emit(NodeType.VECTOR_TRANSFORM, (Value('v', strand, 0),), _OBJECT_TO_WORLD), 0)
-    incoming = Value('v', walker.emit(NodeType.GEOMETRY, ()), _INCOMING)
+    incoming = output(walker.emit(NodeType.GEOMETRY, ()), NodeType.GEOMETRY, "incoming")
     across = _vector(walker, Vector.SUBTRACT, incoming, _vector(walker, Vector.PROJECT, incoming, along))
     unit = _vector(walker, Vector.NORMALIZE, across)
     return _vector(walker, Vector.SCALE, unit, scale=Value('f', strand, 1))

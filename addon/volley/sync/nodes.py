@@ -10,13 +10,16 @@ from collections import namedtuple
 
 import numpy as np
 
-from ..abi import (BlendMode, DistributionType, ImageExtension, ImageInterpolation, MathOperation as Math, NodeType,
-                   TangentSource, VectorOperation as Vector)
+from ..abi import (BlendMode, ClampType, DiffuseModel, DistributionType, EnvironmentProjection,
+                   ImageExtension, ImageInterpolation, ImageProjection, MappingType, MathOperation as Math,
+                   ModeFlags, NodeType, NormalMapSpace, RampInterpolation, SeparateMode, TableSize,
+                   TangentSource, ToonComponent, VectorOperation as Vector)
 from ..compat import HAS_CORRELATED_MICROFACETS, KEEPS_DIFFUSE_ENERGY, RAMP_STEPS
 from . import tangents
 from .converters import CONVERTERS, instance_value
 from .derived import ISLAND, POINTINESS
 from .instance import VALUES_GENERATED, VALUES_UV
+from .node_list import input_kinds, input_number, output_kinds
 from .textures import TEXTURES
 from .values import CONSTANT, DEFAULT, Value
 
@@ -38,35 +41,35 @@ _INTERPOLATIONS = {
     'Cubic': ImageInterpolation.CUBIC, 'Smart': ImageInterpolation.CUBIC}
 _EXTENSIONS = {'REPEAT': ImageExtension.REPEAT, 'EXTEND': ImageExtension.EXTEND, 'CLIP': ImageExtension.CLIP,
                'MIRROR': ImageExtension.MIRROR}
-_PROJECTIONS = {'FLAT': 0, 'BOX': 1, 'SPHERE': 2, 'TUBE': 3}
-_CLAMP_RESULT = 256
-_ANISOTROPIC = {  # anisotropy, tangent
-    NodeType.GLOSSY: (2, 5), NodeType.PRINCIPLED: (7, 21), NodeType.LAYERED_PRINCIPLED: (9, 11)}
-RAMP_SIZE = 257
+_PROJECTIONS = ImageProjection.__members__
+_ANISOTROPIC = {  # where anisotropy and tangent stand
+    kind: (input_number(kind, name), input_number(kind, "tangent"))
+    for kind, name in ((NodeType.GLOSSY, "anisotropy"), (NodeType.PRINCIPLED, "anisotropic"),
+                       (NodeType.LAYERED_PRINCIPLED, "anisotropic"))}
 
-# inputs: (kind, socket identifiers by preference...); outputs: (socket identifier, kind) in the
-# library's order; mode(node): mode bits or None where the node is set to something unsupported.
+# inputs, outputs: identifiers of Blender's sockets in the library's order; mode(node): mode bits or None
+# where the node is set to something unsupported.
 Spec = namedtuple("Spec", "type inputs outputs mode", defaults=(None,))
 
 # Socket names of the Principled shader in the library's order: of 3.4 ...
 _PRINCIPLED_INPUTS = (
-    ('c', "Base Color"), ('f', "Subsurface"), ('c', "Subsurface Color"), ('f', "Metallic"),
-    ('f', "Specular"), ('f', "Specular Tint"), ('f', "Roughness"), ('f', "Anisotropic"),
-    ('f', "Anisotropic Rotation"), ('f', "Sheen"), ('f', "Sheen Tint"), ('f', "Clearcoat"),
-    ('f', "Clearcoat Roughness"), ('f', "IOR"), ('f', "Transmission"), ('f', "Transmission Roughness"),
-    ('c', "Emission"), ('f', "Emission Strength"), ('f', "Alpha"), ('v', "Normal"),
-    ('v', "Clearcoat Normal"), ('v', "Tangent"))
+    "Base Color", "Subsurface", "Subsurface Color", "Metallic",
+    "Specular", "Specular Tint", "Roughness", "Anisotropic",
+    "Anisotropic Rotation", "Sheen", "Sheen Tint", "Clearcoat",
+    "Clearcoat Roughness", "IOR", "Transmission", "Transmission Roughness",
+    "Emission", "Emission Strength", "Alpha", "Normal",
+    "Clearcoat Normal", "Tangent")
 
 # ... and from 4.0 on.
 _LAYERED_INPUTS = (
-    ('c', "Base Color"), ('f', "Metallic"), ('f', "Roughness"), ('f', "IOR"), ('f', "Alpha"),
-    ('v', "Normal"), ('f', "Diffuse Roughness"), ('f', "Specular IOR Level"), ('c', "Specular Tint"),
-    ('f', "Anisotropic"), ('f', "Anisotropic Rotation"), ('v', "Tangent"),
-    ('f', "Transmission Weight"), ('f', "Coat Weight"), ('f', "Coat Roughness"), ('f', "Coat IOR"),
-    ('c', "Coat Tint"), ('v', "Coat Normal"), ('f', "Sheen Weight"), ('f', "Sheen Roughness"),
-    ('c', "Sheen Tint"), ('c', "Emission Color"), ('f', "Emission Strength"))
+    "Base Color", "Metallic", "Roughness", "IOR", "Alpha",
+    "Normal", "Diffuse Roughness", "Specular IOR Level", "Specular Tint",
+    "Anisotropic", "Anisotropic Rotation", "Tangent",
+    "Transmission Weight", "Coat Weight", "Coat Roughness", "Coat IOR",
+    "Coat Tint", "Coat Normal", "Sheen Weight", "Sheen Roughness",
+    "Sheen Tint", "Emission Color", "Emission Strength")
 
-_SHADER = (("BSDF", 's'),)
+_SHADER = ("BSDF",)
 
 
 def _distribution(node):
@@ -79,16 +82,25 @@ def _microfacets(node):
     return None if distribution is None else distribution | _CORRELATED
 
 
+def _diffuse_model(_node):
+    return DiffuseModel.KEEPS_ENERGY if KEEPS_DIFFUSE_ENERGY else DiffuseModel.LOSES_ENERGY
+
+
+def _mode(mode):
+    """The mode of a node without settings."""
+    return lambda _node: mode
+
+
 def _color_mode(node):
     """RGB, HSV or HSL of the Separate and Combine Color nodes."""
-    return ('RGB', 'HSV', 'HSL').index(getattr(node, "mode", 'RGB'))
+    return SeparateMode[getattr(node, "mode", 'RGB')]
 
 
 def _math_mode(node):
     operation = 'WRAP' if node.operation == 'FLOORED_MODULO' else node.operation
     if operation not in _MATH_OPERATIONS:
         return None
-    return _MATH_OPERATIONS[operation] | (_CLAMP_RESULT if node.use_clamp else 0)
+    return _MATH_OPERATIONS[operation] | (ModeFlags.CLAMP if node.use_clamp else 0)
 
 
 def _vector_math_mode(node):
@@ -98,85 +110,61 @@ def _vector_math_mode(node):
 def _mix_rgb_mode(node):
     if node.blend_type not in _BLENDS:
         return None
-    return _BLENDS[node.blend_type] | (_CLAMP_RESULT if node.use_clamp else 0)
+    return _BLENDS[node.blend_type] | (ModeFlags.CLAMP if node.use_clamp else 0)
 
 
 _SPECS = {
-    "ShaderNodeBsdfDiffuse": Spec(
-        NodeType.DIFFUSE, (('c', "Color"), ('f', "Roughness"), ('v', "Normal")), _SHADER,
-        lambda _node: int(KEEPS_DIFFUSE_ENERGY)),
+    "ShaderNodeBsdfDiffuse": Spec(NodeType.DIFFUSE, ("Color", "Roughness", "Normal"), _SHADER, _diffuse_model),
     "ShaderNodeBsdfGlossy": Spec(
-        NodeType.GLOSSY, (('c', "Color"), ('f', "Roughness"), ('f', "Anisotropy"), ('f', "Rotation"),
-                 ('v', "Normal"), ('v', "Tangent")), _SHADER, _microfacets),
-    "ShaderNodeBsdfGlass": Spec(
-        NodeType.GLASS, (('c', "Color"), ('f', "Roughness"), ('f', "IOR"), ('v', "Normal")), _SHADER,
+        NodeType.GLOSSY, ("Color", "Roughness", "Anisotropy", "Rotation", "Normal", "Tangent"), _SHADER,
         _microfacets),
+    "ShaderNodeBsdfGlass": Spec(NodeType.GLASS, ("Color", "Roughness", "IOR", "Normal"), _SHADER, _microfacets),
     "ShaderNodeBsdfRefraction": Spec(
-        NodeType.REFRACTION, (('c', "Color"), ('f', "Roughness"), ('f', "IOR"), ('v', "Normal")), _SHADER,
-        _microfacets),
-    "ShaderNodeBsdfTransparent": Spec(NodeType.TRANSPARENT, (('c', "Color"),), _SHADER),
-    "ShaderNodeBsdfTranslucent": Spec(NodeType.TRANSLUCENT, (('c', "Color"), ('v', "Normal")), _SHADER),
-    "ShaderNodeBsdfVelvet": Spec(
-        NodeType.VELVET, (('c', "Color"), ('f', "Sigma"), ('v', "Normal")), _SHADER),
+        NodeType.REFRACTION, ("Color", "Roughness", "IOR", "Normal"), _SHADER, _microfacets),
+    "ShaderNodeBsdfTransparent": Spec(NodeType.TRANSPARENT, ("Color",), _SHADER),
+    "ShaderNodeBsdfTranslucent": Spec(NodeType.TRANSLUCENT, ("Color", "Normal"), _SHADER),
+    "ShaderNodeBsdfVelvet": Spec(NodeType.VELVET, ("Color", "Sigma", "Normal"), _SHADER),
     "ShaderNodeBsdfToon": Spec(
-        NodeType.TOON, (('c', "Color"), ('f', "Size"), ('f', "Smooth"), ('v', "Normal")), _SHADER,
-        lambda node: 0 if node.component == 'DIFFUSE' else 1),
-    "ShaderNodeEmission": Spec(
-        NodeType.EMISSION, (('c', "Color"), ('f', "Strength")), (("Emission", 's'),)),
-    "ShaderNodeBackground": Spec(
-        NodeType.BACKGROUND, (('c', "Color"), ('f', "Strength")), (("Background", 's'),)),
-    "ShaderNodeMixShader": Spec(
-        NodeType.MIX_SHADER, (('f', "Fac"), ('s', "Shader"), ('s', "Shader_001")), (("Shader", 's'),)),
-    "ShaderNodeAddShader": Spec(
-        NodeType.ADD_SHADER, (('s', "Shader"), ('s', "Shader_001")), (("Shader", 's'),)),
-    "ShaderNodeHoldout": Spec(NodeType.HOLDOUT, (), (("Holdout", 's'),)),
+        NodeType.TOON, ("Color", "Size", "Smooth", "Normal"), _SHADER,
+        lambda node: ToonComponent[node.component]),
+    "ShaderNodeEmission": Spec(NodeType.EMISSION, ("Color", "Strength"), ("Emission",)),
+    "ShaderNodeBackground": Spec(NodeType.BACKGROUND, ("Color", "Strength"), ("Background",)),
+    "ShaderNodeMixShader": Spec(NodeType.MIX_SHADER, ("Fac", "Shader", "Shader_001"), ("Shader",)),
+    "ShaderNodeAddShader": Spec(NodeType.ADD_SHADER, ("Shader", "Shader_001"), ("Shader",)),
+    "ShaderNodeHoldout": Spec(NodeType.HOLDOUT, (), ("Holdout",)),
     "ShaderNodeMapping": Spec(
-        NodeType.MAPPING, (('v', "Vector"), ('v', "Location"), ('v', "Rotation"), ('v', "Scale")),
-        (("Vector", 'v'),), lambda node: ('POINT', 'TEXTURE', 'VECTOR', 'NORMAL').index(node.vector_type)),
-    "ShaderNodeMixRGB": Spec(
-        NodeType.MIX_COLOR, (('f', "Fac"), ('c', "Color1"), ('c', "Color2")), (("Color", 'c'),),
-        _mix_rgb_mode),
+        NodeType.MAPPING, ("Vector", "Location", "Rotation", "Scale"), ("Vector",),
+        lambda node: MappingType[node.vector_type]),
+    "ShaderNodeMixRGB": Spec(NodeType.MIX_COLOR, ("Fac", "Color1", "Color2"), ("Color",), _mix_rgb_mode),
     "ShaderNodeVectorMath": Spec(
-        NodeType.VECTOR_MATH, (('v', "Vector"), ('v', "Vector_001"), ('v', "Vector_002"), ('f', "Scale")),
-        (("Vector", 'v'), ("Value", 'f')), _vector_math_mode),
-    "ShaderNodeFresnel": Spec(NodeType.FRESNEL, (('f', "IOR"), ('v', "Normal")), (("Fac", 'f'),)),
-    "ShaderNodeLayerWeight": Spec(
-        NodeType.LAYER_WEIGHT, (('f', "Blend"), ('v', "Normal")), (("Fresnel", 'f'), ("Facing", 'f'))),
-    "ShaderNodeLightPath": Spec(
-        NodeType.LIGHT_PATH, (), tuple((name, 'f') for name in (
-            "Is Camera Ray", "Is Shadow Ray", "Is Diffuse Ray", "Is Glossy Ray", "Is Singular Ray",
-            "Is Reflection Ray", "Is Transmission Ray", "Ray Length", "Ray Depth", "Diffuse Depth",
-            "Glossy Depth", "Transparent Depth", "Transmission Depth"))),
-    "ShaderNodeInvert": Spec(NodeType.INVERT, (('f', "Fac"), ('c', "Color")), (("Color", 'c'),)),
-    "ShaderNodeGamma": Spec(NodeType.GAMMA, (('c', "Color"), ('f', "Gamma")), (("Color", 'c'),)),
+        NodeType.VECTOR_MATH, ("Vector", "Vector_001", "Vector_002", "Scale"), ("Vector", "Value"),
+        _vector_math_mode),
+    "ShaderNodeFresnel": Spec(NodeType.FRESNEL, ("IOR", "Normal"), ("Fac",)),
+    "ShaderNodeLayerWeight": Spec(NodeType.LAYER_WEIGHT, ("Blend", "Normal"), ("Fresnel", "Facing")),
+    "ShaderNodeLightPath": Spec(NodeType.LIGHT_PATH, (), (
+        "Is Camera Ray", "Is Shadow Ray", "Is Diffuse Ray", "Is Glossy Ray", "Is Singular Ray",
+        "Is Reflection Ray", "Is Transmission Ray", "Ray Length", "Ray Depth", "Diffuse Depth",
+        "Glossy Depth", "Transparent Depth", "Transmission Depth")),
+    "ShaderNodeInvert": Spec(NodeType.INVERT, ("Fac", "Color"), ("Color",)),
+    "ShaderNodeGamma": Spec(NodeType.GAMMA, ("Color", "Gamma"), ("Color",)),
     "ShaderNodeHueSaturation": Spec(
-        NodeType.HUE_SATURATION, (('f', "Hue"), ('f', "Saturation"), ('f', "Value"), ('f', "Fac"),
-                         ('c', "Color")), (("Color", 'c'),)),
-    "ShaderNodeBrightContrast": Spec(
-        NodeType.BRIGHT_CONTRAST, (('c', "Color"), ('f', "Bright"), ('f', "Contrast")), (("Color", 'c'),)),
-    "ShaderNodeSeparateXYZ": Spec(
-        NodeType.SEPARATE, (('v', "Vector"),), (("X", 'f'), ("Y", 'f'), ("Z", 'f'))),
-    "ShaderNodeSeparateRGB": Spec(NodeType.SEPARATE, (('c', "Image"),), (("R", 'f'), ("G", 'f'), ("B", 'f'))),
-    "ShaderNodeSeparateColor": Spec(
-        NodeType.SEPARATE, (('c', "Color"),), (("Red", 'f'), ("Green", 'f'), ("Blue", 'f')), _color_mode),
-    "ShaderNodeSeparateHSV": Spec(
-        NodeType.SEPARATE, (('c', "Color"),), (("H", 'f'), ("S", 'f'), ("V", 'f')), lambda _node: 1),
-    "ShaderNodeCombineHSV": Spec(
-        NodeType.COMBINE, (('f', "H"), ('f', "S"), ('f', "V")), (("Color", 'c'),), lambda _node: 1),
-    "ShaderNodeCombineXYZ": Spec(NodeType.COMBINE, (('f', "X"), ('f', "Y"), ('f', "Z")), (("Vector", 'v'),)),
-    "ShaderNodeCombineRGB": Spec(NodeType.COMBINE, (('f', "R"), ('f', "G"), ('f', "B")), (("Image", 'c'),)),
-    "ShaderNodeCombineColor": Spec(
-        NodeType.COMBINE, (('f', "Red"), ('f', "Green"), ('f', "Blue")), (("Color", 'c'),), _color_mode),
+        NodeType.HUE_SATURATION, ("Hue", "Saturation", "Value", "Fac", "Color"), ("Color",)),
+    "ShaderNodeBrightContrast": Spec(NodeType.BRIGHT_CONTRAST, ("Color", "Bright", "Contrast"), ("Color",)),
+    "ShaderNodeSeparateXYZ": Spec(NodeType.SEPARATE, ("Vector",), ("X", "Y", "Z"), _mode(SeparateMode.XYZ)),
+    "ShaderNodeSeparateRGB": Spec(NodeType.SEPARATE, ("Image",), ("R", "G", "B")),
+    "ShaderNodeSeparateColor": Spec(NodeType.SEPARATE, ("Color",), ("Red", "Green", "Blue"), _color_mode),
+    "ShaderNodeSeparateHSV": Spec(NodeType.SEPARATE, ("Color",), ("H", "S", "V"), _mode(SeparateMode.HSV)),
+    "ShaderNodeCombineHSV": Spec(NodeType.COMBINE, ("H", "S", "V"), ("Color",), _mode(SeparateMode.HSV)),
+    "ShaderNodeCombineXYZ": Spec(NodeType.COMBINE, ("X", "Y", "Z"), ("Vector",), _mode(SeparateMode.XYZ)),
+    "ShaderNodeCombineRGB": Spec(NodeType.COMBINE, ("R", "G", "B"), ("Image",)),
+    "ShaderNodeCombineColor": Spec(NodeType.COMBINE, ("Red", "Green", "Blue"), ("Color",), _color_mode),
     "ShaderNodeClamp": Spec(
-        NodeType.CLAMP, (('f', "Value"), ('f', "Min"), ('f', "Max")), (("Result", 'f'),),
-        lambda node: 0 if node.clamp_type == 'MINMAX' else 1),
+        NodeType.CLAMP, ("Value", "Min", "Max"), ("Result",), lambda node: ClampType[node.clamp_type]),
     "ShaderNodeTexChecker": Spec(
-        NodeType.CHECKER, (('v', "Vector"), ('c', "Color1"), ('c', "Color2"), ('f', "Scale")),
-        (("Color", 'c'), ("Fac", 'f'))),
+        NodeType.CHECKER, ("Vector", "Color1", "Color2", "Scale"), ("Color", "Fac")),
     "ShaderNodeObjectInfo": Spec(
-        NodeType.OBJECT_INFO, (), (("Location", 'v'), ("Color", 'c'), ("Alpha", 'f'), ("Object Index", 'f'),
-                          ("Material Index", 'f'), ("Random", 'f'))),
-    "ShaderNodeRGBToBW": Spec(NodeType.RGB_TO_BW, (('c', "Color"),), (("Val", 'f'),)),
+        NodeType.OBJECT_INFO, (), ("Location", "Color", "Alpha", "Object Index", "Material Index", "Random")),
+    "ShaderNodeRGBToBW": Spec(NodeType.RGB_TO_BW, ("Color",), ("Val",)),
 }
 _SPECS["ShaderNodeBsdfAnisotropic"] = _SPECS["ShaderNodeBsdfGlossy"]
 
@@ -196,9 +184,9 @@ def translate(walker, node, path):
     mode = None if spec is None else 0 if spec.mode is None else spec.mode(node)
     if mode is None:
         return _unsupported(walker, node, sockets)
-    values = [sockets.get(kind, *names) for kind, *names in spec.inputs]
+    values = sockets.all_of(spec.type, spec.inputs)
     _note_generated(walker, node, spec.type, values)
-    return _outputs(walker, walker.emit(spec.type, values, mode), spec.outputs)
+    return _outputs(walker.emit(spec.type, values, mode), spec.type, spec.outputs, mode)
 
 
 def _note_generated(walker, node, node_type, values):
@@ -235,6 +223,10 @@ class Sockets:
             return Value(kind, DEFAULT if kind == 'v' else CONSTANT, 0)
         return self._walker.convert(self._walker.input_value(socket, self._path), kind)
 
+    def all_of(self, node_type, names):
+        """The values of a library type's inputs from the sockets of those names."""
+        return [self.get(kind, name) for kind, name in zip(input_kinds(node_type), names, strict=True)]
+
     def is_linked(self, *names):
         """Whether something is linked to it."""
         socket = self.find(*names)
@@ -247,8 +239,9 @@ def _constant(kind, x, y=None, z=None):
     return Value(kind, CONSTANT, 0, (x, x if y is None else y, x if z is None else z))
 
 
-def _outputs(walker, index, outputs):
-    return {name: Value(kind, index, i) for i, (name, kind) in enumerate(outputs)}
+def _outputs(index, node_type, names, mode=0):
+    """{socket identifier: Value} of the node at index, whose outputs have those names in order."""
+    return {name: Value(kind, index, i) for i, (kind, name) in enumerate(zip(output_kinds(node_type, mode), names))}
 
 
 def _number(walker, operation, *values):
@@ -293,7 +286,7 @@ def _principled(walker, node, sockets):
     is_layered = sockets.find("Specular IOR Level") is not None
     kind = NodeType.LAYERED_PRINCIPLED if is_layered else NodeType.PRINCIPLED
     inputs = _LAYERED_INPUTS if is_layered else _PRINCIPLED_INPUTS
-    values = [sockets.get(kind_of_value, name) for kind_of_value, name in inputs]
+    values = sockets.all_of(kind, inputs)
     _name_missing(walker, sockets)
     _note_generated(walker, node, kind, values)
     return {"BSDF": Value('s', walker.emit(kind, values, _distribution(node) or 0), 0)}
@@ -353,9 +346,8 @@ def _edge_tint(n, k):
 
 def _sheen(walker, node, sockets):
     """The Sheen shader of 4.0 and later; Velvet is one of its distributions."""
-    values = [sockets.get(kind, name) for kind, name in (('c', "Color"), ('f', "Roughness"),
-                                                         ('v', "Normal"))]
     kind = NodeType.VELVET if node.distribution == 'ASHIKHMIN' else NodeType.SHEEN
+    values = sockets.all_of(kind, ("Color", "Roughness", "Normal"))
     return {"BSDF": Value('s', walker.emit(kind, values), 0)}
 
 
@@ -381,12 +373,12 @@ def _image(walker, node, sockets):
     if vector.node == DEFAULT:
         walker.flat.uv_names.add("")
     mode = (_INTERPOLATIONS.get(node.interpolation, 0) | _EXTENSIONS.get(node.extension, 0)
-            | _PROJECTIONS.get(node.projection, 0) << 4)
+            | _PROJECTIONS.get(node.projection, 0))
     if node.image is not None and node.image.source == 'TILED' and node.projection == 'FLAT':
         return _tiles(walker, walker.tiles_of(node), vector, mode)
     blend = _constant('f', node.projection_blend)
     index = walker.emit(NodeType.IMAGE, (vector, blend), mode, image=walker.image_of(node))
-    return _outputs(walker, index, (("Color", 'c'), ("Alpha", 'f')))
+    return _outputs(index, NodeType.IMAGE, ("Color", "Alpha"))
 
 
 def _tiles(walker, tiles, vector, mode):
@@ -411,17 +403,16 @@ def _tiles(walker, tiles, vector, mode):
 
 def _environment(walker, node, sockets):
     mode = (_INTERPOLATIONS.get(node.interpolation, 0)
-            | (16 if node.projection == 'MIRROR_BALL' else 0))
+            | EnvironmentProjection[node.projection])
     index = walker.emit(NodeType.ENVIRONMENT, (sockets.get('v', "Vector"),), mode,
                         image=walker.image_of(node))
-    return _outputs(walker, index, (("Color", 'c'),))
+    return _outputs(index, NodeType.ENVIRONMENT, ("Color",))
 
 
 def _geometry(walker, node, sockets):
     _note_generated(walker, node, NodeType.GEOMETRY, ())
-    outputs = _outputs(walker, walker.emit(NodeType.GEOMETRY, ()), (
-        ("Position", 'v'), ("Normal", 'v'), ("Tangent", 'v'), ("True Normal", 'v'), ("Incoming", 'v'),
-        ("Parametric", 'v'), ("Backfacing", 'f')))
+    outputs = _outputs(walker.emit(NodeType.GEOMETRY, ()), NodeType.GEOMETRY, (
+        "Position", "Normal", "Tangent", "True Normal", "Incoming", "Parametric", "Backfacing"))
     for output, attribute in (("Pointiness", POINTINESS), ("Random Per Island", ISLAND)):
         if node.outputs[output].is_linked:
             walker.flat.color_names.add(attribute)
@@ -434,7 +425,7 @@ def _uv_map(walker, node, _sockets):
     if node.from_instancer:
         return {"UV": instance_value(walker, 'v', VALUES_UV)}
     walker.flat.uv_names.add(node.uv_map)
-    return _outputs(walker, walker.emit(NodeType.UV_MAP, (), name=node.uv_map), (("UV", 'v'),))
+    return _outputs(walker.emit(NodeType.UV_MAP, (), name=node.uv_map), NodeType.UV_MAP, ("UV",))
 
 
 def _texture_coordinate(walker, node, _sockets):
@@ -443,8 +434,8 @@ def _texture_coordinate(walker, node, _sockets):
         walker.flat.uv_names.add("")
     walker.flat.needs_generated |= "Generated" in linked
     index = walker.emit(NodeType.TEXTURE_COORDINATE, ())
-    outputs = _outputs(walker, index, tuple((name, 'v') for name in (
-        "Generated", "Normal", "UV", "Object", "Camera", "Window", "Reflection")))
+    outputs = _outputs(index, NodeType.TEXTURE_COORDINATE, (
+        "Generated", "Normal", "UV", "Object", "Camera", "Window", "Reflection"))
     if node.object is not None and "Object" in linked:
         outputs["Object"] = _place_in(walker, node.object)
     if node.from_instancer:
@@ -468,7 +459,7 @@ def _place_in(walker, blender_object):
 def _color_attribute(walker, node, _sockets):
     walker.flat.color_names.add(node.layer_name)
     index = walker.emit(NodeType.COLOR_ATTRIBUTE, (), name=node.layer_name)
-    return _outputs(walker, index, (("Color", 'c'), ("Alpha", 'f')))
+    return _outputs(index, NodeType.COLOR_ATTRIBUTE, ("Color", "Alpha"))
 
 
 def _attribute(walker, node, _sockets):
@@ -477,7 +468,7 @@ def _attribute(walker, node, _sockets):
         return None
     walker.flat.color_names.add(node.attribute_name)
     index = walker.emit(NodeType.COLOR_ATTRIBUTE, (), name=node.attribute_name)
-    outputs = _outputs(walker, index, (("Color", 'c'), ("Alpha", 'f')))
+    outputs = _outputs(index, NodeType.COLOR_ATTRIBUTE, ("Color", "Alpha"))
     outputs["Vector"] = outputs["Color"]._replace(kind='v')
     outputs["Fac"] = walker.convert(outputs["Vector"], 'f')
     return outputs
@@ -490,15 +481,15 @@ def _math(walker, node, sockets):
     values = [sockets.get('f', name) for name in ("Value", "Value_001", "Value_002")]
     if node.operation == 'FLOORED_MODULO':  # the range to wrap into begins at 0
         values[2] = _constant('f', 0.0)
-    return _outputs(walker, walker.emit(NodeType.MATH, values, mode), (("Value", 'f'),))
+    return _outputs(walker.emit(NodeType.MATH, values, mode), NodeType.MATH, ("Value",))
 
 
 def _normal_map(walker, node, sockets):
-    space = ('TANGENT', 'OBJECT', 'WORLD', 'BLENDER_OBJECT', 'BLENDER_WORLD').index(node.space)
-    name = _tangents_of(walker, node) if space == 0 else ""
+    space = NormalMapSpace[node.space]
+    name = _tangents_of(walker, node) if space == NormalMapSpace.TANGENT else ""
     index = walker.emit(NodeType.NORMAL_MAP, (sockets.get('f', "Strength"), sockets.get('c', "Color")), space,
                         name=name)
-    return _outputs(walker, index, (("Normal", 'v'),))
+    return _outputs(index, NodeType.NORMAL_MAP, ("Normal",))
 
 
 def _tangents_of(walker, node):
@@ -514,17 +505,17 @@ def _tangent(walker, node, _sockets):
         mode, name = TangentSource.UV, _tangents_of(walker, node)
     else:
         walker.flat.needs_generated = True
-    return _outputs(walker, walker.emit(NodeType.TANGENT, (), mode, name=name), (("Tangent", 'v'),))
+    return _outputs(walker.emit(NodeType.TANGENT, (), mode, name=name), NodeType.TANGENT, ("Tangent",))
 
 
 def _color_ramp(walker, node, sockets):
-    ramp, factor, steps = node.color_ramp, sockets.get('f', "Fac"), RAMP_SIZE - 1
-    is_constant = ramp.interpolation == 'CONSTANT'
+    ramp, factor, steps = node.color_ramp, sockets.get('f', "Fac"), TableSize.ENTRIES - 1
+    mode = RampInterpolation.CONSTANT if ramp.interpolation == 'CONSTANT' else RampInterpolation.LINEAR
     if RAMP_STEPS != steps:  # Cycles' entries at the start of the library's table
         factor = _number(walker, Math.MULTIPLY, factor, _constant('f', RAMP_STEPS / steps))
-    table = np.array([ramp.evaluate(min(i / RAMP_STEPS, 1.0)) for i in range(RAMP_SIZE)], np.float32)
-    index = walker.emit(NodeType.COLOR_RAMP, (factor,), mode=int(is_constant), table=table)
-    return _outputs(walker, index, (("Color", 'c'), ("Alpha", 'f')))
+    table = np.array([ramp.evaluate(min(i / RAMP_STEPS, 1.0)) for i in range(TableSize.ENTRIES)], np.float32)
+    index = walker.emit(NodeType.COLOR_RAMP, (factor,), mode, table=table)
+    return _outputs(index, NodeType.COLOR_RAMP, ("Color", "Alpha"))
 
 
 def _mix(walker, node, sockets):
@@ -538,7 +529,7 @@ def _mix(walker, node, sockets):
         return {"Result_Vector": _mix_vectors(walker, node, sockets)}
     if node.data_type != 'RGBA' or node.blend_type not in _BLENDS:
         return None
-    mode = _BLENDS[node.blend_type] | (_CLAMP_RESULT if node.clamp_result else 0)
+    mode = _BLENDS[node.blend_type] | (ModeFlags.CLAMP if node.clamp_result else 0)
     values = (_clamped(walker, sockets.get('f', "Factor_Float"), node.clamp_factor),
               sockets.get('c', "A_Color"), sockets.get('c', "B_Color"))
     return {"Result_Color": Value('c', walker.emit(NodeType.MIX_COLOR, values, mode), 0)}
