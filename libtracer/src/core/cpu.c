@@ -67,8 +67,25 @@ static void detect(void) {
 }
 #endif
 
+/* Sets whose kernels were left out of this build. */
+static void drop_missing(void) {
+#ifdef TRC_WITHOUT_SSE42
+    available[TRC_ISA_SSE42] = false;
+#endif
+#ifdef TRC_WITHOUT_AVX2
+    available[TRC_ISA_AVX2] = false;
+#endif
+#ifdef TRC_WITHOUT_AVX512
+    available[TRC_ISA_AVX512] = false;
+#endif
+#ifdef TRC_WITHOUT_NEON
+    available[TRC_ISA_NEON] = false;
+#endif
+}
+
 static void initialise(void) {
     detect();
+    drop_missing();
     for (uint32_t isa = TRC_ISA_SCALAR; isa < ISA_COUNT; isa++) {
         if (available[isa])
             best = isa;

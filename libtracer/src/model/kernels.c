@@ -16,13 +16,19 @@ const struct trc_kernels *trc_kernels_get(uint32_t isa) {
     case TRC_ISA_SCALAR:
         return &trc_kernels_scalar;
 #if defined(__x86_64__)
+#ifndef TRC_WITHOUT_SSE42
     case TRC_ISA_SSE42:
         return &trc_kernels_sse42;
+#endif
+#ifndef TRC_WITHOUT_AVX2
     case TRC_ISA_AVX2:
         return &trc_kernels_avx2;
+#endif
+#ifndef TRC_WITHOUT_AVX512
     case TRC_ISA_AVX512:
         return &trc_kernels_avx512;
-#elif defined(__aarch64__)
+#endif
+#elif defined(__aarch64__) && !defined(TRC_WITHOUT_NEON)
     case TRC_ISA_NEON:
         return &trc_kernels_neon;
 #endif
