@@ -2,7 +2,7 @@
  * in the way.
  *
  * Shadow rays go from the floor nearly to the light: they end 2e-5 of their way before it
- * (SHADOW_END in kernels/tile/shade.c). So what has a light on it, within that, does not block it,
+ * (SHADOW_END in kernels/tile/direct.c). So what has a light on it, within that, does not block it,
  * whichever side it is seen from; what is farther from it does. */
 #include "figures.h"
 #include "picture_test.h"

@@ -1,0 +1,171 @@
+/* Direct light: samples of lights, their weights, and the shadow rays that they send.
+ *
+ * Rough lobes join light samples and continuation rays by multiple importance sampling (E. Veach
+ * and L. Guibas 1995, power heuristic). */
+#include "kernels/tile/shade.h"
+#include "kernels/trace/spawn.h"
+#include "model/lights.h"
+
+/* Shadow rays end this much before the light, as a fraction of the way: mesh lights must not shade
+ * themselves, whatever the rounding of both ends. */
+#define SHADOW_END (1.0f - 2e-5f)
+
+/* Origin of a shadow ray: where light grazes a smooth surface it starts from the curved surface
+ * that the normals describe, or the flat triangles would cast shadows with edges of their own.
+ * Shape and limit of the transition as in Cycles, with its default of the geometry offset. */
+#define TERMINATOR_COSINE 0.1f
+TRC_INLINE vvec3 shadow_origin(const struct trc_surface *s, vvec3 w) {
+    const vfloat zero = vf_set(0.0f), one = vf_set(1.0f);
+    const vfloat cos_n = v3_dot(w, s->n), cos_g = v3_dot(w, s->ng);
+    const vmask outside = vf_ge(cos_n, zero);
+    const vvec3 o = trc_spawn_origin(s, outside);
+    if (!vm_any(s->smooth))
+        return o;
+    const vfloat scale = vf_set(1.0f / TERMINATOR_COSINE);
+    const vfloat near = vf_select(vf_lt(cos_n, vf_set(TERMINATOR_COSINE)),
+                                  vf_set(2.0f) - (cos_g + cos_n) * scale, one - cos_g * scale);
+    const vfloat amount = vf_min(vf_max(near, zero), one);
+    return v3_add(o, v3_scale(s->bulge, vf_select(outside, amount, zero)));
+}
+
+/* Contributions of the lanes' light samples, weighted; lanes that get nothing are dropped from
+ * active. */
+static vmask light_contribute(const struct trc_tile *t, const struct arrival *a,
+                              const struct trc_surface *s, const struct trc_lobes *lobes,
+                              const struct trc_light_sample *l, vfloat count, vmask active,
+                              struct light_result *out) {
+    struct trc_bsdf_value f;
+    trc_bsdf_eval(lobes, s, l->wi, active, &f);
+    const vfloat one = vf_set(1.0f), zero = vf_set(0.0f);
+    const vuint seen = trc_light_visibility(t->snapshot, l, a->path);
+    const vmask alone = vm_or(l->delta, l->no_mis);
+    vfloat mis, mis_diffuse = one;
+    if (t->desc->integrator == TRC_INTEGRATOR_DISTRIBUTION) {
+        /* A continuation ray's weight has all lobes in it (kernels/lobe/bsdf.h), so this has too.
+         */
+        const vfloat pl = l->pdf * count, pb = f.pdf * a->chance;
+        const vfloat pl2 = pl * pl, pb2 = pb * pb;
+        mis = mis_diffuse = vf_select(alone, one, pl2 / (pl2 + pb2));
+    } else {
+        /* Ideal continuation rays find lights of extent by themselves; highlights of points are
+         * here. */
+        mis = vf_select(alone, one, zero);
+    }
+    const vfloat scale = one / (l->pdf * count);
+    const vvec3 light = v3_mul(a->weight, v3_scale(l->radiance, scale));
+#define SEEN(bit) vi_eq((vint)(seen & vu_set(bit)), vi_set(bit))
+    out->diffuse = v3_mul(
+        light, v3_scale(v3_select(SEEN(TRC_VISIBLE_DIFFUSE), f.diffuse, v3_zero()), mis_diffuse));
+    out->glossy =
+        v3_mul(light, v3_scale(v3_select(SEEN(TRC_VISIBLE_GLOSSY), f.glossy, v3_zero()), mis));
+    out->transmission = v3_mul(
+        light, v3_scale(v3_select(SEEN(TRC_VISIBLE_TRANSMISSION), f.transmission, v3_zero()), mis));
+#undef SEEN
+    const vvec3 sum = v3_add(out->diffuse, v3_add(out->glossy, out->transmission));
+    const vfloat size = v3_max(sum);
+    return vm_and(active, vm_and(vf_gt(size, zero), vf_lt(size, vf_set(3e38f))));
+}
+
+/* Adds the lanes' shadow rays to the queue. cell: where on the light, for sorting, below
+ * TRC_DIRECTION_CELLS. */
+void trc_shadow_push(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
+                     const struct trc_light_sample *l, const struct light_result *r, vuint cell,
+                     vmask active) {
+    const vvec3 o = shadow_origin(s, l->wi);
+    const vmask far = vf_ge(l->distance, vf_set(TRC_FAR));
+    const vvec3 target = v3_add(v3_scale(l->wi, vf_select(far, vf_set(1.0f), l->distance)),
+                                v3_select(far, v3_zero(), v3_sub(s->p, o)));
+    const vfloat tmax = vf_select(vm_not(l->casts_shadow), vf_set(-1.0f),
+                                  vf_select(far, vf_set(INFINITY), vf_set(SHADOW_END)));
+    const vvec3 sum = v3_add(r->diffuse, v3_add(r->glossy, r->transmission));
+    const struct trc_shadow_rays rays = {
+        .o = {o.x, o.y, o.z},
+        .d = {target.x, target.y, target.z},
+        .tmax = tmax,
+        .time = a->time,
+        .radiance = {sum.x, sum.y, sum.z},
+        .slot = a->slot,
+        .path = a->path,
+        .target = (vuint)l->light * vu_set(TRC_DIRECTION_CELLS) + cell,
+        .depths = a->depths,
+    };
+    struct trc_shadow_store *q = &t->shadows;
+    const uint32_t bits = vm_bits(active), at = trc_shadows_append(q, &rays, bits);
+    if (t->light_passes) {
+        const vvec3 parts[3] = {r->diffuse, r->glossy, r->transmission};
+        for (int k = 0; k < 3; k++) {
+            vf_compress(q->split[3 * k] + at, parts[k].x, bits);
+            vf_compress(q->split[3 * k + 1] + at, parts[k].y, bits);
+            vf_compress(q->split[3 * k + 2] + at, parts[k].z, bits);
+        }
+    }
+    for (int k = 0; q->lamp[0] && k < 3; k++)
+        vf_compress(q->lamp[k] + at, r->lamp, bits);
+}
+
+/* What the lanes' light samples are in the Shadow pass if nothing is in the way: lamps count
+ * equally, whatever they are chosen by; the world and emissive triangles do not. */
+static vfloat lamp_part(const struct trc_tile *t, const struct arrival *a,
+                        const struct trc_surface *s, const struct trc_light_sample *l, vfloat count,
+                        vmask active) {
+    const int32_t lamps = (int32_t)t->snapshot->lights->lamp_count;
+    const vint straight = vi_set(TRC_PATH_TRANSPARENT_BACKGROUND);
+    const vmask counts = vm_and(vm_and(active, vi_lt(l->light, vi_set(lamps))),
+                                vi_eq((vint)a->path & straight, straight));
+    if (!vm_any(counts))
+        return vf_set(0.0f);
+    const vfloat chance = trc_light_chosen(s, a->receive_n, l, counts);
+    return vf_select(counts, vf_divide(vf_set(1.0f / (float)lamps), chance * count), vf_set(0.0f));
+}
+
+static void sample_use(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
+                       const struct trc_lobes *lobes, const struct trc_light_sample *sample,
+                       vfloat count, vuint cell, vmask active) {
+    struct light_result r;
+    vmask lit = vm_and(active, sample->valid);
+    if (vm_any(lit))
+        lit = light_contribute(t, a, s, lobes, sample, count, lit, &r);
+    if (t->shadows.lamp[0] && vm_any(lit))
+        r.lamp = lamp_part(t, a, s, sample, count, lit);
+    if (vm_any(lit))
+        trc_shadow_push(t, a, s, sample, &r, cell, lit);
+}
+
+/* sample_count: of each lane. */
+static void light_samples(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
+                          const struct trc_lobes *lobes, uint32_t sample_count, vmask active) {
+    const uint32_t dimension = TRC_DIM_BOUNCE + t->generation * TRC_DIMS_PER_BOUNCE;
+    const vfloat count = vf_set((float)sample_count);
+    const struct trc_light_table *lights = t->snapshot->lights;
+    const bool world_apart = lights->world_apart && !a->world_alone;
+    const bool is_only_world = lights->world_light != UINT32_MAX && !lights->world_apart;
+    if (lights->cut_count + lights->distant_count == 0 || (is_only_world && a->world_alone))
+        return;
+    trc_shadow_reserve(t, sample_count * (world_apart ? 2 : 1));
+    for (uint32_t l = 0; l < sample_count; l++) {
+        vfloat u[3];
+        trc_samples(&t->sampler, a->pixel, a->sample, dimension, 3, l, sample_count, u);
+        struct trc_light_sample sample;
+        trc_light_sample(s, a->receive_n, u[0], u[1], u[2], &sample);
+        const vuint cell =
+            trc_light_cell(u[1], u[2], vf_select(sample.delta, vf_set(INFINITY), sample.density));
+        sample_use(t, a, s, lobes, &sample, count, cell, active);
+        if (world_apart) {
+            trc_light_sample_world(s, a->receive_n, u[1], u[2], &sample);
+            sample_use(t, a, s, lobes, &sample, count, trc_direction_cell(sample.wi), active);
+        }
+    }
+}
+
+/* The lanes that the camera sees, through transparent surfaces too, take as many samples as the
+ * settings say, those behind a bounce one. */
+void trc_direct_light(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
+                      const struct trc_lobes *lobes, vmask active) {
+    const uint32_t many = t->desc->light_samples;
+    const vmask seen = many > 1 ? vm_and(active, sees_directly(a->depths)) : vm_none();
+    const vmask bounced = vm_andnot(active, seen);
+    if (vm_any(seen))
+        light_samples(t, a, s, lobes, many, seen);
+    if (vm_any(bounced))
+        light_samples(t, a, s, lobes, 1, bounced);
+}

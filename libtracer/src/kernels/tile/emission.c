@@ -1,0 +1,174 @@
+/* Light that rays find by themselves: of surfaces, of lights they pass, of the world. */
+#include "kernels/light/clamp.h"
+#include "kernels/tile/shade.h"
+#include "model/lights.h"
+
+/* The limit of what rays find by themselves: what one bounce shows is direct light. */
+static vfloat found_limit(const struct trc_tile *t, const struct arrival *a) {
+    const vint depth = (vint)trc_depth_of(a->depths, TRC_DEPTH_ALL_SHIFT);
+    return trc_clamp_limit(t->desc, vi_lt(depth, vi_set(2)));
+}
+
+/* Light found by rays, weighted and clamped: to the samples, and to the pass its depth says.
+ * camera_pass: what camera rays see it as. */
+static void found_add(struct trc_tile *t, const struct arrival *a, vmask active, vvec3 c,
+                      uint32_t camera_pass) {
+    const vuint depth = trc_depth_of(a->depths, TRC_DEPTH_ALL_SHIFT);
+    float lanes[3][TRC_WIDTH];
+    uint32_t depths[TRC_WIDTH], path[TRC_WIDTH];
+    vf_store(lanes[0], c.x), vf_store(lanes[1], c.y), vf_store(lanes[2], c.z);
+    vu_store(depths, depth), vu_store(path, a->path);
+    for (uint32_t bits = vm_bits(active); bits; bits &= bits - 1) {
+        const int i = __builtin_ctz(bits);
+        const float rgb[3] = {lanes[0][i], lanes[1][i], lanes[2][i]};
+        trc_sample_add(t, a->slots[i], rgb);
+        const uint32_t category = path[i] >> TRC_PATH_CATEGORY_SHIFT & 3u;
+        if (category == TRC_CATEGORY_CAMERA)
+            trc_pass_add(t, camera_pass, a->slots[i], rgb);
+        else if (t->light_passes)
+            trc_pass_add(t, trc_category_pass(category) + (depths[i] > 1 ? 1 : 0), a->slots[i],
+                         rgb);
+    }
+}
+
+/* Emission or background found by rays. Returns what is added. */
+static vvec3 emission_add(struct trc_tile *t, const struct arrival *a, vmask active, vvec3 radiance,
+                          uint32_t camera_pass) {
+    if (!vm_any(active))
+        return v3_zero();
+    vvec3 c = v3_mul(a->found_weight, radiance);
+    if (trc_clamps(t->desc))
+        c = v3_scale(c, trc_clamp_factor(c, found_limit(t, a)));
+    found_add(t, a, active, c, camera_pass);
+    return c;
+}
+
+/* The same light to the passes of the lanes' light groups. */
+static void group_add(struct trc_tile *t, const struct arrival *a, vmask active, vvec3 light,
+                      const uint32_t groups[TRC_WIDTH]) {
+    float lanes[3][TRC_WIDTH];
+    vf_store(lanes[0], light.x), vf_store(lanes[1], light.y), vf_store(lanes[2], light.z);
+    for (uint32_t bits = vm_bits(active); bits; bits &= bits - 1) {
+        const int i = __builtin_ctz(bits);
+        const float rgb[3] = {lanes[0][i], lanes[1][i], lanes[2][i]};
+        if (groups[i])
+            trc_pass_add(t, TRC_PASS_LIGHT_GROUP(groups[i] - 1), a->slots[i], rgb);
+    }
+}
+
+/* Of one group for all lanes. */
+static void one_group_add(struct trc_tile *t, const struct arrival *a, vmask active, vvec3 light,
+                          uint32_t group) {
+    uint32_t groups[TRC_WIDTH];
+    vu_store(groups, vu_set(group));
+    if (group)
+        group_add(t, a, active, light, groups);
+}
+
+/* Rays that left the scene. */
+void trc_emission_misses(struct trc_tile *t, const struct arrival *a, vmask missed) {
+    if (t->desc->film_transparent) {
+        const vmask seen =
+            vm_and(missed, vi_eq((vint)(a->path & vu_set(TRC_PATH_TRANSPARENT_BACKGROUND)),
+                                 vi_set(TRC_PATH_TRANSPARENT_BACKGROUND)));
+        float through[TRC_WIDTH];
+        vf_store(through, v3_average(a->found_weight));
+        for (uint32_t bits = vm_bits(seen); bits; bits &= bits - 1) {
+            const int i = __builtin_ctz(bits);
+            t->samples.transparency[a->slots[i]] += through[i];
+        }
+        missed = vm_andnot(missed, seen);
+    }
+    if (!(t->snapshot->features & TRC_FEATURE_ENVIRONMENT) || !vm_any(missed))
+        return;
+    const vvec3 c = trc_world_radiance(t->snapshot, a->o, a->n_from, a->d, a->pdf,
+                                       light_count_before(t, a->depths), a->path, missed);
+    const vvec3 added = emission_add(t, a, missed, c, TRC_PASS_ENVIRONMENT);
+    if (t->desc->light_group_count)
+        one_group_add(t, a, missed, added, t->snapshot->world.light_group);
+    const uint32_t material = t->snapshot->world.material;
+    if (material != UINT32_MAX && t->snapshot->materials[material]->aov_count)
+        trc_world_aovs(t, a->d, a->path, a->slots, missed);
+}
+
+/* Lamps of a light group, or of all, that the rays pass on their way to end. */
+static vvec3 pass_lamps(struct trc_tile *t, const struct arrival *a, vfloat end, uint32_t group) {
+    vvec3 c = v3_zero();
+    /* It is surfaces alone that rays look back for. */
+    const vfloat tmin = vf_max(a->tmin, vf_set(0.0f));
+    const vfloat count = light_count_before(t, a->depths);
+    if (trc_clamps(t->desc)) {
+        trc_light_hit_clamped(t->snapshot, a->o, a->n_from, a->d, tmin, end, a->pdf, count, a->path,
+                              group, a->found_weight, found_limit(t, a), a->active, &c);
+    } else {
+        trc_light_hit(t->snapshot, a->o, a->n_from, a->d, tmin, end, a->pdf, count, a->path, group,
+                      a->active, &c);
+    }
+    const vmask seen = vm_and(a->active, vf_gt(v3_max(c), vf_set(0.0f)));
+    if (!vm_any(seen))
+        return v3_zero();
+    c = v3_where(seen, v3_mul(a->found_weight, c));
+    found_add(t, a, seen, c, TRC_PASS_EMISSION);
+    return c;
+}
+
+/* Lights that rays pass on their way, in the order of t->work. */
+void trc_emission_rays(struct trc_tile *t) {
+    const bool lights = t->snapshot->features & TRC_FEATURE_LIGHTS;
+    const uint32_t *seen = t->snapshot->lights->group_seen;
+    for (uint32_t i = 0; i < t->work.count; i += TRC_WIDTH) {
+        const vint index = vi_set((int32_t)i) + vi_lane();
+        const vmask active = vm_first((int32_t)(t->work.count - i));
+        const vmask missed =
+            vm_and(active, vi_eq(vi_load((int32_t *)t->hits.instance + i), vi_set(-1)));
+        if (!lights && !vm_any(missed))
+            continue;
+        struct arrival a;
+        trc_arrival_load(t, index, active, &a);
+        if (lights) {
+            const vfloat end = vf_select(missed, vf_set(TRC_FAR), a.t);
+            if (!t->desc->light_group_count)
+                pass_lamps(t, &a, end, TRC_ALL_GROUPS);
+            for (uint32_t g = 0; t->desc->light_group_count && g <= TRC_MAX_LIGHT_GROUPS; g++)
+                if (seen[g] < seen[g + 1])
+                    one_group_add(t, &a, active, pass_lamps(t, &a, end, g), g);
+        }
+        if (vm_any(missed))
+            trc_emission_misses(t, &a, missed);
+    }
+}
+
+/* Emission of surfaces to the passes of their instances' light groups. */
+static void surface_group_add(struct trc_tile *t, const struct arrival *a,
+                              const struct trc_surface *s, vmask active, vvec3 light) {
+    uint32_t groups[TRC_WIDTH];
+    for (uint32_t bits = vm_bits(active); bits; bits &= bits - 1) {
+        const int i = __builtin_ctz(bits);
+        groups[i] = t->snapshot->instances[vi_get(s->instance, i)].light_group;
+    }
+    group_add(t, a, active, light, groups);
+}
+
+void trc_emission_surface(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
+                          const struct trc_lobes *lobes, vmask active) {
+    const vmask lit = vm_and(active, vf_gt(v3_max(lobes->emission), vf_set(0.0f)));
+    if (!vm_any(lit))
+        return;
+    const vfloat w =
+        trc_light_triangle_weight(s, a->o, a->n_from, a->pdf, light_count_before(t, a->depths));
+    const vvec3 added = emission_add(t, a, lit, v3_scale(lobes->emission, w), TRC_PASS_EMISSION);
+    if (t->desc->light_group_count)
+        surface_group_add(t, a, s, lit, added);
+}
+
+void trc_emission_holdout(struct trc_tile *t, const struct arrival *a,
+                          const struct trc_lobes *lobes, vmask active) {
+    float part[TRC_WIDTH];
+    const vmask background = vi_eq((vint)(a->path & vu_set(TRC_PATH_TRANSPARENT_BACKGROUND)),
+                                   vi_set(TRC_PATH_TRANSPARENT_BACKGROUND));
+    vf_store(part, v3_average(a->found_weight) * lobes->holdout);
+    for (uint32_t bits = vm_bits(vm_and(active, background)); bits; bits &= bits - 1) {
+        const int i = __builtin_ctz(bits);
+        t->samples.transparency[a->slots[i]] += part[i];
+    }
+}
