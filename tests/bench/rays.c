@@ -151,8 +151,8 @@ static void camera_ray(const struct maker *m, const struct sample *s, struct ray
     r->key = 0;
 }
 
-/* The cell of time or lens that AUTO sorts camera samples by: kernels/tile/tile.c, samples_order;
- * lenses are wide here. */
+/* The cell of time or lens that AUTO sorts camera samples by: kernels/tile/samples.c,
+ * samples_order; lenses are wide here. */
 static uint32_t sample_cell(const struct maker *m, const struct sample *s) {
     if (m->moving)
         return (uint32_t)(sample_number(m, s, TRC_DIM_TIME) * SHARED_CELLS);
@@ -394,8 +394,8 @@ static void square_append(struct maker *m, const struct rectangle *tile, uint32_
     }
 }
 
-/* A range of a tile's samples, at most SAMPLES_PER_BATCH, in squares as kernels/tile/tile.c walks
- * it. */
+/* A range of a tile's samples, at most SAMPLES_PER_BATCH, in squares as
+ * kernels/tile/samples.c walks it. */
 static void samples_make(struct maker *m, const struct rectangle *tile, uint32_t begin,
                          uint32_t end) {
     const bool cells =

@@ -1,8 +1,8 @@
 /* The rays to measure: of one kind, over tiles of a frame, in the order in which packets take them.
  *
- * Samples come from the renderer's sampler, tiles and batches are cut as kernels/tile/tile.c does
- * it. Secondary rays start at what the pinhole camera sees, off the surface by a small part of the
- * scene's extent, so that both sides of a comparison find the same things. */
+ * Samples come from the renderer's sampler, tiles and batches are cut as kernels/tile/samples.c
+ * does it. Secondary rays start at what the pinhole camera sees, off the surface by a small part of
+ * the scene's extent, so that both sides of a comparison find the same things. */
 #ifndef TRACER_BENCH_RAYS_H
 #define TRACER_BENCH_RAYS_H
 

@@ -58,6 +58,11 @@ enum trc_sample_row {
 };
 #define TRC_CATCHER_ROWS 4
 
+/* Entries of columns: of samples, and of the rays of a step. */
+TRC_INLINE uint32_t trc_column_entries(bool catchers) {
+    return catchers ? TRC_CATCHER_ROWS * TRC_CATCHER_BATCH : TRC_BATCH;
+}
+
 /* Samples of the batch, by slot: row * TRC_CATCHER_BATCH + number. */
 struct trc_sample_store {
     uint32_t count;
@@ -134,19 +139,33 @@ TRC_INLINE vuint trc_light_cell(vfloat u, vfloat v, vfloat density) {
 /* Number of bins of the counting sorts. */
 #define TRC_BINS 4096
 
-/* order[0..count) = indices sorted stably by keys[i] < TRC_BINS. */
+/* order[0..count) = indices sorted stably by keys[i] < TRC_BINS. (kernels/tile/sort.c) */
 void trc_tile_sort(struct trc_tile *t, const uint32_t *keys, uint32_t count, uint32_t *order);
 
 /* Material of a hit, into the snapshot's. */
 uint32_t trc_hit_material(const struct trc_snapshot *snapshot, uint32_t instance,
                           uint32_t triangle);
 
-/* From here on time counts as tracing, as shading. */
+/* Finds what the rays of t->work hit, into t->hits. (kernels/tile/assembly.c) */
+void trc_assembly_trace(struct trc_tile *t);
+
+/* From here on time counts as tracing, as shading, as neither. */
 void trc_clock_trace(struct trc_tile *t);
 void trc_clock_shade(struct trc_tile *t);
+void trc_clock_other(struct trc_tile *t);
 
 size_t trc_tile_memory_bytes(const trc_render_desc *desc, const struct trc_snapshot *snapshot);
 void trc_tile_render(struct trc_tile_job *job);
+
+/* Renders all samples of the job's pixels. (kernels/tile/samples.c) */
+void trc_samples_render(struct trc_tile *t);
+
+/* Adds the batch's samples to the film in the order of their slots. Those that are not finite are
+ * left out and counted. (kernels/tile/film.c) */
+void trc_film_add(struct trc_tile *t);
+
+/* The tables of mattes as the film has them. */
+void trc_film_load_mattes(struct trc_tile *t);
 
 /* Camera rays of the samples' slots, into the empty stack; also their times.
  * (kernels/tile/camera.c) */

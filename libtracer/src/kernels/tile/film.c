@@ -1,0 +1,144 @@
+/* The film's part of a tile: samples that are done, and mattes. */
+#include "kernels/tile/tile.h"
+
+#include <math.h>
+
+#include "model/sequence.h"
+
+TRC_INLINE bool is_finite_sample(const struct trc_tile *t, uint32_t slot) {
+    return isfinite(t->samples.radiance[0][slot] + t->samples.radiance[1][slot] +
+                    t->samples.radiance[2][slot]);
+}
+
+/* Adds what shadow catchers of a sample got to its pixel, if it is finite. */
+static void film_add_caught(struct trc_tile *t, uint32_t sample, size_t pixel) {
+    const uint32_t blocked = sample + TRC_ROW_BLOCKED * TRC_CATCHER_BATCH;
+    const uint32_t unblocked = sample + TRC_ROW_UNBLOCKED * TRC_CATCHER_BATCH;
+    const uint32_t background = sample + TRC_ROW_BACKGROUND * TRC_CATCHER_BATCH;
+    if (!is_finite_sample(t, blocked) || !is_finite_sample(t, unblocked) ||
+        !is_finite_sample(t, background)) {
+        t->job->counts.dropped_samples++;
+        return;
+    }
+    struct trc_caught *sum = &t->job->film->caught[pixel];
+    double *environment = t->job->film->sums[TRC_PASS_ENVIRONMENT];
+    for (int c = 0; c < 3; c++) {
+        const double behind = (double)t->samples.radiance[c][background];
+        trc_sum_add(&sum->blocked[c], (double)t->samples.radiance[c][blocked]);
+        trc_sum_add(&sum->unblocked[c], (double)t->samples.radiance[c][unblocked]);
+        trc_sum_add(&sum->background[c], behind);
+        if (environment)
+            trc_sum_add(&environment[3 * pixel + (size_t)c], behind);
+    }
+    trc_sum_add(&sum->coverage, -(double)t->samples.transparency[blocked]);
+}
+
+/* Adds a sample's passes to its pixel. */
+static void film_add_passes(struct trc_tile *t, uint32_t slot, size_t pixel, bool first) {
+    for (uint32_t i = 0; i < t->samples.pass_count; i++) {
+        const uint32_t pass = t->samples.passes[i];
+        const uint32_t channels = trc_film_channels(pass);
+        double *sum = t->job->film->sums[pass] + channels * pixel;
+        for (uint32_t k = 0; k < channels; k++) {
+            const double value = (double)t->samples.pass[pass][k][slot];
+            if (!isfinite(value))
+                continue;
+            if (first)
+                trc_sum_store(&sum[k], value);
+            else if (!trc_film_is_first_sample(pass))
+                trc_sum_add(&sum[k], value);
+        }
+    }
+    if (t->catchers)
+        film_add_caught(t, slot, pixel);
+}
+
+/* Adds the samples [begin, end), of one pixel, to it, in their order. Those that are not finite are
+ * left out and counted. */
+static void film_add_run(struct trc_tile *t, uint32_t begin, uint32_t end, size_t pixel) {
+    struct trc_film *film = t->job->film;
+    double *combined = film->sums[TRC_PASS_COMBINED] + 4 * pixel;
+    double sum[4] = {0.0, 0.0, 0.0, 0.0};
+    /* A pixel's first sample reads no sums: fresh memory that is read before it is written costs
+     * each page a second fault, a third of a picture of one sample. */
+    uint32_t count = film->sample_counts[pixel];
+    if (count)
+        memcpy(sum, combined, sizeof sum);
+    for (uint32_t slot = begin; slot < end; slot++) {
+        if (!is_finite_sample(t, slot)) {
+            t->job->counts.dropped_samples++;
+            continue;
+        }
+        for (int c = 0; c < 3; c++)
+            sum[c] += (double)t->samples.radiance[c][slot];
+        sum[3] += 1.0 - (double)t->samples.transparency[slot];
+        if (t->extra_passes)
+            film_add_passes(t, slot, pixel, count == 0);
+        count++;
+    }
+    for (int c = 0; c < 4; c++)
+        trc_sum_store(&combined[c], sum[c]);
+    __atomic_store_n(&film->sample_counts[pixel], count, __ATOMIC_RELAXED);
+    const size_t mattes = trc_tile_pixel(t, begin) * film->matte_count;
+    for (int k = 0; film->matte_count && k < TRC_CRYPTOMATTE_KINDS; k++)
+        if (t->mattes[k])
+            trc_mattes_store(film->mattes[k] + pixel * film->matte_count, t->mattes[k] + mattes,
+                             film->matte_count);
+}
+
+/* Adds the batch's samples to the film in the order of their slots. */
+static void film_add_runs(struct trc_tile *t) {
+    const uint32_t *pixel = t->samples.pixel, count = t->samples.count;
+    for (uint32_t begin = 0; begin < count;) {
+        uint32_t end = begin + 1;
+        while (end < count && pixel[end] == pixel[begin])
+            end++;
+        film_add_run(t, begin, end, trc_film_pixel(t, begin));
+        begin = end;
+    }
+}
+
+/* The same with adaptive sampling, whose sums may go on where the film's count has ended. */
+static void film_add_adaptive(struct trc_tile *t) {
+    for (uint32_t slot = 0; slot < t->samples.count; slot++) {
+        if (!is_finite_sample(t, slot)) {
+            t->job->counts.dropped_samples++;
+            continue;
+        }
+        const size_t pixel = trc_film_pixel(t, slot);
+        struct trc_adaptive_pixel *p = &t->job->adaptive->pixels[pixel];
+        for (int c = 0; c < 3; c++)
+            p->sum[c] += (double)t->samples.radiance[c][slot];
+        /* A catcher's light is as noisy as the shadow on it. */
+        for (int c = 0; t->catchers && c < 3; c++)
+            p->sum[c] += (double)t->samples.radiance[c][slot + TRC_ROW_BLOCKED * TRC_CATCHER_BATCH];
+        if (p->reasons & TRC_PIXEL_COUNTS)
+            film_add_run(t, slot, slot + 1, pixel);
+    }
+}
+
+void trc_film_add(struct trc_tile *t) {
+    atomic_uint *sequence = trc_film_sequence(t->job->film, t->job->x, t->job->y);
+    trc_sequence_write_begin(sequence);
+    if (t->job->adaptive)
+        film_add_adaptive(t);
+    else
+        film_add_runs(t);
+    trc_sequence_write_end(sequence);
+}
+
+/* The tables of mattes as the film has them. */
+void trc_film_load_mattes(struct trc_tile *t) {
+    const struct trc_tile_job *job = t->job;
+    const struct trc_film *film = job->film;
+    const size_t places = film->matte_count, row = job->width * places;
+    for (int k = 0; k < TRC_CRYPTOMATTE_KINDS; k++)
+        for (uint32_t y = 0; t->mattes[k] && y < job->height; y++) {
+            struct trc_matte *to = t->mattes[k] + y * TRC_TILE_SIZE * places;
+            const size_t pixel = (size_t)(job->y + y) * film->width + job->x;
+            if (job->sample_begin == 0) /* fresh memory is not read: film_add_run */
+                memset(to, 0, row * sizeof *to);
+            else
+                memcpy(to, film->mattes[k] + pixel * places, row * sizeof *to);
+        }
+}
