@@ -14,11 +14,8 @@
 #include "model/snapshot.h"
 
 enum trc_light_kind {
-    TRC_KIND_POINT,
-    TRC_KIND_SPOT,
-    TRC_KIND_SUN,
-    TRC_KIND_RECTANGLE,
-    TRC_KIND_ELLIPSE,
+#define TRC_LAMP_KIND(NAME, name, is_it) TRC_KIND_##NAME,
+#include "model/light_kinds.def"
     TRC_KIND_WORLD,
     TRC_KIND_TRIANGLE
 };
@@ -27,14 +24,15 @@ enum {
     TRC_LAMP_DELTA = 1, /* no extent: continuation rays never meet it */
     TRC_LAMP_MIS = 2,   /* continuation rays see it */
     TRC_LAMP_CASTS_SHADOW = 4,
-    TRC_LAMP_SPHERE = 8,    /* TRC_LIGHT_SPHERE */
-    TRC_LAMP_EVEN_CONE = 16 /* TRC_LIGHT_EVEN_CONE */
+    TRC_LAMP_SPHERE = 8,     /* TRC_LIGHT_SPHERE */
+    TRC_LAMP_EVEN_CONE = 16, /* TRC_LIGHT_EVEN_CONE */
+    TRC_LAMP_DISTANT = 32    /* it has no place: position is the direction towards it */
 };
 
 /* A lamp: 32 words, read by gathers of TRC_LAMP_WORDS stride. Positions in world space. */
 #define TRC_LAMP_WORDS 32
 struct trc_lamp {
-    float position[3];          /* centre; of a sun the unit direction towards it */
+    float position[3];          /* centre; of a distant one the unit direction towards it */
     float axis_u[3], axis_v[3]; /* area: unit */
     float normal[3];            /* the way spot and area shine, unit */
     float radiance[3]; /* towards a point that sees it head-on; delta: intensity, sun irradiance */

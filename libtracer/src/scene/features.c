@@ -8,6 +8,7 @@
 #include "scene/commit.h"
 #include "scene/mesh.h"
 #include "scene/scene.h"
+#include "shading/lamps.h"
 
 static uint32_t material_features(uint32_t has) {
     static const uint32_t pairs[][2] = {
@@ -64,10 +65,9 @@ static uint32_t light_features(const struct trc_scene_state *scene) {
     for (uint32_t i = trc_store_first(store); i != TRC_STORE_END; i = trc_store_next(store, i)) {
         const trc_light_desc *light = store->slots[i].object;
         features |= TRC_FEATURE_LIGHTS;
-        const float extent = light->type == TRC_LIGHT_SUN    ? light->angle
-                             : light->type == TRC_LIGHT_AREA ? 1.0f
-                                                             : light->radius;
-        if (extent > 0.0f)
+        struct trc_lamp lamp;
+        trc_lamp_make(light, &lamp);
+        if (!(lamp.flags & TRC_LAMP_DELTA))
             features |= TRC_FEATURE_AREA_LIGHTS;
     }
     return features;

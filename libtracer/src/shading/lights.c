@@ -1,10 +1,4 @@
-/* Light tables: strengths to radiance, bounds for choosing, emissive triangles.
- *
- * Units, as measured on and read from Cycles 3.4: a point or spot of P watts has the intensity P /
- * (4 pi) and, with a radius r, is a disk that faces whoever looks, of radiance P / (4 pi^2 r^2); an
- * area light has the radiance P / (4 area); a sun of strength S and half angle h is a disk at
- * distance 1 of radius tan h and radiance S / (pi tan^2 h cos^3 theta). Of Cycles 4.3: a sun's cone
- * has the radiance S / (pi sin^2 h) all over. */
+/* Light tables: lamps, emissive triangles and the world, and what chooses among them. */
 #include "shading/lights.h"
 
 #include <math.h>
@@ -12,170 +6,18 @@
 
 #include "core/core.h"
 #include "model/material.h"
+#include "shading/lamps.h"
+#include "shading/vectors.h"
 
 #define PI 3.14159265358979f
 /* Triangles between two looks at whether the commit is cancelled. */
 #define POLL_INTERVAL 16384u
 #define RECEIVERS (TRC_VISIBLE_DIFFUSE | TRC_VISIBLE_GLOSSY | TRC_VISIBLE_TRANSMISSION)
 
-_Static_assert(sizeof(struct trc_lamp) == 4 * TRC_LAMP_WORDS, "read by gathers");
 _Static_assert(sizeof(struct trc_light_triangle) == 4 * TRC_TRIANGLE_WORDS, "read by gathers");
 _Static_assert(sizeof(struct trc_light_bound) == 4 * TRC_BOUND_WORDS, "read by gathers");
 
-/* ---- vectors ---- */
-
-static float dot(const float a[3], const float b[3]) {
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-static void cross(const float a[3], const float b[3], float out[3]) {
-    out[0] = a[1] * b[2] - a[2] * b[1];
-    out[1] = a[2] * b[0] - a[0] * b[2];
-    out[2] = a[0] * b[1] - a[1] * b[0];
-}
-static float length(const float a[3]) { return sqrtf(dot(a, a)); }
-/* Length before; a zero vector becomes fallback. */
-static float normalize(float a[3], float x, float y, float z) {
-    const float size = length(a);
-    if (size > 0.0f && size < INFINITY) {
-        for (int i = 0; i < 3; i++)
-            a[i] /= size;
-        return size;
-    }
-    a[0] = x;
-    a[1] = y;
-    a[2] = z;
-    return 0.0f;
-}
-static float brightness(const float c[3]) { return fabsf(trc_luminance(c)); }
-
-/* ---- lamps ---- */
-
-static void set_radiance(struct trc_lamp *lamp, const trc_light_desc *desc, float factor) {
-    for (int i = 0; i < 3; i++)
-        lamp->radiance[i] = desc->color[i] * desc->strength * factor;
-}
-
-static void make_point(struct trc_lamp *lamp, const trc_light_desc *desc) {
-    const float r = fmaxf(desc->radius, 0.0f);
-    lamp->half_u = lamp->half_v = r;
-    lamp->inv_area = r > 0.0f ? 1.0f / (PI * r * r) : 1.0f;
-    set_radiance(lamp, desc, 0.25f / PI * lamp->inv_area);
-    if (r == 0.0f)
-        lamp->flags |= TRC_LAMP_DELTA;
-    if (desc->flags & TRC_LIGHT_SPHERE)
-        lamp->flags |= TRC_LAMP_SPHERE;
-    if (desc->type != TRC_LIGHT_SPOT)
-        return;
-    lamp->kind = TRC_KIND_SPOT;
-    if (desc->flags & TRC_LIGHT_EVEN_CONE)
-        lamp->flags |= TRC_LAMP_EVEN_CONE;
-    lamp->cos_cone = cosf(0.5f * fminf(desc->spot_angle, PI));
-    const float width = (1.0f - lamp->cos_cone) * fminf(fmaxf(desc->spot_blend, 0.0f), 1.0f);
-    lamp->inv_smooth = width > 0.0f ? 1.0f / width : 0.0f;
-}
-
-static void make_sun(struct trc_lamp *lamp, const trc_light_desc *desc) {
-    /* At pi the disk would be infinite; Cycles has no limit and gets nothing useful there. */
-    const float half = 0.5f * fminf(fmaxf(desc->angle, 0.0f), 3.1f);
-    const float r = tanf(half);
-    lamp->kind = TRC_KIND_SUN;
-    lamp->half_u = lamp->half_v = r;
-    lamp->cos_cone = cosf(half);
-    lamp->inv_area = r > 0.0f ? 1.0f / (PI * r * r) : 1.0f;
-    set_radiance(lamp, desc, lamp->inv_area);
-    if (r > 0.0f && (desc->flags & TRC_LIGHT_EVEN_CONE)) {
-        lamp->flags |= TRC_LAMP_EVEN_CONE;
-        set_radiance(lamp, desc, 1.0f / (PI * sinf(half) * sinf(half)));
-    }
-    for (int i = 0; i < 3; i++)
-        lamp->position[i] = -lamp->normal[i];
-    if (r == 0.0f)
-        lamp->flags |= TRC_LAMP_DELTA;
-}
-
-/* False for one without area. */
-static bool make_area(struct trc_lamp *lamp, const trc_light_desc *desc) {
-    const float *m = desc->transform;
-    float u[3] = {m[0], m[4], m[8]}, v[3] = {m[1], m[5], m[9]};
-    const float size_u = normalize(u, 1, 0, 0) * desc->size_x;
-    const float size_v = normalize(v, 0, 1, 0) * desc->size_y;
-    const bool is_round = desc->area_shape == TRC_AREA_ELLIPSE;
-    const float area = size_u * size_v * (is_round ? 0.25f * PI : 1.0f);
-    if (!(area > 0.0f) || !(area < INFINITY))
-        return false;
-    memcpy(lamp->axis_u, u, sizeof u);
-    memcpy(lamp->axis_v, v, sizeof v);
-    lamp->kind = is_round ? TRC_KIND_ELLIPSE : TRC_KIND_RECTANGLE;
-    lamp->half_u = 0.5f * size_u;
-    lamp->half_v = 0.5f * size_v;
-    lamp->inv_area = 1.0f / area;
-    lamp->spread_scale = 1.0f;
-    const float half = 0.5f * fmaxf(desc->spread, 0.0f);
-    if (half < 0.5f * PI - 1e-4f) {
-        /* A grid of slats: what passes at theta is 1 - tan(theta) / tan(half), scaled to keep the
-         * power. */
-        const float t = tanf(fmaxf(half, 1e-3f));
-        lamp->tan_spread = 1.0f / t;
-        lamp->spread_scale = 1.0f / (1.0f - fmaxf(half, 1e-3f) / t);
-    }
-    set_radiance(lamp, desc, 0.25f * lamp->inv_area);
-    return true;
-}
-
-/* False for a lamp that gives no light to anything. */
-static bool make_lamp(struct trc_lamp *lamp, const trc_light_desc *desc) {
-    memset(lamp, 0, sizeof *lamp);
-    const float *m = desc->transform;
-    float normal[3] = {-m[2], -m[6], -m[10]};
-    normalize(normal, 0, 0, -1);
-    memcpy(lamp->normal, normal, sizeof normal);
-    for (int i = 0; i < 3; i++)
-        lamp->position[i] = m[4 * i + 3];
-    lamp->kind = TRC_KIND_POINT;
-    lamp->visibility = desc->visibility | TRC_VISIBLE_SHADOW;
-    if (!(desc->flags & TRC_LIGHT_SYNTHETIC))
-        lamp->visibility |= TRC_VISIBLE_UNBLOCKED;
-    lamp->group = desc->light_group;
-    lamp->flags =
-        (desc->use_mis ? TRC_LAMP_MIS : 0) | (desc->cast_shadow ? TRC_LAMP_CASTS_SHADOW : 0);
-    if (desc->type == TRC_LIGHT_SUN)
-        make_sun(lamp, desc);
-    else if (desc->type != TRC_LIGHT_AREA)
-        make_point(lamp, desc);
-    else if (!make_area(lamp, desc))
-        return false;
-    const float light = brightness(lamp->radiance);
-    return light > 0.0f && light < INFINITY && (desc->visibility & TRC_VISIBLE_ALL) != 0;
-}
-
-/* ---- bounds ---- */
-
-static void bound_lamp(const struct trc_lamp *lamp, uint32_t number, struct trc_light_bound *b) {
-    memset(b, 0, sizeof *b);
-    memcpy(b->center, lamp->position, sizeof b->center);
-    memcpy(b->axis, lamp->normal, sizeof b->axis);
-    b->child = -1;
-    b->light = (int32_t)number;
-    const bool is_area = lamp->kind == TRC_KIND_RECTANGLE || lamp->kind == TRC_KIND_ELLIPSE;
-    const float light = brightness(lamp->radiance);
-    if (is_area) {
-        const float a = lamp->half_u, c = lamp->half_v;
-        b->radius = lamp->kind == TRC_KIND_ELLIPSE ? fmaxf(a, c) : sqrtf(a * a + c * c);
-        b->intensity = light / lamp->inv_area * lamp->spread_scale;
-        b->cos_o = 1.0f;
-        /* cot(h) = tan_spread. */
-        b->cos_e = lamp->tan_spread / sqrtf(1.0f + lamp->tan_spread * lamp->tan_spread);
-        return;
-    }
-    b->radius = lamp->half_u;
-    b->intensity = light / lamp->inv_area;
-    if (lamp->kind == TRC_KIND_SPOT) {
-        b->cos_o = 1.0f;
-        b->cos_e = fmaxf(lamp->cos_cone, 0.0f);
-    } else {
-        b->cos_o = -1.0f; /* all directions */
-    }
-}
+/* ---- emissive triangles ---- */
 
 static void bound_triangle(const struct trc_light_triangle *t, float light, uint32_t number,
                            const float lower[3], const float upper[3], struct trc_light_bound *b) {
@@ -187,17 +29,15 @@ static void bound_triangle(const struct trc_light_triangle *t, float light, uint
         half[i] = 0.5f * (upper[i] - lower[i]);
         b->center[i] = 0.5f * (upper[i] + lower[i]);
     }
-    cross(e1, e2, b->axis);
-    const float area = 0.5f * normalize(b->axis, 0, 0, 1);
-    b->radius = length(half);
+    trc_cross(e1, e2, b->axis);
+    const float area = 0.5f * trc_normalize(b->axis, 0, 0, 1);
+    b->radius = trc_length(half);
     b->intensity = light * area;
     b->two_sided = 1;
     b->cos_o = t->flags & TRC_TRIANGLE_MOVES ? -1.0f : 1.0f;
     b->child = -1;
     b->light = (int32_t)number;
 }
-
-/* ---- emissive triangles ---- */
 
 static void transform_point(const struct trc_affine *a, const float p[3], float out[3]) {
     for (int i = 0; i < 3; i++)
@@ -224,7 +64,7 @@ static bool is_light(const struct trc_material *m, uint32_t scatters) {
         return false;
     if (!(scatters & TRC_MATERIAL_IS_MATT) && !(m->flags & TRC_MATERIAL_SAMPLE_EMISSION))
         return false;
-    return (m->has & TRC_MATERIAL_EMISSION_VARIES) || brightness(m->emission) > 0.0f;
+    return (m->has & TRC_MATERIAL_EMISSION_VARIES) || trc_brightness(m->emission) > 0.0f;
 }
 
 static bool has_lights(const struct trc_snapshot *s, const struct trc_instance *instance,
@@ -273,8 +113,8 @@ static bool world_triangle(const struct trc_instance *instance, const struct trc
         if (!(upper[i] - lower[i] < 1e18f))
             return false;
     }
-    cross(e1, e2, n);
-    return length(n) > 0.0f || moves;
+    trc_cross(e1, e2, n);
+    return trc_length(n) > 0.0f || moves;
 }
 
 static void add_triangles(struct trc_light_table *table, const struct trc_snapshot *s,
@@ -298,7 +138,7 @@ static void add_triangles(struct trc_light_table *table, const struct trc_snapsh
         t->instance = (int32_t)instance_number;
         t->triangle = (int32_t)i;
         t->material = number;
-        float light = brightness(m->emission);
+        float light = trc_brightness(m->emission);
         if (m->has & TRC_MATERIAL_EMISSION_VARIES) {
             t->flags |= TRC_TRIANGLE_VARIES;
             light = fmaxf(light, 1e-3f);
@@ -344,7 +184,7 @@ static bool world_is_light(const struct trc_snapshot *s, uint32_t scatters) {
         return false;
     if (w->material == UINT32_MAX || !(w->visibility & RECEIVERS))
         return false;
-    return !w->is_constant || brightness(w->radiance) > 0.0f;
+    return !w->is_constant || trc_brightness(w->radiance) > 0.0f;
 }
 
 /* Width of the map when the caller leaves it open. */
@@ -375,7 +215,7 @@ static trc_status add_world(struct trc_light_table *table, const struct trc_snap
         memcpy(average, table->map->average, sizeof average);
     }
     table->distant[table->distant_count] = table->world_light;
-    table->distant_irradiance[table->distant_count++] = PI * fmaxf(brightness(average), 1e-6f);
+    table->distant_irradiance[table->distant_count++] = PI * fmaxf(trc_brightness(average), 1e-6f);
     if (table->map && world && !world->use_sampling) {
         trc_world_map_release(table->map);
         table->map = NULL;
@@ -406,7 +246,7 @@ static void add_lamps(struct trc_light_table *table, const struct trc_light_opti
                       struct trc_light_bound *bounds, uint32_t *bound_count) {
     for (uint32_t i = 0; i < options->light_count; i++) {
         struct trc_lamp *lamp = &table->lamps[table->lamp_count];
-        if (!make_lamp(lamp, &options->lights[i]))
+        if (!trc_lamp_make(&options->lights[i], lamp))
             continue;
         const uint32_t number = table->lamp_count++;
         table->kinds |= 1u << lamp->kind;
@@ -414,12 +254,12 @@ static void add_lamps(struct trc_light_table *table, const struct trc_light_opti
             continue;
         const uint32_t all = RECEIVERS | TRC_VISIBLE_UNBLOCKED;
         table->hides |= (lamp->visibility & all) != all;
-        if (lamp->kind == TRC_KIND_SUN) {
+        if (lamp->flags & TRC_LAMP_DISTANT) {
             table->distant[table->distant_count] = number;
             table->distant_irradiance[table->distant_count++] =
-                brightness(lamp->radiance) / lamp->inv_area;
+                trc_brightness(lamp->radiance) / lamp->inv_area;
         } else {
-            bound_lamp(lamp, number, &bounds[(*bound_count)++]);
+            trc_lamp_bound(lamp, number, &bounds[(*bound_count)++]);
         }
     }
 }

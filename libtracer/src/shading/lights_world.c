@@ -93,7 +93,7 @@ struct measuring {
 
 #define SAMPLES_PER_CELL (SUBSAMPLES * SUBSAMPLES)
 
-/* Same mapping as kernels/light_world.c: u by azimuth from +X, v by angle from +Z. */
+/* Same mapping as kernels/light/world_place.h: u by azimuth from +X, v by angle from +Z. */
 static void set_directions(const struct measuring *m, uint32_t row, float *directions) {
     const uint32_t columns = m->map->width * SUBSAMPLES;
     for (uint32_t k = 0; k < SUBSAMPLES; k++) {

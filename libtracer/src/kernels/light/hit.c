@@ -1,9 +1,11 @@
 /* Lights that continuation and camera rays find by themselves, and the weights of that. */
 #include "kernels/light/clamp.h"
+#include "kernels/light/lamps.h"
 #include "kernels/light/light.h"
 #include "kernels/light/select.h"
-#include "kernels/light/shape.h"
+#include "kernels/light/triangle.h"
 #include "kernels/light/world.h"
+#include "kernels/light/world_place.h"
 
 /* Power heuristic (E. Veach, "Robust Monte Carlo Methods for Light Transport Simulation", 1997) for
  * the ray, one of them, against count light samples of density pl. Negative pb: no light sample
@@ -31,12 +33,11 @@ TRC_INLINE vmask hidden_from(uint32_t visibility, vuint path) {
 TRC_INLINE vmask is_camera_ray(vuint path) {
     return vi_eq((vint)(path & vu_set(TRC_VISIBLE_CAMERA)), vi_set(TRC_VISIBLE_CAMERA));
 }
-/* Of the lanes in active, those that may see the lamp. Camera rays see lamps that are visible to
- * them; suns in addition need multiple importance. */
+/* Of the lanes in active, those that may see the lamp. */
 static vmask lamp_viewers(const struct trc_lamp *lamp, vuint path, vmask active) {
     const vmask camera = is_camera_ray(path);
     const bool mis = lamp->flags & TRC_LAMP_MIS;
-    if (!mis && (lamp->kind == TRC_KIND_SUN || !(lamp->visibility & TRC_VISIBLE_CAMERA)))
+    if (!mis && !(lamp->visibility & TRC_VISIBLE_CAMERA))
         return vm_none();
     vmask viewers = vm_andnot(active, hidden_from(lamp->visibility, path));
     if (!(lamp->visibility & TRC_VISIBLE_CAMERA))
@@ -48,7 +49,7 @@ static vmask lamp_viewers(const struct trc_lamp *lamp, vuint path, vmask active)
 
 /* Lanes whose ray comes within the sphere about the lamp: most lamps are missed by all. */
 TRC_INLINE vmask near_lamp(const struct trc_lamp *lamp, vvec3 p, vvec3 wi) {
-    if (lamp->kind == TRC_KIND_SUN)
+    if (lamp->flags & TRC_LAMP_DISTANT)
         return vf_ge(v3_dot(v3_set(lamp->position), wi), vf_set(lamp->cos_cone));
     const vvec3 to = v3_sub(v3_set(lamp->position), p);
     const vfloat along = v3_dot(to, wi);
@@ -63,35 +64,14 @@ TRC_INLINE vmask near_lamp(const struct trc_lamp *lamp, vvec3 p, vvec3 wi) {
 static vfloat meet_lamp(const struct trc_lamp *lamp, vvec3 p, vvec3 wi, vfloat *pdf,
                         vvec3 *radiance) {
     const struct trc_wide_lamp l = trc_lamp_broadcast(lamp);
-    *radiance = l.radiance;
-    if (lamp->kind == TRC_KIND_POINT || lamp->kind == TRC_KIND_SPOT) {
-        const vfloat t = trc_point_hit(&l, p, wi, pdf);
-        if (lamp->kind == TRC_KIND_SPOT)
-            *radiance = v3_scale(l.radiance, trc_spot_factor(&l, wi));
-        return t;
-    }
-    if (lamp->kind == TRC_KIND_SUN) {
-        const vfloat c = v3_dot(l.position, wi);
-        const vmask hit = vf_ge(c, l.cos_cone);
-        *pdf = trc_sun_density(&l, vf_max(c, vf_set(1e-3f)));
-        if (!(lamp->flags & TRC_LAMP_EVEN_CONE))
-            *radiance = v3_scale(l.radiance, *pdf / l.inv_area);
-        return vf_select(hit, vf_set(TRC_FAR), vf_set(INFINITY));
-    }
-    vfloat u, v;
-    const vfloat t = trc_area_hit(&l, p, wi, &u, &v);
-    const vmask round = vf_le(u * u + v * v, vf_one());
-    const vmask square = vm_and(vf_le(vf_abs(u), vf_one()), vf_le(vf_abs(v), vf_one()));
-    const bool is_ellipse = lamp->kind == TRC_KIND_ELLIPSE;
-    const vmask hit = is_ellipse ? round : square;
-    if (!vm_any(vm_and(hit, vf_lt(t, vf_set(INFINITY)))))
+    switch (lamp->kind) {
+#define TRC_LAMP_KIND(NAME, name, is_it) \
+    case TRC_KIND_##NAME:                \
+        return trc_##name##_hit(&l, p, wi, pdf, radiance);
+#include "model/light_kinds.def"
+    default:
         return vf_set(INFINITY);
-    *radiance = v3_scale(l.radiance, trc_spread_factor(&l, wi));
-    const struct trc_view_rectangle r = trc_rectangle_view(&l, p);
-    const struct trc_spherical_rectangle q = trc_rectangle_angles(&r, is_ellipse);
-    const vvec3 to = v3_scale(wi, t);
-    *pdf = trc_area_density(&l, &r, &q, is_ellipse, v3_dot(to, l.axis_u), v3_dot(to, l.axis_v));
-    return vf_select(hit, t, vf_set(INFINITY));
+    }
 }
 
 /* Under which clamp lamps are seen. */

@@ -1,9 +1,11 @@
 /* Light samples: a light for every point, a place on it, the radiance it sends. */
 #include "kernels/light/light.h"
 
+#include "kernels/light/lamps.h"
 #include "kernels/light/select.h"
-#include "kernels/light/shape.h"
+#include "kernels/light/triangle.h"
 #include "kernels/light/world.h"
+#include "kernels/light/world_place.h"
 #include "kernels/lobe/bsdf.h"
 
 /* Everything of one call. */
@@ -29,45 +31,18 @@ static void set_place(const struct draw *d, const struct trc_place *place, vmask
 
 /* ---- lamps ---- */
 
-TRC_INLINE vmask is_kind(const struct trc_wide_lamp *l, enum trc_light_kind kind) {
-    return vi_eq(l->kind, vi_set((int32_t)kind));
-}
-
+/* kinds: 1 << kind of those among the lanes. */
 static void sample_lamps(const struct draw *d, const struct trc_wide_lamp *l, uint32_t kinds,
                          vmask m) {
-    const vvec3 p = d->s->p;
-    if (kinds & (1u << TRC_KIND_POINT | 1u << TRC_KIND_SPOT)) {
-        const vmask spot = vm_and(m, is_kind(l, TRC_KIND_SPOT));
-        const vmask lanes = vm_or(spot, vm_and(m, is_kind(l, TRC_KIND_POINT)));
-        if (vm_any(lanes)) {
-            struct trc_place place = trc_point_sample(l, p, d->u1, d->u2);
-            if (vm_any(spot))
-                place.radiance = v3_select(
-                    spot, v3_scale(place.radiance, trc_spot_factor(l, place.wi)), place.radiance);
-            set_place(d, &place, lanes);
-        }
+#define TRC_LAMP_KIND(NAME, name, is_it)                                                  \
+    if (kinds & 1u << TRC_KIND_##NAME) {                                                  \
+        const vmask lanes = vm_and(m, vi_eq(l->kind, vi_set(TRC_KIND_##NAME)));           \
+        if (vm_any(lanes)) {                                                              \
+            const struct trc_place place = trc_##name##_sample(l, d->s->p, d->u1, d->u2); \
+            set_place(d, &place, lanes);                                                  \
+        }                                                                                 \
     }
-    if (kinds & 1u << TRC_KIND_SUN) {
-        const vmask lanes = vm_and(m, is_kind(l, TRC_KIND_SUN));
-        if (vm_any(lanes)) {
-            const struct trc_place place = trc_sun_sample(l, d->u1, d->u2);
-            set_place(d, &place, lanes);
-        }
-    }
-    if (kinds & 1u << TRC_KIND_RECTANGLE) {
-        const vmask lanes = vm_and(m, is_kind(l, TRC_KIND_RECTANGLE));
-        if (vm_any(lanes)) {
-            const struct trc_place place = trc_area_sample(l, false, p, d->u1, d->u2);
-            set_place(d, &place, lanes);
-        }
-    }
-    if (kinds & 1u << TRC_KIND_ELLIPSE) {
-        const vmask lanes = vm_and(m, is_kind(l, TRC_KIND_ELLIPSE));
-        if (vm_any(lanes)) {
-            const struct trc_place place = trc_area_sample(l, true, p, d->u1, d->u2);
-            set_place(d, &place, lanes);
-        }
-    }
+#include "model/light_kinds.def"
 }
 
 /* Lanes whose bits are set in a word. */
@@ -153,12 +128,12 @@ static void evaluate_emission(const struct draw *d, vint index, vfloat u, vfloat
 
 static void sample_triangles(const struct draw *d, vmask m) {
     const struct trc_light_table *t = d->table;
-    const float *base = (const float *)t->triangles;
     const vint index = d->light - vi_set((int32_t)t->first_triangle);
     const vint at = index * vi_set(TRC_TRIANGLE_WORDS);
     struct trc_corners c;
-    for (int k = 0; k < 3; k++)
-        c.corner[k] = v3_gather(base + 3 * k, at, m);
+    c.corner[0] = v3_gather(t->triangles->v0, at, m);
+    c.corner[1] = v3_gather(t->triangles->v1, at, m);
+    c.corner[2] = v3_gather(t->triangles->v2, at, m);
     const vint flags = vi_gather((const int32_t *)&t->triangles->flags, at, m);
     const vmask moves = t->moves ? vm_and(m, has_bit(flags, TRC_TRIANGLE_MOVES)) : vm_none();
     if (vm_any(moves)) {
@@ -168,7 +143,7 @@ static void sample_triangles(const struct draw *d, vmask m) {
     }
     vfloat u, v;
     struct trc_place place = trc_triangle_sample(&c, d->s->p, d->u1, d->u2, &u, &v);
-    place.radiance = v3_gather(base + 9, at, m);
+    place.radiance = v3_gather(t->triangles->emission, at, m);
     set_place(d, &place, m);
     const vmask varies = t->varies ? vm_and(m, has_bit(flags, TRC_TRIANGLE_VARIES)) : vm_none();
     if (vm_any(varies))

@@ -34,16 +34,15 @@ TRC_INLINE struct trc_wide_bound trc_bound_broadcast(const struct trc_light_boun
 /* Bounds number index of each lane. */
 TRC_INLINE struct trc_wide_bound trc_bound_gather(const struct trc_light_bound *bounds, vint index,
                                                   vmask m) {
-    const float *base = (const float *)bounds;
     const vint at = index * vi_set(TRC_BOUND_WORDS);
     struct trc_wide_bound b;
-    b.center = v3_gather(base, at, m);
-    b.radius = vf_gather(base + 3, at, m);
-    b.axis = v3_gather(base + 4, at, m);
-    b.cos_o = vf_gather(base + 7, at, m);
-    b.sin_o = vf_gather(base + 8, at, m);
-    b.cos_e = vf_gather(base + 9, at, m);
-    b.intensity = vf_gather(base + 10, at, m);
+    b.center = v3_gather(bounds->center, at, m);
+    b.radius = vf_gather(&bounds->radius, at, m);
+    b.axis = v3_gather(bounds->axis, at, m);
+    b.cos_o = vf_gather(&bounds->cos_o, at, m);
+    b.sin_o = vf_gather(&bounds->sin_o, at, m);
+    b.cos_e = vf_gather(&bounds->cos_e, at, m);
+    b.intensity = vf_gather(&bounds->intensity, at, m);
     b.two_sided = vm_not(vi_eq(vi_gather(&bounds->two_sided, at, m), vi_set(0)));
     return b;
 }

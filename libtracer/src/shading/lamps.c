@@ -1,0 +1,191 @@
+/* Lamps from their descriptors: strengths to radiance, bounds for choosing.
+ *
+ * Units, as measured on and read from Cycles 3.4: a point or spot of P watts has the intensity P /
+ * (4 pi) and, with a radius r, is a disk that faces whoever looks, of radiance P / (4 pi^2 r^2); an
+ * area light has the radiance P / (4 area); a sun of strength S and half angle h is a disk at
+ * distance 1 of radius tan h and radiance S / (pi tan^2 h cos^3 theta). Of Cycles 4.3: a sun's cone
+ * has the radiance S / (pi sin^2 h) all over. */
+#include "shading/lamps.h"
+
+#include <string.h>
+
+#include "shading/vectors.h"
+
+#define PI 3.14159265358979f
+
+_Static_assert(sizeof(struct trc_lamp) == 4 * TRC_LAMP_WORDS, "read by gathers");
+
+static void set_radiance(struct trc_lamp *lamp, const trc_light_desc *desc, float factor) {
+    for (int i = 0; i < 3; i++)
+        lamp->radiance[i] = desc->color[i] * desc->strength * factor;
+}
+
+/* ---- point ---- */
+
+static bool point_make(const trc_light_desc *desc, struct trc_lamp *lamp) {
+    const float r = fmaxf(desc->radius, 0.0f);
+    lamp->half_u = lamp->half_v = r;
+    lamp->inv_area = r > 0.0f ? 1.0f / (PI * r * r) : 1.0f;
+    set_radiance(lamp, desc, 0.25f / PI * lamp->inv_area);
+    if (r == 0.0f)
+        lamp->flags |= TRC_LAMP_DELTA;
+    if (desc->flags & TRC_LIGHT_SPHERE)
+        lamp->flags |= TRC_LAMP_SPHERE;
+    return true;
+}
+
+static void point_bound(const struct trc_lamp *lamp, struct trc_light_bound *b) {
+    b->radius = lamp->half_u;
+    b->intensity = trc_brightness(lamp->radiance) / lamp->inv_area;
+    b->cos_o = -1.0f; /* all directions */
+}
+
+/* ---- spot ---- */
+
+static bool spot_make(const trc_light_desc *desc, struct trc_lamp *lamp) {
+    point_make(desc, lamp);
+    if (desc->flags & TRC_LIGHT_EVEN_CONE)
+        lamp->flags |= TRC_LAMP_EVEN_CONE;
+    lamp->cos_cone = cosf(0.5f * fminf(desc->spot_angle, PI));
+    const float width = (1.0f - lamp->cos_cone) * fminf(fmaxf(desc->spot_blend, 0.0f), 1.0f);
+    lamp->inv_smooth = width > 0.0f ? 1.0f / width : 0.0f;
+    return true;
+}
+
+static void spot_bound(const struct trc_lamp *lamp, struct trc_light_bound *b) {
+    point_bound(lamp, b);
+    b->cos_o = 1.0f;
+    b->cos_e = fmaxf(lamp->cos_cone, 0.0f);
+}
+
+/* ---- sun ---- */
+
+static bool sun_make(const trc_light_desc *desc, struct trc_lamp *lamp) {
+    /* At pi the disk would be infinite; Cycles has no limit and gets nothing useful there. */
+    const float half = 0.5f * fminf(fmaxf(desc->angle, 0.0f), 3.1f);
+    const float r = tanf(half);
+    lamp->flags |= TRC_LAMP_DISTANT;
+    lamp->half_u = lamp->half_v = r;
+    lamp->cos_cone = cosf(half);
+    lamp->inv_area = r > 0.0f ? 1.0f / (PI * r * r) : 1.0f;
+    set_radiance(lamp, desc, lamp->inv_area);
+    if (r > 0.0f && (desc->flags & TRC_LIGHT_EVEN_CONE)) {
+        lamp->flags |= TRC_LAMP_EVEN_CONE;
+        set_radiance(lamp, desc, 1.0f / (PI * sinf(half) * sinf(half)));
+    }
+    for (int i = 0; i < 3; i++)
+        lamp->position[i] = -lamp->normal[i];
+    if (r == 0.0f)
+        lamp->flags |= TRC_LAMP_DELTA;
+    if (!desc->use_mis) /* of suns the camera sees those alone that reflections see */
+        lamp->visibility &= ~(uint32_t)TRC_VISIBLE_CAMERA;
+    return true;
+}
+
+/* It has no place. */
+static void sun_bound(const struct trc_lamp *lamp, struct trc_light_bound *b) {
+    (void)lamp;
+    (void)b;
+}
+
+/* ---- rectangle and ellipse ---- */
+
+/* fill: its part of the rectangle. False for one without area. */
+static bool area_make(const trc_light_desc *desc, float fill, struct trc_lamp *lamp) {
+    const float *m = desc->transform;
+    float u[3] = {m[0], m[4], m[8]}, v[3] = {m[1], m[5], m[9]};
+    const float size_u = trc_normalize(u, 1, 0, 0) * desc->size_x;
+    const float size_v = trc_normalize(v, 0, 1, 0) * desc->size_y;
+    const float area = size_u * size_v * fill;
+    if (!(area > 0.0f) || !(area < INFINITY))
+        return false;
+    memcpy(lamp->axis_u, u, sizeof u);
+    memcpy(lamp->axis_v, v, sizeof v);
+    lamp->half_u = 0.5f * size_u;
+    lamp->half_v = 0.5f * size_v;
+    lamp->inv_area = 1.0f / area;
+    lamp->spread_scale = 1.0f;
+    const float half = 0.5f * fmaxf(desc->spread, 0.0f);
+    if (half < 0.5f * PI - 1e-4f) {
+        /* A grid of slats: what passes at theta is 1 - tan(theta) / tan(half), scaled to keep the
+         * power. */
+        const float t = tanf(fmaxf(half, 1e-3f));
+        lamp->tan_spread = 1.0f / t;
+        lamp->spread_scale = 1.0f / (1.0f - fmaxf(half, 1e-3f) / t);
+    }
+    set_radiance(lamp, desc, 0.25f * lamp->inv_area);
+    return true;
+}
+
+static void area_bound(const struct trc_lamp *lamp, float radius, struct trc_light_bound *b) {
+    b->radius = radius;
+    b->intensity = trc_brightness(lamp->radiance) / lamp->inv_area * lamp->spread_scale;
+    b->cos_o = 1.0f;
+    /* cot(h) = tan_spread. */
+    b->cos_e = lamp->tan_spread / sqrtf(1.0f + lamp->tan_spread * lamp->tan_spread);
+}
+
+static bool rectangle_make(const trc_light_desc *desc, struct trc_lamp *lamp) {
+    return area_make(desc, 1.0f, lamp);
+}
+static void rectangle_bound(const struct trc_lamp *lamp, struct trc_light_bound *b) {
+    const float u = lamp->half_u, v = lamp->half_v;
+    area_bound(lamp, sqrtf(u * u + v * v), b);
+}
+
+static bool ellipse_make(const trc_light_desc *desc, struct trc_lamp *lamp) {
+    return area_make(desc, 0.25f * PI, lamp);
+}
+static void ellipse_bound(const struct trc_lamp *lamp, struct trc_light_bound *b) {
+    area_bound(lamp, fmaxf(lamp->half_u, lamp->half_v), b);
+}
+
+/* ---- all ---- */
+
+/* Of its kind; false for one that has no such shape. */
+static bool make_kind(const trc_light_desc *desc, struct trc_lamp *lamp) {
+#define TRC_LAMP_KIND(NAME, name, is_it) \
+    if (is_it) {                         \
+        lamp->kind = TRC_KIND_##NAME;    \
+        return name##_make(desc, lamp);  \
+    }
+#include "model/light_kinds.def"
+    return false;
+}
+
+bool trc_lamp_make(const trc_light_desc *desc, struct trc_lamp *lamp) {
+    memset(lamp, 0, sizeof *lamp);
+    const float *m = desc->transform;
+    float normal[3] = {-m[2], -m[6], -m[10]};
+    trc_normalize(normal, 0, 0, -1);
+    memcpy(lamp->normal, normal, sizeof normal);
+    for (int i = 0; i < 3; i++)
+        lamp->position[i] = m[4 * i + 3];
+    lamp->visibility = desc->visibility | TRC_VISIBLE_SHADOW;
+    if (!(desc->flags & TRC_LIGHT_SYNTHETIC))
+        lamp->visibility |= TRC_VISIBLE_UNBLOCKED;
+    lamp->group = desc->light_group;
+    lamp->flags =
+        (desc->use_mis ? TRC_LAMP_MIS : 0) | (desc->cast_shadow ? TRC_LAMP_CASTS_SHADOW : 0);
+    if (!make_kind(desc, lamp))
+        return false;
+    const float light = trc_brightness(lamp->radiance);
+    return light > 0.0f && light < INFINITY && (desc->visibility & TRC_VISIBLE_ALL) != 0;
+}
+
+void trc_lamp_bound(const struct trc_lamp *lamp, uint32_t number, struct trc_light_bound *b) {
+    memset(b, 0, sizeof *b);
+    memcpy(b->center, lamp->position, sizeof b->center);
+    memcpy(b->axis, lamp->normal, sizeof b->axis);
+    b->child = -1;
+    b->light = (int32_t)number;
+    switch (lamp->kind) {
+#define TRC_LAMP_KIND(NAME, name, is_it) \
+    case TRC_KIND_##NAME:                \
+        name##_bound(lamp, b);           \
+        break;
+#include "model/light_kinds.def"
+    default:
+        break;
+    }
+}
