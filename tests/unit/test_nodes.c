@@ -97,6 +97,19 @@ static void test_all_types_add_up(void **state) {
     assert_null(trc_node_info_of(UINT32_MAX));
 }
 
+/* Every shader is a closure, once, but for those that weigh others. */
+static void test_all_shaders_are_closures(void **state) {
+    (void)state;
+    uint32_t closures[TRC_NODE_IMAGE] = {0};
+#define TRC_CLOSURE(NODE, bits, branches) closures[TRC_NODE_##NODE]++;
+#include "model/closures.def"
+    for (uint32_t type = 0; type < TRC_NODE_IMAGE; type++) {
+        const bool is_closure =
+            trc_node_info_of(type) && type != TRC_NODE_MIX_SHADER && type != TRC_NODE_ADD_SHADER;
+        assert_int_equal(closures[type], is_closure);
+    }
+}
+
 /* How many modes below 2^16 a type has: the product of what its fields may be. */
 static void test_counts_of_modes(void **state) {
     (void)state;
@@ -177,6 +190,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_offsets_add_up),
         cmocka_unit_test(test_all_types_add_up),
+        cmocka_unit_test(test_all_shaders_are_closures),
         cmocka_unit_test(test_counts_of_modes),
         cmocka_unit_test(test_numbers),
         cmocka_unit_test(test_operations_that_fill_a_node),

@@ -110,52 +110,35 @@ static uint32_t layered_principled_bits(uint32_t distribution, const struct trc_
 
 static uint32_t leaf_bits(const struct trc_leaf *leaf, const struct trc_operand *in) {
     switch (leaf->type) {
-    case TRC_NODE_DIFFUSE:
-    case TRC_NODE_VELVET:
-    case TRC_NODE_SHEEN:
-        return TRC_MATERIAL_HAS_DIFFUSE;
-    case TRC_NODE_TOON:
-        return leaf->mode == TRC_TOON_GLOSSY ? TRC_MATERIAL_HAS_GLOSSY : TRC_MATERIAL_HAS_DIFFUSE;
-    case TRC_NODE_TRANSLUCENT:
-        return TRC_MATERIAL_HAS_TRANSLUCENT;
-    case TRC_NODE_TRANSPARENT:
-        return TRC_MATERIAL_HAS_TRANSPARENCY;
-    case TRC_NODE_HOLDOUT:
-        return TRC_MATERIAL_HAS_HOLDOUT;
-    case TRC_NODE_GLOSSY:
-        return microfacet_bits(leaf->mode, in[TRC_AT(GLOSSY, roughness)]);
-    case TRC_NODE_GLASS:
-        return TRC_MATERIAL_HAS_REFRACTION |
-               microfacet_bits(leaf->mode, in[TRC_AT(GLASS, roughness)]);
-    case TRC_NODE_REFRACTION:
-        return TRC_MATERIAL_HAS_REFRACTION |
-               microfacet_bits(leaf->mode, in[TRC_AT(REFRACTION, roughness)]);
-    case TRC_NODE_PRINCIPLED:
-        return principled_bits(leaf->mode, in);
-    case TRC_NODE_LAYERED_PRINCIPLED:
-        return layered_principled_bits(leaf->mode, in);
+#define TRC_CLOSURE(NODE, bits, branches) \
+    case TRC_NODE_##NODE:                 \
+        return bits;
+#include "model/closures.def"
     default:
         return 0;
     }
 }
 
-/* Lobes of a leaf that rays are continued for, transparency apart: kernels/lobe/bsdf_setup.c. */
+/* Glass is two lobes that rays are continued for. */
+static uint32_t principled_branches(const struct trc_operand *in) {
+    const uint32_t reflection = 1;
+    return reflection + (may_exceed(in[TRC_AT(PRINCIPLED, transmission)], 0.0f) ? 2 : 0) +
+           (may_exceed(in[TRC_AT(PRINCIPLED, clearcoat)], 0.0f) ? 1 : 0);
+}
+
+static uint32_t layered_principled_branches(const struct trc_operand *in) {
+    const uint32_t reflection = 1;
+    return reflection + (may_exceed(in[TRC_AT(LAYERED_PRINCIPLED, metallic)], 0.0f) ? 1 : 0) +
+           (may_exceed(in[TRC_AT(LAYERED_PRINCIPLED, transmission_weight)], 0.0f) ? 2 : 0) +
+           (may_exceed(in[TRC_AT(LAYERED_PRINCIPLED, coat_weight)], 0.0f) ? 1 : 0);
+}
+
 static uint32_t leaf_branches(const struct trc_leaf *leaf, const struct trc_operand *in) {
-    const uint32_t reflection = 1, glass = 2; /* which reflects and refracts */
     switch (leaf->type) {
-    case TRC_NODE_TOON:
-    case TRC_NODE_GLOSSY:
-    case TRC_NODE_REFRACTION:
-        return 1;
-    case TRC_NODE_GLASS:
-        return glass;
-    case TRC_NODE_PRINCIPLED:
-        return reflection + (may_exceed(in[TRC_AT(PRINCIPLED, transmission)], 0.0f) ? glass : 0) +
-               (may_exceed(in[TRC_AT(PRINCIPLED, clearcoat)], 0.0f) ? 1 : 0);
-    case TRC_NODE_LAYERED_PRINCIPLED:
-        return reflection + (may_exceed(in[TRC_AT(LAYERED_PRINCIPLED, metallic)], 0.0f) ? 1 : 0) +
-               (may_exceed(in[TRC_AT(LAYERED_PRINCIPLED, transmission_weight)], 0.0f) ? glass : 0) +
-               (may_exceed(in[TRC_AT(LAYERED_PRINCIPLED, coat_weight)], 0.0f) ? 1 : 0);
+#define TRC_CLOSURE(NODE, bits, branches) \
+    case TRC_NODE_##NODE:                 \
+        return branches;
+#include "model/closures.def"
     default:
         return 0;
     }

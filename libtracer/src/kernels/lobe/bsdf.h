@@ -2,7 +2,7 @@
  * at once, all of one material, so the kinds of lobes are uniform and their parameters are not.
  *
  * The formulas are those of Cycles in Blender 3.4, and of 4.3 for the nodes and modes that stand
- * for it; where a lobe departs from it, bsdf.c says so. */
+ * for it; where a lobe departs from it, its file says so. */
 #ifndef TRACER_KERNELS_LOBE_BSDF_H
 #define TRACER_KERNELS_LOBE_BSDF_H
 
@@ -11,39 +11,18 @@
 
 #define TRC_MAX_LOBES 24
 
+/* Which side and which passes a lobe's light belongs to, and whether rays are continued for it. */
 enum trc_lobe_kind {
-    TRC_LOBE_DIFFUSE,     /* see TRC_DIFFUSE_* */
-    TRC_LOBE_SHEEN,       /* see TRC_SHEEN_*; counts as diffuse */
+    TRC_LOBE_DIFFUSE,     /* ends here: its light is all in light samples */
     TRC_LOBE_TRANSLUCENT, /* counts as diffuse in passes and for light visibility, as in Cycles */
     TRC_LOBE_REFLECT,     /* microfacet reflection or ideal mirror */
     TRC_LOBE_REFRACT,     /* microfacet refraction or ideal */
     TRC_LOBE_TRANSPARENT  /* straight through */
 };
 
-/* trc_lobe.distribution of TRC_LOBE_DIFFUSE ... */
-enum {
-    TRC_DIFFUSE_LAMBERT,
-    TRC_DIFFUSE_OREN_NAYAR,
-    TRC_DIFFUSE_PRINCIPLED,
-    TRC_DIFFUSE_VELVET,
-    TRC_DIFFUSE_TOON,
-    TRC_DIFFUSE_ENERGY_OREN_NAYAR /* what scatters more than once is kept */
-};
-/* ... of TRC_LOBE_SHEEN ... */
-enum {
-    TRC_SHEEN_SCHLICK, /* Principled of 3.4 */
-    TRC_SHEEN_FIBRES   /* of 4.0 */
-};
-/* ... and of microfacets. MULTI_GGX: GGX with height-correlated masking and the energy of the
- * single scattering restored, in place of Cycles' random walk. */
-enum {
-    TRC_LOBE_GGX,
-    TRC_LOBE_GTR1,
-    TRC_LOBE_BECKMANN,
-    TRC_LOBE_ASHIKHMIN,
-    TRC_LOBE_MULTI_GGX,
-    TRC_LOBE_TOON /* no microfacets: a cone about the mirror direction */
-};
+/* trc_lobe.distribution, of microfacets. MULTI_GGX: GGX with height-correlated masking and the
+ * energy of the single scattering restored, in place of Cycles' random walk. */
+enum { TRC_LOBE_GGX, TRC_LOBE_GTR1, TRC_LOBE_BECKMANN, TRC_LOBE_ASHIKHMIN, TRC_LOBE_MULTI_GGX };
 
 /* trc_lobe.fresnel: what multiplies the weight at a microfacet. */
 enum {
@@ -54,8 +33,11 @@ enum {
     TRC_FRESNEL_DIELECTRIC /* F of ior for reflection, 1 - F for refraction */
 };
 
+struct trc_lobe_model; /* kernels/lobe/lobe.h */
+
 struct trc_lobe {
-    enum trc_lobe_kind kind;
+    const struct trc_lobe_model *model;
+    enum trc_lobe_kind kind; /* the model's */
     uint32_t distribution;
     uint32_t fresnel;
     bool correlated;  /* microfacets mask and shadow by one height, as in Cycles 4 */
@@ -99,7 +81,7 @@ struct trc_lobes {
 
 /* From a material's leaves and the registers its program left. filter_alpha: lower bound on alpha
  * (Filter Glossy), 0 for none. Unit: weights include mix factors and alpha.
- * (kernels/lobe/bsdf_setup.c) */
+ * (kernels/lobe/setup.c) */
 void trc_lobes_setup(const struct trc_material *m, const struct trc_surface *s,
                      const struct trc_registers *regs, vfloat filter_alpha, struct trc_lobes *out);
 
@@ -165,10 +147,6 @@ void trc_lobes_features(const struct trc_lobes *l, const struct trc_surface *s,
 /* What ambient light meets: the weights of diffuse lobes, translucent ones too, and the mean of
  * their normals, the shading normal without any. */
 vvec3 trc_lobes_diffuse(const struct trc_lobes *l, const struct trc_surface *s, vvec3 *normal_out);
-
-/* Albedo of the single-scattering part of an energy-keeping Oren-Nayar lobe. (kernels/lobe/bsdf.c)
- */
-vfloat trc_oren_nayar_albedo(vfloat sigma, vfloat cosine);
 
 /* Sum of transparent weights: what a shadow ray or the film's alpha sees through. */
 vvec3 trc_lobes_transparency(const struct trc_lobes *l);

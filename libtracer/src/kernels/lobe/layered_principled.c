@@ -1,13 +1,12 @@
 /* Principled of Blender 4.0 and later, as Cycles 4.3 sets up its closures: layer upon layer, each
- * taking its albedo from what is below. A part of bsdf_setup.c.
+ * taking its albedo from what is below.
  *
  * From the top: transparency, sheen, coat with its tint, emission, then metal, glass, and specular
  * reflection over diffuse. Departures: subsurface scattering is diffuse, thin film is left out. */
-#ifndef TRACER_KERNELS_LOBE_LAYERED_PRINCIPLED_H
-#define TRACER_KERNELS_LOBE_LAYERED_PRINCIPLED_H
+#include "kernels/lobe/facets.h"
 
 /* Whether an input can differ from a value. */
-static bool may_differ(const struct setup *c, const struct trc_leaf *leaf, uint32_t at,
+static bool may_differ(const struct trc_setup *c, const struct trc_leaf *leaf, uint32_t at,
                        float value) {
     const struct trc_operand *o = input(c, leaf, at);
     return o->reg >= 0 || o->value != value;
@@ -16,66 +15,26 @@ static bool may_differ(const struct setup *c, const struct trc_leaf *leaf, uint3
 /* What is left for the layers below one of that albedo, by its strongest channel. */
 static vfloat below(vvec3 albedo) { return vf_saturate(vf_one() - v3_max(albedo)); }
 
-/* ---- sheen ---- */
-
-/* Albedo of the fibres and the coefficients of their transform: rational fits to the tables of
- * Zeltner et al. (2022), as published with MaterialX 1.39. */
-static vfloat fibres_albedo(vfloat x, vfloat y) {
-    const vfloat s = y * (vf_set(0.0206607f) + vf_set(1.58491f) * y) /
-                     (vf_set(0.0379424f) + y * (vf_set(1.32227f) + y));
-    const vfloat m = y *
-                     (vf_set(-0.193854f) +
-                      y * (vf_set(-1.14885f) + y * (vf_set(1.7932f) - vf_set(0.95943f) * y * y))) /
-                     (vf_set(0.046391f) + y);
-    const vfloat o = y *
-                     (vf_set(0.000654023f) + (vf_set(-0.0207818f) + vf_set(0.119681f) * y) * y) /
-                     (vf_set(1.26264f) + y * (vf_set(-1.92021f) + y));
-    const vfloat off = (x - m) / s;
-    return vf_saturate(vf_exp(vf_set(-0.5f) * off * off) * vf_set(0.39894228f) / s + o);
-}
-static vfloat fibres_scale(vfloat x, vfloat y) {
-    return (vf_set(2.58126f) * x + vf_set(0.813703f) * y) * y /
-           (vf_one() + vf_set(0.310327f) * x * x + vf_set(2.60994f) * x * y);
-}
-static vfloat fibres_lean(vfloat x, vfloat y) {
-    return vf_safe_sqrt(vf_one() - x) * (y - vf_one()) * y * y * y /
-           (vf_set(0.0000254053f) + vf_set(1.71228f) * x - vf_set(1.71506f) * x * y +
-            vf_set(1.34174f) * y * y);
-}
-
-/* Returns the albedo over the weight. */
-static vfloat add_fibres(struct setup *c, vvec3 weight, vvec3 n, vfloat roughness) {
-    const vfloat rough = vf_clamp(roughness, 0.01f, 1.0f); /* where the fits hold */
-    const vfloat cosine = vf_saturate(v3_dot(n, c->s->wo));
-    const vfloat albedo =
-        vf_where(vf_gt(v3_dot(n, c->s->wo), vf_zero()), fibres_albedo(cosine, rough));
-    struct trc_lobe *lobe =
-        add_diffuse(c, TRC_LOBE_SHEEN, TRC_SHEEN_FIBRES, v3_scale(weight, albedo), n, rough);
-    if (lobe)
-        lobe->f0 = v3(fibres_scale(cosine, rough), fibres_lean(cosine, rough), vf_zero());
-    return albedo;
-}
-
 /* ---- layers ---- */
 
 /* All returns are what is left for the layers below. */
-static vfloat layered_sheen(struct setup *c, const struct trc_leaf *leaf, vfloat weight) {
+static vfloat layered_sheen(struct trc_setup *c, const struct trc_leaf *leaf, vfloat weight) {
     const vvec3 tint =
         v3_scale(colour(c, leaf, TRC_AT(LAYERED_PRINCIPLED, sheen_tint)),
                  vf_max(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, sheen_weight)), vf_zero()));
-    const vvec3 bent = leaf_normal(c, leaf, TRC_AT(LAYERED_PRINCIPLED, coat_normal));
+    const vvec3 bent = trc_leaf_normal(c, leaf, TRC_AT(LAYERED_PRINCIPLED, coat_normal));
     const vfloat coat = vf_saturate(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, coat_weight)));
-    const vvec3 n =
-        v3_normalize(v3_lerp(leaf_normal(c, leaf, TRC_AT(LAYERED_PRINCIPLED, normal)), bent, coat));
+    const vvec3 n = v3_normalize(
+        v3_lerp(trc_leaf_normal(c, leaf, TRC_AT(LAYERED_PRINCIPLED, normal)), bent, coat));
     const vfloat albedo =
-        add_fibres(c, v3_scale(tint, weight), n,
-                   vf_saturate(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, sheen_roughness))));
+        trc_add_fibres(c, v3_scale(tint, weight), n,
+                       vf_saturate(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, sheen_roughness))));
     return below(v3_scale(tint, albedo));
 }
 
 /* What the tint of the coat leaves of light from below: it is that of the way straight down, the
  * view refracted into the coat takes a longer one. */
-static vvec3 coat_tint(const struct setup *c, const struct trc_leaf *leaf, vfloat cos_o,
+static vvec3 coat_tint(const struct trc_setup *c, const struct trc_leaf *leaf, vfloat cos_o,
                        vfloat coat, vfloat ior) {
     const vvec3 white = v3_splat(vf_one());
     if (!may_differ(c, leaf, TRC_AT(LAYERED_PRINCIPLED, coat_tint), 1.0f) &&
@@ -91,18 +50,18 @@ static vvec3 coat_tint(const struct setup *c, const struct trc_leaf *leaf, vfloa
 }
 
 /* What a coat leaves for the layers below. */
-static vvec3 coat_passes(const struct setup *c, const struct trc_leaf *leaf, vfloat cos_o,
+static vvec3 coat_passes(const struct trc_setup *c, const struct trc_leaf *leaf, vfloat cos_o,
                          vfloat coat, vfloat ior) {
     const vfloat f = trc_fresnel_dielectric(cos_o, ior);
     return v3_scale(coat_tint(c, leaf, cos_o, coat, ior), vf_saturate(vf_one() - coat * f));
 }
 
-static vvec3 layered_coat(struct setup *c, const struct trc_leaf *leaf, vfloat weight) {
+static vvec3 layered_coat(struct trc_setup *c, const struct trc_leaf *leaf, vfloat weight) {
     const vfloat coat = vf_max(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, coat_weight)), vf_zero());
     const vfloat ior = vf_max(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, coat_ior)), vf_one());
-    const vvec3 n = leaf_normal(c, leaf, TRC_AT(LAYERED_PRINCIPLED, coat_normal));
+    const vvec3 n = trc_leaf_normal(c, leaf, TRC_AT(LAYERED_PRINCIPLED, coat_normal));
     const vfloat cos_o = v3_dot(n, c->s->wo);
-    struct trc_lobe *lobe = add_lobe(c, TRC_LOBE_REFLECT, v3_splat(coat * weight));
+    struct trc_lobe *lobe = trc_add_reflection(c, v3_splat(coat * weight));
     if (lobe) {
         lobe->distribution = TRC_LOBE_GGX;
         lobe->correlated = true;
@@ -111,16 +70,16 @@ static vvec3 layered_coat(struct setup *c, const struct trc_leaf *leaf, vfloat w
         lobe->ior = ior;
         lobe->alpha_x = lobe->alpha_y =
             vf_square(vf_saturate(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, coat_roughness))));
-        finish_microfacets(c, lobe, false);
+        trc_facets_finish(c, lobe, false);
         lobe->mix_weight = lobe->mix_weight * trc_fresnel_dielectric(cos_o, ior);
     }
     return coat_passes(c, leaf, cos_o, coat, ior);
 }
 
 /* A GGX lobe with the node's roughness and anisotropy. */
-static struct trc_lobe *add_anisotropic(struct setup *c, const struct trc_leaf *leaf, vvec3 weight,
-                                        vvec3 n, vfloat ior) {
-    struct trc_lobe *lobe = add_lobe(c, TRC_LOBE_REFLECT, weight);
+static struct trc_lobe *add_anisotropic(struct trc_setup *c, const struct trc_leaf *leaf,
+                                        vvec3 weight, vvec3 n, vfloat ior) {
+    struct trc_lobe *lobe = trc_add_reflection(c, weight);
     if (!lobe)
         return NULL;
     const vfloat alpha =
@@ -138,16 +97,16 @@ static struct trc_lobe *add_anisotropic(struct setup *c, const struct trc_leaf *
         lobe->alpha_x = alpha / aspect;
         lobe->alpha_y = alpha * aspect;
         lobe->tangent =
-            leaf_tangent(c, leaf, TRC_AT(LAYERED_PRINCIPLED, tangent), n,
-                         number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, anisotropic_rotation)));
+            trc_leaf_tangent(c, leaf, TRC_AT(LAYERED_PRINCIPLED, tangent), n,
+                             number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, anisotropic_rotation)));
     }
-    finish_microfacets(c, lobe, false);
+    trc_facets_finish(c, lobe, false);
     return lobe;
 }
 
 /* Metal: Schlick's approximation with a tint that is whole at 82 degrees (N. Kutz, M. Hasan and D.
  * Edmondson, "Novel Aspects of the Adobe Standard Material", 2021). */
-static void layered_metal(struct setup *c, const struct trc_leaf *leaf, vvec3 weight, vvec3 n) {
+static void layered_metal(struct trc_setup *c, const struct trc_leaf *leaf, vvec3 weight, vvec3 n) {
     struct trc_lobe *lobe = add_anisotropic(c, leaf, weight, n, vf_one());
     if (!lobe)
         return;
@@ -164,11 +123,11 @@ static void layered_metal(struct setup *c, const struct trc_leaf *leaf, vvec3 we
                               v3_scale(lobe->f90, vf_set(1.0f / 126.0f)));
     lobe->mix_weight = lobe->mix_weight * v3_average(mean);
     if (leaf->mode == TRC_DISTRIBUTION_MULTI_GGX)
-        keep_energy(lobe, v3_saturate(mean));
+        trc_facets_keep_energy(lobe, v3_saturate(mean));
 }
 
 /* The dielectric reflection; its index is the one that gives the reflectance level asks for. */
-static vfloat layered_specular(struct setup *c, const struct trc_leaf *leaf, vvec3 weight,
+static vfloat layered_specular(struct trc_setup *c, const struct trc_leaf *leaf, vvec3 weight,
                                vvec3 n) {
     const vfloat one = vf_one(),
                  ior = vf_max(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, ior)), vf_set(1e-5f));
@@ -200,32 +159,32 @@ static vfloat layered_specular(struct setup *c, const struct trc_leaf *leaf, vve
     if (leaf->mode == TRC_DISTRIBUTION_MULTI_GGX) {
         const vvec3 mean = v3_lerp(low, white, mean_blend(eta));
         const vfloat before = v3_max(lobe->weight);
-        keep_energy(lobe, v3_saturate(mean));
+        trc_facets_keep_energy(lobe, v3_saturate(mean));
         const vfloat single = vf_max(trc_ggx_albedo(lobe->cos_o, alpha), vf_set(1e-3f));
         kept = single * v3_max(lobe->weight) / vf_max(before, tiny);
     }
     return vf_select(is_seen, below(v3_scale(albedo, kept)), one);
 }
 
-static vfloat opacity_of(const struct setup *c, const struct trc_leaf *leaf) {
+static vfloat opacity_of(const struct trc_setup *c, const struct trc_leaf *leaf) {
     const struct trc_operand *alpha = input(c, leaf, TRC_AT(LAYERED_PRINCIPLED, alpha));
     return alpha->reg < 0 && alpha->value >= 1.0f ? vf_one()
                                                   : vf_saturate(trc_operand_value(alpha, c->regs));
 }
 
-static void add_layered_principled(struct setup *c, const struct trc_leaf *leaf, vfloat whole) {
+static void add_layered_principled(struct trc_setup *c, const struct trc_leaf *leaf, vfloat whole) {
     vfloat weight = whole;
     const struct trc_operand *alpha = input(c, leaf, TRC_AT(LAYERED_PRINCIPLED, alpha));
     if (alpha->reg >= 0 || alpha->value < 1.0f) {
         weight = whole * opacity_of(c, leaf);
-        add_transparent(c, v3_splat(whole - weight));
+        trc_add_transparent(c, v3_splat(whole - weight));
     }
     if (may_exceed_zero(c, leaf, TRC_AT(LAYERED_PRINCIPLED, sheen_weight)))
         weight = weight * layered_sheen(c, leaf, weight);
     vvec3 rest = v3_splat(weight);
     if (may_exceed_zero(c, leaf, TRC_AT(LAYERED_PRINCIPLED, coat_weight)))
         rest = v3_mul(rest, layered_coat(c, leaf, weight));
-    const vvec3 n = leaf_normal(c, leaf, TRC_AT(LAYERED_PRINCIPLED, normal)),
+    const vvec3 n = trc_leaf_normal(c, leaf, TRC_AT(LAYERED_PRINCIPLED, normal)),
                 base = colour(c, leaf, TRC_AT(LAYERED_PRINCIPLED, base_color));
     if (may_exceed_zero(c, leaf, TRC_AT(LAYERED_PRINCIPLED, metallic))) {
         const vfloat metallic = vf_saturate(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, metallic)));
@@ -238,10 +197,10 @@ static void add_layered_principled(struct setup *c, const struct trc_leaf *leaf,
         const vvec3 glass = v3_scale(rest, transmission), clear = v3_saturate(base);
         /* In at one surface and out at another: each has the root of the colour. */
         const vvec3 tint = v3(vf_sqrt(clear.x), vf_sqrt(clear.y), vf_sqrt(clear.z));
-        const vfloat eta = relative_ior(c, number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, ior)));
+        const vfloat eta = trc_relative_ior(c, number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, ior)));
         const vvec3 f0 = v3_scale(colour(c, leaf, TRC_AT(LAYERED_PRINCIPLED, specular_tint)),
                                   trc_fresnel_normal(eta));
-        add_correlated_glass(
+        trc_add_correlated_glass(
             c, glass, v3_mul(glass, tint), v3_saturate(f0), n,
             vf_square(vf_saturate(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, roughness)))), eta,
             leaf->mode | TRC_DISTRIBUTION_CORRELATED);
@@ -250,15 +209,15 @@ static void add_layered_principled(struct setup *c, const struct trc_leaf *leaf,
     rest = v3_scale(rest, layered_specular(c, leaf, rest, n));
     const struct trc_operand *sigma = input(c, leaf, TRC_AT(LAYERED_PRINCIPLED, diffuse_roughness));
     if (sigma->reg < 0 && sigma->value <= 0.0f)
-        add_diffuse(c, TRC_LOBE_DIFFUSE, TRC_DIFFUSE_LAMBERT, v3_mul(base, rest), n, vf_zero());
+        trc_add_lambert(c, v3_mul(base, rest), n);
     else
-        add_energy_oren_nayar(c, v3_mul(base, rest), base, n,
-                              vf_saturate(trc_operand_value(sigma, c->regs)));
+        trc_add_energy_oren_nayar(c, v3_mul(base, rest), base, n,
+                                  vf_saturate(trc_operand_value(sigma, c->regs)));
 }
 
 /* Emission shines through sheen and coat. Without a surface, for samples of it as a light, Cycles
  * knows of the coat's tint only; here as seen head-on. */
-static bool layered_emission(const struct setup *c, const struct trc_leaf *leaf, vfloat weight,
+static bool layered_emission(const struct trc_setup *c, const struct trc_leaf *leaf, vfloat weight,
                              vvec3 *emission) {
     const struct trc_operand *strength =
         input(c, leaf, TRC_AT(LAYERED_PRINCIPLED, emission_strength));
@@ -272,7 +231,7 @@ static bool layered_emission(const struct setup *c, const struct trc_leaf *leaf,
                      vf_max(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, sheen_weight)), vf_zero()));
         const vfloat rough =
             vf_clamp(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, sheen_roughness)), 0.01f, 1.0f);
-        rest = v3_scale(rest, below(v3_scale(tint, fibres_albedo(cos_o, rough))));
+        rest = v3_scale(rest, below(v3_scale(tint, trc_fibres_albedo(cos_o, rough))));
     }
     if (may_exceed_zero(c, leaf, TRC_AT(LAYERED_PRINCIPLED, coat_weight))) {
         const vfloat coat =
@@ -285,4 +244,5 @@ static bool layered_emission(const struct setup *c, const struct trc_leaf *leaf,
     return true;
 }
 
-#endif
+const struct trc_closure TRC_CLOSURE_OF(LAYERED_PRINCIPLED) = {.add = add_layered_principled,
+                                                               .emission = layered_emission};

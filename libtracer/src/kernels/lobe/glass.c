@@ -1,0 +1,190 @@
+/* Glass: refraction of microfacets, and how it shares the light with reflection. The Glass and
+ * Refraction shaders. */
+#include "kernels/lobe/facets.h"
+
+/* ---- refraction ---- */
+
+/* Walter 2007, eq. 21 and 17. */
+static struct lobe_value refraction_value(const struct trc_lobe *lobe, const struct trc_surface *s,
+                                          vvec3 wi) {
+    const vvec3 wo = s->wo;
+    const vfloat cos_i = v3_dot(lobe->n, wi);
+    vmask m = vm_and(vf_lt(cos_i, vf_zero()), vf_gt(lobe->cos_o, vf_zero()));
+    m = vm_andnot(m, lobe->ideal);
+    if (!vm_any(m))
+        return no_value();
+    vvec3 sum = v3_mad(wi, lobe->ior, wo);
+    /* It points to the denser side; the micro-normal is on the side of n. */
+    sum = v3_scale(sum, vf_copysign(vf_one(), v3_dot(sum, lobe->n)));
+    const vfloat length2 = v3_dot(sum, sum);
+    const vvec3 half = v3_normalize(sum);
+    const vfloat cos_ho = v3_dot(half, wo), cos_hi = v3_dot(half, wi);
+    const struct half_vector h = half_of(lobe, half, wi, cos_i);
+    /* Only micro-normals that wo sees and that refract to the other side. */
+    m = vm_and(m, vm_and(vf_gt(h.cos_m, vf_zero()),
+                         vm_and(vf_gt(cos_ho, vf_zero()), vf_lt(cos_hi, vf_zero()))));
+    const vfloat d = vf_where(m, distribution_d(lobe, &h));
+    const vfloat jacobian = vf_abs(cos_ho * cos_hi) * lobe->ior * lobe->ior / length2;
+    const vfloat visible = d * jacobian;
+    struct lobe_value r;
+    r.pdf = vf_set(4.0f) * lobe->pdf_scale * visible;
+    r.claim = r.pick = lobe->g1_o * visible / lobe->cos_o;
+    const vfloat f = r.claim * shadowing(lobe, h.tan2_i);
+    r.value = v3_mul(v3_scale(lobe->weight, f), facet_fresnel(lobe, cos_ho));
+    r.value = v3_where(m, r.value);
+    r.pdf = vf_where(m, r.pdf);
+    r.claim = r.pick = vf_where(m, r.claim);
+    weigh_pair(lobe, cos_ho, &r);
+    return r;
+}
+
+/* ---- setting up ---- */
+
+vfloat trc_relative_ior(const struct trc_setup *c, vfloat ior) {
+    const vfloat eta = vf_max(ior, vf_set(1e-5f));
+    return vf_select(c->s->backfacing, vf_rcp(eta), eta);
+}
+
+struct trc_lobe *trc_add_dielectric(struct trc_setup *c, enum trc_lobe_kind kind, vvec3 weight,
+                                    vvec3 n, vfloat alpha, vfloat eta, uint32_t mode) {
+    static const struct trc_lobe_model refraction = {.kind = TRC_LOBE_REFRACT,
+                                                     .has_facets = true,
+                                                     .value = refraction_value,
+                                                     .direction = TRC_KERNEL(trc_facets_direction)};
+    struct trc_lobe *lobe = kind == TRC_LOBE_REFRACT ? trc_add_lobe(c, &refraction, weight)
+                                                     : trc_add_reflection(c, weight);
+    if (!lobe)
+        return NULL;
+    const uint32_t distribution = distribution_of(mode);
+    lobe->distribution = distribution == TRC_LOBE_BECKMANN ? TRC_LOBE_BECKMANN : TRC_LOBE_GGX;
+    lobe->correlated = mode & TRC_DISTRIBUTION_CORRELATED;
+    lobe->n = n;
+    lobe->alpha_x = lobe->alpha_y = alpha;
+    lobe->ior = eta;
+    trc_facets_finish(c, lobe, is_sharp(mode));
+    return lobe;
+}
+
+/* Chances of two lobes that have the factor of the micro-normal, f that of the normal. Where both
+ * are rough they share micro-normals, each of which reflects as often as it should (weigh_pair):
+ * with chances by the normal, a path within glass gained or lost weight at every bounce, and after
+ * 30 of them a few paths carried most of the light (15 times the squared error at 256 samples). */
+static void share_chances(struct trc_lobe *reflect, struct trc_lobe *refract, vfloat f) {
+    if (reflect)
+        reflect->mix_weight = reflect->mix_weight * f;
+    if (refract)
+        refract->mix_weight = refract->mix_weight * (vf_one() - f);
+    if (!reflect || !refract)
+        return;
+    const vfloat reflected = v3_average(reflect->weight), refracted = v3_average(refract->weight);
+    const vmask both = vm_and(vf_gt(reflected, vf_zero()), vf_gt(refracted, vf_zero()));
+    const vmask paired = vm_andnot(both, vm_or(reflect->ideal, refract->ideal));
+    const vfloat half = vf_set(0.5f) * (reflect->mix_weight + refract->mix_weight);
+    reflect->mix_weight = vf_select(paired, half, reflect->mix_weight);
+    refract->mix_weight = vf_select(paired, half, refract->mix_weight);
+    reflect->pdf_scale = vf_select(paired, refract->pdf_scale, reflect->pdf_scale);
+    reflect->paired = refract->paired = paired;
+    reflect->pair_tint = refract->pair_tint = vf_divide(refracted, reflected);
+}
+
+/* What single scattering keeps; all where trc_facets_finish makes refraction ideal, for the index
+ * is that of what is around. */
+static vfloat kept_by_glass(vfloat albedo, vfloat eta) {
+    const vmask is_nothing = vf_lt(vf_abs(eta - vf_one()), vf_set(NO_REFRACTION));
+    return vf_select(is_nothing, vf_one(), albedo);
+}
+
+void trc_add_multi_glass(struct trc_setup *c, vvec3 weight, vvec3 reflected, vvec3 refracted,
+                         vvec3 n, vfloat alpha, vfloat eta) {
+    /* As rough as the lobes will be: a filtered one keeps its energy too. */
+    const vfloat rough = vf_max(vf_clamp(alpha, 1e-4f, 1.0f), c->filter_alpha);
+    const vfloat kept = kept_by_glass(trc_glass_albedo(v3_dot(n, c->s->wo), rough, eta), eta);
+    /* What does not get away is coloured again at every further bounce: a geometric series. */
+    const vfloat share = trc_glass_reflected_share(v3_dot(n, c->s->wo), rough, eta);
+    const vvec3 colors = v3_lerp(refracted, reflected, vf_clamp(share, 0.05f, 0.95f));
+    const vvec3 again = v3_scale(colors, vf_one() - kept);
+    const vfloat least = vf_set(0.1f), one = vf_one();
+    const vvec3 gain =
+        v3(vf_rcp(vf_max(one - again.x, least)), vf_rcp(vf_max(one - again.y, least)),
+           vf_rcp(vf_max(one - again.z, least)));
+    const vvec3 w = v3_mul(weight, gain);
+    struct trc_lobe *reflect = trc_add_dielectric(c, TRC_LOBE_REFLECT, v3_mul(w, reflected), n,
+                                                  rough, eta, TRC_DISTRIBUTION_GGX);
+    if (reflect)
+        reflect->fresnel = TRC_FRESNEL_DIELECTRIC;
+    struct trc_lobe *refract = trc_add_dielectric(c, TRC_LOBE_REFRACT, v3_mul(w, refracted), n,
+                                                  rough, eta, TRC_DISTRIBUTION_GGX);
+    if (refract)
+        refract->fresnel = TRC_FRESNEL_DIELECTRIC;
+    share_chances(reflect, refract, trc_fresnel_dielectric(v3_dot(n, c->s->wo), eta));
+}
+
+/* The factor of the micro-normal goes from f0 to 1; kept: what single scattering keeps. */
+static void blend_dielectric(struct trc_lobe *lobe, vvec3 f0, vfloat kept) {
+    lobe->fresnel = TRC_FRESNEL_BLEND;
+    lobe->f0 = f0;
+    lobe->f90 = v3_splat(vf_one());
+    lobe->albedo_scale = kept;
+    lobe->mix_weight = lobe->mix_weight * kept;
+}
+
+void trc_add_correlated_glass(struct trc_setup *c, vvec3 reflected, vvec3 refracted, vvec3 f0,
+                              vvec3 n, vfloat alpha, vfloat eta, uint32_t mode) {
+    const vfloat cos_o = v3_dot(n, c->s->wo);
+    vfloat kept = vf_one();
+    if (distribution_of(mode) == TRC_LOBE_MULTI_GGX) {
+        kept = kept_by_glass(trc_correlated_glass_albedo(cos_o, alpha, eta), eta);
+        kept = vf_max(kept, vf_set(0.1f));
+        reflected = v3_scale(reflected, vf_rcp(kept));
+        refracted = v3_scale(refracted, vf_rcp(kept));
+    }
+    struct trc_lobe *reflect =
+        trc_add_dielectric(c, TRC_LOBE_REFLECT, reflected, n, alpha, eta, mode);
+    if (reflect)
+        blend_dielectric(reflect, f0, kept);
+    struct trc_lobe *refract =
+        trc_add_dielectric(c, TRC_LOBE_REFRACT, refracted, n, alpha, eta, mode);
+    if (refract)
+        blend_dielectric(refract, f0, kept);
+    const vfloat blend = vf_saturate(trc_fresnel_blend(cos_o, eta));
+    share_chances(reflect, refract, v3_average(v3_lerp(f0, v3_splat(vf_one()), blend)));
+}
+
+/* Cycles refracts at least 1e-4, and so gives that much more than it gets. */
+vfloat trc_reflected_part(vfloat f) {
+    const vfloat least = vf_set(TRC_WEIGHT_CUTOFF);
+    return vf_where(vf_ge(f, least), vf_select(vf_lt(vf_one() - f, least), vf_one(), f));
+}
+
+static void add_glass(struct trc_setup *c, const struct trc_leaf *leaf, vfloat weight) {
+    const vvec3 tint = v3_scale(colour(c, leaf, TRC_AT(GLASS, color)), weight);
+    const vvec3 n = trc_leaf_normal(c, leaf, TRC_AT(GLASS, normal));
+    const vfloat alpha = vf_square(number(c, leaf, TRC_AT(GLASS, roughness)));
+    const vfloat eta = trc_relative_ior(c, number(c, leaf, TRC_AT(GLASS, ior)));
+    if (leaf->mode & TRC_DISTRIBUTION_CORRELATED) {
+        trc_add_correlated_glass(c, tint, tint, v3_splat(trc_fresnel_normal(eta)), n,
+                                 vf_saturate(alpha), eta, leaf->mode);
+        return;
+    }
+    if (leaf->mode == TRC_DISTRIBUTION_MULTI_GGX) {
+        const vvec3 color = v3_saturate(colour(c, leaf, TRC_AT(GLASS, color)));
+        trc_add_multi_glass(c, v3_splat(weight), color, color, n, alpha, eta);
+        return;
+    }
+    const vfloat f = trc_reflected_part(trc_fresnel_dielectric(v3_dot(n, c->s->wo), eta));
+    trc_add_dielectric(c, TRC_LOBE_REFLECT, v3_scale(tint, f), n, alpha, eta, leaf->mode);
+    trc_add_dielectric(c, TRC_LOBE_REFRACT, v3_scale(tint, vf_one() - f), n, alpha, eta,
+                       leaf->mode);
+}
+
+const struct trc_closure TRC_CLOSURE_OF(GLASS) = {.add = add_glass};
+
+static void add_refraction(struct trc_setup *c, const struct trc_leaf *leaf, vfloat weight) {
+    trc_add_dielectric(c, TRC_LOBE_REFRACT,
+                       v3_scale(colour(c, leaf, TRC_AT(REFRACTION, color)), weight),
+                       trc_leaf_normal(c, leaf, TRC_AT(REFRACTION, normal)),
+                       vf_square(number(c, leaf, TRC_AT(REFRACTION, roughness))),
+                       trc_relative_ior(c, number(c, leaf, TRC_AT(REFRACTION, ior))), leaf->mode);
+}
+
+const struct trc_closure TRC_CLOSURE_OF(REFRACTION) = {.add = add_refraction};

@@ -1,0 +1,170 @@
+/* From the leaves of a material to lobes, as Cycles sets up its closures: normals and tangents, the
+ * closures of the leaves, chances. */
+#include "kernels/lobe/lobe.h"
+
+/* First hit: a lobe gets at least this share of the samples (Cycles 3.4's defensive sampling). */
+#define DEFENSIVE_SHARE 0.125f
+
+/* ---- normals and tangents ---- */
+
+/* Of two candidates for the squared z of the bent normal, the one whose mirror direction is valid;
+ * see below. Returns x and z in the plane of ng and n. */
+static void choose_bend(vfloat first2, vfloat second2, vfloat ix, vfloat iz, vfloat *x, vfloat *z,
+                        vmask *any) {
+    const vfloat least = vf_set(1e-5f), most = vf_set(1.0f + 1e-5f);
+    const vmask fits1 = vm_and(vf_gt(first2, least), vf_le(first2, most));
+    const vmask fits2 = vm_and(vf_gt(second2, least), vf_le(second2, most));
+    const vfloat x1 = vf_safe_sqrt(vf_one() - first2), z1 = vf_safe_sqrt(first2);
+    const vfloat x2 = vf_safe_sqrt(vf_one() - second2), z2 = vf_safe_sqrt(second2);
+    const vfloat r1 = vf_set(2.0f) * (x1 * ix + z1 * iz) * z1 - iz;
+    const vfloat r2 = vf_set(2.0f) * (x2 * ix + z2 * iz) * z2 - iz;
+    const vmask up1 = vf_ge(r1, least), up2 = vf_ge(r2, least);
+    /* Both fit: the shallower of two valid mirrors, else the higher. */
+    const vmask first_of_both =
+        vm_or(vm_and(vm_and(up1, up2), vf_lt(r1, r2)), vm_andnot(vf_gt(r1, r2), vm_and(up1, up2)));
+    const vmask use1 = vm_and(fits1, vm_or(vm_not(fits2), first_of_both));
+    *x = vf_select(use1, x1, x2);
+    *z = vf_select(use1, z1, z2);
+    *any = vm_or(fits1, fits2);
+}
+
+/* Turns n towards the geometric normal as little as makes the mirror direction of wo rise above the
+ * surface by a threshold t. With z = ng and x = the part of n across it, the turned normal (x, 0,
+ * z) satisfies 2 (x ix + z iz) z - iz = t, a quadratic in z^2 because x^2 = 1 - z^2. */
+static vvec3 valid_normal(const struct trc_surface *s, vvec3 n) {
+    const vfloat iz = v3_dot(s->ng, s->wo);
+    const vfloat t = vf_min(vf_set(0.9f) * iz, vf_set(0.01f));
+    const vmask bad = vm_and(s->active, vf_lt(v3_dot(s->ng, v3_reflect(s->wo, n)), t));
+    if (!vm_any(bad))
+        return n;
+    const vvec3 across = v3_normalize(v3_sub(n, v3_scale(s->ng, v3_dot(n, s->ng))));
+    const vfloat ix = v3_dot(s->wo, across), ix2 = ix * ix;
+    const vfloat a = ix2 + iz * iz;
+    const vfloat b = vf_safe_sqrt(ix2 * (a - t * t));
+    const vfloat c = iz * t + a;
+    const vfloat half = vf_divide(vf_set(0.5f), a);
+    vfloat x, z;
+    vmask found;
+    choose_bend(half * (c + b), half * (c - b), ix, iz, &x, &z, &found);
+    const vvec3 turned = v3_mad(across, x, v3_scale(s->ng, z));
+    return v3_select(bad, v3_select(found, turned, s->ng), n);
+}
+
+vvec3 trc_leaf_normal(struct trc_setup *c, const struct trc_leaf *leaf, uint32_t at) {
+    if (!is_unlinked(c, leaf, at))
+        return valid_normal(c->s, colour(c, leaf, at));
+    if (!c->has_default_n) {
+        c->default_n = valid_normal(c->s, c->s->n);
+        c->has_default_n = true;
+    }
+    return c->default_n;
+}
+
+vvec3 trc_leaf_tangent(const struct trc_setup *c, const struct trc_leaf *leaf, uint32_t at, vvec3 n,
+                       vfloat rotation) {
+    const vvec3 t = colour(c, leaf, at);
+    vfloat sine, cosine;
+    vf_sincos_turns(rotation, &sine, &cosine);
+    const vvec3 along = v3_scale(n, v3_dot(n, t) * (vf_one() - cosine));
+    const vvec3 turned = v3_mad(v3_cross(n, t), sine, v3_mad(t, cosine, along));
+    const vvec3 bitangent = v3_normalize(v3_cross(n, turned));
+    vvec3 a, b;
+    v3_frame(n, &a, &b);
+    const vmask fine = vf_gt(v3_dot(bitangent, bitangent), vf_zero());
+    return v3_select(fine, v3_cross(bitangent, n), a);
+}
+
+/* ---- lobes ---- */
+
+struct trc_lobe *trc_add_lobe(struct trc_setup *c, const struct trc_lobe_model *model,
+                              vvec3 weight) {
+    struct trc_lobes *out = c->out;
+    const vvec3 w =
+        v3(vf_max(weight.x, vf_zero()), vf_max(weight.y, vf_zero()), vf_max(weight.z, vf_zero()));
+    const vfloat mean = v3_average(w);
+    /* False for NaN too. */
+    const vmask counts = vm_and(c->s->active, vf_ge(mean, vf_set(TRC_WEIGHT_CUTOFF)));
+    if (!vm_any(counts) || out->count == TRC_MAX_LOBES)
+        return NULL;
+    struct trc_lobe *lobe = &out->lobe[out->count++];
+    lobe->model = model;
+    lobe->kind = model->kind;
+    lobe->distribution = TRC_LOBE_GGX;
+    lobe->fresnel = TRC_FRESNEL_NONE;
+    lobe->correlated = false;
+    lobe->albedo_scale = vf_one();
+    lobe->anisotropic = false;
+    lobe->ideal = lobe->paired = vm_none();
+    lobe->weight = v3_where(counts, w);
+    lobe->mix_weight = vf_where(counts, mean);
+    lobe->sample_weight = vf_zero();
+    return lobe;
+}
+
+/* Chances of the lobes. At the first hit small ones may be raised to a share of the sum. */
+static void set_chances(const struct trc_material *m, const struct trc_surface *s,
+                        struct trc_lobes *out) {
+    vfloat floor_weight = vf_zero();
+    if (!(m->flags & TRC_MATERIAL_PLAIN_CHOICE)) {
+        vfloat sum = vf_zero();
+        for (int i = 0; i < out->count; i++)
+            sum = sum + out->lobe[i].mix_weight;
+        const vmask is_first = vi_eq(s->depth + s->transparent_depth, vi_set(0));
+        floor_weight = vf_where(is_first, sum * vf_set(DEFENSIVE_SHARE));
+    }
+    out->mix_weight = vf_zero();
+    out->continue_weight = vf_zero();
+    for (int i = 0; i < out->count; i++) {
+        struct trc_lobe *lobe = &out->lobe[i];
+        const vmask present = vf_gt(v3_max(lobe->weight), vf_zero());
+        lobe->mix_weight = vf_where(present, vf_max(lobe->mix_weight, floor_weight));
+        out->mix_weight = out->mix_weight + lobe->mix_weight;
+        if (lobe->kind == TRC_LOBE_DIFFUSE)
+            continue;
+        lobe->sample_weight = lobe->mix_weight;
+        out->continue_weight = out->continue_weight + lobe->mix_weight;
+    }
+}
+
+/* ---- leaves ---- */
+
+/* By the type of a leaf's node; all types that leaves have are there (tests/unit/test_nodes.c). */
+static const struct trc_closure *const closures[TRC_NODE_IMAGE] = {
+#define TRC_CLOSURE(NODE, bits, branches) [TRC_NODE_##NODE] = &TRC_CLOSURE_OF(NODE),
+#include "model/closures.def"
+};
+
+void trc_lobes_setup(const struct trc_material *m, const struct trc_surface *s,
+                     const struct trc_registers *regs, vfloat filter_alpha, struct trc_lobes *out) {
+    struct trc_setup c = {m, s, regs, filter_alpha, v3_zero(), false, out};
+    out->count = 0;
+    out->emission = v3_zero();
+    out->holdout = vf_zero();
+    out->below_horizon = vm_none();
+    for (uint32_t i = 0; i < m->leaf_count; i++) {
+        const struct trc_leaf *leaf = &m->leaves[i];
+        const vfloat weight = trc_operand_value(&leaf->weight, regs);
+        if (!vm_any(vm_and(s->active, vf_ne(weight, vf_zero()))))
+            continue;
+        const struct trc_closure *closure = closures[leaf->type];
+        vvec3 emission;
+        if (closure->emission && closure->emission(&c, leaf, weight, &emission))
+            out->emission = v3_add(out->emission, emission);
+        if (closure->add)
+            closure->add(&c, leaf, weight);
+    }
+    set_chances(m, s, out);
+}
+
+vvec3 trc_lobes_emission(const struct trc_material *m, const struct trc_registers *regs) {
+    const struct trc_setup c = {m, NULL, regs, vf_zero(), v3_zero(), false, NULL};
+    vvec3 sum = v3_zero(), emission;
+    for (uint32_t i = 0; i < m->leaf_count; i++) {
+        const struct trc_leaf *leaf = &m->leaves[i];
+        const struct trc_closure *closure = closures[leaf->type];
+        if (closure->emission &&
+            closure->emission(&c, leaf, trc_operand_value(&leaf->weight, regs), &emission))
+            sum = v3_add(sum, emission);
+    }
+    return sum;
+}
