@@ -501,6 +501,57 @@ static void times_are_clamped(void **state) {
     }
 }
 
+/* A triangle that stretches while its instance turns, of other keys than it: normals are those of
+ * the corners as they stand in the world, each in its own time. */
+static void normals_are_of_both_motions(void **state) {
+    (void)state;
+    static const float times[] = {0.0f, 0.2f, 0.35f, 0.5f, 0.6f, 0.9f, 1.0f};
+    const uint32_t time_count = sizeof times / sizeof *times;
+    struct trial t;
+    trial_init(&t);
+    struct mesh *mesh = query_world_object(&t.world);
+    add_floor(mesh, 3.0f);
+    mesh_set_keys(mesh, 2);
+    for (int v = 0; v < 3; v++)
+        mesh_key(mesh, 1)[3 * v + 2] += 0.3f * (float)v;
+    struct query_instance *instance = &t.world.instances[0];
+    instance->key_count = 4;
+    for (uint32_t key = 0; key < 4; key++) {
+        static const float axis[3] = {1, 0, 0}, scale[3] = {1, 1, 1}, none[3] = {0, 0, 0};
+        query_transform(axis, 0.15f * (float)key, scale, none, instance->transforms[key]);
+    }
+    for (uint32_t i = 0; i < time_count; i++)
+        ray_set_add(&t.rays, origin, (const float[3]){0, 0, 1}, 0.0f, INFINITY, times[i]);
+    run(&t, false);
+    for (uint32_t i = 0; i < time_count; i++) {
+        const double time = (double)times[i], at = 3.0 * time, f = at - fmin(floor(at), 2.0);
+        const int key = (int)fmin(floor(at), 2.0);
+        double p[3][3], n[3], size = 0.0, found_size = 0.0, cosine = 0.0;
+        assert_int_equal(t.hits.instance[i], 0);
+        for (int v = 0; v < 3; v++)
+            for (int r = 0; r < 3; r++) {
+                const float *a = instance->transforms[key] + 4 * r, *b = a + 12;
+                p[v][r] = (1.0 - f) * (double)a[3] + f * (double)b[3];
+                for (int k = 0; k < 3; k++)
+                    p[v][r] += ((1.0 - f) * (double)a[k] + f * (double)b[k]) *
+                               ((1.0 - time) * (double)mesh_key(mesh, 0)[3 * v + k] +
+                                time * (double)mesh_key(mesh, 1)[3 * v + k]);
+            }
+        for (int k = 0; k < 3; k++) {
+            const int x = (k + 1) % 3, y = (k + 2) % 3;
+            n[k] = (p[1][x] - p[0][x]) * (p[2][y] - p[0][y]) -
+                   (p[1][y] - p[0][y]) * (p[2][x] - p[0][x]);
+            const double found = (double)t.hits.normal[k][i];
+            size += n[k] * n[k];
+            found_size += found * found;
+            cosine += n[k] * found;
+        }
+        /* Of any length, on the side of the winding. */
+        assert_true(cosine / sqrt(size * found_size) > 1.0 - 1e-10);
+    }
+    trial_free(&t);
+}
+
 /* ---- the host ---- */
 
 /* The caller's floating-point state neither changes nor matters. */
@@ -553,6 +604,7 @@ int main(void) {
         cmocka_unit_test(origins_on_boxes),
         cmocka_unit_test(instances_hide_from_rays),
         cmocka_unit_test(times_are_clamped),
+        cmocka_unit_test(normals_are_of_both_motions),
         cmocka_unit_test(host_state_is_kept),
     };
     if (!query_test_isa())

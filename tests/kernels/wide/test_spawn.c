@@ -7,6 +7,7 @@
 
 #include "figures.h"
 #include "kernels/simd/wide_math.h"
+#include "kernels/trace/object_rays.h"
 #include "kernels/trace/spawn.h"
 #include "model/kernels.h"
 #include "query_test.h"
@@ -334,6 +335,108 @@ static void near_sheets_are_met(void **state) {
     assert_int_equal(missed, 0);
 }
 
+/* ---- the bound itself ---- */
+
+/* Small triangles about one unit from the origin, in planes through it: what the matrix adds is
+ * most of their error. */
+static void add_radial_triangles(struct mesh *mesh, struct rng *rng) {
+    for (uint32_t t = 0; t < TRIANGLES; t++) {
+        float center[3], side[3];
+        rng_direction(rng, center);
+        rng_direction(rng, side);
+        const uint32_t axis = t % 3; /* of the plane's normal */
+        for (int v = 0; v < 3; v++) {
+            float p[3];
+            for (int i = 0; i < 3; i++)
+                p[i] = center[i] + (v == 1 ? 0.01f * side[i] : v == 2 ? 0.01f * side[2 - i] : 0.0f);
+            p[axis] = 0.0f;
+            mesh_add_vertex(mesh, p[0], p[1], p[2]);
+        }
+        mesh_add_triangle(mesh, 3 * t, 3 * t + 1, 3 * t + 2);
+    }
+}
+
+/* The error of a point has room for what its image in object space is off by, seen from the world:
+ * five half-ulps of |M| |image|, which test_object_rays.c holds object_rays.h to. About the origin
+ * of the world little else is in it. */
+static void errors_cover_the_way_to_object_space(void **state) {
+    (void)state;
+    static const float scale[3] = {1, 1, 1};
+    struct rng rng = rng_seed(31);
+    double most = 0.0;
+    for (int world = 0; world < 20; world++) {
+        struct query_world w;
+        query_world_init(&w);
+        add_radial_triangles(query_world_mesh(&w), &rng);
+        for (int k = 0; k < 2; k++)
+            place(query_world_instance(&w, 0), 1, scale, 0.0f, &rng);
+        struct query_scene scene = query_test_scene(&w, false);
+        const struct trc_snapshot *snapshot = query_scene_snapshot(scene.scene);
+        const float *m = snapshot->instances[0].object_to_world->m;
+        for (uint32_t first = 0; first < TRIANGLES; first += TRC_WIDTH) {
+            const struct trc_surface s = surfaces(snapshot, first, 1, &rng);
+            const vfloat p[3] = {s.p.x, s.p.y, s.p.z};
+            const vfloat error[3] = {s.p_error.x, s.p_error.y, s.p_error.z};
+            struct trc_packet rays, image;
+            memset(&rays, 0, sizeof rays);
+            for (int i = 0; i < 3; i++)
+                vf_store(rays.o[i], p[i]);
+            trc_packet_to_object(&snapshot->instances[0], &rays, UINT64_MAX, &image);
+            for (int lane = 0; lane < TRC_WIDTH; lane++)
+                for (int i = 0; i < 3; i++) {
+                    double reach = 0.0;
+                    for (int k = 0; k < 3; k++)
+                        reach += fabs((double)m[4 * i + k]) * fabs((double)image.o[k][lane]);
+                    most = fmax(most, 5.0 * 0x1p-24 * reach / (double)vf_get(error[i], lane));
+                }
+        }
+        query_scene_destroy(&scene);
+        query_world_free(&w);
+    }
+    print_figure("errors of points of turned instances", "the way back needs %.2f of them", most);
+    assert_true(most < 1.0);
+}
+
+/* Rays that go on through a surface look back less than half of the way to where they come from,
+ * and not at all to a surface as near as the error; those that stay on its side only where they had
+ * looked back. */
+static void rays_look_back_no_farther_than_they_came(void **state) {
+    (void)state;
+    struct rng rng = rng_seed(33);
+    uint64_t through_count = 0, limited = 0;
+    struct query_world world;
+    query_world_init(&world);
+    struct mesh *mesh = query_world_object(&world);
+    for (uint32_t t = 0; t < TRIANGLES; t++)
+        add_triangle(mesh, &rng, 1.0f, 100.0f);
+    struct query_scene scene = query_test_scene(&world, false);
+    for (int round = 0; round < 400; round++) {
+        const struct trc_surface s = surfaces(query_scene_snapshot(scene.scene),
+                                              rng_below(&rng, TRIANGLES - TRC_WIDTH + 1), 1, &rng);
+        const vvec3 w = leaving(&s, cosines[round % 4], &rng);
+        const vvec3 o = trc_spawn_origin(&s, vf_ge(v3_dot(w, s.ng), vf_zero()));
+        /* From far less than the error to the size of the scene. */
+        const float way = round % 8 == 0 ? -1e-5f : exp2f(rng_range(&rng, -30.0f, 7.0f));
+        const vfloat back = trc_spawn_look_back(&s, o, w, vf_set(way));
+        for (int lane = 0; lane < TRC_WIDTH; lane++) {
+            const float b = vf_get(back, lane);
+            const float cosine = vf_get(v3_dot(w, s.ng), lane);
+            assert_true(b <= 0.0f);
+            if (cosine >= 0.0f) {
+                assert_true(b == 0.0f || way <= 0.0f);
+                continue;
+            }
+            through_count += b < 0.0f;
+            limited += b == -0.5f * way;
+            assert_true(way > 0.0f ? b >= -0.5f * way : b == 0.0f);
+        }
+    }
+    assert_true(through_count > 1000);
+    assert_true(limited > 100);
+    query_scene_destroy(&scene);
+    query_world_free(&world);
+}
+
 int main(void) {
     if (!test_cpu_can())
         return 77;
@@ -341,6 +444,8 @@ int main(void) {
         return 1;
     const struct CMUnitTest tests[] = {cmocka_unit_test(surfaces_are_left),
                                        cmocka_unit_test(instances_are_left),
+                                       cmocka_unit_test(errors_cover_the_way_to_object_space),
+                                       cmocka_unit_test(rays_look_back_no_farther_than_they_came),
                                        cmocka_unit_test(near_sheets_are_met)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
