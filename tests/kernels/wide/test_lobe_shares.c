@@ -71,9 +71,10 @@ struct split {
     double reflected, transmitted, chance;
 };
 
-/* by_facet: each facet has its own Fresnel factor; else all have that of the normal. */
+/* by_facet: each facet has its own Fresnel factor; else all have that of the normal. tint: how
+ * bright refraction is over reflection. */
 static struct split glass_split(const struct facets *f, double eta, bool by_facet,
-                                bool is_correlated) {
+                                bool is_correlated, double tint) {
     struct split s = {0.0, 0.0, 0.0};
     for (int i = 0; i < NORMALS; i++)
         for (int j = 0; j < NORMALS; j++) {
@@ -91,7 +92,7 @@ static struct split glass_split(const struct facets *f, double eta, bool by_face
                 s.reflected += seen * reflectance * shadowing(f, up, is_correlated);
             if (k > 0.0 && down[2] < 0.0)
                 s.transmitted += seen * (1.0 - reflectance) * shadowing(f, down, is_correlated);
-            s.chance += seen * reflectance;
+            s.chance += seen * reflectance / (reflectance + (1.0 - reflectance) * tint);
         }
     s.reflected /= NORMALS * NORMALS;
     s.transmitted /= NORMALS * NORMALS;
@@ -184,7 +185,7 @@ static void glass_splits_by_fresnel(void **state) {
             const struct facets f = {alpha, alpha, {sqrt(1.0 - cosine * cosine), 0.0, cosine}};
             const double eta = back ? 1.0 / 1.5 : 1.5;
             const struct split want =
-                glass_split(&f, eta, kinds[i].by_facet, kinds[i].is_correlated);
+                glass_split(&f, eta, kinds[i].by_facet, kinds[i].is_correlated, 1.0);
             /* All that is lost otherwise is put back in proportion. */
             const bool is_multi = kinds[i].mode & TRC_DISTRIBUTION_MULTI_GGX;
             const double gain = is_multi ? 1.0 / (want.reflected + want.transmitted) : 1.0;
@@ -199,6 +200,31 @@ static void glass_splits_by_fresnel(void **state) {
                    kinds[i].table);
             expect("rays sent below", name, found.mean[2], found.error[2], 1.0 - want.chance, 0.0);
         }
+    assert_int_equal(failures, 0);
+}
+
+/* Where refraction is darker than reflection, rays are sent as bright as they come back: the root
+ * of the colour at each of two surfaces. */
+static void tinted_glass_splits_by_brightness(void **state) {
+    (void)state;
+    static const double tints[] = {0.1, 0.5};
+    failures = 0;
+    for (int k = 0; k < 8; k++) {
+        const bool back = k % 2;
+        const double tint = tints[k / 2 % 2], cosine = k < 4 ? 0.9 : 0.35;
+        const struct facets f = {0.36, 0.36, {sqrt(1.0 - cosine * cosine), 0.0, cosine}};
+        const struct split want = glass_split(&f, back ? 1.0 / 1.5 : 1.5, true, true, tint);
+        struct model m = layered_glass(TRC_DISTRIBUTION_GGX, 0.6f, back);
+        const float color = (float)(tint * tint);
+        set3(&m, TRC_AT(LAYERED_PRINCIPLED, base_color), color, color, color);
+        const struct means found = sample_means(&m, wide(f.o[0], f.o[1], f.o[2]));
+        char name[80];
+        snprintf(name, sizeof name, "tint %.1f, cos %.2f, %s", tint, cosine,
+                 back ? "inside" : "outside");
+        expect("reflected", name, found.mean[0], found.error[0], want.reflected, 0.0);
+        expect("transmitted", name, found.mean[1], found.error[1], tint * want.transmitted, 0.0);
+        expect("rays sent below", name, found.mean[2], found.error[2], 1.0 - want.chance, 0.0);
+    }
     assert_int_equal(failures, 0);
 }
 
@@ -246,6 +272,7 @@ int main(void) {
         return 77;
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(glass_splits_by_fresnel),
+        cmocka_unit_test(tinted_glass_splits_by_brightness),
         cmocka_unit_test(anisotropy_keeps_energy),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

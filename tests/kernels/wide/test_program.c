@@ -492,6 +492,63 @@ static void test_at_surfaces(void **state) {
     }
 }
 
+/* Seen from behind: the index of a Fresnel is that from inside, and mapped normals turn over. */
+static void test_from_behind(void **state) {
+    (void)state;
+    static const struct expectation cases[] = {
+        {TRC_OP_FRESNEL, 0, 0, {1.5f, 0, 0, 1}, {{0.11414110f}, {0.11414110f}, {0.11414110f}}},
+        {TRC_OP_NORMAL_MAP,
+         0,
+         TRC_NO_RESOURCE,
+         {1, 1, .5f, .5f},
+         {{-1, 0, 0}, {0, 0, 1}, {0, 0, 1}}},
+        {TRC_OP_NORMAL_MAP, 0, NAME_UV, {.5f, 1, .5f, .5f}, {{-H, 0, H}, {0, 0, 1}, {0, 0, 1}}},
+        {TRC_OP_NORMAL_MAP, 1, 0, {1, 1, .5f, .5f}, {{0, -1, 0}, {-1, 0, 0}, {0, 0, 1}}},
+    };
+    static struct world_of_test w;
+    struct trc_surface s;
+    build_scene(&w);
+    build_surface(&w, &s);
+    s.backfacing = vm_all_set();
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
+        check_expectation(&cases[i], &s);
+}
+
+/* An object mirrored along x, and twice as long there: normals go by the inverse transpose and stay
+ * on their side. */
+static void test_mirrored_object(void **state) {
+    (void)state;
+    static const float mirrored[12] = {-2, 0, 0, 10, 0, 1, 0, 20, 0, 0, 1, 30},
+                       inverse[12] = {-.5f, 0, 0, 5, 0, 1, 0, -20, 0, 0, 1, -30};
+    static const struct expectation cases[] = {
+        {TRC_OP_TRANSFORM,
+         TRC_TRANSFORM_OBJECT_TO_WORLD | TRC_TRANSFORM_NORMAL,
+         0,
+         {1, 1, 0},
+         {{-.44721360f, .89442719f, 0}, {H, H, 0}, {1, 1, 0}}},
+        {TRC_OP_TRANSFORM,
+         TRC_TRANSFORM_OBJECT_TO_WORLD | TRC_TRANSFORM_NORMAL,
+         0,
+         {0, 0, 1},
+         {{0, 0, 1}, {0, 0, 1}, {0, 0, 1}}},
+        {TRC_OP_TRANSFORM,
+         TRC_TRANSFORM_WORLD_TO_OBJECT | TRC_TRANSFORM_NORMAL,
+         0,
+         {1, 1, 0},
+         {{-.89442719f, .44721360f, 0}, {H, H, 0}, {1, 1, 0}}},
+        {TRC_OP_NORMAL_MAP, 1, 0, {1, .5f, .5f, 1}, {{0, 0, 1}, {0, 0, 1}, {0, 0, 1}}},
+    };
+    static struct world_of_test w;
+    struct trc_surface s;
+    build_scene(&w);
+    build_surface(&w, &s);
+    memcpy(w.to_world[0].m, mirrored, sizeof mirrored);
+    memcpy(w.to_object[0].m, inverse, sizeof inverse);
+    w.instances[0].flips = 1;
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
+        check_expectation(&cases[i], &s);
+}
+
 /* Lanes that are not active must not be read: their instance is nonsense. */
 static void test_inactive_lanes(void **state) {
     (void)state;
@@ -600,6 +657,8 @@ int main(void) {
         cmocka_unit_test(test_curves),
         cmocka_unit_test(test_axis_rotation),
         cmocka_unit_test(test_at_surfaces),
+        cmocka_unit_test(test_from_behind),
+        cmocka_unit_test(test_mirrored_object),
         cmocka_unit_test(test_inactive_lanes),
         cmocka_unit_test(test_smooth_normal_map),
         cmocka_unit_test(test_world),

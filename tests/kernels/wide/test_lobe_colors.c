@@ -1,0 +1,120 @@
+/* Colours of Principled's lobes: what tints make of reflections, and what layers leave for those
+ * below them. Ratios of two settings, which formulas of a line tell. */
+#include "bsdf_test.h"
+
+static const float tint[3] = {0.9f, 0.5f, 0.2f};
+
+static float channel(vvec3 a, int c) { return vf_get(c == 0 ? a.x : c == 1 ? a.y : a.z, 0); }
+
+/* Reflection of light from the mirror direction, so that the normal is the micro-normal. */
+static vvec3 mirrored(struct model *m, double cosine) {
+    struct trc_surface s;
+    struct trc_lobes l;
+    struct trc_bsdf_value v;
+    prepare(m, direction(cosine, 0.0), &s, &l);
+    trc_bsdf_eval(&l, &s, direction(cosine, M_PI), vm_all_set(), &v);
+    return v.glossy;
+}
+
+/* Weight of the diffuse lobe seen at that cosine. */
+static vvec3 diffuse_weight(struct model *m, double cosine) {
+    struct trc_surface s;
+    struct trc_lobes l;
+    prepare(m, direction(cosine, 0.3), &s, &l);
+    for (int i = 0; i < l.count; i++)
+        if (l.lobe[i].kind == TRC_LOBE_DIFFUSE)
+            return l.lobe[i].weight;
+    fail_msg("there is no diffuse lobe");
+    return v3_zero();
+}
+
+static void expect_ratio(const char *what, vvec3 found, vvec3 whole, const double want[3]) {
+    for (int c = 0; c < 3; c++) {
+        const double ratio = (double)channel(found, c) / (double)channel(whole, c);
+        if (!(fabs(ratio - want[c]) <= 1e-4 * fmax(want[c], 1.0)))
+            fail_msg("%s, channel %d: %.5f, not %.5f", what, c, ratio, want[c]);
+    }
+}
+
+/* Blender 3.4: the hue is the colour over .3 red, .6 green and .1 blue. */
+static void specular_tint_is_the_hue(void **state) {
+    (void)state;
+    struct model plain = principled("plain"), tinted = principled("tinted");
+    const double bright = 0.3 * (double)tint[0] + 0.6 * (double)tint[1] + 0.1 * (double)tint[2];
+    for (int k = 1; k <= 2; k++) {
+        const double amount = 0.5 * k;
+        double want[3];
+        set3(&plain, TRC_AT(PRINCIPLED, base_color), tint[0], tint[1], tint[2]);
+        set3(&tinted, TRC_AT(PRINCIPLED, base_color), tint[0], tint[1], tint[2]);
+        set(&tinted, TRC_AT(PRINCIPLED, specular_tint), (float)amount);
+        for (int c = 0; c < 3; c++)
+            want[c] = 1.0 - amount + amount * (double)tint[c] / bright;
+        expect_ratio("specular tint", mirrored(&tinted, 1.0), mirrored(&plain, 1.0), want);
+    }
+}
+
+/* Blender 4: the tint of metal is whole where the cosine is 1/7, and nothing at the normal. */
+static void metals_have_their_tint_at_the_edge(void **state) {
+    (void)state;
+    struct model plain = layered_metal(TRC_DISTRIBUTION_GGX, 0.5f), tinted = plain;
+    const double none[3] = {1.0, 1.0, 1.0},
+                 whole[3] = {(double)tint[0], (double)tint[1], (double)tint[2]};
+    set3(&plain, TRC_AT(LAYERED_PRINCIPLED, base_color), 0.7f, 0.6f, 0.5f);
+    set3(&tinted, TRC_AT(LAYERED_PRINCIPLED, base_color), 0.7f, 0.6f, 0.5f);
+    set3(&tinted, TRC_AT(LAYERED_PRINCIPLED, specular_tint), tint[0], tint[1], tint[2]);
+    expect_ratio("at the normal", mirrored(&tinted, 1.0), mirrored(&plain, 1.0), none);
+    expect_ratio("at the edge", mirrored(&tinted, 1.0 / 7.0), mirrored(&plain, 1.0 / 7.0), whole);
+}
+
+/* Blender 4: a layer takes as much from all channels as its strongest one reflects. */
+static void layers_darken_by_their_strongest_channel(void **state) {
+    (void)state;
+    static const double same[3] = {1.0, 1.0, 1.0};
+    static const double cosines[] = {1.0, 0.5, 0.2};
+    for (int k = 0; k < 3; k++) {
+        struct model white = layered("white sheen", TRC_DISTRIBUTION_GGX, 0.5f), red = white;
+        set(&white, TRC_AT(LAYERED_PRINCIPLED, sheen_weight), 1.0f);
+        set(&red, TRC_AT(LAYERED_PRINCIPLED, sheen_weight), 1.0f);
+        set3(&red, TRC_AT(LAYERED_PRINCIPLED, sheen_tint), 1.0f, 0.1f, 0.0f);
+        const vvec3 below_white = diffuse_weight(&white, cosines[k]);
+        expect_ratio("below sheen", diffuse_weight(&red, cosines[k]), below_white, same);
+        struct model bare = layered("bare", TRC_DISTRIBUTION_GGX, 0.5f);
+        assert_true(channel(below_white, 0) <
+                    0.99f * channel(diffuse_weight(&bare, cosines[k]), 0));
+        struct model blue = bare;
+        set3(&blue, TRC_AT(LAYERED_PRINCIPLED, specular_tint), 0.0f, 0.0f, 1.0f);
+        expect_ratio("below gloss", diffuse_weight(&blue, cosines[k]),
+                     diffuse_weight(&bare, cosines[k]), same);
+    }
+}
+
+/* The tint of a coat is that of light that goes straight down; from the side its way is longer, as
+ * the coat's index bends it. */
+static void coats_tint_by_the_way_through_them(void **state) {
+    (void)state;
+    for (int k = 0; k < 4; k++) {
+        const double cosine = 1.0 - 0.28 * k, index = 1.5;
+        const double way = 1.0 / sqrt(1.0 - (1.0 - cosine * cosine) / (index * index));
+        double want[3];
+        struct model white = layered("white coat", TRC_DISTRIBUTION_GGX, 0.5f);
+        set(&white, TRC_AT(LAYERED_PRINCIPLED, coat_weight), 1.0f);
+        struct model tinted = white;
+        set3(&tinted, TRC_AT(LAYERED_PRINCIPLED, coat_tint), tint[0], tint[1], tint[2]);
+        for (int c = 0; c < 3; c++)
+            want[c] = pow((double)tint[c], way);
+        expect_ratio("below a coat", diffuse_weight(&tinted, cosine),
+                     diffuse_weight(&white, cosine), want);
+    }
+}
+
+int main(void) {
+    if (!test_cpu_can())
+        return 77;
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(specular_tint_is_the_hue),
+        cmocka_unit_test(metals_have_their_tint_at_the_edge),
+        cmocka_unit_test(layers_darken_by_their_strongest_channel),
+        cmocka_unit_test(coats_tint_by_the_way_through_them),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
