@@ -1,6 +1,7 @@
 /* Rough gloss beside integrals in double: light samples and continuation rays share the light of
  * what has extent, whatever their numbers; Filter Glossy. */
 #include "figures.h"
+#include "node_list.h"
 #include "picture_test.h"
 
 /* The picture: a strip of the floor z = 0 about the origin, seen from straight above in parallel
@@ -288,10 +289,53 @@ static void filter_glossy(void **state) {
     assert_ok(trc_scene_destroy(scene));
 }
 
+/* Two weak mirrors, one leaning to each side, under walls of their own brightness: rays are sent
+ * now and then, and those that are choose between both. */
+static void rays_sent_seldom_choose_all_lobes(void **state) {
+    (void)state;
+    static const float left[12] = {-4, -9, -9, -4, -9, 9, -4, 9, 9, -4, 9, -9};
+    static const float right[12] = {4, -9, -9, 4, 9, -9, 4, 9, 9, 4, -9, 9};
+    static const float weights[2] = {0.02f, 0.05f}, walls[2] = {1.0f, 4.0f};
+    static float pixels[4 * FRAME];
+    const trc_scene scene = floor_scene(SOURCES, 0.0f, false);
+    struct node_list list = {0};
+    uint32_t mirrors[2];
+    for (int k = 0; k < 2; k++) {
+        const float x = k ? 0.6f : -0.6f;
+        mirrors[k] = NODE_ADD(&list, TRC_NODE_GLOSSY, TRC_DISTRIBUTION_SHARP,
+                              node_color(weights[k], weights[k], weights[k]), node_number(0.0f),
+                              node_number(0.0f), node_number(0.0f), node_color(x, 0.0f, 0.8f),
+                              node_standard());
+    }
+    const uint32_t sum =
+        NODE_ADD(&list, TRC_NODE_ADD_SHADER, 0, node_link(mirrors[0], 0), node_link(mirrors[1], 0));
+    const trc_material_desc both = node_list_material(&list, sum);
+    trc_id id = 0;
+    assert_ok(trc_material_create(scene, &both, &id));
+    fixture_level(scene, 1.0f, 0.1f, id);
+    fixture_quad(scene, left, fixture_material(scene, TRC_NODE_EMISSION, walls[0]));
+    fixture_quad(scene, right, fixture_material(scene, TRC_NODE_EMISSION, walls[1]));
+    assert_ok(trc_scene_commit(scene));
+    const trc_render_desc desc = render_desc(SIDE, 4 * SAMPLES);
+    render(scene, &desc, pixels);
+    const double want = (double)(weights[0] * walls[0] + weights[1] * walls[1]);
+    double mean = 0.0, mean2 = 0.0;
+    for (int p = 0; p < FRAME; p++) {
+        mean += (double)pixels[4 * p] / FRAME;
+        mean2 += (double)pixels[4 * p] * (double)pixels[4 * p] / FRAME;
+    }
+    const double error = sqrt(fmax(mean2 - mean * mean, 0.0) / (FRAME - 1));
+    printf("  two weak mirrors: %.5f +- %.5f, %.5f expected\n", mean, error, want);
+    assert_true(error < 0.005 * want);
+    assert_true(fabs(mean - want) <= 5.0 * error + 1e-5);
+    assert_ok(trc_scene_destroy(scene));
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(weights_count_light_samples),
         cmocka_unit_test(weights_count_rays_not_sent),
+        cmocka_unit_test(rays_sent_seldom_choose_all_lobes),
         cmocka_unit_test(weights_pass_transparency),
         cmocka_unit_test(filter_glossy),
     };

@@ -172,12 +172,143 @@ static void faces_that_shine_are_weighed_by_themselves(void **state) {
     assert_ok(trc_scene_destroy(found));
 }
 
+/* ---- many lights, and hidden ones ---- */
+
+static trc_id add_material_sum(trc_scene scene, float matt, float gloss, float roughness) {
+    struct node_list list = {0};
+    const uint32_t a = NODE_ADD(&list, TRC_NODE_DIFFUSE, 0, node_color(matt, matt, matt),
+                                node_number(0.0f), node_standard());
+    const uint32_t b =
+        NODE_ADD(&list, TRC_NODE_GLOSSY, TRC_DISTRIBUTION_GGX, node_color(gloss, gloss, gloss),
+                 node_number(roughness), node_number(0.0f), node_number(0.0f), node_standard(),
+                 node_standard());
+    const uint32_t sum = NODE_ADD(&list, TRC_NODE_ADD_SHADER, 0, node_link(a, 0), node_link(b, 0));
+    return level_material(scene, &list, sum, 0);
+}
+
+/* A large lamp 2 m above a floor. */
+static trc_scene lit_floor(uint32_t visibility, trc_id (*material)(trc_scene scene)) {
+    const trc_scene scene = fixture_level_view();
+    trc_light_desc lamp = default_light_desc();
+    trc_id id = 0;
+    lamp.transform[11] = 2.0f;
+    lamp.size_x = lamp.size_y = 4.0f;
+    lamp.visibility = visibility;
+    assert_ok(trc_light_create(scene, &lamp, &id));
+    fixture_level(scene, 100.0f, 0.0f, material(scene));
+    assert_ok(trc_scene_commit(scene));
+    return scene;
+}
+static trc_id matt(trc_scene scene) { return fixture_material(scene, TRC_NODE_DIFFUSE, 0.5f); }
+static trc_id matt_and_gloss(trc_scene scene) { return add_material_sum(scene, 0.5f, 0.4f, 0.7f); }
+
+/* A lamp that glossy rays do not meet: no ray brings what its samples leave to rays, so that matt
+ * and glossy lobes together show what matt ones do alone. */
+static void hidden_lamps_leave_nothing_to_rays(void **state) {
+    (void)state;
+    const uint32_t hidden = TRC_VISIBLE_ALL & ~(uint32_t)TRC_VISIBLE_GLOSSY;
+    const trc_scene alone = lit_floor(hidden, matt), both = lit_floor(hidden, matt_and_gloss);
+    const trc_scene seen = lit_floor(TRC_VISIBLE_ALL, matt_and_gloss);
+    const struct mean want = mean_of(alone, 64);
+    expect_same("matt and glossy", mean_of(both, 64), want);
+    assert_true(mean_of(seen, 64).value > 1.2 * want.value);
+    assert_ok(trc_scene_destroy(alone));
+    assert_ok(trc_scene_destroy(both));
+    assert_ok(trc_scene_destroy(seen));
+}
+
+/* A lamp on edge, most of it below the floor; and a dim one of its own. */
+static trc_scene sunken(bool has_lamp, bool has_dim) {
+    const trc_scene scene = fixture_level_view();
+    /* Faces -x from x = 6, z from -5 to 1. */
+    static const float on_edge[12] = {0, 0, 1, 6, 1, 0, 0, 0, 0, 1, 0, -2};
+    trc_light_desc lamp = default_light_desc();
+    trc_id id = 0;
+    memcpy(lamp.transform, on_edge, sizeof on_edge);
+    lamp.size_x = lamp.size_y = 6.0f;
+    lamp.strength = 400.0f;
+    lamp.cast_shadow = 0;
+    if (has_lamp)
+        assert_ok(trc_light_create(scene, &lamp, &id));
+    trc_light_desc dim = default_light_desc();
+    dim.strength = 20.0f;
+    dim.type = TRC_LIGHT_POINT;
+    if (has_dim)
+        assert_ok(trc_light_create(scene, &dim, &id));
+    fixture_level(scene, 100.0f, 0.0f, matt(scene));
+    assert_ok(trc_scene_commit(scene));
+    return scene;
+}
+
+/* Lights whose middle is below the horizon shine with what is above: two give the sum of both. */
+static void lamps_below_the_horizon_are_chosen(void **state) {
+    (void)state;
+    struct mean alone[2];
+    for (int k = 0; k < 2; k++) {
+        const trc_scene scene = sunken(k == 0, k == 1);
+        alone[k] = mean_of(scene, 256);
+        assert_ok(trc_scene_destroy(scene));
+    }
+    assert_true(alone[0].value > 0.1 * alone[1].value);
+    const struct mean sum = {alone[0].value + alone[1].value,
+                             hypot(alone[0].error, alone[1].error)};
+    const trc_scene both = sunken(true, true);
+    expect_same("two lamps", mean_of(both, 256), sum);
+    assert_ok(trc_scene_destroy(both));
+}
+
+/* A dark sky with one bright texel above the horizon, over a floor. */
+static trc_scene one_bright_texel(uint32_t is_sampled) {
+    enum { WIDTH = 32, HEIGHT = 16 };
+    static float pixels[4 * WIDTH * HEIGHT];
+    const trc_scene scene = fixture_level_view();
+    for (uint32_t i = 0; i < 4 * WIDTH * HEIGHT; i++)
+        pixels[i] = i % 4 == 3 ? 1.0f : i / 4 == 11 * WIDTH + 5 ? 100.0f : 0.01f;
+    trc_image_desc desc = default_image_desc();
+    trc_id image = 0;
+    desc.width = WIDTH;
+    desc.height = HEIGHT;
+    desc.pixels = pixels;
+    desc.pixel_bytes = sizeof pixels;
+    assert_ok(trc_image_create(scene, &desc, &image));
+    struct node_list list = {0};
+    const uint32_t texture =
+        NODE_ADD(&list, TRC_NODE_ENVIRONMENT, TRC_IMAGE_CLOSEST, node_standard());
+    list.nodes[texture].image = image;
+    const uint32_t surface =
+        NODE_ADD(&list, TRC_NODE_BACKGROUND, 0, node_link(texture, 0), node_number(1.0f));
+    trc_world_desc world = default_world_desc(level_material(scene, &list, surface, 0));
+    world.use_sampling = is_sampled;
+    world.map_resolution = 64;
+    assert_ok(trc_scene_set_world(scene, &world));
+    fixture_level(scene, 100.0f, 0.0f, matt(scene));
+    assert_ok(trc_scene_commit(scene));
+    return scene;
+}
+
+/* Samples go where the sky is bright: the noise is that of a tenth of them at most. */
+static void the_sky_is_sampled_where_it_is_bright(void **state) {
+    (void)state;
+    const trc_scene even = one_bright_texel(0), map = one_bright_texel(1);
+    const struct mean want = mean_of(even, 4096), found = mean_of(map, 256);
+    const struct mean blind = mean_of(even, 256);
+    printf("  sky: %.5f +- %.5f by the map, %.5f +- %.5f without\n", found.value, found.error,
+           blind.value, blind.error);
+    assert_true(fabs(found.value - want.value) <= 5.0 * hypot(found.error, want.error));
+    assert_true(found.error < 0.3 * blind.error);
+    assert_ok(trc_scene_destroy(even));
+    assert_ok(trc_scene_destroy(map));
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(spheres_are_met_from_inside),
         cmocka_unit_test(lamps_keep_their_switches),
         cmocka_unit_test(emissive_meshes_keep_their_switches),
         cmocka_unit_test(faces_that_shine_are_weighed_by_themselves),
+        cmocka_unit_test(hidden_lamps_leave_nothing_to_rays),
+        cmocka_unit_test(lamps_below_the_horizon_are_chosen),
+        cmocka_unit_test(the_sky_is_sampled_where_it_is_bright),
     };
     if (!query_test_isa())
         return QUERY_TEST_SKIPPED;

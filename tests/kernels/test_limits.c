@@ -161,6 +161,44 @@ static void panes_in_shadows_are_limited(void **state) {
         }
 }
 
+/* Triangles of slots that an instance has no material for have its last one, for shadow rays too.
+ */
+static void slots_beyond_the_materials_have_the_last(void **state) {
+    (void)state;
+    for (int is_clear = 0; is_clear < 2; is_clear++) {
+        static const float corners[12] = {-9, -9, 3, 9, -9, 3, 9, 9, 3, -9, 9, 3};
+        static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
+        static const uint16_t slots[2] = {1, 7};
+        const trc_scene scene = fixture_level_view();
+        trc_light_desc light = default_light_desc();
+        trc_id id = 0;
+        light.type = TRC_LIGHT_SUN;
+        light.strength = (float)PI;
+        assert_ok(trc_light_create(scene, &light, &id));
+        fixture_level(scene, 20.0f, 0.0f, fixture_material(scene, TRC_NODE_DIFFUSE, 0.5f));
+        trc_mesh_desc desc = default_mesh_desc();
+        desc.vertex_count = 4;
+        desc.triangle_count = 2;
+        desc.positions = corners;
+        desc.position_count = 12;
+        desc.indices = indices;
+        desc.index_count = 6;
+        desc.material_index = slots;
+        assert_ok(trc_mesh_create(scene, &desc, &id));
+        const trc_id matt = fixture_material(scene, TRC_NODE_DIFFUSE, 0.5f);
+        const trc_id clear = clear_glass(scene);
+        const trc_id materials[2] = {is_clear ? matt : clear, is_clear ? clear : matt};
+        trc_instance_desc instance = default_instance_desc(id);
+        instance.materials = materials;
+        instance.material_count = 2;
+        assert_ok(trc_instance_create(scene, &instance, &id));
+        assert_ok(trc_scene_commit(scene));
+        const trc_render_desc render = level_desc(4);
+        expect_all(scene, &render, TRC_PASS_COMBINED, is_clear ? 0.5 : 0.0, 1e-5);
+        assert_ok(trc_scene_destroy(scene));
+    }
+}
+
 /* ---- what is seen of world and lights ---- */
 
 static void a_world_can_hide_from_the_camera(void **state) {
@@ -236,6 +274,7 @@ int main(void) {
         cmocka_unit_test(glossy_bounces_are_limited),
         cmocka_unit_test(panes_are_limited),
         cmocka_unit_test(panes_in_shadows_are_limited),
+        cmocka_unit_test(slots_beyond_the_materials_have_the_last),
         cmocka_unit_test(a_world_can_hide_from_the_camera),
         cmocka_unit_test(groups_are_exposed),
         cmocka_unit_test(samples_without_a_number_are_reported),

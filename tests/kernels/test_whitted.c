@@ -1,6 +1,6 @@
 /* Whitted's trees of rays: whole, however many rays wait. A closed room of mirrors whose pictures
  * and counts of rays are known from following the one path that all rays of a tree share. */
-#include "picture_test.h"
+#include "level_test.h"
 
 /* Each wall has so many ideal lobes of that weight: more rays than any stack of the tile's rays
  * would hold at once if steps took all they can. */
@@ -156,8 +156,47 @@ static void two_trees(void **state) {
     assert_ok(trc_scene_destroy(scene));
 }
 
+/* A roof of radiance 1 over a rough mirror, as a lamp or as a surface that is no light. */
+static trc_scene mirrored_roof(bool is_lamp) {
+    const trc_scene scene = fixture_level_view();
+    fixture_level(scene, 100.0f, 0.0f, fixture_glossy(scene, 0.8f, 0.3f));
+    if (is_lamp) {
+        trc_light_desc lamp = default_light_desc();
+        trc_id id = 0;
+        lamp.transform[11] = 3.0f;
+        lamp.size_x = lamp.size_y = 20.0f;
+        lamp.strength = 4.0f * 20.0f * 20.0f;
+        assert_ok(trc_light_create(scene, &lamp, &id));
+    } else {
+        struct node_list list = {0};
+        NODE_ADD(&list, TRC_NODE_EMISSION, 0, node_color(1, 1, 1), node_number(1.0f));
+        fixture_level(scene, 10.0f, 3.0f, level_material(scene, &list, 0, 0));
+    }
+    assert_ok(trc_scene_commit(scene));
+    return scene;
+}
+
+/* What a lamp of extent looks like in gloss is left to ideal rays, as of any surface that shines:
+ * its samples add nothing there. */
+static void lamps_are_mirrored_once(void **state) {
+    (void)state;
+    float pixels[2][4 * LEVEL_PIXELS];
+    for (int is_lamp = 0; is_lamp < 2; is_lamp++) {
+        const trc_scene scene = mirrored_roof(is_lamp);
+        trc_render_desc desc = level_desc(4);
+        desc.integrator = TRC_INTEGRATOR_WHITTED;
+        render(scene, &desc, pixels[is_lamp]);
+        assert_ok(trc_scene_destroy(scene));
+    }
+    for (int p = 0; p < LEVEL_PIXELS; p++) {
+        assert_true(pixels[0][4 * p] > 0.5f);
+        assert_float_equal(pixels[1][4 * p], pixels[0][4 * p], 1e-5f);
+    }
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(whole_trees), cmocka_unit_test(two_trees)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(whole_trees), cmocka_unit_test(two_trees),
+                                       cmocka_unit_test(lamps_are_mirrored_once)};
     if (!query_test_isa())
         return QUERY_TEST_SKIPPED;
     return cmocka_run_group_tests_name("whitted", tests, NULL, NULL);
