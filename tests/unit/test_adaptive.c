@@ -258,6 +258,66 @@ static void same_mean(void **state) {
     assert_true(fabs(a - f) < 4.0 * sqrt(variance));
 }
 
+/* A veil over all of the picture that lets half through: every sample that counts meets it, so it
+ * covers a half of every pixel, however many samples are taken for the error alone. */
+static void mattes_are_of_samples_that_count(void **state) {
+    (void)state;
+    const trc_scene scene = fixture_scene();
+    const trc_node_input inputs[] = {{.node = -1, .value = {0.5f, 0.5f, 0.5f}}};
+    const trc_node node = {.type = TRC_NODE_TRANSPARENT, .input_count = 1};
+    const trc_material_desc veil = {.struct_size = sizeof veil,
+                                    .node_count = 1,
+                                    .nodes = &node,
+                                    .inputs = inputs,
+                                    .input_count = 1,
+                                    .flags = TRC_MATERIAL_TRANSPARENT_SHADOW};
+    const float corners[12] = {-9, -9, 3, 9, -9, 3, 9, 9, 3, -9, 9, 3};
+    static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
+    trc_mesh_desc mesh = default_mesh_desc();
+    trc_id id = 0, material = 0;
+    mesh.vertex_count = 4;
+    mesh.triangle_count = 2;
+    mesh.positions = corners;
+    mesh.position_count = 12;
+    mesh.indices = indices;
+    mesh.index_count = 6;
+    assert_int_equal(trc_material_create(scene, &veil, &material), TRC_OK);
+    assert_int_equal(trc_mesh_create(scene, &mesh, &id), TRC_OK);
+    trc_instance_desc instance = default_instance_desc(id);
+    instance.materials = &material;
+    instance.material_count = 1;
+    instance.cryptomatte_object = trc_cryptomatte_id("veil");
+    assert_int_equal(trc_instance_create(scene, &instance, &id), TRC_OK);
+    assert_int_equal(trc_scene_commit(scene), TRC_OK);
+    static float mattes[4 * FRAME], counts[FRAME];
+    trc_render_desc desc = picture_desc(0.003f);
+    desc.passes |= UINT64_C(1) << TRC_PASS_SAMPLE_COUNT;
+    desc.cryptomattes = 1u << TRC_CRYPTOMATTE_OBJECT;
+    desc.cryptomatte_depth = 2;
+    trc_render render = 0;
+    assert_int_equal(trc_render_start(scene, &desc, &render), TRC_OK);
+    assert_int_equal(trc_render_wait(render, -1.0), TRC_OK);
+    assert_int_equal(
+        trc_render_read(render, TRC_PASS_CRYPTOMATTE(TRC_CRYPTOMATTE_OBJECT, 0), mattes, 4 * FRAME),
+        TRC_OK);
+    assert_int_equal(trc_render_read(render, TRC_PASS_SAMPLE_COUNT, counts, FRAME), TRC_OK);
+    trc_render_progress progress = {.struct_size = sizeof progress};
+    assert_int_equal(trc_render_poll(render, &progress), TRC_OK);
+    assert_int_equal(trc_render_destroy(render), TRC_OK);
+    double counted = 0.0;
+    float least = INFINITY, most = 0.0f;
+    for (uint32_t i = 0; i < FRAME; i++) {
+        counted += (double)counts[i];
+        least = fminf(least, counts[i]);
+        most = fmaxf(most, counts[i]);
+        assert_true(mattes[4 * i] == trc_cryptomatte_id("veil"));
+        assert_float_equal(mattes[4 * i + 1], 0.5f, 1e-6f);
+    }
+    assert_true(least < most);
+    assert_true(counted < 0.99 * (double)progress.rays_camera / 2.0); /* one on through the veil */
+    assert_int_equal(trc_scene_destroy(scene), TRC_OK);
+}
+
 static int group_setup(void **state) {
     static trc_scene scene;
     scene = fixture_scene();
@@ -269,8 +329,12 @@ static int group_teardown(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(unbiased),   cmocka_unit_test(stages),
-                                       cmocka_unit_test(neighbours), cmocka_unit_test(unreached),
-                                       cmocka_unit_test(counts),     cmocka_unit_test(same_mean)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(unbiased),
+                                       cmocka_unit_test(stages),
+                                       cmocka_unit_test(neighbours),
+                                       cmocka_unit_test(unreached),
+                                       cmocka_unit_test(counts),
+                                       cmocka_unit_test(same_mean),
+                                       cmocka_unit_test(mattes_are_of_samples_that_count)};
     return cmocka_run_group_tests(tests, group_setup, group_teardown);
 }

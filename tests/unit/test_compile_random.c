@@ -89,6 +89,8 @@ static void random_graph(uint32_t seed, bool hidden) {
     add_emission(link_to(made[23], 0), 1);
 }
 
+static bool is_same(float a, float b) { return a == b || (isnan(a) && isnan(b)); }
+
 static void test_folded_equals_run(void **state) {
     (void)state;
     struct trc_instance instance = {.random = 1.0f};
@@ -111,7 +113,7 @@ static void test_folded_equals_run(void **state) {
                 const float a = folded->operands[folded->leaves[0].first_operand + c].value;
                 const float b =
                     trc_operand_value(&run->operands[run->leaves[0].first_operand + c], &regs);
-                if (memcmp(&a, &b, sizeof a) != 0 && !(isnan(a) && isnan(b)) && a != b) {
+                if (!is_same(a, b)) {
                     fail_msg("seed %u: folded %.9g, run %.9g", seed, a, b);
                 }
             }
@@ -120,6 +122,60 @@ static void test_folded_equals_run(void **state) {
         trc_material_release(run);
     }
     assert_true(programs > 1000);
+}
+
+/* Operations that give an input back for 0 or 1 at the other: each mode of Math and of Mix Color
+ * with such a constant at any of its inputs, and a number of the object at the rest. The same as
+ * where that constant is one of the object, too, so that nothing is known of it. */
+static void test_neutral_constants(void **state) {
+    (void)state;
+    struct trc_instance instance = {.random = 0.375f, .color = {0.0f, 1.0f, 0.0f, 0.0f}};
+    struct trc_mesh mesh = {.default_uv = -1}, *meshes[1] = {&mesh};
+    const struct trc_snapshot snapshot = {
+        .instance_count = 1, .instances = &instance, .mesh_count = 1, .meshes = meshes};
+    const struct trc_surface s = {.snapshot = &snapshot, .active = vm_all_set()};
+    static struct trc_registers regs;
+    static const struct {
+        uint32_t type, modes;
+    } types[] = {{TRC_NODE_MATH, TRC_MATH_DEGREES + 1},
+                 {TRC_NODE_MIX_COLOR, TRC_BLEND_EXCLUSION + 1}};
+    uint32_t shorter = 0;
+    for (int type = 0; type < 2; type++)
+        for (uint32_t mode = 0; mode < types[type].modes; mode++)
+            for (int at = 0; at < 3; at++)
+                for (int constant = 0; constant < 2; constant++) {
+                    float found[2][3];
+                    uint32_t lengths[2];
+                    for (int hidden = 0; hidden < 2; hidden++) {
+                        graph_clear();
+                        const int32_t info = add(TRC_NODE_OBJECT_INFO, 0, 0, NULL);
+                        const int32_t parts = ADD(TRC_NODE_SEPARATE, 0, link_to(info, 1));
+                        trc_node_input in[3];
+                        for (int i = 0; i < 3; i++)
+                            in[i] = link_to(info, 5);
+                        in[at] =
+                            hidden ? link_to(parts, (uint32_t)constant) : value((float)constant);
+                        const int32_t node = add(types[type].type, mode, 3, in);
+                        add_emission(link_to(node, 0), 1);
+                        struct trc_material *m = compiled();
+                        lengths[hidden] = m->instruction_count;
+                        trc_program_run_scalar(m, &s, &regs);
+                        for (int c = 0; c < 3; c++)
+                            found[hidden][c] =
+                                m->leaf_count
+                                    ? trc_operand_value(
+                                          &m->operands[m->leaves[0].first_operand + c], &regs)
+                                    : 0.0f;
+                        trc_material_release(m);
+                    }
+                    shorter += lengths[0] < lengths[1];
+                    for (int c = 0; c < 3; c++)
+                        if (!is_same(found[0][c], found[1][c]))
+                            fail_msg("node %u mode %u, %d at input %d: %g, not %g",
+                                     types[type].type, mode, constant, at, (double)found[0][c],
+                                     (double)found[1][c]);
+                }
+    assert_true(shorter > 100);
 }
 
 /* Random node lists, mostly nonsense: compiled or refused, never worse. */
@@ -168,6 +224,7 @@ static void test_random_descriptors(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_folded_equals_run),
+        cmocka_unit_test(test_neutral_constants),
         cmocka_unit_test(test_random_descriptors),
     };
     return cmocka_run_group_tests(tests, setup, teardown);

@@ -197,6 +197,28 @@ static void test_scene_limit(void **state) {
     assert_int_equal(trc_scene_destroy(scene), TRC_OK);
 }
 
+/* A smaller image is read as the whole one: what its numbers are stays. */
+static void test_halves_keep_their_kind(void **state) {
+    (void)state;
+    static const float pixels[4 * 16] = {1, 0.5f, 0.25f, 0.5f, 1, 1, 1, 0};
+    for (uint32_t mode = TRC_ALPHA_STRAIGHT; mode <= TRC_ALPHA_NONE; mode++)
+        for (uint32_t is_float = 0; is_float < 2; is_float++) {
+            trc_image_desc desc = pixels_desc(4, 4, pixels, is_float);
+            desc.alpha_mode = mode;
+            desc.is_srgb = !is_float;
+            struct trc_image *image = loaded(&desc), *half = NULL;
+            assert_int_equal(trc_image_halve(image, &half), TRC_OK);
+            assert_int_equal(half->levels[0].width, 2);
+            assert_int_equal(half->is_associated, image->is_associated);
+            assert_int_equal(half->is_associated, mode < 2);
+            assert_int_equal(half->is_srgb, image->is_srgb);
+            assert_int_equal(half->format, image->format);
+            assert_int_equal(half->bad_texel_count, image->bad_texel_count);
+            trc_image_release(half);
+            trc_image_release(image);
+        }
+}
+
 enum { KEPT = 3, KEPT_SIDE = 256 };
 
 /* The images of a scene as the last commit has them, of which the caller is a holder. */
@@ -861,6 +883,7 @@ int main(void) {
         cmocka_unit_test(test_refused_pixels),
         cmocka_unit_test(test_limits),
         cmocka_unit_test(test_scene_limit),
+        cmocka_unit_test(test_halves_keep_their_kind),
         cmocka_unit_test(test_scene_limit_without_memory),
         cmocka_unit_test(test_levels),
         cmocka_unit_test(test_holders),
@@ -882,7 +905,8 @@ int main(void) {
         cmocka_unit_test(test_color_of_grey_files),
         cmocka_unit_test(test_refused_colors),
 #else
-        cmocka_unit_test(test_no_colors),       cmocka_unit_test(test_no_files),
+        cmocka_unit_test(test_no_colors),
+        cmocka_unit_test(test_no_files),
 #endif
     };
     return cmocka_run_group_tests(tests, set_up_reader, tear_down_reader);

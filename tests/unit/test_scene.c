@@ -9,6 +9,7 @@
 
 #include "bvh/bvh.h"
 #include "core/core.h"
+#include "model/film.h"
 #include "scene/rebuild.h"
 #include "scene/scene.h"
 
@@ -280,6 +281,92 @@ static void rebuilds_end_with_what_they_are_for(void **state) {
     assert_int_equal(trc_scene_destroy(final.scene), TRC_OK);
 }
 
+static bool has_rebuild(trc_scene scene) {
+    struct trc_scene_access access;
+    assert_int_equal(trc_scene_enter(scene, &access), TRC_OK);
+    const bool found = access.scene->rebuild != NULL;
+    trc_scene_leave(&access);
+    return found;
+}
+
+/* Destroys the sheet while its tree is under way and puts a cube in its place; false if the tree
+ * was done before the cube was committed. */
+static bool replace_sheet(struct sheet *sheet) {
+    for (float share = 0.002f; !has_rebuild(sheet->scene); share += 0.002f) {
+        assert_true(share < 0.5f);
+        sheet_pose(sheet, share);
+    }
+    const trc_mesh_desc cube = default_mesh_desc();
+    assert_int_equal(trc_instance_destroy(sheet->scene, sheet->instance), TRC_OK);
+    assert_int_equal(trc_mesh_destroy(sheet->scene, sheet->mesh), TRC_OK);
+    assert_int_equal(trc_mesh_create(sheet->scene, &cube, &sheet->mesh), TRC_OK);
+    trc_instance_desc instance = default_instance_desc(sheet->mesh);
+    instance.visibility = TRC_VISIBLE_CAMERA;
+    assert_int_equal(trc_instance_create(sheet->scene, &instance, &sheet->instance), TRC_OK);
+    assert_int_equal(trc_scene_commit(sheet->scene), TRC_OK);
+    return has_rebuild(sheet->scene);
+}
+
+/* The tree of a mesh that has gone is not for the one in its place. */
+static void rebuilds_are_for_their_own_mesh(void **state) {
+    (void)state;
+    bool is_under_way = false;
+    for (int trial = 0; trial < 200 && !is_under_way; trial++) {
+        struct sheet sheet = sheet_create(0, 0.0f);
+        is_under_way = replace_sheet(&sheet);
+        if (is_under_way) {
+            float posed[24];
+            char message[256];
+            assert_true(await_rebuild(sheet.scene));
+            for (int i = 0; i < 24; i++)
+                posed[i] = 1.01f * cube_positions[i];
+            assert_int_equal(trc_mesh_update(sheet.scene, sheet.mesh, 1, posed, 24, NULL, 0),
+                             TRC_OK);
+            assert_int_equal(trc_scene_commit(sheet.scene), TRC_OK);
+            const struct trc_snapshot *snapshot = snapshot_of(sheet.scene);
+            if (!trc_bvh_check(snapshot->bvh, snapshot, message, sizeof message))
+                fail_msg("%s", message);
+        }
+        assert_int_equal(trc_scene_destroy(sheet.scene), TRC_OK);
+    }
+    assert_true(is_under_way);
+}
+
+/* ---- queries ---- */
+
+/* Whether they are answered or refused. */
+static void queries_hold_the_snapshot_no_longer(void **state) {
+    (void)state;
+    const trc_scene scene = fixture_scene();
+    struct trc_snapshot *snapshot = (struct trc_snapshot *)snapshot_of(scene);
+    const uint32_t refs = (uint32_t)atomic_load(&snapshot->refs);
+    const float zero = 0.0f, down = -1.0f, up = 5.0f;
+    uint32_t instance = 0;
+    uint8_t occluded = 0;
+    trc_rays rays = {.struct_size = sizeof rays,
+                     .visibility = TRC_VISIBLE_ALL,
+                     .count = 1,
+                     .origin_x = &zero,
+                     .origin_y = &zero,
+                     .origin_z = &up,
+                     .direction_x = &zero,
+                     .direction_y = &zero,
+                     .direction_z = &down};
+    const trc_hits hits = {.struct_size = sizeof hits, .instance = &instance};
+    for (uint32_t size = 0; size < 2; size++) {
+        const trc_status want = size ? TRC_ERROR_INVALID_ARGUMENT : TRC_OK;
+        const uint32_t packet_size = 3 * size;
+        assert_int_equal(trc_query_closest(scene, &rays, packet_size, &hits), want);
+        assert_int_equal(trc_query_occluded(scene, &rays, packet_size, &occluded, 1), want);
+        assert_int_equal((uint32_t)atomic_load(&snapshot->refs), refs);
+    }
+    rays.direction_x = NULL;
+    assert_int_equal(trc_query_closest(scene, &rays, 0, &hits), TRC_ERROR_INVALID_ARGUMENT);
+    assert_int_equal(trc_query_occluded(scene, &rays, 0, &occluded, 1), TRC_ERROR_INVALID_ARGUMENT);
+    assert_int_equal((uint32_t)atomic_load(&snapshot->refs), refs);
+    assert_int_equal(trc_scene_destroy(scene), TRC_OK);
+}
+
 /* ---- edits ---- */
 
 static void removed_lights_are_gone(void **state) {
@@ -533,6 +620,55 @@ static void cancelled_renders_keep_what_they_have(void **state) {
     assert_int_equal(trc_render_destroy(render), TRC_ERROR_INVALID_HANDLE);
 }
 
+/* Of a tile and the edge of another, the thread that has the edge waits for the tile most of the
+ * time. */
+static void waiting_threads_are_cancelled(void **state) {
+    (void)state;
+    const trc_scene scene = fixture_scene();
+    trc_render_desc desc = default_render_desc(TRC_TILE_SIZE + 1, TRC_TILE_SIZE, 1u << 20);
+    desc.progressive = 1;
+    desc.thread_count = 2;
+    for (int trial = 0; trial < 20; trial++) {
+        trc_render render = 0;
+        trc_render_progress progress = {.struct_size = sizeof progress};
+        assert_int_equal(trc_render_start(scene, &desc, &render), TRC_OK);
+        assert_int_equal(trc_render_wait(render, 0.005 * (trial + 1)), TRC_OK);
+        assert_int_equal(trc_render_cancel(render), TRC_OK);
+        assert_int_equal(trc_render_wait(render, 20.0), TRC_OK);
+        assert_int_equal(trc_render_poll(render, &progress), TRC_OK);
+        if (progress.state != TRC_PROGRESS_CANCELLED)
+            fail_msg("a thread still waits for a tile"); /* destroying would wait for it, too */
+        assert_int_equal(trc_render_destroy(render), TRC_OK);
+    }
+    assert_int_equal(trc_scene_destroy(scene), TRC_OK);
+}
+
+/* Every pixel has at least as many samples as are said to be done: all together no fewer than the
+ * fraction. A film that is cancelled keeps them. */
+static void progress_counts_whole_batches(void **state) {
+    (void)state;
+    const trc_scene scene = fixture_scene();
+    trc_render_desc desc = default_render_desc(96, 96, 1u << 12);
+    desc.progressive = 1;
+    trc_render render = 0;
+    trc_render_progress progress = {.struct_size = sizeof progress};
+    assert_int_equal(trc_render_start(scene, &desc, &render), TRC_OK);
+    do {
+        assert_int_equal(trc_render_wait(render, 0.001), TRC_OK);
+        assert_int_equal(trc_render_poll(render, &progress), TRC_OK);
+        assert_true(progress.samples_done <=
+                    (double)progress.fraction * desc.sample_count * (1.0 + 1e-6));
+    } while (progress.state == TRC_PROGRESS_RUNNING && progress.samples_done < 4);
+    assert_int_equal(trc_render_cancel(render), TRC_OK);
+    assert_int_equal(trc_render_wait(render, -1.0), TRC_OK);
+    assert_int_equal(trc_render_poll(render, &progress), TRC_OK);
+    assert_true(progress.samples_done >= 4);
+    assert_true(progress.samples_done <=
+                (double)progress.fraction * desc.sample_count * (1.0 + 1e-6));
+    assert_int_equal(trc_render_destroy(render), TRC_OK);
+    assert_int_equal(trc_scene_destroy(scene), TRC_OK);
+}
+
 static void *wait_for_end(void *context) {
     return (void *)(uintptr_t)(trc_render_wait(*(trc_render *)context, -1.0) + 1);
 }
@@ -663,6 +799,8 @@ int main(void) {
         cmocka_unit_test(grown_trees_are_rebuilt_apart),
         cmocka_unit_test(rebuilt_trees_wait_to_be_taken),
         cmocka_unit_test(rebuilds_end_with_what_they_are_for),
+        cmocka_unit_test(rebuilds_are_for_their_own_mesh),
+        cmocka_unit_test(queries_hold_the_snapshot_no_longer),
         cmocka_unit_test(removed_lights_are_gone),
         cmocka_unit_test(cameras_move_if_their_keys_differ),
         cmocka_unit_test(instruction_sets_may_change),
@@ -672,6 +810,8 @@ int main(void) {
         cmocka_unit_test(destroyed_materials_leave_the_default),
         cmocka_unit_test(image_does_not_depend_on_threads),
         cmocka_unit_test(cancelled_renders_keep_what_they_have),
+        cmocka_unit_test(waiting_threads_are_cancelled),
+        cmocka_unit_test(progress_counts_whole_batches),
         cmocka_unit_test(destroying_releases_waiters),
         cmocka_unit_test(several_renders_at_once),
         cmocka_unit_test(cancelled_commits_leave_the_snapshot),

@@ -1,0 +1,134 @@
+/* A scene that has been edited shows what one shows that was made so: the same bits, whatever of
+ * the former state a commit keeps. */
+#include "level_test.h"
+
+/* A floor under a roof, a sun above, and what is edited of them. */
+struct edited {
+    trc_scene scene;
+    trc_id roof, world, image;
+};
+
+static trc_material_desc node_material(struct node_list *list, uint32_t type, float value) {
+    memset(list, 0, sizeof *list);
+    if (type == TRC_NODE_EMISSION)
+        NODE_ADD(list, type, 0, node_color(value, value, value), node_number(1.0f));
+    else if (type == TRC_NODE_TRANSPARENT)
+        NODE_ADD(list, type, 0, node_color(value, value, value));
+    else
+        NODE_ADD(list, type, 0, node_color(value, value, value), node_number(0.0f),
+                 node_standard());
+    trc_material_desc desc = node_list_material(list, 0);
+    desc.flags |= TRC_MATERIAL_SAMPLE_EMISSION;
+    return desc;
+}
+
+/* An image of one bright texel in the upper half. */
+static trc_id add_sky(trc_scene scene, uint32_t bright) {
+    enum { WIDTH = 16, HEIGHT = 8 };
+    static float pixels[4 * WIDTH * HEIGHT];
+    for (uint32_t i = 0; i < WIDTH * HEIGHT; i++)
+        for (uint32_t c = 0; c < 4; c++)
+            pixels[4 * i + c] = c == 3 || i != bright ? (c == 3 ? 1.0f : 0.01f) : 20.0f;
+    trc_image_desc desc = default_image_desc();
+    trc_id image = 0;
+    desc.width = WIDTH;
+    desc.height = HEIGHT;
+    desc.pixels = pixels;
+    desc.pixel_bytes = sizeof pixels;
+    assert_ok(trc_image_create(scene, &desc, &image));
+    return image;
+}
+
+static trc_id add_sky_material(trc_scene scene, trc_id image) {
+    struct node_list list = {0};
+    const uint32_t texture = NODE_ADD(&list, TRC_NODE_ENVIRONMENT, 0, node_standard());
+    list.nodes[texture].image = image;
+    const uint32_t surface =
+        NODE_ADD(&list, TRC_NODE_BACKGROUND, 0, node_link(texture, 0), node_number(1.0f));
+    return level_material(scene, &list, surface, 0);
+}
+
+/* roof, value: of its material; bright: the sky's texel. */
+static struct edited edited_make(uint32_t roof, float value, uint32_t bright) {
+    struct edited e = {.scene = fixture_level_view()};
+    struct node_list list;
+    const trc_material_desc roof_desc = node_material(&list, roof, value);
+    assert_ok(trc_material_create(e.scene, &roof_desc, &e.roof));
+    fixture_level(e.scene, 20.0f, 0.0f, fixture_material(e.scene, TRC_NODE_DIFFUSE, 0.5f));
+    static const float corners[12] = {1, -1, 3, 2, -1, 3, 2, 1, 3, 1, 1, 3};
+    fixture_quad(e.scene, corners, e.roof);
+    trc_light_desc sun = default_light_desc();
+    trc_id id = 0;
+    sun.type = TRC_LIGHT_SUN;
+    sun.strength = (float)PI;
+    assert_ok(trc_light_create(e.scene, &sun, &id));
+    e.image = add_sky(e.scene, bright);
+    e.world = add_sky_material(e.scene, e.image);
+    trc_world_desc world = default_world_desc(e.world);
+    world.use_sampling = 1;
+    world.map_resolution = 32;
+    assert_ok(trc_scene_set_world(e.scene, &world));
+    return e;
+}
+
+static void draw(trc_scene scene, float pixels[4 * LEVEL_PIXELS]) {
+    const trc_render_desc desc = level_desc(4);
+    assert_ok(trc_scene_commit(scene));
+    render(scene, &desc, pixels);
+}
+
+/* Both pictures have the same bits, and the edit is seen. */
+static void expect_same(const struct edited *found, const struct edited *want,
+                        const float before[4 * LEVEL_PIXELS]) {
+    static float a[4 * LEVEL_PIXELS], b[4 * LEVEL_PIXELS];
+    draw(found->scene, a);
+    draw(want->scene, b);
+    assert_memory_equal(a, b, sizeof a);
+    assert_memory_not_equal(a, before, sizeof a);
+    assert_ok(trc_scene_destroy(found->scene));
+    assert_ok(trc_scene_destroy(want->scene));
+}
+
+static void materials_change(void **state) {
+    (void)state;
+    static const struct {
+        uint32_t from, to;
+        float from_value, to_value;
+    } cases[] = {
+        {TRC_NODE_DIFFUSE, TRC_NODE_TRANSPARENT, 0.5f, 0.5f},
+        {TRC_NODE_TRANSPARENT, TRC_NODE_DIFFUSE, 0.5f, 0.5f},
+        {TRC_NODE_DIFFUSE, TRC_NODE_EMISSION, 0.5f, 30.0f},
+        {TRC_NODE_EMISSION, TRC_NODE_DIFFUSE, 30.0f, 0.5f},
+        {TRC_NODE_EMISSION, TRC_NODE_EMISSION, 1.0f, 30.0f},
+    };
+    static float before[4 * LEVEL_PIXELS];
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        const struct edited e = edited_make(cases[i].from, cases[i].from_value, 40);
+        const struct edited fresh = edited_make(cases[i].to, cases[i].to_value, 40);
+        struct node_list list;
+        draw(e.scene, before);
+        const trc_material_desc desc = node_material(&list, cases[i].to, cases[i].to_value);
+        assert_ok(trc_material_update(e.scene, e.roof, &desc));
+        expect_same(&e, &fresh, before);
+    }
+}
+
+/* The image goes and the world is magenta; its map then is that of an even one. */
+static void images_of_the_world_change(void **state) {
+    (void)state;
+    static float before[4 * LEVEL_PIXELS];
+    const struct edited e = edited_make(TRC_NODE_DIFFUSE, 0.5f, 40);
+    const struct edited fresh = edited_make(TRC_NODE_DIFFUSE, 0.5f, 40);
+    draw(e.scene, before);
+    assert_ok(trc_image_destroy(e.scene, e.image));
+    assert_ok(trc_image_destroy(fresh.scene, fresh.image)); /* before its first commit */
+    expect_same(&e, &fresh, before);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(materials_change),
+        cmocka_unit_test(images_of_the_world_change),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
