@@ -1066,3 +1066,42 @@ NODES = {
         (("COLOR", "color"),),
         ()),
 }
+
+# Channels of the passes, a letter each.
+PASS_CHANNELS = {
+    PassId.COMBINED: "RGBA",
+    PassId.DEPTH: "Z",
+    PassId.NORMAL: "XYZ",
+    PassId.POSITION: "XYZ",
+    PassId.UV: "UVA",
+    PassId.OBJECT_INDEX: "X",
+    PassId.MATERIAL_INDEX: "X",
+    PassId.EMISSION: "RGB",
+    PassId.ENVIRONMENT: "RGB",
+    PassId.DIFFUSE_DIRECT: "RGB",
+    PassId.DIFFUSE_INDIRECT: "RGB",
+    PassId.DIFFUSE_COLOR: "RGB",
+    PassId.GLOSSY_DIRECT: "RGB",
+    PassId.GLOSSY_INDIRECT: "RGB",
+    PassId.GLOSSY_COLOR: "RGB",
+    PassId.TRANSMISSION_DIRECT: "RGB",
+    PassId.TRANSMISSION_INDIRECT: "RGB",
+    PassId.TRANSMISSION_COLOR: "RGB",
+    PassId.SAMPLE_COUNT: "X",
+    PassId.MIST: "Z",
+    PassId.DENOISING_ALBEDO: "RGB",
+    PassId.DENOISING_NORMAL: "XYZ",
+    PassId.DENOISING_DEPTH: "Z",
+    PassId.VECTOR: "XYZW",
+    PassId.AMBIENT_OCCLUSION: "RGB",
+    PassId.SHADOW: "RGB",
+    PassId.SHADOW_CATCHER: "RGB",
+}
+
+# Passes of each range, and their channels.
+PASS_RANGES = {
+    PassRange.FIRST_AOV_VALUE: (16, "X"),
+    PassRange.FIRST_AOV_COLOR: (16, "RGBA"),
+    PassRange.FIRST_LIGHT_GROUP: (32, "RGB"),
+    PassRange.FIRST_CRYPTOMATTE: (24, "rgba"),
+}

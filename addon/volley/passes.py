@@ -6,51 +6,45 @@ from collections import namedtuple
 import numpy as np
 
 from .abi import (CRYPTOMATTE_LAYER_RANKS, MAX_AOVS, MAX_CRYPTOMATTE_DEPTH, MAX_CRYPTOMATTE_LAYERS,
-                  MAX_LIGHT_GROUPS, CryptomatteKind, PassId, PassRange)
+                  MAX_LIGHT_GROUPS, PASS_CHANNELS, PASS_RANGES, CryptomatteKind, PassId, PassRange)
 from .compat import HAS_LONG_PASS_NAMES
 
-# index: a PassId, or a number from a PassRange on; names: before 5.0 and since; channels: one letter
-# each; kind: as Blender's; setting: path below the view layer.
-Pass = namedtuple("Pass", "index names channels kind setting")
+# index: a PassId, or a number of a PassRange; names: before 5.0 and since; channels: one letter each;
+# setting: path below the view layer.
+Pass = namedtuple("Pass", "index names channels setting")
 
-PASSES = (
-    Pass(PassId.COMBINED, ("Combined", "Combined"), "RGBA", 'COLOR', "use_pass_combined"),
-    Pass(PassId.DEPTH, ("Depth", "Depth"), "Z", 'VALUE', "use_pass_z"),
-    Pass(PassId.POSITION, ("Position", "Position"), "XYZ", 'VECTOR', "use_pass_position"),
-    Pass(PassId.NORMAL, ("Normal", "Normal"), "XYZ", 'VECTOR', "use_pass_normal"),
-    Pass(PassId.VECTOR, ("Vector", "Vector"), "XYZW", 'VECTOR', "use_pass_vector"),
-    Pass(PassId.UV, ("UV", "UV"), "UVA", 'VECTOR', "use_pass_uv"),
-    Pass(PassId.OBJECT_INDEX, ("IndexOB", "Object Index"), "X", 'VALUE', "use_pass_object_index"),
-    Pass(PassId.MATERIAL_INDEX, ("IndexMA", "Material Index"), "X", 'VALUE', "use_pass_material_index"),
-    Pass(PassId.DIFFUSE_DIRECT, ("DiffDir", "Diffuse Direct"), "RGB", 'COLOR', "use_pass_diffuse_direct"),
-    Pass(PassId.DIFFUSE_INDIRECT, ("DiffInd", "Diffuse Indirect"), "RGB", 'COLOR',
-         "use_pass_diffuse_indirect"),
-    Pass(PassId.DIFFUSE_COLOR, ("DiffCol", "Diffuse Color"), "RGB", 'COLOR', "use_pass_diffuse_color"),
-    Pass(PassId.GLOSSY_DIRECT, ("GlossDir", "Glossy Direct"), "RGB", 'COLOR', "use_pass_glossy_direct"),
-    Pass(PassId.GLOSSY_INDIRECT, ("GlossInd", "Glossy Indirect"), "RGB", 'COLOR', "use_pass_glossy_indirect"),
-    Pass(PassId.GLOSSY_COLOR, ("GlossCol", "Glossy Color"), "RGB", 'COLOR', "use_pass_glossy_color"),
-    Pass(PassId.TRANSMISSION_DIRECT, ("TransDir", "Transmission Direct"), "RGB", 'COLOR',
-         "use_pass_transmission_direct"),
-    Pass(PassId.TRANSMISSION_INDIRECT, ("TransInd", "Transmission Indirect"), "RGB", 'COLOR',
-         "use_pass_transmission_indirect"),
-    Pass(PassId.TRANSMISSION_COLOR, ("TransCol", "Transmission Color"), "RGB", 'COLOR',
-         "use_pass_transmission_color"),
-    Pass(PassId.EMISSION, ("Emit", "Emission"), "RGB", 'COLOR', "use_pass_emit"),
-    Pass(PassId.ENVIRONMENT, ("Env", "Environment"), "RGB", 'COLOR', "use_pass_environment"),
-    Pass(PassId.AMBIENT_OCCLUSION, ("AO", "Ambient Occlusion"), "RGB", 'COLOR', "use_pass_ambient_occlusion"),
-    Pass(PassId.SHADOW, ("Shadow", "Shadow"), "RGB", 'COLOR', "use_pass_shadow"),
-    Pass(PassId.SHADOW_CATCHER, ("Shadow Catcher", "Shadow Catcher"), "RGB", 'COLOR',
-         "volley.use_pass_shadow_catcher"),
-    Pass(PassId.MIST, ("Mist", "Mist"), "Z", 'VALUE', "use_pass_mist"),
-    Pass(PassId.DENOISING_ALBEDO, ("Denoising Albedo", "Denoising Albedo"), "RGB", 'COLOR',
-         "volley.denoising_store_passes"),
-    Pass(PassId.DENOISING_NORMAL, ("Denoising Normal", "Denoising Normal"), "XYZ", 'VECTOR',
-         "volley.denoising_store_passes"),
-    Pass(PassId.DENOISING_DEPTH, ("Denoising Depth", "Denoising Depth"), "Z", 'VALUE',
-         "volley.denoising_store_passes"),
-    Pass(PassId.SAMPLE_COUNT, ("Debug Sample Count", "Debug Sample Count"), "X", 'VALUE',
-         "volley.use_pass_sample_count"),
-)
+# Names before Blender 5.0 and since, and settings, in the order in which Blender shows them.
+_BLENDER_PASSES = {
+    PassId.COMBINED: ("Combined", "Combined", "use_pass_combined"),
+    PassId.DEPTH: ("Depth", "Depth", "use_pass_z"),
+    PassId.POSITION: ("Position", "Position", "use_pass_position"),
+    PassId.NORMAL: ("Normal", "Normal", "use_pass_normal"),
+    PassId.VECTOR: ("Vector", "Vector", "use_pass_vector"),
+    PassId.UV: ("UV", "UV", "use_pass_uv"),
+    PassId.OBJECT_INDEX: ("IndexOB", "Object Index", "use_pass_object_index"),
+    PassId.MATERIAL_INDEX: ("IndexMA", "Material Index", "use_pass_material_index"),
+    PassId.DIFFUSE_DIRECT: ("DiffDir", "Diffuse Direct", "use_pass_diffuse_direct"),
+    PassId.DIFFUSE_INDIRECT: ("DiffInd", "Diffuse Indirect", "use_pass_diffuse_indirect"),
+    PassId.DIFFUSE_COLOR: ("DiffCol", "Diffuse Color", "use_pass_diffuse_color"),
+    PassId.GLOSSY_DIRECT: ("GlossDir", "Glossy Direct", "use_pass_glossy_direct"),
+    PassId.GLOSSY_INDIRECT: ("GlossInd", "Glossy Indirect", "use_pass_glossy_indirect"),
+    PassId.GLOSSY_COLOR: ("GlossCol", "Glossy Color", "use_pass_glossy_color"),
+    PassId.TRANSMISSION_DIRECT: ("TransDir", "Transmission Direct", "use_pass_transmission_direct"),
+    PassId.TRANSMISSION_INDIRECT: ("TransInd", "Transmission Indirect", "use_pass_transmission_indirect"),
+    PassId.TRANSMISSION_COLOR: ("TransCol", "Transmission Color", "use_pass_transmission_color"),
+    PassId.EMISSION: ("Emit", "Emission", "use_pass_emit"),
+    PassId.ENVIRONMENT: ("Env", "Environment", "use_pass_environment"),
+    PassId.AMBIENT_OCCLUSION: ("AO", "Ambient Occlusion", "use_pass_ambient_occlusion"),
+    PassId.SHADOW: ("Shadow", "Shadow", "use_pass_shadow"),
+    PassId.SHADOW_CATCHER: ("Shadow Catcher", "Shadow Catcher", "volley.use_pass_shadow_catcher"),
+    PassId.MIST: ("Mist", "Mist", "use_pass_mist"),
+    PassId.DENOISING_ALBEDO: ("Denoising Albedo", "Denoising Albedo", "volley.denoising_store_passes"),
+    PassId.DENOISING_NORMAL: ("Denoising Normal", "Denoising Normal", "volley.denoising_store_passes"),
+    PassId.DENOISING_DEPTH: ("Denoising Depth", "Denoising Depth", "volley.denoising_store_passes"),
+    PassId.SAMPLE_COUNT: ("Debug Sample Count", "Debug Sample Count", "volley.use_pass_sample_count"),
+}
+PASSES = tuple(Pass(index, (name, long_name), PASS_CHANNELS[index], setting)
+               for index, (name, long_name, setting) in _BLENDER_PASSES.items())
 COMBINED = PASSES[0]
 
 # Name, setting of the view layer.
@@ -58,14 +52,25 @@ CRYPTOMATTES = {CryptomatteKind.OBJECT: ("CryptoObject", "use_pass_cryptomatte_o
                 CryptomatteKind.MATERIAL: ("CryptoMaterial", "use_pass_cryptomatte_material"),
                 CryptomatteKind.ASSET: ("CryptoAsset", "use_pass_cryptomatte_asset")}
 
-# By the type of an AOV: number of the first, channels, kind of pass.
-_AOVS = {'VALUE': (PassRange.FIRST_AOV_VALUE, "X", 'VALUE'),
-         'COLOR': (PassRange.FIRST_AOV_COLOR, "RGBA", 'COLOR')}
+# The passes of the two types of AOVs.
+_AOVS = {'VALUE': PassRange.FIRST_AOV_VALUE, 'COLOR': PassRange.FIRST_AOV_COLOR}
 
 
 def name_of(entry, long_names=HAS_LONG_PASS_NAMES):
     """The pass's name in this Blender."""
     return entry.names[1 if long_names else 0]
+
+
+def kind_of(entry):
+    """The pass's kind as Blender's register_pass() wants it."""
+    if len(entry.channels) == 1:
+        return 'VALUE'
+    return 'COLOR' if entry.channels.upper().startswith("RGB") else 'VECTOR'
+
+
+def _in_range(first, number, name, setting):
+    """A pass of a PassRange."""
+    return Pass(first + number, (name, name), PASS_RANGES[first][1], setting)
 
 
 def is_enabled(entry, view_layer):
@@ -97,8 +102,7 @@ def aov_numbers(view_layer):
 
 def _aovs(view_layer):
     for name, (aov_type, number) in aov_numbers(view_layer).items():
-        first, channels, kind = _AOVS[aov_type]
-        yield Pass(first + number, (name, name), channels, kind, "aovs")
+        yield _in_range(_AOVS[aov_type], number, name, "aovs")
 
 
 def light_group_numbers(view_layer):
@@ -120,25 +124,23 @@ def left_out(view_layer):
 
 def _light_groups(view_layer):
     for name, number in light_group_numbers(view_layer).items():
-        yield Pass(PassRange.FIRST_LIGHT_GROUP + number - 1, (f"Combined_{name}",) * 2, "RGB", 'COLOR',
-                   "lightgroups")
+        yield _in_range(PassRange.FIRST_LIGHT_GROUP, number - 1, f"Combined_{name}", "lightgroups")
 
 
 def _cryptomatte_layers(view_layer):
-    """Channels in small letters: so Blender's OpenEXR writer knows that they must not be changed."""
     ranks = min(view_layer.pass_cryptomatte_depth, MAX_CRYPTOMATTE_DEPTH)
     for kind, (name, setting) in CRYPTOMATTES.items():
         if getattr(view_layer, setting):
             for layer in range((ranks + 1) // CRYPTOMATTE_LAYER_RANKS):
-                index = PassRange.FIRST_CRYPTOMATTE + kind * MAX_CRYPTOMATTE_LAYERS + layer
-                yield Pass(index, (f"{name}{layer:02d}",) * 2, "rgba", 'COLOR', setting)
+                number = kind * MAX_CRYPTOMATTE_LAYERS + layer
+                yield _in_range(PassRange.FIRST_CRYPTOMATTE, number, f"{name}{layer:02d}", setting)
 
 
 def register_passes(engine, scene, view_layer):
     """Tell the compositor which sockets there are."""
     for entry in enabled(view_layer):
         engine.register_pass(scene, view_layer, name_of(entry), len(entry.channels), entry.channels,
-                             entry.kind)
+                             kind_of(entry))
 
 
 def add_to_result(engine, entries):
@@ -155,15 +157,14 @@ def without_vector(entries):
 
 def request_fields(entries):
     """The passes as fields of trc_render_desc."""
-    layers = [divmod(entry.index - PassRange.FIRST_CRYPTOMATTE, MAX_CRYPTOMATTE_LAYERS) for entry in entries
-              if entry.index >= PassRange.FIRST_CRYPTOMATTE]
-    aov_counts = [sum(first <= entry.index < first + MAX_AOVS for entry in entries)
-                  for first, _, _ in _AOVS.values()]
+    def numbers(first):
+        return [entry.index - first for entry in entries if 0 <= entry.index - first < PASS_RANGES[first][0]]
+    layers = [divmod(number, MAX_CRYPTOMATTE_LAYERS) for number in numbers(PassRange.FIRST_CRYPTOMATTE)]
     return {
         "passes": sum(1 << entry.index for entry in entries if entry.index < PassId.COUNT),
-        "aov_value_count": aov_counts[0], "aov_color_count": aov_counts[1],
-        "light_group_count": sum(PassRange.FIRST_LIGHT_GROUP <= entry.index < PassRange.FIRST_CRYPTOMATTE
-                                 for entry in entries),
+        "aov_value_count": len(numbers(PassRange.FIRST_AOV_VALUE)),
+        "aov_color_count": len(numbers(PassRange.FIRST_AOV_COLOR)),
+        "light_group_count": len(numbers(PassRange.FIRST_LIGHT_GROUP)),
         "cryptomattes": sum(1 << kind for kind in {kind for kind, _ in layers}),
         "cryptomatte_depth": CRYPTOMATTE_LAYER_RANKS * max((layer + 1 for _, layer in layers), default=0),
     }

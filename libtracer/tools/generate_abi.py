@@ -33,7 +33,11 @@ Structure = namedtuple("Structure", "name fields")
 Function = namedtuple("Function", "name result arguments")
 # label: for people; inputs, outputs: [(kind, name)].
 Node = namedtuple("Node", "name label inputs outputs")
-Interface = namedtuple("Interface", "constants enumerations structures functions typedefs nodes")
+# channels: a letter each; of a range count passes from the named one on.
+Pass = namedtuple("Pass", "name channels")
+PassRange = namedtuple("PassRange", "name count channels")
+Interface = namedtuple("Interface", "constants enumerations structures functions typedefs nodes "
+                                    "passes pass_ranges")
 
 _CTYPES = {"int32_t": "c_int32", "uint32_t": "c_uint32", "uint64_t": "c_uint64", "int64_t": "c_int64",
            "uint16_t": "c_uint16", "uint8_t": "c_uint8", "float": "c_float", "double": "c_double"}
@@ -48,14 +52,23 @@ def header_paths(include=INCLUDE):
 
 def read_interface(include=INCLUDE):
     """All that the public headers declare."""
-    interface = Interface({}, [], [], [], {}, [])
+    interface = Interface({}, [], [], [], {}, [], [], [])
     text = "\n".join(_without_comments(path.read_text()) for path in header_paths(include))
     text = _read_macros(_expand_lists(text, include), interface)
     _read_declarations(text, interface)
-    nodes = include / "tracer" / "nodes.def"
-    if nodes.is_file():
-        interface.nodes.extend(_read_nodes(_without_comments(nodes.read_text())))
+    interface.nodes.extend(_read_nodes(_list_text(include, "nodes")))
+    passes = _list_text(include, "passes")
+    interface.passes.extend(Pass(name, channels.strip('"'))
+                            for name, _, channels, *_ in _calls(passes, "TRC_PASS"))
+    interface.pass_ranges.extend(PassRange(name, _number(count, interface), channels.strip('"'))
+                                 for name, _, count, channels, *_ in _calls(passes, "TRC_PASS_RANGE"))
     return interface
+
+
+def _list_text(include, name):
+    """The list tracer/NAME.def without its comments; empty where there is none."""
+    path = include / "tracer" / f"{name}.def"
+    return _without_comments(path.read_text()) if path.is_file() else ""
 
 
 def _without_comments(text):
@@ -232,6 +245,8 @@ def python_text(interface):
     parts.append("# Result and arguments.\nFUNCTIONS = {\n" + "\n".join(lines) + "\n}\n")
     if interface.nodes:
         parts.append(_nodes_text(interface.nodes))
+    if interface.passes:
+        parts.append(_passes_text(interface))
     text = "\n".join(parts)
     used = sorted(set(re.findall(r"\bc_\w+\b", text)))
     return _PYTHON_HEAD + _wrapped("from ctypes import (", ["POINTER", "Structure", *used], ")") \
@@ -251,6 +266,14 @@ def _nodes_text(nodes):
             lines.append(_wrapped("        (", pairs, "," * (len(pairs) == 1) + ")" + tail))
     return ("# Label, inputs and outputs of the node types: kind and name of each.\nNODES = {\n"
             + "\n".join(lines) + "\n}\n")
+
+
+def _passes_text(interface):
+    passes = "\n".join(f'    PassId.{entry.name}: "{entry.channels}",' for entry in interface.passes)
+    ranges = "\n".join(f'    PassRange.FIRST_{entry.name}: ({entry.count}, "{entry.channels}"),'
+                       for entry in interface.pass_ranges)
+    return ("# Channels of the passes, a letter each.\nPASS_CHANNELS = {\n" + passes + "\n}\n\n"
+            "# Passes of each range, and their channels.\nPASS_RANGES = {\n" + ranges + "\n}\n")
 
 
 def _plain_constants(interface):

@@ -68,7 +68,7 @@ def test_another_header_makes_them_stale(tmp_path):
     """A field, an enumerator, a limit or a function more is in both files."""
     folder = tmp_path / "tracer"
     folder.mkdir()
-    for header in (*HEADERS, HEADERS[0].with_name("nodes.def")):
+    for header in (*HEADERS, *HEADERS[0].parent.glob("*.def")):
         (folder / header.name).write_text(header.read_text())
     with open(folder / "camera.h", "a") as file:
         file.write("#define TRC_MAX_LENSES 7\nenum trc_lens_kind { TRC_LENS_ROUND, TRC_LENS_FLAT = 1 << 4 };\n"
@@ -105,6 +105,26 @@ def test_lists_become_enumerators_and_tables(tmp_path):
     assert names["NODES"][3] == ("Tint, soft", (("COLOR", "color"), ("FLOAT", "factor")),
                                  (("COLOR", "color"),))
     assert names["NODES"][4] == ("Nothing", (), (("FLOAT", "one"),))
+
+
+def test_passes_become_enumerators_and_channels(tmp_path):
+    """The form in which tracer/passes.def is included."""
+    folder = tmp_path / "tracer"
+    folder.mkdir()
+    (folder / "passes.def").write_text('#ifndef TRC_PASS\n#define TRC_PASS(a, b, c)\n#endif\n'
+                                       'TRC_PASS(GLOW, 0, "RGB", LIGHT, NONE, 0.0f)\n'
+                                       'TRC_PASS_RANGE(GUIDE, 64, 2 * TRC_MAX_GUIDES, "X", MEAN)\n')
+    (folder / "passes.h").write_text(
+        '#define TRC_MAX_GUIDES 8\n'
+        'enum trc_pass_id {\n#define TRC_PASS(N, n, c, k, d, m) TRC_PASS_##N = n,\n'
+        '#include "tracer/passes.def"\n    TRC_PASS_COUNT\n};\n'
+        'enum trc_pass_range {\n#define TRC_PASS_RANGE(N, f, n, c, k) TRC_PASS_FIRST_##N = f,\n'
+        '#include "tracer/passes.def"\n};\n')
+    names = {}
+    exec(generate_abi.python_text(generate_abi.read_interface(tmp_path)), names)
+    assert names["PassId"].COUNT == 1 and names["PASS_CHANNELS"] == {names["PassId"].GLOW: "RGB"}
+    assert names["PASS_RANGES"] == {names["PassRange"].FIRST_GUIDE: (16, "X")}
+    assert names["PassRange"].FIRST_GUIDE == 64
 
 
 def test_names_lose_the_words_of_their_enumeration():

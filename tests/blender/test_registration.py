@@ -92,7 +92,7 @@ def inside_render_passes():
 def test_pass_names_are_blenders(blender):
     default, everything, long_names = blender.run(inside_render_passes)
     assert ("Combined", 4, "RGBA", 'COLOR') in default and len(default) <= 2
-    assert len(everything) == 26 and len({name for name, *_ in everything}) == 26
+    assert len({name for name, *_ in everything}) == len(everything) > 20
     assert ("Depth", 1, "Z", 'VALUE') in everything
     for name in ("Object Index", "Diffuse Direct", "Emission", "Environment"):
         assert name in long_names

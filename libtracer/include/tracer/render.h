@@ -37,79 +37,25 @@ enum trc_filter_type {
     TRC_FILTER_BLACKMAN_HARRIS = 2
 };
 
-/* Passes and their channels. */
+/* The list of passes is tracer/passes.def. */
 enum trc_pass_id {
-    TRC_PASS_COMBINED = 0, /* 4: premultiplied RGBA. Shadow catchers are black in it, covering as
-                              much as they lose of their light by the mean of its channels;
-                              where the film is not transparent, on the background */
-    TRC_PASS_DEPTH = 1,    /* 1: distance as Cycles: along the view axis for perspective and
-                              orthographic; 1e10 on a miss; first sample */
-    TRC_PASS_NORMAL = 2,   /* 3: world shading normal */
-    TRC_PASS_POSITION = 3, /* 3: of the first sample, as the depth */
-    TRC_PASS_UV = 4,       /* 3: u, v, 1 on a hit */
-    TRC_PASS_OBJECT_INDEX = 5,   /* 1: first sample */
-    TRC_PASS_MATERIAL_INDEX = 6, /* 1: first sample */
-    TRC_PASS_EMISSION = 7,       /* 3 */
-    TRC_PASS_ENVIRONMENT = 8,    /* 3 */
-    TRC_PASS_DIFFUSE_DIRECT = 9,
-    TRC_PASS_DIFFUSE_INDIRECT = 10,
-    TRC_PASS_DIFFUSE_COLOR = 11,
-    TRC_PASS_GLOSSY_DIRECT = 12,
-    TRC_PASS_GLOSSY_INDIRECT = 13,
-    TRC_PASS_GLOSSY_COLOR = 14,
-    TRC_PASS_TRANSMISSION_DIRECT = 15,
-    TRC_PASS_TRANSMISSION_INDIRECT = 16,
-    TRC_PASS_TRANSMISSION_COLOR = 17,
-    TRC_PASS_SAMPLE_COUNT = 18, /* 1 */
-    TRC_PASS_MIST = 19,         /* 1: Cycles' Mist, 0 at mist_start or nearer, 1 far away and on a
-                                   miss; transparent surfaces count by what they cover */
-    /* For denoisers, as Cycles' passes: of the first surface that is rough enough, seen directly,
-     * in mirrors or through glass. */
-    TRC_PASS_DENOISING_ALBEDO = 20, /* 3: its albedo, times the throughput of the way to it */
-    TRC_PASS_DENOISING_NORMAL =
-        21, /* 3: its mean normal in the camera's space: right, up, forward */
-    TRC_PASS_DENOISING_DEPTH = 22, /* 1: lengths of the rays to it, by their throughput; metres */
-    TRC_PASS_VECTOR = 23, /* 4: pixels in x and y that the first surface moves from the shutter's
-                             start to its middle, negated, and from there to its end, negated; right
-                             and up are positive. Mean of the samples that hit something. What has
-                             keys moves even where shutter_time is 0 and nothing is blurred */
-    TRC_PASS_AMBIENT_OCCLUSION =
-        24,               /* 3: the part of the directions above a surface, by the cosine,
-                             in which nothing is within ao_distance of the world, which
-                             applies with an ao_factor of 0, too; by what is seen of it */
-    TRC_PASS_SHADOW = 25, /* 3: Cycles' Shadow up to 3.4: the part of all lamps, each of equal
-                             weight, that a surface sees of those that light it */
-    TRC_PASS_SHADOW_CATCHER =
-        26, /* 3: what shadow catchers leave of the footage's light by channel, which it is to be
-               multiplied by before Combined goes over it; 1 where there are none. Combined is
-               without their shadows then */
-    TRC_PASS_COUNT = 27
+#define TRC_PASS(NAME, number, channels, kind, color, miss) TRC_PASS_##NAME = number,
+#include "tracer/passes.def"
+    TRC_PASS_COUNT /* numbers below it are single passes, bits of trc_render_desc.passes */
 };
 
 /* Passes of which a render has as many as it asks for: the numbers of the first ones. */
 enum trc_pass_range {
-    TRC_PASS_FIRST_AOV_VALUE = 64,
-    TRC_PASS_FIRST_AOV_COLOR = 80,
-    TRC_PASS_FIRST_LIGHT_GROUP = 96,
-    TRC_PASS_FIRST_CRYPTOMATTE = 128
+#define TRC_PASS_RANGE(NAME, first, count, channels, kind) TRC_PASS_FIRST_##NAME = first,
+#include "tracer/passes.def"
 };
 
-/* What the AOV nodes of materials and the world write, by the numbers of their modes: 1 channel,
- * and 4 of which the last is 1. Of each sample the values at the first surface that is not mostly
- * seen through, and as in Cycles at those before it, added up, whatever these let through. */
-#define TRC_MAX_AOVS 16 /* of each of the two */
+#define TRC_MAX_AOVS 16 /* of values, and of colours */
 #define TRC_PASS_AOV_VALUE(number) ((uint32_t)TRC_PASS_FIRST_AOV_VALUE + (number))
 #define TRC_PASS_AOV_COLOR(number) ((uint32_t)TRC_PASS_FIRST_AOV_COLOR + (number))
-
-/* Light of one light group each: 3 channels. What is in no group is only in Combined. */
 #define TRC_PASS_LIGHT_GROUP(number) \
     ((uint32_t)TRC_PASS_FIRST_LIGHT_GROUP + (number)) /* of group number + 1 */
 
-/* Cryptomatte: which objects, materials or assets (an object's uppermost parent) cover a pixel, and
- * how much of it (J. Friedman, A. Jones, "Fully Automatic ID Mattes with Support for Motion Blur
- * and Transparency", SIGGRAPH 2015 posters; Psyop's specification 1.2.0). Ranks are pairs of an id
- * and its coverage, largest first, two of them in the 4 channels of a layer. What is partly
- * transparent shares the coverage with what is behind it. */
 enum trc_cryptomatte_kind {
     TRC_CRYPTOMATTE_OBJECT = 0,
     TRC_CRYPTOMATTE_MATERIAL,

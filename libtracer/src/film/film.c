@@ -26,7 +26,7 @@ uint64_t trc_film_pixel_bytes(const trc_render_desc *desc) {
     uint64_t bytes = sizeof(uint32_t); /* its sample count */
     for (uint32_t pass = 0; pass < TRC_SUM_COUNT; pass++) {
         if (trc_film_has_sums(desc, pass))
-            bytes += trc_film_channels(pass) * sizeof(double);
+            bytes += trc_pass_info_of(pass)->sums * sizeof(double);
     }
     return bytes + (uint64_t)__builtin_popcount(desc->cryptomattes) * trc_film_matte_count(desc) *
                        sizeof(struct trc_matte);
@@ -56,7 +56,7 @@ trc_status trc_film_create(const trc_render_desc *desc, struct trc_film *film) {
     for (uint32_t pass = 0; ok && pass < TRC_SUM_COUNT; pass++) {
         if (!trc_film_has_sums(desc, pass))
             continue;
-        made.sums[pass] = trc_alloc_zeroed(pixels, trc_film_channels(pass) * sizeof(double));
+        made.sums[pass] = trc_alloc_zeroed(pixels, trc_pass_info_of(pass)->sums * sizeof(double));
         ok = made.sums[pass] != NULL;
     }
     for (uint32_t kind = 0; ok && kind < TRC_CRYPTOMATTE_KINDS; kind++) {

@@ -19,7 +19,8 @@
 /* What is read, to where: channels of the film's pixels. */
 struct reading {
     const struct trc_film *film;
-    uint32_t pass, channels;
+    uint32_t pass;
+    const struct trc_pass_info *info;
     float exposure;
     float *out;
 };
@@ -28,24 +29,6 @@ struct reading {
 struct row {
     uint64_t first, end;
 };
-
-/* Passes that are radiance: exposure scales them. */
-static bool is_light(uint32_t pass) {
-    switch (pass) {
-    case TRC_PASS_COMBINED:
-    case TRC_PASS_EMISSION:
-    case TRC_PASS_ENVIRONMENT:
-    case TRC_PASS_DIFFUSE_DIRECT:
-    case TRC_PASS_DIFFUSE_INDIRECT:
-    case TRC_PASS_GLOSSY_DIRECT:
-    case TRC_PASS_GLOSSY_INDIRECT:
-    case TRC_PASS_TRANSMISSION_DIRECT:
-    case TRC_PASS_TRANSMISSION_INDIRECT:
-        return true;
-    default:
-        return trc_film_is_light_group(pass);
-    }
-}
 
 static float to_float(double value) {
     if (!(value > -FLT_MAX))
@@ -57,19 +40,13 @@ static uint32_t load_count(const struct trc_film *film, uint64_t pixel) {
     return __atomic_load_n(&film->sample_counts[pixel], __ATOMIC_RELAXED);
 }
 
-/* The sums that a light pass is divided by, as Cycles divides it: the colour of its kind; NULL:
- * none. */
-static const double *divisor_of(const struct trc_film *film, uint32_t pass) {
-    const uint32_t color = trc_film_color_pass(pass);
-    return color != TRC_PASS_COMBINED && color != pass ? film->sums[color] : NULL;
-}
-
 static bool has_pass(const struct trc_film *film, uint32_t pass) {
-    if (pass == TRC_PASS_SAMPLE_COUNT)
+    const enum trc_pass_kind kind = trc_pass_info_of(pass)->kind;
+    if (kind == TRC_PASS_KIND_COUNT)
         return film->shows_counts;
-    if (pass == TRC_PASS_SHADOW_CATCHER)
+    if (kind == TRC_PASS_KIND_SHADOW)
         return film->shows_shadows;
-    if (!trc_film_is_cryptomatte(pass))
+    if (kind != TRC_PASS_KIND_MATTE)
         return film->sums[pass] != NULL;
     const uint32_t number = pass - TRC_PASS_CRYPTOMATTE(0, 0),
                    layer = number % TRC_MAX_CRYPTOMATTE_LAYERS;
@@ -89,26 +66,28 @@ static void read_mattes(const struct reading *r, struct row row) {
                         r->out + i * TRC_MATTE_CHANNELS);
 }
 
-/* Passes that are sums or values of samples. */
+static void read_counts(const struct reading *r, struct row row) {
+    for (uint64_t i = row.first; i < row.end; i++)
+        r->out[i] = (float)load_count(r->film, i);
+}
+
+/* Passes that are sums or values of samples. Light is divided by its colour as Cycles divides it.
+ */
 static void read_sums(const struct reading *r, struct row row) {
-    const uint32_t pass = r->pass, channels = r->channels;
-    const double *sums = r->film->sums[pass], *divisor = divisor_of(r->film, pass);
-    const double light = is_light(pass) ? r->exposure : 1.0;
-    const bool first_sample = trc_film_is_first_sample(pass);
-    const uint32_t stride = trc_film_channels(pass);
+    const enum trc_pass_kind kind = r->info->kind;
+    const uint32_t channels = r->info->channels, stride = r->info->sums;
+    const double *sums = r->film->sums[r->pass];
+    const double *divisor = r->info->color != TRC_PASS_NONE ? r->film->sums[r->info->color] : NULL;
+    const double light = kind == TRC_PASS_KIND_LIGHT ? r->exposure : 1.0;
     for (uint64_t i = row.first; i < row.end; i++) {
         const uint32_t count = load_count(r->film, i);
         float *pixel = r->out + i * channels;
-        if (pass == TRC_PASS_SAMPLE_COUNT) {
-            pixel[0] = (float)count;
-            continue;
-        }
-        double weight = first_sample ? 1.0 : count;
-        if (pass == TRC_PASS_VECTOR)
+        double weight = kind == TRC_PASS_KIND_FIRST ? 1.0 : count;
+        if (kind == TRC_PASS_KIND_HITS)
             weight = trc_sum_load(&sums[i * stride + channels]);
         const double factor = count && weight > 0.0 ? 1.0 / weight : 0.0;
         for (uint32_t c = 0; c < channels; c++) {
-            const bool is_alpha = pass == TRC_PASS_COMBINED && c == 3;
+            const bool is_alpha = r->pass == TRC_PASS_COMBINED && c == 3;
             double value = trc_sum_load(&sums[i * stride + c]);
             if (divisor) {
                 /* Both are sums of the same samples: the counts cancel. */
@@ -167,12 +146,22 @@ static void add_shadows(const struct reading *r, struct row row) {
 
 static void read_row(const struct reading *r, struct row row) {
     const struct trc_film *film = r->film;
-    if (trc_film_is_cryptomatte(r->pass))
+    switch ((enum trc_pass_kind)r->info->kind) {
+    case TRC_PASS_KIND_MATTE:
         read_mattes(r, row);
-    else if (r->pass == TRC_PASS_SHADOW_CATCHER)
+        break;
+    case TRC_PASS_KIND_SHADOW:
         read_shadows(r, row);
-    else
+        break;
+    case TRC_PASS_KIND_COUNT:
+        read_counts(r, row);
+        break;
+    case TRC_PASS_KIND_LIGHT:
+    case TRC_PASS_KIND_MEAN:
+    case TRC_PASS_KIND_HITS:
+    case TRC_PASS_KIND_FIRST:
         read_sums(r, row);
+    }
     if (r->pass == TRC_PASS_COMBINED && film->caught && !film->shows_shadows)
         add_shadows(r, row);
 }
@@ -205,15 +194,15 @@ static void read_tile(const struct reading *r, uint32_t tile_x, uint32_t tile_y)
 
 trc_status trc_film_read(const struct trc_film *film, uint32_t pass, float exposure, float *out,
                          uint64_t float_count) {
-    const uint32_t channels = trc_pass_channels(pass);
-    if (!channels)
+    const struct trc_pass_info *info = trc_pass_info_of(pass);
+    if (!info->channels)
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "there is no pass %" PRIu32, pass);
     if (!has_pass(film, pass)) {
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "pass %" PRIu32 " was not asked for", pass);
     }
-    TRC_TRY(trc_check_array(out, float_count, (uint64_t)film->width * film->height * channels,
+    TRC_TRY(trc_check_array(out, float_count, (uint64_t)film->width * film->height * info->channels,
                             sizeof(float), sizeof(float), "pixels_out"));
-    const struct reading reading = {film, pass, channels, exposure, out};
+    const struct reading reading = {film, pass, info, exposure, out};
     for (uint32_t y = 0; y < trc_film_tiles(film->height); y++)
         for (uint32_t x = 0; x < trc_film_tiles(film->width); x++)
             read_tile(&reading, x, y);

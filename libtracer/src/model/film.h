@@ -12,6 +12,7 @@
 #include <stdint.h>
 
 #include "model/cryptomatte.h"
+#include "model/passes.h"
 #include "tracer/render.h"
 
 /* Passes that are sums have numbers below this. */
@@ -39,8 +40,8 @@ struct trc_caught {
 
 struct trc_film {
     uint32_t width, height;      /* of the crop */
-    double *sums[TRC_SUM_COUNT]; /* by pass: trc_film_channels * width * height, or NULL; bottom row
-                                    first. "First sample" passes hold the value itself */
+    double *sums[TRC_SUM_COUNT]; /* by pass: trc_pass_info.sums * width * height, or NULL; bottom
+                                    row first. TRC_PASS_KIND_FIRST: the value itself */
     struct trc_matte *mattes[TRC_CRYPTOMATTE_KINDS]; /* matte_count * width * height, or NULL */
     uint32_t matte_count;                            /* places of a pixel's table; 0: no mattes */
     uint32_t *sample_counts;                         /* width * height */
@@ -57,32 +58,11 @@ static inline atomic_uint *trc_film_sequence(const struct trc_film *film, uint32
     return &film->sequences[row * trc_film_tiles(film->width) + x / TRC_TILE_SIZE];
 }
 
-/* Whether the film has sums of a pass: it is asked for by the resolved desc, and by more than the
- * counts of samples. */
+/* Whether the film has sums of a pass: it is asked for by the resolved desc, and is of a kind that
+ * has them. */
 bool trc_film_has_sums(const trc_render_desc *desc, uint32_t pass);
-
-/* Sums of a pass for each pixel: its channels, and for the Vector pass the number of samples that
- * hit something, as it is their mean. */
-#define TRC_MAX_FILM_CHANNELS 5
-uint32_t trc_film_channels(uint32_t pass);
-
-/* Whether a pass is a layer of mattes, the light of a group. */
-static inline bool trc_film_is_cryptomatte(uint32_t pass) {
-    return pass >= TRC_PASS_CRYPTOMATTE(0, 0) &&
-           pass < TRC_PASS_CRYPTOMATTE(TRC_CRYPTOMATTE_KINDS, 0);
-}
-static inline bool trc_film_is_light_group(uint32_t pass) {
-    return pass >= TRC_PASS_LIGHT_GROUP(0) && pass < TRC_PASS_LIGHT_GROUP(TRC_MAX_LIGHT_GROUPS);
-}
-
-/* Whether a pass holds the value of a pixel's first sample, not a sum. */
-bool trc_film_is_first_sample(uint32_t pass);
 
 /* Places of a pixel's table of mattes; 0: none are asked for. */
 uint32_t trc_film_matte_count(const trc_render_desc *desc);
-
-/* The colour pass that goes with a diffuse, glossy or transmission pass, TRC_PASS_COMBINED for
- * others: light passes are divided by it when read, so whoever asks for one asks for it too. */
-uint32_t trc_film_color_pass(uint32_t pass);
 
 #endif

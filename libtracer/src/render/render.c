@@ -78,10 +78,7 @@ trc_render_desc trc_render_resolve(const trc_render_desc *desc) {
         if (*depths[i] > TRC_MAX_DEPTH)
             *depths[i] = TRC_MAX_DEPTH;
     }
-    for (uint32_t pass = 0; pass < TRC_PASS_COUNT; pass++)
-        if (desc->passes >> pass & 1)
-            r.passes |= UINT64_C(1) << trc_film_color_pass(pass);
-    r.passes |= UINT64_C(1) << TRC_PASS_COMBINED;
+    r.passes = trc_passes_with_colors(r.passes) | UINT64_C(1) << TRC_PASS_COMBINED;
     return r;
 }
 

@@ -37,15 +37,15 @@ static void film_add_caught(struct trc_tile *t, uint32_t sample, size_t pixel) {
 static void film_add_passes(struct trc_tile *t, uint32_t slot, size_t pixel, bool first) {
     for (uint32_t i = 0; i < t->samples.pass_count; i++) {
         const uint32_t pass = t->samples.passes[i];
-        const uint32_t channels = trc_film_channels(pass);
-        double *sum = t->job->film->sums[pass] + channels * pixel;
-        for (uint32_t k = 0; k < channels; k++) {
+        const struct trc_pass_info *info = trc_pass_info_of(pass);
+        double *sum = t->job->film->sums[pass] + info->sums * pixel;
+        for (uint32_t k = 0; k < info->sums; k++) {
             const double value = (double)t->samples.pass[pass][k][slot];
             if (!isfinite(value))
                 continue;
             if (first)
                 trc_sum_store(&sum[k], value);
-            else if (!trc_film_is_first_sample(pass))
+            else if (info->kind != TRC_PASS_KIND_FIRST)
                 trc_sum_add(&sum[k], value);
         }
     }

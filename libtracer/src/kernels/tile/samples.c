@@ -11,22 +11,17 @@
 #define LAST_GENERATION 200
 
 static void samples_clear(struct trc_tile *t) {
-    const size_t bytes = trc_column_entries(t->catchers) * sizeof(float);
+    const uint32_t entries = trc_column_entries(t->catchers);
+    const size_t bytes = entries * sizeof(float);
     for (int k = 0; k < 3; k++)
         memset(t->samples.radiance[k], 0, bytes);
     memset(t->samples.transparency, 0, bytes);
-    for (uint32_t i = 0; i < t->samples.pass_count; i++)
-        for (uint32_t k = 0; k < trc_film_channels(t->samples.passes[i]); k++)
-            memset(t->samples.pass[t->samples.passes[i]][k], 0, bytes);
-    /* What a miss has. */
-    static const struct {
-        uint32_t pass;
-        float value;
-    } miss[] = {{TRC_PASS_DEPTH, 1e10f}, {TRC_PASS_MIST, 1.0f}};
-    for (size_t k = 0; k < sizeof miss / sizeof *miss; k++) {
-        float *values = t->samples.pass[miss[k].pass][0];
-        for (uint32_t i = 0; values && i < TRC_BATCH; i++)
-            values[i] = miss[k].value;
+    for (uint32_t i = 0; i < t->samples.pass_count; i++) {
+        const uint32_t pass = t->samples.passes[i];
+        const struct trc_pass_info *info = trc_pass_info_of(pass);
+        for (uint32_t k = 0; k < info->sums; k++)
+            for (uint32_t slot = 0; slot < entries; slot++)
+                t->samples.pass[pass][k][slot] = info->miss;
     }
 }
 

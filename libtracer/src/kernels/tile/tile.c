@@ -21,7 +21,7 @@ void trc_clock_other(struct trc_tile *t) { clock_to(t, &t->job->counts.seconds_o
 /* ---- memory ---- */
 
 static bool wants_light_passes(const trc_render_desc *desc) {
-    return desc->passes >> TRC_PASS_DIFFUSE_DIRECT & 0x1ff;
+    return desc->passes & trc_passes_divided();
 }
 
 /* Rays that a hit sends on at most. */
@@ -40,7 +40,7 @@ static void sums_carve(struct trc_carver *c, struct trc_sample_store *s,
         if (!trc_film_has_sums(desc, pass))
             continue;
         s->passes[s->pass_count++] = (uint8_t)pass;
-        for (uint32_t k = 0; k < trc_film_channels(pass); k++)
+        for (uint32_t k = 0; k < trc_pass_info_of(pass)->sums; k++)
             s->pass[pass][k] = trc_carve(c, column_bytes);
     }
 }

@@ -71,8 +71,8 @@ struct trc_sample_store {
     float *radiance[3];
     float *transparency; /* part of the film that is seen through */
     float *pass[TRC_SUM_COUNT]
-               [TRC_MAX_FILM_CHANNELS]; /* trc_film_channels each; NULL unless asked for */
-    uint8_t passes[TRC_SUM_COUNT];      /* the numbers of those */
+               [TRC_MAX_PASS_SUMS]; /* trc_pass_info.sums each; NULL unless asked for */
+    uint8_t passes[TRC_SUM_COUNT];  /* the numbers of those */
     uint32_t pass_count;
 };
 
