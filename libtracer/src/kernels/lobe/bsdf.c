@@ -201,40 +201,17 @@ void trc_bsdf_albedo(const struct trc_lobes *l, const struct trc_surface *s, vve
     }
 }
 
-/* Lanes where a lobe is too rough for the surfaces it shows to be told from each other. */
-#define FEATURE_ALPHA 0.075f
-static vmask is_rough(const struct trc_lobe *lobe) {
-    if (lobe->kind == TRC_LOBE_TRANSPARENT)
-        return vm_none();
+vfloat trc_lobe_alpha(const struct trc_lobe *lobe) {
     if (!lobe->model->has_facets)
-        return vm_all_set();
-    const vmask blurred =
-        vf_gt(lobe->alpha_x * lobe->alpha_y, vf_set(FEATURE_ALPHA * FEATURE_ALPHA));
-    return vm_andnot(blurred, lobe->ideal);
+        return vf_one();
+    return vf_select(lobe->ideal, vf_zero(), vf_sqrt(lobe->alpha_x * lobe->alpha_y));
 }
 
-void trc_lobes_features(const struct trc_lobes *l, const struct trc_surface *s,
-                        struct trc_denoising_features *out) {
-    const vfloat zero = vf_zero();
-    vvec3 normal = v3_zero(), albedo = v3_zero();
-    vfloat all = zero, rough = zero;
-    for (int i = 0; i < l->count; i++) {
-        const struct trc_lobe *lobe = &l->lobe[i];
-        const bool is_microfacet = lobe->kind == TRC_LOBE_REFLECT || lobe->kind == TRC_LOBE_REFRACT;
-        const vmask told = is_rough(lobe);
-        const vvec3 n = lobe->kind == TRC_LOBE_TRANSPARENT ? s->n : lobe->n;
-        vvec3 color = v3_scale(lobe->weight, lobe->albedo_scale);
-        if (is_microfacet)
-            color = v3_mul(color, facet_fresnel(lobe, v3_dot(n, s->wo)));
-        normal = v3_mad(n, lobe->mix_weight, normal);
-        all = all + lobe->mix_weight;
-        rough = rough + vf_where(told, lobe->mix_weight);
-        albedo = v3_add(albedo, v3_where(told, color));
-    }
-    const vmask some = vf_gt(all, zero);
-    out->normal = v3_where(some, v3_scale(normal, vf_rcp(vf_select(some, all, vf_one()))));
-    out->albedo = albedo;
-    out->is_told = vm_or(vm_not(some), vf_gt(rough * vf_set(4.0f), all));
+vvec3 trc_lobe_albedo(const struct trc_lobe *lobe, vvec3 wo) {
+    const vvec3 albedo = v3_scale(lobe->weight, lobe->albedo_scale);
+    if (lobe->kind != TRC_LOBE_REFLECT && lobe->kind != TRC_LOBE_REFRACT)
+        return albedo;
+    return v3_mul(albedo, facet_fresnel(lobe, v3_dot(lobe->n, wo)));
 }
 
 vvec3 trc_lobes_diffuse(const struct trc_lobes *l, const struct trc_surface *s, vvec3 *normal_out) {

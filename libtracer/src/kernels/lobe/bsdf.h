@@ -61,7 +61,7 @@ struct trc_lobe {
     vfloat pair_tint;     /* mean colour of refraction over that of reflection, paired lanes */
     vvec3 multi_weight;   /* MULTI_GGX: what the lobe of the missing energy is scaled by */
     vfloat multi_chance;  /* and how often it is sampled, by cosine */
-    vfloat albedo_scale;  /* what Cycles leaves of the weight where it tells the albedo */
+    vfloat albedo_scale;  /* what Cycles leaves of the weight in the albedo */
     vfloat mix_weight;    /* Cycles' sample weight, of every lobe */
     vfloat sample_weight; /* chance in proportion, 0 for lobes that are not continued */
 };
@@ -133,16 +133,11 @@ void trc_bsdf_ideal(const struct trc_lobes *l, int i, const struct trc_surface *
  * without what a Fresnel factor or masking takes; of correlated lobes with the Fresnel factor. */
 void trc_bsdf_albedo(const struct trc_lobes *l, const struct trc_surface *s, vvec3 albedo_out[3]);
 
-/* What a denoiser is told of a surface, as Cycles chooses it: the mean normal of the lobes by their
- * mix_weight, and the albedo, Fresnel factors included, of those too rough to show another surface.
- * is_told: lanes where rough lobes are more than a quarter of all, or where there are none at all;
- * elsewhere the denoiser is told of what is seen through or mirrored. */
-struct trc_denoising_features {
-    vvec3 normal, albedo;
-    vmask is_told;
-};
-void trc_lobes_features(const struct trc_lobes *l, const struct trc_surface *s,
-                        struct trc_denoising_features *out);
+/* Albedo of one lobe towards wo, Fresnel factors included. */
+vvec3 trc_lobe_albedo(const struct trc_lobe *lobe, vvec3 wo);
+
+/* How rough one lobe is: the mean alpha of its facets, 0 where it is ideal, 1 without facets. */
+vfloat trc_lobe_alpha(const struct trc_lobe *lobe);
 
 /* What ambient light meets: the weights of diffuse lobes, translucent ones too, and the mean of
  * their normals, the shading normal without any. */

@@ -52,7 +52,8 @@ static void ray_push(struct trc_tile *t, const struct arrival *a, const struct t
     kind = kind | (vuint)vi_select(ideal, vi_set(TRC_PATH_SINGULAR), vi_set(0));
     kind = kind | (vuint)vi_select(b->diffuse, vi_set(TRC_VISIBLE_DIFFUSE), vi_set(0));
     kind = kind | (vuint)vi_select(first, own, (vint)category);
-    kind = kind | (a->path & vu_set(TRC_PATH_DATA_DONE | TRC_PATH_TOLD | TRC_VISIBLE_UNBLOCKED)) |
+    kind = kind |
+           (a->path & vu_set(TRC_PATH_DATA_DONE | TRC_PATH_FEATURES_DONE | TRC_VISIBLE_UNBLOCKED)) |
            vu_set(a->world_alone ? TRC_PATH_WORLD_ALONE : 0);
     vuint path = (vuint)vi_select(straight, (vint)a->path, (vint)kind);
     path = path | (vuint)vi_select(over, vi_set(TRC_PATH_LAST), vi_set(0));

@@ -1,4 +1,4 @@
-/* Passes of what the camera sees, apart from light.
+/* Passes of what the camera sees, apart from light and from features for denoisers.
  *
  * Two kinds, as in Cycles: those of the first surface that is not mostly seen through (depth,
  * normal, indices ...), and those that add up over all surfaces on the straight way through
@@ -11,10 +11,6 @@
 /* Cycles' default of the view layer's Alpha Threshold. */
 #define ALPHA_THRESHOLD 0.5f
 
-#define DENOISING_PASSES                                                     \
-    (1ull << TRC_PASS_DENOISING_ALBEDO | 1ull << TRC_PASS_DENOISING_NORMAL | \
-     1ull << TRC_PASS_DENOISING_DEPTH)
-
 static void store_vector(struct trc_tile *t, uint32_t pass, uint32_t slot, float x, float y,
                          float z) {
     float *const *p = t->samples.pass[pass];
@@ -26,9 +22,8 @@ static void store_vector(struct trc_tile *t, uint32_t pass, uint32_t slot, float
         p[2][slot] = z;
 }
 
-/* Adds the lanes' vectors to a pass, if it is asked for. */
-static void add_lanes(struct trc_tile *t, uint32_t pass, vvec3 value, const uint32_t *slots,
-                      vmask active) {
+void trc_pass_add_lanes(struct trc_tile *t, uint32_t pass, vvec3 value,
+                        const uint32_t slots[TRC_WIDTH], vmask active) {
     if (!t->samples.pass[pass][0])
         return;
     float lanes[3][TRC_WIDTH];
@@ -165,7 +160,7 @@ static void add_colors(struct trc_tile *t, const struct trc_surface *s,
     vvec3 albedo[3];
     trc_bsdf_albedo(lobes, s, albedo);
     for (int k = 0; k < 3; k++)
-        add_lanes(t, pass[k], v3_mul(weight, albedo[k]), slots, active);
+        trc_pass_add_lanes(t, pass[k], v3_mul(weight, albedo[k]), slots, active);
 }
 
 /* Takes what is seen before the mist from the pass, which starts at 1. */
@@ -186,7 +181,7 @@ static void add_mist(struct trc_tile *t, const struct trc_surface *s, vvec3 seen
     const vfloat depth = vf_min(vf_max((distance - vf_set(d->mist_start)) * inv_depth, zero), one);
     const vfloat mist = d->mist_falloff == 1.0f ? depth : vf_pow(depth, vf_set(d->mist_falloff));
     const vfloat clear = (mist - one) * v3_average(seen);
-    add_lanes(t, TRC_PASS_MIST, v3(clear, zero, zero), slots, active);
+    trc_pass_add_lanes(t, TRC_PASS_MIST, v3(clear, zero, zero), slots, active);
 }
 
 /* ---- mattes ---- */
@@ -265,52 +260,11 @@ void trc_world_aovs(struct trc_tile *t, vvec3 d, vuint path, const uint32_t slot
     add_aovs(t, m, &regs, slots, active);
 }
 
-/* ---- for denoisers: of the first rough surface, through mirrors and glass too ----
- *
- * As Cycles, but for surfaces that are not told of and yet have diffuse lobes: with diffuse bounces
- * 0 it loses the paths that pick those, and with them a part of what lies behind. */
-
-/* Writes the mean normal once, in the camera's space (x right, y up, z forward), whichever way of
- * the sample comes first; the others add up by their throughput. Returns the new path words. */
-static vuint add_features(struct trc_tile *t, const struct trc_surface *s,
-                          const struct trc_lobes *lobes, vvec3 weight, vfloat length,
-                          const uint32_t *slots) {
-    const vmask on = vm_and(s->active, vi_eq((vint)s->path & vi_set(TRC_PATH_TOLD), vi_set(0)));
-    if (!vm_any(on))
-        return s->path;
-    struct trc_denoising_features f;
-    trc_lobes_features(lobes, s, &f);
-    const vfloat zero = vf_set(0.0f);
-    const float *camera = world_to_camera(t);
-    const vfloat way = v3_average(weight) * length;
-    add_lanes(t, TRC_PASS_DENOISING_DEPTH, v3(way, zero, zero), slots, on);
-    const vmask told = vm_and(on, f.is_told);
-    add_lanes(t, TRC_PASS_DENOISING_ALBEDO, v3_mul(weight, f.albedo), slots, told);
-    if (t->samples.pass[TRC_PASS_DENOISING_NORMAL][0]) {
-        float n[3][TRC_WIDTH];
-        for (int k = 0; k < 3; k++) {
-            const float *row = camera + 4 * k;
-            const vfloat along =
-                v3_dot(f.normal, v3(vf_set(row[0]), vf_set(row[1]), vf_set(row[2])));
-            vf_store(n[k], k == 2 ? zero - along : along);
-        }
-        for (uint32_t bits = vm_bits(told); bits; bits &= bits - 1) {
-            const int i = __builtin_ctz(bits);
-            float *const *p = t->samples.pass[TRC_PASS_DENOISING_NORMAL];
-            if (p[0][slots[i]] == 0.0f && p[1][slots[i]] == 0.0f && p[2][slots[i]] == 0.0f)
-                store_vector(t, TRC_PASS_DENOISING_NORMAL, slots[i], n[0][i], n[1][i], n[2][i]);
-        }
-    }
-    return (vuint)vi_select(told, (vint)s->path | vi_set(TRC_PATH_TOLD), (vint)s->path);
-}
-
 vuint trc_data_passes(struct trc_tile *t, const struct trc_surface *s, const struct trc_material *m,
                       const struct trc_registers *regs, const struct trc_lobes *lobes,
                       vvec3 found_weight, vfloat beyond, vfloat length,
                       const uint32_t slots[TRC_WIDTH]) {
-    const vuint path = t->desc->passes & DENOISING_PASSES
-                           ? add_features(t, s, lobes, found_weight, length, slots)
-                           : s->path;
+    const vuint path = trc_denoising_passes(t, s, lobes, found_weight, length, slots);
     const vint straight = vi_set(TRC_PATH_TRANSPARENT_BACKGROUND);
     const vmask on = vm_and(s->active, vi_eq((vint)s->path & straight, straight));
     if (!vm_any(on))

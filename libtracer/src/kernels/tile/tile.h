@@ -16,13 +16,13 @@
 
 /* Bits of a ray's path word above those of kernels/trace/surface.h. */
 enum {
-    TRC_PATH_CATEGORY_SHIFT = 12, /* TRC_CATEGORY_* */
-    TRC_PATH_LAST = 1 << 14,      /* only emission counts at the next surface */
-    TRC_PATH_DATA_DONE = 1 << 15, /* data passes of the sample are written */
-    TRC_PATH_TOLD = 1 << 16,      /* and the denoising passes of this way of it */
-    TRC_PATH_OCCLUSION = 1 << 17, /* shadow rays: of the pass of ambient occlusion, no light */
-    TRC_PATH_CAUGHT = 1 << 18,    /* the camera sees this way through a shadow catcher */
-    TRC_PATH_CLAMPED = 1 << 19    /* shadow rays: what they carry is clamped already */
+    TRC_PATH_CATEGORY_SHIFT = 12,     /* TRC_CATEGORY_* */
+    TRC_PATH_LAST = 1 << 14,          /* only emission counts at the next surface */
+    TRC_PATH_DATA_DONE = 1 << 15,     /* data passes of the sample are written */
+    TRC_PATH_FEATURES_DONE = 1 << 16, /* and its denoising passes, along this path */
+    TRC_PATH_OCCLUSION = 1 << 17,     /* shadow rays: of the pass of ambient occlusion, no light */
+    TRC_PATH_CAUGHT = 1 << 18,        /* the camera sees this way through a shadow catcher */
+    TRC_PATH_CLAMPED = 1 << 19        /* shadow rays: what they carry is clamped already */
 };
 
 /* What a path's first bounce was; diffuse: through a translucent surface. */
@@ -187,6 +187,12 @@ TRC_INLINE vuint trc_sample_of(vuint slot) { return slot & vu_set(TRC_CATCHER_BA
 /* Shades the hits of t->work, sorted by material, and what missed. (kernels/tile/shade.c) */
 void trc_shade_batch(struct trc_tile *t);
 
+/* Features for denoisers of a group of hits: weight: throughputs of the rays that arrived; length:
+ * of these. Returns their path words, which remember what is written. (kernels/tile/denoising.c) */
+vuint trc_denoising_passes(struct trc_tile *t, const struct trc_surface *s,
+                           const struct trc_lobes *lobes, vvec3 weight, vfloat length,
+                           const uint32_t slots[TRC_WIDTH]);
+
 /* Passes that hold no light but what surfaces are, for a group of hits of one material:
  * found_weight and beyond as kernels/lobe/bsdf.h has them, of the rays that arrived; length: of
  * their way since the last surface or the near clip. Returns the rays' path words, which remember
@@ -195,6 +201,10 @@ vuint trc_data_passes(struct trc_tile *t, const struct trc_surface *s, const str
                       const struct trc_registers *regs, const struct trc_lobes *lobes,
                       vvec3 found_weight, vfloat beyond, vfloat length,
                       const uint32_t slots[TRC_WIDTH]);
+
+/* Adds the lanes' vectors to a pass, if it is asked for. (kernels/tile/data_passes.c) */
+void trc_pass_add_lanes(struct trc_tile *t, uint32_t pass, vvec3 value,
+                        const uint32_t slots[TRC_WIDTH], vmask active);
 
 /* What the world's material gives to AOVs where rays in direction d leave the scene; path: their
  * words. (kernels/tile/data_passes.c) */

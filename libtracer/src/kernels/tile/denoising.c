@@ -1,0 +1,88 @@
+/* Passes for denoisers: features of the first surface that is rough enough, seen directly, in
+ * mirrors or through glass.
+ *
+ * As Cycles of 3.4, but for surfaces whose features are not taken and that yet have diffuse lobes:
+ * with diffuse bounces 0 it loses the paths that pick those, and with them a part of what lies
+ * behind. */
+#include "kernels/simd/wide_math.h"
+#include "kernels/tile/tile.h"
+
+#define DENOISING_PASSES                                                     \
+    (1ull << TRC_PASS_DENOISING_ALBEDO | 1ull << TRC_PASS_DENOISING_NORMAL | \
+     1ull << TRC_PASS_DENOISING_DEPTH)
+
+/* Rougher lobes blur what they show too much for its features to be of use. */
+#define FEATURE_ALPHA 0.075f
+/* Part of all lobes, by mix_weight, that must be rough. */
+#define ROUGH_SHARE 0.25f
+
+struct features {
+    vvec3 normal, albedo; /* mean of all lobes; sum of the rough ones */
+    vmask are_taken;      /* lanes whose lobes are rough enough, or that have none */
+};
+
+static vmask is_rough(const struct trc_lobe *lobe) {
+    if (lobe->kind == TRC_LOBE_TRANSPARENT)
+        return vm_none();
+    return vf_gt(trc_lobe_alpha(lobe), vf_set(FEATURE_ALPHA));
+}
+
+static void features_of(const struct trc_lobes *l, const struct trc_surface *s,
+                        struct features *out) {
+    const vfloat zero = vf_zero();
+    vvec3 normal = v3_zero(), albedo = v3_zero();
+    vfloat all = zero, rough = zero;
+    for (int i = 0; i < l->count; i++) {
+        const struct trc_lobe *lobe = &l->lobe[i];
+        const vmask counts = is_rough(lobe);
+        const vvec3 n = lobe->kind == TRC_LOBE_TRANSPARENT ? s->n : lobe->n;
+        normal = v3_mad(n, lobe->mix_weight, normal);
+        all = all + lobe->mix_weight;
+        rough = rough + vf_where(counts, lobe->mix_weight);
+        albedo = v3_add(albedo, v3_where(counts, trc_lobe_albedo(lobe, s->wo)));
+    }
+    const vmask some = vf_gt(all, zero);
+    out->normal = v3_where(some, v3_scale(normal, vf_rcp(vf_select(some, all, vf_one()))));
+    out->albedo = albedo;
+    out->are_taken = vm_or(vm_not(some), vf_gt(rough * vf_set(1.0f / ROUGH_SHARE), all));
+}
+
+/* Writes the mean normal in the camera's space: x right, y up, z forward. Once, whichever path of
+ * the sample comes first. */
+static void write_normal(struct trc_tile *t, vvec3 normal, const uint32_t *slots, vmask active) {
+    float *const *out = t->samples.pass[TRC_PASS_DENOISING_NORMAL];
+    if (!out[0])
+        return;
+    const float *camera = t->snapshot->camera.world_to_camera[1].m;
+    float n[3][TRC_WIDTH];
+    for (int k = 0; k < 3; k++) {
+        const float *row = camera + 4 * k;
+        const vfloat along = v3_dot(normal, v3(vf_set(row[0]), vf_set(row[1]), vf_set(row[2])));
+        vf_store(n[k], k == 2 ? vf_zero() - along : along);
+    }
+    for (uint32_t bits = vm_bits(active); bits; bits &= bits - 1) {
+        const int i = __builtin_ctz(bits);
+        const uint32_t slot = slots[i];
+        if (out[0][slot] != 0.0f || out[1][slot] != 0.0f || out[2][slot] != 0.0f)
+            continue;
+        for (int k = 0; k < 3; k++)
+            out[k][slot] = n[k][i];
+    }
+}
+
+vuint trc_denoising_passes(struct trc_tile *t, const struct trc_surface *s,
+                           const struct trc_lobes *lobes, vvec3 weight, vfloat length,
+                           const uint32_t slots[TRC_WIDTH]) {
+    const vint done = vi_set(TRC_PATH_FEATURES_DONE);
+    const vmask on = vm_and(s->active, vi_eq((vint)s->path & done, vi_set(0)));
+    if (!(t->desc->passes & DENOISING_PASSES) || !vm_any(on))
+        return s->path;
+    struct features f;
+    features_of(lobes, s, &f);
+    const vfloat depth = v3_average(weight) * length;
+    trc_pass_add_lanes(t, TRC_PASS_DENOISING_DEPTH, v3(depth, vf_zero(), vf_zero()), slots, on);
+    const vmask taken = vm_and(on, f.are_taken);
+    trc_pass_add_lanes(t, TRC_PASS_DENOISING_ALBEDO, v3_mul(weight, f.albedo), slots, taken);
+    write_normal(t, f.normal, slots, taken);
+    return (vuint)vi_select(taken, (vint)s->path | done, (vint)s->path);
+}
