@@ -10,7 +10,7 @@ from ..abi import (CurvesExtension, MathOperation as Math, ModeFlags, NodeType, 
                    TableSize, TransformedType, VectorOperation as Vector, VectorTransformMode)
 from ..compat import TRANSFORMS_NORMALS
 from .instance import VALUES_LOCATION, VALUES_PARTICLE, VALUES_SPIN, VALUES_VELOCITY
-from .node_list import output
+from .node_list import named_outputs, output
 from .strands import DIRECTION_ATTRIBUTE, HAIR_ATTRIBUTE
 from .values import CONSTANT, DEFAULT, Value
 
@@ -159,8 +159,7 @@ def _vector_rotate(walker, node, sockets):
 
 def _camera_data(walker, _node, _sockets):
     index = walker.emit(NodeType.CAMERA_DATA, ())
-    return {"View Vector": Value('v', index, 0), "View Z Depth": Value('f', index, 1),
-            "View Distance": Value('f', index, 2)}
+    return named_outputs(index, NodeType.CAMERA_DATA, ("View Vector", "View Z Depth", "View Distance"))
 
 
 def _wireframe(walker, node, sockets):
@@ -203,7 +202,7 @@ def _tangent_normal(walker):
     incoming = output(walker.emit(NodeType.GEOMETRY, ()), NodeType.GEOMETRY, "incoming")
     across = _vector(walker, Vector.SUBTRACT, incoming, _vector(walker, Vector.PROJECT, incoming, along))
     unit = _vector(walker, Vector.NORMALIZE, across)
-    return _vector(walker, Vector.SCALE, unit, scale=Value('f', strand, 1))
+    return _vector(walker, Vector.SCALE, unit, scale=output(strand, NodeType.COLOR_ATTRIBUTE, "alpha"))
 
 
 def _hair_info(walker, node, _sockets):
@@ -213,7 +212,7 @@ def _hair_info(walker, node, _sockets):
     parts = walker.emit(NodeType.SEPARATE, (Value('c', index, 0),))
     intercept, length, thickness = (Value('f', parts, i) for i in range(3))
     is_strand = _number(walker, Math.GREATER_THAN, length, _constant('f', 0.0))
-    random = _number(walker, Math.MULTIPLY, Value('f', index, 1), is_strand)
+    random = _number(walker, Math.MULTIPLY, output(index, NodeType.COLOR_ATTRIBUTE, "alpha"), is_strand)
     is_read = node.outputs["Tangent Normal"].is_linked
     tangent_normal = _tangent_normal(walker) if is_read else _constant('v', 0.0)
     return {"Is Strand": is_strand, "Intercept": intercept, "Length": length, "Thickness": thickness,

@@ -12,6 +12,7 @@ that is not supported becomes a diffuse of its colour. Each is named once in the
 from ..abi import NodeType, VectorOperation as Vector
 from ..compat import aov_name
 from . import nodes
+from .node_list import output
 from .values import CONSTANT, DEFAULT, NO_SHADER, Value
 
 _KINDS = {'VALUE': 'f', 'INT': 'f', 'BOOLEAN': 'f', 'RGBA': 'c', 'VECTOR': 'v', 'ROTATION': 'v',
@@ -59,10 +60,10 @@ def flatten(tree, label, warnings, images=None, aovs=None):
     label names the owner in messages; images: image.Images, without which all are missing; aovs:
     {name: (type, number)} of those that are asked for."""
     walker = Walker(label, warnings, images)
-    output = tree.get_output_node('CYCLES')
-    if output is None:
+    end = tree.get_output_node('CYCLES')
+    if end is None:
         return walker.flat
-    sockets = {socket.identifier: socket for socket in output.inputs}
+    sockets = {socket.identifier: socket for socket in end.inputs}
     for name in ("Volume", "Displacement"):
         if name in sockets and walker.is_linked(sockets[name]):
             warnings.add(f"{label}: {name.lower()} is not supported and is left out")
@@ -260,7 +261,7 @@ class Walker:
         zero = Value('v', CONSTANT, 0)
         index = self.emit(NodeType.VECTOR_MATH, (value, third, zero, Value('f', CONSTANT, 0)),
                           mode=Vector.DOT)
-        return Value('f', index, 1)
+        return output(index, NodeType.VECTOR_MATH, "value")
 
     def _as_emission(self, value):
         """A colour where a shader is expected shines with that colour."""

@@ -37,6 +37,18 @@ def input_number(node_type, name):
     return _INPUT_NUMBERS[node_type, name]
 
 
+def arranged(node_type, values):
+    """The inputs of a type in the library's order; values: {the library's name: Value}, of all inputs."""
+    assert len(values) == len(NODES[node_type][1])
+    return [values[name] for _, name in NODES[node_type][1]]
+
+
+def named_outputs(index, node_type, names, mode=0):
+    """{Blender's name: Value} of the node at index; names: of its outputs in the library's order."""
+    return {name: Value(kind, index, number)
+            for number, (kind, name) in enumerate(zip(output_kinds(node_type, mode), names))}
+
+
 def output(index, node_type, name):
     """The output of that name of the node at index."""
     number = _OUTPUT_NUMBERS[node_type, name]

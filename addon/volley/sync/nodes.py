@@ -19,7 +19,7 @@ from . import tangents
 from .converters import CONVERTERS, instance_value
 from .derived import ISLAND, POINTINESS
 from .instance import VALUES_GENERATED, VALUES_UV
-from .node_list import input_kinds, input_number, output_kinds
+from .node_list import arranged, input_kinds, input_number, named_outputs, output
 from .textures import TEXTURES
 from .values import CONSTANT, DEFAULT, Value
 
@@ -186,7 +186,7 @@ def translate(walker, node, path):
         return _unsupported(walker, node, sockets)
     values = sockets.all_of(spec.type, spec.inputs)
     _note_generated(walker, node, spec.type, values)
-    return _outputs(walker.emit(spec.type, values, mode), spec.type, spec.outputs, mode)
+    return named_outputs(walker.emit(spec.type, values, mode), spec.type, spec.outputs, mode)
 
 
 def _note_generated(walker, node, node_type, values):
@@ -237,11 +237,6 @@ def _constant(kind, x, y=None, z=None):
     if kind == 'f':
         return Value('f', CONSTANT, 0, (x, 0.0, 0.0))
     return Value(kind, CONSTANT, 0, (x, x if y is None else y, x if z is None else z))
-
-
-def _outputs(index, node_type, names, mode=0):
-    """{socket identifier: Value} of the node at index, whose outputs have those names in order."""
-    return {name: Value(kind, index, i) for i, (kind, name) in enumerate(zip(output_kinds(node_type, mode), names))}
 
 
 def _number(walker, operation, *values):
@@ -319,10 +314,14 @@ def _metallic(walker, node, sockets):
         edge = _constant('c', *(_edge_tint(n, k) for n, k in pairs))
     one, zero, none = _constant('f', 1.0), _constant('f', 0.0), Value('v', DEFAULT, 0)
     white, black = _constant('c', 1.0), _constant('c', 0.0)
-    values = [base, one, sockets.get('f', "Roughness"), _constant('f', 1.5), one,
-              sockets.get('v', "Normal"), zero, zero, edge, sockets.get('f', "Anisotropy"),
-              sockets.get('f', "Rotation"), sockets.get('v', "Tangent"), zero, zero, zero, one, white,
-              none, zero, zero, white, black, zero]
+    values = arranged(NodeType.LAYERED_PRINCIPLED, {
+        "base_color": base, "metallic": one, "roughness": sockets.get('f', "Roughness"),
+        "ior": _constant('f', 1.5), "alpha": one, "normal": sockets.get('v', "Normal"),
+        "diffuse_roughness": zero, "specular_ior_level": zero, "specular_tint": edge,
+        "anisotropic": sockets.get('f', "Anisotropy"), "anisotropic_rotation": sockets.get('f', "Rotation"),
+        "tangent": sockets.get('v', "Tangent"), "transmission_weight": zero, "coat_weight": zero, "coat_roughness": zero,
+        "coat_ior": one, "coat_tint": white, "coat_normal": none, "sheen_weight": zero, "sheen_roughness": zero,
+        "sheen_tint": white, "emission_color": black, "emission_strength": zero})
     _note_generated(walker, node, NodeType.LAYERED_PRINCIPLED, values)
     return {"BSDF": Value('s', walker.emit(NodeType.LAYERED_PRINCIPLED, values, _distribution(node) or 0), 0)}
 
@@ -365,7 +364,7 @@ def _normal(walker, node, sockets):
     values = (_vector(walker, Vector.NORMALIZE, sockets.get('v', "Normal")),
               _vector(walker, Vector.NORMALIZE, direction), _constant('v', 0.0), _constant('f', 0.0))
     dot = walker.emit(NodeType.VECTOR_MATH, values, Vector.DOT)
-    return {"Normal": direction, "Dot": Value('f', dot, 1)}
+    return {"Normal": direction, "Dot": output(dot, NodeType.VECTOR_MATH, "value")}
 
 
 def _image(walker, node, sockets):
@@ -378,7 +377,7 @@ def _image(walker, node, sockets):
         return _tiles(walker, walker.tiles_of(node), vector, mode)
     blend = _constant('f', node.projection_blend)
     index = walker.emit(NodeType.IMAGE, (vector, blend), mode, image=walker.image_of(node))
-    return _outputs(index, NodeType.IMAGE, ("Color", "Alpha"))
+    return named_outputs(index, NodeType.IMAGE, ("Color", "Alpha"))
 
 
 def _tiles(walker, tiles, vector, mode):
@@ -395,8 +394,9 @@ def _tiles(walker, tiles, vector, mode):
                              for i, number in enumerate((float(column), float(row))))
         is_here = _number(walker, Math.MULTIPLY, is_column, is_row)
         index = walker.emit(NodeType.IMAGE, (place, no_blend), mode, image=image)
-        color = Value('c', walker.emit(NodeType.MIX_COLOR, (is_here, color, Value('c', index, 0))), 0)
-        step = _number(walker, Math.SUBTRACT, Value('f', index, 1), alpha)
+        image_color, image_alpha = (output(index, NodeType.IMAGE, name) for name in ("color", "alpha"))
+        color = Value('c', walker.emit(NodeType.MIX_COLOR, (is_here, color, image_color)), 0)
+        step = _number(walker, Math.SUBTRACT, image_alpha, alpha)
         alpha = _number(walker, Math.MULTIPLY_ADD, step, is_here, alpha)
     return {"Color": color, "Alpha": alpha}
 
@@ -406,18 +406,18 @@ def _environment(walker, node, sockets):
             | EnvironmentProjection[node.projection])
     index = walker.emit(NodeType.ENVIRONMENT, (sockets.get('v', "Vector"),), mode,
                         image=walker.image_of(node))
-    return _outputs(index, NodeType.ENVIRONMENT, ("Color",))
+    return named_outputs(index, NodeType.ENVIRONMENT, ("Color",))
 
 
 def _geometry(walker, node, sockets):
     _note_generated(walker, node, NodeType.GEOMETRY, ())
-    outputs = _outputs(walker.emit(NodeType.GEOMETRY, ()), NodeType.GEOMETRY, (
+    outputs = named_outputs(walker.emit(NodeType.GEOMETRY, ()), NodeType.GEOMETRY, (
         "Position", "Normal", "Tangent", "True Normal", "Incoming", "Parametric", "Backfacing"))
-    for output, attribute in (("Pointiness", POINTINESS), ("Random Per Island", ISLAND)):
-        if node.outputs[output].is_linked:
+    for name, attribute in (("Pointiness", POINTINESS), ("Random Per Island", ISLAND)):
+        if node.outputs[name].is_linked:
             walker.flat.color_names.add(attribute)
             index = walker.emit(NodeType.COLOR_ATTRIBUTE, (), name=attribute)
-            outputs[output] = Value('f', walker.emit(NodeType.SEPARATE, (Value('c', index, 0),)), 0)
+            outputs[name] = Value('f', walker.emit(NodeType.SEPARATE, (Value('c', index, 0),)), 0)
     return outputs
 
 
@@ -425,7 +425,7 @@ def _uv_map(walker, node, _sockets):
     if node.from_instancer:
         return {"UV": instance_value(walker, 'v', VALUES_UV)}
     walker.flat.uv_names.add(node.uv_map)
-    return _outputs(walker.emit(NodeType.UV_MAP, (), name=node.uv_map), NodeType.UV_MAP, ("UV",))
+    return named_outputs(walker.emit(NodeType.UV_MAP, (), name=node.uv_map), NodeType.UV_MAP, ("UV",))
 
 
 def _texture_coordinate(walker, node, _sockets):
@@ -434,7 +434,7 @@ def _texture_coordinate(walker, node, _sockets):
         walker.flat.uv_names.add("")
     walker.flat.needs_generated |= "Generated" in linked
     index = walker.emit(NodeType.TEXTURE_COORDINATE, ())
-    outputs = _outputs(index, NodeType.TEXTURE_COORDINATE, (
+    outputs = named_outputs(index, NodeType.TEXTURE_COORDINATE, (
         "Generated", "Normal", "UV", "Object", "Camera", "Window", "Reflection"))
     if node.object is not None and "Object" in linked:
         outputs["Object"] = _place_in(walker, node.object)
@@ -447,19 +447,20 @@ def _texture_coordinate(walker, node, _sockets):
 def _place_in(walker, blender_object):
     """The shading point in another object's coordinates."""
     walker.flat.follows_objects = True
-    position = Value('v', walker.emit(NodeType.GEOMETRY, ()), 0)
+    position = output(walker.emit(NodeType.GEOMETRY, ()), NodeType.GEOMETRY, "position")
     zero = _constant('v', 0.0), _constant('f', 0.0)
     parts = []
     for row in blender_object.matrix_world.inverted_safe()[:3]:
         dot = walker.emit(NodeType.VECTOR_MATH, (position, _constant('v', *row[:3])) + zero, Vector.DOT)
-        parts.append(_number(walker, Math.ADD, Value('f', dot, 1), _constant('f', row[3])))
+        product = output(dot, NodeType.VECTOR_MATH, "value")
+        parts.append(_number(walker, Math.ADD, product, _constant('f', row[3])))
     return Value('v', walker.emit(NodeType.COMBINE, parts), 0)
 
 
 def _color_attribute(walker, node, _sockets):
     walker.flat.color_names.add(node.layer_name)
     index = walker.emit(NodeType.COLOR_ATTRIBUTE, (), name=node.layer_name)
-    return _outputs(index, NodeType.COLOR_ATTRIBUTE, ("Color", "Alpha"))
+    return named_outputs(index, NodeType.COLOR_ATTRIBUTE, ("Color", "Alpha"))
 
 
 def _attribute(walker, node, _sockets):
@@ -468,7 +469,7 @@ def _attribute(walker, node, _sockets):
         return None
     walker.flat.color_names.add(node.attribute_name)
     index = walker.emit(NodeType.COLOR_ATTRIBUTE, (), name=node.attribute_name)
-    outputs = _outputs(index, NodeType.COLOR_ATTRIBUTE, ("Color", "Alpha"))
+    outputs = named_outputs(index, NodeType.COLOR_ATTRIBUTE, ("Color", "Alpha"))
     outputs["Vector"] = outputs["Color"]._replace(kind='v')
     outputs["Fac"] = walker.convert(outputs["Vector"], 'f')
     return outputs
@@ -481,7 +482,7 @@ def _math(walker, node, sockets):
     values = [sockets.get('f', name) for name in ("Value", "Value_001", "Value_002")]
     if node.operation == 'FLOORED_MODULO':  # the range to wrap into begins at 0
         values[2] = _constant('f', 0.0)
-    return _outputs(walker.emit(NodeType.MATH, values, mode), NodeType.MATH, ("Value",))
+    return named_outputs(walker.emit(NodeType.MATH, values, mode), NodeType.MATH, ("Value",))
 
 
 def _normal_map(walker, node, sockets):
@@ -489,7 +490,7 @@ def _normal_map(walker, node, sockets):
     name = _tangents_of(walker, node) if space == NormalMapSpace.TANGENT else ""
     index = walker.emit(NodeType.NORMAL_MAP, (sockets.get('f', "Strength"), sockets.get('c', "Color")), space,
                         name=name)
-    return _outputs(index, NodeType.NORMAL_MAP, ("Normal",))
+    return named_outputs(index, NodeType.NORMAL_MAP, ("Normal",))
 
 
 def _tangents_of(walker, node):
@@ -505,7 +506,7 @@ def _tangent(walker, node, _sockets):
         mode, name = TangentSource.UV, _tangents_of(walker, node)
     else:
         walker.flat.needs_generated = True
-    return _outputs(walker.emit(NodeType.TANGENT, (), mode, name=name), NodeType.TANGENT, ("Tangent",))
+    return named_outputs(walker.emit(NodeType.TANGENT, (), mode, name=name), NodeType.TANGENT, ("Tangent",))
 
 
 def _color_ramp(walker, node, sockets):
@@ -515,7 +516,7 @@ def _color_ramp(walker, node, sockets):
         factor = _number(walker, Math.MULTIPLY, factor, _constant('f', RAMP_STEPS / steps))
     table = np.array([ramp.evaluate(min(i / RAMP_STEPS, 1.0)) for i in range(TableSize.ENTRIES)], np.float32)
     index = walker.emit(NodeType.COLOR_RAMP, (factor,), mode, table=table)
-    return _outputs(index, NodeType.COLOR_RAMP, ("Color", "Alpha"))
+    return named_outputs(index, NodeType.COLOR_RAMP, ("Color", "Alpha"))
 
 
 def _mix(walker, node, sockets):

@@ -7,16 +7,16 @@ values that its textures imply.
 """
 
 from ..abi import (BrickMode, FractalType, GradientType, NodeType, NoiseMode, VoronoiFeature, VoronoiMetric,
-                   VoronoiMode, WaveMode, WaveProfile)
+                   VoronoiMode, WaveDirection, WaveMode, WaveProfile)
+from .node_list import named_outputs, output
 from .sky_texture import sky_texture
 from .values import CONSTANT, DEFAULT, Value
 
 _DIMENSIONS = ('1D', '2D', '3D', '4D')
-_FRACTALS = {kind: FractalType[kind] for kind in (
-    'FBM', 'MULTIFRACTAL', 'HETERO_TERRAIN', 'HYBRID_MULTIFRACTAL', 'RIDGED_MULTIFRACTAL')}
+_FRACTALS = FractalType.__members__
 _PROFILES = {'SIN': WaveProfile.SINE, 'SAW': WaveProfile.SAW, 'TRI': WaveProfile.TRIANGLE}
-_BANDS = ('X', 'Y', 'Z', 'DIAGONAL')
-_RINGS = ('X', 'Y', 'Z', 'SPHERICAL')
+_RINGS = {'X': WaveDirection.X, 'Y': WaveDirection.Y, 'Z': WaveDirection.Z,
+          'SPHERICAL': WaveDirection.DIAGONAL}
 
 
 def _number(sockets, name, default):
@@ -49,7 +49,7 @@ def _noise(walker, node, sockets):
               _number(sockets, "Offset", 0.0), _number(sockets, "Gain", 1.0),
               sockets.get('f', "Distortion")]
     index = walker.emit(NodeType.NOISE, values, dimensions | fractal << NoiseMode.TYPE_SHIFT)
-    return {"Fac": Value('f', index, 0), "Color": Value('c', index, 1)}
+    return named_outputs(index, NodeType.NOISE, ("Fac", "Color"))
 
 
 def _musgrave(walker, node, sockets):
@@ -60,7 +60,7 @@ def _musgrave(walker, node, sockets):
         "Scale", "Detail", "Dimension", "Lacunarity", "Offset", "Gain")]
     mode = dimensions | _FRACTALS[node.musgrave_type] << NoiseMode.TYPE_SHIFT
     index = walker.emit(NodeType.MUSGRAVE, values, mode)
-    return {"Fac": Value('f', index, 0)}
+    return named_outputs(index, NodeType.MUSGRAVE, ("Fac",))
 
 
 def _voronoi(walker, node, sockets):
@@ -76,25 +76,24 @@ def _voronoi(walker, node, sockets):
     if getattr(node, "normalize", False):
         mode |= VoronoiMode.NORMALIZE
     index = walker.emit(NodeType.VORONOI, values, mode)
-    return {"Distance": Value('f', index, 0), "Color": Value('c', index, 1),
-            "Position": Value('v', index, 2), "W": Value('f', index, 3), "Radius": Value('f', index, 4)}
+    return named_outputs(index, NodeType.VORONOI, ("Distance", "Color", "Position", "W", "Radius"))
 
 
 def _wave(walker, node, sockets):
     if node.wave_type == 'BANDS':
-        mode, direction = 0, _BANDS.index(node.bands_direction)
+        mode, direction = 0, WaveDirection[node.bands_direction]
     else:
-        mode, direction = WaveMode.RINGS, _RINGS.index(node.rings_direction)
+        mode, direction = WaveMode.RINGS, _RINGS[node.rings_direction]
     mode |= _PROFILES[node.wave_profile] | direction << WaveMode.DIRECTION_SHIFT
     values = [sockets.get('v', "Vector")] + [sockets.get('f', name) for name in (
         "Scale", "Distortion", "Detail", "Detail Scale", "Detail Roughness", "Phase Offset")]
     index = walker.emit(NodeType.WAVE, values, mode)
-    return _grey(walker, Value('f', index, 0))
+    return _grey(walker, output(index, NodeType.WAVE, "value"))
 
 
 def _gradient(walker, node, sockets):
     index = walker.emit(NodeType.GRADIENT, [sockets.get('v', "Vector")], GradientType[node.gradient_type])
-    return _grey(walker, Value('f', index, 0))
+    return _grey(walker, output(index, NodeType.GRADIENT, "value"))
 
 
 def _grey(walker, value):
@@ -107,13 +106,13 @@ def _white_noise(walker, node, sockets):
     if vector.node == DEFAULT:  # unlike other textures', an unlinked vector is 0
         vector = Value('v', CONSTANT, 0)
     index = walker.emit(NodeType.WHITE_NOISE, [vector, w], dimensions)
-    return {"Value": Value('f', index, 0), "Color": Value('c', index, 1)}
+    return named_outputs(index, NodeType.WHITE_NOISE, ("Value", "Color"))
 
 
 def _magic(walker, node, sockets):
     values = [sockets.get('v', "Vector"), sockets.get('f', "Scale"), sockets.get('f', "Distortion")]
     index = walker.emit(NodeType.MAGIC, values, node.turbulence_depth)
-    return {"Color": Value('c', index, 0), "Fac": Value('f', index, 1)}
+    return named_outputs(index, NodeType.MAGIC, ("Color", "Fac"))
 
 
 def _brick(walker, node, sockets):
@@ -126,7 +125,7 @@ def _brick(walker, node, sockets):
     values += [amount(node.offset), amount(node.squash)]
     mode = node.offset_frequency | node.squash_frequency << BrickMode.SQUASH_SHIFT
     index = walker.emit(NodeType.BRICK, values, mode)
-    return {"Color": Value('c', index, 0), "Fac": Value('f', index, 1)}
+    return named_outputs(index, NodeType.BRICK, ("Color", "Fac"))
 
 
 TEXTURES = {
