@@ -35,6 +35,18 @@ def _show(material, node, output, scale):
     emission.inputs["Strength"].default_value = scale
 
 
+def _shining(name, attribute_type, attribute, output, scale=1.0):
+    """A material that shines with the output of an Attribute node."""
+    import scenes
+    made = scenes.emitter((0.0, 0.0, 0.0), name, scale)
+    tree = made.node_tree
+    node = tree.nodes.new("ShaderNodeAttribute")
+    node.attribute_type, node.attribute_name = attribute_type, attribute
+    emission = next(n for n in tree.nodes if n.type == 'EMISSION')
+    tree.links.new(node.outputs[output], emission.inputs["Color"])
+    return made
+
+
 def _emitter(grid):
     """A wall of faces that throws 30 balls from frame 1 to 10."""
     import scenes
@@ -114,7 +126,39 @@ def inside_meshes():
     return pictures
 
 
-@pytest.mark.parametrize("inside", [inside_particles, inside_places, inside_meshes])
+def inside_instancers():
+    """{attribute: [by Volley, by Cycles]} of balls by particles, on faces and alone: of the particles' settings,
+    of what makes the instances and of the ball."""
+    import bpy
+    import scenes
+    scene = _stage()
+    wall = scenes.wall("Wall", 4.0, 2.0, material=scenes.emitter((0.0, 0.0, 0.0), "Black"))
+    ball = _emitter(wall)
+    for frame in range(1, 13):
+        scene.frame_set(frame)
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=3, y_subdivisions=2, size=3.0,
+                                    rotation=(np.pi / 2, 0.0, 0.0))
+    grid = bpy.context.object
+    grid.instance_type, grid.show_instancer_for_render = 'FACES', False
+    placed = scenes.sphere("Placed", 0.3)
+    placed.parent = grid
+    placed.data = ball.data
+    alone = scenes.sphere("Alone", 0.3, location=(2.0, 0.0, 1.5))
+    alone.data = ball.data
+    settings = wall.particle_systems[0].settings
+    settings["glow"], wall["glow"], grid["glow"] = (0.9, 0.2, 0.1), (0.1, 0.1, 0.1), 0.4
+    placed["glow"], alone["glow"] = 0.2, (0.1, 0.3, 0.9)
+    ball.data["shade"], grid["shade"] = (0.2, 0.5, 0.3), (0.6, 0.3, 0.5)
+    pictures = {}
+    for attribute_type, name in (('INSTANCER', "glow"), ('INSTANCER', "shade"), ('OBJECT', "glow"),
+                                 ('INSTANCER', "lifetime")):
+        ball.data.materials[0] = _shining(f"{attribute_type} {name}", attribute_type, name, "Color",
+                                          0.02 if name == "lifetime" else 1.0)
+        pictures[f"{attribute_type} {name}"] = _both()
+    return pictures
+
+
+@pytest.mark.parametrize("inside", [inside_particles, inside_places, inside_meshes, inside_instancers])
 def test_instancer(blender, inside):
     pictures = blender.run(inside)
     assert len(pictures) >= 3
@@ -122,4 +166,69 @@ def test_instancer(blender, inside):
         assert theirs.std() > 0.02, name
         wrong = (np.abs(ours - theirs) > 1e-3).any(axis=-1).mean()
         assert wrong <= 0.005, f"{name}: {wrong}"
+    assert "not supported" not in blender.output
+
+
+# What Attribute nodes show: type, name, output.
+ATTRIBUTES = (
+    ('OBJECT', "number", "Color"), ('OBJECT', "number", "Fac"), ('OBJECT', "number", "Alpha"),
+    ('OBJECT', "whole", "Vector"), ('OBJECT', "switch", "Color"), ('OBJECT', "triple", "Color"),
+    ('OBJECT', "triple", "Fac"), ('OBJECT', "quadruple", "Color"), ('OBJECT', "quadruple", "Alpha"),
+    ('OBJECT', "five", "Color"), ('OBJECT', "wholes", "Color"), ('OBJECT', "text", "Alpha"),
+    ('OBJECT', "of_mesh", "Color"), ('OBJECT', "pass_index", "Color"), ('OBJECT', "color", "Color"),
+    ('OBJECT', "color", "Alpha"), ('OBJECT', "location", "Vector"),
+    ('OBJECT', "active_material.metallic", "Fac"),
+    ('OBJECT', "show_name", "Color"), ('OBJECT', "lock_location", "Color"),
+    ('OBJECT', "matrix_world", "Alpha"), ('OBJECT', "nowhere", "Alpha"),
+    ('INSTANCER', "number", "Color"), ('VIEW_LAYER', "of_layer", "Color"), ('VIEW_LAYER', "of_scene", "Fac"),
+    ('VIEW_LAYER', "of_world", "Color"), ('VIEW_LAYER', "color", "Color"), ('VIEW_LAYER', "color", "Alpha"),
+    ('VIEW_LAYER', "render.resolution_percentage", "Fac"), ('VIEW_LAYER', "nowhere", "Alpha"))
+COLUMNS = 6
+
+
+def inside_attributes():
+    """{case: [by Volley, by Cycles]}: the mean colours of walls, each of one attribute, and what instances
+    show, by particles, faces and by themselves."""
+    import bpy
+    import scenes
+    scene = _stage()
+    scene.render.resolution_percentage = 100
+    scene.world.color = (0.0, 0.0, 0.0)
+    bpy.context.view_layer["of_layer"], scene["of_layer"] = (0.3, 0.2, 0.7), (0.9, 0.9, 0.9)
+    scene["of_scene"], scene.world["of_scene"], scene.world["of_world"] = 0.4, 0.8, [0.6, 0.5, 0.1]
+    scene.world.color = (0.25, 0.5, 0.75)
+    for number, (attribute_type, name, output) in enumerate(ATTRIBUTES):
+        place = 0.8 * (number % COLUMNS - 2.5), 0.8 * (number // COLUMNS - 2.0)
+        scale = 0.005 if name == "render.resolution_percentage" else 1.0
+        wall = scenes.wall(f"Wall{number}", 0.6, center=place, material=_shining(
+            f"Shining{number}", attribute_type, name, output, scale))
+        wall["number"], wall["whole"], wall["switch"], wall["text"] = 0.35, 1, True, "0.5"
+        wall["triple"], wall["quadruple"] = (0.7, 0.1, 0.4), (0.2, 0.6, 0.4, 0.3)
+        wall["five"], wall["wholes"] = (0.1, 0.2, 0.3, 0.4, 0.5), [1, 0, 1]
+        wall.data["of_mesh"], wall.data["number"] = [0.5, 0.25], 0.9
+        wall.pass_index, wall.color = 1, (0.8, 0.3, 0.1, 0.6)
+        wall.show_name, wall.lock_location = True, (True, False, True)
+        wall.location = (0.1, 0.0, 0.05)
+        wall.active_material.metallic = 0.55
+    pictures, pixels_per_metre = _both(), SIZE[0] / (7.0 * 36.0 / 50.0)
+    found = {}
+    for number, case in enumerate(ATTRIBUTES):
+        x, z = 0.8 * (number % COLUMNS - 2.5) + 0.1, 0.8 * (number // COLUMNS - 2.0) + 0.05
+        column, row = int(0.5 * SIZE[0] + pixels_per_metre * x), int(0.5 * SIZE[1] + pixels_per_metre * z)
+        found[case] = [picture[row - 1:row + 2, column - 1:column + 2].mean(axis=(0, 1))
+                       for picture in pictures]
+    return found
+
+
+def test_attributes_of_objects_and_layers(blender):
+    found = blender.run(inside_attributes)
+    lines, values = [], set()
+    for (attribute_type, name, output), (ours, theirs) in found.items():
+        error = np.abs(ours - theirs).max()
+        lines.append(f"{attribute_type:10} {name:30} {output:6} {np.round(theirs, 4)} {error:.1e}")
+        values.add(tuple(np.round(theirs, 3)))
+    print("\n".join(lines))
+    assert len(values) >= 12  # Cycles tells them apart
+    for line, (ours, theirs) in zip(lines, found.values()):
+        assert np.abs(ours - theirs).max() < 1e-4, line
     assert "not supported" not in blender.output

@@ -74,7 +74,7 @@ class SceneSync:
         if shutter is None and self._update_part(source):
             return
         self._images.begin(source.changes, _size_limit(source))
-        self._materials.begin(source.changes, source.aovs)
+        self._materials.begin(source.depsgraph, source.changes, source.aovs)
         self._meshes.begin()
         self._sync_materials(source)
         walk = _Walk(self, source, shutter)
@@ -103,12 +103,12 @@ class SceneSync:
             return False
         self._shown = None  # until all is done
         self._images.begin(changes, _size_limit(source))
-        names, volumes = self._materials.attribute_names(), self._materials.volume_names()
+        names = self._materials.read_names()
         if not self._materials.change(source.depsgraph, changes):
             return False
         if changes.world:
             self._sync_world(source)
-        if self._materials.attribute_names() != names or self._materials.volume_names() != volumes:
+        if self._materials.read_names() != names:
             return False
         for each in touched:
             if each is not shown.IRRELEVANT and not self._change_object(each, shown, source):
@@ -134,7 +134,7 @@ class SceneSync:
             return False
         item = instance.describe(each, view_layer, source.light_groups)
         item.mesh_key = known.mesh_key
-        _dress(item, self._materials, each, view_layer)
+        _dress(item, self._materials, each, source, self._materials.instance_values())
         self._instances.change(item, self._meshes.id_of(item.mesh_key))
         self._meshes.free_retired()
         return True
@@ -241,8 +241,12 @@ def _size_limit(source):
     return image.size_limit(source.depsgraph.scene_eval, source.v3d is None)
 
 
-def _dress(item, materials, each, view_layer):
-    """Note the library's ids of an instance's material slots, and of a hole in their place."""
+def _dress(item, materials, each, source, values_of):
+    """Note the library's ids of an instance's material slots, and of a hole in their place, and the values
+    that materials read of it."""
+    view_layer = source.depsgraph.view_layer_eval
+    if values_of is not None:
+        item.values = values_of(each, source.depsgraph.scene_eval)
     item.hole = materials.holdout_id() if visibility.is_holdout(each, view_layer) else 0
     item.materials = tuple(materials.id_of(material) for material in _materials_of(each.object, view_layer))
 
@@ -283,8 +287,8 @@ class _Walk:
     def __init__(self, sync, source, shutter):
         self._sync, self._source, self._shutter = sync, source, shutter
         self._view_layer = source.depsgraph.view_layer_eval
-        uv_names, color_names, needs_generated, self._needs_instancer, self._tangent_readers = \
-            sync._materials.attribute_names()
+        uv_names, color_names, needs_generated, self._tangent_readers = sync._materials.attribute_names()
+        self._values_of = sync._materials.instance_values()
         if source.needs_uv:
             uv_names.add("")
         self._names = frozenset(uv_names), frozenset(color_names), needs_generated
@@ -353,6 +357,9 @@ class _Walk:
             if instance.is_in_view(each, self._source.v3d):
                 yield each
 
+    def _dress(self, item, each):
+        _dress(item, self._sync._materials, each, self._source, self._values_of)
+
     def _describe(self, each):
         return instance.describe(each, self._view_layer, self._source.light_groups)
 
@@ -367,12 +374,10 @@ class _Walk:
         if _is_volume(self._sync._materials, each, self._view_layer):
             return
         item = self._describe(each)
-        _dress(item, self._sync._materials, each, self._view_layer)
+        self._dress(item, each)
         if self._shutter is not None:
             item.motion_keys = motion.key_count(blender_object, _maker_of(each))
             item.transforms *= item.motion_keys
-        if self._needs_instancer and each.is_instance:
-            item.values = instance.instancer_values(each, self._source.depsgraph.scene_eval)
         item.mesh_key = self._mesh_key(item, each)
         if item.mesh_key is not None:
             self.items[item.key] = item
@@ -385,7 +390,7 @@ class _Walk:
             self.tied.add(blender_object.name_full)  # only a walk sees what its hair does
             item = self._describe(each)
             item.key = instance.hair_key(each, number)
-            _dress(item, self._sync._materials, each, self._view_layer)
+            self._dress(item, each)
             slot = max(min(modifier.particle_system.settings.material, len(item.materials)), 1) - 1
             item.materials = item.materials[slot:slot + 1]
             hair = strands.Hair(number, self._source.depsgraph, is_final, self._names[:2])
@@ -401,7 +406,7 @@ class _Walk:
     def _add_strands(self, each):
         """A Curves or Point Cloud object."""
         item = self._describe(each)
-        _dress(item, self._sync._materials, each, self._view_layer)
+        self._dress(item, each)
         item.materials = item.materials[:1]
         self.tied.add(each.object.name_full)
         self._add_made(each, item, each.object.data.as_pointer(), strands.StrandObject(self._names[:2]))

@@ -45,8 +45,9 @@ class FlatTree:
         self.color_names = set()  # "" is the active colour attribute
         self.needs_generated = False  # coordinates of the undeformed mesh
         self.needs_instancer = False  # what made the instance, see instance.instancer_values
+        self.instance_attributes = set()  # (type, name), see attributes.Attributes
         self.sun = None           # sky_texture.Sun that the tree shows
-        self.follows_objects = False  # it reads where other objects are
+        self.follows_scene = False  # it reads where other objects are, or properties of the view layer
         self.has_volume = False   # something is linked to the output's Volume
 
     def signature(self):
@@ -54,12 +55,13 @@ class FlatTree:
         return self.surface, tuple(node.signature() for node in self.nodes)
 
 
-def flatten(tree, label, warnings, images=None, aovs=None):
+def flatten(tree, label, warnings, images=None, aovs=None, attributes=None):
     """The surface of a material or world tree as a FlatTree.
 
     label names the owner in messages; images: image.Images, without which all are missing; aovs:
-    {name: (type, number)} of those that are asked for."""
-    walker = Walker(label, warnings, images)
+    {name: (type, number)} of those that are asked for; attributes: attributes.Attributes, without which
+    those of meshes alone are read."""
+    walker = Walker(label, warnings, images, attributes)
     end = tree.get_output_node('CYCLES')
     if end is None:
         return walker.flat
@@ -115,9 +117,9 @@ def _emission(flat, index):
 class Walker:
     """Walks one tree. A path is the tuple of group nodes that were entered on the way."""
 
-    def __init__(self, label, warnings, images=None):
+    def __init__(self, label, warnings, images=None, attributes=None):
         self.flat = FlatTree()
-        self.label = label
+        self.label, self.attributes = label, attributes
         self._warnings = warnings
         self._images = images
         self._done = {}       # (path names, node name) -> {output identifier: Value}

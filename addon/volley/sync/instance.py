@@ -35,7 +35,7 @@ class Item:
     color: tuple = (1.0, 1.0, 1.0, 1.0)
     light_group: int = 0       # from 1 on, 0 for none
     flags: int = 0             # INSTANCE_*
-    values: tuple = ()         # see instancer_values
+    values: tuple = ()         # see instancer_values and attributes.Attributes
     light: dict = None         # fields of a light instead of a mesh
     motion_keys: int = 1       # how many the object asks for
     deforms: bool = False      # whether the mesh may change its shape in time
@@ -118,17 +118,23 @@ def describe(instance, view_layer, light_groups):
         flags=int(abi.InstanceFlags.SHADOW_CATCHER) * visibility.is_shadow_catcher(instance, view_layer))
 
 
-# Where the numbers of instancer_values begin.
-VALUES_PARTICLE, VALUES_LOCATION, VALUES_VELOCITY, VALUES_SPIN, VALUES_GENERATED, VALUES_UV = 0, 5, 8, 11, 14, 17
+# Where the numbers of instancer_values begin, and where they all end.
+VALUES_PARTICLE = 0
+VALUES_LOCATION = VALUES_PARTICLE + 5
+VALUES_VELOCITY = VALUES_LOCATION + 3
+VALUES_SPIN = VALUES_VELOCITY + 3
+VALUES_GENERATED = VALUES_SPIN + 3
+VALUES_UV = VALUES_GENERATED + 3
+VALUES_END = VALUES_UV + 2
 
 
 def instancer_values(instance, scene):
     """What made an instance: its particle's index, random number, age, lifetime (frames) and size, its
     location, velocity and angular velocity, the Generated (halved, as in Cycles) and the UV coordinates
     of its place; 0 what there is not. Child particles have nothing, as in Cycles."""
-    values = np.zeros(19, np.float32)
+    values = np.zeros(VALUES_END, np.float32)
     values[VALUES_GENERATED:VALUES_UV] = 0.5 * np.array(instance.orco) - 0.5
-    values[VALUES_UV:] = instance.uv
+    values[VALUES_UV:VALUES_END] = instance.uv
     system, number = instance.particle_system, instance.persistent_id[0]
     if system is not None and 0 <= number < len(system.particles):
         particle = system.particles[number]

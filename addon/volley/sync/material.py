@@ -6,7 +6,8 @@ import bpy
 from .. import abi, native
 from ..abi import NodeType
 from ..compat import CHOOSES_LOBES_PLAINLY, cycles, uses_nodes
-from . import flatten, tangents
+from . import flatten, instance, tangents
+from .attributes import Attributes
 from .changes import Changes
 from .values import CONSTANT, DEFAULT, Value
 
@@ -23,10 +24,12 @@ class Materials:
         self._seen = set()
         self._changes = Changes.everything()
         self._aovs = {}
+        self._attributes = Attributes()
 
-    def begin(self, changes, aovs):
+    def begin(self, depsgraph, changes, aovs):
         """Start a sync: nothing has been asked for yet. Materials that changes does not name are taken
         as they are. aovs: {name: (type, number)}."""
+        self._attributes.begin(depsgraph)
         self._seen = set()
         self._changes = changes if aovs == self._aovs else Changes.everything()
         self._aovs = aovs
@@ -55,6 +58,7 @@ class Materials:
 
     def change(self, depsgraph, changes):
         """Flatten those again that changes names, all others stay. False if one cannot be found."""
+        self._attributes.begin(depsgraph)
         self._changes = changes
         self._seen = set()
         for key in list(self._entries):
@@ -109,9 +113,9 @@ class Materials:
 
     def attribute_names(self):
         """The UV maps and colour attributes that the materials of this sync read, two sets, whether one
-        reads Generated coordinates, and one what made the instance, and {name: attributes of tangents}
-        of the materials that read those."""
-        uv_names, color_names, needs_generated, needs_instancer = set(), set(), False, False
+        reads Generated coordinates, and {name: attributes of tangents} of the materials that read
+        those."""
+        uv_names, color_names, needs_generated = set(), set(), False
         tangent_readers = {}
         for key in self._seen:
             of_tangents = tangents.names_among(self._entries[key].color_names)
@@ -120,8 +124,29 @@ class Materials:
             uv_names |= self._entries[key].uv_names
             color_names |= self._entries[key].color_names
             needs_generated |= self._entries[key].needs_generated
-            needs_instancer |= self._entries[key].needs_instancer
-        return uv_names, color_names, needs_generated, needs_instancer, tangent_readers
+        return uv_names, color_names, needs_generated, tangent_readers
+
+    def instance_values(self):
+        """Makes instances' values as the materials of this sync read them: a function of an instance of
+        the depsgraph and the scene; None where they read none."""
+        entries = [self._entries[key] for key in self._seen]
+        wanted = set().union(*(entry.instance_attributes for entry in entries))
+        needs_instancer = any(entry.needs_instancer for entry in entries)
+        if not wanted and not needs_instancer:
+            return None
+
+        def values_of(each, scene):
+            values = instance.instancer_values(each, scene) if needs_instancer and each.is_instance else ()
+            return self._attributes.add_values(wanted, each, values)
+        return values_of
+
+    def read_names(self):
+        """All that the materials of this sync read of meshes and instances, and which are of volumes alone:
+        where it stays the same, so does what the others need."""
+        entries = [self._entries[key] for key in self._seen]
+        return (self.attribute_names(), self.volume_names(),
+                set().union(*(entry.instance_attributes for entry in entries)),
+                any(entry.needs_instancer for entry in entries))
 
     def tangents_read_by(self, materials):
         """The attributes of tangents that some of Blender's materials of this sync read."""
@@ -129,6 +154,7 @@ class Materials:
 
     def end(self):
         """Free what nothing asked for since begin; call when no instance uses it any more."""
+        self._attributes.end()
         for key in [key for key in self._entries if key not in self._seen]:
             material_id = self._entries.pop(key).id
             if material_id:
@@ -149,7 +175,7 @@ class Materials:
         return {key for key in self._seen if self._entries[key].is_volume}
 
     def _flatten(self, tree, label):
-        return flatten.flatten(tree, label, self._warnings, self._images, self._aovs)
+        return flatten.flatten(tree, label, self._warnings, self._images, self._aovs, self._attributes)
 
     def names(self):
         """The names in mattes."""
@@ -167,9 +193,9 @@ class Materials:
         entry.signature, entry.name = signature, name
         entry.uv_names, entry.color_names = flat.uv_names, flat.color_names
         entry.needs_generated, entry.sun = flat.needs_generated, flat.sun
-        entry.needs_instancer = flat.needs_instancer
+        entry.needs_instancer, entry.instance_attributes = flat.needs_instancer, flat.instance_attributes
         entry.images, is_animated = self._images.take_asked()
-        entry.is_animated = is_animated or flat.follows_objects
+        entry.is_animated = is_animated or flat.follows_scene
 
     def _send(self, entry, key, flat, values):
         """Create or change it in the library; a refused one becomes the default material."""
@@ -197,7 +223,7 @@ class Entry:
         self.name = ""  # in mattes
         self.uv_names, self.color_names = set(), set()
         self.needs_generated, self.sun = False, None
-        self.needs_instancer = False
+        self.needs_instancer, self.instance_attributes = False, set()
         self.is_volume = False  # see Materials.is_volume
         self.images = set()  # those it reads
         self.is_animated = False  # whether what it reads may be another in the next sync

@@ -446,7 +446,7 @@ def _texture_coordinate(walker, node, _sockets):
 
 def _place_in(walker, blender_object):
     """The shading point in another object's coordinates."""
-    walker.flat.follows_objects = True
+    walker.flat.follows_scene = True
     position = output(walker.emit(NodeType.GEOMETRY, ()), NodeType.GEOMETRY, "position")
     zero = _constant('v', 0.0), _constant('f', 0.0)
     parts = []
@@ -464,12 +464,19 @@ def _color_attribute(walker, node, _sockets):
 
 
 def _attribute(walker, node, _sockets):
-    """A mesh attribute of any type: sent as a colour, whose mean is its number."""
-    if getattr(node, "attribute_type", 'GEOMETRY') != 'GEOMETRY' or not node.attribute_name:
+    """An attribute of any type as a colour, whose mean is its number: of the mesh, or of the object, what
+    made the instance or the view layer."""
+    if not node.attribute_name:
         return None
-    walker.flat.color_names.add(node.attribute_name)
-    index = walker.emit(NodeType.COLOR_ATTRIBUTE, (), name=node.attribute_name)
-    outputs = named_outputs(index, NodeType.COLOR_ATTRIBUTE, ("Color", "Alpha"))
+    if node.attribute_type == 'GEOMETRY':
+        walker.flat.color_names.add(node.attribute_name)
+        index = walker.emit(NodeType.COLOR_ATTRIBUTE, (), name=node.attribute_name)
+        outputs = named_outputs(index, NodeType.COLOR_ATTRIBUTE, ("Color", "Alpha"))
+    else:
+        values = walker.attributes and walker.attributes.read(walker, node.attribute_type, node.attribute_name)
+        if not values:
+            return None
+        outputs = dict(zip(("Color", "Alpha"), values))
     outputs["Vector"] = outputs["Color"]._replace(kind='v')
     outputs["Fac"] = walker.convert(outputs["Vector"], 'f')
     return outputs

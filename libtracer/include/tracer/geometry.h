@@ -85,7 +85,7 @@ enum trc_visible_rays {
  * not light it as footage. */
 enum trc_instance_flags { TRC_INSTANCE_SHADOW_CATCHER = 1 };
 
-#define TRC_MAX_INSTANCE_VALUES 64
+#define TRC_MAX_INSTANCE_VALUES 256
 
 typedef struct trc_instance_desc {
     uint32_t struct_size;    /* of this structure; checked */

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What Attribute nodes read of objects, of what made an instance, and of the view layer.
+
+A name is looked up as Cycles does: a custom property, else a path from the data-block such as
+"pass_index", "color" or "location", in one data-block after the other. Numbers are grey; of arrays of up
+to four numbers, not switches, the fourth is alpha.
+"""
+
+import bpy
+
+from ..abi import MAX_INSTANCE_VALUES, NodeType
+from .instance import VALUES_END
+from .values import CONSTANT, Value
+
+_COMPONENTS = 4  # RGBA
+_NOTHING = (0.0,) * _COMPONENTS
+
+
+class Attributes:
+    """Where the values of attributes of instances stand among those that the library has of an instance,
+    the same for all materials of a scene."""
+
+    def __init__(self):
+        self._firsts = {}  # (type of attribute, name): number of the first of four
+        self._depsgraph = None
+
+    def begin(self, depsgraph):
+        """Look into a depsgraph until end()."""
+        self._depsgraph = depsgraph
+
+    def end(self):
+        """Keep nothing of Blender."""
+        self._depsgraph = None
+
+    def read(self, walker, attribute_type, name):
+        """An attribute's colour and alpha as Values; None where there is no room for it."""
+        if attribute_type == 'VIEW_LAYER':
+            walker.flat.follows_scene = True
+            red, green, blue, alpha = self._of_view_layer(name)
+            return Value('c', CONSTANT, 0, (red, green, blue)), Value('f', CONSTANT, 0, (alpha, 0.0, 0.0))
+        key = attribute_type, name
+        first = self._firsts.setdefault(key, VALUES_END + _COMPONENTS * len(self._firsts))
+        if first + _COMPONENTS > MAX_INSTANCE_VALUES:
+            return None
+        walker.flat.instance_attributes.add(key)
+        color = Value('c', walker.emit(NodeType.INSTANCE_VALUES, (), first), 0)
+        last = Value('c', walker.emit(NodeType.INSTANCE_VALUES, (), first + 3), 0)
+        return color, Value('f', walker.emit(NodeType.SEPARATE, (last,)), 0)
+
+    def _of_view_layer(self, name):
+        """Looked up in the view layer, the scene and the world."""
+        scene = self._depsgraph.scene_eval
+        return _first_found((self._depsgraph.view_layer_eval, scene, scene.world), name)
+
+    def add_values(self, wanted, instance, values):
+        """The values of an instance with the attributes that are wanted, a set of (type, name)."""
+        if not wanted:
+            return values
+        firsts = {self._firsts[key]: key for key in wanted}
+        values = list(values) + [0.0] * (max(firsts) + _COMPONENTS - len(values))
+        for first, (attribute_type, name) in firsts.items():
+            owners = [instance.object, instance.object.data]
+            if attribute_type == 'INSTANCER' and instance.is_instance:
+                system = instance.particle_system
+                owners = [system.settings if system is not None else None, instance.parent, *owners]
+            values[first:first + _COMPONENTS] = _first_found(owners, name)
+        return tuple(values)
+
+
+def _first_found(owners, name):
+    """The value of the first data-block that has it, RGBA."""
+    for owner in owners:
+        for path in (f'["{bpy.utils.escape_identifier(name)}"]', name):
+            value = _resolved(owner, path)
+            if value is not None:
+                return value
+    return _NOTHING
+
+
+def _resolved(owner, path):
+    """A property as RGBA, None where there is none of numbers."""
+    if owner is None:
+        return None
+    try:
+        value = owner.path_resolve(path)
+    except (ValueError, TypeError):
+        return None
+    if isinstance(value, (float, int)):
+        return (float(value),) * 3 + (1.0,)
+    components = tuple(value) if hasattr(value, "__len__") and len(value) <= _COMPONENTS else ()
+    if not components or not all(type(component) in (float, int) for component in components):
+        return None
+    return tuple(map(float, components)) + (0.0, 0.0, 0.0, 1.0)[len(components):]
