@@ -546,7 +546,8 @@ class PassId(IntEnum):
     AMBIENT_OCCLUSION = 24
     SHADOW = 25
     SHADOW_CATCHER = 26
-    COUNT = 27
+    DENOISING_ROUGHNESS = 27
+    COUNT = 28
 
 
 class PassRange(IntEnum):
@@ -1096,6 +1097,7 @@ PASS_CHANNELS = {
     PassId.AMBIENT_OCCLUSION: "RGB",
     PassId.SHADOW: "RGB",
     PassId.SHADOW_CATCHER: "RGB",
+    PassId.DENOISING_ROUGHNESS: "X",
 }
 
 # Passes of each range, and their channels.

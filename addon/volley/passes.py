@@ -41,6 +41,8 @@ _BLENDER_PASSES = {
     PassId.DENOISING_ALBEDO: ("Denoising Albedo", "Denoising Albedo", "volley.denoising_store_passes"),
     PassId.DENOISING_NORMAL: ("Denoising Normal", "Denoising Normal", "volley.denoising_store_passes"),
     PassId.DENOISING_DEPTH: ("Denoising Depth", "Denoising Depth", "volley.denoising_store_passes"),
+    PassId.DENOISING_ROUGHNESS: ("Denoising Roughness", "Denoising Roughness",
+                                 "volley.denoising_store_passes"),
     PassId.SAMPLE_COUNT: ("Debug Sample Count", "Debug Sample Count", "volley.use_pass_sample_count"),
 }
 PASSES = tuple(Pass(index, (name, long_name), PASS_CHANNELS[index], setting)

@@ -123,6 +123,69 @@ static void holdouts_behind_a_veil(void **state) {
         }
 }
 
+/* ---- features for denoisers ---- */
+
+/* A surface of a diffuse of that share, the rest glossy, both white, and how much of it is clear.
+ */
+struct rough_surface {
+    float diffuse, roughness, clear;
+};
+
+static trc_id add_rough(trc_scene scene, const struct rough_surface *s) {
+    struct node_list list = {0};
+    const trc_node_input white = node_color(0.8f, 0.4f, 0.6f);
+    const uint32_t matt =
+        NODE_ADD(&list, TRC_NODE_DIFFUSE, 0, white, node_number(0.0f), node_standard());
+    const uint32_t gloss =
+        NODE_ADD(&list, TRC_NODE_GLOSSY, TRC_DISTRIBUTION_GGX, white, node_number(s->roughness),
+                 node_number(0.0f), node_number(0.0f), node_standard(), node_standard());
+    const uint32_t both = NODE_ADD(&list, TRC_NODE_MIX_SHADER, 0, node_number(s->diffuse),
+                                   node_link(gloss, 0), node_link(matt, 0));
+    const uint32_t clear = NODE_ADD(&list, TRC_NODE_TRANSPARENT, 0, node_color(1.0f, 1.0f, 1.0f));
+    const uint32_t mix = NODE_ADD(&list, TRC_NODE_MIX_SHADER, 0, node_number(s->clear),
+                                  node_link(both, 0), node_link(clear, 0));
+    return level_material(scene, &list, mix, 0);
+}
+
+/* Every branch is followed, so that what is behind is seen without noise. */
+static void draw_features(trc_scene scene, uint32_t pass, float *pixels) {
+    trc_render_desc desc = level_desc(1);
+    desc.integrator = TRC_INTEGRATOR_WHITTED;
+    desc.passes = UINT64_C(1) << pass;
+    fixture_draw(scene, &desc, pass, pixels, (uint64_t)trc_pass_channels(pass) * LEVEL_PIXELS);
+}
+
+static double mean_alpha(const struct rough_surface *s) {
+    return (double)s->diffuse + (1.0 - (double)s->diffuse) * pow((double)s->roughness, 2.0);
+}
+
+/* Of a surface, and of one behind it by what the first lets through. */
+static void roughness_is_that_of_what_is_seen(void **state) {
+    (void)state;
+    static const struct rough_surface near[] = {
+        {0.0f, 0.3f, 0.0f}, {0.0f, 0.0f, 0.0f},  {1.0f, 0.0f, 0.0f}, {0.25f, 0.5f, 0.0f},
+        {0.0f, 0.7f, 0.5f}, {0.5f, 0.2f, 0.25f}, {0.0f, 0.1f, 1.0f}};
+    static const struct rough_surface far = {0.5f, 0.4f, 0.0f};
+    double worst = 0.0;
+    for (size_t k = 0; k < sizeof near / sizeof *near; k++) {
+        const trc_scene scene = fixture_level_view();
+        fixture_level(scene, 10.0f, 0.5f, add_rough(scene, &near[k]));
+        fixture_level(scene, 10.0f, 0.0f, add_rough(scene, &far));
+        assert_ok(trc_scene_commit(scene));
+        /* A surface that is clear throughout has no lobe of its own. */
+        const double own = near[k].clear < 1.0f ? sqrt(mean_alpha(&near[k])) : 0.0;
+        const double want = own + (double)near[k].clear * sqrt(mean_alpha(&far));
+        float pixels[LEVEL_PIXELS];
+        draw_features(scene, TRC_PASS_DENOISING_ROUGHNESS, pixels);
+        for (int p = 0; p < LEVEL_PIXELS; p++) {
+            expect("roughness", pixels + p, &want, 1, 1e-5);
+            worst = fmax(worst, fabs((double)pixels[p] - want));
+        }
+        assert_ok(trc_scene_destroy(scene));
+    }
+    printf("  roughness: at most %.1e off\n", worst);
+}
+
 /* ---- light in groups ---- */
 
 enum { GROUPS = 4 };
@@ -288,6 +351,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(aovs_behind_a_veil),
         cmocka_unit_test(holdouts_behind_a_veil),
+        cmocka_unit_test(roughness_is_that_of_what_is_seen),
         cmocka_unit_test(emission_is_in_its_instances_group),
         cmocka_unit_test(groups_share_out_light_samples),
     };

@@ -1,15 +1,15 @@
 /* Passes for denoisers: features of the first surface that is rough enough, seen directly, in
  * mirrors or through glass.
  *
- * As Cycles of 3.4, but for surfaces whose features are not taken and that yet have diffuse lobes:
- * with diffuse bounces 0 it loses the paths that pick those, and with them a part of what lies
- * behind. */
+ * As Cycles of 3.4, the roughness as that of 5.2, but for surfaces whose features are not taken and
+ * that yet have diffuse lobes: with diffuse bounces 0 it loses the paths that pick those, and with
+ * them a part of what lies behind. */
 #include "kernels/simd/wide_math.h"
 #include "kernels/tile/tile.h"
 
 #define DENOISING_PASSES                                                     \
     (1ull << TRC_PASS_DENOISING_ALBEDO | 1ull << TRC_PASS_DENOISING_NORMAL | \
-     1ull << TRC_PASS_DENOISING_DEPTH)
+     1ull << TRC_PASS_DENOISING_DEPTH | 1ull << TRC_PASS_DENOISING_ROUGHNESS)
 
 /* Rougher lobes blur what they show too much for its features to be of use. */
 #define FEATURE_ALPHA 0.075f
@@ -18,6 +18,7 @@
 
 struct features {
     vvec3 normal, albedo; /* mean of all lobes; sum of the rough ones */
+    vfloat alpha;         /* mean of all lobes but transparent ones, by albedo */
     vmask are_taken;      /* lanes whose lobes are rough enough, or that have none */
 };
 
@@ -31,7 +32,7 @@ static void features_of(const struct trc_lobes *l, const struct trc_surface *s,
                         struct features *out) {
     const vfloat zero = vf_zero();
     vvec3 normal = v3_zero(), albedo = v3_zero();
-    vfloat all = zero, rough = zero;
+    vfloat all = zero, rough = zero, alpha = zero, scattered = zero;
     for (int i = 0; i < l->count; i++) {
         const struct trc_lobe *lobe = &l->lobe[i];
         const vmask counts = is_rough(lobe);
@@ -39,11 +40,18 @@ static void features_of(const struct trc_lobes *l, const struct trc_surface *s,
         normal = v3_mad(n, lobe->mix_weight, normal);
         all = all + lobe->mix_weight;
         rough = rough + vf_where(counts, lobe->mix_weight);
-        albedo = v3_add(albedo, v3_where(counts, trc_lobe_albedo(lobe, s->wo)));
+        if (lobe->kind == TRC_LOBE_TRANSPARENT)
+            continue;
+        const vvec3 color = trc_lobe_albedo(lobe, s->wo);
+        const vfloat share = v3_average(color);
+        albedo = v3_add(albedo, v3_where(counts, color));
+        alpha = alpha + trc_lobe_alpha(lobe) * share;
+        scattered = scattered + share;
     }
     const vmask some = vf_gt(all, zero);
     out->normal = v3_where(some, v3_scale(normal, vf_rcp(vf_select(some, all, vf_one()))));
     out->albedo = albedo;
+    out->alpha = vf_divide(alpha, scattered);
     out->are_taken = vm_or(vm_not(some), vf_gt(rough * vf_set(1.0f / ROUGH_SHARE), all));
 }
 
@@ -70,17 +78,24 @@ static void write_normal(struct trc_tile *t, vvec3 normal, const uint32_t *slots
     }
 }
 
+static void add_number(struct trc_tile *t, uint32_t pass, vfloat value, const uint32_t *slots,
+                       vmask active) {
+    trc_pass_add_lanes(t, pass, v3(value, vf_zero(), vf_zero()), slots, active);
+}
+
 vuint trc_denoising_passes(struct trc_tile *t, const struct trc_surface *s,
                            const struct trc_lobes *lobes, vvec3 weight, vfloat length,
                            const uint32_t slots[TRC_WIDTH]) {
     const vint done = vi_set(TRC_PATH_FEATURES_DONE);
+    const vint straight = vi_set(TRC_PATH_TRANSPARENT_BACKGROUND);
     const vmask on = vm_and(s->active, vi_eq((vint)s->path & done, vi_set(0)));
-    if (!(t->desc->passes & DENOISING_PASSES) || !vm_any(on))
+    const vmask seen = vm_and(s->active, vi_eq((vint)s->path & straight, straight));
+    if (!(t->desc->passes & DENOISING_PASSES) || !vm_any(vm_or(on, seen)))
         return s->path;
     struct features f;
     features_of(lobes, s, &f);
-    const vfloat depth = v3_average(weight) * length;
-    trc_pass_add_lanes(t, TRC_PASS_DENOISING_DEPTH, v3(depth, vf_zero(), vf_zero()), slots, on);
+    add_number(t, TRC_PASS_DENOISING_ROUGHNESS, v3_average(weight) * vf_sqrt(f.alpha), slots, seen);
+    add_number(t, TRC_PASS_DENOISING_DEPTH, v3_average(weight) * length, slots, on);
     const vmask taken = vm_and(on, f.are_taken);
     trc_pass_add_lanes(t, TRC_PASS_DENOISING_ALBEDO, v3_mul(weight, f.albedo), slots, taken);
     write_normal(t, f.normal, slots, taken);
