@@ -547,7 +547,8 @@ class PassId(IntEnum):
     SHADOW = 25
     SHADOW_CATCHER = 26
     DENOISING_ROUGHNESS = 27
-    COUNT = 28
+    DENOISING_SPECULAR_ALBEDO = 28
+    COUNT = 29
 
 
 class PassRange(IntEnum):
@@ -1098,6 +1099,7 @@ PASS_CHANNELS = {
     PassId.SHADOW: "RGB",
     PassId.SHADOW_CATCHER: "RGB",
     PassId.DENOISING_ROUGHNESS: "X",
+    PassId.DENOISING_SPECULAR_ALBEDO: "RGB",
 }
 
 # Passes of each range, and their channels.

@@ -43,6 +43,8 @@ _BLENDER_PASSES = {
     PassId.DENOISING_DEPTH: ("Denoising Depth", "Denoising Depth", "volley.denoising_store_passes"),
     PassId.DENOISING_ROUGHNESS: ("Denoising Roughness", "Denoising Roughness",
                                  "volley.denoising_store_passes"),
+    PassId.DENOISING_SPECULAR_ALBEDO: ("Denoising Specular Albedo", "Denoising Specular Albedo",
+                                       "volley.denoising_store_passes"),
     PassId.SAMPLE_COUNT: ("Debug Sample Count", "Debug Sample Count", "volley.use_pass_sample_count"),
 }
 PASSES = tuple(Pass(index, (name, long_name), PASS_CHANNELS[index], setting)

@@ -186,6 +186,41 @@ static void roughness_is_that_of_what_is_seen(void **state) {
     printf("  roughness: at most %.1e off\n", worst);
 }
 
+/* The white of both lobes, of the glossy one as far as it is nearly a mirror. */
+static void specular_albedo_is_of_mirrors(void **state) {
+    (void)state;
+    static const double color[3] = {0.8, 0.4, 0.6};
+    static const struct rough_surface surfaces[] = {
+        {0.0f, 0.0f, 0.0f}, {0.0f, 0.2f, 0.0f},  {0.0f, 0.3f, 0.0f},  {0.0f, 0.4f, 0.0f},
+        {1.0f, 0.1f, 0.0f}, {0.25f, 0.3f, 0.0f}, {0.0f, 0.25f, 0.5f}, {0.5f, 0.35f, 1.0f}};
+    static const struct rough_surface far = {0.5f, 0.2f, 0.0f};
+    double worst = 0.0;
+    for (size_t k = 0; k < sizeof surfaces / sizeof *surfaces; k++) {
+        const trc_scene scene = fixture_level_view();
+        const struct rough_surface *const both[2] = {&surfaces[k], &far};
+        double want[3] = {0.0, 0.0, 0.0}, through = 1.0;
+        for (int i = 0; i < 2; i++) {
+            const double t = fmin(pow((double)both[i]->roughness, 2.0) / 0.15, 1.0);
+            const double own = (1.0 - (double)both[i]->clear) * (1.0 - (double)both[i]->diffuse) *
+                               (1.0 - t * t * (3.0 - 2.0 * t));
+            for (int c = 0; c < 3; c++)
+                want[c] += through * own * color[c];
+            through *= (double)both[i]->clear;
+            fixture_level(scene, 10.0f, i ? 0.0f : 0.5f, add_rough(scene, both[i]));
+        }
+        assert_ok(trc_scene_commit(scene));
+        float pixels[3 * LEVEL_PIXELS];
+        draw_features(scene, TRC_PASS_DENOISING_SPECULAR_ALBEDO, pixels);
+        for (int p = 0; p < LEVEL_PIXELS; p++) {
+            expect("specular albedo", pixels + 3 * p, want, 3, 1e-5);
+            for (int c = 0; c < 3; c++)
+                worst = fmax(worst, fabs((double)pixels[3 * p + c] - want[c]));
+        }
+        assert_ok(trc_scene_destroy(scene));
+    }
+    printf("  specular albedo: at most %.1e off\n", worst);
+}
+
 /* ---- light in groups ---- */
 
 enum { GROUPS = 4 };
@@ -352,6 +387,7 @@ int main(void) {
         cmocka_unit_test(aovs_behind_a_veil),
         cmocka_unit_test(holdouts_behind_a_veil),
         cmocka_unit_test(roughness_is_that_of_what_is_seen),
+        cmocka_unit_test(specular_albedo_is_of_mirrors),
         cmocka_unit_test(emission_is_in_its_instances_group),
         cmocka_unit_test(groups_share_out_light_samples),
     };

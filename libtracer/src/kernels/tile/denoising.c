@@ -1,26 +1,36 @@
 /* Passes for denoisers: features of the first surface that is rough enough, seen directly, in
  * mirrors or through glass.
  *
- * As Cycles of 3.4, the roughness as that of 5.2, but for surfaces whose features are not taken and
- * that yet have diffuse lobes: with diffuse bounces 0 it loses the paths that pick those, and with
- * them a part of what lies behind. */
+ * As Cycles of 3.4, roughness and specular albedo as those of 5.2, but for surfaces whose features
+ * are not taken and that yet have diffuse lobes: with diffuse bounces 0 it loses the paths that
+ * pick those, and with them a part of what lies behind. */
 #include "kernels/simd/wide_math.h"
 #include "kernels/tile/tile.h"
 
-#define DENOISING_PASSES                                                     \
-    (1ull << TRC_PASS_DENOISING_ALBEDO | 1ull << TRC_PASS_DENOISING_NORMAL | \
-     1ull << TRC_PASS_DENOISING_DEPTH | 1ull << TRC_PASS_DENOISING_ROUGHNESS)
+#define DENOISING_PASSES                                                       \
+    (1ull << TRC_PASS_DENOISING_ALBEDO | 1ull << TRC_PASS_DENOISING_NORMAL |   \
+     1ull << TRC_PASS_DENOISING_DEPTH | 1ull << TRC_PASS_DENOISING_ROUGHNESS | \
+     1ull << TRC_PASS_DENOISING_SPECULAR_ALBEDO)
 
 /* Rougher lobes blur what they show too much for its features to be of use. */
 #define FEATURE_ALPHA 0.075f
+/* From this alpha on, a lobe's albedo is not specular. */
+#define SPECULAR_ALPHA 0.15f
 /* Part of all lobes, by mix_weight, that must be rough. */
 #define ROUGH_SHARE 0.25f
 
 struct features {
     vvec3 normal, albedo; /* mean of all lobes; sum of the rough ones */
+    vvec3 specular;       /* albedo of the lobes that are nearly mirrors */
     vfloat alpha;         /* mean of all lobes but transparent ones, by albedo */
     vmask are_taken;      /* lanes whose lobes are rough enough, or that have none */
 };
+
+/* How much of a lobe's albedo is specular: 1 at an alpha of 0, fading smoothly. */
+static vfloat specular_share(vfloat alpha) {
+    const vfloat t = vf_saturate(alpha * vf_set(1.0f / SPECULAR_ALPHA));
+    return vf_one() - t * t * (vf_set(3.0f) - t - t);
+}
 
 static vmask is_rough(const struct trc_lobe *lobe) {
     if (lobe->kind == TRC_LOBE_TRANSPARENT)
@@ -31,7 +41,7 @@ static vmask is_rough(const struct trc_lobe *lobe) {
 static void features_of(const struct trc_lobes *l, const struct trc_surface *s,
                         struct features *out) {
     const vfloat zero = vf_zero();
-    vvec3 normal = v3_zero(), albedo = v3_zero();
+    vvec3 normal = v3_zero(), albedo = v3_zero(), specular = v3_zero();
     vfloat all = zero, rough = zero, alpha = zero, scattered = zero;
     for (int i = 0; i < l->count; i++) {
         const struct trc_lobe *lobe = &l->lobe[i];
@@ -45,12 +55,14 @@ static void features_of(const struct trc_lobes *l, const struct trc_surface *s,
         const vvec3 color = trc_lobe_albedo(lobe, s->wo);
         const vfloat share = v3_average(color);
         albedo = v3_add(albedo, v3_where(counts, color));
+        specular = v3_mad(color, specular_share(trc_lobe_alpha(lobe)), specular);
         alpha = alpha + trc_lobe_alpha(lobe) * share;
         scattered = scattered + share;
     }
     const vmask some = vf_gt(all, zero);
     out->normal = v3_where(some, v3_scale(normal, vf_rcp(vf_select(some, all, vf_one()))));
     out->albedo = albedo;
+    out->specular = specular;
     out->alpha = vf_divide(alpha, scattered);
     out->are_taken = vm_or(vm_not(some), vf_gt(rough * vf_set(1.0f / ROUGH_SHARE), all));
 }
@@ -95,6 +107,8 @@ vuint trc_denoising_passes(struct trc_tile *t, const struct trc_surface *s,
     struct features f;
     features_of(lobes, s, &f);
     add_number(t, TRC_PASS_DENOISING_ROUGHNESS, v3_average(weight) * vf_sqrt(f.alpha), slots, seen);
+    trc_pass_add_lanes(t, TRC_PASS_DENOISING_SPECULAR_ALBEDO, v3_mul(weight, f.specular), slots,
+                       seen);
     add_number(t, TRC_PASS_DENOISING_DEPTH, v3_average(weight) * length, slots, on);
     const vmask taken = vm_and(on, f.are_taken);
     trc_pass_add_lanes(t, TRC_PASS_DENOISING_ALBEDO, v3_mul(weight, f.albedo), slots, taken);
