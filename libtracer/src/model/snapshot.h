@@ -89,6 +89,9 @@ struct trc_instance {
                          in world space */
 };
 
+/* Entries of trc_camera.shutter_cdf_inverse. */
+#define TRC_SHUTTER_ENTRIES 256
+
 struct trc_camera {
     uint32_t type;
     uint32_t key_count;
@@ -99,7 +102,7 @@ struct trc_camera {
     float clip_start, clip_end;
     float aperture_radius, focus_distance, blade_rotation, aperture_ratio;
     uint32_t blade_count;
-    float *shutter_cdf_inverse; /* 256 values of time, or NULL: identity */
+    float *shutter_cdf_inverse; /* TRC_SHUTTER_ENTRIES times, or NULL: identity */
     uint32_t has_motion;        /* shutter open: rays carry a time */
 };
 

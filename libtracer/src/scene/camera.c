@@ -7,9 +7,6 @@
 #include "scene/affine.h"
 #include "scene/scene.h"
 
-/* Entries of trc_camera.shutter_cdf_inverse. */
-#define SHUTTER_ENTRIES 256
-
 /* Metres. A focus beyond is at infinity for every float, and infinity itself would give NaN. */
 #define FOCUS_FAR 1e9f
 
@@ -51,11 +48,11 @@ static trc_status make_shutter(const float *curve, uint32_t count, float **inver
     }
     if (constant || !(total > 0.0))
         return TRC_OK;
-    float *inverse = trc_alloc(SHUTTER_ENTRIES, sizeof *inverse);
+    float *inverse = trc_alloc(TRC_SHUTTER_ENTRIES, sizeof *inverse);
     if (!inverse)
         return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for the camera");
-    for (int i = 0; i < SHUTTER_ENTRIES; i++) {
-        inverse[i] = invert_shutter(curve, count, total, (double)i / (SHUTTER_ENTRIES - 1));
+    for (int i = 0; i < TRC_SHUTTER_ENTRIES; i++) {
+        inverse[i] = invert_shutter(curve, count, total, (double)i / (TRC_SHUTTER_ENTRIES - 1));
     }
     *inverse_out = inverse;
     return TRC_OK;

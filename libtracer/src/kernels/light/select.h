@@ -77,13 +77,20 @@ TRC_INLINE enum trc_bound_shape trc_shape_of(const struct trc_light_bound *b) {
  * ball (1.0e-4 at best; 8: 1.8e-4, 1: 2.6e-4). */
 #define TRC_NEAR_FADE 8.0f
 
+/* What rounding may add to a cosine: no light that reaches a point counts as none. */
+#define EDGE_SLACK 1e-4f
+/* What light at an angle counts at least, of what it gives head-on: lobes need not be diffuse. */
+#define MIN_FACING 0.0625f
+/* Squared metres; what is divided by. */
+#define MIN_DISTANCE2 1e-20f
+
 /* Part of the light may be within 90 degrees of an axis iff cos a + sin b > 0, a the angle of its
  * centre, b its half angle; the sum also stands for the cosine of the nearest part, without
  * roots. */
 TRC_INLINE vfloat trc_bound_importance(const struct trc_wide_bound *b, const struct trc_receiver *r,
                                        enum trc_bound_shape shape, bool has_radius) {
     const vvec3 d = v3_sub(b->center, r->p);
-    const vfloat d2 = vf_max(v3_dot(d, d), vf_set(1e-20f));
+    const vfloat d2 = vf_max(v3_dot(d, d), vf_set(MIN_DISTANCE2));
     const vfloat inverse = vf_rcp(vf_sqrt(d2));
     const vvec3 w = v3_scale(d, inverse);
     /* Sine of the half angle of the sphere seen from p; within it, everything. */
@@ -93,7 +100,7 @@ TRC_INLINE vfloat trc_bound_importance(const struct trc_wide_bound *b, const str
         sin_b = b->radius * inverse;
         within = vf_ge(sin_b, vf_one());
         sin_b = vf_min(sin_b, vf_one());
-        const vfloat r2 = vf_max(b->radius * b->radius, vf_set(1e-20f));
+        const vfloat r2 = vf_max(b->radius * b->radius, vf_set(MIN_DISTANCE2));
         fade = vf_min(fade, vf_set(TRC_NEAR_FADE) * vf_rcp(r2));
     }
     vfloat cos_light = vf_one();
@@ -112,13 +119,12 @@ TRC_INLINE vfloat trc_bound_importance(const struct trc_wide_bound *b, const str
             cos_light = trc_cos_less(cos_x, sin_x, cos_b, sin_b);
             limit = b->cos_e;
         }
-        reaches = vm_or(within, vf_gt(cos_light, limit - vf_set(1e-4f)));
+        reaches = vm_or(within, vf_gt(cos_light, limit - vf_set(EDGE_SLACK)));
     }
     const vfloat cos_receiver = vf_select(r->has_n, v3_dot(r->n, w) + sin_b, vf_one());
-    reaches = vm_and(reaches, vm_or(within, vf_gt(cos_receiver, vf_set(-1e-4f))));
-    /* At least 1/16 of what head-on gives, for lobes that are not diffuse. */
+    reaches = vm_and(reaches, vm_or(within, vf_gt(cos_receiver, vf_set(-EDGE_SLACK))));
     const vfloat factor =
-        vf_clamp(cos_light, 0.0625f, 1.0f) * vf_clamp(cos_receiver, 0.0625f, 1.0f);
+        vf_clamp(cos_light, MIN_FACING, 1.0f) * vf_clamp(cos_receiver, MIN_FACING, 1.0f);
     return vf_where(reaches, b->intensity * factor * fade);
 }
 
@@ -134,8 +140,8 @@ TRC_INLINE vfloat trc_distant_importance(const struct trc_light_table *t, uint32
     const float sine = sqrtf(fmaxf(1.0f - sun->cos_cone * sun->cos_cone, 0.0f));
     vfloat cosine = trc_cos_less(cos_n, sin_n, vf_set(sun->cos_cone), vf_set(sine));
     cosine = vf_select(r->has_n, cosine, vf_one());
-    const vmask reaches = vf_gt(cosine, vf_set(-1e-4f));
-    return vf_where(reaches, irradiance * vf_max(cosine, vf_set(0.0625f)));
+    const vmask reaches = vf_gt(cosine, vf_set(-EDGE_SLACK));
+    return vf_where(reaches, irradiance * vf_max(cosine, vf_set(MIN_FACING)));
 }
 
 /* Candidates: the cut, then suns, then the world unless apart. */
@@ -194,7 +200,7 @@ static inline vint trc_tree_choose(const struct trc_light_table *t, const struct
         const vmask left = vf_lt(u, first);
         const vfloat other = vf_one() - first;
         vfloat rest = vf_select(left, vf_divide(u, first), vf_divide(u - first, other));
-        rest = vf_min(vf_max(rest, vf_zero()), vf_set(0x1.fffffep-1f));
+        rest = vf_min(vf_max(rest, vf_zero()), vf_set(TRC_BELOW_ONE));
         u = vf_select(go, rest, u);
         *chance = vf_select(go, *chance * vf_select(left, first, other), *chance);
         node = vi_select(go, vi_select(left, node + vi_set(1), second), node);

@@ -98,7 +98,7 @@ TRC_INLINE struct trc_place trc_world_sample(const struct trc_light_table *t, vv
         const vfloat chance = trc_world_sun_chance(&t->map->sun, n, has_n);
         const vmask is_sun = vf_lt(u1, chance);
         const vfloat rest = vf_divide(u1 - chance, vf_one() - chance);
-        u1 = vf_min(vf_select(is_sun, vf_divide(u1, chance), rest), vf_set(0x1.fffffep-1f));
+        u1 = vf_min(vf_select(is_sun, vf_divide(u1, chance), rest), vf_set(TRC_BELOW_ONE));
         const vvec3 to_sun = trc_world_sun_sample(&t->map->sun, u1, u2);
         s.wi = v3_select(is_sun, to_sun, trc_map_sample(t->map, u1, u2, m, &s.pdf));
         s.pdf = trc_world_density(t, n, has_n, s.wi, m);

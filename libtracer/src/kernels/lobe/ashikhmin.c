@@ -7,8 +7,8 @@ static struct lobe_value ashikhmin_value(const struct trc_lobe *lobe, const stru
     if (!meet(lobe, s->wo, wi, &at))
         return no_value();
     const vfloat density = trc_ashikhmin_lobe(at.h.local, lobe->alpha_x, lobe->alpha_y) /
-                           vf_max(at.cos_h, vf_set(1e-6f));
-    const vfloat f = density * at.cos_i / vf_max(vf_max(at.cos_i, lobe->cos_o), vf_set(1e-6f));
+                           vf_max(at.cos_h, vf_set(MIN_COSINE));
+    const vfloat f = density * at.cos_i / vf_max(vf_max(at.cos_i, lobe->cos_o), vf_set(MIN_COSINE));
     const vfloat pdf = vf_where(at.m, density);
     return (struct lobe_value){v3_scale(lobe->weight, vf_where(at.m, f)), pdf, pdf, pdf};
 }

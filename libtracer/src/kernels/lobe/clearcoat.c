@@ -1,14 +1,19 @@
 /* The clearcoat of Principled in Blender 3.4. */
 #include "kernels/lobe/facets.h"
 
-/* Clearcoat: D of GTR1, masking of GGX with alpha 1/4. Cycles samples it as GGX and claims GTR1. */
+/* As Burley (2012): alpha of the masking, index, and its reflectance at normal incidence. */
+#define MASKING_ALPHA 0.25f
+#define CLEARCOAT_IOR 1.5f
+#define CLEARCOAT_F0 0.04f
+
+/* Clearcoat: D of GTR1, masking of GGX. Cycles samples it as GGX and claims GTR1. */
 static struct lobe_value clearcoat_value(const struct trc_lobe *lobe, const struct trc_surface *s,
                                          vvec3 wi) {
     struct meeting at;
     if (!meet(lobe, s->wo, wi, &at))
         return no_value();
     const vfloat d = trc_gtr1_d(at.h.sin2_m, lobe->alpha_x);
-    const vfloat alpha2 = vf_set(0.0625f);
+    const vfloat alpha2 = vf_set(MASKING_ALPHA * MASKING_ALPHA);
     const vfloat co2 = lobe->cos_o * lobe->cos_o, ci2 = at.cos_i * at.cos_i;
     const vfloat g_o = trc_ggx_g1(vf_max(alpha2 * (vf_one() - co2) / co2, vf_zero()));
     const vfloat g_i = trc_ggx_g1(vf_max(alpha2 * (vf_one() - ci2) / ci2, vf_zero()));
@@ -31,9 +36,9 @@ void trc_add_clearcoat(struct trc_setup *c, vvec3 weight, vvec3 n, vfloat roughn
         return;
     lobe->distribution = TRC_LOBE_GTR1;
     lobe->n = n;
-    lobe->ior = vf_set(1.5f);
+    lobe->ior = vf_set(CLEARCOAT_IOR);
     lobe->alpha_x = lobe->alpha_y = vf_square(roughness);
     trc_facets_finish(c, lobe, false);
     const vfloat quarter = vf_set(0.25f) * coat;
-    set_blend(c, lobe, v3_splat(vf_set(0.04f) * quarter), v3_splat(quarter));
+    set_blend(c, lobe, v3_splat(vf_set(CLEARCOAT_F0) * quarter), v3_splat(quarter));
 }

@@ -53,24 +53,24 @@ vvec3 trc_facets_direction(const struct trc_lobe *lobe, const struct trc_surface
 }
 
 void trc_facets_finish(const struct trc_setup *c, struct trc_lobe *lobe, bool is_sharp) {
-    const vfloat least =
+    const vfloat minimum =
         vf_set(lobe->distribution == TRC_LOBE_ASHIKHMIN || lobe->distribution == TRC_LOBE_MULTI_GGX
-                   ? 1e-4f
+                   ? MIN_ALPHA
                    : 0.0f);
     if (is_sharp) {
         lobe->alpha_x = lobe->alpha_y = vf_zero();
     } else {
-        lobe->alpha_x = vf_max(vf_min(vf_max(lobe->alpha_x, least), vf_one()), c->filter_alpha);
-        lobe->alpha_y = vf_max(vf_min(vf_max(lobe->alpha_y, least), vf_one()), c->filter_alpha);
+        lobe->alpha_x = vf_max(vf_min(vf_max(lobe->alpha_x, minimum), vf_one()), c->filter_alpha);
+        lobe->alpha_y = vf_max(vf_min(vf_max(lobe->alpha_y, minimum), vf_one()), c->filter_alpha);
     }
     const vfloat ax = lobe->alpha_x, ay = lobe->alpha_y;
     lobe->ideal = lobe->distribution == TRC_LOBE_ASHIKHMIN
-                      ? vf_le(vf_max(ax, ay), vf_set(1e-4f))
+                      ? vf_le(vf_max(ax, ay), vf_set(MIN_ALPHA))
                       : vf_le(ax * ay, vf_set(TRC_SINGULAR_ALPHA2));
     if (lobe->kind == TRC_LOBE_REFRACT)
         lobe->ideal =
             vm_or(lobe->ideal, vf_lt(vf_abs(lobe->ior - vf_one()), vf_set(NO_REFRACTION)));
-    const vfloat cos_o = vf_max(v3_dot(lobe->n, c->s->wo), vf_set(1e-6f));
+    const vfloat cos_o = vf_max(v3_dot(lobe->n, c->s->wo), vf_set(MIN_COSINE));
     /* Densities and values have to agree about it. */
     lobe->cos_o =
         vf_select(vf_gt(v3_dot(lobe->n, c->s->wo), vf_zero()), cos_o, v3_dot(lobe->n, c->s->wo));

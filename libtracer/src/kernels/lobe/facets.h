@@ -121,6 +121,11 @@ TRC_INLINE vfloat shadowing(const struct trc_lobe *lobe, vfloat tan2_i) {
 
 /* ---- setting up ---- */
 
+/* The lowest alpha of Ashikhmin's distribution, which is ideal from there on, and of surfaces whose
+ * missing energy is put back. */
+#define MIN_ALPHA 1e-4f
+/* Of what light that grazes is divided by. */
+#define MIN_COSINE 1e-6f
 /* Indices that close to 1 do not refract. */
 #define NO_REFRACTION 1e-4f
 
@@ -138,6 +143,12 @@ TRC_INLINE uint32_t distribution_of(uint32_t mode) {
 }
 TRC_INLINE bool is_sharp(uint32_t mode) {
     return (mode & ~(uint32_t)TRC_DISTRIBUTION_CORRELATED) == TRC_DISTRIBUTION_SHARP;
+}
+
+/* Ratio of alpha_x to their mean, and of that to alpha_y, for an anisotropy in [0, 1] (B. Burley,
+ * "Physically Based Shading at Disney", 2012). */
+TRC_INLINE vfloat aspect_of(vfloat anisotropy) {
+    return vf_safe_sqrt(vf_one() - vf_set(0.9f) * anisotropy);
 }
 
 /* Turns a lobe into one that goes from f0 at normal incidence to f90, and accounts for it in the

@@ -33,7 +33,8 @@ TRC_INLINE vfloat trc_grid_row(const float *table, vint at, vfloat x) {
     const vmask all = vm_all_set();
     return vf_lerp(vf_gather(table, at, all), vf_gather(table + 1, at, all), x);
 }
-/* The same in a table of parts of 65535; the result is in such parts, too. */
+/* The same in a table of parts of TRC_ENERGY_PARTS; the result is in such parts, too. */
+#define TRC_ENERGY_PARTS 65535.0f
 TRC_INLINE vfloat trc_energy_row(const uint16_t *table, vint at, vfloat x) {
     const vuint pair = vu_gather_pair(table, at);
     return vf_lerp(vi_to_float((vint)(pair & vu_set(0xffff))), vi_to_float((vint)(pair >> 16)), x);
@@ -53,7 +54,7 @@ TRC_INLINE vfloat trc_ggx_albedo(vfloat cos_theta, vfloat alpha) {
     const vint at = row * vi_set(TRC_GGX_ENERGY_SIZE) + column;
     const vfloat parts = vf_lerp(trc_energy_row(trc_ggx_energy, at, x),
                                  trc_energy_row(trc_ggx_energy + TRC_GGX_ENERGY_SIZE, at, x), y);
-    return parts * vf_set(1.0f / 65535.0f);
+    return parts * vf_set(1.0f / TRC_ENERGY_PARTS);
 }
 TRC_INLINE vfloat trc_ggx_mean_albedo(vfloat alpha) {
     vfloat y;
@@ -122,7 +123,7 @@ TRC_INLINE vfloat trc_glass_energy_lookup(const uint16_t *table, vfloat cos_thet
     const vfloat e0 = d1 - d0, e1 = d2 - d1;
     const vfloat parts =
         value[0] + z * (d0 + z1 * vf_set(0.5f) * (e0 + z2 * vf_set(1.0f / 3.0f) * (e1 - e0)));
-    const vfloat energy = vf_min(parts * vf_set(1.0f / 65535.0f), vf_one());
+    const vfloat energy = vf_min(parts * vf_set(1.0f / TRC_ENERGY_PARTS), vf_one());
     /* Where smooth glass is grazed, below a cos of 0.05, columns miss the valley. To put less back
      * than what is missing is safe. */
     const vfloat rough = vf_saturate(alpha * vf_set(1.0f / TRC_GLASS_ROUGH_ALPHA));

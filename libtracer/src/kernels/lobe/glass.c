@@ -41,7 +41,7 @@ static struct lobe_value refraction_value(const struct trc_lobe *lobe, const str
 /* ---- setting up ---- */
 
 vfloat trc_relative_ior(const struct trc_setup *c, vfloat ior) {
-    const vfloat eta = vf_max(ior, vf_set(1e-5f));
+    const vfloat eta = vf_max(ior, vf_set(TRC_MIN_IOR));
     return vf_select(c->s->backfacing, vf_rcp(eta), eta);
 }
 
@@ -94,19 +94,25 @@ static vfloat kept_by_glass(vfloat albedo, vfloat eta) {
     return vf_select(is_nothing, vf_one(), albedo);
 }
 
+/* Bounds on what is taken from tables: the part that single scattering keeps, and of the rest the
+ * share that is reflected. */
+#define MIN_KEPT 0.1f
+#define MIN_SHARE 0.05f
+#define MAX_SHARE 0.95f
+
 void trc_add_multi_glass(struct trc_setup *c, vvec3 weight, vvec3 reflected, vvec3 refracted,
                          vvec3 n, vfloat alpha, vfloat eta) {
     /* As rough as the lobes will be: a filtered one keeps its energy too. */
-    const vfloat rough = vf_max(vf_clamp(alpha, 1e-4f, 1.0f), c->filter_alpha);
+    const vfloat rough = vf_max(vf_clamp(alpha, MIN_ALPHA, 1.0f), c->filter_alpha);
     const vfloat kept = kept_by_glass(trc_glass_albedo(v3_dot(n, c->s->wo), rough, eta), eta);
     /* What does not get away is coloured again at every further bounce: a geometric series. */
     const vfloat share = trc_glass_reflected_share(v3_dot(n, c->s->wo), rough, eta);
-    const vvec3 colors = v3_lerp(refracted, reflected, vf_clamp(share, 0.05f, 0.95f));
+    const vvec3 colors = v3_lerp(refracted, reflected, vf_clamp(share, MIN_SHARE, MAX_SHARE));
     const vvec3 again = v3_scale(colors, vf_one() - kept);
-    const vfloat least = vf_set(0.1f), one = vf_one();
+    const vfloat minimum = vf_set(MIN_KEPT), one = vf_one();
     const vvec3 gain =
-        v3(vf_rcp(vf_max(one - again.x, least)), vf_rcp(vf_max(one - again.y, least)),
-           vf_rcp(vf_max(one - again.z, least)));
+        v3(vf_rcp(vf_max(one - again.x, minimum)), vf_rcp(vf_max(one - again.y, minimum)),
+           vf_rcp(vf_max(one - again.z, minimum)));
     const vvec3 w = v3_mul(weight, gain);
     struct trc_lobe *reflect = trc_add_dielectric(c, TRC_LOBE_REFLECT, v3_mul(w, reflected), n,
                                                   rough, eta, TRC_DISTRIBUTION_GGX);
@@ -134,7 +140,7 @@ void trc_add_correlated_glass(struct trc_setup *c, vvec3 reflected, vvec3 refrac
     vfloat kept = vf_one();
     if (distribution_of(mode) == TRC_LOBE_MULTI_GGX) {
         kept = kept_by_glass(trc_correlated_glass_albedo(cos_o, alpha, eta), eta);
-        kept = vf_max(kept, vf_set(0.1f));
+        kept = vf_max(kept, vf_set(MIN_KEPT));
         reflected = v3_scale(reflected, vf_rcp(kept));
         refracted = v3_scale(refracted, vf_rcp(kept));
     }
@@ -152,8 +158,8 @@ void trc_add_correlated_glass(struct trc_setup *c, vvec3 reflected, vvec3 refrac
 
 /* Cycles refracts at least 1e-4, and so gives that much more than it gets. */
 vfloat trc_reflected_part(vfloat f) {
-    const vfloat least = vf_set(TRC_WEIGHT_CUTOFF);
-    return vf_where(vf_ge(f, least), vf_select(vf_lt(vf_one() - f, least), vf_one(), f));
+    const vfloat minimum = vf_set(TRC_WEIGHT_CUTOFF);
+    return vf_where(vf_ge(f, minimum), vf_select(vf_lt(vf_one() - f, minimum), vf_one(), f));
 }
 
 static void add_glass(struct trc_setup *c, const struct trc_leaf *leaf, vfloat weight) {

@@ -91,9 +91,8 @@ static struct trc_lobe *add_anisotropic(struct trc_setup *c, const struct trc_le
     lobe->alpha_x = lobe->alpha_y = alpha;
     lobe->anisotropic = may_exceed_zero(c, leaf, TRC_AT(LAYERED_PRINCIPLED, anisotropic));
     if (lobe->anisotropic) {
-        const vfloat aspect = vf_safe_sqrt(
-            vf_one() -
-            vf_set(0.9f) * vf_saturate(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, anisotropic))));
+        const vfloat aspect =
+            aspect_of(vf_saturate(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, anisotropic))));
         lobe->alpha_x = alpha / aspect;
         lobe->alpha_y = alpha * aspect;
         lobe->tangent =
@@ -129,8 +128,9 @@ static void layered_metal(struct trc_setup *c, const struct trc_leaf *leaf, vvec
 /* The dielectric reflection; its index is the one that gives the reflectance level asks for. */
 static vfloat layered_specular(struct trc_setup *c, const struct trc_leaf *leaf, vvec3 weight,
                                vvec3 n) {
-    const vfloat one = vf_one(),
-                 ior = vf_max(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, ior)), vf_set(1e-5f));
+    const vfloat one = vf_one();
+    const vfloat ior =
+        vf_max(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, ior)), vf_set(TRC_MIN_IOR));
     vfloat eta = ior, f0 = trc_fresnel_normal(ior);
     if (may_differ(c, leaf, TRC_AT(LAYERED_PRINCIPLED, specular_ior_level), 0.5f)) {
         const vfloat level =

@@ -3,6 +3,12 @@
  * Departure from Cycles: subsurface scattering is the diffuse lobe with the mixed colour. */
 #include "kernels/lobe/facets.h"
 
+/* Reflectance at normal incidence where Specular is 1 (Burley 2012). */
+#define SPECULAR_SCALE 0.08f
+/* Roughness from which Cycles follows light that scatters more than once. */
+#define MULTIPLE_FROM 0.075f
+#define MULTIPLE_GLASS_FROM 0.05f
+
 static vvec3 mix_white(vvec3 tint, vfloat amount) {
     return v3_lerp(v3_splat(vf_one()), tint, amount);
 }
@@ -44,19 +50,19 @@ static void principled_specular(struct trc_setup *c, const struct trc_leaf *leaf
     const vfloat roughness = number(c, leaf, TRC_AT(PRINCIPLED, roughness)),
                  alpha = roughness * roughness;
     lobe->n = n;
-    lobe->ior = vf_set(2.0f) / (vf_one() - vf_safe_sqrt(vf_set(0.08f) * specular)) - vf_one();
+    lobe->ior =
+        vf_set(2.0f) / (vf_one() - vf_safe_sqrt(vf_set(SPECULAR_SCALE) * specular)) - vf_one();
     lobe->alpha_x = lobe->alpha_y = alpha;
     lobe->anisotropic = may_exceed_zero(c, leaf, TRC_AT(PRINCIPLED, anisotropic));
     if (lobe->anisotropic) {
-        const vfloat aspect = vf_safe_sqrt(
-            vf_one() - vf_set(0.9f) * number(c, leaf, TRC_AT(PRINCIPLED, anisotropic)));
+        const vfloat aspect = aspect_of(number(c, leaf, TRC_AT(PRINCIPLED, anisotropic)));
         lobe->alpha_x = alpha / aspect;
         lobe->alpha_y = alpha * aspect;
         lobe->tangent = trc_leaf_tangent(c, leaf, TRC_AT(PRINCIPLED, tangent), n,
                                          number(c, leaf, TRC_AT(PRINCIPLED, anisotropic_rotation)));
     }
     const vvec3 base = colour(c, leaf, TRC_AT(PRINCIPLED, base_color));
-    vvec3 dielectric = v3_splat(vf_set(0.08f) * specular);
+    vvec3 dielectric = v3_splat(vf_set(SPECULAR_SCALE) * specular);
     if (may_exceed_zero(c, leaf, TRC_AT(PRINCIPLED, specular_tint))) {
         const vfloat bright = vf_set(0.3f) * base.x + vf_set(0.6f) * base.y + vf_set(0.1f) * base.z;
         const vvec3 tint =
@@ -67,7 +73,7 @@ static void principled_specular(struct trc_setup *c, const struct trc_leaf *leaf
     /* Cycles keeps single scattering at low roughness; where lanes disagree the missing energy is
      * nil. */
     const bool multiple = leaf->mode == TRC_DISTRIBUTION_MULTI_GGX &&
-                          vm_any(vm_and(c->s->active, vf_gt(roughness, vf_set(0.075f))));
+                          vm_any(vm_and(c->s->active, vf_gt(roughness, vf_set(MULTIPLE_FROM))));
     lobe->distribution = multiple ? TRC_LOBE_MULTI_GGX : TRC_LOBE_GGX;
     trc_facets_finish(c, lobe, false);
     set_blend(c, lobe, f0, v3_splat(vf_one()));
@@ -85,7 +91,7 @@ static void principled_glass(struct trc_setup *c, const struct trc_leaf *leaf, v
     const vvec3 f0 =
         v3_saturate(mix_white(base, number(c, leaf, TRC_AT(PRINCIPLED, specular_tint))));
     if (leaf->mode == TRC_DISTRIBUTION_MULTI_GGX &&
-        vm_any(vm_and(c->s->active, vf_gt(roughness, vf_set(5e-2f))))) {
+        vm_any(vm_and(c->s->active, vf_gt(roughness, vf_set(MULTIPLE_GLASS_FROM))))) {
         const vfloat blend = trc_fresnel_blend(v3_dot(n, c->s->wo), eta);
         trc_add_multi_glass(c, glass, v3_lerp(f0, v3_splat(vf_one()), vf_saturate(blend)),
                             v3_saturate(base), n, alpha, eta);

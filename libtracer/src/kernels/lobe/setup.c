@@ -7,18 +7,21 @@
 
 /* ---- normals and tangents ---- */
 
+/* What rounding may add to a square in [0, 1]. */
+#define SLACK 1e-5f
+
 /* Of two candidates for the squared z of the bent normal, the one whose mirror direction is valid;
  * see below. Returns x and z in the plane of ng and n. */
 static void choose_bend(vfloat first2, vfloat second2, vfloat ix, vfloat iz, vfloat *x, vfloat *z,
                         vmask *any) {
-    const vfloat least = vf_set(1e-5f), most = vf_set(1.0f + 1e-5f);
-    const vmask fits1 = vm_and(vf_gt(first2, least), vf_le(first2, most));
-    const vmask fits2 = vm_and(vf_gt(second2, least), vf_le(second2, most));
+    const vfloat minimum = vf_set(SLACK), maximum = vf_set(1.0f + SLACK);
+    const vmask fits1 = vm_and(vf_gt(first2, minimum), vf_le(first2, maximum));
+    const vmask fits2 = vm_and(vf_gt(second2, minimum), vf_le(second2, maximum));
     const vfloat x1 = vf_safe_sqrt(vf_one() - first2), z1 = vf_safe_sqrt(first2);
     const vfloat x2 = vf_safe_sqrt(vf_one() - second2), z2 = vf_safe_sqrt(second2);
     const vfloat r1 = vf_set(2.0f) * (x1 * ix + z1 * iz) * z1 - iz;
     const vfloat r2 = vf_set(2.0f) * (x2 * ix + z2 * iz) * z2 - iz;
-    const vmask up1 = vf_ge(r1, least), up2 = vf_ge(r2, least);
+    const vmask up1 = vf_ge(r1, minimum), up2 = vf_ge(r2, minimum);
     /* Both fit: the shallower of two valid mirrors, else the higher. */
     const vmask first_of_both =
         vm_or(vm_and(vm_and(up1, up2), vf_lt(r1, r2)), vm_andnot(vf_gt(r1, r2), vm_and(up1, up2)));
@@ -28,12 +31,16 @@ static void choose_bend(vfloat first2, vfloat second2, vfloat ix, vfloat iz, vfl
     *any = vm_or(fits1, fits2);
 }
 
+/* How high the mirror direction must rise: less where the view itself is lower, as in Cycles. */
+#define THRESHOLD 0.01f
+#define THRESHOLD_SHARE 0.9f
+
 /* Turns n towards the geometric normal as little as makes the mirror direction of wo rise above the
  * surface by a threshold t. With z = ng and x = the part of n across it, the turned normal (x, 0,
  * z) satisfies 2 (x ix + z iz) z - iz = t, a quadratic in z^2 because x^2 = 1 - z^2. */
 static vvec3 valid_normal(const struct trc_surface *s, vvec3 n) {
     const vfloat iz = v3_dot(s->ng, s->wo);
-    const vfloat t = vf_min(vf_set(0.9f) * iz, vf_set(0.01f));
+    const vfloat t = vf_min(vf_set(THRESHOLD_SHARE) * iz, vf_set(THRESHOLD));
     const vmask bad = vm_and(s->active, vf_lt(v3_dot(s->ng, v3_reflect(s->wo, n)), t));
     if (!vm_any(bad))
         return n;

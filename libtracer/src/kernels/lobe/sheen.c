@@ -73,8 +73,10 @@ static vfloat fibres_lean(vfloat x, vfloat y) {
             vf_set(1.34174f) * y * y);
 }
 
+/* Where the fits hold. */
+#define MIN_FIBRE_ROUGHNESS 0.01f
 vfloat trc_add_fibres(struct trc_setup *c, vvec3 weight, vvec3 n, vfloat roughness) {
-    const vfloat rough = vf_clamp(roughness, 0.01f, 1.0f); /* where the fits hold */
+    const vfloat rough = vf_clamp(roughness, MIN_FIBRE_ROUGHNESS, 1.0f);
     const vfloat cosine = vf_saturate(v3_dot(n, c->s->wo));
     const vfloat albedo =
         vf_where(vf_gt(v3_dot(n, c->s->wo), vf_zero()), trc_fibres_albedo(cosine, rough));
@@ -96,12 +98,14 @@ const struct trc_closure TRC_CLOSURE_OF(SHEEN) = {.add = add_sheen};
 
 /* M. Ashikhmin, S. Premoze and P. Shirley, "A Microfacet-Based BRDF Generator" (2000): slopes are
  * rare around the normal. */
+#define VELVET_MIN_COSINE 1e-5f
+#define VELVET_MIN_SIGMA 0.01f
 TRC_INLINE vfloat velvet(vfloat inverse_sigma2, vfloat cos_i, vfloat cos_o, vfloat cos_m,
                          vfloat cos_mo) {
-    const vfloat one = vf_one(), least = vf_set(1e-5f), c = vf_abs(cos_mo);
-    const vmask valid =
-        vm_and(vm_and(vf_gt(cos_o, vf_zero()), vf_gt(c, least)), vf_lt(vf_abs(cos_m), one - least));
-    const vfloat ratio = vf_set(2.0f) * vf_max(vf_divide(cos_m, c), least);
+    const vfloat one = vf_one(), minimum = vf_set(VELVET_MIN_COSINE), c = vf_abs(cos_mo);
+    const vmask valid = vm_and(vm_and(vf_gt(cos_o, vf_zero()), vf_gt(c, minimum)),
+                               vf_lt(vf_abs(cos_m), one - minimum));
+    const vfloat ratio = vf_set(2.0f) * vf_max(vf_divide(cos_m, c), minimum);
     const vfloat masking = vf_min(one, ratio * vf_min(vf_abs(cos_o), vf_abs(cos_i)));
     const vfloat sin2 = vf_select(valid, one - cos_m * cos_m, one);
     const vfloat d = vf_exp(-cos_m * cos_m / sin2 * inverse_sigma2) * inverse_sigma2 *
@@ -121,7 +125,7 @@ static struct lobe_value velvet_value(const struct trc_lobe *lobe, const struct 
 static const struct trc_lobe_model velvet_model = {.kind = TRC_LOBE_DIFFUSE, .value = velvet_value};
 
 static void add_velvet(struct trc_setup *c, const struct trc_leaf *leaf, vfloat weight) {
-    const vfloat sigma = vf_max(number(c, leaf, TRC_AT(VELVET, sigma)), vf_set(0.01f));
+    const vfloat sigma = vf_max(number(c, leaf, TRC_AT(VELVET, sigma)), vf_set(VELVET_MIN_SIGMA));
     trc_add_matt(c, &velvet_model, v3_scale(colour(c, leaf, TRC_AT(VELVET, color)), weight),
                  trc_leaf_normal(c, leaf, TRC_AT(VELVET, normal)), vf_rcp(sigma * sigma));
 }

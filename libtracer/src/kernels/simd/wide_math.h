@@ -18,6 +18,8 @@
 #define TRC_TWO_PI 6.28318530717959f
 #define TRC_HALF_PI 1.57079632679490f
 #define TRC_INV_PI 0.318309886183791f
+/* The largest number below 1: ends of what is drawn from [0, 1). */
+#define TRC_BELOW_ONE 0x1.fffffep-1f
 
 /* ---- small helpers ---- */
 

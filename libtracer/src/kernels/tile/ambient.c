@@ -60,8 +60,7 @@ static void ambient_samples(struct trc_tile *t, const struct arrival *a,
         const vvec3 light = adds ? white : ambient_world(t, s, lobes, n, sample.wi, active);
         const struct light_result r = {.diffuse = v3_mul(weight, light)};
         const vfloat size = v3_max(r.diffuse);
-        const vmask lit =
-            vm_and(active, vm_and(vf_gt(size, vf_set(0.0f)), vf_lt(size, vf_set(3e38f))));
+        const vmask lit = vm_and(active, is_light(size));
         if (vm_any(lit))
             trc_shadow_push(t, &own, s, &sample, &r, trc_direction_cell(sample.wi), lit);
     }

@@ -17,6 +17,8 @@ uint32_t trc_hit_material(const struct trc_snapshot *snapshot, uint32_t instance
  * section 3.3). Keys are what rays of a packet share; runs break packets where the key changes. */
 #define RAY_KIND (TRC_VISIBLE_ALL | TRC_VISIBLE_UNBLOCKED)
 #define RAY_KIND_BITS 6
+/* Of the material that rays left, what its groups are told apart by: keys stay below TRC_BINS. */
+#define GROUP_MASK 63u
 static bool all_see_the_same(const struct trc_tile *t) {
     return !(t->snapshot->features & (TRC_FEATURE_VISIBILITY | TRC_FEATURE_SHADOW_CATCHERS));
 }
@@ -27,7 +29,7 @@ static uint32_t assembly_key(const struct trc_tile *t, uint32_t ray) {
     case TRC_ASSEMBLY_BLIND:
         return all_see_the_same(t) ? 0 : kind;
     case TRC_ASSEMBLY_GROUPS:
-        return kind | (r->w[TRC_RAY_PARENT][ray] & 63u) << RAY_KIND_BITS;
+        return kind | (r->w[TRC_RAY_PARENT][ray] & GROUP_MASK) << RAY_KIND_BITS;
     case TRC_ASSEMBLY_OCTANTS:
         return kind | (uint32_t)(r->f[TRC_RAY_DX][ray] < 0.0f) << RAY_KIND_BITS |
                (uint32_t)(r->f[TRC_RAY_DY][ray] < 0.0f) << (RAY_KIND_BITS + 1) |

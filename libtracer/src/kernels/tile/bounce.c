@@ -74,7 +74,7 @@ static void ray_push(struct trc_tile *t, const struct arrival *a, const struct t
 static vmask attenuate(const struct trc_tile *t, const struct arrival *a,
                        const struct trc_bsdf_sample *b, vmask active) {
     const vfloat size = v3_max(v3_mul(a->weight, b->weight));
-    active = vm_and(active, vm_and(vf_gt(size, vf_set(0.0f)), vf_lt(size, vf_set(3e38f))));
+    active = vm_and(active, is_light(size));
     if (t->desc->integrator == TRC_INTEGRATOR_DISTRIBUTION)
         return active;
     return vm_andnot(active, vf_lt(size, vf_set(t->desc->attenuation_cutoff)));
@@ -131,7 +131,7 @@ void trc_bounce(struct trc_tile *t, const struct arrival *a, const struct trc_su
     active = vm_and(active, vf_lt(u[0], a->chance));
     if (!vm_any(active))
         return;
-    u[0] = vf_min(vf_divide(u[0], a->chance), vf_set(0x1.fffffep-1f));
+    u[0] = vf_min(vf_divide(u[0], a->chance), vf_set(TRC_BELOW_ONE));
     trc_bsdf_sample(lobes, s, u[0], u[1], u[2], &b);
     b.weight = v3_scale(b.weight, vf_divide(vf_set(1.0f), a->chance));
     const vmask go = attenuate(t, a, &b, vm_and(active, b.valid));

@@ -1,5 +1,7 @@
 /* Camera rays: pixel filter, lens, shutter. The lens is a disk by the concentric map of Shirley and
  * Chiu, 1997, or a regular polygon. */
+#include <float.h>
+
 #include "kernels/simd/wide_math.h"
 #include "kernels/tile/tile.h"
 #include "kernels/trace/mesh_fetch.h"
@@ -80,15 +82,15 @@ void trc_camera_rays(struct trc_tile *t) {
         const vuint pixel = vu_load(t->samples.pixel + i), index = vu_load(t->samples.index + i);
         vfloat f[2];
         trc_samples(sampler, pixel, index, TRC_DIM_FILTER_X, 2, 0, 1, f);
-        const vfloat px = vi_to_float((vint)(pixel & vu_set(0xffffu))) + vf_set(0.5f) +
+        const vfloat px = vi_to_float((vint)(pixel & vu_set(TRC_PIXEL_X_MASK))) + vf_set(0.5f) +
                           table_lookup(t->job->filter_table, TRC_FILTER_TABLE, f[0], active);
-        const vfloat py = vi_to_float((vint)(pixel >> 16)) + vf_set(0.5f) +
+        const vfloat py = vi_to_float((vint)(pixel >> TRC_PIXEL_Y_SHIFT)) + vf_set(0.5f) +
                           table_lookup(t->job->filter_table, TRC_FILTER_TABLE, f[1], active);
         vfloat time = vf_set(0.5f);
         if (camera->has_motion) {
             time = trc_sample(sampler, pixel, index, TRC_DIM_TIME);
             if (camera->shutter_cdf_inverse)
-                time = table_lookup(camera->shutter_cdf_inverse, 256, time, active);
+                time = table_lookup(camera->shutter_cdf_inverse, TRC_SHUTTER_ENTRIES, time, active);
         }
         vfloat m[12], window[4];
         camera_matrix(camera, time, active, m, window);
@@ -128,7 +130,7 @@ void trc_camera_rays(struct trc_tile *t) {
         for (int k = TRC_RAY_WEIGHT_R; k <= TRC_RAY_WEIGHT_B; k++)
             vf_store(out->f[k] + i, one);
         vf_store(out->f[TRC_RAY_PDF] + i, -one);
-        vf_store(out->f[TRC_RAY_MIN_PDF] + i, vf_set(3.4e38f));
+        vf_store(out->f[TRC_RAY_MIN_PDF] + i, vf_set(FLT_MAX));
         for (int k = TRC_RAY_NX; k <= TRC_RAY_NZ; k++)
             vf_store(out->f[k] + i, zero);
         vf_store(out->f[TRC_RAY_BEYOND] + i, one);

@@ -63,7 +63,7 @@ static vmask light_contribute(const struct trc_tile *t, const struct arrival *a,
 #undef SEEN
     const vvec3 sum = v3_add(out->diffuse, v3_add(out->glossy, out->transmission));
     const vfloat size = v3_max(sum);
-    return vm_and(active, vm_and(vf_gt(size, zero), vf_lt(size, vf_set(3e38f))));
+    return vm_and(active, is_light(size));
 }
 
 /* Adds the lanes' shadow rays to the queue. cell: where on the light, for sorting, below

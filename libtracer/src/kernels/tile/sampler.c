@@ -269,7 +269,7 @@ static vfloat sudoku_number(const struct trc_sampler *sampler, vuint pixel, vuin
     const vfloat jitter = vu_to_unit(vu_hash2(h, pixel));
     const vfloat u = (stratum + (vi_to_float((vint)cell) + jitter) * vf_set(1.0f / 64.0f)) *
                      vf_set(1.0f / strata);
-    return vf_min(u, vf_set(0x1.fffffep-1f));
+    return vf_min(u, vf_set(TRC_BELOW_ONE));
 }
 
 /* ---- jittered and independent ---- */
@@ -324,7 +324,7 @@ static vfloat jitter_number(vuint key, vuint index, uint32_t index_bits, uint32_
         stratum = cell >> columns;
     }
     const vfloat u = (vi_to_float((vint)stratum) + jitter) * vf_set(1.0f / (float)(1u << bits));
-    return vf_min(u, vf_set(0x1.fffffep-1f));
+    return vf_min(u, vf_set(TRC_BELOW_ONE));
 }
 
 /* ---- interface ---- */

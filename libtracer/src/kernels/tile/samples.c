@@ -100,7 +100,7 @@ static void square_append(struct trc_tile *t, uint32_t x, uint32_t y, uint32_t b
             continue;
         const uint32_t px = t->desc->crop_x + job->x + i, py = t->desc->crop_y + job->y + j;
         for (uint32_t s = begin; s < end; s++) {
-            t->samples.pixel[t->samples.count] = px | py << 16;
+            t->samples.pixel[t->samples.count] = px | py << TRC_PIXEL_Y_SHIFT;
             t->samples.index[t->samples.count++] = s;
         }
     }

@@ -34,9 +34,9 @@ static void surface_setup(struct trc_tile *t, const struct arrival *a, bool has_
     s->transmission_depth = (vint)trc_depth_of(a->depths, TRC_DEPTH_TRANSMISSION_SHIFT);
     s->transparent_depth = (vint)trc_depth_of(a->depths, TRC_DEPTH_TRANSPARENT_SHIFT);
     s->footprint = has_footprint ? beam_width(t, a) : vf_set(0.0f);
-    s->raster_x = (vi_to_float((vint)(a->pixel & vu_set(0xffffu))) + vf_set(0.5f)) *
+    s->raster_x = (vi_to_float((vint)(a->pixel & vu_set(TRC_PIXEL_X_MASK))) + vf_set(0.5f)) *
                   vf_set(1.0f / (float)t->desc->width);
-    s->raster_y = (vi_to_float((vint)(a->pixel >> 16)) + vf_set(0.5f)) *
+    s->raster_y = (vi_to_float((vint)(a->pixel >> TRC_PIXEL_Y_SHIFT)) + vf_set(0.5f)) *
                   vf_set(1.0f / (float)t->desc->height);
     trc_surface_fetch(s);
 }

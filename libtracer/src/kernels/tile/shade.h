@@ -14,6 +14,12 @@ TRC_INLINE vmask goes_out(const struct trc_surface *s, vvec3 w) {
     return vf_ge(v3_dot(w, s->ng), vf_set(0.0f));
 }
 
+/* Lanes whose light, by its largest channel, is some and finite. */
+#define FINITE_LIGHT 3e38f
+TRC_INLINE vmask is_light(vfloat size) {
+    return vm_and(vf_gt(size, vf_set(0.0f)), vf_lt(size, vf_set(FINITE_LIGHT)));
+}
+
 /* ---- light that rays find (kernels/tile/emission.c) ---- */
 
 /* Of lights that rays pass and of the world, of all rays of t->work. */

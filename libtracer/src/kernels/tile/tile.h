@@ -63,10 +63,14 @@ TRC_INLINE uint32_t trc_column_entries(bool catchers) {
     return catchers ? TRC_CATCHER_ROWS * TRC_CATCHER_BATCH : TRC_BATCH;
 }
 
+/* A pixel's place in one word. */
+#define TRC_PIXEL_Y_SHIFT 16
+#define TRC_PIXEL_X_MASK 0xffffu
+
 /* Samples of the batch, by slot: row * TRC_CATCHER_BATCH + number. */
 struct trc_sample_store {
     uint32_t count;
-    uint32_t *pixel; /* x | y << 16 in the full frame */
+    uint32_t *pixel; /* x | y << TRC_PIXEL_Y_SHIFT in the full frame */
     uint32_t *index; /* number of the sample */
     float *radiance[3];
     float *transparency; /* part of the film that is seen through */
@@ -224,15 +228,15 @@ TRC_INLINE void trc_shadow_reserve(struct trc_tile *t, uint32_t per_lane) {
 
 /* A sample's pixel in the film. */
 TRC_INLINE size_t trc_film_pixel(const struct trc_tile *t, uint32_t slot) {
-    const uint32_t x = (t->samples.pixel[slot] & 0xffffu) - t->desc->crop_x;
-    const uint32_t y = (t->samples.pixel[slot] >> 16) - t->desc->crop_y;
+    const uint32_t x = (t->samples.pixel[slot] & TRC_PIXEL_X_MASK) - t->desc->crop_x;
+    const uint32_t y = (t->samples.pixel[slot] >> TRC_PIXEL_Y_SHIFT) - t->desc->crop_y;
     return (size_t)y * t->job->film->width + x;
 }
 
 /* And in the tile. */
 TRC_INLINE size_t trc_tile_pixel(const struct trc_tile *t, uint32_t slot) {
-    const uint32_t x = (t->samples.pixel[slot] & 0xffffu) - t->desc->crop_x - t->job->x;
-    const uint32_t y = (t->samples.pixel[slot] >> 16) - t->desc->crop_y - t->job->y;
+    const uint32_t x = (t->samples.pixel[slot] & TRC_PIXEL_X_MASK) - t->desc->crop_x - t->job->x;
+    const uint32_t y = (t->samples.pixel[slot] >> TRC_PIXEL_Y_SHIFT) - t->desc->crop_y - t->job->y;
     return (size_t)y * TRC_TILE_SIZE + x;
 }
 
