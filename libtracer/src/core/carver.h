@@ -31,10 +31,11 @@ struct trc_guard {
 };
 #define TRC_GUARD_PATTERN UINT64_C(0x7fa5c3967fa5c396) /* as two floats: NaN */
 #if defined(TRC_HAS_ADDRESS_SANITIZER) || !defined(NDEBUG)
-#define TRC_GUARD_BYTES sizeof(struct trc_guard)
+#define TRC_GUARD_BYTES 64 /* of struct trc_guard; read by #if, too */
 #else
 #define TRC_GUARD_BYTES 0
 #endif
+_Static_assert(TRC_GUARD_BYTES == 0 || TRC_GUARD_BYTES == sizeof(struct trc_guard), "of a guard");
 
 struct trc_carver {
     char *base; /* aligned, or NULL */

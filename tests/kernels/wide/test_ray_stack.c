@@ -2,6 +2,7 @@
  * the tree; what guards the columns. */
 #include "wide_test.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -214,12 +215,39 @@ static void append_too_many(struct stacks *s) {
 
 static void reserve_too_many(struct stacks *s) { trc_rays_reserve(&s->stack, TRC_BATCH + 1); }
 
+/* What was reserved ends when rays are taken, all or some. */
+static void append_after_take_all(struct stacks *s) {
+    trc_rays_reserve(&s->stack, 2 * TRC_WIDTH);
+    ray_append(&s->stack, 0, 0, TRC_LANE_BITS);
+    trc_rays_take(&s->stack, &s->work, TRC_WIDTH);
+    ray_append(&s->stack, 0, 0, TRC_LANE_BITS);
+}
+
+static void append_after_take_some(struct stacks *s) {
+    trc_rays_reserve(&s->stack, 4);
+    ray_append(&s->stack, 0, 0, 1);
+    ray_append(&s->stack, 1, 0, 1);
+    trc_rays_take(&s->stack, &s->work, 1);
+    ray_append(&s->stack, 2, 0, 1);
+}
+
+static void append_to_taken(struct stacks *s) {
+    trc_rays_reserve(&s->work, TRC_BATCH);
+    trc_rays_reserve(&s->stack, 1);
+    ray_append(&s->stack, 0, 0, 1);
+    trc_rays_take(&s->stack, &s->work, 1);
+    ray_append(&s->work, 1, 0, 1);
+}
+
 static void guards(void **state) {
     (void)state;
     assert_false(is_caught(nothing));
     assert_true(is_caught(write_behind_a_column));
     assert_true(is_caught(append_too_many));
     assert_true(is_caught(reserve_too_many));
+    assert_true(is_caught(append_after_take_all));
+    assert_true(is_caught(append_after_take_some));
+    assert_true(is_caught(append_to_taken));
 }
 #else
 static void guards(void **state) {

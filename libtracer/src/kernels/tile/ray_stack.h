@@ -54,7 +54,7 @@ enum trc_ray_word {
 
 struct trc_ray_store {
     uint32_t capacity, count;
-    uint32_t reserved_end; /* most rays there may be until the next reserve */
+    uint32_t reserved_end; /* rays there may be until the next reserve */
     float *f[TRC_RAY_FLOATS];
     uint32_t *w[TRC_RAY_WORDS];
     int word_count; /* without TRC_RAY_LEFT where no ray looks back */
@@ -138,7 +138,8 @@ TRC_INLINE uint32_t trc_rays_step(const struct trc_ray_store *r, const struct tr
     return fit >= all ? all : fit > 1 ? fit : 1;
 }
 
-/* Moves count rays from the top of one store to the other, whose own are dropped. */
+/* Moves count rays from the top of one store to the other, whose own are dropped. What was reserved
+ * in either ends. */
 TRC_INLINE void trc_rays_take(struct trc_ray_store *from, struct trc_ray_store *to,
                               uint32_t count) {
     assert(count <= from->count && count <= to->capacity);
@@ -146,7 +147,8 @@ TRC_INLINE void trc_rays_take(struct trc_ray_store *from, struct trc_ray_store *
         const struct trc_ray_store swap = *from;
         *from = *to;
         *to = swap;
-        from->count = 0;
+        from->count = from->reserved_end = 0;
+        to->reserved_end = count;
         return;
     }
     const uint32_t first = from->count - count;
@@ -154,8 +156,8 @@ TRC_INLINE void trc_rays_take(struct trc_ray_store *from, struct trc_ray_store *
         memcpy(to->f[i], from->f[i] + first, count * sizeof(float));
     for (int i = 0; i < from->word_count; i++)
         memcpy(to->w[i], from->w[i] + first, count * sizeof(uint32_t));
-    to->count = count;
-    from->count = first;
+    to->count = to->reserved_end = count;
+    from->count = from->reserved_end = first;
 }
 
 #endif

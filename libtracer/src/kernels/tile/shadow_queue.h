@@ -23,7 +23,7 @@ _Static_assert(TRC_SHADOW_QUEUE >= 2 * 64 * TRC_WIDTH, "an empty queue has room 
 /* target: the light's number and cell, what packets are sorted by. */
 struct trc_shadow_store {
     uint32_t count;
-    uint32_t reserved_end; /* most rays there may be until the next reserve */
+    uint32_t reserved_end; /* rays there may be until the next reserve */
     float *o[3], *d[3], *tmax, *time, *radiance[3];
     float *split[9]; /* diffuse, glossy, transmission parts, or NULL: no light passes */
     float *lamp[3];  /* for the Shadow pass, or NULL */
