@@ -40,16 +40,16 @@ def inside_panels():
     import bpy
     import drawing
     import scenes
-    from volley import ui
+    from volley.ui import render, shading
     scene = scenes.empty()
     light = scenes.light('POINT').data
     light.use_nodes = False
     context = drawing.Context(engine='VOLLEY', light=light, world=scene.world, scene=scene)
-    found = {"no mist": ui.VOLLEY_WORLD_PT_mist.poll(context)}
+    found = {"no mist": shading.VOLLEY_WORLD_PT_mist.poll(context)}
     bpy.context.view_layer.use_pass_mist = True
-    found["mist"] = ui.VOLLEY_WORLD_PT_mist.poll(context)
-    for panel in (ui.VOLLEY_WORLD_PT_mist, ui.VOLLEY_LIGHT_PT_nodes, ui.VOLLEY_RENDER_PT_simplify_viewport,
-                  ui.VOLLEY_RENDER_PT_simplify_render):
+    found["mist"] = shading.VOLLEY_WORLD_PT_mist.poll(context)
+    for panel in (shading.VOLLEY_WORLD_PT_mist, shading.VOLLEY_LIGHT_PT_nodes, render.VOLLEY_RENDER_PT_simplify_viewport,
+                  render.VOLLEY_RENDER_PT_simplify_render):
         found[panel.__name__] = drawing.draw(panel, context).properties
     return found
 

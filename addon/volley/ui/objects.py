@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Panels of objects."""
+
+from bpy.types import Panel
+
+from .panel import VolleyPanel, column_of, draw_light_group
+
+
+_SHAPED = {'MESH', 'CURVE', 'SURFACE', 'FONT', 'META', 'CURVES', 'POINTCLOUD'}
+
+
+def _has_shape(active):
+    return active.type in _SHAPED or (active.instance_type == 'COLLECTION'
+                                      and active.instance_collection is not None)
+
+
+class _ObjectPanel(VolleyPanel):
+    bl_context = "object"
+    needs = "object"
+
+
+class _SeenObjectPanel(_ObjectPanel):
+    """Of objects that rays meet: shapes and lights."""
+
+    @classmethod
+    def poll(cls, context):
+        active = context.object
+        return super().poll(context) and (_has_shape(active) or active.type == 'LIGHT')
+
+
+class VOLLEY_OBJECT_PT_visibility(_ObjectPanel, Panel):
+    bl_label = "Visibility"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context):
+        layout, active = column_of(self), context.object
+        layout.prop(active, "hide_select", text="Selectable", invert_checkbox=True, toggle=False)
+        column = layout.column(heading="Show In")
+        column.prop(active, "hide_viewport", text="Viewports", invert_checkbox=True, toggle=False)
+        column.prop(active, "hide_render", text="Renders", invert_checkbox=True, toggle=False)
+        column = layout.column(heading="Mask")
+        if _has_shape(active) or active.type == 'LIGHT':
+            column.prop(active, "is_shadow_catcher")
+        if _has_shape(active):
+            column.prop(active, "is_holdout")
+
+
+class VOLLEY_OBJECT_PT_ray_visibility(_SeenObjectPanel, Panel):
+    bl_label = "Ray Visibility"
+    bl_parent_id = "VOLLEY_OBJECT_PT_visibility"
+
+    def draw(self, context):
+        column, active = column_of(self).column(), context.object
+        for name in ("camera", "diffuse", "glossy", "transmission"):
+            column.prop(active, f"visible_{name}", text=name.title())
+        if active.type != 'LIGHT':
+            column.prop(active, "visible_shadow", text="Shadow")
+
+
+class VOLLEY_OBJECT_PT_motion_blur(_ObjectPanel, Panel):
+    bl_label = "Motion Blur"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    @classmethod
+    def poll(cls, context):
+        active = context.object
+        return super().poll(context) and hasattr(active, "cycles") \
+            and (_has_shape(active) or active.type == 'CAMERA')
+
+    def draw_header(self, context):
+        self.layout.active = context.scene.render.use_motion_blur
+        self.layout.prop(context.object.cycles, "use_motion_blur", text="")
+
+    def draw(self, context):
+        layout, settings = column_of(self), context.object.cycles
+        layout.active = context.scene.render.use_motion_blur and settings.use_motion_blur
+        layout.prop(settings, "motion_steps", text="Steps")
+        if context.object.type != 'CAMERA':
+            layout.prop(settings, "use_deform_motion", text="Deformation")
+
+
+class VOLLEY_OBJECT_PT_lightgroup(_SeenObjectPanel, Panel):
+    bl_label = "Light Group"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context):
+        draw_light_group(self, context.object, context.view_layer)

@@ -1,0 +1,202 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Panels of lights, worlds and materials."""
+
+from bpy.types import Panel
+
+from .panel import VolleyPanel, column_of, draw_light_group, prop_if_present
+
+
+class _LightPanel(VolleyPanel):
+    bl_context = "data"
+    needs = "light"
+
+
+class _WorldPanel(VolleyPanel):
+    bl_context = "world"
+    needs = "world"
+
+
+class _MaterialPanel(VolleyPanel):
+    bl_context = "material"
+    needs = "material"
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and not context.material.grease_pencil
+
+
+def _draw_surface(panel, data):
+    """The surface part of a node tree, as the Properties editor shows it."""
+    layout = panel.layout
+    if hasattr(data, "use_nodes") and (not data.use_nodes or data.node_tree is None):
+        layout.prop(data, "use_nodes", icon='NODETREE', toggle=True)  # nameless where properties are split
+        return False
+    layout.use_property_split = True
+    tree = data.node_tree
+    output = tree.get_output_node('CYCLES') if tree is not None else None
+    surface = output.inputs.get("Surface") if output is not None else None
+    if surface is None:
+        layout.label(text="No output node")
+    else:
+        layout.template_node_view(tree, output, surface)
+    return True
+
+
+class VOLLEY_LIGHT_PT_light(_LightPanel, Panel):
+    bl_label = "Light"
+
+    def draw(self, context):
+        light, layout = context.light, self.layout
+        layout.row().prop(light, "type", expand=True)
+        layout = column_of(self)
+        column = layout.column()
+        column.prop(light, "color")
+        prop_if_present(column, light, "use_temperature")
+        if getattr(light, "use_temperature", False):
+            column.prop(light, "temperature")
+        column.prop(light, "energy", text="Strength" if light.type == 'SUN' else "Power")
+        prop_if_present(column, light, "exposure")
+        column.separator()
+        self._draw_shape(column, light)
+        column.separator()
+        settings = getattr(light, "cycles", None)
+        if hasattr(light, "use_shadow"):
+            column.prop(light, "use_shadow", text="Cast Shadow")
+        else:
+            prop_if_present(column, settings, "cast_shadow")
+        prop_if_present(column, settings, "use_multiple_importance_sampling",
+                         text="Multiple Importance")
+
+    @staticmethod
+    def _draw_shape(column, light):
+        if light.type in {'POINT', 'SPOT'}:
+            column.prop(light, "shadow_soft_size", text="Radius")
+            prop_if_present(column, light, "use_soft_falloff")
+        elif light.type == 'SUN':
+            column.prop(light, "angle")
+        elif light.type == 'AREA':
+            column.prop(light, "shape", text="Shape")
+            sub = column.column(align=True)
+            if light.shape in {'SQUARE', 'DISK'}:
+                sub.prop(light, "size")
+            else:
+                sub.prop(light, "size", text="Size X")
+                sub.prop(light, "size_y", text="Y")
+
+
+class VOLLEY_LIGHT_PT_beam_shape(_LightPanel, Panel):
+    bl_label = "Beam Shape"
+    bl_parent_id = "VOLLEY_LIGHT_PT_light"
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and context.light.type in {'SPOT', 'AREA'}
+
+    def draw(self, context):
+        light, column = context.light, column_of(self).column()
+        if light.type == 'SPOT':
+            column.prop(light, "spot_size", text="Spot Size")
+            column.prop(light, "spot_blend", text="Blend", slider=True)
+            column.prop(light, "show_cone")
+        else:
+            column.prop(light, "spread", text="Spread")
+
+
+class VOLLEY_LIGHT_PT_nodes(_LightPanel, Panel):
+    bl_label = "Nodes"
+
+    def draw(self, context):
+        _draw_surface(self, context.light)
+
+
+class VOLLEY_WORLD_PT_preview(_WorldPanel, Panel):
+    bl_label = "Preview"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context):
+        self.layout.template_preview(context.world)
+
+
+class VOLLEY_WORLD_PT_surface(_WorldPanel, Panel):
+    bl_label = "Surface"
+
+    def draw(self, context):
+        if not _draw_surface(self, context.world):
+            self.layout.prop(context.world, "color")
+
+
+class VOLLEY_WORLD_PT_mist(_WorldPanel, Panel):
+    bl_label = "Mist Pass"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and any(layer.use_pass_mist for layer in context.scene.view_layers)
+
+    def draw(self, context):
+        layout, settings = column_of(self), context.world.mist_settings
+        column = layout.column(align=True)
+        column.prop(settings, "start")
+        column.prop(settings, "depth")
+        layout.prop(settings, "falloff")
+
+
+class VOLLEY_WORLD_PT_ray_visibility(_WorldPanel, Panel):
+    bl_label = "Ray Visibility"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and hasattr(context.world, "cycles_visibility")
+
+    def draw(self, context):
+        column = column_of(self).column()
+        for name in ("camera", "diffuse", "glossy", "transmission"):
+            column.prop(context.world.cycles_visibility, name)
+
+
+class VOLLEY_WORLD_PT_settings(_WorldPanel, Panel):
+    bl_label = "Settings"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and hasattr(context.world, "cycles")
+
+    def draw(self, context):
+        column, settings = column_of(self).column(), context.world.cycles
+        column.prop(settings, "sampling_method", text="Sampling")
+        if settings.sampling_method == 'MANUAL':
+            column.prop(settings, "sample_map_resolution")
+
+
+class VOLLEY_WORLD_PT_lightgroup(_WorldPanel, Panel):
+    bl_label = "Light Group"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context):
+        draw_light_group(self, context.world, context.view_layer)
+
+
+class VOLLEY_MATERIAL_PT_surface(_MaterialPanel, Panel):
+    bl_label = "Surface"
+
+    def draw(self, context):
+        if not _draw_surface(self, context.material):
+            self.layout.prop(context.material, "diffuse_color")
+
+
+class VOLLEY_MATERIAL_PT_settings(_MaterialPanel, Panel):
+    bl_label = "Settings"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context):
+        material, column = context.material, column_of(self).column()
+        column.prop(material, "pass_index")
+        settings = getattr(material, "cycles", None)
+        if hasattr(material, "use_transparent_shadow"):
+            column.prop(material, "use_transparent_shadow", text="Transparent Shadows")
+        else:
+            prop_if_present(column, settings, "use_transparent_shadow", text="Transparent Shadows")
+        prop_if_present(column, settings, "sample_as_light", text="Multiple Importance")
+        prop_if_present(column, settings, "emission_sampling")
