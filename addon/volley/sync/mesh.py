@@ -78,7 +78,7 @@ def extract(mesh, uv_names=(), color_names=(), material_count=1):
     if triangle_count == 0:
         return None
     indices = _read(mesh.loop_triangles, "vertices", (triangle_count, 3), _INDEX_TYPE)
-    loops = _LazyLoops(mesh, triangle_count)
+    loops = LazyLoops(mesh, triangle_count)
     data = MeshData(read_positions(mesh), indices.view(np.uint32))
     if material_count > 1:
         data.material_index = _material_index(mesh, loops)
@@ -185,15 +185,15 @@ def memory_of(collection, name, width, dtype):
 
 def read_normals(mesh, data, loops=None):
     """Fill normals, their kind and the smooth flags, by what Blender would shade with."""
-    loops = loops or _LazyLoops(mesh, len(data.indices))
-    if _has_corner_normals(mesh):
+    loops = loops or LazyLoops(mesh, len(data.indices))
+    if has_corner_normals(mesh):
         data.corners = loops.of_triangles
-        data.normals, data.normal_kind = _corner_normals(mesh)[data.corners], abi.NormalsLayout.CORNER
+        data.normals, data.normal_kind = corner_normals(mesh)[data.corners], abi.NormalsLayout.CORNER
         return
     smooth = _read(mesh.polygons, "use_smooth", (len(mesh.polygons),), np.bool_)
     if not smooth.any():
         return
-    data.normals = np.array(_vertex_normals(mesh))
+    data.normals = np.array(vertex_normals(mesh))
     data.normal_kind = abi.NormalsLayout.VERTEX
     if smooth.all():
         data.smooth = np.ones(len(data.indices), np.uint8)
@@ -201,7 +201,7 @@ def read_normals(mesh, data, loops=None):
         data.smooth = smooth.view(np.uint8)[loops.polygons]
 
 
-class _LazyLoops:
+class LazyLoops:
     """Corner and polygon of each triangle, read when first asked for."""
 
     def __init__(self, mesh, triangle_count):
@@ -243,7 +243,7 @@ def _material_index(mesh, loops):
     return slots.clip(0, 0xFFFF).astype(np.uint16)[loops.polygons]
 
 
-def _has_corner_normals(mesh):
+def has_corner_normals(mesh):
     """Whether normals belong to corners: auto-smooth or custom normals before 4.1, a domain since."""
     domain = getattr(mesh, "normals_domain", None)
     if domain is not None:
@@ -251,7 +251,7 @@ def _has_corner_normals(mesh):
     return mesh.use_auto_smooth
 
 
-def _corner_normals(mesh):
+def corner_normals(mesh):
     """(corners, 3) float32, unit."""
     if hasattr(mesh, "corner_normals"):
         return _read(mesh.corner_normals, "vector", (len(mesh.loops), 3), np.float32)
@@ -261,7 +261,7 @@ def _corner_normals(mesh):
     return normals
 
 
-def _vertex_normals(mesh):
+def vertex_normals(mesh):
     """(vertices, 3) float32, unit. They may be Blender's own: copy what is kept."""
     memory = memory_of(mesh.vertex_normals, "vector", 3, np.float32)
     if memory is not None:
@@ -347,7 +347,7 @@ def _edges(mesh):
 
 _DERIVED = {  # attributes that Blender does not have: (vertices,) float32 of a mesh
     derived.POINTINESS: lambda mesh: derived.pointiness(
-        read_positions(mesh), _vertex_normals(mesh), _edges(mesh)),
+        read_positions(mesh), vertex_normals(mesh), _edges(mesh)),
     derived.ISLAND: lambda mesh: derived.island_numbers(len(mesh.vertices), _edges(mesh))}
 
 _WIDTHS = {'FLOAT_COLOR': ("color", 4), 'BYTE_COLOR': ("color", 4), 'FLOAT_VECTOR': ("vector", 3),
@@ -390,186 +390,3 @@ def _widen(values):
     rgba[:, 3] = 1.0
     rgba[:, :3 if width == 1 else width] = values
     return rgba
-
-
-# Modifiers that move vertices, or make new ones by a rule that does not look at where they are.
-_POSING_MODIFIERS = {
-    'ARMATURE', 'CAST', 'CORRECTIVE_SMOOTH', 'CURVE', 'HOOK', 'LAPLACIANDEFORM', 'LAPLACIANSMOOTH',
-    'LATTICE', 'MESH_CACHE', 'MESH_DEFORM', 'MIRROR', 'MULTIRES', 'SHRINKWRAP', 'SIMPLE_DEFORM',
-    'SMOOTH', 'SUBSURF', 'SURFACE_DEFORM', 'WARP', 'WAVE', 'CLOTH', 'SOFT_BODY'}
-
-
-# Those of them that join vertices which come near each other.
-_JOINING_MODIFIERS = {'MIRROR'}
-
-
-def keeps_topology(blender_object):
-    """Whether a posable object's topology is another only when its mesh or modifiers were edited."""
-    return not any(modifier.type in _JOINING_MODIFIERS for modifier in blender_object.original.modifiers)
-
-
-def is_posable(blender_object):
-    """Whether a mesh object's new shapes differ in places alone, as long as their topology is equal."""
-    original = blender_object.original
-    return original.type == 'MESH' and bool(original.modifiers) and all(
-        modifier.type in _POSING_MODIFIERS for modifier in original.modifiers)
-
-
-class KeyedShapes:
-    """Shapes of a mesh over the shutter, one slot per motion key."""
-
-    def __init__(self, data, key_count):
-        self._data = data
-        self.positions = [data.positions] * key_count
-        self.normals = [data.normals] * key_count
-        self.is_dropped = False
-
-    def keys(self):
-        """positions and normals, (keys, ...) each; one key when nothing moves or motion is dropped."""
-        base = self._data
-        still = all(np.array_equal(p, base.positions) for p in self.positions)
-        if self.is_dropped or still:
-            return base.positions[None], None if base.normals is None else base.normals[None]
-        return np.stack(self.positions), None if base.normals is None else np.stack(self.normals)
-
-
-class MeshMotion(KeyedShapes):
-    """The shapes of one deforming mesh of Blender's."""
-
-    def __init__(self, mesh, data, key_count):
-        super().__init__(data, key_count)
-        self._topology = Topology(mesh)
-        self._corners = None
-        if data.normal_kind == abi.NormalsLayout.CORNER:
-            self._corners = _LazyLoops(mesh, len(data.indices)).of_triangles
-
-    def set_key(self, index, blender_object):
-        """Take the shape of an evaluated object as that key; False (and no motion) when its topology is
-        another."""
-        with shown_mesh(blender_object) as mesh:
-            return self._set_key(index, mesh)
-
-    def _set_key(self, index, mesh):
-        if not self._topology.is_of(mesh):
-            self.is_dropped = True
-            return False
-        self.positions[index] = read_positions(mesh)
-        if self._data.normal_kind == abi.NormalsLayout.CORNER:
-            self.normals[index] = _corner_normals(mesh)[self._corners]
-        elif self._data.normal_kind == abi.NormalsLayout.VERTEX:
-            self.normals[index] = np.array(_vertex_normals(mesh))
-        return True
-
-
-class MeshEntry:
-    """A mesh in the library. pointer tells one evaluation's data from another's, never followed."""
-
-    __slots__ = ("id", "pointer", "topology", "shape", "names", "corners", "normal_kind", "poses")
-
-
-class Meshes:
-    """The meshes of one scene of the library, by the key of the instance that owns each.
-
-    With will_resync, checksums are kept so that a later sync sends only what differs."""
-
-    def __init__(self, scene, will_resync, warnings):
-        self._scene, self.will_resync, self._warnings = scene, will_resync, warnings
-        self._entries, self._seen, self._retired = {}, set(), []
-
-    def begin(self):
-        """Start a sync."""
-        self._seen = set()
-
-    def reuse(self, key, pointer, names):
-        """Keep a mesh without reading it, if it is of the same evaluation and attributes."""
-        entry = self._entries.get(key)
-        if entry is None or entry.pointer != pointer or entry.names != names:
-            return False
-        self._seen.add(key)
-        return True
-
-    def put(self, key, pointer, data, names, motion=None):
-        """Bring a mesh up to date: nothing, positions alone, or all of it. One that the library
-        refuses is left out."""
-        positions, normals = motion.keys() if motion else (
-            data.positions[None], None if data.normals is None else data.normals[None])
-        entry = self._entries.get(key)
-        topology, shape = self._signatures(data, positions, normals)
-        try:
-            if entry is None or topology is None or entry.topology != topology:
-                entry = self._create(key, data, positions, normals)
-            elif entry.shape != shape:
-                self._scene.update_mesh(entry.id, positions, normals)
-        except native.TracerError as error:
-            if error.status not in (abi.StatusCode.ERROR_INVALID_ARGUMENT, abi.StatusCode.ERROR_TOO_LARGE):
-                raise
-            self._warnings.add(f"Mesh of '{key[0]}': {error}; it is left out")
-            return
-        entry.pointer, entry.topology, entry.shape, entry.names = pointer, topology, shape, names
-        entry.poses, entry.corners, entry.normal_kind = data.poses, data.corners, data.normal_kind
-        self._seen.add(key)
-
-    def pose(self, key, pointer, mesh, is_known):
-        """Send a Blender mesh's positions and normals for a known topology. False, and nothing is sent,
-        where the topology turns out to be another; is_known: nobody edited it.
-
-        Triangles stay those of the shape that was read in full: faces of more than three corners may
-        be cut otherwise in a fresh render, if they bend much."""
-        entry = self._entries.get(key)
-        if entry is None or entry.poses is None:
-            return False
-        if not (entry.poses.has_counts_of(mesh) if is_known else entry.poses.is_of(mesh)):
-            return False
-        normals = None
-        if _has_corner_normals(mesh) != (entry.normal_kind == abi.NormalsLayout.CORNER):
-            return False
-        if entry.normal_kind == abi.NormalsLayout.CORNER:
-            normals = _corner_normals(mesh)[entry.corners][None]
-        elif entry.normal_kind == abi.NormalsLayout.VERTEX:
-            normals = _vertex_normals(mesh)[None]
-        self._scene.update_mesh(entry.id, read_positions(mesh)[None], normals)
-        entry.pointer, entry.shape = pointer, None
-        return True
-
-    def _signatures(self, data, positions, normals):
-        """Checksums of topology and shape, None where no later sync will compare them."""
-        if not self.will_resync:
-            return None, None
-        normal_sum = 0 if normals is None else zlib.crc32(normals.tobytes())
-        return data.topology_signature(), (zlib.crc32(positions.tobytes()), normal_sum)
-
-    def _create(self, key, data, positions, normals):
-        """A new mesh; one of the same key goes when no instance shows it any more."""
-        entry = MeshEntry()
-        entry.id = self._scene.create_mesh(positions, data.indices, normals, data.normal_kind,
-                                           data.smooth, data.material_index, data.attributes,
-                                           data.generated)
-        if key in self._entries:
-            self._retired.append(self._entries[key].id)
-        self._entries[key] = entry
-        return entry
-
-    def brings(self, key, color_names):
-        """Whether a mesh was read with those attributes."""
-        entry = self._entries.get(key)
-        return entry is not None and color_names <= entry.names[1]
-
-    def id_of(self, key):
-        """Library id of one mesh."""
-        return self._entries[key].id
-
-    def ids(self):
-        """Library id of each mesh of this sync, by key."""
-        return {key: self._entries[key].id for key in self._seen}
-
-    def end(self):
-        """Free what this sync did not see; call after the instances were updated."""
-        for key in [key for key in self._entries if key not in self._seen]:
-            self._retired.append(self._entries.pop(key).id)
-        self.free_retired()
-
-    def free_retired(self):
-        """Free the meshes that others took the place of; call after their instances were updated."""
-        for mesh_id in self._retired:
-            self._scene.destroy_mesh(mesh_id)
-        self._retired = []

@@ -15,8 +15,9 @@ import numpy as np
 
 from .. import abi
 from ..compat import cycles_curves
+from .deform import KeyedShapes
 from .hashing import HASH_MAX, hash_numbers
-from .mesh import KeyedShapes, MeshData
+from .mesh import MeshData
 
 _MOST_TRIANGLES = 2_000_000  # of one object's strands or points; above the fewest sides
 _SIDES = (8, 6, 4, 3)

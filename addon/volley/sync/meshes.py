@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The meshes of one scene of the library."""
+
+import zlib
+
+from .. import abi, native
+from .mesh import corner_normals, has_corner_normals, read_positions, vertex_normals
+
+
+class MeshEntry:
+    """A mesh in the library. pointer tells one evaluation's data from another's, never followed."""
+
+    __slots__ = ("id", "pointer", "topology", "shape", "names", "corners", "normal_kind", "poses")
+
+
+class Meshes:
+    """The meshes of one scene of the library, by the key of the instance that owns each.
+
+    With will_resync, checksums are kept so that a later sync sends only what differs."""
+
+    def __init__(self, scene, will_resync, warnings):
+        self._scene, self.will_resync, self._warnings = scene, will_resync, warnings
+        self._entries, self._seen, self._retired = {}, set(), []
+
+    def begin(self):
+        """Start a sync."""
+        self._seen = set()
+
+    def reuse(self, key, pointer, names):
+        """Keep a mesh without reading it, if it is of the same evaluation and attributes."""
+        entry = self._entries.get(key)
+        if entry is None or entry.pointer != pointer or entry.names != names:
+            return False
+        self._seen.add(key)
+        return True
+
+    def put(self, key, pointer, data, names, motion=None):
+        """Bring a mesh up to date: nothing, positions alone, or all of it. One that the library
+        refuses is left out."""
+        positions, normals = motion.keys() if motion else (
+            data.positions[None], None if data.normals is None else data.normals[None])
+        entry = self._entries.get(key)
+        topology, shape = self._signatures(data, positions, normals)
+        try:
+            if entry is None or topology is None or entry.topology != topology:
+                entry = self._create(key, data, positions, normals)
+            elif entry.shape != shape:
+                self._scene.update_mesh(entry.id, positions, normals)
+        except native.TracerError as error:
+            if error.status not in (abi.StatusCode.ERROR_INVALID_ARGUMENT, abi.StatusCode.ERROR_TOO_LARGE):
+                raise
+            self._warnings.add(f"Mesh of '{key[0]}': {error}; it is left out")
+            return
+        entry.pointer, entry.topology, entry.shape, entry.names = pointer, topology, shape, names
+        entry.poses, entry.corners, entry.normal_kind = data.poses, data.corners, data.normal_kind
+        self._seen.add(key)
+
+    def pose(self, key, pointer, mesh, is_known):
+        """Send a Blender mesh's positions and normals for a known topology. False, and nothing is sent,
+        where the topology turns out to be another; is_known: nobody edited it.
+
+        Triangles stay those of the shape that was read in full: faces of more than three corners may
+        be cut otherwise in a fresh render, if they bend much."""
+        entry = self._entries.get(key)
+        if entry is None or entry.poses is None:
+            return False
+        if not (entry.poses.has_counts_of(mesh) if is_known else entry.poses.is_of(mesh)):
+            return False
+        normals = None
+        if has_corner_normals(mesh) != (entry.normal_kind == abi.NormalsLayout.CORNER):
+            return False
+        if entry.normal_kind == abi.NormalsLayout.CORNER:
+            normals = corner_normals(mesh)[entry.corners][None]
+        elif entry.normal_kind == abi.NormalsLayout.VERTEX:
+            normals = vertex_normals(mesh)[None]
+        self._scene.update_mesh(entry.id, read_positions(mesh)[None], normals)
+        entry.pointer, entry.shape = pointer, None
+        return True
+
+    def _signatures(self, data, positions, normals):
+        """Checksums of topology and shape, None where no later sync will compare them."""
+        if not self.will_resync:
+            return None, None
+        normal_sum = 0 if normals is None else zlib.crc32(normals.tobytes())
+        return data.topology_signature(), (zlib.crc32(positions.tobytes()), normal_sum)
+
+    def _create(self, key, data, positions, normals):
+        """A new mesh; one of the same key goes when no instance shows it any more."""
+        entry = MeshEntry()
+        entry.id = self._scene.create_mesh(positions, data.indices, normals, data.normal_kind,
+                                           data.smooth, data.material_index, data.attributes,
+                                           data.generated)
+        if key in self._entries:
+            self._retired.append(self._entries[key].id)
+        self._entries[key] = entry
+        return entry
+
+    def brings(self, key, color_names):
+        """Whether a mesh was read with those attributes."""
+        entry = self._entries.get(key)
+        return entry is not None and color_names <= entry.names[1]
+
+    def id_of(self, key):
+        """Library id of one mesh."""
+        return self._entries[key].id
+
+    def ids(self):
+        """Library id of each mesh of this sync, by key."""
+        return {key: self._entries[key].id for key in self._seen}
+
+    def end(self):
+        """Free what this sync did not see; call after the instances were updated."""
+        for key in [key for key in self._entries if key not in self._seen]:
+            self._retired.append(self._entries.pop(key).id)
+        self.free_retired()
+
+    def free_retired(self):
+        """Free the meshes that others took the place of; call after their instances were updated."""
+        for mesh_id in self._retired:
+            self._scene.destroy_mesh(mesh_id)
+        self._retired = []

@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One scene of the library, kept like Blender's evaluated scene: marking first, copying after."""
+
+import bpy
+
+from .. import native
+from ..compat import uses_nodes
+from ..log import Warnings
+from . import camera, deform, image, instance, light, mesh, meshes, world
+from .image import Images
+from .material import Materials
+from .shown import Shown
+from .walk import Walk, dress, is_volume, materials_of
+
+
+class SceneSync:
+    """One scene of the library and what it was last told."""
+
+    def __init__(self, is_final, thread_count, will_resync, image_megabytes=0):
+        if image.has_files():
+            native.start_reader()
+        self.scene = native.Scene(is_final, thread_count, image_megabytes)
+        self.warnings = Warnings()
+        self._images = Images(self.scene, self.warnings)
+        self._materials = Materials(self.scene, self._images, self.warnings)
+        self._meshes = meshes.Meshes(self.scene, will_resync, self.warnings)
+        self._instances = instance.Instances(self.scene, self.warnings)
+        self._lights = light.Lights(self.scene, self.warnings)
+        self._world = None   # what the library was last told of it
+        self._shown = None   # what the last full walk found
+
+    def destroy(self):
+        """Free the library's scene."""
+        self.scene.destroy()
+
+    def update(self, source, shutter=None, camera_keys=None):
+        """Bring everything but the camera up to date. With a shutter, Blender is moved through it;
+        camera_keys(fraction) is called at each time to look at the camera too. The caller restores
+        the frame."""
+        if shutter is None and self._update_part(source):
+            return
+        self._images.begin(source.changes, size_limit(source))
+        self._materials.begin(source.depsgraph, source.changes, source.aovs)
+        self._meshes.begin()
+        self._sync_materials(source)
+        walk = Walk(self, source, shutter)
+        walk.run()
+        if shutter is not None:
+            walk.follow_motion(camera_keys)
+        walk.send_deforming()
+        self._instances.update(walk.items.values(), self._meshes.ids())
+        self._lights.update(walk.lights)
+        self._sync_world(source)
+        self._meshes.end()
+        self._materials.end()
+        self._images.end()
+        self._shown = Shown(walk, source) if shutter is None else None
+
+    def _update_part(self, source):
+        """Bring up to date what changed, without a walk over everything; False where one is needed,
+        which is safe at any point before the end."""
+        changes, shown = source.changes, self._shown
+        if changes.full or changes.structure or shown is None or not shown.is_of(source):
+            return False
+        if not all(self._materials.knows(name) for name in changes.materials):
+            return False
+        touched = [shown.find(name, source) for name in changes.objects]
+        if not all(touched):
+            return False
+        self._shown = None  # until all is done
+        self._images.begin(changes, size_limit(source))
+        names = self._materials.read_names()
+        if not self._materials.change(source.depsgraph, changes):
+            return False
+        if changes.world:
+            self._sync_world(source)
+        if self._materials.read_names() != names:
+            return False
+        for each in touched:
+            if each is not shown.IRRELEVANT and not self._change_object(each, shown, source):
+                return False
+        self._images.end()
+        self._shown = shown
+        return True
+
+    def _change_object(self, each, shown, source):
+        """Bring one object up to date; False where its mesh must be read in a walk."""
+        name, view_layer = each.object.name_full, source.depsgraph.view_layer_eval
+        if instance.is_light(each):
+            item = instance.describe(each, view_layer, source.light_groups)
+            fields = light.describe(each.object, item, self.warnings)
+            return fields is not None and self._lights.change(item.key, fields)
+        known = shown.items[instance.key_of(each)]
+        if is_volume(self._materials, each, view_layer):
+            return False
+        made_of = filter(None, materials_of(each.object, view_layer))
+        if not self._meshes.brings(known.mesh_key, self._materials.tangents_read_by(made_of)):
+            return False
+        if name in source.changes.geometry and not self._change_mesh(each, known, shown, source):
+            return False
+        item = instance.describe(each, view_layer, source.light_groups)
+        item.mesh_key = known.mesh_key
+        dress(item, self._materials, each, source, self._materials.instance_values())
+        self._instances.change(item, self._meshes.id_of(item.mesh_key))
+        self._meshes.free_retired()
+        return True
+
+    def _change_mesh(self, each, known, shown, source):
+        """Send the mesh of one object, of a pose the places of its vertices alone; False where others
+        show it too or it has no faces now."""
+        if shown.users[known.mesh_key] != 1:
+            return False
+        changes, blender_object = source.changes, each.object
+        pointer = blender_object.data.as_pointer()
+        if known.owner not in changes.topology and deform.is_posable(blender_object):
+            is_known = deform.keeps_topology(blender_object) \
+                and blender_object.original.data.name_full not in changes.meshes
+            with mesh.shown_mesh(blender_object) as shape:
+                if self._meshes.pose(known.mesh_key, pointer, shape, is_known):
+                    return True
+        return Walk(self, source, None).read_mesh(known, each, pointer)
+
+    def _sync_materials(self, source):
+        """Flatten the materials first: they say which attributes the meshes must bring. Their images, and
+        the world's, are read meanwhile."""
+        override = source.depsgraph.view_layer_eval.material_override
+        shown = [data for data in source.depsgraph.ids
+                 if isinstance(data, bpy.types.Material) and override in (None, data)]
+        readers = [data for data in (*shown, shown_world(source))
+                   if data is not None and uses_nodes(data) and not self._materials.is_kept(data)]
+        self._images.expect(data.node_tree for data in readers)
+        for data in shown:
+            self._materials.entry_of(data)
+
+    def _sync_world(self, source):
+        scene = source.depsgraph.scene_eval
+        shown = shown_world(source)
+        material_id, sun = self._materials.world_id(shown) if shown else (0, None)
+        fields = world.describe(shown, material_id, sun, scene.volley, source.light_groups)
+        if fields != self._world:
+            self.scene.set_world(**fields)
+        self._world = fields
+
+    def cryptomatte_names(self):
+        """The names of objects, materials and assets in mattes: by TRC_CRYPTOMATTE."""
+        objects, assets = self._instances.names()
+        return objects, self._materials.names(), assets
+
+    def set_camera(self, keys, shutter=None):
+        """Send the camera; keys as camera.CameraKeys."""
+        if shutter is None or shutter.curve is None:
+            camera.send(self.scene, keys)
+        else:
+            camera.send(self.scene, keys, shutter.length, shutter.curve)
+
+
+def shown_world(source):
+    """The world that is seen, or None."""
+    depsgraph, view_layer = source.depsgraph, source.depsgraph.view_layer_eval
+    if not view_layer.use_sky:
+        return None
+    override = getattr(view_layer, "world_override", None)  # from 4.3 on
+    return depsgraph.scene_eval.world if override is None else override.evaluated_get(depsgraph)
+
+
+def size_limit(source):
+    """The longest side (pixels) of images, 0 for any."""
+    return image.size_limit(source.depsgraph.scene_eval, source.v3d is None)

@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a full walk found, so that later syncs need not walk."""
+
+from collections import Counter
+
+import bpy
+
+from . import instance
+
+
+class Shown:
+    """What a full walk found, by which later syncs know objects that stand for themselves."""
+
+    IRRELEVANT = object()  # an object that is no part of the picture
+
+    # These never show anything and never make instances.
+    _SILENT_TYPES = {'ARMATURE', 'CAMERA', 'LATTICE', 'SPEAKER', 'LIGHT_PROBE', 'VOLUME'}
+
+    def __init__(self, walk, source):
+        self.items, self._lights, self._tied = walk.items, walk.lights, walk.tied
+        self.users = Counter(item.mesh_key for item in walk.items.values())
+        self._identity = self._identity_of(source)
+
+    @staticmethod
+    def _identity_of(source):
+        depsgraph = source.depsgraph
+        return depsgraph.scene.name_full, depsgraph.view_layer.name, depsgraph.as_pointer()
+
+    def is_of(self, source):
+        """Whether a source shows the same scene and view layer."""
+        return self._identity == self._identity_of(source)
+
+    def find(self, name, source):
+        """The object of that name as an instance, IRRELEVANT, or None where only a walk can tell."""
+        original = bpy.data.objects.get(name)
+        if original is None or name in self._tied:
+            return None
+        evaluated = original.evaluated_get(source.depsgraph)
+        if not evaluated.is_evaluated:
+            return None
+        each = instance.Plain(evaluated)
+        key = instance.key_of(each)
+        if key in self.items or key in self._lights:
+            return each if instance.is_shown(each, source.v3d) else None
+        is_silent = evaluated.type in self._SILENT_TYPES or (
+            evaluated.type == 'EMPTY' and evaluated.instance_type == 'NONE')
+        return self.IRRELEVANT if is_silent else None

@@ -1,0 +1,295 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Walks over the depsgraph: what is there, what it shows, and where it is at other times."""
+
+from dataclasses import dataclass
+
+import bpy
+
+from . import deform, instance, light, mesh, motion, strands, tubes, visibility
+from .matrix import rows12
+from .source import Cancelled
+
+_BREAK_INTERVAL = 32  # instances between two looks at whether the user pressed Esc
+
+# Properties of light linking, what they are called, and what their objects do without.
+_LINKS = (("receiver_collection", "Light linking", "lights everything"),
+          ("blocker_collection", "Shadow linking", "is blocked by everything"))
+
+
+def dress(item, materials, each, source, values_of):
+    """Note the library's ids of an instance's material slots, and of a hole in their place, and the values
+    that materials read of it."""
+    view_layer = source.depsgraph.view_layer_eval
+    if values_of is not None:
+        item.values = values_of(each, source.depsgraph.scene_eval)
+    item.hole = materials.holdout_id() if visibility.is_holdout(each, view_layer) else 0
+    item.materials = tuple(materials.id_of(material) for material in materials_of(each.object, view_layer))
+
+
+def maker_of(each):
+    """What makes an instance, None for an object that stands for itself."""
+    return each.parent if each.is_instance else None
+
+
+def materials_of(blender_object, view_layer):
+    """What an object is made of, slot by slot, None where a slot is empty."""
+    if view_layer.material_override is not None:
+        return [view_layer.material_override]
+    return [slot.material for slot in blender_object.material_slots]
+
+
+def is_volume(materials, each, view_layer):
+    """Whether an instance is nothing but the bounds of a volume. No ray may meet it: those that pass many
+    would be seen through too often."""
+    made_of = materials_of(each.object, view_layer)
+    return bool(made_of) and all(map(materials.is_volume, made_of))
+
+
+@dataclass
+class _Deforming:
+    """A mesh that waits for its other shapes. read: of an instance at one time, what its shapes take."""
+
+    pointer: int
+    data: mesh.MeshData
+    names: tuple
+    shapes: deform.KeyedShapes
+    read: object
+
+
+class Walk:
+    """One sync's walks over the depsgraph: the first finds everything, more follow motion."""
+
+    def __init__(self, sync, source, shutter):
+        self._sync, self._source, self._shutter = sync, source, shutter
+        self._view_layer = source.depsgraph.view_layer_eval
+        uv_names, color_names, needs_generated, self._tangent_readers = sync._materials.attribute_names()
+        self._values_of = sync._materials.instance_values()
+        if source.needs_uv:
+            uv_names.add("")
+        self._names = frozenset(uv_names), frozenset(color_names), needs_generated
+        self._tangents = None  # pointer of a mesh -> the tangents that its objects' materials read
+        self._owners = {}     # pointer of a mesh -> key of its owner, within this walk
+        self._deforming = {}  # owner key -> _Deforming
+        self.items = {}       # key -> Item with a mesh
+        self.lights = {}      # key -> fields of a light
+        self.tied = set()     # names of objects that are instanced or make instances
+        self._volumes = set()  # names of objects of volumes
+        self._linked = {}      # property of light linking -> names of objects that use it
+
+    def run(self):
+        """Find what is there now."""
+        for each in self._instances():
+            if each.is_instance:
+                self.tied.update(instance.names_of(each))
+            if each.show_particles and self._view_layer.use_strand:
+                self._add_hair(each)
+            if not each.show_self:
+                continue
+            for name in visibility.light_links(each.object):
+                self._linked.setdefault(name, set()).add(each.object.name)
+            if instance.is_light(each):
+                self._add_light(each)
+            elif instance.has_mesh(each) and self._view_layer.use_solid:
+                self._add_mesh_instance(each)
+            elif strands.has_strands(each) and self._view_layer.use_strand:
+                self._add_strands(each)
+            elif isinstance(each.object.data, bpy.types.Volume):
+                self._volumes.add(each.object.name)
+        self._warn_of("Volumes are not supported", self._volumes, "is left out")
+        for name, what, does in _LINKS:
+            self._warn_of(f"{what} is not supported", self._linked.get(name), does)
+
+    def _warn_of(self, text, names, does):
+        """One warning of all objects of those names, if there are any."""
+        if names:
+            first, more = min(names), len(names) - 1
+            also = f" and {more} more" if more else ""
+            self._sync.warnings.add(f"{text}: object '{first}'{also} {does}")
+
+    def follow_motion(self, camera_keys):
+        """Look at every moving thing at its other times."""
+        counts = {item.motion_keys for item in self.items.values()}
+        counts.add(camera_keys.count)
+        for fraction in motion.fractions_of(counts):
+            self._source.engine.frame_set(*self._shutter.frame_at(fraction))
+            camera_keys.look(fraction)
+            for each in self._instances():
+                self._move_hair(each, fraction)
+                item = self.items.get(instance.key_of(each))
+                if item is not None:
+                    self._look_again(item, each, fraction)
+
+    def send_deforming(self):
+        """Send the meshes that waited for their motion keys."""
+        for key, waiting in self._deforming.items():
+            self._sync._meshes.put(key, waiting.pointer, waiting.data, waiting.names, waiting.shapes)
+
+    def _instances(self):
+        """Those that take part, by themselves or by their particles."""
+        for number, each in enumerate(self._source.depsgraph.object_instances):
+            if number % _BREAK_INTERVAL == 0 and self._source.is_cancelled():
+                raise Cancelled()
+            if instance.is_in_view(each, self._source.v3d):
+                yield each
+
+    def _dress(self, item, each):
+        dress(item, self._sync._materials, each, self._source, self._values_of)
+
+    def _describe(self, each):
+        return instance.describe(each, self._view_layer, self._source.light_groups)
+
+    def _add_light(self, each):
+        item = self._describe(each)
+        fields = light.describe(each.object, item, self._sync.warnings)
+        if fields is not None:
+            self.lights[item.key] = fields
+
+    def _add_mesh_instance(self, each):
+        blender_object = each.object
+        if is_volume(self._sync._materials, each, self._view_layer):
+            return
+        item = self._describe(each)
+        self._dress(item, each)
+        if self._shutter is not None:
+            item.motion_keys = motion.key_count(blender_object, maker_of(each))
+            item.transforms *= item.motion_keys
+        item.mesh_key = self._mesh_key(item, each)
+        if item.mesh_key is not None:
+            self.items[item.key] = item
+
+    def _add_hair(self, each):
+        """The hair of an object's particle systems, each a mesh of one material."""
+        blender_object = each.object
+        is_final = self._source.v3d is None
+        for number, modifier in strands.hair_systems(blender_object, is_final):
+            self.tied.add(blender_object.name_full)  # only a walk sees what its hair does
+            item = self._describe(each)
+            item.key = instance.hair_key(each, number)
+            self._dress(item, each)
+            slot = max(min(modifier.particle_system.settings.material, len(item.materials)), 1) - 1
+            item.materials = item.materials[slot:slot + 1]
+            hair = strands.Hair(number, self._source.depsgraph, is_final, self._names[:2])
+            self._add_made(each, item, (blender_object.name_full, number), hair)
+
+    def _move_hair(self, each, fraction):
+        """Hair goes where its object goes, and by itself."""
+        for number in range(len(each.object.particle_systems)):
+            item = self.items.get(instance.hair_key(each, number))
+            if item is not None:
+                self._look_again(item, each, fraction)
+
+    def _add_strands(self, each):
+        """A Curves or Point Cloud object."""
+        item = self._describe(each)
+        self._dress(item, each)
+        item.materials = item.materials[:1]
+        self.tied.add(each.object.name_full)
+        self._add_made(each, item, each.object.data.as_pointer(), strands.StrandObject(self._names[:2]))
+
+    def _add_made(self, each, item, source, made_of):
+        """An item of strands or points (strands.Hair or strands.StrandObject) whose mesh is made unless another
+        item of the same source has it."""
+        if self._shutter is not None:
+            item.motion_keys = motion.key_count(each.object, maker_of(each))
+            item.transforms *= item.motion_keys
+        if source not in self._owners:
+            self._owners[source] = item.key if self._put_made(each, item, source, made_of) else None
+        item.mesh_key = self._owners[source]
+        if item.mesh_key is not None:
+            self.items[item.key] = item
+
+    def _put_made(self, each, item, source, made_of):
+        """Have the mesh of an item in the library, or wait for its shapes; False where there is nothing to
+        show."""
+        changes, meshes = self._source.changes, self._sync._meshes
+        is_same = not changes.full and item.owner not in changes.objects
+        if is_same and meshes.reuse(item.key, source, self._names):
+            return True
+        shape = made_of.read(each)
+        made = None if shape is None else made_of.solid(each, shape)
+        if made is None:
+            return False
+        solid, data = made
+        if item.motion_keys > 1 and motion.may_deform(each.object, maker_of(each)) and made_of.may_move(each):
+            shapes = tubes.StrandMotion(solid, shape, data, item.motion_keys)
+            self._deforming[item.key] = _Deforming(source, data, self._names, shapes, made_of.read)
+        else:
+            meshes.put(item.key, source, data, self._names)
+        return True
+
+    def _mesh_key(self, item, each):
+        """The key of the mesh the item shows, which is read now if no other item showed it before."""
+        pointer = each.object.data.as_pointer()
+        if pointer in self._owners:
+            return self._owners[pointer]
+        self._owners[pointer] = item.key if self.read_mesh(item, each, pointer) else None
+        return self._owners[pointer]
+
+    def read_mesh(self, item, each, pointer):
+        """Have the mesh of an item in the library, or wait for its shapes; False where there is nothing
+        to show."""
+        meshes, blender_object = self._sync._meshes, each.object
+        is_changed = self._source.changes.geometry_of(item.owner)
+        names = self._names_of(pointer)
+        if not is_changed and meshes.reuse(item.key, pointer, names):
+            return True
+        with mesh.shown_mesh(blender_object) as shape:
+            data, shapes = self._extract(item, each, shape, names)
+        if data is None:
+            return False
+        if shapes is not None:
+            self._deforming[item.key] = _Deforming(pointer, data, names, shapes, lambda each: each.object)
+        else:
+            meshes.put(item.key, pointer, data, names)
+        return True
+
+    def _extract(self, item, each, shape, names):
+        """The mesh that an instance shows as MeshData, None where it has no face, and as deform.MeshMotion
+        where it has to wait for its shapes, else None."""
+        blender_object = each.object
+        if mesh.is_sculpted_multires(blender_object):
+            self._sync.warnings.add(f"Object '{blender_object.name}': while it is sculpted, the mesh below its "
+                                    "multiresolution is shown")
+        slot_count = max(len(blender_object.material_slots), len(shape.materials))
+        data = mesh.extract(shape, *names[:2], slot_count)
+        if data is None:
+            return None, None
+        if names[2]:
+            data.generated = mesh.generated_coordinates(blender_object, shape, data.positions)
+        if self._sync._meshes.will_resync and deform.is_posable(blender_object):
+            data.poses = mesh.Topology(shape)
+        if item.motion_keys > 1 and motion.may_deform(blender_object, maker_of(each)):
+            return data, deform.MeshMotion(shape, data, item.motion_keys)
+        return data, None
+
+    def _names_of(self, pointer):
+        """What a mesh brings: tangents only where they are read, as they take longest to make."""
+        if not self._tangent_readers:
+            return self._names
+        if self._tangents is None:
+            self._tangents = self._find_tangents()
+        uv_names, color_names, needs_generated = self._names
+        every = set().union(*self._tangent_readers.values())
+        return uv_names, color_names - (every - self._tangents.get(pointer, every)), needs_generated
+
+    def _find_tangents(self):
+        """{pointer of a mesh: names of the tangents that the materials of its objects read}"""
+        found = {}
+        for each in self._source.depsgraph.objects:
+            if each.data is not None:
+                names = found.setdefault(each.data.as_pointer(), set())
+                for material in filter(None, materials_of(each, self._view_layer)):
+                    names |= self._tangent_readers.get(material.name_full, set())
+        return found
+
+    def _look_again(self, item, each, fraction):
+        index = motion.key_index(fraction, item.motion_keys)
+        if index is None:
+            return
+        item.transforms[index] = rows12(each.matrix_world)
+        waiting = self._deforming.get(item.key)
+        if waiting is None or waiting.shapes.is_dropped:
+            return
+        if not waiting.shapes.set_key(index, waiting.read(each)):
+            self._sync.warnings.add(
+                f"Object '{each.object.name}': its topology changes in time, no deformation blur")
