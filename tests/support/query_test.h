@@ -16,7 +16,7 @@
 #include <string.h>
 
 #include "brute.h"
-#include "bvh/bvh.h"
+#include "bvh_check.h"
 #include "model/snapshot.h"
 #include "query_scene.h"
 #include "ray_set.h"
@@ -59,7 +59,7 @@ QUERY_TEST_INLINE struct query_scene query_test_scene(const struct query_world *
     char message[256] = "";
     assert_ok(query_scene_create(world, is_final, 1, &scene));
     const struct trc_snapshot *snapshot = query_scene_snapshot(scene.scene);
-    if (!trc_bvh_check(snapshot->bvh, snapshot, message, sizeof message))
+    if (!bvh_check(snapshot->bvh, snapshot, message, sizeof message))
         fail_msg("%s", message);
     return scene;
 }

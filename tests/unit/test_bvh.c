@@ -1,4 +1,4 @@
-/* Trees hold their invariants (trc_bvh_check) whatever they are built from and however they are
+/* Trees hold their invariants (bvh_check) whatever they are built from and however they are
  * posed, and the check finds trees that do not. */
 #include "query_test.h"
 
@@ -15,7 +15,7 @@ static const float unit_lower[3] = {-1, -1, -1}, unit_upper[3] = {1, 1, 1}, orig
 static void expect_good(trc_scene scene, const char *name) {
     char message[256] = "";
     const struct trc_snapshot *snapshot = query_scene_snapshot(scene);
-    if (!trc_bvh_check(snapshot->bvh, snapshot, message, sizeof message))
+    if (!bvh_check(snapshot->bvh, snapshot, message, sizeof message))
         fail_msg("%s: %s", name, message);
 }
 
@@ -739,20 +739,20 @@ static void check_finds_damage(void **state) {
     for (int kind = 0; kind < 12; kind++) {
         char message[256] = "";
         damage(tree, kind);
-        if (trc_bvh_check(snapshot->bvh, snapshot, message, sizeof message))
+        if (bvh_check(snapshot->bvh, snapshot, message, sizeof message))
             fail_msg("damage %d was not found", kind);
         assert_true(strlen(message) > 0);
-        assert_false(trc_bvh_check(snapshot->bvh, snapshot, NULL, 0));
+        assert_false(bvh_check(snapshot->bvh, snapshot, NULL, 0));
         memcpy(tree->nodes, node, node_bytes);
         tree->slots->slots[0] = slot;
         tree->vertices[3] = coordinate;
         expect_good(scene.scene, "mended");
     }
     tree->triangle_count++;
-    assert_false(trc_bvh_check(snapshot->bvh, snapshot, NULL, 0));
+    assert_false(bvh_check(snapshot->bvh, snapshot, NULL, 0));
     tree->triangle_count--;
     tree->upper[0] = 0.0f;
-    assert_false(trc_bvh_check(snapshot->bvh, snapshot, NULL, 0));
+    assert_false(bvh_check(snapshot->bvh, snapshot, NULL, 0));
     free(node);
     query_scene_destroy(&scene);
     query_world_free(&world);

@@ -262,7 +262,7 @@ static void the_check_finds_lost_pieces(void **state) {
                 continue;
             tried++;
             *upper = 0.5f * (upper[-8] + whole);
-            found += !trc_bvh_check(snapshot->bvh, snapshot, message, sizeof message);
+            found += !bvh_check(snapshot->bvh, snapshot, message, sizeof message);
             *upper = whole;
         }
     assert_int_equal(tried, 50);

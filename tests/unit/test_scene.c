@@ -8,6 +8,7 @@
 #include <stdlib.h>
 
 #include "bvh/bvh.h"
+#include "bvh_check.h"
 #include "core/core.h"
 #include "model/film.h"
 #include "scene/rebuild.h"
@@ -226,7 +227,7 @@ static void expect_fresh_hits(const struct sheet *sheet, float share) {
     assert_int_equal(trc_scene_destroy(fresh.scene), TRC_OK);
     char message[256];
     const struct trc_snapshot *snapshot = snapshot_of(sheet->scene);
-    if (!trc_bvh_check(snapshot->bvh, snapshot, message, sizeof message))
+    if (!bvh_check(snapshot->bvh, snapshot, message, sizeof message))
         fail_msg("%s", message);
 }
 
@@ -324,7 +325,7 @@ static void rebuilds_are_for_their_own_mesh(void **state) {
                              TRC_OK);
             assert_int_equal(trc_scene_commit(sheet.scene), TRC_OK);
             const struct trc_snapshot *snapshot = snapshot_of(sheet.scene);
-            if (!trc_bvh_check(snapshot->bvh, snapshot, message, sizeof message))
+            if (!bvh_check(snapshot->bvh, snapshot, message, sizeof message))
                 fail_msg("%s", message);
         }
         assert_int_equal(trc_scene_destroy(sheet.scene), TRC_OK);

@@ -56,10 +56,4 @@ trc_status trc_blas_build(const struct trc_mesh *mesh, struct trc_pool *pool,
 /* NULL is fine; trees that took it on keep it. */
 void trc_blas_release(struct trc_blas *blas);
 
-/* Checks the invariants: every child inside its parent at every key, every triangle in exactly one
- * leaf, or in several that hold it together (or counted as skipped), acyclic, depth within the
- * stack. False writes why to message. */
-bool trc_bvh_check(const struct trc_bvh *bvh, const struct trc_snapshot *snapshot, char *message,
-                   uint32_t capacity);
-
 #endif

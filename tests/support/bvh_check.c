@@ -1,17 +1,10 @@
-/* Invariants of trees, by walking them whole: for tests and for debugging, not for speed.
- *
- * What traversal relies on: references in range, every node and slot reached once and nodes after
- * their parents (so there is no cycle), no path longer than the stack allows, boxes that hold what
- * is below them at every key, or, of clipped triangles, boxes that do so together, leaves that hold
- * their triangles' vertices as the mesh and the transform give them. Containment between keys
- * follows up to rounding, as boxes and vertices are interpolated by the same formula;
- * kernels/trace/beam.h allows for the rounding. */
+#include "bvh_check.h"
+
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
-#include "bvh/bvh.h"
 #include "bvh/part.h"
 #include "bvh/thin.h"
 #include "bvh/tree.h"
@@ -535,8 +528,8 @@ static bool check_top(struct checker *c, uint8_t *placed) {
     return check_tree(&t, 0, NULL);
 }
 
-bool trc_bvh_check(const struct trc_bvh *bvh, const struct trc_snapshot *snapshot, char *message,
-                   uint32_t capacity) {
+bool bvh_check(const struct trc_bvh *bvh, const struct trc_snapshot *snapshot, char *message,
+               uint32_t capacity) {
     struct checker c = {bvh, snapshot, message, capacity};
     if (bvh->tree != &bvh->top && bvh->tree != &bvh->joined)
         return complain(&c, "the tree in use is neither of its own");
