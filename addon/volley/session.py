@@ -22,7 +22,7 @@ STATUS_SECONDS = 0.2         # between two status lines
 PICTURE_SECONDS = 0.7        # between two of them
 PICTURE_COST = 20            # at least this many times what showing one takes
 MEGA = 1024.0 * 1024.0
-LEAST_NOISE_THRESHOLD = 0.001  # that is chosen without the user
+MIN_NOISE_THRESHOLD = 0.001  # that is chosen without the user
 
 
 class Session:
@@ -293,7 +293,7 @@ def _adaptive_fields(settings, is_preview):
         return {"noise_threshold": 0.0}
     threshold = getattr(settings, f"{prefix}noise_threshold")
     if threshold == 0.0:  # as Cycles chooses it
-        threshold = max(LEAST_NOISE_THRESHOLD, 1.0 / getattr(settings, f"{prefix}samples"))
+        threshold = max(MIN_NOISE_THRESHOLD, 1.0 / getattr(settings, f"{prefix}samples"))
     return {"noise_threshold": threshold,
             "min_samples": getattr(settings, f"{prefix}adaptive_min_samples")}
 

@@ -184,10 +184,10 @@ class _Pictures:
         self._started = time.monotonic()
         self._patience = FRAME_SECONDS
         size = scene.render.preview_pixel_size
-        least = 1 if size == 'AUTO' else int(size)
+        smallest = 1 if size == 'AUTO' else int(size)
         pixel_count = fields["crop_width"] * fields["crop_height"]
-        first = max(least, first_divisor(pixel_count * self._pixel_seconds))
-        self._stages = [(first, 1)] + ([(least, 1)] if first > least else []) + [(least, None)]
+        first = max(smallest, first_divisor(pixel_count * self._pixel_seconds))
+        self._stages = [(first, 1)] + ([(smallest, 1)] if first > smallest else []) + [(smallest, None)]
         self._next_stage(sync)
 
     def stop(self):

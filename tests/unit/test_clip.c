@@ -12,12 +12,12 @@
 
 /* ---- one ref ---- */
 
-#define MOST_TRIANGLES 4
+#define MAX_TRIANGLES 4
 
 /* Triangles that go together as one ref of the first part. */
 struct cluster {
-    float positions[9 * MOST_TRIANGLES + 1];
-    uint32_t indices[3 * MOST_TRIANGLES];
+    float positions[9 * MAX_TRIANGLES + 1];
+    uint32_t indices[3 * MAX_TRIANGLES];
     struct trc_mesh mesh;
     struct trc_part part;
     struct trc_ref ref;
@@ -42,7 +42,7 @@ static void cluster_measure(struct cluster *c, uint32_t count) {
 
 /* Random triangles that follow one another, from needles to round ones, a way from the origin. */
 static void cluster_random(struct rng *rng, float offset, struct cluster *c) {
-    const uint32_t count = 1 + rng_below(rng, MOST_TRIANGLES);
+    const uint32_t count = 1 + rng_below(rng, MAX_TRIANGLES);
     float along[3], aside[3];
     rng_direction(rng, along);
     rng_direction(rng, aside);
@@ -55,12 +55,12 @@ static void cluster_random(struct rng *rng, float offset, struct cluster *c) {
     cluster_measure(c, count);
 }
 
-static struct trc_clip clip_of(const struct trc_ref *ref, float least_area) {
+static struct trc_clip clip_of(const struct trc_ref *ref, float min_area) {
     const f4 margin = {0.4f, 0.7f, 0.1f, 0.0f}; /* planes fall anywhere in it */
     struct box bounds = trc_ref_box(ref);
     bounds.lower -= margin;
     bounds.upper += margin;
-    return (struct trc_clip){bounds, least_area};
+    return (struct trc_clip){bounds, min_area};
 }
 
 static bool box_has(const struct trc_ref *r, const long double p[3]) {
@@ -111,14 +111,14 @@ static void pieces_hold_all_points(void **state) {
     uint64_t points = 0, lost = 0, cut = 0;
     for (int i = 0; i < 4000; i++) {
         struct cluster c;
-        struct trc_ref pieces[TRC_CLIP_MOST_PIECES];
+        struct trc_ref pieces[TRC_CLIP_MAX_PIECES];
         uint32_t triangles, counted, sum = 0;
         cluster_random(&rng, offsets[i % 4], &c);
         const struct trc_clip clip = clip_of(&c.ref, powf(10.0f, rng_range(&rng, -4.0f, -1.0f)));
         const uint32_t count = trc_ref_clip(&c.part, &c.ref, &clip, pieces, &triangles);
         assert_int_equal(trc_ref_clip(&c.part, &c.ref, &clip, NULL, &counted), count);
         assert_int_equal(counted, triangles);
-        assert_in_range(count, 1, TRC_CLIP_MOST_PIECES);
+        assert_in_range(count, 1, TRC_CLIP_MAX_PIECES);
         for (uint32_t k = 0; k < count; k++) {
             sum += trc_ref_count(&pieces[k]);
             assert_int_equal(pieces[k].part, count > 1 ? TRC_PART_CLIPPED : 0);
@@ -145,7 +145,7 @@ static void pieces_hold_all_points(void **state) {
 static void pieces_are_smaller(void **state) {
     (void)state;
     struct cluster c = {.positions = {0, 0, 0, 1, 1, 1, 1, 1, 0.999f}};
-    struct trc_ref pieces[TRC_CLIP_MOST_PIECES];
+    struct trc_ref pieces[TRC_CLIP_MAX_PIECES];
     uint32_t triangles;
     float sum = 0.0f;
     cluster_measure(&c, 1);
@@ -159,20 +159,20 @@ static void pieces_are_smaller(void **state) {
 
 static void full_and_small_boxes_stay_whole(void **state) {
     (void)state;
-    struct trc_ref pieces[TRC_CLIP_MOST_PIECES];
+    struct trc_ref pieces[TRC_CLIP_MAX_PIECES];
     struct cluster upright = {.positions = {0, 0, 0, 5, 0, 0, 5, 5, 0, 0, 0, 0, 5, 5, 0, 0, 5, 0}};
     struct cluster slanting = {.positions = {0, 0, 0, 1, 1, 1, 1, 1, 0.99f}};
     struct cluster line = {.positions = {0, 0, 0, 1, 1, 1, 2, 2, 2}};
     struct {
         struct cluster *cluster;
         uint32_t count;
-        float least_area;
+        float min_area;
     } whole[] = {{&upright, 2, 0.0f}, {&upright, 1, 0.0f}, {&slanting, 1, 3.0f}, {&line, 1, 0.0f}};
     for (size_t i = 0; i < sizeof whole / sizeof *whole; i++) {
         struct cluster *c = whole[i].cluster;
         uint32_t triangles;
         cluster_measure(c, whole[i].count);
-        const struct trc_clip clip = clip_of(&c->ref, whole[i].least_area);
+        const struct trc_clip clip = clip_of(&c->ref, whole[i].min_area);
         assert_int_equal(trc_ref_clip(&c->part, &c->ref, &clip, pieces, &triangles), 1);
         assert_int_equal(triangles, whole[i].count);
         assert_memory_equal(&pieces[0], &c->ref, sizeof c->ref);

@@ -144,10 +144,10 @@ def follow_turns(transforms):
     if np.abs(np.diff(linear, axis=0)).max(initial=0.0) < math.sin(_MAX_TURN) * _smallest_axis(linear):
         return transforms
     u, sizes, v = np.linalg.svd(linear)
-    least = sizes.max() * _SINGULAR
-    if sizes[:, 1].min() <= least:
+    limit = sizes.max() * _SINGULAR
+    if sizes[:, 1].min() <= limit:
         return transforms
-    flat = sizes[:, 2] <= least  # either side of what is flat may be its front: the one that only turns
+    flat = sizes[:, 2] <= limit  # either side of what is flat may be its front: the one that only turns
     u[flat, :, 2] *= np.sign(np.linalg.det(u @ v))[flat, None]
     rotations = u @ v
     rotations *= np.sign(np.linalg.det(rotations))[:, None, None]

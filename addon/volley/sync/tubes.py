@@ -19,7 +19,7 @@ from .deform import KeyedShapes
 from .hashing import HASH_MAX, hash_numbers
 from .mesh import MeshData
 
-_MOST_TRIANGLES = 2_000_000  # of one object's strands or points; above the fewest sides
+_MAX_TRIANGLES = 2_000_000  # of one object's strands or points; above the fewest sides
 _SIDES = (8, 6, 4, 3)
 _SHORTEST = 1e-12            # m; keys of a strand that are closer are one
 
@@ -74,7 +74,7 @@ def _resolution(segment_count):
     """Pieces of a segment and sides of a tube, as many as there is room for."""
     for sides in _SIDES:
         for level in range(cycles_curves(bpy.context.scene, "subdivisions", 2), -1, -1):
-            if 2 * sides * segment_count << level <= _MOST_TRIANGLES:
+            if 2 * sides * segment_count << level <= _MAX_TRIANGLES:
                 return 1 << level, sides
     return 1, _SIDES[-1]
 
@@ -232,7 +232,7 @@ class Balls:
 
     def __init__(self, points):
         self._count = len(points.positions)
-        level = next((level for level in (2, 1) if 20 * 4 ** level * self._count <= _MOST_TRIANGLES), 0)
+        level = next((level for level in (2, 1) if 20 * 4 ** level * self._count <= _MAX_TRIANGLES), 0)
         self._normals, self._faces = _icosphere(level)
         corners = self._normals[self._faces]
         area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]),

@@ -7,7 +7,7 @@ from .visibility import world_visibility
 
 
 DEFAULT_AO_DISTANCE = 10.0  # m; Blender's of a new world
-LEAST_AO_DISTANCE = 1e-6  # m; Blender's slider goes down to 0
+MIN_AO_DISTANCE = 1e-6  # m; Blender's slider goes down to 0
 MIST_EXPONENTS = {'QUADRATIC': 2.0, 'LINEAR': 1.0, 'INVERSE_QUADRATIC': 0.5}
 
 
@@ -18,7 +18,7 @@ def describe(world, material_id, sun, settings, light_groups):
               "map_resolution": 0, "ao_factor": 0.0, "ao_distance": DEFAULT_AO_DISTANCE}
     if world is None:
         return fields
-    fields["ao_distance"] = max(world.light_settings.distance, LEAST_AO_DISTANCE)
+    fields["ao_distance"] = max(world.light_settings.distance, MIN_AO_DISTANCE)
     fields["light_group"] = light_groups.get(world.lightgroup, 0)
     if settings.use_ambient_occlusion:
         fields["ao_factor"] = world.light_settings.ao_factor

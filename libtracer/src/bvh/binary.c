@@ -31,19 +31,19 @@ struct trc_binary_node trc_binary_node(const struct trc_binary_node *nodes, uint
 }
 
 /* What stands for a node as no more than so many children. */
-static int children_add(const struct trc_binary_node *nodes, uint32_t node, int most,
+static int children_add(const struct trc_binary_node *nodes, uint32_t node, int limit,
                         uint32_t *children_out) {
     const bool is_leaf = node & TRC_REF_LEAF;
-    while (most > 1 && !is_leaf && !nodes[node].left_count[most - 2])
-        most--;
-    if (most == 1 || is_leaf) {
+    while (limit > 1 && !is_leaf && !nodes[node].left_count[limit - 2])
+        limit--;
+    if (limit == 1 || is_leaf) {
         *children_out = node;
         return 1;
     }
     const struct trc_binary_node *n = &nodes[node];
-    const int left = n->left_count[most - 2];
+    const int left = n->left_count[limit - 2];
     const int count = children_add(nodes, n->left, left, children_out);
-    return count + children_add(nodes, n->right, most - left, children_out + count);
+    return count + children_add(nodes, n->right, limit - left, children_out + count);
 }
 
 int trc_binary_children(const struct trc_binary_node *nodes, uint32_t node,

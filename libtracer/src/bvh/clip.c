@@ -10,7 +10,7 @@
  * upright, half a rectangle has 2, and stays whole. */
 #define EMPTY_RATIO 2.2f
 /* Planes stay that part of a box's length away from its ends. */
-#define LEAST_PART 0.05f
+#define MIN_PART 0.05f
 /* Corners of a triangle cut six times: one more each time; where rounding makes them zigzag, half
  * as many more. */
 #define POLYGON_CORNERS 28
@@ -80,8 +80,8 @@ static struct box triangle_within(const struct trc_part *part, uint32_t triangle
     struct polygon p = {.count = 3};
     trc_part_corners(part, part->mesh->indices + 3 * (size_t)triangle, 0, p.corner);
     const struct box whole = polygon_bounds(&p);
-    const f4 most = f4_max(f4_abs(whole.lower), f4_abs(whole.upper));
-    const float error = CLIP_ERROR * fmaxf(most[0], fmaxf(most[1], most[2]));
+    const f4 largest = f4_max(f4_abs(whole.lower), f4_abs(whole.upper));
+    const float error = CLIP_ERROR * fmaxf(largest[0], fmaxf(largest[1], largest[2]));
     const struct box wider = box_widened(within, error);
     for (int axis = 0; axis < 3; axis++) {
         if (whole.lower[axis] < wider.lower[axis])
@@ -123,8 +123,7 @@ static bool piece_cut(const struct trc_part *part, const struct trc_ref *ref, st
 /* Where a box is cut: at a plane of the coarsest grid that has one well within it. */
 static float grid_plane(const struct trc_clip *clip, struct box b, int axis) {
     const float origin = clip->bounds.lower[axis], length = b.upper[axis] - b.lower[axis];
-    const float low = b.lower[axis] + LEAST_PART * length,
-                high = b.upper[axis] - LEAST_PART * length;
+    const float low = b.lower[axis] + MIN_PART * length, high = b.upper[axis] - MIN_PART * length;
     float cell = clip->bounds.upper[axis] - origin;
     /* Cells as long as what is between low and high have a plane there. */
     while (cell > 0.5f * length) {
@@ -141,7 +140,7 @@ static uint32_t piece_divide(const struct trc_part *part, const struct trc_clip 
                              const struct piece *p, struct piece sides_out[2]) {
     const struct box box = trc_ref_box(&p->ref);
     const float area = box_area(box);
-    if (area <= clip->least_area || area <= EMPTY_RATIO * p->area || p->area == 0.0f)
+    if (area <= clip->min_area || area <= EMPTY_RATIO * p->area || p->area == 0.0f)
         return 0;
     const int axis = f4_largest_axis(box_size(box));
     const float plane = grid_plane(clip, box, axis);
@@ -162,7 +161,7 @@ uint32_t trc_ref_clip(const struct trc_part *part, const struct trc_ref *ref,
     stack[0].ref = *ref;
     while (top > 0) {
         const struct piece p = stack[--top];
-        const bool has_room = top + 2 <= STACK_PIECES && count + top + 2 <= TRC_CLIP_MOST_PIECES;
+        const bool has_room = top + 2 <= STACK_PIECES && count + top + 2 <= TRC_CLIP_MAX_PIECES;
         const uint32_t sides = has_room ? piece_divide(part, clip, &p, stack + top) : 0;
         top += sides;
         if (sides > 0)

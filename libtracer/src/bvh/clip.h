@@ -25,15 +25,15 @@
 /* What is to be cut: refs of a tree with those bounds whose boxes are larger (half the surface). */
 struct trc_clip {
     struct box bounds;
-    float least_area;
+    float min_area;
 };
 
 /* Boxes of less than this part of the tree's stay whole. With a third of it rays of upright scenes
  * are 2 % slower, and of turned ones no faster. */
-#define TRC_CLIP_LEAST_SHARE 3e-3f
+#define TRC_CLIP_MIN_SHARE 3e-3f
 
 /* Pieces of a ref at most. */
-#define TRC_CLIP_MOST_PIECES 256
+#define TRC_CLIP_MAX_PIECES 256
 
 /* Cuts a ref to triangles of the part: pieces_out, unless it is NULL, gets those that stand for it,
  * itself where it stays whole. Each point of its triangles is in the box of a piece that has that

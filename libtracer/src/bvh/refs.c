@@ -72,7 +72,7 @@ static void collect_task(void *context, uint32_t index, uint32_t worker) {
 static bool is_cancelled(const struct ref_job *job) { return job->cancel && *job->cancel; }
 
 static bool is_large(const struct ref_job *job, const struct trc_ref *ref) {
-    return box_area(trc_ref_box(ref)) > job->clip.least_area;
+    return box_area(trc_ref_box(ref)) > job->clip.min_area;
 }
 
 /* Counts what a block comes to when it is clipped; cancelled, it stays as it is. */
@@ -115,8 +115,8 @@ static void gather_task(void *context, uint32_t index, uint32_t worker) {
 static void clip_choose(struct ref_job *job, uint32_t block_count, uint64_t room,
                         struct trc_pool *pool) {
     /* Areas that underflow would not be told from 0. */
-    job->clip.least_area = fmaxf(TRC_CLIP_LEAST_SHARE * box_area(job->clip.bounds), FLT_MIN);
-    for (;; job->clip.least_area *= 2.0f) {
+    job->clip.min_area = fmaxf(TRC_CLIP_MIN_SHARE * box_area(job->clip.bounds), FLT_MIN);
+    for (;; job->clip.min_area *= 2.0f) {
         uint64_t more = 0;
         trc_pool_run(pool, block_count, clip_count_task, job);
         for (uint32_t i = 0; i < block_count; i++)
@@ -156,9 +156,9 @@ static struct box centroids_of(const struct trc_ref *refs, uint32_t count) {
 trc_status trc_refs_collect(const struct trc_part *parts, uint32_t part_count,
                             uint64_t triangle_count, bool clips, struct trc_pool *pool,
                             const atomic_uint *cancel, struct trc_refs *out) {
-    const uint64_t most = TRC_REF_INDEX_MASK - triangle_count,
+    const uint64_t limit = TRC_REF_INDEX_MASK - triangle_count,
                    wanted = clips ? triangle_count / TRIANGLES_PER_PIECE : 0,
-                   room = wanted < most ? wanted : most;
+                   room = wanted < limit ? wanted : limit;
     const uint64_t capacity = triangle_count + room;
     uint32_t block_count;
     struct trc_ref *memory = trc_alloc(2 * (capacity + 1), sizeof *memory);

@@ -122,12 +122,12 @@ static void work(void *context) {
 
 /* Another thread where there are more jobs than threads. Under the lock. */
 static void add_thread(struct trc_prefetch *prefetch) {
-    uint32_t waiting = 0, most = trc_thread_processor_count();
+    uint32_t waiting = 0, limit = trc_thread_processor_count();
     for (const struct job *job = prefetch->jobs; job; job = job->next)
         waiting += job->state != JOB_DONE;
-    if (most > MAX_THREADS)
-        most = MAX_THREADS;
-    if (prefetch->thread_count < most && prefetch->thread_count < waiting &&
+    if (limit > MAX_THREADS)
+        limit = MAX_THREADS;
+    if (prefetch->thread_count < limit && prefetch->thread_count < waiting &&
         trc_thread_start(&prefetch->threads[prefetch->thread_count], work, prefetch) == TRC_OK)
         prefetch->thread_count++;
 }

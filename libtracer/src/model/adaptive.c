@@ -10,13 +10,13 @@
 /* Cycles' numbers and automatic choice, so that settings mean about the same in both engines. */
 #define THRESHOLD_SCALE 5.0f
 #define MEAN_EPSILON 1e-4f /* keeps the relative error of black finite */
-#define LEAST_MIN_SAMPLES 4
+#define MIN_SAMPLES_FLOOR 4
 
 uint32_t trc_adaptive_min_samples(float noise_threshold, uint32_t min_samples) {
     float wanted = (float)min_samples;
     if (!min_samples) /* 0.1: 32, 0.01: 64, 0.001: 128, to the nearest power of two */
         wanted = fminf(16.0f / powf(noise_threshold, 0.3f) * 0.70710678f, 0x1p20f);
-    uint32_t power = LEAST_MIN_SAMPLES;
+    uint32_t power = MIN_SAMPLES_FLOOR;
     while ((float)power < wanted)
         power *= 2;
     return power;
@@ -82,7 +82,7 @@ static void look(struct trc_adaptive_pixel *p, uint32_t samples) {
     p->variance = error * error * (float)samples;
 }
 
-static bool has_converged(const struct tile *t, uint32_t x, uint32_t y, float most) {
+static bool has_converged(const struct tile *t, uint32_t x, uint32_t y, float limit) {
     const struct trc_adaptive_pixel *const all[] = {
         pixel_at(t, x, y), pixel_at(t, x - 1, y - 1), pixel_at(t, x + 1, y - 1),
         pixel_at(t, x - 1, y + 1), pixel_at(t, x + 1, y + 1)};
@@ -93,7 +93,7 @@ static bool has_converged(const struct tile *t, uint32_t x, uint32_t y, float mo
             count += 1.0f;
         }
     }
-    return sum <= most * count; /* a sum that is not finite goes on */
+    return sum <= limit * count; /* a sum that is not finite goes on */
 }
 
 static bool in_chain(const struct trc_adaptive_pixel *p) {
@@ -116,7 +116,7 @@ static bool is_called(const struct tile *t, uint32_t x, uint32_t y) {
 void trc_adaptive_update(struct trc_adaptive *adaptive, uint32_t x, uint32_t y, uint32_t width,
                          uint32_t height, uint32_t samples) {
     const struct tile t = tile_of(adaptive, x, y, width, height);
-    const float most = adaptive->error2 * (float)samples;
+    const float limit = adaptive->error2 * (float)samples;
     for (uint32_t j = 0; j < height; j++)
         for (uint32_t i = 0; i < width; i++)
             if (in_chain(pixel_at(&t, i, j)))
@@ -127,7 +127,7 @@ void trc_adaptive_update(struct trc_adaptive *adaptive, uint32_t x, uint32_t y, 
     for (uint32_t j = 0; j < height; j++)
         for (uint32_t i = 0; i < width; i++) {
             struct trc_adaptive_pixel *p = pixel_at(&t, i, j);
-            if (in_chain(p) && has_converged(&t, i, j, most))
+            if (in_chain(p) && has_converged(&t, i, j, limit))
                 p->reasons &= ~(uint32_t)TRC_PIXEL_CHAIN;
         }
     for (uint32_t j = 0; j < height; j++)

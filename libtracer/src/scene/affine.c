@@ -123,23 +123,23 @@ bool trc_affine_is_thin(const struct trc_affine *a) {
            fmin(x, fmin(y, z)) < THIN_LENGTHS * fmax(x, fmax(y, z));
 }
 
-/* The longest cross product of two of three vectors, unit, from those of lengths at most 1. False
- * where they all lie on a line. */
+/* The longest cross product of two of three vectors, unit, from those of lengths at longest 1.
+ * False where they all lie on a line. */
 static bool widest_normal(const double *const v[3], double normal_out[3]) {
-    double most = SINGULAR_RATIO;
+    double longest = SINGULAR_RATIO;
     bool found = false;
     for (int i = 0; i < 3; i++) {
         double n[3];
         cross(v[(i + 1) % 3], v[(i + 2) % 3], n);
         const double length = length_of(n);
-        if (!(length > most))
+        if (!(length > longest))
             continue;
-        most = length;
+        longest = length;
         found = true;
         memcpy(normal_out, n, sizeof n);
     }
     if (found)
-        scale(normal_out, 1.0 / most);
+        scale(normal_out, 1.0 / longest);
     return found;
 }
 

@@ -85,13 +85,13 @@ static struct trc_image *fitted(const struct trc_store *images, struct trc_image
 static uint32_t find_largest(const struct trc_store *images, struct trc_image *const *halves,
                              uint64_t *bytes_out) {
     uint32_t largest = TRC_STORE_END;
-    uint64_t bytes = 0, most = 0;
+    uint64_t bytes = 0, largest_bytes = 0;
     for (uint32_t i = trc_store_first(images); i != TRC_STORE_END; i = trc_store_next(images, i)) {
         const struct trc_image *image = fitted(images, halves, i);
         bytes += trc_image_bytes(image);
-        if (trc_image_can_halve(image) && trc_image_bytes(image) > most) {
+        if (trc_image_can_halve(image) && trc_image_bytes(image) > largest_bytes) {
             largest = i;
-            most = trc_image_bytes(image);
+            largest_bytes = trc_image_bytes(image);
         }
     }
     *bytes_out = bytes;

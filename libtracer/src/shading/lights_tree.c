@@ -36,9 +36,9 @@ static float dot(f4 a, f4 b) {
     return c[0] + c[1] + c[2];
 }
 /* fminf and fmaxf are calls. */
-static float least(float a, float b) { return a < b ? a : b; }
-static float most(float a, float b) { return a > b ? a : b; }
-static float sine(float cosine) { return sqrtf(most(1.0f - cosine * cosine, 0.0f)); }
+static float minimum(float a, float b) { return a < b ? a : b; }
+static float maximum(float a, float b) { return a > b ? a : b; }
+static float sine(float cosine) { return sqrtf(maximum(1.0f - cosine * cosine, 0.0f)); }
 
 static struct cluster empty_cluster(void) { return (struct cluster){.box = box_empty()}; }
 
@@ -62,7 +62,7 @@ static void unite_cones(struct cluster *a, const struct cluster *b) {
         d = -d;
         other = -other;
     }
-    d = least(most(d, -1.0f), 1.0f);
+    d = minimum(maximum(d, -1.0f), 1.0f);
     const float s = sine(d);
     const bool a_is_wide = a->cos_o <= b->cos_o;
     const struct cluster *wide = a_is_wide ? a : b, *narrow = a_is_wide ? b : a;
@@ -83,13 +83,13 @@ static void unite_cones(struct cluster *a, const struct cluster *b) {
     /* Half of the angle between both rims. */
     const float cos_rims = cos_w * cos_far - sin_w * sin_far;
     const float sin_rims = sin_w * cos_far + cos_w * sin_far;
-    const float cos_u = copysignf(sqrtf(most(0.5f + 0.5f * cos_rims, 0.0f)), sin_rims);
-    const float sin_u = sqrtf(most(0.5f - 0.5f * cos_rims, 0.0f));
+    const float cos_u = copysignf(sqrtf(maximum(0.5f + 0.5f * cos_rims, 0.0f)), sin_rims);
+    const float sin_u = sqrtf(maximum(0.5f - 0.5f * cos_rims, 0.0f));
     /* The axis turns by what the half angle has grown. */
     const float cos_t = cos_u * cos_w + sin_u * sin_w, sin_t = sin_u * cos_w - cos_u * sin_w;
     const f4 axis = from * f4_set(cos_t - sin_t * d / s) + to * f4_set(sin_t / s);
     a->axis = axis / f4_set(sqrtf(dot(axis, axis)));
-    a->cos_o = most(cos_u - CONE_SLACK, -1.0f);
+    a->cos_o = maximum(cos_u - CONE_SLACK, -1.0f);
     a->sin_o = sine(a->cos_o);
 }
 
@@ -102,7 +102,7 @@ static void unite(struct cluster *a, const struct cluster *b) {
     }
     box_grow(&a->box, b->box);
     unite_cones(a, b);
-    a->cos_e = least(a->cos_e, b->cos_e);
+    a->cos_e = minimum(a->cos_e, b->cos_e);
     a->intensity += b->intensity;
     a->count += b->count;
 }
@@ -124,7 +124,7 @@ static struct cluster leaf_cluster(const struct trc_light_bound *b, bool is_orie
 
 /* acos to 7e-5 (Abramowitz and Stegun 1964, 4.4.45), close enough to compare costs. */
 static float angle_of(float cosine) {
-    const float x = least(fabsf(cosine), 1.0f);
+    const float x = minimum(fabsf(cosine), 1.0f);
     const float angle =
         sqrtf(1.0f - x) * (1.5707288f + x * (-0.2121144f + x * (0.0742610f - x * 0.0187293f)));
     return cosine < 0.0f ? PI - angle : angle;
@@ -133,14 +133,14 @@ static float angle_of(float cosine) {
 /* Measure of the directions a cluster shines in, times its area and intensity. */
 static float cluster_cost(const struct cluster *c) {
     const float cos_o = c->cos_o, sin_o = c->sin_o, cos_e = c->cos_e;
-    float beyond; /* what shines beyond the cone */
+    float outside; /* what shines beyond the cone */
     if (cos_o <= -cos_e) {
-        beyond = 2.0f * (PI - angle_of(cos_o)) * sin_o;
+        outside = 2.0f * (PI - angle_of(cos_o)) * sin_o;
     } else {
         const float cos_2e = 2.0f * cos_e * cos_e - 1.0f, sin_2e = 2.0f * cos_e * sine(cos_e);
-        beyond = 2.0f * angle_of(cos_e) * sin_o - (cos_o * cos_2e - sin_o * sin_2e) + cos_o;
+        outside = 2.0f * angle_of(cos_e) * sin_o - (cos_o * cos_2e - sin_o * sin_2e) + cos_o;
     }
-    const float omega = 2.0f * PI * (1.0f - cos_o) + 0.5f * PI * beyond;
+    const float omega = 2.0f * PI * (1.0f - cos_o) + 0.5f * PI * outside;
     return c->intensity * omega * box_area(c->box);
 }
 
@@ -202,7 +202,7 @@ static void sweep_bins(const struct cluster bins[BIN_COUNT], float factor, float
 static bool best_cut(const struct trc_light_bound *leaves, uint32_t count, struct cut *cut) {
     const struct box range = center_range(leaves, count);
     const f4 extent = box_size(range);
-    const float longest = most(extent[0], most(extent[1], extent[2]));
+    const float longest = maximum(extent[0], maximum(extent[1], extent[2]));
     f4 scale;
     struct cluster bins[3][BIN_COUNT];
     for (int axis = 0; axis < 3; axis++) {
@@ -342,11 +342,11 @@ static struct cluster bound_top(const struct builder *b, uint32_t number) {
 
 /* Parts of the whole below which a node of the cut stays closed: each gets one of the 16 shares of
  * kernels/light/select.h at least. */
-#define LEAST_PART (1.0f / 16.0f)
+#define MIN_PART (1.0f / 16.0f)
 
 /* Opens nodes that are strong, first where lights are far apart, until there are cut_max. */
 static void choose_cut(struct trc_light_table *table, uint32_t cut_max) {
-    const float floor = table->bounds[0].intensity * LEAST_PART;
+    const float floor = table->bounds[0].intensity * MIN_PART;
     table->cut[0] = 0;
     table->cut_count = 1;
     while (table->cut_count < cut_max) {

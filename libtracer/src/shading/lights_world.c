@@ -15,10 +15,10 @@
 #define SUN_RINGS 4
 #define SUN_TURNS 8
 /* Share of the light samples that the sun gets at most: the sky around it lights shadows alone. */
-#define MOST_SUN_SHARE 0.8f
+#define MAX_SUN_SHARE 0.8f
 
 /* Share of the mean that every cell gets: what the samples missed must not be impossible. */
-#define LEAST_SHARE 0.05f
+#define MIN_SHARE 0.05f
 
 static bool is_on_sun(const struct trc_world_sun *sun, const float d[3]) {
     float square = 0.0f;
@@ -76,7 +76,7 @@ static void weigh_sun(const struct trc_snapshot *s, struct trc_world_map *map) {
     const float light = trc_luminance(mean), sky = trc_luminance(map->average);
     if (!(light > 0.0f && light < 1e30f))
         return;
-    sun->share = fminf(light / (light + sky), MOST_SUN_SHARE);
+    sun->share = fminf(light / (light + sky), MAX_SUN_SHARE);
     for (int i = 0; i < 3; i++)
         map->average[i] += mean[i];
 }
@@ -168,10 +168,10 @@ static void accumulate(struct trc_world_map *map) {
     double down = 0.0;
     for (uint32_t y = 0; y < height; y++) {
         float *cell = map->density + (size_t)y * width, *row = map->rows + (size_t)y * (width + 1);
-        const double least = LEAST_SHARE * sin(3.14159265358979 * (y + 0.5) / height);
+        const double minimum = MIN_SHARE * sin(3.14159265358979 * (y + 0.5) / height);
         double along = 0.0;
         for (uint32_t x = 0; x < width; x++) {
-            cell[x] = (float)((mean > 0.0 ? (double)cell[x] / mean : 0.0) + least);
+            cell[x] = (float)((mean > 0.0 ? (double)cell[x] / mean : 0.0) + minimum);
             row[x] = (float)along;
             along += (double)cell[x];
         }

@@ -181,7 +181,7 @@ static const struct trc_build_op *source_of(const struct trc_build *b, uint32_t 
 
 /* What a mapping scales its U and V by at least; 0 unless it is constant and turns them about the
  * third axis alone. in: of TRC_OP_MAPPING. */
-static float least_scale(uint32_t mode, const struct trc_operand *in) {
+static float min_scale(uint32_t mode, const struct trc_operand *in) {
     /* Of the matrix: what mixes Z with X and Y. */
     static const uint32_t zeros[4] = {TRC_OP_AT(MAPPING, row0) + 2, TRC_OP_AT(MAPPING, row1) + 2,
                                       TRC_OP_AT(MAPPING, row2), TRC_OP_AT(MAPPING, row2) + 1};
@@ -197,14 +197,14 @@ static float least_scale(uint32_t mode, const struct trc_operand *in) {
     return fminf(fabsf(in[scale].value), fabsf(in[scale + 1].value));
 }
 
-/* The least that a UV map's coordinates, mapped or not, change by per metre of the surface; 0, for
- * which lookups read no smaller levels, where they come from elsewhere. */
+/* The minimum that a UV map's coordinates, mapped or not, change by per metre of the surface; 0,
+ * for which lookups read no smaller levels, where they come from elsewhere. */
 static trc_status density_of(const struct lowering *l, const struct trc_operand *uv,
                              struct trc_operand *out) {
     const struct trc_build_op *mapping = source_of(l->b, TRC_OP_MAPPING, uv);
     const struct trc_operand *in = mapping ? l->b->inputs + mapping->first_input : uv;
     const struct trc_build_op *map = source_of(l->b, TRC_OP_UV, in);
-    const float scale = mapping ? least_scale(mapping->mode, in) : 1.0f;
+    const float scale = mapping ? min_scale(mapping->mode, in) : 1.0f;
     *out = trc_constant(0.0f);
     if (!map || scale == 0.0f)
         return TRC_OK;
@@ -371,14 +371,14 @@ static trc_status lower_vector_transform(const struct lowering *l) {
                                                            : 0u;
     copy3(l->out, l->in);
     if (from != to && from != TRC_SPACE_WORLD) {
-        const uint32_t way = from == TRC_SPACE_OBJECT ? TRC_TRANSFORM_OBJECT_TO_WORLD
-                                                      : TRC_TRANSFORM_CAMERA_TO_WORLD;
-        TRC_TRY(op(l->b, TRC_OP_TRANSFORM, way | kind, l->out, l->out));
+        const uint32_t transform = from == TRC_SPACE_OBJECT ? TRC_TRANSFORM_OBJECT_TO_WORLD
+                                                            : TRC_TRANSFORM_CAMERA_TO_WORLD;
+        TRC_TRY(op(l->b, TRC_OP_TRANSFORM, transform | kind, l->out, l->out));
     }
     if (from != to && to != TRC_SPACE_WORLD) {
-        const uint32_t way =
+        const uint32_t transform =
             to == TRC_SPACE_OBJECT ? TRC_TRANSFORM_WORLD_TO_OBJECT : TRC_TRANSFORM_WORLD_TO_CAMERA;
-        TRC_TRY(op(l->b, TRC_OP_TRANSFORM, way | kind, l->out, l->out));
+        TRC_TRY(op(l->b, TRC_OP_TRANSFORM, transform | kind, l->out, l->out));
     }
     return type == TRC_TRANSFORMED_UNIT_VECTOR || (type == TRC_TRANSFORMED_NORMAL && from != to)
                ? combine(l->b, TRC_VECTOR_NORMALIZE, l->out, NULL, l->out)

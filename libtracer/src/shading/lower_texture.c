@@ -98,16 +98,16 @@ static trc_status build_noise(struct trc_build *b, uint32_t mode, const struct t
 static trc_status build_musgrave(struct trc_build *b, uint32_t mode, const struct trc_operand *in,
                                  struct trc_operand *out) {
     struct trc_operand to[TRC_OP_AT(NOISE, end)], all[TRC_OP_OUT_AT(NOISE, end)];
-    struct trc_operand dimension, zero = trc_constant(0.0f), least = trc_constant(1e-5f);
+    struct trc_operand dimension, zero = trc_constant(0.0f), minimum = trc_constant(1e-5f);
     struct trc_operand *lacunarity = to + TRC_OP_AT(NOISE, lacunarity);
     TRC_TRY(place(b, mode, in + TRC_AT(MUSGRAVE, vector), in[TRC_AT(MUSGRAVE, w)],
                   in[TRC_AT(MUSGRAVE, scale)], to + TRC_OP_AT(NOISE, vector),
                   to + TRC_OP_AT(NOISE, w)));
     TRC_TRY(clamped(b, in[TRC_AT(MUSGRAVE, detail)], 0.0f, TRC_MAX_OCTAVES - 1.0f,
                     to + TRC_OP_AT(NOISE, octaves)));
-    TRC_TRY(calculate(b, TRC_MATH_MAXIMUM, in[TRC_AT(MUSGRAVE, dimension)], least, &dimension));
+    TRC_TRY(calculate(b, TRC_MATH_MAXIMUM, in[TRC_AT(MUSGRAVE, dimension)], minimum, &dimension));
     TRC_TRY(calculate(b, TRC_MATH_SUBTRACT, zero, dimension, &dimension));
-    TRC_TRY(calculate(b, TRC_MATH_MAXIMUM, in[TRC_AT(MUSGRAVE, lacunarity)], least, lacunarity));
+    TRC_TRY(calculate(b, TRC_MATH_MAXIMUM, in[TRC_AT(MUSGRAVE, lacunarity)], minimum, lacunarity));
     TRC_TRY(calculate(b, TRC_MATH_POWER, *lacunarity, dimension, to + TRC_OP_AT(NOISE, roughness)));
     to[TRC_OP_AT(NOISE, offset)] = in[TRC_AT(MUSGRAVE, offset)];
     to[TRC_OP_AT(NOISE, gain)] = in[TRC_AT(MUSGRAVE, gain)];
