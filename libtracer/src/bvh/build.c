@@ -5,12 +5,8 @@
  * subtrees of TRC_SHARED_RANGE refs or less are tasks, and so are the wide nodes that stand for
  * them. Sizes do not depend on the number of threads, so the tree does not either.
  *
- * Splitting the child of the largest area until there are eight, as in Ingo Wald, Carsten Benthin,
- * Solomon Boulos, "Getting Rid of Packets", 2008, makes half as many nodes again, and rays 2 %
- * slower. Nodes taken out of the binary tree and put back where they cost least (Jiri Bittner,
- * Michal Hapala, Vlastimil Havran, "Fast Insertion-Based Optimization of Bounding Volume
- * Hierarchies", 2013) make its inner nodes a tenth smaller, and rays 0.7 % faster in the mean (-12
- * to +12); leaves chosen by what the whole wide tree costs make them 1 to 4 % slower. */
+ * Other ways to make wide nodes, and to improve a tree once it is built, were measured:
+ * docs/measurements.md. */
 #include <string.h>
 
 #include "bvh/binary.h"

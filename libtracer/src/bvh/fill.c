@@ -14,7 +14,7 @@
 /* Nodes whose leaves one task fills: large enough that handing out tasks costs nothing. */
 #define NODES_PER_TASK 256
 /* What is fetched so far ahead: what refits know of slots, and the memory that is filled, nodes and
- * vertices. Refits are 15 to 20 % faster; fetching positions ahead gains nothing. */
+ * vertices. */
 #define PREFETCH_SLOTS 32
 #define PREFETCH_NODES 4
 #define PREFETCH_VERTEX_BYTES 2048
@@ -158,7 +158,7 @@ static inline void slots_load(const struct fill_job *job, uint32_t slot, uint32_
     triangles4_load(part, index, key, out);
 }
 
-/* The same of a refit that knows their vertices: a tenth faster. */
+/* The same of a refit that knows their vertices. */
 static inline void known_load(const struct fill_job *job, uint32_t slot, uint32_t count,
                               uint32_t key, struct triangles4 *out) {
     const uint32_t(*known)[3] = job->known->index + slot;
