@@ -40,7 +40,7 @@ static double divide(double a, double b) { return b > 0.0 ? a / b : 0.0; }
 
 static void print_title(const struct report_table *t) {
     printf("\n%s (%u triangles), %s, %u %s", t->scene, t->triangle_count,
-           t->moving ? "moving" : "still", t->threads, t->threads == 1 ? "thread" : "threads");
+           t->moving ? "moving" : "static", t->threads, t->threads == 1 ? "thread" : "threads");
 }
 
 /* ---- builds ---- */

@@ -3,7 +3,7 @@
 
 The shutter is an interval of frames. An object with ``steps`` motion steps (a setting of Cycles') is
 seen at 2^steps + 1 evenly spaced times, so that objects of different steps share theirs. The scene's
-still parts are those of the interval's centre.
+static parts are those of the interval's centre.
 """
 
 import math

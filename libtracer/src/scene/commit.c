@@ -120,8 +120,8 @@ static trc_status build_bvh(struct trc_scene_state *scene, const struct trc_snap
 static trc_status collect_bvh(struct trc_scene_state *scene,
                               const struct trc_snapshot_block *former,
                               struct trc_snapshot_block *block) {
-    const bool still = !(scene->changed & (TRC_CHANGED_MESHES | TRC_CHANGED_INSTANCES));
-    if (former && still && transparency_is_equal(&former->snapshot, &block->snapshot)) {
+    const bool is_static = !(scene->changed & (TRC_CHANGED_MESHES | TRC_CHANGED_INSTANCES));
+    if (former && is_static && transparency_is_equal(&former->snapshot, &block->snapshot)) {
         block->bvh = trc_shared_retain(former->bvh);
         block->build = former->build;
         block->build.seconds = 0.0;

@@ -45,7 +45,7 @@ def kernel_line(rows):
     if not raced:
         return ""
     parts = []
-    for motion, word in ((False, "still"), (True, "moving")):
+    for motion, word in ((False, "static"), (True, "moving")):
         values = [row["embree_default"]["ratio"] for row in raced if row["motion"] == motion]
         if values:
             parts.append(f"{word} {digits(estimates.geometric_mean(values), 3)} "
@@ -128,7 +128,7 @@ def losing_builds(rows):
     """Builds, refits and memory behind Embree's."""
     lines = []
     for row in kernels.builds(rows):
-        name = f"{row['scene']} {'moving' if row['motion'] else 'still'}, {row['threads']} threads"
+        name = f"{row['scene']} {'moving' if row['motion'] else 'static'}, {row['threads']} threads"
         for what in ("build", "refit"):
             peer = row.get(f"embree_{what}_mtri_s")
             if peer and row[f"{what}_mtri_s"]["median"] < peer["median"]:
@@ -294,7 +294,7 @@ def build_row(row):
         peer = row.get(f"embree_{what}_mtri_s")
         return f"{row[what + '_mtri_s']['median'] / peer['median']:.2f}" if peer else "–"
 
-    return [f"{row['scene']} {'moving' if row['motion'] else 'still'}, {row['triangles']:,}",
+    return [f"{row['scene']} {'moving' if row['motion'] else 'static'}, {row['triangles']:,}",
             str(row["threads"]), digits(row["build_mtri_s"]["median"]), over("build"),
             digits(row["refit_mtri_s"]["median"]), over("refit"),
             digits(row["bytes_per_triangle"]), digits(row.get("embree_bytes_per_triangle"))]

@@ -157,7 +157,7 @@ def draw_kernels(rows, path):
             axis.plot(row["embree_default"]["ratio"], len(kinds) - 1 - kinds.index(row["kind"]), "o",
                       color=COLORS[scenes.index(row["scene"]) % len(COLORS)], markersize=5)
         axis.axvline(1.0, color=CYCLES_COLOR, linewidth=1.2)
-        axis.set(xscale="log", title=f"{isa}, {'moving' if motion else 'still'}",
+        axis.set(xscale="log", title=f"{isa}, {'moving' if motion else 'static'}",
                  xlabel="Mrays/s over Embree's best mode", yticks=range(len(kinds)),
                  yticklabels=[kind.replace("_", " ") for kind in reversed(kinds)])
         plain_log_ticks(axis, "x")
