@@ -122,6 +122,37 @@ def test_depth_of_field(blender):
     assert off == 0.0
 
 
+# A lens that zooms ---------------------------------------------------------------------------------
+
+def inside_zoom():
+    """A wall's edge while the focal length is animated: means of columns, with and without motion blur."""
+    import scenes
+    scene = scenes.empty(size=(64, 8), samples=256)
+    made = scenes.camera()
+    scenes.wall(size=20.0, center=(11.2, 0.0), material=scenes.emitter((1.0, 1.0, 1.0)))  # from x = 1.2 m on
+    made.data.driver_add("lens").driver.expression = "20 + 30 * frame"
+    scene.frame_set(1)
+    scenes.sharpen()
+    scene.render.motion_blur_shutter = 1.0
+    pictures = []
+    for scene.render.use_motion_blur in (False, True):
+        pictures.append(scenes.render()[..., 0].mean(axis=0))
+    return [picture.tolist() for picture in pictures]
+
+
+def test_zooms_blur(blender):
+    still, blurred = blender.run(inside_zoom)
+    edges = (np.arange(64) + 0.5) / 32.0 - 1.0  # of the frame's half width
+    assert set(np.round(still, 3)) == {0.0, 1.0}
+    # The frame of a lens is 36 mm wide; it is wide as the keys of the shutter say, in line between them.
+    times = np.linspace(0.0, 1.0, 2001)
+    half = np.interp(times, (0.0, 0.5, 1.0), 18.0 / np.array((35.0, 50.0, 65.0)))
+    expected = [(0.2 / half < edge).mean() for edge in edges]
+    assert sum(0.02 < each < 0.98 for each in expected) >= 5
+    # 256 samples of a pixel: five times the deviation of a half at most.
+    assert np.abs(np.array(blurred) - expected).max() < 5.0 * 0.5 / np.sqrt(256 * 8)
+
+
 # A camera that its parent shears -------------------------------------------------------------------
 
 def _sheared_camera():

@@ -82,3 +82,47 @@ def inside_failing_commit():
 def test_a_commit_that_fails_in_any_way_fails_the_render(blender):
     render, view = blender.run(inside_failing_commit)
     assert "Volley: out of memory" in render and view == "memory"
+
+
+def inside_settings_that_last():
+    """Settings of the library's scenes that three renders with persistent data open, the limit of textures and
+    the threads changed between them; pictures of two frames whose seed is animated or not."""
+    import numpy as np
+    import scenes
+    from volley import session
+    scene = scenes.empty(size=(16, 12), samples=1)
+    scenes.camera()
+    scenes.wall()
+    scenes.light()
+    scene.render.use_persistent_data = True
+    opened, sync = [], session.SceneSync
+
+    def count(**settings):
+        opened.append((settings["image_megabytes"], settings["thread_count"]))
+        return sync(**settings)
+
+    session.SceneSync = count
+    scene.render.threads_mode, scene.render.threads = 'FIXED', 1
+    scene.volley.texture_memory = 64
+    counts = []
+    for change in ({}, {}, {"texture_memory": 32}, {}, {"threads": 2}, {}):
+        for name, value in change.items():
+            setattr(scene.volley if name == "texture_memory" else scene.render, name, value)
+        scenes.render()
+        counts.append(len(opened))
+    session.SceneSync = sync
+    same = []
+    for scene.volley.use_animated_seed in (False, True):
+        pictures = []
+        for frame in (1, 2, 1):
+            scene.frame_set(frame)
+            pictures.append(scenes.render())
+        same.append([bool(np.array_equal(pictures[0], other)) for other in pictures[1:]])
+    return opened, counts, same
+
+
+def test_settings_of_the_next_render_are_taken(blender):
+    opened, counts, same = blender.run(inside_settings_that_last)
+    assert counts == [1, 1, 2, 2, 3, 3]
+    assert [tuple(each) for each in opened] == [(64, 1), (32, 1), (32, 2)]
+    assert same == [[True, True], [False, True]]  # of the next frame, and of the first once more
