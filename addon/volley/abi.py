@@ -158,6 +158,7 @@ class NodeType(IntEnum):
     VECTOR_ROTATE = 109
     CAMERA_DATA = 110
     WIREFRAME = 111
+    BUMP = 115
     TANGENT = 114
     AOV_VALUE = 112
     AOV_COLOR = 113
@@ -194,6 +195,11 @@ class NormalMapSpace(IntEnum):
     WORLD = 2
     BLENDER_OBJECT = 3
     BLENDER_WORLD = 4
+
+
+class BumpMode(IntEnum):
+    INVERT = 1
+    ABOVE = 2
 
 
 class RampInterpolation(IntEnum):
@@ -757,7 +763,7 @@ ENUMERATIONS = {StatusCode: "TRC_", IsaId: "TRC_ISA_", CameraType: "TRC_CAMERA_"
                 LightType: "TRC_LIGHT_", AreaShape: "TRC_AREA_", LightFlags: "TRC_LIGHT_",
                 AoMethod: "TRC_AO_", NodeType: "TRC_NODE_", ModeFlags: "TRC_MODE_", TableSize: "TRC_TABLE_",
                 DiffuseModel: "TRC_DIFFUSE_", ToonComponent: "TRC_TOON_", MappingType: "TRC_MAPPING_",
-                NormalMapSpace: "TRC_NORMAL_MAP_", RampInterpolation: "TRC_RAMP_",
+                NormalMapSpace: "TRC_NORMAL_MAP_", BumpMode: "TRC_BUMP_", RampInterpolation: "TRC_RAMP_",
                 CurvesExtension: "TRC_CURVES_", SeparateMode: "TRC_SEPARATE_", ClampType: "TRC_CLAMP_",
                 TangentSource: "TRC_TANGENT_", SpaceId: "TRC_SPACE_", TransformedType: "TRC_TRANSFORMED_",
                 VectorTransformMode: "TRC_", RotateMode: "TRC_ROTATE_", RotateFlags: "TRC_ROTATE_",
@@ -1058,6 +1064,10 @@ NODES = {
     NodeType.WIREFRAME: ("Wireframe",
         (("FLOAT", "size"),),
         (("FLOAT", "factor"),)),
+    NodeType.BUMP: ("Bump",
+        (("FLOAT", "strength"), ("FLOAT", "distance"), ("FLOAT", "filter_width"), ("FLOAT", "height"),
+         ("NORMAL", "normal")),
+        (("VECTOR", "normal"),)),
     NodeType.TANGENT: ("Tangent",
         (),
         (("VECTOR", "tangent"),)),

@@ -31,6 +31,9 @@ CHOOSES_LOBES_PLAINLY = bpy.app.version >= (4, 0, 0)
 # Rough diffuse surfaces keep their energy from 4.3 on.
 KEEPS_DIFFUSE_ENERGY = bpy.app.version >= (4, 3, 0)
 
+# The Bump node no longer keeps what its normals reflect above the surface: shaders do.
+LEAVES_BUMPS = bpy.app.version >= (4, 0, 0)
+
 # Cycles' tables of colour ramps have 257 entries instead of 256.
 RAMP_STEPS = 256 if bpy.app.version >= (4, 0, 0) else 255
 

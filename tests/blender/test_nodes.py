@@ -131,8 +131,6 @@ def inside_fallbacks():
     tree.links.new(scattering.outputs[0], mix.inputs[1])
     tree.links.new(velvet.outputs[0], mix.inputs[2])
     tree.links.new(mix.outputs[0], output.inputs["Surface"])
-    bump = tree.nodes.new("ShaderNodeBump")
-    tree.links.new(bump.outputs[0], velvet.inputs["Normal"])
     scatter = tree.nodes.new("ShaderNodeVolumeScatter")
     tree.links.new(scatter.outputs[0], output.inputs["Volume"])
     return _flat(tree)
@@ -146,7 +144,7 @@ def test_unsupported_nodes_fall_back_and_are_named(blender):
     assert flat["nodes"][2][3][0] == (-1, 0, (0.125, 0, 0))
     assert flat["nodes"][1][3][1] == (-2, 0, (0, 0, 0))
     text = "\n".join(flat["warnings"])
-    for name in ("Point Density", "Subsurface Scattering", "Bump", "volume"):
+    for name in ("Point Density", "Subsurface Scattering", "volume"):
         assert text.count(name) == 1, text
 
 

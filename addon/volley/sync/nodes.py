@@ -10,11 +10,11 @@ from collections import namedtuple
 
 import numpy as np
 
-from ..abi import (BlendMode, ClampType, DiffuseModel, DistributionType, EnvironmentProjection,
+from ..abi import (BlendMode, BumpMode, ClampType, DiffuseModel, DistributionType, EnvironmentProjection,
                    ImageExtension, ImageInterpolation, ImageProjection, MappingType, MathOperation as Math,
                    ModeFlags, NodeType, NormalMapSpace, RampInterpolation, SeparateMode, TableSize,
                    TangentSource, ToonComponent, VectorOperation as Vector)
-from ..compat import HAS_CORRELATED_MICROFACETS, KEEPS_DIFFUSE_ENERGY, RAMP_STEPS
+from ..compat import HAS_CORRELATED_MICROFACETS, KEEPS_DIFFUSE_ENERGY, LEAVES_BUMPS, RAMP_STEPS
 from . import tangents
 from .converters import CONVERTERS, instance_value
 from .derived import ISLAND, POINTINESS
@@ -168,9 +168,6 @@ _SPECS = {
 }
 _SPECS["ShaderNodeBsdfAnisotropic"] = _SPECS["ShaderNodeBsdfGlossy"]
 
-# Nodes that bend what goes through them: unsupported, what comes in goes out.
-_PASSED_THROUGH = {"ShaderNodeBump": ("Normal", "Normal")}
-
 
 def translate(walker, node, path):
     """The outputs of a node as {socket identifier: Value}; nothing for an unsupported one."""
@@ -262,11 +259,6 @@ def _unsupported(walker, node, sockets):
         values = (sockets.get('c', "Color", "Base Color"), _constant('f', 0.0),
                   sockets.get('v', "Normal"))
         return {shader.identifier: Value('s', walker.emit(NodeType.DIFFUSE, values), 0)}
-    if node.bl_idname in _PASSED_THROUGH:
-        source, target = _PASSED_THROUGH[node.bl_idname]
-        walker.warn(f"{node.bl_label} is not supported, its input {source} is passed on")
-        kind = 'c' if source == "Color" else 'v'
-        return {target: sockets.get(kind, source)}
     setting = next((getattr(node, name) for name in ("operation", "mode", "blend_type")
                     if node.bl_idname in _SPECS and hasattr(node, name)), "")
     detail = f" ({setting})" if setting else ""
@@ -500,6 +492,16 @@ def _normal_map(walker, node, sockets):
     return named_outputs(index, NodeType.NORMAL_MAP, ("Normal",))
 
 
+def _bump(walker, node, sockets):
+    """Before it had a filter width, the height was taken a whole pixel apart."""
+    has_width = sockets.find("Filter Width") is not None
+    width = sockets.get('f', "Filter Width") if has_width else _constant('f', 1.0)
+    values = (sockets.get('f', "Strength"), sockets.get('f', "Distance"), width,
+              sockets.get('f', "Height"), sockets.get('v', "Normal"))
+    mode = (BumpMode.INVERT if node.invert else 0) | (0 if LEAVES_BUMPS else BumpMode.ABOVE)
+    return named_outputs(walker.emit(NodeType.BUMP, values, mode), NodeType.BUMP, ("Normal",))
+
+
 def _tangents_of(walker, node):
     """The attribute with the tangents of a node's UV map."""
     name = tangents.attribute_name(node.uv_map)
@@ -575,6 +577,6 @@ _SPECIAL = {
     "ShaderNodeTexEnvironment": _environment, "ShaderNodeUVMap": _uv_map,
     "ShaderNodeTexCoord": _texture_coordinate, "ShaderNodeVertexColor": _color_attribute,
     "ShaderNodeAttribute": _attribute, "ShaderNodeNormalMap": _normal_map,
-    "ShaderNodeMath": _math, "ShaderNodeTangent": _tangent,
+    "ShaderNodeBump": _bump, "ShaderNodeMath": _math, "ShaderNodeTangent": _tangent,
     "ShaderNodeValToRGB": _color_ramp, "ShaderNodeMix": _mix,
 }

@@ -48,6 +48,10 @@ enum trc_normal_map_space {
     TRC_NORMAL_MAP_BLENDER_WORLD
 };
 
+/* INVERT: bumps become hollows. ABOVE: normals are turned back until what they reflect rises above
+ * the surface, as in Blender before 4.0. */
+enum trc_bump_mode { TRC_BUMP_INVERT = 1, TRC_BUMP_ABOVE = 2 };
+
 /* Between the entries of the table. */
 enum trc_ramp_interpolation { TRC_RAMP_LINEAR = 0, TRC_RAMP_CONSTANT };
 

@@ -62,6 +62,9 @@ enum {
     TRC_TRANSFORM_NORMAL = 8 /* bit: by the inverse transpose, unit; between world and object */
 };
 
+/* TRC_OP_BESIDE: the direction; below it, the operation. */
+#define TRC_BESIDE_Y (1u << 15)
+
 /* Set where nothing reads the colour of an operation whose colour costs extra. */
 #define TRC_MODE_NO_COLOR (1u << 15)
 

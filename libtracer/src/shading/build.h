@@ -26,6 +26,9 @@ struct trc_build_op {
 
 #define TRC_BUILD_BUCKETS 1024
 
+/* Which point nodes are lowered for: the one that is shaded, or one of the three of a height. */
+enum trc_build_place { TRC_PLACE_SHADED, TRC_PLACE_MIDDLE, TRC_PLACE_X, TRC_PLACE_Y };
+
 struct trc_build {
     const trc_material_desc *desc;
     const struct trc_compile_context *context;
@@ -40,6 +43,11 @@ struct trc_build {
     uint32_t buckets[TRC_BUILD_BUCKETS];
     struct trc_operand *outputs; /* of nodes: three per colour or vector, one per float */
     uint32_t *first_output;      /* of each node, into outputs */
+    uint32_t output_count;
+    enum trc_build_place place;
+    struct trc_operand filter_width;    /* of the height that is lowered */
+    struct trc_operand *height_outputs; /* of its nodes; NULL before the first Bump node */
+    uint8_t *height_nodes;              /* which those are */
     struct trc_leaf leaves[TRC_MAX_LEAVES];
     uint32_t leaf_count;
     struct trc_aov_output aovs[TRC_MAX_AOV_OUTPUTS];
@@ -78,6 +86,17 @@ trc_status trc_build_input(struct trc_build *b, const trc_node *node, uint32_t i
  * (shading/lower_texture.c) */
 trc_status trc_build_texture(struct trc_build *b, const trc_node *node,
                              const struct trc_operand *in, struct trc_operand *out);
+/* An operation of a point without inputs, at the point that nodes are lowered for.
+ * (shading/lower.c)
+ */
+trc_status trc_build_point(struct trc_build *b, uint32_t op, uint32_t resource,
+                           struct trc_operand *outputs);
+/* Outputs of those value nodes before end that are wanted; NULL: all. (shading/lower.c) */
+trc_status trc_build_nodes(struct trc_build *b, const uint8_t *wanted, uint32_t end);
+/* The output of a Bump node from its inputs, in floats as those of trc_build_input.
+ * (shading/lower_relief.c) */
+trc_status trc_build_bump(struct trc_build *b, const trc_node *node, const struct trc_operand *in,
+                          struct trc_operand *out);
 /* Outputs of all value nodes. (shading/lower.c) */
 trc_status trc_build_values(struct trc_build *b);
 /* Leaves, their weights and operands. (shading/leaves.c) */

@@ -13,6 +13,8 @@ static void build_free(struct trc_build *b) {
     trc_free(b->tables);
     trc_free(b->outputs);
     trc_free(b->first_output);
+    trc_free(b->height_outputs);
+    trc_free(b->height_nodes);
     trc_free(b->value_is_live);
     trc_free(b);
 }

@@ -25,6 +25,37 @@ static void copy3(struct trc_operand *out, const struct trc_operand *in) {
     memcpy(out, in, 3 * sizeof *out);
 }
 
+/* ---- the point ---- */
+
+/* Whether it has another value at another place of the surface; normals, tangents, the ray and the
+ * object count as the same. */
+static bool varies_in_place(uint32_t code) {
+    switch (code) {
+    case TRC_OP_POSITION:
+    case TRC_OP_PARAMETRIC:
+    case TRC_OP_GENERATED:
+    case TRC_OP_OBJECT_POSITION:
+    case TRC_OP_CAMERA_POSITION:
+    case TRC_OP_WINDOW:
+    case TRC_OP_UV:
+    case TRC_OP_COLOR_ATTRIBUTE:
+        return true;
+    default:
+        return false;
+    }
+}
+
+trc_status trc_build_point(struct trc_build *b, uint32_t code, uint32_t resource,
+                           struct trc_operand *outputs) {
+    if (b->place <= TRC_PLACE_MIDDLE || !varies_in_place(code))
+        return trc_build_op(b, code, 0, resource, NULL, outputs);
+    struct trc_operand out[TRC_OP_OUT_AT(BESIDE, end)];
+    const uint32_t direction = b->place == TRC_PLACE_Y ? TRC_BESIDE_Y : 0;
+    TRC_TRY(trc_build_op(b, TRC_OP_BESIDE, code | direction, resource, &b->filter_width, out));
+    memcpy(outputs, out, trc_op_outputs(code) * sizeof *out);
+    return TRC_OK;
+}
+
 /* ---- inputs ---- */
 
 static uint32_t output_offset(const trc_node *node, uint32_t output) {
@@ -41,12 +72,12 @@ static trc_status default_input(struct trc_build *b, enum trc_socket_kind kind,
     case TRC_SOCKET_NORMAL:
         return op(b, TRC_OP_NORMAL, 0, NULL, out);
     case TRC_SOCKET_GENERATED:
-        return op(b, TRC_OP_GENERATED, 0, NULL, out);
+        return trc_build_point(b, TRC_OP_GENERATED, TRC_NO_RESOURCE, out);
     case TRC_SOCKET_POSITION:
-        return op(b, TRC_OP_POSITION, 0, NULL, out);
+        return trc_build_point(b, TRC_OP_POSITION, TRC_NO_RESOURCE, out);
     case TRC_SOCKET_UV:
         out[TRC_OP_OUT_AT(UV, end)] = trc_constant(0.0f);
-        return op(b, TRC_OP_UV, 0, NULL, out);
+        return trc_build_point(b, TRC_OP_UV, TRC_NO_RESOURCE, out);
     default:
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "an input has no default");
     }
@@ -127,7 +158,7 @@ static trc_status table_of(const struct lowering *l, uint32_t *resource) {
 static trc_status lower_outputs(const struct lowering *l, const uint16_t *codes, uint32_t count) {
     struct trc_operand *out = l->out;
     for (uint32_t i = 0; i < count; i++) {
-        TRC_TRY(op(l->b, codes[i], 0, NULL, out));
+        TRC_TRY(trc_build_point(l->b, codes[i], TRC_NO_RESOURCE, out));
         if (trc_op_outputs(codes[i]) == 2)
             out[2] = trc_constant(0.0f);
         const uint32_t floats = trc_op_outputs(codes[i]);
@@ -225,7 +256,8 @@ static trc_status lower_image(const struct lowering *l) {
         const uint32_t wrap =
             projection == TRC_IMAGE_SPHERE ? TRC_PROJECT_SPHERE : TRC_PROJECT_TUBE;
         TRC_TRY(op(l->b, TRC_OP_PROJECT, wrap, l->in + vector, uv));
-    } else if ((mode & TRC_IMAGE_INTERPOLATION_MASK) != TRC_IMAGE_CLOSEST && has_levels(l)) {
+    } else if ((mode & TRC_IMAGE_INTERPOLATION_MASK) != TRC_IMAGE_CLOSEST && has_levels(l) &&
+               l->b->place == TRC_PLACE_SHADED) { /* slopes would be those of the level */
         TRC_TRY(density_of(l, uv, uv + TRC_OP_AT(IMAGE, density)));
     }
     return trc_build_op(l->b, TRC_OP_IMAGE, mode, image, uv, l->out);
@@ -246,9 +278,16 @@ static trc_status lower_environment(const struct lowering *l) {
 static trc_status lower_named(const struct lowering *l, uint32_t code, uint32_t mode) {
     uint32_t name;
     TRC_TRY(name_of(l, &name));
+    return trc_build_op(l->b, code, mode, name, l->in, l->out);
+}
+
+/* An attribute at the point. */
+static trc_status lower_attribute(const struct lowering *l, uint32_t code) {
+    uint32_t name;
+    TRC_TRY(name_of(l, &name));
     if (code == TRC_OP_UV)
         l->out[TRC_OP_OUT_AT(UV, end)] = trc_constant(0.0f);
-    return trc_build_op(l->b, code, mode, name, l->in, l->out);
+    return trc_build_point(l->b, code, name, l->out);
 }
 
 static trc_status lower_mapping(const struct lowering *l) {
@@ -439,9 +478,11 @@ static trc_status lower_node(const struct lowering *l) {
     case TRC_NODE_ENVIRONMENT:
         return lower_environment(l);
     case TRC_NODE_UV_MAP:
-        return lower_named(l, TRC_OP_UV, 0);
+        return lower_attribute(l, TRC_OP_UV);
     case TRC_NODE_COLOR_ATTRIBUTE:
-        return lower_named(l, TRC_OP_COLOR_ATTRIBUTE, 0);
+        return lower_attribute(l, TRC_OP_COLOR_ATTRIBUTE);
+    case TRC_NODE_BUMP:
+        return trc_build_bump(b, l->node, l->in, l->out);
     case TRC_NODE_NORMAL_MAP:
         return lower_named(l, TRC_OP_NORMAL_MAP, mode);
     case TRC_NODE_TANGENT:
@@ -516,23 +557,12 @@ static trc_status lower_node(const struct lowering *l) {
     }
 }
 
-trc_status trc_build_values(struct trc_build *b) {
-    uint32_t total = 0;
-    b->first_output = trc_alloc(b->desc->node_count, sizeof *b->first_output);
-    if (!b->first_output)
-        goto no_memory;
-    for (uint32_t i = 0; i < b->desc->node_count; i++) {
-        const trc_node *node = &b->desc->nodes[i];
-        b->first_output[i] = total;
-        total += output_offset(node, trc_node_info_of(node->type)->output_count);
-    }
-    b->outputs = trc_alloc(total, sizeof *b->outputs);
-    if (!b->outputs)
-        goto no_memory;
-    for (uint32_t i = 0; i < b->desc->node_count; i++) {
+trc_status trc_build_nodes(struct trc_build *b, const uint8_t *wanted, uint32_t end) {
+    for (uint32_t i = 0; i < end; i++) {
         struct lowering l = {
             .b = b, .node = &b->desc->nodes[i], .out = b->outputs + b->first_output[i]};
-        if (trc_node_is_shader(l.node->type) || trc_node_is_output(l.node->type))
+        if ((wanted && !wanted[i]) || trc_node_is_shader(l.node->type) ||
+            trc_node_is_output(l.node->type))
             continue;
         uint32_t floats = 0;
         for (uint32_t k = 0; k < l.node->input_count; k++) {
@@ -542,6 +572,21 @@ trc_status trc_build_values(struct trc_build *b) {
         TRC_TRY(lower_node(&l));
     }
     return TRC_OK;
+}
+
+trc_status trc_build_values(struct trc_build *b) {
+    b->first_output = trc_alloc(b->desc->node_count, sizeof *b->first_output);
+    if (!b->first_output)
+        goto no_memory;
+    for (uint32_t i = 0; i < b->desc->node_count; i++) {
+        const trc_node *node = &b->desc->nodes[i];
+        b->first_output[i] = b->output_count;
+        b->output_count += output_offset(node, trc_node_info_of(node->type)->output_count);
+    }
+    b->outputs = trc_alloc(b->output_count, sizeof *b->outputs);
+    if (!b->outputs)
+        goto no_memory;
+    return trc_build_nodes(b, NULL, b->desc->node_count);
 no_memory:
     return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory to compile a material");
 }

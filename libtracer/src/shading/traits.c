@@ -221,6 +221,8 @@ void trc_build_traits(const struct trc_build *b, struct trc_material *m) {
             m->has |= TRC_MATERIAL_HAS_TEXTURE;
         if (o->op == TRC_OP_UV_DENSITY)
             m->has |= TRC_MATERIAL_READS_FOOTPRINT;
+        if (o->op == TRC_OP_BUMP)
+            m->has |= TRC_MATERIAL_READS_PIXEL;
         if (o->op == TRC_OP_LIGHT_PATH)
             m->has |= TRC_MATERIAL_READS_LIGHT_PATH;
     }

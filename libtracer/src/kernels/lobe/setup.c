@@ -1,61 +1,12 @@
 /* From the leaves of a material to lobes, as Cycles sets up its closures: normals and tangents, the
  * closures of the leaves, chances. */
 #include "kernels/lobe/lobe.h"
+#include "kernels/trace/valid_normal.h"
 
 /* First hit: a lobe gets at least this share of the samples (Cycles 3.4's defensive sampling). */
 #define DEFENSIVE_SHARE 0.125f
 
 /* ---- normals and tangents ---- */
-
-/* What rounding may add to a square in [0, 1]. */
-#define SLACK 1e-5f
-
-/* Of two candidates for the squared z of the bent normal, the one whose mirror direction is valid;
- * see below. Returns x and z in the plane of ng and n. */
-static void choose_bend(vfloat first2, vfloat second2, vfloat ix, vfloat iz, vfloat *x, vfloat *z,
-                        vmask *any) {
-    const vfloat minimum = vf_set(SLACK), maximum = vf_set(1.0f + SLACK);
-    const vmask fits1 = vm_and(vf_gt(first2, minimum), vf_le(first2, maximum));
-    const vmask fits2 = vm_and(vf_gt(second2, minimum), vf_le(second2, maximum));
-    const vfloat x1 = vf_safe_sqrt(vf_one() - first2), z1 = vf_safe_sqrt(first2);
-    const vfloat x2 = vf_safe_sqrt(vf_one() - second2), z2 = vf_safe_sqrt(second2);
-    const vfloat r1 = vf_set(2.0f) * (x1 * ix + z1 * iz) * z1 - iz;
-    const vfloat r2 = vf_set(2.0f) * (x2 * ix + z2 * iz) * z2 - iz;
-    const vmask up1 = vf_ge(r1, minimum), up2 = vf_ge(r2, minimum);
-    /* Both fit: the shallower of two valid mirrors, else the higher. */
-    const vmask first_of_both =
-        vm_or(vm_and(vm_and(up1, up2), vf_lt(r1, r2)), vm_andnot(vf_gt(r1, r2), vm_and(up1, up2)));
-    const vmask use1 = vm_and(fits1, vm_or(vm_not(fits2), first_of_both));
-    *x = vf_select(use1, x1, x2);
-    *z = vf_select(use1, z1, z2);
-    *any = vm_or(fits1, fits2);
-}
-
-/* How high the mirror direction must rise: less where the view itself is lower, as in Cycles. */
-#define THRESHOLD 0.01f
-#define THRESHOLD_SHARE 0.9f
-
-/* Turns n towards the geometric normal as little as makes the mirror direction of wo rise above the
- * surface by a threshold t. With z = ng and x = the part of n across it, the turned normal (x, 0,
- * z) satisfies 2 (x ix + z iz) z - iz = t, a quadratic in z^2 because x^2 = 1 - z^2. */
-static vvec3 valid_normal(const struct trc_surface *s, vvec3 n) {
-    const vfloat iz = v3_dot(s->ng, s->wo);
-    const vfloat t = vf_min(vf_set(THRESHOLD_SHARE) * iz, vf_set(THRESHOLD));
-    const vmask bad = vm_and(s->active, vf_lt(v3_dot(s->ng, v3_reflect(s->wo, n)), t));
-    if (!vm_any(bad))
-        return n;
-    const vvec3 across = v3_normalize(v3_sub(n, v3_scale(s->ng, v3_dot(n, s->ng))));
-    const vfloat ix = v3_dot(s->wo, across), ix2 = ix * ix;
-    const vfloat a = ix2 + iz * iz;
-    const vfloat b = vf_safe_sqrt(ix2 * (a - t * t));
-    const vfloat c = iz * t + a;
-    const vfloat half = vf_divide(vf_set(0.5f), a);
-    vfloat x, z;
-    vmask found;
-    choose_bend(half * (c + b), half * (c - b), ix, iz, &x, &z, &found);
-    const vvec3 turned = v3_mad(across, x, v3_scale(s->ng, z));
-    return v3_select(bad, v3_select(found, turned, s->ng), n);
-}
 
 vvec3 trc_leaf_normal(struct trc_setup *c, const struct trc_leaf *leaf, uint32_t at) {
     if (!is_unlinked(c, leaf, at))

@@ -6,6 +6,7 @@
 #include "kernels/program/math.h"
 #include "kernels/program/normal.h"
 #include "kernels/program/procedural.h"
+#include "kernels/program/relief.h"
 #include "kernels/program/table.h"
 #include "kernels/program/texture.h"
 
@@ -203,6 +204,9 @@ static void run_at_surface(const struct trc_surface *s, const struct trc_instruc
         v3_write(out, op_normal_map(s, i->mode, i->resource, in[TRC_OP_AT(NORMAL_MAP, strength)],
                                     v3_read(in + TRC_OP_AT(NORMAL_MAP, color))));
         break;
+    case TRC_OP_BUMP:
+        v3_write(out, op_bump(s, i->mode, in));
+        break;
     case TRC_OP_TRANSFORM:
         v3_write(out, op_transform(s, i->mode, v3_read(in)));
         break;
@@ -224,6 +228,16 @@ static void run_at_surface(const struct trc_surface *s, const struct trc_instruc
     }
 }
 
+/* What an operation gives at a point beside. */
+static void run_beside(const struct trc_surface *s, const struct trc_instruction *i,
+                       const vfloat *in, vfloat *out) {
+    struct trc_surface beside;
+    point_beside(s, i->mode & TRC_BESIDE_Y, in[TRC_OP_AT(BESIDE, filter_width)], &beside);
+    const struct trc_instruction there = {.op = (uint16_t)(i->mode & ~TRC_BESIDE_Y),
+                                          .resource = i->resource};
+    run_at_surface(&beside, &there, in, out);
+}
+
 void trc_program_run(const struct trc_material *m, const struct trc_surface *s,
                      struct trc_registers *regs) {
     for (uint32_t k = 0; k < m->instruction_count; k++) {
@@ -234,7 +248,11 @@ void trc_program_run(const struct trc_material *m, const struct trc_surface *s,
             in[n] = trc_operand_value(&operands[n], regs);
         vfloat *out = &regs->r[i->out];
         const float *table = trc_op_has_table(i->op) ? m->tables + i->resource : NULL;
-        if (!run_pure(i->op, i->mode, table, in, out))
+        if (run_pure(i->op, i->mode, table, in, out))
+            continue;
+        if (i->op == TRC_OP_BESIDE)
+            run_beside(s, i, in, out);
+        else
             run_at_surface(s, i, in, out);
     }
 }

@@ -4,6 +4,8 @@
  * and light samples are uniform. */
 #include "kernels/tile/shade.h"
 
+#include "kernels/tile/pixel.h"
+
 /* Width of the beam that one sample stands for where its ray arrives: of the camera's rays a share
  * of the pixel, of those that rough lobes have sent a share of their directions (Suykens and
  * Willems, "Path Differentials and Applications", 2001). Ideal bounces may focus: 0. */
@@ -16,7 +18,8 @@ static vfloat beam_width(const struct trc_tile *t, const struct arrival *a) {
     return vf_select(camera, vf_set(t->beam_width) + length * vf_set(t->beam_spread), bounced);
 }
 
-static void surface_setup(struct trc_tile *t, const struct arrival *a, bool has_footprint,
+/* has: of the material. */
+static void surface_setup(struct trc_tile *t, const struct arrival *a, uint32_t has,
                           struct trc_surface *s) {
     s->snapshot = t->snapshot;
     s->active = a->active;
@@ -33,7 +36,8 @@ static void surface_setup(struct trc_tile *t, const struct arrival *a, bool has_
     s->glossy_depth = (vint)trc_depth_of(a->depths, TRC_DEPTH_GLOSSY_SHIFT);
     s->transmission_depth = (vint)trc_depth_of(a->depths, TRC_DEPTH_TRANSMISSION_SHIFT);
     s->transparent_depth = (vint)trc_depth_of(a->depths, TRC_DEPTH_TRANSPARENT_SHIFT);
-    s->footprint = has_footprint ? beam_width(t, a) : vf_set(0.0f);
+    s->footprint = has & TRC_MATERIAL_READS_FOOTPRINT ? beam_width(t, a) : vf_set(0.0f);
+    s->pixel = has & TRC_MATERIAL_READS_PIXEL ? pixel_distance(t, a) : vf_set(0.0f);
     s->raster_x = (vi_to_float((vint)(a->pixel & vu_set(TRC_PIXEL_X_MASK))) + vf_set(0.5f)) *
                   vf_set(1.0f / (float)t->desc->width);
     s->raster_y = (vi_to_float((vint)(a->pixel >> TRC_PIXEL_Y_SHIFT)) + vf_set(0.5f)) *
@@ -74,7 +78,7 @@ static void shade_group(struct trc_tile *t, uint32_t material, vint index, vmask
     struct trc_lobes lobes;
     trc_arrival_load(t, index, active, &a);
     trc_arrival_load_samples(t, &a);
-    surface_setup(t, &a, m->has & TRC_MATERIAL_READS_FOOTPRINT, &s);
+    surface_setup(t, &a, m->has, &s);
     if (m->instruction_count)
         trc_program_run(m, &s, &regs);
     trc_lobes_setup(m, &s, &regs, filter_alpha(t, &a), &lobes);

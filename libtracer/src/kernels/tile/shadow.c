@@ -67,7 +67,7 @@ static vvec3 surface_transparency(struct trc_tile *t, const struct trc_packet *p
         s.ray_length = vf_load(&p->t[i]);
         s.depth = s.diffuse_depth = s.glossy_depth = s.transmission_depth = s.transparent_depth =
             vi_set(0);
-        s.footprint = s.raster_x = s.raster_y = vf_set(0.0f);
+        s.footprint = s.pixel = s.raster_x = s.raster_y = vf_set(0.0f);
         trc_surface_fetch(&s);
         if (m->instruction_count)
             trc_program_run(m, &s, &regs);

@@ -34,6 +34,7 @@ struct trc_surface {
     vuint path; /* TRC_VISIBLE_* | TRC_PATH_* */
     vint depth, diffuse_depth, glossy_depth, transmission_depth, transparent_depth;
     vfloat footprint;          /* width of the ray's cone at p, world, for texture filters */
+    vfloat pixel;              /* how far the next pixel's ray is from p, world, for slopes */
     vfloat raster_x, raster_y; /* window coordinates [0, 1] */
 };
 

@@ -1,0 +1,78 @@
+/* The Bump node: slopes of a height from its values at three points of the surface.
+ *
+ * J. Blinn, "Simulation of Wrinkled Surfaces" (1978), in the form of M. Mikkelsen, "Bump Mapping
+ * Unparametrized Surfaces on the GPU" (2010). The two points beside are one pixel's width away,
+ * along the axes that Cycles takes: across the geometric normal, whatever the camera's. */
+#ifndef TRACER_KERNELS_PROGRAM_RELIEF_H
+#define TRACER_KERNELS_PROGRAM_RELIEF_H
+
+#include "kernels/program/input.h"
+#include "kernels/trace/valid_normal.h"
+
+/* Steps along the surface. */
+static void pixel_steps(const struct trc_surface *s, vvec3 step[2]) {
+    const vvec3 n = s->ng;
+    const vmask even = vm_and(vf_eq(n.x, n.y), vf_eq(n.x, n.z));
+    const vvec3 across = v3(n.z - n.y, vf_select(even, n.x + n.z, n.x - n.z),
+                            vf_select(even, -n.y - n.x, n.y - n.x));
+    const vvec3 unit = v3_normalize(across);
+    step[0] = v3_scale(unit, s->pixel);
+    step[1] = v3_scale(v3_cross(n, unit), s->pixel);
+}
+
+/* The surface at a point beside: in the plane of the triangle, beyond its edges too. All but the
+ * place stays. As in Cycles, attributes of a surface seen from behind are those of the point on the
+ * other side. */
+static void point_beside(const struct trc_surface *s, bool is_along_y, vfloat filter_width,
+                         struct trc_surface *out) {
+    vvec3 steps[2];
+    pixel_steps(s, steps);
+    const vvec3 step = v3_scale(steps[is_along_y], filter_width);
+    const vfloat side = vf_select(s->backfacing, vf_set(-1.0f), vf_one());
+    *out = *s;
+    struct lane_group g = groups_begin(s);
+    while (groups_next(s, &g)) {
+        if (!g.mesh)
+            continue;
+        vint index[3];
+        struct trc_corners c;
+        struct trc_wide_affine m;
+        trc_load_indices(g.mesh, s->triangle, g.lanes, index);
+        trc_load_vectors(g.mesh->positions, index, g.mesh->vertex_count, g.mesh->key_count, s->time,
+                         g.lanes, &c);
+        trc_load_affine(g.instance, s->time, &m);
+        const vvec3 e1 = trc_transform_vector(&m, v3_sub(c.corner[1], c.corner[0]));
+        const vvec3 e2 = trc_transform_vector(&m, v3_sub(c.corner[2], c.corner[0]));
+        const vvec3 n = v3_cross(e1, e2);
+        const vfloat scale = vf_divide(side, v3_dot(n, n));
+        const vfloat du = v3_dot(v3_cross(step, e2), n) * scale;
+        const vfloat dv = v3_dot(v3_cross(e1, step), n) * scale;
+        out->p = v3_select(g.lanes, v3_add(s->p, step), out->p);
+        out->u = vf_select(g.lanes, s->u + du, out->u);
+        out->v = vf_select(g.lanes, s->v + dv, out->v);
+    }
+}
+
+static vvec3 op_bump(const struct trc_surface *s, uint32_t mode, const vfloat *in) {
+    const vvec3 n = v3_read(in + TRC_OP_AT(BUMP, normal));
+    const vfloat zero = vf_zero(), middle = in[TRC_OP_AT(BUMP, middle)];
+    vvec3 step[2];
+    pixel_steps(s, step);
+    const vvec3 x = v3_cross(step[1], n), y = v3_cross(n, step[0]);
+    const vfloat area = v3_dot(step[0], x);
+    const vvec3 slope = v3_add(v3_scale(x, in[TRC_OP_AT(BUMP, beside_x)] - middle),
+                               v3_scale(y, in[TRC_OP_AT(BUMP, beside_y)] - middle));
+    vfloat distance = in[TRC_OP_AT(BUMP, distance)];
+    distance = vf_select(vf_lt(area, zero), -distance, vf_where(vf_gt(area, zero), distance));
+    if (mode & TRC_BUMP_INVERT)
+        distance = -distance;
+    const vvec3 turned = v3_normalize(v3_sub(
+        v3_scale(n, in[TRC_OP_AT(BUMP, filter_width)] * vf_abs(area)), v3_scale(slope, distance)));
+    const vfloat strength = vf_max(in[TRC_OP_AT(BUMP, strength)], zero);
+    const vvec3 mixed = v3_normalize(v3_mad(turned, strength, v3_scale(n, vf_one() - strength)));
+    /* Where there is no slope, or no pixel: 0, or not a number. */
+    const vvec3 out = v3_select(vf_gt(v3_dot(turned, turned), zero), mixed, n);
+    return mode & TRC_BUMP_ABOVE ? valid_normal(s, out) : out;
+}
+
+#endif
