@@ -54,6 +54,13 @@ class IsaId(IntEnum):
 class CameraType(IntEnum):
     PERSPECTIVE = 0
     ORTHOGRAPHIC = 1
+    EQUIRECTANGULAR = 2
+    CUBE_MAP_FACE = 3
+    MIRROR_BALL = 4
+    FISHEYE_EQUIDISTANT = 5
+    FISHEYE_EQUISOLID = 6
+    FISHEYE_POLYNOMIAL = 7
+    CYLINDRICAL = 8
 
 
 class NormalsLayout(IntEnum):
@@ -605,7 +612,12 @@ class CameraDesc(Structure):
                 ("window_key_count", c_uint32), ("clip_start", c_float), ("clip_end", c_float),
                 ("aperture_radius", c_float), ("focus_distance", c_float), ("blade_rotation", c_float),
                 ("aperture_ratio", c_float), ("shutter_time", c_float), ("shutter_curve_count", c_uint32),
-                ("shutter_curve", c_void_p))
+                ("shutter_curve", c_void_p), ("longitude_min", c_float), ("longitude_max", c_float),
+                ("latitude_min", c_float), ("latitude_max", c_float), ("height_min", c_float),
+                ("height_max", c_float), ("fisheye_angle", c_float), ("fisheye_lens", c_float),
+                ("sensor_width", c_float), ("sensor_height", c_float), ("fisheye_polynomial", c_float * 5),
+                ("eye_offset", c_float), ("convergence_distance", c_float), ("pole_merge_from", c_float),
+                ("pole_merge_to", c_float), ("row_delay", c_float))
 
 
 class CornerAttribute(Structure):

@@ -49,6 +49,13 @@ def cycles(data, name, default):
     return getattr(getattr(data, "cycles", None), name, default)
 
 
+def panorama_setting(camera, name, default):
+    """A setting of panoramas: Blender's own from 5.0 on, else Cycles' of the camera where they exist."""
+    if hasattr(camera, "panorama_type"):
+        return getattr(camera, name, default)
+    return cycles(camera, name, default)
+
+
 def cycles_curves(scene, name, default):
     """A setting of Cycles' curves where they exist, else default."""
     return getattr(getattr(scene, "cycles_curves", None), name, default)

@@ -300,7 +300,8 @@ class _View:
         camera_object = v3d.camera if v3d.use_local_camera else depsgraph.scene.camera
         if camera_object is not None:
             camera_object = camera_object.evaluated_get(depsgraph)
-        keys = camera.view_camera(rv3d, v3d, camera_object, size, warnings)
+        whole_frame = camera.frame_of(depsgraph.scene_eval.render)
+        keys = camera.view_camera(rv3d, v3d, camera_object, size, whole_frame, warnings)
         return cls(keys, size, _crop_of(v3d, rv3d, size))
 
 

@@ -9,7 +9,8 @@ def inside_warnings():
     import bpy
     import scenes
     scene = scenes.empty(samples=1)
-    scenes.camera().data.type = 'PANO'
+    scenes.camera()
+    scenes.link("Fog", bpy.data.volumes.new("Fog"))
     scene.view_layers.new("Second")
     scene.frame_end = 3
     scene.render.filepath = bpy.app.tempdir + "frame"
@@ -20,7 +21,7 @@ def inside_warnings():
 
 def test_a_job_says_a_warning_once(blender):
     blender.run(inside_warnings)
-    assert blender.output.count("panoramic projection is not supported") == 2  # one for each job
+    assert blender.output.count("Volumes are not supported") == 2  # one for each job
 
 
 def inside_failure():

@@ -31,7 +31,7 @@ static void set_camera(struct bytes *b, trc_scene scene) {
     bytes_floats(b, windows, 8);
     bytes_floats(b, curve, 16);
     const trc_camera_desc desc = {.struct_size = sizeof desc,
-                                  .type = bytes_below(b, 3),
+                                  .type = bytes_below(b, TRC_CAMERA_CYLINDRICAL + 2),
                                   .key_count = keys,
                                   .blade_count = bytes_byte(b),
                                   .transforms = transforms,
@@ -45,7 +45,23 @@ static void set_camera(struct bytes *b, trc_scene scene) {
                                   .aperture_ratio = bytes_float(b),
                                   .shutter_time = bytes_float(b),
                                   .shutter_curve_count = bytes_below(b, 17),
-                                  .shutter_curve = curve};
+                                  .shutter_curve = curve,
+                                  .longitude_min = bytes_float(b),
+                                  .longitude_max = bytes_float(b),
+                                  .latitude_min = bytes_float(b),
+                                  .latitude_max = bytes_float(b),
+                                  .height_min = bytes_float(b),
+                                  .height_max = bytes_float(b),
+                                  .fisheye_angle = bytes_float(b),
+                                  .fisheye_lens = bytes_float(b),
+                                  .sensor_width = bytes_float(b),
+                                  .sensor_height = bytes_float(b),
+                                  .fisheye_polynomial = {bytes_float(b), bytes_float(b)},
+                                  .eye_offset = bytes_float(b),
+                                  .convergence_distance = bytes_float(b),
+                                  .pole_merge_from = bytes_float(b),
+                                  .pole_merge_to = bytes_float(b),
+                                  .row_delay = bytes_float(b)};
     (void)trc_scene_set_camera(scene, &desc);
 }
 

@@ -577,7 +577,20 @@ static void cameras(void **state) {
         change;                                              \
         REFUSED(status, trc_scene_set_camera(scene, &desc)); \
     } while (0)
-    REFUSE_CAMERA(ARGUMENT, desc.type = 2);
+    REFUSE_CAMERA(ARGUMENT, desc.type = TRC_CAMERA_CYLINDRICAL + 1);
+    REFUSE_CAMERA(ARGUMENT, desc.type = TRC_CAMERA_EQUIRECTANGULAR; desc.longitude_min = NAN);
+    REFUSE_CAMERA(ARGUMENT, desc.type = TRC_CAMERA_EQUIRECTANGULAR; desc.latitude_max = 1.6f);
+    REFUSE_CAMERA(ARGUMENT, desc.type = TRC_CAMERA_CYLINDRICAL; desc.height_max = INFINITY);
+    REFUSE_CAMERA(ARGUMENT, desc.type = TRC_CAMERA_FISHEYE_EQUIDISTANT; desc.fisheye_angle = 0.0f);
+    REFUSE_CAMERA(ARGUMENT, desc.type = TRC_CAMERA_FISHEYE_EQUISOLID; desc.fisheye_lens = 0.0f);
+    REFUSE_CAMERA(ARGUMENT, desc.type = TRC_CAMERA_FISHEYE_EQUISOLID; desc.sensor_height = -1.0f);
+    REFUSE_CAMERA(ARGUMENT, desc.type = TRC_CAMERA_FISHEYE_POLYNOMIAL;
+                  desc.fisheye_polynomial[4] = NAN);
+    REFUSE_CAMERA(ARGUMENT, desc.eye_offset = INFINITY);
+    REFUSE_CAMERA(ARGUMENT, desc.eye_offset = 0.1f; desc.convergence_distance = 0.0f);
+    REFUSE_CAMERA(ARGUMENT, desc.eye_offset = 0.1f; desc.convergence_distance = 2.0f;
+                  desc.pole_merge_to = 2.0f);
+    REFUSE_CAMERA(ARGUMENT, desc.row_delay = 1.5f);
     REFUSE_CAMERA(ARGUMENT, desc.key_count = 0);
     REFUSE_CAMERA(LARGE, desc.key_count = 34);
     REFUSE_CAMERA(ARGUMENT, desc.transforms = NULL);

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Cameras: lens, sensor, shift and depth of field, from Blender's units to the library's.
 
-The library wants the view window on the plane at distance 1 (perspective) or in metres (orthographic)
-for the whole frame; sensor fit, shift and pixel aspect are folded into it here.
+The library wants the view window on the plane at distance 1 (perspective), in metres (orthographic) or in
+shares of the panorama for the whole frame; sensor fit, shift and pixel aspect are folded into it here.
 """
 
 from dataclasses import dataclass, field, replace
@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from .. import abi
-from . import motion
+from . import motion, panorama
 from .matrix import rows12
 
 VIEW_SENSOR_MM = 72.0  # the viewport's lens is meant for a sensor of twice Blender's default
@@ -21,6 +21,8 @@ class Lens:
     """What forms the picture, apart from where the camera stands. Lengths in metres unless said."""
 
     is_ortho: bool = False
+    panorama: tuple = ()  # see panorama.fields
+    stereo: tuple = ()    # see panorama.stereo_fields
     focal_mm: float = 50.0
     sensor_width_mm: float = 36.0
     sensor_height_mm: float = 24.0
@@ -56,23 +58,47 @@ class CameraKeys:
     windows: list = field(default_factory=list)
 
 
-def window(lens, frame, offset=(0.0, 0.0)):
-    """left, right, bottom, top of the view window; offset: in frame widths and heights."""
-    pixel_aspect = frame.aspect_y / frame.aspect_x
+def _fits_width(lens, frame):
+    """Whether the sensor is fitted to the frame's width, not its height."""
     is_wide = frame.width * frame.aspect_x >= frame.height * frame.aspect_y
-    fits_width = is_wide if lens.sensor_fit == 'AUTO' else lens.sensor_fit == 'HORIZONTAL'
-    fitted_px = frame.width if fits_width else frame.height * pixel_aspect
-    if lens.is_ortho:
-        size = lens.ortho_scale
-    else:
-        sensor_mm = lens.sensor_height_mm if lens.sensor_fit == 'VERTICAL' else lens.sensor_width_mm
-        size = sensor_mm / lens.focal_mm
+    return is_wide if lens.sensor_fit == 'AUTO' else lens.sensor_fit == 'HORIZONTAL'
+
+
+def _fitted_sensor_mm(lens):
+    return lens.sensor_height_mm if lens.sensor_fit == 'VERTICAL' else lens.sensor_width_mm
+
+
+def window(lens, frame, offset=(0.0, 0.0)):
+    """left, right, bottom, top of the view window of a plane camera, of panoramas as if they were one;
+    offset: in frame widths and heights."""
+    pixel_aspect = frame.aspect_y / frame.aspect_x
+    fitted_px = frame.width if _fits_width(lens, frame) else frame.height * pixel_aspect
+    size = lens.ortho_scale if lens.is_ortho else _fitted_sensor_mm(lens) / lens.focal_mm
     scale = size * lens.zoom / fitted_px
     center_x = lens.shift[0] * fitted_px + offset[0] * frame.width
     center_y = lens.shift[1] * fitted_px + offset[1] * frame.height
     half_x, half_y = 0.5 * frame.width, 0.5 * frame.height * pixel_aspect
     return ((center_x - half_x) * scale, (center_x + half_x) * scale,
             (center_y - half_y) * scale, (center_y + half_y) * scale)
+
+
+def panorama_window(lens, seen, whole):
+    """The part of a panorama that a window shows if another one, of a plane camera too, shows all of it."""
+    left, right, bottom, top = whole
+    shift_x, shift_y = lens.shift
+    return ((seen[0] - left) / (right - left) + shift_x, (seen[1] - left) / (right - left) + shift_x,
+            (seen[2] - bottom) / (top - bottom) + shift_y, (seen[3] - bottom) / (top - bottom) + shift_y)
+
+
+def _with_sensor(lens, frame):
+    """The lens with the sensor that a panorama's fields lack: fitted to the whole frame."""
+    if not lens.panorama:
+        return lens
+    sensor_mm = _fitted_sensor_mm(lens)
+    aspect = frame.width * frame.aspect_x / (frame.height * frame.aspect_y)
+    size = (sensor_mm, sensor_mm / aspect) if _fits_width(lens, frame) else (sensor_mm * aspect, sensor_mm)
+    sensor = (("sensor_width", size[0]), ("sensor_height", size[1]))
+    return replace(lens, panorama=lens.panorama + sensor)
 
 
 def frame_of(render, resolution=None):
@@ -118,14 +144,15 @@ def lens_of(camera_object, warnings, shift_x=None):
     """The lens of an evaluated camera object; shift_x replaces the camera's own (stereo views)."""
     data = camera_object.data
     is_ortho = data.type == 'ORTHO'
-    if data.type == 'PANO':
-        warnings.add(f"Camera '{data.name}': panoramic projection is not supported, perspective is used")
+    if data.type not in {'PERSP', 'ORTHO', 'PANO'}:
+        warnings.add(f"Camera '{data.name}': type {data.type} is not supported, perspective is used")
     dof, aperture_radius = data.dof, 0.0
     if dof.use_dof:
         focal_m = 1.0 if is_ortho else data.lens * 1e-3
         aperture_radius = focal_m / (2.0 * max(dof.aperture_fstop, 1e-5))
     return Lens(
-        is_ortho=is_ortho, focal_mm=data.lens, sensor_width_mm=data.sensor_width,
+        is_ortho=is_ortho, panorama=panorama.fields(data, warnings) if data.type == 'PANO' else (),
+        focal_mm=data.lens, sensor_width_mm=data.sensor_width,
         sensor_height_mm=data.sensor_height, sensor_fit=data.sensor_fit,
         ortho_scale=data.ortho_scale,
         shift=(data.shift_x if shift_x is None else shift_x, data.shift_y),
@@ -137,13 +164,18 @@ def lens_of(camera_object, warnings, shift_x=None):
 
 def render_camera(engine, camera_object, frame, warnings):
     """The camera of the active view of a render at the depsgraph's present time, with one key."""
-    lens = lens_of(camera_object, warnings, engine.camera_shift_x(camera_object))
-    transform = rows12(engine.camera_model_matrix(camera_object))
-    return CameraKeys(lens, [transform], [window(lens, frame)])
+    is_spherical = engine.use_spherical_stereo(camera_object)
+    shift_x = engine.camera_shift_x(camera_object, use_spherical_stereo=is_spherical)
+    lens = _with_sensor(lens_of(camera_object, warnings, shift_x), frame)
+    if is_spherical:
+        lens = replace(lens, stereo=panorama.stereo_fields(camera_object.data, engine.active_view_get()))
+    transform = rows12(engine.camera_model_matrix(camera_object, use_spherical_stereo=is_spherical))
+    shown = window(lens, frame)
+    return CameraKeys(lens, [transform], [panorama_window(lens, shown, shown) if lens.panorama else shown])
 
 
-def view_camera(rv3d, v3d, camera_object, region_size, warnings):
-    """The camera of a viewport whose region has (width, height) pixels.
+def view_camera(rv3d, v3d, camera_object, region_size, whole_frame, warnings):
+    """The camera of a viewport whose region has (width, height) pixels; whole_frame: of a render.
 
     Through the camera, Blender fits the sensor to the region as it would to a frame, then zooms and
     moves the picture; shift and offset grow with the zoom."""
@@ -152,9 +184,12 @@ def view_camera(rv3d, v3d, camera_object, region_size, warnings):
     offset = (0.0, 0.0)
     if rv3d.view_perspective == 'CAMERA' and getattr(camera_object, "type", "") == 'CAMERA':
         factor = view_camera_zoom_factor(rv3d.view_camera_zoom)
-        lens = lens_of(camera_object, warnings)
+        lens = whole = _with_sensor(lens_of(camera_object, warnings), whole_frame)
         lens = replace(lens, zoom=1.0 / factor, shift=tuple(factor * s for s in lens.shift))
         offset = tuple(2.0 * factor * value for value in rv3d.view_camera_offset)
+        if whole.panorama:
+            shown = panorama_window(whole, window(lens, frame, offset), window(whole, whole_frame))
+            return CameraKeys(whole, [rows12(view_to_world)], [shown])
     elif rv3d.view_perspective == 'ORTHO':
         # Clipping reaches behind the view's origin, so the camera starts that far back.
         lens = Lens(is_ortho=True, ortho_scale=rv3d.view_distance * VIEW_SENSOR_MM / v3d.lens,
@@ -171,22 +206,25 @@ def view_camera_zoom_factor(view_camera_zoom):
     return ((2.0 ** 0.5 + view_camera_zoom / 50.0) ** 2) / 4.0
 
 
-def send(scene, keys, shutter_time=0.0, shutter_curve=None):
-    """Give the camera to the library; equal keys are sent as one."""
+def send(scene, keys, shutter=None):
+    """Give the camera to the library; equal keys are sent as one. shutter: as motion.Shutter, None for no
+    blur."""
     transforms = motion.follow_turns(np.asarray(_collapse(keys.transforms), np.float32))
     windows, lens = _collapse(keys.windows), keys.lens
     if len(windows) > 1:
         if len(transforms) == 1:
             transforms = np.repeat(transforms, len(windows), axis=0)
         windows = motion.resample(windows, len(transforms))
+    kind = abi.CameraType.ORTHOGRAPHIC if lens.is_ortho else abi.CameraType.PERSPECTIVE
+    shape = {"type": kind, **dict(lens.panorama), **dict(lens.stereo)}
+    shutter = shutter or motion.Shutter(0.0, 0.0, None)
     scene.set_camera(
-        transforms, windows, shutter_curve,
-        type=abi.CameraType.ORTHOGRAPHIC if lens.is_ortho else abi.CameraType.PERSPECTIVE,
+        transforms, windows, shutter.curve, **shape,
         blade_count=lens.blade_count, clip_start=lens.clip_start,
         clip_end=max(lens.clip_end, lens.clip_start * (1.0 + 1e-5)),
         aperture_radius=lens.aperture_radius, focus_distance=lens.focus_distance,
         blade_rotation=lens.blade_rotation, aperture_ratio=lens.aperture_ratio,
-        shutter_time=shutter_time)
+        shutter_time=shutter.length, row_delay=shutter.row_delay)
 
 
 def _collapse(values):

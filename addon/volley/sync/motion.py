@@ -27,11 +27,13 @@ _SINGULAR = 1e-6               # smallest share of its size that a matrix needs 
 @dataclass
 class Shutter:
     """When it is open: length and centre in frames; curve: samples of its opening, None where motion
-    is only told to the Vector pass and nothing is blurred."""
+    is only told to the Vector pass and nothing is blurred; row_delay: of a rolling shutter, the share of
+    the length in which rows begin."""
 
     length: float
     center: float
     curve: np.ndarray
+    row_delay: float = 0.0
 
     def frame_at(self, fraction):
         """The frame at a fraction of the shutter time, as (whole frame, rest in [0, 1))."""
@@ -55,7 +57,13 @@ def shutter_of(scene, view_layer, position, wants_vector=False):
         return Shutter(2.0, now, None) if wants_vector else None
     length = render.motion_blur_shutter
     center = now + _CENTER_OFFSETS[position] * length
-    return Shutter(length, center, _curve_of(render))
+    return Shutter(length, center, _curve_of(render), _row_delay_of(scene))
+
+
+def _row_delay_of(scene):
+    if cycles(scene, "rolling_shutter_type", 'NONE') == 'NONE':
+        return 0.0
+    return 1.0 - cycles(scene, "rolling_shutter_duration", 0.1)
 
 
 def _curve_of(render):

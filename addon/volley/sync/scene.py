@@ -151,7 +151,7 @@ class SceneSync:
         if shutter is None or shutter.curve is None:
             camera.send(self.scene, keys)
         else:
-            camera.send(self.scene, keys, shutter.length, shutter.curve)
+            camera.send(self.scene, keys, shutter)
 
 
 def shown_world(source):

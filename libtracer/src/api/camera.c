@@ -13,6 +13,9 @@
 /* Samples of the shutter's curve: hosts have some hundred. */
 #define MAX_SHUTTER_SAMPLES 65536
 
+/* Latitude of the poles, as a float of pi / 2 that has been rounded up. */
+#define HALF_PI 1.5707964f
+
 static trc_status check_windows(const trc_camera_desc *desc) {
     if (desc->window_key_count != 1 && desc->window_key_count != desc->key_count) {
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT,
@@ -45,6 +48,7 @@ static trc_status check_lens(const trc_camera_desc *desc) {
 
 static trc_status check_shutter(const trc_camera_desc *desc) {
     TRC_TRY(trc_check_float(desc->shutter_time, 0.0f, FLT_MAX, "shutter_time"));
+    TRC_TRY(trc_check_float(desc->row_delay, 0.0f, 1.0f, "row_delay"));
     TRC_TRY(
         trc_check_count(desc->shutter_curve_count, 0, MAX_SHUTTER_SAMPLES, "shutter_curve_count"));
     if (!desc->shutter_curve_count)
@@ -56,14 +60,60 @@ static trc_status check_shutter(const trc_camera_desc *desc) {
     return TRC_OK;
 }
 
+static trc_status check_longitudes(const trc_camera_desc *desc) {
+    TRC_TRY(trc_check_finite(&desc->longitude_min, 1, "longitude_min"));
+    return trc_check_finite(&desc->longitude_max, 1, "longitude_max");
+}
+
+static trc_status check_sensor(const trc_camera_desc *desc) {
+    TRC_TRY(trc_check_float(desc->fisheye_angle, FLT_MIN, FLT_MAX, "fisheye_angle"));
+    TRC_TRY(trc_check_float(desc->sensor_width, FLT_MIN, FLT_MAX, "sensor_width"));
+    return trc_check_float(desc->sensor_height, FLT_MIN, FLT_MAX, "sensor_height");
+}
+
+/* What the type reads. */
+static trc_status check_panorama(const trc_camera_desc *desc) {
+    switch (desc->type) {
+    case TRC_CAMERA_EQUIRECTANGULAR:
+        TRC_TRY(check_longitudes(desc));
+        TRC_TRY(trc_check_float(desc->latitude_min, -HALF_PI, HALF_PI, "latitude_min"));
+        return trc_check_float(desc->latitude_max, -HALF_PI, HALF_PI, "latitude_max");
+    case TRC_CAMERA_CYLINDRICAL:
+        TRC_TRY(check_longitudes(desc));
+        TRC_TRY(trc_check_finite(&desc->height_min, 1, "height_min"));
+        return trc_check_finite(&desc->height_max, 1, "height_max");
+    case TRC_CAMERA_FISHEYE_EQUIDISTANT:
+        return trc_check_float(desc->fisheye_angle, FLT_MIN, FLT_MAX, "fisheye_angle");
+    case TRC_CAMERA_FISHEYE_EQUISOLID:
+        TRC_TRY(check_sensor(desc));
+        return trc_check_float(desc->fisheye_lens, FLT_MIN, FLT_MAX, "fisheye_lens");
+    case TRC_CAMERA_FISHEYE_POLYNOMIAL:
+        TRC_TRY(check_sensor(desc));
+        return trc_check_finite(desc->fisheye_polynomial, 5, "fisheye_polynomial");
+    default:
+        return TRC_OK;
+    }
+}
+
+static trc_status check_stereo(const trc_camera_desc *desc) {
+    TRC_TRY(trc_check_finite(&desc->eye_offset, 1, "eye_offset"));
+    if (desc->eye_offset == 0.0f)
+        return TRC_OK;
+    TRC_TRY(trc_check_float(desc->convergence_distance, FLT_MIN, INFINITY, "convergence_distance"));
+    TRC_TRY(trc_check_float(desc->pole_merge_from, 0.0f, HALF_PI, "pole_merge_from"));
+    return trc_check_float(desc->pole_merge_to, 0.0f, HALF_PI, "pole_merge_to");
+}
+
 static trc_status check_camera(const trc_camera_desc *desc) {
     TRC_TRY(trc_check_struct(desc, sizeof *desc, "trc_camera_desc"));
-    TRC_TRY(trc_check_enum(desc->type, 2, "type"));
+    TRC_TRY(trc_check_enum(desc->type, TRC_CAMERA_CYLINDRICAL + 1, "type"));
     TRC_TRY(trc_check_count(desc->key_count, 1, TRC_MAX_KEYS, "key_count"));
     TRC_TRY(trc_check_out(desc->transforms, sizeof(float), "transforms"));
     TRC_TRY(trc_check_finite(desc->transforms, (size_t)12 * desc->key_count, "transforms"));
     TRC_TRY(check_windows(desc));
     TRC_TRY(check_lens(desc));
+    TRC_TRY(check_panorama(desc));
+    TRC_TRY(check_stereo(desc));
     return check_shutter(desc);
 }
 

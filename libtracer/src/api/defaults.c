@@ -1,4 +1,5 @@
 /* Descriptors that need no thought: what a caller does not set stays valid, and costs nothing. */
+#include <math.h>
 #include <stdint.h>
 
 #include "tracer/tracer.h"
@@ -64,7 +65,18 @@ trc_camera_desc trc_camera_desc_default(void) {
                              .clip_start = 0.1f,
                              .clip_end = 1000.0f,
                              .focus_distance = 10.0f,
-                             .aperture_ratio = 1.0f};
+                             .aperture_ratio = 1.0f,
+                             .longitude_min = -PI,
+                             .longitude_max = PI,
+                             .latitude_min = -0.5f * PI,
+                             .latitude_max = 0.5f * PI,
+                             .height_min = -1.0f,
+                             .height_max = 1.0f,
+                             .fisheye_angle = PI,
+                             .fisheye_lens = 10.5f,
+                             .sensor_width = 36.0f,
+                             .sensor_height = 24.0f,
+                             .convergence_distance = INFINITY};
 }
 
 trc_node_input trc_node_input_default(void) { return (trc_node_input){.node = TRC_INPUT_CONSTANT}; }

@@ -7,6 +7,7 @@
 #define TRACER_MODEL_SNAPSHOT_H
 
 #include <stdatomic.h>
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "tracer/tracer.h"
@@ -92,6 +93,17 @@ struct trc_instance {
 /* Entries of trc_camera.shutter_cdf_inverse. */
 #define TRC_SHUTTER_ENTRIES 256
 
+/* Of a panorama, as trc_camera_desc has it. */
+struct trc_panorama {
+    float longitude[2], latitude[2], height[2]; /* at the lower and at the upper end */
+    float angle, lens, sensor[2], polynomial[5];
+};
+
+/* Of spherical stereo, as trc_camera_desc has it. */
+struct trc_stereo {
+    float eye_offset, convergence_distance, pole_merge_from, pole_merge_to;
+};
+
 struct trc_camera {
     uint32_t type;
     uint32_t key_count;
@@ -104,7 +116,14 @@ struct trc_camera {
     uint32_t blade_count;
     float *shutter_cdf_inverse; /* TRC_SHUTTER_ENTRIES times, or NULL: identity */
     uint32_t has_motion;        /* shutter open: rays carry a time */
+    float row_delay;
+    struct trc_panorama panorama;
+    struct trc_stereo stereo;
 };
+
+static inline bool trc_is_panorama(const struct trc_camera *camera) {
+    return camera->type >= TRC_CAMERA_EQUIRECTANGULAR;
+}
 
 struct trc_world {
     uint32_t material; /* into snapshot materials, or UINT32_MAX: black */

@@ -68,6 +68,21 @@ static void copy_settings(struct trc_camera *camera, const trc_camera_desc *desc
     camera->aperture_ratio = desc->aperture_ratio;
     camera->blade_count = desc->blade_count;
     camera->has_motion = desc->shutter_time > 0.0f;
+    camera->row_delay = desc->row_delay;
+    camera->panorama = (struct trc_panorama){
+        .longitude = {desc->longitude_min, desc->longitude_max},
+        .latitude = {desc->latitude_min, desc->latitude_max},
+        .height = {desc->height_min, desc->height_max},
+        .angle = desc->fisheye_angle,
+        .lens = desc->fisheye_lens,
+        .sensor = {desc->sensor_width, desc->sensor_height},
+    };
+    memcpy(camera->panorama.polynomial, desc->fisheye_polynomial,
+           sizeof camera->panorama.polynomial);
+    if (desc->type != TRC_CAMERA_ORTHOGRAPHIC) {
+        camera->stereo = (struct trc_stereo){desc->eye_offset, desc->convergence_distance,
+                                             desc->pole_merge_from, desc->pole_merge_to};
+    }
 }
 
 /* A camera that stands still has one key: motion that is off costs nothing. */

@@ -11,6 +11,7 @@
 
 #include "kernels/program/math.h"
 #include "kernels/trace/mesh_fetch.h"
+#include "kernels/trace/panorama.h"
 #include "kernels/trace/surface.h"
 #include "model/nodes.h"
 
@@ -267,8 +268,8 @@ static vvec3 op_object_normal(const struct trc_surface *s) {
     return out;
 }
 
-/* The camera at the middle of the shutter, looking along +Z as in Cycles. Without a camera it
- * stands at the origin. */
+/* The camera at the middle of the shutter, looking along +Z as in Cycles, of panoramas with their
+ * own axes (kernels/trace/panorama.h). Without a camera it stands at the origin. */
 static void load_camera_to_world(const struct trc_snapshot *snapshot, struct trc_wide_affine *m) {
     const struct trc_camera *camera = &snapshot->camera;
     uint32_t key = 0;
@@ -280,9 +281,12 @@ static void load_camera_to_world(const struct trc_snapshot *snapshot, struct trc
         for (int i = 0; i < 12; i++)
             e[i] = a[i] + f * (b[i] - a[i]);
     }
-    for (int i = 0; i < 3; i++)
-        m->column[i] = v3(vf_set(e[i]), vf_set(e[4 + i]), vf_set(e[8 + i]));
-    m->column[2] = v3_neg(m->column[2]);
+    const struct trc_view_axis *axes = trc_view_axes(camera);
+    for (int i = 0; i < 3; i++) {
+        const float *column = e + axes[i].column;
+        const vvec3 axis = v3(vf_set(column[0]), vf_set(column[4]), vf_set(column[8]));
+        m->column[i] = axes[i].sign < 0.0f ? v3_neg(axis) : axis;
+    }
     m->origin = v3(vf_set(e[3]), vf_set(e[7]), vf_set(e[11]));
 }
 
@@ -305,6 +309,10 @@ static void op_window(const struct trc_surface *s, vfloat *out) {
     out[0] = out[1] = vf_zero();
     if (!s->snapshot->has_camera)
         return;
+    if (trc_is_panorama(camera)) { /* of the whole one, without shift, as in Cycles */
+        trc_panorama_place(camera, op_camera_position(s), &out[0], &out[1]);
+        return;
+    }
     uint32_t key;
     float f;
     trc_key_at(0.5f, camera->key_count, &key, &f);
@@ -443,6 +451,8 @@ static vfloat op_ray_length(const struct trc_surface *s) {
         vi_eq((vint)(s->path & vu_set(TRC_VISIBLE_CAMERA)), vi_set(TRC_VISIBLE_CAMERA));
     if (!s->snapshot->has_camera || !vm_any(seen))
         return s->ray_length;
+    if (trc_is_panorama(camera))
+        return vf_select(seen, s->ray_length - vf_set(camera->clip_start), s->ray_length);
     struct trc_wide_affine to_world, to_camera;
     trc_load_keys(camera->camera_to_world, camera->key_count, s->time, &to_world);
     affine_inverse(&to_world, &to_camera);

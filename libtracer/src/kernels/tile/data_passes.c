@@ -7,6 +7,7 @@
 #include "kernels/simd/wide_math.h"
 #include "kernels/tile/tile.h"
 #include "kernels/trace/mesh_fetch.h"
+#include "kernels/trace/panorama.h"
 
 /* Cycles' default of the view layer's Alpha Threshold. */
 #define ALPHA_THRESHOLD 0.5f
@@ -56,9 +57,12 @@ static vvec3 from_camera(const struct trc_tile *t, vvec3 p) {
     return v3_sub(p, v3(vf_set(m[3]), vf_set(m[7]), vf_set(m[11])));
 }
 
-/* Along the camera's -Z, in its own space: of a sheared camera no distance in the world. */
+/* Along the camera's -Z, in its own space: of a sheared camera no distance in the world. Of
+ * panoramas, which have no such axis, the distance. */
 static vfloat depth_of(const struct trc_tile *t, vvec3 p) {
     const float *m = world_to_camera(t);
+    if (trc_is_panorama(&t->snapshot->camera))
+        return v3_length(from_camera(t, p));
     return vf_set(0.0f) - v3_dot(from_camera(t, p), v3(vf_set(m[8]), vf_set(m[9]), vf_set(m[10])));
 }
 
@@ -75,6 +79,17 @@ static void point_at(const struct trc_instance *instance, const struct trc_mesh 
     for (int k = 0; k < 3; k++)
         p[k] = m[4 * k] * object[0] + m[4 * k + 1] * object[1] + m[4 * k + 2] * object[2] +
                m[4 * k + 3];
+}
+
+/* Where a panorama shows what is at a place of the camera's own space. */
+static void panorama_place(const struct trc_camera *c, const float at[3], float place[2]) {
+    const struct trc_view_axis *axes = trc_view_axes(c);
+    vfloat d[3], u, v;
+    for (int k = 0; k < 3; k++)
+        d[k] = vf_set(axes[k].sign * at[axes[k].column]);
+    trc_panorama_place(c, v3(d[0], d[1], d[2]), &u, &v);
+    place[0] = vf_get(u, 0);
+    place[1] = vf_get(v, 0);
 }
 
 /* Where the camera sees a point at the start (moment 0), in the middle (1) or at the end (2) of the
@@ -94,10 +109,17 @@ static void raster_at(const struct trc_tile *t, const float p[3], int moment, fl
     }
     for (int k = 0; k < 3; k++)
         at[k] = m[4 * k] * way[0] + m[4 * k + 1] * way[1] + m[4 * k + 2] * way[2];
-    const float scale = c->type == TRC_CAMERA_ORTHOGRAPHIC ? 1.0f : -1.0f / at[2];
+    float place[2];
+    if (trc_is_panorama(c)) {
+        panorama_place(c, at, place);
+    } else {
+        const float scale = c->type == TRC_CAMERA_ORTHOGRAPHIC ? 1.0f : -1.0f / at[2];
+        for (int k = 0; k < 2; k++)
+            place[k] = at[k] * scale;
+    }
     const float size[2] = {(float)t->desc->width, (float)t->desc->height};
     for (int k = 0; k < 2; k++)
-        raster[k] = (at[k] * scale - window[2 * k]) / (window[2 * k + 1] - window[2 * k]) * size[k];
+        raster[k] = (place[k] - window[2 * k]) / (window[2 * k + 1] - window[2 * k]) * size[k];
 }
 
 /* Not counted where the camera does not see the point at all three times. */

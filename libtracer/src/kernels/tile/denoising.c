@@ -6,6 +6,7 @@
  * pick those, and with them a part of what lies behind. */
 #include "kernels/simd/wide_math.h"
 #include "kernels/tile/tile.h"
+#include "kernels/trace/panorama.h"
 
 #define DENOISING_PASSES                                                       \
     (1ull << TRC_PASS_DENOISING_ALBEDO | 1ull << TRC_PASS_DENOISING_NORMAL |   \
@@ -67,18 +68,19 @@ static void features_of(const struct trc_lobes *l, const struct trc_surface *s,
     out->are_taken = vm_or(vm_not(some), vf_gt(rough * vf_set(1.0f / ROUGH_SHARE), all));
 }
 
-/* Writes the mean normal in the camera's space: x right, y up, z forward. Once, whichever path of
- * the sample comes first. */
+/* Writes the mean normal in the space that shaders see as the camera's: x right, y up, z forward;
+ * of panoramas along their own axes. Once, whichever path of the sample comes first. */
 static void write_normal(struct trc_tile *t, vvec3 normal, const uint32_t *slots, vmask active) {
     float *const *out = t->samples.pass[TRC_PASS_DENOISING_NORMAL];
     if (!out[0])
         return;
     const float *camera = t->snapshot->camera.world_to_camera[1].m;
+    const struct trc_view_axis *axes = trc_view_axes(&t->snapshot->camera);
     float n[3][TRC_WIDTH];
     for (int k = 0; k < 3; k++) {
-        const float *row = camera + 4 * k;
+        const float *row = camera + 4 * axes[k].column;
         const vfloat along = v3_dot(normal, v3(vf_set(row[0]), vf_set(row[1]), vf_set(row[2])));
-        vf_store(n[k], k == 2 ? vf_zero() - along : along);
+        vf_store(n[k], axes[k].sign < 0.0f ? vf_zero() - along : along);
     }
     for (uint32_t bits = vm_bits(active); bits; bits &= bits - 1) {
         const int i = __builtin_ctz(bits);

@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "kernels/simd/wide_math.h"
+#include "kernels/trace/panorama.h"
 
 /* ---- a batch ---- */
 
@@ -111,8 +112,14 @@ enum sharing { SHARE_NOTHING, SHARE_TIME, SHARE_LENS };
 
 static enum sharing sharing_of(const struct trc_tile *t, uint32_t sample_count) {
     const struct trc_camera *c = &t->snapshot->camera;
-    const float pixel = fabsf(c->windows[0][1] - c->windows[0][0]) / (float)t->desc->width *
-                        (c->type == TRC_CAMERA_ORTHOGRAPHIC ? 1.0f : c->focus_distance);
+    float pixel = fabsf(c->windows[0][1] - c->windows[0][0]) / (float)t->desc->width;
+    if (c->aperture_radius > 0.0f && trc_is_panorama(c))
+        pixel = vf_get(trc_panorama_pixel_angle(c, vf_set(0.5f), vf_set(0.5f),
+                                                1.0f / (float)t->desc->width,
+                                                1.0f / (float)t->desc->height),
+                       0);
+    if (c->type != TRC_CAMERA_ORTHOGRAPHIC)
+        pixel *= c->focus_distance;
     if (sample_count < SHARED_CELLS)
         return SHARE_NOTHING;
     if (c->has_motion)

@@ -3,6 +3,20 @@
  * Hits come sorted by material, so a group of TRC_WIDTH runs one material's code; loops over lobes
  * and light samples are uniform. */
 #include "kernels/tile/shade.h"
+#include "kernels/trace/panorama.h"
+
+/* What the pixels of a panorama see, in radians. */
+static vfloat pixel_angle(const struct trc_tile *t, const struct arrival *a) {
+    const struct trc_camera *c = &t->snapshot->camera;
+    const float *w = c->windows[0];
+    const float inv_width = 1.0f / (float)t->desc->width,
+                inv_height = 1.0f / (float)t->desc->height;
+    const vfloat x = vi_to_float((vint)(a->pixel & vu_set(TRC_PIXEL_X_MASK))) + vf_set(0.5f);
+    const vfloat y = vi_to_float((vint)(a->pixel >> TRC_PIXEL_Y_SHIFT)) + vf_set(0.5f);
+    return trc_panorama_pixel_angle(c, vf_set(w[0]) + x * vf_set((w[1] - w[0]) * inv_width),
+                                    vf_set(w[2]) + y * vf_set((w[3] - w[2]) * inv_height),
+                                    inv_width, inv_height);
+}
 
 #include "kernels/tile/pixel.h"
 
@@ -15,7 +29,10 @@ static vfloat beam_width(const struct trc_tile *t, const struct arrival *a) {
     const vmask camera =
         vi_eq((vint)(a->path & vu_set(TRC_VISIBLE_CAMERA)), vi_set(TRC_VISIBLE_CAMERA));
     const vfloat bounced = vf_where(vf_gt(a->pdf, vf_set(0.0f)), length * vf_safe_sqrt(solid));
-    return vf_select(camera, vf_set(t->beam_width) + length * vf_set(t->beam_spread), bounced);
+    vfloat spread = vf_set(t->beam_spread);
+    if (trc_is_panorama(&t->snapshot->camera) && vm_any(camera))
+        spread = spread * pixel_angle(t, a);
+    return vf_select(camera, vf_set(t->beam_width) + length * spread, bounced);
 }
 
 /* has: of the material. */

@@ -90,16 +90,20 @@ size_t trc_tile_memory_bytes(const trc_render_desc *desc, const struct trc_snaps
 /* ---- the job ---- */
 
 /* The beam of a camera sample: the narrowest of the frame, in a corner. The shear of a camera
- * narrows it by no more than its axes' volume. */
+ * narrows it by no more than its axes' volume. Of panoramas, whose pixels differ most, it is a
+ * share of each pixel's own. */
 static void beam_setup(struct trc_tile *t) {
     const struct trc_camera *c = &t->snapshot->camera;
     const float *w = c->windows[0];
     const float x = fmaxf(fabsf(w[0]), fabsf(w[1])), y = fmaxf(fabsf(w[2]), fabsf(w[3]));
     const float pixel = fminf(fabsf(w[1] - w[0]) / (float)t->desc->width,
                               fabsf(w[3] - w[2]) / (float)t->desc->height);
-    const float sample = c->axes_volume * pixel * fminf(t->desc->filter_width, 1.0f) /
-                         sqrtf((float)t->desc->sample_count);
-    if (c->type == TRC_CAMERA_ORTHOGRAPHIC)
+    const float share =
+        c->axes_volume * fminf(t->desc->filter_width, 1.0f) / sqrtf((float)t->desc->sample_count);
+    const float sample = pixel * share;
+    if (trc_is_panorama(c))
+        t->beam_spread = share;
+    else if (c->type == TRC_CAMERA_ORTHOGRAPHIC)
         t->beam_width = sample;
     else
         t->beam_spread = sample / (1.0f + x * x + y * y);
@@ -123,7 +127,8 @@ void trc_tile_render(struct trc_tile_job *job) {
         job->snapshot->features & (TRC_FEATURE_OBJECT_MOTION | TRC_FEATURE_DEFORMATION);
     t->camera_common = job->snapshot->camera.aperture_radius <= 0.0f &&
                        job->snapshot->camera.key_count < 2 &&
-                       job->snapshot->camera.type == TRC_CAMERA_PERSPECTIVE;
+                       job->snapshot->camera.stereo.eye_offset == 0.0f &&
+                       job->snapshot->camera.type != TRC_CAMERA_ORTHOGRAPHIC;
     t->packet_size =
         job->desc->packet_size < TRC_PACKET_SIZE ? job->desc->packet_size : TRC_PACKET_SIZE;
     t->bundle = job->desc->packet_size / t->packet_size;

@@ -95,7 +95,8 @@ struct trc_tile {
     uint32_t packet_size;       /* 1..TRC_PACKET_SIZE */
     uint32_t bundle;            /* packets of a bundle at most, where rays stay together */
     float beam_width;           /* of a camera sample where it starts, metres */
-    float beam_spread;          /* and what it widens by per metre */
+    float beam_spread;          /* and what it widens by per metre; of panoramas times the angle
+                                   of its pixel */
     double *clock, clock_start; /* the stage whose time is running */
     uint32_t generation;        /* bounces the rays of this step have behind them */
     struct trc_carver carver;   /* of the memory behind this */
