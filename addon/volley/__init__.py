@@ -29,9 +29,9 @@ _registered = globals().get("_registered", [])  # modules, in order; kept where 
 
 def register():
     """Load the native library and register everything; a load error is shown in the preferences."""
-    from . import engine, log, native, node_menus, preferences, properties, ui
+    from . import engine, from_cycles, log, native, node_menus, preferences, presets, properties, ui
     native.load()
-    for module in (log, preferences, properties, engine, ui, node_menus):
+    for module in (log, preferences, properties, from_cycles, presets, engine, ui, node_menus):
         module.register()
         _registered.append(module)
 

@@ -49,11 +49,14 @@ def cycles(data, name, default):
     return getattr(getattr(data, "cycles", None), name, default)
 
 
+def panorama_settings(camera):
+    """What holds the settings of a camera's panorama, None without Cycles where they are its own."""
+    return camera if hasattr(camera, "panorama_type") else getattr(camera, "cycles", None)
+
+
 def panorama_setting(camera, name, default):
-    """A setting of panoramas: Blender's own from 5.0 on, else Cycles' of the camera where they exist."""
-    if hasattr(camera, "panorama_type"):
-        return getattr(camera, name, default)
-    return cycles(camera, name, default)
+    """A setting of panoramas: Blender's own where it has them, else Cycles' of the camera where they exist."""
+    return getattr(panorama_settings(camera), name, default)
 
 
 def cycles_curves(scene, name, default):

@@ -44,6 +44,12 @@ AO_METHOD_ITEMS = (
     ('REPLACE', "Replace", "The world's light, which only near objects keep away from diffuse surfaces"),
     ('ADD', "Add", "White light on diffuse surfaces besides all other"),
 )
+TEXTURE_LIMIT_ITEMS = (
+    ('CYCLES', "As in Cycles", "The limit among the settings of Cycles, where there are any"),
+    ('OFF', "No Limit", "Images of any size"),
+    *((str(size), str(size), f"Images of at most {size} pixels a side")
+      for size in (128, 256, 512, 1024, 2048, 4096, 8192)),
+)
 FILTER_ITEMS = (
     ('BOX', "Box", "Box filter"),
     ('GAUSSIAN', "Gaussian", "Gaussian filter"),
@@ -105,6 +111,11 @@ class VolleySceneSettings(bpy.types.PropertyGroup):
         name="Min Samples", default=0, min=0, max=4096,
         description="Samples of each pixel of the viewport before noise is judged; rounded up to a "
                     "power of two. 0 chooses by the noise threshold", update=_changed)
+    time_limit: FloatProperty(
+        name="Time Limit", default=0.0, min=0.0, step=100, unit='TIME_ABSOLUTE',
+        description="Most seconds of rendering for each view layer, without synchronizing and building: the "
+                    "picture has the samples that were taken by then, one of each pixel at least. 0 is no "
+                    "limit", update=_changed)
     sampler: EnumProperty(
         name="Sampler", items=SAMPLER_ITEMS, default='SOBOL', description="Where samples are taken",
         update=_changed)
@@ -157,6 +168,16 @@ class VolleySceneSettings(bpy.types.PropertyGroup):
         description="Most memory for images, MiB: where more are used, the largest are shown at half their "
                     "size, again and again. 0 for no limit; taken by renders and views that start",
         update=_changed)
+
+    texture_limit: EnumProperty(
+        name="Viewport Texture Limit", items=TEXTURE_LIMIT_ITEMS, default='CYCLES', update=_changed,
+        description="Largest size of images in the viewport, while Simplify is on")
+    texture_limit_render: EnumProperty(
+        name="Render Texture Limit", items=TEXTURE_LIMIT_ITEMS, default='CYCLES', update=_changed,
+        description="Largest size of images in renders, while Simplify is on")
+    is_cycles_answered: BoolProperty(
+        name="Settings of Cycles", default=False, options={'HIDDEN'},
+        description="Whether the user has chosen to take over Cycles' settings, or not to")
 
     film_exposure: FloatProperty(
         name="Exposure", default=1.0, min=0.0, soft_max=10.0, description="Factor on all light",

@@ -66,6 +66,7 @@ class Session:
                                    view_layer.use_pass_vector)
         if shutter is not None and shutter.curve is not None:
             entries = passes.without_vector(entries)
+        time_limit = 0.0 if engine.is_preview else scene.volley.time_limit
         views = self._synchronise(engine, depsgraph, frame, shutter, view_names)
         for view_name, keys in views:
             self._sync.set_camera(keys, shutter)
@@ -74,9 +75,11 @@ class Session:
             settings = render_fields(scene, frame, crop, entries, engine.is_preview)
             if view_layer.samples > 0:
                 settings["sample_count"] = view_layer.samples
+            # All of the picture must have samples when the time is over.
+            settings["progressive"] = int(time_limit > 0.0)
             render = self._sync.scene.start_render(**settings)
             try:
-                _Run(engine, self._sync, render, settings["sample_count"]).follow(
+                _Run(engine, self._sync, render, settings["sample_count"], time_limit).follow(
                     view_layer.name, view_name, entries)
             finally:
                 render.destroy()
@@ -171,8 +174,9 @@ class CameraMotion:
 class _Run:
     """One running render: progress, unfinished pictures, Esc, the result."""
 
-    def __init__(self, engine, sync, render, sample_count):
+    def __init__(self, engine, sync, render, sample_count, time_limit):
         self._engine, self._render, self._sample_count = engine, render, sample_count
+        self._time_limit = time_limit  # seconds, 0 for none
         self._features = sync.scene.features()
         self._next_picture = time.monotonic() + FIRST_PICTURE_SECONDS
         self._shown_version = 0
@@ -192,6 +196,10 @@ class _Run:
                     render.cancel()
                     render.wait(-1.0)
                 progress = render.poll()
+                if self._is_over_time(progress):
+                    render.cancel()
+                    render.wait(-1.0)
+                    progress = render.poll()
                 is_done = progress.state != abi.ProgressState.RUNNING
                 self._show_progress(progress, is_done)
                 if not is_done:
@@ -201,6 +209,11 @@ class _Run:
                          ", ".join(self._features))
         finally:
             engine.end_result(result)
+
+    def _is_over_time(self, progress):
+        """Whether to stop with what there is, which is at least a sample of each pixel."""
+        return 0.0 < self._time_limit < progress.seconds and progress.samples_done > 0 \
+            and progress.state == abi.ProgressState.RUNNING
 
     def _show_progress(self, progress, is_done):
         now = time.monotonic()

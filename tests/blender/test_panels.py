@@ -63,6 +63,100 @@ def test_panels_show_what_they_are_for(blender):
     assert "simplify_subdivision_render" in found["VOLLEY_RENDER_PT_simplify_render"]
 
 
+def inside_cycles_settings():
+    """What becomes of the offer, and of settings, when Cycles' are taken over; every preset at last."""
+    import os
+    import bpy
+    import scenes
+    from volley import from_cycles, presets
+    scene = scenes.empty()
+    for name in scene.volley.keys():
+        scene.volley.property_unset(name)
+    found = {"untouched": from_cycles.is_offered(scene)}
+    theirs, ours = scene.cycles, scene.volley
+    changed = {"samples": 77, "adaptive_threshold": 0.05, "max_bounces": 9, "glossy_bounces": 7,
+               "sample_clamp_indirect": 4.0, "blur_glossy": 0.5, "film_exposure": 1.5, "use_fast_gi": True,
+               "fast_gi_method": 'ADD', "pixel_filter_type": 'GAUSSIAN', "filter_width": 2.0, "time_limit": 12.0,
+               "texture_limit_render": '1024', "diffuse_bounces": 0, "light_sampling_threshold": 0.0,
+               "use_denoising": False}
+    for name, value in changed.items():
+        setattr(theirs, name, value)
+    found["offered"] = from_cycles.is_offered(scene)
+    theirs.volume_bounces = 3
+    found["result"] = bpy.ops.volley.copy_cycles_settings()
+    found["again"] = from_cycles.is_offered(scene)
+    found["pairs"] = {target: (getattr(theirs, source), getattr(ours, target))
+                      for source, target in from_cycles._COPIED if hasattr(theirs, source)}
+    found["left"] = from_cycles.copy(scene)
+    for file in sorted(os.listdir(presets._OWN)):
+        bpy.ops.script.execute_preset(filepath=os.path.join(presets._OWN, file),
+                                      menu_idname="VOLLEY_PT_sampling_presets")
+        found[file] = ours.integrator, ours.samples
+    found["dismissed"] = bpy.ops.volley.keep_settings()
+    return found
+
+
+def test_settings_of_cycles_are_taken_over(blender):
+    found = blender.run(inside_cycles_settings)
+    assert not found["untouched"] and found["offered"] and not found["again"]
+    assert found["result"] == {'FINISHED'} == found["dismissed"]
+    assert len(found["pairs"]) >= 22
+    assert all(theirs == ours for theirs, ours in found["pairs"].values()), found["pairs"]
+    assert found["pairs"]["samples"][1] == 77 and found["pairs"]["texture_limit_render"][1] == '1024'
+    assert "Volume Bounces" in found["left"] and "Diffuse Bounces" not in found["left"]
+    assert found["Default.py"] == ('DISTRIBUTION', 64) and found["Whitted.py"] == ('WHITTED', 1)
+    assert "Settings copied from Cycles; Volley has nothing for" in blender.output
+
+
+def inside_time_limit():
+    """Samples of the pixels and their colours: without a limit and with one far too short."""
+    import bpy
+    import scenes
+    scene = scenes.empty(samples=3)
+    scenes.camera()
+    scenes.wall(size=40.0, material=scenes.emitter((0.25, 0.5, 1.0)))
+    scene.view_layers[0].volley.use_pass_sample_count = True
+    found = []
+    for samples, limit in ((3, 0.0), (3, 1000.0), (1 << 20, 1e-3)):
+        scene.volley.samples, scene.volley.time_limit = samples, limit
+        passes = scenes.render_passes(["Combined", "Debug Sample Count"])
+        found.append((passes["Combined"], passes["Debug Sample Count"][..., 0]))
+    return found
+
+
+def test_time_limit_ends_a_render(blender):
+    found = blender.run(inside_time_limit)
+    for picture, _ in found:
+        assert abs(picture[..., :3] - (0.25, 0.5, 1.0)).max() < 1e-5
+    assert (found[0][1] == 3.0).all() and (found[1][1] == 3.0).all()
+    assert 1.0 <= found[2][1].min() and found[2][1].max() < 1 << 19
+
+
+def inside_panorama_panel():
+    import drawing
+    import scenes
+    from volley import ui
+    scenes.empty()
+    made = scenes.camera().data
+    context = drawing.Context(engine='VOLLEY', camera=made)
+    found = {"plane": ui.VOLLEY_CAMERA_PT_panorama.poll(context)}
+    made.type = 'PANO'
+    found["panorama"] = ui.VOLLEY_CAMERA_PT_panorama.poll(context)
+    place = made if hasattr(made, "panorama_type") else made.cycles
+    for kind in place.bl_rna.properties["panorama_type"].enum_items.keys():
+        place.panorama_type = kind
+        found[kind] = list(drawing.draw(ui.VOLLEY_CAMERA_PT_panorama, context).properties)
+    return found
+
+
+def test_panoramas_have_a_panel(blender):
+    found = blender.run(inside_panorama_panel)
+    assert not found.pop("plane") and found.pop("panorama")
+    assert {kind for kind, shown in found.items() if len(shown) == 1} == {
+        'EQUIANGULAR_CUBEMAP_FACE', 'MIRRORBALL'}
+    assert len(found['EQUIRECTANGULAR']) == 5
+
+
 def inside_render():
     import scenes
     from volley import session

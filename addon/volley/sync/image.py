@@ -199,7 +199,10 @@ class Images:
 
 def size_limit(scene, is_final):
     """The longest side (pixels) that Simplify allows an image, 0 for any."""
-    limit = cycles(scene, "texture_limit_render" if is_final else "texture_limit", 'OFF')
+    name = "texture_limit_render" if is_final else "texture_limit"
+    limit = getattr(scene.volley, name)
+    if limit == 'CYCLES':
+        limit = cycles(scene, name, 'OFF')
     return int(limit) if scene.render.use_simplify and limit != 'OFF' else 0
 
 

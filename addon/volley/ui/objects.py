@@ -50,7 +50,7 @@ class VOLLEY_OBJECT_PT_ray_visibility(_SeenObjectPanel, Panel):
     bl_parent_id = "VOLLEY_OBJECT_PT_visibility"
 
     def draw(self, context):
-        column, active = column_of(self).column(), context.object
+        column, active = column_of(self, has_keys=True).column(), context.object
         for name in ("camera", "diffuse", "glossy", "transmission"):
             column.prop(active, f"visible_{name}", text=name.title())
         if active.type != 'LIGHT':

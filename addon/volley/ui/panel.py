@@ -19,11 +19,11 @@ class VolleyPanel:
             cls.needs is None or bool(getattr(context, cls.needs, None)))
 
 
-def column_of(panel):
-    """The panel's layout in Blender's two-column style."""
+def column_of(panel, has_keys=False):
+    """The panel's layout in Blender's two-column style; has_keys: with a dot to animate each property."""
     layout = panel.layout
     layout.use_property_split = True
-    layout.use_property_decorate = False
+    layout.use_property_decorate = has_keys
     return layout
 
 

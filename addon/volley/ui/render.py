@@ -4,15 +4,23 @@
 from bl_ui.properties_grease_pencil_common import GreasePencilSimplifyPanel
 from bpy.types import Panel
 
+from .. import from_cycles, presets
 from ..compat import motion_position
-from .panel import VolleyPanel, column_of, prop_if_present
+from .panel import VolleyPanel, column_of
 
 
 class VOLLEY_RENDER_PT_sampling(VolleyPanel, Panel):
     bl_label = "Sampling"
 
+    def draw_header_preset(self, context):
+        presets.VOLLEY_PT_sampling_presets.draw_panel_header(self.layout)
+        self.layout.operator(from_cycles.VOLLEY_OT_copy_cycles_settings.bl_idname, text="", icon='IMPORT',
+                             emboss=False)
+
     def draw(self, context):
-        column_of(self).prop(context.scene.volley, "integrator")
+        layout = column_of(self)
+        from_cycles.draw_offer(layout, context.scene)
+        layout.prop(context.scene.volley, "integrator")
 
 
 def _draw_samples(layout, settings, prefix=""):
@@ -46,6 +54,7 @@ class VOLLEY_RENDER_PT_sampling_render(VolleyPanel, Panel):
     def draw(self, context):
         settings, layout = context.scene.volley, column_of(self)
         _draw_samples(layout, settings)
+        layout.prop(settings, "time_limit")
         layout.prop(settings, "light_samples")
 
 
@@ -135,7 +144,7 @@ def _draw_simplify(panel, scene, suffix=""):
     column = layout.column()
     column.prop(scene.render, f"simplify_subdivision{suffix}", text="Max Subdivision")
     column.prop(scene.render, f"simplify_child_particles{suffix}", text="Child Particles")
-    prop_if_present(column, getattr(scene, "cycles", None), f"texture_limit{suffix}", text="Texture Limit")
+    column.prop(scene.volley, f"texture_limit{suffix}", text="Texture Limit")
 
 
 class VOLLEY_RENDER_PT_simplify_viewport(VolleyPanel, Panel):
@@ -178,6 +187,13 @@ class VOLLEY_RENDER_PT_motion_blur(VolleyPanel, Panel):
         else:
             column.label(text=f"Position: {motion_position(scene).title()}")
         column.prop(scene.render, "motion_blur_shutter")
+        settings = getattr(scene, "cycles", None)
+        if hasattr(settings, "rolling_shutter_type"):
+            column.separator()
+            column.prop(settings, "rolling_shutter_type", text="Rolling Shutter")
+            duration = column.column()
+            duration.active = settings.rolling_shutter_type != 'NONE'
+            duration.prop(settings, "rolling_shutter_duration")
 
 
 class VOLLEY_RENDER_PT_motion_blur_curve(VolleyPanel, Panel):

@@ -48,7 +48,7 @@ class VOLLEY_LIGHT_PT_light(_LightPanel, Panel):
     def draw(self, context):
         light, layout = context.light, self.layout
         layout.row().prop(light, "type", expand=True)
-        layout = column_of(self)
+        layout = column_of(self, has_keys=True)
         column = layout.column()
         column.prop(light, "color")
         prop_if_present(column, light, "use_temperature")
@@ -93,7 +93,7 @@ class VOLLEY_LIGHT_PT_beam_shape(_LightPanel, Panel):
         return super().poll(context) and context.light.type in {'SPOT', 'AREA'}
 
     def draw(self, context):
-        light, column = context.light, column_of(self).column()
+        light, column = context.light, column_of(self, has_keys=True).column()
         if light.type == 'SPOT':
             column.prop(light, "spot_size", text="Spot Size")
             column.prop(light, "spot_blend", text="Blend", slider=True)

@@ -1,0 +1,9 @@
+import bpy
+volley = bpy.context.scene.volley
+
+volley.integrator = 'DISTRIBUTION'
+volley.samples = 16
+volley.preview_samples = 8
+volley.light_samples = 0
+volley.use_adaptive_sampling = False
+volley.time_limit = 0.0
