@@ -83,6 +83,9 @@ class VolleySceneSettings(bpy.types.PropertyGroup):
     preview_samples: IntProperty(
         name="Samples", default=32, min=1, max=1 << 20, soft_max=4096,
         description="Samples of each pixel in the viewport", update=_changed)
+    preview_pause: BoolProperty(
+        name="Pause Viewport", default=False, update=_changed,
+        description="Stop rendering in all viewports; what is on the screen stays")
     light_samples: IntProperty(
         name="Light Samples", default=0, min=0, max=64,
         description="Shadow rays at each point the camera sees; 0 lets the library choose",

@@ -13,7 +13,7 @@ from . import abi, cryptomatte, jobs, native, passes
 from .commit import Commit
 from .compat import motion_position
 from .log import logger
-from .sync import Cancelled, SceneSync, Source, camera, motion, world
+from .sync import Cancelled, SceneSync, Source, camera, culling, motion, world
 from .sync.changes import Changes
 
 POLL_SECONDS = 0.02
@@ -110,6 +110,7 @@ class Session:
             if moved and shutter.frame_at(motion.CENTER) != now:
                 engine.frame_set(*shutter.frame_at(motion.CENTER))
             cameras.look(motion.CENTER)
+            source.culling = culling.of(scene, next(iter(cameras.keys.values())))
             self._sync.update(source, shutter, cameras)
         finally:
             if moved:

@@ -20,7 +20,7 @@ from gpu_extras.presets import draw_texture_2d
 from . import abi, native, passes, writes
 from .commit import Commit
 from .session import render_fields, status_text, thread_count, timecode
-from .sync import SceneSync, Source, camera
+from .sync import SceneSync, Source, camera, culling, light
 from .sync.changes import Changes
 
 MAX_HALF = 65504.0
@@ -70,6 +70,9 @@ class Viewport:
         """Copy what was marked, start a build or a render where one is due, draw the latest picture."""
         if self._is_freed:
             return
+        if depsgraph.scene_eval.volley.preview_pause:
+            self._pictures.pause(engine, depsgraph.scene_eval)
+            return
         may_wait = not writes.is_rendering()  # which may wait for this draw
         is_current = self._synchronise(engine, context, depsgraph, may_wait)
         if is_current:
@@ -96,7 +99,8 @@ class Viewport:
         changes, self._changes = self._changes, Changes()
         if changes.any():
             try:
-                self._sync.update(Source(depsgraph, changes, v3d=context.space_data))
+                self._sync.update(Source(depsgraph, changes, v3d=context.space_data,
+                                         culling=_culling_of(context, depsgraph, self._sync.warnings)))
             except BaseException:
                 self._changes = Changes.everything()
                 raise
@@ -197,6 +201,12 @@ class _Pictures:
         if render is not None:
             render.destroy()
 
+    def pause(self, engine, scene):
+        """Stop where it is and go on drawing what there is; :meth:`follow` starts anew."""
+        self.stop()
+        self._status = "Paused"
+        self.draw(engine, scene)
+
     def is_urgent(self):
         """Whether quick pictures are still to come."""
         return bool(self._stages) or not self._is_last
@@ -277,7 +287,7 @@ def _visibility_of(v3d):
     """What a 3D view alone decides of which objects it shows."""
     kinds = tuple(value for name in _OBJECT_KINDS if (value := getattr(v3d, name, None)) is not None)
     local = v3d.local_view is not None
-    return local, v3d.use_local_collections, kinds
+    return local, v3d.use_local_collections, kinds, light.are_shown(v3d)
 
 
 _OBJECT_KINDS = tuple(f"show_object_viewport_{kind}" for kind in (
@@ -302,17 +312,45 @@ class _View:
             camera_object = camera_object.evaluated_get(depsgraph)
         whole_frame = camera.frame_of(depsgraph.scene_eval.render)
         keys = camera.view_camera(rv3d, v3d, camera_object, size, whole_frame, warnings)
-        return cls(keys, size, _crop_of(v3d, rv3d, size))
+        return cls(keys, size, _crop_of(keys, v3d, depsgraph.scene_eval.render, size))
 
 
-def _crop_of(v3d, rv3d, size):
-    """The render region of a view outside the camera, in pixels; else the whole region."""
+def _culling_of(context, depsgraph, warnings):
+    """What Simplify hides from a view; it follows edits, not the view alone, as in Cycles."""
+    scene = depsgraph.scene_eval
+    if not culling.is_on(scene):
+        return None
+    return culling.of(scene, _View.of_context(context, depsgraph, warnings).keys)
+
+
+def _crop_of(keys, v3d, render, size):
+    """The render region of a view in pixels, through the camera that of the scene; else the whole region."""
     width, height = size
-    if rv3d.view_perspective == 'CAMERA' or not v3d.use_render_border:
+    if keys.frame_window is None:
+        is_used, frame = v3d.use_render_border, (0.0, width, 0.0, height)
+        border = (v3d.render_border_min_x, v3d.render_border_max_x,
+                  v3d.render_border_min_y, v3d.render_border_max_y)
+    else:
+        is_used, frame = render.use_border, _place_of(keys.frame_window, keys.windows[0], size)
+        border = (render.border_min_x, render.border_max_x, render.border_min_y, render.border_max_y)
+    if not is_used:
         return 0, 0, width, height
-    x0, x1 = int(v3d.render_border_min_x * width), int(v3d.render_border_max_x * width)
-    y0, y1 = int(v3d.render_border_min_y * height), int(v3d.render_border_max_y * height)
+    x0, x1 = (_within(frame[:2], part, width) for part in border[:2])
+    y0, y1 = (_within(frame[2:], part, height) for part in border[2:])
+    x0, y0 = min(x0, width - 1), min(y0, height - 1)
     return x0, y0, max(1, x1 - x0), max(1, y1 - y0)
+
+
+def _within(ends, part, most):
+    """The pixel, of so many, at a share of the way between two places."""
+    return min(max(int(ends[0] + part * (ends[1] - ends[0])), 0), most)
+
+
+def _place_of(inner, outer, size):
+    """left, right, bottom, top of a window in another that has (width, height) pixels."""
+    (left, right, bottom, top), (width, height) = outer, size
+    return ((inner[0] - left) / (right - left) * width, (inner[1] - left) / (right - left) * width,
+            (inner[2] - bottom) / (top - bottom) * height, (inner[3] - bottom) / (top - bottom) * height)
 
 
 def _texture_of(pixels):

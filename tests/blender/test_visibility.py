@@ -5,6 +5,7 @@ of instances, each in a column of its own beside Cycles."""
 import math
 
 import compare
+import numpy as np
 import pytest
 
 COLUMNS = 6
@@ -282,3 +283,56 @@ def test_switches(blender, kind):
 @pytest.mark.parametrize("inside", [inside_makers, inside_holes, inside_hidden, inside_motion, inside_camera])
 def test_pictures(blender, inside):
     _agree(blender.run(inside))
+
+
+# Simplify's culling ------------------------------------------------------------------------------------
+
+CULLINGS = (
+    {"use_camera_cull": True, "camera_cull_margin": 0.1},
+    {"use_camera_cull": True, "camera_cull_margin": 0.6},
+    {"use_distance_cull": True, "distance_cull_margin": 5.0},
+    {"use_distance_cull": True, "distance_cull_margin": 0.0},
+    {"use_camera_cull": True, "use_distance_cull": True, "camera_cull_margin": 0.1,
+     "distance_cull_margin": 7.0},
+)
+
+
+def inside_culling():
+    """Both engines' pictures of balls all around a camera, in a mirror before it too, and how many of them
+    each setting leaves."""
+    import bpy
+    import scenes
+    scene = scenes.empty(size=(96, 64))
+    scenes.camera(location=(0.0, 0.0, 0.0))
+    scenes.wall("Mirror", 30.0, 9.0, material=scenes.material(
+        "Mirror", "ShaderNodeBsdfGlossy", Color=(1.0, 1.0, 1.0), Roughness=0.0))
+    ball = scenes.sphere("Ball", 0.35, material=scenes.emitter((1.0, 1.0, 1.0)))
+    for number in range(60):
+        made = ball.copy()
+        made.data = ball.data.copy()
+        made.data.materials[0] = scenes.emitter(((number * 0.37) % 1.0, (number * 0.61) % 1.0, 0.2))
+        made.location = (8.0 * ((number * 0.618) % 1.0 - 0.5), 18.0 * ((number * 0.755) % 1.0 - 0.5),
+                         5.0 * ((number * 0.569) % 1.0 - 0.5))
+        scene.collection.objects.link(made)
+        made.cycles.use_camera_cull, made.cycles.use_distance_cull = number % 4 != 0, number % 5 != 0
+    bpy.data.objects.remove(ball)
+    scenes.sharpen()
+    found = [scenes.by_both(1)]
+    scene.render.use_simplify = True
+    for settings in CULLINGS:
+        scene.cycles.use_camera_cull = scene.cycles.use_distance_cull = False
+        for name, value in settings.items():
+            setattr(scene.cycles, name, value)
+        found.append(scenes.by_both(1))
+    return found
+
+
+def test_culling_is_that_of_cycles(blender):
+    found = blender.run(inside_culling)
+    whole = found[0][0]
+    for number, (ours, theirs) in enumerate(found):
+        differ = np.abs(ours - theirs).max(axis=-1) > 1e-3
+        hidden = np.abs(ours - whole).max(axis=-1) > 1e-3
+        print(f"culling {number}: {differ.mean():.4f} of the pixels differ, {hidden.mean():.3f} are others")
+        assert differ.mean() < 2e-3, number
+        assert (hidden.mean() > 0.01) == (number not in (0, 4)), number

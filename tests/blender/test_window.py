@@ -420,3 +420,73 @@ def inside_render_that_begins_within_a_draw():
 
 def test_scripts_may_write_after_a_render_that_begins_within_a_draw(window):
     assert window.run_in_window(inside_render_that_begins_within_a_draw, timeout=60)
+
+
+# The view through the camera, and what the shading menu says ----------------------------------------
+
+def _green_box(shot):
+    """left, right, bottom, top of what is green."""
+    is_green = (shot[..., 1] > 0.9) & (shot[..., 0] < 0.1)
+    columns, rows = np.flatnonzero(is_green.any(axis=0)), np.flatnonzero(is_green.any(axis=1))
+    return [int(edge) for edge in (columns[0], columns[-1] + 1, rows[0], rows[-1] + 1)]
+
+
+def inside_camera_region():
+    """The part of the view that is rendered, beside where Blender has the camera's frame; then a lamp that
+    is hidden by the shading menu, and a view that is paused."""
+    import bpy
+    import scenes
+    from bpy_extras.view3d_utils import location_3d_to_region_2d
+    yield 0.1
+    scene = scenes.empty(samples=2)
+    yield DRAW_SECONDS
+    made = scenes.camera(shift_x=0.1, shift_y=-0.05)
+    wall = scenes.wall(size=60.0, material=scenes.emitter((0.0, 1.0, 0.0)))
+    space = _open(scene)
+    _, area, _ = _view()
+    region = next(region for region in area.regions if region.type == 'WINDOW')
+    rv3d = space.region_3d
+    rv3d.view_perspective, rv3d.view_camera_zoom = 'CAMERA', -8.0
+    rv3d.view_camera_offset = (0.03, -0.02)
+    render = scene.render
+    found = {"boxes": []}
+    for kind in ('PERSP', 'ORTHO'):
+        made.data.type = kind
+        render.use_border = True
+        render.border_min_x, render.border_max_x = 0.2, 0.7
+        render.border_min_y, render.border_max_y = 0.4, 0.6
+        yield from _settled()
+        shot = _shot()
+        corners = [made.matrix_world @ corner for corner in made.data.view_frame(scene=scene)]
+        at = [location_3d_to_region_2d(region, rv3d, corner) for corner in corners]
+        low = [min(point[axis] for point in at) for axis in (0, 1)]
+        high = [max(point[axis] for point in at) for axis in (0, 1)]
+        found["boxes"].append((_green_box(shot), [
+            low[0] + 0.2 * (high[0] - low[0]), low[0] + 0.7 * (high[0] - low[0]),
+            low[1] + 0.4 * (high[1] - low[1]), low[1] + 0.6 * (high[1] - low[1])]))
+    render.use_border, made.data.type = False, 'PERSP'
+    wall.data.materials[0] = scenes.material("Matt", "ShaderNodeBsdfDiffuse", Color=(1.0, 1.0, 1.0))
+    scenes.light('SUN', energy=3.0, rotation=(0.5, 0.0, 0.0))
+    for name, is_shown in (("lit", True), ("unlit", False), ("lit again", True)):
+        space.shading.use_scene_lights_render = is_shown
+        shot = yield from _settled()
+        found[name] = float(shot[shot.shape[0] // 2, shot.shape[1] // 2, 1])
+    scene.volley.preview_pause = True
+    bpy.data.objects["Light"].data.energy = 0.0
+    for _ in range(4):
+        area.tag_redraw()
+        yield DRAW_SECONDS
+    shot = _shot()
+    found["paused"] = float(shot[shot.shape[0] // 2, shot.shape[1] // 2, 1])
+    scene.volley.preview_pause = False
+    shot = yield from _settled()
+    found["resumed"] = float(shot[shot.shape[0] // 2, shot.shape[1] // 2, 1])
+    return found
+
+
+def test_view_through_the_camera(window):
+    found = window.run_in_window(inside_camera_region)
+    for box, frame in found["boxes"]:
+        assert np.abs(np.subtract(box, frame)).max() < 2.0, (box, frame)
+    assert found["lit"] > 0.3 and found["lit again"] == found["lit"] and found["unlit"] < 0.01
+    assert found["paused"] == found["lit"] and found["resumed"] < 0.01

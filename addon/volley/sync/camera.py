@@ -51,11 +51,13 @@ class Frame:
 
 @dataclass
 class CameraKeys:
-    """A camera over the shutter: one transform (12 floats) and window (4 floats) per key."""
+    """A camera over the shutter: one transform (12 floats) and window (4 floats) per key; frame_window: that
+    of the camera's own frame where a viewport looks through it."""
 
     lens: Lens
     transforms: list = field(default_factory=list)
     windows: list = field(default_factory=list)
+    frame_window: tuple = None
 
 
 def _fits_width(lens, frame):
@@ -181,15 +183,17 @@ def view_camera(rv3d, v3d, camera_object, region_size, whole_frame, warnings):
     moves the picture; shift and offset grow with the zoom."""
     frame = Frame(*region_size)
     view_to_world = rv3d.view_matrix.inverted()
-    offset = (0.0, 0.0)
+    offset, frame_window = (0.0, 0.0), None
     if rv3d.view_perspective == 'CAMERA' and getattr(camera_object, "type", "") == 'CAMERA':
         factor = view_camera_zoom_factor(rv3d.view_camera_zoom)
         lens = whole = _with_sensor(lens_of(camera_object, warnings), whole_frame)
         lens = replace(lens, zoom=1.0 / factor, shift=tuple(factor * s for s in lens.shift))
         offset = tuple(2.0 * factor * value for value in rv3d.view_camera_offset)
+        frame_window = window(whole, whole_frame)
         if whole.panorama:
-            shown = panorama_window(whole, window(lens, frame, offset), window(whole, whole_frame))
-            return CameraKeys(whole, [rows12(view_to_world)], [shown])
+            shown = panorama_window(whole, window(lens, frame, offset), frame_window)
+            return CameraKeys(whole, [rows12(view_to_world)], [shown],
+                              panorama_window(whole, frame_window, frame_window))
     elif rv3d.view_perspective == 'ORTHO':
         # Clipping reaches behind the view's origin, so the camera starts that far back.
         lens = Lens(is_ortho=True, ortho_scale=rv3d.view_distance * VIEW_SENSOR_MM / v3d.lens,
@@ -198,7 +202,7 @@ def view_camera(rv3d, v3d, camera_object, region_size, whole_frame, warnings):
     else:
         lens = Lens(focal_mm=v3d.lens, sensor_width_mm=VIEW_SENSOR_MM, clip_start=v3d.clip_start,
                     clip_end=v3d.clip_end)
-    return CameraKeys(lens, [rows12(view_to_world)], [window(lens, frame, offset)])
+    return CameraKeys(lens, [rows12(view_to_world)], [window(lens, frame, offset)], frame_window)
 
 
 def view_camera_zoom_factor(view_camera_zoom):

@@ -13,6 +13,11 @@ from . import flatten
 from .visibility import light_visibility
 
 
+def are_shown(v3d):
+    """Whether a viewport, None for a render, shows the scene's lights."""
+    return v3d is None or v3d.shading.type != 'RENDERED' or v3d.shading.use_scene_lights_render
+
+
 def describe(light_object, item, warnings):
     """The fields of trc_light_desc for an evaluated light object, described as an item too, or None for
     one that is skipped."""

@@ -60,7 +60,7 @@ class SceneSync:
         """Bring up to date what changed, without a walk over everything; False where one is needed,
         which is safe at any point before the end."""
         changes, shown = source.changes, self._shown
-        if changes.full or changes.structure or shown is None or not shown.is_of(source):
+        if changes.full or changes.structure or shown is None or not shown.is_of(source) or source.culling:
             return False
         if not all(self._materials.knows(name) for name in changes.materials):
             return False

@@ -14,7 +14,8 @@ class Cancelled(Exception):
 class Source:
     """Where a sync reads from. engine: moves the scene in time for motion blur, else None; v3d: the
     viewport whose visibility counts, None for a render; aovs: {name: (type, number)} and light_groups:
-    {name: number} of those that are rendered; is_cancelled: asked now and then."""
+    {name: number} of those that are rendered; is_cancelled: asked now and then; culling: culling.Culling or
+    None."""
 
     depsgraph: object
     changes: Changes
@@ -24,3 +25,4 @@ class Source:
     aovs: dict = field(default_factory=dict)
     light_groups: dict = field(default_factory=dict)
     is_cancelled: object = staticmethod(lambda: False)
+    culling: object = None

@@ -81,6 +81,8 @@ class Walk:
         for each in self._instances():
             if each.is_instance:
                 self.tied.update(instance.names_of(each))
+            if self._source.culling and not instance.is_light(each) and self._source.culling.hides(each):
+                continue
             if each.show_particles and self._view_layer.use_strand:
                 self._add_hair(each)
             if not each.show_self:
@@ -139,6 +141,8 @@ class Walk:
         return instance.describe(each, self._view_layer, self._source.light_groups)
 
     def _add_light(self, each):
+        if not light.are_shown(self._source.v3d):
+            return
         item = self._describe(each)
         fields = light.describe(each.object, item, self._sync.warnings)
         if fields is not None:

@@ -45,14 +45,24 @@ def _compatible_panels():
             yield panel
 
 
+def _draw_pause(header, context):
+    """The button that pauses a rendered viewport, in the 3D view's header."""
+    if context.engine == ENGINE and context.space_data.shading.type == 'RENDERED':
+        settings = context.scene.volley
+        icon = 'PLAY' if settings.preview_pause else 'PAUSE'
+        header.layout.prop(settings, "preview_pause", text="", icon=icon)
+
+
 def register():
     for panel in _own_panels():
         bpy.utils.register_class(panel)
     for panel in _compatible_panels():
         panel.COMPAT_ENGINES.add(ENGINE)
+    bpy.types.VIEW3D_HT_header.append(_draw_pause)
 
 
 def unregister():
+    bpy.types.VIEW3D_HT_header.remove(_draw_pause)
     for panel in _compatible_panels():
         panel.COMPAT_ENGINES.discard(ENGINE)
     for panel in reversed(_own_panels()):

@@ -57,6 +57,23 @@ class VOLLEY_OBJECT_PT_ray_visibility(_SeenObjectPanel, Panel):
             column.prop(active, "visible_shadow", text="Shadow")
 
 
+class VOLLEY_OBJECT_PT_culling(_SeenObjectPanel, Panel):
+    bl_label = "Culling"
+    bl_parent_id = "VOLLEY_OBJECT_PT_visibility"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and _has_shape(context.object) and hasattr(context.object, "cycles")
+
+    def draw(self, context):
+        layout, settings, scene = column_of(self), context.object.cycles, context.scene
+        for kind in ("camera", "distance"):
+            row = layout.row()
+            row.active = scene.render.use_simplify and getattr(scene.cycles, f"use_{kind}_cull")
+            row.prop(settings, f"use_{kind}_cull")
+
+
 class VOLLEY_OBJECT_PT_motion_blur(_ObjectPanel, Panel):
     bl_label = "Motion Blur"
     bl_options = {'DEFAULT_CLOSED'}

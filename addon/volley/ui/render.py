@@ -163,6 +163,28 @@ class VOLLEY_RENDER_PT_simplify_render(VolleyPanel, Panel):
         _draw_simplify(self, context.scene, "_render")
 
 
+class VOLLEY_RENDER_PT_simplify_culling(VolleyPanel, Panel):
+    """Its settings are Cycles'."""
+
+    bl_label = "Culling"
+    bl_parent_id = "VOLLEY_RENDER_PT_simplify"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and hasattr(context.scene, "cycles")
+
+    def draw(self, context):
+        layout, settings = column_of(self), context.scene.cycles
+        layout.active = context.scene.render.use_simplify
+        for kind in ("camera", "distance"):
+            row = layout.row(heading=f"{kind.title()} Culling")
+            row.prop(settings, f"use_{kind}_cull", text="")
+            value = row.column()
+            value.active = getattr(settings, f"use_{kind}_cull")
+            value.prop(settings, f"{kind}_cull_margin", text="")
+
+
 class VOLLEY_RENDER_PT_simplify_greasepencil(VolleyPanel, GreasePencilSimplifyPanel, Panel):
     bl_label = "Grease Pencil"
     bl_parent_id = "VOLLEY_RENDER_PT_simplify"
