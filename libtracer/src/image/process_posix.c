@@ -25,8 +25,6 @@
 #include "core/core.h"
 #include "image/process_launch.h"
 
-extern char **environ;
-
 /* For the launcher to tell how a process ended: it only has to kill and reap. */
 #define END_SECONDS 5.0
 /* For the launcher to be gone after it was killed: longer only if it is in the midst of a read from

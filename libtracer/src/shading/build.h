@@ -80,7 +80,7 @@ trc_status trc_build_math(struct trc_build *b, uint32_t mode, struct trc_operand
 
 /* Operands of an input of a value or shader node, converted to its kind; defaults are made, but for
  * normals and tangents of shader nodes, whose operands get TRC_REG_DEFAULT. (shading/lower.c) */
-trc_status trc_build_input(struct trc_build *b, const trc_node *node, uint32_t input,
+trc_status trc_build_input(struct trc_build *b, const trc_node *node, uint32_t index,
                            struct trc_operand *out);
 /* The outputs of a procedural texture from its inputs, in floats as those of trc_build_input.
  * (shading/lower_texture.c) */
