@@ -98,6 +98,7 @@ class LightFlags(IntFlag):
     SPHERE = 1
     EVEN_CONE = 2
     SYNTHETIC = 4
+    LOCAL_UV = 8
 
 
 class AoMethod(IntEnum):
@@ -653,7 +654,7 @@ class LightDesc(Structure):
                 ("size_x", c_float), ("size_y", c_float), ("area_shape", c_uint32), ("spread", c_float),
                 ("spot_angle", c_float), ("spot_blend", c_float), ("visibility", c_uint32),
                 ("cast_shadow", c_uint32), ("use_mis", c_uint32), ("light_group", c_uint32),
-                ("flags", c_uint32))
+                ("flags", c_uint32), ("random", c_float), ("material", c_uint64))
 
 
 class WorldDesc(Structure):

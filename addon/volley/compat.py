@@ -19,6 +19,10 @@ AREA_LIGHT_POWER = 4.0 / math.pi if bpy.app.version >= (4, 0, 0) else 1.0
 # A spot's cone became evenly bright in 4.0; before, it was times the cosine to its axis.
 SPOT_IS_EVEN = bpy.app.version >= (4, 0, 0)
 
+# Nodes of a light have UV coordinates, in the light's own space, and a spot's image spans its cone; seen in
+# 4.3, not in 3.4.
+LIGHT_UV_IS_LOCAL = bpy.app.version >= (4, 0, 0)
+
 # A sun is as bright all over its disc; seen in 4.3, not in 3.4.
 SUN_IS_EVEN = bpy.app.version >= (4, 1, 0)
 

@@ -209,15 +209,18 @@ def inside_lights():
     emission = tree.nodes["Emission"]
     emission.inputs["Color"].default_value = (1.0, 0.5, 0.25, 1.0)
     emission.inputs["Strength"].default_value = 4.0
-    warnings = Warnings()
-    constant = flatten.constant_emission(tree, "Light", warnings)
-    quiet = warnings.take()
-    geometry = tree.nodes.new("ShaderNodeNewGeometry")
-    tree.links.new(geometry.outputs["Backfacing"], emission.inputs["Strength"])
-    return constant, quiet, flatten.constant_emission(tree, "Light", warnings), warnings.take()
+    falloff = tree.nodes.new("ShaderNodeLightFalloff")
+    falloff.inputs["Strength"].default_value = 3.0
+    warnings, flats = Warnings(), []
+    for output in ("Quadratic", "Linear", "Constant"):
+        tree.links.new(falloff.outputs[output], emission.inputs["Strength"])
+        flat = flatten.flatten(tree, "Light", warnings)
+        flats.append([int(node.type) for node in flat.nodes])
+    return flats, warnings.take()
 
 
 def test_light_nodes(blender):
-    constant, quiet, varying, loud = blender.run(inside_lights)
-    assert constant == pytest.approx((4.0, 2.0, 1.0)) and quiet == []
-    assert varying == (1.0, 1.0, 1.0) and len(loud) == 1
+    (quadratic, linear, constant), loud = blender.run(inside_lights)
+    assert loud == []
+    # Light Path first, Emission last; the library drops what an output does not need.
+    assert quadratic == linear == constant and quadratic[0] == 74 and quadratic[-1] == 7

@@ -4,11 +4,16 @@
 Functions as in ``textures.py``: of the walker, the node and its ``Sockets``.
 """
 
+import math
+
+import bpy
 import numpy as np
 
-from ..abi import (CurvesExtension, MathOperation as Math, ModeFlags, NodeType, RotateFlags, RotateMode, SpaceId,
-                   TableSize, TransformedType, VectorOperation as Vector, VectorTransformMode)
+from ..abi import (CurvesExtension, ImageExtension, MathOperation as Math, ModeFlags, NodeType, RotateFlags,
+                   RotateMode, SeparateMode, SpaceId, TableSize, TransformedType,
+                   VectorOperation as Vector, VectorTransformMode)
 from ..compat import TRANSFORMS_NORMALS
+from . import ies
 from .instance import VALUES_LOCATION, VALUES_PARTICLE, VALUES_SPIN, VALUES_VELOCITY
 from .node_list import named_outputs, output
 from .strands import DIRECTION_ATTRIBUTE, HAIR_ATTRIBUTE
@@ -174,11 +179,57 @@ def _light_falloff(walker, _node, sockets):
     strength, smooth = sockets.get('f', "Strength"), sockets.get('f', "Smooth")
     length = output(walker.emit(NodeType.LIGHT_PATH, ()), NodeType.LIGHT_PATH, "ray_length")
     square = _number(walker, Math.MULTIPLY, length, length)
-    if smooth.node != CONSTANT or smooth.constant[0] > 0.0:
-        share = _number(walker, Math.DIVIDE, square, _number(walker, Math.ADD, square, smooth))
-        strength = _number(walker, Math.MULTIPLY, strength, share)
+    if smooth.node != CONSTANT or smooth.constant[0] > 0.0:  # a sun's square is infinite
+        loss = _number(walker, Math.ADD, _number(walker, Math.DIVIDE, smooth, square), 1.0)
+        strength = _number(walker, Math.DIVIDE, strength, loss)
     return {"Quadratic": strength, "Linear": _number(walker, Math.MULTIPLY, strength, length),
             "Constant": _number(walker, Math.MULTIPLY, strength, square)}
+
+
+_MISSING_WEB = 100.0  # Cycles' value of an IES file that cannot be read
+
+
+def _ies(walker, node, sockets):
+    """A lamp's light in the direction of the vector, by default that of the lamp's own normal."""
+    strength = sockets.get('f', "Strength")
+    text = _ies_text(node)
+    web = ies.web_of(text)
+    if web is None:
+        walker.warn(f"node '{node.name}': its IES file cannot be read")
+        return {"Fac": _number(walker, Math.MULTIPLY, strength, _MISSING_WEB)}
+    vector = sockets.get('v', "Vector")
+    if vector.node == DEFAULT:
+        vector = output(walker.emit(NodeType.TEXTURE_COORDINATE, ()), NodeType.TEXTURE_COORDINATE, "normal")
+    parts = walker.emit(NodeType.SEPARATE, (_vector(walker, Vector.NORMALIZE, vector),), SeparateMode.XYZ)
+    x, y, z = (Value('f', parts, i) for i in range(3))
+    horizontal = _number(walker, Math.ARCTAN2, x, y)
+    vertical = _number(walker, Math.ARCCOSINE, _number(walker, Math.MULTIPLY, z, -1.0))
+    columns, rows = ies.picture_size(web)
+    low, high = (math.radians(angle) for angle in (web[1][0], web[1][-1]))
+    # The angles' ends are the centres of the picture's outer pixels.
+    u = _number(walker, Math.MULTIPLY_ADD, horizontal, (columns - 1) / (2.0 * math.pi * columns), 0.5)
+    scale = (rows - 1) / (rows * (high - low))
+    v = _number(walker, Math.MULTIPLY_ADD, vertical, scale, 0.5 / rows - low * scale)
+    place = Value('v', walker.emit(NodeType.COMBINE, (u, v, _constant('f', 0.0)), SeparateMode.XYZ), 0)
+    image = walker.table_image("ies", ies.picture_of, text)
+    found = walker.emit(NodeType.IMAGE, (place, _constant('f', 0.0)), ImageExtension.EXTEND, image=image)
+    red = Value('f', walker.emit(NodeType.SEPARATE, (Value('c', found, 0),)), 0)
+    # Nothing goes beyond the last angle.
+    is_lit = _number(walker, Math.LESS_THAN, vertical, high)
+    factor = _number(walker, Math.MULTIPLY, _number(walker, Math.MULTIPLY, red, is_lit), strength)
+    return {"Fac": factor}
+
+
+def _ies_text(node):
+    """What an IES node's file holds, "" if it cannot be read."""
+    if node.mode == 'INTERNAL':
+        return node.ies.as_string() if node.ies is not None else ""
+    path = bpy.path.abspath(node.filepath, library=node.id_data.library)
+    try:
+        with open(path, encoding="latin-1") as file:
+            return file.read()
+    except OSError:
+        return ""
 
 
 def _ambient_occlusion(walker, _node, sockets):
@@ -243,7 +294,7 @@ CONVERTERS = {
     "ShaderNodeWavelength": _wavelength, "ShaderNodeMapRange": _map_range,
     "ShaderNodeVectorTransform": _vector_transform, "ShaderNodeVectorRotate": _vector_rotate,
     "ShaderNodeCameraData": _camera_data, "ShaderNodeWireframe": _wireframe,
-    "ShaderNodeLightFalloff": _light_falloff, "ShaderNodeAmbientOcclusion": _ambient_occlusion,
-    "ShaderNodeBevel": _bevel, "ShaderNodeParticleInfo": _particle_info,
+    "ShaderNodeLightFalloff": _light_falloff, "ShaderNodeTexIES": _ies,
+    "ShaderNodeAmbientOcclusion": _ambient_occlusion, "ShaderNodeBevel": _bevel, "ShaderNodeParticleInfo": _particle_info,
     "ShaderNodeHairInfo": _hair_info,
 }

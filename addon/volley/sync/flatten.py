@@ -82,38 +82,6 @@ def flatten(tree, label, warnings, images=None, aovs=None, attributes=None):
     return walker.flat
 
 
-def constant_emission(tree, label, warnings):
-    """Colour times strength of a light's tree, three floats, as far as it is constant."""
-    flat = flatten(tree, label, warnings)
-    if flat.surface < 0:
-        return 0.0, 0.0, 0.0
-    color = _emission(flat, flat.surface)
-    if color is None:
-        warnings.add(f"{label}: only constant Emission nodes are supported, white is used")
-        return 1.0, 1.0, 1.0
-    return color
-
-
-def _emission(flat, index):
-    """The constant emission of a shader node of a list, None if it is not constant."""
-    node = flat.nodes[index]
-    constants = [value for source, _, value in node.inputs if source == CONSTANT]
-    if node.type == NodeType.EMISSION and len(constants) == 2:
-        return tuple(component * constants[1][0] for component in constants[0])
-    if node.type in (NodeType.ADD_SHADER, NodeType.MIX_SHADER):
-        shaders = [source for source, _, _ in node.inputs[-2:]]
-        colors = [_emission(flat, source) if source >= 0 else (0.0, 0.0, 0.0) for source in shaders]
-        weights = (1.0, 1.0)
-        if node.type == NodeType.MIX_SHADER:
-            if node.inputs[0][0] != CONSTANT:
-                return None
-            factor = min(max(node.inputs[0][2][0], 0.0), 1.0)
-            weights = (1.0 - factor, factor)
-        if None not in colors:
-            return tuple(a * weights[0] + b * weights[1] for a, b in zip(*colors))
-    return None
-
-
 class Walker:
     """Walks one tree. A path is the tuple of group nodes that were entered on the way."""
 

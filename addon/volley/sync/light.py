@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Lights: Blender's light objects to the library's descriptors.
 
-A light's node tree is evaluated here as far as it is constant: Emission nodes whose inputs are not
-linked to textures. Anything else is named in the warnings and its unlinked part is used.
+A light's node tree goes to the library as a material, whose emission at the place on the light that is
+seen scales what the light gives there.
 """
 
 import math
 
 from .. import abi, native
-from ..compat import AREA_LIGHT_POWER, SPOT_IS_EVEN, SUN_IS_EVEN, casts_shadow, cycles, is_ball, uses_nodes
-from . import flatten
+from ..compat import (AREA_LIGHT_POWER, LIGHT_UV_IS_LOCAL, SPOT_IS_EVEN, SUN_IS_EVEN, casts_shadow, cycles,
+                      is_ball, uses_nodes)
 from .visibility import light_visibility
 
 
@@ -18,31 +18,34 @@ def are_shown(v3d):
     return v3d is None or v3d.shading.type != 'RENDERED' or v3d.shading.use_scene_lights_render
 
 
-def describe(light_object, item, warnings):
+def describe(light_object, item, materials, warnings):
     """The fields of trc_light_desc for an evaluated light object, described as an item too, or None for
-    one that is skipped."""
+    one that is skipped; materials: material.Materials, which takes its nodes."""
     light = light_object.data
     if light.type not in abi.LightType.__members__:
         warnings.add(f"Light '{light.name}': type {light.type} is not supported, it is left out")
         return None
     if light.type == 'AREA' and cycles(light, "is_portal", False):
         return None  # of itself dark: it tells Cycles' sampling where the world shines in
-    factor = _node_color(light, warnings)
     fields = {
         "type": abi.LightType[light.type],
         "transform": tuple(item.transforms[0]),
-        "color": tuple(c * f for c, f in zip(_color(light), factor)),
+        "color": _color(light),
         "strength": light.energy * 2.0 ** getattr(light, "exposure", 0.0) *
         (AREA_LIGHT_POWER if light.type == 'AREA' else 1.0),
         "spread": math.pi, "spot_angle": math.pi,
         "visibility": light_visibility(light_object),
         "light_group": item.light_group,
+        "random": item.random,
+        "material": materials.light_id(light) if uses_nodes(light) else 0,
         "cast_shadow": int(casts_shadow(light)),
         "use_mis": int(cycles(light, "use_multiple_importance_sampling", True)),
     }
     fields.update(_SHAPES[light.type](light))
     if not light_object.is_shadow_catcher:
         fields["flags"] = fields.get("flags", 0) | abi.LightFlags.SYNTHETIC
+    if LIGHT_UV_IS_LOCAL:
+        fields["flags"] = fields.get("flags", 0) | abi.LightFlags.LOCAL_UV
     return fields
 
 
@@ -77,13 +80,6 @@ def _area(light):
 
 
 _SHAPES = {'POINT': _point, 'SPOT': _spot, 'SUN': _sun, 'AREA': _area}
-
-
-def _node_color(light, warnings):
-    """Colour times strength of the light's constant Emission, (1, 1, 1) without nodes."""
-    if not uses_nodes(light):
-        return 1.0, 1.0, 1.0
-    return flatten.constant_emission(light.node_tree, f"Light '{light.name}'", warnings)
 
 
 class Lights:

@@ -22,6 +22,7 @@ class Materials:
         self._scene, self._images, self._warnings = scene, images, warnings
         self._entries = {}  # key -> Entry
         self._seen = set()
+        self._lights = set()  # keys of the lights that are flattened in this sync
         self._changes = Changes.everything()
         self._aovs = {}
         self._attributes = Attributes()
@@ -30,7 +31,7 @@ class Materials:
         """Start a sync: nothing has been asked for yet. Materials that changes does not name are taken
         as they are. aovs: {name: (type, number)}."""
         self._attributes.begin(depsgraph)
-        self._seen = set()
+        self._seen, self._lights = set(), set()
         self._changes = changes if aovs == self._aovs else Changes.everything()
         self._aovs = aovs
 
@@ -60,7 +61,7 @@ class Materials:
         """Flatten those again that changes names, all others stay. False if one cannot be found."""
         self._attributes.begin(depsgraph)
         self._changes = changes
-        self._seen = set()
+        self._seen, self._lights = set(), set()
         for key in list(self._entries):
             if isinstance(key, tuple):  # no material of Blender's
                 self._hold(key)
@@ -110,6 +111,18 @@ class Materials:
         self._update(key, flat)
         entry = self._entries[key]
         return entry.id, entry.sun
+
+    def light_id(self, light):
+        """The nodes of an evaluated light as a material, flattened once per sync."""
+        key = ("light", light.name_full)
+        if key not in self._lights:
+            self._lights.add(key)
+            flat = flatten.flatten(light.node_tree, f"Light '{light.name}'", self._warnings, self._images)
+            flat.uv_names, flat.color_names = set(), set()  # no mesh has to bring them
+            flat.needs_generated = flat.needs_instancer = False
+            self._update(key, flat)
+        self._seen.add(key)
+        return self._entries[key].id
 
     def attribute_names(self):
         """The UV maps and colour attributes that the materials of this sync read, two sets, whether one

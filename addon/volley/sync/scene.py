@@ -88,7 +88,7 @@ class SceneSync:
         name, view_layer = each.object.name_full, source.depsgraph.view_layer_eval
         if instance.is_light(each):
             item = instance.describe(each, view_layer, source.light_groups)
-            fields = light.describe(each.object, item, self.warnings)
+            fields = light.describe(each.object, item, self._materials, self.warnings)
             return fields is not None and self._lights.change(item.key, fields)
         known = shown.items[instance.key_of(each)]
         if is_volume(self._materials, each, view_layer):

@@ -20,8 +20,11 @@ enum trc_light_flags {
                                 axis, as in Blender before 4.0. Sun: the same radiance all over its
                                 disc, strength the irradiance; else more at the rim and less in all,
                                 as in Blender 3 */
-    TRC_LIGHT_SYNTHETIC = 4  /* not a light of the footage that shadow catchers stand for: what
+    TRC_LIGHT_SYNTHETIC = 4, /* not a light of the footage that shadow catchers stand for: what
                                 blocks it casts no shadow there */
+    TRC_LIGHT_LOCAL_UV = 8   /* its nodes' UV and Parametric are of the light's own space, and a
+                                spot's span its cone, as in Blender 4; else a point's and a spot's
+                                Parametric goes by world directions and UV is 0, as in Blender 3.4 */
 };
 
 /* Strengths are Blender's: watts for point, spot and area, W/m^2 for the sun, times color. A light
@@ -30,7 +33,7 @@ typedef struct trc_light_desc {
     uint32_t struct_size; /* of this structure; checked */
     uint32_t type;        /* TRC_LIGHT_* */
     float transform[12];  /* light to world */
-    float color[3];       /* scene-linear, times the nodes' constant colour and strength */
+    float color[3];       /* scene-linear */
     float strength;       /* see above; may be negative */
     float radius;         /* point, spot: metres, >= 0 */
     float angle;          /* sun: angular diameter, radians, [0, pi] */
@@ -44,6 +47,9 @@ typedef struct trc_light_desc {
     uint32_t use_mis;     /* reflected and refracted rays see it ("multiple importance") */
     uint32_t light_group; /* 0..TRC_MAX_LIGHT_GROUPS */
     uint32_t flags;       /* TRC_LIGHT_SPHERE and the like */
+    float random;         /* Object Info's Random for its nodes, [0, 1) */
+    trc_id material;      /* its nodes: a material of the scene, of which emission alone counts,
+                             times color and strength. 0, or one that was destroyed: white */
 } trc_light_desc;
 
 /* A point light of 1 W at the origin, white, without extent, that casts shadows and that all rays
@@ -52,7 +58,7 @@ typedef struct trc_light_desc {
 TRC_API trc_light_desc trc_light_desc_default(void);
 
 /* Adds a light from the next commit on. INVALID_ARGUMENT for a value out of range; what a type does
- * not read must be finite. */
+ * not read must be finite. INVALID_HANDLE for a material that the scene does not have. */
 TRC_API trc_status trc_light_create(trc_scene scene, const trc_light_desc *desc, trc_id *light_out);
 
 /* Replaces all that is known of a light; errors as for create. */

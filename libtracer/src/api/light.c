@@ -14,7 +14,7 @@
 /* Sizes may be negative by a mirroring host; the table takes their magnitude. */
 static trc_status check_light(const trc_light_desc *desc) {
     TRC_TRY(trc_check_struct(desc, sizeof *desc, "trc_light_desc"));
-    TRC_TRY(trc_check_enum(desc->type, 4, "type"));
+    TRC_TRY(trc_check_enum(desc->type, TRC_LIGHT_AREA + 1, "type"));
     TRC_TRY(trc_check_finite(desc->transform, 12, "transform"));
     TRC_TRY(trc_check_finite(desc->color, 3, "color"));
     TRC_TRY(trc_check_finite(&desc->strength, 1, "strength"));
@@ -34,7 +34,8 @@ static trc_status check_light(const trc_light_desc *desc) {
     TRC_TRY(trc_check_enum(desc->cast_shadow, 2, "cast_shadow"));
     TRC_TRY(trc_check_enum(desc->use_mis, 2, "use_mis"));
     TRC_TRY(trc_check_count(desc->light_group, 0, TRC_MAX_LIGHT_GROUPS, "light_group"));
-    return trc_check_enum(desc->flags, 2 * TRC_LIGHT_SYNTHETIC, "flags");
+    TRC_TRY(trc_check_finite(&desc->random, 1, "random"));
+    return trc_check_enum(desc->flags, 2 * TRC_LIGHT_LOCAL_UV, "flags");
 }
 
 trc_status trc_light_create(trc_scene scene, const trc_light_desc *desc, trc_id *light_out) {

@@ -1,6 +1,7 @@
 /* This instruction set's entry in the dispatch (model/kernels.c). */
 #include "model/kernels.h"
 
+#include "kernels/light/lamp_shade.h"
 #include "kernels/light/world.h"
 #include "kernels/program/program.h"
 #include "kernels/tile/tile.h"
@@ -24,6 +25,7 @@ const struct trc_kernels TRC_KERNEL(trc_kernels) = {
     .query_closest = TRC_KERNEL(trc_query_closest_rays),
     .query_occluded = TRC_KERNEL(trc_query_occluded_rays),
     .world_evaluate = TRC_KERNEL(trc_world_evaluate),
+    .lamp_measure = TRC_KERNEL(trc_lamp_measure),
 #if TRC_WIDTH == 1
     .program_fold = TRC_KERNEL(trc_program_fold),
 #endif

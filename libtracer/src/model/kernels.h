@@ -11,6 +11,8 @@
 #include "model/snapshot.h"
 #include "tracer/tracer.h"
 
+struct trc_light_bound; /* model/lights.h */
+struct trc_light_table;
 struct trc_range; /* model/range.h */
 struct trc_split; /* model/split.h */
 struct trc_split_blocks;
@@ -55,6 +57,11 @@ struct trc_kernels {
      * importance maps at commit. */
     void (*world_evaluate)(const struct trc_snapshot *snapshot, const float *directions,
                            float *radiance, uint32_t count);
+    /* Mean of what the program of a lamp emits, over its places and the points within bound that
+     * are up to reach from it: tells what it counts among other lights. */
+    void (*lamp_measure)(const struct trc_snapshot *snapshot, const struct trc_light_table *table,
+                         uint32_t lamp, const struct trc_light_bound *bound, float reach,
+                         float mean[3]);
     /* One pure operation of a program (model/program.h): out gets its outputs. table: if
      * trc_op_has_table. Of the one-lane kernels alone, NULL in others. */
     void (*program_fold)(uint32_t op, uint32_t mode, const float *table, const float *in,

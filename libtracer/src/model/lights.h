@@ -26,7 +26,8 @@ enum {
     TRC_LAMP_CASTS_SHADOW = 4,
     TRC_LAMP_SPHERE = 8,     /* TRC_LIGHT_SPHERE */
     TRC_LAMP_EVEN_CONE = 16, /* TRC_LIGHT_EVEN_CONE */
-    TRC_LAMP_DISTANT = 32    /* it has no place: position is the direction towards it */
+    TRC_LAMP_DISTANT = 32,   /* it has no place: position is the direction towards it */
+    TRC_LAMP_LOCAL_UV = 64   /* TRC_LIGHT_LOCAL_UV */
 };
 
 /* A lamp: 32 words, read by gathers of TRC_LAMP_WORDS stride. Positions in world space. */
@@ -46,7 +47,16 @@ struct trc_lamp {
     int32_t kind, flags;
     uint32_t visibility; /* TRC_VISIBLE_*, UNBLOCKED too */
     uint32_t group;      /* light group; 0: none */
-    float unused[6];
+    uint32_t program;    /* number of its trc_lamp_program, from 1 on; 0: none */
+    float unused[5];
+};
+
+/* What the nodes of a lamp need that does not emit evenly. */
+struct trc_lamp_program {
+    uint32_t material; /* into snapshot materials */
+    float random;      /* of Object Info */
+    float to_world[9]; /* rows; of directions */
+    float to_light[9]; /* its inverse, 0 where it has none */
 };
 
 /* An emissive triangle. */
@@ -119,7 +129,9 @@ struct trc_light_table {
     bool world_apart; /* the world is sampled beside the other lights, not chosen among them */
     bool moves;       /* some emissive triangle moves */
     bool varies;      /* some has emission by program */
+    uint32_t program_count;
     struct trc_lamp *lamps;
+    struct trc_lamp_program *programs; /* of lamps; NULL: all emit evenly */
     struct trc_light_triangle *triangles;
     /* Chosen among: bounds in a list, or a tree of which bounds[0] is the root. Candidates are the
      * list or a cut through the tree, as indices of bounds, then what is distant. */

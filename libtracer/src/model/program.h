@@ -45,6 +45,9 @@ enum trc_op {
  * interpolation and extension; projections are operations of their own. */
 #define TRC_IMAGE_MODE_ALPHA (1u << 4)
 
+/* TRC_OP_CAMERA_POSITION: of the Texture Coordinate node, of Camera Data, which differ on lamps. */
+enum { TRC_CAMERA_COORDINATES, TRC_CAMERA_DATA_POSITION };
+
 enum { TRC_PROJECT_EQUIRECTANGULAR, TRC_PROJECT_MIRROR_BALL, TRC_PROJECT_SPHERE, TRC_PROJECT_TUBE };
 
 /* TRC_OP_CURVE: the channel of the table, and straight on beyond its ends. */

@@ -6,6 +6,7 @@
 #include "scene/commit.h"
 
 #include <inttypes.h>
+#include <math.h>
 #include <string.h>
 
 #include "core/checks.h"
@@ -164,21 +165,39 @@ static uint32_t find_scattering(const struct trc_snapshot *s) {
     return has & TRC_MATERIAL_SCATTERS;
 }
 
+/* From corner to corner of the bounds, 0 for an empty scene. */
+static float scene_extent(const struct trc_bvh_build_stats *build) {
+    float square = 0.0f;
+    for (int i = 0; i < 3; i++) {
+        const float side = build->bounds_upper[i] - build->bounds_lower[i];
+        square += side > 0.0f && side < 1e18f ? side * side : 0.0f;
+    }
+    return sqrtf(square);
+}
+
 static trc_status build_lights(const struct trc_scene_state *scene,
                                const struct trc_snapshot_block *former,
                                struct trc_snapshot_block *block) {
     const struct trc_store *store = &scene->lights;
     trc_light_desc *descs = trc_alloc(store->living_count, sizeof *descs);
-    if (!descs)
+    uint32_t *materials = trc_alloc(store->living_count, sizeof *materials);
+    if (!descs || !materials) {
+        trc_free(descs);
+        trc_free(materials);
         return no_memory();
+    }
     uint32_t count = 0;
     for (uint32_t i = trc_store_first(store); i != TRC_STORE_END; i = trc_store_next(store, i)) {
-        descs[count++] = *(const trc_light_desc *)store->slots[i].object;
+        descs[count] = *(const trc_light_desc *)store->slots[i].object;
+        materials[count] = trc_scene_material_index(scene, descs[count].material);
+        count++;
     }
     struct trc_light_table *lights;
     const struct trc_light_options options = {
         .lights = descs,
+        .light_materials = materials,
         .light_count = count,
+        .reach = scene_extent(&block->build),
         .scatters = find_scattering(&block->snapshot),
         .world = scene->world.struct_size ? &scene->world : NULL,
         .previous = same_world(scene, former, block),
@@ -187,6 +206,7 @@ static trc_status build_lights(const struct trc_scene_state *scene,
     };
     const trc_status status = trc_light_table_create(&block->snapshot, &options, &lights);
     trc_free(descs);
+    trc_free(materials);
     if (status != TRC_OK)
         return status;
     block->lights = trc_shared_create(lights, destroy_lights);

@@ -163,8 +163,15 @@ trc_status trc_scene_remove_instance(struct trc_scene_state *scene, trc_id id) {
 
 /* ---- lights ---- */
 
+static trc_status check_light_material(const struct trc_scene_state *scene,
+                                       const trc_light_desc *desc) {
+    void *ignored;
+    return desc->material ? trc_store_find(&scene->materials, desc->material, &ignored) : TRC_OK;
+}
+
 trc_status trc_scene_add_light(struct trc_scene_state *scene, const trc_light_desc *desc,
                                trc_id *id) {
+    TRC_TRY(check_light_material(scene, desc));
     trc_light_desc *light = trc_alloc(1, sizeof *light);
     if (!light)
         return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for a light");
@@ -182,6 +189,7 @@ trc_status trc_scene_change_light(struct trc_scene_state *scene, trc_id id,
                                   const trc_light_desc *desc) {
     void *light;
     TRC_TRY(trc_store_find(&scene->lights, id, &light));
+    TRC_TRY(check_light_material(scene, desc));
     *(trc_light_desc *)light = *desc;
     scene->changed |= TRC_CHANGED_LIGHTS;
     return TRC_OK;

@@ -59,12 +59,15 @@ static bool is_instanced(const struct trc_scene_state *scene) {
     return false;
 }
 
-static uint32_t light_features(const struct trc_scene_state *scene) {
+static uint32_t light_features(const struct trc_scene_state *scene, const struct trc_snapshot *s) {
     const struct trc_store *store = &scene->lights;
     uint32_t features = 0;
     for (uint32_t i = trc_store_first(store); i != TRC_STORE_END; i = trc_store_next(store, i)) {
         const trc_light_desc *light = store->slots[i].object;
+        const uint32_t has = s->materials[trc_scene_material_index(scene, light->material)]->has;
         features |= TRC_FEATURE_LIGHTS;
+        if (light->material)
+            features |= material_features(has) & (TRC_FEATURE_PROGRAMS | TRC_FEATURE_TEXTURES);
         struct trc_lamp lamp;
         trc_lamp_make(light, &lamp);
         if (!(lamp.flags & TRC_LAMP_DELTA))
@@ -113,7 +116,7 @@ uint32_t trc_find_branches(const struct trc_snapshot *s) {
 }
 
 uint32_t trc_find_features(const struct trc_scene_state *scene, const struct trc_snapshot *s) {
-    return instance_features(s) | light_features(scene) | view_features(s) |
+    return instance_features(s) | light_features(scene, s) | view_features(s) |
            (is_instanced(scene) ? (uint32_t)TRC_FEATURE_INSTANCES : 0u);
 }
 

@@ -242,11 +242,12 @@ static void list_seen(struct trc_light_table *table) {
     table->group_seen[TRC_MAX_LIGHT_GROUPS + 1] = count;
 }
 
-static void add_lamps(struct trc_light_table *table, const struct trc_light_options *options,
-                      struct trc_light_bound *bounds, uint32_t *bound_count) {
+static void add_lamps(struct trc_light_table *table, const struct trc_snapshot *s,
+                      const struct trc_light_options *options, struct trc_light_bound *bounds,
+                      uint32_t *bound_count) {
     for (uint32_t i = 0; i < options->light_count; i++) {
         struct trc_lamp *lamp = &table->lamps[table->lamp_count];
-        if (!trc_lamp_make(&options->lights[i], lamp))
+        if (!trc_lamp_make(&options->lights[i], lamp) || !trc_lamp_take_nodes(table, s, options, i))
             continue;
         const uint32_t number = table->lamp_count++;
         table->kinds |= 1u << lamp->kind;
@@ -254,12 +255,16 @@ static void add_lamps(struct trc_light_table *table, const struct trc_light_opti
             continue;
         const uint32_t all = RECEIVERS | TRC_VISIBLE_UNBLOCKED;
         table->hides |= (lamp->visibility & all) != all;
+        struct trc_light_bound *bound = &bounds[*bound_count];
+        trc_lamp_bound(lamp, number, bound);
+        const float mean = trc_lamp_mean(table, s, number, bound, options->reach);
         if (lamp->flags & TRC_LAMP_DISTANT) {
             table->distant[table->distant_count] = number;
             table->distant_irradiance[table->distant_count++] =
-                trc_brightness(lamp->radiance) / lamp->inv_area;
+                trc_brightness(lamp->radiance) / lamp->inv_area * mean;
         } else {
-            trc_lamp_bound(lamp, number, &bounds[(*bound_count)++]);
+            bound->intensity *= mean;
+            (*bound_count)++;
         }
     }
 }
@@ -300,6 +305,21 @@ static trc_status set_bounds(struct trc_light_table *table, struct trc_light_bou
     return status;
 }
 
+/* Room for the programs of lamps, if some may have one. */
+static trc_status allocate_programs(struct trc_light_table *table, const struct trc_snapshot *s,
+                                    const struct trc_light_options *options) {
+    uint32_t count = 0;
+    for (uint32_t i = 0; options->light_materials && i < options->light_count; i++) {
+        const uint32_t material = options->light_materials[i];
+        count += material && (s->materials[material]->has & TRC_MATERIAL_EMISSION_VARIES);
+    }
+    if (!count)
+        return TRC_OK;
+    table->programs = trc_alloc(count, sizeof *table->programs);
+    return table->programs ? TRC_OK
+                           : trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for %u lamps", count);
+}
+
 static trc_status allocate(struct trc_light_table *table, uint32_t lamps, uint64_t triangles,
                            uint32_t instances, struct trc_light_bound **bounds_out) {
     if (triangles + lamps > INT32_MAX / TRC_LAMP_WORDS)
@@ -329,7 +349,12 @@ static trc_status fill(struct trc_light_table *table, const struct trc_snapshot 
     if (status != TRC_OK)
         return status;
     uint32_t bound_count = 0;
-    add_lamps(table, options, bounds, &bound_count);
+    status = allocate_programs(table, s, options);
+    if (status != TRC_OK) {
+        trc_free(bounds);
+        return status;
+    }
+    add_lamps(table, s, options, bounds, &bound_count);
     list_seen(table);
     table->world_visibility = world_sample_visibility(&s->world);
     table->world_light = world_is_light(s, scatters) ? table->lamp_count : UINT32_MAX;
@@ -373,6 +398,7 @@ void trc_light_table_destroy(struct trc_light_table *table) {
         return;
     trc_world_map_release(table->map);
     trc_free(table->lamps);
+    trc_free(table->programs);
     trc_free(table->triangles);
     trc_free(table->bounds);
     trc_free(table->candidates);

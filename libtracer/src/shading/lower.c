@@ -457,7 +457,7 @@ static trc_status lower_vector_rotate(const struct lowering *l) {
 static trc_status lower_camera_data(const struct lowering *l) {
     struct trc_operand in[TRC_OP_AT(VECTOR_MEASURE, end)];
     struct trc_operand *seen = in + TRC_OP_AT(VECTOR_MEASURE, a);
-    TRC_TRY(op(l->b, TRC_OP_CAMERA_POSITION, 0, NULL, seen));
+    TRC_TRY(op(l->b, TRC_OP_CAMERA_POSITION, TRC_CAMERA_DATA_POSITION, NULL, seen));
     for (uint32_t i = 0; i < 3; i++)
         in[TRC_OP_AT(VECTOR_MEASURE, b) + i] = trc_constant(0.0f);
     l->out[TRC_OUT_AT(CAMERA_DATA, view_z_depth)] = seen[2];

@@ -319,6 +319,19 @@ static void triangles_match_closed_forms(void **state) {
 
 /* ---- densities ---- */
 
+/* Rays of one light sample up to tmax. */
+static struct trc_light_ray seeing(vvec3 p, vvec3 n, vvec3 wi, vfloat tmax, vfloat pdf,
+                                   uint32_t path) {
+    return (struct trc_light_ray){.p = p,
+                                  .n = n,
+                                  .wi = wi,
+                                  .tmin = vf_zero(),
+                                  .tmax = tmax,
+                                  .bsdf_pdf = pdf,
+                                  .light_sample_count = vf_one(),
+                                  .path = vu_set(path)};
+}
+
 /* Density of light sampling that trc_light_hit weighs with, from the weight it gives. */
 static double implied_pdf(double seen, double radiance, double pb) {
     const double w = seen / radiance;
@@ -364,9 +377,9 @@ static void rays_agree_with_samples(void **state) {
         vvec3 radiance = v3_zero();
         const vfloat far =
             vf_select(vf_ge(l.distance, vf_set(TRC_FAR)), l.distance, l.distance * vf_set(1.001f));
-        trc_light_hit(&s.snapshot, r.p, r.n, l.wi, vf_zero(), far, pb, vf_one(),
-                      vu_set(TRC_VISIBLE_GLOSSY | TRC_PATH_REFLECTED), TRC_ALL_GROUPS, l.valid,
-                      &radiance);
+        const struct trc_light_ray ray =
+            seeing(r.p, r.n, l.wi, far, pb, TRC_VISIBLE_GLOSSY | TRC_PATH_REFLECTED);
+        trc_light_hit(&s.snapshot, &ray, TRC_ALL_GROUPS, l.valid, &radiance);
         for (int k = 0; k < TRC_WIDTH; k++) {
             if (!((vm_bits(l.valid) >> k) & 1u))
                 continue;
@@ -428,11 +441,11 @@ static void densities_integrate_to_one(void **state) {
                     (vi_to_float(vi_lane() + vi_set(j)) + vf_set(0.5f)) / vf_set((float)side);
                 const vvec3 wi = trc_warp_cone(vf_set((float)cos_cone), u1, u2);
                 vvec3 weighed = v3_zero(), whole = v3_zero();
-                const vuint path = vu_set(TRC_VISIBLE_GLOSSY | TRC_PATH_REFLECTED);
-                trc_light_hit(&s.snapshot, r.p, r.n, wi, vf_zero(), vf_set(TRC_FAR), vf_one(),
-                              vf_one(), path, TRC_ALL_GROUPS, vm_all_set(), &weighed);
-                trc_light_hit(&s.snapshot, r.p, r.n, wi, vf_zero(), vf_set(TRC_FAR), vf_set(-1.0f),
-                              vf_one(), path, TRC_ALL_GROUPS, vm_all_set(), &whole);
+                struct trc_light_ray ray = seeing(r.p, r.n, wi, vf_set(TRC_FAR), vf_one(),
+                                                  TRC_VISIBLE_GLOSSY | TRC_PATH_REFLECTED);
+                trc_light_hit(&s.snapshot, &ray, TRC_ALL_GROUPS, vm_all_set(), &weighed);
+                ray.bsdf_pdf = vf_set(-1.0f);
+                trc_light_hit(&s.snapshot, &ray, TRC_ALL_GROUPS, vm_all_set(), &whole);
                 for (int k = 0; k < TRC_WIDTH; k++)
                     if (vf_get(weighed.y, k) > 0.0f)
                         sum += implied_pdf((double)vf_get(weighed.y, k), (double)vf_get(whole.y, k),
@@ -654,13 +667,14 @@ static void hidden_lamps(void **state) {
         scene_begin(&s);
         scene_commit(&s, &d, 1);
         vvec3 radiance = v3_zero();
-        trc_light_hit(&s.snapshot, v3_zero(), v3_zero(), up, vf_zero(), vf_set(5.0f), vf_set(-1.0f),
-                      vf_one(), vu_set(cases[i].path), TRC_ALL_GROUPS, vm_all_set(), &radiance);
+        struct trc_light_ray ray =
+            seeing(v3_zero(), v3_zero(), up, vf_set(5.0f), vf_set(-1.0f), cases[i].path);
+        trc_light_hit(&s.snapshot, &ray, TRC_ALL_GROUPS, vm_all_set(), &radiance);
         const float want = cases[i].seen ? 25.0f : 0.0f;
         assert_true(fabsf(vf_get(radiance.x, 0) - want) < 1e-3f);
         /* Rays that pass do not end at lamps; those that stop before do not see them. */
-        trc_light_hit(&s.snapshot, v3_zero(), v3_zero(), up, vf_zero(), vf_set(1.9f), vf_set(-1.0f),
-                      vf_one(), vu_set(cases[i].path), TRC_ALL_GROUPS, vm_all_set(), &radiance);
+        ray.tmax = vf_set(1.9f);
+        trc_light_hit(&s.snapshot, &ray, TRC_ALL_GROUPS, vm_all_set(), &radiance);
         assert_true(fabsf(vf_get(radiance.x, 0) - want) < 1e-3f);
         scene_end(&s);
     }

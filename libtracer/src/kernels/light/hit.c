@@ -1,5 +1,6 @@
 /* Lights that continuation and camera rays find by themselves, and the weights of that. */
 #include "kernels/light/clamp.h"
+#include "kernels/light/lamp_shade.h"
 #include "kernels/light/lamps.h"
 #include "kernels/light/light.h"
 #include "kernels/light/select.h"
@@ -74,6 +75,20 @@ static vfloat meet_lamp(const struct trc_lamp *lamp, vvec3 p, vvec3 wi, vfloat *
     }
 }
 
+/* What the nodes of a lamp emit towards the rays that meet it at that distance. */
+static vvec3 emission_met(const struct trc_snapshot *snapshot, const struct trc_light_ray *ray,
+                          uint32_t number, vfloat distance, vmask m) {
+    const struct trc_lamp_view view = {.scene = snapshot,
+                                       .table = snapshot->lights,
+                                       .light = vi_set((int32_t)number),
+                                       .p = ray->p,
+                                       .wi = ray->wi,
+                                       .distance = distance,
+                                       .time = ray->time,
+                                       .depth = ray->depth};
+    return trc_lamp_emission(&view, m);
+}
+
 /* Under which clamp lamps are seen. */
 struct lamp_clamp {
     vvec3 weight; /* of the path */
@@ -81,35 +96,36 @@ struct lamp_clamp {
 };
 
 /* clamp: NULL for none. */
-TRC_INLINE void lamps_meet(const struct trc_snapshot *snapshot, vvec3 p, vvec3 n, vvec3 wi,
-                           vfloat tmin, vfloat tmax, vfloat bsdf_pdf, vfloat light_sample_count,
-                           vuint path, uint32_t group, const struct lamp_clamp *clamp, vmask active,
+TRC_INLINE void lamps_meet(const struct trc_snapshot *snapshot, const struct trc_light_ray *ray,
+                           uint32_t group, const struct lamp_clamp *clamp, vmask active,
                            vvec3 *radiance) {
     const struct trc_light_table *t = snapshot->lights;
     const bool all = group == TRC_ALL_GROUPS;
     const uint32_t end = t->group_seen[all ? TRC_MAX_LIGHT_GROUPS + 1 : group + 1];
-    const struct trc_receiver receiver = trc_receiver_make(p, n);
+    const struct trc_receiver receiver = trc_receiver_make(ray->p, ray->n);
     for (uint32_t i = all ? 0 : t->group_seen[group]; i < end; i++) {
         const uint32_t number = t->seen[i];
         const struct trc_lamp *lamp = &t->lamps[number];
-        vmask viewers = vm_and(active, near_lamp(lamp, p, wi));
+        vmask viewers = vm_and(active, near_lamp(lamp, ray->p, ray->wi));
         if (!vm_any(viewers))
             continue;
-        viewers = lamp_viewers(lamp, path, viewers);
+        viewers = lamp_viewers(lamp, ray->path, viewers);
         if (!vm_any(viewers))
             continue;
         vfloat pdf = vf_zero();
         vvec3 light;
-        const vfloat distance = meet_lamp(lamp, p, wi, &pdf, &light);
-        vmask hit = vm_and(viewers, vm_and(vf_gt(distance, tmin), vf_le(distance, tmax)));
+        const vfloat distance = meet_lamp(lamp, ray->p, ray->wi, &pdf, &light);
+        vmask hit = vm_and(viewers, vm_and(vf_gt(distance, ray->tmin), vf_le(distance, ray->tmax)));
         hit = vm_and(hit, vf_lt(distance, vf_set(INFINITY)));
         if (!vm_any(hit))
             continue;
+        if (lamp->program)
+            light = v3_mul(light, emission_met(snapshot, ray, number, distance, hit));
         vfloat weight = vf_one();
-        const vmask weighed = vm_andnot(hit, vf_lt(bsdf_pdf, vf_zero()));
+        const vmask weighed = vm_andnot(hit, vf_lt(ray->bsdf_pdf, vf_zero()));
         if (vm_any(weighed)) {
             const vfloat chance = trc_light_chance(t, &receiver, vi_set((int32_t)number), weighed);
-            weight = ray_weight(bsdf_pdf, pdf * chance, light_sample_count);
+            weight = ray_weight(ray->bsdf_pdf, pdf * chance, ray->light_sample_count);
         }
         if (clamp)
             weight = weight *
@@ -118,20 +134,16 @@ TRC_INLINE void lamps_meet(const struct trc_snapshot *snapshot, vvec3 p, vvec3 n
     }
 }
 
-void trc_light_hit(const struct trc_snapshot *snapshot, vvec3 p, vvec3 n, vvec3 wi, vfloat tmin,
-                   vfloat tmax, vfloat bsdf_pdf, vfloat light_sample_count, vuint path,
+void trc_light_hit(const struct trc_snapshot *snapshot, const struct trc_light_ray *ray,
                    uint32_t group, vmask active, vvec3 *radiance) {
-    lamps_meet(snapshot, p, n, wi, tmin, tmax, bsdf_pdf, light_sample_count, path, group, NULL,
-               active, radiance);
+    lamps_meet(snapshot, ray, group, NULL, active, radiance);
 }
 
-void trc_light_hit_clamped(const struct trc_snapshot *snapshot, vvec3 p, vvec3 n, vvec3 wi,
-                           vfloat tmin, vfloat tmax, vfloat bsdf_pdf, vfloat light_sample_count,
-                           vuint path, uint32_t group, vvec3 weight, vfloat limit, vmask active,
+void trc_light_hit_clamped(const struct trc_snapshot *snapshot, const struct trc_light_ray *ray,
+                           uint32_t group, vvec3 weight, vfloat limit, vmask active,
                            vvec3 *radiance) {
     const struct lamp_clamp clamp = {weight, limit};
-    lamps_meet(snapshot, p, n, wi, tmin, tmax, bsdf_pdf, light_sample_count, path, group, &clamp,
-               active, radiance);
+    lamps_meet(snapshot, ray, group, &clamp, active, radiance);
 }
 
 uint32_t trc_light_group(const struct trc_snapshot *snapshot, uint32_t light) {

@@ -2,7 +2,8 @@
  *
  * Of each kind, by its name: sample, a place on the lamp for a point, the density per solid angle
  * of that place, the radiance it sends there; hit, the distance along a ray from the point,
- * infinite where it misses, the density that sample would have had, and the radiance. Lamps that
+ * infinite where it misses, the density that sample would have had, and the radiance; place, what
+ * the lamp's nodes see there, unless it is a normal along the ray and no Parametric. Lamps that
  * are small as seen from the point are sampled by area: there the density is nearly constant
  * anyway, and spherical angles would lose their digits.
  *
@@ -63,6 +64,21 @@ TRC_INLINE struct trc_wide_lamp trc_lamp_gather(const struct trc_lamp *lamps, vi
         .kind = vi_gather(&lamps->kind, at, m),
     };
 }
+
+/* For the nodes of a lamp: from world directions to its own. */
+struct trc_lamp_axes {
+    const float *to_light; /* rows */
+    bool is_local;         /* TRC_LIGHT_LOCAL_UV */
+};
+TRC_INLINE vvec3 trc_lamp_local(const struct trc_lamp_axes *a, vvec3 w) {
+    const float *m = a->to_light;
+    return v3(v3_dot(v3_set(m), w), v3_dot(v3_set(m + 3), w), v3_dot(v3_set(m + 6), w));
+}
+/* A place on a lamp as its nodes see it: normal, and the two numbers of Parametric. */
+struct trc_lamp_place {
+    vvec3 n;
+    vfloat x, y;
+};
 
 /* ---- point: a disk that faces whoever looks, or a sphere ---- */
 
@@ -131,6 +147,19 @@ TRC_INLINE vfloat trc_point_hit(const struct trc_wide_lamp *l, vvec3 p, vvec3 wi
     return vf_select(hit, trc_point_distance(l, reach, cosine), vf_set(INFINITY));
 }
 
+/* off: of the place from the lamp's position; out: the way of the light. */
+TRC_INLINE void trc_point_place(const struct trc_wide_lamp *l, const struct trc_lamp_axes *a,
+                                vvec3 off, vvec3 out, struct trc_lamp_place *q) {
+    const vmask ball = vm_and(trc_lamp_has(l, TRC_LAMP_SPHERE), vf_gt(l->half_u, vf_zero()));
+    q->n = v3_select(ball, v3_normalize(off), out);
+    const vvec3 w = a->is_local ? v3_normalize(trc_lamp_local(a, q->n)) : q->n;
+    const vfloat u = vf_set(0.5f) - vf_atan2(w.x, w.y) * vf_set(0.5f * TRC_INV_PI);
+    const vfloat v = vf_one() - vf_acos(vf_clamp(w.z, -1.0f, 1.0f)) * vf_set(TRC_INV_PI);
+    /* 3.4 took them for barycentrics. */
+    q->x = a->is_local ? u : vf_one() - u - v;
+    q->y = a->is_local ? v : u;
+}
+
 /* ---- spot: a point behind a cone ---- */
 
 TRC_INLINE vfloat trc_spot_factor(const struct trc_wide_lamp *l, vvec3 wi) {
@@ -153,6 +182,19 @@ TRC_INLINE vfloat trc_spot_hit(const struct trc_wide_lamp *l, vvec3 p, vvec3 wi,
     const vfloat t = trc_point_hit(l, p, wi, pdf, radiance);
     *radiance = v3_scale(*radiance, trc_spot_factor(l, wi));
     return t;
+}
+
+/* An image spans the cone, whatever its angle. */
+TRC_INLINE void trc_spot_place(const struct trc_wide_lamp *l, const struct trc_lamp_axes *a,
+                               vvec3 off, vvec3 out, struct trc_lamp_place *q) {
+    trc_point_place(l, a, off, out, q);
+    if (!a->is_local)
+        return;
+    const vvec3 w = trc_lamp_local(a, out);
+    const vfloat sine = vf_safe_sqrt(vf_one() - l->cos_cone * l->cos_cone);
+    const vfloat scale = vf_divide(vf_set(-0.5f) * l->cos_cone, sine * w.z);
+    q->x = vf_set(0.5f) + w.x * scale;
+    q->y = vf_set(0.5f) + w.y * scale;
 }
 
 /* ---- sun: a disk at distance 1 across its axis ---- */
@@ -187,6 +229,22 @@ TRC_INLINE vfloat trc_sun_hit(const struct trc_wide_lamp *l, vvec3 p, vvec3 wi, 
     const vmask even = trc_lamp_has(l, TRC_LAMP_EVEN_CONE);
     *radiance = v3_scale(l->radiance, vf_select(even, vf_one(), *pdf / l->inv_area));
     return vf_select(vf_ge(c, l->cos_cone), vf_set(TRC_FAR), vf_set(INFINITY));
+}
+
+/* An image spans its disk. */
+TRC_INLINE void trc_sun_place(const struct trc_wide_lamp *l, const struct trc_lamp_axes *a,
+                              vvec3 off, vvec3 out, struct trc_lamp_place *q) {
+    (void)off;
+    if (!a->is_local)
+        return;
+    const vvec3 w = v3_neg(trc_lamp_local(a, out));
+    /* Twice the sine of half of the angular radius, and the distance of the ends of out and of a
+     * unit vector towards the sun. */
+    const vfloat chord = vf_sqrt(vf_set(2.0f) * (vf_one() - l->cos_cone));
+    const vfloat apart = v3_length(v3_sub(l->position, out));
+    const vfloat scale = vf_where(vf_gt(chord, vf_zero()), vf_divide(vf_one(), chord * apart));
+    q->x = vf_set(0.5f) + w.x * scale;
+    q->y = vf_set(0.5f) + w.y * scale;
 }
 
 /* ---- rectangle and ellipse: flat, shining from their front ---- */
@@ -353,6 +411,16 @@ TRC_INLINE vfloat trc_area_hit(const struct trc_wide_lamp *l, bool is_ellipse, v
     return vf_select(hit, t, vf_set(INFINITY));
 }
 
+TRC_INLINE void trc_rectangle_place(const struct trc_wide_lamp *l, const struct trc_lamp_axes *a,
+                                    vvec3 off, vvec3 out, struct trc_lamp_place *q) {
+    const vfloat half = vf_set(0.5f);
+    (void)a;
+    (void)out;
+    q->n = l->normal;
+    q->x = half + half * v3_dot(off, l->axis_u) / l->half_u;
+    q->y = half + half * v3_dot(off, l->axis_v) / l->half_v;
+}
+
 TRC_INLINE struct trc_place trc_rectangle_sample(const struct trc_wide_lamp *l, vvec3 p, vfloat u1,
                                                  vfloat u2) {
     return trc_area_sample(l, false, p, u1, u2);
@@ -368,6 +436,11 @@ TRC_INLINE struct trc_place trc_ellipse_sample(const struct trc_wide_lamp *l, vv
 TRC_INLINE vfloat trc_ellipse_hit(const struct trc_wide_lamp *l, vvec3 p, vvec3 wi, vfloat *pdf,
                                   vvec3 *radiance) {
     return trc_area_hit(l, true, p, wi, pdf, radiance);
+}
+
+TRC_INLINE void trc_ellipse_place(const struct trc_wide_lamp *l, const struct trc_lamp_axes *a,
+                                  vvec3 off, vvec3 out, struct trc_lamp_place *q) {
+    trc_rectangle_place(l, a, off, out, q);
 }
 
 #endif

@@ -1,6 +1,7 @@
 /* Light samples: a light for every point, a place on it, the radiance it sends. */
 #include "kernels/light/light.h"
 
+#include "kernels/light/lamp_shade.h"
 #include "kernels/light/lamps.h"
 #include "kernels/light/select.h"
 #include "kernels/light/triangle.h"
@@ -76,6 +77,21 @@ static void sample_chosen_lamps(const struct draw *d, vmask m) {
     l = trc_lamp_gather(t->lamps, d->light, m);
     sample_lamps(d, &l, t->kinds, m);
     mark_flags(d, l.flags, m);
+}
+
+/* Of lamps that do not emit evenly, what their nodes emit from the sampled places. */
+static void shade_chosen_lamps(const struct draw *d, vmask m) {
+    struct trc_light_sample *out = d->out;
+    const struct trc_lamp_view view = {.scene = d->scene,
+                                       .table = d->table,
+                                       .light = d->light,
+                                       .p = d->s->p,
+                                       .wi = out->wi,
+                                       .distance = out->distance,
+                                       .time = d->s->time,
+                                       .depth = d->s->depth};
+    const vvec3 light = v3_mul(out->radiance, trc_lamp_emission(&view, m));
+    out->radiance = v3_select(m, light, out->radiance);
 }
 
 /* ---- triangles ---- */
@@ -279,8 +295,11 @@ void trc_light_sample_prepared(const struct trc_surface *s, const struct trc_lig
         return;
     out->light = vi_select(chosen, d.light, out->light);
     const vmask lamps = vm_and(chosen, vi_lt(d.light, vi_set((int32_t)t->lamp_count)));
-    if (vm_any(lamps))
+    if (vm_any(lamps)) {
         sample_chosen_lamps(&d, lamps);
+        if (t->programs)
+            shade_chosen_lamps(&d, lamps);
+    }
     if (t->kinds & 1u << TRC_KIND_WORLD) {
         const vmask world = vm_and(chosen, vi_eq(d.light, vi_set((int32_t)t->world_light)));
         if (vm_any(world))

@@ -65,21 +65,28 @@ vfloat trc_light_chosen(const struct trc_surface *s, vvec3 n, const struct trc_l
 vuint trc_light_visibility(const struct trc_snapshot *snapshot,
                            const struct trc_light_sample *sample, vuint path);
 
-/* Light seen directly by rays that were traced from p in direction wi over (tmin, tmax] (tmax
- * TRC_FAR for a miss): area, point, spot with extent; with tmax == TRC_FAR also the sun. Lights do
- * not occlude. bsdf_pdf: density of the bounce (solid angle); < 0 for camera rays and ideal bounces
- * (no MIS). n: see above, of the point at p. path: TRC_VISIBLE_* | TRC_PATH_*. light_sample_count:
- * L of the point, for the weights. group: only lamps of that light group, or TRC_ALL_GROUPS. Adds
- * to radiance what the rays see, MIS-weighted (power heuristic). */
-void trc_light_hit(const struct trc_snapshot *snapshot, vvec3 p, vvec3 n, vvec3 wi, vfloat tmin,
-                   vfloat tmax, vfloat bsdf_pdf, vfloat light_sample_count, vuint path,
+/* Rays that were traced from p in direction wi over (tmin, tmax], tmax TRC_FAR for a miss. */
+struct trc_light_ray {
+    vvec3 p, n, wi; /* n: see above, of the point at p */
+    vfloat tmin, tmax;
+    vfloat bsdf_pdf; /* of the bounce, per solid angle; < 0 for camera rays and ideal bounces, which
+                        have no MIS */
+    vfloat light_sample_count; /* L of the point, for the weights */
+    vfloat time;
+    vuint path; /* TRC_VISIBLE_* | TRC_PATH_* */
+    vint depth; /* bounces */
+};
+
+/* Light seen directly by the rays: area, point, spot with extent; where they miss also the sun.
+ * Lights do not occlude. group: only lamps of that light group, or TRC_ALL_GROUPS. Adds to radiance
+ * what the rays see, MIS-weighted (power heuristic). */
+void trc_light_hit(const struct trc_snapshot *snapshot, const struct trc_light_ray *ray,
                    uint32_t group, vmask active, vvec3 *radiance);
 
 /* The same under Cycles' clamps: what each lamp gives to a path of that weight is scaled down to
  * the limit (kernels/light/clamp.h). */
-void trc_light_hit_clamped(const struct trc_snapshot *snapshot, vvec3 p, vvec3 n, vvec3 wi,
-                           vfloat tmin, vfloat tmax, vfloat bsdf_pdf, vfloat light_sample_count,
-                           vuint path, uint32_t group, vvec3 weight, vfloat limit, vmask active,
+void trc_light_hit_clamped(const struct trc_snapshot *snapshot, const struct trc_light_ray *ray,
+                           uint32_t group, vvec3 weight, vfloat limit, vmask active,
                            vvec3 *radiance);
 
 /* The light group of a light, 0 for none. Numbers after the last light are ambient occlusion, which

@@ -13,6 +13,7 @@
 #include "kernels/trace/mesh_fetch.h"
 #include "kernels/trace/panorama.h"
 #include "kernels/trace/surface.h"
+#include "model/lights.h"
 #include "model/nodes.h"
 
 /* ---- objects among the lanes ---- */
@@ -20,8 +21,9 @@
 struct lane_group {
     uint32_t rest; /* lanes still to come */
     vmask lanes;
-    const struct trc_instance *instance; /* NULL: the world */
+    const struct trc_instance *instance; /* NULL: a lamp or the world */
     const struct trc_mesh *mesh;
+    const struct trc_lamp *lamp; /* NULL: none */
 };
 
 TRC_INLINE struct lane_group groups_begin(const struct trc_surface *s) {
@@ -35,6 +37,7 @@ TRC_INLINE bool groups_next(const struct trc_surface *s, struct lane_group *g) {
     g->rest &= ~vm_bits(g->lanes);
     g->instance = id >= 0 ? &s->snapshot->instances[id] : NULL;
     g->mesh = g->instance ? s->snapshot->meshes[g->instance->mesh] : NULL;
+    g->lamp = id <= TRC_FIRST_LAMP ? &s->lamps->lamps[TRC_FIRST_LAMP - id] : NULL;
     return true;
 }
 
@@ -136,11 +139,16 @@ TRC_INLINE void attribute_corners(const struct trc_attribute *a, uint32_t c, vin
 
 /* ---- attributes ---- */
 
+/* A lamp's are Parametric, of any name, or 0. */
 static void op_uv(const struct trc_surface *s, uint32_t name, vfloat *out) {
     const vvec3 w = corner_weights(s);
     out[0] = out[1] = vf_zero();
     struct lane_group g = groups_begin(s);
     while (groups_next(s, &g)) {
+        if (g.lamp && (g.lamp->flags & TRC_LAMP_LOCAL_UV)) {
+            out[0] = vf_select(g.lanes, w.x, out[0]);
+            out[1] = vf_select(g.lanes, w.y, out[1]);
+        }
         const struct trc_attribute *a = g.mesh ? mesh_attribute(g.mesh, name, 2) : NULL;
         for (uint32_t c = 0; a && c < 2; c++) {
             vfloat corner[3];
@@ -255,14 +263,26 @@ static vvec3 op_object_position(const struct trc_surface *s) {
     return out;
 }
 
+/* The axes of a lamp. */
+static void load_lamp_to_world(const struct trc_surface *s, const struct trc_lamp *lamp,
+                               struct trc_wide_affine *a) {
+    const float *m = s->lamps->programs[lamp->program - 1].to_world;
+    for (int i = 0; i < 3; i++)
+        a->column[i] = v3(vf_set(m[i]), vf_set(m[3 + i]), vf_set(m[6 + i]));
+    a->origin = v3_zero();
+}
+
 static vvec3 op_object_normal(const struct trc_surface *s) {
     vvec3 out = s->n;
     struct lane_group g = groups_begin(s);
     while (groups_next(s, &g)) {
-        if (!g.instance)
-            continue;
         struct trc_wide_affine a;
-        trc_load_affine(g.instance, s->time, &a);
+        if (g.instance)
+            trc_load_affine(g.instance, s->time, &a);
+        else if (g.lamp)
+            load_lamp_to_world(s, g.lamp, &a);
+        else
+            continue;
         out = v3_select(g.lanes, normal_to_object(&a, s->n), out);
     }
     return out;
@@ -296,11 +316,14 @@ static void load_world_to_camera(const struct trc_snapshot *snapshot, struct trc
     affine_inverse(&to_world, m);
 }
 
-/* Lanes in the world have a direction for a position: it is seen from the camera's place. */
-static vvec3 op_camera_position(const struct trc_surface *s) {
+/* Lanes in the world have a direction for a position: it is seen from the camera's place. So are
+ * lamps' positions in texture coordinates, but not for the Camera Data node. */
+static vvec3 op_camera_position(const struct trc_surface *s, uint32_t mode) {
     struct trc_wide_affine a;
     load_world_to_camera(s->snapshot, &a);
-    const vmask world = vi_lt(s->instance, vi_set(0));
+    const vmask world = mode == TRC_CAMERA_DATA_POSITION
+                            ? vi_eq(s->instance, vi_set(TRC_WORLD_LOOKUP))
+                            : vi_lt(s->instance, vi_set(0));
     return v3_select(world, trc_transform_vector(&a, s->p), trc_transform_point(&a, s->p));
 }
 
@@ -310,7 +333,7 @@ static void op_window(const struct trc_surface *s, vfloat *out) {
     if (!s->snapshot->has_camera)
         return;
     if (trc_is_panorama(camera)) { /* of the whole one, without shift, as in Cycles */
-        trc_panorama_place(camera, op_camera_position(s), &out[0], &out[1]);
+        trc_panorama_place(camera, op_camera_position(s, TRC_CAMERA_COORDINATES), &out[0], &out[1]);
         return;
     }
     uint32_t key;
@@ -322,7 +345,7 @@ static void op_window(const struct trc_surface *s, vfloat *out) {
         window[i] =
             camera->windows[key][i] + f * (camera->windows[next][i] - camera->windows[key][i]);
     }
-    const vvec3 p = op_camera_position(s);
+    const vvec3 p = op_camera_position(s, TRC_CAMERA_COORDINATES);
     const bool perspective = camera->type == TRC_CAMERA_PERSPECTIVE;
     const vfloat x = perspective ? vf_divide(p.x, p.z) : p.x;
     const vfloat y = perspective ? vf_divide(p.y, p.z) : p.y;
@@ -417,9 +440,10 @@ static vfloat object_number(const struct trc_surface *s, int which) {
     vfloat out = vf_zero();
     struct lane_group g = groups_begin(s);
     while (groups_next(s, &g)) {
-        if (!g.instance)
+        if (!g.instance && (!g.lamp || which != OBJECT_RANDOM))
             continue;
-        const float value = which < OBJECT_INDEX    ? g.instance->color[which]
+        const float value = g.lamp                  ? s->lamps->programs[g.lamp->program - 1].random
+                            : which < OBJECT_INDEX  ? g.instance->color[which]
                             : which == OBJECT_INDEX ? (float)g.instance->pass_index
                                                     : g.instance->random;
         out = vf_select(g.lanes, vf_set(value), out);

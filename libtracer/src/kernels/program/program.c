@@ -152,7 +152,7 @@ static void run_at_surface(const struct trc_surface *s, const struct trc_instruc
         v3_write(out, op_object_position(s));
         break;
     case TRC_OP_CAMERA_POSITION:
-        v3_write(out, op_camera_position(s));
+        v3_write(out, op_camera_position(s, i->mode));
         break;
     case TRC_OP_WINDOW:
         op_window(s, out);

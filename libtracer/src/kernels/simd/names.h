@@ -60,6 +60,8 @@
 #define trc_film_add(...) TRC_KERNEL(trc_film_add)(__VA_ARGS__)
 #define trc_film_load_mattes(...) TRC_KERNEL(trc_film_load_mattes)(__VA_ARGS__)
 #define trc_hit_material(...) TRC_KERNEL(trc_hit_material)(__VA_ARGS__)
+#define trc_lamp_emission(...) TRC_KERNEL(trc_lamp_emission)(__VA_ARGS__)
+#define trc_lamp_measure(...) TRC_KERNEL(trc_lamp_measure)(__VA_ARGS__)
 #define trc_leaf_normal(...) TRC_KERNEL(trc_leaf_normal)(__VA_ARGS__)
 #define trc_leaf_tangent(...) TRC_KERNEL(trc_leaf_tangent)(__VA_ARGS__)
 #define trc_light_chosen(...) TRC_KERNEL(trc_light_chosen)(__VA_ARGS__)

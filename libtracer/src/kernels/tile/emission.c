@@ -95,14 +95,23 @@ void trc_emission_misses(struct trc_tile *t, const struct arrival *a, vmask miss
 static vvec3 pass_lamps(struct trc_tile *t, const struct arrival *a, vfloat end, uint32_t group) {
     vvec3 c = v3_zero();
     /* It is surfaces alone that rays look back for. */
-    const vfloat tmin = vf_max(a->tmin, vf_set(0.0f));
-    const vfloat count = light_count_before(t, a->depths);
+    const struct trc_light_ray ray = {
+        .p = a->o,
+        .n = a->n_from,
+        .wi = a->d,
+        .tmin = vf_max(a->tmin, vf_set(0.0f)),
+        .tmax = end,
+        .bsdf_pdf = a->pdf,
+        .light_sample_count = light_count_before(t, a->depths),
+        .time = a->time,
+        .path = a->path,
+        .depth = (vint)trc_depth_of(a->depths, TRC_DEPTH_ALL_SHIFT),
+    };
     if (trc_clamps(t->desc)) {
-        trc_light_hit_clamped(t->snapshot, a->o, a->n_from, a->d, tmin, end, a->pdf, count, a->path,
-                              group, a->found_weight, found_limit(t, a), a->active, &c);
+        trc_light_hit_clamped(t->snapshot, &ray, group, a->found_weight, found_limit(t, a),
+                              a->active, &c);
     } else {
-        trc_light_hit(t->snapshot, a->o, a->n_from, a->d, tmin, end, a->pdf, count, a->path, group,
-                      a->active, &c);
+        trc_light_hit(t->snapshot, &ray, group, a->active, &c);
     }
     const vmask seen = vm_and(a->active, vf_gt(v3_max(c), vf_set(0.0f)));
     if (!vm_any(seen))

@@ -15,10 +15,15 @@ enum {
     TRC_PATH_WORLD_ALONE = 1 << 11 /* no light sample of the world was taken at the last bounce */
 };
 
+/* In place of an instance's number: a world lookup, and the first lamp, below which others follow.
+ */
+enum { TRC_WORLD_LOOKUP = -1, TRC_FIRST_LAMP = -2 };
+
 struct trc_surface {
     const struct trc_snapshot *snapshot;
+    const struct trc_light_table *lamps; /* where the instance is a lamp */
     vmask active;
-    vint instance, triangle; /* of the lanes in active; -1 for world lookups */
+    vint instance, triangle; /* of the lanes in active; see above */
     vfloat u, v;             /* barycentrics, see query.h */
     vfloat time;
     vvec3 p;          /* world position */
