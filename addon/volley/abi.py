@@ -654,7 +654,8 @@ class LightDesc(Structure):
                 ("size_x", c_float), ("size_y", c_float), ("area_shape", c_uint32), ("spread", c_float),
                 ("spot_angle", c_float), ("spot_blend", c_float), ("visibility", c_uint32),
                 ("cast_shadow", c_uint32), ("use_mis", c_uint32), ("light_group", c_uint32),
-                ("flags", c_uint32), ("random", c_float), ("material", c_uint64))
+                ("flags", c_uint32), ("random", c_float), ("bounce_limit", c_uint32), ("reserved", c_uint32),
+                ("material", c_uint64))
 
 
 class WorldDesc(Structure):

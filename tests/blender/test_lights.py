@@ -34,6 +34,11 @@ _add('AREA', {"energy": 300.0, "size": 1.5, "size_y": 0.5},
 _add('AREA', {"energy": 300.0, "shape": 'RECTANGLE', "size": 6.0, "size_y": 0.05}, spread=(3.14159, 0.3))
 _add('WORLD', sampling=('AUTOMATIC', 'NONE'), power=(0.1, 1.0))
 _add('MESH', energy=(0.5, 20.0))
+# Blender before 5.0 has no such switch, and shares energy out.
+_add('POINT', {"energy": 500.0, "normalize": False}, shadow_soft_size=(0.0, 0.3))
+_add('SUN', {"energy": 30.0, "normalize": False}, angle=(0.4,))
+_add('AREA', {"energy": 300.0, "size": 1.5, "size_y": 0.5, "normalize": False}, shape=('RECTANGLE', 'DISK'))
+_add('POINT', {"energy": 500.0, "shadow_soft_size": 0.3, "wall": True}, max_bounces=(0, 1))
 
 
 # Inside Blender ------------------------------------------------------------------------------------
@@ -42,6 +47,12 @@ def _shine(kind, settings):
     import bpy
     import scenes
     settings = dict(settings)
+    bounces = settings.pop("max_bounces", None)
+    if settings.pop("wall", False):  # of rough gloss: it shows the floor and the light
+        gloss = scenes.material("Gloss", "ShaderNodeBsdfGlossy", Color=(0.8, 0.8, 0.8), Roughness=0.3)
+        scenes.mesh("Wall", [(-4, 2, 0), (4, 2, 0), (4, 2, 6), (-4, 2, 6)], [(0, 1, 2, 3)], gloss)
+    if "normalize" in settings and "normalize" not in bpy.types.Light.bl_rna.properties:
+        del settings["normalize"]
     if kind == 'WORLD':
         world = bpy.context.scene.world
         world.cycles.sampling_method = settings["sampling"]
@@ -51,7 +62,9 @@ def _shine(kind, settings):
                                                                            settings["energy"]))
         lamp.scale = (1.0, 2.0, 0.5)
     else:
-        scenes.light(kind, location=(2.0, -2.0, 4.0), rotation=(0.72, 0.0, 0.785), **settings)
+        lamp = scenes.light(kind, location=(2.0, -2.0, 4.0), rotation=(0.72, 0.0, 0.785), **settings)
+        if bounces is not None:
+            lamp.data.cycles.max_bounces = bounces
 
 
 def inside_pictures():

@@ -31,12 +31,12 @@ def describe(light_object, item, materials, warnings):
         "type": abi.LightType[light.type],
         "transform": tuple(item.transforms[0]),
         "color": _color(light),
-        "strength": light.energy * 2.0 ** getattr(light, "exposure", 0.0) *
-        (AREA_LIGHT_POWER if light.type == 'AREA' else 1.0),
+        "strength": light.energy * 2.0 ** getattr(light, "exposure", 0.0) * _own_power(light, item),
         "spread": math.pi, "spot_angle": math.pi,
         "visibility": light_visibility(light_object),
         "light_group": item.light_group,
         "random": item.random,
+        "bounce_limit": _bounce_limit(light),
         "material": materials.light_id(light) if uses_nodes(light) else 0,
         "cast_shadow": int(casts_shadow(light)),
         "use_mis": int(cycles(light, "use_multiple_importance_sampling", True)),
@@ -55,6 +55,32 @@ def _color(light):
     if getattr(light, "use_temperature", False):
         color = tuple(c * t for c, t in zip(color, light.temperature_color))
     return color
+
+
+def _own_power(light, item):
+    """What its shape makes of a light's energy. Without Normalize (5.0 on) it is not shared out over the
+    light's size."""
+    power = AREA_LIGHT_POWER if light.type == 'AREA' else 1.0
+    if getattr(light, "normalize", True):
+        return power
+    if light.type == 'SUN':
+        return math.pi * math.sin(0.5 * light.angle) ** 2 if light.angle > 0.0 else 1.0
+    if light.type == 'AREA':
+        shape = _area(light)
+        fill = 1.0 if shape["area_shape"] == abi.AreaShape.RECTANGLE else 0.25 * math.pi
+        columns = [math.hypot(*item.transforms[0][axis::4]) for axis in (0, 1)]
+        return power * fill * shape["size_x"] * columns[0] * shape["size_y"] * columns[1]
+    radius = light.shadow_soft_size
+    return 4.0 * math.pi * radius ** 2 if radius > 0.0 else 4.0
+
+
+def _bounce_limit(light):
+    """Cycles' Max Bounces counts those that are allowed; its default is more than there are."""
+    bounces = cycles(light, "max_bounces", _MANY_BOUNCES)
+    return 0 if bounces >= _MANY_BOUNCES else bounces + 1
+
+
+_MANY_BOUNCES = 1024
 
 
 def _point(light):

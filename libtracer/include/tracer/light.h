@@ -48,8 +48,12 @@ typedef struct trc_light_desc {
     uint32_t light_group; /* 0..TRC_MAX_LIGHT_GROUPS */
     uint32_t flags;       /* TRC_LIGHT_SPHERE and the like */
     float random;         /* Object Info's Random for its nodes, [0, 1) */
-    trc_id material;      /* its nodes: a material of the scene, of which emission alone counts,
-                             times color and strength. 0, or one that was destroyed: white */
+    uint32_t
+        bounce_limit;  /* points that the path reaches after so many bounces or more get no light
+                          samples of it; 0: all do. Rays that meet it see it all the same */
+    uint32_t reserved; /* 0 */
+    trc_id material;   /* its nodes: a material of the scene, of which emission alone counts,
+                          times color and strength. 0, or one that was destroyed: white */
 } trc_light_desc;
 
 /* A point light of 1 W at the origin, white, without extent, that casts shadows and that all rays

@@ -45,10 +45,11 @@ struct trc_lamp {
     float spread_scale; /* area: factor that keeps the power */
     float inv_area;
     int32_t kind, flags;
-    uint32_t visibility; /* TRC_VISIBLE_*, UNBLOCKED too */
-    uint32_t group;      /* light group; 0: none */
-    uint32_t program;    /* number of its trc_lamp_program, from 1 on; 0: none */
-    float unused[5];
+    uint32_t visibility;   /* TRC_VISIBLE_*, UNBLOCKED too */
+    uint32_t group;        /* light group; 0: none */
+    uint32_t program;      /* number of its trc_lamp_program, from 1 on; 0: none */
+    uint32_t bounce_limit; /* as trc_light_desc has it */
+    float unused[4];
 };
 
 /* What the nodes of a lamp need that does not emit evenly. */
@@ -129,6 +130,7 @@ struct trc_light_table {
     bool world_apart; /* the world is sampled beside the other lights, not chosen among them */
     bool moves;       /* some emissive triangle moves */
     bool varies;      /* some has emission by program */
+    bool limited;     /* some lamp has a bounce limit */
     uint32_t program_count;
     struct trc_lamp *lamps;
     struct trc_lamp_program *programs; /* of lamps; NULL: all emit evenly */

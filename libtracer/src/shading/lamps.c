@@ -167,6 +167,7 @@ bool trc_lamp_make(const trc_light_desc *desc, struct trc_lamp *lamp) {
     if (desc->flags & TRC_LIGHT_LOCAL_UV)
         lamp->flags |= TRC_LAMP_LOCAL_UV;
     lamp->group = desc->light_group;
+    lamp->bounce_limit = desc->bounce_limit;
     lamp->flags |=
         (desc->use_mis ? TRC_LAMP_MIS : 0) | (desc->cast_shadow ? TRC_LAMP_CASTS_SHADOW : 0);
     if (!make_kind(desc, lamp))

@@ -251,6 +251,7 @@ static void add_lamps(struct trc_light_table *table, const struct trc_snapshot *
             continue;
         const uint32_t number = table->lamp_count++;
         table->kinds |= 1u << lamp->kind;
+        table->limited |= lamp->bounce_limit != 0;
         if (!options->scatters || !(lamp->visibility & RECEIVERS))
             continue;
         const uint32_t all = RECEIVERS | TRC_VISIBLE_UNBLOCKED;

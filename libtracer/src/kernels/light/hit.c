@@ -122,10 +122,14 @@ TRC_INLINE void lamps_meet(const struct trc_snapshot *snapshot, const struct trc
         if (lamp->program)
             light = v3_mul(light, emission_met(snapshot, ray, number, distance, hit));
         vfloat weight = vf_one();
-        const vmask weighed = vm_andnot(hit, vf_lt(ray->bsdf_pdf, vf_zero()));
+        vmask weighed = vm_andnot(hit, vf_lt(ray->bsdf_pdf, vf_zero()));
+        if (lamp->bounce_limit) /* beyond it there were no samples */
+            weighed = vm_andnot(weighed, vi_lt(vi_set((int32_t)lamp->bounce_limit), ray->depth));
         if (vm_any(weighed)) {
             const vfloat chance = trc_light_chance(t, &receiver, vi_set((int32_t)number), weighed);
             weight = ray_weight(ray->bsdf_pdf, pdf * chance, ray->light_sample_count);
+            if (lamp->bounce_limit)
+                weight = vf_select(weighed, weight, vf_one());
         }
         if (clamp)
             weight = weight *

@@ -248,6 +248,15 @@ static void finish_sample(const struct draw *d, vmask m) {
     out->valid = vm_and(m, vm_and(finite, vf_gt(most, vf_zero())));
 }
 
+/* Lamps give nothing to points beyond their limit of bounces. */
+static void limit_sample(const struct draw *d, vmask m) {
+    const vint limit = vi_gather((const int32_t *)&d->table->lamps->bounce_limit,
+                                 d->light * vi_set(TRC_LAMP_WORDS), m);
+    const vmask limited = vm_andnot(m, vi_eq(limit, vi_set(0)));
+    const vmask beyond = vm_andnot(limited, vi_lt(d->s->depth, limit));
+    d->out->valid = vm_andnot(d->out->valid, beyond);
+}
+
 /* The only light of a scene. */
 TRC_INLINE int32_t single_light(const struct trc_light_table *t) {
     return t->bound_count ? t->bounds[0].light : (int32_t)t->distant[0];
@@ -312,4 +321,6 @@ void trc_light_sample_prepared(const struct trc_surface *s, const struct trc_lig
             sample_triangles(&d, triangles);
     }
     finish_sample(&d, chosen);
+    if (t->limited && vm_any(lamps))
+        limit_sample(&d, lamps);
 }
