@@ -209,15 +209,16 @@ static vfloat voronoi_radius(const struct voronoi *v) {
     voronoi_nearest(&euclidean, &first, NULL);
     const int count = voronoi_cell_count(v->dims, 1);
     vfloat best = vf_set(VORONOI_FAR);
+    struct voronoi_point other;
+    voronoi_nothing(&other); /* gcc 16 believes that coordinates beyond the dimensions are read */
     for (int k = 0; k < count; k++) {
-        vfloat offset[TRC_MAX_DIMENSIONS], at[TRC_MAX_DIMENSIONS];
         if (k == count / 2) /* the point itself */
             continue;
-        voronoi_offset(v->dims, 1, k, offset);
+        voronoi_offset(v->dims, 1, k, other.offset);
         for (int i = 0; i < v->dims; i++)
-            offset[i] = offset[i] + first.offset[i];
-        voronoi_at(v, offset, at);
-        best = vf_min(voronoi_distance(&euclidean, first.at, at), best);
+            other.offset[i] = other.offset[i] + first.offset[i];
+        voronoi_at(v, other.offset, other.at);
+        best = vf_min(voronoi_distance(&euclidean, first.at, other.at), best);
     }
     return best * vf_set(0.5f);
 }

@@ -255,7 +255,7 @@ static void add_aovs(struct trc_tile *t, const struct trc_material *m,
                      const struct trc_registers *regs, const uint32_t *slots, vmask active) {
     for (uint32_t a = 0; a < m->aov_count; a++) {
         float *const *out = t->samples.pass[m->aovs[a].pass];
-        const uint32_t channels = trc_pass_channels(m->aovs[a].pass);
+        const uint32_t channels = trc_pass_channels(m->aovs[a].pass) == 4 ? 4 : 1;
         float lanes[4][TRC_WIDTH];
         if (!out[0])
             continue;
