@@ -1,23 +1,21 @@
 #!/usr/bin/env bash
-# The add-on in the next Blender: Debian 13 with Blender 4.3.2 in a folder of its own, where the library
-# is built and tested as a user of Debian 13 would.
+# The add-on in a newer Blender: a Debian with it in a folder of its own, where the library is built and
+# tested as a user of that Debian would.
 #
-#   bash tests/blender_next.sh [--fast] [--report XML] [PYTEST ARGUMENT]...
-#   bash tests/blender_next.sh --curves DIR
+#   bash tests/blender_next.sh [--suite SUITE] [--fast] [--report XML] [PYTEST ARGUMENT]...
+#   bash tests/blender_next.sh [--suite SUITE] --curves DIR
 #
-# Runs all Blender tests if no argument says which; --fast leaves out what a change of Blender's version
-# hardly touches (see SLOW); --report writes JUnit XML. --curves measures error against time there
-# instead, and leaves its JSON in DIR. Needs root, a Debian mirror and 2.5 GB; the folder is
-# $XDG_CACHE_HOME/volley/trixie and stays, so that the next run takes only the build and the tests.
-# Nothing is mounted. Exit code 77: it cannot be set up here, with
-# the reason as the last line; else pytest's.
+# SUITE is trixie (Debian 13, Blender 4.3; the default) or sid (Debian unstable, Blender 5.2). Runs all
+# Blender tests if no argument says which; --fast leaves out what a change of Blender's version hardly
+# touches (see SLOW) and builds kernels for this processor alone; --report writes JUnit XML. --curves
+# measures error against time there instead, and leaves its JSON in DIR. Needs root, a Debian mirror and
+# 2.5 GB; the folder is $XDG_CACHE_HOME/volley/SUITE and stays, so that the next run takes only the build
+# and the tests. Nothing is mounted. Exit code 77: it cannot be set up here, with the reason as the last
+# line; else pytest's.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
-SUITE=trixie
 CACHE=${XDG_CACHE_HOME:-$HOME/.cache}/volley
-ROOT=$CACHE/$SUITE
-# Without Xvfb: screenshots of Blender 4.3 on it are black, so tests in windows are skipped.
 PACKAGES=(
     blender gcc g++ cmake ninja-build libc6-dev libopenimageio-dev openimageio-tools
     python3-numpy python3-openimageio python3-pytest
@@ -25,12 +23,26 @@ PACKAGES=(
 SKIPPED=77
 
 say() { printf '== %s\n' "$*"; }
-skip() { printf 'Blender of Debian 13: %s\n' "$*"; exit "$SKIPPED"; }
+skip() { printf 'Blender of %s: %s\n' "$NAME" "$*"; exit "$SKIPPED"; }
 die() { printf 'blender_next: %s\n' "$*" >&2; exit 1; }
 
 inside() {
     chroot "$ROOT" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LC_ALL=C.UTF-8 \
         ${http_proxy:+http_proxy="$http_proxy"} "$@" </dev/null
+}
+
+# What the suite is called, where its folder is, and what its Blender needs besides. Without Xvfb in
+# Debian 13: screenshots of Blender 4.3 on it are black, so tests in windows are skipped.
+choose_suite() {
+    SUITE=$1 ROOT=$CACHE/$1
+    case $SUITE in
+        trixie) NAME="Debian 13" ;;
+        sid)
+            NAME="Debian unstable"
+            PACKAGES+=(python3-cattr python3-requests) # which its blender imports and does not ask for
+            ;;
+        *) die "unknown suite: $SUITE" ;;
+    esac
 }
 
 # The mirror that this system installs from.
@@ -43,15 +55,15 @@ mirror() {
 
 # Packages without documentation and without waiting for the disk: the folder can be made again.
 configure_packages() {
-    local root=$1
     printf '%s\n' force-unsafe-io 'path-exclude=/usr/share/doc/*' 'path-exclude=/usr/share/man/*' \
-        'path-exclude=/usr/share/locale/*' >"$root/etc/dpkg/dpkg.cfg.d/volley"
+        'path-exclude=/usr/share/locale/*' >"$ROOT/etc/dpkg/dpkg.cfg.d/volley"
+    # Mirrors of unstable may lag behind: what they have is as good.
     printf '%s\n' 'Acquire::Languages "none";' 'APT::Install-Recommends "false";' \
-        >"$root/etc/apt/apt.conf.d/volley"
+        'Acquire::Check-Valid-Until "false";' >"$ROOT/etc/apt/apt.conf.d/volley"
 }
 
 make_root() {
-    local log=$CACHE/debootstrap.log proxy="" part=$ROOT.part
+    local log=$CACHE/$SUITE.debootstrap.log proxy="" part=$ROOT.part
     if ! command -v debootstrap >/dev/null; then
         { apt-get update -q && apt-get install -q -y --no-install-recommends debootstrap; } \
             </dev/null >/dev/null 2>&1 || skip "debootstrap cannot be installed"
@@ -60,23 +72,23 @@ make_root() {
     [ -z "$proxy" ] || export http_proxy=$proxy
     mkdir -p "$CACHE"
     rm -rf "$part"
-    say "Debian 13 into $ROOT"
+    say "$NAME into $ROOT"
     # Its own mount name space, if there may be one: what debootstrap mounts goes away with it.
     local private=()
     ! unshare --mount true 2>/dev/null || private=(unshare --mount)
     "${private[@]}" debootstrap --variant=minbase "$SUITE" "$part" "$(mirror)" >"$log" 2>&1 </dev/null ||
         { tail -n 5 "$log"; skip "debootstrap failed, see $log"; }
-    configure_packages "$part"
     mv "$part" "$ROOT"
 }
 
 install_packages() {
-    local log=$CACHE/packages.log
+    local log=$CACHE/$SUITE.packages.log
     if inside dpkg-query -W -f '${db:Status-Status}\n' "${PACKAGES[@]}" 2>/dev/null |
         awk '$1 != "installed" { bad = 1 } END { exit bad || NR < '${#PACKAGES[@]}' }'; then
         return
     fi
-    say "Packages of Debian 13"
+    say "Packages of $NAME"
+    configure_packages
     { inside apt-get update -q &&
         inside env DEBIAN_FRONTEND=noninteractive apt-get install -q -y "${PACKAGES[@]}"; } \
         >"$log" 2>&1 || { tail -n 5 "$log"; skip "its packages cannot be installed, see $log"; }
@@ -93,11 +105,22 @@ copy_sources() {
     printf '%s' "$PWD" >"$target/working_tree"
 }
 
+# The widest kernels that this processor runs, nothing for others than x86-64.
+widest_isa() {
+    local kind
+    for kind in avx512vl:avx512 avx2:avx2 sse4_2:sse42; do
+        if grep -qw "${kind%:*}" /proc/cpuinfo; then
+            printf '%s' "${kind#*:}"
+            return
+        fi
+    done
+}
+
 build() {
-    local log=$CACHE/build.log
-    say "Building with Debian 13's compiler and OpenImageIO"
+    local isas=$1 log=$CACHE/$SUITE.build.log
+    say "Building with the compiler and OpenImageIO of $NAME"
     inside sh -c 'cd /volley && cmake -G Ninja -C .cmake/ci.cmake -B build -DTRACER_BUILD_TESTS=OFF \
-        -DTRACER_BUILD_BENCH=OFF && cmake --build build' >"$log" 2>&1 ||
+        -DTRACER_BUILD_BENCH=OFF -DTRACER_BUILD_ISAS="$1" && cmake --build build' build "$isas" >"$log" 2>&1 ||
         { tail -n 40 "$log" >&2; die "the build failed"; }
 }
 
@@ -105,7 +128,7 @@ run_tests() {
     say "Tests in $(inside blender --version 2>/dev/null | head -n 1)"
     inside env VOLLEY_WITHOUT=xvfb VOLLEY_BUILD=/volley/build \
         BLENDER_USER_SCRIPTS=/volley/build/blender PYTHONPATH=/volley/tests/support sh -c 'cd /volley && exec python3 -m pytest "$@"' pytest \
-        -q -ra -p no:cacheprovider --rootdir tests --junit-prefix next \
+        -q -ra -p no:cacheprovider --rootdir tests --junit-prefix "next_$SUITE" \
         --junit-xml build/pytest.xml "$@"
 }
 
@@ -122,21 +145,23 @@ measure_curves() {
 SLOW="test_whitted or test_means_are_those_of_cycles"
 
 main() {
-    local report="" curves="" status=0 arguments=()
+    local report="" curves="" suite=trixie isas="" status=0 arguments=()
     while [ $# -gt 0 ]; do
         case $1 in
-            --fast) arguments+=(-k "not ($SLOW)"); shift ;;
+            --suite) suite=${2:?--suite needs a name}; shift 2 ;;
+            --fast) arguments+=(-k "not ($SLOW)") isas=$(widest_isa); shift ;;
             --report) report=${2:?--report needs a file}; shift 2 ;;
             --curves) curves=${2:?--curves needs a folder}; shift 2 ;;
             *) break ;;
         esac
     done
     [ -n "$curves" ] || [ $# -gt 0 ] || set -- tests/blender
+    choose_suite "$suite"
     [ "$(id -u)" -eq 0 ] || skip "changing into its folder needs root"
     [ -d "$ROOT" ] || make_root
     install_packages
     copy_sources
-    build
+    build "$isas"
     if [ -n "$curves" ]; then
         measure_curves "$curves"
         exit

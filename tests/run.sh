@@ -4,8 +4,8 @@
 #   bash tests/run.sh [--checks FILE] [--blender-next] [--blender-next-fast]
 #
 # FILE holds further results to count, one per line: "passed NAME" or "failed NAME". --blender-next runs
-# the Blender tests in Blender 4.3 too, --blender-next-fast a selection of them (see blender_next.sh);
-# where that cannot be set up, it is one test skipped. What tests measured of numerical stability is in
+# the Blender tests in Blender 4.3 and 5.2 too, --blender-next-fast a selection of them in 4.3 (see
+# blender_next.sh); where one of the two cannot be set up, it is one test skipped. What tests measured of numerical stability is in
 # build/results/stability.md. The exit code is 0 only if something passed and
 # nothing failed. Python tests find the build through these variables:
 #   VOLLEY_BUILD          the build folder
@@ -18,7 +18,8 @@ source tests/find_python.sh
 
 results=build/results
 summary=()
-next="" # what to run in the next Blender: nothing, all or fast
+next=""   # what to run in newer Blenders: all or fast
+suites=() # of Debian that have those
 
 say() { printf '== %s\n' "$*"; }
 
@@ -44,22 +45,24 @@ run_pytest() {
 }
 
 run_blender_next() {
-    local status=0 arguments=(--report "$results/next.xml")
+    local suite=$1 status=0
+    local name=$results/next_$suite
+    local arguments=(--suite "$suite" --report "$name.xml")
     [ "$next" = all ] || arguments+=(--fast)
-    bash tests/blender_next.sh "${arguments[@]}" 2>&1 | tee "$results/next.log" || status=$?
+    bash tests/blender_next.sh "${arguments[@]}" 2>&1 | tee "$name.log" || status=$?
     if [ "$status" -eq 77 ]; then
-        printf 'skipped %s\n' "$(tail -n 1 "$results/next.log")" >"$results/next.checks"
-        summary+=(--checks "$results/next.checks")
+        printf 'skipped %s\n' "$(tail -n 1 "$name.log")" >"$name.checks"
+        summary+=(--checks "$name.checks")
     else
-        summary+=(--pytest "$results/next.xml" "$status")
+        summary+=(--pytest "$name.xml" "$status")
     fi
 }
 
 while [ $# -gt 0 ]; do
     case $1 in
         --checks) summary+=(--checks "${2:?--checks needs a file}"); shift 2 ;;
-        --blender-next) next=all; shift ;;
-        --blender-next-fast) next=fast; shift ;;
+        --blender-next) next=all suites=(trixie sid); shift ;;
+        --blender-next-fast) next=fast suites=(trixie); shift ;;
         *) printf 'tests/run.sh: unknown argument: %s\n' "$1" >&2; exit 2 ;;
     esac
 done
@@ -79,5 +82,7 @@ summary+=(--ctest "$results/ctest.xml" "$status")
 status=0
 run_pytest || status=$?
 summary+=(--pytest "$results/pytest.xml" "$status")
-[ -z "$next" ] || run_blender_next
+for suite in "${suites[@]}"; do
+    run_blender_next "$suite"
+done
 exec "$python" tests/support/summary.py "${summary[@]}"
