@@ -116,14 +116,15 @@ def _phases(cosine):
 
 
 @functools.lru_cache(maxsize=8)  # a viewport goes back and forth between few
-def nishita_table(sun_elevation, altitude, amounts):
+def nishita_table(sun_elevation, altitude, amounts, ends_at_zenith=False):
     """Radiance (TABLE_HEIGHT, TABLE_WIDTH, 3) float32 without the sun itself, W/(m^2 sr); it may be
     negative where a colour is out of gamut. Row y is of the elevation pi/2 (y / TABLE_HEIGHT)^2, column x
     of the azimuth 2 pi x / TABLE_WIDTH from the one opposite the sun. altitude: m; amounts of air, dust
-    and ozone: 1 for the Earth's."""
+    and ozone: 1 for the Earth's; ends_at_zenith: as in Cycles since 5.0."""
     rows = np.arange(TABLE_HEIGHT, dtype=np.float32) / TABLE_HEIGHT
-    # Cycles' rows end half a step beyond the zenith.
-    elevation = (0.5 * math.pi * (1.0 + 0.5 / TABLE_HEIGHT)) * rows * rows
+    # Otherwise Cycles' rows end half a step beyond the zenith.
+    top = 0.5 * math.pi * (1.0 if ends_at_zenith else 1.0 + 0.5 / TABLE_HEIGHT)
+    elevation = top * rows * rows
     azimuth = 2.0 * math.pi * (0.5 - np.arange(TABLE_WIDTH // 2, dtype=np.float32) / TABLE_WIDTH)
     up, ahead = np.sin(elevation), np.cos(elevation)
     to_sun = (ahead[:, None] * (np.cos(azimuth) * math.cos(sun_elevation)) +

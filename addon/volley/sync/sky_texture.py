@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Sky Texture in the library's terms: its models (``sky.py``) as formulas of plain nodes.
+"""The Sky Texture in the library's terms: its models (``sky.py``, ``sky_scattering.py``) as formulas of plain
+nodes.
 
-Nishita's sky is an image of its table, looked up by elevation and azimuth; its sun is a disc whose
-direction and size the world is told, to be sampled. Hosek and Wilkie's data set is not part of this
+A sky of scattered light is an image of its table, looked up by elevation and azimuth; its sun is a disc
+whose direction and size the world is told, to be sampled. Hosek and Wilkie's data set is not part of this
 add-on: Preetham's sky stands in, dimmed.
 """
 
@@ -12,12 +13,15 @@ from collections import namedtuple
 import numpy as np
 
 from ..abi import ImageExtension, MathOperation as Math, NodeType, VectorOperation as Vector
-from . import sky
+from . import sky, sky_scattering
 from .values import CONSTANT, DEFAULT, Value
 
 _HORIZON = math.cos(0.5 * math.pi - 0.001)  # cosine to the zenith below which Preetham's sky stays the same
 # How bright Hosek and Wilkie's skies in Cycles are beside Preetham's (measured: 0.11 to 0.22).
 _HOSEK_SCALE = 0.16
+
+# Where Cycles looks up the horizon for what is below it, since 5.0: 2.048 rows above the table's lower edge.
+_ROW_BELOW = 2.0 * (0.508 - 0.5)
 
 # A bright disc that a tree shows, for the world to sample: unit direction, diameter in radians.
 Sun = namedtuple("Sun", "direction angle")
@@ -78,8 +82,8 @@ def sky_texture(walker, node, sockets):
     if direction.node == DEFAULT:
         direction = Value('v', walker.emit(NodeType.TEXTURE_COORDINATE, ()), 0)
     formula = _Formula(walker)
-    if node.sky_type == 'NISHITA':
-        color = _nishita(walker, formula, node, direction)
+    if node.sky_type in {'NISHITA', 'SINGLE_SCATTERING', 'MULTIPLE_SCATTERING'}:
+        color = _scattered(walker, formula, node, direction)
     elif node.sky_type in {'PREETHAM', 'HOSEK_WILKIE'}:
         color = _preetham(formula, node, direction)
     else:
@@ -124,39 +128,74 @@ def _preetham(formula, node, direction):
 
 def _altitude(node):
     """Metres above the sea: as in Cycles, the viewer is kept inside the atmosphere."""
-    return min(max(node.altitude, 1.0), 59999.0)
+    return min(max(node.altitude, 1.0), 99999.0 if node.sky_type == 'MULTIPLE_SCATTERING' else 59999.0)
 
 
-def _nishita(walker, formula, node, direction):
-    altitude = _altitude(node)
-    amounts = node.air_density, node.dust_density, node.ozone_density
-    image = walker.table_image("sky", sky.nishita_table, node.sun_elevation, altitude, amounts)
+def _amounts(node):
+    """Of air, dust and ozone; dust is called aerosols since 5.0."""
+    dust = node.aerosol_density if hasattr(node, "aerosol_density") else node.dust_density
+    return node.air_density, dust, node.ozone_density
+
+
+def _scattered(walker, formula, node, direction):
+    """Nishita's sky (single scattering) or one of multiple scattering, and the sun."""
     x, y, z = formula.parts(direction)
     up = formula.number(Math.MINIMUM, formula.number(Math.MAXIMUM, z, -1.0), 1.0)
     elevation = formula.number(Math.ARCSINE, up)
-    above = formula.number(Math.MAXIMUM, elevation, 0.0)
-    row = formula.number(Math.SQRT, formula.number(Math.DIVIDE, above, 0.5 * math.pi))
     turns = formula.number(Math.DIVIDE, formula.number(Math.ARCTAN2, x, y), 2.0 * math.pi)
     turns = formula.number(Math.ADD, turns, 0.5 - node.sun_rotation / (2.0 * math.pi))
-    place = formula.combine(formula.number(Math.FRACT, turns), row, 0.0)
-    color = Value('v', walker.emit(NodeType.IMAGE, (place, _number(0.0)), ImageExtension.EXTEND, image=image), 0)
-    # Below the horizon its colours fade out.
+    turns = formula.number(Math.FRACT, turns)
+    if node.sky_type == 'MULTIPLE_SCATTERING':
+        color = _multiple(walker, formula, node, turns, elevation)
+    else:
+        color = _single(walker, formula, node, turns, elevation, z)
+    horizon = sky_scattering.horizon(_altitude(node)) if node.sky_type == 'MULTIPLE_SCATTERING' else 0.0
+    if not node.sun_disc or node.sun_elevation + 0.5 * node.sun_size <= horizon:
+        return color
+    return _sun_disc(walker, formula, node, direction, elevation, horizon, color)
+
+
+def _look_up(walker, formula, turns, row, table, *arguments):
+    image = walker.table_image("sky", table, *arguments)
+    place = formula.combine(turns, row, 0.0)
+    return Value('v', walker.emit(NodeType.IMAGE, (place, _number(0.0)), ImageExtension.EXTEND, image=image), 0)
+
+
+def _multiple(walker, formula, node, turns, elevation):
+    """Its table reaches from the nadir to the zenith."""
+    size = formula.number(Math.DIVIDE, formula.number(Math.ABSOLUTE, elevation), 0.5 * math.pi)
+    row = formula.number(Math.MULTIPLY, formula.number(Math.SQRT, size), 0.5)
+    row = formula.number(Math.MULTIPLY_ADD, row, formula.number(Math.SIGN, elevation), 0.5)
+    return _look_up(walker, formula, turns, row, sky_scattering.table, node.sun_elevation, _altitude(node),
+                    _amounts(node))
+
+
+def _single(walker, formula, node, turns, elevation, z):
+    """Its table begins at the horizon, below which colours fade out."""
+    is_new = node.sky_type == 'SINGLE_SCATTERING'
+    above = formula.number(Math.MAXIMUM, elevation, 0.0)
+    row = formula.number(Math.SQRT, formula.number(Math.DIVIDE, above, 0.5 * math.pi))
+    if is_new:
+        is_below = formula.number(Math.LESS_THAN, z, 0.0)
+        row = formula.number(Math.MULTIPLY_ADD, is_below, _ROW_BELOW, row)
+    color = _look_up(walker, formula, turns, row, sky.nishita_table, node.sun_elevation, _altitude(node),
+                     _amounts(node), is_new)
     fade = formula.number(Math.MULTIPLY_ADD, formula.number(Math.MINIMUM, z, 0.0), 2.5, 1.0)
     fade = formula.number(Math.MAXIMUM, fade, 0.0)
     cube = formula.number(Math.MULTIPLY, formula.number(Math.MULTIPLY, fade, fade), fade)
-    color = formula.vector(Vector.MULTIPLY, color, formula.spread(cube))
-    if not node.sun_disc or node.sun_elevation + 0.5 * node.sun_size <= 0.0:
-        return color
-    return _sun_disc(walker, formula, node, direction, elevation, color)
+    return formula.vector(Vector.MULTIPLY, color, formula.spread(cube))
 
 
-def _sun_disc(walker, formula, node, direction, elevation, color):
-    """The sky's colour with the sun's in front of it, above the horizon."""
+def _sun_disc(walker, formula, node, direction, elevation, horizon, color):
+    """The sky's colour with the sun's above the horizon: in front of it or, since 5.0, added to it."""
     height, turn, size = node.sun_elevation, node.sun_rotation, node.sun_size
     sun = (math.cos(height) * math.sin(turn), math.cos(height) * math.cos(turn), math.sin(height))
     walker.flat.sun = Sun(sun, size)
-    low, high = sky.sun_colors(height, size, _altitude(node), (node.air_density, node.dust_density))
-    bottom, top = max(height - 0.5 * size, 0.0), height + 0.5 * size
+    colors = sky_scattering.sun_colors if node.sky_type == 'MULTIPLE_SCATTERING' else sky.sun_colors
+    low, high = colors(height, size, _altitude(node), _amounts(node))
+    bottom, top = height - 0.5 * size, height + 0.5 * size
+    if node.sky_type == 'NISHITA':
+        bottom = max(bottom, 0.0)
     part = formula.number(Math.DIVIDE, formula.number(Math.SUBTRACT, elevation, bottom), top - bottom)
     shown = formula.vector(Vector.MULTIPLY_ADD, formula.spread(part), high - low, low)
     # The angle by its chord, which small angles need.
@@ -168,8 +207,12 @@ def _sun_disc(walker, formula, node, direction, elevation, color):
     limb = formula.number(Math.SQRT, formula.number(Math.SUBTRACT, 1.0, square))
     limb = formula.number(Math.MULTIPLY_ADD, limb, 0.6 * node.sun_intensity, 0.4 * node.sun_intensity)
     shown = formula.vector(Vector.MULTIPLY, shown, formula.spread(limb))
+    shown = formula.vector(Vector.MAXIMUM, shown, (0.0,) * 3)
     is_sun = formula.number(Math.LESS_THAN, ratio, 1.0)
-    if height < 0.5 * size:
-        is_up = formula.number(Math.LESS_THAN, 0.0, elevation)
+    if height - 0.5 * size < horizon:
+        is_up = formula.number(Math.LESS_THAN, horizon, elevation)
         is_sun = formula.number(Math.MULTIPLY, is_sun, is_up)
-    return formula.choose(is_sun, formula.vector(Vector.MAXIMUM, shown, (0.0,) * 3), color)
+    if node.sky_type == 'NISHITA':
+        return formula.choose(is_sun, shown, color)
+    color = formula.vector(Vector.MAXIMUM, color, (0.0,) * 3)
+    return formula.vector(Vector.MULTIPLY_ADD, shown, formula.spread(is_sun), color)
