@@ -168,7 +168,7 @@ def inside_flat():
             pulsing.keyframe_insert("scale", frame=frame)
             sliding.keyframe_insert("location", frame=frame)
         for moving in (pulsing, sliding):
-            for curve in moving.animation_data.action.fcurves:
+            for curve in scenes.curves(moving):
                 for key in curve.keyframe_points:
                     key.interpolation = 'LINEAR'
         scene.frame_set(1)
@@ -395,7 +395,7 @@ def inside_shutter():
     for frame, x in ((0, -3.6), (2, 3.6)):
         moving.location.x = x
         moving.keyframe_insert("location", frame=frame)
-    for key in moving.animation_data.action.fcurves[0].keyframe_points:
+    for key in scenes.curves(moving)[0].keyframe_points:
         key.interpolation = 'LINEAR'
     scene.frame_set(1)
     scene.render.use_motion_blur, scene.render.motion_blur_shutter = True, 1.0
@@ -436,7 +436,7 @@ def inside_turning():
     scene.frame_set(1)
     scene.render.use_motion_blur, scene.render.motion_blur_shutter = True, 1.0
     pictures = _both(512)
-    for key in bar.animation_data.action.fcurves.find("scale", index=1).keyframe_points:
+    for key in scenes.curves(bar).find("scale", index=1).keyframe_points:
         key.co.y = key.handle_left.y = key.handle_right.y = 0.0
     scene.frame_set(1)
     scenes.set_engine('VOLLEY', 512)

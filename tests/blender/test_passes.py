@@ -278,16 +278,13 @@ def _matte(names):
     import bpy
     import scenes
     scene = bpy.context.scene
-    tree, folder = scene.node_tree, tempfile.mkdtemp(prefix="volley_")
-    tree.nodes.clear()
+    folder = tempfile.mkdtemp(prefix="volley_")
+    tree, shown = scenes.compositor()
     node = tree.nodes.new("CompositorNodeCryptomatteV2")
     node.scene, node.layer_name, node.matte_id = scene, "ViewLayer.CryptoObject", names
     tree.links.new(tree.nodes.new("CompositorNodeRLayers").outputs["Image"], node.inputs["Image"])
-    output = tree.nodes.new("CompositorNodeOutputFile")
-    output.base_path = folder
-    output.format.file_format, output.format.color_depth = 'OPEN_EXR', '32'
-    tree.links.new(node.outputs["Matte"], output.inputs[0])
-    tree.links.new(node.outputs["Image"], tree.nodes.new("CompositorNodeComposite").inputs[0])
+    tree.links.new(node.outputs["Matte"], scenes.file_output(tree, folder, ["matte"])["matte"])
+    tree.links.new(node.outputs["Image"], shown)
     bpy.ops.render.render()
     return scenes.load(os.path.join(folder, os.listdir(folder)[0]))
 

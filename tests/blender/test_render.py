@@ -92,12 +92,9 @@ def inside_view_layers():
     second.layer_collection.children["Hidden"].exclude = True
     third = scene.view_layers.new("Third")
     third.material_override = scenes.emitter((0.0, 0.0, 1.0), "Blue")
-    scene.use_nodes = True
-    tree = scene.node_tree
-    tree.nodes.clear()
-    composite = tree.nodes.new("CompositorNodeComposite")
+    tree, shown = scenes.compositor()
     layers = tree.nodes.new("CompositorNodeRLayers")
-    tree.links.new(layers.outputs["Image"], composite.inputs[0])
+    tree.links.new(layers.outputs["Image"], shown)
     pictures = []
     for layer in (first, second, third):
         layers.layer = layer.name

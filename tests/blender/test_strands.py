@@ -159,10 +159,11 @@ def _stage():
 
 def _keyed(owner, path, values, frames=(0, 2)):
     """Make a property go through values in straight lines."""
+    import scenes
     for frame, value in zip(frames, values):
         setattr(owner, path, value)
         owner.keyframe_insert(path, frame=frame)
-    for curve in owner.id_data.animation_data.action.fcurves:
+    for curve in scenes.curves(owner.id_data):
         for point in curve.keyframe_points:
             point.interpolation = 'LINEAR'
 

@@ -235,8 +235,8 @@ def inside_motion(position):
         modifier = changing.modifiers.new("Build", 'BUILD')
         modifier.frame_start, modifier.frame_duration = 0, 4
     scenes.geometry_nodes(dotted, "GeometryNodeMeshToPoints")
-    for action in bpy.data.actions:
-        for curve in action.fcurves:
+    for animated in bpy.data.objects:
+        for curve in scenes.curves(animated) if animated.animation_data else ():
             for point in curve.keyframe_points:
                 point.interpolation = 'LINEAR'
     scene = bpy.context.scene

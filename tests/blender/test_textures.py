@@ -343,7 +343,7 @@ def _build(tree, center, case, output):
             socket.default_value = (*value, 1.0)
         else:
             socket.default_value = value
-    tree.links.new(next(s for s in node.outputs if s.name == output and s.enabled), shown.inputs[0])
+    tree.links.new(next(s for s in node.outputs if output in (s.name, s.identifier) and s.enabled), shown.inputs[0])
 
 
 def _is_known(node_type, properties):

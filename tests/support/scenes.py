@@ -56,6 +56,50 @@ def set_engine(engine, samples):
             cycles.sampling_pattern = 'TABULATED_SOBOL'
 
 
+def socket(sockets, name):
+    """A node's socket of that name or identifier: 5.0 gave some other names."""
+    return sockets[name] if name in sockets else next(s for s in sockets if s.identifier == name)
+
+
+def curves(owner):
+    """The animation curves of what is animated; since 4.4 they lie in layers."""
+    action, slot = owner.animation_data.action, getattr(owner.animation_data, "action_slot", None)
+    if hasattr(action, "fcurves"):
+        return action.fcurves
+    return action.layers[0].strips[0].channelbag(slot).fcurves
+
+
+def compositor():
+    """The scene's empty compositing tree, and the input that takes its picture."""
+    scene = bpy.context.scene
+    if hasattr(scene, "compositing_node_group"):  # since 5.0
+        tree = bpy.data.node_groups.new("Compositor", 'CompositorNodeTree')
+        tree.interface.new_socket("Image", in_out='OUTPUT', socket_type='NodeSocketColor')
+        scene.compositing_node_group = tree
+        return tree, tree.nodes.new("NodeGroupOutput").inputs[0]
+    scene.use_nodes = True
+    scene.node_tree.nodes.clear()
+    return scene.node_tree, scene.node_tree.nodes.new("CompositorNodeComposite").inputs[0]
+
+
+def file_output(tree, folder, names):
+    """A compositing node that writes EXR files whose names begin so: its inputs, by name."""
+    output = tree.nodes.new("CompositorNodeOutputFile")
+    if hasattr(output, "file_output_items"):  # since 5.0
+        output.format.media_type, output.directory, output.file_name = 'IMAGE', folder, ""
+    else:
+        output.base_path = folder
+        output.file_slots.clear()
+    output.format.file_format, output.format.color_depth = 'OPEN_EXR', '32'
+    output.format.color_mode = 'RGBA'
+    for name in names:
+        if hasattr(output, "file_output_items"):
+            output.file_output_items.new('RGBA', name)
+        else:
+            output.file_slots.new(name)
+    return dict(zip(names, output.inputs))
+
+
 def link(name, data):
     """A new object of that data in the scene's collection."""
     made = bpy.data.objects.new(name, data)
@@ -239,21 +283,13 @@ def load(path):
 
 def render_passes(names):
     """Render once; {pass name: picture} of the active view layer, through the compositor."""
-    scene = bpy.context.scene
     folder = tempfile.mkdtemp(prefix="volley_")
-    scene.use_nodes = True
-    tree = scene.node_tree
-    tree.nodes.clear()
+    tree, shown = compositor()
     layers = tree.nodes.new("CompositorNodeRLayers")
-    output = tree.nodes.new("CompositorNodeOutputFile")
-    output.base_path = folder
-    output.format.file_format, output.format.color_depth = 'OPEN_EXR', '32'
-    output.format.color_mode = 'RGBA'
-    output.file_slots.clear()
-    for number, name in enumerate(names):
-        output.file_slots.new(f"pass{number:02d}_")
-        tree.links.new(layers.outputs["Image" if name == "Combined" else name], output.inputs[-1])
-    tree.links.new(layers.outputs["Image"], tree.nodes.new("CompositorNodeComposite").inputs[0])
+    files = [f"pass{number:02d}_" for number in range(len(names))]
+    for name, written in zip(names, file_output(tree, folder, files).values()):
+        tree.links.new(layers.outputs["Image" if name == "Combined" else name], written)
+    tree.links.new(layers.outputs["Image"], shown)
     bpy.ops.render.render()
     files = sorted(os.listdir(folder))
     assert len(files) == len(names), f"{files} for passes {names}"
