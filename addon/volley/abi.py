@@ -562,7 +562,8 @@ class PassId(IntEnum):
     SHADOW_CATCHER = 26
     DENOISING_ROUGHNESS = 27
     DENOISING_SPECULAR_ALBEDO = 28
-    COUNT = 29
+    NOISY_COMBINED = 29
+    COUNT = 30
 
 
 class PassRange(IntEnum):
@@ -728,7 +729,8 @@ class RenderDesc(Structure):
                 ("progressive", c_uint32), ("noise_threshold", c_float), ("min_samples", c_uint32),
                 ("mist_start", c_float), ("mist_depth", c_float), ("mist_falloff", c_float),
                 ("cryptomattes", c_uint32), ("cryptomatte_depth", c_uint32), ("aov_value_count", c_uint32),
-                ("aov_color_count", c_uint32), ("light_group_count", c_uint32))
+                ("aov_color_count", c_uint32), ("light_group_count", c_uint32), ("denoise", c_uint32),
+                ("reserved", c_uint32))
 
 
 class RenderProgress(Structure):
@@ -1124,6 +1126,7 @@ PASS_CHANNELS = {
     PassId.SHADOW_CATCHER: "RGB",
     PassId.DENOISING_ROUGHNESS: "X",
     PassId.DENOISING_SPECULAR_ALBEDO: "RGB",
+    PassId.NOISY_COMBINED: "RGBA",
 }
 
 # Passes of each range, and their channels.

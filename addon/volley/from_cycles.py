@@ -12,6 +12,7 @@ _COPIED = (
     ("use_preview_adaptive_sampling", "use_preview_adaptive_sampling"),
     ("preview_adaptive_threshold", "preview_noise_threshold"),
     ("preview_adaptive_min_samples", "preview_adaptive_min_samples"),
+    ("use_denoising", "use_denoising"), ("use_preview_denoising", "use_preview_denoising"),
     ("seed", "seed"), ("use_animated_seed", "use_animated_seed"),
     ("max_bounces", "max_depth"), ("glossy_bounces", "max_glossy_depth"),
     ("transmission_bounces", "max_transmission_depth"), ("transparent_max_bounces", "max_transparent_depth"),
@@ -28,8 +29,7 @@ _UNMATCHED = (
     ("min_light_bounces", 0, "Min Light Bounces"), ("min_transparent_bounces", 0, "Min Transparent Bounces"),
     ("light_sampling_threshold", 0.0, "Light Threshold"), ("use_light_tree", True, "Light Tree"),
     ("use_guiding", False, "Path Guiding"), ("sample_offset", 0, "Sample Offset"),
-    ("scrambling_distance", 1.0, "Scrambling Distance"), ("use_denoising", False, "Denoise"),
-    ("use_preview_denoising", False, "Denoise in the viewport"),
+    ("scrambling_distance", 1.0, "Scrambling Distance"),
     ("film_transparent_glass", False, "Transparent Glass"),
 )
 

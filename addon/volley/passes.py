@@ -38,6 +38,7 @@ _BLENDER_PASSES = {
     PassId.SHADOW: ("Shadow", "Shadow", "use_pass_shadow"),
     PassId.SHADOW_CATCHER: ("Shadow Catcher", "Shadow Catcher", "volley.use_pass_shadow_catcher"),
     PassId.MIST: ("Mist", "Mist", "use_pass_mist"),
+    PassId.NOISY_COMBINED: ("Noisy Image", "Noisy Image", "volley.denoising_store_passes"),
     PassId.DENOISING_ALBEDO: ("Denoising Albedo", "Denoising Albedo", "volley.denoising_store_passes"),
     PassId.DENOISING_NORMAL: ("Denoising Normal", "Denoising Normal", "volley.denoising_store_passes"),
     PassId.DENOISING_DEPTH: ("Denoising Depth", "Denoising Depth", "volley.denoising_store_passes"),

@@ -119,6 +119,14 @@ class VolleySceneSettings(bpy.types.PropertyGroup):
         description="Most seconds of rendering for each view layer, without synchronizing and building: the "
                     "picture has the samples that were taken by then, one of each pixel at least. 0 is no "
                     "limit", update=_changed)
+    use_denoising: BoolProperty(
+        name="Denoise", default=False,
+        description="Take the noise out of the picture once it has all samples, not one that Esc or a time "
+                    "limit ends before; with more samples it goes to the same limit as without",
+        update=_changed)
+    use_preview_denoising: BoolProperty(
+        name="Denoise", default=False,
+        description="Take the noise out of the viewport's picture once it has all samples", update=_changed)
     sampler: EnumProperty(
         name="Sampler", items=SAMPLER_ITEMS, default='SOBOL', description="Where samples are taken",
         update=_changed)

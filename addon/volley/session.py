@@ -214,7 +214,7 @@ class _Run:
     def _is_over_time(self, progress):
         """Whether to stop with what there is, which is at least a sample of each pixel."""
         return 0.0 < self._time_limit < progress.seconds and progress.samples_done > 0 \
-            and progress.state == abi.ProgressState.RUNNING
+            and progress.fraction < 1.0 and progress.state == abi.ProgressState.RUNNING
 
     def _show_progress(self, progress, is_done):
         now = time.monotonic()
@@ -295,6 +295,7 @@ def render_fields(scene, frame, crop, entries, is_preview=False):
         "filter": abi.FilterType[settings.pixel_filter_type], "filter_width": settings.filter_width,
         "film_transparent": int(scene.render.film_transparent),
         "film_exposure": settings.film_exposure, **passes.request_fields(entries),
+        "denoise": int(settings.use_preview_denoising if is_preview else settings.use_denoising),
         "thread_count": thread_count(scene.render), **_adaptive_fields(settings, is_preview),
         **world.mist_fields(scene.world),
     }

@@ -219,7 +219,7 @@ class _Pictures:
         self._is_last = not self._stages
         fields = divided(self._fields, divisor)
         if sample_count is not None:
-            fields.update(sample_count=sample_count, noise_threshold=0.0)
+            fields.update(sample_count=sample_count, noise_threshold=0.0, denoise=0)
         self._samples = fields["sample_count"]
         width, height = fields["width"], fields["height"]
         scale_x, scale_y = self._view.size[0] / width, self._view.size[1] / height

@@ -148,6 +148,7 @@ static void check_render(struct session *s, uint32_t progressive) {
     desc.cryptomattes = (1u << TRC_CRYPTOMATTE_KINDS) - 1;
     desc.cryptomatte_depth = 6;
     desc.aov_value_count = desc.aov_color_count = desc.light_group_count = 1;
+    desc.denoise = 1;
     trc_render render;
     STEP_OUT(render, trc_render_start(s->scene, &desc, &render));
     STEP(trc_render_wait(render, -1.0));

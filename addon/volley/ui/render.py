@@ -36,6 +36,7 @@ def _draw_samples(layout, settings, prefix=""):
     column.prop(settings, f"{prefix}samples", text="Max Samples" if is_adaptive else "Samples")
     if is_adaptive:
         column.prop(settings, f"{prefix}adaptive_min_samples")
+    layout.prop(settings, f"use_{prefix}denoising")
 
 
 class VOLLEY_RENDER_PT_sampling_viewport(VolleyPanel, Panel):

@@ -41,6 +41,7 @@ trc_status trc_film_create(const trc_render_desc *desc, struct trc_film *film) {
                             .height = desc->crop_height,
                             .shows_counts = desc->passes >> TRC_PASS_SAMPLE_COUNT & 1,
                             .shows_shadows = desc->passes >> TRC_PASS_SHADOW_CATCHER & 1,
+                            .shows_noise = desc->passes >> TRC_PASS_NOISY_COMBINED & 1,
                             .is_transparent = desc->film_transparent,
                             .matte_count = trc_film_matte_count(desc)};
     TRC_TRY(trc_film_check_budget(made.width, made.height, trc_film_pixel_bytes(desc), 0));
@@ -81,6 +82,10 @@ trc_status trc_film_add_catchers(struct trc_film *film) {
 
 void trc_film_destroy(struct trc_film *film) {
     trc_free(film->caught);
+    trc_free(film->halves);
+    trc_free(film->clean.caught);
+    for (uint32_t pass = 0; pass < TRC_SUM_COUNT; pass++)
+        trc_free(film->clean.sums[pass]);
     for (uint32_t pass = 0; pass < TRC_SUM_COUNT; pass++)
         trc_free(film->sums[pass]);
     for (uint32_t kind = 0; kind < TRC_CRYPTOMATTE_KINDS; kind++)

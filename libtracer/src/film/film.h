@@ -2,6 +2,7 @@
 #ifndef TRACER_FILM_FILM_H
 #define TRACER_FILM_FILM_H
 
+#include "model/denoise.h"
 #include "model/film.h"
 
 /* TRC_ERROR_TOO_LARGE unless so many bytes for every pixel, and others, can be had
@@ -19,6 +20,18 @@ trc_status trc_film_create(const trc_render_desc *desc, struct trc_film *film);
 
 /* Takes the memory for shadow catchers. TRC_ERROR_OUT_OF_MEMORY. */
 trc_status trc_film_add_catchers(struct trc_film *film);
+
+/* Takes the memory that reconstruction needs of the film, after the memory for shadow catchers;
+ * desc is resolved. TRC_ERROR_OUT_OF_MEMORY. (film/denoise.c) */
+trc_status trc_film_add_halves(const trc_render_desc *desc, struct trc_film *film);
+
+/* Bytes of that and of the filter for each pixel. */
+uint64_t trc_film_half_bytes(const trc_render_desc *desc, bool has_catchers);
+
+/* Takes the memory between the phases of reconstruction, of a film with halves.
+ * TRC_ERROR_OUT_OF_MEMORY. */
+trc_status trc_denoise_create(struct trc_film *film, struct trc_denoise *denoise);
+void trc_denoise_destroy(struct trc_denoise *denoise);
 
 void trc_film_destroy(struct trc_film *film);
 

@@ -22,6 +22,7 @@ struct reading {
     uint32_t pass;
     const struct trc_pass_info *info;
     float exposure;
+    bool is_clean; /* reconstructed light, where there is any */
     float *out;
 };
 
@@ -40,12 +41,23 @@ static uint32_t load_count(const struct trc_film *film, uint64_t pixel) {
     return __atomic_load_n(&film->sample_counts[pixel], __ATOMIC_RELAXED);
 }
 
+static const double *sums_of(const struct reading *r, uint32_t pass) {
+    const double *clean = r->film->clean.sums[pass];
+    return r->is_clean && clean ? clean : r->film->sums[pass];
+}
+static const struct trc_caught *caught_of(const struct reading *r) {
+    const struct trc_caught *clean = r->film->clean.caught;
+    return r->is_clean && clean ? clean : r->film->caught;
+}
+
 static bool has_pass(const struct trc_film *film, uint32_t pass) {
     const enum trc_pass_kind kind = trc_pass_info_of(pass)->kind;
     if (kind == TRC_PASS_KIND_COUNT)
         return film->shows_counts;
     if (kind == TRC_PASS_KIND_SHADOW)
         return film->shows_shadows;
+    if (kind == TRC_PASS_KIND_PLAIN)
+        return film->shows_noise;
     if (kind != TRC_PASS_KIND_MATTE)
         return film->sums[pass] != NULL;
     const uint32_t number = pass - TRC_PASS_CRYPTOMATTE(0, 0),
@@ -76,8 +88,8 @@ static void read_counts(const struct reading *r, struct row row) {
 static void read_sums(const struct reading *r, struct row row) {
     const enum trc_pass_kind kind = r->info->kind;
     const uint32_t channels = r->info->channels, stride = r->info->sums;
-    const double *sums = r->film->sums[r->pass];
-    const double *divisor = r->info->color != TRC_PASS_NONE ? r->film->sums[r->info->color] : NULL;
+    const double *sums = sums_of(r, r->pass);
+    const double *divisor = r->info->color != TRC_PASS_NONE ? sums_of(r, r->info->color) : NULL;
     const double light = kind == TRC_PASS_KIND_LIGHT ? r->exposure : 1.0;
     for (uint64_t i = row.first; i < row.end; i++) {
         const uint32_t count = load_count(r->film, i);
@@ -110,13 +122,14 @@ static void remains_of(const struct trc_caught *caught, double remains[3]) {
 /* What the footage is to be multiplied by: a pixel's mean over what the picture does not cover. */
 static void read_shadows(const struct reading *r, struct row row) {
     const struct trc_film *film = r->film;
+    const struct trc_caught *caught = caught_of(r);
+    const double *combined = sums_of(r, TRC_PASS_COMBINED);
     for (uint64_t i = row.first; i < row.end; i++) {
         double remains[3] = {1.0, 1.0, 1.0}, part = 0.0;
-        if (film->caught) {
-            const double open =
-                load_count(film, i) - trc_sum_load(&film->sums[TRC_PASS_COMBINED][4 * i + 3]);
-            remains_of(&film->caught[i], remains);
-            part = open > 0.0 ? fmin(trc_sum_load(&film->caught[i].coverage) / open, 1.0) : 0.0;
+        if (caught) {
+            const double open = load_count(film, i) - trc_sum_load(&combined[4 * i + 3]);
+            remains_of(&caught[i], remains);
+            part = open > 0.0 ? fmin(trc_sum_load(&caught[i].coverage) / open, 1.0) : 0.0;
         }
         for (int c = 0; c < 3; c++)
             r->out[3 * i + c] = to_float(1.0 + part * (remains[c] - 1.0));
@@ -128,7 +141,7 @@ static void read_shadows(const struct reading *r, struct row row) {
 static void add_shadows(const struct reading *r, struct row row) {
     const struct trc_film *film = r->film;
     for (uint64_t i = row.first; i < row.end; i++) {
-        const struct trc_caught *caught = &film->caught[i];
+        const struct trc_caught *caught = &caught_of(r)[i];
         const uint32_t count = load_count(film, i);
         const double part = count ? trc_sum_load(&caught->coverage) / count : 0.0;
         if (!(part > 0.0))
@@ -160,6 +173,7 @@ static void read_row(const struct reading *r, struct row row) {
     case TRC_PASS_KIND_MEAN:
     case TRC_PASS_KIND_HITS:
     case TRC_PASS_KIND_FIRST:
+    case TRC_PASS_KIND_PLAIN:
         read_sums(r, row);
     }
     if (r->pass == TRC_PASS_COMBINED && film->caught && !film->shows_shadows)
@@ -202,7 +216,19 @@ trc_status trc_film_read(const struct trc_film *film, uint32_t pass, float expos
     }
     TRC_TRY(trc_check_array(out, float_count, (uint64_t)film->width * film->height * info->channels,
                             sizeof(float), sizeof(float), "pixels_out"));
-    const struct reading reading = {film, pass, info, exposure, out};
+    struct reading reading = {
+        .film = film,
+        .pass = pass,
+        .info = info,
+        .exposure = exposure,
+        .is_clean = __atomic_load_n(&film->is_clean, __ATOMIC_ACQUIRE),
+        .out = out,
+    };
+    if (info->kind == TRC_PASS_KIND_PLAIN) {
+        reading.pass = TRC_PASS_COMBINED;
+        reading.info = trc_pass_info_of(TRC_PASS_COMBINED);
+        reading.is_clean = false;
+    }
     for (uint32_t y = 0; y < trc_film_tiles(film->height); y++)
         for (uint32_t x = 0; x < trc_film_tiles(film->width); x++)
             read_tile(&reading, x, y);

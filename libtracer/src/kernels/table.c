@@ -1,6 +1,7 @@
 /* This instruction set's entry in the dispatch (model/kernels.c). */
 #include "model/kernels.h"
 
+#include "kernels/filter/filter.h"
 #include "kernels/light/lamp_shade.h"
 #include "kernels/light/world.h"
 #include "kernels/program/program.h"
@@ -22,6 +23,8 @@ const struct trc_kernels TRC_KERNEL(trc_kernels) = {
     .width = TRC_WIDTH,
     .tile_memory_bytes = TRC_KERNEL(trc_tile_memory_bytes),
     .tile_render = TRC_KERNEL(trc_tile_render),
+    .denoise_memory_bytes = TRC_KERNEL(trc_denoise_memory_bytes),
+    .denoise_tile = TRC_KERNEL(trc_denoise_tile),
     .query_closest = TRC_KERNEL(trc_query_closest_rays),
     .query_occluded = TRC_KERNEL(trc_query_occluded_rays),
     .world_evaluate = TRC_KERNEL(trc_world_evaluate),

@@ -38,6 +38,22 @@ struct trc_caught {
     double coverage;                 /* how much of the footage the catchers stand for */
 };
 
+/* So many doubles. */
+#define TRC_CAUGHT_CHANNELS (sizeof(struct trc_caught) / sizeof(double))
+
+/* Sums over the first half of a pixel's samples, by which reconstruction knows noise. */
+struct trc_half {
+    float light[4];    /* of Combined; with the light of shadow catchers */
+    float features[7]; /* of the passes for denoisers: albedo, normal, depth */
+    uint32_t count;    /* of the samples, below that of all; 0: there is no half yet */
+};
+
+/* What reconstruction makes of sums of light; NULL where there is nothing of the kind. */
+struct trc_clean_film {
+    double *sums[TRC_SUM_COUNT];
+    struct trc_caught *caught;
+};
+
 struct trc_film {
     uint32_t width, height;      /* of the crop */
     double *sums[TRC_SUM_COUNT]; /* by pass: trc_pass_info.sums * width * height, or NULL; bottom
@@ -50,12 +66,23 @@ struct trc_film {
     struct trc_caught *caught; /* width * height, or NULL: the scene has no shadow catchers */
     bool shows_shadows;        /* their shadows are a pass, so Combined is without them */
     bool is_transparent;       /* trc_render_desc.film_transparent */
+    struct trc_half *halves;   /* width * height, or NULL: no reconstruction */
+    uint32_t half_count;       /* samples of the first half; 0: the largest power of two below
+                                  their count */
+    struct trc_clean_film clean;
+    uint32_t is_clean; /* atomic: the clean film is what is read */
+    bool shows_noise;  /* the plain Combined is a pass */
 };
 
 /* The sequence number of the tile that has the pixel. */
 static inline atomic_uint *trc_film_sequence(const struct trc_film *film, uint32_t x, uint32_t y) {
     const size_t row = y / TRC_TILE_SIZE;
     return &film->sequences[row * trc_film_tiles(film->width) + x / TRC_TILE_SIZE];
+}
+
+/* Whether a pixel's first half of samples ends with so many. */
+static inline bool trc_film_ends_half(const struct trc_film *film, uint32_t count) {
+    return film->half_count ? count == film->half_count : count && !(count & (count - 1));
 }
 
 /* Whether the film has sums of a pass: it is asked for by the resolved desc, and is of a kind that

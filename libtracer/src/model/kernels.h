@@ -7,6 +7,7 @@
 #include <stdint.h>
 
 #include "model/adaptive.h"
+#include "model/denoise.h"
 #include "model/film.h"
 #include "model/snapshot.h"
 #include "tracer/tracer.h"
@@ -47,6 +48,9 @@ struct trc_kernels {
     size_t (*tile_memory_bytes)(const trc_render_desc *desc, const struct trc_snapshot *snapshot);
     /* Renders a job; never fails. The thread's floating-point state must be the default. */
     void (*tile_render)(struct trc_tile_job *job);
+    /* Bytes of scratch memory a job of reconstruction needs, and the job; never fails. */
+    size_t (*denoise_memory_bytes)(void);
+    void (*denoise_tile)(const struct trc_denoise_job *job);
     /* trc_query_*: arguments already validated; chunk [begin, end) of the arrays. packet_size
      * resolved. */
     void (*query_closest)(const struct trc_snapshot *snapshot, const trc_rays *rays,

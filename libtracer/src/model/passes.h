@@ -14,7 +14,8 @@ enum trc_pass_kind {
     TRC_PASS_KIND_FIRST,
     TRC_PASS_KIND_COUNT,
     TRC_PASS_KIND_SHADOW,
-    TRC_PASS_KIND_MATTE
+    TRC_PASS_KIND_MATTE,
+    TRC_PASS_KIND_PLAIN
 };
 
 /* No pass: trc_pass_info.color. */

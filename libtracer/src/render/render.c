@@ -32,13 +32,14 @@ struct trc_render_state {
     const struct trc_kernels *kernels;
     struct trc_film film;
     struct trc_adaptive adaptive; /* without pixels: off */
+    struct trc_denoise denoise;   /* without film: off */
     struct trc_schedule schedule;
     uint32_t *sampler_table;
     float filter_table[TRC_FILTER_TABLE];
     uint32_t worker_count, started_count;
     struct worker *workers;
     atomic_uint cancel;
-    atomic_uint_fast64_t next_item;
+    atomic_uint_fast64_t next_item, next_denoise_item;
 
     pthread_mutex_t lock; /* all below */
     pthread_cond_t tile_done;
@@ -47,6 +48,7 @@ struct trc_render_state {
     uint32_t *batch_tiles;  /* tiles done of each batch */
     uint32_t lowest_batch;  /* first batch that not all tiles have */
     uint32_t tiles_done;    /* with all their batches */
+    uint64_t denoise_done;  /* tiles of all phases of reconstruction */
     uint64_t pixel_samples_done;
     struct trc_tile_counts counts;
     uint32_t version, state;
@@ -79,6 +81,8 @@ trc_render_desc trc_render_resolve(const trc_render_desc *desc) {
             *depths[i] = TRC_MAX_DEPTH;
     }
     r.passes = trc_passes_with_colors(r.passes) | UINT64_C(1) << TRC_PASS_COMBINED;
+    if (r.denoise)
+        r.passes |= TRC_DENOISE_PASSES;
     return r;
 }
 
@@ -192,11 +196,62 @@ static bool render_item_adaptive(struct trc_render_state *render, uint32_t tile,
     return true;
 }
 
+/* ---- reconstruction ---- */
+
+/* Tiles of all phases. */
+static uint64_t denoise_item_count(const struct trc_render_state *render) {
+    const uint64_t phases = render->denoise.film ? TRC_DENOISE_PHASE_COUNT : 0;
+    return phases * render->schedule.tile_count;
+}
+
+/* Waits until all tiles are through what comes before a phase; false if the render is cancelled. */
+static bool await_former_phase(struct trc_render_state *render, uint32_t phase) {
+    const uint32_t tile_count = render->schedule.tile_count;
+    pthread_mutex_lock(&render->lock);
+    while (
+        (render->tiles_done < tile_count || render->denoise_done < (uint64_t)phase * tile_count) &&
+        !atomic_load(&render->cancel))
+        pthread_cond_wait(&render->tile_done, &render->lock);
+    pthread_mutex_unlock(&render->lock);
+    return !atomic_load(&render->cancel);
+}
+
+static void finish_denoise_item(struct trc_render_state *render) {
+    pthread_mutex_lock(&render->lock);
+    if (++render->denoise_done == denoise_item_count(render)) {
+        __atomic_store_n(&render->film.is_clean, 1, __ATOMIC_RELEASE);
+        render->version++;
+    }
+    pthread_cond_broadcast(&render->tile_done);
+    pthread_mutex_unlock(&render->lock);
+}
+
+/* Takes tiles of the phases in their order until none is left. */
+static void reconstruct(struct trc_render_state *render, void *memory) {
+    const uint64_t item_count = denoise_item_count(render);
+    while (!atomic_load(&render->cancel)) {
+        const uint64_t item = atomic_fetch_add(&render->next_denoise_item, 1);
+        if (item >= item_count)
+            return;
+        const uint32_t tile_count = render->schedule.tile_count;
+        const uint32_t phase = (uint32_t)(item / tile_count);
+        if (!await_former_phase(render, phase))
+            return;
+        const struct trc_tile_area area =
+            trc_schedule_tile(&render->schedule, (uint32_t)(item % tile_count));
+        const struct trc_denoise_job job = {&render->denoise, phase,       area.x, area.y,
+                                            area.width,       area.height, memory};
+        render->kernels->denoise_tile(&job);
+        finish_denoise_item(render);
+    }
+}
+
 /* The last one to leave ends the render. */
 static void leave(struct trc_render_state *render) {
     pthread_mutex_lock(&render->lock);
     if (--render->running_count == 0) {
-        const bool complete = render->tiles_done == render->schedule.tile_count;
+        const bool complete = render->tiles_done == render->schedule.tile_count &&
+                              render->denoise_done == denoise_item_count(render);
         render->state = complete ? TRC_PROGRESS_DONE : TRC_PROGRESS_CANCELLED;
         render->time_end = trc_seconds();
         pthread_cond_broadcast(&render->ended);
@@ -224,6 +279,7 @@ static void worker_main(void *context) {
             break;
         finish_item(render, tile, batch);
     }
+    reconstruct(render, worker->memory);
     leave(render);
 }
 
@@ -260,6 +316,8 @@ static trc_status check_memory(const trc_render_desc *desc, const struct trc_sna
         pixel_bytes += sizeof(struct trc_caught);
     if (desc->noise_threshold > 0.0f)
         pixel_bytes += sizeof(struct trc_adaptive_pixel);
+    if (desc->denoise)
+        pixel_bytes += trc_film_half_bytes(desc, snapshot->features & TRC_FEATURE_SHADOW_CATCHERS);
     const uint64_t tiles =
         (uint64_t)trc_film_tiles(desc->crop_width) * trc_film_tiles(desc->crop_height);
     const uint64_t workers = desc->thread_count < tiles ? desc->thread_count : tiles;
@@ -272,13 +330,20 @@ static trc_status check_memory(const trc_render_desc *desc, const struct trc_sna
 static trc_status take_memory(struct trc_render_state *render) {
     const trc_render_desc *desc = &render->desc;
     const uint32_t features = render->snapshot->features;
-    const size_t memory_bytes = render->kernels->tile_memory_bytes(desc, render->snapshot);
+    const struct trc_kernels *kernels = render->kernels;
+    size_t memory_bytes = kernels->tile_memory_bytes(desc, render->snapshot);
+    if (desc->denoise && kernels->denoise_memory_bytes() > memory_bytes)
+        memory_bytes = kernels->denoise_memory_bytes();
     TRC_TRY(check_memory(desc, render->snapshot, memory_bytes));
     TRC_TRY(trc_film_create(desc, &render->film));
     if (features & TRC_FEATURE_SHADOW_CATCHERS)
         TRC_TRY(trc_film_add_catchers(&render->film));
     if (desc->noise_threshold > 0.0f)
         TRC_TRY(trc_adaptive_create(desc, &render->adaptive));
+    if (desc->denoise) {
+        TRC_TRY(trc_film_add_halves(desc, &render->film));
+        TRC_TRY(trc_denoise_create(&render->film, &render->denoise));
+    }
     TRC_TRY(trc_schedule_create(desc, &render->schedule));
     const struct trc_schedule *schedule = &render->schedule;
     TRC_TRY(trc_sobol_table_create(&render->sampler_table));
@@ -308,6 +373,7 @@ static void free_memory(struct trc_render_state *render) {
     trc_free(render->sampler_table);
     trc_schedule_destroy(&render->schedule);
     trc_adaptive_destroy(&render->adaptive);
+    trc_denoise_destroy(&render->denoise);
     trc_film_destroy(&render->film);
     trc_snapshot_release(render->snapshot);
     trc_free(render);
@@ -343,6 +409,7 @@ trc_status trc_render_state_start(struct trc_snapshot *snapshot, const trc_rende
     render->kernels = trc_kernels_current();
     atomic_init(&render->cancel, 0);
     atomic_init(&render->next_item, 0);
+    atomic_init(&render->next_denoise_item, 0);
     trc_status status = take_memory(render);
     if (status == TRC_OK)
         status = init_sync(render);

@@ -53,6 +53,24 @@ static void film_add_passes(struct trc_tile *t, uint32_t slot, size_t pixel, boo
         film_add_caught(t, slot, pixel);
 }
 
+/* Keeps the sums of a pixel's first half of samples: what it has so far. */
+static void film_keep_half(const struct trc_film *film, size_t pixel, const double sum[4],
+                           uint32_t count) {
+    static const uint32_t passes[] = {TRC_PASS_DENOISING_ALBEDO, TRC_PASS_DENOISING_NORMAL,
+                                      TRC_PASS_DENOISING_DEPTH};
+    struct trc_half *half = &film->halves[pixel];
+    for (int c = 0; c < 4; c++)
+        half->light[c] = (float)sum[c];
+    for (int c = 0; film->caught && c < 3; c++)
+        half->light[c] = (float)(sum[c] + film->caught[pixel].blocked[c]);
+    float *feature = half->features;
+    for (int i = 0; i < 3; i++)
+        for (uint32_t k = 0; k < trc_pass_info_of(passes[i])->sums; k++)
+            *feature++ =
+                (float)film->sums[passes[i]][trc_pass_info_of(passes[i])->sums * pixel + k];
+    half->count = count;
+}
+
 /* Adds the samples [begin, end), of one pixel, to it, in their order. Those that are not finite are
  * left out and counted. */
 static void film_add_run(struct trc_tile *t, uint32_t begin, uint32_t end, size_t pixel) {
@@ -69,6 +87,8 @@ static void film_add_run(struct trc_tile *t, uint32_t begin, uint32_t end, size_
             t->job->counts.dropped_samples++;
             continue;
         }
+        if (t->extra_passes && film->halves && trc_film_ends_half(film, count))
+            film_keep_half(film, pixel, sum, count);
         for (int c = 0; c < 3; c++)
             sum[c] += (double)t->samples.radiance[c][slot];
         sum[3] += 1.0 - (double)t->samples.transparency[slot];

@@ -1,0 +1,71 @@
+/* Memory of reconstruction: of the film, and of the filter between its phases. */
+#include <string.h>
+
+#include "core/checks.h"
+#include "core/core.h"
+#include "film/film.h"
+
+/* Colours that light is divided by are filtered as it is: a pixel that gets light of its neighbours
+ * may have no colour of that kind itself. */
+static bool is_divisor(uint32_t pass) {
+    for (uint32_t light = 0; light < TRC_PASS_COUNT; light++)
+        if (trc_pass_info_of(light)->color == pass)
+            return true;
+    return false;
+}
+
+static bool is_reconstructed(const trc_render_desc *desc, uint32_t pass) {
+    return trc_film_has_sums(desc, pass) &&
+           (trc_pass_info_of(pass)->kind == TRC_PASS_KIND_LIGHT || is_divisor(pass));
+}
+
+uint64_t trc_film_half_bytes(const trc_render_desc *desc, bool has_catchers) {
+    uint64_t bytes = sizeof(struct trc_half) + TRC_DENOISE_PIXEL_BYTES;
+    if (has_catchers)
+        bytes += sizeof(struct trc_caught);
+    for (uint32_t pass = 0; pass < TRC_SUM_COUNT; pass++)
+        if (is_reconstructed(desc, pass))
+            bytes += trc_pass_info_of(pass)->sums * sizeof(double);
+    return bytes;
+}
+
+trc_status trc_film_add_halves(const trc_render_desc *desc, struct trc_film *film) {
+    const size_t pixels = (size_t)film->width * film->height;
+    /* Pixels that stop at a power of two, or are shown at one, are halved there. */
+    const bool stops = desc->noise_threshold > 0.0f || desc->progressive;
+    film->half_count = stops || desc->sample_count < 2 ? 0 : desc->sample_count / 2;
+    film->halves = trc_alloc_zeroed(pixels, sizeof *film->halves);
+    bool ok = film->halves != NULL;
+    for (uint32_t pass = 0; ok && pass < TRC_SUM_COUNT; pass++) {
+        if (!is_reconstructed(desc, pass))
+            continue;
+        film->clean.sums[pass] =
+            trc_alloc_zeroed(pixels, trc_pass_info_of(pass)->sums * sizeof(double));
+        ok = film->clean.sums[pass] != NULL;
+    }
+    if (ok && film->caught) {
+        film->clean.caught = trc_alloc_zeroed(pixels, sizeof *film->clean.caught);
+        ok = film->clean.caught != NULL;
+    }
+    return ok ? TRC_OK : trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for reconstruction");
+}
+
+trc_status trc_denoise_create(struct trc_film *film, struct trc_denoise *denoise) {
+    const size_t pixels = (size_t)film->width * film->height;
+    *denoise = (struct trc_denoise){.film = film};
+    float **const planes[] = {&denoise->variance, &denoise->error};
+    bool ok = true;
+    for (int k = 0; ok && k < TRC_FEATURE_COUNT; k++)
+        ok = (denoise->features[k] = trc_alloc(pixels, sizeof(float))) != NULL;
+    for (int k = 0; ok && k < 2; k++)
+        ok = (*planes[k] = trc_alloc(pixels, sizeof(float))) != NULL;
+    return ok ? TRC_OK : trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for reconstruction");
+}
+
+void trc_denoise_destroy(struct trc_denoise *denoise) {
+    for (int k = 0; k < TRC_FEATURE_COUNT; k++)
+        trc_free(denoise->features[k]);
+    trc_free(denoise->variance);
+    trc_free(denoise->error);
+    memset(denoise, 0, sizeof *denoise);
+}

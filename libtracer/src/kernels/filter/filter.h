@@ -1,0 +1,36 @@
+/* The filter of a finished film, tile by tile. See model/denoise.h for what it does. */
+#ifndef TRACER_KERNELS_FILTER_FILTER_H
+#define TRACER_KERNELS_FILTER_FILTER_H
+
+#include "kernels/filter/plane.h"
+
+/* What the light of a pixel is compared by: square roots of its red, green and blue, and alpha. */
+#define TRC_GUIDE_CHANNELS 4
+
+/* Planes of a tile for regression. Variances are those of the mean of all samples, smoothed. */
+struct trc_guide {
+    float *half[2][TRC_GUIDE_CHANNELS]; /* of either half of the samples */
+    float *more[2];                     /* how many times as noisy that half is */
+    float *light[2];                    /* mean of its red, green and blue */
+    float *variance[TRC_GUIDE_CHANNELS];
+    float *noise;  /* variance of the light, above 0 */
+    float *rest;   /* scratch */
+    float *inside; /* 1 where there are samples, 0 beyond the frame */
+    float *features[TRC_FEATURE_COUNT];
+};
+
+/* Fills the planes from the film and the features. (kernels/filter/guide.c) */
+void trc_guide_load(const struct trc_denoise_job *job, struct trc_guide *guide);
+
+/* The phases. (kernels/filter/features.c, regress.c, blend.c) */
+size_t trc_features_bytes(void);
+void trc_features_filter(const struct trc_denoise_job *job);
+size_t trc_regress_bytes(void);
+void trc_regress(const struct trc_denoise_job *job);
+size_t trc_blend_bytes(void);
+void trc_blend(const struct trc_denoise_job *job);
+
+size_t trc_denoise_memory_bytes(void);
+void trc_denoise_tile(const struct trc_denoise_job *job);
+
+#endif

@@ -1,0 +1,112 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Error and time with and without Denoise, of .blend files as they are.
+
+    denoise.py FILE.blend... [--samples 4 16 64 256] [--width 320] [--height 180] [--pictures DIR]
+
+For each file and number of samples: mean squared and relative squared error against Volley's own picture of
+many samples, which another seed made, how many times they are lower with Denoise, the worst 32 x 32 tile by
+that, and the seconds of both renders. Errors do not depend on the load of the machine, times do.
+"""
+
+import argparse
+import json
+import pathlib
+import tempfile
+
+import compare_cycles
+import numpy as np
+
+import compare  # found by compare_cycles' path
+
+SEED, REFERENCE_SEED = 1, 1000
+# Tiles whose relative error is below are as good as without noise.
+LEAST_ERROR = 1e-5
+
+
+def job(options, samples, denoise, seed, output):
+    """One picture for scene_setups.py's batch."""
+    settings = {"width": options.width, "height": options.height, "samples": samples, "seed": seed,
+                "volley": {"use_denoising": denoise}}
+    return {"engine": "VOLLEY", "frame": options.frame, "settings": settings, "output": str(output)}
+
+
+def run_jobs(blend, jobs, options):
+    """Render them in one Blender; the seconds of each."""
+    with tempfile.TemporaryDirectory() as folder:
+        jobs_path, seconds_path = (pathlib.Path(folder) / name for name in ("jobs", "seconds"))
+        jobs_path.write_text(json.dumps(jobs))
+        compare_cycles.run_blender(
+            ["-t", options.threads, "--addons", "volley", blend, "--python-exit-code", 1, "-P",
+             compare_cycles.SETUPS_FILE, "--", "batch", jobs_path, seconds_path], options)
+        return json.loads(seconds_path.read_text())
+
+
+def relative_error(picture, exact):
+    """By pixel, as compare.rel_mse."""
+    weights = (np.maximum(exact, 0.0) + compare.RELATIVE_FLOOR) ** -2.0
+    return (weights * compare.squared_error(picture, exact)).mean(axis=-1)
+
+
+def worst_tile(plain, clean, tile=32):
+    """The largest error with Denoise over that without, by tile."""
+    height, width = plain.shape
+    parts = [(slice(y, y + tile), slice(x, x + tile))
+             for y in range(0, height, tile) for x in range(0, width, tile)]
+    return max(clean[part].mean() / max(plain[part].mean(), LEAST_ERROR) for part in parts)
+
+
+def measure(blend, options):
+    """A row for each number of samples."""
+    with tempfile.TemporaryDirectory() as folder:
+        def output(name):
+            return pathlib.Path(folder) / f"{name}.exr"
+
+        names = [(samples, denoise) for samples in options.samples for denoise in (False, True)]
+        jobs = [job(options, options.reference_samples, False, REFERENCE_SEED, output("exact"))]
+        jobs += [job(options, samples, denoise, SEED, output(f"{samples}-{denoise}"))
+                 for samples, denoise in names]
+        seconds = dict(zip(names, run_jobs(blend, jobs, options)[1:]))
+        exact = compare.read_rgb(output("exact")).astype(np.float64)
+        for samples in options.samples:
+            plain, clean = (compare.read_rgb(output(f"{samples}-{denoise}")) for denoise in (False, True))
+            errors = [relative_error(picture, exact) for picture in (plain, clean)]
+            if options.pictures:
+                options.pictures.mkdir(parents=True, exist_ok=True)
+                for name, picture in (("plain", plain), ("denoised", clean), ("exact", exact)):
+                    compare.write_png(options.pictures / f"{blend.stem}-{samples}-{name}.png", picture)
+            yield {"file": blend.stem, "samples": samples,
+                   "mse": [compare.mse(picture, exact) for picture in (plain, clean)],
+                   "rel_mse": [float(error.mean()) for error in errors],
+                   "worst_tile": float(worst_tile(*errors)),
+                   "seconds": [seconds[samples, denoise] for denoise in (False, True)]}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("files", nargs="+", type=pathlib.Path)
+    parser.add_argument("--samples", nargs="+", type=int, default=[4, 16, 64, 256])
+    parser.add_argument("--reference-samples", type=int, default=4096)
+    parser.add_argument("--width", type=int, default=320)
+    parser.add_argument("--height", type=int, default=180)
+    parser.add_argument("--frame", type=int, default=1)
+    parser.add_argument("--threads", type=int, default=0, help="0: all")
+    parser.add_argument("--build", type=pathlib.Path, default=compare_cycles.PROJECT / "build")
+    parser.add_argument("--blender", default="blender")
+    parser.add_argument("--pictures", type=pathlib.Path, help="PNGs go here")
+    parser.add_argument("--json", action="store_true", help="one JSON object a row")
+    options = parser.parse_args()
+    for blend in options.files:
+        for row in measure(blend, options):
+            if options.json:
+                print(json.dumps(row), flush=True)
+                continue
+            gains = [row[name][0] / row[name][1] for name in ("mse", "rel_mse")]
+            print(f"{row['file']:16} {row['samples']:5} samples: MSE {gains[0]:6.2f}, relMSE {gains[1]:6.2f} "
+                  f"times lower, worst tile {row['worst_tile']:5.2f}; {row['seconds'][0]:.2f} to "
+                  f"{row['seconds'][1]:.2f} s", flush=True)
+
+
+if __name__ == "__main__":
+    main()
