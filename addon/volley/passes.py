@@ -192,6 +192,27 @@ def write(render, layer, entries):
     layer.passes.foreach_set("rect", flat)
 
 
+# What a viewport may show; it has no motion for the Vector pass.
+SHOWN_PASSES = {entry.index.name: entry for entry in PASSES if entry.index != PassId.VECTOR}
+
+
+def shown_in(v3d):
+    """The pass that a viewport shows."""
+    return SHOWN_PASSES[v3d.shading.volley.render_pass]
+
+
+def read_shown(render, entry):
+    """A pass as a picture, (height, width, 4) float32, bottom row first: numbers are grey."""
+    if entry is COMBINED:
+        return read_combined(render)
+    width, height = render.size
+    channels = len(entry.channels)
+    values = render.read(entry.index, np.empty(width * height * channels, np.float32))
+    pixels = np.ones((height, width, 4), np.float32)
+    pixels[..., :3] = values.reshape(height, width, channels)[..., :3]
+    return pixels
+
+
 def read_combined(render):
     """The film's Combined pass, (height, width, 4) float32, bottom row first."""
     width, height = render.size

@@ -8,6 +8,8 @@ same in both engines without touching anything.
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty
 
+from . import passes
+
 SINGLE_SAMPLE = 1    # default of the integrators without distribution
 DISTRIBUTION_SAMPLES = 64
 
@@ -217,7 +219,15 @@ class VolleyViewLayerSettings(bpy.types.PropertyGroup):
         update=_changed)
 
 
-_classes = (VolleySceneSettings, VolleyViewLayerSettings)
+class VolleyViewSettings(bpy.types.PropertyGroup):
+    """Settings of a 3D view, ``space.shading.volley``."""
+
+    render_pass: EnumProperty(
+        name="Render Pass", default=passes.COMBINED.index.name, description="What the viewport shows",
+        items=tuple((name, entry.names[1], "") for name, entry in passes.SHOWN_PASSES.items()))
+
+
+_classes = (VolleySceneSettings, VolleyViewLayerSettings, VolleyViewSettings)
 
 
 def register():
@@ -225,9 +235,11 @@ def register():
         bpy.utils.register_class(cls)
     bpy.types.Scene.volley = PointerProperty(type=VolleySceneSettings, name="Volley Settings")
     bpy.types.ViewLayer.volley = PointerProperty(type=VolleyViewLayerSettings, name="Volley Settings")
+    bpy.types.View3DShading.volley = PointerProperty(type=VolleyViewSettings, name="Volley Settings")
 
 
 def unregister():
+    del bpy.types.View3DShading.volley
     del bpy.types.ViewLayer.volley
     del bpy.types.Scene.volley
     for cls in reversed(_classes):

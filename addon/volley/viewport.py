@@ -100,6 +100,7 @@ class Viewport:
         if changes.any():
             try:
                 self._sync.update(Source(depsgraph, changes, v3d=context.space_data,
+                                         needs_uv=_needs_uv(context.space_data),
                                          culling=_culling_of(context, depsgraph, self._sync.warnings)))
             except BaseException:
                 self._changes = Changes.everything()
@@ -148,6 +149,7 @@ class _Pictures:
 
     def __init__(self):
         self._view = None
+        self._shown_pass = passes.COMBINED
         self._wanted = None     # what the stages render: revision, view and settings
         self._fields = {}
         self._stages = []       # still to come: divisor of the size, samples or None for all
@@ -173,8 +175,9 @@ class _Pictures:
     def follow(self, sync, context, depsgraph):
         """Start to render what is in the library, unless that is under way or done."""
         scene, view = depsgraph.scene_eval, self._view
-        fields = render_fields(scene, camera.Frame(*view.size), view.crop, [passes.COMBINED],
-                               is_preview=True)
+        self._shown_pass = passes.shown_in(context.space_data)
+        fields = render_fields(scene, camera.Frame(*view.size), view.crop,
+                               list(dict.fromkeys((passes.COMBINED, self._shown_pass))), is_preview=True)
         fields["progressive"] = 1
         if scene.volley.sampler == 'SOBOL':
             fields["sampler"] = abi.SamplerType['BLUE_NOISE']
@@ -242,7 +245,7 @@ class _Pictures:
         if progress.samples_done >= shown and progress.version != self._version and (
                 now >= self._next_read or not is_running):
             self._version, self._next_read = progress.version, now + DRAW_SECONDS
-            pixels = passes.read_combined(self._render)
+            pixels = passes.read_shown(self._render, self._shown_pass)
             self._texture, self._place = _texture_of(pixels), self._next_place
             total = self._fields["sample_count"]
             self._status = f"Time:{timecode(now - self._started)} | {status_text(progress, total)}"
@@ -287,7 +290,11 @@ def _visibility_of(v3d):
     """What a 3D view alone decides of which objects it shows."""
     kinds = tuple(value for name in _OBJECT_KINDS if (value := getattr(v3d, name, None)) is not None)
     local = v3d.local_view is not None
-    return local, v3d.use_local_collections, kinds, light.are_shown(v3d)
+    return local, v3d.use_local_collections, kinds, light.are_shown(v3d), _needs_uv(v3d)
+
+
+def _needs_uv(v3d):
+    return passes.shown_in(v3d).index == abi.PassId.UV
 
 
 _OBJECT_KINDS = tuple(f"show_object_viewport_{kind}" for kind in (

@@ -471,6 +471,13 @@ def inside_camera_region():
         space.shading.use_scene_lights_render = is_shown
         shot = yield from _settled()
         found[name] = float(shot[shot.shape[0] // 2, shot.shape[1] // 2, 1])
+    wall.data.materials[0] = scenes.material("Blue", "ShaderNodeBsdfDiffuse", Color=(0.0, 0.214, 1.0))
+    for name in ('DIFFUSE_COLOR', 'EMISSION', 'UV', 'COMBINED'):
+        space.shading.volley.render_pass = name
+        shot = yield from _settled()
+        found[name] = shot[shot.shape[0] // 2, shot.shape[1] // 2].tolist()
+    wall.data.materials[0] = bpy.data.materials["Matt"]
+    yield from _settled()
     scene.volley.preview_pause = True
     bpy.data.objects["Light"].data.energy = 0.0
     for _ in range(4):
@@ -489,4 +496,7 @@ def test_view_through_the_camera(window):
     for box, frame in found["boxes"]:
         assert np.abs(np.subtract(box, frame)).max() < 2.0, (box, frame)
     assert found["lit"] > 0.3 and found["lit again"] == found["lit"] and found["unlit"] < 0.01
+    assert np.allclose(found['DIFFUSE_COLOR'], (0.0, 0.5, 1.0), atol=0.01)  # display colours
+    assert found['EMISSION'] == [0.0, 0.0, 0.0] and found['COMBINED'][2] > 0.3
+    assert found['UV'][0] > 0.5 and found['UV'][1] > 0.5 and found['UV'][2] == 1.0
     assert found["paused"] == found["lit"] and found["resumed"] < 0.01

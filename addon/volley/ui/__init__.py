@@ -8,10 +8,10 @@ shown where that add-on is enabled.
 import bpy
 from bpy.types import Panel
 
-from . import camera, objects, render, shading, view_layer
+from . import camera, objects, render, shading, view, view_layer
 from .panel import ENGINE
 
-_MODULES = (render, view_layer, objects, camera, shading)
+_MODULES = (render, view_layer, objects, camera, shading, view)
 
 # Panels of other engines whose content holds here as it is; not every version has each.
 _SHARED_PANELS = {
