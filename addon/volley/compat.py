@@ -59,7 +59,7 @@ def panorama_settings(camera):
 
 
 def panorama_setting(camera, name, default):
-    """A setting of panoramas: Blender's own where it has them, else Cycles' of the camera where they exist."""
+    """A setting of panoramas: Blender's own where it has them, else Cycles' of the camera."""
     return getattr(panorama_settings(camera), name, default)
 
 

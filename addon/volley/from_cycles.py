@@ -39,7 +39,7 @@ def _settings_of(scene):
 
 
 def is_offered(scene):
-    """Whether to offer it: for a file with settings of Cycles' and none of ours, until the user has chosen."""
+    """Whether to offer it: for a scene with settings of Cycles' and none of ours, until the user chooses."""
     theirs, ours = _settings_of(scene), scene.volley
     return theirs is not None and not ours.is_cycles_answered \
         and any(theirs.is_property_set(name) for name, _ in _COPIED if hasattr(theirs, name)) \
@@ -65,7 +65,7 @@ def copy(scene):
 
 
 class VOLLEY_OT_copy_cycles_settings(Operator):
-    """Take over samples, bounces, clamps, filter, exposure and the like from this scene's settings of Cycles"""
+    """Take over samples, bounces, clamps, filter, exposure and the like from this scene's Cycles settings"""
 
     bl_idname = "volley.copy_cycles_settings"
     bl_label = "Copy Settings from Cycles"

@@ -20,7 +20,7 @@ from gpu_extras.presets import draw_texture_2d
 from . import abi, native, passes, writes
 from .commit import Commit
 from .session import render_fields, status_text, thread_count, timecode
-from .sync import SceneSync, Source, camera, culling, light
+from .sync import SceneSync, Source, camera, culling, light, studio
 from .sync.changes import Changes
 
 MAX_HALF = 65504.0
@@ -40,6 +40,7 @@ class Viewport:
         self._sync = None
         self._changes = Changes.everything()  # not yet copied
         self._visibility = None  # what of the view decides which objects it shows
+        self._studio = None      # what it shows in place of the world
         self._commit = None
         self._built_revision = -1
         self._pictures = _Pictures()
@@ -96,6 +97,9 @@ class Viewport:
         visibility = _visibility_of(context.space_data)
         if visibility != self._visibility:  # Blender tells no engine of these
             self._changes, self._visibility = Changes.everything(), visibility
+        shown_studio = studio.of_view(context.space_data, depsgraph.scene_eval)
+        if shown_studio != self._studio:  # nor of these
+            self._studio, self._changes.world = shown_studio, True
         changes, self._changes = self._changes, Changes()
         if changes.any():
             try:

@@ -76,7 +76,8 @@ def inside_cycles_settings():
     theirs, ours = scene.cycles, scene.volley
     changed = {"samples": 77, "adaptive_threshold": 0.05, "max_bounces": 9, "glossy_bounces": 7,
                "sample_clamp_indirect": 4.0, "blur_glossy": 0.5, "film_exposure": 1.5, "use_fast_gi": True,
-               "fast_gi_method": 'ADD', "pixel_filter_type": 'GAUSSIAN', "filter_width": 2.0, "time_limit": 12.0,
+               "fast_gi_method": 'ADD', "pixel_filter_type": 'GAUSSIAN', "filter_width": 2.0,
+               "time_limit": 12.0,
                "texture_limit_render": '1024', "diffuse_bounces": 0, "light_sampling_threshold": 0.0,
                "use_denoising": False}
     for name, value in changed.items():

@@ -248,5 +248,5 @@ def test_blur_and_passes_are_those_of_cycles(blender):
                     a = a * (-1.0, 1.0, -1.0, 1.0)  # Cycles' fisheyes are the wrong way round there
             error = np.abs(a - b).max(axis=-1)[seen]
             # Near poles and rims a hundredth of a pixel is much.
-            print(f"{name} {each}: off by {np.percentile(error, 95):.2g} where the largest is {np.abs(b[seen]).max():.3g}")
+            print(f"{name} {each}: off by {np.percentile(error, 95):.2g} of {np.abs(b[seen]).max():.3g}")
             assert np.percentile(error, 95) < allowed, (name, each)

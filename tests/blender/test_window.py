@@ -491,6 +491,51 @@ def inside_camera_region():
     return found
 
 
+def inside_studio():
+    """The background as a studio light, then as a world of the same nodes, and where the camera does not see
+    it."""
+    import bpy
+    import scenes
+    yield 0.1
+    scene = scenes.empty(samples=2)
+    yield DRAW_SECONDS
+    scenes.camera(lens=20.0)
+    scenes.sphere(material=scenes.material("Mirror", "ShaderNodeBsdfGlossy", Roughness=0.0), smooth=True)
+    space = _open(scene)
+    space.region_3d.view_perspective = 'CAMERA'
+    shading, found = space.shading, {}
+    scene.world.color = (0.0, 0.214, 0.0)
+    shading.use_scene_world_render = False
+    shading.studio_light = 'forest.exr'
+    shading.studiolight_rotate_z, shading.studiolight_intensity = 0.7, 0.6
+    for share in (1.0, 0.0):
+        shading.studiolight_background_alpha = share
+        found[share] = yield from _settled()
+    scene.world.use_nodes = True
+    tree = scene.world.node_tree
+    picture, mapping = tree.nodes.new("ShaderNodeTexEnvironment"), tree.nodes.new("ShaderNodeMapping")
+    picture.image = bpy.data.images.load(shading.selected_studio_light.path)
+    mapping.vector_type, mapping.inputs["Rotation"].default_value = 'VECTOR', (0.0, 0.0, 0.7)
+    tree.links.new(tree.nodes.new("ShaderNodeTexCoord").outputs["Generated"], mapping.inputs["Vector"])
+    tree.links.new(mapping.outputs[0], picture.inputs[0])
+    tree.links.new(picture.outputs[0], tree.nodes["Background"].inputs["Color"])
+    tree.nodes["Background"].inputs["Strength"].default_value = 0.6
+    shading.use_scene_world_render = True
+    found["world"] = yield from _settled()
+    return found
+
+
+def test_studio_lights_are_shown_for_the_world(window):
+    found = window.run_in_window(inside_studio)
+    seen, hidden, world = found[1.0], found[0.0], found["world"]
+    assert world.std() > 0.05
+    assert np.abs(seen - world).max() < 0.02
+    x, y = seen.shape[1] // 2, seen.shape[0] * 2 // 3  # the upper quarter is left out
+    middle = np.s_[y - 4:y + 4, x - 4:x + 4]
+    assert np.abs(hidden[middle] - world[middle]).max() < 0.02  # mirrored
+    assert (np.abs(hidden - (0.0, 0.5, 0.0)).max(axis=-1) < 0.01).mean() > 0.05
+
+
 def test_view_through_the_camera(window):
     found = window.run_in_window(inside_camera_region)
     for box, frame in found["boxes"]:

@@ -134,6 +134,21 @@ class Images:
             self._entries[key] = (None, created)
         return self._entries[key][1]
 
+    def id_of_file(self, path):
+        """The library's image of a file of scene-linear colours, 0 with a warning if it cannot be read."""
+        key = ("", path)
+        self._asked[0].add(key)
+        self._seen.add(key)
+        if key not in self._entries:
+            try:
+                created = self._scene.create_image(
+                    path=path, alpha_mode=abi.AlphaMode.CHANNEL_PACKED, is_srgb=False)
+            except native.TracerError as error:
+                self._warnings.add(f"Image '{path}': {error}; magenta is used")
+                created = 0
+            self._entries[key] = (None, created)
+        return self._entries[key][1]
+
     def end(self):
         """Free what nothing asked for since begin."""
         for key in [key for key in self._entries if key not in self._seen]:

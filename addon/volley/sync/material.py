@@ -6,12 +6,13 @@ import bpy
 from .. import abi, native
 from ..abi import NodeType
 from ..compat import CHOOSES_LOBES_PLAINLY, cycles, uses_nodes
-from . import flatten, instance, tangents
+from . import flatten, instance, studio, tangents
 from .attributes import Attributes
 from .changes import Changes
 from .values import CONSTANT, DEFAULT, Value
 
 _HOLDOUT_KEY = ("holdout",)
+_STUDIO_KEY = ("studio",)
 _DEFAULT_NAME = "default_surface"  # of the library's default material in mattes
 
 
@@ -123,6 +124,12 @@ class Materials:
             self._update(key, flat)
         self._seen.add(key)
         return self._entries[key].id
+
+    def studio_id(self, light):
+        """A viewport's studio.Studio as a material."""
+        image_id = self._images.id_of_file(light.path) if light.path else 0
+        self._update(_STUDIO_KEY, studio.flatten_studio(light, image_id))
+        return self._entries[_STUDIO_KEY].id
 
     def attribute_names(self):
         """The UV maps and colour attributes that the materials of this sync read, two sets, whether one

@@ -6,7 +6,7 @@ import bpy
 from .. import native
 from ..compat import uses_nodes
 from ..log import Warnings
-from . import camera, deform, image, instance, light, mesh, meshes, world
+from . import camera, deform, image, instance, light, mesh, meshes, studio, world
 from .image import Images
 from .material import Materials
 from .shown import Shown
@@ -134,9 +134,14 @@ class SceneSync:
 
     def _sync_world(self, source):
         scene = source.depsgraph.scene_eval
-        shown = shown_world(source)
-        material_id, sun = self._materials.world_id(shown) if shown else (0, None)
-        fields = world.describe(shown, material_id, sun, scene.volley, source.light_groups)
+        shown_studio = studio.of_view(source.v3d, scene)
+        if shown_studio is None:
+            shown = shown_world(source)
+            material_id, sun = self._materials.world_id(shown) if shown else (0, None)
+            fields = world.describe(shown, material_id, sun, scene.volley, source.light_groups)
+        else:
+            fields = {**world.describe(None, self._materials.studio_id(shown_studio), None, scene.volley, {}),
+                      "use_sampling": 1}
         if fields != self._world:
             self.scene.set_world(**fields)
         self._world = fields
