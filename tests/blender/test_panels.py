@@ -136,7 +136,7 @@ def test_time_limit_ends_a_render(blender):
 def inside_panorama_panel():
     import drawing
     import scenes
-    from volley import ui
+    from volley.ui import camera as ui
     scenes.empty()
     made = scenes.camera().data
     context = drawing.Context(engine='VOLLEY', camera=made)
