@@ -303,10 +303,10 @@ static void factor_beyond(void **state) {
     struct trc_bsdf_sample b;
     prepare(&pure, direction(0.7, 0.0), &s, &l);
     trc_bsdf_sample(&l, &s, vf_set(0.5f), vf_set(0.3f), vf_set(0.4f), &b);
-    assert_true(fabsf(vf_get(b.beyond, 0) - 1.0f) < 1e-6f);
+    assert_true(fabsf(vf_get(b.indirect_scale, 0) - 1.0f) < 1e-6f);
     prepare(&mixed, direction(0.7, 0.0), &s, &l);
     trc_bsdf_sample(&l, &s, vf_set(0.5f), vf_set(0.3f), vf_set(0.4f), &b);
-    assert_true(vf_get(b.beyond, 0) > 0.0f && vf_get(b.beyond, 0) < 1.0f);
+    assert_true(vf_get(b.indirect_scale, 0) > 0.0f && vf_get(b.indirect_scale, 0) < 1.0f);
     const double share = (double)vf_get(l.continue_weight / l.mix_weight, 0);
     struct trc_lobes first;
     s.depth = vi_set(0);

@@ -346,7 +346,7 @@ static void rays_carry_the_share_of_continued_lobes(void **state) {
                              (4.0 * o[2]) * (double)vf_get(l.lobe[1].mix_weight, 0);
         const double matt = i[2] / M_PI * (double)vf_get(l.lobe[0].mix_weight, 0);
         const double want = gloss / (gloss + matt);
-        assert_true(fabs((double)vf_get(b.beyond, 0) - want) <= 1e-4);
+        assert_true(fabs((double)vf_get(b.indirect_scale, 0) - want) <= 1e-4);
         lowest = fmin(lowest, want);
         highest = fmax(highest, want);
     }

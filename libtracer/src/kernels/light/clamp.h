@@ -19,9 +19,9 @@ TRC_INLINE vfloat trc_clamp_limit(const trc_render_desc *desc, vmask is_direct) 
 
 /* What a contribution is to be multiplied by. */
 TRC_INLINE vfloat trc_clamp_factor(vvec3 c, vfloat limit) {
-    const vfloat sum = vf_abs(c.x) + vf_abs(c.y) + vf_abs(c.z), most = limit * vf_set(3.0f);
-    const vmask over = vf_gt(sum, most);
-    return vf_select(over, vf_divide(most, vf_select(over, sum, vf_set(1.0f))), vf_set(1.0f));
+    const vfloat sum = vf_abs(c.x) + vf_abs(c.y) + vf_abs(c.z), maximum = limit * vf_set(3.0f);
+    const vmask over = vf_gt(sum, maximum);
+    return vf_select(over, vf_divide(maximum, vf_select(over, sum, vf_set(1.0f))), vf_set(1.0f));
 }
 
 #endif

@@ -243,9 +243,9 @@ static void finish_sample(const struct draw *d, vmask m) {
     if (d->table->hides)
         mark_hidden(d, m);
     const vvec3 r = out->radiance;
-    const vfloat most = vf_max(vf_max(vf_abs(r.x), vf_abs(r.y)), vf_abs(r.z));
+    const vfloat maximum = vf_max(vf_max(vf_abs(r.x), vf_abs(r.y)), vf_abs(r.z));
     const vmask finite = vm_and(vf_gt(out->pdf, vf_zero()), vf_lt(out->pdf, vf_set(INFINITY)));
-    out->valid = vm_and(m, vm_and(finite, vf_gt(most, vf_zero())));
+    out->valid = vm_and(m, vm_and(finite, vf_gt(maximum, vf_zero())));
 }
 
 /* Lamps give nothing to points beyond their limit of bounces. */

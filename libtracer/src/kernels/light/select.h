@@ -1,9 +1,9 @@
 /* Choosing among lights: how much each might give to a point, and with what chance it is chosen.
  *
  * A. Conty Estevez and C. Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting"
- * (2018): intensity over squared distance, times the least angle any part of the light may make
- * with its own axis, times the least angle it may make with the receiver's normal. Both bounds are
- * conservative, so a light of importance 0 gives nothing. */
+ * (2018): intensity over squared distance, times the minimum angle any part of the light may make
+ * with its own axis, times the minimum angle it may make with the receiver's normal. Both bounds
+ * are conservative, so a light of importance 0 gives nothing. */
 #ifndef TRACER_KERNELS_LIGHT_SELECT_H
 #define TRACER_KERNELS_LIGHT_SELECT_H
 
@@ -68,13 +68,9 @@ TRC_INLINE enum trc_bound_shape trc_shape_of(const struct trc_light_bound *b) {
     return b->cos_o >= 1.0f && b->cos_e == 0.0f ? TRC_BOUND_HEMISPHERE : TRC_BOUND_CONE;
 }
 
-/* Most that nearness counts, over 1 / squared radius. With 1, as in the paper, a point close to a
- * shining mesh takes half of its samples away from the nearest lights at each level of the tree, so
- * that those are found by few samples of great weight: where a ball of 960 triangles, or a ring of
- * 20,000, stands on a floor, 10 to 20 times the squared error at 64 samples. Of 4, 8, 16
- * and 64, 8 is the least on the ball and within 5 % of it on the ring; limits that grow with the
- * number of levels have up to twice its error there, but less where a sun is beside a shining
- * ball (1.0e-4 at best; 8: 1.8e-4, 1: 2.6e-4). */
+/* Maximum that nearness counts, over 1 / squared radius. With 1, as in the paper, a point close to
+ * a shining mesh takes half of its samples away from the nearest lights at each level of the tree,
+ * so that those are found by few samples of great weight. */
 #define TRC_NEAR_FADE 8.0f
 
 /* What rounding may add to a cosine: no light that reaches a point counts as none. */
@@ -234,7 +230,7 @@ static inline vfloat trc_tree_chance(const struct trc_light_table *t, const stru
 
 /* Chances of few candidates are whole sixteenths: numbers that are stratified in blocks of 16 then
  * give each light the same share of any block's samples, where a remainder would make a sample more
- * or less by chance (box of the tests, 64 samples: 4 to 13 times the squared error). */
+ * or less by chance. */
 #define TRC_SHARED_CANDIDATES 8
 #define TRC_SHARES 16.0f
 /* Candidates due less than this part of a share keep their own small chance: a whole share would

@@ -7,7 +7,7 @@
  * Departures from Cycles 3.4: a sampled direction of a toon lobe fades as an evaluated one;
  * reflections are sampled by bounded visible normals, refractions by the spherical cap; densities
  * are the true ones, where Cycles gives clearcoat the density of GTR1 and samples GGX. What that
- * does to its pictures is kept in trc_bsdf_sample.beyond. */
+ * does to its pictures is kept in trc_bsdf_sample.indirect_scale. */
 #include "kernels/lobe/facets.h"
 
 /* Lanes in which wi counts as reflected, as transmitted. */
@@ -83,7 +83,7 @@ static void weigh_direction(const struct trc_lobes *l, const struct trc_surface 
     const vmask lit = vm_and(active, vf_gt(pdf, vf_zero()));
     out->pdf = vf_select(active, pdf, out->pdf);
     out->weight = v3_select(active, v3_where(lit, v3_scale(value, vf_rcp(pdf))), out->weight);
-    out->beyond = vf_select(lit, vf_divide(picked, claimed), out->beyond);
+    out->indirect_scale = vf_select(lit, vf_divide(picked, claimed), out->indirect_scale);
     out->valid = vm_or(vm_andnot(out->valid, active), vm_and(lit, vf_gt(v3_max(value), vf_zero())));
 }
 
@@ -108,7 +108,7 @@ static vvec3 ideal_direction(const struct trc_lobe *lobe, const struct trc_surfa
 static void clear_sample(struct trc_bsdf_sample *out) {
     out->wi = v3(vf_zero(), vf_zero(), vf_one());
     out->weight = v3_zero();
-    out->beyond = vf_one();
+    out->indirect_scale = vf_one();
     out->pdf = vf_zero();
     out->valid = out->singular = out->transparent = out->transmitted = out->diffuse = vm_none();
 }

@@ -105,18 +105,18 @@ void trc_bsdf_eval(const struct trc_lobes *l, const struct trc_surface *s, vvec3
  *
  * Two throughputs. weight is for the emission, lamps and world that the ray itself finds (through
  * transparent surfaces too), with MIS against light samples: unbiased. Everything behind the next
- * surface gets weight * beyond. beyond differs from 1 only where a rough lobe shares its direction
- * with lobes that are not continued: Cycles picks one lobe, diffuse ones included, and weights the
- * pick by the densities of all of them (balance heuristic); with diffuse bounces 0 the picks of
- * diffuse lobes then end, so the others carry S(wi) / P(wi), S the densities of continued lobes and
- * P of all. A picture without that factor would be "right" and differ from Cycles' by several per
- * cent on rough Principled materials. */
+ * surface gets weight * indirect_scale, which differs from 1 only where a rough lobe shares its
+ * direction with lobes that are not continued: Cycles picks one lobe, diffuse ones included, and
+ * weights the pick by the densities of all of them (balance heuristic); with diffuse bounces 0 the
+ * picks of diffuse lobes then end, so the others carry S(wi) / P(wi), S the densities of continued
+ * lobes and P of all. A picture without that factor would be "right" and differ from Cycles' by
+ * several per cent on rough Principled materials. */
 struct trc_bsdf_sample {
-    vvec3 wi;      /* unit */
-    vvec3 weight;  /* value * cos / pdf, over all lobes for rough ones, for this lobe if ideal */
-    vfloat beyond; /* 1 for ideal and transparent ones */
-    vfloat pdf;    /* as in trc_bsdf_eval; 0 where ideal or transparent */
-    vmask valid;   /* the ray is worth tracing */
+    vvec3 wi;     /* unit */
+    vvec3 weight; /* value * cos / pdf, over all lobes for rough ones, for this lobe if ideal */
+    vfloat indirect_scale; /* 1 for ideal and transparent ones */
+    vfloat pdf;            /* as in trc_bsdf_eval; 0 where ideal or transparent */
+    vmask valid;           /* the ray is worth tracing */
     vmask singular, transparent,
         transmitted; /* transmitted: to the other side, incl. translucent */
     vmask diffuse;   /* the lobe was translucent: a diffuse transmission ray */

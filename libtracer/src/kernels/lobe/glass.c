@@ -67,8 +67,8 @@ struct trc_lobe *trc_add_dielectric(struct trc_setup *c, enum trc_lobe_kind kind
 
 /* Chances of two lobes that have the factor of the micro-normal, f that of the normal. Where both
  * are rough they share micro-normals, each of which reflects as often as it should (weigh_pair):
- * with chances by the normal, a path within glass gained or lost weight at every bounce, and after
- * 30 of them a few paths carried most of the light (15 times the squared error at 256 samples). */
+ * with chances by the normal, a path within glass would gain or lose weight at every bounce, until
+ * few paths carry most of the light. */
 static void share_chances(struct trc_lobe *reflect, struct trc_lobe *refract, vfloat f) {
     if (reflect)
         reflect->mix_weight = reflect->mix_weight * f;

@@ -32,7 +32,7 @@ static vfloat layered_sheen(struct trc_setup *c, const struct trc_leaf *leaf, vf
     return below(v3_scale(tint, albedo));
 }
 
-/* What the tint of the coat leaves of light from below: it is that of the way straight down, the
+/* What the tint of the coat leaves of light from below: it is that of the path straight down, the
  * view refracted into the coat takes a longer one. */
 static vvec3 coat_tint(const struct trc_setup *c, const struct trc_leaf *leaf, vfloat cos_o,
                        vfloat coat, vfloat ior) {

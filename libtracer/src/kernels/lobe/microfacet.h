@@ -18,7 +18,8 @@
 /* The lowest index that shaders take, as in Cycles. */
 #define TRC_MIN_IOR 1e-5f
 
-/* Reflectance of a dielectric, eta the relative index beyond over before. 1 at total reflection. */
+/* Reflectance of a dielectric, eta the relative index, transmitted over incident side. 1 at total
+ * reflection. */
 TRC_INLINE vfloat trc_fresnel_dielectric(vfloat cos_i, vfloat eta) {
     const vfloat c = vf_abs(cos_i);
     const vfloat g2 = eta * eta - vf_one() + c * c;

@@ -59,9 +59,9 @@ static void mend_inverse(const struct trc_instance *instance, const struct trc_w
     const vvec3 *c = a->column;
     const vvec3 cofactors = v3_cross(c[1], c[2]);
     const vfloat volume = vf_abs(v3_dot(c[0], cofactors));
-    const vfloat most = v3_dot(v3_abs(c[0]), v3_abs(cofactors));
+    const vfloat maximum = v3_dot(v3_abs(c[0]), v3_abs(cofactors));
     /* A few digits more than the sum of three products leaves: 2^-20. */
-    const vmask flat = vf_le(volume, most * vf_set(0x1p-20f));
+    const vmask flat = vf_le(volume, maximum * vf_set(0x1p-20f));
     for (int k = 0; k < 3; k++)
         m->column[k] = v3_select(flat, between.column[k], m->column[k]);
     m->origin = v3_select(flat, between.origin, m->origin);
@@ -93,11 +93,11 @@ static vvec3 normal_to_object(const struct trc_wide_affine *object_to_world, vve
  * first, so that their products neither overflow nor vanish. */
 static vvec3 normal_to_world(const struct trc_wide_affine *object_to_world, vvec3 n) {
     vvec3 c[3];
-    vfloat most = vf_zero();
+    vfloat maximum = vf_zero();
     for (int k = 0; k < 3; k++)
-        most = vf_max(most, v3_max(v3_abs(object_to_world->column[k])));
+        maximum = vf_max(maximum, v3_max(v3_abs(object_to_world->column[k])));
     for (int k = 0; k < 3; k++) {
-        c[k] = v3_scale(object_to_world->column[k], vf_divide(vf_one(), most));
+        c[k] = v3_scale(object_to_world->column[k], vf_divide(vf_one(), maximum));
     }
     const vvec3 x = v3_cross(c[1], c[2]), y = v3_cross(c[2], c[0]), z = v3_cross(c[0], c[1]);
     const vvec3 sum = v3_mad(x, n.x, v3_mad(y, n.y, v3_scale(z, n.z)));
@@ -190,8 +190,9 @@ static vfloat op_uv_density(const struct trc_surface *s, uint32_t name) {
                              (u2 * u2 + v2 * v2) * e11;
         const vfloat determinant = uv_area * uv_area * area2;
         const vfloat root = vf_safe_sqrt(trace * trace - vf_set(4.0f) * determinant);
-        const vfloat least = vf_divide(vf_set(2.0f) * uv_area * uv_area, trace + root);
-        out = vf_select(vm_and(g.lanes, vf_lt(least, vf_set(INFINITY))), vf_safe_sqrt(least), out);
+        const vfloat minimum = vf_divide(vf_set(2.0f) * uv_area * uv_area, trace + root);
+        out = vf_select(vm_and(g.lanes, vf_lt(minimum, vf_set(INFINITY))), vf_safe_sqrt(minimum),
+                        out);
     }
     return out;
 }

@@ -301,7 +301,7 @@ static void voronoi_fractal(struct voronoi *v, uint32_t mode, vfloat smoothness,
     const bool normalizes = mode & TRC_VORONOI_NORMALIZE;
     const vfloat reach = normalizes ? voronoi_reach(v, feature) : vf_one();
     const vfloat whole = vf_floor(d->detail), rest = d->detail - whole;
-    vfloat amplitude = vf_one(), scale = vf_one(), most = is_edge ? reach : vf_one();
+    vfloat amplitude = vf_one(), scale = vf_one(), maximum = is_edge ? reach : vf_one();
     voronoi_enter(v, place, scale);
     voronoi_octave(v, feature, smoothness, has_color, sum);
     for (float number = 1.0f; number < TRC_MAX_OCTAVES; number++) {
@@ -319,11 +319,11 @@ static void voronoi_fractal(struct voronoi *v, uint32_t mode, vfloat smoothness,
         if (is_edge) {
             const vfloat nearest = vf_min(sum->distance, vf_divide(octave.distance, scale));
             voronoi_add(counts, weight, nearest - sum->distance, &sum->distance);
-            voronoi_add(counts, weight, vf_divide(reach, scale) - most, &most);
+            voronoi_add(counts, weight, vf_divide(reach, scale) - maximum, &maximum);
             continue;
         }
         voronoi_add(counts, weight, octave.distance, &sum->distance);
-        voronoi_add(counts, weight, vf_one(), &most);
+        voronoi_add(counts, weight, vf_one(), &maximum);
         if (has_color)
             sum->color = v3_select(counts, v3_mad(octave.color, weight, sum->color), sum->color);
         for (int i = 0; i < v->dims; i++)
@@ -331,8 +331,8 @@ static void voronoi_fractal(struct voronoi *v, uint32_t mode, vfloat smoothness,
     }
     if (!normalizes)
         return;
-    sum->color = v3_scale(sum->color, vf_rcp(most));
-    sum->distance = sum->distance / (is_edge ? most : most * reach);
+    sum->color = v3_scale(sum->color, vf_rcp(maximum));
+    sum->distance = sum->distance / (is_edge ? maximum : maximum * reach);
 }
 
 /* ---- the texture ---- */

@@ -264,7 +264,7 @@ TRC_INLINE vfloat vf_max(vfloat a, vfloat b) {
     return vf_select(vf_gt(a, b), a, b);
 #endif
 }
-/* a, and in the lanes of m the least or most of a and b. */
+/* a, and in the lanes of m the minimum or maximum of a and b. */
 TRC_INLINE vfloat vf_min_where(vmask m, vfloat a, vfloat b) {
 #if TRC_WIDTH == 16
     return _mm512_mask_min_ps(a, m, a, b);

@@ -14,8 +14,8 @@ void trc_arrival_load(const struct trc_tile *t, vint index, vmask active, struct
                          column(f[TRC_RAY_WEIGHT_B], a));
     a->n_from = v3(column(f[TRC_RAY_NX], a), column(f[TRC_RAY_NY], a), column(f[TRC_RAY_NZ], a));
     a->tmin = column(f[TRC_RAY_TMIN], a);
-    a->beyond = column(f[TRC_RAY_BEYOND], a);
-    a->weight = v3_scale(a->found_weight, a->beyond);
+    a->indirect_scale = column(f[TRC_RAY_INDIRECT_SCALE], a);
+    a->weight = v3_scale(a->found_weight, a->indirect_scale);
     a->time = column(f[TRC_RAY_TIME], a);
     a->pdf = column(f[TRC_RAY_PDF], a);
     a->min_pdf = column(f[TRC_RAY_MIN_PDF], a);

@@ -12,11 +12,11 @@ struct arrival {
         run; /* index of the first lane where all lanes are active and follow each other, or -1 */
     vmask active;
     vvec3 o, d, n_from;
-    vvec3 found_weight; /* of emission the ray finds, also straight on through transparency */
-    vvec3 weight;       /* of light and rays that scatter here: found_weight * beyond */
-    vfloat beyond;      /* kernels/lobe/bsdf.h, trc_bsdf_sample */
-    vvec3 receive_n;    /* normal as kernels/light/light.h wants it of the surface hit */
-    vfloat t;           /* 0 or below: what coincides with the surface that the ray left */
+    vvec3 found_weight;    /* of emission the ray finds, also straight on through transparency */
+    vvec3 weight;          /* of light and rays that scatter here: found_weight * indirect_scale */
+    vfloat indirect_scale; /* kernels/lobe/bsdf.h, trc_bsdf_sample */
+    vvec3 receive_n;       /* normal as kernels/light/light.h wants it of the surface hit */
+    vfloat t;              /* 0 or below: what coincides with the surface that the ray left */
     vfloat tmin, time, pdf, min_pdf;
     vfloat
         chance; /* that a continuation ray is sent: densities of its directions have it in them */

@@ -13,11 +13,11 @@ uint32_t trc_hit_material(const struct trc_snapshot *snapshot, uint32_t instance
     return in->materials[slot < in->material_count ? slot : in->material_count - 1];
 }
 
-/* Rays of one packet share their visibility; beyond that the assembly decides (Boulos et al. 2007,
+/* Rays of one packet share their visibility; else the assembly decides (Boulos et al. 2007,
  * section 3.3). Keys are what rays of a packet share; runs break packets where the key changes. */
 #define RAY_KIND (TRC_VISIBLE_ALL | TRC_VISIBLE_UNBLOCKED)
 #define RAY_KIND_BITS 6
-/* Of the material that rays left, what its groups are told apart by: keys stay below TRC_BINS. */
+/* Of the material that rays left, what its groups differ by: keys stay below TRC_BINS. */
 #define GROUP_MASK 63u
 static bool all_see_the_same(const struct trc_tile *t) {
     return !(t->snapshot->features & (TRC_FEATURE_VISIBILITY | TRC_FEATURE_SHADOW_CATCHERS));

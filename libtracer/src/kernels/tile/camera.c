@@ -190,7 +190,7 @@ static void path_begin(struct trc_tile *t, uint32_t i) {
     vf_store(out->f[TRC_RAY_MIN_PDF] + i, vf_set(FLT_MAX));
     for (int k = TRC_RAY_NX; k <= TRC_RAY_NZ; k++)
         vf_store(out->f[k] + i, zero);
-    vf_store(out->f[TRC_RAY_BEYOND] + i, one);
+    vf_store(out->f[TRC_RAY_INDIRECT_SCALE] + i, one);
     vi_store((int32_t *)out->w[TRC_RAY_SLOT] + i, vi_set((int32_t)i) + vi_lane());
     vu_store(out->w[TRC_RAY_PATH] + i,
              vu_set(TRC_VISIBLE_CAMERA | TRC_PATH_TRANSPARENT_BACKGROUND));

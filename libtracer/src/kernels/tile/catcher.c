@@ -8,7 +8,7 @@
  * counts as change, too. Behaviour as in Cycles from 3.0 on. */
 #include "kernels/tile/tile.h"
 
-/* The first catcher on the way straight from the camera. */
+/* The first catcher of a path straight from the camera. */
 static bool is_caught(const struct trc_tile *t, uint32_t ray) {
     const uint32_t straight = TRC_PATH_TRANSPARENT_BACKGROUND, hit = t->hits.instance[ray];
     const uint32_t path = t->work.w[TRC_RAY_PATH][ray];

@@ -1,7 +1,7 @@
 /* Passes of what the camera sees, apart from light and from features for denoisers.
  *
  * Two kinds, as in Cycles: those of the first surface that is not mostly seen through (depth,
- * normal, indices ...), and those that add up over all surfaces on the straight way through
+ * normal, indices ...), and those that add up over all surfaces on straight paths through
  * transparency, each by what it lets be seen of itself (colours, mist, mattes). */
 #include "kernels/light/world.h"
 #include "kernels/simd/wide_math.h"
@@ -172,7 +172,7 @@ static void first_surface(struct trc_tile *t, const struct trc_surface *s,
     }
 }
 
-/* ---- of all surfaces on the way ---- */
+/* ---- of all surfaces of a straight path ---- */
 
 static void add_colors(struct trc_tile *t, const struct trc_surface *s,
                        const struct trc_lobes *lobes, vvec3 weight, const uint32_t *slots,
@@ -284,14 +284,14 @@ void trc_world_aovs(struct trc_tile *t, vvec3 d, vuint path, const uint32_t slot
 
 vuint trc_data_passes(struct trc_tile *t, const struct trc_surface *s, const struct trc_material *m,
                       const struct trc_registers *regs, const struct trc_lobes *lobes,
-                      vvec3 found_weight, vfloat beyond, vfloat length,
+                      vvec3 found_weight, vfloat indirect_scale, vfloat length,
                       const uint32_t slots[TRC_WIDTH]) {
     const vuint path = trc_denoising_passes(t, s, lobes, found_weight, length, slots);
     const vint straight = vi_set(TRC_PATH_TRANSPARENT_BACKGROUND);
     const vmask on = vm_and(s->active, vi_eq((vint)s->path & straight, straight));
     if (!vm_any(on))
         return path;
-    const vvec3 weight = v3_scale(found_weight, beyond);
+    const vvec3 weight = v3_scale(found_weight, indirect_scale);
     const vvec3 one = v3(vf_set(1.0f), vf_set(1.0f), vf_set(1.0f));
     const vvec3 alpha = v3_sub(one, trc_lobes_transparency(lobes));
     add_colors(t, s, lobes, weight, slots, on);

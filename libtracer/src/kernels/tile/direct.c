@@ -6,8 +6,8 @@
 #include "kernels/trace/spawn.h"
 #include "model/lights.h"
 
-/* Shadow rays end this much before the light, as a fraction of the way: mesh lights must not shade
- * themselves, whatever the rounding of both ends. */
+/* Shadow rays end this much before the light, as a fraction of their length: mesh lights must not
+ * shade themselves, whatever the rounding of both ends. */
 #define SHADOW_END (1.0f - 2e-5f)
 
 /* Origin of a shadow ray: where light grazes a smooth surface it starts from the curved surface

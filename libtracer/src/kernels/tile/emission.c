@@ -91,7 +91,7 @@ void trc_emission_misses(struct trc_tile *t, const struct arrival *a, vmask miss
         trc_world_aovs(t, a->d, a->path, a->slots, missed);
 }
 
-/* Lamps of a light group, or of all, that the rays pass on their way to end. */
+/* Lamps of a light group, or of all, that the rays pass until their end. */
 static vvec3 pass_lamps(struct trc_tile *t, const struct arrival *a, vfloat end, uint32_t group) {
     vvec3 c = v3_zero();
     /* It is surfaces alone that rays look back for. */
@@ -121,7 +121,7 @@ static vvec3 pass_lamps(struct trc_tile *t, const struct arrival *a, vfloat end,
     return c;
 }
 
-/* Lights that rays pass on their way, in the order of t->work. */
+/* Lights that rays pass, in the order of t->work. */
 void trc_emission_rays(struct trc_tile *t) {
     const bool lights = t->snapshot->features & TRC_FEATURE_LIGHTS;
     const uint32_t *seen = t->snapshot->lights->group_seen;

@@ -39,8 +39,8 @@ enum trc_ray_float {
     TRC_RAY_MIN_PDF, /* smallest so far, for Filter Glossy */
     TRC_RAY_NX,
     TRC_RAY_NY,
-    TRC_RAY_NZ,     /* normal where it left, as kernels/light/light.h wants it */
-    TRC_RAY_BEYOND, /* factor on everything behind the next surface: kernels/lobe/bsdf.h */
+    TRC_RAY_NZ,             /* normal where it left, as kernels/light/light.h wants it */
+    TRC_RAY_INDIRECT_SCALE, /* factor on everything behind the next surface: kernels/lobe/bsdf.h */
     TRC_RAY_FLOATS
 };
 enum trc_ray_word {

@@ -62,9 +62,7 @@ static void batch_render(struct trc_tile *t) {
 #define SAMPLES_PER_BATCH 16
 #define SQUARE 8
 /* With an open shutter packets hold a 4x4 square of pixels and a quarter of the time, else with a
- * wide lens a quarter of the lens. By tracer_bench, conference and character at 1024x1024: without
- * cells, packets in fast motion are up to 2.5 times as slow, in slow motion at most 1.2 times as
- * fast; with 16, up to 1.5 times as slow nearly everywhere. */
+ * wide lens a quarter of the lens. */
 #define SHARED_CELLS 4
 /* Radius of the circle of confusion far behind the focus, from which on a lens is wide. */
 #define WIDE_LENS_PIXELS 8.0f
@@ -166,12 +164,12 @@ static void batch_flush(struct trc_tile *t, enum sharing sharing) {
 /* The samples [begin, end) of the tile's pixels. */
 static void samples_render(struct trc_tile *t, uint32_t begin, uint32_t end) {
     const struct trc_tile_job *job = t->job;
-    const uint32_t most = t->catchers ? TRC_CATCHER_BATCH : TRC_BATCH;
+    const uint32_t maximum = t->catchers ? TRC_CATCHER_BATCH : TRC_BATCH;
     const enum sharing sharing = sharing_of(t, end - begin);
     t->samples.count = 0;
     for (uint32_t y = 0; y < job->height; y += SQUARE)
         for (uint32_t x = 0; x < job->width; x += SQUARE) {
-            if (t->samples.count + square_pixels(t, x, y) * (end - begin) > most)
+            if (t->samples.count + square_pixels(t, x, y) * (end - begin) > maximum)
                 batch_flush(t, sharing);
             square_append(t, x, y, begin, end);
         }
@@ -180,9 +178,9 @@ static void samples_render(struct trc_tile *t, uint32_t begin, uint32_t end) {
 
 void trc_samples_render(struct trc_tile *t) {
     const struct trc_tile_job *job = t->job;
-    const uint32_t most = t->catchers ? SAMPLES_PER_BATCH / 2 : SAMPLES_PER_BATCH;
+    const uint32_t maximum = t->catchers ? SAMPLES_PER_BATCH / 2 : SAMPLES_PER_BATCH;
     for (uint32_t s = job->sample_begin; s < job->sample_end && !*job->cancel;) {
-        const uint32_t end = job->sample_end - s > most ? s + most : job->sample_end;
+        const uint32_t end = job->sample_end - s > maximum ? s + maximum : job->sample_end;
         samples_render(t, s, end);
         s = end;
     }

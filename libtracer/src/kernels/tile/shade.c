@@ -73,18 +73,20 @@ TRC_INLINE vfloat filter_alpha(const struct trc_tile *t, const struct arrival *a
                      vf_set(0.0f));
 }
 
-/* Of a way that a shadow catcher split, the half that goes on as ever writes the sample's data. */
+/* Of a path that a shadow catcher split, the half that goes on as ever writes the sample's data. */
 static vuint data_passes(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
                          const struct trc_material *m, const struct trc_registers *regs,
                          const struct trc_lobes *lobes) {
     const vfloat length = vf_max(a->t - vf_max(a->tmin, vf_set(0.0f)), vf_set(0.0f));
     if (!t->catchers)
-        return trc_data_passes(t, s, m, regs, lobes, a->found_weight, a->beyond, length, a->slots);
+        return trc_data_passes(t, s, m, regs, lobes, a->found_weight, a->indirect_scale, length,
+                               a->slots);
     struct trc_surface seen = *s;
     uint32_t samples[TRC_WIDTH];
     seen.active = vm_andnot(s->active, trc_is_unblocked(a->path));
     vu_store(samples, trc_sample_of(a->slot));
-    return trc_data_passes(t, &seen, m, regs, lobes, a->found_weight, a->beyond, length, samples);
+    return trc_data_passes(t, &seen, m, regs, lobes, a->found_weight, a->indirect_scale, length,
+                           samples);
 }
 
 static void shade_group(struct trc_tile *t, uint32_t material, vint index, vmask active) {

@@ -175,7 +175,7 @@ static void passes_add(struct trc_tile *t, uint32_t ray) {
 }
 
 /* Adds what rays found to the passes of ambient occlusion and shadow. Those of ambient occlusion
- * carry no light beyond that. */
+ * carry no light besides. */
 static void occlusion_add(struct trc_tile *t) {
     struct trc_shadow_store *q = &t->shadows;
     for (uint32_t i = 0; i < q->count; i++) {

@@ -21,7 +21,7 @@ enum {
     TRC_PATH_DATA_DONE = 1 << 15,     /* data passes of the sample are written */
     TRC_PATH_FEATURES_DONE = 1 << 16, /* and its denoising passes, along this path */
     TRC_PATH_OCCLUSION = 1 << 17,     /* shadow rays: of the pass of ambient occlusion, no light */
-    TRC_PATH_CAUGHT = 1 << 18,        /* the camera sees this way through a shadow catcher */
+    TRC_PATH_CAUGHT = 1 << 18,        /* the camera sees this path through a shadow catcher */
     TRC_PATH_CLAMPED = 1 << 19        /* shadow rays: what they carry is clamped already */
 };
 
@@ -129,7 +129,7 @@ TRC_INLINE vuint trc_direction_cell(vvec3 d) {
 /* Cell of a place on a light, below TRC_DIRECTION_CELLS: rays to one cell share packets. More cells
  * mean packets of more pixels, so a light that is small as seen from the point has fewer: 4x4, 2x2
  * or one, by the density per solid angle. The bounds are where either is as fast, at 1024x1024 and
- * 16 samples; in one cell, rays to a point light are 2.5 times as fast as in 4x4. */
+ * 16 samples. */
 #define TRC_NARROW_LIGHT 64.0f
 #define TRC_MIDDLING_LIGHT 4.0f
 TRC_INLINE vuint trc_light_cell(vfloat u, vfloat v, vfloat density) {
@@ -199,12 +199,13 @@ vuint trc_denoising_passes(struct trc_tile *t, const struct trc_surface *s,
                            const uint32_t slots[TRC_WIDTH]);
 
 /* Passes that hold no light but what surfaces are, for a group of hits of one material:
- * found_weight and beyond as kernels/lobe/bsdf.h has them, of the rays that arrived; length: of
- * their way since the last surface or the near clip. Returns the rays' path words, which remember
- * what is written. Called only with more passes than Combined. (kernels/tile/data_passes.c) */
+ * found_weight and indirect_scale as kernels/lobe/bsdf.h has them, of the rays that arrived;
+ * length: of their path since the last surface or the near clip. Returns the rays' path words,
+ * which remember what is written. Called only with more passes than Combined.
+ * (kernels/tile/data_passes.c) */
 vuint trc_data_passes(struct trc_tile *t, const struct trc_surface *s, const struct trc_material *m,
                       const struct trc_registers *regs, const struct trc_lobes *lobes,
-                      vvec3 found_weight, vfloat beyond, vfloat length,
+                      vvec3 found_weight, vfloat indirect_scale, vfloat length,
                       const uint32_t slots[TRC_WIDTH]);
 
 /* Adds the lanes' vectors to a pass, if it is asked for. (kernels/tile/data_passes.c) */

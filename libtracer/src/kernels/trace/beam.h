@@ -3,7 +3,7 @@
  * Boulos et al. 2007, section 3.2, cull a box against intervals of a packet's origins and
  * directions. Here the rays of a beam share their dominant axis z and its sign, and the hull is
  * kept as two ranges per cross axis, at a near and a far plane of z, joined linearly: each ray is
- * linear in z, so the least and the largest x of all rays between the planes lie within the joined
+ * linear in z, so the minimum and maximum x of all rays between the planes lie within the joined
  * lines. It is tighter than intervals of slopes when origins differ.
  *
  * Everything here only culls. Rounding is covered by slack, an absolute widening of boxes:
@@ -22,7 +22,7 @@
 
 #define TRC_SLACK 2.4e-6f
 /* Denormal coordinates: errors are absolute there. */
-#define TRC_LEAST_SLACK 1e-42f
+#define TRC_MIN_SLACK 1e-42f
 /* Widest half of a narrow beam, per length. */
 #define TRC_NARROW_BEAM 0.03f
 /* Between planes nearer than this, slopes per z would overflow. */
@@ -40,7 +40,7 @@ struct trc_beam {
     /* The same as middle and half width. */
     float u_mid, v_mid, u_half, v_half, u_mid_slope, v_mid_slope, u_half_slope, v_half_slope;
     float u_widest, v_widest; /* largest half width between the planes */
-    float u_spread, v_spread; /* most that a ray's distance from the middle changes per z */
+    float u_spread, v_spread; /* maximum change per z of a ray's distance from the middle */
     bool converges;           /* narrower at z1 than at z0 */
     bool is_narrow;           /* rays mostly meet the same boxes */
 };
@@ -209,7 +209,7 @@ TRC_INLINE bool trc_group_setup(struct trc_group *g, const struct trc_packet *pa
     b->side = side;
     b->sign = side ? -1.0f : 1.0f;
     const struct trc_group_reach reach = trc_group_rays(g, packets, mask);
-    b->slack = TRC_SLACK * (reach.origin + tree->extent) + TRC_LEAST_SLACK;
+    b->slack = TRC_SLACK * (reach.origin + tree->extent) + TRC_MIN_SLACK;
     const float low = side ? -tree->upper[z] : tree->lower[z];
     const float high = side ? -tree->lower[z] : tree->upper[z];
     b->z0 = f_max(reach.z_near, low) - b->slack;
@@ -297,7 +297,7 @@ TRC_INLINE void trc_beam_corners_set(const struct trc_beam *b, int corner, f8 u,
 
 /* Edge functions: rounding of their terms, and products that underflow. */
 #define TRC_EDGE_ROUNDING 1e-6f
-#define TRC_EDGE_LEAST 1e-36f
+#define TRC_MIN_EDGE 1e-36f
 
 /* What trc_triangle_test knows beforehand of triangles in that range of z whose corners are so far
  * from the beam's middle: a vertex is no farther from a ray than from the middle and that from the
@@ -306,11 +306,11 @@ TRC_INLINE struct trc_precision8 trc_beam_precision(const struct trc_group *g, f
                                                     f8 u, f8 v) {
     const struct trc_beam *b = &g->beam;
     const f8 zero = f8_set(0.0f), length = f8_set(b->length), slack = f8_set(b->slack);
-    const f8 beyond = f8_max(zero, f8_max(z_high - length, -z_low));
-    const f8 x = u + slack + f8_madd(beyond, f8_set(b->u_spread), f8_set(b->u_widest));
-    const f8 y = v + slack + f8_madd(beyond, f8_set(b->v_spread), f8_set(b->v_widest));
+    const f8 excess = f8_max(zero, f8_max(z_high - length, -z_low));
+    const f8 x = u + slack + f8_madd(excess, f8_set(b->u_spread), f8_set(b->u_widest));
+    const f8 y = v + slack + f8_madd(excess, f8_set(b->v_spread), f8_set(b->v_widest));
     const f8 z = f8_max(f8_abs(z_low), f8_abs(z_high)) + f8_set(g->z_origin);
-    return trc_precision_most(x, y, z, z_high - z_low + slack);
+    return trc_precision_maximum(x, y, z, z_high - z_low + slack);
 }
 
 /* Bits of the triangles that some ray of the beam may hit. later: where the corners are at the end
@@ -359,7 +359,7 @@ TRC_INLINE uint32_t trc_beam_triangles(const struct trc_group *g, const struct t
     const f8 rounding = f8_set(TRC_EDGE_ROUNDING);
     const f8 u_reach = f8_madd(rounding, f8_max(f8_abs(u_low), f8_abs(u_high)) + u_half, u_half);
     const f8 v_reach = f8_madd(rounding, f8_max(f8_abs(v_low), f8_abs(v_high)) + v_half, v_half);
-    f8 most = f8_set(INFINITY), least = f8_set(-INFINITY); /* of the edge functions' bounds */
+    f8 maximum = f8_set(INFINITY), minimum = f8_set(-INFINITY); /* of the edge functions' bounds */
     for (int k = 0; k < 3; k++) {
         const int next = (k + 1) % 3;
         const f8 du = c->u[next] - c->u[k], dv = c->v[next] - c->v[k];
@@ -375,12 +375,12 @@ TRC_INLINE uint32_t trc_beam_triangles(const struct trc_group *g, const struct t
             reach = f8_max(reach, f8_madd(f8_abs(eu), v_reach, f8_abs(ev) * u_reach)) +
                     f8_set(0.2501f) * square;
         }
-        most = f8_min(most, high + reach);
-        least = f8_max(least, low - reach);
+        maximum = f8_min(maximum, high + reach);
+        minimum = f8_max(minimum, low - reach);
     }
     /* Outside of an edge, whichever way it turns. Not a number stays in. */
     const uint32_t outside =
-        f8_le(most, f8_set(-TRC_EDGE_LEAST)) & f8_le(f8_set(TRC_EDGE_LEAST), least);
+        f8_le(maximum, f8_set(-TRC_MIN_EDGE)) & f8_le(f8_set(TRC_MIN_EDGE), minimum);
     return boxes & ~outside;
 }
 

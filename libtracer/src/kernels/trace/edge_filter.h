@@ -22,12 +22,12 @@ struct trc_edge_filter {
 };
 #define TRC_EDGE_MARGIN 2e-6f
 /* Products of lengths must neither overflow nor vanish; slack is in proportion to lengths. */
-#define TRC_FILTER_LEAST_SLACK 1e-18f
-#define TRC_FILTER_MOST_SLACK 1e6f
+#define TRC_FILTER_MIN_SLACK 1e-18f
+#define TRC_FILTER_MAX_SLACK 1e6f
 
 TRC_INLINE bool trc_edge_filter_applies(const struct trc_packet *p, const struct trc_group *g) {
-    return p->common_origin && g->beam.slack > TRC_FILTER_LEAST_SLACK &&
-           g->beam.slack < TRC_FILTER_MOST_SLACK;
+    return p->common_origin && g->beam.slack > TRC_FILTER_MIN_SLACK &&
+           g->beam.slack < TRC_FILTER_MAX_SLACK;
 }
 
 /* Sets the filter up for the triangles [vertex][axis u, v, z] of a leaf. Bits of the candidates
@@ -74,10 +74,10 @@ TRC_INLINE uint32_t trc_edge_filter_lanes(const struct trc_edge_filter *e,
     for (int k = 0; k < 3; k++)
         value[k] = vf_madd(vf_set(e->n[k][0][slot]), su,
                            vf_madd(vf_set(e->n[k][1][slot]), sv, vf_set(e->n[k][2][slot])));
-    const vfloat least = vf_min(value[0], vf_min(value[1], value[2]));
-    const vfloat most = vf_max(value[0], vf_max(value[1], value[2]));
+    const vfloat minimum = vf_min(value[0], vf_min(value[1], value[2]));
+    const vfloat maximum = vf_max(value[0], vf_max(value[1], value[2]));
     const vfloat margin = vf_set(e->margin[slot]);
-    return vm_bits(vm_or(vf_ge(least, -margin), vf_le(most, margin)));
+    return vm_bits(vm_or(vf_ge(minimum, -margin), vf_le(maximum, margin)));
 }
 
 #endif

@@ -53,8 +53,8 @@ TRC_INLINE vfloat trc_spawn_look_back(const struct trc_surface *s, vvec3 o, vvec
     const vmask alone = vf_gt(t * v3_dot(s->wo, s->ng), two * depth);
     const vmask looks = vm_or(vm_and(through, alone), vm_andnot(vf_le(t, zero), through));
     /* Not as far as where the ray came from. */
-    const vfloat most = vf_select(through, vf_set(-0.5f) * t, behind);
-    return vf_select(looks, vf_max(behind, most), zero);
+    const vfloat maximum = vf_select(through, vf_set(-0.5f) * t, behind);
+    return vf_select(looks, vf_max(behind, maximum), zero);
 }
 
 #endif

@@ -2,7 +2,7 @@
  *
  * Ingo Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies", 2007: centroids are
  * counted into bins of all three axes, and the cheapest plane between bins is taken. With AVX a box
- * is one register, and builds are 6 % faster. */
+ * is one register. */
 #include "kernels/trace/split.h"
 
 #include <float.h>
@@ -13,9 +13,7 @@
 #include "model/tree.h"
 
 /* Where triangles are few, fewer bins are as good. What might stay a leaf is sorted instead, along
- * the longest axis alone (for all few triangles, that costs 3 %). Where they are many, more bins
- * cost nothing, and rays are 1 % faster in the mean of six scenes: single kinds of rays by -28 to
- * 24 %, as the first planes are drawn elsewhere. */
+ * the longest axis alone. Where they are many, more bins cost nothing. */
 #define FEW_TRIANGLES 24
 #define FEW_BINS 8
 #define MANY_TRIANGLES 4096
@@ -59,8 +57,8 @@ static inline bounds bounds_ref(const struct trc_ref *r) {
 #endif
 
 static inline bounds bounds_empty(void) {
-    const f4 most = {FLT_MAX, FLT_MAX, FLT_MAX, 0.0f};
-    return bounds_of(most, most);
+    const f4 maximum = {FLT_MAX, FLT_MAX, FLT_MAX, 0.0f};
+    return bounds_of(maximum, maximum);
 }
 static inline bounds bounds_load(const struct trc_bin_box *box) {
     bounds b;
@@ -273,7 +271,7 @@ static struct trc_split few_find(const struct trc_range *r) {
 /* ---- by all threads ---- */
 
 /* Refs of a block at least. */
-#define LEAST_BLOCK 2048
+#define MIN_BLOCK 2048
 
 static struct trc_ref *block_refs(const struct trc_split_blocks *b, uint32_t block) {
     return b->range->refs + block * b->block_size;
@@ -290,7 +288,7 @@ static void blocks_run(struct trc_split_blocks *b, const struct trc_range *r,
     const uint32_t share = (r->count + TRC_SPLIT_BLOCKS - 1) / TRC_SPLIT_BLOCKS;
     b->range = r;
     b->split = s;
-    b->block_size = share > LEAST_BLOCK ? share : LEAST_BLOCK;
+    b->block_size = share > MIN_BLOCK ? share : MIN_BLOCK;
     b->block_count = (r->count + b->block_size - 1) / b->block_size;
     trc_pool_run(b->pool, b->block_count, task, b);
 }

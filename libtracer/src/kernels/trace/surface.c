@@ -149,11 +149,11 @@ static vvec3 scaled_to_one(vvec3 a) { return v3_scale(a, vf_divide(vf_one(), v3_
  * here. */
 static vvec3 transform_normal(const struct trc_wide_affine *m, vvec3 n) {
     vvec3 c[3];
-    vfloat most = vf_zero();
+    vfloat maximum = vf_zero();
     for (int k = 0; k < 3; k++)
-        most = vf_max(most, v3_max(v3_abs(m->column[k])));
+        maximum = vf_max(maximum, v3_max(v3_abs(m->column[k])));
     for (int k = 0; k < 3; k++)
-        c[k] = v3_scale(m->column[k], vf_divide(vf_one(), most));
+        c[k] = v3_scale(m->column[k], vf_divide(vf_one(), maximum));
     return v3_mad(v3_cross(c[1], c[2]), n.x,
                   v3_mad(v3_cross(c[2], c[0]), n.y, v3_scale(v3_cross(c[0], c[1]), n.z)));
 }

@@ -39,13 +39,9 @@ TRC_WEIGHT_ERROR(trc_weight_error8, f8, f8_set)
 /* Hits that are computed in double: those whose barycentrics are off by more than that, needles,
  * whose edge functions lose what their length has over their width; and those whose distance is, by
  * more than one part in so many, such as of the surface that a ray leaves. What floats say is not
- * ahead is not asked again: rays that leave surfaces would take up to 6 % longer (point shadow and
- * mirror most, hemispheres none), to meet what is less than ten floats ahead.
- *
- * At 512 distances on needles 1e4 times as long as wide are off by 287 ulps at most, for no time;
- * at 2048 by 57 and at 8192 by 14, but primary rays among many take a seventh and a quarter longer.
- * The products' share of the error alone, which is what double does away with, times 32768, makes
- * 57 for 1 to 4 % of the time. */
+ * ahead is not asked again: that would meet what is less than ten floats ahead, and slow rays down
+ * that leave surfaces. With these two, distances on needles 1e4 times as long as wide are off by at
+ * most 287 ulps. */
 #define TRC_WEIGHT_IMPRECISE (1.0f / 64.0f)
 #define TRC_T_IMPRECISE 512.0f
 /* Errors of higher order, of weights as precise as that. */
@@ -66,7 +62,7 @@ struct trc_precision8 {
     f8 z, range;
 };
 /* 1.001: both this and a ray's own are rounded. */
-TRC_INLINE struct trc_precision8 trc_precision_most(f8 x, f8 y, f8 z, f8 range) {
+TRC_INLINE struct trc_precision8 trc_precision_maximum(f8 x, f8 y, f8 z, f8 range) {
     const f8 error = f8_set(1.001f * 6.0f * (TRC_GAMMA(2) + 2.0f * TRC_GAMMA(5))) * x * y +
                      f8_set(1.001f * 6.0f * TRC_GAMMA(5)) * z * (x + y);
     return (struct trc_precision8){error, z, range};
@@ -76,10 +72,10 @@ struct trc_precision {
     float weight_error, z, range;
 };
 /* Below it products may have underflowed: then it says nothing. */
-#define TRC_LEAST_WEIGHT_ERROR 1e-30f
+#define TRC_MIN_WEIGHT_ERROR 1e-30f
 TRC_INLINE struct trc_precision trc_precision_of(const struct trc_precision8 *p, int i) {
-    return (struct trc_precision){p->weight_error[i] >= TRC_LEAST_WEIGHT_ERROR ? p->weight_error[i]
-                                                                               : INFINITY,
+    return (struct trc_precision){p->weight_error[i] >= TRC_MIN_WEIGHT_ERROR ? p->weight_error[i]
+                                                                             : INFINITY,
                                   p->z[i], p->range[i]};
 }
 
@@ -130,12 +126,12 @@ static __attribute__((noinline)) bool trc_triangle_exact(const struct trc_doubtf
     const bool sure = fmax(low, -high) > (double)TRC_Z_ERROR * fmax(high, -low);
     const double nearest = fmin(low * scale, high * scale),
                  farthest = fmax(low * scale, high * scale);
-    const double least = sure ? nearest : fmin(nearest, 0.0);
+    const double minimum = sure ? nearest : fmin(nearest, 0.0);
     double distance = (n[0] * way[0] + n[1] * way[1] + n[2] * way[2]) /
                       (n[0] * (double)d->su + n[1] * (double)d->sv + n[2]) * scale;
     /* In this order NaN stays: the ray is in the triangle's plane. */
     distance = farthest < distance ? farthest : distance;
-    distance = distance < least ? least : distance;
+    distance = distance < minimum ? minimum : distance;
     *t = (float)distance;
     *u = (float)(e1 / det);
     *v = (float)(e2 / det);
@@ -213,11 +209,11 @@ static __attribute__((noinline)) vmask trc_triangle_exact_lanes(
     const trc_vdouble zero = {0.0};
     const trc_vlong sure = trc_vd_max(trc_vd_of(low), -trc_vd_of(high)) >
                            (double)TRC_Z_ERROR * trc_vd_max(trc_vd_of(high), -trc_vd_of(low));
-    const trc_vdouble least = trc_vd_select(sure, nearest, trc_vd_min(nearest, zero));
+    const trc_vdouble minimum = trc_vd_select(sure, nearest, trc_vd_min(nearest, zero));
     trc_vdouble distance = (n[0] * way[0] + n[1] * way[1] + n[2] * way[2]) /
                            (n[0] * trc_vd_of(su) + n[1] * trc_vd_of(sv) + n[2]) * scale;
     distance = trc_vd_min(farthest, distance);
-    distance = trc_vd_max(least, distance);
+    distance = trc_vd_max(minimum, distance);
     *t = __builtin_convertvector(distance, vfloat);
     *u = __builtin_convertvector(e1 / det, vfloat);
     *v = __builtin_convertvector(e2 / det, vfloat);
@@ -265,11 +261,11 @@ TRC_INLINE vmask trc_triangle_near(const struct trc_triangle_lanes *p, vfloat ou
                  vf_le(vf_max(e[0], vf_max(e[1], e[2])), margin));
 }
 
-/* Lanes of active whose ray passes through the triangle at distance *t; also barycentrics. most: of
- * all rays, so that few need to compute their own bounds. */
+/* Lanes of active whose ray passes through the triangle at distance *t; also barycentrics. maximum:
+ * of all rays, so that few need to compute their own bounds. */
 TRC_INLINE vmask trc_triangle_test(const struct trc_triangle_lanes *p, vfloat ou, vfloat ov,
                                    vfloat oz, vfloat su, vfloat sv, vfloat sz, vfloat tmin,
-                                   const struct trc_precision *most, vmask active, vfloat *t,
+                                   const struct trc_precision *maximum, vmask active, vfloat *t,
                                    vfloat *u, vfloat *v) {
     struct trc_triangle_sheared s;
     vmask hit = vm_and(active, trc_triangle_edges(p, ou, ov, oz, su, sv, &s));
@@ -279,13 +275,14 @@ TRC_INLINE vmask trc_triangle_test(const struct trc_triangle_lanes *p, vfloat ou
     *u = s.e[1] * inv;
     *v = s.e[2] * inv;
     *t = (s.e[0] * inv * s.z[0] + *u * s.z[1] + *v * s.z[2]) * sz;
-    /* Of hits: the least |edge function|. */
+    /* Of hits: the minimum of |edge function|. */
     const vmask near_edge = vf_le(vf_max(s.low, -s.high), vf_set(TRC_TINY_EDGE));
     const vfloat inv_size = vf_abs(inv), sz_size = vf_abs(sz), t_size = vf_abs(*t);
-    const vfloat error_most = vf_set(most->weight_error) * inv_size;
-    const vfloat doubt_most = trc_t_doubt(vf_set(most->z), vf_set(most->range), error_most);
-    const vmask surely_precise = vm_and(vf_le(error_most, vf_set(TRC_WEIGHT_IMPRECISE)),
-                                        vf_gt(t_size, doubt_most * sz_size));
+    const vfloat error_maximum = vf_set(maximum->weight_error) * inv_size;
+    const vfloat doubt_maximum =
+        trc_t_doubt(vf_set(maximum->z), vf_set(maximum->range), error_maximum);
+    const vmask surely_precise = vm_and(vf_le(error_maximum, vf_set(TRC_WEIGHT_IMPRECISE)),
+                                        vf_gt(t_size, doubt_maximum * sz_size));
     const vmask maybe = vm_or(near_edge, vm_andnot(vf_gt(*t, tmin), surely_precise));
     if (!vm_any(vm_and(hit, maybe)))
         return hit;
@@ -358,8 +355,8 @@ TRC_INLINE uint32_t trc_triangle8_test(const struct trc_triangle8 *p, float ou, 
     const f8 e1 = ax * cy - ay * cx;
     const f8 e2 = bx * ay - by * ax;
     const f8 zero = f8_set(0.0f);
-    const f8 least = f8_min(e0, f8_min(e1, e2)), most = f8_max(e0, f8_max(e1, e2));
-    uint32_t hit = candidates & (f8_le(zero, least) | f8_le(most, zero));
+    const f8 minimum = f8_min(e0, f8_min(e1, e2)), maximum = f8_max(e0, f8_max(e1, e2));
+    uint32_t hit = candidates & (f8_le(zero, minimum) | f8_le(maximum, zero));
     if (!hit)
         return 0;
     const f8 inv = f8_set(1.0f) / (e0 + e1 + e2);

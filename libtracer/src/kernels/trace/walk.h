@@ -31,7 +31,7 @@
  * trees, hulled over the group's interval of time. */
 struct opened {
     float planes[6][TRC_NODE_WIDTH]; /* low and high along u, v; near and far along z */
-    float order[TRC_NODE_WIDTH];     /* least first; of closest hits, nearest mirrored z */
+    float order[TRC_NODE_WIDTH];     /* minimum first; of closest hits, nearest mirrored z */
     struct trc_live mask;            /* rays that reached it */
     uint32_t first; /* bits of the children that the first of those meets; wide beams: none */
 } __attribute__((aligned(64)));

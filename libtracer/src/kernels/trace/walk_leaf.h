@@ -106,10 +106,10 @@ TRC_INLINE float least_distance(const struct walk *w, int k, int ray, const stru
 
 /* From such a distance on those of triangles are to be precise: floats may put what a ray looks
  * back for too far behind it. */
-TRC_INLINE vfloat precise_beyond(vfloat least) {
+TRC_INLINE vfloat precise_beyond(vfloat minimum) {
     if (!TRC_WALK_LOOKS_BACK)
-        return least;
-    return vf_select(vf_lt(least, vf_set(0.0f)), vf_set(-INFINITY), least);
+        return minimum;
+    return vf_select(vf_lt(minimum, vf_set(0.0f)), vf_set(-INFINITY), minimum);
 }
 TRC_INLINE float leaf_precise_beyond(const struct walk *w, int k, int ray,
                                      const struct trc_slot *slots, uint32_t count) {
@@ -167,7 +167,7 @@ struct leaf {
  * chunks, live or not, and all packets before the first test: to branch by masks that are still in
  * the making costs more than it spares (primary rays 5 to 17 %, others up to 12). */
 TRC_INLINE uint64_t slot_edges(const struct walk *w, const struct leaf *leaf, int slot,
-                               const struct trc_precision *most, struct trc_triangle_lanes *tri,
+                               const struct trc_precision *maximum, struct trc_triangle_lanes *tri,
                                int k, uint64_t mask, bool motion) {
     const struct trc_packet *p = &w->packets[k];
     const struct trc_sheared *g = &w->group->of[k];
@@ -183,7 +183,7 @@ TRC_INLINE uint64_t slot_edges(const struct walk *w, const struct leaf *leaf, in
             lanes_load(w, leaf->vertices + slot, leaf->count, true, k, i, tri);
         const vmask near = trc_triangle_near(
             tri, vf_load(&p->o[axis.u][i]), vf_load(&p->o[axis.v][i]), vf_load(&p->o[axis.z][i]),
-            vf_load(&g->su[i]), vf_load(&g->sv[i]), most->weight_error);
+            vf_load(&g->su[i]), vf_load(&g->sv[i]), maximum->weight_error);
         pass |= (uint64_t)vm_bits(near) << i;
     }
     return pass & mask;
@@ -192,7 +192,7 @@ TRC_INLINE uint64_t slot_edges(const struct walk *w, const struct leaf *leaf, in
 /* Tests the triangle in a slot, loaded into tri where it is at rest, against the rays of packet k
  * in mask; those that it hits or, of closest hits, whose hit it became. */
 TRC_INLINE uint64_t slot_packet(struct walk *w, const struct leaf *leaf, int slot,
-                                const struct trc_precision *most, struct trc_triangle_lanes *tri,
+                                const struct trc_precision *maximum, struct trc_triangle_lanes *tri,
                                 int k, uint64_t mask, bool any, bool motion) {
     const struct trc_packet *p = &w->packets[k];
     const struct trc_sheared *g = &w->group->of[k];
@@ -211,7 +211,7 @@ TRC_INLINE uint64_t slot_packet(struct walk *w, const struct leaf *leaf, int slo
                                       vf_load(&p->o[axis.z][i]), vf_load(&g->su[i]),
                                       vf_load(&g->sv[i]), vf_load(&g->sz[i]),
                                       precise_beyond(least_distances(w, k, i, &leaf->ids[slot])),
-                                      most, vm_from_bits(bits), &t, &bu, &bv);
+                                      maximum, vm_from_bits(bits), &t, &bu, &bv);
         if (!vm_any(hit))
             continue;
         if (any) {
@@ -244,19 +244,19 @@ TRC_INLINE bool leaf_packet(struct walk *w, uint32_t ref, struct trc_live mask, 
         const int slot = __builtin_ctz(slots);
         if (any && w->packets->skip_transparent && (leaf.ids[slot].instance & TRC_SLOT_TRANSPARENT))
             continue;
-        const struct trc_precision most = trc_precision_of(&leaf.precision, slot);
+        const struct trc_precision maximum = trc_precision_of(&leaf.precision, slot);
         struct trc_triangle_lanes tri;
         if (!motion)
             lanes_load(w, leaf.vertices + slot, leaf.count, false, 0, 0, &tri);
         struct trc_live pass = mask;
         for (int k = 0; k < TRC_WALK_PACKETS; k++)
             if (mask.of[k])
-                pass.of[k] = slot_edges(w, &leaf, slot, &most, &tri, k, mask.of[k], motion);
+                pass.of[k] = slot_edges(w, &leaf, slot, &maximum, &tri, k, mask.of[k], motion);
         for (int k = 0; k < TRC_WALK_PACKETS; k++) {
             if (!pass.of[k])
                 continue;
             const uint64_t hit =
-                slot_packet(w, &leaf, slot, &most, &tri, k, pass.of[k], any, motion);
+                slot_packet(w, &leaf, slot, &maximum, &tri, k, pass.of[k], any, motion);
             found |= hit;
             if (any) {
                 w->occluded.of[k] |= hit;

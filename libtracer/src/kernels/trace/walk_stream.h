@@ -9,9 +9,8 @@
 
 #include "kernels/trace/walk_leaf.h"
 
-/* Rays of a stream at most, and live rays at or below which packets end in one. By tracer_bench:
- * rays alone are up to 1.3 times as slow, at four of one origin or eight of many; lanes that are
- * half empty cost more than streams, more so where they are fewer. */
+/* Maximum of rays of a stream, and live rays at or below which packets end in one: lanes that are
+ * half empty cost more than streams. */
 #define STREAM_SIZE 32
 #define STREAM_ANY STREAM_SIZE
 #define STREAM_CLOSEST (TRC_WIDTH < 16 ? STREAM_SIZE : 24)
