@@ -16,12 +16,12 @@ static vvec3 mirrored(struct model *m, double cosine) {
     return v.glossy;
 }
 
-/* Weight of the diffuse lobe seen at that cosine. */
+/* Weight of the diffuse lobe seen at that cosine: the last one, below sheen. */
 static vvec3 diffuse_weight(struct model *m, double cosine) {
     struct trc_surface s;
     struct trc_lobes l;
     prepare(m, direction(cosine, 0.3), &s, &l);
-    for (int i = 0; i < l.count; i++)
+    for (int i = l.count - 1; i >= 0; i--)
         if (l.lobe[i].kind == TRC_LOBE_DIFFUSE)
             return l.lobe[i].weight;
     fail_msg("there is no diffuse lobe");
