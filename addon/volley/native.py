@@ -108,10 +108,19 @@ def load_error():
 
 
 def description():
-    """Version and instruction set of the loaded library, for people."""
+    """Version, revision and instruction set of the loaded library, for people."""
     library = _require()
     isa = library.trc_isa_name(library.trc_isa()).decode()
-    return f"libtracer {library.trc_version_string().decode()}, {isa}"
+    return f"libtracer {library.trc_version_string().decode()}{_revision()}, {isa}"
+
+
+def _revision():
+    """The state of the sources that the add-on was built from, as git names it, where that is known."""
+    try:
+        with open(os.path.join(os.path.dirname(library_path()), "revision"), encoding="utf-8") as file:
+            return f" ({file.read().strip()})"
+    except OSError:
+        return ""
 
 
 def _declare(library, names):

@@ -1,0 +1,96 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Packs a staged add-on: the extension, the legacy add-on, and a bill of materials (see package.sh).
+
+    package.py --stage DIR --platform linux-x64 --out DIR
+
+Archives of equal contents are equal bytes: entries are sorted and carry one date."""
+
+import argparse
+import ast
+import hashlib
+import json
+import re
+import zipfile
+from pathlib import Path
+
+_DATE = (1980, 1, 1, 0, 0, 0)  # the earliest that zip can say
+_PROGRAM, _FILE, _FOLDER = 0o100755, 0o100644, 0o040755
+
+
+def version_of(stage):
+    """The version, which the manifest and bl_info have to agree on."""
+    manifest = re.search(r'^version = "([^"]+)"$', (stage / "blender_manifest.toml").read_text(), re.MULTILINE)[1]
+    for statement in ast.parse((stage / "__init__.py").read_text()).body:
+        if isinstance(statement, ast.Assign) and statement.targets[0].id == "bl_info":
+            legacy = ".".join(map(str, ast.literal_eval(statement.value)["version"]))
+            break
+    if legacy != manifest:
+        raise SystemExit(f"package: bl_info says version {legacy}, blender_manifest.toml {manifest}")
+    return manifest
+
+
+def files_of(stage):
+    """{path in the package: bytes} of all that is staged."""
+    return {str(path.relative_to(stage)): path.read_bytes() for path in sorted(stage.rglob("*"))
+            if path.is_file() and "__pycache__" not in path.parts}
+
+
+def with_platform(manifest, platform):
+    """The manifest of a package for one platform."""
+    return manifest.replace(b"\n\n[", f'\nplatforms = ["{platform}"]\n\n['.encode(), 1)
+
+
+def pack(path, files, folder=""):
+    """Write a zip of files, below a folder in it or at its top.
+
+    The folder has an entry of its own: by that Blender finds the former one, and removes it before it unpacks
+    the zip. It would write into a library that is loaded otherwise, and fall."""
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
+        if folder:
+            entry = zipfile.ZipInfo(folder, _DATE)
+            entry.external_attr = _FOLDER << 16
+            archive.writestr(entry, b"")
+        for name in sorted(files):
+            entry = zipfile.ZipInfo(folder + name, _DATE)
+            entry.external_attr = (_PROGRAM if name.startswith("lib/") else _FILE) << 16
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            archive.writestr(entry, files[name])
+
+
+def bill_of_materials(version, platform, files):
+    """What the package is made of, as CycloneDX 1.5: its own two parts, and no third one's."""
+    def component(kind, name, licence, names):
+        return {"type": kind, "name": name, "version": version, "licenses": [{"license": {"id": licence}}],
+                "components": [{"type": "file", "name": path, "hashes": [
+                    {"alg": "SHA-256", "content": hashlib.sha256(files[path]).hexdigest()}]}
+                    for path in names]}
+
+    library = [name for name in sorted(files) if name.startswith("lib/")]
+    addon = [name for name in sorted(files) if name not in library]
+    return {"bomFormat": "CycloneDX", "specVersion": "1.5", "version": 1,
+            "metadata": {"component": {"type": "application", "name": "volley", "version": version,
+                                       "properties": [{"name": "platform", "value": platform}]}},
+            "components": [component("library", "libtracer", "Apache-2.0", library),
+                           component("application", "volley", "GPL-3.0-or-later", addon)]}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--stage", type=Path, required=True)
+    parser.add_argument("--platform", required=True)
+    parser.add_argument("--out", type=Path, required=True)
+    arguments = parser.parse_args()
+    version, files = version_of(arguments.stage), files_of(arguments.stage)
+    name = f"volley-{version}-{arguments.platform}"
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    manifest = with_platform(files["blender_manifest.toml"], arguments.platform)
+    pack(arguments.out / f"{name}.zip", {**files, "blender_manifest.toml": manifest})
+    legacy = {path: content for path, content in files.items() if path != "blender_manifest.toml"}
+    pack(arguments.out / f"{name}-legacy.zip", legacy, "volley/")
+    bill = bill_of_materials(version, arguments.platform, files)
+    (arguments.out / f"{name}.cdx.json").write_text(json.dumps(bill, indent=2) + "\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,123 @@
+#!/usr/bin/env bash
+# Makes the packages that users install from a file, in build/packages:
+#
+#   bash examples/package.sh [linux-x64] [linux-arm64]        linux-x64 if none is named
+#
+#   volley-VERSION-PLATFORM.zip          the extension, for Blender 4.2 and later
+#   volley-VERSION-PLATFORM-legacy.zip   the add-on, for Blender 3.4 to 4.1
+#   volley-VERSION-PLATFORM.cdx.json     bill of materials (CycloneDX)
+#   SHA256SUMS
+#
+# The library loads with glibc 2.28 and later: today's compiler builds it against the headers and libraries
+# of Debian 11, which are fetched once into $XDG_CACHE_HOME/volley. Needs Debian, and root or sudo where
+# packages are missing. A checkout with changes is packed as it is, and its version says so.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+OLD_SUITE=bullseye
+CACHE=${XDG_CACHE_HOME:-$HOME/.cache}/volley
+out=build/packages
+
+say() { printf '== %s\n' "$*"; }
+die() { printf 'package: %s\n' "$*" >&2; exit 1; }
+
+as_root() {
+    if [ "$(id -u)" -eq 0 ]; then "$@"; else sudo "$@"; fi
+}
+
+# Debian's compiler for a platform, and what it takes to build and pack with.
+install_packages() {
+    local package missing=()
+    for package in cmake ninja-build python3 binutils "$@"; do
+        [ "$(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null)" = installed ] ||
+            missing+=("$package")
+    done
+    [ ${#missing[@]} -gt 0 ] || return 0
+    say "Installing: ${missing[*]}"
+    as_root apt-get update -q </dev/null
+    as_root env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends \
+        "${missing[@]}" </dev/null
+}
+
+# The mirror that this system installs from.
+mirror() {
+    local found
+    found=$(apt-get indextargets --format '$(SITE) $(REPO_URI)' 'Created-By: Packages' 2>/dev/null |
+        sed -n 's|^[^ ]* \(.*/debian/\{0,1\}\)$|\1|p' | head -n 1)
+    printf '%s\n' "${found:-http://deb.debian.org/debian}"
+}
+
+# Headers and libraries of Debian 11 for an architecture, unpacked into a folder: nothing is installed.
+make_sysroot() {
+    local architecture=$1 root=$2 part=$2.part apt=$2.apt deb link
+    [ ! -d "$root" ] || return 0
+    say "Debian 11's C library for $architecture into $root"
+    rm -rf "$part" "$apt"
+    mkdir -p "$part" "$apt/lists/partial" "$apt/cache/archives/partial"
+    : >"$apt/status"
+    printf 'deb %s %s main\n' "$(mirror)" "$OLD_SUITE" >"$apt/sources.list"
+    apt=$(realpath "$apt")
+    local options=(-q -o "APT::Architecture=$architecture" -o "APT::Architectures::=$architecture"
+        -o "Dir::State=$apt" -o "Dir::State::status=$apt/status"
+        -o "Dir::Etc::sourcelist=$apt/sources.list" -o Dir::Etc::sourceparts=-
+        -o "Dir::Cache=$apt/cache" -o Acquire::Languages=none)
+    apt-get "${options[@]}" update >"$apt/log" 2>&1 </dev/null || die "no $OLD_SUITE: see $apt/log"
+    (cd "$apt" && apt-get "${options[@]}" download \
+        libc6:"$architecture" libc6-dev:"$architecture" linux-libc-dev:"$architecture") \
+        >>"$apt/log" 2>&1 </dev/null || die "$OLD_SUITE has no C library for $architecture: see $apt/log"
+    for deb in "$apt"/*.deb; do
+        dpkg-deb -x "$deb" "$part"
+    done
+    # Links to absolute paths would lead into this system.
+    find "$part" -type l -lname '/*' | while read -r link; do
+        ln -sfnr "$part$(readlink "$link")" "$link"
+    done
+    mv "$part" "$root"
+}
+
+# No symbol that glibc has only had since after 2.28, and none that is not the library's own interface.
+check_library() {
+    local library=$1 newest foreign
+    newest=$(objdump -T "$library" | grep -o 'GLIBC_[0-9.]*' | sort -uV | tail -n 1)
+    [ "$(printf 'GLIBC_2.28\n%s\n' "$newest" | sort -V | tail -n 1)" = GLIBC_2.28 ] ||
+        die "$library needs $newest"
+    foreign=$(nm -D --defined-only "$library" | awk '$NF !~ /^trc_/ { print $NF }')
+    [ -z "$foreign" ] || die "$library exports $foreign"
+    say "Needs $newest or later and $(readelf -d "$library" | sed -n 's/.*NEEDED.*\[\(.*\)\]/\1/p' |
+        tr '\n' ' ')"
+}
+
+build() {
+    local platform=$1 sysroot=$2 dir=$3
+    say "Building for $platform"
+    mkdir -p "$dir"
+    cmake -G Ninja --toolchain .cmake/package.cmake -DTRACER_TARGET="$platform" \
+        -DTRACER_SYSROOT="$sysroot" -DTRACER_WERROR=ON -S . -B "$dir" >"$dir/configure.log" 2>&1 </dev/null ||
+        { cat "$dir/configure.log" >&2; die "cmake could not configure $dir"; }
+    cmake --build "$dir" --target blender_scripts >"$dir/build.log" </dev/null ||
+        { tail -n 40 "$dir/build.log" >&2; die "the build in $dir failed"; }
+}
+
+package() {
+    local platform=$1 architecture=$2 compiler=$3
+    local sysroot=$CACHE/$OLD_SUITE-$architecture dir=build/package-$platform
+    install_packages "$compiler"
+    mkdir -p "$CACHE"
+    make_sysroot "$architecture" "$sysroot"
+    build "$platform" "$sysroot" "$dir"
+    check_library "$dir/blender/addons/volley/lib/libtracer.so"
+    python3 examples/package.py --stage "$dir/blender/addons/volley" --platform "$platform" --out "$out"
+}
+
+[ $# -gt 0 ] || set -- linux-x64
+rm -rf "$out"
+for platform in "$@"; do
+    case $platform in
+        linux-x64) package linux-x64 amd64 gcc ;;
+        linux-arm64) package linux-arm64 arm64 gcc-aarch64-linux-gnu ;;
+        *) die "unknown platform: $platform" ;;
+    esac
+done
+(cd "$out" && sha256sum -- *.zip *.json >SHA256SUMS)
+say "Packages in $out:"
+cat "$out/SHA256SUMS"

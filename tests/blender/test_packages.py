@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Packages: made of the staged add-on, installed as a user does, used, brought up to date, removed.
+
+Blender runs with a home folder of its own and without the user scripts of the build, so that the package
+is all there is of Volley."""
+
+import os
+import subprocess
+import sys
+import zipfile
+
+import pytest
+
+import blender as blender_support
+
+_REPOSITORY = blender_support.REPOSITORY
+_HAS_EXTENSIONS = (4, 2)  # the first Blender that has them
+_EXTENSION = "bl_ext.user_default.volley"
+
+_RENDER = """
+import bpy, sys
+scene = bpy.context.scene
+scene.render.engine = 'VOLLEY'
+scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 32, 24, 100
+scene.volley.samples = 4
+scene.render.image_settings.file_format = 'PNG'
+scene.render.filepath = sys.argv[-1]
+bpy.ops.render.render(write_still=True)
+"""
+
+_REMOVE = """
+import bpy
+screen = bpy.context.window_manager.windows[0].screen
+with bpy.context.temp_override(area=screen.areas[0]):  # which the operator redraws
+    bpy.ops.preferences.addon_remove(module='volley')
+"""
+
+
+@pytest.fixture
+def home(tmp_path):
+    """Runs Blender for a user who has nothing yet; the finished process."""
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("BLENDER_USER")}
+    environment.update(HOME=str(tmp_path), XDG_CONFIG_HOME=str(tmp_path / "config"))
+
+    def run(*arguments):
+        done = subprocess.run([blender_support.executable(), *map(str, arguments)], env=environment, text=True,
+                              stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                              timeout=120, check=False)
+        assert done.returncode == 0, done.stdout
+        assert "Traceback" not in done.stdout, done.stdout
+        return done.stdout
+    return run
+
+
+@pytest.fixture
+def packages(tmp_path):
+    """The packages made of the staged add-on: (extension, legacy)."""
+    stage = os.path.join(blender_support.user_scripts(), "addons", "volley")
+    out = tmp_path / "packages"
+    subprocess.run([sys.executable, os.path.join(_REPOSITORY, "examples/package.py"), "--stage", stage,
+                    "--platform", "linux-x64", "--out", out], check=True)
+    legacy, = out.glob("*-legacy.zip")
+    extension, = (path for path in out.glob("*.zip") if path != legacy)
+    return extension, legacy
+
+
+def test_contents(packages):
+    extension, legacy = packages
+    with zipfile.ZipFile(extension) as archive:
+        names = set(archive.namelist())
+        assert b'platforms = ["linux-x64"]' in archive.read("blender_manifest.toml")
+        assert archive.getinfo("lib/libtracer.so").external_attr >> 16 & 0o111
+    with zipfile.ZipFile(legacy) as archive:
+        expected = {f"volley/{name}" for name in names - {"blender_manifest.toml"}} | {"volley/"}
+        assert set(archive.namelist()) == expected
+    assert {"__init__.py", "LICENSE", "lib/libtracer.so"} <= names
+    assert not any("__pycache__" in name for name in names)
+
+
+def _render(home, tmp_path, *arguments):
+    picture = tmp_path / "picture.png"
+    script = tmp_path / "render.py"
+    script.write_text(_RENDER)
+    home("-b", *arguments, "--python-exit-code", 1, "--python", script, "--", picture)
+    assert picture.read_bytes()[1:4] == b"PNG"
+    picture.unlink()
+
+
+@pytest.fixture
+def is_extension():
+    return blender_support.version() >= _HAS_EXTENSIONS
+
+
+def test_legacy_package(home, packages, tmp_path, is_extension):
+    """Installed by the preferences' operators, twice, as an update is; then removed."""
+    if is_extension:
+        pytest.skip("installs extensions")
+    install = (f"import bpy; bpy.ops.preferences.addon_install(filepath={str(packages[1])!r}); "
+               "bpy.ops.preferences.addon_enable(module='volley')")
+    home("-b", "--python-exit-code", 1, "--python-expr", install)
+    _render(home, tmp_path, "--addons", "volley")
+    home("-b", "--addons", "volley", "--python-exit-code", 1, "--python-expr", install +
+         "; assert bpy.context.scene.volley.samples")
+    home("-b", "--addons", "volley", "--python-exit-code", 1, "--python-expr", _REMOVE)
+    assert not list(tmp_path.glob("config/blender/*/scripts/addons/volley"))
+
+
+def test_extension(home, packages, tmp_path, is_extension):
+    """Checked and installed by Blender's command, twice, as an update is; then removed."""
+    if not is_extension:
+        pytest.skip("installs add-ons")
+    extension = packages[0]
+    home("--command", "extension", "validate", extension)
+    for _ in range(2):
+        home("--command", "extension", "install-file", "--repo", "user_default", "--enable", extension)
+        _render(home, tmp_path, "--addons", _EXTENSION)
+    folder, = tmp_path.glob("config/blender/*/extensions/user_default/volley")
+    home("--command", "extension", "remove", "volley")
+    assert not folder.exists()
