@@ -74,6 +74,79 @@ static void lamps_keep_their_switches(void **state) {
     }
 }
 
+/* Nodes that emit white, so strong for any ray: by a program that adds what is 0 for lights. */
+static trc_id even_nodes(trc_scene scene, float strength) {
+    static const trc_node_input inputs[] = {
+        {TRC_INPUT_CONSTANT, 0, {0}},       {0, 0, {0}}, {TRC_INPUT_CONSTANT, 0, {0}},
+        {TRC_INPUT_CONSTANT, 0, {1, 1, 1}}, {1, 0, {0}},
+    };
+    trc_node_input own[5];
+    memcpy(own, inputs, sizeof own);
+    own[0].value[0] = strength;
+    const trc_node nodes[] = {
+        {.type = TRC_NODE_LIGHT_PATH},
+        {.type = TRC_NODE_MATH, .mode = TRC_MATH_ADD, .first_input = 0, .input_count = 3},
+        {.type = TRC_NODE_EMISSION, .first_input = 3, .input_count = 2},
+    };
+    trc_material_desc desc = trc_material_desc_default();
+    trc_id id = 0;
+    desc.nodes = nodes;
+    desc.node_count = 3;
+    desc.inputs = own;
+    desc.input_count = 5;
+    desc.surface = 2;
+    assert_ok(trc_material_create(scene, &desc, &id));
+    return id;
+}
+
+/* The mean of a floor under a lamp of each kind; nodes: 0, or what its nodes emit. */
+static double under_lamp(uint32_t type, float strength, float nodes, uint32_t bounce_limit,
+                         bool is_glossy) {
+    const trc_scene scene = fixture_level_view();
+    trc_light_desc light = default_light_desc();
+    trc_id id = 0;
+    light.type = type;
+    light.strength = strength;
+    light.transform[11] = 3.0f;
+    light.radius = 0.5f;
+    light.angle = 0.2f;
+    light.spot_angle = 2.0f;
+    light.bounce_limit = bounce_limit;
+    if (nodes != 0.0f)
+        light.material = even_nodes(scene, nodes);
+    assert_ok(trc_light_create(scene, &light, &id));
+    light.material = id;
+    assert_int_equal(trc_light_update(scene, id, &light), TRC_ERROR_INVALID_HANDLE);
+    fixture_level(scene, 100.0f, 0.0f,
+                  is_glossy ? fixture_glossy(scene, 0.5f, 0.3f)
+                            : fixture_material(scene, TRC_NODE_DIFFUSE, 0.5f));
+    assert_ok(trc_scene_commit(scene));
+    const struct mean mean = mean_of(scene, 16);
+    assert_ok(trc_scene_destroy(scene));
+    return mean.value;
+}
+
+/* A program that emits evenly gives what a strength does, by light samples and by rays. */
+static void programs_of_lamps_scale_their_light(void **state) {
+    (void)state;
+    for (uint32_t type = TRC_LIGHT_POINT; type <= TRC_LIGHT_AREA; type++)
+        for (int glossy = 0; glossy < 2; glossy++) {
+            const double want = under_lamp(type, 30.0f, 0.0f, 0, glossy);
+            const double got = under_lamp(type, 10.0f, 3.0f, 0, glossy);
+            assert_true(want > 0.0 && fabs(got - want) < 1e-5 * want);
+        }
+}
+
+/* A lamp that is limited to no bounces lights what the camera sees all the same. */
+static void limits_of_bounces_spare_the_first(void **state) {
+    (void)state;
+    for (int glossy = 0; glossy < 2; glossy++) {
+        const double want = under_lamp(TRC_LIGHT_POINT, 30.0f, 0.0f, 0, glossy);
+        const double got = under_lamp(TRC_LIGHT_POINT, 30.0f, 0.0f, 1, glossy);
+        assert_true(want > 0.0 && fabs(got - want) < 1e-5 * want);
+    }
+}
+
 /* A roof of emission 4 m above a floor. */
 static trc_scene roofed(uint32_t visibility, uint32_t surface) {
     static const uint32_t down[6] = {0, 2, 1, 0, 3, 2};
@@ -304,6 +377,8 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(spheres_are_met_from_inside),
         cmocka_unit_test(lamps_keep_their_switches),
+        cmocka_unit_test(programs_of_lamps_scale_their_light),
+        cmocka_unit_test(limits_of_bounces_spare_the_first),
         cmocka_unit_test(emissive_meshes_keep_their_switches),
         cmocka_unit_test(faces_that_shine_are_weighed_by_themselves),
         cmocka_unit_test(hidden_lamps_leave_nothing_to_rays),
