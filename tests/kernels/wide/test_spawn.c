@@ -15,7 +15,8 @@
 extern const struct trc_kernels TRC_KERNEL(trc_kernels);
 
 #define TRIANGLES 512
-#define ROUNDS 16 /* rays of each triangle for each angle */
+#define ROUNDS 16         /* rays of each triangle for each angle */
+#define LOOKING_BACK 6400 /* rays that go on through surfaces, of any width */
 #define GAMMA(n) ((n)*0x1p-24 / (1.0 - (n)*0x1p-24))
 
 /* A triangle of about that size, that far from the origin, whose corners are not on a line. */
@@ -410,7 +411,7 @@ static void rays_look_back_no_farther_than_they_came(void **state) {
     for (uint32_t t = 0; t < TRIANGLES; t++)
         add_triangle(mesh, &rng, 1.0f, 100.0f);
     struct query_scene scene = query_test_scene(&world, false);
-    for (int round = 0; round < 400; round++) {
+    for (int round = 0; round < LOOKING_BACK / TRC_WIDTH; round++) {
         const struct trc_surface s = surfaces(query_scene_snapshot(scene.scene),
                                               rng_below(&rng, TRIANGLES - TRC_WIDTH + 1), 1, &rng);
         const vvec3 w = leaving(&s, cosines[round % 4], &rng);
