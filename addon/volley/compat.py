@@ -26,6 +26,10 @@ LIGHT_UV_IS_LOCAL = bpy.app.version >= (4, 0, 0)
 # A sun is as bright all over its disc; seen in 4.3, not in 3.4.
 SUN_IS_EVEN = bpy.app.version >= (4, 1, 0)
 
+# Cycles 4 sees the nodes of a spot with a radius from another place, and has other splines between the angles
+# of an IES file (measured beside 4.3: up to 37 % and 9 % of the brightest pixel), which is not followed.
+FOLLOWS_LIGHT_NODES = bpy.app.version < (4, 0, 0)
+
 # Cycles of 4.0 has other microfacets: one height for masking and shadowing, glass by the micro-normal.
 HAS_CORRELATED_MICROFACETS = bpy.app.version >= (4, 0, 0)
 

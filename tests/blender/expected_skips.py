@@ -19,6 +19,7 @@ _OCTAVES = "Voronoi has octaves since 4.0"
 _VELVET = "the Velvet shader gave way to Sheen"
 _SHEEN = "the Sheen shader came with 4.0"
 _METALLIC = "the Metallic shader came with 4.3"
+_LIGHT_NODES = "differs from Cycles 4, which a warning says"
 _PRINCIPLED = "Principled has other inputs since 4.0; those of each have cases of their own"
 
 SKIPS = (
@@ -47,6 +48,10 @@ SKIPS = (
     Skip("test_warnings.py::test_worlds_of_view_layers", None, (4, 3), "the setting came with 4.3"),
     Skip("test_sky.py::test_against_cycles[multiple*]", None, (5, 0), "the model came with 5.0"),
     # Blender 4
+    *(Skip(f"test_light_nodes.py::test_webs[{web} *]", (4, 0), None, _LIGHT_NODES) for web in (
+        "round", "quadrant", "half", "whole", "open", "type b")),
+    *(Skip(f"test_light_nodes.py::test_soft_lights[{case}]", (4, 0), None, _LIGHT_NODES) for case in (
+        "spot noise", "two lights")),
     Skip(f"{_TEXTURE}[musgrave *]", (4, 1), None, _MERGED),
     Skip(f"{_SHADER}[velvet *]", (4, 0), None, _VELVET),
     Skip(f"{_LIGHT}[velvet]", (4, 0), None, _VELVET),

@@ -115,7 +115,7 @@ def _after_normal_map():
 
 def _fresnel():
     tree = Tree()
-    bump = tree.add("Bump", Height=_noise("Object")(tree), Distance=0.05)
+    bump = tree.add("Bump", Height=_noise("Object")(tree), Distance=0.04)
     tree.show(tree.add("Fresnel", IOR=1.5, Normal=(bump, 0)), 0)
     return tree.material
 

@@ -12,7 +12,7 @@ import numpy as np
 from ..abi import (CurvesExtension, ImageExtension, MathOperation as Math, ModeFlags, NodeType, RotateFlags,
                    RotateMode, SeparateMode, SpaceId, TableSize, TransformedType,
                    VectorOperation as Vector, VectorTransformMode)
-from ..compat import TRANSFORMS_NORMALS
+from ..compat import FOLLOWS_LIGHT_NODES, TRANSFORMS_NORMALS
 from . import ies
 from .instance import VALUES_LOCATION, VALUES_PARTICLE, VALUES_SPIN, VALUES_VELOCITY
 from .node_list import named_outputs, output
@@ -197,6 +197,8 @@ def _ies(walker, node, sockets):
     if web is None:
         walker.warn(f"node '{node.name}': its IES file cannot be read")
         return {"Fac": _number(walker, Math.MULTIPLY, strength, _MISSING_WEB)}
+    if not FOLLOWS_LIGHT_NODES:
+        walker.warn(f"node '{node.name}': between the angles of its IES file it is approximated")
     vector = sockets.get('v', "Vector")
     if vector.node == DEFAULT:
         vector = output(walker.emit(NodeType.TEXTURE_COORDINATE, ()), NodeType.TEXTURE_COORDINATE, "normal")
