@@ -235,7 +235,7 @@ def inside_motion(position):
         modifier = changing.modifiers.new("Build", 'BUILD')
         modifier.frame_start, modifier.frame_duration = 0, 4
     scenes.geometry_nodes(dotted, "GeometryNodeMeshToPoints")
-    for animated in bpy.data.objects:
+    for animated in (*bpy.data.objects, *bpy.data.shape_keys):
         for curve in scenes.curves(animated) if animated.animation_data else ():
             for point in curve.keyframe_points:
                 point.interpolation = 'LINEAR'
