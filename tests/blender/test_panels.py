@@ -89,7 +89,7 @@ def inside_cycles_settings():
     found["pairs"] = {target: (getattr(theirs, source), getattr(ours, target))
                       for source, target in from_cycles._COPIED if hasattr(theirs, source)}
     found["left"] = from_cycles.copy(scene)
-    for file in sorted(os.listdir(presets._OWN)):
+    for file in sorted(name for name in os.listdir(presets._OWN) if name.endswith(".py")):
         bpy.ops.script.execute_preset(filepath=os.path.join(presets._OWN, file),
                                       menu_idname="VOLLEY_PT_sampling_presets")
         found[file] = ours.integrator, ours.samples
