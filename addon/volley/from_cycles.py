@@ -19,8 +19,6 @@ _COPIED = (
     ("sample_clamp_direct", "clamp_direct"), ("sample_clamp_indirect", "clamp_indirect"),
     ("blur_glossy", "filter_glossy"), ("use_fast_gi", "use_ambient_occlusion"),
     ("fast_gi_method", "ao_method"), ("film_exposure", "film_exposure"),
-    ("film_transparent_glass", "film_transparent_glass"),
-    ("film_transparent_roughness", "film_transparent_roughness"),
     ("pixel_filter_type", "pixel_filter_type"), ("filter_width", "filter_width"),
     ("texture_limit", "texture_limit"), ("texture_limit_render", "texture_limit_render"),
 )
@@ -32,6 +30,7 @@ _UNMATCHED = (
     ("light_sampling_threshold", 0.0, "Light Threshold"), ("use_light_tree", True, "Light Tree"),
     ("use_guiding", False, "Path Guiding"), ("sample_offset", 0, "Sample Offset"),
     ("scrambling_distance", 1.0, "Scrambling Distance"),
+    ("film_transparent_glass", False, "Transparent Glass"),
 )
 
 

@@ -13,6 +13,7 @@ each field of a descriptor.
 
 import ctypes
 import functools
+import importlib.util
 import os
 import sys
 
@@ -29,6 +30,8 @@ class TracerError(Exception):
         super().__init__(message)
         self.status = status
 
+
+_READER_SCRIPT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "reader", "program.py")
 
 # Loading ---------------------------------------------------------------------------------------
 
@@ -69,16 +72,34 @@ def load(path=None):
 
 
 def _create_reader():
-    """A reader of image files. What unpacks an archive may have made its program a plain file."""
+    """A reader of image files: the program beside the library or, in packages, which have none, Blender's
+    Python with the OpenImageIO that it brings."""
     program = os.path.join(os.path.dirname(library_path()), "tracer_reader")
-    if os.path.isfile(program) and not os.access(program, os.X_OK):
+    values = {}
+    if os.path.isfile(program):
+        _make_runnable(program)
+    elif _python() and importlib.util.find_spec("OpenImageIO"):
+        values = {"program": os.fsencode(_python()), "script": os.fsencode(_READER_SCRIPT)}
+    handle = ctypes.c_uint64()
+    _call("trc_reader_create", ctypes.byref(describe(abi.ReaderDesc, **values)), ctypes.byref(handle))
+    return handle.value
+
+
+def _make_runnable(program):
+    """What unpacks an archive may have made it a plain file."""
+    if not os.access(program, os.X_OK):
         try:
             os.chmod(program, os.stat(program).st_mode | 0o111)
         except OSError:
             pass  # the library says that it cannot be started
-    handle = ctypes.c_uint64()
-    _call("trc_reader_create", ctypes.byref(describe(abi.ReaderDesc)), ctypes.byref(handle))
-    return handle.value
+
+
+def _python():
+    """The program of the Python that runs inside Blender, None where there is none. What sys.executable
+    names may be another one, found by the user's path."""
+    name = f"python{sys.version_info.major}.{sys.version_info.minor}"
+    path = os.path.join(sys.prefix, "bin", name)
+    return path if os.name == "posix" and os.access(path, os.X_OK) else None
 
 
 def start_reader():

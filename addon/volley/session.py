@@ -294,8 +294,6 @@ def render_fields(scene, frame, crop, entries, is_preview=False):
         "sampler": abi.SamplerType[settings.sampler], "seed": seed & 0xFFFFFFFF,
         "filter": abi.FilterType[settings.pixel_filter_type], "filter_width": settings.filter_width,
         "film_transparent": int(scene.render.film_transparent),
-        "film_transparent_glass": int(settings.film_transparent_glass),
-        "film_glass_roughness": settings.film_transparent_roughness,
         "film_exposure": settings.film_exposure, **passes.request_fields(entries),
         "denoise": int(settings.use_preview_denoising if is_preview else settings.use_denoising),
         "thread_count": thread_count(scene.render), **_adaptive_fields(settings, is_preview),

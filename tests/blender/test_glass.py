@@ -80,37 +80,3 @@ def test_floor_below_a_block(blender):
     assert ours[1] == pytest.approx(theirs[1], rel=TOLERANCE)
     # The upper face mirrors the sky; where the lower one is met before the floor, it does so, too.
     assert theirs[0] * (1.0 - TOLERANCE) < ours[0] < theirs[0] * (2.0 + TOLERANCE) < 0.5 * ours[1]
-
-
-def inside_transparent_film():
-    """Pictures by both engines of balls of glass before a transparent film, and with the film seen through
-    them up to a roughness."""
-    import bpy
-    import scenes
-    scene = scenes.empty(size=(96, 32))
-    scenes.camera(lens=80.0)
-    scene.world.color = (0.5, 0.6, 0.7)
-    scenes.light('SUN', energy=2.0)
-    for number, roughness in enumerate((0.0, 0.2, 0.5)):
-        scenes.sphere(f"Ball {number}", 0.4, ((number - 1) * 0.9, 0.0, 0.0), scenes.material(
-            f"Glass {number}", "ShaderNodeBsdfGlass", Color=(0.9, 1.0, 0.8), Roughness=roughness, IOR=1.3))
-    scene.render.film_transparent = True
-    pictures = []
-    for is_seen_through, threshold in ((False, 0.1), (True, 0.0), (True, 0.1), (True, 0.3), (True, 1.0)):
-        for settings in (scene.volley, scene.cycles):
-            settings.film_transparent_glass, settings.film_transparent_roughness = is_seen_through, threshold
-        pictures.append(scenes.by_both(256))
-    return pictures
-
-
-def test_the_film_is_seen_through_glass(blender):
-    pictures = blender.run(inside_transparent_film)
-    for number, (ours, theirs) in enumerate(pictures):
-        blocks = [picture.reshape(4, 8, 12, 8, 4).mean(axis=(1, 3)) for picture in (ours, theirs)]
-        off = abs(blocks[0] - blocks[1]).max()
-        alphas = [float(ours[14:18, column, 3].mean()) for column in (20, 48, 76)]
-        print(f"film {number}: blocks off by {off:.3f}, alpha {alphas}")
-        assert off < 0.03, number
-        assert [alpha > 0.9 for alpha in alphas] == [
-            [True, True, True], [False, True, True], [False, True, True], [False, False, True],
-            [False, False, False]][number]

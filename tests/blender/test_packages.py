@@ -5,6 +5,7 @@ Blender runs with a home folder of its own and without the user scripts of the b
 is all there is of Volley."""
 
 import os
+import shutil
 import subprocess
 import sys
 import zipfile
@@ -17,15 +18,43 @@ _REPOSITORY = blender_support.REPOSITORY
 _HAS_EXTENSIONS = (4, 2)  # the first Blender that has them
 _EXTENSION = "bl_ext.user_default.volley"
 
+# A red tile beside a green one: right only where files are read tile by tile.
 _RENDER = """
-import bpy, sys
+import bpy, os, sys
 scene = bpy.context.scene
+for number, color in ((1001, (1, 0, 0, 1)), (1002, (0, 1, 0, 1))):
+    made = bpy.data.images.new("Tile", 8, 8)
+    made.pixels.foreach_set(color * 64)
+    made.filepath_raw, made.file_format = os.path.join(sys.argv[-1], f"t.{number}.png"), 'PNG'
+    made.save()
+image = bpy.data.images.load(os.path.join(sys.argv[-1], "t.1001.png"))
+image.source = 'TILED'
+image.tiles.get(1002) or image.tiles.new(1002)
+image.filepath = os.path.join(sys.argv[-1], "t.<UDIM>.png")
+bpy.ops.object.select_all(action='SELECT')
+bpy.ops.object.delete()
+bpy.ops.mesh.primitive_plane_add()
+for uv in bpy.context.object.data.uv_layers[0].data:
+    uv.uv[0] *= 2
+material = bpy.data.materials.new("Tiles")
+material.use_nodes = True
+nodes, links = material.node_tree.nodes, material.node_tree.links
+texture, emission = nodes.new("ShaderNodeTexImage"), nodes.new("ShaderNodeEmission")
+texture.image = image
+links.new(texture.outputs["Color"], emission.inputs["Color"])
+links.new(emission.outputs["Emission"], nodes["Material Output"].inputs["Surface"])
+bpy.context.object.data.materials.append(material)
+bpy.ops.object.camera_add(location=(0, 0, 3))
+scene.camera = bpy.context.object
 scene.render.engine = 'VOLLEY'
 scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 32, 24, 100
 scene.volley.samples = 4
 scene.render.image_settings.file_format = 'PNG'
-scene.render.filepath = sys.argv[-1]
+scene.view_settings.view_transform = 'Raw'
+scene.render.filepath = os.path.join(sys.argv[-1], "picture.png")
 bpy.ops.render.render(write_still=True)
+pixels = bpy.data.images.load(scene.render.filepath).pixels[:]
+print("red and green:", [round(pixels[4 * (32 * 12 + x) + channel], 2) for x in (12, 20) for channel in range(3)])
 """
 
 _REMOVE = """
@@ -55,8 +84,9 @@ def home(tmp_path):
 @pytest.fixture
 def packages(tmp_path):
     """The packages made of the staged add-on: (extension, legacy)."""
-    stage = os.path.join(blender_support.user_scripts(), "addons", "volley")
-    out = tmp_path / "packages"
+    stage, out = tmp_path / "stage", tmp_path / "packages"
+    shutil.copytree(os.path.join(blender_support.user_scripts(), "addons", "volley"), stage,
+                    ignore=shutil.ignore_patterns("tracer_reader"))
     subprocess.run([sys.executable, os.path.join(_REPOSITORY, "examples/package.py"), "--stage", stage,
                     "--platform", "linux-x64", "--out", out], check=True)
     legacy, = out.glob("*-legacy.zip")
@@ -78,12 +108,11 @@ def test_contents(packages):
 
 
 def _render(home, tmp_path, *arguments):
-    picture = tmp_path / "picture.png"
     script = tmp_path / "render.py"
     script.write_text(_RENDER)
-    home("-b", *arguments, "--python-exit-code", 1, "--python", script, "--", picture)
-    assert picture.read_bytes()[1:4] == b"PNG"
-    picture.unlink()
+    output = home("-b", *arguments, "--python-exit-code", 1, "--python", script, "--", tmp_path)
+    assert "red and green: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0]" in output, output
+    assert "Blender reads them" not in output, output  # as where no program for it is found
 
 
 @pytest.fixture

@@ -133,28 +133,6 @@ def test_background(blender):
 PASSES = ["Combined", "Shadow Catcher", "DiffDir", "Combined_sky", "Depth"]
 
 
-def inside_glass():
-    """A ball of glass through which the transparent film is seen, as an object and as a catcher."""
-    import scenes
-    pairs = {}
-    scene = _floor(Color=(0.8, 0.6, 0.4))
-    _sun()
-    glass = scenes.material("Glass", "ShaderNodeBsdfGlass", Roughness=0.0, IOR=1.1)
-    ball = scenes.sphere("Clear", 0.5, (0.8, -1.2, 0.6), glass)
-    for settings in (scene.volley, scene.cycles):
-        settings.film_transparent_glass = True
-    pairs["an object"] = scenes.by_both(SAMPLES)
-    ball.is_shadow_catcher = True
-    pairs["a catcher"] = scenes.by_both(SAMPLES)
-    return pairs
-
-
-def test_behind_clear_glass(blender):
-    for name, (ours, theirs) in blender.run(inside_glass, timeout=300).items():
-        print(f"{name}: pixels apart by {np.abs(ours - theirs).max(axis=-1).mean():.4f}")
-        _agree(ours, theirs)
-
-
 def inside_passes():
     import bpy
     import scenes

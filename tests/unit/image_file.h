@@ -24,14 +24,17 @@ static void write_file(const char *name, const void *bytes, size_t size) {
 /* What reads the files; a group's set-up makes it. */
 static struct trc_image_source source;
 
+/* The environment may name another one: TRC_TEST_PYTHON to run TRC_TEST_SCRIPT. */
 static int set_up_reader(void **state) {
     (void)state;
 #ifdef TRC_TEST_READER
-    const char *program = TRC_TEST_READER;
+    const char *built = TRC_TEST_READER;
 #else
-    const char *program = "/nonexistent/reader";
+    const char *built = "/nonexistent/reader";
 #endif
-    if (trc_image_reader_create(program, &source.reader) != TRC_OK)
+    const char *python = getenv("TRC_TEST_PYTHON");
+    if (trc_image_reader_create(python ? python : built, python ? getenv("TRC_TEST_SCRIPT") : NULL,
+                                &source.reader) != TRC_OK)
         return -1;
     trc_image_reader_start(source.reader);
     return 0;

@@ -51,7 +51,7 @@ static const char *make_file(const char *name, const char *text, mode_t mode) {
 
 static struct trc_image_reader *reader_of(const char *program, double patience) {
     struct trc_image_reader *reader;
-    assert_int_equal(trc_image_reader_create(program, &reader), TRC_OK);
+    assert_int_equal(trc_image_reader_create(program, NULL, &reader), TRC_OK);
     trc_image_reader_set_patience(reader, patience);
     return reader;
 }
@@ -454,7 +454,7 @@ static void every_allocation_fails(void **state) {
         struct trc_image_reader *reader = NULL;
         struct trc_image *image = NULL;
         trc_memory_fail_at(n, false);
-        trc_status status = trc_image_reader_create(TRC_BAD_READER, &reader);
+        trc_status status = trc_image_reader_create(TRC_BAD_READER, NULL, &reader);
         if (status == TRC_OK)
             status = load(reader, "good", &image);
         trc_memory_fail_at(-1, false);

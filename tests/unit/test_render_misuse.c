@@ -63,8 +63,6 @@ static void render_settings(void **state) {
     REFUSE_RENDER(ARGUMENT, desc.filter_width = 0.0f);
     REFUSE_RENDER(ARGUMENT, desc.filter_width = NAN);
     REFUSE_RENDER(ARGUMENT, desc.film_transparent = 2);
-    REFUSE_RENDER(ARGUMENT, desc.film_transparent_glass = 2);
-    REFUSE_RENDER(ARGUMENT, desc.film_glass_roughness = 1.5f);
     REFUSE_RENDER(ARGUMENT, desc.film_exposure = -1.0f);
     REFUSE_RENDER(ARGUMENT, desc.film_exposure = NAN);
     REFUSE_RENDER(LARGE, desc.thread_count = 1025);

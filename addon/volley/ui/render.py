@@ -239,15 +239,9 @@ class VOLLEY_RENDER_PT_film(VolleyPanel, Panel):
     bl_options = {'DEFAULT_CLOSED'}
 
     def draw(self, context):
-        layout, settings, render = column_of(self), context.scene.volley, context.scene.render
-        layout.prop(settings, "film_exposure")
-        layout.prop(render, "film_transparent", text="Transparent")
-        glass = layout.column()
-        glass.active = render.film_transparent
-        glass.prop(settings, "film_transparent_glass")
-        roughness = glass.column()
-        roughness.active = settings.film_transparent_glass
-        roughness.prop(settings, "film_transparent_roughness")
+        layout = column_of(self)
+        layout.prop(context.scene.volley, "film_exposure")
+        layout.prop(context.scene.render, "film_transparent", text="Transparent")
 
 
 class VOLLEY_RENDER_PT_film_filter(VolleyPanel, Panel):

@@ -20,6 +20,9 @@ typedef struct trc_reader_desc {
     uint32_t struct_size; /* of this structure; checked */
     uint32_t reserved;    /* 0 */
     const char *program;  /* path of the program; NULL: tracer_reader in the library's folder */
+    /* What the program is to run if it is a Python, apart from the user's environment (-I); NULL:
+     * the program reads images itself. */
+    const char *script;
 } trc_reader_desc;
 
 /* The program in the library's folder. */

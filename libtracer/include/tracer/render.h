@@ -100,15 +100,11 @@ typedef struct trc_render_desc {
     uint32_t filter;      /* TRC_FILTER_* */
     float filter_width;   /* pixels, > 0 */
     uint32_t film_transparent; /* 1: the background adds no radiance and no alpha */
-    /* 1: nor where it is seen through refracting surfaces of at most film_glass_roughness. Not read
-     * without film_transparent. */
-    uint32_t film_transparent_glass;
-    float film_glass_roughness; /* in [0, 1], of a surface's setting: its square is alpha */
-    float film_exposure;        /* factor on Combined and light passes */
-    uint64_t passes;            /* bit per TRC_PASS_*, COMBINED is always there */
-    uint32_t thread_count;      /* 0: one per logical processor */
-    uint32_t progressive;       /* 1: whole frame, samples in rising batches (previews); 0: tiles to
-                                   the end one after the other */
+    float film_exposure;       /* factor on Combined and light passes */
+    uint64_t passes;           /* bit per TRC_PASS_*, COMBINED is always there */
+    uint32_t thread_count;     /* 0: one per logical processor */
+    uint32_t progressive;      /* 1: whole frame, samples in rising batches (previews); 0: tiles to
+                                  the end one after the other */
     /* Adaptive sampling, off where noise_threshold is 0: a pixel gets min_samples (rounded up to a
      * power of two; 0 chooses by the threshold, 64 for 0.01) and then doubles its count until the
      * estimated error is below the threshold, in units of Cycles' Noise Threshold, or sample_count

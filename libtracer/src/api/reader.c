@@ -8,7 +8,7 @@ trc_status trc_reader_create(const trc_reader_desc *desc, trc_reader *reader_out
     TRC_TRY(trc_check_struct(desc, sizeof *desc, "trc_reader_desc"));
     TRC_TRY(trc_check_out(reader_out, sizeof *reader_out, "reader_out"));
     struct trc_image_reader *reader;
-    TRC_TRY(trc_image_reader_create(desc->program, &reader));
+    TRC_TRY(trc_image_reader_create(desc->program, desc->script, &reader));
     const trc_status status = trc_handle_create(TRC_HANDLE_READER, reader, reader_out);
     if (status != TRC_OK)
         trc_image_reader_release(reader);

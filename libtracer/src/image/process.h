@@ -36,9 +36,11 @@ struct trc_process_exit {
     int32_t code;   /* without a signal */
 };
 
-/* Starts a program, a path of which the name alone is the process's name, and does not wait for it.
- * UNSUPPORTED with the reason if the system cannot run it, OUT_OF_MEMORY. */
-trc_status trc_launcher_start(const char *program, struct trc_launcher **launcher_out);
+/* Starts a program, a path, and does not wait for it; a Python runs the script, apart from the
+ * user's environment, unless that is NULL. UNSUPPORTED with the reason if the system cannot run it,
+ * OUT_OF_MEMORY. */
+trc_status trc_launcher_start(const char *program, const char *script,
+                              struct trc_launcher **launcher_out);
 
 /* Whether it has not been found dead or talking nonsense. */
 bool trc_launcher_is_sound(const struct trc_launcher *launcher);

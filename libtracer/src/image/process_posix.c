@@ -158,7 +158,7 @@ static int describe_child(posix_spawn_file_actions_t *actions, posix_spawnattr_t
                                                             POSIX_SPAWN_SETPGROUP);
 }
 
-static int spawn(const char *program, int stream, pid_t *pid) {
+static int spawn(const char *program, const char *script, int stream, pid_t *pid) {
     posix_spawn_file_actions_t actions;
     posix_spawnattr_t attributes;
     int error = posix_spawn_file_actions_init(&actions);
@@ -167,7 +167,7 @@ static int spawn(const char *program, int stream, pid_t *pid) {
     error = posix_spawnattr_init(&attributes);
     if (!error) {
         error = describe_child(&actions, &attributes, stream);
-        char *arguments[] = {(char *)program, NULL};
+        char *arguments[] = {(char *)program, script ? (char *)"-I" : NULL, (char *)script, NULL};
         if (!error)
             error = posix_spawn(pid, program, &actions, &attributes, arguments, environ);
         posix_spawnattr_destroy(&attributes);
@@ -176,7 +176,8 @@ static int spawn(const char *program, int stream, pid_t *pid) {
     return error;
 }
 
-trc_status trc_launcher_start(const char *program, struct trc_launcher **launcher_out) {
+trc_status trc_launcher_start(const char *program, const char *script,
+                              struct trc_launcher **launcher_out) {
     struct trc_launcher *launcher = trc_alloc_zeroed(1, sizeof *launcher);
     if (!launcher || pthread_mutex_init(&launcher->lock, NULL)) {
         trc_free(launcher);
@@ -185,7 +186,7 @@ trc_status trc_launcher_start(const char *program, struct trc_launcher **launche
     int ends[2] = {-1, -1};
     int error = trc_memory_should_fail() || !create_streams(ends) ? ENOMEM : 0;
     if (!error)
-        error = spawn(program, ends[1], &launcher->pid);
+        error = spawn(program, script, ends[1], &launcher->pid);
     close_descriptor(ends[1]);
     launcher->stream = ends[0];
     atomic_init(&launcher->refs, 1);

@@ -42,7 +42,7 @@
 
 struct trc_image_reader {
     atomic_uint refs;
-    char *program;
+    char *program, *script; /* script: NULL for none */
     double patience;
     pthread_mutex_t lock; /* what follows */
     struct trc_launcher *launcher;
@@ -55,18 +55,26 @@ struct trc_image_reader {
 
 /* ---- life ---- */
 
-trc_status trc_image_reader_create(const char *program, struct trc_image_reader **reader_out) {
+static char *copy_of(const char *text) {
+    char *copy = trc_alloc(strlen(text) + 1, 1);
+    if (copy)
+        memcpy(copy, text, strlen(text) + 1);
+    return copy;
+}
+
+trc_status trc_image_reader_create(const char *program, const char *script,
+                                   struct trc_image_reader **reader_out) {
     struct trc_image_reader *reader = trc_alloc_zeroed(1, sizeof *reader);
-    if (reader && program) {
-        reader->program = trc_alloc(strlen(program) + 1, 1);
-        if (reader->program)
-            memcpy(reader->program, program, strlen(program) + 1);
-    } else if (reader) {
-        reader->program = trc_file_beside_library(PROGRAM);
+    if (reader) {
+        reader->program = program ? copy_of(program) : trc_file_beside_library(PROGRAM);
+        reader->script = script ? copy_of(script) : NULL;
     }
-    if (!reader || !reader->program || pthread_mutex_init(&reader->lock, NULL)) {
-        if (reader)
+    if (!reader || !reader->program || (script && !reader->script) ||
+        pthread_mutex_init(&reader->lock, NULL)) {
+        if (reader) {
             trc_free(reader->program);
+            trc_free(reader->script);
+        }
         trc_free(reader);
         return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for a reader of images");
     }
@@ -98,6 +106,7 @@ void trc_image_reader_release(struct trc_image_reader *reader) {
         (void)trc_process_destroy(reader->idle[i]);
     pthread_mutex_destroy(&reader->lock);
     trc_free(reader->program);
+    trc_free(reader->script);
     trc_free(reader);
 }
 
@@ -125,7 +134,8 @@ static trc_status ensure_launcher(struct trc_image_reader *reader) {
     if (reader->launcher)
         trc_launcher_end(reader->launcher);
     reader->launcher = NULL;
-    const trc_status status = trc_launcher_start(reader->program, &reader->launcher);
+    const trc_status status =
+        trc_launcher_start(reader->program, reader->script, &reader->launcher);
     return status == TRC_ERROR_UNSUPPORTED ? give_up(reader, "") : status;
 }
 

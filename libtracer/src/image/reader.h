@@ -16,9 +16,11 @@
 
 struct trc_image_reader;
 
-/* program: the path of the program that reads images; NULL: tracer_reader beside the library. Not
- * started yet. One holder: the caller. OUT_OF_MEMORY. */
-trc_status trc_image_reader_create(const char *program, struct trc_image_reader **reader_out);
+/* program: the path of the program that reads images; NULL: tracer_reader beside the library.
+ * script: what it runs if it is a Python, else NULL. Not started yet. One holder: the caller.
+ * OUT_OF_MEMORY. */
+trc_status trc_image_reader_create(const char *program, const char *script,
+                                   struct trc_image_reader **reader_out);
 
 /* NULL is fine for both. The last release ends all processes. */
 struct trc_image_reader *trc_image_reader_retain(struct trc_image_reader *reader);

@@ -33,7 +33,7 @@ static void init_stores(struct trc_scene_state *scene) {
 /* The reader of a handle, or one of the scene's own. */
 static trc_status take_reader(trc_reader handle, struct trc_image_reader **reader_out) {
     if (!handle)
-        return trc_image_reader_create(NULL, reader_out);
+        return trc_image_reader_create(NULL, NULL, reader_out);
     void *object;
     TRC_TRY(trc_handle_acquire(handle, TRC_HANDLE_READER, &object));
     *reader_out = trc_image_reader_retain(object);

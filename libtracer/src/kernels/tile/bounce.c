@@ -4,25 +4,9 @@
 #include "kernels/tile/shade.h"
 #include "kernels/trace/spawn.h"
 
-/* Lanes whose refraction is sharp enough for the film to be seen through, as in Cycles. Of several
- * lobes that refract all have to be; Cycles asks the one that it chose. */
-static vmask is_clear(const struct trc_tile *t, const struct trc_lobes *lobes) {
-    const float r = t->desc->film_glass_roughness;
-    const vfloat maximum = vf_set(r * r * (r * r)); /* of alpha squared */
-    vmask clear = vm_all_set();
-    for (int i = 0; i < lobes->count; i++) {
-        const struct trc_lobe *lobe = &lobes->lobe[i];
-        if (lobe->kind == TRC_LOBE_REFRACT)
-            clear =
-                vm_and(clear, vm_or(lobe->ideal, vf_le(lobe->alpha_x * lobe->alpha_y, maximum)));
-    }
-    return clear;
-}
-
 /* Pushes the lanes' rays. direction, weight factor, pdf (< 0: ideal). */
 static void ray_push(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
-                     const struct trc_lobes *lobes, const struct trc_bsdf_sample *b,
-                     uint32_t material, vmask active) {
+                     const struct trc_bsdf_sample *b, uint32_t material, vmask active) {
     const trc_render_desc *desc = t->desc;
     const vmask straight = b->transparent;
     const vvec3 w = v3_select(straight, a->d, b->wi);
@@ -69,14 +53,8 @@ static void ray_push(struct trc_tile *t, const struct arrival *a, const struct t
     kind = kind | (vuint)vi_select(b->diffuse, vi_set(TRC_VISIBLE_DIFFUSE), vi_set(0));
     kind = kind | (vuint)vi_select(first, own, (vint)category);
     kind = kind |
-           (a->path & vu_set(TRC_PATH_DATA_DONE | TRC_PATH_FEATURES_DONE | TRC_PATH_CAUGHT |
-                             TRC_VISIBLE_UNBLOCKED)) |
+           (a->path & vu_set(TRC_PATH_DATA_DONE | TRC_PATH_FEATURES_DONE | TRC_VISIBLE_UNBLOCKED)) |
            vu_set(a->world_alone ? TRC_PATH_WORLD_ALONE : 0);
-    if (desc->film_transparent && desc->film_transparent_glass) {
-        const vmask through = vm_andnot(vm_and(b->transmitted, is_clear(t, lobes)), b->diffuse);
-        const vuint background = a->path & vu_set(TRC_PATH_TRANSPARENT_BACKGROUND);
-        kind = kind | (vuint)vi_select(through, (vint)background, vi_set(0));
-    }
     vuint path = (vuint)vi_select(straight, (vint)a->path, (vint)kind);
     path = path | (vuint)vi_select(over, vi_set(TRC_PATH_LAST), vi_set(0));
 
@@ -130,7 +108,7 @@ void trc_bounce_straight(struct trc_tile *t, const struct arrival *a, const stru
                               vi_set((int32_t)t->desc->max_transparent_depth + 1));
     active = attenuate(t, a, &b, vm_and(active, below));
     if (vm_any(active))
-        ray_push(t, a, s, lobes, &b, material, active);
+        ray_push(t, a, s, &b, material, active);
 }
 
 void trc_bounce(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
@@ -141,7 +119,7 @@ void trc_bounce(struct trc_tile *t, const struct arrival *a, const struct trc_su
             trc_bsdf_ideal(lobes, i, s, &b);
             const vmask go = attenuate(t, a, &b, vm_and(active, b.valid));
             if (vm_any(go))
-                ray_push(t, a, s, lobes, &b, material, go);
+                ray_push(t, a, s, &b, material, go);
         }
         return;
     }
@@ -157,5 +135,5 @@ void trc_bounce(struct trc_tile *t, const struct arrival *a, const struct trc_su
     b.weight = v3_scale(b.weight, vf_divide(vf_set(1.0f), a->chance));
     const vmask go = attenuate(t, a, &b, vm_and(active, b.valid));
     if (vm_any(go))
-        ray_push(t, a, s, lobes, &b, material, go);
+        ray_push(t, a, s, &b, material, go);
 }
