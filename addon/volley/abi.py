@@ -167,9 +167,12 @@ class NodeType(IntEnum):
     CAMERA_DATA = 110
     WIREFRAME = 111
     BUMP = 115
+    DISPLACEMENT = 116
+    VECTOR_DISPLACEMENT = 117
     TANGENT = 114
     AOV_VALUE = 112
     AOV_COLOR = 113
+    DISPLACEMENT_OUTPUT = 118
 
 
 class ModeFlags(IntFlag):
@@ -208,6 +211,13 @@ class NormalMapSpace(IntEnum):
 class BumpMode(IntEnum):
     INVERT = 1
     ABOVE = 2
+
+
+class DisplacementMethod(IntEnum):
+    BUMP = 0
+    TRUE = 1
+    BOTH = 2
+    ABOVE = 4
 
 
 class RampInterpolation(IntEnum):
@@ -605,6 +615,7 @@ class FeatureFlags(IntFlag):
     VISIBILITY = 65536
     AMBIENT_OCCLUSION = 131072
     SHADOW_CATCHERS = 262144
+    SLOPES = 524288
 
 
 class CameraDesc(Structure):
@@ -780,7 +791,8 @@ ENUMERATIONS = {StatusCode: "TRC_", IsaId: "TRC_ISA_", CameraType: "TRC_CAMERA_"
                 LightType: "TRC_LIGHT_", AreaShape: "TRC_AREA_", LightFlags: "TRC_LIGHT_",
                 AoMethod: "TRC_AO_", NodeType: "TRC_NODE_", ModeFlags: "TRC_MODE_", TableSize: "TRC_TABLE_",
                 DiffuseModel: "TRC_DIFFUSE_", ToonComponent: "TRC_TOON_", MappingType: "TRC_MAPPING_",
-                NormalMapSpace: "TRC_NORMAL_MAP_", BumpMode: "TRC_BUMP_", RampInterpolation: "TRC_RAMP_",
+                NormalMapSpace: "TRC_NORMAL_MAP_", BumpMode: "TRC_BUMP_",
+                DisplacementMethod: "TRC_DISPLACEMENT_", RampInterpolation: "TRC_RAMP_",
                 CurvesExtension: "TRC_CURVES_", SeparateMode: "TRC_SEPARATE_", ClampType: "TRC_CLAMP_",
                 TangentSource: "TRC_TANGENT_", SpaceId: "TRC_SPACE_", TransformedType: "TRC_TRANSFORMED_",
                 VectorTransformMode: "TRC_", RotateMode: "TRC_ROTATE_", RotateFlags: "TRC_ROTATE_",
@@ -1085,6 +1097,12 @@ NODES = {
         (("FLOAT", "strength"), ("FLOAT", "distance"), ("FLOAT", "filter_width"), ("FLOAT", "height"),
          ("NORMAL", "normal")),
         (("VECTOR", "normal"),)),
+    NodeType.DISPLACEMENT: ("Displacement",
+        (("FLOAT", "height"), ("FLOAT", "midlevel"), ("FLOAT", "scale"), ("NORMAL", "normal")),
+        (("VECTOR", "displacement"),)),
+    NodeType.VECTOR_DISPLACEMENT: ("Vector Displacement",
+        (("VECTOR", "vector"), ("FLOAT", "midlevel"), ("FLOAT", "scale")),
+        (("VECTOR", "displacement"),)),
     NodeType.TANGENT: ("Tangent",
         (),
         (("VECTOR", "tangent"),)),
@@ -1093,6 +1111,9 @@ NODES = {
         ()),
     NodeType.AOV_COLOR: ("AOV Color",
         (("COLOR", "color"),),
+        ()),
+    NodeType.DISPLACEMENT_OUTPUT: ("Displacement Output",
+        (("VECTOR", "displacement"), ("FLOAT", "filter_width")),
         ()),
 }
 

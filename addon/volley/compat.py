@@ -42,6 +42,9 @@ KEEPS_DIFFUSE_ENERGY = bpy.app.version >= (4, 3, 0)
 # The Bump node no longer keeps what its normals reflect above the surface: shaders do.
 LEAVES_BUMPS = bpy.app.version >= (4, 0, 0)
 
+# Of heights, in pixels: a whole one till the Bump node got an input for it in 4.4.
+BUMP_FILTER_WIDTH = 0.1 if bpy.app.version >= (4, 4, 0) else 1.0
+
 # Cycles' tables of colour ramps have 257 entries instead of 256.
 RAMP_STEPS = 256 if bpy.app.version >= (4, 0, 0) else 255
 
@@ -70,6 +73,18 @@ def panorama_setting(camera, name, default):
 def cycles_curves(scene, name, default):
     """A setting of Cycles' curves where they exist, else default."""
     return getattr(getattr(scene, "cycles_curves", None), name, default)
+
+
+def has_adaptive_subdivision(blender_object):
+    """Whether Cycles would dice an object's subdivision surface by its size in the picture: a setting of
+    its last modifier, or of Cycles' of the object where experimental features are on."""
+    last = blender_object.modifiers[-1] if blender_object.modifiers else None
+    if last is None or last.type != 'SUBSURF' or not last.show_render:
+        return False
+    if hasattr(last, "use_adaptive_subdivision"):
+        return last.use_adaptive_subdivision
+    is_experimental = cycles(bpy.context.scene, "feature_set", 'SUPPORTED') == 'EXPERIMENTAL'
+    return is_experimental and cycles(blender_object, "use_adaptive_subdivision", False)
 
 
 def motion_position(scene):

@@ -43,7 +43,14 @@ class Tree:
         self.surface(self.add("Emission", Color=(shown, 0)))
 
     def surface(self, node):
+        """A shader for the surface."""
         self._tree.links.new(node.outputs[0], self.output.inputs["Surface"])
+
+    def displace(self, node, method):
+        """A node for the displacement, shown by that method."""
+        self._tree.links.new(node.outputs[0], self.output.inputs["Displacement"])
+        owner = self.material if hasattr(self.material, "displacement_method") else self.material.cycles
+        owner.displacement_method = method
 
 
 def _bumped(height, **inputs):
@@ -195,7 +202,7 @@ def inside_places():
 
 
 def inside_light():
-    """{name: [by Volley, by Cycles]} of a lit surface."""
+    """{name: [by Volley, by Cycles]} of a lit surface, and of one in a mirror."""
     import bpy
     import scenes
     pictures = {}
@@ -209,6 +216,13 @@ def inside_light():
         tree.surface(tree.add(kind, Normal=(bump, 0), **inputs))
         _shape().data.materials.append(tree.material)
         pictures[name] = scenes.by_both(1)
+    _stage()
+    mirror = scenes.wall(size=6.0, material=scenes.material("Mirror", "ShaderNodeBsdfGlossy", Roughness=0.0))
+    mirror.rotation_euler.z = 0.5
+    made = _shape()
+    made.location = (3.4, -2.2, 0.0)
+    made.data.materials.append(_bumped(_noise("Object"), Distance=0.1))
+    pictures["in a mirror"] = scenes.by_both(1)
     return pictures
 
 

@@ -137,6 +137,85 @@ static void test_unread_bumps(void **state) {
     trc_material_release(m);
 }
 
+/* ---- displacement ---- */
+
+static int32_t add_displaced(uint32_t method, trc_node_input height) {
+    const int32_t node =
+        ADD(TRC_NODE_DISPLACEMENT, TRC_SPACE_WORLD, height, value(.5f), value(2), standard());
+    return ADD(TRC_NODE_DISPLACEMENT_OUTPUT, method, link_to(node, 0), value(1));
+}
+
+/* As a bump it sets the normal for all that reads it afterwards; the displacement itself still has
+ * the one of the mesh. */
+static void test_displacement_sets_the_normal(void **state) {
+    (void)state;
+    graph_clear();
+    const int32_t height = add_height(TRC_OUTPUT_OF(GEOMETRY, position));
+    add_displaced(TRC_DISPLACEMENT_BUMP, link_to(height, 0));
+    const int32_t geometry = add(TRC_NODE_GEOMETRY, 0, 0, NULL);
+    add_emission(link_to(geometry, TRC_OUTPUT_OF(GEOMETRY, normal)), 1);
+    struct trc_material *m = compiled();
+    assert_int_equal(count_op(m, TRC_OP_SET_NORMAL), 1);
+    assert_int_equal(count_op(m, TRC_OP_BUMP), 1);
+    assert_int_equal(count_op(m, TRC_OP_NORMAL), 2);
+    uint32_t set = 0, last = 0;
+    for (uint32_t i = 0; i < m->instruction_count; i++) {
+        set = m->instructions[i].op == TRC_OP_SET_NORMAL ? i : set;
+        last = m->instructions[i].op == TRC_OP_NORMAL ? i : last;
+    }
+    assert_true(last > set);
+    assert_null(m->displacement);
+    trc_material_release(m);
+}
+
+/* Shaders see it even where no node does. */
+static void test_displacement_needs_no_reader(void **state) {
+    (void)state;
+    graph_clear();
+    const int32_t height = add_height(TRC_OUTPUT_OF(GEOMETRY, position));
+    add_displaced(TRC_DISPLACEMENT_BUMP, link_to(height, 0));
+    add_diffuse(color(1, 1, 1));
+    struct trc_material *m = compiled();
+    assert_int_equal(count_op(m, TRC_OP_SET_NORMAL), 1);
+    assert_true(m->has & TRC_MATERIAL_READS_PIXEL);
+    trc_material_release(m);
+}
+
+/* Moved vertices have a program of their own, and leave that of the surface as it was. */
+static void test_true_displacement(void **state) {
+    (void)state;
+    for (uint32_t method = TRC_DISPLACEMENT_TRUE; method <= TRC_DISPLACEMENT_BOTH; method++) {
+        graph_clear();
+        const int32_t height = add_height(TRC_OUTPUT_OF(GEOMETRY, position));
+        add_displaced(method, link_to(height, 0));
+        add_diffuse(color(1, 1, 1));
+        struct trc_material *m = compiled();
+        const bool is_both = method == TRC_DISPLACEMENT_BOTH;
+        assert_int_equal(count_op(m, TRC_OP_SET_NORMAL), is_both);
+        assert_int_equal(m->keeps_normals, is_both);
+        assert_true(is_both || m->instruction_count == 0);
+        const struct trc_material *offset = m->displacement;
+        assert_non_null(offset);
+        assert_int_equal(offset->leaf_count, 0);
+        assert_int_equal(offset->aov_count, 1);
+        assert_int_equal(count_op(offset, TRC_OP_SET_NORMAL) + count_op(offset, TRC_OP_BESIDE), 0);
+        for (uint32_t i = 0; i < 3; i++)
+            assert_true(offset->operands[offset->aovs[0].first_operand + i].reg >= 0);
+        trc_material_release(m);
+    }
+}
+
+/* An even displacement turns nothing. */
+static void test_even_displacement(void **state) {
+    (void)state;
+    graph_clear();
+    add_displaced(TRC_DISPLACEMENT_BUMP, value(3));
+    add_diffuse(color(1, 1, 1));
+    struct trc_material *m = compiled();
+    assert_int_equal(m->instruction_count, 0);
+    trc_material_release(m);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_three_points),
@@ -145,6 +224,10 @@ int main(void) {
         cmocka_unit_test(test_images_of_heights_are_whole),
         cmocka_unit_test(test_bumps_within_heights),
         cmocka_unit_test(test_unread_bumps),
+        cmocka_unit_test(test_displacement_sets_the_normal),
+        cmocka_unit_test(test_displacement_needs_no_reader),
+        cmocka_unit_test(test_true_displacement),
+        cmocka_unit_test(test_even_displacement),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }

@@ -93,7 +93,7 @@ static void test_all_types_add_up(void **state) {
 #include "tracer/nodes.def"
     assert_null(trc_node_info_of(0));
     assert_null(trc_node_info_of(17));
-    assert_null(trc_node_info_of(116));
+    assert_null(trc_node_info_of(119));
     assert_null(trc_node_info_of(UINT32_MAX));
 }
 
@@ -145,6 +145,9 @@ static void test_counts_of_modes(void **state) {
         {TRC_NODE_VECTOR_ROTATE, 5 * 2},
         {TRC_NODE_TANGENT, 4},
         {TRC_NODE_BUMP, 2 * 2},
+        {TRC_NODE_DISPLACEMENT, 2},
+        {TRC_NODE_VECTOR_DISPLACEMENT, 3},
+        {TRC_NODE_DISPLACEMENT_OUTPUT, 3 * 2},
         {TRC_NODE_AOV_COLOR, TRC_MAX_AOVS},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
@@ -174,6 +177,8 @@ static void test_numbers(void **state) {
     assert_int_equal(TRC_NODE_AOV_COLOR, 113);
     assert_int_equal(TRC_NODE_TANGENT, 114);
     assert_int_equal(TRC_NODE_BUMP, 115);
+    assert_int_equal(TRC_NODE_DISPLACEMENT, 116);
+    assert_int_equal(TRC_NODE_DISPLACEMENT_OUTPUT, 118);
 }
 
 /* Outputs of operations that stand for outputs of nodes stand alike. */

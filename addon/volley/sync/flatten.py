@@ -10,7 +10,7 @@ that is not supported becomes a diffuse of its colour. Each is named once in the
 """
 
 from ..abi import NodeType, VectorOperation as Vector
-from ..compat import aov_name
+from ..compat import BUMP_FILTER_WIDTH, aov_name
 from . import nodes
 from .node_list import output
 from .values import CONSTANT, DEFAULT, NO_SHADER, Value
@@ -55,22 +55,24 @@ class FlatTree:
         return self.surface, tuple(node.signature() for node in self.nodes)
 
 
-def flatten(tree, label, warnings, images=None, aovs=None, attributes=None):
+def flatten(tree, label, warnings, images=None, aovs=None, attributes=None, displacement=None):
     """The surface of a material or world tree as a FlatTree.
 
     label names the owner in messages; images: image.Images, without which all are missing; aovs:
     {name: (type, number)} of those that are asked for; attributes: attributes.Attributes, without which
-    those of meshes alone are read."""
+    those of meshes alone are read; displacement: the mode of a DISPLACEMENT_OUTPUT, None where there is
+    none."""
     walker = Walker(label, warnings, images, attributes)
     end = tree.get_output_node('CYCLES')
     if end is None:
         return walker.flat
     sockets = {socket.identifier: socket for socket in end.inputs}
-    for name in ("Volume", "Displacement"):
-        if name in sockets and walker.is_linked(sockets[name]):
-            warnings.add(f"{label}: {name.lower()} is not supported and is left out")
+    if "Volume" in sockets and walker.is_linked(sockets["Volume"]):
+        warnings.add(f"{label}: volume is not supported and is left out")
     try:
         value = walker.input_value(sockets["Surface"], ())
+        if displacement is not None and walker.is_linked(sockets["Displacement"]):
+            walker.emit_displacement(sockets["Displacement"], displacement)
         if aovs:
             walker.emit_aovs(tree, aovs, ())
     except RecursionError:
@@ -114,6 +116,12 @@ class Walker:
         inputs = [(value.node, value.output, value.constant) for value in values]
         self.flat.nodes.append(FlatNode(node_type, inputs, mode, image, name, table))
         return len(self.flat.nodes) - 1
+
+    def emit_displacement(self, socket, mode):
+        """Append the output for what comes to a socket of a tree's end."""
+        vector = self.convert(self.input_value(socket, ()), 'v')
+        width = Value('f', CONSTANT, 0, (BUMP_FILTER_WIDTH, 0.0, 0.0))
+        self.emit(NodeType.DISPLACEMENT_OUTPUT, (vector, width), mode)
 
     def emit_aovs(self, tree, aovs, path):
         """Append the AOV outputs of a tree and of the groups in it, wherever they stand."""

@@ -4,8 +4,8 @@
 import bpy
 
 from .. import abi, native
-from ..abi import NodeType
-from ..compat import CHOOSES_LOBES_PLAINLY, cycles, uses_nodes
+from ..abi import DisplacementMethod, NodeType
+from ..compat import CHOOSES_LOBES_PLAINLY, LEAVES_BUMPS, cycles, uses_nodes
 from . import flatten, instance, studio, tangents
 from .attributes import Attributes
 from .changes import Changes
@@ -13,6 +13,8 @@ from .values import CONSTANT, DEFAULT, Value
 
 _HOLDOUT_KEY = ("holdout",)
 _STUDIO_KEY = ("studio",)
+_DISPLACEMENTS = {'BUMP': DisplacementMethod.BUMP, 'DISPLACEMENT': DisplacementMethod.TRUE,
+                  'BOTH': DisplacementMethod.BOTH}
 _DEFAULT_NAME = "default_surface"  # of the library's default material in mattes
 
 
@@ -183,7 +185,7 @@ class Materials:
     def flatten(self, material, label):
         """A material's surface as a flat tree."""
         if uses_nodes(material):
-            return self._flatten(material.node_tree, label)
+            return self._flatten(material.node_tree, label, _displacement_mode(material))
         return _plain_surface(material)
 
     def is_volume(self, material):
@@ -194,8 +196,9 @@ class Materials:
         """The names of such materials of this sync."""
         return {key for key in self._seen if self._entries[key].is_volume}
 
-    def _flatten(self, tree, label):
-        return flatten.flatten(tree, label, self._warnings, self._images, self._aovs, self._attributes)
+    def _flatten(self, tree, label, displacement=None):
+        return flatten.flatten(tree, label, self._warnings, self._images, self._aovs, self._attributes,
+                               displacement)
 
     def names(self):
         """The names in mattes."""
@@ -256,6 +259,12 @@ def _flags(material, is_volume):
     if cycles(material, "sample_as_light", cycles(material, "emission_sampling", 'AUTO') != 'NONE'):
         flags |= abi.MaterialFlags.SAMPLE_EMISSION
     return flags
+
+
+def _displacement_mode(material):
+    """How displacement shows. The setting moved from Cycles' to the material itself in 4.1."""
+    method = getattr(material, "displacement_method", cycles(material, "displacement_method", 'BUMP'))
+    return _DISPLACEMENTS[method] | (0 if LEAVES_BUMPS else DisplacementMethod.ABOVE)
 
 
 def _has_transparent_shadow(material):

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..abi import (BlendMode, BumpMode, ClampType, DiffuseModel, DistributionType, EnvironmentProjection,
                    ImageExtension, ImageInterpolation, ImageProjection, MappingType, MathOperation as Math,
-                   ModeFlags, NodeType, NormalMapSpace, RampInterpolation, SeparateMode, TableSize,
+                   ModeFlags, NodeType, NormalMapSpace, RampInterpolation, SeparateMode, SpaceId, TableSize,
                    TangentSource, ToonComponent, VectorOperation as Vector)
 from ..compat import HAS_CORRELATED_MICROFACETS, KEEPS_DIFFUSE_ENERGY, LEAVES_BUMPS, RAMP_STEPS
 from . import tangents
@@ -502,6 +502,22 @@ def _bump(walker, node, sockets):
     return named_outputs(walker.emit(NodeType.BUMP, values, mode), NodeType.BUMP, ("Normal",))
 
 
+def _displacement(walker, node, sockets):
+    values = sockets.all_of(NodeType.DISPLACEMENT, ("Height", "Midlevel", "Scale", "Normal"))
+    index = walker.emit(NodeType.DISPLACEMENT, values, SpaceId[node.space])
+    return named_outputs(index, NodeType.DISPLACEMENT, ("Displacement",))
+
+
+def _vector_displacement(walker, node, sockets):
+    space = NormalMapSpace[node.space]
+    name = tangents.attribute_name("") if space == NormalMapSpace.TANGENT else ""
+    if name:
+        walker.flat.color_names.add(name)
+    values = sockets.all_of(NodeType.VECTOR_DISPLACEMENT, ("Vector", "Midlevel", "Scale"))
+    index = walker.emit(NodeType.VECTOR_DISPLACEMENT, values, space, name=name)
+    return named_outputs(index, NodeType.VECTOR_DISPLACEMENT, ("Displacement",))
+
+
 def _tangents_of(walker, node):
     """The attribute with the tangents of a node's UV map."""
     name = tangents.attribute_name(node.uv_map)
@@ -577,6 +593,7 @@ _SPECIAL = {
     "ShaderNodeTexEnvironment": _environment, "ShaderNodeUVMap": _uv_map,
     "ShaderNodeTexCoord": _texture_coordinate, "ShaderNodeVertexColor": _color_attribute,
     "ShaderNodeAttribute": _attribute, "ShaderNodeNormalMap": _normal_map,
-    "ShaderNodeBump": _bump, "ShaderNodeMath": _math, "ShaderNodeTangent": _tangent,
+    "ShaderNodeMath": _math, "ShaderNodeTangent": _tangent, "ShaderNodeBump": _bump,
+    "ShaderNodeDisplacement": _displacement, "ShaderNodeVectorDisplacement": _vector_displacement,
     "ShaderNodeValToRGB": _color_ramp, "ShaderNodeMix": _mix,
 }

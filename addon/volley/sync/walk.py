@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import bpy
 
+from ..compat import has_adaptive_subdivision
 from . import deform, instance, light, mesh, motion, strands, tubes, visibility
 from .matrix import rows12
 from .source import Cancelled
@@ -254,6 +255,9 @@ class Walk:
         if mesh.is_sculpted_multires(blender_object):
             self._sync.warnings.add(f"Object '{blender_object.name}': while it is sculpted, the mesh below its "
                                     "multiresolution is shown")
+        if has_adaptive_subdivision(blender_object):
+            self._sync.warnings.add(f"Object '{blender_object.name}': adaptive subdivision is not "
+                                    "supported, its modifier's levels are used")
         slot_count = max(len(blender_object.material_slots), len(shape.materials))
         data = mesh.extract(shape, *names[:2], slot_count)
         if data is None:

@@ -52,6 +52,16 @@ enum trc_normal_map_space {
  * the surface, as in Blender before 4.0. */
 enum trc_bump_mode { TRC_BUMP_INVERT = 1, TRC_BUMP_ABOVE = 2 };
 
+/* BUMP: the height along the normal turns the shading normal, as a Bump node would. TRUE: at commit
+ * the vertices are moved, and their normals made anew. BOTH: they are moved, their normals stay and
+ * are turned. ABOVE: a bit, as TRC_BUMP_ABOVE. */
+enum trc_displacement_method {
+    TRC_DISPLACEMENT_BUMP = 0,
+    TRC_DISPLACEMENT_TRUE,
+    TRC_DISPLACEMENT_BOTH,
+    TRC_DISPLACEMENT_ABOVE = 4
+};
+
 /* Between the entries of the table. */
 enum trc_ramp_interpolation { TRC_RAMP_LINEAR = 0, TRC_RAMP_CONSTANT };
 

@@ -31,6 +31,7 @@ const struct trc_kernels TRC_KERNEL(trc_kernels) = {
     .lamp_measure = TRC_KERNEL(trc_lamp_measure),
 #if TRC_WIDTH == 1
     .program_fold = TRC_KERNEL(trc_program_fold),
+    .displace = TRC_KERNEL(trc_program_displace),
 #endif
     .split_find = TRC_KERNEL(trc_split_find),
     .split_apply = TRC_KERNEL(trc_split_apply),

@@ -40,6 +40,17 @@ struct trc_tile_job {
     struct trc_tile_counts counts; /* added to */
 };
 
+/* Vertices of an instance's mesh, to be moved by a program. */
+struct trc_displace_job {
+    const struct trc_snapshot *snapshot; /* its instances, meshes, images and camera are read */
+    uint32_t instance;
+    const struct trc_material *program; /* trc_material.displacement */
+    const uint32_t *corners;            /* 3 * triangle + corner: where each vertex is looked at */
+    uint32_t count;
+    const float *normals; /* of all vertices, unit, object space */
+    float *offsets;       /* of all vertices, object space: those of the corners are set */
+};
+
 struct trc_kernels {
     uint32_t isa;   /* TRC_ISA_* */
     uint32_t width; /* lanes */
@@ -70,6 +81,8 @@ struct trc_kernels {
      * trc_op_has_table. Of the one-lane kernels alone, NULL in others. */
     void (*program_fold)(uint32_t op, uint32_t mode, const float *table, const float *in,
                          float *out);
+    /* Never fails. Of the one-lane kernels alone, NULL in others. */
+    void (*displace)(const struct trc_displace_job *job);
     /* Builds: the cheapest plane of a range, or axis -1 if no plane parts its refs. Every
      * instruction set finds the same. May sort the refs. blocks: to be found by all threads; NULL:
      * by this one. */

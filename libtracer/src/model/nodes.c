@@ -28,7 +28,8 @@ const struct trc_node_info *trc_node_info_of(uint32_t type) {
 bool trc_node_is_shader(uint32_t type) { return type < TRC_NODE_IMAGE; }
 
 bool trc_node_is_output(uint32_t type) {
-    return type == TRC_NODE_AOV_VALUE || type == TRC_NODE_AOV_COLOR;
+    return type == TRC_NODE_AOV_VALUE || type == TRC_NODE_AOV_COLOR ||
+           type == TRC_NODE_DISPLACEMENT_OUTPUT;
 }
 
 bool trc_node_has_table(uint32_t type) {

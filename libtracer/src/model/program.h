@@ -65,6 +65,9 @@ enum {
     TRC_TRANSFORM_NORMAL = 8 /* bit: by the inverse transpose, unit; between world and object */
 };
 
+/* TRC_OP_BUMP: heights are in the lengths of the object. */
+#define TRC_BUMP_IN_OBJECT (1u << 2)
+
 /* TRC_OP_BESIDE: the direction; below it, the operation. */
 #define TRC_BESIDE_Y (1u << 15)
 

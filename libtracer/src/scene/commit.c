@@ -15,6 +15,7 @@
 #include "image/image.h"
 #include "image/prefetch.h"
 #include "model/material.h"
+#include "scene/displace.h"
 #include "scene/mesh.h"
 #include "scene/rebuild.h"
 #include "scene/scene.h"
@@ -95,7 +96,7 @@ static trc_status build_bvh(struct trc_scene_state *scene, const struct trc_snap
     const struct trc_store *store = &scene->meshes;
     for (uint32_t i = trc_store_first(store); i != TRC_STORE_END; i = trc_store_next(store, i)) {
         const struct trc_scene_mesh *mesh = store->slots[i].object;
-        if (mesh->committed != mesh->geometry)
+        if (mesh->committed != mesh->shown)
             replaced[mesh->index] = mesh->committed;
     }
     const struct trc_bvh_options options = {.is_final = scene->is_final,
@@ -117,12 +118,20 @@ static trc_status build_bvh(struct trc_scene_state *scene, const struct trc_snap
     return TRC_OK;
 }
 
+/* A mesh may be moved by what materials and images have become. */
+static bool geometry_is_equal(const struct trc_snapshot *a, const struct trc_snapshot *b) {
+    return a->mesh_count == b->mesh_count &&
+           (a->mesh_count == 0 ||
+            memcmp(a->meshes, b->meshes, a->mesh_count * sizeof(struct trc_mesh *)) == 0);
+}
+
 /* Trees are alike for all instruction sets: one that another has made is as good. */
 static trc_status collect_bvh(struct trc_scene_state *scene,
                               const struct trc_snapshot_block *former,
                               struct trc_snapshot_block *block) {
     const bool is_static = !(scene->changed & (TRC_CHANGED_MESHES | TRC_CHANGED_INSTANCES));
-    if (former && is_static && transparency_is_equal(&former->snapshot, &block->snapshot)) {
+    if (former && is_static && geometry_is_equal(&former->snapshot, &block->snapshot) &&
+        transparency_is_equal(&former->snapshot, &block->snapshot)) {
         block->bvh = trc_shared_retain(former->bvh);
         block->build = former->build;
         block->build.seconds = 0.0;
@@ -298,6 +307,7 @@ static trc_status fill_block(struct trc_scene_state *scene, const struct trc_sna
     TRC_TRY(trc_collect_meshes(scene, s));
     TRC_TRY(trc_collect_instances(scene, former, block));
     trc_collect_view(scene, block);
+    TRC_TRY(trc_displace_meshes(scene, s));
     s->features = trc_find_features(scene, s);
     s->branch_count = trc_find_branches(s);
     TRC_TRY(check_cancel(scene));
@@ -326,7 +336,7 @@ static void publish(struct trc_scene_state *scene, struct trc_snapshot_block *bl
     const struct trc_store *store = &scene->meshes;
     for (uint32_t i = trc_store_first(store); i != TRC_STORE_END; i = trc_store_next(store, i)) {
         struct trc_scene_mesh *mesh = store->slots[i].object;
-        mesh->committed = mesh->geometry;
+        mesh->committed = mesh->shown;
     }
     follow_rebuilds(scene, block);
 }

@@ -4,6 +4,7 @@
 
 #include "core/checks.h"
 #include "core/core.h"
+#include "scene/displace.h"
 #include "scene/mesh.h"
 #include "scene/scene.h"
 
@@ -64,6 +65,7 @@ trc_status trc_scene_remove_mesh(struct trc_scene_state *scene, trc_id id) {
                         mesh->use_count);
     }
     trc_store_remove(&scene->meshes, id);
+    trc_displacer_destroy(mesh->displacer);
     trc_geometry_release(mesh->geometry);
     trc_free(mesh);
     scene->changed |= TRC_CHANGED_MESHES;

@@ -287,6 +287,47 @@ trc_status trc_geometry_pose(const struct trc_mesh *from, uint32_t key_count,
                        normals, mesh_out);
 }
 
+/* Blender's default texture space, as kernels/program/input.h has it. */
+static void fill_generated(const struct trc_mesh *from, float *generated) {
+    for (uint32_t axis = 0; axis < 3; axis++) {
+        const float low = from->bounds_lower[axis], high = from->bounds_upper[axis];
+        const float half = 0.5f * (high - low), center = 0.5f * (low + high);
+        const float scale = half == 0.0f ? 0.5f : 0.5f / (half < 1e-5f ? 1e-5f : half);
+        for (size_t v = 0; v < from->vertex_count; v++)
+            generated[3 * v + axis] =
+                from->positions[3 * v + axis] * scale - (center * scale - 0.5f);
+    }
+    clear_bad_values(generated, (uint64_t)3 * from->vertex_count);
+}
+
+trc_status trc_geometry_displace(const struct trc_mesh *from, const float *positions,
+                                 struct trc_mesh **mesh_out) {
+    const float *normals = from->corner_normals ? from->corner_normals : from->vertex_normals;
+    const size_t vertices = (size_t)3 * from->vertex_count;
+    struct trc_mesh *mesh;
+    TRC_TRY(trc_geometry_pose(from, from->key_count, positions, normals, &mesh));
+    bool ok = true;
+    if (from->vertex_normals && !mesh->vertex_normals) { /* made by trc_geometry_finish */
+        mesh->vertex_normals = trc_alloc(vertices * from->key_count, sizeof(float));
+        ok = mesh->vertex_normals != NULL;
+        if (ok)
+            memcpy(mesh->vertex_normals, from->vertex_normals,
+                   vertices * mesh->key_count * sizeof(float));
+    }
+    if (!mesh->generated) {
+        mesh->generated = trc_alloc(vertices, sizeof(float));
+        ok = ok && mesh->generated;
+        if (ok)
+            fill_generated(from, mesh->generated);
+    }
+    if (!ok) {
+        trc_geometry_release(mesh);
+        return no_memory();
+    }
+    *mesh_out = mesh;
+    return TRC_OK;
+}
+
 uint32_t trc_geometry_normal_kind(const struct trc_mesh *mesh) {
     return ((const struct trc_geometry *)mesh)->topology->normal_kind;
 }
@@ -303,6 +344,8 @@ void trc_geometry_release(struct trc_mesh *mesh) {
     trc_free(mesh->positions);
     trc_free(mesh->vertex_normals);
     trc_free(mesh->corner_normals);
+    if (mesh->generated != ((struct trc_geometry *)mesh)->topology->generated)
+        trc_free(mesh->generated);
     release_topology(((struct trc_geometry *)mesh)->topology);
     trc_free(mesh);
 }

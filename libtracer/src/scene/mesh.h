@@ -19,6 +19,11 @@ trc_status trc_geometry_pose(const struct trc_mesh *from, uint32_t key_count,
                              const float *positions, const float *normals,
                              struct trc_mesh **mesh_out);
 
+/* The same mesh with other positions, of as many keys; its normals are those of from. Generated
+ * coordinates stay. OUT_OF_MEMORY. */
+trc_status trc_geometry_displace(const struct trc_mesh *from, const float *positions,
+                                 struct trc_mesh **mesh_out);
+
 /* What normals the caller gave: TRC_NORMALS_*. */
 uint32_t trc_geometry_normal_kind(const struct trc_mesh *mesh);
 
@@ -35,6 +40,11 @@ uint64_t trc_geometry_bytes(const struct trc_mesh *mesh);
  * in Blender. Deterministic for any number of threads. OUT_OF_MEMORY or CANCELLED. */
 trc_status trc_geometry_finish(struct trc_mesh *mesh, struct trc_pool *pool,
                                const atomic_uint *cancel);
+
+/* Unit normals of all vertices at the first key, whether the mesh is shaded with them or not; the
+ * caller frees them. OUT_OF_MEMORY or CANCELLED. */
+trc_status trc_geometry_vertex_normals(const struct trc_mesh *mesh, struct trc_pool *pool,
+                                       const atomic_uint *cancel, float **normals_out);
 
 /* ---- shared by scene/mesh.c and scene/normals.c ---- */
 

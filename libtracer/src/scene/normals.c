@@ -17,7 +17,7 @@ struct face {
 };
 
 struct job {
-    struct trc_mesh *mesh;
+    const struct trc_mesh *mesh;
     const struct trc_mesh_topology *topology;
     const float *positions; /* of the key */
     float *normals;         /* of the key */
@@ -165,16 +165,16 @@ static trc_status find_corners(const struct trc_mesh *mesh, const atomic_uint *c
     return TRC_OK;
 }
 
-trc_status trc_geometry_finish(struct trc_mesh *mesh, struct trc_pool *pool,
-                               const atomic_uint *cancel) {
-    if (!mesh->smooth || mesh->vertex_normals || mesh->corner_normals)
-        return TRC_OK;
-    struct trc_mesh_topology *topology = ((struct trc_geometry *)mesh)->topology;
+/* Normals of so many keys. */
+static trc_status make_normals(const struct trc_mesh *mesh, uint32_t key_count,
+                               struct trc_pool *pool, const atomic_uint *cancel,
+                               float **normals_out) {
+    struct trc_mesh_topology *topology = ((const struct trc_geometry *)mesh)->topology;
     const size_t per_key = (size_t)3 * mesh->vertex_count;
     struct face *faces = trc_alloc(mesh->triangle_count, sizeof *faces);
-    float *normals = trc_alloc(per_key * mesh->key_count, sizeof *normals);
+    float *normals = trc_alloc(per_key * key_count, sizeof *normals);
     trc_status status = faces && normals ? find_corners(mesh, cancel, topology) : no_memory();
-    for (uint32_t key = 0; key < mesh->key_count && status == TRC_OK; key++) {
+    for (uint32_t key = 0; key < key_count && status == TRC_OK; key++) {
         struct job job = {mesh,  topology, mesh->positions + per_key * key, normals + per_key * key,
                           faces, cancel};
         trc_pool_run(pool, (mesh->triangle_count + CHUNK - 1) / CHUNK, face_task, &job);
@@ -187,6 +187,25 @@ trc_status trc_geometry_finish(struct trc_mesh *mesh, struct trc_pool *pool,
         trc_free(normals);
         return status;
     }
-    mesh->vertex_normals = normals;
+    *normals_out = normals;
+    return TRC_OK;
+}
+
+trc_status trc_geometry_finish(struct trc_mesh *mesh, struct trc_pool *pool,
+                               const atomic_uint *cancel) {
+    if (!mesh->smooth || mesh->vertex_normals || mesh->corner_normals)
+        return TRC_OK;
+    return make_normals(mesh, mesh->key_count, pool, cancel, &mesh->vertex_normals);
+}
+
+trc_status trc_geometry_vertex_normals(const struct trc_mesh *mesh, struct trc_pool *pool,
+                                       const atomic_uint *cancel, float **normals_out) {
+    const size_t count = (size_t)3 * mesh->vertex_count;
+    if (!mesh->vertex_normals)
+        return make_normals(mesh, 1, pool, cancel, normals_out);
+    *normals_out = trc_alloc(count, sizeof(float));
+    if (!*normals_out)
+        return no_memory();
+    memcpy(*normals_out, mesh->vertex_normals, count * sizeof(float));
     return TRC_OK;
 }

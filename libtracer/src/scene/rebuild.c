@@ -43,7 +43,7 @@ static struct trc_rebuild *start(const struct trc_store *meshes, uint32_t slot) 
     rebuild->slot = slot;
     rebuild->generation = meshes->slots[slot].generation;
     rebuild->geometry =
-        trc_geometry_retain(((struct trc_scene_mesh *)meshes->slots[slot].object)->geometry);
+        trc_geometry_retain(((struct trc_scene_mesh *)meshes->slots[slot].object)->shown);
     if (trc_pool_create(1, &rebuild->pool) != TRC_OK ||
         trc_thread_start(&rebuild->thread, work, rebuild) != TRC_OK) {
         free_rebuild(rebuild);

@@ -14,6 +14,7 @@
 #include "image/prefetch.h"
 #include "image/reader.h"
 #include "scene/commit.h"
+#include "scene/displace.h"
 #include "scene/mesh.h"
 #include "shading/compile.h"
 
@@ -73,6 +74,7 @@ trc_status trc_scene_state_create(const trc_scene_desc *desc, struct trc_scene_s
 }
 
 static void destroy_mesh(void *object) {
+    trc_displacer_destroy(((struct trc_scene_mesh *)object)->displacer);
     trc_geometry_release(((struct trc_scene_mesh *)object)->geometry);
     trc_free(object);
 }

@@ -15,6 +15,7 @@
 struct trc_pool;         /* core/pool.h */
 struct trc_image_reader; /* image/reader.h */
 struct trc_prefetch;     /* image/prefetch.h */
+struct trc_displacer;    /* scene/displace.h */
 
 /* What has changed since the last successful commit. */
 enum {
@@ -29,10 +30,12 @@ enum {
 };
 
 struct trc_scene_mesh {
-    struct trc_mesh *geometry;  /* held */
-    struct trc_mesh *committed; /* the geometry in the scene's snapshot, or NULL */
-    uint32_t use_count;         /* instances */
-    uint32_t index;             /* in the snapshot under construction */
+    struct trc_mesh *geometry;       /* held */
+    struct trc_displacer *displacer; /* of the geometry with displacement, or NULL */
+    struct trc_mesh *shown;          /* what the snapshot under construction has of it */
+    struct trc_mesh *committed;      /* and what the scene's snapshot has, or NULL */
+    uint32_t use_count;              /* instances */
+    uint32_t index;                  /* in the snapshot under construction */
 };
 
 /* One block: the keys stand behind the struct, then the ids, then the values. */

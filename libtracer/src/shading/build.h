@@ -47,7 +47,8 @@ struct trc_build {
     enum trc_build_place place;
     struct trc_operand filter_width;    /* of the height that is lowered */
     struct trc_operand *height_outputs; /* of its nodes; NULL before the first Bump node */
-    uint8_t *height_nodes;              /* which those are */
+    uint32_t normal_since; /* index of the first operation that reads the normal of SET_NORMAL */
+    uint8_t *height_nodes; /* which those are */
     struct trc_leaf leaves[TRC_MAX_LEAVES];
     uint32_t leaf_count;
     struct trc_aov_output aovs[TRC_MAX_AOV_OUTPUTS];
@@ -97,6 +98,20 @@ trc_status trc_build_nodes(struct trc_build *b, const uint8_t *wanted, uint32_t 
  * (shading/lower_relief.c) */
 trc_status trc_build_bump(struct trc_build *b, const trc_node *node, const struct trc_operand *in,
                           struct trc_operand *out);
+/* The output of a displacement node, as above. (shading/lower_relief.c) */
+trc_status trc_build_displacement(struct trc_build *b, const trc_node *node,
+                                  const struct trc_operand *in, struct trc_operand *out);
+/* The first DISPLACEMENT_OUTPUT, NULL without one. (shading/lower_relief.c) */
+const trc_node *trc_displacement_of(const trc_material_desc *desc);
+/* TRC_DISPLACEMENT_BUMP, TRUE or BOTH of such a node; BUMP for NULL. (shading/lower_relief.c) */
+uint32_t trc_displacement_method_of(const trc_node *node);
+/* Sets the normal by the displacement, before all that reads it; once room for outputs is made.
+ * (shading/lower_relief.c) */
+trc_status trc_build_relief(struct trc_build *b);
+/* A program of the displacement alone: its vector is AOV 0. (shading/lower_relief.c) */
+trc_status trc_build_offset(struct trc_build *b);
+/* Room for the outputs of nodes. (shading/lower.c) */
+trc_status trc_build_prepare(struct trc_build *b);
 /* Outputs of all value nodes. (shading/lower.c) */
 trc_status trc_build_values(struct trc_build *b);
 /* Leaves, their weights and operands. (shading/leaves.c) */

@@ -20,6 +20,7 @@ static void build_free(struct trc_build *b) {
 }
 
 static void material_free(struct trc_material *m) {
+    trc_material_release(m->displacement);
     trc_free(m->aovs);
     trc_free(m->operands);
     trc_free(m->instructions);
@@ -37,10 +38,17 @@ static trc_status compile(struct trc_build *b, struct trc_material *m) {
     return trc_build_emit(b, m);
 }
 
-trc_status trc_material_compile(const trc_material_desc *desc,
-                                const struct trc_compile_context *context,
-                                struct trc_material **material_out) {
-    TRC_TRY(trc_material_validate(desc));
+/* The program that moves vertices. */
+static trc_status compile_offset(struct trc_build *b, struct trc_material *m) {
+    memset(b->buckets, 0xff, sizeof b->buckets);
+    TRC_TRY(trc_build_offset(b));
+    TRC_TRY(trc_build_mark(b));
+    return trc_build_emit(b, m);
+}
+
+static trc_status build(const trc_material_desc *desc, const struct trc_compile_context *context,
+                        trc_status (*how)(struct trc_build *b, struct trc_material *m),
+                        struct trc_material **material_out) {
     struct trc_build *b = trc_alloc_zeroed(1, sizeof *b);
     struct trc_material *m = trc_alloc_zeroed(1, sizeof *m);
     trc_status status = TRC_ERROR_OUT_OF_MEMORY;
@@ -51,7 +59,7 @@ trc_status trc_material_compile(const trc_material_desc *desc,
         m->flags = desc->flags;
         m->pass_index = desc->pass_index;
         m->cryptomatte = desc->cryptomatte;
-        status = compile(b, m);
+        status = how(b, m);
     } else {
         trc_fail(status, "no memory to compile a material");
     }
@@ -61,6 +69,25 @@ trc_status trc_material_compile(const trc_material_desc *desc,
         if (m)
             material_free(m);
         return status;
+    }
+    *material_out = m;
+    return TRC_OK;
+}
+
+trc_status trc_material_compile(const trc_material_desc *desc,
+                                const struct trc_compile_context *context,
+                                struct trc_material **material_out) {
+    struct trc_material *m;
+    TRC_TRY(trc_material_validate(desc));
+    TRC_TRY(build(desc, context, compile, &m));
+    const uint32_t method = trc_displacement_method_of(trc_displacement_of(desc));
+    if (method != TRC_DISPLACEMENT_BUMP) {
+        const trc_status status = build(desc, context, compile_offset, &m->displacement);
+        if (status != TRC_OK) {
+            material_free(m);
+            return status;
+        }
+        m->keeps_normals = method == TRC_DISPLACEMENT_BOTH;
     }
     *material_out = m;
     return TRC_OK;

@@ -112,11 +112,29 @@ static uint32_t hash_op(uint32_t op, uint32_t mode, uint32_t resource,
     return h % TRC_BUILD_BUCKETS;
 }
 
+/* Whether it depends on the shading normal besides its inputs. */
+static bool reads_normal(uint32_t op) {
+    switch (op) {
+    case TRC_OP_NORMAL:
+    case TRC_OP_OBJECT_NORMAL:
+    case TRC_OP_REFLECTION:
+    case TRC_OP_TANGENT:
+    case TRC_OP_TANGENT_VECTOR:
+    case TRC_OP_NORMAL_MAP:
+    case TRC_OP_IMAGE_BOX:
+        return true;
+    default:
+        return false;
+    }
+}
+
 static const struct trc_build_op *find_equal(const struct trc_build *b, uint32_t hash, uint32_t op,
                                              uint32_t mode, uint32_t resource,
                                              const struct trc_operand *inputs) {
     for (uint32_t i = b->buckets[hash]; i != UINT32_MAX; i = b->ops[i].next) {
         const struct trc_build_op *o = &b->ops[i];
+        if (i < b->normal_since && reads_normal(op))
+            break; /* chains go back in time */
         if (o->op == op && o->mode == mode && o->resource == resource &&
             (op_infos[op].inputs == 0 || memcmp(b->inputs + o->first_input, inputs,
                                                 op_infos[op].inputs * sizeof *inputs) == 0)) {

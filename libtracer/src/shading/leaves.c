@@ -135,7 +135,7 @@ trc_status trc_build_leaves(struct trc_build *b) {
 trc_status trc_build_aovs(struct trc_build *b) {
     for (uint32_t i = 0; i < b->desc->node_count; i++) {
         const trc_node *node = &b->desc->nodes[i];
-        if (!trc_node_is_output(node->type))
+        if (!trc_node_is_output(node->type) || node->type == TRC_NODE_DISPLACEMENT_OUTPUT)
             continue;
         if (b->aov_count == TRC_MAX_AOV_OUTPUTS) {
             return trc_fail(TRC_ERROR_TOO_LARGE, "the material has more than %d AOV nodes",

@@ -454,6 +454,24 @@ static trc_status lower_vector_rotate(const struct lowering *l) {
     return combine(l->b, TRC_VECTOR_ADD, l->out, center, l->out);
 }
 
+/* Less the midlevel, times the scale, to the world. */
+static trc_status lower_vector_displacement(const struct lowering *l) {
+    const struct trc_operand none = trc_constant(0.0f), *in = l->in;
+    uint32_t name;
+    for (uint32_t i = 0; i < 3; i++) {
+        TRC_TRY(trc_build_math(l->b, TRC_MATH_SUBTRACT, in[TRC_AT(VECTOR_DISPLACEMENT, vector) + i],
+                               in[TRC_AT(VECTOR_DISPLACEMENT, midlevel)], none, l->out + i));
+        TRC_TRY(trc_build_math(l->b, TRC_MATH_MULTIPLY, l->out[i],
+                               in[TRC_AT(VECTOR_DISPLACEMENT, scale)], none, l->out + i));
+    }
+    if (l->node->mode == TRC_NORMAL_MAP_WORLD)
+        return TRC_OK;
+    if (l->node->mode == TRC_NORMAL_MAP_OBJECT)
+        return op(l->b, TRC_OP_TRANSFORM, TRC_TRANSFORM_OBJECT_TO_WORLD, l->out, l->out);
+    TRC_TRY(name_of(l, &name));
+    return trc_build_op(l->b, TRC_OP_TANGENT_VECTOR, 0, name, l->out, l->out);
+}
+
 static trc_status lower_camera_data(const struct lowering *l) {
     struct trc_operand in[TRC_OP_AT(VECTOR_MEASURE, end)];
     struct trc_operand *seen = in + TRC_OP_AT(VECTOR_MEASURE, a);
@@ -483,6 +501,10 @@ static trc_status lower_node(const struct lowering *l) {
         return lower_attribute(l, TRC_OP_COLOR_ATTRIBUTE);
     case TRC_NODE_BUMP:
         return trc_build_bump(b, l->node, l->in, l->out);
+    case TRC_NODE_DISPLACEMENT:
+        return trc_build_displacement(b, l->node, l->in, l->out);
+    case TRC_NODE_VECTOR_DISPLACEMENT:
+        return lower_vector_displacement(l);
     case TRC_NODE_NORMAL_MAP:
         return lower_named(l, TRC_OP_NORMAL_MAP, mode);
     case TRC_NODE_TANGENT:
@@ -574,7 +596,7 @@ trc_status trc_build_nodes(struct trc_build *b, const uint8_t *wanted, uint32_t 
     return TRC_OK;
 }
 
-trc_status trc_build_values(struct trc_build *b) {
+trc_status trc_build_prepare(struct trc_build *b) {
     b->first_output = trc_alloc(b->desc->node_count, sizeof *b->first_output);
     if (!b->first_output)
         goto no_memory;
@@ -584,9 +606,14 @@ trc_status trc_build_values(struct trc_build *b) {
         b->output_count += output_offset(node, trc_node_info_of(node->type)->output_count);
     }
     b->outputs = trc_alloc(b->output_count, sizeof *b->outputs);
-    if (!b->outputs)
-        goto no_memory;
-    return trc_build_nodes(b, NULL, b->desc->node_count);
+    if (b->outputs)
+        return TRC_OK;
 no_memory:
     return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory to compile a material");
+}
+
+trc_status trc_build_values(struct trc_build *b) {
+    TRC_TRY(trc_build_prepare(b));
+    TRC_TRY(trc_build_relief(b));
+    return trc_build_nodes(b, NULL, b->desc->node_count);
 }

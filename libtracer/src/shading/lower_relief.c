@@ -96,3 +96,93 @@ trc_status trc_build_bump(struct trc_build *b, const trc_node *node, const struc
     to[TRC_OP_AT(BUMP, beside_y)] = height[2][0];
     return trc_build_op(b, TRC_OP_BUMP, node->mode, TRC_NO_RESOURCE, to, out);
 }
+
+/* ---- displacement ---- */
+
+/* Along the normal, scaled in object or world space. */
+trc_status trc_build_displacement(struct trc_build *b, const trc_node *node,
+                                  const struct trc_operand *in, struct trc_operand *out) {
+    const struct trc_operand none = trc_constant(0.0f);
+    const bool is_object = node->mode == TRC_SPACE_OBJECT;
+    const uint32_t to_object = TRC_TRANSFORM_WORLD_TO_OBJECT | TRC_TRANSFORM_NORMAL;
+    struct trc_operand height, normal[3];
+    memcpy(normal, in + TRC_AT(DISPLACEMENT, normal), sizeof normal);
+    TRC_TRY(trc_build_math(b, TRC_MATH_SUBTRACT, in[TRC_AT(DISPLACEMENT, height)],
+                           in[TRC_AT(DISPLACEMENT, midlevel)], none, &height));
+    TRC_TRY(trc_build_math(b, TRC_MATH_MULTIPLY, height, in[TRC_AT(DISPLACEMENT, scale)], none,
+                           &height));
+    if (is_object)
+        TRC_TRY(trc_build_op(b, TRC_OP_TRANSFORM, to_object, TRC_NO_RESOURCE, normal, normal));
+    for (uint32_t i = 0; i < 3; i++)
+        TRC_TRY(trc_build_math(b, TRC_MATH_MULTIPLY, normal[i], height, none, out + i));
+    return is_object ? trc_build_op(b, TRC_OP_TRANSFORM, TRC_TRANSFORM_OBJECT_TO_WORLD,
+                                    TRC_NO_RESOURCE, out, out)
+                     : TRC_OK;
+}
+
+const trc_node *trc_displacement_of(const trc_material_desc *desc) {
+    for (uint32_t i = 0; i < desc->node_count; i++)
+        if (desc->nodes[i].type == TRC_NODE_DISPLACEMENT_OUTPUT)
+            return &desc->nodes[i];
+    return NULL;
+}
+
+uint32_t trc_displacement_method_of(const trc_node *node) {
+    return node ? node->mode & ~(uint32_t)TRC_DISPLACEMENT_ABOVE : (uint32_t)TRC_DISPLACEMENT_BUMP;
+}
+
+/* Lowers all nodes up to those that the displacement comes from, for the point. */
+static trc_status lower_sources(struct trc_build *b, const trc_node *node) {
+    uint32_t end = 0;
+    for (uint32_t i = 0; i < node->input_count; i++) {
+        const int32_t source = b->desc->inputs[node->first_input + i].node;
+        if (source >= 0 && (uint32_t)source >= end)
+            end = (uint32_t)source + 1;
+    }
+    return trc_build_nodes(b, NULL, end);
+}
+
+/* As a bump whose height is the offset along the normal, as in Cycles. */
+trc_status trc_build_relief(struct trc_build *b) {
+    const trc_node *node = trc_displacement_of(b->desc);
+    if (!node || trc_displacement_method_of(node) == TRC_DISPLACEMENT_TRUE)
+        return TRC_OK;
+    struct trc_operand offset[3][3], filter_width, to[TRC_OP_AT(BUMP, end)];
+    struct trc_operand dot[TRC_OP_AT(VECTOR_MEASURE, end)];
+    struct trc_operand *heights = to + TRC_OP_AT(BUMP, middle);
+    const uint32_t mode =
+        (node->mode & TRC_DISPLACEMENT_ABOVE ? (uint32_t)TRC_BUMP_ABOVE : 0u) |
+        (trc_displacement_method_of(node) == TRC_DISPLACEMENT_BOTH ? TRC_BUMP_IN_OBJECT : 0u);
+    TRC_TRY(lower_sources(b, node));
+    TRC_TRY(
+        trc_build_input(b, node, TRC_INPUT_OF(DISPLACEMENT_OUTPUT, filter_width), &filter_width));
+    TRC_TRY(lower_height(b, node, TRC_INPUT_OF(DISPLACEMENT_OUTPUT, displacement), filter_width,
+                         offset));
+    struct trc_operand *normal = to + TRC_OP_AT(BUMP, normal);
+    TRC_TRY(trc_build_op(b, TRC_OP_NORMAL, 0, TRC_NO_RESOURCE, NULL, normal));
+    for (uint32_t i = 0; i < 3; i++) {
+        memcpy(dot + TRC_OP_AT(VECTOR_MEASURE, a), offset[i], sizeof offset[i]);
+        memcpy(dot + TRC_OP_AT(VECTOR_MEASURE, b), normal, 3 * sizeof *normal);
+        TRC_TRY(trc_build_op(b, TRC_OP_VECTOR_MEASURE, TRC_VECTOR_DOT, TRC_NO_RESOURCE, dot,
+                             heights + i));
+    }
+    if (is_same(heights[0], heights[1]) && is_same(heights[0], heights[2]))
+        return TRC_OK;
+    to[TRC_OP_AT(BUMP, strength)] = to[TRC_OP_AT(BUMP, distance)] = trc_constant(1.0f);
+    to[TRC_OP_AT(BUMP, filter_width)] = filter_width;
+    TRC_TRY(trc_build_op(b, TRC_OP_BUMP, mode, TRC_NO_RESOURCE, to, to));
+    TRC_TRY(trc_build_op(b, TRC_OP_SET_NORMAL, 0, TRC_NO_RESOURCE, to, to));
+    b->normal_since = b->op_count;
+    return TRC_OK;
+}
+
+trc_status trc_build_offset(struct trc_build *b) {
+    const trc_node *node = trc_displacement_of(b->desc);
+    TRC_TRY(trc_build_prepare(b));
+    TRC_TRY(lower_sources(b, node));
+    TRC_TRY(trc_build_input(b, node, TRC_INPUT_OF(DISPLACEMENT_OUTPUT, displacement),
+                            b->leaf_operands));
+    b->leaf_operand_count = 3;
+    b->aovs[b->aov_count++] = (struct trc_aov_output){.first_operand = 0};
+    return TRC_OK;
+}

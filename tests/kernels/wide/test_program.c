@@ -461,7 +461,7 @@ static const struct expectation expectations[] = {
     {TRC_OP_TANGENT, TRC_TANGENT_UV, NAME_TANGENT, {0}, {{-1, 0, 0}, {0, 0, 0}, {0, 0, 0}}},
 };
 
-static void check_expectation(const struct expectation *e, const struct trc_surface *s) {
+static void check_expectation(const struct expectation *e, struct trc_surface *s) {
     static struct trc_registers regs;
     struct single p;
     single_init(&p, e->op, e->mode, e->resource);

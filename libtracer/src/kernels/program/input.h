@@ -137,6 +137,26 @@ TRC_INLINE void attribute_corners(const struct trc_attribute *a, uint32_t c, vin
         out[k] = vf_gather(a->values + k * a->width + c, first, lanes);
 }
 
+/* Positions of the corners in object space, of one object's lanes. */
+static void group_corners(const struct trc_surface *s, const struct lane_group *g,
+                          struct trc_corners *out) {
+    const struct trc_mesh *mesh = g->mesh;
+    vint index[3];
+    trc_load_indices(mesh, s->triangle, g->lanes, index);
+    trc_load_vectors(mesh->positions, index, mesh->vertex_count, mesh->key_count, s->time, g->lanes,
+                     out);
+}
+
+/* The sides from the first corner to both others in world space, of one object's lanes. */
+static void group_sides(const struct trc_surface *s, const struct lane_group *g, vvec3 out[2]) {
+    struct trc_corners c;
+    struct trc_wide_affine m;
+    group_corners(s, g, &c);
+    trc_load_affine(g->instance, s->time, &m);
+    for (int i = 0; i < 2; i++)
+        out[i] = trc_transform_vector(&m, v3_sub(c.corner[i + 1], c.corner[0]));
+}
+
 /* ---- attributes ---- */
 
 /* A lamp's are Parametric, of any name, or 0. */
@@ -170,20 +190,14 @@ static vfloat op_uv_density(const struct trc_surface *s, uint32_t name) {
         const struct trc_attribute *a = g.mesh ? mesh_attribute(g.mesh, name, 2) : NULL;
         if (!a || !trc_mesh_in_reach(g.mesh))
             continue;
-        struct trc_corners p;
-        struct trc_wide_affine m;
-        vint index[3];
+        vvec3 side[2];
         vfloat u[3], v[3];
-        trc_load_indices(g.mesh, s->triangle, g.lanes, index);
-        trc_load_vectors(g.mesh->positions, index, g.mesh->vertex_count, g.mesh->key_count, s->time,
-                         g.lanes, &p);
-        trc_load_affine(g.instance, s->time, &m);
+        group_sides(s, &g, side);
         attribute_corners(a, 0, s->triangle, g.lanes, u);
         attribute_corners(a, 1, s->triangle, g.lanes, v);
-        const vvec3 e1 = trc_transform_vector(&m, v3_sub(p.corner[1], p.corner[0]));
-        const vvec3 e2 = trc_transform_vector(&m, v3_sub(p.corner[2], p.corner[0]));
         const vfloat u1 = u[1] - u[0], u2 = u[2] - u[0], v1 = v[1] - v[0], v2 = v[2] - v[0];
-        const vfloat e11 = v3_dot(e1, e1), e12 = v3_dot(e1, e2), e22 = v3_dot(e2, e2);
+        const vfloat e11 = v3_dot(side[0], side[0]), e12 = v3_dot(side[0], side[1]);
+        const vfloat e22 = v3_dot(side[1], side[1]);
         /* Trace and determinant of the map times its transpose, times that of the edges. */
         const vfloat area2 = e11 * e22 - e12 * e12, uv_area = u1 * v2 - u2 * v1;
         const vfloat trace = (u1 * u1 + v1 * v1) * e22 - vf_set(2.0f) * (u1 * u2 + v1 * v2) * e12 +
@@ -393,12 +407,9 @@ static vfloat op_wireframe(const struct trc_surface *s, vfloat size) {
     while (groups_next(s, &g)) {
         if (!g.mesh)
             continue;
-        vint index[3];
         struct trc_corners c;
         struct trc_wide_affine a;
-        trc_load_indices(g.mesh, s->triangle, g.lanes, index);
-        trc_load_vectors(g.mesh->positions, index, g.mesh->vertex_count, g.mesh->key_count, s->time,
-                         g.lanes, &c);
+        group_corners(s, &g, &c);
         trc_load_affine(g.instance, s->time, &a);
         for (int k = 0; k < 3; k++)
             c.corner[k] = trc_transform_point(&a, c.corner[k]);

@@ -183,4 +183,32 @@ static vvec3 op_tangent(const struct trc_surface *s, uint32_t mode, uint32_t nam
     return out;
 }
 
+/* From tangent space to the world, about the shading normal; without that attribute the tangent is
+ * the first side of the triangle. */
+static vvec3 op_tangent_vector(const struct trc_surface *s, uint32_t name, vvec3 v) {
+    vvec3 out = v;
+    struct lane_group g = groups_begin(s);
+    while (groups_next(s, &g)) {
+        if (!g.instance)
+            continue;
+        struct trc_wide_affine m;
+        vvec3 normal, tangent;
+        vfloat sign = vf_one();
+        const struct trc_attribute *a = mesh_attribute(g.mesh, name, 2);
+        trc_load_affine(g.instance, s->time, &m);
+        if (a) {
+            tangent_frame(s, &g, a, &normal, &tangent, &sign);
+        } else {
+            struct trc_corners p;
+            group_corners(s, &g, &p);
+            tangent = v3_normalize(v3_sub(p.corner[1], p.corner[0]));
+        }
+        normal = normal_to_object(&m, s->n);
+        const vvec3 bitangent = v3_scale(v3_normalize(v3_cross(normal, tangent)), sign);
+        const vvec3 sum = v3_mad(tangent, v.x, v3_mad(normal, v.y, v3_scale(bitangent, v.z)));
+        out = v3_select(g.lanes, trc_transform_vector(&m, sum), out);
+    }
+    return out;
+}
+
 #endif

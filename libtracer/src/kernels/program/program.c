@@ -1,6 +1,8 @@
 /* Runs material programs on TRC_WIDTH shading points, and single operations on constants. */
 #include "kernels/program/program.h"
 
+#include <string.h>
+
 #include "kernels/program/color.h"
 #include "kernels/program/input.h"
 #include "kernels/program/math.h"
@@ -204,6 +206,9 @@ static void run_at_surface(const struct trc_surface *s, const struct trc_instruc
         v3_write(out, op_normal_map(s, i->mode, i->resource, in[TRC_OP_AT(NORMAL_MAP, strength)],
                                     v3_read(in + TRC_OP_AT(NORMAL_MAP, color))));
         break;
+    case TRC_OP_TANGENT_VECTOR:
+        v3_write(out, op_tangent_vector(s, i->resource, v3_read(in)));
+        break;
     case TRC_OP_BUMP:
         v3_write(out, op_bump(s, i->mode, in));
         break;
@@ -238,7 +243,7 @@ static void run_beside(const struct trc_surface *s, const struct trc_instruction
     run_at_surface(&beside, &there, in, out);
 }
 
-void trc_program_run(const struct trc_material *m, const struct trc_surface *s,
+void trc_program_run(const struct trc_material *m, struct trc_surface *s,
                      struct trc_registers *regs) {
     for (uint32_t k = 0; k < m->instruction_count; k++) {
         const struct trc_instruction *i = &m->instructions[k];
@@ -250,15 +255,59 @@ void trc_program_run(const struct trc_material *m, const struct trc_surface *s,
         const float *table = trc_op_has_table(i->op) ? m->tables + i->resource : NULL;
         if (run_pure(i->op, i->mode, table, in, out))
             continue;
-        if (i->op == TRC_OP_BESIDE)
+        if (i->op == TRC_OP_BESIDE) {
             run_beside(s, i, in, out);
-        else
+        } else if (i->op == TRC_OP_SET_NORMAL) {
+            s->n = v3_select(s->active, v3_read(in), s->n);
+            v3_write(out, s->n);
+        } else {
             run_at_surface(s, i, in, out);
+        }
     }
 }
 
 #if TRC_WIDTH == 1
 void trc_program_fold(uint32_t op, uint32_t mode, const float *table, const float *in, float *out) {
     run_pure(op, mode, table, in, out);
+}
+
+/* A corner of a triangle in the middle of the shutter, shaded smoothly, that no ray has hit: it has
+ * no footprint. */
+static void corner_surface(const struct trc_displace_job *job, uint32_t corner,
+                           const struct trc_wide_affine *to_world, struct trc_surface *s) {
+    const struct trc_instance *instance = &job->snapshot->instances[job->instance];
+    const struct trc_mesh *mesh = job->snapshot->meshes[instance->mesh];
+    memset(s, 0, sizeof *s);
+    s->snapshot = job->snapshot;
+    s->active = vm_all_set();
+    s->instance = vi_set((int32_t)job->instance);
+    s->triangle = vi_set((int32_t)(corner / 3));
+    s->u = vf_set(corner % 3 == 1 ? 1.0f : 0.0f);
+    s->v = vf_set(corner % 3 == 2 ? 1.0f : 0.0f);
+    s->time = vf_set(0.5f);
+    trc_surface_fetch(s);
+    const float *n = job->normals + 3 * (size_t)mesh->indices[corner];
+    s->n = normal_to_world(to_world, v3(vf_set(n[0]), vf_set(n[1]), vf_set(n[2])));
+}
+
+void trc_program_displace(const struct trc_displace_job *job) {
+    const struct trc_instance *instance = &job->snapshot->instances[job->instance];
+    const struct trc_mesh *mesh = job->snapshot->meshes[instance->mesh];
+    const struct trc_material *program = job->program;
+    const struct trc_operand *moved_by = program->operands + program->aovs[0].first_operand;
+    struct trc_wide_affine to_world, to_object;
+    trc_load_affine(instance, vf_set(0.5f), &to_world);
+    affine_inverse(&to_world, &to_object);
+    for (uint32_t i = 0; i < job->count; i++) {
+        struct trc_surface s;
+        struct trc_registers regs;
+        corner_surface(job, job->corners[i], &to_world, &s);
+        trc_program_run(program, &s, &regs);
+        const vvec3 offset = trc_transform_vector(&to_object, trc_operand_vec3(moved_by, &regs));
+        const float out[3] = {vf_get(offset.x, 0), vf_get(offset.y, 0), vf_get(offset.z, 0)};
+        for (int k = 0; k < 3; k++)
+            job->offsets[3 * (size_t)mesh->indices[job->corners[i]] + (size_t)k] =
+                isfinite(out[k]) ? out[k] : 0.0f;
+    }
 }
 #endif

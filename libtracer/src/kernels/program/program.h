@@ -3,6 +3,7 @@
 #define TRACER_KERNELS_PROGRAM_PROGRAM_H
 
 #include "kernels/trace/surface.h"
+#include "model/kernels.h"
 #include "model/program.h"
 
 /* The registers of one run of a program. */
@@ -10,9 +11,13 @@ struct trc_registers {
     vfloat r[TRC_MAX_REGISTERS];
 };
 
-/* Runs the material's program, if it has one, for the active lanes. (kernels/program/program.c) */
-void trc_program_run(const struct trc_material *m, const struct trc_surface *s,
+/* Runs the material's program, if it has one, for the active lanes. It may change the shading
+ * normal. (kernels/program/program.c) */
+void trc_program_run(const struct trc_material *m, struct trc_surface *s,
                      struct trc_registers *regs);
+
+/* How far vertices move, in the one-lane build alone. */
+void trc_program_displace(const struct trc_displace_job *job);
 
 TRC_INLINE vfloat trc_operand_value(const struct trc_operand *o, const struct trc_registers *regs) {
     return o->reg >= 0 ? regs->r[o->reg] : vf_set(o->value);

@@ -28,36 +28,27 @@ static void point_beside(const struct trc_surface *s, bool is_along_y, vfloat fi
     vvec3 steps[2];
     pixel_steps(s, steps);
     const vvec3 step = v3_scale(steps[is_along_y], filter_width);
-    const vfloat side = vf_select(s->backfacing, vf_set(-1.0f), vf_one());
+    const vfloat facing = vf_select(s->backfacing, vf_set(-1.0f), vf_one());
     *out = *s;
     struct lane_group g = groups_begin(s);
     while (groups_next(s, &g)) {
         if (!g.mesh)
             continue;
-        vint index[3];
-        struct trc_corners c;
-        struct trc_wide_affine m;
-        trc_load_indices(g.mesh, s->triangle, g.lanes, index);
-        trc_load_vectors(g.mesh->positions, index, g.mesh->vertex_count, g.mesh->key_count, s->time,
-                         g.lanes, &c);
-        trc_load_affine(g.instance, s->time, &m);
-        const vvec3 e1 = trc_transform_vector(&m, v3_sub(c.corner[1], c.corner[0]));
-        const vvec3 e2 = trc_transform_vector(&m, v3_sub(c.corner[2], c.corner[0]));
-        const vvec3 n = v3_cross(e1, e2);
-        const vfloat scale = vf_divide(side, v3_dot(n, n));
-        const vfloat du = v3_dot(v3_cross(step, e2), n) * scale;
-        const vfloat dv = v3_dot(v3_cross(e1, step), n) * scale;
+        vvec3 side[2];
+        group_sides(s, &g, side);
+        const vvec3 n = v3_cross(side[0], side[1]);
+        const vfloat scale = vf_divide(facing, v3_dot(n, n));
+        const vfloat du = v3_dot(v3_cross(step, side[1]), n) * scale;
+        const vfloat dv = v3_dot(v3_cross(side[0], step), n) * scale;
         out->p = v3_select(g.lanes, v3_add(s->p, step), out->p);
         out->u = vf_select(g.lanes, s->u + du, out->u);
         out->v = vf_select(g.lanes, s->v + dv, out->v);
     }
 }
 
-static vvec3 op_bump(const struct trc_surface *s, uint32_t mode, const vfloat *in) {
-    const vvec3 n = v3_read(in + TRC_OP_AT(BUMP, normal));
+/* The normal n turned by the slope of the heights; n and steps are in one space. */
+static vvec3 turn_normal(uint32_t mode, vvec3 n, const vvec3 step[2], const vfloat *in) {
     const vfloat zero = vf_zero(), middle = in[TRC_OP_AT(BUMP, middle)];
-    vvec3 step[2];
-    pixel_steps(s, step);
     const vvec3 x = v3_cross(step[1], n), y = v3_cross(n, step[0]);
     const vfloat area = v3_dot(step[0], x);
     const vvec3 slope = v3_add(v3_scale(x, in[TRC_OP_AT(BUMP, beside_x)] - middle),
@@ -71,7 +62,26 @@ static vvec3 op_bump(const struct trc_surface *s, uint32_t mode, const vfloat *i
     const vfloat strength = vf_max(in[TRC_OP_AT(BUMP, strength)], zero);
     const vvec3 mixed = v3_normalize(v3_mad(turned, strength, v3_scale(n, vf_one() - strength)));
     /* Where there is no slope, or no pixel: 0, or not a number. */
-    const vvec3 out = v3_select(vf_gt(v3_dot(turned, turned), zero), mixed, n);
+    return v3_select(vf_gt(v3_dot(turned, turned), zero), mixed, n);
+}
+
+static vvec3 op_bump(const struct trc_surface *s, uint32_t mode, const vfloat *in) {
+    const vvec3 n = v3_read(in + TRC_OP_AT(BUMP, normal));
+    vvec3 step[2];
+    pixel_steps(s, step);
+    vvec3 out = turn_normal(mode, n, step, in);
+    struct lane_group g = groups_begin(s);
+    while (mode & TRC_BUMP_IN_OBJECT && groups_next(s, &g)) {
+        if (!g.instance)
+            continue;
+        struct trc_wide_affine to_object, to_world;
+        load_world_to_object(&g, s->time, &to_object);
+        trc_load_affine(g.instance, s->time, &to_world);
+        const vvec3 own[2] = {trc_transform_vector(&to_object, step[0]),
+                              trc_transform_vector(&to_object, step[1])};
+        const vvec3 turned = turn_normal(mode, normal_to_object(&to_world, n), own, in);
+        out = v3_select(g.lanes, normal_to_world(&to_world, turned), out);
+    }
     return mode & TRC_BUMP_ABOVE ? valid_normal(s, out) : out;
 }
 

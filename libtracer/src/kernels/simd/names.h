@@ -89,6 +89,7 @@
 #define trc_lobes_transparency(...) TRC_KERNEL(trc_lobes_transparency)(__VA_ARGS__)
 #define trc_oren_nayar_albedo(...) TRC_KERNEL(trc_oren_nayar_albedo)(__VA_ARGS__)
 #define trc_pass_add_lanes(...) TRC_KERNEL(trc_pass_add_lanes)(__VA_ARGS__)
+#define trc_program_displace(...) TRC_KERNEL(trc_program_displace)(__VA_ARGS__)
 #define trc_program_fold(...) TRC_KERNEL(trc_program_fold)(__VA_ARGS__)
 #define trc_program_procedural(...) TRC_KERNEL(trc_program_procedural)(__VA_ARGS__)
 #define trc_program_run(...) TRC_KERNEL(trc_program_run)(__VA_ARGS__)

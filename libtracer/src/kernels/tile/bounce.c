@@ -58,9 +58,14 @@ static void ray_push(struct trc_tile *t, const struct arrival *a, const struct t
     vuint path = (vuint)vi_select(straight, (vint)a->path, (vint)kind);
     path = path | (vuint)vi_select(over, vi_set(TRC_PATH_LAST), vi_set(0));
 
+    vfloat path_length = vf_set(0.0f);
+    if (t->measures_paths) {
+        path_length = column(t->work.f[TRC_RAY_PATH_LENGTH], a);
+        path_length = vf_select(straight, path_length, path_length + arrival_length(a));
+    }
     const vfloat values[TRC_RAY_FLOATS] = {
-        o.x,      o.y,      o.z,      w.x, w.y,     w.z, tmin, tmax, a->time,
-        weight.x, weight.y, weight.z, pdf, min_pdf, n.x, n.y,  n.z,  indirect_scale};
+        o.x,      o.y,      o.z, w.x,     w.y, w.z, tmin, tmax,           a->time,    weight.x,
+        weight.y, weight.z, pdf, min_pdf, n.x, n.y, n.z,  indirect_scale, path_length};
     vuint left = vu_set(0);
     if (t->looks_back)
         left =

@@ -171,7 +171,7 @@ static uint32_t drop_unseen(struct trc_ray_store *r, uint32_t count) {
     for (uint32_t i = 0; i < count; i++) {
         if (r->f[TRC_RAY_TMAX][i] < 0.0f)
             continue;
-        for (int k = 0; kept != i && k < TRC_RAY_FLOATS; k++)
+        for (int k = 0; kept != i && k < r->float_count; k++)
             r->f[k][kept] = r->f[k][i];
         for (int k = 0; kept != i && k < r->word_count; k++)
             r->w[k][kept] = r->w[k][i];
@@ -196,6 +196,8 @@ static void path_begin(struct trc_tile *t, uint32_t i) {
              vu_set(TRC_VISIBLE_CAMERA | TRC_PATH_TRANSPARENT_BACKGROUND));
     vu_store(out->w[TRC_RAY_DEPTHS] + i, vu_set(0));
     vu_store(out->w[TRC_RAY_PARENT] + i, vu_set(0));
+    if (t->measures_paths)
+        vf_store(out->f[TRC_RAY_PATH_LENGTH] + i, zero);
     if (t->looks_back)
         vu_store(out->w[TRC_RAY_LEFT] + i, vu_set(TRC_NO_HIT));
 }

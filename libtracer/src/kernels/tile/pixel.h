@@ -12,7 +12,7 @@ TRC_INLINE vfloat pixel_turn(vfloat x, vfloat y, float dx, float dy) {
 }
 
 /* The mean of both directions on the image, as Cycles has it: rays go apart as those of the camera
- * do, whatever they met on the way. */
+ * do, along the whole path, whatever they met on it. Of scenes with TRC_FEATURE_SLOPES. */
 static vfloat pixel_distance(const struct trc_tile *t, const struct arrival *a) {
     const struct trc_camera *c = &t->snapshot->camera;
     uint32_t key;
@@ -30,7 +30,8 @@ static vfloat pixel_distance(const struct trc_tile *t, const struct arrival *a) 
     const vfloat px = vi_to_float((vint)(a->pixel & vu_set(TRC_PIXEL_X_MASK))) + half;
     const vfloat py = vi_to_float((vint)(a->pixel >> TRC_PIXEL_Y_SHIFT)) + half;
     const vfloat x = vf_set(w[0]) + px * vf_set(dx), y = vf_set(w[2]) + py * vf_set(dy);
-    return arrival_length(a) * half * (pixel_turn(x, y, dx, 0.0f) + pixel_turn(x, y, 0.0f, dy));
+    return (column(t->work.f[TRC_RAY_PATH_LENGTH], a) + arrival_length(a)) * half *
+           (pixel_turn(x, y, dx, 0.0f) + pixel_turn(x, y, 0.0f, dy));
 }
 
 #endif

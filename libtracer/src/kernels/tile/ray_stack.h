@@ -41,6 +41,7 @@ enum trc_ray_float {
     TRC_RAY_NY,
     TRC_RAY_NZ,             /* normal where it left, as kernels/light/light.h wants it */
     TRC_RAY_INDIRECT_SCALE, /* factor on everything behind the next surface: kernels/lobe/bsdf.h */
+    TRC_RAY_PATH_LENGTH, /* from the camera to where it left; of scenes with TRC_FEATURE_SLOPES */
     TRC_RAY_FLOATS
 };
 enum trc_ray_word {
@@ -57,7 +58,8 @@ struct trc_ray_store {
     uint32_t reserved_end; /* rays there may be until the next reserve */
     float *f[TRC_RAY_FLOATS];
     uint32_t *w[TRC_RAY_WORDS];
-    int word_count; /* without TRC_RAY_LEFT where no ray looks back */
+    int word_count;  /* without TRC_RAY_LEFT where no ray looks back */
+    int float_count; /* without TRC_RAY_PATH_LENGTH where nothing reads it */
 };
 
 /* How much of a stack its rays may need. */
@@ -80,12 +82,13 @@ TRC_INLINE struct trc_ray_room trc_ray_room_of(const trc_render_desc *desc, uint
 }
 
 TRC_INLINE void trc_rays_carve(struct trc_carver *c, struct trc_ray_store *r, uint32_t capacity,
-                               bool look_back) {
+                               bool look_back, bool measure_paths) {
     r->capacity = capacity;
     r->count = r->reserved_end = 0;
     r->word_count = look_back ? TRC_RAY_WORDS : TRC_RAY_LEFT;
+    r->float_count = measure_paths ? TRC_RAY_FLOATS : TRC_RAY_PATH_LENGTH;
     /* Vectors are stored whole: vf_compress. */
-    for (int i = 0; i < TRC_RAY_FLOATS; i++)
+    for (int i = 0; i < r->float_count; i++)
         r->f[i] = trc_carve(c, (capacity + TRC_WIDTH) * sizeof(float));
     for (int i = 0; i < r->word_count; i++)
         r->w[i] = trc_carve(c, (capacity + TRC_WIDTH) * sizeof(uint32_t));
@@ -103,13 +106,16 @@ TRC_INLINE void trc_rays_add(struct trc_ray_store *r, uint32_t count) {
     r->count += count;
 }
 
-/* The lanes of bits. words: TRC_RAY_LEFT may be missing where no ray looks back. */
+/* The lanes of bits. words: TRC_RAY_LEFT may be missing where no ray looks back, as
+ * TRC_RAY_PATH_LENGTH of values where nothing reads it. */
 TRC_INLINE void trc_rays_append(struct trc_ray_store *r, const vfloat values[TRC_RAY_FLOATS],
                                 const vuint words[TRC_RAY_WORDS], uint32_t bits) {
     const uint32_t at = r->count;
     trc_rays_add(r, (uint32_t)__builtin_popcount(bits));
-    for (int k = 0; k < TRC_RAY_FLOATS; k++)
+    for (int k = 0; k < TRC_RAY_PATH_LENGTH; k++)
         vf_compress(r->f[k] + at, values[k], bits);
+    if (r->float_count > TRC_RAY_PATH_LENGTH)
+        vf_compress(r->f[TRC_RAY_PATH_LENGTH] + at, values[TRC_RAY_PATH_LENGTH], bits);
     for (int k = 0; k < TRC_RAY_LEFT; k++)
         vu_compress(r->w[k] + at, words[k], bits);
     if (r->word_count > TRC_RAY_LEFT)
@@ -120,7 +126,7 @@ TRC_INLINE void trc_rays_append(struct trc_ray_store *r, const vfloat values[TRC
 TRC_INLINE uint32_t trc_rays_duplicate(struct trc_ray_store *r, uint32_t ray) {
     const uint32_t other = r->count;
     trc_rays_add(r, 1);
-    for (int k = 0; k < TRC_RAY_FLOATS; k++)
+    for (int k = 0; k < r->float_count; k++)
         r->f[k][other] = r->f[k][ray];
     for (int k = 0; k < r->word_count; k++)
         r->w[k][other] = r->w[k][ray];
@@ -152,7 +158,7 @@ TRC_INLINE void trc_rays_take(struct trc_ray_store *from, struct trc_ray_store *
         return;
     }
     const uint32_t first = from->count - count;
-    for (int i = 0; i < TRC_RAY_FLOATS; i++)
+    for (int i = 0; i < from->float_count; i++)
         memcpy(to->f[i], from->f[i] + first, count * sizeof(float));
     for (int i = 0; i < from->word_count; i++)
         memcpy(to->w[i], from->w[i] + first, count * sizeof(uint32_t));

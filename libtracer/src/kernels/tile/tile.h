@@ -91,6 +91,7 @@ struct trc_tile {
     bool occlusion_passes;      /* some pass wants what shadow rays find, not light */
     bool object_motion;         /* rays need times */
     bool looks_back;            /* rays go through surfaces: kernels/trace/spawn.h */
+    bool measures_paths;        /* rays know how long their path is */
     bool camera_common;         /* camera rays start at one point */
     uint32_t packet_size;       /* 1..TRC_PACKET_SIZE */
     uint32_t bundle;            /* packets of a bundle at most, where rays stay together */

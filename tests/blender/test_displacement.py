@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The Displacement and Vector Displacement nodes beside Cycles': as bumps, as moved vertices, as both; shown
+by emissions of the normal and the position, one sample in the middle of each pixel."""
+
+import numpy as np
+from test_bump import Tree, _beyond, _image, _noise, _stage
+
+SIZE = 96
+EDGES = 0.02  # of the pixels: where the outline of moved triangles runs, either engine may see what is behind
+
+
+# Inside Blender ------------------------------------------------------------------------------------
+
+def _tree(shown, kind="Displacement", space='OBJECT', method='BUMP', height=None, **inputs):
+    """A material that shows an output of the Geometry node and is displaced by a node of that kind."""
+    tree = Tree()
+    tree.show(tree.add("NewGeometry"), shown)
+    socket = "Height" if kind == "Displacement" else "Vector"
+    node = tree.add(kind, {"space": space}, **{socket: (height or _noise("Object"))(tree)}, **inputs)
+    tree.displace(node, method)
+    return tree.material
+
+
+def _shape(subdivisions=5, smooth=True, **settings):
+    import bpy
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=subdivisions)
+    made = bpy.context.object
+    made.rotation_euler, made.scale = (0.3, 0.2, 0.5), (1.1, 1.1, 1.1)
+    for polygon in made.data.polygons:
+        polygon.use_smooth = smooth
+    for name, value in settings.items():
+        setattr(made, name, value)
+    return made
+
+
+def _color(tree):
+    return _noise("Object")(tree)[0], "Color"
+
+
+def _pictures(materials, made):
+    import scenes
+    pictures = {}
+    for name, material in materials.items():
+        made.data.materials.clear()
+        made.data.materials.append(material)
+        pictures[name] = scenes.by_both(1)
+    return pictures
+
+
+def inside_bumps():
+    import scenes
+    _stage(SIZE)
+    made = scenes.sphere()
+    made.rotation_euler, made.scale = (0.3, 0.2, 0.5), (1.1, 1.1, 1.1)
+    return _pictures({
+        "object space": _tree("Normal", Scale=0.1, Midlevel=0.3),
+        "world space": _tree("Normal", space='WORLD', Scale=0.15),
+        "UV": _tree("Normal", height=_noise("UV", 8.0), Scale=0.1),
+        "vector, object": _tree("Normal", "VectorDisplacement", height=_color, Scale=0.1),
+        "vector, world": _tree("Normal", "VectorDisplacement", 'WORLD', height=_color, Scale=0.1),
+        "vector, tangent": _tree("Normal", "VectorDisplacement", 'TANGENT', height=_color, Scale=0.1),
+        "true normal": _tree("True Normal", Scale=0.2),
+    }, made)
+
+
+def inside_moved():
+    _stage(SIZE)
+    made = _shape()
+    return _pictures({
+        "moved, normal": _tree("Normal", method='DISPLACEMENT', Scale=0.3),
+        "moved, position": _tree("Position", method='DISPLACEMENT', Scale=0.3),
+        "moved, world": _tree("Position", space='WORLD', method='DISPLACEMENT', Scale=0.3),
+        "moved, vector": _tree("Position", "VectorDisplacement", 'OBJECT', 'DISPLACEMENT', _color, Scale=0.3),
+        "moved, generated": _tree("Position", method='DISPLACEMENT', height=_noise(""), Scale=0.3),
+        "moved, image": _tree("Position", method='DISPLACEMENT', height=_image, Scale=0.5),
+    }, made)
+
+
+def inside_both():
+    _stage(SIZE)
+    return _pictures({
+        name: _tree("Normal", method='BOTH', height=_noise(name), Scale=0.2) for name in ("Generated", "UV")},
+        _shape())
+
+
+def inside_meshes():
+    """Flat faces, two materials of which one is moved, and two objects of one mesh."""
+    import bpy
+    import scenes
+    pictures = {}
+    _stage(SIZE)
+    made = _shape(4, smooth=False)
+    pictures.update(_pictures({"flat": _tree("Normal", method='DISPLACEMENT', Scale=0.2)}, made))
+    for name in ("Normal", "Position"):
+        _stage(SIZE)
+        made = _shape()
+        made.data.materials.append(_tree(name, method='DISPLACEMENT', Scale=0.3))
+        made.data.materials.append(_tree(name, Scale=0.0))
+        for polygon in made.data.polygons:
+            polygon.material_index = int(polygon.center.z > 0.0)
+        pictures[f"two materials, {name}"] = scenes.by_both(1)
+    _stage(SIZE, type='ORTHO', ortho_scale=5.0)
+    made = _shape(location=(-1.2, 0.0, 0.0))
+    made.data.materials.append(_tree("Position", method='DISPLACEMENT', Scale=0.3))
+    other = scenes.link("Other", made.data)
+    other.location = (1.2, 0.0, 0.0)
+    pictures["two objects"] = scenes.by_both(1)
+    return pictures
+
+
+def inside_changes():
+    """A moved sphere after its material, its transform and its method have changed: as a fresh render."""
+    import bpy
+    import scenes
+    _stage(SIZE)
+    scenes.set_engine('VOLLEY', 1)
+    made = _shape(4)
+    tree = _tree("Position", method='DISPLACEMENT', Scale=0.3)
+    made.data.materials.append(tree)
+    bpy.context.scene.render.use_persistent_data = True
+    scenes.render()
+    node = next(n for n in tree.node_tree.nodes if n.type == 'DISPLACEMENT')
+    node.inputs["Scale"].default_value = 0.1
+    made.location.x = 0.2
+    kept = [scenes.render()]
+    bpy.context.scene.render.use_persistent_data = False
+    fresh = [scenes.render()]
+    return kept, fresh
+
+
+def inside_adaptive():
+    import bpy
+    import scenes
+    scenes.empty(size=(16, 16), samples=1)
+    scenes.camera()
+    made = scenes.wall()
+    modifier = made.modifiers.new("Subdivision", 'SUBSURF')
+    if hasattr(modifier, "use_adaptive_subdivision"):
+        modifier.use_adaptive_subdivision = True
+    else:
+        bpy.context.scene.cycles.feature_set = 'EXPERIMENTAL'
+        made.cycles.use_adaptive_subdivision = True
+    from volley import compat
+    told = [compat.has_adaptive_subdivision(made)]
+    made.modifiers.clear()
+    told.append(compat.has_adaptive_subdivision(made))
+    return told
+
+
+# Comparison ----------------------------------------------------------------------------------------
+
+def _check(pictures, share, tolerance=1e-3):
+    found = {name: (_beyond(*pair, tolerance), float(np.abs(pair[0] - pair[1]).mean()))
+             for name, pair in pictures.items()}
+    for name, (beyond, mean) in found.items():
+        print(f"{name}: {beyond:.2%} of the pixels differ, mean difference {mean:.1e}")
+    for name, (ours, theirs) in pictures.items():
+        assert theirs[..., :3].std() > 0.05, f"{name}: the picture shows nothing"
+        assert found[name][0] <= share, f"{name}: {found[name][0]:.2%} of the pixels differ"
+
+
+def test_bumps(blender):
+    _check(blender.run(inside_bumps), 0.005)
+
+
+def test_moved_vertices(blender):
+    _check(blender.run(inside_moved), EDGES)
+
+
+def test_both(blender):
+    """Cycles takes slopes from the mesh as it was before, Volley as it is: they differ a little."""
+    _check(blender.run(inside_both), EDGES, 5e-3)
+
+
+def test_meshes(blender):
+    _check(blender.run(inside_meshes), EDGES)
+
+
+def test_changes(blender):
+    kept, fresh = blender.run(inside_changes)
+    assert all(np.array_equal(a, b) for a, b in zip(kept, fresh))
+
+
+def test_adaptive_subdivision_is_known(blender):
+    assert blender.run(inside_adaptive) == [True, False]
