@@ -20,9 +20,6 @@ _HORIZON = math.cos(0.5 * math.pi - 0.001)  # cosine to the zenith below which P
 # How bright Hosek and Wilkie's skies in Cycles are beside Preetham's (measured: 0.11 to 0.22).
 _HOSEK_SCALE = 0.16
 
-# Where Cycles looks up the horizon for what is below it, since 5.0: 2.048 rows above the table's lower edge.
-_ROW_BELOW = 2.0 * (0.508 - 0.5)
-
 # A bright disc that a tree shows, for the world to sample: unit direction, diameter in radians.
 Sun = namedtuple("Sun", "direction angle")
 
@@ -175,12 +172,16 @@ def _single(walker, formula, node, turns, elevation, z):
     is_new = node.sky_type == 'SINGLE_SCATTERING'
     above = formula.number(Math.MAXIMUM, elevation, 0.0)
     row = formula.number(Math.SQRT, formula.number(Math.DIVIDE, above, 0.5 * math.pi))
-    if is_new:
-        is_below = formula.number(Math.LESS_THAN, z, 0.0)
-        row = formula.number(Math.MULTIPLY_ADD, is_below, _ROW_BELOW, row)
     color = _look_up(walker, formula, turns, row, sky.nishita_table, node.sun_elevation, _altitude(node),
                      _amounts(node), is_new)
-    fade = formula.number(Math.MULTIPLY_ADD, formula.number(Math.MINIMUM, z, 0.0), 2.5, 1.0)
+    z = formula.number(Math.MINIMUM, z, 0.0)
+    if is_new:  # it is a table too, of which a cell's value is that of its lower edge
+        below = formula.number(Math.MAXIMUM, formula.number(Math.SUBTRACT, 0.0, elevation), 0.0)
+        row = formula.number(Math.SQRT, formula.number(Math.DIVIDE, below, 0.5 * math.pi))
+        row = formula.number(Math.ADD, row, 0.5 / sky.TABLE_HEIGHT)
+        square = formula.number(Math.MULTIPLY, row, row)
+        z = formula.number(Math.SINE, formula.number(Math.MULTIPLY, square, -0.5 * math.pi))
+    fade = formula.number(Math.MULTIPLY_ADD, z, 2.5, 1.0)
     fade = formula.number(Math.MAXIMUM, fade, 0.0)
     cube = formula.number(Math.MULTIPLY, formula.number(Math.MULTIPLY, fade, fade), fade)
     return formula.vector(Vector.MULTIPLY, color, formula.spread(cube))
