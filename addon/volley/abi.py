@@ -318,6 +318,7 @@ class VoronoiMode(IntEnum):
     FEATURE_MASK = 7
     FEATURE_SHIFT = 4
     NORMALIZE = 128
+    PCG = 256
 
 
 class WaveProfile(IntEnum):

@@ -8,6 +8,7 @@ values that its textures imply.
 
 from ..abi import (BrickMode, FractalType, GradientType, NodeType, NoiseMode, VoronoiFeature, VoronoiMetric,
                    VoronoiMode, WaveDirection, WaveMode, WaveProfile)
+from ..compat import HASHES_CELLS_BY_PCG
 from .node_list import named_outputs, output
 from .sky_texture import sky_texture
 from .values import CONSTANT, DEFAULT, Value
@@ -75,6 +76,8 @@ def _voronoi(walker, node, sockets):
             | VoronoiFeature[node.feature] << VoronoiMode.FEATURE_SHIFT)
     if getattr(node, "normalize", False):
         mode |= VoronoiMode.NORMALIZE
+    if HASHES_CELLS_BY_PCG:
+        mode |= VoronoiMode.PCG
     index = walker.emit(NodeType.VORONOI, values, mode)
     return named_outputs(index, NodeType.VORONOI, ("Distance", "Color", "Position", "W", "Radius"))
 

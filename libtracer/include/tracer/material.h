@@ -139,7 +139,9 @@ enum trc_voronoi_mode {
     TRC_VORONOI_METRIC_SHIFT = 2,
     TRC_VORONOI_FEATURE_MASK = 7, /* after the shift */
     TRC_VORONOI_FEATURE_SHIFT = 4,
-    TRC_VORONOI_NORMALIZE = 1 << 7 /* distance and color to about [0, 1] */
+    TRC_VORONOI_NORMALIZE = 1 << 7, /* distance and color to about [0, 1] */
+    /* Points of cells as in Blender 5: those of 2 dimensions and more are hashed otherwise. */
+    TRC_VORONOI_PCG = 1 << 8
 };
 
 enum trc_wave_profile { TRC_WAVE_SINE = 0, TRC_WAVE_SAW, TRC_WAVE_TRIANGLE };

@@ -1,7 +1,8 @@
 /* Hashes of whole numbers and floats for procedural textures, and where they place things.
  *
  * Bob Jenkins, "lookup3.c" (2006, public domain), for keys of one to four words, with the seeds and
- * the order of words that Cycles uses: patterns come out the same. */
+ * the order of words that Cycles uses: patterns come out the same. M. Jarzynski, M. Olano, "Hash
+ * Functions for GPU Rendering" (2020), for cells of Blender 5. */
 #ifndef TRACER_KERNELS_PROGRAM_HASH_H
 #define TRACER_KERNELS_PROGRAM_HASH_H
 
@@ -127,6 +128,48 @@ TRC_INLINE void hash_point(int dims, const vfloat *p, vfloat *out) {
         out[3] = hash4(p[1], p[2], p[3], p[0]);
         break;
     }
+}
+
+/* ---- cells, whose coordinates are whole; those beyond the dimensions are 0 ---- */
+
+/* A linear congruential generator's (W. H. Press et al., "Numerical Recipes"). */
+#define PCG_MULTIPLIER 1664525u
+#define PCG_INCREMENT 1013904223u
+
+/* The paper's pcg2d, pcg3d and pcg4d have this round twice; count: 2 to 4. */
+TRC_INLINE void pcg_round(int count, vuint v[TRC_MAX_DIMENSIONS]) {
+    const vuint multiplier = vu_set(PCG_MULTIPLIER);
+    if (count == 2) {
+        v[0] = v[0] + v[1] * multiplier;
+        v[1] = v[1] + v[0] * multiplier;
+        return;
+    }
+    v[0] = v[0] + v[1] * (count == 3 ? v[2] : v[3]);
+    v[1] = v[1] + v[2] * v[0];
+    v[2] = v[2] + v[0] * v[1];
+    v[3] = v[3] + v[1] * v[2];
+}
+
+/* The point of a cell of two to four dimensions, each coordinate in [0, 1]. As in Cycles, words
+ * are signed where they are shifted. */
+TRC_INLINE void cell_point(int dims, const vfloat cell[TRC_MAX_DIMENSIONS],
+                           vfloat point[TRC_MAX_DIMENSIONS]) {
+    vuint v[TRC_MAX_DIMENSIONS];
+    for (int i = 0; i < TRC_MAX_DIMENSIONS; i++)
+        v[i] = (vuint)vf_to_int(cell[i]) * vu_set(PCG_MULTIPLIER) + vu_set(PCG_INCREMENT);
+    pcg_round(dims, v);
+    for (int i = 0; i < TRC_MAX_DIMENSIONS; i++)
+        v[i] = v[i] ^ (vuint)((vint)v[i] >> 16);
+    pcg_round(dims, v);
+    for (int i = 0; i < TRC_MAX_DIMENSIONS; i++)
+        point[i] = vi_to_float((vint)(v[i] & vu_set(0x7fffffffu))) * vf_set(0x1p-31f);
+}
+
+/* Its colour: a plane's cells are those of space at height 0. */
+TRC_INLINE vvec3 cell_color(int dims, const vfloat cell[TRC_MAX_DIMENSIONS]) {
+    vfloat color[TRC_MAX_DIMENSIONS];
+    cell_point(dims == 4 ? 4 : 3, cell, color);
+    return v3(color[0], color[1], color[2]);
 }
 
 #endif

@@ -18,6 +18,7 @@
 struct voronoi {
     int dims;
     uint32_t metric; /* TRC_VORONOI_* */
+    bool has_pcg;    /* TRC_VORONOI_PCG, where it matters */
     vfloat exponent, randomness;
     vfloat cell[TRC_MAX_DIMENSIONS], local[TRC_MAX_DIMENSIONS];
 };
@@ -43,20 +44,27 @@ TRC_INLINE void voronoi_offset(int dims, int reach, int index, vfloat *offset) {
     }
 }
 
+/* The cell at an offset from the place's; 0 beyond the dimensions. */
+TRC_INLINE void voronoi_cell(const struct voronoi *v, const vfloat *offset, vfloat *cell) {
+    for (int i = 0; i < TRC_MAX_DIMENSIONS; i++)
+        cell[i] = i < v->dims ? v->cell[i] + offset[i] : vf_zero();
+}
+
 TRC_INLINE void voronoi_at(const struct voronoi *v, const vfloat *offset, vfloat *at) {
     vfloat cell[TRC_MAX_DIMENSIONS], random[TRC_MAX_DIMENSIONS];
-    for (int i = 0; i < v->dims; i++)
-        cell[i] = v->cell[i] + offset[i];
-    hash_point(v->dims, cell, random);
+    voronoi_cell(v, offset, cell);
+    if (v->has_pcg)
+        cell_point(v->dims, cell, random);
+    else
+        hash_point(v->dims, cell, random);
     for (int i = 0; i < v->dims; i++)
         at[i] = offset[i] + random[i] * v->randomness;
 }
 
 static vvec3 voronoi_color(const struct voronoi *v, const vfloat *offset) {
     vfloat cell[TRC_MAX_DIMENSIONS];
-    for (int i = 0; i < v->dims; i++)
-        cell[i] = v->cell[i] + offset[i];
-    return hash_color(v->dims, cell);
+    voronoi_cell(v, offset, cell);
+    return v->has_pcg ? cell_color(v->dims, cell) : hash_color(v->dims, cell);
 }
 
 TRC_INLINE vfloat voronoi_square(int dims, const vfloat *a, const vfloat *b) {
@@ -338,7 +346,9 @@ static void voronoi_fractal(struct voronoi *v, uint32_t mode, vfloat smoothness,
 /* ---- the texture ---- */
 
 static void op_voronoi(uint32_t mode, const vfloat *in, vfloat *out) {
-    struct voronoi v = {.dims = (int)(mode & TRC_DIMENSIONS_MASK) + 1,
+    const int dims = (int)(mode & TRC_DIMENSIONS_MASK) + 1;
+    struct voronoi v = {.dims = dims,
+                        .has_pcg = dims > 1 && (mode & TRC_VORONOI_PCG),
                         .metric = (mode >> TRC_VORONOI_METRIC_SHIFT) & TRC_VORONOI_METRIC_MASK,
                         .exponent = in[TRC_OP_AT(VORONOI, exponent)],
                         .randomness = vf_saturate(in[TRC_OP_AT(VORONOI, randomness)])};
