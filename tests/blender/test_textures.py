@@ -334,7 +334,7 @@ def _build(tree, center, case, output):
     for socket, value in zip(node.inputs[1:], _OTHER_INPUTS.get(node_type, ())):
         socket.default_value = value
     for key, value in inputs.items():
-        socket = next((s for s in node.inputs if s.name == key and s.enabled), None)
+        socket = next((s for s in node.inputs if key in (s.name, s.identifier) and s.enabled), None)
         if socket is None:  # not in this mode
             continue
         if isinstance(value, str) or (isinstance(value, tuple) and len(value) == 2):
