@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Small valid image files of every format that OpenImageIO was built with, and damaged ones made of them.
 
-    python3 tests/support/image_corpus.py FOLDER
+    python3 tests/support/image_corpus.py [--fuzz] FOLDER
 
-``make`` writes the files: those of formats that OpenImageIO writes by it, those of the others byte by byte.
-``damage`` spoils one by a random generator: the same seed, the same file.
+With --fuzz the files are inputs of tests/fuzz/fuzz_image.c. ``make`` writes the files: those of formats that
+OpenImageIO writes by it, those of the others byte by byte. ``damage`` spoils one by a random generator: the same seed, the same file.
 """
 
 import os
 import struct
 import sys
+import tempfile
 
 import numpy as np
 import OpenImageIO as oiio
@@ -280,5 +281,23 @@ def damage(data, kind, dice):
     return KINDS[kind](data, dice)
 
 
+# What fuzz_image.c reads before a file: straight alpha, no sRGB, bytes, linear interpolation, and that it is one.
+_FUZZ_SETTINGS = bytes((0, 0, 0, 0, 1))
+
+
+def make_inputs(folder):
+    """Write the corpus as inputs of the image fuzzer; their paths."""
+    with tempfile.TemporaryDirectory() as files:
+        inputs = []
+        for path in make(files):
+            name = os.path.basename(path)
+            with open(path, "rb") as file:
+                data = _FUZZ_SETTINGS + name.rpartition(".")[2].encode() + b"\0" + file.read()
+            os.makedirs(folder, exist_ok=True)
+            inputs.append(_write(os.path.join(folder, name), data))
+    return inputs
+
+
 if __name__ == "__main__":
-    print("\n".join(make(sys.argv[1])))
+    made = make_inputs(sys.argv[2]) if sys.argv[1] == "--fuzz" else make(sys.argv[1])
+    print("\n".join(made))
