@@ -97,7 +97,7 @@ static void test_folded_equals_run(void **state) {
     struct trc_mesh mesh = {.default_uv = -1}, *meshes[1] = {&mesh};
     const struct trc_snapshot snapshot = {
         .instance_count = 1, .instances = &instance, .mesh_count = 1, .meshes = meshes};
-    const struct trc_surface s = {.snapshot = &snapshot, .active = vm_all_set()};
+    struct trc_surface s = {.snapshot = &snapshot, .active = vm_all_set()};
     static struct trc_registers regs;
     uint32_t programs = 0;
     for (uint32_t seed = 1; seed <= 3000; seed++) {
@@ -133,7 +133,7 @@ static void test_neutral_constants(void **state) {
     struct trc_mesh mesh = {.default_uv = -1}, *meshes[1] = {&mesh};
     const struct trc_snapshot snapshot = {
         .instance_count = 1, .instances = &instance, .mesh_count = 1, .meshes = meshes};
-    const struct trc_surface s = {.snapshot = &snapshot, .active = vm_all_set()};
+    struct trc_surface s = {.snapshot = &snapshot, .active = vm_all_set()};
     static struct trc_registers regs;
     static const struct {
         uint32_t type, modes;
