@@ -91,7 +91,7 @@ static bool is_of(const struct trc_displacer *d, const struct trc_snapshot *s,
 
 struct work {
     const struct trc_snapshot *snapshot;
-    const struct trc_mesh *mesh;
+    struct trc_mesh *mesh;
     uint32_t instance;
     const atomic_uint *cancel;
     float *normals;    /* of the vertices */
@@ -262,7 +262,7 @@ static trc_status fill_normals(const struct work *w, struct trc_mesh *moved) {
 /* ---- a mesh ---- */
 
 static trc_status shift(const struct work *w, struct trc_mesh **moved_out) {
-    const struct trc_mesh *from = w->mesh;
+    struct trc_mesh *from = w->mesh;
     const size_t per_key = (size_t)3 * from->vertex_count;
     float *positions = trc_alloc(per_key * from->key_count, sizeof *positions);
     if (!positions)

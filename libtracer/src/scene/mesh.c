@@ -300,12 +300,14 @@ static void fill_generated(const struct trc_mesh *from, float *generated) {
     clear_bad_values(generated, (uint64_t)3 * from->vertex_count);
 }
 
-trc_status trc_geometry_displace(const struct trc_mesh *from, const float *positions,
+trc_status trc_geometry_displace(struct trc_mesh *from, const float *positions,
                                  struct trc_mesh **mesh_out) {
     const float *normals = from->corner_normals ? from->corner_normals : from->vertex_normals;
     const size_t vertices = (size_t)3 * from->vertex_count;
     struct trc_mesh *mesh;
     TRC_TRY(trc_geometry_pose(from, from->key_count, positions, normals, &mesh));
+    ((struct trc_geometry *)mesh)->from = trc_geometry_retain(from);
+    mesh->rest = from->positions;
     bool ok = true;
     if (from->vertex_normals && !mesh->vertex_normals) { /* made by trc_geometry_finish */
         mesh->vertex_normals = trc_alloc(vertices * from->key_count, sizeof(float));
@@ -346,6 +348,7 @@ void trc_geometry_release(struct trc_mesh *mesh) {
     trc_free(mesh->corner_normals);
     if (mesh->generated != ((struct trc_geometry *)mesh)->topology->generated)
         trc_free(mesh->generated);
+    trc_geometry_release(((struct trc_geometry *)mesh)->from);
     release_topology(((struct trc_geometry *)mesh)->topology);
     trc_free(mesh);
 }

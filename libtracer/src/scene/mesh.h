@@ -20,8 +20,8 @@ trc_status trc_geometry_pose(const struct trc_mesh *from, uint32_t key_count,
                              struct trc_mesh **mesh_out);
 
 /* The same mesh with other positions, of as many keys; its normals are those of from. Generated
- * coordinates stay. OUT_OF_MEMORY. */
-trc_status trc_geometry_displace(const struct trc_mesh *from, const float *positions,
+ * coordinates stay. Holds from. OUT_OF_MEMORY. */
+trc_status trc_geometry_displace(struct trc_mesh *from, const float *positions,
                                  struct trc_mesh **mesh_out);
 
 /* What normals the caller gave: TRC_NORMALS_*. */
@@ -67,6 +67,7 @@ struct trc_mesh_topology {
 struct trc_geometry {
     struct trc_mesh mesh; /* first: a trc_mesh is a trc_geometry */
     struct trc_mesh_topology *topology;
+    struct trc_mesh *from; /* what it was before displacement, held, or NULL */
 };
 
 /* A direction for a vertex whose triangles give none: away from the object's origin, as Blender. */

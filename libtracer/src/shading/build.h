@@ -46,8 +46,10 @@ struct trc_build {
     uint32_t output_count;
     enum trc_build_place place;
     struct trc_operand filter_width;    /* of the height that is lowered */
+    struct trc_operand position_width;  /* the same for what is read from the position */
     struct trc_operand *height_outputs; /* of its nodes; NULL before the first Bump node */
-    uint32_t normal_since; /* index of the first operation that reads the normal of SET_NORMAL */
+    uint32_t point_since;  /* operations from here on read what SET_NORMAL and SET_POSITION set */
+    bool moves_point;      /* SET_POSITION is among them */
     uint8_t *height_nodes; /* which those are */
     struct trc_leaf leaves[TRC_MAX_LEAVES];
     uint32_t leaf_count;
@@ -112,6 +114,8 @@ trc_status trc_build_relief(struct trc_build *b);
 trc_status trc_build_offset(struct trc_build *b);
 /* Room for the outputs of nodes. (shading/lower.c) */
 trc_status trc_build_prepare(struct trc_build *b);
+/* Whether an operation of the point reads its position. (shading/fold.c) */
+bool trc_op_reads_position(uint32_t op);
 /* Outputs of all value nodes. (shading/lower.c) */
 trc_status trc_build_values(struct trc_build *b);
 /* Leaves, their weights and operands. (shading/leaves.c) */

@@ -32,7 +32,8 @@ trc_status trc_build_mark(struct trc_build *b) {
     for (uint32_t i = b->op_count; i-- > 0;) {
         struct trc_build_op *o = &b->ops[i];
         const uint8_t *live = b->value_is_live + o->first_value;
-        o->is_live = memchr(live, 1, trc_op_outputs(o->op)) != NULL || o->op == TRC_OP_SET_NORMAL;
+        o->is_live = memchr(live, 1, trc_op_outputs(o->op)) != NULL || o->op == TRC_OP_SET_NORMAL ||
+                     o->op == TRC_OP_SET_POSITION;
         if (!o->is_live)
             continue;
         mark_operands(b, b->inputs + o->first_input, trc_op_inputs(o->op));

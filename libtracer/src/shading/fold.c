@@ -128,12 +128,25 @@ static bool reads_normal(uint32_t op) {
     }
 }
 
+bool trc_op_reads_position(uint32_t op) {
+    return op == TRC_OP_POSITION || op == TRC_OP_OBJECT_POSITION || op == TRC_OP_CAMERA_POSITION ||
+           op == TRC_OP_WINDOW;
+}
+
+/* Whether it gives something else since the point has changed. */
+static bool is_changed(const struct trc_build *b, uint32_t op) {
+    if (reads_normal(op))
+        return true;
+    return b->moves_point &&
+           (trc_op_reads_position(op) || op == TRC_OP_BESIDE || op == TRC_OP_WIREFRAME);
+}
+
 static const struct trc_build_op *find_equal(const struct trc_build *b, uint32_t hash, uint32_t op,
                                              uint32_t mode, uint32_t resource,
                                              const struct trc_operand *inputs) {
     for (uint32_t i = b->buckets[hash]; i != UINT32_MAX; i = b->ops[i].next) {
         const struct trc_build_op *o = &b->ops[i];
-        if (i < b->normal_since && reads_normal(op))
+        if (i < b->point_since && is_changed(b, op))
             break; /* chains go back in time */
         if (o->op == op && o->mode == mode && o->resource == resource &&
             (op_infos[op].inputs == 0 || memcmp(b->inputs + o->first_input, inputs,

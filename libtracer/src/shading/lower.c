@@ -51,7 +51,9 @@ trc_status trc_build_point(struct trc_build *b, uint32_t code, uint32_t resource
         return trc_build_op(b, code, 0, resource, NULL, outputs);
     struct trc_operand out[TRC_OP_OUT_AT(BESIDE, end)];
     const uint32_t direction = b->place == TRC_PLACE_Y ? TRC_BESIDE_Y : 0;
-    TRC_TRY(trc_build_op(b, TRC_OP_BESIDE, code | direction, resource, &b->filter_width, out));
+    const struct trc_operand *width =
+        trc_op_reads_position(code) ? &b->position_width : &b->filter_width;
+    TRC_TRY(trc_build_op(b, TRC_OP_BESIDE, code | direction, resource, width, out));
     memcpy(outputs, out, trc_op_outputs(code) * sizeof *out);
     return TRC_OK;
 }

@@ -54,13 +54,15 @@ static void keep_outputs(struct trc_build *b, const struct trc_operand *outputs,
 /* An input of a node at the three places, each of the floats of its kind; all nodes that it depends
  * on have been lowered for the shaded point. */
 static trc_status lower_height(struct trc_build *b, const trc_node *node, uint32_t input,
-                               struct trc_operand filter_width, struct trc_operand out[3][3]) {
+                               struct trc_operand filter_width, struct trc_operand position_width,
+                               struct trc_operand out[3][3]) {
     struct trc_operand *const outputs = b->outputs;
     TRC_TRY(make_room(b));
     const uint32_t end = mark_nodes(b, &b->desc->inputs[node->first_input + input]);
     keep_outputs(b, outputs, end);
     b->outputs = b->height_outputs;
     b->filter_width = filter_width;
+    b->position_width = position_width;
     trc_status status = TRC_OK;
     for (uint32_t i = 0; i < 3 && status == TRC_OK; i++) {
         b->place = TRC_PLACE_MIDDLE + i;
@@ -81,15 +83,15 @@ trc_status trc_build_bump(struct trc_build *b, const trc_node *node, const struc
                           struct trc_operand *out) {
     struct trc_operand to[TRC_OP_AT(BUMP, end)], height[3][3];
     const struct trc_operand *normal = in + TRC_AT(BUMP, normal);
-    TRC_TRY(
-        lower_height(b, node, TRC_INPUT_OF(BUMP, height), in[TRC_AT(BUMP, filter_width)], height));
+    const struct trc_operand width = in[TRC_AT(BUMP, filter_width)];
+    TRC_TRY(lower_height(b, node, TRC_INPUT_OF(BUMP, height), width, width, height));
     if (is_same(height[0][0], height[1][0]) && is_same(height[0][0], height[2][0])) {
         memcpy(out, normal, 3 * sizeof *out);
         return TRC_OK;
     }
     to[TRC_OP_AT(BUMP, strength)] = in[TRC_AT(BUMP, strength)];
     to[TRC_OP_AT(BUMP, distance)] = in[TRC_AT(BUMP, distance)];
-    to[TRC_OP_AT(BUMP, filter_width)] = in[TRC_AT(BUMP, filter_width)];
+    to[TRC_OP_AT(BUMP, filter_width)] = width;
     memcpy(to + TRC_OP_AT(BUMP, normal), normal, 3 * sizeof *to);
     to[TRC_OP_AT(BUMP, middle)] = height[0][0];
     to[TRC_OP_AT(BUMP, beside_x)] = height[1][0];
@@ -142,38 +144,72 @@ static trc_status lower_sources(struct trc_build *b, const trc_node *node) {
     return trc_build_nodes(b, NULL, end);
 }
 
-/* As a bump whose height is the offset along the normal, as in Cycles. */
-trc_status trc_build_relief(struct trc_build *b) {
-    const trc_node *node = trc_displacement_of(b->desc);
-    if (!node || trc_displacement_method_of(node) == TRC_DISPLACEMENT_TRUE)
-        return TRC_OK;
-    struct trc_operand offset[3][3], filter_width, to[TRC_OP_AT(BUMP, end)];
-    struct trc_operand dot[TRC_OP_AT(VECTOR_MEASURE, end)];
-    struct trc_operand *heights = to + TRC_OP_AT(BUMP, middle);
-    const uint32_t mode =
-        (node->mode & TRC_DISPLACEMENT_ABOVE ? (uint32_t)TRC_BUMP_ABOVE : 0u) |
-        (trc_displacement_method_of(node) == TRC_DISPLACEMENT_BOTH ? TRC_BUMP_IN_OBJECT : 0u);
-    TRC_TRY(lower_sources(b, node));
-    TRC_TRY(
-        trc_build_input(b, node, TRC_INPUT_OF(DISPLACEMENT_OUTPUT, filter_width), &filter_width));
+static trc_status set_position(struct trc_build *b, const struct trc_operand position[3]) {
+    struct trc_operand out[3];
+    TRC_TRY(trc_build_op(b, TRC_OP_SET_POSITION, 0, TRC_NO_RESOURCE, position, out));
+    b->moves_point = true;
+    b->point_since = b->op_count;
+    return TRC_OK;
+}
+
+/* Offsets along the normal at the three places: heights of a bump. rest_step: that of
+ * TRC_OP_REST. */
+static trc_status lower_offsets(struct trc_build *b, const trc_node *node,
+                                struct trc_operand filter_width, struct trc_operand rest_step,
+                                const struct trc_operand normal[3], struct trc_operand heights[3]) {
+    const struct trc_operand none = trc_constant(0.0f);
+    struct trc_operand dot[TRC_OP_AT(VECTOR_MEASURE, end)], offset[3][3], position_width;
+    TRC_TRY(trc_build_math(b, TRC_MATH_MULTIPLY, filter_width, rest_step, none, &position_width));
     TRC_TRY(lower_height(b, node, TRC_INPUT_OF(DISPLACEMENT_OUTPUT, displacement), filter_width,
-                         offset));
-    struct trc_operand *normal = to + TRC_OP_AT(BUMP, normal);
-    TRC_TRY(trc_build_op(b, TRC_OP_NORMAL, 0, TRC_NO_RESOURCE, NULL, normal));
+                         position_width, offset));
     for (uint32_t i = 0; i < 3; i++) {
         memcpy(dot + TRC_OP_AT(VECTOR_MEASURE, a), offset[i], sizeof offset[i]);
         memcpy(dot + TRC_OP_AT(VECTOR_MEASURE, b), normal, 3 * sizeof *normal);
         TRC_TRY(trc_build_op(b, TRC_OP_VECTOR_MEASURE, TRC_VECTOR_DOT, TRC_NO_RESOURCE, dot,
                              heights + i));
     }
+    return TRC_OK;
+}
+
+/* As a bump whose height is the offset along the normal, as in Cycles. rest_step: how long steps
+ * were where heights are looked up. */
+static trc_status bend(struct trc_build *b, const trc_node *node, uint32_t mode,
+                       struct trc_operand rest_step) {
+    const struct trc_operand none = trc_constant(0.0f), one = trc_constant(1.0f);
+    struct trc_operand to[TRC_OP_AT(BUMP, end)];
+    struct trc_operand *const heights = to + TRC_OP_AT(BUMP, middle);
+    struct trc_operand *const normal = to + TRC_OP_AT(BUMP, normal);
+    struct trc_operand *const width = to + TRC_OP_AT(BUMP, filter_width);
+    TRC_TRY(lower_sources(b, node));
+    TRC_TRY(trc_build_input(b, node, TRC_INPUT_OF(DISPLACEMENT_OUTPUT, filter_width), width));
+    TRC_TRY(trc_build_op(b, TRC_OP_NORMAL, 0, TRC_NO_RESOURCE, NULL, normal));
+    TRC_TRY(lower_offsets(b, node, *width, rest_step, normal, heights));
     if (is_same(heights[0], heights[1]) && is_same(heights[0], heights[2]))
         return TRC_OK;
-    to[TRC_OP_AT(BUMP, strength)] = to[TRC_OP_AT(BUMP, distance)] = trc_constant(1.0f);
-    to[TRC_OP_AT(BUMP, filter_width)] = filter_width;
+    to[TRC_OP_AT(BUMP, strength)] = one;
+    TRC_TRY(
+        trc_build_math(b, TRC_MATH_DIVIDE, one, rest_step, none, to + TRC_OP_AT(BUMP, distance)));
     TRC_TRY(trc_build_op(b, TRC_OP_BUMP, mode, TRC_NO_RESOURCE, to, to));
     TRC_TRY(trc_build_op(b, TRC_OP_SET_NORMAL, 0, TRC_NO_RESOURCE, to, to));
-    b->normal_since = b->op_count;
+    b->point_since = b->op_count;
     return TRC_OK;
+}
+
+trc_status trc_build_relief(struct trc_build *b) {
+    const trc_node *node = trc_displacement_of(b->desc);
+    const uint32_t method = trc_displacement_method_of(node);
+    if (!node || method == TRC_DISPLACEMENT_TRUE)
+        return TRC_OK;
+    const uint32_t mode = node->mode & TRC_DISPLACEMENT_ABOVE ? TRC_BUMP_ABOVE : 0u;
+    if (method == TRC_DISPLACEMENT_BUMP)
+        return bend(b, node, mode, trc_constant(1.0f));
+    /* On the surface as it was before its vertices moved. */
+    struct trc_operand position[3], rest[TRC_OP_OUT_AT(REST, end)];
+    TRC_TRY(trc_build_op(b, TRC_OP_POSITION, 0, TRC_NO_RESOURCE, NULL, position));
+    TRC_TRY(trc_build_op(b, TRC_OP_REST, 0, TRC_NO_RESOURCE, NULL, rest));
+    TRC_TRY(set_position(b, rest + TRC_OP_OUT_AT(REST, position)));
+    TRC_TRY(bend(b, node, mode | TRC_BUMP_IN_OBJECT, rest[TRC_OP_OUT_AT(REST, step)]));
+    return set_position(b, position);
 }
 
 trc_status trc_build_offset(struct trc_build *b) {

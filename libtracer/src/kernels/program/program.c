@@ -209,6 +209,9 @@ static void run_at_surface(const struct trc_surface *s, const struct trc_instruc
     case TRC_OP_TANGENT_VECTOR:
         v3_write(out, op_tangent_vector(s, i->resource, v3_read(in)));
         break;
+    case TRC_OP_REST:
+        op_rest(s, out);
+        break;
     case TRC_OP_BUMP:
         v3_write(out, op_bump(s, i->mode, in));
         break;
@@ -257,6 +260,9 @@ void trc_program_run(const struct trc_material *m, struct trc_surface *s,
             continue;
         if (i->op == TRC_OP_BESIDE) {
             run_beside(s, i, in, out);
+        } else if (i->op == TRC_OP_SET_POSITION) {
+            s->p = v3_select(s->active, v3_read(in), s->p);
+            v3_write(out, s->p);
         } else if (i->op == TRC_OP_SET_NORMAL) {
             s->n = v3_select(s->active, v3_read(in), s->n);
             v3_write(out, s->n);

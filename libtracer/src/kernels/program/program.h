@@ -11,8 +11,8 @@ struct trc_registers {
     vfloat r[TRC_MAX_REGISTERS];
 };
 
-/* Runs the material's program, if it has one, for the active lanes. It may change the shading
- * normal. (kernels/program/program.c) */
+/* Runs the material's program, if it has one, for the active lanes. It may change the position
+ * and the shading normal. (kernels/program/program.c) */
 void trc_program_run(const struct trc_material *m, struct trc_surface *s,
                      struct trc_registers *regs);
 

@@ -20,6 +20,14 @@ static void pixel_steps(const struct trc_surface *s, vvec3 step[2]) {
     step[1] = v3_scale(v3_cross(n, unit), s->pixel);
 }
 
+/* What a step in the plane of a triangle adds to U and V. */
+static void step_in_triangle(const vvec3 side[2], vvec3 step, vfloat *du, vfloat *dv) {
+    const vvec3 n = v3_cross(side[0], side[1]);
+    const vfloat scale = vf_divide(vf_one(), v3_dot(n, n));
+    *du = v3_dot(v3_cross(step, side[1]), n) * scale;
+    *dv = v3_dot(v3_cross(side[0], step), n) * scale;
+}
+
 /* The surface at a point beside: in the plane of the triangle, beyond its edges too. All but the
  * place stays. As in Cycles, attributes of a surface seen from behind are those of the point on the
  * other side. */
@@ -36,14 +44,50 @@ static void point_beside(const struct trc_surface *s, bool is_along_y, vfloat fi
             continue;
         vvec3 side[2];
         group_sides(s, &g, side);
-        const vvec3 n = v3_cross(side[0], side[1]);
-        const vfloat scale = vf_divide(facing, v3_dot(n, n));
-        const vfloat du = v3_dot(v3_cross(step, side[1]), n) * scale;
-        const vfloat dv = v3_dot(v3_cross(side[0], step), n) * scale;
+        vfloat du, dv;
+        step_in_triangle(side, v3_scale(step, facing), &du, &dv);
         out->p = v3_select(g.lanes, v3_add(s->p, step), out->p);
         out->u = vf_select(g.lanes, s->u + du, out->u);
         out->v = vf_select(g.lanes, s->v + dv, out->v);
     }
+}
+
+/* The point before displacement, and the mean length of both steps there, as Cycles has it, in
+ * those of now. */
+static void op_rest(const struct trc_surface *s, vfloat *out) {
+    vvec3 steps[2], p = s->p;
+    vfloat length = s->pixel;
+    pixel_steps(s, steps);
+    struct lane_group g = groups_begin(s);
+    while (groups_next(s, &g)) {
+        if (!g.mesh || !g.mesh->rest)
+            continue;
+        const struct trc_mesh *mesh = g.mesh;
+        vint index[3];
+        struct trc_corners c;
+        struct trc_wide_affine m;
+        vvec3 side[2], rest[2];
+        vfloat sum = vf_zero();
+        group_sides(s, &g, side);
+        trc_load_indices(mesh, s->triangle, g.lanes, index);
+        trc_load_vectors(mesh->rest, index, mesh->vertex_count, mesh->key_count, s->time, g.lanes,
+                         &c);
+        trc_load_affine(g.instance, s->time, &m);
+        for (int i = 0; i < 2; i++)
+            rest[i] = trc_transform_vector(&m, v3_sub(c.corner[i + 1], c.corner[0]));
+        for (int i = 0; i < 2; i++) {
+            vfloat du, dv;
+            step_in_triangle(side, steps[i], &du, &dv);
+            sum = sum + v3_length(v3_mad(rest[0], du, v3_scale(rest[1], dv)));
+        }
+        const vvec3 there = trc_transform_point(&m, corners_mix(corner_weights(s), c.corner));
+        p = v3_select(g.lanes, there, p);
+        length = vf_select(g.lanes, sum * vf_set(0.5f), length);
+    }
+    v3_write(out + TRC_OP_OUT_AT(REST, position), p);
+    /* Where there is no pixel, nothing asks for slopes. */
+    out[TRC_OP_OUT_AT(REST, step)] =
+        vf_select(vf_gt(s->pixel, vf_zero()), vf_divide(length, s->pixel), vf_one());
 }
 
 /* The normal n turned by the slope of the heights; n and steps are in one space. */
