@@ -10,6 +10,7 @@ processes) and image/protocol.h (reading); both ends are of one version.
 
 import array
 import ctypes
+import errno
 import mmap
 import os
 import resource
@@ -400,13 +401,13 @@ class Launcher:
             for descriptor in descriptors:
                 os.close(descriptor)
         if child < 0:
-            return 11, 0, 0, 0  # EAGAIN
+            return errno.EAGAIN, 0, 0, 0
         self._processes.add(child)
         return 0, child, 0, 0
 
     def _end(self, process):
         if process not in self._processes:
-            return 3, 0, 0, 0  # ESRCH
+            return errno.ESRCH, 0, 0, 0
         self._processes.remove(process)
         os.kill(process, signal.SIGKILL)  # no more than a formality if it is dead already
         _, status = os.waitpid(process, 0)
