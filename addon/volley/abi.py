@@ -80,6 +80,7 @@ class VisibleRays(IntFlag):
 
 class InstanceFlags(IntFlag):
     SHADOW_CATCHER = 1
+    KEEPS_SHAPE = 2
 
 
 class LightType(IntEnum):

@@ -73,6 +73,19 @@ def inside_both():
         for name in ("Generated", "UV", "Object")}, _shape())
 
 
+def inside_hair():
+    """[[by Volley, by Cycles]] of hair of a material that moves vertices, and of the same without."""
+    import scenes
+    stage()
+    skin = _shape(3)
+    skin.modifiers.new("Hair", 'PARTICLE_SYSTEM')
+    hair = skin.particle_systems[0].settings
+    hair.type, hair.count, hair.hair_length, hair.radius_scale = 'HAIR', 60, 0.5, 0.05
+    skin.show_instancer_for_render = False
+    return list(pictures_of({scale: _tree("Position", method='DISPLACEMENT', Scale=scale)
+                             for scale in (0.3, 0.0)}, skin).values())
+
+
 def inside_meshes():
     """Flat faces, two materials of which one is moved, and two objects of one mesh."""
     import bpy
@@ -152,6 +165,14 @@ def test_both(blender):
     1e-3 (coordinates of the object) and .006 at 1e-2."""
     tolerance = 1e-3 if blender_support.version() < (4, 0) else 1e-2
     check(blender.run(inside_both), EDGES, tolerance)
+
+
+def test_hair_keeps_its_shape(blender):
+    """Moved or not, it is the same to each engine."""
+    moved, still = blender.run(inside_hair)
+    for one, other in zip(moved, still):
+        assert one[..., :3].std() > 0.05
+        assert np.abs(one - other).max() < 1e-5
 
 
 def test_meshes(blender):

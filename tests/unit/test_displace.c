@@ -134,6 +134,24 @@ static void first_triangles_rule(void **state) {
     assert_int_equal(trc_scene_destroy(s.scene), TRC_OK);
 }
 
+/* Of two slots that move, none does for an instance that keeps its shape, and both do again after.
+ */
+static void shapes_are_kept(void **state) {
+    (void)state;
+    struct node_list list;
+    struct stage s;
+    const trc_material_desc desc = mover(&list, 0.5f, TRC_DISPLACEMENT_TRUE);
+    build(&s, &desc, &desc);
+    for (uint32_t round = 0; round < 2; round++) {
+        s.desc.flags = round ? 0 : TRC_INSTANCE_KEEPS_SHAPE;
+        assert_int_equal(trc_instance_update(s.scene, s.instance, &s.desc), TRC_OK);
+        assert_int_equal(trc_scene_commit(s.scene), TRC_OK);
+        for (uint32_t v = 0; v < 4; v++)
+            expect_moved(snapshot_of(s.scene)->meshes[0], v, round ? 0.5f : 0.0f);
+    }
+    assert_int_equal(trc_scene_destroy(s.scene), TRC_OK);
+}
+
 static void unit_normal(const struct trc_mesh *mesh, uint32_t triangle, double n[3]) {
     const uint32_t *v = triangles + 3 * triangle;
     double a[3], b[3];
@@ -276,6 +294,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(vertices_move),
         cmocka_unit_test(slots_move_their_own),
+        cmocka_unit_test(shapes_are_kept),
         cmocka_unit_test(first_triangles_rule),
         cmocka_unit_test(normals_are_made_anew),
         cmocka_unit_test(generated_coordinates_stay),

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import bpy
 
+from ..abi import InstanceFlags
 from ..compat import has_adaptive_subdivision
 from . import deform, instance, light, mesh, motion, strands, tubes, visibility
 from .matrix import rows12
@@ -193,7 +194,8 @@ class Walk:
 
     def _add_made(self, each, item, source, made_of):
         """An item of strands or points (strands.Hair or strands.StrandObject) whose mesh is made unless another
-        item of the same source has it."""
+        item of the same source has it. As in Cycles, displacement moves neither."""
+        item.flags |= InstanceFlags.KEEPS_SHAPE
         if self._shutter is not None:
             item.motion_keys = motion.key_count(each.object, maker_of(each))
             item.transforms *= item.motion_keys

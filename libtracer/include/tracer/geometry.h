@@ -83,7 +83,10 @@ enum trc_visible_rays {
  * the part of its light that other instances take from it, and TRC_PASS_SHADOW_CATCHER has that
  * light by channel. Other rays meet it as any instance. Emission of instances that are none does
  * not light it as footage. */
-enum trc_instance_flags { TRC_INSTANCE_SHADOW_CATCHER = 1 };
+enum trc_instance_flags {
+    TRC_INSTANCE_SHADOW_CATCHER = 1,
+    TRC_INSTANCE_KEEPS_SHAPE = 2 /* displacement moves no vertices, as of hair */
+};
 
 #define TRC_MAX_INSTANCE_VALUES 256
 

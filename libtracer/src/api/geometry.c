@@ -126,7 +126,7 @@ static trc_status check_instance(const trc_instance_desc *desc) {
     TRC_TRY(trc_check_finite(desc->color, 4, "color"));
     TRC_TRY(trc_check_finite(&desc->cryptomatte_object, 1, "cryptomatte_object"));
     TRC_TRY(trc_check_count(desc->light_group, 0, TRC_MAX_LIGHT_GROUPS, "light_group"));
-    TRC_TRY(trc_check_enum(desc->flags, TRC_INSTANCE_SHADOW_CATCHER + 1, "flags"));
+    TRC_TRY(trc_check_enum(desc->flags, 2 * TRC_INSTANCE_KEEPS_SHAPE, "flags"));
     TRC_TRY(trc_check_count(desc->value_count, 0, TRC_MAX_INSTANCE_VALUES, "value_count"));
     if (desc->value_count) {
         TRC_TRY(trc_check_out(desc->values, sizeof(float), "values"));

@@ -86,6 +86,7 @@ struct trc_instance {
     uint32_t light_group; /* of its emission, from 1 on; 0: none */
     uint32_t first_light; /* first emissive-triangle light of this instance or UINT32_MAX */
     uint32_t flips;       /* 1: negative determinant at key 0 */
+    uint32_t keeps_shape; /* 1: displacement moves no vertices */
     uint32_t is_identity; /* 1: one key, which changes no point */
     uint32_t is_thin; /* 1: some key's transform is (scene/affine.h); rays meet a tree of its own
                          in world space */

@@ -186,6 +186,7 @@ static uint64_t fill_instances(const struct trc_scene_state *scene,
             .cryptomatte_asset = source->cryptomatte_asset,
             .light_group = source->light_group,
             .first_light = UINT32_MAX,
+            .keeps_shape = (source->flags & TRC_INSTANCE_KEEPS_SHAPE) != 0,
         };
         memcpy(instance->color, source->color, sizeof instance->color);
         for (uint32_t m = 0; m < material_count; m++) {
