@@ -21,6 +21,7 @@ class Changes:
         self.meshes = set()      # names of meshes that were edited: a pose names none
         self.objects = set()     # names of objects of which anything changed, the above among them
         self.materials = set()   # names of materials to flatten again
+        self.lights = set()      # names of lights' data that was edited, for which Blender may name no object
         self.all_materials = False
         self.world = False
 
@@ -47,6 +48,7 @@ class Changes:
         self.meshes |= later.meshes
         self.objects |= later.objects
         self.materials |= later.materials
+        self.lights |= later.lights
         self.full |= later.full
         self.structure |= later.structure
         self.all_materials |= later.all_materials
@@ -62,7 +64,7 @@ class Changes:
 
     def any(self):
         """Whether there is anything to sync at all."""
-        return bool(self.full or self.structure or self.objects or self.materials
+        return bool(self.full or self.structure or self.objects or self.materials or self.lights
                     or self.all_materials or self.world)
 
     def _mark(self, update):
@@ -73,6 +75,8 @@ class Changes:
             self.meshes.add(data.name_full)
         elif isinstance(data, bpy.types.Material):
             self.materials.add(data.name_full)
+        elif isinstance(data, bpy.types.Light):
+            self.lights.add(data.name_full)
         elif isinstance(data, bpy.types.World):
             self.world = True
         elif isinstance(data, bpy.types.NodeTree):

@@ -64,7 +64,7 @@ class SceneSync:
             return False
         if not all(self._materials.knows(name) for name in changes.materials):
             return False
-        touched = [shown.find(name, source) for name in changes.objects]
+        touched = [shown.find(name, source) for name in changes.objects | shown.owners_of(changes.lights)]
         if not all(touched):
             return False
         self._shown = None  # until all is done

@@ -30,6 +30,13 @@ class Shown:
         """Whether a source shows the same scene and view layer."""
         return self._identity == self._identity_of(source)
 
+    def owners_of(self, lights):
+        """Names of the objects that show these lights, by the names of their data."""
+        if not lights:
+            return set()
+        owners = filter(None, (bpy.data.objects.get(key[0]) for key in self._lights))
+        return {owner.name_full for owner in owners if owner.data.name_full in lights}
+
     def find(self, name, source):
         """The object of that name as an instance, IRRELEVANT, or None where only a walk can tell."""
         original = bpy.data.objects.get(name)
