@@ -122,6 +122,49 @@ def test_depth_of_field(blender):
     assert off == 0.0
 
 
+# Regions of viewports ------------------------------------------------------------------------------
+
+def inside_regions():
+    """Render regions of views through a camera that show a part of its frame, and of the free view: the
+    edges by the add-on, the same by shares of the frame, the size of the view; then (edges, divisor, edges
+    of the picture with fewer pixels)."""
+    from types import SimpleNamespace
+    from volley import viewport
+    regions, divided = [], []
+    for size in ((640, 360), (300, 500)):
+        for frame in (None, (-1.0, 1.0, -0.5, 0.5), (-3.0, 2.0, -2.0, 4.0)):
+            for border in ((0.2, 0.7, 0.1, 0.95), (0.05, 0.3, 0.6, 1.0)):
+                names = ("min_x", "max_x", "min_y", "max_y")
+                render = SimpleNamespace(use_border=True, **{f"border_{n}": b for n, b in zip(names, border)})
+                view = SimpleNamespace(use_render_border=True, **{
+                    f"render_border_{n}": b for n, b in zip(names, border)})
+                keys = SimpleNamespace(frame_window=frame, windows=[(-1.5, 1.0, -1.0, 1.0)])
+                x, y, width, height = viewport._crop_of(keys, view, render, size)
+                edges, expected = (x, x + width, y, y + height), []
+                for axis, (low, high) in enumerate(((-1.5, 1.0), (-1.0, 1.0))):
+                    begin, end = (low, high) if frame is None else frame[2 * axis:2 * axis + 2]
+                    for share in border[2 * axis:2 * axis + 2]:
+                        place = (begin + share * (end - begin) - low) / (high - low)
+                        expected.append(min(max(place, 0.0), 1.0) * size[axis])
+                regions.append((edges, expected, size))
+                for divisor in (1, 2, 3, 8):
+                    fields = viewport.divided({"width": size[0], "height": size[1], "crop_x": x, "crop_y": y,
+                                               "crop_width": width, "crop_height": height}, divisor)
+                    x0, y0 = fields["crop_x"], fields["crop_y"]
+                    divided.append((edges, divisor, (x0, x0 + fields["crop_width"], y0,
+                                                     y0 + fields["crop_height"])))
+    return regions, divided
+
+
+def test_regions_of_views(blender):
+    regions, divided = blender.run(inside_regions)
+    for edges, expected, size in regions:
+        assert 0 <= edges[0] < edges[1] <= size[0] and 0 <= edges[2] < edges[3] <= size[1]
+        assert np.abs(np.subtract(edges, expected)).max() <= 1.0, (edges, expected)
+    for edges, divisor, small in divided:
+        assert np.abs(np.array(edges) / divisor - small).max() <= 2.0, (edges, divisor, small)
+
+
 # A lens that zooms ---------------------------------------------------------------------------------
 
 def inside_zoom():

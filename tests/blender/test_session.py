@@ -85,6 +85,42 @@ def test_a_commit_that_fails_in_any_way_fails_the_render(blender):
     assert "Volley: out of memory" in render and view == "memory"
 
 
+def inside_viewport():
+    """What a viewport says of three lists of warnings, and which scenes of the library are left when it is
+    closed."""
+    import scenes
+    from volley import native, viewport
+    from volley.sync import SceneSync
+    scenes.empty()
+    said, destroyed = [], []
+
+    class Engine:
+        def report(self, kind, message):
+            said.append((kind, message))
+
+    view = viewport.Viewport()
+    for messages in (["no volumes", "no movies"], ["no movies"], ["no movies", "no links"]):
+        view._report(Engine(), messages)
+    destroy = native.Scene.destroy
+
+    def noting_destroy(scene):
+        destroyed.append(scene)
+        destroy(scene)
+
+    native.Scene.destroy = noting_destroy
+    view._sync = SceneSync(is_final=False, thread_count=0, will_resync=True)
+    opened = view._sync.scene
+    view.free()
+    view.free()
+    return said, [each is opened for each in destroyed]
+
+
+def test_a_viewport_warns_once_and_leaves_nothing(blender):
+    said, freed = blender.run(inside_viewport)
+    assert said == [({'WARNING'}, message) for message in ("no volumes", "no movies", "no links")]
+    assert freed == [True]
+
+
 def inside_settings_that_last():
     """Settings of the library's scenes that three renders with persistent data open, the limit of textures and
     the threads changed between them; pictures of two frames whose seed is animated or not."""

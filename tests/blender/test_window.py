@@ -65,6 +65,26 @@ def _open(scene):
     return space
 
 
+def _fail_once():
+    """Let the next sync of a viewport fail without the view being given up; a list that says if it did."""
+    from volley import viewport
+    failed, synchronise, update = [], viewport.Viewport._synchronise, viewport.SceneSync.update
+
+    def fail(*_):
+        viewport.SceneSync.update = update
+        raise KeyboardInterrupt
+
+    def careless(*arguments):
+        try:
+            return synchronise(*arguments)
+        except KeyboardInterrupt:
+            failed.append(True)
+            return False
+
+    viewport.Viewport._synchronise, viewport.SceneSync.update = careless, fail
+    return failed
+
+
 def inside_edits():
     import bpy
     import scenes
@@ -93,9 +113,11 @@ def inside_edits():
     yield DRAW_SECONDS
     colors["orthographic"] = center()
     space.region_3d.view_perspective = 'CAMERA'
+    failed = _fail_once()
     material.node_tree.nodes["Emission"].inputs["Color"].default_value = (1.0, 0.0, 0.0, 1.0)
     yield DRAW_SECONDS
     colors["recoloured"] = center()
+    assert failed == [True]
     near = scenes.wall("Near", 30.0, -1.0, material=scenes.emitter((0.0, 0.0, 1.0), "Blue"))
     yield DRAW_SECONDS
     colors["added"] = center()
@@ -431,6 +453,38 @@ def _green_box(shot):
     return [int(edge) for edge in (columns[0], columns[-1] + 1, rows[0], rows[-1] + 1)]
 
 
+def _moved_view(rv3d, region, wall):
+    """Where a small wall is shown, and where Blender has it, by two offsets of the view."""
+    from bpy_extras.view3d_utils import location_3d_to_region_2d
+    boxes, offset = [], tuple(rv3d.view_camera_offset)
+    wall.scale = (0.02, 1.0, 0.02)
+    for rv3d.view_camera_offset in (offset, (-0.06, 0.05)):
+        shot = yield from _settled()
+        corners = [wall.matrix_world @ vertex.co for vertex in wall.data.vertices]
+        at = [location_3d_to_region_2d(region, rv3d, corner) for corner in corners]
+        boxes.append((_green_box(shot), [edge(point[axis] for point in at) for axis in (0, 1)
+                                         for edge in (min, max)]))
+    rv3d.view_camera_offset, wall.scale = offset, (1.0, 1.0, 1.0)
+    return boxes
+
+
+def _chosen_sizes(scene):
+    """{size of a pixel that the user chose: that of the last picture in the view's pixels}"""
+    from volley import native
+    start, widths, found = native.Scene.start_render, [], {}
+
+    def noting_start(self, **fields):
+        widths.append(fields["width"])
+        return start(self, **fields)
+
+    native.Scene.start_render = noting_start
+    for scene.render.preview_pixel_size in ('1', '4', 'AUTO'):
+        yield from _settled()
+        found[scene.render.preview_pixel_size] = widths[-1]
+    native.Scene.start_render = start
+    return found
+
+
 def inside_camera_region():
     """The part of the view that is rendered, beside where Blender has the camera's frame; then a lamp that
     is hidden by the shading menu, and a view that is paused."""
@@ -465,6 +519,8 @@ def inside_camera_region():
             low[0] + 0.2 * (high[0] - low[0]), low[0] + 0.7 * (high[0] - low[0]),
             low[1] + 0.4 * (high[1] - low[1]), low[1] + 0.6 * (high[1] - low[1])]))
     render.use_border, made.data.type = False, 'PERSP'
+    found["moved"] = yield from _moved_view(rv3d, region, wall)
+    found["sizes"] = yield from _chosen_sizes(scene)
     wall.data.materials[0] = scenes.material("Matt", "ShaderNodeBsdfDiffuse", Color=(1.0, 1.0, 1.0))
     scenes.light('SUN', energy=3.0, rotation=(0.5, 0.0, 0.0))
     for name, is_shown in (("lit", True), ("unlit", False), ("lit again", True)):
@@ -540,6 +596,11 @@ def test_view_through_the_camera(window):
     found = window.run_in_window(inside_camera_region)
     for box, frame in found["boxes"]:
         assert np.abs(np.subtract(box, frame)).max() < 2.0, (box, frame)
+    for box, place in found["moved"]:
+        assert np.abs(np.subtract(box, place)).max() < 2.0, (box, place)
+    assert abs(found["moved"][0][0][0] - found["moved"][1][0][0]) > 20
+    sizes = found["sizes"]
+    assert sizes['4'] == sizes['1'] // 4 and sizes['AUTO'] == sizes['1'] > 400
     assert found["lit"] > 0.3 and found["lit again"] == found["lit"] and found["unlit"] < 0.01
     assert np.allclose(found['DIFFUSE_COLOR'], (0.0, 0.5, 1.0), atol=0.01)  # display colours
     assert found['EMISSION'] == [0.0, 0.0, 0.0] and found['COMBINED'][2] > 0.3
