@@ -133,6 +133,37 @@ def test_limit(blender):
     _close(ours, theirs, 0.02)
 
 
+def inside_rewritten():
+    """[Volley's, Cycles'] of a file, and of what another program has made of it, in one session."""
+    import os
+    import tempfile
+    import bpy
+    import scenes
+    path = os.path.join(tempfile.mkdtemp(prefix="volley_"), "image.png")
+
+    def image():
+        _tile(path, 32, 4)
+        return bpy.data.images.load(path)
+    _stage(image)
+    pictures = []
+    for engine in ('VOLLEY', 'CYCLES'):
+        scenes.set_engine(engine, 1)
+        # Cycles would go on with the file as it was.
+        bpy.context.scene.render.use_persistent_data = engine == 'VOLLEY'
+        for seed in (5, 6):
+            _tile(path, 32, seed)
+            bpy.data.images["image.png"].reload()
+            pictures.append(scenes.render()[..., :3])
+    return pictures[::2], pictures[1::2]
+
+
+def test_files_that_are_written_again(blender):
+    before, after = blender.run(inside_rewritten)
+    _close(*before)
+    _close(*after)
+    assert np.abs(before[1] - after[1]).max() > 0.1
+
+
 def inside_memory():
     """Noise of 4 MiB and its levels within 2 MiB, and at half its side by Simplify."""
     import bpy

@@ -79,7 +79,8 @@ def inside_particles():
 
 
 def inside_places():
-    """{(node, output): [by Volley, by Cycles]} of balls on the faces of a wall, and beside it."""
+    """{(node, output): [by Volley, by Cycles]} of balls on the faces of a wall, and beside it:
+    the coordinates of their places, and the random number of each."""
     import bpy
     import scenes
     _stage()
@@ -91,10 +92,11 @@ def inside_places():
     ball.parent = grid
     scenes.sphere("Alone", 0.3, location=(2.5, 0.0, 1.5), material=ball.data.materials[0])
     pictures = {}
-    for name, outputs in (("ShaderNodeTexCoord", ("Generated", "UV")),
-                          ("ShaderNodeUVMap", ("UV",))):
+    for name, outputs in (("ShaderNodeTexCoord", ("Generated", "UV")), ("ShaderNodeUVMap", ("UV",)),
+                          ("ShaderNodeObjectInfo", ("Random",))):
         node = ball.data.materials[0].node_tree.nodes.new(name)
-        node.from_instancer = True
+        if hasattr(node, "from_instancer"):
+            node.from_instancer = True
         for output in outputs:
             _show(ball.data.materials[0], node, output, 1.0)
             pictures[f"{name} {output}"] = _both()

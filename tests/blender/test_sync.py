@@ -246,7 +246,7 @@ def inside_motion(position):
         scene.render.motion_blur_position = position
     else:
         scene.cycles.motion_blur_position = position
-    cube.cycles.motion_steps = 2
+    cube.cycles.motion_steps = 3
     told, original = _Recorder(), native.Scene
     told.stats_features = []
 
@@ -282,12 +282,12 @@ def inside_motion(position):
 @pytest.mark.parametrize("position, start", [('CENTER', 1.75), ('START', 2.0), ('END', 1.5)])
 def test_motion_keys_follow_the_shutter(blender, position, start):
     found = blender.run(inside_motion, position)
-    times = [start + 0.5 * i / 4 for i in range(5)]
-    moving = next(keys for keys in found["moving"] if len(keys) == 5)
+    times = [start + 0.5 * i / 8 for i in range(9)]
+    moving = next(keys for keys in found["moving"] if len(keys) == 9)
     assert moving == pytest.approx([(t - 1.0) * 10.0 for t in times], abs=1e-3)
-    deforming = next(keys for keys in found["shapes"] if len(keys) == 5)
+    deforming = next(keys for keys in found["shapes"] if len(keys) == 9)
     assert deforming == pytest.approx([-1.0 - (t - 1.0) * 4.0 for t in times], abs=1e-3)
-    assert found["camera_z"] == pytest.approx([(t - 1.0) for t in times[::2]], abs=1e-3)
+    assert found["camera_z"] == pytest.approx([(t - 1.0) for t in times[::4]], abs=1e-3)
     assert found["shutter"] == 0.5 and found["frame"] == 2.0
     for name in ("Built", "Dotted"):
         assert [w for w in found["warnings"] if name in w and "topology" in w]
@@ -342,31 +342,34 @@ def inside_attributes():
     import scenes
     from volley.sync import mesh
     scenes.empty()
-    wall = scenes.wall()
+    wall = scenes.mesh("Wall", [(0, 0, 0), (1, 0, 0), (1, 0, 1), (0, 0, 1), (2, 0, 0), (2, 0, 1)],
+                       [(0, 1, 2, 3), (1, 4, 5, 2)])
     data = wall.data
-    second = data.uv_layers.new(name="Second")
+    second, _, default = (data.uv_layers.new(name=name) for name in ("Second", "Other", "UVMap"))
     for i, loop in enumerate(second.data):
         loop.uv = (i * 0.1, 0.5)
-    data.uv_layers["UVMap"].active_render = True
+    default.active_render = True
     paint = data.color_attributes.new("Paint", 'FLOAT_COLOR', 'POINT')
     for i, item in enumerate(paint.data):
         item.color = (i * 0.25, 0.5, 0.75, 1.0)
     value = data.attributes.new("Value", 'FLOAT', 'FACE')
-    value.data[0].value = 0.625
+    value.data[0].value, value.data[1].value = 0.625, 0.25
     evaluated = wall.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
     taken = mesh.extract(evaluated, {"", "Second", "Missing"}, {"Paint", "Value", "Nothing", ""})
-    loops = np.empty(6, np.int32)
+    loops, vertices = np.empty(12, np.int32), np.empty(12, np.int32)
     evaluated.loop_triangles.foreach_get("loops", loops)
-    return [(name, values.tolist()) for name, values in taken.attributes], loops.tolist()
+    evaluated.loop_triangles.foreach_get("vertices", vertices)
+    return [(name, values.tolist()) for name, values in taken.attributes], loops.tolist(), vertices.tolist()
 
 
 def test_attributes_in_triangle_order(blender):
-    attributes, loops = blender.run(inside_attributes)
+    attributes, loops, vertices = blender.run(inside_attributes)
     assert [name for name, _ in attributes] == ["UVMap", "Second", "", "Paint", "Value"]
     by_name = dict(attributes)
     assert by_name["Second"] == [pytest.approx([loop * 0.1, 0.5]) for loop in loops]
-    assert by_name["Paint"] == [pytest.approx([loop * 0.25, 0.5, 0.75, 1.0]) for loop in loops]
-    assert by_name["Value"] == [pytest.approx([0.625, 0.625, 0.625, 1.0])] * 6
+    assert by_name["Paint"] == [pytest.approx([vertex * 0.25, 0.5, 0.75, 1.0]) for vertex in vertices]
+    assert by_name["Value"] == [pytest.approx([value, value, value, 1.0]) for value in (0.625, 0.25)
+                                for _ in range(6)]
     assert by_name[""] == by_name["Paint"]
 
 
