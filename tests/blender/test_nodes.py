@@ -38,6 +38,9 @@ def inside_group():
         inner.inputs.new("NodeSocketFloat", "Rough")
         inner.outputs.new("NodeSocketShader", "Shader")
     start, end = inner.nodes.new("NodeGroupInput"), inner.nodes.new("NodeGroupOutput")
+    other = inner.nodes.new("NodeGroupOutput")  # which the active output stands for
+    inner.links.new(inner.nodes.new("ShaderNodeEmission").outputs[0], end.inputs["Shader"])
+    end.is_active_output, other.is_active_output, end = False, True, other
     diffuse = inner.nodes.new("ShaderNodeBsdfDiffuse")
     inner.links.new(start.outputs["Color"], diffuse.inputs["Color"])
     inner.links.new(start.outputs["Rough"], diffuse.inputs["Roughness"])

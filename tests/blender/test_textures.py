@@ -174,6 +174,9 @@ for _blend in _BLENDS:
          Factor=0.6, A='color', B=(0.7, 0.3, 0.5))
     _add(f"mix {_blend}, the second varies", "ShaderNodeMixRGB", ("Color",),
          {"blend_type": _blend, "use_clamp": True}, Fac=0.8, Color1=(0.7, 0.3, 0.5), Color2='color')
+_add("mix ADD, clamped", "ShaderNodeMix", ("Result",),
+     {"data_type": 'RGBA', "blend_type": 'ADD', "clamp_result": True}, Factor=0.9, A='color',
+     B=(0.7, 0.3, 0.5))
 for _clamp in (False, True):
     _end = ", factor clamped" * _clamp
     _add(f"mix numbers{_end}", "ShaderNodeMix", ("Result",), {"data_type": 'FLOAT', "clamp_factor": _clamp},

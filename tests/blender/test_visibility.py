@@ -206,6 +206,31 @@ def inside_hidden():
     return {"hidden": _pictures()}
 
 
+def inside_shadows():
+    """Clear and half clear balls whose shadows are as clear or not, and lamps over dull ones that cast
+    shadows or not."""
+    import scenes
+    _room()
+    clear = scenes.material("Clear", "ShaderNodeBsdfTransparent", Color=(0.9, 0.6, 0.3))
+    half = scenes.material("Half", "ShaderNodeBsdfDiffuse", Color=(0.3, 0.6, 1.0))
+    tree = half.node_tree
+    mix = tree.nodes.new("ShaderNodeMixShader")
+    tree.links.new(tree.nodes["Diffuse BSDF"].outputs[0], mix.inputs[1])
+    tree.links.new(tree.nodes.new("ShaderNodeBsdfTransparent").outputs[0], mix.inputs[2])
+    tree.links.new(mix.outputs[0], tree.nodes["Material Output"].inputs["Surface"])
+    for number, (material, is_clear) in enumerate(((clear, True), (clear, False), (half, False))):
+        made = scenes.sphere("Clear", 0.4, (_column(number), 0.0, 1.3), material.copy()).data.materials[0]
+        owner = made if hasattr(made, "use_transparent_shadow") else made.cycles
+        owner.use_transparent_shadow = is_clear
+    for number, kind in ((3, 'POINT'), (4, 'POINT'), (5, 'AREA')):
+        _ball(number, False).location.x = _column(number)
+        lamp = scenes.light(kind, (_column(number), 0.0, 2.4), (0.0, 0.0, 0.0), energy=20.0)
+        lamp.data.use_shadow = number == 3
+        if hasattr(lamp.data.cycles, "cast_shadow"):  # before 4.2
+            lamp.data.cycles.cast_shadow = number == 3
+    return {"shadows": _pictures()}
+
+
 def inside_motion():
     """Moving instances whose blur is off or of other steps, by themselves or by their instancers, and
     members that deform; turning fast, so that steps are to be seen."""
@@ -280,7 +305,8 @@ def test_switches(blender, kind):
     _agree(blender.run(inside_switches, kind))
 
 
-@pytest.mark.parametrize("inside", [inside_makers, inside_holes, inside_hidden, inside_motion, inside_camera])
+@pytest.mark.parametrize("inside", [inside_makers, inside_holes, inside_hidden, inside_shadows, inside_motion,
+                                    inside_camera])
 def test_pictures(blender, inside):
     _agree(blender.run(inside))
 
