@@ -420,12 +420,24 @@ def _aov_scene():
 
 
 def inside_aovs():
+    """The AOVs by both engines, and Combined before and after one of that name, which Blender refuses."""
+    import bpy
+    import scenes
     _aov_scene()
-    return _both(["height", "tint", "facing", "unused"])
+    pairs = _both(["height", "tint", "facing", "unused"])
+    scenes.set_engine('VOLLEY', 1)
+    combined = [scenes.render()]
+    aov = bpy.context.view_layer.aovs.add()
+    aov.name, aov.type = "Combined", 'COLOR'
+    bpy.context.view_layer.use_pass_mist = True  # it looks at the names when the passes change
+    is_valid = aov.is_valid
+    return pairs, is_valid, combined + [scenes.render()]
 
 
 def test_aovs(blender):
-    pairs = blender.run(inside_aovs)
+    pairs, is_valid, combined = blender.run(inside_aovs)
+    assert not is_valid and combined[0][..., :3].std() > 0.02
+    assert np.array_equal(*combined)
     for picture in pairs.pop("unused"):
         assert not picture.any()
     for name, (ours, theirs) in pairs.items():

@@ -65,6 +65,41 @@ def test_integrator_brings_its_samples(blender):
     assert blender.run(inside_integrator_samples) == (1, 64, 7)
 
 
+def inside_changed_settings():
+    """Of each setting, whether the depsgraph hears of its change by a script."""
+    import bpy
+    import scenes
+    scene = scenes.empty()
+    layer, told, heard = bpy.context.view_layer, {}, []
+
+    def another(settings, setting):
+        value = getattr(settings, setting.identifier)
+        if setting.type == 'ENUM':
+            return next(item.identifier for item in setting.enum_items if item.identifier != value)
+        if setting.type == 'BOOLEAN':
+            return not value
+        return value + 1 if value + 1 <= setting.hard_max else value - 1
+
+    bpy.app.handlers.depsgraph_update_post.append(lambda _scene, depsgraph: heard.extend(
+        type(update.id).__name__ for update in depsgraph.updates))
+    for settings in (scene.volley, layer.volley):
+        for setting in settings.bl_rna.properties:
+            if setting.identifier in {"rna_type", "name"} or setting.is_hidden:
+                continue
+            layer.update()
+            heard.clear()
+            setattr(settings, setting.identifier, another(settings, setting))
+            layer.update()
+            told[type(settings).__name__, setting.identifier] = list(heard)
+    return told
+
+
+def test_a_changed_setting_is_heard_of(blender):
+    told = blender.run(inside_changed_settings)
+    assert len(told) > 30
+    assert [name for name, heard in told.items() if "Scene" not in heard] == []
+
+
 def inside_render_passes():
     import bpy
     import scenes

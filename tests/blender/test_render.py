@@ -246,11 +246,28 @@ def inside_adaptive():
         for key, value in values.items():
             setattr(settings, key, value)
         counts[name] = scenes.render_passes(["Debug Sample Count"])["Debug Sample Count"][..., 0]
-    return counts
+    return counts, _preview_thresholds(settings)
+
+
+def _preview_thresholds(settings):
+    """The thresholds of noise of viewports and previews whose adaptive sampling is off, on, automatic."""
+    import bpy
+    from volley import passes
+    from volley.session import render_fields
+    from volley.sync import camera
+    scene, found = bpy.context.scene, []
+    settings.preview_samples = 16
+    for settings.use_preview_adaptive_sampling, settings.preview_noise_threshold in (
+            (False, 0.25), (True, 0.25), (True, 0.0)):
+        fields = render_fields(scene, camera.frame_of(scene.render), (0, 0, 64, 48), [passes.COMBINED],
+                               is_preview=True)
+        found.append(fields["noise_threshold"])
+    return found
 
 
 def test_adaptive_sampling_and_its_settings(blender):
-    counts = blender.run(inside_adaptive)
+    counts, preview_thresholds = blender.run(inside_adaptive)
+    assert preview_thresholds == [0.0, 0.25, 1.0 / 16.0]
     assert (counts["off"] == 128).all()
     assert counts["fine"].max() == 128 and counts["fine"].mean() > counts["coarse"].mean()
     # Automatic choices are those of Cycles: 64 samples before the first look at 0.01.
