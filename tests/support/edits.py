@@ -50,6 +50,7 @@ def _make_materials():
     else:
         group.outputs.new('NodeSocketColor', "Color")
     color = group.nodes.new("ShaderNodeRGB")
+    color.name = "RGB"  # as it is called before 5.0
     group.links.new(color.outputs[0], group.nodes.new("NodeGroupOutput").inputs[0])
     grouped = scenes.material("Grouped", "ShaderNodeBsdfDiffuse")
     node = grouped.node_tree.nodes.new("ShaderNodeGroup")
