@@ -2,7 +2,7 @@
 """The library's list of node types (abi.NODES) in terms of Values: kinds of sockets, and where they stand."""
 
 from ..abi import NODES, NodeType, SeparateMode
-from .values import Value
+from .values import CONSTANT, DEFAULT, Value
 
 # All other kinds are vectors with a default.
 _KINDS = {"FLOAT": 'f', "COLOR": 'c', "SHADER": 's'}
@@ -37,10 +37,17 @@ def input_number(node_type, name):
     return _INPUT_NUMBERS[node_type, name]
 
 
+def absent(kind):
+    """The value of an input that nothing gives: 0 or, for a vector, the library's default."""
+    return Value(kind, DEFAULT if kind == 'v' else CONSTANT, 0)
+
+
 def arranged(node_type, values):
-    """The inputs of a type in the library's order; values: {the library's name: Value}, of all inputs."""
-    assert len(values) == len(NODES[node_type][1])
-    return [values[name] for _, name in NODES[node_type][1]]
+    """The inputs of a type in the library's order; values: {the library's name: Value}, the others are
+    absent."""
+    names = [name for _, name in NODES[node_type][1]]
+    assert set(values) <= set(names)
+    return [values.get(name) or absent(kind) for name, kind in zip(names, input_kinds(node_type))]
 
 
 def named_outputs(index, node_type, names, mode=0):

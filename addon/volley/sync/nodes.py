@@ -19,7 +19,7 @@ from . import tangents
 from .converters import CONVERTERS, instance_value
 from .derived import ISLAND, POINTINESS
 from .instance import VALUES_GENERATED, VALUES_UV
-from .node_list import arranged, input_kinds, input_number, named_outputs, output
+from .node_list import absent, arranged, input_kinds, input_number, named_outputs, output
 from .textures import TEXTURES
 from .values import CONSTANT, DEFAULT, Value
 
@@ -213,11 +213,10 @@ class Sockets:
         return next((self._by_name[name] for name in names if name in self._by_name), None)
 
     def get(self, kind, *names):
-        """The value of the first socket of those names; one that this Blender lacks is 0 or, for a
-        vector, the library's default."""
+        """The value of the first socket of those names; one that this Blender lacks is absent."""
         socket = self.find(*names)
         if socket is None:
-            return Value(kind, DEFAULT if kind == 'v' else CONSTANT, 0)
+            return absent(kind)
         return self._walker.convert(self._walker.input_value(socket, self._path), kind)
 
     def all_of(self, node_type, names):
@@ -304,16 +303,12 @@ def _metallic(walker, node, sockets):
         pairs = tuple(zip(index.constant, loss.constant))
         base = _constant('c', *(_conductor(n, k, 1.0) for n, k in pairs))
         edge = _constant('c', *(_edge_tint(n, k) for n, k in pairs))
-    one, zero, none = _constant('f', 1.0), _constant('f', 0.0), Value('v', DEFAULT, 0)
-    white, black = _constant('c', 1.0), _constant('c', 0.0)
+    one = _constant('f', 1.0)
     values = arranged(NodeType.LAYERED_PRINCIPLED, {
-        "base_color": base, "metallic": one, "roughness": sockets.get('f', "Roughness"),
-        "ior": _constant('f', 1.5), "alpha": one, "normal": sockets.get('v', "Normal"),
-        "diffuse_roughness": zero, "specular_ior_level": zero, "specular_tint": edge,
+        "base_color": base, "metallic": one, "roughness": sockets.get('f', "Roughness"), "ior": one,
+        "alpha": one, "normal": sockets.get('v', "Normal"), "specular_tint": edge,
         "anisotropic": sockets.get('f', "Anisotropy"), "anisotropic_rotation": sockets.get('f', "Rotation"),
-        "tangent": sockets.get('v', "Tangent"), "transmission_weight": zero, "coat_weight": zero, "coat_roughness": zero,
-        "coat_ior": one, "coat_tint": white, "coat_normal": none, "sheen_weight": zero, "sheen_roughness": zero,
-        "sheen_tint": white, "emission_color": black, "emission_strength": zero})
+        "tangent": sockets.get('v', "Tangent")})
     _note_generated(walker, node, NodeType.LAYERED_PRINCIPLED, values)
     return {"BSDF": Value('s', walker.emit(NodeType.LAYERED_PRINCIPLED, values, _distribution(node) or 0), 0)}
 
