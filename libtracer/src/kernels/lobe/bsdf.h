@@ -26,17 +26,20 @@ enum { TRC_LOBE_GGX, TRC_LOBE_GTR1, TRC_LOBE_BECKMANN, TRC_LOBE_ASHIKHMIN, TRC_L
 
 /* trc_lobe.fresnel: what multiplies the weight at a microfacet. */
 enum {
-    TRC_FRESNEL_NONE,      /* 1 (glass has the factor of the macro normal in its weight) */
-    TRC_FRESNEL_BLEND,     /* f0 to f90 as the dielectric of index ior goes from F(0) to 1; 1 minus
-                              it for refraction */
-    TRC_FRESNEL_F82,       /* Schlick's from f0 to 1, less f90 * cos * (1 - cos)^6 */
-    TRC_FRESNEL_DIELECTRIC /* F of ior for reflection, 1 - F for refraction */
+    TRC_FRESNEL_NONE,       /* 1 (glass has the factor of the macro normal in its weight) */
+    TRC_FRESNEL_BLEND,      /* f0 to f90 as the dielectric of index ior goes from F(0) to 1; 1 minus
+                               it for refraction */
+    TRC_FRESNEL_DIELECTRIC, /* F of ior for reflection, 1 - F for refraction */
+    TRC_FRESNEL_OWN         /* trc_lobe.reflectance; 1 minus it for refraction */
 };
 
 struct trc_lobe_model; /* kernels/lobe/lobe.h */
 
 struct trc_lobe {
     const struct trc_lobe_model *model;
+    /* Reflected part of what meets a micro-normal at that cosine, of TRC_FRESNEL_OWN alone; f0 and
+     * f90 are what it makes of them. */
+    vvec3 (*reflectance)(const struct trc_lobe *lobe, vfloat cos_m);
     enum trc_lobe_kind kind; /* the model's */
     uint32_t distribution;
     uint32_t fresnel;

@@ -65,11 +65,8 @@ TRC_INLINE bool meet(const struct trc_lobe *lobe, vvec3 wo, vvec3 wi, struct mee
 TRC_INLINE vvec3 facet_reflectance(const struct trc_lobe *lobe, vfloat cos_m) {
     if (lobe->fresnel == TRC_FRESNEL_BLEND)
         return v3_lerp(lobe->f0, lobe->f90, trc_fresnel_blend(cos_m, lobe->ior));
-    if (lobe->fresnel == TRC_FRESNEL_F82) {
-        const vfloat rest = vf_saturate(vf_one() - cos_m), power = trc_schlick_weight(cos_m);
-        const vvec3 schlick = v3_lerp(lobe->f0, v3_splat(vf_one()), power);
-        return v3_saturate(v3_sub(schlick, v3_scale(lobe->f90, cos_m * power * rest)));
-    }
+    if (lobe->fresnel == TRC_FRESNEL_OWN)
+        return lobe->reflectance(lobe, cos_m);
     if (lobe->fresnel == TRC_FRESNEL_DIELECTRIC)
         return v3_splat(trc_fresnel_dielectric(cos_m, lobe->ior));
     return v3_splat(vf_one());
@@ -149,6 +146,17 @@ TRC_INLINE bool is_sharp(uint32_t mode) {
  * "Physically Based Shading at Disney", 2012). */
 TRC_INLINE vfloat aspect_of(vfloat anisotropy) {
     return vf_safe_sqrt(vf_one() - vf_set(0.9f) * anisotropy);
+}
+
+TRC_INLINE void set_fresnel(struct trc_lobe *lobe, const struct trc_fresnel *fresnel) {
+    lobe->fresnel = fresnel->kind;
+    lobe->reflectance = fresnel->reflectance;
+    lobe->f0 = fresnel->f0;
+    lobe->f90 = fresnel->f90;
+}
+/* From f0 at normal incidence to white. */
+TRC_INLINE struct trc_fresnel blend_to_white(vvec3 f0) {
+    return (struct trc_fresnel){.kind = TRC_FRESNEL_BLEND, .f0 = f0, .f90 = v3_splat(vf_one())};
 }
 
 /* Turns a lobe into one that goes from f0 at normal incidence to f90, and accounts for it in the

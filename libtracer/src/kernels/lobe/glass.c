@@ -125,17 +125,23 @@ void trc_add_multi_glass(struct trc_setup *c, vvec3 weight, vvec3 reflected, vve
     share_chances(reflect, refract, trc_fresnel_dielectric(v3_dot(n, c->s->wo), eta));
 }
 
-/* The factor of the micro-normal goes from f0 to 1; kept: what single scattering keeps. */
-static void blend_dielectric(struct trc_lobe *lobe, vvec3 f0, vfloat kept) {
-    lobe->fresnel = TRC_FRESNEL_BLEND;
-    lobe->f0 = f0;
-    lobe->f90 = v3_splat(vf_one());
+/* kept: what single scattering keeps. */
+static void correlate(struct trc_lobe *lobe, const struct trc_fresnel *fresnel, vfloat kept) {
+    set_fresnel(lobe, fresnel);
     lobe->albedo_scale = kept;
     lobe->mix_weight = lobe->mix_weight * kept;
 }
 
-void trc_add_correlated_glass(struct trc_setup *c, vvec3 reflected, vvec3 refracted, vvec3 f0,
-                              vvec3 n, vfloat alpha, vfloat eta, uint32_t mode) {
+/* The factor of the lobe's normal; a blend never leaves its ends. */
+static vvec3 smooth_reflectance(const struct trc_lobe *lobe, vfloat cos_o) {
+    if (lobe->fresnel != TRC_FRESNEL_BLEND)
+        return facet_reflectance(lobe, cos_o);
+    return v3_lerp(lobe->f0, lobe->f90, vf_saturate(trc_fresnel_blend(cos_o, lobe->ior)));
+}
+
+void trc_add_correlated_glass(struct trc_setup *c, vvec3 reflected, vvec3 refracted,
+                              const struct trc_fresnel *fresnel, vvec3 n, vfloat alpha, vfloat eta,
+                              uint32_t mode) {
     const vfloat cos_o = v3_dot(n, c->s->wo);
     vfloat kept = vf_one();
     if (distribution_of(mode) == TRC_LOBE_MULTI_GGX) {
@@ -147,13 +153,14 @@ void trc_add_correlated_glass(struct trc_setup *c, vvec3 reflected, vvec3 refrac
     struct trc_lobe *reflect =
         trc_add_dielectric(c, TRC_LOBE_REFLECT, reflected, n, alpha, eta, mode);
     if (reflect)
-        blend_dielectric(reflect, f0, kept);
+        correlate(reflect, fresnel, kept);
     struct trc_lobe *refract =
         trc_add_dielectric(c, TRC_LOBE_REFRACT, refracted, n, alpha, eta, mode);
     if (refract)
-        blend_dielectric(refract, f0, kept);
-    const vfloat blend = vf_saturate(trc_fresnel_blend(cos_o, eta));
-    share_chances(reflect, refract, v3_average(v3_lerp(f0, v3_splat(vf_one()), blend)));
+        correlate(refract, fresnel, kept);
+    const struct trc_lobe *either = reflect ? reflect : refract;
+    if (either)
+        share_chances(reflect, refract, v3_average(smooth_reflectance(either, cos_o)));
 }
 
 /* Cycles refracts at least 1e-4, and so gives that much more than it gets. */
@@ -168,8 +175,8 @@ static void add_glass(struct trc_setup *c, const struct trc_leaf *leaf, vfloat w
     const vfloat alpha = vf_square(number(c, leaf, TRC_AT(GLASS, roughness)));
     const vfloat eta = trc_relative_ior(c, number(c, leaf, TRC_AT(GLASS, ior)));
     if (leaf->mode & TRC_DISTRIBUTION_CORRELATED) {
-        trc_add_correlated_glass(c, tint, tint, v3_splat(trc_fresnel_normal(eta)), n,
-                                 vf_saturate(alpha), eta, leaf->mode);
+        const struct trc_fresnel fresnel = blend_to_white(v3_splat(trc_fresnel_normal(eta)));
+        trc_add_correlated_glass(c, tint, tint, &fresnel, n, vf_saturate(alpha), eta, leaf->mode);
         return;
     }
     if (leaf->mode == TRC_DISTRIBUTION_MULTI_GGX) {

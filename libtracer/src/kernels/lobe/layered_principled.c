@@ -104,7 +104,15 @@ static struct trc_lobe *add_anisotropic(struct trc_setup *c, const struct trc_le
 }
 
 /* Metal: Schlick's approximation with a tint that is whole at 82 degrees (N. Kutz, M. Hasan and D.
- * Edmondson, "Novel Aspects of the Adobe Standard Material", 2021). */
+ * Edmondson, "Novel Aspects of the Adobe Standard Material", 2021): from f0 to white, less f90 *
+ * cos
+ * * (1 - cos)^6. */
+static vvec3 metal_reflectance(const struct trc_lobe *lobe, vfloat cos_m) {
+    const vfloat rest = vf_saturate(vf_one() - cos_m), power = trc_schlick_weight(cos_m);
+    const vvec3 schlick = v3_lerp(lobe->f0, v3_splat(vf_one()), power);
+    return v3_saturate(v3_sub(schlick, v3_scale(lobe->f90, cos_m * power * rest)));
+}
+
 static void layered_metal(struct trc_setup *c, const struct trc_leaf *leaf, vvec3 weight, vvec3 n) {
     struct trc_lobe *lobe = add_anisotropic(c, leaf, weight, n, vf_one());
     if (!lobe)
@@ -114,7 +122,8 @@ static void layered_metal(struct trc_setup *c, const struct trc_leaf *leaf, vvec
                 f0 = v3_saturate(colour(c, leaf, TRC_AT(LAYERED_PRINCIPLED, base_color)));
     const vvec3 edge = v3_saturate(colour(c, leaf, TRC_AT(LAYERED_PRINCIPLED, specular_tint)));
     const vvec3 at_edge = v3_lerp(f0, white, power5);
-    lobe->fresnel = TRC_FRESNEL_F82;
+    lobe->fresnel = TRC_FRESNEL_OWN;
+    lobe->reflectance = metal_reflectance;
     lobe->f0 = f0;
     lobe->f90 = v3_scale(v3_mul(at_edge, v3_sub(white, edge)), vf_set(49.0f / 6.0f) / power5);
     /* Schlick's mean over the hemisphere is 1/21 of the way to white. */
@@ -123,6 +132,20 @@ static void layered_metal(struct trc_setup *c, const struct trc_leaf *leaf, vvec
     lobe->mix_weight = lobe->mix_weight * v3_average(mean);
     if (leaf->mode == TRC_DISTRIBUTION_MULTI_GGX)
         trc_facets_keep_energy(lobe, v3_saturate(mean));
+}
+
+static void layered_glass(struct trc_setup *c, const struct trc_leaf *leaf, vvec3 weight, vvec3 n) {
+    const vvec3 clear = v3_saturate(colour(c, leaf, TRC_AT(LAYERED_PRINCIPLED, base_color)));
+    /* In at one surface and out at another: each has the root of the colour. */
+    const vvec3 tint = v3(vf_sqrt(clear.x), vf_sqrt(clear.y), vf_sqrt(clear.z));
+    const vfloat eta = trc_relative_ior(c, number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, ior)));
+    const vvec3 f0 = v3_scale(colour(c, leaf, TRC_AT(LAYERED_PRINCIPLED, specular_tint)),
+                              trc_fresnel_normal(eta));
+    const struct trc_fresnel fresnel = blend_to_white(v3_saturate(f0));
+    trc_add_correlated_glass(
+        c, weight, v3_mul(weight, tint), &fresnel, n,
+        vf_square(vf_saturate(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, roughness)))), eta,
+        leaf->mode | TRC_DISTRIBUTION_CORRELATED);
 }
 
 /* The dielectric reflection; its index is the one that gives the reflectance level asks for. */
@@ -149,9 +172,8 @@ static vfloat layered_specular(struct trc_setup *c, const struct trc_leaf *leaf,
     const vvec3 tinted = v3_scale(colour(c, leaf, TRC_AT(LAYERED_PRINCIPLED, specular_tint)), f0);
     const vvec3 low =
         v3(vf_max(tinted.x, vf_zero()), vf_max(tinted.y, vf_zero()), vf_max(tinted.z, vf_zero()));
-    lobe->fresnel = TRC_FRESNEL_BLEND;
-    lobe->f0 = low;
-    lobe->f90 = white;
+    const struct trc_fresnel fresnel = blend_to_white(low);
+    set_fresnel(lobe, &fresnel);
     /* What it takes from below: of one bounce where the rest of the bounces is added. */
     const vvec3 albedo = v3_lerp(low, white, trc_dielectric_share(lobe->cos_o, alpha, eta));
     lobe->mix_weight = lobe->mix_weight * v3_average(albedo);
@@ -194,16 +216,7 @@ static void add_layered_principled(struct trc_setup *c, const struct trc_leaf *l
     if (may_exceed_zero(c, leaf, TRC_AT(LAYERED_PRINCIPLED, transmission_weight))) {
         const vfloat transmission =
             vf_saturate(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, transmission_weight)));
-        const vvec3 glass = v3_scale(rest, transmission), clear = v3_saturate(base);
-        /* In at one surface and out at another: each has the root of the colour. */
-        const vvec3 tint = v3(vf_sqrt(clear.x), vf_sqrt(clear.y), vf_sqrt(clear.z));
-        const vfloat eta = trc_relative_ior(c, number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, ior)));
-        const vvec3 f0 = v3_scale(colour(c, leaf, TRC_AT(LAYERED_PRINCIPLED, specular_tint)),
-                                  trc_fresnel_normal(eta));
-        trc_add_correlated_glass(
-            c, glass, v3_mul(glass, tint), v3_saturate(f0), n,
-            vf_square(vf_saturate(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, roughness)))), eta,
-            leaf->mode | TRC_DISTRIBUTION_CORRELATED);
+        layered_glass(c, leaf, v3_scale(rest, transmission), n);
         rest = v3_scale(rest, vf_one() - transmission);
     }
     rest = v3_scale(rest, layered_specular(c, leaf, rest, n));

@@ -38,6 +38,13 @@ struct trc_lobe_model {
                        vfloat u2, vfloat chosen_at, vmask *alive, vmask *crosses);
 };
 
+/* What multiplies the weight at a micro-normal; see the fields of trc_lobe. */
+struct trc_fresnel {
+    uint32_t kind;
+    vvec3 (*reflectance)(const struct trc_lobe *lobe, vfloat cos_m);
+    vvec3 f0, f90;
+};
+
 /* ---- from leaves to lobes ---- */
 
 struct trc_setup {
@@ -145,8 +152,9 @@ struct trc_lobe *trc_add_dielectric(struct trc_setup *c, enum trc_lobe_kind kind
  * keep all energy together. reflected, refracted: colours of the lobes. */
 void trc_add_multi_glass(struct trc_setup *c, vvec3 weight, vvec3 reflected, vvec3 refracted,
                          vvec3 n, vfloat alpha, vfloat eta);
-/* Glass of Cycles 4: both lobes with the factor of the micro-normal, which goes from f0 to 1. */
-void trc_add_correlated_glass(struct trc_setup *c, vvec3 reflected, vvec3 refracted, vvec3 f0,
-                              vvec3 n, vfloat alpha, vfloat eta, uint32_t mode);
+/* Glass of Cycles 4: both lobes with the factor of the micro-normal. */
+void trc_add_correlated_glass(struct trc_setup *c, vvec3 reflected, vvec3 refracted,
+                              const struct trc_fresnel *fresnel, vvec3 n, vfloat alpha, vfloat eta,
+                              uint32_t mode);
 
 #endif
