@@ -942,7 +942,7 @@ NODES = {
          ("FLOAT", "coat_weight"), ("FLOAT", "coat_roughness"), ("FLOAT", "coat_ior"),
          ("COLOR", "coat_tint"), ("NORMAL", "coat_normal"), ("FLOAT", "sheen_weight"),
          ("FLOAT", "sheen_roughness"), ("COLOR", "sheen_tint"), ("COLOR", "emission_color"),
-         ("FLOAT", "emission_strength")),
+         ("FLOAT", "emission_strength"), ("FLOAT", "film_thickness"), ("FLOAT", "film_ior")),
         (("SHADER", "closure"),)),
     NodeType.SHEEN: ("Sheen",
         (("COLOR", "color"), ("FLOAT", "roughness"), ("NORMAL", "normal")),

@@ -67,7 +67,8 @@ _LAYERED_INPUTS = (
     "Anisotropic", "Anisotropic Rotation", "Tangent",
     "Transmission Weight", "Coat Weight", "Coat Roughness", "Coat IOR",
     "Coat Tint", "Coat Normal", "Sheen Weight", "Sheen Roughness",
-    "Sheen Tint", "Emission Color", "Emission Strength")
+    "Sheen Tint", "Emission Color", "Emission Strength",
+    "Thin Film Thickness", "Thin Film IOR")
 
 _SHADER = ("BSDF",)
 
@@ -281,8 +282,7 @@ def _principled(walker, node, sockets):
 def _name_missing(walker, sockets):
     """Warn of inputs of Principled that are in use and mean something else here, or nothing."""
     for name, instead in (("Subsurface", "is rendered as diffuse"),
-                          ("Subsurface Weight", "is rendered as diffuse"),
-                          ("Thin Film Thickness", "is not supported and is left out")):
+                          ("Subsurface Weight", "is rendered as diffuse")):
         if sockets.find(name) is None:
             continue
         value = sockets.get('f', name)

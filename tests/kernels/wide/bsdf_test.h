@@ -12,7 +12,8 @@
 #include "model/nodes.h"
 #include "wide_test.h"
 
-#define OPERANDS 40
+/* Of the node with the most inputs. */
+#define OPERANDS TRC_AT(LAYERED_PRINCIPLED, end)
 
 /* ---- materials of one leaf ---- */
 
@@ -29,6 +30,7 @@ static inline struct trc_operand constant(float value) {
 
 static inline void begin(struct model *m, const char *name, uint32_t type, uint32_t mode,
                          uint32_t count) {
+    assert_true(count <= OPERANDS);
     memset(m, 0, sizeof *m);
     m->name = name;
     m->material.leaf_count = 1;
@@ -174,6 +176,15 @@ static inline struct model layered_glass(uint32_t mode, float roughness, bool ba
     struct model m = layered("layered glass", mode, roughness);
     set(&m, TRC_AT(LAYERED_PRINCIPLED, transmission_weight), 1.0f);
     m.back = back;
+    return m;
+}
+/* Glass and gloss under a film. */
+static inline struct model filmed(uint32_t mode, float roughness, bool back) {
+    struct model m = layered_glass(mode, roughness, back);
+    m.name = "glass under a film";
+    set(&m, TRC_AT(LAYERED_PRINCIPLED, transmission_weight), 0.7f);
+    set(&m, TRC_AT(LAYERED_PRINCIPLED, film_thickness), 400.0f);
+    set(&m, TRC_AT(LAYERED_PRINCIPLED, film_ior), 1.8f);
     return m;
 }
 static inline struct model layered_all(void) {

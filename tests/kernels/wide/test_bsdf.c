@@ -83,6 +83,8 @@ static void sampling_matches_density(void **state) {
         glossy(TRC_DISTRIBUTION_GGX | TRC_DISTRIBUTION_CORRELATED, 0.7f, 0.3f),
         glass(TRC_DISTRIBUTION_MULTI_GGX | TRC_DISTRIBUTION_CORRELATED, 0.7f, 1.5f, true),
         layered_glass(TRC_DISTRIBUTION_GGX, 0.6f, false),
+        filmed(TRC_DISTRIBUTION_GGX, 0.6f, false),
+        filmed(TRC_DISTRIBUTION_MULTI_GGX, 0.6f, true),
         layered_all(),
     };
     int failed = 0;

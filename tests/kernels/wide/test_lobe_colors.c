@@ -2,6 +2,10 @@
  * below them. Ratios of two settings, which formulas of a line tell. */
 #include "bsdf_test.h"
 
+/* For the observer's spectrum alone. */
+#pragma GCC diagnostic ignored "-Wunused-function"
+#include "kernels/program/table.h"
+
 static const float tint[3] = {0.9f, 0.5f, 0.2f};
 
 static float channel(vvec3 a, int c) { return vf_get(c == 0 ? a.x : c == 1 ? a.y : a.z, 0); }
@@ -107,6 +111,81 @@ static void coats_tint_by_the_way_through_them(void **state) {
     }
 }
 
+/* What one polarisation reflects at a wavelength: Airy's formula from the amplitudes of both sides,
+ * at phase between waves that differ by one way through the film and back. */
+static double airy(double upper, double lower, double phase) {
+    const double both = upper * lower, c = 2.0 * both * cos(phase);
+    return (upper * upper + lower * lower + c) / (1.0 + both * both + c);
+}
+
+/* Of unpolarised light, by the channels of Rec.709, integrated over the observer's spectrum; an
+ * even one is white. */
+static void film_reflectance(double cosine, double thickness, double film, double ior,
+                             double rgb[3]) {
+    static const double to_rgb[3][3] = {{3.2404542, -1.5371385, -0.4985314},
+                                        {-0.9692660, 1.8760108, 0.0415560},
+                                        {0.0556434, -0.2040259, 1.0572252}};
+    const double within = sqrt(1.0 - (1.0 - cosine * cosine) / (film * film));
+    const double below = sqrt(1.0 - (1.0 - cosine * cosine) / (ior * ior));
+    const double across[2] = {(cosine - film * within) / (cosine + film * within),
+                              (film * within - ior * below) / (film * within + ior * below)};
+    const double along[2] = {(film * cosine - within) / (film * cosine + within),
+                             (ior * within - film * below) / (ior * within + film * below)};
+    static const double white[3] = {0.9504700, 1.0, 1.0888300};
+    double seen[3] = {0, 0, 0}, all[3] = {0, 0, 0};
+    for (int i = 0; i < 8 * (CIE_COUNT - 1); i++) {
+        const int low = i / 8;
+        const double part = (double)(i % 8) / 8.0;
+        const double wavelength = (double)CIE_FIRST + (double)CIE_STEP * (low + part);
+        const double phase = 4.0 * M_PI * film * thickness * within / wavelength;
+        const double r =
+            0.5 * (airy(across[0], across[1], phase) + airy(along[0], along[1], phase));
+        for (int k = 0; k < 3; k++) {
+            const double weight = (1.0 - part) * (double)cie_observer[low][k] +
+                                  part * (double)cie_observer[low + 1][k];
+            seen[k] += weight * r;
+            all[k] += weight;
+        }
+    }
+    for (int c = 0; c < 3; c++) {
+        double sum = 0.0;
+        for (int k = 0; k < 3; k++)
+            sum += to_rgb[c][k] * white[k] * seen[k] / all[k];
+        rgb[c] = fmin(fmax(sum, 0.0), 1.0);
+    }
+}
+
+/* A film on a dielectric, of several thicknesses and indices; thinner than 30 nm it fades away. */
+static void films_interfere(void **state) {
+    (void)state;
+    static const double thicknesses[] = {15.0, 120.0, 300.0, 550.0, 1100.0};
+    static const double films[] = {1.33, 1.8, 2.4}, cosines[] = {1.0, 0.6, 0.25};
+    const double ior = 1.5;
+    double worst = 0.0, least = 1.0, most = 0.0;
+    for (int n = 0; n < 5 * 3 * 3; n++) {
+        const double thickness = thicknesses[n / 9], film = films[n / 3 % 3],
+                     cosine = cosines[n % 3];
+        struct model plain = layered("bare", TRC_DISTRIBUTION_GGX, 0.3f), filmed = plain;
+        set(&filmed, TRC_AT(LAYERED_PRINCIPLED, film_thickness), (float)thickness);
+        set(&filmed, TRC_AT(LAYERED_PRINCIPLED, film_ior), (float)film);
+        const double x = fmin(thickness / 30.0, 1.0), fade = x * x * (3.0 - 2.0 * x);
+        double want[3], bare[3];
+        film_reflectance(cosine, thickness, 1.0 + (film - 1.0) * fade, ior, want);
+        film_reflectance(cosine, 0.0, 1.0, ior, bare);
+        const vvec3 with = mirrored(&filmed, cosine), without = mirrored(&plain, cosine);
+        for (int c = 0; c < 3; c++) {
+            const double found = bare[c] * (double)channel(with, c) / (double)channel(without, c);
+            worst = fmax(worst, fabs(found - want[c]));
+            least = fmin(least, found / bare[c]);
+            most = fmax(most, found / bare[c]);
+        }
+    }
+    print_message("films: off by at most %.1e; %.2f to %.2f times what the bare surface reflects\n",
+                  worst, least, most);
+    assert_true(worst <= 2e-3);
+    assert_true(least < 0.5 && most > 3.0);
+}
+
 int main(void) {
     if (!test_cpu_can())
         return 77;
@@ -115,6 +194,7 @@ int main(void) {
         cmocka_unit_test(metals_have_their_tint_at_the_edge),
         cmocka_unit_test(layers_darken_by_their_strongest_channel),
         cmocka_unit_test(coats_tint_by_the_way_through_them),
+        cmocka_unit_test(films_interfere),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

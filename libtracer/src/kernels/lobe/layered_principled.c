@@ -2,7 +2,7 @@
  * taking its albedo from what is below.
  *
  * From the top: transparency, sheen, coat with its tint, emission, then metal, glass, and specular
- * reflection over diffuse. Departures: subsurface scattering is diffuse, thin film is left out. */
+ * reflection over diffuse. Departures: subsurface scattering is diffuse. */
 #include "kernels/lobe/facets.h"
 
 /* Whether an input can differ from a value. */
@@ -134,14 +134,33 @@ static void layered_metal(struct trc_setup *c, const struct trc_leaf *leaf, vvec
         trc_facets_keep_energy(lobe, v3_saturate(mean));
 }
 
+/* Puts the film, if there is any, on a dielectric; ior: of what it is seen from. The lanes that
+ * have one. */
+static vmask layered_film(const struct trc_setup *c, const struct trc_leaf *leaf, vfloat ior,
+                          struct trc_fresnel *fresnel) {
+    const uint32_t at = TRC_AT(LAYERED_PRINCIPLED, film_thickness);
+    if (!may_exceed_zero(c, leaf, at))
+        return vm_none();
+    const vfloat thickness = number(c, leaf, at);
+    const vfloat film =
+        vf_max(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, film_ior)), vf_set(TRC_MIN_IOR));
+    const vmask covered = vm_and(c->s->active, vf_gt(thickness, vf_set(TRC_MIN_THIN_FILM)));
+    if (vm_any(covered))
+        trc_thin_film_cover(fresnel, thickness, film / ior);
+    return covered;
+}
+
 static void layered_glass(struct trc_setup *c, const struct trc_leaf *leaf, vvec3 weight, vvec3 n) {
     const vvec3 clear = v3_saturate(colour(c, leaf, TRC_AT(LAYERED_PRINCIPLED, base_color)));
     /* In at one surface and out at another: each has the root of the colour. */
     const vvec3 tint = v3(vf_sqrt(clear.x), vf_sqrt(clear.y), vf_sqrt(clear.z));
-    const vfloat eta = trc_relative_ior(c, number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, ior)));
+    const vfloat ior = number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, ior));
+    const vfloat eta = trc_relative_ior(c, ior);
     const vvec3 f0 = v3_scale(colour(c, leaf, TRC_AT(LAYERED_PRINCIPLED, specular_tint)),
                               trc_fresnel_normal(eta));
-    const struct trc_fresnel fresnel = blend_to_white(v3_saturate(f0));
+    struct trc_fresnel fresnel = blend_to_white(v3_saturate(f0));
+    const vfloat above = vf_select(c->s->backfacing, vf_max(ior, vf_set(TRC_MIN_IOR)), vf_one());
+    layered_film(c, leaf, above, &fresnel);
     trc_add_correlated_glass(
         c, weight, v3_mul(weight, tint), &fresnel, n,
         vf_square(vf_saturate(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, roughness)))), eta,
@@ -163,19 +182,23 @@ static vfloat layered_specular(struct trc_setup *c, const struct trc_leaf *leaf,
         eta = (one + root) / (one - root);
         eta = vf_select(vf_lt(ior, one), vf_rcp(eta), eta);
     }
-    const vmask is_seen = vf_ne(eta, one);
-    struct trc_lobe *lobe = add_anisotropic(c, leaf, v3_where(is_seen, weight), n, eta);
-    if (!lobe)
-        return one;
-    const vfloat alpha = vf_sqrt(lobe->alpha_x * lobe->alpha_y), tiny = vf_set(1e-6f);
-    const vvec3 white = v3_splat(one);
     const vvec3 tinted = v3_scale(colour(c, leaf, TRC_AT(LAYERED_PRINCIPLED, specular_tint)), f0);
     const vvec3 low =
         v3(vf_max(tinted.x, vf_zero()), vf_max(tinted.y, vf_zero()), vf_max(tinted.z, vf_zero()));
-    const struct trc_fresnel fresnel = blend_to_white(low);
+    struct trc_fresnel fresnel = blend_to_white(low);
+    const vmask covered = layered_film(c, leaf, one, &fresnel);
+    const vmask is_seen = vm_or(vf_ne(eta, one), covered);
+    struct trc_lobe *lobe = add_anisotropic(c, leaf, v3_where(is_seen, weight), n, eta);
+    if (!lobe)
+        return one;
     set_fresnel(lobe, &fresnel);
-    /* What it takes from below: of one bounce where the rest of the bounces is added. */
-    const vvec3 albedo = v3_lerp(low, white, trc_dielectric_share(lobe->cos_o, alpha, eta));
+    /* What it takes from below: of one bounce where the rest of the bounces is added; under a film
+     * as if it were smooth, and the rest as without. */
+    const vfloat alpha = vf_sqrt(lobe->alpha_x * lobe->alpha_y), tiny = vf_set(1e-6f);
+    const vvec3 white = v3_splat(one);
+    vvec3 albedo = v3_lerp(low, white, trc_dielectric_share(lobe->cos_o, alpha, eta));
+    if (vm_any(covered))
+        albedo = v3_select(covered, facet_reflectance(lobe, lobe->cos_o), albedo);
     lobe->mix_weight = lobe->mix_weight * v3_average(albedo);
     vfloat kept = one;
     if (leaf->mode == TRC_DISTRIBUTION_MULTI_GGX) {

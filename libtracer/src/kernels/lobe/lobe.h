@@ -138,6 +138,14 @@ struct trc_lobe *trc_add_ashikhmin(struct trc_setup *c, vvec3 weight);
 /* kernels/lobe/clearcoat.c; coat: its strength. */
 void trc_add_clearcoat(struct trc_setup *c, vvec3 weight, vvec3 n, vfloat roughness, vfloat coat);
 
+/* kernels/lobe/thin_film.c */
+
+/* Nanometres up to which a film is none. */
+#define TRC_MIN_THIN_FILM 0.1f
+/* Puts a film on a dielectric whose fresnel goes from f0 to white. thickness: nanometres, lanes of
+ * none stay as they are; ior: of the film over that of what is above it. */
+void trc_thin_film_cover(struct trc_fresnel *fresnel, vfloat thickness, vfloat ior);
+
 /* kernels/lobe/glass.c */
 
 /* Index seen from the side of wo. */

@@ -109,6 +109,7 @@
 #define trc_split_apply(...) TRC_KERNEL(trc_split_apply)(__VA_ARGS__)
 #define trc_split_find(...) TRC_KERNEL(trc_split_find)(__VA_ARGS__)
 #define trc_surface_fetch(...) TRC_KERNEL(trc_surface_fetch)(__VA_ARGS__)
+#define trc_thin_film_cover(...) TRC_KERNEL(trc_thin_film_cover)(__VA_ARGS__)
 #define trc_tile_memory_bytes(...) TRC_KERNEL(trc_tile_memory_bytes)(__VA_ARGS__)
 #define trc_tile_render(...) TRC_KERNEL(trc_tile_render)(__VA_ARGS__)
 #define trc_tile_sort(...) TRC_KERNEL(trc_tile_sort)(__VA_ARGS__)

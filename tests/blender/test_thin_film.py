@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The thin film of Principled beside Cycles: spheres in a white world, whose pixels show what a film
+reflects at every angle."""
+
+import numpy as np
+import pytest
+
+_SMOOTH = {"Base Color": (0.0, 0.0, 0.0), "Roughness": 0.0, "Thin Film IOR": 1.33}
+_FILMS = {
+    "20 nm": {**_SMOOTH, "Thin Film Thickness": 20.0},
+    "120 nm": {**_SMOOTH, "Thin Film Thickness": 120.0},
+    "350 nm": {**_SMOOTH, "Thin Film Thickness": 350.0},
+    "350 nm, index 2": {**_SMOOTH, "Thin Film Thickness": 350.0, "Thin Film IOR": 2.0},
+    "800 nm on index 2": {**_SMOOTH, "Thin Film Thickness": 800.0, "IOR": 2.0},
+    "rough": {**_SMOOTH, "Thin Film Thickness": 350.0, "Thin Film IOR": 1.8, "Roughness": 0.5},
+    "over a base": {**_SMOOTH, "Thin Film Thickness": 350.0, "Thin Film IOR": 1.8,
+                    "Base Color": (0.8, 0.5, 0.2)},
+    "tinted": {**_SMOOTH, "Thin Film Thickness": 350.0, "Specular Tint": (1.0, 0.3, 0.1),
+               "Specular IOR Level": 0.8},
+    "glass": {**_SMOOTH, "Thin Film Thickness": 350.0, "Thin Film IOR": 1.8, "Transmission Weight": 1.0,
+              "Base Color": (0.2, 0.5, 0.9)},
+}
+TOLERANCE = 0.012
+SAMPLES = 256
+SIZE = (48, 48)
+
+
+def inside_films(films):
+    """{name: pictures by both engines and, by Volley, without the film}."""
+    import scenes
+    pictures = {}
+    for name, inputs in films.items():
+        scene = scenes.empty(size=SIZE)
+        if not scenes.has_node("ShaderNodeBsdfPrincipled", inputs):
+            continue
+        scene.world.color = (1.0, 1.0, 1.0)
+        scenes.camera(location=(0.0, -5.0, 0.0), type='ORTHO', ortho_scale=2.2)
+        made = scenes.material("Film", "ShaderNodeBsdfPrincipled",
+                               **{key.replace(" ", "_"): value for key, value in inputs.items()})
+        scenes.sphere(material=made)
+        both = scenes.by_both(SAMPLES)
+        scenes.shader_of(made).inputs["Thin Film Thickness"].default_value = 0.0
+        scenes.set_engine('VOLLEY', SAMPLES)
+        pictures[name] = both + [scenes.render()]
+    return pictures
+
+
+@pytest.fixture(scope="module")
+def films(blender_of_module):
+    return blender_of_module.run(inside_films, _FILMS, timeout=300)
+
+
+@pytest.mark.parametrize("name", _FILMS)
+def test_film(films, name):
+    if name not in films:
+        pytest.skip("this Blender has no thin film")
+    # Means of 4 x 4 pixels: what rounds off the triangles and the noise of rough ones.
+    ours, theirs, bare = (picture[..., :3].reshape(12, 4, 12, 4, 3).mean(axis=(1, 3))
+                          for picture in films[name])
+    off, shift = np.abs(ours - theirs), np.abs(theirs - bare).max()
+    worst = off.max()
+    print(f"{name:20} off by at most {worst:.4f}, mean {off.mean():.5f}; the film makes {shift:.3f}")
+    assert worst < TOLERANCE
+    assert shift > 2.5 * worst
