@@ -368,6 +368,7 @@ class DistributionType(IntEnum):
     SHARP = 3
     ASHIKHMIN = 4
     CORRELATED = 16
+    FILMED_METAL = 32
 
 
 class BlendMode(IntEnum):
@@ -893,7 +894,8 @@ NODES = {
          ("NORMAL", "normal"), ("TANGENT", "tangent")),
         (("SHADER", "closure"),)),
     NodeType.GLASS: ("Glass",
-        (("COLOR", "color"), ("FLOAT", "roughness"), ("FLOAT", "ior"), ("NORMAL", "normal")),
+        (("COLOR", "color"), ("FLOAT", "roughness"), ("FLOAT", "ior"), ("NORMAL", "normal"),
+         ("FLOAT", "film_thickness"), ("FLOAT", "film_ior")),
         (("SHADER", "closure"),)),
     NodeType.REFRACTION: ("Refraction",
         (("COLOR", "color"), ("FLOAT", "roughness"), ("FLOAT", "ior"), ("NORMAL", "normal")),

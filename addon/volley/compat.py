@@ -36,6 +36,9 @@ HAS_CORRELATED_MICROFACETS = bpy.app.version >= (4, 0, 0)
 # Its camera hits no longer choose faint lobes more often than their share.
 CHOOSES_LOBES_PLAINLY = bpy.app.version >= (4, 0, 0)
 
+# Thin films lie on metals, too, and thin ones do not fade away; seen in 5.2, not in 4.3.
+HAS_FILMED_METAL = bpy.app.version >= (5, 0, 0)
+
 # Rough diffuse surfaces keep their energy from 4.3 on.
 KEEPS_DIFFUSE_ENERGY = bpy.app.version >= (4, 3, 0)
 

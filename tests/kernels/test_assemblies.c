@@ -13,13 +13,13 @@
 
 static trc_id add_material(trc_scene scene, uint32_t type, float grey, float roughness, float ior) {
     const bool is_glass = type == TRC_NODE_GLASS, is_plain = type == TRC_NODE_TRANSPARENT;
-    const uint32_t count = is_plain ? 1 : is_glass ? 4 : type == TRC_NODE_GLOSSY ? 6 : 3;
+    const uint32_t count = is_plain ? 1 : is_glass || type == TRC_NODE_GLOSSY ? 6 : 3;
     trc_node_input inputs[6] = {{.node = -1, .value = {grey, 0.8f * grey, 0.6f * grey}},
                                 {.node = -1, .value = {roughness}},
                                 {.node = -1, .value = {is_glass ? ior : 0.0f}},
                                 {.node = is_glass ? -2 : -1},
-                                {.node = -2},
-                                {.node = -2}};
+                                {.node = is_glass ? -1 : -2},
+                                {.node = is_glass ? -1 : -2}};
     if (type == TRC_NODE_DIFFUSE)
         inputs[2].node = -2;
     const trc_node node = {.type = type, .input_count = count};

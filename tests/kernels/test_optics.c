@@ -18,14 +18,19 @@ enum { INTEGRATORS = 2 };
 
 /* GLASS or REFRACTION, ideal; ior: the index within its surface over that outside. */
 static trc_id add_dielectric(trc_scene scene, uint32_t type, float ior) {
-    const trc_node_input inputs[4] = {
-        {.node = -1, .value = {1, 1, 1}}, {.node = -1}, {.node = -1, .value = {ior}}, {.node = -2}};
-    const trc_node node = {.type = type, .mode = TRC_DISTRIBUTION_SHARP, .input_count = 4};
+    const trc_node_input inputs[6] = {{.node = -1, .value = {1, 1, 1}},
+                                      {.node = -1},
+                                      {.node = -1, .value = {ior}},
+                                      {.node = -2},
+                                      {.node = -1},
+                                      {.node = -1}};
+    const uint32_t count = type == TRC_NODE_GLASS ? 6 : 4; /* it may have a film */
+    const trc_node node = {.type = type, .mode = TRC_DISTRIBUTION_SHARP, .input_count = count};
     const trc_material_desc desc = {.struct_size = sizeof desc,
                                     .node_count = 1,
                                     .nodes = &node,
                                     .inputs = inputs,
-                                    .input_count = 4};
+                                    .input_count = count};
     trc_id id = 0;
     assert_ok(trc_material_create(scene, &desc, &id));
     return id;

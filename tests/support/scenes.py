@@ -114,6 +114,14 @@ def independent_seeds():
         cycles.sampling_pattern = 'SOBOL_BURLEY'
 
 
+def light_world(color):
+    """A world of one colour, by nodes: those of Blender 5 have no colour without."""
+    world = bpy.context.scene.world
+    world.use_nodes = True
+    background = next(node for node in world.node_tree.nodes if node.bl_idname == "ShaderNodeBackground")
+    background.inputs["Color"].default_value = (*color, 1.0)
+
+
 def camera(location=(0.0, -6.0, 0.0), rotation=(math.pi / 2, 0.0, 0.0), **settings):
     """The scene's camera; by default it looks along +Y from 6 m before the origin."""
     made = link("Camera", bpy.data.cameras.new("Camera"))

@@ -376,7 +376,8 @@ static void test_traits_of_simple_shaders(void **state) {
     ADD(TRC_NODE_GLOSSY, TRC_DISTRIBUTION_SHARP, white, value(.5f), value(0), value(0), n, n);
     assert_int_equal(traits(), S);
     graph_clear();
-    ADD(TRC_NODE_GLASS, TRC_DISTRIBUTION_GGX, white, value(-.5f), value(1.5f), n);
+    ADD(TRC_NODE_GLASS, TRC_DISTRIBUTION_GGX, white, value(-.5f), value(1.5f), n, value(0),
+        value(0));
     assert_int_equal(traits(), S | R);
     graph_clear();
     ADD(TRC_NODE_REFRACTION, TRC_DISTRIBUTION_GGX, white, value(.5f), value(1.5f), n);

@@ -14,7 +14,7 @@ from ..abi import (BlendMode, BumpMode, ClampType, DiffuseModel, DistributionTyp
                    ImageExtension, ImageInterpolation, ImageProjection, MappingType, MathOperation as Math,
                    ModeFlags, NodeType, NormalMapSpace, RampInterpolation, SeparateMode, SpaceId, TableSize,
                    TangentSource, ToonComponent, VectorOperation as Vector)
-from ..compat import HAS_CORRELATED_MICROFACETS, KEEPS_DIFFUSE_ENERGY, LEAVES_BUMPS, RAMP_STEPS
+from ..compat import HAS_CORRELATED_MICROFACETS, HAS_FILMED_METAL, KEEPS_DIFFUSE_ENERGY, LEAVES_BUMPS, RAMP_STEPS
 from . import tangents
 from .converters import CONVERTERS, instance_value
 from .derived import ISLAND, POINTINESS
@@ -83,6 +83,11 @@ def _microfacets(node):
     return None if distribution is None else distribution | _CORRELATED
 
 
+def _layered(node):
+    """The mode of the layered Principled."""
+    return (_distribution(node) or 0) | (DistributionType.FILMED_METAL if HAS_FILMED_METAL else 0)
+
+
 def _diffuse_model(_node):
     return DiffuseModel.KEEPS_ENERGY if KEEPS_DIFFUSE_ENERGY else DiffuseModel.LOSES_ENERGY
 
@@ -119,7 +124,9 @@ _SPECS = {
     "ShaderNodeBsdfGlossy": Spec(
         NodeType.GLOSSY, ("Color", "Roughness", "Anisotropy", "Rotation", "Normal", "Tangent"), _SHADER,
         _microfacets),
-    "ShaderNodeBsdfGlass": Spec(NodeType.GLASS, ("Color", "Roughness", "IOR", "Normal"), _SHADER, _microfacets),
+    "ShaderNodeBsdfGlass": Spec(
+        NodeType.GLASS, ("Color", "Roughness", "IOR", "Normal", "Thin Film Thickness", "Thin Film IOR"), _SHADER,
+        _microfacets),
     "ShaderNodeBsdfRefraction": Spec(
         NodeType.REFRACTION, ("Color", "Roughness", "IOR", "Normal"), _SHADER, _microfacets),
     "ShaderNodeBsdfTransparent": Spec(NodeType.TRANSPARENT, ("Color",), _SHADER),
@@ -276,7 +283,8 @@ def _principled(walker, node, sockets):
     values = sockets.all_of(kind, inputs)
     _name_missing(walker, sockets)
     _note_generated(walker, node, kind, values)
-    return {"BSDF": Value('s', walker.emit(kind, values, _distribution(node) or 0), 0)}
+    mode = _layered(node) if is_layered else _distribution(node) or 0
+    return {"BSDF": Value('s', walker.emit(kind, values, mode), 0)}
 
 
 def _name_missing(walker, sockets):
@@ -308,9 +316,10 @@ def _metallic(walker, node, sockets):
         "base_color": base, "metallic": one, "roughness": sockets.get('f', "Roughness"), "ior": one,
         "alpha": one, "normal": sockets.get('v', "Normal"), "specular_tint": edge,
         "anisotropic": sockets.get('f', "Anisotropy"), "anisotropic_rotation": sockets.get('f', "Rotation"),
-        "tangent": sockets.get('v', "Tangent")})
+        "tangent": sockets.get('v', "Tangent"), "film_thickness": sockets.get('f', "Thin Film Thickness"),
+        "film_ior": sockets.get('f', "Thin Film IOR")})
     _note_generated(walker, node, NodeType.LAYERED_PRINCIPLED, values)
-    return {"BSDF": Value('s', walker.emit(NodeType.LAYERED_PRINCIPLED, values, _distribution(node) or 0), 0)}
+    return {"BSDF": Value('s', walker.emit(NodeType.LAYERED_PRINCIPLED, values, _layered(node)), 0)}
 
 
 _EDGE_COSINE = 1.0 / 7.0  # where the edge tint rules: 82 degrees

@@ -177,7 +177,10 @@ enum trc_distribution_type {
     TRC_DISTRIBUTION_ASHIKHMIN = 4,
     /* Bit for Glossy, Glass and Refraction, as Blender 4.0 and later: masking and shadowing of one
      * height, Fresnel by the micro-normal, the energy of MULTI_GGX by a factor. */
-    TRC_DISTRIBUTION_CORRELATED = 16
+    TRC_DISTRIBUTION_CORRELATED = 16,
+    /* Bit for Principled from 4.0 on, as Blender 5: thin films lie on metal, too, and interfere in
+     * full from 1 nm on in place of 30. */
+    TRC_DISTRIBUTION_FILMED_METAL = 32
 };
 
 enum trc_blend_mode {

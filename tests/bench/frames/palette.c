@@ -44,9 +44,9 @@ static int32_t reflecting(struct graph *g, float roughness) {
 }
 
 static int32_t glass(struct graph *g) {
-    return node_add(
-        g, TRC_NODE_GLASS, 4,
-        (const trc_node_input[]){number(0.95f), number(0.0f), number(GLASS_INDEX), standard()});
+    return node_add(g, TRC_NODE_GLASS, 6,
+                    (const trc_node_input[]){number(0.95f), number(0.0f), number(GLASS_INDEX),
+                                             standard(), number(0.0f), number(0.0f)});
 }
 
 static int32_t mixed(struct graph *g, float factor, int32_t first, int32_t second) {

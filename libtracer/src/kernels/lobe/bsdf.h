@@ -50,8 +50,10 @@ struct trc_lobe {
     vvec3 n;          /* the lobe's normal */
     vvec3 tangent;    /* unit, orthogonal to n, anisotropic lobes only; bitangent is n x tangent */
     vfloat alpha_x, alpha_y;
-    vfloat ior;       /* refraction: relative index, transmitted over incident side */
-    vfloat roughness; /* Oren-Nayar sigma; Principled's roughness; velvet: 1 / sigma^2 */
+    vfloat ior;       /* refraction: relative index, transmitted over incident side; metal under a
+                         film: the film's */
+    vfloat roughness; /* Oren-Nayar sigma; Principled's roughness; velvet: 1 / sigma^2; metal under
+                         a film: its thickness */
     /* Toon, f0: angle of full light, angle of its fading, cosine of both. Fibres, f0: the two
      * coefficients of their transform. Oren-Nayar that keeps energy, f0: factor of the part that
      * scatters more than once. */

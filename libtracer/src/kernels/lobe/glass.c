@@ -45,6 +45,10 @@ vfloat trc_relative_ior(const struct trc_setup *c, vfloat ior) {
     return vf_select(c->s->backfacing, vf_rcp(eta), eta);
 }
 
+vfloat trc_ior_above(const struct trc_setup *c, vfloat ior) {
+    return vf_select(c->s->backfacing, vf_max(ior, vf_set(TRC_MIN_IOR)), vf_one());
+}
+
 struct trc_lobe *trc_add_dielectric(struct trc_setup *c, enum trc_lobe_kind kind, vvec3 weight,
                                     vvec3 n, vfloat alpha, vfloat eta, uint32_t mode) {
     static const struct trc_lobe_model refraction = {.kind = TRC_LOBE_REFRACT,
@@ -173,9 +177,11 @@ static void add_glass(struct trc_setup *c, const struct trc_leaf *leaf, vfloat w
     const vvec3 tint = v3_scale(colour(c, leaf, TRC_AT(GLASS, color)), weight);
     const vvec3 n = trc_leaf_normal(c, leaf, TRC_AT(GLASS, normal));
     const vfloat alpha = vf_square(number(c, leaf, TRC_AT(GLASS, roughness)));
-    const vfloat eta = trc_relative_ior(c, number(c, leaf, TRC_AT(GLASS, ior)));
+    const vfloat ior = number(c, leaf, TRC_AT(GLASS, ior)), eta = trc_relative_ior(c, ior);
     if (leaf->mode & TRC_DISTRIBUTION_CORRELATED) {
-        const struct trc_fresnel fresnel = blend_to_white(v3_splat(trc_fresnel_normal(eta)));
+        struct trc_fresnel fresnel = blend_to_white(v3_splat(trc_fresnel_normal(eta)));
+        trc_thin_film_cover(c, leaf, TRC_AT(GLASS, film_thickness), trc_ior_above(c, ior),
+                            TRC_WHOLE_FILM_5, &fresnel);
         trc_add_correlated_glass(c, tint, tint, &fresnel, n, vf_saturate(alpha), eta, leaf->mode);
         return;
     }

@@ -103,21 +103,26 @@ static struct trc_lobe *add_anisotropic(struct trc_setup *c, const struct trc_le
     return lobe;
 }
 
-/* Metal: Schlick's approximation with a tint that is whole at 82 degrees (N. Kutz, M. Hasan and D.
- * Edmondson, "Novel Aspects of the Adobe Standard Material", 2021): from f0 to white, less f90 *
- * cos
- * * (1 - cos)^6. */
+/* Nanometres from which a film interferes in full. */
+static float whole_film(const struct trc_leaf *leaf) {
+    return leaf->mode & TRC_DISTRIBUTION_FILMED_METAL ? TRC_WHOLE_FILM_5 : TRC_WHOLE_FILM_4;
+}
+
+static uint32_t distribution(const struct trc_leaf *leaf) {
+    return leaf->mode & ~(uint32_t)TRC_DISTRIBUTION_FILMED_METAL;
+}
+
 static vvec3 metal_reflectance(const struct trc_lobe *lobe, vfloat cos_m) {
-    const vfloat rest = vf_saturate(vf_one() - cos_m), power = trc_schlick_weight(cos_m);
-    const vvec3 schlick = v3_lerp(lobe->f0, v3_splat(vf_one()), power);
-    return v3_saturate(v3_sub(schlick, v3_scale(lobe->f90, cos_m * power * rest)));
+    return v3(trc_metal_fresnel(lobe->f0.x, lobe->f90.x, cos_m),
+              trc_metal_fresnel(lobe->f0.y, lobe->f90.y, cos_m),
+              trc_metal_fresnel(lobe->f0.z, lobe->f90.z, cos_m));
 }
 
 static void layered_metal(struct trc_setup *c, const struct trc_leaf *leaf, vvec3 weight, vvec3 n) {
     struct trc_lobe *lobe = add_anisotropic(c, leaf, weight, n, vf_one());
     if (!lobe)
         return;
-    const vfloat one = vf_one(), power5 = vf_set(0.46266436f); /* (6 / 7)^5 */
+    const vfloat one = vf_one(), power5 = vf_set(TRC_METAL_EDGE_POWER);
     const vvec3 white = v3_splat(one),
                 f0 = v3_saturate(colour(c, leaf, TRC_AT(LAYERED_PRINCIPLED, base_color)));
     const vvec3 edge = v3_saturate(colour(c, leaf, TRC_AT(LAYERED_PRINCIPLED, specular_tint)));
@@ -129,25 +134,16 @@ static void layered_metal(struct trc_setup *c, const struct trc_leaf *leaf, vvec
     /* Schlick's mean over the hemisphere is 1/21 of the way to white. */
     const vvec3 mean = v3_sub(v3_lerp(f0, white, vf_set(1.0f / 21.0f)),
                               v3_scale(lobe->f90, vf_set(1.0f / 126.0f)));
-    lobe->mix_weight = lobe->mix_weight * v3_average(mean);
-    if (leaf->mode == TRC_DISTRIBUTION_MULTI_GGX)
+    vvec3 albedo = mean;
+    if (leaf->mode & TRC_DISTRIBUTION_FILMED_METAL) {
+        const vmask covered = trc_thin_film_cover_metal(
+            c, leaf, TRC_AT(LAYERED_PRINCIPLED, film_thickness), whole_film(leaf), lobe);
+        if (vm_any(covered))
+            albedo = v3_select(covered, facet_reflectance(lobe, lobe->cos_o), mean);
+    }
+    lobe->mix_weight = lobe->mix_weight * v3_average(albedo);
+    if (distribution(leaf) == TRC_DISTRIBUTION_MULTI_GGX)
         trc_facets_keep_energy(lobe, v3_saturate(mean));
-}
-
-/* Puts the film, if there is any, on a dielectric; ior: of what it is seen from. The lanes that
- * have one. */
-static vmask layered_film(const struct trc_setup *c, const struct trc_leaf *leaf, vfloat ior,
-                          struct trc_fresnel *fresnel) {
-    const uint32_t at = TRC_AT(LAYERED_PRINCIPLED, film_thickness);
-    if (!may_exceed_zero(c, leaf, at))
-        return vm_none();
-    const vfloat thickness = number(c, leaf, at);
-    const vfloat film =
-        vf_max(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, film_ior)), vf_set(TRC_MIN_IOR));
-    const vmask covered = vm_and(c->s->active, vf_gt(thickness, vf_set(TRC_MIN_THIN_FILM)));
-    if (vm_any(covered))
-        trc_thin_film_cover(fresnel, thickness, film / ior);
-    return covered;
 }
 
 static void layered_glass(struct trc_setup *c, const struct trc_leaf *leaf, vvec3 weight, vvec3 n) {
@@ -159,12 +155,12 @@ static void layered_glass(struct trc_setup *c, const struct trc_leaf *leaf, vvec
     const vvec3 f0 = v3_scale(colour(c, leaf, TRC_AT(LAYERED_PRINCIPLED, specular_tint)),
                               trc_fresnel_normal(eta));
     struct trc_fresnel fresnel = blend_to_white(v3_saturate(f0));
-    const vfloat above = vf_select(c->s->backfacing, vf_max(ior, vf_set(TRC_MIN_IOR)), vf_one());
-    layered_film(c, leaf, above, &fresnel);
+    trc_thin_film_cover(c, leaf, TRC_AT(LAYERED_PRINCIPLED, film_thickness), trc_ior_above(c, ior),
+                        whole_film(leaf), &fresnel);
     trc_add_correlated_glass(
         c, weight, v3_mul(weight, tint), &fresnel, n,
         vf_square(vf_saturate(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, roughness)))), eta,
-        leaf->mode | TRC_DISTRIBUTION_CORRELATED);
+        distribution(leaf) | TRC_DISTRIBUTION_CORRELATED);
 }
 
 /* The dielectric reflection; its index is the one that gives the reflectance level asks for. */
@@ -186,7 +182,8 @@ static vfloat layered_specular(struct trc_setup *c, const struct trc_leaf *leaf,
     const vvec3 low =
         v3(vf_max(tinted.x, vf_zero()), vf_max(tinted.y, vf_zero()), vf_max(tinted.z, vf_zero()));
     struct trc_fresnel fresnel = blend_to_white(low);
-    const vmask covered = layered_film(c, leaf, one, &fresnel);
+    const vmask covered = trc_thin_film_cover(c, leaf, TRC_AT(LAYERED_PRINCIPLED, film_thickness),
+                                              one, whole_film(leaf), &fresnel);
     const vmask is_seen = vm_or(vf_ne(eta, one), covered);
     struct trc_lobe *lobe = add_anisotropic(c, leaf, v3_where(is_seen, weight), n, eta);
     if (!lobe)
@@ -201,7 +198,7 @@ static vfloat layered_specular(struct trc_setup *c, const struct trc_leaf *leaf,
         albedo = v3_select(covered, facet_reflectance(lobe, lobe->cos_o), albedo);
     lobe->mix_weight = lobe->mix_weight * v3_average(albedo);
     vfloat kept = one;
-    if (leaf->mode == TRC_DISTRIBUTION_MULTI_GGX) {
+    if (distribution(leaf) == TRC_DISTRIBUTION_MULTI_GGX) {
         const vvec3 mean = v3_lerp(low, white, mean_blend(eta));
         const vfloat before = v3_max(lobe->weight);
         trc_facets_keep_energy(lobe, v3_saturate(mean));

@@ -142,14 +142,24 @@ void trc_add_clearcoat(struct trc_setup *c, vvec3 weight, vvec3 n, vfloat roughn
 
 /* Nanometres up to which a film is none. */
 #define TRC_MIN_THIN_FILM 0.1f
-/* Puts a film on a dielectric whose fresnel goes from f0 to white. thickness: nanometres, lanes of
- * none stay as they are; ior: of the film over that of what is above it. */
-void trc_thin_film_cover(struct trc_fresnel *fresnel, vfloat thickness, vfloat ior);
+/* And from which its waves interfere in full, in Blender 4 and 5. */
+#define TRC_WHOLE_FILM_4 30.0f
+#define TRC_WHOLE_FILM_5 1.0f
+/* Puts the film of a leaf, if there is one, on a dielectric whose fresnel goes from f0 to white.
+ * at: the input that is its thickness, its index is the next; above: index of what it is seen from;
+ * whole: one of those above. Returns the lanes that have a film. */
+vmask trc_thin_film_cover(const struct trc_setup *c, const struct trc_leaf *leaf, uint32_t at,
+                          vfloat above, float whole, struct trc_fresnel *fresnel);
+/* The same on a lobe of metal, whose fresnel is that of trc_metal_fresnel. */
+vmask trc_thin_film_cover_metal(const struct trc_setup *c, const struct trc_leaf *leaf, uint32_t at,
+                                float whole, struct trc_lobe *lobe);
 
 /* kernels/lobe/glass.c */
 
 /* Index seen from the side of wo. */
 vfloat trc_relative_ior(const struct trc_setup *c, vfloat ior);
+/* Of what is on the side of wo. */
+vfloat trc_ior_above(const struct trc_setup *c, vfloat ior);
 /* Of a Fresnel factor what is reflected: the part of a lobe too light to be kept goes to the other.
  */
 vfloat trc_reflected_part(vfloat f);

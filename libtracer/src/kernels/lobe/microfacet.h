@@ -44,6 +44,21 @@ TRC_INLINE vfloat trc_schlick_weight(vfloat u) {
     return m2 * m2 * m;
 }
 
+/* Metal: Schlick's approximation with a dip before the edge (N. Kutz, M. Hasan and D. Edmondson,
+ * "Novel Aspects of the Adobe Standard Material", 2021): from f0 to white, less dip * cos * (1 -
+ * cos)^6. */
+#define TRC_METAL_EDGE (1.0f / 7.0f) /* the cosine at which the dip is given: 82 degrees */
+TRC_INLINE vfloat trc_metal_fresnel(vfloat f0, vfloat dip, vfloat cos_m) {
+    const vfloat rest = vf_saturate(vf_one() - cos_m), power = trc_schlick_weight(cos_m);
+    return vf_saturate(vf_lerp(f0, vf_one(), power) - dip * (cos_m * power * rest));
+}
+/* What Schlick's approximation makes of f0 there, and the dip that lowers it to a reflectance. */
+#define TRC_METAL_EDGE_POWER 0.46266436f /* (6 / 7)^5 */
+TRC_INLINE vfloat trc_metal_dip(vfloat f0, vfloat at_edge) {
+    const vfloat schlick = vf_lerp(f0, vf_one(), vf_set(TRC_METAL_EDGE_POWER));
+    return (schlick - at_edge) * (vf_set(49.0f / 6.0f) / vf_set(TRC_METAL_EDGE_POWER));
+}
+
 /* Refracted direction of wo at the unit normal m (m . wo > 0); lanes of total reflection are not in
  * the result's mask. eta as above. */
 TRC_INLINE vmask trc_refract(vvec3 wo, vvec3 m, vfloat eta, vvec3 *wi) {
