@@ -21,10 +21,11 @@ CRYPTOMATTE_KINDS = 3
 CRYPTOMATTE_LAYER_RANKS = 2
 MAX_CRYPTOMATTE_LAYERS = 8
 MAX_CRYPTOMATTE_DEPTH = 16
+SUMS_END = 194
 VERSION_MAJOR = 0
 VERSION_MINOR = 1
 VERSION_PATCH = 0
-ABI_VERSION = 3
+ABI_VERSION = 4
 
 
 class StatusCode(IntEnum):
@@ -598,6 +599,11 @@ class ProgressState(IntEnum):
     CANCELLED = 2
 
 
+class SumsId(IntEnum):
+    CATCHERS = 192
+    HALVES = 193
+
+
 class FeatureFlags(IntFlag):
     LENS = 1
     CAMERA_MOTION = 2
@@ -745,7 +751,7 @@ class RenderDesc(Structure):
                 ("mist_start", c_float), ("mist_depth", c_float), ("mist_falloff", c_float),
                 ("cryptomattes", c_uint32), ("cryptomatte_depth", c_uint32), ("aov_value_count", c_uint32),
                 ("aov_color_count", c_uint32), ("light_group_count", c_uint32), ("denoise", c_uint32),
-                ("reserved", c_uint32))
+                ("sample_offset", c_uint32), ("sample_subset", c_uint32), ("reserved", c_uint32))
 
 
 class RenderProgress(Structure):
@@ -757,6 +763,18 @@ class RenderProgress(Structure):
                 ("tiles_done", c_uint32), ("tile_count", c_uint32), ("version", c_uint32),
                 ("reserved", c_uint32), ("seconds_trace", c_double), ("seconds_shade", c_double),
                 ("seconds_other", c_double))
+
+
+class Sums(Structure):
+    __slots__ = ()
+    _fields_ = (("struct_size", c_uint32), ("number", c_uint32), ("values", c_void_p),
+                ("value_count", c_uint64))
+
+
+class PartDesc(Structure):
+    __slots__ = ()
+    _fields_ = (("struct_size", c_uint32), ("sample_offset", c_uint32), ("sample_subset", c_uint32),
+                ("sums_count", c_uint32), ("sums", POINTER(Sums)))
 
 
 class SceneDesc(Structure):
@@ -784,9 +802,9 @@ CONSTANTS = {"TRC_MAX_LIGHT_GROUPS": MAX_LIGHT_GROUPS, "TRC_MAX_KEYS": MAX_KEYS,
              "TRC_MAX_AOVS": MAX_AOVS, "TRC_CRYPTOMATTE_KINDS": CRYPTOMATTE_KINDS,
              "TRC_CRYPTOMATTE_LAYER_RANKS": CRYPTOMATTE_LAYER_RANKS,
              "TRC_MAX_CRYPTOMATTE_LAYERS": MAX_CRYPTOMATTE_LAYERS,
-             "TRC_MAX_CRYPTOMATTE_DEPTH": MAX_CRYPTOMATTE_DEPTH, "TRC_VERSION_MAJOR": VERSION_MAJOR,
-             "TRC_VERSION_MINOR": VERSION_MINOR, "TRC_VERSION_PATCH": VERSION_PATCH,
-             "TRC_ABI_VERSION": ABI_VERSION}
+             "TRC_MAX_CRYPTOMATTE_DEPTH": MAX_CRYPTOMATTE_DEPTH, "TRC_SUMS_END": SUMS_END,
+             "TRC_VERSION_MAJOR": VERSION_MAJOR, "TRC_VERSION_MINOR": VERSION_MINOR,
+             "TRC_VERSION_PATCH": VERSION_PATCH, "TRC_ABI_VERSION": ABI_VERSION}
 
 # Enumerations, with what their members' names begin with in C.
 ENUMERATIONS = {StatusCode: "TRC_", IsaId: "TRC_ISA_", CameraType: "TRC_CAMERA_",
@@ -810,15 +828,15 @@ ENUMERATIONS = {StatusCode: "TRC_", IsaId: "TRC_ISA_", CameraType: "TRC_CAMERA_"
                 MaterialFlags: "TRC_MATERIAL_", AlphaMode: "TRC_ALPHA_", IntegratorType: "TRC_INTEGRATOR_",
                 SamplerType: "TRC_SAMPLER_", AssemblyType: "TRC_ASSEMBLY_", FilterType: "TRC_FILTER_",
                 PassId: "TRC_PASS_", PassRange: "TRC_PASS_", CryptomatteKind: "TRC_CRYPTOMATTE_",
-                ProgressState: "TRC_PROGRESS_", FeatureFlags: "TRC_FEATURE_"}
+                ProgressState: "TRC_PROGRESS_", SumsId: "TRC_SUMS_", FeatureFlags: "TRC_FEATURE_"}
 
 STRUCTURES = {"trc_camera_desc": CameraDesc, "trc_corner_attribute": CornerAttribute,
               "trc_mesh_desc": MeshDesc, "trc_instance_desc": InstanceDesc, "trc_light_desc": LightDesc,
               "trc_world_desc": WorldDesc, "trc_node_input": NodeInput, "trc_node": Node,
               "trc_material_desc": MaterialDesc, "trc_image_desc": ImageDesc, "trc_rays": Rays,
               "trc_hits": Hits, "trc_reader_desc": ReaderDesc, "trc_render_desc": RenderDesc,
-              "trc_render_progress": RenderProgress, "trc_scene_desc": SceneDesc,
-              "trc_scene_stats": SceneStats}
+              "trc_render_progress": RenderProgress, "trc_sums": Sums, "trc_part_desc": PartDesc,
+              "trc_scene_desc": SceneDesc, "trc_scene_stats": SceneStats}
 
 # Result and arguments.
 FUNCTIONS = {
@@ -873,6 +891,13 @@ FUNCTIONS = {
     "trc_render_cancel": (c_int32, (c_uint64,)),
     "trc_render_read": (c_int32, (c_uint64, c_uint32, c_void_p, c_uint64)),
     "trc_pass_channels": (c_uint32, (c_uint32,)),
+    "trc_sums_channels": (c_uint32, (c_uint64, c_uint32)),
+    "trc_sums_read": (c_int32, (c_uint64, c_uint32, c_void_p, c_uint64)),
+    "trc_sums_default": (Sums, ()),
+    "trc_part_desc_default": (PartDesc, ()),
+    "trc_merge_start": (c_int32, (POINTER(RenderDesc), c_uint32, POINTER(c_uint64))),
+    "trc_merge_add": (c_int32, (c_uint64, POINTER(PartDesc))),
+    "trc_merge_finish": (c_int32, (c_uint64,)),
     "trc_render_destroy": (c_int32, (c_uint64,)),
     "trc_scene_desc_default": (SceneDesc, ()),
     "trc_scene_create": (c_int32, (POINTER(SceneDesc), POINTER(c_uint64))),

@@ -64,12 +64,12 @@ static void ranks_are_sorted(void **state) {
         for (uint32_t k = 0, first = 0; k < IDS; first += IDS - k++)
             if (id >= first && id < first + IDS - k) {
                 expected[k] += 0.5f;
-                trc_matte_add(mattes, PLACES, (float)(k + 1), 0.5f);
+                trc_matte_add(mattes, PLACES, (float)(k + 1), 2);
             }
     }
     for (uint32_t layer = 0; layer < PLACES / 2; layer++) {
         float out[4];
-        trc_mattes_read(mattes, PLACES, layer, SAMPLES, out);
+        trc_mattes_read(mattes, PLACES, layer, 4 * SAMPLES, out);
         for (uint32_t i = 0; i < 2; i++) {
             const uint32_t rank = 2 * layer + i;
             assert_true(out[2 * i] == (rank < IDS ? (float)(rank + 1) : 0.0f));
@@ -93,11 +93,11 @@ static void ties_stand_by_bits(void **state) {
     for (uint32_t order = 0; order < ORDERS; order++) {
         struct trc_matte mattes[IDS + 1] = {{0}};
         uint32_t left[IDS] = {ids[0], ids[1], ids[2], ids[3]};
-        trc_matte_add(mattes, IDS + 1, 5.0f, 3.0f); /* the largest of all */
+        trc_matte_add(mattes, IDS + 1, 5.0f, 3); /* the largest of all */
         for (uint32_t k = 0, digits = order; k < IDS; digits /= IDS - k, k++) {
             const uint32_t pick = k + digits % (IDS - k), bits = left[pick];
             left[pick] = left[k];
-            trc_matte_add(mattes, IDS + 1, id_of(bits), 2.0f);
+            trc_matte_add(mattes, IDS + 1, id_of(bits), 2);
         }
         float out[3][4];
         for (uint32_t layer = 0; layer < 3; layer++)
@@ -111,10 +111,10 @@ static void ties_stand_by_bits(void **state) {
 static void full_tables_keep_what_they_have(void **state) {
     (void)state;
     struct trc_matte mattes[2] = {{0}};
-    trc_matte_add(mattes, 2, 3.0f, 1.0f);
-    trc_matte_add(mattes, 2, 4.0f, 1.0f);
-    trc_matte_add(mattes, 2, 5.0f, 9.0f);
-    trc_matte_add(mattes, 2, 4.0f, 1.0f);
+    trc_matte_add(mattes, 2, 3.0f, 1);
+    trc_matte_add(mattes, 2, 4.0f, 1);
+    trc_matte_add(mattes, 2, 5.0f, 9);
+    trc_matte_add(mattes, 2, 4.0f, 1);
     float out[4];
     trc_mattes_read(mattes, 2, 0, 4, out);
     assert_true(out[0] == 4.0f && out[1] == 0.5f && out[2] == 3.0f && out[3] == 0.25f);

@@ -129,6 +129,12 @@ typedef struct trc_render_desc {
      * samples. Takes about 200 bytes a pixel, and 24 more for each pass of light. Until it is done,
      * and after a cancel, passes are without it. 0: off */
     uint32_t denoise;
+    /* A part of the picture: samples [sample_offset, sample_offset + sample_subset) of
+     * sample_count, with the numbers that they have in the whole; 0 samples: all from sample_offset
+     * on. Progress and what is read are of these samples alone. Parts are put together by
+     * trc_merge_add; a part itself is not reconstructed, and takes all samples where
+     * noise_threshold says to stop. */
+    uint32_t sample_offset, sample_subset;
     uint32_t reserved; /* 0 */
 } trc_render_desc;
 
@@ -186,6 +192,68 @@ TRC_API trc_status trc_render_read(trc_render render, uint32_t pass, float *pixe
 
 /* Channels of a pass, 0 for an unknown one. */
 TRC_API uint32_t trc_pass_channels(uint32_t pass);
+
+/* ---- parts of a picture, put together ----
+ *
+ * What a film has of a part are sums, of which there are as many as passes, by their numbers, and
+ * those below. Sums of a part that go to another process and are added to a film there give the
+ * picture that one render of all samples gives: the same bits, unless a sum has rounding errors
+ * (samples of a pixel that differ by more than about 2^28), then within one unit in the last place.
+ * Cryptomattes have the same bits as long as no pixel of a part meets more than
+ * TRC_MAX_CRYPTOMATTE_DEPTH + 2 ids of a kind. */
+
+/* Sums beside those of passes. Those of TRC_PASS_SAMPLE_COUNT are there of every film; mattes of a
+ * kind are together at TRC_PASS_CRYPTOMATTE(kind, 0). */
+enum trc_sums_id {
+    TRC_SUMS_CATCHERS = 192, /* what shadow catchers got */
+    TRC_SUMS_HALVES = 193    /* what reconstruction needs */
+};
+#define TRC_SUMS_END 194 /* all numbers of sums are below it */
+
+/* Doubles that a render's film keeps of each pixel under that number; 0: none, or no such render.
+ */
+TRC_API uint32_t trc_sums_channels(trc_render render, uint32_t sums);
+
+/* Copies sums of a render that has ended, in the order of trc_render_read. double_count must be
+ * crop width * height * trc_sums_channels. */
+TRC_API trc_status trc_sums_read(trc_render render, uint32_t sums, double *sums_out,
+                                 uint64_t double_count);
+
+typedef struct trc_sums {
+    uint32_t struct_size; /* of this structure; checked */
+    uint32_t number;
+    const double *values; /* as trc_sums_read gives them */
+    uint64_t value_count;
+} trc_sums;
+
+/* None. */
+TRC_API trc_sums trc_sums_default(void);
+
+typedef struct trc_part_desc {
+    uint32_t struct_size;                  /* of this structure; checked */
+    uint32_t sample_offset, sample_subset; /* its samples, at least one */
+    uint32_t sums_count;
+    const trc_sums *sums; /* each that a film of such a part has, once, in any order */
+} trc_part_desc;
+
+/* No samples and no sums yet. */
+TRC_API trc_part_desc trc_part_desc_default(void);
+
+/* A render whose samples come by trc_merge_add instead of from a scene; the caller owns it until
+ * trc_render_destroy. desc: of the whole, with no sample_offset and sample_subset; settings of
+ * rendering are not read. has_catchers: 1 if the parts have TRC_SUMS_CATCHERS, else 0. It runs, and
+ * trc_render_wait does not return, until trc_merge_finish. TOO_LARGE as trc_render_start. */
+TRC_API trc_status trc_merge_start(const trc_render_desc *desc, uint32_t has_catchers,
+                                   trc_render *render_out);
+
+/* Adds a part, which begins where the one before it ended. With adaptive sampling the pixels that
+ * would have stopped do not take it; then parts have to end at each count of samples at which
+ * pixels may stop. INVALID_ARGUMENT leaves the film as it is. Not from two threads at once. */
+TRC_API trc_status trc_merge_add(trc_render render, const trc_part_desc *part);
+
+/* All parts are there, or INVALID_ARGUMENT: the picture is reconstructed, where desc says so, in
+ * the background, and the render ends. */
+TRC_API trc_status trc_merge_finish(trc_render render);
 
 /* Cancels, waits and frees. The handle becomes stale. */
 TRC_API trc_status trc_render_destroy(trc_render render);

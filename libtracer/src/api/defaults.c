@@ -118,6 +118,12 @@ trc_render_progress trc_render_progress_default(void) {
     return (trc_render_progress){.struct_size = sizeof(trc_render_progress)};
 }
 
+trc_sums trc_sums_default(void) { return (trc_sums){.struct_size = sizeof(trc_sums)}; }
+
+trc_part_desc trc_part_desc_default(void) {
+    return (trc_part_desc){.struct_size = sizeof(trc_part_desc)};
+}
+
 trc_rays trc_rays_default(void) {
     return (trc_rays){.struct_size = sizeof(trc_rays), .visibility = TRC_VISIBLE_ALL};
 }

@@ -59,6 +59,12 @@ static trc_status check_sampling(const trc_render_desc *desc) {
     return trc_check_enum(desc->progressive, 2, "progressive");
 }
 
+static trc_status check_range(const trc_render_desc *desc) {
+    TRC_TRY(trc_check_count(desc->sample_offset, 0, desc->sample_count - 1, "sample_offset"));
+    return trc_check_count(desc->sample_subset, 0, desc->sample_count - desc->sample_offset,
+                           "sample_subset");
+}
+
 static trc_status check_mist(const trc_render_desc *desc) {
     TRC_TRY(trc_check_float(desc->mist_start, 0.0f, FLT_MAX, "mist_start"));
     TRC_TRY(trc_check_float(desc->mist_depth, 0.0f, FLT_MAX, "mist_depth"));
@@ -89,6 +95,7 @@ static trc_status check_render(const trc_render_desc *desc) {
     TRC_TRY(trc_check_struct(desc, sizeof *desc, "trc_render_desc"));
     TRC_TRY(check_frame(desc));
     TRC_TRY(check_sampling(desc));
+    TRC_TRY(check_range(desc));
     return check_film(desc);
 }
 
@@ -164,6 +171,61 @@ trc_status trc_render_read(trc_render render, uint32_t pass, float *pixels_out,
     const uint64_t fp_state = trc_fp_enter();
     const trc_status status = trc_render_state_read(object, pass, pixels_out, float_count);
     trc_fp_leave(fp_state);
+    trc_handle_release(render);
+    return status;
+}
+
+/* ---- parts ---- */
+
+uint32_t trc_sums_channels(trc_render render, uint32_t sums) {
+    void *object;
+    if (trc_handle_acquire(render, TRC_HANDLE_RENDER, &object) != TRC_OK)
+        return 0;
+    const uint32_t channels = trc_render_state_sums_channels(object, sums);
+    trc_handle_release(render);
+    return channels;
+}
+
+trc_status trc_sums_read(trc_render render, uint32_t sums, double *sums_out,
+                         uint64_t double_count) {
+    void *object;
+    TRC_TRY(trc_handle_acquire(render, TRC_HANDLE_RENDER, &object));
+    const trc_status status = trc_render_state_read_sums(object, sums, sums_out, double_count);
+    trc_handle_release(render);
+    return status;
+}
+
+trc_status trc_merge_start(const trc_render_desc *desc, uint32_t has_catchers,
+                           trc_render *render_out) {
+    TRC_TRY(check_render(desc));
+    TRC_TRY(trc_check_enum(has_catchers, 2, "has_catchers"));
+    TRC_TRY(trc_check_out(render_out, sizeof *render_out, "render_out"));
+    if (desc->sample_offset || desc->sample_subset)
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "parts are merged into a whole");
+    const trc_render_desc resolved = trc_render_resolve(desc);
+    struct trc_render_state *render;
+    TRC_TRY(trc_render_state_merge(&resolved, has_catchers, &render));
+    const trc_status status = trc_handle_create(TRC_HANDLE_RENDER, render, render_out);
+    if (status != TRC_OK)
+        trc_render_state_destroy(render);
+    return status;
+}
+
+trc_status trc_merge_add(trc_render render, const trc_part_desc *part) {
+    TRC_TRY(trc_check_struct(part, sizeof *part, "trc_part_desc"));
+    void *object;
+    TRC_TRY(trc_handle_acquire(render, TRC_HANDLE_RENDER, &object));
+    const uint64_t fp_state = trc_fp_enter();
+    const trc_status status = trc_render_state_add(object, part);
+    trc_fp_leave(fp_state);
+    trc_handle_release(render);
+    return status;
+}
+
+trc_status trc_merge_finish(trc_render render) {
+    void *object;
+    TRC_TRY(trc_handle_acquire(render, TRC_HANDLE_RENDER, &object));
+    const trc_status status = trc_render_state_finish(object);
     trc_handle_release(render);
     return status;
 }

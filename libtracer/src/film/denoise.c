@@ -20,6 +20,8 @@ static bool is_reconstructed(const trc_render_desc *desc, uint32_t pass) {
 }
 
 uint64_t trc_film_half_bytes(const trc_render_desc *desc, bool has_catchers) {
+    if (trc_film_is_part(desc))
+        return sizeof(struct trc_half);
     uint64_t bytes = sizeof(struct trc_half) + TRC_DENOISE_PIXEL_BYTES;
     if (has_catchers)
         bytes += sizeof(struct trc_caught);
@@ -36,6 +38,8 @@ trc_status trc_film_add_halves(const trc_render_desc *desc, struct trc_film *fil
     film->half_count = stops || desc->sample_count < 2 ? 0 : desc->sample_count / 2;
     film->halves = trc_alloc_zeroed(pixels, sizeof *film->halves);
     bool ok = film->halves != NULL;
+    if (trc_film_is_part(desc)) /* is not reconstructed */
+        return ok ? TRC_OK : trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for reconstruction");
     for (uint32_t pass = 0; ok && pass < TRC_SUM_COUNT; pass++) {
         if (!is_reconstructed(desc, pass))
             continue;

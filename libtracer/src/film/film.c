@@ -43,7 +43,9 @@ trc_status trc_film_create(const trc_render_desc *desc, struct trc_film *film) {
                             .shows_shadows = desc->passes >> TRC_PASS_SHADOW_CATCHER & 1,
                             .shows_noise = desc->passes >> TRC_PASS_NOISY_COMBINED & 1,
                             .is_transparent = desc->film_transparent,
-                            .matte_count = trc_film_matte_count(desc)};
+                            .matte_count = trc_film_matte_count(desc),
+                            .matte_units = trc_matte_units(desc->sample_count),
+                            .sample_offset = desc->sample_offset};
     TRC_TRY(trc_film_check_budget(made.width, made.height, trc_film_pixel_bytes(desc), 0));
     const size_t pixels = (size_t)made.width * made.height;
     /* Tiles read the counts before they write them, and the sums only where there is a count. */

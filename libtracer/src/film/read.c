@@ -74,8 +74,8 @@ static void read_mattes(const struct reading *r, struct row row) {
     const struct trc_matte *mattes = film->mattes[number / TRC_MAX_CRYPTOMATTE_LAYERS];
     for (uint64_t i = row.first; i < row.end; i++)
         trc_mattes_read(mattes + i * film->matte_count, film->matte_count,
-                        number % TRC_MAX_CRYPTOMATTE_LAYERS, load_count(film, i),
-                        r->out + i * TRC_MATTE_CHANNELS);
+                        number % TRC_MAX_CRYPTOMATTE_LAYERS,
+                        load_count(film, i) * film->matte_units, r->out + i * TRC_MATTE_CHANNELS);
 }
 
 static void read_counts(const struct reading *r, struct row row) {

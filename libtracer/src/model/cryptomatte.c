@@ -56,8 +56,8 @@ static int is_before(const struct trc_matte *a, const struct trc_matte *b) {
     return a->weight != b->weight ? a->weight > b->weight : bits_of(a->id) < bits_of(b->id);
 }
 
-void trc_mattes_read(const struct trc_matte *mattes, uint32_t count, uint32_t layer,
-                     uint32_t samples, float out[TRC_MATTE_CHANNELS]) {
+void trc_mattes_read(const struct trc_matte *mattes, uint32_t count, uint32_t layer, uint32_t whole,
+                     float out[TRC_MATTE_CHANNELS]) {
     struct trc_matte ranked[TRC_MAX_CRYPTOMATTE_DEPTH + TRC_SPARE_MATTES];
     uint32_t used = 0;
     for (uint32_t i = 0; i < count; i++) {
@@ -72,11 +72,11 @@ void trc_mattes_read(const struct trc_matte *mattes, uint32_t count, uint32_t la
         ranked[k] = m;
     }
     memset(out, 0, TRC_MATTE_CHANNELS * sizeof *out);
-    for (uint32_t i = 0; samples && i < TRC_CRYPTOMATTE_LAYER_RANKS; i++) {
+    for (uint32_t i = 0; whole && i < TRC_CRYPTOMATTE_LAYER_RANKS; i++) {
         const uint32_t rank = TRC_CRYPTOMATTE_LAYER_RANKS * layer + i;
         if (rank >= used)
             break;
-        const float coverage = ranked[rank].weight / (float)samples;
+        const float coverage = (float)ranked[rank].weight / (float)whole;
         out[2 * i] = ranked[rank].id;
         out[2 * i + 1] = coverage < 1.0f ? coverage : 1.0f;
     }

@@ -11,5 +11,26 @@ bool trc_film_has_sums(const trc_render_desc *desc, uint32_t pass) {
 uint32_t trc_film_matte_count(const trc_render_desc *desc) {
     const uint32_t layers =
         (desc->cryptomatte_depth + TRC_CRYPTOMATTE_LAYER_RANKS - 1) / TRC_CRYPTOMATTE_LAYER_RANKS;
-    return desc->cryptomattes ? layers * TRC_CRYPTOMATTE_LAYER_RANKS + TRC_SPARE_MATTES : 0;
+    if (!desc->cryptomattes)
+        return 0;
+    return (trc_film_is_part(desc) ? TRC_MAX_CRYPTOMATTE_DEPTH
+                                   : layers * TRC_CRYPTOMATTE_LAYER_RANKS) +
+           TRC_SPARE_MATTES;
+}
+
+void trc_film_keep_half(const struct trc_film *film, size_t pixel, const double sum[4],
+                        uint32_t count) {
+    static const uint32_t passes[] = {TRC_PASS_DENOISING_ALBEDO, TRC_PASS_DENOISING_NORMAL,
+                                      TRC_PASS_DENOISING_DEPTH};
+    struct trc_half *half = &film->halves[pixel];
+    for (int c = 0; c < 4; c++)
+        half->light[c] = (float)sum[c];
+    for (int c = 0; film->caught && c < 3; c++)
+        half->light[c] = (float)(sum[c] + film->caught[pixel].blocked[c]);
+    float *feature = half->features;
+    for (int i = 0; i < 3; i++)
+        for (uint32_t k = 0; k < trc_pass_info_of(passes[i])->sums; k++)
+            *feature++ =
+                (float)film->sums[passes[i]][trc_pass_info_of(passes[i])->sums * pixel + k];
+    half->count = count;
 }

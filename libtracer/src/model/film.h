@@ -60,6 +60,7 @@ struct trc_film {
                                     row first. TRC_PASS_KIND_FIRST: the value itself */
     struct trc_matte *mattes[TRC_CRYPTOMATTE_KINDS]; /* matte_count * width * height, or NULL */
     uint32_t matte_count;                            /* places of a pixel's table; 0: no mattes */
+    uint32_t matte_units;                            /* weight of a whole sample in them */
     uint32_t *sample_counts;                         /* width * height */
     atomic_uint *sequences;    /* of the tiles: odd while one is written (model/sequence.h) */
     bool shows_counts;         /* they are a pass */
@@ -69,6 +70,7 @@ struct trc_film {
     struct trc_half *halves;   /* width * height, or NULL: no reconstruction */
     uint32_t half_count;       /* samples of the first half; 0: the largest power of two below
                                   their count */
+    uint32_t sample_offset;    /* samples of a pixel before those of this film, to tell halves by */
     struct trc_clean_film clean;
     uint32_t is_clean; /* atomic: the clean film is what is read */
     bool shows_noise;  /* the plain Combined is a pass */
@@ -80,16 +82,28 @@ static inline atomic_uint *trc_film_sequence(const struct trc_film *film, uint32
     return &film->sequences[row * trc_film_tiles(film->width) + x / TRC_TILE_SIZE];
 }
 
-/* Whether a pixel's first half of samples ends with so many. */
+/* Whether a pixel's first half of samples ends with so many of this film. */
 static inline bool trc_film_ends_half(const struct trc_film *film, uint32_t count) {
+    count += film->sample_offset;
     return film->half_count ? count == film->half_count : count && !(count & (count - 1));
+}
+
+/* Keeps the sums of a pixel's first half of samples: what it has so far, count samples of which sum
+ * is Combined. */
+void trc_film_keep_half(const struct trc_film *film, size_t pixel, const double sum[4],
+                        uint32_t count);
+
+/* Whether desc is that of a part of the samples. */
+static inline bool trc_film_is_part(const trc_render_desc *desc) {
+    return desc->sample_offset || (desc->sample_subset && desc->sample_subset < desc->sample_count);
 }
 
 /* Whether the film has sums of a pass: it is asked for by the resolved desc, and is of a kind that
  * has them. */
 bool trc_film_has_sums(const trc_render_desc *desc, uint32_t pass);
 
-/* Places of a pixel's table of mattes; 0: none are asked for. */
+/* Places of a pixel's table of mattes; 0: none are asked for. A part has all, as what it leaves out
+ * may be what other parts have much of. */
 uint32_t trc_film_matte_count(const trc_render_desc *desc);
 
 #endif

@@ -11,6 +11,7 @@
 #include "core/checks.h"
 #include "core/core.h"
 #include "core/thread.h"
+#include "film/part.h"
 #include "model/filter.h"
 #include "model/kernels.h"
 #include "model/sobol.h"
@@ -50,6 +51,7 @@ struct trc_render_state {
     uint32_t tiles_done;    /* with all their batches */
     uint64_t denoise_done;  /* tiles of all phases of reconstruction */
     uint64_t pixel_samples_done;
+    uint32_t merged_count; /* samples that parts brought */
     struct trc_tile_counts counts;
     uint32_t version, state;
     uint32_t running_count; /* threads that have not ended, and the starter */
@@ -72,6 +74,8 @@ trc_render_desc trc_render_resolve(const trc_render_desc *desc) {
         if (r.min_samples >= r.sample_count)
             r.noise_threshold = 0.0f;
     }
+    if (!r.sample_subset)
+        r.sample_subset = r.sample_count - r.sample_offset;
     if (!r.thread_count)
         r.thread_count = trc_thread_processor_count();
     uint32_t *depths[] = {&r.max_depth, &r.max_transparent_depth, &r.max_glossy_depth,
@@ -133,7 +137,8 @@ static void finish_item(struct trc_render_state *render, uint32_t tile, uint32_t
     pthread_mutex_unlock(&render->lock);
 }
 
-/* Samples [begin, end) of a tile; false if the render was cancelled before the end. */
+/* Samples [begin, end) of a tile, counted from the render's first; false if the render was
+ * cancelled before the end. */
 static bool render_samples(struct trc_render_state *render, const struct trc_tile_area *area,
                            uint32_t begin, uint32_t end, void *memory) {
     struct trc_tile_job job = {
@@ -147,8 +152,8 @@ static bool render_samples(struct trc_render_state *render, const struct trc_til
         .y = area->y,
         .width = area->width,
         .height = area->height,
-        .sample_begin = begin,
-        .sample_end = end,
+        .sample_begin = render->schedule.sample_begin + begin,
+        .sample_end = render->schedule.sample_begin + end,
         .memory = memory,
         .cancel = &render->cancel,
     };
@@ -308,16 +313,21 @@ fail:
     return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "the system has no resources for a render");
 }
 
+/* Pixels of a part cannot tell when to stop: that takes all samples before it. */
+static bool is_adaptive(const trc_render_desc *desc) {
+    return desc->noise_threshold > 0.0f && !trc_film_is_part(desc);
+}
+
 /* Whether all parts of a frame can be had at once, before the first is taken. */
-static trc_status check_memory(const trc_render_desc *desc, const struct trc_snapshot *snapshot,
+static trc_status check_memory(const trc_render_desc *desc, bool has_catchers,
                                uint64_t worker_bytes) {
     uint64_t pixel_bytes = trc_film_pixel_bytes(desc);
-    if (snapshot->features & TRC_FEATURE_SHADOW_CATCHERS)
+    if (has_catchers)
         pixel_bytes += sizeof(struct trc_caught);
-    if (desc->noise_threshold > 0.0f)
+    if (is_adaptive(desc))
         pixel_bytes += sizeof(struct trc_adaptive_pixel);
     if (desc->denoise)
-        pixel_bytes += trc_film_half_bytes(desc, snapshot->features & TRC_FEATURE_SHADOW_CATCHERS);
+        pixel_bytes += trc_film_half_bytes(desc, has_catchers);
     const uint64_t tiles =
         (uint64_t)trc_film_tiles(desc->crop_width) * trc_film_tiles(desc->crop_height);
     const uint64_t workers = desc->thread_count < tiles ? desc->thread_count : tiles;
@@ -327,23 +337,35 @@ static trc_status check_memory(const trc_render_desc *desc, const struct trc_sna
                                      TRC_SOBOL_TABLE_BYTES);
 }
 
-static trc_status take_memory(struct trc_render_state *render) {
-    const trc_render_desc *desc = &render->desc;
-    const uint32_t features = render->snapshot->features;
+/* Bytes that a thread of the render works in: kernels take samples of a scene, or reconstruct. */
+static size_t worker_memory_bytes(const struct trc_render_state *render) {
     const struct trc_kernels *kernels = render->kernels;
-    size_t memory_bytes = kernels->tile_memory_bytes(desc, render->snapshot);
-    if (desc->denoise && kernels->denoise_memory_bytes() > memory_bytes)
-        memory_bytes = kernels->denoise_memory_bytes();
-    TRC_TRY(check_memory(desc, render->snapshot, memory_bytes));
+    size_t bytes =
+        render->snapshot ? kernels->tile_memory_bytes(&render->desc, render->snapshot) : 1;
+    if (render->desc.denoise && kernels->denoise_memory_bytes() > bytes)
+        bytes = kernels->denoise_memory_bytes();
+    return bytes;
+}
+
+static trc_status take_film(struct trc_render_state *render, bool has_catchers) {
+    const trc_render_desc *desc = &render->desc;
     TRC_TRY(trc_film_create(desc, &render->film));
-    if (features & TRC_FEATURE_SHADOW_CATCHERS)
+    if (has_catchers)
         TRC_TRY(trc_film_add_catchers(&render->film));
-    if (desc->noise_threshold > 0.0f)
+    if (is_adaptive(desc))
         TRC_TRY(trc_adaptive_create(desc, &render->adaptive));
-    if (desc->denoise) {
+    if (desc->denoise)
         TRC_TRY(trc_film_add_halves(desc, &render->film));
+    if (desc->denoise && !trc_film_is_part(desc))
         TRC_TRY(trc_denoise_create(&render->film, &render->denoise));
-    }
+    return TRC_OK;
+}
+
+static trc_status take_memory(struct trc_render_state *render, bool has_catchers) {
+    const trc_render_desc *desc = &render->desc;
+    const size_t memory_bytes = worker_memory_bytes(render);
+    TRC_TRY(check_memory(desc, has_catchers, memory_bytes));
+    TRC_TRY(take_film(render, has_catchers));
     TRC_TRY(trc_schedule_create(desc, &render->schedule));
     const struct trc_schedule *schedule = &render->schedule;
     TRC_TRY(trc_sobol_table_create(&render->sampler_table));
@@ -382,8 +404,10 @@ static void free_memory(struct trc_render_state *render) {
 /* NO_THREAD only if not one could be started. */
 static trc_status start_workers(struct trc_render_state *render) {
     trc_status status = TRC_OK;
+    pthread_mutex_lock(&render->lock);
     render->time_start = trc_seconds();
     render->running_count = 1; /* this thread, so that early ends do not end the render */
+    pthread_mutex_unlock(&render->lock);
     for (uint32_t i = 0; i < render->worker_count && status == TRC_OK; i++) {
         struct worker *worker = &render->workers[i];
         pthread_mutex_lock(&render->lock);
@@ -399,25 +423,37 @@ static trc_status start_workers(struct trc_render_state *render) {
     return render->started_count ? TRC_OK : status;
 }
 
-trc_status trc_render_state_start(struct trc_snapshot *snapshot, const trc_render_desc *desc,
-                                  struct trc_render_state **render_out) {
+/* A render without threads yet. snapshot: NULL, or the caller's reference, which it takes. */
+static trc_status create(struct trc_snapshot *snapshot, const trc_render_desc *desc,
+                         bool has_catchers, struct trc_render_state **render_out) {
     struct trc_render_state *render = trc_alloc_zeroed(1, sizeof *render);
-    if (!render)
+    if (!render) {
+        trc_snapshot_release(snapshot);
         return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for a render");
-    render->snapshot = trc_snapshot_retain(snapshot);
+    }
+    render->snapshot = snapshot;
     render->desc = *desc;
     render->kernels = trc_kernels_current();
     atomic_init(&render->cancel, 0);
     atomic_init(&render->next_item, 0);
     atomic_init(&render->next_denoise_item, 0);
-    trc_status status = take_memory(render);
+    trc_status status = take_memory(render, has_catchers);
     if (status == TRC_OK)
         status = init_sync(render);
     if (status != TRC_OK) {
         free_memory(render);
         return status;
     }
-    status = start_workers(render);
+    *render_out = render;
+    return TRC_OK;
+}
+
+trc_status trc_render_state_start(struct trc_snapshot *snapshot, const trc_render_desc *desc,
+                                  struct trc_render_state **render_out) {
+    struct trc_render_state *render;
+    TRC_TRY(create(trc_snapshot_retain(snapshot), desc,
+                   snapshot->features & TRC_FEATURE_SHADOW_CATCHERS, &render));
+    const trc_status status = start_workers(render);
     if (status != TRC_OK) {
         trc_render_state_destroy(render);
         return status;
@@ -426,12 +462,88 @@ trc_status trc_render_state_start(struct trc_snapshot *snapshot, const trc_rende
     return TRC_OK;
 }
 
+/* ---- merging parts ---- */
+
+trc_status trc_render_state_merge(const trc_render_desc *desc, bool has_catchers,
+                                  struct trc_render_state **render_out) {
+    TRC_TRY(create(NULL, desc, has_catchers, render_out));
+    struct trc_render_state *render = *render_out;
+    render->time_start = trc_seconds();
+    const struct trc_schedule *schedule = &render->schedule;
+    atomic_store(&render->next_item, (uint64_t)schedule->batch_count * schedule->tile_count);
+    return TRC_OK;
+}
+
+/* What pixels decide after so many samples. */
+static void decide(struct trc_render_state *render, uint32_t samples) {
+    for (uint32_t tile = 0; tile < render->schedule.tile_count; tile++) {
+        const struct trc_tile_area a = trc_schedule_tile(&render->schedule, tile);
+        if (trc_adaptive_tile_runs(&render->adaptive, a.x, a.y, a.width, a.height))
+            trc_adaptive_update(&render->adaptive, a.x, a.y, a.width, a.height, samples);
+    }
+}
+
+static trc_status check_part(const struct trc_render_state *render, const trc_part_desc *part) {
+    const uint32_t begin = part->sample_offset, count = render->schedule.sample_count;
+    if (render->state != TRC_PROGRESS_RUNNING || render->tiles_done) {
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "the merge has ended");
+    }
+    if (begin != render->merged_count) {
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "the part begins at sample %u, not at %u",
+                        begin, render->merged_count);
+    }
+    TRC_TRY(trc_check_count(part->sample_subset, 1, count - begin, "sample_subset"));
+    if (!render->adaptive.pixels)
+        return TRC_OK;
+    const uint32_t stage = trc_adaptive_next_stage(&render->adaptive, begin);
+    if (stage < begin + part->sample_subset) {
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT,
+                        "with adaptive sampling a part has to end at sample %u", stage);
+    }
+    return TRC_OK;
+}
+
+trc_status trc_render_state_add(struct trc_render_state *render, const trc_part_desc *part) {
+    TRC_TRY(check_part(render, part));
+    TRC_TRY(trc_film_add_part(&render->film, render->adaptive.pixels, part));
+    render->merged_count += part->sample_subset;
+    if (render->adaptive.pixels &&
+        render->merged_count == trc_adaptive_next_stage(&render->adaptive, part->sample_offset))
+        decide(render, render->merged_count);
+    pthread_mutex_lock(&render->lock);
+    render->pixel_samples_done =
+        (uint64_t)render->merged_count * render->schedule.width * render->schedule.height;
+    render->version++;
+    pthread_mutex_unlock(&render->lock);
+    return TRC_OK;
+}
+
+trc_status trc_render_state_finish(struct trc_render_state *render) {
+    const struct trc_schedule *schedule = &render->schedule;
+    if (render->merged_count != schedule->sample_count) {
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "parts are missing: samples %u to %u",
+                        render->merged_count, schedule->sample_count);
+    }
+    if (render->tiles_done)
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "the merge has ended");
+    pthread_mutex_lock(&render->lock);
+    render->tiles_done = schedule->tile_count;
+    render->lowest_batch = schedule->batch_count;
+    pthread_mutex_unlock(&render->lock);
+    return start_workers(render);
+}
+
 /* ---- what the caller sees ---- */
 
 void trc_render_state_cancel(struct trc_render_state *render) {
     pthread_mutex_lock(&render->lock);
     atomic_store(&render->cancel, 1);
     pthread_cond_broadcast(&render->tile_done);
+    if (render->state == TRC_PROGRESS_RUNNING && !render->running_count) { /* an unfinished merge */
+        render->state = TRC_PROGRESS_CANCELLED;
+        render->time_end = trc_seconds();
+        pthread_cond_broadcast(&render->ended);
+    }
     pthread_mutex_unlock(&render->lock);
 }
 
@@ -507,4 +619,18 @@ void trc_render_state_poll(struct trc_render_state *render, trc_render_progress 
 trc_status trc_render_state_read(struct trc_render_state *render, uint32_t pass, float *pixels_out,
                                  uint64_t float_count) {
     return trc_film_read(&render->film, pass, render->desc.film_exposure, pixels_out, float_count);
+}
+
+uint32_t trc_render_state_sums_channels(const struct trc_render_state *render, uint32_t sums) {
+    return trc_film_sums_channels(&render->film, sums);
+}
+
+trc_status trc_render_state_read_sums(struct trc_render_state *render, uint32_t sums,
+                                      double *sums_out, uint64_t double_count) {
+    pthread_mutex_lock(&render->lock);
+    const bool is_running = render->state == TRC_PROGRESS_RUNNING;
+    pthread_mutex_unlock(&render->lock);
+    if (is_running)
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "the render has not ended");
+    return trc_film_read_sums(&render->film, sums, sums_out, double_count);
 }

@@ -6,6 +6,8 @@
 #ifndef TRACER_RENDER_RENDER_H
 #define TRACER_RENDER_RENDER_H
 
+#include <stdbool.h>
+
 #include "model/snapshot.h"
 #include "tracer/render.h"
 
@@ -39,6 +41,19 @@ void trc_render_state_poll(struct trc_render_state *render, trc_render_progress 
 
 trc_status trc_render_state_read(struct trc_render_state *render, uint32_t pass, float *pixels_out,
                                  uint64_t float_count);
+
+/* Sums of the film, of a render that has ended (film/part.h). */
+uint32_t trc_render_state_sums_channels(const struct trc_render_state *render, uint32_t sums);
+trc_status trc_render_state_read_sums(struct trc_render_state *render, uint32_t sums,
+                                      double *sums_out, uint64_t double_count);
+
+/* A render whose samples come in parts, one after the other from one thread; it runs until it is
+ * finished or cancelled. desc is resolved. The same errors. */
+trc_status trc_render_state_merge(const trc_render_desc *desc, bool has_catchers,
+                                  struct trc_render_state **render_out);
+/* INVALID_ARGUMENT, with nothing changed. */
+trc_status trc_render_state_add(struct trc_render_state *render, const trc_part_desc *part);
+trc_status trc_render_state_finish(struct trc_render_state *render);
 
 /* Cancels, joins and frees. NULL is fine. */
 void trc_render_state_destroy(struct trc_render_state *render);

@@ -53,15 +53,21 @@ uint32_t trc_schedule_batch_begin(const struct trc_schedule *schedule, uint32_t 
     return (batch - MAX_BATCH_LOG2) << MAX_BATCH_LOG2;
 }
 
+/* Those of a part, or all. */
+static uint32_t sample_count_of(const trc_render_desc *desc) {
+    return desc->sample_subset ? desc->sample_subset : desc->sample_count - desc->sample_offset;
+}
+
 static uint32_t count_batches(const trc_render_desc *desc) {
     if (!desc->progressive)
         return 1;
     const uint32_t doubling = 1u << MAX_BATCH_LOG2;
+    const uint32_t samples = sample_count_of(desc);
     uint32_t batches = 1;
-    for (uint32_t end = 1; end < desc->sample_count && end < doubling; end *= 2)
+    for (uint32_t end = 1; end < samples && end < doubling; end *= 2)
         batches++;
-    if (desc->sample_count > doubling)
-        batches += (desc->sample_count - 1) / doubling;
+    if (samples > doubling)
+        batches += (samples - 1) / doubling;
     return batches;
 }
 
@@ -71,7 +77,8 @@ trc_status trc_schedule_create(const trc_render_desc *desc, struct trc_schedule 
         .height = desc->crop_height,
         .tiles_x = trc_film_tiles(desc->crop_width),
         .tiles_y = trc_film_tiles(desc->crop_height),
-        .sample_count = desc->sample_count,
+        .sample_begin = desc->sample_offset,
+        .sample_count = sample_count_of(desc),
         .batch_count = count_batches(desc),
         .progressive = desc->progressive != 0,
     };

@@ -215,12 +215,17 @@ static bool is_counted(const struct trc_tile *t, size_t pixel) {
     return !a || (a->pixels[pixel].reasons & TRC_PIXEL_COUNTS);
 }
 
+/* Of a sample, which fits the table's units. Surfaces that brighten what is behind them are rare.
+ */
+#define MAX_MATTE_WEIGHT 2.0f
+
 /* What the surfaces cover goes to the pixel's table at once, as a sample may meet any number of
  * them. Whole holdouts are in no matte, as in Cycles. */
 static void add_mattes(struct trc_tile *t, const struct trc_surface *s,
                        const struct trc_material *m, const struct trc_lobes *lobes, vvec3 seen,
                        const uint32_t *slots, vmask active) {
     const uint32_t places = t->job->film->matte_count;
+    const float one = (float)t->job->film->matte_units;
     float weight[TRC_WIDTH];
     if (m->has & TRC_MATERIAL_HAS_HOLDOUT)
         active = vm_and(active, vf_lt(lobes->holdout, vf_set(1.0f)));
@@ -237,9 +242,10 @@ static void add_mattes(struct trc_tile *t, const struct trc_surface *s,
             !is_counted(t, trc_film_pixel(t, slots[i])))
             continue;
         const size_t first = trc_tile_pixel(t, slots[i]) * places;
+        const uint32_t units = (uint32_t)(fminf(weight[i], MAX_MATTE_WEIGHT) * one + 0.5f);
         for (int k = 0; k < TRC_CRYPTOMATTE_KINDS; k++)
             if (t->mattes[k] && ids[k] != 0.0f)
-                trc_matte_add(t->mattes[k] + first, places, ids[k], weight[i]);
+                trc_matte_add(t->mattes[k] + first, places, ids[k], units);
     }
 }
 

@@ -33,8 +33,11 @@ static void film_add_caught(struct trc_tile *t, uint32_t sample, size_t pixel) {
     trc_sum_add(&sum->coverage, -(double)t->samples.transparency[blocked]);
 }
 
-/* Adds a sample's passes to its pixel. */
-static void film_add_passes(struct trc_tile *t, uint32_t slot, size_t pixel, bool first) {
+/* Adds a sample's passes to its pixel. has_any: it has samples. Samples may come in another order
+ * than that of their numbers; the first is the one with the first number, unless that was dropped.
+ */
+static void film_add_passes(struct trc_tile *t, uint32_t slot, size_t pixel, bool has_any) {
+    const bool is_first = t->samples.index[slot] == t->desc->sample_offset;
     for (uint32_t i = 0; i < t->samples.pass_count; i++) {
         const uint32_t pass = t->samples.passes[i];
         const struct trc_pass_info *info = trc_pass_info_of(pass);
@@ -43,7 +46,7 @@ static void film_add_passes(struct trc_tile *t, uint32_t slot, size_t pixel, boo
             const double value = (double)t->samples.pass[pass][k][slot];
             if (!isfinite(value))
                 continue;
-            if (first)
+            if (!has_any || (info->kind == TRC_PASS_KIND_FIRST && is_first))
                 trc_sum_store(&sum[k], value);
             else if (info->kind != TRC_PASS_KIND_FIRST)
                 trc_sum_add(&sum[k], value);
@@ -51,24 +54,6 @@ static void film_add_passes(struct trc_tile *t, uint32_t slot, size_t pixel, boo
     }
     if (t->catchers)
         film_add_caught(t, slot, pixel);
-}
-
-/* Keeps the sums of a pixel's first half of samples: what it has so far. */
-static void film_keep_half(const struct trc_film *film, size_t pixel, const double sum[4],
-                           uint32_t count) {
-    static const uint32_t passes[] = {TRC_PASS_DENOISING_ALBEDO, TRC_PASS_DENOISING_NORMAL,
-                                      TRC_PASS_DENOISING_DEPTH};
-    struct trc_half *half = &film->halves[pixel];
-    for (int c = 0; c < 4; c++)
-        half->light[c] = (float)sum[c];
-    for (int c = 0; film->caught && c < 3; c++)
-        half->light[c] = (float)(sum[c] + film->caught[pixel].blocked[c]);
-    float *feature = half->features;
-    for (int i = 0; i < 3; i++)
-        for (uint32_t k = 0; k < trc_pass_info_of(passes[i])->sums; k++)
-            *feature++ =
-                (float)film->sums[passes[i]][trc_pass_info_of(passes[i])->sums * pixel + k];
-    half->count = count;
 }
 
 /* Adds the samples [begin, end), of one pixel, to it, in their order. Those that are not finite are
@@ -88,12 +73,12 @@ static void film_add_run(struct trc_tile *t, uint32_t begin, uint32_t end, size_
             continue;
         }
         if (t->extra_passes && film->halves && trc_film_ends_half(film, count))
-            film_keep_half(film, pixel, sum, count);
+            trc_film_keep_half(film, pixel, sum, count);
         for (int c = 0; c < 3; c++)
             sum[c] += (double)t->samples.radiance[c][slot];
         sum[3] += 1.0 - (double)t->samples.transparency[slot];
         if (t->extra_passes)
-            film_add_passes(t, slot, pixel, count == 0);
+            film_add_passes(t, slot, pixel, count > 0);
         count++;
     }
     for (int c = 0; c < 4; c++)
@@ -156,7 +141,8 @@ void trc_film_load_mattes(struct trc_tile *t) {
         for (uint32_t y = 0; t->mattes[k] && y < job->height; y++) {
             struct trc_matte *to = t->mattes[k] + y * TRC_TILE_SIZE * places;
             const size_t pixel = (size_t)(job->y + y) * film->width + job->x;
-            if (job->sample_begin == 0) /* fresh memory is not read: film_add_run */
+            /* Fresh memory is not read: film_add_run. */
+            if (job->sample_begin == t->desc->sample_offset)
                 memset(to, 0, row * sizeof *to);
             else
                 memcpy(to, film->mattes[k] + pixel * places, row * sizeof *to);
