@@ -18,6 +18,13 @@ def write_manifests(engine, view_layer, names):
     """Add the manifests of a view layer's mattes to the render result; names: sets of them by
     CryptomatteKind."""
     result = engine.get_result()
+    for key, value in manifests(view_layer, names).items():
+        result.stamp_data_add_field(key, value)
+
+
+def manifests(view_layer, names):
+    """{key: value} of them."""
+    found = {}
     for (kind, setting), members in zip(CRYPTOMATTES.values(), names):
         if not getattr(view_layer, setting):
             continue
@@ -25,7 +32,8 @@ def write_manifests(engine, view_layer, names):
         fields = {"name": name, "hash": "MurmurHash3_32", "conversion": "uint32_to_float32",
                   "manifest": manifest(members)}
         for field, value in fields.items():
-            result.stamp_data_add_field(f"cryptomatte/{_digits(name)[:_KEY_DIGITS]}/{field}", value)
+            found[f"cryptomatte/{_digits(name)[:_KEY_DIGITS]}/{field}"] = value
+    return found
 
 
 def manifest(names):

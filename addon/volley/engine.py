@@ -6,6 +6,8 @@ import traceback
 import bpy
 
 from . import jobs, native, passes, viewport, writes
+from .farm import job
+from .farm.parts import PartError
 from .log import logger
 from .session import Session
 
@@ -89,7 +91,7 @@ class VolleyRenderEngine(bpy.types.RenderEngine):
         engine meanwhile."""
         try:
             function(*arguments)
-        except native.TracerError as error:
+        except (native.TracerError, PartError, OSError) as error:
             self._fail(str(error))
         except MemoryError:
             self._fail("out of memory")
@@ -102,6 +104,7 @@ class VolleyRenderEngine(bpy.types.RenderEngine):
 
     def _fail(self, message):
         _free(self)
+        job.add_failure(message)
         self.error_set(f"Volley: {message}")
         self.report({'ERROR'}, f"Volley: {message}")  # on the console, too, when there is no window
 

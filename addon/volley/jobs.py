@@ -83,6 +83,11 @@ def is_new(engine, message):
     return not is_known
 
 
+def stop(reason):
+    """Have what renders end, and nothing begin until :func:`allow`."""
+    _Jobs.refusal = reason
+
+
 def refusal():
     """Why nothing can be rendered now, "" where it can."""
     return _Jobs.refusal

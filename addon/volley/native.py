@@ -463,6 +463,15 @@ class Scene:
         self.revision += 1
 
 
+def start_merge(has_catchers, **values):
+    """A :class:`Render` whose samples come by :meth:`Render.add_part`; keywords are the fields of
+    trc_render_desc of the whole."""
+    handle = ctypes.c_uint64()
+    desc = describe(abi.RenderDesc, **values)
+    _call("trc_merge_start", ctypes.byref(desc), int(has_catchers), ctypes.byref(handle))
+    return Render(handle.value, (desc.crop_width or desc.width, desc.crop_height or desc.height))
+
+
 class Render:
     """A render that runs in threads of the library. ``size``: width and height of its film, pixels."""
 
@@ -476,6 +485,30 @@ class Render:
         progress = describe(abi.RenderProgress)
         _call("trc_render_poll", self._handle, ctypes.byref(progress))
         return progress
+
+    def sums_channels(self, number):
+        """Doubles of each pixel under a number of sums, 0 for none."""
+        return _require().trc_sums_channels(self._handle, number)
+
+    def read_sums(self, number):
+        """Sums of a render that has ended, flat float64, in the order of :meth:`read`."""
+        out = np.empty(self.size[0] * self.size[1] * self.sums_channels(number), np.float64)
+        _call("trc_sums_read", self._handle, number, _address(out), out.size)
+        return out
+
+    def add_part(self, sample_offset, sample_subset, sums):
+        """Add a part to a merge; sums: {number: flat float64}."""
+        arrays = {number: _array(values, np.float64) for number, values in sums.items()}
+        structs = (abi.Sums * len(arrays))(*(
+            describe(abi.Sums, number=number, values=_address(values), value_count=values.size)
+            for number, values in arrays.items()))
+        desc = describe(abi.PartDesc, sample_offset=sample_offset, sample_subset=sample_subset,
+                        sums_count=len(arrays), sums=structs)
+        _call("trc_merge_add", self._handle, ctypes.byref(desc))
+
+    def finish_merge(self):
+        """All parts are there."""
+        _call("trc_merge_finish", self._handle)
 
     def wait(self, timeout_seconds):
         """Return when it has ended or after the time."""

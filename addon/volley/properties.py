@@ -134,6 +134,13 @@ class VolleySceneSettings(bpy.types.PropertyGroup):
         update=_changed)
     seed: IntProperty(
         name="Seed", default=0, min=0, description="Another number gives other noise", update=_changed)
+    sample_offset: IntProperty(
+        name="Sample Offset", default=0, min=0, max=(1 << 20) - 1,
+        description="First sample of a part of the picture, counted from 0; parts are put together by the "
+                    "command line of farms", update=_changed)
+    sample_subset: IntProperty(
+        name="Sample Subset", default=0, min=0, max=1 << 20,
+        description="Samples of a part of the picture; 0 is all from the first on", update=_changed)
     use_animated_seed: BoolProperty(
         name="Animate Seed", default=False, description="Other noise on every frame", update=_changed)
 

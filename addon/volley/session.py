@@ -12,6 +12,7 @@ import bpy
 from . import abi, cryptomatte, jobs, native, passes
 from .commit import Commit
 from .compat import motion_position
+from .farm import job, parts
 from .log import logger
 from .sync import Cancelled, SceneSync, Source, camera, culling, motion, world
 from .sync.changes import Changes
@@ -66,7 +67,9 @@ class Session:
                                    view_layer.use_pass_vector)
         if shutter is not None and shutter.curve is not None:
             entries = passes.without_vector(entries)
-        time_limit = 0.0 if engine.is_preview else scene.volley.time_limit
+        # A part has all of its samples.
+        is_limited = not engine.is_preview and not job.job().parts_folder
+        time_limit = scene.volley.time_limit if is_limited else 0.0
         views = self._synchronise(engine, depsgraph, frame, shutter, view_names)
         for view_name, keys in views:
             self._sync.set_camera(keys, shutter)
@@ -75,12 +78,17 @@ class Session:
             settings = render_fields(scene, frame, crop, entries, engine.is_preview)
             if view_layer.samples > 0:
                 settings["sample_count"] = view_layer.samples
+            sample_count = _fit_subset(settings)
             # All of the picture must have samples when the time is over.
             settings["progressive"] = int(time_limit > 0.0)
             render = self._sync.scene.start_render(**settings)
             try:
-                _Run(engine, self._sync, render, settings["sample_count"], time_limit).follow(
+                progress = _Run(engine, self._sync, render, sample_count, time_limit).follow(
                     view_layer.name, view_name, entries)
+                folder = "" if engine.is_preview else job.job().parts_folder
+                if folder and progress.state == abi.ProgressState.DONE:
+                    parts.write(folder, scene, render, entries, settings, view_layer.name, view_name,
+                                cryptomatte.manifests(view_layer, self._sync.cryptomatte_names()))
             finally:
                 render.destroy()
         cryptomatte.write_manifests(engine, view_layer, self._sync.cryptomatte_names())
@@ -178,13 +186,15 @@ class _Run:
     def __init__(self, engine, sync, render, sample_count, time_limit):
         self._engine, self._render, self._sample_count = engine, render, sample_count
         self._time_limit = time_limit  # seconds, 0 for none
+        self._frame = bpy.context.scene.frame_current
         self._features = sync.scene.features()
         self._next_picture = time.monotonic() + FIRST_PICTURE_SECONDS
         self._shown_version = 0
         self._next_status = 0.0
 
     def follow(self, layer_name, view_name, entries):
-        """Poll until it ends or the user stops it; what is finished is kept either way."""
+        """Poll until it ends or the user stops it; what is finished is kept either way. Its last progress
+        is returned."""
         engine, render = self._engine, self._render
         width, height = render.size
         result = engine.begin_result(0, 0, width, height, layer=layer_name, view=view_name)
@@ -208,6 +218,8 @@ class _Run:
             passes.write(render, layer, entries)
             logger.debug("%d rays in %.3f s; the scene has: %s", native.ray_count(progress), progress.seconds,
                          ", ".join(self._features))
+            job.add_render(progress, native.ray_count(progress))
+            return progress
         finally:
             engine.end_result(result)
 
@@ -222,6 +234,7 @@ class _Run:
             return
         self._next_status = now + STATUS_SECONDS
         self._engine.update_progress(progress.fraction)
+        job.say_progress(self._frame, progress.fraction, status_text(progress, self._sample_count))
         self._engine.update_stats("", status_text(progress, self._sample_count))
         self._engine.update_memory_stats(memory_used=progress.memory_bytes / MEGA,
                                          memory_peak=progress.peak_memory_bytes / MEGA)
@@ -261,6 +274,7 @@ def report_warning(engine, message):
     when there is no window to show them in."""
     if not jobs.is_new(engine, message):
         return
+    job.add_warning(message)
     if bpy.app.background:
         logger.warning(message)
     else:
@@ -283,6 +297,8 @@ def render_fields(scene, frame, crop, entries, is_preview=False):
         "crop_x": crop[0], "crop_y": crop[1], "crop_width": crop[2], "crop_height": crop[3],
         "integrator": abi.IntegratorType[settings.integrator],
         "sample_count": settings.preview_samples if is_preview else settings.samples,
+        "sample_offset": 0 if is_preview else settings.sample_offset,
+        "sample_subset": 0 if is_preview else settings.sample_subset,
         "light_samples": settings.light_samples,
         "max_depth": settings.max_depth, "max_transparent_depth": settings.max_transparent_depth,
         "max_glossy_depth": settings.max_glossy_depth,
@@ -299,6 +315,13 @@ def render_fields(scene, frame, crop, entries, is_preview=False):
         "thread_count": thread_count(scene.render), **_adaptive_fields(settings, is_preview),
         **world.mist_fields(scene.world),
     }
+
+
+def _fit_subset(fields):
+    """Cut the subset of samples to those that there are; how many are rendered."""
+    left = max(0, fields["sample_count"] - fields["sample_offset"])
+    fields["sample_subset"] = min(fields["sample_subset"], left)
+    return fields["sample_subset"] or left
 
 
 def _adaptive_fields(settings, is_preview):

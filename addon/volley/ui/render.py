@@ -70,6 +70,9 @@ class VOLLEY_RENDER_PT_sampling_advanced(VolleyPanel, Panel):
         row.prop(settings, "seed")
         row.prop(settings, "use_animated_seed", text="", icon='TIME')
         layout.prop(settings, "sampler")
+        column = layout.column(align=True)
+        column.prop(settings, "sample_offset")
+        column.prop(settings, "sample_subset", text="Subset")
 
 
 class VOLLEY_RENDER_PT_light_paths(VolleyPanel, Panel):

@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A part of the samples of a frame's layer, as an OpenEXR file.
+
+Its picture can be looked at; beside it are the film's sums, from which :mod:`merge` makes the frame. A
+double is the bits of two integers, or one number where that holds it whole. The metadata say of what file,
+settings and version it is and which samples it has, and have a digest of all that.
+"""
+
+import hashlib
+import json
+import os
+import re
+
+import bpy
+import numpy as np
+
+from .. import native, passes
+from ..abi import SUMS_END
+from . import exr, job
+
+ATTRIBUTE = "volley:part"
+_DIGEST = "volley:digest"
+_EXTENSION = ".part.exr"
+_SAMPLED_BYTES = 1 << 20  # of files beside the scene: read at both ends
+# Fields of trc_render_desc in which parts of a picture may differ.
+_OWN_FIELDS = {"sample_offset", "sample_subset", "thread_count", "progressive"}
+
+
+class PartError(Exception):
+    """A file that is no part, or one that does not fit others."""
+
+
+# What a part is made of --------------------------------------------------------------------------
+
+def identity(scene, fields, layer_name, view_name):
+    """What all parts of a picture have in common, {group: {name: value}}, as JSON can hold it."""
+    settings = {name: float(value) if isinstance(value, float) else int(value)
+                for name, value in fields.items() if name not in _OWN_FIELDS}
+    return {"frame": {"number": scene.frame_current, "layer": layer_name, "view": view_name},
+            "version": version(), "settings": settings, "file": files()}
+
+
+def version():
+    """{name: version} of what renders."""
+    return {"volley": native.description().rsplit(", ", 1)[0], "blender": bpy.app.version_string}
+
+
+def files():
+    """{name: digest} of the file and of those that it reads."""
+    if not bpy.data.filepath:
+        raise PartError("parts are of a saved file")
+    digests = {"scene": _digest_of(bpy.data.filepath, 0)}
+    for library in bpy.data.libraries:
+        digests[f"library {library.name}"] = _digest_of(bpy.path.abspath(library.filepath), 0)
+    for path in image_files().values():
+        digests[f"image {os.path.basename(path)}"] = _digest_of(path, _SAMPLED_BYTES)
+    return digests
+
+
+def image_files():
+    """{image name: path} of the images that are read from single files."""
+    return {image.name_full: bpy.path.abspath(image.filepath, library=image.library)
+            for image in bpy.data.images
+            if image.source == 'FILE' and image.users and image.filepath and not image.packed_file}
+
+
+_digests = {}
+
+
+def _digest_of(path, sampled_bytes):
+    """A digest of a file's bytes, or of its size and both ends; "missing" where there is none."""
+    try:
+        status = os.stat(path)
+        key = path, status.st_mtime_ns, status.st_size
+        if key not in _digests:
+            digest = hashlib.sha256(str(status.st_size).encode())
+            with open(path, "rb") as file:
+                if sampled_bytes and status.st_size > 2 * sampled_bytes:
+                    digest.update(file.read(sampled_bytes))
+                    file.seek(-sampled_bytes, os.SEEK_END)
+                for block in iter(lambda: file.read(_SAMPLED_BYTES), b""):
+                    digest.update(block)
+            _digests[key] = digest.hexdigest()
+        return _digests[key]
+    except OSError:
+        return "missing"
+
+
+# Files -------------------------------------------------------------------------------------------
+
+def path_of(folder, scene, layer_name, view_name, begin, end):
+    """Where a part belongs."""
+    names = [re.sub(r"[^A-Za-z0-9_-]", "_", name) for name in (scene.name, layer_name, view_name) if name]
+    return os.path.join(folder, f"{scene.frame_current:06d}.{'.'.join(names)}.{begin:07d}-{end:07d}{_EXTENSION}")
+
+
+def write(folder, scene, render, entries, fields, layer_name, view_name, manifests):
+    """Write a finished render as a part. entries: of passes; manifests: attributes of Cryptomatte."""
+    begin = fields["sample_offset"]
+    end = begin + (fields["sample_subset"] or fields["sample_count"] - begin)
+    sums = {number: render.read_sums(number) for number in range(SUMS_END) if render.sums_channels(number)}
+    width, height = render.size
+    channels = {}
+    for number, values in sums.items():
+        planes = values.reshape(height, width, -1)
+        for index in range(planes.shape[2]):
+            channels.update(_split(f"sums.{number:03d}.{index:02d}", planes[..., index]))
+    combined = passes.read_combined(render)
+    channels.update((letter, np.ascontiguousarray(combined[..., index]))
+                    for index, letter in enumerate("RGBA"))
+    about = {"identity": identity(scene, fields, layer_name, view_name), "begin": begin, "end": end,
+             "isa": native.description().rsplit(", ", 1)[1],
+             "passes": [[int(entry.index), passes.name_of(entry), entry.channels] for entry in entries],
+             "manifests": manifests}
+    text = json.dumps(about, sort_keys=True)
+    os.makedirs(folder, exist_ok=True)
+    path = path_of(folder, scene, layer_name, view_name, begin, end)
+    exr.write(path, render.size, channels, {ATTRIBUTE: text, _DIGEST: _digest(text, channels)})
+    job.job().part_paths.append(path)
+
+
+def _digest(text, channels):
+    digest = hashlib.sha256(text.encode())
+    for name in sorted(channels):
+        digest.update(name.encode())
+        digest.update(channels[name].tobytes())
+    return digest.hexdigest()
+
+
+def _split(name, values):
+    """{channel: array} that hold doubles to the bit."""
+    values = np.ascontiguousarray(values)
+    bits = values.view("<u8")
+    for letter, dtype in (("U", "<u4"), ("F", "<f4")):
+        with np.errstate(all="ignore"):
+            narrow = values.astype(dtype)
+        if (narrow.astype("<f8").view("<u8") == bits).all():
+            return {f"{name}.{letter}": narrow}
+    return {f"{name}.H": (bits >> np.uint64(32)).astype("<u4"), f"{name}.L": bits.astype("<u4")}
+
+
+class Part:
+    """A part's file. ``begin``, ``end``: its samples; ``identity``: as :func:`identity`."""
+
+    def __init__(self, path):
+        """Read it all; PartError says what is wrong with it."""
+        self.path = path
+        try:
+            self.size, self._channels, attributes = exr.read(path)
+            text = attributes.get(ATTRIBUTE)
+            if text is None:
+                raise PartError(f"{path}: it is not a part of a render")
+            if attributes.get(_DIGEST) != _digest(text, self._channels):
+                raise PartError(f"{path}: it is damaged")
+            about = json.loads(text)
+        except exr.ExrError as error:
+            raise PartError(f"{path}: {error}") from error
+        except OSError as error:
+            raise PartError(f"{path}: {error.strerror or error}") from error
+        self.begin, self.end, self.identity = about["begin"], about["end"], about["identity"]
+        self.isa, self.passes, self.manifests = about["isa"], about["passes"], about["manifests"]
+
+    def sums(self):
+        """{number: doubles, flat}."""
+        planes = {}
+        for name, values in self._channels.items():
+            if name.startswith("sums."):
+                _, number, index, letter = name.split(".")
+                planes.setdefault(int(number), {}).setdefault(int(index), {})[letter] = values
+        return {number: np.stack([_joined(by_index[index]) for index in sorted(by_index)], axis=-1).reshape(-1)
+                for number, by_index in planes.items()}
+
+    def forget_pixels(self):
+        """Free the memory; what it says of itself stays."""
+        self._channels = {}
+
+
+def _joined(by_letter):
+    if "H" in by_letter:
+        bits = by_letter["H"].astype("<u8") << np.uint64(32) | by_letter["L"]
+        return bits.view("<f8")
+    return next(iter(by_letter.values())).astype("<f8")
