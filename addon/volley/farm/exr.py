@@ -86,7 +86,7 @@ def _header(width, height, channels, attributes):
 def _compressed(arrays, height, first):
     """The lines from first on, counted from above, as a chunk."""
     last = min(first + _CHUNK_LINES, height)
-    lines = np.stack([array[height - last:height - first][::-1] .view("<u4") for array in arrays], axis=1)
+    lines = np.stack([array[height - last:height - first][::-1].view("<u4") for array in arrays], axis=1)
     raw = np.ascontiguousarray(lines).reshape(-1).view(np.uint8)
     parted = np.concatenate([raw[0::2], raw[1::2]])
     steps = parted.copy()

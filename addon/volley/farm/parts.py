@@ -52,8 +52,8 @@ def files():
     digests = {"scene": _digest_of(bpy.data.filepath, 0)}
     for library in bpy.data.libraries:
         digests[f"library {library.name}"] = _digest_of(bpy.path.abspath(library.filepath), 0)
-    for path in image_files().values():
-        digests[f"image {os.path.basename(path)}"] = _digest_of(path, _SAMPLED_BYTES)
+    for name, path in image_files().items():
+        digests[f"image {name}"] = _digest_of(path, _SAMPLED_BYTES)
     return digests
 
 

@@ -1,0 +1,289 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Farms: parts of frames, merged to the bits of one render; what does not fit is refused with the reason, and
+nothing is overwritten; exit codes, summaries, signals."""
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from blender import Blender, executable, user_scripts
+
+MAIN = "import volley.farm.command as c; c.main()"
+SAMPLES = 64
+
+
+# In Blender --------------------------------------------------------------------------------------
+
+def _make_scene(path):
+    """A moving half transparent cube over a floor, with most kinds of passes."""
+    import bpy
+    bpy.ops.wm.read_factory_settings()
+    import addon_utils
+    addon_utils.enable("volley")
+    scene = bpy.context.scene
+    render = scene.render
+    render.engine = 'VOLLEY'
+    render.resolution_x, render.resolution_y, render.resolution_percentage = 48, 32, 100
+    render.use_motion_blur = True
+    scene.volley.samples = SAMPLES
+    bpy.ops.mesh.primitive_plane_add(size=20.0, location=(0.0, 0.0, -1.0))
+    cube = bpy.data.objects["Cube"]
+    cube.data.materials[0].node_tree.nodes["Principled BSDF"].inputs["Alpha"].default_value = 0.6
+    for frame, x in ((1, 0.0), (8, 2.0)):
+        cube.location.x = x
+        cube.keyframe_insert("location", frame=frame)
+    layer = scene.view_layers[0]
+    layer.use_pass_z = layer.use_pass_normal = layer.use_pass_diffuse_direct = True
+    layer.use_pass_object_index = layer.use_pass_cryptomatte_object = True
+    layer.volley.use_pass_sample_count = True
+    layer.lightgroups.add(name="Key")
+    bpy.data.objects["Light"].lightgroup = "Key"
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+
+
+def _whole(scene):
+    """{channel: array} of the picture of one render, through Blender's result as this version names it."""
+    import bpy
+    from volley import passes
+    kept = {}
+    write = passes.write
+
+    def keep(render, layer, entries):
+        width, height = render.size
+        for entry in entries:
+            pixels = render.read(entry.index, np.empty(width * height * len(entry.channels), np.float32))
+            for k, letter in enumerate(entry.channels):
+                kept[f"ViewLayer.{passes.name_of(entry)}.{letter}"] = pixels.reshape(height, width, -1)[..., k]
+        write(render, layer, entries)
+    passes.write = keep
+    try:
+        bpy.ops.render.render()
+    finally:
+        passes.write = write
+    return kept
+
+
+def _same(path, whole):
+    """How many numbers of a merged file differ in their bits."""
+    from volley.farm import exr
+    _, channels, attributes = exr.read(path)
+    assert channels.keys() == whole.keys()
+    assert any(key.endswith("/manifest") for key in attributes)
+    return sum(int((channels[name].view(np.uint32) != np.ascontiguousarray(whole[name]).view(np.uint32)).sum())
+               for name in whole)
+
+
+def merged_bits(folder):
+    """{case: numbers that differ} of parts of 2, 5 and 64 blocks and of an odd range, and settings that stop
+    pixels or denoise."""
+    import bpy
+    from volley.farm import command
+    _make_scene(f"{folder}/farm.blend")
+    scene, found = bpy.context.scene, {}
+    cases = {"plain": {}, "adaptive": {"use_adaptive_sampling": True, "noise_threshold": 0.05,
+                                       "adaptive_min_samples": 8}, "denoise": {"use_denoising": True}}
+    for case, settings in cases.items():
+        for name, value in settings.items():
+            setattr(scene.volley, name, value)
+        whole = _whole(scene)
+        for count in {"plain": (2, 5, 64), "adaptive": (16,), "denoise": (2,)}[case]:
+            parts = f"{folder}/{case}{count}"
+            assert command.run(["render", "--parts", parts, "--blocks", f"0-{count - 1}/{count}"]) == 0
+            assert command.run(["merge", parts, "--output", f"{parts}_##"]) == 0
+            found[f"{case} {count}"] = _same(f"{parts}_01.exr", whole)
+        for name in settings:
+            scene.volley.property_unset(name)
+    assert not scene.volley.sample_offset and not scene.volley.sample_subset
+    return found
+
+
+def test_merged_frames_have_the_bits_of_one_render(tmp_path):
+    assert Blender().run(merged_bits, str(tmp_path)) == dict.fromkeys(
+        ("plain 2", "plain 5", "plain 64", "adaptive 16", "denoise 2"), 0)
+
+
+@contextlib.contextmanager
+def _full_disk():
+    """As one that is full after 4 KiB: by the limit of a file's size."""
+    import resource
+    limit = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, limit[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limit)
+
+
+def _refusal(folder, names, output, around=contextlib.nullcontext):
+    """What a merge of some parts says, with a file at the output that must stay."""
+    import io
+    import shutil
+    from volley.farm import command
+    chosen = os.path.join(folder, "chosen")
+    shutil.rmtree(chosen, ignore_errors=True)
+    os.makedirs(chosen)
+    for name in names:
+        shutil.copy(os.path.join(folder, name), os.path.join(chosen, os.path.basename(name)))
+    with open(output, "w", encoding="utf-8") as file:
+        file.write("before")
+    said = io.StringIO()
+    with contextlib.redirect_stdout(said), around():
+        code = command.run(["merge", chosen, "--frames", "1", "--output", output])
+    with open(output, encoding="utf-8", errors="replace") as file:
+        assert code == 1 and file.read() == "before", said.getvalue()
+    assert sorted(os.listdir(chosen)) == sorted({os.path.basename(name) for name in names})
+    return said.getvalue()
+
+
+@contextlib.contextmanager
+def _read_only(output):
+    """As a folder in which nothing may be made, for root too."""
+    import errno
+    import tempfile
+    from unittest import mock
+    refusal = PermissionError(errno.EACCES, "Permission denied", output)
+    with mock.patch.object(tempfile, "mkstemp", side_effect=refusal):
+        yield
+
+
+def refusals(folder):
+    """{case: what was said}."""
+    import bpy
+    from volley.farm import command, parts
+    _make_scene(f"{folder}/farm.blend")
+    scene, said, output = bpy.context.scene, {}, f"{folder}/frame_0001.exr"
+
+    def render(name, samples):
+        assert command.run(["render", "--parts", f"{folder}/{name}", "--samples", samples]) == 0, name
+        return [f"{name}/{file}" for file in os.listdir(f"{folder}/{name}")]
+
+    first, second = render("first", "0:20"), render("second", "20:64")
+    overlap = render("overlap", "10:64")
+    said["overlap"] = _refusal(folder, first + overlap, output)
+    said["missing before"] = _refusal(folder, second, output)
+    said["missing after"] = _refusal(folder, first, output)
+    said["none"] = _refusal(folder, [], output)
+    scene.volley.seed = 7
+    said["seed"] = _refusal(folder, first + render("seed", "20:64"), output)
+    scene.volley.seed = 0
+    version = parts.version
+    parts.version = lambda: {**version(), "volley": "libtracer 9.9.9"}
+    said["version"] = _refusal(folder, first + render("version", "20:64"), output)
+    parts.version = version
+    with open(f"{folder}/{first[0]}", "rb") as file:
+        data = file.read()
+    name = os.path.basename(first[0])
+    os.makedirs(f"{folder}/damaged")
+    for case, bad in (("cut short", data[:-100]), ("flipped", data[:-50] + bytes([data[-50] ^ 4]) + data[-49:]),
+                      ("relabelled", data.replace(b'"begin": 0', b'"begin": 1')), ("no picture", b"hello")):
+        with open(f"{folder}/damaged/{name}", "wb") as file:
+            file.write(bad)
+        said[case] = _refusal(folder, [f"damaged/{name}"] + second, output)
+    # A disk that is full halfway, a folder that cannot be written.
+    said["full"] = _refusal(folder, first + second, output, _full_disk)
+    with _full_disk():
+        assert command.run(["render", "--parts", f"{folder}/full", "--samples", "0:20"]) == 1
+    assert not os.listdir(f"{folder}/full")
+    assert not [name for name in os.listdir(folder) if name.endswith(".part")]
+    assert command.run(["render", "--parts", "/proc/parts", "--samples", "0:20"]) == 1
+    said["no permission"] = _refusal(folder, first + second, output, lambda: _read_only(output))
+    bpy.data.objects["Cube"].scale.x = 2.0
+    bpy.ops.wm.save_as_mainfile(filepath=f"{folder}/other.blend")
+    said["file"] = _refusal(folder, first + render("file", "20:64"), output)
+    return said
+
+
+def test_parts_that_do_not_fit_are_refused_with_the_reason(tmp_path):
+    said = Blender().run(refusals, str(tmp_path))
+    reasons = {"overlap": "overlap", "missing before": "samples 0 to 20", "missing after": "samples 20 to 64",
+               "none": "there are no parts", "seed": "seed is 7, not 0", "version": "libtracer 9.9.9",
+               "file": "scene is", "cut short": "", "flipped": "damaged", "relabelled": "damaged",
+               "no picture": "no OpenEXR file", "full": "File too large",
+               "no permission": "Permission denied"}
+    assert said.keys() == reasons.keys()
+    for case, reason in reasons.items():
+        assert reason in said[case] and "error: frame 1" in said[case], (case, said[case])
+    assert ".part.exr" in said["overlap"] and ".part.exr" in said["cut short"]
+
+
+def save_scene(path, samples):
+    import bpy
+    _make_scene(path)
+    image = bpy.data.images.new("gone", 4, 4)
+    image.filepath, image.source, image.use_fake_user = "//gone.png", 'FILE', True
+    bpy.context.scene.volley.samples = samples
+    bpy.ops.wm.save_mainfile()
+
+
+# The command line --------------------------------------------------------------------------------
+
+def _command(*arguments, blend=None, **options):
+    environment = {**os.environ, "BLENDER_USER_SCRIPTS": user_scripts()}
+    return subprocess.Popen([executable(), "-b", "--addons", "volley", *([blend] if blend else []),
+                             "--python-expr", MAIN, "--", *arguments], env=environment, text=True,
+                            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, **options)
+
+
+def test_command_line(tmp_path):
+    """Missing files, SIGTERM and going on after it, summaries, two starts at once, no writes elsewhere."""
+    blend, parts = str(tmp_path / "farm.blend"), tmp_path / "parts"
+    Blender().run(save_scene, blend, 16384)
+    before = set(os.listdir(tmp_path))
+    strict = _command("render", "--parts", str(parts), "--strict", blend=blend)
+    stopped = _command("render", "--parts", str(parts), "--blocks", "0-63/64", "--threads", "1", blend=blend)
+    said = strict.communicate()[0]
+    assert strict.returncode == 2 and "gone.png: there is no such file" in said, said
+    end = time.monotonic() + 100.0
+    while not (parts.is_dir() and list(parts.glob("0*.exr"))) and time.monotonic() < end:
+        time.sleep(0.05)
+    stopped.send_signal(signal.SIGTERM)
+    said = stopped.communicate()[0]
+    assert stopped.returncode == 143 and "stopped by SIGTERM" in said, said
+    finished = set(parts.glob("*"))
+    assert finished and len(finished) < 64 and all(path.name.endswith(".part.exr") for path in finished)
+    times = {path: path.stat().st_mtime_ns for path in finished}
+    # The same again takes what is there as it is.
+    summary = tmp_path / "summary.json"
+    last = len(finished)
+    again = _command("render", "--parts", str(parts), "--blocks", f"0-{last}/64", "--summary", str(summary),
+                     blend=blend)
+    refused = _command("render", "--samples", "5:4", "--parts", str(parts), blend=blend)
+    said, refused_said = again.communicate()[0], refused.communicate()[0]
+    assert again.returncode == 0, said
+    assert refused.returncode == 2 and "no such samples" in refused_said, refused_said
+    assert {path: path.stat().st_mtime_ns for path in finished} == times
+    values = json.loads(summary.read_text())
+    assert values["status"] == "done" and values["frame"] == 1 and len(values["outputs"]) == last + 1
+    assert values["rays"] > 0 and values["peak_memory_bytes"] > 0 and not values["errors"]
+    assert "progress 100.0%" in said
+    assert set(os.listdir(tmp_path)) == before | {"parts", "summary.json"}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="/proc")
+def test_animations_take_steady_memory(tmp_path):
+    """Frames of one Blender by the command line: pictures there, memory the same after 4 and after 24."""
+    assert Blender().run(animation_growth, str(tmp_path)) < 4 << 20
+
+
+def animation_growth(folder):
+    import bpy
+    from volley.farm import command
+    _make_scene(f"{folder}/farm.blend")
+    bpy.context.scene.volley.samples = 1
+
+    def resident():
+        with open("/proc/self/statm", encoding="ascii") as file:
+            return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    sizes = []
+    for frames in ("1-8", "9-32"):
+        assert command.run(["render", "--frames", frames, "--output", f"{folder}/picture_###"]) == 0
+        sizes.append(resident())
+    assert len([name for name in os.listdir(folder) if name.startswith("picture_")]) == 32
+    return sizes[1] - sizes[0]
