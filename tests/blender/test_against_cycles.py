@@ -469,7 +469,7 @@ def _shine(kind):
     import scenes
     if kind in {'WORLD', 'PORTAL'}:
         import bpy
-        bpy.context.scene.world.color = (0.5, 0.6, 0.8)
+        scenes.world_color(bpy.context.scene.world, (0.5, 0.6, 0.8))
         if kind == 'WORLD':
             return
     settings = {
@@ -597,7 +597,7 @@ def inside_ambient():
         scenes.wall("Mirror", 6.0, 2.5, (0, 2), scenes.material(
             "Mirror", "ShaderNodeBsdfGlossy", Color=(0.9, 0.9, 0.9), Roughness=0.0))
         scenes.light('POINT', location=(2.0, -3.0, 4.0), energy=200.0, shadow_soft_size=0.5)
-        scene.world.color = (0.5, 0.6, 0.8)
+        scenes.world_color(scene.world, (0.5, 0.6, 0.8))
         scene.world.cycles.sampling_method = sampling
         settings = scene.world.light_settings
         settings.ao_factor, settings.distance = 0.7, 1.5

@@ -48,7 +48,7 @@ def _scene():
         "Veil", "ShaderNodeBsdfTransparent", Color=(0.3, 0.9, 0.5)))
     glow = scenes.wall("Sign", 0.8, -1.5, (1.2, 1.0), scenes.emitter((2.0, 1.0, 0.5)))
     sun = scenes.light('SUN', rotation=(0.7, 0.2, 0.0), angle=0.0, energy=6.0)
-    scene.world.color = (0.4, 0.6, 0.9)
+    scenes.world_color(scene.world, (0.4, 0.6, 0.9))
     scene.world.cycles.sampling_method = 'NONE'
     for owner in (scene.world.cycles_visibility, glow):
         prefix = "visible_" if owner == glow else ""

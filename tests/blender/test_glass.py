@@ -17,7 +17,7 @@ def inside_balls():
     import scenes
     scenes.empty(size=(SIZE, SIZE))
     scenes.camera(location=(0.0, -6.0, 0.0))
-    bpy.context.scene.world.color = (WORLD,) * 3
+    scenes.world_color(bpy.context.scene.world, (WORLD,) * 3)
     x, y = np.meshgrid(*[np.arange(SIZE) - 0.5 * (SIZE - 1)] * 2)
     disk = np.hypot(x, y) < 0.28 * SIZE
     ball = scenes.sphere("Ball", 1.6)
@@ -62,7 +62,7 @@ def block_on_a_floor():
     import scenes
     scenes.empty(size=(SIZE, SIZE))
     scenes.camera(location=(0.0, 0.0, 8.0), rotation=(0.0, 0.0, 0.0))
-    bpy.context.scene.world.color = (WORLD,) * 3
+    scenes.world_color(bpy.context.scene.world, (WORLD,) * 3)
     grey = scenes.material("Grey", "ShaderNodeBsdfDiffuse", Color=(0.5, 0.5, 0.5))
     scenes.mesh("Floor", [(-20, -20, 0), (20, -20, 0), (20, 20, 0), (-20, 20, 0)], [(0, 1, 2, 3)], grey)
     bpy.ops.mesh.primitive_cube_add(size=2.0, location=(0.0, 0.0, 1.0), rotation=(0.0, 0.0, 0.6))

@@ -195,10 +195,10 @@ def inside_attributes():
     import scenes
     scene = _stage()
     scene.render.resolution_percentage = 100
-    scene.world.color = (0.0, 0.0, 0.0)
+    scenes.world_color(scene.world, (0.0, 0.0, 0.0))
     bpy.context.view_layer["of_layer"], scene["of_layer"] = (0.3, 0.2, 0.7), (0.9, 0.9, 0.9)
     scene["of_scene"], scene.world["of_scene"], scene.world["of_world"] = 0.4, 0.8, [0.6, 0.5, 0.1]
-    scene.world.color = (0.25, 0.5, 0.75)
+    scenes.world_color(scene.world, (0.25, 0.5, 0.75))
     for number, (attribute_type, name, output) in enumerate(ATTRIBUTES):
         place = 0.8 * (number % COLUMNS - 2.5), 0.8 * (number // COLUMNS - 2.0)
         scale = 0.005 if name == "render.resolution_percentage" else 1.0

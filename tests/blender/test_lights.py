@@ -56,7 +56,7 @@ def _shine(kind, settings):
     if kind == 'WORLD':
         world = bpy.context.scene.world
         world.cycles.sampling_method = settings["sampling"]
-        world.color = tuple(settings["power"] * part for part in (0.5, 0.6, 0.8))
+        scenes.world_color(world, tuple(settings["power"] * part for part in (0.5, 0.6, 0.8)))
     elif kind == 'MESH':
         lamp = scenes.sphere("Lamp", 0.3, (1.5, -1.0, 2.2), scenes.emitter((1.0, 0.8, 0.6), "Lamp",
                                                                            settings["energy"]))

@@ -91,7 +91,7 @@ def inside_gallery():
     import scenes
     from volley import passes
     scene = _scene()
-    scene.world.color = (0.4, 0.5, 0.7)
+    scenes.world_color(scene.world, (0.4, 0.5, 0.7))
     scenes.light('AREA', location=(2.0, -3.0, 4.0), rotation=(0.8, 0.0, 0.5), energy=300.0, size=1.5)
     scenes.sphere("Glass", 0.7, (-2.4, -1.0, -0.2), scenes.material(
         "Glass", "ShaderNodeBsdfGlass", Color=(0.9, 0.95, 1.0), Roughness=0.1, IOR=1.45))
@@ -496,7 +496,7 @@ def _grouped_scene():
     scenes.light('SPOT', (2.0, -5.0, 3.0), (0.9, 0.0, 0.3), energy=500.0, shadow_soft_size=0.2)
     glow = scenes.sphere("Glow", 0.3, (0.3, -1.0, 1.6), scenes.emitter((4.0, 2.0, 1.0)))
     assert len(bpy.data.lights) == 4 and glow.name == "Glow"
-    scene.world.color = (0.1, 0.15, 0.2)
+    scenes.world_color(scene.world, (0.1, 0.15, 0.2))
     layer = bpy.context.view_layer
     for group, members in LIGHT_GROUPS.items():
         layer.lightgroups.add(name=group) if hasattr(layer.lightgroups, "add") \

@@ -31,7 +31,7 @@ def inside_integrators():
     pictures["exposure"] = scenes.render()
     scene.volley.film_exposure = 1.0
     bpy.data.objects["Wall"].hide_render = True
-    scene.world.color = (0.1, 0.2, 0.3)
+    scenes.world_color(scene.world, (0.1, 0.2, 0.3))
     pictures["world"] = scenes.render()
     scene.render.film_transparent = True
     pictures["transparent"] = scenes.render()
@@ -114,7 +114,7 @@ def inside_layer_switches():
     import bpy
     import scenes
     scene = scenes.empty()
-    scene.world.color = (0.25, 0.25, 0.25)
+    scenes.world_color(scene.world, (0.25, 0.25, 0.25))
     scenes.camera()
     moving = scenes.wall("Wall", 40.0, 0.0, (-20.0, 0.0), scenes.emitter((1.0, 0.0, 0.0)))
     for frame, x in ((0, -24.0), (1, -20.0), (2, -16.0)):
@@ -166,7 +166,7 @@ def inside_passes():
     small = scenes.wall("Small", 1.0, -1.0, material=scenes.emitter((2.0, 1.0, 0.5)))
     small.pass_index = 4
     scenes.light('SUN', rotation=(np.pi / 2, 0.0, 0.0), energy=2.0)
-    scene.world.color = (0.0, 0.0, 0.0)
+    scenes.world_color(scene.world, (0.0, 0.0, 0.0))
     names = []
     for entry in passes.PASSES:
         if "." not in entry.setting:

@@ -109,7 +109,7 @@ def _stage():
     scene = scenes.empty(size=(side, side))
     scenes.camera(location=(0.0, -20.0, 0.0), type='ORTHO', ortho_scale=float(GRID))
     scenes.light('AREA', location=(-6.0, -9.0, 8.0), rotation=(0.9, 0.0, -0.6), energy=1500.0, size=4.0)
-    scene.world.color = (0.35, 0.4, 0.5)
+    scenes.world_color(scene.world, (0.35, 0.4, 0.5))
     scenes.independent_seeds()
     bpy.context.scene.volley.clamp_indirect = 0.0
     bpy.context.scene.cycles.sample_clamp_indirect = 0.0

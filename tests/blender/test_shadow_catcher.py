@@ -48,7 +48,7 @@ def inside_lights():
     area = scenes.light('AREA', (1.5, -1.0, 3.5), (0.25, 0.35, 0.0), energy=200.0, size=1.0)
     pairs["area"] = scenes.by_both(SAMPLES)
     area.hide_render = True
-    bpy.context.scene.world.color = (0.1, 0.2, 0.4)
+    scenes.world_color(bpy.context.scene.world, (0.1, 0.2, 0.4))
     pairs["world"] = scenes.by_both(SAMPLES)
     sun.hide_render = area.hide_render = False
     sun.is_shadow_catcher = False  # not a light of the footage
@@ -75,11 +75,11 @@ def inside_surfaces():
             ("mirror", "ShaderNodeBsdfGlossy", {"Color": (0.8, 0.8, 0.8), "Roughness": 0.0}),
             ("gloss", "ShaderNodeBsdfPrincipled", {"Base_Color": (0.5, 0.4, 0.3), "Roughness": 0.3})):
         scene = _floor(node_type, **inputs)
-        scene.world.color = (0.4, 0.5, 0.6)
+        scenes.world_color(scene.world, (0.4, 0.5, 0.6))
         _sun()
         pairs[name] = scenes.by_both(SAMPLES)
     scene = _floor(Color=(0.8, 0.6, 0.4))
-    scene.world.color = (0.1, 0.15, 0.3)
+    scenes.world_color(scene.world, (0.1, 0.15, 0.3))
     _sun()
     scenes.wall("Pane", 2.0, -2.0, (0.6, 1.2),
                 scenes.material("Pane", "ShaderNodeBsdfTransparent", Color=(0.5, 0.8, 0.9)))
@@ -111,7 +111,7 @@ def inside_films():
     """The picture over the world by itself, and Cycles' transparent one to lay over it."""
     import scenes
     scene = _floor(Color=(0.8, 0.6, 0.4))
-    scene.world.color = WORLD
+    scenes.world_color(scene.world, WORLD)
     _sun()
     scenes.set_engine('CYCLES', SAMPLES)
     transparent = scenes.render()
@@ -139,7 +139,7 @@ def inside_passes():
     from volley import passes
     scene = _floor(Color=(0.8, 0.6, 0.4))
     _sun().data.color = (1.0, 0.7, 0.4)
-    scene.world.color = (0.1, 0.15, 0.3)
+    scenes.world_color(scene.world, (0.1, 0.15, 0.3))
     layer = bpy.context.view_layer
     bpy.ops.scene.view_layer_add_lightgroup(name="sky")
     scene.world.lightgroup = "sky"
@@ -183,7 +183,7 @@ def inside_regions():
     """The whole picture, and what a border and other integrators make of it."""
     import scenes
     scene = _floor(Color=(0.8, 0.6, 0.4))
-    scene.world.color = WORLD
+    scenes.world_color(scene.world, WORLD)
     _sun()
     scenes.set_engine('VOLLEY', 256)
     whole = scenes.render()

@@ -46,7 +46,7 @@ def _stage():
     scenes.sphere(radius=0.8, location=(0.0, 0.0, 0.8),
                   material=scenes.material("Ball", "ShaderNodeBsdfDiffuse", Color=(0.3, 0.5, 0.8)))
     scenes.light('SUN', (0, 0, 4), (0.6, 0.3, 0), energy=3.0, angle=0.1)
-    scene.world.color = (0.1, 0.2, 0.4)
+    scenes.world_color(scene.world, (0.1, 0.2, 0.4))
     return scene
 
 

@@ -98,7 +98,7 @@ def inside_override():
     scene = scenes.empty(size=(16, 16))
     scenes.camera()
     scenes.wall("Wall", 1.0, 0.0, material=scenes.material("Grey", "ShaderNodeBsdfDiffuse"))
-    scene.world.color = (0.1, 0.2, 0.4)
+    scenes.world_color(scene.world, (0.1, 0.2, 0.4))
     own = bpy.data.worlds.new("Own")
     own.color = (0.5, 0.3, 0.1)
     told = _listen()

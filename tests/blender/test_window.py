@@ -560,7 +560,7 @@ def inside_studio():
     space = _open(scene)
     space.region_3d.view_perspective = 'CAMERA'
     shading, found = space.shading, {}
-    scene.world.color = (0.0, 0.214, 0.0)
+    scenes.world_color(scene.world, (0.0, 0.214, 0.0))
     shading.use_scene_world_render = False
     shading.studio_light = 'forest.exr'
     shading.studiolight_rotate_z, shading.studiolight_intensity = 0.7, 0.6

@@ -25,7 +25,7 @@ def empty(engine='VOLLEY', size=(64, 48), samples=4):
         bpy.ops.preferences.addon_enable(module="volley")
     scene = bpy.context.scene
     scene.world = bpy.data.worlds.new("World")
-    scene.world.color = (0.0, 0.0, 0.0)
+    world_color(scene.world, (0.0, 0.0, 0.0))
     render = scene.render
     render.resolution_x, render.resolution_y = size
     render.resolution_percentage = 100
@@ -59,6 +59,13 @@ def set_engine(engine, samples):
 def socket(sockets, name):
     """A node's socket of that name or identifier: 5.0 gave some other names."""
     return sockets[name] if name in sockets else next(s for s in sockets if s.identifier == name)
+
+
+def world_color(world, color):
+    """Light a world evenly: since 5.0 its nodes do that, which it always has."""
+    world.color = color
+    if world.use_nodes:
+        world.node_tree.nodes["Background"].inputs["Color"].default_value = (*color, 1.0)
 
 
 def curves(owner):
