@@ -210,6 +210,13 @@ class NormalMapSpace(IntEnum):
     BLENDER_WORLD = 4
 
 
+class NormalMapFlags(IntFlag):
+    SCALED = 8
+    UNIT = 16
+    DOWN = 32
+    SPACE_MASK = 7
+
+
 class BumpMode(IntEnum):
     INVERT = 1
     ABOVE = 2
@@ -465,6 +472,9 @@ class VectorOperation(IntEnum):
     WRAP = 24
     FACEFORWARD = 25
     REFRACT = 26
+    ROUND = 27
+    SIGN = 28
+    POWER = 29
 
 
 class ImageInterpolation(IntEnum):
@@ -507,6 +517,7 @@ class MaterialFlags(IntFlag):
     SAMPLE_EMISSION = 1
     TRANSPARENT_SHADOW = 2
     PLAIN_CHOICE = 4
+    FACET_SHADOWING = 8
 
 
 class AlphaMode(IntEnum):
@@ -812,7 +823,7 @@ ENUMERATIONS = {StatusCode: "TRC_", IsaId: "TRC_ISA_", CameraType: "TRC_CAMERA_"
                 LightType: "TRC_LIGHT_", AreaShape: "TRC_AREA_", LightFlags: "TRC_LIGHT_",
                 AoMethod: "TRC_AO_", NodeType: "TRC_NODE_", ModeFlags: "TRC_MODE_", TableSize: "TRC_TABLE_",
                 DiffuseModel: "TRC_DIFFUSE_", ToonComponent: "TRC_TOON_", MappingType: "TRC_MAPPING_",
-                NormalMapSpace: "TRC_NORMAL_MAP_", BumpMode: "TRC_BUMP_",
+                NormalMapSpace: "TRC_NORMAL_MAP_", NormalMapFlags: "TRC_NORMAL_MAP_", BumpMode: "TRC_BUMP_",
                 DisplacementMethod: "TRC_DISPLACEMENT_", RampInterpolation: "TRC_RAMP_",
                 CurvesExtension: "TRC_CURVES_", SeparateMode: "TRC_SEPARATE_", ClampType: "TRC_CLAMP_",
                 TangentSource: "TRC_TANGENT_", SpaceId: "TRC_SPACE_", TransformedType: "TRC_TRANSFORMED_",

@@ -45,6 +45,15 @@ KEEPS_DIFFUSE_ENERGY = bpy.app.version >= (4, 3, 0)
 # The Bump node no longer keeps what its normals reflect above the surface: shaders do.
 LEAVES_BUMPS = bpy.app.version >= (4, 0, 0)
 
+# What lies in the shadow of bumps goes by other means; seen in 5.2, not in 4.3.
+HAS_FACET_SHADOWING = bpy.app.version >= (5, 0, 0)
+
+# The strength of a normal map of tangents scales what the map says; seen in 4.3, not in 3.4.
+SCALES_NORMAL_MAPS = bpy.app.version >= (4, 0, 0)
+
+# Such a map turns normals that are of unit length between the corners too; seen in 5.2, not in 4.3.
+HAS_UNIT_NORMALS = bpy.app.version >= (5, 0, 0)
+
 # Of heights, in pixels: a whole one till the Bump node got an input for it in 4.4.
 BUMP_FILTER_WIDTH = 0.1 if bpy.app.version >= (4, 4, 0) else 1.0
 

@@ -53,6 +53,8 @@ SKIPS = (
     Skip("test_warnings.py::test_nodes_of_lights_differ", None, (4, 0), "Cycles 3.4 is followed"),
     Skip("test_warnings.py::test_worlds_of_view_layers", None, (4, 3), "the setting came with 4.3"),
     Skip("test_sky.py::test_against_cycles[multiple*]", None, (5, 0), "the model came with 5.0"),
+    *(Skip(f"{_TEXTURE}[vector math {operation}]", None, (5, 0), "the operation came with 5.0") for operation in (
+        "ROUND", "SIGN", "POWER")),
     # Blender 4
     *(Skip(f"test_light_nodes.py::test_webs[{web} *]", (4, 0), None, _LIGHT_NODES) for web in (
         "round", "quadrant", "half", "whole", "open", "type b")),

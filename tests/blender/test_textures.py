@@ -151,7 +151,7 @@ for _kind in ("AXIS_ANGLE", "X_AXIS", "Y_AXIS", "Z_AXIS", "EULER_XYZ"):
 for _operation in ("ADD", "SUBTRACT", "MULTIPLY", "DIVIDE", "MULTIPLY_ADD", "CROSS_PRODUCT", "PROJECT",
                    "REFLECT", "REFRACT", "FACEFORWARD", "DOT_PRODUCT", "DISTANCE", "LENGTH", "SCALE",
                    "NORMALIZE", "ABSOLUTE", "MINIMUM", "MAXIMUM", "FLOOR", "CEIL", "FRACTION", "MODULO",
-                   "WRAP", "SNAP", "SINE", "COSINE", "TANGENT"):
+                   "WRAP", "SNAP", "SINE", "COSINE", "TANGENT", "ROUND", "SIGN", "POWER"):
     _add(f"vector math {_operation}", "ShaderNodeVectorMath",
          ("Value",) if _operation in ("DOT_PRODUCT", "DISTANCE", "LENGTH") else ("Vector",),
          {"operation": _operation}, Vector='vector')

@@ -19,7 +19,7 @@ static const struct {
 } random_types[] = {
     {TRC_NODE_MATH, TRC_MATH_DEGREES + 1, "fff"},
     {TRC_NODE_MIX_COLOR, TRC_BLEND_EXCLUSION + 1, "fcc"},
-    {TRC_NODE_VECTOR_MATH, TRC_VECTOR_REFRACT + 1, "cccf"},
+    {TRC_NODE_VECTOR_MATH, TRC_VECTOR_POWER + 1, "cccf"},
     {TRC_NODE_SEPARATE, 4, "c"},
     {TRC_NODE_COMBINE, 4, "fff"},
     {TRC_NODE_CLAMP, 2, "fff"},

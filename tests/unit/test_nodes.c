@@ -128,10 +128,10 @@ static void test_counts_of_modes(void **state) {
         {TRC_NODE_MIX_COLOR, 19 * 2},
         {TRC_NODE_MATH, 40 * 2},
         {TRC_NODE_MAP_RANGE, 2},
-        {TRC_NODE_NORMAL_MAP, 5},
+        {TRC_NODE_NORMAL_MAP, 5 * 2 * 2 * 2}, /* space, flags */
         {TRC_NODE_COLOR_RAMP, 2},
         {TRC_NODE_SEPARATE, 4},
-        {TRC_NODE_VECTOR_MATH, 27},
+        {TRC_NODE_VECTOR_MATH, 30},
         {TRC_NODE_INSTANCE_VALUES, TRC_MAX_INSTANCE_VALUES},
         {TRC_NODE_NOISE, 4 * 6},
         {TRC_NODE_MUSGRAVE, 4 * 5},

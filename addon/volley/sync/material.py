@@ -5,7 +5,7 @@ import bpy
 
 from .. import abi, native
 from ..abi import DisplacementMethod, NodeType
-from ..compat import CHOOSES_LOBES_PLAINLY, LEAVES_BUMPS, cycles, uses_nodes
+from ..compat import CHOOSES_LOBES_PLAINLY, HAS_FACET_SHADOWING, LEAVES_BUMPS, cycles, uses_nodes
 from . import flatten, instance, studio, tangents
 from .attributes import Attributes
 from .changes import Changes
@@ -256,6 +256,7 @@ def _flags(material, is_volume):
     has_transparent_shadow = is_volume or _has_transparent_shadow(material)
     flags = abi.MaterialFlags.TRANSPARENT_SHADOW if has_transparent_shadow else 0
     flags |= abi.MaterialFlags.PLAIN_CHOICE if CHOOSES_LOBES_PLAINLY else 0
+    flags |= abi.MaterialFlags.FACET_SHADOWING if HAS_FACET_SHADOWING else 0
     if cycles(material, "sample_as_light", cycles(material, "emission_sampling", 'AUTO') != 'NONE'):
         flags |= abi.MaterialFlags.SAMPLE_EMISSION
     return flags

@@ -12,9 +12,10 @@ import numpy as np
 
 from ..abi import (BlendMode, BumpMode, ClampType, DiffuseModel, DistributionType, EnvironmentProjection,
                    ImageExtension, ImageInterpolation, ImageProjection, MappingType, MathOperation as Math,
-                   ModeFlags, NodeType, NormalMapSpace, RampInterpolation, SeparateMode, SpaceId, TableSize,
-                   TangentSource, ToonComponent, VectorOperation as Vector)
-from ..compat import HAS_CORRELATED_MICROFACETS, HAS_FILMED_METAL, KEEPS_DIFFUSE_ENERGY, LEAVES_BUMPS, RAMP_STEPS
+                   ModeFlags, NodeType, NormalMapFlags, NormalMapSpace, RampInterpolation, SeparateMode,
+                   SpaceId, TableSize, TangentSource, ToonComponent, VectorOperation as Vector)
+from ..compat import (HAS_CORRELATED_MICROFACETS, HAS_FILMED_METAL, HAS_UNIT_NORMALS, KEEPS_DIFFUSE_ENERGY,
+                      LEAVES_BUMPS, RAMP_STEPS, SCALES_NORMAL_MAPS)
 from . import tangents
 from .converters import CONVERTERS, instance_value
 from .derived import ISLAND, POINTINESS
@@ -488,11 +489,17 @@ def _math(walker, node, sockets):
     return named_outputs(walker.emit(NodeType.MATH, values, mode), NodeType.MATH, ("Value",))
 
 
+_NORMAL_MAP_FLAGS = ((NormalMapFlags.SCALED if SCALES_NORMAL_MAPS else 0)
+                     | (NormalMapFlags.UNIT if HAS_UNIT_NORMALS else 0))
+
+
 def _normal_map(walker, node, sockets):
     space = NormalMapSpace[node.space]
     name = _tangents_of(walker, node) if space == NormalMapSpace.TANGENT else ""
-    index = walker.emit(NodeType.NORMAL_MAP, (sockets.get('f', "Strength"), sockets.get('c', "Color")), space,
-                        name=name)
+    is_down = getattr(node, "convention", 'OPENGL') == 'DIRECTX'
+    mode = space | _NORMAL_MAP_FLAGS | (NormalMapFlags.DOWN if is_down else 0)
+    values = sockets.get('f', "Strength"), sockets.get('c', "Color")
+    index = walker.emit(NodeType.NORMAL_MAP, values, mode, name=name)
     return named_outputs(index, NodeType.NORMAL_MAP, ("Normal",))
 
 

@@ -48,6 +48,17 @@ enum trc_normal_map_space {
     TRC_NORMAL_MAP_BLENDER_WORLD
 };
 
+/* Bits of NORMAL_MAP besides its space. SCALED: strength scales what a map of tangents says, and a
+ * negative one turns it around, as from Blender 4.0 on; else it goes from the shading normal to
+ * that of the map. UNIT: what such a map turns is as long between corners as at them, as in
+ * Blender 5. DOWN: the map's Y points down (DirectX). */
+enum trc_normal_map_flags {
+    TRC_NORMAL_MAP_SCALED = 8,
+    TRC_NORMAL_MAP_UNIT = 16,
+    TRC_NORMAL_MAP_DOWN = 32,
+    TRC_NORMAL_MAP_SPACE_MASK = 7
+};
+
 /* INVERT: bumps become hollows. ABOVE: normals are turned back until what they reflect rises above
  * the surface, as in Blender before 4.0. */
 enum trc_bump_mode { TRC_BUMP_INVERT = 1, TRC_BUMP_ABOVE = 2 };
@@ -275,7 +286,10 @@ enum trc_vector_operation {
     TRC_VECTOR_MODULO,
     TRC_VECTOR_WRAP,
     TRC_VECTOR_FACEFORWARD,
-    TRC_VECTOR_REFRACT /* scale: the relative index of refraction */
+    TRC_VECTOR_REFRACT, /* scale: the relative index of refraction */
+    TRC_VECTOR_ROUND,
+    TRC_VECTOR_SIGN,
+    TRC_VECTOR_POWER
 };
 
 /* Mode bits of IMAGE, one of each of the three. */
@@ -358,7 +372,10 @@ enum trc_material_flags {
         2, /* shadow rays see its transparency; else it is opaque to them */
     /* Lobes are chosen by their weights at camera hits too, as in Cycles 4; else each at least one
      * time in nine or so (Cycles 3.4). What Cycles loses with diffuse bounces 0 depends on it. */
-    TRC_MATERIAL_PLAIN_CHOICE = 4
+    TRC_MATERIAL_PLAIN_CHOICE = 4,
+    /* Diffuse lobes whose normals are bent lie in shadow as microfacets do (Cycles 5), which is
+     * darker towards the terminator; else as Cycles 3.4 and 4 have it. */
+    TRC_MATERIAL_FACET_SHADOWING = 8
 };
 
 /* A material from a node list, in use from the next commit on. INVALID_ARGUMENT, with the node and

@@ -339,6 +339,7 @@ static trc_status lower_vector_math(const struct lowering *l) {
     copy3(in + TRC_OP_AT(VECTOR_MATH, a), l->in + TRC_AT(VECTOR_MATH, a));
     const bool is_unary = mode == TRC_VECTOR_LENGTH || mode == TRC_VECTOR_SCALE ||
                           mode == TRC_VECTOR_NORMALIZE || mode == TRC_VECTOR_ABSOLUTE ||
+                          mode == TRC_VECTOR_ROUND || mode == TRC_VECTOR_SIGN ||
                           (mode >= TRC_VECTOR_FLOOR && mode <= TRC_VECTOR_TANGENT);
     if (!is_unary)
         copy3(in + TRC_OP_AT(VECTOR_MATH, b), l->in + TRC_AT(VECTOR_MATH, b));

@@ -116,7 +116,7 @@ static uint32_t last_mode(uint32_t op) {
         return TRC_BLEND_EXCLUSION;
     case TRC_OP_VECTOR_MATH:
     case TRC_OP_VECTOR_MEASURE:
-        return TRC_VECTOR_REFRACT;
+        return TRC_VECTOR_POWER;
     case TRC_OP_NOISE:
         return (TRC_FRACTAL_RIDGED_MULTIFRACTAL << TRC_NOISE_TYPE_SHIFT) + 3;
     case TRC_OP_WHITE_NOISE:
@@ -419,6 +419,21 @@ static const struct expectation expectations[] = {
     {TRC_OP_NORMAL_MAP, 0, NAME_UV, {.5f, 1, .5f, .5f}, {{H, 0, H}, {0, 0, 1}, {0, 0, 1}}},
     {TRC_OP_NORMAL_MAP, 0, NAME_TANGENT, {1, 1, .5f, .5f}, {{-1, 0, 0}, {0, 0, 1}, {0, 0, 1}}},
     {TRC_OP_NORMAL_MAP, 0, NAME_TANGENT, {1, .5f, 1, .5f}, {{0, 1, 0}, {0, 0, 1}, {0, 0, 1}}},
+    {TRC_OP_NORMAL_MAP,
+     TRC_NORMAL_MAP_SCALED,
+     NAME_TANGENT,
+     {-1, 1, .5f, .5f},
+     {{.94868330f, 0, .31622777f}, {0, 0, 1}, {0, 0, 1}}}, /* the object is 3 high */
+    {TRC_OP_NORMAL_MAP,
+     TRC_NORMAL_MAP_SCALED,
+     NAME_TANGENT,
+     {2, 1, .5f, .5f},
+     {{-1, 0, 0}, {0, 0, 1}, {0, 0, 1}}},
+    {TRC_OP_NORMAL_MAP,
+     2 | TRC_NORMAL_MAP_DOWN,
+     0,
+     {1, .5f, 1, .5f},
+     {{0, -1, 0}, {0, -1, 0}, {0, 0, 1}}},
     {TRC_OP_NORMAL_MAP, 1, 0, {1, 1, .5f, .5f}, {{0, 1, 0}, {1, 0, 0}, {0, 0, 1}}},
     {TRC_OP_NORMAL_MAP, 2, 0, {1, 1, .5f, .5f}, {{1, 0, 0}, {1, 0, 0}, {0, 0, 1}}},
     {TRC_OP_TRANSFORM,

@@ -43,12 +43,13 @@ struct trc_lobe {
     enum trc_lobe_kind kind; /* the model's */
     uint32_t distribution;
     uint32_t fresnel;
-    bool correlated;  /* microfacets mask and shadow by one height, as in Cycles 4 */
-    bool anisotropic; /* tangent is set and alpha_x may differ from alpha_y */
-    vmask ideal;      /* lanes that scatter into one direction only */
-    vvec3 weight;     /* throughput colour, >= 0; 0 in lanes that do not have the lobe */
-    vvec3 n;          /* the lobe's normal */
-    vvec3 tangent;    /* unit, orthogonal to n, anisotropic lobes only; bitangent is n x tangent */
+    bool correlated;      /* microfacets mask and shadow by one height, as in Cycles 4 */
+    bool facet_shadowing; /* bent normals lie in shadow as microfacets do, as in Cycles 5 */
+    bool anisotropic;     /* tangent is set and alpha_x may differ from alpha_y */
+    vmask ideal;          /* lanes that scatter into one direction only */
+    vvec3 weight;         /* throughput colour, >= 0; 0 in lanes that do not have the lobe */
+    vvec3 n;              /* the lobe's normal */
+    vvec3 tangent; /* unit, orthogonal to n, anisotropic lobes only; bitangent is n x tangent */
     vfloat alpha_x, alpha_y;
     vfloat ior;       /* refraction: relative index, transmitted over incident side; metal under a
                          film: the film's */

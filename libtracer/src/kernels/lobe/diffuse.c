@@ -77,7 +77,7 @@ static struct lobe_value energy_oren_nayar_value(const struct trc_lobe *lobe,
                                                  const struct trc_surface *s, vvec3 wi) {
     const vfloat cos_n = v3_dot(lobe->n, wi);
     const vmask faces = vf_gt(cos_n, vf_zero());
-    const vfloat bumps = bump_shadowing(s->n, lobe->n, wi, cos_n);
+    const vfloat bumps = bump_shadowing_of(lobe, s, wi, cos_n);
     const vvec3 value = energy_oren_nayar(lobe, cos_n, v3_dot(wi, s->wo));
     const vfloat pdf = vf_where(faces, cosine_density(cos_n));
     return (struct lobe_value){v3_mul(lobe->weight, v3_where(faces, v3_scale(value, bumps))), pdf,

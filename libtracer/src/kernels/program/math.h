@@ -77,6 +77,9 @@ static vfloat math_compare(vfloat a, vfloat b, vfloat c) {
     return vf_truth(vm_or(vf_eq(a, b), near));
 }
 
+/* Ties go up. */
+static vfloat math_round(vfloat a) { return vf_floor(a + vf_set(0.5f)); }
+
 /* The Math node without its clamp. Long because it is the list of its modes. */
 static vfloat op_math(uint32_t mode, vfloat a, vfloat b, vfloat c) {
     switch (mode) {
@@ -119,7 +122,7 @@ static vfloat op_math(uint32_t mode, vfloat a, vfloat b, vfloat c) {
     case TRC_MATH_SMOOTH_MAX:
         return -math_smooth_min(-a, -b, c);
     case TRC_MATH_ROUND:
-        return vf_floor(a + vf_set(0.5f));
+        return math_round(a);
     case TRC_MATH_FLOOR:
         return vf_floor(a);
     case TRC_MATH_CEIL:
@@ -264,6 +267,12 @@ static vvec3 op_vector_math(uint32_t mode, vvec3 a, vvec3 b, vvec3 c, vfloat sca
         return v3_select(vf_lt(v3_dot(c, b), vf_zero()), a, v3_neg(a));
     case TRC_VECTOR_REFRACT:
         return vector_refract(a, b, scale);
+    case TRC_VECTOR_ROUND:
+        return v3(math_round(a.x), math_round(a.y), math_round(a.z));
+    case TRC_VECTOR_SIGN:
+        return v3(math_sign(a.x), math_sign(a.y), math_sign(a.z));
+    case TRC_VECTOR_POWER:
+        return v3(math_power(a.x, b.x), math_power(a.y, b.y), math_power(a.z, b.z));
     default:
         return v3_zero();
     }

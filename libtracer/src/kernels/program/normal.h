@@ -100,13 +100,16 @@ static void tangent_frame(const struct trc_surface *s, const struct lane_group *
  */
 static vvec3 normal_of_group(const struct trc_surface *s, const struct lane_group *g, uint32_t mode,
                              const struct trc_attribute *a, vvec3 c) {
-    if (mode == TRC_NORMAL_MAP_WORLD || mode == TRC_NORMAL_MAP_BLENDER_WORLD)
+    const uint32_t space = mode & TRC_NORMAL_MAP_SPACE_MASK;
+    if (space == TRC_NORMAL_MAP_WORLD || space == TRC_NORMAL_MAP_BLENDER_WORLD)
         return v3_normalize(c);
     vvec3 n = c;
-    if (mode == TRC_NORMAL_MAP_TANGENT) {
+    if (space == TRC_NORMAL_MAP_TANGENT) {
         vvec3 normal, tangent;
         vfloat sign;
         tangent_frame(s, g, a, &normal, &tangent, &sign);
+        if (mode & TRC_NORMAL_MAP_UNIT)
+            normal = v3_normalize(normal);
         const vvec3 bitangent = v3_scale(v3_cross(normal, tangent), sign);
         n = v3_mad(tangent, c.x, v3_mad(bitangent, c.y, v3_scale(normal, c.z)));
     }
@@ -115,13 +118,25 @@ static vvec3 normal_of_group(const struct trc_surface *s, const struct lane_grou
     return normal_to_world(&m, n);
 }
 
+/* What a colour of a map says, of length 1 in most maps. */
+TRC_INLINE vvec3 normal_of_color(uint32_t mode, vvec3 color) {
+    const vfloat half = vf_set(0.5f), two = vf_set(2.0f);
+    const vvec3 c = v3(two * (color.x - half), two * (color.y - half), two * (color.z - half));
+    const bool is_blender = (mode & TRC_NORMAL_MAP_SPACE_MASK) >= TRC_NORMAL_MAP_BLENDER_OBJECT;
+    const bool turns_y = is_blender != !!(mode & TRC_NORMAL_MAP_DOWN);
+    return v3(c.x, turns_y ? -c.y : c.y, is_blender ? -c.z : c.z);
+}
+
 /* The shading normal stays where there is no such attribute. */
 static vvec3 op_normal_map(const struct trc_surface *s, uint32_t mode, uint32_t name,
                            vfloat strength, vvec3 color) {
-    const vfloat half = vf_set(0.5f), two = vf_set(2.0f);
-    vvec3 c = v3(two * (color.x - half), two * (color.y - half), two * (color.z - half));
-    if (mode >= TRC_NORMAL_MAP_BLENDER_OBJECT)
-        c = v3(c.x, -c.y, -c.z);
+    const bool is_tangent = (mode & TRC_NORMAL_MAP_SPACE_MASK) == TRC_NORMAL_MAP_TANGENT;
+    vvec3 c = normal_of_color(mode, color);
+    if (is_tangent && mode & TRC_NORMAL_MAP_SCALED) {
+        const vfloat height = vf_one() + vf_saturate(strength) * (c.z - vf_one());
+        c = v3(c.x * strength, c.y * strength, height);
+        strength = vf_one();
+    }
     const vmask full = vf_eq(strength, vf_one());
     vvec3 out = s->n;
     struct lane_group g = groups_begin(s);
@@ -129,7 +144,7 @@ static vvec3 op_normal_map(const struct trc_surface *s, uint32_t mode, uint32_t 
         if (!g.instance)
             continue;
         const struct trc_attribute *a = mesh_attribute(g.mesh, name, 2);
-        if (mode == TRC_NORMAL_MAP_TANGENT && !a)
+        if (is_tangent && !a)
             continue;
         vvec3 n = normal_of_group(s, &g, mode, a, c);
         n = v3_select(s->backfacing, v3_neg(n), n);
