@@ -13,6 +13,7 @@ MAX_LIGHT_GROUPS = 32
 MAX_KEYS = 33
 MAX_ATTRIBUTES = 8
 MAX_INSTANCE_VALUES = 256
+MAX_SHADOW_CLASSES = 15
 MAX_NODES = 4096
 MAX_NODE_INPUTS = 32
 NO_HIT = 4294967295
@@ -636,6 +637,7 @@ class FeatureFlags(IntFlag):
     AMBIENT_OCCLUSION = 131072
     SHADOW_CATCHERS = 262144
     SLOPES = 524288
+    LINKS = 1048576
 
 
 class CameraDesc(Structure):
@@ -676,7 +678,8 @@ class InstanceDesc(Structure):
                 ("visibility", c_uint32), ("pass_index", c_int32), ("random", c_float),
                 ("color", c_float * 4), ("cryptomatte_object", c_float), ("cryptomatte_asset", c_float),
                 ("light_group", c_uint32), ("flags", c_uint32), ("reserved", c_uint32),
-                ("value_count", c_uint32), ("values", c_void_p))
+                ("value_count", c_uint32), ("values", c_void_p), ("light_set", c_uint32),
+                ("shadow_set", c_uint32), ("light_exclude", c_uint64), ("shadow_exclude", c_uint64))
 
 
 class LightDesc(Structure):
@@ -687,7 +690,7 @@ class LightDesc(Structure):
                 ("spot_angle", c_float), ("spot_blend", c_float), ("visibility", c_uint32),
                 ("cast_shadow", c_uint32), ("use_mis", c_uint32), ("light_group", c_uint32),
                 ("flags", c_uint32), ("random", c_float), ("bounce_limit", c_uint32), ("reserved", c_uint32),
-                ("material", c_uint64))
+                ("material", c_uint64), ("light_exclude", c_uint64), ("shadow_exclude", c_uint64))
 
 
 class WorldDesc(Structure):
@@ -809,8 +812,9 @@ class SceneStats(Structure):
 # By their names in C.
 CONSTANTS = {"TRC_MAX_LIGHT_GROUPS": MAX_LIGHT_GROUPS, "TRC_MAX_KEYS": MAX_KEYS,
              "TRC_MAX_ATTRIBUTES": MAX_ATTRIBUTES, "TRC_MAX_INSTANCE_VALUES": MAX_INSTANCE_VALUES,
-             "TRC_MAX_NODES": MAX_NODES, "TRC_MAX_NODE_INPUTS": MAX_NODE_INPUTS, "TRC_NO_HIT": NO_HIT,
-             "TRC_MAX_AOVS": MAX_AOVS, "TRC_CRYPTOMATTE_KINDS": CRYPTOMATTE_KINDS,
+             "TRC_MAX_SHADOW_CLASSES": MAX_SHADOW_CLASSES, "TRC_MAX_NODES": MAX_NODES,
+             "TRC_MAX_NODE_INPUTS": MAX_NODE_INPUTS, "TRC_NO_HIT": NO_HIT, "TRC_MAX_AOVS": MAX_AOVS,
+             "TRC_CRYPTOMATTE_KINDS": CRYPTOMATTE_KINDS,
              "TRC_CRYPTOMATTE_LAYER_RANKS": CRYPTOMATTE_LAYER_RANKS,
              "TRC_MAX_CRYPTOMATTE_LAYERS": MAX_CRYPTOMATTE_LAYERS,
              "TRC_MAX_CRYPTOMATTE_DEPTH": MAX_CRYPTOMATTE_DEPTH, "TRC_SUMS_END": SUMS_END,

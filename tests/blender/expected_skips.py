@@ -49,7 +49,7 @@ SKIPS = (
         "velvety", "coated emission")),
     Skip(f"{_SHADER}[principled diffuse roughness *]", None, (4, 3), "the input came with 4.3"),
     Skip(f"{_LIGHT}[rough base]", None, (4, 3), "the input came with 4.3"),
-    Skip("test_warnings.py::test_links_of_lights_are_left_out", None, (4, 0), "light linking came with 4.0"),
+    Skip("test_linking.py::*", None, (4, 0), "light linking came with 4.0"),
     Skip("test_warnings.py::test_nodes_of_lights_differ", None, (4, 0), "Cycles 3.4 is followed"),
     Skip("test_warnings.py::test_worlds_of_view_layers", None, (4, 3), "the setting came with 4.3"),
     Skip("test_sky.py::test_against_cycles[multiple*]", None, (5, 0), "the model came with 5.0"),

@@ -52,45 +52,6 @@ def test_movies_are_not_played(blender):
         assert color[2] > 0.4 and color[0] < 0.4  # a frame of it, not magenta
 
 
-def inside_links():
-    """The warnings of a scene without links of lights, with those of one object, and with more."""
-    import bpy
-    import scenes
-    scenes.empty(size=(16, 16))
-    scenes.camera()
-    wall = scenes.wall("Wall", 2.0, 0.0)
-    lights = [scenes.light('SUN'), scenes.light('POINT'), wall]
-    group = bpy.data.collections.new("Group")
-    told, found = _listen(), []
-
-    def look():
-        told.clear()
-        scenes.render()
-        found.append(list(told))
-
-    look()
-    lights[0].light_linking.receiver_collection = group
-    look()
-    for each in lights:
-        each.light_linking.receiver_collection = group
-    lights[1].light_linking.blocker_collection = group
-    look()
-    lights[1].hide_render = True
-    look()
-    return [each.name for each in lights], found
-
-
-def test_links_of_lights_are_left_out(blender):
-    import blender as blender_support
-    if blender_support.version() < (4, 0):
-        pytest.skip("lights have no links")
-    names, found = blender.run(inside_links)
-    one = f"Light linking is not supported: object '{names[0]}' lights everything"
-    more = one.replace("' l", "' and 2 more l")
-    assert found == [[], [one], [more, f"Shadow linking is not supported: object '{names[1]}' is blocked by "
-                                 "everything"], [one.replace("' l", "' and 1 more l")]]
-
-
 def inside_override():
     """Pictures by both engines of two view layers, one with a world of its own, and the warnings."""
     import bpy

@@ -14,6 +14,7 @@ import numpy as np
 from .. import abi, native
 from . import motion, visibility
 from .hashing import HASH_MAX, hash_name, hash_pair
+from .linking import ObjectLinks
 from .matrix import rows12
 
 
@@ -35,6 +36,7 @@ class Item:
     color: tuple = (1.0, 1.0, 1.0, 1.0)
     light_group: int = 0       # from 1 on, 0 for none
     flags: int = 0             # INSTANCE_*
+    links: ObjectLinks = ObjectLinks()
     values: tuple = ()         # see instancer_values and attributes.Attributes
     light: dict = None         # fields of a light instead of a mesh
     motion_keys: int = 1       # how many the object asks for
@@ -60,6 +62,11 @@ class Plain:
 
     def __init__(self, evaluated):
         self.object, self.matrix_world = evaluated, evaluated.matrix_world
+
+
+def maker_of(instance):
+    """What makes an instance, None for an object that stands for itself."""
+    return instance.parent if instance.is_instance else None
 
 
 def hair_key(instance, number):
@@ -104,8 +111,9 @@ def _uppermost(blender_object):
     return blender_object
 
 
-def describe(instance, view_layer, light_groups):
-    """The parts of an item that meshes and lights share; light_groups: {name: number}."""
+def describe(instance, view_layer, light_groups, links):
+    """The parts of an item that meshes and lights share; light_groups: {name: number}, links:
+    linking.Links."""
     blender_object = instance.object
     return Item(
         key=key_of(instance), owner=blender_object.name_full,
@@ -115,6 +123,7 @@ def describe(instance, view_layer, light_groups):
         pass_index=blender_object.pass_index, random=random_of(instance),
         color=tuple(blender_object.color),
         light_group=light_groups.get(blender_object.lightgroup, 0),
+        links=links.of(blender_object, maker_of(instance)),
         flags=int(abi.InstanceFlags.SHADOW_CATCHER) * visibility.is_shadow_catcher(instance, view_layer))
 
 
@@ -211,13 +220,13 @@ class Instances:
         transforms = motion.follow_turns(collapse(item.transforms))
         signature = (mesh_id, transforms.tobytes(), item.materials, item.hole, item.visibility,
                      item.pass_index, item.random, item.color, item.name, item.asset, item.light_group,
-                     item.flags, item.values)
+                     item.flags, item.links, item.values)
         entry = self._entries.get(item.key)
         if entry is not None and entry.signature == signature:
             return
         values = {"mesh": mesh_id, "transforms": transforms, "pass_index": item.pass_index,
                   "random": item.random, "color": item.color, "light_group": item.light_group,
-                  "flags": item.flags, "values": item.values,
+                  "flags": item.flags, **item.links._asdict(), "values": item.values,
                   "cryptomatte_object": native.cryptomatte_id(item.name),
                   "cryptomatte_asset": native.cryptomatte_id(item.asset)}
         parts = _parts(item)

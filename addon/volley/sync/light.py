@@ -35,6 +35,8 @@ def describe(light_object, item, materials, warnings):
         "spread": math.pi, "spot_angle": math.pi,
         "visibility": light_visibility(light_object),
         "light_group": item.light_group,
+        "light_exclude": item.links.light_exclude,
+        "shadow_exclude": item.links.shadow_exclude,
         "random": item.random,
         "bounce_limit": _bounce_limit(light),
         "material": materials.light_id(light) if uses_nodes(light) else 0,

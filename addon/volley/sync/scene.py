@@ -87,7 +87,7 @@ class SceneSync:
         """Bring one object up to date; False where its mesh must be read in a walk."""
         name, view_layer = each.object.name_full, source.depsgraph.view_layer_eval
         if instance.is_light(each):
-            item = instance.describe(each, view_layer, source.light_groups)
+            item = instance.describe(each, view_layer, source.light_groups, shown.links)
             fields = light.describe(each.object, item, self._materials, self.warnings)
             return fields is not None and self._lights.change(item.key, fields)
         known = shown.items[instance.key_of(each)]
@@ -98,7 +98,7 @@ class SceneSync:
             return False
         if name in source.changes.geometry and not self._change_mesh(each, known, shown, source):
             return False
-        item = instance.describe(each, view_layer, source.light_groups)
+        item = instance.describe(each, view_layer, source.light_groups, shown.links)
         item.mesh_key = known.mesh_key
         dress(item, self._materials, each, source, self._materials.instance_values())
         self._instances.change(item, self._meshes.id_of(item.mesh_key))

@@ -18,6 +18,7 @@ class Shown:
 
     def __init__(self, walk, source):
         self.items, self._lights, self._tied = walk.items, walk.lights, walk.tied
+        self.links = walk.links
         self.users = Counter(item.mesh_key for item in walk.items.values())
         self._identity = self._identity_of(source)
 
@@ -43,7 +44,7 @@ class Shown:
         if original is None or name in self._tied:
             return None
         evaluated = original.evaluated_get(source.depsgraph)
-        if not evaluated.is_evaluated:
+        if not evaluated.is_evaluated or not self.links.knows(evaluated):
             return None
         each = instance.Plain(evaluated)
         key = instance.key_of(each)

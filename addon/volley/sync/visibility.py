@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Which rays see an object: Blender's ray visibility switches as the library's bits."""
 
-import bpy
-
 from ..abi import VisibleRays
 
 # Plain numbers: these are put together for every object, and flags of Python's are slow at it.
@@ -47,17 +45,6 @@ def instance_visibility(instance, view_layer):
     if owner.indirect_only_get(view_layer=view_layer) and not is_holdout(instance, view_layer):
         mask &= ~_CAMERA
     return mask
-
-
-_HAS_LINKING = "light_linking" in bpy.types.Object.bl_rna.properties  # from 4.0 on
-
-
-def light_links(blender_object):
-    """Names of the properties of light linking that an object uses."""
-    linking = blender_object.light_linking if _HAS_LINKING else None
-    if linking is None:
-        return ()
-    return [name for name in ("receiver_collection", "blocker_collection") if getattr(linking, name) is not None]
 
 
 def is_holdout(instance, view_layer):

@@ -8,14 +8,11 @@ import bpy
 from ..abi import InstanceFlags
 from ..compat import has_adaptive_subdivision
 from . import deform, instance, light, mesh, motion, strands, tubes, visibility
+from .linking import Links
 from .matrix import rows12
 from .source import Cancelled
 
 _BREAK_INTERVAL = 32  # instances between two looks at whether the user pressed Esc
-
-# Properties of light linking, what they are called, and what their objects do without.
-_LINKS = (("receiver_collection", "Light linking", "lights everything"),
-          ("blocker_collection", "Shadow linking", "is blocked by everything"))
 
 
 def dress(item, materials, each, source, values_of):
@@ -26,11 +23,6 @@ def dress(item, materials, each, source, values_of):
         item.values = values_of(each, source.depsgraph.scene_eval)
     item.hole = materials.holdout_id() if visibility.is_holdout(each, view_layer) else 0
     item.materials = tuple(materials.id_of(material) for material in materials_of(each.object, view_layer))
-
-
-def maker_of(each):
-    """What makes an instance, None for an object that stands for itself."""
-    return each.parent if each.is_instance else None
 
 
 def materials_of(blender_object, view_layer):
@@ -76,7 +68,7 @@ class Walk:
         self.lights = {}      # key -> fields of a light
         self.tied = set()     # names of objects that are instanced or make instances
         self._volumes = set()  # names of objects of volumes
-        self._linked = {}      # property of light linking -> names of objects that use it
+        self.links = Links(source.depsgraph, sync.warnings)
 
     def run(self):
         """Find what is there now."""
@@ -89,8 +81,6 @@ class Walk:
                 self._add_hair(each)
             if not each.show_self:
                 continue
-            for name in visibility.light_links(each.object):
-                self._linked.setdefault(name, set()).add(each.object.name)
             if instance.is_light(each):
                 self._add_light(each)
             elif instance.has_mesh(each) and self._view_layer.use_solid:
@@ -100,8 +90,6 @@ class Walk:
             elif isinstance(each.object.data, bpy.types.Volume):
                 self._volumes.add(each.object.name)
         self._warn_of("Volumes are not supported", self._volumes, "is left out")
-        for name, what, does in _LINKS:
-            self._warn_of(f"{what} is not supported", self._linked.get(name), does)
 
     def _warn_of(self, text, names, does):
         """One warning of all objects of those names, if there are any."""
@@ -140,7 +128,7 @@ class Walk:
         dress(item, self._sync._materials, each, self._source, self._values_of)
 
     def _describe(self, each):
-        return instance.describe(each, self._view_layer, self._source.light_groups)
+        return instance.describe(each, self._view_layer, self._source.light_groups, self.links)
 
     def _add_light(self, each):
         if not light.are_shown(self._source.v3d):
@@ -157,7 +145,7 @@ class Walk:
         item = self._describe(each)
         self._dress(item, each)
         if self._shutter is not None:
-            item.motion_keys = motion.key_count(blender_object, maker_of(each))
+            item.motion_keys = motion.key_count(blender_object, instance.maker_of(each))
             item.transforms *= item.motion_keys
         item.mesh_key = self._mesh_key(item, each)
         if item.mesh_key is not None:
@@ -197,7 +185,7 @@ class Walk:
         item of the same source has it. As in Cycles, displacement moves neither."""
         item.flags |= InstanceFlags.KEEPS_SHAPE
         if self._shutter is not None:
-            item.motion_keys = motion.key_count(each.object, maker_of(each))
+            item.motion_keys = motion.key_count(each.object, instance.maker_of(each))
             item.transforms *= item.motion_keys
         if source not in self._owners:
             self._owners[source] = item.key if self._put_made(each, item, source, made_of) else None
@@ -217,7 +205,8 @@ class Walk:
         if made is None:
             return False
         solid, data = made
-        if item.motion_keys > 1 and motion.may_deform(each.object, maker_of(each)) and made_of.may_move(each):
+        may_deform = item.motion_keys > 1 and motion.may_deform(each.object, instance.maker_of(each))
+        if may_deform and made_of.may_move(each):
             shapes = tubes.StrandMotion(solid, shape, data, item.motion_keys)
             self._deforming[item.key] = _Deforming(source, data, self._names, shapes, made_of.read)
         else:
@@ -268,7 +257,7 @@ class Walk:
             data.generated = mesh.generated_coordinates(blender_object, shape, data.positions)
         if self._sync._meshes.will_resync and deform.is_posable(blender_object):
             data.poses = mesh.Topology(shape)
-        if item.motion_keys > 1 and motion.may_deform(blender_object, maker_of(each)):
+        if item.motion_keys > 1 and motion.may_deform(blender_object, instance.maker_of(each)):
             return data, deform.MeshMotion(shape, data, item.motion_keys)
         return data, None
 

@@ -90,6 +90,10 @@ enum trc_instance_flags {
 
 #define TRC_MAX_INSTANCE_VALUES 256
 
+/* Different values of shadow_exclude beside 0, of instances and lights of one scene; what has one
+ * of more is blocked by everything, and a warning says so. */
+#define TRC_MAX_SHADOW_CLASSES 15
+
 typedef struct trc_instance_desc {
     uint32_t struct_size;    /* of this structure; checked */
     uint32_t key_count;      /* transforms, 1..TRC_MAX_KEYS, evenly spaced over [0, 1] */
@@ -110,6 +114,13 @@ typedef struct trc_instance_desc {
     uint32_t reserved;                           /* 0 */
     uint32_t value_count;                        /* 0..TRC_MAX_INSTANCE_VALUES */
     const float *values;                         /* for TRC_NODE_INSTANCE_VALUES */
+    uint32_t light_set;      /* 0..63: its bit in the light_exclude of what does not light it */
+    uint32_t shadow_set;     /* 0..63: its bit in the shadow_exclude of what shines through it. What
+                                is opaque and of set 0 hides such lights from reflected and
+                                refracted rays all the same, as in Cycles */
+    uint64_t light_exclude;  /* as an emitter: 1 << light_set of those that it does not light, as in
+                                trc_light_desc. The camera sees its emission all the same */
+    uint64_t shadow_exclude; /* as an emitter: 1 << shadow_set of those that do not block it */
 } trc_instance_desc;
 
 /* Of no mesh yet: at the origin, unscaled, the default material, visible to all rays, white. */

@@ -54,6 +54,10 @@ typedef struct trc_light_desc {
     uint32_t reserved; /* 0 */
     trc_id material;   /* its nodes: a material of the scene, of which emission alone counts,
                           times color and strength. 0, or one that was destroyed: white */
+    uint64_t light_exclude;  /* light linking: 1 << trc_instance_desc.light_set of the instances
+                                that it does not light; 0: it lights all */
+    uint64_t shadow_exclude; /* shadow linking: 1 << trc_instance_desc.shadow_set of those that do
+                                not block it, see TRC_MAX_SHADOW_CLASSES; 0: all do */
 } trc_light_desc;
 
 /* A point light of 1 W at the origin, white, without extent, that casts shadows and that all rays

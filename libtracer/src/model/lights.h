@@ -49,7 +49,9 @@ struct trc_lamp {
     uint32_t group;        /* light group; 0: none */
     uint32_t program;      /* number of its trc_lamp_program, from 1 on; 0: none */
     uint32_t bounce_limit; /* as trc_light_desc has it */
-    float unused[4];
+    uint32_t excluded[2];  /* its light_exclude, low word first */
+    uint32_t shadow_class; /* trc_snapshot.shadow_classes */
+    float unused[1];
 };
 
 /* What the nodes of a lamp need that does not emit evenly. */
@@ -85,7 +87,7 @@ struct trc_light_bound {
     int32_t two_sided;  /* the axis counts in both directions */
     int32_t child; /* inner node: index of the second child, the first is the next node; leaf: -1 */
     int32_t light; /* leaf: number of the light */
-    int32_t unused[2];
+    uint32_t excluded[2]; /* bits of the light sets that none of its lights lights */
 };
 
 /* Of a scene-linear colour. */
@@ -124,13 +126,15 @@ struct trc_light_table {
     uint32_t world_light;    /* number of the world as a light, or UINT32_MAX */
     uint32_t first_triangle; /* number of the first emissive triangle */
     uint32_t kinds;          /* 1 << kind of every light present */
-    bool hides;       /* some light is not visible to all of diffuse, glossy, transmission, or
-                         not of the footage behind shadow catchers */
-    bool single;      /* there is exactly one light (world apart: besides it) */
-    bool world_apart; /* the world is sampled beside the other lights, not chosen among them */
-    bool moves;       /* some emissive triangle moves */
-    bool varies;      /* some has emission by program */
-    bool limited;     /* some lamp has a bounce limit */
+    bool hides;          /* some light is not visible to all of diffuse, glossy, transmission, or
+                            not of the footage behind shadow catchers */
+    bool single;         /* there is exactly one light (world apart: besides it) */
+    bool world_apart;    /* the world is sampled beside the other lights, not chosen among them */
+    bool moves;          /* some emissive triangle moves */
+    bool varies;         /* some has emission by program */
+    bool linked;         /* TRC_FEATURE_LINKS */
+    bool shadows_linked; /* some emissive triangle has a shadow class */
+    bool limited;        /* some lamp has a bounce limit */
     uint32_t program_count;
     struct trc_lamp *lamps;
     struct trc_lamp_program *programs; /* of lamps; NULL: all emit evenly */

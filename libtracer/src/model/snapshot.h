@@ -64,8 +64,11 @@ struct trc_affine {
  * shadow catchers could be in its way (kernels/tile/catcher.c). */
 enum {
     TRC_VISIBLE_UNBLOCKED = 1 << 5, /* of such rays, of shadow catchers, of lights they find */
-    TRC_UNBLOCKED_SHIFT = 8 /* shadow catchers have their TRC_VISIBLE_* here once more, so that one
-                               test of a traversal tells which unblocked rays meet them */
+    TRC_VISIBLE_EMITTER = 1 << 6,   /* of what has a shadow class: kernels/tile/linked.c */
+    TRC_VISIBLE_SOLID = 1 << 7,     /* of what hides those from some, whatever blocks them */
+    TRC_UNBLOCKED_SHIFT = 8, /* shadow catchers have their TRC_VISIBLE_* here once more, so that one
+                                test of a traversal tells which unblocked rays meet them */
+    TRC_SHADOW_CLASS_SHIFT = 16 /* from here on, by shadow class - 1: what blocks such lights */
 };
 
 struct trc_instance {
@@ -83,7 +86,10 @@ struct trc_instance {
     float random;
     float color[4];
     float cryptomatte_object, cryptomatte_asset;
-    uint32_t light_group; /* of its emission, from 1 on; 0: none */
+    uint32_t light_group;           /* of its emission, from 1 on; 0: none */
+    uint32_t light_set, shadow_set; /* as trc_instance_desc has them */
+    uint32_t shadow_class;          /* of its emission: trc_snapshot.shadow_classes */
+    uint64_t light_exclude;         /* as trc_instance_desc has it */
     uint32_t first_light; /* first emissive-triangle light of this instance or UINT32_MAX */
     uint32_t flips;       /* 1: negative determinant at key 0 */
     uint32_t keeps_shape; /* 1: displacement moves no vertices */
@@ -151,8 +157,19 @@ struct trc_snapshot {
     struct trc_camera camera;
     uint32_t has_camera;
     struct trc_world world;
+    /* The values of shadow_exclude, by shadow class - 1; class 0: everything blocks. */
+    uint64_t shadow_classes[TRC_MAX_SHADOW_CLASSES];
+    uint32_t shadow_class_count;
     trc_scene_stats stats;
 };
+
+/* 0 also for a set that there was no class left for. */
+static inline uint32_t trc_shadow_class_of(const struct trc_snapshot *s, uint64_t excluded) {
+    for (uint32_t i = 0; excluded && i < s->shadow_class_count; i++)
+        if (s->shadow_classes[i] == excluded)
+            return i + 1;
+    return 0;
+}
 
 /* Position of an instance's transform at a time. Formula of every interpolation in the library:
  * a + f * (b - a), so that what stands still keeps its bits beside what never had keys. Bounds

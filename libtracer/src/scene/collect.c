@@ -161,6 +161,62 @@ static uint32_t visibility_of(const struct trc_scene_instance *source) {
     return source->visibility | source->visibility << TRC_UNBLOCKED_SHIFT | TRC_VISIBLE_UNBLOCKED;
 }
 
+/* Gives a shadow_exclude its class. False where none is left. */
+static bool add_class(struct trc_snapshot *s, uint64_t excluded) {
+    if (!excluded || trc_shadow_class_of(s, excluded))
+        return true;
+    if (s->shadow_class_count == TRC_MAX_SHADOW_CLASSES)
+        return false;
+    s->shadow_classes[s->shadow_class_count++] = excluded;
+    return true;
+}
+
+/* The shadow classes of all lights and instances. */
+static void find_classes(const struct trc_scene_state *scene, struct trc_snapshot_block *block) {
+    const struct trc_store *lights = &scene->lights, *instances = &scene->instances;
+    uint32_t failed = 0;
+    for (uint32_t i = trc_store_first(lights); i != TRC_STORE_END; i = trc_store_next(lights, i)) {
+        const trc_light_desc *light = lights->slots[i].object;
+        failed += !add_class(&block->snapshot, light->shadow_exclude);
+    }
+    for (uint32_t i = trc_store_first(instances); i != TRC_STORE_END;
+         i = trc_store_next(instances, i)) {
+        const struct trc_scene_instance *instance = instances->slots[i].object;
+        failed += !add_class(&block->snapshot, instance->shadow_exclude);
+    }
+    if (failed)
+        trc_warn(block,
+                 "%u lights are blocked by everything: there are more than %d sets of blockers",
+                 failed, TRC_MAX_SHADOW_CLASSES);
+}
+
+/* Which lights an instance blocks, and whether it is one of those that rays look for. */
+static uint32_t linked_visibility(const struct trc_snapshot *s,
+                                  const struct trc_instance *instance) {
+    if (!instance->visibility)
+        return 0;
+    uint32_t bits = instance->shadow_class ? TRC_VISIBLE_EMITTER : 0;
+    for (uint32_t i = 0; (instance->visibility & TRC_VISIBLE_SHADOW) && i < s->shadow_class_count;
+         i++)
+        bits |= (uint32_t)(~s->shadow_classes[i] >> instance->shadow_set & 1)
+                << (TRC_SHADOW_CLASS_SHIFT + i);
+    return bits;
+}
+
+/* Marks what hides emitters from rays that look for them: instances that no material lets shadow
+ * rays through and that are nobody's blockers. The instances may be those of a former snapshot,
+ * whose materials were others. */
+static void mark_solid(struct trc_snapshot *s) {
+    for (uint32_t i = 0; s->shadow_class_count && i < s->instance_count; i++) {
+        struct trc_instance *instance = &s->instances[i];
+        bool is_solid = instance->visibility && instance->shadow_set == 0;
+        for (uint32_t m = 0; m < instance->material_count; m++)
+            is_solid &= !trc_material_shadows_transparent(s->materials[instance->materials[m]]);
+        instance->visibility &= ~(uint32_t)TRC_VISIBLE_SOLID;
+        instance->visibility |= is_solid ? TRC_VISIBLE_SOLID : 0;
+    }
+}
+
 static uint64_t fill_instances(const struct trc_scene_state *scene,
                                const struct instance_data *data, struct trc_snapshot *s) {
     const struct trc_store *store = &scene->instances;
@@ -185,6 +241,10 @@ static uint64_t fill_instances(const struct trc_scene_state *scene,
             .cryptomatte_object = source->cryptomatte_object,
             .cryptomatte_asset = source->cryptomatte_asset,
             .light_group = source->light_group,
+            .light_set = source->light_set,
+            .shadow_set = source->shadow_set,
+            .light_exclude = source->light_exclude,
+            .shadow_class = trc_shadow_class_of(s, source->shadow_exclude),
             .first_light = UINT32_MAX,
             .keeps_shape = (source->flags & TRC_INSTANCE_KEEPS_SHAPE) != 0,
         };
@@ -195,6 +255,7 @@ static uint64_t fill_instances(const struct trc_scene_state *scene,
         }
         place(instance, source, transforms);
         hidden += !instance->visibility && source->visibility;
+        instance->visibility |= linked_visibility(s, instance);
         transforms += (size_t)2 * source->key_count;
         materials += material_count;
         memcpy(values, source->values, source->value_count * sizeof *values);
@@ -218,11 +279,16 @@ trc_status trc_collect_instances(const struct trc_scene_state *scene,
             memcpy(s->instances, former->snapshot.instances,
                    s->instance_count * sizeof *s->instances);
         }
+        memcpy(s->shadow_classes, former->snapshot.shadow_classes, sizeof s->shadow_classes);
+        s->shadow_class_count = former->snapshot.shadow_class_count;
         s->stats.skipped_instance_count = former->snapshot.stats.skipped_instance_count;
+        mark_solid(s);
         return TRC_OK;
     }
     TRC_TRY(create_instance_data(store, &block->instance_data));
+    find_classes(scene, block);
     s->stats.skipped_instance_count = fill_instances(scene, block->instance_data->object, s);
+    mark_solid(s);
     return TRC_OK;
 }
 

@@ -112,6 +112,10 @@ static trc_status make_instance(const struct trc_scene_state *scene, const trc_i
         .cryptomatte_asset = desc->cryptomatte_asset,
         .light_group = desc->light_group,
         .flags = desc->flags,
+        .light_set = desc->light_set,
+        .shadow_set = desc->shadow_set,
+        .light_exclude = desc->light_exclude,
+        .shadow_exclude = desc->shadow_exclude,
     };
     memcpy(instance->color, desc->color, sizeof instance->color);
     *instance_out = instance;
@@ -171,6 +175,12 @@ static trc_status check_light_material(const struct trc_scene_state *scene,
     return desc->material ? trc_store_find(&scene->materials, desc->material, &ignored) : TRC_OK;
 }
 
+/* What blocks a light is known to the instances. */
+static void mark_light(struct trc_scene_state *scene, const trc_light_desc *light) {
+    if (light->shadow_exclude)
+        scene->changed |= TRC_CHANGED_INSTANCES;
+}
+
 trc_status trc_scene_add_light(struct trc_scene_state *scene, const trc_light_desc *desc,
                                trc_id *id) {
     TRC_TRY(check_light_material(scene, desc));
@@ -178,6 +188,7 @@ trc_status trc_scene_add_light(struct trc_scene_state *scene, const trc_light_de
     if (!light)
         return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for a light");
     *light = *desc;
+    mark_light(scene, desc);
     const trc_status status = trc_store_add(&scene->lights, light, id);
     if (status != TRC_OK) {
         trc_free(light);
@@ -192,6 +203,8 @@ trc_status trc_scene_change_light(struct trc_scene_state *scene, trc_id id,
     void *light;
     TRC_TRY(trc_store_find(&scene->lights, id, &light));
     TRC_TRY(check_light_material(scene, desc));
+    mark_light(scene, light);
+    mark_light(scene, desc);
     *(trc_light_desc *)light = *desc;
     scene->changed |= TRC_CHANGED_LIGHTS;
     return TRC_OK;
@@ -200,6 +213,7 @@ trc_status trc_scene_change_light(struct trc_scene_state *scene, trc_id id,
 trc_status trc_scene_remove_light(struct trc_scene_state *scene, trc_id id) {
     void *light;
     TRC_TRY(trc_store_find(&scene->lights, id, &light));
+    mark_light(scene, light);
     trc_store_remove(&scene->lights, id);
     trc_free(light);
     scene->changed |= TRC_CHANGED_LIGHTS;

@@ -38,6 +38,8 @@ static uint32_t instance_features(const struct trc_snapshot *s) {
             features |= TRC_FEATURE_VISIBILITY;
         if (!instance->visibility)
             continue;
+        if (instance->light_exclude || instance->shadow_class)
+            features |= TRC_FEATURE_LINKS;
         if (instance->visibility & TRC_VISIBLE_UNBLOCKED)
             features |= TRC_FEATURE_SHADOW_CATCHERS;
         if (instance->key_count > 1)
@@ -67,6 +69,8 @@ static uint32_t light_features(const struct trc_scene_state *scene, const struct
         const trc_light_desc *light = store->slots[i].object;
         const uint32_t has = s->materials[trc_scene_material_index(scene, light->material)]->has;
         features |= TRC_FEATURE_LIGHTS;
+        if (light->light_exclude || light->shadow_exclude)
+            features |= TRC_FEATURE_LINKS;
         if (light->material)
             features |= material_features(has) & (TRC_FEATURE_PROGRAMS | TRC_FEATURE_TEXTURES);
         struct trc_lamp lamp;

@@ -52,8 +52,10 @@ struct trc_scene_instance {
     float random;
     float color[4];
     float cryptomatte_object, cryptomatte_asset;
-    uint32_t light_group; /* of its emission, from 1 on; 0: none */
-    uint32_t flags;       /* TRC_INSTANCE_* */
+    uint32_t light_group;           /* of its emission, from 1 on; 0: none */
+    uint32_t flags;                 /* TRC_INSTANCE_* */
+    uint32_t light_set, shadow_set; /* as trc_instance_desc has them, and so */
+    uint64_t light_exclude, shadow_exclude;
 };
 
 struct trc_scene_state {

@@ -168,6 +168,8 @@ bool trc_lamp_make(const trc_light_desc *desc, struct trc_lamp *lamp) {
         lamp->flags |= TRC_LAMP_LOCAL_UV;
     lamp->group = desc->light_group;
     lamp->bounce_limit = desc->bounce_limit;
+    lamp->excluded[0] = (uint32_t)desc->light_exclude;
+    lamp->excluded[1] = (uint32_t)(desc->light_exclude >> 32);
     lamp->flags |=
         (desc->use_mis ? TRC_LAMP_MIS : 0) | (desc->cast_shadow ? TRC_LAMP_CASTS_SHADOW : 0);
     if (!make_kind(desc, lamp))
@@ -182,6 +184,7 @@ void trc_lamp_bound(const struct trc_lamp *lamp, uint32_t number, struct trc_lig
     memcpy(b->axis, lamp->normal, sizeof b->axis);
     b->child = -1;
     b->light = (int32_t)number;
+    memcpy(b->excluded, lamp->excluded, sizeof b->excluded);
     switch (lamp->kind) {
 #define TRC_LAMP_KIND(NAME, name, is_it) \
     case TRC_KIND_##NAME:                \

@@ -58,11 +58,14 @@ static const struct trc_material *material_of(const struct trc_snapshot *s,
 
 /* Whether a material's triangles are lights. Cycles samples those only whose "multiple importance
  * sample" is on, and finds the others by rays. Matt lobes send none here: where there are some, all
- * are sampled. */
-static bool is_light(const struct trc_material *m, uint32_t scatters) {
+ * are sampled; so are those whose shadows are linked, whose number tells their shadow rays apart.
+ */
+static bool is_light(const struct trc_instance *instance, const struct trc_material *m,
+                     uint32_t scatters) {
     if (!m || !scatters || !(m->has & TRC_MATERIAL_HAS_EMISSION))
         return false;
-    if (!(scatters & TRC_MATERIAL_IS_MATT) && !(m->flags & TRC_MATERIAL_SAMPLE_EMISSION))
+    if (!(scatters & TRC_MATERIAL_IS_MATT) && !(m->flags & TRC_MATERIAL_SAMPLE_EMISSION) &&
+        !instance->shadow_class)
         return false;
     return (m->has & TRC_MATERIAL_EMISSION_VARIES) || trc_brightness(m->emission) > 0.0f;
 }
@@ -72,7 +75,7 @@ static bool has_lights(const struct trc_snapshot *s, const struct trc_instance *
     if (!(instance->visibility & RECEIVERS))
         return false;
     for (uint32_t i = 0; i < instance->material_count; i++)
-        if (is_light(s->materials[instance->materials[i]], scatters))
+        if (is_light(instance, s->materials[instance->materials[i]], scatters))
             return true;
     return false;
 }
@@ -128,7 +131,7 @@ static void add_triangles(struct trc_light_table *table, const struct trc_snapsh
             return; /* set_bounds says so */
         uint32_t number;
         const struct trc_material *m = material_of(s, instance, mesh, i, &number);
-        if (!is_light(m, options->scatters))
+        if (!is_light(instance, m, options->scatters))
             continue;
         struct trc_light_triangle *t = &table->triangles[table->triangle_count];
         float lower[3], upper[3];
@@ -145,8 +148,11 @@ static void add_triangles(struct trc_light_table *table, const struct trc_snapsh
             table->varies = true;
         }
         table->moves |= (t->flags & TRC_TRIANGLE_MOVES) != 0;
+        struct trc_light_bound *bound = &bounds[(*bound_count)++];
         bound_triangle(t, light, table->first_triangle + table->triangle_count, lower, upper,
-                       &bounds[(*bound_count)++]);
+                       bound);
+        bound->excluded[0] = (uint32_t)instance->light_exclude;
+        bound->excluded[1] = (uint32_t)(instance->light_exclude >> 32);
         table->triangle_count++;
     }
     const uint32_t count = table->triangle_count - before;
@@ -155,6 +161,7 @@ static void add_triangles(struct trc_light_table *table, const struct trc_snapsh
         return;
     instance->first_light = table->first_triangle + before;
     table->kinds |= 1u << TRC_KIND_TRIANGLE;
+    table->shadows_linked |= instance->shadow_class != 0;
     const bool catchers = s->features & TRC_FEATURE_SHADOW_CATCHERS;
     const uint32_t all = RECEIVERS | (catchers ? TRC_VISIBLE_UNBLOCKED : 0u);
     table->hides |= (instance->visibility & all) != all;
@@ -252,6 +259,7 @@ static void add_lamps(struct trc_light_table *table, const struct trc_snapshot *
         const uint32_t number = table->lamp_count++;
         table->kinds |= 1u << lamp->kind;
         table->limited |= lamp->bounce_limit != 0;
+        lamp->shadow_class = trc_shadow_class_of(s, options->lights[i].shadow_exclude);
         if (!options->scatters || !(lamp->visibility & RECEIVERS))
             continue;
         const uint32_t all = RECEIVERS | TRC_VISIBLE_UNBLOCKED;
@@ -350,6 +358,7 @@ static trc_status fill(struct trc_light_table *table, const struct trc_snapshot 
     if (status != TRC_OK)
         return status;
     uint32_t bound_count = 0;
+    table->linked = s->features & TRC_FEATURE_LINKS;
     status = allocate_programs(table, s, options);
     if (status != TRC_OK) {
         trc_free(bounds);

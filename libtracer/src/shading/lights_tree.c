@@ -381,6 +381,16 @@ static void enter_lights(struct trc_light_table *table, uint32_t node, uint32_t 
     enter_lights(table, (uint32_t)b->child, candidate, depth + 1, trail | 1u << depth);
 }
 
+/* Children come after their parents. */
+static void unite_excluded(struct trc_light_table *table) {
+    for (uint32_t i = table->bound_count; i-- > 0;) {
+        struct trc_light_bound *node = &table->bounds[i];
+        for (int k = 0; node->child >= 0 && k < 2; k++)
+            node->excluded[k] =
+                table->bounds[i + 1].excluded[k] & table->bounds[node->child].excluded[k];
+    }
+}
+
 trc_status trc_light_tree_build(struct trc_light_table *table, struct trc_light_bound *leaves,
                                 uint32_t count, uint32_t cut_max,
                                 const struct trc_light_options *options) {
@@ -396,6 +406,8 @@ trc_status trc_light_tree_build(struct trc_light_table *table, struct trc_light_
         return trc_fail(TRC_ERROR_CANCELLED, "the commit was cancelled");
     bound_top(&b, 0);
     table->bound_count = 2 * count - 1;
+    if (table->linked)
+        unite_excluded(table);
     choose_cut(table, cut_max);
     for (uint32_t i = 0; i < table->cut_count; i++)
         enter_lights(table, table->cut[i], i, 0, 0);

@@ -535,7 +535,8 @@ static void chances_match(void **state) {
                                    e.active);
             e.p = v3_mad(l.wi, l.distance, r.p);
             e.wo = v3_neg(l.wi);
-            const vfloat w = trc_light_triangle_weight(&e, r.p, r.n, vf_one(), vf_one());
+            const vfloat w =
+                trc_light_triangle_weight(&e, r.p, r.n, vi_set(-1), vf_one(), vf_one());
             for (int k = 0; k < TRC_WIDTH; k++) {
                 if (vi_get(l.light, k) >= 0)
                     count[vi_get(l.light, k)]++;

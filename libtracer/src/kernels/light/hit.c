@@ -95,6 +95,53 @@ struct lamp_clamp {
     vfloat limit;
 };
 
+/* Of the lanes that may see a lamp, those whose rays left what it lights. */
+static vmask linked_viewers(const struct trc_lamp *lamp, const struct trc_light_ray *ray,
+                            const struct trc_receiver *r, vmask viewers) {
+    const vmask unlit = trc_is_unlit(vu_set(lamp->excluded[0]), vu_set(lamp->excluded[1]), r->sets);
+    return vm_andnot(viewers, vm_andnot(unlit, is_camera_ray(ray->path)));
+}
+
+/* Of the lanes that may see the lamp, those that meet it between tmin and tmax; where, and what
+ * they see, weighted. */
+TRC_INLINE vmask lamp_meet(const struct trc_snapshot *snapshot, const struct trc_light_ray *ray,
+                           const struct trc_receiver *receiver, uint32_t number, vmask viewers,
+                           vfloat *distance_out, vvec3 *light_out, vfloat *weight_out) {
+    const struct trc_light_table *t = snapshot->lights;
+    const struct trc_lamp *lamp = &t->lamps[number];
+    vfloat pdf = vf_zero();
+    vvec3 light;
+    const vfloat distance = meet_lamp(lamp, ray->p, ray->wi, &pdf, &light);
+    vmask hit = vm_and(viewers, vm_and(vf_gt(distance, ray->tmin), vf_le(distance, ray->tmax)));
+    hit = vm_and(hit, vf_lt(distance, vf_set(INFINITY)));
+    if (!vm_any(hit))
+        return hit;
+    if (lamp->program)
+        light = v3_mul(light, emission_met(snapshot, ray, number, distance, hit));
+    vfloat weight = vf_one();
+    vmask weighed = vm_andnot(hit, vf_lt(ray->bsdf_pdf, vf_zero()));
+    if (lamp->bounce_limit) /* beyond it there were no samples */
+        weighed = vm_andnot(weighed, vi_lt(vi_set((int32_t)lamp->bounce_limit), ray->depth));
+    if (vm_any(weighed)) {
+        const vfloat chance = trc_light_chance(t, receiver, vi_set((int32_t)number), weighed);
+        weight = ray_weight(ray->bsdf_pdf, pdf * chance, ray->light_sample_count);
+        if (lamp->bounce_limit)
+            weight = vf_select(weighed, weight, vf_one());
+    }
+    *distance_out = distance;
+    *light_out = light;
+    *weight_out = weight;
+    return hit;
+}
+
+static struct trc_receiver receiver_of(const struct trc_snapshot *snapshot,
+                                       const struct trc_light_ray *ray, vmask active) {
+    struct trc_receiver receiver = trc_receiver_make(ray->p, ray->n);
+    if (snapshot->lights->linked)
+        trc_receiver_sets(snapshot, ray->left, active, receiver.sets);
+    return receiver;
+}
+
 /* clamp: NULL for none. */
 TRC_INLINE void lamps_meet(const struct trc_snapshot *snapshot, const struct trc_light_ray *ray,
                            uint32_t group, const struct lamp_clamp *clamp, vmask active,
@@ -102,7 +149,7 @@ TRC_INLINE void lamps_meet(const struct trc_snapshot *snapshot, const struct trc
     const struct trc_light_table *t = snapshot->lights;
     const bool all = group == TRC_ALL_GROUPS;
     const uint32_t end = t->group_seen[all ? TRC_MAX_LIGHT_GROUPS + 1 : group + 1];
-    const struct trc_receiver receiver = trc_receiver_make(ray->p, ray->n);
+    const struct trc_receiver receiver = receiver_of(snapshot, ray, active);
     for (uint32_t i = all ? 0 : t->group_seen[group]; i < end; i++) {
         const uint32_t number = t->seen[i];
         const struct trc_lamp *lamp = &t->lamps[number];
@@ -110,27 +157,18 @@ TRC_INLINE void lamps_meet(const struct trc_snapshot *snapshot, const struct trc
         if (!vm_any(viewers))
             continue;
         viewers = lamp_viewers(lamp, ray->path, viewers);
+        if (t->linked)
+            viewers = linked_viewers(lamp, ray, &receiver, viewers);
+        if (lamp->shadow_class)
+            viewers = vm_and(viewers, is_camera_ray(ray->path));
         if (!vm_any(viewers))
             continue;
-        vfloat pdf = vf_zero();
+        vfloat distance, weight;
         vvec3 light;
-        const vfloat distance = meet_lamp(lamp, ray->p, ray->wi, &pdf, &light);
-        vmask hit = vm_and(viewers, vm_and(vf_gt(distance, ray->tmin), vf_le(distance, ray->tmax)));
-        hit = vm_and(hit, vf_lt(distance, vf_set(INFINITY)));
+        const vmask hit =
+            lamp_meet(snapshot, ray, &receiver, number, viewers, &distance, &light, &weight);
         if (!vm_any(hit))
             continue;
-        if (lamp->program)
-            light = v3_mul(light, emission_met(snapshot, ray, number, distance, hit));
-        vfloat weight = vf_one();
-        vmask weighed = vm_andnot(hit, vf_lt(ray->bsdf_pdf, vf_zero()));
-        if (lamp->bounce_limit) /* beyond it there were no samples */
-            weighed = vm_andnot(weighed, vi_lt(vi_set((int32_t)lamp->bounce_limit), ray->depth));
-        if (vm_any(weighed)) {
-            const vfloat chance = trc_light_chance(t, &receiver, vi_set((int32_t)number), weighed);
-            weight = ray_weight(ray->bsdf_pdf, pdf * chance, ray->light_sample_count);
-            if (lamp->bounce_limit)
-                weight = vf_select(weighed, weight, vf_one());
-        }
         if (clamp)
             weight = weight *
                      trc_clamp_factor(v3_mul(clamp->weight, v3_scale(light, weight)), clamp->limit);
@@ -150,6 +188,25 @@ void trc_light_hit_clamped(const struct trc_snapshot *snapshot, const struct trc
     lamps_meet(snapshot, ray, group, &clamp, active, radiance);
 }
 
+vvec3 trc_light_hit_one(const struct trc_snapshot *snapshot, const struct trc_light_ray *ray,
+                        uint32_t number, vmask active, vfloat *distance) {
+    const struct trc_lamp *lamp = &snapshot->lights->lamps[number];
+    vmask viewers = vm_andnot(active, is_camera_ray(ray->path));
+    viewers = vm_and(viewers, near_lamp(lamp, ray->p, ray->wi));
+    if (!vm_any(viewers))
+        return v3_zero();
+    struct trc_light_ray whole = *ray;
+    whole.tmin = vf_zero();
+    whole.tmax = vf_set(TRC_FAR);
+    const struct trc_receiver receiver = receiver_of(snapshot, ray, active);
+    viewers = linked_viewers(lamp, ray, &receiver, lamp_viewers(lamp, ray->path, viewers));
+    vfloat weight;
+    vvec3 light;
+    const vmask hit =
+        lamp_meet(snapshot, &whole, &receiver, number, viewers, distance, &light, &weight);
+    return vm_any(hit) ? v3_where(hit, v3_scale(light, weight)) : v3_zero();
+}
+
 uint32_t trc_light_group(const struct trc_snapshot *snapshot, uint32_t light) {
     const struct trc_light_table *t = snapshot->lights;
     const struct trc_world *world = &snapshot->world;
@@ -162,9 +219,9 @@ uint32_t trc_light_group(const struct trc_snapshot *snapshot, uint32_t light) {
     return world->ao_method == TRC_AO_REPLACE ? world->light_group : 0;
 }
 
-/* Numbers of the triangles as lights, -1 for those that are none. Lights of an instance are in the
- * order of its triangles: usually all of them are lights, else a search finds the place. */
-static vint triangle_lights(const struct trc_surface *s, vmask m) {
+/* Lights of an instance are in the order of its triangles: usually all of them are lights, else a
+ * search finds the place. */
+vint trc_light_of_triangle(const struct trc_surface *s, vmask m) {
     const struct trc_light_table *t = s->snapshot->lights;
     vint light = vi_set(-1);
     for (uint32_t lanes = vm_bits(m); lanes; lanes &= lanes - 1) {
@@ -206,17 +263,19 @@ static struct trc_corners surface_corners(const struct trc_surface *s, vmask m) 
     return trc_corners_of(p);
 }
 
-vfloat trc_light_triangle_weight(const struct trc_surface *s, vvec3 p_from, vvec3 n_from,
+vfloat trc_light_triangle_weight(const struct trc_surface *s, vvec3 p_from, vvec3 n_from, vint left,
                                  vfloat bsdf_pdf, vfloat light_sample_count) {
     const struct trc_light_table *t = s->snapshot->lights;
     vmask m = vm_andnot(s->active, vf_lt(bsdf_pdf, vf_zero()));
     if (!t->triangle_count || !vm_any(m))
         return vf_one();
-    const vint light = triangle_lights(s, m);
+    const vint light = trc_light_of_triangle(s, m);
     m = vm_andnot(m, vi_lt(light, vi_set(0)));
     if (!vm_any(m))
         return vf_one();
-    const struct trc_receiver receiver = trc_receiver_make(p_from, n_from);
+    struct trc_receiver receiver = trc_receiver_make(p_from, n_from);
+    if (t->linked)
+        trc_receiver_sets(s->snapshot, left, m, receiver.sets);
     const struct trc_corners corners = surface_corners(s, m);
     const struct trc_view_triangle view = trc_triangle_view(&corners, p_from);
     const vfloat distance = v3_length(v3_sub(s->p, p_from));

@@ -201,7 +201,9 @@ static vuint visibility_of(const struct trc_snapshot *scene, vint light, vmask m
 
 vfloat trc_light_chosen(const struct trc_surface *s, vvec3 n, const struct trc_light_sample *sample,
                         vmask m) {
-    const struct trc_receiver receiver = trc_receiver_make(s->p, n);
+    struct trc_receiver receiver = trc_receiver_make(s->p, n);
+    if (s->snapshot->lights->linked)
+        trc_receiver_sets(s->snapshot, s->instance, m, receiver.sets);
     return trc_light_chance(s->snapshot->lights, &receiver, sample->light, m);
 }
 
@@ -213,6 +215,21 @@ vuint trc_light_visibility(const struct trc_snapshot *snapshot,
     const vuint bits = visibility_of(snapshot, sample->light, chosen);
     const vint hidden = (vint)(path & ~bits & vu_set(TRC_VISIBLE_UNBLOCKED));
     return (vuint)vi_select(vi_eq(hidden, vi_set(0)), (vint)bits, vi_set(0));
+}
+
+vuint trc_light_shadow_class(const struct trc_snapshot *snapshot, vint light, vmask m) {
+    const struct trc_light_table *t = snapshot->lights;
+    uint32_t classes[TRC_WIDTH] = {0};
+    for (uint32_t lanes = vm_bits(m); lanes; lanes &= lanes - 1) {
+        const int lane = __builtin_ctz(lanes);
+        const uint32_t number = (uint32_t)vi_get(light, lane),
+                       triangle = number - t->first_triangle;
+        if (number < t->lamp_count)
+            classes[lane] = t->lamps[number].shadow_class;
+        else if (triangle < t->triangle_count)
+            classes[lane] = snapshot->instances[t->triangles[triangle].instance].shadow_class;
+    }
+    return vu_load(classes);
 }
 
 /* A continuation ray towards wi is a glossy one above the surface and a transmitted one below. */
@@ -257,6 +274,30 @@ static void limit_sample(const struct draw *d, vmask m) {
     d->out->valid = vm_andnot(d->out->valid, beyond);
 }
 
+/* Bits of the light sets that a light of that number excludes. */
+static uint64_t excluded_by(const struct trc_snapshot *scene, uint32_t light) {
+    const struct trc_light_table *t = scene->lights;
+    if (light < t->lamp_count)
+        return t->lamps[light].excluded[0] | (uint64_t)t->lamps[light].excluded[1] << 32;
+    if (light - t->first_triangle < t->triangle_count)
+        return scene->instances[t->triangles[light - t->first_triangle].instance].light_exclude;
+    return 0;
+}
+
+/* Lights give nothing to instances that they exclude. */
+static void link_sample(const struct draw *d, vmask m) {
+    uint32_t low[TRC_WIDTH], high[TRC_WIDTH], unlit = 0;
+    vu_store(low, d->receiver.sets[0]);
+    vu_store(high, d->receiver.sets[1]);
+    for (uint32_t lanes = vm_bits(m); lanes; lanes &= lanes - 1) {
+        const int lane = __builtin_ctz(lanes);
+        const uint64_t set = low[lane] | (uint64_t)high[lane] << 32;
+        const uint64_t excluded = excluded_by(d->scene, (uint32_t)vi_get(d->light, lane));
+        unlit |= (uint32_t)((excluded & set) != 0) << lane;
+    }
+    d->out->valid = vm_andnot(d->out->valid, vm_from_bits(unlit));
+}
+
 /* The only light of a scene. */
 TRC_INLINE int32_t single_light(const struct trc_light_table *t) {
     return t->bound_count ? t->bounds[0].light : (int32_t)t->distant[0];
@@ -265,6 +306,8 @@ TRC_INLINE int32_t single_light(const struct trc_light_table *t) {
 void trc_light_prepare(const struct trc_surface *s, vvec3 n, struct trc_light_choices *out) {
     out->p = s->p;
     out->n = n;
+    if (s->snapshot->lights->linked)
+        trc_receiver_sets(s->snapshot, s->instance, s->active, out->sets);
     trc_candidates_weigh(s->snapshot->lights, out);
 }
 
@@ -295,6 +338,10 @@ void trc_light_sample_prepared(const struct trc_surface *s, const struct trc_lig
     clear_sample(out);
     struct draw d = {scene,    t,          s,  trc_receiver_make(s->p, choices->n), u1, u2,
                      vf_one(), vi_set(-1), out};
+    if (t->linked) {
+        d.receiver.sets[0] = choices->sets[0];
+        d.receiver.sets[1] = choices->sets[1];
+    }
     if (t->single)
         d.light = vi_select(s->active, vi_set(single_light(t)), d.light);
     else if (trc_candidate_count(t) > 0)
@@ -323,4 +370,6 @@ void trc_light_sample_prepared(const struct trc_surface *s, const struct trc_lig
     finish_sample(&d, chosen);
     if (t->limited && vm_any(lamps))
         limit_sample(&d, lamps);
+    if (t->linked)
+        link_sample(&d, chosen);
 }

@@ -48,6 +48,7 @@ void trc_light_sample_world(const struct trc_surface *s, vvec3 n, vfloat u1, vfl
 #define TRC_LIGHT_CHOICES_KEPT 48
 struct trc_light_choices {
     vvec3 p, n;
+    vuint sets[2]; /* trc_receiver.sets */
     vfloat sum;
     vfloat kept[TRC_LIGHT_CHOICES_KEPT];
 };
@@ -75,11 +76,13 @@ struct trc_light_ray {
     vfloat time;
     vuint path; /* TRC_VISIBLE_* | TRC_PATH_* */
     vint depth; /* bounces */
+    vint left;  /* instance at p, -1: none; read where lights are linked */
 };
 
 /* Light seen directly by the rays: area, point, spot with extent; where they miss also the sun.
  * Lights do not occlude. group: only lamps of that light group, or TRC_ALL_GROUPS. Adds to radiance
- * what the rays see, MIS-weighted (power heuristic). */
+ * what the rays see, MIS-weighted (power heuristic). Of lamps with a shadow class the camera's rays
+ * alone. */
 void trc_light_hit(const struct trc_snapshot *snapshot, const struct trc_light_ray *ray,
                    uint32_t group, vmask active, vvec3 *radiance);
 
@@ -89,15 +92,26 @@ void trc_light_hit_clamped(const struct trc_snapshot *snapshot, const struct trc
                            uint32_t group, vvec3 weight, vfloat limit, vmask active,
                            vvec3 *radiance);
 
+/* One lamp, as the other rays see it if nothing is in the way, whatever tmin and tmax are: returns
+ * what they see, weighted in the same way, and how far it is, TRC_FAR for the sun. */
+vvec3 trc_light_hit_one(const struct trc_snapshot *snapshot, const struct trc_light_ray *ray,
+                        uint32_t lamp, vmask active, vfloat *distance);
+
+/* Shadow classes of the lights in lanes m, 0 elsewhere. */
+vuint trc_light_shadow_class(const struct trc_snapshot *snapshot, vint light, vmask m);
+
 /* The light group of a light, 0 for none. Numbers after the last light are ambient occlusion, which
  * belongs to the world where it replaces its light. */
 uint32_t trc_light_group(const struct trc_snapshot *snapshot, uint32_t light);
 
 /* MIS weight of emission found on triangle lights by such rays: s is the emissive surface,
- * p_from/n_from the point the ray left. 1 where the triangle is not sampled as a light or bsdf_pdf
- * < 0. */
-vfloat trc_light_triangle_weight(const struct trc_surface *s, vvec3 p_from, vvec3 n_from,
+ * p_from/n_from the point the ray left, left its instance as trc_light_ray has it. 1 where the
+ * triangle is not sampled as a light or bsdf_pdf < 0. */
+vfloat trc_light_triangle_weight(const struct trc_surface *s, vvec3 p_from, vvec3 n_from, vint left,
                                  vfloat bsdf_pdf, vfloat light_sample_count);
+
+/* Numbers of the lanes' triangles as lights, -1 for those that are none. */
+vint trc_light_of_triangle(const struct trc_surface *s, vmask m);
 
 /* Radiance of the world in direction wi, MIS-weighted in the same way; 0 where the world is hidden
  * from rays of that path. */

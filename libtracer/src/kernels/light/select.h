@@ -15,9 +15,29 @@
 struct trc_receiver {
     vvec3 p, n;
     vmask has_n;
+    vuint sets[2]; /* the bit of its light set, low word first; read where lights are linked */
 };
 TRC_INLINE struct trc_receiver trc_receiver_make(vvec3 p, vvec3 n) {
-    return (struct trc_receiver){p, n, vf_gt(v3_dot(n, n), vf_set(0.25f))};
+    return (struct trc_receiver){.p = p, .n = n, .has_n = vf_gt(v3_dot(n, n), vf_set(0.25f))};
+}
+/* Those of the lanes' instances; none of -1, which every light lights. */
+static inline void trc_receiver_sets(const struct trc_snapshot *scene, vint instance, vmask m,
+                                     vuint sets[2]) {
+    uint32_t low[TRC_WIDTH] = {0}, high[TRC_WIDTH] = {0};
+    for (uint32_t lanes = vm_bits(m); lanes; lanes &= lanes - 1) {
+        const int lane = __builtin_ctz(lanes);
+        const int32_t number = vi_get(instance, lane);
+        if (number < 0)
+            continue;
+        const uint32_t set = scene->instances[number].light_set;
+        *(set < 32 ? &low[lane] : &high[lane]) = 1u << set % 32;
+    }
+    sets[0] = vu_load(low);
+    sets[1] = vu_load(high);
+}
+/* Lanes whose set is among those that a light excludes. */
+TRC_INLINE vmask trc_is_unlit(vuint low, vuint high, const vuint sets[2]) {
+    return vm_not(vi_eq((vint)((low & sets[0]) | (high & sets[1])), vi_set(0)));
 }
 
 struct trc_wide_bound {
@@ -153,7 +173,36 @@ TRC_INLINE vfloat trc_candidate_importance(const struct trc_light_table *t, uint
     return trc_bound_importance(&b, r, trc_shape_of(bound), bound->radius > 0.0f);
 }
 
+/* Takes the weight from candidates that do not light the receiver. Those that are not kept have it
+ * still: what is chosen of them counts nothing. */
+static inline void trc_links_apply(const struct trc_light_table *t, const struct trc_receiver *r,
+                                   vfloat *weight, uint32_t count, vfloat *sum) {
+    const uint32_t kept = count < TRC_LIGHT_CHOICES_KEPT ? count : TRC_LIGHT_CHOICES_KEPT;
+    *sum = vf_zero();
+    for (uint32_t i = 0; i < count; i++) {
+        vfloat w = i < kept ? weight[i] : trc_candidate_importance(t, i, r);
+        const uint32_t *excluded = NULL;
+        if (i < t->cut_count)
+            excluded = t->bounds[t->cut[i]].excluded;
+        else if (t->distant[i - t->cut_count] != t->world_light)
+            excluded = t->lamps[t->distant[i - t->cut_count]].excluded;
+        if (i < kept && excluded)
+            w = weight[i] = vf_where(
+                vm_not(trc_is_unlit(vu_set(excluded[0]), vu_set(excluded[1]), r->sets)), w);
+        *sum = *sum + w;
+    }
+}
+
 /* ---- the tree ---- */
+
+/* Lanes whose node has a light that lights the receiver. */
+static inline vmask trc_node_lights(const struct trc_light_table *t, vint node,
+                                    const struct trc_receiver *r, vmask m) {
+    const vint at = node * vi_set(TRC_BOUND_WORDS);
+    const vuint low = vu_gather(&t->bounds->excluded[0], at, m);
+    const vuint high = vu_gather(&t->bounds->excluded[1], at, m);
+    return vm_not(trc_is_unlit(low, high, r->sets));
+}
 
 /* Chance of the first child of each lane's node, as if both could be chosen; -1 where neither gives
  * anything. */
@@ -170,8 +219,12 @@ static inline vfloat trc_tree_first_chance(const struct trc_light_table *t, vint
         a = trc_bound_gather(t->bounds, node + vi_set(1), m);
         b = trc_bound_gather(t->bounds, second, m);
     }
-    const vfloat ia = trc_bound_importance(&a, r, TRC_BOUND_CONE, true);
-    const vfloat ib = trc_bound_importance(&b, r, TRC_BOUND_CONE, true);
+    vfloat ia = trc_bound_importance(&a, r, TRC_BOUND_CONE, true);
+    vfloat ib = trc_bound_importance(&b, r, TRC_BOUND_CONE, true);
+    if (t->linked) {
+        ia = vf_where(trc_node_lights(t, node + vi_set(1), r, m), ia);
+        ib = vf_where(trc_node_lights(t, second, r, m), ib);
+    }
     const vfloat sum = ia + ib;
     return vf_select(vf_gt(sum, vf_zero()), ia / sum, vf_set(-1.0f));
 }
@@ -261,7 +314,7 @@ static inline void trc_shares_round(vfloat *weight, uint32_t count, vfloat *sum)
 
 static inline void trc_candidates_weigh(const struct trc_light_table *t,
                                         struct trc_light_choices *c) {
-    const struct trc_receiver r = trc_receiver_make(c->p, c->n);
+    struct trc_receiver r = trc_receiver_make(c->p, c->n);
     const uint32_t count = t->single ? 0 : trc_candidate_count(t);
     c->sum = vf_zero();
     for (uint32_t i = 0; i < count; i++) {
@@ -269,6 +322,11 @@ static inline void trc_candidates_weigh(const struct trc_light_table *t,
         if (i < TRC_LIGHT_CHOICES_KEPT)
             c->kept[i] = w;
         c->sum = c->sum + w;
+    }
+    if (t->linked) {
+        r.sets[0] = c->sets[0];
+        r.sets[1] = c->sets[1];
+        trc_links_apply(t, &r, c->kept, count, &c->sum);
     }
     if (count <= TRC_SHARED_CANDIDATES)
         trc_shares_round(c->kept, count, &c->sum);
@@ -323,21 +381,27 @@ static inline vfloat trc_light_chance(const struct trc_light_table *t, const str
     const uint32_t count = trc_candidate_count(t);
     const vint candidate = vi_gather((const int32_t *)t->candidates, light, m);
     const bool shared = count <= TRC_SHARED_CANDIDATES;
-    vfloat weight[TRC_SHARED_CANDIDATES];
+    uint32_t kept = shared ? count : 0;
+    vfloat weight[TRC_LIGHT_CHOICES_KEPT];
     vfloat sum = vf_zero(), own = vf_zero();
-    for (uint32_t i = 0; shared && i < count; i++) {
+    if (t->linked)
+        kept = count < TRC_LIGHT_CHOICES_KEPT ? count : TRC_LIGHT_CHOICES_KEPT;
+    for (uint32_t i = 0; i < kept; i++) {
         weight[i] = trc_candidate_importance(t, i, r);
         sum = sum + weight[i];
     }
+    if (t->linked)
+        trc_links_apply(t, r, weight, count, &sum);
     if (shared)
         trc_shares_round(weight, count, &sum);
     for (uint32_t i = 0; i < count; i++) {
         vfloat w;
-        if (shared) {
+        if (i < kept) {
             w = weight[i];
         } else {
             w = trc_candidate_importance(t, i, r);
-            sum = sum + w;
+            if (!t->linked)
+                sum = sum + w;
         }
         own = vf_select(vi_eq(candidate, vi_set((int32_t)i)), w, own);
     }

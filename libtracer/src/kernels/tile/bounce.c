@@ -67,7 +67,7 @@ static void ray_push(struct trc_tile *t, const struct arrival *a, const struct t
         o.x,      o.y,      o.z, w.x,     w.y, w.z, tmin, tmax,           a->time,    weight.x,
         weight.y, weight.z, pdf, min_pdf, n.x, n.y, n.z,  indirect_scale, path_length};
     vuint left = vu_set(0);
-    if (t->looks_back)
+    if (t->remembers_left)
         left =
             (vuint)vi_select(straight, (vint)word_column(t->work.w[TRC_RAY_LEFT], a), s->instance);
     const vuint words[TRC_RAY_WORDS] = {a->slot, path, depths, vu_set(material), left};

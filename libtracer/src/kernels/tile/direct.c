@@ -4,11 +4,6 @@
  * and L. Guibas 1995, power heuristic). */
 #include "kernels/tile/shade.h"
 #include "kernels/trace/spawn.h"
-#include "model/lights.h"
-
-/* Shadow rays end this much before the light, as a fraction of their length: mesh lights must not
- * shade themselves, whatever the rounding of both ends. */
-#define SHADOW_END (1.0f - 2e-5f)
 
 /* Origin of a shadow ray: where light grazes a smooth surface it starts from the curved surface
  * that the normals describe, or the flat triangles would cast shadows with edges of their own.
@@ -78,6 +73,9 @@ void trc_shadow_push(struct trc_tile *t, const struct arrival *a, const struct t
     const vfloat tmax = vf_select(vm_not(l->casts_shadow), vf_set(-1.0f),
                                   vf_select(far, vf_set(INFINITY), vf_set(SHADOW_END)));
     const vvec3 sum = v3_add(r->diffuse, v3_add(r->glossy, r->transmission));
+    vuint path = a->path;
+    if (t->snapshot->shadow_class_count)
+        path = path | trc_light_shadow_class(t->snapshot, l->light, active) << TRC_PATH_CLASS_SHIFT;
     const struct trc_shadow_rays rays = {
         .o = {o.x, o.y, o.z},
         .d = {target.x, target.y, target.z},
@@ -85,7 +83,7 @@ void trc_shadow_push(struct trc_tile *t, const struct arrival *a, const struct t
         .time = a->time,
         .radiance = {sum.x, sum.y, sum.z},
         .slot = a->slot,
-        .path = a->path,
+        .path = path,
         .target = (vuint)l->light * vu_set(TRC_DIRECTION_CELLS) + cell,
         .depths = a->depths,
     };

@@ -1,13 +1,5 @@
 /* Light that rays find by themselves: of surfaces, of lights they pass, of the world. */
-#include "kernels/light/clamp.h"
 #include "kernels/tile/shade.h"
-#include "model/lights.h"
-
-/* The limit of what rays find by themselves: what one bounce shows is direct light. */
-static vfloat found_limit(const struct trc_tile *t, const struct arrival *a) {
-    const vint depth = (vint)trc_depth_of(a->depths, TRC_DEPTH_ALL_SHIFT);
-    return trc_clamp_limit(t->desc, vi_lt(depth, vi_set(2)));
-}
 
 /* Light found by rays, weighted and clamped: to the samples, and to the pass its depth says.
  * camera_pass: what camera rays see it as. */
@@ -94,19 +86,7 @@ void trc_emission_misses(struct trc_tile *t, const struct arrival *a, vmask miss
 /* Lamps of a light group, or of all, that the rays pass until their end. */
 static vvec3 pass_lamps(struct trc_tile *t, const struct arrival *a, vfloat end, uint32_t group) {
     vvec3 c = v3_zero();
-    /* It is surfaces alone that rays look back for. */
-    const struct trc_light_ray ray = {
-        .p = a->o,
-        .n = a->n_from,
-        .wi = a->d,
-        .tmin = vf_max(a->tmin, vf_set(0.0f)),
-        .tmax = end,
-        .bsdf_pdf = a->pdf,
-        .light_sample_count = light_count_before(t, a->depths),
-        .time = a->time,
-        .path = a->path,
-        .depth = (vint)trc_depth_of(a->depths, TRC_DEPTH_ALL_SHIFT),
-    };
+    const struct trc_light_ray ray = light_ray(t, a, end);
     if (trc_clamps(t->desc)) {
         trc_light_hit_clamped(t->snapshot, &ray, group, a->found_weight, found_limit(t, a),
                               a->active, &c);
@@ -158,13 +138,44 @@ static void surface_group_add(struct trc_tile *t, const struct arrival *a,
     group_add(t, a, active, light, groups);
 }
 
+vmask trc_emission_linked(const struct trc_tile *t, const struct arrival *a,
+                          const struct trc_surface *s, vmask active) {
+    const struct trc_instance *instances = t->snapshot->instances;
+    const vint from = left_before(t, a);
+    uint32_t unlinked = 0;
+    for (uint32_t bits = vm_bits(active); bits; bits &= bits - 1) {
+        const int i = __builtin_ctz(bits);
+        const int32_t left = vi_get(from, i);
+        const uint64_t excluded = instances[vi_get(s->instance, i)].light_exclude;
+        if (left >= 0 && excluded >> instances[left].light_set & 1)
+            unlinked |= 1u << i;
+    }
+    return vm_andnot(active, vm_from_bits(unlinked));
+}
+
+/* Of the lanes, those that find the emission of s here and not in kernels/tile/linked.c. */
+static vmask emission_seen(const struct trc_tile *t, const struct arrival *a,
+                           const struct trc_surface *s, vmask active) {
+    uint32_t classed = 0;
+    for (uint32_t bits = vm_bits(active); bits; bits &= bits - 1) {
+        const int i = __builtin_ctz(bits);
+        if (t->snapshot->instances[vi_get(s->instance, i)].shadow_class)
+            classed |= 1u << i;
+    }
+    const vint camera = (vint)(a->path & vu_set(TRC_VISIBLE_CAMERA));
+    const vmask bounced = vi_eq(camera, vi_set(0));
+    return trc_emission_linked(t, a, s, vm_andnot(active, vm_and(bounced, vm_from_bits(classed))));
+}
+
 void trc_emission_surface(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
                           const struct trc_lobes *lobes, vmask active) {
-    const vmask lit = vm_and(active, vf_gt(v3_max(lobes->emission), vf_set(0.0f)));
+    vmask lit = vm_and(active, vf_gt(v3_max(lobes->emission), vf_set(0.0f)));
+    if (t->snapshot->lights->linked)
+        lit = emission_seen(t, a, s, lit);
     if (!vm_any(lit))
         return;
-    const vfloat w =
-        trc_light_triangle_weight(s, a->o, a->n_from, a->pdf, light_count_before(t, a->depths));
+    const vfloat w = trc_light_triangle_weight(s, a->o, a->n_from, left_before(t, a), a->pdf,
+                                               light_count_before(t, a->depths));
     const vvec3 added = emission_add(t, a, lit, v3_scale(lobes->emission, w), TRC_PASS_EMISSION);
     if (t->desc->light_group_count)
         surface_group_add(t, a, s, lit, added);

@@ -49,7 +49,8 @@ enum trc_ray_word {
     TRC_RAY_PATH,
     TRC_RAY_DEPTHS,
     TRC_RAY_PARENT, /* material it left: key of runs and groups */
-    TRC_RAY_LEFT,   /* instance it left; of scenes in which rays look back: kernels/trace/spawn.h */
+    TRC_RAY_LEFT, /* instance it left; of scenes in which rays look back (kernels/trace/spawn.h) or
+                     lights are linked */
     TRC_RAY_WORDS
 };
 
@@ -58,7 +59,7 @@ struct trc_ray_store {
     uint32_t reserved_end; /* rays there may be until the next reserve */
     float *f[TRC_RAY_FLOATS];
     uint32_t *w[TRC_RAY_WORDS];
-    int word_count;  /* without TRC_RAY_LEFT where no ray looks back */
+    int word_count;  /* without TRC_RAY_LEFT where nothing reads it */
     int float_count; /* without TRC_RAY_PATH_LENGTH where nothing reads it */
 };
 
@@ -82,10 +83,10 @@ TRC_INLINE struct trc_ray_room trc_ray_room_of(const trc_render_desc *desc, uint
 }
 
 TRC_INLINE void trc_rays_carve(struct trc_carver *c, struct trc_ray_store *r, uint32_t capacity,
-                               bool look_back, bool measure_paths) {
+                               bool remember_left, bool measure_paths) {
     r->capacity = capacity;
     r->count = r->reserved_end = 0;
-    r->word_count = look_back ? TRC_RAY_WORDS : TRC_RAY_LEFT;
+    r->word_count = remember_left ? TRC_RAY_WORDS : TRC_RAY_LEFT;
     r->float_count = measure_paths ? TRC_RAY_FLOATS : TRC_RAY_PATH_LENGTH;
     /* Vectors are stored whole: vf_compress. */
     for (int i = 0; i < r->float_count; i++)
@@ -106,8 +107,8 @@ TRC_INLINE void trc_rays_add(struct trc_ray_store *r, uint32_t count) {
     r->count += count;
 }
 
-/* The lanes of bits. words: TRC_RAY_LEFT may be missing where no ray looks back, as
- * TRC_RAY_PATH_LENGTH of values where nothing reads it. */
+/* The lanes of bits. TRC_RAY_LEFT of words and TRC_RAY_PATH_LENGTH of values may be missing where
+ * nothing reads them. */
 TRC_INLINE void trc_rays_append(struct trc_ray_store *r, const vfloat values[TRC_RAY_FLOATS],
                                 const vuint words[TRC_RAY_WORDS], uint32_t bits) {
     const uint32_t at = r->count;

@@ -155,6 +155,8 @@ void trc_shade_batch(struct trc_tile *t) {
     if (t->snapshot->features & (TRC_FEATURE_LIGHTS | TRC_FEATURE_ENVIRONMENT) ||
         t->desc->film_transparent)
         trc_emission_rays(t);
+    if (t->snapshot->shadow_class_count && t->generation > 0)
+        trc_linked_lights(t);
     if (t->catchers)
         catch_shadows(t);
     trc_rays_reserve(&t->stack, t->work.count * t->hit_branches);

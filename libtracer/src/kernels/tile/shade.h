@@ -2,8 +2,10 @@
 #ifndef TRACER_KERNELS_TILE_SHADE_H
 #define TRACER_KERNELS_TILE_SHADE_H
 
+#include "kernels/light/clamp.h"
 #include "kernels/light/light.h"
 #include "kernels/tile/arrival.h"
+#include "model/lights.h"
 
 /* Lanes that have not bounced yet. */
 TRC_INLINE vmask sees_directly(vuint depths) {
@@ -20,7 +22,46 @@ TRC_INLINE vmask is_light(vfloat size) {
     return vm_and(vf_gt(size, vf_set(0.0f)), vf_lt(size, vf_set(FINITE_LIGHT)));
 }
 
+/* Shadow rays end this much before the light, as a fraction of their length: mesh lights must not
+ * shade themselves, whatever the rounding of both ends. */
+#define SHADOW_END (1.0f - 2e-5f)
+
 /* ---- light that rays find (kernels/tile/emission.c) ---- */
+
+/* What the lanes' rays left, where lights are linked. */
+TRC_INLINE vint left_before(const struct trc_tile *t, const struct arrival *a) {
+    return t->snapshot->lights->linked ? (vint)word_column(t->work.w[TRC_RAY_LEFT], a) : vi_set(-1);
+}
+
+/* The limit of what rays find by themselves: what one bounce shows is direct light. */
+TRC_INLINE vfloat found_limit(const struct trc_tile *t, const struct arrival *a) {
+    const vint depth = (vint)trc_depth_of(a->depths, TRC_DEPTH_ALL_SHIFT);
+    return trc_clamp_limit(t->desc, vi_lt(depth, vi_set(2)));
+}
+
+/* The rays as lights want them, up to their end. */
+TRC_INLINE struct trc_light_ray light_ray(const struct trc_tile *t, const struct arrival *a,
+                                          vfloat end) {
+    /* It is surfaces alone that rays look back for. */
+    return (struct trc_light_ray){
+        .p = a->o,
+        .n = a->n_from,
+        .wi = a->d,
+        .tmin = vf_max(a->tmin, vf_set(0.0f)),
+        .tmax = end,
+        .bsdf_pdf = a->pdf,
+        .light_sample_count = light_count_before(t, a->depths),
+        .time = a->time,
+        .path = a->path,
+        .depth = (vint)trc_depth_of(a->depths, TRC_DEPTH_ALL_SHIFT),
+        .left = left_before(t, a),
+    };
+}
+
+/* Of the lanes that met the emissive surface s, those whose rays left what it lights, and the
+ * camera's. */
+vmask trc_emission_linked(const struct trc_tile *t, const struct arrival *a,
+                          const struct trc_surface *s, vmask active);
 
 /* Of lights that rays pass and of the world, of all rays of t->work. */
 void trc_emission_rays(struct trc_tile *t);
@@ -35,6 +76,9 @@ void trc_emission_surface(struct trc_tile *t, const struct arrival *a, const str
 /* What holdout leaves cut out of the film. */
 void trc_emission_holdout(struct trc_tile *t, const struct arrival *a,
                           const struct trc_lobes *lobes, vmask active);
+
+/* Of lights with a shadow class, of all rays of t->work that bounced. (kernels/tile/linked.c) */
+void trc_linked_lights(struct trc_tile *t);
 
 /* ---- light that samples bring (kernels/tile/direct.c) ---- */
 

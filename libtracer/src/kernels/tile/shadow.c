@@ -164,7 +164,9 @@ static void passes_add(struct trc_tile *t, uint32_t ray) {
     const uint32_t slot = q->slot[ray], category = q->path[ray] >> TRC_PATH_CATEGORY_SHIFT & 3u;
     if (category != TRC_CATEGORY_CAMERA) {
         const float rgb[3] = {q->radiance[0][ray], q->radiance[1][ray], q->radiance[2][ray]};
-        trc_pass_add(t, trc_category_pass(category) + 1, slot, rgb);
+        const bool is_direct =
+            (q->path[ray] & TRC_PATH_FOUND) && (q->depths[ray] >> TRC_DEPTH_ALL_SHIFT & 255u) < 2;
+        trc_pass_add(t, trc_category_pass(category) + !is_direct, slot, rgb);
         return;
     }
     for (int k = 0; k < 3; k++) {
@@ -260,6 +262,35 @@ static uint32_t unblocked_last(struct trc_tile *t) {
     return others;
 }
 
+/* What blocks rays whose path words have that shadow class and TRC_PATH_FOUND, class by class. */
+static uint32_t blockers(uint32_t kind) {
+    const uint32_t class = kind >> 1, is_found = kind & 1;
+    if (!class)
+        return TRC_VISIBLE_SHADOW;
+    return 1u << (TRC_SHADOW_CLASS_SHIFT + class - 1) | (is_found ? TRC_VISIBLE_SOLID : 0u);
+}
+_Static_assert(TRC_PATH_FOUND == 1 << (TRC_PATH_CLASS_SHIFT - 1),
+               "kinds of rays are whole numbers");
+
+/* Traces the first count rays of the order, those of each kind by themselves. */
+static void kinds_trace(struct trc_tile *t, uint32_t count) {
+    struct trc_shadow_store *q = &t->shadows;
+    uint32_t begin = 0;
+    for (uint32_t kind = 0; kind < 2 * (t->snapshot->shadow_class_count + 1); kind++) {
+        uint32_t end = begin, others = 0;
+        for (uint32_t i = begin; i < count; i++) {
+            const uint32_t ray = q->order[i];
+            if (q->path[ray] >> (TRC_PATH_CLASS_SHIFT - 1) == kind)
+                q->order[end++] = ray;
+            else
+                t->keys[others++] = ray;
+        }
+        memcpy(q->order + end, t->keys, others * sizeof *q->order);
+        rays_trace(t, begin, end, blockers(kind));
+        begin = end;
+    }
+}
+
 void trc_shadow_flush(struct trc_tile *t) {
     struct trc_shadow_store *q = &t->shadows;
     if (!q->count)
@@ -270,7 +301,10 @@ void trc_shadow_flush(struct trc_tile *t) {
     trc_tile_sort(t, t->keys, q->count, q->order);
     memset(q->order + q->count, 0, TRC_PACKET_SIZE * sizeof *q->order);
     const uint32_t blocked = t->catchers ? unblocked_last(t) : q->count;
-    rays_trace(t, 0, blocked, TRC_VISIBLE_SHADOW);
+    if (t->snapshot->shadow_class_count)
+        kinds_trace(t, blocked);
+    else
+        rays_trace(t, 0, blocked, TRC_VISIBLE_SHADOW);
     rays_trace(t, blocked, q->count, TRC_VISIBLE_SHADOW << TRC_UNBLOCKED_SHIFT);
     if (trc_clamps(t->desc))
         light_clamp(t);

@@ -52,6 +52,7 @@ static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc,
     const uint32_t features = snapshot->features;
     const bool catchers = t->catchers = features & TRC_FEATURE_SHADOW_CATCHERS;
     t->looks_back = features & TRC_FEATURE_REFRACTION;
+    t->remembers_left = features & (TRC_FEATURE_REFRACTION | TRC_FEATURE_LINKS);
     t->measures_paths = features & TRC_FEATURE_SLOPES;
     t->hit_branches = count_branches(desc, snapshot);
     /* Whitted's rays may meet a catcher, which splits them before they branch. Of other integrators
@@ -59,8 +60,8 @@ static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc,
     const bool splits = catchers && desc->integrator == TRC_INTEGRATOR_WHITTED;
     t->ray_room = trc_ray_room_of(desc, t->hit_branches * (splits ? 2 : 1));
     const size_t batch = (trc_column_entries(catchers) + TRC_WIDTH) * sizeof(float);
-    trc_rays_carve(&c, &t->stack, t->ray_room.capacity, t->looks_back, t->measures_paths);
-    trc_rays_carve(&c, &t->work, t->ray_room.capacity, t->looks_back, t->measures_paths);
+    trc_rays_carve(&c, &t->stack, t->ray_room.capacity, t->remembers_left, t->measures_paths);
+    trc_rays_carve(&c, &t->work, t->ray_room.capacity, t->remembers_left, t->measures_paths);
     float **const hit_floats[] = {&t->hits.t, &t->hits.u, &t->hits.v};
     for (int i = 0; i < 3; i++)
         *hit_floats[i] = trc_carve(&c, batch);

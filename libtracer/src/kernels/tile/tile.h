@@ -22,7 +22,9 @@ enum {
     TRC_PATH_FEATURES_DONE = 1 << 16, /* and its denoising passes, along this path */
     TRC_PATH_OCCLUSION = 1 << 17,     /* shadow rays: of the pass of ambient occlusion, no light */
     TRC_PATH_CAUGHT = 1 << 18,        /* the camera sees this path through a shadow catcher */
-    TRC_PATH_CLAMPED = 1 << 19        /* shadow rays: what they carry is clamped already */
+    TRC_PATH_CLAMPED = 1 << 19,       /* shadow rays: what they carry is clamped already */
+    TRC_PATH_FOUND = 1 << 23,         /* shadow rays: along a ray of the path (linked.c) */
+    TRC_PATH_CLASS_SHIFT = 24         /* shadow rays: the shadow class of their light, 4 bits */
 };
 
 /* What a path's first bounce was; diffuse: through a translucent surface. */
@@ -91,6 +93,7 @@ struct trc_tile {
     bool occlusion_passes;      /* some pass wants what shadow rays find, not light */
     bool object_motion;         /* rays need times */
     bool looks_back;            /* rays go through surfaces: kernels/trace/spawn.h */
+    bool remembers_left;        /* rays know what they left: they look back, or lights are linked */
     bool measures_paths;        /* rays know how long their path is */
     bool camera_common;         /* camera rays start at one point */
     uint32_t packet_size;       /* 1..TRC_PACKET_SIZE */
