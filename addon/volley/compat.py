@@ -70,6 +70,9 @@ TRANSFORMS_NORMALS = bpy.app.version >= (4, 0, 0)
 HASHES_CELLS_BY_PCG = bpy.app.version >= (5, 0, 0)
 
 
+LINEAR_REC709 = "Linear Rec.709"
+
+
 def cycles(data, name, default):
     """``data.cycles.name`` where Cycles' property groups exist, else default."""
     return getattr(getattr(data, "cycles", None), name, default)
@@ -100,6 +103,11 @@ def has_adaptive_subdivision(blender_object):
         return last.use_adaptive_subdivision
     is_experimental = cycles(bpy.context.scene, "feature_set", 'SUPPORTED') == 'EXPERIMENTAL'
     return is_experimental and cycles(blender_object, "use_adaptive_subdivision", False)
+
+
+def working_space():
+    """The name of the space that colours of scenes are in: of the file's choice since 5.0."""
+    return getattr(getattr(bpy.data, "colorspace", None), "working_space", LINEAR_REC709)
 
 
 def motion_position(scene):

@@ -69,9 +69,10 @@ def flatten(tree, label, warnings, images=None, aovs=None, attributes=None, disp
     sockets = {socket.identifier: socket for socket in end.inputs}
     if "Volume" in sockets and walker.is_linked(sockets["Volume"]):
         warnings.add(f"{label}: volume is not supported and is left out")
+    walker.is_displaced = displacement is not None and walker.is_linked(sockets["Displacement"])
     try:
         value = walker.input_value(sockets["Surface"], ())
-        if displacement is not None and walker.is_linked(sockets["Displacement"]):
+        if walker.is_displaced:
             walker.emit_displacement(sockets["Displacement"], displacement)
         if aovs:
             walker.emit_aovs(tree, aovs, ())
@@ -90,6 +91,7 @@ class Walker:
     def __init__(self, label, warnings, images=None, attributes=None):
         self.flat = FlatTree()
         self.label, self.attributes = label, attributes
+        self.is_displaced = False  # the material has a displacement
         self._warnings = warnings
         self._images = images
         self._done = {}       # (path names, node name) -> {output identifier: Value}

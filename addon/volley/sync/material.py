@@ -47,6 +47,8 @@ class Materials:
         key = material.name_full
         if key not in self._seen and not self._keep(key):
             label = f"Material '{material.name}'"
+            if not cycles(material, "use_bump_map_correction", True):
+                self._warnings.add(f"{label}: bent normals are corrected nonetheless")
             flat = self.flatten(material, label)
             is_volume = flat.surface < 0 and flat.has_volume
             if is_volume:  # nothing but the bounds of what is left out

@@ -150,10 +150,6 @@ _SPECS = {
         _vector_math_mode),
     "ShaderNodeFresnel": Spec(NodeType.FRESNEL, ("IOR", "Normal"), ("Fac",)),
     "ShaderNodeLayerWeight": Spec(NodeType.LAYER_WEIGHT, ("Blend", "Normal"), ("Fresnel", "Facing")),
-    "ShaderNodeLightPath": Spec(NodeType.LIGHT_PATH, (), (
-        "Is Camera Ray", "Is Shadow Ray", "Is Diffuse Ray", "Is Glossy Ray", "Is Singular Ray",
-        "Is Reflection Ray", "Is Transmission Ray", "Ray Length", "Ray Depth", "Diffuse Depth",
-        "Glossy Depth", "Transparent Depth", "Transmission Depth")),
     "ShaderNodeInvert": Spec(NodeType.INVERT, ("Fac", "Color"), ("Color",)),
     "ShaderNodeGamma": Spec(NodeType.GAMMA, ("Color", "Gamma"), ("Color",)),
     "ShaderNodeHueSaturation": Spec(
@@ -291,7 +287,8 @@ def _principled(walker, node, sockets):
 def _name_missing(walker, sockets):
     """Warn of inputs of Principled that are in use and mean something else here, or nothing."""
     for name, instead in (("Subsurface", "is rendered as diffuse"),
-                          ("Subsurface Weight", "is rendered as diffuse")):
+                          ("Subsurface Weight", "is rendered as diffuse"),
+                          ("Thin Wall", "is rendered as a solid")):
         if sockets.find(name) is None:
             continue
         value = sockets.get('f', name)
@@ -493,9 +490,22 @@ _NORMAL_MAP_FLAGS = ((NormalMapFlags.SCALED if SCALES_NORMAL_MAPS else 0)
                      | (NormalMapFlags.UNIT if HAS_UNIT_NORMALS else 0))
 
 
+_LIGHT_PATH = ("Is Camera Ray", "Is Shadow Ray", "Is Diffuse Ray", "Is Glossy Ray", "Is Singular Ray",
+               "Is Reflection Ray", "Is Transmission Ray", "Ray Length", "Ray Depth", "Diffuse Depth",
+               "Glossy Depth", "Transparent Depth", "Transmission Depth")
+
+
+def _light_path(walker, _node, _sockets):
+    """No ray is scattered by a volume or led by a portal."""
+    outputs = named_outputs(walker.emit(NodeType.LIGHT_PATH, ()), NodeType.LIGHT_PATH, _LIGHT_PATH)
+    return {**outputs, "Is Volume Scatter Ray": _constant('f', 0.0), "Portal Depth": _constant('f', 0.0)}
+
+
 def _normal_map(walker, node, sockets):
     space = NormalMapSpace[node.space]
     name = _tangents_of(walker, node) if space == NormalMapSpace.TANGENT else ""
+    if walker.is_displaced and getattr(node, "base", 'DISPLACED') == 'ORIGINAL':
+        walker.warn("Normal Map lies on the displaced surface, not on the original one")
     is_down = getattr(node, "convention", 'OPENGL') == 'DIRECTX'
     mode = space | _NORMAL_MAP_FLAGS | (NormalMapFlags.DOWN if is_down else 0)
     values = sockets.get('f', "Strength"), sockets.get('c', "Color")
@@ -603,7 +613,7 @@ _SPECIAL = {
     "ShaderNodeNewGeometry": _geometry, "ShaderNodeNormal": _normal, "ShaderNodeTexImage": _image,
     "ShaderNodeTexEnvironment": _environment, "ShaderNodeUVMap": _uv_map,
     "ShaderNodeTexCoord": _texture_coordinate, "ShaderNodeVertexColor": _color_attribute,
-    "ShaderNodeAttribute": _attribute, "ShaderNodeNormalMap": _normal_map,
+    "ShaderNodeAttribute": _attribute, "ShaderNodeNormalMap": _normal_map, "ShaderNodeLightPath": _light_path,
     "ShaderNodeMath": _math, "ShaderNodeTangent": _tangent, "ShaderNodeBump": _bump,
     "ShaderNodeDisplacement": _displacement, "ShaderNodeVectorDisplacement": _vector_displacement,
     "ShaderNodeValToRGB": _color_ramp, "ShaderNodeMix": _mix,
