@@ -334,7 +334,7 @@ def inside_manifests(path):
     import scenes
     scene = _crypto_scene()
     bpy.data.objects["Veil"].name = "Veil é"
-    scene.render.image_settings.file_format = 'OPEN_EXR_MULTILAYER'
+    scenes.set_file_format(scene.render.image_settings, 'OPEN_EXR_MULTILAYER')
     for engine in ('VOLLEY', 'CYCLES'):
         scenes.set_engine(engine, 1)
         scene.render.filepath = f"{path}/{engine}.exr"

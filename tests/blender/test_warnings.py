@@ -21,17 +21,13 @@ def inside_movie():
     scene = scenes.empty(size=(32, 32))
     scenes.camera()
     settings = scene.render.image_settings
-    if hasattr(settings, "media_type"):  # since 5.0
-        settings.media_type = 'VIDEO'
-    settings.file_format = 'AVI_JPEG' if bpy.app.version < (4, 0, 0) else 'FFMPEG'
+    scenes.set_file_format(settings, 'AVI_JPEG' if bpy.app.version < (4, 0, 0) else 'FFMPEG')
     scene.frame_end = 3
     scene.render.filepath = bpy.app.tempdir + "movie"
     wall = scenes.wall("Wall", 9.0, 0.0, material=scenes.emitter((0.2, 0.5, 0.8)))
     bpy.ops.render.render(animation=True)
     path = scene.render.frame_path(frame=1)
-    if hasattr(settings, "media_type"):
-        settings.media_type = 'IMAGE'
-    settings.file_format = 'OPEN_EXR'
+    scenes.set_file_format(settings, 'OPEN_EXR')
     image = bpy.data.images.load(path)
     image.name = "Movie"
     assert image.source == 'MOVIE'

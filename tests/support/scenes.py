@@ -68,6 +68,16 @@ def world_color(world, color):
         world.node_tree.nodes["Background"].inputs["Color"].default_value = (*color, 1.0)
 
 
+_MEDIA_TYPES = {'FFMPEG': 'VIDEO', 'AVI_JPEG': 'VIDEO', 'OPEN_EXR_MULTILAYER': 'MULTI_LAYER_IMAGE'}
+
+
+def set_file_format(settings, file_format):
+    """Choose a format of files, which are of three kinds since 5.0."""
+    if hasattr(settings, "media_type"):
+        settings.media_type = _MEDIA_TYPES.get(file_format, 'IMAGE')
+    settings.file_format = file_format
+
+
 def curves(owner):
     """The animation curves of what is animated; since 4.4 they lie in layers."""
     action, slot = owner.animation_data.action, getattr(owner.animation_data, "action_slot", None)
@@ -297,13 +307,17 @@ def load(path):
 
 
 def render_passes(names):
-    """Render once; {pass name: picture} of the active view layer, through the compositor."""
+    """Render once; {pass name: picture} of the active view layer, through the compositor. The names are
+    those before 5.0."""
+    from volley import passes
+    shown_names = {entry.names[0]: passes.name_of(entry) for entry in passes.PASSES}
+    shown_names["Combined"] = "Image"
     folder = tempfile.mkdtemp(prefix="volley_")
     tree, shown = compositor()
     layers = tree.nodes.new("CompositorNodeRLayers")
     files = [f"pass{number:02d}_" for number in range(len(names))]
     for name, written in zip(names, file_output(tree, folder, files).values()):
-        tree.links.new(layers.outputs["Image" if name == "Combined" else name], written)
+        tree.links.new(layers.outputs[shown_names.get(name, name)], written)
     tree.links.new(layers.outputs["Image"], shown)
     bpy.ops.render.render()
     files = sorted(os.listdir(folder))
