@@ -134,8 +134,8 @@ TRC_INLINE vmask lamp_meet(const struct trc_snapshot *snapshot, const struct trc
     return hit;
 }
 
-static struct trc_receiver receiver_of(const struct trc_snapshot *snapshot,
-                                       const struct trc_light_ray *ray, vmask active) {
+TRC_INLINE struct trc_receiver receiver_of(const struct trc_snapshot *snapshot,
+                                           const struct trc_light_ray *ray, vmask active) {
     struct trc_receiver receiver = trc_receiver_make(ray->p, ray->n);
     if (snapshot->lights->linked)
         trc_receiver_sets(snapshot, ray->left, active, receiver.sets);

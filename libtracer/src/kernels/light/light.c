@@ -285,7 +285,7 @@ static uint64_t excluded_by(const struct trc_snapshot *scene, uint32_t light) {
 }
 
 /* Lights give nothing to instances that they exclude. */
-static void link_sample(const struct draw *d, vmask m) {
+TRC_LINKS void link_sample(const struct draw *d, vmask m) {
     uint32_t low[TRC_WIDTH], high[TRC_WIDTH], unlit = 0;
     vu_store(low, d->receiver.sets[0]);
     vu_store(high, d->receiver.sets[1]);
@@ -306,9 +306,12 @@ TRC_INLINE int32_t single_light(const struct trc_light_table *t) {
 void trc_light_prepare(const struct trc_surface *s, vvec3 n, struct trc_light_choices *out) {
     out->p = s->p;
     out->n = n;
-    if (s->snapshot->lights->linked)
+    if (s->snapshot->lights->linked) {
         trc_receiver_sets(s->snapshot, s->instance, s->active, out->sets);
-    trc_candidates_weigh(s->snapshot->lights, out);
+        trc_candidates_weigh_linked(s->snapshot->lights, out);
+    } else {
+        trc_candidates_weigh(s->snapshot->lights, out);
+    }
 }
 
 void trc_light_sample(const struct trc_surface *s, vvec3 n, vfloat u_select, vfloat u1, vfloat u2,

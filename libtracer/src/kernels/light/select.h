@@ -20,9 +20,12 @@ struct trc_receiver {
 TRC_INLINE struct trc_receiver trc_receiver_make(vvec3 p, vvec3 n) {
     return (struct trc_receiver){.p = p, .n = n, .has_n = vf_gt(v3_dot(n, n), vf_set(0.25f))};
 }
+/* What few scenes need stays out of the way of what all do. */
+#define TRC_LINKS static __attribute__((noinline, unused))
+
 /* Those of the lanes' instances; none of -1, which every light lights. */
-static inline void trc_receiver_sets(const struct trc_snapshot *scene, vint instance, vmask m,
-                                     vuint sets[2]) {
+TRC_LINKS void trc_receiver_sets(const struct trc_snapshot *scene, vint instance, vmask m,
+                                 vuint sets[2]) {
     uint32_t low[TRC_WIDTH] = {0}, high[TRC_WIDTH] = {0};
     for (uint32_t lanes = vm_bits(m); lanes; lanes &= lanes - 1) {
         const int lane = __builtin_ctz(lanes);
@@ -175,8 +178,8 @@ TRC_INLINE vfloat trc_candidate_importance(const struct trc_light_table *t, uint
 
 /* Takes the weight from candidates that do not light the receiver. Those that are not kept have it
  * still: what is chosen of them counts nothing. */
-static inline void trc_links_apply(const struct trc_light_table *t, const struct trc_receiver *r,
-                                   vfloat *weight, uint32_t count, vfloat *sum) {
+TRC_LINKS void trc_links_apply(const struct trc_light_table *t, const struct trc_receiver *r,
+                               vfloat *weight, uint32_t count, vfloat *sum) {
     const uint32_t kept = count < TRC_LIGHT_CHOICES_KEPT ? count : TRC_LIGHT_CHOICES_KEPT;
     *sum = vf_zero();
     for (uint32_t i = 0; i < count; i++) {
@@ -314,7 +317,7 @@ static inline void trc_shares_round(vfloat *weight, uint32_t count, vfloat *sum)
 
 static inline void trc_candidates_weigh(const struct trc_light_table *t,
                                         struct trc_light_choices *c) {
-    struct trc_receiver r = trc_receiver_make(c->p, c->n);
+    const struct trc_receiver r = trc_receiver_make(c->p, c->n);
     const uint32_t count = t->single ? 0 : trc_candidate_count(t);
     c->sum = vf_zero();
     for (uint32_t i = 0; i < count; i++) {
@@ -323,11 +326,20 @@ static inline void trc_candidates_weigh(const struct trc_light_table *t,
             c->kept[i] = w;
         c->sum = c->sum + w;
     }
-    if (t->linked) {
-        r.sets[0] = c->sets[0];
-        r.sets[1] = c->sets[1];
-        trc_links_apply(t, &r, c->kept, count, &c->sum);
-    }
+    if (count <= TRC_SHARED_CANDIDATES)
+        trc_shares_round(c->kept, count, &c->sum);
+}
+
+/* The same where lights are linked. */
+TRC_LINKS void trc_candidates_weigh_linked(const struct trc_light_table *t,
+                                           struct trc_light_choices *c) {
+    struct trc_receiver r = trc_receiver_make(c->p, c->n);
+    const uint32_t count = t->single ? 0 : trc_candidate_count(t);
+    r.sets[0] = c->sets[0];
+    r.sets[1] = c->sets[1];
+    for (uint32_t i = 0; i < count && i < TRC_LIGHT_CHOICES_KEPT; i++)
+        c->kept[i] = trc_candidate_importance(t, i, &r);
+    trc_links_apply(t, &r, c->kept, count, &c->sum);
     if (count <= TRC_SHARED_CANDIDATES)
         trc_shares_round(c->kept, count, &c->sum);
 }

@@ -61,6 +61,15 @@ static vmask light_contribute(const struct trc_tile *t, const struct arrival *a,
     return vm_and(active, is_light(size));
 }
 
+/* Enters the shadow classes of the lanes' lights into the path words of their rays, from at on. */
+static __attribute__((noinline)) void classify(struct trc_tile *t, vint light, vmask active,
+                                               uint32_t at) {
+    uint32_t classes[TRC_WIDTH];
+    vu_store(classes, trc_light_shadow_class(t->snapshot, light, active));
+    for (uint32_t bits = vm_bits(active); bits; bits &= bits - 1)
+        t->shadows.path[at++] |= classes[__builtin_ctz(bits)] << TRC_PATH_CLASS_SHIFT;
+}
+
 /* Adds the lanes' shadow rays to the queue. cell: where on the light, for sorting, below
  * TRC_DIRECTION_CELLS. */
 void trc_shadow_push(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
@@ -73,9 +82,6 @@ void trc_shadow_push(struct trc_tile *t, const struct arrival *a, const struct t
     const vfloat tmax = vf_select(vm_not(l->casts_shadow), vf_set(-1.0f),
                                   vf_select(far, vf_set(INFINITY), vf_set(SHADOW_END)));
     const vvec3 sum = v3_add(r->diffuse, v3_add(r->glossy, r->transmission));
-    vuint path = a->path;
-    if (t->snapshot->shadow_class_count)
-        path = path | trc_light_shadow_class(t->snapshot, l->light, active) << TRC_PATH_CLASS_SHIFT;
     const struct trc_shadow_rays rays = {
         .o = {o.x, o.y, o.z},
         .d = {target.x, target.y, target.z},
@@ -83,7 +89,7 @@ void trc_shadow_push(struct trc_tile *t, const struct arrival *a, const struct t
         .time = a->time,
         .radiance = {sum.x, sum.y, sum.z},
         .slot = a->slot,
-        .path = path,
+        .path = a->path,
         .target = (vuint)l->light * vu_set(TRC_DIRECTION_CELLS) + cell,
         .depths = a->depths,
     };
@@ -99,6 +105,8 @@ void trc_shadow_push(struct trc_tile *t, const struct arrival *a, const struct t
     }
     for (int k = 0; q->lamp[0] && k < 3; k++)
         vf_compress(q->lamp[k] + at, r->lamp, bits);
+    if (t->snapshot->shadow_class_count)
+        classify(t, l->light, active, at);
 }
 
 /* What the lanes' light samples are in the Shadow pass if nothing is in the way: lamps count
