@@ -16,19 +16,20 @@ TRC_INLINE vfloat bump_shadowing(vvec3 n_surface, vvec3 n_lobe, vvec3 wi, vfloat
 /* The same by the masking of microfacets of GGX, as rough as the normal is bent: A. Conty Estevez,
  * P. Lecocq and C. Stein, "A Microfacet-Based Shadowing Function to Solve the Bump Terminator
  * Problem" (2019). */
-TRC_INLINE vfloat facet_shadowing(vvec3 n_surface, vvec3 n_lobe, vvec3 wi) {
+TRC_INLINE vfloat facet_shadowing(vvec3 n_surface, vvec3 n_lobe, vvec3 wi, vfloat cos_lobe) {
     const vfloat cos_i = v3_dot(n_surface, wi), cos_d = v3_dot(n_surface, n_lobe);
     const vfloat cos2_i = vf_max(cos_i * cos_i, vf_set(1e-12f));
     const vfloat cos2_d = vf_min(cos_d * cos_d, vf_one());
     const vfloat alpha2 = vf_saturate(vf_set(0.125f) * vf_divide(vf_one() - cos2_d, cos2_d));
     const vfloat tan2_i = (vf_one() - vf_min(cos2_i, vf_one())) / cos2_i;
     const vfloat masking = vf_set(2.0f) / (vf_one() + vf_sqrt(vf_one() + alpha2 * tan2_i));
-    return vf_where(vf_ge(cos_i * cos_d, vf_zero()), masking);
+    /* Of both sides, as light may come through. */
+    return vf_where(vf_ge(cos_i * cos_d * cos_lobe, vf_zero()), masking);
 }
 
 TRC_INLINE vfloat bump_shadowing_of(const struct trc_lobe *lobe, const struct trc_surface *s,
                                     vvec3 wi, vfloat cos_i) {
-    return lobe->facet_shadowing ? facet_shadowing(s->n, lobe->n, wi)
+    return lobe->facet_shadowing ? facet_shadowing(s->n, lobe->n, wi, cos_i)
                                  : bump_shadowing(s->n, lobe->n, wi, cos_i);
 }
 
