@@ -1,19 +1,28 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The same scene by Cycles without diffuse bounces and by Volley: pixels where nothing is random but
-the film, channel means where light is sampled."""
+"""The same scene by Cycles without diffuse bounces and by Volley: tiles of pixels where nothing is random but
+the film, lens and time, channel means where light is sampled."""
 
+import compare
 import numpy as np
 import pytest
 
-FILM_SAMPLES = 16
+FILM_SAMPLES = 64
 LIGHT_SAMPLES = 128
 MEAN_TOLERANCE = 0.01
+# Beyond the noise that the seeds show; 6e-4 were seen, where few samples cross a rim and the noise is known badly.
+OFF = 1e-3
 
 
 def _both(samples):
     """The current scene by both engines."""
     import scenes
     return scenes.by_both(samples)
+
+
+def _seeds(samples=FILM_SAMPLES):
+    """The current scene by both engines, with several seeds."""
+    import scenes
+    return scenes.seeds_by_both(samples)
 
 
 def _walls():
@@ -35,7 +44,7 @@ def inside_cameras():
     def look(name, **settings):
         for key, value in settings.items():
             setattr(made.data, key, value)
-        pairs[name] = _both(FILM_SAMPLES)
+        pairs[name] = _seeds()
 
     look("perspective")
     look("shifted", shift_x=0.2, shift_y=-0.1, sensor_fit='VERTICAL', sensor_height=30.0)
@@ -86,26 +95,22 @@ def inside_geometry():
         instancer.rotation_euler = (0, 0.3 * i, 0)
     scenes.wall("Hidden", 3.0, -2.0, material=green).hide_render = True
     scenes.wall("Unseen", 3.0, -2.0, material=green).visible_camera = False
-    return _both(FILM_SAMPLES)
+    return _seeds()
 
 
-def _close(ours, theirs, share=0.01):
-    """Within film noise: few pixels differ by much, the mean hardly."""
-    difference = np.abs(ours - theirs)[..., :3].max(axis=-1)
-    assert (difference > 0.25).mean() < share, f"{(difference > 0.25).mean():.3%} of the pixels differ"
-    assert difference.mean() < 0.02
-    assert ours[..., 3].mean() == pytest.approx(theirs[..., 3].mean(), abs=5e-3)
+def _close(ours, theirs, name, off=OFF):
+    """Means of the picture and of its tiles are as far apart as noise explains, and that much more."""
+    assert max(compare.unexplained(ours, theirs)) <= off, name
 
 
 def test_cameras(blender):
     for name, (ours, theirs) in blender.run(inside_cameras).items():
         assert theirs[..., :3].max() > 0.5, name
-        _close(ours, theirs)
+        _close(ours, theirs, name)
 
 
 def test_geometry(blender):
-    ours, theirs = blender.run(inside_geometry)
-    _close(ours, theirs)
+    _close(*blender.run(inside_geometry), "geometry")
 
 
 # Flat objects: scaled to nothing along one axis -----------------------------------------------------
@@ -143,7 +148,7 @@ def inside_flat():
     made(add.primitive_monkey_add, -3.0, (1, 0, 1), (0.0, 0.0, 0.3), scenes.emitter((1.0, 0.3, 0.1)))
     made(add.primitive_cube_add, 0.0, (0.8, 0.8, 0), (1.2, 0.4, 0.3), normal)
     made(add.primitive_plane_add, 3.0, (1, 1, 0), (1.1, 0.2, -0.4), coordinates)
-    pairs["colors"] = _both(FILM_SAMPLES)
+    pairs["colors"] = _seeds()
     lit = scenes.material("Lit", "ShaderNodeBsdfDiffuse", Color=(0.8, 0.6, 0.4))
     for each in bpy.data.objects:
         if each.type == 'MESH':
@@ -154,7 +159,7 @@ def inside_flat():
     made(add.primitive_plane_add, -2.0, (1.2, 0.7, 0), (0.9, -0.3, 0.5), lit)
     scenes.mesh("Floor", [(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0)], [(0, 1, 2, 3)], lit)
     scenes.light('SUN', rotation=(0.6, 0.3, 0.0), energy=3.0, angle=0.0)
-    pairs["lit"] = _both(FILM_SAMPLES)
+    pairs["lit"] = _seeds()
     for each in list(bpy.data.objects):
         if each.type == 'MESH':
             bpy.data.objects.remove(each)
@@ -172,17 +177,14 @@ def inside_flat():
                 for key in curve.keyframe_points:
                     key.interpolation = 'LINEAR'
         scene.frame_set(1)
-        scenes.set_engine(engine, LIGHT_SAMPLES)
-        pairs["motion"].append(scenes.render())
+        pairs["motion"].append(scenes.seeds_by(engine, LIGHT_SAMPLES))
     return pairs
 
 
 def test_flat_objects(blender):
     for name, (ours, theirs) in blender.run(inside_flat).items():
         assert (theirs[..., :3].max(axis=-1) > 0.1).mean() > 0.1, name
-        _close(ours, theirs)
-        blocks = [picture[..., :3].reshape(8, 8, 12, 8, 3).mean(axis=(1, 3)) for picture in (ours, theirs)]
-        assert np.abs(blocks[0] - blocks[1]).max() < 0.02, name
+        _close(ours, theirs, name)
 
 
 # Blur ----------------------------------------------------------------------------------------------
@@ -197,7 +199,7 @@ def inside_blur():
     dof = made.data.dof
     dof.use_dof, dof.aperture_fstop, dof.focus_distance = True, 0.05, 6.0
     dof.aperture_blades, dof.aperture_ratio = 5, 1.5
-    pairs["lens"] = _both(LIGHT_SAMPLES)
+    pairs["lens"] = _seeds(LIGHT_SAMPLES)
     dof.use_dof = False
     moving = bpy.data.objects["Red"]
     for frame, x in ((0, -2.0), (4, 6.0)):
@@ -218,16 +220,13 @@ def inside_blur():
         key.keyframe_insert("value", frame=frame)
     scene.frame_set(2)
     scene.render.use_motion_blur, scene.render.motion_blur_shutter = True, 0.8
-    pairs["motion"] = _both(LIGHT_SAMPLES)
+    pairs["motion"] = _seeds(LIGHT_SAMPLES)
     return pairs
 
 
 def test_blur(blender):
     for kind, (ours, theirs) in blender.run(inside_blur).items():
-        blocks = [picture.reshape(6, 8, 9, 8, 4).mean(axis=(1, 3)) for picture in (ours, theirs)]
-        assert np.abs(blocks[0] - blocks[1]).max() < 0.06, kind
-        assert ours[..., :3].mean(axis=(0, 1)) == pytest.approx(theirs[..., :3].mean(axis=(0, 1)),
-                                                                rel=0.02), kind
+        _close(ours, theirs, kind)
 
 
 # Values ----------------------------------------------------------------------------------------------
@@ -267,16 +266,16 @@ def inside_values():
     ramp.color_ramp.interpolation = 'CONSTANT'
     ramp.color_ramp.elements[0].color, ramp.color_ramp.elements[1].color = (1, 0, 0, 1), (0, 0, 1, 1)
     ramp.color_ramp.elements.new(0.4).color = (0, 1, 0, 1)
-    pairs["constant ramp"] = _both(8 * FILM_SAMPLES)  # an edge through the middle
+    pairs["constant ramp"] = _seeds(8 * FILM_SAMPLES)  # an edge through the middle
     for space in ('OBJECT', 'WORLD', 'BLENDER_OBJECT', 'BLENDER_WORLD'):
         node, _ = _shown("ShaderNodeNormalMap", "Normal", space=space)
         node.inputs["Color"].default_value = (0.7, 0.2, 0.3, 1.0)
-        pairs[space] = _both(FILM_SAMPLES)
+        pairs[space] = _seeds()
     for mode in ('HSV', 'HSL'):
         node, _ = _shown("ShaderNodeCombineColor", "Color", color=True, mode=mode)
         for socket, value in zip(node.inputs, (0.6, 0.7, 0.4)):
             socket.default_value = value
-        pairs[mode] = _both(FILM_SAMPLES)
+        pairs[mode] = _seeds()
     image = bpy.data.images.new("Image", 2, 2, alpha=True)
     image.pixels.foreach_set([0.8, 0.5, 0.3, 0.25] * 4)
     image.filepath_raw, image.file_format = bpy.app.tempdir + "sheer.png", 'PNG'
@@ -287,10 +286,10 @@ def inside_values():
             node.image = bpy.data.images.load(image.filepath_raw, check_existing=False) \
                 if name == "file" else image
             node.image.colorspace_settings.name = space
-            pairs[f"{space} {name}"] = _both(FILM_SAMPLES)
+            pairs[f"{space} {name}"] = _seeds()
     node, _ = _shown("ShaderNodeLightPath", "Ray Length")
     made.data.clip_start = 3.0
-    pairs["ray length"] = _both(FILM_SAMPLES)
+    pairs["ray length"] = _seeds()
     made.location.x = -1.0
     made.keyframe_insert("location", frame=0)
     made.rotation_euler.z = -0.2
@@ -301,7 +300,7 @@ def inside_values():
     made.keyframe_insert("rotation_euler", frame=2)
     scene.render.use_motion_blur = True
     scene.frame_set(1)
-    pairs["ray length in motion"] = _both(FILM_SAMPLES)
+    pairs["ray length in motion"] = _seeds()
     return pairs
 
 
@@ -316,11 +315,8 @@ def value_pairs(blender_of_module):
     "sRGB generated", "Non-Color file", "Non-Color generated", "ray length", "ray length in motion"))
 def test_values(value_pairs, name):
     ours, theirs = value_pairs[name]
-    assert np.array_equal(ours[24, 24, :3] == 0.0, theirs[24, 24, :3] == 0.0)
-    _close(ours, theirs, share=0.05 if "motion" in name else 0.02)
-    inside = np.s_[20:28, 20:28, :3]
-    assert ours[inside].mean(axis=(0, 1)) == pytest.approx(theirs[inside].mean(axis=(0, 1)),
-                                                           rel=5e-3, abs=2e-3)
+    assert np.array_equal(ours[:, 24, 24, :3] == 0.0, theirs[:, 24, 24, :3] == 0.0)
+    _close(ours, theirs, name)
 
 
 # Generated coordinates of a posed mesh -------------------------------------------------------------
@@ -345,7 +341,7 @@ def _posed_column(material):
     column.modifiers.new("Armature", 'ARMATURE').object = armature
     pose = armature.pose.bones["Upper"]
     pose.rotation_mode = 'XYZ'
-    pose.rotation_euler = (0.0, 0.0, 0.9)
+    pose.rotation_euler = (0.3, 0.0, 0.9)  # forwards too: no two faces lie in one plane
     return column
 
 
@@ -362,15 +358,15 @@ def inside_generated():
     tree.links.new(tree.nodes.new("ShaderNodeTexCoord").outputs["Generated"],
                    tree.nodes["Emission"].inputs["Color"])
     column = _posed_column(material)
-    pairs = {"posed": _both(FILM_SAMPLES)}
+    pairs = {"posed": _seeds()}
     depsgraph = bpy.context.evaluated_depsgraph_get()
     evaluated = column.evaluated_get(depsgraph)
     viewport = mesh.generated_coordinates(evaluated, evaluated.data, mesh.read_positions(evaluated.data))
     column.data.use_auto_texspace = False
     column.data.texspace_size = (0.5, 1.0, 3.0)
-    pairs["own space"] = _both(FILM_SAMPLES)
+    pairs["own space"] = _seeds()
     column.modifiers.new("Subdivision", 'SUBSURF').render_levels = 1
-    pairs["subdivided"] = _both(FILM_SAMPLES)
+    pairs["subdivided"] = _seeds()
     return pairs, viewport
 
 
@@ -378,9 +374,7 @@ def test_generated_coordinates(blender):
     pairs, viewport = blender.run(inside_generated)
     for name, (ours, theirs) in pairs.items():
         assert theirs[..., :3].max() > 0.5, name
-        _close(ours, theirs)
-        assert ours[..., :3].mean(axis=(0, 1)) == pytest.approx(
-            theirs[..., :3].mean(axis=(0, 1)), rel=5e-3, abs=1e-3), name
+        _close(ours, theirs, name)
     assert viewport[:, 2].reshape(13, 4) == pytest.approx(np.repeat(np.linspace(0, 1, 13), 4).reshape(13, 4))
 
 

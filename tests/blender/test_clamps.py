@@ -19,14 +19,11 @@ PASSES = {("Combined", "Combined"): None, ("AO", "Ambient Occlusion"): "ambient_
           ("GlossInd", "Glossy Indirect"): "glossy_indirect",
           ("GlossCol", "Glossy Color"): "glossy_color"}
 GROUPS = {"Combined_key": "key", "Combined_sky": "sky", "Combined_sign": "sign"}
-# Of the largest mean of a channel. The first is of the whole picture, the second of blocks of 8 by 8
-# pixels, where edges of shadows and reflections fall between other samples.
-MEAN_TOLERANCE = 0.01
-BLOCK_TOLERANCE = {"GlossDir": 0.2, "GlossInd": 0.4}
-USUAL_BLOCK_TOLERANCE = 0.1
-# Beside Cycles 4.3, whose microfacets and choice of lobes are others: up to 0.32 and 0.014 were seen.
-BLOCK_TOLERANCE_4 = {"GlossDir": 0.5, "GlossInd": 0.5}
-MEAN_TOLERANCE_4 = 0.03
+# Beyond the noise that the seeds show, of pictures' means and of tiles' (see compare.unexplained). The pass of
+# shadows ends on rough metal a little before that of Cycles does; beside Cycles 4 and later diffuse light under
+# a limit of direct light is off by .0017, beside 3.4 all but the shadows by .00014.
+OFF = {"Shadow": (2e-3, 0.05)}
+USUAL_OFF = 2e-3, 0.015
 SUM_TOLERANCE = 1e-4
 
 
@@ -78,13 +75,10 @@ def inside_clamps():
             names[name] = short
     clamped = {}
     for direct, indirect in CLAMPS:
-        pictures = []
-        for engine in ('VOLLEY', 'CYCLES'):
-            scenes.set_engine(engine, SAMPLES)
-            scene.volley.clamp_direct = scene.cycles.sample_clamp_direct = direct
-            scene.volley.clamp_indirect = scene.cycles.sample_clamp_indirect = indirect
-            pictures.append(scenes.render_passes(list(names)))
-        clamped[direct, indirect] = {short: [picture[name][..., :3] for picture in pictures]
+        scene.volley.clamp_direct = scene.cycles.sample_clamp_direct = direct
+        scene.volley.clamp_indirect = scene.cycles.sample_clamp_indirect = indirect
+        pairs = scenes.passes_by_both(list(names), SAMPLES)
+        clamped[direct, indirect] = {short: [seeds[..., :3] for seeds in pairs[name]]
                                      for name, short in names.items()}
     return clamped
 
@@ -95,30 +89,19 @@ def _with_color(pairs):
             if name.endswith(("Dir", "Ind")) else pair for name, pair in pairs.items()}
 
 
-def _errors(ours, theirs):
-    """Of the picture's mean and of the means of blocks, as parts of the picture's largest mean."""
-    means, blocks = ([measure(picture) for picture in (ours, theirs)]
-                     for measure in (compare.channel_means, compare.tile_means))
-    scale = max(np.abs(means[1]).max(), 1e-6)
-    return np.abs(means[0] - means[1]).max() / scale, np.abs(blocks[0] - blocks[1]).max() / scale
-
-
 def test_clamps(blender):
     clamped = {clamp: _with_color(pairs)
                for clamp, pairs in blender.run(inside_clamps, timeout=300).items()}
-    lines = [f"{'direct':>6} {'indirect':>8} {'pass':13} {'mean':>9} {'mean error':>10} {'of blocks':>10}"]
+    lines = [f"{'direct':>6} {'indirect':>8} {'pass':13} {'mean':>9} {'mean off':>10} {'of tiles':>10}"]
     for (direct, indirect), pairs in clamped.items():
         for name, (ours, theirs) in pairs.items():
-            error, apart = _errors(ours, theirs)
-            lines.append(f"{direct:6g} {indirect:8g} {name:13} {theirs.mean():9.3g} {error:10.2e} {apart:10.2e}")
+            whole, tiles = compare.unexplained(ours, theirs)
+            lines.append(f"{direct:6g} {indirect:8g} {name:13} {theirs.mean():9.3g} {whole:10.2e} {tiles:10.2e}")
     blender_support.write_result("clamps.txt", lines)
-    is_4 = blender_support.version() >= (4, 0)
-    tolerance = BLOCK_TOLERANCE_4 if is_4 else BLOCK_TOLERANCE
-    mean_tolerance = MEAN_TOLERANCE_4 if is_4 else MEAN_TOLERANCE
     for pairs in clamped.values():
         for name, pair in pairs.items():
-            error, apart = _errors(*pair)
-            assert error < mean_tolerance and apart < tolerance.get(name, USUAL_BLOCK_TOLERANCE), name
+            off = compare.unexplained(*pair)
+            assert all(a <= b for a, b in zip(off, OFF.get(name, USUAL_OFF))), name
         ours = {name: pair[0] for name, pair in pairs.items()}
         by_kind = ours["Emit"] + ours["Env"] + sum(
             ours[f"{kind}{way}"] for kind in ("Diff", "Gloss") for way in ("Dir", "Ind"))

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Objects while they are edited, sculpted and painted: F12 beside Cycles, and what a viewport sees."""
 
+import compare
 import numpy as np
-import pytest
 
-SAMPLES = 16
+SAMPLES = 64
+ROUNDING = 1e-6  # all else is noise, measured on the seeds
 
 
 def _textured(name):
@@ -64,7 +65,7 @@ def _make_objects():
     collection.objects.link(plain)
     instancer = scenes.link("Instancer", None)
     instancer.instance_type, instancer.instance_collection = 'COLLECTION', collection
-    instancer.location, instancer.rotation_euler = (1.9, 0.0, -1.8), (0.0, 0.2, 0.0)
+    instancer.location, instancer.rotation_euler = (1.9, -0.4, -1.8), (0.0, 0.2, 0.0)  # in no other's plane
     blue = scenes.emitter((0.1, 0.2, 0.9), "Blue")
     others = []
     for operator, location in ((bpy.ops.object.text_add, (1.2, 0, 1.2)),
@@ -95,24 +96,18 @@ def inside_edit_mode():
     import bpy
     import scenes
     meshes, others = _make_objects()
-    pairs = {"OBJECT": scenes.by_both(SAMPLES)}
+    pairs = {"OBJECT": scenes.seeds_by_both(SAMPLES)}
     for name, objects in [("meshes", meshes)] + [(each.type, [each]) for each in others]:
         _enter('EDIT', *objects)
         assert all(each.mode == 'EDIT' for each in objects)
-        pairs[name] = scenes.by_both(SAMPLES)
+        pairs[name] = scenes.seeds_by_both(SAMPLES)
         bpy.ops.object.mode_set(mode='OBJECT')
     return pairs
 
 
 def _close(ours, theirs, name):
-    """As in the pictures of plain colours beside Cycles': few pixels differ, all of them at edges."""
-    difference = np.abs(ours - theirs)[..., :3].max(axis=-1)
-    means = [picture[..., :3].mean() for picture in (ours, theirs)]
-    print(f"{name}: means {means[0]:.5f} {means[1]:.5f}, pixels {np.median(difference):.2g} "
-          f"{difference.max():.2g}")
-    assert (difference > 0.25).mean() < 0.01, name
-    assert difference.mean() < 0.02, name
-    assert means[0] == pytest.approx(means[1], rel=0.02), name
+    """Means of the picture and of its tiles are as far apart as noise explains."""
+    assert max(compare.unexplained(ours, theirs)) <= ROUNDING, name
 
 
 def test_edit_mode_is_that_of_cycles(blender):
@@ -150,16 +145,15 @@ def inside_posed_edits():
     scene.frame_set(1)
     scene.render.use_motion_blur, scene.render.motion_blur_shutter = True, 1.0
     _enter('EDIT', bar)
-    return scenes.by_both(256)
+    return scenes.seeds_by_both(256)
 
 
 def test_deformation_blur_in_edit_mode(blender):
     ours, theirs = blender.run(inside_posed_edits)
-    blocks = [picture.reshape(6, 8, 8, 8, 4).mean(axis=(1, 3)) for picture in (ours, theirs)]
-    print(f"means {ours.mean():.5f} {theirs.mean():.5f}, blocks {np.abs(blocks[0] - blocks[1]).max():.2g}")
-    assert blocks[1][..., 0].max() > 0.5
-    assert ((theirs[..., 0] > 0.1) & (theirs[..., 0] < 0.9)).mean() > 0.02  # it is blurred
-    assert np.abs(blocks[0] - blocks[1]).max() < 0.012  # six deviations of an edge, see test_camera.py
+    shown = theirs.mean(axis=0)[..., 0]
+    assert shown.max() > 0.9
+    assert ((shown > 0.1) & (shown < 0.9)).mean() > 0.02  # it is blurred
+    _close(ours, theirs, "deformation blur")
 
 
 def inside_viewport_edits():
@@ -246,7 +240,7 @@ def inside_other_modes():
         for mode in ('OBJECT', 'EDIT', 'SCULPT', 'VERTEX_PAINT', 'WEIGHT_PAINT', 'TEXTURE_PAINT'):
             bpy.ops.object.mode_set(mode=mode)
             follower = Follower()
-            found[mode, has_multires] = (*scenes.by_both(SAMPLES), follower.picture())
+            found[mode, has_multires] = (*scenes.seeds_by_both(SAMPLES), follower.picture())
             warnings.append((mode, has_multires, follower.sync.warnings.take()))
             bpy.ops.object.mode_set(mode='OBJECT')
     return found, [each for each in warnings if each[2]]

@@ -9,6 +9,11 @@ import numpy as np
 import pytest
 
 SAMPLES = 64
+# Beyond the noise that the seeds show, of pictures' means and of tiles' (see compare.unexplained); few samples
+# that are rare and bright, at edges and in mirrors, tell their noise badly.
+OFF = 5e-4, 0.01
+LIGHT_OFF = 5e-4, 0.03
+SHADOW_OFF = 2e-3, 0.08  # on rough metal it ends a little before that of Cycles does
 
 
 def _scene(size=(96, 64)):
@@ -40,24 +45,16 @@ def _veil():
 
 
 def _both(names, samples=SAMPLES):
-    """Those passes by Volley and by Cycles."""
+    """Those passes by Volley and by Cycles, with several seeds."""
     import scenes
-    pictures = []
-    for engine in ('VOLLEY', 'CYCLES'):
-        scenes.set_engine(engine, samples)
-        pictures.append(scenes.render_passes(names))
-    return {name: (pictures[0][name], pictures[1][name]) for name in names}
+    return scenes.passes_by_both(names, samples)
 
 
-def _agree(ours, theirs, channels=3, mean=0.01, share=0.05, step=0.05):
-    """Equal means, and few pixels (edges fall between other samples) that differ by a share of the
-    largest value."""
+def _agree(ours, theirs, name, channels=3, off=OFF):
+    """Means of the picture and of its tiles are as far apart as noise explains, and that much more."""
     ours, theirs = ours[..., :channels], theirs[..., :channels]
-    scale = np.abs(theirs).max()
-    assert scale > 0.0
-    assert np.abs(ours.mean(axis=(0, 1)) - theirs.mean(axis=(0, 1))).max() < mean * scale
-    apart = np.abs(ours - theirs).max(axis=-1) > step * scale
-    assert apart.mean() < share, f"{apart.mean():.3%} of the pixels differ"
+    assert theirs.any(), name
+    assert all(a <= b for a, b in zip(compare.unexplained(ours, theirs), off)), name
 
 
 # Data, light and colours ---------------------------------------------------------------------------
@@ -71,10 +68,8 @@ _LIGHT_PASSES = {
     ("GlossCol", "Glossy Color"): (("GlossDir", "Glossy Direct"), ("GlossInd", "Glossy Indirect")),
     ("TransCol", "Transmission Color"): (("TransDir", "Transmission Direct"),
                                          ("TransInd", "Transmission Indirect"))}
-# Of means. Beside a gloss Cycles lets some light through to the diffuse lobe too, with a bounce that it
-# should not have; lamps seen in mirrors through glass are rare and bright.
-LIGHT_TOLERANCE = {"DiffInd": 0.03, "GlossInd": 0.1}
-BLOCK_TOLERANCE = {"GlossInd": 0.35}
+# Pixels of one sample in their middle: the share that may differ, by more than that share of the largest.
+FIRST_SHARE, FIRST_STEP = 1e-3, 2e-3
 LEAST_COLOR = 0.02  # below it, light over colour is one noise over another
 SUM_TOLERANCE = 1e-4
 
@@ -114,31 +109,28 @@ def inside_gallery():
     names = {_name_of(names): names if isinstance(names, str) else names[0] for names in shown}
     pairs = _both(list(names), 8 * SAMPLES)
     bpy.data.objects["Veil"].hide_render = True  # a sample goes through it or not by chance
-    surface = {_name_of(names): names if isinstance(names, str) else names[0]
-               for names in (*_FIRST_PASSES, *_SURFACE_PASSES)}
-    pairs.update(_both(list(surface), SAMPLES))
-    names.update(surface)
+    pairs.update(_both(_SURFACE_PASSES))
+    scenes.sharpen()
+    first = {_name_of(names): names if isinstance(names, str) else names[0] for names in _FIRST_PASSES}
+    pairs.update(_both(list(first)))
+    names.update(first, **{name: name for name in _SURFACE_PASSES})
     return {names[name]: [picture[..., :3] for picture in pair] for name, pair in pairs.items()}
 
 
 def test_gallery(blender):
     pairs = blender.run(inside_gallery, timeout=300)
-    lines = [f"{'pass':9} {'mean':>9} {'mean error':>10} {'blocks or pixels':>16}"]
+    lines = [f"{'pass':9} {'mean':>9} {'mean off':>10} {'tiles or pixels':>16}"]
 
     def compare_means(name, ours, theirs):
-        means = [picture.mean(axis=(0, 1)) for picture in (ours, theirs)]
-        blocks = [compare.tile_means(picture) for picture in (ours, theirs)]
-        error = np.abs(means[0] - means[1]).max() / max(np.abs(means[1]).max(), 1e-6)
-        apart = np.abs(blocks[0] - blocks[1]).max() / max(np.abs(blocks[1]).max(), 1e-6)
-        lines.append(f"{name:9} {means[1].mean():9.3g} {error:10.2e} {apart:16.3%}")
-        assert error < LIGHT_TOLERANCE.get(name, 0.01), lines[-1]
-        assert apart < BLOCK_TOLERANCE.get(name, 0.1), lines[-1]
+        off = compare.unexplained(ours, theirs)
+        lines.append(f"{name:9} {theirs.mean():9.3g} {off[0]:10.2e} {off[1]:16.2e}")
+        assert off[0] <= LIGHT_OFF[0] and off[1] <= LIGHT_OFF[1], lines[-1]
 
     for name in ("Depth", "Position", "IndexOB", "IndexMA"):
         ours, theirs = pairs[name]
-        apart = (np.abs(ours - theirs) > 0.05 * np.abs(theirs).max()).any(axis=-1).mean()
+        apart = (np.abs(ours - theirs) > FIRST_STEP * np.abs(theirs).max()).any(axis=-1).mean()
         lines.append(f"{name:9} {theirs.mean():9.3g} {'':10} {apart:16.3%}")
-        _agree(ours, theirs)
+        assert apart <= FIRST_SHARE, lines[-1]
     for name in (*_SURFACE_PASSES, "Combined", "Emit", "Env"):
         compare_means(name, *pairs[name])
     for (color, _), light in _LIGHT_PASSES.items():
@@ -175,7 +167,7 @@ def inside_mist():
 
 def test_mist(blender):
     for name, (ours, theirs) in blender.run(inside_mist).items():
-        _agree(ours, theirs, channels=1, mean=2e-3, share=0.01)
+        _agree(ours, theirs, name, channels=1)
         assert 0.0 <= ours.min() and ours.max() <= 1.0, name
 
 
@@ -195,8 +187,8 @@ def inside_denoising():
 
 def test_denoising_data(blender):
     pairs = blender.run(inside_denoising)
-    for ours, theirs in pairs.values():
-        _agree(ours, theirs, mean=5e-3, share=0.05, step=0.1)
+    for name, (ours, theirs) in pairs.items():
+        _agree(ours, theirs, name)
 
 
 # Vector ---------------------------------------------------------------------------------------------
@@ -234,9 +226,9 @@ def test_vector(blender):
     pairs = blender.run(inside_vector)
     for picture in pairs.pop("blurred"):
         assert not picture[..., :3].any()
-    for ours, theirs in pairs.values():  # the file has an alpha of 1 in place of the fourth channel
-        assert np.abs(theirs).max(axis=(0, 1)).min() > 0.5
-        _agree(ours, theirs, mean=5e-3, share=0.02)
+    for name, (ours, theirs) in pairs.items():  # the file has an alpha of 1 in place of the fourth channel
+        assert np.abs(theirs).max(axis=(0, 1, 2)).min() > 0.5
+        _agree(ours, theirs, name)
 
 
 # Cryptomatte ----------------------------------------------------------------------------------------
@@ -295,8 +287,7 @@ def inside_cryptomatte():
     names = [f"{kind}{layer:02d}" for kind in CRYPTOMATTES for layer in range((LEVELS + 1) // 2)]
     pairs, mattes = _both(names, 256), []
     for engine in ('VOLLEY', 'CYCLES'):
-        scenes.set_engine(engine, 256)
-        mattes.append(_matte(MATTED))
+        mattes.append(np.array([_matte(MATTED) for _ in scenes.each_seed(engine, 256)]))
     return pairs, mattes
 
 
@@ -321,12 +312,9 @@ def test_cryptomatte(blender):
         ours, theirs = (_coverages(_ranks(pairs, kind, engine)) for engine in (0, 1))
         assert ours.keys() == theirs.keys() and len(ours) == count
         for number, expected in theirs.items():
-            assert abs(ours[number].mean() - expected.mean()) < 1e-3
-            assert (np.abs(ours[number] - expected) > 0.1).mean() < 0.01
-    ours, theirs = (matte[..., 0] for matte in mattes)
-    assert 0.1 < theirs.mean() < 0.9
-    assert abs(ours.mean() - theirs.mean()) < 1e-3
-    assert (np.abs(ours - theirs) > 0.1).mean() < 0.01
+            _agree(ours[number][..., None], expected[..., None], f"{kind} {number}")
+    assert 0.1 < mattes[1][..., 0].mean() < 0.9
+    _agree(*mattes, "matte", channels=1)
 
 
 def inside_manifests(path):
@@ -442,8 +430,8 @@ def test_aovs(blender):
         assert not picture.any()
     for name, (ours, theirs) in pairs.items():
         channels = 4 if name == "tint" else 1
-        assert (theirs[..., :channels].std(axis=(0, 1)) > 0.02).all()
-        _agree(ours, theirs, channels, mean=3e-3, share=0.01, step=0.1)
+        assert (theirs[..., :channels].std(axis=(0, 1, 2)) > 0.02).all()
+        _agree(ours, theirs, name, channels)
 
 
 # Ambient occlusion and shadow -----------------------------------------------------------------------
@@ -478,9 +466,9 @@ def inside_occlusion():
 
 
 def test_occlusion(blender):
-    for ours, theirs in blender.run(inside_occlusion, timeout=300).values():
+    for name, (ours, theirs) in blender.run(inside_occlusion, timeout=300).items():
         assert theirs[..., 0].std() > 0.1
-        _agree(ours, theirs, mean=5e-3, share=0.03, step=0.1)
+        _agree(ours, theirs, name, off=SHADOW_OFF if name == "Shadow" else OFF)
 
 
 # Light groups ---------------------------------------------------------------------------------------
@@ -546,9 +534,9 @@ def test_what_is_too_much_is_told(blender):
 
 def test_light_groups(blender):
     pairs, grouped = blender.run(inside_light_groups, timeout=300)
-    for ours, theirs in pairs.values():
+    for name, (ours, theirs) in pairs.items():
         assert theirs[..., :3].mean() > 1e-3
         limit = np.quantile(theirs, 0.995)  # Cycles counts mirrored suns to the group of the world
-        _agree(np.minimum(ours, limit), np.minimum(theirs, limit), mean=5e-3, share=0.03, step=0.1)
+        _agree(np.minimum(ours, limit), np.minimum(theirs, limit), name)
     total = sum(ours[..., :3] for ours, _ in pairs.values())
     assert total.mean() == pytest.approx(grouped[..., :3].mean(), rel=5e-3)

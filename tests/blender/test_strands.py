@@ -3,15 +3,20 @@
 
 import math
 
+import compare
 import numpy as np
-import pytest
 
 SAMPLES = 64
+# Beyond the noise that the seeds show, of pictures' means and of tiles' (see compare.unexplained): up to 3e-4 where
+# light falls on strands; where they shine before black, tubes of flat sides are narrower than Cycles' ribbons
+# by up to .0030 and .043.
+LIT_OFF = 1e-3, 1e-3
+SHINING_OFF = 0.004, 0.05
 
 
 def _both(samples=SAMPLES):
     import scenes
-    return [picture[..., :3] for picture in scenes.by_both(samples)]
+    return [seeds[..., :3] for seeds in scenes.seeds_by_both(samples)]
 
 
 def _haired(**settings):
@@ -300,35 +305,34 @@ def inside_moving_points():
     return pictures
 
 
-def _blocks(picture):
-    return picture.reshape(6, 8, 8, 8, 3).mean(axis=(1, 3))
-
-
-def _agree(pictures):
+def _agree(pictures, off):
     for name, (ours, theirs) in pictures.items():
         assert theirs.std() > 0.02, f"{name}: the picture shows nothing"
-        assert ours.mean(axis=(0, 1)) == pytest.approx(theirs.mean(axis=(0, 1)), rel=0.015), name
-        assert np.abs(_blocks(ours) - _blocks(theirs)).max() < 0.08 * theirs.max(), name
+        whole, tile = compare.unexplained(ours, theirs)
+        assert whole <= off[0] and tile <= off[1], name
 
 
 def test_hair(blender):
-    _agree(blender.run(inside_hair))
+    pictures = blender.run(inside_hair)
+    lit = {name: pictures.pop(name) for name in ("plain", "children of a moved ball")}
+    _agree(lit, LIT_OFF)
+    _agree(pictures, SHINING_OFF)
 
 
 def test_attributes(blender):
-    _agree(blender.run(inside_attributes))
+    _agree(blender.run(inside_attributes), SHINING_OFF)
 
 
 def test_moving_hair(blender):
     pictures = blender.run(inside_moving_hair)
-    _agree(pictures)
-    assert np.abs(np.diff([pictures["children with the skin"][1], pictures["without deformation blur"][1]],
-                          axis=0)).max() > 0.1, "nothing is blurred"
+    _agree(pictures, LIT_OFF)
+    shown = [pictures[name][1].mean(axis=0) for name in ("children with the skin", "without deformation blur")]
+    assert np.abs(shown[0] - shown[1]).max() > 0.1, "nothing is blurred"
 
 
 def test_moving_curves_and_points(blender):
-    _agree(blender.run(inside_moving_points))
+    _agree(blender.run(inside_moving_points), SHINING_OFF)
 
 
 def test_curves_and_points(blender):
-    _agree(blender.run(inside_points))
+    _agree(blender.run(inside_points), LIT_OFF)

@@ -273,20 +273,25 @@ def by_both(samples):
     return pictures
 
 
+def each_seed(engine, samples, seeds=SEEDS):
+    """Set the scene up for an engine and one seed after the other; of so many samples altogether."""
+    set_engine(engine, samples // len(seeds))
+    if engine == 'CYCLES':
+        independent_seeds()
+    for seed in seeds:
+        getattr(bpy.context.scene, engine.lower()).seed = seed
+        yield seed
+
+
+def seeds_by(engine, samples, seeds=SEEDS):
+    """The scene as it is by an engine, of so many samples, shared out among seeds: an array (seeds, height,
+    width, 4), whose spread is its noise (see compare.unexplained)."""
+    return np.array([render() for _ in each_seed(engine, samples, seeds)])
+
+
 def seeds_by_both(samples, seeds=SEEDS):
-    """The scene as it is by Volley and by Cycles, of so many samples, shared out among seeds: two arrays
-    (seeds, height, width, 4), whose spread is their noise (see compare.unexplained)."""
-    scene, pictures = bpy.context.scene, []
-    for engine in ('VOLLEY', 'CYCLES'):
-        set_engine(engine, samples // len(seeds))
-        if engine == 'CYCLES':
-            independent_seeds()
-        settings = scene.volley if engine == 'VOLLEY' else scene.cycles
-        pictures.append([])
-        for seed in seeds:
-            settings.seed = seed
-            pictures[-1].append(render())
-    return [np.array(side) for side in pictures]
+    """As seeds_by, by Volley and by Cycles."""
+    return [seeds_by(engine, samples, seeds) for engine in ('VOLLEY', 'CYCLES')]
 
 
 def sharpen():
@@ -323,6 +328,13 @@ def render_passes(names):
     files = sorted(os.listdir(folder))
     assert len(files) == len(names), f"{files} for passes {names}"
     return {name: load(os.path.join(folder, file)) for name, file in zip(names, files)}
+
+
+def passes_by_both(names, samples, seeds=SEEDS):
+    """{pass name: as seeds_by_both} of the active view layer."""
+    sides = [[render_passes(names) for _ in each_seed(engine, samples, seeds)]
+             for engine in ('VOLLEY', 'CYCLES')]
+    return {name: [np.array([picture[name] for picture in side]) for side in sides] for name in names}
 
 
 def channel_means(picture):
