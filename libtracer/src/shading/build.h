@@ -92,7 +92,7 @@ trc_status trc_build_texture(struct trc_build *b, const trc_node *node,
 /* An operation of a point without inputs, at the point that nodes are lowered for.
  * (shading/lower.c)
  */
-trc_status trc_build_point(struct trc_build *b, uint32_t op, uint32_t resource,
+trc_status trc_build_point(struct trc_build *b, uint32_t code, uint32_t resource,
                            struct trc_operand *outputs);
 /* Outputs of those value nodes before end that are wanted; NULL: all. (shading/lower.c) */
 trc_status trc_build_nodes(struct trc_build *b, const uint8_t *wanted, uint32_t end);

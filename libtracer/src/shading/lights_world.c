@@ -62,8 +62,9 @@ static void weigh_sun(const struct trc_snapshot *s, struct trc_world_map *map) {
     const float b[3] = {d[1] * a[2] - d[2] * a[1], d[2] * a[0] - d[0] * a[2],
                         d[0] * a[1] - d[1] * a[0]};
     for (int k = 0; k < SUN_RINGS * SUN_TURNS; k++) {
-        const float r = sun->tangent * sqrtf(((float)(k / SUN_TURNS) + 0.5f) / SUN_RINGS);
-        const float phi = 2.0f * PI * (float)(k % SUN_TURNS) / SUN_TURNS;
+        const int ring = k / SUN_TURNS, turn = k % SUN_TURNS;
+        const float r = sun->tangent * sqrtf(((float)ring + 0.5f) / SUN_RINGS);
+        const float phi = 2.0f * PI * (float)turn / SUN_TURNS;
         for (int i = 0; i < 3; i++)
             directions[3 * k + i] = d[i] + r * (cosf(phi) * a[i] + sinf(phi) * b[i]);
     }

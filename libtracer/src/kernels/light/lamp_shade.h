@@ -21,7 +21,7 @@ vvec3 trc_lamp_emission(const struct trc_lamp_view *view, vmask m);
 
 /* trc_kernels.lamp_measure. */
 void trc_lamp_measure(const struct trc_snapshot *scene, const struct trc_light_table *table,
-                      uint32_t lamp, const struct trc_light_bound *bound, float reach,
+                      uint32_t number, const struct trc_light_bound *bound, float reach,
                       float mean[3]);
 
 #endif

@@ -124,7 +124,8 @@ void trc_add_burley(struct trc_setup *c, vvec3 weight, vvec3 n, vfloat roughness
 void trc_add_schlick_sheen(struct trc_setup *c, vvec3 weight, vvec3 n);
 /* Returns the albedo over the weight. */
 vfloat trc_add_fibres(struct trc_setup *c, vvec3 weight, vvec3 n, vfloat roughness);
-vfloat trc_fibres_albedo(vfloat cosine, vfloat roughness);
+/* The same of a weight of 1, at the cosine x to the normal and the roughness y. */
+vfloat trc_fibres_albedo(vfloat x, vfloat y);
 
 /* kernels/lobe/transparent.c */
 void trc_add_transparent(struct trc_setup *c, vvec3 weight);
