@@ -65,9 +65,13 @@ def shown_mesh(blender_object):
 
 
 def is_sculpted_multires(blender_object):
-    """Whether Blender keeps the shape of an evaluated mesh object to itself."""
-    return blender_object.mode == 'SCULPT' and not blender_object.data.vertices and any(
-        modifier.type == 'MULTIRES' for modifier in blender_object.modifiers)
+    """Whether Blender keeps the shape of an evaluated mesh object to itself: it gives an empty mesh, from 5.0
+    on the one below."""
+    if blender_object.mode != 'SCULPT':
+        return False
+    shown, below = len(blender_object.data.vertices), len(blender_object.original.data.vertices)
+    return any(not shown or shown == below and modifier.show_viewport and modifier.total_levels > 0
+               for modifier in blender_object.modifiers if modifier.type == 'MULTIRES')
 
 
 def extract(mesh, uv_names=(), color_names=(), material_count=1):
