@@ -5,6 +5,7 @@ set -uo pipefail
 frame=$((VOLLEY_FIRST + SLURM_ARRAY_TASK_ID / VOLLEY_TASKS))
 task=$((SLURM_ARRAY_TASK_ID % VOLLEY_TASKS))
 first=$((task * VOLLEY_BLOCKS))
+threads=${SLURM_CPUS_PER_TASK:-${SLURM_CPUS_ON_NODE:-0}}
 main="import importlib; importlib.import_module('$ADDON.farm.command').main()"
 
 # Lines of progress become the job's comment, the others its log.
@@ -20,7 +21,8 @@ watch() {
 }
 
 exec > >(watch) 2>&1
-"$BLENDER" -b --addons "$ADDON" "$VOLLEY_FILE" --python-exit-code 1 --python-expr "$main" -- render \
+# -t for what Blender itself evaluates: some of its modifiers differ in the last digit with more threads.
+"$BLENDER" -b -t "$threads" --addons "$ADDON" "$VOLLEY_FILE" --python-exit-code 1 --python-expr "$main" -- render \
     --frames "$frame" --parts "$VOLLEY_FOLDER/parts" --strict --summary "$VOLLEY_FOLDER/logs/summary.json" \
     --blocks "$first-$((first + VOLLEY_BLOCKS - 1))/$((VOLLEY_TASKS * VOLLEY_BLOCKS))" </dev/null &
 blender=$!
