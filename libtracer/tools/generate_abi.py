@@ -56,8 +56,8 @@ def read_interface(include=INCLUDE):
     text = "\n".join(_without_comments(path.read_text()) for path in header_paths(include))
     text = _read_macros(_expand_lists(text, include), interface)
     _read_declarations(text, interface)
-    interface.nodes.extend(_read_nodes(_list_text(include, "nodes")))
-    passes = _list_text(include, "passes")
+    interface.nodes.extend(_read_nodes(_list_text(include / "tracer" / "nodes.def")))
+    passes = _list_text(include / "tracer" / "passes.def")
     interface.passes.extend(Pass(name, channels.strip('"'))
                             for name, _, channels, *_ in _calls(passes, "TRC_PASS"))
     interface.pass_ranges.extend(PassRange(name, _number(count, interface), channels.strip('"'))
@@ -65,10 +65,13 @@ def read_interface(include=INCLUDE):
     return interface
 
 
-def _list_text(include, name):
-    """The list tracer/NAME.def without its comments; empty where there is none."""
-    path = include / "tracer" / f"{name}.def"
-    return _without_comments(path.read_text()) if path.is_file() else ""
+def _list_text(path):
+    """A list without its comments, and with macros that it says are others as those; empty where there is
+    none."""
+    text = _without_comments(path.read_text()) if path.is_file() else ""
+    for name, other in re.findall(r"^#define (\w+) (\w+)$", text, flags=re.M):
+        text = re.sub(rf"\b{name}\(", f"{other}(", text)
+    return text
 
 
 def _without_comments(text):
@@ -83,7 +86,7 @@ def _expand_lists(text, include):
     def expand(match):
         name, parameters, body, _, path = match.groups()
         parameters = [parameter.strip() for parameter in parameters.split(",")]
-        entries = _calls(_without_comments((include / path).read_text()), name)
+        entries = _calls(_list_text(include / path), name)
         return "\n".join(_substitute(body, dict(zip(parameters, entry))) for entry in entries)
     return re.sub(pattern, expand, text)
 

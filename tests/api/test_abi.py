@@ -95,7 +95,8 @@ def test_lists_become_enumerators_and_tables(tmp_path):
     folder.mkdir()
     (folder / "nodes.def").write_text('/* A, (B) */\nTRC_NODE(TINT, 3, "Tint, soft",\n  TRC_IN(COLOR, color) '
                                       'TRC_IN(FLOAT, factor),\n  TRC_OUT(COLOR, color), mode <= (2))\n'
-                                      'TRC_NODE(NOTHING, 4, "Nothing", , TRC_OUT(FLOAT, one), mode == 0)\n'
+                                      '#ifndef TRC_TEXTURE\n#define TRC_TEXTURE TRC_NODE\n#endif\n'
+                                      'TRC_TEXTURE(NOTHING, 4, "Nothing", , TRC_OUT(FLOAT, one), mode == 0)\n'
                                       '#undef TRC_NODE\n')
     (folder / "nodes.h").write_text('enum trc_node_type {\n#define TRC_NODE(name, number, label, i, o, m) '
                                     'TRC_NODE_##name = number,\n#include "tracer/nodes.def"\n};\n')

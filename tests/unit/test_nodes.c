@@ -92,8 +92,8 @@ static void test_all_types_add_up(void **state) {
     }
 #include "tracer/nodes.def"
     assert_null(trc_node_info_of(0));
-    assert_null(trc_node_info_of(17));
-    assert_null(trc_node_info_of(119));
+    assert_null(trc_node_info_of(TRC_NODE_IMAGE - 1));
+    assert_null(trc_node_info_of(1000));
     assert_null(trc_node_info_of(UINT32_MAX));
 }
 

@@ -183,16 +183,17 @@ trc_status trc_build_texture(struct trc_build *b, const trc_node *node,
         return build_voronoi(b, node->mode, in, out);
     case TRC_NODE_WAVE:
         return build_wave(b, node->mode, in, out);
-    case TRC_NODE_GRADIENT:
-        return op(b, TRC_OP_GRADIENT, node->mode, in, out);
-    case TRC_NODE_WHITE_NOISE:
-        return op(b, TRC_OP_WHITE_NOISE, node->mode, in, out);
     case TRC_NODE_MAGIC:
         TRC_TRY(op(b, TRC_OP_MAGIC, node->mode, in, out + TRC_OUT_AT(MAGIC, color)));
         return op(b, TRC_OP_AVERAGE, 0, out + TRC_OUT_AT(MAGIC, color),
                   out + TRC_OUT_AT(MAGIC, factor));
     case TRC_NODE_BRICK:
         return build_brick(b, node->mode, in, out);
+#define TRC_NODE(NAME, number, label, inputs, outputs, modes)
+#define TRC_TEXTURE(NAME, number, label, inputs, outputs, modes) \
+    case TRC_NODE_##NAME:                                        \
+        return op(b, TRC_OP_##NAME, node->mode, in, out);
+#include "tracer/nodes.def"
     default:
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "a node has an unknown type");
     }

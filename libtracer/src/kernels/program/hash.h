@@ -11,6 +11,13 @@
 /* Coordinates of a place; components beyond the dimensions in use are not read. */
 #define TRC_MAX_DIMENSIONS 4
 
+/* Where a vector and a number w lie in a space of dims dimensions. */
+TRC_INLINE void place_of(int dims, const vfloat *vector, vfloat w, vfloat *p) {
+    for (int i = 0; i < 3; i++)
+        p[i] = vector[i];
+    p[dims == 1 ? 0 : 3] = w;
+}
+
 /* ---- words ---- */
 
 TRC_INLINE vuint vu_rotate(vuint x, int bits) { return (x << bits) | (x >> (32 - bits)); }

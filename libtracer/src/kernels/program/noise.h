@@ -230,13 +230,6 @@ TRC_INLINE void noise_moved(int dims, const vfloat *p, int seed, vfloat *out) {
     }
 }
 
-/* Where a vector and a number w lie in a space of dims dimensions. */
-TRC_INLINE void noise_place(int dims, const vfloat *vector, vfloat w, vfloat *p) {
-    for (int i = 0; i < 3; i++)
-        p[i] = vector[i];
-    p[dims == 1 ? 0 : 3] = w;
-}
-
 static void op_noise(uint32_t mode, const vfloat *in, vfloat *out) {
     const struct fractal f = {.type = (mode & ~TRC_MODE_NO_COLOR) >> TRC_NOISE_TYPE_SHIFT,
                               .dims = (int)(mode & TRC_DIMENSIONS_MASK) + 1,
@@ -248,7 +241,7 @@ static void op_noise(uint32_t mode, const vfloat *in, vfloat *out) {
                               .gain = in[TRC_OP_AT(NOISE, gain)]};
     const vfloat distortion = in[TRC_OP_AT(NOISE, distortion)];
     vfloat p[TRC_MAX_DIMENSIONS], moved[TRC_MAX_DIMENSIONS];
-    noise_place(f.dims, in + TRC_OP_AT(NOISE, vector), in[TRC_OP_AT(NOISE, w)], p);
+    place_of(f.dims, in + TRC_OP_AT(NOISE, vector), in[TRC_OP_AT(NOISE, w)], p);
     if (vm_any(vf_ne(distortion, vf_zero()))) {
         vfloat shift[TRC_MAX_DIMENSIONS];
         for (int i = 0; i < f.dims; i++) {
@@ -266,15 +259,6 @@ static void op_noise(uint32_t mode, const vfloat *in, vfloat *out) {
         noise_moved(f.dims, p, f.dims + i, moved);
         color[1 + i] = fractal_noise(&f, moved);
     }
-}
-
-static void op_white_noise(uint32_t mode, const vfloat *in, vfloat *out) {
-    const int dims = (int)(mode & TRC_DIMENSIONS_MASK) + 1;
-    vfloat p[TRC_MAX_DIMENSIONS];
-    noise_place(dims, in + TRC_OP_AT(WHITE_NOISE, vector), in[TRC_OP_AT(WHITE_NOISE, w)], p);
-    const vvec3 color = hash_color(dims, p);
-    out[TRC_OP_OUT_AT(WHITE_NOISE, value)] = color.x;
-    v3_write(out + TRC_OP_OUT_AT(WHITE_NOISE, color), color);
 }
 
 #endif

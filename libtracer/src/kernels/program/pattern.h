@@ -1,43 +1,8 @@
-/* Regular patterns: the Gradient, Wave, Magic and Brick textures, as in Cycles 3.4. */
+/* Regular patterns: the Wave, Magic and Brick textures, as in Cycles 3.4. */
 #ifndef TRACER_KERNELS_PROGRAM_PATTERN_H
 #define TRACER_KERNELS_PROGRAM_PATTERN_H
 
 #include "kernels/program/noise.h"
-
-/* ---- gradient ---- */
-
-static vfloat op_gradient(uint32_t mode, vvec3 p) {
-    const vfloat zero = vf_zero(), half = vf_set(0.5f);
-    /* Unit vectors give exactly 0. */
-    const vfloat inside = vf_max(vf_set(0.999999f) - v3_length(p), zero);
-    vfloat r = zero;
-    switch (mode) {
-    case TRC_GRADIENT_LINEAR:
-        r = p.x;
-        break;
-    case TRC_GRADIENT_QUADRATIC:
-        r = vf_square(vf_max(p.x, zero));
-        break;
-    case TRC_GRADIENT_EASING: {
-        const vfloat x = vf_saturate(p.x), square = x * x;
-        r = vf_set(3.0f) * square - vf_set(2.0f) * square * x;
-        break;
-    }
-    case TRC_GRADIENT_DIAGONAL:
-        r = (p.x + p.y) * half;
-        break;
-    case TRC_GRADIENT_RADIAL:
-        r = vf_atan2(p.y, p.x) / vf_set(TRC_TWO_PI) + half;
-        break;
-    case TRC_GRADIENT_QUADRATIC_SPHERE:
-        r = inside * inside;
-        break;
-    default:
-        r = inside;
-        break;
-    }
-    return vf_saturate(r);
-}
 
 /* ---- wave ---- */
 

@@ -10,14 +10,8 @@ void trc_program_procedural(uint32_t op, uint32_t mode, const vfloat *in, vfloat
     case TRC_OP_NOISE:
         op_noise(mode, in, out);
         break;
-    case TRC_OP_WHITE_NOISE:
-        op_white_noise(mode, in, out);
-        break;
     case TRC_OP_VORONOI:
         op_voronoi(mode, in, out);
-        break;
-    case TRC_OP_GRADIENT:
-        out[0] = op_gradient(mode, v3_read(in));
         break;
     case TRC_OP_WAVE:
         out[0] = op_wave(mode, in);
@@ -28,6 +22,12 @@ void trc_program_procedural(uint32_t op, uint32_t mode, const vfloat *in, vfloat
     case TRC_OP_BRICK:
         op_brick(mode, in, out);
         break;
+#define TRC_NODE(NAME, number, label, inputs, outputs, modes)
+#define TRC_TEXTURE(NAME, number, label, inputs, outputs, modes) \
+    case TRC_OP_##NAME:                                          \
+        TRC_TEXTURE_OF(NAME)(mode, in, out);                     \
+        break;
+#include "tracer/nodes.def"
     default:
         break;
     }

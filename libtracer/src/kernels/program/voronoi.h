@@ -358,7 +358,7 @@ static void op_voronoi(uint32_t mode, const vfloat *in, vfloat *out) {
     const vfloat zero = vf_zero();
     vfloat place[TRC_MAX_DIMENSIONS];
     struct voronoi_value value;
-    noise_place(v.dims, in + TRC_OP_AT(VORONOI, vector), in[TRC_OP_AT(VORONOI, w)], place);
+    place_of(v.dims, in + TRC_OP_AT(VORONOI, vector), in[TRC_OP_AT(VORONOI, w)], place);
     for (uint32_t i = 0; i < TRC_OP_OUT_AT(VORONOI, end); i++)
         out[i] = zero;
     if (feature == TRC_VORONOI_N_SPHERE_RADIUS) {
