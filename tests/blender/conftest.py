@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fixtures of the tests that run inside Blender, and the check of what is skipped.
 
-A test may skip where expected_skips.py says so for the Blender that is tested, and nowhere else. No Blender
-or no virtual display is a failure, unless VOLLEY_WITHOUT says that this machine has none: "blender",
-"xvfb" or both, with a comma.
+A test may skip where expected_skips.py or its own mark, since(version, why), says so for the Blender that is
+tested, and nowhere else. No Blender or no virtual display is a failure, unless VOLLEY_WITHOUT says that this
+machine has none: "blender", "xvfb" or both, with a comma.
 """
 
 import os
@@ -68,8 +68,19 @@ def _require(item, what, is_there):
 
 # Skips ---------------------------------------------------------------------------------------------
 
+def pytest_configure(config):
+    config.addinivalue_line("markers", "since(version, why): skips in a Blender before (major, minor)")
+
+
 def _name_of(item):
     return f"{item.path.name}::{item.name}"
+
+
+def _expected_skip(item):
+    """Why the Blender that is tested skips it, None if it must run."""
+    version = blender_support.version()
+    later = next((mark.args[1] for mark in item.iter_markers("since") if version < mark.args[0]), None)
+    return later or expected_skips.reason(_name_of(item), version)
 
 
 @pytest.hookimpl(hookwrapper=True)
@@ -79,7 +90,7 @@ def pytest_runtest_makereport(item, call):
     is_over = report.skipped or call.when == "call"
     if not is_over or report.failed or item.stash.get(_IS_WITHOUT, False) or call.when == "teardown":
         return
-    expected = expected_skips.reason(_name_of(item), blender_support.version())
+    expected = _expected_skip(item)
     if report.skipped and expected is None:
         report.outcome, report.longrepr = "failed", f"skipped, which is not expected: {report.longrepr}"
     elif not report.skipped and expected is not None:

@@ -17,9 +17,12 @@ SHARE_WITHIN = 0.995  # of the pixels; edges of cells may fall on either side
 # on the plane, 'number' by its X; 'cells' and 'whole' by the same in steps; 'color' by the place with
 # values about 0 to 1, a pair of numbers by X from the first to the second.
 CASES = {}
+_SINCE = {}  # of those that not all Blenders have: version and why
 
 
-def _add(name, node, outputs, properties=None, **inputs):
+def _add(name, node, outputs, properties=None, since=None, **inputs):
+    if since is not None:
+        _SINCE[name] = since
     CASES[name] = (node, properties or {}, {key.replace("_", " "): value for key, value in inputs.items()},
                    outputs)
 
@@ -402,7 +405,8 @@ def _beyond(ours, theirs):
     return (~(np.abs(ours - theirs) <= limit)).any(axis=-1).mean()
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", [
+    pytest.param(name, marks=[pytest.mark.since(*_SINCE[name])] if name in _SINCE else []) for name in CASES])
 def test_against_cycles(pictures, name):
     shown = {output: pair for (case, output), pair in pictures.items() if case == name}
     if not shown:
