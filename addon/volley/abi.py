@@ -159,6 +159,7 @@ class NodeType(IntEnum):
     WAVE = 99
     GRADIENT = 100
     WHITE_NOISE = 101
+    GABOR = 119
     MAGIC = 102
     BRICK = 103
     CURVES = 104
@@ -1104,6 +1105,10 @@ NODES = {
     NodeType.WHITE_NOISE: ("White Noise",
         (("GENERATED", "vector"), ("FLOAT", "w")),
         (("FLOAT", "value"), ("COLOR", "color"))),
+    NodeType.GABOR: ("Gabor",
+        (("GENERATED", "vector"), ("FLOAT", "scale"), ("FLOAT", "frequency"), ("FLOAT", "anisotropy"),
+         ("FLOAT", "angle"), ("VECTOR", "direction")),
+        (("FLOAT", "value"), ("FLOAT", "phase"), ("FLOAT", "intensity"))),
     NodeType.MAGIC: ("Magic",
         (("GENERATED", "vector"), ("FLOAT", "scale"), ("FLOAT", "distortion")),
         (("COLOR", "color"), ("FLOAT", "factor"))),

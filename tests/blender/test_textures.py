@@ -91,6 +91,12 @@ for _kind in ("LINEAR", "QUADRATIC", "EASING", "DIAGONAL", "RADIAL", "QUADRATIC_
 for _depth in range(11):
     _add(f"magic {_depth}", "ShaderNodeTexMagic", ("Color", "Fac") if _depth == 2 else ("Color",),
          {"turbulence_depth": _depth}, Vector='vector', Scale=0.6, Distortion=1.3)
+for _dimensions in ("2D", "3D"):
+    for _anisotropy in (0.0, 0.6, 1.0):
+        _add(f"gabor {_dimensions}, anisotropy {_anisotropy}", "ShaderNodeTexGabor",
+             ("Value", "Phase", "Intensity"), {"gabor_type": _dimensions}, ((4, 3), "Gabor came with 4.3"),
+             Vector='vector', Scale=1.3, Frequency=2.2, Anisotropy=_anisotropy, Orientation_2D=0.6,
+             Orientation_3D=(0.4, -0.7, 0.9))
 _add("brick", "ShaderNodeTexBrick", ("Color", "Fac"),
      {"offset": 0.4, "offset_frequency": 3, "squash": 0.6, "squash_frequency": 2}, Vector='vector',
      Color1=(0.8, 0.5, 0.2), Color2=(0.1, 0.3, 0.6), Mortar=(0.9, 0.9, 0.8), Scale=2.0, Mortar_Size=0.03,

@@ -112,6 +112,13 @@ def _white_noise(walker, node, sockets):
     return named_outputs(index, NodeType.WHITE_NOISE, ("Value", "Color"))
 
 
+def _gabor(walker, node, sockets):
+    values = [sockets.get('v', "Vector")] + [sockets.get('f', name) for name in (
+        "Scale", "Frequency", "Anisotropy", "Orientation 2D")] + [sockets.get('v', "Orientation 3D")]
+    index = walker.emit(NodeType.GABOR, values, _DIMENSIONS.index(node.gabor_type))
+    return named_outputs(index, NodeType.GABOR, ("Value", "Phase", "Intensity"))
+
+
 def _magic(walker, node, sockets):
     values = [sockets.get('v', "Vector"), sockets.get('f', "Scale"), sockets.get('f', "Distortion")]
     index = walker.emit(NodeType.MAGIC, values, node.turbulence_depth)
@@ -135,5 +142,5 @@ TEXTURES = {
     "ShaderNodeTexNoise": _noise, "ShaderNodeTexMusgrave": _musgrave, "ShaderNodeTexVoronoi": _voronoi,
     "ShaderNodeTexWave": _wave, "ShaderNodeTexGradient": _gradient,
     "ShaderNodeTexWhiteNoise": _white_noise, "ShaderNodeTexMagic": _magic, "ShaderNodeTexBrick": _brick,
-    "ShaderNodeTexSky": sky_texture,
+    "ShaderNodeTexSky": sky_texture, "ShaderNodeTexGabor": _gabor,
 }
