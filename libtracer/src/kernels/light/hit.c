@@ -134,11 +134,14 @@ TRC_INLINE vmask lamp_meet(const struct trc_snapshot *snapshot, const struct trc
     return hit;
 }
 
+/* sets: where those of the receiver are kept. */
 TRC_INLINE struct trc_receiver receiver_of(const struct trc_snapshot *snapshot,
-                                           const struct trc_light_ray *ray, vmask active) {
+                                           const struct trc_light_ray *ray, vmask active,
+                                           vuint sets[2]) {
     struct trc_receiver receiver = trc_receiver_make(ray->p, ray->n);
     if (snapshot->lights->linked)
-        trc_receiver_sets(snapshot, ray->left, active, receiver.sets);
+        trc_receiver_sets(snapshot, ray->left, active, sets);
+    receiver.sets = sets;
     return receiver;
 }
 
@@ -149,7 +152,8 @@ TRC_INLINE void lamps_meet(const struct trc_snapshot *snapshot, const struct trc
     const struct trc_light_table *t = snapshot->lights;
     const bool all = group == TRC_ALL_GROUPS;
     const uint32_t end = t->group_seen[all ? TRC_MAX_LIGHT_GROUPS + 1 : group + 1];
-    const struct trc_receiver receiver = receiver_of(snapshot, ray, active);
+    vuint sets[2];
+    const struct trc_receiver receiver = receiver_of(snapshot, ray, active, sets);
     for (uint32_t i = all ? 0 : t->group_seen[group]; i < end; i++) {
         const uint32_t number = t->seen[i];
         const struct trc_lamp *lamp = &t->lamps[number];
@@ -198,7 +202,8 @@ vvec3 trc_light_hit_one(const struct trc_snapshot *snapshot, const struct trc_li
     struct trc_light_ray whole = *ray;
     whole.tmin = vf_zero();
     whole.tmax = vf_set(TRC_FAR);
-    const struct trc_receiver receiver = receiver_of(snapshot, ray, active);
+    vuint sets[2];
+    const struct trc_receiver receiver = receiver_of(snapshot, ray, active, sets);
     viewers = linked_viewers(lamp, ray, &receiver, lamp_viewers(lamp, ray->path, viewers));
     vfloat weight;
     vvec3 light;
@@ -274,8 +279,10 @@ vfloat trc_light_triangle_weight(const struct trc_surface *s, vvec3 p_from, vvec
     if (!vm_any(m))
         return vf_one();
     struct trc_receiver receiver = trc_receiver_make(p_from, n_from);
+    vuint sets[2];
     if (t->linked)
-        trc_receiver_sets(s->snapshot, left, m, receiver.sets);
+        trc_receiver_sets(s->snapshot, left, m, sets);
+    receiver.sets = sets;
     const struct trc_corners corners = surface_corners(s, m);
     const struct trc_view_triangle view = trc_triangle_view(&corners, p_from);
     const vfloat distance = v3_length(v3_sub(s->p, p_from));

@@ -202,8 +202,10 @@ static vuint visibility_of(const struct trc_snapshot *scene, vint light, vmask m
 vfloat trc_light_chosen(const struct trc_surface *s, vvec3 n, const struct trc_light_sample *sample,
                         vmask m) {
     struct trc_receiver receiver = trc_receiver_make(s->p, n);
+    vuint sets[2];
     if (s->snapshot->lights->linked)
-        trc_receiver_sets(s->snapshot, s->instance, m, receiver.sets);
+        trc_receiver_sets(s->snapshot, s->instance, m, sets);
+    receiver.sets = sets;
     return trc_light_chance(s->snapshot->lights, &receiver, sample->light, m);
 }
 
@@ -255,7 +257,7 @@ static void clear_sample(struct trc_light_sample *out) {
 }
 
 /* What all kinds of lights have in common, after a place was set in lanes m. */
-static void finish_sample(const struct draw *d, vmask m) {
+TRC_INLINE void finish_sample(const struct draw *d, vmask m) {
     struct trc_light_sample *out = d->out;
     if (d->table->hides)
         mark_hidden(d, m);
@@ -341,10 +343,7 @@ void trc_light_sample_prepared(const struct trc_surface *s, const struct trc_lig
     clear_sample(out);
     struct draw d = {scene,    t,          s,  trc_receiver_make(s->p, choices->n), u1, u2,
                      vf_one(), vi_set(-1), out};
-    if (t->linked) {
-        d.receiver.sets[0] = choices->sets[0];
-        d.receiver.sets[1] = choices->sets[1];
-    }
+    d.receiver.sets = choices->sets;
     if (t->single)
         d.light = vi_select(s->active, vi_set(single_light(t)), d.light);
     else if (trc_candidate_count(t) > 0)

@@ -95,7 +95,7 @@ void trc_light_hit_clamped(const struct trc_snapshot *snapshot, const struct trc
 /* One lamp, as the other rays see it if nothing is in the way, whatever tmin and tmax are: returns
  * what they see, weighted in the same way, and how far it is, TRC_FAR for the sun. */
 vvec3 trc_light_hit_one(const struct trc_snapshot *snapshot, const struct trc_light_ray *ray,
-                        uint32_t lamp, vmask active, vfloat *distance);
+                        uint32_t number, vmask active, vfloat *distance);
 
 /* Shadow classes of the lights in lanes m, 0 elsewhere. */
 vuint trc_light_shadow_class(const struct trc_snapshot *snapshot, vint light, vmask m);

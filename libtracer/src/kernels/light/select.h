@@ -15,7 +15,7 @@
 struct trc_receiver {
     vvec3 p, n;
     vmask has_n;
-    vuint sets[2]; /* the bit of its light set, low word first; read where lights are linked */
+    const vuint *sets; /* the bit of its light set, low word first; read where lights are linked */
 };
 TRC_INLINE struct trc_receiver trc_receiver_make(vvec3 p, vvec3 n) {
     return (struct trc_receiver){.p = p, .n = n, .has_n = vf_gt(v3_dot(n, n), vf_set(0.25f))};
@@ -38,6 +38,7 @@ TRC_LINKS void trc_receiver_sets(const struct trc_snapshot *scene, vint instance
     sets[0] = vu_load(low);
     sets[1] = vu_load(high);
 }
+
 /* Lanes whose set is among those that a light excludes. */
 TRC_INLINE vmask trc_is_unlit(vuint low, vuint high, const vuint sets[2]) {
     return vm_not(vi_eq((vint)((low & sets[0]) | (high & sets[1])), vi_set(0)));
@@ -335,8 +336,7 @@ TRC_LINKS void trc_candidates_weigh_linked(const struct trc_light_table *t,
                                            struct trc_light_choices *c) {
     struct trc_receiver r = trc_receiver_make(c->p, c->n);
     const uint32_t count = t->single ? 0 : trc_candidate_count(t);
-    r.sets[0] = c->sets[0];
-    r.sets[1] = c->sets[1];
+    r.sets = c->sets;
     for (uint32_t i = 0; i < count && i < TRC_LIGHT_CHOICES_KEPT; i++)
         c->kept[i] = trc_candidate_importance(t, i, &r);
     trc_links_apply(t, &r, c->kept, count, &c->sum);

@@ -61,15 +61,6 @@ static vmask light_contribute(const struct trc_tile *t, const struct arrival *a,
     return vm_and(active, is_light(size));
 }
 
-/* Enters the shadow classes of the lanes' lights into the path words of their rays, from at on. */
-static __attribute__((noinline)) void classify(struct trc_tile *t, vint light, vmask active,
-                                               uint32_t at) {
-    uint32_t classes[TRC_WIDTH];
-    vu_store(classes, trc_light_shadow_class(t->snapshot, light, active));
-    for (uint32_t bits = vm_bits(active); bits; bits &= bits - 1)
-        t->shadows.path[at++] |= classes[__builtin_ctz(bits)] << TRC_PATH_CLASS_SHIFT;
-}
-
 /* Adds the lanes' shadow rays to the queue. cell: where on the light, for sorting, below
  * TRC_DIRECTION_CELLS. */
 void trc_shadow_push(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
@@ -105,8 +96,6 @@ void trc_shadow_push(struct trc_tile *t, const struct arrival *a, const struct t
     }
     for (int k = 0; q->lamp[0] && k < 3; k++)
         vf_compress(q->lamp[k] + at, r->lamp, bits);
-    if (t->snapshot->shadow_class_count)
-        classify(t, l->light, active, at);
 }
 
 /* What the lanes' light samples are in the Shadow pass if nothing is in the way: lamps count
@@ -124,6 +113,16 @@ static vfloat lamp_part(const struct trc_tile *t, const struct arrival *a,
     return vf_select(counts, vf_divide(vf_set(1.0f / (float)lamps), chance * count), vf_set(0.0f));
 }
 
+/* Enters the shadow classes of the lanes' lights into the path words of their rays, the last of the
+ * queue. */
+static __attribute__((noinline)) void classify(struct trc_tile *t, vint light, vmask active) {
+    uint32_t bits = vm_bits(active);
+    uint32_t at = t->shadows.count - (uint32_t)__builtin_popcount(bits), classes[TRC_WIDTH];
+    vu_store(classes, trc_light_shadow_class(t->snapshot, light, active));
+    for (; bits; bits &= bits - 1)
+        t->shadows.path[at++] |= classes[__builtin_ctz(bits)] << TRC_PATH_CLASS_SHIFT;
+}
+
 static void sample_use(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
                        const struct trc_lobes *lobes, const struct trc_light_sample *sample,
                        vfloat count, vuint cell, vmask active) {
@@ -133,8 +132,11 @@ static void sample_use(struct trc_tile *t, const struct arrival *a, const struct
         lit = light_contribute(t, a, s, lobes, sample, count, lit, &r);
     if (t->shadows.lamp[0] && vm_any(lit))
         r.lamp = lamp_part(t, a, s, sample, count, lit);
-    if (vm_any(lit))
-        trc_shadow_push(t, a, s, sample, &r, cell, lit);
+    if (!vm_any(lit))
+        return;
+    trc_shadow_push(t, a, s, sample, &r, cell, lit);
+    if (t->snapshot->shadow_class_count)
+        classify(t, sample->light, lit);
 }
 
 /* sample_count: of each lane. */
