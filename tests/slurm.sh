@@ -10,7 +10,7 @@ frames=48 nodes=4
 [ "${1:-}" = --quick ] && frames=4 nodes=2
 build=${VOLLEY_BUILD:-$PWD/build}
 export BLENDER_USER_SCRIPTS=$build/blender
-out=$(mktemp -d /tmp/volley_farm.XXXXXX)
+out=$(mktemp -d --tmpdir volley_farm.XXXXXX)
 trap 'bash examples/slurm/cluster.sh stop "$out/cluster"' EXIT
 
 die() { printf 'slurm.sh: %s; files: %s\n' "$*" "$out" >&2; exit 1; }

@@ -22,7 +22,7 @@ if ! timeout 10 sinfo >/dev/null 2>&1; then
         DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends slurm-wlm munge \
             </dev/null >"$out/install.log" 2>&1 || die "Slurm could not be installed: $out/install.log"
     fi
-    cluster=$(mktemp -d /tmp/volley_slurm.XXXXXX)
+    cluster=$(mktemp -d --tmpdir volley_slurm.XXXXXX)
     trap 'bash examples/slurm/cluster.sh stop "$cluster"' EXIT
     bash examples/slurm/cluster.sh start "$cluster" 2
     export SLURM_CONF=$cluster/slurm.conf
