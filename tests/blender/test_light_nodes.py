@@ -238,9 +238,7 @@ def test_webs(webs, name):
 @pytest.fixture(scope="module")
 def soft(blender_of_module):
     pictures = blender_of_module.run(inside_soft, timeout=600)
-    found = {name: compare.agreed_errors(*pair) for name, pair in pictures.items()}
-    lines = [f"{'light':20} {'mean error':>10} {'biased tile':>11}"]
-    lines += [f"{name:20} {mean:10.3%} {tile:11.3%}" for name, (mean, _biased, tile) in found.items()]
+    found, lines = compare.errors_of_cases(pictures)
     blender_support.write_result("light_patterns.txt", lines)
     return found
 

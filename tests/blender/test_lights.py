@@ -96,9 +96,7 @@ def inside_pictures():
 def errors(blender_of_module):
     """The errors of all cases, from one Blender, and their table."""
     pictures = blender_of_module.run(inside_pictures, timeout=600)
-    found = {name: compare.agreed_errors(*pair) for name, pair in pictures.items()}
-    lines = [f"{'light':45} {'mean error':>10} {'biased tile':>11}"]
-    lines += [f"{name:45} {mean:10.3%} {tile:11.3%}" for name, (mean, _biased, tile) in found.items()]
+    found, lines = compare.errors_of_cases(pictures)
     blender_support.write_result("lights.txt", lines)
     return found
 

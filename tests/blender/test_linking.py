@@ -207,9 +207,7 @@ def errors(blender_of_module):
     pictures = blender_of_module.run(inside_pictures, list(CASES), timeout=600)
     if pictures is None:
         return None
-    found = {name: compare.agreed_errors(*pair) for name, pair in pictures.items()}
-    lines = [f"{'case':30} {'mean error':>10} {'biased tile':>11}"]
-    lines += [f"{name:30} {mean:10.3%} {tile:11.3%}" for name, (mean, _biased, tile) in found.items()]
+    found, lines = compare.errors_of_cases(pictures)
     blender_support.write_result("linking.txt", lines)
     return found
 

@@ -280,6 +280,15 @@ def agreed_errors(images_a, images_b, tile_px=TILE_PX, significance=0.01):
     return float(mean_off.max() / scale), float(biased.max() / scale), float(off.max() / scale)
 
 
+def errors_of_cases(pictures):
+    """The agreed_errors of {case: (seeds of one side, seeds of the other)}, and the lines of their table."""
+    found = {name: agreed_errors(*pair) for name, pair in pictures.items()}
+    width = max(map(len, found))
+    lines = [f"{'case':{width}} {'mean error':>10} {'biased tile':>11}"]
+    lines += [f"{name:{width}} {mean:10.3%} {tile:11.3%}" for name, (mean, _biased, tile) in found.items()]
+    return found, lines
+
+
 def unexplained(seeds_a, seeds_b, tile_px=TILE_PX, errors=NOISE_ERRORS):
     """How far two sets of seeds are apart by more than noise explains: the largest excess in the mean of a
     channel, and in the mean of a tile and channel.
