@@ -11,7 +11,7 @@ import time
 
 import numpy as np
 
-from blender import Blender, executable, user_scripts
+from blender import Blender, executable, user_scripts, version
 
 MAIN = "import volley.farm.command as c; c.main()"
 SAMPLES = 64
@@ -223,10 +223,12 @@ def save_scene(path, samples):
 
 # The command line --------------------------------------------------------------------------------
 
-def _command(*arguments, blend=None, **options):
+def _command(*arguments, blend=None, is_blenders=False, **options):
+    """A Blender that runs the command line; is_blenders: as a command of its own, where it has such."""
     environment = {**os.environ, "BLENDER_USER_SCRIPTS": user_scripts()}
-    return subprocess.Popen([executable(), "-b", "--addons", "volley", *([blend] if blend else []),
-                             "--python-expr", MAIN, "--", *arguments], env=environment, text=True,
+    way = ["--command", "volley"] if is_blenders and version() >= (4, 2) else ["--python-expr", MAIN, "--"]
+    return subprocess.Popen([executable(), "-b", "--addons", "volley", *([blend] if blend else []), *way,
+                             *arguments], env=environment, text=True,
                             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, **options)
 
 
@@ -252,8 +254,8 @@ def test_command_line(tmp_path):
     summary = tmp_path / "summary.json"
     last = len(finished)
     again = _command("render", "--parts", str(parts), "--blocks", f"0-{last}/64", "--summary", str(summary),
-                     blend=blend)
-    refused = _command("render", "--samples", "5:4", "--parts", str(parts), blend=blend)
+                     blend=blend, is_blenders=True)
+    refused = _command("render", "--samples", "5:4", "--parts", str(parts), blend=blend, is_blenders=True)
     said, refused_said = again.communicate()[0], refused.communicate()[0]
     assert again.returncode == 0, said
     assert refused.returncode == 2 and "no such samples" in refused_said, refused_said
