@@ -142,7 +142,7 @@ measure_curves() {
 }
 
 # What takes long for what it says of Blender's version.
-SLOW="test_whitted or test_means_are_those_of_cycles"
+SLOW="test_whitted or test_means_are_those_of_cycles or test_shadow_catcher or test_camera"
 
 main() {
     local report="" curves="" suite=trixie isas="" status=0 arguments=()
