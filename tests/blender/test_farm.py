@@ -96,6 +96,9 @@ def merged_bits(folder):
             assert command.run(["render", "--parts", parts, "--blocks", f"0-{count - 1}/{count}"]) == 0
             assert command.run(["merge", parts, "--output", f"{parts}_##"]) == 0
             found[f"{case} {count}"] = _same(f"{parts}_01.exr", whole)
+            if count == 5:
+                assert bpy.ops.volley.merge_parts(directory=parts, output="../operator_##") == {'FINISHED'}
+                found["operator"] = _same(f"{folder}/operator_01.exr", whole)
         for name in settings:
             scene.volley.property_unset(name)
     assert not scene.volley.sample_offset and not scene.volley.sample_subset
@@ -104,7 +107,7 @@ def merged_bits(folder):
 
 def test_merged_frames_have_the_bits_of_one_render(tmp_path):
     assert Blender().run(merged_bits, str(tmp_path)) == dict.fromkeys(
-        ("plain 2", "plain 5", "plain 64", "adaptive 16", "denoise 2"), 0)
+        ("plain 2", "plain 5", "operator", "plain 64", "adaptive 16", "denoise 2"), 0)
 
 
 @contextlib.contextmanager
@@ -152,6 +155,18 @@ def _read_only(output):
         yield
 
 
+def _operator_refusal(folder, names, output):
+    """What the operator says of chosen files, with a file at the output that must stay."""
+    import bpy
+    try:
+        bpy.ops.volley.merge_parts(directory=folder, files=[{"name": name} for name in names], output=output[:-8])
+    except RuntimeError as error:
+        with open(output, encoding="utf-8") as file:
+            assert file.read() == "before"
+        return str(error)
+    return ""
+
+
 def refusals(folder):
     """{case: what was said}."""
     import bpy
@@ -169,6 +184,8 @@ def refusals(folder):
     said["missing before"] = _refusal(folder, second, output)
     said["missing after"] = _refusal(folder, first, output)
     said["none"] = _refusal(folder, [], output)
+    said["operator"] = _operator_refusal(f"{folder}/first", [os.path.basename(name) for name in first], output)
+    said["operator, none"] = _operator_refusal(folder, ["farm.blend"], output)
     scene.volley.seed = 7
     said["seed"] = _refusal(folder, first + render("seed", "20:64"), output)
     scene.volley.seed = 0
@@ -206,10 +223,49 @@ def test_parts_that_do_not_fit_are_refused_with_the_reason(tmp_path):
                "file": "scene is", "cut short": "", "flipped": "damaged", "relabelled": "damaged",
                "no picture": "no OpenEXR file", "full": "File too large",
                "no permission": "Permission denied"}
-    assert said.keys() == reasons.keys()
+    assert "Frame 1: " in said["operator"] and "samples 20 to 64" in said.pop("operator")
+    assert "None of these files is a part" in said.pop("operator, none")
     for case, reason in reasons.items():
         assert reason in said[case] and "error: frame 1" in said[case], (case, said[case])
+    assert said.keys() == reasons.keys()
     assert ".part.exr" in said["overlap"] and ".part.exr" in said["cut short"]
+
+
+def inside_file_browser(folder):
+    """What leads to the operator, what the file browser that it opens is for, and its frame."""
+    import bpy
+    import drawing
+    from volley.farm import command, operator
+    from volley.ui import render
+    yield 0.1
+    _make_scene(f"{folder}/farm.blend")
+    assert command.run(["render", "--parts", f"{folder}/parts", "--blocks", "0-1/2"]) == 0
+    yield 0.1
+    context = drawing.Context(engine='VOLLEY')
+    menu = drawing.Instance(bpy.types.TOPBAR_MT_render)
+    operator._draw_menu(menu, context)
+    found = {"buttons": menu.layout.operators
+             + drawing.draw(render.VOLLEY_RENDER_PT_sampling_advanced, context).operators}
+    manager = bpy.context.window_manager
+    with bpy.context.temp_override(window=manager.windows[0]):
+        bpy.ops.volley.merge_parts('INVOKE_DEFAULT', directory=f"{folder}/parts/")
+    yield 1.0
+    window, area = next((window, area) for window in manager.windows for area in window.screen.areas
+                        if area.type == 'FILE_BROWSER')
+    space = area.spaces.active
+    found["shown"] = space.active_operator.bl_idname, space.params.filter_glob
+    with bpy.context.temp_override(window=window, area=area, region=area.regions[-1]):
+        bpy.ops.file.execute()
+    yield 0.5
+    found["frames"] = [name for name in os.listdir(f"{folder}/parts") if name.startswith("frame")]
+    return found
+
+
+def test_parts_are_merged_from_the_file_browser(window, tmp_path):
+    found = window.run_in_window(inside_file_browser, str(tmp_path))
+    assert found == {"buttons": ["volley.merge_parts"] * 2, "shown": ("VOLLEY_OT_merge_parts", "*.part.exr"),
+                     "frames": ["frame_0001.exr"]}
+    assert "Traceback" not in window.output
 
 
 def save_scene(path, samples):

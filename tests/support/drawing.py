@@ -3,16 +3,17 @@
 
 
 class Layout:
-    """Stands for a layout: notes nodes that are offered and properties that are shown, takes every other
-    call. Layouts made of it share its notes."""
+    """Stands for a layout: notes nodes that are offered, properties and operators that are shown, takes every
+    other call. Layouts made of it share its notes."""
 
     def __init__(self, notes=None):
-        self.nodes, self.properties = notes or ([], {})
+        self.nodes, self.properties, self.operators = notes or ([], {}, [])
         self.operator_context = 'INVOKE_DEFAULT'
         self.use_property_split = False
 
     def operator(self, name, **_):
         button = _Button()
+        self.operators.append(name)
         if name == "node.add_node":
             self.nodes.append(button)
         return button
@@ -21,7 +22,7 @@ class Layout:
         self.properties[name] = {"is_split": self.use_property_split, **options}
 
     def __getattr__(self, name):
-        return lambda *_, **__: Layout((self.nodes, self.properties))
+        return lambda *_, **__: Layout((self.nodes, self.properties, self.operators))
 
 
 class _Button:

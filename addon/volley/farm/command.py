@@ -249,7 +249,7 @@ def _merge(options):
         return EXIT_FAILED
     code = 0
     for frame in frames:
-        output, start = output_path(options.output, frame), time.monotonic()
+        output, start = merge.output_path(options.output, frame), time.monotonic()
         errors, warnings = [], []
         try:
             warnings = merge.merge_frame(found.get(frame, []), output)
@@ -261,16 +261,6 @@ def _merge(options):
                          "status": "failed" if errors else "done",
                          "outputs": [] if errors else [output]}, options.summary)
     return code
-
-
-def output_path(pattern, frame):
-    """The pattern with its last run of # as the frame's digits, or the number at its end, and .exr."""
-    stem = pattern[:-4] if pattern.lower().endswith(".exr") else pattern
-    end = stem.rfind("#") + 1
-    if not end:
-        stem, end = f"{stem}####", len(stem) + 4
-    begin = end - (len(stem[:end]) - len(stem[:end].rstrip("#")))
-    return f"{stem[:begin]}{frame:0{end - begin}d}{stem[end:]}.exr"
 
 
 # Registration ------------------------------------------------------------------------------------

@@ -12,19 +12,34 @@ import numpy as np
 from .. import native
 from ..abi import SumsId
 from . import exr
-from .parts import PartError, Part
+from .parts import EXTENSION, Part, PartError
 
 _WAIT_FOREVER = -1.0
 
 
 def frames_in(folder):
-    """{frame number: paths of its parts} by their names, in order."""
+    """{frame number: paths of its parts} of a folder."""
+    return frames_of(glob.glob(os.path.join(glob.escape(folder), f"*{EXTENSION}")))
+
+
+def frames_of(paths):
+    """{frame number: paths of its parts} by their names, in order; what is named otherwise is left out."""
     found = {}
-    for path in sorted(glob.glob(os.path.join(glob.escape(folder), "*.part.exr"))):
+    for path in sorted(paths):
         number = os.path.basename(path).split(".")[0]
-        if number.lstrip("-").isdigit():
+        if path.endswith(EXTENSION) and number.lstrip("-").isdigit():
             found.setdefault(int(number), []).append(path)
     return found
+
+
+def output_path(pattern, frame):
+    """The pattern with its last run of # as the frame's digits, or the number at its end, and .exr."""
+    stem = pattern[:-4] if pattern.lower().endswith(".exr") else pattern
+    end = stem.rfind("#") + 1
+    if not end:
+        stem, end = f"{stem}####", len(stem) + 4
+    begin = end - (len(stem[:end]) - len(stem[:end].rstrip("#")))
+    return f"{stem[:begin]}{frame:0{end - begin}d}{stem[end:]}.exr"
 
 
 def merge_frame(paths, output):

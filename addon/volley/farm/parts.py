@@ -19,8 +19,8 @@ from ..abi import SUMS_END
 from . import exr, job
 
 ATTRIBUTE = "volley:part"
+EXTENSION = ".part.exr"
 _DIGEST = "volley:digest"
-_EXTENSION = ".part.exr"
 _SAMPLED_BYTES = 1 << 20  # of files beside the scene: read at both ends
 # Fields of trc_render_desc in which parts of a picture may differ.
 _OWN_FIELDS = {"sample_offset", "sample_subset", "thread_count", "progressive"}
@@ -91,7 +91,7 @@ def _digest_of(path, sampled_bytes):
 def path_of(folder, scene, layer_name, view_name, begin, end):
     """Where a part belongs."""
     names = [re.sub(r"[^A-Za-z0-9_-]", "_", name) for name in (scene.name, layer_name, view_name) if name]
-    return os.path.join(folder, f"{scene.frame_current:06d}.{'.'.join(names)}.{begin:07d}-{end:07d}{_EXTENSION}")
+    return os.path.join(folder, f"{scene.frame_current:06d}.{'.'.join(names)}.{begin:07d}-{end:07d}{EXTENSION}")
 
 
 def write(folder, scene, render, entries, fields, layer_name, view_name, manifests):

@@ -6,6 +6,7 @@ from bpy.types import Panel
 
 from .. import from_cycles, presets
 from ..compat import motion_position
+from ..farm.operator import VOLLEY_OT_merge_parts
 from .panel import VolleyPanel, column_of
 
 
@@ -73,6 +74,7 @@ class VOLLEY_RENDER_PT_sampling_advanced(VolleyPanel, Panel):
         column = layout.column(align=True)
         column.prop(settings, "sample_offset")
         column.prop(settings, "sample_subset", text="Subset")
+        layout.operator(VOLLEY_OT_merge_parts.bl_idname, text="Merge Parts...")
 
 
 class VOLLEY_RENDER_PT_light_paths(VolleyPanel, Panel):
