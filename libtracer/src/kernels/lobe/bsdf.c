@@ -185,6 +185,16 @@ void trc_bsdf_ideal(const struct trc_lobes *l, int i, const struct trc_surface *
     take_ideal(lobe, s, s->active, vf_one(), out);
 }
 
+/* What a lobe of Blender 4 reflects under light from everywhere, over its weight. Where the factor
+ * goes to white with the angle, micro-normals count; else it is that of the lobe's normal, as in
+ * Cycles. */
+static vvec3 mean_reflectance(const struct trc_lobe *lobe) {
+    if (lobe->kind != TRC_LOBE_REFLECT || lobe->fresnel != TRC_FRESNEL_BLEND)
+        return facet_fresnel(lobe, lobe->cos_o);
+    const vfloat alpha = vf_sqrt(lobe->alpha_x * lobe->alpha_y);
+    return v3_lerp(lobe->f0, lobe->f90, trc_dielectric_share(lobe->cos_o, alpha, lobe->ior));
+}
+
 void trc_bsdf_albedo(const struct trc_lobes *l, const struct trc_surface *s, vvec3 albedo_out[3]) {
     (void)s;
     for (int k = 0; k < 3; k++)
@@ -196,7 +206,7 @@ void trc_bsdf_albedo(const struct trc_lobes *l, const struct trc_surface *s, vve
         const int k = lobe->kind == TRC_LOBE_REFLECT ? 1 : lobe->kind == TRC_LOBE_REFRACT ? 2 : 0;
         vvec3 albedo = v3_scale(lobe->weight, lobe->albedo_scale);
         if (lobe->correlated)
-            albedo = v3_mul(albedo, facet_fresnel(lobe, lobe->cos_o));
+            albedo = v3_mul(albedo, mean_reflectance(lobe));
         albedo_out[k] = v3_add(albedo_out[k], albedo);
     }
 }

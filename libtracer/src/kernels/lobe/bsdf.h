@@ -136,7 +136,8 @@ void trc_bsdf_ideal(const struct trc_lobes *l, int i, const struct trc_surface *
                     struct trc_bsdf_sample *out);
 
 /* Albedo of the lobes for the colour passes: diffuse, glossy, transmission. As Cycles: the weights,
- * without what a Fresnel factor or masking takes; of correlated lobes with the Fresnel factor. */
+ * without what a Fresnel factor or masking takes; of correlated lobes with the mean Fresnel factor.
+ */
 void trc_bsdf_albedo(const struct trc_lobes *l, const struct trc_surface *s, vvec3 albedo_out[3]);
 
 /* Albedo of one lobe towards wo, Fresnel factors included. */
