@@ -1,12 +1,31 @@
 /* Continuation rays: N rays in, N rays out (Boulos et al. 2007, section 4.1). Distribution chooses
  * one lobe per ray from the sample sequence; Whitted follows every lobe along its ideal direction.
  * Diffuse lobes end here: their light is all in the light samples. */
+#include "kernels/tile/light_split.h"
 #include "kernels/tile/shade.h"
 #include "kernels/trace/spawn.h"
 
+/* The diffuse lobes' share of what the lanes' rays bring, as a word: of rays that bounce for the
+ * first time what lobes have in their direction, unless that is ideal; else as before. */
+static vuint share_of(const struct trc_tile *t, const struct arrival *a,
+                      const struct trc_surface *s, const struct trc_lobes *lobes,
+                      const struct trc_bsdf_sample *b, vmask first, vmask ideal) {
+    const vuint before = word_column(t->work.w[TRC_RAY_SHARE], a);
+    first = vm_andnot(first, b->transparent);
+    if (!vm_any(vm_andnot(first, ideal)))
+        return before;
+    struct trc_bsdf_value f;
+    trc_bsdf_eval(lobes, s, b->wi, vm_andnot(first, ideal), &f);
+    const vvec3 sum = v3_add(f.diffuse, v3_add(f.glossy, f.transmission));
+    const vvec3 share = v3(vf_divide(f.diffuse.x, sum.x), vf_divide(f.diffuse.y, sum.y),
+                           vf_divide(f.diffuse.z, sum.z));
+    return (vuint)vi_select(first, (vint)trc_share_pack(share), (vint)before);
+}
+
 /* Pushes the lanes' rays. direction, weight factor, pdf (< 0: ideal). */
 static void ray_push(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
-                     const struct trc_bsdf_sample *b, uint32_t material, vmask active) {
+                     const struct trc_lobes *lobes, const struct trc_bsdf_sample *b,
+                     uint32_t material, vmask active) {
     const trc_render_desc *desc = t->desc;
     const vmask straight = b->transparent;
     const vvec3 w = v3_select(straight, a->d, b->wi);
@@ -43,10 +62,9 @@ static void ray_push(struct trc_tile *t, const struct arrival *a, const struct t
     const vuint category = a->path & vu_set(3u << TRC_PATH_CATEGORY_SHIFT);
     const vmask first =
         vi_eq((vint)category, vi_set(TRC_CATEGORY_CAMERA << TRC_PATH_CATEGORY_SHIFT));
-    const vint own = vi_select(b->diffuse, vi_set(TRC_CATEGORY_DIFFUSE),
-                               vi_select(b->transmitted, vi_set(TRC_CATEGORY_TRANSMISSION),
-                                         vi_set(TRC_CATEGORY_GLOSSY)))
-                     << TRC_PATH_CATEGORY_SHIFT;
+    const vint own =
+        vi_select(b->transmitted, vi_set(TRC_CATEGORY_TRANSMISSION), vi_set(TRC_CATEGORY_GLOSSY))
+        << TRC_PATH_CATEGORY_SHIFT;
     vuint kind = (vuint)vi_select(b->transmitted, vi_set(TRC_VISIBLE_TRANSMISSION),
                                   vi_set(TRC_VISIBLE_GLOSSY | TRC_PATH_REFLECTED));
     kind = kind | (vuint)vi_select(ideal, vi_set(TRC_PATH_SINGULAR), vi_set(0));
@@ -66,11 +84,13 @@ static void ray_push(struct trc_tile *t, const struct arrival *a, const struct t
     const vfloat values[TRC_RAY_FLOATS] = {
         o.x,      o.y,      o.z, w.x,     w.y, w.z, tmin, tmax,           a->time,    weight.x,
         weight.y, weight.z, pdf, min_pdf, n.x, n.y, n.z,  indirect_scale, path_length};
-    vuint left = vu_set(0);
+    vuint left = vu_set(0), share = vu_set(0);
+    if (t->light_passes)
+        share = share_of(t, a, s, lobes, b, first, ideal);
     if (t->remembers_left)
         left =
             (vuint)vi_select(straight, (vint)word_column(t->work.w[TRC_RAY_LEFT], a), s->instance);
-    const vuint words[TRC_RAY_WORDS] = {a->slot, path, depths, vu_set(material), left};
+    const vuint words[TRC_RAY_WORDS] = {a->slot, path, depths, vu_set(material), left, share};
     trc_rays_append(&t->stack, values, words, vm_bits(active));
 }
 
@@ -113,7 +133,7 @@ void trc_bounce_straight(struct trc_tile *t, const struct arrival *a, const stru
                               vi_set((int32_t)t->desc->max_transparent_depth + 1));
     active = attenuate(t, a, &b, vm_and(active, below));
     if (vm_any(active))
-        ray_push(t, a, s, &b, material, active);
+        ray_push(t, a, s, lobes, &b, material, active);
 }
 
 void trc_bounce(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
@@ -124,7 +144,7 @@ void trc_bounce(struct trc_tile *t, const struct arrival *a, const struct trc_su
             trc_bsdf_ideal(lobes, i, s, &b);
             const vmask go = attenuate(t, a, &b, vm_and(active, b.valid));
             if (vm_any(go))
-                ray_push(t, a, s, &b, material, go);
+                ray_push(t, a, s, lobes, &b, material, go);
         }
         return;
     }
@@ -140,5 +160,5 @@ void trc_bounce(struct trc_tile *t, const struct arrival *a, const struct trc_su
     b.weight = v3_scale(b.weight, vf_divide(vf_set(1.0f), a->chance));
     const vmask go = attenuate(t, a, &b, vm_and(active, b.valid));
     if (vm_any(go))
-        ray_push(t, a, s, &b, material, go);
+        ray_push(t, a, s, lobes, &b, material, go);
 }

@@ -171,10 +171,8 @@ static uint32_t drop_unseen(struct trc_ray_store *r, uint32_t count) {
     for (uint32_t i = 0; i < count; i++) {
         if (r->f[TRC_RAY_TMAX][i] < 0.0f)
             continue;
-        for (int k = 0; kept != i && k < r->float_count; k++)
-            r->f[k][kept] = r->f[k][i];
-        for (int k = 0; kept != i && k < r->word_count; k++)
-            r->w[k][kept] = r->w[k][i];
+        if (kept != i)
+            trc_rays_move(r, i, kept);
         kept++;
     }
     return kept;
@@ -200,6 +198,8 @@ static void path_begin(struct trc_tile *t, uint32_t i) {
         vf_store(out->f[TRC_RAY_PATH_LENGTH] + i, zero);
     if (t->remembers_left)
         vu_store(out->w[TRC_RAY_LEFT] + i, vu_set(TRC_NO_HIT));
+    if (t->light_passes)
+        vu_store(out->w[TRC_RAY_SHARE] + i, vu_set(0));
 }
 
 void trc_camera_rays(struct trc_tile *t) {

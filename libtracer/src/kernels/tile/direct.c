@@ -87,6 +87,7 @@ void trc_shadow_push(struct trc_tile *t, const struct arrival *a, const struct t
     struct trc_shadow_store *q = &t->shadows;
     const uint32_t bits = vm_bits(active), at = trc_shadows_append(q, &rays, bits);
     if (t->light_passes) {
+        vu_compress(q->share + at, word_column(t->work.w[TRC_RAY_SHARE], a), bits);
         const vvec3 parts[3] = {r->diffuse, r->glossy, r->transmission};
         for (int k = 0; k < 3; k++) {
             vf_compress(q->split[3 * k] + at, parts[k].x, bits);

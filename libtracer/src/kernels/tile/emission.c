@@ -1,4 +1,5 @@
 /* Light that rays find by themselves: of surfaces, of lights they pass, of the world. */
+#include "kernels/tile/light_split.h"
 #include "kernels/tile/shade.h"
 
 /* Light found by rays, weighted and clamped: to the samples, and to the pass its depth says.
@@ -7,19 +8,19 @@ static void found_add(struct trc_tile *t, const struct arrival *a, vmask active,
                       uint32_t camera_pass) {
     const vuint depth = trc_depth_of(a->depths, TRC_DEPTH_ALL_SHIFT);
     float lanes[3][TRC_WIDTH];
-    uint32_t depths[TRC_WIDTH], path[TRC_WIDTH];
+    uint32_t depths[TRC_WIDTH], path[TRC_WIDTH], share[TRC_WIDTH];
+    if (t->light_passes)
+        vu_store(share, word_column(t->work.w[TRC_RAY_SHARE], a));
     vf_store(lanes[0], c.x), vf_store(lanes[1], c.y), vf_store(lanes[2], c.z);
     vu_store(depths, depth), vu_store(path, a->path);
     for (uint32_t bits = vm_bits(active); bits; bits &= bits - 1) {
         const int i = __builtin_ctz(bits);
         const float rgb[3] = {lanes[0][i], lanes[1][i], lanes[2][i]};
         trc_sample_add(t, a->slots[i], rgb);
-        const uint32_t category = path[i] >> TRC_PATH_CATEGORY_SHIFT & 3u;
-        if (category == TRC_CATEGORY_CAMERA)
+        if ((path[i] >> TRC_PATH_CATEGORY_SHIFT & 3u) == TRC_CATEGORY_CAMERA)
             trc_pass_add(t, camera_pass, a->slots[i], rgb);
         else if (t->light_passes)
-            trc_pass_add(t, trc_category_pass(category) + (depths[i] > 1 ? 1 : 0), a->slots[i],
-                         rgb);
+            trc_light_split_add(t, path[i], share[i], depths[i] <= 1, a->slots[i], rgb);
     }
 }
 

@@ -42,6 +42,8 @@ static void found_push(struct trc_tile *t, const struct arrival *a, vvec3 radian
     const uint32_t bits = vm_bits(active), at = trc_shadows_append(q, &rays, bits);
     for (uint32_t k = 3; k < q->scaled_count; k++) /* of the passes of first surfaces */
         vf_compress(q->scaled[k] + at, vf_set(0.0f), bits);
+    if (t->light_passes)
+        vu_compress(q->share + at, word_column(t->work.w[TRC_RAY_SHARE], a), bits);
 }
 
 static void find_lamps(struct trc_tile *t, const struct arrival *a, vmask active) {

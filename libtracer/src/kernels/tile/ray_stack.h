@@ -49,18 +49,23 @@ enum trc_ray_word {
     TRC_RAY_PATH,
     TRC_RAY_DEPTHS,
     TRC_RAY_PARENT, /* material it left: key of runs and groups */
-    TRC_RAY_LEFT, /* instance it left; of scenes in which rays look back (kernels/trace/spawn.h) or
-                     lights are linked */
+    TRC_RAY_LEFT,  /* instance it left; of scenes in which rays look back (kernels/trace/spawn.h) or
+                      lights are linked */
+    TRC_RAY_SHARE, /* what diffuse lobes have of its light; with passes of light by kind
+                      (kernels/tile/light_split.h) */
     TRC_RAY_WORDS
+};
+
+/* Columns that not every tile has. */
+struct trc_ray_columns {
+    bool path_length, left, share;
 };
 
 struct trc_ray_store {
     uint32_t capacity, count;
     uint32_t reserved_end; /* rays there may be until the next reserve */
     float *f[TRC_RAY_FLOATS];
-    uint32_t *w[TRC_RAY_WORDS];
-    int word_count;  /* without TRC_RAY_LEFT where nothing reads it */
-    int float_count; /* without TRC_RAY_PATH_LENGTH where nothing reads it */
+    uint32_t *w[TRC_RAY_WORDS]; /* NULL: a column that nothing reads */
 };
 
 /* How much of a stack its rays may need. */
@@ -83,16 +88,16 @@ TRC_INLINE struct trc_ray_room trc_ray_room_of(const trc_render_desc *desc, uint
 }
 
 TRC_INLINE void trc_rays_carve(struct trc_carver *c, struct trc_ray_store *r, uint32_t capacity,
-                               bool remember_left, bool measure_paths) {
+                               struct trc_ray_columns columns) {
     r->capacity = capacity;
     r->count = r->reserved_end = 0;
-    r->word_count = remember_left ? TRC_RAY_WORDS : TRC_RAY_LEFT;
-    r->float_count = measure_paths ? TRC_RAY_FLOATS : TRC_RAY_PATH_LENGTH;
+    const bool has_word[TRC_RAY_WORDS - TRC_RAY_LEFT] = {columns.left, columns.share};
     /* Vectors are stored whole: vf_compress. */
-    for (int i = 0; i < r->float_count; i++)
+    for (int i = 0; i < TRC_RAY_PATH_LENGTH + columns.path_length; i++)
         r->f[i] = trc_carve(c, (capacity + TRC_WIDTH) * sizeof(float));
-    for (int i = 0; i < r->word_count; i++)
-        r->w[i] = trc_carve(c, (capacity + TRC_WIDTH) * sizeof(uint32_t));
+    for (int i = 0; i < TRC_RAY_WORDS; i++)
+        if (i < TRC_RAY_LEFT || has_word[i - TRC_RAY_LEFT])
+            r->w[i] = trc_carve(c, (capacity + TRC_WIDTH) * sizeof(uint32_t));
 }
 
 /* Up to count rays will follow, for which there must be room. */
@@ -107,30 +112,37 @@ TRC_INLINE void trc_rays_add(struct trc_ray_store *r, uint32_t count) {
     r->count += count;
 }
 
-/* The lanes of bits. TRC_RAY_LEFT of words and TRC_RAY_PATH_LENGTH of values may be missing where
- * nothing reads them. */
+/* The lanes of bits. Values of columns that the store lacks are not read. */
 TRC_INLINE void trc_rays_append(struct trc_ray_store *r, const vfloat values[TRC_RAY_FLOATS],
                                 const vuint words[TRC_RAY_WORDS], uint32_t bits) {
     const uint32_t at = r->count;
     trc_rays_add(r, (uint32_t)__builtin_popcount(bits));
     for (int k = 0; k < TRC_RAY_PATH_LENGTH; k++)
         vf_compress(r->f[k] + at, values[k], bits);
-    if (r->float_count > TRC_RAY_PATH_LENGTH)
+    if (r->f[TRC_RAY_PATH_LENGTH])
         vf_compress(r->f[TRC_RAY_PATH_LENGTH] + at, values[TRC_RAY_PATH_LENGTH], bits);
     for (int k = 0; k < TRC_RAY_LEFT; k++)
         vu_compress(r->w[k] + at, words[k], bits);
-    if (r->word_count > TRC_RAY_LEFT)
-        vu_compress(r->w[TRC_RAY_LEFT] + at, words[TRC_RAY_LEFT], bits);
+    for (int k = TRC_RAY_LEFT; k < TRC_RAY_WORDS; k++)
+        if (r->w[k])
+            vu_compress(r->w[k] + at, words[k], bits);
+}
+
+/* Copies a ray to the place of another. */
+TRC_INLINE void trc_rays_move(struct trc_ray_store *r, uint32_t from, uint32_t to) {
+    for (int k = 0; k < TRC_RAY_FLOATS; k++)
+        if (r->f[k])
+            r->f[k][to] = r->f[k][from];
+    for (int k = 0; k < TRC_RAY_WORDS; k++)
+        if (r->w[k])
+            r->w[k][to] = r->w[k][from];
 }
 
 /* One of the rays once more; its number. */
 TRC_INLINE uint32_t trc_rays_duplicate(struct trc_ray_store *r, uint32_t ray) {
     const uint32_t other = r->count;
     trc_rays_add(r, 1);
-    for (int k = 0; k < r->float_count; k++)
-        r->f[k][other] = r->f[k][ray];
-    for (int k = 0; k < r->word_count; k++)
-        r->w[k][other] = r->w[k][ray];
+    trc_rays_move(r, ray, other);
     return other;
 }
 
@@ -159,10 +171,12 @@ TRC_INLINE void trc_rays_take(struct trc_ray_store *from, struct trc_ray_store *
         return;
     }
     const uint32_t first = from->count - count;
-    for (int i = 0; i < from->float_count; i++)
-        memcpy(to->f[i], from->f[i] + first, count * sizeof(float));
-    for (int i = 0; i < from->word_count; i++)
-        memcpy(to->w[i], from->w[i] + first, count * sizeof(uint32_t));
+    for (int i = 0; i < TRC_RAY_FLOATS; i++)
+        if (from->f[i])
+            memcpy(to->f[i], from->f[i] + first, count * sizeof(float));
+    for (int i = 0; i < TRC_RAY_WORDS; i++)
+        if (from->w[i])
+            memcpy(to->w[i], from->w[i] + first, count * sizeof(uint32_t));
     to->count = to->reserved_end = count;
     from->count = from->reserved_end = first;
 }

@@ -6,6 +6,7 @@
 #include "kernels/light/clamp.h"
 #include "kernels/light/light.h"
 #include "kernels/simd/wide_math.h"
+#include "kernels/tile/light_split.h"
 #include "kernels/tile/tile.h"
 
 static void packet_load(const struct trc_tile *t, const uint32_t *order, uint32_t count,
@@ -161,12 +162,12 @@ static void passes_add(struct trc_tile *t, uint32_t ray) {
     static const uint32_t direct[3] = {TRC_PASS_DIFFUSE_DIRECT, TRC_PASS_GLOSSY_DIRECT,
                                        TRC_PASS_TRANSMISSION_DIRECT};
     const struct trc_shadow_store *q = &t->shadows;
-    const uint32_t slot = q->slot[ray], category = q->path[ray] >> TRC_PATH_CATEGORY_SHIFT & 3u;
-    if (category != TRC_CATEGORY_CAMERA) {
+    const uint32_t slot = q->slot[ray], path = q->path[ray];
+    if ((path >> TRC_PATH_CATEGORY_SHIFT & 3u) != TRC_CATEGORY_CAMERA) {
         const float rgb[3] = {q->radiance[0][ray], q->radiance[1][ray], q->radiance[2][ray]};
         const bool is_direct =
-            (q->path[ray] & TRC_PATH_FOUND) && (q->depths[ray] >> TRC_DEPTH_ALL_SHIFT & 255u) < 2;
-        trc_pass_add(t, trc_category_pass(category) + !is_direct, slot, rgb);
+            (path & TRC_PATH_FOUND) && (q->depths[ray] >> TRC_DEPTH_ALL_SHIFT & 255u) < 2;
+        trc_light_split_add(t, path, q->share[ray], is_direct, slot, rgb);
         return;
     }
     for (int k = 0; k < 3; k++) {

@@ -26,6 +26,7 @@ struct trc_shadow_store {
     uint32_t reserved_end; /* rays there may be until the next reserve */
     float *o[3], *d[3], *tmax, *time, *radiance[3];
     float *split[9]; /* diffuse, glossy, transmission parts, or NULL: no light passes */
+    uint32_t *share; /* of the path (kernels/tile/light_split.h), or NULL: no light passes */
     float *lamp[3];  /* for the Shadow pass, or NULL */
     float *scaled[TRC_SCALED_COLUMNS]; /* those that what is in the way takes from, RGB by RGB */
     uint32_t scaled_count;
@@ -47,6 +48,8 @@ TRC_INLINE void trc_shadows_carve(struct trc_carver *c, struct trc_shadow_store 
     q->time = trc_carve(c, column);
     for (int i = 0; splits && i < 9; i++)
         q->split[i] = q->scaled[q->scaled_count++] = trc_carve(c, column);
+    if (splits)
+        q->share = trc_carve(c, column);
     for (int i = 0; lamps && i < 3; i++)
         q->lamp[i] = q->scaled[q->scaled_count++] = trc_carve(c, column);
     uint32_t **const words[] = {&q->slot, &q->path, &q->target, &q->depths, &q->order};

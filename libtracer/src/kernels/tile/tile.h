@@ -27,12 +27,11 @@ enum {
     TRC_PATH_CLASS_SHIFT = 24         /* shadow rays: the shadow class of their light, 4 bits */
 };
 
-/* What a path's first bounce was; diffuse: through a translucent surface. */
+/* What a path's first bounce was. */
 enum {
     TRC_CATEGORY_CAMERA, /* there was none */
     TRC_CATEGORY_GLOSSY,
-    TRC_CATEGORY_TRANSMISSION,
-    TRC_CATEGORY_DIFFUSE
+    TRC_CATEGORY_TRANSMISSION
 };
 
 /* A ray's four depth counters, 8 bits each, saturating by the limits on desc. */
@@ -246,15 +245,7 @@ TRC_INLINE size_t trc_tile_pixel(const struct trc_tile *t, uint32_t slot) {
     return (size_t)y * TRC_TILE_SIZE + x;
 }
 
-/* The pass of direct light of a path that bounced; that of indirect light is the next. */
-TRC_INLINE uint32_t trc_category_pass(uint32_t category) {
-    return category == TRC_CATEGORY_GLOSSY         ? TRC_PASS_GLOSSY_DIRECT
-           : category == TRC_CATEGORY_TRANSMISSION ? TRC_PASS_TRANSMISSION_DIRECT
-                                                   : TRC_PASS_DIFFUSE_DIRECT;
-}
-
-/* Adds light that reached a sample to its radiance and passes. kind: 0 diffuse, 1 glossy, 2
- * transmission of the first surface. */
+/* Adds light that reached a sample to its radiance, to a pass. */
 TRC_INLINE void trc_sample_add(struct trc_tile *t, uint32_t slot, const float rgb[3]) {
     for (int c = 0; c < 3; c++)
         t->samples.radiance[c][slot] += rgb[c];
