@@ -102,6 +102,7 @@ class LightFlags(IntFlag):
     EVEN_CONE = 2
     SYNTHETIC = 4
     LOCAL_UV = 8
+    OBJECT = 16
 
 
 class AoMethod(IntEnum):
@@ -690,8 +691,9 @@ class LightDesc(Structure):
                 ("size_x", c_float), ("size_y", c_float), ("area_shape", c_uint32), ("spread", c_float),
                 ("spot_angle", c_float), ("spot_blend", c_float), ("visibility", c_uint32),
                 ("cast_shadow", c_uint32), ("use_mis", c_uint32), ("light_group", c_uint32),
-                ("flags", c_uint32), ("random", c_float), ("bounce_limit", c_uint32), ("reserved", c_uint32),
-                ("material", c_uint64), ("light_exclude", c_uint64), ("shadow_exclude", c_uint64))
+                ("flags", c_uint32), ("random", c_float), ("bounce_limit", c_uint32),
+                ("pass_index", c_int32), ("object_color", c_float * 4), ("material", c_uint64),
+                ("light_exclude", c_uint64), ("shadow_exclude", c_uint64))
 
 
 class WorldDesc(Structure):

@@ -29,7 +29,7 @@ PATH = ("Is Camera Ray", "Is Shadow Ray", "Is Glossy Ray", "Ray Length", "Ray De
 INPUTS = [("ShaderNodeTexCoord", name) for name in COORDINATES] \
     + [("ShaderNodeNewGeometry", name) for name in GEOMETRY] \
     + [("ShaderNodeLightPath", name) for name in PATH] \
-    + [("ShaderNodeObjectInfo", name) for name in ("Location", "Object Index", "Random")] \
+    + [("ShaderNodeObjectInfo", name) for name in ("Location", "Color", "Alpha", "Object Index", "Random")] \
     + [("ShaderNodeCameraData", name) for name in ("View Vector", "View Z Depth", "View Distance")] \
     + [("ShaderNodeLightFalloff", name) for name in ("Quadratic", "Linear", "Constant")] \
     + [("ShaderNodeTexNoise", "Fac"), ("ShaderNodeBlackbody", "Color"), ("ShaderNodeTexImage", "Color")]
@@ -77,6 +77,7 @@ def _lamp(scenes, kind, settings):
     lamp = scenes.light(kind, location=(0.3, -0.2, 2.0), rotation=(0.3, 0.2, 0.7), **settings)
     if kind != 'AREA':
         lamp.scale = (1.0, 1.0, 2.0)
+    lamp.color, lamp.pass_index = (0.3, 0.9, 0.5, 0.6), 3
     lamp.data.use_nodes = True
     return lamp, lamp.data.node_tree.nodes["Emission"]
 

@@ -8,8 +8,8 @@ seen scales what the light gives there.
 import math
 
 from .. import abi, native
-from ..compat import (AREA_LIGHT_POWER, FOLLOWS_LIGHT_NODES, LIGHT_UV_IS_LOCAL, SPOT_IS_EVEN, SUN_IS_EVEN,
-                      casts_shadow, cycles, is_ball, uses_nodes)
+from ..compat import (AREA_LIGHT_POWER, FOLLOWS_LIGHT_NODES, LIGHT_IS_OBJECT, LIGHT_UV_IS_LOCAL,
+                      SPOT_IS_EVEN, SUN_IS_EVEN, casts_shadow, cycles, is_ball, uses_nodes)
 from .visibility import light_visibility
 
 
@@ -51,6 +51,9 @@ def describe(light_object, item, materials, warnings):
         fields["flags"] = fields.get("flags", 0) | abi.LightFlags.SYNTHETIC
     if LIGHT_UV_IS_LOCAL:
         fields["flags"] = fields.get("flags", 0) | abi.LightFlags.LOCAL_UV
+    if LIGHT_IS_OBJECT:
+        fields["flags"] = fields.get("flags", 0) | abi.LightFlags.OBJECT
+        fields.update(pass_index=item.pass_index, object_color=tuple(item.color))
     return fields
 
 

@@ -22,9 +22,12 @@ enum trc_light_flags {
                                 as in Blender 3 */
     TRC_LIGHT_SYNTHETIC = 4, /* not a light of the footage that shadow catchers stand for: what
                                 blocks it casts no shadow there */
-    TRC_LIGHT_LOCAL_UV = 8   /* its nodes' UV and Parametric are of the light's own space, and a
+    TRC_LIGHT_LOCAL_UV = 8,  /* its nodes' UV and Parametric are of the light's own space, and a
                                 spot's span its cone, as in Blender 4; else a point's and a spot's
                                 Parametric goes by world directions and UV is 0, as in Blender 3.4 */
+    TRC_LIGHT_OBJECT = 16 /* its nodes have object space: Object and Generated coordinates and the
+                             place of Object Info are the light's, as in Blender 5; else only
+                             normals are turned into it */
 };
 
 /* Strengths are Blender's: watts for point, spot and area, W/m^2 for the sun, times color. A light
@@ -49,11 +52,12 @@ typedef struct trc_light_desc {
     uint32_t flags;       /* TRC_LIGHT_SPHERE and the like */
     float random;         /* Object Info's Random for its nodes, [0, 1) */
     uint32_t
-        bounce_limit;  /* points that the path reaches after so many bounces or more get no light
-                          samples of it; 0: all do. Rays that meet it see it all the same */
-    uint32_t reserved; /* 0 */
-    trc_id material;   /* its nodes: a material of the scene, of which emission alone counts,
-                          times color and strength. 0, or one that was destroyed: white */
+        bounce_limit;   /* points that the path reaches after so many bounces or more get no light
+                           samples of it; 0: all do. Rays that meet it see it all the same */
+    int32_t pass_index; /* Object Info's Object Index, */
+    float object_color[4];   /* Color and Alpha for its nodes */
+    trc_id material;         /* its nodes: a material of the scene, of which emission alone counts,
+                                times color and strength. 0, or one that was destroyed: white */
     uint64_t light_exclude;  /* light linking: 1 << trc_instance_desc.light_set of the instances
                                 that it does not light; 0: it lights all */
     uint64_t shadow_exclude; /* shadow linking: 1 << trc_instance_desc.shadow_set of those that do

@@ -35,7 +35,8 @@ static trc_status check_light(const trc_light_desc *desc) {
     TRC_TRY(trc_check_enum(desc->use_mis, 2, "use_mis"));
     TRC_TRY(trc_check_count(desc->light_group, 0, TRC_MAX_LIGHT_GROUPS, "light_group"));
     TRC_TRY(trc_check_finite(&desc->random, 1, "random"));
-    return trc_check_enum(desc->flags, 2 * TRC_LIGHT_LOCAL_UV, "flags");
+    TRC_TRY(trc_check_finite(desc->object_color, 4, "object_color"));
+    return trc_check_enum(desc->flags, 2 * TRC_LIGHT_OBJECT, "flags");
 }
 
 trc_status trc_light_create(trc_scene scene, const trc_light_desc *desc, trc_id *light_out) {

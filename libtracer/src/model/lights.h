@@ -27,7 +27,8 @@ enum {
     TRC_LAMP_SPHERE = 8,     /* TRC_LIGHT_SPHERE */
     TRC_LAMP_EVEN_CONE = 16, /* TRC_LIGHT_EVEN_CONE */
     TRC_LAMP_DISTANT = 32,   /* it has no place: position is the direction towards it */
-    TRC_LAMP_LOCAL_UV = 64   /* TRC_LIGHT_LOCAL_UV */
+    TRC_LAMP_LOCAL_UV = 64,  /* TRC_LIGHT_LOCAL_UV */
+    TRC_LAMP_OBJECT = 128    /* TRC_LIGHT_OBJECT */
 };
 
 /* A lamp: 32 words, read by gathers of TRC_LAMP_WORDS stride. Positions in world space. */
@@ -56,8 +57,10 @@ struct trc_lamp {
 
 /* What the nodes of a lamp need that does not emit evenly. */
 struct trc_lamp_program {
-    uint32_t material; /* into snapshot materials */
-    float random;      /* of Object Info */
+    uint32_t material;  /* into snapshot materials */
+    int32_t pass_index; /* these of Object Info */
+    float random, color[4];
+    float origin[3];
     float to_world[9]; /* rows; of directions */
     float to_light[9]; /* its inverse, 0 where it has none */
 };

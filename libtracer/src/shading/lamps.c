@@ -166,6 +166,8 @@ bool trc_lamp_make(const trc_light_desc *desc, struct trc_lamp *lamp) {
         lamp->visibility |= TRC_VISIBLE_UNBLOCKED;
     if (desc->flags & TRC_LIGHT_LOCAL_UV)
         lamp->flags |= TRC_LAMP_LOCAL_UV;
+    if (desc->flags & TRC_LIGHT_OBJECT)
+        lamp->flags |= TRC_LAMP_OBJECT;
     lamp->group = desc->light_group;
     lamp->bounce_limit = desc->bounce_limit;
     lamp->excluded[0] = (uint32_t)desc->light_exclude;

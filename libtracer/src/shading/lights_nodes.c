@@ -43,8 +43,12 @@ bool trc_lamp_take_nodes(struct trc_light_table *table, const struct trc_snapsho
     struct trc_lamp_program *program = &table->programs[table->program_count++];
     program->material = material;
     program->random = desc->random;
-    for (int i = 0; i < 3; i++)
+    program->pass_index = desc->pass_index;
+    memcpy(program->color, desc->object_color, sizeof program->color);
+    for (int i = 0; i < 3; i++) {
         memcpy(program->to_world + 3 * i, desc->transform + 4 * i, 3 * sizeof(float));
+        program->origin[i] = desc->transform[4 * i + 3];
+    }
     invert(program->to_world, program->to_light);
     lamp->program = table->program_count;
     return true;

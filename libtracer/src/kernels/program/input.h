@@ -68,20 +68,75 @@ static void mend_inverse(const struct trc_instance *instance, const struct trc_w
 }
 
 /* The inverse of an instance's matrix at the lanes' times. */
-static void load_world_to_object(const struct lane_group *g, vfloat time,
-                                 struct trc_wide_affine *m) {
-    if (g->instance->key_count < 2) {
-        const float *e = g->instance->world_to_object->m;
+static void load_world_to_instance(const struct trc_instance *instance, vfloat time,
+                                   struct trc_wide_affine *m) {
+    if (instance->key_count < 2) {
+        const float *e = instance->world_to_object->m;
         for (int i = 0; i < 3; i++)
             m->column[i] = v3(vf_set(e[i]), vf_set(e[4 + i]), vf_set(e[8 + i]));
         m->origin = v3(vf_set(e[3]), vf_set(e[7]), vf_set(e[11]));
         return;
     }
     struct trc_wide_affine a;
-    trc_load_affine(g->instance, time, &a);
+    trc_load_affine(instance, time, &a);
     affine_inverse(&a, m);
-    if (g->instance->is_thin)
-        mend_inverse(g->instance, &a, time, m);
+    if (instance->is_thin)
+        mend_inverse(instance, &a, time, m);
+}
+
+/* ---- object space ---- */
+
+static void columns_of_rows(const float rows[9], vvec3 column[3]) {
+    for (int i = 0; i < 3; i++)
+        column[i] = v3(vf_set(rows[i]), vf_set(rows[3 + i]), vf_set(rows[6 + i]));
+}
+
+static const struct trc_lamp_program *lamp_program(const struct trc_surface *s,
+                                                   const struct lane_group *g) {
+    return &s->lamps->programs[g->lamp->program - 1];
+}
+
+static void load_lamp_to_world(const struct trc_surface *s, const struct lane_group *g,
+                               struct trc_wide_affine *a) {
+    const struct trc_lamp_program *program = lamp_program(s, g);
+    columns_of_rows(program->to_world, a->column);
+    a->origin = v3_set(program->origin);
+}
+
+/* Whether a group's lanes have object space: the world's have none, a lamp's as it says. */
+TRC_INLINE bool has_space(const struct lane_group *g) {
+    return g->instance || (g->lamp && (g->lamp->flags & TRC_LAMP_OBJECT));
+}
+
+/* Active lanes without. */
+static vmask without_space(const struct trc_surface *s) {
+    const vmask lamps = vm_and(s->active, vi_lt(s->instance, vi_set(TRC_FIRST_LAMP + 1)));
+    const vmask none = vi_lt(s->instance, vi_set(0));
+    if (!vm_any(lamps))
+        return none;
+    const vint at = (vi_set(TRC_FIRST_LAMP) - s->instance) * vi_set(TRC_LAMP_WORDS);
+    const vint flags = vi_gather(&s->lamps->lamps->flags, at, lamps);
+    return vm_andnot(none,
+                     vm_and(lamps, vm_not(vi_eq(flags & vi_set(TRC_LAMP_OBJECT), vi_set(0)))));
+}
+
+/* Of a group with object space. */
+static void load_object_to_world(const struct trc_surface *s, const struct lane_group *g,
+                                 struct trc_wide_affine *a) {
+    if (g->instance)
+        trc_load_affine(g->instance, s->time, a);
+    else
+        load_lamp_to_world(s, g, a);
+}
+static void load_world_to_object(const struct trc_surface *s, const struct lane_group *g,
+                                 struct trc_wide_affine *a) {
+    if (g->instance) {
+        load_world_to_instance(g->instance, s->time, a);
+        return;
+    }
+    const struct trc_lamp_program *program = lamp_program(s, g);
+    columns_of_rows(program->to_light, a->column);
+    a->origin = v3_neg(trc_transform_vector(a, v3_set(program->origin)));
 }
 
 /* By the transposed matrix, unit: a normal from world to object space. */
@@ -255,12 +310,21 @@ static vvec3 generated_of_group(const struct trc_surface *s, const struct lane_g
     return v3_read(out);
 }
 
+static vvec3 position_of_group(const struct trc_surface *s, const struct lane_group *g) {
+    struct trc_wide_affine a;
+    load_world_to_object(s, g, &a);
+    return trc_transform_point(&a, s->p);
+}
+
+/* A lamp's are those of its object space. */
 static vvec3 op_generated(const struct trc_surface *s) {
     vvec3 out = s->p; /* the world: the direction */
     struct lane_group g = groups_begin(s);
     while (groups_next(s, &g)) {
         if (g.mesh)
             out = v3_select(g.lanes, generated_of_group(s, &g), out);
+        else if (has_space(&g))
+            out = v3_select(g.lanes, position_of_group(s, &g), out);
     }
     return out;
 }
@@ -269,22 +333,10 @@ static vvec3 op_object_position(const struct trc_surface *s) {
     vvec3 out = s->p;
     struct lane_group g = groups_begin(s);
     while (groups_next(s, &g)) {
-        if (!g.instance)
-            continue;
-        struct trc_wide_affine a;
-        load_world_to_object(&g, s->time, &a);
-        out = v3_select(g.lanes, trc_transform_point(&a, s->p), out);
+        if (has_space(&g))
+            out = v3_select(g.lanes, position_of_group(s, &g), out);
     }
     return out;
-}
-
-/* The axes of a lamp. */
-static void load_lamp_to_world(const struct trc_surface *s, const struct trc_lamp *lamp,
-                               struct trc_wide_affine *a) {
-    const float *m = s->lamps->programs[lamp->program - 1].to_world;
-    for (int i = 0; i < 3; i++)
-        a->column[i] = v3(vf_set(m[i]), vf_set(m[3 + i]), vf_set(m[6 + i]));
-    a->origin = v3_zero();
 }
 
 static vvec3 op_object_normal(const struct trc_surface *s) {
@@ -295,7 +347,7 @@ static vvec3 op_object_normal(const struct trc_surface *s) {
         if (g.instance)
             trc_load_affine(g.instance, s->time, &a);
         else if (g.lamp)
-            load_lamp_to_world(s, g.lamp, &a);
+            load_lamp_to_world(s, &g, &a);
         else
             continue;
         out = v3_select(g.lanes, normal_to_object(&a, s->n), out);
@@ -332,13 +384,14 @@ static void load_world_to_camera(const struct trc_snapshot *snapshot, struct trc
 }
 
 /* Lanes in the world have a direction for a position: it is seen from the camera's place. So are
- * lamps' positions in texture coordinates, but not for the Camera Data node. */
+ * positions on lamps without object space in texture coordinates, but not for the Camera Data
+ * node. */
 static vvec3 op_camera_position(const struct trc_surface *s, uint32_t mode) {
     struct trc_wide_affine a;
     load_world_to_camera(s->snapshot, &a);
     const vmask world = mode == TRC_CAMERA_DATA_POSITION
                             ? vi_eq(s->instance, vi_set(TRC_WORLD_LOOKUP))
-                            : vi_lt(s->instance, vi_set(0));
+                            : without_space(s);
     return v3_select(world, trc_transform_vector(&a, s->p), trc_transform_point(&a, s->p));
 }
 
@@ -383,12 +436,12 @@ static vvec3 op_transform(const struct trc_surface *s, uint32_t mode, vvec3 v) {
     vvec3 out = v;
     struct lane_group g = groups_begin(s);
     while (groups_next(s, &g)) {
-        if (!g.instance)
+        if (!has_space(&g))
             continue;
         if (way == TRC_TRANSFORM_WORLD_TO_OBJECT)
-            load_world_to_object(&g, s->time, &a);
+            load_world_to_object(s, &g, &a);
         else
-            trc_load_affine(g.instance, s->time, &a);
+            load_object_to_world(s, &g, &a);
         vvec3 moved;
         if (mode & TRC_TRANSFORM_NORMAL)
             moved = normal_to_world(&a, v);
@@ -424,9 +477,8 @@ static vfloat op_wireframe(const struct trc_surface *s, vfloat size) {
 }
 
 TRC_INLINE vvec3 op_reflection(const struct trc_surface *s) {
-    const vmask world = vi_lt(s->instance, vi_set(0));
     const vvec3 mirrored = v3_sub(v3_scale(s->n, vf_set(2.0f) * v3_dot(s->n, s->wo)), s->wo);
-    return v3_select(world, s->wo, mirrored);
+    return v3_select(without_space(s), s->wo, mirrored);
 }
 
 /* ---- the object ---- */
@@ -435,10 +487,10 @@ static vvec3 op_object_location(const struct trc_surface *s) {
     vvec3 out = v3_zero();
     struct lane_group g = groups_begin(s);
     while (groups_next(s, &g)) {
-        if (!g.instance)
+        if (!has_space(&g))
             continue;
         struct trc_wide_affine a;
-        trc_load_affine(g.instance, s->time, &a);
+        load_object_to_world(s, &g, &a);
         out = v3_select(g.lanes, a.origin, out);
     }
     return out;
@@ -452,12 +504,13 @@ static vfloat object_number(const struct trc_surface *s, int which) {
     vfloat out = vf_zero();
     struct lane_group g = groups_begin(s);
     while (groups_next(s, &g)) {
-        if (!g.instance && (!g.lamp || which != OBJECT_RANDOM))
+        if (!g.instance && !g.lamp)
             continue;
-        const float value = g.lamp                  ? s->lamps->programs[g.lamp->program - 1].random
-                            : which < OBJECT_INDEX  ? g.instance->color[which]
-                            : which == OBJECT_INDEX ? (float)g.instance->pass_index
-                                                    : g.instance->random;
+        const struct trc_lamp_program *lamp = g.lamp ? lamp_program(s, &g) : NULL;
+        const float value = which < OBJECT_INDEX ? (lamp ? lamp->color : g.instance->color)[which]
+                            : which == OBJECT_INDEX
+                                ? (float)(lamp ? lamp->pass_index : g.instance->pass_index)
+                                : (lamp ? lamp->random : g.instance->random);
         out = vf_select(g.lanes, vf_set(value), out);
     }
     return out;

@@ -119,7 +119,7 @@ static vvec3 op_bump(const struct trc_surface *s, uint32_t mode, const vfloat *i
         if (!g.instance)
             continue;
         struct trc_wide_affine to_object, to_world;
-        load_world_to_object(&g, s->time, &to_object);
+        load_world_to_instance(g.instance, s->time, &to_object);
         trc_load_affine(g.instance, s->time, &to_world);
         const vvec3 own[2] = {trc_transform_vector(&to_object, step[0]),
                               trc_transform_vector(&to_object, step[1])};
