@@ -380,6 +380,7 @@ class DistributionType(IntEnum):
     ASHIKHMIN = 4
     CORRELATED = 16
     FILMED_METAL = 32
+    WHOLE_COAT = 64
 
 
 class BlendMode(IntEnum):

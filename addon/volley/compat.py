@@ -42,6 +42,9 @@ CHOOSES_LOBES_PLAINLY = bpy.app.version >= (4, 0, 0)
 # Thin films lie on metals, too, and thin ones do not fade away; seen in 5.2, not in 4.3.
 HAS_FILMED_METAL = bpy.app.version >= (5, 0, 0)
 
+# The coat of Principled keeps what light loses between its facets; seen in 5.2, not in 4.3.
+HAS_WHOLE_COAT = bpy.app.version >= (5, 0, 0)
+
 # Rough diffuse surfaces keep their energy from 4.3 on.
 KEEPS_DIFFUSE_ENERGY = bpy.app.version >= (4, 3, 0)
 

@@ -14,7 +14,7 @@ from ..abi import (BlendMode, BumpMode, ClampType, DiffuseModel, DistributionTyp
                    ImageExtension, ImageInterpolation, ImageProjection, MappingType, MathOperation as Math,
                    ModeFlags, NodeType, NormalMapFlags, NormalMapSpace, RampInterpolation, SeparateMode,
                    SpaceId, TableSize, TangentSource, ToonComponent, VectorOperation as Vector)
-from ..compat import (HAS_CORRELATED_MICROFACETS, HAS_FILMED_METAL, HAS_UNIT_NORMALS, KEEPS_DIFFUSE_ENERGY,
+from ..compat import (HAS_CORRELATED_MICROFACETS, HAS_FILMED_METAL, HAS_UNIT_NORMALS, HAS_WHOLE_COAT, KEEPS_DIFFUSE_ENERGY,
                       LEAVES_BUMPS, RAMP_STEPS, SCALES_NORMAL_MAPS)
 from . import tangents
 from .converters import CONVERTERS, instance_value
@@ -86,7 +86,9 @@ def _microfacets(node):
 
 def _layered(node):
     """The mode of the layered Principled."""
-    return (_distribution(node) or 0) | (DistributionType.FILMED_METAL if HAS_FILMED_METAL else 0)
+    own = DistributionType.FILMED_METAL if HAS_FILMED_METAL else 0
+    own |= DistributionType.WHOLE_COAT if HAS_WHOLE_COAT else 0
+    return (_distribution(node) or 0) | own
 
 
 def _diffuse_model(_node):

@@ -191,7 +191,9 @@ enum trc_distribution_type {
     TRC_DISTRIBUTION_CORRELATED = 16,
     /* Bit for Principled from 4.0 on, as Blender 5: thin films lie on metal, too, and interfere in
      * full from 1 nm on in place of 30. */
-    TRC_DISTRIBUTION_FILMED_METAL = 32
+    TRC_DISTRIBUTION_FILMED_METAL = 32,
+    /* Bit for Principled from 4.0 on, as Blender 5: its coat has the energy of MULTI_GGX. */
+    TRC_DISTRIBUTION_WHOLE_COAT = 64
 };
 
 enum trc_blend_mode {

@@ -112,15 +112,21 @@ void trc_facets_set_multiple(struct trc_lobe *lobe, vvec3 wo, vvec3 per_bounce, 
     lobe->multi_chance = missing;
 }
 
-void trc_facets_keep_energy(struct trc_lobe *lobe, vvec3 per_bounce) {
-    const vfloat alpha = vf_sqrt(lobe->alpha_x * lobe->alpha_y), one = vf_one();
-    const vfloat mean = trc_ggx_mean_albedo(alpha), lost = one - mean;
-    const vfloat single = vf_max(trc_ggx_albedo(lobe->cos_o, alpha), vf_set(1e-3f));
+vvec3 trc_facets_gain(vfloat cos_o, vfloat alpha, vvec3 per_bounce, vfloat *single_out) {
+    const vfloat mean = trc_ggx_mean_albedo(alpha), one = vf_one(), lost = one - mean;
+    const vfloat single = vf_max(trc_ggx_albedo(cos_o, alpha), vf_set(1e-3f));
     const vfloat missing = (one - single) / single;
     const vvec3 again = v3(per_bounce.x * mean / (one - per_bounce.x * lost),
                            per_bounce.y * mean / (one - per_bounce.y * lost),
                            per_bounce.z * mean / (one - per_bounce.z * lost));
-    const vvec3 gain = v3_mad(again, missing, v3_splat(one));
+    *single_out = single;
+    return v3_mad(again, missing, v3_splat(one));
+}
+
+void trc_facets_keep_energy(struct trc_lobe *lobe, vvec3 per_bounce) {
+    vfloat single;
+    const vvec3 gain =
+        trc_facets_gain(lobe->cos_o, vf_sqrt(lobe->alpha_x * lobe->alpha_y), per_bounce, &single);
     lobe->distribution = TRC_LOBE_GGX;
     lobe->weight = v3_mul(lobe->weight, gain);
     lobe->albedo_scale = single;

@@ -197,5 +197,7 @@ void trc_facets_set_multiple(struct trc_lobe *lobe, vvec3 wo, vvec3 per_bounce, 
  * Models" (2019). The lobe of single scattering is scaled so that a white one keeps all energy; the
  * rest of the bounces have per_bounce as their colour. From then on it is an ordinary GGX lobe. */
 void trc_facets_keep_energy(struct trc_lobe *lobe, vvec3 per_bounce);
+/* What that scales a lobe by; single_out: the albedo of single scattering, white. */
+vvec3 trc_facets_gain(vfloat cos_o, vfloat alpha, vvec3 per_bounce, vfloat *single_out);
 
 #endif

@@ -49,31 +49,59 @@ static vvec3 coat_tint(const struct trc_setup *c, const struct trc_leaf *leaf, v
     return v3_lerp(white, color, coat);
 }
 
-/* What a coat leaves for the layers below. */
+static bool is_whole_coat(const struct trc_leaf *leaf) {
+    return leaf->mode & TRC_DISTRIBUTION_WHOLE_COAT;
+}
+static vfloat coat_alpha(const struct trc_setup *c, const struct trc_leaf *leaf) {
+    return vf_square(vf_saturate(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, coat_roughness))));
+}
+
+/* Mean Fresnel factor of a coat over the hemisphere. */
+static vfloat coat_mean(vfloat ior) {
+    return vf_lerp(trc_fresnel_normal(ior), vf_one(), mean_blend(ior));
+}
+
+/* What a coat of weight 1 reflects of even light: as a smooth one, or as its facets do. */
+static vfloat coat_albedo(const struct trc_setup *c, const struct trc_leaf *leaf, vfloat cos_o,
+                          vfloat ior) {
+    if (!is_whole_coat(leaf))
+        return trc_fresnel_dielectric(cos_o, ior);
+    const vfloat alpha = coat_alpha(c, leaf), one = vf_one();
+    vfloat single;
+    const vfloat gain = trc_facets_gain(cos_o, alpha, v3_splat(coat_mean(ior)), &single).x;
+    const vfloat f = vf_lerp(trc_fresnel_normal(ior), one, trc_dielectric_share(cos_o, alpha, ior));
+    return f * single * gain;
+}
+
+/* What a coat of that albedo leaves for the layers below. */
 static vvec3 coat_passes(const struct trc_setup *c, const struct trc_leaf *leaf, vfloat cos_o,
-                         vfloat coat, vfloat ior) {
-    const vfloat f = trc_fresnel_dielectric(cos_o, ior);
-    return v3_scale(coat_tint(c, leaf, cos_o, coat, ior), vf_saturate(vf_one() - coat * f));
+                         vfloat coat, vfloat ior, vfloat albedo) {
+    return v3_scale(coat_tint(c, leaf, cos_o, coat, ior), vf_saturate(vf_one() - coat * albedo));
 }
 
 static vvec3 layered_coat(struct trc_setup *c, const struct trc_leaf *leaf, vfloat weight) {
     const vfloat coat = vf_max(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, coat_weight)), vf_zero());
     const vfloat ior = vf_max(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, coat_ior)), vf_one());
     const vvec3 n = trc_leaf_normal(c, leaf, TRC_AT(LAYERED_PRINCIPLED, coat_normal));
-    const vfloat cos_o = v3_dot(n, c->s->wo);
+    const vfloat cos_o = v3_dot(n, c->s->wo), albedo = coat_albedo(c, leaf, cos_o, ior);
     struct trc_lobe *lobe = trc_add_reflection(c, v3_splat(coat * weight));
     if (lobe) {
+        const vfloat chance = lobe->mix_weight * albedo;
         lobe->distribution = TRC_LOBE_GGX;
         lobe->correlated = true;
         lobe->fresnel = TRC_FRESNEL_DIELECTRIC;
         lobe->n = n;
         lobe->ior = ior;
-        lobe->alpha_x = lobe->alpha_y =
-            vf_square(vf_saturate(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, coat_roughness))));
+        lobe->alpha_x = lobe->alpha_y = coat_alpha(c, leaf);
         trc_facets_finish(c, lobe, false);
-        lobe->mix_weight = lobe->mix_weight * trc_fresnel_dielectric(cos_o, ior);
+        if (is_whole_coat(leaf)) {
+            const struct trc_fresnel fresnel = blend_to_white(v3_splat(trc_fresnel_normal(ior)));
+            set_fresnel(lobe, &fresnel);
+            trc_facets_keep_energy(lobe, v3_splat(coat_mean(ior)));
+        }
+        lobe->mix_weight = chance;
     }
-    return coat_passes(c, leaf, cos_o, coat, ior);
+    return coat_passes(c, leaf, cos_o, coat, ior, albedo);
 }
 
 /* A GGX lobe with the node's roughness and anisotropy. */
@@ -109,7 +137,7 @@ static float whole_film(const struct trc_leaf *leaf) {
 }
 
 static uint32_t distribution(const struct trc_leaf *leaf) {
-    return leaf->mode & ~(uint32_t)TRC_DISTRIBUTION_FILMED_METAL;
+    return leaf->mode & ~(uint32_t)(TRC_DISTRIBUTION_FILMED_METAL | TRC_DISTRIBUTION_WHOLE_COAT);
 }
 
 static vvec3 metal_reflectance(const struct trc_lobe *lobe, vfloat cos_m) {
@@ -270,8 +298,9 @@ static bool layered_emission(const struct trc_setup *c, const struct trc_leaf *l
         const vfloat coat =
             vf_max(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, coat_weight)), vf_zero());
         const vfloat ior = vf_max(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, coat_ior)), vf_one());
-        rest = v3_mul(rest, c->s ? coat_passes(c, leaf, cos_o, coat, ior)
-                                 : coat_tint(c, leaf, cos_o, coat, ior));
+        rest = v3_mul(
+            rest, c->s ? coat_passes(c, leaf, cos_o, coat, ior, coat_albedo(c, leaf, cos_o, ior))
+                       : coat_tint(c, leaf, cos_o, coat, ior));
     }
     *emission = v3_mul(colour(c, leaf, TRC_AT(LAYERED_PRINCIPLED, emission_color)), rest);
     return true;
