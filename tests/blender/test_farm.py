@@ -5,8 +5,10 @@ nothing is overwritten; exit codes, summaries, signals."""
 import contextlib
 import json
 import os
+import shutil
 import signal
 import subprocess
+import tempfile
 import time
 
 import numpy as np
@@ -269,12 +271,99 @@ def test_parts_are_merged_from_the_file_browser(window, tmp_path):
 
 
 def save_scene(path, samples):
+    """A scene with an image and a library that are not there any more."""
     import bpy
+    library = os.path.join(os.path.dirname(path), "library.blend")
+    bpy.ops.wm.read_factory_settings()
+    bpy.ops.wm.save_as_mainfile(filepath=library)
     _make_scene(path)
+    with bpy.data.libraries.load(library, link=True) as (_, wanted):
+        wanted.objects = ["Cube"]
+    bpy.context.collection.objects.link(wanted.objects[0])
+    os.remove(library)
     image = bpy.data.images.new("gone", 4, 4)
     image.filepath, image.source, image.use_fake_user = "//gone.png", 'FILE', True
     bpy.context.scene.volley.samples = samples
     bpy.ops.wm.save_mainfile()
+
+
+def _save_image(path, color, size=(4, 4)):
+    import bpy
+    image = bpy.data.images.new("made", *size)
+    image.generated_color = color
+    image.filepath_raw, image.file_format = path, 'TARGA_RAW'  # not compressed
+    image.save()
+    bpy.data.images.remove(image)
+
+
+def _show_image(tree, path, source):
+    import bpy
+    image = bpy.data.images.load(path.replace("<UDIM>", "1001"))
+    image.source = source
+    image.filepath = path
+    node = tree.nodes.new("ShaderNodeTexImage")
+    node.image = image
+    surface = next(node for node in tree.nodes if node.type == 'BSDF_PRINCIPLED')
+    tree.links.new(node.outputs["Color"], surface.inputs["Base Color"])
+    return node, image
+
+
+def inside_files(folder):
+    """{case: paths of images that the library is given, and those that are said to be read}, and which names
+    have another digest after one byte in the middle of each file is another."""
+    import bpy
+    from volley import native
+    from volley.farm import files
+    _make_scene(f"{folder}/farm.blend")
+    bpy.ops.wm.save_mainfile()
+    scene, tree = bpy.context.scene, bpy.data.objects["Cube"].data.materials[0].node_tree
+    scene.render.use_motion_blur = False
+    scene.volley.samples = 1
+    given, create = [], native.Scene.create_image
+
+    def note(self, **values):
+        given.append(values.get("path"))
+        return create(self, **values)
+    native.Scene.create_image = note
+    for name in ("plain", "t.1001", "t.1012", *(f"s_{number:03d}" for number in range(3, 13))):
+        _save_image(f"{folder}/{name}.tga", (0.5, 0.25, 0.125, 1.0), (1024, 1024) if name == "plain" else (4, 4))
+    found, changed = {}, set()
+    for name, source in (("plain", 'FILE'), ("t.<UDIM>", 'TILED'), ("s_005", 'SEQUENCE')):
+        node, image = _show_image(tree, f"{folder}/{name}.tga", source)
+        if source == 'TILED':
+            image.tiles.new(1012)
+        user = node.image_user
+        user.frame_duration, user.frame_start, user.frame_offset = 4, 2, 5
+        cases = (1, 3, 8) if source == 'SEQUENCE' else (1,)
+        for is_cyclic in (False, True) if source == 'SEQUENCE' else (False,):
+            user.use_cyclic, user.use_auto_refresh = is_cyclic, True
+            for frame in cases:
+                scene.frame_set(frame)
+                given.clear()
+                bpy.ops.render.render()
+                said = [path for name, path in files.paths(frame).items() if name.startswith("image")]
+                found[source, is_cyclic, frame] = sorted(given), sorted(said)
+        before = files.digests(frame)
+        for path in said:
+            with open(path, "r+b") as file:
+                file.seek(os.path.getsize(path) // 2)
+                byte = file.read(1)[0]
+                file.seek(-1, os.SEEK_CUR)
+                file.write(bytes([byte ^ 1]))
+            os.utime(path, ns=(0, 0))
+        after = files.digests(frame)
+        changed |= {name for name in after if after[name] != before[name]}
+        bpy.data.images.remove(image)
+        tree.nodes.remove(node)
+    return found, changed
+
+
+def test_files_that_a_frame_reads_are_known(tmp_path):
+    found, changed = Blender().run(inside_files, str(tmp_path))
+    for case, (given, said) in found.items():
+        assert given == said and all(given), (case, given, said)
+    assert len(found) == 8 and len({tuple(given) for given, _ in found.values()}) == 6
+    assert changed == {"image plain.tga", "image t.1001.tga 1001", "image t.1001.tga 1012", "image s_005.tga 8"}
 
 
 # The command line --------------------------------------------------------------------------------
@@ -297,6 +386,7 @@ def test_command_line(tmp_path):
     stopped = _command("render", "--parts", str(parts), "--blocks", "0-63/64", "--threads", "1", blend=blend)
     said = strict.communicate()[0]
     assert strict.returncode == 2 and "gone.png: there is no such file" in said, said
+    assert f"error: library {tmp_path}/library.blend: there is no such file" in said, said
     end = time.monotonic() + 100.0
     while not (parts.is_dir() and list(parts.glob("0*.exr"))) and time.monotonic() < end:
         time.sleep(0.05)
@@ -321,6 +411,76 @@ def test_command_line(tmp_path):
     assert values["rays"] > 0 and values["peak_memory_bytes"] > 0 and not values["errors"]
     assert "progress 100.0%" in said
     assert set(os.listdir(tmp_path)) == before | {"parts", "summary.json"}
+
+
+def _contents(folder):
+    """{path: time of change} of all in a folder."""
+    return {os.path.join(place, name): os.stat(os.path.join(place, name)).st_mtime_ns
+            for place, folders, names in os.walk(folder) for name in folders + names}
+
+
+def test_nodes_of_farms(tmp_path):
+    """A user who may write into the output's folder alone, with the add-on in a folder shared by all, without
+    a home and a display; two starts at once."""
+    open_folder = tempfile.mkdtemp(prefix="volley_node")  # pytest's own are not for other users
+    try:
+        os.chmod(open_folder, 0o755)
+        shared, work, temporary, output = (os.path.join(open_folder, name)
+                                           for name in ("shared", "work", "temporary", "output"))
+        shutil.copytree(user_scripts(), shared, ignore=shutil.ignore_patterns("__pycache__"))
+        os.mkdir(work)
+        Blender(str(tmp_path)).run(_make_scene, f"{work}/farm.blend")
+        for folder in (shared, work):
+            subprocess.run(["chmod", "-R", "a-w,a+rX", folder], check=True)
+        for folder in (temporary, output):
+            os.mkdir(folder)
+            os.chmod(folder, 0o777)
+        before = _contents(shared), _contents(work)
+        environment = {name: value for name, value in os.environ.items()
+                       if name not in ("DISPLAY", "WAYLAND_DISPLAY", "XDG_RUNTIME_DIR")}
+        environment.update(BLENDER_USER_SCRIPTS=shared, TMPDIR=temporary, HOME="/nonexistent")
+        user = {"user": 65534, "group": 65534, "extra_groups": []} if os.geteuid() == 0 else {}
+        line = [executable(), "-b", "--addons", "volley", f"{work}/farm.blend", "--python-expr", MAIN, "--", "render"]
+        starts = [subprocess.Popen([*line, *more], env=environment, text=True, cwd=work, **user,
+                                   stdout=subprocess.PIPE, stderr=subprocess.STDOUT) for more in (
+            ["--frames", "1-2", "--output", f"{output}/one_#", "--strict"],
+            ["--parts", f"{output}/parts", "--summary", f"{output}/summary.json"])]
+        said = [start.communicate()[0] for start in starts]
+        assert [start.returncode for start in starts] == [0, 0], said
+        assert (_contents(shared), _contents(work)) == before
+        assert not os.listdir(temporary)
+        assert sorted(os.listdir(output)) == ["one_1.png", "one_2.png", "parts", "summary.json"]
+    finally:
+        shutil.rmtree(open_folder)
+
+
+def inside_little_memory(folder):
+    """What is said, and the exit code: of a limit below what Blender has, of one that leaves some for a frame that
+    needs more, and for one that does not."""
+    import io
+    import resource
+    import bpy
+    from volley.farm import command
+    _make_scene(f"{folder}/farm.blend")
+    bpy.context.scene.volley.samples = 1
+    found = []
+    for side, more in ((32, -1), (8192, 2000), (32, 2000)):
+        bpy.context.scene.render.resolution_x = bpy.context.scene.render.resolution_y = side
+        with open("/proc/self/statm", encoding="ascii") as file:
+            used = int(file.read().split()[0]) * resource.getpagesize() >> 20
+        said = io.StringIO()
+        with contextlib.redirect_stdout(said):
+            code = command.run(["render", "--output", f"{folder}/picture_#", "--memory", str(used + more)])
+        found.append((code, said.getvalue()))
+    return found
+
+
+def test_frames_that_need_too_much_memory_fail(tmp_path):
+    refused, failed, done = Blender().run(inside_little_memory, str(tmp_path))
+    assert refused[0] == 2 and "MiB already" in refused[1]
+    assert failed[0] == 1 and ("no memory" in failed[1] or "MiB left" in failed[1]), failed
+    assert done[0] == 0, done
+    assert [name for name in os.listdir(tmp_path) if name.startswith("picture")] == ["picture_1.png"]
 
 
 def test_animations_take_steady_memory(tmp_path):

@@ -11,6 +11,7 @@ Exit codes: 0 all is there; 1 something failed; 2 the command line, or with --st
 
 import argparse
 import os
+import shutil
 import signal
 import sys
 import time
@@ -18,10 +19,11 @@ import time
 import bpy
 
 from .. import jobs, native
-from . import job, merge, parts
+from . import files, job, merge, parts
 
 EXIT_FAILED, EXIT_REFUSED = 1, 2
 _MEGA = 1 << 20
+_LEAST_MEMORY = 256  # MiB of address space for the threads that Blender starts for a render
 
 
 def main(arguments=None):
@@ -37,7 +39,15 @@ def main(arguments=None):
         code = EXIT_FAILED
     sys.stdout.flush()
     sys.stderr.flush()
+    _remove_temporary_folder()
     os._exit(code)  # Blender's own way out ends with 0 from some versions on, and has nothing left to write
+
+
+def _remove_temporary_folder():
+    """As Blender does when it ends by itself. Where it could not make one, it names the one it was given."""
+    folder = os.path.normpath(bpy.app.tempdir)
+    if os.path.basename(folder).startswith("blender_"):
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def run(arguments):
@@ -115,12 +125,16 @@ def _render(options):
     except ValueError as error:
         job.say(f"error: {error}")
         return EXIT_REFUSED
-    missing = missing_files()
+    missing = missing_files(frames)
     for message in missing:
         job.say(f"{'error' if options.strict else 'warning'}: {message}")
     if missing and options.strict:
         return EXIT_REFUSED
-    _limit(options, scene)
+    refusal = _limit_memory(options.memory) if options.memory else ""
+    if refusal:
+        job.say(f"error: {refusal}")
+        return EXIT_REFUSED
+    _limit_threads(options, scene)
     _listen()
     scene.render.engine = 'VOLLEY'
     scene.render.use_persistent_data = True
@@ -130,24 +144,34 @@ def _render(options):
     return max(codes)
 
 
-def missing_files():
-    """What the file names and the disk does not have."""
-    found = [f"library {library.filepath}: there is no such file" for library in bpy.data.libraries
-             if not library.packed_file and not os.path.isfile(bpy.path.abspath(library.filepath))]
-    return found + [f"image {path}: there is no such file" for path in parts.image_files().values()
-                    if not os.path.isfile(path)]
+def missing_files(frames):
+    """What renders of frames read and the disk does not have."""
+    found = {f"{name.split()[0]} {path}: there is no such file": None for frame in frames
+             for name, path in files.paths(frame).items() if not os.path.isfile(path)}
+    return list(found)
 
 
-def _limit(options, scene):
+def _limit_threads(options, scene):
     threads = options.threads or int(os.environ.get("SLURM_CPUS_PER_TASK", 0))
     if not threads and hasattr(os, "sched_getaffinity"):
         threads = len(os.sched_getaffinity(0))
     if threads:
         scene.render.threads_mode, scene.render.threads = 'FIXED', threads
-    if options.memory:
-        import resource  # not on Windows
-        _, hard = resource.getrlimit(resource.RLIMIT_AS)
-        resource.setrlimit(resource.RLIMIT_AS, (options.memory * _MEGA, hard))
+
+
+def _limit_memory(limit):
+    """Limit the address space, MiB; what speaks against it, or ""."""
+    import resource  # not on Windows
+    try:
+        with open("/proc/self/statm", encoding="ascii") as file:
+            used = int(file.read().split()[0]) * resource.getpagesize() // _MEGA
+    except OSError:
+        used = 0
+    if limit < used + _LEAST_MEMORY:
+        return f"--memory {limit}: Blender has {used} MiB already and waits for ever without {_LEAST_MEMORY} more"
+    _, hard = resource.getrlimit(resource.RLIMIT_AS)
+    resource.setrlimit(resource.RLIMIT_AS, (limit * _MEGA, hard))
+    return ""
 
 
 def _listen():
@@ -167,7 +191,8 @@ def _render_frame(options, scene, frame, blocks):
         outputs = _render_parts(options, scene, blocks) if options.parts else _render_whole(options, scene)
         is_done = not job.job().failures
     except (RuntimeError, OSError, parts.PartError) as error:
-        job.add_failure(str(error).strip())
+        # The engine's own failures come again as errors of Blender's operator.
+        job.add_failure(str(error).strip().removeprefix("Error: Volley: "))
     state = job.job()
     failures = list(dict.fromkeys(state.failures))
     for message in failures:
@@ -209,7 +234,8 @@ def _render_parts(options, scene, blocks):
     kept = settings.sample_offset, settings.sample_subset
     outputs = []
     try:
-        for begin, end in blocks:
+        for index, (begin, end) in enumerate(blocks):
+            state.block = index, len(blocks)
             paths = None if options.again else _parts_there(state.parts_folder, scene, begin, end)
             if paths is None:
                 state.part_paths = []
@@ -231,7 +257,7 @@ def _parts_there(folder, scene, begin, end):
     views = [view.name for view in scene.render.views if view.use] if scene.render.use_multiview else [""]
     paths = [parts.path_of(folder, scene, layer, view, begin, end) for layer in layers for view in views]
     try:
-        wanted = parts.version(), parts.files()
+        wanted = parts.version(), parts.digests(scene)
         found = [parts.Part(path).identity for path in paths if os.path.exists(path)]
         are_ours = all((identity["version"], identity["file"]) == wanted for identity in found)
     except parts.PartError:

@@ -18,13 +18,14 @@ class _Job:
     warnings = []
     counts = {}           # of the frame: what the summary says
     part_paths = []       # written for the frame
+    block = 0, 1          # of the samples: the one rendered, and how many there are
     next_line = 0.0
 
 
 def begin_frame():
     """Forget the last frame."""
     _Job.is_on = True
-    _Job.failures, _Job.warnings, _Job.part_paths = [], [], []
+    _Job.failures, _Job.warnings, _Job.part_paths, _Job.block = [], [], [], (0, 1)
     _Job.counts = {"render_seconds": 0.0, "rays": 0, "dropped_samples": 0, "peak_memory_bytes": 0}
 
 
@@ -52,12 +53,15 @@ def add_render(progress, rays):
 
 
 def say_progress(frame, fraction, text):
-    """A line that farm managers can parse, now and then."""
+    """A line that farm managers can parse, now and then. fraction: of the block of samples."""
     now = time.monotonic()
+    index, count = _Job.block
+    fraction = (index + fraction) / count
     if not _Job.is_on or (now < _Job.next_line and fraction < 1.0):
         return
     _Job.next_line = now + PROGRESS_SECONDS
-    say(f"frame {frame} progress {100.0 * fraction:.1f}% {text}")
+    block = f" | Block {index + 1}/{count}" if count > 1 else ""
+    say(f"frame {frame} progress {100.0 * fraction:.1f}% {text}{block}")
 
 
 def say(text):

@@ -16,12 +16,11 @@ import numpy as np
 
 from .. import native, passes
 from ..abi import SUMS_END
-from . import exr, job
+from . import exr, files, job
 
 ATTRIBUTE = "volley:part"
 EXTENSION = ".part.exr"
 _DIGEST = "volley:digest"
-_SAMPLED_BYTES = 1 << 20  # of files beside the scene: read at both ends
 # Fields of trc_render_desc in which parts of a picture may differ.
 _OWN_FIELDS = {"sample_offset", "sample_subset", "thread_count", "progressive"}
 
@@ -37,7 +36,7 @@ def identity(scene, fields, layer_name, view_name):
     settings = {name: float(value) if isinstance(value, float) else int(value)
                 for name, value in fields.items() if name not in _OWN_FIELDS}
     return {"frame": {"number": scene.frame_current, "layer": layer_name, "view": view_name},
-            "version": version(), "settings": settings, "file": files()}
+            "version": version(), "settings": settings, "file": digests(scene)}
 
 
 def version():
@@ -45,45 +44,11 @@ def version():
     return {"volley": native.description().rsplit(", ", 1)[0], "blender": bpy.app.version_string}
 
 
-def files():
-    """{name: digest} of the file and of those that it reads."""
+def digests(scene):
+    """{name: digest} of the file and of those that a frame reads."""
     if not bpy.data.filepath:
         raise PartError("parts are of a saved file")
-    digests = {"scene": _digest_of(bpy.data.filepath, 0)}
-    for library in bpy.data.libraries:
-        digests[f"library {library.name}"] = _digest_of(bpy.path.abspath(library.filepath), 0)
-    for name, path in image_files().items():
-        digests[f"image {name}"] = _digest_of(path, _SAMPLED_BYTES)
-    return digests
-
-
-def image_files():
-    """{image name: path} of the images that are read from single files."""
-    return {image.name_full: bpy.path.abspath(image.filepath, library=image.library)
-            for image in bpy.data.images
-            if image.source == 'FILE' and image.users and image.filepath and not image.packed_file}
-
-
-_digests = {}
-
-
-def _digest_of(path, sampled_bytes):
-    """A digest of a file's bytes, or of its size and both ends; "missing" where there is none."""
-    try:
-        status = os.stat(path)
-        key = path, status.st_mtime_ns, status.st_size
-        if key not in _digests:
-            digest = hashlib.sha256(str(status.st_size).encode())
-            with open(path, "rb") as file:
-                if sampled_bytes and status.st_size > 2 * sampled_bytes:
-                    digest.update(file.read(sampled_bytes))
-                    file.seek(-sampled_bytes, os.SEEK_END)
-                for block in iter(lambda: file.read(_SAMPLED_BYTES), b""):
-                    digest.update(block)
-            _digests[key] = digest.hexdigest()
-        return _digests[key]
-    except OSError:
-        return "missing"
+    return files.digests(scene.frame_current)
 
 
 # Files -------------------------------------------------------------------------------------------

@@ -314,20 +314,23 @@ def _file_path(image, image_user):
     return os.path.abspath(path) if path and os.path.isfile(path) else ""
 
 
-def _tile_path(image, number):
-    """The absolute path of a tile's file, "" where there is none to read."""
-    if image.packed_file is not None or image.is_dirty:
-        return ""
+def tile_path(image, number):
+    """The absolute path of a tile's file, whether it is there or not."""
     row, column = divmod(number - _FIRST_TILE, _TILES_PER_ROW)
     path = image.filepath_raw.replace("<UDIM>", str(number))
     path = path.replace("<UVTILE>", f"u{column + 1}_v{row + 1}")
-    path = os.path.abspath(bpy.path.abspath(path, library=image.library))
+    return os.path.abspath(bpy.path.abspath(path, library=image.library))
+
+
+def _readable_tile_path(image, number):
+    """The same, "" where there is none to read."""
+    path = "" if image.packed_file is not None or image.is_dirty else tile_path(image, number)
     return path if os.path.isfile(path) else ""
 
 
 def _tile_paths(image):
-    """(number, path as of _tile_path) of each tile of an image."""
-    return [(tile.number, _tile_path(image, tile.number)) for tile in image.tiles]
+    """(number, path as of _readable_tile_path) of each tile of an image."""
+    return [(tile.number, _readable_tile_path(image, tile.number)) for tile in image.tiles]
 
 
 def _image_nodes(trees):
