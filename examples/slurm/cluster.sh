@@ -48,8 +48,14 @@ ReturnToService=2
 JobRequeue=1
 SlurmdTimeout=15
 KillWait=30
+# Jobs of the partition "urgent" take the nodes of others, which get SIGTERM, some seconds, and go back. On
+# clusters that send no signal a job is killed at once and goes back as well.
+SlurmctldParameters=preempt_send_user_signal
+PreemptType=preempt/partition_prio
+PreemptMode=REQUEUE
 NodeName=n[1-$nodes] NodeHostname=$host NodeAddr=127.0.0.1 Port=[$((port + 1))-$((port + nodes))] CPUs=1
-PartitionName=render Nodes=ALL Default=YES MaxTime=INFINITE State=UP
+PartitionName=render Nodes=ALL Default=YES MaxTime=INFINITE State=UP PriorityTier=1 GraceTime=20
+PartitionName=urgent Nodes=ALL MaxTime=INFINITE State=UP PriorityTier=2 PreemptMode=OFF
 CONF
     export SLURM_CONF=$folder/slurm.conf
     slurmctld -c
@@ -59,7 +65,7 @@ CONF
         slurmd -N "n$node"
     done
     for _ in $(seq 100); do
-        [ "$(sinfo -h -N -t idle -o %N 2>/dev/null | wc -l)" -eq "$nodes" ] && return
+        [ "$(sinfo -h -N -p render -t idle -o %N 2>/dev/null | wc -l)" -eq "$nodes" ] && return
         sleep 0.3
     done
     sinfo -N >&2 || true
@@ -99,7 +105,7 @@ kill_node() {
 stop() {
     local file
     export SLURM_CONF=$folder/slurm.conf
-    scancel -p render 2>/dev/null || true
+    scancel --partition=render,urgent 2>/dev/null || true
     for file in "$folder"/slurmd.*.pid "$folder/slurmctld.pid" "$folder/munged.pid"; do
         [ -s "$file" ] && kill "$(cat "$file")" 2>/dev/null || true
     done

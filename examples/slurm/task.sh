@@ -8,6 +8,12 @@ first=$((task * VOLLEY_BLOCKS))
 threads=${SLURM_CPUS_PER_TASK:-${SLURM_CPUS_ON_NODE:-0}}
 main="import importlib; importlib.import_module('$ADDON.farm.command').main()"
 
+STOPPED=143 # of Blender: by SIGTERM, at a time limit or for a job that goes before
+
+parts_of_frame() { find "$VOLLEY_FOLDER/parts" -name "$(printf '%06d' "$frame").*.part.exr" | wc -l; }
+
+is_preempted() { scontrol show job "$SLURM_JOB_ID" | grep -q 'PreemptTime=[0-9]'; }
+
 # Lines of progress become the job's comment, the others its log.
 watch() {
     local line
@@ -21,19 +27,24 @@ watch() {
 }
 
 exec > >(watch) 2>&1
+before=$(parts_of_frame)
 # -t for what Blender itself evaluates: some of its modifiers differ in the last digit with more threads.
 "$BLENDER" -b -t "$threads" --addons "$ADDON" "$VOLLEY_FILE" --python-exit-code 1 --python-expr "$main" -- render \
     --frames "$frame" --parts "$VOLLEY_FOLDER/parts" --strict --summary "$VOLLEY_FOLDER/logs/summary.json" \
     --blocks "$first-$((first + VOLLEY_BLOCKS - 1))/$((VOLLEY_TASKS * VOLLEY_BLOCKS))" </dev/null &
 blender=$!
-trap 'kill -TERM "$blender"; was_stopped=1' TERM
-was_stopped=
+trap 'kill -TERM "$blender" 2>/dev/null' TERM
 wait "$blender"
 status=$?
-if [ -n "$was_stopped" ]; then
-    wait "$blender" # the first one ended with the signal
+while kill -0 "$blender" 2>/dev/null; do # it was the signal that ended the wait
+    wait "$blender"
     status=$?
-    # Preempted jobs go back by themselves.
-    [ "$status" -eq 0 ] || scontrol requeue "$SLURM_JOB_ID" || true
+done
+if [ "$status" -eq "$STOPPED" ]; then
+    # A task that cannot finish a part in its time would come back for ever; one that made way may.
+    if [ "$(parts_of_frame)" -gt "$before" ] || is_preempted; then
+        scontrol requeue "$SLURM_JOB_ID" && exit "$status"
+    fi
+    printf 'No part was finished in the time of the job: give it more time, or the frame more blocks\n'
 fi
 exit "$status"
