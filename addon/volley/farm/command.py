@@ -159,14 +159,19 @@ def _limit_threads(options, scene):
         scene.render.threads_mode, scene.render.threads = 'FIXED', threads
 
 
+def address_space():
+    """What this process has of it, MiB, 0 where the system does not say."""
+    try:
+        with open("/proc/self/statm", encoding="ascii") as file:
+            return int(file.read().split()[0]) * os.sysconf("SC_PAGE_SIZE") // _MEGA
+    except OSError:
+        return 0
+
+
 def _limit_memory(limit):
     """Limit the address space, MiB; what speaks against it, or ""."""
     import resource  # not on Windows
-    try:
-        with open("/proc/self/statm", encoding="ascii") as file:
-            used = int(file.read().split()[0]) * resource.getpagesize() // _MEGA
-    except OSError:
-        used = 0
+    used = address_space()
     if limit < used + _LEAST_MEMORY:
         return f"--memory {limit}: Blender has {used} MiB already and waits for ever without {_LEAST_MEMORY} more"
     _, hard = resource.getrlimit(resource.RLIMIT_AS)
