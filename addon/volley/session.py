@@ -70,10 +70,12 @@ class Session:
         # A part has all of its samples.
         is_limited = not engine.is_preview and not job.job().parts_folder
         time_limit = scene.volley.time_limit if is_limited else 0.0
-        views = self._synchronise(engine, depsgraph, frame, shutter, view_names)
+        with job.timed("sync"):
+            views = self._synchronise(engine, depsgraph, frame, shutter, view_names)
         for view_name, keys in views:
             self._sync.set_camera(keys, shutter)
-            self._commit(engine)
+            with job.timed("build"):
+                self._commit(engine)
             self._report_warnings(engine)
             settings = render_fields(scene, frame, crop, entries, engine.is_preview)
             if view_layer.samples > 0:

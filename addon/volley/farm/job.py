@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the command line asks of the engine, and what it learns of it. One job in a Blender."""
 
+import contextlib
 import json
 import sys
 import time
@@ -26,7 +27,8 @@ def begin_frame():
     """Forget the last frame."""
     _Job.is_on = True
     _Job.failures, _Job.warnings, _Job.part_paths, _Job.block = [], [], [], (0, 1)
-    _Job.counts = {"render_seconds": 0.0, "rays": 0, "dropped_samples": 0, "peak_memory_bytes": 0}
+    _Job.counts = {"sync_seconds": 0.0, "build_seconds": 0.0, "render_seconds": 0.0, "rays": 0,
+                   "dropped_samples": 0, "peak_memory_bytes": 0}
 
 
 def job():
@@ -39,6 +41,17 @@ def add_failure(message):
 
 def add_warning(message):
     _Job.warnings.append(message)
+
+
+@contextlib.contextmanager
+def timed(kind):
+    """Around a step of a render: "sync" or "build"."""
+    start = time.monotonic()
+    try:
+        yield
+    finally:
+        if _Job.is_on:
+            _Job.counts[f"{kind}_seconds"] += time.monotonic() - start
 
 
 def add_render(progress, rays):
