@@ -3,7 +3,7 @@
 
 import json
 
-from . import error_sections, frame_sections, repeated, scope as scopes
+from . import error_sections, farm_section, frame_sections, repeated, scope as scopes
 from .machine import names
 from .tables import table
 
@@ -41,6 +41,8 @@ def text(results, out):
         parts.append(frame_sections.growth(results["frames"]))
     if results.get("blender"):
         parts.append(frame_sections.blender(results["blender"]))
+    if results.get("farm"):
+        parts.append(farm_section.text(results["farm"]))
     if results.get("again"):
         parts.append(repeated.section(results))
     parts.append(pictures(out))

@@ -8,7 +8,7 @@ matplotlib.use("svg")
 
 import matplotlib.pyplot as plt  # noqa: E402  (the backend is chosen first)
 
-from . import curves, estimates, frames, kernels  # noqa: E402
+from . import curves, estimates, farm_section, frames, kernels  # noqa: E402
 
 # Okabe and Ito's colours, told apart by all eyes.
 CYCLES_COLOR, VOLLEY_COLOR = "#D55E00", "#0072B2"
@@ -35,6 +35,8 @@ def draw(results, out):
         draw_povray(results["povray"], folder / "povray.svg")
     if results.get("frames"):
         draw_frames(results["frames"], folder)
+    if results.get("farm"):
+        draw_farm(results["farm"], folder / "farm.svg")
 
 
 def save(figure, path):
@@ -348,4 +350,19 @@ def draw_shares(group, path):
     axis.set(yticks=range(len(names)), yticklabels=[name.replace("_", " ") for name in reversed(names)],
              xlim=(0, 1), xlabel="share of a frame whose tree is built anew")
     axis.legend(fontsize=8, ncol=4, loc="lower left", bbox_to_anchor=(0.0, 1.0))
+    save(figure, path)
+
+
+def draw_farm(result, path):
+    """Speed-up against nodes, of animations and of one frame."""
+    figure, axes = plt.subplots(1, 2, figsize=(9.0, 3.6), sharey=True)
+    for axis, (group, lines) in zip(axes, farm_section.curves(result).items()):
+        for (name, speeds), color in zip(lines.items(), COLORS):
+            axis.plot(farm_section.NODES, speeds, "o-", markersize=3, color=color, label=name)
+        axis.plot(farm_section.NODES, farm_section.NODES, "--", linewidth=1, color="#999999", label="nodes")
+        axis.set(xscale="log", yscale="log", xlabel="nodes", title=group)
+        plain_log_ticks(axis, "xy")
+        axis.legend(fontsize=8)
+    axes[0].set_ylabel("times as soon as one node")
+    figure.tight_layout()
     save(figure, path)
