@@ -8,8 +8,12 @@
 #include "check.h"
 #include "core/pool.h"
 #include "options.h"
+#include "query.h"
 #include "report.h"
 #include "volley.h"
+
+/* The kernels, two kinds of queries, Embree's modes on two scenes. */
+#define CONTESTANTS (3 + 2 * EMBREE_MODES)
 
 struct bench {
     struct options options;
@@ -29,25 +33,42 @@ static struct report_table table_of(const struct bench *b, bool moving, uint32_t
                                  .triangle_count = b->scene.worlds[0].meshes[0].triangle_count,
                                  .moving = moving,
                                  .streamed = b->options.streamed,
+                                 .queries = b->options.queries,
                                  .isa = isa,
                                  .threads = threads};
 }
 
-/* One list's hits and rates. peers: Embree's default and robust scene, or NULL both. */
-static void race_list(const struct bench *b, const struct volley *volley,
+static uint32_t differences(const struct hit_difference *d) {
+    return d->only_a + d->only_b + d->distance;
+}
+
+/* One list's hits and rates. scene: of the queries; peers: Embree's default and robust scene, or
+ * NULL both. */
+static void race_list(const struct bench *b, const struct volley *volley, trc_scene scene,
                       struct embree_scene *const peers[2], const struct ray_list *list,
                       struct trc_pool *pool, struct race_row *row) {
-    struct contestant all[1 + 2 * EMBREE_MODES];
-    struct rate rates[1 + 2 * EMBREE_MODES];
+    const struct query_target packets = {scene, 0}, alone = {scene, 1};
+    struct contestant all[CONTESTANTS];
+    struct rate rates[CONTESTANTS];
     struct hit_set ours, theirs;
     uint32_t count = 0;
     memset(row, 0, sizeof *row);
     row->list = list;
     all[count++] = volley_contestant(volley);
+    if (b->options.queries) {
+        all[count++] = query_contestant("query", &packets);
+        all[count++] = query_contestant("alone", &alone);
+    }
+    const uint32_t own = count;
     hit_set_init(&ours, list->rays.count);
     hit_set_init(&theirs, list->rays.count);
     race_hits(&all[0], list, &ours);
     row->miss_share = race_miss_share(list, &ours);
+    for (uint32_t i = 1; i < own; i++) {
+        race_hits(&all[i], list, &theirs);
+        const struct hit_difference d = race_difference(list, &ours, &theirs);
+        row->query_differences += differences(&d);
+    }
     for (int use = 0; use < 2 && peers[0]; use++) {
         row->mode_count = embree_contestants(peers[use], all + count);
         memcpy(row->modes, all + count, row->mode_count * sizeof *all);
@@ -58,9 +79,13 @@ static void race_list(const struct bench *b, const struct volley *volley,
     }
     race_run(all, count, list, pool, b->options.repeats, b->options.streamed, rates);
     row->volley = rates[0];
+    if (own > 1) {
+        row->query = rates[1];
+        row->alone = rates[2];
+    }
     for (uint32_t i = 0; i < row->mode_count; i++)
         for (int use = 0; use < 2; use++)
-            row->peer[use][i] = rates[1 + (uint32_t)use * row->mode_count + i];
+            row->peer[use][i] = rates[own + (uint32_t)use * row->mode_count + i];
     hit_set_free(&ours);
     hit_set_free(&theirs);
 }
@@ -75,8 +100,9 @@ static void list_make(const struct bench *b, const struct trc_snapshot *snapshot
                   snapshot, packet_kernels_get(trc_isa()));
 }
 
-static bool measure_table(const struct bench *b, const struct trc_snapshot *snapshot,
-                          const struct report_table *table, struct embree_scene *const peers[2]) {
+static bool measure_table(const struct bench *b, trc_scene scene, const struct report_table *table,
+                          struct embree_scene *const peers[2]) {
+    const struct trc_snapshot *snapshot = query_scene_snapshot(scene);
     const struct volley volley = {snapshot, packet_kernels_get(table->isa)};
     struct trc_pool *pool = NULL;
     if (!ok(trc_pool_create(table->threads, &pool)))
@@ -89,7 +115,7 @@ static bool measure_table(const struct bench *b, const struct trc_snapshot *snap
             if (!list_wanted(b, kind, order))
                 continue;
             list_make(b, snapshot, table->moving, kind, order, &list);
-            race_list(b, &volley, peers, &list, pool, &row);
+            race_list(b, &volley, scene, peers, &list, pool, &row);
             report_race(table, &row, b->json);
             ray_list_free(&list);
         }
@@ -114,20 +140,19 @@ static void measure_counts(const struct bench *b, const struct trc_snapshot *sna
 }
 
 /* Tables of one instruction set, one for each number of threads. */
-static bool measure_isa(const struct bench *b, const struct trc_snapshot *snapshot, bool moving,
-                        uint32_t isa) {
+static bool measure_isa(const struct bench *b, trc_scene scene, bool moving, uint32_t isa) {
     const struct options *o = &b->options;
     const struct mesh *mesh = &b->scene.worlds[moving].meshes[0];
     struct embree_device *device = o->embree ? embree_open(isa, 0) : NULL;
     struct embree_scene *peers[2] = {NULL, NULL};
-    bool done = true;
+    bool done = ok(trc_set_isa(isa)); /* of the queries */
     if (device) {
         peers[0] = embree_scene_create(device, mesh, EMBREE_FAST);
         peers[1] = embree_scene_create(device, mesh, EMBREE_ROBUST);
     }
     for (uint32_t i = 0; i < o->thread_count && done; i++) {
         const struct report_table table = table_of(b, moving, isa, o->threads[i]);
-        done = measure_table(b, snapshot, &table, peers);
+        done = measure_table(b, scene, &table, peers);
     }
     embree_scene_destroy(peers[0]);
     embree_scene_destroy(peers[1]);
@@ -155,12 +180,11 @@ static bool measure_scene(const struct bench *b) {
             return false;
         if (!ok(query_scene_create(&b->scene.worlds[moving], true, 0, &built)))
             return false;
-        const struct trc_snapshot *snapshot = query_scene_snapshot(built.scene);
         bool done = true;
         if (b->options.counts)
-            measure_counts(b, snapshot, moving);
+            measure_counts(b, query_scene_snapshot(built.scene), moving);
         for (uint32_t i = 0; i < b->options.isa_count && done; i++)
-            done = measure_isa(b, snapshot, moving, b->options.isas[i]);
+            done = measure_isa(b, built.scene, moving, b->options.isas[i]);
         query_scene_destroy(&built);
         if (!done)
             return false;

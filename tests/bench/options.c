@@ -143,6 +143,10 @@ static bool set_streamed(struct options *o, const char *text) {
     (void)text;
     return o->streamed = true;
 }
+static bool set_queries(struct options *o, const char *text) {
+    (void)text;
+    return o->queries = true;
+}
 static bool set_no_embree(struct options *o, const char *text) {
     (void)text;
     o->embree = false;
@@ -187,6 +191,7 @@ static const struct {
     {"--tiles", "N", "tiles of 32x32 pixels that are traced, over four cameras (16)", set_tiles},
     {"--streamed", NULL, "rays and results pass through memory (default: stay in cache)",
      set_streamed},
+    {"--queries", NULL, "also trace the rays through the public ray queries", set_queries},
     {"--no-embree", NULL, "do not run Embree", set_no_embree},
     {"--no-builds", NULL, "do not measure builds and refits", set_no_builds},
     {"--counts", NULL, "also count box and triangle tests and live rays", set_counts},
@@ -226,6 +231,8 @@ static void print_help(void) {
         "the time spent tracing; with several threads, the sum of each one's own rate. Embree\n"
         "gets full packets in the same order, flushes denormals as its manual asks, and is held\n"
         "to the instruction set of the kernels beside it. The ratio is to its fastest mode.\n"
+        "Public queries read and write the caller's arrays; 'alone' has packets of one ray, and\n"
+        "its ratio is to Embree's single rays.\n"
         "Counts are per ray: 'beams' tests of a packet against the boxes of a node, 'boxes' of a\n"
         "packet's rays against one box, 'triangles' against one triangle, 'alone' nodes and\n"
         "leaves that few rays meet one by one; 'live' is the mean of live rays where packets go.\n"

@@ -26,6 +26,7 @@ struct options {
     uint32_t tiles;   /* of the frame that are traced */
     uint32_t bundle;  /* packets that go through the tree together at most */
     bool streamed;    /* rays and results of a whole set in memory, not of one batch in cache */
+    bool queries;     /* the public ray queries beside the kernels */
     bool embree;
     bool builds;
     bool counts;   /* steps of traversal */

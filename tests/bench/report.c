@@ -101,6 +101,8 @@ void report_races_begin(const struct report_table *table, bool peer) {
            table->streamed ? "streamed" : "in cache");
     printf("  %-16s %-5s %6s %7s %15s %6s", "rays", "order", "in pkt", "volley", "(least-most)",
            "miss%");
+    if (table->queries)
+        printf(" | %7s %6s %7s %6s %6s", "query", "ratio", "alone", "ratio", "differ");
     if (peer)
         printf(" | %7s %7s %7s %7s %7s %6s %6s | %7s %6s %6s", "single", "packet", "coher.",
                "stream", "coher.", "ratio", "differ", "robust", "ratio", "differ");
@@ -120,6 +122,13 @@ static void print_race(const struct race_row *row) {
     printf("  %-16s %-5s %6.1f %7.2f %15s %6.2f", ray_kind_names[list->kind],
            ray_order_names[list->order], divide(list->rays.count, list->packet_count), ours, spread,
            100.0 * row->miss_share);
+    if (row->query.count) {
+        const double query = rate_median(&row->query), alone = rate_median(&row->alone);
+        const bool peer = row->mode_count > 0;
+        printf(" | %7.2f %6.2f %7.2f %6.2f %6u", query,
+               peer ? divide(query, rate_median(&row->peer[0][best_mode(row, 0)])) : 0.0, alone,
+               peer ? divide(alone, rate_median(&row->peer[0][0])) : 0.0, row->query_differences);
+    }
     if (row->mode_count) {
         printf(" |");
         for (uint32_t i = 0; i < EMBREE_MODES; i++)
@@ -163,6 +172,8 @@ void report_race(const struct report_table *table, const struct race_row *row, F
             ray_kind_names[list->kind], ray_order_names[list->order], list->rays.count,
             list->packet_count, row->miss_share);
     json_rate(json, "volley_mrays_s", &row->volley);
+    json_rate(json, "query_mrays_s", &row->query);
+    json_rate(json, "query_alone_mrays_s", &row->alone);
     for (int use = 0; use < 2 && row->mode_count; use++)
         json_peer(json, row, use);
     fprintf(json, "}\n");

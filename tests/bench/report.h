@@ -14,7 +14,7 @@
 struct report_table {
     const char *scene;
     uint32_t triangle_count;
-    bool moving, streamed;
+    bool moving, streamed, queries;
     uint32_t isa, threads;
 };
 
@@ -22,6 +22,8 @@ struct report_table {
 struct race_row {
     const struct ray_list *list;
     struct rate volley;
+    struct rate query, alone;   /* public queries, also of packets of one ray; count 0: not run */
+    uint32_t query_differences; /* rays whose hit is another than the kernels' */
     double miss_share;
     uint32_t mode_count; /* 0: Embree was not run */
     struct contestant modes[EMBREE_MODES];
