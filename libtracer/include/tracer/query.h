@@ -41,9 +41,12 @@ typedef struct trc_hits {
 TRC_API trc_hits trc_hits_default(void);
 
 /* The first hit of each ray with the last committed snapshot, at once and on the calling thread.
- * Rays are taken in packets of packet_size neighbours: 1, 4, 16, 64 or 256; 0 chooses. 256 is for
- * rays that mostly meet the same triangles. The result does not depend on it. NOT_COMMITTED before
- * the first commit; INVALID_ARGUMENT for a required array that is NULL or a misaligned one. */
+ * packet_size: 0 is best for rays of which neighbours in the arrays are neighbours in space; they
+ * are taken in bundles and, inside, ordered by direction where they mix. 4, 16, 64 or 256: packets
+ * of so many neighbours as they are, 256 as a bundle of 64 each; 1: single rays, for those that
+ * have nothing in common (4 and 16 are taken so, too). The result does not depend on it. Cost: rays
+ * of one call go best by the thousand. NOT_COMMITTED before the first commit; INVALID_ARGUMENT for
+ * a required array that is NULL or a misaligned one. */
 TRC_API trc_status trc_query_closest(trc_scene scene, const trc_rays *rays, uint32_t packet_size,
                                      const trc_hits *hits_out);
 

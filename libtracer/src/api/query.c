@@ -10,9 +10,6 @@
 /* Rays of one call of a kernel: whole packets of every size, and indices stay small. */
 #define CHUNK 65536
 
-/* Neighbours share much of their way; the size that is best on most scenes. */
-#define DEFAULT_PACKET_SIZE 64
-
 /* An array of count elements that may be NULL unless it is required. */
 static trc_status check_column(const void *column, uint64_t count, bool required,
                                const char *name) {
@@ -69,8 +66,6 @@ static trc_status check_hits(const trc_hits *hits, uint64_t count) {
 static trc_status resolve_packet_size(uint32_t packet_size, uint32_t *size_out) {
     switch (packet_size) {
     case 0:
-        *size_out = DEFAULT_PACKET_SIZE;
-        return TRC_OK;
     case 1:
     case 4:
     case 16:

@@ -43,6 +43,12 @@ TRC_INLINE uint32_t trc_chunk_bits(uint64_t mask, int c) {
 /* Packets of a bundle at most. */
 #define TRC_BUNDLE 4
 
+/* Maximum of rays of a stream, and live rays at or below which packets end in one
+ * (kernels/trace/walk_stream.h): lanes that are half empty cost more than streams. */
+#define TRC_STREAM_SIZE 32
+#define TRC_STREAM_ANY TRC_STREAM_SIZE
+#define TRC_STREAM_CLOSEST (TRC_WIDTH < 16 ? TRC_STREAM_SIZE : 24)
+
 struct trc_bvh;
 struct trc_snapshot;
 

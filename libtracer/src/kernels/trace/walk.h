@@ -210,7 +210,7 @@ TRC_INLINE void packet_walk(struct walk *w, struct trc_live mask, bool any, bool
     int top = 0;
     for (;;) {
         const int count = trc_live_count(&live);
-        if (count <= (any ? STREAM_ANY : STREAM_CLOSEST)) {
+        if (count <= (any ? TRC_STREAM_ANY : TRC_STREAM_CLOSEST)) {
             stream_walk(w, ref, &live, any, motion);
         } else {
             TRC_COUNT(visits, 1);

@@ -9,21 +9,15 @@
 
 #include "kernels/trace/walk_leaf.h"
 
-/* Maximum of rays of a stream, and live rays at or below which packets end in one: lanes that are
- * half empty cost more than streams. */
-#define STREAM_SIZE 32
-#define STREAM_ANY STREAM_SIZE
-#define STREAM_CLOSEST (TRC_WIDTH < 16 ? STREAM_SIZE : 24)
-
 static void item_packet(struct walk *w, const struct trc_item *item, struct trc_live mask,
                         bool any);
 
 struct stream {
-    float inv[3][STREAM_SIZE], shift[3][STREAM_SIZE]; /* 1 / d, -o / d */
-    float tmin[STREAM_SIZE], t[STREAM_SIZE];
-    float f[STREAM_SIZE];      /* moving trees: position between the keys */
-    uint16_t ray[STREAM_SIZE]; /* packet * TRC_PACKET_SIZE + its number there */
-    uint32_t alive;            /* any only: bits of those that are not occluded */
+    float inv[3][TRC_STREAM_SIZE], shift[3][TRC_STREAM_SIZE]; /* 1 / d, -o / d */
+    float tmin[TRC_STREAM_SIZE], t[TRC_STREAM_SIZE];
+    float f[TRC_STREAM_SIZE];      /* moving trees: position between the keys */
+    uint16_t ray[TRC_STREAM_SIZE]; /* packet * TRC_PACKET_SIZE + its number there */
+    uint32_t alive;                /* any only: bits of those that are not occluded */
 };
 
 /* A subtree to visit. */
@@ -156,7 +150,7 @@ TRC_INLINE void stream_leaf(struct walk *w, uint32_t ref, struct stream *s, uint
     }
 }
 
-/* Walks live rays, at most STREAM_SIZE, through the subtree at ref. */
+/* Walks live rays, at most TRC_STREAM_SIZE, through the subtree at ref. */
 TRC_INLINE void stream_walk(struct walk *w, uint32_t ref, const struct trc_live *live, bool any,
                             bool motion) {
     struct stream_entry stack[TRC_STACK_SIZE];
