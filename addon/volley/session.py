@@ -12,7 +12,7 @@ import bpy
 from . import abi, cryptomatte, jobs, native, passes
 from .commit import Commit
 from .compat import motion_position
-from .farm import job, parts
+from .farm import content, job, parts
 from .log import logger
 from .sync import Cancelled, SceneSync, Source, camera, culling, motion, world
 from .sync.changes import Changes
@@ -90,18 +90,19 @@ class Session:
                 folder = "" if engine.is_preview else job.job().parts_folder
                 if folder and progress.state == abi.ProgressState.DONE:
                     parts.write(folder, scene, render, entries, settings, view_layer.name, view_name,
-                                cryptomatte.manifests(view_layer, self._sync.cryptomatte_names()))
+                                self._sync.scene.content(), cryptomatte.manifests(view_layer, self._sync.cryptomatte_names()))
             finally:
                 render.destroy()
         cryptomatte.write_manifests(engine, view_layer, self._sync.cryptomatte_names())
 
     def _open(self, scene, keep):
         """The library's scene: the one kept from the last frame, or a new one."""
-        settings = (keep, thread_count(scene.render), scene.volley.texture_memory)
+        make_scene = content.NotedScene if job.job().parts_folder else native.Scene
+        settings = (keep, thread_count(scene.render), scene.volley.texture_memory, make_scene)
         if self._sync is None or self._sync_settings != settings:
             self.free()
             self._sync = SceneSync(is_final=True, thread_count=settings[1], will_resync=keep,
-                                   image_megabytes=settings[2])
+                                   image_megabytes=settings[2], make_scene=make_scene)
             self._sync_settings = settings
 
     def _synchronise(self, engine, depsgraph, frame, shutter, view_names):

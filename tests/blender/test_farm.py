@@ -287,6 +287,72 @@ def save_scene(path, samples):
     bpy.ops.wm.save_mainfile()
 
 
+def inside_edits(folder):
+    """{edit after the file was read: (exit code of the merge, what it says)}."""
+    import io
+    import bpy
+    from volley.farm import command
+    _make_scene(f"{folder}/farm.blend")
+    _save_image(f"{folder}/plain.tga", (0.5, 0.25, 0.125, 1.0))
+    scene, cube, light = bpy.context.scene, bpy.data.objects["Cube"], bpy.data.objects["Light"]
+    _show_image(cube.data.materials[0].node_tree, f"{folder}/plain.tga", 'FILE')
+    scene.volley.samples = 4
+    bpy.ops.wm.save_mainfile()
+    found = {}
+
+    def halves(edit, reload=False):
+        parts, before = f"{folder}/{edit.replace(' ', '_')}", "1-3" if reload else "3"
+        said = io.StringIO()
+        with contextlib.redirect_stdout(said):
+            assert command.run(["render", "--frames", before, "--parts", parts, "--samples", "0:2"]) == 0
+            if reload:
+                bpy.ops.wm.open_mainfile(filepath=f"{folder}/farm.blend")
+            else:
+                edits[edit]()
+            assert command.run(["render", "--frames", "3", "--parts", parts, "--samples", "2:4"]) == 0
+            found[edit] = command.run(["merge", parts, "--frames", "3", "--output", f"{parts}_#"]), said.getvalue()
+
+    def change(owner, name, value):
+        kept = getattr(owner, name)
+        setattr(owner, name, value)
+        undo.append((owner, name, kept))
+
+    shader = cube.data.materials[0].node_tree.nodes["Principled BSDF"]
+    vertex, background = cube.data.vertices[0], scene.world.node_tree.nodes["Background"]
+    edits = {"nothing": lambda: None,
+             "rounding": lambda: change(cube.scale, "x", 1.0 + 2.0 ** -23),
+             "object": lambda: change(cube.scale, "x", 1.01),
+             "vertex": lambda: change(vertex.co, "x", 1.01 * vertex.co.x),
+             "camera": lambda: change(scene.camera.location, "x", scene.camera.location.x + 0.01),
+             "lens": lambda: change(scene.camera.data, "lens", 51.0),
+             "light": lambda: change(light.data, "energy", 999.0),
+             "light's place": lambda: change(light.location, "z", light.location.z + 0.01),
+             "material": lambda: change(shader.inputs["Roughness"], "default_value", 0.4),
+             "world": lambda: change(background.inputs["Strength"], "default_value", 2.0),
+             "hidden": lambda: change(cube, "visible_glossy", False)}
+    for edit in edits:
+        undo = []
+        halves(edit)
+        for owner, name, kept in undo:
+            setattr(owner, name, kept)
+    halves("read anew", reload=True)
+    return found
+
+
+def test_edits_that_no_file_has_are_noticed(tmp_path):
+    found = Blender().run(inside_edits, str(tmp_path))
+    changed = {"object": "instances", "vertex": "meshes", "camera": "camera", "lens": "camera",
+               "light": "lights", "light's place": "lights",
+               "material": "instances, materials", "world": "materials, world", "hidden": "instances"}
+    for edit, (code, said) in found.items():
+        if edit in changed:
+            assert code == 1 and "changed after the file was read" in said, (edit, said)
+            assert f".part.exr: {changed[edit]}\n" in said, (edit, said)
+        else:
+            assert code == 0, (edit, said)
+    assert found.keys() == {"nothing", "rounding", "read anew", *changed}
+
+
 def _save_image(path, color, size=(4, 4)):
     import bpy
     image = bpy.data.images.new("made", *size)

@@ -74,6 +74,7 @@ def _checked(paths):
         for part in parts:
             _check_identity(first, part, ("version", "file"))
             _check_identity(parts[0], part, ("frame", "settings"))
+            _check_content(parts[0], part)
             if part.size != parts[0].size or part.passes != parts[0].passes:
                 raise PartError(f"{part.path}: size or passes are others than in {parts[0].path}")
         _check_range(parts)
@@ -90,6 +91,18 @@ def _check_identity(one, other, groups):
             if ours.get(name) != theirs.get(name):
                 raise PartError(f"{other.path}: its {group} is another than in {one.path}: {name} is "
                                 f"{theirs.get(name)}, not {ours.get(name)}")
+
+
+def _check_content(one, other):
+    """That scripts did not change one of them after the file was read; rounding of places is none of theirs."""
+    digests, places = one.content
+    other_digests, other_places = other.content
+    differing = {name for name in digests if digests[name] != other_digests[name]}
+    differing |= {name for name, (place, tolerance) in places.items()
+                  if not abs(place - other_places[name][0]) <= tolerance}
+    if differing:
+        raise PartError(f"{other.path}: its scene was changed after the file was read, or that of {one.path}: "
+                        f"{', '.join(sorted(differing))}")
 
 
 def _check_range(parts):

@@ -59,8 +59,9 @@ def path_of(folder, scene, layer_name, view_name, begin, end):
     return os.path.join(folder, f"{scene.frame_current:06d}.{'.'.join(names)}.{begin:07d}-{end:07d}{EXTENSION}")
 
 
-def write(folder, scene, render, entries, fields, layer_name, view_name, manifests):
-    """Write a finished render as a part. entries: of passes; manifests: attributes of Cryptomatte."""
+def write(folder, scene, render, entries, fields, layer_name, view_name, content, manifests):
+    """Write a finished render as a part. entries: of passes; content: as content.NotedScene has it; manifests:
+    attributes of Cryptomatte."""
     begin = fields["sample_offset"]
     end = begin + (fields["sample_subset"] or fields["sample_count"] - begin)
     sums = {number: render.read_sums(number) for number in range(SUMS_END) if render.sums_channels(number)}
@@ -74,6 +75,7 @@ def write(folder, scene, render, entries, fields, layer_name, view_name, manifes
     channels.update((letter, np.ascontiguousarray(combined[..., index]))
                     for index, letter in enumerate("RGBA"))
     about = {"identity": identity(scene, fields, layer_name, view_name), "begin": begin, "end": end,
+             "content": content,
              "isa": native.description().rsplit(", ", 1)[1],
              "passes": [[int(entry.index), passes.name_of(entry), entry.channels] for entry in entries],
              "manifests": manifests}
@@ -105,7 +107,8 @@ def _split(name, values):
 
 
 class Part:
-    """A part's file. ``begin``, ``end``: its samples; ``identity``: as :func:`identity`."""
+    """A part's file. ``begin``, ``end``: its samples; ``identity``: as :func:`identity`; ``content``: as
+    content.NotedScene has it."""
 
     def __init__(self, path):
         """Read it all; PartError says what is wrong with it."""
@@ -123,6 +126,7 @@ class Part:
         except OSError as error:
             raise PartError(f"{path}: {error.strerror or error}") from error
         self.begin, self.end, self.identity = about["begin"], about["end"], about["identity"]
+        self.content = about["content"]
         self.isa, self.passes, self.manifests = about["isa"], about["passes"], about["manifests"]
 
     def sums(self):

@@ -16,10 +16,10 @@ from .walk import Walk, dress, is_volume, materials_of
 class SceneSync:
     """One scene of the library and what it was last told."""
 
-    def __init__(self, is_final, thread_count, will_resync, image_megabytes=0):
+    def __init__(self, is_final, thread_count, will_resync, image_megabytes=0, make_scene=native.Scene):
         if image.has_files():
             native.start_reader()
-        self.scene = native.Scene(is_final, thread_count, image_megabytes)
+        self.scene = make_scene(is_final, thread_count, image_megabytes)
         self.warnings = Warnings()
         self._images = Images(self.scene, self.warnings)
         self._materials = Materials(self.scene, self._images, self.warnings)
