@@ -5,6 +5,7 @@ A node is one processor of this machine, by taskset. Times are seconds of the pr
 it started: they hold on a machine that does other things as well. Two nodes run side by side.
 """
 
+import dataclasses
 import json
 import os
 import pathlib
@@ -18,8 +19,11 @@ import compare_cycles
 from . import farm_model
 
 MAIN = "import volley.farm.command as c; c.main()"
-SETTINGS = ("import bpy; s = bpy.context.scene; r = s.render; s.frame_set(1); r.engine = 'VOLLEY'; r.use_motion_blur = False; "
-            "r.resolution_x, r.resolution_y, r.resolution_percentage = {width}, {height}, 100; "
+# Summaries have seconds of the processor then.
+PROCESSOR_CLOCK = ("import time, types, volley.farm.job as job; "
+                   "job.time = types.SimpleNamespace(monotonic=time.process_time); ")
+SETTINGS = ("import bpy; s = bpy.context.scene; r = s.render; s.frame_set(1); r.engine = 'VOLLEY'; "
+            "r.use_motion_blur = False; r.resolution_x, r.resolution_y, r.resolution_percentage = {width}, {height}, 100; "
             "r.image_settings.file_format = 'OPEN_EXR_MULTILAYER'; s.volley.samples = {samples}; "
             "bpy.ops.wm.save_as_mainfile(filepath={path!r})")
 WIDTH, HEIGHT, SAMPLES = 480, 270, 64
@@ -81,7 +85,7 @@ class _Bench:
                 *(["--", *map(str, arguments)] if arguments else [])]
 
     def _render(self, node, parts, *arguments):
-        return self._node(node, MAIN, "render", "--threads", 1, "--parts", parts, "--summary",
+        return self._node(node, PROCESSOR_CLOCK + MAIN, "render", "--threads", 1, "--parts", parts, "--summary",
                           self._folder / "summary.json", *arguments)
 
     def _pictures(self, node, frames):
@@ -109,9 +113,10 @@ class _Bench:
         return {"cpu": [cpu[place] for place in sorted(cpu)], "wall": [wall[place] for place in sorted(wall)]}
 
     def _stages(self):
-        """Seconds by the clock of sync and build of the last renders that told, the least."""
+        """Seconds of sync and build: of all renders so far the least, as of a frame that is read anew."""
         rows = [json.loads(line) for line in (self._folder / "summary.json").read_text("utf-8").splitlines()]
-        return {stage: min(row[f"{stage}_seconds"] for row in rows if row["rays"]) for stage in ("sync", "build")}
+        return {stage: min(row[f"{stage}_seconds"] for row in rows if len(row["outputs"]) == 1)
+                for stage in ("sync", "build")}
 
     def sizes(self):
         """Bytes of the file, a part and a picture."""
@@ -122,21 +127,31 @@ class _Bench:
 
 # What comes of it --------------------------------------------------------------------------------
 
-def median_seconds(result, name):
+def _seconds_of(row, name):
     """Of a measured command, seconds of the slower node's processor."""
-    return statistics.median(max(row[name]["cpu"]) for row in result["repeats"])
+    return max(row[name]["cpu"])
+
+
+def median_seconds(result, name):
+    """The same, of all repeats."""
+    return statistics.median(_seconds_of(row, name) for row in result["repeats"])
 
 
 def costs(result):
-    """farm_model.Costs of the measured frame."""
+    """farm_model.Costs of the measured frame: medians of what each repeat, in which all took turns, says."""
+    sizes = result["sizes"]
+    made = [_costs_of(row, sizes) for row in result["repeats"]]
+    return farm_model.Costs(*(statistics.median(values) for values in zip(*map(dataclasses.astuple, made))))
+
+
+def _costs_of(row, sizes):
     def line(name, counts):
         """What each of what is counted costs, and what all else does."""
-        low, high = (median_seconds(result, f"{name} {count}") for count in counts)
+        low, high = (_seconds_of(row, f"{name} {count}") for count in counts)
         each = (high - low) / (counts[1] - counts[0])
         return each, low - counts[0] * each
-    start = median_seconds(result, "start")
+    start = _seconds_of(row, "start")
     sample, fixed = line("samples", SAMPLE_COUNTS)
     merge_part, merge = line("merge", PART_COUNTS)
-    sizes = result["sizes"]
-    return farm_model.Costs(start, max(fixed - start, 0.0), sample, merge, merge_part, sizes["file"], sizes["part"],
-                            sizes["picture"])
+    return farm_model.Costs(start, max(fixed - start, sum(row["stages"].values())), sample, merge, merge_part,
+                            sizes["file"], sizes["part"], sizes["picture"])

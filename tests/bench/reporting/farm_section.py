@@ -77,7 +77,7 @@ def text(result):
         "split into as many tasks as there are nodes, up to the number that is best. Speed-up over one node:",
         table(["nodes", *(f"{nodes:,}" for nodes in SHOWN_NODES)], rows),
         "![Speed-up against nodes](plots/farm.svg)",
-        "Limits. *Frames*: there are no more tasks than frames, and the last round is as long as its slowest task; "
+        "Limits. *Frames*: there are no more tasks than frames, and the last round is as long as its slowest task (so is a frame of as many parts as nodes); "
         f"the scheduler gives {made.starts_per_second:.0f} tasks a second, and the server "
         f"{made.bytes_per_second / LARGE_FILE_BYTES:g} files of 1 GB: beyond that more nodes only wait. "
         f"*One frame*: start and build ({digits(large.start + large.frame)} s) and the merge's start "
