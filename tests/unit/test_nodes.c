@@ -101,8 +101,8 @@ static void test_all_types_add_up(void **state) {
 static void test_all_shaders_are_closures(void **state) {
     (void)state;
     uint32_t closures[TRC_NODE_IMAGE] = {0};
-#define TRC_CLOSURE(NODE, bits, branches) closures[TRC_NODE_##NODE]++;
-#include "model/closures.def"
+#define TRC_CLOSURE(NAME, lobes, branches) closures[TRC_NODE_##NAME]++;
+#include "tracer/nodes.def"
     for (uint32_t type = 0; type < TRC_NODE_IMAGE; type++) {
         const bool is_closure =
             trc_node_info_of(type) && type != TRC_NODE_MIX_SHADER && type != TRC_NODE_ADD_SHADER;

@@ -189,7 +189,6 @@ trc_status trc_build_texture(struct trc_build *b, const trc_node *node,
                   out + TRC_OUT_AT(MAGIC, factor));
     case TRC_NODE_BRICK:
         return build_brick(b, node->mode, in, out);
-#define TRC_NODE(NAME, number, label, inputs, outputs, modes)
 #define TRC_TEXTURE(NAME, number, label, inputs, outputs, modes) \
     case TRC_NODE_##NAME:                                        \
         return op(b, TRC_OP_##NAME, node->mode, in, out);

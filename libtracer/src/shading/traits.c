@@ -110,10 +110,10 @@ static uint32_t layered_principled_bits(uint32_t distribution, const struct trc_
 
 static uint32_t leaf_bits(const struct trc_leaf *leaf, const struct trc_operand *in) {
     switch (leaf->type) {
-#define TRC_CLOSURE(NODE, bits, branches) \
-    case TRC_NODE_##NODE:                 \
-        return bits;
-#include "model/closures.def"
+#define TRC_CLOSURE(NAME, lobes, branches) \
+    case TRC_NODE_##NAME:                  \
+        return lobes;
+#include "tracer/nodes.def"
     default:
         return 0;
     }
@@ -135,10 +135,10 @@ static uint32_t layered_principled_branches(const struct trc_operand *in) {
 
 static uint32_t leaf_branches(const struct trc_leaf *leaf, const struct trc_operand *in) {
     switch (leaf->type) {
-#define TRC_CLOSURE(NODE, bits, branches) \
-    case TRC_NODE_##NODE:                 \
+#define TRC_CLOSURE(NAME, lobes, branches) \
+    case TRC_NODE_##NAME:                  \
         return branches;
-#include "model/closures.def"
+#include "tracer/nodes.def"
     default:
         return 0;
     }

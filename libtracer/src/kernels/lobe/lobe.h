@@ -2,7 +2,7 @@
  *
  * A closure is a shader node: it adds lobes for its leaf of a material. All that is known of a lobe
  * stands in one file: how it is set up, its value, its densities, its directions. A new one is a
- * line of model/closures.def and a file here. */
+ * TRC_CLOSURE of tracer/nodes.def and a file here. */
 #ifndef TRACER_KERNELS_LOBE_LOBE_H
 #define TRACER_KERNELS_LOBE_LOBE_H
 
@@ -91,8 +91,8 @@ struct trc_closure {
 
 /* Where the closure of a node is defined, and where it is used. */
 #define TRC_CLOSURE_OF(NODE) TRC_KERNEL(trc_closure_##NODE)
-#define TRC_CLOSURE(NODE, bits, branches) extern const struct trc_closure TRC_CLOSURE_OF(NODE);
-#include "model/closures.def"
+#define TRC_CLOSURE(NAME, lobes, branches) extern const struct trc_closure TRC_CLOSURE_OF(NAME);
+#include "tracer/nodes.def"
 
 /* ---- kernels/lobe/setup.c ---- */
 

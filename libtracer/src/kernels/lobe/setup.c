@@ -89,8 +89,8 @@ static void set_chances(const struct trc_material *m, const struct trc_surface *
 
 /* By the type of a leaf's node; all types that leaves have are there (tests/unit/test_nodes.c). */
 static const struct trc_closure *const closures[TRC_NODE_IMAGE] = {
-#define TRC_CLOSURE(NODE, bits, branches) [TRC_NODE_##NODE] = &TRC_CLOSURE_OF(NODE),
-#include "model/closures.def"
+#define TRC_CLOSURE(NAME, lobes, branches) [TRC_NODE_##NAME] = &TRC_CLOSURE_OF(NAME),
+#include "tracer/nodes.def"
 };
 
 void trc_lobes_setup(const struct trc_material *m, const struct trc_surface *s,

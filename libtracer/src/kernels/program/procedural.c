@@ -22,7 +22,6 @@ void trc_program_procedural(uint32_t op, uint32_t mode, const vfloat *in, vfloat
     case TRC_OP_BRICK:
         op_brick(mode, in, out);
         break;
-#define TRC_NODE(NAME, number, label, inputs, outputs, modes)
 #define TRC_TEXTURE(NAME, number, label, inputs, outputs, modes) \
     case TRC_OP_##NAME:                                          \
         TRC_TEXTURE_OF(NAME)(mode, in, out);                     \

@@ -11,7 +11,6 @@ void trc_program_procedural(uint32_t op, uint32_t mode, const vfloat *in, vfloat
 /* Where a TRC_TEXTURE of tracer/nodes.def is defined: reads the floats of its inputs, writes those
  * of its outputs. */
 #define TRC_TEXTURE_OF(NODE) TRC_KERNEL(trc_texture_##NODE)
-#define TRC_NODE(NAME, number, label, inputs, outputs, modes)
 #define TRC_TEXTURE(NAME, number, label, inputs, outputs, modes) \
     void TRC_TEXTURE_OF(NAME)(uint32_t mode, const vfloat *in, vfloat *out);
 #include "tracer/nodes.def"

@@ -109,7 +109,6 @@ static bool run_pure(uint32_t op, uint32_t mode, const float *table, const vfloa
     case TRC_OP_WAVE:
     case TRC_OP_MAGIC:
     case TRC_OP_BRICK:
-#define TRC_NODE(NAME, number, label, inputs, outputs, modes)
 #define TRC_TEXTURE(NAME, number, label, inputs, outputs, modes) case TRC_OP_##NAME:
 #include "tracer/nodes.def"
         trc_program_procedural(op, mode, in, out);
