@@ -641,6 +641,7 @@ class FeatureFlags(IntFlag):
     SHADOW_CATCHERS = 262144
     SLOPES = 524288
     LINKS = 1048576
+    PORTALS = 2097152
 
 
 class CameraDesc(Structure):

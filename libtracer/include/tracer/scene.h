@@ -61,7 +61,8 @@ enum trc_feature_flags {
     TRC_FEATURE_AMBIENT_OCCLUSION = 1 << 17,
     TRC_FEATURE_SHADOW_CATCHERS = 1 << 18,
     TRC_FEATURE_SLOPES = 1 << 19, /* some surface has bumps */
-    TRC_FEATURE_LINKS = 1 << 20   /* some light does not light all, or all does not block it */
+    TRC_FEATURE_LINKS = 1 << 20,  /* some light does not light all, or all does not block it */
+    TRC_FEATURE_PORTALS = 1 << 21 /* some surface sends rays on from elsewhere */
 };
 
 typedef struct trc_scene_stats {

@@ -20,6 +20,7 @@ static uint32_t material_features(uint32_t has) {
         {TRC_MATERIAL_HAS_PROGRAM, TRC_FEATURE_PROGRAMS},
         {TRC_MATERIAL_HAS_TEXTURE, TRC_FEATURE_TEXTURES},
         {TRC_MATERIAL_READS_PIXEL, TRC_FEATURE_SLOPES},
+        {TRC_MATERIAL_HAS_PORTAL, TRC_FEATURE_PORTALS},
     };
     uint32_t features = 0;
     for (size_t i = 0; i < sizeof pairs / sizeof *pairs; i++) {

@@ -110,7 +110,8 @@ trc_status trc_build_input(struct trc_build *b, const trc_node *node, uint32_t i
     if (input->node >= 0)
         return linked_input(b, input, kind, out);
     if (input->node == TRC_INPUT_DEFAULT) {
-        if (!trc_node_is_shader(node->type))
+        const bool at_setup = kind == TRC_SOCKET_NORMAL || kind == TRC_SOCKET_TANGENT;
+        if (!trc_node_is_shader(node->type) || !at_setup)
             return default_input(b, kind, out);
         for (uint32_t i = 0; i < floats; i++)
             out[i] = (struct trc_operand){TRC_REG_DEFAULT, 0.0f};

@@ -111,6 +111,7 @@ static void clear_sample(struct trc_bsdf_sample *out) {
     out->indirect_scale = vf_one();
     out->pdf = vf_zero();
     out->valid = out->singular = out->transparent = out->transmitted = out->diffuse = vm_none();
+    out->through_portal = vm_none();
 }
 
 /* Enters the ideal direction of a lobe in lanes m; chance: that it was chosen there. */
@@ -122,6 +123,11 @@ static void take_ideal(const struct trc_lobe *lobe, const struct trc_surface *s,
         out->transparent = vm_or(out->transparent, m);
     else
         wi = ideal_direction(lobe, s, &weight);
+    if (lobe->model->is_portal) {
+        wi = lobe->f90;
+        out->origin = v3_select(m, lobe->f0, out->origin);
+        out->through_portal = vm_or(out->through_portal, m);
+    }
     weight = v3_scale(weight, vf_divide(vf_one(), chance));
     out->wi = v3_select(m, wi, out->wi);
     out->weight = v3_select(m, weight, out->weight);
@@ -241,6 +247,14 @@ vvec3 trc_lobes_transparency(const struct trc_lobes *l) {
     vvec3 sum = v3_zero();
     for (int i = 0; i < l->count; i++)
         if (l->lobe[i].kind == TRC_LOBE_TRANSPARENT)
+            sum = v3_add(sum, l->lobe[i].weight);
+    return sum;
+}
+
+vvec3 trc_lobes_straight(const struct trc_lobes *l) {
+    vvec3 sum = v3_zero();
+    for (int i = 0; i < l->count; i++)
+        if (l->lobe[i].kind == TRC_LOBE_TRANSPARENT && !l->lobe[i].model->is_portal)
             sum = v3_add(sum, l->lobe[i].weight);
     return sum;
 }

@@ -17,7 +17,7 @@ enum trc_lobe_kind {
     TRC_LOBE_TRANSLUCENT, /* counts as diffuse in passes and for light visibility, as in Cycles */
     TRC_LOBE_REFLECT,     /* microfacet reflection or ideal mirror */
     TRC_LOBE_REFRACT,     /* microfacet refraction or ideal */
-    TRC_LOBE_TRANSPARENT  /* straight through */
+    TRC_LOBE_TRANSPARENT  /* straight through, or through a portal: the same path */
 };
 
 /* trc_lobe.distribution, of microfacets. MULTI_GGX: GGX with height-correlated masking and the
@@ -57,7 +57,8 @@ struct trc_lobe {
                          a film: its thickness */
     /* Toon, f0: angle of full light, angle of its fading, cosine of both. Fibres, f0: the two
      * coefficients of their transform. Oren-Nayar that keeps energy, f0: factor of the part that
-     * scatters more than once. */
+     * scatters more than once. Portals: where the ray goes on, and its
+     * direction. */
     vvec3 f0, f90;
     vfloat cos_o;         /* n . wo */
     vfloat g1_o;          /* masking of wo */
@@ -124,8 +125,10 @@ struct trc_bsdf_sample {
     vfloat pdf;            /* as in trc_bsdf_eval; 0 where ideal or transparent */
     vmask valid;           /* the ray is worth tracing */
     vmask singular, transparent,
-        transmitted; /* transmitted: to the other side, incl. translucent */
-    vmask diffuse;   /* the lobe was translucent: a diffuse transmission ray */
+        transmitted;      /* transmitted: to the other side, incl. translucent */
+    vmask diffuse;        /* the lobe was translucent: a diffuse transmission ray */
+    vmask through_portal; /* transparent lanes that go on from origin instead of straight */
+    vvec3 origin;
 };
 void trc_bsdf_sample(const struct trc_lobes *l, const struct trc_surface *s, vfloat u_lobe,
                      vfloat u1, vfloat u2, struct trc_bsdf_sample *out);
@@ -150,7 +153,11 @@ vfloat trc_lobe_alpha(const struct trc_lobe *lobe);
  * their normals, the shading normal without any. */
 vvec3 trc_lobes_diffuse(const struct trc_lobes *l, const struct trc_surface *s, vvec3 *normal_out);
 
-/* Sum of transparent weights: what a shadow ray or the film's alpha sees through. */
+/* Sum of transparent weights: what a shadow ray or the film's alpha sees through; as in Cycles with
+ * the portals of a surface that is transparent besides. */
 vvec3 trc_lobes_transparency(const struct trc_lobes *l);
+
+/* The same without portals: what goes straight on. */
+vvec3 trc_lobes_straight(const struct trc_lobes *l);
 
 #endif

@@ -27,6 +27,8 @@ TRC_INLINE struct lobe_value no_value(void) {
 struct trc_lobe_model {
     enum trc_lobe_kind kind;
     bool has_facets; /* its alpha says how rough it is */
+    /* Of TRC_LOBE_TRANSPARENT: the ray goes on from f0, in the direction f90, which is unit. */
+    bool is_portal;
     /* Towards wi; lanes of the wrong side are dropped by the caller. NULL: straight through. */
     struct lobe_value (*value)(const struct trc_lobe *lobe, const struct trc_surface *s, vvec3 wi);
     /* A direction of the lobe's density, of those that rays are continued for and that are not

@@ -5,7 +5,7 @@ void trc_add_transparent(struct trc_setup *c, vvec3 weight) {
     static const struct trc_lobe_model model = {.kind = TRC_LOBE_TRANSPARENT};
     for (int i = 0; i < c->out->count; i++) {
         struct trc_lobe *lobe = &c->out->lobe[i];
-        if (lobe->kind != TRC_LOBE_TRANSPARENT)
+        if (lobe->model != &model)
             continue;
         const vfloat mean = vf_abs(v3_average(weight));
         const vmask counts = vm_and(c->s->active, vf_ge(mean, vf_set(TRC_WEIGHT_CUTOFF)));

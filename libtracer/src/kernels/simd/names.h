@@ -93,6 +93,7 @@
 #define trc_lobes_diffuse(...) TRC_KERNEL(trc_lobes_diffuse)(__VA_ARGS__)
 #define trc_lobes_emission(...) TRC_KERNEL(trc_lobes_emission)(__VA_ARGS__)
 #define trc_lobes_setup(...) TRC_KERNEL(trc_lobes_setup)(__VA_ARGS__)
+#define trc_lobes_straight(...) TRC_KERNEL(trc_lobes_straight)(__VA_ARGS__)
 #define trc_lobes_transparency(...) TRC_KERNEL(trc_lobes_transparency)(__VA_ARGS__)
 #define trc_oren_nayar_albedo(...) TRC_KERNEL(trc_oren_nayar_albedo)(__VA_ARGS__)
 #define trc_pass_add_lanes(...) TRC_KERNEL(trc_pass_add_lanes)(__VA_ARGS__)

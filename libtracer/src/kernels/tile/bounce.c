@@ -27,28 +27,34 @@ static void ray_push(struct trc_tile *t, const struct arrival *a, const struct t
                      const struct trc_lobes *lobes, const struct trc_bsdf_sample *b,
                      uint32_t material, vmask active) {
     const trc_render_desc *desc = t->desc;
-    const vmask straight = b->transparent;
+    const vmask transparent = b->transparent;
+    const vmask straight = vm_andnot(transparent, b->through_portal);
     const vvec3 w = v3_select(straight, a->d, b->wi);
-    const vvec3 o = v3_select(straight, a->o, trc_spawn_origin(s, goes_out(s, b->wi)));
+    vvec3 o = v3_select(straight, a->o, trc_spawn_origin(s, goes_out(s, b->wi)));
     const vvec3 n = v3_select(straight, a->n_from, a->receive_n);
     const vvec3 weight = v3_mul(v3_select(straight, a->found_weight, a->weight), b->weight);
     const vfloat indirect_scale = vf_select(straight, a->indirect_scale, b->indirect_scale);
-    const vfloat back = t->looks_back ? trc_spawn_look_back(s, o, b->wi, a->t) : vf_set(0.0f);
+    vfloat back = t->looks_back ? trc_spawn_look_back(s, o, b->wi, a->t) : vf_set(0.0f);
+    if (vm_any(b->through_portal)) {
+        o = v3_select(b->through_portal, b->origin, o);
+        back = vf_where(vm_not(b->through_portal), back);
+    }
     const vfloat tmin = vf_select(straight, a->t, back);
     const vfloat old_far = column(t->work.f[TRC_RAY_TMAX], a);
     const vfloat tmax = vf_select(straight, old_far, vf_set(INFINITY));
+    /* Portals end shadow rays: rays alone find what is behind them. */
     const vmask ideal = vm_or(b->singular, vf_le(b->pdf, vf_set(0.0f)));
     const vfloat pdf =
         vf_select(straight, a->pdf, vf_select(ideal, vf_set(-1.0f), b->pdf * a->chance));
     const vfloat min_pdf =
-        vf_select(vm_or(straight, ideal), a->min_pdf, vf_min(a->min_pdf, b->pdf));
+        vf_select(vm_or(transparent, ideal), a->min_pdf, vf_min(a->min_pdf, b->pdf));
 
     const vuint one = vu_set(1);
     vuint depths = a->depths;
     const vuint by_kind =
         (vuint)vi_select(b->transmitted, vi_set(1 << TRC_DEPTH_TRANSMISSION_SHIFT),
                          vi_set(1 << TRC_DEPTH_GLOSSY_SHIFT));
-    depths = depths + (vuint)vi_select(straight, vi_set(1 << TRC_DEPTH_TRANSPARENT_SHIFT),
+    depths = depths + (vuint)vi_select(transparent, vi_set(1 << TRC_DEPTH_TRANSPARENT_SHIFT),
                                        (vint)(by_kind + one));
     const vmask over = vm_or(vm_or(vi_lt(vi_set((int32_t)desc->max_depth),
                                          (vint)trc_depth_of(depths, TRC_DEPTH_ALL_SHIFT)),
@@ -58,7 +64,7 @@ static void ray_push(struct trc_tile *t, const struct arrival *a, const struct t
                                          (vint)trc_depth_of(depths, TRC_DEPTH_TRANSMISSION_SHIFT)),
                                    vi_lt(vi_set((int32_t)desc->max_transparent_depth),
                                          (vint)trc_depth_of(depths, TRC_DEPTH_TRANSPARENT_SHIFT))));
-    /* Straight on: the same ray. Else a new kind, in the category of the first bounce. */
+    /* Transparent: the same path. Else a new kind, in the category of the first bounce. */
     const vuint category = a->path & vu_set(3u << TRC_PATH_CATEGORY_SHIFT);
     const vmask first =
         vi_eq((vint)category, vi_set(TRC_CATEGORY_CAMERA << TRC_PATH_CATEGORY_SHIFT));
@@ -73,7 +79,7 @@ static void ray_push(struct trc_tile *t, const struct arrival *a, const struct t
     kind = kind |
            (a->path & vu_set(TRC_PATH_DATA_DONE | TRC_PATH_FEATURES_DONE | TRC_VISIBLE_UNBLOCKED)) |
            vu_set(a->world_alone ? TRC_PATH_WORLD_ALONE : 0);
-    vuint path = (vuint)vi_select(straight, (vint)a->path, (vint)kind);
+    vuint path = (vuint)vi_select(transparent, (vint)a->path, (vint)kind);
     path = path | (vuint)vi_select(over, vi_set(TRC_PATH_LAST), vi_set(0));
 
     vfloat path_length = vf_set(0.0f);
@@ -88,8 +94,8 @@ static void ray_push(struct trc_tile *t, const struct arrival *a, const struct t
     if (t->light_passes)
         share = share_of(t, a, s, lobes, b, first, ideal);
     if (t->remembers_left)
-        left =
-            (vuint)vi_select(straight, (vint)word_column(t->work.w[TRC_RAY_LEFT], a), s->instance);
+        left = (vuint)vi_select(transparent, (vint)word_column(t->work.w[TRC_RAY_LEFT], a),
+                                s->instance);
     const vuint words[TRC_RAY_WORDS] = {a->slot, path, depths, vu_set(material), left, share};
     trc_rays_append(&t->stack, values, words, vm_bits(active));
 }
@@ -121,13 +127,14 @@ vfloat trc_bounce_chance(const struct trc_tile *t, const struct arrival *a,
 void trc_bounce_straight(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
                          const struct trc_lobes *lobes, uint32_t material, vmask active) {
     struct trc_bsdf_sample b = {.wi = a->d,
-                                .weight = trc_lobes_transparency(lobes),
+                                .weight = trc_lobes_straight(lobes),
                                 .indirect_scale = vf_set(1.0f),
                                 .pdf = vf_set(0.0f),
                                 .singular = vm_all_set(),
                                 .transparent = vm_all_set(),
                                 .transmitted = vm_none(),
                                 .diffuse = vm_none(),
+                                .through_portal = vm_none(),
                                 .valid = active};
     const vmask below = vi_lt((vint)trc_depth_of(a->depths, TRC_DEPTH_TRANSPARENT_SHIFT),
                               vi_set((int32_t)t->desc->max_transparent_depth + 1));

@@ -307,7 +307,7 @@ vuint trc_data_passes(struct trc_tile *t, const struct trc_surface *s, const str
     vmask first = vm_and(on, is_not_done(s->path));
     if (m->aov_count)
         add_aovs(t, m, regs, slots, first);
-    if (m->has & TRC_MATERIAL_HAS_TRANSPARENCY)
+    if (m->has & (TRC_MATERIAL_HAS_TRANSPARENCY | TRC_MATERIAL_HAS_PORTAL))
         first = vm_and(first, vf_ge(v3_average(alpha), vf_set(ALPHA_THRESHOLD)));
     if (!vm_any(first))
         return path;

@@ -131,7 +131,8 @@ void trc_tile_render(struct trc_tile_job *job) {
     t->camera_common = job->snapshot->camera.aperture_radius <= 0.0f &&
                        job->snapshot->camera.key_count < 2 &&
                        job->snapshot->camera.stereo.eye_offset == 0.0f &&
-                       job->snapshot->camera.type != TRC_CAMERA_ORTHOGRAPHIC;
+                       job->snapshot->camera.type != TRC_CAMERA_ORTHOGRAPHIC &&
+                       !(job->snapshot->features & TRC_FEATURE_PORTALS);
     t->packet_size =
         job->desc->packet_size < TRC_PACKET_SIZE ? job->desc->packet_size : TRC_PACKET_SIZE;
     t->bundle = job->desc->packet_size / t->packet_size;

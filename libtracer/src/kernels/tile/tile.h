@@ -94,7 +94,7 @@ struct trc_tile {
     bool looks_back;            /* rays go through surfaces: kernels/trace/spawn.h */
     bool remembers_left;        /* rays know what they left: they look back, or lights are linked */
     bool measures_paths;        /* rays know how long their path is */
-    bool camera_common;         /* camera rays start at one point */
+    bool camera_common;         /* what the camera sees starts at one point */
     uint32_t packet_size;       /* 1..TRC_PACKET_SIZE */
     uint32_t bundle;            /* packets of a bundle at most, where rays stay together */
     float beam_width;           /* of a camera sample where it starts, metres */
