@@ -127,6 +127,7 @@ class NodeType(IntEnum):
     TOON = 14
     LAYERED_PRINCIPLED = 15
     SHEEN = 16
+    RAY_PORTAL = 17
     IMAGE = 64
     ENVIRONMENT = 65
     UV_MAP = 66
@@ -993,6 +994,9 @@ NODES = {
         (("SHADER", "closure"),)),
     NodeType.SHEEN: ("Sheen",
         (("COLOR", "color"), ("FLOAT", "roughness"), ("NORMAL", "normal")),
+        (("SHADER", "closure"),)),
+    NodeType.RAY_PORTAL: ("Ray Portal",
+        (("COLOR", "color"), ("POSITION", "position"), ("VECTOR", "direction")),
         (("SHADER", "closure"),)),
     NodeType.IMAGE: ("Image",
         (("UV", "vector"), ("FLOAT", "blend")),

@@ -346,6 +346,14 @@ def _sheen(walker, node, sockets):
     return {"BSDF": Value('s', walker.emit(kind, values), 0)}
 
 
+def _ray_portal(walker, _node, sockets):
+    """Without a linked direction the ray keeps its own."""
+    color, position, direction = sockets.all_of(NodeType.RAY_PORTAL, ("Color", "Position", "Direction"))
+    if direction.node == DEFAULT:
+        direction = _constant('v', 0.0)
+    return {"BSDF": Value('s', walker.emit(NodeType.RAY_PORTAL, (color, position, direction)), 0)}
+
+
 def _value(walker, node, _sockets):
     return {"Value": _constant('f', float(node.outputs[0].default_value))}
 
@@ -610,7 +618,7 @@ def _clamped(walker, value, is_clamped):
 
 _SPECIAL = {
     "ShaderNodeBsdfPrincipled": _principled, "ShaderNodeBsdfSheen": _sheen,
-    "ShaderNodeBsdfMetallic": _metallic,
+    "ShaderNodeBsdfMetallic": _metallic, "ShaderNodeBsdfRayPortal": _ray_portal,
     "ShaderNodeValue": _value, "ShaderNodeRGB": _rgb,
     "ShaderNodeNewGeometry": _geometry, "ShaderNodeNormal": _normal, "ShaderNodeTexImage": _image,
     "ShaderNodeTexEnvironment": _environment, "ShaderNodeUVMap": _uv_map,
