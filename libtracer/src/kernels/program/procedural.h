@@ -8,6 +8,14 @@
 /* Runs the operation of a procedural texture; inputs and outputs do not overlap. */
 void trc_program_procedural(uint32_t op, uint32_t mode, const vfloat *in, vfloat *out);
 
+/* The operations that stand for a part of their textures' nodes. (kernels/program/noise.c,
+ * voronoi.c, pattern.c) */
+void trc_program_noise(uint32_t mode, const vfloat *in, vfloat *out);
+void trc_program_voronoi(uint32_t mode, const vfloat *in, vfloat *out);
+void trc_program_wave(uint32_t mode, const vfloat *in, vfloat *out);
+void trc_program_magic(uint32_t mode, const vfloat *in, vfloat *out); /* mode: number of folds */
+void trc_program_brick(uint32_t mode, const vfloat *in, vfloat *out);
+
 /* Where a TRC_TEXTURE of tracer/nodes.def is defined: reads the floats of its inputs, writes those
  * of its outputs. */
 #define TRC_TEXTURE_OF(NODE) TRC_KERNEL(trc_texture_##NODE)

@@ -3,10 +3,10 @@
  * S. Worley, "A Cellular Texture Basis Function" (1996); the smooth minimum and the distance to the
  * edge after I. Quilez, "Smooth Voronoi" (2014) and "Voronoi Edges" (2012). Points, order of search
  * and limits as in Cycles 3.4, octaves and what their sums are divided by as in Cycles 4.3. */
-#ifndef TRACER_KERNELS_PROGRAM_VORONOI_H
-#define TRACER_KERNELS_PROGRAM_VORONOI_H
-
-#include "kernels/program/noise.h"
+#include "kernels/program/hash.h"
+#include "kernels/program/procedural.h"
+#include "kernels/program/values.h"
+#include "model/program.h"
 
 /* What is farther counts as nothing. */
 #define VORONOI_FAR 8.0f
@@ -345,7 +345,7 @@ static void voronoi_fractal(struct voronoi *v, uint32_t mode, vfloat smoothness,
 
 /* ---- the texture ---- */
 
-static void op_voronoi(uint32_t mode, const vfloat *in, vfloat *out) {
+void trc_program_voronoi(uint32_t mode, const vfloat *in, vfloat *out) {
     const int dims = (int)(mode & TRC_DIMENSIONS_MASK) + 1;
     struct voronoi v = {.dims = dims,
                         .has_pcg = dims > 1 && (mode & TRC_VORONOI_PCG),
@@ -387,5 +387,3 @@ static void op_voronoi(uint32_t mode, const vfloat *in, vfloat *out) {
             value.at[i];
     }
 }
-
-#endif

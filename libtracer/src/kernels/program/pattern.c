@@ -1,8 +1,9 @@
 /* Regular patterns: the Wave, Magic and Brick textures, as in Cycles 3.4. */
-#ifndef TRACER_KERNELS_PROGRAM_PATTERN_H
-#define TRACER_KERNELS_PROGRAM_PATTERN_H
-
+#include "kernels/program/hash.h"
 #include "kernels/program/noise.h"
+#include "kernels/program/procedural.h"
+#include "kernels/program/values.h"
+#include "model/program.h"
 
 /* ---- wave ---- */
 
@@ -20,9 +21,23 @@ TRC_INLINE vfloat wave_place(uint32_t mode, vvec3 p) {
     return vf_sqrt(sum) * vf_set(20.0f);
 }
 
-static vfloat op_wave(uint32_t mode, const vfloat *in) {
+/* n: the phase, in radians. */
+TRC_INLINE vfloat wave_profile(uint32_t mode, vfloat n) {
+    const vfloat half = vf_set(0.5f), two = vf_set(2.0f);
+    const vfloat turns = n / vf_set(TRC_TWO_PI);
+    switch (mode & TRC_WAVE_PROFILE_MASK) {
+    case TRC_WAVE_SINE:
+        return half + half * vf_sin(n - vf_set(TRC_HALF_PI));
+    case TRC_WAVE_SAW:
+        return turns - vf_floor(turns);
+    default:
+        return vf_abs(turns - vf_floor(turns + half)) * two;
+    }
+}
+
+void trc_program_wave(uint32_t mode, const vfloat *in, vfloat *out) {
     /* The shift and the shrinking keep whole coordinates off the edges. */
-    const vfloat shift = vf_set(0.000001f), shrink = vf_set(0.999999f), half = vf_set(0.5f);
+    const vfloat shift = vf_set(0.000001f), shrink = vf_set(0.999999f);
     const vfloat one = vf_one(), two = vf_set(2.0f);
     const vvec3 v = v3_read(in + TRC_OP_AT(WAVE, vector));
     const vvec3 p = v3((v.x + shift) * shrink, (v.y + shift) * shrink, (v.z + shift) * shrink);
@@ -38,18 +53,10 @@ static vfloat op_wave(uint32_t mode, const vfloat *in) {
                                   .lacunarity = two};
         const vfloat finer = in[TRC_OP_AT(WAVE, detail_scale)];
         const vfloat place[TRC_MAX_DIMENSIONS] = {p.x * finer, p.y * finer, p.z * finer};
-        const vfloat bent = n + distortion * (fractal_noise(&f, place) * two - one);
+        const vfloat bent = n + distortion * (trc_fractal_noise(&f, place) * two - one);
         n = vf_select(is_bent, bent, n);
     }
-    const vfloat turns = n / vf_set(TRC_TWO_PI);
-    switch (mode & TRC_WAVE_PROFILE_MASK) {
-    case TRC_WAVE_SINE:
-        return half + half * vf_sin(n - vf_set(TRC_HALF_PI));
-    case TRC_WAVE_SAW:
-        return turns - vf_floor(turns);
-    default:
-        return vf_abs(turns - vf_floor(turns + half)) * two;
-    }
+    out[0] = wave_profile(mode, n);
 }
 
 /* ---- magic ---- */
@@ -71,8 +78,7 @@ TRC_INLINE vfloat magic_sum(const vfloat c[3], const int8_t of[3]) {
     return of[2] < 0 ? xy - c[2] : xy + c[2];
 }
 
-/* mode: how many folds */
-static vvec3 op_magic(uint32_t mode, const vfloat *in) {
+void trc_program_magic(uint32_t mode, const vfloat *in, vfloat *out) {
     static const int8_t first[3][3] = {{1, 1, 1}, {-1, 1, -1}, {-1, -1, 1}};
     const vfloat turn = vf_set(TRC_TWO_PI), scale = in[TRC_OP_AT(MAGIC, scale)];
     const vfloat distortion = in[TRC_OP_AT(MAGIC, distortion)];
@@ -95,8 +101,7 @@ static vvec3 op_magic(uint32_t mode, const vfloat *in) {
     const vfloat twice = distortion * vf_set(2.0f), half = vf_set(0.5f);
     const vmask bent = vf_ne(distortion, vf_zero());
     for (int i = 0; i < 3; i++)
-        c[i] = half - vf_select(bent, c[i] / twice, c[i]);
-    return v3(c[0], c[1], c[2]);
+        out[i] = half - vf_select(bent, c[i] / twice, c[i]);
 }
 
 /* ---- brick ---- */
@@ -119,7 +124,7 @@ TRC_INLINE vmask is_multiple(vint a, uint32_t n) {
 #endif
 }
 
-static void op_brick(uint32_t mode, const vfloat *in, vfloat *out) {
+void trc_program_brick(uint32_t mode, const vfloat *in, vfloat *out) {
     const uint32_t offset_every = mode & TRC_BRICK_ROWS_MASK;
     const uint32_t squash_every = (mode >> TRC_BRICK_SQUASH_SHIFT) & TRC_BRICK_ROWS_MASK;
     const vvec3 p = v3_read(in + TRC_OP_AT(BRICK, vector));
@@ -146,5 +151,3 @@ static void op_brick(uint32_t mode, const vfloat *in, vfloat *out) {
     const vmask is_soft = vm_and(vf_ne(smooth, zero), vf_lt(depth, smooth));
     out[TRC_OP_OUT_AT(BRICK, mortar)] = vf_where(vf_lt(edge, size), vf_select(is_soft, soft, one));
 }
-
-#endif
