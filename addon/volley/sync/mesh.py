@@ -168,7 +168,7 @@ def _corner_items(mesh):
 
 def memory_of(collection, name, width, dtype):
     """Items as they lie in Blender's memory, (count, width or more), where each begins with the values of
-    a property; None where that cannot be told: side by side, with the values that Blender gives for
+    a property; None where that is unknown: side by side, with the values that Blender gives for
     some."""
     count, size = len(collection), np.dtype(dtype).itemsize
     if count < 2:

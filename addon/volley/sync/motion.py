@@ -27,7 +27,7 @@ _SINGULAR = 1e-6               # smallest share of its size that a matrix needs 
 @dataclass
 class Shutter:
     """When it is open: length and centre in frames; curve: samples of its opening, None where motion
-    is only told to the Vector pass and nothing is blurred; row_delay: of a rolling shutter, the share of
+    is only given to the Vector pass and nothing is blurred; row_delay: of a rolling shutter, the share of
     the length in which rows begin."""
 
     length: float

@@ -14,7 +14,7 @@ from .walk import Walk, dress, is_volume, materials_of
 
 
 class SceneSync:
-    """One scene of the library and what it was last told."""
+    """One scene of the library and what it was last given."""
 
     def __init__(self, is_final, thread_count, will_resync, image_megabytes=0, make_scene=native.Scene):
         if image.has_files():
@@ -26,7 +26,7 @@ class SceneSync:
         self._meshes = meshes.Meshes(self.scene, will_resync, self.warnings)
         self._instances = instance.Instances(self.scene, self.warnings)
         self._lights = light.Lights(self.scene, self.warnings)
-        self._world = None   # what the library was last told of it
+        self._world = None   # what the library was last given of it
         self._shown = None   # what the last full walk found
 
     def destroy(self):

@@ -3,7 +3,7 @@
 nodes.
 
 A sky of scattered light is an image of its table, looked up by elevation and azimuth; its sun is a disc
-whose direction and size the world is told, to be sampled. Hosek and Wilkie's data set is not part of this
+whose direction and size the world gets, to be sampled. Hosek and Wilkie's data set is not part of this
 add-on: Preetham's sky stands in, dimmed.
 """
 

@@ -181,7 +181,7 @@ def _linear(values):
 
 
 def _at_roots(read, modifier, strands, **layer):
-    """What read says of each strand's root. Of children it is told any particle, and their number."""
+    """What read says of each strand's root. For children, read is given any particle, and their number."""
     particles = modifier.particle_system.particles
     return np.array([read(modifier, particle=particles[number if number < len(particles) else 0],
                           particle_no=number, **layer) for number in strands], np.float32)

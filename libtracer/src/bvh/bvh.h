@@ -37,7 +37,7 @@ struct trc_bvh_build_stats {
 /* Builds the trees for snapshot->meshes, ->instances and ->materials (which must be complete;
  * transparency flags of materials are read), reusing what it can of previous (NULL: none): a mesh
  * pointer that is in both keeps its BLAS; a mesh with the same index array contents but new
- * positions, told by replaced[i] = the mesh of the previous snapshot it comes from (or NULL), is
+ * positions, as replaced[i] = the mesh of the previous snapshot it comes from (or NULL), is
  * refitted. Ownership of the result goes to the caller. OUT_OF_MEMORY, NO_THREAD or CANCELLED leave
  * nothing behind. */
 trc_status trc_bvh_create(const struct trc_snapshot *snapshot, const struct trc_bvh *previous,

@@ -114,7 +114,7 @@ static void gather_task(void *context, uint32_t index, uint32_t worker) {
 /* Chooses what is clipped: all that is large, or of too many such refs the largest. */
 static void clip_choose(struct ref_job *job, uint32_t block_count, uint64_t room,
                         struct trc_pool *pool) {
-    /* Areas that underflow would not be told from 0. */
+    /* Areas that underflow would be 0. */
     job->clip.min_area = fmaxf(TRC_CLIP_MIN_SHARE * box_area(job->clip.bounds), FLT_MIN);
     for (;; job->clip.min_area *= 2.0f) {
         uint64_t more = 0;

@@ -22,7 +22,7 @@ void trc_handle_release(uint64_t handle);
 /* Makes the handle stale, so that nobody can pin the object any more, and waits until all pins but
  * the caller's (who must hold one) are gone: then the object is the caller's alone and the pin is
  * gone too. INVALID_HANDLE if another thread was first: the caller's pin is released then. Whatever
- * keeps another thread in the object must have been told to stop before. */
+ * keeps another thread in the object must have been asked to stop before. */
 trc_status trc_handle_remove(uint64_t handle);
 
 /* A number no other call has returned: seeds the generations of ids of a scene. */

@@ -20,7 +20,7 @@
 #define SOME_BINS 16
 
 /* Refs from which every other one is counted into bins of its own: neighbours in a mesh mostly fall
- * into one bin, and would wait for each other's store (builds +3 %). */
+ * into one bin, and would wait for each other's store. */
 #define MANY_REFS 256
 
 /* struct trc_bin_box, held. */

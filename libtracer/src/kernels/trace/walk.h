@@ -10,17 +10,7 @@
  * triangles at a time. Hits do not depend on any of it: candidates are tested by
  * kernels/trace/triangle.h and compared by distance, then by number.
  *
- * Tried: boxes as one origin sees them, rectangles of slopes, cost a ray four comparisons but let
- * in a third more nodes, and with the silhouette's corners cut save no time; vertices less the
- * common origin of a packet, computed once for a triangle, cost more in registers than they save;
- * bundles of 8 packets are up to 6 % slower, of 16 up to 16; a beam for every 16 rays of a bundle,
- * all tested at once, spares primary rays 95 % of the box tests and no time; ordering children
- * without branches, going by bits from chunk to chunk (0 to -5), asking all rays of a stream for
- * edges first (-9 to +3), two rays of a stream at once in 512 bits (-4 to 0), four of them against
- * four triangles of a leaf in 16 lanes, two in 8 (-20 to +8), no box tests for children that are
- * leaves (-3 to +5), streams or leaves as functions of their own (-15 to +8, -2 to -7 in the mean);
- * prefetching for packets, or more of a leaf than two lines, skipping a stream's leaves behind its
- * hits, and visiting what was prefetched longest ago change nothing. */
+ * Other ways were measured: docs/measurements.md. */
 #ifndef TRACER_KERNELS_TRACE_WALK_H
 #define TRACER_KERNELS_TRACE_WALK_H
 

@@ -165,7 +165,7 @@ struct leaf {
 
 /* Of mask, the rays of packet k that pass the edges of the triangle in a slot, or may. For all
  * chunks, live or not, and all packets before the first test: to branch by masks that are still in
- * the making costs more than it spares (primary rays 5 to 17 %, others up to 12). */
+ * the making costs more than it spares. */
 TRC_INLINE uint64_t slot_edges(const struct walk *w, const struct leaf *leaf, int slot,
                                const struct trc_precision *maximum, struct trc_triangle_lanes *tri,
                                int k, uint64_t mask, bool motion) {
