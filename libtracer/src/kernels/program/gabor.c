@@ -92,7 +92,7 @@ static void gabor_sum(const struct gabor *g, vvec3 place, vfloat *real, vfloat *
             }
 }
 
-void TRC_TEXTURE_OF(GABOR)(uint32_t mode, const vfloat *in, vfloat *out) {
+static void gabor(uint32_t mode, const vfloat *in, vfloat *out) {
     const vfloat inv_turn = vf_set(1.0f / TRC_TWO_PI);
     struct gabor g = {.dims = (int)(mode & TRC_DIMENSIONS_MASK) + 1};
     g.frequency = vf_max(in[TRC_OP_AT(GABOR, frequency)], vf_set(GABOR_MIN_FREQUENCY));
@@ -112,3 +112,5 @@ void TRC_TEXTURE_OF(GABOR)(uint32_t mode, const vfloat *in, vfloat *out) {
     out[TRC_OP_OUT_AT(GABOR, phase)] = vf_atan2(imaginary, real) * inv_turn + half;
     out[TRC_OP_OUT_AT(GABOR, intensity)] = vf_sqrt(real * real + imaginary * imaginary) * unit;
 }
+
+const struct trc_texture TRC_TEXTURE_OF(GABOR) = {.run = gabor};

@@ -4,7 +4,7 @@
 #include "kernels/simd/wide_math.h"
 #include "model/program.h"
 
-void TRC_TEXTURE_OF(GRADIENT)(uint32_t mode, const vfloat *in, vfloat *out) {
+static void gradient(uint32_t mode, const vfloat *in, vfloat *out) {
     const vvec3 p = v3_read(in + TRC_OP_AT(GRADIENT, vector));
     const vfloat zero = vf_zero(), half = vf_set(0.5f);
     /* Unit vectors give exactly 0. */
@@ -37,3 +37,5 @@ void TRC_TEXTURE_OF(GRADIENT)(uint32_t mode, const vfloat *in, vfloat *out) {
     }
     out[TRC_OP_OUT_AT(GRADIENT, value)] = vf_saturate(r);
 }
+
+const struct trc_texture TRC_TEXTURE_OF(GRADIENT) = {.run = gradient};

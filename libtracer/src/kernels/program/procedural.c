@@ -22,7 +22,7 @@ void trc_program_procedural(uint32_t op, uint32_t mode, const vfloat *in, vfloat
         break;
 #define TRC_TEXTURE(NAME, number, label, inputs, outputs, modes) \
     case TRC_OP_##NAME:                                          \
-        TRC_TEXTURE_OF(NAME)(mode, in, out);                     \
+        TRC_TEXTURE_OF(NAME).run(mode, in, out);                 \
         break;
 #include "tracer/nodes.def"
     default:

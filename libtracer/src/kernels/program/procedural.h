@@ -16,11 +16,16 @@ void trc_program_wave(uint32_t mode, const vfloat *in, vfloat *out);
 void trc_program_magic(uint32_t mode, const vfloat *in, vfloat *out); /* mode: number of folds */
 void trc_program_brick(uint32_t mode, const vfloat *in, vfloat *out);
 
-/* Where a TRC_TEXTURE of tracer/nodes.def is defined: reads the floats of its inputs, writes those
- * of its outputs. */
+/* A TRC_TEXTURE of tracer/nodes.def: reads the floats of its inputs, writes those of its outputs.
+ */
+struct trc_texture {
+    void (*run)(uint32_t mode, const vfloat *in, vfloat *out);
+};
+
+/* Where that of a node is defined, and where it is used. */
 #define TRC_TEXTURE_OF(NODE) TRC_KERNEL(trc_texture_##NODE)
 #define TRC_TEXTURE(NAME, number, label, inputs, outputs, modes) \
-    void TRC_TEXTURE_OF(NAME)(uint32_t mode, const vfloat *in, vfloat *out);
+    extern const struct trc_texture TRC_TEXTURE_OF(NAME);
 #include "tracer/nodes.def"
 
 #endif

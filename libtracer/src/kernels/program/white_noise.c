@@ -4,7 +4,7 @@
 #include "kernels/program/values.h"
 #include "model/program.h"
 
-void TRC_TEXTURE_OF(WHITE_NOISE)(uint32_t mode, const vfloat *in, vfloat *out) {
+static void white_noise(uint32_t mode, const vfloat *in, vfloat *out) {
     const int dims = (int)(mode & TRC_DIMENSIONS_MASK) + 1;
     vfloat p[TRC_MAX_DIMENSIONS];
     place_of(dims, in + TRC_OP_AT(WHITE_NOISE, vector), in[TRC_OP_AT(WHITE_NOISE, w)], p);
@@ -12,3 +12,5 @@ void TRC_TEXTURE_OF(WHITE_NOISE)(uint32_t mode, const vfloat *in, vfloat *out) {
     out[TRC_OP_OUT_AT(WHITE_NOISE, value)] = color.x;
     v3_write(out + TRC_OP_OUT_AT(WHITE_NOISE, color), color);
 }
+
+const struct trc_texture TRC_TEXTURE_OF(WHITE_NOISE) = {.run = white_noise};
