@@ -771,7 +771,7 @@ class RenderDesc(Structure):
                 ("mist_start", c_float), ("mist_depth", c_float), ("mist_falloff", c_float),
                 ("cryptomattes", c_uint32), ("cryptomatte_depth", c_uint32), ("aov_value_count", c_uint32),
                 ("aov_color_count", c_uint32), ("light_group_count", c_uint32), ("denoise", c_uint32),
-                ("sample_offset", c_uint32), ("sample_subset", c_uint32), ("reserved", c_uint32))
+                ("sample_offset", c_uint32), ("sample_subset", c_uint32), ("blended_features", c_uint32))
 
 
 class RenderProgress(Structure):

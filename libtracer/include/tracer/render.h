@@ -135,7 +135,10 @@ typedef struct trc_render_desc {
      * trc_merge_add; a part itself is not reconstructed, and takes all samples where
      * noise_threshold says to stop. */
     uint32_t sample_offset, sample_subset;
-    uint32_t reserved; /* 0 */
+    /* 1: TRC_PASS_DENOISING_NORMAL and ALBEDO as Blender 5 has them: what mirrors and transparent
+     * surfaces show counts by how much they pass on; 0: as Blender 3.4, the first surface's alone
+     */
+    uint32_t blended_features;
 } trc_render_desc;
 
 /* No frame yet (width and height are to be set); Distribution, 16 samples, 50 bounces, a pixel

@@ -1,9 +1,11 @@
 /* Passes for denoisers: features of the first surface that is rough enough, seen directly, in
  * mirrors or through glass.
  *
- * As Cycles of 3.4, roughness and specular albedo as those of 5.2, but for surfaces whose features
- * are not taken and that yet have diffuse lobes: with diffuse bounces 0 it loses the paths that
- * pick those, and with them a part of what lies behind. */
+ * As Cycles of 3.4, or with trc_render_desc.blended_features of 5.2, whose roughness and specular
+ * albedo are for both. Departures: Cycles loses the paths that pick diffuse lobes (diffuse bounces
+ * are 0), and with them a part of what lies behind surfaces that have some and yet pass on their
+ * features; Cycles 5.2 fades between surfaces that give their features and such that do not, here
+ * it is either. */
 #include "kernels/simd/wide_math.h"
 #include "kernels/tile/tile.h"
 #include "kernels/trace/panorama.h"
@@ -17,7 +19,7 @@
 #define FEATURE_ALPHA 0.075f
 /* From this alpha on, a lobe's albedo is not specular. */
 #define SPECULAR_ALPHA 0.15f
-/* Part of all lobes, by mix_weight, that must be rough. */
+/* Part of all lobes that must be rough: by mix_weight, or by albedo. */
 #define ROUGH_SHARE 0.25f
 
 struct features {
@@ -25,6 +27,10 @@ struct features {
     vvec3 specular;       /* albedo of the lobes that are nearly mirrors */
     vfloat alpha;         /* mean of all lobes but transparent ones, by albedo */
     vmask are_taken;      /* lanes whose lobes are rough enough, or that have none */
+    /* Blended: the mean normal of lobes but transparent ones, times their part of all; albedo that
+     * is not specular; lanes where those are taken. */
+    vvec3 solid_normal, blended_albedo;
+    vmask blended_taken;
 };
 
 /* How much of a lobe's albedo is specular: 1 at an alpha of 0, fading smoothly. */
@@ -43,7 +49,8 @@ static void features_of(const struct trc_lobes *l, const struct trc_surface *s,
                         struct features *out) {
     const vfloat zero = vf_zero();
     vvec3 normal = v3_zero(), albedo = v3_zero(), specular = v3_zero();
-    vfloat all = zero, rough = zero, alpha = zero, scattered = zero;
+    vvec3 solid = v3_zero(), blended = v3_zero();
+    vfloat all = zero, rough = zero, alpha = zero, scattered = zero, clear = zero, blurred = zero;
     for (int i = 0; i < l->count; i++) {
         const struct trc_lobe *lobe = &l->lobe[i];
         const vmask counts = is_rough(lobe);
@@ -51,12 +58,17 @@ static void features_of(const struct trc_lobes *l, const struct trc_surface *s,
         normal = v3_mad(n, lobe->mix_weight, normal);
         all = all + lobe->mix_weight;
         rough = rough + vf_where(counts, lobe->mix_weight);
-        if (lobe->kind == TRC_LOBE_TRANSPARENT)
+        if (lobe->kind == TRC_LOBE_TRANSPARENT) {
+            clear = clear + v3_average(lobe->weight);
             continue;
+        }
         const vvec3 color = trc_lobe_albedo(lobe, s->wo);
-        const vfloat share = v3_average(color);
+        const vfloat share = v3_average(color), mirror = specular_share(trc_lobe_alpha(lobe));
         albedo = v3_add(albedo, v3_where(counts, color));
-        specular = v3_mad(color, specular_share(trc_lobe_alpha(lobe)), specular);
+        specular = v3_mad(color, mirror, specular);
+        blended = v3_mad(color, vf_one() - mirror, blended);
+        blurred = blurred + share * (vf_one() - mirror);
+        solid = v3_mad(lobe->n, share, solid);
         alpha = alpha + trc_lobe_alpha(lobe) * share;
         scattered = scattered + share;
     }
@@ -66,22 +78,35 @@ static void features_of(const struct trc_lobes *l, const struct trc_surface *s,
     out->specular = specular;
     out->alpha = vf_divide(alpha, scattered);
     out->are_taken = vm_or(vm_not(some), vf_gt(rough * vf_set(1.0f / ROUGH_SHARE), all));
+    out->solid_normal = v3_scale(solid, vf_divide(vf_one(), scattered + clear));
+    out->blended_albedo = blended;
+    out->blended_taken = vf_gt(blurred * vf_set(1.0f / ROUGH_SHARE), scattered);
 }
 
-/* Writes the mean normal in the space that shaders see as the camera's: x right, y up, z forward;
- * of panoramas along their own axes. Once, whichever path of the sample comes first. */
+/* A normal in the space that shaders see as the camera's: x right, y up, z forward; of panoramas
+ * along their own axes. */
+static vvec3 normal_to_camera(const struct trc_tile *t, vvec3 normal) {
+    const float *camera = t->snapshot->camera.world_to_camera[1].m;
+    const struct trc_view_axis *axes = trc_view_axes(&t->snapshot->camera);
+    vfloat n[3];
+    for (int k = 0; k < 3; k++) {
+        const float *row = camera + 4 * axes[k].column;
+        const vfloat along = v3_dot(normal, v3(vf_set(row[0]), vf_set(row[1]), vf_set(row[2])));
+        n[k] = axes[k].sign < 0.0f ? vf_zero() - along : along;
+    }
+    return v3(n[0], n[1], n[2]);
+}
+
+/* Writes the mean normal once, whichever path of the sample comes first. */
 static void write_normal(struct trc_tile *t, vvec3 normal, const uint32_t *slots, vmask active) {
     float *const *out = t->samples.pass[TRC_PASS_DENOISING_NORMAL];
     if (!out[0])
         return;
-    const float *camera = t->snapshot->camera.world_to_camera[1].m;
-    const struct trc_view_axis *axes = trc_view_axes(&t->snapshot->camera);
+    const vvec3 seen = normal_to_camera(t, normal);
     float n[3][TRC_WIDTH];
-    for (int k = 0; k < 3; k++) {
-        const float *row = camera + 4 * axes[k].column;
-        const vfloat along = v3_dot(normal, v3(vf_set(row[0]), vf_set(row[1]), vf_set(row[2])));
-        vf_store(n[k], axes[k].sign < 0.0f ? vf_zero() - along : along);
-    }
+    vf_store(n[0], seen.x);
+    vf_store(n[1], seen.y);
+    vf_store(n[2], seen.z);
     for (uint32_t bits = vm_bits(active); bits; bits &= bits - 1) {
         const int i = __builtin_ctz(bits);
         const uint32_t slot = slots[i];
@@ -102,8 +127,11 @@ vuint trc_denoising_passes(struct trc_tile *t, const struct trc_surface *s,
                            const uint32_t slots[TRC_WIDTH]) {
     const vint done = vi_set(TRC_PATH_FEATURES_DONE);
     const vint straight = vi_set(TRC_PATH_TRANSPARENT_BACKGROUND);
-    const vmask on = vm_and(s->active, vi_eq((vint)s->path & done, vi_set(0)));
+    const bool is_blended = t->desc->blended_features;
     const vmask seen = vm_and(s->active, vi_eq((vint)s->path & straight, straight));
+    vmask on = vm_and(s->active, vi_eq((vint)s->path & done, vi_set(0)));
+    if (is_blended) /* what is behind transparency counts besides what is before it */
+        on = vm_or(on, seen);
     if (!(t->desc->passes & DENOISING_PASSES) || !vm_any(vm_or(on, seen)))
         return s->path;
     struct features f;
@@ -112,8 +140,14 @@ vuint trc_denoising_passes(struct trc_tile *t, const struct trc_surface *s,
     trc_pass_add_lanes(t, TRC_PASS_DENOISING_SPECULAR_ALBEDO, v3_mul(weight, f.specular), slots,
                        seen);
     add_number(t, TRC_PASS_DENOISING_DEPTH, v3_average(weight) * length, slots, on);
-    const vmask taken = vm_and(on, f.are_taken);
-    trc_pass_add_lanes(t, TRC_PASS_DENOISING_ALBEDO, v3_mul(weight, f.albedo), slots, taken);
-    write_normal(t, f.normal, slots, taken);
+    const vmask taken = vm_and(on, is_blended ? f.blended_taken : f.are_taken);
+    const vvec3 albedo = is_blended ? f.blended_albedo : f.albedo;
+    trc_pass_add_lanes(t, TRC_PASS_DENOISING_ALBEDO, v3_mul(weight, albedo), slots, taken);
+    if (is_blended)
+        trc_pass_add_lanes(t, TRC_PASS_DENOISING_NORMAL,
+                           v3_scale(normal_to_camera(t, f.solid_normal), v3_average(weight)), slots,
+                           taken);
+    else
+        write_normal(t, f.normal, slots, taken);
     return (vuint)vi_select(taken, (vint)s->path | done, (vint)s->path);
 }
