@@ -609,6 +609,11 @@ class CryptomatteKind(IntEnum):
     ASSET = 2
 
 
+class PassesFlags(IntFlag):
+    BLENDED_FEATURES = 1
+    BACKGROUND_MOTION = 2
+
+
 class ProgressState(IntEnum):
     RUNNING = 0
     DONE = 1
@@ -771,7 +776,7 @@ class RenderDesc(Structure):
                 ("mist_start", c_float), ("mist_depth", c_float), ("mist_falloff", c_float),
                 ("cryptomattes", c_uint32), ("cryptomatte_depth", c_uint32), ("aov_value_count", c_uint32),
                 ("aov_color_count", c_uint32), ("light_group_count", c_uint32), ("denoise", c_uint32),
-                ("sample_offset", c_uint32), ("sample_subset", c_uint32), ("blended_features", c_uint32))
+                ("sample_offset", c_uint32), ("sample_subset", c_uint32), ("pass_flags", c_uint32))
 
 
 class RenderProgress(Structure):
@@ -849,7 +854,8 @@ ENUMERATIONS = {StatusCode: "TRC_", IsaId: "TRC_ISA_", CameraType: "TRC_CAMERA_"
                 MaterialFlags: "TRC_MATERIAL_", AlphaMode: "TRC_ALPHA_", IntegratorType: "TRC_INTEGRATOR_",
                 SamplerType: "TRC_SAMPLER_", AssemblyType: "TRC_ASSEMBLY_", FilterType: "TRC_FILTER_",
                 PassId: "TRC_PASS_", PassRange: "TRC_PASS_", CryptomatteKind: "TRC_CRYPTOMATTE_",
-                ProgressState: "TRC_PROGRESS_", SumsId: "TRC_SUMS_", FeatureFlags: "TRC_FEATURE_"}
+                PassesFlags: "TRC_PASSES_", ProgressState: "TRC_PROGRESS_", SumsId: "TRC_SUMS_",
+                FeatureFlags: "TRC_FEATURE_"}
 
 STRUCTURES = {"trc_camera_desc": CameraDesc, "trc_corner_attribute": CornerAttribute,
               "trc_mesh_desc": MeshDesc, "trc_instance_desc": InstanceDesc, "trc_light_desc": LightDesc,

@@ -48,6 +48,9 @@ HAS_WHOLE_COAT = bpy.app.version >= (5, 0, 0)
 # Passes for denoisers weigh normals by what transparency and mirrors pass on; seen in 5.2, not in 4.3.
 HAS_BLENDED_FEATURES = bpy.app.version >= (5, 0, 0)
 
+# The vector pass has the motion of the background; seen in 5.2, not in 4.3.
+BACKGROUND_MOVES = bpy.app.version >= (5, 0, 0)
+
 # Rough diffuse surfaces keep their energy from 4.3 on.
 KEEPS_DIFFUSE_ENERGY = bpy.app.version >= (4, 3, 0)
 

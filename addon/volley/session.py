@@ -11,7 +11,7 @@ import bpy
 
 from . import abi, cryptomatte, jobs, native, passes
 from .commit import Commit
-from .compat import HAS_BLENDED_FEATURES, motion_position
+from .compat import motion_position
 from .farm import content, job, parts
 from .log import logger
 from .sync import Cancelled, SceneSync, Source, camera, culling, motion, world
@@ -314,7 +314,6 @@ def render_fields(scene, frame, crop, entries, is_preview=False):
         "filter": abi.FilterType[settings.pixel_filter_type], "filter_width": settings.filter_width,
         "film_transparent": int(scene.render.film_transparent),
         "film_exposure": settings.film_exposure, **passes.request_fields(entries),
-        "blended_features": int(HAS_BLENDED_FEATURES),
         "denoise": int(settings.use_preview_denoising if is_preview else settings.use_denoising),
         "thread_count": thread_count(scene.render), **_adaptive_fields(settings, is_preview),
         **world.mist_fields(scene.world),

@@ -72,6 +72,7 @@ _LIGHT_PASSES = {
 FIRST_SHARE, FIRST_STEP = 1e-3, 2e-3
 LEAST_COLOR = 0.02  # below it, light over colour is one noise over another
 SUM_TOLERANCE = 1e-4
+BACKGROUND_OFF = 0.005  # pixels; measured: .001
 
 
 def _name_of(names):
@@ -198,7 +199,7 @@ def inside_vector():
     import bpy
     import scenes
     scene = _scene()
-    bpy.context.view_layer.use_pass_vector = True
+    bpy.context.view_layer.use_pass_vector = bpy.context.view_layer.use_pass_z = True
     bpy.data.objects.remove(bpy.data.objects["Back"])
     made, metal, mirror = scene.camera, bpy.data.objects["Metal"], bpy.data.objects["Mirror"]
     mirror.shape_key_add(name="Basis")
@@ -213,7 +214,8 @@ def inside_vector():
                            (metal, "rotation_euler"), (key, "value")):
             data.keyframe_insert(path, frame=frame)
     scene.frame_set(1)
-    pairs = {"perspective": _both(["Vector"])["Vector"]}
+    found = _both(["Vector", "Depth"])
+    pairs = {"perspective": found["Vector"], "depth": found["Depth"]}
     made.data.type, made.data.ortho_scale = 'ORTHO', 8.0
     if bpy.app.version < (4, 0, 0):  # in 4.3 Cycles gives such a camera ten times the motion
         pairs["orthographic"] = _both(["Vector"])["Vector"]
@@ -222,10 +224,49 @@ def inside_vector():
     return pairs
 
 
+def _background_motion(height, width):
+    """The first three channels of Vector for points far away, as that camera sees them at the middles of pixels;
+    the lowest row first."""
+    def axes(frame):
+        x, z = np.pi / 2 - 0.15, 0.1 + 0.02 * frame * frame
+        about_x = np.array([[1, 0, 0], [0, np.cos(x), -np.sin(x)], [0, np.sin(x), np.cos(x)]])
+        about_z = np.array([[np.cos(z), -np.sin(z), 0], [np.sin(z), np.cos(z), 0], [0, 0, 1]])
+        return about_z @ about_x
+
+    tangent = 18.0 / 50.0  # of half the width: sensor and lens in mm
+    column, row = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
+    here = np.stack([(column / width * 2 - 1) * tangent, (row / height * 2 - 1) * tangent * height / width,
+                     -np.ones_like(row)], axis=-1)
+
+    def raster(frame):
+        seen = here @ axes(1).T @ axes(frame)
+        return seen[..., :2] / -seen[..., 2:] * width / (2 * tangent)
+
+    return np.concatenate([raster(0) - raster(1), (raster(1) - raster(2))[..., :1]], axis=-1)
+
+
+def _compare_background(ours, theirs, depth):
+    """Motion of the background: none before Blender 5; since then as of points far away. That of Cycles 5.2 is
+    not divided by the depth of the direction, up to a third of the motion wrong at the sides, and pixels
+    that show some of it are set aside."""
+    is_far, is_near = (depth[..., 0] > 1e9).all(axis=0), (depth[..., 0] < 1e9).all(axis=0)
+    for axis in (0, 1):  # as far as the filter of pixels reaches
+        is_far, is_near = (np.all([np.roll(mask, shift, axis) for shift in range(-2, 3)], axis=0)
+                           for mask in (is_far, is_near))
+    assert is_far.mean() > 0.2
+    want = _background_motion(*is_far.shape)
+    assert np.abs(ours.mean(axis=0)[..., :3] - want)[is_far].max() < BACKGROUND_OFF
+    for side in (ours, theirs):
+        side[:, ~is_near] = 0.0
+
+
 def test_vector(blender):
     pairs = blender.run(inside_vector)
     for picture in pairs.pop("blurred"):
         assert not picture[..., :3].any()
+    depth = pairs.pop("depth")[1]
+    if blender_support.version() >= (5, 0):
+        _compare_background(*pairs["perspective"], depth)
     for name, (ours, theirs) in pairs.items():  # the file has an alpha of 1 in place of the fourth channel
         assert np.abs(theirs).max(axis=(0, 1, 2)).min() > 0.5
         _agree(ours, theirs, name)

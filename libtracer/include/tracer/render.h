@@ -75,6 +75,15 @@ enum trc_cryptomatte_kind {
  * NULL gives 0, which stands for no id. */
 TRC_API float trc_cryptomatte_id(const char *name);
 
+/* What passes mean in Blender 5 and not before. */
+enum trc_passes_flags {
+    TRC_PASSES_BLENDED_FEATURES = 1, /* in TRC_PASS_DENOISING_NORMAL and ALBEDO what mirrors and
+                                        transparent surfaces show counts by how much they pass on;
+                                        else a sample has its first surface's alone */
+    TRC_PASSES_BACKGROUND_MOTION = 2 /* TRC_PASS_VECTOR has the motion of the background, as of
+                                        points far away; 0 for orthographic cameras */
+};
+
 typedef struct trc_render_desc {
     uint32_t struct_size;             /* of this structure; checked */
     uint32_t width, height;           /* the full frame, 1..65536 each */
@@ -135,10 +144,7 @@ typedef struct trc_render_desc {
      * trc_merge_add; a part itself is not reconstructed, and takes all samples where
      * noise_threshold says to stop. */
     uint32_t sample_offset, sample_subset;
-    /* 1: TRC_PASS_DENOISING_NORMAL and ALBEDO as Blender 5 has them: what mirrors and transparent
-     * surfaces show counts by how much they pass on; 0: as Blender 3.4, the first surface's alone
-     */
-    uint32_t blended_features;
+    uint32_t pass_flags; /* TRC_PASSES_* */
 } trc_render_desc;
 
 /* No frame yet (width and height are to be set); Distribution, 16 samples, 50 bounces, a pixel

@@ -68,6 +68,11 @@ static vfloat depth_of(const struct trc_tile *t, vvec3 p) {
 
 /* ---- of the first surface ---- */
 
+/* Until the first surface that is not mostly seen through, that one too. */
+static vmask is_not_done(vuint path) {
+    return vi_eq((vint)path & vi_set(TRC_PATH_DATA_DONE), vi_set(0));
+}
+
 /* Where a point of a triangle is in the world at a time. */
 static void point_at(const struct trc_instance *instance, const struct trc_mesh *mesh,
                      const uint32_t index[3], float u, float v, float time, float p[3]) {
@@ -92,21 +97,18 @@ static void panorama_place(const struct trc_camera *c, const float at[3], float 
     place[1] = vf_get(v, 0);
 }
 
-/* Where the camera sees a point at the start (moment 0), in the middle (1) or at the end (2) of the
- * shutter, in pixels from the lower left corner. */
-static void raster_at(const struct trc_tile *t, const float p[3], int moment, float raster[2]) {
+/* Where the camera sees what is that way from it at the start (moment 0), in the middle (1) or at
+ * the end (2) of the shutter, in pixels from the lower left corner. */
+static void raster_along(const struct trc_tile *t, const float way[3], int moment,
+                         float raster[2]) {
     const struct trc_camera *c = &t->snapshot->camera;
-    const float time = 0.5f * (float)moment, *m = c->world_to_camera[moment].m;
+    const float *m = c->world_to_camera[moment].m;
     uint32_t key;
-    float f, window[4], way[3], at[3];
-    trc_key_at(time, c->key_count, &key, &f);
+    float f, window[4], at[3];
+    trc_key_at(0.5f * (float)moment, c->key_count, &key, &f);
     const uint32_t next = key + (c->key_count > 1);
     for (int k = 0; k < 4; k++)
         window[k] = c->windows[key][k] + f * (c->windows[next][k] - c->windows[key][k]);
-    for (int k = 0; k < 3; k++) { /* far from the origin more exact than the inverse's own way */
-        const float a = c->camera_to_world[key].m[4 * k + 3];
-        way[k] = p[k] - (a + f * (c->camera_to_world[next].m[4 * k + 3] - a));
-    }
     for (int k = 0; k < 3; k++)
         at[k] = m[4 * k] * way[0] + m[4 * k + 1] * way[1] + m[4 * k + 2] * way[2];
     float place[2];
@@ -122,17 +124,25 @@ static void raster_at(const struct trc_tile *t, const float p[3], int moment, fl
         raster[k] = (place[k] - window[2 * k]) / (window[2 * k + 1] - window[2 * k]) * size[k];
 }
 
-/* Not counted where the camera does not see the point at all three times. */
-static void store_motion(struct trc_tile *t, const struct trc_instance *instance,
-                         const struct trc_mesh *mesh, uint32_t triangle, float u, float v,
-                         uint32_t slot) {
-    float *const *out = t->samples.pass[TRC_PASS_VECTOR];
-    float raster[3][2], p[3];
+/* From the camera to a point: far from the origin more exact than by the inverse's own way. */
+static void way_to(const struct trc_tile *t, const float p[3], int moment, float way[3]) {
+    const struct trc_camera *c = &t->snapshot->camera;
+    uint32_t key;
+    float f;
+    trc_key_at(0.5f * (float)moment, c->key_count, &key, &f);
+    const uint32_t next = key + (c->key_count > 1);
     for (int k = 0; k < 3; k++) {
-        const float time = 0.5f * (float)k;
-        point_at(instance, mesh, mesh->indices + 3 * (size_t)triangle, u, v, time, p);
-        raster_at(t, p, k, raster[k]);
+        const float a = c->camera_to_world[key].m[4 * k + 3];
+        way[k] = p[k] - (a + f * (c->camera_to_world[next].m[4 * k + 3] - a));
     }
+}
+
+/* Not counted where the camera does not see the way at all three times. */
+static void store_motion(struct trc_tile *t, float ways[3][3], uint32_t slot) {
+    float *const *out = t->samples.pass[TRC_PASS_VECTOR];
+    float raster[3][2];
+    for (int k = 0; k < 3; k++)
+        raster_along(t, ways[k], k, raster[k]);
     const float motion[4] = {raster[0][0] - raster[1][0], raster[0][1] - raster[1][1],
                              raster[1][0] - raster[2][0], raster[1][1] - raster[2][1]};
     if (!isfinite(motion[0] + motion[1] + motion[2] + motion[3]))
@@ -140,6 +150,18 @@ static void store_motion(struct trc_tile *t, const struct trc_instance *instance
     for (int k = 0; k < 4; k++)
         out[k][slot] = motion[k];
     out[4][slot] = 1.0f;
+}
+
+static void surface_motion(struct trc_tile *t, const struct trc_instance *instance,
+                           const struct trc_mesh *mesh, uint32_t triangle, float u, float v,
+                           uint32_t slot) {
+    float ways[3][3], p[3];
+    for (int k = 0; k < 3; k++) {
+        const float time = 0.5f * (float)k;
+        point_at(instance, mesh, mesh->indices + 3 * (size_t)triangle, u, v, time, p);
+        way_to(t, p, k, ways[k]);
+    }
+    store_motion(t, ways, slot);
 }
 
 static void first_surface(struct trc_tile *t, const struct trc_surface *s,
@@ -160,8 +182,8 @@ static void first_surface(struct trc_tile *t, const struct trc_surface *s,
         store_vector(t, TRC_PASS_OBJECT_INDEX, slot, (float)instance->pass_index, 0.0f, 0.0f);
         store_vector(t, TRC_PASS_MATERIAL_INDEX, slot, (float)m->pass_index, 0.0f, 0.0f);
         if (t->samples.pass[TRC_PASS_VECTOR][0])
-            store_motion(t, instance, mesh, (uint32_t)vi_get(s->triangle, i), uv[0][i], uv[1][i],
-                         slot);
+            surface_motion(t, instance, mesh, (uint32_t)vi_get(s->triangle, i), uv[0][i], uv[1][i],
+                           slot);
         if (mesh->default_uv >= 0 && t->samples.pass[TRC_PASS_UV][0]) {
             const float *c =
                 mesh->attributes[mesh->default_uv].values + 6 * (size_t)vi_get(s->triangle, i);
@@ -169,6 +191,27 @@ static void first_surface(struct trc_tile *t, const struct trc_surface *s,
             store_vector(t, TRC_PASS_UV, slot, w * c[0] + u * c[2] + v * c[4],
                          w * c[1] + u * c[3] + v * c[5], 1.0f);
         }
+    }
+}
+
+bool trc_shows_background_motion(const struct trc_tile *t) {
+    return t->desc->pass_flags & TRC_PASSES_BACKGROUND_MOTION &&
+           t->desc->passes & 1ull << TRC_PASS_VECTOR &&
+           t->snapshot->camera.type != TRC_CAMERA_ORTHOGRAPHIC;
+}
+
+void trc_background_motion(struct trc_tile *t, vvec3 d, vuint path, const uint32_t slots[TRC_WIDTH],
+                           vmask active) {
+    const vint straight = vi_set(TRC_PATH_TRANSPARENT_BACKGROUND);
+    float x[TRC_WIDTH], y[TRC_WIDTH], z[TRC_WIDTH];
+    vf_store(x, d.x), vf_store(y, d.y), vf_store(z, d.z);
+    active = vm_and(active, vm_and(vi_eq((vint)path & straight, straight), is_not_done(path)));
+    for (uint32_t bits = vm_bits(active); bits; bits &= bits - 1) {
+        const int i = __builtin_ctz(bits);
+        float ways[3][3];
+        for (int k = 0; k < 3; k++)
+            ways[k][0] = x[i], ways[k][1] = y[i], ways[k][2] = z[i];
+        store_motion(t, ways, slots[i]);
     }
 }
 
@@ -250,11 +293,6 @@ static void add_mattes(struct trc_tile *t, const struct trc_surface *s,
 }
 
 /* ---- AOVs ---- */
-
-/* Until the first surface that is not mostly seen through, that one too. */
-static vmask is_not_done(vuint path) {
-    return vi_eq((vint)path & vi_set(TRC_PATH_DATA_DONE), vi_set(0));
-}
 
 /* As Cycles, which takes nothing from what is behind something transparent. */
 static void add_aovs(struct trc_tile *t, const struct trc_material *m,

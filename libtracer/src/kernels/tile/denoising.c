@@ -1,7 +1,7 @@
 /* Passes for denoisers: features of the first surface that is rough enough, seen directly, in
  * mirrors or through glass.
  *
- * As Cycles of 3.4, or with trc_render_desc.blended_features of 5.2, whose roughness and specular
+ * As Cycles of 3.4, or with TRC_PASSES_BLENDED_FEATURES of 5.2, whose roughness and specular
  * albedo are for both. Departures: Cycles loses the paths that pick diffuse lobes (diffuse bounces
  * are 0), and with them a part of what lies behind surfaces that have some and yet pass on their
  * features; Cycles 5.2 fades between surfaces that give their features and such that do not, here
@@ -127,7 +127,7 @@ vuint trc_denoising_passes(struct trc_tile *t, const struct trc_surface *s,
                            const uint32_t slots[TRC_WIDTH]) {
     const vint done = vi_set(TRC_PATH_FEATURES_DONE);
     const vint straight = vi_set(TRC_PATH_TRANSPARENT_BACKGROUND);
-    const bool is_blended = t->desc->blended_features;
+    const bool is_blended = t->desc->pass_flags & TRC_PASSES_BLENDED_FEATURES;
     const vmask seen = vm_and(s->active, vi_eq((vint)s->path & straight, straight));
     vmask on = vm_and(s->active, vi_eq((vint)s->path & done, vi_set(0)));
     if (is_blended) /* what is behind transparency counts besides what is before it */

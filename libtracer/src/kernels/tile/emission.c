@@ -105,6 +105,7 @@ static vvec3 pass_lamps(struct trc_tile *t, const struct arrival *a, vfloat end,
 /* Lights that rays pass, in the order of t->work. */
 void trc_emission_rays(struct trc_tile *t) {
     const bool lights = t->snapshot->features & TRC_FEATURE_LIGHTS;
+    const bool moves = trc_shows_background_motion(t);
     const uint32_t *seen = t->snapshot->lights->group_seen;
     for (uint32_t i = 0; i < t->work.count; i += TRC_WIDTH) {
         const vint index = vi_set((int32_t)i) + vi_lane();
@@ -123,8 +124,11 @@ void trc_emission_rays(struct trc_tile *t) {
                 if (seen[g] < seen[g + 1])
                     one_group_add(t, &a, active, pass_lamps(t, &a, end, g), g);
         }
-        if (vm_any(missed))
-            trc_emission_misses(t, &a, missed);
+        if (!vm_any(missed))
+            continue;
+        trc_emission_misses(t, &a, missed);
+        if (moves)
+            trc_background_motion(t, a.d, a.path, a.slots, missed);
     }
 }
 

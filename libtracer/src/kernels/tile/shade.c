@@ -185,7 +185,7 @@ static void catch_shadows(struct trc_tile *t) {
 
 void trc_shade_batch(struct trc_tile *t) {
     if (t->snapshot->features & (TRC_FEATURE_LIGHTS | TRC_FEATURE_ENVIRONMENT) ||
-        t->desc->film_transparent)
+        t->desc->film_transparent || trc_shows_background_motion(t))
         trc_emission_rays(t);
     if (t->snapshot->shadow_class_count && t->generation > 0)
         trc_linked_lights(t);

@@ -215,6 +215,12 @@ vuint trc_data_passes(struct trc_tile *t, const struct trc_surface *s, const str
 void trc_pass_add_lanes(struct trc_tile *t, uint32_t pass, vvec3 value,
                         const uint32_t slots[TRC_WIDTH], vmask active);
 
+/* Whether the vector pass has the background, and its motion for the lanes that leave the scene in
+ * direction d; path: their words. (kernels/tile/data_passes.c) */
+bool trc_shows_background_motion(const struct trc_tile *t);
+void trc_background_motion(struct trc_tile *t, vvec3 d, vuint path, const uint32_t slots[TRC_WIDTH],
+                           vmask active);
+
 /* What the world's material gives to AOVs where rays in direction d leave the scene; path: their
  * words. (kernels/tile/data_passes.c) */
 void trc_world_aovs(struct trc_tile *t, vvec3 d, vuint path, const uint32_t slots[TRC_WIDTH],
