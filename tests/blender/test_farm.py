@@ -297,6 +297,9 @@ def inside_edits(folder):
     scene, cube, light = bpy.context.scene, bpy.data.objects["Cube"], bpy.data.objects["Light"]
     _show_image(cube.data.materials[0].node_tree, f"{folder}/plain.tga", 'FILE')
     scene.volley.samples = 4
+    bad = bpy.data.meshes.new("bad")
+    bad.from_pydata([(float("nan"), float("inf"), 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)], [], [(0, 1, 2)])
+    scene.collection.objects.link(bpy.data.objects.new("bad", bad))
     bpy.ops.wm.save_mainfile()
     found = {}
 

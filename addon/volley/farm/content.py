@@ -123,7 +123,7 @@ def _kept_value(name, value):
 
 
 class _Places:
-    """A weighted sum of numbers, its length, and of which shape they are."""
+    """A weighted sum of numbers, its length, and of which shape they are. What is not finite counts as 0."""
 
     def __init__(self, value):
         arrays = [(name, array) for name, array in value] if _is_named(value) else [("", value)]
@@ -133,7 +133,7 @@ class _Places:
         for _name, array in arrays:
             numbers = array.reshape(-1)
             for begin in range(0, numbers.size, _BLOCK):
-                block = numbers[begin:begin + _BLOCK].astype(np.float64)
+                block = np.nan_to_num(numbers[begin:begin + _BLOCK].astype(np.float64), posinf=0.0, neginf=0.0)
                 block *= _weights(begin, block.size)
                 self.sum += float(block.sum())
                 self.square += float(block @ block)
@@ -178,11 +178,11 @@ def _plain(value):
         return _plain(value.tolist())
     if isinstance(value, (list, tuple)):
         return [_plain(each) for each in value]
-    if isinstance(value, (bool, int, np.integer)):
-        return int(value)
-    if isinstance(value, (float, np.floating)):
-        return float(value)
-    return value if value is None or isinstance(value, str) else [_plain(each) for each in value]
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, int):
+        return int(value)  # enumerators, too
+    return value if value is None or isinstance(value, (float, str)) else [_plain(each) for each in value]
 
 
 def _digest(value):
