@@ -263,8 +263,10 @@ def _parts_there(folder, scene, begin, end):
     paths = [parts.path_of(folder, scene, layer, view, begin, end) for layer in layers for view in views]
     try:
         wanted = parts.version(), parts.digests(scene)
-        found = [parts.Part(path).identity for path in paths if os.path.exists(path)]
-        are_ours = all((identity["version"], identity["file"]) == wanted for identity in found)
+        found = [parts.Part(path) for path in paths if os.path.exists(path)]
+        are_ours = all((part.identity["version"], part.identity["file"]) == wanted for part in found)
+        for part in found if are_ours else ():
+            part.channels()
     except parts.PartError:
         return None
     return paths if are_ours and len(found) == len(paths) else None

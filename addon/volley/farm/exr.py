@@ -6,6 +6,7 @@ Format: "OpenEXR File Layout", Academy Software Foundation. Of what can be in su
 this module writes are read: one part, zip compression, channels of 32 bits.
 """
 
+import contextlib
 import os
 import struct
 import tempfile
@@ -23,6 +24,7 @@ _TYPES = {np.dtype("<u4"): 0, np.dtype("<f4"): 2}
 _DTYPES = {number: dtype for dtype, number in _TYPES.items()}
 _COMPRESSION_LEVEL = 1      # sums are noise below their first digits: more effort gains nothing
 _MAX_SIDE = 65536
+_HEADER_BYTES = 1 << 16     # read at once of a header
 
 
 class ExrError(Exception):
@@ -99,22 +101,38 @@ def read(path):
     """(width, height), channels and attributes of a file, as :func:`write` takes them. ExrError, OSError."""
     with open(path, "rb") as file:
         data = file.read()
-    try:
+    with _damage():
         return _parsed(data)
+
+
+def read_header(path):
+    """(width, height) and attributes alone."""
+    with open(path, "rb") as file:
+        data = file.read(_HEADER_BYTES)
+        while True:
+            block = file.read(_HEADER_BYTES)
+            try:
+                with _damage():
+                    fields, _ = _fields(data)
+                    return _size(fields), _attributes(fields)
+            except ExrError:
+                if not block:
+                    raise
+            data += block
+
+
+@contextlib.contextmanager
+def _damage():
+    """Whatever damaged bytes lead to, as an ExrError."""
+    try:
+        yield
     except (struct.error, zlib.error, ValueError, IndexError, KeyError, MemoryError) as error:
         raise ExrError(f"it is damaged, or no file of this kind ({error})") from error
 
 
 def _parsed(data):
-    if len(data) < 8 or struct.unpack_from("<i", data)[0] != _MAGIC:
-        raise ExrError("it is no OpenEXR file")
     fields, at = _fields(data)
-    if fields["compression"] != bytes([_ZIP]):
-        raise ExrError("its compression is not zip")
-    x, y, right, top = struct.unpack("<iiii", fields["dataWindow"])
-    width, height = right - x + 1, top - y + 1
-    if (x, y) != (0, 0) or not (0 < width <= _MAX_SIDE and 0 < height <= _MAX_SIDE):
-        raise ExrError("its window is none of a part or a frame")
+    width, height = _size(fields)
     channels = _channels(fields["channels"])
     counts = -(-height // _CHUNK_LINES)
     starts = struct.unpack_from(f"<{counts}Q", data, at)
@@ -122,11 +140,27 @@ def _parsed(data):
                             for index, start in enumerate(starts)])[::-1]
     arrays = {name: np.ascontiguousarray(lines[:, index]).view(dtype)
               for index, (name, dtype) in enumerate(channels)}
-    attributes = {name: value.decode() for name, value in fields.items() if ":" in name or "/" in name}
-    return (width, height), arrays, attributes
+    return (width, height), arrays, _attributes(fields)
+
+
+def _size(fields):
+    if fields["compression"] != bytes([_ZIP]):
+        raise ExrError("its compression is not zip")
+    x, y, right, top = struct.unpack("<iiii", fields["dataWindow"])
+    width, height = right - x + 1, top - y + 1
+    if (x, y) != (0, 0) or not (0 < width <= _MAX_SIDE and 0 < height <= _MAX_SIDE):
+        raise ExrError("its window is none of a part or a frame")
+    return width, height
+
+
+def _attributes(fields):
+    return {name: value.decode() for name, value in fields.items() if ":" in name or "/" in name}
 
 
 def _fields(data):
+    """{name: bytes} of the header, and where it ends."""
+    if len(data) < 8 or struct.unpack_from("<i", data)[0] != _MAGIC:
+        raise ExrError("it is no OpenEXR file")
     fields, at = {}, 8
     while data[at]:
         end = data.index(b"\0", at)

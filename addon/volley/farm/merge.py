@@ -64,7 +64,6 @@ def _checked(paths):
     layers = {}
     for path in paths:
         part = Part(path)
-        part.forget_pixels()
         layers.setdefault((part.identity["frame"]["layer"], part.identity["frame"]["view"]), []).append(part)
     if not layers:
         raise PartError("there are no parts")
@@ -126,7 +125,7 @@ def _merged(parts):
     render = None
     try:
         for part in parts:
-            sums = _sums_again(part)
+            sums = part.sums()
             if render is None:
                 render = native.start_merge(SumsId.CATCHERS in sums, **identity["settings"])
             try:
@@ -139,14 +138,6 @@ def _merged(parts):
     finally:
         if render is not None:
             render.destroy()
-
-
-def _sums_again(part):
-    """A part's sums from its file, which is still the one that was checked."""
-    again = Part(part.path)
-    if (again.identity, again.begin, again.end) != (part.identity, part.begin, part.end):
-        raise PartError(f"{part.path}: it changed meanwhile")
-    return again.sums()
 
 
 def _read(render, frame, passes):

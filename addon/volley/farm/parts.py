@@ -6,6 +6,7 @@ double is the bits of two integers, or one number where that holds it whole. The
 settings and version it is and which samples it has, and have a digest of all that.
 """
 
+import contextlib
 import hashlib
 import json
 import os
@@ -78,16 +79,20 @@ def write(folder, scene, render, entries, fields, layer_name, view_name, content
              "content": content,
              "isa": native.description().rsplit(", ", 1)[1],
              "passes": [[int(entry.index), passes.name_of(entry), entry.channels] for entry in entries],
-             "manifests": manifests}
+             "manifests": manifests, "pixels": _digest_of(channels)}
     text = json.dumps(about, sort_keys=True)
     os.makedirs(folder, exist_ok=True)
     path = path_of(folder, scene, layer_name, view_name, begin, end)
-    exr.write(path, render.size, channels, {ATTRIBUTE: text, _DIGEST: _digest(text, channels)})
+    exr.write(path, render.size, channels, {ATTRIBUTE: text, _DIGEST: _digest_of_text(text)})
     job.job().part_paths.append(path)
 
 
-def _digest(text, channels):
-    digest = hashlib.sha256(text.encode())
+def _digest_of_text(text):
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _digest_of(channels):
+    digest = hashlib.sha256()
     for name in sorted(channels):
         digest.update(name.encode())
         digest.update(channels[name].tobytes())
@@ -111,37 +116,48 @@ class Part:
     content.NotedScene has it."""
 
     def __init__(self, path):
-        """Read it all; PartError says what is wrong with it."""
+        """Read what it says of itself; PartError says what is wrong with it."""
         self.path = path
-        try:
-            self.size, self._channels, attributes = exr.read(path)
-            text = attributes.get(ATTRIBUTE)
-            if text is None:
-                raise PartError(f"{path}: it is not a part of a render")
-            if attributes.get(_DIGEST) != _digest(text, self._channels):
-                raise PartError(f"{path}: it is damaged")
-            about = json.loads(text)
-        except exr.ExrError as error:
-            raise PartError(f"{path}: {error}") from error
-        except OSError as error:
-            raise PartError(f"{path}: {error.strerror or error}") from error
+        with self._errors():
+            self.size, attributes = exr.read_header(path)
+        self._text = attributes.get(ATTRIBUTE)
+        if self._text is None:
+            raise PartError(f"{path}: it is not a part of a render")
+        if attributes.get(_DIGEST) != _digest_of_text(self._text):
+            raise PartError(f"{path}: it is damaged")
+        about = json.loads(self._text)
         self.begin, self.end, self.identity = about["begin"], about["end"], about["identity"]
-        self.content = about["content"]
+        self.content, self._pixels = about["content"], about["pixels"]
         self.isa, self.passes, self.manifests = about["isa"], about["passes"], about["manifests"]
 
+    @contextlib.contextmanager
+    def _errors(self):
+        try:
+            yield
+        except exr.ExrError as error:
+            raise PartError(f"{self.path}: {error}") from error
+        except OSError as error:
+            raise PartError(f"{self.path}: {error.strerror or error}") from error
+
+    def channels(self):
+        """Read the rest, which is whole and what it was; PartError otherwise."""
+        with self._errors():
+            size, channels, attributes = exr.read(self.path)
+        if (size, attributes.get(ATTRIBUTE)) != (self.size, self._text):
+            raise PartError(f"{self.path}: it changed meanwhile")
+        if self._pixels != _digest_of(channels):
+            raise PartError(f"{self.path}: it is damaged")
+        return channels
+
     def sums(self):
-        """{number: doubles, flat}."""
+        """{number: doubles, flat}, read."""
         planes = {}
-        for name, values in self._channels.items():
+        for name, values in self.channels().items():
             if name.startswith("sums."):
                 _, number, index, letter = name.split(".")
                 planes.setdefault(int(number), {}).setdefault(int(index), {})[letter] = values
         return {number: np.stack([_joined(by_index[index]) for index in sorted(by_index)], axis=-1).reshape(-1)
                 for number, by_index in planes.items()}
-
-    def forget_pixels(self):
-        """Free the memory; what it says of itself stays."""
-        self._channels = {}
 
 
 def _joined(by_letter):
