@@ -32,10 +32,11 @@ class Session:
     def __init__(self):
         self._sync = None
         self._sync_settings = None  # what the scene was created with
+        self._synchronised = None   # the depsgraph and view layer that it was brought up to date with
 
     def free(self):
         """Free everything native. May be called at any time, more than once."""
-        sync, self._sync = self._sync, None
+        sync, self._sync, self._synchronised = self._sync, None, None
         if sync is not None:
             sync.destroy()
 
@@ -110,13 +111,17 @@ class Session:
         engine.update_stats("", "Synchronizing")
         scene = depsgraph.scene_eval
         now = motion.split_frame(scene.frame_current_final)
-        source = Source(depsgraph, Changes.everything(), engine=engine,
+        shown = depsgraph.as_pointer(), scene.name_full, depsgraph.view_layer_eval.name
+        moved = shutter is not None
+        is_same = not moved and self._synchronised == shown
+        self._synchronised = None  # until all is done: Blender names what changed once
+        changes = Changes.since_render(depsgraph) if is_same else Changes.everything()
+        source = Source(depsgraph, changes, engine=engine,
                         is_cancelled=lambda: jobs.is_cancelled(engine),
                         needs_uv=depsgraph.view_layer_eval.use_pass_uv,
                         aovs=passes.aov_numbers(depsgraph.view_layer_eval),
                         light_groups=passes.light_group_numbers(depsgraph.view_layer_eval))
         cameras = CameraMotion(engine, frame, shutter, view_names, self._sync.warnings)
-        moved = shutter is not None
         try:
             if moved and shutter.frame_at(motion.CENTER) != now:
                 engine.frame_set(*shutter.frame_at(motion.CENTER))
@@ -126,6 +131,8 @@ class Session:
         finally:
             if moved:
                 engine.frame_set(*now)
+        if not moved:
+            self._synchronised = shown
         return list(cameras.keys.items())
 
     def _commit(self, engine):

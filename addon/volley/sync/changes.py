@@ -11,10 +11,11 @@ import bpy
 
 
 class Changes:
-    """What to look at again. ``full``: everything."""
+    """What to look at again. ``full``: everything, but for meshes where ``keeps_meshes`` says so."""
 
     def __init__(self, full=False):
         self.full = full
+        self.keeps_meshes = False  # those of objects that ``geometry`` does not name are as they were
         self.structure = False   # objects may have appeared, gone, or be hidden
         self.geometry = set()    # names of objects whose mesh may be another
         self.topology = set()    # those of them of which more than the vertices' places may differ
@@ -29,6 +30,16 @@ class Changes:
     def everything(cls):
         """Marks for a first sync or a final render."""
         return cls(full=True)
+
+    @classmethod
+    def since_render(cls, depsgraph):
+        """Marks for a final render that follows another of the same depsgraph, which was still all the
+        while: what Blender names since then, and all but the meshes."""
+        changes = cls(full=True)
+        changes.keeps_meshes = True
+        for update in depsgraph.updates:
+            changes._mark(update)
+        return changes
 
     @classmethod
     def of_depsgraph(cls, depsgraph):
@@ -56,7 +67,7 @@ class Changes:
 
     def geometry_of(self, name):
         """Whether an object's mesh must be read again."""
-        return self.full or name in self.geometry
+        return name in self.geometry or (self.full and not self.keeps_meshes)
 
     def material_of(self, name):
         """Whether a material must be flattened again."""
