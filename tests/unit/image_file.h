@@ -4,6 +4,7 @@
 
 #include <stdio.h>
 #include <stdlib.h>
+#include <unistd.h>
 
 #include "core/core.h"
 #include "image/image.h"
@@ -14,7 +15,8 @@ static char path[256];
 
 static void write_file(const char *name, const void *bytes, size_t size) {
     const char *folder = getenv("TMPDIR");
-    snprintf(path, sizeof path, "%s/trc_test_image_%s", folder ? folder : P_tmpdir, name);
+    snprintf(path, sizeof path, "%s/trc_test_image_%ld_%s", folder ? folder : P_tmpdir,
+             (long)getpid(), name);
     FILE *file = fopen(path, "wb");
     assert_non_null(file);
     assert_int_equal(fwrite(bytes, 1, size, file), size);
