@@ -91,6 +91,23 @@ static const struct trc_part *slot_part(struct tree_check *t, uint32_t slot) {
     return part;
 }
 
+/* A triangle at a key, as a leaf holds it: corners on a line, of meshes at rest, become one point.
+ */
+static void triangle_of(const struct trc_part *part, uint32_t triangle, uint32_t key,
+                        float out[3][3]) {
+    f4 corner[3];
+    double p[3], q[3];
+    trc_part_corners_unplaced(part, part->mesh->indices + 3 * (size_t)triangle, key, corner);
+    for (int i = 0; i < 3; i++) {
+        p[i] = (double)corner[1][i] - corner[0][i];
+        q[i] = (double)corner[2][i] - corner[0][i];
+    }
+    const bool is_line = part->mesh->key_count < 2 && p[1] * q[2] == p[2] * q[1] &&
+                         p[2] * q[0] == p[0] * q[2] && p[0] * q[1] == p[1] * q[0];
+    for (int v = 0; v < 3; v++)
+        f4_store3(out[v], trc_part_point(part, corner[is_line ? 0 : v]));
+}
+
 /* The vertices in a leaf's slot i are those of a triangle of the part, and valid. */
 static bool check_vertices(struct tree_check *t, uint32_t ref, uint32_t i,
                            const struct trc_part *part, uint32_t triangle) {
@@ -98,7 +115,7 @@ static bool check_vertices(struct tree_check *t, uint32_t ref, uint32_t i,
     for (uint32_t key = 0; key < t->tree->key_count; key++) {
         const float *v = trc_leaf_vertices(t->tree, ref, key);
         float triangle_corners[3][3];
-        trc_part_triangle(part, triangle, key, triangle_corners);
+        triangle_of(part, triangle, key, triangle_corners);
         for (uint32_t corner = 0; corner < 3; corner++) {
             const float *expected = triangle_corners[corner];
             float actual[3];

@@ -61,8 +61,9 @@ static inline bool is_on_a_line(const f4 corner[3]) {
     return p[1] * q[2] == p[2] * q[1] && p[2] * q[0] == p[0] * q[2] && p[0] * q[1] == p[1] * q[0];
 }
 
-/* A triangle of a part as it stands in the tree. Corners on a line, which are asked for only where
- * they may be, become one point. */
+/* A triangle of a part as it stands in the tree. Corners on a line (of meshes at rest), which are
+ * asked for only where they may be, become one point, which no ray hits, where rounding would give
+ * them an area. */
 static inline void triangle_place(const struct trc_part *part, bool is_bent, f4 corner[3]) {
     const bool is_line = !is_bent && is_on_a_line(corner);
     for (int v = 0; v < 3; v++)
@@ -90,15 +91,6 @@ static inline void triangles4_load(const struct trc_part *const part[4],
     for (int i = 0; i < 4; i++)
         triangle_place(part[i], is_bent, p[i]);
     triangles4_turn(p, out);
-}
-
-void trc_part_triangle(const struct trc_part *part, uint32_t triangle, uint32_t key,
-                       float out[3][3]) {
-    f4 corner[3];
-    trc_part_corners_unplaced(part, part->mesh->indices + 3 * (size_t)triangle, key, corner);
-    triangle_place(part, part->mesh->key_count > 1, corner);
-    for (int v = 0; v < 3; v++)
-        f4_store3(out[v], corner[v]);
 }
 
 /* ---- leaves ---- */

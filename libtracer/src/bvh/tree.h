@@ -43,11 +43,6 @@ trc_status trc_topology_build(const struct trc_range *all, uint32_t leaf_size,
                               struct trc_topology *out);
 void trc_topology_destroy(struct trc_topology *topology);
 
-/* A triangle at a key, as a leaf holds it: corners on a line (of meshes at rest) become one point,
- * which no ray hits, where rounding would give them an area. */
-void trc_part_triangle(const struct trc_part *part, uint32_t triangle, uint32_t key,
-                       float out[3][3]);
-
 /* A tree of that shape, whose leaves are ranges of count slots, with its vertices, bounds and SAH
  * cost. boxes: at the first slots of clipped leaves what they do not reach beyond, since what their
  * triangles have there stands in other leaves, or NULL. */

@@ -1,6 +1,7 @@
 #define _POSIX_C_SOURCE 200809L
 #include "model/names.h"
 
+#include <stdbool.h>
 #include <string.h>
 
 #include "core/core.h"
@@ -78,10 +79,4 @@ trc_status trc_names_add(struct trc_names *names, const char *name, uint32_t *nu
     memcpy(item->text, name, size + 1);
     *number_out = names->count++;
     return TRC_OK;
-}
-
-uint32_t trc_name_intern(struct trc_names *names, const char *name, bool *ok) {
-    uint32_t number = 0;
-    *ok = trc_names_add(names, name, &number) == TRC_OK;
-    return number;
 }

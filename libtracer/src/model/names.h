@@ -4,7 +4,6 @@
 #ifndef TRACER_MODEL_NAMES_H
 #define TRACER_MODEL_NAMES_H
 
-#include <stdbool.h>
 #include <stdint.h>
 
 #include "tracer/base.h"
@@ -21,8 +20,5 @@ void trc_names_destroy(struct trc_names *names);
 /* The number of a name, which is added if it is new. INVALID_ARGUMENT (NULL), TOO_LARGE (longer
  * than TRC_MAX_NAME_BYTES, too many) or OUT_OF_MEMORY. */
 trc_status trc_names_add(struct trc_names *names, const char *name, uint32_t *number_out);
-
-/* The same; on failure *ok is false, the message is set and 0 is returned. */
-uint32_t trc_name_intern(struct trc_names *names, const char *name, bool *ok);
 
 #endif

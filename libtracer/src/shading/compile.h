@@ -8,6 +8,8 @@
 #ifndef TRACER_SHADING_COMPILE_H
 #define TRACER_SHADING_COMPILE_H
 
+#include <stdbool.h>
+
 #include "model/material.h"
 #include "model/names.h"
 

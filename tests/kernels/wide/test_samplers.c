@@ -391,7 +391,7 @@ static void widths_agree(void **state) {
                         const float f = vf_get(u, n);
                         uint32_t bits;
                         memcpy(&bits, &f, sizeof bits);
-                        sum = trc_hash(sum ^ bits) + d;
+                        sum = (uint32_t)vi_get((vint)vu_hash(vu_set(sum ^ bits)), 0) + d;
                     }
                 }
         printf("%-12s %08x\n", names[k], sum);

@@ -56,9 +56,14 @@ static vfloat wide_sin(vfloat x) { return vf_sin(x); }
 static vfloat wide_cos(vfloat x) { return vf_cos(x); }
 static vfloat wide_tan(vfloat x) { return vf_tan(x); }
 static vfloat wide_exp(vfloat x) { return vf_exp(x); }
-static vfloat wide_exp2(vfloat x) { return vf_exp2(x); }
+static vfloat wide_exp2(vfloat x) { return vf_exp2_split(x, vf_zero()); }
 static vfloat wide_log(vfloat x) { return vf_log(x); }
-static vfloat wide_log2(vfloat x) { return vf_log2(x); }
+/* As vf_pow takes it; the part that floats cannot hold is left out. */
+static vfloat wide_log2(vfloat x) {
+    vfloat high, low;
+    vf_log2_split(vf_max(x, vf_set(1e-45f)), &high, &low);
+    return vf_log_special(x, high);
+}
 static vfloat wide_acos(vfloat x) { return vf_acos(x); }
 static vfloat wide_asin(vfloat x) { return vf_asin(x); }
 static vfloat wide_atan(vfloat x) { return vf_atan(x); }

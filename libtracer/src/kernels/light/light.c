@@ -305,7 +305,7 @@ TRC_INLINE int32_t single_light(const struct trc_light_table *t) {
     return t->bound_count ? t->bounds[0].light : (int32_t)t->distant[0];
 }
 
-void trc_light_prepare(const struct trc_surface *s, vvec3 n, struct trc_light_choices *out) {
+static void prepare(const struct trc_surface *s, vvec3 n, struct trc_light_choices *out) {
     out->p = s->p;
     out->n = n;
     if (s->snapshot->lights->linked) {
@@ -314,13 +314,6 @@ void trc_light_prepare(const struct trc_surface *s, vvec3 n, struct trc_light_ch
     } else {
         trc_candidates_weigh(s->snapshot->lights, out);
     }
-}
-
-void trc_light_sample(const struct trc_surface *s, vvec3 n, vfloat u_select, vfloat u1, vfloat u2,
-                      struct trc_light_sample *out) {
-    struct trc_light_choices choices;
-    trc_light_prepare(s, n, &choices);
-    trc_light_sample_prepared(s, &choices, u_select, u1, u2, out);
 }
 
 void trc_light_sample_world(const struct trc_surface *s, vvec3 n, vfloat u1, vfloat u2,
@@ -335,9 +328,8 @@ void trc_light_sample_world(const struct trc_surface *s, vvec3 n, vfloat u1, vfl
     finish_sample(&d, s->active);
 }
 
-void trc_light_sample_prepared(const struct trc_surface *s, const struct trc_light_choices *choices,
-                               vfloat u_select, vfloat u1, vfloat u2,
-                               struct trc_light_sample *out) {
+static void sample_prepared(const struct trc_surface *s, const struct trc_light_choices *choices,
+                            vfloat u_select, vfloat u1, vfloat u2, struct trc_light_sample *out) {
     const struct trc_snapshot *scene = s->snapshot;
     const struct trc_light_table *t = scene->lights;
     clear_sample(out);
@@ -374,4 +366,11 @@ void trc_light_sample_prepared(const struct trc_surface *s, const struct trc_lig
         limit_sample(&d, lamps);
     if (t->linked)
         link_sample(&d, chosen);
+}
+
+void trc_light_sample(const struct trc_surface *s, vvec3 n, vfloat u_select, vfloat u1, vfloat u2,
+                      struct trc_light_sample *out) {
+    struct trc_light_choices choices;
+    prepare(s, n, &choices);
+    sample_prepared(s, &choices, u_select, u1, u2, out);
 }

@@ -42,20 +42,6 @@ void trc_light_sample(const struct trc_surface *s, vvec3 n, vfloat u_select, vfl
 void trc_light_sample_world(const struct trc_surface *s, vvec3 n, vfloat u1, vfloat u2,
                             struct trc_light_sample *out);
 
-/* The same in two steps, for several samples of one point: what each light may give is computed
- * once. Up to TRC_LIGHT_CHOICES_KEPT lights are remembered, further ones are computed at each
- * sample. */
-#define TRC_LIGHT_CHOICES_KEPT 48
-struct trc_light_choices {
-    vvec3 p, n;
-    vuint sets[2]; /* trc_receiver.sets */
-    vfloat sum;
-    vfloat kept[TRC_LIGHT_CHOICES_KEPT];
-};
-void trc_light_prepare(const struct trc_surface *s, vvec3 n, struct trc_light_choices *out);
-void trc_light_sample_prepared(const struct trc_surface *s, const struct trc_light_choices *choices,
-                               vfloat u_select, vfloat u1, vfloat u2, struct trc_light_sample *out);
-
 /* The chances with which the lanes of m chose their lights. */
 vfloat trc_light_chosen(const struct trc_surface *s, vvec3 n, const struct trc_light_sample *sample,
                         vmask m);

@@ -17,9 +17,21 @@ struct trc_receiver {
     vmask has_n;
     const vuint *sets; /* the bit of its light set, low word first; read where lights are linked */
 };
+
+/* What each light may give to points, each computed once for the choice; of more lights than are
+ * kept the others are computed again. */
+#define TRC_LIGHT_CHOICES_KEPT 48
+struct trc_light_choices {
+    vvec3 p, n;
+    vuint sets[2]; /* trc_receiver.sets */
+    vfloat sum;
+    vfloat kept[TRC_LIGHT_CHOICES_KEPT];
+};
+
 TRC_INLINE struct trc_receiver trc_receiver_make(vvec3 p, vvec3 n) {
     return (struct trc_receiver){.p = p, .n = n, .has_n = vf_gt(v3_dot(n, n), vf_set(0.25f))};
 }
+
 /* What few scenes need stays out of the way of what all do. */
 #define TRC_LINKS static __attribute__((noinline, unused))
 

@@ -224,7 +224,6 @@ TRC_INLINE vfloat vf_exp2_split(vfloat x, vfloat low) {
     const vfloat f = (clamped - n) + low;
     return vf_scale_by_power(vf_exp_core(f * vf_set(0.693147180559945f)), vf_to_int(n));
 }
-TRC_INLINE vfloat vf_exp2(vfloat x) { return vf_exp2_split(x, vf_zero()); }
 
 /* x = m * 2^e with m in [sqrt(1/2), sqrt(2)), for normal and denormal x > 0. */
 TRC_INLINE vfloat vf_split_exponent(vfloat x, vfloat *e) {
@@ -302,11 +301,6 @@ TRC_INLINE void vf_log2_split(vfloat x, vfloat *high, vfloat *low) {
     *high = sum + (sum_low + rest);
     *low = (sum - *high) + (sum_low + rest);
 }
-TRC_INLINE vfloat vf_log2(vfloat x) {
-    vfloat high, low;
-    vf_log2_split(vf_max(x, vf_set(1e-45f)), &high, &low);
-    return vf_log_special(x, high);
-}
 /* x^y for x >= 0, 4 ulp; 0^y is 0 for y > 0, 1 for y == 0, infinite for y < 0. Negative x is
  * NaN. */
 TRC_INLINE vfloat vf_pow(vfloat x, vfloat y) {
@@ -369,13 +363,6 @@ TRC_INLINE vuint vu_hash(vuint x) {
     x *= vu_set(0x21f0aaadu);
     x ^= x >> 15;
     x *= vu_set(0xd35a2d97u);
-    return x ^ (x >> 15);
-}
-TRC_INLINE uint32_t trc_hash(uint32_t x) {
-    x ^= x >> 16;
-    x *= 0x21f0aaadu;
-    x ^= x >> 15;
-    x *= 0xd35a2d97u;
     return x ^ (x >> 15);
 }
 TRC_INLINE vuint vu_hash2(vuint a, vuint b) {
