@@ -169,14 +169,23 @@ def _write(path, text):
         path.write_text(text)
 
 
+def files():
+    """All files that the copy has, too."""
+    names = [ROOT / name for name in COPIED]
+    return [path for name in names for path in ([name] if name.is_file() else name.rglob("*"))
+            if path.is_file() and "__pycache__" not in path.parts]
+
+
+def texts_of(paths):
+    """{path: text} of those in which faults may be."""
+    return {path: path.read_text() for path in paths if path.suffix in {".c", ".h", ".cpp", ".py"}
+            and any(path.is_relative_to(ROOT / folder) for folder in (LIBRARY, ADDON))}
+
+
 def make(target):
     """Make or bring up to date the copy in the folder target."""
-    names = [ROOT / name for name in COPIED]
-    sources = [path for name in names for path in ([name] if name.is_file() else name.rglob("*"))
-               if path.is_file() and "__pycache__" not in path.parts]
-    texts = {path: path.read_text() for path in sources if path.suffix in {".c", ".h", ".cpp", ".py"}
-             and any(path.is_relative_to(ROOT / folder) for folder in (LIBRARY, ADDON))}
-    changed = planted(texts)
+    sources = files()
+    changed = planted(texts_of(sources))
     header = target / LIBRARY / "core/fault.h"
     made = {header: HEADER, target / LIBRARY / "core/fault.c": SOURCE, target / ADDON / "fault.py": MODULE}
     options = "add_library(tracer_options INTERFACE)"
