@@ -89,7 +89,8 @@ def inside_veil():
 
 
 def inside_film():
-    """A transparent film by Volley, Volley's Whitted and Cycles: a portal to the sky, one to a wall."""
+    """A transparent film by Volley, Volley's Whitted and Cycles: a portal to the sky, one to a wall
+    that shines by the count of portals."""
     import bpy
     import scenes
     scenes.empty(size=(32, 16))
@@ -99,7 +100,11 @@ def inside_film():
                                                                    offset=(0.0, 0.0, 9.0)))
     scenes.wall("Door", y=0.0, center=(1.0, 0.0), material=_portal("Door", (0.5, 0.5, 0.5),
                                                                    offset=(0.0, 9.0, 0.0)))
-    scenes.wall("Wall", y=10.0, center=(1.0, 0.0), material=scenes.emitter((1.0, 0.5, 0.25)))
+    shining = scenes.emitter((1.0, 0.5, 0.25))
+    scenes.wall("Wall", y=10.0, center=(1.0, 0.0), material=shining)
+    depth = shining.node_tree.nodes.new("ShaderNodeLightPath").outputs.get("Portal Depth")
+    if depth is not None:  # from Blender 5 on; it is 1 there
+        shining.node_tree.links.new(depth, scenes.shader_of(shining).inputs["Strength"])
     scenes.sharpen()
     scenes.set_engine('VOLLEY', 1)
     bpy.context.scene.volley.integrator = 'WHITTED'

@@ -502,13 +502,13 @@ _NORMAL_MAP_FLAGS = ((NormalMapFlags.SCALED if SCALES_NORMAL_MAPS else 0)
 
 _LIGHT_PATH = ("Is Camera Ray", "Is Shadow Ray", "Is Diffuse Ray", "Is Glossy Ray", "Is Singular Ray",
                "Is Reflection Ray", "Is Transmission Ray", "Ray Length", "Ray Depth", "Diffuse Depth",
-               "Glossy Depth", "Transparent Depth", "Transmission Depth")
+               "Glossy Depth", "Transparent Depth", "Transmission Depth", "Portal Depth")
 
 
 def _light_path(walker, _node, _sockets):
-    """No ray is scattered by a volume or led by a portal."""
+    """No ray is scattered by a volume."""
     outputs = named_outputs(walker.emit(NodeType.LIGHT_PATH, ()), NodeType.LIGHT_PATH, _LIGHT_PATH)
-    return {**outputs, "Is Volume Scatter Ray": _constant('f', 0.0), "Portal Depth": _constant('f', 0.0)}
+    return {**outputs, "Is Volume Scatter Ray": _constant('f', 0.0)}
 
 
 def _normal_map(walker, node, sockets):

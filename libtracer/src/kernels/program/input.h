@@ -579,6 +579,8 @@ static vfloat op_light_path(const struct trc_surface *s, uint32_t output) {
         return vi_to_float(s->transparent_depth);
     case TRC_OUTPUT_OF(LIGHT_PATH, transmission_depth):
         return vi_to_float(s->transmission_depth);
+    case TRC_OUTPUT_OF(LIGHT_PATH, portal_depth):
+        return vi_to_float((vint)(s->path >> TRC_PATH_PORTALS_SHIFT & vu_set(TRC_PATH_PORTALS)));
     default:
         return vf_zero();
     }

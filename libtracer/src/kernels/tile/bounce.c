@@ -35,7 +35,13 @@ static void ray_push(struct trc_tile *t, const struct arrival *a, const struct t
     const vvec3 weight = v3_mul(v3_select(straight, a->found_weight, a->weight), b->weight);
     const vfloat indirect_scale = vf_select(straight, a->indirect_scale, b->indirect_scale);
     vfloat back = t->looks_back ? trc_spawn_look_back(s, o, b->wi, a->t) : vf_set(0.0f);
+    vuint same_path = a->path;
     if (vm_any(b->through_portal)) {
+        const vuint full = vu_set(TRC_PATH_PORTALS << TRC_PATH_PORTALS_SHIFT);
+        const vmask counts =
+            vm_andnot(b->through_portal, vi_eq((vint)(a->path & full), (vint)full));
+        same_path =
+            a->path + (vuint)vi_select(counts, vi_set(1 << TRC_PATH_PORTALS_SHIFT), vi_set(0));
         o = v3_select(b->through_portal, b->origin, o);
         back = vf_where(vm_not(b->through_portal), back);
     }
@@ -77,9 +83,10 @@ static void ray_push(struct trc_tile *t, const struct arrival *a, const struct t
     kind = kind | (vuint)vi_select(b->diffuse, vi_set(TRC_VISIBLE_DIFFUSE), vi_set(0));
     kind = kind | (vuint)vi_select(first, own, (vint)category);
     kind = kind |
-           (a->path & vu_set(TRC_PATH_DATA_DONE | TRC_PATH_FEATURES_DONE | TRC_VISIBLE_UNBLOCKED)) |
+           (a->path & vu_set(TRC_PATH_DATA_DONE | TRC_PATH_FEATURES_DONE | TRC_VISIBLE_UNBLOCKED |
+                             TRC_PATH_PORTALS << TRC_PATH_PORTALS_SHIFT)) |
            vu_set(a->world_alone ? TRC_PATH_WORLD_ALONE : 0);
-    vuint path = (vuint)vi_select(transparent, (vint)a->path, (vint)kind);
+    vuint path = (vuint)vi_select(transparent, (vint)same_path, (vint)kind);
     path = path | (vuint)vi_select(over, vi_set(TRC_PATH_LAST), vi_set(0));
 
     vfloat path_length = vf_set(0.0f);

@@ -12,8 +12,10 @@ enum {
     TRC_PATH_SINGULAR = 1 << 8,                /* last bounce was ideal */
     TRC_PATH_REFLECTED = 1 << 9,               /* last bounce was a reflection */
     TRC_PATH_TRANSPARENT_BACKGROUND = 1 << 10, /* only ideal straight-through so far: film alpha */
-    TRC_PATH_WORLD_ALONE = 1 << 11 /* no light sample of the world was taken at the last bounce */
+    TRC_PATH_WORLD_ALONE = 1 << 11, /* no light sample of the world was taken at the last bounce */
+    TRC_PATH_PORTALS_SHIFT = 20     /* how many portals it went through, 3 bits, saturating */
 };
+#define TRC_PATH_PORTALS 7u
 
 /* In place of an instance's number: a world lookup, and the first lamp, below which others follow.
  */
