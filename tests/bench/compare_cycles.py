@@ -32,7 +32,8 @@ SETUPS_FILE = pathlib.Path(scene_setups.__file__).resolve()
 PROJECT = SETUPS_FILE.parents[2]
 REFERENCE_SEED = 1
 FIRST_REPEAT_SEED = 101
-BLENDER_TIME = re.compile(r"^ ?Time: ([\d:.]+) \(Saving: ([\d:.]+)\)", re.MULTILINE)
+# Blender 5 has the time and "render |" before it.
+BLENDER_TIME = re.compile(r"^(?:.*\|)? ?Time: ([\d:.]+) \(Saving: ([\d:.]+)\)", re.MULTILINE)
 
 
 # Running Blender -------------------------------------------------------------------------------
@@ -54,6 +55,8 @@ def parse_render_time(log):
 
     >>> parse_render_time("Saved: 'x.exr'\\n Time: 00:01.50 (Saving: 00:00.25)\\n")
     1.25
+    >>> parse_render_time("00:01.314  render           | Time: 00:00.75 (Saving: 00:00.25)\\n")
+    0.5
     """
     found = BLENDER_TIME.findall(log)
     if not found:

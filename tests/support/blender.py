@@ -65,6 +65,7 @@ class Blender:
     def __init__(self, folder=None):
         self.folder = folder or tempfile.mkdtemp(prefix="volley_")
         self.output = ""
+        self.options = []  # of the command line, for run()
 
     def command(self, *arguments):
         """Run Blender with these arguments; the finished process, whatever its exit code."""
@@ -85,7 +86,7 @@ class Blender:
         module = os.path.abspath(sys.modules[function.__module__].__file__)
         with open(request, "wb") as file:
             pickle.dump((module, function.__name__, arguments, answer), file)
-        return answer, [executable(), "-b", "--factory-startup", "--addons", "volley",
+        return answer, [executable(), "-b", "--factory-startup", "--addons", "volley", *self.options,
                         "--python-exit-code", "3", "--python", os.path.abspath(__file__), "--", request]
 
     def _answer(self, path, process):
