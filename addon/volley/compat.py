@@ -23,7 +23,8 @@ SPOT_IS_EVEN = bpy.app.version >= (4, 0, 0)
 # 4.3, not in 3.4.
 LIGHT_UV_IS_LOCAL = bpy.app.version >= (4, 0, 0)
 
-# They have object space too; seen in 5.2, not in 4.3.
+# They are objects: with object space and, where they are instanced, the switches of what makes the instances;
+# seen in 5.2, not in 4.3.
 LIGHT_IS_OBJECT = bpy.app.version >= (5, 0, 0)
 
 # A sun is as bright all over its disc; seen in 4.3, not in 3.4.

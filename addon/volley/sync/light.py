@@ -33,7 +33,7 @@ def describe(light_object, item, materials, warnings):
         "color": _color(light),
         "strength": light.energy * 2.0 ** getattr(light, "exposure", 0.0) * _own_power(light, item),
         "spread": math.pi, "spot_angle": math.pi,
-        "visibility": light_visibility(light_object),
+        "visibility": light_visibility(light_object, item),
         "light_group": item.light_group,
         "light_exclude": item.links.light_exclude,
         "shadow_exclude": item.links.shadow_exclude,

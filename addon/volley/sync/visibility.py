@@ -2,6 +2,7 @@
 """Which rays see an object: Blender's ray visibility switches as the library's bits."""
 
 from ..abi import VisibleRays
+from ..compat import LIGHT_IS_OBJECT
 
 # Plain numbers: these are put together for every object, and flags of Python's are slow at it.
 _CAMERA, _SHADOW = int(VisibleRays.CAMERA), int(VisibleRays.SHADOW)
@@ -21,9 +22,10 @@ def object_visibility(blender_object):
     return sum(bit for name, bit in _OBJECT_BITS if getattr(blender_object, name))
 
 
-def light_visibility(light_object):
-    """VisibleRays of a light, its own also where it is instanced; shadow rays do not apply."""
-    return object_visibility(light_object) | _SHADOW
+def light_visibility(light_object, item):
+    """VisibleRays of a light that is described as an item: as of any instance, before Blender 5 its own; shadow
+    rays do not apply."""
+    return (item.visibility if LIGHT_IS_OBJECT else object_visibility(light_object)) | _SHADOW
 
 
 def world_visibility(world):
