@@ -29,7 +29,6 @@ struct tree_check {
     uint8_t *seen;          /* triangles found in leaves */
     uint64_t seen_count;
     uint64_t *covered; /* trees with pieces: points of each triangle in the boxes of its leaves */
-    bool transparent;
 };
 
 __attribute__((format(printf, 2, 3))) static bool complain(struct checker *c, const char *format,
@@ -86,8 +85,6 @@ static const struct trc_part *slot_part(struct tree_check *t, uint32_t slot) {
                  part->mesh->triangle_count);
         return NULL;
     }
-    if (word & TRC_SLOT_TRANSPARENT)
-        t->transparent = true;
     return part;
 }
 
@@ -432,8 +429,6 @@ static bool check_absent(struct tree_check *t, uint32_t part_count) {
                         (unsigned long long)t->seen_count, (unsigned long long)absent,
                         (unsigned long long)t->tree->triangle_count,
                         (unsigned long long)t->tree->skipped_count);
-    if (t->tree->has_transparent != t->transparent)
-        return complain(t->checker, "%s: has_transparent is %d", t->name, t->tree->has_transparent);
     return true;
 }
 

@@ -5,7 +5,7 @@
 /* A floor under a roof, a sun above, and what is edited of them. */
 struct edited {
     trc_scene scene;
-    trc_id roof, world, image;
+    trc_id roof, roof_mesh, world, image;
 };
 
 static trc_material_desc node_material(struct node_list *list, uint32_t type, float value) {
@@ -48,6 +48,28 @@ static trc_id add_sky_material(trc_scene scene, trc_id image) {
     return level_material(scene, &list, surface, 0);
 }
 
+static trc_id add_quad_mesh(trc_scene scene, const float corners[12]) {
+    static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
+    trc_mesh_desc desc = default_mesh_desc();
+    trc_id mesh = 0;
+    desc.vertex_count = 4;
+    desc.triangle_count = 2;
+    desc.positions = corners;
+    desc.position_count = 12;
+    desc.indices = indices;
+    desc.index_count = 6;
+    assert_ok(trc_mesh_create(scene, &desc, &mesh));
+    return mesh;
+}
+
+static void add_instance(trc_scene scene, trc_id mesh, trc_id material) {
+    trc_instance_desc desc = default_instance_desc(mesh);
+    trc_id id = 0;
+    desc.materials = &material;
+    desc.material_count = 1;
+    assert_ok(trc_instance_create(scene, &desc, &id));
+}
+
 /* roof, value: of its material; bright: the sky's texel. */
 static struct edited edited_make(uint32_t roof, float value, uint32_t bright) {
     struct edited e = {.scene = fixture_level_view()};
@@ -56,7 +78,8 @@ static struct edited edited_make(uint32_t roof, float value, uint32_t bright) {
     assert_ok(trc_material_create(e.scene, &roof_desc, &e.roof));
     fixture_level(e.scene, 20.0f, 0.0f, fixture_material(e.scene, TRC_NODE_DIFFUSE, 0.5f));
     static const float corners[12] = {1, -1, 3, 2, -1, 3, 2, 1, 3, 1, 1, 3};
-    fixture_quad(e.scene, corners, e.roof);
+    e.roof_mesh = add_quad_mesh(e.scene, corners);
+    add_instance(e.scene, e.roof_mesh, e.roof);
     trc_light_desc sun = default_light_desc();
     trc_id id = 0;
     sun.type = TRC_LIGHT_SUN;
@@ -113,6 +136,33 @@ static void materials_change(void **state) {
     }
 }
 
+static trc_scene_stats stats_of(trc_scene scene) {
+    trc_scene_stats stats = {.struct_size = sizeof stats};
+    assert_ok(trc_scene_get_stats(scene, &stats));
+    return stats;
+}
+
+/* Trees whose leaves say what is transparent stay while that does, and are refitted. */
+static void trees_of_transparent_meshes_stay(void **state) {
+    (void)state;
+    static const float moved[12] = {1.5f, -1, 3, 3, -1, 3, 3, 1, 2, 1.5f, 1, 2};
+    static float before[4 * LEVEL_PIXELS];
+    const struct edited e = edited_make(TRC_NODE_TRANSPARENT, 0.5f, 40);
+    const struct edited fresh = edited_make(TRC_NODE_TRANSPARENT, 0.5f, 40);
+    draw(e.scene, before);
+    assert_int_equal(stats_of(e.scene).built_count, 2);
+    fixture_quad(e.scene, moved, e.roof);
+    assert_ok(trc_scene_commit(e.scene));
+    assert_int_equal(stats_of(e.scene).built_count, 1); /* the new one */
+    assert_ok(trc_mesh_update(e.scene, e.roof_mesh, 1, moved, 12, NULL, 0));
+    assert_ok(trc_scene_commit(e.scene));
+    assert_int_equal(stats_of(e.scene).built_count, 0);
+    assert_int_equal(stats_of(e.scene).refitted_count, 1);
+    assert_ok(trc_mesh_update(fresh.scene, fresh.roof_mesh, 1, moved, 12, NULL, 0));
+    fixture_quad(fresh.scene, moved, fresh.roof);
+    expect_same(&e, &fresh, before);
+}
+
 /* The image goes and the world is magenta; its map then is that of an even one. */
 static void images_of_the_world_change(void **state) {
     (void)state;
@@ -128,6 +178,7 @@ static void images_of_the_world_change(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(materials_change),
+        cmocka_unit_test(trees_of_transparent_meshes_stay),
         cmocka_unit_test(images_of_the_world_change),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

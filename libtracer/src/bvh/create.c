@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "bvh/bvh.h"
+#include "bvh/former.h"
 #include "bvh/refs.h"
 #include "bvh/thin.h"
 #include "bvh/tree.h"
@@ -29,6 +30,9 @@ struct create_job {
     uint8_t *joined;      /* per instance: part of the joined tree */
     uint8_t *transparent; /* per material slot over all instances */
     uint32_t *first_slot; /* per instance */
+    /* The instances of each mesh: the first, and after each the next; TRC_NO_HIT ends them. */
+    uint32_t *first_user, *next_user;
+    struct trc_former former;
 };
 
 /* One tree over parts of one key count. clips: they are at rest, and it is never refitted, which
@@ -80,6 +84,7 @@ void trc_blas_release(struct trc_blas *blas) {
     if (!blas || atomic_fetch_sub(&blas->refs, 1) != 1)
         return;
     trc_tree_destroy(&blas->tree);
+    trc_free(blas->transparent);
     trc_free(blas);
 }
 
@@ -89,15 +94,13 @@ static trc_status mesh_slots(const struct create_job *job, uint32_t mesh, uint8_
                              uint32_t *count_out) {
     const struct trc_snapshot *s = job->snapshot;
     uint32_t count = 0;
-    for (uint32_t i = 0; i < s->instance_count; i++)
-        if (s->instances[i].mesh == mesh && s->instances[i].material_count > count)
+    for (uint32_t i = job->first_user[mesh]; i != TRC_NO_HIT; i = job->next_user[i])
+        if (s->instances[i].material_count > count)
             count = s->instances[i].material_count;
     uint8_t *slots = trc_alloc_zeroed(count ? count : 1, 1);
     if (!slots)
         return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for material slots");
-    for (uint32_t i = 0; i < s->instance_count; i++) {
-        if (s->instances[i].mesh != mesh)
-            continue;
+    for (uint32_t i = job->first_user[mesh]; i != TRC_NO_HIT; i = job->next_user[i]) {
         const uint32_t last = s->instances[i].material_count - 1;
         for (uint32_t slot = 0; slot < count; slot++)
             slots[slot] |= job->transparent[job->first_slot[i] + (slot < last ? slot : last)];
@@ -107,16 +110,32 @@ static trc_status mesh_slots(const struct create_job *job, uint32_t mesh, uint8_
     return TRC_OK;
 }
 
-static bool slots_match(const struct trc_tree *tree, const uint8_t *slots, uint32_t count) {
-    bool any = false;
-    for (uint32_t i = 0; i < count; i++)
-        any = any || slots[i];
-    return !any && !tree->has_transparent; /* else rebuilt: flags are in the leaves */
+/* The slots as a tree keeps them: none where none is transparent. */
+static uint32_t transparent_count_of(const uint8_t *slots, uint32_t count) {
+    return count && memchr(slots, 1, count) ? count : 0;
+}
+
+/* Whether a tree has the same slots for transparent, as flags are in its leaves. */
+static bool slots_match(const struct trc_blas *blas, const uint8_t *slots, uint32_t count) {
+    count = transparent_count_of(slots, count);
+    return blas->transparent_count == count &&
+           (count == 0 || memcmp(blas->transparent, slots, count) == 0);
+}
+
+static trc_status slots_keep(struct trc_blas *blas, const uint8_t *slots, uint32_t count) {
+    blas->transparent_count = transparent_count_of(slots, count);
+    if (blas->transparent_count == 0)
+        return TRC_OK;
+    blas->transparent = trc_alloc(count, 1);
+    if (!blas->transparent)
+        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for material slots");
+    memcpy(blas->transparent, slots, count);
+    return TRC_OK;
 }
 
 /* The tree of a mesh: the former one, a refit of it, or a new one. */
 static trc_status blas_obtain(struct create_job *job, uint32_t mesh_index,
-                              const struct trc_bvh *previous, struct trc_mesh *const *replaced) {
+                              struct trc_mesh *const *replaced) {
     const struct trc_mesh *mesh = job->snapshot->meshes[mesh_index];
     const struct trc_mesh *source = replaced && replaced[mesh_index] ? replaced[mesh_index] : mesh;
     uint8_t *slots = NULL;
@@ -124,12 +143,12 @@ static trc_status blas_obtain(struct create_job *job, uint32_t mesh_index,
     trc_status status = mesh_slots(job, mesh_index, &slots, &slot_count);
     if (status != TRC_OK)
         return status;
-    struct trc_blas *from = NULL;
-    for (uint32_t i = 0; previous && i < previous->blas_count && !from; i++)
-        if (previous->blas[i] && previous->blas[i]->mesh == source &&
-            slots_match(&previous->blas[i]->tree, slots, slot_count))
-            from = previous->blas[i];
-    if (from && job->options->rebuilt && job->options->rebuilt[mesh_index])
+    struct trc_blas *from = trc_former_find(&job->former, source);
+    if (from && !slots_match(from, slots, slot_count))
+        from = NULL;
+    /* Those that are built apart know no slots. */
+    const bool apart = from && from->transparent_count == 0;
+    if (apart && job->options->rebuilt && job->options->rebuilt[mesh_index])
         from = job->options->rebuilt[mesh_index];
     if (from && from->mesh == mesh) {
         atomic_fetch_add(&from->refs, 1);
@@ -146,9 +165,11 @@ static trc_status blas_obtain(struct create_job *job, uint32_t mesh_index,
     blas->mesh = mesh;
     const struct trc_part part = {mesh, 0, NULL, slots, slot_count};
     bool done = false;
-    const float growth = job->options->keeps_grown ? REBUILD_GROWTH_AT_ONCE : REBUILD_GROWTH;
+    const float growth =
+        job->options->keeps_grown && apart ? REBUILD_GROWTH_AT_ONCE : REBUILD_GROWTH;
+    status = slots_keep(blas, slots, slot_count);
     /* A skipped triangle may have become valid and the other way round: then the shape is stale. */
-    if (from && from->tree.skipped_count == 0) {
+    if (from && from->tree.skipped_count == 0 && status == TRC_OK) {
         status = trc_tree_refit(&from->tree, &part, mesh->key_count, job->pool,
                                 job->options->cancel, &blas->tree);
         blas->tree.triangle_count = from->tree.triangle_count;
@@ -182,7 +203,7 @@ static struct trc_thin *thin_previous(const struct create_job *job, uint32_t num
         return NULL;
     struct trc_thin *thin = previous->thin[number];
     if (!thin || !trc_thin_is_of(thin, instance, job->snapshot->meshes[instance->mesh]) ||
-        !slots_match(&thin->blas.tree, slots, instance->material_count))
+        !slots_match(&thin->blas, slots, instance->material_count))
         return NULL;
     atomic_fetch_add(&thin->blas.refs, 1);
     return thin;
@@ -200,6 +221,8 @@ static trc_status thin_build(struct create_job *job, uint32_t number, const uint
         status = trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for a tree");
     const struct trc_part part = {&placed, 0, NULL, slots, instance->material_count};
     if (thin)
+        status = slots_keep(&thin->blas, slots, instance->material_count);
+    if (thin && status == TRC_OK)
         status = tree_build(job, &part, 1, placed.key_count, false, &thin->blas.tree);
     trc_free(placed.positions);
     if (status == TRC_OK)
@@ -226,7 +249,8 @@ static trc_status thin_obtain(struct create_job *job, uint32_t number,
 
 bool trc_bvh_has_grown(const struct trc_bvh *bvh, uint32_t mesh) {
     const struct trc_blas *blas = bvh->blas[mesh];
-    return blas && blas->tree.sah_cost > REBUILD_GROWTH * blas->built_cost;
+    return blas && blas->transparent_count == 0 &&
+           blas->tree.sah_cost > REBUILD_GROWTH * blas->built_cost;
 }
 
 trc_status trc_blas_build(const struct trc_mesh *mesh, struct trc_pool *pool,
@@ -421,10 +445,29 @@ static trc_status slots_collect(struct create_job *job) {
     return TRC_OK;
 }
 
+static trc_status users_collect(struct create_job *job) {
+    const struct trc_snapshot *s = job->snapshot;
+    job->first_user = trc_alloc(s->mesh_count ? s->mesh_count : 1, sizeof *job->first_user);
+    job->next_user = trc_alloc(s->instance_count ? s->instance_count : 1, sizeof *job->next_user);
+    if (!job->first_user || !job->next_user)
+        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for %u instances", s->instance_count);
+    for (uint32_t mesh = 0; mesh < s->mesh_count; mesh++)
+        job->first_user[mesh] = TRC_NO_HIT;
+    for (uint32_t i = 0; i < s->instance_count; i++) {
+        job->next_user[i] = job->first_user[s->instances[i].mesh];
+        job->first_user[s->instances[i].mesh] = i;
+    }
+    return TRC_OK;
+}
+
 static trc_status trees_build(struct create_job *job, const struct trc_bvh *previous,
                               struct trc_mesh *const *replaced) {
     const struct trc_snapshot *s = job->snapshot;
     trc_status status = slots_collect(job);
+    if (status == TRC_OK)
+        status = users_collect(job);
+    if (status == TRC_OK)
+        status = trc_former_open(previous, &job->former);
     if (status == TRC_OK) {
         join_select(job);
         status = joined_build(job);
@@ -436,13 +479,16 @@ static trc_status trees_build(struct create_job *job, const struct trc_bvh *prev
         if (instance->is_thin)
             status = thin_obtain(job, i, previous);
         else if (!job->bvh->blas[instance->mesh])
-            status = blas_obtain(job, instance->mesh, previous, replaced);
+            status = blas_obtain(job, instance->mesh, replaced);
     }
     if (status == TRC_OK)
         status = top_build(job);
     trc_free(job->joined);
     trc_free(job->transparent);
     trc_free(job->first_slot);
+    trc_free(job->first_user);
+    trc_free(job->next_user);
+    trc_former_close(&job->former);
     return status;
 }
 

@@ -274,7 +274,6 @@ trc_status trc_tree_fill(const struct trc_topology *topology,
                             .tree = tree,
                             .cancel = cancel};
     const trc_status filled = tree_fill(&fill, pool);
-    tree->has_transparent = fill.transparent;
     if (filled != TRC_OK)
         trc_tree_destroy(tree);
     return filled;
@@ -295,7 +294,6 @@ trc_status trc_tree_refit(const struct trc_tree *from, const struct trc_part *pa
     if (status != TRC_OK)
         return status;
     tree->root = from->root;
-    tree->has_transparent = from->has_transparent;
     struct trc_fill fill = {
         .from = from, .parts = part, .tree = tree, .known = from->slot_vertices, .cancel = cancel};
     tree->slot_vertices = from->slot_vertices;

@@ -112,8 +112,6 @@ static void slot_fill(struct trc_fill *fill, uint32_t slot) {
     const uint32_t triangle = fill->triangles[slot].triangle;
     const struct trc_part *part = slot_part(fill, slot);
     const bool transparent = part_is_transparent(part, triangle);
-    if (transparent)
-        atomic_store_explicit(&fill->transparent, true, memory_order_relaxed);
     fill->tree->slots->slots[slot] =
         (struct trc_slot){part->instance | (transparent ? TRC_SLOT_TRANSPARENT : 0u), triangle};
 }

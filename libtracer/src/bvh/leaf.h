@@ -18,7 +18,7 @@ struct trc_fill {
     const atomic_uint *cancel;             /* may be NULL */
     uint8_t *pending;                      /* per node: its box waits for nodes of other tasks */
     double *area_sums;                     /* per task: areas of the boxes that it set */
-    atomic_bool transparent, spoiled;      /* spoiled: a coordinate is not finite */
+    atomic_bool spoiled;                   /* a coordinate is not finite */
 };
 
 /* What of a leaf does not depend on the key: what a new tree's slots stand for, what a refit learns

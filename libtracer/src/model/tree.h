@@ -85,7 +85,6 @@ struct trc_tree {
     struct trc_slot_vertices *slot_vertices; /* shared by refits of one tree; or NULL */
     const struct trc_item *items;            /* TLAS only, by slot */
     bool is_top;
-    bool has_transparent;     /* some slot has TRC_SLOT_TRANSPARENT */
     bool has_pieces;          /* a triangle may stand in several leaves (bvh/clip.h) */
     float lower[3], upper[3]; /* over all keys; lower > upper when empty */
     float extent;             /* largest |coordinate| of the bounds: scale of rounding errors */
@@ -101,6 +100,9 @@ struct trc_blas {
         *mesh;        /* identity only: compared while the snapshot that holds it lives */
     float built_cost; /* SAH cost when last built, to judge refits */
     struct trc_tree tree;
+    /* Per material slot whether the tree has it as transparent to shadow rays; NULL and 0: none. */
+    uint8_t *transparent;
+    uint32_t transparent_count;
 };
 
 /* The tree of a thin instance, in world space. */
