@@ -17,18 +17,19 @@ static uint32_t common_keys(uint32_t a, uint32_t b) {
 static double between(double a, double b, double f) { return a + f * (b - a); }
 
 /* Row-major, 3x4. */
-static void transform_at(const struct trc_instance *instance, float time, double m[12]) {
+static void transform_at(const struct trc_instance *instance, float time,
+                         double m[TRC_AFFINE_FLOATS]) {
     uint32_t key;
     float f;
     trc_key_at(time, instance->key_count, &key, &f);
     const float *a = instance->object_to_world[key].m;
     const float *b = instance->object_to_world[key + (instance->key_count > 1)].m;
-    for (int i = 0; i < 12; i++)
+    for (int i = 0; i < TRC_AFFINE_FLOATS; i++)
         m[i] = between(a[i], b[i], f);
 }
 
-static void place_vertices(const struct trc_mesh *mesh, float time, const double m[12],
-                           float *positions) {
+static void place_vertices(const struct trc_mesh *mesh, float time,
+                           const double m[TRC_AFFINE_FLOATS], float *positions) {
     uint32_t key;
     float f;
     trc_key_at(time, mesh->key_count, &key, &f);
@@ -53,7 +54,7 @@ trc_status trc_thin_mesh(const struct trc_instance *instance, const struct trc_m
         return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for a flat mesh");
     for (uint32_t key = 0; key < key_count; key++) {
         const float time = key_count > 1 ? (float)key / (float)(key_count - 1) : 0.0f;
-        double m[12];
+        double m[TRC_AFFINE_FLOATS];
         transform_at(instance, time, m);
         place_vertices(mesh, time, m, positions + per_key * key);
     }

@@ -56,8 +56,9 @@ static inline int trc_point_is_valid(const float p[3]) {
 }
 
 /* A 3x4 matrix, rows. */
+#define TRC_AFFINE_FLOATS 12
 struct trc_affine {
-    float m[12];
+    float m[TRC_AFFINE_FLOATS];
 };
 
 /* Visibility beside TRC_VISIBLE_*. Unblocked rays find the light that would be there if nothing but

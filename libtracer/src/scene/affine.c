@@ -47,14 +47,14 @@ const struct trc_affine trc_affine_identity = {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1,
 
 bool trc_affine_is_identity(const struct trc_affine *a) {
     bool same = true;
-    for (int i = 0; i < 12; i++)
+    for (int i = 0; i < TRC_AFFINE_FLOATS; i++)
         same = same && a->m[i] == trc_affine_identity.m[i]; /* -0, too */
     return same;
 }
 
 bool trc_affine_is_finite(const struct trc_affine *a) {
     bool finite = true;
-    for (int i = 0; i < 12; i++)
+    for (int i = 0; i < TRC_AFFINE_FLOATS; i++)
         finite = finite && isfinite(a->m[i]);
     return finite;
 }
@@ -104,7 +104,7 @@ static bool invert(const struct columns *c, struct trc_affine *inverse_out) {
         }
         inverse.m[4 * row + 3] = (float)(-dot(rows[row], c->origin) / volume);
     }
-    for (int i = 0; i < 12; i++)
+    for (int i = 0; i < TRC_AFFINE_FLOATS; i++)
         usable = usable && isfinite(inverse.m[i]);
     if (usable)
         *inverse_out = inverse;

@@ -107,7 +107,7 @@ static trc_status invert_keys(struct trc_camera *camera) {
         trc_key_at(0.5f * (float)i, camera->key_count, &key, &f);
         const float *a = keys[key].m, *b = keys[key + (camera->key_count > 1)].m;
         struct trc_affine between;
-        for (int k = 0; k < 12; k++)
+        for (int k = 0; k < TRC_AFFINE_FLOATS; k++)
             between.m[k] = a[k] + f * (b[k] - a[k]);
         if (!trc_affine_invert(&between, &camera->world_to_camera[i]) &&
             !trc_affine_invert(&keys[key], &camera->world_to_camera[i])) {
@@ -130,7 +130,7 @@ static trc_status fill_camera(struct trc_camera *camera, const trc_camera_desc *
     for (uint32_t key = 0; key < desc->key_count; key++) {
         struct trc_affine given;
         float volume;
-        memcpy(given.m, desc->transforms + (size_t)12 * key, sizeof given.m);
+        memcpy(given.m, desc->transforms + (size_t)TRC_AFFINE_FLOATS * key, sizeof given.m);
         if (!trc_affine_make_unit(&given, &camera->camera_to_world[key], &volume)) {
             return trc_fail(TRC_ERROR_INVALID_ARGUMENT,
                             "the camera's transform at key %u is singular or not finite", key);

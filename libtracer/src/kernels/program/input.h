@@ -360,12 +360,12 @@ static vvec3 op_object_normal(const struct trc_surface *s) {
 static void load_camera_to_world(const struct trc_snapshot *snapshot, struct trc_wide_affine *m) {
     const struct trc_camera *camera = &snapshot->camera;
     uint32_t key = 0;
-    float f = 0.0f, e[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+    float f = 0.0f, e[TRC_AFFINE_FLOATS] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     if (snapshot->has_camera) {
         trc_key_at(0.5f, camera->key_count, &key, &f);
         const float *a = camera->camera_to_world[key].m;
         const float *b = camera->camera_to_world[key + (camera->key_count > 1)].m;
-        for (int i = 0; i < 12; i++)
+        for (int i = 0; i < TRC_AFFINE_FLOATS; i++)
             e[i] = a[i] + f * (b[i] - a[i]);
     }
     const struct trc_view_axis *axes = trc_view_axes(camera);

@@ -51,10 +51,10 @@ TRC_INLINE void lens_point(const struct trc_camera *camera, vfloat u, vfloat v, 
 
 /* Camera-to-world of each lane's time. */
 TRC_INLINE void camera_matrix(const struct trc_camera *camera, vfloat time, vmask active,
-                              vfloat m[12], vfloat window[4]) {
+                              vfloat m[TRC_AFFINE_FLOATS], vfloat window[4]) {
     const float *base = camera->camera_to_world->m, *windows = camera->windows[0];
     if (camera->key_count < 2) {
-        for (int k = 0; k < 12; k++)
+        for (int k = 0; k < TRC_AFFINE_FLOATS; k++)
             m[k] = vf_set(base[k]);
         for (int k = 0; k < 4; k++)
             window[k] = vf_set(windows[k]);
@@ -62,9 +62,10 @@ TRC_INLINE void camera_matrix(const struct trc_camera *camera, vfloat time, vmas
     }
     vfloat f;
     const vint key = trc_wide_key(time, camera->key_count, &f);
-    for (int k = 0; k < 12; k++)
-        m[k] = trc_between(vf_gather(base + k, key * vi_set(12), active),
-                           vf_gather(base + 12 + k, key * vi_set(12), active), f);
+    for (int k = 0; k < TRC_AFFINE_FLOATS; k++)
+        m[k] = trc_between(
+            vf_gather(base + k, key * vi_set(TRC_AFFINE_FLOATS), active),
+            vf_gather(base + TRC_AFFINE_FLOATS + k, key * vi_set(TRC_AFFINE_FLOATS), active), f);
     for (int k = 0; k < 4; k++)
         window[k] = trc_between(vf_gather(windows + k, key * vi_set(4), active),
                                 vf_gather(windows + 4 + k, key * vi_set(4), active), f);
@@ -137,9 +138,9 @@ static void move_to_eye(const struct trc_stereo *stereo, vvec3 *o, vvec3 *d) {
 
 /* Columns of a matrix (rows of four) in the order of the axes that a panorama's directions are
  * along. */
-static void turn_to_panorama(const struct trc_camera *camera, vfloat m[12]) {
+static void turn_to_panorama(const struct trc_camera *camera, vfloat m[TRC_AFFINE_FLOATS]) {
     const struct trc_view_axis *axes = trc_view_axes(camera);
-    for (int row = 0; row < 12; row += 4) {
+    for (int row = 0; row < TRC_AFFINE_FLOATS; row += 4) {
         const vfloat given[3] = {m[row], m[row + 1], m[row + 2]};
         for (int k = 0; k < 3; k++)
             m[row + k] = given[axes[k].column] * vf_set(axes[k].sign);
@@ -221,7 +222,7 @@ void trc_camera_rays(struct trc_tile *t) {
         const vfloat py = vi_to_float((vint)(pixel >> TRC_PIXEL_Y_SHIFT)) + vf_set(0.5f) +
                           table_lookup(t->job->filter_table, TRC_FILTER_TABLE, f[1], active);
         const vfloat time = sample_times(t, pixel, index, active);
-        vfloat m[12], window[4];
+        vfloat m[TRC_AFFINE_FLOATS], window[4];
         camera_matrix(camera, time, active, m, window);
         const vfloat sx =
             window[0] + (window[1] - window[0]) * px * vf_set(1.0f / (float)t->desc->width);

@@ -42,17 +42,17 @@ static const float *world_to_camera(const struct trc_tile *t) {
 }
 
 /* The same the other way round. */
-static void camera_to_world(const struct trc_tile *t, float m[12]) {
+static void camera_to_world(const struct trc_tile *t, float m[TRC_AFFINE_FLOATS]) {
     const struct trc_camera *c = &t->snapshot->camera;
     const float *before = c->camera_to_world[(c->key_count - 1) / 2].m;
     const float *after = c->camera_to_world[c->key_count / 2].m;
-    for (int k = 0; k < 12; k++)
+    for (int k = 0; k < TRC_AFFINE_FLOATS; k++)
         m[k] = before[k] + 0.5f * (after[k] - before[k]);
 }
 
 /* From the camera's origin to the points. */
 static vvec3 from_camera(const struct trc_tile *t, vvec3 p) {
-    float m[12];
+    float m[TRC_AFFINE_FLOATS];
     camera_to_world(t, m);
     return v3_sub(p, v3(vf_set(m[3]), vf_set(m[7]), vf_set(m[11])));
 }
@@ -76,7 +76,7 @@ static vmask is_not_done(vuint path) {
 /* Where a point of a triangle is in the world at a time. */
 static void point_at(const struct trc_instance *instance, const struct trc_mesh *mesh,
                      const uint32_t index[3], float u, float v, float time, float p[3]) {
-    float c[9], m[12], object[3];
+    float c[9], m[TRC_AFFINE_FLOATS], object[3];
     trc_corner_at(mesh->positions, index, mesh->vertex_count, mesh->key_count, time, c);
     trc_affine_at(instance, time, m);
     for (int k = 0; k < 3; k++)
@@ -235,7 +235,7 @@ static void add_mist(struct trc_tile *t, const struct trc_surface *s, vvec3 seen
         return;
     const trc_render_desc *d = t->desc;
     const vvec3 way = from_camera(t, s->p);
-    float m[12];
+    float m[TRC_AFFINE_FLOATS];
     camera_to_world(t, m);
     const vvec3 axis = v3(vf_set(m[2]), vf_set(m[6]), vf_set(m[10]));
     const vfloat distance = t->snapshot->camera.type == TRC_CAMERA_ORTHOGRAPHIC

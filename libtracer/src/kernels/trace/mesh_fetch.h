@@ -44,14 +44,14 @@ TRC_INLINE vvec3 trc_transform_vector(const struct trc_wide_affine *m, vvec3 v) 
 /* The matrix of key_count keys at the lanes' times: elements are interpolated. */
 TRC_INLINE void trc_load_keys(const struct trc_affine *keys, uint32_t key_count, vfloat time,
                               struct trc_wide_affine *m) {
-    vfloat e[12];
+    vfloat e[TRC_AFFINE_FLOATS];
     if (key_count < 2) {
-        for (int i = 0; i < 12; i++)
+        for (int i = 0; i < TRC_AFFINE_FLOATS; i++)
             e[i] = vf_set(keys[0].m[i]);
     } else {
         vfloat f;
-        const vint at = trc_wide_key(time, key_count, &f) * vi_set(12);
-        for (int i = 0; i < 12; i++)
+        const vint at = trc_wide_key(time, key_count, &f) * vi_set(TRC_AFFINE_FLOATS);
+        for (int i = 0; i < TRC_AFFINE_FLOATS; i++)
             e[i] = trc_between(vf_gather(keys[0].m + i, at, vm_all_set()),
                                vf_gather(keys[1].m + i, at, vm_all_set()), f);
     }
@@ -116,17 +116,18 @@ static inline void trc_corner_at(const float *values, const uint32_t index[3], u
             out[3 * k + axis] = a[i] + f * (b[i] - a[i]);
         }
 }
-static inline void trc_affine_at(const struct trc_instance *instance, float time, float out[12]) {
+static inline void trc_affine_at(const struct trc_instance *instance, float time,
+                                 float out[TRC_AFFINE_FLOATS]) {
     uint32_t key;
     float f;
     trc_key_at(time, instance->key_count, &key, &f);
     const float *a = instance->object_to_world[key].m;
     if (instance->key_count < 2) {
-        memcpy(out, a, 12 * sizeof(float));
+        memcpy(out, a, TRC_AFFINE_FLOATS * sizeof(float));
         return;
     }
     const float *b = instance->object_to_world[key + 1].m;
-    for (int i = 0; i < 12; i++)
+    for (int i = 0; i < TRC_AFFINE_FLOATS; i++)
         out[i] = a[i] + f * (b[i] - a[i]);
 }
 /* Turns TRC_WIDTH rows of width floats into registers. */
@@ -146,7 +147,7 @@ static inline void trc_world_corners_at(const struct trc_snapshot *snapshot, uin
                                         uint32_t triangle, float time, float out[9]) {
     const struct trc_instance *object = &snapshot->instances[instance];
     const struct trc_mesh *mesh = snapshot->meshes[object->mesh];
-    float corner[9], m[12];
+    float corner[9], m[TRC_AFFINE_FLOATS];
     trc_corner_at(mesh->positions, mesh->indices + 3 * (size_t)triangle, mesh->vertex_count,
                   mesh->key_count, time, corner);
     trc_affine_at(object, time, m);

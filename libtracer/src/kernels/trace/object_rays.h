@@ -8,9 +8,9 @@
 /* The matrix of each lane's time, and rows of the inverse of its linear part: the key's, or that of
  * the interpolated matrix. */
 TRC_INLINE void trc_instance_matrices(const struct trc_instance *instance, vfloat time,
-                                      vfloat m[12], vfloat inverse[3][3]) {
+                                      vfloat m[TRC_AFFINE_FLOATS], vfloat inverse[3][3]) {
     if (instance->key_count < 2) {
-        for (int k = 0; k < 12; k++)
+        for (int k = 0; k < TRC_AFFINE_FLOATS; k++)
             m[k] = vf_set(instance->object_to_world->m[k]);
         for (int r = 0; r < 3; r++)
             for (int k = 0; k < 3; k++)
@@ -18,11 +18,11 @@ TRC_INLINE void trc_instance_matrices(const struct trc_instance *instance, vfloa
         return;
     }
     vfloat f;
-    const vint at = trc_wide_key(time, instance->key_count, &f) * vi_set(12);
+    const vint at = trc_wide_key(time, instance->key_count, &f) * vi_set(TRC_AFFINE_FLOATS);
     const float *base = instance->object_to_world->m;
-    for (int k = 0; k < 12; k++)
+    for (int k = 0; k < TRC_AFFINE_FLOATS; k++)
         m[k] = trc_between(vf_gather(base + k, at, vm_all_set()),
-                           vf_gather(base + 12 + k, at, vm_all_set()), f);
+                           vf_gather(base + TRC_AFFINE_FLOATS + k, at, vm_all_set()), f);
     const vvec3 r0 = v3(m[0], m[1], m[2]), r1 = v3(m[4], m[5], m[6]), r2 = v3(m[8], m[9], m[10]);
     const vvec3 c0 = v3_cross(r1, r2), c1 = v3_cross(r2, r0), c2 = v3_cross(r0, r1);
     const vfloat inv_det = vf_set(1.0f) / v3_dot(r0, c0);
@@ -50,7 +50,7 @@ static inline void trc_packet_to_object(const struct trc_instance *instance,
         if (!trc_chunk_bits(mask, c))
             continue;
         const int i = c * TRC_WIDTH;
-        vfloat m[12], inverse[3][3], way[3], guess[3], rest[3];
+        vfloat m[TRC_AFFINE_FLOATS], inverse[3][3], way[3], guess[3], rest[3];
         trc_instance_matrices(instance, vf_load(&p->time[i]), m, inverse);
         for (int r = 0; r < 3; r++)
             way[r] = vf_load(&p->o[r][i]) - m[4 * r + 3];

@@ -52,7 +52,7 @@ enum { LANE_SMOOTH = 1, LANE_FLIPS = 2, LANE_IDENTITY = 4 };
 
 /* One lane: 9 positions, 9 normals, 12 elements. Returns LANE_* together. */
 static uint32_t load_lane(const struct trc_surface *s, int lane, float p[9], float n[9],
-                          float m[12]) {
+                          float m[TRC_AFFINE_FLOATS]) {
     const struct trc_instance *instance = &s->snapshot->instances[vi_get(s->instance, lane)];
     const struct trc_mesh *mesh = s->snapshot->meshes[instance->mesh];
     const uint32_t triangle = (uint32_t)vi_get(s->triangle, lane);
@@ -77,14 +77,15 @@ static uint32_t load_lane(const struct trc_surface *s, int lane, float p[9], flo
 }
 
 static void load_mixed(const struct trc_surface *s, struct raw_hit *out) {
-    float p[TRC_WIDTH * 9], n[TRC_WIDTH * 9], m[TRC_WIDTH * 12];
+    float p[TRC_WIDTH * 9], n[TRC_WIDTH * 9], m[TRC_WIDTH * TRC_AFFINE_FLOATS];
     memset(p, 0, sizeof p);
     memset(n, 0, sizeof n);
     memset(m, 0, sizeof m);
     uint32_t smooth = 0, flips = 0, identity = 0;
     for (uint32_t lanes = vm_bits(s->active); lanes; lanes &= lanes - 1) {
         const int lane = __builtin_ctz(lanes);
-        const uint32_t flags = load_lane(s, lane, p + 9 * lane, n + 9 * lane, m + 12 * lane);
+        const uint32_t flags =
+            load_lane(s, lane, p + 9 * lane, n + 9 * lane, m + TRC_AFFINE_FLOATS * lane);
         smooth |= (uint32_t)((flags & LANE_SMOOTH) != 0) << lane;
         flips |= (uint32_t)((flags & LANE_FLIPS) != 0) << lane;
         identity |= (uint32_t)((flags & LANE_IDENTITY) != 0) << lane;
@@ -93,8 +94,11 @@ static void load_mixed(const struct trc_surface *s, struct raw_hit *out) {
     out->n = trc_corners_of(n);
     for (int k = 0; k < 3; k++)
         out->m.column[k] =
-            v3(trc_column_of(m, 12, k), trc_column_of(m, 12, 4 + k), trc_column_of(m, 12, 8 + k));
-    out->m.origin = v3(trc_column_of(m, 12, 3), trc_column_of(m, 12, 7), trc_column_of(m, 12, 11));
+            v3(trc_column_of(m, TRC_AFFINE_FLOATS, k), trc_column_of(m, TRC_AFFINE_FLOATS, 4 + k),
+               trc_column_of(m, TRC_AFFINE_FLOATS, 8 + k));
+    out->m.origin =
+        v3(trc_column_of(m, TRC_AFFINE_FLOATS, 3), trc_column_of(m, TRC_AFFINE_FLOATS, 7),
+           trc_column_of(m, TRC_AFFINE_FLOATS, 11));
     out->smooth = vm_from_bits(smooth);
     out->flips = vm_from_bits(flips);
     out->identity = vm_from_bits(identity);
