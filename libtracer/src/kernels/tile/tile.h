@@ -11,6 +11,7 @@
 #include "kernels/tile/ray_stack.h"
 #include "kernels/tile/sampler.h"
 #include "kernels/tile/shadow_queue.h"
+#include "kernels/trace/direction.h"
 #include "kernels/trace/packet.h"
 #include "model/kernels.h"
 
@@ -118,16 +119,9 @@ struct trc_tile {
     struct trc_packet_hits packet_hits[TRC_BUNDLE];
 };
 
-/* Rays that share their dominant axis and its side share a beam (kernels/trace/walk.h): six cells
- * of directions, below TRC_DIRECTION_CELLS. */
+/* Cells that rays are sorted by: of their direction (kernels/trace/direction.h) or of a place on a
+ * light are below this. */
 #define TRC_DIRECTION_CELLS 16u
-TRC_INLINE vuint trc_direction_cell(vvec3 d) {
-    const vfloat x = vf_abs(d.x), y = vf_abs(d.y), z = vf_abs(d.z);
-    const vmask by_x = vm_and(vf_ge(x, y), vf_ge(x, z)), by_y = vf_ge(y, z);
-    const vint axis = vi_select(by_x, vi_set(0), vi_select(by_y, vi_set(2), vi_set(4)));
-    const vfloat along = vf_select(by_x, d.x, vf_select(by_y, d.y, d.z));
-    return (vuint)(axis + vi_select(vf_lt(along, vf_set(0.0f)), vi_set(1), vi_set(0)));
-}
 
 /* Cell of a place on a light, below TRC_DIRECTION_CELLS: rays to one cell share packets. More cells
  * mean packets of more pixels, so a light that is small as seen from the point has fewer: 4x4, 2x2

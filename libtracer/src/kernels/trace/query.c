@@ -1,6 +1,7 @@
 /* Ray queries: arrays of the caller through packets. */
 #include "kernels/trace/query.h"
 
+#include "kernels/trace/direction.h"
 #include "kernels/trace/packet.h"
 #include "model/snapshot.h"
 
@@ -257,24 +258,14 @@ void trc_query_normal(const struct trc_snapshot *snapshot, uint32_t instance, ui
 /* Directions in a packet, in the mean, from which on rays are ordered. */
 #define MIXED_DIRECTIONS 3
 
-/* Where each ray goes: its dominant axis and the side of it, TRC_DIRECTIONS in all. */
-#define TRC_DIRECTIONS 6
-TRC_INLINE vint direction_of(vfloat x, vfloat y, vfloat z) {
-    const vfloat ax = vf_abs(x), ay = vf_abs(y), az = vf_abs(z);
-    const vmask by_x = vm_and(vf_ge(ax, ay), vf_ge(ax, az)), by_y = vf_ge(ay, az);
-    const vint axis = vi_select(by_x, vi_set(0), vi_select(by_y, vi_set(2), vi_set(4)));
-    const vfloat along = vf_select(by_x, x, vf_select(by_y, y, z));
-    return axis + vi_select(vf_lt(along, vf_set(0.0f)), vi_set(1), vi_set(0));
-}
-
 /* Sorts the part's rays stably by direction into order, unless most packets are of one direction as
  * they are: then its order stays NULL. */
 static void rays_order(const trc_rays *rays, struct rays_part *part, uint32_t *order) {
     uint32_t direction[ORDERED_RAYS + TRC_WIDTH], first[TRC_DIRECTIONS + 1] = {0}, groups = 0;
     for (uint32_t i = 0; i < part->count; i += TRC_WIDTH)
-        vi_store((int32_t *)direction + i, direction_of(elements_load(rays->direction_x, part, i),
-                                                        elements_load(rays->direction_y, part, i),
-                                                        elements_load(rays->direction_z, part, i)));
+        vu_store(direction + i, trc_direction_cell(v3(elements_load(rays->direction_x, part, i),
+                                                      elements_load(rays->direction_y, part, i),
+                                                      elements_load(rays->direction_z, part, i))));
     for (uint32_t i = 0; i < part->count; i += TRC_PACKET_SIZE) {
         const uint32_t end = part->count - i < TRC_PACKET_SIZE ? part->count : i + TRC_PACKET_SIZE;
         uint32_t seen = 0;
