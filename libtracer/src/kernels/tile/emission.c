@@ -174,7 +174,7 @@ static vmask emission_seen(const struct trc_tile *t, const struct arrival *a,
 
 void trc_emission_surface(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
                           const struct trc_lobes *lobes, vmask active) {
-    vmask lit = vm_and(active, vf_gt(v3_max(lobes->emission), vf_set(0.0f)));
+    vmask lit = vm_and(active, vf_gt(v3_max(v3_abs(lobes->emission)), vf_set(0.0f)));
     if (t->snapshot->lights->linked)
         lit = emission_seen(t, a, s, lit);
     if (!vm_any(lit))
