@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Images in every colour space of Blender's configuration, from files and from pixels, beside Cycles."""
 
+import math
 import os
 
 import numpy as np
 import pytest
 
-GRID, SIZE = 5, 24  # panels along each side of a picture, pixels and texels along each side of a panel
+SIZE = 24  # pixels and texels along each side of a panel
 
 # name: (file format and channels, or None for Blender's own pixels; bits; alpha mode)
 SOURCES = {
@@ -19,7 +20,7 @@ SOURCES = {
     "painted floats": (None, 32, 'STRAIGHT'),
     "transparent bytes": (('PNG', 'RGBA'), 8, 'STRAIGHT'),
     "transparent words": (('PNG', 'RGBA'), 16, 'STRAIGHT'),
-    "transparent floats": (('OPEN_EXR', 'RGBA'), 32, 'STRAIGHT'),
+    "transparent floats": (('OPEN_EXR', 'RGBA'), 32, 'PREMUL'),
     "transparent painted bytes": (None, 8, 'STRAIGHT'),
     "channel-packed bytes": (('PNG', 'RGBA'), 8, 'CHANNEL_PACKED'),
 }
@@ -28,7 +29,7 @@ SOURCES = {
 # transparent ones when it multiplies by alpha and divides again, which steep spaces magnify.
 MEAN_TOLERANCE, TOLERANCE, ROUNDED_TOLERANCE, STEEP_TOLERANCE = 1e-3, 1e-3, 3e-3, 4e-2
 ROUNDED = {"painted bytes", "transparent bytes", "transparent words", "transparent painted bytes"}
-LINEAR = ("Linear", "ACES", "XYZ", "Non-Color", "Raw", "sRGB")  # or as near to it as matters here
+LINEAR = ("Linear", "ACES2065", "ACEScg", "XYZ", "Non-Color", "Raw", "sRGB")  # or as near to it as matters here
 
 
 def _pixels(seed, is_opaque, is_float):
@@ -65,10 +66,10 @@ def _image(source, space, folder):
     return made
 
 
-def _show(number, image):
-    """A panel that shines with an image, a texel in each pixel."""
+def _show(number, grid, image):
+    """A panel that shines with an image, a texel in each pixel; grid: panels along each side of the picture."""
     import scenes
-    center = (number % GRID - 0.5 * (GRID - 1), number // GRID - 0.5 * (GRID - 1))
+    center = (number % grid - 0.5 * (grid - 1), number // grid - 0.5 * (grid - 1))
     wall = scenes.wall(f"Wall{number}", 1.0, center=center, material=scenes.emitter((1.0, 1.0, 1.0)))
     tree = wall.data.materials[0].node_tree
     node = tree.nodes.new("ShaderNodeTexImage")
@@ -81,20 +82,22 @@ def inside(source):
     """{colour space: [picture by Volley, by Cycles]} of an image in each."""
     import tempfile
     import scenes
-    scene = scenes.empty(size=(GRID * SIZE, GRID * SIZE), samples=1)
-    scenes.camera(type='ORTHO', ortho_scale=GRID)
+    scene = scenes.empty(samples=1)
     scenes.sharpen()
     image_type = type(scene.render.image_settings.linear_colorspace_settings).bl_rna
     spaces = [item.name for item in image_type.properties["name"].enum_items]
     spaces = [name for name in spaces if name != "Working Space"]  # of 5.0, which no image takes
+    grid = math.ceil(math.sqrt(len(spaces)))
+    scene.render.resolution_x = scene.render.resolution_y = grid * SIZE
+    scenes.camera(type='ORTHO', ortho_scale=grid)
     folder = tempfile.mkdtemp(prefix="volley_")
     for number, space in enumerate(spaces):
-        _show(number, _image(source, space, folder))
+        _show(number, grid, _image(source, space, folder))
     scene.render.image_settings.file_format, scene.render.image_settings.color_depth = 'OPEN_EXR', '32'
     pictures = [picture[..., :3] for picture in scenes.by_both(1)]
     found = {}
     for number, space in enumerate(spaces):
-        x, y = number % GRID * SIZE, number // GRID * SIZE
+        x, y = number % grid * SIZE, number // grid * SIZE
         found[space] = [picture[y:y + SIZE, x:x + SIZE] for picture in pictures]
     return found
 
@@ -112,6 +115,8 @@ def test_against_cycles(blender, source):
     for space, (ours, theirs) in found.items():
         if source.startswith("channel-packed") and not space.startswith(LINEAR):
             continue  # Cycles divides these colours by an alpha that they are not multiplied by
+        if source in ROUNDED and space == "ADX16":
+            continue  # of Blender 5: densities, a step of whose bytes is a third of the light
         assert theirs.std() > 0.02, space
         error = np.abs(ours - theirs) / np.maximum(theirs.max(axis=-1, keepdims=True), 1.0)
         print(f"{space:30} {error.mean():.1e} {error.max():.1e}")
