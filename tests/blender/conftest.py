@@ -3,7 +3,7 @@
 
 A test may skip where expected_skips.py or its own mark, since(version, why), says so for the Blender that is
 tested, and nowhere else. No Blender or no virtual display is a failure, unless VOLLEY_WITHOUT says that this
-machine has none: "blender", "xvfb" or both, with a comma.
+machine has none, or none that is of use: "blender", "xvfb" or both, with a comma.
 """
 
 import os
@@ -57,11 +57,11 @@ def pytest_runtest_setup(item):
 
 
 def _require(item, what, is_there):
-    """Fail where something is missing, or skip if the user says that it is."""
-    if is_there:
-        return
+    """Fail where something is missing, or skip if the user says that it is: it may be there and of no use."""
     if what not in os.environ.get("VOLLEY_WITHOUT", "").split(","):
-        pytest.fail(f"no {what} found; VOLLEY_WITHOUT={what} leaves out what needs it", pytrace=False)
+        if not is_there:
+            pytest.fail(f"no {what} found; VOLLEY_WITHOUT={what} leaves out what needs it", pytrace=False)
+        return
     item.stash[_IS_WITHOUT] = True
     pytest.skip(f"without {what}, as VOLLEY_WITHOUT says")
 
