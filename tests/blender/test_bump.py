@@ -97,7 +97,8 @@ def inside_normals():
     stage()
     # Cycles 5 puts the steps of Window, along the picture's sides, with steps of the surface along others.
     left_out = {"noise, window"} if bpy.app.version >= (5, 0, 0) else set()
-    materials = {name: _bumped(HEIGHTS[name][0], **HEIGHTS[name][1]) for name in HEIGHTS.keys() - left_out}
+    materials = {name: _bumped(height, **inputs) for name, (height, inputs) in HEIGHTS.items()
+                 if name not in left_out}
     materials.update(chained=_chained(), fresnel=_fresnel(), **{"after a normal map": _after_normal_map()})
     return pictures_of(materials, _shape())
 
