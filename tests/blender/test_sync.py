@@ -24,15 +24,10 @@ class _Recorder:
 def _sync(changes=None, sync=None):
     """Sync the current scene into a recorder; the sync and what it sent."""
     import bpy
-    from volley import native
     from volley.sync import SceneSync, Source
     from volley.sync.changes import Changes
     if sync is None:
-        original, native.Scene = native.Scene, lambda *_: _Recorder()
-        try:
-            sync = SceneSync(True, 0, True)
-        finally:
-            native.Scene = original
+        sync = SceneSync(True, 0, True, make_scene=lambda *_: _Recorder())
     sync.scene.calls.clear()
     depsgraph = bpy.context.evaluated_depsgraph_get()
     sync.update(Source(depsgraph, changes or Changes.everything()))
