@@ -152,14 +152,9 @@ static trc_scene roofed(uint32_t visibility, uint32_t surface) {
     static const uint32_t down[6] = {0, 2, 1, 0, 3, 2};
     static const float corners[12] = {-3, -3, 4, 7, -3, 4, 7, 3, 4, -3, 3, 4};
     const trc_scene scene = fixture_level_view();
-    trc_mesh_desc mesh_desc = default_mesh_desc();
+    trc_mesh_desc mesh_desc = fixture_quad_desc(corners);
     trc_id mesh = 0, instance = 0;
-    mesh_desc.vertex_count = 4;
-    mesh_desc.triangle_count = 2;
-    mesh_desc.positions = corners;
-    mesh_desc.position_count = 12;
     mesh_desc.indices = down;
-    mesh_desc.index_count = 6;
     assert_ok(trc_mesh_create(scene, &mesh_desc, &mesh));
     const trc_id shining = fixture_material(scene, TRC_NODE_EMISSION, 1.0f);
     trc_instance_desc desc = default_instance_desc(mesh);

@@ -167,7 +167,6 @@ static void slots_beyond_the_materials_have_the_last(void **state) {
     (void)state;
     for (int is_clear = 0; is_clear < 2; is_clear++) {
         static const float corners[12] = {-9, -9, 3, 9, -9, 3, 9, 9, 3, -9, 9, 3};
-        static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
         static const uint16_t slots[2] = {1, 7};
         const trc_scene scene = fixture_level_view();
         trc_light_desc light = default_light_desc();
@@ -176,13 +175,7 @@ static void slots_beyond_the_materials_have_the_last(void **state) {
         light.strength = (float)PI;
         assert_ok(trc_light_create(scene, &light, &id));
         fixture_level(scene, 20.0f, 0.0f, fixture_material(scene, TRC_NODE_DIFFUSE, 0.5f));
-        trc_mesh_desc desc = default_mesh_desc();
-        desc.vertex_count = 4;
-        desc.triangle_count = 2;
-        desc.positions = corners;
-        desc.position_count = 12;
-        desc.indices = indices;
-        desc.index_count = 6;
+        trc_mesh_desc desc = fixture_quad_desc(corners);
         desc.material_index = slots;
         assert_ok(trc_mesh_create(scene, &desc, &id));
         const trc_id matt = fixture_material(scene, TRC_NODE_DIFFUSE, 0.5f);

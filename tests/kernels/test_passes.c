@@ -231,18 +231,11 @@ static double strip_light(int x) { return 0.25 + 0.125 * (x % 8); }
 static uint32_t strip_group(int x) { return (uint32_t)(7 * x / 2) % (GROUPS + 1); }
 
 static void add_strip(trc_scene scene, trc_id material, int x, float z) {
-    static const uint32_t up[6] = {0, 1, 2, 0, 2, 3};
     const float left = 0.25f * (float)x, right = left + 0.25f;
     const float corners[12] = {left, -5, z, right, -5, z, right, 5, z, left, 5, z};
     const float light = (float)strip_light(x);
-    trc_mesh_desc mesh_desc = default_mesh_desc();
+    trc_mesh_desc mesh_desc = fixture_quad_desc(corners);
     trc_id mesh = 0, instance = 0;
-    mesh_desc.vertex_count = 4;
-    mesh_desc.triangle_count = 2;
-    mesh_desc.positions = corners;
-    mesh_desc.position_count = 12;
-    mesh_desc.indices = up;
-    mesh_desc.index_count = 6;
     assert_ok(trc_mesh_create(scene, &mesh_desc, &mesh));
     trc_instance_desc desc = default_instance_desc(mesh);
     desc.materials = &material;

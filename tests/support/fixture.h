@@ -47,18 +47,25 @@ FIXTURE_INLINE void fixture_draw(trc_scene scene, const trc_render_desc *desc, u
 
 /* ---- for closed forms: level squares seen from above ---- */
 
-/* An instance of a mesh, moved by a transform, or where the mesh is. flags: TRC_INSTANCE_*. */
+/* An instance of a mesh, moved by a transform. flags: TRC_INSTANCE_*. */
+FIXTURE_INLINE trc_id fixture_instance(trc_scene scene, trc_id mesh, const float transform[12],
+                                       trc_id material, uint32_t flags) {
+    trc_instance_desc desc = default_instance_desc(mesh);
+    trc_id instance = 0;
+    desc.transforms = transform;
+    desc.materials = &material;
+    desc.material_count = 1;
+    desc.flags = flags;
+    assert_int_equal(trc_instance_create(scene, &desc, &instance), TRC_OK);
+    return instance;
+}
+
+/* The same of a new mesh; fixture_mesh: where it is. */
 FIXTURE_INLINE trc_id fixture_mesh_at(trc_scene scene, const trc_mesh_desc *desc,
                                       const float transform[12], trc_id material, uint32_t flags) {
-    trc_id mesh = 0, instance = 0;
+    trc_id mesh = 0;
     assert_int_equal(trc_mesh_create(scene, desc, &mesh), TRC_OK);
-    trc_instance_desc instance_desc = default_instance_desc(mesh);
-    instance_desc.transforms = transform;
-    instance_desc.materials = &material;
-    instance_desc.material_count = 1;
-    instance_desc.flags = flags;
-    assert_int_equal(trc_instance_create(scene, &instance_desc, &instance), TRC_OK);
-    return instance;
+    return fixture_instance(scene, mesh, transform, material, flags);
 }
 
 FIXTURE_INLINE trc_id fixture_mesh(trc_scene scene, const trc_mesh_desc *desc, trc_id material,
@@ -67,8 +74,7 @@ FIXTURE_INLINE trc_id fixture_mesh(trc_scene scene, const trc_mesh_desc *desc, t
 }
 
 /* Two triangles; a, b, c, d counter-clockwise as seen from the front. */
-FIXTURE_INLINE trc_id fixture_flagged_quad(trc_scene scene, const float corners[12],
-                                           trc_id material, uint32_t flags) {
+FIXTURE_INLINE trc_mesh_desc fixture_quad_desc(const float corners[12]) {
     static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
     trc_mesh_desc desc = default_mesh_desc();
     desc.vertex_count = 4;
@@ -77,6 +83,12 @@ FIXTURE_INLINE trc_id fixture_flagged_quad(trc_scene scene, const float corners[
     desc.position_count = 12;
     desc.indices = indices;
     desc.index_count = 6;
+    return desc;
+}
+
+FIXTURE_INLINE trc_id fixture_flagged_quad(trc_scene scene, const float corners[12],
+                                           trc_id material, uint32_t flags) {
+    const trc_mesh_desc desc = fixture_quad_desc(corners);
     return fixture_mesh(scene, &desc, material, flags);
 }
 

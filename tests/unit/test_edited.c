@@ -48,28 +48,6 @@ static trc_id add_sky_material(trc_scene scene, trc_id image) {
     return level_material(scene, &list, surface, 0);
 }
 
-static trc_id add_quad_mesh(trc_scene scene, const float corners[12]) {
-    static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
-    trc_mesh_desc desc = default_mesh_desc();
-    trc_id mesh = 0;
-    desc.vertex_count = 4;
-    desc.triangle_count = 2;
-    desc.positions = corners;
-    desc.position_count = 12;
-    desc.indices = indices;
-    desc.index_count = 6;
-    assert_ok(trc_mesh_create(scene, &desc, &mesh));
-    return mesh;
-}
-
-static void add_instance(trc_scene scene, trc_id mesh, trc_id material) {
-    trc_instance_desc desc = default_instance_desc(mesh);
-    trc_id id = 0;
-    desc.materials = &material;
-    desc.material_count = 1;
-    assert_ok(trc_instance_create(scene, &desc, &id));
-}
-
 /* roof, value: of its material; bright: the sky's texel. */
 static struct edited edited_make(uint32_t roof, float value, uint32_t bright) {
     struct edited e = {.scene = fixture_level_view()};
@@ -78,8 +56,9 @@ static struct edited edited_make(uint32_t roof, float value, uint32_t bright) {
     assert_ok(trc_material_create(e.scene, &roof_desc, &e.roof));
     fixture_level(e.scene, 20.0f, 0.0f, fixture_material(e.scene, TRC_NODE_DIFFUSE, 0.5f));
     static const float corners[12] = {1, -1, 3, 2, -1, 3, 2, 1, 3, 1, 1, 3};
-    e.roof_mesh = add_quad_mesh(e.scene, corners);
-    add_instance(e.scene, e.roof_mesh, e.roof);
+    const trc_mesh_desc quad = fixture_quad_desc(corners);
+    assert_ok(trc_mesh_create(e.scene, &quad, &e.roof_mesh));
+    fixture_instance(e.scene, e.roof_mesh, identity_transform, e.roof, 0);
     trc_light_desc sun = default_light_desc();
     trc_id id = 0;
     sun.type = TRC_LIGHT_SUN;

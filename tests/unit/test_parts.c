@@ -20,16 +20,9 @@ enum {
 
 static trc_id add_square(trc_scene scene, float x, float z, trc_id material, const char *name,
                          uint32_t flags) {
-    static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
     const float corners[12] = {x - 1, -1, z, x + 1, -1, z, x + 1, 1, z, x - 1, 1, z};
-    trc_mesh_desc desc = default_mesh_desc();
+    trc_mesh_desc desc = fixture_quad_desc(corners);
     trc_id mesh = 0, instance = 0;
-    desc.vertex_count = 4;
-    desc.triangle_count = 2;
-    desc.positions = corners;
-    desc.position_count = 12;
-    desc.indices = indices;
-    desc.index_count = 6;
     assert_int_equal(trc_mesh_create(scene, &desc, &mesh), TRC_OK);
     trc_instance_desc instance_desc = default_instance_desc(mesh);
     instance_desc.materials = &material;

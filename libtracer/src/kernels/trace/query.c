@@ -308,56 +308,76 @@ static struct manner manner_of(uint32_t packet_size, uint32_t stream_size) {
     return (struct manner){size, size, false};
 }
 
-static struct rays_part part_of(uint64_t begin, uint64_t end, uint32_t size) {
-    return (struct rays_part){begin, end - begin < size ? (uint32_t)(end - begin) : size, NULL};
+/* The rays of a query on their way, a load after the other. */
+struct rays_walk {
+    const trc_rays *rays;
+    struct manner manner;
+    uint64_t next, end;   /* rays that no part has yet */
+    struct rays_part all; /* the part under way, and how many of it are done */
+    uint32_t done;
+    uint32_t order[ORDERED_RAYS + TRC_WIDTH];
+};
+
+static void rays_walk_begin(struct rays_walk *w, const trc_rays *rays, uint64_t begin, uint64_t end,
+                            struct manner manner) {
+    w->rays = rays;
+    w->manner = manner;
+    w->next = begin;
+    w->end = end;
+    w->all.count = w->done = 0;
 }
 
-/* Rays of a part from i on. */
-static struct rays_part load_of(const struct rays_part *part, uint32_t i, uint32_t size) {
-    const uint32_t count = part->count - i < size ? part->count - i : size;
-    return (struct rays_part){part->order ? part->begin : part->begin + i, count,
-                              part->order ? part->order + i : NULL};
+static uint32_t at_most(uint64_t count, uint32_t size) {
+    return count < size ? (uint32_t)count : size;
+}
+
+/* Loads the next rays; false: there are none. part_out: which they are. */
+static bool rays_walk_load(struct rays_walk *w, struct load *l, struct rays_part *part_out) {
+    if (w->done == w->all.count) {
+        if (w->next == w->end)
+            return false;
+        w->all = (struct rays_part){w->next, at_most(w->end - w->next, w->manner.part_size), NULL};
+        w->next += w->all.count;
+        w->done = 0;
+        if (w->manner.ordered)
+            rays_order(w->rays, &w->all, w->order);
+    }
+    const uint32_t *order = w->all.order;
+    *part_out = (struct rays_part){w->all.begin + (order ? 0 : w->done),
+                                   at_most(w->all.count - w->done, w->manner.load_size),
+                                   order ? order + w->done : NULL};
+    w->done += part_out->count;
+    rays_load(w->rays, part_out, l);
+    return true;
 }
 
 void trc_query_closest_rays(const struct trc_snapshot *snapshot, const trc_rays *rays,
                             const trc_hits *hits, uint64_t begin, uint64_t end,
                             uint32_t packet_size) {
-    const struct manner manner = manner_of(packet_size, TRC_STREAM_CLOSEST);
-    uint32_t order[ORDERED_RAYS + TRC_WIDTH];
+    struct rays_walk walk;
+    struct rays_part part;
     struct load l;
-    for (uint64_t at = begin; at < end; at += manner.part_size) {
-        struct rays_part all = part_of(at, end, manner.part_size);
-        if (manner.ordered)
-            rays_order(rays, &all, order);
-        for (uint32_t i = 0; i < all.count; i += manner.load_size) {
-            const struct rays_part part = load_of(&all, i, manner.load_size);
-            rays_load(rays, &part, &l);
-            hits_clear(&l);
-            trc_trace_closest(snapshot, l.packets, l.hits, l.packet_count);
-            for (uint32_t k = 0; k < l.count; k += TRC_WIDTH)
-                lanes_store(snapshot, hits, &part, k, &l);
-        }
+    rays_walk_begin(&walk, rays, begin, end, manner_of(packet_size, TRC_STREAM_CLOSEST));
+    while (rays_walk_load(&walk, &l, &part)) {
+        hits_clear(&l);
+        trc_trace_closest(snapshot, l.packets, l.hits, l.packet_count);
+        for (uint32_t k = 0; k < l.count; k += TRC_WIDTH)
+            lanes_store(snapshot, hits, &part, k, &l);
     }
 }
 
 void trc_query_occluded_rays(const struct trc_snapshot *snapshot, const trc_rays *rays,
                              uint8_t *occluded, uint64_t begin, uint64_t end,
                              uint32_t packet_size) {
-    const struct manner manner = manner_of(packet_size, TRC_STREAM_ANY);
-    uint32_t order[ORDERED_RAYS + TRC_WIDTH];
-    uint64_t blocked[TRC_BUNDLE];
+    struct rays_walk walk;
+    struct rays_part part;
     struct load l;
-    for (uint64_t at = begin; at < end; at += manner.part_size) {
-        struct rays_part all = part_of(at, end, manner.part_size);
-        if (manner.ordered)
-            rays_order(rays, &all, order);
-        for (uint32_t i = 0; i < all.count; i += manner.load_size) {
-            const struct rays_part part = load_of(&all, i, manner.load_size);
-            rays_load(rays, &part, &l);
-            trc_trace_occluded(snapshot, l.packets, l.packet_count, blocked);
-            for (uint32_t k = 0; k < l.count; k++)
-                occluded[part.begin + (part.order ? part.order[k] : k)] =
-                    (uint8_t)(blocked[k / TRC_PACKET_SIZE] >> k % TRC_PACKET_SIZE & 1u);
-        }
+    uint64_t blocked[TRC_BUNDLE];
+    rays_walk_begin(&walk, rays, begin, end, manner_of(packet_size, TRC_STREAM_ANY));
+    while (rays_walk_load(&walk, &l, &part)) {
+        trc_trace_occluded(snapshot, l.packets, l.packet_count, blocked);
+        for (uint32_t k = 0; k < l.count; k++)
+            occluded[part.begin + (part.order ? part.order[k] : k)] =
+                (uint8_t)(blocked[k / TRC_PACKET_SIZE] >> k % TRC_PACKET_SIZE & 1u);
     }
 }
