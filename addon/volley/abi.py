@@ -10,6 +10,7 @@ from ctypes import (POINTER, Structure, c_char_p, c_double, c_float, c_int32, c_
 from enum import IntEnum, IntFlag
 
 MAX_LIGHT_GROUPS = 32
+MAX_CURVE_PIECES = 32
 MAX_KEYS = 33
 MAX_ATTRIBUTES = 8
 MAX_INSTANCE_VALUES = 256
@@ -63,6 +64,11 @@ class CameraType(IntEnum):
     FISHEYE_EQUISOLID = 6
     FISHEYE_POLYNOMIAL = 7
     CYLINDRICAL = 8
+
+
+class CurveShape(IntEnum):
+    CURVES_RIBBON = 0
+    CURVES_ROUND = 1
 
 
 class NormalsLayout(IntEnum):
@@ -648,6 +654,7 @@ class FeatureFlags(IntFlag):
     SLOPES = 524288
     LINKS = 1048576
     PORTALS = 2097152
+    CURVES = 4194304
 
 
 class CameraDesc(Structure):
@@ -663,6 +670,22 @@ class CameraDesc(Structure):
                 ("sensor_width", c_float), ("sensor_height", c_float), ("fisheye_polynomial", c_float * 5),
                 ("eye_offset", c_float), ("convergence_distance", c_float), ("pole_merge_from", c_float),
                 ("pole_merge_to", c_float), ("row_delay", c_float))
+
+
+class CurveAttribute(Structure):
+    __slots__ = ()
+    _fields_ = (("struct_size", c_uint32), ("width", c_uint32), ("name", c_char_p), ("values", c_void_p),
+                ("value_count", c_uint64), ("per_strand", c_uint32), ("reserved", c_uint32))
+
+
+class CurvesDesc(Structure):
+    __slots__ = ()
+    _fields_ = (("struct_size", c_uint32), ("key_count", c_uint32), ("shape", c_uint32),
+                ("piece_count", c_uint32), ("point_count", c_uint64), ("points", c_void_p),
+                ("point_value_count", c_uint64), ("lengths", c_void_p), ("strand_count", c_uint64),
+                ("generated", c_void_p), ("generated_count", c_uint64),
+                ("attributes", POINTER(CurveAttribute)), ("attribute_count", c_uint32),
+                ("reserved", c_uint32))
 
 
 class CornerAttribute(Structure):
@@ -821,11 +844,11 @@ class SceneStats(Structure):
 
 
 # By their names in C.
-CONSTANTS = {"TRC_MAX_LIGHT_GROUPS": MAX_LIGHT_GROUPS, "TRC_MAX_KEYS": MAX_KEYS,
-             "TRC_MAX_ATTRIBUTES": MAX_ATTRIBUTES, "TRC_MAX_INSTANCE_VALUES": MAX_INSTANCE_VALUES,
-             "TRC_MAX_SHADOW_CLASSES": MAX_SHADOW_CLASSES, "TRC_MAX_NODES": MAX_NODES,
-             "TRC_MAX_NODE_INPUTS": MAX_NODE_INPUTS, "TRC_NO_HIT": NO_HIT, "TRC_MAX_AOVS": MAX_AOVS,
-             "TRC_CRYPTOMATTE_KINDS": CRYPTOMATTE_KINDS,
+CONSTANTS = {"TRC_MAX_LIGHT_GROUPS": MAX_LIGHT_GROUPS, "TRC_MAX_CURVE_PIECES": MAX_CURVE_PIECES,
+             "TRC_MAX_KEYS": MAX_KEYS, "TRC_MAX_ATTRIBUTES": MAX_ATTRIBUTES,
+             "TRC_MAX_INSTANCE_VALUES": MAX_INSTANCE_VALUES, "TRC_MAX_SHADOW_CLASSES": MAX_SHADOW_CLASSES,
+             "TRC_MAX_NODES": MAX_NODES, "TRC_MAX_NODE_INPUTS": MAX_NODE_INPUTS, "TRC_NO_HIT": NO_HIT,
+             "TRC_MAX_AOVS": MAX_AOVS, "TRC_CRYPTOMATTE_KINDS": CRYPTOMATTE_KINDS,
              "TRC_CRYPTOMATTE_LAYER_RANKS": CRYPTOMATTE_LAYER_RANKS,
              "TRC_MAX_CRYPTOMATTE_LAYERS": MAX_CRYPTOMATTE_LAYERS,
              "TRC_MAX_CRYPTOMATTE_DEPTH": MAX_CRYPTOMATTE_DEPTH, "TRC_SUMS_END": SUMS_END,
@@ -833,7 +856,7 @@ CONSTANTS = {"TRC_MAX_LIGHT_GROUPS": MAX_LIGHT_GROUPS, "TRC_MAX_KEYS": MAX_KEYS,
              "TRC_VERSION_PATCH": VERSION_PATCH, "TRC_ABI_VERSION": ABI_VERSION}
 
 # Enumerations, with what their members' names begin with in C.
-ENUMERATIONS = {StatusCode: "TRC_", IsaId: "TRC_ISA_", CameraType: "TRC_CAMERA_",
+ENUMERATIONS = {StatusCode: "TRC_", IsaId: "TRC_ISA_", CameraType: "TRC_CAMERA_", CurveShape: "TRC_",
                 NormalsLayout: "TRC_NORMALS_", VisibleRays: "TRC_VISIBLE_", InstanceFlags: "TRC_INSTANCE_",
                 LightType: "TRC_LIGHT_", AreaShape: "TRC_AREA_", LightFlags: "TRC_LIGHT_",
                 AoMethod: "TRC_AO_", NodeType: "TRC_NODE_", ModeFlags: "TRC_MODE_", TableSize: "TRC_TABLE_",
@@ -857,7 +880,8 @@ ENUMERATIONS = {StatusCode: "TRC_", IsaId: "TRC_ISA_", CameraType: "TRC_CAMERA_"
                 PassesFlags: "TRC_PASSES_", ProgressState: "TRC_PROGRESS_", SumsId: "TRC_SUMS_",
                 FeatureFlags: "TRC_FEATURE_"}
 
-STRUCTURES = {"trc_camera_desc": CameraDesc, "trc_corner_attribute": CornerAttribute,
+STRUCTURES = {"trc_camera_desc": CameraDesc, "trc_curve_attribute": CurveAttribute,
+              "trc_curves_desc": CurvesDesc, "trc_corner_attribute": CornerAttribute,
               "trc_mesh_desc": MeshDesc, "trc_instance_desc": InstanceDesc, "trc_light_desc": LightDesc,
               "trc_world_desc": WorldDesc, "trc_node_input": NodeInput, "trc_node": Node,
               "trc_material_desc": MaterialDesc, "trc_image_desc": ImageDesc, "trc_rays": Rays,
@@ -876,6 +900,10 @@ FUNCTIONS = {
     "trc_isa_name": (c_char_p, (c_uint32,)),
     "trc_camera_desc_default": (CameraDesc, ()),
     "trc_scene_set_camera": (c_int32, (c_uint64, POINTER(CameraDesc))),
+    "trc_curve_attribute_default": (CurveAttribute, ()),
+    "trc_curves_desc_default": (CurvesDesc, ()),
+    "trc_curves_create": (c_int32, (c_uint64, POINTER(CurvesDesc), POINTER(c_uint64))),
+    "trc_curves_update": (c_int32, (c_uint64, c_uint64, c_uint32, c_void_p, c_uint64)),
     "trc_corner_attribute_default": (CornerAttribute, ()),
     "trc_mesh_desc_default": (MeshDesc, ()),
     "trc_mesh_create": (c_int32, (c_uint64, POINTER(MeshDesc), POINTER(c_uint64))),

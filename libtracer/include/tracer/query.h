@@ -25,8 +25,9 @@ TRC_API trc_rays trc_rays_default(void);
 #define TRC_NO_HIT 0xffffffffu
 
 /* Arrays of count each, any may be NULL except instance. Barycentrics: hit = (1-u-v) p0 + u p1 + v
- * p2. On a miss instance is TRC_NO_HIT and the rest is untouched. Of equal distances, the lowest
- * (instance, triangle) in creation order wins. */
+ * p2; of curves, u is along the piece, v across as the ray sees it, of round ones that are met from
+ * within 4 more; of balls both are across. On a miss instance is TRC_NO_HIT and the rest is
+ * untouched. Of equal distances, the lowest (instance, triangle) in creation order wins. */
 typedef struct trc_hits {
     uint32_t struct_size; /* of this structure; checked */
     uint32_t reserved;    /* 0 */
@@ -34,7 +35,8 @@ typedef struct trc_hits {
     uint32_t *triangle;   /* its number in the mesh */
     float *distance;      /* in lengths of the direction */
     float *u, *v;         /* barycentrics, see above */
-    float *normal_x, *normal_y, *normal_z; /* geometric, world, not normalised, by winding */
+    float *normal_x, *normal_y, *normal_z; /* geometric, world, not normalised, by winding; of
+                                              curves towards where the ray came from */
 } trc_hits;
 
 /* No arrays yet. */

@@ -60,9 +60,10 @@ enum trc_feature_flags {
     TRC_FEATURE_VISIBILITY = 1 << 16, /* some instance is hidden from some rays */
     TRC_FEATURE_AMBIENT_OCCLUSION = 1 << 17,
     TRC_FEATURE_SHADOW_CATCHERS = 1 << 18,
-    TRC_FEATURE_SLOPES = 1 << 19, /* some surface has bumps */
-    TRC_FEATURE_LINKS = 1 << 20,  /* some light does not light all, or all does not block it */
-    TRC_FEATURE_PORTALS = 1 << 21 /* some surface sends rays on from elsewhere */
+    TRC_FEATURE_SLOPES = 1 << 19,  /* some surface has bumps */
+    TRC_FEATURE_LINKS = 1 << 20,   /* some light does not light all, or all does not block it */
+    TRC_FEATURE_PORTALS = 1 << 21, /* some surface sends rays on from elsewhere */
+    TRC_FEATURE_CURVES = 1 << 22
 };
 
 typedef struct trc_scene_stats {

@@ -12,6 +12,7 @@
 
 #include "tracer/base.h"
 #include "tracer/camera.h"
+#include "tracer/curves.h"
 #include "tracer/geometry.h"
 #include "tracer/light.h"
 #include "tracer/material.h"

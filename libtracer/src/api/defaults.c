@@ -25,6 +25,15 @@ trc_mesh_desc trc_mesh_desc_default(void) {
     return (trc_mesh_desc){.struct_size = sizeof(trc_mesh_desc), .key_count = 1};
 }
 
+trc_curve_attribute trc_curve_attribute_default(void) {
+    return (trc_curve_attribute){.struct_size = sizeof(trc_curve_attribute), .width = 2};
+}
+
+trc_curves_desc trc_curves_desc_default(void) {
+    return (trc_curves_desc){
+        .struct_size = sizeof(trc_curves_desc), .key_count = 1, .piece_count = 4};
+}
+
 trc_instance_desc trc_instance_desc_default(void) {
     return (trc_instance_desc){.struct_size = sizeof(trc_instance_desc),
                                .key_count = 1,

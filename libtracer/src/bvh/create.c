@@ -281,7 +281,8 @@ static void join_select(struct create_job *job) {
         return;
     for (uint32_t i = 0; i < s->instance_count; i++) {
         const struct trc_instance *instance = &s->instances[i];
-        job->joined[i] = instance->key_count == 1 && s->meshes[instance->mesh]->key_count == 1 &&
+        const struct trc_mesh *mesh = s->meshes[instance->mesh];
+        job->joined[i] = instance->key_count == 1 && mesh->key_count == 1 && !mesh->pieces &&
                          instance->visibility == TRC_VISIBLE_ALL;
     }
     uint32_t *uses = trc_alloc_zeroed(s->mesh_count ? s->mesh_count : 1, sizeof *uses);

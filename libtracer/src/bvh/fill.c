@@ -266,6 +266,7 @@ trc_status trc_tree_fill(const struct trc_topology *topology,
     if (status != TRC_OK)
         return status;
     tree->root = topology->root;
+    tree->shape = parts->mesh->shape;
     tree->has_pieces = boxes != NULL;
     struct trc_fill fill = {.topology = topology,
                             .triangles = triangles,
@@ -294,12 +295,13 @@ trc_status trc_tree_refit(const struct trc_tree *from, const struct trc_part *pa
     if (status != TRC_OK)
         return status;
     tree->root = from->root;
+    tree->shape = from->shape;
     struct trc_fill fill = {
         .from = from, .parts = part, .tree = tree, .known = from->slot_vertices, .cancel = cancel};
     tree->slot_vertices = from->slot_vertices;
     if (tree->slot_vertices)
         atomic_fetch_add(&tree->slot_vertices->refs, 1);
-    else /* without memory for it, the next refit asks the mesh again */
+    else if (!tree->shape) /* without memory for it, the next refit asks the mesh again */
         tree->slot_vertices = fill.learnt = slot_vertices_alloc(from->slot_count);
     if (tree->slot_vertices)
         tree->bytes += from->slot_count * (uint64_t)sizeof tree->slot_vertices->index[0];

@@ -21,6 +21,19 @@ static inline f4 trc_part_point(const struct trc_part *part, f4 p) {
     return x * f4_set(p[0]) + y * f4_set(p[1]) + z * f4_set(p[2]) + w;
 }
 
+/* Ends of a piece of a curve and their radii; curves stand in trees of their own, in object space.
+ */
+static inline void trc_piece_ends(const struct trc_mesh *mesh, uint32_t piece, uint32_t key,
+                                  f4 ends[2], float radii[2]) {
+    uint32_t index[3];
+    trc_mesh_corners(mesh, piece, index);
+    for (int end = 0; end < 2; end++) {
+        const size_t vertex = (size_t)key * mesh->vertex_count + index[end];
+        ends[end] = f4_load3_padded(mesh->positions + 3 * vertex);
+        radii[end] = mesh->radii[vertex];
+    }
+}
+
 /* The corners of the triangle with those vertices, in the part's space. */
 static inline void trc_part_corners_unplaced(const struct trc_part *part, const uint32_t index[3],
                                              uint32_t key, f4 corner[3]) {

@@ -11,8 +11,30 @@
 #include "core/core.h"
 #include "core/pool.h"
 
+/* Box of a piece of a curve, the mean over its keys; false where an end is not valid at some key,
+ * or neither has a radius. */
+static bool piece_ref(const struct trc_mesh *mesh, uint32_t piece, struct trc_ref *ref) {
+    const f4 share = f4_set(1.0f / (float)mesh->key_count), limit = f4_set(TRC_MAX_COORDINATE);
+    f4 lower = f4_set(0.0f), upper = f4_set(0.0f);
+    for (uint32_t key = 0; key < mesh->key_count; key++) {
+        f4 p[2];
+        float r[2];
+        trc_piece_ends(mesh, piece, key, p, r);
+        if (!i4_all((f4_abs(p[0]) <= limit) & (f4_abs(p[1]) <= limit)) ||
+            !(r[0] <= TRC_MAX_COORDINATE && r[1] <= TRC_MAX_COORDINATE && r[0] + r[1] > 0.0f))
+            return false;
+        lower += f4_min(p[0] - f4_set(r[0]), p[1] - f4_set(r[1])) * share;
+        upper += f4_max(p[0] + f4_set(r[0]), p[1] + f4_set(r[1])) * share;
+    }
+    f4_store3(ref->lower, lower);
+    f4_store3(ref->upper, upper);
+    return true;
+}
+
 /* Box of a triangle, the mean over its keys; false where a corner is not valid at some key. */
 static bool triangle_ref(const struct trc_part *part, uint32_t triangle, struct trc_ref *ref) {
+    if (part->mesh->pieces)
+        return piece_ref(part->mesh, triangle, ref);
     const uint32_t *index = part->mesh->indices + 3 * (size_t)triangle;
     const uint32_t key_count = part->mesh->key_count;
     const f4 share = f4_set(1.0f / (float)key_count), limit = f4_set(TRC_MAX_COORDINATE);

@@ -17,20 +17,36 @@ struct trc_material;    /* model/material.h */
 struct trc_light_table; /* shading/lights.h */
 struct trc_image;       /* image/image.h */
 
-/* One attribute per triangle corner. */
+/* One attribute per triangle corner; of curves, per vertex. */
 struct trc_attribute {
-    uint32_t name;  /* index of the name in the snapshot's name table (trc_names) */
-    uint32_t width; /* 2 or 4 */
-    float *values;  /* width * 3 * triangle_count */
+    uint32_t name;          /* index of the name in the snapshot's name table (trc_names) */
+    uint32_t width;         /* 2 or 4 */
+    float *values;          /* width * 3 * triangle_count; curves: width * vertex_count */
+    const uint32_t *pieces; /* of the mesh */
+    uint32_t piece_end;     /* from a piece's first vertex to its other: 1, balls 0 */
 };
 
-/* Geometry of a mesh, shared and immutable; refs counts the holders. */
+/* What the primitives of a mesh are. */
+enum trc_mesh_shape {
+    TRC_SHAPE_TRIANGLES = 0,
+    TRC_SHAPE_RIBBONS,
+    TRC_SHAPE_ROUND,
+    TRC_SHAPE_BALLS
+};
+
+/* Geometry of a mesh, shared and immutable; refs counts the holders.
+ *
+ * Of curves the vertices are the ends of straight pieces, and what is said of triangles is of
+ * pieces: their corners are those of trc_mesh_corners, and attributes are one of each vertex. */
 struct trc_mesh {
     atomic_uint refs;
     uint32_t key_count;
     uint32_t vertex_count, triangle_count;
-    float *positions;      /* 3 * vertex_count * key_count, and one unset beyond: f4_load3_padded */
-    uint32_t *indices;     /* 3 * triangle_count */
+    float *positions;  /* 3 * vertex_count * key_count, and one unset beyond: f4_load3_padded */
+    uint32_t *indices; /* 3 * triangle_count; curves: NULL */
+    uint32_t shape;    /* TRC_SHAPE_* */
+    uint32_t *pieces;  /* curves: first vertex of each piece, the next is its other; else NULL */
+    float *radii;      /* curves: vertex_count * key_count */
     float *vertex_normals; /* 3 * vertex_count * key_count or NULL */
     float *corner_normals; /* 9 * triangle_count * key_count or NULL; rules over vertex_normals */
     uint8_t *smooth;       /* per triangle, or NULL: none smooth (corner normals: all) */
@@ -43,6 +59,20 @@ struct trc_mesh {
     float bounds_lower[3],
         bounds_upper[3]; /* object space, all keys: Generated coordinates use key 0 */
 };
+
+/* Vertices of a triangle's corners; of a piece of a curve its ends, of a ball its middle, with the
+ * first for the third: barycentrics (u, 0) are along it. */
+static inline void trc_mesh_corners(const struct trc_mesh *mesh, uint32_t triangle,
+                                    uint32_t corners_out[3]) {
+    if (!mesh->pieces) {
+        const uint32_t *index = mesh->indices + 3 * (size_t)triangle;
+        for (int k = 0; k < 3; k++)
+            corners_out[k] = index[k];
+        return;
+    }
+    corners_out[0] = corners_out[2] = mesh->pieces[triangle];
+    corners_out[1] = corners_out[0] + (mesh->shape != TRC_SHAPE_BALLS);
+}
 
 /* Coordinates beyond this, or not finite, take their triangles out of the scene: sums and
  * differences of what remains stay far from overflow, and so do the squares in a triangle test

@@ -15,6 +15,9 @@
  * All of that is the same for every instruction set, whatever its width, to the bit: trees serve
  * each of them.
  *
+ * A piece of a curve takes the room of a triangle: x, y, z and radius of one end, then of the
+ * other, and TRC_PIECE_*, as a number.
+ *
  * A TLAS has the same nodes; its leaves have no vertices: each is one entry of items. */
 #ifndef TRACER_MODEL_TREE_H
 #define TRACER_MODEL_TREE_H
@@ -46,6 +49,12 @@
  * otherwise. A traversal pushes at most 7 entries a level. */
 #define TRC_MAX_LEVELS 48
 #define TRC_STACK_SIZE (TRC_MAX_LEVELS * (TRC_NODE_WIDTH - 1) + 1)
+
+/* Floats of a piece: those of an end and where the other's begin, and what it is of its strand. */
+#define TRC_PIECE_RADIUS 3
+#define TRC_PIECE_END 4
+#define TRC_PIECE_FLAGS 8
+enum { TRC_PIECE_FIRST = 1, TRC_PIECE_LAST = 2 };
 
 struct trc_tree;
 
@@ -85,6 +94,7 @@ struct trc_tree {
     struct trc_slot_vertices *slot_vertices; /* shared by refits of one tree; or NULL */
     const struct trc_item *items;            /* TLAS only, by slot */
     bool is_top;
+    uint32_t shape;           /* TRC_SHAPE_* of what is in its leaves */
     bool has_pieces;          /* a triangle may stand in several leaves (bvh/clip.h) */
     float lower[3], upper[3]; /* over all keys; lower > upper when empty */
     float extent;             /* largest |coordinate| of the bounds: scale of rounding errors */

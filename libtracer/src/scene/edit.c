@@ -4,29 +4,45 @@
 
 #include "core/checks.h"
 #include "core/core.h"
+#include "scene/curves.h"
 #include "scene/displace.h"
 #include "scene/mesh.h"
 #include "scene/scene.h"
 
 /* ---- meshes ---- */
 
-trc_status trc_scene_add_mesh(struct trc_scene_state *scene, const trc_mesh_desc *desc,
-                              trc_id *id) {
+/* Takes the geometry over, on failure too. */
+static trc_status add_geometry(struct trc_scene_state *scene, struct trc_mesh *geometry,
+                               trc_id *id) {
     struct trc_scene_mesh *mesh = trc_alloc_zeroed(1, sizeof *mesh);
-    if (!mesh)
-        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for a mesh");
-    trc_status status = trc_geometry_create(desc, scene->names, &mesh->geometry);
-    if (status == TRC_OK) {
+    trc_status status = TRC_OK;
+    if (mesh) {
+        mesh->geometry = geometry;
         status = trc_store_add(&scene->meshes, mesh, id);
-        if (status != TRC_OK)
-            trc_geometry_release(mesh->geometry);
+    } else {
+        status = trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for a mesh");
     }
     if (status != TRC_OK) {
+        trc_geometry_release(geometry);
         trc_free(mesh);
         return status;
     }
     scene->changed |= TRC_CHANGED_MESHES;
     return TRC_OK;
+}
+
+trc_status trc_scene_add_mesh(struct trc_scene_state *scene, const trc_mesh_desc *desc,
+                              trc_id *id) {
+    struct trc_mesh *geometry;
+    TRC_TRY(trc_geometry_create(desc, scene->names, &geometry));
+    return add_geometry(scene, geometry, id);
+}
+
+trc_status trc_scene_add_curves(struct trc_scene_state *scene, const trc_curves_desc *desc,
+                                trc_id *id) {
+    struct trc_mesh *geometry;
+    TRC_TRY(trc_curves_geometry_create(desc, scene->names, &geometry));
+    return add_geometry(scene, geometry, id);
 }
 
 trc_status trc_scene_pose_mesh(struct trc_scene_state *scene, trc_id id, uint32_t key_count,
@@ -36,6 +52,8 @@ trc_status trc_scene_pose_mesh(struct trc_scene_state *scene, trc_id id, uint32_
     TRC_TRY(trc_store_find(&scene->meshes, id, &object));
     struct trc_scene_mesh *mesh = object;
     const struct trc_mesh *former = mesh->geometry;
+    if (former->pieces)
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "the mesh is of curves");
     const uint32_t kind = trc_geometry_normal_kind(former);
     const uint64_t expected = (uint64_t)3 * former->vertex_count * key_count;
     const uint64_t expected_normals = kind == TRC_NORMALS_NONE ? 0
@@ -50,6 +68,19 @@ trc_status trc_scene_pose_mesh(struct trc_scene_state *scene, trc_id id, uint32_
     }
     struct trc_mesh *pose;
     TRC_TRY(trc_geometry_pose(former, key_count, positions, normals, &pose));
+    trc_geometry_release(mesh->geometry);
+    mesh->geometry = pose;
+    scene->changed |= TRC_CHANGED_MESHES;
+    return TRC_OK;
+}
+
+trc_status trc_scene_pose_curves(struct trc_scene_state *scene, trc_id id, uint32_t key_count,
+                                 const float *points, uint64_t point_value_count) {
+    void *object;
+    TRC_TRY(trc_store_find(&scene->meshes, id, &object));
+    struct trc_scene_mesh *mesh = object;
+    struct trc_mesh *pose;
+    TRC_TRY(trc_curves_geometry_pose(mesh->geometry, key_count, points, point_value_count, &pose));
     trc_geometry_release(mesh->geometry);
     mesh->geometry = pose;
     scene->changed |= TRC_CHANGED_MESHES;

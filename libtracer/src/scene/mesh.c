@@ -14,7 +14,7 @@ static trc_status no_memory(void) {
 
 /* ---- topology ---- */
 
-static void release_topology(struct trc_mesh_topology *topology) {
+void trc_topology_release(struct trc_mesh_topology *topology) {
     if (!topology || atomic_fetch_sub(&topology->refs, 1) != 1)
         return;
     trc_free(topology->indices);
@@ -26,11 +26,12 @@ static void release_topology(struct trc_mesh_topology *topology) {
     }
     trc_free(topology->corner_begin);
     trc_free(topology->corners);
+    trc_free(topology->pieces);
+    trc_free(topology->lengths);
     trc_free(topology);
 }
 
-/* A copy of count elements, or NULL in *copy_out for none. False when out of memory. */
-static bool copy_array(struct trc_mesh_topology *topology, const void *source, uint64_t count,
+bool trc_topology_copy(struct trc_mesh_topology *topology, const void *source, uint64_t count,
                        size_t size, void *copy_out) {
     void *copy = NULL;
     if (source && count) {
@@ -61,8 +62,7 @@ static bool all_zero(const void *data, uint64_t bytes) {
     return !b || !bytes || (b[0] == 0 && memcmp(b, b + 1, bytes - 1) == 0);
 }
 
-/* A NaN coordinate would reach integer conversions in texture lookups. */
-static void clear_bad_values(float *values, uint64_t count) {
+void trc_clear_bad_values(float *values, uint64_t count) {
     for (uint64_t i = 0; i < count; i++) {
         if (!isfinite(values[i]))
             values[i] = 0.0f;
@@ -74,11 +74,12 @@ static trc_status copy_attribute(struct trc_mesh_topology *topology,
     struct trc_attribute *attribute = &topology->attributes[topology->attribute_count];
     attribute->width = desc->width;
     TRC_TRY(trc_names_add(names, desc->name, &attribute->name));
-    if (!copy_array(topology, desc->values, desc->value_count, sizeof(float), &attribute->values)) {
+    if (!trc_topology_copy(topology, desc->values, desc->value_count, sizeof(float),
+                           &attribute->values)) {
         return no_memory();
     }
     topology->attribute_count++;
-    clear_bad_values(attribute->values, desc->value_count);
+    trc_clear_bad_values(attribute->values, desc->value_count);
     return TRC_OK;
 }
 
@@ -91,16 +92,18 @@ static trc_status fill_topology(struct trc_mesh_topology *topology, const trc_me
         topology->normal_kind != TRC_NORMALS_CORNER && !all_zero(desc->smooth, triangles);
     const bool slots = !all_zero(desc->material_index, triangles * sizeof(uint16_t));
     TRC_TRY(check_indices(desc->indices, 3 * triangles, desc->vertex_count));
-    if (!copy_array(topology, desc->indices, 3 * triangles, sizeof(uint32_t), &topology->indices) ||
-        !copy_array(topology, smooth ? desc->smooth : NULL, triangles, 1, &topology->smooth) ||
-        !copy_array(topology, slots ? desc->material_index : NULL, triangles, sizeof(uint16_t),
-                    &topology->material_index) ||
-        !copy_array(topology, desc->generated, desc->generated_count, sizeof(float),
-                    &topology->generated)) {
+    if (!trc_topology_copy(topology, desc->indices, 3 * triangles, sizeof(uint32_t),
+                           &topology->indices) ||
+        !trc_topology_copy(topology, smooth ? desc->smooth : NULL, triangles, 1,
+                           &topology->smooth) ||
+        !trc_topology_copy(topology, slots ? desc->material_index : NULL, triangles,
+                           sizeof(uint16_t), &topology->material_index) ||
+        !trc_topology_copy(topology, desc->generated, desc->generated_count, sizeof(float),
+                           &topology->generated)) {
         return no_memory();
     }
     if (topology->generated)
-        clear_bad_values(topology->generated, desc->generated_count);
+        trc_clear_bad_values(topology->generated, desc->generated_count);
     for (uint32_t i = 0; i < desc->attribute_count; i++) {
         TRC_TRY(copy_attribute(topology, &desc->attributes[i], names));
     }
@@ -161,7 +164,7 @@ static void grow_bounds(const float *p, float lower[3], float upper[3]) {
 }
 
 /* Over all keys and vertices; those that take no part in the scene do not count. */
-static void find_bounds(struct trc_mesh *mesh) {
+void trc_geometry_bound(struct trc_mesh *mesh) {
     float lower[3] = {INFINITY, INFINITY, INFINITY}, upper[3] = {-INFINITY, -INFINITY, -INFINITY};
     const size_t count = (size_t)3 * mesh->vertex_count * mesh->key_count;
     const float *p = mesh->positions;
@@ -205,6 +208,8 @@ static void share_topology(struct trc_geometry *geometry, struct trc_mesh_topolo
     mesh->smooth = topology->smooth;
     mesh->material_index = topology->material_index;
     mesh->generated = topology->generated;
+    mesh->pieces = topology->pieces;
+    mesh->shape = topology->shape;
     mesh->attribute_count = topology->attribute_count;
     memcpy(mesh->attributes, topology->attributes, sizeof mesh->attributes);
     mesh->default_uv = -1;
@@ -212,6 +217,29 @@ static void share_topology(struct trc_geometry *geometry, struct trc_mesh_topolo
         if (mesh->attributes[i].width == 2)
             mesh->default_uv = (int32_t)i;
     }
+}
+
+trc_status trc_geometry_alloc(struct trc_mesh_topology *topology, uint32_t vertex_count,
+                              uint32_t triangle_count, uint32_t key_count,
+                              struct trc_mesh **mesh_out) {
+    struct trc_geometry *geometry = trc_alloc_zeroed(1, sizeof *geometry);
+    if (!geometry) {
+        trc_topology_release(topology);
+        return no_memory();
+    }
+    struct trc_mesh *mesh = &geometry->mesh;
+    atomic_init(&mesh->refs, 1);
+    share_topology(geometry, topology);
+    mesh->vertex_count = vertex_count;
+    mesh->triangle_count = triangle_count;
+    mesh->key_count = key_count;
+    mesh->positions = trc_alloc((uint64_t)3 * vertex_count * key_count + 1, sizeof(float));
+    if (!mesh->positions) {
+        trc_geometry_release(mesh);
+        return no_memory();
+    }
+    *mesh_out = mesh;
+    return TRC_OK;
 }
 
 /* Takes the topology's reference over, on failure too. */
@@ -226,39 +254,26 @@ static trc_status create_pose(struct trc_mesh_topology *topology, uint32_t verte
         keys_are_equal(normals, normals_per_key, key_count)) {
         key_count = 1;
     }
-    struct trc_geometry *geometry = trc_alloc_zeroed(1, sizeof *geometry);
-    if (!geometry) {
-        release_topology(topology);
-        return no_memory();
-    }
-    struct trc_mesh *mesh = &geometry->mesh;
-    atomic_init(&mesh->refs, 1);
-    share_topology(geometry, topology);
-    mesh->vertex_count = vertex_count;
-    mesh->triangle_count = triangle_count;
-    mesh->key_count = key_count;
-    mesh->positions = trc_alloc(per_key * key_count + 1, sizeof(float));
-    bool ok = mesh->positions != NULL;
+    struct trc_mesh *mesh;
+    TRC_TRY(trc_geometry_alloc(topology, vertex_count, triangle_count, key_count, &mesh));
     /* Without smooth triangles nothing reads vertex normals. */
-    if (ok && (kind == TRC_NORMALS_CORNER || (kind == TRC_NORMALS_VERTEX && mesh->smooth))) {
+    if (kind == TRC_NORMALS_CORNER || (kind == TRC_NORMALS_VERTEX && mesh->smooth)) {
         float *copy = trc_alloc(normals_per_key * key_count, sizeof(float));
-        ok = copy != NULL;
-        if (ok && normals_per_key) {
-            memcpy(copy, normals, normals_per_key * key_count * sizeof(float));
+        if (!copy) {
+            trc_geometry_release(mesh);
+            return no_memory();
         }
+        if (normals_per_key)
+            memcpy(copy, normals, normals_per_key * key_count * sizeof(float));
         if (kind == TRC_NORMALS_CORNER)
             mesh->corner_normals = copy;
         else
             mesh->vertex_normals = copy;
     }
-    if (!ok) {
-        trc_geometry_release(mesh);
-        return no_memory();
-    }
     if (per_key)
         memcpy(mesh->positions, positions, per_key * key_count * sizeof(float));
     repair_normals(mesh);
-    find_bounds(mesh);
+    trc_geometry_bound(mesh);
     *mesh_out = mesh;
     return TRC_OK;
 }
@@ -271,7 +286,7 @@ trc_status trc_geometry_create(const trc_mesh_desc *desc, struct trc_names *name
     atomic_init(&topology->refs, 1);
     const trc_status status = fill_topology(topology, desc, names);
     if (status != TRC_OK) {
-        release_topology(topology);
+        trc_topology_release(topology);
         return status;
     }
     return create_pose(topology, (uint32_t)desc->vertex_count, (uint32_t)desc->triangle_count,
@@ -297,7 +312,7 @@ static void fill_generated(const struct trc_mesh *from, float *generated) {
             generated[3 * v + axis] =
                 from->positions[3 * v + axis] * scale - (center * scale - 0.5f);
     }
-    clear_bad_values(generated, (uint64_t)3 * from->vertex_count);
+    trc_clear_bad_values(generated, (uint64_t)3 * from->vertex_count);
 }
 
 trc_status trc_geometry_displace(struct trc_mesh *from, const float *positions,
@@ -344,18 +359,21 @@ void trc_geometry_release(struct trc_mesh *mesh) {
     if (!mesh || atomic_fetch_sub(&mesh->refs, 1) != 1)
         return;
     trc_free(mesh->positions);
+    trc_free(mesh->radii);
     trc_free(mesh->vertex_normals);
     trc_free(mesh->corner_normals);
     if (mesh->generated != ((struct trc_geometry *)mesh)->topology->generated)
         trc_free(mesh->generated);
     trc_geometry_release(((struct trc_geometry *)mesh)->from);
-    release_topology(((struct trc_geometry *)mesh)->topology);
+    trc_topology_release(((struct trc_geometry *)mesh)->topology);
     trc_free(mesh);
 }
 
 uint64_t trc_geometry_bytes(const struct trc_mesh *mesh) {
     const uint64_t vertex = (uint64_t)3 * mesh->vertex_count * mesh->key_count * sizeof(float);
     const uint64_t corner = (uint64_t)9 * mesh->triangle_count * mesh->key_count * sizeof(float);
+    const uint64_t radii = (uint64_t)mesh->vertex_count * mesh->key_count * sizeof(float);
     return ((const struct trc_geometry *)mesh)->topology->bytes + vertex +
-           (mesh->vertex_normals ? vertex : 0) + (mesh->corner_normals ? corner : 0);
+           (mesh->radii ? radii : 0) + (mesh->vertex_normals ? vertex : 0) +
+           (mesh->corner_normals ? corner : 0);
 }

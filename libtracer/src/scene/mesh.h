@@ -3,6 +3,8 @@
 #ifndef TRACER_SCENE_MESH_H
 #define TRACER_SCENE_MESH_H
 
+#include <stdbool.h>
+
 #include "model/names.h"
 #include "model/snapshot.h"
 
@@ -46,7 +48,7 @@ trc_status trc_geometry_finish(struct trc_mesh *mesh, struct trc_pool *pool,
 trc_status trc_geometry_vertex_normals(const struct trc_mesh *mesh, struct trc_pool *pool,
                                        const atomic_uint *cancel, float **normals_out);
 
-/* ---- shared by scene/mesh.c and scene/normals.c ---- */
+/* ---- shared by scene/mesh.c, scene/normals.c and scene/curves.c ---- */
 
 /* What all poses of a mesh have in common. */
 struct trc_mesh_topology {
@@ -61,6 +63,11 @@ struct trc_mesh_topology {
     /* Corners (3 * triangle + corner) of each vertex, made when normals are first needed:
      * corners[corner_begin[v]] to corners[corner_begin[v + 1]]. */
     uint32_t *corner_begin, *corners;
+    /* Curves: how many pieces from point to point, of which points; see model/snapshot.h. */
+    uint32_t *pieces;
+    uint32_t *lengths; /* points of each strand, or NULL: balls */
+    uint32_t strand_count, point_count, piece_count;
+    uint32_t shape; /* TRC_SHAPE_* */
     uint64_t bytes;
 };
 
@@ -69,6 +76,26 @@ struct trc_geometry {
     struct trc_mesh_topology *topology;
     struct trc_mesh *from; /* what it was before displacement, held, or NULL */
 };
+
+/* NULL is fine. */
+void trc_topology_release(struct trc_mesh_topology *topology);
+
+/* A copy of count elements, or NULL in *copy_out for none. False when out of memory. */
+bool trc_topology_copy(struct trc_mesh_topology *topology, const void *source, uint64_t count,
+                       size_t size, void *copy_out);
+
+/* A mesh of that topology, whose reference it takes over, on failure too; its positions are not
+ * set. OUT_OF_MEMORY. */
+trc_status trc_geometry_alloc(struct trc_mesh_topology *topology, uint32_t vertex_count,
+                              uint32_t triangle_count, uint32_t key_count,
+                              struct trc_mesh **mesh_out);
+
+/* Sets the bounds by the positions. */
+void trc_geometry_bound(struct trc_mesh *mesh);
+
+/* A NaN coordinate would reach integer conversions in texture lookups: what is not finite becomes
+ * 0. */
+void trc_clear_bad_values(float *values, uint64_t count);
 
 /* A direction for a vertex whose triangles give none: away from the object's origin, as Blender. */
 void trc_normal_fallback(const float position[3], float normal_out[3]);

@@ -100,6 +100,10 @@ trc_status trc_scene_add_mesh(struct trc_scene_state *scene, const trc_mesh_desc
 trc_status trc_scene_pose_mesh(struct trc_scene_state *scene, trc_id id, uint32_t key_count,
                                const float *positions, uint64_t position_count,
                                const float *normals, uint64_t normal_count);
+trc_status trc_scene_add_curves(struct trc_scene_state *scene, const trc_curves_desc *desc,
+                                trc_id *id);
+trc_status trc_scene_pose_curves(struct trc_scene_state *scene, trc_id id, uint32_t key_count,
+                                 const float *points, uint64_t point_value_count);
 trc_status trc_scene_remove_mesh(struct trc_scene_state *scene, trc_id id);
 
 trc_status trc_scene_add_instance(struct trc_scene_state *scene, const trc_instance_desc *desc,

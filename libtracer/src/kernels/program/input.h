@@ -187,6 +187,14 @@ static const struct trc_attribute *mesh_attribute(const struct trc_mesh *mesh, u
 /* Component c of an attribute at the three corners. */
 TRC_INLINE void attribute_corners(const struct trc_attribute *a, uint32_t c, vint triangle,
                                   vmask lanes, vfloat out[3]) {
+    if (a->pieces) {
+        const vint width = vi_set((int32_t)a->width);
+        const vint piece = vi_gather((const int32_t *)a->pieces, triangle, lanes) * width;
+        const float *end = a->values + c + a->piece_end * a->width;
+        out[0] = out[2] = vf_gather(a->values + c, piece, lanes);
+        out[1] = vf_gather(end, piece, lanes);
+        return;
+    }
     const vint first = triangle * vi_set((int32_t)(3 * a->width));
     for (uint32_t k = 0; k < 3; k++)
         out[k] = vf_gather(a->values + k * a->width + c, first, lanes);

@@ -48,6 +48,8 @@
 #define trc_clock_other(...) TRC_KERNEL(trc_clock_other)(__VA_ARGS__)
 #define trc_clock_shade(...) TRC_KERNEL(trc_clock_shade)(__VA_ARGS__)
 #define trc_clock_trace(...) TRC_KERNEL(trc_clock_trace)(__VA_ARGS__)
+#define trc_curve_fetch(...) TRC_KERNEL(trc_curve_fetch)(__VA_ARGS__)
+#define trc_curve_lanes(...) TRC_KERNEL(trc_curve_lanes)(__VA_ARGS__)
 #define trc_data_passes(...) TRC_KERNEL(trc_data_passes)(__VA_ARGS__)
 #define trc_denoise_memory_bytes(...) TRC_KERNEL(trc_denoise_memory_bytes)(__VA_ARGS__)
 #define trc_denoise_tile(...) TRC_KERNEL(trc_denoise_tile)(__VA_ARGS__)

@@ -29,6 +29,23 @@ TRC_INLINE f8 f8_max(f8 a, f8 b) {
 }
 #endif
 
+TRC_INLINE f8 f8_sqrt(f8 a) {
+#if defined(__AVX__)
+    return (f8)_mm256_sqrt_ps((__m256)a);
+#else
+    f8 r;
+    for (int i = 0; i < 8; i++)
+        r[i] = __builtin_sqrtf(a[i]);
+    return r;
+#endif
+}
+
+/* x where a <= b, else y (also for NaN). */
+TRC_INLINE f8 f8_select_le(f8 a, f8 b, f8 x, f8 y) {
+    const i8x m = a <= b;
+    return (f8)(((i8x)x & m) | ((i8x)y & ~m));
+}
+
 /* a * b + c, fused where the hardware can: only for culls whose slack covers either rounding. */
 TRC_INLINE f8 f8_madd(f8 a, f8 b, f8 c) {
 #if defined(__FMA__)

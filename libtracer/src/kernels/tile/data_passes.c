@@ -156,12 +156,25 @@ static void surface_motion(struct trc_tile *t, const struct trc_instance *instan
                            const struct trc_mesh *mesh, uint32_t triangle, float u, float v,
                            uint32_t slot) {
     float ways[3][3], p[3];
+    uint32_t corners[3];
+    trc_mesh_corners(mesh, triangle, corners);
     for (int k = 0; k < 3; k++) {
         const float time = 0.5f * (float)k;
-        point_at(instance, mesh, mesh->indices + 3 * (size_t)triangle, u, v, time, p);
+        point_at(instance, mesh, corners, u, v, time, p);
         way_to(t, p, k, ways[k]);
     }
     store_motion(t, ways, slot);
+}
+
+/* The default UVs of a triangle's corners. */
+static void uv_corners(const struct trc_mesh *mesh, uint32_t triangle,
+                       const float *corners_out[3]) {
+    const float *values = mesh->attributes[mesh->default_uv].values;
+    uint32_t index[3] = {3 * triangle, 3 * triangle + 1, 3 * triangle + 2};
+    if (mesh->pieces)
+        trc_mesh_corners(mesh, triangle, index);
+    for (int k = 0; k < 3; k++)
+        corners_out[k] = values + 2 * (size_t)index[k];
 }
 
 static void first_surface(struct trc_tile *t, const struct trc_surface *s,
@@ -185,11 +198,11 @@ static void first_surface(struct trc_tile *t, const struct trc_surface *s,
             surface_motion(t, instance, mesh, (uint32_t)vi_get(s->triangle, i), uv[0][i], uv[1][i],
                            slot);
         if (mesh->default_uv >= 0 && t->samples.pass[TRC_PASS_UV][0]) {
-            const float *c =
-                mesh->attributes[mesh->default_uv].values + 6 * (size_t)vi_get(s->triangle, i);
+            const float *c[3];
             const float u = uv[0][i], v = uv[1][i], w = 1.0f - u - v;
-            store_vector(t, TRC_PASS_UV, slot, w * c[0] + u * c[2] + v * c[4],
-                         w * c[1] + u * c[3] + v * c[5], 1.0f);
+            uv_corners(mesh, (uint32_t)vi_get(s->triangle, i), c);
+            store_vector(t, TRC_PASS_UV, slot, w * c[0][0] + u * c[1][0] + v * c[2][0],
+                         w * c[0][1] + u * c[1][1] + v * c[2][1], 1.0f);
         }
     }
 }

@@ -82,8 +82,14 @@ TRC_INLINE void trc_load_vectors(const float *values, const vint index[3], uint3
                                       v3_gather(values + 3 * (size_t)stride, at, m), f);
     }
 }
+/* Corners as trc_mesh_corners has them. */
 TRC_INLINE void trc_load_indices(const struct trc_mesh *mesh, vint triangle, vmask m,
                                  vint index[3]) {
+    if (mesh->pieces) {
+        index[0] = index[2] = vi_gather((const int32_t *)mesh->pieces, triangle, m);
+        index[1] = index[0] + vi_set(mesh->shape != TRC_SHAPE_BALLS);
+        return;
+    }
     const vint at = triangle * vi_set(3);
     for (int k = 0; k < 3; k++)
         index[k] = vi_gather((const int32_t *)mesh->indices + k, at, m);
@@ -148,8 +154,9 @@ static inline void trc_world_corners_at(const struct trc_snapshot *snapshot, uin
     const struct trc_instance *object = &snapshot->instances[instance];
     const struct trc_mesh *mesh = snapshot->meshes[object->mesh];
     float corner[9], m[TRC_AFFINE_FLOATS];
-    trc_corner_at(mesh->positions, mesh->indices + 3 * (size_t)triangle, mesh->vertex_count,
-                  mesh->key_count, time, corner);
+    uint32_t index[3];
+    trc_mesh_corners(mesh, triangle, index);
+    trc_corner_at(mesh->positions, index, mesh->vertex_count, mesh->key_count, time, corner);
     trc_affine_at(object, time, m);
     for (int k = 0; k < 3; k++)
         for (int i = 0; i < 3; i++)

@@ -24,7 +24,10 @@ struct trc_packet {
     bool skip_transparent; /* occlusion: materials that shadow rays see through do not count */
 } __attribute__((aligned(64)));
 
-/* Written where a ray hits; instance must be TRC_NO_HIT before. */
+/* Added to the v of hits of round curves and balls that are met from within. */
+#define TRC_CURVE_WITHIN 4.0f
+
+/* Written where a ray hits; instance must be TRC_NO_HIT before. u and v as in tracer/query.h. */
 struct trc_packet_hits {
     uint32_t instance[TRC_PACKET_SIZE];
     uint32_t triangle[TRC_PACKET_SIZE];

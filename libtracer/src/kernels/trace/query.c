@@ -1,5 +1,6 @@
 /* Ray queries: arrays of the caller through packets. */
 #include "kernels/trace/query.h"
+#include "kernels/trace/curve_surface.h"
 
 #include "kernels/trace/direction.h"
 #include "kernels/trace/packet.h"
@@ -184,6 +185,24 @@ TRC_INLINE void elements_store(void *column, const struct rays_part *part, uint3
     }
 }
 
+/* The normal of a hit of a curve, towards where the ray came from, unit. */
+static void curve_normal(const struct trc_snapshot *snapshot, const struct trc_packet *p,
+                         const struct trc_packet_hits *h, uint32_t lane, float normal[3]) {
+    const vvec3 d = v3(vf_set(p->d[0][lane]), vf_set(p->d[1][lane]), vf_set(p->d[2][lane]));
+    struct trc_surface s = {.snapshot = snapshot,
+                            .active = vm_from_bits(1),
+                            .instance = vi_set((int32_t)h->instance[lane]),
+                            .triangle = vi_set((int32_t)h->triangle[lane]),
+                            .u = vf_set(h->u[lane]),
+                            .v = vf_set(h->v[lane]),
+                            .time = vf_set(p->time[lane]),
+                            .wo = v3_neg(v3_normalize(d))};
+    trc_curve_fetch(&s, s.active);
+    normal[0] = vf_get(s.n.x, 0);
+    normal[1] = vf_get(s.n.y, 0);
+    normal[2] = vf_get(s.n.z, 0);
+}
+
 static void normals_store(const struct trc_snapshot *snapshot, const trc_hits *out,
                           const struct rays_part *part, uint32_t at, const struct trc_packet *p,
                           const struct trc_packet_hits *h, uint32_t hit) {
@@ -191,7 +210,10 @@ static void normals_store(const struct trc_snapshot *snapshot, const trc_hits *o
     for (; hit; hit &= hit - 1) {
         const uint32_t number = at + (uint32_t)__builtin_ctz(hit), lane = number % TRC_PACKET_SIZE;
         float n[3];
-        trc_query_normal(snapshot, h->instance[lane], h->triangle[lane], p->time[lane], n);
+        if (snapshot->meshes[snapshot->instances[h->instance[lane]].mesh]->pieces)
+            curve_normal(snapshot, p, h, lane, n);
+        else
+            trc_query_normal(snapshot, h->instance[lane], h->triangle[lane], p->time[lane], n);
         for (int k = 0; k < 3; k++)
             if (columns[k])
                 columns[k][part->begin + (part->order ? part->order[number] : number)] = n[k];

@@ -1,6 +1,7 @@
 /* The surface at a hit: position with the bound of its error, normals, sides. */
 #include "kernels/trace/surface.h"
 
+#include "kernels/trace/curve_surface.h"
 #include "kernels/trace/mesh_fetch.h"
 
 /* What is read from the scene, before arithmetic. */
@@ -207,9 +208,7 @@ static void set_normals(struct trc_surface *s, const struct raw_hit *h, vvec3 e1
     s->n = v3_scale(n, side);
 }
 
-void trc_surface_fetch(struct trc_surface *s) {
-    if (!vm_any(s->active))
-        return;
+static void triangle_fetch(struct trc_surface *s) {
     struct raw_hit h;
     const int32_t uniform = trc_uniform_instance(s->instance, s->active);
     const struct trc_instance *instance = uniform >= 0 ? &s->snapshot->instances[uniform] : NULL;
@@ -222,4 +221,28 @@ void trc_surface_fetch(struct trc_surface *s) {
     const vvec3 e2 = v3_sub(h.p.corner[2], h.p.corner[0]);
     set_position(s, &h, e1, e2);
     set_normals(s, &h, e1, e2);
+}
+
+/* The same where there are curves. */
+static void mixed_fetch(struct trc_surface *s) {
+    const vmask active = s->active, curves = trc_curve_lanes(s);
+    s->active = vm_andnot(active, curves);
+    if (vm_any(s->active)) {
+        triangle_fetch(s);
+    } else {
+        s->p = s->p_error = s->ng = s->n = s->bulge = v3_zero();
+        s->backfacing = s->smooth = vm_none();
+    }
+    s->active = active;
+    if (vm_any(curves))
+        trc_curve_fetch(s, curves);
+}
+
+void trc_surface_fetch(struct trc_surface *s) {
+    if (!vm_any(s->active))
+        return;
+    if (s->snapshot->features & TRC_FEATURE_CURVES)
+        mixed_fetch(s);
+    else
+        triangle_fetch(s);
 }

@@ -190,7 +190,16 @@ TRC_INLINE struct trc_live child_rays(const struct walk *w, const struct opened 
     return trc_live_any(&live) ? box_rays(w, node, child, &live, together) : live;
 }
 
-TRC_INLINE void packet_walk(struct walk *w, struct trc_live mask, bool any, bool motion) {
+TRC_INLINE bool leaf_rays(struct walk *w, uint32_t ref, struct trc_live mask, bool any, bool motion,
+                          bool curves) {
+    if (curves)
+        return curve_leaf_packet(w, ref, mask, any, motion);
+    return leaf_packet(w, ref, mask, any, motion);
+}
+
+/* curves: what is in the tree's leaves. */
+TRC_INLINE void packet_walk(struct walk *w, struct trc_live mask, bool any, bool motion,
+                            bool curves) {
     struct entry stack[TRC_STACK_SIZE];
     struct opened opened[TRC_MAX_LEVELS + 1]; /* on the way to ref */
     uint16_t level = 0;
@@ -201,18 +210,18 @@ TRC_INLINE void packet_walk(struct walk *w, struct trc_live mask, bool any, bool
     for (;;) {
         const int count = trc_live_count(&live);
         if (count <= (any ? TRC_STREAM_ANY : TRC_STREAM_CLOSEST)) {
-            stream_walk(w, ref, &live, any, motion);
+            stream_walk(w, ref, &live, any, motion, curves);
         } else {
             TRC_COUNT(visits, 1);
             TRC_COUNT(visit_rays, count);
             if (!(ref & TRC_REF_LEAF)) {
                 TRC_COUNT(nodes, 1);
                 top = node_open(w, ref, &live, any, motion, level, &opened[level], stack, top);
-            } else if (w->tree->is_top) {
+            } else if (!curves && w->tree->is_top) {
                 item_packet(w, &w->tree->items[trc_leaf_first(ref)], live, any);
                 if (!any)
                     beam_shorten(w, &mask);
-            } else if (leaf_packet(w, ref, live, any, motion) && !any) {
+            } else if (leaf_rays(w, ref, live, any, motion, curves) && !any) {
                 beam_shorten(w, &mask);
             }
         }
@@ -227,15 +236,36 @@ TRC_INLINE void packet_walk(struct walk *w, struct trc_live mask, bool any, bool
     }
 }
 
-static void walk_any(struct walk *w, struct trc_live mask) { packet_walk(w, mask, true, false); }
+static void walk_any(struct walk *w, struct trc_live mask) {
+    packet_walk(w, mask, true, false, false);
+}
 static void walk_closest(struct walk *w, struct trc_live mask) {
-    packet_walk(w, mask, false, false);
+    packet_walk(w, mask, false, false, false);
 }
 static void walk_any_moving(struct walk *w, struct trc_live mask) {
-    packet_walk(w, mask, true, true);
+    packet_walk(w, mask, true, true, false);
 }
 static void walk_closest_moving(struct walk *w, struct trc_live mask) {
-    packet_walk(w, mask, false, true);
+    packet_walk(w, mask, false, true, false);
+}
+static void walk_any_curves(struct walk *w, struct trc_live mask) {
+    packet_walk(w, mask, true, false, true);
+}
+static void walk_closest_curves(struct walk *w, struct trc_live mask) {
+    packet_walk(w, mask, false, false, true);
+}
+static void walk_any_moving_curves(struct walk *w, struct trc_live mask) {
+    packet_walk(w, mask, true, true, true);
+}
+static void walk_closest_moving_curves(struct walk *w, struct trc_live mask) {
+    packet_walk(w, mask, false, true, true);
+}
+
+static void walk_curves(struct walk *w, struct trc_live mask, bool any, bool motion) {
+    if (motion)
+        (any ? walk_any_moving_curves : walk_closest_moving_curves)(w, mask);
+    else
+        (any ? walk_any_curves : walk_closest_curves)(w, mask);
 }
 
 /* Moving trees: rays of one segment between keys at a time, each with its place in it. */
@@ -269,13 +299,30 @@ static void walk_segments(struct walk *w, struct trc_live mask, bool any) {
             mask.of[k] &= ~same.of[k];
         }
         w->key = key;
-        (any ? walk_any_moving : walk_closest_moving)(w, same);
+        if (w->tree->shape)
+            walk_curves(w, same, any, true);
+        else
+            (any ? walk_any_moving : walk_closest_moving)(w, same);
     }
+}
+
+/* The same of trees of curves. */
+static void walk_curves_group(struct walk *w, struct trc_live mask, bool any) {
+    struct trc_turned turned[TRC_WALK_PACKETS];
+    for (int k = 0; k < TRC_WALK_PACKETS; k++)
+        trc_turned_setup(&w->group->of[k], mask.of[k], &turned[k]);
+    w->turned = turned;
+    if (w->tree->key_count > 1)
+        walk_segments(w, mask, any);
+    else
+        walk_curves(w, mask, any, false);
 }
 
 /* The rays of w's group through w's tree. */
 static void walk_group(struct walk *w, struct trc_live mask, bool any) {
-    if (w->tree->key_count > 1)
+    if (w->tree->shape)
+        walk_curves_group(w, mask, any);
+    else if (w->tree->key_count > 1)
         walk_segments(w, mask, any);
     else
         (any ? walk_any : walk_closest)(w, mask);

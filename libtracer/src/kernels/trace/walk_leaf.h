@@ -20,6 +20,8 @@
 #define TRC_WALK_LOOKS_BACK 0
 #endif
 
+struct trc_turned; /* kernels/trace/curve.h */
+
 struct walk {
     const struct trc_snapshot *snapshot;
     const struct trc_tree *tree;
@@ -29,7 +31,8 @@ struct walk {
     uint32_t instance;            /* of the tree; TRC_NO_HIT: leaves say */
     uint32_t key;                 /* moving trees: first key of the segment */
     struct trc_group *group;
-    const uint32_t *left; /* looking back: the instances that the packet's rays left */
+    struct trc_turned *turned; /* curves: of each packet's rays in the group */
+    const uint32_t *left;      /* looking back: the instances that the packet's rays left */
 };
 
 /* ---- packets ---- */
@@ -269,6 +272,36 @@ TRC_INLINE bool leaf_packet(struct walk *w, uint32_t ref, struct trc_live mask, 
 
 /* ---- one ray ---- */
 
+/* Keeps a ray's hits of slots, as hits_keep. True: occluded (any only). */
+TRC_INLINE bool ray_keep(struct walk *w, const struct trc_slot *ids, int k, int ray, uint32_t hit,
+                         f8 t, f8 u, f8 v, bool any) {
+    struct trc_packet *p = &w->packets[k];
+    for (; hit; hit &= hit - 1) {
+        const int slot = __builtin_ctz(hit);
+        const float distance = t[slot];
+        if (!(distance > least_distance(w, k, ray, &ids[slot])))
+            continue;
+        if (any) {
+            if (distance < p->t[ray] &&
+                !(p->skip_transparent && (ids[slot].instance & TRC_SLOT_TRANSPARENT)))
+                return true;
+            continue;
+        }
+        const uint32_t instance = slot_instance(w, ids[slot]), triangle = ids[slot].triangle;
+        struct trc_packet_hits *h = &w->hits[k];
+        const bool lower = instance < h->instance[ray] ||
+                           (instance == h->instance[ray] && triangle < h->triangle[ray]);
+        if (distance < p->t[ray] || (distance == p->t[ray] && lower && distance < INFINITY)) {
+            p->t[ray] = distance;
+            h->u[ray] = u[slot];
+            h->v[ray] = v[slot];
+            h->instance[ray] = instance;
+            h->triangle[ray] = triangle;
+        }
+    }
+    return false;
+}
+
 /* One ray's tests against a leaf. True: occluded (any only). */
 TRC_INLINE bool leaf_single(struct walk *w, uint32_t ref, int k, int ray, bool any, bool motion) {
     struct trc_packet *p = &w->packets[k];
@@ -295,30 +328,7 @@ TRC_INLINE bool leaf_single(struct walk *w, uint32_t ref, int k, int ray, bool a
     uint32_t hit = trc_triangle8_test(
         &tri, p->o[axis.u][ray], p->o[axis.v][ray], p->o[axis.z][ray], g->su[ray], g->sv[ray],
         g->sz[ray], leaf_precise_beyond(w, k, ray, ids, count), (1u << count) - 1u, &t, &bu, &bv);
-    for (; hit; hit &= hit - 1) {
-        const int slot = __builtin_ctz(hit);
-        const float distance = t[slot];
-        if (!(distance > least_distance(w, k, ray, &ids[slot])))
-            continue;
-        if (any) {
-            if (distance < p->t[ray] &&
-                !(p->skip_transparent && (ids[slot].instance & TRC_SLOT_TRANSPARENT)))
-                return true;
-            continue;
-        }
-        const uint32_t instance = slot_instance(w, ids[slot]), triangle = ids[slot].triangle;
-        struct trc_packet_hits *h = &w->hits[k];
-        const bool lower = instance < h->instance[ray] ||
-                           (instance == h->instance[ray] && triangle < h->triangle[ray]);
-        if (distance < p->t[ray] || (distance == p->t[ray] && lower && distance < INFINITY)) {
-            p->t[ray] = distance;
-            h->u[ray] = bu[slot];
-            h->v[ray] = bv[slot];
-            h->instance[ray] = instance;
-            h->triangle[ray] = triangle;
-        }
-    }
-    return false;
+    return ray_keep(w, ids, k, ray, hit, t, bu, bv, any);
 }
 
 #endif

@@ -7,7 +7,7 @@
 #ifndef TRACER_KERNELS_TRACE_WALK_STREAM_H
 #define TRACER_KERNELS_TRACE_WALK_STREAM_H
 
-#include "kernels/trace/walk_leaf.h"
+#include "kernels/trace/walk_curves.h"
 
 static void item_packet(struct walk *w, const struct trc_item *item, struct trc_live mask,
                         bool any);
@@ -137,11 +137,13 @@ TRC_INLINE void stream_item(struct walk *w, uint32_t ref, struct stream *s, uint
 }
 
 TRC_INLINE void stream_leaf(struct walk *w, uint32_t ref, struct stream *s, uint32_t rays, bool any,
-                            bool motion) {
+                            bool motion, bool curves) {
     for (; rays; rays &= rays - 1) {
         const int i = __builtin_ctz(rays);
         const int k = s->ray[i] / TRC_PACKET_SIZE, ray = s->ray[i] % TRC_PACKET_SIZE;
-        if (leaf_single(w, ref, k, ray, any, motion)) {
+        const bool occluded = curves ? curve_leaf_single(w, ref, k, ray, any, motion)
+                                     : leaf_single(w, ref, k, ray, any, motion);
+        if (occluded) {
             w->occluded.of[k] |= 1ull << ray;
             s->alive &= ~(1u << i);
         }
@@ -152,7 +154,7 @@ TRC_INLINE void stream_leaf(struct walk *w, uint32_t ref, struct stream *s, uint
 
 /* Walks live rays, at most TRC_STREAM_SIZE, through the subtree at ref. */
 TRC_INLINE void stream_walk(struct walk *w, uint32_t ref, const struct trc_live *live, bool any,
-                            bool motion) {
+                            bool motion, bool curves) {
     struct stream_entry stack[TRC_STACK_SIZE];
     struct stream s;
     int top = 0;
@@ -163,10 +165,10 @@ TRC_INLINE void stream_walk(struct walk *w, uint32_t ref, const struct trc_live 
             TRC_COUNT(single_nodes, __builtin_popcount(rays));
             const uint32_t bits = stream_node(w, ref, &s, rays, motion, met);
             top = stream_push(w, ref, bits, met, any, stack, top);
-        } else if (w->tree->is_top) {
+        } else if (!curves && w->tree->is_top) {
             stream_item(w, ref, &s, rays, any);
         } else {
-            stream_leaf(w, ref, &s, rays, any, motion);
+            stream_leaf(w, ref, &s, rays, any, motion, curves);
         }
         do {
             if (top == 0)

@@ -1,0 +1,14 @@
+/* The surface at hits of curves. */
+#ifndef TRACER_KERNELS_TRACE_CURVE_SURFACE_H
+#define TRACER_KERNELS_TRACE_CURVE_SURFACE_H
+
+#include "kernels/trace/surface.h"
+
+/* Active lanes that hit curves. */
+vmask trc_curve_lanes(const struct trc_surface *s);
+
+/* What trc_surface_fetch fills, of those lanes; what others have stays. v, which normals are made
+ * of, becomes 0: with u, barycentrics of the piece's ends. */
+void trc_curve_fetch(struct trc_surface *s, vmask lanes);
+
+#endif

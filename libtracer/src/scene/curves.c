@@ -1,0 +1,260 @@
+#include "scene/curves.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <stdbool.h>
+#include <string.h>
+
+#include "core/checks.h"
+#include "core/core.h"
+#include "scene/mesh.h"
+
+static trc_status no_memory(void) {
+    return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for curves");
+}
+
+/* ---- counts ---- */
+
+/* Of vertices and primitives. */
+struct counts {
+    uint64_t vertices, pieces;
+};
+
+static struct counts strand_counts(uint32_t length, uint32_t piece_count) {
+    if (length < 2)
+        return (struct counts){0, 0};
+    const uint64_t pieces = (uint64_t)(length - 1) * piece_count;
+    return (struct counts){pieces + 1, pieces};
+}
+
+static trc_status count_all(const trc_curves_desc *desc, struct counts *out) {
+    uint64_t points = 0;
+    *out = (struct counts){0, 0};
+    for (uint64_t i = 0; desc->lengths && i < desc->strand_count; i++) {
+        const struct counts c = strand_counts(desc->lengths[i], desc->piece_count);
+        points += desc->lengths[i];
+        out->vertices += c.vertices;
+        out->pieces += c.pieces;
+    }
+    if (!desc->lengths)
+        *out = (struct counts){desc->point_count, desc->point_count};
+    else if (points != desc->point_count)
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT,
+                        "the lengths of strands sum up to %" PRIu64 ", but there are %" PRIu64
+                        " points",
+                        points, desc->point_count);
+    if (out->vertices > INT32_MAX / 4 || 4 * out->vertices * desc->key_count > INT32_MAX)
+        return trc_fail(TRC_ERROR_TOO_LARGE, "%" PRIu64 " ends of pieces at %u keys are too many",
+                        out->vertices, desc->key_count);
+    return TRC_OK;
+}
+
+/* ---- from points to vertices ---- */
+
+/* The spline's weights of the points p0 to p3, t from p1 to p2. */
+static void spline_weights(float t, float w[4]) {
+    const float t2 = t * t, t3 = t2 * t;
+    w[0] = 0.5f * (-t + 2.0f * t2 - t3);
+    w[1] = 0.5f * (2.0f - 5.0f * t2 + 3.0f * t3);
+    w[2] = 0.5f * (t + 4.0f * t2 - 3.0f * t3);
+    w[3] = 0.5f * (t3 - t2);
+}
+
+/* A vertex; NaN stays, as it takes its pieces out. */
+static void vertex_store(const float p[4], float position[3], float *radius) {
+    memcpy(position, p, 3 * sizeof *p);
+    *radius = p[3] < 0.0f ? 0.0f : p[3];
+}
+
+/* The vertices of a strand of two points or more. */
+static void strand_fill(const float *points, uint32_t length, uint32_t piece_count,
+                        float (*weights)[4], float *positions, float *radii) {
+    for (uint32_t i = 0; i + 1 < length; i++) {
+        const float *p1 = points + 4 * (size_t)i, *p2 = p1 + 4;
+        const float *p0 = i > 0 ? p1 - 4 : p1, *p3 = i + 2 < length ? p2 + 4 : p2;
+        vertex_store(p1, positions, radii++);
+        positions += 3;
+        for (uint32_t k = 1; k < piece_count; k++, positions += 3) {
+            const float *w = weights[k];
+            float p[4];
+            for (int axis = 0; axis < 4; axis++)
+                p[axis] = w[0] * p0[axis] + w[1] * p1[axis] + w[2] * p2[axis] + w[3] * p3[axis];
+            vertex_store(p, positions, radii++);
+        }
+    }
+    vertex_store(points + 4 * (size_t)(length - 1), positions, radii);
+}
+
+/* The vertices of all strands at a key. */
+static void key_fill(const struct trc_mesh_topology *t, const float *points, float *positions,
+                     float *radii) {
+    float weights[TRC_MAX_CURVE_PIECES][4];
+    for (uint32_t k = 1; k < t->piece_count; k++)
+        spline_weights((float)k / (float)t->piece_count, weights[k]);
+    for (uint32_t i = 0; !t->lengths && i < t->point_count; i++)
+        vertex_store(points + 4 * (size_t)i, positions + 3 * (size_t)i, radii + i);
+    for (uint32_t i = 0; t->lengths && i < t->strand_count; i++) {
+        const uint32_t length = t->lengths[i];
+        const uint64_t vertices = strand_counts(length, t->piece_count).vertices;
+        if (vertices)
+            strand_fill(points, length, t->piece_count, weights, positions, radii);
+        points += 4 * (size_t)length;
+        positions += 3 * vertices;
+        radii += vertices;
+    }
+}
+
+static trc_status create_pose(struct trc_mesh_topology *topology, const struct counts *counts,
+                              uint32_t key_count, const float *points, struct trc_mesh **mesh_out) {
+    const size_t per_key = (size_t)4 * topology->point_count, vertices = counts->vertices;
+    bool moves = false;
+    for (uint32_t key = 1; key < key_count && !moves; key++)
+        moves = memcmp(points, points + per_key * key, per_key * sizeof *points) != 0;
+    key_count = moves ? key_count : 1;
+    struct trc_mesh *mesh;
+    TRC_TRY(trc_geometry_alloc(topology, (uint32_t)vertices, (uint32_t)counts->pieces, key_count,
+                               &mesh));
+    mesh->radii = trc_alloc(vertices * key_count, sizeof *mesh->radii);
+    if (!mesh->radii) {
+        trc_geometry_release(mesh);
+        return no_memory();
+    }
+    for (uint32_t key = 0; key < key_count; key++)
+        key_fill(topology, points + per_key * key, mesh->positions + 3 * vertices * key,
+                 mesh->radii + vertices * key);
+    trc_geometry_bound(mesh);
+    *mesh_out = mesh;
+    return TRC_OK;
+}
+
+/* ---- what does not move ---- */
+
+static void pieces_fill(const struct trc_mesh_topology *t, uint32_t *pieces) {
+    uint32_t vertex = 0;
+    for (uint32_t i = 0; !t->lengths && i < t->point_count; i++)
+        pieces[i] = i;
+    for (uint32_t i = 0; t->lengths && i < t->strand_count; i++) {
+        const struct counts c = strand_counts(t->lengths[i], t->piece_count);
+        for (uint64_t k = 0; k < c.pieces; k++)
+            *pieces++ = vertex++;
+        vertex += c.pieces > 0;
+    }
+}
+
+/* Values of strands, for each of their vertices. */
+static void spread_strands(const struct trc_mesh_topology *t, const float *values, uint32_t width,
+                           float *out) {
+    for (uint32_t i = 0; i < t->strand_count; i++, values += width) {
+        const uint64_t count =
+            t->lengths ? strand_counts(t->lengths[i], t->piece_count).vertices : 1;
+        for (uint64_t k = 0; k < count; k++, out += width)
+            memcpy(out, values, width * sizeof *out);
+    }
+}
+
+/* Values of points, on straight lines between them. */
+static void spread_points(const struct trc_mesh_topology *t, const float *values, uint32_t width,
+                          float *out) {
+    if (!t->lengths) {
+        if (t->point_count)
+            memcpy(out, values, (size_t)t->point_count * width * sizeof *out);
+        return;
+    }
+    for (uint32_t i = 0; i < t->strand_count; i++) {
+        const uint32_t length = t->lengths[i];
+        for (uint32_t p = 0; p + 1 < length; p++)
+            for (uint32_t k = 0; k < t->piece_count; k++, out += width) {
+                const float f = (float)k / (float)t->piece_count;
+                const float *a = values + (size_t)p * width, *b = a + width;
+                for (uint32_t c = 0; c < width; c++)
+                    out[c] = a[c] + f * (b[c] - a[c]);
+            }
+        if (length > 1) {
+            memcpy(out, values + (size_t)(length - 1) * width, width * sizeof *out);
+            out += width;
+        }
+        values += (size_t)length * width;
+    }
+}
+
+static trc_status add_attribute(struct trc_mesh_topology *t, const trc_curve_attribute *desc,
+                                uint64_t vertices, struct trc_names *names) {
+    struct trc_attribute *a = &t->attributes[t->attribute_count];
+    a->width = desc->width;
+    a->pieces = t->pieces;
+    a->piece_end = t->shape != TRC_SHAPE_BALLS;
+    TRC_TRY(trc_names_add(names, desc->name, &a->name));
+    a->values = trc_alloc(vertices * desc->width, sizeof *a->values);
+    if (!a->values)
+        return no_memory();
+    t->attribute_count++;
+    t->bytes += vertices * desc->width * sizeof *a->values;
+    (desc->per_strand ? spread_strands : spread_points)(t, desc->values, desc->width, a->values);
+    trc_clear_bad_values(a->values, vertices * desc->width);
+    return TRC_OK;
+}
+
+#define GENERATED_FLOATS 3
+
+static trc_status fill_topology(struct trc_mesh_topology *t, const trc_curves_desc *desc,
+                                const struct counts *counts, struct trc_names *names) {
+    t->shape = !desc->lengths                     ? TRC_SHAPE_BALLS
+               : desc->shape == TRC_CURVES_RIBBON ? TRC_SHAPE_RIBBONS
+                                                  : TRC_SHAPE_ROUND;
+    t->normal_kind = TRC_NORMALS_NONE;
+    t->piece_count = desc->piece_count;
+    t->point_count = (uint32_t)desc->point_count;
+    t->strand_count = (uint32_t)(desc->lengths ? desc->strand_count : desc->point_count);
+    if (!trc_topology_copy(t, desc->lengths, desc->strand_count, sizeof(uint32_t), &t->lengths))
+        return no_memory();
+    t->pieces = trc_alloc(counts->pieces, sizeof *t->pieces);
+    if (!t->pieces)
+        return no_memory();
+    t->bytes += counts->pieces * sizeof *t->pieces;
+    pieces_fill(t, t->pieces);
+    if (desc->generated) {
+        const uint64_t count = GENERATED_FLOATS * counts->vertices;
+        t->generated = trc_alloc(count, sizeof *t->generated);
+        if (!t->generated)
+            return no_memory();
+        t->bytes += count * sizeof *t->generated;
+        spread_strands(t, desc->generated, GENERATED_FLOATS, t->generated);
+        trc_clear_bad_values(t->generated, count);
+    }
+    for (uint32_t i = 0; i < desc->attribute_count; i++)
+        TRC_TRY(add_attribute(t, &desc->attributes[i], counts->vertices, names));
+    return TRC_OK;
+}
+
+trc_status trc_curves_geometry_create(const trc_curves_desc *desc, struct trc_names *names,
+                                      struct trc_mesh **mesh_out) {
+    struct counts counts;
+    TRC_TRY(count_all(desc, &counts));
+    struct trc_mesh_topology *topology = trc_alloc_zeroed(1, sizeof *topology);
+    if (!topology)
+        return no_memory();
+    atomic_init(&topology->refs, 1);
+    const trc_status status = fill_topology(topology, desc, &counts, names);
+    if (status != TRC_OK) {
+        trc_topology_release(topology);
+        return status;
+    }
+    return create_pose(topology, &counts, desc->key_count, desc->points, mesh_out);
+}
+
+trc_status trc_curves_geometry_pose(const struct trc_mesh *from, uint32_t key_count,
+                                    const float *points, uint64_t point_value_count,
+                                    struct trc_mesh **mesh_out) {
+    struct trc_mesh_topology *topology = ((const struct trc_geometry *)from)->topology;
+    const struct counts counts = {from->vertex_count, from->triangle_count};
+    if (!topology->pieces)
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "the mesh is not of curves");
+    TRC_TRY(trc_check_array(points, point_value_count,
+                            (uint64_t)4 * topology->point_count * key_count, sizeof(float),
+                            sizeof(float), "points"));
+    if (4 * counts.vertices * key_count > INT32_MAX)
+        return trc_fail(TRC_ERROR_TOO_LARGE, "%" PRIu64 " ends of pieces at %u keys are too many",
+                        counts.vertices, key_count);
+    atomic_fetch_add(&topology->refs, 1);
+    return create_pose(topology, &counts, key_count, points, mesh_out);
+}
