@@ -655,6 +655,7 @@ class FeatureFlags(IntFlag):
     LINKS = 1048576
     PORTALS = 2097152
     CURVES = 4194304
+    SHADOW_TERMINATORS = 8388608
 
 
 class CameraDesc(Structure):
@@ -710,9 +711,10 @@ class InstanceDesc(Structure):
                 ("transforms", c_void_p), ("materials", c_void_p), ("material_count", c_uint32),
                 ("visibility", c_uint32), ("pass_index", c_int32), ("random", c_float),
                 ("color", c_float * 4), ("cryptomatte_object", c_float), ("cryptomatte_asset", c_float),
-                ("light_group", c_uint32), ("flags", c_uint32), ("reserved", c_uint32),
+                ("light_group", c_uint32), ("flags", c_uint32), ("ao_distance", c_float),
                 ("value_count", c_uint32), ("values", c_void_p), ("light_set", c_uint32),
-                ("shadow_set", c_uint32), ("light_exclude", c_uint64), ("shadow_exclude", c_uint64))
+                ("shadow_set", c_uint32), ("light_exclude", c_uint64), ("shadow_exclude", c_uint64),
+                ("shadow_terminator_geometry", c_float), ("shadow_terminator_shading", c_float))
 
 
 class LightDesc(Structure):

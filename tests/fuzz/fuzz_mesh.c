@@ -63,7 +63,8 @@ static void create_instance(struct bytes *b, trc_scene scene, trc_id mesh, float
                                     .key_count = keys,
                                     .mesh = mesh,
                                     .transforms = transforms,
-                                    .visibility = bytes_byte(b) & TRC_VISIBLE_ALL};
+                                    .visibility = bytes_byte(b) & TRC_VISIBLE_ALL,
+                                    .shadow_terminator_geometry = 0.1f};
     trc_id id;
     (void)trc_instance_create(scene, &desc, &id);
 }

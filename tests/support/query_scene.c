@@ -67,7 +67,8 @@ static trc_status create_instance(trc_scene scene, const struct query_instance *
                                     .mesh = mesh,
                                     .transforms = instance->transforms[0],
                                     .visibility = instance->visibility,
-                                    .color = {1, 1, 1, 1}};
+                                    .color = {1, 1, 1, 1},
+                                    .shadow_terminator_geometry = 0.1f};
     return trc_instance_create(scene, &desc, id);
 }
 

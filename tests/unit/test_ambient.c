@@ -219,10 +219,36 @@ static void replaced(void **state) {
     assert_int_equal(trc_scene_destroy(scene), TRC_OK);
 }
 
+/* An object's own distance: under a ceiling at h, (h / d)^2 of the rays are free. It is for
+ * replacing alone. */
+static void own_distance(void **state) {
+    (void)state;
+    const trc_scene scene = fixture_level_view();
+    const float floor[12] = {-1e3f, -1e3f, 0, 1e3f, -1e3f, 0, 1e3f, 1e3f, 0, -1e3f, 1e3f, 0};
+    const trc_mesh_desc mesh_desc = fixture_quad_desc(floor);
+    const trc_id grey = fixture_material(scene, TRC_NODE_DIFFUSE, (float)ALBEDO);
+    const trc_id sky = fixture_material(scene, TRC_NODE_BACKGROUND, 0.25f);
+    trc_id mesh = 0, instance = 0;
+    double column[WIDTH];
+    assert_int_equal(trc_mesh_create(scene, &mesh_desc, &mesh), TRC_OK);
+    trc_instance_desc desc = default_instance_desc(mesh);
+    desc.materials = &grey;
+    desc.material_count = 1;
+    desc.ao_distance = 2.0f;
+    assert_int_equal(trc_instance_create(scene, &desc, &instance), TRC_OK);
+    fixture_level(scene, 1000.0f, 1.5f, grey);
+    draw(scene, &(struct setting){15.0f, 0.5f, TRC_AO_REPLACE, 4, sky}, 0, column);
+    expect_all(column, ALBEDO * 0.5 * 0.25 * 0.5625, 5e-4);
+    draw(scene, &(struct setting){15.0f, 0.5f, TRC_AO_ADD, 4, 0}, 0, column);
+    expect_all(column, ALBEDO * 0.5 * 0.01, 2e-3);
+    assert_int_equal(trc_scene_destroy(scene), TRC_OK);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(plane),    cmocka_unit_test(ceiling),  cmocka_unit_test(corner),
-        cmocka_unit_test(box),      cmocka_unit_test(mirror),   cmocka_unit_test(passes),
-        cmocka_unit_test(own_pass), cmocka_unit_test(replaced), cmocka_unit_test(behind_glass)};
+        cmocka_unit_test(plane),       cmocka_unit_test(ceiling),  cmocka_unit_test(corner),
+        cmocka_unit_test(box),         cmocka_unit_test(mirror),   cmocka_unit_test(passes),
+        cmocka_unit_test(own_pass),    cmocka_unit_test(replaced), cmocka_unit_test(behind_glass),
+        cmocka_unit_test(own_distance)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

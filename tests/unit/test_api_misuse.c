@@ -508,6 +508,10 @@ static void instances(void **state) {
     REFUSE_INSTANCE(ARGUMENT, desc.cryptomatte_object = NAN);
     REFUSE_INSTANCE(ARGUMENT, desc.cryptomatte_asset = -INFINITY);
     REFUSE_INSTANCE(LARGE, desc.light_group = TRC_MAX_LIGHT_GROUPS + 1);
+    REFUSE_INSTANCE(ARGUMENT, desc.ao_distance = -1.0f);
+    REFUSE_INSTANCE(ARGUMENT, desc.shadow_terminator_geometry = NAN);
+    REFUSE_INSTANCE(ARGUMENT, desc.shadow_terminator_geometry = 1.01f);
+    REFUSE_INSTANCE(ARGUMENT, desc.shadow_terminator_shading = -0.01f);
     const float bad_values[] = {1.0f, NAN};
     REFUSE_INSTANCE(ARGUMENT, desc.value_count = 1);
     REFUSE_INSTANCE(ARGUMENT, desc.values = bad_values; desc.value_count = 2);

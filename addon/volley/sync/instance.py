@@ -7,15 +7,30 @@ mesh that many instances show is read once; the first of them to come along owns
 
 import functools
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import bpy
 import numpy as np
 
-from .. import abi, native
+from .. import abi, compat, native
 from . import motion, visibility
 from .hashing import HASH_MAX, hash_name, hash_pair
 from .linking import ObjectLinks
 from .matrix import rows12
+
+
+class Offsets(NamedTuple):
+    """The fields of trc_instance_desc that say where rays of an object start and end."""
+
+    shadow_terminator_geometry: float
+    shadow_terminator_shading: float
+    ao_distance: float
+
+
+def offsets_of(blender_object):
+    """Those of an object's settings."""
+    return Offsets(*compat.shadow_terminator(blender_object),
+                   max(compat.cycles(blender_object, "ao_distance", 0.0), 0.0))
 
 
 @dataclass
@@ -37,6 +52,7 @@ class Item:
     light_group: int = 0       # from 1 on, 0 for none
     flags: int = 0             # INSTANCE_*
     links: ObjectLinks = ObjectLinks()
+    offsets: Offsets = Offsets(0.1, 0.0, 0.0)
     values: tuple = ()         # see instancer_values and attributes.Attributes
     light: dict = None         # fields of a light instead of a mesh
     motion_keys: int = 1       # how many the object asks for
@@ -124,6 +140,7 @@ def describe(instance, view_layer, light_groups, links):
         color=tuple(blender_object.color),
         light_group=light_groups.get(blender_object.lightgroup, 0),
         links=links.of(blender_object, maker_of(instance)),
+        offsets=offsets_of(blender_object),
         flags=int(abi.InstanceFlags.SHADOW_CATCHER) * visibility.is_shadow_catcher(instance, view_layer))
 
 
@@ -220,13 +237,13 @@ class Instances:
         transforms = motion.follow_turns(collapse(item.transforms))
         signature = (mesh_id, transforms.tobytes(), item.materials, item.hole, item.visibility,
                      item.pass_index, item.random, item.color, item.name, item.asset, item.light_group,
-                     item.flags, item.links, item.values)
+                     item.flags, item.links, item.offsets, item.values)
         entry = self._entries.get(item.key)
         if entry is not None and entry.signature == signature:
             return
         values = {"mesh": mesh_id, "transforms": transforms, "pass_index": item.pass_index,
                   "random": item.random, "color": item.color, "light_group": item.light_group,
-                  "flags": item.flags, **item.links._asdict(), "values": item.values,
+                  "flags": item.flags, **item.links._asdict(), **item.offsets._asdict(), "values": item.values,
                   "cryptomatte_object": native.cryptomatte_id(item.name),
                   "cryptomatte_asset": native.cryptomatte_id(item.asset)}
         parts = _parts(item)

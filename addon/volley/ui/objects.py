@@ -3,6 +3,7 @@
 
 from bpy.types import Panel
 
+from ..compat import shadow_terminator_settings
 from .panel import VolleyPanel, column_of, draw_light_group
 
 
@@ -72,6 +73,42 @@ class VOLLEY_OBJECT_PT_culling(_SeenObjectPanel, Panel):
             row = layout.row()
             row.active = scene.render.use_simplify and getattr(scene.cycles, f"use_{kind}_cull")
             row.prop(settings, f"use_{kind}_cull")
+
+
+class _ShadingPanel(_ObjectPanel):
+    bl_options = {'DEFAULT_CLOSED'}
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and _has_shape(context.object) and hasattr(context.object, "cycles")
+
+
+class VOLLEY_OBJECT_PT_shading(_ShadingPanel, Panel):
+    bl_label = "Shading"
+
+    def draw(self, context):
+        pass
+
+
+class VOLLEY_OBJECT_PT_shadow_terminator(_ShadingPanel, Panel):
+    bl_label = "Shadow Terminator"
+    bl_parent_id = "VOLLEY_OBJECT_PT_shading"
+
+    def draw(self, context):
+        column, active = column_of(self).column(align=True), context.object
+        owner, names = shadow_terminator_settings(active)
+        for name, text in zip(names, ("Geometry Offset", "Shading Offset")):
+            column.prop(owner, name, text=text)
+
+
+class VOLLEY_OBJECT_PT_fast_gi(_ShadingPanel, Panel):
+    bl_label = "Ambient Occlusion"
+    bl_parent_id = "VOLLEY_OBJECT_PT_shading"
+
+    def draw(self, context):
+        column, settings = column_of(self).column(), context.scene.volley
+        column.active = settings.use_ambient_occlusion and settings.ao_method == 'REPLACE'
+        column.prop(context.object.cycles, "ao_distance", text="AO Distance")
 
 
 class VOLLEY_OBJECT_PT_motion_blur(_ObjectPanel, Panel):

@@ -111,19 +111,25 @@ typedef struct trc_instance_desc {
                                                     asset's name; 0: in no matte */
     uint32_t light_group;                        /* of its emission, 0..TRC_MAX_LIGHT_GROUPS */
     uint32_t flags;                              /* TRC_INSTANCE_* */
-    uint32_t reserved;                           /* 0 */
-    uint32_t value_count;                        /* 0..TRC_MAX_INSTANCE_VALUES */
-    const float *values;                         /* for TRC_NODE_INSTANCE_VALUES */
-    uint32_t light_set;      /* 0..63: its bit in the light_exclude of what does not light it */
-    uint32_t shadow_set;     /* 0..63: its bit in the shadow_exclude of what shines through it. What
-                                is opaque and of set 0 hides such lights from reflected and
-                                refracted rays all the same, as in Cycles */
+    float ao_distance;    /* in place of that of trc_world_desc for TRC_AO_REPLACE, >= 0; 0: not */
+    uint32_t value_count; /* 0..TRC_MAX_INSTANCE_VALUES */
+    const float *values;  /* for TRC_NODE_INSTANCE_VALUES */
+    uint32_t light_set;   /* 0..63: its bit in the light_exclude of what does not light it */
+    uint32_t shadow_set;  /* 0..63: its bit in the shadow_exclude of what shines through it. What
+                             is opaque and of set 0 hides such lights from reflected and
+                             refracted rays all the same, as in Cycles */
     uint64_t light_exclude;  /* as an emitter: 1 << light_set of those that it does not light, as in
                                 trc_light_desc. The camera sees its emission all the same */
     uint64_t shadow_exclude; /* as an emitter: 1 << shadow_set of those that do not block it */
+    /* Where light grazes smooth triangles, shadow rays start from the curved surface that the
+     * normals describe. geometry: cosine to either normal below which they begin to, 0 (not at all)
+     * to 1. shading: 0 (none) to 1, takes light from reflecting lobes on the last part of the way
+     * to where it would graze. */
+    float shadow_terminator_geometry, shadow_terminator_shading;
 } trc_instance_desc;
 
-/* Of no mesh yet: at the origin, unscaled, the default material, visible to all rays, white. */
+/* Of no mesh yet: at the origin, unscaled, the default material, visible to all rays, white, a
+ * shadow_terminator_geometry of 0.1. */
 TRC_API trc_instance_desc trc_instance_desc_default(void);
 
 /* Places a mesh in the scene from the next commit on. INVALID_HANDLE for a mesh or a material that

@@ -63,7 +63,9 @@ enum trc_feature_flags {
     TRC_FEATURE_SLOPES = 1 << 19,  /* some surface has bumps */
     TRC_FEATURE_LINKS = 1 << 20,   /* some light does not light all, or all does not block it */
     TRC_FEATURE_PORTALS = 1 << 21, /* some surface sends rays on from elsewhere */
-    TRC_FEATURE_CURVES = 1 << 22
+    TRC_FEATURE_CURVES = 1 << 22,
+    /* Some instance has shadow terminator offsets other than the defaults. */
+    TRC_FEATURE_SHADOW_TERMINATORS = 1 << 23
 };
 
 typedef struct trc_scene_stats {

@@ -39,7 +39,8 @@ trc_instance_desc trc_instance_desc_default(void) {
                                .key_count = 1,
                                .transforms = identity,
                                .visibility = TRC_VISIBLE_ALL,
-                               .color = {1, 1, 1, 1}};
+                               .color = {1, 1, 1, 1},
+                               .shadow_terminator_geometry = 0.1f};
 }
 
 trc_light_desc trc_light_desc_default(void) {

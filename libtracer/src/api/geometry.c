@@ -1,4 +1,5 @@
 /* Public calls on meshes and instances. */
+#include <float.h>
 #include <inttypes.h>
 
 #include "core/checks.h"
@@ -127,6 +128,11 @@ static trc_status check_instance(const trc_instance_desc *desc) {
     TRC_TRY(trc_check_finite(&desc->cryptomatte_object, 1, "cryptomatte_object"));
     TRC_TRY(trc_check_count(desc->light_group, 0, TRC_MAX_LIGHT_GROUPS, "light_group"));
     TRC_TRY(trc_check_enum(desc->flags, 2 * TRC_INSTANCE_KEEPS_SHAPE, "flags"));
+    TRC_TRY(trc_check_float(desc->ao_distance, 0.0f, FLT_MAX, "ao_distance"));
+    TRC_TRY(trc_check_float(desc->shadow_terminator_geometry, 0.0f, 1.0f,
+                            "shadow_terminator_geometry"));
+    TRC_TRY(
+        trc_check_float(desc->shadow_terminator_shading, 0.0f, 1.0f, "shadow_terminator_shading"));
     TRC_TRY(trc_check_count(desc->light_set, 0, 63, "light_set"));
     TRC_TRY(trc_check_count(desc->shadow_set, 0, 63, "shadow_set"));
     TRC_TRY(trc_check_count(desc->value_count, 0, TRC_MAX_INSTANCE_VALUES, "value_count"));

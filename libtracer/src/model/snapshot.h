@@ -102,6 +102,9 @@ enum {
     TRC_SHADOW_CLASS_SHIFT = 16 /* from here on, by shadow class - 1: what blocks such lights */
 };
 
+/* Cosine below which shadow rays of most instances begin to start from the curved surface. */
+#define TRC_TERMINATOR_COSINE 0.1f
+
 struct trc_instance {
     uint32_t mesh; /* into snapshot meshes */
     uint32_t key_count;
@@ -121,11 +124,15 @@ struct trc_instance {
     uint32_t light_set, shadow_set; /* as trc_instance_desc has them */
     uint32_t shadow_class;          /* of its emission: trc_snapshot.shadow_classes */
     uint64_t light_exclude;         /* as trc_instance_desc has it */
-    uint32_t first_light; /* first emissive-triangle light of this instance or UINT32_MAX */
-    uint32_t flips;       /* 1: negative determinant at key 0 */
-    uint32_t keeps_shape; /* 1: displacement moves no vertices */
-    uint32_t is_identity; /* 1: one key, which changes no point */
-    uint32_t is_thin; /* 1: some key's transform is (scene/affine.h); rays meet a tree of its own
+    float terminator_cosine; /* shadow_terminator_geometry, TRC_TERMINATOR_COSINE by default */
+    float terminator_turn; /* of shadow_terminator_shading: the factor on the angle of light to the
+                              normal at which lobes reflect it; 1 by default */
+    float ao_distance;     /* 0: the world's */
+    uint32_t first_light;  /* first emissive-triangle light of this instance or UINT32_MAX */
+    uint8_t flips;         /* 1: negative determinant at key 0 */
+    uint8_t keeps_shape;   /* 1: displacement moves no vertices */
+    uint8_t is_identity;   /* 1: one key, which changes no point */
+    uint8_t is_thin; /* 1: some key's transform is (scene/affine.h); rays meet a tree of its own
                          in world space */
 };
 

@@ -147,6 +147,9 @@ static trc_status make_instance(const struct trc_scene_state *scene, const trc_i
         .shadow_set = desc->shadow_set,
         .light_exclude = desc->light_exclude,
         .shadow_exclude = desc->shadow_exclude,
+        .shadow_terminator_geometry = desc->shadow_terminator_geometry,
+        .shadow_terminator_shading = desc->shadow_terminator_shading,
+        .ao_distance = desc->ao_distance,
     };
     memcpy(instance->color, desc->color, sizeof instance->color);
     *instance_out = instance;

@@ -43,6 +43,9 @@ static uint32_t instance_features(const struct trc_snapshot *s) {
             features |= TRC_FEATURE_LINKS;
         if (instance->visibility & TRC_VISIBLE_UNBLOCKED)
             features |= TRC_FEATURE_SHADOW_CATCHERS;
+        if (instance->terminator_cosine != TRC_TERMINATOR_COSINE ||
+            instance->terminator_turn != 1.0f)
+            features |= TRC_FEATURE_SHADOW_TERMINATORS;
         if (instance->key_count > 1)
             features |= TRC_FEATURE_OBJECT_MOTION;
         if (s->meshes[instance->mesh]->key_count > 1)

@@ -56,6 +56,7 @@ struct trc_scene_instance {
     uint32_t flags;                 /* TRC_INSTANCE_* */
     uint32_t light_set, shadow_set; /* as trc_instance_desc has them, and so */
     uint64_t light_exclude, shadow_exclude;
+    float shadow_terminator_geometry, shadow_terminator_shading, ao_distance;
 };
 
 struct trc_scene_state {

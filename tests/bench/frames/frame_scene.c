@@ -58,14 +58,11 @@ static trc_status mesh_create(trc_scene scene, const struct mesh *mesh, trc_id *
 static trc_status instance_create(trc_scene scene, trc_id mesh, const float transform[12],
                                   const trc_id *materials, uint32_t material_count) {
     trc_id instance;
-    const trc_instance_desc desc = {.struct_size = sizeof desc,
-                                    .key_count = 1,
-                                    .mesh = mesh,
-                                    .transforms = transform,
-                                    .materials = materials,
-                                    .material_count = material_count,
-                                    .visibility = TRC_VISIBLE_ALL,
-                                    .color = {1, 1, 1, 1}};
+    trc_instance_desc desc = trc_instance_desc_default();
+    desc.mesh = mesh;
+    desc.transforms = transform;
+    desc.materials = materials;
+    desc.material_count = material_count;
     return trc_instance_create(scene, &desc, &instance);
 }
 

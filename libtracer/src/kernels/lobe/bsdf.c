@@ -25,9 +25,21 @@ TRC_INLINE bool is_reflection(enum trc_lobe_kind kind) {
     return kind == TRC_LOBE_DIFFUSE || kind == TRC_LOBE_REFLECT;
 }
 
-TRC_INLINE struct lobe_value value_of(const struct trc_lobe *lobe, const struct trc_surface *s,
-                                      vvec3 wi, vmask side) {
+/* What a shading offset leaves of light from wi: it comes as from further down, so it is gone
+ * before the lobe's horizon (F. Beaune, appleseed, in the form of Cycles). */
+static __attribute__((noinline)) vfloat turned_share(const struct trc_lobes *l, vvec3 n, vvec3 wi) {
+    const vfloat cosine = vf_min(v3_dot(n, wi), vf_one());
+    const vfloat turned = vf_max(vf_cos(vf_acos(cosine) * l->turn), vf_zero());
+    const vmask bends = vm_and(vf_gt(l->turn, vf_one()), vf_gt(cosine, vf_zero()));
+    return vf_select(bends, vf_divide(turned, cosine), vf_one());
+}
+
+TRC_INLINE struct lobe_value value_of(const struct trc_lobes *l, const struct trc_lobe *lobe,
+                                      const struct trc_surface *s, vvec3 wi, vmask side,
+                                      bool turns) {
     struct lobe_value r = lobe->model->value(lobe, s, wi);
+    if (turns && is_reflection(lobe->kind))
+        r.value = v3_scale(r.value, turned_share(l, lobe->n, wi));
     r.value = v3_where(side, r.value);
     r.pdf = vf_where(side, r.pdf);
     r.pick = vf_where(side, r.pick);
@@ -35,8 +47,9 @@ TRC_INLINE struct lobe_value value_of(const struct trc_lobe *lobe, const struct 
     return r;
 }
 
-void trc_bsdf_eval(const struct trc_lobes *l, const struct trc_surface *s, vvec3 wi, vmask active,
-                   struct trc_bsdf_value *out) {
+/* turns: as of l; a constant, so that lobes that turn nothing have no test of it. */
+TRC_INLINE void sum_lobes(const struct trc_lobes *l, const struct trc_surface *s, vvec3 wi,
+                          vmask active, bool turns, struct trc_bsdf_value *out) {
     vmask above, below;
     sides(l, s, wi, active, &above, &below);
     const bool any_above = vm_any(above), any_below = vm_any(below);
@@ -47,7 +60,7 @@ void trc_bsdf_eval(const struct trc_lobes *l, const struct trc_surface *s, vvec3
         const bool up = is_reflection(lobe->kind);
         if (lobe->kind == TRC_LOBE_TRANSPARENT || !(up ? any_above : any_below))
             continue;
-        const struct lobe_value r = value_of(lobe, s, wi, up ? above : below);
+        const struct lobe_value r = value_of(l, lobe, s, wi, up ? above : below, turns);
         if (lobe->kind == TRC_LOBE_REFLECT)
             out->glossy = v3_add(out->glossy, r.value);
         else if (lobe->kind == TRC_LOBE_REFRACT)
@@ -59,9 +72,23 @@ void trc_bsdf_eval(const struct trc_lobes *l, const struct trc_surface *s, vvec3
     out->pdf = vf_divide(out->pdf, l->continue_weight);
 }
 
-/* Sums over the lobes for a sampled rough direction. */
-static void weigh_direction(const struct trc_lobes *l, const struct trc_surface *s, vmask active,
-                            struct trc_bsdf_sample *out) {
+static __attribute__((noinline)) void sum_turned(const struct trc_lobes *l,
+                                                 const struct trc_surface *s, vvec3 wi,
+                                                 vmask active, struct trc_bsdf_value *out) {
+    sum_lobes(l, s, wi, active, true, out);
+}
+
+void trc_bsdf_eval(const struct trc_lobes *l, const struct trc_surface *s, vvec3 wi, vmask active,
+                   struct trc_bsdf_value *out) {
+    if (l->turns)
+        sum_turned(l, s, wi, active, out);
+    else
+        sum_lobes(l, s, wi, active, false, out);
+}
+
+/* Sums over the lobes for a sampled rough direction; turns: as above. */
+TRC_INLINE void weigh_direction(const struct trc_lobes *l, const struct trc_surface *s,
+                                vmask active, bool turns, struct trc_bsdf_sample *out) {
     vmask above, below;
     sides(l, s, out->wi, active, &above, &below);
     const bool any_above = vm_any(above), any_below = vm_any(below);
@@ -72,7 +99,7 @@ static void weigh_direction(const struct trc_lobes *l, const struct trc_surface 
         const bool up = is_reflection(lobe->kind);
         if (lobe->kind == TRC_LOBE_TRANSPARENT || !(up ? any_above : any_below))
             continue;
-        const struct lobe_value r = value_of(lobe, s, out->wi, up ? above : below);
+        const struct lobe_value r = value_of(l, lobe, s, out->wi, up ? above : below, turns);
         value = v3_add(value, r.value);
         pdf = pdf + r.pdf * lobe->sample_weight;
         claimed = claimed + r.claim * lobe->mix_weight;
@@ -85,6 +112,12 @@ static void weigh_direction(const struct trc_lobes *l, const struct trc_surface 
     out->weight = v3_select(active, v3_where(lit, v3_scale(value, vf_rcp(pdf))), out->weight);
     out->indirect_scale = vf_select(lit, vf_divide(picked, claimed), out->indirect_scale);
     out->valid = vm_or(vm_andnot(out->valid, active), vm_and(lit, vf_gt(v3_max(value), vf_zero())));
+}
+
+static __attribute__((noinline)) void weigh_turned(const struct trc_lobes *l,
+                                                   const struct trc_surface *s, vmask active,
+                                                   struct trc_bsdf_sample *out) {
+    weigh_direction(l, s, active, true, out);
 }
 
 /* ---- sampling ---- */
@@ -115,14 +148,17 @@ static void clear_sample(struct trc_bsdf_sample *out) {
 }
 
 /* Enters the ideal direction of a lobe in lanes m; chance: that it was chosen there. */
-static void take_ideal(const struct trc_lobe *lobe, const struct trc_surface *s, vmask m,
-                       vfloat chance, struct trc_bsdf_sample *out) {
+static void take_ideal(const struct trc_lobes *l, const struct trc_lobe *lobe,
+                       const struct trc_surface *s, vmask m, vfloat chance,
+                       struct trc_bsdf_sample *out) {
     vvec3 weight = lobe->weight;
     vvec3 wi = v3_neg(s->wo);
     if (lobe->kind == TRC_LOBE_TRANSPARENT)
         out->transparent = vm_or(out->transparent, m);
     else
         wi = ideal_direction(lobe, s, &weight);
+    if (l->turns && lobe->kind == TRC_LOBE_REFLECT)
+        weight = v3_scale(weight, turned_share(l, lobe->n, wi));
     if (lobe->model->is_portal) {
         wi = lobe->f90;
         out->origin = v3_select(m, lobe->f0, out->origin);
@@ -164,7 +200,7 @@ void trc_bsdf_sample(const struct trc_lobes *l, const struct trc_surface *s, vfl
         if (lobe->kind == TRC_LOBE_TRANSLUCENT)
             out->diffuse = vm_or(out->diffuse, m);
         if (vm_any(exact))
-            take_ideal(lobe, s, exact, lobe->sample_weight / l->continue_weight, out);
+            take_ideal(l, lobe, s, exact, lobe->sample_weight / l->continue_weight, out);
         if (vm_any(spread)) {
             vmask alive = spread, crosses, above, below;
             const vvec3 wi =
@@ -175,8 +211,12 @@ void trc_bsdf_sample(const struct trc_lobes *l, const struct trc_surface *s, vfl
             rough = vm_or(rough, vm_select(crosses, below, above));
         }
     }
-    if (vm_any(rough))
-        weigh_direction(l, s, rough, out);
+    if (!vm_any(rough))
+        return;
+    if (l->turns)
+        weigh_turned(l, s, rough, out);
+    else
+        weigh_direction(l, s, rough, false, out);
 }
 
 void trc_bsdf_ideal(const struct trc_lobes *l, int i, const struct trc_surface *s,
@@ -188,7 +228,7 @@ void trc_bsdf_ideal(const struct trc_lobes *l, int i, const struct trc_surface *
         return;
     if (lobe->kind == TRC_LOBE_REFRACT)
         out->transmitted = s->active;
-    take_ideal(lobe, s, s->active, vf_one(), out);
+    take_ideal(l, lobe, s, s->active, vf_one(), out);
 }
 
 /* What a lobe of Blender 4 reflects under light from everywhere, over its weight. Where the factor

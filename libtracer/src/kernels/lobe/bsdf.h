@@ -84,6 +84,9 @@ struct trc_lobes {
      * trc_lobes_setup sets none: nothing shines through. Direct light sets it for smooth surfaces,
      * as its shadow rays start off the flat triangle. */
     vmask below_horizon;
+    /* Factor on the angle of light to the normals of reflecting lobes, where turns; likewise. */
+    bool turns;
+    vfloat turn;
 };
 
 /* From a material's leaves and the registers its program left. filter_alpha: lower bound on alpha

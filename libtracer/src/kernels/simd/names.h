@@ -121,6 +121,7 @@
 #define trc_shade_batch(...) TRC_KERNEL(trc_shade_batch)(__VA_ARGS__)
 #define trc_shadow_flush(...) TRC_KERNEL(trc_shadow_flush)(__VA_ARGS__)
 #define trc_shadow_push(...) TRC_KERNEL(trc_shadow_push)(__VA_ARGS__)
+#define trc_shadow_push_from(...) TRC_KERNEL(trc_shadow_push_from)(__VA_ARGS__)
 #define trc_shows_background_motion(...) TRC_KERNEL(trc_shows_background_motion)(__VA_ARGS__)
 #define trc_split_apply(...) TRC_KERNEL(trc_split_apply)(__VA_ARGS__)
 #define trc_split_find(...) TRC_KERNEL(trc_split_find)(__VA_ARGS__)

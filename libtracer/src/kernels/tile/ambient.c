@@ -1,7 +1,11 @@
 /* Ambient occlusion: rays from diffuse lobes by the cosine, along with the shadow rays. Diffuse
  * lobes are not continued, so the random numbers of the continuation ray are free for them. */
+#include <stddef.h>
+
 #include "kernels/light/clamp.h"
 #include "kernels/tile/shade.h"
+#include "kernels/trace/mesh_fetch.h"
+#include "kernels/trace/spawn.h"
 #include "model/lights.h"
 
 /* White light on diffuse lobes, whatever the direction. */
@@ -31,6 +35,13 @@ static vvec3 ambient_world(const struct trc_tile *t, const struct trc_surface *s
     return v3_scale(v3_mul(f.diffuse, world), vf_divide(vf_set(TRC_PI), cosine));
 }
 
+/* How far rays of the lanes' objects go where ambient light takes the place of the world's. */
+static vfloat ambient_distance(const struct trc_surface *s) {
+    const vfloat own = trc_instance_float(s->snapshot, s->instance,
+                                          offsetof(struct trc_instance, ao_distance), s->active);
+    return vf_select(vf_gt(own, vf_set(0.0f)), own, vf_set(s->snapshot->world.ao_distance));
+}
+
 static void ambient_samples(struct trc_tile *t, const struct arrival *a,
                             const struct trc_surface *s, const struct trc_lobes *lobes,
                             uint32_t sample_count, vmask active) {
@@ -43,6 +54,7 @@ static void ambient_samples(struct trc_tile *t, const struct arrival *a,
     const bool adds = world->ao_method == TRC_AO_ADD;
     const vvec3 white = ambient_white(t, a, lobes, albedo);
     const vvec3 weight = v3_scale(a->weight, vf_set(world->ao_factor / (float)sample_count));
+    const vfloat distance = adds ? vf_set(world->ao_distance) : ambient_distance(s);
     struct arrival own = *a;
     own.path = a->path | vu_set(adds ? TRC_PATH_CLAMPED : 0);
     v3_frame(n, &x, &y);
@@ -54,15 +66,23 @@ static void ambient_samples(struct trc_tile *t, const struct arrival *a,
         trc_samples(&t->sampler, a->pixel, a->sample, dimension, 2, l, sample_count, u);
         const struct trc_light_sample sample = {
             .wi = v3_from_frame(trc_warp_cosine(u[0], u[1]), x, y, n),
-            .distance = vf_set(world->ao_distance),
+            .distance = distance,
             .casts_shadow = vm_all_set(),
             .light = vi_set(number)};
         const vvec3 light = adds ? white : ambient_world(t, s, lobes, n, sample.wi, active);
         const struct light_result r = {.diffuse = v3_mul(weight, light)};
         const vfloat size = v3_max(r.diffuse);
         const vmask lit = vm_and(active, is_light(size));
-        if (vm_any(lit))
-            trc_shadow_push(t, &own, s, &sample, &r, trc_direction_cell(sample.wi), lit);
+        if (!vm_any(lit))
+            continue;
+        const vuint cell = trc_direction_cell(sample.wi);
+        if (adds) {
+            trc_shadow_push(t, &own, s, &sample, &r, cell, lit);
+        } else {
+            /* They stand for rays of the path, and start as those do. */
+            const vvec3 o = trc_spawn_origin(s, goes_out(s, sample.wi));
+            trc_shadow_push_from(t, &own, s, &sample, &r, &o, cell, lit);
+        }
     }
 }
 

@@ -2,25 +2,45 @@
  *
  * Rough lobes join light samples and continuation rays by multiple importance sampling (E. Veach
  * and L. Guibas 1995, power heuristic). */
+#include <stddef.h>
+
 #include "kernels/tile/shade.h"
+#include "kernels/trace/mesh_fetch.h"
 #include "kernels/trace/spawn.h"
 
-/* Origin of a shadow ray: where light grazes a smooth surface it starts from the curved surface
- * that the normals describe, or the flat triangles would cast shadows with edges of their own.
- * Shape and limit of the transition as in Cycles, with its default of the geometry offset. */
-#define TERMINATOR_COSINE 0.1f
-TRC_INLINE vvec3 shadow_origin(const struct trc_surface *s, vvec3 w) {
+/* Where light grazes a smooth surface, shadow rays start from the curved surface that the normals
+ * describe, or the flat triangles would cast shadows with edges of their own. This is which part of
+ * the way to it a ray towards w starts with; the transition, between cosine and 0 to both normals,
+ * is as in Cycles. */
+TRC_INLINE vfloat lift(const struct trc_surface *s, vvec3 w, vfloat cosine, vfloat inverse) {
     const vfloat zero = vf_set(0.0f), one = vf_set(1.0f);
     const vfloat cos_n = v3_dot(w, s->n), cos_g = v3_dot(w, s->ng);
-    const vmask outside = vf_ge(cos_n, zero);
-    const vvec3 o = trc_spawn_origin(s, outside);
+    const vfloat near = vf_select(vf_lt(cos_n, cosine), vf_set(2.0f) - (cos_g + cos_n) * inverse,
+                                  one - cos_g * inverse);
+    const vfloat amount = vf_min(vf_max(near, zero), one);
+    return vf_select(vf_ge(cos_n, zero), amount, zero);
+}
+
+/* Origin of a shadow ray towards w. */
+TRC_INLINE vvec3 shadow_origin(const struct trc_surface *s, vvec3 w) {
+    const vvec3 o = trc_spawn_origin(s, vf_ge(v3_dot(w, s->n), vf_set(0.0f)));
     if (!vm_any(s->smooth))
         return o;
-    const vfloat scale = vf_set(1.0f / TERMINATOR_COSINE);
-    const vfloat near = vf_select(vf_lt(cos_n, vf_set(TERMINATOR_COSINE)),
-                                  vf_set(2.0f) - (cos_g + cos_n) * scale, one - cos_g * scale);
-    const vfloat amount = vf_min(vf_max(near, zero), one);
-    return v3_add(o, v3_scale(s->bulge, vf_select(outside, amount, zero)));
+    return v3_add(o, v3_scale(s->bulge, lift(s, w, vf_set(TRC_TERMINATOR_COSINE),
+                                             vf_set(1.0f / TRC_TERMINATOR_COSINE))));
+}
+
+/* The same by the offset of each lane's instance. Where that is 0, no ray is lifted, and all leave
+ * on the side that they go to. */
+static vvec3 own_origin(const struct trc_surface *s, vvec3 w) {
+    const vfloat zero = vf_set(0.0f);
+    const vfloat cosine = trc_instance_float(
+        s->snapshot, s->instance, offsetof(struct trc_instance, terminator_cosine), s->active);
+    const vmask lifts = vf_gt(cosine, zero);
+    const vfloat part = lift(s, w, cosine, vf_divide(vf_set(1.0f), cosine));
+    const vvec3 o =
+        trc_spawn_origin(s, vm_select(lifts, vf_ge(v3_dot(w, s->n), zero), goes_out(s, w)));
+    return v3_add(o, v3_scale(s->bulge, vf_select(lifts, part, zero)));
 }
 
 /* Contributions of the lanes' light samples, weighted; lanes that get nothing are dropped from
@@ -61,12 +81,9 @@ static vmask light_contribute(const struct trc_tile *t, const struct arrival *a,
     return vm_and(active, is_light(size));
 }
 
-/* Adds the lanes' shadow rays to the queue. cell: where on the light, for sorting, below
- * TRC_DIRECTION_CELLS. */
-void trc_shadow_push(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
-                     const struct trc_light_sample *l, const struct light_result *r, vuint cell,
-                     vmask active) {
-    const vvec3 o = shadow_origin(s, l->wi);
+TRC_INLINE void push(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
+                     const struct trc_light_sample *l, const struct light_result *r, vvec3 o,
+                     vuint cell, vmask active) {
     const vmask far = vf_ge(l->distance, vf_set(TRC_FAR));
     const vvec3 target = v3_add(v3_scale(l->wi, vf_select(far, vf_set(1.0f), l->distance)),
                                 v3_select(far, v3_zero(), v3_sub(s->p, o)));
@@ -97,6 +114,23 @@ void trc_shadow_push(struct trc_tile *t, const struct arrival *a, const struct t
     }
     for (int k = 0; q->lamp[0] && k < 3; k++)
         vf_compress(q->lamp[k] + at, r->lamp, bits);
+}
+
+void trc_shadow_push_from(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
+                          const struct trc_light_sample *l, const struct light_result *r,
+                          const vvec3 *o, vuint cell, vmask active) {
+    push(t, a, s, l, r, *o, cell, active);
+}
+
+void trc_shadow_push(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
+                     const struct trc_light_sample *l, const struct light_result *r, vuint cell,
+                     vmask active) {
+    if (t->snapshot->features & TRC_FEATURE_SHADOW_TERMINATORS) {
+        const vvec3 o = own_origin(s, l->wi);
+        trc_shadow_push_from(t, a, s, l, r, &o, cell, active);
+        return;
+    }
+    push(t, a, s, l, r, shadow_origin(s, l->wi), cell, active);
 }
 
 /* What the lanes' light samples are in the Shadow pass if nothing is in the way: lamps count

@@ -2,7 +2,10 @@
  *
  * Hits come sorted by material, so a group of TRC_WIDTH runs one material's code; loops over lobes
  * and light samples are uniform. */
+#include <stddef.h>
+
 #include "kernels/tile/shade.h"
+#include "kernels/trace/mesh_fetch.h"
 #include "kernels/trace/panorama.h"
 
 /* What the pixels of a panorama see, in radians. */
@@ -133,6 +136,11 @@ static void shade_group(struct trc_tile *t, uint32_t material, vint index, vmask
     if (m->instruction_count)
         trc_program_run(m, &s, &regs);
     trc_lobes_setup(m, &s, &regs, filter_alpha(t, &a), &lobes);
+    if (t->snapshot->features & TRC_FEATURE_SHADOW_TERMINATORS) {
+        lobes.turns = true;
+        lobes.turn = trc_instance_float(t->snapshot, s.instance,
+                                        offsetof(struct trc_instance, terminator_turn), active);
+    }
     a.chance = trc_bounce_chance(t, &a, &lobes);
     const bool lets_through = m->has & (TRC_MATERIAL_HAS_REFRACTION | TRC_MATERIAL_HAS_TRANSLUCENT);
     a.receive_n = lets_through ? v3_zero() : s.n;
@@ -153,10 +161,10 @@ static void shade_group(struct trc_tile *t, uint32_t material, vint index, vmask
     if (m->has & TRC_MATERIAL_SCATTERS) {
         lobes.below_horizon = s.smooth;
         trc_direct_light(t, &a, &s, &lobes, on);
+        lobes.below_horizon = vm_none();
         if ((t->snapshot->features & TRC_FEATURE_AMBIENT_OCCLUSION) &&
             (m->has & TRC_MATERIAL_IS_MATT))
             trc_ambient_light(t, &a, &s, &lobes, on);
-        lobes.below_horizon = vm_none();
     }
     if (t->samples.pass[TRC_PASS_AMBIENT_OCCLUSION][0])
         trc_ambient_pass(t, &a, &s, &lobes, on);

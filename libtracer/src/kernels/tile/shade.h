@@ -97,6 +97,11 @@ void trc_shadow_push(struct trc_tile *t, const struct arrival *a, const struct t
                      const struct trc_light_sample *l, const struct light_result *r, vuint cell,
                      vmask active);
 
+/* The same of rays that start at o. */
+void trc_shadow_push_from(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
+                          const struct trc_light_sample *l, const struct light_result *r,
+                          const vvec3 *o, vuint cell, vmask active);
+
 /* ---- ambient occlusion (kernels/tile/ambient.c) ---- */
 
 /* Light by the world's ambient occlusion. */

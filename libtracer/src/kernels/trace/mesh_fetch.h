@@ -164,6 +164,18 @@ static inline void trc_world_corners_at(const struct trc_snapshot *snapshot, uin
                              m[4 * i + 2] * corner[3 * k + 2] + m[4 * i + 3];
 }
 
+/* A float of each active lane's instance: offset, of that member in struct trc_instance. */
+static inline vfloat trc_instance_float(const struct trc_snapshot *snapshot, vint instance,
+                                        size_t offset, vmask m) {
+    float values[TRC_WIDTH] = {0};
+    for (uint32_t lanes = vm_bits(m); lanes; lanes &= lanes - 1) {
+        const int lane = __builtin_ctz(lanes);
+        const struct trc_instance *of = &snapshot->instances[vi_get(instance, lane)];
+        memcpy(&values[lane], (const char *)of + offset, sizeof *values);
+    }
+    return vf_load(values);
+}
+
 /* The instance of all lanes in m, or -1 when they differ. m not empty. */
 TRC_INLINE int32_t trc_uniform_instance(vint instance, vmask m) {
     const int32_t first = vi_get(instance, __builtin_ctz(vm_bits(m)));
