@@ -14,7 +14,7 @@ from ..abi import (CurvesExtension, ImageExtension, MathOperation as Math, ModeF
                    VectorOperation as Vector, VectorTransformMode)
 from ..compat import FOLLOWS_LIGHT_NODES, TRANSFORMS_NORMALS
 from . import ies
-from .instance import VALUES_LOCATION, VALUES_PARTICLE, VALUES_SPIN, VALUES_VELOCITY
+from .instance import NO_PARTICLE_RANDOM, VALUES_LOCATION, VALUES_PARTICLE, VALUES_SPIN, VALUES_VELOCITY
 from .node_list import named_outputs, output
 from .strands import DIRECTION_ATTRIBUTE, HAIR_ATTRIBUTE
 from .values import CONSTANT, DEFAULT, Value
@@ -287,6 +287,8 @@ def _particle_info(walker, node, _sockets):
                         ("Angular Velocity", VALUES_SPIN)):
         if node.outputs[name].is_linked:
             outputs[name] = instance_value(walker, 'v', first)
+    if "Random" in outputs:
+        outputs["Random"] = _number(walker, Math.ADD, outputs["Random"], _constant('f', NO_PARTICLE_RANDOM))
     return outputs
 
 

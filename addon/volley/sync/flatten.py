@@ -251,11 +251,12 @@ class Walker:
 
 
 def _source(socket):
-    """The output socket that feeds an input, None without a link that counts."""
-    if not socket.is_linked:
+    """The output socket that feeds an input, None without a link that counts. Sockets that a node's settings
+    hide keep their links."""
+    if not socket.is_linked or socket.is_unavailable:
         return None
     for link in socket.links:
-        if link.is_valid and not link.is_muted:
+        if link.is_valid and not link.is_muted and not link.from_socket.is_unavailable:
             return link.from_socket
     return None
 

@@ -153,9 +153,12 @@ VALUES_GENERATED = VALUES_SPIN + 3
 VALUES_UV = VALUES_GENERATED + 3
 VALUES_END = VALUES_UV + 2
 
+# Random of what is no particle. Values are 0 there, so those of particles count from it.
+NO_PARTICLE_RANDOM = hash_pair(0, 0) / HASH_MAX
+
 
 def instancer_values(instance, scene):
-    """What made an instance: its particle's index, random number, age, lifetime (frames) and size, its
+    """What made an instance: its particle's index, random number (less NO_PARTICLE_RANDOM), age, lifetime (frames) and size, its
     location, velocity and angular velocity, the Generated (halved, as in Cycles) and the UV coordinates
     of its place; 0 what there is not. Child particles have nothing, as in Cycles."""
     values = np.zeros(VALUES_END, np.float32)
@@ -166,7 +169,7 @@ def instancer_values(instance, scene):
         particle = system.particles[number]
         age = scene.frame_current_final - particle.birth_time
         values[:VALUES_GENERATED] = (
-            number, hash_pair(number, 0) / HASH_MAX, age, particle.lifetime, particle.size,
+            number, hash_pair(number, 0) / HASH_MAX - NO_PARTICLE_RANDOM, age, particle.lifetime, particle.size,
             *particle.location, *particle.velocity, *particle.angular_velocity)
     return tuple(np.nan_to_num(values).tolist())
 

@@ -21,6 +21,7 @@ from .converters import CONVERTERS, instance_value
 from .derived import ISLAND, POINTINESS
 from .instance import VALUES_GENERATED, VALUES_UV
 from .node_list import absent, arranged, input_kinds, input_number, named_outputs, output
+from .texture_mapping import mapped
 from .textures import TEXTURES
 from .values import CONSTANT, DEFAULT, Value
 
@@ -88,7 +89,8 @@ def _layered(node):
     """The mode of the layered Principled."""
     own = DistributionType.FILMED_METAL if HAS_FILMED_METAL else 0
     own |= DistributionType.WHOLE_COAT if HAS_WHOLE_COAT else 0
-    return (_distribution(node) or 0) | own
+    distribution = _distribution(node)
+    return (DistributionType.MULTI_GGX if distribution == DistributionType.MULTI_GGX else DistributionType.GGX) | own
 
 
 def _diffuse_model(_node):
@@ -212,7 +214,7 @@ class Sockets:
     """The inputs of one node by identifier."""
 
     def __init__(self, walker, node, path):
-        self._walker, self._path = walker, path
+        self._walker, self._node, self._path = walker, node, path
         self._by_name = {socket.identifier: socket for socket in node.inputs}
 
     def find(self, *names):
@@ -224,7 +226,8 @@ class Sockets:
         socket = self.find(*names)
         if socket is None:
             return absent(kind)
-        return self._walker.convert(self._walker.input_value(socket, self._path), kind)
+        value = self._walker.convert(self._walker.input_value(socket, self._path), kind)
+        return mapped(self._walker, self._node, value) if socket.identifier == "Vector" else value
 
     def all_of(self, node_type, names):
         """The values of a library type's inputs from the sockets of those names."""
@@ -311,6 +314,8 @@ def _metallic(walker, node, sockets):
         pairs = tuple(zip(index.constant, loss.constant))
         base = _constant('c', *(_conductor(n, k, 1.0) for n, k in pairs))
         edge = _constant('c', *(_edge_tint(n, k) for n, k in pairs))
+    if node.distribution == 'BECKMANN':
+        walker.warn("Metallic BSDF: Beckmann's distribution is approximated by GGX")
     one = _constant('f', 1.0)
     values = arranged(NodeType.LAYERED_PRINCIPLED, {
         "base_color": base, "metallic": one, "roughness": sockets.get('f', "Roughness"), "ior": one,

@@ -199,9 +199,10 @@ def _sun_disc(walker, formula, node, direction, elevation, horizon, color):
         bottom = max(bottom, 0.0)
     part = formula.number(Math.DIVIDE, formula.number(Math.SUBTRACT, elevation, bottom), top - bottom)
     shown = formula.vector(Vector.MULTIPLY_ADD, formula.spread(part), high - low, low)
-    # The angle by its chord, which small angles need.
+    # The angle as Cycles has it, exact for small ones; of vectors that are not of unit length, too.
     chord = formula.measure(Vector.DISTANCE, direction, sun)
-    half = formula.number(Math.ARCSINE, formula.number(Math.MULTIPLY, chord, 0.5))
+    across = formula.measure(Vector.LENGTH, formula.vector(Vector.ADD, direction, sun))
+    half = formula.number(Math.ARCTAN2, chord, across)
     angle = formula.number(Math.MULTIPLY, half, 2.0)
     ratio = formula.number(Math.DIVIDE, angle, 0.5 * size)
     square = formula.number(Math.MINIMUM, formula.number(Math.MULTIPLY, ratio, ratio), 1.0)
