@@ -31,6 +31,11 @@ _UNMATCHED = (
     ("use_guiding", False, "Path Guiding"), ("sample_offset", 0, "Sample Offset"),
     ("scrambling_distance", 1.0, "Scrambling Distance"),
     ("film_transparent_glass", False, "Transparent Glass"),
+    ("caustics_reflective", True, "Reflective Caustics"), ("caustics_refractive", True, "Refractive Caustics"),
+    ("use_layer_samples", 'USE', "Layer Samples"), ("use_pixel_jitter", False, "Pixel Jitter"),
+    ("texture_resolution", 1.0, "Texture Resolution"),
+    ("ao_bounces", 1, "AO Bounces"), ("ao_bounces_render", 1, "AO Bounces (Render)"),
+    ("texture_resolution_render", 1.0, "Texture Resolution (Render)"),
 )
 
 

@@ -230,3 +230,50 @@ def test_light_nodes(blender):
     assert loud == []
     # Light Path first, Emission last; the library drops what an output does not need.
     assert quadratic == linear == constant and quadratic[0] == 74 and quadratic[-1] == 7
+
+
+def inside_unrolled():
+    """Two walls by Volley and by Cycles: of a repeat zone's number, and of a menu's colour in a group."""
+    import bpy
+    import scenes
+    scenes.empty(size=(32, 16))
+    scenes.camera()
+    scenes.sharpen()
+    walls = []
+    for name, x in (("Repeated", -1.5), ("Chosen", 1.5)):
+        material = scenes.emitter((0.2, 0.4, 0.6), name)
+        scenes.wall(name, 2.9, 0.0, (x, 0.0), material)
+        walls.append(material.node_tree)
+    tree = walls[0]
+    begin, end = (tree.nodes.new(f"GeometryNodeRepeat{side}put") for side in ("In", "Out"))
+    begin.pair_with_output(end)
+    end.repeat_items.new('FLOAT', "Sum")
+    begin.inputs["Iterations"].default_value = 3
+    add = tree.nodes.new("ShaderNodeMath")
+    add.inputs[1].default_value = 0.25
+    tree.links.new(begin.outputs["Sum"], add.inputs[0])
+    tree.links.new(add.outputs[0], end.inputs["Sum"])
+    tree.links.new(end.outputs["Sum"], tree.nodes["Emission"].inputs["Strength"])
+    group = bpy.data.node_groups.new("Group", "ShaderNodeTree")
+    group.interface.new_socket("Color", in_out='OUTPUT', socket_type='NodeSocketColor')
+    switch = group.nodes.new("GeometryNodeMenuSwitch")
+    switch.data_type = 'RGBA'
+    switch.inputs["Menu"].default_value = "B"
+    switch.inputs["B"].default_value = (0.8, 0.3, 0.1, 1.0)
+    group.links.new(switch.outputs[0], group.nodes.new("NodeGroupOutput").inputs[0])
+    outer = walls[1].nodes.new("ShaderNodeGroup")
+    outer.node_tree = group
+    walls[1].links.new(outer.outputs[0], walls[1].nodes["Emission"].inputs["Color"])
+    return scenes.by_both(4)
+
+
+@pytest.mark.since((5, 0), "repeat zones and menus came to shaders with 5.0")
+def test_what_blender_unrolls(blender):
+    import blender as blender_support
+    if blender_support.version() < (5, 0):
+        pytest.skip("there is nothing of it")
+    ours, theirs = blender.run(inside_unrolled)
+    assert ours[8, 8, :3] == pytest.approx((0.15, 0.3, 0.45), rel=1e-5)
+    assert ours[8, 24, :3] == pytest.approx((0.8, 0.3, 0.1), rel=1e-5)
+    for x in (8, 24):
+        assert abs(ours - theirs)[5:11, x - 3:x + 3].max() < 1e-5

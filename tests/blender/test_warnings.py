@@ -165,3 +165,80 @@ def test_what_came_with_the_fifth_is_named(blender):
         ["Material 'Wall': bent normals are corrected nonetheless"],
         ["The working space ACEScg is not supported: images, temperatures, skies and the grey of colours are those of "
          "Linear Rec.709"]]
+
+
+def inside_settings_of_objects():
+    """The warnings of a scene of two balls with Cycles' defaults, with shadow terminators and with distances of
+    ambient occlusion of their own; the latter without and with occlusion."""
+    import bpy
+    import scenes
+    scene = scenes.empty(size=(16, 16))
+    scenes.camera()
+    balls = [scenes.sphere(name, 0.5, (x, 0.0, 0.0)) for name, x in (("A", -1.0), ("B", 1.0))]
+    told, found = _listen(), []
+
+    def look():
+        told.clear()
+        scenes.render()
+        found.append(list(told))
+
+    look()
+    for ball in balls:
+        is_own = hasattr(ball, "shadow_terminator_geometry_offset")  # since 5.0
+        setattr(ball if is_own else ball.cycles, "shadow_terminator_geometry_offset", 0.3)
+    look()
+    for ball in balls:
+        is_own = hasattr(ball, "shadow_terminator_geometry_offset")
+        setattr(ball if is_own else ball.cycles, "shadow_terminator_geometry_offset", 0.1)
+        ball.cycles.ao_distance = 0.5
+    look()
+    scene.volley.use_ambient_occlusion = True
+    look()
+    return found
+
+
+def test_settings_of_objects(blender):
+    plain, terminators, unused, distances = blender.run(inside_settings_of_objects)
+    assert plain == unused == []
+    assert terminators == ["Shadow terminator offsets are Cycles' defaults: object 'A' and 1 more has others"]
+    assert distances == ["The distance of ambient occlusion is the world's: object 'A' and 1 more has its own"]
+
+
+def inside_settings_of_worlds():
+    """The warnings of a world as it is, whose light ends after some bounces, and that casts no shadows (5.2)."""
+    import scenes
+    scene = scenes.empty(size=(16, 16))
+    scenes.camera()
+    told, found = _listen(), []
+    for name, value in ((None, None), ("max_bounces", 4), ("use_shadows", False)):
+        if name is not None and hasattr(scene.world.cycles, name):
+            setattr(scene.world.cycles, name, value)
+        told.clear()
+        scenes.render()
+        found.append(list(told))
+    return found, hasattr(scene.world.cycles, "use_shadows")
+
+
+def test_settings_of_worlds(blender):
+    (plain, bounces, shadows), has_shadows = blender.run(inside_settings_of_worlds)
+    assert plain == []
+    assert len(bounces) == 1 and "light of the world goes on for all bounces" in bounces[0]
+    assert len(shadows) == 1 + has_shadows
+    assert not has_shadows or "the world casts shadows nonetheless" in shadows[1]
+
+
+def inside_custom_cameras():
+    import scenes
+    scenes.empty(size=(16, 16))
+    scenes.camera().data.type = 'CUSTOM'
+    told = _listen()
+    scenes.render()
+    return list(told)
+
+
+@pytest.mark.since((5, 0), "cameras of scripts came with 5.0")
+def test_custom_cameras(blender):
+    import blender as blender_support
+    if blender_support.version() < (5, 0):
+        pytest.skip("there are none")
+    assert blender.run(inside_custom_cameras) == ["Camera 'Camera': type CUSTOM is not supported, perspective is used"]

@@ -9,6 +9,7 @@ from ..compat import CHOOSES_LOBES_PLAINLY, HAS_FACET_SHADOWING, LEAVES_BUMPS, c
 from . import flatten, instance, studio, tangents
 from .attributes import Attributes
 from .changes import Changes
+from .inlined import shader_tree
 from .values import CONSTANT, DEFAULT, Value
 
 _HOLDOUT_KEY = ("holdout",)
@@ -110,7 +111,7 @@ class Materials:
         key = ("world", world.name_full)
         label = f"World '{world.name}'"
         if uses_nodes(world):
-            flat = self._flatten(world.node_tree, label)
+            flat = self._flatten(world, label)
         else:
             flat = _background(world.color)
         self._update(key, flat)
@@ -122,7 +123,9 @@ class Materials:
         key = ("light", light.name_full)
         if key not in self._lights:
             self._lights.add(key)
-            flat = flatten.flatten(light.node_tree, f"Light '{light.name}'", self._warnings, self._images)
+            with shader_tree(light) as (tree, is_made):
+                flat = flatten.flatten(tree, f"Light '{light.name}'", self._warnings, self._images)
+            flat.follows_scene |= is_made
             flat.uv_names, flat.color_names = set(), set()  # no mesh has to bring them
             flat.needs_generated = flat.needs_instancer = False
             self._update(key, flat)
@@ -187,7 +190,7 @@ class Materials:
     def flatten(self, material, label):
         """A material's surface as a flat tree."""
         if uses_nodes(material):
-            return self._flatten(material.node_tree, label, _displacement_mode(material))
+            return self._flatten(material, label, _displacement_mode(material))
         return _plain_surface(material)
 
     def is_volume(self, material):
@@ -198,9 +201,13 @@ class Materials:
         """The names of such materials of this sync."""
         return {key for key in self._seen if self._entries[key].is_volume}
 
-    def _flatten(self, tree, label, displacement=None):
-        return flatten.flatten(tree, label, self._warnings, self._images, self._aovs, self._attributes,
-                               displacement)
+    def _flatten(self, data, label, displacement=None):
+        """The tree of an evaluated material or world; one of Blender's making may be another in the next sync."""
+        with shader_tree(data) as (tree, is_made):
+            flat = flatten.flatten(tree, label, self._warnings, self._images, self._aovs, self._attributes,
+                                   displacement)
+        flat.follows_scene |= is_made
+        return flat
 
     def names(self):
         """The names in mattes."""

@@ -141,6 +141,8 @@ class SceneSync:
         if shown_studio is None:
             shown = shown_world(source)
             material_id, sun = self._materials.world_id(shown) if shown else (0, None)
+            if shown:
+                world.note_unread(shown, self.warnings)
             fields = world.describe(shown, material_id, sun, scene.volley, source.light_groups)
         else:
             fields = {**world.describe(None, self._materials.studio_id(shown_studio), None, scene.volley, {}),

@@ -33,6 +33,17 @@ def describe(world, material_id, sun, settings, light_groups):
     return fields
 
 
+_MANY_BOUNCES = 1024  # Cycles' default, more than there are
+
+
+def note_unread(world, warnings):
+    """Warn of settings that change Cycles' picture alone."""
+    if cycles(world, "max_bounces", _MANY_BOUNCES) < _MANY_BOUNCES:
+        warnings.add(f"World '{world.name}': Max Bounces is not supported, light of the world goes on for all bounces")
+    if not cycles(world, "use_shadows", True):
+        warnings.add(f"World '{world.name}': Cast Shadow is not supported, the world casts shadows nonetheless")
+
+
 def mist_fields(world):
     """The fields of trc_render_desc for the Mist pass; without a world, Blender's defaults."""
     if world is None:
