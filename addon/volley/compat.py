@@ -133,21 +133,6 @@ def has_adaptive_subdivision(blender_object):
     return is_experimental and cycles(blender_object, "use_adaptive_subdivision", False)
 
 
-def has_own_terminator(blender_object):
-    """Whether an object's shadow terminator offsets are not those of new objects: Cycles' of the object, since
-    5.0 Blender's own."""
-    if hasattr(blender_object, "shadow_terminator_shading_offset"):
-        shading, geometry = blender_object.shadow_terminator_shading_offset, \
-            blender_object.shadow_terminator_geometry_offset
-    else:
-        shading = cycles(blender_object, "shadow_terminator_offset", 0.0)
-        geometry = cycles(blender_object, "shadow_terminator_geometry_offset", _TERMINATOR_OFFSET)
-    return shading > 0.0 or abs(geometry - _TERMINATOR_OFFSET) > 1e-6
-
-
-_TERMINATOR_OFFSET = 0.1  # of surfaces that are smooth, as a cosine
-
-
 def working_space():
     """The name of the space that colours of scenes are in: of the file's choice since 5.0."""
     return getattr(getattr(bpy.data, "colorspace", None), "working_space", LINEAR_REC709)

@@ -167,43 +167,6 @@ def test_what_came_with_the_fifth_is_named(blender):
          "Linear Rec.709"]]
 
 
-def inside_settings_of_objects():
-    """The warnings of a scene of two balls with Cycles' defaults, with shadow terminators and with distances of
-    ambient occlusion of their own; the latter without and with occlusion."""
-    import bpy
-    import scenes
-    scene = scenes.empty(size=(16, 16))
-    scenes.camera()
-    balls = [scenes.sphere(name, 0.5, (x, 0.0, 0.0)) for name, x in (("A", -1.0), ("B", 1.0))]
-    told, found = _listen(), []
-
-    def look():
-        told.clear()
-        scenes.render()
-        found.append(list(told))
-
-    look()
-    for ball in balls:
-        is_own = hasattr(ball, "shadow_terminator_geometry_offset")  # since 5.0
-        setattr(ball if is_own else ball.cycles, "shadow_terminator_geometry_offset", 0.3)
-    look()
-    for ball in balls:
-        is_own = hasattr(ball, "shadow_terminator_geometry_offset")
-        setattr(ball if is_own else ball.cycles, "shadow_terminator_geometry_offset", 0.1)
-        ball.cycles.ao_distance = 0.5
-    look()
-    scene.volley.use_ambient_occlusion = True
-    look()
-    return found
-
-
-def test_settings_of_objects(blender):
-    plain, terminators, unused, distances = blender.run(inside_settings_of_objects)
-    assert plain == unused == []
-    assert terminators == ["Shadow terminator offsets are Cycles' defaults: object 'A' and 1 more has others"]
-    assert distances == ["The distance of ambient occlusion is the world's: object 'A' and 1 more has its own"]
-
-
 def inside_settings_of_worlds():
     """The warnings of a world as it is, whose light ends after some bounces, and that casts no shadows (5.2)."""
     import scenes

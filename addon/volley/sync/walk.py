@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Walks over the depsgraph: what is there, what it shows, and where it is at other times."""
 
-from collections import defaultdict
 from dataclasses import dataclass
 
 import bpy
 
 from ..abi import InstanceFlags
-from ..compat import cycles, has_adaptive_subdivision, has_own_terminator
+from ..compat import has_adaptive_subdivision
 from . import deform, instance, light, mesh, motion, strands, tubes, visibility
 from .linking import Links
 from .matrix import rows12
@@ -68,7 +67,7 @@ class Walk:
         self.items = {}       # key -> Item with a mesh
         self.lights = {}      # key -> fields of a light
         self.tied = set()     # names of objects that are instanced or make instances
-        self._left_out = defaultdict(set)  # (what, what becomes of it) -> names of objects, for warnings
+        self._volumes = set()  # names of objects of volumes
         self.links = Links(source.depsgraph, sync.warnings)
 
     def run(self):
@@ -89,24 +88,15 @@ class Walk:
             elif strands.has_strands(each) and self._view_layer.use_strand:
                 self._add_strands(each)
             elif isinstance(each.object.data, bpy.types.Volume):
-                self._left_out["Volumes are not supported", "is left out"].add(each.object.name)
-        self._warn()
+                self._volumes.add(each.object.name)
+        self._warn_of("Volumes are not supported", self._volumes, "is left out")
 
-    def _warn(self):
-        """One warning of each kind, of all objects that it is about."""
-        for (text, does), names in self._left_out.items():
+    def _warn_of(self, text, names, does):
+        """One warning of all objects of those names, if there are any."""
+        if names:
             first, more = min(names), len(names) - 1
             also = f" and {more} more" if more else ""
             self._sync.warnings.add(f"{text}: object '{first}'{also} {does}")
-
-    def _note_unread(self, blender_object):
-        """Note the settings of an object that change its picture in Cycles alone."""
-        if has_own_terminator(blender_object):
-            self._left_out["Shadow terminator offsets are Cycles' defaults", "has others"].add(blender_object.name)
-        is_used = self._source.depsgraph.scene_eval.volley.use_ambient_occlusion
-        if is_used and cycles(blender_object, "ao_distance", 0.0) > 0.0:
-            self._left_out["The distance of ambient occlusion is the world's",
-                           "has its own"].add(blender_object.name)
 
     def follow_motion(self, camera_keys):
         """Look at every moving thing at its other times."""
@@ -152,7 +142,6 @@ class Walk:
         blender_object = each.object
         if is_volume(self._sync._materials, each, self._view_layer):
             return
-        self._note_unread(blender_object)
         item = self._describe(each)
         self._dress(item, each)
         if self._shutter is not None:
