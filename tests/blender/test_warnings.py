@@ -13,45 +13,6 @@ def _listen():
     return told
 
 
-def inside_movie():
-    """Two walls with one movie, another without, rendered at two frames: the warnings of each render, and
-    the pictures."""
-    import bpy
-    import scenes
-    scene = scenes.empty(size=(32, 32))
-    scenes.camera()
-    settings = scene.render.image_settings
-    scenes.set_file_format(settings, 'AVI_JPEG' if bpy.app.version < (4, 0, 0) else 'FFMPEG')
-    scene.frame_end = 3
-    scene.render.filepath = bpy.app.tempdir + "movie"
-    wall = scenes.wall("Wall", 9.0, 0.0, material=scenes.emitter((0.2, 0.5, 0.8)))
-    bpy.ops.render.render(animation=True)
-    path = scene.render.frame_path(frame=1)
-    scenes.set_file_format(settings, 'OPEN_EXR')
-    image = bpy.data.images.load(path)
-    image.name = "Movie"
-    assert image.source == 'MOVIE'
-    material = scenes.material("Screen", "ShaderNodeEmission")
-    node = material.node_tree.nodes.new("ShaderNodeTexImage")
-    node.image = image
-    material.node_tree.links.new(node.outputs[0], material.node_tree.nodes["Emission"].inputs["Color"])
-    wall.data.materials[0] = material
-    scenes.wall("Other", 1.0, -1.0, material=material)
-    told, found = _listen(), []
-    for frame in (1, 2):
-        scene.frame_set(frame)
-        told.clear()
-        picture = scenes.render()
-        found.append((list(told), picture[16, 16, :3].tolist()))
-    return found
-
-
-def test_movies_are_not_played(blender):
-    for told, color in blender.run(inside_movie):
-        assert told == ["Image 'Movie': movies are not played, one frame is used"]
-        assert color[2] > 0.4 and color[0] < 0.4  # a frame of it, not magenta
-
-
 def inside_override():
     """Pictures by both engines of two view layers, one with a world of its own, and the warnings."""
     import bpy

@@ -7,14 +7,13 @@ Not among them: caches of physics beside the .blend, and what add-ons and script
 
 import hashlib
 import os
-import re
 
 import bpy
 
-from ..sync.image import tile_path
+from ..sync.image import path_in_sequence, tile_path
+from ..sync.movie import frame_of
 
 _BLOCK_BYTES = 1 << 20
-_NUMBER = re.compile(r"(\d+)(\D*)$")    # of a sequence: the last digits of the name
 _BUILT_IN = "<builtin>"                 # of a font
 
 
@@ -31,8 +30,8 @@ def paths(frame):
             found.update(_of_image(image))
     for image, user in _image_users():
         if image.source == 'SEQUENCE' and image.filepath and not image.packed_file:
-            number = _number_of(user, frame)
-            found[f"image {image.name_full} {number}"] = _of_sequence(_absolute(image.filepath, image), number)
+            number = frame_of(user, frame)
+            found[f"image {image.name_full} {number}"] = path_in_sequence(_absolute(image.filepath, image), number)
     for tree in _trees():
         for node in tree.nodes:
             if node.type == 'TEX_IES' and node.mode == 'EXTERNAL' and node.filepath:
@@ -54,7 +53,7 @@ def _absolute(path, owner):
 
 def _of_image(image):
     """Names and paths of an image that is the same in all frames."""
-    if image.source == 'FILE':
+    if image.source in {'FILE', 'MOVIE'}:
         yield f"image {image.name_full}", _absolute(image.filepath, image)
     elif image.source == 'TILED':
         for tile in image.tiles:
@@ -72,21 +71,6 @@ def _image_users():
              if node.type in {'TEX_IMAGE', 'TEX_ENVIRONMENT'}]
     found += [(texture.image, texture.image_user) for texture in bpy.data.textures if texture.type == 'IMAGE']
     return [(image, user) for image, user in found if image is not None]
-
-
-def _number_of(user, frame):
-    """The number in the name of a sequence's file, as Blender counts."""
-    if not user.use_auto_refresh:
-        return user.frame_current
-    place = frame - user.frame_start + 1
-    if user.use_cyclic and user.frame_duration:
-        place = (place - 1) % user.frame_duration + 1
-    return min(max(place, 0), user.frame_duration) + user.frame_offset
-
-
-def _of_sequence(path, number):
-    folder, name = os.path.split(path)
-    return os.path.join(folder, _NUMBER.sub(lambda found: f"{number:0{len(found[1])}d}{found[2]}", name))
 
 
 # Bytes -------------------------------------------------------------------------------------------

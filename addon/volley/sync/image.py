@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Images: files by their path, everything else by its pixels.
 
-Plain and packed files are read by the library itself. Generated, painted and movie images, and files
-in formats that the library does not know, come from Blender's pixels. An image that is missing, damaged,
+Plain and packed files are read by the library itself. Generated and painted images, frames of movies, and
+files in formats that the library does not know, come from Blender's pixels. An image that is missing, damaged,
 too large or whatever else is 0, which renders magenta, with one warning; it never costs the render.
 Colours are converted to scene-linear ones by the library, with Blender's OpenColorIO configuration.
 """
@@ -18,6 +18,7 @@ import numpy as np
 
 from .. import abi, native
 from ..compat import cycles
+from .movie import frame_of, turn_to
 
 _ALPHA_MODES = {'STRAIGHT': abi.AlphaMode.STRAIGHT, 'PREMUL': abi.AlphaMode.PREMULTIPLIED,
                 'CHANNEL_PACKED': abi.AlphaMode.CHANNEL_PACKED, 'NONE': abi.AlphaMode.NONE}
@@ -38,12 +39,13 @@ class Images:
         self._seen = set()
         self._look_again = True
         self._limit = 0
+        self._frame = 0
         self._asked = set(), False
 
-    def begin(self, changes, limit=0):
+    def begin(self, changes, limit=0, frame=0):
         """Start a sync: nothing has been asked for yet. Unless changes names images, those known are
-        taken as they are. limit: pixels a side, 0 for none."""
-        self._seen = set()
+        taken as they are. limit: pixels a side, 0 for none; frame: of the scene."""
+        self._seen, self._frame = set(), frame
         self._look_again = changes.full or changes.all_materials or limit != self._limit
         self._limit = limit
 
@@ -66,7 +68,10 @@ class Images:
                 for _, path in _tile_paths(image):
                     self._expect_path(image, path, False)
             else:
-                self._expect_path(image, _file_path(image, node.image_user), _is_mip_mapped(node))
+                self._expect_path(image, self._path_of(node), _is_mip_mapped(node))
+
+    def _path_of(self, node):
+        return _file_path(node.image, frame_of(node.image_user, self._frame))
 
     def _expect_path(self, image, path, is_mip_mapped):
         known = self._entries.get((image.name_full, path, is_mip_mapped))
@@ -78,7 +83,9 @@ class Images:
         image = node.image
         if image is None:
             return 0
-        return self._id_of_path(image, _file_path(image, node.image_user), _is_mip_mapped(node))
+        if image.source == 'MOVIE':
+            return self._id_of_path(image, "", _is_mip_mapped(node), frame_of(node.image_user, self._frame))
+        return self._id_of_path(image, self._path_of(node), _is_mip_mapped(node))
 
     def tiles_of(self, node):
         """The tiles of a tiled image: (column, row, library's image) of each."""
@@ -93,9 +100,10 @@ class Images:
             self._warnings.add(f"Image '{image.name}': tiles without a file are shown as missing")
         return found
 
-    def _id_of_path(self, image, path, is_mip_mapped):
-        """The library's image of a file of an image, or of its pixels where path is ""."""
-        key = (image.name_full, path, is_mip_mapped)
+    def _id_of_path(self, image, path, is_mip_mapped, frame=None):
+        """The library's image of a file of an image, or of its pixels where path is "": of a movie those of a
+        frame."""
+        key = (image.name_full, path, is_mip_mapped, *(() if frame is None else (frame,)))
         keys, is_animated = self._asked
         keys.add(key)
         self._asked = keys, is_animated or image.source in _ANIMATED_SOURCES
@@ -104,6 +112,8 @@ class Images:
             self._seen.add(key)
             return known[1]
         self._seen.add(key)
+        if frame is not None:
+            turn_to(image, frame)
         signature = self._signature(image, path)
         if known and known[0] == signature:
             return known[1]
@@ -157,8 +167,6 @@ class Images:
                 self._scene.destroy_image(image_id)
 
     def _create(self, image, path, is_mip_mapped):
-        if image.source == 'MOVIE':
-            self._warnings.add(f"Image '{image.name}': movies are not played, one frame is used")
         try:
             if path:
                 return self._from_file(image, path, is_mip_mapped)
@@ -306,12 +314,24 @@ def _pixel_alpha_mode(image):
     return abi.AlphaMode.PREMULTIPLIED if image.is_float else abi.AlphaMode.STRAIGHT
 
 
-def _file_path(image, image_user):
-    """The absolute path of an image the library can read itself, "" for one of Blender's own."""
+def _file_path(image, frame):
+    """The absolute path of an image the library can read itself, "" for one of Blender's own; frame: of a
+    sequence."""
     if image.source not in {'FILE', 'SEQUENCE'} or image.packed_file is not None or image.is_dirty:
         return ""
-    path = image.filepath_from_user(image_user=image_user)
+    path = image.filepath_from_user()
+    if path and image.source == 'SEQUENCE':
+        path = path_in_sequence(path, frame)
     return os.path.abspath(path) if path and os.path.isfile(path) else ""
+
+
+_NUMBER = re.compile(r"(\d+)(\D*)$")  # of a sequence: the last digits of the name
+
+
+def path_in_sequence(path, number):
+    """The path of a sequence's file of that number; path: of any of them."""
+    folder, name = os.path.split(path)
+    return os.path.join(folder, _NUMBER.sub(lambda found: f"{number:0{len(found[1])}d}{found[2]}", name))
 
 
 def tile_path(image, number):

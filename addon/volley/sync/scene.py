@@ -42,7 +42,7 @@ class SceneSync:
         if working_space() != LINEAR_REC709:
             self.warnings.add(f"The working space {working_space()} is not supported: images, temperatures, skies "
                               f"and the grey of colours are those of {LINEAR_REC709}")
-        self._images.begin(source.changes, size_limit(source))
+        self._images.begin(source.changes, size_limit(source), source.depsgraph.scene_eval.frame_current)
         self._materials.begin(source.depsgraph, source.changes, source.aovs)
         self._meshes.begin()
         self._sync_materials(source)
@@ -71,7 +71,7 @@ class SceneSync:
         if not all(touched):
             return False
         self._shown = None  # until all is done
-        self._images.begin(changes, size_limit(source))
+        self._images.begin(changes, size_limit(source), source.depsgraph.scene_eval.frame_current)
         names = self._materials.read_names()
         if not self._materials.change(source.depsgraph, changes):
             return False

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Movies and sequences as textures follow the frame, by each node's settings: beside Cycles in renders of single
+frames and of an animation, and in viewports."""
+
+import os
+import tempfile
+
+import numpy as np
+import pytest
+
+COUNT = 5        # frames of the movie
+TOLERANCE = 1e-3
+COLORS = ((0.8, 0.1, 0.1), (0.1, 0.8, 0.1), (0.1, 0.1, 0.8), (0.7, 0.7, 0.1), (0.4, 0.4, 0.4))
+
+# Settings of image users, a wall for each.
+USERS = ({}, {"frame_start": 3}, {"frame_offset": 2}, {"frame_duration": 3}, {"use_cyclic": True, "frame_start": 2},
+         {"frame_offset": -2}, {"use_cyclic": True, "frame_duration": 2, "frame_offset": 1},
+         {"use_auto_refresh": False})
+
+
+def _write(kind):
+    """Write frames of one colour each as a movie or a sequence of pictures: the path of the first."""
+    import bpy
+    import scenes
+    scene = scenes.empty(size=(32, 32), samples=1)
+    scenes.camera()
+    scenes.wall("Screen", 9.0, 0.0, material=scenes.emitter(COLORS[0]))
+    tree = bpy.data.materials[0].node_tree
+    color = tree.nodes["Emission"].inputs["Color"]
+    for number, value in enumerate(COLORS):
+        color.default_value = (*value, 1.0)
+        color.keyframe_insert("default_value", frame=number + 1)
+    for curve in scenes.curves(tree):
+        for key in curve.keyframe_points:
+            key.interpolation = 'CONSTANT'
+    settings, scene.frame_end = scene.render.image_settings, COUNT
+    scene.view_settings.view_transform = 'Standard'
+    scenes.set_file_format(settings, 'FFMPEG' if kind == 'MOVIE' else 'PNG')
+    if kind == 'MOVIE':
+        scene.render.ffmpeg.format, scene.render.ffmpeg.codec = 'MPEG4', 'H264'
+    scene.render.filepath = os.path.join(tempfile.mkdtemp(prefix="volley_"), kind.lower())
+    bpy.ops.render.render(animation=True)
+    return scene.render.frame_path(frame=1)
+
+
+def _stage(kind):
+    """A row of walls that show it, each by settings of its own."""
+    import bpy
+    import scenes
+    path = _write(kind)
+    scene = scenes.empty(size=(8 * len(USERS), 8), samples=1)
+    scenes.camera(type='ORTHO', ortho_scale=float(len(USERS)))
+    scenes.sharpen()
+    image = bpy.data.images.load(path)
+    image.source = kind
+    for number, settings in enumerate(USERS):
+        material = scenes.material(f"Screen {number}", "ShaderNodeEmission")
+        tree = material.node_tree
+        node = tree.nodes.new("ShaderNodeTexImage")
+        node.image = image
+        values = {"frame_duration": COUNT, "frame_start": 1, "use_auto_refresh": True, **settings}
+        for name, value in values.items():
+            setattr(node.image_user, name, value)
+        tree.links.new(node.outputs[0], tree.nodes["Emission"].inputs["Color"])
+        scenes.wall(f"Screen {number}", 0.98, 0.0, (number - 0.5 * len(USERS) + 0.5, 0.0), material)
+    return scene
+
+
+def _colors(picture):
+    """Of the middle of each wall."""
+    return picture[4, 4::8, :3]
+
+
+def inside_frames(kind):
+    """{frame: colours of the walls by Volley and by Cycles, and the warnings}."""
+    import scenes
+    import volley.session
+    scene, told = _stage(kind), []
+    volley.session.report_warning = lambda _engine, message: told.append(message)
+    found = {}
+    for frame in range(-1, 9):
+        scene.frame_set(frame)
+        found[frame] = [_colors(picture) for picture in scenes.by_both(1)]
+    return found, told
+
+
+@pytest.mark.parametrize("kind", ['MOVIE', 'SEQUENCE'])
+def test_frames(blender, kind):
+    found, told = blender.run(inside_frames, kind)
+    beyond = "cannot be read, magenta is used"  # a sequence has no such picture, movies stay at their ends
+    assert all(kind == 'SEQUENCE' and beyond in message for message in told)
+    for frame, (ours, theirs) in found.items():
+        assert np.abs(ours - theirs).max() < TOLERANCE, frame
+    shown = [found[frame][0][0] for frame in range(1, COUNT + 1)]
+    assert all(np.abs(color - expected).max() < 0.03 for color, expected in zip(shown, COLORS))  # lossy
+
+
+def inside_animation(is_persistent):
+    """Colours of the walls in each frame of an animation."""
+    import bpy
+    import scenes
+    scene = _stage('MOVIE')
+    scene.render.use_persistent_data = is_persistent
+    scene.frame_start, scene.frame_end = 1, COUNT
+    scene.render.filepath = os.path.join(tempfile.mkdtemp(prefix="volley_"), "shown")
+    bpy.ops.render.render(animation=True)
+    return [_colors(scenes.load(scene.render.frame_path(frame=frame))) for frame in range(1, COUNT + 1)]
+
+
+@pytest.mark.parametrize("is_persistent", [False, True])
+def test_animation(blender, is_persistent):
+    for colors, expected in zip(blender.run(inside_animation, is_persistent), COLORS, strict=True):
+        assert np.abs(colors[0] - expected).max() < 0.03
+
+
+def inside_viewport():
+    """Colours of the walls in a viewport: frames are changed where nothing is animated, and where a wall moves."""
+    from follower import Follower
+    scene = _stage('MOVIE')
+    follower, found = Follower(), []
+    for frame in (1, 2, 4):
+        scene.frame_set(frame)
+        found.append(_colors(follower.picture()))
+    import bpy
+    wall = bpy.data.objects["Screen 7"]
+    for frame, x in ((1, 3.5), (5, 3.51)):
+        wall.location.x = x - 3.5
+        wall.keyframe_insert("location", frame=frame)
+    for frame in (3, 5):
+        scene.frame_set(frame)
+        found.append(_colors(follower.picture()))
+    return found
+
+
+def test_viewport(blender):
+    for colors, frame in zip(blender.run(inside_viewport), (1, 2, 4, 3, 5), strict=True):
+        assert np.abs(colors[0] - COLORS[frame - 1]).max() < 0.03, frame
