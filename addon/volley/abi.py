@@ -181,6 +181,9 @@ class NodeType(IntEnum):
     BUMP = 115
     DISPLACEMENT = 116
     VECTOR_DISPLACEMENT = 117
+    AMBIENT_OCCLUSION = 124
+    BEVEL = 125
+    RAYCAST = 126
     TANGENT = 114
     AOV_VALUE = 112
     AOV_COLOR = 113
@@ -230,6 +233,17 @@ class NormalMapFlags(IntFlag):
 class BumpMode(IntEnum):
     INVERT = 1
     ABOVE = 2
+
+
+class AmbientMode(IntEnum):
+    SAMPLES_MASK = 255
+    INSIDE = 256
+    ONLY_LOCAL = 512
+    OF_WORLD = 1024
+
+
+class RaycastMode(IntEnum):
+    ONLY_LOCAL = 1
 
 
 class DisplacementMethod(IntEnum):
@@ -864,6 +878,7 @@ ENUMERATIONS = {StatusCode: "TRC_", IsaId: "TRC_ISA_", CameraType: "TRC_CAMERA_"
                 AoMethod: "TRC_AO_", NodeType: "TRC_NODE_", ModeFlags: "TRC_MODE_", TableSize: "TRC_TABLE_",
                 DiffuseModel: "TRC_DIFFUSE_", ToonComponent: "TRC_TOON_", MappingType: "TRC_MAPPING_",
                 NormalMapSpace: "TRC_NORMAL_MAP_", NormalMapFlags: "TRC_NORMAL_MAP_", BumpMode: "TRC_BUMP_",
+                AmbientMode: "TRC_AMBIENT_", RaycastMode: "TRC_RAYCAST_",
                 DisplacementMethod: "TRC_DISPLACEMENT_", RampInterpolation: "TRC_RAMP_",
                 CurvesExtension: "TRC_CURVES_", SeparateMode: "TRC_SEPARATE_", ClampType: "TRC_CLAMP_",
                 TangentSource: "TRC_TANGENT_", SpaceId: "TRC_SPACE_", TransformedType: "TRC_TRANSFORMED_",
@@ -1197,6 +1212,16 @@ NODES = {
     NodeType.VECTOR_DISPLACEMENT: ("Vector Displacement",
         (("VECTOR", "vector"), ("FLOAT", "midlevel"), ("FLOAT", "scale")),
         (("VECTOR", "displacement"),)),
+    NodeType.AMBIENT_OCCLUSION: ("Ambient Occlusion",
+        (("COLOR", "color"), ("FLOAT", "distance"), ("NORMAL", "normal")),
+        (("COLOR", "color"), ("FLOAT", "open"))),
+    NodeType.BEVEL: ("Bevel",
+        (("FLOAT", "radius"), ("NORMAL", "normal")),
+        (("VECTOR", "normal"),)),
+    NodeType.RAYCAST: ("Raycast",
+        (("POSITION", "position"), ("NORMAL", "direction"), ("FLOAT", "distance")),
+        (("FLOAT", "is_hit"), ("FLOAT", "self_hit"), ("FLOAT", "hit_distance"), ("VECTOR", "hit_position"),
+         ("VECTOR", "hit_normal"))),
     NodeType.TANGENT: ("Tangent",
         (),
         (("VECTOR", "tangent"),)),

@@ -145,6 +145,9 @@ static void test_counts_of_modes(void **state) {
         {TRC_NODE_VECTOR_ROTATE, 5 * 2},
         {TRC_NODE_TANGENT, 4},
         {TRC_NODE_BUMP, 2 * 2},
+        {TRC_NODE_AMBIENT_OCCLUSION, 255 * 2 * 2 * 2}, /* samples, bits */
+        {TRC_NODE_BEVEL, 255},
+        {TRC_NODE_RAYCAST, 2},
         {TRC_NODE_DISPLACEMENT, 2},
         {TRC_NODE_VECTOR_DISPLACEMENT, 3},
         {TRC_NODE_DISPLACEMENT_OUTPUT, 3 * 2},
@@ -179,6 +182,8 @@ static void test_numbers(void **state) {
     assert_int_equal(TRC_NODE_BUMP, 115);
     assert_int_equal(TRC_NODE_DISPLACEMENT, 116);
     assert_int_equal(TRC_NODE_DISPLACEMENT_OUTPUT, 118);
+    assert_int_equal(TRC_NODE_AMBIENT_OCCLUSION, 124);
+    assert_int_equal(TRC_NODE_RAYCAST, 126);
 }
 
 /* Outputs of operations that stand for outputs of nodes stand alike. */

@@ -9,8 +9,8 @@ import math
 import bpy
 import numpy as np
 
-from ..abi import (CurvesExtension, ImageExtension, MathOperation as Math, ModeFlags, NodeType, RotateFlags,
-                   RotateMode, SeparateMode, SpaceId, TableSize, TransformedType,
+from ..abi import (AmbientMode, CurvesExtension, ImageExtension, MathOperation as Math, ModeFlags, NodeType,
+                   RaycastMode, RotateFlags, RotateMode, SeparateMode, SpaceId, TableSize, TransformedType,
                    VectorOperation as Vector, VectorTransformMode)
 from ..compat import FOLLOWS_LIGHT_NODES, TRANSFORMS_NORMALS
 from . import ies
@@ -234,17 +234,31 @@ def _ies_text(node):
         return ""
 
 
-def _ambient_occlusion(walker, _node, sockets):
-    walker.warn("Ambient Occlusion is approximated: nothing is taken to be near")
-    return {"Color": sockets.get('c', "Color"), "AO": _constant('f', 1.0)}
+def _ambient_occlusion(walker, node, sockets):
+    distance = sockets.get('f', "Distance")
+    mode = min(node.samples, AmbientMode.SAMPLES_MASK)
+    mode |= AmbientMode.INSIDE * node.inside | AmbientMode.ONLY_LOCAL * node.only_local
+    if distance == _constant('f', 0.0):
+        mode |= AmbientMode.OF_WORLD
+    index = walker.emit(NodeType.AMBIENT_OCCLUSION, (
+        sockets.get('c', "Color"), distance, sockets.get('v', "Normal")), mode)
+    return named_outputs(index, NodeType.AMBIENT_OCCLUSION, ("Color", "AO"))
 
 
-def _bevel(walker, _node, sockets):
-    walker.warn("Bevel is approximated by the normal as it is")
-    normal = sockets.get('v', "Normal")
-    if normal.node == DEFAULT:
-        normal = output(walker.emit(NodeType.GEOMETRY, ()), NodeType.GEOMETRY, "normal")
-    return {"Normal": normal}
+def _bevel(walker, node, sockets):
+    index = walker.emit(NodeType.BEVEL, (sockets.get('f', "Radius"), sockets.get('v', "Normal")),
+                        min(node.samples, AmbientMode.SAMPLES_MASK))
+    return named_outputs(index, NodeType.BEVEL, ("Normal",))
+
+
+def _raycast(walker, node, sockets):
+    if len(node.sample_attribute_items):
+        walker.warn(f"node '{node.name}': attributes of what its ray meets are not looked up")
+    index = walker.emit(NodeType.RAYCAST, (
+        sockets.get('v', "Position"), sockets.get('v', "Direction"), sockets.get('f', "Length")),
+        RaycastMode.ONLY_LOCAL * node.only_local)
+    return named_outputs(index, NodeType.RAYCAST,
+                         ("Is Hit", "Self Hit", "Hit Distance", "Hit Position", "Hit Normal"))
 
 
 def _tangent_normal(walker):
@@ -299,6 +313,7 @@ CONVERTERS = {
     "ShaderNodeVectorTransform": _vector_transform, "ShaderNodeVectorRotate": _vector_rotate,
     "ShaderNodeCameraData": _camera_data, "ShaderNodeWireframe": _wireframe,
     "ShaderNodeLightFalloff": _light_falloff, "ShaderNodeTexIES": _ies,
-    "ShaderNodeAmbientOcclusion": _ambient_occlusion, "ShaderNodeBevel": _bevel, "ShaderNodeParticleInfo": _particle_info,
+    "ShaderNodeAmbientOcclusion": _ambient_occlusion, "ShaderNodeBevel": _bevel, "ShaderNodeRaycast": _raycast,
+    "ShaderNodeParticleInfo": _particle_info,
     "ShaderNodeHairInfo": _hair_info,
 }

@@ -63,6 +63,18 @@ enum trc_normal_map_flags {
  * the surface, as in Blender before 4.0. */
 enum trc_bump_mode { TRC_BUMP_INVERT = 1, TRC_BUMP_ABOVE = 2 };
 
+/* The number of samples, and bits. INSIDE: around the opposite of the normal. ONLY_LOCAL: of the
+ * same instance alone. OF_WORLD: within the distance of trc_world_desc.
+ */
+enum trc_ambient_mode {
+    TRC_AMBIENT_SAMPLES_MASK = 255,
+    TRC_AMBIENT_INSIDE = 1 << 8,
+    TRC_AMBIENT_ONLY_LOCAL = 1 << 9,
+    TRC_AMBIENT_OF_WORLD = 1 << 10
+};
+
+enum trc_raycast_mode { TRC_RAYCAST_ONLY_LOCAL = 1 };
+
 /* BUMP: the height along the normal turns the shading normal, as a Bump node would. TRUE: at commit
  * the vertices are moved, and their normals made anew. BOTH: they are moved, their normals stay and
  * are turned. ABOVE: a bit, as TRC_BUMP_ABOVE. */

@@ -76,6 +76,7 @@ enum {
     TRC_MATERIAL_READS_FOOTPRINT = 1 << 12, /* an image has smaller levels */
     TRC_MATERIAL_READS_PIXEL = 1 << 13,     /* it has slopes of heights */
     TRC_MATERIAL_HAS_PORTAL = 1 << 14,      /* rays go on elsewhere; shadow rays end */
+    TRC_MATERIAL_TRACES_RAYS = 1 << 15,     /* its program does */
     /* Lobes that no ray is continued for: only samples of lights bring them light. */
     TRC_MATERIAL_IS_MATT = TRC_MATERIAL_HAS_DIFFUSE | TRC_MATERIAL_HAS_TRANSLUCENT,
     /* All lobes that light samples light. */

@@ -122,6 +122,7 @@ static bool reads_normal(uint32_t op) {
     case TRC_OP_TANGENT_VECTOR:
     case TRC_OP_NORMAL_MAP:
     case TRC_OP_IMAGE_BOX:
+    case TRC_OP_BEVEL:
         return true;
     default:
         return false;

@@ -489,6 +489,30 @@ static trc_status lower_camera_data(const struct lowering *l) {
                    l->out + TRC_OUT_AT(CAMERA_DATA, view_vector));
 }
 
+static trc_status lower_ambient_occlusion(const struct lowering *l) {
+    struct trc_operand in[TRC_OP_AT(AMBIENT_OCCLUSION, end)];
+    struct trc_operand *const open = l->out + TRC_OUT_AT(AMBIENT_OCCLUSION, open);
+    in[TRC_OP_AT(AMBIENT_OCCLUSION, distance)] = l->in[TRC_AT(AMBIENT_OCCLUSION, distance)];
+    copy3(in + TRC_OP_AT(AMBIENT_OCCLUSION, normal), l->in + TRC_AT(AMBIENT_OCCLUSION, normal));
+    TRC_TRY(op(l->b, TRC_OP_AMBIENT_OCCLUSION, l->node->mode, in, open));
+    for (uint32_t i = 0; i < 3; i++)
+        TRC_TRY(trc_build_math(l->b, TRC_MATH_MULTIPLY, l->in[TRC_AT(AMBIENT_OCCLUSION, color) + i],
+                               *open, trc_constant(0.0f), l->out + i));
+    return TRC_OK;
+}
+
+/* A normal of its own is turned as the point's. */
+static trc_status lower_bevel(const struct lowering *l) {
+    struct trc_operand normal[3];
+    TRC_TRY(op(l->b, TRC_OP_BEVEL, l->node->mode, l->in + TRC_AT(BEVEL, radius), l->out));
+    if (l->b->desc->inputs[l->node->first_input + TRC_INPUT_OF(BEVEL, normal)].node < 0)
+        return TRC_OK;
+    TRC_TRY(op(l->b, TRC_OP_NORMAL, 0, NULL, normal));
+    TRC_TRY(combine(l->b, TRC_VECTOR_SUBTRACT, l->out, normal, l->out));
+    TRC_TRY(combine(l->b, TRC_VECTOR_ADD, l->in + TRC_AT(BEVEL, normal), l->out, l->out));
+    return combine(l->b, TRC_VECTOR_NORMALIZE, l->out, NULL, l->out);
+}
+
 /* Long because it is the list of node types. */
 static trc_status lower_node(const struct lowering *l) {
     struct trc_build *b = l->b;
@@ -568,6 +592,12 @@ static trc_status lower_node(const struct lowering *l) {
         return lower_vector_rotate(l);
     case TRC_NODE_CAMERA_DATA:
         return lower_camera_data(l);
+    case TRC_NODE_AMBIENT_OCCLUSION:
+        return lower_ambient_occlusion(l);
+    case TRC_NODE_BEVEL:
+        return lower_bevel(l);
+    case TRC_NODE_RAYCAST:
+        return op(b, TRC_OP_RAYCAST, mode, l->in, l->out);
     case TRC_NODE_WIREFRAME:
         return op(b, TRC_OP_WIREFRAME, 0, l->in, l->out);
     case TRC_NODE_SEPARATE:

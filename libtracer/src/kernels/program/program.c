@@ -11,6 +11,7 @@
 #include "kernels/program/relief.h"
 #include "kernels/program/table.h"
 #include "kernels/program/texture.h"
+#include "kernels/program/tracing.h"
 
 /* Operations that depend on inputs alone. Long because it is the list of them; true if op is one.
  */
@@ -217,6 +218,11 @@ static void run_at_surface(const struct trc_surface *s, const struct trc_instruc
         break;
     case TRC_OP_TRANSFORM:
         v3_write(out, op_transform(s, i->mode, v3_read(in)));
+        break;
+    case TRC_OP_AMBIENT_OCCLUSION:
+    case TRC_OP_BEVEL:
+    case TRC_OP_RAYCAST:
+        trc_program_trace(s, i->op, i->mode, in, out);
         break;
     case TRC_OP_WIREFRAME:
         out[0] = op_wireframe(s, in[0]);

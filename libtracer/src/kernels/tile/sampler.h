@@ -27,6 +27,10 @@ enum {
     TRC_DIMS_PER_BOUNCE
 };
 
+/* First dimension of the numbers that programs ask for at the first hit, and how many of each;
+ * those of further hits follow. Beyond any that paths take. */
+#define TRC_DIM_PROBE (TRC_DIM_BOUNCE + 4096 * TRC_DIMS_PER_BOUNCE)
+
 struct trc_sampler {
     uint32_t kind; /* TRC_SAMPLER_* */
     uint32_t seed;

@@ -4,6 +4,7 @@
  * and light samples are uniform. */
 #include <stddef.h>
 
+#include "kernels/program/tracing.h"
 #include "kernels/tile/shade.h"
 #include "kernels/trace/mesh_fetch.h"
 #include "kernels/trace/panorama.h"
@@ -124,6 +125,35 @@ static vuint data_passes(struct trc_tile *t, const struct arrival *a, const stru
                            samples);
 }
 
+/* What programs trace rays with, for the lanes that have arrived. */
+struct shading_probe {
+    struct trc_probe probe;
+    const struct trc_tile *tile;
+    const struct arrival *arrival;
+};
+
+static void probe_numbers(const struct trc_probe *probe, enum trc_probe_use use, uint32_t sample,
+                          uint32_t count, vfloat u[2]) {
+    const struct shading_probe *p = (const struct shading_probe *)probe;
+    const uint32_t at = 2 * (TRC_PROBE_USES * p->tile->generation + use);
+    trc_samples(&p->tile->sampler, p->arrival->pixel, p->arrival->sample, TRC_DIM_PROBE + at, 2,
+                sample, count, u);
+}
+
+static void program_run(struct trc_tile *t, const struct arrival *a, const struct trc_material *m,
+                        struct trc_surface *s, struct trc_registers *regs) {
+    const struct shading_probe own = {.probe = {.numbers = probe_numbers,
+                                                .packet = &t->packets[0],
+                                                .hits = &t->packet_hits[0],
+                                                .ray_count = &t->job->counts.rays_shadow,
+                                                .min_pdf = a->min_pdf},
+                                      .tile = t,
+                                      .arrival = a};
+    s->probe = &own.probe;
+    trc_program_run(m, s, regs);
+    s->probe = NULL;
+}
+
 static void shade_group(struct trc_tile *t, uint32_t material, vint index, vmask active) {
     const struct trc_material *m = t->snapshot->materials[material];
     struct arrival a;
@@ -133,7 +163,9 @@ static void shade_group(struct trc_tile *t, uint32_t material, vint index, vmask
     trc_arrival_load(t, index, active, &a);
     trc_arrival_load_samples(t, &a);
     surface_setup(t, &a, m->has, &s);
-    if (m->instruction_count)
+    if (m->has & TRC_MATERIAL_TRACES_RAYS)
+        program_run(t, &a, m, &s, &regs);
+    else if (m->instruction_count)
         trc_program_run(m, &s, &regs);
     trc_lobes_setup(m, &s, &regs, filter_alpha(t, &a), &lobes);
     if (t->snapshot->features & TRC_FEATURE_SHADOW_TERMINATORS) {

@@ -69,6 +69,11 @@ void trc_trace_closest(const struct trc_snapshot *snapshot, struct trc_packet *p
 void trc_trace_looking_back(const struct trc_snapshot *snapshot, struct trc_packet *packet,
                             struct trc_packet_hits *hits, const uint32_t left[TRC_PACKET_SIZE]);
 
+/* The same of one packet whose rays meet nothing but the instance of that number, whatever lies in
+ * the same place. (kernels/trace/trace_one.c) */
+void trc_trace_one_instance(const struct trc_snapshot *snapshot, struct trc_packet *packet,
+                            struct trc_packet_hits *hits, const uint32_t instance[TRC_PACKET_SIZE]);
+
 /* Active rays with anything in (tmin, t): a mask for each packet. t is left as it was. */
 void trc_trace_occluded(const struct trc_snapshot *snapshot, struct trc_packet *packets,
                         uint32_t packet_count, uint64_t *occluded);

@@ -21,8 +21,11 @@ enum {
  */
 enum { TRC_WORLD_LOOKUP = -1, TRC_FIRST_LAMP = -2 };
 
+struct trc_probe; /* kernels/program/tracing.h */
+
 struct trc_surface {
     const struct trc_snapshot *snapshot;
+    const struct trc_probe *probe;       /* what its program traces rays with; NULL: none */
     const struct trc_light_table *lamps; /* where the instance is a lamp */
     vmask active;
     vint instance, triangle; /* of the lanes in active; see above */

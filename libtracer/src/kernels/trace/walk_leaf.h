@@ -20,6 +20,11 @@
 #define TRC_WALK_LOOKS_BACK 0
 #endif
 
+/* Whether rays meet nothing but one instance each, w->left; compiled apart likewise. */
+#ifndef TRC_WALK_ONE_INSTANCE
+#define TRC_WALK_ONE_INSTANCE 0
+#endif
+
 struct trc_turned; /* kernels/trace/curve.h */
 
 struct walk {
@@ -32,7 +37,7 @@ struct walk {
     uint32_t key;                 /* moving trees: first key of the segment */
     struct trc_group *group;
     struct trc_turned *turned; /* curves: of each packet's rays in the group */
-    const uint32_t *left;      /* looking back: the instances that the packet's rays left */
+    const uint32_t *left;      /* looking back, one instance: those of the packet's rays */
 };
 
 /* ---- packets ---- */
@@ -94,14 +99,18 @@ TRC_INLINE uint32_t slot_instance(const struct walk *w, struct trc_slot slot) {
 /* How far hits of a slot must be ahead, of a chunk of rays and of one. */
 TRC_INLINE vfloat least_distances(const struct walk *w, int k, int i, const struct trc_slot *slot) {
     const vfloat tmin = vf_load(&w->packets[k].tmin[i]);
-    if (!TRC_WALK_LOOKS_BACK)
+    if (!TRC_WALK_LOOKS_BACK && !TRC_WALK_ONE_INSTANCE)
         return tmin;
     const vint instance = vi_set((int32_t)slot_instance(w, *slot));
-    return vf_select(vi_eq(vi_load((const int32_t *)w->left + i), instance),
-                     vf_max(tmin, vf_set(0.0f)), tmin);
+    const vmask same = vi_eq(vi_load((const int32_t *)w->left + i), instance);
+    if (TRC_WALK_ONE_INSTANCE)
+        return vf_select(same, tmin, vf_set(INFINITY));
+    return vf_select(same, vf_max(tmin, vf_set(0.0f)), tmin);
 }
 TRC_INLINE float least_distance(const struct walk *w, int k, int ray, const struct trc_slot *slot) {
     const float tmin = w->packets[k].tmin[ray];
+    if (TRC_WALK_ONE_INSTANCE)
+        return w->left[ray] == slot_instance(w, *slot) ? tmin : INFINITY;
     if (!TRC_WALK_LOOKS_BACK || w->left[ray] != slot_instance(w, *slot))
         return tmin;
     return f_max(tmin, 0.0f);
