@@ -15,8 +15,9 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 ADDON = os.path.join(blender_support.REPOSITORY, "addon", "volley")
 TABLE = os.path.join(os.path.dirname(HERE), "settings.md")
 SHARE_OFF = 0.08  # of a ball's pixels, which edges take: 5 of 76
-# Measured by others, as their edges are all over a ball.
-ELSEWHERE = {("ShaderNodeTexWhiteNoise", ""), ("ShaderNodeNewGeometry", "<Parametric")}
+# Measured by others, as their edges, or their noise, are all over a ball.
+ELSEWHERE = {("ShaderNodeTexWhiteNoise", ""), ("ShaderNodeNewGeometry", "<Parametric"),
+             ("ShaderNodeAmbientOcclusion", ""), ("ShaderNodeBevel", "")}
 
 
 def inside_walk():

@@ -124,6 +124,22 @@ def inside_pictures(names):
     return {name: (pair['VOLLEY'], pair['CYCLES']) for name, pair in pictures.items()}
 
 
+def inside_attributes():
+    """What a render says of a Raycast node that looks up an attribute of what it meets."""
+    import bpy
+    import scenes
+    import volley.session
+    told = []
+    volley.session.report_warning = lambda _engine, message: told.append(message)
+    build("Raycast", {}, {}, "Is Hit", "emission")
+    tree = bpy.data.materials["Shown"].node_tree
+    node = next(node for node in tree.nodes if node.bl_idname == "ShaderNodeRaycast")
+    node.sample_attribute_items.new('FLOAT', "Tint")
+    tree.links.new(node.outputs["Tint"], scenes.shader_of(bpy.data.materials["Shown"]).inputs["Strength"])
+    scenes.render()
+    return told
+
+
 # Comparison ----------------------------------------------------------------------------------------
 
 @pytest.fixture(scope="module")
@@ -135,9 +151,11 @@ def errors(blender_of_module):
     return found
 
 
+SINCE = (5, 1), "the Raycast node came with 5.1"
+
+
 def _parameter(name):
-    since = pytest.mark.since((5, 1), "the Raycast node came with 5.1")
-    return pytest.param(name, marks=[since] if CASES[name][0] == "Raycast" else [])
+    return pytest.param(name, marks=[pytest.mark.since(*SINCE)] if CASES[name][0] == "Raycast" else [])
 
 
 @pytest.mark.parametrize("name", list(map(_parameter, CASES)))
@@ -147,3 +165,10 @@ def test_against_cycles(errors, name):
     mean, _biased, tile = errors[name]
     assert mean < TOLERANCE
     assert tile < TOLERANCE
+
+
+@pytest.mark.since(*SINCE)
+def test_attributes_are_named(blender):
+    if blender_support.version() < SINCE[0]:
+        pytest.skip(SINCE[1])
+    assert any("attributes of what its ray meets are not looked up" in each for each in blender.run(inside_attributes))
