@@ -21,10 +21,8 @@ turns.
 
 import argparse
 import json
-import mmap
 import pathlib
 import statistics
-import struct
 import sys
 import threading
 import time
@@ -37,6 +35,7 @@ from gpu_extras.presets import draw_texture_2d
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "support"))
 import scenes  # noqa: E402  (found by the line above)
 import viewport_scenes  # noqa: E402
+from screen import Screen  # noqa: E402
 
 POSES = (0.5, 3.5)        # of viewport_scenes.pose: bent to one side and to the other
 REST_SECONDS = 3.0        # until a view has a picture at rest
@@ -63,18 +62,6 @@ class ColorEngine(bpy.types.RenderEngine):
         self.bind_display_space_shader(depsgraph.scene)
         draw_texture_2d(texture, (0, 0), context.region.width, context.region.height)
         self.unbind_display_space_shader()
-
-
-class Screen:
-    """The pixels of Xvfb's screen, from the file in xwd format that holds its memory."""
-
-    def __init__(self, path):
-        with open(path, "rb") as file:
-            memory = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
-        header = struct.unpack(">25I", memory[:100])
-        begin, width, height = header[0] + 12 * header[19], header[4], header[5]
-        pixels = np.frombuffer(memory, np.uint8, height * header[12], begin)
-        self.pixels = pixels.reshape(height, -1, 4)[:, :width, :3]
 
 
 class Watch(threading.Thread):

@@ -18,13 +18,8 @@ def _view():
 
 def _shot():
     """What the 3D view shows, (height, width, 3), display colours."""
-    import bpy
-    import scenes
-    window, area, _ = _view()
-    path = bpy.app.tempdir + "shot.png"
-    with bpy.context.temp_override(window=window):
-        bpy.ops.screen.screenshot(filepath=path)
-    picture = scenes.load(path)
+    import screen
+    picture, area = screen.Screen().picture(), _view()[1]
     region = next(region for region in area.regions if region.type == 'WINDOW')
     return picture[region.y:region.y + region.height, region.x:region.x + region.width, :3]
 

@@ -102,11 +102,12 @@ class Blender:
         """The same with a window of that size on a virtual display. The function returns a generator:
         what it yields is the seconds to let Blender draw, what it returns is the result."""
         answer, line = self._request(function, arguments)
-        display = ["xvfb-run", "-a", "-s", f"-screen 0 {size[0]}x{size[1]}x24"]
+        display = ["xvfb-run", "-a", "-s", f"-screen 0 {size[0]}x{size[1]}x24 -fbdir {self.folder}"]
         line = display + [argument for argument in line if argument != "-b"]
         position = line.index("--factory-startup")
         line[position:position] = ["--window-geometry", "0", "0", *map(str, size)]
-        process = self._start(line, timeout, {"LIBGL_ALWAYS_SOFTWARE": "1"})
+        process = self._start(line, timeout, {"LIBGL_ALWAYS_SOFTWARE": "1",
+                                              "VOLLEY_SCREEN": os.path.join(self.folder, "Xvfb_screen0")})
         return self._answer(answer, process)
 
     def _start(self, line, timeout, environment=None):
