@@ -10,7 +10,7 @@
 # touches (see SLOW) and builds kernels for this processor alone; --report writes JUnit XML. --curves
 # measures error against time there instead, and leaves its JSON in DIR. Needs root, a Debian mirror and
 # 2.5 GB; the folder is $XDG_CACHE_HOME/volley/SUITE and stays, so that the next run takes only the build
-# and the tests. Nothing is mounted. Exit code 77: it cannot be set up here, with the reason as the last
+# and the tests. Nothing stays mounted: /proc is there in a name space of its own, where there may be one. Exit code 77: it cannot be set up here, with the reason as the last
 # line; else pytest's.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -18,7 +18,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 CACHE=${XDG_CACHE_HOME:-$HOME/.cache}/volley
 PACKAGES=(
     blender gcc g++ cmake ninja-build libc6-dev libopenimageio-dev openimageio-tools
-    python3-numpy python3-openimageio python3-pytest
+    python3-numpy python3-openimageio python3-pytest xvfb xauth libgl1-mesa-dri
 )
 SKIPPED=77
 
@@ -26,13 +26,21 @@ say() { printf '== %s\n' "$*"; }
 skip() { printf 'Blender of %s: %s\n' "$NAME" "$*"; exit "$SKIPPED"; }
 die() { printf 'blender_next: %s\n' "$*" >&2; exit 1; }
 
+# In a mount name space of its own, where there may be one: what is mounted there goes away with it.
+in_private() {
+    if unshare --mount true 2>/dev/null; then
+        unshare --mount "$@"
+    else
+        "$@"
+    fi
+}
+
 inside() {
-    chroot "$ROOT" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LC_ALL=C.UTF-8 \
+    in_private sh -c 'mount -t proc proc "$0/proc" 2>/dev/null; exec chroot "$0" "$@"' "$ROOT" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LC_ALL=C.UTF-8 \
         ${http_proxy:+http_proxy="$http_proxy"} "$@" </dev/null
 }
 
-# What the suite is called, where its folder is, and what its Blender needs besides. Without Xvfb in
-# Debian 13: screenshots of Blender 4.3 on it are black, so tests in windows are skipped.
+# What the suite is called, where its folder is, and what its Blender needs besides.
 choose_suite() {
     SUITE=$1 ROOT=$CACHE/$1
     case $SUITE in
@@ -73,10 +81,7 @@ make_root() {
     mkdir -p "$CACHE"
     rm -rf "$part"
     say "$NAME into $ROOT"
-    # Its own mount name space, if there may be one: what debootstrap mounts goes away with it.
-    local private=()
-    ! unshare --mount true 2>/dev/null || private=(unshare --mount)
-    "${private[@]}" debootstrap --variant=minbase "$SUITE" "$part" "$(mirror)" >"$log" 2>&1 </dev/null ||
+    in_private debootstrap --variant=minbase "$SUITE" "$part" "$(mirror)" >"$log" 2>&1 </dev/null ||
         { tail -n 5 "$log"; skip "debootstrap failed, see $log"; }
     mv "$part" "$ROOT"
 }
@@ -126,7 +131,7 @@ build() {
 
 run_tests() {
     say "Tests in $(inside blender --version 2>/dev/null | head -n 1)"
-    inside env VOLLEY_WITHOUT=xvfb VOLLEY_BUILD=/volley/build \
+    inside env VOLLEY_BUILD=/volley/build \
         BLENDER_USER_SCRIPTS=/volley/build/blender PYTHONPATH=/volley/tests/support sh -c 'cd /volley && exec python3 -m pytest "$@"' pytest \
         -q -ra -p no:cacheprovider --rootdir tests --junit-prefix "next_$SUITE" \
         --junit-xml build/pytest.xml "$@"

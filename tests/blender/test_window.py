@@ -52,7 +52,7 @@ def _open(scene):
     """A plain view through the camera: no overlays, no gizmos, colours as they are."""
     import bpy
     bpy.context.preferences.view.show_splash = False
-    scene.view_settings.view_transform = 'Standard'
+    scene.view_settings.view_transform, scene.render.dither_intensity = 'Standard', 0.0
     scene.volley.preview_samples = 2
     _, _, space = _view()
     space.overlay.show_overlays = space.show_gizmo = False

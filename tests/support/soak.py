@@ -7,6 +7,9 @@ render that, starts a final render, which sees Esc after a random time, in sync,
 end; then the engine has freed all it had.
 """
 
+import math
+import os
+
 WINDOW = 320, 240       # pixels: Blender's drawing without a graphics card is most of a cycle
 CANCEL_SECONDS = 0.15   # the latest Esc, about twice what a render takes
 UNDO_CYCLES = 25        # from one storm to the next
@@ -100,6 +103,8 @@ def _undo_storm(bpy, edits, dice, view):
 
 
 def _resident_mib():
+    if not os.path.exists("/proc/self/statm"):
+        return math.nan
     with open("/proc/self/statm", encoding="ascii") as file:
         return int(file.read().split()[1]) * 4096 / 2.0 ** 20
 
