@@ -67,8 +67,8 @@ class CameraType(IntEnum):
 
 
 class CurveShape(IntEnum):
-    CURVES_RIBBON = 0
-    CURVES_ROUND = 1
+    RIBBON = 0
+    ROUND = 1
 
 
 class NormalsLayout(IntEnum):
@@ -872,7 +872,7 @@ CONSTANTS = {"TRC_MAX_LIGHT_GROUPS": MAX_LIGHT_GROUPS, "TRC_MAX_CURVE_PIECES": M
              "TRC_VERSION_PATCH": VERSION_PATCH, "TRC_ABI_VERSION": ABI_VERSION}
 
 # Enumerations, with what their members' names begin with in C.
-ENUMERATIONS = {StatusCode: "TRC_", IsaId: "TRC_ISA_", CameraType: "TRC_CAMERA_", CurveShape: "TRC_",
+ENUMERATIONS = {StatusCode: "TRC_", IsaId: "TRC_ISA_", CameraType: "TRC_CAMERA_", CurveShape: "TRC_CURVE_",
                 NormalsLayout: "TRC_NORMALS_", VisibleRays: "TRC_VISIBLE_", InstanceFlags: "TRC_INSTANCE_",
                 LightType: "TRC_LIGHT_", AreaShape: "TRC_AREA_", LightFlags: "TRC_LIGHT_",
                 AoMethod: "TRC_AO_", NodeType: "TRC_NODE_", ModeFlags: "TRC_MODE_", TableSize: "TRC_TABLE_",

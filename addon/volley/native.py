@@ -319,6 +319,31 @@ class Scene:
         self._edit("trc_mesh_update", mesh, positions.shape[0], _address(positions),
                    positions.size, _address(normals), 0 if normals is None else normals.size)
 
+    def create_curves(self, points, lengths=None, shape=abi.CurveShape.RIBBON, piece_count=1, attributes=(),
+                      generated=None):
+        """Curves: points (keys, points, 4) float32, place and radius; lengths (strands,) uint32, points of
+        each, or None: balls; attributes: (name, array (points | strands, 2 | 4) float32, whether of strands),
+        the default UV map first; generated: (strands, 3) or None. They are a mesh to all else."""
+        points, lengths = _array(points, np.float32), _array(lengths, np.uint32)
+        generated = _array(generated, np.float32)
+        arrays = [(_text(name) or b"", _array(values, np.float32), of_strands)
+                  for name, values, of_strands in attributes]
+        structs = (abi.CurveAttribute * len(arrays))(*(
+            describe(abi.CurveAttribute, width=values.shape[-1], name=name, values=_address(values),
+                     value_count=values.size, per_strand=int(of_strands)) for name, values, of_strands in arrays))
+        desc = describe(
+            abi.CurvesDesc, key_count=points.shape[0], shape=shape, piece_count=piece_count,
+            point_count=points.shape[1], points=_address(points), point_value_count=points.size,
+            lengths=_address(lengths), strand_count=0 if lengths is None else len(lengths),
+            generated=_address(generated), generated_count=0 if generated is None else generated.size,
+            attributes=structs if arrays else None, attribute_count=len(arrays))
+        return self._create("trc_curves_create", desc)
+
+    def update_curves(self, mesh, points):
+        """New places and radii, (keys, points, 4), of the same strands."""
+        points = _array(points, np.float32)
+        self._edit("trc_curves_update", mesh, points.shape[0], _address(points), points.size)
+
     def destroy_mesh(self, mesh):
         self._edit("trc_mesh_destroy", mesh)
 

@@ -216,7 +216,7 @@ static void expected(const struct strands *s, const struct ray_set *rays, uint32
             const uint32_t at = s->desc.lengths ? p : p * PIECES;
             vertex_at(s, strand, at, rays->time[i], a);
             vertex_at(s, strand, s->desc.lengths ? p + 1 : at, rays->time[i], b);
-            if (s->desc.lengths && s->desc.shape == TRC_CURVES_RIBBON)
+            if (s->desc.lengths && s->desc.shape == TRC_CURVE_RIBBON)
                 answer = meet_ribbon(&ray, a, b, p == 0, p + 1 == pieces, &distance);
             else
                 answer = meet_round(&ray, a, b, &distance);
@@ -289,7 +289,7 @@ static void test_against_double(void **state) {
     for (uint32_t variant = 0; variant < 9; variant++) {
         static struct strands s;
         const uint32_t kind = variant % 3;
-        strands_make(&s, &rng, kind == 1 ? TRC_CURVES_ROUND : TRC_CURVES_RIBBON, kind == 2, 1,
+        strands_make(&s, &rng, kind == 1 ? TRC_CURVE_ROUND : TRC_CURVE_RIBBON, kind == 2, 1,
                      variant / 3 == 1);
         check_against_oracle(&s, &rng);
         assert_ok(trc_scene_destroy(s.scene));
@@ -301,7 +301,7 @@ static void test_moving(void **state) {
     struct rng rng = rng_seed(8);
     for (uint32_t kind = 0; kind < 3; kind++) {
         static struct strands s;
-        strands_make(&s, &rng, kind == 1 ? TRC_CURVES_ROUND : TRC_CURVES_RIBBON, kind == 2,
+        strands_make(&s, &rng, kind == 1 ? TRC_CURVE_ROUND : TRC_CURVE_RIBBON, kind == 2,
                      MAX_KEYS, true);
         check_against_oracle(&s, &rng);
         assert_ok(trc_scene_destroy(s.scene));
@@ -317,7 +317,7 @@ static void test_aimed(void **state) {
         struct ray_set rays;
         struct hit_set hits;
         const uint32_t count = query_test_rays(AIMED);
-        strands_make(&s, &rng, variant % 2 ? TRC_CURVES_ROUND : TRC_CURVES_RIBBON, false,
+        strands_make(&s, &rng, variant % 2 ? TRC_CURVE_ROUND : TRC_CURVE_RIBBON, false,
                      variant / 2 ? MAX_KEYS : 1, variant / 2);
         ray_set_init(&rays);
         for (uint32_t i = 0; i < count; i++) {

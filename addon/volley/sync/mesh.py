@@ -8,7 +8,6 @@ reach this module as the meshes they evaluate to.
 """
 
 import contextlib
-import zlib
 from dataclasses import dataclass, field
 
 import bpy
@@ -38,13 +37,22 @@ class MeshData:
     corners: np.ndarray = None        # (triangles * 3,) integers: Blender's corners, for corner normals
     poses: object = None              # Topology where later shapes are awaited
 
-    def topology_signature(self):
-        """Equal when only positions and normals may differ."""
-        arrays = [self.indices, self.smooth, self.material_index, self.generated]
-        arrays += [v for _, v in self.attributes]
-        sums = tuple(None if a is None else zlib.crc32(a.tobytes()) for a in arrays)
+    def topology(self):
+        """All but positions and normals: what can be compared, and arrays, some of them None."""
         return (len(self.positions), len(self.indices), self.normal_kind, self.normals is None,
-                tuple(name for name, _ in self.attributes), sums)
+                *(name for name, _ in self.attributes)), [
+                    self.indices, self.smooth, self.material_index, self.generated,
+                    *(values for _, values in self.attributes)]
+
+    def create(self, scene, positions, normals):
+        """A mesh of the library's scene, of those keys; its id."""
+        return scene.create_mesh(positions, self.indices, normals, self.normal_kind, self.smooth,
+                                 self.material_index, self.attributes, self.generated)
+
+    @staticmethod
+    def update(scene, mesh_id, positions, normals):
+        """Give it other positions and normals."""
+        scene.update_mesh(mesh_id, positions, normals)
 
 
 @contextlib.contextmanager

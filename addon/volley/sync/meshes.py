@@ -45,7 +45,7 @@ class Meshes:
             if entry is None or topology is None or entry.topology != topology:
                 entry = self._create(key, data, positions, normals)
             elif entry.shape != shape:
-                self._scene.update_mesh(entry.id, positions, normals)
+                data.update(self._scene, entry.id, positions, normals)
         except native.TracerError as error:
             if error.status not in (abi.StatusCode.ERROR_INVALID_ARGUMENT, abi.StatusCode.ERROR_TOO_LARGE):
                 raise
@@ -82,14 +82,14 @@ class Meshes:
         if not self.will_resync:
             return None, None
         normal_sum = 0 if normals is None else zlib.crc32(normals.tobytes())
-        return data.topology_signature(), (zlib.crc32(positions.tobytes()), normal_sum)
+        counts, arrays = data.topology()
+        topology = counts, tuple(None if a is None else zlib.crc32(a.tobytes()) for a in arrays)
+        return topology, (zlib.crc32(positions.tobytes()), normal_sum)
 
     def _create(self, key, data, positions, normals):
         """A new mesh; one of the same key goes when no instance shows it any more."""
         entry = MeshEntry()
-        entry.id = self._scene.create_mesh(positions, data.indices, normals, data.normal_kind,
-                                           data.smooth, data.material_index, data.attributes,
-                                           data.generated)
+        entry.id = data.create(self._scene, positions, normals)
         if key in self._entries:
             self._retired.append(self._entries[key].id)
         self._entries[key] = entry

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair and points: particle hair, Curves and Point Cloud objects, which become the solids of ``tubes``."""
+"""Hair and points: particle hair, Curves and Point Cloud objects, as ``curves`` has them."""
 
 import bpy
 import numpy as np
 
 from .. import abi
-from . import tubes
+from . import curves
 from .mesh import active_color_name, attribute_colors, wanted_uv_layers
 
 HAIR_ATTRIBUTE = ".hair"  # (intercept, length, thickness, random) of the Hair Info node
@@ -36,7 +36,8 @@ _DATA_TYPES = tuple(getattr(bpy.types, name) for name in ("Curves", "PointCloud"
 
 class Hair:
     """The hair of one of an object's particle systems, at any time that the depsgraph is moved to. names:
-    UV maps and colours that are wanted; a strand has those of its root."""
+    UV maps and colours that are wanted, and whether Generated coordinates are; a strand has those of its
+    root."""
 
     def __init__(self, number, depsgraph, is_final, names):
         self._number, self._depsgraph, self._is_final, self._names = number, depsgraph, is_final, names
@@ -57,7 +58,7 @@ class Hair:
                 or any(_has_force(each) for each in self._depsgraph.objects))
 
     def read(self, instance):
-        """It as tubes.Strands, None without a strand."""
+        """It as curves.Strands, None without a strand."""
         real, modifier = self._find(instance)
         if modifier is None:
             return None
@@ -71,15 +72,23 @@ class Hair:
         if len(keys) == 0:
             return None
         matrix = np.array(real.matrix_world.inverted_safe())  # particles are in the world
-        keys = (keys @ matrix[:3, :3].T + matrix[:3, 3]).reshape(-1, steps, 3)
-        radii = _hair_radii(settings, keys)
-        return tubes.Strands(keys.reshape(-1, 3), radii.reshape(-1), np.full(len(keys), steps))
+        keys = keys @ matrix[:3, :3].T + matrix[:3, 3]
+        strands = curves.Strands(keys, np.zeros(len(keys)), np.full(len(keys) // steps, steps))
+        strands.radii = _hair_radii(settings, strands)
+        return strands
 
-    def solid(self, instance, strands):
-        """The tubes of what was read and their MeshData, None without a face."""
+    def curves(self, instance, strands):
+        """Which keys of what was read are kept, None for all, and those as curves.CurvesData."""
         real, modifier = self._find(instance)
-        roots = _root_values(real.data, modifier, _shown_strands(modifier.particle_system), *self._names)
-        return _tubes(tubes.Tubes(strands, joins_keys=True), strands, roots, self._names)
+        uv_names, color_names, needs_generated = self._names
+        values = _root_values(real.data, modifier, _shown_strands(modifier.particle_system), uv_names, color_names)
+        is_kept = strands.keys_kept()
+        strands = strands.only(is_kept)
+        generated = None
+        if needs_generated:
+            location, size = (np.array(each) for each in (real.data.texspace_location, real.data.texspace_size))
+            generated = _in_box(strands.first_points(), location, size)
+        return is_kept, _curves(strands, values, color_names, generated)
 
 
 class StrandObject:
@@ -95,25 +104,26 @@ class StrandObject:
 
     @staticmethod
     def read(instance):
-        """It as tubes.Strands."""
+        """It as curves.Strands, None without a point."""
         data = instance.object.data
         positions = _values(data, "position", "vector", 3)
+        if len(positions) == 0:
+            return None
         if not isinstance(data, bpy.types.Curves):
-            return tubes.Strands(positions, _values(data, "radius", "value", 1, _DEFAULT_POINT_RADIUS)[:, 0])
+            return curves.Strands(positions, _values(data, "radius", "value", 1, _DEFAULT_POINT_RADIUS)[:, 0])
         lengths = np.empty(len(data.curves), np.int32)
         data.curves.foreach_get("points_length", lengths)
-        return tubes.Strands(positions, _values(data, "radius", "value", 1, _DEFAULT_RADIUS)[:, 0], lengths)
+        return curves.Strands(positions, _values(data, "radius", "value", 1, _DEFAULT_RADIUS)[:, 0], lengths)
 
-    def solid(self, instance, strands):
-        """The tubes or balls of what was read and their MeshData, None without a face."""
-        values = _object_values(instance.object.data, *self._names)
-        if strands.lengths is not None:
-            return _tubes(tubes.Tubes(strands), strands, values, self._names)
-        if len(strands.positions) == 0:
-            return None
-        balls = tubes.Balls(strands)
-        values = [(name, balls.spread(each)) for name, each, _ in values]
-        return balls, tubes.mesh_of(balls, strands, values[:abi.MAX_ATTRIBUTES])
+    def curves(self, instance, strands):
+        """Which keys of what was read are kept (None: all), and those as curves.CurvesData."""
+        uv_names, color_names, needs_generated = self._names
+        values = _object_values(instance.object.data, uv_names, color_names)
+        generated = None
+        if needs_generated:
+            lower, upper = strands.positions.min(axis=0), strands.positions.max(axis=0)
+            generated = _in_box(strands.first_points(), 0.5 * (lower + upper), 0.5 * (upper - lower))
+        return None, _curves(strands, values, color_names, generated)
 
 
 def _has_force(blender_object):
@@ -128,23 +138,27 @@ def _shown_strands(system):
     return range(first, parent_count + child_count)
 
 
-def _tubes(solid, strands, values, names):
-    """Tubes and their MeshData with values of strands or their keys as attributes, None without a face."""
-    if solid.is_empty:
-        return None
-    values = [(name, solid.spread(each, of_keys)) for name, each, of_keys in values]
-    own = [(name, tell(strands)) for name, tell in (
-        (HAIR_ATTRIBUTE, solid.info), (DIRECTION_ATTRIBUTE, solid.directions)) if name in names[1]]
-    return solid, tubes.mesh_of(solid, strands, values[:abi.MAX_ATTRIBUTES - len(own)] + own)
+def _in_box(points, middle, half):
+    """Places as Generated coordinates of a box; a flat side becomes 0.5."""
+    return 0.5 + np.divide(points - middle, 2.0 * half, out=np.zeros(points.shape), where=half > 0.0)
+
+
+def _curves(strands, values, color_names, generated):
+    """curves.CurvesData of strands or points, with those values."""
+    own = []
+    if strands.lengths is not None:
+        own = [(name, tell(), False) for name, tell in (
+            (HAIR_ATTRIBUTE, strands.info), (DIRECTION_ATTRIBUTE, strands.directions)) if name in color_names]
+    return curves.curves_of(strands, values[:abi.MAX_ATTRIBUTES - len(own)] + own, generated)
 
 
 def _root_values(mesh, modifier, strands, uv_names, color_names):
-    """(name, (strands, 2 or 4), False) of each UV map and colour attribute that is asked for, as meshes have
+    """(name, (strands, 2 or 4), True) of each UV map and colour attribute that is asked for, as meshes have
     them: the default map first."""
     found = []
     for number, layer in wanted_uv_layers(mesh, uv_names):
         values = _at_roots(modifier.particle_system.uv_on_emitter, modifier, strands, uv_no=number)
-        found.append((layer.name, values, False))
+        found.append((layer.name, values, True))
     colors = mesh.vertex_colors
     for name in sorted(color_names):
         source = name or active_color_name(mesh)
@@ -153,12 +167,12 @@ def _root_values(mesh, modifier, strands, uv_names, color_names):
             values = np.ones((len(strands), 4), np.float32)
             values[:, :3] = _linear(_at_roots(modifier.particle_system.mcol_on_emitter, modifier, strands,
                                               vcol_no=number))
-            found.append((name, values, False))
+            found.append((name, values, True))
     return found
 
 
 def _object_values(data, uv_names, color_names):
-    """(name, (strands or keys, 2 or 4), whether of keys) of each attribute that is asked for. The first
+    """(name, (strands or keys, 2 or 4), whether of strands) of each attribute that is asked for. The first
     of two numbers is the default UV map, as Cycles has it."""
     found = []
     maps = [each for each in data.attributes if each.data_type == 'FLOAT2'] if uv_names else []
@@ -166,12 +180,12 @@ def _object_values(data, uv_names, color_names):
         if number == 0 or attribute.name in uv_names:
             values = np.empty((len(attribute.data), 2), np.float32)
             attribute.data.foreach_get("vector", values.reshape(-1))
-            found.append((attribute.name, values, attribute.domain == 'POINT'))
+            found.append((attribute.name, values, attribute.domain == 'CURVE'))
     for name in sorted(color_names):
         attribute = data.attributes.get(name)
         values = None if attribute is None else attribute_colors(attribute)
         if values is not None and all(name != known for known, _, _ in found):
-            found.append((name, values, attribute.domain == 'POINT'))
+            found.append((name, values, attribute.domain == 'CURVE'))
     return found
 
 
@@ -196,9 +210,9 @@ def _values(data, name, field, width, default=0.0):
     return values
 
 
-def _hair_radii(settings, keys):
+def _hair_radii(settings, strands):
     """Radii of hair, from root to tip by the settings' shape."""
-    left = 1.0 - tubes.fractions(keys)[0].clip(0.0, 1.0)
+    left = 1.0 - strands.fractions()[0].clip(0.0, 1.0)
     is_tip = left <= 0.0
     shape = settings.shape
     if shape < 0.0:
@@ -210,5 +224,3 @@ def _hair_radii(settings, keys):
     if settings.use_close_tip:
         radii[is_tip] = 0.0
     return radii
-
-

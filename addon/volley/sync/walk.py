@@ -7,7 +7,7 @@ import bpy
 
 from ..abi import InstanceFlags
 from ..compat import has_adaptive_subdivision
-from . import deform, instance, light, mesh, motion, strands, tubes, visibility
+from . import curves, deform, instance, light, mesh, motion, strands, visibility
 from .linking import Links
 from .matrix import rows12
 from .source import Cancelled
@@ -162,7 +162,7 @@ class Walk:
             self._dress(item, each)
             slot = max(min(modifier.particle_system.settings.material, len(item.materials)), 1) - 1
             item.materials = item.materials[slot:slot + 1]
-            hair = strands.Hair(number, self._source.depsgraph, is_final, self._names[:2])
+            hair = strands.Hair(number, self._source.depsgraph, is_final, self._names)
             self._add_made(each, item, (blender_object.name_full, number), hair)
 
     def _move_hair(self, each, fraction):
@@ -178,7 +178,7 @@ class Walk:
         self._dress(item, each)
         item.materials = item.materials[:1]
         self.tied.add(each.object.name_full)
-        self._add_made(each, item, each.object.data.as_pointer(), strands.StrandObject(self._names[:2]))
+        self._add_made(each, item, each.object.data.as_pointer(), strands.StrandObject(self._names))
 
     def _add_made(self, each, item, source, made_of):
         """An item of strands or points (strands.Hair or strands.StrandObject) whose mesh is made unless another
@@ -201,13 +201,12 @@ class Walk:
         if is_same and meshes.reuse(item.key, source, self._names):
             return True
         shape = made_of.read(each)
-        made = None if shape is None else made_of.solid(each, shape)
-        if made is None:
+        if shape is None:
             return False
-        solid, data = made
+        is_kept, data = made_of.curves(each, shape)
         may_deform = item.motion_keys > 1 and motion.may_deform(each.object, instance.maker_of(each))
         if may_deform and made_of.may_move(each):
-            shapes = tubes.StrandMotion(solid, shape, data, item.motion_keys)
+            shapes = curves.StrandMotion(shape, is_kept, data, item.motion_keys)
             self._deforming[item.key] = _Deforming(source, data, self._names, shapes, made_of.read)
         else:
             meshes.put(item.key, source, data, self._names)

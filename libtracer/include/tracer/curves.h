@@ -14,10 +14,10 @@ TRC_BEGIN_DECLS
 
 /* What is around a curve. */
 enum trc_curve_shape {
-    TRC_CURVES_RIBBON = 0, /* flat, each ray sees it from the front, with the normals of a round
+    TRC_CURVE_RIBBON = 0, /* flat, each ray sees it from the front, with the normals of a round
                               one; ends are cut; nothing nearer than its width to a ray's origin
                               counts, which is how it does not meet itself */
-    TRC_CURVES_ROUND = 1   /* solid, round at its joints and ends */
+    TRC_CURVE_ROUND = 1   /* solid, round at its joints and ends */
 };
 
 /* A named value of each point, or of each strand. */
@@ -37,7 +37,7 @@ TRC_API trc_curve_attribute trc_curve_attribute_default(void);
 typedef struct trc_curves_desc {
     uint32_t struct_size; /* of this structure; checked */
     uint32_t key_count;   /* motion keys, 1..TRC_MAX_KEYS, evenly spaced over [0, 1] */
-    uint32_t shape;       /* TRC_CURVES_* */
+    uint32_t shape;       /* TRC_CURVE_* */
     uint32_t piece_count; /* 1..TRC_MAX_CURVE_PIECES: straight pieces between two points of the
                              Catmull-Rom spline; its first and last points stand for those beyond
                              the ends, too */

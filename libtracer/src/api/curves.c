@@ -25,7 +25,7 @@ static trc_status check_attribute(const trc_curve_attribute *attribute,
 static trc_status check_curves(const trc_curves_desc *desc) {
     TRC_TRY(trc_check_struct(desc, sizeof *desc, "trc_curves_desc"));
     TRC_TRY(trc_check_count(desc->key_count, 1, TRC_MAX_KEYS, "key_count"));
-    TRC_TRY(trc_check_enum(desc->shape, TRC_CURVES_ROUND + 1, "shape"));
+    TRC_TRY(trc_check_enum(desc->shape, TRC_CURVE_ROUND + 1, "shape"));
     TRC_TRY(trc_check_count(desc->piece_count, 1, TRC_MAX_CURVE_PIECES, "piece_count"));
     /* Singles first: later products of them cannot wrap. */
     TRC_TRY(trc_check_count(desc->point_count, 0, INT32_MAX / 4, "point_count"));

@@ -199,7 +199,7 @@ static trc_status add_attribute(struct trc_mesh_topology *t, const trc_curve_att
 static trc_status fill_topology(struct trc_mesh_topology *t, const trc_curves_desc *desc,
                                 const struct counts *counts, struct trc_names *names) {
     t->shape = !desc->lengths                     ? TRC_SHAPE_BALLS
-               : desc->shape == TRC_CURVES_RIBBON ? TRC_SHAPE_RIBBONS
+               : desc->shape == TRC_CURVE_RIBBON ? TRC_SHAPE_RIBBONS
                                                   : TRC_SHAPE_ROUND;
     t->normal_kind = TRC_NORMALS_NONE;
     t->piece_count = desc->piece_count;
