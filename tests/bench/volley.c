@@ -53,6 +53,7 @@ static void load(const struct contestant *c, const struct ray_list *list, uint32
         p->visibility = TRC_VISIBLE_ALL;
         p->common_origin = list->common_origin;
         p->skip_transparent = false;
+        p->left = NULL;
         memset(b.hits[k].instance, 0xff, sizeof b.hits[k].instance);
     }
 }

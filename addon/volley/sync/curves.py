@@ -12,7 +12,7 @@ from .deform import KeyedShapes
 from .hashing import HASH_MAX, hash_numbers
 
 _SHORTEST = 1e-12   # m; keys of a strand that are closer are one
-_ROUND_PIECES = 4   # of a segment of round curves
+_ROUND_PIECES = 8   # of a segment of round curves
 
 
 @dataclass
@@ -128,7 +128,7 @@ def _shape():
     scene = bpy.context.scene
     shape = cycles_curves(scene, "shape", 'RIBBONS')
     if shape == 'RIBBONS':
-        return abi.CurveShape.RIBBON, min(cycles_curves(scene, "subdivisions", 2) + 1, abi.MAX_CURVE_PIECES)
+        return abi.CurveShape.RIBBON, min(1 << cycles_curves(scene, "subdivisions", 2), abi.MAX_CURVE_PIECES)
     return abi.CurveShape.ROUND, 1 if shape == 'THICK_LINEAR' else _ROUND_PIECES
 
 

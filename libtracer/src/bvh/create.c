@@ -282,7 +282,7 @@ static void join_select(struct create_job *job) {
     for (uint32_t i = 0; i < s->instance_count; i++) {
         const struct trc_instance *instance = &s->instances[i];
         const struct trc_mesh *mesh = s->meshes[instance->mesh];
-        job->joined[i] = instance->key_count == 1 && mesh->key_count == 1 && !mesh->pieces &&
+        job->joined[i] = instance->key_count == 1 && mesh->key_count == 1 && !mesh->strands &&
                          instance->visibility == TRC_VISIBLE_ALL;
     }
     uint32_t *uses = trc_alloc_zeroed(s->mesh_count ? s->mesh_count : 1, sizeof *uses);

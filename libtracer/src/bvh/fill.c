@@ -22,9 +22,11 @@ static struct trc_slot_block *slots_alloc(uint32_t count) {
     return block;
 }
 
-/* slots: to share, or NULL for new ones. */
+/* slots: to share, or NULL for new ones. mesh: whose shape is in it; NULL: a TLAS. */
 static trc_status tree_alloc(struct trc_tree *tree, uint32_t node_count, uint32_t slot_count,
-                             uint32_t key_count, bool is_top, struct trc_slot_block *slots) {
+                             uint32_t key_count, const struct trc_mesh *mesh,
+                             struct trc_slot_block *slots) {
+    const bool is_top = !mesh;
     *tree = (struct trc_tree){.key_count = key_count,
                               .node_count = node_count,
                               .slot_count = slot_count,
@@ -32,7 +34,12 @@ static trc_status tree_alloc(struct trc_tree *tree, uint32_t node_count, uint32_
                               .is_top = is_top};
     tree->node_stride = TRC_NODE_CHILDREN_BYTES + (size_t)key_count * TRC_NODE_KEY_BYTES;
     tree->nodes = trc_alloc_large(node_count ? node_count : 1, tree->node_stride);
-    const size_t floats = (size_t)slot_count * key_count * TRC_TRIANGLE_FLOATS;
+    size_t floats = (size_t)slot_count * key_count * TRC_TRIANGLE_FLOATS;
+    if (mesh && mesh->shape) {
+        tree->shape = mesh->shape;
+        tree->vertex_count = mesh->vertex_count;
+        floats = (size_t)mesh->vertex_count * key_count * TRC_CURVE_VERTEX_FLOATS;
+    }
     if (!is_top) {
         tree->vertices = trc_alloc_large(floats + LOAD_SLOTS, sizeof *tree->vertices);
         tree->slots = slots ? slots : slots_alloc(slot_count);
@@ -239,8 +246,20 @@ static trc_status nodes_fill(struct trc_fill *fill, uint32_t task_count, struct 
     return TRC_OK;
 }
 
+/* Vertices of curves as kernels read them. */
+static void curve_vertices_fill(const struct trc_mesh *mesh, struct trc_tree *tree) {
+    const size_t count = (size_t)mesh->vertex_count * tree->key_count;
+    for (size_t i = 0; i < count; i++) {
+        float *v = tree->vertices + TRC_CURVE_VERTEX_FLOATS * i;
+        memcpy(v, mesh->positions + 3 * i, 3 * sizeof *v);
+        v[3] = mesh->radii[i];
+    }
+}
+
 static trc_status tree_fill(struct trc_fill *fill, struct trc_pool *pool) {
     struct trc_tree *tree = fill->tree;
+    if (tree->shape)
+        curve_vertices_fill(fill->parts->mesh, tree);
     const uint32_t task_count = (tree->node_count + NODES_PER_TASK - 1) / NODES_PER_TASK;
     fill->pending = trc_alloc(tree->node_count ? tree->node_count : 1, sizeof *fill->pending);
     fill->area_sums = trc_alloc(task_count ? task_count : 1, sizeof *fill->area_sums);
@@ -262,11 +281,11 @@ trc_status trc_tree_fill(const struct trc_topology *topology,
                          const struct trc_part_triangle *triangles, const struct box *boxes,
                          uint32_t count, const struct trc_part *parts, uint32_t key_count,
                          struct trc_pool *pool, const atomic_uint *cancel, struct trc_tree *tree) {
-    const trc_status status = tree_alloc(tree, topology->node_count, count, key_count, false, NULL);
+    const trc_status status =
+        tree_alloc(tree, topology->node_count, count, key_count, parts->mesh, NULL);
     if (status != TRC_OK)
         return status;
     tree->root = topology->root;
-    tree->shape = parts->mesh->shape;
     tree->has_pieces = boxes != NULL;
     struct trc_fill fill = {.topology = topology,
                             .triangles = triangles,
@@ -291,11 +310,10 @@ trc_status trc_tree_refit(const struct trc_tree *from, const struct trc_part *pa
                           uint32_t key_count, struct trc_pool *pool, const atomic_uint *cancel,
                           struct trc_tree *tree) {
     const trc_status status =
-        tree_alloc(tree, from->node_count, from->slot_count, key_count, false, from->slots);
+        tree_alloc(tree, from->node_count, from->slot_count, key_count, part->mesh, from->slots);
     if (status != TRC_OK)
         return status;
     tree->root = from->root;
-    tree->shape = from->shape;
     struct trc_fill fill = {
         .from = from, .parts = part, .tree = tree, .known = from->slot_vertices, .cancel = cancel};
     tree->slot_vertices = from->slot_vertices;
@@ -315,7 +333,7 @@ trc_status trc_tree_fill_top(const struct trc_topology *topology,
                              const struct trc_part_triangle *order, uint32_t count,
                              const struct trc_item *items, const struct box *boxes,
                              struct trc_item *items_out, struct trc_tree *tree) {
-    const trc_status status = tree_alloc(tree, topology->node_count, count, 1, true, NULL);
+    const trc_status status = tree_alloc(tree, topology->node_count, count, 1, NULL, NULL);
     if (status != TRC_OK)
         return status;
     for (uint32_t slot = 0; slot < count; slot++)

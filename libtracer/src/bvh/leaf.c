@@ -107,13 +107,22 @@ static inline const struct trc_part *slot_part(const struct trc_fill *fill, uint
     return &fill->parts[fill->triangles[slot].part & TRC_PART_INDEX_MASK];
 }
 
+/* What a slot says of a piece of a curve. */
+static uint32_t piece_word(const struct trc_mesh *mesh, uint32_t piece) {
+    const uint32_t *strands = mesh->strands, strand = strands[piece];
+    const bool first = piece == 0 || strands[piece - 1] != strand;
+    const bool last = piece + 1 == mesh->triangle_count || strands[piece + 1] != strand;
+    return strand | (first ? TRC_SLOT_FIRST : 0u) | (last ? TRC_SLOT_LAST : 0u);
+}
+
 /* What stands in the slot of a new tree. */
 static void slot_fill(struct trc_fill *fill, uint32_t slot) {
     const uint32_t triangle = fill->triangles[slot].triangle;
     const struct trc_part *part = slot_part(fill, slot);
     const bool transparent = part_is_transparent(part, triangle);
+    const uint32_t word = part->mesh->strands ? piece_word(part->mesh, triangle) : part->instance;
     fill->tree->slots->slots[slot] =
-        (struct trc_slot){part->instance | (transparent ? TRC_SLOT_TRANSPARENT : 0u), triangle};
+        (struct trc_slot){word | (transparent ? TRC_SLOT_TRANSPARENT : 0u), triangle};
 }
 
 /* The slot's part, and the three vertices of its triangle there. */
@@ -170,37 +179,21 @@ static inline void rows_store(float *row, uint32_t count, const struct triangles
             memcpy(row, &t->v[k / 3][k % 3], count * sizeof *row);
 }
 
-/* TRC_PIECE_* of a piece. */
-static float piece_flags(const struct trc_mesh *mesh, uint32_t piece) {
-    const uint32_t vertex = mesh->pieces[piece];
-    const bool first = piece == 0 || mesh->pieces[piece - 1] + 1 != vertex;
-    const bool last = piece + 1 == mesh->triangle_count || mesh->pieces[piece + 1] != vertex + 1;
-    return (float)((first ? TRC_PIECE_FIRST : 0) | (last ? TRC_PIECE_LAST : 0));
-}
-
-/* Pieces of curves, as trc_leaf_fill. */
-static bool pieces_fill(const struct trc_fill *fill, uint32_t ref, uint32_t key, float lower_out[3],
-                        float upper_out[3]) {
+/* The box of a leaf's pieces of curves, as trc_leaf_fill. */
+static bool pieces_bound(const struct trc_fill *fill, uint32_t ref, uint32_t key,
+                         float lower_out[3], float upper_out[3]) {
     const uint32_t first = trc_leaf_first(ref), count = trc_leaf_count(ref);
-    float *v = trc_leaf_vertices(fill->tree, ref, key);
     f4 lower = f4_set(INFINITY), upper = f4_set(-INFINITY);
     bool is_finite = true;
-    for (uint32_t slot = 0; slot < count; slot++, v++) {
-        const struct trc_mesh *mesh = fill->parts->mesh;
-        const uint32_t piece = fill->tree->slots->slots[first + slot].triangle;
+    for (uint32_t slot = first; slot < first + count; slot++) {
         f4 p[2];
         float r[2];
-        trc_piece_ends(mesh, piece, key, p, r);
+        trc_piece_ends(fill->parts->mesh, fill->tree->slots->slots[slot].triangle, key, p, r);
         for (int end = 0; end < 2; end++) {
-            float *row = v + (size_t)(end * TRC_PIECE_END) * count;
-            for (int axis = 0; axis < 3; axis++)
-                row[(size_t)axis * count] = p[end][axis];
-            row[(size_t)TRC_PIECE_RADIUS * count] = r[end];
             lower = f4_min(p[end] - f4_set(r[end]), lower);
             upper = f4_max(p[end] + f4_set(r[end]), upper);
             is_finite &= i4_all(f4_abs(p[end]) + f4_set(r[end]) < f4_set(INFINITY));
         }
-        v[(size_t)TRC_PIECE_FLAGS * count] = piece_flags(mesh, piece);
     }
     f4_store3(lower_out, lower);
     f4_store3(upper_out, upper);
@@ -211,7 +204,7 @@ static bool pieces_fill(const struct trc_fill *fill, uint32_t ref, uint32_t key,
 bool trc_leaf_fill(const struct trc_fill *fill, uint32_t ref, uint32_t key, float lower_out[3],
                    float upper_out[3]) {
     if (fill->tree->shape)
-        return pieces_fill(fill, ref, key, lower_out, upper_out);
+        return pieces_bound(fill, ref, key, lower_out, upper_out);
     const uint32_t first = trc_leaf_first(ref), count = trc_leaf_count(ref);
     const uint32_t last = count > 4 ? count - 4 : 0;
     float *v = trc_leaf_vertices(fill->tree, ref, key);

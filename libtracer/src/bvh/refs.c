@@ -33,7 +33,7 @@ static bool piece_ref(const struct trc_mesh *mesh, uint32_t piece, struct trc_re
 
 /* Box of a triangle, the mean over its keys; false where a corner is not valid at some key. */
 static bool triangle_ref(const struct trc_part *part, uint32_t triangle, struct trc_ref *ref) {
-    if (part->mesh->pieces)
+    if (part->mesh->strands)
         return piece_ref(part->mesh, triangle, ref);
     const uint32_t *index = part->mesh->indices + 3 * (size_t)triangle;
     const uint32_t key_count = part->mesh->key_count;

@@ -19,11 +19,11 @@ struct trc_image;       /* image/image.h */
 
 /* One attribute per triangle corner; of curves, per vertex. */
 struct trc_attribute {
-    uint32_t name;          /* index of the name in the snapshot's name table (trc_names) */
-    uint32_t width;         /* 2 or 4 */
-    float *values;          /* width * 3 * triangle_count; curves: width * vertex_count */
-    const uint32_t *pieces; /* of the mesh */
-    uint32_t piece_end;     /* from a piece's first vertex to its other: 1, balls 0 */
+    uint32_t name;           /* index of the name in the snapshot's name table (trc_names) */
+    uint32_t width;          /* 2 or 4 */
+    float *values;           /* width * 3 * triangle_count; curves: width * vertex_count */
+    const uint32_t *strands; /* of the mesh */
+    uint32_t piece_end;      /* from a piece's first vertex to its other: 1, balls 0 */
 };
 
 /* What the primitives of a mesh are. */
@@ -42,11 +42,12 @@ struct trc_mesh {
     atomic_uint refs;
     uint32_t key_count;
     uint32_t vertex_count, triangle_count;
-    float *positions;  /* 3 * vertex_count * key_count, and one unset beyond: f4_load3_padded */
-    uint32_t *indices; /* 3 * triangle_count; curves: NULL */
-    uint32_t shape;    /* TRC_SHAPE_* */
-    uint32_t *pieces;  /* curves: first vertex of each piece, the next is its other; else NULL */
-    float *radii;      /* curves: vertex_count * key_count */
+    float *positions;      /* 3 * vertex_count * key_count, and one unset beyond: f4_load3_padded */
+    uint32_t *indices;     /* 3 * triangle_count; curves: NULL */
+    uint32_t shape;        /* TRC_SHAPE_* */
+    uint32_t *strands;     /* curves: of each piece, numbered as they have vertices; balls: 0; else
+                              NULL */
+    float *radii;          /* curves: vertex_count * key_count */
     float *vertex_normals; /* 3 * vertex_count * key_count or NULL */
     float *corner_normals; /* 9 * triangle_count * key_count or NULL; rules over vertex_normals */
     uint8_t *smooth;       /* per triangle, or NULL: none smooth (corner normals: all) */
@@ -64,13 +65,13 @@ struct trc_mesh {
  * first for the third: barycentrics (u, 0) are along it. */
 static inline void trc_mesh_corners(const struct trc_mesh *mesh, uint32_t triangle,
                                     uint32_t corners_out[3]) {
-    if (!mesh->pieces) {
+    if (!mesh->strands) {
         const uint32_t *index = mesh->indices + 3 * (size_t)triangle;
         for (int k = 0; k < 3; k++)
             corners_out[k] = index[k];
         return;
     }
-    corners_out[0] = corners_out[2] = mesh->pieces[triangle];
+    corners_out[0] = corners_out[2] = triangle + mesh->strands[triangle];
     corners_out[1] = corners_out[0] + (mesh->shape != TRC_SHAPE_BALLS);
 }
 

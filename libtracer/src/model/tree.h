@@ -15,8 +15,8 @@
  * All of that is the same for every instruction set, whatever its width, to the bit: trees serve
  * each of them.
  *
- * A piece of a curve takes the room of a triangle: x, y, z and radius of one end, then of the
- * other, and TRC_PIECE_*, as a number.
+ * Leaves of curves have slots alone: what they stand for is read from the vertices, which pieces
+ * share: x, y, z and radius of each at the first key, then at the next.
  *
  * A TLAS has the same nodes; its leaves have no vertices: each is one entry of items. */
 #ifndef TRACER_MODEL_TREE_H
@@ -50,11 +50,13 @@
 #define TRC_MAX_LEVELS 48
 #define TRC_STACK_SIZE (TRC_MAX_LEVELS * (TRC_NODE_WIDTH - 1) + 1)
 
-/* Floats of a piece: those of an end and where the other's begin, and what it is of its strand. */
-#define TRC_PIECE_RADIUS 3
-#define TRC_PIECE_END 4
-#define TRC_PIECE_FLAGS 8
-enum { TRC_PIECE_FIRST = 1, TRC_PIECE_LAST = 2 };
+/* Instance word of a slot in a tree of curves: transparency as above, the strand, and whether the
+ * piece begins or ends it. Its first vertex is the number of the piece plus that of the strand. */
+#define TRC_SLOT_FIRST 0x40000000u
+#define TRC_SLOT_LAST 0x20000000u
+#define TRC_SLOT_STRAND_MASK 0x1fffffffu
+
+#define TRC_CURVE_VERTEX_FLOATS 4
 
 struct trc_tree;
 
@@ -89,12 +91,14 @@ struct trc_tree {
     uint32_t root; /* reference; TRC_REF_EMPTY for no triangles */
     size_t node_stride;
     uint8_t *nodes;                          /* node_count * node_stride, 32-byte aligned */
-    float *vertices;                         /* slot_count * key_count * 9, and a load beyond */
+    float *vertices;                         /* slot_count * key_count * 9, and a load beyond;
+                                                curves: key by key vertex_count * 4 */
     struct trc_slot_block *slots;            /* slot_count; TLAS: NULL, as vertices are */
     struct trc_slot_vertices *slot_vertices; /* shared by refits of one tree; or NULL */
     const struct trc_item *items;            /* TLAS only, by slot */
     bool is_top;
     uint32_t shape;           /* TRC_SHAPE_* of what is in its leaves */
+    uint32_t vertex_count;    /* curves */
     bool has_pieces;          /* a triangle may stand in several leaves (bvh/clip.h) */
     float lower[3], upper[3]; /* over all keys; lower > upper when empty */
     float extent;             /* largest |coordinate| of the bounds: scale of rounding errors */

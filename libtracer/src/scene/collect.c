@@ -257,7 +257,7 @@ static uint64_t fill_instances(const struct trc_scene_state *scene,
             materials[m] = trc_scene_material_index(scene, id);
         }
         place(instance, source, transforms);
-        if (instance->is_thin && mesh->geometry->pieces)
+        if (instance->is_thin && mesh->geometry->strands)
             instance->visibility = instance->is_thin = 0; /* rays have no cross-section there */
         hidden += !instance->visibility && source->visibility;
         instance->visibility |= linked_visibility(s, instance);

@@ -129,15 +129,18 @@ static trc_status create_pose(struct trc_mesh_topology *topology, const struct c
 
 /* ---- what does not move ---- */
 
-static void pieces_fill(const struct trc_mesh_topology *t, uint32_t *pieces) {
-    uint32_t vertex = 0;
-    for (uint32_t i = 0; !t->lengths && i < t->point_count; i++)
-        pieces[i] = i;
+/* Strands are numbered without those that have no pieces, so that each has a vertex more than
+ * pieces. */
+static void strands_fill(const struct trc_mesh_topology *t, uint64_t piece_count,
+                         uint32_t *strands) {
+    uint32_t number = 0;
+    if (!t->lengths)
+        memset(strands, 0, piece_count * sizeof *strands);
     for (uint32_t i = 0; t->lengths && i < t->strand_count; i++) {
-        const struct counts c = strand_counts(t->lengths[i], t->piece_count);
-        for (uint64_t k = 0; k < c.pieces; k++)
-            *pieces++ = vertex++;
-        vertex += c.pieces > 0;
+        const uint64_t pieces = strand_counts(t->lengths[i], t->piece_count).pieces;
+        for (uint64_t k = 0; k < pieces; k++)
+            *strands++ = number;
+        number += pieces > 0;
     }
 }
 
@@ -181,7 +184,7 @@ static trc_status add_attribute(struct trc_mesh_topology *t, const trc_curve_att
                                 uint64_t vertices, struct trc_names *names) {
     struct trc_attribute *a = &t->attributes[t->attribute_count];
     a->width = desc->width;
-    a->pieces = t->pieces;
+    a->strands = t->strands;
     a->piece_end = t->shape != TRC_SHAPE_BALLS;
     TRC_TRY(trc_names_add(names, desc->name, &a->name));
     a->values = trc_alloc(vertices * desc->width, sizeof *a->values);
@@ -198,20 +201,20 @@ static trc_status add_attribute(struct trc_mesh_topology *t, const trc_curve_att
 
 static trc_status fill_topology(struct trc_mesh_topology *t, const trc_curves_desc *desc,
                                 const struct counts *counts, struct trc_names *names) {
-    t->shape = !desc->lengths                     ? TRC_SHAPE_BALLS
+    t->shape = !desc->lengths                    ? TRC_SHAPE_BALLS
                : desc->shape == TRC_CURVE_RIBBON ? TRC_SHAPE_RIBBONS
-                                                  : TRC_SHAPE_ROUND;
+                                                 : TRC_SHAPE_ROUND;
     t->normal_kind = TRC_NORMALS_NONE;
     t->piece_count = desc->piece_count;
     t->point_count = (uint32_t)desc->point_count;
     t->strand_count = (uint32_t)(desc->lengths ? desc->strand_count : desc->point_count);
     if (!trc_topology_copy(t, desc->lengths, desc->strand_count, sizeof(uint32_t), &t->lengths))
         return no_memory();
-    t->pieces = trc_alloc(counts->pieces, sizeof *t->pieces);
-    if (!t->pieces)
+    t->strands = trc_alloc(counts->pieces, sizeof *t->strands);
+    if (!t->strands)
         return no_memory();
-    t->bytes += counts->pieces * sizeof *t->pieces;
-    pieces_fill(t, t->pieces);
+    t->bytes += counts->pieces * sizeof *t->strands;
+    strands_fill(t, counts->pieces, t->strands);
     if (desc->generated) {
         const uint64_t count = GENERATED_FLOATS * counts->vertices;
         t->generated = trc_alloc(count, sizeof *t->generated);
@@ -247,7 +250,7 @@ trc_status trc_curves_geometry_pose(const struct trc_mesh *from, uint32_t key_co
                                     struct trc_mesh **mesh_out) {
     struct trc_mesh_topology *topology = ((const struct trc_geometry *)from)->topology;
     const struct counts counts = {from->vertex_count, from->triangle_count};
-    if (!topology->pieces)
+    if (!topology->strands)
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "the mesh is not of curves");
     TRC_TRY(trc_check_array(points, point_value_count,
                             (uint64_t)4 * topology->point_count * key_count, sizeof(float),

@@ -309,7 +309,7 @@ static void find_instances(const struct trc_snapshot *s, uint32_t *instance_of_m
         instance_of_mesh[i] = UINT32_MAX;
     for (uint32_t i = s->instance_count; i-- > 0;) {
         const struct trc_instance *instance = &s->instances[i];
-        const bool keeps_shape = instance->keeps_shape || s->meshes[instance->mesh]->pieces;
+        const bool keeps_shape = instance->keeps_shape || s->meshes[instance->mesh]->strands;
         for (uint32_t m = 0; m < instance->material_count && !keeps_shape; m++)
             if (s->materials[instance->materials[m]]->displacement)
                 instance_of_mesh[instance->mesh] = i;

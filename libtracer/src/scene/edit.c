@@ -52,7 +52,7 @@ trc_status trc_scene_pose_mesh(struct trc_scene_state *scene, trc_id id, uint32_
     TRC_TRY(trc_store_find(&scene->meshes, id, &object));
     struct trc_scene_mesh *mesh = object;
     const struct trc_mesh *former = mesh->geometry;
-    if (former->pieces)
+    if (former->strands)
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "the mesh is of curves");
     const uint32_t kind = trc_geometry_normal_kind(former);
     const uint64_t expected = (uint64_t)3 * former->vertex_count * key_count;

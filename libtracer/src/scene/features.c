@@ -50,7 +50,7 @@ static uint32_t instance_features(const struct trc_snapshot *s) {
             features |= TRC_FEATURE_OBJECT_MOTION;
         if (s->meshes[instance->mesh]->key_count > 1)
             features |= TRC_FEATURE_DEFORMATION;
-        if (s->meshes[instance->mesh]->pieces)
+        if (s->meshes[instance->mesh]->strands)
             features |= TRC_FEATURE_CURVES;
         for (uint32_t m = 0; m < instance->material_count; m++) {
             features |= material_features(s->materials[instance->materials[m]]->has);

@@ -26,7 +26,7 @@ void trc_topology_release(struct trc_mesh_topology *topology) {
     }
     trc_free(topology->corner_begin);
     trc_free(topology->corners);
-    trc_free(topology->pieces);
+    trc_free(topology->strands);
     trc_free(topology->lengths);
     trc_free(topology);
 }
@@ -208,7 +208,7 @@ static void share_topology(struct trc_geometry *geometry, struct trc_mesh_topolo
     mesh->smooth = topology->smooth;
     mesh->material_index = topology->material_index;
     mesh->generated = topology->generated;
-    mesh->pieces = topology->pieces;
+    mesh->strands = topology->strands;
     mesh->shape = topology->shape;
     mesh->attribute_count = topology->attribute_count;
     memcpy(mesh->attributes, topology->attributes, sizeof mesh->attributes);

@@ -64,7 +64,7 @@ struct trc_mesh_topology {
      * corners[corner_begin[v]] to corners[corner_begin[v + 1]]. */
     uint32_t *corner_begin, *corners;
     /* Curves: how many pieces from point to point, of which points; see model/snapshot.h. */
-    uint32_t *pieces;
+    uint32_t *strands;
     uint32_t *lengths; /* points of each strand, or NULL: balls */
     uint32_t strand_count, point_count, piece_count;
     uint32_t shape; /* TRC_SHAPE_* */

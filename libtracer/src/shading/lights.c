@@ -72,7 +72,7 @@ static bool is_light(const struct trc_instance *instance, const struct trc_mater
 
 static bool has_lights(const struct trc_snapshot *s, const struct trc_instance *instance,
                        uint32_t scatters) {
-    if (!(instance->visibility & RECEIVERS) || s->meshes[instance->mesh]->pieces)
+    if (!(instance->visibility & RECEIVERS) || s->meshes[instance->mesh]->strands)
         return false;
     for (uint32_t i = 0; i < instance->material_count; i++)
         if (is_light(instance, s->materials[instance->materials[i]], scatters))

@@ -187,9 +187,10 @@ static const struct trc_attribute *mesh_attribute(const struct trc_mesh *mesh, u
 /* Component c of an attribute at the three corners. */
 TRC_INLINE void attribute_corners(const struct trc_attribute *a, uint32_t c, vint triangle,
                                   vmask lanes, vfloat out[3]) {
-    if (a->pieces) {
+    if (a->strands) {
         const vint width = vi_set((int32_t)a->width);
-        const vint piece = vi_gather((const int32_t *)a->pieces, triangle, lanes) * width;
+        const vint strand = vi_gather((const int32_t *)a->strands, triangle, lanes);
+        const vint piece = (triangle + strand) * width;
         const float *end = a->values + c + a->piece_end * a->width;
         out[0] = out[2] = vf_gather(a->values + c, piece, lanes);
         out[1] = vf_gather(end, piece, lanes);

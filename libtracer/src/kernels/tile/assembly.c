@@ -54,8 +54,10 @@ static void keys_by_direction(struct trc_tile *t) {
     }
 }
 
+/* left: NULL where there are no curves. */
 static void packet_load(struct trc_tile *t, const uint32_t *order, uint32_t count,
-                        struct trc_packet *p, struct trc_packet_hits *h) {
+                        struct trc_packet *p, struct trc_packet_hits *h,
+                        struct trc_left_strands *left) {
     const struct trc_ray_store *r = &t->work;
     float *const to[] = {p->o[0], p->o[1], p->o[2], p->d[0], p->d[1],
                          p->d[2], p->tmin, p->t,    p->time};
@@ -84,6 +86,11 @@ static void packet_load(struct trc_tile *t, const uint32_t *order, uint32_t coun
         p->visibility <<= TRC_UNBLOCKED_SHIFT;
     p->common_origin = (path & TRC_VISIBLE_CAMERA) && t->camera_common;
     p->skip_transparent = false;
+    p->left = left;
+    for (uint32_t i = 0; left && i < count; i++) {
+        left->instance[i] = r->w[TRC_RAY_STRAND_INSTANCE][order[i]];
+        left->strand[i] = r->w[TRC_RAY_STRAND][order[i]];
+    }
     memset(h->instance, 0xff, count * sizeof *h->instance);
 }
 
@@ -155,7 +162,8 @@ static void bundle_trace(struct trc_tile *t, struct bundle *b) {
     uint32_t together = 0;
     for (uint32_t k = 0; k < b->count; k++) {
         const uint32_t *order = t->order + b->begin[k], count = b->end[k] - b->begin[k];
-        packet_load(t, order, count, &t->packets[k], &t->packet_hits[k]);
+        packet_load(t, order, count, &t->packets[k], &t->packet_hits[k],
+                    t->left ? &t->left[k] : NULL);
         together += !(t->looks_back && t->generation > 0 &&
                       looked_back(t, order, count, &t->packets[k], &t->packet_hits[k]));
     }

@@ -97,13 +97,16 @@ static void ray_push(struct trc_tile *t, const struct arrival *a, const struct t
     const vfloat values[TRC_RAY_FLOATS] = {
         o.x,      o.y,      o.z, w.x,     w.y, w.z, tmin, tmax,           a->time,    weight.x,
         weight.y, weight.z, pdf, min_pdf, n.x, n.y, n.z,  indirect_scale, path_length};
-    vuint left = vu_set(0), share = vu_set(0);
+    vuint left = vu_set(0), share = vu_set(0), strand[2] = {vu_set(0), vu_set(0)};
     if (t->light_passes)
         share = share_of(t, a, s, lobes, b, first, ideal);
     if (t->remembers_left)
         left = (vuint)vi_select(transparent, (vint)word_column(t->work.w[TRC_RAY_LEFT], a),
                                 s->instance);
-    const vuint words[TRC_RAY_WORDS] = {a->slot, path, depths, vu_set(material), left, share};
+    if (t->left)
+        trc_strand_words(s, strand);
+    const vuint words[TRC_RAY_WORDS] = {a->slot, path,  depths,    vu_set(material),
+                                        left,    share, strand[0], strand[1]};
     trc_rays_append(&t->stack, values, words, vm_bits(active));
 }
 

@@ -201,6 +201,10 @@ static void path_begin(struct trc_tile *t, uint32_t i) {
         vu_store(out->w[TRC_RAY_LEFT] + i, vu_set(TRC_NO_HIT));
     if (t->light_passes)
         vu_store(out->w[TRC_RAY_SHARE] + i, vu_set(0));
+    if (t->left) {
+        vu_store(out->w[TRC_RAY_STRAND_INSTANCE] + i, vu_set(TRC_NO_HIT));
+        vu_store(out->w[TRC_RAY_STRAND] + i, vu_set(0));
+    }
 }
 
 void trc_camera_rays(struct trc_tile *t) {

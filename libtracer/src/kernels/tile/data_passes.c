@@ -171,7 +171,7 @@ static void uv_corners(const struct trc_mesh *mesh, uint32_t triangle,
                        const float *corners_out[3]) {
     const float *values = mesh->attributes[mesh->default_uv].values;
     uint32_t index[3] = {3 * triangle, 3 * triangle + 1, 3 * triangle + 2};
-    if (mesh->pieces)
+    if (mesh->strands)
         trc_mesh_corners(mesh, triangle, index);
     for (int k = 0; k < 3; k++)
         corners_out[k] = values + 2 * (size_t)index[k];

@@ -112,6 +112,12 @@ TRC_INLINE void push(struct trc_tile *t, const struct arrival *a, const struct t
             vf_compress(q->split[3 * k + 2] + at, parts[k].z, bits);
         }
     }
+    if (t->left) {
+        vuint strand[2];
+        trc_strand_words(s, strand);
+        vu_compress(q->strand_instance + at, strand[0], bits);
+        vu_compress(q->strand + at, strand[1], bits);
+    }
     for (int k = 0; q->lamp[0] && k < 3; k++)
         vf_compress(q->lamp[k] + at, r->lamp, bits);
 }

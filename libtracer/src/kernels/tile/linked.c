@@ -133,6 +133,7 @@ static void packet_load(const struct trc_tile *t, const uint32_t *order, uint32_
         vf_store(&p->time[i], vf_gather(t->work.f[TRC_RAY_TIME], at, m));
         p->active |= (uint64_t)vm_bits(m) << i;
     }
+    p->left = NULL;
     p->visibility = TRC_VISIBLE_EMITTER;
 }
 

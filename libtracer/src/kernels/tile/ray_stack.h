@@ -53,12 +53,15 @@ enum trc_ray_word {
                       lights are linked */
     TRC_RAY_SHARE, /* what diffuse lobes have of its light; with passes of light by kind
                       (kernels/tile/light_split.h) */
+    TRC_RAY_STRAND_INSTANCE, /* of scenes with curves: instance of the strand it left, TRC_NO_HIT:
+                              */
+    TRC_RAY_STRAND,          /* it left none; and the strand (struct trc_left_strands) */
     TRC_RAY_WORDS
 };
 
 /* Columns that not every tile has. */
 struct trc_ray_columns {
-    bool path_length, left, share;
+    bool path_length, left, share, strands;
 };
 
 struct trc_ray_store {
@@ -91,7 +94,8 @@ TRC_INLINE void trc_rays_carve(struct trc_carver *c, struct trc_ray_store *r, ui
                                struct trc_ray_columns columns) {
     r->capacity = capacity;
     r->count = r->reserved_end = 0;
-    const bool has_word[TRC_RAY_WORDS - TRC_RAY_LEFT] = {columns.left, columns.share};
+    const bool has_word[TRC_RAY_WORDS - TRC_RAY_LEFT] = {columns.left, columns.share,
+                                                         columns.strands, columns.strands};
     /* Vectors are stored whole: vf_compress. */
     for (int i = 0; i < TRC_RAY_PATH_LENGTH + columns.path_length; i++)
         r->f[i] = trc_carve(c, (capacity + TRC_WIDTH) * sizeof(float));

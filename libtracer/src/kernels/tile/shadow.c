@@ -9,8 +9,9 @@
 #include "kernels/tile/light_split.h"
 #include "kernels/tile/tile.h"
 
+/* left: NULL where there are no curves. */
 static void packet_load(const struct trc_tile *t, const uint32_t *order, uint32_t count,
-                        uint32_t visibility, struct trc_packet *p) {
+                        uint32_t visibility, struct trc_packet *p, struct trc_left_strands *left) {
     const struct trc_shadow_store *q = &t->shadows;
     p->active = 0;
     for (uint32_t i = 0; i < count; i += TRC_WIDTH) {
@@ -31,6 +32,11 @@ static void packet_load(const struct trc_tile *t, const uint32_t *order, uint32_
     p->visibility = visibility;
     p->common_origin = false;
     p->skip_transparent = t->snapshot->features & TRC_FEATURE_TRANSPARENCY;
+    p->left = left;
+    for (uint32_t i = 0; left && i < count; i++) {
+        left->instance[i] = q->strand_instance[order[i]];
+        left->strand[i] = q->strand[order[i]];
+    }
 }
 
 /* What the surfaces that the lanes' rays meet let through; 0 where a material is opaque to shadows.
@@ -234,7 +240,8 @@ static void rays_trace(struct trc_tile *t, uint32_t begin, uint32_t end, uint32_
         do {
             const uint32_t left = end - begin - taken;
             const uint32_t count = left < t->packet_size ? left : t->packet_size;
-            packet_load(t, order + taken, count, visibility, &t->packets[packets]);
+            packet_load(t, order + taken, count, visibility, &t->packets[packets],
+                        t->left ? &t->left[packets] : NULL);
             counts[packets++] = count;
             taken += count;
         } while (packets < t->bundle && begin + taken < end &&

@@ -27,7 +27,9 @@ struct trc_shadow_store {
     float *o[3], *d[3], *tmax, *time, *radiance[3];
     float *split[9]; /* diffuse, glossy, transmission parts, or NULL: no light passes */
     uint32_t *share; /* of the path (kernels/tile/light_split.h), or NULL: no light passes */
-    float *lamp[3];  /* for the Shadow pass, or NULL */
+    uint32_t *strand_instance,
+        *strand;    /* that the ray left, as rays have them, or NULL: no curves */
+    float *lamp[3]; /* for the Shadow pass, or NULL */
     float *scaled[TRC_SCALED_COLUMNS]; /* those that what is in the way takes from, RGB by RGB */
     uint32_t scaled_count;
     uint32_t *slot, *path, *target;
@@ -35,9 +37,9 @@ struct trc_shadow_store {
     uint32_t *order;  /* own: the queue may be flushed while hits are shaded in t->order */
 };
 
-/* splits, lamps: with the columns of light passes, of the Shadow pass. */
+/* splits, lamps, strands: with the columns of light passes, of the Shadow pass, of curves. */
 TRC_INLINE void trc_shadows_carve(struct trc_carver *c, struct trc_shadow_store *q, bool splits,
-                                  bool lamps) {
+                                  bool lamps, bool strands) {
     const size_t column = TRC_SHADOW_COLUMN * sizeof(float);
     for (int i = 0; i < 3; i++) {
         q->o[i] = trc_carve(c, column);
@@ -50,6 +52,10 @@ TRC_INLINE void trc_shadows_carve(struct trc_carver *c, struct trc_shadow_store 
         q->split[i] = q->scaled[q->scaled_count++] = trc_carve(c, column);
     if (splits)
         q->share = trc_carve(c, column);
+    if (strands) {
+        q->strand_instance = trc_carve(c, column);
+        q->strand = trc_carve(c, column);
+    }
     for (int i = 0; lamps && i < 3; i++)
         q->lamp[i] = q->scaled[q->scaled_count++] = trc_carve(c, column);
     uint32_t **const words[] = {&q->slot, &q->path, &q->target, &q->depths, &q->order};

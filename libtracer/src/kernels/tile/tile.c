@@ -61,7 +61,9 @@ static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc,
     t->ray_room = trc_ray_room_of(desc, t->hit_branches * (splits ? 2 : 1));
     const size_t batch = (trc_column_entries(catchers) + TRC_WIDTH) * sizeof(float);
     const bool splits_light = wants_light_passes(desc);
-    const struct trc_ray_columns columns = {t->measures_paths, t->remembers_left, splits_light};
+    const bool curves = features & TRC_FEATURE_CURVES;
+    const struct trc_ray_columns columns = {t->measures_paths, t->remembers_left, splits_light,
+                                            curves};
     trc_rays_carve(&c, &t->stack, t->ray_room.capacity, columns);
     trc_rays_carve(&c, &t->work, t->ray_room.capacity, columns);
     float **const hit_floats[] = {&t->hits.t, &t->hits.u, &t->hits.v};
@@ -76,7 +78,9 @@ static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc,
     for (uint32_t k = 0; k < TRC_CRYPTOMATTE_KINDS; k++)
         if (desc->cryptomattes >> k & 1)
             t->mattes[k] = trc_carve(&c, places * sizeof *t->mattes[k]);
-    trc_shadows_carve(&c, &t->shadows, splits_light, desc->passes >> TRC_PASS_SHADOW & 1);
+    trc_shadows_carve(&c, &t->shadows, splits_light, desc->passes >> TRC_PASS_SHADOW & 1, curves);
+    if (curves)
+        t->left = trc_carve(&c, TRC_BUNDLE * sizeof *t->left);
     t->keys = trc_carve(&c, TRC_SHADOW_COLUMN * sizeof *t->keys);
     t->order = trc_carve(&c, batch);
     t->bins = trc_carve(&c, (TRC_BINS + 1) * sizeof *t->bins);

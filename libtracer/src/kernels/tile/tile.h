@@ -117,6 +117,7 @@ struct trc_tile {
     uint32_t *keys, *bins; /* scratch of sorts: TRC_SHADOW_COLUMN, bins */
     struct trc_packet packets[TRC_BUNDLE];
     struct trc_packet_hits packet_hits[TRC_BUNDLE];
+    struct trc_left_strands *left; /* TRC_BUNDLE, of the packets; NULL: there are no curves */
 };
 
 /* Cells that rays are sorted by: of their direction (kernels/trace/direction.h) or of a place on a

@@ -4,10 +4,10 @@
  * An end of a piece is moved to the ray's origin, turned so that x and y are across the ray and z
  * is along it, and rounded the same way whatever piece it belongs to: two pieces that share an end
  * meet in it without a gap. A ribbon is hit where its axis passes nearest, if that is within its
- * radius there; joints are discs. A round piece is the union of the balls along it (a cone between
- * two balls): a ball at s is entered at z(s) - sqrt(g(s)), g = r^2 - x^2 - y^2 along s a parabola,
- * and the first of all is either end's or where the derivative is 0. Both forms make the same
- * operations in the same order: the same bits.
+ * radius there. A round piece is the union of the balls along it (a cone between two balls): a ball
+ * at s is entered at z(s) - sqrt(g(s)), g = r^2 - x^2 - y^2 along s a parabola, and the first of
+ * all is either end's or where the derivative is 0. Both forms make the same operations in the same
+ * order: the same bits. What a ray has left is no hit (struct trc_packet.left).
  *
  * S. Woop, C. Benthin, I. Wald, G. Johnson, E. Tabellion, "Exploiting Local Orientation Similarity
  * for Efficient Ray Traversal of Hair and Fur", 2014, turn splines to the ray as well, and cut them
@@ -18,9 +18,9 @@
 #include "kernels/simd/simd8.h"
 #include "kernels/trace/beam.h"
 
-/* What hits of a ribbon must be ahead of the least distance, in radii: a ray that leaves one meets
- * the ribbon of its own strand turned about, as in Embree's curve_self_intersection_avoidance. Of
- * round ones: what sqrt(g) is off by where a ray grazes them, 2^-12 of a radius, with room. */
+/* What hits of a ribbon must be ahead of where a ray begins, in radii, as in Embree, whose
+ * curve_self_intersection_avoidance_factor this is: ribbons turn with the ray. Of round ones: what
+ * sqrt(g) is off by where a ray grazes them, 2^-12 of a radius, with room. */
 #define TRC_RIBBON_AHEAD 2.0f
 #define TRC_ROUND_AHEAD 0x1p-10f
 
@@ -62,6 +62,7 @@ TRC_INLINE void trc_turned_setup(const struct trc_sheared *g, uint64_t mask,
 #define MAXIMUM vf_max
 #define ROOT vf_sqrt
 #define LE vf_le
+#define ANY vm_any
 #define BOTH vm_and
 #define SELECT_LE(a, b, x, y) vf_select(vf_le(a, b), x, y)
 #define NAMED(name) name##_lanes
@@ -73,6 +74,7 @@ TRC_INLINE void trc_turned_setup(const struct trc_sheared *g, uint64_t mask,
 #undef MAXIMUM
 #undef ROOT
 #undef LE
+#undef ANY
 #undef BOTH
 #undef SELECT_LE
 #undef NAMED
@@ -84,6 +86,7 @@ TRC_INLINE void trc_turned_setup(const struct trc_sheared *g, uint64_t mask,
 #define MAXIMUM f8_max
 #define ROOT f8_sqrt
 #define LE f8_le
+#define ANY(m) ((m) != 0)
 #define BOTH(a, b) ((a) & (b))
 #define SELECT_LE f8_select_le
 #define NAMED(name) name##8
@@ -95,6 +98,7 @@ TRC_INLINE void trc_turned_setup(const struct trc_sheared *g, uint64_t mask,
 #undef MAXIMUM
 #undef ROOT
 #undef LE
+#undef ANY
 #undef BOTH
 #undef SELECT_LE
 #undef NAMED

@@ -21,7 +21,7 @@ vmask trc_curve_lanes(const struct trc_surface *s) {
     for (uint32_t lanes = vm_bits(s->active); lanes; lanes &= lanes - 1) {
         const int lane = __builtin_ctz(lanes);
         const struct trc_instance *instance = &s->snapshot->instances[vi_get(s->instance, lane)];
-        bits |= (uint32_t)(s->snapshot->meshes[instance->mesh]->pieces != NULL) << lane;
+        bits |= (uint32_t)(s->snapshot->meshes[instance->mesh]->strands != NULL) << lane;
     }
     return vm_from_bits(bits);
 }
@@ -40,23 +40,27 @@ static void vertex_at(const struct trc_mesh *mesh, uint32_t vertex, float time, 
     *radius = mesh->radii[a] + f * (mesh->radii[b] - mesh->radii[a]);
 }
 
-static void lane_load(const struct trc_surface *s, int lane, struct raw_curve *out) {
+/* Returns the strand. */
+static int32_t lane_load(const struct trc_surface *s, int lane, struct raw_curve *out) {
     const struct trc_instance *instance = &s->snapshot->instances[vi_get(s->instance, lane)];
     const struct trc_mesh *mesh = s->snapshot->meshes[instance->mesh];
-    const uint32_t piece = (uint32_t)vi_get(s->triangle, lane), *pieces = mesh->pieces;
+    const uint32_t piece = (uint32_t)vi_get(s->triangle, lane), *strands = mesh->strands;
     const float time = vf_get(s->time, lane);
     uint32_t ends[3];
     float ignored;
     trc_mesh_corners(mesh, piece, ends);
-    const bool first = piece == 0 || pieces[piece - 1] + 1 != ends[0];
-    const bool last = piece + 1 == mesh->triangle_count || pieces[piece + 1] != ends[1];
+    const bool balls = mesh->shape == TRC_SHAPE_BALLS;
+    const bool first = balls || piece == 0 || strands[piece - 1] != strands[piece];
+    const bool last =
+        balls || piece + 1 == mesh->triangle_count || strands[piece + 1] != strands[piece];
     for (int end = 0; end < 2; end++)
         vertex_at(mesh, ends[end], time, out->p[end], &out->r[end]);
     vertex_at(mesh, ends[0] - !first, time, out->before, &ignored);
     vertex_at(mesh, ends[1] + !last, time, out->after, &ignored);
     trc_affine_at(instance, time, out->m);
     out->shape = (float)mesh->shape;
-    out->u = mesh->shape == TRC_SHAPE_BALLS ? 0.0f : vf_get(s->u, lane);
+    out->u = balls ? 0.0f : vf_get(s->u, lane);
+    return (int32_t)(balls ? piece : strands[piece]);
 }
 
 TRC_INLINE vfloat raw_column(const struct raw_curve *raw, int at) {
@@ -133,11 +137,14 @@ static vvec3 ball_normal(vvec3 d, vfloat x, vfloat y, vfloat front) {
 
 void trc_curve_fetch(struct trc_surface *s, vmask lanes) {
     struct raw_curve raw[TRC_WIDTH];
+    int32_t strands[TRC_WIDTH];
     memset(raw, 0, sizeof raw);
+    vi_store(strands, s->strand);
     for (uint32_t bits = vm_bits(lanes); bits; bits &= bits - 1) {
         const int lane = __builtin_ctz(bits);
-        lane_load(s, lane, &raw[lane]);
+        strands[lane] = lane_load(s, lane, &raw[lane]);
     }
+    s->strand = vi_load(strands);
     struct space m;
     space_load(raw, &m);
     const vfloat u = raw_column(raw, RAW_AT(u)), one = vf_one(), zero = vf_zero();
@@ -177,7 +184,7 @@ void trc_curve_fetch(struct trc_surface *s, vmask lanes) {
     s->p = v3_select(lanes, p, s->p);
     s->p_error = v3_select(lanes, error, s->p_error);
     s->n = v3_select(lanes, facing, s->n);
-    s->ng = v3_select(lanes, v3_select(ribbon, s->wo, facing), s->ng);
+    s->ng = v3_select(lanes, facing, s->ng); /* Cycles has that of ribbons, too, where it counts */
     s->backfacing = vm_or(vm_andnot(s->backfacing, lanes), back);
     s->smooth = vm_andnot(s->smooth, lanes);
     s->bulge = v3_select(lanes, v3_zero(), s->bulge);

@@ -7,12 +7,14 @@ struct NAMED(trc_curve_ray) {
     REAL ou, ov, oz, su, sv;
     REAL xx, xy, yy, zx, zy, zz;
     REAL per_length, tmin;
+    REAL near; /* from where on TRC_RIBBON_AHEAD counts */
     REAL side; /* sign of the direction along z */
 };
-/* A piece: ends and radii, and the range of s where an end of a strand cuts it. */
+/* A piece: ends and radii, and the vertices before and after it, or the ends themselves. */
 struct NAMED(trc_piece) {
     REAL p[2][3], r[2];
-    REAL low, high;
+    REAL before[3], after[3];
+    REAL r_before, r_after;
 };
 struct NAMED(trc_curve_hit) {
     MASK hit;
@@ -26,6 +28,27 @@ TRC_INLINE void NAMED(trc_piece_turn)(const struct NAMED(trc_curve_ray) * ray, c
     *y = ray->yy * py;
     *z = ray->zz * pz + ray->zx * px + ray->zy * py;
 }
+/* What is not left to the neighbours: rays within the lines that halve the angles at the ends. Both
+ * pieces at an end find the same bits for it; where it turns back on itself there is no such line,
+ * and rounding lets both have what is near. Strands end upright. r: of the piece, about. */
+TRC_INLINE MASK NAMED(trc_ribbon_owns)(const struct NAMED(trc_curve_ray) * ray,
+                                       const struct NAMED(trc_piece) * piece, REAL x0, REAL y0,
+                                       REAL x1, REAL y1, REAL r) {
+    REAL xb, yb, xa, ya, ignored;
+    NAMED(trc_piece_turn)(ray, piece->before, &xb, &yb, &ignored);
+    NAMED(trc_piece_turn)(ray, piece->after, &xa, &ya, &ignored);
+    const REAL zero = SET(0.0f), one = SET(1.0f);
+    const REAL bx = x0 - xb, by = y0 - yb, dx = x1 - x0, dy = y1 - y0, ax = xa - x1, ay = ya - y1;
+    const REAL d = ROOT(dx * dx + dy * dy), b = ROOT(bx * bx + by * by),
+               a = ROOT(ax * ax + ay * ay);
+    /* Where there is no neighbour both terms are of this piece. */
+    const REAL to_b = SELECT_LE(b, zero, one, b), to_a = SELECT_LE(a, zero, one, a);
+    const REAL e0 = x0 * (bx * d + dx * to_b) + y0 * (by * d + dy * to_b);
+    const REAL e1 = x1 * (dx * to_a + ax * d) + y1 * (dy * to_a + ay * d);
+    const REAL doubt = SET(1e-5f) * d * (d + r);
+    return BOTH(LE(e0, doubt * to_b), LE(zero - doubt * to_a, e1));
+}
+
 TRC_INLINE struct NAMED(trc_curve_hit)
     NAMED(trc_ribbon_test)(const struct NAMED(trc_curve_ray) * ray,
                            const struct NAMED(trc_piece) * piece) {
@@ -39,17 +62,56 @@ TRC_INLINE struct NAMED(trc_curve_hit)
     const REAL s = MINIMUM(MAXIMUM(at, zero), one);
     const REAL x = x0 + s * dx, y = y0 + s * dy, z = z0 + s * (z1 - z0);
     const REAL r = piece->r[0] + s * (piece->r[1] - piece->r[0]);
-    const REAL t = z * ray->per_length;
-    const REAL ahead = ray->tmin + SET(TRC_RIBBON_AHEAD) * r * ray->per_length;
+    const REAL square = x * x + y * y;
+    const REAL ahead = ray->near + SET(TRC_RIBBON_AHEAD) * r * ray->per_length;
     struct NAMED(trc_curve_hit) h;
-    h.hit = BOTH(BOTH(LE(x * x + y * y, r * r), LE(ahead, t)),
-                 BOTH(LE(piece->low, at), LE(at, piece->high)));
-    h.t = t;
+    h.t = z * ray->per_length;
+    h.hit = BOTH(LE(square, r * r), BOTH(LE(ahead, h.t), LE(ray->tmin, h.t)));
     h.u = s;
-    const REAL across = ray->side * (dy * x - dx * y) / (ROOT(length2) * r);
-    h.v = MINIMUM(MAXIMUM(across, zero - one), one);
+    h.v = zero;
+    if (!ANY(h.hit))
+        return h;
+    h.hit = BOTH(h.hit, NAMED(trc_ribbon_owns)(ray, piece, x0, y0, x1, y1, r));
+    const REAL across = MINIMUM(ROOT(square) / r, one), sign = ray->side * (dy * x - dx * y);
+    h.v = SELECT_LE(zero, sign, across, zero - across);
     return h;
 }
+/* Where a round piece leaves off at one of its ends: hits at z on the ray are its own where
+ * slope * z <= from. */
+struct NAMED(trc_round_limit) {
+    REAL slope, from;
+};
+
+/* Strands end upright and open; without a limit at joints, pieces shorter than their radius would
+ * close them. Both pieces at a joint have some of what is beyond the plane that halves its angle,
+ * by how much it bends and how they taper, as they do not meet in that plane; where that is a
+ * radius or more, or the planes of this joint and the next meet within the radius, there is no
+ * limit. x, y, z, r: the end, dx, dy, dz, dr: from the other; next: the vertex beyond. */
+TRC_INLINE struct NAMED(trc_round_limit)
+    NAMED(trc_round_limit_of)(const struct NAMED(trc_curve_ray) * ray, const REAL next[3],
+                              REAL next_r, REAL x, REAL y, REAL z, REAL r, REAL dx, REAL dy,
+                              REAL dz, REAL dr) {
+    REAL nx, ny, nz;
+    NAMED(trc_piece_turn)(ray, next, &nx, &ny, &nz);
+    nx = nx - x;
+    ny = ny - y;
+    nz = nz - z;
+    const REAL zero = SET(0.0f), one = SET(1.0f), tiny = SET(1e-36f), never = SET(INFINITY);
+    const REAL d2 = dx * dx + dy * dy + dz * dz, n2 = nx * nx + ny * ny + nz * nz;
+    const REAL to_d = one / ROOT(MAXIMUM(d2, tiny));
+    const REAL to_n = SELECT_LE(n2, zero, zero, one / ROOT(MAXIMUM(n2, tiny)));
+    const REAL bx = nx * to_n - dx * to_d, by = ny * to_n - dy * to_d, bz = nz * to_n - dz * to_d;
+    const REAL bend2 = bx * bx + by * by + bz * bz, bend = ROOT(bend2);
+    const REAL wx = nx * to_n + dx * to_d, wy = ny * to_n + dy * to_d, wz = nz * to_n + dz * to_d;
+    const REAL nr = next_r - r;
+    const REAL taper = MAXIMUM(dr, zero - dr) * to_d + MAXIMUM(nr, zero - nr) * to_n;
+    const REAL share = SET(0.05f) + bend + taper, widest = MAXIMUM(r, MAXIMUM(next_r, r - dr));
+    REAL margin = SELECT_LE(share, one, SET(2.0f) * share * widest, never);
+    margin = SELECT_LE(bend2 * widest * widest, SET(0.25f) * MINIMUM(d2, n2), margin, never);
+    margin = SELECT_LE(n2, zero, zero, margin);
+    return (struct NAMED(trc_round_limit)){wz, x * wx + y * wy + z * wz + margin};
+}
+
 TRC_INLINE struct NAMED(trc_curve_hit)
     NAMED(trc_round_test)(const struct NAMED(trc_curve_ray) * ray,
                           const struct NAMED(trc_piece) * piece) {
@@ -84,17 +146,26 @@ TRC_INLINE struct NAMED(trc_curve_hit)
     near = MINIMUM(body_near, near);
     far_s = SELECT_LE(far, body_far, s_far, far_s);
     far = MAXIMUM(body_far, far);
-    const REAL margin = SET(TRC_ROUND_AHEAD) * MAXIMUM(r0, r1) * ray->per_length;
-    const REAL least = ray->tmin + margin;
-    const REAL t_near = near * ray->per_length, t_far = far * ray->per_length;
-    const REAL t = SELECT_LE(least, t_near, t_near, t_far);
-    const REAL s = SELECT_LE(least, t_near, near_s, far_s);
-    const REAL within = SELECT_LE(least, t_near, zero, SET(TRC_CURVE_WITHIN));
-    const REAL x = x0 + s * dx, y = y0 + s * dy, r = r0 + s * dr;
+    const REAL radius = MAXIMUM(r0, r1);
+    const struct NAMED(trc_round_limit)
+        begin = NAMED(trc_round_limit_of)(ray, piece->before, piece->r_before, x0, y0, z0, r0,
+                                          zero - dx, zero - dy, zero - dz, zero - dr),
+        end = NAMED(trc_round_limit_of)(ray, piece->after, piece->r_after, x1, y1, z1, r1, dx, dy,
+                                        dz, dr);
+    const REAL near_in = MINIMUM(begin.from - begin.slope * near, end.from - end.slope * near);
+    const REAL far_in = MINIMUM(begin.from - begin.slope * far, end.from - end.slope * far);
+    const REAL least = ray->tmin + SET(TRC_ROUND_AHEAD) * radius * ray->per_length;
+    const REAL t_near = SELECT_LE(zero, near_in, near * ray->per_length, zero - never);
+    const REAL t_far = SELECT_LE(zero, far_in, far * ray->per_length, zero - never);
     struct NAMED(trc_curve_hit) h;
-    h.hit = LE(least, t); /* infinite: none */
-    h.t = t;
-    h.u = s;
+    h.t = SELECT_LE(least, t_near, t_near, t_far);
+    h.u = SELECT_LE(least, t_near, near_s, far_s);
+    h.hit = LE(least, h.t); /* infinite: none */
+    h.v = zero;
+    if (!ANY(h.hit))
+        return h;
+    const REAL within = SELECT_LE(least, t_near, zero, SET(TRC_CURVE_WITHIN));
+    const REAL x = x0 + h.u * dx, y = y0 + h.u * dy, r = r0 + h.u * dr;
     const REAL length = ROOT(MAXIMUM(dx * dx + dy * dy, SET(1e-36f)));
     const REAL across = ray->side * (dy * x - dx * y) / (length * r);
     h.v = MINIMUM(MAXIMUM(across, zero - one), one) + within;

@@ -85,8 +85,8 @@ TRC_INLINE void trc_load_vectors(const float *values, const vint index[3], uint3
 /* Corners as trc_mesh_corners has them. */
 TRC_INLINE void trc_load_indices(const struct trc_mesh *mesh, vint triangle, vmask m,
                                  vint index[3]) {
-    if (mesh->pieces) {
-        index[0] = index[2] = vi_gather((const int32_t *)mesh->pieces, triangle, m);
+    if (mesh->strands) {
+        index[0] = index[2] = triangle + vi_gather((const int32_t *)mesh->strands, triangle, m);
         index[1] = index[0] + vi_set(mesh->shape != TRC_SHAPE_BALLS);
         return;
     }

@@ -70,6 +70,7 @@ static inline void trc_packet_to_object(const struct trc_instance *instance,
         vf_store(&out->time[i], vf_load(&p->time[i]));
     }
     out->visibility = p->visibility;
+    out->left = p->left;
     out->skip_transparent = p->skip_transparent;
     out->common_origin = p->common_origin && instance->key_count < 2;
 }

@@ -10,6 +10,12 @@
 #define TRC_PACKET_SIZE 64
 #define TRC_PACKET_CHUNKS (TRC_PACKET_SIZE / TRC_WIDTH)
 
+/* The strands that rays have left, and meet no more, as in Cycles; of balls their numbers. */
+struct trc_left_strands {
+    uint32_t instance[TRC_PACKET_SIZE]; /* TRC_NO_HIT: none */
+    uint32_t strand[TRC_PACKET_SIZE];
+} __attribute__((aligned(64)));
+
 /* Directions need not be unit, but their largest component must be in [2^-60, 2^60]; distances are
  * in units of the direction. Lanes out of the active mask may hold anything. */
 struct trc_packet {
@@ -19,8 +25,9 @@ struct trc_packet {
     float t[TRC_PACKET_SIZE];    /* in: farthest distance; out: distance of the hit */
     float time[TRC_PACKET_SIZE]; /* [0, 1]; read only in scenes with object motion */
     uint64_t active;
-    uint32_t visibility;   /* TRC_VISIBLE_* */
-    bool common_origin;    /* all active rays start at the same point */
+    uint32_t visibility;                 /* TRC_VISIBLE_* */
+    bool common_origin;                  /* all active rays start at the same point */
+    const struct trc_left_strands *left; /* NULL: none; read only where there are curves */
     bool skip_transparent; /* occlusion: materials that shadow rays see through do not count */
 } __attribute__((aligned(64)));
 

@@ -139,6 +139,7 @@ static void rays_load(const trc_rays *rays, const struct rays_part *part, struct
         p->active = 0;
         p->visibility = rays->visibility;
         p->skip_transparent = false;
+        p->left = NULL;
         for (uint32_t i = 0; i < TRC_PACKET_SIZE && k * TRC_PACKET_SIZE + i < count;
              i += TRC_WIDTH) {
             const uint32_t at = k * TRC_PACKET_SIZE + i;
@@ -196,6 +197,7 @@ static void curve_normal(const struct trc_snapshot *snapshot, const struct trc_p
                             .u = vf_set(h->u[lane]),
                             .v = vf_set(h->v[lane]),
                             .time = vf_set(p->time[lane]),
+                            .strand = vi_set(-1),
                             .wo = v3_neg(v3_normalize(d))};
     trc_curve_fetch(&s, s.active);
     normal[0] = vf_get(s.n.x, 0);
@@ -210,7 +212,7 @@ static void normals_store(const struct trc_snapshot *snapshot, const trc_hits *o
     for (; hit; hit &= hit - 1) {
         const uint32_t number = at + (uint32_t)__builtin_ctz(hit), lane = number % TRC_PACKET_SIZE;
         float n[3];
-        if (snapshot->meshes[snapshot->instances[h->instance[lane]].mesh]->pieces)
+        if (snapshot->meshes[snapshot->instances[h->instance[lane]].mesh]->strands)
             curve_normal(snapshot, p, h, lane, n);
         else
             trc_query_normal(snapshot, h->instance[lane], h->triangle[lane], p->time[lane], n);

@@ -227,6 +227,7 @@ static void triangle_fetch(struct trc_surface *s) {
 static void mixed_fetch(struct trc_surface *s) {
     const vmask active = s->active, curves = trc_curve_lanes(s);
     s->active = vm_andnot(active, curves);
+    s->strand = vi_set(-1);
     if (vm_any(s->active)) {
         triangle_fetch(s);
     } else {

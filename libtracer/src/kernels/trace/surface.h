@@ -31,7 +31,8 @@ struct trc_surface {
     vint instance, triangle; /* of the lanes in active; see above */
     vfloat u, v;             /* barycentrics, see query.h */
     vfloat time;
-    vvec3 p;          /* world position */
+    vint strand; /* of curves, see struct trc_left_strands; -1: none; only where there are curves */
+    vvec3 p;     /* world position */
     vvec3 p_error;    /* bound of its rounding error per axis, world */
     vvec3 ng;         /* geometric normal, unit, on the side of wo */
     vvec3 n;          /* shading normal, unit, on the side of wo as Cycles has it */
@@ -47,6 +48,13 @@ struct trc_surface {
     vfloat pixel;              /* how far the next pixel's ray is from p, world, for slopes */
     vfloat raster_x, raster_y; /* window coordinates [0, 1] */
 };
+
+/* What rays that leave s keep of the strand: its instance, TRC_NO_HIT of none, and it. */
+TRC_INLINE void trc_strand_words(const struct trc_surface *s, vuint out[2]) {
+    const vmask none = vi_lt(s->strand, vi_set(0));
+    out[0] = (vuint)vi_select(none, vi_set((int32_t)TRC_NO_HIT), s->instance);
+    out[1] = (vuint)s->strand;
+}
 
 /* Fills p, p_error, ng, n, backfacing, smooth, bulge from instance, triangle, u, v, time, wo.
  * (kernels/trace/surface.c) */

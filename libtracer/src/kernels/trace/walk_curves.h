@@ -2,8 +2,36 @@
 #ifndef TRACER_KERNELS_TRACE_WALK_CURVES_H
 #define TRACER_KERNELS_TRACE_WALK_CURVES_H
 
+#include "core/box.h"
 #include "kernels/trace/curve.h"
 #include "kernels/trace/walk_leaf.h"
+
+/* What tells a strand from others of its tree. */
+TRC_INLINE uint32_t slot_strand(const struct walk *w, const struct trc_slot *slot) {
+    return w->tree->shape == TRC_SHAPE_BALLS ? slot->triangle
+                                             : slot->instance & TRC_SLOT_STRAND_MASK;
+}
+
+/* Numbers of the vertices of a piece: its ends, the one before and the one after. */
+struct piece_vertices {
+    uint32_t end[2], before, after;
+};
+TRC_INLINE struct piece_vertices piece_vertices_of(const struct walk *w,
+                                                   const struct trc_slot *slot) {
+    if (w->tree->shape == TRC_SHAPE_BALLS)
+        return (struct piece_vertices){
+            {slot->triangle, slot->triangle}, slot->triangle, slot->triangle};
+    const uint32_t first = slot->triangle + (slot->instance & TRC_SLOT_STRAND_MASK);
+    return (struct piece_vertices){{first, first + 1},
+                                   first - !(slot->instance & TRC_SLOT_FIRST),
+                                   first + 1 + !(slot->instance & TRC_SLOT_LAST)};
+}
+
+/* A vertex of w's tree, at the first key of the segment or the next. */
+TRC_INLINE const float *curve_vertex(const struct walk *w, uint32_t vertex, uint32_t next) {
+    return w->tree->vertices +
+           TRC_CURVE_VERTEX_FLOATS * ((size_t)(w->key + next) * w->tree->vertex_count + vertex);
+}
 
 /* ---- packets ---- */
 
@@ -12,6 +40,7 @@ TRC_INLINE struct trc_curve_ray_lanes curve_rays(const struct walk *w, int k, in
     const struct trc_sheared *g = &w->group->of[k];
     const struct trc_turned *r = &w->turned[k];
     const struct trc_shear axis = w->group->beam.axis;
+    const vfloat tmin = vf_max(vf_load(&p->tmin[i]), vf_set(0.0f));
     return (struct trc_curve_ray_lanes){
         .ou = vf_load(&p->o[axis.u][i]),
         .ov = vf_load(&p->o[axis.v][i]),
@@ -25,67 +54,92 @@ TRC_INLINE struct trc_curve_ray_lanes curve_rays(const struct walk *w, int k, in
         .zy = vf_load(&r->zy[i]),
         .zz = vf_load(&r->zz[i]),
         .per_length = vf_load(&r->per_length[i]),
-        .tmin = vf_max(vf_load(&p->tmin[i]), vf_set(0.0f)),
+        .tmin = tmin,
+        .near = p->left ? vf_set(0.0f) : tmin,
         .side = vf_set(w->group->beam.sign),
     };
 }
 
-/* A float of a leaf of count pieces, between two keys where it moves. */
-TRC_INLINE vfloat piece_lanes_at(const float *v, uint32_t count, uint32_t at, bool motion,
-                                 vfloat f) {
-    const vfloat a = vf_set(v[at * count]);
-    return motion ? a + f * (vf_set(v[(TRC_TRIANGLE_FLOATS + at) * count]) - a) : a;
+/* Broadcasts a vertex in the order u, v, z, or interpolates it for each ray by f. */
+TRC_INLINE void vertex_lanes_load(const struct walk *w, uint32_t vertex, bool motion, vfloat f,
+                                  vfloat p[3], vfloat *radius) {
+    const struct trc_shear axis = w->group->beam.axis;
+    const int order[TRC_CURVE_VERTEX_FLOATS] = {axis.u, axis.v, axis.z, 3};
+    const float *a = curve_vertex(w, vertex, 0), *b = motion ? curve_vertex(w, vertex, 1) : a;
+    for (int i = 0; i < TRC_CURVE_VERTEX_FLOATS; i++) {
+        const vfloat x = vf_set(a[order[i]]);
+        *(i < 3 ? &p[i] : radius) = motion ? x + f * (vf_set(b[order[i]]) - x) : x;
+    }
 }
 
-/* Broadcasts the piece of v's first slot, or interpolates it for each ray of chunk i of packet k.
- */
-TRC_INLINE void piece_lanes_load(const struct walk *w, const float *v, uint32_t count, bool motion,
+/* Broadcasts a piece, or interpolates it for each ray of chunk i of packet k. */
+TRC_INLINE void piece_lanes_load(const struct walk *w, const struct trc_slot *slot, bool motion,
                                  int k, int i, struct trc_piece_lanes *out) {
-    const uint32_t order[3] = {(uint32_t)w->group->beam.axis.u, (uint32_t)w->group->beam.axis.v,
-                               (uint32_t)w->group->beam.axis.z};
+    const struct piece_vertices v = piece_vertices_of(w, slot);
     const vfloat f = motion ? vf_load(&w->group->of[k].f[i]) : vf_set(0.0f);
-    for (uint32_t end = 0; end < 2; end++) {
-        for (int axis = 0; axis < 3; axis++)
-            out->p[end][axis] =
-                piece_lanes_at(v, count, end * TRC_PIECE_END + order[axis], motion, f);
-        out->r[end] = piece_lanes_at(v, count, end * TRC_PIECE_END + TRC_PIECE_RADIUS, motion, f);
+    for (int end = 0; end < 2; end++)
+        vertex_lanes_load(w, v.end[end], motion, f, out->p[end], &out->r[end]);
+    vertex_lanes_load(w, v.before, motion, f, out->before, &out->r_before);
+    vertex_lanes_load(w, v.after, motion, f, out->after, &out->r_after);
+}
+
+/* A vertex of each slot, x, y, z and radius, at a fraction between two keys. */
+TRC_INLINE void vertices8_load(const struct walk *w, const uint32_t vertex[8], bool motion,
+                               float fraction, f8 out[TRC_CURVE_VERTEX_FLOATS]) {
+    f4 rows[8];
+    for (int i = 0; i < 8; i++) {
+        rows[i] = f4_load4(curve_vertex(w, vertex[i], 0));
+        if (motion)
+            rows[i] =
+                rows[i] + f4_set(fraction) * (f4_load4(curve_vertex(w, vertex[i], 1)) - rows[i]);
     }
-    const uint32_t flags = (uint32_t)v[TRC_PIECE_FLAGS * count];
-    out->low = vf_set(flags & TRC_PIECE_FIRST ? 0.0f : -INFINITY);
-    out->high = vf_set(flags & TRC_PIECE_LAST ? 1.0f : INFINITY);
+    f4_transpose(rows);
+    f4_transpose(rows + 4);
+    for (int i = 0; i < TRC_CURVE_VERTEX_FLOATS; i++)
+        out[i] = __builtin_shufflevector(rows[i], rows[i + 4], 0, 1, 2, 3, 4, 5, 6, 7);
+}
+
+/* Vertices of a leaf's pieces; of fewer than eight, the last stands in the lanes left. */
+struct leaf_vertices {
+    uint32_t end[2][8], before[8], after[8];
+};
+TRC_INLINE void leaf_vertices_of(const struct walk *w, const struct trc_slot *slots, uint32_t count,
+                                 struct leaf_vertices *out) {
+    for (uint32_t i = 0; i < 8; i++) {
+        const struct piece_vertices v = piece_vertices_of(w, &slots[i < count ? i : count - 1]);
+        out->end[0][i] = v.end[0];
+        out->end[1][i] = v.end[1];
+        out->before[i] = v.before;
+        out->after[i] = v.after;
+    }
 }
 
 /* Widens boxes by the pieces' as they are at a fraction between two keys. */
-TRC_INLINE void piece_boxes_grow(const float *v, uint32_t count, bool motion, float fraction,
-                                 f8 lower[3], f8 upper[3]) {
-    const float *e = v + TRC_TRIANGLE_FLOATS * count;
-    const f8 f = f8_set(fraction);
-    for (uint32_t end = 0; end < 2; end++) {
-        const uint32_t first = end * TRC_PIECE_END;
-        f8 x[TRC_PIECE_END];
-        for (uint32_t i = 0; i < TRC_PIECE_END; i++) {
-            x[i] = f8_load(v + (first + i) * count);
-            if (motion)
-                x[i] = x[i] + f * (f8_load(e + (first + i) * count) - x[i]);
-        }
+TRC_INLINE void piece_boxes_grow(const struct walk *w, const struct leaf_vertices *v, bool motion,
+                                 float fraction, f8 lower[3], f8 upper[3]) {
+    for (int end = 0; end < 2; end++) {
+        f8 x[TRC_CURVE_VERTEX_FLOATS];
+        vertices8_load(w, v->end[end], motion, fraction, x);
         for (int axis = 0; axis < 3; axis++) {
-            lower[axis] = f8_min(lower[axis], x[axis] - x[TRC_PIECE_RADIUS]);
-            upper[axis] = f8_max(upper[axis], x[axis] + x[TRC_PIECE_RADIUS]);
+            lower[axis] = f8_min(lower[axis], x[axis] - x[3]);
+            upper[axis] = f8_max(upper[axis], x[axis] + x[3]);
         }
     }
 }
 
 /* Bits of the pieces that the beam may touch. */
-TRC_INLINE uint32_t piece_candidates(const struct walk *w, const float *v, uint32_t count,
-                                     bool motion) {
+TRC_INLINE uint32_t piece_candidates(const struct walk *w, const struct trc_slot *slots,
+                                     uint32_t count, bool motion) {
+    struct leaf_vertices v;
     f8 lower[3], upper[3], key;
+    leaf_vertices_of(w, slots, count, &v);
     for (int axis = 0; axis < 3; axis++) {
         lower[axis] = f8_set(INFINITY);
         upper[axis] = f8_set(-INFINITY);
     }
-    piece_boxes_grow(v, count, motion, w->group->f_min, lower, upper);
+    piece_boxes_grow(w, &v, motion, w->group->f_min, lower, upper);
     if (motion)
-        piece_boxes_grow(v, count, motion, w->group->f_max, lower, upper);
+        piece_boxes_grow(w, &v, motion, w->group->f_max, lower, upper);
     return trc_beam_test(&w->group->beam, lower, upper, &key) & ((1u << count) - 1u);
 }
 
@@ -97,29 +151,39 @@ TRC_INLINE struct trc_curve_hit_lanes curve_test_lanes(uint32_t shape,
                                       : trc_ball_test_lanes(rays, piece);
 }
 
+/* Bits of chunk i of packet k that have left the strand. */
+TRC_INLINE vmask left_lanes(const struct walk *w, int k, int i, const struct trc_slot *slot) {
+    const struct trc_left_strands *left = w->packets[k].left;
+    const vint instance = vi_load((const int32_t *)&left->instance[i]),
+               strand = vi_load((const int32_t *)&left->strand[i]);
+    return vm_and(vi_eq(instance, vi_set((int32_t)w->instance)),
+                  vi_eq(strand, vi_set((int32_t)slot_strand(w, slot))));
+}
+
 /* Tests the piece in a slot against the rays of packet k in mask; those that it hits or, of closest
  * hits, whose hit it became. */
-TRC_INLINE uint64_t piece_packet(struct walk *w, const float *v, uint32_t count,
-                                 const struct trc_slot *slot, int k, uint64_t mask, bool any,
-                                 bool motion) {
+TRC_INLINE uint64_t piece_packet(struct walk *w, const struct trc_slot *slot, int k, uint64_t mask,
+                                 bool any, bool motion) {
     const struct trc_packet *p = &w->packets[k];
     uint64_t found = 0;
     struct trc_piece_lanes piece;
     if (!motion)
-        piece_lanes_load(w, v, count, false, 0, 0, &piece);
+        piece_lanes_load(w, slot, false, 0, 0, &piece);
     for (int c = 0; c < TRC_PACKET_CHUNKS; c++) {
         const uint32_t bits = trc_chunk_bits(mask, c);
         if (!bits)
             continue;
         const int i = c * TRC_WIDTH;
         if (motion)
-            piece_lanes_load(w, v, count, true, k, i, &piece);
+            piece_lanes_load(w, slot, true, k, i, &piece);
         const struct trc_curve_ray_lanes rays = curve_rays(w, k, i);
         TRC_COUNT(triangle_rays, __builtin_popcount(bits));
         const struct trc_curve_hit_lanes h = curve_test_lanes(w->tree->shape, &rays, &piece);
         vmask hit = vm_and(vm_from_bits(bits), h.hit);
         if (!vm_any(hit))
             continue;
+        if (p->left)
+            hit = vm_andnot(hit, left_lanes(w, k, i, slot));
         if (any) {
             hit = vm_and(hit,
                          vm_and(vf_gt(h.t, vf_load(&p->tmin[i])), vf_lt(h.t, vf_load(&p->t[i]))));
@@ -134,19 +198,17 @@ TRC_INLINE uint64_t piece_packet(struct walk *w, const float *v, uint32_t count,
 /* Tests a leaf's pieces; true if any ray found a (nearer) hit. */
 TRC_INLINE bool curve_leaf_packet(struct walk *w, uint32_t ref, struct trc_live mask, bool any,
                                   bool motion) {
-    const float *v = trc_leaf_vertices(w->tree, ref, w->key);
     const uint32_t count = trc_leaf_count(ref);
     const struct trc_slot *ids = trc_leaf_slots(w->tree, ref);
     uint64_t found = 0;
-    for (uint32_t slots = piece_candidates(w, v, count, motion); slots; slots &= slots - 1) {
+    for (uint32_t slots = piece_candidates(w, ids, count, motion); slots; slots &= slots - 1) {
         const int slot = __builtin_ctz(slots);
         if (any && w->packets->skip_transparent && (ids[slot].instance & TRC_SLOT_TRANSPARENT))
             continue;
         for (int k = 0; k < TRC_WALK_PACKETS; k++) {
             if (!mask.of[k])
                 continue;
-            const uint64_t hit =
-                piece_packet(w, v + slot, count, &ids[slot], k, mask.of[k], any, motion);
+            const uint64_t hit = piece_packet(w, &ids[slot], k, mask.of[k], any, motion);
             found |= hit;
             if (any) {
                 w->occluded.of[k] |= hit;
@@ -164,6 +226,7 @@ TRC_INLINE struct trc_curve_ray8 curve_ray(const struct walk *w, int k, int ray)
     const struct trc_sheared *g = &w->group->of[k];
     const struct trc_turned *r = &w->turned[k];
     const struct trc_shear axis = w->group->beam.axis;
+    const float tmin = f_max(p->tmin[ray], 0.0f);
     return (struct trc_curve_ray8){
         .ou = f8_set(p->o[axis.u][ray]),
         .ov = f8_set(p->o[axis.v][ray]),
@@ -177,52 +240,62 @@ TRC_INLINE struct trc_curve_ray8 curve_ray(const struct walk *w, int k, int ray)
         .zy = f8_set(r->zy[ray]),
         .zz = f8_set(r->zz[ray]),
         .per_length = f8_set(r->per_length[ray]),
-        .tmin = f8_set(f_max(p->tmin[ray], 0.0f)),
+        .tmin = f8_set(tmin),
+        .near = f8_set(p->left ? 0.0f : tmin),
         .side = f8_set(w->group->beam.sign),
     };
 }
 
-TRC_INLINE void pieces8_load(const struct walk *w, const float *v, uint32_t count, bool motion,
-                             float fraction, struct trc_piece8 *out) {
-    const uint32_t order[3] = {(uint32_t)w->group->beam.axis.u, (uint32_t)w->group->beam.axis.v,
-                               (uint32_t)w->group->beam.axis.z};
-    const float *e = v + TRC_TRIANGLE_FLOATS * count;
-    const f8 f = f8_set(fraction);
-    for (uint32_t end = 0; end < 2; end++)
-        for (int i = 0; i < TRC_PIECE_END; i++) {
-            const bool is_radius = i == TRC_PIECE_RADIUS;
-            const uint32_t at =
-                (end * TRC_PIECE_END + (is_radius ? TRC_PIECE_RADIUS : order[i])) * count;
-            f8 x = f8_load(v + at);
-            if (motion)
-                x = x + f * (f8_load(e + at) - x);
-            if (is_radius)
-                out->r[end] = x;
-            else
-                out->p[end][i] = x;
-        }
-    /* 0 to 3: TRC_PIECE_*. */
-    const f8 flags = f8_load(v + TRC_PIECE_FLAGS * count), last = f8_set(TRC_PIECE_LAST);
-    const f8 rest = f8_select_le(last, flags, flags - last, flags);
-    out->low = f8_select_le(f8_set(TRC_PIECE_FIRST), rest, f8_set(0.0f), f8_set(-INFINITY));
-    out->high = f8_select_le(last, flags, f8_set(1.0f), f8_set(INFINITY));
+TRC_INLINE void pieces8_load(const struct walk *w, const struct trc_slot *slots, uint32_t count,
+                             bool motion, float fraction, struct trc_piece8 *out) {
+    const struct trc_shear axis = w->group->beam.axis;
+    const int order[3] = {axis.u, axis.v, axis.z};
+    struct leaf_vertices v;
+    f8 x[TRC_CURVE_VERTEX_FLOATS];
+    leaf_vertices_of(w, slots, count, &v);
+    for (int end = 0; end < 2; end++) {
+        vertices8_load(w, v.end[end], motion, fraction, x);
+        for (int i = 0; i < 3; i++)
+            out->p[end][i] = x[order[i]];
+        out->r[end] = x[3];
+    }
+    vertices8_load(w, v.before, motion, fraction, x);
+    for (int i = 0; i < 3; i++)
+        out->before[i] = x[order[i]];
+    out->r_before = x[3];
+    vertices8_load(w, v.after, motion, fraction, x);
+    for (int i = 0; i < 3; i++)
+        out->after[i] = x[order[i]];
+    out->r_after = x[3];
+}
+
+/* Bits of the slots whose strands the ray has not left. */
+TRC_INLINE uint32_t slots_not_left(const struct walk *w, const struct trc_slot *slots, int k,
+                                   int ray, uint32_t bits) {
+    const struct trc_left_strands *left = w->packets[k].left;
+    if (!left || left->instance[ray] != w->instance)
+        return bits;
+    for (uint32_t rest = bits; rest; rest &= rest - 1)
+        if (slot_strand(w, &slots[__builtin_ctz(rest)]) == left->strand[ray])
+            bits &= ~(rest & -rest);
+    return bits;
 }
 
 /* One ray's tests against a leaf. True: occluded (any only). */
 TRC_INLINE bool curve_leaf_single(struct walk *w, uint32_t ref, int k, int ray, bool any,
                                   bool motion) {
     const uint32_t count = trc_leaf_count(ref), shape = w->tree->shape;
+    const struct trc_slot *slots = trc_leaf_slots(w->tree, ref);
     struct trc_piece8 pieces;
-    pieces8_load(w, trc_leaf_vertices(w->tree, ref, w->key), count, motion,
-                 motion ? w->group->of[k].f[ray] : 0.0f, &pieces);
+    pieces8_load(w, slots, count, motion, motion ? w->group->of[k].f[ray] : 0.0f, &pieces);
     const struct trc_curve_ray8 r = curve_ray(w, k, ray);
     TRC_COUNT(single_leaves, 1);
     TRC_COUNT(single_triangles, count);
     const struct trc_curve_hit8 h = shape == TRC_SHAPE_RIBBONS ? trc_ribbon_test8(&r, &pieces)
                                     : shape == TRC_SHAPE_ROUND ? trc_round_test8(&r, &pieces)
                                                                : trc_ball_test8(&r, &pieces);
-    return ray_keep(w, trc_leaf_slots(w->tree, ref), k, ray, h.hit & ((1u << count) - 1u), h.t, h.u,
-                    h.v, any);
+    const uint32_t hit = slots_not_left(w, slots, k, ray, h.hit & ((1u << count) - 1u));
+    return hit && ray_keep(w, slots, k, ray, hit, h.t, h.u, h.v, any);
 }
 
 #endif

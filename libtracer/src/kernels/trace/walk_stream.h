@@ -86,10 +86,14 @@ TRC_INLINE uint32_t stream_node(const struct walk *w, uint32_t node, const struc
 #define NODE_LINES ((TRC_NODE_CHILDREN_BYTES + TRC_NODE_KEY_BYTES + CACHE_LINE - 1) / CACHE_LINE)
 #define LEAF_LINES 2 /* a leaf is of three triangles, mostly */
 /* Asks for the memory of what waits on a stack; a TLAS is small. */
-TRC_INLINE void ref_prefetch(const struct walk *w, uint32_t ref, bool any) {
+TRC_INLINE void ref_prefetch(const struct walk *w, uint32_t ref, bool any, bool curves) {
     const bool is_leaf = ref & TRC_REF_LEAF;
-    if (w->tree->is_top)
+    if (!curves && w->tree->is_top)
         return;
+    if (curves && is_leaf) {
+        __builtin_prefetch(trc_leaf_slots(w->tree, ref));
+        return;
+    }
     const char *at = is_leaf ? (const char *)trc_leaf_vertices(w->tree, ref, w->key)
                              : (const char *)trc_node_children(w->tree, ref);
     for (int line = 0; line < (is_leaf ? LEAF_LINES : NODE_LINES); line++)
@@ -100,8 +104,8 @@ TRC_INLINE void ref_prefetch(const struct walk *w, uint32_t ref, bool any) {
 
 /* Pushes the children that are met: to the closest hit the nearest on top, to any in any order. */
 TRC_INLINE int stream_push(const struct walk *w, uint32_t node, uint32_t bits,
-                           const uint32_t met[TRC_NODE_WIDTH], bool any, struct stream_entry *stack,
-                           int top) {
+                           const uint32_t met[TRC_NODE_WIDTH], bool any, bool curves,
+                           struct stream_entry *stack, int top) {
     const uint32_t *children = trc_node_children(w->tree, node);
     const struct trc_beam *b = &w->group->beam;
     const float *z = trc_node_bounds(w->tree, node, w->key) + 16 * b->axis.z + 8 * b->side;
@@ -110,7 +114,7 @@ TRC_INLINE int stream_push(const struct walk *w, uint32_t node, uint32_t bits,
         const int child = __builtin_ctz(bits);
         const struct stream_entry entry = {children[child], met[child], b->sign * z[child]};
         int at = top++;
-        ref_prefetch(w, entry.ref, any);
+        ref_prefetch(w, entry.ref, any, curves);
         for (; !any && at > bottom && stack[at - 1].z < entry.z; at--)
             stack[at] = stack[at - 1];
         stack[at] = entry;
@@ -164,7 +168,7 @@ TRC_INLINE void stream_walk(struct walk *w, uint32_t ref, const struct trc_live 
             uint32_t met[TRC_NODE_WIDTH];
             TRC_COUNT(single_nodes, __builtin_popcount(rays));
             const uint32_t bits = stream_node(w, ref, &s, rays, motion, met);
-            top = stream_push(w, ref, bits, met, any, stack, top);
+            top = stream_push(w, ref, bits, met, any, curves, stack, top);
         } else if (!curves && w->tree->is_top) {
             stream_item(w, ref, &s, rays, any);
         } else {
