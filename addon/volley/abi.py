@@ -402,6 +402,7 @@ class DistributionType(IntEnum):
     CORRELATED = 16
     FILMED_METAL = 32
     WHOLE_COAT = 64
+    THIN_WALL = 128
 
 
 class BlendMode(IntEnum):

@@ -286,19 +286,29 @@ def _principled(walker, node, sockets):
     _name_missing(walker, sockets)
     _note_generated(walker, node, kind, values)
     mode = _layered(node) if is_layered else _distribution(node) or 0
+    if _is_thin(sockets):
+        mode |= DistributionType.THIN_WALL
     return {"BSDF": Value('s', walker.emit(kind, values, mode), 0)}
+
+
+def _is_thin(sockets):
+    """Whether Principled of Blender 5.2 is a thin wall everywhere."""
+    if sockets.find("Thin Wall") is None:
+        return False
+    value = sockets.get('f', "Thin Wall")
+    return value.node == CONSTANT and value.constant[0] > 0.0
 
 
 def _name_missing(walker, sockets):
     """Warn of inputs of Principled that are in use and mean something else here, or nothing."""
-    for name, instead in (("Subsurface", "is rendered as diffuse"),
-                          ("Subsurface Weight", "is rendered as diffuse"),
-                          ("Thin Wall", "is rendered as a solid")):
+    for name in ("Subsurface", "Subsurface Weight"):
         if sockets.find(name) is None:
             continue
         value = sockets.get('f', name)
         if value.node != CONSTANT or value.constant[0] > 0.0:
-            walker.warn(f"Principled BSDF: {name} {instead}")
+            walker.warn(f"Principled BSDF: {name} is rendered as diffuse")
+    if sockets.find("Thin Wall") is not None and sockets.get('f', "Thin Wall").node != CONSTANT:
+        walker.warn("Principled BSDF: a Thin Wall that is linked is rendered as a solid")
 
 
 def _metallic(walker, node, sockets):

@@ -205,7 +205,9 @@ enum trc_distribution_type {
      * full from 1 nm on in place of 30. */
     TRC_DISTRIBUTION_FILMED_METAL = 32,
     /* Bit for Principled from 4.0 on, as Blender 5: its coat has the energy of MULTI_GGX. */
-    TRC_DISTRIBUTION_WHOLE_COAT = 64
+    TRC_DISTRIBUTION_WHOLE_COAT = 64,
+    /* Bit for Principled from 4.0 on, of Blender 5: its glass is a sheet without thickness. */
+    TRC_DISTRIBUTION_THIN_WALL = 128
 };
 
 enum trc_blend_mode {

@@ -88,18 +88,19 @@ static uint32_t principled_bits(uint32_t distribution, const struct trc_operand 
     return has;
 }
 
-static uint32_t layered_principled_bits(uint32_t distribution, const struct trc_operand *in) {
+static uint32_t layered_principled_bits(uint32_t mode, const struct trc_operand *in) {
     const struct trc_operand metallic = in[TRC_AT(LAYERED_PRINCIPLED, metallic)];
     const struct trc_operand transmission = in[TRC_AT(LAYERED_PRINCIPLED, transmission_weight)];
     const struct trc_operand alpha = in[TRC_AT(LAYERED_PRINCIPLED, alpha)];
     uint32_t has = may_be_below(alpha, 1.0f) ? TRC_MATERIAL_HAS_TRANSPARENCY : 0u;
     if (!may_exceed(alpha, 0.0f))
         return has;
-    has |= microfacet_bits(distribution, in[TRC_AT(LAYERED_PRINCIPLED, roughness)]);
+    has |= microfacet_bits(mode, in[TRC_AT(LAYERED_PRINCIPLED, roughness)]);
     if (may_be_below(metallic, 1.0f) && may_be_below(transmission, 1.0f))
         has |= TRC_MATERIAL_HAS_DIFFUSE;
     if (may_be_below(metallic, 1.0f) && may_exceed(transmission, TRC_WEIGHT_CUTOFF))
-        has |= TRC_MATERIAL_HAS_REFRACTION;
+        has |= TRC_MATERIAL_HAS_REFRACTION |
+               (mode & TRC_DISTRIBUTION_THIN_WALL ? TRC_MATERIAL_HAS_TRANSPARENCY : 0u);
     if (may_exceed(in[TRC_AT(LAYERED_PRINCIPLED, coat_weight)], TRC_WEIGHT_CUTOFF))
         has |=
             microfacet_bits(TRC_DISTRIBUTION_GGX, in[TRC_AT(LAYERED_PRINCIPLED, coat_roughness)]);

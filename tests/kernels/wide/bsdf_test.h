@@ -178,6 +178,11 @@ static inline struct model layered_glass(uint32_t mode, float roughness, bool ba
     m.back = back;
     return m;
 }
+static inline struct model thin_wall(float roughness) {
+    struct model m = layered_glass(TRC_DISTRIBUTION_GGX | TRC_DISTRIBUTION_THIN_WALL, roughness, 0);
+    m.name = "thin wall";
+    return m;
+}
 /* Glass and gloss under a film. */
 static inline struct model filmed(uint32_t mode, float roughness, bool back) {
     struct model m = layered_glass(mode, roughness, back);

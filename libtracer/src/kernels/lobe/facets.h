@@ -184,6 +184,10 @@ TRC_INLINE vfloat mean_blend(vfloat ior) {
 vvec3 trc_facets_direction(const struct trc_lobe *lobe, const struct trc_surface *s, vfloat u1,
                            vfloat u2, vfloat chosen_at, vmask *alive, vmask *crosses);
 
+/* As trc_lobe_model.value, of the reflection of all distributions. (kernels/lobe/reflection.c) */
+struct lobe_value trc_reflection_value(const struct trc_lobe *lobe, const struct trc_surface *s,
+                                       vvec3 wi);
+
 /* What reflection and refraction need once alpha, ior and tangent are set. */
 void trc_facets_finish(const struct trc_setup *c, struct trc_lobe *lobe, bool is_sharp);
 

@@ -137,7 +137,8 @@ static float whole_film(const struct trc_leaf *leaf) {
 }
 
 static uint32_t distribution(const struct trc_leaf *leaf) {
-    return leaf->mode & ~(uint32_t)(TRC_DISTRIBUTION_FILMED_METAL | TRC_DISTRIBUTION_WHOLE_COAT);
+    return leaf->mode & ~(uint32_t)(TRC_DISTRIBUTION_FILMED_METAL | TRC_DISTRIBUTION_WHOLE_COAT |
+                                    TRC_DISTRIBUTION_THIN_WALL);
 }
 
 static vvec3 metal_reflectance(const struct trc_lobe *lobe, vfloat cos_m) {
@@ -189,6 +190,63 @@ static void layered_glass(struct trc_setup *c, const struct trc_leaf *leaf, vvec
         c, weight, v3_mul(weight, tint), &fresnel, n,
         vf_square(vf_saturate(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, roughness)))), eta,
         distribution(leaf) | TRC_DISTRIBUTION_CORRELATED);
+}
+
+/* What the surface of a thin wall reflects; above: index of where that is seen from, cos_o: of the
+ * angle there. */
+static vvec3 wall_reflects(const struct trc_setup *c, const struct trc_leaf *leaf, vvec3 f0,
+                           vfloat above, vfloat ior, vfloat cos_o) {
+    struct trc_lobe side;
+    struct trc_fresnel fresnel = blend_to_white(f0);
+    side.ior = vf_select(vf_eq(above, vf_one()), ior, vf_rcp(ior));
+    trc_thin_film_cover(c, leaf, TRC_AT(LAYERED_PRINCIPLED, film_thickness), above,
+                        whole_film(leaf), &fresnel);
+    set_fresnel(&side, &fresnel);
+    return v3_saturate(facet_reflectance(&side, cos_o));
+}
+
+/* Of one channel: what both surfaces of a wall send back and through, reflecting front and back,
+ * with that transmittance between them. */
+static void wall_sum(vfloat front, vfloat back, vfloat between, vfloat *reflected,
+                     vfloat *transmitted) {
+    const vfloat one = vf_one(), once = back * between;
+    *transmitted = vf_divide(between * (one - front) * (one - back), one - once * once);
+    *transmitted = vf_where(vf_lt(once, one), *transmitted);
+    *reflected = front + *transmitted * once;
+}
+
+static void layered_thin_glass(struct trc_setup *c, const struct trc_leaf *leaf, vvec3 weight,
+                               vvec3 n) {
+    const vfloat one = vf_one();
+    const vfloat ior =
+        vf_max(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, ior)), vf_set(TRC_MIN_IOR));
+    const vvec3 tint = colour(c, leaf, TRC_AT(LAYERED_PRINCIPLED, specular_tint));
+    const vvec3 clear = v3_saturate(colour(c, leaf, TRC_AT(LAYERED_PRINCIPLED, base_color)));
+    const vvec3 f0 = v3_saturate(v3_scale(tint, trc_fresnel_normal(ior)));
+    const vfloat cos_o = v3_dot(n, c->s->wo);
+    const vfloat cos2_t = one - (one - cos_o * cos_o) / (ior * ior);
+    const vfloat cos_t = vf_safe_sqrt(cos2_t);
+    const vvec3 front = wall_reflects(c, leaf, f0, one, ior, cos_o);
+    vvec3 back = front;
+    if (may_exceed_zero(c, leaf, TRC_AT(LAYERED_PRINCIPLED, film_thickness)))
+        back = wall_reflects(c, leaf, f0, ior, ior, cos_t);
+    /* The colour is that of the way straight through; there is none where all is reflected. */
+    const vmask passes = vf_gt(cos_t, vf_zero());
+    const vfloat way = vf_divide(one, cos_t);
+    const vvec3 between =
+        v3_where(passes, v3(vf_pow(clear.x, way), vf_pow(clear.y, way), vf_pow(clear.z, way)));
+    vvec3 reflected, transmitted;
+    wall_sum(front.x, back.x, between.x, &reflected.x, &transmitted.x);
+    wall_sum(front.y, back.y, between.y, &reflected.y, &transmitted.y);
+    wall_sum(front.z, back.z, between.z, &reflected.z, &transmitted.z);
+    trc_add_thin_glass(
+        c, &(struct trc_thin_glass){.reflected = v3_mul(weight, reflected),
+                                    .transmitted = v3_mul(weight, transmitted),
+                                    .tint = v3_saturate(tint),
+                                    .n = n,
+                                    .alpha = vf_square(vf_saturate(
+                                        number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, roughness)))),
+                                    .ior = ior});
 }
 
 /* The dielectric reflection; its index is the one that gives the reflectance level asks for. */
@@ -264,7 +322,8 @@ static void add_layered_principled(struct trc_setup *c, const struct trc_leaf *l
     if (may_exceed_zero(c, leaf, TRC_AT(LAYERED_PRINCIPLED, transmission_weight))) {
         const vfloat transmission =
             vf_saturate(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, transmission_weight)));
-        layered_glass(c, leaf, v3_scale(rest, transmission), n);
+        (leaf->mode & TRC_DISTRIBUTION_THIN_WALL ? layered_thin_glass : layered_glass)(
+            c, leaf, v3_scale(rest, transmission), n);
         rest = v3_scale(rest, vf_one() - transmission);
     }
     rest = v3_scale(rest, layered_specular(c, leaf, rest, n));

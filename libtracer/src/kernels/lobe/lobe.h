@@ -169,6 +169,14 @@ vfloat trc_reflected_part(vfloat f);
 /* One of the two lobes of glass. */
 struct trc_lobe *trc_add_dielectric(struct trc_setup *c, enum trc_lobe_kind kind, vvec3 weight,
                                     vvec3 n, vfloat alpha, vfloat eta, uint32_t mode);
+/* kernels/lobe/thin_glass.c: glass without thickness. Its index; the weights of both sides; tint:
+ * of bounces between facets. */
+struct trc_thin_glass {
+    vvec3 reflected, transmitted, tint, n;
+    vfloat alpha, ior;
+};
+void trc_add_thin_glass(struct trc_setup *c, const struct trc_thin_glass *glass);
+
 /* Multiple-scattering glass: both lobes with the factor of the micro-normal, scaled so that they
  * keep all energy together. reflected, refracted: colours of the lobes. */
 void trc_add_multi_glass(struct trc_setup *c, vvec3 weight, vvec3 reflected, vvec3 refracted,

@@ -2,8 +2,8 @@
  * shader. */
 #include "kernels/lobe/facets.h"
 
-static struct lobe_value reflection_value(const struct trc_lobe *lobe, const struct trc_surface *s,
-                                          vvec3 wi) {
+struct lobe_value trc_reflection_value(const struct trc_lobe *lobe, const struct trc_surface *s,
+                                       vvec3 wi) {
     struct meeting at;
     if (!meet(lobe, s->wo, wi, &at))
         return no_value();
@@ -36,7 +36,7 @@ static struct lobe_value reflection_value(const struct trc_lobe *lobe, const str
 struct trc_lobe *trc_add_reflection(struct trc_setup *c, vvec3 weight) {
     static const struct trc_lobe_model model = {.kind = TRC_LOBE_REFLECT,
                                                 .has_facets = true,
-                                                .value = reflection_value,
+                                                .value = TRC_KERNEL(trc_reflection_value),
                                                 .direction = TRC_KERNEL(trc_facets_direction)};
     return trc_add_lobe(c, &model, weight);
 }
