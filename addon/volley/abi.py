@@ -258,6 +258,11 @@ class RampInterpolation(IntEnum):
     CONSTANT = 1
 
 
+class Gamut(IntEnum):
+    CLIPPED = 0
+    OPEN = 1
+
+
 class CurvesExtension(IntEnum):
     CONSTANT = 0
     EXTRAPOLATED = 1
@@ -880,7 +885,7 @@ ENUMERATIONS = {StatusCode: "TRC_", IsaId: "TRC_ISA_", CameraType: "TRC_CAMERA_"
                 DiffuseModel: "TRC_DIFFUSE_", ToonComponent: "TRC_TOON_", MappingType: "TRC_MAPPING_",
                 NormalMapSpace: "TRC_NORMAL_MAP_", NormalMapFlags: "TRC_NORMAL_MAP_", BumpMode: "TRC_BUMP_",
                 AmbientMode: "TRC_AMBIENT_", RaycastMode: "TRC_RAYCAST_",
-                DisplacementMethod: "TRC_DISPLACEMENT_", RampInterpolation: "TRC_RAMP_",
+                DisplacementMethod: "TRC_DISPLACEMENT_", RampInterpolation: "TRC_RAMP_", Gamut: "TRC_GAMUT_",
                 CurvesExtension: "TRC_CURVES_", SeparateMode: "TRC_SEPARATE_", ClampType: "TRC_CLAMP_",
                 TangentSource: "TRC_TANGENT_", SpaceId: "TRC_SPACE_", TransformedType: "TRC_TRANSFORMED_",
                 VectorTransformMode: "TRC_", RotateMode: "TRC_ROTATE_", RotateFlags: "TRC_ROTATE_",

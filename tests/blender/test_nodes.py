@@ -124,16 +124,14 @@ def test_link_conversions(blender):
 
 
 def inside_fallbacks():
-    import bpy
     tree, output = _new_tree()
-    has_density = hasattr(bpy.types, "ShaderNodeTexPointDensity")  # till 5.0
-    unknown = tree.nodes.new("ShaderNodeTexPointDensity" if has_density else "ShaderNodeRaycast")
+    unknown = tree.nodes.new("ShaderNodeVolumeInfo")
     velvet = tree.nodes.new("ShaderNodeBsdfTranslucent")
     scattering = tree.nodes.new("ShaderNodeSubsurfaceScattering")
     scattering.inputs["Color"].default_value = (0.2, 0.4, 0.6, 1.0)
     mix = tree.nodes.new("ShaderNodeMixShader")
     mix.inputs[0].default_value = 0.125
-    tree.links.new(unknown.outputs["Density" if has_density else "Hit Distance"], mix.inputs[0])
+    tree.links.new(unknown.outputs["Density"], mix.inputs[0])
     tree.links.new(scattering.outputs[0], mix.inputs[1])
     tree.links.new(velvet.outputs[0], mix.inputs[2])
     tree.links.new(mix.outputs[0], output.inputs["Surface"])

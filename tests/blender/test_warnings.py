@@ -80,8 +80,8 @@ def test_nodes_of_lights_differ(blender):
 
 
 def inside_fifth():
-    """The warnings of what came with Blender 5 and is not there: a working space, a normal map below a displaced
-    surface, thin walls, normals as they are."""
+    """The warnings of what came with Blender 5 and is not there: a normal map below a displaced surface,
+    thin walls, normals as they are; another working space, where thin films alone are."""
     import bpy
     import scenes
     scenes.empty(size=(16, 16))
@@ -113,6 +113,8 @@ def inside_fifth():
     material.cycles.use_bump_map_correction = True
     bpy.ops.wm.set_working_color_space(working_space='ACEScg')
     look()
+    principled.inputs["Thin Film Thickness"].default_value = 300.0
+    look()
     return found
 
 
@@ -123,9 +125,8 @@ def test_what_came_with_the_fifth_is_named(blender):
     assert blender.run(inside_fifth) == [
         [], ["Material 'Wall': Normal Map lies on the displaced surface, not on the original one"],
         ["Material 'Wall': Principled BSDF: Thin Wall is rendered as a solid"],
-        ["Material 'Wall': bent normals are corrected nonetheless"],
-        ["The working space ACEScg is not supported: images, temperatures, skies and the grey of colours are those of "
-         "Linear Rec.709"]]
+        ["Material 'Wall': bent normals are corrected nonetheless"], [],
+        ["Material 'Wall': Principled BSDF: its thin film has the colours of Rec.709"]]
 
 
 def inside_settings_of_worlds():

@@ -13,7 +13,7 @@ from ..abi import (AmbientMode, CurvesExtension, ImageExtension, MathOperation a
                    RaycastMode, RotateFlags, RotateMode, SeparateMode, SpaceId, TableSize, TransformedType,
                    VectorOperation as Vector, VectorTransformMode)
 from ..compat import FOLLOWS_LIGHT_NODES, TRANSFORMS_NORMALS
-from . import ies
+from . import ies, working_space
 from .instance import NO_PARTICLE_RANDOM, VALUES_LOCATION, VALUES_PARTICLE, VALUES_SPIN, VALUES_VELOCITY
 from .node_list import named_outputs, output
 from .strands import DIRECTION_ATTRIBUTE, HAIR_ATTRIBUTE
@@ -85,11 +85,15 @@ def _float_curve(walker, node, sockets):
 
 
 def _blackbody(walker, _node, sockets):
-    return {"Color": Value('c', walker.emit(NodeType.BLACKBODY, (sockets.get('f', "Temperature"),)), 0)}
+    return {"Color": working_space.spectral(walker, NodeType.BLACKBODY, sockets.get('f', "Temperature"))}
+
+
+def _rgb_to_bw(walker, _node, sockets):
+    return {"Val": working_space.luminance(walker, sockets.get('c', "Color"))}
 
 
 def _wavelength(walker, _node, sockets):
-    return {"Color": Value('c', walker.emit(NodeType.WAVELENGTH, (sockets.get('f', "Wavelength"),)), 0)}
+    return {"Color": working_space.spectral(walker, NodeType.WAVELENGTH, sockets.get('f', "Wavelength"))}
 
 
 # Ranges --------------------------------------------------------------------------------------------
@@ -309,7 +313,7 @@ def _particle_info(walker, node, _sockets):
 CONVERTERS = {
     "ShaderNodeRGBCurve": _color_curves(4, "Color"), "ShaderNodeVectorCurve": _color_curves(3, "Vector"),
     "ShaderNodeFloatCurve": _float_curve, "ShaderNodeBlackbody": _blackbody,
-    "ShaderNodeWavelength": _wavelength, "ShaderNodeMapRange": _map_range,
+    "ShaderNodeRGBToBW": _rgb_to_bw, "ShaderNodeWavelength": _wavelength, "ShaderNodeMapRange": _map_range,
     "ShaderNodeVectorTransform": _vector_transform, "ShaderNodeVectorRotate": _vector_rotate,
     "ShaderNodeCameraData": _camera_data, "ShaderNodeWireframe": _wireframe,
     "ShaderNodeLightFalloff": _light_falloff, "ShaderNodeTexIES": _ies,

@@ -11,7 +11,7 @@ that is not supported becomes a diffuse of its colour. Each is named once in the
 
 from ..abi import NodeType, VectorOperation as Vector
 from ..compat import BUMP_FILTER_WIDTH, aov_name
-from . import nodes
+from . import nodes, working_space
 from .node_list import output
 from .values import CONSTANT, DEFAULT, NO_SHADER, Value
 
@@ -236,7 +236,7 @@ class Walker:
     def _to_number(self, value):
         """Luminance of a colour, mean of a vector."""
         if value.kind == 'c':
-            return Value('f', self.emit(NodeType.RGB_TO_BW, (value,)), 0)
+            return working_space.luminance(self, value)
         third = Value('v', CONSTANT, 0, (1.0 / 3.0,) * 3)
         zero = Value('v', CONSTANT, 0)
         index = self.emit(NodeType.VECTOR_MATH, (value, third, zero, Value('f', CONSTANT, 0)),

@@ -17,7 +17,8 @@ import bpy
 import numpy as np
 
 from .. import abi, native
-from ..compat import cycles
+from ..compat import cycles, working_space
+from . import working_space as spaces
 from .movie import frame_of, turn_to
 
 _ALPHA_MODES = {'STRAIGHT': abi.AlphaMode.STRAIGHT, 'PREMUL': abi.AlphaMode.PREMULTIPLIED,
@@ -123,7 +124,7 @@ class Images:
         return self._entries[key][1]
 
     def _signature(self, image, path):
-        return _signature(image, path) + (self._limit,)
+        return _signature(image, path) + (self._limit, working_space())
 
     def _file_values(self, image, path, is_mip_mapped):
         """A file as keywords of create_image, but for its colour space."""
@@ -197,6 +198,8 @@ class Images:
         if pixels is None:
             self._warnings.add(f"Image '{image.name}': cannot be read, magenta is used")
             return 0
+        if image.is_float and _is_rec709(image):
+            pixels = spaces.rec709_pixels(pixels)
         values = {"pixels": pixels, "alpha_mode": _pixel_alpha_mode(image), "max_side": self._limit,
                   "is_mip_mapped": is_mip_mapped}
         return self._scene.create_image(**values) if image.is_float else self._in_its_space(image, values)
@@ -271,6 +274,19 @@ def _encoding(image):
 def _is_data(image):
     settings = image.colorspace_settings
     return settings.is_data or settings.name == "Raw"  # 3.4 has two names, and knows one of them
+
+
+def _is_rec709(image):
+    """Whether the library has an image's colours in Rec.709: sRGB, and what Blender's configuration converts,
+    which has that as its scene-linear space; another's may have the working space."""
+    if _is_data(image):
+        return False
+    return image.colorspace_settings.name == "sRGB" or _scene_linear(_color_config()) != working_space()
+
+
+def image_color(walker, image, color):
+    """The colour that an image's texture gives, in the working space."""
+    return spaces.from_rec709(walker, color) if image is not None and _is_rec709(image) else color
 
 
 def _color_config():

@@ -19,11 +19,13 @@ from ..compat import (HAS_CORRELATED_MICROFACETS, HAS_FILMED_METAL, HAS_UNIT_NOR
 from . import tangents
 from .converters import CONVERTERS, instance_value
 from .derived import ISLAND, POINTINESS
+from .image import image_color
 from .instance import VALUES_GENERATED, VALUES_UV
 from .node_list import absent, arranged, input_kinds, input_number, named_outputs, output
 from .texture_mapping import mapped
 from .textures import TEXTURES
 from .values import CONSTANT, DEFAULT, Value
+from .working_space import is_rec709
 
 _TANGENT_AXES = {'X': TangentSource.X, 'Y': TangentSource.Y, 'Z': TangentSource.Z}
 
@@ -173,7 +175,6 @@ _SPECS = {
         NodeType.CHECKER, ("Vector", "Color1", "Color2", "Scale"), ("Color", "Fac")),
     "ShaderNodeObjectInfo": Spec(
         NodeType.OBJECT_INFO, (), ("Location", "Color", "Alpha", "Object Index", "Material Index", "Random")),
-    "ShaderNodeRGBToBW": Spec(NodeType.RGB_TO_BW, ("Color",), ("Val",)),
 }
 _SPECS["ShaderNodeBsdfAnisotropic"] = _SPECS["ShaderNodeBsdfGlossy"]
 
@@ -181,6 +182,7 @@ _SPECS["ShaderNodeBsdfAnisotropic"] = _SPECS["ShaderNodeBsdfGlossy"]
 def translate(walker, node, path):
     """The outputs of a node as {socket identifier: Value}; nothing for an unsupported one."""
     sockets = Sockets(walker, node, path)
+    _warn_of_film(walker, node, sockets)
     special = next((table[node.bl_idname] for table in (_SPECIAL, TEXTURES, CONVERTERS)
                     if node.bl_idname in table), None)
     if special is not None:
@@ -193,6 +195,15 @@ def translate(walker, node, path):
     values = sockets.all_of(spec.type, spec.inputs)
     _note_generated(walker, node, spec.type, values)
     return named_outputs(walker.emit(spec.type, values, mode), spec.type, spec.outputs, mode)
+
+
+def _warn_of_film(walker, node, sockets):
+    """Thin films are computed for the wavelengths that channels of Rec.709 see."""
+    if is_rec709() or sockets.find("Thin Film Thickness") is None:
+        return
+    thickness = sockets.get('f', "Thin Film Thickness")
+    if thickness.node != CONSTANT or thickness.constant[0] > 0.0:
+        walker.warn(f"{node.bl_label}: its thin film has the colours of Rec.709")
 
 
 def _note_generated(walker, node, node_type, values):
@@ -393,13 +404,14 @@ def _image(walker, node, sockets):
     mode = (_INTERPOLATIONS.get(node.interpolation, 0) | _EXTENSIONS.get(node.extension, 0)
             | _PROJECTIONS.get(node.projection, 0))
     if node.image is not None and node.image.source == 'TILED' and node.projection == 'FLAT':
-        return _tiles(walker, walker.tiles_of(node), vector, mode)
+        return _tiles(walker, node.image, walker.tiles_of(node), vector, mode)
     blend = _constant('f', node.projection_blend)
     index = walker.emit(NodeType.IMAGE, (vector, blend), mode, image=walker.image_of(node))
-    return named_outputs(index, NodeType.IMAGE, ("Color", "Alpha"))
+    outputs = named_outputs(index, NodeType.IMAGE, ("Color", "Alpha"))
+    return {**outputs, "Color": image_color(walker, node.image, outputs["Color"])}
 
 
-def _tiles(walker, tiles, vector, mode):
+def _tiles(walker, image, tiles, vector, mode):
     """Each tile of a tiled image in its own unit square, magenta beyond all."""
     if vector.node == DEFAULT:
         vector = Value('v', walker.emit(NodeType.UV_MAP, (), name=""), 0)
@@ -408,14 +420,15 @@ def _tiles(walker, tiles, vector, mode):
     parts = walker.emit(NodeType.SEPARATE, (floor,))
     color, alpha = _constant('c', 1.0, 0.0, 1.0), _constant('f', 1.0)
     half, no_blend = _constant('f', 0.5), _constant('f', 0.0)
-    for column, row, image in tiles:
+    for column, row, tile in tiles:
         is_column, is_row = (_number(walker, Math.COMPARE, Value('f', parts, i), _constant('f', number), half)
                              for i, number in enumerate((float(column), float(row))))
         is_here = _number(walker, Math.MULTIPLY, is_column, is_row)
-        index = walker.emit(NodeType.IMAGE, (place, no_blend), mode, image=image)
-        image_color, image_alpha = (output(index, NodeType.IMAGE, name) for name in ("color", "alpha"))
-        color = Value('c', walker.emit(NodeType.MIX_COLOR, (is_here, color, image_color)), 0)
-        step = _number(walker, Math.SUBTRACT, image_alpha, alpha)
+        index = walker.emit(NodeType.IMAGE, (place, no_blend), mode, image=tile)
+        tile_color, tile_alpha = (output(index, NodeType.IMAGE, name) for name in ("color", "alpha"))
+        tile_color = image_color(walker, image, tile_color)
+        color = Value('c', walker.emit(NodeType.MIX_COLOR, (is_here, color, tile_color)), 0)
+        step = _number(walker, Math.SUBTRACT, tile_alpha, alpha)
         alpha = _number(walker, Math.MULTIPLY_ADD, step, is_here, alpha)
     return {"Color": color, "Alpha": alpha}
 
@@ -425,7 +438,8 @@ def _environment(walker, node, sockets):
             | EnvironmentProjection[node.projection])
     index = walker.emit(NodeType.ENVIRONMENT, (sockets.get('v', "Vector"),), mode,
                         image=walker.image_of(node))
-    return named_outputs(index, NodeType.ENVIRONMENT, ("Color",))
+    color = output(index, NodeType.ENVIRONMENT, "color")
+    return {"Color": image_color(walker, node.image, color)}
 
 
 def _geometry(walker, node, sockets):

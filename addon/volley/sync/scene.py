@@ -4,7 +4,7 @@
 import bpy
 
 from .. import native
-from ..compat import LINEAR_REC709, uses_nodes, working_space
+from ..compat import uses_nodes
 from ..log import Warnings
 from . import camera, deform, image, instance, light, mesh, meshes, studio, world
 from .image import Images
@@ -39,9 +39,6 @@ class SceneSync:
         the frame."""
         if shutter is None and self._update_part(source):
             return
-        if working_space() != LINEAR_REC709:
-            self.warnings.add(f"The working space {working_space()} is not supported: images, temperatures, skies "
-                              f"and the grey of colours are those of {LINEAR_REC709}")
         self._images.begin(source.changes, size_limit(source), source.depsgraph.scene_eval.frame_current)
         self._materials.begin(source.depsgraph, source.changes, source.aovs)
         self._meshes.begin()

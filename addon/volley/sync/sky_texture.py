@@ -15,6 +15,7 @@ import numpy as np
 from ..abi import ImageExtension, MathOperation as Math, NodeType, VectorOperation as Vector
 from . import sky, sky_scattering
 from .values import CONSTANT, DEFAULT, Value
+from .working_space import from_rec709
 
 _HORIZON = math.cos(0.5 * math.pi - 0.001)  # cosine to the zenith below which Preetham's sky stays the same
 # How bright Hosek and Wilkie's skies in Cycles are beside Preetham's (measured: 0.11 to 0.22).
@@ -88,6 +89,7 @@ def sky_texture(walker, node, sockets):
     if node.sky_type == 'HOSEK_WILKIE':
         walker.warn("Sky Texture: Hosek / Wilkie is approximated by Preetham's sky, dimmed")
         color = formula.vector(Vector.MULTIPLY, color, (_HOSEK_SCALE,) * 3)
+    color = from_rec709(walker, color)
     return {"Color": formula.vector(Vector.MAXIMUM, color, (0.0,) * 3)._replace(kind='c')}
 
 

@@ -6,6 +6,7 @@ from collections import namedtuple
 from ..abi import MappingType, NodeType
 from . import flatten
 from .values import CONSTANT, Value
+from .working_space import from_rec709
 
 # An equirectangular picture, turned about Z (radians); how much of it the camera sees before a colour.
 Studio = namedtuple("Studio", "path rotation strength camera_share background")
@@ -38,6 +39,7 @@ def flatten_studio(studio, image_id):
         direction, constant('v'), constant('v', 0.0, 0.0, studio.rotation), constant('v', 1.0, 1.0, 1.0)),
         MappingType.VECTOR), 0)
     color = Value('c', walker.emit(NodeType.ENVIRONMENT, (turned,), image=image_id), 0)
+    color = from_rec709(walker, color)
     light = walker.emit(NodeType.BACKGROUND, (color, constant('f', studio.strength)))
     if studio.camera_share < 1.0:
         is_camera = Value('f', walker.emit(NodeType.LIGHT_PATH, ()), 0)

@@ -583,9 +583,9 @@ static trc_status lower_node(const struct lowering *l) {
         TRC_TRY(table_of(l, &resource));
         return lower_curves(l, resource);
     case TRC_NODE_BLACKBODY:
-        return op(b, TRC_OP_BLACKBODY, 0, l->in, l->out);
+        return op(b, TRC_OP_BLACKBODY, mode, l->in, l->out);
     case TRC_NODE_WAVELENGTH:
-        return op(b, TRC_OP_WAVELENGTH, 0, l->in, l->out);
+        return op(b, TRC_OP_WAVELENGTH, mode, l->in, l->out);
     case TRC_NODE_VECTOR_TRANSFORM:
         return lower_vector_transform(l);
     case TRC_NODE_VECTOR_ROTATE:

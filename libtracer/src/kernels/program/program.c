@@ -50,10 +50,10 @@ static bool run_pure(uint32_t op, uint32_t mode, const float *table, const vfloa
         out[0] = op_curve(mode, table, in);
         return true;
     case TRC_OP_BLACKBODY:
-        v3_write(out, op_blackbody(in[0]));
+        v3_write(out, op_blackbody(mode, in[0]));
         return true;
     case TRC_OP_WAVELENGTH:
-        v3_write(out, op_wavelength(in[0]));
+        v3_write(out, op_wavelength(mode, in[0]));
         return true;
     case TRC_OP_MAPPING:
         v3_write(out, op_mapping(mode, in));

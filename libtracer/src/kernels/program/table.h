@@ -25,9 +25,9 @@ static vfloat op_curve(uint32_t mode, const float *table, const vfloat *in) {
 
 /* ---- blackbodies ---- */
 
-/* Rec.709 colour of unit luminance of a blackbody, fitted to what Cycles 3.4 shows: red and green
- * are a / T + b T + c, blue is a cubic in T, between these temperatures in kelvin. Below the first
- * and above the last the colour stays. */
+/* Rec.709 colour of unit luminance of a blackbody, fitted to what Cycles shows: red and green are
+ * a / T + b T + c, blue is a cubic in T, between these temperatures in kelvin. Below the first and
+ * above the last the colour stays. What is negative is outside Rec.709. */
 #define BLACKBODY_SEGMENTS 7
 static const float blackbody_from[BLACKBODY_SEGMENTS] = {800.0f,  965.0f,  1167.0f, 1449.0f,
                                                          1902.0f, 3315.0f, 6365.0f};
@@ -38,28 +38,33 @@ static const float blackbody_red[BLACKBODY_SEGMENTS][3] = {
     {3787.17457f, 9.35907693e-06f, 0.399075872f},
 };
 static const float blackbody_green[BLACKBODY_SEGMENTS][3] = {
-    {0.0f, 0.0f, 0.0f},
-    {-755.994038f, 0.000316730356f, 0.478305649f},
-    {-1023.63811f, 0.000120224472f, 0.936659733f},
-    {-1265.71414f, 4.87301195e-06f, 1.27054627f},
-    {-1425.29364f, -4.01150958e-05f, 1.43972804f},
-    {-1175.54839f, -2.16378154e-05f, 1.30408033f},
+    {-488.999748f, 0.000604330754f, -0.0755807526f}, {-755.994038f, 0.000316730356f, 0.478305649f},
+    {-1023.63811f, 0.000120224472f, 0.936659733f},   {-1265.71414f, 4.87301195e-06f, 1.27054627f},
+    {-1425.29364f, -4.01150958e-05f, 1.43972804f},   {-1175.54839f, -2.16378154e-05f, 1.30408033f},
     {-500.799272f, -4.59831513e-06f, 1.09098761f},
 };
 static const float blackbody_blue[BLACKBODY_SEGMENTS][4] = {
-    {0.0f, 0.0f, 0.0f, 0.0f},
-    {0.0f, 0.0f, 0.0f, 0.0f},
-    {0.0f, 0.0f, 0.0f, 0.0f},
-    {0.0f, 0.0f, 0.0f, 0.0f},
+    {5.96945309e-11f, -4.85742887e-08f, -9.70622247e-05f, -0.00407936148f},
+    {2.40430366e-11f, 5.55021075e-08f, -0.000198503712f, 0.0289312858f},
+    {-1.40949732e-11f, 1.89878968e-07f, -0.000356632824f, 0.0910767778f},
+    {-3.61460868e-11f, 2.84822009e-07f, -0.000493211319f, 0.15672344f},
     {-1.97075558e-11f, 1.75359216e-07f, -0.000250542516f, -0.0222785725f},
     {-1.619759e-13f, -1.64218833e-08f, 0.00038621747f, -0.738079076f},
     {6.72650189e-13f, -2.73078726e-08f, 0.000424098144f, -0.752335247f},
 };
 #define BLACKBODY_HIGHEST 12000.0f
-static const float blackbody_lowest_color[3] = {5.4132943153f, 0.0f, 0.0f};
+static const float blackbody_lowest_color[3] = {5.4132943153f, -0.2031939f, -0.0822535f};
 static const float blackbody_highest_color[3] = {0.826295495f, 0.994508028f, 1.566307664f};
 
-static vvec3 op_blackbody(vfloat temperature) {
+/* A colour without negative components unless mode, TRC_GAMUT_*, keeps them. */
+TRC_INLINE vvec3 in_gamut(uint32_t mode, vvec3 c) {
+    const vfloat zero = vf_zero();
+    if (mode == TRC_GAMUT_OPEN)
+        return c;
+    return v3(vf_max(c.x, zero), vf_max(c.y, zero), vf_max(c.z, zero));
+}
+
+static vvec3 op_blackbody(uint32_t mode, vfloat temperature) {
     const vfloat zero = vf_zero();
     vfloat r[3] = {zero, zero, zero}, g[3] = {zero, zero, zero}, b[4] = {zero, zero, zero, zero};
     for (int i = 0; i < BLACKBODY_SEGMENTS; i++) {
@@ -76,7 +81,7 @@ static vvec3 op_blackbody(vfloat temperature) {
                      ((b[0] * t + b[1]) * t + b[2]) * t + b[3]);
     color = v3_select(vf_ge(t, vf_set(BLACKBODY_HIGHEST)), v3_set(blackbody_highest_color), color);
     color = v3_select(vf_lt(t, vf_set(blackbody_from[0])), v3_set(blackbody_lowest_color), color);
-    return v3(vf_max(color.x, zero), vf_max(color.y, zero), vf_max(color.z, zero));
+    return in_gamut(mode, color);
 }
 
 /* ---- wavelengths ---- */
@@ -117,12 +122,12 @@ static const float cie_observer[CIE_COUNT][3] = {
 /* Brings the highest component of all wavelengths to about 1, as Cycles does. */
 #define CIE_SCALE (1.0f / 2.52f)
 
-/* nm -> Rec.709, straight between the samples, without negative components. */
-static vvec3 op_wavelength(vfloat wavelength) {
+/* nm -> Rec.709, straight between the samples. */
+static vvec3 op_wavelength(uint32_t mode, vfloat wavelength) {
     const vfloat x = (wavelength - vf_set(CIE_FIRST)) * vf_set(1.0f / CIE_STEP);
     const vmask visible = vm_and(vf_gt(x, vf_set(-1.0f)), vf_lt(x, vf_set(CIE_COUNT - 1)));
     const vint i = vf_to_int(vf_trunc(vf_where(visible, x))), row = i + i + i;
-    const vfloat t = x - vi_to_float(i), zero = vf_zero();
+    const vfloat t = x - vi_to_float(i);
     const vvec3 a = v3_gather(cie_observer[0], row, visible);
     const vvec3 b = v3_gather(cie_observer[1], row, visible);
     const vvec3 c = v3_lerp(a, b, t);
@@ -133,8 +138,7 @@ static vvec3 op_wavelength(vfloat wavelength) {
         c.y * vf_set(1.8760108f) - c.x * vf_set(0.9692660f) + c.z * vf_set(0.0415560f);
     const vfloat blue =
         c.x * vf_set(0.0556434f) - c.y * vf_set(0.2040259f) + c.z * vf_set(1.0572252f);
-    return v3_where(visible, v3(vf_max(red * scale, zero), vf_max(green * scale, zero),
-                                vf_max(blue * scale, zero)));
+    return v3_where(visible, in_gamut(mode, v3(red * scale, green * scale, blue * scale)));
 }
 
 #endif
