@@ -362,7 +362,7 @@ static void test_moving(void **state) {
     for (uint32_t kind = 0; kind < 3; kind++) {
         static struct strands s;
         strands_make(&s, &rng, kind == 1 ? TRC_CURVE_ROUND : TRC_CURVE_RIBBON, kind == 2, MAX_KEYS,
-                     true);
+                     true, 0.0f);
         check_against_oracle(&s, &rng);
         assert_ok(trc_scene_destroy(s.scene));
     }
