@@ -4,7 +4,7 @@
 #   bash tests/run.sh [--checks FILE] [--blender-next] [--blender-next-fast]
 #
 # FILE holds further results to count, one per line: "passed NAME" or "failed NAME". --blender-next runs
-# the Blender tests in Blender 4.3 and 5.2 too, --blender-next-fast a selection of them in 4.3 (see
+# the Blender tests in Blender 4.3 and 5.2 too, --blender-next-fast a selection of them (see
 # blender_next.sh); where one of the two cannot be set up, it is one test skipped. What tests measured of numerical stability is in
 # build/results/stability.md. The exit code is 0 only if something passed and
 # nothing failed. Python tests find the build through these variables:
@@ -62,7 +62,7 @@ while [ $# -gt 0 ]; do
     case $1 in
         --checks) summary+=(--checks "${2:?--checks needs a file}"); shift 2 ;;
         --blender-next) next=all suites=(trixie sid); shift ;;
-        --blender-next-fast) next=fast suites=(trixie); shift ;;
+        --blender-next-fast) next=fast suites=(trixie sid); shift ;;
         *) printf 'tests/run.sh: unknown argument: %s\n' "$1" >&2; exit 2 ;;
     esac
 done

@@ -81,7 +81,7 @@ def test_nodes_of_lights_differ(blender):
 
 def inside_fifth():
     """The warnings of what came with Blender 5 and is not there: a normal map below a displaced surface,
-    thin walls, normals as they are; another working space, where thin films alone are."""
+    normals as they are; another working space, where thin films alone are."""
     import bpy
     import scenes
     scenes.empty(size=(16, 16))
@@ -105,9 +105,6 @@ def inside_fifth():
     tree.links.new(displacement.outputs[0], tree.nodes["Material Output"].inputs["Displacement"])
     look()
     normal_map.base = 'DISPLACED'
-    principled.inputs["Thin Wall"].default_value = True
-    look()
-    principled.inputs["Thin Wall"].default_value = False
     material.cycles.use_bump_map_correction = False
     look()
     material.cycles.use_bump_map_correction = True
@@ -124,7 +121,6 @@ def test_what_came_with_the_fifth_is_named(blender):
         pytest.skip("nothing of it is there")
     assert blender.run(inside_fifth) == [
         [], ["Material 'Wall': Normal Map lies on the displaced surface, not on the original one"],
-        ["Material 'Wall': Principled BSDF: Thin Wall is rendered as a solid"],
         ["Material 'Wall': bent normals are corrected nonetheless"], [],
         ["Material 'Wall': Principled BSDF: its thin film has the colours of Rec.709"]]
 
