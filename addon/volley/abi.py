@@ -184,6 +184,7 @@ class NodeType(IntEnum):
     AMBIENT_OCCLUSION = 124
     BEVEL = 125
     RAYCAST = 126
+    POINT_INFO = 127
     TANGENT = 114
     AOV_VALUE = 112
     AOV_COLOR = 113
@@ -1228,6 +1229,9 @@ NODES = {
         (("POSITION", "position"), ("NORMAL", "direction"), ("FLOAT", "distance")),
         (("FLOAT", "is_hit"), ("FLOAT", "self_hit"), ("FLOAT", "hit_distance"), ("VECTOR", "hit_position"),
          ("VECTOR", "hit_normal"))),
+    NodeType.POINT_INFO: ("Point Info",
+        (),
+        (("VECTOR", "position"), ("FLOAT", "radius"), ("FLOAT", "random"))),
     NodeType.TANGENT: ("Tangent",
         (),
         (("VECTOR", "tangent"),)),

@@ -24,6 +24,7 @@ CASES = {
     "AO inside local": ("AmbientOcclusion", {"inside": True, "only_local": True, "samples": 40}, {"Distance": 0.5},
                         "AO", "emission"),
     "AO by a normal": ("AmbientOcclusion", {}, {"Normal": "Incoming"}, "AO", "emission"),
+    "AO of points": ("AmbientOcclusion", {"samples": 8}, {"Distance": 0.6}, "AO", "points"),
     "AO as a colour": ("AmbientOcclusion", {"samples": 4}, {"Distance": 1.5}, "Color", "diffuse"),
     "bevel": ("Bevel", {}, {"Radius": 0.2}, "Normal", "normal"),
     "bevel wide": ("Bevel", {"samples": 9}, {"Radius": 0.6}, "Normal", "normal"),
@@ -81,7 +82,7 @@ def _material(kind, settings, inputs, output, shown):
 
 
 def build(kind, settings, inputs, output, shown):
-    """Boxes that touch and a ball on a floor, before a mirror, and a pane that lets shadow rays through. All but the
+    """Boxes that touch and a ball, or points in its place, on a floor, before a mirror, and a pane that lets shadow rays through. All but the
     last are of the material, the floor only if it shines: nothing shall be lit by what samples of lights find of it,
     which Cycles 5 traces rays for."""
     import bpy
@@ -95,12 +96,15 @@ def build(kind, settings, inputs, output, shown):
     shown_by = _material(kind, settings, inputs, output, shown)
     grey = scenes.material("Grey", "ShaderNodeBsdfDiffuse", Color=(0.5, 0.5, 0.5))
     scenes.mesh("Floor", [(-6, -6, 0), (6, -6, 0), (6, 6, 0), (-6, 6, 0)], [(0, 1, 2, 3)],
-                shown_by if shown in ("emission", "normal") else grey)
+                shown_by if shown in ("emission", "normal", "points") else grey)
     for size, place, turn in ((1.4, (-0.8, 0.0, 0.7), 0.3), (0.7, (-0.7, 0.0, 1.7), 0.9)):
         bpy.ops.mesh.primitive_cube_add(size=size, location=place, rotation=(0.0, 0.0, turn))
         bpy.context.object.data.materials.append(shown_by)
     bpy.context.object.scale.x = -1.4
-    scenes.sphere("Ball", 0.7, (1.0, -0.6, 0.7), shown_by)
+    ball = scenes.sphere("Ball", 0.7, (1.0, -0.6, 0.7), shown_by)
+    if shown == "points":
+        nodes = scenes.geometry_nodes(ball, "GeometryNodeMeshToPoints", "GeometryNodeSetMaterial")
+        nodes[0].inputs["Radius"].default_value, nodes[1].inputs["Material"].default_value = 0.1, shown_by
     tint = scenes.material("Tint", "ShaderNodeBsdfTransparent", Color=(0.9, 0.9, 0.9))
     scenes.mesh("Pane", [(0.4, -1.8, 0), (1.6, -1.8, 0), (1.6, -1.8, 1), (0.4, -1.8, 1)], [(0, 1, 2, 3)], tint)
     scenes.mesh("Mirror", [(-3, 1.6, 0), (3, 1.6, 0), (3, 1.6, 3), (-3, 1.6, 3)], [(0, 1, 2, 3)],

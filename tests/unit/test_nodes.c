@@ -148,6 +148,7 @@ static void test_counts_of_modes(void **state) {
         {TRC_NODE_AMBIENT_OCCLUSION, 255 * 2 * 2 * 2}, /* samples, bits */
         {TRC_NODE_BEVEL, 255},
         {TRC_NODE_RAYCAST, 2},
+        {TRC_NODE_POINT_INFO, 1},
         {TRC_NODE_DISPLACEMENT, 2},
         {TRC_NODE_VECTOR_DISPLACEMENT, 3},
         {TRC_NODE_DISPLACEMENT_OUTPUT, 3 * 2},

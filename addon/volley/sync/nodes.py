@@ -175,6 +175,7 @@ _SPECS = {
         NodeType.CHECKER, ("Vector", "Color1", "Color2", "Scale"), ("Color", "Fac")),
     "ShaderNodeObjectInfo": Spec(
         NodeType.OBJECT_INFO, (), ("Location", "Color", "Alpha", "Object Index", "Material Index", "Random")),
+    "ShaderNodePointInfo": Spec(NodeType.POINT_INFO, (), ("Position", "Radius", "Random")),
 }
 _SPECS["ShaderNodeBsdfAnisotropic"] = _SPECS["ShaderNodeBsdfGlossy"]
 

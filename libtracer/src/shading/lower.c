@@ -592,6 +592,8 @@ static trc_status lower_node(const struct lowering *l) {
         return lower_vector_rotate(l);
     case TRC_NODE_CAMERA_DATA:
         return lower_camera_data(l);
+    case TRC_NODE_POINT_INFO:
+        return op(b, TRC_OP_POINT_INFO, 0, NULL, l->out);
     case TRC_NODE_AMBIENT_OCCLUSION:
         return lower_ambient_occlusion(l);
     case TRC_NODE_BEVEL:

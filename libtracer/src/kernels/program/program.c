@@ -7,6 +7,7 @@
 #include "kernels/program/input.h"
 #include "kernels/program/math.h"
 #include "kernels/program/normal.h"
+#include "kernels/program/point.h"
 #include "kernels/program/procedural.h"
 #include "kernels/program/relief.h"
 #include "kernels/program/table.h"
@@ -190,6 +191,9 @@ static void run_at_surface(const struct trc_surface *s, const struct trc_instruc
         break;
     case TRC_OP_INSTANCE_VALUES:
         op_instance_values(s, i->mode, out);
+        break;
+    case TRC_OP_POINT_INFO:
+        op_point_info(s, out);
         break;
     case TRC_OP_FRESNEL:
         out[0] =

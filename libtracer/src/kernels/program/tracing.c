@@ -49,8 +49,19 @@ static void rays_store(const struct trc_surface *s, int chunk, const struct prob
     p->active |= (uint64_t)vm_bits(rays_valid(r)) << i;
 }
 
-static void packet_begin(const struct trc_surface *s, uint32_t visibility) {
+/* leaves: whether rays leave the surface, whose strands they then do not meet. */
+static void packet_begin(const struct trc_surface *s, uint32_t visibility, bool leaves) {
     struct trc_packet *p = s->probe->packet;
+    struct trc_left_strands *left = leaves ? s->probe->left : NULL;
+    p->left = left;
+    if (left) {
+        vuint strand[2];
+        trc_strand_words(s, strand);
+        for (int c = 0; c < TRC_PACKET_CHUNKS; c++) {
+            vu_store(left->instance + c * TRC_WIDTH, strand[0]);
+            vu_store(left->strand + c * TRC_WIDTH, strand[1]);
+        }
+    }
     p->active = 0;
     p->visibility = visibility;
     p->common_origin = false;
@@ -110,7 +121,7 @@ static vfloat ambient_occlusion(const struct trc_surface *s, uint32_t mode, cons
     const vmask asks = vm_and(s->active, vf_gt(distance, vf_zero()));
     vfloat blocked = vf_zero();
     for (uint32_t sample = 0; sample < count && vm_any(asks);) {
-        packet_begin(s, is_local ? TRC_VISIBLE_ALL : TRC_VISIBLE_SHADOW);
+        packet_begin(s, is_local ? TRC_VISIBLE_ALL : TRC_VISIBLE_SHADOW, true);
         for (int c = 0; c < TRC_PACKET_CHUNKS && sample < count; c++, sample++) {
             vfloat u[2];
             s->probe->numbers(s->probe, TRC_PROBE_AMBIENT, sample, count, u);
@@ -235,12 +246,14 @@ static vvec3 bevel(const struct trc_surface *s, uint32_t mode, const vfloat *in)
     const uint32_t count = mode;
     const vfloat radius = in[TRC_OP_AT(BEVEL, radius)];
     vmask asks = vm_and(s->active, vf_gt(radius, vf_zero()));
+    if (s->probe->left) /* curves have no edges */
+        asks = vm_and(asks, vi_lt(s->strand, vi_set(0)));
     asks = vm_and(asks, vf_ge(s->probe->min_pdf, vf_set(SHARP_BOUNCE)));
     vvec3 sum = v3_zero();
     for (uint32_t number = 0; number < count && vm_any(asks);) {
         struct bevel_sample samples[TRC_PACKET_CHUNKS];
         int c = 0;
-        packet_begin(s, TRC_VISIBLE_ALL);
+        packet_begin(s, TRC_VISIBLE_ALL, false);
         for (; c < TRC_PACKET_CHUNKS && number < count; c++, number++) {
             struct bevel_sample *sample = &samples[c];
             vfloat u[2], turn, sine, cosine;
@@ -275,7 +288,7 @@ static void raycast(const struct trc_surface *s, uint32_t mode, const vfloat *in
     const vvec3 away = trc_spawn_origin(s, vf_ge(v3_dot(d, s->ng), vf_zero()));
     const struct probe_rays rays = {v3_select(here, away, position), d,
                                     in[TRC_OP_AT(RAYCAST, distance)], s->active};
-    packet_begin(s, TRC_VISIBLE_ALL);
+    packet_begin(s, TRC_VISIBLE_ALL, vm_all(vm_or(here, vm_not(s->active))));
     rays_store(s, 0, &rays);
     trace_nearest(s, mode & TRC_RAYCAST_ONLY_LOCAL);
     const vmask met = vm_from_bits(trc_chunk_bits(s->probe->packet->active, 0));

@@ -17,8 +17,9 @@ struct trc_probe {
                     uint32_t count, vfloat u[2]);
     struct trc_packet *packet; /* room for one */
     struct trc_packet_hits *hits;
-    uint64_t *ray_count; /* what is traced is added to it */
-    vfloat min_pdf;      /* smallest density of a bounce so far */
+    struct trc_left_strands *left; /* room for those of the packet; NULL: there are no curves */
+    uint64_t *ray_count;           /* what is traced is added to it */
+    vfloat min_pdf;                /* smallest density of a bounce so far */
 };
 
 /* Runs one of them; inputs and outputs do not overlap. */

@@ -145,6 +145,7 @@ static void program_run(struct trc_tile *t, const struct arrival *a, const struc
     const struct shading_probe own = {.probe = {.numbers = probe_numbers,
                                                 .packet = &t->packets[0],
                                                 .hits = &t->packet_hits[0],
+                                                .left = t->left,
                                                 .ray_count = &t->job->counts.rays_shadow,
                                                 .min_pdf = a->min_pdf},
                                       .tile = t,
