@@ -707,7 +707,7 @@ class CurvesDesc(Structure):
                 ("point_value_count", c_uint64), ("lengths", c_void_p), ("strand_count", c_uint64),
                 ("generated", c_void_p), ("generated_count", c_uint64),
                 ("attributes", POINTER(CurveAttribute)), ("attribute_count", c_uint32),
-                ("reserved", c_uint32))
+                ("tolerance", c_float))
 
 
 class CornerAttribute(Structure):

@@ -49,6 +49,7 @@ static void strands_make(struct strands *s, struct rng *rng, uint32_t shape, boo
     s->desc.key_count = key_count;
     s->desc.shape = shape;
     s->desc.piece_count = PIECES;
+    s->desc.tolerance = 0.0f;
     s->desc.point_count = STRANDS * POINTS;
     s->desc.points = s->points[0][0];
     s->desc.point_value_count = 4ull * STRANDS * POINTS * key_count;

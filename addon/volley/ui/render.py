@@ -130,6 +130,22 @@ class VOLLEY_RENDER_PT_ambient_occlusion(VolleyPanel, Panel):
             column.prop(scene.world.light_settings, "distance", text="AO Distance")
 
 
+class VOLLEY_RENDER_PT_curves(VolleyPanel, Panel):
+    bl_label = "Curves"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    @classmethod
+    def poll(cls, context):
+        # Shapes are those of Cycles, so that a file looks alike in both.
+        return super().poll(context) and hasattr(context.scene, "cycles_curves")
+
+    def draw(self, context):
+        layout, settings = column_of(self), context.scene.cycles_curves
+        layout.prop(settings, "shape", text="Shape")
+        if settings.shape == 'RIBBONS':
+            layout.prop(settings, "subdivisions", text="Curve Subdivisions")
+
+
 class VOLLEY_RENDER_PT_simplify(VolleyPanel, Panel):
     """Blender's own would stand above all panels of this add-on."""
 

@@ -39,7 +39,7 @@ typedef struct trc_curves_desc {
     uint32_t key_count;   /* motion keys, 1..TRC_MAX_KEYS, evenly spaced over [0, 1] */
     uint32_t shape;       /* TRC_CURVE_* */
     uint32_t piece_count; /* 1..TRC_MAX_CURVE_PIECES: straight pieces between two points of the
-                             Catmull-Rom spline; its first and last points stand for those beyond
+                             Catmull-Rom spline, whose first and last points stand for those beyond
                              the ends, too */
     uint64_t point_count; /* of all strands, one strand after the other */
     const float *points;  /* 4 * point_count * key_count: x, y, z, radius in metres (below 0: 0) */
@@ -53,10 +53,11 @@ typedef struct trc_curves_desc {
     uint64_t generated_count;   /* number of floats, checked */
     const trc_curve_attribute *attributes; /* the first of width 2 is the default UV map */
     uint32_t attribute_count;              /* 0..TRC_MAX_ATTRIBUTES */
-    uint32_t reserved;                     /* 0 */
+    float tolerance; /* how far pieces may be from the spline at the first key, in radii: then
+                        there are fewer where it bends little; 0: piece_count everywhere */
 } trc_curves_desc;
 
-/* One key of no points, ribbons of 4 pieces. */
+/* One key of no points, ribbons of 4 pieces at most, within a tenth of the radius. */
 TRC_API trc_curves_desc trc_curves_desc_default(void);
 
 /* Copies curves into the scene. Pieces that are not finite, beyond 1.8e18 or of radius 0 at some

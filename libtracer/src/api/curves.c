@@ -27,6 +27,7 @@ static trc_status check_curves(const trc_curves_desc *desc) {
     TRC_TRY(trc_check_count(desc->key_count, 1, TRC_MAX_KEYS, "key_count"));
     TRC_TRY(trc_check_enum(desc->shape, TRC_CURVE_ROUND + 1, "shape"));
     TRC_TRY(trc_check_count(desc->piece_count, 1, TRC_MAX_CURVE_PIECES, "piece_count"));
+    TRC_TRY(trc_check_float(desc->tolerance, 0.0f, 1e6f, "tolerance"));
     /* Singles first: later products of them cannot wrap. */
     TRC_TRY(trc_check_count(desc->point_count, 0, INT32_MAX / 4, "point_count"));
     TRC_TRY(trc_check_count(desc->strand_count, 0, INT32_MAX / 4, "strand_count"));

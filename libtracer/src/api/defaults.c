@@ -30,8 +30,10 @@ trc_curve_attribute trc_curve_attribute_default(void) {
 }
 
 trc_curves_desc trc_curves_desc_default(void) {
-    return (trc_curves_desc){
-        .struct_size = sizeof(trc_curves_desc), .key_count = 1, .piece_count = 4};
+    return (trc_curves_desc){.struct_size = sizeof(trc_curves_desc),
+                             .key_count = 1,
+                             .piece_count = 4,
+                             .tolerance = 0.1f};
 }
 
 trc_instance_desc trc_instance_desc_default(void) {

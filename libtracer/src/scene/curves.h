@@ -7,8 +7,8 @@
 
 /* Cuts the strands of a descriptor, whose counts and pointers are checked (api/curves.c), into
  * pieces: Catmull-Rom splines (E. Catmull, R. Rom, "A Class of Local Interpolating Splines", 1974),
- * radii too; attributes are linear between points. Keys that are all equal become one.
- * INVALID_ARGUMENT, TOO_LARGE or OUT_OF_MEMORY. */
+ * radii too, into as many as the first pose needs; attributes are linear between points. Keys that
+ * are all equal become one. INVALID_ARGUMENT, TOO_LARGE or OUT_OF_MEMORY. */
 trc_status trc_curves_geometry_create(const trc_curves_desc *desc, struct trc_names *names,
                                       struct trc_mesh **mesh_out);
 

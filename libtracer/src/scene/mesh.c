@@ -28,6 +28,7 @@ void trc_topology_release(struct trc_mesh_topology *topology) {
     trc_free(topology->corners);
     trc_free(topology->strands);
     trc_free(topology->lengths);
+    trc_free(topology->cuts);
     trc_free(topology);
 }
 

@@ -63,10 +63,11 @@ struct trc_mesh_topology {
     /* Corners (3 * triangle + corner) of each vertex, made when normals are first needed:
      * corners[corner_begin[v]] to corners[corner_begin[v + 1]]. */
     uint32_t *corner_begin, *corners;
-    /* Curves: how many pieces from point to point, of which points; see model/snapshot.h. */
+    /* Curves, see model/snapshot.h. */
     uint32_t *strands;
     uint32_t *lengths; /* points of each strand, or NULL: balls */
-    uint32_t strand_count, point_count, piece_count;
+    uint8_t *cuts;     /* pieces from each point of a strand to the next */
+    uint32_t strand_count, point_count;
     uint32_t shape; /* TRC_SHAPE_* */
     uint64_t bytes;
 };
