@@ -7,7 +7,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+#if EMBREE_MAJOR >= 4
+#include <embree4/rtcore.h>
+#else
 #include <embree3/rtcore.h>
+#endif
 
 #include "buffers.h"
 #include "core/core.h"
@@ -165,10 +169,11 @@ enum ray_word {
     WORD_TRIANGLE = 17,
     WORD_GEOMETRY = 18,
     WORD_INSTANCE = 19,
-    RAY_HIT_WORDS = 20
+    RAY_HIT_WORDS = EMBREE_MAJOR >= 4 ? 21 : 20, /* with the instance's primitive */
+    SINGLE_HIT_WORDS = (RAY_HIT_WORDS + 3) / 4 * 4
 };
 _Static_assert(sizeof(struct RTCRay) == 4 * RAY_WORDS, "RTCRay");
-_Static_assert(sizeof(struct RTCRayHit) == 4 * RAY_HIT_WORDS, "RTCRayHit");
+_Static_assert(sizeof(struct RTCRayHit) == 4 * SINGLE_HIT_WORDS, "RTCRayHit");
 _Static_assert(sizeof(struct RTCRayHit4) == 16 * RAY_HIT_WORDS, "RTCRayHit4");
 _Static_assert(sizeof(struct RTCRayHit8) == 32 * RAY_HIT_WORDS, "RTCRayHit8");
 _Static_assert(sizeof(struct RTCRayHit16) == 64 * RAY_HIT_WORDS, "RTCRayHit16");
@@ -178,8 +183,8 @@ union word {
     uint32_t u;
 };
 
-static size_t words_of(const struct ray_list *list) {
-    return list->any ? RAY_WORDS : RAY_HIT_WORDS;
+static size_t words_of(const struct contestant *c, const struct ray_list *list) {
+    return list->any ? RAY_WORDS : c->width == 1 ? SINGLE_HIT_WORDS : RAY_HIT_WORDS;
 }
 
 static size_t batch_bytes(const struct contestant *c, const struct ray_list *list) {
@@ -187,7 +192,7 @@ static size_t batch_bytes(const struct contestant *c, const struct ray_list *lis
     for (uint32_t i = 0; i < list->batch_count; i++)
         most = batch_rays(list, i) > most ? batch_rays(list, i) : most;
     const size_t blocks = (most + c->width - 1) / c->width;
-    return (blocks * c->width * words_of(list) * sizeof(union word) + 63) / 64 * 64;
+    return (blocks * c->width * words_of(c, list) * sizeof(union word) + 63) / 64 * 64;
 }
 
 static void load(const struct contestant *c, const struct ray_list *list, uint32_t batch,
@@ -195,7 +200,7 @@ static void load(const struct contestant *c, const struct ray_list *list, uint32
     const struct ray_set *rays = &list->rays;
     const uint32_t begin = list->batch_begin[batch], count = batch_rays(list, batch), w = c->width;
     for (uint32_t i = 0; i < count; i++) {
-        union word *block = (union word *)memory + i / w * w * words_of(list) + i % w;
+        union word *block = (union word *)memory + i / w * w * words_of(c, list) + i % w;
         for (uint32_t k = 0; k < 3; k++) {
             block[(WORD_ORIGIN + k) * w].f = rays->origin[k][begin + i];
             block[(WORD_DIRECTION + k) * w].f = rays->direction[k][begin + i];
@@ -215,7 +220,8 @@ static void store(const struct contestant *c, const struct ray_list *list, uint3
                   const void *memory, struct hit_set *hits) {
     const uint32_t begin = list->batch_begin[batch], count = batch_rays(list, batch), w = c->width;
     for (uint32_t i = 0; i < count; i++) {
-        const union word *block = (const union word *)memory + i / w * w * words_of(list) + i % w;
+        const union word *block =
+            (const union word *)memory + i / w * w * words_of(c, list) + i % w;
         hits->occluded[begin + i] = list->any && block[WORD_TFAR * w].f == -INFINITY;
         if (list->any)
             continue;
@@ -232,11 +238,40 @@ static void store(const struct contestant *c, const struct ray_list *list, uint3
 
 /* ---- modes ---- */
 
-static void context_init(const struct contestant *c, struct RTCIntersectContext *context) {
-    rtcInitIntersectContext(context);
-    context->flags =
+/* What goes with a query: a context in version 3, arguments for each kind of query in version 4. */
+#if EMBREE_MAJOR >= 4
+struct query {
+    struct RTCIntersectArguments closest;
+    struct RTCOccludedArguments any;
+};
+
+static void query_init(const struct contestant *c, struct query *q) {
+    rtcInitIntersectArguments(&q->closest);
+    rtcInitOccludedArguments(&q->any);
+    q->closest.flags = q->any.flags =
+        c->coherent ? RTC_RAY_QUERY_FLAG_COHERENT : RTC_RAY_QUERY_FLAG_INCOHERENT;
+}
+
+#define CLOSEST_1(scene, query, hit) rtcIntersect1(scene, hit, &(query)->closest)
+#define ANY_1(scene, query, ray) rtcOccluded1(scene, ray, &(query)->any)
+#define CLOSEST_W(W, valid, scene, query, hit) rtcIntersect##W(valid, scene, hit, &(query)->closest)
+#define ANY_W(W, valid, scene, query, ray) rtcOccluded##W(valid, scene, ray, &(query)->any)
+#else
+struct query {
+    struct RTCIntersectContext context;
+};
+
+static void query_init(const struct contestant *c, struct query *q) {
+    rtcInitIntersectContext(&q->context);
+    q->context.flags =
         c->coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
 }
+
+#define CLOSEST_1(scene, query, hit) rtcIntersect1(scene, &(query)->context, hit)
+#define ANY_1(scene, query, ray) rtcOccluded1(scene, &(query)->context, ray)
+#define CLOSEST_W(W, valid, scene, query, hit) rtcIntersect##W(valid, scene, &(query)->context, hit)
+#define ANY_W(W, valid, scene, query, ray) rtcOccluded##W(valid, scene, &(query)->context, ray)
+#endif
 
 /* What Embree's manual asks for. Returns the former state. */
 static unsigned denormals_off(void) {
@@ -251,51 +286,57 @@ static void trace_single(const struct contestant *c, const struct ray_list *list
     const struct embree_scene *s = c->tracer;
     const uint32_t count = batch_rays(list, batch);
     const unsigned former = denormals_off();
-    struct RTCIntersectContext context;
-    context_init(c, &context);
+    struct query query;
+    query_init(c, &query);
     if (list->any)
         for (uint32_t i = 0; i < count; i++)
-            rtcOccluded1(s->scene, &context, (struct RTCRay *)memory + i);
+            ANY_1(s->scene, &query, (struct RTCRay *)memory + i);
     else
         for (uint32_t i = 0; i < count; i++)
-            rtcIntersect1(s->scene, &context, (struct RTCRayHit *)memory + i);
+            CLOSEST_1(s->scene, &query, (struct RTCRayHit *)memory + i);
     _mm_setcsr(former);
 }
 
+#if EMBREE_MAJOR < 4 /* which has no streams */
 static void trace_stream(const struct contestant *c, const struct ray_list *list, uint32_t batch,
                          void *memory) {
     const struct embree_scene *s = c->tracer;
     const uint32_t count = batch_rays(list, batch);
     const unsigned former = denormals_off();
-    struct RTCIntersectContext context;
-    context_init(c, &context);
+    struct query query;
+    query_init(c, &query);
     if (list->any)
-        rtcOccluded1M(s->scene, &context, memory, count, sizeof(struct RTCRay));
+        rtcOccluded1M(s->scene, &query.context, memory, count, sizeof(struct RTCRay));
     else
-        rtcIntersect1M(s->scene, &context, memory, count, sizeof(struct RTCRayHit));
+        rtcIntersect1M(s->scene, &query.context, memory, count, sizeof(struct RTCRayHit));
     _mm_setcsr(former);
 }
 
+static bool has_streams(const struct embree_scene *s) {
+    return rtcGetDeviceProperty(s->device->device, RTC_DEVICE_PROPERTY_RAY_STREAM_SUPPORTED);
+}
+#endif
+
 /* trace_packet_W: the last packet may have fewer rays. */
-#define DEFINE_TRACE_PACKET(W)                                                                     \
-    static void trace_packet_##W(const struct contestant *c, const struct ray_list *list,          \
-                                 uint32_t batch, void *memory) {                                   \
-        const struct embree_scene *s = c->tracer;                                                  \
-        const uint32_t count = batch_rays(list, batch);                                            \
-        int valid[W] __attribute__((aligned(64)));                                                 \
-        const unsigned former = denormals_off();                                                   \
-        struct RTCIntersectContext context;                                                        \
-        context_init(c, &context);                                                                 \
-        memset(valid, 0xff, sizeof valid);                                                         \
-        for (uint32_t i = 0; i < count; i += W) {                                                  \
-            for (uint32_t lane = count - i; lane < W; lane++)                                      \
-                valid[lane] = 0;                                                                   \
-            if (list->any)                                                                         \
-                rtcOccluded##W(valid, s->scene, &context, (struct RTCRay##W *)memory + i / W);     \
-            else                                                                                   \
-                rtcIntersect##W(valid, s->scene, &context, (struct RTCRayHit##W *)memory + i / W); \
-        }                                                                                          \
-        _mm_setcsr(former);                                                                        \
+#define DEFINE_TRACE_PACKET(W)                                                                \
+    static void trace_packet_##W(const struct contestant *c, const struct ray_list *list,     \
+                                 uint32_t batch, void *memory) {                              \
+        const struct embree_scene *s = c->tracer;                                             \
+        const uint32_t count = batch_rays(list, batch);                                       \
+        int valid[W] __attribute__((aligned(64)));                                            \
+        const unsigned former = denormals_off();                                              \
+        struct query query;                                                                   \
+        query_init(c, &query);                                                                \
+        memset(valid, 0xff, sizeof valid);                                                    \
+        for (uint32_t i = 0; i < count; i += W) {                                             \
+            for (uint32_t lane = count - i; lane < W; lane++)                                 \
+                valid[lane] = 0;                                                              \
+            if (list->any)                                                                    \
+                ANY_W(W, valid, s->scene, &query, (struct RTCRay##W *)memory + i / W);        \
+            else                                                                              \
+                CLOSEST_W(W, valid, s->scene, &query, (struct RTCRayHit##W *)memory + i / W); \
+        }                                                                                     \
+        _mm_setcsr(former);                                                                   \
     }
 DEFINE_TRACE_PACKET(4)
 DEFINE_TRACE_PACKET(8)
@@ -303,7 +344,6 @@ DEFINE_TRACE_PACKET(16)
 
 uint32_t embree_contestants(const struct embree_scene *scene, struct contestant out[EMBREE_MODES]) {
     static const struct contestant_calls single = {batch_bytes, load, trace_single, store};
-    static const struct contestant_calls stream = {batch_bytes, load, trace_stream, store};
     static const struct contestant_calls packet4 = {batch_bytes, load, trace_packet_4, store};
     static const struct contestant_calls packet8 = {batch_bytes, load, trace_packet_8, store};
     static const struct contestant_calls packet16 = {batch_bytes, load, trace_packet_16, store};
@@ -317,13 +357,14 @@ uint32_t embree_contestants(const struct embree_scene *scene, struct contestant 
         snprintf(out[count].name, sizeof out[count].name, "packet%u%s", w, suffix);
         count++;
     }
-    if (!rtcGetDeviceProperty(scene->device->device, RTC_DEVICE_PROPERTY_RAY_STREAM_SUPPORTED))
-        return count;
-    for (int coherent = 0; coherent < 2; coherent++) {
+#if EMBREE_MAJOR < 4
+    static const struct contestant_calls stream = {batch_bytes, load, trace_stream, store};
+    for (int coherent = 0; coherent < 2 && has_streams(scene); coherent++) {
         const char *suffix = coherent ? "_coherent" : "";
         out[count] = (struct contestant){&stream, "", scene, 1, coherent};
         snprintf(out[count].name, sizeof out[count].name, "stream%s", suffix);
         count++;
     }
+#endif
     return count;
 }

@@ -25,7 +25,7 @@ def describe(options, scope):
         "isa": library_isa(options),
         "compiler": compiler(options),
         "blender": first_line([options.blender, "--version"]),
-        "embree": package_version("libembree3-3"),
+        "embree": package_version("libembree4-4") or package_version("libembree3-3"),
         "povray": package_version("povray"),
         "commit": first_line(["git", "-C", str(PROJECT), "rev-parse", "--short=12", "HEAD"]),
     }
