@@ -42,8 +42,39 @@ static bool failed_cleanly(trc_status status) {
 
 struct session {
     trc_scene scene;
-    trc_id mesh, instance, second, material, glow, image, light;
+    trc_id mesh, curves, instance, second, strands, material, glow, image, light;
 };
+
+static const float strand_points[2][3][4] = {
+    {{-1, 0, 1.5f, 0.1f}, {0, 0.5f, 1.5f, 0.1f}, {1, 0, 1.5f, 0.1f}},
+    {{-1, 0, 1.6f, 0.1f}, {0, 0.5f, 1.6f, 0.1f}, {1, 0, 1.6f, 0.1f}}};
+#define STRAND_FLOATS 12
+
+/* A strand in motion. */
+static void create_curves(struct session *s) {
+    static const uint32_t length = 3;
+    static const float uv[2], generated[3];
+    const trc_curve_attribute attribute = {.struct_size = sizeof attribute,
+                                           .width = 2,
+                                           .name = "UVMap",
+                                           .values = uv,
+                                           .value_count = 2,
+                                           .per_strand = 1};
+    trc_curves_desc desc = trc_curves_desc_default();
+    desc.key_count = 2;
+    desc.point_count = 3;
+    desc.points = strand_points[0][0];
+    desc.point_value_count = 2 * STRAND_FLOATS;
+    desc.lengths = &length;
+    desc.strand_count = 1;
+    desc.generated = generated;
+    desc.generated_count = 3;
+    desc.attributes = &attribute;
+    desc.attribute_count = 1;
+    STEP_OUT(s->curves, trc_curves_create(s->scene, &desc, &s->curves));
+    const trc_instance_desc instance = default_instance_desc(s->curves);
+    STEP_OUT(s->strands, trc_instance_create(s->scene, &instance, &s->strands));
+}
 
 static trc_mesh_desc rich_mesh(void) {
     static float uv[72], positions[48];
@@ -109,6 +140,7 @@ static void create_objects(struct session *s) {
     STEP_OUT(s->second, trc_instance_create(s->scene, &instance, &s->second));
     STEP(trc_instance_update(s->scene, s->second, &instance));
     STEP_OUT(s->light, trc_light_create(s->scene, &light, &s->light));
+    create_curves(s);
 }
 
 static void set_view(struct session *s) {
@@ -194,6 +226,7 @@ static void run_session(uint32_t is_final) {
     /* A pose, an edit of everything, a second commit beside the first. */
     const trc_light_desc light = default_light_desc();
     STEP(trc_mesh_update(s.scene, s.mesh, 1, cube_positions, 24, NULL, 0));
+    STEP(trc_curves_update(s.scene, s.curves, 1, strand_points[1][0], STRAND_FLOATS));
     STEP(trc_light_update(s.scene, s.light, &light));
     static const float flat[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0};
     trc_instance_desc second = default_instance_desc(s.mesh);
