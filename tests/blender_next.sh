@@ -7,11 +7,12 @@
 #
 # SUITE is trixie (Debian 13, Blender 4.3; the default) or sid (Debian unstable, Blender 5.2). Runs all
 # Blender tests if no argument says which; --fast leaves out what a change of Blender's version hardly
-# touches (see SLOW; of Blender 5.2 it runs CHANGED alone) and builds kernels for this processor alone; --report writes JUnit XML. --curves
-# measures error against time there instead, and leaves its JSON in DIR. Needs root, a Debian mirror and
-# 2.5 GB; the folder is $XDG_CACHE_HOME/volley/SUITE and stays, so that the next run takes only the build
-# and the tests. Nothing stays mounted: /proc is there in a name space of its own, where there may be one. Exit code 77: it cannot be set up here, with the reason as the last
-# line; else pytest's.
+# touches (see SLOW; of Blender 5.2 it runs CHANGED alone) and builds kernels for this processor alone;
+# --report writes JUnit XML. --curves measures error against time there instead, and leaves its JSON in DIR.
+# Needs root, a Debian mirror and 2.5 GB; the folder is $XDG_CACHE_HOME/volley/SUITE and stays, so that the
+# next run takes only the build and the tests. Nothing stays mounted: /proc is there in a name space of its
+# own, where there may be one. Exit code 77: it cannot be set up here, with the reason as the last line;
+# else pytest's.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
