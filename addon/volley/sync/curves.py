@@ -12,7 +12,8 @@ from .deform import KeyedShapes
 from .hashing import HASH_MAX, hash_numbers
 
 _SHORTEST = 1e-12   # m; keys of a strand that are closer are one
-_ROUND_PIECES = 8   # of a segment of round curves
+_ROUND_PIECES = 8   # most of a segment of round curves
+_TOLERANCE = 0.1    # radii that pieces may be off: less than is seen
 
 
 @dataclass
@@ -108,7 +109,7 @@ class CurvesData:
     def create(self, scene, positions, _normals):
         """A mesh of the library's scene, of those keys; its id."""
         return scene.create_curves(positions, self.lengths, self.shape, self.pieces, self.attributes,
-                                   self.generated)
+                                   self.generated, _TOLERANCE)
 
     @staticmethod
     def update(scene, mesh_id, positions, _normals):
