@@ -16,7 +16,8 @@ HAS_LONG_PASS_NAMES = bpy.app.version >= (5, 0, 0)
 # issue 109404).
 AREA_LIGHT_POWER = 4.0 / math.pi if bpy.app.version >= (4, 0, 0) else 1.0
 
-# A spot's cone became evenly bright in 4.0; before, it was times the cosine to its axis.
+# A spot's cone became evenly bright in 4.0, and is scaled as the light; before, it was round and times the cosine to
+# its axis.
 SPOT_IS_EVEN = bpy.app.version >= (4, 0, 0)
 
 # Nodes of a light have UV coordinates, in the light's own space, and a spot's image spans its cone; seen in
@@ -30,9 +31,12 @@ LIGHT_IS_OBJECT = bpy.app.version >= (5, 0, 0)
 # A sun is as bright all over its disc; seen in 4.3, not in 3.4.
 SUN_IS_EVEN = bpy.app.version >= (4, 1, 0)
 
-# Patterns of a spot's nodes where it has a radius, and IES files between their angles, agree with Cycles 3.4 and
-# not with 4.3 (measured: a tile 37 % off, a pixel 9 % of the brightest). Why is not known.
-FOLLOWS_LIGHT_NODES = bpy.app.version < (4, 0, 0)
+# What IES files have beyond their first and last angles: around they go on where they began, and down as they came;
+# nothing; what they end with (seen in 3.4, 4.3 and 5.2).
+IES_ENDS = 'MIRRORED' if bpy.app.version < (4, 0, 0) else 'DARK' if bpy.app.version < (5, 0, 0) else 'LEVEL'
+
+# IES files of type B have light all around, not on one half; seen in 3.4, not in 4.3.
+CLOSES_IES_TYPE_B = bpy.app.version < (4, 0, 0)
 
 # Cycles of 4.0 has other microfacets: one height for masking and shadowing, glass by the micro-normal.
 HAS_CORRELATED_MICROFACETS = bpy.app.version >= (4, 0, 0)

@@ -21,7 +21,6 @@ _SHEEN = "the Sheen shader came with 4.0"
 _FILM = "Principled has a thin film since 4.2"
 _LATER_FILM = "Glass and metals have thin films since 5.0"
 _METALLIC = "the Metallic shader came with 4.3"
-_LIGHT_NODES = "differs from Cycles 4, which a warning says"
 _PRINCIPLED = "Principled has other inputs since 4.0; those of each have cases of their own"
 
 SKIPS = (
@@ -50,17 +49,12 @@ SKIPS = (
     Skip(f"{_SHADER}[principled diffuse roughness *]", None, (4, 3), "the input came with 4.3"),
     Skip(f"{_LIGHT}[rough base]", None, (4, 3), "the input came with 4.3"),
     Skip("test_linking.py::*", None, (4, 0), "light linking came with 4.0"),
-    Skip("test_warnings.py::test_nodes_of_lights_differ", None, (4, 0), "Cycles 3.4 is followed"),
     Skip("test_warnings.py::test_worlds_of_view_layers", None, (4, 3), "the setting came with 4.3"),
     Skip("test_sky.py::test_against_cycles[multiple*]", None, (5, 0), "the model came with 5.0"),
     *(Skip(f"{_TEXTURE}[vector math {operation}]", None, (5, 0), "the operation came with 5.0") for operation in (
         "ROUND", "SIGN", "POWER")),
     Skip("test_warnings.py::test_what_came_with_the_fifth_is_named", None, (5, 0), "nothing of it is there"),
     # Blender 4
-    *(Skip(f"test_light_nodes.py::test_webs[{web} *]", (4, 0), None, _LIGHT_NODES) for web in (
-        "round", "quadrant", "half", "whole", "open", "type b")),
-    *(Skip(f"test_light_nodes.py::test_soft_lights[{case}]", (4, 0), None, _LIGHT_NODES) for case in (
-        "spot noise", "two lights")),
     Skip(f"{_TEXTURE}[musgrave *]", (4, 1), None, _MERGED),
     Skip(f"{_SHADER}[velvet *]", (4, 0), None, _VELVET),
     Skip(f"{_LIGHT}[velvet]", (4, 0), None, _VELVET),

@@ -231,8 +231,6 @@ def webs(blender_of_module):
 
 @pytest.mark.parametrize("name", [f"{web} {way}" for web in WEBS for way in ("inside", "by a vector")])
 def test_webs(webs, name):
-    if blender_support.version() >= (4, 0) and not name.startswith("damaged"):
-        pytest.skip("differs from Cycles 4, which a warning says")
     assert webs[name] < WEB
 
 
@@ -246,8 +244,6 @@ def soft(blender_of_module):
 
 @pytest.mark.parametrize("name", SOFT_CASES)
 def test_soft_lights(soft, name):
-    if blender_support.version() >= (4, 0) and name in ("spot noise", "two lights"):
-        pytest.skip("differs from Cycles 4, which a warning says")
     mean, _biased, tile = soft[name]
     assert mean < SOFT
     assert tile < SOFT

@@ -44,41 +44,6 @@ def test_worlds_of_view_layers(blender):
         assert ours[0, 0, :3] == pytest.approx(theirs[0, 0, :3], rel=1e-4), name
 
 
-def inside_light_nodes():
-    """The warnings of a scene with a plain spot, with a pattern on it, and with an IES file."""
-    import bpy
-    import scenes
-    scenes.empty(size=(16, 16))
-    scenes.camera()
-    scenes.wall("Wall", 9.0, 0.0)
-    light = scenes.light('SPOT', location=(0, 0, 2), energy=10.0, shadow_soft_size=0.2).data
-    light.use_nodes = True
-    tree, told, found = light.node_tree, _listen(), []
-    emission = next(node for node in tree.nodes if node.type == 'EMISSION')
-    for kind in (None, "ShaderNodeTexNoise", "ShaderNodeTexIES"):
-        if kind:
-            node = tree.nodes.new(kind)
-            tree.links.new(node.outputs["Fac"], emission.inputs["Strength"])
-        if kind == "ShaderNodeTexIES":
-            light.shadow_soft_size = 0.0
-            node.mode, node.ies = 'INTERNAL', bpy.data.texts.new("Web")
-            node.ies.write("IESNA:LM-63-1995\nTILT=NONE\n1 1000 1 2 1 1 1 0 0 0\n1 1 1\n0 90\n0\n100 50\n")
-        told.clear()
-        scenes.render()
-        found.append(list(told))
-    return found
-
-
-def test_nodes_of_lights_differ(blender):
-    import blender as blender_support
-    if blender_support.version() < (4, 0):
-        pytest.skip("Cycles 3.4 is followed")
-    plain, pattern, web = blender.run(inside_light_nodes)
-    assert plain == []
-    assert len(pattern) == 1 and "pattern of its nodes" in pattern[0]
-    assert len(web) == 1 and "between the angles of its IES file" in web[0]
-
-
 def inside_fifth():
     """The warnings of what came with Blender 5 and is not there: a normal map below a displaced surface,
     normals as they are; another working space, where thin films alone are."""

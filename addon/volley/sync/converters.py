@@ -12,7 +12,7 @@ import numpy as np
 from ..abi import (AmbientMode, CurvesExtension, ImageExtension, MathOperation as Math, ModeFlags, NodeType,
                    RaycastMode, RotateFlags, RotateMode, SeparateMode, SpaceId, TableSize, TransformedType,
                    VectorOperation as Vector, VectorTransformMode)
-from ..compat import FOLLOWS_LIGHT_NODES, TRANSFORMS_NORMALS
+from ..compat import IES_ENDS, TRANSFORMS_NORMALS
 from . import ies, working_space
 from .instance import NO_PARTICLE_RANDOM, VALUES_LOCATION, VALUES_PARTICLE, VALUES_SPIN, VALUES_VELOCITY
 from .node_list import named_outputs, output
@@ -201,29 +201,41 @@ def _ies(walker, node, sockets):
     if web is None:
         walker.warn(f"node '{node.name}': its IES file cannot be read")
         return {"Fac": _number(walker, Math.MULTIPLY, strength, _MISSING_WEB)}
-    if not FOLLOWS_LIGHT_NODES:
-        walker.warn(f"node '{node.name}': between the angles of its IES file it is approximated")
     vector = sockets.get('v', "Vector")
     if vector.node == DEFAULT:
         vector = output(walker.emit(NodeType.TEXTURE_COORDINATE, ()), NodeType.TEXTURE_COORDINATE, "normal")
     parts = walker.emit(NodeType.SEPARATE, (_vector(walker, Vector.NORMALIZE, vector),), SeparateMode.XYZ)
     x, y, z = (Value('f', parts, i) for i in range(3))
-    horizontal = _number(walker, Math.ARCTAN2, x, y)
+    horizontal = _number(walker, Math.ADD, _number(walker, Math.ARCTAN2, x, y), _constant('f', math.pi))
     vertical = _number(walker, Math.ARCCOSINE, _number(walker, Math.MULTIPLY, z, -1.0))
-    columns, rows = ies.picture_size(web)
-    low, high = (math.radians(angle) for angle in (web[1][0], web[1][-1]))
     # The angles' ends are the centres of the picture's outer pixels.
-    u = _number(walker, Math.MULTIPLY_ADD, horizontal, (columns - 1) / (2.0 * math.pi * columns), 0.5)
-    scale = (rows - 1) / (rows * (high - low))
-    v = _number(walker, Math.MULTIPLY_ADD, vertical, scale, 0.5 / rows - low * scale)
+    ends = [(math.radians(angles[0]), math.radians(angles[-1])) for angles in web[:2]]
+    u, v = (_number(walker, Math.MULTIPLY_ADD, angle, (count - 1) / (count * (high - low)),
+                    0.5 / count - low * (count - 1) / (count * (high - low)))
+            for angle, (low, high), count in zip((horizontal, vertical), ends, ies.picture_size(web)))
     place = Value('v', walker.emit(NodeType.COMBINE, (u, v, _constant('f', 0.0)), SeparateMode.XYZ), 0)
     image = walker.table_image("ies", ies.picture_of, text)
     found = walker.emit(NodeType.IMAGE, (place, _constant('f', 0.0)), ImageExtension.EXTEND, image=image)
-    red = Value('f', walker.emit(NodeType.SEPARATE, (Value('c', found, 0),)), 0)
-    # Nothing goes beyond the last angle.
-    is_lit = _number(walker, Math.LESS_THAN, vertical, high)
-    factor = _number(walker, Math.MULTIPLY, _number(walker, Math.MULTIPLY, red, is_lit), strength)
-    return {"Fac": factor}
+    value = Value('f', walker.emit(NodeType.SEPARATE, (Value('c', found, 0),)), 0)
+    for is_within in _within(walker, horizontal, vertical, ends):
+        value = _number(walker, Math.MULTIPLY, value, is_within)
+    return {"Fac": _number(walker, Math.MULTIPLY, value, strength)}
+
+
+_FULL_TURN = 2.0 * math.pi - 1e-6
+
+
+def _within(walker, horizontal, vertical, ends):
+    """Whether angles lie between those of a file: nothing goes beyond, which before Cycles 4 was looked at below
+    alone."""
+    (left, right), (low, high) = ends
+    yield _number(walker, Math.LESS_THAN, vertical, high)
+    if low > 0.0 and IES_ENDS != 'MIRRORED':
+        yield _number(walker, Math.GREATER_THAN, vertical, low)
+    if left > 0.0:
+        yield _number(walker, Math.GREATER_THAN, horizontal, left)
+    if right < _FULL_TURN:
+        yield _number(walker, Math.LESS_THAN, horizontal, right)
 
 
 def _ies_text(node):

@@ -3,13 +3,16 @@
 
 Horizontal angles go once around, vertical ones from straight down; what the file leaves out by symmetry
 is filled in. Photometric types C and B are read, and values between the angles of a file lie on cubics
-through four of them, as in Cycles.
+through four of them, as in Cycles. What lies beyond the first and the last of them is another in Cycles 3, 4
+and 5: see IES_ENDS.
 """
 
 import functools
 import re
 
 import numpy as np
+
+from ..compat import CLOSES_IES_TYPE_B, IES_ENDS
 
 # Candela to the watts of a light: an efficacy of 177.83 lm/W (D65), times the whole sphere.
 _WATTS_PER_CANDELA = 4.0 * np.pi / 177.83
@@ -24,8 +27,9 @@ _STEPS, _MOST_COLUMNS, _MOST_ROWS = 16, 1024, 2048
 
 @functools.lru_cache(maxsize=16)  # a node asks for the picture's size, then for the picture
 def web_of(text):
-    """A file's horizontal angles (0 to 360 degrees) and vertical ones, and its values by both, in watts of a
-    light that sends as much everywhere; None for one that is no such file."""
+    """A file's horizontal angles (0 to 360 degrees, or a part of them outside of which there is no light) and
+    vertical ones, and its values by both, in watts of a light that sends as much everywhere; None for one that
+    is no such file."""
     try:
         web = _web_of(text)
     except (ValueError, StopIteration, OverflowError):
@@ -39,26 +43,51 @@ def web_of(text):
 def picture_size(web):
     """Columns and rows of a web's picture. A web that is the same all around has one column."""
     horizontal, vertical, values = web
-    is_round = (values == values[0]).all()
+    is_round = (values == values[0]).all() and IES_ENDS != 'DARK' and _goes_around(horizontal)
     columns = 1 if is_round else _samples(horizontal, _MOST_COLUMNS)
     return columns, _samples(vertical, _MOST_ROWS)
 
 
 def picture_of(text):
-    """The picture of a file's web, (rows, columns, 3): from straight down in the first row to the last
-    vertical angle, once around, both ends included."""
+    """The picture of a file's web, (rows, columns, 3): from the first vertical angle in the first row to the
+    last, from the first horizontal angle to the last, all ends included."""
     horizontal, vertical, values = web_of(text)
     columns, rows = picture_size((horizontal, vertical, values))
-    # Beyond the ends of a column it goes on as it came; around, it goes on where it began.
-    down = np.concatenate((values[:, 1:2], values, values[:, -1:]), axis=1)
+    down = np.concatenate((_above(vertical, values), values, _below(values)), axis=1)
     by_row = _between(vertical, down, np.linspace(vertical[0], vertical[-1], rows))
     if columns > 1:
-        around = np.concatenate((by_row.T[:, -2:-1], by_row.T, by_row.T[:, 1:2]), axis=1)
-        by_row = _between(horizontal, around, np.linspace(0.0, 360.0, columns)).T
+        before, after = _beside(by_row.T)
+        around = np.concatenate((before, by_row.T, after), axis=1)
+        by_row = _between(horizontal, around, np.linspace(horizontal[0], horizontal[-1], columns)).T
     else:
         by_row = by_row[:1]
     picture = np.maximum(by_row.T, 0.0).astype(np.float32)
     return np.repeat(picture[..., None], 3, axis=2)
+
+
+def _above(vertical, values):
+    """What the cubics find before the first vertical angle: on the other side of the pole it goes on as it came."""
+    if vertical[0] == 0.0 or IES_ENDS == 'MIRRORED':
+        return values[:, 1:2]
+    return 0.0 * values[:, :1] if IES_ENDS == 'DARK' else values[:, :1]
+
+
+def _below(values):
+    """The same beyond the last one."""
+    return 0.0 * values[:, -1:] if IES_ENDS == 'DARK' else values[:, -1:]
+
+
+def _beside(values):
+    """The same of horizontal angles, before the first and beyond the last."""
+    if IES_ENDS == 'MIRRORED':  # around it goes on where it began
+        return values[:, -2:-1], values[:, 1:2]
+    if IES_ENDS == 'DARK':
+        return 0.0 * values[:, :1], 0.0 * values[:, :1]
+    return values[:, :1], values[:, -2:-1]
+
+
+def _goes_around(horizontal):
+    return horizontal[0] == 0.0 and horizontal[-1] == 360.0
 
 
 def _samples(angles, most):
@@ -144,7 +173,9 @@ def _spread_b(horizontal, vertical, values):
         return None
     horizontal, values = _half_turn(horizontal, values)
     vertical, turned = _half_turn(vertical, values.T)
-    horizontal, values = _closed(horizontal, turned.T)
+    values = turned.T
+    if CLOSES_IES_TYPE_B:
+        horizontal, values = _closed(horizontal, values)
     return horizontal, vertical, values
 
 

@@ -8,7 +8,7 @@ seen scales what the light gives there.
 import math
 
 from .. import abi, native
-from ..compat import (AREA_LIGHT_POWER, FOLLOWS_LIGHT_NODES, LIGHT_IS_OBJECT, LIGHT_UV_IS_LOCAL,
+from ..compat import (AREA_LIGHT_POWER, LIGHT_IS_OBJECT, LIGHT_UV_IS_LOCAL,
                       SPOT_IS_EVEN, SUN_IS_EVEN, casts_shadow, cycles, is_ball, uses_nodes)
 from .visibility import light_visibility
 
@@ -43,9 +43,6 @@ def describe(light_object, item, materials, warnings):
         "cast_shadow": int(casts_shadow(light)),
         "use_mis": int(cycles(light, "use_multiple_importance_sampling", True)),
     }
-    if not FOLLOWS_LIGHT_NODES and light.type == 'SPOT' and light.shadow_soft_size > 0.0 and _has_pattern(light):
-        warnings.add(f"Light '{light.name}': the pattern of its nodes lies otherwise than in Cycles, as it has "
-                     "a radius")
     fields.update(_SHAPES[light.type](light))
     if not light_object.is_shadow_catcher:
         fields["flags"] = fields.get("flags", 0) | abi.LightFlags.SYNTHETIC
@@ -55,12 +52,6 @@ def describe(light_object, item, materials, warnings):
         fields["flags"] = fields.get("flags", 0) | abi.LightFlags.OBJECT
         fields.update(pass_index=item.pass_index, object_color=tuple(item.color))
     return fields
-
-
-def _has_pattern(light):
-    """Whether a light's nodes may tell one place or direction from another."""
-    return uses_nodes(light) and any(node.type.startswith('TEX_') or node.type == 'NEW_GEOMETRY'
-                                     for node in light.node_tree.nodes)
 
 
 def _color(light):

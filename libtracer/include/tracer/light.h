@@ -16,8 +16,9 @@ enum trc_area_shape { TRC_AREA_RECTANGLE = 0, TRC_AREA_ELLIPSE = 1 };
 enum trc_light_flags {
     TRC_LIGHT_SPHERE = 1,    /* point, spot: a sphere; else a disk that faces the lit point, as in
                                 Blender before 4.0 and, from 4.1 on, with Soft Falloff */
-    TRC_LIGHT_EVEN_CONE = 2, /* spot: as bright all over its cone; else times the cosine to its
-                                axis, as in Blender before 4.0. Sun: the same radiance all over its
+    TRC_LIGHT_EVEN_CONE = 2, /* spot: as bright all over its cone, which is stretched as the
+                                transform is (without shear); else times the cosine to its axis and
+                                round, as in Blender before 4.0. Sun: the same radiance all over its
                                 disc, strength the irradiance; else more at the rim and less in all,
                                 as in Blender 3 */
     TRC_LIGHT_SYNTHETIC = 4, /* not a light of the footage that shadow catchers stand for: what

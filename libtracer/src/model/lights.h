@@ -28,14 +28,16 @@ enum {
     TRC_LAMP_EVEN_CONE = 16, /* TRC_LIGHT_EVEN_CONE */
     TRC_LAMP_DISTANT = 32,   /* it has no place: position is the direction towards it */
     TRC_LAMP_LOCAL_UV = 64,  /* TRC_LIGHT_LOCAL_UV */
-    TRC_LAMP_OBJECT = 128    /* TRC_LIGHT_OBJECT */
+    TRC_LAMP_OBJECT = 128,   /* TRC_LIGHT_OBJECT */
+    TRC_LAMP_STRETCHED = 256 /* spot: its cone is not round */
 };
 
 /* A lamp: 32 words, read by gathers of TRC_LAMP_WORDS stride. Positions in world space. */
 #define TRC_LAMP_WORDS 32
 struct trc_lamp {
     float position[3];          /* centre; of a distant one the unit direction towards it */
-    float axis_u[3], axis_v[3]; /* area: unit */
+    float axis_u[3], axis_v[3]; /* area: unit; stretched spot: as long as its own Z axis over its X,
+                                 * and over its Y axis */
     float normal[3];            /* the way spot and area shine, unit */
     float radiance[3]; /* towards a point that sees it head-on; delta: intensity, sun irradiance */
     float half_u,

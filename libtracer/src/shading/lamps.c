@@ -12,6 +12,8 @@
 #include "shading/vectors.h"
 
 #define PI 3.14159265358979f
+/* Relative difference of axes up to which a spot's cone counts as round. */
+#define ROUND_CONE 1e-5f
 
 _Static_assert(sizeof(struct trc_lamp) == 4 * TRC_LAMP_WORDS, "read by gathers");
 
@@ -42,10 +44,28 @@ static void point_bound(const struct trc_lamp *lamp, struct trc_light_bound *b) 
 
 /* ---- spot ---- */
 
+/* How much longer the light's Z axis is than its X and Y axes: in its own space the cone is round. */
+static void stretch_spot(const trc_light_desc *desc, struct trc_lamp *lamp) {
+    const float *m = desc->transform;
+    float u[3] = {m[0], m[4], m[8]}, v[3] = {m[1], m[5], m[9]}, w[3] = {m[2], m[6], m[10]};
+    const float x = trc_normalize(u, 1, 0, 0), y = trc_normalize(v, 0, 1, 0);
+    const float z = trc_normalize(w, 0, 0, 1);
+    if (!(x > 0.0f && y > 0.0f && z > 0.0f) ||
+        (fabsf(z - x) <= ROUND_CONE * z && fabsf(z - y) <= ROUND_CONE * z))
+        return;
+    lamp->flags |= TRC_LAMP_STRETCHED;
+    for (int i = 0; i < 3; i++) {
+        lamp->axis_u[i] = u[i] * (z / x);
+        lamp->axis_v[i] = v[i] * (z / y);
+    }
+}
+
 static bool spot_make(const trc_light_desc *desc, struct trc_lamp *lamp) {
     point_make(desc, lamp);
-    if (desc->flags & TRC_LIGHT_EVEN_CONE)
+    if (desc->flags & TRC_LIGHT_EVEN_CONE) {
         lamp->flags |= TRC_LAMP_EVEN_CONE;
+        stretch_spot(desc, lamp);
+    }
     lamp->cos_cone = cosf(0.5f * fminf(desc->spot_angle, PI));
     const float width = (1.0f - lamp->cos_cone) * fminf(fmaxf(desc->spot_blend, 0.0f), 1.0f);
     lamp->inv_smooth = width > 0.0f ? 1.0f / width : 0.0f;
@@ -56,6 +76,11 @@ static void spot_bound(const struct trc_lamp *lamp, struct trc_light_bound *b) {
     point_bound(lamp, b);
     b->cos_o = 1.0f;
     b->cos_e = fmaxf(lamp->cos_cone, 0.0f);
+    if (lamp->flags & TRC_LAMP_STRETCHED && b->cos_e > 0.0f) {
+        const float shortest = fminf(trc_length(lamp->axis_u), trc_length(lamp->axis_v));
+        const float widest = sqrtf(1.0f - b->cos_e * b->cos_e) / (b->cos_e * fminf(shortest, 1.0f));
+        b->cos_e = 1.0f / sqrtf(1.0f + widest * widest);
+    }
 }
 
 /* ---- sun ---- */

@@ -162,8 +162,16 @@ TRC_INLINE void trc_point_place(const struct trc_wide_lamp *l, const struct trc_
 
 /* ---- spot: a point behind a cone ---- */
 
+/* The cosine to the axis of a stretched cone in the light's own space, where the cone is round. */
+TRC_INLINE vfloat trc_spot_stretched(const struct trc_wide_lamp *l, vvec3 wi, vfloat c) {
+    const vfloat x = v3_dot(l->axis_u, wi), y = v3_dot(l->axis_v, wi);
+    return vf_divide(c, vf_sqrt(x * x + y * y + c * c));
+}
 TRC_INLINE vfloat trc_spot_factor(const struct trc_wide_lamp *l, vvec3 wi) {
-    const vfloat c = -v3_dot(l->normal, wi);
+    vfloat c = -v3_dot(l->normal, wi);
+    const vmask stretched = trc_lamp_has(l, TRC_LAMP_STRETCHED);
+    if (vm_any(stretched))
+        c = vf_select(stretched, trc_spot_stretched(l, wi, c), c);
     const vfloat over = c - l->cos_cone;
     const vfloat t = vf_saturate(over * l->inv_smooth);
     const vfloat soft = t * t * (vf_set(3.0f) - vf_set(2.0f) * t);
