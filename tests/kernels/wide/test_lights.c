@@ -218,6 +218,13 @@ static void lamps_have_cycles_units(void **state) {
     even.flags = TRC_LIGHT_EVEN_CONE;
     e.value = one_lamp(even, &e.error);
     expect("even spot from the side", e, 100 / (4 * M_PI) / 25 * 0.8);
+    even.spot_angle = 1.2f; /* the tangent of its half is 0.68, that of the way 0.75 */
+    assert_true(one_lamp(even, &e.error) == 0.0);
+    even.transform[10] = 0.5f;
+    e.value = one_lamp(even, &e.error);
+    expect("stretched spot from the side", e, 100 / (4 * M_PI) / 25 * 0.8);
+    even.transform[0] = 0.25f;
+    assert_true(one_lamp(even, &e.error) == 0.0);
     trc_light_desc spot = lamp(TRC_LIGHT_SPOT, 0, 0, 4);
     spot.radius = 2.0f;
     e.value = one_lamp(spot, &e.error);
