@@ -17,7 +17,7 @@ enum trc_curve_shape {
     TRC_CURVE_RIBBON = 0, /* flat, each ray sees it from the front, with the normals of a round
                               one; ends are cut; nothing nearer than its width to a ray's origin
                               counts, which is how it does not meet itself */
-    TRC_CURVE_ROUND = 1   /* solid, round at its joints and ends */
+    TRC_CURVE_ROUND = 1   /* a tube, closed at its joints, cut upright and open at its ends */
 };
 
 /* A named value of each point, or of each strand. */
@@ -64,9 +64,10 @@ TRC_API trc_curves_desc trc_curves_desc_default(void);
  * key at both ends are skipped and counted as triangles are (trc_scene_stats). Instances whose
  * transform flattens them are hidden. Hits tell pieces for triangles, in the order of points; u
  * goes along a piece, v across it from -1 to 1 (trc_hits). They are no lights, however they shine,
- * and displacement does not move them. Cost: 16 bytes for each piece's end and key, besides the
- * tree. INVALID_ARGUMENT, TOO_LARGE (of 4 * ends * key_count floats there can be 2^31) or
- * OUT_OF_MEMORY. */
+ * and displacement does not move them. Renders let no ray meet again the strand that it left;
+ * queries know of no strand that a ray left. Cost: 16 bytes for each piece's end and key, which the
+ * tree has once more. INVALID_ARGUMENT, TOO_LARGE (of 4 * ends * key_count floats there can be
+ * 2^31) or OUT_OF_MEMORY. */
 TRC_API trc_status trc_curves_create(trc_scene scene, const trc_curves_desc *desc,
                                      trc_id *mesh_out);
 

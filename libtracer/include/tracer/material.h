@@ -88,11 +88,11 @@ enum trc_displacement_method {
 /* Between the entries of the table. */
 enum trc_ramp_interpolation { TRC_RAMP_LINEAR = 0, TRC_RAMP_CONSTANT };
 
-/* Beyond the ends of the table: as at the end, or straight on. */
 /* Of trc_node.mode of a BLACKBODY and a WAVELENGTH: whether what Rec.709 cannot show keeps its
  * negative components, for another space of wider primaries. */
 enum trc_gamut { TRC_GAMUT_CLIPPED = 0, TRC_GAMUT_OPEN };
 
+/* Beyond the ends of the table: as at the end, or straight on. */
 enum trc_curves_extension { TRC_CURVES_CONSTANT = 0, TRC_CURVES_EXTRAPOLATED };
 
 enum trc_separate_mode {

@@ -53,9 +53,9 @@ enum trc_ray_word {
                       lights are linked */
     TRC_RAY_SHARE, /* what diffuse lobes have of its light; with passes of light by kind
                       (kernels/tile/light_split.h) */
-    TRC_RAY_STRAND_INSTANCE, /* of scenes with curves: instance of the strand it left, TRC_NO_HIT:
-                              */
-    TRC_RAY_STRAND,          /* it left none; and the strand (struct trc_left_strands) */
+    /* Of scenes with curves, as struct trc_left_strands has them: */
+    TRC_RAY_STRAND_INSTANCE,
+    TRC_RAY_STRAND,
     TRC_RAY_WORDS
 };
 

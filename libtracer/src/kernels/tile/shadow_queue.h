@@ -27,9 +27,9 @@ struct trc_shadow_store {
     float *o[3], *d[3], *tmax, *time, *radiance[3];
     float *split[9]; /* diffuse, glossy, transmission parts, or NULL: no light passes */
     uint32_t *share; /* of the path (kernels/tile/light_split.h), or NULL: no light passes */
-    uint32_t *strand_instance,
-        *strand;    /* that the ray left, as rays have them, or NULL: no curves */
-    float *lamp[3]; /* for the Shadow pass, or NULL */
+    uint32_t *strand_instance;         /* as struct trc_left_strands has it, or NULL: no curves */
+    uint32_t *strand;                  /* the same */
+    float *lamp[3];                    /* for the Shadow pass, or NULL */
     float *scaled[TRC_SCALED_COLUMNS]; /* those that what is in the way takes from, RGB by RGB */
     uint32_t scaled_count;
     uint32_t *slot, *path, *target;

@@ -25,9 +25,9 @@ struct trc_packet {
     float t[TRC_PACKET_SIZE];    /* in: farthest distance; out: distance of the hit */
     float time[TRC_PACKET_SIZE]; /* [0, 1]; read only in scenes with object motion */
     uint64_t active;
+    const struct trc_left_strands *left; /* NULL: none; read only where there are curves */
     uint32_t visibility;                 /* TRC_VISIBLE_* */
     bool common_origin;                  /* all active rays start at the same point */
-    const struct trc_left_strands *left; /* NULL: none; read only where there are curves */
     bool skip_transparent; /* occlusion: materials that shadow rays see through do not count */
 } __attribute__((aligned(64)));
 

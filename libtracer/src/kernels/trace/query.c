@@ -1,7 +1,7 @@
 /* Ray queries: arrays of the caller through packets. */
 #include "kernels/trace/query.h"
-#include "kernels/trace/curve_surface.h"
 
+#include "kernels/trace/curve_surface.h"
 #include "kernels/trace/direction.h"
 #include "kernels/trace/packet.h"
 #include "model/snapshot.h"
