@@ -109,10 +109,8 @@ static inline const struct trc_part *slot_part(const struct trc_fill *fill, uint
 
 /* What a slot says of a piece of a curve. */
 static uint32_t piece_word(const struct trc_mesh *mesh, uint32_t piece) {
-    const uint32_t *strands = mesh->strands, strand = strands[piece];
-    const bool first = piece == 0 || strands[piece - 1] != strand;
-    const bool last = piece + 1 == mesh->triangle_count || strands[piece + 1] != strand;
-    return strand | (first ? TRC_SLOT_FIRST : 0u) | (last ? TRC_SLOT_LAST : 0u);
+    return mesh->strands[piece] | (trc_piece_is_first(mesh, piece) ? TRC_SLOT_FIRST : 0u) |
+           (trc_piece_is_last(mesh, piece) ? TRC_SLOT_LAST : 0u);
 }
 
 /* What stands in the slot of a new tree. */

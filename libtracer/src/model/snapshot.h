@@ -75,6 +75,14 @@ static inline void trc_mesh_corners(const struct trc_mesh *mesh, uint32_t triang
     corners_out[1] = corners_out[0] + (mesh->shape != TRC_SHAPE_BALLS);
 }
 
+/* Whether a piece of a curve is the first, or the last, of its strand. */
+static inline bool trc_piece_is_first(const struct trc_mesh *mesh, uint32_t piece) {
+    return piece == 0 || mesh->strands[piece - 1] != mesh->strands[piece];
+}
+static inline bool trc_piece_is_last(const struct trc_mesh *mesh, uint32_t piece) {
+    return piece + 1 == mesh->triangle_count || mesh->strands[piece + 1] != mesh->strands[piece];
+}
+
 /* Coordinates beyond this, or not finite, take their triangles out of the scene: sums and
  * differences of what remains stay far from overflow, and so do the squares in a triangle test
  * (1.8e18^2 = 3.2e36). */

@@ -8,21 +8,14 @@
 /* Of one lane: where the middle is in the world, and the mean of the radii there. */
 static void point_at(const struct trc_instance *instance, const struct trc_mesh *mesh,
                      uint32_t point, float time, float position[3], float *radius) {
-    uint32_t key;
-    float f, m[TRC_AFFINE_FLOATS], p[3], diagonal2 = 0.0f;
-    trc_key_at(time, mesh->key_count, &key, &f);
-    const size_t a = (size_t)key * mesh->vertex_count + point;
-    const size_t b = mesh->key_count > 1 ? a + mesh->vertex_count : a;
-    for (size_t i = 0; i < 3; i++)
-        p[i] = mesh->positions[3 * a + i] +
-               f * (mesh->positions[3 * b + i] - mesh->positions[3 * a + i]);
+    float m[TRC_AFFINE_FLOATS], p[3], own, diagonal2 = 0.0f;
+    trc_curve_vertex_at(mesh, point, time, p, &own);
     trc_affine_at(instance, time, m);
     for (int i = 0; i < 3; i++) {
         const float *row = m + 4 * i, sum = row[0] + row[1] + row[2];
         position[i] = row[0] * p[0] + row[1] * p[1] + row[2] * p[2] + row[3];
         diagonal2 += sum * sum;
     }
-    const float own = mesh->radii[a] + f * (mesh->radii[b] - mesh->radii[a]);
     *radius = own * sqrtf(diagonal2 / 3.0f);
 }
 

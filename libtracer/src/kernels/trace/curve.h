@@ -24,6 +24,19 @@
 #define TRC_RIBBON_AHEAD 2.0f
 #define TRC_ROUND_AHEAD 0x1p-10f
 
+/* Squares of lengths are taken for this, at least, where they divide. */
+#define TRC_CURVE_TINY 1e-36f
+/* How far beyond the line between two pieces of a ribbon both of them own hits, relative: many
+ * times what rounding may move the line by. */
+#define TRC_RIBBON_DOUBT 1e-5f
+/* Two pieces of a round strand overlap by MARGIN * (OVERLAP + bend + taper) radii at their joint;
+ * OVERLAP is what straight strands have for rounding. No limit where the square of the bend times
+ * the radius is beyond BEND_SQUARED of that of the shorter piece: the planes of its two joints may
+ * meet within the radius. */
+#define TRC_ROUND_OVERLAP 0.05f
+#define TRC_ROUND_MARGIN 2.0f
+#define TRC_ROUND_BEND_SQUARED 0.25f
+
 /* Turns of the rays of a packet, after their shear: across x' = xx x + xy y, y' = yy y, along
  * z' = zz z + zx x + zy y, all in lengths of object space, and 1 / |d|. */
 struct trc_turned {
@@ -67,17 +80,6 @@ TRC_INLINE void trc_turned_setup(const struct trc_sheared *g, uint64_t mask,
 #define SELECT_LE(a, b, x, y) vf_select(vf_le(a, b), x, y)
 #define NAMED(name) name##_lanes
 #include "kernels/trace/curve_test.h"
-#undef REAL
-#undef MASK
-#undef SET
-#undef MINIMUM
-#undef MAXIMUM
-#undef ROOT
-#undef LE
-#undef ANY
-#undef BOTH
-#undef SELECT_LE
-#undef NAMED
 
 #define REAL f8
 #define MASK uint32_t
@@ -91,16 +93,5 @@ TRC_INLINE void trc_turned_setup(const struct trc_sheared *g, uint64_t mask,
 #define SELECT_LE f8_select_le
 #define NAMED(name) name##8
 #include "kernels/trace/curve_test.h"
-#undef REAL
-#undef MASK
-#undef SET
-#undef MINIMUM
-#undef MAXIMUM
-#undef ROOT
-#undef LE
-#undef ANY
-#undef BOTH
-#undef SELECT_LE
-#undef NAMED
 
 #endif

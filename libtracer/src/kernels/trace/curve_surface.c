@@ -26,41 +26,26 @@ vmask trc_curve_lanes(const struct trc_surface *s) {
     return vm_from_bits(bits);
 }
 
-/* A vertex at a time: position and radius. */
-static void vertex_at(const struct trc_mesh *mesh, uint32_t vertex, float time, float p[3],
-                      float *radius) {
-    uint32_t key;
-    float f;
-    trc_key_at(time, mesh->key_count, &key, &f);
-    const size_t a = (size_t)key * mesh->vertex_count + vertex;
-    const size_t b = mesh->key_count > 1 ? a + mesh->vertex_count : a;
-    for (int i = 0; i < 3; i++)
-        p[i] = mesh->positions[3 * a + (size_t)i] +
-               f * (mesh->positions[3 * b + (size_t)i] - mesh->positions[3 * a + (size_t)i]);
-    *radius = mesh->radii[a] + f * (mesh->radii[b] - mesh->radii[a]);
-}
-
 /* Returns the strand. */
 static int32_t lane_load(const struct trc_surface *s, int lane, struct raw_curve *out) {
     const struct trc_instance *instance = &s->snapshot->instances[vi_get(s->instance, lane)];
     const struct trc_mesh *mesh = s->snapshot->meshes[instance->mesh];
-    const uint32_t piece = (uint32_t)vi_get(s->triangle, lane), *strands = mesh->strands;
+    const uint32_t piece = (uint32_t)vi_get(s->triangle, lane);
     const float time = vf_get(s->time, lane);
     uint32_t ends[3];
     float ignored;
     trc_mesh_corners(mesh, piece, ends);
     const bool balls = mesh->shape == TRC_SHAPE_BALLS;
-    const bool first = balls || piece == 0 || strands[piece - 1] != strands[piece];
-    const bool last =
-        balls || piece + 1 == mesh->triangle_count || strands[piece + 1] != strands[piece];
+    const bool first = balls || trc_piece_is_first(mesh, piece);
+    const bool last = balls || trc_piece_is_last(mesh, piece);
     for (int end = 0; end < 2; end++)
-        vertex_at(mesh, ends[end], time, out->p[end], &out->r[end]);
-    vertex_at(mesh, ends[0] - !first, time, out->before, &ignored);
-    vertex_at(mesh, ends[1] + !last, time, out->after, &ignored);
+        trc_curve_vertex_at(mesh, ends[end], time, out->p[end], &out->r[end]);
+    trc_curve_vertex_at(mesh, ends[0] - !first, time, out->before, &ignored);
+    trc_curve_vertex_at(mesh, ends[1] + !last, time, out->after, &ignored);
     trc_affine_at(instance, time, out->m);
     out->shape = (float)mesh->shape;
     out->u = balls ? 0.0f : vf_get(s->u, lane);
-    return (int32_t)(balls ? piece : strands[piece]);
+    return (int32_t)(balls ? piece : mesh->strands[piece]);
 }
 
 TRC_INLINE vfloat raw_column(const struct raw_curve *raw, int at) {

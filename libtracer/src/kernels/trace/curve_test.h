@@ -1,6 +1,7 @@
 /* The tests of kernels/trace/curve.h, which includes this once for rays in the lanes and once for
- * pieces: REAL, MASK (of comparisons), SET, MINIMUM, MAXIMUM, ROOT, LE, BOTH, SELECT_LE(a, b, x, y)
- * (x where a <= b, else y) and NAMED(name) are defined there. */
+ * pieces: REAL, MASK (of comparisons), SET, MINIMUM, MAXIMUM, ROOT, LE, ANY (of a mask), BOTH,
+ * SELECT_LE(a, b, x, y) (x where a <= b, else y) and NAMED(name) are defined there, and undefined
+ * here. */
 
 /* A ray: origin, shear, turn, least distance, in the order u, v, z of its axes. */
 struct NAMED(trc_curve_ray) {
@@ -10,6 +11,7 @@ struct NAMED(trc_curve_ray) {
     REAL near; /* from where on TRC_RIBBON_AHEAD counts */
     REAL side; /* sign of the direction along z */
 };
+
 /* A piece: ends and radii, and the vertices before and after it, or the ends themselves. */
 struct NAMED(trc_piece) {
     REAL p[2][3], r[2];
@@ -20,6 +22,7 @@ struct NAMED(trc_curve_hit) {
     MASK hit;
     REAL t, u, v;
 };
+
 TRC_INLINE void NAMED(trc_piece_turn)(const struct NAMED(trc_curve_ray) * ray, const REAL p[3],
                                       REAL *x, REAL *y, REAL *z) {
     const REAL pz = p[2] - ray->oz;
@@ -28,6 +31,7 @@ TRC_INLINE void NAMED(trc_piece_turn)(const struct NAMED(trc_curve_ray) * ray, c
     *y = ray->yy * py;
     *z = ray->zz * pz + ray->zx * px + ray->zy * py;
 }
+
 /* What is not left to the neighbours: rays within the lines that halve the angles at the ends. Both
  * pieces at an end find the same bits for it; where it turns back on itself there is no such line,
  * and rounding lets both have what is near. Strands end upright. r: of the piece, about. */
@@ -45,7 +49,7 @@ TRC_INLINE MASK NAMED(trc_ribbon_owns)(const struct NAMED(trc_curve_ray) * ray,
     const REAL to_b = SELECT_LE(b, zero, one, b), to_a = SELECT_LE(a, zero, one, a);
     const REAL e0 = x0 * (bx * d + dx * to_b) + y0 * (by * d + dy * to_b);
     const REAL e1 = x1 * (dx * to_a + ax * d) + y1 * (dy * to_a + ay * d);
-    const REAL doubt = SET(1e-5f) * d * (d + r);
+    const REAL doubt = SET(TRC_RIBBON_DOUBT) * d * (d + r);
     return BOTH(LE(e0, doubt * to_b), LE(zero - doubt * to_a, e1));
 }
 
@@ -57,7 +61,7 @@ TRC_INLINE struct NAMED(trc_curve_hit)
     NAMED(trc_piece_turn)(ray, piece->p[1], &x1, &y1, &z1);
     const REAL zero = SET(0.0f), one = SET(1.0f);
     const REAL dx = x1 - x0, dy = y1 - y0;
-    const REAL length2 = MAXIMUM(dx * dx + dy * dy, SET(1e-36f));
+    const REAL length2 = MAXIMUM(dx * dx + dy * dy, SET(TRC_CURVE_TINY));
     const REAL at = (zero - (x0 * dx + y0 * dy)) / length2;
     const REAL s = MINIMUM(MAXIMUM(at, zero), one);
     const REAL x = x0 + s * dx, y = y0 + s * dy, z = z0 + s * (z1 - z0);
@@ -76,6 +80,7 @@ TRC_INLINE struct NAMED(trc_curve_hit)
     h.v = SELECT_LE(zero, sign, across, zero - across);
     return h;
 }
+
 /* Where a round piece leaves off at one of its ends: hits at z on the ray are its own where
  * slope * z <= from. */
 struct NAMED(trc_round_limit) {
@@ -96,7 +101,7 @@ TRC_INLINE struct NAMED(trc_round_limit)
     nx = nx - x;
     ny = ny - y;
     nz = nz - z;
-    const REAL zero = SET(0.0f), one = SET(1.0f), tiny = SET(1e-36f), never = SET(INFINITY);
+    const REAL zero = SET(0.0f), one = SET(1.0f), tiny = SET(TRC_CURVE_TINY), never = SET(INFINITY);
     const REAL d2 = dx * dx + dy * dy + dz * dz, n2 = nx * nx + ny * ny + nz * nz;
     const REAL to_d = one / ROOT(MAXIMUM(d2, tiny));
     const REAL to_n = SELECT_LE(n2, zero, zero, one / ROOT(MAXIMUM(n2, tiny)));
@@ -105,9 +110,11 @@ TRC_INLINE struct NAMED(trc_round_limit)
     const REAL wx = nx * to_n + dx * to_d, wy = ny * to_n + dy * to_d, wz = nz * to_n + dz * to_d;
     const REAL nr = next_r - r;
     const REAL taper = MAXIMUM(dr, zero - dr) * to_d + MAXIMUM(nr, zero - nr) * to_n;
-    const REAL share = SET(0.05f) + bend + taper, widest = MAXIMUM(r, MAXIMUM(next_r, r - dr));
-    REAL margin = SELECT_LE(share, one, SET(2.0f) * share * widest, never);
-    margin = SELECT_LE(bend2 * widest * widest, SET(0.25f) * MINIMUM(d2, n2), margin, never);
+    const REAL share = SET(TRC_ROUND_OVERLAP) + bend + taper,
+               widest = MAXIMUM(r, MAXIMUM(next_r, r - dr));
+    REAL margin = SELECT_LE(share, one, SET(TRC_ROUND_MARGIN) * share * widest, never);
+    margin = SELECT_LE(bend2 * widest * widest, SET(TRC_ROUND_BEND_SQUARED) * MINIMUM(d2, n2),
+                       margin, never);
     margin = SELECT_LE(n2, zero, zero, margin);
     return (struct NAMED(trc_round_limit)){wz, x * wx + y * wy + z * wz + margin};
 }
@@ -166,11 +173,12 @@ TRC_INLINE struct NAMED(trc_curve_hit)
         return h;
     const REAL within = SELECT_LE(least, t_near, zero, SET(TRC_CURVE_WITHIN));
     const REAL x = x0 + h.u * dx, y = y0 + h.u * dy, r = r0 + h.u * dr;
-    const REAL length = ROOT(MAXIMUM(dx * dx + dy * dy, SET(1e-36f)));
+    const REAL length = ROOT(MAXIMUM(dx * dx + dy * dy, SET(TRC_CURVE_TINY)));
     const REAL across = ray->side * (dy * x - dx * y) / (length * r);
     h.v = MINIMUM(MAXIMUM(across, zero - one), one) + within;
     return h;
 }
+
 TRC_INLINE struct NAMED(trc_curve_hit) NAMED(trc_ball_test)(const struct NAMED(trc_curve_ray) * ray,
                                                             const struct NAMED(trc_piece) * piece) {
     REAL x, y, z;
@@ -187,3 +195,15 @@ TRC_INLINE struct NAMED(trc_curve_hit) NAMED(trc_ball_test)(const struct NAMED(t
     h.v = (zero - y) / r + SELECT_LE(least, t_near, zero, SET(TRC_CURVE_WITHIN));
     return h;
 }
+
+#undef REAL
+#undef MASK
+#undef SET
+#undef MINIMUM
+#undef MAXIMUM
+#undef ROOT
+#undef LE
+#undef ANY
+#undef BOTH
+#undef SELECT_LE
+#undef NAMED

@@ -136,6 +136,19 @@ static inline void trc_affine_at(const struct trc_instance *instance, float time
     for (int i = 0; i < TRC_AFFINE_FLOATS; i++)
         out[i] = a[i] + f * (b[i] - a[i]);
 }
+/* Of a mesh of curves: position and radius. */
+static inline void trc_curve_vertex_at(const struct trc_mesh *mesh, uint32_t vertex, float time,
+                                       float position_out[3], float *radius_out) {
+    uint32_t key;
+    float f;
+    trc_key_at(time, mesh->key_count, &key, &f);
+    const size_t a = (size_t)key * mesh->vertex_count + vertex;
+    const size_t b = mesh->key_count > 1 ? a + mesh->vertex_count : a;
+    const float *p = mesh->positions + 3 * a, *q = mesh->positions + 3 * b;
+    for (int i = 0; i < 3; i++)
+        position_out[i] = p[i] + f * (q[i] - p[i]);
+    *radius_out = mesh->radii[a] + f * (mesh->radii[b] - mesh->radii[a]);
+}
 /* Turns TRC_WIDTH rows of width floats into registers. */
 TRC_INLINE vfloat trc_column_of(const float *rows, int width, int column) {
     return vf_gather(rows + column, vi_lane() * vi_set(width), vm_all_set());
