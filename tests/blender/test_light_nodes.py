@@ -181,20 +181,15 @@ def inside_soft():
     import scenes
     pictures = {}
     for name, (kind, settings) in SOFT_CASES.items():
-        scene = _floor(scenes, samples=SAMPLES)
-        scenes.independent_seeds()
+        _floor(scenes, samples=SAMPLES)
         gloss = scenes.material("Gloss", "ShaderNodeBsdfGlossy", Color=(0.8, 0.8, 0.8), Roughness=0.4)
         scenes.mesh("Gloss", [(0, -2, 0.01), (2, -2, 0.01), (2, 2, 0.01), (0, 2, 0.01)], [(0, 1, 2, 3)], gloss)
         lamp, emission = _lamp(scenes, kind, settings)
         _pattern(lamp.data.node_tree, emission, name)
         if name == "two lights":
             scenes.light('POINT', location=(-1.0, 1.0, 1.5), energy=20.0, shadow_soft_size=0.2)
-        for engine in ('VOLLEY', 'CYCLES'):
-            scenes.set_engine(engine, SAMPLES)
-            for seed in SEEDS:
-                scene.volley.seed = scene.cycles.seed = seed
-                pictures.setdefault(name, {}).setdefault(engine, []).append(scenes.render()[..., :3])
-    return {name: (pair['VOLLEY'], pair['CYCLES']) for name, pair in pictures.items()}
+        pictures[name] = scenes.seeds_by_both(SAMPLES * len(SEEDS), SEEDS)
+    return pictures
 
 
 # Comparison ----------------------------------------------------------------------------------------

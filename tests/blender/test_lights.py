@@ -73,8 +73,7 @@ def inside_pictures():
     import scenes
     pictures = {}
     for name, (kind, settings) in CASES.items():
-        scene = scenes.empty(size=SIZE)
-        scenes.independent_seeds()
+        scenes.empty(size=SIZE)
         scenes.camera(location=(0.0, -7.0, 3.0), rotation=(1.25, 0.0, 0.0))
         grey = scenes.material("Grey", "ShaderNodeBsdfDiffuse", Color=(0.6, 0.6, 0.6))
         scenes.mesh("Floor", [(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0)], [(0, 1, 2, 3)], grey)
@@ -82,12 +81,8 @@ def inside_pictures():
         bpy.ops.mesh.primitive_cube_add(size=1.2, location=(1.0, 0.5, 0.6))
         bpy.context.object.data.materials.append(grey)
         _shine(kind, settings)
-        for engine in ('VOLLEY', 'CYCLES'):
-            scenes.set_engine(engine, SAMPLES)
-            for seed in SEEDS:
-                scene.volley.seed = scene.cycles.seed = seed
-                pictures.setdefault(name, {}).setdefault(engine, []).append(scenes.render()[..., :3])
-    return {name: (pair['VOLLEY'], pair['CYCLES']) for name, pair in pictures.items()}
+        pictures[name] = scenes.seeds_by_both(SAMPLES * len(SEEDS), SEEDS)
+    return pictures
 
 
 # Comparison ----------------------------------------------------------------------------------------

@@ -104,7 +104,6 @@ def _build(lights, lobe, receivers, blockers):
     import bpy
     import scenes
     scene = scenes.empty(size=SIZE)
-    scenes.independent_seeds()
     scenes.camera(location=(0.0, -7.0, 3.0), rotation=(1.25, 0.0, 0.0))
     grey = scenes.material("Grey", "ShaderNodeBsdfDiffuse", Color=(0.6, 0.6, 0.6))
     floor = grey
@@ -153,13 +152,9 @@ def inside_pictures(names):
         return None
     pictures = {}
     for name in names:
-        scene = _build(*CASES[name])
-        for engine in ('VOLLEY', 'CYCLES'):
-            scenes.set_engine(engine, SAMPLES)
-            for seed in SEEDS:
-                scene.volley.seed = scene.cycles.seed = seed
-                pictures.setdefault(name, {}).setdefault(engine, []).append(scenes.render()[..., :3])
-    return {name: (pair['VOLLEY'], pair['CYCLES']) for name, pair in pictures.items()}
+        _build(*CASES[name])
+        pictures[name] = scenes.seeds_by_both(SAMPLES * len(SEEDS), SEEDS)
+    return pictures
 
 
 def inside_edits():

@@ -59,7 +59,6 @@ def _material(lobe):
 def build(light, lobe, geometry, shading):
     import scenes
     scene = scenes.empty(size=SIZE)
-    scenes.independent_seeds()
     scenes.camera(location=(0.0, -6.5, 1.6), rotation=(1.45, 0.0, 0.0))
     grey = scenes.material("Grey", "ShaderNodeBsdfDiffuse", Color=(0.5, 0.5, 0.5))
     scenes.mesh("Floor", [(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0)], [(0, 1, 2, 3)], grey)
@@ -87,13 +86,9 @@ def inside_pictures(names):
     import scenes
     pictures = {}
     for name in names:
-        scene = build(*CASES[name])
-        for engine in ('VOLLEY', 'CYCLES'):
-            scenes.set_engine(engine, SAMPLES)
-            for seed in SEEDS:
-                scene.volley.seed = scene.cycles.seed = seed
-                pictures.setdefault(name, {}).setdefault(engine, []).append(scenes.render()[..., :3])
-    return {name: (pair['VOLLEY'], pair['CYCLES']) for name, pair in pictures.items()}
+        build(*CASES[name])
+        pictures[name] = scenes.seeds_by_both(SAMPLES * len(SEEDS), SEEDS)
+    return pictures
 
 
 def inside_edits():

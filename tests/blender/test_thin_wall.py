@@ -32,7 +32,6 @@ CASES = {
 def build(inputs):
     import scenes
     scene = scenes.empty(size=SIZE)
-    scenes.independent_seeds()
     scene.cycles.blur_glossy = scene.volley.filter_glossy = 0.0  # Cycles' takes energy from the mirror
     scenes.camera(location=(0.0, -7.0, 2.0), rotation=(1.4, 0.0, 0.0))
     scenes.light_world((0.3, 0.35, 0.4))
@@ -53,7 +52,6 @@ def build(inputs):
         pane = scenes.wall("Pane", size=1.5, y=0.0, center=(0.0, 1.0), material=glass)
         pane.location.x, pane.rotation_euler = x, (0.15, 0.0, turn)
     scenes.sphere("Ball", 0.8, (1.7, 0.0, 0.9), glass)
-    return scene
 
 
 def inside_pictures(names):
@@ -61,13 +59,9 @@ def inside_pictures(names):
     import scenes
     pictures = {}
     for name in names:
-        scene = build(CASES[name])
-        for engine in ('VOLLEY', 'CYCLES'):
-            scenes.set_engine(engine, SAMPLES)
-            for seed in SEEDS:
-                scene.volley.seed = scene.cycles.seed = seed
-                pictures.setdefault(name, {}).setdefault(engine, []).append(scenes.render()[..., :3])
-    return {name: (pair['VOLLEY'], pair['CYCLES']) for name, pair in pictures.items()}
+        build(CASES[name])
+        pictures[name] = scenes.seeds_by_both(SAMPLES * len(SEEDS), SEEDS)
+    return pictures
 
 
 def inside_linked():

@@ -82,13 +82,12 @@ def _material(kind, settings, inputs, output, shown):
 
 
 def build(kind, settings, inputs, output, shown):
-    """Boxes that touch and a ball, or points in its place, on a floor, before a mirror, and a pane that lets shadow rays through. All but the
-    last are of the material, the floor only if it shines: nothing shall be lit by what samples of lights find of it,
-    which Cycles 5 traces rays for."""
+    """Boxes that touch and a ball, or points in its place, on a floor, before a mirror, and a pane that lets
+    shadow rays through. All but the last are of the material, the floor only if it shines: nothing shall be
+    lit by what samples of lights find of it, which Cycles 5 traces rays for."""
     import bpy
     import scenes
     scene = scenes.empty(size=SIZE)
-    scenes.independent_seeds()
     scenes.camera(location=(0.5, -6.0, 3.2), rotation=(1.1, 0.0, 0.08))
     scenes.light_world((0.4, 0.5, 0.6))
     scene.world.light_settings.distance = 0.7
@@ -109,7 +108,6 @@ def build(kind, settings, inputs, output, shown):
     scenes.mesh("Pane", [(0.4, -1.8, 0), (1.6, -1.8, 0), (1.6, -1.8, 1), (0.4, -1.8, 1)], [(0, 1, 2, 3)], tint)
     scenes.mesh("Mirror", [(-3, 1.6, 0), (3, 1.6, 0), (3, 1.6, 3), (-3, 1.6, 3)], [(0, 1, 2, 3)],
                 scenes.material("Mirror", "ShaderNodeBsdfGlossy", Color=(0.8, 0.8, 0.8), Roughness=0.0))
-    return scene
 
 
 def inside_pictures(names):
@@ -119,13 +117,9 @@ def inside_pictures(names):
     for name in names:
         if not scenes.has_node(f"ShaderNode{CASES[name][0]}"):
             continue
-        scene = build(*CASES[name])
-        for engine in ('VOLLEY', 'CYCLES'):
-            scenes.set_engine(engine, SAMPLES)
-            for seed in SEEDS:
-                scene.volley.seed = scene.cycles.seed = seed
-                pictures.setdefault(name, {}).setdefault(engine, []).append(scenes.render()[..., :3])
-    return {name: (pair['VOLLEY'], pair['CYCLES']) for name, pair in pictures.items()}
+        build(*CASES[name])
+        pictures[name] = scenes.seeds_by_both(SAMPLES * len(SEEDS), SEEDS)
+    return pictures
 
 
 def inside_attributes():

@@ -281,8 +281,10 @@ def agreed_errors(images_a, images_b, tile_px=TILE_PX, significance=0.01):
 
 
 def errors_of_cases(pictures):
-    """The agreed_errors of {case: (seeds of one side, seeds of the other)}, and the lines of their table."""
-    found = {name: agreed_errors(*pair) for name, pair in pictures.items()}
+    """The agreed_errors in colour of {case: (seeds of one side, seeds of the other)}, and the lines of their
+    table."""
+    found = {name: agreed_errors(*(np.asarray(side)[..., :3] for side in pair))
+             for name, pair in pictures.items()}
     width = max(map(len, found))
     lines = [f"{'case':{width}} {'mean error':>10} {'biased tile':>11}"]
     lines += [f"{name:{width}} {mean:10.3%} {tile:11.3%}" for name, (mean, _biased, tile) in found.items()]
