@@ -305,6 +305,35 @@ def inside_moving_points():
     return pictures
 
 
+def inside_shapes():
+    """{shape: [picture that a viewport follows, of a new one, of F12 while another scene is shown, of F12]}"""
+    import bpy
+    import scenes
+    from follower import Follower, picture
+    from volley.sync import SceneSync
+    from volley.sync.changes import Changes
+    scene = _stage()
+    _haired(kink='WAVE', kink_amplitude=0.3)
+    other = bpy.data.scenes.new("Other")
+    shapes = scene.cycles_curves.bl_rna.properties["shape"].enum_items.keys()
+    follower, pictures = Follower(), {}
+    for shape in shapes:
+        scene.cycles_curves.shape = shape
+        scene.update_tag()  # as buttons do
+        bpy.context.view_layer.update()
+        fresh = SceneSync(is_final=False, thread_count=0, will_resync=False)
+        pictures[shape] = [follower.picture(), picture(fresh, Changes.everything())]
+        fresh.destroy()
+    for shape in shapes:
+        scene.cycles_curves.shape = shape
+        other.cycles_curves.shape = 'RIBBONS' if shape != 'RIBBONS' else 'THICK'
+        bpy.context.window.scene = other
+        pictures[shape].append(scenes.render(scene))
+        bpy.context.window.scene = scene
+        pictures[shape].append(scenes.render())
+    return pictures
+
+
 def _agree(pictures):
     for name, (ours, theirs) in pictures.items():
         assert theirs.std() > 0.02, f"{name}: the picture shows nothing"
@@ -333,3 +362,13 @@ def test_moving_curves_and_points(blender):
 
 def test_curves_and_points(blender):
     _agree(blender.run(inside_points))
+
+
+def test_shapes_are_those_of_the_scene_that_is_rendered(blender):
+    pictures = blender.run(inside_shapes)
+    shown = list(pictures.values())
+    assert len(shown) > 1
+    for (followed, fresh, from_other, own), before in zip(shown, [None] + shown):
+        assert np.array_equal(followed, fresh)
+        assert np.array_equal(from_other, own)
+        assert before is None or not np.array_equal(own, before[3]), "the shape is not seen"

@@ -256,11 +256,11 @@ def geometry_nodes(owner, *kinds):
     return nodes[1:-1]
 
 
-def render():
-    """Render the scene as F12 does; its Combined picture."""
-    path = os.path.join(tempfile.mkdtemp(prefix="volley_"), "picture.exr")
-    bpy.context.scene.render.filepath = path
-    bpy.ops.render.render(write_still=True)
+def render(scene=None):
+    """Render the scene, or one that the window does not show, as F12 does; its Combined picture."""
+    scene = scene or bpy.context.scene
+    scene.render.filepath = path = os.path.join(tempfile.mkdtemp(prefix="volley_"), "picture.exr")
+    bpy.ops.render.render(write_still=True, scene=scene.name)
     return load(path)
 
 

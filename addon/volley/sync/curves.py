@@ -2,8 +2,8 @@
 """Strands and points as the library has them: Catmull-Rom splines with radii, and balls."""
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
-import bpy
 import numpy as np
 
 from .. import abi
@@ -14,6 +14,25 @@ from .hashing import HASH_MAX, hash_numbers
 _SHORTEST = 1e-12   # m; keys of a strand that are closer are one
 _ROUND_PIECES = 8   # most of a segment of round curves
 _TOLERANCE = 0.1    # radii that pieces may be off: less than is seen
+
+
+class Wanted(NamedTuple):
+    """What a sync makes of all strands and points."""
+
+    uv_names: frozenset
+    color_names: frozenset
+    needs_generated: bool
+    shape: int   # abi.CurveShape
+    pieces: int  # most of a segment
+
+    @classmethod
+    def of_scene(cls, names, scene):
+        """names: the first three fields; the others are those that Cycles is set to in the scene."""
+        if cycles_curves(scene, "shape", 'RIBBONS') == 'RIBBONS':
+            pieces = min(1 << cycles_curves(scene, "subdivisions", 2), abi.MAX_CURVE_PIECES)
+            return cls(*names, abi.CurveShape.RIBBON, pieces)
+        is_linear = cycles_curves(scene, "shape", 'RIBBONS') == 'THICK_LINEAR'
+        return cls(*names, abi.CurveShape.ROUND, 1 if is_linear else _ROUND_PIECES)
 
 
 @dataclass
@@ -117,20 +136,11 @@ class CurvesData:
         scene.update_curves(mesh_id, positions)
 
 
-def curves_of(strands, values=(), generated=None):
+def curves_of(strands, wanted, values=(), generated=None):
     """Strands or points as CurvesData; values: (name, (keys | strands, 2 | 4), whether of strands)."""
-    shape, pieces = _shape()
     lengths = None if strands.lengths is None else strands.lengths.astype(np.uint32)
-    return CurvesData(strands.points(), lengths, shape, pieces, list(values)[:abi.MAX_ATTRIBUTES], generated)
-
-
-def _shape():
-    """The shape of curves that Cycles is set to, and into how many pieces it cuts a segment of them."""
-    scene = bpy.context.scene
-    shape = cycles_curves(scene, "shape", 'RIBBONS')
-    if shape == 'RIBBONS':
-        return abi.CurveShape.RIBBON, min(1 << cycles_curves(scene, "subdivisions", 2), abi.MAX_CURVE_PIECES)
-    return abi.CurveShape.ROUND, 1 if shape == 'THICK_LINEAR' else _ROUND_PIECES
+    return CurvesData(strands.points(), lengths, wanted.shape, wanted.pieces,
+                      list(values)[:abi.MAX_ATTRIBUTES], generated)
 
 
 class StrandMotion(KeyedShapes):

@@ -37,12 +37,11 @@ _DATA_TYPES = tuple(getattr(bpy.types, name) for name in ("Curves", "PointCloud"
 
 
 class Hair:
-    """The hair of one of an object's particle systems, at any time that the depsgraph is moved to. names:
-    UV maps and colours that are wanted, and whether Generated coordinates are; a strand has those of its
-    root."""
+    """The hair of one of an object's particle systems, at any time that the depsgraph is moved to.
+    wanted: curves.Wanted; a strand has the values of its root."""
 
-    def __init__(self, number, depsgraph, is_final, names):
-        self._number, self._depsgraph, self._is_final, self._names = number, depsgraph, is_final, names
+    def __init__(self, number, depsgraph, is_final, wanted):
+        self._number, self._depsgraph, self._is_final, self._wanted = number, depsgraph, is_final, wanted
 
     def _find(self, instance):
         """The evaluated object itself of an instance of it, and the modifier, None where it is off."""
@@ -84,22 +83,22 @@ class Hair:
     def curves(self, instance, strands):
         """Which keys of what was read are kept, None for all, and those as curves.CurvesData."""
         real, modifier = self._find(instance)
-        uv_names, color_names, needs_generated = self._names
-        values = _root_values(real.data, modifier, _shown_strands(modifier.particle_system), uv_names, color_names)
+        values = _root_values(real.data, modifier, _shown_strands(modifier.particle_system),
+                              self._wanted.uv_names, self._wanted.color_names)
         is_kept = strands.keys_kept()
         strands = strands.only(is_kept)
         generated = None
-        if needs_generated:
+        if self._wanted.needs_generated:
             location, size = (np.array(each) for each in (real.data.texspace_location, real.data.texspace_size))
             generated = _in_box(strands.first_points(), location, size)
-        return is_kept, _curves(strands, values, color_names, generated)
+        return is_kept, _curves(strands, self._wanted, values, generated)
 
 
 class StrandObject:
-    """A Curves or Point Cloud object, at any time; names: as Hair's."""
+    """A Curves or Point Cloud object, at any time; wanted: as Hair's."""
 
-    def __init__(self, names):
-        self._names = names
+    def __init__(self, wanted):
+        self._wanted = wanted
 
     @staticmethod
     def may_move(_instance):
@@ -121,13 +120,12 @@ class StrandObject:
 
     def curves(self, instance, strands):
         """Which keys of what was read are kept (None: all), and those as curves.CurvesData."""
-        uv_names, color_names, needs_generated = self._names
-        values = _object_values(instance.object.data, uv_names, color_names)
+        values = _object_values(instance.object.data, self._wanted.uv_names, self._wanted.color_names)
         generated = None
-        if needs_generated:
+        if self._wanted.needs_generated:
             lower, upper = strands.positions.min(axis=0), strands.positions.max(axis=0)
             generated = _in_box(strands.first_points(), 0.5 * (lower + upper), 0.5 * (upper - lower))
-        return None, _curves(strands, values, color_names, generated)
+        return None, _curves(strands, self._wanted, values, generated)
 
 
 def _has_force(blender_object):
@@ -147,13 +145,13 @@ def _in_box(points, middle, half):
     return 0.5 + np.divide(points - middle, 2.0 * half, out=np.zeros(points.shape), where=half > 0.0)
 
 
-def _curves(strands, values, color_names, generated):
+def _curves(strands, wanted, values, generated):
     """curves.CurvesData of strands or points, with those values."""
     own = []
     if strands.lengths is not None:
         own = [(name, tell(), False) for name, tell in (
-            (HAIR_ATTRIBUTE, strands.info), (DIRECTION_ATTRIBUTE, strands.directions)) if name in color_names]
-    return curves.curves_of(strands, values[:abi.MAX_ATTRIBUTES - len(own)] + own, generated)
+            (HAIR_ATTRIBUTE, strands.info), (DIRECTION_ATTRIBUTE, strands.directions)) if name in wanted.color_names]
+    return curves.curves_of(strands, wanted, values[:abi.MAX_ATTRIBUTES - len(own)] + own, generated)
 
 
 def _root_values(mesh, modifier, strands, uv_names, color_names):

@@ -61,6 +61,7 @@ class Walk:
         if source.needs_uv:
             uv_names.add("")
         self._names = frozenset(uv_names), frozenset(color_names), needs_generated
+        self._wanted_strands = curves.Wanted.of_scene(self._names, source.depsgraph.scene_eval)
         self._tangents = None  # pointer of a mesh -> the tangents that its objects' materials read
         self._owners = {}     # pointer of a mesh -> key of its owner, within this walk
         self._deforming = {}  # owner key -> _Deforming
@@ -162,7 +163,7 @@ class Walk:
             self._dress(item, each)
             slot = max(min(modifier.particle_system.settings.material, len(item.materials)), 1) - 1
             item.materials = item.materials[slot:slot + 1]
-            hair = strands.Hair(number, self._source.depsgraph, is_final, self._names)
+            hair = strands.Hair(number, self._source.depsgraph, is_final, self._wanted_strands)
             self._add_made(each, item, (blender_object.name_full, number), hair)
 
     def _move_hair(self, each, fraction):
@@ -178,7 +179,7 @@ class Walk:
         self._dress(item, each)
         item.materials = item.materials[:1]
         self.tied.add(each.object.name_full)
-        self._add_made(each, item, each.object.data.as_pointer(), strands.StrandObject(self._names))
+        self._add_made(each, item, each.object.data.as_pointer(), strands.StrandObject(self._wanted_strands))
 
     def _add_made(self, each, item, source, made_of):
         """An item of strands or points (strands.Hair or strands.StrandObject) whose mesh is made unless another
@@ -198,7 +199,7 @@ class Walk:
         show."""
         changes, meshes = self._source.changes, self._sync._meshes
         is_same = not changes.full and item.owner not in changes.objects
-        if is_same and meshes.reuse(item.key, source, self._names):
+        if is_same and meshes.reuse(item.key, source, self._wanted_strands):
             return True
         shape = made_of.read(each)
         if shape is None:
@@ -207,9 +208,9 @@ class Walk:
         may_deform = item.motion_keys > 1 and motion.may_deform(each.object, instance.maker_of(each))
         if may_deform and made_of.may_move(each):
             shapes = curves.StrandMotion(shape, is_kept, data, item.motion_keys)
-            self._deforming[item.key] = _Deforming(source, data, self._names, shapes, made_of.read)
+            self._deforming[item.key] = _Deforming(source, data, self._wanted_strands, shapes, made_of.read)
         else:
-            meshes.put(item.key, source, data, self._names)
+            meshes.put(item.key, source, data, self._wanted_strands)
         return True
 
     def _mesh_key(self, item, each):
