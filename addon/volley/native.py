@@ -323,19 +323,19 @@ class Scene:
                       generated=None, tolerance=0.0):
         """Curves: points (keys, points, 4) float32, place and radius; lengths (strands,) uint32, points of
         each, or None: balls; attributes: (name, array (points | strands, 2 | 4) float32, whether of strands),
-        the default UV map first; generated: (strands, 3) or None; tolerance: in radii, 0 for piece_count pieces everywhere. They
-        are a mesh to all else."""
+        the default UV map first; generated: (strands, 3) or None; tolerance: in radii, 0 for piece_count
+        pieces everywhere. They are a mesh to all else."""
         points, lengths = _array(points, np.float32), _array(lengths, np.uint32)
         generated = _array(generated, np.float32)
         arrays = [(_text(name) or b"", _array(values, np.float32), of_strands)
                   for name, values, of_strands in attributes]
         structs = (abi.CurveAttribute * len(arrays))(*(
             describe(abi.CurveAttribute, width=values.shape[-1], name=name, values=_address(values),
-                     value_count=values.size, per_strand=int(of_strands)) for name, values, of_strands in arrays))
+                     value_count=values.size, per_strand=int(of_strands))
+            for name, values, of_strands in arrays))
         desc = describe(
             abi.CurvesDesc, key_count=points.shape[0], shape=shape, piece_count=piece_count,
-            tolerance=tolerance,
-            point_count=points.shape[1], points=_address(points), point_value_count=points.size,
+            tolerance=tolerance, point_count=points.shape[1], points=_address(points), point_value_count=points.size,
             lengths=_address(lengths), strand_count=0 if lengths is None else len(lengths),
             generated=_address(generated), generated_count=0 if generated is None else generated.size,
             attributes=structs if arrays else None, attribute_count=len(arrays))

@@ -158,9 +158,9 @@ NO_PARTICLE_RANDOM = hash_pair(0, 0) / HASH_MAX
 
 
 def instancer_values(instance, scene):
-    """What made an instance: its particle's index, random number (less NO_PARTICLE_RANDOM), age, lifetime (frames) and size, its
-    location, velocity and angular velocity, the Generated (halved, as in Cycles) and the UV coordinates
-    of its place; 0 what there is not. Child particles have nothing, as in Cycles."""
+    """What made an instance: its particle's index, random number (less NO_PARTICLE_RANDOM), age, lifetime
+    (frames) and size, its location, velocity and angular velocity, the Generated (halved, as in Cycles) and
+    the UV coordinates of its place; 0 what there is not. Child particles have nothing, as in Cycles."""
     values = np.zeros(VALUES_END, np.float32)
     values[VALUES_GENERATED:VALUES_UV] = 0.5 * np.array(instance.orco) - 0.5
     values[VALUES_UV:VALUES_END] = instance.uv

@@ -14,8 +14,8 @@ from ..abi import (BlendMode, BumpMode, ClampType, DiffuseModel, DistributionTyp
                    ImageExtension, ImageInterpolation, ImageProjection, MappingType, MathOperation as Math,
                    ModeFlags, NodeType, NormalMapFlags, NormalMapSpace, RampInterpolation, SeparateMode,
                    SpaceId, TableSize, TangentSource, ToonComponent, VectorOperation as Vector)
-from ..compat import (HAS_CORRELATED_MICROFACETS, HAS_FILMED_METAL, HAS_UNIT_NORMALS, HAS_WHOLE_COAT, KEEPS_DIFFUSE_ENERGY,
-                      LEAVES_BUMPS, RAMP_STEPS, SCALES_NORMAL_MAPS)
+from ..compat import (HAS_CORRELATED_MICROFACETS, HAS_FILMED_METAL, HAS_UNIT_NORMALS, HAS_WHOLE_COAT,
+                      KEEPS_DIFFUSE_ENERGY, LEAVES_BUMPS, RAMP_STEPS, SCALES_NORMAL_MAPS)
 from . import tangents
 from .converters import CONVERTERS, instance_value
 from .derived import ISLAND, POINTINESS

@@ -44,8 +44,7 @@ static void point_bound(const struct trc_lamp *lamp, struct trc_light_bound *b) 
 
 /* ---- spot ---- */
 
-/* How much longer the light's Z axis is than its X and Y axes: in its own space the cone is round.
- */
+/* By its Z axis over its X and Y axes: the cone is round in the light's own space. */
 static void stretch_spot(const trc_light_desc *desc, struct trc_lamp *lamp) {
     const float *m = desc->transform;
     float u[3] = {m[0], m[4], m[8]}, v[3] = {m[1], m[5], m[9]}, w[3] = {m[2], m[6], m[10]};
