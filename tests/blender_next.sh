@@ -37,7 +37,8 @@ in_private() {
 }
 
 inside() {
-    in_private sh -c 'mount -t proc proc "$0/proc" 2>/dev/null; exec chroot "$0" "$@"' "$ROOT" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LC_ALL=C.UTF-8 \
+    in_private sh -c 'mount -t proc proc "$0/proc" 2>/dev/null; exec chroot "$0" "$@"' "$ROOT" \
+        env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LC_ALL=C.UTF-8 \
         ${http_proxy:+http_proxy="$http_proxy"} "$@" </dev/null
 }
 
@@ -153,7 +154,8 @@ or test_leaving or test_random_edits or test_a_session_of_work"
 # In what Blender 5 differs most from 4.3.
 CHANGED="test_sky or test_working_space or test_textures or test_shaders or test_thin_film or test_bump \
 or test_color_spaces or test_warnings or test_node_menus or test_registration or test_panels or test_passes \
-or test_follows_edits or test_view_through or test_ray_nodes or test_displacement"
+or test_follows_edits or test_view_through or test_ray_nodes or test_displacement or test_thin_wall \
+or test_tracing_nodes or test_strands or test_settings"
 
 fast_selection() {
     case $SUITE in
