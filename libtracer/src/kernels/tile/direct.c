@@ -112,31 +112,45 @@ TRC_INLINE void push(struct trc_tile *t, const struct arrival *a, const struct t
             vf_compress(q->split[3 * k + 2] + at, parts[k].z, bits);
         }
     }
-    if (t->left) {
-        vuint strand[2];
-        trc_strand_words(s, strand);
-        vu_compress(q->strand_instance + at, strand[0], bits);
-        vu_compress(q->strand + at, strand[1], bits);
-    }
     for (int k = 0; q->lamp[0] && k < 3; k++)
         vf_compress(q->lamp[k] + at, r->lamp, bits);
+}
+
+/* Enters the strands that the lanes' rays have left, the last of the queue. */
+static void strands_enter(struct trc_shadow_store *q, const struct trc_surface *s, vmask active) {
+    const uint32_t bits = vm_bits(active), at = q->count - (uint32_t)__builtin_popcount(bits);
+    vuint strand[2];
+    trc_strand_words(s, strand);
+    vu_compress(q->strand_instance + at, strand[0], bits);
+    vu_compress(q->strand + at, strand[1], bits);
 }
 
 void trc_shadow_push_from(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
                           const struct trc_light_sample *l, const struct light_result *r,
                           const vvec3 *o, vuint cell, vmask active) {
     push(t, a, s, l, r, *o, cell, active);
+    if (t->left)
+        strands_enter(&t->shadows, s, active);
+}
+
+/* Where instances have offsets or there are curves: of others, rays pay nothing for it. */
+static __attribute__((noinline)) void push_own(struct trc_tile *t, const struct arrival *a,
+                                               const struct trc_surface *s,
+                                               const struct trc_light_sample *l,
+                                               const struct light_result *r, vuint cell,
+                                               vmask active) {
+    const bool has_offsets = t->snapshot->features & TRC_FEATURE_SHADOW_TERMINATORS;
+    const vvec3 o = has_offsets ? own_origin(s, l->wi) : shadow_origin(s, l->wi);
+    trc_shadow_push_from(t, a, s, l, r, &o, cell, active);
 }
 
 void trc_shadow_push(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
                      const struct trc_light_sample *l, const struct light_result *r, vuint cell,
                      vmask active) {
-    if (t->snapshot->features & TRC_FEATURE_SHADOW_TERMINATORS) {
-        const vvec3 o = own_origin(s, l->wi);
-        trc_shadow_push_from(t, a, s, l, r, &o, cell, active);
-        return;
-    }
-    push(t, a, s, l, r, shadow_origin(s, l->wi), cell, active);
+    if (t->snapshot->features & (TRC_FEATURE_SHADOW_TERMINATORS | TRC_FEATURE_CURVES))
+        push_own(t, a, s, l, r, cell, active);
+    else
+        push(t, a, s, l, r, shadow_origin(s, l->wi), cell, active);
 }
 
 /* What the lanes' light samples are in the Shadow pass if nothing is in the way: lamps count

@@ -208,7 +208,9 @@ static void set_normals(struct trc_surface *s, const struct raw_hit *h, vvec3 e1
     s->n = v3_scale(n, side);
 }
 
-static void triangle_fetch(struct trc_surface *s) {
+void trc_triangle_fetch(struct trc_surface *s) {
+    if (!vm_any(s->active))
+        return;
     struct raw_hit h;
     const int32_t uniform = trc_uniform_instance(s->instance, s->active);
     const struct trc_instance *instance = uniform >= 0 ? &s->snapshot->instances[uniform] : NULL;
@@ -223,13 +225,12 @@ static void triangle_fetch(struct trc_surface *s) {
     set_normals(s, &h, e1, e2);
 }
 
-/* The same where there are curves. */
-static void mixed_fetch(struct trc_surface *s) {
+void trc_mixed_fetch(struct trc_surface *s) {
     const vmask active = s->active, curves = trc_curve_lanes(s);
     s->active = vm_andnot(active, curves);
     s->strand = vi_set(-1);
     if (vm_any(s->active)) {
-        triangle_fetch(s);
+        trc_triangle_fetch(s);
     } else {
         s->p = s->p_error = s->ng = s->n = s->bulge = v3_zero();
         s->backfacing = s->smooth = vm_none();
@@ -237,13 +238,4 @@ static void mixed_fetch(struct trc_surface *s) {
     s->active = active;
     if (vm_any(curves))
         trc_curve_fetch(s, curves);
-}
-
-void trc_surface_fetch(struct trc_surface *s) {
-    if (!vm_any(s->active))
-        return;
-    if (s->snapshot->features & TRC_FEATURE_CURVES)
-        mixed_fetch(s);
-    else
-        triangle_fetch(s);
 }

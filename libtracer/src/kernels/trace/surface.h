@@ -56,8 +56,17 @@ TRC_INLINE void trc_strand_words(const struct trc_surface *s, vuint out[2]) {
     out[1] = (vuint)s->strand;
 }
 
+/* trc_surface_fetch where there are curves, and where there are none. */
+void trc_mixed_fetch(struct trc_surface *s);
+void trc_triangle_fetch(struct trc_surface *s);
+
 /* Fills p, p_error, ng, n, backfacing, smooth, bulge from instance, triangle, u, v, time, wo.
  * (kernels/trace/surface.c) */
-void trc_surface_fetch(struct trc_surface *s);
+TRC_INLINE void trc_surface_fetch(struct trc_surface *s) {
+    if (s->snapshot->features & TRC_FEATURE_CURVES)
+        trc_mixed_fetch(s);
+    else
+        trc_triangle_fetch(s);
+}
 
 #endif
