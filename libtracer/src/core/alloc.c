@@ -1,14 +1,10 @@
 /* Memory of the library: every block is 64-byte aligned, counted, and can be made to fail. */
-#define _DEFAULT_SOURCE /* madvise */
-
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
-#ifdef __linux__
-#include <sys/mman.h>
-#endif
 
 #include "core/core.h"
+#include "core/system.h"
 
 /* A cache line, and the widest vector register. */
 #define ALIGNMENT 64
@@ -76,15 +72,12 @@ void *trc_alloc(size_t count, size_t size) { return allocate(count, size, ALIGNM
 void *trc_alloc_zeroed(size_t count, size_t size) { return allocate(count, size, ALIGNMENT, true); }
 
 void *trc_alloc_large(size_t count, size_t size) {
-#ifdef MADV_HUGEPAGE
-    if (size && count >= LARGE_PAGE / size) {
-        void *block = allocate(count, size, LARGE_PAGE, false);
-        if (block)
-            madvise(block, count * size, MADV_HUGEPAGE); /* a wish: small pages do, too */
-        return block;
-    }
-#endif
-    return allocate(count, size, ALIGNMENT, false);
+    if (!size || count < LARGE_PAGE / size)
+        return allocate(count, size, ALIGNMENT, false);
+    void *block = allocate(count, size, LARGE_PAGE, false);
+    if (block)
+        trc_system_want_large_pages(block, count * size);
+    return block;
 }
 
 void trc_free(void *block) {
@@ -99,3 +92,9 @@ void trc_free(void *block) {
 uint64_t trc_memory_bytes(void) { return atomic_load(&bytes_in_use); }
 
 uint64_t trc_memory_peak_bytes(void) { return atomic_load(&bytes_peak); }
+
+uint64_t trc_memory_left_bytes(void) {
+    const uint64_t used = trc_memory_bytes(), all = trc_system_memory_bytes();
+    const uint64_t own = all > used ? all - used : 0, left = trc_system_address_space_left();
+    return own < left ? own : left;
+}

@@ -1,15 +1,13 @@
-#define _POSIX_C_SOURCE 200809L
 #include "render/render.h"
 
-#include <errno.h>
 #include <math.h>
 #include <pthread.h>
 #include <stdbool.h>
 #include <string.h>
-#include <time.h>
 
 #include "core/checks.h"
 #include "core/core.h"
+#include "core/system.h"
 #include "core/thread.h"
 #include "film/part.h"
 #include "model/filter.h"
@@ -291,24 +289,17 @@ static void worker_main(void *context) {
 /* ---- start ---- */
 
 static trc_status init_sync(struct trc_render_state *render) {
-    pthread_condattr_t monotonic;
-    if (pthread_condattr_init(&monotonic))
-        goto fail;
-    pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
     if (pthread_mutex_init(&render->lock, NULL))
-        goto fail_attributes;
+        goto fail;
     if (pthread_cond_init(&render->tile_done, NULL))
         goto fail_lock;
-    if (pthread_cond_init(&render->ended, &monotonic))
+    if (!trc_system_create_condition(&render->ended))
         goto fail_tile_done;
-    pthread_condattr_destroy(&monotonic);
     return TRC_OK;
 fail_tile_done:
     pthread_cond_destroy(&render->tile_done);
 fail_lock:
     pthread_mutex_destroy(&render->lock);
-fail_attributes:
-    pthread_condattr_destroy(&monotonic);
 fail:
     return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "the system has no resources for a render");
 }
@@ -560,29 +551,15 @@ void trc_render_state_destroy(struct trc_render_state *render) {
     free_memory(render);
 }
 
-/* now + seconds, at most a century: what a timespec surely holds. */
-static struct timespec deadline_in(double seconds) {
-    struct timespec t = {0};
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    seconds = fmin(seconds, 100.0 * 365 * 86400);
-    const double whole = floor(seconds);
-    t.tv_sec += (time_t)whole;
-    t.tv_nsec += (long)((seconds - whole) * 1e9);
-    if (t.tv_nsec >= 1000000000L) {
-        t.tv_nsec -= 1000000000L;
-        t.tv_sec++;
-    }
-    return t;
-}
-
 void trc_render_state_wait(struct trc_render_state *render, double timeout_seconds) {
     const bool limited = timeout_seconds >= 0.0;
-    const struct timespec deadline = deadline_in(limited ? timeout_seconds : 0.0);
-    int error = 0;
+    /* At most a century: what every system can count to. */
+    const double deadline = trc_seconds() + fmin(timeout_seconds, 100.0 * 365 * 86400);
+    bool goes_on = true;
     pthread_mutex_lock(&render->lock);
-    while (render->state == TRC_PROGRESS_RUNNING && error != ETIMEDOUT) {
+    while (render->state == TRC_PROGRESS_RUNNING && goes_on) {
         if (limited)
-            error = pthread_cond_timedwait(&render->ended, &render->lock, &deadline);
+            goes_on = trc_system_wait(&render->ended, &render->lock, deadline);
         else
             pthread_cond_wait(&render->ended, &render->lock);
     }
