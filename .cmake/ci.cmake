@@ -1,4 +1,5 @@
-# Release with warnings as errors: cmake -G Ninja -C .cmake/ci.cmake -B build
+# Release with tests and benchmarks, warnings as errors: cmake -G Ninja -C .cmake/ci.cmake -B build
 include(${CMAKE_CURRENT_LIST_DIR}/release.cmake)
 set(TRACER_WERROR ON CACHE BOOL "")
 set(TRACER_BUILD_TESTS ON CACHE BOOL "")
+set(TRACER_BUILD_BENCH ON CACHE BOOL "")

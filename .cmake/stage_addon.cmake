@@ -1,5 +1,6 @@
-# Makes STAGE a copy of the add-on in SOURCE plus lib/libtracer.so (LIBRARY), lib/tracer_reader (READER,
-# unless that is empty), lib/revision (of the sources, where git knows it) and LICENSE.
+# Makes STAGE a copy of the add-on in SOURCE that says it is VERSION, plus lib/LIBRARY_NAME (LIBRARY),
+# lib/tracer_reader (READER, unless that is empty), lib/revision (of the sources, where git knows it) and
+# LICENSE.
 #
 # Only what differs is written, and by renaming: a Blender that has the old library loaded keeps it.
 # Files that left SOURCE leave STAGE too. Python's __pycache__ folders are left alone.
@@ -19,22 +20,45 @@ function(stage from to)
     file(RENAME "${to}.new" "${to}")
 endfunction()
 
+# A file of SOURCE with its one PLACE for the version filled in.
+set(versioned __init__.py blender_manifest.toml)
+function(stage_versioned name place filled)
+    file(READ "${SOURCE}/${name}" content)
+    string(FIND "${content}" "${place}" found)
+    if(found EQUAL -1)
+        message(FATAL_ERROR "${SOURCE}/${name} has no ${place}")
+    endif()
+    string(REPLACE "${place}" "${filled}" content "${content}")
+    file(WRITE "${STAGE}.${name}" "${content}")
+    stage("${STAGE}.${name}" "${STAGE}/${name}")
+    file(REMOVE "${STAGE}.${name}")
+endfunction()
+
 file(GLOB_RECURSE sources LIST_DIRECTORIES false RELATIVE "${SOURCE}" "${SOURCE}/*")
 list(FILTER sources EXCLUDE REGEX "__pycache__|\\.pyc$|^lib/")
 file(GLOB_RECURSE staged LIST_DIRECTORIES false RELATIVE "${STAGE}" "${STAGE}/*")
 list(FILTER staged EXCLUDE REGEX "__pycache__")
 
+set(added LICENSE lib/${LIBRARY_NAME} lib/revision)
+if(READER)
+    list(APPEND added lib/tracer_reader)
+endif()
 foreach(name IN LISTS staged)
-    if(NOT name IN_LIST sources AND NOT name STREQUAL "lib/libtracer.so"
-            AND NOT name STREQUAL "lib/revision" AND NOT name STREQUAL "LICENSE" AND NOT (READER AND name STREQUAL "lib/tracer_reader"))
+    if(NOT name IN_LIST sources AND NOT name IN_LIST added)
         file(REMOVE "${STAGE}/${name}")
     endif()
 endforeach()
 foreach(name IN LISTS sources)
-    stage("${SOURCE}/${name}" "${STAGE}/${name}")
+    if(NOT name IN_LIST versioned)
+        stage("${SOURCE}/${name}" "${STAGE}/${name}")
+    endif()
 endforeach()
+string(REPLACE "." ", " version_tuple "${VERSION}")
+set(remark "# the build fills in that of the library")
+stage_versioned(__init__.py "\"version\": (0, 0, 0),  ${remark}" "\"version\": (${version_tuple}),")
+stage_versioned(blender_manifest.toml "version = \"0.0.0\" ${remark}" "version = \"${VERSION}\"")
 stage("${LICENSE}" "${STAGE}/LICENSE")
-stage("${LIBRARY}" "${STAGE}/lib/libtracer.so")
+stage("${LIBRARY}" "${STAGE}/lib/${LIBRARY_NAME}")
 if(READER)
     stage("${READER}" "${STAGE}/lib/tracer_reader")
 endif()

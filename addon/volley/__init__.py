@@ -6,13 +6,12 @@ import sys
 bl_info = {
     "name": "Volley",
     "author": "The Volley authors",
-    "version": (0, 1, 0),
+    "version": (0, 0, 0),  # the build fills in that of the library
     "blender": (3, 4, 0),
     "location": "Render Properties > Render Engine > Volley",
     "description": "Packet-based Whitted and distribution ray tracing",
     "category": "Render",
 }
-
 
 
 def _forget_submodules():

@@ -1,4 +1,4 @@
-/* Version of the library and of its binary interface. */
+/* Version of the library, the add-on and their packages, and of the binary interface. */
 #ifndef TRACER_VERSION_H
 #define TRACER_VERSION_H
 
