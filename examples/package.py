@@ -1,33 +1,28 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Packs a staged add-on: the extension, the legacy add-on, and a bill of materials (see package.sh).
+"""Packs a staged add-on: the extension, the legacy add-on, and a bill of materials; then lists the extensions
+(see package.sh).
 
-    package.py --stage DIR --platform linux-x64 --out DIR
+    package.py pack --stage DIR --platform linux-x64 --out DIR
+    package.py index --out DIR
 
 Archives of equal contents are equal bytes: entries are sorted and carry one date."""
 
 import argparse
-import ast
 import hashlib
 import json
-import re
+import tomllib
 import zipfile
 from pathlib import Path
 
 _DATE = (1980, 1, 1, 0, 0, 0)  # the earliest that zip can say
 _PROGRAM, _FILE, _FOLDER = 0o100755, 0o100644, 0o040755
+_LEGACY = "legacy"  # a folder of their own: what is beside an index are extensions
 
 
 def version_of(stage):
-    """The version, which the manifest and bl_info have to agree on."""
-    manifest = re.search(r'^version = "([^"]+)"$', (stage / "blender_manifest.toml").read_text(), re.MULTILINE)[1]
-    for statement in ast.parse((stage / "__init__.py").read_text()).body:
-        if isinstance(statement, ast.Assign) and statement.targets[0].id == "bl_info":
-            legacy = ".".join(map(str, ast.literal_eval(statement.value)["version"]))
-            break
-    if legacy != manifest:
-        raise SystemExit(f"package: bl_info says version {legacy}, blender_manifest.toml {manifest}")
-    return manifest
+    """The version that the build has written into the manifest."""
+    return tomllib.loads((stage / "blender_manifest.toml").read_text())["version"]
 
 
 def files_of(stage):
@@ -75,21 +70,46 @@ def bill_of_materials(version, platform, files):
                            component("application", "volley", "GPL-3.0-or-later", addon)]}
 
 
+def pack_stage(stage, platform, out):
+    """Both packages of a platform and their bill of materials."""
+    version, files = version_of(stage), files_of(stage)
+    name = f"volley-{version}-{platform}"
+    (out / _LEGACY).mkdir(parents=True, exist_ok=True)
+    manifest = with_platform(files["blender_manifest.toml"], platform)
+    pack(out / f"{name}.zip", {**files, "blender_manifest.toml": manifest})
+    legacy = {path: content for path, content in files.items() if path != "blender_manifest.toml"}
+    pack(out / _LEGACY / f"{name}-legacy.zip", legacy, "volley/")
+    bill = bill_of_materials(version, platform, files)
+    (out / f"{name}.cdx.json").write_text(json.dumps(bill, indent=2) + "\n")
+
+
+def index(out):
+    """What Blender reads of a repository: of each extension its manifest, size and checksum. The same as of
+    ``blender --command extension server-generate``, for machines without Blender 4.2."""
+    listed = []
+    for path in sorted(out.glob("*.zip")):
+        with zipfile.ZipFile(path) as archive:
+            manifest = tomllib.loads(archive.read("blender_manifest.toml").decode())
+        content = path.read_bytes()
+        listed.append({**manifest, "archive_url": f"./{path.name}", "archive_size": len(content),
+                       "archive_hash": f"sha256:{hashlib.sha256(content).hexdigest()}"})
+    text = json.dumps({"version": "v1", "blocklist": [], "data": listed}, indent=2)
+    (out / "index.json").write_text(text + "\n")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--stage", type=Path, required=True)
-    parser.add_argument("--platform", required=True)
-    parser.add_argument("--out", type=Path, required=True)
-    arguments = parser.parse_args()
-    version, files = version_of(arguments.stage), files_of(arguments.stage)
-    name = f"volley-{version}-{arguments.platform}"
-    arguments.out.mkdir(parents=True, exist_ok=True)
-    manifest = with_platform(files["blender_manifest.toml"], arguments.platform)
-    pack(arguments.out / f"{name}.zip", {**files, "blender_manifest.toml": manifest})
-    legacy = {path: content for path, content in files.items() if path != "blender_manifest.toml"}
-    pack(arguments.out / f"{name}-legacy.zip", legacy, "volley/")
-    bill = bill_of_materials(version, arguments.platform, files)
-    (arguments.out / f"{name}.cdx.json").write_text(json.dumps(bill, indent=2) + "\n")
+    commands = parser.add_subparsers(required=True)
+    packing = commands.add_parser("pack")
+    packing.set_defaults(run=pack_stage)
+    packing.add_argument("--stage", type=Path, required=True)
+    packing.add_argument("--platform", required=True)
+    listing = commands.add_parser("index")
+    listing.set_defaults(run=index)
+    for command in packing, listing:
+        command.add_argument("--out", type=Path, required=True)
+    arguments = vars(parser.parse_args())
+    arguments.pop("run")(**arguments)
 
 
 if __name__ == "__main__":

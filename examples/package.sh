@@ -1,14 +1,15 @@
 #!/usr/bin/env bash
 # Makes the packages that users install from a file, in build/packages:
 #
-#   bash examples/package.sh [linux-x64] [linux-arm64]        linux-x64 if none is named
+#   bash examples/package.sh [PLATFORM]...        linux-x64 if none is named
 #
-#   volley-VERSION-PLATFORM.zip          the extension, for Blender 4.2 and later
-#   volley-VERSION-PLATFORM-legacy.zip   the add-on, for Blender 3.4 to 4.1
-#   volley-VERSION-PLATFORM.cdx.json     bill of materials (CycloneDX)
+#   volley-VERSION-PLATFORM.zip                 the extension, for Blender 4.2 and later
+#   index.json                                  lists the extensions: the folder is a repository for Blender
+#   legacy/volley-VERSION-PLATFORM-legacy.zip   the add-on, for Blender 3.4 to 4.1
+#   volley-VERSION-PLATFORM.cdx.json            bill of materials (CycloneDX)
 #   SHA256SUMS
 #
-# The library loads with glibc 2.28 and later: today's compiler builds it against the headers and libraries
+# A library for Linux loads with glibc 2.28 and later: today's compiler builds it against the headers and libraries
 # of Debian 11, which are fetched once into $XDG_CACHE_HOME/volley. Needs Debian, and root or sudo where
 # packages are missing. A checkout with changes is packed as it is, and its version says so.
 set -euo pipefail
@@ -17,6 +18,15 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 OLD_SUITE=bullseye
 CACHE=${XDG_CACHE_HOME:-$HOME/.cache}/volley
 out=build/packages
+
+# Blender's name of a platform, Debian's of its architecture where Debian 11's C library is needed ("-":
+# it is not), and the package of the compiler. What the compiler is told is in .cmake/package.cmake.
+platforms() {
+    cat <<'END'
+linux-x64 amd64 gcc
+linux-arm64 arm64 gcc-aarch64-linux-gnu
+END
+}
 
 say() { printf '== %s\n' "$*"; }
 die() { printf 'package: %s\n' "$*" >&2; exit 1; }
@@ -76,8 +86,8 @@ make_sysroot() {
 }
 
 # No symbol that glibc has only had since after 2.28, and none that is not the library's own interface.
-check_library() {
-    local library=$1 newest foreign
+check_linux_library() {
+    local library=$1/libtracer.so newest foreign
     newest=$(objdump -T "$library" | grep -o 'GLIBC_[0-9.]*' | sort -uV | tail -n 1)
     [ "$(printf 'GLIBC_2.28\n%s\n' "$newest" | sort -V | tail -n 1)" = GLIBC_2.28 ] ||
         die "$library needs $newest"
@@ -100,24 +110,30 @@ build() {
 
 package() {
     local platform=$1 architecture=$2 compiler=$3
-    local sysroot=$CACHE/$OLD_SUITE-$architecture dir=build/package-$platform
+    local sysroot="" dir=build/package-$platform
+    local stage=$dir/blender/addons/volley
     install_packages "$compiler"
-    mkdir -p "$CACHE"
-    make_sysroot "$architecture" "$sysroot"
+    if [ "$architecture" != - ]; then
+        sysroot=$CACHE/$OLD_SUITE-$architecture
+        mkdir -p "$CACHE"
+        make_sysroot "$architecture" "$sysroot"
+    fi
     build "$platform" "$sysroot" "$dir"
-    check_library "$dir/blender/addons/volley/lib/libtracer.so"
-    python3 examples/package.py --stage "$dir/blender/addons/volley" --platform "$platform" --out "$out"
+    case $platform in
+        linux-*) check_linux_library "$stage/lib" ;;
+    esac
+    python3 examples/package.py pack --stage "$stage" --platform "$platform" --out "$out"
 }
 
 [ $# -gt 0 ] || set -- linux-x64
+for platform in "$@"; do
+    platforms | grep -q "^$platform " || die "unknown platform: $platform; there are $(platforms | cut -d ' ' -f 1 | xargs)"
+done
 rm -rf "$out"
 for platform in "$@"; do
-    case $platform in
-        linux-x64) package linux-x64 amd64 gcc ;;
-        linux-arm64) package linux-arm64 arm64 gcc-aarch64-linux-gnu ;;
-        *) die "unknown platform: $platform" ;;
-    esac
+    package $(platforms | grep "^$platform ")
 done
-(cd "$out" && sha256sum -- *.zip *.json >SHA256SUMS)
+python3 examples/package.py index --out "$out"
+(cd "$out" && sha256sum -- *.zip legacy/*.zip *.json >SHA256SUMS)
 say "Packages in $out:"
 cat "$out/SHA256SUMS"

@@ -87,10 +87,10 @@ def packages(tmp_path):
     stage, out = tmp_path / "stage", tmp_path / "packages"
     shutil.copytree(os.path.join(blender_support.user_scripts(), "addons", "volley"), stage,
                     ignore=shutil.ignore_patterns("tracer_reader"))
-    subprocess.run([sys.executable, os.path.join(_REPOSITORY, "examples/package.py"), "--stage", stage,
+    subprocess.run([sys.executable, os.path.join(_REPOSITORY, "examples/package.py"), "pack", "--stage", stage,
                     "--platform", "linux-x64", "--out", out], check=True)
-    legacy, = out.glob("*-legacy.zip")
-    extension, = (path for path in out.glob("*.zip") if path != legacy)
+    extension, = out.glob("*.zip")
+    legacy, = out.glob("legacy/*.zip")
     return extension, legacy
 
 
