@@ -26,6 +26,8 @@ _PRINCIPLED = "Principled has other inputs since 4.0; those of each have cases o
 SKIPS = (
     Skip("test_packages.py::test_legacy_package", (4, 2), None, "extensions took the place of add-ons"),
     Skip("test_packages.py::test_extension", None, (4, 2), "extensions came with 4.2"),
+    Skip("test_packages.py::test_extension_by_operators", None, (4, 2), "extensions came with 4.2"),
+    Skip("test_packages.py::test_repository", None, (4, 2), "extensions came with 4.2"),
     # Blender 3
     *(Skip(f"{_TEXTURE}[voronoi {kind}]", None, (4, 0), _OCTAVES) for kind in (
         "*, octaves", "* to 1", "* varies", "F1, no lacunarity")),

@@ -2,8 +2,9 @@
 """Images: files by their path, everything else by its pixels.
 
 Plain and packed files are read by the library itself. Generated and painted images, frames of movies, and
-files in formats that the library does not know, come from Blender's pixels. An image that is missing, damaged,
-too large or whatever else is 0, which renders magenta, with one warning; it never costs the render.
+files in formats that the library does not know, or any where it has no OpenImageIO, come from Blender's
+pixels. An image that is missing, damaged, too large or whatever else is 0, which renders magenta, with one
+warning; it never costs the render.
 Colours are converted to scene-linear ones by the library, with Blender's OpenColorIO configuration.
 """
 
@@ -178,7 +179,7 @@ class Images:
                         file.write(image.packed_file.data)
                     return self._from_file(image, path, is_mip_mapped)
             return self._from_pixels(image, is_mip_mapped)
-        except (native.TracerError, OSError, MemoryError) as error:
+        except (native.TracerError, OSError, RuntimeError, MemoryError) as error:  # RuntimeError: of Blender
             self._warnings.add(f"Image '{image.name}': {error or 'no memory'}; magenta is used")
             return 0
 
@@ -191,7 +192,8 @@ class Images:
                 self._warnings.add(f"{error}; Blender reads them")
             elif error.status != abi.StatusCode.ERROR_FORMAT:
                 raise
-        return self._from_pixels(image, is_mip_mapped)
+        with bpy.data.temp_data() as data:  # the image itself shows any one of its frames or tiles
+            return self._from_pixels(_loaded(data, image, path), is_mip_mapped)
 
     def _from_pixels(self, image, is_mip_mapped):
         pixels = read_pixels(image)
@@ -245,6 +247,14 @@ def read_pixels(image):
         pixels += 0.5
         pixels = pixels.astype(np.uint8)
     return _to_rgba(pixels.reshape(height, width, -1))
+
+
+def _loaded(data, image, path):
+    """A file of an image as one of its own in data, with the same settings."""
+    loaded = data.images.load(path)
+    loaded.colorspace_settings.name = image.colorspace_settings.name
+    loaded.alpha_mode = image.alpha_mode
+    return loaded
 
 
 def _to_rgba(pixels):
