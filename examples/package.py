@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Packs a staged add-on: the extension, the legacy add-on, and a bill of materials; then lists the extensions
-(see package.sh).
+"""Checks a library for Linux, packs a staged add-on: the extension, the legacy add-on, and a bill of materials;
+then lists the extensions (see package.sh).
 
+    package.py check --library FILE
     package.py pack --stage DIR --platform linux-x64 --out DIR
     package.py index --out DIR
 
@@ -11,6 +12,8 @@ Archives of equal contents are equal bytes: entries are sorted and carry one dat
 import argparse
 import hashlib
 import json
+import re
+import subprocess
 import tomllib
 import zipfile
 from pathlib import Path
@@ -18,6 +21,41 @@ from pathlib import Path
 _DATE = (1980, 1, 1, 0, 0, 0)  # the earliest that zip can say
 _PROGRAM, _FILE, _FOLDER = 0o100755, 0o100644, 0o040755
 _LEGACY = "legacy"  # a folder of their own: what is beside an index are extensions
+
+# What a library for Linux may ask of the system: Blender's own baseline.
+_GLIBC = (2, 28)
+_SYSTEM_LIBRARIES = {"libc.so.6", "libm.so.6", "libpthread.so.0", "libdl.so.2"}
+_LOADER = "ld-linux"
+
+
+def symbols_of(library):
+    """The dynamic symbols of an ELF file: ({imported name: version of glibc or None}, exported names, names of
+    needed libraries)."""
+    listing = subprocess.run(["readelf", "--wide", "--dynamic", "--dyn-syms", library], check=True, text=True,
+                             stdout=subprocess.PIPE, env={"PATH": "/usr/bin:/bin", "LC_ALL": "C"}).stdout
+    imported, exported = {}, set()
+    for index, name in re.findall(r"(?:GLOBAL|WEAK) +\w+ +(\w+) (\S+)", listing):
+        name, _, version = name.partition("@")
+        if index == "UND":
+            found = re.fullmatch(r"@?GLIBC_([0-9.]+)", version)
+            imported[name] = tuple(map(int, found[1].split("."))) if found else None
+        else:
+            exported.add(name)
+    return imported, exported, set(re.findall(r"\(NEEDED\).*\[(.*)\]", listing))
+
+
+def check_library(library):
+    """Refuse a library that would not load with glibc 2.28, that needs more than the system's libraries, or that
+    exports more than its interface."""
+    imported, exported, needed = symbols_of(library)
+    newer = {name: version for name, version in imported.items() if version and version > _GLIBC}
+    foreign = {name for name in exported if not name.startswith("trc_")}
+    others = {name for name in needed - _SYSTEM_LIBRARIES if not name.startswith(_LOADER)}
+    if newer or foreign or others or not exported:
+        raise SystemExit(f"package: {library} needs {newer or 'no newer glibc'} and {others or 'no other library'}, "
+                         f"exports {foreign or 'nothing else'}")
+    newest = max(filter(None, imported.values()))
+    print(f"== Needs glibc {'.'.join(map(str, newest))} or later and {' '.join(sorted(needed))}")
 
 
 def version_of(stage):
@@ -100,6 +138,9 @@ def index(out):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     commands = parser.add_subparsers(required=True)
+    checking = commands.add_parser("check")
+    checking.set_defaults(run=check_library)
+    checking.add_argument("--library", type=Path, required=True)
     packing = commands.add_parser("pack")
     packing.set_defaults(run=pack_stage)
     packing.add_argument("--stage", type=Path, required=True)

@@ -14,9 +14,9 @@
 # packages are missing. A checkout with changes is packed as it is, and its version says so.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
+source tests/debian.sh
 
 OLD_SUITE=bullseye
-CACHE=${XDG_CACHE_HOME:-$HOME/.cache}/volley
 out=build/packages
 
 # Blender's name of a platform, Debian's of its architecture where Debian 11's C library is needed ("-":
@@ -28,7 +28,6 @@ linux-arm64 arm64 gcc-aarch64-linux-gnu
 END
 }
 
-say() { printf '== %s\n' "$*"; }
 die() { printf 'package: %s\n' "$*" >&2; exit 1; }
 
 as_root() {
@@ -36,7 +35,7 @@ as_root() {
 }
 
 # Debian's compiler for a platform, and what it takes to build and pack with.
-install_packages() {
+install_tools() {
     local package missing=()
     for package in cmake ninja-build python3 binutils "$@"; do
         [ "$(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null)" = installed ] ||
@@ -47,14 +46,6 @@ install_packages() {
     as_root apt-get update -q </dev/null
     as_root env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends \
         "${missing[@]}" </dev/null
-}
-
-# The mirror that this system installs from.
-mirror() {
-    local found
-    found=$(apt-get indextargets --format '$(SITE) $(REPO_URI)' 'Created-By: Packages' 2>/dev/null |
-        sed -n 's|^[^ ]* \(.*/debian/\{0,1\}\)$|\1|p' | head -n 1)
-    printf '%s\n' "${found:-http://deb.debian.org/debian}"
 }
 
 # Headers and libraries of Debian 11 for an architecture, unpacked into a folder: nothing is installed.
@@ -85,18 +76,6 @@ make_sysroot() {
     mv "$part" "$root"
 }
 
-# No symbol that glibc has only had since after 2.28, and none that is not the library's own interface.
-check_linux_library() {
-    local library=$1/libtracer.so newest foreign
-    newest=$(objdump -T "$library" | grep -o 'GLIBC_[0-9.]*' | sort -uV | tail -n 1)
-    [ "$(printf 'GLIBC_2.28\n%s\n' "$newest" | sort -V | tail -n 1)" = GLIBC_2.28 ] ||
-        die "$library needs $newest"
-    foreign=$(nm -D --defined-only "$library" | awk '$NF !~ /^trc_/ { print $NF }')
-    [ -z "$foreign" ] || die "$library exports $foreign"
-    say "Needs $newest or later and $(readelf -d "$library" | sed -n 's/.*NEEDED.*\[\(.*\)\]/\1/p' |
-        tr '\n' ' ')"
-}
-
 build() {
     local platform=$1 sysroot=$2 dir=$3
     say "Building for $platform"
@@ -112,7 +91,7 @@ package() {
     local platform=$1 architecture=$2 compiler=$3
     local sysroot="" dir=build/package-$platform
     local stage=$dir/blender/addons/volley
-    install_packages "$compiler"
+    install_tools "$compiler"
     if [ "$architecture" != - ]; then
         sysroot=$CACHE/$OLD_SUITE-$architecture
         mkdir -p "$CACHE"
@@ -120,7 +99,7 @@ package() {
     fi
     build "$platform" "$sysroot" "$dir"
     case $platform in
-        linux-*) check_linux_library "$stage/lib" ;;
+        linux-*) python3 examples/package.py check --library "$stage/lib/libtracer.so" ;;
     esac
     python3 examples/package.py pack --stage "$stage" --platform "$platform" --out "$out"
 }
