@@ -4,6 +4,7 @@
 Blender runs with a home folder of its own and without the user scripts of the build, so that the package
 is all there is of Volley."""
 
+import ast
 import json
 import os
 import re
@@ -177,13 +178,23 @@ def test_contents(packages):
     extension, legacy = packages
     with zipfile.ZipFile(extension) as archive:
         names = set(archive.namelist())
-        assert b'platforms = ["linux-x64"]' in archive.read("blender_manifest.toml")
+        manifest = archive.read("blender_manifest.toml").decode()
+        assert 'platforms = ["linux-x64"]' in manifest
         assert archive.getinfo("lib/libtracer.so").external_attr >> 16 & 0o111
     with zipfile.ZipFile(legacy) as archive:
         expected = {f"volley/{name}" for name in names - {"blender_manifest.toml"}} | {"volley/"}
         assert set(archive.namelist()) == expected
+        module = ast.parse(archive.read("volley/__init__.py"))
     assert {"__init__.py", "LICENSE", "lib/libtracer.so"} <= names
     assert not any("__pycache__" in name for name in names)
+    # One version, which is the library's; Blender reads that of an add-on without running it.
+    with open(os.path.join(_REPOSITORY, "libtracer/include/tracer/version.h"), encoding="utf-8") as file:
+        version = tuple(map(int, re.findall(r"TRC_VERSION_\w+ (\d+)", file.read())))
+    info, = (ast.literal_eval(node.value) for node in module.body
+             if isinstance(node, ast.Assign) and node.targets[0].id == "bl_info")
+    text = ".".join(map(str, version))
+    assert info["version"] == version and extension.name == f"volley-{text}-linux-x64.zip"
+    assert f'version = "{text}"' in manifest
 
 
 def _render(home, tmp_path, module, readers=(True, False)):

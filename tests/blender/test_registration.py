@@ -2,7 +2,9 @@
 """The add-on registers, names its passes, checks its library and leaves nothing behind."""
 
 import os
+import re
 import shutil
+from pathlib import Path
 
 import blender as blender_support
 
@@ -47,6 +49,31 @@ def test_register_and_unregister(blender):
     expected = {"integrator": 'DISTRIBUTION', "samples": 64, "light_samples": 0, "max_depth": 50,
                 "assembly": 'AUTO', "packet_size": 'AUTO', "sampler": 'SOBOL', "seed": 0}
     assert {name: found["defaults"][name] for name in expected} == expected
+
+
+def inside_preferences():
+    """What the page of the preferences shows."""
+    import types
+    import bpy
+    from volley import preferences
+    shown = []
+
+    class Column:
+        alert = False
+
+        def label(self, text, icon='NONE'):
+            shown.append(text)
+
+    page = types.SimpleNamespace(layout=types.SimpleNamespace(column=Column))
+    preferences.VolleyPreferences.draw(page, bpy.context)
+    return shown
+
+
+def test_preferences_name_version_and_revision(blender):
+    path = Path(blender_support.user_scripts(), "addons/volley/lib/revision")
+    revision = f" ({path.read_text().strip()})" if path.exists() else ""  # sources without git have none
+    shown, = blender.run(inside_preferences)
+    assert re.fullmatch(rf"libtracer \d+\.\d+\.\d+{re.escape(revision)}, \w+", shown)
 
 
 def inside_integrator_samples():
