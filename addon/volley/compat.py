@@ -95,19 +95,16 @@ def cycles(data, name, default):
     return getattr(getattr(data, "cycles", None), name, default)
 
 
+_HAS_OWN_TERMINATOR = "shadow_terminator_geometry_offset" in bpy.types.Object.bl_rna.properties
+
+
 def shadow_terminator_settings(blender_object):
     """What holds the offsets of an object's shadow terminator, and the names of its geometry and its shading
     offset: the object from Blender 5 on, before Cycles' settings of it, None where there are none."""
-    if hasattr(blender_object, "shadow_terminator_geometry_offset"):
+    if _HAS_OWN_TERMINATOR:
         return blender_object, ("shadow_terminator_geometry_offset", "shadow_terminator_shading_offset")
     return (getattr(blender_object, "cycles", None),
             ("shadow_terminator_geometry_offset", "shadow_terminator_offset"))
-
-
-def shadow_terminator(blender_object):
-    """The values of both."""
-    owner, (geometry, shading) = shadow_terminator_settings(blender_object)
-    return getattr(owner, geometry, 0.1), getattr(owner, shading, 0.0)
 
 
 def panorama_settings(camera):

@@ -16,7 +16,10 @@ from .. import abi, compat, native
 from . import motion, visibility
 from .hashing import HASH_MAX, hash_name, hash_pair
 from .linking import ObjectLinks
-from .matrix import rows12
+from .matrix import rows
+
+
+_SHADOW_CATCHER = int(abi.InstanceFlags.SHADOW_CATCHER)  # flags of Python's are slow
 
 
 class Offsets(NamedTuple):
@@ -29,8 +32,9 @@ class Offsets(NamedTuple):
 
 def offsets_of(blender_object):
     """Those of an object's settings."""
-    return Offsets(*compat.shadow_terminator(blender_object),
-                   max(compat.cycles(blender_object, "ao_distance", 0.0), 0.0))
+    owner, (geometry, shading) = compat.shadow_terminator_settings(blender_object)
+    distance = getattr(getattr(blender_object, "cycles", None), "ao_distance", 0.0)
+    return Offsets(getattr(owner, geometry, 0.1), getattr(owner, shading, 0.0), distance if distance > 0.0 else 0.0)
 
 
 @dataclass
@@ -41,7 +45,7 @@ class Item:
     owner: str                 # name of the object it is of, as Blender's updates name it
     name: str                  # in mattes, of the object and
     asset: str                 # of its uppermost parent
-    transforms: list           # 12 floats for each motion key
+    transforms: list           # a tuple of 12 floats for each motion key
     mesh_key: tuple = None     # the key of the item that owns the mesh
     materials: tuple = ()
     hole: int = 0              # the material that the camera sees in place of them, 0 for none
@@ -111,14 +115,18 @@ def names_of(instance):
 
 def random_of(instance):
     """Object Info's Random, [0, 1), the number Cycles has for the same instance."""
-    number = instance.random_id & HASH_MAX if instance.is_instance \
-        else _name_random(instance.object.name)
-    return min(number / HASH_MAX, 1.0 - 2.0 ** -24)
+    if instance.is_instance:
+        return _random_number(instance.random_id & HASH_MAX)
+    return _name_random(instance.object.name)
 
 
 @functools.lru_cache(maxsize=1 << 16)  # a walk asks for every object
 def _name_random(name):
-    return hash_pair(hash_name(name), 0)
+    return _random_number(hash_pair(hash_name(name), 0))
+
+
+def _random_number(number):
+    return min(number / HASH_MAX, 1.0 - 2.0 ** -24)
 
 
 def _uppermost(blender_object):
@@ -130,18 +138,18 @@ def _uppermost(blender_object):
 def describe(instance, view_layer, light_groups, links):
     """The parts of an item that meshes and lights share; light_groups: {name: number}, links:
     linking.Links."""
-    blender_object = instance.object
+    blender_object, maker, key = instance.object, maker_of(instance), key_of(instance)
     return Item(
-        key=key_of(instance), owner=blender_object.name_full,
+        key=key, owner=key[0],
         name=blender_object.name, asset=_uppermost(blender_object).name,
-        transforms=[rows12(instance.matrix_world)],
-        visibility=visibility.instance_visibility(instance, view_layer),
+        transforms=[rows(instance.matrix_world)],
+        visibility=visibility.instance_visibility(blender_object, maker, view_layer),
         pass_index=blender_object.pass_index, random=random_of(instance),
-        color=tuple(blender_object.color),
-        light_group=light_groups.get(blender_object.lightgroup, 0),
-        links=links.of(blender_object, maker_of(instance)),
+        color=blender_object.color[:],
+        light_group=light_groups.get(blender_object.lightgroup, 0) if light_groups else 0,
+        links=links.of(blender_object, maker),
         offsets=offsets_of(blender_object),
-        flags=int(abi.InstanceFlags.SHADOW_CATCHER) * visibility.is_shadow_catcher(instance, view_layer))
+        flags=_SHADOW_CATCHER if visibility.is_shadow_catcher(blender_object, maker, view_layer) else 0)
 
 
 # Where the numbers of instancer_values begin, and where they all end.
@@ -176,7 +184,7 @@ def instancer_values(instance, scene):
 
 def has_mesh(instance):
     """Whether the instance shows a mesh; curves, text and the like come along as one of their own."""
-    return isinstance(instance.object.data, bpy.types.Mesh)
+    return type(instance.object.data) is bpy.types.Mesh  # isinstance takes thrice as long
 
 
 def is_light(instance):
@@ -237,13 +245,13 @@ class Instances:
         return {entry.name for entry in entries}, {entry.asset for entry in entries}
 
     def _update_one(self, item, mesh_id):
-        transforms = motion.follow_turns(collapse(item.transforms))
-        signature = (mesh_id, transforms.tobytes(), item.materials, item.hole, item.visibility,
+        signature = (mesh_id, tuple(item.transforms), item.materials, item.hole, item.visibility,
                      item.pass_index, item.random, item.color, item.name, item.asset, item.light_group,
                      item.flags, item.links, item.offsets, item.values)
         entry = self._entries.get(item.key)
         if entry is not None and entry.signature == signature:
             return
+        transforms = motion.follow_turns(collapse(item.transforms))
         values = {"mesh": mesh_id, "transforms": transforms, "pass_index": item.pass_index,
                   "random": item.random, "color": item.color, "light_group": item.light_group,
                   "flags": item.flags, **item.links._asdict(), **item.offsets._asdict(), "values": item.values,
@@ -270,7 +278,5 @@ def _parts(item):
 
 def collapse(arrays):
     """Equal motion keys as one; (keys, ...) float32."""
-    if len(arrays) == 1:
-        return arrays[0][None]
-    stacked = np.stack(arrays)
+    stacked = np.array(arrays, np.float32)
     return stacked[:1] if len(arrays) > 1 and (stacked == stacked[0]).all() else stacked

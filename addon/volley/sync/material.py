@@ -39,9 +39,12 @@ class Materials:
         self._changes = changes if aovs == self._aovs else Changes.everything()
         self._aovs = aovs
 
-    def id_of(self, material):
-        """The library's id of an evaluated material, 0 (the default) for None."""
-        return self.entry_of(material).id if material is not None else 0
+    def ids_of(self, made_of):
+        """The library's ids of evaluated materials, 0 (the default) for None; and whether each of them is of a
+        volume alone, so that what is made of them is not there."""
+        entries = [_NO_ENTRY if material is None else self.entry_of(material) for material in made_of]
+        is_volume = bool(entries) and entries[0].is_volume and all([entry.is_volume for entry in entries])
+        return tuple([entry.id for entry in entries]), is_volume
 
     def entry_of(self, material):
         """The entry of an evaluated material, brought up to date once per sync."""
@@ -193,12 +196,8 @@ class Materials:
             return self._flatten(material, label, _displacement_mode(material))
         return _plain_surface(material)
 
-    def is_volume(self, material):
-        """Whether an evaluated material is of a volume alone: what has no other is not there."""
-        return material is not None and self.entry_of(material).is_volume
-
     def volume_names(self):
-        """The names of such materials of this sync."""
+        """The names of materials of this sync that are of volumes alone."""
         return {key for key in self._seen if self._entries[key].is_volume}
 
     def _flatten(self, data, label, displacement=None):
@@ -256,9 +255,12 @@ class Entry:
         self.uv_names, self.color_names = set(), set()
         self.needs_generated, self.sun = False, None
         self.needs_instancer, self.instance_attributes = False, set()
-        self.is_volume = False  # see Materials.is_volume
+        self.is_volume = False  # of a volume alone: what has no other is not there
         self.images = set()  # those it reads
         self.is_animated = False  # whether what it reads may be another in the next sync
+
+
+_NO_ENTRY = Entry()
 
 
 def _flags(material, is_volume):

@@ -4,6 +4,11 @@
 import numpy as np
 
 
+def rows(matrix):
+    """The 12 numbers of a mathutils Matrix, as a tuple."""
+    return matrix[0][:] + matrix[1][:] + matrix[2][:]
+
+
 def rows12(matrix):
     """A mathutils Matrix (or nested sequence) as a float32 array of 12."""
     return np.array((*matrix[0], *matrix[1], *matrix[2]), dtype=np.float32)  # five times the nested speed

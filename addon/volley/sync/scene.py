@@ -10,7 +10,7 @@ from . import camera, deform, image, instance, light, mesh, meshes, studio, worl
 from .image import Images
 from .material import Materials
 from .shown import Shown
-from .walk import Walk, dress, is_volume, materials_of
+from .walk import Walk, dress, materials_of
 
 
 class SceneSync:
@@ -91,16 +91,18 @@ class SceneSync:
             fields = light.describe(each.object, item, self._materials, self.warnings)
             return fields is not None and self._lights.change(item.key, fields)
         known = shown.items[instance.key_of(each)]
-        if is_volume(self._materials, each, view_layer):
+        made_of = materials_of(each.object, view_layer)
+        ids, is_volume = self._materials.ids_of(made_of)
+        if is_volume:
             return False
-        made_of = filter(None, materials_of(each.object, view_layer))
-        if not self._meshes.brings(known.mesh_key, self._materials.tangents_read_by(made_of)):
+        if not self._meshes.brings(known.mesh_key, self._materials.tangents_read_by(filter(None, made_of))):
             return False
         if name in source.changes.geometry and not self._change_mesh(each, known, shown, source):
             return False
         item = instance.describe(each, view_layer, source.light_groups, shown.links)
-        item.mesh_key = known.mesh_key
-        dress(item, self._materials, each, source, self._materials.instance_values())
+        item.mesh_key, item.materials = known.mesh_key, ids
+        dress(item, self._materials, each, view_layer, self._materials.instance_values(),
+              source.depsgraph.scene_eval)
         self._instances.change(item, self._meshes.id_of(item.mesh_key))
         self._meshes.free_retired()
         return True
@@ -124,8 +126,8 @@ class SceneSync:
         """Flatten the materials first: they say which attributes the meshes must bring. Their images, and
         the world's, are read meanwhile."""
         override = source.depsgraph.view_layer_eval.material_override
-        shown = [data for data in source.depsgraph.ids
-                 if isinstance(data, bpy.types.Material) and override in (None, data)]
+        kind = bpy.types.Material  # compared, as isinstance takes longer than the rest
+        shown = [data for data in source.depsgraph.ids if type(data) is kind and override in (None, data)]
         readers = [data for data in (*shown, shown_world(source))
                    if data is not None and uses_nodes(data) and not self._materials.is_kept(data)]
         self._images.expect(data.node_tree for data in readers)

@@ -5,21 +5,18 @@ from ..abi import VisibleRays
 from ..compat import LIGHT_IS_OBJECT
 
 # Plain numbers: these are put together for every object, and flags of Python's are slow at it.
-_CAMERA, _SHADOW = int(VisibleRays.CAMERA), int(VisibleRays.SHADOW)
-
-_OBJECT_BITS = (
-    ("visible_camera", _CAMERA), ("visible_diffuse", int(VisibleRays.DIFFUSE)),
-    ("visible_glossy", int(VisibleRays.GLOSSY)), ("visible_transmission", int(VisibleRays.TRANSMISSION)),
-    ("visible_shadow", _SHADOW))
+_CAMERA, _DIFFUSE, _GLOSSY, _TRANSMISSION, _SHADOW = map(int, (
+    VisibleRays.CAMERA, VisibleRays.DIFFUSE, VisibleRays.GLOSSY, VisibleRays.TRANSMISSION, VisibleRays.SHADOW))
 
 _WORLD_BITS = (
-    ("camera", _CAMERA), ("diffuse", int(VisibleRays.DIFFUSE)), ("glossy", int(VisibleRays.GLOSSY)),
-    ("transmission", int(VisibleRays.TRANSMISSION)))
+    ("camera", _CAMERA), ("diffuse", _DIFFUSE), ("glossy", _GLOSSY), ("transmission", _TRANSMISSION))
 
 
 def object_visibility(blender_object):
     """VisibleRays of an object's own switches."""
-    return sum(bit for name, bit in _OBJECT_BITS if getattr(blender_object, name))
+    return (_CAMERA * blender_object.visible_camera | _DIFFUSE * blender_object.visible_diffuse
+            | _GLOSSY * blender_object.visible_glossy | _TRANSMISSION * blender_object.visible_transmission
+            | _SHADOW * blender_object.visible_shadow)
 
 
 def light_visibility(light_object, item):
@@ -36,27 +33,23 @@ def world_visibility(world):
     return sum(bit for name, bit in _WORLD_BITS if getattr(switches, name)) | _SHADOW
 
 
-def instance_visibility(instance, view_layer):
-    """VisibleRays of one depsgraph instance: the object's and its instancer's switches."""
-    blender_object = instance.object
+def instance_visibility(blender_object, maker, view_layer):
+    """VisibleRays of an object or the instance of it that another one makes: the switches of both."""
     mask = object_visibility(blender_object)
-    parent = instance.parent if instance.is_instance else None
-    if parent is not None:
-        mask &= object_visibility(parent)
-    owner = parent or blender_object
-    if owner.indirect_only_get(view_layer=view_layer) and not is_holdout(instance, view_layer):
+    if maker is not None:
+        mask &= object_visibility(maker)
+    owner = maker or blender_object
+    if owner.indirect_only_get(view_layer=view_layer) and not is_holdout(blender_object, maker, view_layer):
         mask &= ~_CAMERA
     return mask
 
 
-def is_holdout(instance, view_layer):
-    """Whether the instance punches a hole into the picture: as what makes it says, if something does."""
-    owner = instance.parent if instance.is_instance and instance.parent else instance.object
-    return owner.holdout_get(view_layer=view_layer)
+def is_holdout(blender_object, maker, view_layer):
+    """Whether it punches a hole into the picture: as what makes it says, if something does."""
+    return (maker or blender_object).holdout_get(view_layer=view_layer)
 
 
-def is_shadow_catcher(instance, view_layer):
-    """Whether the instance stands for something of the footage; holes are no part of that."""
-    is_instanced = instance.is_instance and instance.parent and instance.parent.is_shadow_catcher
-    return bool(instance.object.is_shadow_catcher or is_instanced) \
-        and not is_holdout(instance, view_layer)
+def is_shadow_catcher(blender_object, maker, view_layer):
+    """Whether it stands for something of the footage; holes are no part of that."""
+    is_catcher = blender_object.is_shadow_catcher or (maker is not None and maker.is_shadow_catcher)
+    return is_catcher and not is_holdout(blender_object, maker, view_layer)

@@ -9,20 +9,18 @@ from ..abi import InstanceFlags
 from ..compat import has_adaptive_subdivision
 from . import curves, deform, instance, light, mesh, motion, strands, visibility
 from .linking import Links
-from .matrix import rows12
+from .matrix import rows
 from .source import Cancelled
 
 _BREAK_INTERVAL = 32  # instances between two looks at whether the user pressed Esc
 
 
-def dress(item, materials, each, source, values_of):
-    """Note the library's ids of an instance's material slots, and of a hole in their place, and the values
-    that materials read of it."""
-    view_layer = source.depsgraph.view_layer_eval
+def dress(item, materials, each, view_layer, values_of, scene):
+    """Note the id of the hole in place of an instance's materials, and the values that these read of it."""
     if values_of is not None:
-        item.values = values_of(each, source.depsgraph.scene_eval)
-    item.hole = materials.holdout_id() if visibility.is_holdout(each, view_layer) else 0
-    item.materials = tuple(materials.id_of(material) for material in materials_of(each.object, view_layer))
+        item.values = values_of(each, scene)
+    if visibility.is_holdout(each.object, instance.maker_of(each), view_layer):
+        item.hole = materials.holdout_id()
 
 
 def materials_of(blender_object, view_layer):
@@ -30,13 +28,6 @@ def materials_of(blender_object, view_layer):
     if view_layer.material_override is not None:
         return [view_layer.material_override]
     return [slot.material for slot in blender_object.material_slots]
-
-
-def is_volume(materials, each, view_layer):
-    """Whether an instance is nothing but the bounds of a volume. No ray may meet it: those that pass many
-    would be seen through too often."""
-    made_of = materials_of(each.object, view_layer)
-    return bool(made_of) and all(map(materials.is_volume, made_of))
 
 
 @dataclass
@@ -55,13 +46,13 @@ class Walk:
 
     def __init__(self, sync, source, shutter):
         self._sync, self._source, self._shutter = sync, source, shutter
-        self._view_layer = source.depsgraph.view_layer_eval
+        self._view_layer, self._scene = source.depsgraph.view_layer_eval, source.depsgraph.scene_eval
         uv_names, color_names, needs_generated, self._tangent_readers = sync._materials.attribute_names()
         self._values_of = sync._materials.instance_values()
         if source.needs_uv:
             uv_names.add("")
         self._names = frozenset(uv_names), frozenset(color_names), needs_generated
-        self._wanted_strands = curves.Wanted.of_scene(self._names, source.depsgraph.scene_eval)
+        self._wanted_strands = curves.Wanted.of_scene(self._names, self._scene)
         self._tangents = None  # pointer of a mesh -> the tangents that its objects' materials read
         self._owners = {}     # pointer of a mesh -> key of its owner, within this walk
         self._deforming = {}  # owner key -> _Deforming
@@ -73,20 +64,23 @@ class Walk:
 
     def run(self):
         """Find what is there now."""
+        culling = self._source.culling
+        shows_solids, shows_strands = self._view_layer.use_solid, self._view_layer.use_strand
         for each in self._instances():
             if each.is_instance:
                 self.tied.update(instance.names_of(each))
-            if self._source.culling and not instance.is_light(each) and self._source.culling.hides(each):
+            is_light = instance.is_light(each)
+            if culling and not is_light and culling.hides(each):
                 continue
-            if each.show_particles and self._view_layer.use_strand:
+            if shows_strands and each.show_particles:
                 self._add_hair(each)
             if not each.show_self:
                 continue
-            if instance.is_light(each):
+            if is_light:
                 self._add_light(each)
-            elif instance.has_mesh(each) and self._view_layer.use_solid:
+            elif shows_solids and instance.has_mesh(each):
                 self._add_mesh_instance(each)
-            elif strands.has_strands(each) and self._view_layer.use_strand:
+            elif shows_strands and strands.has_strands(each):
                 self._add_strands(each)
             elif isinstance(each.object.data, bpy.types.Volume):
                 self._volumes.add(each.object.name)
@@ -119,14 +113,19 @@ class Walk:
 
     def _instances(self):
         """Those that take part, by themselves or by their particles."""
+        v3d = self._source.v3d
         for number, each in enumerate(self._source.depsgraph.object_instances):
             if number % _BREAK_INTERVAL == 0 and self._source.is_cancelled():
                 raise Cancelled()
-            if instance.is_in_view(each, self._source.v3d):
+            if v3d is None or instance.is_in_view(each, v3d):
                 yield each
 
+    def _ids_of(self, each):
+        """See material.Materials.ids_of."""
+        return self._sync._materials.ids_of(materials_of(each.object, self._view_layer))
+
     def _dress(self, item, each):
-        dress(item, self._sync._materials, each, self._source, self._values_of)
+        dress(item, self._sync._materials, each, self._view_layer, self._values_of, self._scene)
 
     def _describe(self, each):
         return instance.describe(each, self._view_layer, self._source.light_groups, self.links)
@@ -141,9 +140,11 @@ class Walk:
 
     def _add_mesh_instance(self, each):
         blender_object = each.object
-        if is_volume(self._sync._materials, each, self._view_layer):
+        ids, is_volume = self._ids_of(each)
+        if is_volume:  # those that pass many of its bounds would be seen through too often
             return
         item = self._describe(each)
+        item.materials = ids
         self._dress(item, each)
         if self._shutter is not None:
             item.motion_keys = motion.key_count(blender_object, instance.maker_of(each))
@@ -161,8 +162,9 @@ class Walk:
             item = self._describe(each)
             item.key = instance.hair_key(each, number)
             self._dress(item, each)
-            slot = max(min(modifier.particle_system.settings.material, len(item.materials)), 1) - 1
-            item.materials = item.materials[slot:slot + 1]
+            ids = self._ids_of(each)[0]
+            slot = max(min(modifier.particle_system.settings.material, len(ids)), 1) - 1
+            item.materials = ids[slot:slot + 1]
             hair = strands.Hair(number, self._source.depsgraph, is_final, self._wanted_strands)
             self._add_made(each, item, (blender_object.name_full, number), hair)
 
@@ -177,7 +179,7 @@ class Walk:
         """A Curves or Point Cloud object."""
         item = self._describe(each)
         self._dress(item, each)
-        item.materials = item.materials[:1]
+        item.materials = self._ids_of(each)[0][:1]
         self.tied.add(each.object.name_full)
         self._add_made(each, item, each.object.data.as_pointer(), strands.StrandObject(self._wanted_strands))
 
@@ -285,7 +287,7 @@ class Walk:
         index = motion.key_index(fraction, item.motion_keys)
         if index is None:
             return
-        item.transforms[index] = rows12(each.matrix_world)
+        item.transforms[index] = rows(each.matrix_world)
         waiting = self._deforming.get(item.key)
         if waiting is None or waiting.shapes.is_dropped:
             return
