@@ -4,13 +4,16 @@
 
     denoise.py FILE.blend... [--samples 4 16 64 256] [--width 320] [--height 180] [--pictures DIR]
 
-For each file and number of samples: mean squared and relative squared error against Volley's own picture of
-many samples, which another seed made, how many times they are lower with Denoise, the worst 32 x 32 tile by
-that, and the seconds of both renders. Errors do not depend on the load of the machine, times do.
+For each file and number of samples: mean squared and relative squared error and FLIP against Volley's own
+picture of many samples, which another seed made, how many times they are lower with Denoise, the worst 32 x 32
+tile by that, and the seconds of both renders. Errors do not depend on the load of the machine, times do. With
+--keep DIR the pictures without Denoise stay there and are not rendered again, and have no times then.
 """
 
 import argparse
+import contextlib
 import json
+import math
 import pathlib
 import tempfile
 
@@ -18,6 +21,7 @@ import compare_cycles
 import numpy as np
 
 import compare  # found by compare_cycles' path
+import flip
 
 SEED, REFERENCE_SEED = 1, 1000
 # Tiles whose relative error is below are as good as without noise.
@@ -56,20 +60,42 @@ def worst_tile(plain, clean, tile=32):
     return max(clean[part].mean() / max(plain[part].mean(), LEAST_ERROR) for part in parts)
 
 
+@contextlib.contextmanager
+def folder_of(blend, options):
+    """Where pictures go: one that stays, or a temporary one."""
+    if options.keep is None:
+        with tempfile.TemporaryDirectory() as folder:
+            yield pathlib.Path(folder)
+        return
+    folder = options.keep / f"{blend.stem}-{options.width}x{options.height}-{options.frame}"
+    folder.mkdir(parents=True, exist_ok=True)
+    yield folder
+
+
+def render_all(blend, folder, options):
+    """The seconds of each picture by (samples, denoise), NaN where it was there."""
+    seconds = dict.fromkeys([(samples, denoise) for samples in options.samples for denoise in (False, True)],
+                            math.nan)
+    exact = (options.reference_samples, None)
+    missing = [name for name in [exact, *seconds] if name[1] or not output(folder, *name).exists()]
+    jobs = [job(options, samples, bool(denoise), REFERENCE_SEED if denoise is None else SEED,
+                output(folder, samples, denoise)) for samples, denoise in missing]
+    seconds.update(zip(missing, run_jobs(blend, jobs, options)))
+    return seconds
+
+
+def output(folder, samples, denoise):
+    """The file of a picture; denoise None: of the reference."""
+    return folder / f"{samples}-{({None: 'exact', False: 'plain', True: 'denoised'})[denoise]}.exr"
+
+
 def measure(blend, options):
     """A row for each number of samples."""
-    with tempfile.TemporaryDirectory() as folder:
-        def output(name):
-            return pathlib.Path(folder) / f"{name}.exr"
-
-        names = [(samples, denoise) for samples in options.samples for denoise in (False, True)]
-        jobs = [job(options, options.reference_samples, False, REFERENCE_SEED, output("exact"))]
-        jobs += [job(options, samples, denoise, SEED, output(f"{samples}-{denoise}"))
-                 for samples, denoise in names]
-        seconds = dict(zip(names, run_jobs(blend, jobs, options)[1:]))
-        exact = compare.read_rgb(output("exact")).astype(np.float64)
+    with folder_of(blend, options) as folder:
+        seconds = render_all(blend, folder, options)
+        exact = compare.read_rgb(output(folder, options.reference_samples, None)).astype(np.float64)
         for samples in options.samples:
-            plain, clean = (compare.read_rgb(output(f"{samples}-{denoise}")) for denoise in (False, True))
+            plain, clean = (compare.read_rgb(output(folder, samples, denoise)) for denoise in (False, True))
             errors = [relative_error(picture, exact) for picture in (plain, clean)]
             if options.pictures:
                 options.pictures.mkdir(parents=True, exist_ok=True)
@@ -78,6 +104,7 @@ def measure(blend, options):
             yield {"file": blend.stem, "samples": samples,
                    "mse": [compare.mse(picture, exact) for picture in (plain, clean)],
                    "rel_mse": [float(error.mean()) for error in errors],
+                   "flip": [flip.mean_flip(picture, exact) for picture in (plain, clean)],
                    "worst_tile": float(worst_tile(*errors)),
                    "seconds": [seconds[samples, denoise] for denoise in (False, True)]}
 
@@ -94,6 +121,7 @@ def main():
     parser.add_argument("--threads", type=int, default=0, help="0: all")
     parser.add_argument("--build", type=pathlib.Path, default=compare_cycles.PROJECT / "build")
     parser.add_argument("--blender", default="blender")
+    parser.add_argument("--keep", type=pathlib.Path, metavar="DIR", help="pictures stay in it")
     parser.add_argument("--pictures", type=pathlib.Path, help="PNGs go here")
     parser.add_argument("--json", action="store_true", help="one JSON object a row")
     options = parser.parse_args()
@@ -102,9 +130,9 @@ def main():
             if options.json:
                 print(json.dumps(row), flush=True)
                 continue
-            gains = [row[name][0] / row[name][1] for name in ("mse", "rel_mse")]
-            print(f"{row['file']:16} {row['samples']:5} samples: MSE {gains[0]:6.2f}, relMSE {gains[1]:6.2f} "
-                  f"times lower, worst tile {row['worst_tile']:5.2f}; {row['seconds'][0]:.2f} to "
+            gains = [row[name][0] / row[name][1] for name in ("mse", "rel_mse", "flip")]
+            print(f"{row['file']:16} {row['samples']:5} samples: MSE {gains[0]:6.2f}, relMSE {gains[1]:6.2f}, "
+                  f"FLIP {gains[2]:5.2f} times lower, worst tile {row['worst_tile']:5.2f}; {row['seconds'][0]:.2f} to "
                   f"{row['seconds'][1]:.2f} s", flush=True)
 
 
