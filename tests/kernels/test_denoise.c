@@ -242,6 +242,29 @@ static void bright_sample(void **state) {
     trc_film_destroy(&film);
 }
 
+/* Nor does it change pixels beside it whose own halves agree: thin highlights stay thin. */
+static void calm_neighbors(void **state) {
+    (void)state;
+    const trc_render_desc desc = desc_of(16);
+    static float clean[4 * FRAME];
+    struct trc_film film;
+    film_make(&desc, still, &film);
+    const int column = 30;
+    for (int y = 0; y < HEIGHT; y += 2)
+        film.sums[TRC_PASS_COMBINED][4 * (y * WIDTH + column)] += 16.0;
+    film_reconstruct(&film, trc_kernels_current(), false);
+    assert_ok(trc_film_read(&film, TRC_PASS_COMBINED, 1.0f, clean, 4 * FRAME));
+    double most = 0.0;
+    for (int y = 0; y < HEIGHT; y++)
+        for (int x = column - 2; x <= column + 2; x++)
+            if (x != column)
+                most = fmax(most, fabs((double)clean[4 * (y * WIDTH + x)] - 0.3));
+    print_figure("31: a column of bright samples, of 16", "changes those beside it by %.2g at most",
+                 most);
+    assert_true(most < 0.03);
+    trc_film_destroy(&film);
+}
+
 /* Passes add up, and are the same combination of pixels. */
 static void sums(void **state) {
     (void)state;
@@ -368,9 +391,11 @@ static void counts(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(noiseless),      cmocka_unit_test(noisy),  cmocka_unit_test(many_samples),
-        cmocka_unit_test(bright_sample),  cmocka_unit_test(sums),   cmocka_unit_test(same_bits),
-        cmocka_unit_test(scene_pictures), cmocka_unit_test(counts),
+        cmocka_unit_test(noiseless),      cmocka_unit_test(noisy),
+        cmocka_unit_test(many_samples),   cmocka_unit_test(bright_sample),
+        cmocka_unit_test(calm_neighbors), cmocka_unit_test(sums),
+        cmocka_unit_test(same_bits),      cmocka_unit_test(scene_pictures),
+        cmocka_unit_test(counts),
     };
     if (!query_test_isa())
         return QUERY_TEST_SKIPPED;

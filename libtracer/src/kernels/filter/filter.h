@@ -13,9 +13,10 @@ struct trc_guide {
     float *more[2];                     /* how many times as noisy that half is */
     float *light[2];                    /* mean of its red, green and blue */
     float *variance[TRC_GUIDE_CHANNELS];
-    float *noise;  /* variance of the light, above 0 */
-    float *rest;   /* scratch */
-    float *inside; /* 1 where there are samples, 0 beyond the frame */
+    float *noise;     /* variance of the light, above 0 */
+    float *own_noise; /* the same, or less where the pixel's own halves agree */
+    float *rest;      /* scratch */
+    float *inside;    /* 1 where there are samples, 0 beyond the frame */
     float *features[TRC_FEATURE_COUNT];
 };
 

@@ -12,9 +12,9 @@
 /* Rows of a strip, of whose patches one row more on each side is compared. */
 #define STRIP 8
 #define PATCH_ROWS (STRIP + 2)
-/* How many standard deviations are still alike: 0.5 left noise, 1 and 1.4 flattened textures and
- * spread highlights. */
-#define BANDWIDTH 0.85f
+/* How many standard deviations are still alike: 0.5 left noise, 0.85 to 1.4 flattened textures
+ * and spread highlights. */
+#define BANDWIDTH 0.7f
 /* Differences of no variance: of squares of roots, and alpha. */
 #define LEAST_VARIANCE 1e-8f
 /* Weights below are none. */
@@ -47,7 +47,7 @@ struct work {
 static size_t carve(struct work *w, void *memory) {
     struct trc_carver c = {.base = memory};
     struct trc_guide *g = &w->guide;
-    float **const single[] = {&g->noise, &g->rest, &g->inside, &w->data};
+    float **const single[] = {&g->noise, &g->own_noise, &g->rest, &g->inside, &w->data};
     for (int k = 0; k < 2; k++) {
         for (int i = 0; i < TRC_GUIDE_CHANNELS; i++)
             g->half[k][i] = trc_plane_carve(&c);
@@ -59,7 +59,7 @@ static size_t carve(struct work *w, void *memory) {
         g->variance[i] = trc_plane_carve(&c);
     for (int i = 0; i < TRC_FEATURE_COUNT; i++)
         g->features[i] = trc_plane_carve(&c);
-    for (int i = 0; i < 4; i++)
+    for (size_t i = 0; i < sizeof single / sizeof *single; i++)
         *single[i] = trc_plane_carve(&c);
     w->apart = trc_carve(&c, PATCH_ROWS * sizeof *w->apart);
     return c.used;
@@ -107,7 +107,8 @@ static void weigh(struct work *w, int half, int y, int dx, int dy) {
                     sum = sum + vf_load(w->apart[j + a] + x + b);
             const int p = trc_plane_at(x, y + j), q = p + shift;
             const vfloat alike = vf_exp(vf_min(sum * vf_set(-1.0f / 9.0f), vf_set(0.0f)));
-            const vfloat calm = vf_min(vf_load(g->noise + p) / vf_load(g->noise + q), vf_set(1.0f));
+            const vfloat calm =
+                vf_min(vf_load(g->own_noise + p) / vf_load(g->noise + q), vf_set(1.0f));
             const vfloat weight = alike * calm * vf_load(g->inside + q);
             vf_store(weights[j] + x,
                      vf_select(vf_lt(weight, vf_set(LEAST_WEIGHT)), vf_set(0.0f), weight));
