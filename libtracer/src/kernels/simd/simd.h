@@ -16,6 +16,8 @@
 
 #if TRC_WIDTH > 1 && (defined(__x86_64__) || defined(_M_X64))
 #include <immintrin.h>
+#elif TRC_WIDTH > 1 && defined(__aarch64__)
+#include <arm_neon.h>
 #endif
 
 #define TRC_INLINE static inline __attribute__((always_inline, unused))
@@ -112,7 +114,7 @@ TRC_INLINE vfloat vi_as_float(vint a) {
 }
 TRC_INLINE vuint vf_as_uint(vfloat a) { return (vuint)vf_as_int(a); }
 
-/* Rounds towards zero; values outside int32 give INT32_MIN on x86. */
+/* Rounds towards zero; values outside int32 give INT32_MIN. */
 TRC_INLINE vint vf_to_int(vfloat a) {
 #if TRC_WIDTH == 1
     return (a >= -2147483648.0f && a < 2147483648.0f) ? (int32_t)a : INT32_MIN;
@@ -123,7 +125,9 @@ TRC_INLINE vint vf_to_int(vfloat a) {
 #elif TRC_WIDTH == 4 && defined(__SSE2__)
     return (vint)_mm_cvttps_epi32(a);
 #else
-    return __builtin_convertvector(a, vint);
+    /* What is too large or not a number would give the nearest or 0. */
+    const vint fits = (vint)(a < vf_set(0x1p31f));
+    return (__builtin_convertvector(a, vint) & fits) | (vi_set(INT32_MIN) & ~fits);
 #endif
 }
 TRC_INLINE vfloat vi_to_float(vint a) {
@@ -184,6 +188,8 @@ TRC_INLINE uint32_t vm_bits(vmask m) {
     return (uint32_t)_mm256_movemask_ps((__m256)m);
 #elif TRC_WIDTH == 4 && defined(__SSE__)
     return (uint32_t)_mm_movemask_ps((__m128)m);
+#elif TRC_WIDTH == 4 && defined(__aarch64__)
+    return vaddvq_u32((uint32x4_t)(m & (vint){1, 2, 4, 8}));
 #else
     uint32_t bits = 0;
     for (int i = 0; i < TRC_WIDTH; i++)
@@ -292,6 +298,8 @@ TRC_INLINE vfloat vf_sqrt(vfloat a) {
     return _mm256_sqrt_ps(a);
 #elif TRC_WIDTH == 4 && defined(__SSE__)
     return _mm_sqrt_ps(a);
+#elif TRC_WIDTH == 4 && defined(__aarch64__)
+    return (vfloat)vsqrtq_f32((float32x4_t)a);
 #else
     vfloat r;
     for (int i = 0; i < TRC_WIDTH; i++)
@@ -313,6 +321,8 @@ TRC_INLINE vfloat vf_floor(vfloat a) {
     return _mm256_floor_ps(a);
 #elif TRC_WIDTH == 4 && defined(__SSE4_1__)
     return _mm_floor_ps(a);
+#elif TRC_WIDTH == 4 && defined(__aarch64__)
+    return (vfloat)vrndmq_f32((float32x4_t)a);
 #else
     vfloat r;
     for (int i = 0; i < TRC_WIDTH; i++)
@@ -350,6 +360,9 @@ TRC_INLINE float vf_lanes_min(vfloat a) {
 #endif
     const __m128 two = _mm_min_ps(four, _mm_movehl_ps(four, four));
     return _mm_cvtss_f32(_mm_min_ss(two, _mm_shuffle_ps(two, two, 1)));
+#elif TRC_WIDTH == 4
+    const vfloat two = vf_min(a, __builtin_shufflevector(a, a, 2, 3, 2, 3));
+    return f_min(two[0], two[1]);
 #else
     float r = a[0];
     for (int i = 1; i < TRC_WIDTH; i++)

@@ -40,6 +40,16 @@ TRC_INLINE f8 f8_sqrt(f8 a) {
 #endif
 }
 
+#if TRC_WIDTH == 4 && defined(__aarch64__)
+/* One bit per lane, of which all bits are set or none. */
+TRC_INLINE uint32_t i8_mask_bits(i8x m) {
+    const i8x bits = m & (i8x){1, 2, 4, 8, 16, 32, 64, 128};
+    uint32x4_t halves[2];
+    memcpy(halves, &bits, sizeof bits);
+    return vaddvq_u32(vorrq_u32(halves[0], halves[1]));
+}
+#endif
+
 /* x where a <= b, else y (also for NaN). */
 TRC_INLINE f8 f8_select_le(f8 a, f8 b, f8 x, f8 y) {
     const i8x m = a <= b;
@@ -61,6 +71,8 @@ TRC_INLINE uint32_t f8_le(f8 a, f8 b) {
     return _mm256_cmp_ps_mask((__m256)a, (__m256)b, _CMP_LE_OQ);
 #elif defined(__AVX__)
     return (uint32_t)_mm256_movemask_ps(_mm256_cmp_ps((__m256)a, (__m256)b, _CMP_LE_OQ));
+#elif TRC_WIDTH == 4 && defined(__aarch64__)
+    return i8_mask_bits(a <= b);
 #else
     const i8x m = a <= b;
     uint32_t bits = 0;
@@ -77,6 +89,8 @@ TRC_INLINE uint32_t i8_nonzero(i8x a) {
 #elif defined(__AVX2__)
     const __m256i zero = _mm256_cmpeq_epi32((__m256i)a, _mm256_setzero_si256());
     return ~(uint32_t)_mm256_movemask_ps((__m256)zero) & 0xffu;
+#elif TRC_WIDTH == 4 && defined(__aarch64__)
+    return i8_mask_bits(a != 0);
 #else
     uint32_t bits = 0;
     for (int i = 0; i < 8; i++)

@@ -50,6 +50,8 @@ TRC_INLINE vuint reverse_bits(vuint x) {
                     (vuint)_mm_shuffle_epi8(table, (__m128i)high);
     return (vuint)_mm_shuffle_epi8((__m128i)r, bytes);
 #endif
+#elif TRC_WIDTH == 4 && defined(__aarch64__)
+    return (vuint)vrev32q_u8(vrbitq_u8((uint8x16_t)x));
 #else
     x = (x >> 16) | (x << 16);
     x = ((x >> 8) & vu_set(0x00ff00ffu)) | ((x & vu_set(0x00ff00ffu)) << 8);
