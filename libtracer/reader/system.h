@@ -1,5 +1,6 @@
-/* What the program that reads images asks of the operating system (system_posix.c): to be a
- * launcher of processes for the library (src/image/process.h), the stream of a process, limits. */
+/* What the program that reads images asks of the operating system (system_posix.c,
+ * system_windows.c): to be a launcher of processes for the library (src/image/process.h), the
+ * stream of a process, limits. */
 #ifndef TRACER_READER_SYSTEM_H
 #define TRACER_READER_SYSTEM_H
 

@@ -8,9 +8,16 @@
 
 #include "tracer/base.h"
 
+/* What the compiler holds formats against: C's own, also where the system has others. */
+#ifdef __MINGW32__
+#define TRC_PRINTF gnu_printf
+#else
+#define TRC_PRINTF printf
+#endif
+
 /* Sets this thread's message (printf-like, cut to 511 bytes) and returns status. */
 trc_status trc_fail(trc_status status, const char *format, ...)
-    __attribute__((format(printf, 2, 3)));
+    __attribute__((format(TRC_PRINTF, 2, 3)));
 
 /* Memory of the library: 64-byte aligned, counted, may fail (NULL). Sizes are count * size, checked
  * for overflow. trc_free(NULL) is fine. Freed blocks must come from here. */

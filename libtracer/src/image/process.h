@@ -1,6 +1,6 @@
 /* Processes that read images, as the operating system makes them: started, spoken to, ended. All of
  * the library that asks the system for processes, sockets and shared memory stands behind this
- * header (process_posix.c).
+ * header (process_posix.c, process_windows.c).
  *
  * A launcher is the program that reads images, started once: to load its libraries takes it a
  * quarter of a second. Its processes are made from it in milliseconds. A process has a stream of

@@ -1,5 +1,9 @@
-/* What library and program say to each other to make and end processes (POSIX). Both are of one
- * build, on one machine. */
+/* What library and program say to each other to make and end processes. Both are of one build, on
+ * one machine.
+ *
+ * Windows has no copies of a process: there the program is started for each, with the name of the
+ * block of memory and its bytes as last arguments and the stream as standard input and output, and
+ * says that it is there by an answer that nobody has asked for. */
 #ifndef TRACER_IMAGE_PROCESS_LAUNCH_H
 #define TRACER_IMAGE_PROCESS_LAUNCH_H
 

@@ -5,6 +5,7 @@
 #include <stdbool.h>
 
 #include "bvh/bvh.h"
+#include "core/core.h"
 #include "model/snapshot.h"
 #include "scene/shared.h"
 
@@ -62,6 +63,6 @@ void trc_count_stats(const struct trc_scene_state *scene, struct trc_snapshot *s
 
 /* Appends a line to the warnings; what does not fit is left out. */
 void trc_warn(struct trc_snapshot_block *block, const char *format, ...)
-    __attribute__((format(printf, 2, 3)));
+    __attribute__((format(TRC_PRINTF, 2, 3)));
 
 #endif
