@@ -74,7 +74,7 @@ def load(path=None):
 def _create_reader():
     """A reader of image files: the program beside the library or, in packages, which have none, Blender's
     Python with the OpenImageIO that it brings."""
-    program = os.path.join(os.path.dirname(library_path()), "tracer_reader")
+    program = os.path.join(os.path.dirname(library_path()), "tracer_reader" + (".exe" if os.name == "nt" else ""))
     values = {}
     if os.path.isfile(program):
         _make_runnable(program)
@@ -97,9 +97,9 @@ def _make_runnable(program):
 def _python():
     """The program of the Python that runs inside Blender, None where there is none. What sys.executable
     names may be another one, found by the user's path."""
-    name = f"python{sys.version_info.major}.{sys.version_info.minor}"
+    name = "python.exe" if os.name == "nt" else f"python{sys.version_info.major}.{sys.version_info.minor}"
     path = os.path.join(sys.prefix, "bin", name)
-    return path if os.name == "posix" and os.access(path, os.X_OK) else None
+    return path if os.access(path, os.X_OK) else None
 
 
 def start_reader():

@@ -4,7 +4,8 @@
 It stands in for tracer_reader, which does the same in C++ and which packages do not have: Blender's own
 OpenImageIO is found from Python alone. It is started with a socket to the library as descriptor 3 and makes
 processes, each of which serves requests one by one until it is ended, by whatever: a damaged file costs a
-process, never Blender. What is said is described in the library's image/process_launch.h (making
+process, never Blender. On Windows, where processes cannot be copied, it is started for each, with a pipe as
+standard input and output. What is said is described in the library's image/process_launch.h (making
 processes) and image/protocol.h (reading); both ends are of one version.
 """
 
@@ -13,12 +14,16 @@ import ctypes
 import errno
 import mmap
 import os
-import resource
 import select
 import signal
 import socket
 import struct
 import sys
+
+try:
+    import resource
+except ImportError:  # Windows
+    resource = None
 
 # image/process_launch.h
 _LAUNCH_MAGIC, _LAUNCH_DESCRIPTOR = 0x5443524C, 3
@@ -104,6 +109,8 @@ class Connection:
 # Memory --------------------------------------------------------------------------------------------
 
 def _address_space():
+    if not resource:
+        return 0
     try:
         with open("/proc/self/statm", encoding="ascii") as file:
             return int(file.read().split()[0]) * resource.getpagesize()
@@ -313,9 +320,9 @@ class Colors:
 
 # Processes -----------------------------------------------------------------------------------------
 
-def _serve(to, oiio):
+def _serve(to, oiio, has_asked=_await):
     memory, colors = Memory(), Colors(oiio)
-    while _await(to.stream):
+    while has_asked(to.stream):
         request = to.request()
         try:
             if request[1] == _FILE:
@@ -420,17 +427,55 @@ class Launcher:
         return os.waitid(os.P_PID, process, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None
 
 
-def main():
-    """Take leave of what the host has left open, load the library, make processes."""
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    os.closerange(_LAUNCH_DESCRIPTOR + 1, resource.getrlimit(resource.RLIMIT_NOFILE)[0])
-    os.set_inheritable(_LAUNCH_DESCRIPTOR, False)
+class Pipe:
+    """Standard input and output as the stream to the library; what is printed goes nowhere from here on."""
+
+    def __init__(self):
+        self._descriptor = os.dup(0)  # Python has made it binary
+        nowhere = os.open(os.devnull, os.O_RDWR)
+        os.dup2(nowhere, 0)
+        os.dup2(nowhere, 1)
+
+    def recv(self, size):
+        """Up to so many bytes, b"" at the end."""
+        return os.read(self._descriptor, size)
+
+    def sendall(self, content):
+        """All bytes; OSError when nobody reads them."""
+        while content:
+            content = content[os.write(self._descriptor, content):]
+
+
+def _load_openimageio():
     import OpenImageIO as oiio
     import numpy  # noqa: F401  (loaded once, not in each process)
     oiio.attribute("threads", 1)  # files are read side by side by several processes
     oiio.attribute("exr_threads", 1)
     oiio.get_string_attribute("input_format_list")  # finds what there is before processes are made
-    Launcher(oiio).run()
+    return oiio
+
+
+def _run_single(name, shared_bytes):
+    """The one process that was started, which shares the block of that name. It ends with its pipe."""
+    pipe = Pipe()
+    oiio = _load_openimageio()
+    block = mmap.mmap(-1, shared_bytes, tagname=name)
+    pipe.sendall(_LAUNCH_ANSWER.pack(_LAUNCH_MAGIC, 0, os.getpid(), 0, 0))
+    try:
+        _serve(Connection(pipe, block), oiio, lambda stream: True)
+    except Gone:
+        pass
+    return 0
+
+
+def main():
+    """Take leave of what the host has left open, load the library, make processes."""
+    if sys.platform == "win32":
+        return _run_single(sys.argv[-2], int(sys.argv[-1]))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    os.closerange(_LAUNCH_DESCRIPTOR + 1, resource.getrlimit(resource.RLIMIT_NOFILE)[0])
+    os.set_inheritable(_LAUNCH_DESCRIPTOR, False)
+    Launcher(_load_openimageio()).run()
     return 0
 
 
