@@ -10,7 +10,11 @@ void *buffer_alloc(size_t count, size_t size) {
     void *block = NULL;
     if (!size || count <= limit / size) {
         const size_t bytes = (count * size + 63) / 64 * 64;
+#ifdef _WIN32 /* what is aligned to more than vectors of SSE is not for free() */
+        block = malloc(bytes ? bytes : 64);
+#else
         block = aligned_alloc(64, bytes ? bytes : 64);
+#endif
         if (block)
             memset(block, 0, bytes);
     }

@@ -13,7 +13,7 @@
 /* Of the file written last: the test removes it. */
 static char path[256];
 
-static void write_file(const char *name, const void *bytes, size_t size) {
+static inline void write_file(const char *name, const void *bytes, size_t size) {
     const char *folder = getenv("TMPDIR");
     snprintf(path, sizeof path, "%s/trc_test_image_%ld_%s", folder ? folder : P_tmpdir,
              (long)getpid(), name);
@@ -55,7 +55,7 @@ static inline uint64_t memory_of_images(void) {
 }
 
 /* An image that must load. */
-static struct trc_image *loaded(const trc_image_desc *desc) {
+static inline struct trc_image *loaded(const trc_image_desc *desc) {
     struct trc_image *image = NULL;
     const trc_status status = trc_image_load(desc, &source, &image);
     if (status != TRC_OK)

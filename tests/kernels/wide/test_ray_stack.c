@@ -4,10 +4,14 @@
 
 #include <stdio.h>
 #include <stdlib.h>
+
+#include "core/core.h"
+#include "kernels/tile/ray_stack.h"
+
+#if TRC_GUARD_BYTES
 #include <sys/wait.h>
 #include <unistd.h>
-
-#include "kernels/tile/ray_stack.h"
+#endif
 
 struct stacks {
     void *memory;
@@ -21,7 +25,7 @@ static void stacks_make(struct stacks *s, uint32_t capacity) {
         trc_rays_carve(&c, &s->stack, capacity, (struct trc_ray_columns){true, true, true, true});
         trc_rays_carve(&c, &s->work, capacity, (struct trc_ray_columns){true, true, true, true});
         if (turn == 0) {
-            s->memory = aligned_alloc(TRC_CARVER_ALIGNMENT, c.used);
+            s->memory = trc_alloc(c.used, 1);
             assert_non_null(s->memory);
             c = (struct trc_carver){.base = s->memory};
         }
@@ -121,7 +125,7 @@ static struct growth follow(const struct trc_ray_room *room, uint32_t last_depth
         assert_true(s.stack.count <= room->capacity);
     }
     assert_true(trc_carver_check(&s.carver));
-    free(s.memory);
+    trc_free(s.memory);
     assert_true(g.taken == g.pushed && g.sum == 0);
     return g;
 }
@@ -195,7 +199,7 @@ static bool is_caught(void (*misuse)(struct stacks *)) {
     }
     int status = 0;
     assert_int_equal(waitpid(child, &status, 0), child);
-    free(s.memory);
+    trc_free(s.memory);
     return !(WIFEXITED(status) && WEXITSTATUS(status) == 0);
 }
 

@@ -2,6 +2,11 @@
  * with a file is the name of the file: to read it well, an image of GOOD_WIDTH x GOOD_HEIGHT, or
  * one of the many things that damaged files may make a process do. Nothing is read of the file. */
 #define _GNU_SOURCE /* kill, getppid */
+#ifdef _WIN32
+#define WIN32_LEAN_AND_MEAN
+#include <windows.h>
+#endif
+
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -52,7 +57,11 @@ static void reply(struct connection *to, struct trc_reader_answer answer) {
 
 static _Noreturn void hang(void) {
     for (;;)
+#ifdef _WIN32
+        Sleep(INFINITE);
+#else
         pause();
+#endif
 }
 
 /* Where the test finds this process. */
@@ -62,7 +71,11 @@ static void write_process(const char *path) {
     FILE *file = fopen(name, "w");
     if (!file)
         _exit(1);
+#ifdef _WIN32
+    (void)fprintf(file, "%ld\n", (long)getpid());
+#else
     (void)fprintf(file, "%ld %ld\n", (long)getpid(), (long)getppid());
+#endif
     (void)fclose(file);
 }
 
@@ -138,7 +151,9 @@ static bool tell_lie(struct connection *to, const char *name) {
 }
 
 static void serve_file(struct connection *to, const char *path) {
-    const char *name = strrchr(path, '/') + 1;
+    const char *name = path + strlen(path);
+    while (name > path && !strchr("/\\", name[-1]))
+        name--;
     const struct trc_reader_answer first = info();
     if (!strcmp(name, "dies") || (!strcmp(name, "dies_if_used") && served)) {
         (void)raise(SIGSEGV);
@@ -164,9 +179,11 @@ static void serve_file(struct connection *to, const char *path) {
     } else if (!strcmp(name, "talks_on")) {
         serve_good(to);
         reply(to, first);
+#ifndef _WIN32
     } else if (!strcmp(name, "kills_launcher")) {
         (void)kill(getppid(), SIGKILL);
         hang();
+#endif
     } else if (!strcmp(name, "fails")) {
         reply(to, failed(TRC_ERROR_IMAGE, "line one\nline two\t\n"));
     } else if (!strcmp(name, "fails_at_length")) {
