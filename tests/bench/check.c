@@ -1,10 +1,16 @@
 #include "check.h"
 
+#include <inttypes.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "brute.h"
 #include "race.h"
 #include "volley.h"
+
+/* FNV-1a (G. Fowler, L. Noll, K.-P. Vo, 1991), by words of 32 bits. */
+#define HASH_START UINT64_C(0xcbf29ce484222325)
+#define HASH_PRIME UINT64_C(0x100000001b3)
 
 struct verdicts {
     uint32_t counts[BRUTE_DIFFERS + 1];
@@ -28,6 +34,27 @@ static void judge_list(const struct query_world *world, const struct ray_list *l
     brute_list_free(&candidates);
 }
 
+static uint64_t add_words(uint64_t hash, const void *words, uint32_t count) {
+    for (uint32_t i = 0; i < count; i++) {
+        uint32_t word;
+        memcpy(&word, (const char *)words + i * sizeof word, sizeof word);
+        hash = (hash ^ word) * HASH_PRIME;
+    }
+    return hash;
+}
+
+/* Of all bits but the normals': where two machines say the same number, they found the same. */
+static uint64_t hash_of(const struct hit_set *hits) {
+    uint64_t hash = add_words(HASH_START, hits->instance, hits->count);
+    hash = add_words(hash, hits->triangle, hits->count);
+    hash = add_words(hash, hits->distance, hits->count);
+    hash = add_words(hash, hits->u, hits->count);
+    hash = add_words(hash, hits->v, hits->count);
+    for (uint32_t i = 0; i < hits->count; i++)
+        hash = (hash ^ hits->occluded[i]) * HASH_PRIME;
+    return hash;
+}
+
 static bool check_list(const struct bench_scene *scene, bool moving, const struct ray_list *list,
                        const struct trc_snapshot *snapshot, const struct options *options) {
     struct hit_set hits[OPTIONS_ISAS];
@@ -42,10 +69,10 @@ static bool check_list(const struct bench_scene *scene, bool moving, const struc
     judge_list(&scene->worlds[moving], list, hits, options, verdicts);
     for (uint32_t i = 0; i < options->isa_count; i++) {
         const uint32_t *counts = verdicts[i].counts;
-        printf("%-12s %-6s %-7s %-16s %-5s %7u rays, %u doubtful, %u wrong\n", scene->name,
-               moving ? "moving" : "still", trc_isa_name(options->isas[i]),
+        printf("%-12s %-6s %-7s %-16s %-5s %7u rays, %u doubtful, %u wrong, hash %016" PRIx64 "\n",
+               scene->name, moving ? "moving" : "still", trc_isa_name(options->isas[i]),
                ray_kind_names[list->kind], ray_order_names[list->order], list->rays.count,
-               counts[BRUTE_DOUBTFUL], counts[BRUTE_DIFFERS]);
+               counts[BRUTE_DOUBTFUL], counts[BRUTE_DIFFERS], hash_of(&hits[i]));
         good = good && counts[BRUTE_DIFFERS] == 0;
         hit_set_free(&hits[i]);
     }
