@@ -25,6 +25,7 @@ platforms() {
     cat <<'END'
 linux-x64 amd64 gcc
 linux-arm64 arm64 gcc-aarch64-linux-gnu
+windows-x64 - gcc-mingw-w64-x86-64
 END
 }
 
@@ -76,6 +77,17 @@ make_sysroot() {
     mv "$part" "$root"
 }
 
+# No library but the system's own, and none exported but the interface.
+check_windows_library() {
+    local library=$1/tracer.dll objdump=x86_64-w64-mingw32-objdump foreign
+    foreign=$("$objdump" -p "$library" | sed -n 's/.*DLL Name: //p' | grep -vixE 'kernel32.dll|msvcrt.dll' || true)
+    [ -z "$foreign" ] || die "$library needs $foreign"
+    foreign=$("$objdump" -p "$library" | sed -n '/^\[Ordinal\/Name Pointer\]/,/^$/p' |
+        sed -n 's/^\t\[ *[0-9]*\] //p' | grep -v '^trc_' || true)
+    [ -z "$foreign" ] || die "$library exports $foreign"
+    say "Needs KERNEL32.dll and msvcrt.dll of Windows 10"
+}
+
 build() {
     local platform=$1 sysroot=$2 dir=$3
     say "Building for $platform"
@@ -100,6 +112,7 @@ package() {
     build "$platform" "$sysroot" "$dir"
     case $platform in
         linux-*) python3 examples/package.py check --library "$stage/lib/libtracer.so" ;;
+        windows-*) check_windows_library "$stage/lib" ;;
     esac
     python3 examples/package.py pack --stage "$stage" --platform "$platform" --out "$out"
 }
