@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# The packages of build/packages as a user has them: each installed into a Debian that holds Blender alone, no
+# The packages of build/packages as a user has them: each installed into a Debian that holds Blender alone (and
+# numpy, which the one of blender.org brings), no
 # compiler, no OpenImageIO for Python and nothing of the sources, where the example is rendered.
 #
 #   bash tests/installed.sh [SUITE]...
@@ -19,7 +20,7 @@ die() { printf 'installed: %s\n' "$*" >&2; exit 1; }
 skip() { die "$NAME: $*"; }
 
 choose_suite() {
-    SUITE=$1 ROOT=$CACHE/user-$1 PACKAGES=(blender)
+    SUITE=$1 ROOT=$CACHE/user-$1 PACKAGES=(blender python3-numpy)
     case $SUITE in
         bookworm) NAME="Debian 12" ;;
         trixie) NAME="Debian 13" ;;
