@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The packages of build/packages as a user has them: each installed into a Debian that holds Blender alone (and
-# numpy, which the one of blender.org brings), no
-# compiler, no OpenImageIO for Python and nothing of the sources, where the example is rendered.
+# NumPy, which the one of blender.org brings), no compiler, no OpenImageIO for Python and nothing of the
+# sources, where the example is rendered.
 #
 #   bash tests/installed.sh [SUITE]...
 #
@@ -64,10 +64,11 @@ bpy.ops.wm.save_userpref()"
     fi
 }
 
-# The example as PICTURE, by the add-on MODULE of what is installed.
+# The example as PICTURE, by the add-on MODULE of what is installed. With several threads Blender's own modifiers
+# differ in a last digit between two starts.
 render() {
     local module=$1 picture=$2
-    blender_there --python-exit-code 1 --addons "$module" /opt/volley/character.blend -E VOLLEY \
+    blender_there -t 1 --python-exit-code 1 --addons "$module" /opt/volley/character.blend -E VOLLEY \
         -o "/opt/volley/$picture" -F OPEN_EXR -f 1
     [ -s "$ROOT/opt/volley/${picture}0001.exr" ] || die "$NAME: no picture"
 }
