@@ -4,7 +4,7 @@
 from bl_ui.properties_grease_pencil_common import GreasePencilSimplifyPanel
 from bpy.types import Panel
 
-from .. import from_cycles, presets
+from .. import denoise_nodes, from_cycles, presets
 from ..compat import motion_position
 from ..farm.operator import VOLLEY_OT_merge_parts
 from .panel import VolleyPanel, column_of
@@ -56,6 +56,7 @@ class VOLLEY_RENDER_PT_sampling_render(VolleyPanel, Panel):
     def draw(self, context):
         settings, layout = context.scene.volley, column_of(self)
         _draw_samples(layout, settings)
+        layout.operator(denoise_nodes.VOLLEY_OT_set_up_denoise_nodes.bl_idname)
         layout.prop(settings, "time_limit")
         layout.prop(settings, "light_samples")
 
