@@ -18,6 +18,7 @@ from .scope import SAMPLERS
 MEASURES = {"mse": "MSE", "rel_mse": "relMSE", "p999": "99.9th percentile", "flip": "FLIP"}
 BASE = "cycles"
 DEFAULT = "volley sobol l1"  # Volley as it is without touching anything
+DENOISED = "volley denoised"
 SHEET_SAMPLES = (1, 16)      # of the pictures to look at
 
 
@@ -58,10 +59,13 @@ def write_sheet(name, options, folder):
 
 
 def configurations(name, scope):
-    """Cycles, Volley with each number of light samples, and with the other samplers."""
+    """Cycles, Volley with each number of light samples, with Denoise, and with the other samplers."""
     made = [error_time.Configuration(BASE, "CYCLES")]
     for count in scope.light_samples:
         made.append(volley("SOBOL", count))
+    if scope.denoise:
+        made.append(error_time.Configuration(DENOISED, "VOLLEY", {
+            **volley("SOBOL", scope.light_samples[0]).volley, "use_denoising": True}))
     if name in scope.sampler_scenes:
         made += [volley(sampler, scope.light_samples[0]) for sampler in SAMPLERS
                  if sampler != "SOBOL"]

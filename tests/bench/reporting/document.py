@@ -3,7 +3,7 @@
 
 import json
 
-from . import error_sections, farm_section, frame_sections, repeated, scope as scopes
+from . import denoise_section, error_sections, farm_section, frame_sections, repeated, scope as scopes
 from .machine import names
 from .tables import table
 
@@ -29,6 +29,7 @@ def text(results, out):
         parts.append(error_sections.equal_error_next(results["curves_next"]))
     if results.get("curves"):
         parts.append(error_sections.curves_and_bias(results["curves"]))
+        parts.append(denoise_section.text(results["curves"]))
     if results.get("kernels"):
         parts.append(error_sections.kernels_beside_embree(results["kernels"]))
     if results.get("povray"):
