@@ -42,7 +42,7 @@ blender_there() {
 check_is_bare() {
     local program
     for program in cc gcc clang cmake; do
-        ! inside which "$program" >/dev/null || die "$NAME has $program"
+        ! inside sh -c 'command -v "$0"' "$program" >/dev/null || die "$NAME has $program"
     done
     ! inside python3 -c 'import OpenImageIO' 2>/dev/null || die "$NAME has OpenImageIO for Python"
 }
