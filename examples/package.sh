@@ -31,24 +31,6 @@ END
 
 die() { printf 'package: %s\n' "$*" >&2; exit 1; }
 
-as_root() {
-    if [ "$(id -u)" -eq 0 ]; then "$@"; else sudo "$@"; fi
-}
-
-# Debian's compiler for a platform, and what it takes to build and pack with.
-install_tools() {
-    local package missing=()
-    for package in cmake ninja-build python3 binutils "$@"; do
-        [ "$(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null)" = installed ] ||
-            missing+=("$package")
-    done
-    [ ${#missing[@]} -gt 0 ] || return 0
-    say "Installing: ${missing[*]}"
-    as_root apt-get update -q </dev/null
-    as_root env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends \
-        "${missing[@]}" </dev/null
-}
-
 # Headers and libraries of Debian 11 for an architecture, unpacked into a folder: nothing is installed.
 make_sysroot() {
     local architecture=$1 root=$2 part=$2.part apt=$2.apt deb link
@@ -103,7 +85,7 @@ package() {
     local platform=$1 architecture=$2 compiler=$3
     local sysroot="" dir=build/package-$platform
     local stage=$dir/blender/addons/volley
-    install_tools "$compiler"
+    install_here cmake ninja-build python3 binutils "$compiler"
     if [ "$architecture" != - ]; then
         sysroot=$CACHE/$OLD_SUITE-$architecture
         mkdir -p "$CACHE"

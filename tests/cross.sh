@@ -11,8 +11,8 @@
 # "N passed, N failed, N skipped"; the logs are ctest.log, check.log and bench.log in the folder.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
+source tests/debian.sh
 
-say() { printf '== %s\n' "$*"; }
 die() { printf 'cross: %s\n' "$*" >&2; exit 1; }
 
 platform=${1:-}
@@ -34,23 +34,6 @@ case $platform in
 esac
 dir=$PWD/build/cross-$platform
 cmocka=$dir/cmocka
-
-as_root() {
-    if [ "$(id -u)" -eq 0 ]; then "$@"; else sudo "$@"; fi
-}
-
-install_packages() {
-    local package missing=()
-    for package in cmake ninja-build dpkg-dev "${packages[@]}"; do
-        [ "$(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null)" = installed ] ||
-            missing+=("$package")
-    done
-    [ ${#missing[@]} -gt 0 ] || return 0
-    say "Installing: ${missing[*]}"
-    as_root apt-get update -q </dev/null
-    as_root env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends \
-        "${missing[@]}" </dev/null
-}
 
 configure() {
     cmake -G Ninja --toolchain "$PWD/.cmake/package.cmake" -DTRACER_TARGET="$platform" "$@" </dev/null
@@ -92,7 +75,7 @@ build() {
 export WINEPREFIX=$dir/wine WINEDEBUG=-all TMPDIR=/tmp
 
 mkdir -p "$dir"
-install_packages
+install_here cmake ninja-build dpkg-dev "${packages[@]}"
 build_cmocka
 build
 say "Tests"

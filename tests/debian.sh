@@ -1,10 +1,25 @@
-# Debian's suites in folders of their own, and the mirror they come from: sourced by what needs them.
+# What scripts share that install from Debian's mirrors: packages here, and suites in folders of their own.
 #
-# The script that sources this sets SUITE ("trixie"), NAME (for people, "Debian 13"), ROOT (the folder) and
-# PACKAGES, and defines skip, which says why there can be no such Debian here and ends the script.
+# For the latter the script that sources this sets SUITE ("trixie"), NAME (for people, "Debian 13"), ROOT (the
+# folder) and PACKAGES, and defines skip, which says why there can be no such Debian here and ends the script.
 CACHE=${XDG_CACHE_HOME:-$HOME/.cache}/volley
 
 say() { printf '== %s\n' "$*"; }
+
+# Installs packages that are missing here, as root or through sudo.
+install_here() {
+    local package missing=()
+    for package in "$@"; do
+        [ "$(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null)" = installed ] ||
+            missing+=("$package")
+    done
+    [ ${#missing[@]} -gt 0 ] || return 0
+    say "Installing: ${missing[*]}"
+    set -- env DEBIAN_FRONTEND=noninteractive apt-get -q
+    [ "$(id -u)" -eq 0 ] || set -- sudo "$@"
+    "$@" update </dev/null
+    "$@" install -y --no-install-recommends "${missing[@]}" </dev/null
+}
 
 # In a mount name space of its own, where there may be one: what is mounted there goes away with it.
 in_private() {
