@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Objects' shadow terminator offsets and distances of Fast GI beside Cycles: on coarse balls, matt, of rough and of
-smooth gloss, in rows of different offsets. Means within 1 %, and no tile that several seeds find off by as much.
+"""Objects' shadow terminator offsets and distances of Fast GI beside Cycles: on coarse balls and a ring between them,
+which is hollow along its hole, matt, of rough and of smooth gloss, of different offsets. Means within 1 %, and no tile that several seeds find off by as much.
 The table goes to results/shading_offsets.txt of the build."""
 
 import blender as blender_support
@@ -12,7 +12,7 @@ SEEDS = (51, 52, 53, 54)
 SAMPLES = 64
 TOLERANCE = 0.01  # relative to the mean of the picture
 
-# name: (light, lobe, geometry offset, shading offset) of every other ball; the rest have Cycles' defaults.
+# name: (light, lobe, geometry offset, shading offset) of the balls; the ring has Cycles' defaults.
 CASES = {
     "defaults": ('SUN', "diffuse", 0.1, 0.0),
     "no geometry": ('SUN', "diffuse", 0.0, 0.0),
@@ -37,9 +37,21 @@ def _set_offsets(owner, geometry, shading):
         owner.cycles.shadow_terminator_offset = shading
 
 
-def _ball(name, x, material):
+def _ball(x):
     import bpy
     bpy.ops.mesh.primitive_uv_sphere_add(segments=12, ring_count=7, radius=0.9, location=(x, 0.0, 0.9))
+
+
+def _ring(x):
+    import bpy
+    bpy.ops.mesh.primitive_torus_add(major_segments=14, minor_segments=7, major_radius=0.62, minor_radius=0.27,
+                                     location=(x, 0.0, 0.9), rotation=(1.1, 0.0, 0.0))
+
+
+def _smooth(name, add, x, material):
+    """The object that an operator adds, smooth and of that material."""
+    import bpy
+    add(x)
     made = bpy.context.object
     made.name = name
     for polygon in made.data.polygons:
@@ -63,14 +75,15 @@ def build(light, lobe, geometry, shading):
     grey = scenes.material("Grey", "ShaderNodeBsdfDiffuse", Color=(0.5, 0.5, 0.5))
     scenes.mesh("Floor", [(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0)], [(0, 1, 2, 3)], grey)
     material = _material(lobe)
-    balls = [_ball(f"Ball {i}", 2.1 * i - 2.1, material) for i in range(3)]
-    for ball in balls[::2]:
+    balls = [_smooth("Ball 0", _ball, -2.1, material), _smooth("Ball 1", _ball, 2.1, material)]
+    _smooth("Ring", _ring, 0.0, material)
+    for ball in balls:
         _set_offsets(ball, geometry, shading)
     if light == 'AO':
         scenes.light_world((0.5, 0.6, 0.8))
         scene.world.cycles.sampling_method = 'NONE'
         scene.world.light_settings.distance = 3.0
-        balls[0].cycles.ao_distance, balls[2].cycles.ao_distance = 0.4, 1.0
+        balls[0].cycles.ao_distance, balls[1].cycles.ao_distance = 0.4, 1.0
         scene.volley.use_ambient_occlusion, scene.volley.ao_method = True, 'REPLACE'
         scene.cycles.use_fast_gi, scene.cycles.fast_gi_method = True, 'REPLACE'
         scene.cycles.ao_bounces_render = 1

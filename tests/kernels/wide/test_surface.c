@@ -85,7 +85,8 @@ static void build(void) {
 /* One hit in long double from the same float keys: corners and matrix are rounded as the library
  * does. */
 struct truth {
-    long double p[3], ng[3], n[3], bulge[3];
+    long double p[3], ng[3], n[3], up[3];
+    long double height[2]; /* of the bulge, in lengths of up, on that side and on the other */
     bool smooth;
 };
 static void cross(const long double a[3], const long double b[3], long double out[3]) {
@@ -107,24 +108,39 @@ static float between(const float *keys, uint32_t key_count, size_t stride, size_
     const float a = keys[stride * key + at];
     return a + f * (keys[stride * (key + 1) + at] - a);
 }
-/* Above each edge a parabola of height wa wb (na - nb) . (pa - pb), weights wa and wb of its ends;
- * all along the interpolated normal, in object space. */
+/* How high the surface that the normals describe lies on a side (1 or -1): the lowest of the planes
+ * at the corners, in hollows raised to their highest neighbour, and half the parabolas of the
+ * edges, of height wa wb (na - nb) . (pa - pb), where those are higher. In object space. */
+static long double bulge_height(long double p[3][3], long double n[3][3],
+                                const long double weight[3], int side) {
+    long double planes = 1e30L, arcs = 0;
+    for (int k = 0; k < 3; k++) {
+        long double top = 0, here = 0, bend = 0;
+        const int next = (k + 1) % 3;
+        for (int j = 0; j < 3; j++) {
+            long double above = 0;
+            for (int i = 0; i < 3; i++)
+                above += side * (p[j][i] - p[k][i]) * n[k][i];
+            top = fmaxl(top, above);
+            here += weight[j] * above;
+        }
+        planes = fminl(planes, fmaxl(top - here, 0));
+        for (int i = 0; i < 3; i++)
+            bend += side * (n[next][i] - n[k][i]) * (p[next][i] - p[k][i]);
+        arcs += weight[k] * weight[next] * bend;
+    }
+    return side * fmaxl(planes, arcs / 2);
+}
 static void set_bulge(struct truth *t, long double p[3][3], long double n[3][3],
                       long double column[3][3], long double u, long double v) {
     const long double weight[3] = {1 - u - v, u, v};
-    long double height = 0, along[3];
-    for (int k = 0; k < 3; k++) {
-        const int next = (k + 1) % 3;
-        long double bend = 0;
-        for (int i = 0; i < 3; i++)
-            bend += (n[next][i] - n[k][i]) * (p[next][i] - p[k][i]);
-        height += weight[k] * weight[next] * bend;
-    }
+    long double along[3];
+    for (int side = 0; side < 2; side++)
+        t->height[side] = bulge_height(p, n, weight, side ? -1 : 1);
     for (int i = 0; i < 3; i++)
         along[i] = weight[0] * n[0][i] + weight[1] * n[1][i] + weight[2] * n[2][i];
     for (int i = 0; i < 3; i++)
-        t->bulge[i] =
-            height * (column[0][i] * along[0] + column[1][i] * along[1] + column[2][i] * along[2]);
+        t->up[i] = column[0][i] * along[0] + column[1][i] * along[1] + column[2][i] * along[2];
 }
 static struct truth exact(int instance_number, int triangle, float u, float v, float time) {
     const struct trc_instance *instance = &scene.instance[instance_number];
@@ -209,23 +225,22 @@ static struct trc_surface fetch(const struct hits *h, vvec3 wo) {
     return s;
 }
 
-/* How far the bulge of a lane is off, as a part of its size. */
+/* How far the bulge of a lane is off, in lengths of its direction. */
 static double bulge_error(const struct trc_surface *s, int lane, const struct truth *t, bool back) {
     const vfloat found[3] = {s->bulge.x, s->bulge.y, s->bulge.z};
     long double size = 0, above = 0;
     double off = 0.0;
     for (int i = 0; i < 3; i++) {
-        size += t->bulge[i] * t->bulge[i];
-        above += t->bulge[i] * t->ng[i] * (back ? -1 : 1);
+        size += t->up[i] * t->up[i];
+        above += t->up[i] * t->ng[i] * (back ? -1 : 1);
     }
     size = sqrtl(size);
     /* Where it is nearly within the triangle, or cancels itself, rounding decides. */
     if (fabsl(above) < 1e-3L * size || size < 1e-3L)
         return 0.0;
-    const bool is_seen = t->smooth && above > 0;
+    const long double height = t->smooth ? t->height[above < 0] : 0;
     for (int i = 0; i < 3; i++)
-        off =
-            fmax(off, fabs((double)vf_get(found[i], lane) - (is_seen ? (double)t->bulge[i] : 0.0)));
+        off = fmax(off, fabs((double)vf_get(found[i], lane) - (double)(height * t->up[i])));
     return off / (double)size;
 }
 

@@ -163,18 +163,30 @@ static vvec3 transform_normal(const struct trc_wide_affine *m, vvec3 n) {
                   v3_mad(v3_cross(c[2], c[0]), n.y, v3_scale(v3_cross(c[0], c[1]), n.z)));
 }
 
-/* The curved surface above the triangle: along each edge a parabola whose height, weights wa and wb
- * of its ends, is wa wb (na - nb) . (pa - pb), the sum of the three along the interpolated normal.
- * Twice the height of the arc that has the normals at its ends, so that it clears its neighbours
- * (J. Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems II, 2021, has tangent planes in
- * place of parabolas). Object space. */
-static vvec3 bulge_of(const struct trc_surface *s, const struct raw_hit *h, vvec3 e1, vvec3 e2,
-                      vvec3 n) {
+/* The height of a point below the plane through a corner that is normal to its normal, at least 0;
+ * where the surface is hollow there, below the higher of the two neighbours. da and db are how high
+ * they lie above the plane, wa and wb the point's weights of them. */
+TRC_INLINE vfloat height_below(vfloat da, vfloat db, vfloat wa, vfloat wb) {
+    const vfloat zero = vf_zero(), top = vf_max(vf_max(da, db), zero);
+    return vf_max(top - (wa * da + wb * db), zero);
+}
+
+/* How high the curved surface that the normals describe lies above the triangle, in lengths of n,
+ * as in Cycles: the lowest of the planes at the corners (J. Hanika, "Hacking the Shadow
+ * Terminator", Ray Tracing Gems II, 2021), or where that is lower half of the parabolas along the
+ * edges, whose heights are wa wb (na - nb) . (pa - pb). Object space; e1 and e2 change their sign
+ * with the side. */
+static vfloat bulge_of(const struct trc_surface *s, const struct raw_hit *h, vvec3 e1, vvec3 e2) {
     const vvec3 *c = h->n.corner;
-    const vfloat w = vf_one() - s->u - s->v;
-    const vfloat k01 = v3_dot(v3_sub(c[1], c[0]), e1), k02 = v3_dot(v3_sub(c[2], c[0]), e2),
-                 k12 = v3_dot(v3_sub(c[2], c[1]), v3_sub(e2, e1));
-    return v3_scale(n, w * (s->u * k01 + s->v * k02) + s->u * s->v * k12);
+    const vvec3 e3 = v3_sub(e2, e1);
+    const vfloat u = s->u, v = s->v, w = vf_one() - u - v, zero = vf_zero();
+    const vfloat d01 = v3_dot(e1, c[0]), d02 = v3_dot(e2, c[0]);
+    const vfloat d10 = zero - v3_dot(e1, c[1]), d12 = v3_dot(e3, c[1]);
+    const vfloat d20 = zero - v3_dot(e2, c[2]), d21 = zero - v3_dot(e3, c[2]);
+    const vfloat planes = vf_min(vf_min(height_below(d01, d02, u, v), height_below(d10, d12, w, v)),
+                                 height_below(d20, d21, w, u));
+    const vfloat arcs = w * (u * (d01 + d10) + v * (d02 + d20)) + u * v * (d12 + d21);
+    return vf_max(planes, vf_set(-0.5f) * arcs);
 }
 
 static void set_normals(struct trc_surface *s, const struct raw_hit *h, vvec3 e1, vvec3 e2) {
@@ -197,12 +209,14 @@ static void set_normals(struct trc_surface *s, const struct raw_hit *h, vvec3 e1
         const vfloat w = vf_one() - s->u - s->v;
         vvec3 sum =
             v3_mad(h->n.corner[0], w, v3_mad(h->n.corner[1], s->u, v3_scale(h->n.corner[2], s->v)));
-        const vvec3 bulge = trc_transform_vector(&h->m, bulge_of(s, h, e1, e2, sum));
+        const vvec3 up = trc_transform_vector(&h->m, sum);
+        const vfloat turn =
+            vf_select(vf_lt(v3_dot(up, ng) * side, vf_zero()), vf_set(-1.0f), vf_one());
+        const vfloat height = bulge_of(s, h, v3_scale(e1, turn), v3_scale(e2, turn)) * turn;
         sum = v3_normalize(v3_scale(transform_normal(&h->m, sum), sign));
         s->smooth = vm_and(h->smooth, vf_gt(v3_dot(sum, sum), vf_set(0.5f)));
         n = v3_select(s->smooth, sum, ng);
-        const vmask above = vf_gt(v3_dot(bulge, ng) * side, vf_zero());
-        s->bulge = v3_where(vm_and(s->smooth, above), bulge);
+        s->bulge = v3_where(s->smooth, v3_scale(up, height));
     }
     s->ng = v3_scale(ng, side);
     s->n = v3_scale(n, side);

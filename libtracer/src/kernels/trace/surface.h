@@ -40,7 +40,7 @@ struct trc_surface {
     vmask backfacing; /* the ray came from the back of the winding */
     vmask smooth;     /* n is interpolated */
     vvec3 bulge;      /* from p to the curved surface that the normals describe, on the side of wo;
-                         0 where that is below the triangle or where not smooth */
+                         0 where that is not above the triangle or where not smooth */
     vfloat ray_length;
     vuint path; /* TRC_VISIBLE_* | TRC_PATH_* */
     vint depth, diffuse_depth, glossy_depth, transmission_depth, transparent_depth;
