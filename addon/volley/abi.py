@@ -817,6 +817,7 @@ class RenderDesc(Structure):
                 ("filter_glossy", c_float), ("clamp_direct", c_float), ("clamp_indirect", c_float),
                 ("assembly", c_uint32), ("packet_size", c_uint32), ("sampler", c_uint32), ("seed", c_uint32),
                 ("filter", c_uint32), ("filter_width", c_float), ("film_transparent", c_uint32),
+                ("film_transparent_glass", c_uint32), ("film_transparent_roughness", c_float),
                 ("film_exposure", c_float), ("passes", c_uint64), ("thread_count", c_uint32),
                 ("progressive", c_uint32), ("noise_threshold", c_float), ("min_samples", c_uint32),
                 ("mist_start", c_float), ("mist_depth", c_float), ("mist_falloff", c_float),

@@ -122,15 +122,15 @@ def cycles_curves(scene, name, default):
     return getattr(getattr(scene, "cycles_curves", None), name, default)
 
 
-def has_adaptive_subdivision(blender_object):
-    """Whether Cycles would dice an object's subdivision surface by its size in the picture: a setting of
+def has_adaptive_subdivision(blender_object, scene):
+    """Whether Cycles would dice an object's subdivision surface by its size in pictures of the scene: a setting of
     its last modifier, or of Cycles' of the object where experimental features are on."""
     last = blender_object.modifiers[-1] if blender_object.modifiers else None
     if last is None or last.type != 'SUBSURF' or not last.show_render:
         return False
     if hasattr(last, "use_adaptive_subdivision"):
         return last.use_adaptive_subdivision
-    is_experimental = cycles(bpy.context.scene, "feature_set", 'SUPPORTED') == 'EXPERIMENTAL'
+    is_experimental = cycles(scene, "feature_set", 'SUPPORTED') == 'EXPERIMENTAL'
     return is_experimental and cycles(blender_object, "use_adaptive_subdivision", False)
 
 

@@ -19,6 +19,8 @@ _COPIED = (
     ("sample_clamp_direct", "clamp_direct"), ("sample_clamp_indirect", "clamp_indirect"),
     ("blur_glossy", "filter_glossy"), ("use_fast_gi", "use_ambient_occlusion"),
     ("fast_gi_method", "ao_method"), ("film_exposure", "film_exposure"),
+    ("film_transparent_glass", "film_transparent_glass"),
+    ("film_transparent_roughness", "film_transparent_roughness"),
     ("pixel_filter_type", "pixel_filter_type"), ("filter_width", "filter_width"),
     ("texture_limit", "texture_limit"), ("texture_limit_render", "texture_limit_render"),
 )
@@ -30,7 +32,6 @@ _UNMATCHED = (
     ("light_sampling_threshold", 0.0, "Light Threshold"), ("use_light_tree", True, "Light Tree"),
     ("use_guiding", False, "Path Guiding"), ("sample_offset", 0, "Sample Offset"),
     ("scrambling_distance", 1.0, "Scrambling Distance"),
-    ("film_transparent_glass", False, "Transparent Glass"),
     ("caustics_reflective", True, "Reflective Caustics"), ("caustics_refractive", True, "Refractive Caustics"),
     ("use_layer_samples", 'USE', "Layer Samples"), ("use_pixel_jitter", False, "Pixel Jitter"),
     ("texture_resolution", 1.0, "Texture Resolution"),

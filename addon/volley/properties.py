@@ -202,6 +202,13 @@ class VolleySceneSettings(bpy.types.PropertyGroup):
     film_exposure: FloatProperty(
         name="Exposure", default=1.0, min=0.0, soft_max=10.0, description="Factor on all light",
         update=_changed)
+    film_transparent_glass: BoolProperty(
+        name="Transparent Glass", default=False, update=_changed,
+        description="Where the film is transparent, show glass over the footage, too: the background is seen "
+                    "through it")
+    film_transparent_roughness: FloatProperty(
+        name="Roughness Threshold", default=0.1, min=0.0, max=1.0, update=_changed,
+        description="Glass that is rougher hides the background")
     pixel_filter_type: EnumProperty(
         name="Filter Type", items=FILTER_ITEMS, default='BLACKMAN_HARRIS', description="Pixel filter",
         update=_changed)

@@ -86,7 +86,7 @@ class Session:
             settings["progressive"] = int(time_limit > 0.0)
             render = self._sync.scene.start_render(**settings)
             try:
-                progress = _Run(engine, self._sync, render, sample_count, time_limit).follow(
+                progress = _Run(engine, self._sync, render, sample_count, time_limit, scene.frame_current).follow(
                     view_layer.name, view_name, entries)
                 folder = "" if engine.is_preview else job.job().parts_folder
                 if folder and progress.state == abi.ProgressState.DONE:
@@ -108,7 +108,7 @@ class Session:
 
     def _synchronise(self, engine, depsgraph, frame, shutter, view_names):
         """Send everything but the camera; the cameras come back, one for each view."""
-        engine.update_stats("", "Synchronizing")
+        engine.update_stats("", "Reading the scene")
         scene = depsgraph.scene_eval
         now = motion.split_frame(scene.frame_current_final)
         shown = depsgraph.as_pointer(), scene.name_full, depsgraph.view_layer_eval.name
@@ -137,7 +137,7 @@ class Session:
 
     def _commit(self, engine):
         """Build on another thread, so that Esc is heard meanwhile."""
-        engine.update_stats("", "Building")
+        engine.update_stats("", "Preparing to render")
         commit = Commit(self._sync.scene)
         try:
             while not commit.is_done(POLL_SECONDS):
@@ -193,10 +193,10 @@ class CameraMotion:
 class _Run:
     """One running render: progress, unfinished pictures, Esc, the result."""
 
-    def __init__(self, engine, sync, render, sample_count, time_limit):
+    def __init__(self, engine, sync, render, sample_count, time_limit, frame):
         self._engine, self._render, self._sample_count = engine, render, sample_count
         self._time_limit = time_limit  # seconds, 0 for none
-        self._frame = bpy.context.scene.frame_current
+        self._frame = frame  # that progress is told of
         self._features = sync.scene.features()
         self._next_picture = time.monotonic() + FIRST_PICTURE_SECONDS
         self._shown_version = 0
@@ -320,6 +320,8 @@ def render_fields(scene, frame, crop, entries, is_preview=False):
         "sampler": abi.SamplerType[settings.sampler], "seed": seed & 0xFFFFFFFF,
         "filter": abi.FilterType[settings.pixel_filter_type], "filter_width": settings.filter_width,
         "film_transparent": int(scene.render.film_transparent),
+        "film_transparent_glass": int(settings.film_transparent_glass),
+        "film_transparent_roughness": settings.film_transparent_roughness,
         "film_exposure": settings.film_exposure, **passes.request_fields(entries),
         "denoise": int(settings.use_preview_denoising if is_preview else settings.use_denoising),
         "thread_count": thread_count(scene.render), **_adaptive_fields(settings, is_preview),

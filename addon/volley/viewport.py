@@ -19,7 +19,7 @@ from gpu_extras.presets import draw_texture_2d
 
 from . import abi, native, passes, writes
 from .commit import Commit
-from .session import render_fields, status_text, thread_count, timecode
+from .session import MEGA, render_fields, status_text, thread_count, timecode
 from .sync import SceneSync, Source, camera, culling, light, studio
 from .sync.changes import Changes
 
@@ -252,7 +252,8 @@ class _Pictures:
             pixels = passes.read_shown(self._render, self._shown_pass)
             self._texture, self._place = _texture_of(pixels), self._next_place
             total = self._fields["sample_count"]
-            self._status = f"Time:{timecode(now - self._started)} | {status_text(progress, total)}"
+            self._status = " | ".join((f"Time:{timecode(now - self._started)}",
+                                       f"Mem:{progress.memory_bytes / MEGA:.0f}M", status_text(progress, total)))
             if not self._is_last:
                 self._pixel_seconds = progress.seconds / (pixels.shape[0] * pixels.shape[1])
         if not self._is_last and not is_running:

@@ -143,10 +143,17 @@ def inside_adaptive():
     else:
         bpy.context.scene.cycles.feature_set = 'EXPERIMENTAL'
         made.cycles.use_adaptive_subdivision = True
-    from volley import compat
-    told = [compat.has_adaptive_subdivision(made)]
+    from volley import session
+    told, shown = [], bpy.context.scene
+    session.report_warning = lambda _engine, message: told[-1].append(message)
+    for is_other_shown in (False, True):
+        told.append([])
+        if is_other_shown:
+            bpy.context.window.scene = bpy.data.scenes.new("Other")
+        scenes.render(shown)
     made.modifiers.clear()
-    told.append(compat.has_adaptive_subdivision(made))
+    told.append([])
+    scenes.render(shown)
     return told
 
 
@@ -185,4 +192,7 @@ def test_changes(blender):
 
 
 def test_adaptive_subdivision_is_known(blender):
-    assert blender.run(inside_adaptive) == [True, False]
+    """By the settings of the scene that is rendered, not of the one shown."""
+    alone, beside_other, without = blender.run(inside_adaptive)
+    assert alone == beside_other and without == []
+    assert "adaptive subdivision is not supported, its modifier's levels are used" in alone[0]

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A ball of rough glass in an even world against Cycles': what many bounces inside keep of the light."""
 
+import compare
 import pytest
 
 SAMPLES = 64
@@ -80,3 +81,52 @@ def test_floor_below_a_block(blender):
     assert ours[1] == pytest.approx(theirs[1], rel=TOLERANCE)
     # The upper face mirrors the sky; where the lower one is met before the floor, it does so, too.
     assert theirs[0] * (1.0 - TOLERANCE) < ours[0] < theirs[0] * (2.0 + TOLERANCE) < 0.5 * ours[1]
+
+
+# What the film's alpha says behind glass: {name: (shader node, its inputs)}.
+SEEN_THROUGH = {
+    "clear": ("ShaderNodeBsdfGlass", {"Roughness": 0.0}),
+    "below the threshold": ("ShaderNodeBsdfGlass", {"Roughness": 0.15}),
+    "above it": ("ShaderNodeBsdfGlass", {"Roughness": 0.3}),
+    "refraction": ("ShaderNodeBsdfRefraction", {"Roughness": 0.1}),
+    "Principled": ("ShaderNodeBsdfPrincipled", {"Roughness": 0.05, "Transmission": 0.95}),
+    "translucent": ("ShaderNodeBsdfTranslucent", {}),
+}
+THRESHOLD, FILM_SAMPLES, ALPHA_OFF = 0.2, 256, 2e-3
+
+
+def inside_transparent_film():
+    """A row of balls over a floor that ends behind them: seeds by both engines, without and with what is asked of
+    glass."""
+    import bpy
+    import scenes
+    scene = scenes.empty(size=(24 * len(SEEN_THROUGH), 24))
+    scenes.camera(location=(0.0, -12.0, 0.0), type='ORTHO', ortho_scale=2.4 * len(SEEN_THROUGH))
+    scenes.world_color(scene.world, (0.4, 0.5, 0.6))
+    scene.render.film_transparent = True
+    matt = scenes.material("Matt", "ShaderNodeBsdfDiffuse", Color=(0.7, 0.3, 0.2))
+    scenes.mesh("Floor", [(-9, -3, -1.05), (9, -3, -1.05), (9, 3, -1.05), (-9, 3, -1.05)], [(0, 1, 2, 3)], matt)
+    for number, (name, (kind, inputs)) in enumerate(SEEN_THROUGH.items()):
+        made = scenes.material(name, kind)
+        for socket, value in inputs.items():
+            node = scenes.shader_of(made)
+            node.inputs[socket if socket in node.inputs else "Transmission Weight"].default_value = value
+        scenes.sphere(name, 1.0, (2.4 * (number - 0.5 * len(SEEN_THROUGH) + 0.5), 0.0, 0.0), made)
+    found = []
+    for is_on in (False, True):
+        for settings in (scene.volley, scene.cycles):
+            settings.film_transparent_glass, settings.film_transparent_roughness = is_on, THRESHOLD
+        found.append(scenes.seeds_by_both(FILM_SAMPLES))
+    return found
+
+
+def test_transparent_glass(blender):
+    without, asked = blender.run(inside_transparent_film)
+    for ours, theirs in (without, asked):
+        assert max(compare.unexplained(ours, theirs)) <= ALPHA_OFF
+    # Balls of clear glass become transparent, others stay.
+    alphas = [ours[..., 8:16, :, 3].mean(axis=(0, 1)).reshape(len(SEEN_THROUGH), -1)[:, 9:15].mean(axis=1)
+              for ours, _ in (without, asked)]
+    assert all(abs(alphas[0] - 1.0) < 0.02)
+    assert [name for name, alpha in zip(SEEN_THROUGH, alphas[1]) if alpha < 0.5] == [
+        "clear", "below the threshold", "refraction", "Principled"]

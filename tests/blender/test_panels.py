@@ -67,6 +67,36 @@ def test_panels_show_what_they_are_for(blender):
     assert "simplify_subdivision_render" in found["VOLLEY_RENDER_PT_simplify_render"]
 
 
+def inside_dots():
+    """Names of the properties with a dot that animates them: of each kind of light, and of its rays and a mesh's."""
+    import bpy
+    import drawing
+    import scenes
+    from volley.ui import objects, shading
+    scenes.empty()
+    found = {}
+
+    def note(name, panel, **values):
+        shown = drawing.draw(panel, drawing.Context(engine='VOLLEY', scene=bpy.context.scene, **values)).properties
+        found[name] = {key for key, options in shown.items() if options["has_dot"]}
+
+    for kind in ('POINT', 'SPOT', 'SUN', 'AREA'):
+        note(kind, shading.VOLLEY_LIGHT_PT_light, light=scenes.light(kind).data)
+    note("rays of a light", objects.VOLLEY_OBJECT_PT_ray_visibility, object=bpy.data.objects[0])
+    note("rays of a mesh", objects.VOLLEY_OBJECT_PT_ray_visibility, object=scenes.wall())
+    note("visibility", objects.VOLLEY_OBJECT_PT_visibility, object=bpy.data.objects["Wall"])
+    return found
+
+
+def test_what_is_animated_has_dots(blender):
+    found = blender.run(inside_dots)
+    for kind in ('POINT', 'SPOT', 'SUN', 'AREA'):
+        assert {"color", "energy"} <= found[kind], kind
+    rays = {f"visible_{name}" for name in ("camera", "diffuse", "glossy", "transmission")}
+    assert rays == found["rays of a light"] and found["rays of a mesh"] == rays | {"visible_shadow"}
+    assert {"hide_viewport", "hide_render"} <= found["visibility"]
+
+
 def inside_cycles_settings():
     """What becomes of the offer, and of settings, when Cycles' are taken over; every preset at last."""
     import os
@@ -178,7 +208,7 @@ def test_status_of_a_render(blender):
     times = blender.run(inside_render)
     assert times == ["00:00.00", "01:00.00", "01:02:03.46"]
     lines = STATUS_LINE.findall(blender.output)
-    samples = [line for line in lines if line not in {"Synchronizing", "Building"}]
+    samples = [line for line in lines if line not in {"Reading the scene", "Preparing to render"}]
     assert all(STATUS.match(line) for line in samples), samples
     assert samples[-1] == "Sample 4/4"
 
@@ -216,6 +246,7 @@ def test_status_of_a_viewport(window):
     texts = window.run_in_window(inside_view)
     assert texts[-1].endswith("Sample 6/6")
     for text in texts:
-        time, _, status = text.partition(" | ")
+        time, memory, status = text.split(" | ", 2)
+        assert re.match("Mem:[0-9]+M$", memory), text
         assert re.match("Time:[0-9]{2}:[0-9]{2}[.][0-9]{2}$", time), text
         assert STATUS.match(status).group(2) == "6", text

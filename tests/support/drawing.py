@@ -9,7 +9,7 @@ class Layout:
     def __init__(self, notes=None):
         self.nodes, self.properties, self.operators = notes or ([], {}, [])
         self.operator_context = 'INVOKE_DEFAULT'
-        self.use_property_split = False
+        self.use_property_split = self.use_property_decorate = False
 
     def operator(self, name, **_):
         button = _Button()
@@ -19,10 +19,17 @@ class Layout:
         return button
 
     def prop(self, _data, name, **options):
-        self.properties[name] = {"is_split": self.use_property_split, **options}
+        self.properties[name] = {"is_split": self.use_property_split, "has_dot": self.use_property_decorate,
+                                 **options}
 
     def __getattr__(self, name):
-        return lambda *_, **__: Layout((self.nodes, self.properties, self.operators))
+        return self._part
+
+    def _part(self, *_, **__):
+        """A row, column or the like, which has its parent's style."""
+        part = Layout((self.nodes, self.properties, self.operators))
+        part.use_property_split, part.use_property_decorate = self.use_property_split, self.use_property_decorate
+        return part
 
 
 class _Button:

@@ -13,9 +13,11 @@ import numpy as np
 import scenes
 
 SEEDS = scenes.SEEDS
+WINDOW_SEEDS = SEEDS[:2]
 DRAW_SECONDS = 0.5
-STILL_DRAWS = 6       # that show the same, after which a viewport is taken to have ended
+STILL_DRAWS = 5       # that show the same, after which a viewport is taken to have ended
 LONGEST_DRAWS = 240
+EXPOSED_SAMPLES, EXPOSED_PERCENT, EXPOSED_TO = 16, 99.5, 0.7
 EXTENT_DISTANCES = 1.6  # of the camera that is added, from the middle of the scene
 
 
@@ -78,6 +80,7 @@ def in_window(path, size, samples, **switches):
     viewport.Viewport._report = lambda _self, _engine, messages: told.extend(messages)
     yield 0.1
     scene = open_file(path, size, **switches)
+    _expose(scene)
     bpy.context.preferences.view.show_splash = False
     yield DRAW_SECONDS
     area, space = _view()
@@ -87,16 +90,24 @@ def in_window(path, size, samples, **switches):
     for engine in ('VOLLEY', 'CYCLES'):
         space.shading.type = 'SOLID'
         pictures = []
-        for _ in scenes.each_seed(engine, samples):
-            getattr(scene, engine.lower()).preview_samples = max(1, samples // len(SEEDS))
+        for _ in scenes.each_seed(engine, samples, WINDOW_SEEDS):
+            getattr(scene, engine.lower()).preview_samples = max(1, samples // len(WINDOW_SEEDS))
             if engine == 'CYCLES':
                 scene.cycles.use_preview_denoising = scene.cycles.use_preview_adaptive_sampling = False
+            scene.update_tag()  # which buttons do
             space.shading.type = 'RENDERED'
             pictures.append((yield from _still(area)))
             space.shading.type = 'SOLID'
             yield DRAW_SECONDS
         shown.append(np.array(pictures))
     return shown, sorted(set(told))
+
+
+def _expose(scene):
+    """Have the screen show what is bright as nearly white, nothing brighter: it has no values above 1."""
+    scenes.set_engine('VOLLEY', EXPOSED_SAMPLES)
+    bright = np.percentile(scenes.render(scene)[..., :3].max(axis=2), EXPOSED_PERCENT)
+    scene.view_settings.exposure = math.log2(EXPOSED_TO / max(bright, 1e-3))
 
 
 def _view():

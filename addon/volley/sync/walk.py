@@ -248,7 +248,7 @@ class Walk:
         if mesh.is_sculpted_multires(blender_object):
             self._sync.warnings.add(f"Object '{blender_object.name}': while it is sculpted, the mesh below its "
                                     "multiresolution is shown")
-        if has_adaptive_subdivision(blender_object):
+        if has_adaptive_subdivision(blender_object, self._source.depsgraph.scene_eval):
             self._sync.warnings.add(f"Object '{blender_object.name}': adaptive subdivision is not "
                                     "supported, its modifier's levels are used")
         slot_count = max(len(blender_object.material_slots), len(shape.materials))

@@ -34,7 +34,7 @@ class VOLLEY_OBJECT_PT_visibility(_ObjectPanel, Panel):
     bl_options = {'DEFAULT_CLOSED'}
 
     def draw(self, context):
-        layout, active = column_of(self), context.object
+        layout, active = column_of(self, has_keys=True), context.object
         layout.prop(active, "hide_select", text="Selectable", invert_checkbox=True, toggle=False)
         column = layout.column(heading="Show In")
         column.prop(active, "hide_viewport", text="Viewports", invert_checkbox=True, toggle=False)
@@ -54,8 +54,11 @@ class VOLLEY_OBJECT_PT_ray_visibility(_SeenObjectPanel, Panel):
         column, active = column_of(self, has_keys=True).column(), context.object
         for name in ("camera", "diffuse", "glossy", "transmission"):
             column.prop(active, f"visible_{name}", text=name.title())
-        if active.type != 'LIGHT':
-            column.prop(active, "visible_shadow", text="Shadow")
+        if active.type == 'LIGHT':
+            return
+        column.prop(active, "visible_shadow", text="Shadow")
+        if active.visible_diffuse != active.visible_shadow:
+            column.label(text="The world's light goes by Shadow alone", icon='INFO')
 
 
 class VOLLEY_OBJECT_PT_culling(_SeenObjectPanel, Panel):

@@ -261,9 +261,23 @@ class VOLLEY_RENDER_PT_film(VolleyPanel, Panel):
     bl_options = {'DEFAULT_CLOSED'}
 
     def draw(self, context):
-        layout = column_of(self)
-        layout.prop(context.scene.volley, "film_exposure")
-        layout.prop(context.scene.render, "film_transparent", text="Transparent")
+        column_of(self).prop(context.scene.volley, "film_exposure")
+
+
+class VOLLEY_RENDER_PT_film_transparency(VolleyPanel, Panel):
+    bl_label = "Transparent"
+    bl_parent_id = "VOLLEY_RENDER_PT_film"
+
+    def draw_header(self, context):
+        self.layout.prop(context.scene.render, "film_transparent", text="")
+
+    def draw(self, context):
+        settings, layout = context.scene.volley, column_of(self)
+        layout.active = context.scene.render.film_transparent
+        layout.prop(settings, "film_transparent_glass")
+        row = layout.row()
+        row.active = settings.film_transparent_glass
+        row.prop(settings, "film_transparent_roughness")
 
 
 class VOLLEY_RENDER_PT_film_filter(VolleyPanel, Panel):

@@ -109,11 +109,15 @@ typedef struct trc_render_desc {
     uint32_t filter;      /* TRC_FILTER_* */
     float filter_width;   /* pixels, > 0 */
     uint32_t film_transparent; /* 1: the background adds no radiance and no alpha */
-    float film_exposure;       /* factor on Combined and light passes */
-    uint64_t passes;           /* bit per TRC_PASS_*, COMBINED is always there */
-    uint32_t thread_count;     /* 0: one per logical processor */
-    uint32_t progressive;      /* 1: whole frame, samples in rising batches (previews); 0: tiles to
-                                  the end one after the other */
+    /* 1: a transparent film is so behind glass, too, up to a roughness (0..1, as Principled has
+     * it): what refracted rays see of the background adds neither radiance nor alpha. */
+    uint32_t film_transparent_glass;
+    float film_transparent_roughness;
+    float film_exposure;   /* factor on Combined and light passes */
+    uint64_t passes;       /* bit per TRC_PASS_*, COMBINED is always there */
+    uint32_t thread_count; /* 0: one per logical processor */
+    uint32_t progressive;  /* 1: whole frame, samples in rising batches (previews); 0: tiles to
+                              the end one after the other */
     /* Adaptive sampling, off where noise_threshold is 0: a pixel gets min_samples (rounded up to a
      * power of two; 0 chooses by the threshold, 64 for 0.01) and then doubles its count until the
      * estimated error is below the threshold, in units of Cycles' Noise Threshold, or sample_count

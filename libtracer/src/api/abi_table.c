@@ -688,6 +688,8 @@ const struct trc_abi_entry trc_abi_entries[] = {
     {"trc_render_desc.denoise", offsetof(trc_render_desc, denoise)},
     {"trc_render_desc.film_exposure", offsetof(trc_render_desc, film_exposure)},
     {"trc_render_desc.film_transparent", offsetof(trc_render_desc, film_transparent)},
+    {"trc_render_desc.film_transparent_glass", offsetof(trc_render_desc, film_transparent_glass)},
+    {"trc_render_desc.film_transparent_roughness", offsetof(trc_render_desc, film_transparent_roughness)},
     {"trc_render_desc.filter", offsetof(trc_render_desc, filter)},
     {"trc_render_desc.filter_glossy", offsetof(trc_render_desc, filter_glossy)},
     {"trc_render_desc.filter_width", offsetof(trc_render_desc, filter_width)},

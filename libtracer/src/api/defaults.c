@@ -120,6 +120,7 @@ trc_render_desc trc_render_desc_default(void) {
                              .max_transmission_depth = UINT32_MAX,
                              .filter = TRC_FILTER_BLACKMAN_HARRIS,
                              .filter_width = 1.5f,
+                             .film_transparent_roughness = 0.1f,
                              .film_exposure = 1.0f,
                              .passes = UINT64_C(1) << TRC_PASS_COMBINED,
                              .mist_falloff = 1.0f,

@@ -75,6 +75,9 @@ static trc_status check_film(const trc_render_desc *desc) {
     TRC_TRY(trc_check_enum(desc->filter, TRC_FILTER_BLACKMAN_HARRIS + 1, "filter"));
     TRC_TRY(trc_check_float(desc->filter_width, FLT_MIN, MAX_FILTER_WIDTH, "filter_width"));
     TRC_TRY(trc_check_enum(desc->film_transparent, 2, "film_transparent"));
+    TRC_TRY(trc_check_enum(desc->film_transparent_glass, 2, "film_transparent_glass"));
+    TRC_TRY(trc_check_float(desc->film_transparent_roughness, 0.0f, 1.0f,
+                            "film_transparent_roughness"));
     TRC_TRY(trc_check_float(desc->film_exposure, 0.0f, FLT_MAX, "film_exposure"));
     if (desc->passes >> TRC_PASS_COUNT) {
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "passes has bits of no pass");

@@ -144,7 +144,13 @@ static void clear_sample(struct trc_bsdf_sample *out) {
     out->indirect_scale = vf_one();
     out->pdf = vf_zero();
     out->valid = out->singular = out->transparent = out->transmitted = out->diffuse = vm_none();
-    out->through_portal = vm_none();
+    out->clear = out->through_portal = vm_none();
+}
+
+/* Lanes of m that a refracting lobe lets through clearly. */
+TRC_INLINE vmask clear_lanes(const struct trc_lobes *l, const struct trc_lobe *lobe, vmask m) {
+    const vmask smooth = vf_le(lobe->alpha_x * lobe->alpha_y, vf_set(l->clear_alpha2));
+    return vm_and(m, vm_or(lobe->ideal, smooth));
 }
 
 /* Enters the ideal direction of a lobe in lanes m; chance: that it was chosen there. */
@@ -197,6 +203,8 @@ void trc_bsdf_sample(const struct trc_lobes *l, const struct trc_surface *s, vfl
         const vmask exact = vm_and(m, lobe->ideal), spread = vm_andnot(m, lobe->ideal);
         if (lobe->kind != TRC_LOBE_REFLECT && lobe->kind != TRC_LOBE_TRANSPARENT)
             out->transmitted = vm_or(out->transmitted, exact);
+        if (l->clear_alpha2 >= 0.0f && lobe->kind == TRC_LOBE_REFRACT)
+            out->clear = vm_or(out->clear, clear_lanes(l, lobe, m));
         if (lobe->kind == TRC_LOBE_TRANSLUCENT)
             out->diffuse = vm_or(out->diffuse, m);
         if (vm_any(exact))
@@ -228,6 +236,8 @@ void trc_bsdf_ideal(const struct trc_lobes *l, int i, const struct trc_surface *
         return;
     if (lobe->kind == TRC_LOBE_REFRACT)
         out->transmitted = s->active;
+    if (lobe->kind == TRC_LOBE_REFRACT && l->clear_alpha2 >= 0.0f)
+        out->clear = clear_lanes(l, lobe, s->active);
     take_ideal(l, lobe, s, s->active, vf_one(), out);
 }
 

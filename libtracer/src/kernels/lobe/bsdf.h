@@ -87,6 +87,8 @@ struct trc_lobes {
     /* Factor on the angle of light to the normals of reflecting lobes, where turns; likewise. */
     bool turns;
     vfloat turn;
+    /* Product of alphas up to which refraction counts as clear, < 0: none does; likewise. */
+    float clear_alpha2;
 };
 
 /* From a material's leaves and the registers its program left. filter_alpha: lower bound on alpha
@@ -130,6 +132,7 @@ struct trc_bsdf_sample {
     vmask singular, transparent,
         transmitted;      /* transmitted: to the other side, incl. translucent */
     vmask diffuse;        /* the lobe was translucent: a diffuse transmission ray */
+    vmask clear;          /* refracted by what is smooth enough, where lobes ask */
     vmask through_portal; /* transparent lanes that go on from origin instead of straight */
     vvec3 origin;
 };

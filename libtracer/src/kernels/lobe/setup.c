@@ -101,6 +101,7 @@ void trc_lobes_setup(const struct trc_material *m, const struct trc_surface *s,
     out->holdout = vf_zero();
     out->below_horizon = vm_none();
     out->turns = false;
+    out->clear_alpha2 = -1.0f;
     for (uint32_t i = 0; i < m->leaf_count; i++) {
         const struct trc_leaf *leaf = &m->leaves[i];
         const vfloat weight = trc_operand_value(&leaf->weight, regs);

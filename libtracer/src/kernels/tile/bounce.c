@@ -82,6 +82,11 @@ static void ray_push(struct trc_tile *t, const struct arrival *a, const struct t
     kind = kind | (vuint)vi_select(ideal, vi_set(TRC_PATH_SINGULAR), vi_set(0));
     kind = kind | (vuint)vi_select(b->diffuse, vi_set(TRC_VISIBLE_DIFFUSE), vi_set(0));
     kind = kind | (vuint)vi_select(first, own, (vint)category);
+    if (lobes->clear_alpha2 >= 0.0f) {
+        const vuint straight_on = a->path & vu_set(TRC_PATH_TRANSPARENT_BACKGROUND);
+        kind =
+            kind | (vuint)vi_select(vm_and(b->clear, b->transmitted), (vint)straight_on, vi_set(0));
+    }
     kind = kind |
            (a->path & vu_set(TRC_PATH_DATA_DONE | TRC_PATH_FEATURES_DONE | TRC_VISIBLE_UNBLOCKED |
                              TRC_PATH_PORTALS << TRC_PATH_PORTALS_SHIFT)) |
@@ -144,6 +149,7 @@ void trc_bounce_straight(struct trc_tile *t, const struct arrival *a, const stru
                                 .transparent = vm_all_set(),
                                 .transmitted = vm_none(),
                                 .diffuse = vm_none(),
+                                .clear = vm_none(),
                                 .through_portal = vm_none(),
                                 .valid = active};
     const vmask below = vi_lt((vint)trc_depth_of(a->depths, TRC_DEPTH_TRANSPARENT_SHIFT),

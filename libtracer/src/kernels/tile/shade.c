@@ -174,6 +174,11 @@ static void shade_group(struct trc_tile *t, uint32_t material, vint index, vmask
         lobes.turn = trc_instance_float(t->snapshot, s.instance,
                                         offsetof(struct trc_instance, terminator_turn), active);
     }
+    if (t->desc->film_transparent && t->desc->film_transparent_glass) {
+        const float alpha =
+            t->desc->film_transparent_roughness * t->desc->film_transparent_roughness;
+        lobes.clear_alpha2 = alpha * alpha;
+    }
     a.chance = trc_bounce_chance(t, &a, &lobes);
     const bool lets_through = m->has & (TRC_MATERIAL_HAS_REFRACTION | TRC_MATERIAL_HAS_TRANSLUCENT);
     a.receive_n = lets_through ? v3_zero() : s.n;

@@ -11,7 +11,7 @@
 enum {
     TRC_PATH_SINGULAR = 1 << 8,                /* last bounce was ideal */
     TRC_PATH_REFLECTED = 1 << 9,               /* last bounce was a reflection */
-    TRC_PATH_TRANSPARENT_BACKGROUND = 1 << 10, /* only ideal straight-through so far: film alpha */
+    TRC_PATH_TRANSPARENT_BACKGROUND = 1 << 10, /* only straight through so far: film alpha */
     TRC_PATH_WORLD_ALONE = 1 << 11, /* no light sample of the world was taken at the last bounce */
     TRC_PATH_PORTALS_SHIFT = 20     /* how many portals it went through, 3 bits, saturating */
 };
