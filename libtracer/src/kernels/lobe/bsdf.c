@@ -147,7 +147,7 @@ static void clear_sample(struct trc_bsdf_sample *out) {
     out->clear = out->through_portal = vm_none();
 }
 
-/* Lanes of m that a refracting lobe lets through clearly. */
+/* Lanes of m that a lobe lets through clearly where it refracts. */
 TRC_INLINE vmask clear_lanes(const struct trc_lobes *l, const struct trc_lobe *lobe, vmask m) {
     const vmask smooth = vf_le(lobe->alpha_x * lobe->alpha_y, vf_set(l->clear_alpha2));
     return vm_and(m, vm_or(lobe->ideal, smooth));
@@ -203,7 +203,8 @@ void trc_bsdf_sample(const struct trc_lobes *l, const struct trc_surface *s, vfl
         const vmask exact = vm_and(m, lobe->ideal), spread = vm_andnot(m, lobe->ideal);
         if (lobe->kind != TRC_LOBE_REFLECT && lobe->kind != TRC_LOBE_TRANSPARENT)
             out->transmitted = vm_or(out->transmitted, exact);
-        if (l->clear_alpha2 >= 0.0f && lobe->kind == TRC_LOBE_REFRACT)
+        /* Reflection, too: of a pair either may cross the surface. */
+        if (l->clear_alpha2 >= 0.0f && lobe->model->has_facets)
             out->clear = vm_or(out->clear, clear_lanes(l, lobe, m));
         if (lobe->kind == TRC_LOBE_TRANSLUCENT)
             out->diffuse = vm_or(out->diffuse, m);
