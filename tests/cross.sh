@@ -84,7 +84,7 @@ ctest --test-dir "$dir" -R "$tests" --timeout 3600 </dev/null >"$dir/ctest.log" 
 grep -E '\*\*\*(Failed|Timeout|Exception)|Not Run' "$dir/ctest.log" || true
 say "tracer_bench"
 bench=$(echo "$dir"/bin/tracer_bench*)
-check=(--check --scene tiny --turn 30 --size 16 --samples 4 --tiles 4 --isa)
+check=(--check --scene tiny --turn 30 --size 16 --samples 1 --tiles 1 --order auto --isa)
 "${run[@]}" "$bench" "${check[@]}" "$isas" </dev/null | tr -d '\r' >"$dir/check.log" || status=1
 if [ -x build/bin/tracer_bench ]; then
     differing=$(build/bin/tracer_bench "${check[@]}" "$own" | sed 's/ sse42 / neon  /' |
