@@ -168,6 +168,7 @@ class NodeType(IntEnum):
     GRADIENT = 100
     WHITE_NOISE = 101
     GABOR = 119
+    RADIAL_TILING = 128
     MAGIC = 102
     BRICK = 103
     CURVES = 104
@@ -388,6 +389,10 @@ class GradientType(IntEnum):
     RADIAL = 4
     QUADRATIC_SPHERE = 5
     SPHERICAL = 6
+
+
+class RadialTilingMode(IntEnum):
+    NORMALIZE = 1
 
 
 class MagicDepth(IntEnum):
@@ -894,10 +899,11 @@ ENUMERATIONS = {StatusCode: "TRC_", IsaId: "TRC_ISA_", CameraType: "TRC_CAMERA_"
                 TextureMode: "TRC_", FractalType: "TRC_FRACTAL_", NoiseMode: "TRC_NOISE_",
                 VoronoiMetric: "TRC_VORONOI_", VoronoiFeature: "TRC_VORONOI_", VoronoiMode: "TRC_VORONOI_",
                 WaveProfile: "TRC_WAVE_", WaveDirection: "TRC_WAVE_", WaveMode: "TRC_WAVE_",
-                GradientType: "TRC_GRADIENT_", MagicDepth: "TRC_MAGIC_", BrickMode: "TRC_BRICK_",
-                DistributionType: "TRC_DISTRIBUTION_", BlendMode: "TRC_BLEND_", MathOperation: "TRC_MATH_",
-                VectorOperation: "TRC_VECTOR_", ImageInterpolation: "TRC_IMAGE_",
-                ImageExtension: "TRC_IMAGE_", ImageProjection: "TRC_IMAGE_", ImageMode: "TRC_IMAGE_",
+                GradientType: "TRC_GRADIENT_", RadialTilingMode: "TRC_RADIAL_TILING_",
+                MagicDepth: "TRC_MAGIC_", BrickMode: "TRC_BRICK_", DistributionType: "TRC_DISTRIBUTION_",
+                BlendMode: "TRC_BLEND_", MathOperation: "TRC_MATH_", VectorOperation: "TRC_VECTOR_",
+                ImageInterpolation: "TRC_IMAGE_", ImageExtension: "TRC_IMAGE_",
+                ImageProjection: "TRC_IMAGE_", ImageMode: "TRC_IMAGE_",
                 EnvironmentProjection: "TRC_ENVIRONMENT_", InputSource: "TRC_INPUT_",
                 MaterialFlags: "TRC_MATERIAL_", AlphaMode: "TRC_ALPHA_", IntegratorType: "TRC_INTEGRATOR_",
                 SamplerType: "TRC_SAMPLER_", AssemblyType: "TRC_ASSEMBLY_", FilterType: "TRC_FILTER_",
@@ -1177,6 +1183,9 @@ NODES = {
         (("GENERATED", "vector"), ("FLOAT", "scale"), ("FLOAT", "frequency"), ("FLOAT", "anisotropy"),
          ("FLOAT", "angle"), ("VECTOR", "direction")),
         (("FLOAT", "value"), ("FLOAT", "phase"), ("FLOAT", "intensity"))),
+    NodeType.RADIAL_TILING: ("Radial Tiling",
+        (("VECTOR", "vector"), ("FLOAT", "sides"), ("FLOAT", "roundness")),
+        (("VECTOR", "coordinates"), ("FLOAT", "id"), ("FLOAT", "width"), ("FLOAT", "rotation"))),
     NodeType.MAGIC: ("Magic",
         (("GENERATED", "vector"), ("FLOAT", "scale"), ("FLOAT", "distortion")),
         (("COLOR", "color"), ("FLOAT", "factor"))),

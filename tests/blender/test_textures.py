@@ -97,6 +97,22 @@ for _dimensions in ("2D", "3D"):
              ("Value", "Phase", "Intensity"), {"gabor_type": _dimensions}, ((4, 3), "Gabor came with 4.3"),
              Vector='vector', Scale=1.3, Frequency=2.2, Anisotropy=_anisotropy, Orientation_2D=0.6,
              Orientation_3D=(0.4, -0.7, 0.9))
+_TILING = ("Segment Coordinates", "Segment ID", "Segment Rotation", "Segment Width")
+_TILING_CAME = ((5, 0), "Radial Tiling came with 5.0")
+for _sides in (2.0, 2.3, 3.0, 4.6, 5.0, 7.95, 12.0):
+    for _roundness in (0.0, 0.35, 0.9, 1.0):
+        if _sides == 2.0 and 0.0 < _roundness < 1.0:
+            continue  # Cycles has no numbers there
+        for _unit in (False, True):
+            # Sectors of whole numbers of sides are as wide as each other.
+            _add(f"radial tiling {_sides}, round {_roundness}{' to 1' * _unit}", "ShaderNodeRadialTiling",
+                 _TILING[:1] if _unit else _TILING[:3] if _sides % 1.0 == 0.0 else _TILING,
+                 {"normalize": _unit}, _TILING_CAME, Vector='vector', Sides=_sides, Roundness=_roundness)
+_add("radial tiling, sides vary", "ShaderNodeRadialTiling", _TILING, {"normalize": False}, _TILING_CAME,
+     Vector='color', Sides=(2.05, 9.0), Roundness=0.4)
+_add("radial tiling, roundness varies", "ShaderNodeRadialTiling", _TILING, {"normalize": True}, _TILING_CAME,
+     Vector='vector', Sides=3.7, Roundness=(-0.2, 1.2))
+_add("radial tiling, empty", "ShaderNodeRadialTiling", _TILING, {"normalize": True}, _TILING_CAME)
 _add("brick", "ShaderNodeTexBrick", ("Color", "Fac"),
      {"offset": 0.4, "offset_frequency": 3, "squash": 0.6, "squash_frequency": 2}, Vector='vector',
      Color1=(0.8, 0.5, 0.2), Color2=(0.1, 0.3, 0.6), Mortar=(0.9, 0.9, 0.8), Scale=2.0, Mortar_Size=0.03,

@@ -139,6 +139,7 @@ static void test_counts_of_modes(void **state) {
         {TRC_NODE_WAVE, 3 * 2 * 4},            /* profile, bands or rings, direction */
         {TRC_NODE_GRADIENT, 7},
         {TRC_NODE_WHITE_NOISE, 4},
+        {TRC_NODE_RADIAL_TILING, 2},
         {TRC_NODE_MAGIC, 11},
         {TRC_NODE_BRICK, 128 * 128},
         {TRC_NODE_VECTOR_TRANSFORM, 3 * 3 * 4},
@@ -185,6 +186,7 @@ static void test_numbers(void **state) {
     assert_int_equal(TRC_NODE_DISPLACEMENT_OUTPUT, 118);
     assert_int_equal(TRC_NODE_AMBIENT_OCCLUSION, 124);
     assert_int_equal(TRC_NODE_RAYCAST, 126);
+    assert_int_equal(TRC_NODE_RADIAL_TILING, 128);
 }
 
 /* Outputs of operations that stand for outputs of nodes stand alike. */

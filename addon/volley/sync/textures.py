@@ -6,8 +6,8 @@ None for a setting that is not supported. Sockets that 3.4 lacks (lacunarity, of
 values that its textures imply.
 """
 
-from ..abi import (BrickMode, FractalType, GradientType, NodeType, NoiseMode, VoronoiFeature, VoronoiMetric,
-                   VoronoiMode, WaveDirection, WaveMode, WaveProfile)
+from ..abi import (BrickMode, FractalType, GradientType, NodeType, NoiseMode, RadialTilingMode, VoronoiFeature,
+                   VoronoiMetric, VoronoiMode, WaveDirection, WaveMode, WaveProfile)
 from ..compat import HASHES_CELLS_BY_PCG
 from .node_list import named_outputs, output
 from .sky_texture import sky_texture
@@ -138,9 +138,17 @@ def _brick(walker, node, sockets):
     return named_outputs(index, NodeType.BRICK, ("Color", "Fac"))
 
 
+def _radial_tiling(walker, node, sockets):
+    values = [sockets.get('v', "Vector"), sockets.get('f', "Sides"), sockets.get('f', "Roundness")]
+    index = walker.emit(NodeType.RADIAL_TILING, values, RadialTilingMode.NORMALIZE * node.normalize)
+    return named_outputs(index, NodeType.RADIAL_TILING, (
+        "Segment Coordinates", "Segment ID", "Segment Width", "Segment Rotation"))
+
+
 TEXTURES = {
     "ShaderNodeTexNoise": _noise, "ShaderNodeTexMusgrave": _musgrave, "ShaderNodeTexVoronoi": _voronoi,
     "ShaderNodeTexWave": _wave, "ShaderNodeTexGradient": _gradient,
     "ShaderNodeTexWhiteNoise": _white_noise, "ShaderNodeTexMagic": _magic, "ShaderNodeTexBrick": _brick,
     "ShaderNodeTexSky": sky_texture, "ShaderNodeTexGabor": _gabor,
+    "ShaderNodeRadialTiling": _radial_tiling,
 }

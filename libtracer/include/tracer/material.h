@@ -191,6 +191,8 @@ enum trc_gradient_type {
     TRC_GRADIENT_SPHERICAL
 };
 
+enum trc_radial_tiling_mode { TRC_RADIAL_TILING_NORMALIZE = 1 };
+
 enum trc_magic_depth { TRC_MAGIC_MAX_DEPTH = 10 };
 
 enum trc_brick_mode { TRC_BRICK_ROWS_MASK = 127, TRC_BRICK_SQUASH_SHIFT = 7 };
