@@ -3,12 +3,13 @@
 # tested as a user of that Debian would.
 #
 #   bash tests/blender_next.sh [--suite SUITE] [--fast] [--report XML] [PYTEST ARGUMENT]...
-#   bash tests/blender_next.sh [--suite SUITE] --curves DIR
+#   bash tests/blender_next.sh [--suite SUITE] [--fast] --measure PART DIR
 #
 # SUITE is trixie (Debian 13, Blender 4.3; the default) or sid (Debian unstable, Blender 5.2). Runs all
 # Blender tests if no argument says which; --fast leaves out what a change of Blender's version hardly
 # touches (see SLOW; of Blender 5.2 it runs CHANGED alone) and builds kernels for this processor alone;
-# --report writes JUnit XML. --curves measures error against time there instead, and leaves its JSON in DIR.
+# --report writes JUnit XML. --measure measures a part of tests/bench/report.sh there instead, curves or
+# kernels (beside Embree), and leaves its JSON in DIR; with --fast what report.sh --quick measures.
 # Needs root, a Debian mirror and 2.5 GB; the folder is $XDG_CACHE_HOME/volley/SUITE and stays, so that the
 # next run takes only the build and the tests. Nothing stays mounted: /proc is there in a name space of its
 # own, where there may be one. Exit code 77: it cannot be set up here, with the reason as the last line;
@@ -62,10 +63,11 @@ widest_isa() {
 }
 
 build() {
-    local isas=$1 log=$CACHE/$SUITE.build.log
+    local isas=$1 bench=${2:-OFF} log=$CACHE/$SUITE.build.log
     say "Building with the compiler and OpenImageIO of $NAME"
     inside sh -c 'cd /volley && cmake -G Ninja -C .cmake/ci.cmake -B build -DTRACER_BUILD_TESTS=OFF \
-        -DTRACER_BUILD_BENCH=OFF -DTRACER_BUILD_ISAS="$1" && cmake --build build' build "$isas" >"$log" 2>&1 ||
+        -DTRACER_BUILD_BENCH="$2" -DTRACER_BUILD_ISAS="$1" && cmake --build build' build "$isas" "$bench" \
+        >"$log" 2>&1 ||
         { tail -n 40 "$log" >&2; die "the build failed"; }
 }
 
@@ -77,11 +79,12 @@ run_tests() {
         --junit-xml build/pytest.xml "$@"
 }
 
-measure_curves() {
-    local out=$1
-    say "Error against time in $(inside blender --version 2>/dev/null | head -n 1)"
-    inside sh -c 'cd /volley && exec python3 tests/bench/report.py --next --measure \
-        --parts curves --out build/report'
+measure() {
+    local part=$1 out=$2 scope=$3
+    say "$part with $(inside blender --version 2>/dev/null | head -n 1)"
+    rm -rf "$ROOT/volley/build/report"
+    inside sh -c 'cd /volley && exec python3 tests/bench/report.py "$2" --measure --parts "$1" \
+        --out build/report' measure "$part" "$scope"
     mkdir -p "$out"
     cp "$ROOT"/volley/build/report/data/*.json "$out"
 }
@@ -103,27 +106,33 @@ fast_selection() {
 }
 
 main() {
-    local report="" curves="" suite=trixie isas="" is_fast="" status=0 arguments=()
+    local report="" part="" out="" suite=trixie isas="" is_fast="" scope=--next status=0 arguments=()
     while [ $# -gt 0 ]; do
         case $1 in
             --suite) suite=${2:?--suite needs a name}; shift 2 ;;
-            --fast) is_fast=1 isas=$(widest_isa); shift ;;
+            --fast) is_fast=1 isas=$(widest_isa) scope=--quick; shift ;;
             --report) report=${2:?--report needs a file}; shift 2 ;;
-            --curves) curves=${2:?--curves needs a folder}; shift 2 ;;
+            --measure) part=${2:?--measure needs a part} out=${3:?--measure needs a folder}; shift 3 ;;
             *) break ;;
         esac
     done
-    [ -n "$curves" ] || [ $# -gt 0 ] || set -- tests/blender
+    [ -n "$part" ] || [ $# -gt 0 ] || set -- tests/blender
     choose_suite "$suite"
+    [ "$part" != kernels ] || PACKAGES+=(libembree-dev)
     [ -z "$is_fast" ] || arguments+=(-k "$(fast_selection)")
     make_root
     install_packages
     copy_sources
-    build "$isas"
-    if [ -n "$curves" ]; then
-        measure_curves "$curves"
+    if [ -n "$part" ]; then
+        if [ "$part" = kernels ]; then
+            build "" ON # tracer_bench has the kernels of all
+        else
+            build "$isas"
+        fi
+        measure "$part" "$out" "$scope"
         exit
     fi
+    build "$isas"
     rm -f "$ROOT/volley/build/pytest.xml"
     run_tests "${arguments[@]}" "$@" || status=$?
     [ -z "$report" ] || cp "$ROOT/volley/build/pytest.xml" "$report" || true

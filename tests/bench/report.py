@@ -13,7 +13,7 @@ import sys
 import time
 
 import compare_cycles
-from reporting import (blender_costs, curves, curves_next, document, farm, frames, gate, kernels, machine, povray,
+from reporting import (blender_costs, curves, document, elsewhere, farm, frames, gate, kernels, machine, povray,
                        readme, repeated, scope as scopes)
 
 
@@ -50,7 +50,9 @@ PARTS = {
     "povray": lambda options: povray.measure(options, options.scope, options.out / "pictures"),
     "curves": lambda options: curves.measure(options, options.scope, options.out / "pictures"),
     "farm": lambda options: farm.measure(options, options.scope),
-    "curves_next": lambda options: curves_next.measure(options.scope),
+    "curves_trixie": lambda options: elsewhere.measure(options.scope, "trixie", "curves"),
+    "curves_sid": lambda options: elsewhere.measure(options.scope, "sid", "curves"),
+    "kernels_sid": lambda options: elsewhere.measure(options.scope, "sid", "kernels"),
 }
 
 

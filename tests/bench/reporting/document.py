@@ -3,7 +3,8 @@
 
 import json
 
-from . import denoise_section, error_sections, farm_section, frame_sections, repeated, scope as scopes
+from . import (denoise_section, elsewhere, error_sections, farm_section, frame_sections, repeated,
+               scope as scopes)
 from .machine import names
 from .tables import table
 
@@ -25,13 +26,13 @@ def text(results, out):
              error_sections.losing_cases(results)]
     if results.get("curves"):
         parts.append(error_sections.equal_error(results["curves"]))
-    if results.get("curves_next"):
-        parts.append(error_sections.equal_error_next(results["curves_next"]))
+    parts += [error_sections.equal_error_elsewhere(run) for run in elsewhere.of_part(results, "curves")]
     if results.get("curves"):
         parts.append(error_sections.curves_and_bias(results["curves"]))
         parts.append(denoise_section.text(results["curves"]))
     if results.get("kernels"):
         parts.append(error_sections.kernels_beside_embree(results["kernels"]))
+    parts += [error_sections.kernels_elsewhere(run) for run in elsewhere.of_part(results, "kernels")]
     if results.get("povray"):
         parts.append(error_sections.beside_povray(results["povray"]))
     if results.get("frames"):
@@ -57,7 +58,7 @@ def where(made, described):
 
 def head(results):
     """What it was measured with."""
-    machine, next_blender = results["machine"], results.get("curves_next", {}).get("blender")
+    machine = results["machine"]
     scope = scopes.SCOPES[machine["scope"]]
     rows = [
         ["scope", f"{scope.name}: {scope.seeds} seeds, {scope.samples[0]} to {scope.samples[-1]} "
@@ -71,8 +72,9 @@ def head(results):
                              for part, made in machine["parts"].items())],
         ["against", ", ".join(filter(None, (
             f"{machine['blender']} with Cycles",
-            next_blender and f"{next_blender} with Cycles",
+            *(f"{run['blender']} with Cycles" for run in elsewhere.of_part(results, "curves")),
             machine["embree"] and f"Embree {machine['embree']}",
+            *(elsewhere.embree_name(run) for run in elsewhere.of_part(results, "kernels")),
             machine["povray"] and f"POV-Ray {machine['povray']}")))],
     ]
     return ("# Speed against error\n\n"

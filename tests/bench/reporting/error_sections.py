@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sections about Volley beside Cycles, Embree and POV-Ray."""
 
-from . import curves, estimates, kernels
+from . import curves, elsewhere, estimates, kernels
 from .tables import digits, median_with_spread, ratio, table, words
 
 
@@ -17,11 +17,13 @@ def headline_lines(results):
     lines = []
     if results.get("curves"):
         lines.append(equal_error_line(results["curves"]))
-    if results.get("curves_next"):
-        made = results["curves_next"]
-        lines.append(equal_error_line(made["scenes"], f"Cycles of {made['blender']}"))
+    lines += [equal_error_line(run["made"], f"Cycles of {run['blender']}")
+              for run in elsewhere.of_part(results, "curves")]
     if results.get("kernels"):
-        lines += [kernel_line(results["kernels"]), accuracy_line(results["kernels"])]
+        lines.append(kernel_line(results["kernels"]))
+    lines += [kernel_line(run["made"], elsewhere.embree_name(run)) for run in elsewhere.of_part(results, "kernels")]
+    if results.get("kernels"):
+        lines.append(accuracy_line(results["kernels"]))
     if results.get("povray"):
         lines.append(povray_line(results["povray"]))
     return [line for line in lines if line]
@@ -39,7 +41,7 @@ def equal_error_line(scenes, cycles="Cycles"):
             f"slower in {lost}).")
 
 
-def kernel_line(rows):
+def kernel_line(rows, embree="Embree"):
     """Least and most ratio to Embree."""
     raced = [row for row in kernels.races(rows) if row["threads"] == 1 and row["order"] == "auto"]
     if not raced:
@@ -50,7 +52,7 @@ def kernel_line(rows):
         if values:
             parts.append(f"{word} {digits(estimates.geometric_mean(values), 3)} "
                          f"({digits(min(values), 3)} to {digits(max(values), 3)})")
-    return ("Watertight rays per second over Embree's fastest mode, which is not watertight, on one "
+    return (f"Watertight rays per second over {embree}'s fastest mode, which is not watertight, on one "
             "thread, geometric mean over scenes, kinds of rays and instruction sets: "
             + "; ".join(parts) + ".")
 
@@ -90,10 +92,13 @@ LOST_DISTANCE = 1.5
 
 def losing_cases(results):
     """Everything in which Volley is behind, the worst of each comparison first."""
-    made = results.get("curves_next") or {"blender": "", "scenes": {}}
-    lines = [*losing_curves(results.get("curves", {})),
-             *losing_curves(made["scenes"], f" of {made['blender']}"), *losing_kernels(results.get("kernels", [])),
-             *losing_builds(results.get("kernels", [])),
+    lines = losing_curves(results.get("curves", {}))
+    for run in elsewhere.of_part(results, "curves"):
+        lines += losing_curves(run["made"], f" of {run['blender']}")
+    lines += losing_kernels(results.get("kernels", []))
+    for run in elsewhere.of_part(results, "kernels"):
+        lines += losing_kernels(run["made"], elsewhere.embree_name(run))
+    lines = [*lines, *losing_builds(results.get("kernels", [])),
              *losing_distances(results.get("kernels", [])), *losing_povray(results.get("povray", {}))]
     if not lines:
         return "## Where Volley loses\n\nNowhere in what was measured."
@@ -112,7 +117,7 @@ def losing_curves(scenes, of_blender=""):
     return [line for _ratio, line in sorted(lost)]
 
 
-def losing_kernels(rows):
+def losing_kernels(rows, embree="Embree"):
     """Kinds of rays that Embree's best mode traces faster; robust mode beside."""
     lines = []
     for row in kernels.races(rows):
@@ -120,7 +125,7 @@ def losing_kernels(rows):
         if made < 1.0 and row["order"] == "auto" and row["threads"] == 1:
             robust = row["embree_robust"]["ratio"]
             lines.append(f"{kernels.label(row)}, {row['isa']}: "
-                         f"**{made:.2f}** of Embree ({robust:.2f} of its robust mode)")
+                         f"**{made:.2f}** of {embree} ({robust:.2f} of its robust mode)")
     return lines
 
 
@@ -187,11 +192,11 @@ def equal_error(scenes):
             "![Time to equal error](plots/time-to-equal-error.svg)\n\n" + equal_error_table(scenes))
 
 
-def equal_error_next(made):
-    """The same in the next Blender."""
-    return (f"### In {made['blender']}\n\n"
-            "Both engines in Debian 13's Blender, the library of its compiler, on the same machine, with "
-            "references by its own Cycles.\n\n" + equal_error_table(made["scenes"]))
+def equal_error_elsewhere(run):
+    """The same in a newer Blender."""
+    return (f"### In {run['blender']}\n\n"
+            f"Both engines in the Blender of {run['system']}, the library of its compiler, on the same machine, "
+            "with references by its own Cycles.\n\n" + equal_error_table(run["made"]))
 
 
 def curves_and_bias(scenes):
@@ -234,10 +239,7 @@ def kernels_beside_embree(rows):
         "hits, and distances that differ by more than 1e-4 of them; *largest* is the largest relative "
         "difference of the others. Counts against the robust mode tell whose misses they are.",
         "![Kernels](plots/kernels.svg)",
-        table(["rays", "isa", "threads", "Volley, Mrays/s", "Embree's best", "ratio", "misses",
-               "differ: hits, distances", "robust: ratio", "differ: hits, distances", "largest"],
-              [kernel_row(row) for row in kernels.races(rows)]) if kernels.races(rows)
-        else "Embree was not there.",
+        race_table(rows) if kernels.races(rows) else "Embree was not there.",
         "### Builds",
         table(["scene", "threads", "build, Mtri/s", "over Embree", "refit, Mtri/s", "over Embree",
                "bytes/triangle", "Embree's"], [build_row(row) for row in kernels.builds(rows)])]
@@ -252,6 +254,20 @@ def kernels_beside_embree(rows):
                    "distance: most, ulps", "mean", "normal: most"],
                   [accuracy_row(*key, modes) for key, modes in kernels.accuracy(rows).items()])]
     return "\n\n".join(lines)
+
+
+def race_table(rows):
+    """Rates, misses and differences."""
+    return table(["rays", "isa", "threads", "Volley, Mrays/s", "Embree's best", "ratio", "misses",
+                  "differ: hits, distances", "robust: ratio", "differ: hits, distances", "largest"],
+                 [kernel_row(row) for row in kernels.races(rows)])
+
+
+def kernels_elsewhere(run):
+    """The same rays beside a newer Embree."""
+    return (f"### Beside {elsewhere.embree_name(run)}\n\n"
+            f"That of {run['system']}, which has no streams, and the library of its compiler, on the same "
+            "machine.\n\n" + race_table(run["made"]))
 
 
 def accuracy_row(mesh, isa, tracer, modes):

@@ -3,7 +3,7 @@
 
 import math
 
-from . import curves, estimates, kernels
+from . import curves, elsewhere, estimates, kernels
 from .tables import digits, table
 
 
@@ -11,14 +11,21 @@ def spreads(results):
     """{part: {name: [ratio, low, high]}} of a run: what it says of time at equal error and of rays per
     second, and how sure it is. A ratio of rates may be that of any two of their repeats."""
     found = {"time at equal error": curve_spreads(results.get("curves", {}))}
-    if results.get("curves_next"):
-        made = results["curves_next"]
-        found[f"time at equal error, {made['blender']}"] = curve_spreads(made["scenes"])
-    found["rays per second"] = {}
-    for row in kernels.races(results.get("kernels", [])):
+    for run in elsewhere.of_part(results, "curves"):
+        found[f"time at equal error, {run['blender']}"] = curve_spreads(run["made"])
+    found["rays per second"] = kernel_spreads(results.get("kernels", []))
+    for run in elsewhere.of_part(results, "kernels"):
+        found[f"rays per second, {elsewhere.embree_name(run)}"] = kernel_spreads(run["made"])
+    return found
+
+
+def kernel_spreads(rows):
+    """{name: [ratio, low, high]} of rays per second."""
+    found = {}
+    for row in kernels.races(rows):
         own, peer = row["volley_mrays_s"], row["embree_default"]
         best = peer[peer["best"]]
-        found["rays per second"][f"{kernels.label(row)}, {row['isa']} x{row['threads']}"] = [
+        found[f"{kernels.label(row)}, {row['isa']} x{row['threads']}"] = [
             peer["ratio"], own["min"] / best["max"], own["max"] / best["min"]]
     return found
 

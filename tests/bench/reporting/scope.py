@@ -27,7 +27,7 @@ class Scope:
     repeats: int
     times_scale: int        # timed pictures are so many times as wide and high
     denoise: bool           # Volley with Denoise, too
-    next_blender: bool      # Blender 4.3 too, in the scope of NEXT
+    elsewhere: bool         # with newer Blenders and Embree too, in the scope of NEXT
     farm: bool              # commands of farms
     # POV-Ray.
     classic_scenes: tuple
@@ -52,7 +52,7 @@ QUICK = Scope(
     name="quick", minutes=4,
     scenes=("area_light", "gallery"), sampler_scenes=(), samples=(1, 4, 16), time_samples=(1, 4, 16),
     seeds=3, reference_samples=128, reference_seeds=2, light_samples=(1, 4), repeats=3, times_scale=2,
-    denoise=False, next_blender=False, farm=False,
+    denoise=False, elsewhere=False, farm=False,
     classic_scenes=("classic",), classic_width=256,
     kernel_scenes=("character",),
     kernel_arguments=("--order", "auto", "--motion", "still", "--repeats", "3", "--tiles", "8",
@@ -66,7 +66,7 @@ MEDIUM = Scope(
     name="medium", minutes=60,
     scenes=EFFECTS + JOINED, sampler_scenes=("gallery",), samples=(1, 4, 16, 64, 256, 1024),
     time_samples=(1, 4, 16, 64), seeds=10, reference_samples=1024, reference_seeds=4,
-    light_samples=(1, 4), repeats=3, times_scale=2, denoise=True, next_blender=True, farm=True,
+    light_samples=(1, 4), repeats=3, times_scale=2, denoise=True, elsewhere=True, farm=True,
     classic_scenes=("classic", "classic_soft"), classic_width=320,
     kernel_scenes=("conference", "pool_hall", "character"),
     kernel_arguments=("--order", "auto", "--repeats", "3", "--tiles", "8"), accuracy=True,
@@ -79,7 +79,7 @@ FULL = Scope(
     scenes=EFFECTS + JOINED, sampler_scenes=EFFECTS + JOINED,
     samples=tuple(2 ** i for i in range(11)), time_samples=tuple(2 ** i for i in range(11)),
     seeds=10, reference_samples=4096, reference_seeds=8, light_samples=(1, 2, 4, 8), repeats=5,
-    times_scale=3, denoise=True, next_blender=True, farm=True,
+    times_scale=3, denoise=True, elsewhere=True, farm=True,
     classic_scenes=("classic", "classic_soft"), classic_width=640,
     kernel_scenes=("conference", "pool_hall", "character"),
     kernel_arguments=("--repeats", "9"), accuracy=True,
@@ -87,8 +87,8 @@ FULL = Scope(
     distribution_samples=64, counted_edge=512,
     largest_triangles=20_000_000, largest_lights=10_000, largest_instances=1_000_000)
 
-# Of medium and full in the next Blender: its Cycles beside Volley as it is.
+# Of medium and full with newer Blenders and Embree: beside Volley as it is.
 NEXT = replace(MEDIUM, name="next", samples=(1, 4, 16, 64, 256), sampler_scenes=(), light_samples=(1,),
-               next_blender=False, farm=False)
+               elsewhere=False, farm=False)
 
 SCOPES = {scope.name: scope for scope in (QUICK, MEDIUM, FULL, NEXT)}
