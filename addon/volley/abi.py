@@ -779,7 +779,7 @@ class MaterialDesc(Structure):
     _fields_ = (("struct_size", c_uint32), ("node_count", c_uint32), ("nodes", POINTER(Node)),
                 ("inputs", POINTER(NodeInput)), ("input_count", c_uint32), ("surface", c_int32),
                 ("pass_index", c_int32), ("flags", c_uint32), ("cryptomatte", c_float),
-                ("reserved", c_uint32))
+                ("reserved", c_uint32), ("film_colors", c_void_p))
 
 
 class ImageDesc(Structure):
@@ -788,7 +788,7 @@ class ImageDesc(Structure):
                 ("alpha_mode", c_uint32), ("is_srgb", c_uint32), ("is_float", c_uint32),
                 ("pixels", c_void_p), ("pixel_bytes", c_uint64), ("path", c_char_p),
                 ("color_config", c_char_p), ("color_space", c_char_p), ("max_side", c_uint32),
-                ("is_mip_mapped", c_uint32))
+                ("is_mip_mapped", c_uint32), ("is_alpha_literal", c_uint32))
 
 
 class Rays(Structure):

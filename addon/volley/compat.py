@@ -83,6 +83,9 @@ SHUTTER_DELAY = 0.5 if bpy.app.version >= (4, 0, 0) else 0.0
 # The Vector Transform node treats normals as normals; 3.4 made unit vectors of them.
 TRANSFORMS_NORMALS = bpy.app.version >= (4, 0, 0)
 
+# STRAIGHT and PREMUL say what the colours of an image are, whatever its file says; seen in 5.2, not in 4.3.
+HAS_LITERAL_ALPHA = bpy.app.version >= (5, 0, 0)
+
 # Voronoi's points in 2 to 4 dimensions come of another hash since 5.0.
 HASHES_CELLS_BY_PCG = bpy.app.version >= (5, 0, 0)
 

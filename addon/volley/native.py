@@ -406,24 +406,26 @@ class Scene:
 
     # Materials and images
 
-    def create_material(self, nodes, surface, **values):
+    def create_material(self, nodes, surface, film_colors=None, **values):
         """A material from a flat node list; see :meth:`update_material`."""
-        desc, keep = self._material_desc(nodes, surface, **values)
+        desc, keep = self._material_desc(nodes, surface, film_colors, **values)
         return self._create("trc_material_create", desc)
 
-    def update_material(self, material, nodes, surface, **values):
+    def update_material(self, material, nodes, surface, film_colors=None, **values):
         """nodes: objects with type, mode, inputs, image, name, table; inputs: (node, output, (x, y, z))
-        triples, node -1 for the constant, -2 for the socket's own default. surface: node index; other
-        keywords are fields of trc_material_desc: pass_index, flags, cryptomatte."""
-        desc, keep = self._material_desc(nodes, surface, **values)
+        triples, node -1 for the constant, -2 for the socket's own default. surface: node index;
+        film_colors: matrix (3, 3) or None; other keywords are fields of trc_material_desc: pass_index,
+        flags, cryptomatte."""
+        desc, keep = self._material_desc(nodes, surface, film_colors, **values)
         self._edit("trc_material_update", material, ctypes.byref(desc))
 
     def destroy_material(self, material):
         self._edit("trc_material_destroy", material)
 
     @staticmethod
-    def _material_desc(nodes, surface, **values):
-        keep, structs, inputs = [], [], []
+    def _material_desc(nodes, surface, film_colors, **values):
+        film_colors = _array(film_colors, np.float32)
+        keep, structs, inputs = [film_colors], [], []
         for node in nodes:
             table = _array(node.table, np.float32)
             keep.append(table)
@@ -437,7 +439,7 @@ class Scene:
         desc = describe(
             abi.MaterialDesc, node_count=len(structs), nodes=structs if len(structs) else None,
             inputs=inputs if len(inputs) else None, input_count=len(inputs), surface=surface,
-            **values)
+            film_colors=_address(film_colors), **values)
         return desc, (keep, structs, inputs)
 
     def create_image(self, **values):
@@ -454,13 +456,15 @@ class Scene:
 
     @staticmethod
     def _image_desc(pixels=None, path=None, alpha_mode=AlphaMode.STRAIGHT, is_srgb=False,
-                    color_space=(None, None), max_side=0, is_mip_mapped=False):
+                    color_space=(None, None), max_side=0, is_mip_mapped=False, is_alpha_literal=False):
         """path: absolute; color_space: a configuration of OpenColorIO and a name in it; max_side: pixels, to
-        which a larger one is halved, 0 for none; is_mip_mapped: with smaller levels for minification."""
+        which a larger one is halved, 0 for none; is_mip_mapped: with smaller levels for minification;
+        is_alpha_literal: alpha_mode is that of a file's colours, whatever it says."""
         config, space = color_space[0] and os.fsencode(color_space[0]), _text(color_space[1])
         desc = describe(abi.ImageDesc, alpha_mode=alpha_mode, is_srgb=int(is_srgb),
                         path=path and os.fsencode(path), color_config=config, color_space=space,
-                        max_side=max_side, is_mip_mapped=int(is_mip_mapped))
+                        max_side=max_side, is_mip_mapped=int(is_mip_mapped),
+                        is_alpha_literal=int(is_alpha_literal))
         if pixels is not None:
             pixels = np.ascontiguousarray(pixels)
             desc.height, desc.width = pixels.shape[:2]

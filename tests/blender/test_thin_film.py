@@ -31,15 +31,19 @@ _LATER = {
     "metal, rough": ("ShaderNodeBsdfMetallic", {**_GOLD, "Roughness": 0.5, "Thin Film IOR": 1.33}),
 }
 _CASES = {**{name: (_PRINCIPLED, inputs) for name, inputs in _FILMS.items()}, **_LATER}
+_OF_SPACES = ("120 nm", "over a base", "tinted", "glass node", "metal", "metal, rough")
 TOLERANCE = 0.02
 SAMPLES = 256
 SIZE = (48, 48)
 
 
-def inside_films(films):
-    """{name: pictures by both engines and, by Volley, without the film}."""
+def inside_films(films, space=None):
+    """{name: pictures by both engines and, by Volley, without the film}; space: the working space."""
+    import bpy
     import scenes
     pictures = {}
+    if space is not None:
+        bpy.ops.wm.set_working_color_space(working_space=space)
     for name, (node, inputs) in films.items():
         scene = scenes.empty(size=SIZE)
         if not scenes.has_node(node, inputs):
@@ -66,9 +70,21 @@ def films(blender_of_module):
 def test_film(films, name):
     if name not in films:
         pytest.skip("this Blender has no thin film")
+    _compare(name, films[name])
+
+
+@pytest.mark.since((5, 0), "working spaces came with 5.0")
+@pytest.mark.parametrize("space", ("Linear Rec.2020", "ACEScg"))
+def test_working_spaces(blender, space):
+    for name, pictures in blender.run(inside_films, {name: _CASES[name] for name in _OF_SPACES}, space).items():
+        _compare(f"{name}, {space}", pictures)
+
+
+def _compare(name, pictures):
+    """Hold pictures by both engines and without the film to the tolerance."""
     # Means of 4 x 4 pixels: what rounds off the triangles and the noise of rough ones.
     ours, theirs, bare = (picture[..., :3].reshape(12, 4, 12, 4, 3).mean(axis=(1, 3))
-                          for picture in films[name])
+                          for picture in pictures)
     off, shift = np.abs(ours - theirs), np.abs(theirs - bare).max()
     worst = off.max()
     print(f"{name:20} off by at most {worst:.4f}, mean {off.mean():.5f}; the film makes {shift:.3f}")

@@ -46,13 +46,14 @@ class FlatTree:
         self.needs_generated = False  # coordinates of the undeformed mesh
         self.needs_instancer = False  # what made the instance, see instance.instancer_values
         self.instance_attributes = set()  # (type, name), see attributes.Attributes
+        self.film_colors = None   # of thin films: working_space.from_rec709_matrix, None in Rec.709
         self.sun = None           # sky_texture.Sun that the tree shows
         self.follows_scene = False  # it reads where other objects are, or properties of the view layer
         self.has_volume = False   # something is linked to the output's Volume
 
     def signature(self):
         """Equal for trees that mean the same."""
-        return self.surface, tuple(node.signature() for node in self.nodes)
+        return self.surface, self.film_colors, tuple(node.signature() for node in self.nodes)
 
 
 def flatten(tree, label, warnings, images=None, aovs=None, attributes=None, displacement=None):

@@ -18,7 +18,7 @@ import bpy
 import numpy as np
 
 from .. import abi, native
-from ..compat import cycles, working_space
+from ..compat import HAS_LITERAL_ALPHA, cycles, working_space
 from . import working_space as spaces
 from .movie import frame_of, turn_to
 
@@ -129,8 +129,8 @@ class Images:
 
     def _file_values(self, image, path, is_mip_mapped):
         """A file as keywords of create_image, but for its colour space."""
-        return {"path": path, "alpha_mode": _alpha_mode(image), "max_side": self._limit,
-                "is_mip_mapped": is_mip_mapped}
+        return {"path": path, "alpha_mode": _alpha_mode(image), "is_alpha_literal": HAS_LITERAL_ALPHA,
+                "max_side": self._limit, "is_mip_mapped": is_mip_mapped}
 
     def id_of_table(self, name, make, *arguments):
         """The library's image of a table (height, width, 3) of scene-linear colours, make(*arguments)."""
@@ -333,9 +333,9 @@ def _alpha_mode(image):
 
 
 def _pixel_alpha_mode(image):
-    """Alpha of Blender's own buffers: floats are premultiplied, bytes are not."""
+    """Alpha of Blender's own buffers: floats are premultiplied, bytes are not, unless the image says so."""
     mode = _alpha_mode(image)
-    if mode in (abi.AlphaMode.NONE, abi.AlphaMode.CHANNEL_PACKED):
+    if HAS_LITERAL_ALPHA or mode in (abi.AlphaMode.NONE, abi.AlphaMode.CHANNEL_PACKED):
         return mode
     return abi.AlphaMode.PREMULTIPLIED if image.is_float else abi.AlphaMode.STRAIGHT
 

@@ -232,9 +232,9 @@ class Materials:
         """Create or change it in the library; a refused one becomes the default material."""
         try:
             if entry.id:
-                self._scene.update_material(entry.id, flat.nodes, flat.surface, **values)
+                self._scene.update_material(entry.id, flat.nodes, flat.surface, flat.film_colors, **values)
             else:
-                entry.id = self._scene.create_material(flat.nodes, flat.surface, **values)
+                entry.id = self._scene.create_material(flat.nodes, flat.surface, flat.film_colors, **values)
         except native.TracerError as error:
             if error.status not in (abi.StatusCode.ERROR_INVALID_ARGUMENT, abi.StatusCode.ERROR_TOO_LARGE):
                 raise

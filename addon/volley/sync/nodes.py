@@ -25,7 +25,7 @@ from .node_list import absent, arranged, input_kinds, input_number, named_output
 from .texture_mapping import mapped
 from .textures import TEXTURES
 from .values import CONSTANT, DEFAULT, Value
-from .working_space import is_rec709
+from .working_space import from_rec709_matrix, is_rec709
 
 _TANGENT_AXES = {'X': TangentSource.X, 'Y': TangentSource.Y, 'Z': TangentSource.Z}
 
@@ -183,7 +183,7 @@ _SPECS["ShaderNodeBsdfAnisotropic"] = _SPECS["ShaderNodeBsdfGlossy"]
 def translate(walker, node, path):
     """The outputs of a node as {socket identifier: Value}; nothing for an unsupported one."""
     sockets = Sockets(walker, node, path)
-    _warn_of_film(walker, node, sockets)
+    _note_film(walker, sockets)
     special = next((table[node.bl_idname] for table in (_SPECIAL, TEXTURES, CONVERTERS)
                     if node.bl_idname in table), None)
     if special is not None:
@@ -198,13 +198,10 @@ def translate(walker, node, path):
     return named_outputs(walker.emit(spec.type, values, mode), spec.type, spec.outputs, mode)
 
 
-def _warn_of_film(walker, node, sockets):
-    """Thin films are computed for the wavelengths that channels of Rec.709 see."""
-    if is_rec709() or sockets.find("Thin Film Thickness") is None:
-        return
-    thickness = sockets.get('f', "Thin Film Thickness")
-    if thickness.node != CONSTANT or thickness.constant[0] > 0.0:
-        walker.warn(f"{node.bl_label}: its thin film has the colours of Rec.709")
+def _note_film(walker, sockets):
+    """Thin films are computed for the wavelengths that channels of Rec.709 see, and converted."""
+    if not is_rec709() and sockets.find("Thin Film Thickness") is not None:
+        walker.flat.film_colors = from_rec709_matrix()
 
 
 def _note_generated(walker, node, node_type, values):

@@ -26,12 +26,17 @@ def _columns(_space, conversion):
     return tuple(tuple(getattr(Color(primary), conversion)()) for primary in np.eye(3).tolist())
 
 
+def from_rec709_matrix():
+    """What makes colours of the working space of those in Rec.709, row by row."""
+    matrix = np.transpose(_columns(working_space(), "from_rec709_linear_to_scene_linear"))
+    return tuple(map(tuple, matrix.tolist()))
+
+
 def from_rec709(walker, color):
     """A colour in Rec.709 in the working space."""
     if is_rec709():
         return color
-    matrix = np.transpose(_columns(working_space(), "from_rec709_linear_to_scene_linear"))
-    return _combine(walker, [_dot(walker, color, row) for row in matrix.tolist()])
+    return _combine(walker, [_dot(walker, color, row) for row in from_rec709_matrix()])
 
 
 def spectral(walker, node_type, value):

@@ -380,6 +380,9 @@ typedef struct trc_material_desc {
     uint32_t flags;               /* TRC_MATERIAL_* */
     float cryptomatte;            /* trc_cryptomatte_id of its name; 0: in no matte */
     uint32_t reserved;            /* 0 */
+    /* Thin films: what the colours of the scene are of those in Linear Rec.709, row by row, 9
+     * floats, each row with the sum 1 for white to stay white; copied. NULL: they are those. */
+    const float *film_colors;
 } trc_material_desc;
 
 /* Black. With nodes: emission is sampled, shadow rays see transparency. */
@@ -442,6 +445,9 @@ typedef struct trc_image_desc {
      * stands for 4 texels or more: less noise, fewer cache misses, a sixth more memory (floats: a
      * twelfth). With more samples per pixel lookups return to the image itself. */
     uint32_t is_mip_mapped;
+    /* 1: alpha_mode says of a file what its colours are, STRAIGHT or PREMULTIPLIED, as of pixels
+     * (Blender 5); 0: the file does. */
+    uint32_t is_alpha_literal;
 } trc_image_desc;
 
 /* Nothing yet: straight alpha, values as they are. */

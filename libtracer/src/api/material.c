@@ -20,6 +20,8 @@ static trc_status check_material(const trc_material_desc *desc) {
     if (desc->input_count) {
         TRC_TRY(trc_check_out(desc->inputs, _Alignof(trc_node_input), "inputs"));
     }
+    if (desc->film_colors)
+        TRC_TRY(trc_check_out(desc->film_colors, _Alignof(float), "film_colors"));
     if (desc->surface < -1 || (desc->surface >= 0 && (uint32_t)desc->surface >= desc->node_count)) {
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "surface is %" PRId32 " of %" PRIu32 " nodes",
                         desc->surface, desc->node_count);
@@ -87,6 +89,7 @@ static trc_status check_image(const trc_image_desc *desc) {
     TRC_TRY(trc_check_enum(desc->alpha_mode, 4, "alpha_mode"));
     TRC_TRY(trc_check_enum(desc->is_srgb, 2, "is_srgb"));
     TRC_TRY(trc_check_enum(desc->is_mip_mapped, 2, "is_mip_mapped"));
+    TRC_TRY(trc_check_enum(desc->is_alpha_literal, 2, "is_alpha_literal"));
     if (!desc->path == !desc->pixels) {
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "an image needs either pixels or a path");
     }

@@ -404,7 +404,9 @@ static trc_status load_file(const trc_image_desc *desc, const struct trc_image_s
         .context = &file, .cancel = source->cancel, .begin = begin_file, .rows = take_rows};
     trc_status status = trc_image_reader_read(source->reader, desc->path, &taker);
     if (status == TRC_OK)
-        status = finish(file.image, desc, source, file.info.channels, file.info.is_unassociated);
+        status = finish(file.image, desc, source, file.info.channels,
+                        desc->is_alpha_literal ? desc->alpha_mode == TRC_ALPHA_STRAIGHT
+                                               : file.info.is_unassociated);
     if (status != TRC_OK) {
         trc_image_release(file.image);
         return status;

@@ -45,9 +45,10 @@ static bool text_equals(const char *a, const char *b) {
 }
 
 static bool desc_equals(const trc_image_desc *a, const trc_image_desc *b) {
-    return a->alpha_mode == b->alpha_mode && a->is_srgb == b->is_srgb &&
-           a->max_side == b->max_side && a->is_mip_mapped == b->is_mip_mapped &&
-           text_equals(a->path, b->path) && text_equals(a->color_space, b->color_space) &&
+    return a->alpha_mode == b->alpha_mode && a->is_alpha_literal == b->is_alpha_literal &&
+           a->is_srgb == b->is_srgb && a->max_side == b->max_side &&
+           a->is_mip_mapped == b->is_mip_mapped && text_equals(a->path, b->path) &&
+           text_equals(a->color_space, b->color_space) &&
            text_equals(a->color_config, b->color_config);
 }
 

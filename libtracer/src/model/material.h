@@ -97,7 +97,9 @@ struct trc_material {
     struct trc_operand *operands;
     struct trc_instruction *instructions;
     float *tables;
-    float emission[3]; /* constant emission; a mean estimate when it varies */
+    bool has_film_colors;
+    float film_colors[9]; /* of trc_material_desc */
+    float emission[3];    /* constant emission; a mean estimate when it varies */
     /* Of a material that moves vertices, else NULL: has no leaves, but an AOV that is how far. */
     struct trc_material *displacement;
     uint32_t keeps_normals; /* 1: normals of moved vertices stay */

@@ -59,6 +59,9 @@ static trc_status build(const trc_material_desc *desc, const struct trc_compile_
         m->flags = desc->flags;
         m->pass_index = desc->pass_index;
         m->cryptomatte = desc->cryptomatte;
+        m->has_film_colors = desc->film_colors != NULL;
+        if (desc->film_colors)
+            memcpy(m->film_colors, desc->film_colors, sizeof m->film_colors);
         status = how(b, m);
     } else {
         trc_fail(status, "no memory to compile a material");

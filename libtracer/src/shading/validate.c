@@ -117,6 +117,8 @@ trc_status trc_material_validate(const trc_material_desc *desc) {
                         desc->flags);
     }
     TRC_TRY(trc_check_finite(&desc->cryptomatte, 1, "cryptomatte"));
+    if (desc->film_colors)
+        TRC_TRY(trc_check_finite(desc->film_colors, 9, "film_colors"));
     for (uint32_t i = 0; i < desc->node_count; i++)
         TRC_TRY(check_node(desc, i));
     if (desc->node_count == 0 || desc->surface == -1)

@@ -40,7 +40,8 @@ struct trc_lobe {
     /* Reflected part of what meets a micro-normal at that cosine, of TRC_FRESNEL_OWN alone; f0 and
      * f90 are what it makes of them. */
     vvec3 (*reflectance)(const struct trc_lobe *lobe, vfloat cos_m);
-    enum trc_lobe_kind kind; /* the model's */
+    const float *film_colors; /* of thin films: trc_material's; NULL: Rec.709 */
+    enum trc_lobe_kind kind;  /* the model's */
     uint32_t distribution;
     uint32_t fresnel;
     bool correlated;      /* microfacets mask and shadow by one height, as in Cycles 4 */

@@ -151,6 +151,7 @@ TRC_INLINE vfloat aspect_of(vfloat anisotropy) {
 TRC_INLINE void set_fresnel(struct trc_lobe *lobe, const struct trc_fresnel *fresnel) {
     lobe->fresnel = fresnel->kind;
     lobe->reflectance = fresnel->reflectance;
+    lobe->film_colors = fresnel->film_colors;
     lobe->f0 = fresnel->f0;
     lobe->f90 = fresnel->f90;
 }

@@ -44,6 +44,7 @@ struct trc_lobe_model {
 struct trc_fresnel {
     uint32_t kind;
     vvec3 (*reflectance)(const struct trc_lobe *lobe, vfloat cos_m);
+    const float *film_colors;
     vvec3 f0, f90;
 };
 

@@ -49,6 +49,11 @@ TRC_INLINE struct film_wave film_seen(const float table[2][TRC_THIN_FILM_SIZE], 
     return (struct film_wave){real * cosine - imaginary * sine, real * sine + imaginary * cosine};
 }
 
+/* What the channels of a scene see, from those of Rec.709. */
+TRC_INLINE vfloat film_mix(const float row[3], vfloat red, vfloat green, vfloat blue) {
+    return vf_set(row[0]) * red + vf_set(row[1]) * green + vf_set(row[2]) * blue;
+}
+
 static const float film_carriers[TRC_THIN_FILM_CHANNELS] = {TRC_THIN_FILM_RED, TRC_THIN_FILM_GREEN,
                                                             TRC_THIN_FILM_BLUE};
 
@@ -73,7 +78,8 @@ TRC_INLINE vvec3 film_sum(vfloat upper, vfloat lower, const vvec3 seen[FILM_ORDE
 
 /* cos_i: to the normal; thickness: nanometres; index, ior: of the film and of what is below over
  * that of what is above. */
-static vvec3 film_fresnel(vfloat cos_i, vfloat thickness, vfloat index, vfloat ior) {
+static vvec3 film_fresnel(vfloat cos_i, vfloat thickness, vfloat index, vfloat ior,
+                          const float *colors) {
     const struct film_side upper = film_side_of(vf_abs(cos_i), index);
     const struct film_side lower = film_side_of(upper.cosine, ior / index);
     const vfloat difference = (thickness + thickness) * index * upper.cosine;
@@ -84,9 +90,13 @@ static vvec3 film_fresnel(vfloat cos_i, vfloat thickness, vfloat index, vfloat i
                      film_seen(trc_thin_film_table[1], film_carriers[1], d).real,
                      film_seen(trc_thin_film_table[2], film_carriers[2], d).real);
     }
-    const vvec3 mean = v3_scale(v3_add(film_sum(upper.across, lower.across, seen),
-                                       film_sum(upper.along, lower.along, seen)),
-                                vf_set(0.5f));
+    vvec3 mean = v3_scale(v3_add(film_sum(upper.across, lower.across, seen),
+                                 film_sum(upper.along, lower.along, seen)),
+                          vf_set(0.5f));
+    if (colors)
+        mean = v3(film_mix(colors, mean.x, mean.y, mean.z),
+                  film_mix(colors + 3, mean.x, mean.y, mean.z),
+                  film_mix(colors + 6, mean.x, mean.y, mean.z));
     return v3_select(vm_and(upper.passes, lower.passes), v3_saturate(mean), v3_splat(vf_one()));
 }
 
@@ -100,7 +110,7 @@ TRC_INLINE vfloat scaled(vfloat film, vfloat f0, vfloat own) {
 static vvec3 film_reflectance(const struct trc_lobe *lobe, vfloat cos_m) {
     const vfloat thickness = lobe->f90.x, own = trc_fresnel_normal(lobe->ior);
     const vvec3 bare = v3_lerp(lobe->f0, v3_splat(vf_one()), trc_fresnel_blend(cos_m, lobe->ior));
-    const vvec3 film = film_fresnel(cos_m, thickness, lobe->f90.y, lobe->ior);
+    const vvec3 film = film_fresnel(cos_m, thickness, lobe->f90.y, lobe->ior, lobe->film_colors);
     const vvec3 tinted = v3(scaled(film.x, lobe->f0.x, own), scaled(film.y, lobe->f0.y, own),
                             scaled(film.z, lobe->f0.z, own));
     const vmask has_own = vf_gt(own, vf_set(MIN_OWN));
@@ -171,15 +181,31 @@ TRC_INLINE vfloat film_metal_sum(vfloat upper, vfloat lower2, struct film_wave t
     return sum;
 }
 
-static vfloat film_metal_channel(const struct trc_lobe *lobe, int channel, vfloat f0, vfloat dip,
+/* What the channels see of each order. */
+static void film_metal_seen(const struct trc_lobe *lobe, const struct film_side *upper,
+                            struct film_wave seen[TRC_THIN_FILM_CHANNELS][FILM_ORDERS]) {
+    const vfloat difference = (lobe->roughness + lobe->roughness) * lobe->ior * upper->cosine;
+    for (int m = 0; m < FILM_ORDERS; m++) {
+        struct film_wave w[TRC_THIN_FILM_CHANNELS];
+        for (int c = 0; c < TRC_THIN_FILM_CHANNELS; c++)
+            w[c] = film_seen(trc_thin_film_table[c], film_carriers[c],
+                             difference * vf_set((float)(m + 1)));
+        for (int c = 0; c < TRC_THIN_FILM_CHANNELS; c++) {
+            const float *row = lobe->film_colors ? lobe->film_colors + 3 * c : NULL;
+            seen[c][m] = w[c];
+            if (row) {
+                seen[c][m].real = film_mix(row, w[0].real, w[1].real, w[2].real);
+                seen[c][m].imaginary =
+                    film_mix(row, w[0].imaginary, w[1].imaginary, w[2].imaginary);
+            }
+        }
+    }
+}
+
+static vfloat film_metal_channel(const struct trc_lobe *lobe,
+                                 const struct film_wave seen[FILM_ORDERS], vfloat f0, vfloat dip,
                                  const struct film_side *upper) {
-    const vfloat thickness = lobe->roughness, index = lobe->ior;
-    const vfloat difference = (thickness + thickness) * index * upper->cosine;
-    struct film_wave seen[FILM_ORDERS];
-    for (int m = 0; m < FILM_ORDERS; m++)
-        seen[m] = film_seen(trc_thin_film_table[channel], film_carriers[channel],
-                            difference * vf_set((float)(m + 1)));
-    const struct film_metal lower = film_metal_of(f0, dip, index, upper->cosine);
+    const struct film_metal lower = film_metal_of(f0, dip, lobe->ior, upper->cosine);
     const vfloat sum = film_metal_sum(upper->across, lower.part, lower.across, seen) +
                        film_metal_sum(upper->along, lower.part, lower.along, seen);
     return vf_select(upper->passes, vf_saturate(vf_set(0.5f) * sum), vf_one());
@@ -188,9 +214,11 @@ static vfloat film_metal_channel(const struct trc_lobe *lobe, int channel, vfloa
 static vvec3 film_metal_reflectance(const struct trc_lobe *lobe, vfloat cos_m) {
     const struct film_side upper = film_side_of(vf_abs(cos_m), lobe->ior);
     const vvec3 f0 = lobe->f0, dip = lobe->f90;
-    const vvec3 film = v3(film_metal_channel(lobe, 0, f0.x, dip.x, &upper),
-                          film_metal_channel(lobe, 1, f0.y, dip.y, &upper),
-                          film_metal_channel(lobe, 2, f0.z, dip.z, &upper));
+    struct film_wave seen[TRC_THIN_FILM_CHANNELS][FILM_ORDERS];
+    film_metal_seen(lobe, &upper, seen);
+    const vvec3 film = v3(film_metal_channel(lobe, seen[0], f0.x, dip.x, &upper),
+                          film_metal_channel(lobe, seen[1], f0.y, dip.y, &upper),
+                          film_metal_channel(lobe, seen[2], f0.z, dip.z, &upper));
     const vvec3 bare =
         v3(trc_metal_fresnel(f0.x, dip.x, cos_m), trc_metal_fresnel(f0.y, dip.y, cos_m),
            trc_metal_fresnel(f0.z, dip.z, cos_m));
@@ -198,6 +226,10 @@ static vvec3 film_metal_reflectance(const struct trc_lobe *lobe, vfloat cos_m) {
 }
 
 /* ---- setting up ---- */
+
+static const float *film_colors_of(const struct trc_setup *c) {
+    return c->material->has_film_colors ? c->material->film_colors : NULL;
+}
 
 /* The film of a leaf, whose thickness is input number at and whose index is the next: the lanes
  * that have one. */
@@ -219,6 +251,7 @@ vmask trc_thin_film_cover(const struct trc_setup *c, const struct trc_leaf *leaf
     if (vm_any(covered)) {
         fresnel->kind = TRC_FRESNEL_OWN;
         fresnel->reflectance = film_reflectance;
+        fresnel->film_colors = film_colors_of(c);
         fresnel->f90 = v3(thickness, index, vf_zero());
     }
     return covered;
@@ -230,6 +263,7 @@ vmask trc_thin_film_cover_metal(const struct trc_setup *c, const struct trc_leaf
     const vmask covered = film_of(c, leaf, at, vf_one(), whole, &thickness, &index);
     if (vm_any(covered)) {
         lobe->reflectance = film_metal_reflectance;
+        lobe->film_colors = film_colors_of(c);
         lobe->roughness = thickness;
         lobe->ior = index;
     }
