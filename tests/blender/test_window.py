@@ -601,3 +601,31 @@ def test_view_through_the_camera(window):
     assert found['EMISSION'] == [0.0, 0.0, 0.0] and found['COMBINED'][2] > 0.3
     assert found['UV'][0] > 0.5 and found['UV'][1] > 0.5 and found['UV'][2] == 1.0
     assert found["paused"] == found["lit"] and found["resumed"] < 0.01
+
+
+def inside_linked_instance(path):
+    """What a view shows in its middle where an instance is of a collection that is in a library alone."""
+    import bpy
+    import scenes
+    yield 0.1
+    scene = scenes.empty(size=(64, 48))
+    group = bpy.data.collections.new("Group")
+    group.objects.link(scenes.wall(size=30.0, material=scenes.emitter((0.0, 1.0, 0.0))))
+    bpy.data.libraries.write(path, {group})
+    scene = scenes.empty(size=(64, 48))
+    yield DRAW_SECONDS
+    with bpy.data.libraries.load(path, link=True) as (_, wanted):
+        wanted.collections = ["Group"]
+    made = scenes.link("Instance", None)
+    made.instance_type, made.instance_collection = 'COLLECTION', wanted.collections[0]
+    scenes.camera()
+    space = _open(scene)
+    space.region_3d.view_perspective = 'CAMERA'
+    shot = yield from _settled()
+    height, width = shot.shape[:2]
+    return shot[height // 2, width // 2]
+
+
+def test_instances_of_what_is_linked_are_seen(window, tmp_path):
+    shown = window.run_in_window(inside_linked_instance, str(tmp_path / "assets.blend"))
+    assert shown == pytest.approx([0.0, 1.0, 0.0], abs=0.03)

@@ -99,12 +99,23 @@ def is_shown(instance, v3d=None):
     return instance.show_self and is_in_view(instance, v3d)
 
 
+# Types of objects that 3D views call otherwise.
+_VIEW_KINDS = {'SURFACE': "surf", 'GPENCIL': "grease_pencil", 'GREASEPENCIL': "grease_pencil"}
+
+
 def is_in_view(instance, v3d=None):
     """Whether its object and particles may be seen: viewports have local views, which show instances with
     what makes them, and hide types of objects, which hides instances by their own."""
-    if v3d is None:
+    if v3d is None or instance.object.visible_in_viewport_get(v3d):
         return True
-    return instance.object.visible_in_viewport_get(v3d)
+    # Of an object that only a linked collection has Blender may not say so, though what instances it is seen.
+    return instance.is_instance and _is_kind_shown(instance.object, v3d) \
+        and instance.parent.visible_in_viewport_get(v3d)
+
+
+def _is_kind_shown(blender_object, v3d):
+    kind = _VIEW_KINDS.get(blender_object.type, blender_object.type.lower())
+    return getattr(v3d, f"show_object_viewport_{kind}", True)
 
 
 def names_of(instance):
