@@ -21,6 +21,14 @@ SKY_WIDTH, SKY_HEIGHT = 256, 128
 
 # Building blocks -------------------------------------------------------------------------------
 
+def keep_from_sampling(material):
+    """Leave its light to the rays that find it; the setting was another before 3.5."""
+    if hasattr(material.cycles, "emission_sampling"):
+        material.cycles.emission_sampling = 'NONE'
+    else:
+        material.cycles.sample_as_light = False
+
+
 def empty(world=(0.0, 0.0, 0.0)):
     """Nothing, under a world of one colour."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -158,7 +166,7 @@ def prepare_gloss(_source, _folder):
     add_things([glossy((0.8, 0.8, 0.8), roughness) for roughness in (0.05, 0.12, 0.2, 0.3, 0.4)])
     for i in range(9):
         stripe = emission(COLORS[i % 6], 1.5 if i % 2 else 0.2)
-        stripe.cycles.sample_as_light = False
+        keep_from_sampling(stripe)
         add_box((2.2 * i - 8.8, 6.0, 2.5), (2.2, 0.1, 6.0), stripe)
     look()
 
@@ -169,7 +177,7 @@ def prepare_glass(_source, _folder):
     add_things([glass(), glass(0.15), glass(), glass(0.3)])
     for i in range(12):
         stripe = emission(COLORS[i % 6], 1.0 if i % 2 else 0.2)
-        stripe.cycles.sample_as_light = False
+        keep_from_sampling(stripe)
         add_box((1.2 * i - 6.6, 5.0, 1.5), (1.2, 0.1, 6.0), stripe)
     look()
 

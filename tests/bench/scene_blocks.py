@@ -2,11 +2,16 @@
 """Building blocks of scenes for comparing engines; runs inside Blender. Lengths are metres, powers
 watts."""
 
+import pathlib
+import sys
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "support"))
 try:
     import bpy
+    import scenes
     from mathutils import Vector
 except ImportError:  # outside Blender only the table of scenes is of use
-    bpy = Vector = None
+    bpy = Vector = scenes = None
 
 
 def add_area_light(name, location, target, size, power, color=(1.0, 1.0, 1.0)):
@@ -100,6 +105,6 @@ def animate(moved, path, offsets):
     for frame, offset in offsets.items():
         setattr(moved, path, tuple(r + o for r, o in zip(rest, offset)))
         moved.keyframe_insert(path, frame=frame)
-    for curve in moved.animation_data.action.fcurves:
+    for curve in scenes.curves(moved):
         for key in curve.keyframe_points:
             key.interpolation = "LINEAR"

@@ -41,7 +41,7 @@ from scene_blocks import (  # noqa: E402
     add_area_light, add_ball, add_camera, add_floor, animate, open_blend, pose_from_action, set_world)
 
 # Raise this when a helper, here or in scene_blocks.py, changes what prepared scenes look like.
-SETUP_VERSION = 1
+SETUP_VERSION = 2
 
 DEFAULT_SETTINGS = {
     "width": 320, "height": 180, "samples": 64, "seed": 0, "max_depth": 50,
