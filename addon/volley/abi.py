@@ -134,6 +134,8 @@ class NodeType(IntEnum):
     LAYERED_PRINCIPLED = 15
     SHEEN = 16
     RAY_PORTAL = 17
+    HAIR = 18
+    PRINCIPLED_HAIR = 19
     IMAGE = 64
     ENVIRONMENT = 65
     UV_MAP = 66
@@ -208,6 +210,17 @@ class DiffuseModel(IntEnum):
 class ToonComponent(IntEnum):
     DIFFUSE = 0
     GLOSSY = 1
+
+
+class HairComponent(IntEnum):
+    REFLECTION = 0
+    TRANSMISSION = 1
+
+
+class Pigment(IntEnum):
+    COLOR = 0
+    MELANIN = 1
+    ABSORPTION = 2
 
 
 class MappingType(IntEnum):
@@ -889,21 +902,21 @@ ENUMERATIONS = {StatusCode: "TRC_", IsaId: "TRC_ISA_", CameraType: "TRC_CAMERA_"
                 NormalsLayout: "TRC_NORMALS_", VisibleRays: "TRC_VISIBLE_", InstanceFlags: "TRC_INSTANCE_",
                 LightType: "TRC_LIGHT_", AreaShape: "TRC_AREA_", LightFlags: "TRC_LIGHT_",
                 AoMethod: "TRC_AO_", NodeType: "TRC_NODE_", ModeFlags: "TRC_MODE_", TableSize: "TRC_TABLE_",
-                DiffuseModel: "TRC_DIFFUSE_", ToonComponent: "TRC_TOON_", MappingType: "TRC_MAPPING_",
-                NormalMapSpace: "TRC_NORMAL_MAP_", NormalMapFlags: "TRC_NORMAL_MAP_", BumpMode: "TRC_BUMP_",
-                AmbientMode: "TRC_AMBIENT_", RaycastMode: "TRC_RAYCAST_",
-                DisplacementMethod: "TRC_DISPLACEMENT_", RampInterpolation: "TRC_RAMP_", Gamut: "TRC_GAMUT_",
-                CurvesExtension: "TRC_CURVES_", SeparateMode: "TRC_SEPARATE_", ClampType: "TRC_CLAMP_",
-                TangentSource: "TRC_TANGENT_", SpaceId: "TRC_SPACE_", TransformedType: "TRC_TRANSFORMED_",
-                VectorTransformMode: "TRC_", RotateMode: "TRC_ROTATE_", RotateFlags: "TRC_ROTATE_",
-                TextureMode: "TRC_", FractalType: "TRC_FRACTAL_", NoiseMode: "TRC_NOISE_",
-                VoronoiMetric: "TRC_VORONOI_", VoronoiFeature: "TRC_VORONOI_", VoronoiMode: "TRC_VORONOI_",
-                WaveProfile: "TRC_WAVE_", WaveDirection: "TRC_WAVE_", WaveMode: "TRC_WAVE_",
-                GradientType: "TRC_GRADIENT_", RadialTilingMode: "TRC_RADIAL_TILING_",
-                MagicDepth: "TRC_MAGIC_", BrickMode: "TRC_BRICK_", DistributionType: "TRC_DISTRIBUTION_",
-                BlendMode: "TRC_BLEND_", MathOperation: "TRC_MATH_", VectorOperation: "TRC_VECTOR_",
-                ImageInterpolation: "TRC_IMAGE_", ImageExtension: "TRC_IMAGE_",
-                ImageProjection: "TRC_IMAGE_", ImageMode: "TRC_IMAGE_",
+                DiffuseModel: "TRC_DIFFUSE_", ToonComponent: "TRC_TOON_", HairComponent: "TRC_HAIR_",
+                Pigment: "TRC_PIGMENT_", MappingType: "TRC_MAPPING_", NormalMapSpace: "TRC_NORMAL_MAP_",
+                NormalMapFlags: "TRC_NORMAL_MAP_", BumpMode: "TRC_BUMP_", AmbientMode: "TRC_AMBIENT_",
+                RaycastMode: "TRC_RAYCAST_", DisplacementMethod: "TRC_DISPLACEMENT_",
+                RampInterpolation: "TRC_RAMP_", Gamut: "TRC_GAMUT_", CurvesExtension: "TRC_CURVES_",
+                SeparateMode: "TRC_SEPARATE_", ClampType: "TRC_CLAMP_", TangentSource: "TRC_TANGENT_",
+                SpaceId: "TRC_SPACE_", TransformedType: "TRC_TRANSFORMED_", VectorTransformMode: "TRC_",
+                RotateMode: "TRC_ROTATE_", RotateFlags: "TRC_ROTATE_", TextureMode: "TRC_",
+                FractalType: "TRC_FRACTAL_", NoiseMode: "TRC_NOISE_", VoronoiMetric: "TRC_VORONOI_",
+                VoronoiFeature: "TRC_VORONOI_", VoronoiMode: "TRC_VORONOI_", WaveProfile: "TRC_WAVE_",
+                WaveDirection: "TRC_WAVE_", WaveMode: "TRC_WAVE_", GradientType: "TRC_GRADIENT_",
+                RadialTilingMode: "TRC_RADIAL_TILING_", MagicDepth: "TRC_MAGIC_", BrickMode: "TRC_BRICK_",
+                DistributionType: "TRC_DISTRIBUTION_", BlendMode: "TRC_BLEND_", MathOperation: "TRC_MATH_",
+                VectorOperation: "TRC_VECTOR_", ImageInterpolation: "TRC_IMAGE_",
+                ImageExtension: "TRC_IMAGE_", ImageProjection: "TRC_IMAGE_", ImageMode: "TRC_IMAGE_",
                 EnvironmentProjection: "TRC_ENVIRONMENT_", InputSource: "TRC_INPUT_",
                 MaterialFlags: "TRC_MATERIAL_", AlphaMode: "TRC_ALPHA_", IntegratorType: "TRC_INTEGRATOR_",
                 SamplerType: "TRC_SAMPLER_", AssemblyType: "TRC_ASSEMBLY_", FilterType: "TRC_FILTER_",
@@ -1062,6 +1075,16 @@ NODES = {
         (("SHADER", "closure"),)),
     NodeType.RAY_PORTAL: ("Ray Portal",
         (("COLOR", "color"), ("POSITION", "position"), ("VECTOR", "direction")),
+        (("SHADER", "closure"),)),
+    NodeType.HAIR: ("Hair",
+        (("COLOR", "color"), ("FLOAT", "offset"), ("FLOAT", "roughness_u"), ("FLOAT", "roughness_v"),
+         ("TANGENT", "tangent")),
+        (("SHADER", "closure"),)),
+    NodeType.PRINCIPLED_HAIR: ("Principled Hair",
+        (("COLOR", "color"), ("VECTOR", "absorption"), ("COLOR", "tint"), ("FLOAT", "melanin"),
+         ("FLOAT", "melanin_redness"), ("FLOAT", "roughness"), ("FLOAT", "radial_roughness"),
+         ("FLOAT", "coat"), ("FLOAT", "ior"), ("FLOAT", "offset"), ("FLOAT", "random_color"),
+         ("FLOAT", "random_roughness"), ("FLOAT", "random"), ("TANGENT", "tangent")),
         (("SHADER", "closure"),)),
     NodeType.IMAGE: ("Image",
         (("UV", "vector"), ("FLOAT", "blend")),

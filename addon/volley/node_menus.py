@@ -26,6 +26,7 @@ _OUTPUTS = {"ShaderNodeOutputMaterial": _OBJECT, "ShaderNodeOutputLight": _OBJEC
 _SHADERS = {
     "ShaderNodeAddShader": _OBJECT | _WORLD, "ShaderNodeBsdfAnisotropic": _OBJECT,
     "ShaderNodeBsdfDiffuse": _OBJECT, "ShaderNodeBsdfGlass": _OBJECT, "ShaderNodeBsdfGlossy": _OBJECT,
+    "ShaderNodeBsdfHair": _OBJECT, "ShaderNodeBsdfHairPrincipled": _OBJECT,
     "ShaderNodeBsdfPrincipled": _OBJECT, "ShaderNodeBsdfRefraction": _OBJECT,
     "ShaderNodeBsdfSheen": _OBJECT, "ShaderNodeBsdfToon": _OBJECT, "ShaderNodeBsdfTranslucent": _OBJECT,
     "ShaderNodeBsdfTransparent": _OBJECT, "ShaderNodeBsdfVelvet": _OBJECT,

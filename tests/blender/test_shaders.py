@@ -19,6 +19,8 @@ SEEDS = (11, 12, 13, 14, 15, 16)
 SAMPLES = 96       # of each seed
 TOLERANCE = 0.01           # relative to the mean of the ball
 
+STRANDS = "strands of "        # names of cases that begin so have them in the place of a ball
+
 # name: (node, inputs, settings)
 CASES = {}
 
@@ -26,6 +28,8 @@ CASES = {}
 _MULTIPLE = "light that scatters more than once comes from a table here, from random walks in Cycles 3.4"
 _SHEEN = "Cycles' fit, at the outline"
 _COAT = "Cycles 3.4 samples its coat by GGX but weighs the samples as GTR1; by lamps alone both agree"
+_TILT = "Cycles 3.4 tilts samples and what weighs them by angles that are not each other's"
+_BEHIND = "light from behind, which Cycles 4 samples no lamps for, and 3.4 does"
 KNOWN = {
     "glossy roughness 0.8 distribution ASHIKHMIN_SHIRLEY":
         (0.02, 0.035, "Cycles keeps rays that go below the faces at the outline; inside it both agree"),
@@ -34,6 +38,14 @@ KNOWN = {
     "glass roughness 0.5 ior 2.2 distribution BECKMANN":
         (0.04, 0.12, "not understood: light that is caught inside for long"),
     "glass roughness 0.5 ior 1.1 distribution GGX": (0.01, 0.02, "not understood"),
+    "principled hair roughness 0.4 radial roughness 0.2 parametrization COLOR":
+        (0.01, 0.05, "Cycles 3.4 alone, not understood"),
+    "principled hair absorption coefficient (0.0, 0.0, 0.0) parametrization ABSORPTION":
+        (0.01, 0.025, "Cycles 3.4 alone, not understood"),
+    **{f"{what}principled hair coat {coat} ior {ior} parametrization COLOR": (0.03, 0.1, _TILT)
+       for what in ("", "strands of ") for coat in (0.0, 0.8) for ior in (1.2, 1.8)},
+    **{f"{what}hair roughnessu {u} roughnessv 1.0 offset {offset}": (0.045, 0.08, _BEHIND)
+       for what in ("", "strands of ") for u in (0.1, 0.4) for offset in (0.0, 0.3)},
     "sheen roughness 0.5": (0.01, 0.02, _SHEEN),
     "sheen roughness 1.0": (0.01, 0.02, _SHEEN),
     "principled clearcoat roughness 0.03": (0.015, 0.03, _COAT),
@@ -96,6 +108,22 @@ _add("principled", _PRINCIPLED, {"Base Color": _GOLD, "Coat Weight": 1.0}, Coat_
 _add("principled", _PRINCIPLED, {"Base Color": _PALE}, Transmission_Weight=(0.5, 1.0), IOR=(1.2, 1.6),
      Roughness=(0.0, 0.3))
 _add("principled", _PRINCIPLED, {"Base Color": _GOLD}, Diffuse_Roughness=(0.3, 1.0))
+# Fibres on the faces of balls, and on strands around small ones.
+_PRINCIPLED_HAIR, _HAIR = "ShaderNodeBsdfHairPrincipled", "ShaderNodeBsdfHair"
+for _what in ("", STRANDS):
+    _add(_what + "hair", _HAIR, {"Color": _GOLD}, {"component": 'Reflection'}, RoughnessU=(0.1, 0.4),
+         RoughnessV=(0.2, 1.0), Offset=(0.0, 0.3))
+    _add(_what + "hair", _HAIR, {"Color": _GOLD}, {"component": 'Transmission'}, RoughnessU=(0.1, 0.4),
+         RoughnessV=(0.2, 1.0))
+    _add(_what + "principled hair", _PRINCIPLED_HAIR, {"Color": _GOLD, "Coat": 0.0, "Offset": 0.0},
+         None, Roughness=(0.1, 0.4), Radial_Roughness=(0.2, 0.7), parametrization=('COLOR',))
+    _add(_what + "principled hair", _PRINCIPLED_HAIR, {"Color": _GOLD, "Offset": 0.2},
+         None, Coat=(0.0, 0.8), IOR=(1.2, 1.8), parametrization=('COLOR',))
+    _add(_what + "principled hair", _PRINCIPLED_HAIR, {"Melanin": 0.6, "Tint": _PALE},
+         None, Melanin_Redness=(0.2, 1.0), Random_Color=(0.0, 0.9), Random_Roughness=(0.0, 0.8),
+         parametrization=('MELANIN',))
+    _add(_what + "principled hair", _PRINCIPLED_HAIR, {"Offset": 0.0},
+         None, Absorption_Coefficient=((0.0, 0.0, 0.0), (0.3, 0.6, 1.5)), parametrization=('ABSORPTION',))
 _add("metallic", "ShaderNodeBsdfMetallic", {"Base Color": _GOLD, "Edge Tint": (0.5, 0.7, 0.9)},
      {"fresnel_type": 'F82'}, Roughness=(0.1, 0.4, 0.9), Anisotropy=(0.0, 0.6))
 
@@ -121,12 +149,20 @@ def _ball(number, name, case):
     node_type, inputs, settings = case
     if not scenes.has_node(node_type, inputs, settings):
         return False
-    material = scenes.material(name, node_type, **{key.replace(" ", "_"): value for key, value in inputs.items()})
-    for key, value in settings.items():
-        setattr(scenes.shader_of(material), key, value)
+    material = scenes.material(name, node_type, settings,
+                               **{key.replace(" ", "_"): value for key, value in inputs.items()})
     x, z = number % GRID, number // GRID
     away = DEPTH * ((3 * x + 5 * z) % GRID)  # from its neighbours, which it would show
-    scenes.sphere(name, 0.42, (x - 0.5 * (GRID - 1), away, z - 0.5 * (GRID - 1)), material)
+    place = (x - 0.5 * (GRID - 1), away, z - 0.5 * (GRID - 1))
+    if not name.startswith(STRANDS):
+        scenes.sphere(name, 0.42, place, material)
+        return True
+    ball = scenes.sphere(name, 0.1, place, material)
+    ball.show_instancer_for_render = False
+    ball.modifiers.new("Hair", 'PARTICLE_SYSTEM')
+    hair = ball.particle_systems[0].settings
+    hair.type, hair.count, hair.hair_length, hair.render_step = 'HAIR', 40, 0.3, 2
+    hair.root_radius, hair.tip_radius, hair.radius_scale = 1.0, 0.6, 0.08
     return True
 
 

@@ -200,8 +200,12 @@ def has_node(node_type, inputs=(), settings=None):
     tree = bpy.data.node_groups.new("Asked", "ShaderNodeTree")
     try:
         node = tree.nodes.new(node_type)
-        return all(name in node.inputs for name in inputs) and all(
-            _takes(node.bl_rna.properties.get(name), value) for name, value in (settings or {}).items())
+        settings = settings or {}
+        if not all(_takes(node.bl_rna.properties.get(name), value) for name, value in settings.items()):
+            return False
+        for name, value in settings.items():
+            setattr(node, name, value)  # which may hide inputs
+        return all(name in node.inputs for name in inputs)
     except RuntimeError:  # no such type
         return False
     finally:
@@ -213,14 +217,16 @@ def _takes(setting, value):
     return setting is not None and (setting.type != 'ENUM' or value in setting.enum_items.keys())
 
 
-def material(name, node_type, **inputs):
-    """A material of one shader node; keywords are its inputs with underscores for spaces."""
+def material(name, node_type, settings=None, **inputs):
+    """A material of one shader node of those settings; keywords are its inputs with underscores for spaces."""
     made = bpy.data.materials.new(name)
     made.use_nodes = True
     tree = made.node_tree
     tree.nodes.clear()
     output = tree.nodes.new("ShaderNodeOutputMaterial")
     node = tree.nodes.new(node_type)
+    for key, value in (settings or {}).items():
+        setattr(node, key, value)
     for key, value in inputs.items():
         name = key.replace("_", " ")
         socket = node.inputs[name if name in node.inputs else _RENAMED_SOCKETS[name]]

@@ -288,14 +288,25 @@ def _tangent_normal(walker):
     return _vector(walker, Vector.SCALE, unit, scale=output(strand, NodeType.COLOR_ATTRIBUTE, "alpha"))
 
 
-def _hair_info(walker, node, _sockets):
-    """What the meshes of strands bring as attributes; 0 on all others."""
+def _strand_values(walker):
+    """Intercept, length, thickness, random number and whether there is any: what the meshes of strands bring as
+    attributes; 0 on all others."""
     walker.flat.color_names.add(HAIR_ATTRIBUTE)
     index = walker.emit(NodeType.COLOR_ATTRIBUTE, (), name=HAIR_ATTRIBUTE)
     parts = walker.emit(NodeType.SEPARATE, (Value('c', index, 0),))
     intercept, length, thickness = (Value('f', parts, i) for i in range(3))
     is_strand = _number(walker, Math.GREATER_THAN, length, _constant('f', 0.0))
     random = _number(walker, Math.MULTIPLY, output(index, NodeType.COLOR_ATTRIBUTE, "alpha"), is_strand)
+    return intercept, length, thickness, random, is_strand
+
+
+def strand_random(walker):
+    """The number of its own that a strand has."""
+    return _strand_values(walker)[3]
+
+
+def _hair_info(walker, node, _sockets):
+    intercept, length, thickness, random, is_strand = _strand_values(walker)
     is_read = node.outputs["Tangent Normal"].is_linked
     tangent_normal = _tangent_normal(walker) if is_read else _constant('v', 0.0)
     return {"Is Strand": is_strand, "Intercept": intercept, "Length": length, "Thickness": thickness,

@@ -11,13 +11,14 @@ from collections import namedtuple
 import numpy as np
 
 from ..abi import (BlendMode, BumpMode, ClampType, DiffuseModel, DistributionType, EnvironmentProjection,
-                   ImageExtension, ImageInterpolation, ImageProjection, MappingType, MathOperation as Math,
-                   ModeFlags, NodeType, NormalMapFlags, NormalMapSpace, RampInterpolation, SeparateMode,
-                   SpaceId, TableSize, TangentSource, ToonComponent, VectorOperation as Vector)
+                   HairComponent, ImageExtension, ImageInterpolation, ImageProjection, MappingType,
+                   MathOperation as Math, ModeFlags, NodeType, NormalMapFlags, NormalMapSpace, Pigment,
+                   RampInterpolation, SeparateMode, SpaceId, TableSize, TangentSource, ToonComponent,
+                   VectorOperation as Vector)
 from ..compat import (HAS_CORRELATED_MICROFACETS, HAS_FILMED_METAL, HAS_UNIT_NORMALS, HAS_WHOLE_COAT,
                       KEEPS_DIFFUSE_ENERGY, LEAVES_BUMPS, RAMP_STEPS, SCALES_NORMAL_MAPS)
 from . import tangents
-from .converters import CONVERTERS, instance_value
+from .converters import CONVERTERS, instance_value, strand_random
 from .derived import ISLAND, POINTINESS
 from .image import image_color
 from .instance import VALUES_GENERATED, VALUES_UV
@@ -142,6 +143,9 @@ _SPECS = {
     "ShaderNodeBsdfToon": Spec(
         NodeType.TOON, ("Color", "Size", "Smooth", "Normal"), _SHADER,
         lambda node: ToonComponent[node.component]),
+    "ShaderNodeBsdfHair": Spec(
+        NodeType.HAIR, ("Color", "Offset", "RoughnessU", "RoughnessV", "Tangent"), _SHADER,
+        lambda node: HairComponent[node.component.upper()]),
     "ShaderNodeEmission": Spec(NodeType.EMISSION, ("Color", "Strength"), ("Emission",)),
     "ShaderNodeBackground": Spec(NodeType.BACKGROUND, ("Color", "Strength"), ("Background",)),
     "ShaderNodeMixShader": Spec(NodeType.MIX_SHADER, ("Fac", "Shader", "Shader_001"), ("Shader",)),
@@ -368,6 +372,23 @@ def _sheen(walker, node, sockets):
     kind = NodeType.VELVET if node.distribution == 'ASHIKHMIN' else NodeType.SHEEN
     values = sockets.all_of(kind, ("Color", "Roughness", "Normal"))
     return {"BSDF": Value('s', walker.emit(kind, values), 0)}
+
+
+def _principled_hair(walker, node, sockets):
+    """Principled Hair by Chiang's model; Huang's of Blender 4 is named in a warning. Strands that are given no
+    number have their own."""
+    if getattr(node, "model", 'CHIANG') != 'CHIANG':
+        walker.warn("Principled Hair BSDF: Huang's model is approximated by Chiang's")
+    values = {name.lower().replace(" ", "_"): sockets.get('f', name) for name in (
+        "Melanin", "Melanin Redness", "Roughness", "Radial Roughness", "Coat", "IOR", "Offset", "Random Color",
+        "Random Roughness")}
+    values.update(color=sockets.get('c', "Color"), tint=sockets.get('c', "Tint"),
+                  absorption=sockets.get('v', "Absorption Coefficient"),
+                  random=sockets.get('f', "Random") if sockets.is_linked("Random") else strand_random(walker),
+                  tangent=absent('v'))
+    index = walker.emit(NodeType.PRINCIPLED_HAIR, arranged(NodeType.PRINCIPLED_HAIR, values),
+                        Pigment[node.parametrization])
+    return {"BSDF": Value('s', index, 0)}
 
 
 def _ray_portal(walker, _node, sockets):
@@ -646,6 +667,7 @@ def _clamped(walker, value, is_clamped):
 _SPECIAL = {
     "ShaderNodeBsdfPrincipled": _principled, "ShaderNodeBsdfSheen": _sheen,
     "ShaderNodeBsdfMetallic": _metallic, "ShaderNodeBsdfRayPortal": _ray_portal,
+    "ShaderNodeBsdfHairPrincipled": _principled_hair,
     "ShaderNodeValue": _value, "ShaderNodeRGB": _rgb,
     "ShaderNodeNewGeometry": _geometry, "ShaderNodeNormal": _normal, "ShaderNodeTexImage": _image,
     "ShaderNodeTexEnvironment": _environment, "ShaderNodeUVMap": _uv_map,

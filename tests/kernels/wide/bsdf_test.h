@@ -222,6 +222,33 @@ static inline struct model clearcoat(float roughness) {
     return m;
 }
 
+/* Of fibres along a direction that lies in the surface. */
+static inline struct model hair(uint32_t component, float u, float v, float offset) {
+    struct model m;
+    begin(&m, component ? "hair transmission" : "hair reflection", TRC_NODE_HAIR, component,
+          TRC_AT(HAIR, end));
+    set3(&m, TRC_AT(HAIR, color), 1, 1, 1);
+    set(&m, TRC_AT(HAIR, offset), offset);
+    set(&m, TRC_AT(HAIR, roughness_u), u);
+    set(&m, TRC_AT(HAIR, roughness_v), v);
+    set3(&m, TRC_AT(HAIR, tangent), 0.6f, 0.8f, 0.0f);
+    return m;
+}
+static inline struct model principled_hair(float absorption, float roughness, float radial,
+                                           float coat, float offset) {
+    struct model m;
+    begin(&m, "Principled Hair", TRC_NODE_PRINCIPLED_HAIR, TRC_PIGMENT_ABSORPTION,
+          TRC_AT(PRINCIPLED_HAIR, end));
+    set3(&m, TRC_AT(PRINCIPLED_HAIR, absorption), absorption, absorption, absorption);
+    set(&m, TRC_AT(PRINCIPLED_HAIR, roughness), roughness);
+    set(&m, TRC_AT(PRINCIPLED_HAIR, radial_roughness), radial);
+    set(&m, TRC_AT(PRINCIPLED_HAIR, coat), coat);
+    set(&m, TRC_AT(PRINCIPLED_HAIR, ior), 1.55f);
+    set(&m, TRC_AT(PRINCIPLED_HAIR, offset), offset);
+    set3(&m, TRC_AT(PRINCIPLED_HAIR, tangent), 0.6f, 0.8f, 0.0f);
+    return m;
+}
+
 /* ---- a shading point ---- */
 
 static inline vvec3 wide(double x, double y, double z) {

@@ -87,6 +87,8 @@ static void sampling_matches_density(void **state) {
         filmed(TRC_DISTRIBUTION_GGX, 0.6f, false),
         filmed(TRC_DISTRIBUTION_MULTI_GGX, 0.6f, true),
         layered_all(),
+        principled_hair(0.2f, 0.6f, 0.7f, 0.3f, 0.05f),
+        principled_hair(0.0f, 0.8f, 0.5f, 0.0f, 0.0f),
     };
     int failed = 0;
     for (size_t i = 0; i < sizeof models / sizeof models[0]; i++)

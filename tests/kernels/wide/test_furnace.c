@@ -149,6 +149,40 @@ static void furnace_is_white(void **state) {
     assert_true(half_width <= 0.0005);
 }
 
+/* Of fibres that absorb nothing, whose lobes are whole densities: all samples weigh 1 and no
+ * density integrates to more. The Hair shader's share of directions beyond its strand is not found
+ * by samples of lights. */
+static void hair_furnace_is_white(void **state) {
+    (void)state;
+    const float roughnesses[] = {0.25f, 0.5f, 1.0f};
+    const double cosines[] = {0.95, 0.5, 0.1};
+    double worst = 0.0, worst_density = 0.0;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            for (int k = 0; k < 3; k++) {
+                struct model white =
+                    principled_hair(0.0f, roughnesses[i], roughnesses[j], 0.4f, 0.05f);
+                struct trc_surface s;
+                struct trc_lobes l;
+                prepare(&white, direction(cosines[k], 0.3), &s, &l);
+                worst = fmax(worst, fabs(albedo(&white, cosines[k]) - 1.0));
+                double sum = 0.0, unused, value;
+                for (int row = 0; row < ROWS; row++)
+                    for (int column = 0; column < COLUMNS; column++) {
+                        integrate_cell(&l, &s, row, column, 32, &unused, &value);
+                        sum += value;
+                    }
+                worst_density = fmax(worst_density, fabs(sum - 1.0));
+                for (uint32_t m = TRC_HAIR_REFLECTION; m <= TRC_HAIR_TRANSMISSION; m++) {
+                    struct model fibres = hair(m, roughnesses[i], roughnesses[j], 0.1f);
+                    worst = fmax(worst, fabs(albedo(&fibres, cosines[k]) - 1.0));
+                }
+            }
+    print_figure("39: white furnace, hair", "off by at most %.5f, its density by %.5f", worst,
+                 worst_density);
+    assert_true(worst <= 0.002 && worst_density <= 0.005);
+}
+
 static double diffuse_albedo(struct model *m, double cos_o) {
     struct trc_surface s;
     struct trc_lobes l;
@@ -323,9 +357,13 @@ int main(void) {
     if (!test_cpu_can())
         return 77;
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(furnace_is_white),          cmocka_unit_test(diffuse_albedos),
-        cmocka_unit_test(ideal_glass_splits_energy), cmocka_unit_test(glass_at_the_critical_angle),
-        cmocka_unit_test(glass_weights_are_steady),  cmocka_unit_test(rough_goes_over_into_ideal),
+        cmocka_unit_test(furnace_is_white),
+        cmocka_unit_test(diffuse_albedos),
+        cmocka_unit_test(hair_furnace_is_white),
+        cmocka_unit_test(ideal_glass_splits_energy),
+        cmocka_unit_test(glass_at_the_critical_angle),
+        cmocka_unit_test(glass_weights_are_steady),
+        cmocka_unit_test(rough_goes_over_into_ideal),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

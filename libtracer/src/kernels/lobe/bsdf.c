@@ -25,6 +25,10 @@ TRC_INLINE bool is_reflection(enum trc_lobe_kind kind) {
     return kind == TRC_LOBE_DIFFUSE || kind == TRC_LOBE_REFLECT;
 }
 
+TRC_INLINE bool is_hair(enum trc_lobe_kind kind) {
+    return kind == TRC_LOBE_HAIR_REFLECT || kind == TRC_LOBE_HAIR_TRANSMIT;
+}
+
 /* What a shading offset leaves of light from wi: it comes as from further down, so it is gone
  * before the lobe's horizon (F. Beaune, appleseed, in the form of Cycles). */
 static __attribute__((noinline)) vfloat turned_share(const struct trc_lobes *l, vvec3 n, vvec3 wi) {
@@ -36,9 +40,9 @@ static __attribute__((noinline)) vfloat turned_share(const struct trc_lobes *l, 
 
 TRC_INLINE struct lobe_value value_of(const struct trc_lobes *l, const struct trc_lobe *lobe,
                                       const struct trc_surface *s, vvec3 wi, vmask side,
-                                      bool turns) {
+                                      bool rare) {
     struct lobe_value r = lobe->model->value(lobe, s, wi);
-    if (turns && is_reflection(lobe->kind))
+    if (rare && (l->rare & TRC_LOBES_TURN) && is_reflection(lobe->kind))
         r.value = v3_scale(r.value, turned_share(l, lobe->n, wi));
     r.value = v3_where(side, r.value);
     r.pdf = vf_where(side, r.pdf);
@@ -47,9 +51,9 @@ TRC_INLINE struct lobe_value value_of(const struct trc_lobes *l, const struct tr
     return r;
 }
 
-/* turns: as of l; a constant, so that lobes that turn nothing have no test of it. */
+/* rare: whether l has anything rare; a constant, so that others have no test of it. */
 TRC_INLINE void sum_lobes(const struct trc_lobes *l, const struct trc_surface *s, vvec3 wi,
-                          vmask active, bool turns, struct trc_bsdf_value *out) {
+                          vmask active, bool rare, struct trc_bsdf_value *out) {
     vmask above, below;
     sides(l, s, wi, active, &above, &below);
     const bool any_above = vm_any(above), any_below = vm_any(below);
@@ -58,12 +62,14 @@ TRC_INLINE void sum_lobes(const struct trc_lobes *l, const struct trc_surface *s
     for (int i = 0; i < l->count; i++) {
         const struct trc_lobe *lobe = &l->lobe[i];
         const bool up = is_reflection(lobe->kind);
-        if (lobe->kind == TRC_LOBE_TRANSPARENT || !(up ? any_above : any_below))
+        const bool hair = rare && is_hair(lobe->kind);
+        if (lobe->kind == TRC_LOBE_TRANSPARENT || (!hair && !(up ? any_above : any_below)))
             continue;
-        const struct lobe_value r = value_of(l, lobe, s, wi, up ? above : below, turns);
-        if (lobe->kind == TRC_LOBE_REFLECT)
+        const vmask side = hair ? active : up ? above : below;
+        const struct lobe_value r = value_of(l, lobe, s, wi, side, rare);
+        if (lobe->kind == TRC_LOBE_REFLECT || (rare && lobe->kind == TRC_LOBE_HAIR_REFLECT))
             out->glossy = v3_add(out->glossy, r.value);
-        else if (lobe->kind == TRC_LOBE_REFRACT)
+        else if (lobe->kind == TRC_LOBE_REFRACT || (rare && lobe->kind == TRC_LOBE_HAIR_TRANSMIT))
             out->transmission = v3_add(out->transmission, r.value);
         else
             out->diffuse = v3_add(out->diffuse, r.value);
@@ -72,23 +78,34 @@ TRC_INLINE void sum_lobes(const struct trc_lobes *l, const struct trc_surface *s
     out->pdf = vf_divide(out->pdf, l->continue_weight);
 }
 
-static __attribute__((noinline)) void sum_turned(const struct trc_lobes *l,
-                                                 const struct trc_surface *s, vvec3 wi,
-                                                 vmask active, struct trc_bsdf_value *out) {
+static __attribute__((noinline)) void sum_rare(const struct trc_lobes *l,
+                                               const struct trc_surface *s, vvec3 wi, vmask active,
+                                               struct trc_bsdf_value *out) {
     sum_lobes(l, s, wi, active, true, out);
 }
 
 void trc_bsdf_eval(const struct trc_lobes *l, const struct trc_surface *s, vvec3 wi, vmask active,
                    struct trc_bsdf_value *out) {
-    if (l->turns)
-        sum_turned(l, s, wi, active, out);
+    if (l->rare)
+        sum_rare(l, s, wi, active, out);
     else
         sum_lobes(l, s, wi, active, false, out);
 }
 
-/* Sums over the lobes for a sampled rough direction; turns: as above. */
+/* Of a lobe of hair, in lanes that it was chosen in. */
+static void take_sampled(const struct trc_lobe *lobe, const struct trc_surface *s, vvec3 wi,
+                         vmask lanes, struct lobe_value *r) {
+    const struct lobe_value own = lobe->model->sampled(lobe, s, wi);
+    r->value = v3_select(lanes, own.value, r->value);
+    r->pdf = vf_select(lanes, own.pdf, r->pdf);
+    r->pick = vf_select(lanes, own.pick, r->pick);
+    r->claim = vf_select(lanes, own.claim, r->claim);
+}
+
+/* Sums over the lobes for a sampled rough direction; chosen: the number of the lobe, read if rare,
+ * which is as above. */
 TRC_INLINE void weigh_direction(const struct trc_lobes *l, const struct trc_surface *s,
-                                vmask active, bool turns, struct trc_bsdf_sample *out) {
+                                vmask active, vint chosen, bool rare, struct trc_bsdf_sample *out) {
     vmask above, below;
     sides(l, s, out->wi, active, &above, &below);
     const bool any_above = vm_any(above), any_below = vm_any(below);
@@ -97,9 +114,13 @@ TRC_INLINE void weigh_direction(const struct trc_lobes *l, const struct trc_surf
     for (int i = 0; i < l->count; i++) {
         const struct trc_lobe *lobe = &l->lobe[i];
         const bool up = is_reflection(lobe->kind);
-        if (lobe->kind == TRC_LOBE_TRANSPARENT || !(up ? any_above : any_below))
+        const bool hair = rare && is_hair(lobe->kind);
+        if (lobe->kind == TRC_LOBE_TRANSPARENT || (!hair && !(up ? any_above : any_below)))
             continue;
-        const struct lobe_value r = value_of(l, lobe, s, out->wi, up ? above : below, turns);
+        const vmask side = hair ? active : up ? above : below;
+        struct lobe_value r = value_of(l, lobe, s, out->wi, side, rare);
+        if (hair && lobe->model->sampled)
+            take_sampled(lobe, s, out->wi, vm_and(active, vi_eq(chosen, vi_set(i))), &r);
         value = v3_add(value, r.value);
         pdf = pdf + r.pdf * lobe->sample_weight;
         claimed = claimed + r.claim * lobe->mix_weight;
@@ -112,12 +133,6 @@ TRC_INLINE void weigh_direction(const struct trc_lobes *l, const struct trc_surf
     out->weight = v3_select(active, v3_where(lit, v3_scale(value, vf_rcp(pdf))), out->weight);
     out->indirect_scale = vf_select(lit, vf_divide(picked, claimed), out->indirect_scale);
     out->valid = vm_or(vm_andnot(out->valid, active), vm_and(lit, vf_gt(v3_max(value), vf_zero())));
-}
-
-static __attribute__((noinline)) void weigh_turned(const struct trc_lobes *l,
-                                                   const struct trc_surface *s, vmask active,
-                                                   struct trc_bsdf_sample *out) {
-    weigh_direction(l, s, active, true, out);
 }
 
 /* ---- sampling ---- */
@@ -163,7 +178,7 @@ static void take_ideal(const struct trc_lobes *l, const struct trc_lobe *lobe,
         out->transparent = vm_or(out->transparent, m);
     else
         wi = ideal_direction(lobe, s, &weight);
-    if (l->turns && lobe->kind == TRC_LOBE_REFLECT)
+    if ((l->rare & TRC_LOBES_TURN) && lobe->kind == TRC_LOBE_REFLECT)
         weight = v3_scale(weight, turned_share(l, lobe->n, wi));
     if (lobe->model->is_portal) {
         wi = lobe->f90;
@@ -177,9 +192,10 @@ static void take_ideal(const struct trc_lobes *l, const struct trc_lobe *lobe,
     out->valid = vm_or(out->valid, vm_and(m, vf_gt(v3_max(weight), vf_zero())));
 }
 
-void trc_bsdf_sample(const struct trc_lobes *l, const struct trc_surface *s, vfloat u_lobe,
-                     vfloat u1, vfloat u2, struct trc_bsdf_sample *out) {
+TRC_INLINE void sample_lobes(const struct trc_lobes *l, const struct trc_surface *s, vfloat u_lobe,
+                             vfloat u1, vfloat u2, bool rare, struct trc_bsdf_sample *out) {
     clear_sample(out);
+    vint chosen = vi_set(-1);
     vmask waiting = vm_and(s->active, vf_gt(l->continue_weight, vf_zero()));
     vmask rough = vm_none();
     vfloat rest = u_lobe * l->continue_weight;
@@ -217,15 +233,29 @@ void trc_bsdf_sample(const struct trc_lobes *l, const struct trc_surface *s, vfl
             sides(l, s, wi, alive, &above, &below);
             out->wi = v3_select(spread, wi, out->wi);
             out->transmitted = vm_or(out->transmitted, crosses);
-            rough = vm_or(rough, vm_select(crosses, below, above));
+            const bool hair = rare && is_hair(lobe->kind);
+            rough = vm_or(rough, hair ? alive : vm_select(crosses, below, above));
+            if (hair)
+                chosen = vi_select(spread, vi_set(i), chosen);
         }
     }
-    if (!vm_any(rough))
-        return;
-    if (l->turns)
-        weigh_turned(l, s, rough, out);
+    if (vm_any(rough))
+        weigh_direction(l, s, rough, chosen, rare, out);
+}
+
+static __attribute__((noinline)) void sample_rare(const struct trc_lobes *l,
+                                                  const struct trc_surface *s, vfloat u_lobe,
+                                                  vfloat u1, vfloat u2,
+                                                  struct trc_bsdf_sample *out) {
+    sample_lobes(l, s, u_lobe, u1, u2, true, out);
+}
+
+void trc_bsdf_sample(const struct trc_lobes *l, const struct trc_surface *s, vfloat u_lobe,
+                     vfloat u1, vfloat u2, struct trc_bsdf_sample *out) {
+    if (l->rare)
+        sample_rare(l, s, u_lobe, u1, u2, out);
     else
-        weigh_direction(l, s, rough, false, out);
+        sample_lobes(l, s, u_lobe, u1, u2, false, out);
 }
 
 void trc_bsdf_ideal(const struct trc_lobes *l, int i, const struct trc_surface *s,
@@ -260,7 +290,11 @@ void trc_bsdf_albedo(const struct trc_lobes *l, const struct trc_surface *s, vve
         const struct trc_lobe *lobe = &l->lobe[i];
         if (lobe->kind == TRC_LOBE_TRANSPARENT)
             continue;
-        const int k = lobe->kind == TRC_LOBE_REFLECT ? 1 : lobe->kind == TRC_LOBE_REFRACT ? 2 : 0;
+        static const int pass_of[] = {[TRC_LOBE_REFLECT] = 1,
+                                      [TRC_LOBE_REFRACT] = 2,
+                                      [TRC_LOBE_HAIR_REFLECT] = 1,
+                                      [TRC_LOBE_HAIR_TRANSMIT] = 2};
+        const int k = pass_of[lobe->kind];
         vvec3 albedo = v3_scale(lobe->weight, lobe->albedo_scale);
         if (lobe->correlated)
             albedo = v3_mul(albedo, mean_reflectance(lobe));
@@ -276,7 +310,7 @@ vfloat trc_lobe_alpha(const struct trc_lobe *lobe) {
 
 vvec3 trc_lobe_albedo(const struct trc_lobe *lobe, vvec3 wo) {
     const vvec3 albedo = v3_scale(lobe->weight, lobe->albedo_scale);
-    if (lobe->kind != TRC_LOBE_REFLECT && lobe->kind != TRC_LOBE_REFRACT)
+    if (lobe->kind == TRC_LOBE_DIFFUSE || lobe->kind == TRC_LOBE_TRANSLUCENT)
         return albedo;
     return v3_mul(albedo, facet_fresnel(lobe, v3_dot(lobe->n, wo)));
 }

@@ -17,7 +17,10 @@ enum trc_lobe_kind {
     TRC_LOBE_TRANSLUCENT, /* counts as diffuse in passes and for light visibility, as in Cycles */
     TRC_LOBE_REFLECT,     /* microfacet reflection or ideal mirror */
     TRC_LOBE_REFRACT,     /* microfacet refraction or ideal */
-    TRC_LOBE_TRANSPARENT  /* straight through, or through a portal: the same path */
+    TRC_LOBE_TRANSPARENT, /* straight through, or through a portal: the same path */
+    /* Of fibres, from and to all around, in the passes of reflection and of transmission. */
+    TRC_LOBE_HAIR_REFLECT,
+    TRC_LOBE_HAIR_TRANSMIT
 };
 
 /* trc_lobe.distribution, of microfacets. MULTI_GGX: GGX with height-correlated masking and the
@@ -59,7 +62,7 @@ struct trc_lobe {
     /* Toon, f0: angle of full light, angle of its fading, cosine of both. Fibres, f0: the two
      * coefficients of their transform. Oren-Nayar that keeps energy, f0: factor of the part that
      * scatters more than once. Portals: where the ray goes on, and its
-     * direction. */
+     * direction. Fibres: kernels/lobe/hair.c and principled_hair.c. */
     vvec3 f0, f90;
     vfloat cos_o;         /* n . wo */
     vfloat g1_o;          /* masking of wo */
@@ -74,6 +77,12 @@ struct trc_lobe {
     vfloat sample_weight; /* chance in proportion, 0 for lobes that are not continued */
 };
 
+/* trc_lobes.rare */
+enum {
+    TRC_LOBES_TURN = 1 << 0, /* a shading offset: see turn */
+    TRC_LOBES_HAIR = 1 << 1  /* there are TRC_LOBE_HAIR_* */
+};
+
 struct trc_lobes {
     int count;
     struct trc_lobe lobe[TRC_MAX_LOBES];
@@ -85,8 +94,8 @@ struct trc_lobes {
      * trc_lobes_setup sets none: nothing shines through. Direct light sets it for smooth surfaces,
      * as its shadow rays start off the flat triangle. */
     vmask below_horizon;
-    /* Factor on the angle of light to the normals of reflecting lobes, where turns; likewise. */
-    bool turns;
+    uint32_t rare; /* TRC_LOBES_*, all that takes paths of their own */
+    /* TRC_LOBES_TURN: factor on the angle of light to the normals of reflecting lobes; likewise. */
     vfloat turn;
     /* Product of alphas up to which refraction counts as clear, < 0: none does; likewise. */
     float clear_alpha2;

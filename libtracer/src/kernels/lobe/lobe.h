@@ -31,6 +31,9 @@ struct trc_lobe_model {
     bool is_portal;
     /* Towards wi; lanes of the wrong side are dropped by the caller. NULL: straight through. */
     struct lobe_value (*value)(const struct trc_lobe *lobe, const struct trc_surface *s, vvec3 wi);
+    /* Of hair: the same of a direction that this lobe has sampled. NULL: no other. */
+    struct lobe_value (*sampled)(const struct trc_lobe *lobe, const struct trc_surface *s,
+                                 vvec3 wi);
     /* A direction of the lobe's density, of those that rays are continued for and that are not
      * always ideal. chosen_at, evenly below its sample_weight, decides between paired lobes. Lanes
      * leave *alive where total reflection leaves none, or where it is on the wrong side: other
@@ -105,6 +108,8 @@ struct trc_lobe *trc_add_lobe(struct trc_setup *c, const struct trc_lobe_model *
 
 /* The normal of an input, turned so that the mirror direction is above the surface. */
 vvec3 trc_leaf_normal(struct trc_setup *c, const struct trc_leaf *leaf, uint32_t at);
+/* The same of an input that is not linked. */
+vvec3 trc_default_normal(struct trc_setup *c);
 
 /* The tangent of an anisotropic leaf, turned about n by rotation (in turns), then orthogonal to n.
  */

@@ -11,6 +11,10 @@
 vvec3 trc_leaf_normal(struct trc_setup *c, const struct trc_leaf *leaf, uint32_t at) {
     if (!is_unlinked(c, leaf, at))
         return valid_normal(c->s, colour(c, leaf, at));
+    return trc_default_normal(c);
+}
+
+vvec3 trc_default_normal(struct trc_setup *c) {
     if (!c->has_default_n) {
         c->default_n = valid_normal(c->s, c->s->n);
         c->has_default_n = true;
@@ -100,8 +104,8 @@ void trc_lobes_setup(const struct trc_material *m, const struct trc_surface *s,
     out->emission = v3_zero();
     out->holdout = vf_zero();
     out->below_horizon = vm_none();
-    out->turns = false;
     out->clear_alpha2 = -1.0f;
+    out->rare = 0;
     for (uint32_t i = 0; i < m->leaf_count; i++) {
         const struct trc_leaf *leaf = &m->leaves[i];
         const vfloat weight = trc_operand_value(&leaf->weight, regs);

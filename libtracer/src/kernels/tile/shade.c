@@ -170,7 +170,7 @@ static void shade_group(struct trc_tile *t, uint32_t material, vint index, vmask
         trc_program_run(m, &s, &regs);
     trc_lobes_setup(m, &s, &regs, filter_alpha(t, &a), &lobes);
     if (t->snapshot->features & TRC_FEATURE_SHADOW_TERMINATORS) {
-        lobes.turns = true;
+        lobes.rare |= TRC_LOBES_TURN;
         lobes.turn = trc_instance_float(t->snapshot, s.instance,
                                         offsetof(struct trc_instance, terminator_turn), active);
     }

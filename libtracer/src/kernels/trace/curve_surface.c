@@ -95,6 +95,26 @@ static vvec3 normal_to_world(const struct space *m, vvec3 n) {
     return v3_scale(v3_normalize(sum), vf_copysign(vf_one(), m->determinant));
 }
 
+/* Along the smooth curve in object space, unit. */
+static vvec3 along_of(const struct raw_curve *raw, vfloat u) {
+    const vvec3 p0 = raw_vector(raw, RAW_AT(p)), p1 = raw_vector(raw, RAW_AT(p) + 3);
+    return v3_normalize(trc_between3(v3_sub(p1, raw_vector(raw, RAW_AT(before))),
+                                     v3_sub(raw_vector(raw, RAW_AT(after)), p0), u));
+}
+
+vvec3 trc_curve_along(const struct trc_surface *s, vmask lanes) {
+    struct raw_curve raw[TRC_WIDTH];
+    memset(raw, 0, sizeof raw);
+    for (uint32_t bits = vm_bits(lanes); bits; bits &= bits - 1) {
+        const int lane = __builtin_ctz(bits);
+        lane_load(s, lane, &raw[lane]);
+    }
+    struct space m;
+    space_load(raw, &m);
+    return v3_normalize(
+        trc_transform_vector(&m.to_world, along_of(raw, raw_column(raw, RAW_AT(u)))));
+}
+
 /* The normal of a ball from how far the ray passes its middle, across (kernels/trace/curve.h). */
 static vvec3 ball_normal(vvec3 d, vfloat x, vfloat y, vfloat front) {
     const vfloat ax = vf_abs(d.x), ay = vf_abs(d.y), az = vf_abs(d.z);
@@ -140,8 +160,7 @@ void trc_curve_fetch(struct trc_surface *s, vmask lanes) {
     const vfloat r0 = raw_column(raw, RAW_AT(r)), r1 = raw_column(raw, RAW_AT(r) + 1);
     const vvec3 middle = trc_between3(p0, p1, u);
     const vfloat radius = trc_between(r0, r1, u);
-    const vvec3 along = v3_normalize(trc_between3(v3_sub(p1, raw_vector(raw, RAW_AT(before))),
-                                                  v3_sub(raw_vector(raw, RAW_AT(after)), p0), u));
+    const vvec3 along = along_of(raw, u);
     const vvec3 d = direction_to_object(&m, v3_neg(s->wo));
     const vmask within = vf_ge(s->v, vf_set(0.5f * TRC_CURVE_WITHIN));
     const vfloat front = vf_select(within, vf_set(-1.0f), one);

@@ -11,4 +11,7 @@ vmask trc_curve_lanes(const struct trc_surface *s);
  * of, becomes 0: with u, barycentrics of the piece's ends. */
 void trc_curve_fetch(struct trc_surface *s, vmask lanes);
 
+/* Of a surface that was fetched, of those lanes: along the strand in the world, unit. */
+vvec3 trc_curve_along(const struct trc_surface *s, vmask lanes);
+
 #endif

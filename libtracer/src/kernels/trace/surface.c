@@ -239,6 +239,27 @@ void trc_triangle_fetch(struct trc_surface *s) {
     set_normals(s, &h, e1, e2);
 }
 
+void trc_surface_sides(const struct trc_surface *s, vvec3 *first, vvec3 *second) {
+    const vmask curves =
+        s->snapshot->features & TRC_FEATURE_CURVES ? trc_curve_lanes(s) : vm_none();
+    float corners[TRC_WIDTH][9] = {{0}};
+    for (uint32_t lanes = vm_bits(vm_andnot(s->active, curves)); lanes; lanes &= lanes - 1) {
+        const int lane = __builtin_ctz(lanes);
+        trc_world_corners_at(s->snapshot, (uint32_t)vi_get(s->instance, lane),
+                             (uint32_t)vi_get(s->triangle, lane), vf_get(s->time, lane),
+                             corners[lane]);
+    }
+    const struct trc_corners c = trc_corners_of(corners[0]);
+    vvec3 sides[2] = {v3_sub(c.corner[1], c.corner[0]), v3_sub(c.corner[2], c.corner[0])};
+    if (vm_any(curves)) {
+        const vvec3 along = trc_curve_along(s, curves);
+        for (int k = 0; k < 2; k++)
+            sides[k] = v3_select(curves, along, sides[k]);
+    }
+    *first = v3_select(s->backfacing, v3_neg(sides[0]), sides[0]);
+    *second = v3_select(s->backfacing, v3_neg(sides[1]), sides[1]);
+}
+
 void trc_mixed_fetch(struct trc_surface *s) {
     const vmask active = s->active, curves = trc_curve_lanes(s);
     s->active = vm_andnot(active, curves);

@@ -56,6 +56,11 @@ TRC_INLINE void trc_strand_words(const struct trc_surface *s, vuint out[2]) {
     out[1] = (vuint)s->strand;
 }
 
+/* Directions in which the first and the second coordinate of the surface grow, turned over where
+ * the ray came from the back, not unit: along strands (twice), of triangles the sides from the
+ * first corner. Of the active lanes. (kernels/trace/surface.c) */
+void trc_surface_sides(const struct trc_surface *s, vvec3 *first, vvec3 *second);
+
 /* trc_surface_fetch where there are curves, and where there are none. */
 void trc_mixed_fetch(struct trc_surface *s);
 void trc_triangle_fetch(struct trc_surface *s);
