@@ -4,7 +4,8 @@
 #
 # TRACER_TARGET is linux-x64, linux-arm64 or windows-x64. TRACER_SYSROOT, for Linux, is a folder with the
 # headers and libraries of a system that is old enough for glibc 2.28, Blender's own baseline; the compiler
-# is today's. Without it the compiler's own are taken, which do for tests (tests/cross.sh). Images come from Blender's libraries: nothing but the system's is linked.
+# is today's. Without it the compiler's own are taken, which do for tests (tests/cross.sh). Images come from
+# Blender's libraries: nothing but the system's is linked.
 list(APPEND CMAKE_TRY_COMPILE_PLATFORM_VARIABLES TRACER_TARGET TRACER_SYSROOT)
 if(TRACER_TARGET STREQUAL "windows-x64")
     set(CMAKE_SYSTEM_NAME Windows)

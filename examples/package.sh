@@ -101,7 +101,8 @@ package() {
 
 [ $# -gt 0 ] || set -- linux-x64
 for platform in "$@"; do
-    platforms | grep -q "^$platform " || die "unknown platform: $platform; there are $(platforms | cut -d ' ' -f 1 | xargs)"
+    platforms | grep -q "^$platform " ||
+        die "unknown platform: $platform; there are $(platforms | cut -d ' ' -f 1 | xargs)"
 done
 rm -rf "$out"
 for platform in "$@"; do

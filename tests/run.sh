@@ -5,9 +5,9 @@
 #
 # FILE holds further results to count, one per line: "passed NAME" or "failed NAME". --blender-next runs
 # the Blender tests in Blender 4.3 and 5.2 too, --blender-next-fast a selection of them (see
-# blender_next.sh); where one of the two cannot be set up, it is one test skipped. What tests measured of numerical stability is in
-# build/results/stability.md. The exit code is 0 only if something passed and
-# nothing failed. Python tests find the build through these variables:
+# blender_next.sh); where one of the two cannot be set up, it is one test skipped. What tests measured of
+# numerical stability is in build/results/stability.md. The exit code is 0 only if something passed and nothing
+# failed. Python tests find the build through these variables:
 #   VOLLEY_BUILD          the build folder
 #   BLENDER_USER_SCRIPTS  the folder that makes Blender find the add-on
 # tests/support is on their import path.

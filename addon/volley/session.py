@@ -90,8 +90,9 @@ class Session:
                     view_layer.name, view_name, entries)
                 folder = "" if engine.is_preview else job.job().parts_folder
                 if folder and progress.state == abi.ProgressState.DONE:
+                    manifests = cryptomatte.manifests(view_layer, self._sync.cryptomatte_names())
                     parts.write(folder, scene, render, entries, settings, view_layer.name, view_name,
-                                self._sync.scene.content(), cryptomatte.manifests(view_layer, self._sync.cryptomatte_names()))
+                                self._sync.scene.content(), manifests)
             finally:
                 render.destroy()
         cryptomatte.write_manifests(engine, view_layer, self._sync.cryptomatte_names())

@@ -51,8 +51,8 @@ def inside_panels():
     found = {"no mist": shading.VOLLEY_WORLD_PT_mist.poll(context)}
     bpy.context.view_layer.use_pass_mist = True
     found["mist"] = shading.VOLLEY_WORLD_PT_mist.poll(context)
-    for panel in (shading.VOLLEY_WORLD_PT_mist, shading.VOLLEY_LIGHT_PT_nodes, render.VOLLEY_RENDER_PT_simplify_viewport,
-                  render.VOLLEY_RENDER_PT_simplify_render):
+    for panel in (shading.VOLLEY_WORLD_PT_mist, shading.VOLLEY_LIGHT_PT_nodes,
+                  render.VOLLEY_RENDER_PT_simplify_viewport, render.VOLLEY_RENDER_PT_simplify_render):
         found[panel.__name__] = drawing.draw(panel, context).properties
     return found
 

@@ -132,7 +132,8 @@ def build(out):
     tree.make(out / "tree")
     with open(out / "build.log", "w") as log:
         for command in (["cmake", "-G", "Ninja", "-C", out / "tree/.cmake/ci.cmake",
-                         "-DTRACER_WERROR=OFF", "-S", out / "tree", "-B", out / "build"], ["nice", "cmake", "--build", out / "build"]):
+                         "-DTRACER_WERROR=OFF", "-S", out / "tree", "-B", out / "build"],
+                        ["nice", "cmake", "--build", out / "build"]):
             if subprocess.run(command, stdout=log, stderr=subprocess.STDOUT).returncode:
                 sys.exit(f"the copy cannot be built: see {out / 'build.log'}")
 

@@ -4,7 +4,8 @@
     python3 tests/support/image_corpus.py [--fuzz] FOLDER
 
 With --fuzz the files are inputs of tests/fuzz/fuzz_image.c. ``make`` writes the files: those of formats that
-OpenImageIO writes by it, those of the others byte by byte. ``damage`` spoils one by a random generator: the same seed, the same file.
+OpenImageIO writes by it, those of the others byte by byte. ``damage`` spoils one by a random generator: the same
+seed, the same file.
 """
 
 import os

@@ -12,7 +12,8 @@ import scenes
 
 GRID = 20     # balls along each side of a picture
 BALL_PX = 10  # pixels along each side of a ball's cell
-TOLERANCE = 0.02  # of a pixel, relative where the value is above 0.5: textures are steep, and samples lie 1e-2 pixels apart
+# Of a pixel, relative where the value is above 0.5: textures are steep, and samples lie 1e-2 pixels apart.
+TOLERANCE = 0.02
 _PER_PICTURE = GRID * GRID
 _CONSTANT_BALLS = 0.48  # radius over the size of a cell
 
