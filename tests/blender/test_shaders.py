@@ -29,7 +29,7 @@ _MULTIPLE = "light that scatters more than once comes from a table here, from ra
 _SHEEN = "Cycles' fit, at the outline"
 _COAT = "Cycles 3.4 samples its coat by GGX but weighs the samples as GTR1; by lamps alone both agree"
 _TILT = "Cycles 3.4 tilts samples and what weighs them by angles that are not each other's"
-_BEHIND = "light from behind, which Cycles 4 samples no lamps for, and 3.4 does"
+_AROUND = "not understood: reflections all around fibres, as far as on faces"
 KNOWN = {
     "glossy roughness 0.8 distribution ASHIKHMIN_SHIRLEY":
         (0.02, 0.035, "Cycles keeps rays that go below the faces at the outline; inside it both agree"),
@@ -38,19 +38,22 @@ KNOWN = {
     "glass roughness 0.5 ior 2.2 distribution BECKMANN":
         (0.04, 0.12, "not understood: light that is caught inside for long"),
     "glass roughness 0.5 ior 1.1 distribution GGX": (0.01, 0.02, "not understood"),
-    "principled hair roughness 0.4 radial roughness 0.2 parametrization COLOR":
-        (0.01, 0.05, "Cycles 3.4 alone, not understood"),
-    "principled hair absorption coefficient (0.0, 0.0, 0.0) parametrization ABSORPTION":
-        (0.01, 0.025, "Cycles 3.4 alone, not understood"),
-    **{f"{what}principled hair coat {coat} ior {ior} parametrization COLOR": (0.03, 0.1, _TILT)
-       for what in ("", "strands of ") for coat in (0.0, 0.8) for ior in (1.2, 1.8)},
-    **{f"{what}hair roughnessu {u} roughnessv 1.0 offset {offset}": (0.045, 0.1, _BEHIND)
-       for what in ("", "strands of ") for u in (0.1, 0.4) for offset in (0.0, 0.3)},
     "sheen roughness 0.5": (0.01, 0.02, _SHEEN),
     "sheen roughness 1.0": (0.01, 0.02, _SHEEN),
     "principled clearcoat roughness 0.03": (0.015, 0.03, _COAT),
     "principled clearcoat roughness 0.5": (0.01, 0.015, _COAT),
 }
+# Those of some Blenders alone.
+KNOWN_BEFORE_4 = {
+    "principled hair roughness 0.4 radial roughness 0.2 parametrization COLOR": (0.01, 0.05, "not understood"),
+    "principled hair absorption coefficient (0.0, 0.0, 0.0) parametrization ABSORPTION":
+        (0.01, 0.025, "not understood"),
+    **{f"{what}principled hair coat {coat} ior {ior} parametrization COLOR": (0.03, 0.1, _TILT)
+       for what in ("", "strands of ") for coat in (0.0, 0.8) for ior in (1.2, 1.8)},
+}
+KNOWN_FROM_4 = {
+    f"{what}hair roughnessu {u} roughnessv 1.0 offset {offset}": (0.045, 0.1, _AROUND)
+    for what in ("", "strands of ") for u in (0.1, 0.4) for offset in (0.0, 0.3)}
 
 
 def _add(kind, node, inputs=None, settings=None, **varied):
@@ -193,9 +196,8 @@ def inside_balls():
 
 def _known(name):
     """The limits of a case, largest mean and tile, and why they are not the usual ones."""
-    if blender_support.version() >= (5, 0) and name.startswith("principled hair"):
-        return 0.075, 0.2, "on faces, beside Cycles 5 alone, not understood; strands agree"
-    return KNOWN.get(name, (TOLERANCE, TOLERANCE, ""))
+    of_version = KNOWN_BEFORE_4 if blender_support.version() < (4, 0) else KNOWN_FROM_4
+    return of_version.get(name) or KNOWN.get(name, (TOLERANCE, TOLERANCE, ""))
 
 
 # Comparison ----------------------------------------------------------------------------------------

@@ -401,7 +401,8 @@ enum trc_material_flags {
      * time in nine or so (Cycles 3.4). What Cycles loses with diffuse bounces 0 depends on it. */
     TRC_MATERIAL_PLAIN_CHOICE = 4,
     /* Diffuse lobes whose normals are bent lie in shadow as microfacets do (Cycles 5), which is
-     * darker towards the terminator; else as Cycles 3.4 and 4 have it. */
+     * darker towards the terminator, and Principled Hair on faces takes light samples from a part
+     * of all sides; else as Cycles 3.4 and 4 have it. */
     TRC_MATERIAL_FACET_SHADOWING = 8
 };
 

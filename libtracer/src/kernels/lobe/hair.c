@@ -148,10 +148,7 @@ static void add_hair(struct trc_setup *c, const struct trc_leaf *leaf, vfloat we
     if (is_unlinked(c, leaf, TRC_AT(HAIR, tangent))) {
         vvec3 first;
         trc_surface_sides(s, &first, &tangent);
-        if (!(s->snapshot->features & TRC_FEATURE_CURVES))
-            lobe->roughness = vf_zero();
-        else
-            lobe->roughness = vf_where(vm_not(vi_lt(s->strand, vi_set(0))), lobe->roughness);
+        lobe->roughness = vf_where(trc_on_strand(s), lobe->roughness);
     } else {
         tangent = colour(c, leaf, TRC_AT(HAIR, tangent));
     }

@@ -21,6 +21,12 @@ enum { PATH_R, PATH_TT, PATH_TRT, PATH_REST, PATH_COUNT };
 /* Roughnesses are at least this (Cycles). */
 #define MIN_ROUGHNESS 1e-3f
 #define MIN_IOR 1e-5f
+/* What melanin leaves of 1 is at least this: its concentration is finite (Cycles). */
+#define MIN_LEFT 1e-4f
+/* Of random numbers whose logarithm is taken (Cycles). */
+#define MIN_RANDOM 1e-5f
+/* sqrt(pi / 8): of a normal distribution's width, that of the logistic one that is like it. */
+#define SQRT_PI_8 0.626657069f
 /* Albedos of whose paths inside all is kept would be infinite. */
 #define MAX_KEPT 0.99999f
 
@@ -148,6 +154,21 @@ static struct lobe_value value(const struct trc_lobe *lobe, const struct trc_sur
     return (struct lobe_value){v3_mul(lobe->weight, sum), pdf, pdf, pdf};
 }
 
+/* What light samples get in Cycles 5: on faces nothing where the face's normal and the one across
+ * the strand and wo, which it takes for the lobe's own, disagree on the side. */
+static struct lobe_value sided_value(const struct trc_lobe *lobe, const struct trc_surface *s,
+                                     vvec3 wi) {
+    struct lobe_value r = value(lobe, s, wi);
+    const vvec3 across = v3_cross(lobe->tangent, s->wo);
+    const vfloat agreement = v3_dot(s->n, wi) * v3_dot(s->n, across) * v3_dot(across, wi);
+    const vmask lit = vm_or(vf_ge(agreement, vf_zero()), trc_on_strand(s));
+    r.value = v3_where(lit, r.value);
+    r.pdf = vf_where(lit, r.pdf);
+    r.pick = vf_where(lit, r.pick);
+    r.claim = vf_where(lit, r.claim);
+    return r;
+}
+
 static vvec3 direction(const struct trc_lobe *lobe, const struct trc_surface *s, vfloat u1,
                        vfloat u2, vfloat chosen_at, vmask *alive, vmask *crosses) {
     struct fibre f;
@@ -178,7 +199,7 @@ static vvec3 direction(const struct trc_lobe *lobe, const struct trc_surface *s,
     }
     /* 1 less the cosine of how far it is off, along the strand and around an axis of it. */
     const vfloat tail = vf_exp(vf_set(-2.0f) / v);
-    u = vf_clamp(u, 1e-5f, 1.0f);
+    u = vf_clamp(u, MIN_RANDOM, 1.0f);
     const vfloat off = vf_clamp(-v * vf_log(u + (one - u) * tail), 0.0f, 2.0f);
     vfloat unused, cosine;
     vf_sincos_turns(u2, &unused, &cosine);
@@ -211,11 +232,10 @@ static vfloat variance_of(vfloat roughness) {
     return vf_square(vf_set(0.726f) * r + vf_set(0.812f) * r * r + vf_set(3.7f) * power_20(r));
 }
 
-/* Equation 8: the scale around it; sqrt(pi / 8) makes a logistic distribution's of a normal one's.
- */
+/* Equation 8: the scale around it. */
 static vfloat scale_of(vfloat roughness) {
     const vfloat r = roughness, r2 = r * r;
-    return vf_set(0.626657069f) *
+    return vf_set(SQRT_PI_8) *
            (vf_set(0.265f) * r + vf_set(1.194f) * r2 + vf_set(5.372f) * power_20(r) * r2);
 }
 
@@ -231,15 +251,13 @@ static vfloat albedo_scale(vfloat roughness) {
 static vfloat absorbed(vfloat color, vfloat scale) {
     return vf_square(vf_log(vf_max(color, vf_zero())) / scale);
 }
+
 static vvec3 absorption_of_color(vvec3 color, vfloat roughness) {
     const vfloat scale = albedo_scale(roughness);
     return v3(absorbed(color.x, scale), absorbed(color.y, scale), absorbed(color.z, scale));
 }
 
-/* Absorption by melanin: E. d'Eon et al. 2011, with B. Bitterli's ratio of both kinds; random is
- * what the concentration is scaled by. Least that is left of 1: the most of it is finite (Cycles).
- */
-#define MIN_LEFT 1e-4f
+/* Absorption by melanin, 0 to 1: E. d'Eon et al. 2011, with B. Bitterli's ratio of both kinds. */
 static vvec3 absorption_of_melanin(vfloat melanin, vfloat redness) {
     static const float eumelanin[3] = {0.506f, 0.841f, 1.653f};
     static const float pheomelanin[3] = {0.343f, 0.733f, 1.924f};
@@ -264,7 +282,12 @@ static vvec3 absorption_of(const struct trc_setup *c, const struct trc_leaf *lea
 static void add_principled_hair(struct trc_setup *c, const struct trc_leaf *leaf, vfloat weight) {
     static const struct trc_lobe_model model = {
         .kind = TRC_LOBE_HAIR_REFLECT, .value = value, .direction = direction};
-    struct trc_lobe *lobe = trc_add_lobe(c, &model, v3_splat(weight));
+    static const struct trc_lobe_model sided = {.kind = TRC_LOBE_HAIR_REFLECT,
+                                                .value = sided_value,
+                                                .sampled = value,
+                                                .direction = direction};
+    const bool is_sided = c->material->flags & TRC_MATERIAL_FACET_SHADOWING;
+    struct trc_lobe *lobe = trc_add_lobe(c, is_sided ? &sided : &model, v3_splat(weight));
     if (!lobe)
         return;
     const struct trc_surface *s = c->s;
@@ -277,8 +300,7 @@ static void add_principled_hair(struct trc_setup *c, const struct trc_leaf *leaf
         trc_surface_sides(s, &along, &second);
     lobe->tangent = v3_normalize(along);
 
-    /* -1 to 1. */
-    const vfloat randomness = vf_set(2.0f) * NUMBER(random) - one;
+    const vfloat randomness = vf_set(2.0f) * NUMBER(random) - one; /* -1 to 1 */
     const vfloat factor = one + randomness * NUMBER(random_roughness);
     const vfloat radial = NUMBER(radial_roughness) * factor;
     const vfloat rough = vf_clamp(NUMBER(roughness) * factor, MIN_ROUGHNESS, 1.0f);

@@ -172,10 +172,10 @@ TRC_INLINE vfloat height_below(vfloat da, vfloat db, vfloat wa, vfloat wb) {
 }
 
 /* How high the curved surface that the normals describe lies above the triangle, in lengths of n,
- * as in Cycles: the lowest of the planes at the corners (J. Hanika, "Hacking the Shadow
- * Terminator", Ray Tracing Gems II, 2021), or where that is lower half of the parabolas along the
- * edges, whose heights are wa wb (na - nb) . (pa - pb). Object space; e1 and e2 change their sign
- * with the side. */
+ * as in Cycles: as high as the lowest of the planes at the corners (J. Hanika, "Hacking the Shadow
+ * Terminator", Ray Tracing Gems II, 2021), but at least as half of the sum of the parabolas along
+ * the edges, whose heights are wa wb (na - nb) . (pa - pb). Object space; e1 and e2 change their
+ * sign with the side. */
 static vfloat bulge_of(const struct trc_surface *s, const struct raw_hit *h, vvec3 e1, vvec3 e2) {
     const vvec3 *c = h->n.corner;
     const vvec3 e3 = v3_sub(e2, e1);

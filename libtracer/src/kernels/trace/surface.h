@@ -61,6 +61,13 @@ TRC_INLINE void trc_strand_words(const struct trc_surface *s, vuint out[2]) {
  * first corner. Of the active lanes. (kernels/trace/surface.c) */
 void trc_surface_sides(const struct trc_surface *s, vvec3 *first, vvec3 *second);
 
+/* Lanes whose surface is a strand's. */
+TRC_INLINE vmask trc_on_strand(const struct trc_surface *s) {
+    if (!(s->snapshot->features & TRC_FEATURE_CURVES))
+        return vm_none();
+    return vm_not(vi_lt(s->strand, vi_set(0)));
+}
+
 /* trc_surface_fetch where there are curves, and where there are none. */
 void trc_mixed_fetch(struct trc_surface *s);
 void trc_triangle_fetch(struct trc_surface *s);
