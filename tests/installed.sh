@@ -14,7 +14,8 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 source tests/debian.sh
 
 out=build/installed
-USER_FOLDERS=(opt/volley root/.config opt/tree) # in the Debian: files to open, preferences, the built tree
+# In the Debian: files that are opened and made, the built tree, preferences.
+FILES=/opt/volley TREE=/opt/tree PREFERENCES=/root/.config
 
 die() { printf 'installed: %s\n' "$*" >&2; exit 1; }
 skip() { die "$NAME: $*"; }
@@ -50,16 +51,16 @@ check_is_bare() {
 # Installs the package that is right for this Blender: as a user would, or by the operators that a click calls.
 install_addon() {
     if [ "$SUITE" = bookworm ]; then
-        cp build/packages/legacy/*-linux-x64-legacy.zip "$ROOT/opt/volley/package.zip"
+        cp build/packages/legacy/*-linux-x64-legacy.zip "$ROOT$FILES/package.zip"
         blender_there --python-exit-code 1 --python-expr "import bpy
-bpy.ops.preferences.addon_install(filepath='/opt/volley/package.zip')
+bpy.ops.preferences.addon_install(filepath='$FILES/package.zip')
 bpy.ops.preferences.addon_enable(module='volley')
 bpy.ops.wm.save_userpref()"
         MODULE=volley
     else
-        cp build/packages/*-linux-x64.zip "$ROOT/opt/volley/package.zip"
-        inside blender --command extension validate /opt/volley/package.zip
-        inside blender --command extension install-file --repo user_default --enable /opt/volley/package.zip
+        cp build/packages/*-linux-x64.zip "$ROOT$FILES/package.zip"
+        inside blender --command extension validate "$FILES/package.zip"
+        inside blender --command extension install-file --repo user_default --enable "$FILES/package.zip"
         MODULE=bl_ext.user_default.volley
     fi
 }
@@ -68,18 +69,18 @@ bpy.ops.wm.save_userpref()"
 # differ in a last digit between two starts.
 render() {
     local module=$1 picture=$2
-    blender_there -t 1 --python-exit-code 1 --addons "$module" /opt/volley/character.blend -E VOLLEY \
-        -o "/opt/volley/$picture" -F OPEN_EXR -f 1
-    [ -s "$ROOT/opt/volley/${picture}0001.exr" ] || die "$NAME: no picture"
+    blender_there -t 1 --python-exit-code 1 --addons "$module" "$FILES/character.blend" -E VOLLEY \
+        -o "$FILES/$picture" -F OPEN_EXR -f 1
+    [ -s "$ROOT$FILES/${picture}0001.exr" ] || die "$NAME: no picture"
 }
 
 render_with_tree() {
-    mkdir -p "$ROOT/opt/tree"
-    cp -r build/blender/. "$ROOT/opt/tree"
+    mkdir -p "$ROOT$TREE"
+    cp -r build/blender/. "$ROOT$TREE"
     (
         inside() {
-            in_private chroot "$ROOT" env -i PATH=/usr/bin:/bin HOME=/root/.config/tree LC_ALL=C.UTF-8 \
-                BLENDER_USER_SCRIPTS=/opt/tree "$@" </dev/null
+            in_private chroot "$ROOT" env -i PATH=/usr/bin:/bin HOME="$PREFERENCES/tree" LC_ALL=C.UTF-8 \
+                BLENDER_USER_SCRIPTS="$TREE" "$@" </dev/null
         }
         render volley tree_
     )
@@ -89,9 +90,9 @@ compare() {
     blender_there --factory-startup --python-exit-code 1 --python-expr "import bpy
 pictures = []
 for name in 'package_0001', 'tree_0001':
-    image = bpy.data.images.load(f'/opt/volley/{name}.exr')
+    image = bpy.data.images.load(f'$FILES/{name}.exr')
     pictures.append(image.pixels[:])
-    image.save_render(f'/opt/volley/{name}.png')
+    image.save_render(f'$FILES/{name}.png')
 package, tree = pictures
 different = sum(a != b for a, b in zip(package, tree, strict=True))
 print('values', len(tree), 'mean', sum(tree) / len(tree), 'different', different)
@@ -104,18 +105,18 @@ try() {
     choose_suite "$1"
     make_root
     install_packages
-    for folder in "${USER_FOLDERS[@]}"; do
-        rm -rf "${ROOT:?}/$folder"
+    for folder in "$FILES" "$TREE" "$PREFERENCES"; do
+        rm -rf "${ROOT:?}$folder"
     done
-    mkdir -p "$ROOT/opt/volley"
+    mkdir -p "$ROOT$FILES"
     check_is_bare
     say "$NAME: $(inside blender --version 2>/dev/null | head -n 1), without compilers or OpenImageIO for Python"
-    cp build/examples/character.blend "$ROOT/opt/volley"
+    cp build/examples/character.blend "$ROOT$FILES"
     install_addon
     render "$MODULE" package_
     render_with_tree
     compare
-    cp "$ROOT/opt/volley/package_0001.png" "$out/$SUITE.png"
+    cp "$ROOT$FILES/package_0001.png" "$out/$SUITE.png"
     say "$NAME: the same picture from the package and the built tree, $out/$SUITE.png"
 }
 
