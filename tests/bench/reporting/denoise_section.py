@@ -8,7 +8,7 @@ from .tables import digits, table, words
 
 PEER_SAMPLES = (64, 256)   # of Cycles' plain pictures
 MEASURES = ("rel_mse", "flip")
-MOST_RATIO = 1.05          # of an error with Denoise to that without it, by the project's goals
+MAX_RATIO = 1.05           # of an error with Denoise to that without it; what is above is marked
 
 
 def text(scenes):
@@ -55,4 +55,4 @@ def _time_rows(scenes):
 
 
 def _ratio(value):
-    return f"**{digits(value)}**" if value > MOST_RATIO else digits(value)
+    return f"**{digits(value)}**" if value > MAX_RATIO else digits(value)
