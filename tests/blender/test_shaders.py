@@ -18,6 +18,7 @@ NOISE = 0.02               # of means that no two seeds agree on
 SEEDS = (11, 12, 13, 14, 15, 16)
 SAMPLES = 96       # of each seed
 TOLERANCE = 0.01           # relative to the mean of the ball
+STRANDS_TILE = 0.02        # of a ball of strands: they cover a third of a part, which so has more noise
 
 STRANDS = "strands of "        # names of cases that begin so have them in the place of a ball
 
@@ -197,7 +198,8 @@ def inside_balls():
 def _known(name):
     """The limits of a case, largest mean and tile, and why they are not the usual ones."""
     of_version = KNOWN_BEFORE_4 if blender_support.version() < (4, 0) else KNOWN_FROM_4
-    return of_version.get(name) or KNOWN.get(name, (TOLERANCE, TOLERANCE, ""))
+    usual = (TOLERANCE, STRANDS_TILE if name.startswith(STRANDS) else TOLERANCE, "")
+    return of_version.get(name) or KNOWN.get(name, usual)
 
 
 # Comparison ----------------------------------------------------------------------------------------
