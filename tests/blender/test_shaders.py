@@ -51,6 +51,11 @@ KNOWN_BEFORE_4 = {
         (0.01, 0.025, "not understood"),
     **{f"{what}principled hair coat {coat} ior {ior} parametrization COLOR": (0.03, 0.1, _TILT)
        for what in ("", "strands of ") for coat in (0.0, 0.8) for ior in (1.2, 1.8)},
+    # These have the node's own Offset, two degrees.
+    **{f"{what}principled hair melanin redness {redness} random color {color} random roughness {roughness} "
+       "parametrization MELANIN": (0.01, 0.03, _TILT)
+       for what in ("", "strands of ") for redness in (0.2, 1.0) for color in (0.0, 0.9)
+       for roughness in (0.0, 0.8)},
 }
 KNOWN_FROM_4 = {
     f"{what}hair roughnessu {u} roughnessv 1.0 offset {offset}": (0.045, 0.1, _AROUND)
