@@ -13,8 +13,8 @@ import sys
 import time
 
 import compare_cycles
-from reporting import (blender_costs, curves, document, elsewhere, farm, frames, gate, kernels, machine, povray,
-                       readme, repeated, scope as scopes)
+from reporting import (blender_costs, curves, document, elsewhere, farm, frames, gate, hair, kernels, machine,
+                       povray, readme, repeated, scope as scopes)
 
 
 def parse_arguments(arguments):
@@ -50,6 +50,7 @@ PARTS = {
     "povray": lambda options: povray.measure(options, options.scope, options.out / "pictures"),
     "curves": lambda options: curves.measure(options, options.scope, options.out / "pictures"),
     "farm": lambda options: farm.measure(options, options.scope),
+    "hair": lambda options: hair.measure(options, options.scope, options.out / "pictures"),
     "curves_trixie": lambda options: elsewhere.measure(options.scope, "trixie", "curves"),
     "curves_sid": lambda options: elsewhere.measure(options.scope, "sid", "curves"),
     "kernels_sid": lambda options: elsewhere.measure(options.scope, "sid", "kernels"),

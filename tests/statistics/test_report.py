@@ -13,7 +13,7 @@ TESTS = pathlib.Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(TESTS / "support"), str(TESTS / "bench")]
 import flip  # noqa: E402  (the folders are on the path only now)
 from reporting import (curves, document, error_sections, estimates, frames, gate,  # noqa: E402
-                       machine, readme, repeated)
+                       hair, machine, readme, repeated)
 
 
 @pytest.mark.parametrize("module", ["flip", "error_time", "stability", "reporting.estimates", "reporting.frames",
@@ -131,6 +131,21 @@ def test_newer_blenders_have_their_own_figures():
     assert found["time at equal error, Blender 9.9"]["ball, volley sobol l1"][0] == pytest.approx(
         0.5, rel=0.08)
     assert "| ball |" in error_sections.equal_error_elsewhere(results["curves_sid"])
+
+
+def test_hair_that_cycles_renders_sooner_is_a_loss():
+    def engine(seconds, mse):
+        return {"seconds": [seconds] * 3, "mse": mse, "rel_mse": mse, "mean_ratios": [1.0]}
+    results = {"hair": {"fast": {"CYCLES": engine(6.0, 2.0), "VOLLEY": engine(2.0, 1.0)},
+                        "slow": {"CYCLES": engine(1.0, 1.0), "VOLLEY": engine(2.0, 3.0)}}}
+    line, = error_sections.headline_lines(results)
+    assert "0.50 to 3.0 times" in line
+    assert hair.losses(results["hair"]) == ["slow: F12 of Cycles over Volley's **0.50** (0.50–0.50)",
+                                            "slow: MSE over Cycles' at equal samples **3.00**"]
+    rows = hair.section(results["hair"]).splitlines()[-2:]
+    assert [row.split(" | ")[0] for row in rows] == ["| slow", "| fast"]
+    assert "3.00 (3.00–3.00) | 0.500 | 0.500" in rows[1]
+    assert hair.losses({}) == []
 
 
 # Accuracy ----------------------------------------------------------------------------------------

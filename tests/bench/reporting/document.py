@@ -3,7 +3,7 @@
 
 import json
 
-from . import (denoise_section, elsewhere, error_sections, farm_section, frame_sections, repeated,
+from . import (denoise_section, elsewhere, error_sections, farm_section, frame_sections, hair, repeated,
                scope as scopes)
 from .machine import names
 from .tables import table
@@ -30,6 +30,8 @@ def text(results, out):
     if results.get("curves"):
         parts.append(error_sections.curves_and_bias(results["curves"]))
         parts.append(denoise_section.text(results["curves"]))
+    if results.get("hair"):
+        parts.append(hair.section(results["hair"]))
     if results.get("kernels"):
         parts.append(error_sections.kernels_beside_embree(results["kernels"]))
     parts += [error_sections.kernels_elsewhere(run) for run in elsewhere.of_part(results, "kernels")]
@@ -91,6 +93,6 @@ def pictures(out):
         return ""
     lines = ["## Pictures",
              "Cycles above Volley: 1 sample per pixel, 16 and the reference. POV-Ray: its picture, "
-             "Volley's, the reference, 16 samples each."]
+             "Volley's, the reference, 16 samples each. Hair: Cycles, Volley, 64 samples each, the reference."]
     lines += [f"{name[:-4]}:\n\n![{name[:-4]}](pictures/{name})" for name in names]
     return "\n\n".join(lines)

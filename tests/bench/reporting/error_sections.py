@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sections about Volley beside Cycles, Embree and POV-Ray."""
 
-from . import curves, elsewhere, estimates, kernels
+from . import curves, elsewhere, estimates, hair, kernels
 from .tables import digits, median_with_spread, ratio, table, words
 
 
@@ -26,6 +26,8 @@ def headline_lines(results):
         lines.append(accuracy_line(results["kernels"]))
     if results.get("povray"):
         lines.append(povray_line(results["povray"]))
+    if results.get("hair"):
+        lines.append(hair.headline(results["hair"]))
     return [line for line in lines if line]
 
 
@@ -99,7 +101,8 @@ def losing_cases(results):
     for run in elsewhere.of_part(results, "kernels"):
         lines += losing_kernels(run["made"], elsewhere.embree_name(run))
     lines = [*lines, *losing_builds(results.get("kernels", [])),
-             *losing_distances(results.get("kernels", [])), *losing_povray(results.get("povray", {}))]
+             *losing_distances(results.get("kernels", [])), *losing_povray(results.get("povray", {})),
+             *hair.losses(results.get("hair", {}))]
     if not lines:
         return "## Where Volley loses\n\nNowhere in what was measured."
     return "## Where Volley loses\n\n" + "\n".join(f"- {line}" for line in lines)
