@@ -5,12 +5,12 @@
  * features (B. Bitterli, F. Rousselle, B. Moon, J. Iglesias-Guitian, D. Adler, K. Mitchell, W.
  * Jarosz, J. Novak, "Nonlinearly Weighted First-order Regression for Denoising Monte Carlo
  * Renderings", EGSR 2016). Departures: features are albedo, normal and the logarithm of depth and
- * the place in the picture; colours are compared as square roots, whose noise depends less on
- * brightness; a pixel that is noisier than the one that it lends to counts less by the ratio of
- * their variances, its own halves counting most, so that single bright samples stay where they are;
- * the prediction is taken at the pixel alone, without collaboration, which costs half and measured
- * as good; and instead of a choice among bandwidths the estimated error decides how much of the
- * plain pixel stays.
+ * the place in the picture; a window has holes, and both halves share one matrix of products;
+ * colours are compared as square roots, whose noise depends less on brightness; a pixel that is
+ * noisier than the one that it lends to counts less by the ratio of their variances, its own halves
+ * counting most, so that single bright samples stay where they are; the prediction is taken at the
+ * pixel alone, without collaboration, which costs half and measured as good; and instead of a
+ * choice among bandwidths the estimated error decides how much of the plain pixel stays.
  *
  * Two halves of each pixel's samples, a sum of the first one kept aside, tell noise from structure:
  * weights found in one half are tried on the other.

@@ -29,32 +29,26 @@ size_t trc_blend_bytes(void) {
 static void sum_squares(const struct trc_denoise_job *job, const float *values, struct work *w,
                         float *sums) {
     const struct trc_film *film = job->denoise->film;
-    for (int y = -REACH; y < TRC_TILE_SIZE + REACH; y++)
+    for (int y = -REACH; y < TRC_TILE_SIZE + REACH; y++) {
+        const float *row =
+            values + (size_t)trc_mirror((int64_t)job->y + y, film->height) * film->width;
         for (int x = -REACH; x < TRC_TILE_SIZE + REACH; x++)
-            w->estimate[trc_plane_at(x, y)] =
-                values[(size_t)trc_mirror((int64_t)job->y + y, film->height) * film->width +
-                       trc_mirror((int64_t)job->x + x, film->width)];
-    for (int y = 0; y < TRC_TILE_SIZE; y++)
-        for (int x = -REACH; x < TRC_TILE_SIZE + REACH; x++) {
-            float sum = 0.0f;
+            w->estimate[trc_plane_at(x, y)] = row[trc_mirror((int64_t)job->x + x, film->width)];
+    }
+    for (int y = 0; y < TRC_TILE_SIZE; y++) {
+        for (int x = -TRC_HALO; x < TRC_PLANE_COLUMNS - TRC_HALO; x += TRC_WIDTH) {
+            const float *estimate = w->estimate + trc_plane_at(x, y);
+            vfloat sum = vf_set(0.0f);
             for (int j = -REACH; j <= REACH; j++)
-                sum += w->estimate[trc_plane_at(x, y + j)];
-            w->columns[trc_plane_at(x, y)] = sum;
+                sum = sum + vf_load(estimate + j * TRC_PLANE_STRIDE);
+            vf_store(w->columns + trc_plane_at(x, 0), sum);
         }
-    for (int y = 0; y < TRC_TILE_SIZE; y++)
-        for (int x = 0; x < TRC_TILE_SIZE; x++) {
-            float sum = 0.0f;
+        for (int x = 0; x < TRC_TILE_SIZE; x += TRC_WIDTH) {
+            vfloat sum = vf_set(0.0f);
             for (int i = -REACH; i <= REACH; i++)
-                sum += w->columns[trc_plane_at(x + i, y)];
-            sums[trc_plane_at(x, y)] = sum;
+                sum = sum + vf_load(w->columns + trc_plane_at(x + i, 0));
+            vf_store(sums + trc_plane_at(x, y), sum);
         }
-}
-
-/* Moves a pixel's clean sums to the plain ones as far as these are kept. */
-static void blend(const double *plain, double *clean, uint32_t channels, double part) {
-    for (uint32_t k = 0; k < channels; k++) {
-        const double mixed = plain[k] + part * (clean[k] - plain[k]);
-        clean[k] = isfinite(mixed) ? mixed : plain[k];
     }
 }
 
@@ -69,33 +63,61 @@ static double limit(const struct trc_film *film, size_t pixel, double part) {
     return part;
 }
 
-static void blend_pixel(const struct trc_film *film, size_t pixel, double part) {
-    part = limit(film, pixel, part);
-    for (uint32_t pass = 0; pass < TRC_SUM_COUNT; pass++)
-        if (film->clean.sums[pass]) {
-            const uint32_t channels = trc_pass_info_of(pass)->sums;
-            blend(film->sums[pass] + pixel * channels, film->clean.sums[pass] + pixel * channels,
-                  channels, part);
+/* Moves a tile's clean sums to the plain ones as far as these are kept. */
+static void blend(const struct trc_denoise_job *job, const float *parts, const double *plain,
+                  double *clean, uint32_t channels) {
+    for (uint32_t y = 0; y < job->height; y++) {
+        const size_t row = (size_t)(job->y + y) * job->denoise->film->width + job->x;
+        for (uint32_t x = 0; x < job->width; x++) {
+            const double part = (double)parts[trc_plane_at((int)x, (int)y)];
+            for (size_t i = (row + x) * channels; i < (row + x + 1) * channels; i++) {
+                const double mixed = plain[i] + part * (clean[i] - plain[i]);
+                clean[i] = isfinite(mixed) ? mixed : plain[i];
+            }
         }
-    double *alpha = &film->clean.sums[TRC_PASS_COMBINED][4 * pixel + 3];
-    *alpha = fmin(fmax(*alpha, 0.0), film->sample_counts[pixel]);
-    if (film->clean.caught)
-        blend((const double *)&film->caught[pixel], (double *)&film->clean.caught[pixel],
-              TRC_CAUGHT_CHANNELS, part);
+    }
+}
+
+static void find_parts(const struct trc_denoise_job *job, const struct work *w, float *parts) {
+    const struct trc_film *film = job->denoise->film;
+    for (uint32_t y = 0; y < job->height; y++)
+        for (uint32_t x = 0; x < job->width; x++) {
+            const int at = trc_plane_at((int)x, (int)y);
+            const float variance = w->mean[0][at];
+            const float error = w->mean[1][at] > 0.0f ? w->mean[1][at] : 0.0f;
+            float part = variance > 0.0f ? FAVOR * variance / (variance + error) : 0.0f;
+            part = part < 1.0f ? part : 1.0f;
+            const size_t pixel = (size_t)(job->y + y) * film->width + job->x + x;
+            parts[at] = (float)limit(film, pixel, (double)part);
+        }
+}
+
+static void limit_alpha(const struct trc_denoise_job *job) {
+    const struct trc_film *film = job->denoise->film;
+    for (uint32_t y = 0; y < job->height; y++)
+        for (uint32_t x = 0; x < job->width; x++) {
+            const size_t pixel = (size_t)(job->y + y) * film->width + job->x + x;
+            double *alpha = &film->clean.sums[TRC_PASS_COMBINED][4 * pixel + 3];
+            const double most = film->sample_counts[pixel];
+            *alpha = *alpha > 0.0 ? (*alpha < most ? *alpha : most) : 0.0;
+        }
 }
 
 void trc_blend(const struct trc_denoise_job *job) {
     const struct trc_denoise *d = job->denoise;
+    const struct trc_film *film = d->film;
     struct work w;
     carve(&w, job->memory);
     sum_squares(job, d->variance, &w, w.mean[0]);
     sum_squares(job, d->error, &w, w.mean[1]);
-    for (uint32_t y = 0; y < job->height; y++)
-        for (uint32_t x = 0; x < job->width; x++) {
-            const int at = trc_plane_at((int)x, (int)y);
-            const float variance = w.mean[0][at], error = fmaxf(w.mean[1][at], 0.0f);
-            const float part =
-                variance > 0.0f ? fminf(FAVOR * variance / (variance + error), 1.0f) : 0.0f;
-            blend_pixel(d->film, (size_t)(job->y + y) * d->film->width + job->x + x, (double)part);
-        }
+    float *parts = w.columns;
+    find_parts(job, &w, parts);
+    for (uint32_t pass = 0; pass < TRC_SUM_COUNT; pass++)
+        if (film->clean.sums[pass])
+            blend(job, parts, film->sums[pass], film->clean.sums[pass],
+                  trc_pass_info_of(pass)->sums);
+    limit_alpha(job);
+    if (film->clean.caught)
+        blend(job, parts, (const double *)film->caught, (double *)film->clean.caught,
+              TRC_CAUGHT_CHANNELS);
 }

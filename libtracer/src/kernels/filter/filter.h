@@ -18,6 +18,7 @@ struct trc_guide {
     float *rest;      /* scratch */
     float *inside;    /* 1 where there are samples, 0 beyond the frame */
     float *features[TRC_FEATURE_COUNT];
+    bool has_alpha; /* alpha differs somewhere */
 };
 
 /* Fills the planes from the film and the features. (kernels/filter/guide.c) */

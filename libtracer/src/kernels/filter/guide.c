@@ -7,88 +7,87 @@
 #define LEAST_NOISE 1e-8f
 /* Part of the noise around a pixel that it has itself although its halves agree, which they may do
  * by chance: 0.02 takes a tenth off what is gained at 4 samples, 0.3 smears thin highlights. */
-#define LEAST_OWN_NOISE 0.1f
+#define LEAST_OWN_NOISE 0.05f
 
-/* A pixel's red, green, blue and alpha in the mean of some of its samples. */
-struct color {
-    float c[4];
-};
-
-static struct color mean_of(const double sum[4], double count) {
-    struct color mean;
-    for (int c = 0; c < 4; c++)
-        mean.c[c] = fminf(fmaxf((float)(sum[c] / count), 0.0f), MOST_LIGHT);
-    return mean;
-}
-
-static float light_of(struct color color) {
-    return (color.c[0] + color.c[1] + color.c[2]) * (1.0f / 3.0f);
-}
-
-/* The color with the light of shadow catchers, whose noise is the shadow's. */
-static void sum_of(const struct trc_film *film, size_t pixel, double sum[4]) {
-    memcpy(sum, film->sums[TRC_PASS_COMBINED] + 4 * pixel, 4 * sizeof *sum);
+/* The sums of a pixel with the light of shadow catchers, whose noise is the shadow's. */
+static void sum_of(const struct trc_film *film, size_t pixel, double sum[TRC_GUIDE_CHANNELS]) {
+    memcpy(sum, film->sums[TRC_PASS_COMBINED] + 4 * pixel, TRC_GUIDE_CHANNELS * sizeof *sum);
     for (int c = 0; film->caught && c < 3; c++)
         sum[c] += film->caught[pixel].blocked[c];
 }
 
-/* Both halves of a pixel; false if there is but one. parts: of the samples that are in each. */
-static bool halves_of(const struct trc_film *film, size_t pixel, struct color half[2],
-                      float parts[2]) {
-    double sum[4], first[4];
+/* Means of a pixel's halves, as light is; both are the mean of all samples if there is but one. */
+static void load_pixel(const struct trc_film *film, size_t pixel, struct trc_guide *g, int at) {
     const double count = film->sample_counts[pixel];
-    const struct trc_half *h = &film->halves[pixel];
+    const struct trc_half *first = &film->halves[pixel];
+    const bool both = first->count && first->count < film->sample_counts[pixel];
+    const double parts[2] = {both ? first->count : count, both ? count - first->count : count};
+    const double scales[2] = {1.0 / parts[0], 1.0 / parts[1]};
+    double sum[TRC_GUIDE_CHANNELS];
     sum_of(film, pixel, sum);
-    if (!h->count || h->count >= film->sample_counts[pixel]) {
-        half[0] = half[1] = mean_of(sum, count);
-        parts[0] = parts[1] = 1.0f;
-        return false;
+    for (int c = 0; c < TRC_GUIDE_CHANNELS; c++) {
+        const double of_first = both ? (double)first->light[c] : sum[c];
+        const double of_second = both ? sum[c] - of_first : sum[c];
+        g->half[0][c][at] = trc_cut(of_first * scales[0], 0.0f, MOST_LIGHT);
+        g->half[1][c][at] = trc_cut(of_second * scales[1], 0.0f, MOST_LIGHT);
     }
-    for (int c = 0; c < 4; c++) {
-        first[c] = (double)h->light[c];
-        sum[c] -= first[c];
-    }
-    half[0] = mean_of(first, h->count);
-    half[1] = mean_of(sum, count - h->count);
-    parts[0] = (float)(h->count / count);
-    parts[1] = 1.0f - parts[0];
-    return true;
+    for (int k = 0; k < 2; k++)
+        g->more[k][at] = (float)(count * scales[k]);
 }
 
-static void load_pixel(const struct trc_film *film, size_t pixel, struct trc_guide *g, int at) {
-    struct color half[2];
-    float parts[2];
-    const bool both = halves_of(film, pixel, half, parts);
-    /* The difference of two means has the variance of the mean of all, over both parts. */
-    const float scale = both ? parts[0] * parts[1] : 0.0f;
-    for (int c = 0; c < TRC_GUIDE_CHANNELS; c++) {
-        for (int k = 0; k < 2; k++)
-            g->half[k][c][at] = c < 3 ? sqrtf(half[k].c[c]) : half[k].c[c];
-        const float change = g->half[0][c][at] - g->half[1][c][at];
-        g->variance[c][at] = change * change * scale;
+/* From halves to their light, their noise, and what is compared. The difference of two means has
+ * the variance of the mean of all, over both parts. */
+static void convert(struct trc_guide *g, int at) {
+    const vfloat third = vf_set(1.0f / 3.0f), more = vf_load(g->more[0] + at);
+    const vmask both = vf_gt(more, vf_set(1.0f));
+    const vfloat scale = vf_select(
+        both, vf_set(1.0f) / vf_max(more * vf_load(g->more[1] + at), vf_set(1.0f)), vf_set(0.0f));
+    vfloat light[2] = {vf_set(0.0f), vf_set(0.0f)}, light2 = vf_set(0.0f);
+    for (int c = 0; c < 3; c++) {
+        vfloat half[2], root[2];
+        for (int k = 0; k < 2; k++) {
+            half[k] = vf_load(g->half[k][c] + at);
+            root[k] = vf_sqrt(half[k]);
+            light[k] = light[k] + half[k];
+            vf_store(g->half[k][c] + at, root[k]);
+        }
+        light2 = light2 + (half[0] - half[1]) * (half[0] - half[1]);
+        vf_store(g->variance[c] + at, (root[0] - root[1]) * (root[0] - root[1]) * scale);
     }
-    for (int k = 0; k < 2; k++) {
-        g->more[k][at] = 1.0f / parts[k];
-        g->light[k][at] = light_of(half[k]);
-    }
-    float change2 = 0.0f;
-    for (int c = 0; c < 3; c++)
-        change2 += (half[0].c[c] - half[1].c[c]) * (half[0].c[c] - half[1].c[c]);
-    g->noise[at] = change2 * scale * (1.0f / 3.0f);
+    const vfloat alpha = vf_load(g->half[0][3] + at) - vf_load(g->half[1][3] + at);
+    vf_store(g->variance[3] + at, alpha * alpha * scale);
+    for (int k = 0; k < 2; k++)
+        vf_store(g->light[k] + at, light[k] * third);
+    vf_store(g->noise + at, light2 * scale * third);
+}
+
+/* The squared difference of a pixel and the mean of those around it. */
+static float change2_at(const float *plane, int at) {
+    float sum = 0.0f;
+    for (int j = -1; j <= 1; j++)
+        for (int i = -1; i <= 1; i++)
+            sum += plane[at + j * TRC_PLANE_STRIDE + i];
+    const float change = plane[at] - sum * (1.0f / 9.0f);
+    return change * change;
 }
 
 /* Pixels with one sample tell nothing of noise: what their neighbours' mean differs by stands for
  * it. */
 static void guess_variance(struct trc_guide *g, int at) {
-    for (int c = 0; c < TRC_GUIDE_CHANNELS + 1; c++) {
-        const float *of = c < TRC_GUIDE_CHANNELS ? g->half[0][c] : g->light[0];
-        float sum = 0.0f;
-        for (int j = -1; j <= 1; j++)
-            for (int i = -1; i <= 1; i++)
-                sum += of[at + j * TRC_PLANE_STRIDE + i];
-        const float change = of[at] - sum * (1.0f / 9.0f);
-        *(c < TRC_GUIDE_CHANNELS ? &g->variance[c][at] : &g->noise[at]) = change * change;
-    }
+    for (int c = 0; c < TRC_GUIDE_CHANNELS; c++)
+        g->variance[c][at] = change2_at(g->half[0][c], at);
+    g->noise[at] = change2_at(g->light[0], at);
+}
+
+/* Whether alpha differs, which most pictures have none of. */
+static bool alpha_varies(const struct trc_guide *g) {
+    const float alpha = g->half[0][3][trc_plane_at(0, 0)];
+    for (int y = -TRC_HALO; y < TRC_TILE_SIZE + TRC_HALO; y++)
+        for (int x = -TRC_HALO; x < TRC_TILE_SIZE + TRC_HALO; x++)
+            for (int k = 0; k < 2; k++)
+                if (g->half[k][3][trc_plane_at(x, y)] != alpha)
+                    return true;
+    return false;
 }
 
 static void smooth(struct trc_guide *g, float *plane, float least) {
@@ -115,12 +114,15 @@ void trc_guide_load(const struct trc_denoise_job *job, struct trc_guide *g) {
             for (int k = 0; k < TRC_FEATURE_COUNT; k++)
                 g->features[k][at] = job->denoise->features[k][pixel];
         }
+    for (int i = 0; i < TRC_PLANE_FLOATS; i += TRC_WIDTH)
+        convert(g, i);
     for (int y = 1 - TRC_HALO; y < TRC_TILE_SIZE + TRC_HALO - 1; y++)
         for (int x = 1 - TRC_HALO; x < TRC_TILE_SIZE + TRC_HALO - 1; x++)
             if (g->more[0][trc_plane_at(x, y)] == 1.0f)
                 guess_variance(g, trc_plane_at(x, y));
     for (int c = 0; c < TRC_GUIDE_CHANNELS; c++)
         smooth(g, g->variance[c], 0.0f);
+    g->has_alpha = alpha_varies(g);
     smooth(g, g->noise, LEAST_NOISE);
     for (int i = 0; i < TRC_PLANE_FLOATS; i += TRC_WIDTH) {
         const vfloat noise = vf_load(g->noise + i), own = vf_load(g->rest + i); /* unsmoothed */

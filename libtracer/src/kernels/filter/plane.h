@@ -10,7 +10,7 @@
 #include "model/denoise.h"
 
 /* Pixels on each side: of a window, a patch and a smoothed variance. */
-#define TRC_HALO 7
+#define TRC_HALO 6
 #define TRC_PLANE_ROWS (TRC_TILE_SIZE + 2 * TRC_HALO)
 /* The tile begins at this column; vectors of a row end before the stride. */
 #define TRC_PLANE_LEFT 8
@@ -52,6 +52,37 @@ TRC_INLINE void trc_plane_smooth(const float *in, float *out, int end) {
                     sum = sum + vf_load(in + trc_plane_at(x + i, y + j));
             vf_store(out + trc_plane_at(x, y), sum * vf_set(1.0f / 9.0f));
         }
+}
+
+/* A mean as a float within limits; NaN: the lower. Comparisons, as fminf may be a call. */
+TRC_INLINE float trc_cut(double mean, float low, float high) {
+    const float value = (float)mean;
+    return value > low ? (value < high ? value : high) : low;
+}
+
+/* Squared differences less what noise makes of them, over what it may make of them. least: what
+ * differences of no noise are compared to. */
+TRC_INLINE vfloat trc_excess(vfloat change2, vfloat noise_p, vfloat noise_q, float least) {
+    return (change2 - (noise_p + vf_min(noise_p, noise_q))) / (noise_p + noise_q + vf_set(least));
+}
+
+/* Sums of a row and the two above it, in place, for patches of 3 x 3; rows in their order. */
+TRC_INLINE void trc_patch_columns(float *row, int stride) {
+    for (int x = 0; x < TRC_PLANE_COLUMNS; x += TRC_WIDTH)
+        vf_store(row + x,
+                 vf_load(row + x) + vf_load(row + stride + x) + vf_load(row + 2 * stride + x));
+}
+
+/* The mean of the patch whose column sums begin there. */
+TRC_INLINE vfloat trc_patch_mean(const float *columns) {
+    return (vf_load(columns) + vf_load(columns + 1) + vf_load(columns + 2)) * vf_set(1.0f / 9.0f);
+}
+
+/* A weight by how far patches are apart: like exp(-x), but 0 from 8 on; 1 below 0. */
+TRC_INLINE vfloat trc_bell(vfloat x) {
+    const vfloat t = vf_clamp(vf_set(1.0f) - x * vf_set(0.125f), 0.0f, 1.0f);
+    const vfloat t2 = t * t, t4 = t2 * t2;
+    return t4 * t4;
 }
 
 #endif

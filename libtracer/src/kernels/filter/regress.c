@@ -3,27 +3,29 @@
  *
  * A tile goes in strips, so that the weights of a strip stay in a second-level cache. Sums are
  * written out without fused multiplication: all instruction sets give the same bits. */
+#include <stdlib.h>
+
 #include "kernels/filter/filter.h"
 
-/* Pixels on each side from which a pixel takes. */
-#define REACH 5
+/* Pixels on each side from which a pixel takes: all that are near, farther off every second one, as
+ * fields of a chessboard, within a circle. A window of 5 or 6 gives lower errors on flat surfaces,
+ * but softens shadows, and FLIP is worse than without at 16 samples. */
+#define REACH 4
+#define NEAR 2
 #define SIDE (2 * REACH + 1)
-#define WINDOW (SIDE * SIDE)
 /* Rows of a strip, of whose patches one row more on each side is compared. */
-#define STRIP 8
+#define STRIP 16
 #define PATCH_ROWS (STRIP + 2)
 /* How many standard deviations are still alike: 0.5 left noise, 0.85 to 1.4 flattened textures
  * and spread highlights. */
 #define BANDWIDTH 0.7f
-/* Differences of no variance: of squares of roots, and alpha. */
-#define LEAST_VARIANCE 1e-8f
-/* Weights below are none. */
-#define LEAST_WEIGHT 1e-4f
+/* Squared differences of roots of light, and of alpha, that count where there is no noise. */
+#define LEAST_CHANGE 2e-8f
 /* A constant, features, place. */
 #define TERMS (1 + TRC_FEATURE_COUNT + 2)
 #define PRODUCTS (TERMS * (TERMS + 1) / 2)
 /* What keeps slopes small where features hardly differ: a part of the sum of weights. */
-#define RIDGE 0.01f
+#define RIDGE 0.02f
 /* Differences of features that count as one: albedo, normal, logarithm of depth, of the window. */
 static const float feature_scale[TRC_FEATURE_COUNT] = {4.5f, 4.5f, 4.5f, 3.0f, 3.0f, 3.0f, 3.0f};
 #define PLACE_SCALE (1.0f / REACH)
@@ -35,25 +37,45 @@ static const float feature_scale[TRC_FEATURE_COUNT] = {4.5f, 4.5f, 4.5f, 3.0f, 3
 #define DARK 0.01f
 #define MOST_ERROR 1e3f
 #define MOST_LIGHT 1e30f
+/* Of what one half's weights take, which with those of the other half sum to 1. */
+#define LEAST_TOTAL 0.05f
+
+/* Of a pixel from which is taken, from the one that takes. */
+struct offset {
+    int x, y, shift; /* shift: in a plane */
+};
 
 struct work {
     struct trc_guide guide;
+    int offset_count; /* of those below */
+    struct offset offsets[SIDE * SIDE];
     /* By the half that was compared, offset, row, column; then the first holds what is taken. */
     float (*weights[2])[STRIP][TRC_TILE_SIZE];
     float (*apart)[TRC_PLANE_STRIDE]; /* PATCH_ROWS: how far pixels are apart */
     float *data;                      /* a plane of light */
 };
 
+static void list_offsets(struct work *w) {
+    w->offset_count = 0;
+    for (int y = -REACH; y <= REACH; y++)
+        for (int x = -REACH; x <= REACH; x++) {
+            const bool is_taken = (abs(x) <= NEAR && abs(y) <= NEAR) || !((x + y) & 1);
+            if (is_taken && x * x + y * y <= REACH * REACH)
+                w->offsets[w->offset_count++] = (struct offset){x, y, y * TRC_PLANE_STRIDE + x};
+        }
+}
+
 static size_t carve(struct work *w, void *memory) {
     struct trc_carver c = {.base = memory};
     struct trc_guide *g = &w->guide;
     float **const single[] = {&g->noise, &g->own_noise, &g->rest, &g->inside, &w->data};
+    list_offsets(w);
     for (int k = 0; k < 2; k++) {
         for (int i = 0; i < TRC_GUIDE_CHANNELS; i++)
             g->half[k][i] = trc_plane_carve(&c);
         g->more[k] = trc_plane_carve(&c);
         g->light[k] = trc_plane_carve(&c);
-        w->weights[k] = trc_carve(&c, WINDOW * sizeof *w->weights[k]);
+        w->weights[k] = trc_carve(&c, (size_t)w->offset_count * sizeof *w->weights[k]);
     }
     for (int i = 0; i < TRC_GUIDE_CHANNELS; i++)
         g->variance[i] = trc_plane_carve(&c);
@@ -72,46 +94,38 @@ size_t trc_regress_bytes(void) {
 
 /* ---- weights ---- */
 
-/* Squared differences of pixels at p and q in one half, less what noise makes of them, over what it
- * may make of them. */
+/* How far pixels at p and q are apart in one half. */
 static vfloat difference(const struct trc_guide *g, int half, int p, int q) {
-    const vfloat least = vf_set(2.0f * LEAST_VARIANCE * BANDWIDTH * BANDWIDTH);
     const vfloat more_p = vf_load(g->more[half] + p), more_q = vf_load(g->more[half] + q);
     vfloat sum = vf_set(0.0f);
-    for (int c = 0; c < TRC_GUIDE_CHANNELS; c++) {
-        const vfloat at_p = more_p * vf_load(g->variance[c] + p);
-        const vfloat at_q = more_q * vf_load(g->variance[c] + q);
+    for (int c = 0; c < (g->has_alpha ? 4 : 3); c++) {
         const vfloat change = vf_load(g->half[half][c] + p) - vf_load(g->half[half][c] + q);
-        const vfloat apart = (change * change - (at_p + vf_min(at_p, at_q))) /
-                             (least + vf_set(BANDWIDTH * BANDWIDTH) * (at_p + at_q));
+        const vfloat apart = trc_excess(change * change, more_p * vf_load(g->variance[c] + p),
+                                        more_q * vf_load(g->variance[c] + q), LEAST_CHANGE);
         sum = sum + (c < 3 ? apart * vf_set(1.0f / 3.0f) : apart);
     }
-    return sum;
+    return sum * vf_set(1.0f / (BANDWIDTH * BANDWIDTH));
 }
 
 /* Weights of the pixels at an offset for those of the strip that begins at row y. */
-static void weigh(struct work *w, int half, int y, int dx, int dy) {
+static void weigh(struct work *w, int half, int y, int offset) {
     const struct trc_guide *g = &w->guide;
-    const int shift = dy * TRC_PLANE_STRIDE + dx;
+    const int shift = w->offsets[offset].shift;
     for (int j = 0; j < PATCH_ROWS; j++)
         for (int x = -1; x < TRC_PLANE_COLUMNS - 1; x += TRC_WIDTH) {
             const int p = trc_plane_at(x, y + j - 1);
             vf_store(w->apart[j] + x + 1, difference(g, half, p, p + shift));
         }
-    float(*const weights)[TRC_TILE_SIZE] = w->weights[half][(dy + REACH) * SIDE + dx + REACH];
+    for (int j = 0; j < STRIP; j++)
+        trc_patch_columns(w->apart[j], TRC_PLANE_STRIDE);
+    float(*const weights)[TRC_TILE_SIZE] = w->weights[half][offset];
     for (int j = 0; j < STRIP; j++)
         for (int x = 0; x < TRC_TILE_SIZE; x += TRC_WIDTH) {
-            vfloat sum = vf_set(0.0f);
-            for (int a = 0; a < 3; a++)
-                for (int b = 0; b < 3; b++)
-                    sum = sum + vf_load(w->apart[j + a] + x + b);
             const int p = trc_plane_at(x, y + j), q = p + shift;
-            const vfloat alike = vf_exp(vf_min(sum * vf_set(-1.0f / 9.0f), vf_set(0.0f)));
             const vfloat calm =
                 vf_min(vf_load(g->own_noise + p) / vf_load(g->noise + q), vf_set(1.0f));
-            const vfloat weight = alike * calm * vf_load(g->inside + q);
             vf_store(weights[j] + x,
-                     vf_select(vf_lt(weight, vf_set(LEAST_WEIGHT)), vf_set(0.0f), weight));
+                     trc_bell(trc_patch_mean(w->apart[j] + x)) * calm * vf_load(g->inside + q));
         }
 }
 
@@ -128,35 +142,37 @@ static vfloat weight_of(const struct group *u, int half, int offset) {
 }
 
 /* What the pixels at an offset differ by in all terms. */
-static void terms_of(const struct group *u, int dx, int dy, vfloat terms[TERMS]) {
+static void terms_of(const struct group *u, const struct offset *o, vfloat terms[TERMS]) {
     const struct trc_guide *g = &u->work->guide;
-    const int q = u->at + dy * TRC_PLANE_STRIDE + dx;
     terms[0] = vf_set(1.0f);
     for (int k = 0; k < TRC_FEATURE_COUNT; k++)
-        terms[1 + k] = (vf_load(g->features[k] + q) - vf_load(g->features[k] + u->at)) *
-                       vf_set(feature_scale[k]);
-    terms[TERMS - 2] = vf_set((float)dx * PLACE_SCALE);
-    terms[TERMS - 1] = vf_set((float)dy * PLACE_SCALE);
+        terms[1 + k] =
+            (vf_load(g->features[k] + u->at + o->shift) - vf_load(g->features[k] + u->at)) *
+            vf_set(feature_scale[k]);
+    terms[TERMS - 2] = vf_set((float)o->x * PLACE_SCALE);
+    terms[TERMS - 1] = vf_set((float)o->y * PLACE_SCALE);
 }
 
-/* Sums of weighted products of terms, the lower triangle row by row. */
-static void sum_products(const struct group *u, vfloat products[2][PRODUCTS]) {
-    for (int half = 0; half < 2; half++)
-        for (int k = 0; k < PRODUCTS; k++)
-            products[half][k] = vf_set(0.0f);
-    for (int offset = 0; offset < WINDOW; offset++) {
-        const vfloat weights[2] = {weight_of(u, 0, offset), weight_of(u, 1, offset)};
-        if (!vm_any(vf_gt(vf_max(weights[0], weights[1]), vf_set(0.0f))))
+/* Sums of weighted products of terms, the lower triangle row by row; the weights of both halves go
+ * into one sum, as slopes of each would cost twice as much and measured no better. */
+static void sum_products(const struct group *u, vfloat products[PRODUCTS]) {
+    const struct work *w = u->work;
+    for (int k = 0; k < PRODUCTS; k++)
+        products[k] = vf_set(0.0f);
+    for (int offset = 0; offset < w->offset_count; offset++) {
+        const vfloat weight = weight_of(u, 0, offset) + weight_of(u, 1, offset);
+        if (!vm_any(vf_gt(weight, vf_set(0.0f))))
             continue;
         vfloat terms[TERMS];
-        terms_of(u, offset % SIDE - REACH, offset / SIDE - REACH, terms);
-        for (int half = 0; half < 2; half++) {
-            vfloat *sum = products[half];
-            for (int i = 0; i < TERMS; i++) {
-                const vfloat weighted = weights[half] * terms[i];
-                for (int j = 0; j <= i; j++, sum++)
-                    *sum = *sum + weighted * terms[j];
-            }
+        terms_of(u, &w->offsets[offset], terms);
+        products[0] = products[0] + weight;
+        vfloat *sum = products + 1;
+        for (int i = 1; i < TERMS; i++) {
+            const vfloat weighted = weight * terms[i];
+            *sum = *sum + weighted;
+            sum++;
+            for (int j = 1; j <= i; j++, sum++)
+                *sum = *sum + weighted * terms[j];
         }
     }
 }
@@ -240,26 +256,27 @@ static void store_error(const struct trc_denoise_job *job, const struct group *u
 /* Regression for a vector of pixels of the tile's row y: weights become what is taken. */
 static void regress(const struct trc_denoise_job *job, struct work *w, const struct group *u,
                     int y) {
-    vfloat products[2][PRODUCTS], slopes[2][TERMS];
+    vfloat products[PRODUCTS], slopes[TERMS];
     sum_products(u, products);
-    for (int half = 0; half < 2; half++)
-        solve(products[half], slopes[half]);
-    vfloat clean[2] = {vf_set(0.0f), vf_set(0.0f)};
-    for (int offset = 0; offset < WINDOW; offset++) {
-        const int dx = offset % SIDE - REACH, dy = offset / SIDE - REACH;
+    solve(products, slopes);
+    vfloat clean[2] = {vf_set(0.0f), vf_set(0.0f)}, total[2] = {vf_set(0.0f), vf_set(0.0f)};
+    for (int offset = 0; offset < w->offset_count; offset++) {
+        const struct offset *o = &w->offsets[offset];
         vfloat terms[TERMS], taken[2];
-        terms_of(u, dx, dy, terms);
+        terms_of(u, o, terms);
+        vfloat sum = slopes[0];
+        for (int i = 1; i < TERMS; i++)
+            sum = sum + slopes[i] * terms[i];
         for (int half = 0; half < 2; half++) {
-            vfloat sum = slopes[half][0];
-            for (int i = 1; i < TERMS; i++)
-                sum = sum + slopes[half][i] * terms[i];
             taken[half] = sum * weight_of(u, half, offset);
             const float *light = w->guide.light[1 - half];
-            clean[half] =
-                clean[half] + taken[half] * vf_load(light + u->at + dy * TRC_PLANE_STRIDE + dx);
+            total[half] = total[half] + taken[half];
+            clean[half] = clean[half] + taken[half] * vf_load(light + u->at + o->shift);
         }
-        vf_store(w->weights[0][offset][u->row] + u->x, vf_set(0.5f) * (taken[0] + taken[1]));
+        vf_store(w->weights[0][offset][u->row] + u->x, taken[0] + taken[1]);
     }
+    for (int half = 0; half < 2; half++)
+        clean[half] = clean[half] / vf_max(total[half], vf_set(LEAST_TOTAL));
     store_error(job, u, y, clean);
 }
 
@@ -279,14 +296,14 @@ static void load_strip(const struct trc_denoise_job *job, const struct channel *
     for (int j = y - REACH; j < y + STRIP + REACH; j++)
         for (int i = -REACH; i < TRC_TILE_SIZE + REACH; i++) {
             const int64_t frame_x = (int64_t)job->x + i, frame_y = (int64_t)job->y + j;
-            float mean = 0.0f;
+            double mean = 0.0;
             if (frame_x >= 0 && frame_x < film->width && frame_y >= 0 && frame_y < film->height) {
                 const size_t pixel = (size_t)frame_y * film->width + (size_t)frame_x;
                 const uint32_t count = film->sample_counts[pixel];
                 if (count)
-                    mean = (float)(c->sums[pixel * c->stride] / count);
+                    mean = c->sums[pixel * c->stride] / count;
             }
-            data[trc_plane_at(i, j)] = fminf(fmaxf(mean, -MOST_LIGHT), MOST_LIGHT);
+            data[trc_plane_at(i, j)] = trc_cut(mean, -MOST_LIGHT, MOST_LIGHT);
         }
 }
 
@@ -297,11 +314,10 @@ static void take_channel(const struct trc_denoise_job *job, const struct work *w
     for (int j = 0; j < STRIP && (uint32_t)(y + j) < job->height; j++)
         for (int x = 0; (uint32_t)x < job->width; x += TRC_WIDTH) {
             vfloat sum = vf_set(0.0f);
-            for (int offset = 0; offset < WINDOW; offset++) {
-                const int dx = offset % SIDE - REACH, dy = offset / SIDE - REACH;
+            const float *data = w->data + trc_plane_at(x, y + j);
+            for (int offset = 0; offset < w->offset_count; offset++)
                 sum = sum + vf_load(w->weights[0][offset][j] + x) *
-                                vf_load(w->data + trc_plane_at(x + dx, y + j + dy));
-            }
+                                vf_load(data + w->offsets[offset].shift);
             float lanes[TRC_WIDTH];
             vf_store(lanes, sum);
             for (int i = 0; i < TRC_WIDTH && (uint32_t)(x + i) < job->width; i++) {
@@ -336,8 +352,8 @@ void trc_regress(const struct trc_denoise_job *job) {
     trc_guide_load(job, &w.guide);
     for (int y = 0; (uint32_t)y < job->height; y += STRIP) {
         for (int half = 0; half < 2; half++)
-            for (int offset = 0; offset < WINDOW; offset++)
-                weigh(&w, half, y, offset % SIDE - REACH, offset / SIDE - REACH);
+            for (int offset = 0; offset < w.offset_count; offset++)
+                weigh(&w, half, y, offset);
         for (int row = 0; row < STRIP && (uint32_t)(y + row) < job->height; row++)
             for (int x = 0; (uint32_t)x < job->width; x += TRC_WIDTH) {
                 const struct group u = {&w, row, x, trc_plane_at(x, y + row)};
