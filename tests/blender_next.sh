@@ -2,14 +2,15 @@
 # The add-on in a newer Blender: a Debian with it in a folder of its own, where the library is built and
 # tested as a user of that Debian would.
 #
-#   bash tests/blender_next.sh [--suite SUITE] [--fast] [--report XML] [PYTEST ARGUMENT]...
+#   bash tests/blender_next.sh [--suite SUITE] [--fast] [--report XML] [--results DIR] [PYTEST ARGUMENT]...
 #   bash tests/blender_next.sh [--suite SUITE] [--fast] --measure PART DIR
 #
 # SUITE is trixie (Debian 13, Blender 4.3; the default) or sid (Debian unstable, Blender 5.2). Runs all
 # Blender tests if no argument says which; --fast leaves out what a change of Blender's version hardly
 # touches (see SLOW; of Blender 5.2 it runs CHANGED alone) and builds kernels for this processor alone;
-# --report writes JUnit XML. --measure measures a part of tests/bench/report.sh there instead, curves or
-# kernels (beside Embree), and leaves its JSON in DIR; with --fast what report.sh --quick measures.
+# --report writes JUnit XML, --results what tests measured, the tables of build/results. --measure measures a
+# part of tests/bench/report.sh there instead, curves or kernels (beside Embree), and leaves its JSON in DIR;
+# with --fast what report.sh --quick measures.
 # Needs root, a Debian mirror and 2.5 GB; the folder is $XDG_CACHE_HOME/volley/SUITE and stays, so that the
 # next run takes only the build and the tests. Nothing stays mounted: /proc is there in a name space of its
 # own, where there may be one. Exit code 77: it cannot be set up here, with the reason as the last line;
@@ -107,12 +108,13 @@ fast_selection() {
 }
 
 main() {
-    local report="" part="" out="" suite=trixie isas="" is_fast="" scope=--next status=0 arguments=()
+    local report="" results="" part="" out="" suite=trixie isas="" is_fast="" scope=--next status=0 arguments=()
     while [ $# -gt 0 ]; do
         case $1 in
             --suite) suite=${2:?--suite needs a name}; shift 2 ;;
             --fast) is_fast=1 isas=$(widest_isa) scope=--quick; shift ;;
             --report) report=${2:?--report needs a file}; shift 2 ;;
+            --results) results=${2:?--results needs a folder}; shift 2 ;;
             --measure) part=${2:?--measure needs a part} out=${3:?--measure needs a folder}; shift 3 ;;
             *) break ;;
         esac
@@ -134,9 +136,14 @@ main() {
         exit
     fi
     build "$isas"
-    rm -f "$ROOT/volley/build/pytest.xml"
+    rm -rf "$ROOT/volley/build/pytest.xml" "$ROOT/volley/build/results"
+    mkdir "$ROOT/volley/build/results"
     run_tests "${arguments[@]}" "$@" || status=$?
     [ -z "$report" ] || cp "$ROOT/volley/build/pytest.xml" "$report" || true
+    if [ -n "$results" ]; then
+        mkdir -p "$results"
+        cp "$ROOT"/volley/build/results/* "$results" || true
+    fi
     exit "$status"
 }
 

@@ -47,7 +47,7 @@ run_pytest() {
 run_blender_next() {
     local suite=$1 status=0
     local name=$results/next_$suite
-    local arguments=(--suite "$suite" --report "$name.xml")
+    local arguments=(--suite "$suite" --report "$name.xml" --results "$name")
     [ "$next" = all ] || arguments+=(--fast)
     bash tests/blender_next.sh "${arguments[@]}" 2>&1 | tee "$name.log" || status=$?
     if [ "$status" -eq 77 ]; then

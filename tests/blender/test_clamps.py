@@ -95,11 +95,13 @@ def test_clamps(blender):
     clamped = {clamp: _with_color(pairs)
                for clamp, pairs in blender.run(inside_clamps, timeout=300).items()}
     lines = [f"{'direct':>6} {'indirect':>8} {'pass':13} {'mean':>9} {'mean off':>10} {'of tiles':>10}"]
+    errors = {}
     for (direct, indirect), pairs in clamped.items():
         for name, (ours, theirs) in pairs.items():
             whole, tiles = compare.unexplained(ours, theirs)
             lines.append(f"{direct:6g} {indirect:8g} {name:13} {theirs.mean():9.3g} {whole:10.2e} {tiles:10.2e}")
-    blender_support.write_result("clamps.txt", lines)
+            errors[f"{name}, direct {direct:g}, indirect {indirect:g}"] = whole / theirs.mean()
+    blender_support.write_result("clamps", lines, errors)
     for pairs in clamped.values():
         for name, pair in pairs.items():
             off = compare.unexplained(*pair)

@@ -207,7 +207,7 @@ def inputs(blender_of_module):
     lines = [f"{'light':6} {'node':24} {'output':16} {'error':>9}"]
     lines += [f"{kind.lower():6} {node[10:]:24} {output:16} {error:9.2e}"
               for (kind, node, output), error in found.items()]
-    blender_support.write_result("light_nodes.txt", lines)
+    blender_support.write_result("light_nodes", lines, {" ".join(key): error for key, error in found.items()})
     return found
 
 
@@ -220,7 +220,7 @@ def test_inputs(inputs, kind, node, output):
 def webs(blender_of_module):
     found = {name: _difference(*pair)
              for name, pair in blender_of_module.run(inside_webs, timeout=300).items()}
-    blender_support.write_result("light_webs.txt", [f"{name:24} {error:9.2e}" for name, error in found.items()])
+    blender_support.write_result("light_webs", [f"{name:24} {error:9.2e}" for name, error in found.items()], found)
     return found
 
 
@@ -233,7 +233,7 @@ def test_webs(webs, name):
 def soft(blender_of_module):
     pictures = blender_of_module.run(inside_soft, timeout=600)
     found, lines = compare.errors_of_cases(pictures)
-    blender_support.write_result("light_patterns.txt", lines)
+    blender_support.write_result("light_patterns", lines, compare.largest_errors(found))
     return found
 
 

@@ -203,7 +203,7 @@ def errors(blender_of_module):
     if pictures is None:
         return None
     found, lines = compare.errors_of_cases(pictures)
-    blender_support.write_result("linking.txt", lines)
+    blender_support.write_result("linking", lines, compare.largest_errors(found))
     return found
 
 

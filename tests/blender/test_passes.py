@@ -120,17 +120,19 @@ def inside_gallery():
 
 def test_gallery(blender):
     pairs = blender.run(inside_gallery, timeout=300)
-    lines = [f"{'pass':9} {'mean':>9} {'mean off':>10} {'tiles or pixels':>16}"]
+    lines, errors = [f"{'pass':9} {'mean':>9} {'mean off':>10} {'tiles or pixels':>16}"], {}
 
     def compare_means(name, ours, theirs):
         off = compare.unexplained(ours, theirs)
         lines.append(f"{name:9} {theirs.mean():9.3g} {off[0]:10.2e} {off[1]:16.2e}")
+        errors[name] = off[0] / theirs.mean()
         assert off[0] <= LIGHT_OFF[0] and off[1] <= LIGHT_OFF[1], lines[-1]
 
     for name in ("Depth", "Position", "IndexOB", "IndexMA"):
         ours, theirs = pairs[name]
         apart = (np.abs(ours - theirs) > FIRST_STEP * np.abs(theirs).max()).any(axis=-1).mean()
         lines.append(f"{name:9} {theirs.mean():9.3g} {'':10} {apart:16.3%}")
+        errors[name] = apart
         assert apart <= FIRST_SHARE, lines[-1]
     for name in (*_SURFACE_PASSES, "Combined", "Emit", "Env"):
         compare_means(name, *pairs[name])
@@ -139,7 +141,7 @@ def test_gallery(blender):
         seen = pairs[color][1].min(axis=-1, keepdims=True) > LEAST_COLOR
         for name, _ in light:
             compare_means(name, *(picture * seen for picture in pairs[name]))
-    blender_support.write_result("passes.txt", lines)
+    blender_support.write_result("passes", lines, errors)
     light = sum((pairs[direct][0] + pairs[indirect][0]) * pairs[color][0]
                 for (color, _), ((direct, _), (indirect, _)) in _LIGHT_PASSES.items())
     assert pairs["Combined"][0] == pytest.approx(light + pairs["Emit"][0] + pairs["Env"][0], abs=SUM_TOLERANCE)

@@ -217,7 +217,7 @@ def errors(blender_of_module):
     lines = [f"{'shader':75} {'mean error':>10} {'biased':>8} {'biased tile':>11}"]
     lines += [f"{name:75} {mean:10.3%} {biased:8.3%} {tile:11.3%}  {_known(name)[-1]}".rstrip()
               for name, (mean, biased, tile) in found.items()]
-    blender_support.write_result("shaders.txt", lines)
+    blender_support.write_result("shaders", lines, compare.largest_errors(found))
     return found
 
 

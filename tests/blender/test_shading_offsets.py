@@ -136,7 +136,7 @@ def errors(blender_of_module):
     """The errors of all cases, from one Blender, and their table."""
     pictures = blender_of_module.run(inside_pictures, list(CASES), timeout=600)
     found, lines = compare.errors_of_cases(pictures)
-    blender_support.write_result("shading_offsets.txt", lines)
+    blender_support.write_result("shading_offsets", lines, compare.largest_errors(found))
     return found
 
 

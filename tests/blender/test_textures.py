@@ -413,11 +413,13 @@ def pictures(blender_of_module):
     """All cases from one Blender, and the table of their errors."""
     found = blender_of_module.run(inside_cases, list(CASES), timeout=600)
     lines = [f"{'node':40} {'output':10} {'mean':>9} {'mean error':>10} {'largest':>9} {'beyond':>8}"]
+    errors = {}
     for (name, output), (ours, theirs) in found.items():
         error = np.abs(ours - theirs)
+        errors[f"{name} {output}"] = error.mean() / max(1.0, np.abs(theirs).mean())
         lines.append(f"{name:40} {output:10} {theirs.mean():9.4f} {error.mean():10.2e} "
                      f"{error.max():9.2e} {_beyond(ours, theirs):8.3%}")
-    blender_support.write_result("textures.txt", lines)
+    blender_support.write_result("textures", lines, errors)
     return found
 
 

@@ -92,7 +92,7 @@ def errors(blender_of_module):
     if blender_support.version() < SINCE[0]:
         pytest.skip(SINCE[1])
     found, lines = compare.errors_of_cases(blender_of_module.run(inside_pictures, list(CASES), timeout=600))
-    blender_support.write_result("thin_wall.txt", lines)
+    blender_support.write_result("thin_wall", lines, compare.largest_errors(found))
     return found
 
 

@@ -11,6 +11,7 @@ too). An exception inside, a crash or a time-out fails the test with Blender's o
 
 import enum
 import functools
+import json
 import os
 import pickle
 import re
@@ -34,11 +35,16 @@ def executable():
 
 
 @functools.lru_cache(maxsize=None)
-def version():
-    """Major and minor number of the Blender to test with."""
+def full_version():
+    """The Blender to test with, like "4.3.2"."""
     output = subprocess.run([executable(), "--version"], stdin=subprocess.DEVNULL, text=True,
                             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=True).stdout
-    return tuple(int(number) for number in re.search(r"Blender (\d+)\.(\d+)", output).groups())
+    return re.search(r"Blender (\d+\.\d+(\.\d+)?)", output).group(1)
+
+
+def version():
+    """Its major and minor number."""
+    return tuple(int(number) for number in full_version().split(".")[:2])
 
 
 def has_display():
@@ -51,12 +57,16 @@ def user_scripts():
     return os.environ.get("BLENDER_USER_SCRIPTS") or os.path.join(REPOSITORY, "build", "blender")
 
 
-def write_result(name, lines):
-    """Keep a table among the results of the build that is tested, where there is one."""
-    folder = os.path.join(os.environ.get("VOLLEY_BUILD", ""), "results")
-    if os.path.isdir(folder):
-        with open(os.path.join(folder, name), "w", encoding="utf-8") as file:
-            file.write("\n".join(lines) + "\n")
+def write_result(name, lines, errors):
+    """Keep a table among the results of the build that is tested, where there is one: its lines for people in
+    NAME.txt, {case: relative error} in NAME.json for tests/versions_table.py."""
+    path = os.path.join(os.environ.get("VOLLEY_BUILD", ""), "results", name)
+    if not os.path.isdir(os.path.dirname(path)):
+        return
+    with open(path + ".txt", "w", encoding="utf-8") as file:
+        file.write("\n".join(lines) + "\n")
+    with open(path + ".json", "w", encoding="utf-8") as file:
+        json.dump({"blender": full_version(), "errors": {case: float(error) for case, error in errors.items()}}, file)
 
 
 class Blender:

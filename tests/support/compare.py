@@ -291,6 +291,15 @@ def errors_of_cases(pictures):
     return found, lines
 
 
+def largest_errors(found):
+    """{case: the larger of its mean's error and its worst tile's} of agreed_errors by case.
+
+    >>> largest_errors({"ball": (0.2, 0.1, 0.0)})
+    {'ball': 0.2}
+    """
+    return {name: max(mean, tile) for name, (mean, _biased, tile) in found.items()}
+
+
 def unexplained(seeds_a, seeds_b, tile_px=TILE_PX, errors=NOISE_ERRORS):
     """How far two sets of seeds are apart by more than noise explains: the largest excess in the mean of a
     channel, and in the mean of a tile and channel.
