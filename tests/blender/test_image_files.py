@@ -2,6 +2,7 @@
 """Images of several files, limited ones and projected ones against Cycles'."""
 
 import numpy as np
+import pytest
 
 SIZE = 48
 
@@ -43,9 +44,10 @@ def _both(samples=1):
     return [picture[..., :3] for picture in scenes.by_both(samples)]
 
 
-def inside_tiles():
-    """Three of four tiles, of different sizes, by UDIM numbers."""
+def inside_tiles(is_packed):
+    """Three of four tiles, of different sizes, by UDIM numbers; packed: and their files are gone."""
     import os
+    import shutil
     import tempfile
     import bpy
     folder = tempfile.mkdtemp(prefix="volley_")
@@ -59,6 +61,9 @@ def inside_tiles():
             if made.tiles.get(number) is None:
                 made.tiles.new(number)
         made.filepath = os.path.join(folder, "t.<UDIM>.png")
+        if is_packed:
+            made.pack()
+            shutil.rmtree(folder)
         return made
     _stage(image)
     return _both()
@@ -96,8 +101,9 @@ def _close(ours, theirs, tolerance=1e-3):
     assert (np.abs(ours - theirs) > tolerance).any(axis=-1).mean() <= 0.005
 
 
-def test_tiles(blender):
-    ours, theirs = blender.run(inside_tiles)
+@pytest.mark.parametrize("is_packed", (False, True), ids=("files", "packed"))
+def test_tiles(blender, is_packed):
+    ours, theirs = blender.run(inside_tiles, is_packed)
     _close(ours, theirs)
     assert "tiles" not in blender.output
 

@@ -95,17 +95,18 @@ class Images:
         paths = _tile_paths(image)
         found = []
         for number, path in paths:
-            if path or number == paths[0][0]:
+            packed = None if path else _packed_file(image, number)
+            if path or packed or number == paths[0][0]:
                 row, column = divmod(number - _FIRST_TILE, _TILES_PER_ROW)
-                found.append((column, row, self._id_of_path(image, path, False)))
+                found.append((column, row, self._id_of_path(image, path, False, tile=packed and number)))
         if len(found) < len(paths):
             self._warnings.add(f"Image '{image.name}': tiles without a file are shown as missing")
         return found
 
-    def _id_of_path(self, image, path, is_mip_mapped, frame=None):
-        """The library's image of a file of an image, or of its pixels where path is "": of a movie those of a
-        frame."""
-        key = (image.name_full, path, is_mip_mapped, *(() if frame is None else (frame,)))
+    def _id_of_path(self, image, path, is_mip_mapped, frame=None, tile=None):
+        """The library's image of a file of an image, or of what is in the .blend where path is "": of a movie the
+        pixels of a frame, of a tiled image that is packed the file of a tile."""
+        key = (image.name_full, path, is_mip_mapped, *(each for each in (frame, tile) if each is not None))
         keys, is_animated = self._asked
         keys.add(key)
         self._asked = keys, is_animated or image.source in _ANIMATED_SOURCES
@@ -116,16 +117,16 @@ class Images:
         self._seen.add(key)
         if frame is not None:
             turn_to(image, frame)
-        signature = self._signature(image, path)
+        signature = self._signature(image, path, tile)
         if known and known[0] == signature:
             return known[1]
-        self._entries[key] = (signature, self._create(image, path, is_mip_mapped))
+        self._entries[key] = (signature, self._create(image, path, is_mip_mapped, tile))
         if known and known[1]:
             self._scene.destroy_image(known[1])
         return self._entries[key][1]
 
-    def _signature(self, image, path):
-        return _signature(image, path) + (self._limit, working_space())
+    def _signature(self, image, path, tile=None):
+        return _signature(image, path, tile) + (self._limit, working_space())
 
     def _file_values(self, image, path, is_mip_mapped):
         """A file as keywords of create_image, but for its colour space."""
@@ -168,15 +169,17 @@ class Images:
             if image_id:
                 self._scene.destroy_image(image_id)
 
-    def _create(self, image, path, is_mip_mapped):
+    def _create(self, image, path, is_mip_mapped, tile):
         try:
             if path:
                 return self._from_file(image, path, is_mip_mapped)
-            if _is_packed(image):
+            packed = _packed_file(image, tile)
+            if packed:
                 with tempfile.TemporaryDirectory() as folder:
-                    path = os.path.join(folder, os.path.basename(image.filepath) or image.name)
+                    name = os.path.basename(image.filepath if tile is None else tile_path(image, tile))
+                    path = os.path.join(folder, name or image.name)
                     with open(path, "wb") as file:
-                        file.write(image.packed_file.data)
+                        file.write(packed.data)
                     return self._from_file(image, path, is_mip_mapped)
             return self._from_pixels(image, is_mip_mapped)
         except (native.TracerError, OSError, RuntimeError, MemoryError) as error:  # RuntimeError: of Blender
@@ -400,12 +403,16 @@ def has_files():
     return any(image.users and image.source in _FILE_SOURCES for image in bpy.data.images)
 
 
-def _is_packed(image):
-    """Whether the file inside the .blend is what the image shows."""
-    return image.source == 'FILE' and image.packed_file is not None and not image.is_dirty
+def _packed_file(image, tile=None):
+    """The file inside the .blend that the image shows, or a tile of that number; None: there is none."""
+    if image.is_dirty:
+        return None
+    if image.source == 'TILED':
+        return next((each.packed_file for each in image.packed_files if each.tile_number == tile), None)
+    return image.packed_file if image.source == 'FILE' else None
 
 
-def _signature(image, path):
+def _signature(image, path, tile):
     """Equal while the image's pixels and their meaning are."""
     meaning = (image.colorspace_settings.name, image.alpha_mode, path)
     if path:
@@ -414,7 +421,8 @@ def _signature(image, path):
         except OSError:  # gone since
             return meaning + (None,)
         return meaning + (status.st_mtime_ns, status.st_size)
-    if _is_packed(image):
-        return meaning + (zlib.crc32(image.packed_file.data),)
+    packed = _packed_file(image, tile)
+    if packed:
+        return meaning + (zlib.crc32(packed.data),)
     pixels = read_pixels(image)
     return meaning + ((0,) if pixels is None else (pixels.shape, zlib.crc32(pixels.tobytes())))
