@@ -65,6 +65,10 @@ LEAVES_BUMPS = bpy.app.version >= (4, 0, 0)
 # What lies in the shadow of bumps goes by other means; seen in 5.2, not in 4.3.
 HAS_FACET_SHADOWING = bpy.app.version >= (5, 0, 0)
 
+# Bumps of Window coordinates have their steps, along the picture's sides, along other directions of the
+# surface; seen in 5.2, not in 4.3.
+TURNS_WINDOW_BUMPS = bpy.app.version >= (5, 0, 0)
+
 # The strength of a normal map of tangents scales what the map says; seen in 4.3, not in 3.4.
 SCALES_NORMAL_MAPS = bpy.app.version >= (4, 0, 0)
 

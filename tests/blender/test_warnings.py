@@ -46,7 +46,7 @@ def test_worlds_of_view_layers(blender):
 
 def inside_fifth():
     """The warnings of what came with Blender 5 and is not there: a normal map below a displaced surface,
-    normals as they are; none of another working space."""
+    normals as they are, bumps by Window coordinates; none of another working space."""
     import bpy
     import scenes
     scenes.empty(size=(16, 16))
@@ -76,6 +76,12 @@ def inside_fifth():
     bpy.ops.wm.set_working_color_space(working_space='ACEScg')
     principled.inputs["Thin Film Thickness"].default_value = 300.0
     look()
+    place, noise, bump = [tree.nodes.new(f"ShaderNode{kind}") for kind in ("TexCoord", "TexNoise", "Bump")]
+    tree.links.new(noise.outputs[0], bump.inputs["Height"])
+    tree.links.new(bump.outputs[0], principled.inputs["Normal"])
+    for kind in ("Object", "Window"):
+        tree.links.new(place.outputs[kind], noise.inputs["Vector"])
+        look()
     return found
 
 
@@ -85,7 +91,8 @@ def test_what_came_with_the_fifth_is_named(blender):
         pytest.skip("nothing of it is there")
     assert blender.run(inside_fifth) == [
         [], ["Material 'Wall': Normal Map lies on the displaced surface, not on the original one"],
-        ["Material 'Wall': bent normals are corrected nonetheless"], []]
+        ["Material 'Wall': bent normals are corrected nonetheless"], [], [],
+        ["Material 'Wall': bumps by Window coordinates are not turned as those of Cycles 5 are"]]
 
 
 def inside_settings_of_worlds():

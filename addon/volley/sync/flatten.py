@@ -120,6 +120,21 @@ class Walker:
         self.flat.nodes.append(FlatNode(node_type, inputs, mode, image, name, table))
         return len(self.flat.nodes) - 1
 
+    def depends_on(self, value, node_type, name):
+        """Whether an output of that name of a node of that type is among what a value is made of."""
+        waiting, seen = [value.node], set()
+        while waiting:
+            index = waiting.pop()
+            if index < 0 or index in seen:
+                continue
+            seen.add(index)
+            for source, number, _constant in self.flat.nodes[index].inputs:
+                if source >= 0 and self.flat.nodes[source].type == node_type:
+                    if output(source, node_type, name).output == number:
+                        return True
+                waiting.append(source)
+        return False
+
     def emit_displacement(self, socket, mode):
         """Append the output for what comes to a socket of a tree's end."""
         vector = self.convert(self.input_value(socket, ()), 'v')

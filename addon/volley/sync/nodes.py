@@ -16,7 +16,7 @@ from ..abi import (BlendMode, BumpMode, ClampType, DiffuseModel, DistributionTyp
                    RampInterpolation, SeparateMode, SpaceId, TableSize, TangentSource, ToonComponent,
                    VectorOperation as Vector)
 from ..compat import (HAS_CORRELATED_MICROFACETS, HAS_FILMED_METAL, HAS_UNIT_NORMALS, HAS_WHOLE_COAT,
-                      KEEPS_DIFFUSE_ENERGY, LEAVES_BUMPS, RAMP_STEPS, SCALES_NORMAL_MAPS)
+                      KEEPS_DIFFUSE_ENERGY, LEAVES_BUMPS, RAMP_STEPS, SCALES_NORMAL_MAPS, TURNS_WINDOW_BUMPS)
 from . import tangents
 from .converters import CONVERTERS, instance_value, strand_random
 from .derived import ISLAND, POINTINESS
@@ -575,8 +575,10 @@ def _bump(walker, node, sockets):
     """Before it had a filter width, the height was taken a whole pixel apart."""
     has_width = sockets.find("Filter Width") is not None
     width = sockets.get('f', "Filter Width") if has_width else _constant('f', 1.0)
-    values = (sockets.get('f', "Strength"), sockets.get('f', "Distance"), width,
-              sockets.get('f', "Height"), sockets.get('v', "Normal"))
+    height = sockets.get('f', "Height")
+    if TURNS_WINDOW_BUMPS and walker.depends_on(height, NodeType.TEXTURE_COORDINATE, "window"):
+        walker.warn("bumps by Window coordinates are not turned as those of Cycles 5 are")
+    values = (sockets.get('f', "Strength"), sockets.get('f', "Distance"), width, height, sockets.get('v', "Normal"))
     mode = (BumpMode.INVERT if node.invert else 0) | (0 if LEAVES_BUMPS else BumpMode.ABOVE)
     return named_outputs(walker.emit(NodeType.BUMP, values, mode), NodeType.BUMP, ("Normal",))
 
