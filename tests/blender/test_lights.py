@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every kind of light over a grid of its parameters beside Cycles: a ball and a box on a floor. Means
-within 1 %, and no tile that several seeds find off by as much. The table goes to results/lights.txt of the
-build."""
+"""Every kind of light over a grid of its parameters beside Cycles: a ball and a box on a floor. Means within 1
+%, and no tile further off than noise explains by as much. The table goes to results/lights.txt of the build."""
 
 import itertools
 

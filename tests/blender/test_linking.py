@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Light linking and shadow linking beside Cycles: every kind of light, receivers and blockers that are
-included and excluded, themselves, by collections and by what instances them, seen directly, in mirrors and
-through rough gloss. Means within 1 %, and no tile that several seeds find off by as much. The table goes to
+"""Light linking and shadow linking beside Cycles: every kind of light, receivers and blockers that are included
+and excluded, themselves, by collections and by what instances them, seen directly, in mirrors and through rough
+gloss. Means within 1 %, and no tile further off than noise explains by as much. The table goes to
 results/linking.txt of the build."""
 
 import blender as blender_support

@@ -12,7 +12,7 @@ pytestmark = pytest.mark.since(*SINCE)
 
 SEEDS = (11, 12, 13, 14, 15, 16)
 SAMPLES = 64       # of each seed
-TOLERANCE = 0.01   # of the mean, and of the mean of tiles that the seeds find biased, over the picture's mean
+TOLERANCE = 0.01   # of the mean, and of tiles beyond noise, over the picture's mean
 FILM_TOLERANCE = 1e-6
 _ROOM = 40.0       # m to the other room
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Principled's Thin Wall of Blender 5.2 beside Cycles: panes and a ball of it before a patterned wall and over a floor
-that they shade, and in a mirror. Means within 1 %, and no tile that several seeds find off by as much. The table goes
-to results/thin_wall.txt of the build."""
+"""Principled's Thin Wall of Blender 5.2 beside Cycles: panes and a ball of it before a patterned wall and over
+a floor that they shade, and in a mirror. Means within 1 %, and no tile further off than noise explains by as
+much. The table goes to results/thin_wall.txt of the build."""
 
 import blender as blender_support
 import compare

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Nodes that trace rays beside Cycles: Ambient Occlusion, Bevel, and Raycast from Blender 5.1 on, seen directly as
-emission and in a mirror, and as what lights and colours surfaces. Means within 1 %, and no tile that several seeds
-find off by as much. The table goes to results/tracing_nodes.txt of the build."""
+"""Nodes that trace rays beside Cycles: Ambient Occlusion, Bevel, and Raycast from Blender 5.1 on, seen directly
+as emission and in a mirror, and as what lights and colours surfaces. Means within 1 %, and no tile further off
+than noise explains by as much. The table goes to results/tracing_nodes.txt of the build."""
 
 import blender as blender_support
 import compare
