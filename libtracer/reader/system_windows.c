@@ -39,7 +39,7 @@ bool connection_send(struct connection *connection, const void *bytes, size_t si
     return true;
 }
 
-/* There is no such limit of a process itself. */
+/* The library limits its processes: trc_process_limit_memory. */
 void system_limit_memory(uint64_t bytes) { (void)bytes; }
 
 /* The stream from where it was inherited; what libraries print goes nowhere from here on. */

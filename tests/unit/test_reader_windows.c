@@ -108,6 +108,32 @@ static void programs_that_are_none(void **state) {
     }
 }
 
+/* wine takes limits of jobs and forgets them. */
+static bool system_has_limits(void) {
+    JOBOBJECT_EXTENDED_LIMIT_INFORMATION limits = {.ProcessMemoryLimit = 1 << 30};
+    limits.BasicLimitInformation.LimitFlags = JOB_OBJECT_LIMIT_PROCESS_MEMORY;
+    const HANDLE job = CreateJobObjectW(NULL, NULL);
+    assert_non_null(job);
+    assert_true(
+        SetInformationJobObject(job, JobObjectExtendedLimitInformation, &limits, sizeof limits));
+    memset(&limits, 0, sizeof limits);
+    assert_true(QueryInformationJobObject(job, JobObjectExtendedLimitInformation, &limits,
+                                          sizeof limits, NULL));
+    CloseHandle(job);
+    return limits.ProcessMemoryLimit == 1 << 30;
+}
+
+static void memory_is_limited(void **state) {
+    (void)state;
+    if (!system_has_limits())
+        skip();
+    struct trc_image_reader *reader = reader_of(TRC_BAD_READER, LONG_PATIENCE);
+    struct trc_image *image;
+    assert_int_equal(load(reader, "swells", &image), TRC_ERROR_OUT_OF_MEMORY);
+    loads_good(reader);
+    trc_image_reader_release(reader);
+}
+
 static DWORD count_handles(void) {
     DWORD count = 0;
     assert_true(GetProcessHandleCount(GetCurrentProcess(), &count));
@@ -156,9 +182,8 @@ static void every_allocation_fails(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(processes_that_misbehave),
-        cmocka_unit_test(programs_that_are_none),
-        cmocka_unit_test(nothing_is_left),
+        cmocka_unit_test(processes_that_misbehave), cmocka_unit_test(programs_that_are_none),
+        cmocka_unit_test(memory_is_limited),        cmocka_unit_test(nothing_is_left),
         cmocka_unit_test(every_allocation_fails),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

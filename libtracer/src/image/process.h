@@ -57,6 +57,10 @@ trc_status trc_process_create(struct trc_launcher *launcher, size_t shared_bytes
 /* Ends the process in whatever state it is, and frees all; how it had ended if it had. */
 struct trc_process_exit trc_process_destroy(struct trc_process *process);
 
+/* Has memory refused to the process that goes so many bytes beyond what it had at its start. Where
+ * the program can set that limit itself (POSIX) it does, and this changes nothing. */
+void trc_process_limit_memory(struct trc_process *process, uint64_t bytes);
+
 /* Its content may change at any time, as the process likes. */
 void *trc_process_shared(const struct trc_process *process);
 

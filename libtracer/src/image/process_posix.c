@@ -371,6 +371,10 @@ enum trc_received trc_process_receive(struct trc_process *process, void *bytes, 
     return receive_bytes(process->stream, bytes, size, seconds);
 }
 
+void trc_process_limit_memory(struct trc_process *process, uint64_t bytes) {
+    (void)process, (void)bytes;
+}
+
 bool trc_process_is_idle(const struct trc_process *process) {
     char byte;
     const ssize_t got = recv(process->stream, &byte, 1, MSG_DONTWAIT | MSG_PEEK);

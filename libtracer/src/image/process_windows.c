@@ -7,7 +7,10 @@
 #include <string.h>
 
 #define WIN32_LEAN_AND_MEAN
+#define PSAPI_VERSION 2 /* of the system's own library */
 #include <windows.h>
+
+#include <psapi.h>
 
 #include "core/checks.h"
 #include "core/core.h"
@@ -124,6 +127,8 @@ struct trc_launcher {
 struct trc_process {
     struct trc_launcher *launcher; /* held */
     HANDLE process;
+    HANDLE job; /* inside that of the launcher, for the limit of memory; NULL: there is none */
+    uint64_t own_bytes; /* committed at its start */
     struct stream stream;
     HANDLE block;
     void *shared;
@@ -138,13 +143,18 @@ static void launcher_release(struct trc_launcher *launcher) {
     trc_free(launcher);
 }
 
+static void limit_job(HANDLE job, DWORD flags, uint64_t memory_bytes) {
+    JOBOBJECT_EXTENDED_LIMIT_INFORMATION limits = {.ProcessMemoryLimit = (SIZE_T)memory_bytes};
+    limits.BasicLimitInformation.LimitFlags = flags;
+    SetInformationJobObject(job, JobObjectExtendedLimitInformation, &limits, sizeof limits);
+}
+
 static HANDLE create_job(void) {
     const HANDLE job = CreateJobObjectW(NULL, NULL);
-    JOBOBJECT_EXTENDED_LIMIT_INFORMATION limits = {0};
-    limits.BasicLimitInformation.LimitFlags =
-        JOB_OBJECT_LIMIT_KILL_ON_JOB_CLOSE | JOB_OBJECT_LIMIT_DIE_ON_UNHANDLED_EXCEPTION;
     if (job)
-        SetInformationJobObject(job, JobObjectExtendedLimitInformation, &limits, sizeof limits);
+        limit_job(job,
+                  JOB_OBJECT_LIMIT_KILL_ON_JOB_CLOSE | JOB_OBJECT_LIMIT_DIE_ON_UNHANDLED_EXCEPTION,
+                  0);
     return job;
 }
 
@@ -275,6 +285,7 @@ static void process_free(struct trc_process *process) {
     if (process->process)
         TerminateProcess(process->process, KILLED_CODE);
     close_handle(process->process);
+    close_handle(process->job);
     stream_close(&process->stream);
     if (process->shared)
         UnmapViewOfFile(process->shared);
@@ -300,6 +311,19 @@ static trc_status process_start(struct trc_process *process, size_t shared_bytes
     return status;
 }
 
+/* Prepares trc_process_limit_memory: a process that cannot have a job of its own goes without. */
+static void measure_own(struct trc_process *process) {
+    PROCESS_MEMORY_COUNTERS counters = {.cb = sizeof counters};
+    if (!GetProcessMemoryInfo(process->process, &counters, sizeof counters))
+        return;
+    process->own_bytes = counters.PagefileUsage;
+    process->job = CreateJobObjectW(NULL, NULL);
+    if (process->job && !AssignProcessToJobObject(process->job, process->process)) {
+        CloseHandle(process->job);
+        process->job = NULL;
+    }
+}
+
 trc_status trc_process_create(struct trc_launcher *launcher, size_t shared_bytes, double seconds,
                               struct trc_process **process_out) {
     struct trc_process *process = trc_alloc_zeroed(1, sizeof *process);
@@ -318,6 +342,8 @@ trc_status trc_process_create(struct trc_launcher *launcher, size_t shared_bytes
                                                                : NULL;
         if (reason)
             status = trc_fail(TRC_ERROR_UNSUPPORTED, "%s", reason);
+        else
+            measure_own(process);
     }
     if (status == TRC_ERROR_UNSUPPORTED)
         atomic_store(&launcher->is_sound, false);
@@ -339,6 +365,13 @@ struct trc_process_exit trc_process_destroy(struct trc_process *process) {
     exit.code = (int32_t)code;
     process_free(process);
     return exit;
+}
+
+void trc_process_limit_memory(struct trc_process *process, uint64_t bytes) {
+    const uint64_t room = SIZE_MAX - process->own_bytes;
+    if (process->job)
+        limit_job(process->job, JOB_OBJECT_LIMIT_PROCESS_MEMORY,
+                  process->own_bytes + (bytes < room ? bytes : room));
 }
 
 void *trc_process_shared(const struct trc_process *process) { return process->shared; }

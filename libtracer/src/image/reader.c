@@ -335,6 +335,10 @@ static uint64_t pixel_bytes_max(const struct file_call *file) {
     return PICTURE_BYTES + PICTURE_BYTES_PER_FILE_BYTE * file->file_bytes;
 }
 
+static uint64_t picture_bytes(const struct trc_reader_answer *info) {
+    return (uint64_t)info->width * info->height * info->channels * channel_bytes[info->format];
+}
+
 /* Sizes are as the file claims. */
 static trc_status check_info(struct call *call, const struct file_call *file,
                              const struct trc_reader_answer *answer) {
@@ -342,9 +346,7 @@ static trc_status check_info(struct call *call, const struct file_call *file,
         answer->is_unassociated > 1 || !answer->width || !answer->height)
         return lost(call, LOSS_NONSENSE);
     TRC_TRY(trc_image_check_size(answer->width, answer->height, answer->format, call->object));
-    const uint64_t bytes =
-        (uint64_t)answer->width * answer->height * answer->channels * channel_bytes[answer->format];
-    return bytes <= pixel_bytes_max(file) ? TRC_OK : lost(call, LOSS_NONSENSE);
+    return picture_bytes(answer) <= pixel_bytes_max(file) ? TRC_OK : lost(call, LOSS_NONSENSE);
 }
 
 static trc_status take_rows(struct call *call, const struct file_call *file,
@@ -381,9 +383,13 @@ static trc_status call_file(struct call *call, void *context) {
         .pixel_bytes_max = pixel_bytes_max(file),
         .text_bytes = {(uint32_t)strlen(file->path) + 1}};
     memcpy(trc_process_shared(call->process), file->path, request.text_bytes[0]);
+    trc_process_limit_memory(call->process, request.memory_bytes);
     TRC_TRY(send_request(call, &request));
     TRC_TRY(take_answer(call, TRC_READER_INFO, &answer));
     TRC_TRY(check_info(call, file, &answer));
+    const uint64_t wanted = request.memory_bytes + MEMORY_PER_BYTE * picture_bytes(&answer);
+    trc_process_limit_memory(call->process,
+                             wanted < request.memory_bytes_max ? wanted : request.memory_bytes_max);
     const struct trc_file_info info = {.width = answer.width,
                                        .height = answer.height,
                                        .channels = answer.channels,
@@ -472,6 +478,7 @@ static trc_status call_colors(struct call *call, void *context) {
     char *text = trc_process_shared(call->process);
     memcpy(text, color->config, request.text_bytes[0]);
     memcpy(text + request.text_bytes[0], color->space, request.text_bytes[1]);
+    trc_process_limit_memory(call->process, request.memory_bytes);
     TRC_TRY(send_request(call, &request));
     TRC_TRY(take_answer(call, TRC_READER_DONE, &answer));
     if (answer.is_identity)

@@ -19,6 +19,9 @@
 #include "system.h"
 #include "tracer/base.h"
 
+/* More than a small file's reader may take. */
+#define SWOLLEN_BYTES ((size_t)3 << 30)
+
 /* Files that this process has been asked for before. */
 static int served;
 
@@ -179,7 +182,13 @@ static void serve_file(struct connection *to, const char *path) {
     } else if (!strcmp(name, "talks_on")) {
         serve_good(to);
         reply(to, first);
-#ifndef _WIN32
+#ifdef _WIN32
+    } else if (!strcmp(name, "swells")) {
+        if (VirtualAlloc(NULL, SWOLLEN_BYTES, MEM_COMMIT | MEM_RESERVE, PAGE_READWRITE))
+            serve_good(to);
+        else
+            reply(to, failed(TRC_ERROR_OUT_OF_MEMORY, "no memory"));
+#else
     } else if (!strcmp(name, "kills_launcher")) {
         (void)kill(getppid(), SIGKILL);
         hang();
