@@ -100,7 +100,7 @@ def test_clamps(blender):
         for name, (ours, theirs) in pairs.items():
             whole, tiles = compare.unexplained(ours, theirs)
             lines.append(f"{direct:6g} {indirect:8g} {name:13} {theirs.mean():9.3g} {whole:10.2e} {tiles:10.2e}")
-            errors[f"{name}, direct {direct:g}, indirect {indirect:g}"] = whole / theirs.mean()
+            errors[f"{name}, direct {direct:g}, indirect {indirect:g}"] = whole / (theirs.mean() or 1.0)
     blender_support.write_result("clamps", lines, errors)
     for pairs in clamped.values():
         for name, pair in pairs.items():

@@ -125,7 +125,7 @@ def test_gallery(blender):
     def compare_means(name, ours, theirs):
         off = compare.unexplained(ours, theirs)
         lines.append(f"{name:9} {theirs.mean():9.3g} {off[0]:10.2e} {off[1]:16.2e}")
-        errors[name] = off[0] / theirs.mean()
+        errors[name] = off[0] / (theirs.mean() or 1.0)
         assert off[0] <= LIGHT_OFF[0] and off[1] <= LIGHT_OFF[1], lines[-1]
 
     for name in ("Depth", "Position", "IndexOB", "IndexMA"):
