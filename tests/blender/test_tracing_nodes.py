@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Nodes that trace rays beside Cycles: Ambient Occlusion, Bevel, and Raycast from Blender 5.1 on, seen directly
-as emission and in a mirror, and as what lights and colours surfaces. Means within 1 %, and no tile further off
-than noise explains by as much. The table goes to results/tracing_nodes.txt of the build."""
+as emission and in a mirror, and as what lights and colours surfaces. Means and tiles within 1 %, beyond what
+noise explains. The table goes to results/tracing_nodes.txt of the build."""
 
 import blender as blender_support
 import compare
@@ -160,8 +160,8 @@ def _parameter(name):
 def test_against_cycles(errors, name):
     if name not in errors:
         pytest.skip("this Blender has no such node")
-    mean, _biased, tile = errors[name]
-    assert mean < TOLERANCE
+    _mean, biased, tile = errors[name]
+    assert biased < TOLERANCE
     assert tile < TOLERANCE
 
 
