@@ -13,7 +13,7 @@ SAMPLES = 64
 # that are rare and bright, at edges and in mirrors, tell their noise badly.
 OFF = 5e-4, 0.01
 LIGHT_OFF = 1e-3, 0.03  # of light seen in mirrors .019, beside 4.3 as beside 3.4; the rest 4e-6
-SHADOW_OFF = 2e-3, 0.08  # on rough metal it ends a little before that of Cycles does
+SHADOW_OFF = 3e-3, 0.1  # on rough metal it ends a little before that of Cycles does
 
 
 def _scene(size=(96, 64)):
