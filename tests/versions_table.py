@@ -67,8 +67,8 @@ def lines_of(measured):
     columns = list(measured.values())
     lines = ["# How far Volley is from Cycles, in each Blender", "",
              "Written by `tests/versions_table.py` from what `tests/blender` measures with diffuse bounces 0; each",
-             "Blender beside its own Cycles. Cells: the number of cases, and the largest error among them. Noise of",
-             "a few samples is part of it. The limits and their reasons stand in the tests.", "",
+             "Blender beside its own Cycles. Cells: the number of cases, and the largest error among them, of tiles",
+             "what is beyond noise, of means with it. The limits and their reasons stand in the tests.", "",
              f"| what | error of | {heads} |", "|---|---|" + "---|" * len(columns)]
     for name, (what, measure) in TABLES.items():
         cells = " | ".join(summary(column.get(name)) for column in columns)

@@ -89,7 +89,7 @@ def test_against_cycles(pictures, name):
     assert theirs.max() > 0.05
     error = np.abs(ours - theirs) / (theirs.max(axis=-1, keepdims=True) + 1e-2 * theirs.max())
     assert (error > TOLERANCE).any(axis=-1).mean() < 0.005, f"{error.max():.2e}"
-    assert ours.mean(axis=(0, 1)) == pytest.approx(theirs.mean(axis=(0, 1)), rel=1e-3)
+    assert ours.mean(axis=(0, 1)) == pytest.approx(theirs.mean(axis=(0, 1)), rel=2e-3)
 
 
 def test_hosek_is_about_as_bright(pictures):
