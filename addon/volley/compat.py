@@ -8,6 +8,20 @@ of Blender's own Cycles add-on; they are read where that add-on is enabled, else
 import math
 
 import bpy
+from mathutils import Vector
+
+
+def _is_buffer(value):
+    """Whether its bytes can be read without making objects of its numbers."""
+    try:
+        memoryview(value)
+    except TypeError:
+        return False
+    return True
+
+
+# Of float32; seen in 5.2, not in 4.3.
+VECTORS_ARE_BUFFERS = _is_buffer(Vector())
 
 # Render passes were renamed in 5.0, which leaves nothing to look at but the version.
 HAS_LONG_PASS_NAMES = bpy.app.version >= (5, 0, 0)

@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 
 from .. import abi
+from ..compat import VECTORS_ARE_BUFFERS
 from . import curves
 from .mesh import active_color_name, attribute_colors, wanted_uv_layers
 
@@ -64,16 +65,14 @@ class Hair:
         if modifier is None:
             return None
         system = modifier.particle_system
-        settings, place = system.settings, system.co_hair
+        settings = system.settings
         steps = (1 << (settings.render_step if self._is_final else settings.display_step)) + 1
         if settings.kink == 'SPIRAL':
             steps += settings.kink_extra_steps
         shown = _shown_strands(system)
         if not shown:
             return None
-        # Numbers one by one: of vectors, numpy takes five times as long.
-        places = (place(real, particle_no=number, step=step) for number in shown for step in range(steps))
-        keys = np.fromiter(chain.from_iterable(places), np.float64, 3 * steps * len(shown)).reshape(-1, 3)
+        keys = _places(real, system, shown, steps)
         matrix = np.array(real.matrix_world.inverted_safe())  # particles are in the world
         keys = keys @ matrix[:3, :3].T + matrix[:3, 3]
         strands = curves.Strands(keys, np.zeros(len(keys)), np.full(len(keys) // steps, steps))
@@ -138,6 +137,18 @@ def _shown_strands(system):
     parent_count, child_count = len(system.particles), len(system.child_particles)
     first = parent_count if child_count and not system.settings.use_parent_particles else 0
     return range(first, parent_count + child_count)
+
+
+def _places(real, system, strands, steps):
+    """(keys, 3) float64: where the keys of strands are in the world. Blender gives them one by one alone."""
+    place, each = system.co_hair, range(steps)
+    vectors = ([place(real, particle_no=number, step=step) for step in each] for number in strands)
+    if VECTORS_ARE_BUFFERS:
+        keys = np.frombuffer(b"".join(map(b"".join, vectors)), np.float32).astype(np.float64)
+    else:  # numbers one by one: of vectors, numpy takes five times as long
+        numbers = chain.from_iterable(chain.from_iterable(vectors))
+        keys = np.fromiter(numbers, np.float64, 3 * steps * len(strands))
+    return keys.reshape(-1, 3)
 
 
 def _in_box(points, middle, half):
