@@ -9,6 +9,7 @@ import numpy as np
 SAMPLES = 64
 # Beyond the noise that the seeds show, of pictures' means and of tiles' (see compare.unexplained): nothing is seen.
 OFF = 1e-4, 1e-3
+TUBE_OFF = 1e-3, 2e-3  # of normals of 3D curves, whose pieces are straight
 
 
 def _both(samples=SAMPLES):
@@ -334,11 +335,132 @@ def inside_shapes():
     return pictures
 
 
-def _agree(pictures):
+# Of one kind of strands: what the first sample says (pixels whose samples are all in their middle), and means. By
+# their names before Blender 5.
+FIRST_PASSES = ("Depth", "Position", "IndexOB", "IndexMA")
+MEAN_PASSES = ("Combined", "Normal", "UV", "DiffCol", "DiffDir", "Emit", "Env", "Mist")
+LOBE_PASSES = {'RIBBONS': ("GlossCol", "GlossDir"), 'THICK': ("TransCol", "TransDir")}
+FIRST_SHARE = 2e-3  # of pixels that may be off, by more than that share of the largest:
+FIRST_STEPS = {'RIBBONS': 2e-3, 'THICK': 0.02}  # pieces are off by a tenth of a radius at most, which slants lengthen
+PASS_OFF = 1e-3, 0.01
+
+
+def _sharpened(names):
+    """Passes of samples in the middles of pixels; the filter is as before after it."""
+    import bpy
+    import scenes
+    owners = bpy.context.scene.volley, bpy.context.scene.cycles
+    before = [(owner.pixel_filter_type, owner.filter_width) for owner in owners]
+    scenes.sharpen()
+    found = scenes.passes_by_both(names, 4)
+    for owner, (kind, width) in zip(owners, before):
+        owner.pixel_filter_type, owner.filter_width = kind, width
+    return found
+
+
+def inside_passes():
+    """{shape of strands: ({pass: both}, {pass of first samples: both}, both Vectors, mattes of both)}"""
+    import bpy
+    import scenes
+    from volley import passes
+    scene = scenes.empty(size=(64, 48))
+    scenes.camera(location=(0.0, -7.0, 0.0))
+    scenes.light('SUN', energy=3.0, angle=0.2, rotation=(0.9, 0.3, 0.2))
+    scenes.world_color(scene.world, (0.3, 0.4, 0.5))
+    ball, hair = _haired(count=60, radius_scale=0.15)
+    _paint(ball.data)
+    ball.pass_index = 3
+    strand = bpy.data.materials["Hair"]
+    strand.pass_index = 5
+    layer = bpy.context.view_layer
+    for entry in passes.PASSES:
+        if "." not in entry.setting:
+            setattr(layer, entry.setting, True)
+    found = {}
+    # Two kinds of lobes each: of a third in the same direction, Volley's passes take the light by the ray's kind.
+    for shape, kind in (('RIBBONS', "ShaderNodeBsdfGlossy"), ('THICK', "ShaderNodeBsdfHair")):
+        scene.cycles_curves.shape = shape
+        _add_to_diffuse(strand, kind)
+        layer.use_pass_cryptomatte_object = layer.use_pass_cryptomatte_material = False
+        means = scenes.passes_by_both(MEAN_PASSES + LOBE_PASSES[shape], SAMPLES)
+        first = _sharpened(FIRST_PASSES)
+        layer.use_pass_cryptomatte_object = layer.use_pass_cryptomatte_material = True
+        mattes = scenes.passes_by_both(("CryptoObject00", "CryptoMaterial00"), SAMPLES)
+        found[shape] = means, first, mattes
+    for frame, shift in ((0, -0.4), (2, 0.9)):
+        ball.location.x, ball.rotation_euler.y = shift, 0.5 * shift
+        for path in ("location", "rotation_euler"):
+            ball.keyframe_insert(path, frame=frame)
+    scene.frame_set(1)
+    hair.kink = 'WAVE'
+    _keyed(hair, "kink_amplitude", (0.0, 0.4))
+    return found, _sharpened(["Vector"])["Vector"]
+
+
+def _add_to_diffuse(material, node_type):
+    """A second shader beside a material's first one: gloss, or light through strands."""
+    tree = material.node_tree
+    add, more = tree.nodes.new("ShaderNodeAddShader"), tree.nodes.new(node_type)
+    more.inputs["Color"].default_value = (0.2, 0.1, 0.3, 1.0)
+    if node_type == "ShaderNodeBsdfHair":
+        more.component = 'Transmission'
+    else:
+        more.inputs["Roughness"].default_value = 0.5
+    for number, node in enumerate((tree.nodes["Diffuse BSDF"], more)):
+        tree.links.new(node.outputs[0], add.inputs[number])
+    tree.links.new(add.outputs[0], tree.nodes["Material Output"].inputs["Surface"])
+
+
+def inside_masks():
+    """Strands that are holdouts, that catch shadows, and what they throw on a catcher."""
+    import bpy
+    import scenes
+    scene = scenes.empty(size=(64, 48))
+    scene.render.film_transparent = True
+    scenes.camera(location=(0.0, -7.0, 0.0))
+    scenes.light('SUN', energy=3.0, angle=0.2, rotation=(0.9, 0.3, 0.2))
+    wall = scenes.wall("Back", 20.0, 1.0, material=scenes.material("Wall", "ShaderNodeBsdfDiffuse"))
+    ball, _hair = _haired(count=60, radius_scale=0.15)
+    pictures = {}
+    wall.is_shadow_catcher = True
+    pictures["shadows on a catcher"] = scenes.seeds_by_both(SAMPLES)
+    wall.is_shadow_catcher = False
+    ball.is_holdout = True
+    pictures["holdout"] = scenes.seeds_by_both(SAMPLES)
+    ball.is_holdout = False
+    ball.is_shadow_catcher = True
+    wall.hide_render = True
+    scenes.sphere("Shade", 0.4, (0.6, -1.5, 0.9), material=scenes.emitter((0.1, 0.2, 0.3), "Shade"))
+    pictures["strands that catch shadows"] = scenes.seeds_by_both(SAMPLES)
+    return pictures
+
+
+def inside_outputs():
+    """What nodes tell of strands: Hair Info, Texture Coordinate, Geometry, Object Info."""
+    import bpy
+    import scenes
+    scenes.empty(size=(64, 48))
+    scenes.camera(location=(0.0, -7.0, 0.0))
+    scenes.wall("Back", 20.0, 4.0, material=scenes.emitter((0.3, 0.3, 0.4), "Grey"))
+    ball, _hair = _haired(count=60, radius_scale=0.15, length_random=0.8)
+    ball.rotation_euler, ball.scale = (0.2, 0.4, 0.1), (1.0, 0.8, 1.2)
+    material, pictures = bpy.data.materials["Hair"], {}
+    for kind, outputs in (("ShaderNodeHairInfo", ("Length", "Thickness")),
+                          ("ShaderNodeTexCoord", ("Generated", "Object", "Normal", "Camera")),
+                          ("ShaderNodeNewGeometry", ("Position", "Normal", "Incoming", "True Normal", "Backfacing"))):
+        for output in outputs:
+            pictures[output] = _shown(material, kind, output)
+    bpy.context.scene.cycles_curves.shape = 'THICK'
+    for output in ("Generated", "Normal"):
+        pictures[f"{output} of 3D curves"] = _shown(material, "ShaderNodeTexCoord", output)
+    return pictures
+
+
+def _agree(pictures, off=OFF):
     for name, (ours, theirs) in pictures.items():
         assert theirs.std() > 0.02, f"{name}: the picture shows nothing"
         whole, tile = compare.unexplained(ours, theirs)
-        assert whole <= OFF[0] and tile <= OFF[1], name
+        assert whole <= off[0] and tile <= off[1], name
 
 
 def test_hair(blender):
@@ -372,3 +494,51 @@ def test_shapes_are_those_of_the_scene_that_is_rendered(blender):
         assert np.array_equal(followed, fresh)
         assert np.array_equal(from_other, own)
         assert before is None or not np.array_equal(own, before[3]), "the shape is not seen"
+
+
+def test_what_nodes_tell_of_strands(blender):
+    _agree(blender.run(inside_outputs), TUBE_OFF)
+
+
+def test_masks(blender):
+    for name, (ours, theirs) in blender.run(inside_masks).items():
+        assert 0.02 < theirs[..., 3].mean() < 0.98, f"{name}: the picture shows nothing"
+        _pass_is_near(ours, theirs, name)
+
+
+def _off_pixels(ours, theirs, step):
+    """The share of pixels that are apart."""
+    ours, theirs = ours[..., :3], theirs[..., :3]
+    assert theirs.any()
+    return (np.abs(ours - theirs) > step * np.abs(theirs).max()).any(axis=-1).mean()
+
+
+def _coverages(ranks):
+    """{id: (seeds, height, width, 1) of what it covers} in the first two ranks."""
+    ids, parts = ranks[..., 0::2], ranks[..., 1::2]
+    return {float(number): np.where(ids == number, parts, 0.0).sum(axis=-1)[..., None]
+            for number in np.unique(ids) if number != 0.0}
+
+
+def _pass_is_near(ours, theirs, name):
+    assert theirs.any(), name
+    whole, tile = compare.unexplained(ours, theirs)
+    assert whole <= PASS_OFF[0] and tile <= PASS_OFF[1], name
+
+
+def test_passes(blender):
+    found, vectors = blender.run(inside_passes, timeout=300)
+    for shape, (means, first, mattes) in found.items():
+        for name, (ours, theirs) in first.items():
+            assert _off_pixels(ours, theirs, FIRST_STEPS[shape]) <= FIRST_SHARE, f"{name}, {shape}"
+        for light in [name for name in means if name.endswith("Dir")]:  # times its colour: both are noise at edges
+            colors = means[light.replace("Dir", "Col")]
+            means[light] = [side * color for side, color in zip(means[light], colors)]
+        for name, (ours, theirs) in means.items():
+            _pass_is_near(ours[..., :3], theirs[..., :3], f"{name}, {shape}")
+        for name, count in (("CryptoObject00", 1), ("CryptoMaterial00", 2)):
+            ours, theirs = map(_coverages, mattes[name])
+            assert ours.keys() == theirs.keys() and len(ours) == count, name
+            for number in theirs:
+                _pass_is_near(ours[number], theirs[number], f"{name}, {shape}")
+    assert _off_pixels(*vectors, FIRST_STEPS['THICK']) <= 3 * FIRST_SHARE

@@ -13,6 +13,7 @@
 #include "kernels/program/table.h"
 #include "kernels/program/texture.h"
 #include "kernels/program/tracing.h"
+#include "kernels/trace/curve_surface.h"
 
 /* Operations that depend on inputs alone. Long because it is the list of them; true if op is one.
  */
@@ -131,7 +132,7 @@ static void run_at_surface(const struct trc_surface *s, const struct trc_instruc
         v3_write(out, s->n);
         break;
     case TRC_OP_TRUE_NORMAL:
-        v3_write(out, s->ng);
+        v3_write(out, trc_curve_true_normal(s));
         break;
     case TRC_OP_INCOMING:
         v3_write(out, s->wo);

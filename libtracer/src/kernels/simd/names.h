@@ -50,6 +50,7 @@
 #define trc_clock_shade(...) TRC_KERNEL(trc_clock_shade)(__VA_ARGS__)
 #define trc_clock_trace(...) TRC_KERNEL(trc_clock_trace)(__VA_ARGS__)
 #define trc_curve_along(...) TRC_KERNEL(trc_curve_along)(__VA_ARGS__)
+#define trc_curve_true_normal(...) TRC_KERNEL(trc_curve_true_normal)(__VA_ARGS__)
 #define trc_curve_fetch(...) TRC_KERNEL(trc_curve_fetch)(__VA_ARGS__)
 #define trc_curve_lanes(...) TRC_KERNEL(trc_curve_lanes)(__VA_ARGS__)
 #define trc_data_passes(...) TRC_KERNEL(trc_data_passes)(__VA_ARGS__)

@@ -115,6 +115,17 @@ vvec3 trc_curve_along(const struct trc_surface *s, vmask lanes) {
         trc_transform_vector(&m.to_world, along_of(raw, raw_column(raw, RAW_AT(u)))));
 }
 
+vvec3 trc_curve_true_normal(const struct trc_surface *s) {
+    uint32_t ribbons = 0;
+    for (uint32_t lanes = vm_bits(vm_and(s->active, trc_on_strand(s))); lanes; lanes &= lanes - 1) {
+        const int lane = __builtin_ctz(lanes);
+        const struct trc_instance *instance = &s->snapshot->instances[vi_get(s->instance, lane)];
+        const bool is_ribbon = s->snapshot->meshes[instance->mesh]->shape == TRC_SHAPE_RIBBONS;
+        ribbons |= (uint32_t)is_ribbon << lane;
+    }
+    return v3_select(vm_from_bits(ribbons), s->wo, s->ng);
+}
+
 /* The normal of a ball from how far the ray passes its middle, across (kernels/trace/curve.h). */
 static vvec3 ball_normal(vvec3 d, vfloat x, vfloat y, vfloat front) {
     const vfloat ax = vf_abs(d.x), ay = vf_abs(d.y), az = vf_abs(d.z);

@@ -14,4 +14,8 @@ void trc_curve_fetch(struct trc_surface *s, vmask lanes);
 /* Of a surface that was fetched, of those lanes: along the strand in the world, unit. */
 vvec3 trc_curve_along(const struct trc_surface *s, vmask lanes);
 
+/* The true normal of a surface that was fetched, as nodes are told it: of ribbons, which face the
+ * ray, the way that it came from. */
+vvec3 trc_curve_true_normal(const struct trc_surface *s);
+
 #endif
