@@ -28,11 +28,12 @@ _registered = globals().get("_registered", [])  # modules, in order; kept where 
 
 def register():
     """Load the native library and register everything; a load error is shown in the preferences."""
-    from . import denoise_nodes, engine, from_cycles, log, native, node_menus, preferences, presets, properties, ui
+    from . import (
+        denoise_nodes, engine, from_cycles, log, native, node_menus, preferences, presets, properties, ui, writes)
     from .farm import command, operator
     native.load()
-    for module in (log, preferences, properties, from_cycles, presets, engine, denoise_nodes, ui, node_menus, command,
-                   operator):
+    for module in (log, writes, preferences, properties, from_cycles, presets, engine, denoise_nodes, ui, node_menus,
+                   command, operator):
         module.register()
         _registered.append(module)
 

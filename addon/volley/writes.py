@@ -7,6 +7,9 @@ order of their begin can leave it set: a render that begins within a draw of the
 it, say; from then on timers and handlers of all add-ons fail. So a render that found the switch set ends
 within a call that did not, a draw that is made for it; one that did not ends after all that began
 meanwhile. What is kept here is guarded by Python's own lock.
+
+Of the calls of a viewport in a window the switch is set from the start. What has to be written there all the
+same, settings of temporary data, is written by the getter of a property: those Blender lets write always.
 """
 
 import contextlib
@@ -59,6 +62,40 @@ def draw_call(redraw):
         if not call.found_set:
             _wait_until(lambda: not _draw_is_awaited())
         _end(call)
+
+
+def run(function):
+    """function() and its result where Blender may forbid writing; for temporary data alone."""
+    _Writer.function = function
+    bpy.context.window_manager.volley_write
+    result, error = _Writer.result
+    _Writer.function = _Writer.result = None
+    if error is not None:
+        raise error
+    return result
+
+
+class _Writer:
+    """What the getter runs, and its (result, exception)."""
+
+    function = result = None
+
+
+def _run_function(_window_manager):
+    if _Writer.function is not None:
+        try:
+            _Writer.result = _Writer.function(), None
+        except Exception as error:  # Blender prints those of getters and goes on
+            _Writer.result = None, error
+    return False
+
+
+def register():
+    bpy.types.WindowManager.volley_write = bpy.props.BoolProperty(get=_run_function, options={'HIDDEN', 'SKIP_SAVE'})
+
+
+def unregister():
+    del bpy.types.WindowManager.volley_write
 
 
 def is_rendering():

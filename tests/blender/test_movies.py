@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Movies and sequences as textures follow the frame, by each node's settings: beside Cycles in renders of single
-frames and of an animation, and in viewports."""
+frames and of an animation, in viewports and in a window."""
 
 import os
 import tempfile
@@ -10,6 +10,8 @@ import pytest
 
 COUNT = 5        # frames of the movie
 TOLERANCE = 1e-3
+SHOWN_TOLERANCE = 0.05  # of what a window shows of a compressed movie
+LONGEST_DRAWS = 60      # until a window must show a frame, on a busy machine too
 COLORS = ((0.8, 0.1, 0.1), (0.1, 0.8, 0.1), (0.1, 0.1, 0.8), (0.7, 0.7, 0.1), (0.4, 0.4, 0.4))
 
 # Settings of image users, a wall for each.
@@ -135,3 +137,37 @@ def inside_viewport():
 def test_viewport(blender):
     for colors, frame in zip(blender.run(inside_viewport), (1, 2, 4, 3, 5), strict=True):
         assert np.abs(colors[0] - COLORS[frame - 1]).max() < 0.03, frame
+
+
+def inside_window():
+    """Colours in the middle of a window's view of a wall that shows the movie, at two frames."""
+    import bpy
+    import screen
+    import scenes
+    import whole_files
+    yield 0.1
+    scene = _stage('MOVIE')
+    scenes.wall("Front", 30.0, -1.0, material=bpy.data.materials["Screen 0"])
+    bpy.context.preferences.view.show_splash = False
+    scene.view_settings.view_transform, scene.render.dither_intensity = 'Raw', 0.0
+    area, space = whole_files.view()
+    space.overlay.show_overlays = space.show_gizmo = False
+    space.region_3d.view_perspective = 'CAMERA'
+    scenes.set_engine('VOLLEY', 1)
+    scene.volley.preview_samples = 1
+    space.shading.type = 'RENDERED'
+    region = next(region for region in area.regions if region.type == 'WINDOW')
+    found = []
+    for frame in (2, 3):
+        scene.frame_set(frame)
+        for _ in range(LONGEST_DRAWS):
+            yield 0.5
+            found.append(screen.Screen().picture()[region.y + region.height // 2, region.x + region.width // 2])
+            if np.abs(found[-1] - COLORS[frame - 1]).max() < SHOWN_TOLERANCE:
+                break
+    return found[-1]
+
+
+def test_window(window):
+    assert np.abs(window.run_in_window(inside_window) - COLORS[2]).max() < SHOWN_TOLERANCE
+    assert "Traceback" not in window.output and "rror" not in window.output

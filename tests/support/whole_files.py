@@ -83,7 +83,7 @@ def in_window(path, size, samples, **switches):
     _expose(scene)
     bpy.context.preferences.view.show_splash = False
     yield DRAW_SECONDS
-    area, space = _view()
+    area, space = view()
     space.overlay.show_overlays = space.show_gizmo = space.show_region_header = False
     space.region_3d.view_perspective = 'CAMERA'
     shown = []
@@ -110,7 +110,7 @@ def _expose(scene):
     scene.view_settings.exposure = math.log2(EXPOSED_TO / max(bright, 1e-3))
 
 
-def _view():
+def view():
     """The 3D view of the window and its space."""
     area = next(area for area in bpy.context.window_manager.windows[0].screen.areas if area.type == 'VIEW_3D')
     return area, area.spaces.active

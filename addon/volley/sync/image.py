@@ -17,7 +17,7 @@ import zlib
 import bpy
 import numpy as np
 
-from .. import abi, native
+from .. import abi, native, writes
 from ..compat import HAS_LITERAL_ALPHA, cycles, working_space
 from . import working_space as spaces
 from .movie import frame_of, turn_to
@@ -255,9 +255,13 @@ def read_pixels(image):
 def _loaded(data, image, path):
     """A file of an image as one of its own in data, with the same settings."""
     loaded = data.images.load(path)
+    writes.run(lambda: _take_settings(loaded, image))
+    return loaded
+
+
+def _take_settings(loaded, image):
     loaded.colorspace_settings.name = image.colorspace_settings.name
     loaded.alpha_mode = image.alpha_mode
-    return loaded
 
 
 def _to_rgba(pixels):

@@ -3,6 +3,8 @@
 
 import bpy
 
+from .. import writes
+
 _CORNER = (0.0, 0.0, 0.0)
 
 
@@ -21,7 +23,11 @@ def turn_to(image, frame):
     this one lives outside the file's data, so any thread may make it."""
     with bpy.data.temp_data() as data:
         texture = data.textures.new("Frame", 'IMAGE')
-        texture.image = image
-        texture.image_user.frame_current = frame
-        texture.evaluate(_CORNER)
-        texture.image = None
+        writes.run(lambda: _show(texture, image, frame))
+
+
+def _show(texture, image, frame):
+    texture.image = image
+    texture.image_user.frame_current = frame
+    texture.evaluate(_CORNER)
+    texture.image = None
