@@ -18,6 +18,7 @@ NOISE = 0.02               # of means, at most
 SEEDS = (11, 12, 13, 14, 15, 16)
 SAMPLES = 96       # of each seed
 TOLERANCE = 0.005          # beyond noise, relative to the mean of the ball
+STRANDS_TILE = 0.015       # of a part of a ball of strands, of which they cover a third
 
 STRANDS = "strands of "        # names of cases that begin so have them in the place of a ball
 
@@ -46,7 +47,7 @@ KNOWN_BEFORE_4 = {
        for what in ("", "strands of ") for coat in (0.0, 0.8) for ior in (1.2, 1.8)},
     # These have the node's own Offset, two degrees.
     **{f"{what}principled hair melanin redness {redness} random color {color} random roughness {roughness} "
-       "parametrization MELANIN": (0.01, 0.01, _TILT)
+       "parametrization MELANIN": (0.01, STRANDS_TILE, _TILT)
        for what in ("", "strands of ") for redness in (0.2, 1.0) for color in (0.0, 0.9)
        for roughness in (0.0, 0.8)},
 }
@@ -196,7 +197,8 @@ def inside_balls():
 def _known(name):
     """The limits of a case, largest mean and tile, and why they are not the usual ones."""
     of_version = KNOWN_BEFORE_4 if blender_support.version() < (4, 0) else KNOWN_FROM_4
-    return of_version.get(name) or KNOWN.get(name, (TOLERANCE, TOLERANCE, ""))
+    usual = (TOLERANCE, STRANDS_TILE if name.startswith(STRANDS) else TOLERANCE, "")
+    return of_version.get(name) or KNOWN.get(name, usual)
 
 
 # Comparison ----------------------------------------------------------------------------------------
