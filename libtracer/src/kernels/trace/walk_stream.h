@@ -17,13 +17,14 @@ struct stream {
     float tmin[TRC_STREAM_SIZE], t[TRC_STREAM_SIZE];
     float f[TRC_STREAM_SIZE];      /* moving trees: position between the keys */
     uint16_t ray[TRC_STREAM_SIZE]; /* packet * TRC_PACKET_SIZE + its number there */
-    uint32_t alive;                /* any only: bits of those that are not occluded */
+    int count;
+    uint32_t alive; /* any only: bits of those that are not occluded */
 };
 
 /* A subtree to visit. */
 struct stream_entry {
     uint32_t ref, rays; /* rays: bits, into the stream */
-    float z;            /* closest only: of its box, the nearest mirrored one */
+    float near;         /* closest only: the least distance at which one of them meets its box */
 };
 
 TRC_INLINE void stream_setup(const struct walk *w, const struct trc_live *live, bool motion,
@@ -44,11 +45,22 @@ TRC_INLINE void stream_setup(const struct walk *w, const struct trc_live *live, 
             s->ray[n] = (uint16_t)(k * TRC_PACKET_SIZE + i);
         }
     s->alive = (uint32_t)((1ull << n) - 1);
+    s->count = n;
 }
 
-/* For each child of a node the rays that meet its box; returns the bits of children with any. */
+/* Those of a stream's rays that have no hit before a distance. */
+TRC_INLINE uint32_t stream_beyond(const struct stream *s, uint32_t rays, float distance) {
+    uint32_t beyond = 0;
+    for (int i = 0; i < s->count; i += 8)
+        beyond |= f8_le(f8_set(distance), f8_load(&s->t[i])) << i;
+    return rays & beyond;
+}
+
+/* For each child of a node the rays that meet its box, and for closest hits the least distance at
+ * which one does; returns the bits of children with any. */
 TRC_INLINE uint32_t stream_node(const struct walk *w, uint32_t node, const struct stream *s,
-                                uint32_t rays, bool motion, uint32_t met[TRC_NODE_WIDTH]) {
+                                uint32_t rays, bool any, bool motion, uint32_t met[TRC_NODE_WIDTH],
+                                float nearest[TRC_NODE_WIDTH]) {
     const float *b = trc_node_bounds(w->tree, node, w->key);
     const float *e = b + (motion ? TRC_NODE_KEY_BYTES / sizeof(float) : 0);
     const f8 slack = f8_set(w->group->beam.slack);
@@ -58,6 +70,7 @@ TRC_INLINE uint32_t stream_node(const struct walk *w, uint32_t node, const struc
         high[axis] = f8_load(b + 16 * axis + 8) + slack;
     }
     i8x children, all = {0};
+    f8 least = f8_set(INFINITY);
     for (; rays; rays &= rays - 1) {
         const int i = __builtin_ctz(rays);
         f8 near = f8_set(s->tmin[i]), far = f8_set(s->t[i]);
@@ -75,7 +88,11 @@ TRC_INLINE uint32_t stream_node(const struct walk *w, uint32_t node, const struc
             far = f8_min(far, f8_max(l, h));
         }
         all |= (i8x)(near <= far) & (int32_t)(1u << i);
+        if (!any)
+            least = f8_min(least, f8_select_le(near, far, near, f8_set(INFINITY)));
     }
+    if (!any)
+        f8_store(nearest, least);
     memcpy(&children, trc_node_children(w->tree, node), sizeof children);
     all &= children != (int32_t)TRC_REF_EMPTY; /* inverted boxes are met, too */
     memcpy(met, &all, sizeof all);
@@ -104,18 +121,17 @@ TRC_INLINE void ref_prefetch(const struct walk *w, uint32_t ref, bool any, bool 
 
 /* Pushes the children that are met: to the closest hit the nearest on top, to any in any order. */
 TRC_INLINE int stream_push(const struct walk *w, uint32_t node, uint32_t bits,
-                           const uint32_t met[TRC_NODE_WIDTH], bool any, bool curves,
-                           struct stream_entry *stack, int top) {
+                           const uint32_t met[TRC_NODE_WIDTH], const float nearest[TRC_NODE_WIDTH],
+                           bool any, bool curves, struct stream_entry *stack, int top) {
     const uint32_t *children = trc_node_children(w->tree, node);
-    const struct trc_beam *b = &w->group->beam;
-    const float *z = trc_node_bounds(w->tree, node, w->key) + 16 * b->axis.z + 8 * b->side;
     const int bottom = top;
     for (; bits; bits &= bits - 1) {
         const int child = __builtin_ctz(bits);
-        const struct stream_entry entry = {children[child], met[child], b->sign * z[child]};
+        const struct stream_entry entry = {children[child], met[child],
+                                           any ? 0.0f : nearest[child]};
         int at = top++;
         ref_prefetch(w, entry.ref, any, curves);
-        for (; !any && at > bottom && stack[at - 1].z < entry.z; at--)
+        for (; !any && at > bottom && stack[at - 1].near < entry.near; at--)
             stack[at] = stack[at - 1];
         stack[at] = entry;
     }
@@ -166,9 +182,10 @@ TRC_INLINE void stream_walk(struct walk *w, uint32_t ref, const struct trc_live 
     for (uint32_t rays = s.alive;;) {
         if (!(ref & TRC_REF_LEAF)) {
             uint32_t met[TRC_NODE_WIDTH];
+            float nearest[TRC_NODE_WIDTH];
             TRC_COUNT(single_nodes, __builtin_popcount(rays));
-            const uint32_t bits = stream_node(w, ref, &s, rays, motion, met);
-            top = stream_push(w, ref, bits, met, any, curves, stack, top);
+            const uint32_t bits = stream_node(w, ref, &s, rays, any, motion, met, nearest);
+            top = stream_push(w, ref, bits, met, nearest, any, curves, stack, top);
         } else if (!curves && w->tree->is_top) {
             stream_item(w, ref, &s, rays, any);
         } else {
@@ -178,7 +195,8 @@ TRC_INLINE void stream_walk(struct walk *w, uint32_t ref, const struct trc_live 
             if (top == 0)
                 return;
             ref = stack[--top].ref;
-            rays = any ? stack[top].rays & s.alive : stack[top].rays;
+            rays = any ? stack[top].rays & s.alive
+                       : stream_beyond(&s, stack[top].rays, stack[top].near);
         } while (!rays);
     }
 }
