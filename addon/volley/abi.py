@@ -654,6 +654,12 @@ class CryptomatteKind(IntEnum):
     ASSET = 2
 
 
+class DenoiseType(IntEnum):
+    NONE = 0
+    FINAL = 1
+    PREVIEW = 2
+
+
 class PassesFlags(IntFlag):
     BLENDED_FEATURES = 1
     BACKGROUND_MOTION = 2
@@ -921,8 +927,8 @@ ENUMERATIONS = {StatusCode: "TRC_", IsaId: "TRC_ISA_", CameraType: "TRC_CAMERA_"
                 MaterialFlags: "TRC_MATERIAL_", AlphaMode: "TRC_ALPHA_", IntegratorType: "TRC_INTEGRATOR_",
                 SamplerType: "TRC_SAMPLER_", AssemblyType: "TRC_ASSEMBLY_", FilterType: "TRC_FILTER_",
                 PassId: "TRC_PASS_", PassRange: "TRC_PASS_", CryptomatteKind: "TRC_CRYPTOMATTE_",
-                PassesFlags: "TRC_PASSES_", ProgressState: "TRC_PROGRESS_", SumsId: "TRC_SUMS_",
-                FeatureFlags: "TRC_FEATURE_"}
+                DenoiseType: "TRC_DENOISE_", PassesFlags: "TRC_PASSES_", ProgressState: "TRC_PROGRESS_",
+                SumsId: "TRC_SUMS_", FeatureFlags: "TRC_FEATURE_"}
 
 STRUCTURES = {"trc_camera_desc": CameraDesc, "trc_curve_attribute": CurveAttribute,
               "trc_curves_desc": CurvesDesc, "trc_corner_attribute": CornerAttribute,
@@ -989,6 +995,7 @@ FUNCTIONS = {
     "trc_render_wait": (c_int32, (c_uint64, c_double)),
     "trc_render_cancel": (c_int32, (c_uint64,)),
     "trc_render_read": (c_int32, (c_uint64, c_uint32, c_void_p, c_uint64)),
+    "trc_render_read_preview": (c_int32, (c_uint64, c_void_p, c_uint64)),
     "trc_pass_channels": (c_uint32, (c_uint32,)),
     "trc_sums_channels": (c_uint32, (c_uint64, c_uint32)),
     "trc_sums_read": (c_int32, (c_uint64, c_uint32, c_void_p, c_uint64)),

@@ -307,6 +307,84 @@ static void same_bits(void **state) {
     }
 }
 
+/* ---- previews ---- */
+
+static void film_preview(struct trc_film *film, const struct trc_kernels *kernels, uint32_t threads,
+                         float *pixels) {
+    assert_ok(trc_film_read_preview(film, kernels, threads, 1.0f, pixels, 4 * FRAME));
+}
+
+/* Without noise the preview is the picture: flat, with a slope, with an edge of alpha. */
+static void preview_noiseless(void **state) {
+    (void)state;
+    static struct picture p;
+    static const truth_of truths[] = {still, hole};
+    trc_render_desc desc = desc_of(4);
+    desc.denoise = TRC_DENOISE_PREVIEW;
+    for (int k = 0; k < 2; k++) {
+        struct trc_film film;
+        film_make(&desc, truths[k], &film);
+        assert_ok(trc_film_read(&film, TRC_PASS_COMBINED, 1.0f, p.plain, 4 * FRAME));
+        film_preview(&film, trc_kernels_current(), 2, p.clean);
+        for (int i = 0; i < 4 * FRAME; i++)
+            assert_true(fabsf(p.clean[i] - p.plain[i]) <= 4e-6f);
+        trc_film_destroy(&film);
+    }
+}
+
+/* Noise falls, the more the fewer samples there are, and edges of albedo stay. */
+static void preview_noisy(void **state) {
+    (void)state;
+    static struct picture p;
+    static const uint32_t samples[] = {1, 4, 1024};
+    double gains[3], edge_gains[3];
+    for (int k = 0; k < 3; k++) {
+        trc_render_desc desc = desc_of(samples[k]);
+        desc.denoise = TRC_DENOISE_PREVIEW;
+        static const truth_of truths[] = {flat, edge};
+        for (int t = 0; t < 2; t++) {
+            struct trc_film film;
+            film_make(&desc, truths[t], &film);
+            assert_ok(trc_film_read(&film, TRC_PASS_COMBINED, 1.0f, p.plain, 4 * FRAME));
+            film_preview(&film, trc_kernels_current(), 2, p.clean);
+            (t ? edge_gains : gains)[k] =
+                error_of(p.plain, truths[t], t ? EDGE - 1 : 0, t ? EDGE + 1 : WIDTH) /
+                error_of(p.clean, truths[t], t ? EDGE - 1 : 0, t ? EDGE + 1 : WIDTH);
+            trc_film_destroy(&film);
+        }
+    }
+    print_figure(
+        "31: previews of made films at 1, 4 and 1,024 samples",
+        "error %.1f, %.1f and %.1f times lower on a flat surface, %.1f, %.1f and %.1f at an "
+        "edge of albedo",
+        gains[0], gains[1], gains[2], edge_gains[0], edge_gains[1], edge_gains[2]);
+    assert_true(gains[0] > 3.0 && gains[1] > 4.0 && gains[2] >= 1.0);
+    assert_true(edge_gains[0] > 1.5 && edge_gains[1] > 1.5 && edge_gains[2] > 0.95);
+}
+
+/* The same bits as scalar kernels make, by any number of threads; the plain picture where the film
+ * has no halves. */
+static void preview_bits(void **state) {
+    (void)state;
+    static float expected[4 * FRAME], found[4 * FRAME];
+    trc_render_desc desc = desc_of(4);
+    desc.denoise = TRC_DENOISE_PREVIEW;
+    struct trc_film film;
+    film_make(&desc, edge, &film);
+    film_preview(&film, trc_kernels_get(TRC_ISA_SCALAR), 1, expected);
+    for (uint32_t threads = 1; threads <= 3; threads++) {
+        film_preview(&film, trc_kernels_current(), threads, found);
+        assert_memory_equal(found, expected, sizeof found);
+    }
+    struct trc_half *halves = film.halves;
+    film.halves = NULL;
+    assert_ok(trc_film_read(&film, TRC_PASS_COMBINED, 1.0f, expected, 4 * FRAME));
+    film_preview(&film, trc_kernels_current(), 1, found);
+    assert_memory_equal(found, expected, sizeof found);
+    film.halves = halves;
+    trc_film_destroy(&film);
+}
+
 /* ---- a scene ---- */
 
 /* A ground under a square lamp that a square shades. */
@@ -361,6 +439,38 @@ static void scene_pictures(void **state) {
     assert_ok(trc_scene_destroy(scene));
 }
 
+/* Previews of several tiles: any number of threads, and a lower error than without. */
+static void scene_previews(void **state) {
+    (void)state;
+    enum { ACROSS = 300, UP = 150, FLOATS = 4 * ACROSS * UP };
+    static float plain[FLOATS], previews[2][FLOATS], exact[FLOATS];
+    const trc_scene scene = lit_scene();
+    trc_render_desc desc = default_render_desc(ACROSS, UP, 128);
+    fixture_draw(scene, &desc, TRC_PASS_COMBINED, exact, FLOATS);
+    desc.sample_count = 2;
+    desc.progressive = 1;
+    desc.denoise = TRC_DENOISE_PREVIEW;
+    for (uint32_t k = 0; k < 2; k++) {
+        desc.thread_count = k + 1;
+        trc_render render;
+        assert_ok(trc_render_start(scene, &desc, &render));
+        assert_ok(trc_render_wait(render, -1.0));
+        assert_ok(trc_render_read(render, TRC_PASS_COMBINED, plain, FLOATS));
+        assert_ok(trc_render_read_preview(render, previews[k], FLOATS));
+        assert_ok(trc_render_destroy(render));
+    }
+    assert_memory_equal(previews[0], previews[1], sizeof plain);
+    double before = 0.0, after = 0.0;
+    for (int i = 0; i < FLOATS; i++) {
+        before += pow((double)(plain[i] - exact[i]), 2.0);
+        after += pow((double)(previews[0][i] - exact[i]), 2.0);
+    }
+    print_figure("31: preview of a square's soft shadow at 2 samples", "error %.2f times lower",
+                 before / after);
+    assert_true(after < 0.8 * before);
+    assert_ok(trc_scene_destroy(scene));
+}
+
 /* Counts that differ by pixel, as adaptive sampling makes them, and numbers of samples of all
  * kinds: one, which has no halves, and odd ones. */
 static void counts(void **state) {
@@ -395,7 +505,9 @@ int main(void) {
         cmocka_unit_test(many_samples),   cmocka_unit_test(bright_sample),
         cmocka_unit_test(calm_neighbors), cmocka_unit_test(sums),
         cmocka_unit_test(same_bits),      cmocka_unit_test(scene_pictures),
-        cmocka_unit_test(counts),
+        cmocka_unit_test(counts),         cmocka_unit_test(preview_noiseless),
+        cmocka_unit_test(preview_noisy),  cmocka_unit_test(preview_bits),
+        cmocka_unit_test(scene_previews),
     };
     if (!query_test_isa())
         return QUERY_TEST_SKIPPED;

@@ -189,6 +189,7 @@ static void check_render(struct session *s, uint32_t progressive) {
     assert_int_equal(progress.state, TRC_PROGRESS_DONE);
     static float pixels[WIDTH * HEIGHT * 4];
     STEP(trc_render_read(render, TRC_PASS_COMBINED, pixels, WIDTH * HEIGHT * 4));
+    STEP(trc_render_read_preview(render, pixels, WIDTH * HEIGHT * 4));
     for (int i = 0; i < WIDTH * HEIGHT * 4; i++)
         assert_true(isfinite(pixels[i]));
     STEP(trc_render_destroy(render));

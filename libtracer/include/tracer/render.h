@@ -66,6 +66,18 @@ enum trc_cryptomatte_kind {
 #define TRC_MAX_CRYPTOMATTE_LAYERS 8 /* of each kind */
 #define TRC_MAX_CRYPTOMATTE_DEPTH (TRC_CRYPTOMATTE_LAYER_RANKS * TRC_MAX_CRYPTOMATTE_LAYERS)
 
+/* Reconstruction: noise goes, edges and textures stay, and where the estimated error says so, the
+ * plain pixel does. With more samples the picture goes to the same limit. */
+enum trc_denoise_type {
+    TRC_DENOISE_NONE = 0, /* takes no memory and no time */
+    /* Once all samples are there. Combined, the passes of light, light groups, shadow catchers and
+     * the colours that light is divided by are filtered alike, so that they still add up; others
+     * stay as they are. Takes about 200 bytes a pixel, and 24 more for each pass of light. Until it
+     * is done, and after a cancel, passes are without it. trc_render_read_preview, too. */
+    TRC_DENOISE_FINAL,
+    TRC_DENOISE_PREVIEW /* by trc_render_read_preview alone; takes about 110 bytes a pixel */
+};
+
 /* The number of a Cryptomatte layer for trc_render_read. */
 #define TRC_PASS_CRYPTOMATTE(kind, layer) \
     ((uint32_t)TRC_PASS_FIRST_CRYPTOMATTE + TRC_MAX_CRYPTOMATTE_LAYERS * (kind) + (layer))
@@ -135,13 +147,7 @@ typedef struct trc_render_desc {
                                    number; not read without cryptomattes */
     uint32_t aov_value_count, aov_color_count; /* passes of each, 0..TRC_MAX_AOVS */
     uint32_t light_group_count;                /* passes, 0..TRC_MAX_LIGHT_GROUPS */
-    /* 1: once all samples are there, light is reconstructed: noise goes, edges and textures stay,
-     * and where the estimated error says so, the plain pixel does. Combined, the passes of light,
-     * light groups, shadow catchers and the colours that light is divided by are filtered alike, so
-     * that they still add up; others stay as they are. The picture goes to the same limit with more
-     * samples. Takes about 200 bytes a pixel, and 24 more for each pass of light. Until it is done,
-     * and after a cancel, passes are without it. 0: off */
-    uint32_t denoise;
+    uint32_t denoise;                          /* TRC_DENOISE_* */
     /* A part of the picture: samples [sample_offset, sample_offset + sample_subset) of
      * sample_count, with the numbers that they have in the whole; 0 samples: all from sample_offset
      * on. Progress and what is read are of these samples alone. Parts are put together by
@@ -202,6 +208,15 @@ TRC_API trc_status trc_render_cancel(trc_render render);
  * * channels. */
 TRC_API trc_status trc_render_read(trc_render render, uint32_t pass, float *pixels_out,
                                    uint64_t float_count);
+
+/* Copies Combined, quickly reconstructed: for pictures that are looked at while they gather
+ * samples. At any time, as trc_render_read, of which it takes the tiles as they are; threads of its
+ * own, as many as the render has, work on it meanwhile. The more samples there are, the less is
+ * changed. Without denoise in the render's descriptor, and of scenes with shadow catchers, the same
+ * as trc_render_read. float_count must be crop width * height * 4. OUT_OF_MEMORY and NO_THREAD
+ * leave pixels_out as it was. */
+TRC_API trc_status trc_render_read_preview(trc_render render, float *pixels_out,
+                                           uint64_t float_count);
 
 /* Channels of a pass, 0 for an unknown one. */
 TRC_API uint32_t trc_pass_channels(uint32_t pass);

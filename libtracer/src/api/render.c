@@ -90,7 +90,7 @@ static trc_status check_film(const trc_render_desc *desc) {
     TRC_TRY(trc_check_count(desc->aov_value_count, 0, TRC_MAX_AOVS, "aov_value_count"));
     TRC_TRY(trc_check_count(desc->aov_color_count, 0, TRC_MAX_AOVS, "aov_color_count"));
     TRC_TRY(trc_check_count(desc->light_group_count, 0, TRC_MAX_LIGHT_GROUPS, "light_group_count"));
-    TRC_TRY(trc_check_enum(desc->denoise, 2, "denoise"));
+    TRC_TRY(trc_check_enum(desc->denoise, TRC_DENOISE_PREVIEW + 1, "denoise"));
     TRC_TRY(trc_check_enum(desc->pass_flags, 2 * TRC_PASSES_BACKGROUND_MOTION, "pass_flags"));
     return desc->passes >> TRC_PASS_MIST & 1 ? check_mist(desc) : TRC_OK;
 }
@@ -174,6 +174,16 @@ trc_status trc_render_read(trc_render render, uint32_t pass, float *pixels_out,
     TRC_TRY(trc_handle_acquire(render, TRC_HANDLE_RENDER, &object));
     const uint64_t fp_state = trc_fp_enter();
     const trc_status status = trc_render_state_read(object, pass, pixels_out, float_count);
+    trc_fp_leave(fp_state);
+    trc_handle_release(render);
+    return status;
+}
+
+trc_status trc_render_read_preview(trc_render render, float *pixels_out, uint64_t float_count) {
+    void *object;
+    TRC_TRY(trc_handle_acquire(render, TRC_HANDLE_RENDER, &object));
+    const uint64_t fp_state = trc_fp_enter();
+    const trc_status status = trc_render_state_read_preview(object, pixels_out, float_count);
     trc_fp_leave(fp_state);
     trc_handle_release(render);
     return status;

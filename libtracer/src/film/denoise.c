@@ -5,6 +5,11 @@
 #include "core/core.h"
 #include "film/film.h"
 
+/* Whether the film is to be reconstructed at its end; a part is not. */
+static bool has_clean_film(const trc_render_desc *desc) {
+    return desc->denoise == TRC_DENOISE_FINAL && !trc_film_is_part(desc);
+}
+
 /* Colours that light is divided by are filtered as it is: a pixel that gets light of its neighbours
  * may have no colour of that kind itself. */
 static bool is_divisor(uint32_t pass) {
@@ -20,7 +25,7 @@ static bool is_reconstructed(const trc_render_desc *desc, uint32_t pass) {
 }
 
 uint64_t trc_film_half_bytes(const trc_render_desc *desc, bool has_catchers) {
-    if (trc_film_is_part(desc))
+    if (!has_clean_film(desc))
         return sizeof(struct trc_half);
     uint64_t bytes = sizeof(struct trc_half) + TRC_DENOISE_PIXEL_BYTES;
     if (has_catchers)
@@ -38,7 +43,7 @@ trc_status trc_film_add_halves(const trc_render_desc *desc, struct trc_film *fil
     film->half_count = stops || desc->sample_count < 2 ? 0 : desc->sample_count / 2;
     film->halves = trc_alloc_zeroed(pixels, sizeof *film->halves);
     bool ok = film->halves != NULL;
-    if (trc_film_is_part(desc)) /* is not reconstructed */
+    if (!has_clean_film(desc))
         return ok ? TRC_OK : trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for reconstruction");
     for (uint32_t pass = 0; ok && pass < TRC_SUM_COUNT; pass++) {
         if (!is_reconstructed(desc, pass))

@@ -4,6 +4,7 @@
 
 #include "model/denoise.h"
 #include "model/film.h"
+#include "model/kernels.h"
 
 /* TRC_ERROR_TOO_LARGE unless so many bytes for every pixel, and others, can be had
  * (trc_memory_left_bytes): a system that overcommits would grant more than there is and kill the
@@ -40,5 +41,15 @@ void trc_film_destroy(struct trc_film *film);
  * tile's batch is being added, some ten microseconds. (film/read.c) */
 trc_status trc_film_read(const struct trc_film *film, uint32_t pass, float exposure, float *out,
                          uint64_t float_count);
+
+/* The number of a tile that is not being written, after waiting for that (model/sequence.h).
+ * (film/read.c) */
+unsigned trc_film_await_writer(const atomic_uint *sequence);
+
+/* Combined, quickly reconstructed by so many threads; as trc_film_read gives it where the film has
+ * no halves, or has shadow catchers. OUT_OF_MEMORY and NO_THREAD, too. (film/preview.c) */
+trc_status trc_film_read_preview(const struct trc_film *film, const struct trc_kernels *kernels,
+                                 uint32_t thread_count, float exposure, float *out,
+                                 uint64_t float_count);
 
 #endif

@@ -182,7 +182,7 @@ static void read_row(const struct reading *r, struct row row) {
 
 /* ---- tiles ---- */
 
-static unsigned await_writer(const atomic_uint *sequence) {
+unsigned trc_film_await_writer(const atomic_uint *sequence) {
     unsigned number;
     for (uint32_t looks = 0; !trc_sequence_read_begin(sequence, &number); looks++)
         if (looks >= LOOKS_BEFORE_YIELDING)
@@ -198,7 +198,7 @@ static void read_tile(const struct reading *r, uint32_t tile_x, uint32_t tile_y)
     const atomic_uint *sequence = trc_film_sequence(film, x, y);
     unsigned number;
     do {
-        number = await_writer(sequence);
+        number = trc_film_await_writer(sequence);
         for (uint32_t j = y; j < y + height; j++) {
             const uint64_t first = (uint64_t)j * film->width + x;
             read_row(r, (struct row){first, first + width});

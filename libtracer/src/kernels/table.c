@@ -25,6 +25,7 @@ const struct trc_kernels TRC_KERNEL(trc_kernels) = {
     .tile_render = TRC_KERNEL(trc_tile_render),
     .denoise_memory_bytes = TRC_KERNEL(trc_denoise_memory_bytes),
     .denoise_tile = TRC_KERNEL(trc_denoise_tile),
+    .preview_filter = TRC_KERNEL(trc_preview_filter),
     .query_closest = TRC_KERNEL(trc_query_closest_rays),
     .query_occluded = TRC_KERNEL(trc_query_occluded_rays),
     .world_evaluate = TRC_KERNEL(trc_world_evaluate),

@@ -48,6 +48,15 @@ struct trc_denoise {
 /* Bytes of the above for each pixel. */
 #define TRC_DENOISE_PIXEL_BYTES ((TRC_FEATURE_COUNT + 2) * sizeof(float))
 
+/* A pixel of the frame beyond whose edges it is mirrored; far outside, its edge. */
+static inline uint32_t trc_mirror(int64_t x, uint32_t size) {
+    if (x < 0)
+        x = -x - 1;
+    if (x >= size)
+        x = 2 * (int64_t)size - 1 - x;
+    return x < 0 ? 0 : x >= size ? size - 1 : (uint32_t)x;
+}
+
 /* A tile in a phase, for one thread. */
 struct trc_denoise_job {
     const struct trc_denoise *denoise;
@@ -55,5 +64,42 @@ struct trc_denoise_job {
     uint32_t x, y, width, height; /* of the crop, pixels; at most TRC_TILE_SIZE */
     void *memory; /* denoise_memory_bytes(...) bytes, 64-byte aligned, one thread's */
 };
+
+/* ---- quick reconstruction, of a picture that is still gathering samples ----
+ *
+ * Wavelets with holes whose weights follow variance and features (H. Dammertz, D. Sewtz, J. Hanika,
+ * H. Lensch, "Edge-Avoiding A-Trous Wavelet Transform for fast Global Illumination Filtering", HPG
+ * 2010; C. Schied and others, "Spatiotemporal Variance-Guided Filtering", HPG 2017), of light over
+ * albedo. Departures: nothing of former pictures; noise comes from two halves of the samples, the
+ * wider wavelets fade as samples gather, and the part of the plain pixel that stays follows the
+ * estimated error. */
+
+/* Pixels of a tile, and around it: of three wavelets, and smoothed estimates. */
+#define TRC_PREVIEW_WIDTH 128
+#define TRC_PREVIEW_HEIGHT 64
+#define TRC_PREVIEW_HALO 10
+/* Planes of floats, rows of so many; the tile begins at TRC_PREVIEW_LEFT. */
+#define TRC_PREVIEW_LEFT 16
+#define TRC_PREVIEW_STRIDE (TRC_PREVIEW_WIDTH + 2 * TRC_PREVIEW_LEFT)
+#define TRC_PREVIEW_ROWS (TRC_PREVIEW_HEIGHT + 2 * TRC_PREVIEW_HALO)
+#define TRC_PREVIEW_FLOATS (TRC_PREVIEW_ROWS * TRC_PREVIEW_STRIDE)
+
+/* What is in the planes: first what is filtered, which becomes what is shown. */
+enum trc_preview_plane {
+    TRC_PREVIEW_COLOR = 0,  /* and alpha */
+    TRC_PREVIEW_ALBEDO = 4, /* three */
+    TRC_PREVIEW_NORMAL = 7, /* three */
+    TRC_PREVIEW_DEPTH = 10, /* below 0: there are no samples */
+    TRC_PREVIEW_CHANGE,     /* standard deviation of the mean of the three colours as the halves
+                               tell it; below 0: there are no halves */
+    TRC_PREVIEW_COUNT,      /* samples */
+    TRC_PREVIEW_INPUTS,
+    TRC_PREVIEW_PLANES = TRC_PREVIEW_INPUTS + 16 /* the others are the filter's own */
+};
+
+/* Where the tile's pixel x, y is in a plane. */
+static inline int trc_preview_at(int x, int y) {
+    return (y + TRC_PREVIEW_HALO) * TRC_PREVIEW_STRIDE + x + TRC_PREVIEW_LEFT;
+}
 
 #endif

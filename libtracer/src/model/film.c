@@ -18,19 +18,23 @@ uint32_t trc_film_matte_count(const trc_render_desc *desc) {
            TRC_SPARE_MATTES;
 }
 
+/* What previews read meanwhile (model/sequence.h). */
+static void store_float(float *p, float value) { __atomic_store(p, &value, __ATOMIC_RELAXED); }
+
 void trc_film_keep_half(const struct trc_film *film, size_t pixel, const double sum[4],
                         uint32_t count) {
     static const uint32_t passes[] = {TRC_PASS_DENOISING_ALBEDO, TRC_PASS_DENOISING_NORMAL,
                                       TRC_PASS_DENOISING_DEPTH};
     struct trc_half *half = &film->halves[pixel];
-    for (int c = 0; c < 4; c++)
-        half->light[c] = (float)sum[c];
-    for (int c = 0; film->caught && c < 3; c++)
-        half->light[c] = (float)(sum[c] + film->caught[pixel].blocked[c]);
+    for (int c = 0; c < 4; c++) {
+        const bool has_shadow = film->caught && c < 3;
+        const double light = has_shadow ? sum[c] + film->caught[pixel].blocked[c] : sum[c];
+        store_float(&half->light[c], (float)light);
+    }
     float *feature = half->features;
     for (int i = 0; i < 3; i++)
         for (uint32_t k = 0; k < trc_pass_info_of(passes[i])->sums; k++)
             *feature++ =
                 (float)film->sums[passes[i]][trc_pass_info_of(passes[i])->sums * pixel + k];
-    half->count = count;
+    __atomic_store_n(&half->count, count, __ATOMIC_RELAXED);
 }

@@ -62,6 +62,9 @@ struct trc_kernels {
     /* Bytes of scratch memory a job of reconstruction needs, and the job; never fails. */
     size_t (*denoise_memory_bytes)(void);
     void (*denoise_tile)(const struct trc_denoise_job *job);
+    /* Quick reconstruction of a tile, in place: memory has TRC_PREVIEW_PLANES planes, the inputs
+     * filled in, all numbers finite; 64-byte aligned. Never fails. */
+    void (*preview_filter)(float *memory);
     /* trc_query_*: arguments already validated; chunk [begin, end) of the arrays. packet_size
      * resolved. */
     void (*query_closest)(const struct trc_snapshot *snapshot, const trc_rays *rays,

@@ -333,7 +333,7 @@ static size_t worker_memory_bytes(const struct trc_render_state *render) {
     const struct trc_kernels *kernels = render->kernels;
     size_t bytes =
         render->snapshot ? kernels->tile_memory_bytes(&render->desc, render->snapshot) : 1;
-    if (render->desc.denoise && kernels->denoise_memory_bytes() > bytes)
+    if (render->desc.denoise == TRC_DENOISE_FINAL && kernels->denoise_memory_bytes() > bytes)
         bytes = kernels->denoise_memory_bytes();
     return bytes;
 }
@@ -347,7 +347,7 @@ static trc_status take_film(struct trc_render_state *render, bool has_catchers) 
         TRC_TRY(trc_adaptive_create(desc, &render->adaptive));
     if (desc->denoise)
         TRC_TRY(trc_film_add_halves(desc, &render->film));
-    if (desc->denoise && !trc_film_is_part(desc))
+    if (desc->denoise == TRC_DENOISE_FINAL && !trc_film_is_part(desc))
         TRC_TRY(trc_denoise_create(&render->film, &render->denoise));
     return TRC_OK;
 }
@@ -596,6 +596,12 @@ void trc_render_state_poll(struct trc_render_state *render, trc_render_progress 
 trc_status trc_render_state_read(struct trc_render_state *render, uint32_t pass, float *pixels_out,
                                  uint64_t float_count) {
     return trc_film_read(&render->film, pass, render->desc.film_exposure, pixels_out, float_count);
+}
+
+trc_status trc_render_state_read_preview(struct trc_render_state *render, float *pixels_out,
+                                         uint64_t float_count) {
+    return trc_film_read_preview(&render->film, render->kernels, render->desc.thread_count,
+                                 render->desc.film_exposure, pixels_out, float_count);
 }
 
 uint32_t trc_render_state_sums_channels(const struct trc_render_state *render, uint32_t sums) {

@@ -42,6 +42,9 @@ void trc_render_state_poll(struct trc_render_state *render, trc_render_progress 
 trc_status trc_render_state_read(struct trc_render_state *render, uint32_t pass, float *pixels_out,
                                  uint64_t float_count);
 
+trc_status trc_render_state_read_preview(struct trc_render_state *render, float *pixels_out,
+                                         uint64_t float_count);
+
 /* Sums of the film, of a render that has ended (film/part.h). */
 uint32_t trc_render_state_sums_channels(const struct trc_render_state *render, uint32_t sums);
 trc_status trc_render_state_read_sums(struct trc_render_state *render, uint32_t sums,

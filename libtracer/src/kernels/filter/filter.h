@@ -35,4 +35,7 @@ void trc_blend(const struct trc_denoise_job *job);
 size_t trc_denoise_memory_bytes(void);
 void trc_denoise_tile(const struct trc_denoise_job *job);
 
+/* The quick filter. (kernels/filter/preview.c) */
+void trc_preview_filter(float *memory);
+
 #endif

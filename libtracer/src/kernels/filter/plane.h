@@ -30,15 +30,6 @@ TRC_INLINE float *trc_plane_carve(struct trc_carver *c) {
     return plane;
 }
 
-/* A pixel of the frame beyond whose edges it is mirrored; far outside, its edge. */
-TRC_INLINE uint32_t trc_mirror(int64_t x, uint32_t size) {
-    if (x < 0)
-        x = -x - 1;
-    if (x >= size)
-        x = 2 * (int64_t)size - 1 - x;
-    return x < 0 ? 0 : x >= size ? size - 1 : (uint32_t)x;
-}
-
 /* Columns from -TRC_HALO on that may be of use, in whole vectors of every width. */
 #define TRC_PLANE_COLUMNS 48
 

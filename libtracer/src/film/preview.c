@@ -1,0 +1,168 @@
+/* What a film shows while it gathers samples, quickly reconstructed (model/denoise.h). */
+#include <math.h>
+
+#include "core/checks.h"
+#include "core/core.h"
+#include "core/pool.h"
+#include "film/film.h"
+#include "model/kernels.h"
+#include "model/sequence.h"
+
+/* Numbers above are as good as this, so that squares stay finite. */
+#define MOST 1e15f
+
+struct preview {
+    const struct trc_film *film;
+    const struct trc_kernels *kernels;
+    float exposure;
+    float *memory; /* planes of each worker */
+    float *out;
+};
+
+/* A mean as a float within limits; NaN: the lower. */
+static float cut(double mean, float low) {
+    const float value = (float)mean;
+    return value > low ? (value < MOST ? value : MOST) : low;
+}
+
+static float load_float(const float *p) {
+    float value;
+    __atomic_load(p, &value, __ATOMIC_RELAXED);
+    return value;
+}
+
+static void load_means(const double *sums, uint32_t channels, double scale, float low,
+                       float *plane) {
+    for (uint32_t k = 0; k < channels; k++)
+        plane[k * TRC_PREVIEW_FLOATS] = cut(trc_sum_load(&sums[k]) * scale, low);
+}
+
+/* The standard deviation of a pixel's mean light, by its halves; below 0 without them. */
+static float change_of(const struct trc_film *film, size_t pixel, uint32_t count, double exposure) {
+    const struct trc_half *half = &film->halves[pixel];
+    const uint32_t first = __atomic_load_n(&half->count, __ATOMIC_RELAXED);
+    if (!first || first >= count)
+        return -1.0f;
+    double of_all = 0.0, of_first = 0.0;
+    for (int c = 0; c < 3; c++) {
+        of_all += trc_sum_load(&film->sums[TRC_PASS_COMBINED][4 * pixel + (size_t)c]);
+        of_first += (double)load_float(&half->light[c]);
+    }
+    const double part = (double)first / count;
+    const double change = of_first / first - (of_all - of_first) / (count - first);
+    return cut(fabs(change) * exposure * (1.0 / 3.0) * sqrt(part * (1.0 - part)), 0.0f);
+}
+
+/* A pixel of the film into planes that begin at its place. */
+static void load_pixel(const struct preview *p, size_t pixel, float *at) {
+    const struct trc_film *film = p->film;
+    const uint32_t count = __atomic_load_n(&film->sample_counts[pixel], __ATOMIC_RELAXED);
+    const double scale = count ? 1.0 / count : 0.0, exposure = (double)p->exposure;
+    const double *combined = film->sums[TRC_PASS_COMBINED] + 4 * pixel;
+    load_means(combined, 3, scale * exposure, -MOST, at + TRC_PREVIEW_COLOR * TRC_PREVIEW_FLOATS);
+    load_means(combined + 3, 1, scale, 0.0f, at + (TRC_PREVIEW_COLOR + 3) * TRC_PREVIEW_FLOATS);
+    load_means(film->sums[TRC_PASS_DENOISING_ALBEDO] + 3 * pixel, 3, scale, 0.0f,
+               at + TRC_PREVIEW_ALBEDO * TRC_PREVIEW_FLOATS);
+    load_means(film->sums[TRC_PASS_DENOISING_NORMAL] + 3 * pixel, 3, scale, -MOST,
+               at + TRC_PREVIEW_NORMAL * TRC_PREVIEW_FLOATS);
+    load_means(film->sums[TRC_PASS_DENOISING_DEPTH] + pixel, 1, scale, 0.0f,
+               at + TRC_PREVIEW_DEPTH * TRC_PREVIEW_FLOATS);
+    at[TRC_PREVIEW_CHANGE * TRC_PREVIEW_FLOATS] = change_of(film, pixel, count, exposure);
+    at[TRC_PREVIEW_COUNT * TRC_PREVIEW_FLOATS] = (float)count;
+    if (!count)
+        at[TRC_PREVIEW_DEPTH * TRC_PREVIEW_FLOATS] = -1.0f;
+}
+
+/* Pixels [x, x_end) of a row, counted from a tile of the preview, that are in one tile of the film.
+ */
+struct run {
+    int x, x_end, y;
+    size_t pixel; /* the first */
+    int step;     /* to the next one: -1 in the frame's mirror image */
+};
+
+/* The run that begins at a place of the preview's tile and ends by x_end. */
+static struct run run_of(const struct preview *p, int64_t left, int64_t bottom, int x, int y,
+                         int x_end) {
+    const struct trc_film *film = p->film;
+    const uint32_t first = trc_mirror(left + x, film->width);
+    struct run run = {x, x + 1, y,
+                      (size_t)trc_mirror(bottom + y, film->height) * film->width + first, 1};
+    const bool inside = left + x >= 0 && left + x < film->width;
+    const uint32_t end = (first / TRC_TILE_SIZE + 1) * TRC_TILE_SIZE;
+    if (inside)
+        run.x_end = x + (int)((end < film->width ? end : film->width) - first);
+    if (run.x_end > x_end)
+        run.x_end = x_end;
+    return run;
+}
+
+static void load_run(const struct preview *p, const struct run *run, float *memory) {
+    const struct trc_film *film = p->film;
+    const atomic_uint *sequence = trc_film_sequence(film, (uint32_t)(run->pixel % film->width),
+                                                    (uint32_t)(run->pixel / film->width));
+    unsigned number;
+    do {
+        number = trc_film_await_writer(sequence);
+        for (int x = run->x; x < run->x_end; x++)
+            load_pixel(p, run->pixel + (size_t)(x - run->x), memory + trc_preview_at(x, run->y));
+    } while (!trc_sequence_is_whole(sequence, number));
+}
+
+static void load(const struct preview *p, uint32_t left, uint32_t bottom, float *memory) {
+    for (int y = -TRC_PREVIEW_HALO; y < TRC_PREVIEW_HEIGHT + TRC_PREVIEW_HALO; y++)
+        for (int x = -TRC_PREVIEW_HALO; x < TRC_PREVIEW_WIDTH + TRC_PREVIEW_HALO;) {
+            const struct run run =
+                run_of(p, left, bottom, x, y, TRC_PREVIEW_WIDTH + TRC_PREVIEW_HALO);
+            load_run(p, &run, memory);
+            x = run.x_end;
+        }
+}
+
+static void store(const struct preview *p, uint32_t left, uint32_t bottom, const float *memory) {
+    const struct trc_film *film = p->film;
+    for (uint32_t y = 0; y < TRC_PREVIEW_HEIGHT && bottom + y < film->height; y++)
+        for (uint32_t x = 0; x < TRC_PREVIEW_WIDTH && left + x < film->width; x++) {
+            float *out = p->out + 4 * ((size_t)(bottom + y) * film->width + left + x);
+            const float *from = memory + trc_preview_at((int)x, (int)y);
+            for (int c = 0; c < 4; c++)
+                out[c] = from[c * TRC_PREVIEW_FLOATS];
+        }
+}
+
+static uint32_t tiles_along(uint32_t pixels, uint32_t size) {
+    return (uint32_t)(((uint64_t)pixels + size - 1) / size);
+}
+
+static void show_tile(void *context, uint32_t index, uint32_t worker) {
+    const struct preview *p = context;
+    const uint32_t across = tiles_along(p->film->width, TRC_PREVIEW_WIDTH);
+    const uint32_t left = index % across * TRC_PREVIEW_WIDTH;
+    const uint32_t bottom = index / across * TRC_PREVIEW_HEIGHT;
+    float *memory = p->memory + (size_t)worker * TRC_PREVIEW_PLANES * TRC_PREVIEW_FLOATS;
+    load(p, left, bottom, memory);
+    p->kernels->preview_filter(memory);
+    store(p, left, bottom, memory);
+}
+
+trc_status trc_film_read_preview(const struct trc_film *film, const struct trc_kernels *kernels,
+                                 uint32_t thread_count, float exposure, float *out,
+                                 uint64_t float_count) {
+    if (!film->halves || film->caught)
+        return trc_film_read(film, TRC_PASS_COMBINED, exposure, out, float_count);
+    TRC_TRY(trc_check_array(out, float_count, (uint64_t)film->width * film->height * 4,
+                            sizeof(float), sizeof(float), "pixels_out"));
+    const uint32_t tiles =
+        tiles_along(film->width, TRC_PREVIEW_WIDTH) * tiles_along(film->height, TRC_PREVIEW_HEIGHT);
+    struct trc_pool *pool;
+    TRC_TRY(trc_pool_create(thread_count < tiles ? thread_count : tiles, &pool));
+    struct preview preview = {film, kernels, exposure, NULL, out};
+    preview.memory = trc_alloc_zeroed(trc_pool_thread_count(pool),
+                                      TRC_PREVIEW_PLANES * TRC_PREVIEW_FLOATS * sizeof(float));
+    if (preview.memory)
+        trc_pool_run(pool, tiles, show_tile, &preview);
+    trc_pool_destroy(pool);
+    const bool ok = preview.memory != NULL;
+    trc_free(preview.memory);
+    return ok ? TRC_OK : trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for reconstruction");
+}

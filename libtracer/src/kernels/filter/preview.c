@@ -1,0 +1,294 @@
+/* The quick filter of model/denoise.h, of one tile's planes. */
+#include "kernels/filter/filter.h"
+
+/* Wavelets, of steps of 1, 2 and 4 pixels. */
+#define LEVELS 3
+/* Standard deviations of light, lengths of normals, and slopes of the logarithm of depth by which
+ * pixels are still alike: 1.5 of the first left noise, 3 smeared from 4 samples on. */
+#define LIGHT_WIDTH 2.5f
+#define LEAST_LIGHT_WIDTH 1e-3f
+#define NORMAL_WIDTH 0.3f
+#define LEAST_DEPTH_WIDTH 0.01f
+/* Of albedo that light is divided by: less makes dark surfaces' noise large. */
+#define LEAST_ALBEDO 0.2f
+/* Samples at which a wavelet begins to fade and is gone; the first one stays. */
+static const float fade_begin[LEVELS] = {0.0f, 16.0f, 4.0f},
+                   fade_end[LEVELS] = {0.0f, 64.0f, 16.0f};
+/* The part kept is that much of variance / (variance + error), as in blend.c. */
+#define FAVOR 1.5f
+/* Variance of the mean of all samples over what the halves tell, which depend on each other as
+ * regress.c says: (1 - 0.3) / (1 + 0.3). */
+#define HALVES_VARIANCE 0.54f
+#define DARK 0.01f
+#define MOST_ERROR 1e3f
+/* Of pixels without samples, which are unlike all others. */
+#define NO_DEPTH -1e4f
+
+#define AT(x, y) trc_preview_at(x, y)
+#define STRIDE TRC_PREVIEW_STRIDE
+
+struct planes {
+    float *color, *albedo, *normal, *depth, *change, *count;
+    float *light[2][4], *light_mean, *variance[2], *smooth, *slope, *own, *first_variance;
+    float *estimate;
+};
+
+static struct planes planes_of(float *memory) {
+    struct planes p = {
+        .color = memory + TRC_PREVIEW_COLOR * TRC_PREVIEW_FLOATS,
+        .albedo = memory + TRC_PREVIEW_ALBEDO * TRC_PREVIEW_FLOATS,
+        .normal = memory + TRC_PREVIEW_NORMAL * TRC_PREVIEW_FLOATS,
+        .depth = memory + TRC_PREVIEW_DEPTH * TRC_PREVIEW_FLOATS,
+        .change = memory + TRC_PREVIEW_CHANGE * TRC_PREVIEW_FLOATS,
+        .count = memory + TRC_PREVIEW_COUNT * TRC_PREVIEW_FLOATS,
+    };
+    float *next = memory + TRC_PREVIEW_INPUTS * TRC_PREVIEW_FLOATS;
+    for (int k = 0; k < 2; k++) {
+        for (int c = 0; c < 4; c++, next += TRC_PREVIEW_FLOATS)
+            p.light[k][c] = next;
+        p.variance[k] = next;
+        next += TRC_PREVIEW_FLOATS;
+    }
+    float **const others[] = {&p.light_mean, &p.smooth,         &p.slope,
+                              &p.own,        &p.first_variance, &p.estimate};
+    for (size_t i = 0; i < sizeof others / sizeof *others; i++, next += TRC_PREVIEW_FLOATS)
+        *others[i] = next;
+    return p;
+}
+
+static vfloat albedo_at(const struct planes *p, int c, int at) {
+    return vf_load(p->albedo + c * TRC_PREVIEW_FLOATS + at) + vf_set(LEAST_ALBEDO);
+}
+
+/* Calls body for vectors of the tile and as many pixels around it. */
+#define FOR_PIXELS(margin, at)                                                        \
+    for (int y_ = -(margin); y_ < TRC_PREVIEW_HEIGHT + (margin); y_++)                \
+        for (int at = AT(0, y_) - ((margin) + TRC_WIDTH - 1) / TRC_WIDTH * TRC_WIDTH; \
+             at < AT(TRC_PREVIEW_WIDTH + (margin), y_); at += TRC_WIDTH)
+
+static vfloat box(const float *in, int at) {
+    vfloat sum = vf_set(0.0f);
+    for (int j = -1; j <= 1; j++)
+        for (int i = -1; i <= 1; i++)
+            sum = sum + vf_load(in + at + j * STRIDE + i);
+    return sum * vf_set(1.0f / 9.0f);
+}
+
+/* ---- what there is ---- */
+
+static void prepare_light(const struct planes *p) {
+    FOR_PIXELS(TRC_PREVIEW_HALO, at) {
+        vfloat mean = vf_set(0.0f), albedo_mean = vf_set(0.0f);
+        for (int c = 0; c < 3; c++) {
+            const vfloat albedo = albedo_at(p, c, at);
+            const vfloat light = vf_load(p->color + c * TRC_PREVIEW_FLOATS + at) / albedo;
+            vf_store(p->light[0][c] + at, light);
+            mean = mean + light;
+            albedo_mean = albedo_mean + albedo;
+        }
+        vf_store(p->light[0][3] + at, vf_load(p->color + 3 * TRC_PREVIEW_FLOATS + at));
+        vf_store(p->light_mean + at, mean * vf_set(1.0f / 3.0f));
+        const vfloat depth = vf_load(p->depth + at);
+        vf_store(p->depth + at, vf_select(vf_lt(depth, vf_set(0.0f)), vf_set(NO_DEPTH),
+                                          vf_log1p(vf_max(depth, vf_set(0.0f)))));
+        const vfloat change = vf_load(p->change + at) * vf_set(3.0f) / albedo_mean;
+        vf_store(p->first_variance + at, change * change);
+        vf_store(p->own + at, vf_set(1.0f));
+    }
+}
+
+/* Pixels without halves have the variance of what is around them. */
+static void prepare_variance(const struct planes *p) {
+    FOR_PIXELS(TRC_PREVIEW_HALO - 1, at) {
+        const vfloat mean = box(p->light_mean, at);
+        vfloat square = vf_set(0.0f);
+        for (int j = -1; j <= 1; j++)
+            for (int i = -1; i <= 1; i++) {
+                const vfloat apart = vf_load(p->light_mean + at + j * STRIDE + i) - mean;
+                square = square + apart * apart;
+            }
+        const vmask none = vf_lt(vf_load(p->change + at), vf_set(0.0f));
+        vf_store(p->variance[0] + at,
+                 vf_select(none, square * vf_set(1.0f / 8.0f), vf_load(p->first_variance + at)));
+    }
+    FOR_PIXELS(TRC_PREVIEW_HALO - 1, at)
+    vf_store(p->first_variance + at, vf_load(p->variance[0] + at));
+}
+
+/* How fast depth changes from pixel to pixel on the flatter sides. */
+static void prepare_slope(const struct planes *p) {
+    FOR_PIXELS(TRC_PREVIEW_HALO - 1, at) {
+        const vfloat depth = vf_load(p->depth + at);
+        vfloat slope = vf_set(0.0f);
+        for (int axis = 0; axis < 2; axis++) {
+            const int step = axis ? STRIDE : 1;
+            slope = slope + vf_min(vf_abs(vf_load(p->depth + at + step) - depth),
+                                   vf_abs(vf_load(p->depth + at - step) - depth));
+        }
+        vf_store(p->smooth + at, slope);
+    }
+    FOR_PIXELS(TRC_PREVIEW_HALO - 2, at)
+    vf_store(p->slope + at, box(p->smooth, at));
+}
+
+/* ---- wavelets ---- */
+
+/* What a pixel is compared by. */
+struct center {
+    vfloat light, normal[3], depth, per_light, slope;
+};
+
+static struct center center_at(const struct planes *p, int at) {
+    struct center c = {.light = vf_load(p->light_mean + at),
+                       .depth = vf_load(p->depth + at),
+                       .slope = vf_load(p->slope + at)};
+    for (int k = 0; k < 3; k++)
+        c.normal[k] = vf_load(p->normal + k * TRC_PREVIEW_FLOATS + at);
+    c.per_light = vf_set(1.0f) / (vf_sqrt(vf_load(p->smooth + at)) * vf_set(LIGHT_WIDTH) +
+                                  vf_set(LEAST_LIGHT_WIDTH));
+    return c;
+}
+
+static vfloat weight_at(const struct planes *p, const struct center *c, int q, vfloat per_depth) {
+    vfloat apart = vf_abs(vf_load(p->light_mean + q) - c->light) * c->per_light +
+                   vf_abs(vf_load(p->depth + q) - c->depth) * per_depth;
+    vfloat normal2 = vf_set(0.0f);
+    for (int k = 0; k < 3; k++) {
+        const vfloat change = vf_load(p->normal + k * TRC_PREVIEW_FLOATS + q) - c->normal[k];
+        normal2 = normal2 + change * change;
+    }
+    return trc_bell(apart + normal2 * vf_set(1.0f / (NORMAL_WIDTH * NORMAL_WIDTH)));
+}
+
+/* The part of a wavelet that is left at the pixel's samples. */
+static vfloat rest_of(const struct planes *p, int level, int at) {
+    if (!level)
+        return vf_set(1.0f);
+    const float end = fade_end[level];
+    return vf_clamp((vf_set(end) - vf_load(p->count + at)) *
+                        vf_set(1.0f / (end - fade_begin[level])),
+                    0.0f, 1.0f);
+}
+
+static void filter_pixels(const struct planes *p, int level, int at) {
+    float *const *in = p->light[level & 1], *const *out = p->light[~level & 1];
+    const float *variance = p->variance[level & 1];
+    const struct center center = center_at(p, at);
+    vfloat sums[4], total = vf_set(0.25f), noise = vf_set(0.0625f) * vf_load(variance + at);
+    for (int c = 0; c < 4; c++)
+        sums[c] = vf_set(0.25f) * vf_load(in[c] + at);
+    const int step = 1 << level;
+    const vfloat per_depth[2] = {
+        vf_set(1.0f) / (center.slope * vf_set((float)step) + vf_set(LEAST_DEPTH_WIDTH)),
+        vf_set(1.0f) /
+            (center.slope * vf_set((float)step * 1.41421356f) + vf_set(LEAST_DEPTH_WIDTH))};
+    for (int j = -1; j <= 1; j++)
+        for (int i = -1; i <= 1; i++) {
+            if (!i && !j)
+                continue;
+            const int q = at + step * (j * STRIDE + i);
+            const bool corner = i && j;
+            const vfloat weight =
+                weight_at(p, &center, q, per_depth[corner]) * vf_set(corner ? 0.0625f : 0.125f);
+            for (int c = 0; c < 4; c++)
+                sums[c] = sums[c] + weight * vf_load(in[c] + q);
+            total = total + weight;
+            noise = noise + weight * weight * vf_load(variance + q);
+        }
+    const vfloat inverse = vf_set(1.0f) / total, rest = rest_of(p, level, at);
+    for (int c = 0; c < 4; c++) {
+        const vfloat former = vf_load(in[c] + at);
+        vf_store(out[c] + at, former + rest * (sums[c] * inverse - former));
+    }
+    const vfloat former = vf_load(variance + at);
+    vf_store(p->variance[~level & 1] + at, former + rest * (noise * inverse * inverse - former));
+    vf_store(p->own + at, vf_load(p->own + at) *
+                              (vf_set(1.0f) + rest * (vf_set(0.25f) * inverse - vf_set(1.0f))));
+}
+
+/* Pixels around the tile that a level still needs: of those that follow it, and of estimates. */
+static int margin_of(int level) {
+    int margin = 2;
+    for (int next = level + 1; next < LEVELS; next++)
+        margin += 1 << next;
+    return margin;
+}
+
+static void filter_level(const struct planes *p, int level) {
+    const int margin = margin_of(level);
+    FOR_PIXELS(margin, at)
+    vf_store(p->smooth + at, box(p->variance[level & 1], at));
+    FOR_PIXELS(margin, at)
+    filter_pixels(p, level, at);
+    float *const *light = p->light[~level & 1];
+    if (level + 1 < LEVELS)
+        FOR_PIXELS(margin, at)
+    vf_store(p->light_mean + at,
+             (vf_load(light[0] + at) + vf_load(light[1] + at) + vf_load(light[2] + at)) *
+                 vf_set(1.0f / 3.0f));
+}
+
+/* ---- how much of it is kept ---- */
+
+/* Sums of 5 x 5 estimates. */
+static vfloat around(const float *estimate, int at) {
+    vfloat sum = vf_set(0.0f);
+    for (int j = -2; j <= 2; j++)
+        for (int i = -2; i <= 2; i++)
+            sum = sum + vf_load(estimate + at + j * STRIDE + i);
+    return sum;
+}
+
+/* Estimates of the plain pixel's variance and the filtered one's error, over the light there,
+ * squared: into smooth and estimate. Light gets its albedo again. */
+static void estimate(const struct planes *p) {
+    float *const *light = p->light[LEVELS & 1];
+    FOR_PIXELS(2, at) {
+        vfloat change2 = vf_set(0.0f), mean = vf_set(0.0f), albedo_mean = vf_set(0.0f);
+        for (int c = 0; c < 3; c++) {
+            const vfloat albedo = albedo_at(p, c, at), clean = vf_load(light[c] + at) * albedo;
+            const vfloat change = clean - vf_load(p->color + c * TRC_PREVIEW_FLOATS + at);
+            change2 = change2 + change * change;
+            mean = mean + clean;
+            albedo_mean = albedo_mean + albedo;
+            vf_store(light[c] + at, clean);
+        }
+        const vfloat third = vf_set(1.0f / 3.0f), dark = mean * third + vf_set(DARK);
+        const vfloat unit = vf_set(1.0f) / (dark * dark);
+        const vfloat scale =
+            vf_set(HALVES_VARIANCE) * (albedo_mean * third) * (albedo_mean * third);
+        const vfloat variance =
+            vf_min(vf_load(p->first_variance + at) * scale * unit, vf_set(MOST_ERROR));
+        const vfloat own = vf_set(1.0f) - vf_set(2.0f) * vf_load(p->own + at);
+        vf_store(p->smooth + at, variance);
+        vf_store(p->estimate + at,
+                 vf_min(change2 * third * unit, vf_set(MOST_ERROR)) - variance * own);
+    }
+}
+
+static void blend(const struct planes *p) {
+    float *const *light = p->light[LEVELS & 1];
+    estimate(p);
+    FOR_PIXELS(0, at) {
+        const vfloat variance = around(p->smooth, at);
+        const vfloat error = vf_max(around(p->estimate, at), vf_set(0.0f));
+        const vfloat kept = vf_set(FAVOR) * variance / (variance + error + vf_set(1e-12f));
+        const vmask none = vf_lt(vf_load(p->change + at), vf_set(0.0f));
+        const vfloat part = vf_select(none, vf_set(1.0f), vf_min(kept, vf_set(1.0f)));
+        for (int c = 0; c < 4; c++) {
+            float *shown = p->color + c * TRC_PREVIEW_FLOATS + at;
+            const vfloat plain = vf_load(shown);
+            vf_store(shown, plain + part * (vf_load(light[c] + at) - plain));
+        }
+    }
+}
+
+void trc_preview_filter(float *memory) {
+    const struct planes p = planes_of(memory);
+    prepare_light(&p);
+    prepare_variance(&p);
+    prepare_slope(&p);
+    for (int level = 0; level < LEVELS; level++)
+        filter_level(&p, level);
+    blend(&p);
+}
