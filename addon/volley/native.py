@@ -555,6 +555,11 @@ class Render:
         _call("trc_render_read", self._handle, pass_index, _address(out), out.size)
         return out
 
+    def read_preview(self, out):
+        """Copy Combined, quickly reconstructed, into out, as :meth:`read`."""
+        _call("trc_render_read_preview", self._handle, _address(out), out.size)
+        return out
+
     def destroy(self):
         """Cancel, wait and free. May be called twice."""
         handle, self._handle = self._handle, 0

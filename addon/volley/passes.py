@@ -215,6 +215,12 @@ def read_shown(render, entry):
     return pixels
 
 
+def read_preview(render):
+    """The film's Combined pass as :func:`read_combined`, quickly reconstructed."""
+    width, height = render.size
+    return render.read_preview(np.empty(width * height * 4, np.float32)).reshape(height, width, 4)
+
+
 def read_combined(render):
     """The film's Combined pass, (height, width, 4) float32, bottom row first."""
     width, height = render.size

@@ -128,7 +128,13 @@ class VolleySceneSettings(bpy.types.PropertyGroup):
         update=_changed)
     use_preview_denoising: BoolProperty(
         name="Denoise", default=False,
-        description="Take the noise out of the viewport's picture once it has all samples", update=_changed)
+        description="Take the noise out of the viewport's picture, quickly while it gathers samples and as final "
+                    "renders once it has all; not in scenes with shadow catchers before it has all",
+        update=_changed)
+    preview_denoising_start_sample: IntProperty(
+        name="Start Sample", default=1, min=0, max=(1 << 20),
+        description="Samples of the viewport's picture from which on it is shown without its noise",
+        update=_changed)
     sampler: EnumProperty(
         name="Sampler", items=SAMPLER_ITEMS, default='SOBOL', description="Where samples are taken",
         update=_changed)

@@ -156,6 +156,7 @@ class _Pictures:
         self._shown_pass = passes.COMBINED
         self._wanted = None     # what the stages render: revision, view and settings
         self._fields = {}
+        self._denoise, self._clean_samples = abi.DenoiseType.NONE, 1  # of the stage; from so many on
         self._stages = []       # still to come: divisor of the size, samples or None for all
         self._is_last = True    # whether the stage under way is the last
         self._render = None
@@ -180,13 +181,14 @@ class _Pictures:
         """Start to render what is in the library, unless that is under way or done."""
         scene, view = depsgraph.scene_eval, self._view
         self._shown_pass = passes.shown_in(context.space_data)
+        self._clean_samples = scene.volley.preview_denoising_start_sample
         fields = render_fields(scene, camera.Frame(*view.size), view.crop,
                                list(dict.fromkeys((passes.COMBINED, self._shown_pass))), is_preview=True)
         fields["progressive"] = 1
         if scene.volley.sampler == 'SOBOL':
             fields["sampler"] = abi.SamplerType['BLUE_NOISE']
         wanted = (sync.scene.revision, view.signature, tuple(sorted(fields.items())),
-                  scene.render.preview_pixel_size)
+                  scene.render.preview_pixel_size, self._clean_samples)
         if wanted == self._wanted:
             self._next_stage(sync)
             return
@@ -226,7 +228,10 @@ class _Pictures:
         self._is_last = not self._stages
         fields = divided(self._fields, divisor)
         if sample_count is not None:
-            fields.update(sample_count=sample_count, noise_threshold=0.0, denoise=0)
+            is_clean = fields["denoise"] and sample_count >= self._clean_samples
+            fields.update(sample_count=sample_count, noise_threshold=0.0,
+                          denoise=abi.DenoiseType.PREVIEW if is_clean else abi.DenoiseType.NONE)
+        self._denoise = fields["denoise"]
         self._samples = fields["sample_count"]
         width, height = fields["width"], fields["height"]
         scale_x, scale_y = self._view.size[0] / width, self._view.size[1] / height
@@ -249,7 +254,7 @@ class _Pictures:
         if progress.samples_done >= shown and progress.version != self._version and (
                 now >= self._next_read or not is_running):
             self._version, self._next_read = progress.version, now + DRAW_SECONDS
-            pixels = passes.read_shown(self._render, self._shown_pass)
+            pixels = self._read_pixels(progress)
             self._texture, self._place = _texture_of(pixels), self._next_place
             total = self._fields["sample_count"]
             self._status = " | ".join((f"Time:{timecode(now - self._started)}",
@@ -261,6 +266,14 @@ class _Pictures:
             self._render = None
             return True
         return is_running or progress.version != self._version
+
+    def _read_pixels(self, progress):
+        """The pass that is shown, without its noise if that is wanted of so many samples."""
+        is_final = self._denoise == abi.DenoiseType.FINAL and progress.state == abi.ProgressState.DONE
+        if self._shown_pass is passes.COMBINED and self._denoise and not is_final and (
+                progress.samples_done >= self._clean_samples):
+            return passes.read_preview(self._render)
+        return passes.read_shown(self._render, self._shown_pass)
 
     def draw(self, engine, scene):
         """Draw the texture and write what it took."""

@@ -629,3 +629,55 @@ def inside_linked_instance(path):
 def test_instances_of_what_is_linked_are_seen(window, tmp_path):
     shown = window.run_in_window(inside_linked_instance, str(tmp_path / "assets.blend"))
     assert shown == pytest.approx([0.0, 1.0, 0.0], abs=0.03)
+
+
+def _noting(shown):
+    """Let viewports note what they show, by whether it is a preview that is cleaned, with the plain picture."""
+    from volley import passes
+    read_shown, read_preview = passes.read_shown, passes.read_preview
+
+    def note_shown(render, entry):
+        shown["plain"].append(read_shown(render, entry).copy())
+        return read_shown(render, entry)
+
+    def note_preview(render):
+        picture = read_preview(render)
+        shown["previews"].append((picture.copy(), passes.read_combined(render)))
+        return picture
+
+    passes.read_shown, passes.read_preview = note_shown, note_preview
+
+
+def inside_denoised_previews():
+    """Squared errors of previews and of the plain pictures under them, and how many there were of each kind."""
+    import bpy
+    import scenes
+    yield 0.1
+    scene = scenes.empty()
+    scenes.wall(size=8.0, material=scenes.material("Grey", "ShaderNodeBsdfDiffuse"))
+    scenes.wall("Blocker", 1.0, -1.0)
+    scenes.light('AREA', (0.0, -6.0, 4.0), (0.6, 0.0, 0.0), energy=500.0, size=4.0)
+    scenes.camera()
+    space = _open(scene)
+    space.region_3d.view_perspective = 'CAMERA'
+    scene.render.preview_pixel_size = '1'
+    scene.volley.preview_samples, shown = 512, {"plain": [], "previews": []}
+    _noting(shown)
+    yield from _settled()
+    exact = shown["plain"][-1]
+    counts = [len(shown["previews"])]
+    scene.volley.use_preview_denoising, scene.volley.preview_samples = True, 4
+    scene.volley.preview_denoising_start_sample = 16
+    yield from _settled()
+    counts.append(len(shown["previews"]))
+    scene.volley.preview_denoising_start_sample = 1
+    yield from _settled()
+    previews = [pair for pair in shown["previews"] if pair[0].shape == exact.shape]
+    return counts, [[float(((picture - exact) ** 2).mean()) for picture in pair] for pair in previews]
+
+
+def test_previews_are_denoised_from_the_start_sample_on(window):
+    counts, errors = window.run_in_window(inside_denoised_previews)
+    assert counts == [0, 0] and errors
+    gains = [plain / clean for clean, plain in errors]
+    assert min(gains) > 1.3, gains

@@ -45,8 +45,12 @@ class VOLLEY_RENDER_PT_sampling_viewport(VolleyPanel, Panel):
     bl_parent_id = "VOLLEY_RENDER_PT_sampling"
 
     def draw(self, context):
-        _draw_samples(column_of(self), context.scene.volley, "preview_")
-        column_of(self).prop(context.scene.render, "preview_pixel_size", text="Pixel Size")
+        settings, layout = context.scene.volley, column_of(self)
+        _draw_samples(layout, settings, "preview_")
+        start = layout.column()
+        start.active = settings.use_preview_denoising
+        start.prop(settings, "preview_denoising_start_sample")
+        layout.prop(context.scene.render, "preview_pixel_size", text="Pixel Size")
 
 
 class VOLLEY_RENDER_PT_sampling_render(VolleyPanel, Panel):
