@@ -3,11 +3,15 @@
 """Error and time with and without Denoise, of .blend files as they are.
 
     denoise.py FILE.blend... [--samples 4 16 64 256] [--width 320] [--height 180] [--pictures DIR]
+    denoise.py FILE.blend... --flicker 4 [--samples 16] [--reference-samples 512]
 
 For each file and number of samples: mean squared and relative squared error and FLIP against Volley's own
 picture of many samples, which another seed made, how many times they are lower with Denoise, the worst 32 x 32
 tile by that, and the seconds of both renders. Errors do not depend on the load of the machine, times do. With
 --keep DIR the pictures without Denoise stay there and are not rendered again, and have no times then.
+
+--flicker renders so many successive frames instead, each with another seed: relative squared changes of the
+error from frame to frame, of pictures with Denoise, without, and without at 4 times the samples, over the last.
 """
 
 import argparse
@@ -28,11 +32,11 @@ SEED, REFERENCE_SEED = 1, 1000
 LEAST_ERROR = 1e-5
 
 
-def job(options, samples, denoise, seed, output):
+def job(options, samples, denoise, seed, output, frame=None):
     """One picture for scene_setups.py's batch."""
     settings = {"width": options.width, "height": options.height, "samples": samples, "seed": seed,
                 "volley": {"use_denoising": denoise}}
-    return {"engine": "VOLLEY", "frame": options.frame, "settings": settings, "output": str(output)}
+    return {"engine": "VOLLEY", "frame": options.frame if frame is None else frame, "settings": settings, "output": str(output)}
 
 
 def run_jobs(blend, jobs, options):
@@ -109,6 +113,38 @@ def measure(blend, options):
                    "seconds": [seconds[samples, denoise] for denoise in (False, True)]}
 
 
+def flicker(changes, exact):
+    """The mean relative square by which the error changes from one frame to the next."""
+    errors = [picture - true for picture, true in zip(changes, exact)]
+    return float(np.mean([relative_error(after - before + true, true)
+                          for before, after, true in zip(errors, errors[1:], exact[1:])]))
+
+
+def measure_flicker(blend, options):
+    """A row for each number of samples: flicker by what was rendered."""
+    frames = range(options.frame, options.frame + options.flicker)
+    for samples in options.samples:
+        kinds = {"denoised": (samples, True), "plain": (samples, False), "plain, 4 times": (4 * samples, False),
+                 "exact": (options.reference_samples, False)}
+        with tempfile.TemporaryDirectory() as folder:
+            paths = {kind: [pathlib.Path(folder) / f"{kind}-{frame}.exr" for frame in frames] for kind in kinds}
+            run_jobs(blend, [job(options, *kinds[kind], (REFERENCE_SEED if kind == "exact" else SEED) + frame,
+                                 path, frame) for kind in kinds for frame, path in zip(frames, paths[kind])], options)
+            pictures = {kind: [compare.read_rgb(path).astype(np.float64) for path in made]
+                        for kind, made in paths.items()}
+        exact = pictures.pop("exact")
+        yield {"file": blend.stem, "samples": samples, "frames": options.flicker,
+               "flicker": {kind: flicker(made, exact) for kind, made in pictures.items()}}
+
+
+def print_flicker(row):
+    """One line: over that of 4 times the samples, which must not be exceeded."""
+    base = row["flicker"]["plain, 4 times"]
+    print(f"{row['file']:16} {row['samples']:5} samples, {row['frames']} frames: flicker with Denoise "
+          f"{row['flicker']['denoised'] / base:.2f} of that of 4 times the samples, without "
+          f"{row['flicker']['plain'] / base:.2f}", flush=True)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -123,12 +159,16 @@ def main():
     parser.add_argument("--blender", default="blender")
     parser.add_argument("--keep", type=pathlib.Path, metavar="DIR", help="pictures stay in it")
     parser.add_argument("--pictures", type=pathlib.Path, help="PNGs go here")
+    parser.add_argument("--flicker", type=int, default=0, metavar="FRAMES", help="measure flicker over so many frames")
     parser.add_argument("--json", action="store_true", help="one JSON object a row")
     options = parser.parse_args()
     for blend in options.files:
-        for row in measure(blend, options):
+        for row in measure_flicker(blend, options) if options.flicker else measure(blend, options):
             if options.json:
                 print(json.dumps(row), flush=True)
+                continue
+            if options.flicker:
+                print_flicker(row)
                 continue
             gains = [row[name][0] / row[name][1] for name in ("mse", "rel_mse", "flip")]
             print(f"{row['file']:16} {row['samples']:5} samples: MSE {gains[0]:6.2f}, relMSE {gains[1]:6.2f}, "

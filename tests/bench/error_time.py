@@ -379,6 +379,7 @@ def measure_scene(name, options):
              **scene_errors(blend, key, own)}
     if options.times:
         scene["times"] = scene_times(blend, own)
+        scene["times_scale"] = own.times_scale
     scene["comparison"] = compare_curves(scene)
     return scene
 

@@ -8,6 +8,8 @@ from .tables import digits, table, words
 
 PEER_SAMPLES = (64, 256)   # of Cycles' plain pictures
 MEASURES = ("rel_mse", "flip")
+PIXEL_BYTES = 172          # halves 48, clean Combined 32, features 28 and their passes' sums 56, estimates 8
+PASS_BYTES = 24            # three doubles
 MAX_RATIO = 1.05           # of an error with Denoise to that without it; what is above is marked
 
 
@@ -26,12 +28,24 @@ def text(scenes):
         "Time of Cycles' plain picture over that of Volley for the same error, the filter's time included; – where "
         "the errors measured do not reach that one. Bias is in the table above.",
         table(["scene", *(f"{curves.MEASURES[measure]}, {count} samples, {kind}" for measure in MEASURES
-                          for count in PEER_SAMPLES for kind in ("Denoise", "plain"))], _time_rows(made))])
+                          for count in PEER_SAMPLES for kind in ("Denoise", "plain"))], _time_rows(made)),
+        f"What it costs: seconds a megapixel with all threads, differences of the times of whole renders, and "
+        f"{PIXEL_BYTES} bytes a pixel, {PASS_BYTES} more for each pass of light beside Combined.",
+        table(["scene", *samples], [[words(name), *map(digits, filter_seconds(scene, samples))]
+                                    for name, scene in made.items()])])
 
 
 def error_ratio(scene, samples):
     """relMSE with Denoise over that without."""
     return scene["curves"][curves.DENOISED][samples]["rel_mse"] / scene["curves"][curves.DEFAULT][samples]["rel_mse"]
+
+
+def filter_seconds(scene, samples):
+    """Seconds a megapixel that Denoise adds to a render, by samples; at few of them noise is as large."""
+    megapixels = scene["width"] * scene["height"] * scene["times_scale"] ** 2 / 1e6
+    clean, plain = (dict(zip(scene["curves"][name], curves.curve(scene, name, "mse")[0]))
+                    for name in (curves.DENOISED, curves.DEFAULT))
+    return [(clean[count] - plain[count]) / megapixels for count in samples]
 
 
 def time_ratio(scene, name, measure, samples):
