@@ -3,7 +3,8 @@
 
 Sources: T. Nishita, T. Sirai, K. Tadamura, E. Nakamae, "Display of the Earth Taking into Account
 Atmospheric Scattering" (1993): single scattering in a spherical atmosphere, with ozone; A. J. Preetham,
-P. Shirley, B. Smits, "A Practical Analytic Model for Daylight" (1999).
+P. Shirley, B. Smits, "A Practical Analytic Model for Daylight" (1999); L. Hosek, A. Wilkie, "An Analytic
+Model for Full Spectral Sky-Dome Radiance" (2012).
 
 Directions have Z up, angles are in radians, colours scene-linear Rec. 709.
 """
@@ -201,3 +202,17 @@ def preetham(sun_angle, turbidity):
     a, b, c, d, e = coefficients
     at_zenith = (1.0 + a * np.exp(b)) * (1.0 + c * np.exp(d * sun_angle) + e * math.cos(sun_angle) ** 2)
     return np.array(zenith) / at_zenith, coefficients
+
+
+def hosek_wilkie(elevation, turbidity, albedo):
+    """The coefficients of the formula in the order of ``sky_hosek_wilkie.py`` and the radiance, each of X, Y and Z:
+    (10, 3). elevation: the sun's, not below the horizon."""
+    from .sky_hosek_wilkie import CURVES  # some thousand numbers that few files need
+    place = min(max(turbidity, 1.0), float(len(CURVES))) - 1.0
+    low = min(int(place), len(CURVES) - 2)
+    ground = CURVES[low] + (place - low) * (CURVES[low + 1] - CURVES[low])
+    points = ground[0] + albedo * (ground[1] - ground[0])
+    x = (elevation / (0.5 * math.pi)) ** (1.0 / 3.0)
+    degree = points.shape[-1] - 1
+    weights = [math.comb(degree, k) * x ** k * (1.0 - x) ** (degree - k) for k in range(degree + 1)]
+    return (points @ weights).T

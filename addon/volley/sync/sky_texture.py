@@ -3,8 +3,7 @@
 nodes.
 
 A sky of scattered light is an image of its table, looked up by elevation and azimuth; its sun is a disc
-whose direction and size the world gets, to be sampled. Hosek and Wilkie's data set is not part of this
-add-on: Preetham's sky stands in, dimmed.
+whose direction and size the world gets, to be sampled.
 """
 
 import math
@@ -17,9 +16,7 @@ from . import sky, sky_scattering
 from .values import CONSTANT, DEFAULT, Value
 from .working_space import from_rec709
 
-_HORIZON = math.cos(0.5 * math.pi - 0.001)  # cosine to the zenith below which Preetham's sky stays the same
-# How bright Hosek and Wilkie's skies in Cycles are beside Preetham's (measured: 0.11 to 0.22).
-_HOSEK_SCALE = 0.16
+_HORIZON = math.cos(0.5 * math.pi - 0.001)  # cosine to the zenith below which plain formulas stay the same
 
 # A bright disc that a tree shows, for the world to sample: unit direction, diameter in radians.
 Sun = namedtuple("Sun", "direction angle")
@@ -67,6 +64,10 @@ class _Formula:
         """A number in all components."""
         return self.combine(number, number, number)
 
+    def each(self, operation, vector):
+        """A MATH node's results for a vector's components."""
+        return self.combine(*(self.number(operation, part) for part in self.parts(vector)))
+
     def choose(self, condition, first, second):
         """first where condition is 1, second where it is 0; vectors."""
         weight = self.spread(condition)
@@ -82,47 +83,79 @@ def sky_texture(walker, node, sockets):
     formula = _Formula(walker)
     if node.sky_type in {'NISHITA', 'SINGLE_SCATTERING', 'MULTIPLE_SCATTERING'}:
         color = _scattered(walker, formula, node, direction)
-    elif node.sky_type in {'PREETHAM', 'HOSEK_WILKIE'}:
+    elif node.sky_type == 'PREETHAM':
         color = _preetham(formula, node, direction)
+    elif node.sky_type == 'HOSEK_WILKIE':
+        color = _hosek_wilkie(formula, node, direction)
     else:
         return None
-    if node.sky_type == 'HOSEK_WILKIE':
-        walker.warn("Sky Texture: Hosek / Wilkie is approximated by Preetham's sky, dimmed")
-        color = formula.vector(Vector.MULTIPLY, color, (_HOSEK_SCALE,) * 3)
     color = from_rec709(walker, color)
     return {"Color": formula.vector(Vector.MAXIMUM, color, (0.0,) * 3)._replace(kind='c')}
 
 
-def _preetham(formula, node, direction):
+def _sun_direction(node):
+    """Of unit length."""
     sun = np.array(node.sun_direction, np.float64)
     length = np.linalg.norm(sun)
-    sun = sun / length if length > 0.0 else np.array((0.0, 0.0, 1.0))
-    scale, (a, b, c, d, e) = sky.preetham(math.acos(np.clip(sun[2], -1.0, 1.0)), node.turbidity)
+    return sun / length if length > 0.0 else np.array((0.0, 0.0, 1.0))
+
+
+def _angles(formula, direction, sun):
+    """Cosine to the zenith, kept above the horizon, cosine to the sun, and the angle to it."""
     up = formula.number(Math.MAXIMUM, formula.parts(direction)[2], _HORIZON)
-    inverse = formula.spread(formula.number(Math.DIVIDE, 1.0, up))
     cosine = formula.number(Math.MAXIMUM, formula.measure(Vector.DOT, direction, sun), -1.0)
     cosine = formula.number(Math.MINIMUM, cosine, 1.0)
-    angle = formula.spread(formula.number(Math.ARCCOSINE, cosine))
+    return up, cosine, formula.number(Math.ARCCOSINE, cosine)
+
+
+def _rec709(formula, xyz):
+    """The colour of three numbers."""
+    color = (0.0, 0.0, 0.0)
+    for part, column in zip(xyz, sky.XYZ_TO_RGB.T):
+        color = formula.vector(Vector.MULTIPLY_ADD, formula.spread(part), column, color)
+    return color
+
+
+def _preetham(formula, node, direction):
+    sun = _sun_direction(node)
+    scale, (a, b, c, d, e) = sky.preetham(math.acos(np.clip(sun[2], -1.0, 1.0)), node.turbidity)
+    up, cosine, angle = _angles(formula, direction, sun)
+    inverse = formula.spread(formula.number(Math.DIVIDE, 1.0, up))
     square = formula.spread(formula.number(Math.MULTIPLY, cosine, cosine))
-
-    def exponential(vector):
-        return formula.combine(*(formula.number(Math.EXPONENT, part) for part in formula.parts(vector)))
-
     one = (1.0, 1.0, 1.0)
-    by_height = exponential(formula.vector(Vector.MULTIPLY, inverse, b))
+    by_height = formula.each(Math.EXPONENT, formula.vector(Vector.MULTIPLY, inverse, b))
     by_height = formula.vector(Vector.MULTIPLY_ADD, by_height, a, one)
-    by_sun = exponential(formula.vector(Vector.MULTIPLY, angle, d))
+    by_sun = formula.each(Math.EXPONENT, formula.vector(Vector.MULTIPLY, formula.spread(angle), d))
     by_square = formula.vector(Vector.MULTIPLY_ADD, square, e, one)
     by_sun = formula.vector(Vector.MULTIPLY_ADD, by_sun, c, by_square)
     x, y, luminance = formula.parts(formula.vector(
         Vector.MULTIPLY, formula.vector(Vector.MULTIPLY, by_height, by_sun), scale))
     per_y = formula.number(Math.DIVIDE, luminance, y)
     z = formula.number(Math.SUBTRACT, formula.number(Math.SUBTRACT, 1.0, x), y)
-    xyz = (formula.number(Math.MULTIPLY, x, per_y), luminance, formula.number(Math.MULTIPLY, z, per_y))
-    color = (0.0, 0.0, 0.0)
-    for part, column in zip(xyz, sky.XYZ_TO_RGB.T):
-        color = formula.vector(Vector.MULTIPLY_ADD, formula.spread(part), column, color)
-    return color
+    return _rec709(formula, (formula.number(Math.MULTIPLY, x, per_y), luminance,
+                             formula.number(Math.MULTIPLY, z, per_y)))
+
+
+def _hosek_wilkie(formula, node, direction):
+    x, y, z = _sun_direction(node)
+    elevation, azimuth = math.asin(np.clip(z, 0.0, 1.0)), math.atan2(x, y)  # a sun that has set is on the horizon
+    sun = (math.cos(elevation) * math.sin(azimuth), math.cos(elevation) * math.cos(azimuth), math.sin(elevation))
+    a, b, c, d, e, f, g, i, h, radiance = sky.hosek_wilkie(elevation, node.turbidity, node.ground_albedo)
+    up, cosine, angle = _angles(formula, direction, sun)
+    inverse = formula.spread(formula.number(Math.DIVIDE, 1.0, formula.number(Math.ADD, up, 0.01)))
+    square = formula.number(Math.MULTIPLY, cosine, cosine)
+    by_height = formula.each(Math.EXPONENT, formula.vector(Vector.MULTIPLY, inverse, b))
+    by_height = formula.vector(Vector.MULTIPLY_ADD, by_height, a, (1.0, 1.0, 1.0))
+    by_angle = formula.each(Math.EXPONENT, formula.vector(Vector.MULTIPLY, formula.spread(angle), e))
+    base = formula.vector(Vector.MULTIPLY_ADD, formula.spread(cosine), -2.0 * h, 1.0 + h * h)
+    base = formula.vector(Vector.MULTIPLY, base, formula.each(Math.SQRT, base))
+    glow = formula.vector(Vector.DIVIDE, formula.spread(formula.number(Math.ADD, square, 1.0)), base)
+    by_sun = c
+    for part, factor in ((by_angle, d), (formula.spread(square), f), (glow, g),
+                         (formula.spread(formula.number(Math.SQRT, up)), i)):
+        by_sun = formula.vector(Vector.MULTIPLY_ADD, part, factor, by_sun)
+    xyz = formula.vector(Vector.MULTIPLY, formula.vector(Vector.MULTIPLY, by_height, by_sun), radiance)
+    return _rec709(formula, formula.parts(xyz))
 
 
 def _altitude(node):
