@@ -105,6 +105,18 @@ static void copy_mesh(struct embree_scene *s) {
     copy_positions(s, mesh->positions);
 }
 
+/* Of the geometry, which is attached to the scene. */
+static void build(struct embree_scene *s) {
+    rtcAttachGeometry(s->scene, s->geometry);
+    const long long before = atomic_load(&s->device->bytes);
+    const double start = trc_seconds();
+    rtcCommitGeometry(s->geometry);
+    rtcCommitScene(s->scene);
+    s->build_seconds = trc_seconds() - start;
+    s->build_bytes = (uint64_t)(atomic_load(&s->device->bytes) - before);
+    check(s->device);
+}
+
 struct embree_scene *embree_scene_create(struct embree_device *device, const struct mesh *mesh,
                                          enum embree_use use) {
     struct embree_scene *s = buffer_alloc(1, sizeof *s);
@@ -120,14 +132,68 @@ struct embree_scene *embree_scene_create(struct embree_device *device, const str
         rtcSetGeometryBuildQuality(s->geometry, RTC_BUILD_QUALITY_REFIT);
     }
     copy_mesh(s);
-    rtcAttachGeometry(s->scene, s->geometry);
-    const long long before = atomic_load(&device->bytes);
-    const double start = trc_seconds();
-    rtcCommitGeometry(s->geometry);
-    rtcCommitScene(s->scene);
-    s->build_seconds = trc_seconds() - start;
-    s->build_bytes = (uint64_t)(atomic_load(&device->bytes) - before);
+    build(s);
+    return s;
+}
+
+/* ---- curves ---- */
+
+static const struct {
+    enum RTCGeometryType type;
+    bool is_spline, has_flags;
+} curve_types[] = {
+    [EMBREE_ROUND_LINEAR] = {RTC_GEOMETRY_TYPE_ROUND_LINEAR_CURVE, false, true},
+    [EMBREE_FLAT_LINEAR] = {RTC_GEOMETRY_TYPE_FLAT_LINEAR_CURVE, false, false},
+    [EMBREE_ROUND_CATMULL_ROM] = {RTC_GEOMETRY_TYPE_ROUND_CATMULL_ROM_CURVE, true, false},
+    [EMBREE_FLAT_CATMULL_ROM] = {RTC_GEOMETRY_TYPE_FLAT_CATMULL_ROM_CURVE, true, false}};
+
+/* Strands one after the other, each with extra copies of its first and its last point, and the
+ * first vertex of each segment with its neighbours' flags (NULL: none). */
+static void copy_strands(const float *points, uint32_t strand_count, uint32_t point_count,
+                         uint32_t extra, float *vertices, uint32_t *segments, uint8_t *flags) {
+    const size_t point_bytes = 4 * sizeof(float);
+    const uint32_t stride = point_count + 2 * extra, last = point_count - 1;
+    for (uint32_t strand = 0; strand < strand_count; strand++) {
+        const float *from = points + (size_t)4 * strand * point_count;
+        float *to = vertices + (size_t)4 * strand * stride;
+        for (uint32_t i = 0; i < extra; i++) {
+            memcpy(to + 4 * i, from, point_bytes);
+            memcpy(to + 4 * (extra + point_count + i), from + 4 * last, point_bytes);
+        }
+        memcpy(to + 4 * extra, from, point_bytes * point_count);
+        for (uint32_t i = 0; i < last; i++) {
+            segments[strand * last + i] = strand * stride + i;
+            if (flags)
+                flags[strand * last + i] =
+                    (uint8_t)((i > 0 ? RTC_CURVE_FLAG_NEIGHBOR_LEFT : 0) |
+                              (i + 1 < last ? RTC_CURVE_FLAG_NEIGHBOR_RIGHT : 0));
+        }
+    }
+}
+
+struct embree_scene *embree_curves_create(struct embree_device *device, enum embree_curve curve,
+                                          const float *points, uint32_t strand_count,
+                                          uint32_t point_count, uint32_t pieces) {
+    const uint32_t extra = curve_types[curve].is_spline, segments = point_count - 1;
+    struct embree_scene *s = buffer_alloc(1, sizeof *s);
+    s->device = device;
+    s->scene = rtcNewScene(device->device);
+    s->geometry = rtcNewGeometry(device->device, curve_types[curve].type);
+    if (curve == EMBREE_FLAT_CATMULL_ROM)
+        rtcSetGeometryTessellationRate(s->geometry, (float)pieces);
+    float *vertices = rtcSetNewGeometryBuffer(s->geometry, RTC_BUFFER_TYPE_VERTEX, 0,
+                                              RTC_FORMAT_FLOAT4, 4 * sizeof(float),
+                                              (size_t)strand_count * (point_count + 2 * extra));
+    uint32_t *indices =
+        rtcSetNewGeometryBuffer(s->geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT,
+                                sizeof(uint32_t), (size_t)strand_count * segments);
+    uint8_t *flags = NULL;
+    if (curve_types[curve].has_flags)
+        flags = rtcSetNewGeometryBuffer(s->geometry, RTC_BUFFER_TYPE_FLAGS, 0, RTC_FORMAT_UCHAR, 1,
+                                        (size_t)strand_count * segments);
     check(device);
+    copy_strands(points, strand_count, point_count, extra, vertices, indices, flags);
+    build(s);
     return s;
 }
 

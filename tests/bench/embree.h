@@ -23,6 +23,20 @@ struct embree_scene *embree_scene_create(struct embree_device *device, const str
                                          enum embree_use use);
 void embree_scene_destroy(struct embree_scene *scene);
 
+enum embree_curve {
+    EMBREE_ROUND_LINEAR,
+    EMBREE_FLAT_LINEAR,
+    EMBREE_ROUND_CATMULL_ROM,
+    EMBREE_FLAT_CATMULL_ROM
+};
+
+/* Builds a scene of strands of point_count points each, which may go: x, y, z, radius, the first
+ * and the last of a spline standing for those beyond the ends. pieces: of flat splines. Ends the
+ * program on errors. */
+struct embree_scene *embree_curves_create(struct embree_device *device, enum embree_curve curve,
+                                          const float *points, uint32_t strand_count,
+                                          uint32_t point_count, uint32_t pieces);
+
 /* Of the build, and memory that it left in use. */
 double embree_build_seconds(const struct embree_scene *scene);
 uint64_t embree_build_bytes(const struct embree_scene *scene);

@@ -17,6 +17,18 @@ struct embree_scene *embree_scene_create(struct embree_device *device, const str
     return NULL;
 }
 
+struct embree_scene *embree_curves_create(struct embree_device *device, enum embree_curve curve,
+                                          const float *points, uint32_t strand_count,
+                                          uint32_t point_count, uint32_t pieces) {
+    (void)device;
+    (void)curve;
+    (void)points;
+    (void)strand_count;
+    (void)point_count;
+    (void)pieces;
+    return NULL;
+}
+
 void embree_scene_destroy(struct embree_scene *scene) { (void)scene; }
 
 double embree_build_seconds(const struct embree_scene *scene) {

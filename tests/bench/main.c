@@ -10,6 +10,7 @@
 #include "options.h"
 #include "query.h"
 #include "report.h"
+#include "strands.h"
 #include "volley.h"
 
 /* The kernels, two kinds of queries, Embree's modes on two scenes. */
@@ -194,6 +195,8 @@ static bool measure_scene(const struct bench *b) {
 
 static bool run(struct bench *b) {
     bool good = true;
+    if (b->options.strands)
+        return strands_measure(&b->options, b->json);
     if (b->options.accuracy)
         return accuracy_measure(&b->options, b->json);
     for (uint32_t i = 0; i < b->options.scene_count && good; i++) {

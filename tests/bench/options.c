@@ -165,6 +165,10 @@ static bool set_accuracy(struct options *o, const char *text) {
     (void)text;
     return o->accuracy = true;
 }
+static bool set_strands(struct options *o, const char *text) {
+    (void)text;
+    return o->strands = true;
+}
 static bool set_check(struct options *o, const char *text) {
     (void)text;
     return o->check = true;
@@ -197,6 +201,8 @@ static const struct {
     {"--counts", NULL, "also count box and triangle tests and live rays", set_counts},
     {"--accuracy", NULL, "how exact hits at vertices and edges are; measures nothing else",
      set_accuracy},
+    {"--strands", NULL, "curves beside Embree's, on one thread; measures nothing else",
+     set_strands},
     {"--check", NULL, "compare hits with brute force and measure nothing", set_check},
     {"--json", "FILE", "also write one JSON object per row", set_json},
 };

@@ -31,6 +31,7 @@ struct options {
     bool builds;
     bool counts;   /* steps of traversal */
     bool accuracy; /* of hits beside Embree's, on meshes of its own; no speed */
+    bool strands;  /* curves beside Embree's; nothing else is measured */
     bool check;    /* hits against brute force, nothing is measured */
     const char *json;
 };
