@@ -1,4 +1,6 @@
-/* Mesh buffers, instances, poses and rays: any bits. */
+/* Buffers of meshes and curves, instances, poses and rays: any bits. */
+#include <stdbool.h>
+
 #include "bytes.h"
 #include "stage.h"
 
@@ -8,12 +10,13 @@
 #define RAYS 16
 
 struct buffers {
-    float positions[3 * MOST_VERTICES * MOST_KEYS];
+    float positions[4 * MOST_VERTICES * MOST_KEYS]; /* of points of curves, with radii */
     float normals[9 * MOST_TRIANGLES * MOST_KEYS];
     float generated[3 * MOST_VERTICES];
     uint32_t indices[3 * MOST_TRIANGLES];
     uint8_t smooth[MOST_TRIANGLES];
     uint16_t material[MOST_TRIANGLES];
+    uint32_t lengths[MOST_VERTICES];
     float transforms[12 * MOST_KEYS];
 };
 
@@ -50,6 +53,37 @@ static trc_status create_mesh(struct bytes *b, trc_scene scene, struct buffers *
     *key_count = keys;
     *vertex_count = vertices;
     return trc_mesh_create(scene, &desc, mesh);
+}
+
+/* Strands, or balls, of that many points: lengths that sum up to them, now and then one more. */
+static trc_status create_curves(struct bytes *b, trc_scene scene, struct buffers *f,
+                                uint32_t *key_count, uint32_t *point_count, trc_id *mesh) {
+    const uint32_t keys = 1 + bytes_below(b, MOST_KEYS), points = bytes_below(b, MOST_VERTICES);
+    uint32_t strands = 0;
+    for (uint32_t left = points; left > 0 && strands < MOST_VERTICES; strands++) {
+        f->lengths[strands] = 1 + bytes_below(b, left);
+        left -= f->lengths[strands];
+    }
+    if (strands && bytes_below(b, 64) == 0)
+        f->lengths[strands - 1] += bytes_below(b, 3) - 1;
+    bytes_floats(b, f->positions, (size_t)4 * points * keys);
+    bytes_floats(b, f->generated, (size_t)3 * points);
+    trc_curves_desc desc = trc_curves_desc_default();
+    desc.key_count = keys;
+    desc.shape = bytes_below(b, 2) ? TRC_CURVE_ROUND : TRC_CURVE_RIBBON;
+    desc.piece_count = 1 + bytes_below(b, TRC_MAX_CURVE_PIECES);
+    desc.point_count = points;
+    desc.points = f->positions;
+    desc.point_value_count = 4ull * points * keys;
+    desc.lengths = bytes_below(b, 4) ? f->lengths : NULL;
+    desc.strand_count = desc.lengths ? strands : 0;
+    desc.generated = bytes_below(b, 2) ? f->generated : NULL;
+    desc.generated_count = desc.generated ? 3ull * (desc.lengths ? strands : points) : 0;
+    if (bytes_below(b, 2))
+        bytes_floats(b, &desc.tolerance, 1);
+    *key_count = keys;
+    *point_count = points;
+    return trc_curves_create(scene, &desc, mesh);
 }
 
 static void create_instance(struct bytes *b, trc_scene scene, trc_id mesh, float *transforms) {
@@ -92,6 +126,17 @@ static void query(struct bytes *b, trc_scene scene) {
     (void)trc_query_occluded(scene, &rays, 0, occluded, RAYS);
 }
 
+/* Another pose of the mesh, or of the curves. */
+static void update(struct bytes *b, trc_scene scene, trc_id mesh, bool curves, uint32_t key_count,
+                   uint32_t vertex_count, float *values) {
+    const uint64_t floats = (curves ? 4ull : 3ull) * vertex_count * key_count;
+    bytes_floats(b, values, floats);
+    if (curves)
+        (void)trc_curves_update(scene, mesh, key_count, values, floats);
+    else
+        (void)trc_mesh_update(scene, mesh, key_count, values, floats, NULL, 0);
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     static struct buffers f; /* large; one input runs at a time */
     struct bytes b = {data, size};
@@ -100,15 +145,16 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     uint32_t key_count = 0, vertex_count = 0;
     stage_camera(scene);
     stage_light(scene);
-    if (create_mesh(&b, scene, &f, &key_count, &vertex_count, &mesh) == TRC_OK) {
+    const bool curves = bytes_below(&b, 2);
+    const trc_status status =
+        (curves ? create_curves : create_mesh)(&b, scene, &f, &key_count, &vertex_count, &mesh);
+    if (status == TRC_OK) {
         for (uint32_t i = bytes_below(&b, 4); i > 0; i--)
             create_instance(&b, scene, mesh, f.transforms);
         const trc_render_desc render = stage_render();
         stage_run(scene, &render);
         query(&b, scene);
-        const uint64_t floats = 3ull * vertex_count * key_count;
-        bytes_floats(&b, f.positions, floats);
-        (void)trc_mesh_update(scene, mesh, key_count, f.positions, floats, NULL, 0);
+        update(&b, scene, mesh, curves, key_count, vertex_count, f.positions);
         stage_run(scene, &render);
     }
     (void)trc_scene_destroy(scene);

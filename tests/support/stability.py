@@ -92,8 +92,8 @@ def summary(table):
     """
     missed, count, cases = _counted(table, "misses")
     parts = [f"{missed} misses of {count:,} rays that must hit, in {cases} cases: closed surfaces met at "
-             "their vertices and edges, at rest and in motion, needles, sizes from 1e-38 to 1e18, far from "
-             "the origin"]
+             "their vertices and edges, strands at their joints and along their axes, at rest and in motion, "
+             "needles, sizes from 1e-38 to 1e18, far from the origin"]
     left, leaving, _ = _counted(table, "self-hits")
     if leaving:
         parts.append(f"{left} self-hits of {leaving:,} rays that leave surfaces")
