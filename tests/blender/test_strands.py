@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Hair, curves and points against Cycles': where they are, how thick, what they are made of."""
 
+import itertools
 import math
 
 import compare
@@ -456,6 +457,45 @@ def inside_outputs():
     return pictures
 
 
+LIMITS = {"max_bounces": "max_depth", "glossy_bounces": "max_glossy_depth",
+          "transmission_bounces": "max_transmission_depth"}  # Cycles' name: Volley's
+
+
+def inside_bounces():
+    """{shader, limit: both} under a bright sky: light from one strand to the next."""
+    import bpy
+    import scenes
+    scene = scenes.empty(size=(64, 48))
+    scenes.camera(location=(0.0, -7.0, 0.0))
+    scenes.light_world((0.6, 0.7, 0.8))
+    _haired(count=60, radius_scale=0.15)
+    tree, pictures = bpy.data.materials["Hair"].node_tree, {}
+    for name in ("Reflection", "Transmission", "Principled"):
+        node = tree.nodes.new("ShaderNodeBsdfHairPrincipled" if name == "Principled" else "ShaderNodeBsdfHair")
+        node.inputs["Color"].default_value = (0.9, 0.8, 0.7, 1.0)
+        if name != "Principled":
+            node.component = name
+        elif hasattr(node, "model"):
+            node.model = 'CHIANG'
+        tree.links.new(node.outputs[0], tree.nodes["Material Output"].inputs["Surface"])
+        for limit, count in itertools.product(LIMITS, (0, 1)):
+            pictures[f"{name}, {limit} {count}"] = [_limited(scene, engine, limit, count)
+                                                    for engine in ('VOLLEY', 'CYCLES')]
+    return pictures
+
+
+def _limited(scene, engine, limit, count):
+    """Pictures by one engine with that limit, and 50 for the others."""
+    import scenes
+    seeds = []
+    for _ in scenes.each_seed(engine, SAMPLES):
+        for theirs, ours in LIMITS.items():
+            setattr(scene.cycles, theirs, count if theirs == limit else 50)
+            setattr(scene.volley, ours, count if theirs == limit else 50)
+        seeds.append(scenes.render()[..., :3])
+    return np.array(seeds)
+
+
 def _agree(pictures, off=OFF):
     for name, (ours, theirs) in pictures.items():
         assert theirs.std() > 0.02, f"{name}: the picture shows nothing"
@@ -504,6 +544,15 @@ def test_masks(blender):
     for name, (ours, theirs) in blender.run(inside_masks).items():
         assert 0.02 < theirs[..., 3].mean() < 0.98, f"{name}: the picture shows nothing"
         _pass_is_near(ours, theirs, name)
+
+
+def test_bounces(blender):
+    pictures = blender.run(inside_bounces)
+    _agree(pictures, PASS_OFF)
+    means = {name: theirs.mean() for name, (_, theirs) in pictures.items()}
+    gains = {name: means[f"{name} 1"] / means[f"{name} 0"] for name in
+             ("Reflection, glossy_bounces", "Transmission, transmission_bounces", "Principled, transmission_bounces")}
+    assert min(gains.values()) > 1.01, gains
 
 
 def _off_pixels(ours, theirs, step):
