@@ -1,15 +1,10 @@
 /* What a film shows while it gathers samples, quickly reconstructed (model/denoise.h). */
-#include <math.h>
-
 #include "core/checks.h"
 #include "core/core.h"
 #include "core/pool.h"
 #include "film/film.h"
 #include "model/kernels.h"
 #include "model/sequence.h"
-
-/* Numbers above are as good as this, so that squares stay finite. */
-#define MOST 1e15f
 
 struct preview {
     const struct trc_film *film;
@@ -19,58 +14,34 @@ struct preview {
     float *out;
 };
 
-/* A mean as a float within limits; NaN: the lower. */
-static float cut(double mean, float low) {
-    const float value = (float)mean;
-    return value > low ? (value < MOST ? value : MOST) : low;
-}
-
 static float load_float(const float *p) {
     float value;
     __atomic_load(p, &value, __ATOMIC_RELAXED);
     return value;
 }
 
-static void load_means(const double *sums, uint32_t channels, double scale, float low,
-                       float *plane) {
+static void load_sums(const double *sums, uint32_t channels, float *plane) {
     for (uint32_t k = 0; k < channels; k++)
-        plane[k * TRC_PREVIEW_FLOATS] = cut(trc_sum_load(&sums[k]) * scale, low);
-}
-
-/* The standard deviation of a pixel's mean light, by its halves; below 0 without them. */
-static float change_of(const struct trc_film *film, size_t pixel, uint32_t count, double exposure) {
-    const struct trc_half *half = &film->halves[pixel];
-    const uint32_t first = __atomic_load_n(&half->count, __ATOMIC_RELAXED);
-    if (!first || first >= count)
-        return -1.0f;
-    double of_all = 0.0, of_first = 0.0;
-    for (int c = 0; c < 3; c++) {
-        of_all += trc_sum_load(&film->sums[TRC_PASS_COMBINED][4 * pixel + (size_t)c]);
-        of_first += (double)load_float(&half->light[c]);
-    }
-    const double part = (double)first / count;
-    const double change = of_first / first - (of_all - of_first) / (count - first);
-    return cut(fabs(change) * exposure * (1.0 / 3.0) * sqrt(part * (1.0 - part)), 0.0f);
+        plane[k * TRC_PREVIEW_FLOATS] = (float)trc_sum_load(&sums[k]);
 }
 
 /* A pixel of the film into planes that begin at its place. */
-static void load_pixel(const struct preview *p, size_t pixel, float *at) {
-    const struct trc_film *film = p->film;
-    const uint32_t count = __atomic_load_n(&film->sample_counts[pixel], __ATOMIC_RELAXED);
-    const double scale = count ? 1.0 / count : 0.0, exposure = (double)p->exposure;
-    const double *combined = film->sums[TRC_PASS_COMBINED] + 4 * pixel;
-    load_means(combined, 3, scale * exposure, -MOST, at + TRC_PREVIEW_COLOR * TRC_PREVIEW_FLOATS);
-    load_means(combined + 3, 1, scale, 0.0f, at + (TRC_PREVIEW_COLOR + 3) * TRC_PREVIEW_FLOATS);
-    load_means(film->sums[TRC_PASS_DENOISING_ALBEDO] + 3 * pixel, 3, scale, 0.0f,
-               at + TRC_PREVIEW_ALBEDO * TRC_PREVIEW_FLOATS);
-    load_means(film->sums[TRC_PASS_DENOISING_NORMAL] + 3 * pixel, 3, scale, -MOST,
-               at + TRC_PREVIEW_NORMAL * TRC_PREVIEW_FLOATS);
-    load_means(film->sums[TRC_PASS_DENOISING_DEPTH] + pixel, 1, scale, 0.0f,
-               at + TRC_PREVIEW_DEPTH * TRC_PREVIEW_FLOATS);
-    at[TRC_PREVIEW_CHANGE * TRC_PREVIEW_FLOATS] = change_of(film, pixel, count, exposure);
-    at[TRC_PREVIEW_COUNT * TRC_PREVIEW_FLOATS] = (float)count;
-    if (!count)
-        at[TRC_PREVIEW_DEPTH * TRC_PREVIEW_FLOATS] = -1.0f;
+static void load_pixel(const struct trc_film *film, size_t pixel, float *at) {
+    load_sums(film->sums[TRC_PASS_COMBINED] + 4 * pixel, 4,
+              at + TRC_PREVIEW_COLOR * TRC_PREVIEW_FLOATS);
+    load_sums(film->sums[TRC_PASS_DENOISING_ALBEDO] + 3 * pixel, 3,
+              at + TRC_PREVIEW_ALBEDO * TRC_PREVIEW_FLOATS);
+    load_sums(film->sums[TRC_PASS_DENOISING_NORMAL] + 3 * pixel, 3,
+              at + TRC_PREVIEW_NORMAL * TRC_PREVIEW_FLOATS);
+    load_sums(film->sums[TRC_PASS_DENOISING_DEPTH] + pixel, 1,
+              at + TRC_PREVIEW_DEPTH * TRC_PREVIEW_FLOATS);
+    const struct trc_half *half = &film->halves[pixel];
+    at[TRC_PREVIEW_HALF * TRC_PREVIEW_FLOATS] =
+        load_float(&half->light[0]) + load_float(&half->light[1]) + load_float(&half->light[2]);
+    at[TRC_PREVIEW_HALF_COUNT * TRC_PREVIEW_FLOATS] =
+        (float)__atomic_load_n(&half->count, __ATOMIC_RELAXED);
+    at[TRC_PREVIEW_COUNT * TRC_PREVIEW_FLOATS] =
+        (float)__atomic_load_n(&film->sample_counts[pixel], __ATOMIC_RELAXED);
 }
 
 /* Pixels [x, x_end) of a row, counted from a tile of the preview, that are in one tile of the film.
@@ -105,7 +76,7 @@ static void load_run(const struct preview *p, const struct run *run, float *memo
     do {
         number = trc_film_await_writer(sequence);
         for (int x = run->x; x < run->x_end; x++)
-            load_pixel(p, run->pixel + (size_t)(x - run->x), memory + trc_preview_at(x, run->y));
+            load_pixel(film, run->pixel + (size_t)(x - run->x), memory + trc_preview_at(x, run->y));
     } while (!trc_sequence_is_whole(sequence, number));
 }
 
@@ -141,7 +112,7 @@ static void show_tile(void *context, uint32_t index, uint32_t worker) {
     const uint32_t bottom = index / across * TRC_PREVIEW_HEIGHT;
     float *memory = p->memory + (size_t)worker * TRC_PREVIEW_PLANES * TRC_PREVIEW_FLOATS;
     load(p, left, bottom, memory);
-    p->kernels->preview_filter(memory);
+    p->kernels->preview_filter(memory, p->exposure);
     store(p, left, bottom, memory);
 }
 

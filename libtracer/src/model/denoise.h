@@ -84,15 +84,16 @@ struct trc_denoise_job {
 #define TRC_PREVIEW_ROWS (TRC_PREVIEW_HEIGHT + 2 * TRC_PREVIEW_HALO)
 #define TRC_PREVIEW_FLOATS (TRC_PREVIEW_ROWS * TRC_PREVIEW_STRIDE)
 
-/* What is in the planes: first what is filtered, which becomes what is shown. */
+/* What is in the planes: sums of a pixel's samples, from which the filter makes means first; the
+ * colour becomes what is shown. */
 enum trc_preview_plane {
     TRC_PREVIEW_COLOR = 0,  /* and alpha */
     TRC_PREVIEW_ALBEDO = 4, /* three */
     TRC_PREVIEW_NORMAL = 7, /* three */
-    TRC_PREVIEW_DEPTH = 10, /* below 0: there are no samples */
-    TRC_PREVIEW_CHANGE,     /* standard deviation of the mean of the three colours as the halves
-                               tell it; below 0: there are no halves */
-    TRC_PREVIEW_COUNT,      /* samples */
+    TRC_PREVIEW_DEPTH = 10,
+    TRC_PREVIEW_HALF,       /* the three colours of the first half, added */
+    TRC_PREVIEW_HALF_COUNT, /* samples of the first half; 0: there are no halves */
+    TRC_PREVIEW_COUNT,      /* samples of all */
     TRC_PREVIEW_INPUTS,
     TRC_PREVIEW_PLANES = TRC_PREVIEW_INPUTS + 16 /* the others are the filter's own */
 };

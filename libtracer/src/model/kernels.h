@@ -63,8 +63,8 @@ struct trc_kernels {
     size_t (*denoise_memory_bytes)(void);
     void (*denoise_tile)(const struct trc_denoise_job *job);
     /* Quick reconstruction of a tile, in place: memory has TRC_PREVIEW_PLANES planes, the inputs
-     * filled in, all numbers finite; 64-byte aligned. Never fails. */
-    void (*preview_filter)(float *memory);
+     * filled in; 64-byte aligned. exposure: a factor of the colour. Never fails. */
+    void (*preview_filter)(float *memory, float exposure);
     /* trc_query_*: arguments already validated; chunk [begin, end) of the arrays. packet_size
      * resolved. */
     void (*query_closest)(const struct trc_snapshot *snapshot, const trc_rays *rays,

@@ -21,6 +21,8 @@ static const float fade_begin[LEVELS] = {0.0f, 16.0f, 4.0f},
 #define HALVES_VARIANCE 0.54f
 #define DARK 0.01f
 #define MOST_ERROR 1e3f
+/* Numbers above are as good as this, so that squares stay finite. */
+#define MOST 1e15f
 /* Of pixels without samples, which are unlike all others. */
 #define NO_DEPTH -1e4f
 
@@ -28,7 +30,7 @@ static const float fade_begin[LEVELS] = {0.0f, 16.0f, 4.0f},
 #define STRIDE TRC_PREVIEW_STRIDE
 
 struct planes {
-    float *color, *albedo, *normal, *depth, *change, *count;
+    float *color, *albedo, *normal, *depth, *half, *half_count, *count;
     float *light[2][4], *light_mean, *variance[2], *smooth, *slope, *own, *first_variance;
     float *estimate;
 };
@@ -39,7 +41,8 @@ static struct planes planes_of(float *memory) {
         .albedo = memory + TRC_PREVIEW_ALBEDO * TRC_PREVIEW_FLOATS,
         .normal = memory + TRC_PREVIEW_NORMAL * TRC_PREVIEW_FLOATS,
         .depth = memory + TRC_PREVIEW_DEPTH * TRC_PREVIEW_FLOATS,
-        .change = memory + TRC_PREVIEW_CHANGE * TRC_PREVIEW_FLOATS,
+        .half = memory + TRC_PREVIEW_HALF * TRC_PREVIEW_FLOATS,
+        .half_count = memory + TRC_PREVIEW_HALF_COUNT * TRC_PREVIEW_FLOATS,
         .count = memory + TRC_PREVIEW_COUNT * TRC_PREVIEW_FLOATS,
     };
     float *next = memory + TRC_PREVIEW_INPUTS * TRC_PREVIEW_FLOATS;
@@ -76,8 +79,51 @@ static vfloat box(const float *in, int at) {
 
 /* ---- what there is ---- */
 
-static void prepare_light(const struct planes *p) {
+/* Within limits; NaN: the lower. */
+static vfloat cut(vfloat mean, float low) {
+    return vf_select(vf_gt(mean, vf_set(low)), vf_min(mean, vf_set(MOST)), vf_set(low));
+}
+
+static void mean_of(float *plane, int at, vfloat scale, float low) {
+    vf_store(plane + at, cut(vf_load(plane + at) * scale, low));
+}
+
+/* Pixels whose halves are not both there. */
+static vmask without_halves(const struct planes *p, int at) {
+    const vfloat first = vf_load(p->half_count + at);
+    return vm_or(vf_le(first, vf_set(0.0f)), vf_le(vf_load(p->count + at), first));
+}
+
+/* The standard deviation of a pixel's mean light, by its halves, where both are there. */
+static vfloat change_at(const struct planes *p, int at, float exposure) {
+    const vfloat one = vf_set(1.0f), count = vf_load(p->count + at);
+    const vfloat first = vf_load(p->half_count + at), part = first / count;
+    const vfloat of_first = vf_load(p->half + at);
+    vfloat of_all = vf_set(0.0f);
+    for (int c = 0; c < 3; c++)
+        of_all = of_all + vf_load(p->color + c * TRC_PREVIEW_FLOATS + at);
+    const vfloat change = vf_abs(of_first / first - (of_all - of_first) / (count - first));
+    return cut(change * vf_sqrt(part * (one - part)) * vf_set(exposure / 3.0f), 0.0f);
+}
+
+static void prepare_means(const struct planes *p, int at, float exposure) {
+    const vfloat count = vf_load(p->count + at);
+    const vmask some = vf_gt(count, vf_set(0.0f));
+    const vfloat scale = vf_select(some, vf_set(1.0f) / count, vf_set(0.0f));
+    for (int c = 0; c < 3; c++) {
+        mean_of(p->color + c * TRC_PREVIEW_FLOATS, at, scale * vf_set(exposure), -MOST);
+        mean_of(p->albedo + c * TRC_PREVIEW_FLOATS, at, scale, 0.0f);
+        mean_of(p->normal + c * TRC_PREVIEW_FLOATS, at, scale, -MOST);
+    }
+    mean_of(p->color + 3 * TRC_PREVIEW_FLOATS, at, scale, 0.0f);
+    mean_of(p->depth, at, scale, 0.0f);
+    vf_store(p->depth + at, vf_select(some, vf_log1p(vf_load(p->depth + at)), vf_set(NO_DEPTH)));
+}
+
+static void prepare_light(const struct planes *p, float exposure) {
     FOR_PIXELS(TRC_PREVIEW_HALO, at) {
+        const vfloat deviation = change_at(p, at, exposure);
+        prepare_means(p, at, exposure);
         vfloat mean = vf_set(0.0f), albedo_mean = vf_set(0.0f);
         for (int c = 0; c < 3; c++) {
             const vfloat albedo = albedo_at(p, c, at);
@@ -88,10 +134,7 @@ static void prepare_light(const struct planes *p) {
         }
         vf_store(p->light[0][3] + at, vf_load(p->color + 3 * TRC_PREVIEW_FLOATS + at));
         vf_store(p->light_mean + at, mean * vf_set(1.0f / 3.0f));
-        const vfloat depth = vf_load(p->depth + at);
-        vf_store(p->depth + at, vf_select(vf_lt(depth, vf_set(0.0f)), vf_set(NO_DEPTH),
-                                          vf_log1p(vf_max(depth, vf_set(0.0f)))));
-        const vfloat change = vf_load(p->change + at) * vf_set(3.0f) / albedo_mean;
+        const vfloat change = deviation * vf_set(3.0f) / albedo_mean;
         vf_store(p->first_variance + at, change * change);
         vf_store(p->own + at, vf_set(1.0f));
     }
@@ -107,12 +150,11 @@ static void prepare_variance(const struct planes *p) {
                 const vfloat apart = vf_load(p->light_mean + at + j * STRIDE + i) - mean;
                 square = square + apart * apart;
             }
-        const vmask none = vf_lt(vf_load(p->change + at), vf_set(0.0f));
-        vf_store(p->variance[0] + at,
-                 vf_select(none, square * vf_set(1.0f / 8.0f), vf_load(p->first_variance + at)));
+        const vfloat variance = vf_select(without_halves(p, at), square * vf_set(1.0f / 8.0f),
+                                          vf_load(p->first_variance + at));
+        vf_store(p->variance[0] + at, variance);
+        vf_store(p->first_variance + at, variance);
     }
-    FOR_PIXELS(TRC_PREVIEW_HALO - 1, at)
-    vf_store(p->first_variance + at, vf_load(p->variance[0] + at));
 }
 
 /* How fast depth changes from pixel to pixel on the flatter sides. */
@@ -273,8 +315,8 @@ static void blend(const struct planes *p) {
         const vfloat variance = around(p->smooth, at);
         const vfloat error = vf_max(around(p->estimate, at), vf_set(0.0f));
         const vfloat kept = vf_set(FAVOR) * variance / (variance + error + vf_set(1e-12f));
-        const vmask none = vf_lt(vf_load(p->change + at), vf_set(0.0f));
-        const vfloat part = vf_select(none, vf_set(1.0f), vf_min(kept, vf_set(1.0f)));
+        const vfloat part =
+            vf_select(without_halves(p, at), vf_set(1.0f), vf_min(kept, vf_set(1.0f)));
         for (int c = 0; c < 4; c++) {
             float *shown = p->color + c * TRC_PREVIEW_FLOATS + at;
             const vfloat plain = vf_load(shown);
@@ -283,9 +325,9 @@ static void blend(const struct planes *p) {
     }
 }
 
-void trc_preview_filter(float *memory) {
+void trc_preview_filter(float *memory, float exposure) {
     const struct planes p = planes_of(memory);
-    prepare_light(&p);
+    prepare_light(&p, exposure);
     prepare_variance(&p);
     prepare_slope(&p);
     for (int level = 0; level < LEVELS; level++)
