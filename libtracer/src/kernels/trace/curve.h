@@ -15,6 +15,8 @@
 #ifndef TRACER_KERNELS_TRACE_CURVE_H
 #define TRACER_KERNELS_TRACE_CURVE_H
 
+#include <float.h>
+
 #include "kernels/simd/simd8.h"
 #include "kernels/trace/beam.h"
 

@@ -53,32 +53,47 @@ TRC_INLINE MASK NAMED(trc_ribbon_owns)(const struct NAMED(trc_curve_ray) * ray,
     return BOTH(LE(e0, doubt * to_b), LE(zero - doubt * to_a, e1));
 }
 
-TRC_INLINE struct NAMED(trc_curve_hit)
-    NAMED(trc_ribbon_test)(const struct NAMED(trc_curve_ray) * ray,
-                           const struct NAMED(trc_piece) * piece) {
-    REAL x0, y0, z0, x1, y1, z1;
-    NAMED(trc_piece_turn)(ray, piece->p[0], &x0, &y0, &z0);
-    NAMED(trc_piece_turn)(ray, piece->p[1], &x1, &y1, &z1);
+/* Where the axis of a ribbon passes a ray, without a look at its neighbours. */
+struct NAMED(trc_ribbon_pass) {
+    REAL x0, y0, x1, y1;  /* its ends, turned */
+    REAL s, t, r, square; /* along it, distance, radius and squared distance across there */
+    MASK hit;
+};
+
+TRC_INLINE struct NAMED(trc_ribbon_pass)
+    NAMED(trc_ribbon_pass_of)(const struct NAMED(trc_curve_ray) * ray,
+                              const struct NAMED(trc_piece) * piece) {
+    struct NAMED(trc_ribbon_pass) p;
+    REAL z0, z1;
+    NAMED(trc_piece_turn)(ray, piece->p[0], &p.x0, &p.y0, &z0);
+    NAMED(trc_piece_turn)(ray, piece->p[1], &p.x1, &p.y1, &z1);
     const REAL zero = SET(0.0f), one = SET(1.0f);
-    const REAL dx = x1 - x0, dy = y1 - y0;
+    const REAL dx = p.x1 - p.x0, dy = p.y1 - p.y0;
     const REAL length2 = MAXIMUM(dx * dx + dy * dy, SET(TRC_CURVE_TINY));
-    const REAL at = (zero - (x0 * dx + y0 * dy)) / length2;
-    const REAL s = MINIMUM(MAXIMUM(at, zero), one);
-    const REAL x = x0 + s * dx, y = y0 + s * dy, z = z0 + s * (z1 - z0);
-    const REAL r = piece->r[0] + s * (piece->r[1] - piece->r[0]);
-    const REAL square = x * x + y * y;
-    const REAL ahead = ray->near + SET(TRC_RIBBON_AHEAD) * r * ray->per_length;
-    struct NAMED(trc_curve_hit) h;
-    h.t = z * ray->per_length;
-    h.hit = BOTH(LE(square, r * r), BOTH(LE(ahead, h.t), LE(ray->tmin, h.t)));
-    h.u = s;
-    h.v = zero;
-    if (!ANY(h.hit))
-        return h;
-    h.hit = BOTH(h.hit, NAMED(trc_ribbon_owns)(ray, piece, x0, y0, x1, y1, r));
-    const REAL across = MINIMUM(ROOT(square) / r, one), sign = ray->side * (dy * x - dx * y);
-    h.v = SELECT_LE(zero, sign, across, zero - across);
-    return h;
+    const REAL at = (zero - (p.x0 * dx + p.y0 * dy)) / length2;
+    p.s = MINIMUM(MAXIMUM(at, zero), one);
+    const REAL x = p.x0 + p.s * dx, y = p.y0 + p.s * dy, z = z0 + p.s * (z1 - z0);
+    p.r = piece->r[0] + p.s * (piece->r[1] - piece->r[0]);
+    p.square = x * x + y * y;
+    const REAL ahead = ray->near + SET(TRC_RIBBON_AHEAD) * p.r * ray->per_length;
+    p.t = z * ray->per_length;
+    p.hit = BOTH(LE(p.square, p.r * p.r), BOTH(LE(ahead, p.t), LE(ray->tmin, p.t)));
+    return p;
+}
+
+TRC_INLINE struct NAMED(trc_curve_hit)
+    NAMED(trc_ribbon_hit)(const struct NAMED(trc_curve_ray) * ray,
+                          const struct NAMED(trc_piece) * piece,
+                          const struct NAMED(trc_ribbon_pass) * p) {
+    const REAL zero = SET(0.0f), one = SET(1.0f);
+    const REAL dx = p->x1 - p->x0, dy = p->y1 - p->y0;
+    const REAL x = p->x0 + p->s * dx, y = p->y0 + p->s * dy;
+    const REAL across = MINIMUM(ROOT(p->square) / p->r, one), sign = ray->side * (dy * x - dx * y);
+    return (struct NAMED(trc_curve_hit)){
+        .hit = BOTH(p->hit, NAMED(trc_ribbon_owns)(ray, piece, p->x0, p->y0, p->x1, p->y1, p->r)),
+        .t = p->t,
+        .u = p->s,
+        .v = SELECT_LE(zero, sign, across, zero - across)};
 }
 
 /* Where a round piece leaves off at one of its ends: hits at z on the ray are its own where
@@ -119,23 +134,32 @@ TRC_INLINE struct NAMED(trc_round_limit)
     return (struct NAMED(trc_round_limit)){wz, x * wx + y * wy + z * wz + margin};
 }
 
-TRC_INLINE struct NAMED(trc_curve_hit)
-    NAMED(trc_round_test)(const struct NAMED(trc_curve_ray) * ray,
-                          const struct NAMED(trc_piece) * piece) {
-    REAL x0, y0, z0, x1, y1, z1;
-    NAMED(trc_piece_turn)(ray, piece->p[0], &x0, &y0, &z0);
-    NAMED(trc_piece_turn)(ray, piece->p[1], &x1, &y1, &z1);
+/* Where a ray is inside a round piece without limits, in lengths along z: [near, far]; infinite
+ * where it is not. */
+struct NAMED(trc_round_pass) {
+    REAL x0, y0, z0, x1, y1, z1;   /* its ends, turned */
+    REAL near, far, near_s, far_s; /* s: along the piece */
+    MASK hit;                      /* may be */
+};
+
+TRC_INLINE struct NAMED(trc_round_pass)
+    NAMED(trc_round_pass_of)(const struct NAMED(trc_curve_ray) * ray,
+                             const struct NAMED(trc_piece) * piece) {
+    struct NAMED(trc_round_pass) p;
+    NAMED(trc_piece_turn)(ray, piece->p[0], &p.x0, &p.y0, &p.z0);
+    NAMED(trc_piece_turn)(ray, piece->p[1], &p.x1, &p.y1, &p.z1);
     const REAL zero = SET(0.0f), one = SET(1.0f), never = SET(INFINITY);
     const REAL r0 = piece->r[0], r1 = piece->r[1];
-    const REAL dx = x1 - x0, dy = y1 - y0, dz = z1 - z0, dr = r1 - r0;
+    const REAL dx = p.x1 - p.x0, dy = p.y1 - p.y0, dz = p.z1 - p.z0, dr = r1 - r0;
     /* g(s) = a s^2 + 2 b s + c; the sphere about either end. */
-    const REAL a = dr * dr - (dx * dx + dy * dy), b = r0 * dr - (x0 * dx + y0 * dy);
-    const REAL g0 = r0 * r0 - (x0 * x0 + y0 * y0), g1 = r1 * r1 - (x1 * x1 + y1 * y1);
+    const REAL a = dr * dr - (dx * dx + dy * dy), b = r0 * dr - (p.x0 * dx + p.y0 * dy);
+    const REAL g0 = r0 * r0 - (p.x0 * p.x0 + p.y0 * p.y0),
+               g1 = r1 * r1 - (p.x1 * p.x1 + p.y1 * p.y1);
     const REAL in0 = ROOT(MAXIMUM(g0, zero)), in1 = ROOT(MAXIMUM(g1, zero));
-    REAL near = SELECT_LE(zero, g0, z0 - in0, never), near_s = zero;
-    REAL far = SELECT_LE(zero, g0, z0 + in0, zero - never), far_s = zero;
-    const REAL near1 = SELECT_LE(zero, g1, z1 - in1, never);
-    const REAL far1 = SELECT_LE(zero, g1, z1 + in1, zero - never);
+    REAL near = SELECT_LE(zero, g0, p.z0 - in0, never), near_s = zero;
+    REAL far = SELECT_LE(zero, g0, p.z0 + in0, zero - never), far_s = zero;
+    const REAL near1 = SELECT_LE(zero, g1, p.z1 - in1, never);
+    const REAL far1 = SELECT_LE(zero, g1, p.z1 + in1, zero - never);
     near_s = SELECT_LE(near, near1, near_s, one);
     near = MINIMUM(near1, near);
     far_s = SELECT_LE(far1, far, far_s, one);
@@ -144,35 +168,44 @@ TRC_INLINE struct NAMED(trc_curve_hit)
     const REAL d = b * b - a * g0;
     const REAL g = d / (dz * dz - a), in = ROOT(MAXIMUM(g, zero));
     const REAL s_near = (dz * in - b) / a, s_far = (zero - dz * in - b) / a;
-    const REAL z_near = z0 + s_near * dz - in, z_far = z0 + s_far * dz + in;
+    const REAL z_near = p.z0 + s_near * dz - in, z_far = p.z0 + s_far * dz + in;
     const REAL body_near =
         SELECT_LE(zero, MINIMUM(g, MINIMUM(s_near, one - s_near)), z_near, never);
     const REAL body_far =
         SELECT_LE(zero, MINIMUM(g, MINIMUM(s_far, one - s_far)), z_far, zero - never);
-    near_s = SELECT_LE(body_near, near, s_near, near_s);
-    near = MINIMUM(body_near, near);
-    far_s = SELECT_LE(far, body_far, s_far, far_s);
-    far = MAXIMUM(body_far, far);
+    p.near_s = SELECT_LE(body_near, near, s_near, near_s);
+    p.near = MINIMUM(body_near, near);
+    p.far_s = SELECT_LE(far, body_far, s_far, far_s);
+    p.far = MAXIMUM(body_far, far);
+    p.hit = LE(MINIMUM(p.near, zero - p.far), SET(FLT_MAX)); /* infinite: none */
+    return p;
+}
+
+TRC_INLINE struct NAMED(trc_curve_hit)
+    NAMED(trc_round_hit)(const struct NAMED(trc_curve_ray) * ray,
+                         const struct NAMED(trc_piece) * piece,
+                         const struct NAMED(trc_round_pass) * p) {
+    const REAL zero = SET(0.0f), one = SET(1.0f), never = SET(INFINITY);
+    const REAL r0 = piece->r[0], r1 = piece->r[1];
+    const REAL dx = p->x1 - p->x0, dy = p->y1 - p->y0, dz = p->z1 - p->z0, dr = r1 - r0;
     const REAL radius = MAXIMUM(r0, r1);
     const struct NAMED(trc_round_limit)
-        begin = NAMED(trc_round_limit_of)(ray, piece->before, piece->r_before, x0, y0, z0, r0,
-                                          zero - dx, zero - dy, zero - dz, zero - dr),
-        end = NAMED(trc_round_limit_of)(ray, piece->after, piece->r_after, x1, y1, z1, r1, dx, dy,
-                                        dz, dr);
-    const REAL near_in = MINIMUM(begin.from - begin.slope * near, end.from - end.slope * near);
-    const REAL far_in = MINIMUM(begin.from - begin.slope * far, end.from - end.slope * far);
+        begin = NAMED(trc_round_limit_of)(ray, piece->before, piece->r_before, p->x0, p->y0, p->z0,
+                                          r0, zero - dx, zero - dy, zero - dz, zero - dr),
+        end = NAMED(trc_round_limit_of)(ray, piece->after, piece->r_after, p->x1, p->y1, p->z1, r1,
+                                        dx, dy, dz, dr);
+    const REAL near_in =
+        MINIMUM(begin.from - begin.slope * p->near, end.from - end.slope * p->near);
+    const REAL far_in = MINIMUM(begin.from - begin.slope * p->far, end.from - end.slope * p->far);
     const REAL least = ray->tmin + SET(TRC_ROUND_AHEAD) * radius * ray->per_length;
-    const REAL t_near = SELECT_LE(zero, near_in, near * ray->per_length, zero - never);
-    const REAL t_far = SELECT_LE(zero, far_in, far * ray->per_length, zero - never);
+    const REAL t_near = SELECT_LE(zero, near_in, p->near * ray->per_length, zero - never);
+    const REAL t_far = SELECT_LE(zero, far_in, p->far * ray->per_length, zero - never);
     struct NAMED(trc_curve_hit) h;
     h.t = SELECT_LE(least, t_near, t_near, t_far);
-    h.u = SELECT_LE(least, t_near, near_s, far_s);
+    h.u = SELECT_LE(least, t_near, p->near_s, p->far_s);
     h.hit = LE(least, h.t); /* infinite: none */
-    h.v = zero;
-    if (!ANY(h.hit))
-        return h;
     const REAL within = SELECT_LE(least, t_near, zero, SET(TRC_CURVE_WITHIN));
-    const REAL x = x0 + h.u * dx, y = y0 + h.u * dy, r = r0 + h.u * dr;
+    const REAL x = p->x0 + h.u * dx, y = p->y0 + h.u * dy, r = r0 + h.u * dr;
     const REAL length = ROOT(MAXIMUM(dx * dx + dy * dy, SET(TRC_CURVE_TINY)));
     const REAL across = ray->side * (dy * x - dx * y) / (length * r);
     h.v = MINIMUM(MAXIMUM(across, zero - one), one) + within;

@@ -72,15 +72,20 @@ TRC_INLINE void vertex_lanes_load(const struct walk *w, uint32_t vertex, bool mo
     }
 }
 
-/* Broadcasts a piece, or interpolates it for each ray of chunk i of packet k. */
-TRC_INLINE void piece_lanes_load(const struct walk *w, const struct trc_slot *slot, bool motion,
+/* Broadcasts the ends of a piece, or interpolates them for each ray of chunk i of packet k. */
+TRC_INLINE void piece_lanes_load(const struct walk *w, const struct piece_vertices *v, bool motion,
                                  int k, int i, struct trc_piece_lanes *out) {
-    const struct piece_vertices v = piece_vertices_of(w, slot);
     const vfloat f = motion ? vf_load(&w->group->of[k].f[i]) : vf_set(0.0f);
     for (int end = 0; end < 2; end++)
-        vertex_lanes_load(w, v.end[end], motion, f, out->p[end], &out->r[end]);
-    vertex_lanes_load(w, v.before, motion, f, out->before, &out->r_before);
-    vertex_lanes_load(w, v.after, motion, f, out->after, &out->r_after);
+        vertex_lanes_load(w, v->end[end], motion, f, out->p[end], &out->r[end]);
+}
+
+/* The same of its neighbours. */
+TRC_INLINE void piece_lanes_join(const struct walk *w, const struct piece_vertices *v, bool motion,
+                                 int k, int i, struct trc_piece_lanes *out) {
+    const vfloat f = motion ? vf_load(&w->group->of[k].f[i]) : vf_set(0.0f);
+    vertex_lanes_load(w, v->before, motion, f, out->before, &out->r_before);
+    vertex_lanes_load(w, v->after, motion, f, out->after, &out->r_after);
 }
 
 /* A vertex of each slot, x, y, z and radius, at a fraction between two keys. */
@@ -143,12 +148,28 @@ TRC_INLINE uint32_t piece_candidates(const struct walk *w, const struct trc_slot
     return trc_beam_test(&w->group->beam, lower, upper, &key) & ((1u << count) - 1u);
 }
 
-TRC_INLINE struct trc_curve_hit_lanes curve_test_lanes(uint32_t shape,
+/* Tests a piece, whose neighbours are loaded where they count: few rays pass near enough. */
+TRC_INLINE struct trc_curve_hit_lanes curve_test_lanes(const struct walk *w,
                                                        const struct trc_curve_ray_lanes *rays,
-                                                       const struct trc_piece_lanes *piece) {
-    return shape == TRC_SHAPE_RIBBONS ? trc_ribbon_test_lanes(rays, piece)
-           : shape == TRC_SHAPE_ROUND ? trc_round_test_lanes(rays, piece)
-                                      : trc_ball_test_lanes(rays, piece);
+                                                       const struct piece_vertices *v, bool motion,
+                                                       int k, int i,
+                                                       struct trc_piece_lanes *piece) {
+    struct trc_curve_hit_lanes none = {.hit = vm_none()};
+    if (w->tree->shape == TRC_SHAPE_RIBBONS) {
+        const struct trc_ribbon_pass_lanes pass = trc_ribbon_pass_of_lanes(rays, piece);
+        if (!vm_any(pass.hit))
+            return none;
+        piece_lanes_join(w, v, motion, k, i, piece);
+        return trc_ribbon_hit_lanes(rays, piece, &pass);
+    }
+    if (w->tree->shape == TRC_SHAPE_ROUND) {
+        const struct trc_round_pass_lanes pass = trc_round_pass_of_lanes(rays, piece);
+        if (!vm_any(pass.hit))
+            return none;
+        piece_lanes_join(w, v, motion, k, i, piece);
+        return trc_round_hit_lanes(rays, piece, &pass);
+    }
+    return trc_ball_test_lanes(rays, piece);
 }
 
 /* Bits of chunk i of packet k that have left the strand. */
@@ -166,19 +187,20 @@ TRC_INLINE uint64_t piece_packet(struct walk *w, const struct trc_slot *slot, in
                                  bool any, bool motion) {
     const struct trc_packet *p = &w->packets[k];
     uint64_t found = 0;
+    const struct piece_vertices v = piece_vertices_of(w, slot);
     struct trc_piece_lanes piece;
     if (!motion)
-        piece_lanes_load(w, slot, false, 0, 0, &piece);
+        piece_lanes_load(w, &v, false, 0, 0, &piece);
     for (int c = 0; c < TRC_PACKET_CHUNKS; c++) {
         const uint32_t bits = trc_chunk_bits(mask, c);
         if (!bits)
             continue;
         const int i = c * TRC_WIDTH;
         if (motion)
-            piece_lanes_load(w, slot, true, k, i, &piece);
+            piece_lanes_load(w, &v, true, k, i, &piece);
         const struct trc_curve_ray_lanes rays = curve_rays(w, k, i);
         TRC_COUNT(triangle_rays, __builtin_popcount(bits));
-        const struct trc_curve_hit_lanes h = curve_test_lanes(w->tree->shape, &rays, &piece);
+        const struct trc_curve_hit_lanes h = curve_test_lanes(w, &rays, &v, motion, k, i, &piece);
         vmask hit = vm_and(vm_from_bits(bits), h.hit);
         if (!vm_any(hit))
             continue;
@@ -246,27 +268,71 @@ TRC_INLINE struct trc_curve_ray8 curve_ray(const struct walk *w, int k, int ray)
     };
 }
 
-TRC_INLINE void pieces8_load(const struct walk *w, const struct trc_slot *slots, uint32_t count,
-                             bool motion, float fraction, struct trc_piece8 *out) {
+/* A leaf on its way through single rays. */
+struct curve_leaf {
+    const struct trc_slot *slots;
+    uint32_t count;
+    struct leaf_vertices vertices;
+    struct trc_piece8 pieces;
+    bool is_joined; /* pieces have their neighbours, too */
+};
+
+TRC_INLINE void vertices8_turn(const struct walk *w, const uint32_t vertex[8], bool motion,
+                               float fraction, f8 p[3], f8 *radius) {
     const struct trc_shear axis = w->group->beam.axis;
     const int order[3] = {axis.u, axis.v, axis.z};
-    struct leaf_vertices v;
     f8 x[TRC_CURVE_VERTEX_FLOATS];
-    leaf_vertices_of(w, slots, count, &v);
-    for (int end = 0; end < 2; end++) {
-        vertices8_load(w, v.end[end], motion, fraction, x);
-        for (int i = 0; i < 3; i++)
-            out->p[end][i] = x[order[i]];
-        out->r[end] = x[3];
+    vertices8_load(w, vertex, motion, fraction, x);
+    for (int i = 0; i < 3; i++)
+        p[i] = x[order[i]];
+    *radius = x[3];
+}
+
+/* The ends of a leaf's pieces at a fraction between two keys. */
+TRC_INLINE void curve_leaf_place(const struct walk *w, struct curve_leaf *leaf, bool motion,
+                                 float fraction) {
+    for (int end = 0; end < 2; end++)
+        vertices8_turn(w, leaf->vertices.end[end], motion, fraction, leaf->pieces.p[end],
+                       &leaf->pieces.r[end]);
+    leaf->is_joined = false;
+}
+
+/* The vertices before and after them. */
+TRC_INLINE void curve_leaf_join(const struct walk *w, struct curve_leaf *leaf, bool motion,
+                                float fraction) {
+    if (leaf->is_joined)
+        return;
+    vertices8_turn(w, leaf->vertices.before, motion, fraction, leaf->pieces.before,
+                   &leaf->pieces.r_before);
+    vertices8_turn(w, leaf->vertices.after, motion, fraction, leaf->pieces.after,
+                   &leaf->pieces.r_after);
+    leaf->is_joined = true;
+}
+
+TRC_INLINE void curve_leaf_load(const struct walk *w, uint32_t ref, struct curve_leaf *leaf) {
+    *leaf =
+        (struct curve_leaf){.slots = trc_leaf_slots(w->tree, ref), .count = trc_leaf_count(ref)};
+    leaf_vertices_of(w, leaf->slots, leaf->count, &leaf->vertices);
+}
+
+TRC_INLINE struct trc_curve_hit8 curve_test8(const struct walk *w, const struct trc_curve_ray8 *ray,
+                                             bool motion, float fraction, struct curve_leaf *leaf) {
+    struct trc_curve_hit8 none = {.hit = 0};
+    if (w->tree->shape == TRC_SHAPE_RIBBONS) {
+        const struct trc_ribbon_pass8 pass = trc_ribbon_pass_of8(ray, &leaf->pieces);
+        if (!pass.hit)
+            return none;
+        curve_leaf_join(w, leaf, motion, fraction);
+        return trc_ribbon_hit8(ray, &leaf->pieces, &pass);
     }
-    vertices8_load(w, v.before, motion, fraction, x);
-    for (int i = 0; i < 3; i++)
-        out->before[i] = x[order[i]];
-    out->r_before = x[3];
-    vertices8_load(w, v.after, motion, fraction, x);
-    for (int i = 0; i < 3; i++)
-        out->after[i] = x[order[i]];
-    out->r_after = x[3];
+    if (w->tree->shape == TRC_SHAPE_ROUND) {
+        const struct trc_round_pass8 pass = trc_round_pass_of8(ray, &leaf->pieces);
+        if (!pass.hit)
+            return none;
+        curve_leaf_join(w, leaf, motion, fraction);
+        return trc_round_hit8(ray, &leaf->pieces, &pass);
+    }
+    return trc_ball_test8(ray, &leaf->pieces);
 }
 
 /* Bits of the slots whose strands the ray has not left. */
@@ -282,20 +348,17 @@ TRC_INLINE uint32_t slots_not_left(const struct walk *w, const struct trc_slot *
 }
 
 /* One ray's tests against a leaf. True: occluded (any only). */
-TRC_INLINE bool curve_leaf_single(struct walk *w, uint32_t ref, int k, int ray, bool any,
+TRC_INLINE bool curve_leaf_single(struct walk *w, struct curve_leaf *leaf, int k, int ray, bool any,
                                   bool motion) {
-    const uint32_t count = trc_leaf_count(ref), shape = w->tree->shape;
-    const struct trc_slot *slots = trc_leaf_slots(w->tree, ref);
-    struct trc_piece8 pieces;
-    pieces8_load(w, slots, count, motion, motion ? w->group->of[k].f[ray] : 0.0f, &pieces);
+    const float fraction = motion ? w->group->of[k].f[ray] : 0.0f;
+    if (motion)
+        curve_leaf_place(w, leaf, true, fraction);
     const struct trc_curve_ray8 r = curve_ray(w, k, ray);
     TRC_COUNT(single_leaves, 1);
-    TRC_COUNT(single_triangles, count);
-    const struct trc_curve_hit8 h = shape == TRC_SHAPE_RIBBONS ? trc_ribbon_test8(&r, &pieces)
-                                    : shape == TRC_SHAPE_ROUND ? trc_round_test8(&r, &pieces)
-                                                               : trc_ball_test8(&r, &pieces);
-    const uint32_t hit = slots_not_left(w, slots, k, ray, h.hit & ((1u << count) - 1u));
-    return hit && ray_keep(w, slots, k, ray, hit, h.t, h.u, h.v, any);
+    TRC_COUNT(single_triangles, leaf->count);
+    const struct trc_curve_hit8 h = curve_test8(w, &r, motion, fraction, leaf);
+    const uint32_t hit = slots_not_left(w, leaf->slots, k, ray, h.hit & ((1u << leaf->count) - 1u));
+    return hit && ray_keep(w, leaf->slots, k, ray, hit, h.t, h.u, h.v, any);
 }
 
 #endif

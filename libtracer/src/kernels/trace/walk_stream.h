@@ -158,10 +158,16 @@ TRC_INLINE void stream_item(struct walk *w, uint32_t ref, struct stream *s, uint
 
 TRC_INLINE void stream_leaf(struct walk *w, uint32_t ref, struct stream *s, uint32_t rays, bool any,
                             bool motion, bool curves) {
+    struct curve_leaf leaf;
+    if (curves) {
+        curve_leaf_load(w, ref, &leaf);
+        if (!motion)
+            curve_leaf_place(w, &leaf, false, 0.0f);
+    }
     for (; rays; rays &= rays - 1) {
         const int i = __builtin_ctz(rays);
         const int k = s->ray[i] / TRC_PACKET_SIZE, ray = s->ray[i] % TRC_PACKET_SIZE;
-        const bool occluded = curves ? curve_leaf_single(w, ref, k, ray, any, motion)
+        const bool occluded = curves ? curve_leaf_single(w, &leaf, k, ray, any, motion)
                                      : leaf_single(w, ref, k, ray, any, motion);
         if (occluded) {
             w->occluded.of[k] |= 1ull << ray;
