@@ -16,7 +16,8 @@
 #define LOAD_SLOTS 8
 
 static struct trc_slot_block *slots_alloc(uint32_t count) {
-    struct trc_slot_block *block = trc_alloc(sizeof *block + count * sizeof block->slots[0], 1);
+    struct trc_slot_block *block =
+        trc_alloc(sizeof *block + ((size_t)count + LOAD_SLOTS) * sizeof block->slots[0], 1);
     if (block)
         atomic_init(&block->refs, 1);
     return block;

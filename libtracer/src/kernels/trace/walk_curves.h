@@ -104,19 +104,34 @@ TRC_INLINE void vertices8_load(const struct walk *w, const uint32_t vertex[8], b
         out[i] = __builtin_shufflevector(rows[i], rows[i + 4], 0, 1, 2, 3, 4, 5, 6, 7);
 }
 
-/* Vertices of a leaf's pieces; of fewer than eight, the last stands in the lanes left. */
+/* Vertices of a leaf's pieces; of fewer than eight, the first stands in the lanes left. */
 struct leaf_vertices {
     uint32_t end[2][8], before[8], after[8];
 };
 TRC_INLINE void leaf_vertices_of(const struct walk *w, const struct trc_slot *slots, uint32_t count,
                                  struct leaf_vertices *out) {
-    for (uint32_t i = 0; i < 8; i++) {
-        const struct piece_vertices v = piece_vertices_of(w, &slots[i < count ? i : count - 1]);
-        out->end[0][i] = v.end[0];
-        out->end[1][i] = v.end[1];
-        out->before[i] = v.before;
-        out->after[i] = v.after;
+    const i8x lane = {0, 1, 2, 3, 4, 5, 6, 7};
+    const i8x in = lane < (int32_t)count;
+    i8x low, high;
+    memcpy(&low, slots, sizeof low);
+    memcpy(&high, slots + 4, sizeof high);
+    i8x word = __builtin_shufflevector(low, high, 0, 2, 4, 6, 8, 10, 12, 14);
+    i8x number = __builtin_shufflevector(low, high, 1, 3, 5, 7, 9, 11, 13, 15);
+    word = (word & in) | ((int32_t)slots->instance & ~in);
+    number = (number & in) | ((int32_t)slots->triangle & ~in);
+    i8x first = number, last = number, before = number, after = number;
+    if (w->tree->shape != TRC_SHAPE_BALLS) {
+        const i8x none = {0};
+        first = number + (word & (int32_t)TRC_SLOT_STRAND_MASK);
+        last = first + 1;
+        /* Comparisons are -1 where they hold: a neighbour. */
+        before = first + ((word & (int32_t)TRC_SLOT_FIRST) == none);
+        after = last - ((word & (int32_t)TRC_SLOT_LAST) == none);
     }
+    memcpy(out->end[0], &first, sizeof first);
+    memcpy(out->end[1], &last, sizeof last);
+    memcpy(out->before, &before, sizeof before);
+    memcpy(out->after, &after, sizeof after);
 }
 
 /* Widens boxes by the pieces' as they are at a fraction between two keys. */
