@@ -341,7 +341,7 @@ def inside_shapes():
 FIRST_PASSES = ("Depth", "Position", "IndexOB", "IndexMA")
 MEAN_PASSES = ("Combined", "Normal", "UV", "DiffCol", "DiffDir", "Emit", "Env", "Mist")
 LOBE_PASSES = {'RIBBONS': ("GlossCol", "GlossDir"), 'THICK': ("TransCol", "TransDir")}
-FIRST_SHARE = 2e-3  # of pixels that may be off, by more than that share of the largest:
+FIRST_SHARE = 6e-3  # of pixels that may be off (3e-4 to 2e-3 are), by more than that share of the largest:
 FIRST_STEPS = {'RIBBONS': 2e-3, 'THICK': 0.02}  # pieces are off by a tenth of a radius at most, which slants lengthen
 PASS_OFF = 1e-3, 0.01
 
@@ -590,4 +590,4 @@ def test_passes(blender):
             assert ours.keys() == theirs.keys() and len(ours) == count, name
             for number in theirs:
                 _pass_is_near(ours[number], theirs[number], f"{name}, {shape}")
-    assert _off_pixels(*vectors, FIRST_STEPS['THICK']) <= 3 * FIRST_SHARE
+    assert _off_pixels(*vectors, FIRST_STEPS['THICK']) <= FIRST_SHARE
