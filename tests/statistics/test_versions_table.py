@@ -8,7 +8,8 @@ import sys
 
 import pytest
 
-sys.path.insert(0, str(pathlib.Path(__file__).parent.parent))
+# Behind the support folder, which has modules of the same names.
+sys.path.append(str(pathlib.Path(__file__).parent.parent))
 import versions_table  # noqa: E402  (the folder is on the path only now)
 
 
