@@ -88,20 +88,33 @@ TRC_INLINE void piece_lanes_join(const struct walk *w, const struct piece_vertic
     vertex_lanes_load(w, v->after, motion, f, out->after, &out->r_after);
 }
 
-/* A vertex of each slot, x, y, z and radius, at a fraction between two keys. */
-TRC_INLINE void vertices8_load(const struct walk *w, const uint32_t vertex[8], bool motion,
-                               float fraction, f8 out[TRC_CURVE_VERTEX_FLOATS]) {
+/* A vertex of each slot, x, y, z and radius, at a key. */
+TRC_INLINE void vertices8_load(const struct walk *w, const uint32_t vertex[8], uint32_t next,
+                               f8 out[TRC_CURVE_VERTEX_FLOATS]) {
     f4 rows[8];
-    for (int i = 0; i < 8; i++) {
-        rows[i] = f4_load4(curve_vertex(w, vertex[i], 0));
-        if (motion)
-            rows[i] =
-                rows[i] + f4_set(fraction) * (f4_load4(curve_vertex(w, vertex[i], 1)) - rows[i]);
-    }
+    for (int i = 0; i < 8; i++)
+        rows[i] = f4_load4(curve_vertex(w, vertex[i], next));
     f4_transpose(rows);
     f4_transpose(rows + 4);
     for (int i = 0; i < TRC_CURVE_VERTEX_FLOATS; i++)
         out[i] = __builtin_shufflevector(rows[i], rows[i + 4], 0, 1, 2, 3, 4, 5, 6, 7);
+}
+
+/* The same at both keys of a segment; of curves at rest at the one. */
+struct vertices8 {
+    f8 key[2][TRC_CURVE_VERTEX_FLOATS];
+};
+TRC_INLINE void vertices8_load_keys(const struct walk *w, const uint32_t vertex[8], bool motion,
+                                    struct vertices8 *out) {
+    vertices8_load(w, vertex, 0, out->key[0]);
+    if (motion)
+        vertices8_load(w, vertex, 1, out->key[1]);
+}
+
+/* One of the four numbers at a fraction between the keys. */
+TRC_INLINE f8 vertices8_at(const struct vertices8 *v, int i, bool motion, float fraction) {
+    const f8 x = v->key[0][i];
+    return motion ? x + f8_set(fraction) * (v->key[1][i] - x) : x;
 }
 
 /* Vertices of a leaf's pieces; of fewer than eight, the first stands in the lanes left. */
@@ -135,14 +148,14 @@ TRC_INLINE void leaf_vertices_of(const struct walk *w, const struct trc_slot *sl
 }
 
 /* Widens boxes by the pieces' as they are at a fraction between two keys. */
-TRC_INLINE void piece_boxes_grow(const struct walk *w, const struct leaf_vertices *v, bool motion,
-                                 float fraction, f8 lower[3], f8 upper[3]) {
+TRC_INLINE void piece_boxes_grow(const struct vertices8 ends[2], bool motion, float fraction,
+                                 f8 lower[3], f8 upper[3]) {
     for (int end = 0; end < 2; end++) {
-        f8 x[TRC_CURVE_VERTEX_FLOATS];
-        vertices8_load(w, v->end[end], motion, fraction, x);
+        const f8 r = vertices8_at(&ends[end], 3, motion, fraction);
         for (int axis = 0; axis < 3; axis++) {
-            lower[axis] = f8_min(lower[axis], x[axis] - x[3]);
-            upper[axis] = f8_max(upper[axis], x[axis] + x[3]);
+            const f8 x = vertices8_at(&ends[end], axis, motion, fraction);
+            lower[axis] = f8_min(lower[axis], x - r);
+            upper[axis] = f8_max(upper[axis], x + r);
         }
     }
 }
@@ -153,13 +166,16 @@ TRC_INLINE uint32_t piece_candidates(const struct walk *w, const struct trc_slot
     struct leaf_vertices v;
     f8 lower[3], upper[3], key;
     leaf_vertices_of(w, slots, count, &v);
+    struct vertices8 ends[2];
+    for (int end = 0; end < 2; end++)
+        vertices8_load_keys(w, v.end[end], motion, &ends[end]);
     for (int axis = 0; axis < 3; axis++) {
         lower[axis] = f8_set(INFINITY);
         upper[axis] = f8_set(-INFINITY);
     }
-    piece_boxes_grow(w, &v, motion, w->group->f_min, lower, upper);
+    piece_boxes_grow(ends, motion, w->group->f_min, lower, upper);
     if (motion)
-        piece_boxes_grow(w, &v, motion, w->group->f_max, lower, upper);
+        piece_boxes_grow(ends, motion, w->group->f_max, lower, upper);
     return trc_beam_test(&w->group->beam, lower, upper, &key) & ((1u << count) - 1u);
 }
 
@@ -288,27 +304,27 @@ struct curve_leaf {
     const struct trc_slot *slots;
     uint32_t count;
     struct leaf_vertices vertices;
-    struct trc_piece8 pieces;
-    bool is_joined; /* pieces have their neighbours, too */
+    struct vertices8 ends[2], neighbors[2]; /* neighbors: before and after */
+    struct trc_piece8 pieces;               /* as the ray meets them */
+    bool has_neighbors;                     /* loaded, */
+    bool is_joined;                         /* and in pieces */
 };
 
-TRC_INLINE void vertices8_turn(const struct walk *w, const uint32_t vertex[8], bool motion,
-                               float fraction, f8 p[3], f8 *radius) {
+TRC_INLINE void vertices8_place(const struct walk *w, const struct vertices8 *v, bool motion,
+                                float fraction, f8 p[3], f8 *radius) {
     const struct trc_shear axis = w->group->beam.axis;
     const int order[3] = {axis.u, axis.v, axis.z};
-    f8 x[TRC_CURVE_VERTEX_FLOATS];
-    vertices8_load(w, vertex, motion, fraction, x);
     for (int i = 0; i < 3; i++)
-        p[i] = x[order[i]];
-    *radius = x[3];
+        p[i] = vertices8_at(v, order[i], motion, fraction);
+    *radius = vertices8_at(v, 3, motion, fraction);
 }
 
 /* The ends of a leaf's pieces at a fraction between two keys. */
 TRC_INLINE void curve_leaf_place(const struct walk *w, struct curve_leaf *leaf, bool motion,
                                  float fraction) {
     for (int end = 0; end < 2; end++)
-        vertices8_turn(w, leaf->vertices.end[end], motion, fraction, leaf->pieces.p[end],
-                       &leaf->pieces.r[end]);
+        vertices8_place(w, &leaf->ends[end], motion, fraction, leaf->pieces.p[end],
+                        &leaf->pieces.r[end]);
     leaf->is_joined = false;
 }
 
@@ -317,17 +333,26 @@ TRC_INLINE void curve_leaf_join(const struct walk *w, struct curve_leaf *leaf, b
                                 float fraction) {
     if (leaf->is_joined)
         return;
-    vertices8_turn(w, leaf->vertices.before, motion, fraction, leaf->pieces.before,
-                   &leaf->pieces.r_before);
-    vertices8_turn(w, leaf->vertices.after, motion, fraction, leaf->pieces.after,
-                   &leaf->pieces.r_after);
-    leaf->is_joined = true;
+    if (!leaf->has_neighbors) {
+        vertices8_load_keys(w, leaf->vertices.before, motion, &leaf->neighbors[0]);
+        vertices8_load_keys(w, leaf->vertices.after, motion, &leaf->neighbors[1]);
+    }
+    vertices8_place(w, &leaf->neighbors[0], motion, fraction, leaf->pieces.before,
+                    &leaf->pieces.r_before);
+    vertices8_place(w, &leaf->neighbors[1], motion, fraction, leaf->pieces.after,
+                    &leaf->pieces.r_after);
+    leaf->has_neighbors = leaf->is_joined = true;
 }
 
-TRC_INLINE void curve_leaf_load(const struct walk *w, uint32_t ref, struct curve_leaf *leaf) {
-    *leaf =
-        (struct curve_leaf){.slots = trc_leaf_slots(w->tree, ref), .count = trc_leaf_count(ref)};
+TRC_INLINE void curve_leaf_load(const struct walk *w, uint32_t ref, bool motion,
+                                struct curve_leaf *leaf) {
+    leaf->slots = trc_leaf_slots(w->tree, ref);
+    leaf->count = trc_leaf_count(ref);
+    leaf->has_neighbors = leaf->is_joined = false;
+    leaf->pieces = (struct trc_piece8){.r_before = {0}}; /* compilers do not follow is_joined */
     leaf_vertices_of(w, leaf->slots, leaf->count, &leaf->vertices);
+    for (int end = 0; end < 2; end++)
+        vertices8_load_keys(w, leaf->vertices.end[end], motion, &leaf->ends[end]);
 }
 
 TRC_INLINE struct trc_curve_hit8 curve_test8(const struct walk *w, const struct trc_curve_ray8 *ray,

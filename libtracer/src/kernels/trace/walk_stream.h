@@ -160,7 +160,7 @@ TRC_INLINE void stream_leaf(struct walk *w, uint32_t ref, struct stream *s, uint
                             bool motion, bool curves) {
     struct curve_leaf leaf;
     if (curves) {
-        curve_leaf_load(w, ref, &leaf);
+        curve_leaf_load(w, ref, motion, &leaf);
         if (!motion)
             curve_leaf_place(w, &leaf, false, 0.0f);
     }
