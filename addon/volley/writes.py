@@ -13,6 +13,7 @@ same, settings of temporary data, is written by the getter of a property: those 
 """
 
 import contextlib
+import threading
 import time
 
 import bpy
@@ -66,27 +67,30 @@ def draw_call(redraw):
 
 def run(function):
     """function() and its result where Blender may forbid writing; for temporary data alone."""
-    _Writer.function = function
+    _writer.function = function
     bpy.context.window_manager.volley_write
-    result, error = _Writer.result
-    _Writer.function = _Writer.result = None
+    result, error = _writer.result
+    _writer.function = _writer.result = None
     if error is not None:
         raise error
     return result
 
 
-class _Writer:
-    """What the getter runs, and its (result, exception)."""
+class _Writer(threading.local):
+    """What the getter runs, and its (result, exception), of each thread: renders and viewports read files."""
 
     function = result = None
 
 
+_writer = _Writer()
+
+
 def _run_function(_window_manager):
-    if _Writer.function is not None:
+    if _writer.function is not None:
         try:
-            _Writer.result = _Writer.function(), None
+            _writer.result = _writer.function(), None
         except Exception as error:  # Blender prints those of getters and goes on
-            _Writer.result = None, error
+            _writer.result = None, error
     return False
 
 
