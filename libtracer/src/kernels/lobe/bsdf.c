@@ -44,11 +44,7 @@ TRC_INLINE struct lobe_value value_of(const struct trc_lobes *l, const struct tr
     struct lobe_value r = lobe->model->value(lobe, s, wi);
     if (rare && (l->rare & TRC_LOBES_TURN) && is_reflection(lobe->kind))
         r.value = v3_scale(r.value, turned_share(l, lobe->n, wi));
-    r.value = v3_where(side, r.value);
-    r.pdf = vf_where(side, r.pdf);
-    r.pick = vf_where(side, r.pick);
-    r.claim = vf_where(side, r.claim);
-    return r;
+    return value_where(side, r);
 }
 
 /* rare: whether l has anything rare; a constant, so that others have no test of it. */

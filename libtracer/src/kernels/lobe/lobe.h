@@ -23,6 +23,12 @@ TRC_INLINE struct lobe_value no_value(void) {
     return (struct lobe_value){v3_zero(), vf_zero(), vf_zero(), vf_zero()};
 }
 
+/* The value in the lanes of m, nothing in the others. */
+TRC_INLINE struct lobe_value value_where(vmask m, struct lobe_value r) {
+    return (struct lobe_value){v3_where(m, r.value), vf_where(m, r.pdf), vf_where(m, r.pick),
+                               vf_where(m, r.claim)};
+}
+
 /* The functions of a lobe. Those of the lanes of a group are the same. */
 struct trc_lobe_model {
     enum trc_lobe_kind kind;

@@ -158,15 +158,10 @@ static struct lobe_value value(const struct trc_lobe *lobe, const struct trc_sur
  * the strand and wo, which it takes for the lobe's own, disagree on the side. */
 static struct lobe_value sided_value(const struct trc_lobe *lobe, const struct trc_surface *s,
                                      vvec3 wi) {
-    struct lobe_value r = value(lobe, s, wi);
     const vvec3 across = v3_cross(lobe->tangent, s->wo);
     const vfloat agreement = v3_dot(s->n, wi) * v3_dot(s->n, across) * v3_dot(across, wi);
     const vmask lit = vm_or(vf_ge(agreement, vf_zero()), trc_on_strand(s));
-    r.value = v3_where(lit, r.value);
-    r.pdf = vf_where(lit, r.pdf);
-    r.pick = vf_where(lit, r.pick);
-    r.claim = vf_where(lit, r.claim);
-    return r;
+    return value_where(lit, value(lobe, s, wi));
 }
 
 static vvec3 direction(const struct trc_lobe *lobe, const struct trc_surface *s, vfloat u1,
