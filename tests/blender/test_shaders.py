@@ -54,6 +54,8 @@ KNOWN_BEFORE_4 = {
 KNOWN_FROM_4 = {
     f"hair roughnessu {u} roughnessv 1.0 offset {offset}": (0.045, 0.045, _AROUND)
     for u in (0.1, 0.4) for offset in (0.0, 0.3)}
+# Strands show less of it.
+KNOWN_FROM_4.update({f"{STRANDS}{name}": (0.015, 0.03, _AROUND) for name in KNOWN_FROM_4})
 
 
 def _add(kind, node, inputs=None, settings=None, **varied):

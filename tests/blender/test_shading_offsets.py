@@ -39,8 +39,8 @@ def _set_offsets(owner, geometry, shading):
 
 
 def _ball(x):
-    import bpy
-    bpy.ops.mesh.primitive_uv_sphere_add(segments=12, ring_count=7, radius=0.9, location=(x, 0.0, 0.9))
+    import scenes
+    scenes.uv_sphere(12, 7, radius=0.9, location=(x, 0.0, 0.9))
 
 
 def _ring(x):

@@ -15,10 +15,11 @@ SHARE_WITHIN = 0.995  # of the pixels; an edge may fall on either side
 def _unwrapped(name):
     """A mesh with UVs of the kind of that name, active."""
     import bpy
+    import scenes
     if name == "monkey":
         bpy.ops.mesh.primitive_monkey_add()
     else:
-        bpy.ops.mesh.primitive_uv_sphere_add(segments=24, ring_count=12)
+        scenes.uv_sphere(24, 12)
     made = bpy.context.object
     made.rotation_euler, made.scale = (0.3, 0.2, 0.5), (1.0, 1.2, 0.9)
     if name != "flat":

@@ -8,6 +8,7 @@ import math
 import os
 import tempfile
 
+import bmesh
 import bpy
 import numpy as np
 
@@ -173,10 +174,25 @@ def wall(name="Wall", size=2.0, y=0.0, center=(0.0, 0.0), material=None):
     return made
 
 
+def uv_sphere(segments, rings, **settings):
+    """A UV sphere; settings are those of Blender's operator. Its faces are put in the order of their vertices:
+    the operator leaves them in another one in each run, and with them what hair and particles stand on."""
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=segments, ring_count=rings, **settings)
+    made = bpy.context.object
+    edited = bmesh.new()
+    edited.from_mesh(made.data)
+    ranked = sorted(edited.faces, key=lambda face: sorted(vertex.index for vertex in face.verts))
+    for rank, face in enumerate(ranked):
+        face.index = rank
+    edited.faces.sort()
+    edited.to_mesh(made.data)
+    edited.free()
+    return made
+
+
 def sphere(name="Sphere", radius=1.0, location=(0.0, 0.0, 0.0), material=None, smooth=True):
     """A UV sphere of 32 by 16 faces."""
-    bpy.ops.mesh.primitive_uv_sphere_add(segments=32, ring_count=16, radius=radius, location=location)
-    made = bpy.context.object
+    made = uv_sphere(32, 16, radius=radius, location=location)
     made.name = name
     for polygon in made.data.polygons:
         polygon.use_smooth = smooth
