@@ -2,6 +2,7 @@
 """Whole files beside Cycles, as they lie on the disk: one linked from a library, one with a movie on a wall, one lit
 through a pattern and by an IES file. Other files, and windows: tests/beside_cycles.py."""
 
+import blender as blender_support
 import compare
 import numpy as np
 import pytest
@@ -159,3 +160,21 @@ def _check(found):
 @pytest.mark.parametrize("name", FILES)
 def test_in_the_background(blender, name, tmp_path):
     _check(blender.run(inside_background, name, str(tmp_path)))
+
+
+def inside_failed_view(name, folder):
+    """As a file in a window, of whose view drawing fails."""
+    import whole_files
+    from volley import viewport
+
+    def draw(*_arguments):
+        raise RuntimeError("spoiled on purpose")
+
+    yield 0.1
+    viewport.Viewport.draw = draw
+    return (yield from whole_files.in_window(write(name, folder), SIZE, 1))
+
+
+def test_a_failed_view_is_no_picture(window, tmp_path):
+    with pytest.raises(blender_support.BlenderError, match="the view failed: .*spoiled on purpose"):
+        window.run_in_window(inside_failed_view, "pattern", str(tmp_path))

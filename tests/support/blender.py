@@ -158,6 +158,7 @@ def _answer_request(path):
         result = getattr(module, name)(*arguments)
     except BaseException:
         finish(None, traceback.format_exc())
+        _follow(iter(()), lambda _result: None)  # a window would stay
         return
     if hasattr(result, "send"):
         _follow(result, finish)

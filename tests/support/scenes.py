@@ -178,7 +178,7 @@ def uv_sphere(segments, rings, **settings):
     """A UV sphere; settings are those of Blender's operator. Its faces are put in the order of their vertices:
     the operator leaves them in another one in each run, and with them what hair and particles stand on."""
     bpy.ops.mesh.primitive_uv_sphere_add(segments=segments, ring_count=rings, **settings)
-    made = bpy.context.object
+    made = bpy.context.view_layer.objects.active
     edited = bmesh.new()
     edited.from_mesh(made.data)
     ranked = sorted(edited.faces, key=lambda face: sorted(vertex.index for vertex in face.verts))

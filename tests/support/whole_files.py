@@ -74,9 +74,9 @@ def in_background(path, size, samples, **switches):
 
 def in_window(path, size, samples, **switches):
     """The viewport of a window by both engines, through the camera: arrays (seeds, height, width, 3) of what
-    the screen shows, and what Volley warns of. For Blender.run_in_window."""
+    the screen shows, and what Volley warns of. A view that fails raises. For Blender.run_in_window."""
     from volley import viewport
-    told = []
+    told, failures = [], _noted_failures()
     viewport.Viewport._report = lambda _self, _engine, messages: told.extend(messages)
     yield 0.1
     scene = open_file(path, size, **switches)
@@ -96,7 +96,7 @@ def in_window(path, size, samples, **switches):
                 scene.cycles.use_preview_denoising = scene.cycles.use_preview_adaptive_sampling = False
             scene.update_tag()  # which buttons do
             space.shading.type = 'RENDERED'
-            pictures.append((yield from _still(area)))
+            pictures.append((yield from _still(area, failures)))
             space.shading.type = 'SOLID'
             yield DRAW_SECONDS
         shown.append(np.array(pictures))
@@ -116,19 +116,37 @@ def view():
     return area, area.spaces.active
 
 
-def _still(area):
-    """What the middle of the view shows once it does not change any more."""
+def _noted_failures():
+    """The messages with which Volley gives a render or a view up from now on."""
+    from volley import engine
+    noted, fail = [], engine.VolleyRenderEngine._fail
+
+    def noting_fail(self, message):
+        noted.append(message)
+        fail(self, message)
+
+    engine.VolleyRenderEngine._fail = noting_fail
+    return noted
+
+
+def _still(area, failures):
+    """What the middle of the view shows once it does not change any more. A failed view does not change either:
+    it is known by Volley's failures, or by its one colour where an engine says nothing."""
     import screen
     region = next(region for region in area.regions if region.type == 'WINDOW')
     before, still_count = None, 0
     for _ in range(LONGEST_DRAWS):
         area.tag_redraw()
         yield DRAW_SECONDS
+        if failures:
+            raise AssertionError(f"the view failed: {failures[0]}")
         picture = screen.Screen().picture()
         shot = picture[region.y + region.height // 4:region.y + region.height * 3 // 4,
                        region.x + region.width // 4:region.x + region.width * 3 // 4]
         still_count = still_count + 1 if before is not None and np.array_equal(shot, before) else 0
         if still_count == STILL_DRAWS:
+            if not np.ptp(shot, axis=(0, 1)).any():
+                raise AssertionError("the view shows one colour")
             return shot
         before = shot
     raise AssertionError("the viewport does not come to rest")
