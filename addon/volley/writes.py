@@ -9,7 +9,8 @@ within a call that did not, a draw that is made for it; one that did not ends af
 meanwhile. What is kept here is guarded by Python's own lock.
 
 Of the calls of a viewport in a window the switch is set from the start. What has to be written there all the
-same, settings of temporary data, is written by the getter of a property: those Blender lets write always.
+same, settings of temporary data, is written by a property's update function: those Blender lets write always
+(getters only before 5.0), and properties of the window manager may always be set.
 """
 
 import contextlib
@@ -66,36 +67,44 @@ def draw_call(redraw):
 
 
 def run(function):
-    """function() and its result where Blender may forbid writing; for temporary data alone."""
-    _writer.function = function
-    bpy.context.window_manager.volley_write
-    result, error = _writer.result
-    _writer.function = _writer.result = None
+    """function() and its result where Blender may forbid writing; for temporary data alone. It is called again
+    where it was forbidden to write."""
+    ends = time.monotonic() + _LONGEST_SECONDS
+    while True:
+        try:
+            return function()
+        except AttributeError:  # which is what Blender raises
+            if threading.current_thread() is threading.main_thread():
+                return _run_in_update(function)
+            if time.monotonic() > ends:
+                raise
+        time.sleep(_NAP_SECONDS)  # a draw has set the switch; setting a property redraws, which is no thread's to do
+
+
+def _run_in_update(function):
+    _Update.function = function
+    bpy.context.window_manager.volley_write = True
+    (result, error), _Update.function, _Update.result = _Update.result, None, None
     if error is not None:
         raise error
     return result
 
 
-class _Writer(threading.local):
-    """What the getter runs, and its (result, exception), of each thread: renders and viewports read files."""
+class _Update:
+    """What the update function runs, and its (result, exception); of Blender's own thread."""
 
     function = result = None
 
 
-_writer = _Writer()
-
-
-def _run_function(_window_manager):
-    if _writer.function is not None:
-        try:
-            _writer.result = _writer.function(), None
-        except Exception as error:  # Blender prints those of getters and goes on
-            _writer.result = None, error
-    return False
+def _update(_window_manager, _context):
+    try:
+        _Update.result = _Update.function(), None
+    except Exception as error:  # Blender prints those of update functions and goes on
+        _Update.result = None, error
 
 
 def register():
-    bpy.types.WindowManager.volley_write = bpy.props.BoolProperty(get=_run_function, options={'HIDDEN', 'SKIP_SAVE'})
+    bpy.types.WindowManager.volley_write = bpy.props.BoolProperty(update=_update, options={'HIDDEN', 'SKIP_SAVE'})
 
 
 def unregister():
