@@ -439,6 +439,28 @@ static void scene_pictures(void **state) {
     assert_ok(trc_scene_destroy(scene));
 }
 
+/* Farther from its sides than what is filtered together reaches, a crop is the whole picture's
+ * bits, though its tiles are others. */
+static void crops(void **state) {
+    (void)state;
+    enum { LEFT = 21, BOTTOM = 7, ACROSS = WIDTH - LEFT, UP = HEIGHT - BOTTOM, REACH = 15 };
+    static float whole[4 * FRAME], crop[4 * ACROSS * UP];
+    const trc_scene scene = lit_scene();
+    trc_render_desc desc = default_render_desc(WIDTH, HEIGHT, 16);
+    desc.denoise = TRC_DENOISE_FINAL;
+    draw(scene, &desc, TRC_PASS_COMBINED, whole);
+    desc.crop_x = LEFT;
+    desc.crop_y = BOTTOM;
+    desc.crop_width = ACROSS;
+    desc.crop_height = UP;
+    fixture_draw(scene, &desc, TRC_PASS_COMBINED, crop, 4 * ACROSS * UP);
+    for (int y = REACH; y < UP; y++)
+        assert_memory_equal(crop + 4 * (y * ACROSS + REACH),
+                            whole + 4 * ((y + BOTTOM) * WIDTH + REACH + LEFT),
+                            4 * (ACROSS - REACH) * sizeof(float));
+    assert_ok(trc_scene_destroy(scene));
+}
+
 /* Previews of several tiles: any number of threads, and a lower error than without. */
 static void scene_previews(void **state) {
     (void)state;
@@ -507,7 +529,7 @@ int main(void) {
         cmocka_unit_test(same_bits),      cmocka_unit_test(scene_pictures),
         cmocka_unit_test(counts),         cmocka_unit_test(preview_noiseless),
         cmocka_unit_test(preview_noisy),  cmocka_unit_test(preview_bits),
-        cmocka_unit_test(scene_previews),
+        cmocka_unit_test(scene_previews), cmocka_unit_test(crops),
     };
     if (!query_test_isa())
         return QUERY_TEST_SKIPPED;

@@ -92,14 +92,27 @@ static void find_parts(const struct trc_denoise_job *job, const struct work *w, 
         }
 }
 
-static void limit_alpha(const struct trc_denoise_job *job) {
+static double clamp(double x, double most) { return x > 0.0 ? (x < most ? x : most) : 0.0; }
+
+/* Light of shadow catchers is none below 0, as a shadow is one over another, and they stand for no
+ * more than alpha leaves. */
+static void limit_caught(struct trc_caught *caught, double most_coverage) {
+    caught->coverage = clamp(caught->coverage, most_coverage);
+    for (int c = 0; c < 3; c++) {
+        caught->blocked[c] = fmax(caught->blocked[c], 0.0);
+        caught->unblocked[c] = fmax(caught->unblocked[c], 0.0);
+    }
+}
+
+static void limit_covers(const struct trc_denoise_job *job) {
     const struct trc_film *film = job->denoise->film;
     for (uint32_t y = 0; y < job->height; y++)
         for (uint32_t x = 0; x < job->width; x++) {
             const size_t pixel = (size_t)(job->y + y) * film->width + job->x + x;
             double *alpha = &film->clean.sums[TRC_PASS_COMBINED][4 * pixel + 3];
-            const double most = film->sample_counts[pixel];
-            *alpha = *alpha > 0.0 ? (*alpha < most ? *alpha : most) : 0.0;
+            *alpha = clamp(*alpha, film->sample_counts[pixel]);
+            if (film->clean.caught)
+                limit_caught(&film->clean.caught[pixel], film->sample_counts[pixel] - *alpha);
         }
 }
 
@@ -116,8 +129,8 @@ void trc_blend(const struct trc_denoise_job *job) {
         if (film->clean.sums[pass])
             blend(job, parts, film->sums[pass], film->clean.sums[pass],
                   trc_pass_info_of(pass)->sums);
-    limit_alpha(job);
     if (film->clean.caught)
         blend(job, parts, (const double *)film->caught, (double *)film->clean.caught,
               TRC_CAUGHT_CHANNELS);
+    limit_covers(job);
 }
