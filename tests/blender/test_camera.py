@@ -122,6 +122,24 @@ def test_depth_of_field(blender):
     assert off == 0.0
 
 
+def inside_clipped_blur():
+    """Means by Volley and by Cycles through a wide lens of a red wall before the start of clipping, and a green one
+    about its end, which only rays from the rim of the lens reach or miss."""
+    import scenes
+    scenes.empty(size=(32, 32))
+    made = scenes.camera(location=(0.0, 0.0, 0.0), lens=35.0, clip_start=0.1, clip_end=2.0)
+    made.data.dof.use_dof, made.data.dof.aperture_fstop, made.data.dof.focus_distance = True, 0.1, 0.3
+    for name, y, color in (("Near", 0.094, (1.0, 0.0, 0.0)), ("Far", 1.8, (0.0, 1.0, 0.0))):
+        scenes.wall(name, size=20.0, y=y, material=scenes.emitter(color, name=name))
+    return [picture[..., :3].mean(axis=(0, 1)) for picture in scenes.by_both(1024)]
+
+
+def test_blur_is_clipped_as_in_cycles(blender):
+    ours, theirs = blender.run(inside_clipped_blur)
+    assert 0.1 < theirs[0] < 0.9 and 0.1 < theirs[1] < 0.9
+    assert ours == pytest.approx(theirs, abs=0.01)
+
+
 # Regions of viewports ------------------------------------------------------------------------------
 
 def inside_regions():

@@ -91,14 +91,17 @@ static struct view_rays plane_rays(const struct trc_camera *camera, vfloat sx, v
     const vfloat zero = vf_set(0.0f), one = vf_set(1.0f);
     vvec3 o = orthographic ? v3(sx, sy, zero) : v3_zero();
     vvec3 d = orthographic ? v3(zero, zero, -one) : v3(sx, sy, -one);
+    const vvec3 center = v3_normalize(d);
     if (lens) {
         const vvec3 focus = v3_add(o, v3_scale(d, vf_set(camera->focus_distance)));
         const vfloat radius = vf_set(camera->aperture_radius);
         o = v3_add(o, v3(lens[0] * radius, lens[1] * radius, zero));
-        d = v3_sub(focus, o);
+        d = v3_normalize(v3_sub(focus, o));
+    } else {
+        d = center;
     }
-    d = v3_normalize(d);
-    return (struct view_rays){o, d, -one / d.z, vm_all_set()};
+    /* Of perspective views the centre of the lens says where they are clipped, as in Cycles. */
+    return (struct view_rays){o, d, -one / (orthographic ? d.z : center.z), vm_all_set()};
 }
 
 /* The lens faces each direction, its first axis the one away from the view axis, as in Cycles. */
