@@ -324,12 +324,13 @@ struct manner {
 
 /* As packets of that size, or as is best (0): bundles, which coherent rays gain most from, of rays
  * that are ordered where each packet would go many ways. Packets of fewer than stream_size go as
- * that many single rays: as a stream from the root on. */
+ * that many single rays: as a stream from the root on, ordered alike. */
 static struct manner manner_of(uint32_t packet_size, uint32_t stream_size) {
     if (packet_size == 0)
         return (struct manner){ORDERED_RAYS, TRC_BUNDLE * TRC_PACKET_SIZE, true};
-    const uint32_t size = packet_size < stream_size ? stream_size : packet_size;
-    return (struct manner){size, size, false};
+    if (packet_size < stream_size)
+        return (struct manner){ORDERED_RAYS, stream_size, true};
+    return (struct manner){packet_size, packet_size, false};
 }
 
 /* The rays of a query on their way, a load after the other. */
@@ -390,6 +391,27 @@ void trc_query_closest_rays(const struct trc_snapshot *snapshot, const trc_rays 
     }
 }
 
+/* A byte of 0 or 1 for each of eight bits, the lowest first in memory. */
+static uint64_t bytes_of_bits(uint32_t bits) {
+    const uint64_t ones = 0x0101010101010101u, own_bit = 0x8040201008040201u;
+    return ((((bits & 0xffu) * ones) & own_bit) + 0x7f * ones) >> 7 & ones;
+}
+
+/* Whether rays of the part are blocked, a mask for each packet, into the caller's bytes. */
+static void occluded_store(uint8_t *occluded, const struct rays_part *part,
+                           const uint64_t *blocked) {
+    uint8_t *const to = occluded + part->begin;
+    uint32_t k = 0;
+    for (; !part->order && k + sizeof(uint64_t) <= part->count; k += sizeof(uint64_t)) {
+        const uint64_t bytes =
+            bytes_of_bits((uint32_t)(blocked[k / TRC_PACKET_SIZE] >> k % TRC_PACKET_SIZE));
+        memcpy(to + k, &bytes, sizeof bytes);
+    }
+    for (; k < part->count; k++)
+        to[part->order ? part->order[k] : k] =
+            (uint8_t)(blocked[k / TRC_PACKET_SIZE] >> k % TRC_PACKET_SIZE & 1u);
+}
+
 void trc_query_occluded_rays(const struct trc_snapshot *snapshot, const trc_rays *rays,
                              uint8_t *occluded, uint64_t begin, uint64_t end,
                              uint32_t packet_size) {
@@ -400,8 +422,6 @@ void trc_query_occluded_rays(const struct trc_snapshot *snapshot, const trc_rays
     rays_walk_begin(&walk, rays, begin, end, manner_of(packet_size, TRC_STREAM_ANY));
     while (rays_walk_load(&walk, &l, &part)) {
         trc_trace_occluded(snapshot, l.packets, l.packet_count, blocked);
-        for (uint32_t k = 0; k < l.count; k++)
-            occluded[part.begin + (part.order ? part.order[k] : k)] =
-                (uint8_t)(blocked[k / TRC_PACKET_SIZE] >> k % TRC_PACKET_SIZE & 1u);
+        occluded_store(occluded, &part, blocked);
     }
 }
