@@ -340,7 +340,8 @@ def inside_shapes():
 # their names before Blender 5.
 FIRST_PASSES = ("Depth", "Position", "IndexOB", "IndexMA")
 MEAN_PASSES = ("Combined", "Normal", "UV", "DiffCol", "DiffDir", "Emit", "Env", "Mist")
-LOBE_PASSES = {'RIBBONS': ("GlossCol", "GlossDir"), 'THICK': ("TransCol", "TransDir")}
+GLOSSY_PASSES, TRANSMISSION_PASSES = ("GlossCol", "GlossDir"), ("TransCol", "TransDir")
+LOBE_PASSES = {'RIBBONS': GLOSSY_PASSES, 'THICK': GLOSSY_PASSES + TRANSMISSION_PASSES}
 FIRST_SHARE = 6e-3  # of pixels that may be off (3e-4 to 2e-3 are), by more than that share of the largest:
 FIRST_STEPS = {'RIBBONS': 2e-3, 'THICK': 0.02}  # pieces are off by a tenth of a radius at most, which slants lengthen
 PASS_OFF = 1e-3, 0.01
@@ -378,10 +379,10 @@ def inside_passes():
         if "." not in entry.setting:
             setattr(layer, entry.setting, True)
     found = {}
-    # Two kinds of lobes each: of a third in the same direction, Volley's passes take the light by the ray's kind.
+    # Ribbons have two kinds of lobes, 3D curves a third, which has light in the directions of the others.
     for shape, kind in (('RIBBONS', "ShaderNodeBsdfGlossy"), ('THICK', "ShaderNodeBsdfHair")):
         scene.cycles_curves.shape = shape
-        _add_to_diffuse(strand, kind)
+        _add_shader(strand, kind)
         layer.use_pass_cryptomatte_object = layer.use_pass_cryptomatte_material = False
         means = scenes.passes_by_both(MEAN_PASSES + LOBE_PASSES[shape], SAMPLES)
         first = _sharpened(FIRST_PASSES)
@@ -398,18 +399,19 @@ def inside_passes():
     return found, _sharpened(["Vector"])["Vector"]
 
 
-def _add_to_diffuse(material, node_type):
-    """A second shader beside a material's first one: gloss, or light through strands."""
+def _add_shader(material, node_type):
+    """One more shader of a material: gloss, or light through strands."""
     tree = material.node_tree
+    surface = tree.nodes["Material Output"].inputs["Surface"]
     add, more = tree.nodes.new("ShaderNodeAddShader"), tree.nodes.new(node_type)
     more.inputs["Color"].default_value = (0.2, 0.1, 0.3, 1.0)
     if node_type == "ShaderNodeBsdfHair":
         more.component = 'Transmission'
     else:
         more.inputs["Roughness"].default_value = 0.5
-    for number, node in enumerate((tree.nodes["Diffuse BSDF"], more)):
-        tree.links.new(node.outputs[0], add.inputs[number])
-    tree.links.new(add.outputs[0], tree.nodes["Material Output"].inputs["Surface"])
+    for number, shader in enumerate((surface.links[0].from_socket, more.outputs[0])):
+        tree.links.new(shader, add.inputs[number])
+    tree.links.new(add.outputs[0], surface)
 
 
 def inside_masks():

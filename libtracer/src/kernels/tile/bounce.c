@@ -1,15 +1,23 @@
 /* Continuation rays: N rays in, N rays out (Boulos et al. 2007, section 4.1). Distribution chooses
  * one lobe per ray from the sample sequence; Whitted follows every lobe along its ideal direction.
  * Diffuse lobes end here: their light is all in the light samples. */
+#include "kernels/program/hash.h"
 #include "kernels/tile/light_split.h"
 #include "kernels/tile/shade.h"
 #include "kernels/trace/spawn.h"
 
+/* Per channel. */
+static vvec3 share_in(vvec3 part, vvec3 sum) {
+    return v3(vf_divide(part.x, sum.x), vf_divide(part.y, sum.y), vf_divide(part.z, sum.z));
+}
+
 /* The diffuse lobes' share of what the lanes' rays bring, as a word: of rays that bounce for the
- * first time what lobes have in their direction, unless that is ideal; else as before. */
+ * first time what lobes have in their direction, unless that is ideal; else as before. mixed: lanes
+ * whose word is of TRC_CATEGORY_MIXED. */
 static vuint share_of(const struct trc_tile *t, const struct arrival *a,
                       const struct trc_surface *s, const struct trc_lobes *lobes,
-                      const struct trc_bsdf_sample *b, vmask first, vmask ideal) {
+                      const struct trc_bsdf_sample *b, vmask first, vmask ideal, vmask *mixed) {
+    *mixed = vm_none();
     const vuint before = word_column(t->work.w[TRC_RAY_SHARE], a);
     first = vm_andnot(first, b->transparent);
     if (!vm_any(vm_andnot(first, ideal)))
@@ -17,9 +25,16 @@ static vuint share_of(const struct trc_tile *t, const struct arrival *a,
     struct trc_bsdf_value f;
     trc_bsdf_eval(lobes, s, b->wi, vm_andnot(first, ideal), &f);
     const vvec3 sum = v3_add(f.diffuse, v3_add(f.glossy, f.transmission));
-    const vvec3 share = v3(vf_divide(f.diffuse.x, sum.x), vf_divide(f.diffuse.y, sum.y),
-                           vf_divide(f.diffuse.z, sum.z));
-    return (vuint)vi_select(first, (vint)trc_share_pack(share), (vint)before);
+    const vvec3 share = share_in(f.diffuse, sum);
+    vuint word = trc_share_pack(share);
+    if (lobes->rare & TRC_LOBES_HAIR) {
+        const vfloat least = vf_min(v3_max(f.glossy), v3_max(f.transmission));
+        *mixed = vm_and(vm_andnot(first, ideal), vf_gt(least, vf_set(0.0f)));
+        const vuint both =
+            trc_mixed_pack(share, share_in(f.glossy, sum), hash3(b->wi.x, b->wi.y, b->wi.z));
+        word = (vuint)vi_select(*mixed, (vint)both, (vint)word);
+    }
+    return (vuint)vi_select(first, (vint)word, (vint)before);
 }
 
 /* Pushes the lanes' rays. direction, weight factor, pdf (< 0: ideal). */
@@ -103,8 +118,12 @@ static void ray_push(struct trc_tile *t, const struct arrival *a, const struct t
         o.x,      o.y,      o.z, w.x,     w.y, w.z, tmin, tmax,           a->time,    weight.x,
         weight.y, weight.z, pdf, min_pdf, n.x, n.y, n.z,  indirect_scale, path_length};
     vuint left = vu_set(0), share = vu_set(0), strand[2] = {vu_set(0), vu_set(0)};
-    if (t->light_passes)
-        share = share_of(t, a, s, lobes, b, first, ideal);
+    if (t->light_passes) {
+        vmask mixed;
+        share = share_of(t, a, s, lobes, b, first, ideal, &mixed);
+        const vint both = vi_set(TRC_CATEGORY_MIXED << TRC_PATH_CATEGORY_SHIFT);
+        path = path | (vuint)vi_select(mixed, both, vi_set(0));
+    }
     if (t->remembers_left)
         left = (vuint)vi_select(transparent, (vint)word_column(t->work.w[TRC_RAY_LEFT], a),
                                 s->instance);

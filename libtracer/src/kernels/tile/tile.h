@@ -32,7 +32,8 @@ enum {
 enum {
     TRC_CATEGORY_CAMERA, /* there was none */
     TRC_CATEGORY_GLOSSY,
-    TRC_CATEGORY_TRANSMISSION
+    TRC_CATEGORY_TRANSMISSION,
+    TRC_CATEGORY_MIXED /* either, in one direction: the shares say how much of each */
 };
 
 /* A ray's four depth counters, 8 bits each, saturating by the limits on desc. */
