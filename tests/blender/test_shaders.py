@@ -30,7 +30,6 @@ _MULTIPLE = "light that scatters more than once comes from a table here, from ra
 _SHEEN = "Cycles' fit, at the outline"
 _COAT = "Cycles 3.4 samples its coat by GGX but weighs the samples as GTR1; by lamps alone both agree"
 _TILT = "Cycles 3.4 tilts samples and what weighs them by angles that are not each other's"
-_AROUND = "not understood: reflections all around fibres, on faces alone"
 KNOWN = {
     "glossy roughness 0.8 distribution ASHIKHMIN_SHIRLEY":
         (0.02, 0.025, "Cycles keeps rays that go below the faces at the outline; inside it both agree"),
@@ -41,7 +40,7 @@ KNOWN = {
     "sheen roughness 0.5": (0.005, 0.02, _SHEEN),
     "principled clearcoat roughness 0.03": (0.015, 0.02, _COAT),
 }
-# Those of some Blenders alone.
+# Those of Blender 3.
 KNOWN_BEFORE_4 = {
     **{f"{what}principled hair coat {coat} ior {ior} parametrization COLOR": (0.015, 0.035, _TILT)
        for what in ("", "strands of ") for coat in (0.0, 0.8) for ior in (1.2, 1.8)},
@@ -51,11 +50,6 @@ KNOWN_BEFORE_4 = {
        for what in ("", "strands of ") for redness in (0.2, 1.0) for color in (0.0, 0.9)
        for roughness in (0.0, 0.8)},
 }
-KNOWN_FROM_4 = {
-    f"hair roughnessu {u} roughnessv 1.0 offset {offset}": (0.045, 0.045, _AROUND)
-    for u in (0.1, 0.4) for offset in (0.0, 0.3)}
-# Strands show less of it.
-KNOWN_FROM_4.update({f"{STRANDS}{name}": (0.015, 0.03, _AROUND) for name in KNOWN_FROM_4})
 
 
 def _add(kind, node, inputs=None, settings=None, **varied):
@@ -198,7 +192,7 @@ def inside_balls():
 
 def _known(name):
     """The limits of a case, largest mean and tile, and why they are not the usual ones."""
-    of_version = KNOWN_BEFORE_4 if blender_support.version() < (4, 0) else KNOWN_FROM_4
+    of_version = KNOWN_BEFORE_4 if blender_support.version() < (4, 0) else {}
     usual = (TOLERANCE, STRANDS_TILE if name.startswith(STRANDS) else TOLERANCE, "")
     return of_version.get(name) or KNOWN.get(name, usual)
 

@@ -309,7 +309,7 @@ enum {
     D = TRC_MATERIAL_HAS_DIFFUSE,
     S = TRC_MATERIAL_HAS_SPECULAR,
     G = TRC_MATERIAL_HAS_GLOSSY,
-    R = TRC_MATERIAL_HAS_REFRACTION,
+    R = TRC_MATERIAL_HAS_REFRACTION | TRC_MATERIAL_LIT_BELOW,
     T = TRC_MATERIAL_HAS_TRANSPARENCY,
     E = TRC_MATERIAL_HAS_EMISSION
 };
@@ -387,13 +387,33 @@ static void test_traits_of_simple_shaders(void **state) {
     assert_int_equal(traits(), T);
     graph_clear();
     ADD(TRC_NODE_TRANSLUCENT, 0, white, n);
-    assert_int_equal(traits(), TRC_MATERIAL_HAS_TRANSLUCENT);
+    assert_int_equal(traits(), TRC_MATERIAL_HAS_TRANSLUCENT | TRC_MATERIAL_LIT_BELOW);
     graph_clear();
     add(TRC_NODE_HOLDOUT, 0, 0, NULL);
     assert_int_equal(traits(), TRC_MATERIAL_HAS_HOLDOUT);
     graph_clear();
     ADD(TRC_NODE_BACKGROUND, 0, white, value(2));
     assert_int_equal(traits(), E);
+}
+
+/* Fibres that reflect are lit from below as Cycles 3.4 has it, not as Cycles 4; others as both. */
+static void test_traits_of_hair(void **state) {
+    (void)state;
+    static const struct {
+        uint32_t mode, flags, has;
+    } cases[] = {
+        {TRC_HAIR_REFLECTION, 0, G | R},
+        {TRC_HAIR_REFLECTION, TRC_MATERIAL_PLAIN_CHOICE, G | TRC_MATERIAL_HAS_REFRACTION},
+        {TRC_HAIR_TRANSMISSION, 0, G | R},
+        {TRC_HAIR_TRANSMISSION, TRC_MATERIAL_PLAIN_CHOICE, G | R},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        graph_clear();
+        ADD(TRC_NODE_HAIR, cases[i].mode, color(1, 1, 1), value(0), value(.2f), value(.2f),
+            standard());
+        graph.flags = cases[i].flags;
+        assert_int_equal(traits(), cases[i].has);
+    }
 }
 
 static void test_emission_of_principled(void **state) {
@@ -702,6 +722,7 @@ int main(void) {
         cmocka_unit_test(test_traits_of_principled),
         cmocka_unit_test(test_traits_of_varying_inputs),
         cmocka_unit_test(test_traits_of_simple_shaders),
+        cmocka_unit_test(test_traits_of_hair),
         cmocka_unit_test(test_emission_of_principled),
         cmocka_unit_test(test_default_tangent),
         cmocka_unit_test(test_registers_are_reused),

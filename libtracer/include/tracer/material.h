@@ -398,7 +398,9 @@ enum trc_material_flags {
     TRC_MATERIAL_TRANSPARENT_SHADOW =
         2, /* shadow rays see its transparency; else it is opaque to them */
     /* Lobes are chosen by their weights at camera hits too, as in Cycles 4; else each at least one
-     * time in nine or so (Cycles 3.4). What Cycles loses with diffuse bounces 0 depends on it. */
+     * time in nine or so (Cycles 3.4). What Cycles loses with diffuse bounces 0 depends on it. Rays
+     * that Hair reflects below the surface find what light is wholly there by themselves; else they
+     * share it with samples of lights that Hair gives nothing of, and lose that part. */
     TRC_MATERIAL_PLAIN_CHOICE = 4,
     /* Diffuse lobes whose normals are bent lie in shadow as microfacets do (Cycles 5), which is
      * darker towards the terminator, and Principled Hair on faces takes light samples from a part

@@ -77,6 +77,7 @@ enum {
     TRC_MATERIAL_READS_PIXEL = 1 << 13,     /* it has slopes of heights */
     TRC_MATERIAL_HAS_PORTAL = 1 << 14,      /* rays go on elsewhere; shadow rays end */
     TRC_MATERIAL_TRACES_RAYS = 1 << 15,     /* its program does */
+    TRC_MATERIAL_LIT_BELOW = 1 << 16,       /* light is sampled on both sides of the surface */
     /* Lobes that no ray is continued for: only samples of lights bring them light. */
     TRC_MATERIAL_IS_MATT = TRC_MATERIAL_HAS_DIFFUSE | TRC_MATERIAL_HAS_TRANSLUCENT,
     /* All lobes that light samples light. */

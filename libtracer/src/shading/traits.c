@@ -120,6 +120,14 @@ static uint32_t leaf_bits(const struct trc_leaf *leaf, const struct trc_operand 
     }
 }
 
+/* Fibres that reflect send rays below the surface, too, where Cycles 4 samples no light for them.
+ */
+static bool is_lit_below(const struct trc_leaf *leaf, uint32_t has, uint32_t flags) {
+    if (leaf->type == TRC_NODE_HAIR && leaf->mode == TRC_HAIR_REFLECTION)
+        return !(flags & TRC_MATERIAL_PLAIN_CHOICE);
+    return has & (TRC_MATERIAL_HAS_REFRACTION | TRC_MATERIAL_HAS_TRANSLUCENT);
+}
+
 /* Glass is two lobes that rays are continued for. */
 static uint32_t principled_branches(const struct trc_operand *in) {
     const uint32_t reflection = 1;
@@ -207,7 +215,8 @@ void trc_build_traits(const struct trc_build *b, struct trc_material *m) {
     for (uint32_t i = 0; i < b->leaf_count; i++) {
         const struct trc_leaf *leaf = &b->leaves[i];
         const struct trc_operand *in = b->leaf_operands + leaf->first_operand;
-        m->has |= leaf_bits(leaf, in);
+        const uint32_t has = leaf_bits(leaf, in);
+        m->has |= has | (is_lit_below(leaf, has, m->flags) ? TRC_MATERIAL_LIT_BELOW : 0u);
         m->branch_count += leaf_branches(leaf, in);
         add_emission(leaf, in, m);
     }

@@ -60,6 +60,18 @@ TRC_INLINE vmask near_lamp(const struct trc_lamp *lamp, vvec3 p, vvec3 wi) {
     return vf_le(d2 - along * along, slack);
 }
 
+/* Chance that a light was chosen where a ray of direction wi left. The only light always is, but
+ * not where all of it lies below the surface: rays of fibres alone go there. */
+TRC_INLINE vfloat chance_from(const struct trc_light_table *t, const struct trc_receiver *r,
+                              vint light, vvec3 wi, vmask m) {
+    const vfloat chance = trc_light_chance(t, r, light, m);
+    const vmask below = vm_and(vm_and(m, r->has_n), vf_lt(v3_dot(r->n, wi), vf_zero()));
+    if (!t->single || !vm_any(below))
+        return chance;
+    const vmask reaches = vf_gt(trc_candidate_importance(t, 0, r), vf_zero());
+    return vf_where(vm_or(reaches, vm_not(below)), chance);
+}
+
 /* Distance to the lamp along the ray, infinite where it is missed; density of sampling that place,
  * radiance. */
 static vfloat meet_lamp(const struct trc_lamp *lamp, vvec3 p, vvec3 wi, vfloat *pdf,
@@ -123,7 +135,7 @@ TRC_INLINE vmask lamp_meet(const struct trc_snapshot *snapshot, const struct trc
     if (lamp->bounce_limit) /* beyond it there were no samples */
         weighed = vm_andnot(weighed, vi_lt(vi_set((int32_t)lamp->bounce_limit), ray->depth));
     if (vm_any(weighed)) {
-        const vfloat chance = trc_light_chance(t, receiver, vi_set((int32_t)number), weighed);
+        const vfloat chance = chance_from(t, receiver, vi_set((int32_t)number), ray->wi, weighed);
         weight = ray_weight(ray->bsdf_pdf, pdf * chance, ray->light_sample_count);
         if (lamp->bounce_limit)
             weight = vf_select(weighed, weight, vf_one());
@@ -287,7 +299,7 @@ vfloat trc_light_triangle_weight(const struct trc_surface *s, vvec3 p_from, vvec
     const struct trc_view_triangle view = trc_triangle_view(&corners, p_from);
     const vfloat distance = v3_length(v3_sub(s->p, p_from));
     const vfloat pdf = trc_triangle_density(&view, s->wo, distance);
-    const vfloat chance = trc_light_chance(t, &receiver, light, m);
+    const vfloat chance = chance_from(t, &receiver, light, v3_neg(s->wo), m);
     return vf_select(m, ray_weight(bsdf_pdf, pdf * chance, light_sample_count), vf_one());
 }
 
