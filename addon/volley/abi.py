@@ -660,6 +660,12 @@ class DenoiseType(IntEnum):
     PREVIEW = 2
 
 
+class GuidesType(IntEnum):
+    ALBEDO_NORMAL = 0
+    ALBEDO = 1
+    NONE = 2
+
+
 class PassesFlags(IntFlag):
     BLENDED_FEATURES = 1
     BACKGROUND_MOTION = 2
@@ -847,7 +853,8 @@ class RenderDesc(Structure):
                 ("mist_start", c_float), ("mist_depth", c_float), ("mist_falloff", c_float),
                 ("cryptomattes", c_uint32), ("cryptomatte_depth", c_uint32), ("aov_value_count", c_uint32),
                 ("aov_color_count", c_uint32), ("light_group_count", c_uint32), ("denoise", c_uint32),
-                ("sample_offset", c_uint32), ("sample_subset", c_uint32), ("pass_flags", c_uint32))
+                ("sample_offset", c_uint32), ("sample_subset", c_uint32), ("pass_flags", c_uint32),
+                ("guides", c_uint32))
 
 
 class RenderProgress(Structure):
@@ -927,8 +934,8 @@ ENUMERATIONS = {StatusCode: "TRC_", IsaId: "TRC_ISA_", CameraType: "TRC_CAMERA_"
                 MaterialFlags: "TRC_MATERIAL_", AlphaMode: "TRC_ALPHA_", IntegratorType: "TRC_INTEGRATOR_",
                 SamplerType: "TRC_SAMPLER_", AssemblyType: "TRC_ASSEMBLY_", FilterType: "TRC_FILTER_",
                 PassId: "TRC_PASS_", PassRange: "TRC_PASS_", CryptomatteKind: "TRC_CRYPTOMATTE_",
-                DenoiseType: "TRC_DENOISE_", PassesFlags: "TRC_PASSES_", ProgressState: "TRC_PROGRESS_",
-                SumsId: "TRC_SUMS_", FeatureFlags: "TRC_FEATURE_"}
+                DenoiseType: "TRC_DENOISE_", GuidesType: "TRC_GUIDES_", PassesFlags: "TRC_PASSES_",
+                ProgressState: "TRC_PROGRESS_", SumsId: "TRC_SUMS_", FeatureFlags: "TRC_FEATURE_"}
 
 STRUCTURES = {"trc_camera_desc": CameraDesc, "trc_curve_attribute": CurveAttribute,
               "trc_curves_desc": CurvesDesc, "trc_corner_attribute": CornerAttribute,

@@ -13,6 +13,8 @@ _COPIED = (
     ("preview_adaptive_threshold", "preview_noise_threshold"),
     ("preview_adaptive_min_samples", "preview_adaptive_min_samples"),
     ("use_denoising", "use_denoising"), ("use_preview_denoising", "use_preview_denoising"),
+    ("denoising_input_passes", "denoising_input_passes"),
+    ("preview_denoising_input_passes", "preview_denoising_input_passes"),
     ("preview_denoising_start_sample", "preview_denoising_start_sample"),
     ("seed", "seed"), ("use_animated_seed", "use_animated_seed"),
     ("max_bounces", "max_depth"), ("glossy_bounces", "max_glossy_depth"),

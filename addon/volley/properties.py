@@ -42,6 +42,11 @@ SAMPLER_ITEMS = (
     ('INDEPENDENT', "Independent", "Random samples, as a reference"),
     ('BLUE_NOISE', "Blue Noise", "Sobol with blue-noise ordering over the screen"),
 )
+GUIDE_ITEMS = (
+    ('RGB', "None", "The picture alone: textures and edges lose sharpness where there is noise"),
+    ('RGB_ALBEDO', "Albedo", "The colours of surfaces, too: textures stay sharp"),
+    ('RGB_ALBEDO_NORMAL', "Albedo and Normal", "Normals and depth, too: shapes stay sharp"),
+)
 AO_METHOD_ITEMS = (
     ('REPLACE', "Replace", "The world's light, which only near objects keep away from diffuse surfaces"),
     ('ADD', "Add", "White light on diffuse surfaces besides all other"),
@@ -131,6 +136,12 @@ class VolleySceneSettings(bpy.types.PropertyGroup):
         description="Take the noise out of the viewport's picture, quickly while it gathers samples and as final "
                     "renders once it has all; not in scenes with shadow catchers before it has all",
         update=_changed)
+    denoising_input_passes: EnumProperty(
+        name="Passes", items=GUIDE_ITEMS, default='RGB_ALBEDO_NORMAL', description="What denoising goes by",
+        update=_changed)
+    preview_denoising_input_passes: EnumProperty(
+        name="Passes", items=GUIDE_ITEMS, default='RGB_ALBEDO_NORMAL',
+        description="What denoising of the viewport goes by", update=_changed)
     preview_denoising_start_sample: IntProperty(
         name="Start Sample", default=1, min=0, max=(1 << 20),
         description="Samples of the viewport's picture from which on it is shown without its noise",

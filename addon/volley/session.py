@@ -23,6 +23,8 @@ STATUS_SECONDS = 0.2         # between two status lines
 PICTURE_SECONDS = 0.7        # between two of them
 PICTURE_COST = 20            # at least this many times what showing one takes
 MEGA = 1024.0 * 1024.0
+_GUIDES = {'RGB': abi.GuidesType.NONE, 'RGB_ALBEDO': abi.GuidesType.ALBEDO,
+           'RGB_ALBEDO_NORMAL': abi.GuidesType.ALBEDO_NORMAL}
 MIN_NOISE_THRESHOLD = 0.001  # that is chosen without the user
 
 
@@ -325,6 +327,7 @@ def render_fields(scene, frame, crop, entries, is_preview=False):
         "film_transparent_roughness": settings.film_transparent_roughness,
         "film_exposure": settings.film_exposure, **passes.request_fields(entries),
         "denoise": int(settings.use_preview_denoising if is_preview else settings.use_denoising),
+        "guides": _GUIDES[settings.preview_denoising_input_passes if is_preview else settings.denoising_input_passes],
         "thread_count": thread_count(scene.render), **_adaptive_fields(settings, is_preview),
         **world.mist_fields(scene.world),
     }

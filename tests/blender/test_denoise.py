@@ -167,6 +167,29 @@ def test_views_and_layers_are_as_alone(blender):
     assert np.abs(layers[0] - layers[1]).mean() > 0.01
 
 
+# Passes that it goes by ------------------------------------------------------------------------------
+
+def inside_guides():
+    """Without them, with some and with all: final pictures, and what the viewport would ask for."""
+    import scenes
+    from volley import session
+    from volley.sync import camera
+    scene, found = _scene((64, 48)), {}
+    for kind in ('RGB', 'RGB_ALBEDO', 'RGB_ALBEDO_NORMAL'):
+        scene.volley.denoising_input_passes = scene.volley.preview_denoising_input_passes = kind
+        found[kind] = scenes.render()
+        found[f"viewport {kind}"] = session.render_fields(scene, camera.Frame(64, 48), (0, 0, 64, 48), [], True)["guides"]
+    return found
+
+
+def test_passes_that_it_goes_by(blender):
+    found = blender.run(inside_guides)
+    assert [found[f"viewport {kind}"] for kind in ('RGB_ALBEDO_NORMAL', 'RGB_ALBEDO', 'RGB')] == [0, 1, 2]
+    pictures = [found[kind] for kind in ('RGB', 'RGB_ALBEDO', 'RGB_ALBEDO_NORMAL')]
+    for before, after in zip(pictures, pictures[1:]):
+        assert (np.abs(before - after).max(axis=-1) > 1e-4).mean() > 0.02
+
+
 # The limit ------------------------------------------------------------------------------------------
 
 def inside_limit():

@@ -113,7 +113,8 @@ def inside_cycles_settings():
                "fast_gi_method": 'ADD', "pixel_filter_type": 'GAUSSIAN', "filter_width": 2.0,
                "time_limit": 12.0,
                "texture_limit_render": '1024', "diffuse_bounces": 0, "light_sampling_threshold": 0.0,
-               "use_denoising": False}
+               "use_denoising": False, "denoising_input_passes": 'RGB',
+               "preview_denoising_input_passes": 'RGB_ALBEDO'}
     for name, value in changed.items():
         setattr(theirs, name, value)
     found["offered"] = from_cycles.is_offered(scene)

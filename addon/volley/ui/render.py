@@ -38,6 +38,9 @@ def _draw_samples(layout, settings, prefix=""):
     if is_adaptive:
         column.prop(settings, f"{prefix}adaptive_min_samples")
     layout.prop(settings, f"use_{prefix}denoising")
+    guides = layout.column()
+    guides.active = getattr(settings, f"use_{prefix}denoising")
+    guides.prop(settings, f"{prefix}denoising_input_passes")
 
 
 class VOLLEY_RENDER_PT_sampling_viewport(VolleyPanel, Panel):

@@ -78,6 +78,14 @@ enum trc_denoise_type {
     TRC_DENOISE_PREVIEW /* by trc_render_read_preview alone; takes about 110 bytes a pixel */
 };
 
+/* What reconstruction knows of a pixel beside its light. With less of it, textures and edges lose
+ * sharpness where there is noise. */
+enum trc_guides_type {
+    TRC_GUIDES_ALBEDO_NORMAL = 0, /* albedo, normal and depth */
+    TRC_GUIDES_ALBEDO,
+    TRC_GUIDES_NONE
+};
+
 /* The number of a Cryptomatte layer for trc_render_read. */
 #define TRC_PASS_CRYPTOMATTE(kind, layer) \
     ((uint32_t)TRC_PASS_FIRST_CRYPTOMATTE + TRC_MAX_CRYPTOMATTE_LAYERS * (kind) + (layer))
@@ -155,6 +163,7 @@ typedef struct trc_render_desc {
      * noise_threshold says to stop. */
     uint32_t sample_offset, sample_subset;
     uint32_t pass_flags; /* TRC_PASSES_* */
+    uint32_t guides;     /* TRC_GUIDES_*, of denoise */
 } trc_render_desc;
 
 /* No frame yet (width and height are to be set); Distribution, 16 samples, 50 bounces, a pixel

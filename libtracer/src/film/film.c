@@ -43,6 +43,7 @@ trc_status trc_film_create(const trc_render_desc *desc, struct trc_film *film) {
                             .shows_shadows = desc->passes >> TRC_PASS_SHADOW_CATCHER & 1,
                             .shows_noise = desc->passes >> TRC_PASS_NOISY_COMBINED & 1,
                             .is_transparent = desc->film_transparent,
+                            .guides = desc->guides,
                             .matte_count = trc_film_matte_count(desc),
                             .matte_units = trc_matte_units(desc->sample_count),
                             .sample_offset = desc->sample_offset};

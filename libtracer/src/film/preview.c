@@ -29,12 +29,15 @@ static void load_sums(const double *sums, uint32_t channels, float *plane) {
 static void load_pixel(const struct trc_film *film, size_t pixel, float *at) {
     load_sums(film->sums[TRC_PASS_COMBINED] + 4 * pixel, 4,
               at + TRC_PREVIEW_COLOR * TRC_PREVIEW_FLOATS);
-    load_sums(film->sums[TRC_PASS_DENOISING_ALBEDO] + 3 * pixel, 3,
-              at + TRC_PREVIEW_ALBEDO * TRC_PREVIEW_FLOATS);
-    load_sums(film->sums[TRC_PASS_DENOISING_NORMAL] + 3 * pixel, 3,
-              at + TRC_PREVIEW_NORMAL * TRC_PREVIEW_FLOATS);
-    load_sums(film->sums[TRC_PASS_DENOISING_DEPTH] + pixel, 1,
-              at + TRC_PREVIEW_DEPTH * TRC_PREVIEW_FLOATS);
+    if (film->guides != TRC_GUIDES_NONE)
+        load_sums(film->sums[TRC_PASS_DENOISING_ALBEDO] + 3 * pixel, 3,
+                  at + TRC_PREVIEW_ALBEDO * TRC_PREVIEW_FLOATS);
+    if (film->guides == TRC_GUIDES_ALBEDO_NORMAL) {
+        load_sums(film->sums[TRC_PASS_DENOISING_NORMAL] + 3 * pixel, 3,
+                  at + TRC_PREVIEW_NORMAL * TRC_PREVIEW_FLOATS);
+        load_sums(film->sums[TRC_PASS_DENOISING_DEPTH] + pixel, 1,
+                  at + TRC_PREVIEW_DEPTH * TRC_PREVIEW_FLOATS);
+    }
     const struct trc_half *half = &film->halves[pixel];
     at[TRC_PREVIEW_HALF * TRC_PREVIEW_FLOATS] =
         load_float(&half->light[0]) + load_float(&half->light[1]) + load_float(&half->light[2]);

@@ -72,6 +72,7 @@ struct trc_film {
                                   their count */
     uint32_t sample_offset;    /* samples of a pixel before those of this film, to tell halves by */
     struct trc_clean_film clean;
+    uint32_t guides;   /* trc_render_desc.guides */
     uint32_t is_clean; /* atomic: the clean film is what is read */
     bool shows_noise;  /* the plain Combined is a pass */
 };

@@ -165,11 +165,18 @@ static void add_offset(struct work *w, int kind, int dx, int dy) {
         }
 }
 
+/* Kinds that the render asks for; the others stay 0. */
+static int kinds_of(const struct trc_denoise_job *job) {
+    static const int counts[] = {
+        [TRC_GUIDES_ALBEDO_NORMAL] = KINDS, [TRC_GUIDES_ALBEDO] = 1, [TRC_GUIDES_NONE] = 0};
+    return counts[job->denoise->film->guides];
+}
+
 void trc_features_filter(const struct trc_denoise_job *job) {
     struct work w;
     carve(&w, job->memory);
     load(job, &w);
-    for (int kind = 0; kind < KINDS; kind++)
+    for (int kind = 0; kind < kinds_of(job); kind++)
         for (int dy = -REACH; dy <= REACH; dy++)
             for (int dx = -REACH; dx <= REACH; dx++)
                 if ((abs(dx) <= 1 && abs(dy) <= 1) || !((dx + dy) & 1))
