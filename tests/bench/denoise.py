@@ -30,6 +30,7 @@ import flip
 SEED, REFERENCE_SEED = 1, 1000
 # Tiles whose relative error is below are as good as without noise.
 LEAST_ERROR = 1e-5
+LEAST_MEASURE = 1e-30  # of a picture without noise
 
 
 def job(options, samples, denoise, seed, output, frame=None):
@@ -170,7 +171,7 @@ def main():
             if options.flicker:
                 print_flicker(row)
                 continue
-            gains = [row[name][0] / row[name][1] for name in ("mse", "rel_mse", "flip")]
+            gains = [row[name][0] / max(row[name][1], LEAST_MEASURE) for name in ("mse", "rel_mse", "flip")]
             print(f"{row['file']:16} {row['samples']:5} samples: MSE {gains[0]:6.2f}, relMSE {gains[1]:6.2f}, "
                   f"FLIP {gains[2]:5.2f} times lower, worst tile {row['worst_tile']:5.2f}; {row['seconds'][0]:.2f} to "
                   f"{row['seconds'][1]:.2f} s", flush=True)

@@ -13,7 +13,7 @@ import sys
 import time
 
 import compare_cycles
-from reporting import (blender_costs, curves, document, elsewhere, farm, frames, gate, hair, kernels, machine,
+from reporting import (blender_costs, curves, denoise, document, elsewhere, farm, frames, gate, hair, kernels, machine,
                        povray, readme, repeated, scope as scopes)
 
 
@@ -49,6 +49,7 @@ PARTS = {
     "blender": lambda options: blender_costs.measure(options, options.scope),
     "povray": lambda options: povray.measure(options, options.scope, options.out / "pictures"),
     "curves": lambda options: curves.measure(options, options.scope, options.out / "pictures"),
+    "denoise": lambda options: denoise.measure(options, options.scope, options.out / "pictures"),
     "farm": lambda options: farm.measure(options, options.scope),
     "hair": lambda options: hair.measure(options, options.scope, options.out / "pictures"),
     "curves_trixie": lambda options: elsewhere.measure(options.scope, "trixie", "curves"),

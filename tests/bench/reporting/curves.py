@@ -18,7 +18,6 @@ from .scope import SAMPLERS
 MEASURES = {"mse": "MSE", "rel_mse": "relMSE", "p999": "99.9th percentile", "flip": "FLIP"}
 BASE = "cycles"
 DEFAULT = "volley sobol l1"  # Volley as it is without touching anything
-DENOISED = "volley denoised"
 SHEET_SAMPLES = (1, 16)      # of the pictures to look at
 
 
@@ -29,6 +28,15 @@ def measure(options, scope, pictures):
 
 def measure_scene(name, options, scope, pictures):
     """One scene, as error_time measures it, with intervals."""
+    own = error_options(options, scope, configurations(name, scope))
+    scene = error_time.measure_scene(name, own)
+    scene["comparison"] = compare_configurations(scene)
+    write_sheet(name, own, pictures)
+    return scene
+
+
+def error_options(options, scope, made):
+    """error_time.py's options for a scope and configurations."""
     own = error_time.parse_arguments([
         "--times", "--samples", *map(str, scope.samples),
         "--time-samples", *map(str, scope.time_samples), "--seeds", str(scope.seeds),
@@ -36,11 +44,8 @@ def measure_scene(name, options, scope, pictures):
         "--reference-seeds", str(scope.reference_seeds), "--repeats", str(scope.repeats),
         "--times-scale", str(scope.times_scale), "--threads", str(options.threads),
         "--build", str(options.build), "--blender", options.blender])
-    own.configurations = configurations(name, scope)
-    scene = error_time.measure_scene(name, error_time.identify(own))
-    scene["comparison"] = compare_configurations(scene)
-    write_sheet(name, own, pictures)
-    return scene
+    own.configurations = made
+    return error_time.identify(own)
 
 
 def write_sheet(name, options, folder):
@@ -59,13 +64,10 @@ def write_sheet(name, options, folder):
 
 
 def configurations(name, scope):
-    """Cycles, Volley with each number of light samples, with Denoise, and with the other samplers."""
+    """Cycles, Volley with each number of light samples, and with the other samplers."""
     made = [error_time.Configuration(BASE, "CYCLES")]
     for count in scope.light_samples:
         made.append(volley("SOBOL", count))
-    if scope.denoise:
-        made.append(error_time.Configuration(DENOISED, "VOLLEY", {
-            **volley("SOBOL", scope.light_samples[0]).volley, "use_denoising": True}))
     if name in scope.sampler_scenes:
         made += [volley(sampler, scope.light_samples[0]) for sampler in SAMPLERS
                  if sampler != "SOBOL"]

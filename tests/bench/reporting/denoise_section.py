@@ -1,72 +1,54 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The section about Denoise: errors with it over those without, and its time to Cycles' plain errors."""
+"""The section about Denoise."""
 
-import statistics
-
-from . import curves, estimates
+from . import curves, denoise
 from .tables import digits, table, words
 
 PEER_SAMPLES = (64, 256)   # of Cycles' plain pictures
-MEASURES = ("rel_mse", "flip")
+TIMED = ("rel_mse", "flip")
+MEASURES = ("mse", "rel_mse", "flip")
 PIXEL_BYTES = 172          # halves 48, clean Combined 32, features 28 and their passes' sums 56, estimates 8
 PASS_BYTES = 24            # three doubles
-MAX_RATIO = 1.05           # of an error with Denoise to that without it; what is above is marked
+MAX_RATIO, MAX_TILE = 1.05, 1.5  # of an error with Denoise to that without it; what is above is marked
 
 
-def text(scenes):
-    """The whole section; empty where Denoise was not measured."""
-    made = {name: scene for name, scene in scenes.items() if curves.DENOISED in scene["curves"]}
-    if not made:
-        return ""
-    samples = list(next(iter(made.values()))["curves"][curves.DENOISED])
-    ratios = sorted(((name, [error_ratio(scene, count) for count in samples]) for name, scene in made.items()),
-                    key=lambda row: -max(row[1]))
-    return "\n\n".join([
-        "## Denoise",
-        "relMSE with Denoise over that without, by samples:",
-        table(["scene", *samples], [[words(name), *map(_ratio, values)] for name, values in ratios]),
-        "Time of Cycles' plain picture over that of Volley for the same error, the filter's time included; – where "
-        "the errors measured do not reach that one. Bias is in the table above.",
-        table(["scene", *(f"{curves.MEASURES[measure]}, {count} samples, {kind}" for measure in MEASURES
-                          for count in PEER_SAMPLES for kind in ("Denoise", "plain"))], _time_rows(made)),
-        f"What it costs: seconds a megapixel with all threads, differences of the times of whole renders, and "
-        f"{PIXEL_BYTES} bytes a pixel, {PASS_BYTES} more for each pass of light beside Combined.",
-        table(["scene", *samples], [[words(name), *map(digits, filter_seconds(scene, samples))]
-                                    for name, scene in made.items()])])
+def text(made):
+    """The whole section."""
+    scenes, samples = made["scenes"], list(next(iter(made["worst_tiles"].values())))
+    parts = ["## Denoise"]
+    for measure in MEASURES:
+        rows = [(name, [denoise.error_ratio(scene, measure, count) for count in samples])
+                for name, scene in scenes.items()]
+        parts += [f"{curves.MEASURES[measure]} with Denoise over that without, by samples:",
+                  _ratios(rows, samples, MAX_RATIO)]
+    parts += ["The largest such relMSE of tiles of 32 x 32 pixels:",
+              _ratios([(name, list(tiles.values())) for name, tiles in made["worst_tiles"].items()], samples, MAX_TILE),
+              "Time of Cycles' plain picture over that of Volley for the same error, the filter's time included; – where "
+              "the errors measured do not reach that one.", _times(scenes), _costs(made["costs"])]
+    return "\n\n".join(parts)
 
 
-def error_ratio(scene, samples):
-    """relMSE with Denoise over that without."""
-    return scene["curves"][curves.DENOISED][samples]["rel_mse"] / scene["curves"][curves.DEFAULT][samples]["rel_mse"]
+def _ratios(rows, samples, most):
+    """A table, the worst scene first, what is above the most in bold."""
+    return table(["scene", *samples], [
+        [words(name), *(f"**{digits(value)}**" if value > most else digits(value) for value in values)]
+        for name, values in sorted(rows, key=lambda row: -max(row[1]))])
 
 
-def filter_seconds(scene, samples):
-    """Seconds a megapixel that Denoise adds to a render, by samples; at few of them noise is as large."""
-    megapixels = scene["width"] * scene["height"] * scene["times_scale"] ** 2 / 1e6
-    clean, plain = (dict(zip(scene["curves"][name], curves.curve(scene, name, "mse")[0]))
-                    for name in (curves.DENOISED, curves.DEFAULT))
-    return [(clean[count] - plain[count]) / megapixels for count in samples]
+def _times(scenes):
+    columns = [(name, measure, samples) for measure in TIMED for samples in PEER_SAMPLES
+               for name in (denoise.DENOISED, denoise.PLAIN)]
+    found = {name: [denoise.time_ratio(scene, *column) for column in columns] for name, scene in scenes.items()}
+    rows = [[words(name), *map(digits, values)] for name, values in sorted(found.items(), key=lambda row: row[1][0] or 0.0)]
+    heads = [f"{curves.MEASURES[measure]}, {count} samples, {kind}" for measure in TIMED for count in PEER_SAMPLES
+             for kind in ("Denoise", "plain")]
+    return table(["scene", *heads], [*rows, ["median", *(digits(denoise.middle(column)) for column in zip(*found.values()))]])
 
 
-def time_ratio(scene, name, measure, samples):
-    """Seconds of Cycles at so many samples over those of a configuration at its error; None outside the curve."""
-    seconds, errors = curves.curve(scene, curves.BASE, measure)
-    index = list(scene["curves"][curves.BASE]).index(str(samples))
-    needed = estimates.cost_at(*curves.curve(scene, name, measure), errors[index])
-    return seconds[index] / needed if needed else None
-
-
-def _time_rows(scenes):
-    columns = [(name, measure, samples) for measure in MEASURES for samples in PEER_SAMPLES
-               for name in (curves.DENOISED, curves.DEFAULT)]
-    found = {scene_name: [time_ratio(scene, *column) if str(column[2]) in scene["curves"][curves.BASE] else None
-                          for column in columns] for scene_name, scene in scenes.items()}
-    rows = [[words(name), *map(digits, values)]
-            for name, values in sorted(found.items(), key=lambda row: row[1][0] or 0.0)]
-    medians = [statistics.median(known) if (known := [value for value in column if value is not None]) else None
-               for column in zip(*found.values())]
-    return [*rows, ["median", *map(digits, medians)]]
-
-
-def _ratio(value):
-    return f"**{digits(value)}**" if value > MAX_RATIO else digits(value)
+def _costs(rows):
+    """What the filter costs, by threads."""
+    said = "; ".join(f"{row['threads']} thread{'s' * (row['threads'] > 1)}: {digits(denoise.middle(row['seconds']))} s a "
+                     f"megapixel ({digits(min(row['seconds']))} to {digits(max(row['seconds']))})" for row in rows)
+    same = "the same bits" if all(row["same_bits"] for row in rows) else "**other bits**"
+    return (f"What it costs, differences of the times of whole renders: {said}, and {same} by each; {PIXEL_BYTES} bytes a "
+            f"pixel, {PASS_BYTES} more for each pass of light beside Combined.")

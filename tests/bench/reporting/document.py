@@ -29,7 +29,8 @@ def text(results, out):
     parts += [error_sections.equal_error_elsewhere(run) for run in elsewhere.of_part(results, "curves")]
     if results.get("curves"):
         parts.append(error_sections.curves_and_bias(results["curves"]))
-        parts.append(denoise_section.text(results["curves"]))
+    if results.get("denoise"):
+        parts.append(denoise_section.text(results["denoise"]))
     if results.get("hair"):
         parts.append(hair.section(results["hair"]))
     if results.get("kernels"):

@@ -94,8 +94,8 @@ def draw_curves(name, scene, path):
 
 
 def is_main(configuration):
-    """Cycles and Volley's default sampler, with Denoise too: the others have a plot of their own."""
-    return configuration in (curves.BASE, curves.DENOISED) or configuration.startswith("volley sobol")
+    """Cycles and Volley's default sampler: the others have a plot of their own."""
+    return configuration == curves.BASE or configuration.startswith("volley sobol")
 
 
 def draw_samplers(scenes, folder):

@@ -27,7 +27,7 @@ class Scope:
     light_samples: tuple
     repeats: int
     times_scale: int        # timed pictures are so many times as wide and high
-    denoise: bool           # Volley with Denoise, too
+    denoise: bool           # Volley with Denoise beside it
     elsewhere: bool         # with newer Blenders and Embree too, in the scope of NEXT
     farm: bool              # commands of farms
     hair_scenes: tuple      # a whole F12 in a new Blender

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Denoise: errors and times with it and without beside Cycles, what the filter costs, and whether the number of
+threads changes it."""
+
+import os
+import pathlib
+import statistics
+import tempfile
+from dataclasses import replace
+
+import compare
+import compare_cycles
+import denoise
+import error_time
+import numpy as np
+
+from . import curves, estimates
+
+DENOISED = "volley denoised"
+PLAIN = curves.DEFAULT
+# Enough to tell a tenth, in some 8 minutes of two quiet processors.
+NUMBERS = {"samples": (1, 4, 16, 64, 256), "time_samples": (4, 64), "seeds": 2, "reference_samples": 512,
+           "reference_seeds": 2, "repeats": 2, "times_scale": 2}
+COST_SCENE, COST_WIDTH, COST_HEIGHT, COST_SAMPLES, COST_REPEATS = "billiards", 960, 540, 2, 3
+PICTURE_SAMPLES = 16
+
+
+def measure(options, scope, pictures):
+    """{"scenes": as curves.measure, "worst_tiles", "costs"}; empty where the scope leaves it out."""
+    if not scope.denoise:
+        return {}
+    made, scenes, tiles = replace(scope, **NUMBERS), {}, {}
+    configurations = [error_time.Configuration(curves.BASE, "CYCLES"), curves.volley("SOBOL", 1),
+                      error_time.Configuration(DENOISED, "VOLLEY", {**curves.volley("SOBOL", 1).volley,
+                                                                    "use_denoising": True})]
+    for name in scope.scenes:
+        own = curves.error_options(options, made, configurations)
+        scenes[name] = error_time.measure_scene(name, own)
+        tiles[name] = _tiles_and_picture(name, own, pictures)
+    return {"scenes": scenes, "worst_tiles": tiles, "costs": costs(options)}
+
+
+def _tiles_and_picture(name, options, folder):
+    """{samples: the largest error with Denoise over that without, of tiles}; writes the plain picture, the filtered
+    one and the reference side by side."""
+    own = error_time.scene_options(name, options)
+    blend, key, _name = compare_cycles.prepared_scene(own)
+    seeds = list(range(error_time.FIRST_SEED, error_time.FIRST_SEED + own.seeds))
+    points = [(samples, seeds) for samples in own.samples]
+    exact = error_time.reference_stack(blend, key, own).mean(axis=0).astype(np.float64)
+    plain, clean = (dict(zip(own.samples, error_time.render_stacks(blend, key, configuration, points, own)))
+                    for configuration in own.configurations if configuration.name in (PLAIN, DENOISED))
+    folder.mkdir(parents=True, exist_ok=True)
+    compare.write_png(folder / f"denoise-{name}.png", np.concatenate(
+        [plain[PICTURE_SAMPLES][0], clean[PICTURE_SAMPLES][0], exact], axis=1) * 2.0 ** own.stops)
+    return {samples: denoise.worst_tile(*(np.mean([denoise.relative_error(picture, exact) for picture in stacks[samples]],
+                                                  axis=0) for stacks in (plain, clean))) for samples in own.samples}
+
+
+def costs(options):
+    """For one thread and all: seconds a megapixel that the filter adds, and whether the picture has the same bits
+    as by one thread."""
+    own = error_time.scene_options(COST_SCENE, curves.error_options(options, replace(options.scope, **NUMBERS), []))
+    blend, _key, _name = compare_cycles.prepared_scene(own)
+    own.width, own.height, rows, first = COST_WIDTH, COST_HEIGHT, [], None
+    with tempfile.TemporaryDirectory() as folder:
+        paths = {kind: pathlib.Path(folder) / f"{kind}.exr" for kind in (False, True)}
+        for own.threads in sorted({1, options.threads or os.cpu_count()}):
+            kinds = [False, True] * (1 + COST_REPEATS)  # the first of each pays for pages
+            seconds = denoise.run_jobs(blend, [denoise.job(own, COST_SAMPLES, kind, 1, paths[kind]) for kind in kinds], own)
+            plain, clean = (seconds[start::2][1:] for start in (0, 1))
+            picture = compare.read_rgb(paths[True])
+            first = picture if first is None else first
+            rows.append({"threads": own.threads, "same_bits": bool(np.array_equal(picture, first)),
+                         "seconds": [(b - a) / (COST_WIDTH * COST_HEIGHT / 1e6) for a, b in zip(plain, clean)]})
+    return rows
+
+
+def error_ratio(scene, measure_name, samples):
+    """An error with Denoise over that without."""
+    return scene["curves"][DENOISED][samples][measure_name] / scene["curves"][PLAIN][samples][measure_name]
+
+
+def time_ratio(scene, name, measure_name, samples):
+    """Seconds of Cycles at so many samples over those of a configuration at its error; None outside the curve."""
+    seconds, errors = curves.curve(scene, curves.BASE, measure_name)
+    index = list(scene["curves"][curves.BASE]).index(str(samples))
+    needed = estimates.cost_at(*curves.curve(scene, name, measure_name), errors[index])
+    return seconds[index] / needed if needed else None
+
+
+def middle(values):
+    """The median of those that there are, None of none."""
+    known = [value for value in values if value is not None]
+    return statistics.median(known) if known else None
