@@ -77,6 +77,18 @@ class NormalsLayout(IntEnum):
     CORNER = 2
 
 
+class DicingSurface(IntEnum):
+    LINEAR = 0
+    CURVED = 1
+    CATMULL_CLARK = 2
+
+
+class DicingSpace(IntEnum):
+    OBJECT = 0
+    PARALLEL = 1
+    CENTRAL = 2
+
+
 class VisibleRays(IntFlag):
     CAMERA = 1
     DIFFUSE = 2
@@ -746,6 +758,14 @@ class CornerAttribute(Structure):
                 ("value_count", c_uint64))
 
 
+class DicingDesc(Structure):
+    __slots__ = ()
+    _fields_ = (("struct_size", c_uint32), ("surface", c_uint32), ("space", c_uint32),
+                ("max_subdivisions", c_uint32), ("sharp_corners", c_uint32), ("side", c_float),
+                ("object_to_camera", c_float * 12), ("window", c_float * 4), ("offscreen_scale", c_float),
+                ("triangle_max", c_uint64), ("faces", c_void_p), ("face_count", c_uint64))
+
+
 class MeshDesc(Structure):
     __slots__ = ()
     _fields_ = (("struct_size", c_uint32), ("key_count", c_uint32), ("vertex_count", c_uint64),
@@ -753,7 +773,7 @@ class MeshDesc(Structure):
                 ("indices", c_void_p), ("index_count", c_uint64), ("normals", c_void_p),
                 ("normal_count", c_uint64), ("normal_kind", c_uint32), ("attribute_count", c_uint32),
                 ("smooth", c_void_p), ("material_index", c_void_p), ("attributes", POINTER(CornerAttribute)),
-                ("generated", c_void_p), ("generated_count", c_uint64))
+                ("generated", c_void_p), ("generated_count", c_uint64), ("dicing", POINTER(DicingDesc)))
 
 
 class InstanceDesc(Structure):
@@ -912,11 +932,12 @@ CONSTANTS = {"TRC_MAX_LIGHT_GROUPS": MAX_LIGHT_GROUPS, "TRC_MAX_CURVE_PIECES": M
 
 # Enumerations, with what their members' names begin with in C.
 ENUMERATIONS = {StatusCode: "TRC_", IsaId: "TRC_ISA_", CameraType: "TRC_CAMERA_", CurveShape: "TRC_CURVE_",
-                NormalsLayout: "TRC_NORMALS_", VisibleRays: "TRC_VISIBLE_", InstanceFlags: "TRC_INSTANCE_",
-                LightType: "TRC_LIGHT_", AreaShape: "TRC_AREA_", LightFlags: "TRC_LIGHT_",
-                AoMethod: "TRC_AO_", NodeType: "TRC_NODE_", ModeFlags: "TRC_MODE_", TableSize: "TRC_TABLE_",
-                DiffuseModel: "TRC_DIFFUSE_", ToonComponent: "TRC_TOON_", HairComponent: "TRC_HAIR_",
-                Pigment: "TRC_PIGMENT_", MappingType: "TRC_MAPPING_", NormalMapSpace: "TRC_NORMAL_MAP_",
+                NormalsLayout: "TRC_NORMALS_", DicingSurface: "TRC_DICING_", DicingSpace: "TRC_DICING_",
+                VisibleRays: "TRC_VISIBLE_", InstanceFlags: "TRC_INSTANCE_", LightType: "TRC_LIGHT_",
+                AreaShape: "TRC_AREA_", LightFlags: "TRC_LIGHT_", AoMethod: "TRC_AO_", NodeType: "TRC_NODE_",
+                ModeFlags: "TRC_MODE_", TableSize: "TRC_TABLE_", DiffuseModel: "TRC_DIFFUSE_",
+                ToonComponent: "TRC_TOON_", HairComponent: "TRC_HAIR_", Pigment: "TRC_PIGMENT_",
+                MappingType: "TRC_MAPPING_", NormalMapSpace: "TRC_NORMAL_MAP_",
                 NormalMapFlags: "TRC_NORMAL_MAP_", BumpMode: "TRC_BUMP_", AmbientMode: "TRC_AMBIENT_",
                 RaycastMode: "TRC_RAYCAST_", DisplacementMethod: "TRC_DISPLACEMENT_",
                 RampInterpolation: "TRC_RAMP_", Gamut: "TRC_GAMUT_", CurvesExtension: "TRC_CURVES_",
@@ -939,12 +960,12 @@ ENUMERATIONS = {StatusCode: "TRC_", IsaId: "TRC_ISA_", CameraType: "TRC_CAMERA_"
 
 STRUCTURES = {"trc_camera_desc": CameraDesc, "trc_curve_attribute": CurveAttribute,
               "trc_curves_desc": CurvesDesc, "trc_corner_attribute": CornerAttribute,
-              "trc_mesh_desc": MeshDesc, "trc_instance_desc": InstanceDesc, "trc_light_desc": LightDesc,
-              "trc_world_desc": WorldDesc, "trc_node_input": NodeInput, "trc_node": Node,
-              "trc_material_desc": MaterialDesc, "trc_image_desc": ImageDesc, "trc_rays": Rays,
-              "trc_hits": Hits, "trc_reader_desc": ReaderDesc, "trc_render_desc": RenderDesc,
-              "trc_render_progress": RenderProgress, "trc_sums": Sums, "trc_part_desc": PartDesc,
-              "trc_scene_desc": SceneDesc, "trc_scene_stats": SceneStats}
+              "trc_dicing_desc": DicingDesc, "trc_mesh_desc": MeshDesc, "trc_instance_desc": InstanceDesc,
+              "trc_light_desc": LightDesc, "trc_world_desc": WorldDesc, "trc_node_input": NodeInput,
+              "trc_node": Node, "trc_material_desc": MaterialDesc, "trc_image_desc": ImageDesc,
+              "trc_rays": Rays, "trc_hits": Hits, "trc_reader_desc": ReaderDesc,
+              "trc_render_desc": RenderDesc, "trc_render_progress": RenderProgress, "trc_sums": Sums,
+              "trc_part_desc": PartDesc, "trc_scene_desc": SceneDesc, "trc_scene_stats": SceneStats}
 
 # Result and arguments.
 FUNCTIONS = {
@@ -962,6 +983,7 @@ FUNCTIONS = {
     "trc_curves_create": (c_int32, (c_uint64, POINTER(CurvesDesc), POINTER(c_uint64))),
     "trc_curves_update": (c_int32, (c_uint64, c_uint64, c_uint32, c_void_p, c_uint64)),
     "trc_corner_attribute_default": (CornerAttribute, ()),
+    "trc_dicing_desc_default": (DicingDesc, ()),
     "trc_mesh_desc_default": (MeshDesc, ()),
     "trc_mesh_create": (c_int32, (c_uint64, POINTER(MeshDesc), POINTER(c_uint64))),
     "trc_mesh_update": (c_int32, (c_uint64, c_uint64, c_uint32, c_void_p, c_uint64, c_void_p, c_uint64)),

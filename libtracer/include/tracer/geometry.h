@@ -24,6 +24,51 @@ typedef struct trc_corner_attribute {
 /* A UV map without values. */
 TRC_API trc_corner_attribute trc_corner_attribute_default(void);
 
+/* Where the new vertices of a diced mesh lie. */
+enum trc_dicing_surface {
+    TRC_DICING_LINEAR = 0, /* on the given triangles */
+    TRC_DICING_CURVED = 1, /* on a surface through the given vertices, curved by their normals */
+    TRC_DICING_CATMULL_CLARK = 2 /* on the limit of Catmull-Clark subdivision of the faces */
+};
+
+/* In what the length of an edge is measured. */
+enum trc_dicing_space {
+    TRC_DICING_OBJECT = 0,   /* of the object */
+    TRC_DICING_PARALLEL = 1, /* of the camera */
+    TRC_DICING_CENTRAL = 2   /* of the camera, divided by the distance from it */
+};
+
+/* Subdivision of a mesh when it is created, by how large its edges are to a camera. An edge that is
+ * longer than the diagonal of a square of the given side is split in two, whatever triangles it
+ * belongs to, so that no crack opens; so are its halves, until none is too long. Displacement then
+ * moves the new vertices. */
+typedef struct trc_dicing_desc {
+    uint32_t struct_size; /* of this structure; checked */
+    uint32_t surface; /* TRC_DICING_*, enum trc_dicing_surface. As in Cycles, UV maps and colours
+                         are interpolated linearly in all; CATMULL_CLARK rounds the corners of
+                         open boundaries and knows no creases */
+    uint32_t space;   /* TRC_DICING_*, enum trc_dicing_space */
+    uint32_t max_subdivisions;  /* 0..16 halvings of an edge; CATMULL_CLARK takes one at least */
+    uint32_t sharp_corners;     /* 0 or 1: with CATMULL_CLARK, a vertex of a single face stays */
+    float side;                 /* > 0: metres, or their ratio to the distance for CENTRAL */
+    float object_to_camera[12]; /* see base.h; not read for OBJECT */
+    /* left, right, bottom, top of what the camera shows, at distance 1 for CENTRAL; left = right:
+     * it shows all directions. Not read for OBJECT. */
+    float window[4];
+    float offscreen_scale; /* >= 1: side grows by the factor 1 + d (offscreen_scale - 1) for an edge
+                              outside of the window's frustum, by d metres, for PARALLEL by d halves
+                              of the window's sides (their root mean square) */
+    uint64_t triangle_max; /* a pass that may make more is not begun, and the next commit warns;
+                              0: 2^25 */
+    const uint32_t *faces; /* the face of each triangle, those of one side by side; NULL: each is
+                              one by itself. Read for CATMULL_CLARK alone */
+    uint64_t face_count;   /* number of elements of faces, checked */
+} trc_dicing_desc;
+
+/* Linear, of a side of 1 metre in the object's space, 12 subdivisions at most, an offscreen_scale
+ * of 1. */
+TRC_API trc_dicing_desc trc_dicing_desc_default(void);
+
 typedef struct trc_mesh_desc {
     uint32_t struct_size;    /* of this structure; checked */
     uint32_t key_count;      /* motion keys, 1..TRC_MAX_KEYS, evenly spaced over [0, 1] */
@@ -45,7 +90,11 @@ typedef struct trc_mesh_desc {
     const trc_corner_attribute *attributes; /* the first of width 2 is the default UV map */
     const float *generated; /* Generated coordinates of each vertex, 3 floats, the same at all keys
                                and in all poses; NULL: the bounding box is the unit cube */
-    uint64_t generated_count; /* number of floats, checked */
+    uint64_t generated_count;      /* number of floats, checked */
+    const trc_dicing_desc *dicing; /* NULL: the mesh stays as it is. A diced mesh takes no
+                                      trc_mesh_update; its normals are computed, but for those of
+                                      vertices for LINEAR, which are interpolated; with CORNER, all
+                                      of it is smooth */
 } trc_mesh_desc;
 
 /* One key of no vertices and no triangles, all flat. */

@@ -21,6 +21,14 @@ trc_corner_attribute trc_corner_attribute_default(void) {
     return (trc_corner_attribute){.struct_size = sizeof(trc_corner_attribute), .width = 2};
 }
 
+trc_dicing_desc trc_dicing_desc_default(void) {
+    return (trc_dicing_desc){.struct_size = sizeof(trc_dicing_desc),
+                             .max_subdivisions = 12,
+                             .side = 1.0f,
+                             .object_to_camera = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0},
+                             .offscreen_scale = 1.0f};
+}
+
 trc_mesh_desc trc_mesh_desc_default(void) {
     return (trc_mesh_desc){.struct_size = sizeof(trc_mesh_desc), .key_count = 1};
 }

@@ -50,6 +50,22 @@ static trc_status check_normals(const trc_mesh_desc *desc) {
                            "normals");
 }
 
+static trc_status check_dicing(const trc_dicing_desc *dicing, uint64_t triangle_count) {
+    TRC_TRY(trc_check_struct(dicing, sizeof *dicing, "trc_dicing_desc"));
+    TRC_TRY(trc_check_enum(dicing->surface, TRC_DICING_CATMULL_CLARK + 1, "surface"));
+    TRC_TRY(trc_check_enum(dicing->space, TRC_DICING_CENTRAL + 1, "space"));
+    TRC_TRY(trc_check_enum(dicing->sharp_corners, 2, "sharp_corners"));
+    TRC_TRY(trc_check_count(dicing->max_subdivisions, 0, 16, "max_subdivisions"));
+    TRC_TRY(trc_check_float(dicing->side, FLT_MIN, FLT_MAX, "side"));
+    TRC_TRY(trc_check_finite(dicing->object_to_camera, 12, "object_to_camera"));
+    TRC_TRY(trc_check_finite(dicing->window, 4, "window"));
+    TRC_TRY(trc_check_float(dicing->offscreen_scale, 1.0f, FLT_MAX, "offscreen_scale"));
+    if (!dicing->faces && !dicing->face_count)
+        return TRC_OK;
+    return trc_check_array(dicing->faces, dicing->face_count, triangle_count, sizeof(uint32_t),
+                           sizeof(uint32_t), "faces");
+}
+
 static trc_status check_mesh(const trc_mesh_desc *desc) {
     TRC_TRY(trc_check_struct(desc, sizeof *desc, "trc_mesh_desc"));
     TRC_TRY(trc_check_count(desc->key_count, 1, TRC_MAX_KEYS, "key_count"));
@@ -74,6 +90,8 @@ static trc_status check_mesh(const trc_mesh_desc *desc) {
     for (uint32_t i = 0; i < desc->attribute_count; i++) {
         TRC_TRY(check_attribute(&desc->attributes[i], desc->triangle_count));
     }
+    if (desc->dicing)
+        TRC_TRY(check_dicing(desc->dicing, desc->triangle_count));
     return TRC_OK;
 }
 

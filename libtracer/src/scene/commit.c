@@ -266,6 +266,19 @@ static void warn_of_images(const struct trc_scene_state *scene, struct trc_snaps
     }
 }
 
+static void warn_of_dicing(const struct trc_scene_state *scene, struct trc_snapshot_block *block) {
+    uint64_t coarse = 0;
+    const struct trc_store *store = &scene->meshes;
+    for (uint32_t i = trc_store_first(store); i != TRC_STORE_END; i = trc_store_next(store, i)) {
+        const struct trc_scene_mesh *mesh = store->slots[i].object;
+        coarse += mesh->is_coarse;
+    }
+    if (coarse) {
+        trc_warn(block, "%" PRIu64 " meshes are diced more coarsely than asked, to save memory",
+                 coarse);
+    }
+}
+
 static void finish_stats(const struct trc_scene_state *scene, struct trc_snapshot_block *block) {
     struct trc_snapshot *s = &block->snapshot;
     trc_count_stats(scene, s);
@@ -291,6 +304,7 @@ static void finish_stats(const struct trc_scene_state *scene, struct trc_snapsho
             stats->skipped_instance_count);
     }
     warn_of_images(scene, block);
+    warn_of_dicing(scene, block);
 }
 
 static trc_status check_cancel(const struct trc_scene_state *scene) {

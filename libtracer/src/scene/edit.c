@@ -5,6 +5,7 @@
 #include "core/checks.h"
 #include "core/core.h"
 #include "scene/curves.h"
+#include "scene/dicing.h"
 #include "scene/displace.h"
 #include "scene/mesh.h"
 #include "scene/scene.h"
@@ -33,9 +34,19 @@ static trc_status add_geometry(struct trc_scene_state *scene, struct trc_mesh *g
 
 trc_status trc_scene_add_mesh(struct trc_scene_state *scene, const trc_mesh_desc *desc,
                               trc_id *id) {
+    struct trc_diced_mesh diced = {.desc = *desc};
+    if (desc->dicing)
+        TRC_TRY(trc_dice(desc, &diced));
     struct trc_mesh *geometry;
-    TRC_TRY(trc_geometry_create(desc, scene->names, &geometry));
-    return add_geometry(scene, geometry, id);
+    trc_status status = trc_geometry_create(&diced.desc, scene->names, &geometry);
+    const bool is_coarse = diced.is_coarse;
+    trc_diced_mesh_free(&diced);
+    TRC_TRY(status);
+    status = add_geometry(scene, geometry, id);
+    void *mesh;
+    if (status == TRC_OK && is_coarse && trc_store_find(&scene->meshes, *id, &mesh) == TRC_OK)
+        ((struct trc_scene_mesh *)mesh)->is_coarse = true;
+    return status;
 }
 
 trc_status trc_scene_add_curves(struct trc_scene_state *scene, const trc_curves_desc *desc,

@@ -46,7 +46,7 @@ bool trc_topology_copy(struct trc_mesh_topology *topology, const void *source, u
     return true;
 }
 
-static trc_status check_indices(const uint32_t *indices, uint64_t count, uint64_t vertex_count) {
+trc_status trc_check_indices(const uint32_t *indices, uint64_t count, uint64_t vertex_count) {
     for (uint64_t i = 0; i < count; i++) {
         if (indices[i] >= vertex_count) {
             return trc_fail(TRC_ERROR_INVALID_ARGUMENT,
@@ -92,7 +92,7 @@ static trc_status fill_topology(struct trc_mesh_topology *topology, const trc_me
     const bool smooth =
         topology->normal_kind != TRC_NORMALS_CORNER && !all_zero(desc->smooth, triangles);
     const bool slots = !all_zero(desc->material_index, triangles * sizeof(uint16_t));
-    TRC_TRY(check_indices(desc->indices, 3 * triangles, desc->vertex_count));
+    TRC_TRY(trc_check_indices(desc->indices, 3 * triangles, desc->vertex_count));
     if (!trc_topology_copy(topology, desc->indices, 3 * triangles, sizeof(uint32_t),
                            &topology->indices) ||
         !trc_topology_copy(topology, smooth ? desc->smooth : NULL, triangles, 1,

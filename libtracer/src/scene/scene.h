@@ -31,6 +31,7 @@ enum {
 
 struct trc_scene_mesh {
     struct trc_mesh *geometry;       /* held */
+    bool is_coarse;                  /* diced to fewer triangles than asked for */
     struct trc_displacer *displacer; /* of the geometry with displacement, or NULL */
     struct trc_mesh *shown;          /* what the snapshot under construction has of it */
     struct trc_mesh *committed;      /* and what the scene's snapshot has, or NULL */
