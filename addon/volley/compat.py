@@ -143,13 +143,17 @@ def cycles_curves(scene, name, default):
     return getattr(getattr(scene, "cycles_curves", None), name, default)
 
 
-def has_adaptive_subdivision(blender_object, scene):
+# From 5.0 on, Cycles subdivides the mesh below the modifier, which has the settings then.
+SUBDIVIDES_CAGE = "use_adaptive_subdivision" in bpy.types.SubsurfModifier.bl_rna.properties
+
+
+def has_adaptive_subdivision(blender_object, scene, is_final):
     """Whether Cycles would dice an object's subdivision surface by its size in pictures of the scene: a setting of
     its last modifier, or of Cycles' of the object where experimental features are on."""
     last = blender_object.modifiers[-1] if blender_object.modifiers else None
-    if last is None or last.type != 'SUBSURF' or not last.show_render:
+    if last is None or last.type != 'SUBSURF' or not (last.show_render if is_final else last.show_viewport):
         return False
-    if hasattr(last, "use_adaptive_subdivision"):
+    if SUBDIVIDES_CAGE:
         return last.use_adaptive_subdivision
     is_experimental = cycles(scene, "feature_set", 'SUPPORTED') == 'EXPERIMENTAL'
     return is_experimental and cycles(blender_object, "use_adaptive_subdivision", False)

@@ -289,11 +289,12 @@ class Scene:
     # Meshes
 
     def create_mesh(self, positions, indices, normals=None, normal_kind=NormalsLayout.NONE, smooth=None,
-                    material_index=None, attributes=(), generated=None):
+                    material_index=None, attributes=(), generated=None, dicing=None):
         """A mesh. positions (keys, vertices, 3) float32; indices (triangles, 3) uint32; normals
         (keys, vertices | triangles * 3, 3); smooth (triangles,) uint8; material_index (triangles,)
         uint16; attributes: (name, array (triangles * 3, 2 | 4) float32) pairs, default UV map first;
-        generated: (vertices, 3) or None."""
+        generated: (vertices, 3) or None; dicing: fields of abi.DicingDesc, and faces (triangles,) uint32, or
+        None."""
         positions, indices = _array(positions, np.float32), _array(indices, np.uint32)
         normals, smooth = _array(normals, np.float32), _array(smooth, np.uint8)
         material_index, generated = _array(material_index, np.uint16), _array(generated, np.float32)
@@ -311,6 +312,10 @@ class Scene:
             material_index=_address(material_index),
             attributes=structs if arrays else None, generated=_address(generated),
             generated_count=0 if generated is None else generated.size)
+        if dicing:
+            faces = _array(dicing["faces"], np.uint32)
+            dicing = describe(abi.DicingDesc, **{**dicing, "faces": _address(faces), "face_count": faces.size})
+            desc.dicing = ctypes.pointer(dicing)
         return self._create("trc_mesh_create", desc)
 
     def update_mesh(self, mesh, positions, normals=None):

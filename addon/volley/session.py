@@ -14,7 +14,7 @@ from .commit import Commit
 from .compat import motion_position
 from .farm import content, job, parts
 from .log import logger
-from .sync import Cancelled, SceneSync, Source, camera, culling, motion, world
+from .sync import Cancelled, SceneSync, Source, camera, culling, dicing, motion, world
 from .sync.changes import Changes
 
 POLL_SECONDS = 0.02
@@ -130,6 +130,8 @@ class Session:
                 engine.frame_set(*shutter.frame_at(motion.CENTER))
             cameras.look(motion.CENTER)
             source.culling = culling.of(scene, next(iter(cameras.keys.values())))
+            source.dicing = dicing.Dicing(scene, next(iter(cameras.keys.values())), frame, True,
+                                          self._sync.warnings)
             self._sync.update(source, shutter, cameras)
         finally:
             if moved:

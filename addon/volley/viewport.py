@@ -20,7 +20,7 @@ from gpu_extras.presets import draw_texture_2d
 from . import abi, native, passes, writes
 from .commit import Commit
 from .session import MEGA, render_fields, status_text, thread_count, timecode
-from .sync import SceneSync, Source, camera, culling, light, studio
+from .sync import SceneSync, Source, camera, culling, dicing, light, studio
 from .sync.changes import Changes
 
 MAX_HALF = 65504.0
@@ -105,7 +105,8 @@ class Viewport:
             try:
                 self._sync.update(Source(depsgraph, changes, v3d=context.space_data,
                                          needs_uv=_needs_uv(context.space_data),
-                                         culling=_culling_of(context, depsgraph, self._sync.warnings)))
+                                         culling=_culling_of(context, depsgraph, self._sync.warnings),
+                                         dicing=_dicing_of(context, depsgraph, self._sync.warnings)))
             except BaseException:
                 self._changes = Changes.everything()
                 raise
@@ -346,6 +347,12 @@ def _culling_of(context, depsgraph, warnings):
     if not culling.is_on(scene):
         return None
     return culling.of(scene, _View.of_context(context, depsgraph, warnings).keys)
+
+
+def _dicing_of(context, depsgraph, warnings):
+    """How fine a view has meshes diced; as culling, it follows edits, not the view alone."""
+    view = _View.of_context(context, depsgraph, warnings)
+    return dicing.Dicing(depsgraph.scene_eval, view.keys, camera.Frame(*view.size), False, warnings)
 
 
 def _crop_of(keys, v3d, render, size):

@@ -131,32 +131,6 @@ def inside_changes():
     return kept, fresh
 
 
-def inside_adaptive():
-    import bpy
-    import scenes
-    scenes.empty(size=(16, 16), samples=1)
-    scenes.camera()
-    made = scenes.wall()
-    modifier = made.modifiers.new("Subdivision", 'SUBSURF')
-    if hasattr(modifier, "use_adaptive_subdivision"):
-        modifier.use_adaptive_subdivision = True
-    else:
-        bpy.context.scene.cycles.feature_set = 'EXPERIMENTAL'
-        made.cycles.use_adaptive_subdivision = True
-    from volley import session
-    told, shown = [], bpy.context.scene
-    session.report_warning = lambda _engine, message: told[-1].append(message)
-    for is_other_shown in (False, True):
-        told.append([])
-        if is_other_shown:
-            bpy.context.window.scene = bpy.data.scenes.new("Other")
-        scenes.render(shown)
-    made.modifiers.clear()
-    told.append([])
-    scenes.render(shown)
-    return told
-
-
 # Comparison ----------------------------------------------------------------------------------------
 
 def test_bumps(blender):
@@ -189,10 +163,3 @@ def test_meshes(blender):
 def test_changes(blender):
     kept, fresh = blender.run(inside_changes)
     assert all(np.array_equal(a, b) for a, b in zip(kept, fresh))
-
-
-def test_adaptive_subdivision_is_known(blender):
-    """By the settings of the scene that is rendered, not of the one shown."""
-    alone, beside_other, without = blender.run(inside_adaptive)
-    assert alone == beside_other and without == []
-    assert "adaptive subdivision is not supported, its modifier's levels are used" in alone[0]

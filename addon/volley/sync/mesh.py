@@ -35,6 +35,7 @@ class MeshData:
     attributes: list = field(default_factory=list)  # (name, (triangles * 3, 2 | 4) float32)
     generated: np.ndarray = None      # (vertices, 3) float32
     corners: np.ndarray = None        # (triangles * 3,) integers: Blender's corners, for corner normals
+    dicing: dict = None               # fields of abi.DicingDesc, and "faces", (triangles,) uint32
     poses: object = None              # Topology where later shapes are awaited
 
     def topology(self):
@@ -47,7 +48,7 @@ class MeshData:
     def create(self, scene, positions, normals):
         """A mesh of the library's scene, of those keys; its id."""
         return scene.create_mesh(positions, self.indices, normals, self.normal_kind, self.smooth,
-                                 self.material_index, self.attributes, self.generated)
+                                 self.material_index, self.attributes, self.generated, self.dicing)
 
     @staticmethod
     def update(scene, mesh_id, positions, normals):
@@ -98,6 +99,22 @@ def extract(mesh, uv_names=(), color_names=(), material_count=1):
     data.attributes = _uv_maps(mesh, uv_names, loops) + _colors(mesh, data, color_names, loops)
     del data.attributes[abi.MAX_ATTRIBUTES:]
     return data
+
+
+def dice(data, mesh, fields, needs_generated):
+    """Have the library refine the MeshData of a mesh. Its normals are made anew, but for those that a linear
+    surface is shaded with."""
+    loops = LazyLoops(mesh, len(data.indices))
+    smooth = _read(mesh.polygons, "use_smooth", (len(mesh.polygons),), np.bool_)
+    data.smooth = smooth.view(np.uint8)[loops.polygons] if smooth.any() else None
+    data.normals, data.normal_kind, data.corners = None, abi.NormalsLayout.NONE, None
+    if data.smooth is not None and fields["surface"] == abi.DicingSurface.LINEAR:
+        data.normals, data.normal_kind = np.array(vertex_normals(mesh)), abi.NormalsLayout.VERTEX
+    if needs_generated and data.generated is None:  # the box is that of the mesh before
+        lower, upper = data.positions.min(axis=0), data.positions.max(axis=0)
+        size = np.where(upper > lower, upper - lower, np.float32(2.0))
+        data.generated = (data.positions - 0.5 * (lower + upper)) / size + np.float32(0.5)
+    data.dicing = {**fields, "faces": loops.polygons}
 
 
 def read_positions(mesh):

@@ -15,7 +15,7 @@ class Source:
     """Where a sync reads from. engine: moves the scene in time for motion blur, else None; v3d: the
     viewport whose visibility counts, None for a render; aovs: {name: (type, number)} and light_groups:
     {name: number} of those that are rendered; is_cancelled: asked now and then; culling: culling.Culling or
-    None."""
+    None; dicing: dicing.Dicing or None."""
 
     depsgraph: object
     changes: Changes
@@ -26,3 +26,4 @@ class Source:
     light_groups: dict = field(default_factory=dict)
     is_cancelled: object = staticmethod(lambda: False)
     culling: object = None
+    dicing: object = None

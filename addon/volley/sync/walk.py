@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import bpy
 
 from ..abi import InstanceFlags
-from ..compat import has_adaptive_subdivision
 from . import curves, deform, instance, light, mesh, motion, strands, visibility
 from .linking import Links
 from .matrix import rows
@@ -248,16 +247,16 @@ class Walk:
         if mesh.is_sculpted_multires(blender_object):
             self._sync.warnings.add(f"Object '{blender_object.name}': while it is sculpted, the mesh below its "
                                     "multiresolution is shown")
-        if has_adaptive_subdivision(blender_object, self._source.depsgraph.scene_eval):
-            self._sync.warnings.add(f"Object '{blender_object.name}': adaptive subdivision is not "
-                                    "supported, its modifier's levels are used")
         slot_count = max(len(blender_object.material_slots), len(shape.materials))
         data = mesh.extract(shape, *names[:2], slot_count)
         if data is None:
             return None, None
         if names[2]:
             data.generated = mesh.generated_coordinates(blender_object, shape, data.positions)
-        if self._sync._meshes.will_resync and deform.is_posable(blender_object):
+        fields = self._source.dicing and self._source.dicing.fields_of(each)
+        if fields:
+            mesh.dice(data, shape, fields, names[2])
+        elif self._sync._meshes.will_resync and deform.is_posable(blender_object):
             data.poses = mesh.Topology(shape)
         if item.motion_keys > 1 and motion.may_deform(blender_object, instance.maker_of(each)):
             return data, deform.MeshMotion(shape, data, item.motion_keys)

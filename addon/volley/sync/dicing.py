@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Adaptive subdivision: how finely the meshes of objects that ask for it are diced, by Cycles' settings."""
+
+import math
+
+import numpy as np
+
+from .. import abi
+from ..compat import SUBDIVIDES_CAGE, cycles, has_adaptive_subdivision
+from . import camera
+
+_ALL_AROUND = 2.0 * math.pi  # radians that a panorama's full width is taken for
+
+
+class Dicing:
+    """What a camera and a scene ask for; no reference to Blender is kept but the evaluated scene."""
+
+    def __init__(self, scene, keys, frame, is_final, warnings):
+        self._scene, self._is_final, self._warnings = scene, is_final, warnings
+        self._rate = cycles(scene, "dicing_rate", 1.0) if is_final else cycles(scene, "preview_dicing_rate", 8.0)
+        chosen = cycles(scene, "dicing_camera", None)
+        if chosen is not None and chosen.type == 'CAMERA':
+            lens = camera.lens_of(chosen, warnings)
+            self._lens, self._window = lens, camera.window(lens, frame)
+            matrix = np.array(chosen.matrix_world, np.float64)[:3]
+        else:
+            middle = len(keys.transforms) // 2
+            self._lens, self._window = keys.lens, keys.windows[len(keys.windows) // 2]
+            matrix = np.asarray(keys.transforms[middle], np.float64).reshape(3, 4)
+        to_world = np.eye(4)
+        to_world[:3] = matrix
+        to_world[:3, :3] /= np.linalg.norm(to_world[:3, :3], axis=0)
+        self._to_camera = np.linalg.inv(to_world)
+        self._pixel = (self._window[1] - self._window[0]) / frame.width
+        if self._lens.panorama:
+            self._pixel, self._window = _ALL_AROUND * self._pixel, (0.0,) * 4
+
+    def fields_of(self, each):
+        """abi.DicingDesc's fields for the mesh of an instance, None where it is not subdivided adaptively."""
+        blender_object = each.object
+        if not has_adaptive_subdivision(blender_object, self._scene, self._is_final):
+            return None
+        modifier = blender_object.modifiers[-1]
+        fields = {"surface": self._surface_of(modifier),
+                  "max_subdivisions": cycles(self._scene, "max_subdivisions", 12)}
+        if fields["surface"] != abi.DicingSurface.LINEAR and _has_creases(blender_object.data):
+            self._warnings.add(f"Object '{blender_object.name}': adaptive subdivision knows no creases")
+        if self._is_final and fields["surface"] == abi.DicingSurface.CURVED and self._levels_of(modifier) == 1:
+            self._warnings.add(f"Object '{blender_object.name}': adaptive subdivision starts from the modifier's "
+                               "level 1, which is too coarse for Cycles' surface; 0, 2 and more are not")
+        if SUBDIVIDES_CAGE:
+            fields["sharp_corners"] = modifier.boundary_smooth != 'ALL'
+            if modifier.adaptive_space == 'OBJECT':
+                return {**fields, "space": abi.DicingSpace.OBJECT,
+                        "side": self._rate * modifier.adaptive_object_edge_length}
+            scale = modifier.adaptive_pixel_size
+        else:
+            scale = cycles(blender_object, "dicing_rate", 1.0)
+        space = abi.DicingSpace.PARALLEL if self._lens.is_ortho else abi.DicingSpace.CENTRAL
+        to_camera = (self._to_camera @ np.array(each.matrix_world))[:3]
+        return {**fields, "space": space, "side": self._rate * scale * self._pixel,
+                "object_to_camera": tuple(to_camera.ravel()), "window": tuple(self._window),
+                "offscreen_scale": cycles(self._scene, "offscreen_dicing_scale", 4.0)}
+
+    def _surface_of(self, modifier):
+        """Cycles subdivides what the modifier made once more, from 5.0 on what it began with: the limit of that
+        is what its vertices lie on already."""
+        if modifier.subdivision_type == 'SIMPLE':
+            return abi.DicingSurface.LINEAR
+        if SUBDIVIDES_CAGE and self._levels_of(modifier) > 0:
+            return abi.DicingSurface.CURVED
+        return abi.DicingSurface.CATMULL_CLARK
+
+    def _levels_of(self, modifier):
+        render = self._scene.render
+        levels = modifier.render_levels if self._is_final else modifier.levels
+        if not render.use_simplify:
+            return levels
+        most = render.simplify_subdivision_render if self._is_final else render.simplify_subdivision
+        return min(levels, most)
+
+
+def _has_creases(mesh):
+    attributes = mesh.attributes
+    return "crease_edge" in attributes or "crease_vert" in attributes or getattr(mesh, "has_crease_edge", False)
