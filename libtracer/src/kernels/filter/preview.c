@@ -143,6 +143,11 @@ static void prepare_light(const struct planes *p, float exposure) {
 /* Pixels without halves have the variance of what is around them. */
 static void prepare_variance(const struct planes *p) {
     FOR_PIXELS(TRC_PREVIEW_HALO - 1, at) {
+        const vmask without = without_halves(p, at);
+        if (!vm_any(without)) {
+            vf_store(p->variance[0] + at, vf_load(p->first_variance + at));
+            continue;
+        }
         const vfloat mean = box(p->light_mean, at);
         vfloat square = vf_set(0.0f);
         for (int j = -1; j <= 1; j++)
@@ -150,8 +155,8 @@ static void prepare_variance(const struct planes *p) {
                 const vfloat apart = vf_load(p->light_mean + at + j * STRIDE + i) - mean;
                 square = square + apart * apart;
             }
-        const vfloat variance = vf_select(without_halves(p, at), square * vf_set(1.0f / 8.0f),
-                                          vf_load(p->first_variance + at));
+        const vfloat variance =
+            vf_select(without, square * vf_set(1.0f / 8.0f), vf_load(p->first_variance + at));
         vf_store(p->variance[0] + at, variance);
         vf_store(p->first_variance + at, variance);
     }
@@ -212,7 +217,19 @@ static vfloat rest_of(const struct planes *p, int level, int at) {
                     0.0f, 1.0f);
 }
 
+/* Where a wavelet is gone. */
+static void keep_pixels(const struct planes *p, int level, int at) {
+    for (int c = 0; c < 4; c++)
+        vf_store(p->light[~level & 1][c] + at, vf_load(p->light[level & 1][c] + at));
+    vf_store(p->variance[~level & 1] + at, vf_load(p->variance[level & 1] + at));
+}
+
 static void filter_pixels(const struct planes *p, int level, int at) {
+    const vfloat rest = rest_of(p, level, at);
+    if (!vm_any(vf_gt(rest, vf_set(0.0f)))) {
+        keep_pixels(p, level, at);
+        return;
+    }
     float *const *in = p->light[level & 1], *const *out = p->light[~level & 1];
     const float *variance = p->variance[level & 1];
     const struct center center = center_at(p, at);
@@ -237,7 +254,7 @@ static void filter_pixels(const struct planes *p, int level, int at) {
             total = total + weight;
             noise = noise + weight * weight * vf_load(variance + q);
         }
-    const vfloat inverse = vf_set(1.0f) / total, rest = rest_of(p, level, at);
+    const vfloat inverse = vf_set(1.0f) / total;
     for (int c = 0; c < 4; c++) {
         const vfloat former = vf_load(in[c] + at);
         vf_store(out[c] + at, former + rest * (sums[c] * inverse - former));
@@ -272,12 +289,19 @@ static void filter_level(const struct planes *p, int level) {
 
 /* ---- how much of it is kept ---- */
 
-/* Sums of 5 x 5 estimates. */
-static vfloat around(const float *estimate, int at) {
-    vfloat sum = vf_set(0.0f);
-    for (int j = -2; j <= 2; j++)
-        for (int i = -2; i <= 2; i++)
-            sum = sum + vf_load(estimate + at + j * STRIDE + i);
+/* Sums of five estimates above each other, and of five such sums side by side. */
+static void sum_columns(const float *estimate, float *columns) {
+    FOR_PIXELS(2, at) {
+        vfloat sum = vf_load(estimate + at);
+        for (int j = 1; j <= 2; j++)
+            sum = sum + vf_load(estimate + at + j * STRIDE) + vf_load(estimate + at - j * STRIDE);
+        vf_store(columns + at, sum);
+    }
+}
+static vfloat around(const float *columns, int at) {
+    vfloat sum = vf_load(columns + at);
+    for (int i = 1; i <= 2; i++)
+        sum = sum + vf_load(columns + at + i) + vf_load(columns + at - i);
     return sum;
 }
 
@@ -311,9 +335,11 @@ static void estimate(const struct planes *p) {
 static void blend(const struct planes *p) {
     float *const *light = p->light[LEVELS & 1];
     estimate(p);
+    sum_columns(p->smooth, p->variance[0]);
+    sum_columns(p->estimate, p->variance[1]);
     FOR_PIXELS(0, at) {
-        const vfloat variance = around(p->smooth, at);
-        const vfloat error = vf_max(around(p->estimate, at), vf_set(0.0f));
+        const vfloat variance = around(p->variance[0], at);
+        const vfloat error = vf_max(around(p->variance[1], at), vf_set(0.0f));
         const vfloat kept = vf_set(FAVOR) * variance / (variance + error + vf_set(1e-12f));
         const vfloat part =
             vf_select(without_halves(p, at), vf_set(1.0f), vf_min(kept, vf_set(1.0f)));
