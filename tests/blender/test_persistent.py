@@ -90,3 +90,31 @@ def test_nothing_is_read_again_where_nothing_changed(blender):
     found, difference = blender.run(inside_unchanged)
     assert found["stale"] == [] and found["kept"] == found["read"] > 3
     assert difference == 0.0
+
+
+def inside_collections():
+    """Whether Python collects within a sync and after it, where it did before and where it did not."""
+    import gc
+    import scenes
+    from volley.sync import walk
+    _scene()
+    run, seen = walk.Walk.run, []
+
+    def watched(self):
+        seen.append(gc.isenabled())
+        run(self)
+
+    walk.Walk.run = watched
+    try:
+        for collects in (True, False):
+            (gc.enable if collects else gc.disable)()
+            scenes.render()
+            seen.append(gc.isenabled())
+    finally:
+        gc.enable()
+        walk.Walk.run = run
+    return seen
+
+
+def test_python_does_not_collect_within_a_sync(blender):
+    assert blender.run(inside_collections) == [False, True, False, False]

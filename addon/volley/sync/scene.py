@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One scene of the library, kept like Blender's evaluated scene: marking first, copying after."""
 
+import contextlib
+import gc
+
 import bpy
 
 from .. import native
@@ -11,6 +14,19 @@ from .image import Images
 from .material import Materials
 from .shown import Shown
 from .walk import Walk, dress, materials_of
+
+
+@contextlib.contextmanager
+def _uncollected():
+    """Without Python's look for cycles, of which a sync makes none: the many objects that it makes would have
+    all of Blender's looked through."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
 
 
 class SceneSync:
@@ -33,6 +49,7 @@ class SceneSync:
         """Free the library's scene."""
         self.scene.destroy()
 
+    @_uncollected()
     def update(self, source, shutter=None, camera_keys=None):
         """Bring everything but the camera up to date. With a shutter, Blender is moved through it;
         camera_keys(fraction) is called at each time to look at the camera too. The caller restores
