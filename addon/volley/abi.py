@@ -17,6 +17,7 @@ MAX_INSTANCE_VALUES = 256
 MAX_SHADOW_CLASSES = 15
 MAX_NODES = 4096
 MAX_NODE_INPUTS = 32
+RAYS_REORDER = 1
 NO_HIT = 4294967295
 MAX_AOVS = 16
 CRYPTOMATTE_KINDS = 3
@@ -27,7 +28,7 @@ SUMS_END = 194
 VERSION_MAJOR = 0
 VERSION_MINOR = 1
 VERSION_PATCH = 0
-ABI_VERSION = 4
+ABI_VERSION = 5
 
 
 class StatusCode(IntEnum):
@@ -841,7 +842,8 @@ class Rays(Structure):
     _fields_ = (("struct_size", c_uint32), ("visibility", c_uint32), ("count", c_uint64),
                 ("origin_x", c_void_p), ("origin_y", c_void_p), ("origin_z", c_void_p),
                 ("direction_x", c_void_p), ("direction_y", c_void_p), ("direction_z", c_void_p),
-                ("tmin", c_void_p), ("tmax", c_void_p), ("time", c_void_p))
+                ("tmin", c_void_p), ("tmax", c_void_p), ("time", c_void_p), ("flags", c_uint32),
+                ("reserved", c_uint32))
 
 
 class Hits(Structure):
@@ -922,8 +924,9 @@ class SceneStats(Structure):
 CONSTANTS = {"TRC_MAX_LIGHT_GROUPS": MAX_LIGHT_GROUPS, "TRC_MAX_CURVE_PIECES": MAX_CURVE_PIECES,
              "TRC_MAX_KEYS": MAX_KEYS, "TRC_MAX_ATTRIBUTES": MAX_ATTRIBUTES,
              "TRC_MAX_INSTANCE_VALUES": MAX_INSTANCE_VALUES, "TRC_MAX_SHADOW_CLASSES": MAX_SHADOW_CLASSES,
-             "TRC_MAX_NODES": MAX_NODES, "TRC_MAX_NODE_INPUTS": MAX_NODE_INPUTS, "TRC_NO_HIT": NO_HIT,
-             "TRC_MAX_AOVS": MAX_AOVS, "TRC_CRYPTOMATTE_KINDS": CRYPTOMATTE_KINDS,
+             "TRC_MAX_NODES": MAX_NODES, "TRC_MAX_NODE_INPUTS": MAX_NODE_INPUTS,
+             "TRC_RAYS_REORDER": RAYS_REORDER, "TRC_NO_HIT": NO_HIT, "TRC_MAX_AOVS": MAX_AOVS,
+             "TRC_CRYPTOMATTE_KINDS": CRYPTOMATTE_KINDS,
              "TRC_CRYPTOMATTE_LAYER_RANKS": CRYPTOMATTE_LAYER_RANKS,
              "TRC_MAX_CRYPTOMATTE_LAYERS": MAX_CRYPTOMATTE_LAYERS,
              "TRC_MAX_CRYPTOMATTE_DEPTH": MAX_CRYPTOMATTE_DEPTH, "TRC_SUMS_END": SUMS_END,

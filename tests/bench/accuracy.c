@@ -152,7 +152,8 @@ static void ways_run(struct ways *w, const struct mesh *mesh, const struct ray_l
     for (uint32_t i = 0; i < 2; i++) {
         const trc_hits out = hit_set_view(hits);
         const uint64_t fp_state = trc_fp_enter();
-        w->kernels->query_closest(w->snapshot, &rays, &out, 0, rays.count, i ? 1 : TRC_PACKET_SIZE);
+        w->kernels->query_closest(w->snapshot, &rays, &out, 0, rays.count, i ? 1 : TRC_PACKET_SIZE,
+                                  NULL);
         trc_fp_leave(fp_state);
         accuracy_add(&w->accuracy[i], mesh, &list->rays, hits);
     }

@@ -196,6 +196,11 @@ static void query_all_ways(const char *name, trc_scene scene, const struct ray_s
         (void)snprintf(what, sizeof what, "packets of 64 and of %u", sizes[i]);
         assert_ok(hit_set_query(&other, scene, rays, sizes[i]));
         expect_same(name, what, hits, &other, rays);
+        struct ray_set reordered = *rays;
+        reordered.flags = TRC_RAYS_REORDER;
+        (void)snprintf(what, sizeof what, "packets of 64 and reordered ones of %u", sizes[i]);
+        assert_ok(hit_set_query(&other, scene, &reordered, sizes[i]));
+        expect_same(name, what, hits, &other, rays);
     }
     assert_ok(trc_set_isa(TRC_ISA_SCALAR));
     assert_ok(hit_set_query(&other, scene, rays, 64));

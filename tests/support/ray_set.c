@@ -79,7 +79,8 @@ trc_rays ray_set_view(const struct ray_set *rays, uint32_t first, uint32_t count
                       .direction_z = rays->direction[2] + first,
                       .tmin = rays->tmin + first,
                       .tmax = rays->tmax + first,
-                      .time = rays->time + first};
+                      .time = rays->time + first,
+                      .flags = rays->flags};
 }
 
 void hit_set_init(struct hit_set *hits, uint32_t count) {

@@ -11,6 +11,7 @@
 struct ray_set {
     uint32_t count, capacity;
     uint32_t visibility; /* TRC_VISIBLE_* */
+    uint32_t flags;      /* TRC_RAYS_* */
     float *origin[3], *direction[3], *tmin, *tmax, *time;
 };
 

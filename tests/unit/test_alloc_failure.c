@@ -199,16 +199,19 @@ static void check_queries(struct session *s) {
     static const float zero[5], up[5] = {5, 5, 5, 5, 5}, down[5] = {-1, -1, -1, -1, -1};
     uint32_t instance[5];
     uint8_t occluded[5];
-    const trc_rays rays = {.struct_size = sizeof rays,
-                           .visibility = TRC_VISIBLE_ALL,
-                           .count = 5,
-                           .origin_x = zero,
-                           .origin_y = zero,
-                           .origin_z = up,
-                           .direction_x = zero,
-                           .direction_y = zero,
-                           .direction_z = down};
+    trc_rays rays = {.struct_size = sizeof rays,
+                     .visibility = TRC_VISIBLE_ALL,
+                     .count = 5,
+                     .origin_x = zero,
+                     .origin_y = zero,
+                     .origin_z = up,
+                     .direction_x = zero,
+                     .direction_y = zero,
+                     .direction_z = down};
     const trc_hits hits = {.struct_size = sizeof hits, .instance = instance};
+    STEP(trc_query_closest(s->scene, &rays, 0, &hits));
+    STEP(trc_query_occluded(s->scene, &rays, 0, occluded, 5));
+    rays.flags = TRC_RAYS_REORDER;
     STEP(trc_query_closest(s->scene, &rays, 0, &hits));
     STEP(trc_query_occluded(s->scene, &rays, 0, occluded, 5));
 }

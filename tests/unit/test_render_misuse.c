@@ -130,6 +130,8 @@ static void queries(void **state) {
     REFUSED(ARGUMENT, trc_query_occluded(scene, NULL, 0, occluded, 70));
     REFUSE_RAYS(SIZE, rays.struct_size--);
     REFUSE_RAYS(ARGUMENT, rays.visibility = 32);
+    REFUSE_RAYS(ARGUMENT, rays.flags = 2);
+    REFUSE_RAYS(ARGUMENT, rays.reserved = 1);
     REFUSE_RAYS(LARGE, rays.count = UINT64_MAX);
     REFUSE_RAYS(LARGE, rays.count = UINT64_C(1) << 62);
     REFUSE_RAYS(ARGUMENT, rays.origin_x = NULL);

@@ -6,6 +6,12 @@
 
 TRC_BEGIN_DECLS
 
+/* Rays that have no order in the arrays are taken as if they were sorted by where they start and
+ * where they go, which makes packets of them: every 65,536 of a call are sorted for themselves, at
+ * 20 bytes each while the call lasts. Hits are the same. Those that are neighbours in
+ * space already lose a tenth. */
+#define TRC_RAYS_REORDER 1u
+
 /* Arrays of count floats each; tmin, tmax and time may be NULL (0, infinity, 0). Directions need
  * not be unit; distances are in units of their length. A ray with a NaN, an infinite origin or
  * direction, a zero direction, or tmin > tmax hits nothing. */
@@ -17,6 +23,8 @@ typedef struct trc_rays {
     const float *direction_x, *direction_y, *direction_z; /* world, of any length */
     const float *tmin, *tmax; /* the part of each ray that counts, in lengths of its direction */
     const float *time;        /* over the shutter, [0, 1] */
+    uint32_t flags;           /* TRC_RAYS_REORDER or 0 */
+    uint32_t reserved;        /* 0 */
 } trc_rays;
 
 /* No rays, which meet what any ray does. */
@@ -48,7 +56,8 @@ TRC_API trc_hits trc_hits_default(void);
  * of so many neighbours as they are, 256 as a bundle of 64 each; 1: single rays, for those that
  * have nothing in common (4 and 16 are taken so, too). The result does not depend on it. Cost: rays
  * of one call go best by the thousand. NOT_COMMITTED before the first commit; INVALID_ARGUMENT for
- * a required array that is NULL or a misaligned one. */
+ * a required array that is NULL or a misaligned one. OUT_OF_MEMORY: only of rays that are to be
+ * reordered. */
 TRC_API trc_status trc_query_closest(trc_scene scene, const trc_rays *rays, uint32_t packet_size,
                                      const trc_hits *hits_out);
 

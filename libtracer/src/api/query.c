@@ -1,4 +1,5 @@
 /* Public ray queries: on the calling thread, with the kernels in force. */
+#include "api/ray_order.h"
 #include "core/checks.h"
 #include "core/core.h"
 #include "core/fpstate.h"
@@ -21,6 +22,8 @@ static trc_status check_column(const void *column, uint64_t count, bool required
 static trc_status check_rays(const trc_rays *rays) {
     TRC_TRY(trc_check_struct(rays, sizeof *rays, "trc_rays"));
     TRC_TRY(trc_check_enum(rays->visibility, TRC_VISIBLE_ALL + 1, "visibility"));
+    TRC_TRY(trc_check_enum(rays->flags, TRC_RAYS_REORDER + 1, "flags"));
+    TRC_TRY(trc_check_enum(rays->reserved, 1, "reserved"));
     const struct {
         const float *column;
         bool required;
@@ -96,6 +99,33 @@ static uint64_t chunk_end(uint64_t begin, uint64_t count) {
     return count - begin > CHUNK ? begin + CHUNK : count;
 }
 
+/* A query's rays, chunk by chunk. */
+struct chunks {
+    const trc_rays *rays;
+    uint64_t begin, end;
+    bool is_reordered;
+    struct trc_ray_order order;
+};
+
+/* Closed by trc_ray_order_close, whatever is returned. */
+static trc_status chunks_open(const trc_rays *rays, struct chunks *c) {
+    *c = (struct chunks){.rays = rays, .is_reordered = rays->flags & TRC_RAYS_REORDER};
+    if (!c->is_reordered || rays->count == 0)
+        return TRC_OK;
+    return trc_ray_order_open((uint32_t)chunk_end(0, rays->count), &c->order);
+}
+
+/* Goes on to the next one; false at the end. */
+static bool chunks_next(struct chunks *c) {
+    c->begin = c->end;
+    c->end = chunk_end(c->begin, c->rays->count);
+    if (c->begin == c->end)
+        return false;
+    if (c->is_reordered)
+        trc_ray_order_sort(&c->order, c->rays, c->begin, (uint32_t)(c->end - c->begin));
+    return true;
+}
+
 static trc_status check_closest(const trc_rays *rays, uint32_t packet_size, const trc_hits *hits,
                                 uint32_t *size_out) {
     TRC_TRY(check_rays(rays));
@@ -108,15 +138,19 @@ trc_status trc_query_closest(trc_scene scene, const trc_rays *rays, uint32_t pac
     struct trc_snapshot *snapshot = NULL;
     TRC_TRY(take_snapshot(scene, &snapshot));
     uint32_t size = 0;
-    const trc_status status = check_closest(rays, packet_size, hits_out, &size);
+    struct chunks chunks = {0};
+    trc_status status = check_closest(rays, packet_size, hits_out, &size);
+    if (status == TRC_OK)
+        status = chunks_open(rays, &chunks);
     if (status == TRC_OK) {
         const uint64_t fp_state = trc_fp_enter();
         const struct trc_kernels *kernels = trc_kernels_current();
-        for (uint64_t i = 0; i < rays->count; i = chunk_end(i, rays->count)) {
-            kernels->query_closest(snapshot, rays, hits_out, i, chunk_end(i, rays->count), size);
-        }
+        while (chunks_next(&chunks))
+            kernels->query_closest(snapshot, rays, hits_out, chunks.begin, chunks.end, size,
+                                   chunks.order.order);
         trc_fp_leave(fp_state);
     }
+    trc_ray_order_close(&chunks.order);
     trc_snapshot_release(snapshot);
     return status;
 }
@@ -134,17 +168,19 @@ trc_status trc_query_occluded(trc_scene scene, const trc_rays *rays, uint32_t pa
     struct trc_snapshot *snapshot = NULL;
     TRC_TRY(take_snapshot(scene, &snapshot));
     uint32_t size = 0;
-    const trc_status status =
-        check_occluded(rays, packet_size, occluded_out, occluded_count, &size);
+    struct chunks chunks = {0};
+    trc_status status = check_occluded(rays, packet_size, occluded_out, occluded_count, &size);
+    if (status == TRC_OK)
+        status = chunks_open(rays, &chunks);
     if (status == TRC_OK) {
         const uint64_t fp_state = trc_fp_enter();
         const struct trc_kernels *kernels = trc_kernels_current();
-        for (uint64_t i = 0; i < rays->count; i = chunk_end(i, rays->count)) {
-            kernels->query_occluded(snapshot, rays, occluded_out, i, chunk_end(i, rays->count),
-                                    size);
-        }
+        while (chunks_next(&chunks))
+            kernels->query_occluded(snapshot, rays, occluded_out, chunks.begin, chunks.end, size,
+                                    chunks.order.order);
         trc_fp_leave(fp_state);
     }
+    trc_ray_order_close(&chunks.order);
     trc_snapshot_release(snapshot);
     return status;
 }

@@ -66,11 +66,14 @@ struct trc_kernels {
      * filled in; 64-byte aligned. exposure: a factor of the colour. Never fails. */
     void (*preview_filter)(float *memory, float exposure);
     /* trc_query_*: arguments already validated; chunk [begin, end) of the arrays. packet_size
-     * resolved. */
+     * resolved. order: of the chunk's rays, less begin, with api/ray_order.h's room behind, or
+     * NULL. */
     void (*query_closest)(const struct trc_snapshot *snapshot, const trc_rays *rays,
-                          const trc_hits *hits, uint64_t begin, uint64_t end, uint32_t packet_size);
+                          const trc_hits *hits, uint64_t begin, uint64_t end, uint32_t packet_size,
+                          const uint32_t *order);
     void (*query_occluded)(const struct trc_snapshot *snapshot, const trc_rays *rays,
-                           uint8_t *occluded, uint64_t begin, uint64_t end, uint32_t packet_size);
+                           uint8_t *occluded, uint64_t begin, uint64_t end, uint32_t packet_size,
+                           const uint32_t *order);
     /* Radiance of a world material for count directions (3 floats each) into 3 floats each: fills
      * importance maps at commit. */
     void (*world_evaluate)(const struct trc_snapshot *snapshot, const float *directions,

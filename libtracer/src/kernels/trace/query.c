@@ -337,16 +337,20 @@ static struct manner manner_of(uint32_t packet_size, uint32_t stream_size) {
 struct rays_walk {
     const trc_rays *rays;
     struct manner manner;
-    uint64_t next, end;   /* rays that no part has yet */
-    struct rays_part all; /* the part under way, and how many of it are done */
+    const uint32_t *given; /* the order of all, or NULL */
+    uint64_t next, end;    /* rays that no part has yet */
+    struct rays_part all;  /* the part under way, and how many of it are done */
     uint32_t done;
     uint32_t order[ORDERED_RAYS + TRC_WIDTH];
 };
 
 static void rays_walk_begin(struct rays_walk *w, const trc_rays *rays, uint64_t begin, uint64_t end,
-                            struct manner manner) {
+                            struct manner manner, const uint32_t *given) {
     w->rays = rays;
     w->manner = manner;
+    w->given = given;
+    if (given)
+        w->manner.part_size = (uint32_t)(end - begin);
     w->next = begin;
     w->end = end;
     w->all.count = w->done = 0;
@@ -361,10 +365,11 @@ static bool rays_walk_load(struct rays_walk *w, struct load *l, struct rays_part
     if (w->done == w->all.count) {
         if (w->next == w->end)
             return false;
-        w->all = (struct rays_part){w->next, at_most(w->end - w->next, w->manner.part_size), NULL};
+        w->all =
+            (struct rays_part){w->next, at_most(w->end - w->next, w->manner.part_size), w->given};
         w->next += w->all.count;
         w->done = 0;
-        if (w->manner.ordered)
+        if (w->manner.ordered && !w->given)
             rays_order(w->rays, &w->all, w->order);
     }
     const uint32_t *order = w->all.order;
@@ -378,11 +383,11 @@ static bool rays_walk_load(struct rays_walk *w, struct load *l, struct rays_part
 
 void trc_query_closest_rays(const struct trc_snapshot *snapshot, const trc_rays *rays,
                             const trc_hits *hits, uint64_t begin, uint64_t end,
-                            uint32_t packet_size) {
+                            uint32_t packet_size, const uint32_t *order) {
     struct rays_walk walk;
     struct rays_part part;
     struct load l;
-    rays_walk_begin(&walk, rays, begin, end, manner_of(packet_size, TRC_STREAM_CLOSEST));
+    rays_walk_begin(&walk, rays, begin, end, manner_of(packet_size, TRC_STREAM_CLOSEST), order);
     while (rays_walk_load(&walk, &l, &part)) {
         hits_clear(&l);
         trc_trace_closest(snapshot, l.packets, l.hits, l.packet_count);
@@ -413,13 +418,13 @@ static void occluded_store(uint8_t *occluded, const struct rays_part *part,
 }
 
 void trc_query_occluded_rays(const struct trc_snapshot *snapshot, const trc_rays *rays,
-                             uint8_t *occluded, uint64_t begin, uint64_t end,
-                             uint32_t packet_size) {
+                             uint8_t *occluded, uint64_t begin, uint64_t end, uint32_t packet_size,
+                             const uint32_t *order) {
     struct rays_walk walk;
     struct rays_part part;
     struct load l;
     uint64_t blocked[TRC_BUNDLE];
-    rays_walk_begin(&walk, rays, begin, end, manner_of(packet_size, TRC_STREAM_ANY));
+    rays_walk_begin(&walk, rays, begin, end, manner_of(packet_size, TRC_STREAM_ANY), order);
     while (rays_walk_load(&walk, &l, &part)) {
         trc_trace_occluded(snapshot, l.packets, l.packet_count, blocked);
         occluded_store(occluded, &part, blocked);
