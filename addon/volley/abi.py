@@ -200,6 +200,7 @@ class NodeType(IntEnum):
     AMBIENT_OCCLUSION = 124
     BEVEL = 125
     RAYCAST = 126
+    RAYCAST_ATTRIBUTE = 129
     POINT_INFO = 127
     TANGENT = 114
     AOV_VALUE = 112
@@ -1301,6 +1302,9 @@ NODES = {
         (("POSITION", "position"), ("NORMAL", "direction"), ("FLOAT", "distance")),
         (("FLOAT", "is_hit"), ("FLOAT", "self_hit"), ("FLOAT", "hit_distance"), ("VECTOR", "hit_position"),
          ("VECTOR", "hit_normal"))),
+    NodeType.RAYCAST_ATTRIBUTE: ("Raycast Attribute",
+        (("POSITION", "position"), ("NORMAL", "direction"), ("FLOAT", "distance")),
+        (("COLOR", "color"), ("FLOAT", "alpha"))),
     NodeType.POINT_INFO: ("Point Info",
         (),
         (("VECTOR", "position"), ("FLOAT", "radius"), ("FLOAT", "random"))),

@@ -149,6 +149,7 @@ static void test_counts_of_modes(void **state) {
         {TRC_NODE_AMBIENT_OCCLUSION, 255 * 2 * 2 * 2}, /* samples, bits */
         {TRC_NODE_BEVEL, 255},
         {TRC_NODE_RAYCAST, 2},
+        {TRC_NODE_RAYCAST_ATTRIBUTE, 2},
         {TRC_NODE_POINT_INFO, 1},
         {TRC_NODE_DISPLACEMENT, 2},
         {TRC_NODE_VECTOR_DISPLACEMENT, 3},
@@ -187,6 +188,7 @@ static void test_numbers(void **state) {
     assert_int_equal(TRC_NODE_AMBIENT_OCCLUSION, 124);
     assert_int_equal(TRC_NODE_RAYCAST, 126);
     assert_int_equal(TRC_NODE_RADIAL_TILING, 128);
+    assert_int_equal(TRC_NODE_RAYCAST_ATTRIBUTE, 129);
 }
 
 /* Outputs of operations that stand for outputs of nodes stand alike. */

@@ -18,15 +18,16 @@ static trc_node_input constant(float x, float y, float z) {
 static trc_node_input unlinked(void) { return (trc_node_input){.node = TRC_INPUT_DEFAULT}; }
 
 /* What a node gives, as emission; factor: of it. */
-static trc_id shown(trc_scene scene, uint32_t type, uint32_t mode, const trc_node_input in[3],
-                    uint32_t input_count, uint32_t output, float factor) {
+static trc_id shown_named(trc_scene scene, uint32_t type, uint32_t mode, const char *name,
+                          const trc_node_input in[3], uint32_t input_count, uint32_t output,
+                          float factor) {
     trc_node_input inputs[5];
     for (uint32_t i = 0; i < input_count; i++)
         inputs[i] = in[i];
     inputs[input_count] = (trc_node_input){.node = 0, .output = output};
     inputs[input_count + 1] = constant(factor, 0.0f, 0.0f);
     const trc_node nodes[2] = {
-        {.type = type, .mode = mode, .input_count = input_count},
+        {.type = type, .mode = mode, .name = name, .input_count = input_count},
         {.type = TRC_NODE_EMISSION, .first_input = input_count, .input_count = 2}};
     const trc_material_desc desc = {.struct_size = sizeof desc,
                                     .node_count = 2,
@@ -37,6 +38,11 @@ static trc_id shown(trc_scene scene, uint32_t type, uint32_t mode, const trc_nod
     trc_id id = 0;
     assert_int_equal(trc_material_create(scene, &desc, &id), TRC_OK);
     return id;
+}
+
+static trc_id shown(trc_scene scene, uint32_t type, uint32_t mode, const trc_node_input in[3],
+                    uint32_t input_count, uint32_t output, float factor) {
+    return shown_named(scene, type, mode, NULL, in, input_count, output, factor);
 }
 
 /* Radiance of the columns of pixels, from x = 0 on. */
@@ -199,8 +205,54 @@ static void raycast(void **state) {
     }
 }
 
+/* Of the ceiling of another instance, black and opaque where that has no such attribute, nothing
+ * beyond the ray's reach. */
+static void raycast_attribute(void **state) {
+    (void)state;
+    static const float tint[4] = {0.3f, 0.6f, 0.9f, 0.5f};
+    static const struct {
+        const char *name;
+        float distance;
+        double color, alpha;
+    } cases[] = {{"Tint", 3.0f, 0.6, 0.5}, {"Other", 3.0f, 0.0, 1.0}, {"Tint", 0.5f, 0.0, 0.0}};
+    for (size_t i = 0; i < 2 * sizeof cases / sizeof *cases; i++) {
+        const trc_scene scene = fixture_level_view();
+        const bool is_alpha = i % 2;
+        const trc_node_input in[3] = {unlinked(), constant(0.0f, 0.0f, 2.0f),
+                                      constant(cases[i / 2].distance, 0.0f, 0.0f)};
+        double column[WIDTH];
+        add_room(scene, shown_named(scene, TRC_NODE_RAYCAST_ATTRIBUTE, 0, cases[i / 2].name, in, 3,
+                                    is_alpha, 1.0f));
+        const float h = 1.2f, e = 1e3f;
+        const float corners[12] = {-e, -e, h, e, -e, h, e, e, h, -e, e, h};
+        static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
+        float values[4 * 6];
+        for (size_t k = 0; k < 4 * 6; k++)
+            values[k] = tint[k % 4];
+        trc_corner_attribute attribute = trc_corner_attribute_default();
+        attribute.width = 4;
+        attribute.name = "Tint";
+        attribute.values = values;
+        attribute.value_count = 4 * 6;
+        trc_mesh_desc desc = default_mesh_desc();
+        desc.vertex_count = 4;
+        desc.triangle_count = 2;
+        desc.positions = corners;
+        desc.position_count = 12;
+        desc.indices = indices;
+        desc.index_count = 6;
+        desc.attribute_count = 1;
+        desc.attributes = &attribute;
+        fixture_mesh(scene, &desc, 0, 0);
+        draw(scene, 1, column);
+        expect_all(column, is_alpha ? cases[i / 2].alpha : cases[i / 2].color, 1e-5);
+        assert_int_equal(trc_scene_destroy(scene), TRC_OK);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(ambient_occlusion), cmocka_unit_test(bevel),
-                                       cmocka_unit_test(raycast)};
+                                       cmocka_unit_test(raycast),
+                                       cmocka_unit_test(raycast_attribute)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

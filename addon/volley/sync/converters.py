@@ -5,6 +5,7 @@ Functions as in ``textures.py``: of the walker, the node and its ``Sockets``.
 """
 
 import math
+import re
 
 import bpy
 import numpy as np
@@ -268,13 +269,28 @@ def _bevel(walker, node, sockets):
 
 
 def _raycast(walker, node, sockets):
-    if len(node.sample_attribute_items):
-        walker.warn(f"node '{node.name}': attributes of what its ray meets are not looked up")
-    index = walker.emit(NodeType.RAYCAST, (
-        sockets.get('v', "Position"), sockets.get('v', "Direction"), sockets.get('f', "Length")),
-        RaycastMode.ONLY_LOCAL * node.only_local)
-    return named_outputs(index, NodeType.RAYCAST,
-                         ("Is Hit", "Self Hit", "Hit Distance", "Hit Position", "Hit Normal"))
+    ray = sockets.get('v', "Position"), sockets.get('v', "Direction"), sockets.get('f', "Length")
+    mode = RaycastMode.ONLY_LOCAL * node.only_local
+    outputs = named_outputs(walker.emit(NodeType.RAYCAST, ray, mode), NodeType.RAYCAST,
+                            ("Is Hit", "Self Hit", "Hit Distance", "Hit Position", "Hit Normal"))
+    sockets_of = [each for each in node.outputs if re.fullmatch(r"Attribute_\d+", each.identifier)]
+    linked = {socket.identifier for socket in node.outputs if socket.is_linked}
+    names = [each.default_value for each in node.inputs if each.type == 'STRING']
+    for name, socket in zip(names, sockets_of):
+        named = socket.identifier, socket.identifier + "_Alpha"
+        if name and linked.intersection(named):
+            outputs.update(zip(named, _met_attribute(walker, name, ray, mode, socket.type)))
+    return outputs
+
+
+def _met_attribute(walker, name, ray, mode, socket_type):
+    """An attribute of what a ray meets as a socket of that type shows it, and its alpha."""
+    walker.flat.color_names.add(name)
+    index = walker.emit(NodeType.RAYCAST_ATTRIBUTE, ray, mode, name=name)
+    color, alpha = (output(index, NodeType.RAYCAST_ATTRIBUTE, each) for each in ("color", "alpha"))
+    if socket_type == 'VALUE':  # the mean, as of the Attribute node
+        color = walker.convert(color._replace(kind='v'), 'f')
+    return color, alpha
 
 
 def _tangent_normal(walker):

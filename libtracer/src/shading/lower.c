@@ -600,6 +600,8 @@ static trc_status lower_node(const struct lowering *l) {
         return lower_bevel(l);
     case TRC_NODE_RAYCAST:
         return op(b, TRC_OP_RAYCAST, mode, l->in, l->out);
+    case TRC_NODE_RAYCAST_ATTRIBUTE:
+        return lower_named(l, TRC_OP_RAYCAST_ATTRIBUTE, mode);
     case TRC_NODE_WIREFRAME:
         return op(b, TRC_OP_WIREFRAME, 0, l->in, l->out);
     case TRC_NODE_SEPARATE:

@@ -233,7 +233,8 @@ void trc_build_traits(const struct trc_build *b, struct trc_material *m) {
             m->has |= TRC_MATERIAL_READS_FOOTPRINT;
         if (o->op == TRC_OP_BUMP)
             m->has |= TRC_MATERIAL_READS_PIXEL;
-        if (o->op == TRC_OP_AMBIENT_OCCLUSION || o->op == TRC_OP_BEVEL || o->op == TRC_OP_RAYCAST)
+        if (o->op == TRC_OP_AMBIENT_OCCLUSION || o->op == TRC_OP_BEVEL || o->op == TRC_OP_RAYCAST ||
+            o->op == TRC_OP_RAYCAST_ATTRIBUTE)
             m->has |= TRC_MATERIAL_TRACES_RAYS;
         if (o->op == TRC_OP_LIGHT_PATH)
             m->has |= TRC_MATERIAL_READS_LIGHT_PATH;

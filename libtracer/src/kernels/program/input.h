@@ -275,11 +275,13 @@ static vfloat op_uv_density(const struct trc_surface *s, uint32_t name) {
     return out;
 }
 
-/* Black and transparent where the mesh does not have it. */
-static void op_color_attribute(const struct trc_surface *s, uint32_t name, vfloat *out) {
+/* Black where the mesh does not have it, with an alpha. */
+static void op_color_attribute(const struct trc_surface *s, uint32_t name, vfloat missing_alpha,
+                               vfloat *out) {
     const vvec3 w = corner_weights(s);
-    for (int c = 0; c < 4; c++)
+    for (int c = 0; c < 3; c++)
         out[c] = vf_zero();
+    out[3] = missing_alpha;
     struct lane_group g = groups_begin(s);
     while (groups_next(s, &g)) {
         const struct trc_attribute *a = g.mesh ? mesh_attribute(g.mesh, name, 4) : NULL;

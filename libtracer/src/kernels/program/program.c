@@ -121,6 +121,16 @@ static bool run_pure(uint32_t op, uint32_t mode, const float *table, const vfloa
     }
 }
 
+/* 0 where nothing is met; what has no such attribute is opaque, as in Cycles. */
+static void op_raycast_attribute(const struct trc_surface *s, const struct trc_instruction *i,
+                                 const vfloat *in, vfloat *out) {
+    struct trc_surface hit;
+    if (trc_program_cast(s, i->mode, in, &hit))
+        op_color_attribute(&hit, i->resource, vf_truth(hit.active), out);
+    else
+        memset(out, 0, TRC_OP_OUT_AT(RAYCAST_ATTRIBUTE, end) * sizeof *out);
+}
+
 /* Operations that read the shading point. Long because it is the list of them. */
 static void run_at_surface(const struct trc_surface *s, const struct trc_instruction *i,
                            const vfloat *in, vfloat *out) {
@@ -172,7 +182,7 @@ static void run_at_surface(const struct trc_surface *s, const struct trc_instruc
         out[0] = op_uv_density(s, i->resource);
         break;
     case TRC_OP_COLOR_ATTRIBUTE:
-        op_color_attribute(s, i->resource, out);
+        op_color_attribute(s, i->resource, vf_zero(), out);
         break;
     case TRC_OP_LIGHT_PATH:
         out[0] = op_light_path(s, i->mode);
@@ -228,6 +238,9 @@ static void run_at_surface(const struct trc_surface *s, const struct trc_instruc
     case TRC_OP_BEVEL:
     case TRC_OP_RAYCAST:
         trc_program_trace(s, i->op, i->mode, in, out);
+        break;
+    case TRC_OP_RAYCAST_ATTRIBUTE:
+        op_raycast_attribute(s, i, in, out);
         break;
     case TRC_OP_WIREFRAME:
         out[0] = op_wireframe(s, in[0]);

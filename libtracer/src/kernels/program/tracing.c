@@ -279,7 +279,10 @@ static vvec3 bevel(const struct trc_surface *s, uint32_t mode, const vfloat *in)
 
 /* ---- ray casts ---- */
 
-static void raycast(const struct trc_surface *s, uint32_t mode, const vfloat *in, vfloat *out) {
+bool trc_program_cast(const struct trc_surface *s, uint32_t mode, const vfloat *in,
+                      struct trc_surface *hit) {
+    if (!s->probe)
+        return false;
     const vvec3 position = v3_read(in + TRC_OP_AT(RAYCAST, position));
     const vvec3 d = v3_read(in + TRC_OP_AT(RAYCAST, direction));
     /* From the point itself, as other rays that leave it. */
@@ -293,13 +296,26 @@ static void raycast(const struct trc_surface *s, uint32_t mode, const vfloat *in
     trace_nearest(s, mode & TRC_RAYCAST_ONLY_LOCAL);
     const vmask met = vm_from_bits(trc_chunk_bits(s->probe->packet->active, 0));
     if (!vm_any(met))
-        return;
+        return false;
+    hit_surface(s, 0, met, hit);
+    return true;
+}
+
+static void raycast(const struct trc_surface *s, uint32_t mode, const vfloat *in, vfloat *out) {
+    const vfloat reach = in[TRC_OP_AT(RAYCAST, distance)];
     struct trc_surface hit;
-    hit_surface(s, 0, met, &hit);
+    for (size_t i = 0; i < TRC_OP_OUT_AT(RAYCAST, end); i++)
+        out[i] = vf_zero();
+    out[TRC_OP_OUT_AT(RAYCAST, hit_distance)] = reach;
+    if (!trc_program_cast(s, mode, in, &hit))
+        return;
+    const vvec3 position = v3_read(in + TRC_OP_AT(RAYCAST, position));
+    const vvec3 d = v3_read(in + TRC_OP_AT(RAYCAST, direction));
     const vfloat t = vf_load(s->probe->packet->t);
+    const vmask met = hit.active, self = vi_eq(hit.instance, s->instance);
     out[TRC_OP_OUT_AT(RAYCAST, is_hit)] = vf_truth(met);
-    out[TRC_OP_OUT_AT(RAYCAST, self_hit)] = vf_truth(vm_and(met, vi_eq(hit.instance, s->instance)));
-    out[TRC_OP_OUT_AT(RAYCAST, hit_distance)] = vf_select(met, t, rays.reach);
+    out[TRC_OP_OUT_AT(RAYCAST, self_hit)] = vf_truth(vm_and(met, self));
+    out[TRC_OP_OUT_AT(RAYCAST, hit_distance)] = vf_select(met, t, reach);
     v3_write(out + TRC_OP_OUT_AT(RAYCAST, hit_position), v3_where(met, v3_mad(d, t, position)));
     v3_write(out + TRC_OP_OUT_AT(RAYCAST, hit_normal), v3_where(met, hit.n));
 }
@@ -314,11 +330,7 @@ void trc_program_trace(const struct trc_surface *s, uint32_t op, uint32_t mode, 
         v3_write(out, s->probe ? bevel(s, mode, in) : s->n);
         break;
     default:
-        for (size_t i = 0; i < TRC_OP_OUT_AT(RAYCAST, end); i++)
-            out[i] = vf_zero();
-        out[TRC_OP_OUT_AT(RAYCAST, hit_distance)] = in[TRC_OP_AT(RAYCAST, distance)];
-        if (s->probe)
-            raycast(s, mode, in, out);
+        raycast(s, mode, in, out);
         break;
     }
 }

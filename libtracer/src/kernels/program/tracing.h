@@ -22,6 +22,11 @@ struct trc_probe {
     vfloat min_pdf;                /* smallest density of a bounce so far */
 };
 
+/* What rays of RAYCAST's inputs meet: false if nothing, else the surface, active where there is
+ * one. */
+bool trc_program_cast(const struct trc_surface *s, uint32_t mode, const vfloat *in,
+                      struct trc_surface *hit);
+
 /* Runs one of them; inputs and outputs do not overlap. */
 void trc_program_trace(const struct trc_surface *s, uint32_t op, uint32_t mode, const vfloat *in,
                        vfloat *out);

@@ -105,6 +105,7 @@
 #define trc_mixed_fetch(...) TRC_KERNEL(trc_mixed_fetch)(__VA_ARGS__)
 #define trc_oren_nayar_albedo(...) TRC_KERNEL(trc_oren_nayar_albedo)(__VA_ARGS__)
 #define trc_pass_add_lanes(...) TRC_KERNEL(trc_pass_add_lanes)(__VA_ARGS__)
+#define trc_program_cast(...) TRC_KERNEL(trc_program_cast)(__VA_ARGS__)
 #define trc_program_brick(...) TRC_KERNEL(trc_program_brick)(__VA_ARGS__)
 #define trc_program_displace(...) TRC_KERNEL(trc_program_displace)(__VA_ARGS__)
 #define trc_program_fold(...) TRC_KERNEL(trc_program_fold)(__VA_ARGS__)
