@@ -9,11 +9,14 @@ between two curves say what part of each is radiance and tell curves apart that 
 channel at once. Those of Z begin at X's: each by itself they end at others that show nearly the same.
 
     blender -b --factory-startup --python generate_hosek_wilkie.py    # some minutes
+    blender -b --factory-startup --python generate_hosek_wilkie.py -- --measure    # how far the file is off
 """
 
 import itertools
 import math
 import os
+import runpy
+import sys
 import tempfile
 from pathlib import Path
 
@@ -42,6 +45,7 @@ ATTEMPTS, CURVE_STEPS = 4, 2000
 BAD, ROUNDS = 2e-4, 3      # error of curves that are fitted again, and how often
 TOGETHER_STEPS = 200      # of the fit of all curves of a channel
 FARTHEST, HALVINGS = 4.0, 40  # logarithm of a factor between radiances, and steps to find it
+MEASURED = 12             # skies about each turbidity
 NEARLY = 1e-4             # error with which a curve may be laid through an elevation
 
 
@@ -384,8 +388,41 @@ def fit_together(points, skies, channel):
     return dict(zip(CURVES, found.reshape(len(CURVES), DEGREE + 1, -1))), error
 
 
+# Errors --------------------------------------------------------------------------------------------
+
+def measure():
+    """Print how far the written curves are off, in random skies about each turbidity: the largest and the mean error
+    of a channel's mean, and the largest of a direction, over its brightest channel and 1 % of the sky's."""
+    curves, random = runpy.run_path(str(OUTPUT))["CURVES"], np.random.default_rng(11)
+    looked_at = directions()
+    sky = open_stage(looked_at)
+    path = os.path.join(tempfile.mkdtemp(), "sky.exr")
+    for turbidity in range(1, 11):
+        means, worst = [], 0.0
+        for _ in range(MEASURED):
+            sky.turbidity = min(max(turbidity + random.uniform(-0.5, 0.5), 1.0), 10.0)
+            sky.ground_albedo = random.uniform(0.0, 1.0)
+            elevation = random.uniform(0.02, 1.0) ** 1.5 * 0.5 * math.pi
+            sky.sun_direction = 0.0, math.cos(elevation), math.sin(elevation)
+            rgb = picture(path).reshape(-1, 3).astype(np.float64)
+            views = Views(looked_at, sky.sun_direction)
+            low = min(int(sky.turbidity), len(curves) - 1)
+            ground = curves[low - 1] + (sky.turbidity - low) * (curves[low] - curves[low - 1])
+            points = ground[0] + sky.ground_albedo * (ground[1] - ground[0])
+            xyz = np.stack([value_at(channel.T, views) for channel in points], axis=-1)
+            shown, far = np.maximum(xyz @ XYZ_TO_RGB.T, 0.0), views.gamma > NEAREST
+            means.append(np.abs(shown[far].mean(axis=0) / rgb[far].mean(axis=0) - 1.0).max())
+            off = np.abs(shown - rgb).max(axis=1) / (rgb.max(axis=1) + 0.01 * rgb.max())
+            worst = max(worst, off[far].max())
+        print(f"turbidity {turbidity}: means {max(means):.2%}, on average {np.mean(means):.2%}, directions {worst:.2%}",
+              flush=True)
+
+
 def main():
     """Run the program."""
+    if "--measure" in sys.argv:
+        measure()
+        return
     np.seterr(all="ignore")  # of steps that are not taken
     skies, curves = photograph(), {}
     found = fit_all(skies)
