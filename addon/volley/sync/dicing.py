@@ -27,10 +27,7 @@ class Dicing:
             middle = len(keys.transforms) // 2
             self._lens, self._window = keys.lens, keys.windows[len(keys.windows) // 2]
             matrix = np.asarray(keys.transforms[middle], np.float64).reshape(3, 4)
-        to_world = np.eye(4)
-        to_world[:3] = matrix
-        to_world[:3, :3] /= np.linalg.norm(to_world[:3, :3], axis=0)
-        self._to_camera = np.linalg.inv(to_world)
+        self._axes, self._place = matrix[:, :3], matrix[:, 3]
         self._pixel = (self._window[1] - self._window[0]) / frame.width
         if self._lens.panorama:
             self._pixel, self._window = _ALL_AROUND * self._pixel, (0.0,) * 4
@@ -57,10 +54,16 @@ class Dicing:
         else:
             scale = cycles(blender_object, "dicing_rate", 1.0)
         space = abi.DicingSpace.PARALLEL if self._lens.is_ortho else abi.DicingSpace.CENTRAL
-        to_camera = (self._to_camera @ np.array(each.matrix_world))[:3]
+        to_camera = self._to_camera(np.array(each.matrix_world))
         return {**fields, "space": space, "side": self._rate * scale * self._pixel,
                 "object_to_camera": tuple(to_camera.ravel()), "window": tuple(self._window),
                 "offscreen_scale": cycles(self._scene, "offscreen_dicing_scale", 4.0)}
+
+    def _to_camera(self, to_world):
+        """(3, 4) from an object's space to that of the camera, without the scale of that."""
+        to_world[:3, 3] -= self._place
+        axes = self._axes / np.linalg.norm(self._axes, axis=0)
+        return np.linalg.inv(axes) @ to_world[:3]
 
     def _surface_of(self, modifier):
         """Cycles subdivides what the modifier made once more, from 5.0 on what it began with: the limit of that

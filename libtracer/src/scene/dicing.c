@@ -1,12 +1,10 @@
 #include "scene/dicing.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "core/checks.h"
 #include "core/core.h"
-#include "scene/affine.h"
 #include "scene/catmull_clark.h"
 #include "scene/edge_table.h"
 #include "scene/mesh.h"
@@ -17,7 +15,7 @@
  * curved edges follow the surface closely enough. */
 #define EVEN_FACE_MAX 65536u
 /* Of a sum of unit normals: what is shorter than 1e-6 is the error of the sum. */
-#define SQUARE_MIN 1e-12
+#define SQUARE_MIN 1e-12f
 
 static trc_status no_memory(void) {
     return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for the dicing of a mesh");
@@ -419,7 +417,7 @@ static void compute_normals(struct dicer *d) {
             float *n = row(d, v) + d->normals + k;
             const float square = dot(n, n);
             for (int i = 0; i < 3; i++)
-                n[i] = square > (float)SQUARE_MIN ? n[i] / sqrtf(square) : 0.0f;
+                n[i] = square > SQUARE_MIN ? n[i] / sqrtf(square) : 0.0f;
         }
     }
 }
@@ -494,7 +492,7 @@ static trc_status take_triangles(struct dicer *d, const trc_mesh_desc *desc) {
 
 /* ---- faces of Catmull-Clark ---- */
 
-/* An outline edge of a group of triangles, or one that two of them share. */
+/* Whether another triangle of a face shares the edge that begins at a corner. */
 static bool is_inner(const uint32_t *indices, size_t count, size_t corner) {
     const uint32_t a = indices[corner], b = indices[corner / 3 * 3 + (corner + 1) % 3];
     for (size_t c = 0; c < count; c++)
