@@ -133,3 +133,28 @@ def test_custom_cameras(blender):
     if blender_support.version() < (5, 0):
         pytest.skip("there are none")
     assert blender.run(inside_custom_cameras) == ["Camera 'Camera': type CUSTOM is not supported, perspective is used"]
+
+
+def inside_shining_strands():
+    """The warnings of hair that is matt, that emits, that emits nothing."""
+    import bpy
+    import scenes
+    scenes.empty(size=(16, 16))
+    scenes.camera()
+    ball = scenes.sphere("Ball", 0.5, material=scenes.material("Hair", "ShaderNodeBsdfDiffuse"))
+    ball.modifiers.new("Hair", 'PARTICLE_SYSTEM')
+    ball.particle_systems[0].settings.type = 'HAIR'
+    told, found = _listen(), []
+    for material in (bpy.data.materials["Hair"], scenes.emitter((1.0, 0.5, 0.2), "Lamp"),
+                     scenes.emitter((0.0, 0.0, 0.0), "Black")):
+        ball.data.materials[0] = material
+        told.clear()
+        scenes.render()
+        found.append(list(told))
+    return found
+
+
+def test_strands_that_emit(blender):
+    matt, shining, black = blender.run(inside_shining_strands)
+    assert matt == black == []
+    assert shining == ["Light of strands and points is not sampled: object 'Ball' lights nothing that is matt"]

@@ -12,7 +12,7 @@ that is not supported becomes a diffuse of its colour. Each is named once in the
 from ..abi import NodeType, VectorOperation as Vector
 from ..compat import BUMP_FILTER_WIDTH, aov_name
 from . import nodes, working_space
-from .node_list import output
+from .node_list import input_number, output
 from .values import CONSTANT, DEFAULT, NO_SHADER, Value
 
 _KINDS = {'VALUE': 'f', 'INT': 'f', 'BOOLEAN': 'f', 'RGBA': 'c', 'VECTOR': 'v', 'ROTATION': 'v',
@@ -35,6 +35,16 @@ class FlatNode:
         return self.type, self.mode, tuple(self.inputs), self.image, self.name, table
 
 
+# What the light of a shader is a product of.
+_EMISSIONS = {NodeType.EMISSION: ("color", "strength"), NodeType.PRINCIPLED: ("emission", "emission_strength"),
+              NodeType.LAYERED_PRINCIPLED: ("emission_color", "emission_strength")}
+
+
+def _may_exceed_zero(node_input):
+    node, _output, constant = node_input
+    return node != CONSTANT or any(constant)
+
+
 class FlatTree:
     """A flattened tree: nodes, the index of the output shader, the mesh attributes it reads."""
 
@@ -50,6 +60,11 @@ class FlatTree:
         self.sun = None           # sky_texture.Sun that the tree shows
         self.follows_scene = False  # it reads where other objects are, or properties of the view layer
         self.has_volume = False   # something is linked to the output's Volume
+
+    def emits(self):
+        """Whether one of its shaders may emit light."""
+        return any(all(_may_exceed_zero(node.inputs[input_number(node.type, name)]) for name in _EMISSIONS[node.type])
+                   for node in self.nodes if node.type in _EMISSIONS)
 
     def signature(self):
         """Equal for trees that mean the same."""

@@ -222,7 +222,7 @@ class Materials:
             values["cryptomatte"] = native.cryptomatte_id(name) if name else 0.0
             self._send(entry, key, flat, values)
         entry.signature, entry.name = signature, name
-        entry.uv_names, entry.color_names = flat.uv_names, flat.color_names
+        entry.uv_names, entry.color_names, entry.emits = flat.uv_names, flat.color_names, flat.emits()
         entry.needs_generated, entry.sun = flat.needs_generated, flat.sun
         entry.needs_instancer, entry.instance_attributes = flat.needs_instancer, flat.instance_attributes
         entry.images, is_animated = self._images.take_asked()
@@ -255,6 +255,7 @@ class Entry:
         self.uv_names, self.color_names = set(), set()
         self.needs_generated, self.sun = False, None
         self.needs_instancer, self.instance_attributes = False, set()
+        self.emits = False      # perhaps
         self.is_volume = False  # of a volume alone: what has no other is not there
         self.images = set()  # those it reads
         self.is_animated = False  # whether what it reads may be another in the next sync

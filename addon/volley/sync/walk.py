@@ -59,6 +59,7 @@ class Walk:
         self.lights = {}      # key -> fields of a light
         self.tied = set()     # names of objects that are instanced or make instances
         self._volumes = set()  # names of objects of volumes
+        self._shining = set()  # and of strands and points that emit
         self.links = Links(source.depsgraph, sync.warnings)
 
     def run(self):
@@ -84,6 +85,7 @@ class Walk:
             elif isinstance(each.object.data, bpy.types.Volume):
                 self._volumes.add(each.object.name)
         self._warn_of("Volumes are not supported", self._volumes, "is left out")
+        self._warn_of("Light of strands and points is not sampled", self._shining, "lights nothing that is matt")
 
     def _warn_of(self, text, names, does):
         """One warning of all objects of those names, if there are any."""
@@ -164,6 +166,7 @@ class Walk:
             ids = self._ids_of(each)[0]
             slot = max(min(modifier.particle_system.settings.material, len(ids)), 1) - 1
             item.materials = ids[slot:slot + 1]
+            self._note_light(each, slot)
             hair = strands.Hair(number, self._source.depsgraph, is_final, self._wanted_strands)
             self._add_made(each, item, (blender_object.name_full, number), hair)
 
@@ -179,8 +182,15 @@ class Walk:
         item = self._describe(each)
         self._dress(item, each)
         item.materials = self._ids_of(each)[0][:1]
+        self._note_light(each, 0)
         self.tied.add(each.object.name_full)
         self._add_made(each, item, each.object.data.as_pointer(), strands.StrandObject(self._wanted_strands))
+
+    def _note_light(self, each, slot):
+        """Note whether strands or points of the material in that slot emit."""
+        for material in materials_of(each.object, self._view_layer)[slot:slot + 1]:
+            if material is not None and self._sync._materials.entry_of(material).emits:
+                self._shining.add(each.object.name)
 
     def _add_made(self, each, item, source, made_of):
         """An item of strands or points (strands.Hair or strands.StrandObject) whose mesh is made unless another
