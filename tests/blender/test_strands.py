@@ -344,7 +344,7 @@ GLOSSY_PASSES, TRANSMISSION_PASSES = ("GlossCol", "GlossDir"), ("TransCol", "Tra
 LOBE_PASSES = {'RIBBONS': GLOSSY_PASSES, 'THICK': GLOSSY_PASSES + TRANSMISSION_PASSES}
 FIRST_SHARE = 6e-3  # of pixels that may be off (3e-4 to 2e-3 are), by more than that share of the largest:
 FIRST_STEPS = {'RIBBONS': 2e-3, 'THICK': 0.02}  # pieces are off by a tenth of a radius at most, which slants lengthen
-PASS_OFF = 1e-3, 0.01
+PASS_OFF = 1.5e-3, 0.015
 
 
 def _sharpened(names):
