@@ -225,7 +225,6 @@ static void raycast_attribute(void **state) {
                                     is_alpha, 1.0f));
         const float h = 1.2f, e = 1e3f;
         const float corners[12] = {-e, -e, h, e, -e, h, e, e, h, -e, e, h};
-        static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
         float values[4 * 6];
         for (size_t k = 0; k < 4 * 6; k++)
             values[k] = tint[k % 4];
@@ -234,13 +233,7 @@ static void raycast_attribute(void **state) {
         attribute.name = "Tint";
         attribute.values = values;
         attribute.value_count = 4 * 6;
-        trc_mesh_desc desc = default_mesh_desc();
-        desc.vertex_count = 4;
-        desc.triangle_count = 2;
-        desc.positions = corners;
-        desc.position_count = 12;
-        desc.indices = indices;
-        desc.index_count = 6;
+        trc_mesh_desc desc = fixture_quad_desc(corners);
         desc.attribute_count = 1;
         desc.attributes = &attribute;
         fixture_mesh(scene, &desc, 0, 0);
