@@ -5,7 +5,7 @@
 #include <stdlib.h>
 
 #include "core/core.h"
-#include "scene/dicing.h"
+#include "dicing/dicing.h"
 
 /* A cube from -1 to 1 of six quadrilaterals. */
 static const uint32_t quads[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4},

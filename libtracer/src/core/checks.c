@@ -91,3 +91,15 @@ trc_status trc_check_finite(const float *values, size_t count, const char *name)
     }
     return TRC_OK;
 }
+
+trc_status trc_check_indices(const uint32_t *indices, uint64_t count, uint64_t vertex_count) {
+    for (uint64_t i = 0; i < count; i++) {
+        if (indices[i] >= vertex_count) {
+            return trc_fail(TRC_ERROR_INVALID_ARGUMENT,
+                            "index %" PRIu64 " (triangle %" PRIu64 ") is %" PRIu32
+                            ", but the mesh has %" PRIu64 " vertices",
+                            i, i / 3, indices[i], vertex_count);
+        }
+    }
+    return TRC_OK;
+}

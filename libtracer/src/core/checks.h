@@ -35,6 +35,9 @@ trc_status trc_check_float(float value, float low, float high, const char *name)
 /* Every one of count floats is finite. */
 trc_status trc_check_finite(const float *values, size_t count, const char *name);
 
+/* Every one of count indices of triangles' corners is below vertex_count. */
+trc_status trc_check_indices(const uint32_t *indices, uint64_t count, uint64_t vertex_count);
+
 /* Returns from the calling function on an error. */
 #define TRC_TRY(call)                          \
     do {                                       \

@@ -5,7 +5,7 @@
 #include "core/checks.h"
 #include "core/core.h"
 #include "scene/curves.h"
-#include "scene/dicing.h"
+#include "dicing/dicing.h"
 #include "scene/displace.h"
 #include "scene/mesh.h"
 #include "scene/scene.h"

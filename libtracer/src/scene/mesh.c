@@ -46,18 +46,6 @@ bool trc_topology_copy(struct trc_mesh_topology *topology, const void *source, u
     return true;
 }
 
-trc_status trc_check_indices(const uint32_t *indices, uint64_t count, uint64_t vertex_count) {
-    for (uint64_t i = 0; i < count; i++) {
-        if (indices[i] >= vertex_count) {
-            return trc_fail(TRC_ERROR_INVALID_ARGUMENT,
-                            "index %" PRIu64 " (triangle %" PRIu64 ") is %" PRIu32
-                            ", but the mesh has %" PRIu64 " vertices",
-                            i, i / 3, indices[i], vertex_count);
-        }
-    }
-    return TRC_OK;
-}
-
 static bool all_zero(const void *data, uint64_t bytes) {
     const uint8_t *b = data;
     return !b || !bytes || (b[0] == 0 && memcmp(b, b + 1, bytes - 1) == 0);

@@ -16,9 +16,6 @@ struct trc_pool; /* core/pool.h */
 trc_status trc_geometry_create(const trc_mesh_desc *desc, struct trc_names *names,
                                struct trc_mesh **mesh_out);
 
-/* INVALID_ARGUMENT, naming the index, for one that is not below vertex_count. */
-trc_status trc_check_indices(const uint32_t *indices, uint64_t count, uint64_t vertex_count);
-
 /* Another pose of the same topology; the arrays are checked and laid out as in the descriptor. */
 trc_status trc_geometry_pose(const struct trc_mesh *from, uint32_t key_count,
                              const float *positions, const float *normals,

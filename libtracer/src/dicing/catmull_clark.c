@@ -1,10 +1,10 @@
-#include "scene/catmull_clark.h"
+#include "dicing/catmull_clark.h"
 
 #include <string.h>
 
 #include "core/checks.h"
 #include "core/core.h"
-#include "scene/edge_table.h"
+#include "dicing/edge_table.h"
 
 static trc_status no_memory(void) {
     return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for the subdivision of a mesh");

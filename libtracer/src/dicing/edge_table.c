@@ -1,4 +1,4 @@
-#include "scene/edge_table.h"
+#include "dicing/edge_table.h"
 
 #include <string.h>
 

@@ -1,11 +1,10 @@
-/* Dicing: refinement of a mesh that is about to be created, until no edge is longer than asked
- * for. */
-#ifndef TRACER_SCENE_DICING_H
-#define TRACER_SCENE_DICING_H
+/* What dicing leaves: a descriptor of the refined mesh with the arrays that it points to. */
+#ifndef TRACER_DICING_DICED_MESH_H
+#define TRACER_DICING_DICED_MESH_H
 
 #include <stdbool.h>
 
-#include "tracer/geometry.h"
+#include "dicing/refined_mesh.h"
 
 /* A descriptor and the arrays of its own that it points to; names of attributes are the caller's.
  */
@@ -20,9 +19,10 @@ struct trc_diced_mesh {
     float *values[TRC_MAX_ATTRIBUTES];
 };
 
-/* The diced mesh of a checked descriptor with dicing. INVALID_ARGUMENT for a bad index, TOO_LARGE
- * or OUT_OF_MEMORY, which leave nothing to free. */
-trc_status trc_dice(const trc_mesh_desc *desc, struct trc_diced_mesh *diced_out);
+/* Describes what is done of a mesh, whose arrays that are laid out alike it takes over.
+ * OUT_OF_MEMORY. */
+trc_status trc_diced_mesh_describe(struct trc_refined_mesh *mesh, const trc_mesh_desc *desc,
+                                   struct trc_diced_mesh *out);
 
 /* One without arrays is fine. */
 void trc_diced_mesh_free(struct trc_diced_mesh *diced);

@@ -1,6 +1,6 @@
 /* A number for each edge of a mesh that is asked for. */
-#ifndef TRACER_SCENE_EDGE_TABLE_H
-#define TRACER_SCENE_EDGE_TABLE_H
+#ifndef TRACER_DICING_EDGE_TABLE_H
+#define TRACER_DICING_EDGE_TABLE_H
 
 #include <stdbool.h>
 #include <stdint.h>

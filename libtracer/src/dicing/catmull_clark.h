@@ -2,8 +2,8 @@
  * arbitrary topological meshes", 1978; open boundaries are cubic B-splines. Limit positions by
  * M. Halstead, M. Kass, T. DeRose, "Efficient, fair interpolation using Catmull-Clark surfaces",
  * 1993. */
-#ifndef TRACER_SCENE_CATMULL_CLARK_H
-#define TRACER_SCENE_CATMULL_CLARK_H
+#ifndef TRACER_DICING_CATMULL_CLARK_H
+#define TRACER_DICING_CATMULL_CLARK_H
 
 #include <stdbool.h>
 #include <stddef.h>
