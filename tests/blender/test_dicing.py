@@ -120,6 +120,42 @@ def inside_settings():
     return found
 
 
+def inside_edits():
+    """Of each edit, the mean difference of what is followed from a fresh picture and of that from the one before,
+    and how many meshes were sent anew."""
+    import bpy
+    from follower import Follower, picture
+    from volley.sync import SceneSync
+    from volley.sync.changes import Changes
+    stage()
+    made, settings = _make("cube", rotation=(0.3, 0.2, 0.5)), bpy.context.scene.cycles
+    made.data.materials.append(_tree("Normal", 0.3))
+    settings.preview_dicing_rate = 16.0
+    follower, found = Follower(), {}
+    former, ids = follower.picture(), set(follower.sync._meshes.ids().values())
+
+    def look(name):
+        nonlocal former, ids
+        bpy.context.scene.update_tag()  # as the panels do
+        bpy.context.view_layer.update()
+        followed, now = follower.picture(), set(follower.sync._meshes.ids().values())
+        fresh_sync = SceneSync(is_final=False, thread_count=0, will_resync=False)
+        fresh = picture(fresh_sync, Changes.everything())
+        fresh_sync.destroy()
+        found[name] = [float(np.abs(each - fresh).mean()) for each in (followed, former)] + [len(now - ids)]
+        former, ids = fresh, now
+
+    settings.preview_dicing_rate = 2.0
+    look("rate")
+    settings.max_subdivisions = 2
+    look("limit")
+    bpy.context.scene.render.film_transparent = True
+    look("another setting")
+    bpy.context.scene.camera.location.z += 3.0
+    look("camera")
+    return found
+
+
 # Comparison ----------------------------------------------------------------------------------------
 
 def _tiles(image):
@@ -140,6 +176,14 @@ def test_pictures(blender):
         worse = 2.5 if is_curved and "level 1" in name else 1.0  # of which a warning tells
         assert mean < 0.01 * worse, f"{name}: means differ by {mean:.2%}"
         assert tile < 0.08 * worse, f"{name}: those of tiles differ by up to {tile:.2%}"
+
+
+def test_viewport_follows_settings(blender):
+    found = blender.run(inside_edits)
+    for name in ("rate", "limit"):
+        error, change, sent = found[name]
+        assert error == 0.0 and change > 1e-4 and sent == 1, (name, found)
+    assert found["another setting"][2] == 0 and found["camera"][2] == 0, found
 
 
 def test_settings(blender):

@@ -6,6 +6,7 @@ import bpy
 from volley import passes
 from volley.session import render_fields
 from volley.sync import SceneSync, Source, camera
+from volley.sync.dicing import Dicing
 from volley.sync.changes import Changes
 from volley.sync.matrix import rows12
 
@@ -30,13 +31,13 @@ class Follower:
 def picture(sync, changes):
     """Bring a sync up to date and render what it holds."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    if changes.any():
-        sync.update(Source(depsgraph, changes))
     scene = depsgraph.scene_eval
     frame = camera.frame_of(scene.render)
     lens = camera.lens_of(scene.camera, sync.warnings)
-    sync.set_camera(camera.CameraKeys(lens, [rows12(scene.camera.matrix_world)],
-                                      [camera.window(lens, frame)]))
+    keys = camera.CameraKeys(lens, [rows12(scene.camera.matrix_world)], [camera.window(lens, frame)])
+    if changes.any():
+        sync.update(Source(depsgraph, changes, dicing=Dicing(scene, keys, frame, False, sync.warnings)))
+    sync.set_camera(keys)
     sync.scene.commit()
     crop = (0, 0, frame.width, frame.height)
     fields = render_fields(scene, frame, crop, [passes.COMBINED])

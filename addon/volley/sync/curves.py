@@ -117,7 +117,7 @@ class CurvesData:
     pieces: int = 1
     attributes: list = field(default_factory=list)  # (name, (keys | strands, 2 | 4) float32, whether of strands)
     generated: np.ndarray = None      # (strands, 3) float32
-    normals = corners = poses = dicing = None
+    normals = corners = poses = dicing = diced_by = None
     normal_kind = abi.NormalsLayout.NONE
 
     def topology(self):

@@ -18,6 +18,8 @@ class Dicing:
     def __init__(self, scene, keys, frame, is_final, warnings):
         self._scene, self._is_final, self._warnings = scene, is_final, warnings
         self._rate = cycles(scene, "dicing_rate", 1.0) if is_final else cycles(scene, "preview_dicing_rate", 8.0)
+        self.settings = (self._rate, cycles(scene, "max_subdivisions", 12),
+                         cycles(scene, "offscreen_dicing_scale", 4.0), cycles(scene, "feature_set", None))
         chosen = cycles(scene, "dicing_camera", None)
         if chosen is not None and chosen.type == 'CAMERA':
             lens = camera.lens_of(chosen, warnings)
@@ -58,6 +60,13 @@ class Dicing:
         return {**fields, "space": space, "side": self._rate * scale * self._pixel,
                 "object_to_camera": tuple(to_camera.ravel()), "window": tuple(self._window),
                 "offscreen_scale": cycles(self._scene, "offscreen_dicing_scale", 4.0)}
+
+    def would_repeat(self, each, settings, fields):
+        """Whether an instance's mesh that was diced by such settings, to such fields (None: it was not), would be
+        diced alike. As in Cycles, a viewport's camera moves without dicing anew; a render's picture is its own."""
+        if settings == self.settings and (fields is None or not self._is_final):
+            return True
+        return fields == self.fields_of(each)
 
     def _to_camera(self, to_world):
         """(3, 4) from an object's space to that of the camera, without the scale of that."""

@@ -36,6 +36,7 @@ class MeshData:
     generated: np.ndarray = None      # (vertices, 3) float32
     corners: np.ndarray = None        # (triangles * 3,) integers: Blender's corners, for corner normals
     dicing: dict = None               # fields of abi.DicingDesc, and "faces", (triangles,) uint32
+    diced_by: tuple = None            # dicing.Dicing.settings and fields (None: not diced) where there is one
     poses: object = None              # Topology where later shapes are awaited
 
     def topology(self):

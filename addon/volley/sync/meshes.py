@@ -8,9 +8,11 @@ from .mesh import corner_normals, has_corner_normals, read_positions, vertex_nor
 
 
 class MeshEntry:
-    """A mesh in the library. pointer tells one evaluation's data from another's, never followed."""
+    """A mesh in the library. pointer tells one evaluation's data from another's, never followed;
+    diced_by: see MeshData."""
 
-    __slots__ = ("id", "pointer", "topology", "shape", "names", "corners", "normal_kind", "poses")
+    __slots__ = ("id", "pointer", "topology", "shape", "names", "corners", "normal_kind", "poses",
+                 "diced_by")
 
 
 class Meshes:
@@ -34,6 +36,11 @@ class Meshes:
         self._seen.add(key)
         return True
 
+    def diced_by(self, key):
+        """What MeshData says of it, None where there is no such mesh or nobody asked."""
+        entry = self._entries.get(key)
+        return None if entry is None else entry.diced_by
+
     def put(self, key, pointer, data, names, motion=None):
         """Bring a mesh up to date: nothing, positions alone, or all of it. One that the library
         refuses is left out."""
@@ -53,6 +60,7 @@ class Meshes:
             return
         entry.pointer, entry.topology, entry.shape, entry.names = pointer, topology, shape, names
         entry.poses, entry.corners, entry.normal_kind = data.poses, data.corners, data.normal_kind
+        entry.diced_by = data.diced_by
         self._seen.add(key)
 
     def pose(self, key, pointer, mesh, is_known):

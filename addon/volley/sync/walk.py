@@ -238,7 +238,7 @@ class Walk:
         meshes, blender_object = self._sync._meshes, each.object
         is_changed = self._source.changes.geometry_of(item.owner)
         names = self._names_of(pointer)
-        if not is_changed and meshes.reuse(item.key, pointer, names):
+        if not is_changed and self._is_diced_alike(item.key, each) and meshes.reuse(item.key, pointer, names):
             return True
         with mesh.shown_mesh(blender_object) as shape:
             data, shapes = self._extract(item, each, shape, names)
@@ -249,6 +249,10 @@ class Walk:
         else:
             meshes.put(item.key, pointer, data, names)
         return True
+
+    def _is_diced_alike(self, key, each):
+        diced_by, dicing = self._sync._meshes.diced_by(key), self._source.dicing
+        return diced_by is None or dicing is None or dicing.would_repeat(each, *diced_by)
 
     def _extract(self, item, each, shape, names):
         """The mesh that an instance shows as MeshData, None where it has no face, and as deform.MeshMotion
@@ -263,7 +267,9 @@ class Walk:
             return None, None
         if names[2]:
             data.generated = mesh.generated_coordinates(blender_object, shape, data.positions)
-        fields = self._source.dicing and self._source.dicing.fields_of(each)
+        dicing = self._source.dicing
+        fields = dicing and dicing.fields_of(each)
+        data.diced_by = dicing and (dicing.settings, fields)
         if fields:
             mesh.dice(data, shape, fields, names[2])
         elif self._sync._meshes.will_resync and deform.is_posable(blender_object):
