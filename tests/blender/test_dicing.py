@@ -8,6 +8,8 @@ from reliefs import Tree, noise, stage
 
 SAMPLES = 16
 TILE = 16
+PANORAMAS = {"equirectangular": {"panorama_type": 'EQUIRECTANGULAR'},
+             "equidistant": {"panorama_type": 'FISHEYE_EQUIDISTANT', "fisheye_fov": 1.5}}
 
 
 # Inside Blender ------------------------------------------------------------------------------------
@@ -62,6 +64,13 @@ def inside_pictures():
     stage(type='ORTHO', ortho_scale=4.0)
     bpy.context.scene.cycles.dicing_rate = 8.0
     pictures["coarse"] = _by_both(_make("cube", size=3.0), _tree("Position"))
+    for name, settings in PANORAMAS.items():
+        stage(type='PANO', location=(0.0, 0.0, 2.2), rotation=(0.0, 0.0, 0.0))
+        data = bpy.context.scene.camera.data
+        for key, value in settings.items():
+            setattr(data if hasattr(data, key) else data.cycles, key, value)
+        bpy.context.scene.cycles.dicing_rate = 1.0 if name == "equirectangular" else 6.0  # small there
+        pictures[name] = _by_both(_make("cube", size=3.0), _tree("Position"))
     return pictures
 
 
