@@ -69,7 +69,7 @@ def inside_pictures():
         data = bpy.context.scene.camera.data
         for key, value in settings.items():
             setattr(data if hasattr(data, key) else data.cycles, key, value)
-        bpy.context.scene.cycles.dicing_rate = 1.0 if name == "equirectangular" else 6.0  # small there
+        bpy.context.scene.cycles.dicing_rate = 1.0 if name == "equirectangular" else 3.0  # small there
         pictures[name] = _by_both(_make("cube", size=3.0), _tree("Position"))
     return pictures
 
