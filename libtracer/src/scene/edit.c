@@ -4,8 +4,8 @@
 
 #include "core/checks.h"
 #include "core/core.h"
-#include "scene/curves.h"
 #include "dicing/dicing.h"
+#include "scene/curves.h"
 #include "scene/displace.h"
 #include "scene/mesh.h"
 #include "scene/scene.h"
