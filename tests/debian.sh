@@ -4,7 +4,7 @@
 # folder) and PACKAGES, and defines skip, which says why there can be no such Debian here and ends the script.
 CACHE=${XDG_CACHE_HOME:-$HOME/.cache}/volley
 
-say() { printf '== %s\n' "$*"; }
+say() { printf '== %(%T)T %s\n' -1 "$*"; }
 
 # Installs packages that are missing here, as root or through sudo.
 install_here() {

@@ -21,7 +21,7 @@ summary=()
 next=""   # what to run in newer Blenders: all or fast
 suites=() # of Debian that have those
 
-say() { printf '== %s\n' "$*"; }
+say() { printf '== %(%T)T %s\n' -1 "$*"; }
 
 run_ctest() {
     say "Tests in C"

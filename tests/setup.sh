@@ -18,7 +18,7 @@ packages=(
 ci_packages=(clang-14 libclang-rt-14-dev clang-format-14 binutils)
 report_packages=(povray povray-includes python3-matplotlib)
 
-say() { printf '== %s\n' "$*"; }
+say() { printf '== %(%T)T %s\n' -1 "$*"; }
 die() { printf 'setup: %s\n' "$*" >&2; exit 1; }
 
 as_root() {
