@@ -26,12 +26,14 @@ def _temporary_files():
     with tempfile.TemporaryDirectory(prefix="volley_") as folder, pytest.MonkeyPatch.context() as patch:
         patch.setenv("TMPDIR", folder)
         yield
+        blender_support.close_shared()
 
 
 @pytest.fixture
-def blender(tmp_path):
-    """A Blender to run functions in."""
-    return blender_support.Blender(str(tmp_path))
+def blender(tmp_path, request):
+    """A Blender to run functions in, one for all tests but those of the mark own_process."""
+    is_shared = request.node.get_closest_marker("own_process") is None
+    return blender_support.Blender(str(tmp_path), is_shared)
 
 
 @pytest.fixture
@@ -43,7 +45,7 @@ def window(blender):
 @pytest.fixture(scope="module")
 def blender_of_module(tmp_path_factory):
     """The same for fixtures whose results several tests look at."""
-    return blender_support.Blender(str(tmp_path_factory.mktemp("blender")))
+    return blender_support.Blender(str(tmp_path_factory.mktemp("blender")), is_shared=True)
 
 
 # What is missing -----------------------------------------------------------------------------------
@@ -69,6 +71,7 @@ def _require(item, what, is_there):
 # Skips ---------------------------------------------------------------------------------------------
 
 def pytest_configure(config):
+    config.addinivalue_line("markers", "own_process: runs in a Blender that no other test has used")
     config.addinivalue_line("markers", "since(version, why): skips in a Blender before (major, minor)")
 
 

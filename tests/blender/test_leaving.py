@@ -7,6 +7,8 @@ import shutil
 import blender as blender_support
 import pytest
 
+pytestmark = pytest.mark.own_process
+
 STEP_SECONDS = 0.1
 LONGEST_STEPS = 150
 DRAW_SECONDS = 0.5

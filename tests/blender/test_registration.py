@@ -7,6 +7,9 @@ import shutil
 from pathlib import Path
 
 import blender as blender_support
+import pytest
+
+pytestmark = pytest.mark.own_process
 
 
 def inside_register():

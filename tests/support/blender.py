@@ -3,18 +3,21 @@
 
 ``Blender().run(function, *arguments)`` starts ``blender -b`` with the staged add-on, imports the module
 the function stands in, calls it there and returns its result (anything that can be pickled; numpy arrays
-too). An exception inside, a crash or a time-out fails the test with Blender's output.
+too). An exception inside, a crash or a time-out fails the test with Blender's output. Where it may be
+shared, one Blender answers all, each from the startup file: to start one takes longer than most tests.
 
     VOLLEY_BLENDER        the Blender to run, else ``blender``
     BLENDER_USER_SCRIPTS  the user-scripts folder of the build, else build/blender
 """
 
+import ctypes
 import enum
 import functools
 import json
 import os
 import pickle
 import re
+import select
 import shutil
 import subprocess
 import sys
@@ -23,6 +26,7 @@ import tempfile
 SUPPORT = os.path.dirname(os.path.abspath(__file__))
 REPOSITORY = os.path.dirname(os.path.dirname(SUPPORT))
 _ANSWER = "answer.pickle"
+_SERVE = "serve"
 
 
 class BlenderError(AssertionError):
@@ -70,11 +74,13 @@ def write_result(name, lines, errors):
 
 
 class Blender:
-    """Starts Blender in a folder of its own; ``output`` is what the last run wrote."""
+    """Starts Blender in a folder of its own; ``output`` is what the last run wrote. Those that are shared let
+    one Blender answer what they run."""
 
-    def __init__(self, folder=None):
+    def __init__(self, folder=None, is_shared=False):
         self.folder = folder or tempfile.mkdtemp(prefix="volley_")
         self.output = ""
+        self._is_shared = is_shared
         self.options = []  # of the command line, for run()
 
     def command(self, *arguments):
@@ -85,6 +91,8 @@ class Blender:
     def run(self, function, *arguments, timeout=120):
         """Call a module-level function inside Blender and return what it returns."""
         answer, line = self._request(function, arguments)
+        if self._is_shared and not self.options:
+            return self._answer(answer, self._ask(line[-1], timeout))
         return self._answer(answer, self._start(line, timeout))
 
     def _request(self, function, arguments):
@@ -96,8 +104,7 @@ class Blender:
         module = os.path.abspath(sys.modules[function.__module__].__file__)
         with open(request, "wb") as file:
             pickle.dump((module, function.__name__, arguments, answer), file)
-        return answer, [executable(), "-b", "--factory-startup", "--addons", "volley", *self.options,
-                        "--python-exit-code", "3", "--python", os.path.abspath(__file__), "--", request]
+        return answer, _command_line(self.options, request)
 
     def _answer(self, path, process):
         if not os.path.exists(path):
@@ -105,8 +112,23 @@ class Blender:
         with open(path, "rb") as file:
             result, error = pickle.load(file)
         if error:
+            close_shared()  # whose state nobody knows
             raise BlenderError(f"{error}\nBlender's output:\n{self.output}")
         return result
+
+    def _ask(self, request, timeout):
+        """Let the shared Blender answer; its process."""
+        global _shared
+        if _shared is not None and _shared.process.poll() is not None:
+            close_shared()
+        if _shared is None:
+            _shared = _Server()
+        try:
+            self.output = _shared.answer(request, self.folder, timeout)
+        except subprocess.TimeoutExpired as error:
+            close_shared()
+            raise BlenderError(f"Blender did not end within {timeout} s:\n{error.output}") from error
+        return _shared.process
 
     def run_in_window(self, function, *arguments, timeout=120, size=(640, 480)):
         """The same with a window of that size on a virtual display. The function returns a generator:
@@ -131,6 +153,92 @@ class Blender:
         self.output = process.stdout
         return process
 
+
+def _command_line(options, *arguments):
+    return [executable(), "-b", "--factory-startup", "--addons", "volley", *options,
+            "--python-exit-code", "3", "--python", os.path.abspath(__file__), "--", *arguments]
+
+
+# The shared Blender --------------------------------------------------------------------------------
+
+_shared = None
+
+
+def close_shared():
+    """End the shared Blender, if there is one; the next request starts another."""
+    global _shared
+    if _shared is not None:
+        _shared.close()
+        _shared = None
+
+
+class _Server:
+    """A Blender that answers one request after the other."""
+
+    def __init__(self):
+        self._log = tempfile.TemporaryFile()
+        self._ready, ready = os.pipe()
+        self.process = subprocess.Popen(_command_line([], _SERVE, str(ready)), pass_fds=[ready],
+                                        env=dict(os.environ, BLENDER_USER_SCRIPTS=user_scripts()),
+                                        stdin=subprocess.PIPE, stdout=self._log, stderr=subprocess.STDOUT)
+        os.close(ready)
+
+    def answer(self, request, folder, timeout):
+        """Wait for it to call what a request asks for, in a folder; what it wrote meanwhile."""
+        log, begin = self._log.fileno(), os.fstat(self._log.fileno()).st_size
+        environment = dict(os.environ, BLENDER_USER_SCRIPTS=user_scripts())
+        line = json.dumps({"request": request, "folder": folder, "environment": environment})
+        try:
+            self.process.stdin.write(line.encode() + b"\n")
+            self.process.stdin.flush()
+            is_ready = select.select([self._ready], [], [], timeout)[0]
+        except BrokenPipeError:
+            is_ready = True
+        if is_ready and not os.read(self._ready, 1):
+            self.process.wait()
+        output = os.pread(log, os.fstat(log).st_size - begin, begin).decode(errors="replace")
+        if not is_ready:
+            raise subprocess.TimeoutExpired(self.process.args, timeout, output)
+        return output
+
+    def close(self):
+        self.process.kill()
+        self.process.wait()
+        self.process.stdin.close()
+        self._log.close()
+        os.close(self._ready)
+
+
+def _serve(ready):
+    """Inside Blender: answer the requests of _Server.answer, each as if it were the first."""
+    import addon_utils
+    import bpy
+    os.set_inheritable(ready, False)
+    path = list(sys.path)
+    for line in sys.stdin:
+        order = json.loads(line)
+        bpy.ops.wm.read_homefile(use_factory_startup=True)
+        os.environ.clear()
+        os.environ.update(order["environment"])
+        os.chdir(order["folder"])
+        _answer_request(order["request"])
+        sys.path[:] = path
+        addon_utils.disable("volley")  # of which tests may have replaced parts
+        for name in _modules_below(os.path.dirname(SUPPORT), user_scripts()):
+            del sys.modules[name]
+        addon_utils.enable("volley")
+        sys.stdout.flush()
+        ctypes.CDLL(None).fflush(None)
+        os.write(ready, b".")
+
+
+def _modules_below(*folders):
+    """Names of imported modules whose files are there, but for the one that runs."""
+    files = {name: getattr(module, "__file__", None) or "" for name, module in sys.modules.items()}
+    return [name for name, file in files.items() if file.startswith(folders) and name != "__main__"]
+
+
+# Inside Blender ------------------------------------------------------------------------------------
 
 class _Answers(pickle.Pickler):
     """Without the add-on's classes, which only Blender can import: its enumerators become numbers."""
@@ -185,4 +293,8 @@ def _follow(steps, finish):
 
 
 if __name__ == "__main__":
-    _answer_request(sys.argv[sys.argv.index("--") + 1])
+    arguments = sys.argv[sys.argv.index("--") + 1:]
+    if arguments[0] == _SERVE:
+        _serve(int(arguments[1]))
+    else:
+        _answer_request(arguments[0])
