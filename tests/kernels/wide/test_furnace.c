@@ -112,6 +112,8 @@ static void furnace_is_white(void **state) {
     double of_glossy = 0.0, of_metal = 0.0, of_glass = 0.0, half_width = 0.0;
     for (int k = 0; k < 6; k++)
         for (int j = 0; j < 6; j++) {
+            if (TRC_WIDTH < 8 && (k + j) % 2)
+                continue; /* the same formulas, for longer */
             const float r = roughnesses[j];
             const double c = cosines[k];
             struct model reflecting[] = {glossy(multi, r, 0.0f), glossy(later, r, 0.0f)};
