@@ -21,7 +21,7 @@ source tests/debian.sh
 
 PACKAGES=(
     blender gcc g++ cmake ninja-build libc6-dev libopenimageio-dev openimageio-tools
-    python3-numpy python3-openimageio python3-pytest xvfb xauth libgl1-mesa-dri
+    python3-numpy python3-openimageio python3-pytest python3-pytest-xdist xvfb xauth libgl1-mesa-dri
 )
 SKIPPED=77
 
@@ -77,7 +77,7 @@ run_tests() {
     inside env VOLLEY_BUILD=/volley/build \
         BLENDER_USER_SCRIPTS=/volley/build/blender PYTHONPATH=/volley/tests/support \
         sh -c 'cd /volley && exec python3 -m pytest "$@"' pytest \
-        -q -ra -p no:cacheprovider --rootdir tests --junit-prefix "next_$SUITE" \
+        -q -ra -n 2 --dist loadfile -p no:cacheprovider --rootdir tests --junit-prefix "next_$SUITE" \
         --junit-xml build/pytest.xml "$@"
 }
 

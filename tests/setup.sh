@@ -12,7 +12,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 packages=(
     blender gcc g++ cmake ninja-build libc6-dev
     libopenimageio-dev openimageio-tools libembree-dev libcmocka-dev
-    python3 python3-numpy python3-pytest python3-openimageio
+    python3 python3-numpy python3-pytest python3-pytest-xdist python3-openimageio
     xvfb xauth libgl1-mesa-dri
 )
 ci_packages=(clang-14 libclang-rt-14-dev clang-format-14 binutils)
