@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Unit, kernel and watertight tests of another platform, by hand: an hour or more on two processors.
+# Unit, kernel and watertight tests of another platform, by hand: an hour on two processors.
 #
 #   bash tests/cross.sh windows-x64|linux-arm64 [TESTS]
 #
@@ -80,7 +80,7 @@ build_cmocka
 build
 say "Tests"
 status=0
-ctest --test-dir "$dir" -R "$tests" --timeout 3600 </dev/null >"$dir/ctest.log" 2>&1 || status=1
+ctest --test-dir "$dir" -R "$tests" -j "$(nproc)" --timeout 3600 </dev/null >"$dir/ctest.log" 2>&1 || status=1
 grep -E '\*\*\*(Failed|Timeout|Exception)|Not Run' "$dir/ctest.log" || true
 say "tracer_bench"
 bench=$(echo "$dir"/bin/tracer_bench*)
