@@ -73,14 +73,13 @@ static trc_status take_faces(struct trc_refined_mesh *mesh, const struct trc_fac
 /* Even levels, then the limit; the levels taken are in *levels_out. */
 static trc_status subdivide(struct trc_refined_mesh *mesh, struct trc_faces *f,
                             uint32_t *levels_out) {
-    const bool sharp = mesh->rows.how->sharp_corners != 0;
     uint32_t levels = 0;
     do {
-        TRC_TRY(trc_catmull_clark_subdivide(f, sharp));
+        TRC_TRY(trc_catmull_clark_subdivide(f));
         levels++;
     } while (levels < mesh->rows.how->max_subdivisions && f->face_count <= EVEN_FACE_MAX &&
              8 * (uint64_t)f->face_count <= trc_triangle_max(mesh) && has_long_edge(mesh, f));
-    TRC_TRY(trc_catmull_clark_limit(f, sharp));
+    TRC_TRY(trc_catmull_clark_limit(f));
     *levels_out = levels;
     return take_faces(mesh, f);
 }

@@ -70,6 +70,7 @@ trc_status trc_join_faces(const struct trc_row_layout *rows, const trc_mesh_desc
         .vertex_width = 3 * rows->key_count + (rows->generated ? 3 : 0),
         .corner_width = rows->corner_width,
         .vertex_count = (uint32_t)desc->vertex_count,
+        .sharp_corners = desc->dicing->sharp_corners != 0,
         .begin = trc_alloc(desc->triangle_count + 1, sizeof *f->begin),
         .indices = trc_alloc(corners, sizeof *f->indices),
         .corners = trc_alloc(corners * rows->corner_width, sizeof *f->corners),

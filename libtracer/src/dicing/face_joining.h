@@ -2,7 +2,7 @@
 #ifndef TRACER_DICING_FACE_JOINING_H
 #define TRACER_DICING_FACE_JOINING_H
 
-#include "dicing/catmull_clark.h"
+#include "dicing/faces.h"
 #include "dicing/rows.h"
 
 /* Triangles of one face become one, or stay where they make no ring. OUT_OF_MEMORY; free the faces
