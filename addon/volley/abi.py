@@ -765,7 +765,10 @@ class DicingDesc(Structure):
     _fields_ = (("struct_size", c_uint32), ("surface", c_uint32), ("space", c_uint32),
                 ("max_subdivisions", c_uint32), ("sharp_corners", c_uint32), ("side", c_float),
                 ("object_to_camera", c_float * 12), ("window", c_float * 4), ("offscreen_scale", c_float),
-                ("triangle_max", c_uint64), ("faces", c_void_p), ("face_count", c_uint64))
+                ("triangle_max", c_uint64), ("faces", c_void_p), ("face_count", c_uint64),
+                ("crease_edges", c_void_p), ("crease_edge_count", c_uint64), ("crease_sharpness", c_void_p),
+                ("crease_count", c_uint64), ("vertex_sharpness", c_void_p),
+                ("vertex_sharpness_count", c_uint64))
 
 
 class MeshDesc(Structure):

@@ -1,11 +1,13 @@
 /* Dicing: no crack opens, edges are as short as asked, what is carried stays linear, the limit of
- * Catmull-Clark is met, memory may end. */
+ * Catmull-Clark is met, creases are as sharp as they say, memory may end. */
 #include "fixture.h"
 
 #include <stdlib.h>
 
 #include "core/core.h"
+#include "dicing/catmull_clark.h"
 #include "dicing/dicing.h"
+#include "dicing/face_joining.h"
 
 /* A cube from -1 to 1 of six quadrilaterals. */
 static const uint32_t quads[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4},
@@ -16,6 +18,8 @@ struct cube {
     uint32_t indices[36], faces[12];
     uint16_t slots[12];
     uint8_t smooth[12];
+    uint32_t crease_edges[24];
+    float crease_sharpness[12], vertex_sharpness[8];
     trc_corner_attribute attribute;
     trc_dicing_desc dicing;
     trc_mesh_desc desc;
@@ -65,6 +69,27 @@ static void build(struct cube *c, uint32_t surface, float side) {
     c->desc.attributes = &c->attribute;
     c->desc.attribute_count = 1;
     c->desc.dicing = &c->dicing;
+}
+
+static void crease_edge(struct cube *c, uint32_t a, uint32_t b, float sharpness) {
+    c->crease_edges[2 * c->dicing.crease_count] = a;
+    c->crease_edges[2 * c->dicing.crease_count + 1] = b;
+    c->crease_sharpness[c->dicing.crease_count++] = sharpness;
+    c->dicing.crease_edges = c->crease_edges;
+    c->dicing.crease_sharpness = c->crease_sharpness;
+    c->dicing.crease_edge_count = 2 * c->dicing.crease_count;
+}
+
+/* The edges around the side of z = 1. */
+static void crease_ring(struct cube *c, float sharpness) {
+    for (uint32_t k = 0; k < 4; k++)
+        crease_edge(c, quads[1][(k + 1) % 4], quads[1][k], sharpness);
+}
+
+static void crease_vertex(struct cube *c, uint32_t vertex, float sharpness) {
+    c->vertex_sharpness[vertex] = sharpness;
+    c->dicing.vertex_sharpness = c->vertex_sharpness;
+    c->dicing.vertex_sharpness_count = 8;
 }
 
 static struct trc_diced_mesh dice(const struct cube *c) {
@@ -263,6 +288,175 @@ static void open_boundaries(void **state) {
     }
 }
 
+/* The faces after one level; new vertices: those of the cube, then one of each edge. */
+static struct trc_faces one_level(const struct cube *c) {
+    const struct trc_row_layout rows = trc_row_layout_of(&c->desc);
+    struct trc_faces f;
+    assert_int_equal(trc_join_faces(&rows, &c->desc, &f), TRC_OK);
+    assert_int_equal(trc_catmull_clark_subdivide(&f), TRC_OK);
+    return f;
+}
+
+static void expect_vertex(const struct trc_faces *f, size_t vertex, double x, double y, double z) {
+    const float *p = f->vertices + f->vertex_width * vertex;
+    assert_true(fabs(p[0] - x) < 1e-6 && fabs(p[1] - y) < 1e-6 && fabs(p[2] - z) < 1e-6);
+}
+
+/* The new vertex between two of the cube's. */
+static size_t middle_of(const struct trc_faces *f, uint32_t a, uint32_t b) {
+    for (size_t c = 0; c < 4 * (size_t)f->face_count; c += 4)
+        for (size_t d = 0; d < 4 * (size_t)f->face_count; d += 4)
+            if (f->indices[c] == a && f->indices[d] == b && f->indices[c + 1] == f->indices[d + 3])
+                return f->indices[c + 1];
+    fail();
+    return 0;
+}
+
+static double blended(double smooth, double sharp, double sharpness) {
+    return smooth + (sharp - smooth) * fmin(sharpness, 1);
+}
+
+/* Of (1, 1, 1) and of an edge of it: smooth, they go to 5/9 and 3/4; along the ring, to 3/4 and, in
+ * z and across the edge, nowhere. */
+static void creases_blend(void **state) {
+    (void)state;
+    static const float sharpness[] = {0, 0.25f, 0.75f, 1, 1.5f, 4, 9.75f, 10};
+    for (size_t i = 0; i < sizeof sharpness / sizeof *sharpness; i++) {
+        const double s = sharpness[i];
+        struct cube c;
+        build(&c, TRC_DICING_CATMULL_CLARK, 1);
+        crease_ring(&c, sharpness[i]);
+        struct trc_faces f = one_level(&c);
+        const double along = blended(5.0 / 9, 0.75, s), z = blended(5.0 / 9, 1, s);
+        expect_vertex(&f, 7, along, along, z);
+        expect_vertex(&f, middle_of(&f, 6, 7), 0, blended(0.75, 1, s), blended(0.75, 1, s));
+        expect_vertex(&f, middle_of(&f, 3, 7), 0.75, 0.75, 0);
+        expect_vertex(&f, 3, 5.0 / 9, 5.0 / 9, -5.0 / 9);
+        const float after = s >= 10 ? sharpness[i] : fmaxf(sharpness[i] - 1, 0);
+        size_t sharp_count = 0;
+        for (size_t k = 0; k < 4 * (size_t)f.face_count; k++) {
+            assert_true(f.edge_sharpness[k] == after || f.edge_sharpness[k] == 0);
+            sharp_count += f.edge_sharpness[k] > 0;
+        }
+        assert_int_equal(sharp_count, after > 0 ? 16 : 0); /* 4 edges, 2 halves, 2 faces */
+        trc_faces_free(&f);
+    }
+}
+
+/* One sharp edge ends smoothly, three are a corner, whose fainter edge leaves a crease. */
+static void ends_and_corners_of_creases(void **state) {
+    (void)state;
+    struct cube c;
+    build(&c, TRC_DICING_CATMULL_CLARK, 1);
+    crease_edge(&c, 6, 7, 10);
+    struct trc_faces f = one_level(&c);
+    expect_vertex(&f, 7, 5.0 / 9, 5.0 / 9, 5.0 / 9);
+    expect_vertex(&f, middle_of(&f, 6, 7), 0, 1, 1);
+    trc_faces_free(&f);
+
+    for (uint32_t k = 0; k < 4; k++) {
+        build(&c, TRC_DICING_CATMULL_CLARK, 1);
+        crease_ring(&c, 10);
+        crease_edge(&c, 7, 3, 0.5f * (float)k);
+        f = one_level(&c);
+        expect_vertex(&f, 7, blended(0.75, 1, 0.5 * k), blended(0.75, 1, 0.5 * k), 1);
+        trc_faces_free(&f);
+    }
+    /* What ends together counts by its mean: two edges and the vertex, of 0.75. */
+    build(&c, TRC_DICING_CATMULL_CLARK, 1);
+    crease_ring(&c, 0.75f);
+    crease_vertex(&c, 7, 0.25f);
+    f = one_level(&c);
+    const double corner = blended(5.0 / 9, 1, (0.75 + 0.75 + 0.25) / 3);
+    expect_vertex(&f, 7, corner, corner, corner);
+    trc_faces_free(&f);
+}
+
+static void creased_vertices(void **state) {
+    (void)state;
+    static const float sharpness[] = {0.25f, 1, 2.5f};
+    struct cube c;
+    for (size_t i = 0; i < 3; i++) {
+        build(&c, TRC_DICING_CATMULL_CLARK, 1);
+        crease_vertex(&c, 7, sharpness[i]);
+        struct trc_faces f = one_level(&c);
+        const double place = blended(5.0 / 9, 1, sharpness[i]);
+        expect_vertex(&f, 7, place, place, place);
+        assert_true(f.vertex_sharpness[7] == fmaxf(sharpness[i] - 1, 0));
+        expect_vertex(&f, 6, -5.0 / 9, 5.0 / 9, 5.0 / 9);
+        trc_faces_free(&f);
+    }
+    build(&c, TRC_DICING_CATMULL_CLARK, 0.1f);
+    crease_vertex(&c, 7, 10);
+    struct trc_diced_mesh m = dice(&c);
+    expect_closed(&m);
+    for (int i = 0; i < 3; i++)
+        assert_true(m.positions[3 * 7 + i] == 1 && fabsf(m.positions[i] + 0.5f) < 1e-6f);
+    trc_diced_mesh_free(&m);
+}
+
+static double area_of_slot(const struct trc_diced_mesh *m, uint16_t slot) {
+    double area = 0;
+    for (size_t t = 0; t < m->desc.triangle_count; t++) {
+        const float *a = corner(m, 3 * t), *b = corner(m, 3 * t + 1), *c = corner(m, 3 * t + 2);
+        double square = 0;
+        for (int i = 0; i < 3; i++) {
+            const int j = (i + 1) % 3, k = (i + 2) % 3;
+            const double part = ((double)b[j] - a[j]) * ((double)c[k] - a[k]) -
+                                ((double)b[k] - a[k]) * ((double)c[j] - a[j]);
+            square += part * part;
+        }
+        area += m->material_index[t] == slot ? 0.5 * sqrt(square) : 0;
+    }
+    return area;
+}
+
+/* What a crease for ever surrounds is as if it had been cut out. */
+static void creases_cut(void **state) {
+    (void)state;
+    struct cube c;
+    build(&c, TRC_DICING_CATMULL_CLARK, 0.05f);
+    crease_ring(&c, 10);
+    struct trc_diced_mesh m = dice(&c);
+    expect_closed(&m);
+    for (size_t k = 0; k < m.desc.index_count; k++)
+        assert_true(m.material_index[k / 3] != 1 || fabsf(corner(&m, k)[2] - 1) < 1e-6f);
+    const double area = area_of_slot(&m, 1);
+    trc_diced_mesh_free(&m);
+
+    build(&c, TRC_DICING_CATMULL_CLARK, 0.05f);
+    memcpy(c.indices, c.indices + 6, 6 * sizeof *c.indices); /* that side alone */
+    c.desc.triangle_count = 2;
+    c.desc.index_count = 6;
+    c.attribute.value_count = 12;
+    c.dicing.face_count = 2;
+    m = dice(&c);
+    assert_true(fabs(area_of_slot(&m, 0) - area) < 1e-6);
+    trc_diced_mesh_free(&m);
+}
+
+/* With all edges sharp for ever a cube stays one; a sharpness of 0 is none. */
+static void all_edges_creased(void **state) {
+    (void)state;
+    double volumes[3];
+    for (int round = 0; round < 3; round++) {
+        struct cube c;
+        build(&c, TRC_DICING_CATMULL_CLARK, 0.1f);
+        for (uint32_t a = 0; a < 8 && round; a++)
+            for (uint32_t bit = 1; bit < 8; bit *= 2)
+                if (!(a & bit))
+                    crease_edge(&c, a, a | bit, round == 1 ? 0 : 10);
+        if (round == 1)
+            crease_vertex(&c, 0, 0);
+        struct trc_diced_mesh m = dice(&c);
+        expect_closed(&m);
+        volumes[round] = volume_of(&m);
+        trc_diced_mesh_free(&m);
+    }
+    assert_true(volumes[1] == volumes[0]);
+    assert_true(fabs(volumes[2] - 8) < 1e-6);
+}
+
 static void keys_move_alike(void **state) {
     (void)state;
     struct cube c;
@@ -346,6 +540,8 @@ static void memory_may_end(void **state) {
     for (uint32_t surface = 0; surface <= TRC_DICING_CATMULL_CLARK; surface++) {
         struct cube c;
         build(&c, surface, 0.05f);
+        crease_ring(&c, 2.5f);
+        crease_vertex(&c, 0, 10);
         const uint64_t bytes = trc_memory_bytes();
         trc_status status = TRC_ERROR_OUT_OF_MEMORY;
         int failures = 0;
@@ -391,16 +587,37 @@ static void bad_descriptors(void **state) {
     REFUSED(TRC_ERROR_INVALID_ARGUMENT, c.dicing.face_count = 11);
     REFUSED(TRC_ERROR_INVALID_ARGUMENT, c.dicing.faces = NULL);
     REFUSED(TRC_OK, c.dicing.faces = NULL; c.dicing.face_count = 0);
+    REFUSED(TRC_ERROR_INVALID_ARGUMENT, crease_ring(&c, 1); c.dicing.crease_edge_count = 7);
+    REFUSED(TRC_ERROR_INVALID_ARGUMENT, crease_ring(&c, 1); c.dicing.crease_edges = NULL);
+    REFUSED(TRC_ERROR_INVALID_ARGUMENT, crease_ring(&c, 1); c.dicing.crease_sharpness = NULL);
+    REFUSED(TRC_ERROR_INVALID_ARGUMENT, crease_edge(&c, 7, 8, 1));
+    REFUSED(TRC_ERROR_INVALID_ARGUMENT, crease_edge(&c, 7, 6, -1));
+    REFUSED(TRC_ERROR_INVALID_ARGUMENT, crease_edge(&c, 7, 6, NAN));
+    REFUSED(TRC_ERROR_TOO_LARGE, crease_edge(&c, 7, 6, 1); c.dicing.crease_count = UINT64_MAX / 2);
+    REFUSED(TRC_ERROR_INVALID_ARGUMENT, crease_vertex(&c, 7, -1));
+    REFUSED(TRC_ERROR_INVALID_ARGUMENT, crease_vertex(&c, 7, 1);
+            c.dicing.vertex_sharpness_count = 7);
+    REFUSED(TRC_OK, crease_edge(&c, 7, 0, 1); crease_vertex(&c, 7, 1)); /* no edge, a diagonal */
     assert_int_equal(trc_scene_destroy(scene), TRC_OK);
 }
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(linear_cubes),    cmocka_unit_test(cameras),
-        cmocka_unit_test(catmull_clark),   cmocka_unit_test(curved_edges_follow),
-        cmocka_unit_test(open_boundaries), cmocka_unit_test(keys_move_alike),
-        cmocka_unit_test(limits_are_kept), cmocka_unit_test(odd_meshes),
-        cmocka_unit_test(memory_may_end),  cmocka_unit_test(bad_descriptors),
+        cmocka_unit_test(linear_cubes),
+        cmocka_unit_test(cameras),
+        cmocka_unit_test(catmull_clark),
+        cmocka_unit_test(curved_edges_follow),
+        cmocka_unit_test(open_boundaries),
+        cmocka_unit_test(creases_blend),
+        cmocka_unit_test(ends_and_corners_of_creases),
+        cmocka_unit_test(creased_vertices),
+        cmocka_unit_test(creases_cut),
+        cmocka_unit_test(all_edges_creased),
+        cmocka_unit_test(keys_move_alike),
+        cmocka_unit_test(limits_are_kept),
+        cmocka_unit_test(odd_meshes),
+        cmocka_unit_test(memory_may_end),
+        cmocka_unit_test(bad_descriptors),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

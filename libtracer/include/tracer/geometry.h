@@ -46,7 +46,7 @@ typedef struct trc_dicing_desc {
     uint32_t struct_size; /* of this structure; checked */
     uint32_t surface; /* TRC_DICING_*, enum trc_dicing_surface. As in Cycles, UV maps and colours
                          are interpolated linearly in all; CATMULL_CLARK rounds the corners of
-                         open boundaries and knows no creases */
+                         open boundaries */
     uint32_t space;   /* TRC_DICING_*, enum trc_dicing_space */
     uint32_t max_subdivisions;  /* 0..16 halvings of an edge; CATMULL_CLARK takes one at least */
     uint32_t sharp_corners;     /* 0 or 1: with CATMULL_CLARK, a vertex of a single face stays */
@@ -63,6 +63,17 @@ typedef struct trc_dicing_desc {
     const uint32_t *faces; /* the face of each triangle, those of one side by side; NULL: each is
                               one by itself. Read for CATMULL_CLARK alone */
     uint64_t face_count;   /* number of elements of faces, checked */
+    /* Creases, for CATMULL_CLARK alone. A sharpness, 0 or more, is the number of levels of
+     * subdivision that an edge or vertex is sharp for, a fraction of one in part; from 10 on, for
+     * all. */
+    const uint32_t *crease_edges; /* the two vertices of each crease, in either order; where they
+                                     share no edge of a face, it is none; of an edge named twice
+                                     the first counts */
+    uint64_t crease_edge_count;   /* number of elements of crease_edges: 2 * crease_count */
+    const float *crease_sharpness;
+    uint64_t crease_count; /* number of elements of crease_sharpness; 0: no edge is creased */
+    const float *vertex_sharpness;   /* of each vertex; NULL: 0 */
+    uint64_t vertex_sharpness_count; /* number of elements of vertex_sharpness, checked */
 } trc_dicing_desc;
 
 /* Linear, of a side of 1 metre in the object's space, 12 subdivisions at most, an offscreen_scale

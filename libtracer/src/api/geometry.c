@@ -50,7 +50,36 @@ static trc_status check_normals(const trc_mesh_desc *desc) {
                            "normals");
 }
 
-static trc_status check_dicing(const trc_dicing_desc *dicing, uint64_t triangle_count) {
+static trc_status check_sharpness(const float *values, uint64_t count, const char *name) {
+    for (uint64_t i = 0; i < count; i++)
+        TRC_TRY(trc_check_float(values[i], 0.0f, FLT_MAX, name));
+    return TRC_OK;
+}
+
+static trc_status check_creases(const trc_dicing_desc *dicing, uint64_t vertex_count) {
+    TRC_TRY(check_product(2, dicing->crease_count, 1, "crease_edges"));
+    TRC_TRY(trc_check_array(dicing->crease_edges, dicing->crease_edge_count,
+                            2 * dicing->crease_count, sizeof(uint32_t), sizeof(uint32_t),
+                            "crease_edges"));
+    TRC_TRY(trc_check_array(dicing->crease_sharpness, dicing->crease_count, dicing->crease_count,
+                            sizeof(float), sizeof(float), "crease_sharpness"));
+    TRC_TRY(check_sharpness(dicing->crease_sharpness, dicing->crease_count, "crease_sharpness"));
+    for (uint64_t i = 0; i < dicing->crease_edge_count; i++) {
+        if (dicing->crease_edges[i] >= vertex_count)
+            return trc_fail(TRC_ERROR_INVALID_ARGUMENT,
+                            "crease %" PRIu64 " has the vertex %" PRIu32
+                            ", but the mesh has %" PRIu64,
+                            i / 2, dicing->crease_edges[i], vertex_count);
+    }
+    if (!dicing->vertex_sharpness && !dicing->vertex_sharpness_count)
+        return TRC_OK;
+    TRC_TRY(trc_check_array(dicing->vertex_sharpness, dicing->vertex_sharpness_count, vertex_count,
+                            sizeof(float), sizeof(float), "vertex_sharpness"));
+    return check_sharpness(dicing->vertex_sharpness, vertex_count, "vertex_sharpness");
+}
+
+static trc_status check_dicing(const trc_mesh_desc *desc) {
+    const trc_dicing_desc *dicing = desc->dicing;
     TRC_TRY(trc_check_struct(dicing, sizeof *dicing, "trc_dicing_desc"));
     TRC_TRY(trc_check_enum(dicing->surface, TRC_DICING_CATMULL_CLARK + 1, "surface"));
     TRC_TRY(trc_check_enum(dicing->space, TRC_DICING_CENTRAL + 1, "space"));
@@ -60,10 +89,11 @@ static trc_status check_dicing(const trc_dicing_desc *dicing, uint64_t triangle_
     TRC_TRY(trc_check_finite(dicing->object_to_camera, 12, "object_to_camera"));
     TRC_TRY(trc_check_finite(dicing->window, 4, "window"));
     TRC_TRY(trc_check_float(dicing->offscreen_scale, 1.0f, FLT_MAX, "offscreen_scale"));
+    TRC_TRY(check_creases(dicing, desc->vertex_count));
     if (!dicing->faces && !dicing->face_count)
         return TRC_OK;
-    return trc_check_array(dicing->faces, dicing->face_count, triangle_count, sizeof(uint32_t),
-                           sizeof(uint32_t), "faces");
+    return trc_check_array(dicing->faces, dicing->face_count, desc->triangle_count,
+                           sizeof(uint32_t), sizeof(uint32_t), "faces");
 }
 
 static trc_status check_mesh(const trc_mesh_desc *desc) {
@@ -91,7 +121,7 @@ static trc_status check_mesh(const trc_mesh_desc *desc) {
         TRC_TRY(check_attribute(&desc->attributes[i], desc->triangle_count));
     }
     if (desc->dicing)
-        TRC_TRY(check_dicing(desc->dicing, desc->triangle_count));
+        TRC_TRY(check_dicing(desc));
     return TRC_OK;
 }
 

@@ -113,6 +113,11 @@ static void cut_face(const struct trc_faces *f, const struct trc_rings *r, uint3
             add(values + 2 * width, corner(f, k), 1.0f / (float)(end - begin), width);
         add(values + 3 * width, corner(f, c), 0.5f, width);
         add(values + 3 * width, corner(f, previous), 0.5f, width);
+        if (f->edge_sharpness) { /* its inner edges are smooth */
+            to->edge_sharpness[4 * (size_t)c] = trc_sharpness_after(f->edge_sharpness[c]);
+            to->edge_sharpness[4 * (size_t)c + 3] =
+                trc_sharpness_after(f->edge_sharpness[previous]);
+        }
     }
 }
 
@@ -135,9 +140,15 @@ static trc_status create_level(const struct trc_faces *f, const struct trc_rings
         .corners = trc_alloc_zeroed(4 * corners * f->corner_width, sizeof *to->corners),
         .material_index = trc_alloc(corners, sizeof *to->material_index),
         .smooth = trc_alloc(corners, 1),
+        .edge_sharpness =
+            f->edge_sharpness ? trc_alloc_zeroed(4 * corners, sizeof *to->edge_sharpness) : NULL,
+        .vertex_sharpness =
+            f->vertex_sharpness ? trc_alloc_zeroed(vertices, sizeof *to->vertex_sharpness) : NULL,
     };
-    const bool enough =
-        to->begin && to->indices && to->vertices && to->corners && to->material_index && to->smooth;
+    const bool enough = to->begin && to->indices && to->vertices && to->corners &&
+                        to->material_index && to->smooth &&
+                        (to->edge_sharpness || !f->edge_sharpness) &&
+                        (to->vertex_sharpness || !f->vertex_sharpness);
     return enough ? TRC_OK : trc_no_memory_to_dice();
 }
 
@@ -154,6 +165,8 @@ trc_status trc_catmull_clark_subdivide(struct trc_faces *f) {
         for (uint32_t face = 0; face < f->face_count; face++)
             cut_face(f, &r, face, &to);
         to.begin[to.face_count] = 4 * to.face_count;
+        for (uint32_t v = 0; to.vertex_sharpness && v < f->vertex_count; v++)
+            to.vertex_sharpness[v] = trc_sharpness_after(f->vertex_sharpness[v]);
         trc_faces_free(f);
         *f = to;
     } else {

@@ -70,6 +70,19 @@ static trc_status take_faces(struct trc_refined_mesh *mesh, const struct trc_fac
     return TRC_OK;
 }
 
+/* On creases the surface has no normal: forgets those of their vertices. */
+static void forget_creased_normals(struct trc_refined_mesh *mesh, const struct trc_faces *f) {
+    for (uint32_t c = 0; c < 4 * f->face_count; c++) {
+        const bool is_sharp = f->edge_sharpness && f->edge_sharpness[c] > 0.0f;
+        const uint32_t ends[2] = {f->indices[c], f->indices[(c & ~3u) | ((c + 1) & 3)]};
+        for (int k = 0; k < 2 && is_sharp; k++)
+            trc_forget_normals(mesh, ends[k]);
+    }
+    for (uint32_t v = 0; f->vertex_sharpness && v < f->vertex_count; v++)
+        if (f->vertex_sharpness[v] > 0.0f)
+            trc_forget_normals(mesh, v);
+}
+
 /* Even levels, then the limit; the levels taken are in *levels_out. */
 static trc_status subdivide(struct trc_refined_mesh *mesh, struct trc_faces *f,
                             uint32_t *levels_out) {
@@ -81,7 +94,10 @@ static trc_status subdivide(struct trc_refined_mesh *mesh, struct trc_faces *f,
              8 * (uint64_t)f->face_count <= trc_triangle_max(mesh) && has_long_edge(mesh, f));
     TRC_TRY(trc_catmull_clark_limit(f));
     *levels_out = levels;
-    return take_faces(mesh, f);
+    TRC_TRY(take_faces(mesh, f));
+    trc_compute_vertex_normals(mesh);
+    forget_creased_normals(mesh, f);
+    return TRC_OK;
 }
 
 static trc_status refine(struct trc_refined_mesh *mesh, const trc_mesh_desc *desc) {
@@ -95,10 +111,10 @@ static trc_status refine(struct trc_refined_mesh *mesh, const trc_mesh_desc *des
         trc_faces_free(&faces);
     } else {
         status = take_triangles(mesh, desc);
+        if (status == TRC_OK && mesh->rows.how->surface == TRC_DICING_CURVED)
+            trc_compute_vertex_normals(mesh);
     }
     TRC_TRY(status);
-    if (mesh->rows.how->surface != TRC_DICING_LINEAR)
-        trc_compute_vertex_normals(mesh);
     const uint32_t levels_max = mesh->rows.how->max_subdivisions;
     return trc_split_edges(mesh, levels < levels_max ? levels_max - levels : 0);
 }

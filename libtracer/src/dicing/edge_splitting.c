@@ -9,23 +9,34 @@
 #include "dicing/rate.h"
 #include "dicing/vector.h"
 
+/* The unit normal at one end of an edge; where there is none, that of the other end mirrored. */
+static void normal_at_end(const float own[3], const float other[3], const float along[3],
+                          float square, float normal[3]) {
+    const bool is_known = trc_dot(own, own) > 0.0f;
+    const float turn = 2.0f * trc_dot(along, other) / square;
+    for (int i = 0; i < 3; i++)
+        normal[i] = is_known ? own[i] : other[i] - turn * along[i];
+}
+
 /* The middle of a cubic and the normal there, as in A. Vlachos, J. Peters, C. Boyd, J. Mitchell,
  * "Curved PN triangles", 2001: both are an edge's own. middle is the mean of both ends. */
 static void curve_middle(const float a[3], const float b[3], const float normal_a[3],
                          const float normal_b[3], float middle[3], float normal[3]) {
-    float along[3], sum[3];
-    for (int i = 0; i < 3; i++) {
+    float along[3], at_a[3], at_b[3], sum[3];
+    for (int i = 0; i < 3; i++)
         along[i] = b[i] - a[i];
-        sum[i] = normal_a[i] + normal_b[i];
-    }
     const float square = trc_dot(along, along);
     if (!(square > 0.0f))
         return;
-    const float rise_a = trc_dot(along, normal_a), rise_b = -trc_dot(along, normal_b);
+    normal_at_end(normal_a, normal_b, along, square, at_a);
+    normal_at_end(normal_b, normal_a, along, square, at_b);
+    for (int i = 0; i < 3; i++)
+        sum[i] = at_a[i] + at_b[i];
+    const float rise_a = trc_dot(along, at_a), rise_b = -trc_dot(along, at_b);
     const float turn = 2.0f * trc_dot(along, sum) / square;
     float turned[3];
     for (int i = 0; i < 3; i++) {
-        middle[i] -= 0.125f * (rise_a * normal_a[i] + rise_b * normal_b[i]);
+        middle[i] -= 0.125f * (rise_a * at_a[i] + rise_b * at_b[i]);
         turned[i] = sum[i] - turn * along[i];
     }
     const float size = trc_length(turned);

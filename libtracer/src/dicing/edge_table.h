@@ -19,4 +19,7 @@ void trc_edge_table_free(struct trc_edge_table *table);
  * none yet. */
 uint32_t trc_edge_table_take(struct trc_edge_table *table, uint32_t a, uint32_t b, uint32_t next);
 
+/* The value of an edge, UINT32_MAX where it has none. */
+uint32_t trc_edge_table_find(const struct trc_edge_table *table, uint32_t a, uint32_t b);
+
 #endif

@@ -1,6 +1,7 @@
 #include "dicing/face_joining.h"
 
 #include "core/core.h"
+#include "dicing/creases.h"
 #include "dicing/refined_mesh.h"
 
 /* Whether another triangle of a face shares the edge that begins at a corner. */
@@ -87,5 +88,5 @@ trc_status trc_join_faces(const struct trc_row_layout *rows, const trc_mesh_desc
             trc_fill_row(rows, desc, v, f->vertices + f->vertex_width * v);
     }
     trc_free(outline);
-    return enough ? TRC_OK : trc_no_memory_to_dice();
+    return enough ? trc_take_creases(f, desc->dicing) : trc_no_memory_to_dice();
 }

@@ -9,5 +9,7 @@ void trc_faces_free(struct trc_faces *faces) {
     trc_free(faces->corners);
     trc_free(faces->material_index);
     trc_free(faces->smooth);
+    trc_free(faces->edge_sharpness);
+    trc_free(faces->vertex_sharpness);
     *faces = (struct trc_faces){.vertex_count = 0};
 }

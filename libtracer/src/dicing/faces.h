@@ -19,6 +19,9 @@ struct trc_faces {
     float *vertices, *corners;
     uint16_t *material_index; /* of the faces */
     uint8_t *smooth;          /* of the faces */
+    /* For how many levels creases stay, of the corners that of the edge to the next one, and of the
+     * vertices. NULL: there are none. */
+    float *edge_sharpness, *vertex_sharpness;
 };
 
 void trc_faces_free(struct trc_faces *faces);

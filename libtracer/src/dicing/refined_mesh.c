@@ -105,3 +105,8 @@ void trc_compute_vertex_normals(struct trc_refined_mesh *mesh) {
         }
     }
 }
+
+void trc_forget_normals(struct trc_refined_mesh *mesh, size_t vertex) {
+    memset(trc_refined_row(mesh, vertex) + mesh->rows.normals, 0,
+           3 * mesh->rows.key_count * sizeof(float));
+}

@@ -41,6 +41,9 @@ uint64_t trc_triangle_max(const struct trc_refined_mesh *mesh);
 /* Vertex normals of the open triangles, each weighted by its angle there. */
 void trc_compute_vertex_normals(struct trc_refined_mesh *mesh);
 
+/* A vertex has none from here on. */
+void trc_forget_normals(struct trc_refined_mesh *mesh, size_t vertex);
+
 trc_status trc_no_memory_to_dice(void);
 
 #endif

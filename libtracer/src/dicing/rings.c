@@ -4,10 +4,14 @@
 #include "dicing/edge_table.h"
 #include "dicing/refined_mesh.h"
 
+/* From here on a sharpness does not end, as in OpenSubdiv. */
+#define SHARPNESS_INFINITE 10.0f
+
 void trc_rings_free(struct trc_rings *r) {
     trc_free(r->edges);
     trc_free(r->ends);
     trc_free(r->uses);
+    trc_free(r->sharpness);
     trc_free(r->rings);
 }
 
@@ -21,6 +25,8 @@ static void number_edges(const struct trc_faces *f, struct trc_edge_table *table
                 r->ends[2 * (size_t)edge] = a;
                 r->ends[2 * (size_t)edge + 1] = b;
                 r->uses[edge] = 0;
+                if (r->sharpness)
+                    r->sharpness[edge] = f->edge_sharpness[c];
                 r->edge_count++;
             }
             r->edges[c] = edge;
@@ -30,10 +36,31 @@ static void number_edges(const struct trc_faces *f, struct trc_edge_table *table
     }
 }
 
-static void count_boundaries(struct trc_rings *r) {
-    for (size_t e = 0; e < r->edge_count; e++)
-        for (size_t k = 0; k < 2; k++)
-            r->rings[r->ends[2 * e + k]].boundary_count += r->uses[e] != 2;
+float trc_sharpness_after(float sharpness) {
+    if (sharpness >= SHARPNESS_INFINITE)
+        return sharpness;
+    return sharpness > 1.0f ? sharpness - 1.0f : 0.0f;
+}
+
+static float sharpness_of(const struct trc_rings *r, size_t edge) {
+    if (r->uses[edge] != 2)
+        return SHARPNESS_INFINITE;
+    return r->sharpness ? r->sharpness[edge] : 0.0f;
+}
+
+static void count_sharp_edges(struct trc_rings *r) {
+    for (size_t e = 0; e < r->edge_count; e++) {
+        const float sharpness = sharpness_of(r, e);
+        const bool is_sharp = sharpness > 0.0f, stays = trc_sharpness_after(sharpness) > 0.0f;
+        for (size_t k = 0; k < 2; k++) {
+            struct trc_ring *ring = &r->rings[r->ends[2 * e + k]];
+            ring->boundary_count += r->uses[e] != 2;
+            ring->sharp_count += is_sharp;
+            ring->still_sharp_count += stays;
+            if (is_sharp && !stays)
+                ring->ending += sharpness;
+        }
+    }
 }
 
 trc_status trc_rings_find(const struct trc_faces *f, struct trc_rings *r) {
@@ -42,34 +69,66 @@ trc_status trc_rings_find(const struct trc_faces *f, struct trc_rings *r) {
         .edges = trc_alloc(corners, sizeof *r->edges),
         .ends = trc_alloc(2 * corners, sizeof *r->ends),
         .uses = trc_alloc(corners, sizeof *r->uses),
+        .sharpness = f->edge_sharpness ? trc_alloc(corners, sizeof *r->sharpness) : NULL,
         .rings = trc_alloc_zeroed(f->vertex_count, sizeof *r->rings),
     };
     struct trc_edge_table table;
-    const bool enough =
-        trc_edge_table_create(&table, corners) && r->edges && r->ends && r->uses && r->rings;
+    const bool enough = trc_edge_table_create(&table, corners) && r->edges && r->ends && r->uses &&
+                        (r->sharpness || !f->edge_sharpness) && r->rings;
     if (enough) {
         number_edges(f, &table, r);
-        count_boundaries(r);
+        count_sharp_edges(r);
     }
     trc_edge_table_free(&table);
     return enough ? TRC_OK : trc_no_memory_to_dice();
 }
 
 float trc_edge_rule(const struct trc_rings *r, size_t edge) {
-    return r->uses[edge] == 2 ? 0.0f : 1.0f;
+    const float sharpness = sharpness_of(r, edge);
+    return sharpness < 1.0f ? sharpness : 1.0f;
+}
+
+enum rule { SMOOTH, CREASE, CORNER };
+
+static enum rule rule_of(float vertex_sharpness, uint32_t sharp_count) {
+    if (vertex_sharpness > 0.0f || sharp_count > 2)
+        return CORNER;
+    return sharp_count == 2 ? CREASE : SMOOTH;
+}
+
+/* Infinite where a vertex is a corner by its edges, whatever the rest. */
+static float vertex_sharpness_of(const struct trc_faces *f, const struct trc_ring *ring,
+                                 uint32_t vertex) {
+    const bool is_odd = !ring->face_count || ring->boundary_count % 2 || ring->boundary_count > 2;
+    if (is_odd || (f->sharp_corners && ring->face_count == 1))
+        return SHARPNESS_INFINITE;
+    return f->vertex_sharpness ? f->vertex_sharpness[vertex] : 0.0f;
 }
 
 struct trc_vertex_rule trc_vertex_rule_of(const struct trc_faces *f, const struct trc_rings *r,
                                           uint32_t vertex) {
     const struct trc_ring *ring = &r->rings[vertex];
-    const bool is_sharp_corner = f->sharp_corners && ring->face_count == 1;
-    return (struct trc_vertex_rule){
-        .smooth = ring->face_count && !ring->boundary_count,
-        .crease = ring->boundary_count == 2 && !is_sharp_corner,
-    };
+    const float sharpness = vertex_sharpness_of(f, ring, vertex);
+    const float sharpness_after = trc_sharpness_after(sharpness);
+    const enum rule rules[2] = {rule_of(sharpness, ring->sharp_count),
+                                rule_of(sharpness_after, ring->still_sharp_count)};
+    float parts[2] = {1.0f, 0.0f};
+    /* A rule that ends holds by the mean sharpness of all that ends. */
+    if (rules[0] != rules[1]) {
+        const bool vertex_ends = sharpness > 0.0f && !(sharpness_after > 0.0f);
+        const uint32_t count = ring->sharp_count - ring->still_sharp_count + vertex_ends;
+        parts[0] = (ring->ending + (vertex_ends ? sharpness : 0.0f)) / (float)count;
+        parts[1] = 1.0f - parts[0];
+    }
+    struct trc_vertex_rule rule = {.sharpness_min = rules[0] == CREASE ? 0.0f : 1.0f};
+    for (int i = 0; i < 2; i++) {
+        rule.smooth += rules[i] == SMOOTH ? parts[i] : 0.0f;
+        rule.crease += rules[i] == CREASE ? parts[i] : 0.0f;
+    }
+    return rule;
 }
 
 bool trc_is_along_crease(const struct trc_rings *r, const struct trc_vertex_rule *rule,
                          size_t edge) {
-    return rule->crease > 0.0f && r->uses[edge] != 2;
+    return rule->crease > 0.0f && sharpness_of(r, edge) > rule->sharpness_min;
 }
