@@ -212,6 +212,12 @@ def _array(values, dtype):
     return None if values is None else np.ascontiguousarray(values, dtype=dtype)
 
 
+# Of abi.DicingDesc: fields that are arrays, of their numbers of elements, and types.
+_DICING_ARRAYS = (("faces", "face_count", np.uint32), ("crease_edges", "crease_edge_count", np.uint32),
+                  ("crease_sharpness", "crease_count", np.float32),
+                  ("vertex_sharpness", "vertex_sharpness_count", np.float32))
+
+
 def _address(array):
     return None if array is None or array.size == 0 else array.ctypes.data
 
@@ -293,8 +299,8 @@ class Scene:
         """A mesh. positions (keys, vertices, 3) float32; indices (triangles, 3) uint32; normals
         (keys, vertices | triangles * 3, 3); smooth (triangles,) uint8; material_index (triangles,)
         uint16; attributes: (name, array (triangles * 3, 2 | 4) float32) pairs, default UV map first;
-        generated: (vertices, 3) or None; dicing: fields of abi.DicingDesc, and faces (triangles,) uint32, or
-        None."""
+        generated: (vertices, 3) or None; dicing: fields of abi.DicingDesc, of which faces, (triangles,)
+        uint32, and those of creases, if there are any, are arrays, or None."""
         positions, indices = _array(positions, np.float32), _array(indices, np.uint32)
         normals, smooth = _array(normals, np.float32), _array(smooth, np.uint8)
         material_index, generated = _array(material_index, np.uint16), _array(generated, np.float32)
@@ -313,9 +319,10 @@ class Scene:
             attributes=structs if arrays else None, generated=_address(generated),
             generated_count=0 if generated is None else generated.size)
         if dicing:
-            faces = _array(dicing["faces"], np.uint32)
-            dicing = describe(abi.DicingDesc, **{**dicing, "faces": _address(faces), "face_count": faces.size})
-            desc.dicing = ctypes.pointer(dicing)
+            arrays = {name: _array(dicing.get(name), dtype) for name, _, dtype in _DICING_ARRAYS}
+            counts = {count: 0 if arrays[name] is None else arrays[name].size for name, count, _ in _DICING_ARRAYS}
+            places = {name: _address(values) for name, values in arrays.items()}
+            desc.dicing = ctypes.pointer(describe(abi.DicingDesc, **{**dicing, **places, **counts}))
         return self._create("trc_mesh_create", desc)
 
     def update_mesh(self, mesh, positions, normals=None):

@@ -40,6 +40,22 @@ def _make(shape, levels=0, kind='CATMULL_CLARK', **settings):
     return made
 
 
+def _crease(made, of_edges=None, of_vertices=None):
+    """Creases by the numbers of edges or vertices; all others are smooth."""
+    import bmesh
+    mesh = bmesh.new()
+    mesh.from_mesh(made.data)
+    for items, name, values in (mesh.edges, "crease_edge", of_edges), (mesh.verts, "crease_vert", of_vertices):
+        if not values:
+            continue
+        layers = items.layers
+        layer = layers.crease.verify() if hasattr(layers, "crease") else layers.float.new(name)
+        for item in items:
+            item[layer] = values.get(item.index, 0.0)
+    mesh.to_mesh(made.data)
+    mesh.free()
+
+
 def _by_both(made, material):
     import scenes
     made.data.materials.append(material)
@@ -74,8 +90,30 @@ def inside_pictures():
     return pictures
 
 
+def inside_creases():
+    import bpy
+    ring = (0, 1, 2, 3)  # around one side of the cube
+    cases = {"sharp": {"of_edges": dict.fromkeys(ring, 1.0)}, "soft": {"of_edges": dict.fromkeys(ring, 0.3)},
+             "fraction": {"of_edges": {0: 0.05, 1: 0.05, 2: 0.15, 3: 0.15, 4: 0.25, 9: 0.25}},
+             "all edges": {"of_edges": dict.fromkeys(range(12), 1.0)},
+             "corners": {"of_edges": {**dict.fromkeys(ring, 1.0), 4: 0.12, 9: 0.2}},
+             "vertices": {"of_vertices": {0: 1.0, 3: 0.2, 5: 0.07, 6: 0.2}},
+             "level 2": {"of_edges": dict.fromkeys(ring, 1.0), "of_vertices": {5: 0.2}, "levels": 2},
+             "off": {"of_edges": dict.fromkeys(ring, 1.0), "use_creases": False},
+             "plane": {"shape": "plane", "of_edges": {0: 1.0, 1: 1.0, 2: 0.2, 3: 0.2}}}
+    pictures = {}
+    for name, case in cases.items():
+        stage()
+        made = _make(case.get("shape", "cube"), case.get("levels", 0), rotation=(0.3, 0.2, 0.5))
+        made.modifiers[-1].use_creases = case.get("use_creases", True)
+        _crease(made, case.get("of_edges"), case.get("of_vertices"))
+        bpy.context.view_layer.update()
+        pictures[name] = _by_both(made, _tree("Normal"))
+    return pictures
+
+
 def inside_settings():
-    """{name: fields of a plane with one setting changed, None where it is not diced}"""
+    """{name: fields of a plane with one setting changed, None where it is not diced, warnings, and creases}"""
     import bpy
     from volley.sync import camera, dicing
     from volley.log import Warnings
@@ -90,7 +128,10 @@ def inside_settings():
         shown = dicing.Dicing(scene, keys, frame, is_final, warnings)
         for each in depsgraph.object_instances:  # which lasts no longer than its turn
             if each.object.type == 'MESH':
-                found[name] = shown.fields_of(each), list(warnings.take())
+                fields = shown.fields_of(each)
+                creases = shown.creases_of(each, each.object.data, fields) if fields else {}
+                found[name] = (fields, list(warnings.take()),
+                               {field: values.tolist() for field, values in creases.items()})
 
     stage()
     made, settings = _make("plane"), bpy.context.scene.cycles
@@ -107,18 +148,21 @@ def inside_settings():
     settings.dicing_camera = other
     look("camera")
     settings.dicing_camera = None
-    bpy.ops.object.mode_set(mode='EDIT')
-    bpy.ops.mesh.select_all(action='SELECT')
-    bpy.ops.transform.edge_crease(value=1.0)
-    bpy.ops.object.mode_set(mode='OBJECT')
+    _crease(made, {0: 0.0}, {1: 0.0})
+    look("creases of 0")
+    _crease(made, {1: 1.0, 2: 0.25}, {1: 0.5})
     look("creases")
+    modifier.use_creases = False
+    look("no creases")
+    modifier.subdivision_type = 'SIMPLE'
+    look("creases, simple")
+    modifier.subdivision_type = 'CATMULL_CLARK'
     modifier.show_render = False
     look("hidden")
     modifier.show_render = True
     if hasattr(modifier, "adaptive_space"):
         modifier.adaptive_space, modifier.adaptive_object_edge_length = 'OBJECT', 0.25
         look("length")
-        made.data.attributes.remove(made.data.attributes["crease_edge"])
         for levels in (1, 2):
             modifier.levels = modifier.render_levels = levels
             look(f"level {levels}")
@@ -172,14 +216,26 @@ def _tiles(image):
     return image.reshape(count, TILE, count, TILE, -1).mean(axis=(1, 3))
 
 
-def test_pictures(blender):
+def _differences(pictures):
+    """{name: how far apart the means are of both pictures, and those of their tiles}"""
     found = {}
-    for name, (ours, theirs) in blender.run(inside_pictures).items():
+    for name, (ours, theirs) in pictures.items():
         ours, theirs = ours[..., :3], theirs[..., :3]
         mean = abs(ours.mean() / theirs.mean() - 1.0)
         tile = np.abs(_tiles(ours) - _tiles(theirs)).max() / theirs.mean()
         found[name] = float(mean), float(tile)
         print(f"{name}: means differ by {mean:.2%}, of tiles by up to {tile:.2%}, {theirs.mean():.3f}")
+    return found
+
+
+def test_creases(blender):
+    for name, (mean, tile) in _differences(blender.run(inside_creases)).items():
+        assert mean < 0.01, f"{name}: means differ by {mean:.2%}"
+        assert tile < 0.08, f"{name}: those of tiles differ by up to {tile:.2%}"
+
+
+def test_pictures(blender):
+    found = _differences(blender.run(inside_pictures))
     is_curved = blender_support.version() >= (5, 0)  # from one level of the modifier on, not subdivided
     for name, (mean, tile) in found.items():
         worse = 2.5 if is_curved and "level 1" in name else 1.0  # of which a warning tells
@@ -206,8 +262,16 @@ def test_settings(blender):
     assert np.isclose(found["camera"][0]["side"], 2.0 * plain["side"])
     assert np.allclose(np.reshape(found["camera"][0]["object_to_camera"], (3, 4))[:, 3], (-1.0, -2.0, -3.0))
     assert found["hidden"][0] is None and found["off"][0] is None
-    assert not found["plain"][1]
-    assert any("knows no creases" in warning for warning in found["creases"][1])
+    assert not found["plain"][1] and not found["creases"][1]
+    assert found["plain"][2] == found["creases of 0"][2] == found["creases, simple"][2] == {}
+    creases = found["creases"][2]
+    assert sorted(creases["crease_sharpness"]) == [2.5, 10.0]
+    corner, = set(creases["crease_edges"][0]) & set(creases["crease_edges"][1])
+    expected = [0.0] * 4
+    expected[1] += 5.0
+    expected[corner] += 2.5  # of two edges: as the smoother one
+    assert creases["vertex_sharpness"] == expected
+    assert found["no creases"][2] == ({} if "length" in found else creases)  # Cycles 4.3 heeds them all the same
     if "length" in found:
         assert np.isclose(found["length"][0]["side"], 0.25)
         assert "too coarse for Cycles' surface" in found["level 1"][1][0] and not found["level 2"][1]

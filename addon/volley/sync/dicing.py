@@ -7,7 +7,7 @@ import numpy as np
 
 from .. import abi
 from ..compat import SUBDIVIDES_CAGE, cycles, has_adaptive_subdivision
-from . import camera
+from . import camera, creases
 
 _ALL_AROUND = 2.0 * math.pi  # radians that a panorama's full width is taken for
 
@@ -42,8 +42,6 @@ class Dicing:
         modifier = blender_object.modifiers[-1]
         fields = {"surface": self._surface_of(modifier),
                   "max_subdivisions": cycles(self._scene, "max_subdivisions", 12)}
-        if fields["surface"] != abi.DicingSurface.LINEAR and _has_creases(blender_object.data):
-            self._warnings.add(f"Object '{blender_object.name}': adaptive subdivision knows no creases")
         if self._is_final and fields["surface"] == abi.DicingSurface.CURVED and self._levels_of(modifier) == 1:
             self._warnings.add(f"Object '{blender_object.name}': adaptive subdivision starts from the modifier's "
                                "level 1, which is too coarse for Cycles' surface; 0, 2 and more are not")
@@ -60,6 +58,13 @@ class Dicing:
         return {**fields, "space": space, "side": self._rate * scale * self._pixel,
                 "object_to_camera": tuple(to_camera.ravel()), "window": tuple(self._window),
                 "offscreen_scale": cycles(self._scene, "offscreen_dicing_scale", 4.0)}
+
+    @staticmethod
+    def creases_of(each, mesh, fields):
+        """Further fields, arrays, of creases for the mesh of an instance that is diced by such fields. Till 4.3,
+        Cycles heeds them whatever the modifier says."""
+        is_off = SUBDIVIDES_CAGE and not each.object.modifiers[-1].use_creases
+        return {} if is_off or fields["surface"] != abi.DicingSurface.CATMULL_CLARK else creases.creases_of(mesh)
 
     def would_repeat(self, each, settings, fields):
         """Whether an instance's mesh that was diced by such settings, to such fields (None: it was not), would be
@@ -90,8 +95,3 @@ class Dicing:
             return levels
         most = render.simplify_subdivision_render if self._is_final else render.simplify_subdivision
         return min(levels, most)
-
-
-def _has_creases(mesh):
-    attributes = mesh.attributes
-    return "crease_edge" in attributes or "crease_vert" in attributes or getattr(mesh, "has_crease_edge", False)

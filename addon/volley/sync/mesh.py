@@ -35,7 +35,7 @@ class MeshData:
     attributes: list = field(default_factory=list)  # (name, (triangles * 3, 2 | 4) float32)
     generated: np.ndarray = None      # (vertices, 3) float32
     corners: np.ndarray = None        # (triangles * 3,) integers: Blender's corners, for corner normals
-    dicing: dict = None               # fields of abi.DicingDesc, and "faces", (triangles,) uint32
+    dicing: dict = None               # fields of abi.DicingDesc, those of faces and creases as arrays
     diced_by: tuple = None            # dicing.Dicing.settings and fields (None: not diced) where there is one
     poses: object = None              # Topology where later shapes are awaited
 

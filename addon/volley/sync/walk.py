@@ -271,7 +271,7 @@ class Walk:
         fields = dicing and dicing.fields_of(each)
         data.diced_by = dicing and (dicing.settings, fields)
         if fields:
-            mesh.dice(data, shape, fields, names[2])
+            mesh.dice(data, shape, {**fields, **dicing.creases_of(each, shape, fields)}, names[2])
         elif self._sync._meshes.will_resync and deform.is_posable(blender_object):
             data.poses = mesh.Topology(shape)
         if item.motion_keys > 1 and motion.may_deform(blender_object, instance.maker_of(each)):
