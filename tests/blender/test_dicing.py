@@ -93,7 +93,8 @@ def inside_pictures():
 def inside_creases():
     import bpy
     ring = (0, 1, 2, 3)  # around one side of the cube
-    cases = {"sharp": {"of_edges": dict.fromkeys(ring, 1.0)}, "soft": {"of_edges": dict.fromkeys(ring, 0.3)},
+    cases = {"sharp": {"of_edges": dict.fromkeys(ring, 1.0)}, "firm": {"of_edges": dict.fromkeys(ring, 0.6)},
+             "soft": {"of_edges": dict.fromkeys(ring, 0.3)},
              "fraction": {"of_edges": {0: 0.05, 1: 0.05, 2: 0.15, 3: 0.15, 4: 0.25, 9: 0.25}},
              "all edges": {"of_edges": dict.fromkeys(range(12), 1.0)},
              "corners": {"of_edges": {**dict.fromkeys(ring, 1.0), 4: 0.12, 9: 0.2}},
