@@ -22,13 +22,15 @@ def _tree(shown, scale=0.0, kind="NewGeometry"):
     return tree.material
 
 
-def _make(shape, levels=0, kind='CATMULL_CLARK', **settings):
-    """A plane or a cube that is subdivided adaptively."""
+def _make(shape, levels=0, kind='CATMULL_CLARK', has_other=False, **settings):
+    """A plane or a cube that is subdivided adaptively, maybe on top of another modifier, which does nothing."""
     import bpy
     getattr(bpy.ops.mesh, f"primitive_{shape}_add")(**settings)
     made = bpy.context.object
     for polygon in made.data.polygons:
         polygon.use_smooth = True
+    if has_other:
+        made.modifiers.new("Cast", 'CAST').factor = 0.0
     modifier = made.modifiers.new("Subdivision", 'SUBSURF')
     modifier.levels = modifier.render_levels = levels
     modifier.subdivision_type = kind
@@ -54,6 +56,7 @@ def _crease(made, of_edges=None, of_vertices=None):
             item[layer] = values.get(item.index, 0.0)
     mesh.to_mesh(made.data)
     mesh.free()
+    made.data.update()
 
 
 def _by_both(made, material):
@@ -77,6 +80,9 @@ def inside_pictures():
         stage()
         made = _make("cube", levels, rotation=(0.3, 0.2, 0.5))
         pictures[f"smooth, level {levels}"] = _by_both(made, _tree("UV", kind="TexCoord"))
+        stage()
+        made = _make("cube", levels, has_other=True, rotation=(0.3, 0.2, 0.5))
+        pictures[f"on another, level {levels}"] = _by_both(made, _tree("Normal"))
     stage(type='ORTHO', ortho_scale=4.0)
     bpy.context.scene.cycles.dicing_rate = 8.0
     pictures["coarse"] = _by_both(_make("cube", size=3.0), _tree("Position"))
@@ -98,7 +104,8 @@ def inside_creases():
              "fraction": {"of_edges": {0: 0.05, 1: 0.05, 2: 0.15, 3: 0.15, 4: 0.25, 9: 0.25}},
              "all edges": {"of_edges": dict.fromkeys(range(12), 1.0)},
              "corners": {"of_edges": {**dict.fromkeys(ring, 1.0), 4: 0.12, 9: 0.2}},
-             "vertices": {"of_vertices": {0: 1.0, 3: 0.2, 5: 0.07, 6: 0.2}},
+             "vertices": {"of_vertices": {0: 0.3, 3: 0.2, 5: 0.07, 6: 0.2}},
+             "spike": {"of_vertices": {5: 1.0}},
              "level 2": {"of_edges": dict.fromkeys(ring, 1.0), "of_vertices": {5: 0.2}, "levels": 2},
              "off": {"of_edges": dict.fromkeys(ring, 1.0), "use_creases": False},
              "plane": {"shape": "plane", "of_edges": {0: 1.0, 1: 1.0, 2: 0.2, 3: 0.2}}}
@@ -164,9 +171,15 @@ def inside_settings():
     if hasattr(modifier, "adaptive_space"):
         modifier.adaptive_space, modifier.adaptive_object_edge_length = 'OBJECT', 0.25
         look("length")
-        for levels in (1, 2):
-            modifier.levels = modifier.render_levels = levels
-            look(f"level {levels}")
+        modifier.levels = modifier.render_levels = 1
+        look("alone, level 1")
+        made.modifiers.new("Cast", 'CAST').factor = 0.0
+        made.modifiers.move(1, 0)
+        look("level 1")
+        modifier.levels = modifier.render_levels = 2
+        look("level 2")
+        modifier.use_creases = True
+        look("level 2, creases")
         modifier.use_adaptive_subdivision = False
     else:
         settings.feature_set = 'SUPPORTED'
@@ -230,16 +243,18 @@ def _differences(pictures):
 
 
 def test_creases(blender):
+    is_isolated = blender_support.version() >= (5, 0)  # for three levels; Cycles rounds what is still sharp then
     for name, (mean, tile) in _differences(blender.run(inside_creases)).items():
         assert mean < 0.01, f"{name}: means differ by {mean:.2%}"
-        assert tile < 0.08, f"{name}: those of tiles differ by up to {tile:.2%}"
+        worse = 2.0 if is_isolated and name == "spike" else 1.0
+        assert tile < 0.08 * worse, f"{name}: those of tiles differ by up to {tile:.2%}"
 
 
 def test_pictures(blender):
     found = _differences(blender.run(inside_pictures))
-    is_curved = blender_support.version() >= (5, 0)  # from one level of the modifier on, not subdivided
+    is_curved = blender_support.version() >= (5, 0)  # on another modifier, not subdivided
     for name, (mean, tile) in found.items():
-        worse = 2.5 if is_curved and "level 1" in name else 1.0  # of which a warning tells
+        worse = 2.5 if is_curved and name == "on another, level 1" else 1.0  # of which a warning tells
         assert mean < 0.01 * worse, f"{name}: means differ by {mean:.2%}"
         assert tile < 0.08 * worse, f"{name}: those of tiles differ by up to {tile:.2%}"
 
@@ -275,4 +290,7 @@ def test_settings(blender):
     assert found["no creases"][2] == ({} if "length" in found else creases)  # Cycles 4.3 heeds them all the same
     if "length" in found:
         assert np.isclose(found["length"][0]["side"], 0.25)
-        assert "too coarse for Cycles' surface" in found["level 1"][1][0] and not found["level 2"][1]
+        assert found["alone, level 1"][0]["surface"] == found["plain"][0]["surface"] != found["level 1"][0]["surface"]
+        assert "too coarse for Cycles' surface" in found["level 1"][1][0]
+        assert not found["alone, level 1"][1] and not found["level 2"][1]
+        assert "creases are not those of Cycles" in found["level 2, creases"][1][0]

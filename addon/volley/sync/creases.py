@@ -4,6 +4,8 @@
 import bpy
 import numpy as np
 
+from ..compat import CREASE_LEVELS
+
 _SHARPNESS = np.float32(10.0)  # of a crease of 1: it never ends
 
 
@@ -16,6 +18,7 @@ def creases_of(mesh):
         edges = np.empty((len(mesh.edges), 2), np.uint32)
         mesh.edges.foreach_get("vertices", edges.reshape(-1))
         of_vertices = _with_outer_corners(mesh, edges, of_edges, of_vertices)
+        of_edges = np.where(of_edges < _SHARPNESS, np.minimum(of_edges, np.float32(CREASE_LEVELS)), of_edges)
         is_crease = of_edges > 0.0
         fields["crease_edges"], fields["crease_sharpness"] = edges[is_crease], of_edges[is_crease]
     if of_vertices is not None:

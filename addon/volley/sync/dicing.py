@@ -3,6 +3,7 @@
 
 import math
 
+import bpy
 import numpy as np
 
 from .. import abi
@@ -40,11 +41,10 @@ class Dicing:
         if not has_adaptive_subdivision(blender_object, self._scene, self._is_final):
             return None
         modifier = blender_object.modifiers[-1]
-        fields = {"surface": self._surface_of(modifier),
+        fields = {"surface": self._surface_of(each),
                   "max_subdivisions": cycles(self._scene, "max_subdivisions", 12)}
-        if self._is_final and fields["surface"] == abi.DicingSurface.CURVED and self._levels_of(modifier) == 1:
-            self._warnings.add(f"Object '{blender_object.name}': adaptive subdivision starts from the modifier's "
-                               "level 1, which is too coarse for Cycles' surface; 0, 2 and more are not")
+        if self._is_final and fields["surface"] == abi.DicingSurface.CURVED:
+            self._warn_of_levels(blender_object, modifier)
         if SUBDIVIDES_CAGE:
             fields["sharp_corners"] = modifier.boundary_smooth != 'ALL'
             if modifier.adaptive_space == 'OBJECT':
@@ -58,6 +58,22 @@ class Dicing:
         return {**fields, "space": space, "side": self._rate * scale * self._pixel,
                 "object_to_camera": tuple(to_camera.ravel()), "window": tuple(self._window),
                 "offscreen_scale": cycles(self._scene, "offscreen_dicing_scale", 4.0)}
+
+    def cage_of(self, each):
+        """The mesh that Cycles subdivides, where it can be had: below the modifier, if that makes levels, nothing else
+        changes the shape. Else None."""
+        blender_object = each.object
+        if not SUBDIVIDES_CAGE or not has_adaptive_subdivision(blender_object, self._scene, self._is_final):
+            return None
+        original, modifier = blender_object.original, blender_object.modifiers[-1]
+        shown = [modifier for modifier in blender_object.modifiers
+                 if (modifier.show_render if self._is_final else modifier.show_viewport)]
+        cage = original.data
+        if len(shown) > 1 or not isinstance(cage, bpy.types.Mesh) or original.mode in {'EDIT', 'SCULPT'}:
+            return None
+        is_still = cage.shape_keys is None and cage.animation_data is None
+        has_levels = modifier.subdivision_type != 'SIMPLE' and self._levels_of(modifier) > 0
+        return cage if is_still and has_levels else None
 
     @staticmethod
     def creases_of(each, mesh, fields):
@@ -79,14 +95,25 @@ class Dicing:
         axes = self._axes / np.linalg.norm(self._axes, axis=0)
         return np.linalg.inv(axes) @ to_world[:3]
 
-    def _surface_of(self, modifier):
-        """Cycles subdivides what the modifier made once more, from 5.0 on what it began with: the limit of that
-        is what its vertices lie on already."""
+    def _surface_of(self, each):
+        """Cycles subdivides what the modifier made once more, from 5.0 on what it began with: where that cannot be
+        had, the vertices that it made lie on the limit already."""
+        modifier = each.object.modifiers[-1]
         if modifier.subdivision_type == 'SIMPLE':
             return abi.DicingSurface.LINEAR
-        if SUBDIVIDES_CAGE and self._levels_of(modifier) > 0:
+        if SUBDIVIDES_CAGE and self._levels_of(modifier) > 0 and self.cage_of(each) is None:
             return abi.DicingSurface.CURVED
         return abi.DicingSurface.CATMULL_CLARK
+
+    def _warn_of_levels(self, blender_object, modifier):
+        """Of how a surface differs that follows what the modifier made; Blender squares creases, Cycles does not."""
+        levels, name = self._levels_of(modifier), blender_object.name
+        if levels == 1:
+            self._warnings.add(f"Object '{name}': adaptive subdivision starts from the modifier's level 1, which is "
+                               "too coarse for Cycles' surface; 0, 2 and more are not")
+        if modifier.use_creases and creases.creases_of(blender_object.data):
+            self._warnings.add(f"Object '{name}': adaptive subdivision starts from the modifier's level {levels}, "
+                               "whose creases are not those of Cycles; level 0 has them")
 
     def _levels_of(self, modifier):
         render = self._scene.render

@@ -262,19 +262,21 @@ class Walk:
             self._sync.warnings.add(f"Object '{blender_object.name}': while it is sculpted, the mesh below its "
                                     "multiresolution is shown")
         slot_count = max(len(blender_object.material_slots), len(shape.materials))
+        dicing = self._source.dicing
+        cage = dicing and dicing.cage_of(each)
+        shape = cage or shape
         data = mesh.extract(shape, *names[:2], slot_count)
         if data is None:
             return None, None
         if names[2]:
             data.generated = mesh.generated_coordinates(blender_object, shape, data.positions)
-        dicing = self._source.dicing
         fields = dicing and dicing.fields_of(each)
         data.diced_by = dicing and (dicing.settings, fields)
         if fields:
             mesh.dice(data, shape, {**fields, **dicing.creases_of(each, shape, fields)}, names[2])
         elif self._sync._meshes.will_resync and deform.is_posable(blender_object):
             data.poses = mesh.Topology(shape)
-        if item.motion_keys > 1 and motion.may_deform(blender_object, instance.maker_of(each)):
+        if cage is None and item.motion_keys > 1 and motion.may_deform(blender_object, instance.maker_of(each)):
             return data, deform.MeshMotion(shape, data, item.motion_keys)
         return data, None
 
