@@ -51,7 +51,10 @@ def _crease(made, of_edges=None, of_vertices=None):
         if not values:
             continue
         layers = items.layers
-        layer = layers.crease.verify() if hasattr(layers, "crease") else layers.float.new(name)
+        if hasattr(layers, "crease"):
+            layer = layers.crease.verify()
+        else:
+            layer = layers.float.get(name) or layers.float.new(name)
         for item in items:
             item[layer] = values.get(item.index, 0.0)
     mesh.to_mesh(made.data)
@@ -105,7 +108,7 @@ def inside_creases():
              "all edges": {"of_edges": dict.fromkeys(range(12), 1.0)},
              "corners": {"of_edges": {**dict.fromkeys(ring, 1.0), 4: 0.12, 9: 0.2}},
              "vertices": {"of_vertices": {0: 0.3, 3: 0.2, 5: 0.07, 6: 0.2}},
-             "spike": {"of_vertices": {5: 1.0}},
+             "spike": {"of_vertices": {0: 1.0}},
              "level 2": {"of_edges": dict.fromkeys(ring, 1.0), "of_vertices": {5: 0.2}, "levels": 2},
              "off": {"of_edges": dict.fromkeys(ring, 1.0), "use_creases": False},
              "plane": {"shape": "plane", "of_edges": {0: 1.0, 1: 1.0, 2: 0.2, 3: 0.2}}}
