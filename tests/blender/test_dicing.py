@@ -219,6 +219,11 @@ def inside_edits():
     look("rate")
     settings.max_subdivisions = 2
     look("limit")
+    _crease(made, dict.fromkeys(range(4), 1.0))
+    look("creases")
+    made.modifiers[-1].levels = 1
+    _crease(made, dict.fromkeys(range(4), 0.1))
+    look("creases and levels")
     bpy.context.scene.render.film_transparent = True
     look("another setting")
     bpy.context.scene.camera.location.z += 3.0
@@ -264,7 +269,7 @@ def test_pictures(blender):
 
 def test_viewport_follows_settings(blender):
     found = blender.run(inside_edits)
-    for name in ("rate", "limit"):
+    for name in ("rate", "limit", "creases", "creases and levels"):
         error, change, sent = found[name]
         assert error == 0.0 and change > 1e-4 and sent == 1, (name, found)
     assert found["another setting"][2] == 0 and found["camera"][2] == 0, found
