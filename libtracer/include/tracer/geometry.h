@@ -66,11 +66,11 @@ typedef struct trc_dicing_desc {
     /* Creases, for CATMULL_CLARK alone. A sharpness, 0 or more, is the number of levels of
      * subdivision that an edge or vertex is sharp for, a fraction of one in part; from 10 on, for
      * all. */
-    const uint32_t *crease_edges; /* the two vertices of each crease, in either order; where they
-                                     share no edge of a face, it is none; of an edge named twice
-                                     the first counts */
-    uint64_t crease_edge_count;   /* number of elements of crease_edges: 2 * crease_count */
-    const float *crease_sharpness;
+    const uint32_t *crease_edges;  /* the two vertices of each crease, in either order; where they
+                                      share no edge of a face, it is none; of an edge named twice
+                                      the first counts */
+    uint64_t crease_edge_count;    /* number of elements of crease_edges: 2 * crease_count */
+    const float *crease_sharpness; /* of each crease */
     uint64_t crease_count; /* number of elements of crease_sharpness; 0: no edge is creased */
     const float *vertex_sharpness;   /* of each vertex; NULL: 0 */
     uint64_t vertex_sharpness_count; /* number of elements of vertex_sharpness, checked */

@@ -120,6 +120,7 @@ struct trc_vertex_rule trc_vertex_rule_of(const struct trc_faces *f, const struc
         parts[0] = (ring->ending + (vertex_ends ? sharpness : 0.0f)) / (float)count;
         parts[1] = 1.0f - parts[0];
     }
+    /* A corner may become a crease: along what is still sharp at the next level. */
     struct trc_vertex_rule rule = {.sharpness_min = rules[0] == CREASE ? 0.0f : 1.0f};
     for (int i = 0; i < 2; i++) {
         rule.smooth += rules[i] == SMOOTH ? parts[i] : 0.0f;
