@@ -28,7 +28,7 @@ SUMS_END = 194
 VERSION_MAJOR = 0
 VERSION_MINOR = 1
 VERSION_PATCH = 0
-ABI_VERSION = 5
+ABI_VERSION = 6
 
 
 class StatusCode(IntEnum):
@@ -580,8 +580,9 @@ class InputSource(IntEnum):
 class MaterialFlags(IntFlag):
     SAMPLE_EMISSION = 1
     TRANSPARENT_SHADOW = 2
-    PLAIN_CHOICE = 4
+    DEFENSIVE_SAMPLING = 4
     FACET_SHADOWING = 8
+    LIGHT_TREE = 16
 
 
 class AlphaMode(IntEnum):

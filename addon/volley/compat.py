@@ -56,7 +56,7 @@ CLOSES_IES_TYPE_B = bpy.app.version < (4, 0, 0)
 HAS_CORRELATED_MICROFACETS = bpy.app.version >= (4, 0, 0)
 
 # Its camera hits no longer choose faint lobes more often than their share.
-CHOOSES_LOBES_PLAINLY = bpy.app.version >= (4, 0, 0)
+HAS_DEFENSIVE_SAMPLING = bpy.app.version < (4, 0, 0)
 
 # Thin films lie on metals, too, and thin ones do not fade away; seen in 5.2, not in 4.3.
 HAS_FILMED_METAL = bpy.app.version >= (5, 0, 0)
@@ -141,6 +141,11 @@ def panorama_setting(camera, name, default):
 def cycles_curves(scene, name, default):
     """A setting of Cycles' curves where they exist, else default."""
     return getattr(getattr(scene, "cycles_curves", None), name, default)
+
+
+def has_light_tree(scene):
+    """Whether Cycles chooses lights by a tree: from 3.5 on, unless the scene says otherwise."""
+    return cycles(scene, "use_light_tree", bpy.app.version >= (3, 5, 0))
 
 
 # From 5.0 on, Cycles subdivides the mesh below the modifier, which has the settings then.

@@ -32,8 +32,8 @@ _COPIED = (
 _UNMATCHED = (
     ("diffuse_bounces", 0, "Diffuse Bounces"), ("volume_bounces", 0, "Volume Bounces"),
     ("min_light_bounces", 0, "Min Light Bounces"), ("min_transparent_bounces", 0, "Min Transparent Bounces"),
-    ("light_sampling_threshold", 0.0, "Light Threshold"), ("use_light_tree", True, "Light Tree"),
-    ("use_guiding", False, "Path Guiding"), ("sample_offset", 0, "Sample Offset"),
+    ("light_sampling_threshold", 0.0, "Light Threshold"), ("use_guiding", False, "Path Guiding"),
+    ("sample_offset", 0, "Sample Offset"),
     ("scrambling_distance", 1.0, "Scrambling Distance"),
     ("caustics_reflective", True, "Reflective Caustics"), ("caustics_refractive", True, "Refractive Caustics"),
     ("use_layer_samples", 'USE', "Layer Samples"), ("use_pixel_jitter", False, "Pixel Jitter"),

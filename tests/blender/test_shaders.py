@@ -126,6 +126,9 @@ for _what in ("", STRANDS):
 _add("metallic", "ShaderNodeBsdfMetallic", {"Base Color": _GOLD, "Edge Tint": (0.5, 0.7, 0.9)},
      {"fresnel_type": 'F82'}, Roughness=(0.1, 0.4, 0.9), Anisotropy=(0.0, 0.6))
 
+REFLECTING_HAIR = [name for name, (node, _inputs, settings) in CASES.items()
+                   if node == _HAIR and settings["component"] == 'Reflection']
+
 
 # Inside Blender ------------------------------------------------------------------------------------
 
@@ -165,10 +168,25 @@ def _ball(number, name, case):
     return True
 
 
-def inside_balls():
-    """{case: (pictures by Volley, pictures by Cycles)}, one for each seed."""
+def _cells(shown):
+    """{case: [pictures by Volley, pictures by Cycles]}, one for each seed, of the balls on the stage."""
     import bpy
     import scenes
+    pictures, cells = {}, {}
+    for engine in ('VOLLEY', 'CYCLES'):
+        scenes.set_engine(engine, SAMPLES)
+        for seed in SEEDS:
+            bpy.context.scene.volley.seed = bpy.context.scene.cycles.seed = seed
+            pictures.setdefault(engine, []).append(scenes.render()[..., :3])
+    for number, name in enumerate(shown):
+        x, y = number % GRID * CELL_PX, number // GRID * CELL_PX
+        cells[name] = [np.array([picture[y:y + CELL_PX, x:x + CELL_PX] for picture in pictures[engine]])
+                       for engine in ('VOLLEY', 'CYCLES')]
+    return cells
+
+
+def inside_balls():
+    """The cells of all cases that this Blender has."""
     waiting, cells = list(CASES.items()), {}
     while waiting:
         _stage()
@@ -177,17 +195,48 @@ def inside_balls():
             name, case = waiting.pop(0)
             if _ball(len(shown), name, case):
                 shown.append(name)
-        pictures = {}
-        for engine in ('VOLLEY', 'CYCLES'):
-            scenes.set_engine(engine, SAMPLES)
-            for seed in SEEDS:
-                bpy.context.scene.volley.seed = bpy.context.scene.cycles.seed = seed
-                pictures.setdefault(engine, []).append(scenes.render()[..., :3])
-        for number, name in enumerate(shown):
-            x, y = number % GRID * CELL_PX, number // GRID * CELL_PX
-            cells[name] = [np.array([picture[y:y + CELL_PX, x:x + CELL_PX] for picture in pictures[engine]])
-                           for engine in ('VOLLEY', 'CYCLES')]
+        cells.update(_cells(shown))
     return cells
+
+
+def _stage_hair():
+    _stage()
+    for number, name in enumerate(REFLECTING_HAIR):
+        _ball(number, name, CASES[name])
+
+
+def inside_light_tree():
+    """[cells of REFLECTING_HAIR with the light tree, cells without it]."""
+    import bpy
+    _stage_hair()
+    found = []
+    for is_on in (True, False):
+        bpy.context.scene.cycles.use_light_tree = is_on
+        found.append(_cells(REFLECTING_HAIR))
+    return found
+
+
+def inside_light_tree_edits():
+    """Of each change of Light Tree, the mean difference of what is followed from a fresh picture and of that from
+    the one before."""
+    import bpy
+    from follower import Follower, picture
+    from volley.sync import SceneSync
+    from volley.sync.changes import Changes
+    _stage_hair()
+    follower, found = Follower(), []
+    former = follower.picture()
+    for is_on in (False, True):
+        bpy.context.scene.cycles.use_light_tree = is_on
+        bpy.context.scene.update_tag()  # as the panels do
+        bpy.context.view_layer.update()
+        followed = follower.picture()
+        fresh_sync = SceneSync(is_final=False, thread_count=0, will_resync=False)
+        fresh = picture(fresh_sync, Changes.everything())
+        fresh_sync.destroy()
+        found.append([float(np.abs(each - fresh).mean()) for each in (followed, former)])
+        former = fresh
+    return found
 
 
 def _known(name):
@@ -215,7 +264,34 @@ def errors(blender_of_module):
 def test_against_cycles(errors, name):
     if name not in errors:
         pytest.skip("this Blender has no such shader")
-    mean, biased, tile = errors[name]
+    _check(name, *errors[name])
+
+
+def _check(name, mean, biased, tile):
     largest_mean, largest_tile, _why = _known(name)
-    assert biased < largest_mean and mean < largest_mean + NOISE
-    assert tile < largest_tile
+    assert biased < largest_mean and mean < largest_mean + NOISE, name
+    assert tile < largest_tile, name
+
+
+SINCE = (3, 5), "Cycles has its light tree from 3.5 on"
+
+
+@pytest.mark.since(*SINCE)
+def test_light_tree(blender):
+    """Hair that reflects below the surface has another share of what lies there without a light tree."""
+    if blender_support.version() < SINCE[0]:
+        pytest.skip(SINCE[1])
+    with_tree, without = blender.run(inside_light_tree, timeout=600)
+    for cells in (with_tree, without):
+        for name, pair in cells.items():
+            _check(name, *compare.agreed_errors(*pair, TILE_PX))
+    changes = [without[name][1].mean() / with_tree[name][1].mean() - 1.0 for name in REFLECTING_HAIR]
+    assert max(map(abs, changes)) > 0.02, changes
+
+
+@pytest.mark.since(*SINCE)
+def test_viewport_follows_light_tree(blender):
+    if blender_support.version() < SINCE[0]:
+        pytest.skip(SINCE[1])
+    found = blender.run(inside_light_tree_edits)
+    assert all(error == 0.0 and change > 1e-5 for error, change in found), found

@@ -59,7 +59,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
                                     .inputs = l.inputs,
                                     .input_count = l.input_count,
                                     .surface = (int32_t)bytes_below(&b, MOST_NODES + 1) - 1,
-                                    .flags = bytes_below(&b, 4)};
+                                    .flags = bytes_below(&b, 2 * TRC_MATERIAL_LIGHT_TREE)};
     const trc_scene scene = stage_scene();
     trc_id material = 0;
     stage_camera(scene);

@@ -396,16 +396,17 @@ static void test_traits_of_simple_shaders(void **state) {
     assert_int_equal(traits(), E);
 }
 
-/* Fibres that reflect are lit from below as Cycles 3.4 has it, not as Cycles 4; others as both. */
+/* Fibres that reflect are lit from below without a light tree; those that transmit always. */
 static void test_traits_of_hair(void **state) {
     (void)state;
     static const struct {
         uint32_t mode, flags, has;
     } cases[] = {
         {TRC_HAIR_REFLECTION, 0, G | R},
-        {TRC_HAIR_REFLECTION, TRC_MATERIAL_PLAIN_CHOICE, G | TRC_MATERIAL_HAS_REFRACTION},
+        {TRC_HAIR_REFLECTION, TRC_MATERIAL_DEFENSIVE_SAMPLING, G | R},
+        {TRC_HAIR_REFLECTION, TRC_MATERIAL_LIGHT_TREE, G | TRC_MATERIAL_HAS_REFRACTION},
         {TRC_HAIR_TRANSMISSION, 0, G | R},
-        {TRC_HAIR_TRANSMISSION, TRC_MATERIAL_PLAIN_CHOICE, G | R},
+        {TRC_HAIR_TRANSMISSION, TRC_MATERIAL_LIGHT_TREE, G | R},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         graph_clear();

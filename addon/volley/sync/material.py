@@ -5,7 +5,7 @@ import bpy
 
 from .. import abi, native
 from ..abi import DisplacementMethod, NodeType
-from ..compat import CHOOSES_LOBES_PLAINLY, HAS_FACET_SHADOWING, LEAVES_BUMPS, cycles, uses_nodes
+from ..compat import HAS_DEFENSIVE_SAMPLING, HAS_FACET_SHADOWING, LEAVES_BUMPS, cycles, has_light_tree, uses_nodes
 from . import flatten, instance, studio, tangents
 from .attributes import Attributes
 from .changes import Changes
@@ -28,7 +28,7 @@ class Materials:
         self._seen = set()
         self._lights = set()  # keys of the lights that are flattened in this sync
         self._changes = Changes.everything()
-        self._aovs = {}
+        self._aovs, self._has_light_tree = {}, False
         self._attributes = Attributes()
 
     def begin(self, depsgraph, changes, aovs):
@@ -36,8 +36,9 @@ class Materials:
         as they are. aovs: {name: (type, number)}."""
         self._attributes.begin(depsgraph)
         self._seen, self._lights = set(), set()
-        self._changes = changes if aovs == self._aovs else Changes.everything()
-        self._aovs = aovs
+        read = aovs, has_light_tree(depsgraph.scene_eval)
+        self._changes = changes if read == (self._aovs, self._has_light_tree) else Changes.everything()
+        self._aovs, self._has_light_tree = read
 
     def ids_of(self, made_of):
         """The library's ids of evaluated materials, 0 (the default) for None; and whether each of them is of a
@@ -58,7 +59,7 @@ class Materials:
             if is_volume:  # nothing but the bounds of what is left out
                 _let_through(flat)
             self._update(key, flat, material.name, pass_index=material.pass_index,
-                         flags=_flags(material, is_volume))
+                         flags=_flags(material, is_volume, self._has_light_tree))
             self._entries[key].is_volume = is_volume
         return self._entries[key]
 
@@ -264,11 +265,12 @@ class Entry:
 _NO_ENTRY = Entry()
 
 
-def _flags(material, is_volume):
+def _flags(material, is_volume, is_by_light_tree):
     has_transparent_shadow = is_volume or _has_transparent_shadow(material)
     flags = abi.MaterialFlags.TRANSPARENT_SHADOW if has_transparent_shadow else 0
-    flags |= abi.MaterialFlags.PLAIN_CHOICE if CHOOSES_LOBES_PLAINLY else 0
+    flags |= abi.MaterialFlags.DEFENSIVE_SAMPLING if HAS_DEFENSIVE_SAMPLING else 0
     flags |= abi.MaterialFlags.FACET_SHADOWING if HAS_FACET_SHADOWING else 0
+    flags |= abi.MaterialFlags.LIGHT_TREE if is_by_light_tree else 0
     if cycles(material, "sample_as_light", cycles(material, "emission_sampling", 'AUTO') != 'NONE'):
         flags |= abi.MaterialFlags.SAMPLE_EMISSION
     return flags

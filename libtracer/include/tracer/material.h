@@ -397,15 +397,17 @@ enum trc_material_flags {
     TRC_MATERIAL_SAMPLE_EMISSION = 1,
     TRC_MATERIAL_TRANSPARENT_SHADOW =
         2, /* shadow rays see its transparency; else it is opaque to them */
-    /* Lobes are chosen by their weights at camera hits too, as in Cycles 4; else each at least one
-     * time in nine or so (Cycles 3.4). What Cycles loses with diffuse bounces 0 depends on it. Rays
-     * that Hair reflects below the surface find what light is wholly there by themselves; else they
-     * share it with samples of lights that Hair gives nothing of, and lose that part. */
-    TRC_MATERIAL_PLAIN_CHOICE = 4,
+    /* At camera hits each lobe is chosen at least one time in nine or so (Cycles 3.4); else by its
+     * weight alone, as at later hits. What Cycles loses with diffuse bounces 0 depends on it. */
+    TRC_MATERIAL_DEFENSIVE_SAMPLING = 4,
     /* Diffuse lobes whose normals are bent lie in shadow as microfacets do (Cycles 5), which is
      * darker towards the terminator, and Principled Hair on faces takes light samples from a part
      * of all sides; else as Cycles 3.4 and 4 have it. */
-    TRC_MATERIAL_FACET_SHADOWING = 8
+    TRC_MATERIAL_FACET_SHADOWING = 8,
+    /* Rays that Hair reflects below the surface keep all light of what lies wholly there, as with
+     * Cycles' light tree, which never chooses such a light for a surface without transmission; else
+     * they share it with samples of lights that Hair gives nothing of, and lose that part. */
+    TRC_MATERIAL_LIGHT_TREE = 16
 };
 
 /* A material from a node list, in use from the next commit on. INVALID_ARGUMENT, with the node and

@@ -120,11 +120,11 @@ static uint32_t leaf_bits(const struct trc_leaf *leaf, const struct trc_operand 
     }
 }
 
-/* Fibres that reflect send rays below the surface, too, where Cycles 4 samples no light for them.
+/* Fibres that reflect send rays below the surface, too, where a light tree has no lights for them.
  */
 static bool is_lit_below(const struct trc_leaf *leaf, uint32_t has, uint32_t flags) {
     if (leaf->type == TRC_NODE_HAIR && leaf->mode == TRC_HAIR_REFLECTION)
-        return !(flags & TRC_MATERIAL_PLAIN_CHOICE);
+        return !(flags & TRC_MATERIAL_LIGHT_TREE);
     return has & (TRC_MATERIAL_HAS_REFRACTION | TRC_MATERIAL_HAS_TRANSLUCENT);
 }
 

@@ -101,7 +101,8 @@ trc_status palette_create(trc_scene scene, enum surface surface, bool rough,
                                         .inputs = g.inputs,
                                         .input_count = g.input_count,
                                         .surface = output,
-                                        .flags = TRC_MATERIAL_TRANSPARENT_SHADOW};
+                                        .flags = TRC_MATERIAL_TRANSPARENT_SHADOW |
+                                                 TRC_MATERIAL_DEFENSIVE_SAMPLING};
         status = trc_material_create(scene, &desc, &materials_out[slot]);
     }
     return status;

@@ -68,7 +68,7 @@ struct trc_lobe *trc_add_lobe(struct trc_setup *c, const struct trc_lobe_model *
 static void set_chances(const struct trc_material *m, const struct trc_surface *s,
                         struct trc_lobes *out) {
     vfloat floor_weight = vf_zero();
-    if (!(m->flags & TRC_MATERIAL_PLAIN_CHOICE)) {
+    if (m->flags & TRC_MATERIAL_DEFENSIVE_SAMPLING) {
         vfloat sum = vf_zero();
         for (int i = 0; i < out->count; i++)
             sum = sum + out->lobe[i].mix_weight;
