@@ -151,7 +151,10 @@ def inside_attributes():
     tree.links.new(tree.nodes.new("ShaderNodeNewGeometry").outputs["Position"], node.inputs["Position"])
     for kind, name in SAMPLED:
         node.sample_attribute_items.new(kind, f"Sampled {name}")
-        [each for each in node.inputs if each.type == 'STRING'][-1].default_value = name
+        field = [each for each in node.inputs if each.type == 'STRING'][-1]
+        field.default_value = name
+        # No socket of a shader's tree has text: what is linked to a name changes nothing.
+        tree.links.new(tree.nodes.new("ShaderNodeValue").outputs[0], field)
     pictures = {}
     for socket in [each for each in node.outputs if each.identifier.startswith("Attribute_")]:
         tree.links.new(socket, scenes.shader_of(material).inputs["Color"])
