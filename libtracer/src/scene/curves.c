@@ -218,10 +218,13 @@ static void spread_strands(const struct trc_mesh_topology *t, const float *value
                            float *out) {
     const uint8_t *cuts = t->cuts;
     for (uint32_t i = 0; i < t->strand_count; i++, values += width) {
-        const uint64_t count = t->lengths ? strand_counts(cuts, t->lengths[i]).vertices : 1;
+        uint64_t count = 1;
+        if (t->lengths) {
+            count = strand_counts(cuts, t->lengths[i]).vertices;
+            cuts += t->lengths[i];
+        }
         for (uint64_t k = 0; k < count; k++, out += width)
             memcpy(out, values, width * sizeof *out);
-        cuts += t->lengths ? t->lengths[i] : 0;
     }
 }
 
