@@ -76,9 +76,7 @@ run_tests() {
     say "Tests in $(inside blender --version 2>/dev/null | head -n 1)"
     inside env VOLLEY_BUILD=/volley/build \
         BLENDER_USER_SCRIPTS=/volley/build/blender PYTHONPATH=/volley/tests/support \
-        sh -c 'cd /volley && exec python3 -m pytest "$@"' pytest \
-        -q -ra -n 2 --dist loadfile -p no:cacheprovider --rootdir tests --junit-prefix "next_$SUITE" \
-        --junit-xml build/pytest.xml "$@"
+        bash /volley/tests/run_pytest.sh python3 build/pytest.xml --junit-prefix "next_$SUITE" "$@"
 }
 
 measure() {

@@ -40,8 +40,7 @@ run_pytest() {
     say "Tests in Python"
     VOLLEY_BUILD=$PWD/build BLENDER_USER_SCRIPTS=$PWD/build/blender \
         PYTHONPATH=$PWD/tests/support${PYTHONPATH:+:$PYTHONPATH} \
-        "$python" -m pytest -q -ra -n 2 --dist loadfile -p no:cacheprovider --rootdir tests \
-        --junit-xml "$results/pytest.xml" "${folders[@]}" </dev/null
+        bash tests/run_pytest.sh "$python" "$results/pytest.xml" "${folders[@]}"
 }
 
 run_blender_next() {

@@ -72,6 +72,7 @@ def _require(item, what, is_there):
 
 def pytest_configure(config):
     config.addinivalue_line("markers", "own_process: runs in a Blender that no other test has used")
+    config.addinivalue_line("markers", "window: opens windows, and goes by the clock")
     config.addinivalue_line("markers", "since(version, why): skips in a Blender before (major, minor)")
 
 
@@ -102,7 +103,11 @@ def pytest_runtest_makereport(item, call):
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config, items):
-    """Refuse an entry of the list that stands for no test, where all tests of its file were collected."""
+    """Mark tests in windows. Refuse an entry of the list that stands for no test, where all tests of its file were
+    collected."""
+    for item in items:
+        if "window" in getattr(item, "fixturenames", ()):
+            item.add_marker("window")
     if any("::" in str(argument) for argument in config.args):
         return
     names = [_name_of(item) for item in items if str(item.path.parent) == _HERE]
