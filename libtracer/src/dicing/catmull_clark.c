@@ -61,31 +61,31 @@ static void place_vertex_points(const struct trc_faces *f, const struct trc_ring
     for (size_t e = 0; e < r->edge_count; e++) {
         for (size_t k = 0; k < 2; k++) {
             const uint32_t own = r->ends[2 * e + k], other = r->ends[2 * e + 1 - k];
-            const struct trc_vertex_rule rule = trc_vertex_rule_of(f, r, own);
+            const struct trc_vertex_rule *rule = &r->rules[own];
             const float n = (float)r->rings[own].face_count;
-            if (rule.smooth > 0.0f) {
-                add(vertex(to, own), vertex(f, own), rule.smooth / (n * n), width);
-                add(vertex(to, own), vertex(f, other), rule.smooth / (n * n), width);
+            if (rule->smooth > 0.0f) {
+                add(vertex(to, own), vertex(f, own), rule->smooth / (n * n), width);
+                add(vertex(to, own), vertex(f, other), rule->smooth / (n * n), width);
             }
-            if (trc_is_along_crease(r, &rule, e))
-                add(vertex(to, own), vertex(f, other), 0.125f * rule.crease, width);
+            if (trc_is_along_crease(r, rule, e))
+                add(vertex(to, own), vertex(f, other), 0.125f * rule->crease, width);
         }
     }
     for (uint32_t face = 0; face < f->face_count; face++) {
         const float *point = vertex(to, (size_t)f->vertex_count + r->edge_count + face);
         for (uint32_t c = f->begin[face]; c < f->begin[face + 1]; c++) {
-            const struct trc_vertex_rule rule = trc_vertex_rule_of(f, r, f->indices[c]);
+            const struct trc_vertex_rule *rule = &r->rules[f->indices[c]];
             const float n = (float)r->rings[f->indices[c]].face_count;
-            if (rule.smooth > 0.0f)
-                add(vertex(to, f->indices[c]), point, rule.smooth / (n * n), width);
+            if (rule->smooth > 0.0f)
+                add(vertex(to, f->indices[c]), point, rule->smooth / (n * n), width);
         }
     }
     for (uint32_t v = 0; v < f->vertex_count; v++) {
-        const struct trc_vertex_rule rule = trc_vertex_rule_of(f, r, v);
+        const struct trc_vertex_rule *rule = &r->rules[v];
         const float n = (float)r->rings[v].face_count;
-        float weight = 1.0f - rule.smooth - 0.25f * rule.crease;
-        if (rule.smooth > 0.0f)
-            weight += rule.smooth * (n - 3.0f) / n;
+        float weight = 1.0f - rule->smooth - 0.25f * rule->crease;
+        if (rule->smooth > 0.0f)
+            weight += rule->smooth * (n - 3.0f) / n;
         add(vertex(to, v), vertex(f, v), weight, width);
     }
 }
@@ -186,20 +186,20 @@ static void sum_limit(const struct trc_faces *f, const struct trc_rings *r, floa
         for (size_t k = 0; k < 2; k++) {
             const uint32_t own = r->ends[2 * e + k];
             const float *other = vertex(f, r->ends[2 * e + 1 - k]);
-            const struct trc_vertex_rule rule = trc_vertex_rule_of(f, r, own);
+            const struct trc_vertex_rule *rule = &r->rules[own];
             const float n = (float)r->rings[own].face_count;
-            if (rule.smooth > 0.0f)
-                add(sums + own * width, other, rule.smooth * 4.0f / (n * (n + 5.0f)), width);
-            if (trc_is_along_crease(r, &rule, e))
-                add(sums + own * width, other, rule.crease / 6.0f, width);
+            if (rule->smooth > 0.0f)
+                add(sums + own * width, other, rule->smooth * 4.0f / (n * (n + 5.0f)), width);
+            if (trc_is_along_crease(r, rule, e))
+                add(sums + own * width, other, rule->crease / 6.0f, width);
         }
     }
     for (uint32_t c = 0; c < 4 * f->face_count; c++) {
         const uint32_t own = f->indices[c];
-        const struct trc_vertex_rule rule = trc_vertex_rule_of(f, r, own);
+        const struct trc_vertex_rule *rule = &r->rules[own];
         const float n = (float)r->rings[own].face_count;
-        if (rule.smooth > 0.0f) /* two corners on, of four */
-            add(sums + own * width, vertex(f, f->indices[c ^ 2]), rule.smooth / (n * (n + 5.0f)),
+        if (rule->smooth > 0.0f) /* two corners on, of four */
+            add(sums + own * width, vertex(f, f->indices[c ^ 2]), rule->smooth / (n * (n + 5.0f)),
                 width);
     }
 }
@@ -213,9 +213,9 @@ trc_status trc_catmull_clark_limit(struct trc_faces *f) {
     if (status == TRC_OK) {
         sum_limit(f, &r, sums);
         for (uint32_t v = 0; v < f->vertex_count; v++) {
-            const struct trc_vertex_rule rule = trc_vertex_rule_of(f, &r, v);
+            const struct trc_vertex_rule *rule = &r.rules[v];
             const float n = (float)r.rings[v].face_count;
-            const float own = 1.0f - rule.smooth * 5.0f / (n + 5.0f) - rule.crease / 3.0f;
+            const float own = 1.0f - rule->smooth * 5.0f / (n + 5.0f) - rule->crease / 3.0f;
             float *row = vertex(f, v);
             for (size_t i = 0; i < f->vertex_width; i++)
                 row[i] = own * row[i] + sums[v * f->vertex_width + i];

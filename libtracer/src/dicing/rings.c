@@ -13,6 +13,7 @@ void trc_rings_free(struct trc_rings *r) {
     trc_free(r->uses);
     trc_free(r->sharpness);
     trc_free(r->rings);
+    trc_free(r->rules);
 }
 
 static void number_edges(const struct trc_faces *f, struct trc_edge_table *table,
@@ -63,26 +64,6 @@ static void count_sharp_edges(struct trc_rings *r) {
     }
 }
 
-trc_status trc_rings_find(const struct trc_faces *f, struct trc_rings *r) {
-    const size_t corners = f->begin[f->face_count];
-    *r = (struct trc_rings){
-        .edges = trc_alloc(corners, sizeof *r->edges),
-        .ends = trc_alloc(2 * corners, sizeof *r->ends),
-        .uses = trc_alloc(corners, sizeof *r->uses),
-        .sharpness = f->edge_sharpness ? trc_alloc(corners, sizeof *r->sharpness) : NULL,
-        .rings = trc_alloc_zeroed(f->vertex_count, sizeof *r->rings),
-    };
-    struct trc_edge_table table;
-    const bool enough = trc_edge_table_create(&table, corners) && r->edges && r->ends && r->uses &&
-                        (r->sharpness || !f->edge_sharpness) && r->rings;
-    if (enough) {
-        number_edges(f, &table, r);
-        count_sharp_edges(r);
-    }
-    trc_edge_table_free(&table);
-    return enough ? TRC_OK : trc_no_memory_to_dice();
-}
-
 float trc_edge_rule(const struct trc_rings *r, size_t edge) {
     const float sharpness = sharpness_of(r, edge);
     return sharpness < 1.0f ? sharpness : 1.0f;
@@ -105,8 +86,8 @@ static float vertex_sharpness_of(const struct trc_faces *f, const struct trc_rin
     return f->vertex_sharpness ? f->vertex_sharpness[vertex] : 0.0f;
 }
 
-struct trc_vertex_rule trc_vertex_rule_of(const struct trc_faces *f, const struct trc_rings *r,
-                                          uint32_t vertex) {
+static struct trc_vertex_rule rule_of_vertex(const struct trc_faces *f, const struct trc_rings *r,
+                                             uint32_t vertex) {
     const struct trc_ring *ring = &r->rings[vertex];
     const float sharpness = vertex_sharpness_of(f, ring, vertex);
     const float sharpness_after = trc_sharpness_after(sharpness);
@@ -127,6 +108,29 @@ struct trc_vertex_rule trc_vertex_rule_of(const struct trc_faces *f, const struc
         rule.crease += rules[i] == CREASE ? parts[i] : 0.0f;
     }
     return rule;
+}
+
+trc_status trc_rings_find(const struct trc_faces *f, struct trc_rings *r) {
+    const size_t corners = f->begin[f->face_count];
+    *r = (struct trc_rings){
+        .edges = trc_alloc(corners, sizeof *r->edges),
+        .ends = trc_alloc(2 * corners, sizeof *r->ends),
+        .uses = trc_alloc(corners, sizeof *r->uses),
+        .sharpness = f->edge_sharpness ? trc_alloc(corners, sizeof *r->sharpness) : NULL,
+        .rings = trc_alloc_zeroed(f->vertex_count, sizeof *r->rings),
+        .rules = trc_alloc(f->vertex_count, sizeof *r->rules),
+    };
+    struct trc_edge_table table;
+    const bool enough = trc_edge_table_create(&table, corners) && r->edges && r->ends && r->uses &&
+                        (r->sharpness || !f->edge_sharpness) && r->rings && r->rules;
+    if (enough) {
+        number_edges(f, &table, r);
+        count_sharp_edges(r);
+        for (uint32_t v = 0; v < f->vertex_count; v++)
+            r->rules[v] = rule_of_vertex(f, r, v);
+    }
+    trc_edge_table_free(&table);
+    return enough ? TRC_OK : trc_no_memory_to_dice();
 }
 
 bool trc_is_along_crease(const struct trc_rings *r, const struct trc_vertex_rule *rule,

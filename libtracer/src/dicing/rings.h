@@ -15,19 +15,20 @@ struct trc_ring {
     float ending;                            /* sharpness of those that are not any more, summed */
 };
 
-struct trc_rings {
-    uint32_t edge_count;
-    uint32_t *edges;        /* of the corners, the edge to the next one */
-    uint32_t *ends;         /* both of each edge */
-    uint32_t *uses;         /* faces of each edge */
-    float *sharpness;       /* of each edge; NULL: boundaries alone are sharp */
-    struct trc_ring *rings; /* of each vertex */
-};
-
 /* How much of a vertex follows the smooth rule, and how much that of a crease, along its edges that
  * are sharper than a minimum; the rest stays. */
 struct trc_vertex_rule {
     float smooth, crease, sharpness_min;
+};
+
+struct trc_rings {
+    uint32_t edge_count;
+    uint32_t *edges;               /* of the corners, the edge to the next one */
+    uint32_t *ends;                /* both of each edge */
+    uint32_t *uses;                /* faces of each edge */
+    float *sharpness;              /* of each edge; NULL: boundaries alone are sharp */
+    struct trc_ring *rings;        /* of each vertex */
+    struct trc_vertex_rule *rules; /* of each vertex */
 };
 
 /* OUT_OF_MEMORY; free the rings in either case. */
@@ -39,9 +40,6 @@ float trc_sharpness_after(float sharpness);
 
 /* 0 for a smooth edge, 1 for one that is a crease. */
 float trc_edge_rule(const struct trc_rings *rings, size_t edge);
-
-struct trc_vertex_rule trc_vertex_rule_of(const struct trc_faces *faces,
-                                          const struct trc_rings *rings, uint32_t vertex);
 
 /* Whether an edge is one of the two of a vertex's crease. */
 bool trc_is_along_crease(const struct trc_rings *rings, const struct trc_vertex_rule *rule,
