@@ -70,7 +70,7 @@ if ! bash tests/setup.sh; then
     printf '0 passed, 1 failed\n'
     exit 1
 fi
-python=$(find_python numpy pytest)
+python=$(find_python numpy pytest xdist)
 rm -rf "$results"
 mkdir -p "$results"
 

@@ -11,7 +11,7 @@ mapfile -t tests < <(grep -l 'write_result(' tests/blender/test_*.py)
 mkdir -p "$results"
 rm -rf "$results"/next_*/
 VOLLEY_BUILD=$PWD/build BLENDER_USER_SCRIPTS=$PWD/build/blender PYTHONPATH=$PWD/tests/support \
-    "$(find_python numpy pytest)" -m pytest -q -p no:cacheprovider --rootdir tests "${tests[@]}" </dev/null
+    bash tests/run_pytest.sh "$(find_python numpy pytest xdist)" "$results/versions.xml" "${tests[@]}"
 for suite in trixie sid; do
     bash tests/blender_next.sh --suite "$suite" --results "$results/next_$suite" "${tests[@]}"
 done

@@ -27,6 +27,7 @@ SUPPORT = os.path.dirname(os.path.abspath(__file__))
 REPOSITORY = os.path.dirname(os.path.dirname(SUPPORT))
 _ANSWER = "answer.pickle"
 _SERVE = "serve"
+_LEAVING_SECONDS = 10.0
 
 
 class BlenderError(AssertionError):
@@ -202,9 +203,12 @@ class _Server:
         return output
 
     def close(self):
-        self.process.kill()
-        self.process.wait()
-        self.process.stdin.close()
+        self.process.stdin.close()  # at which it ends, and writes what coverage.sh counts
+        try:
+            self.process.wait(_LEAVING_SECONDS)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
         self._log.close()
         os.close(self._ready)
 
