@@ -15,6 +15,7 @@ import pytest
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "support"))
 import blender as blender_support  # noqa: E402  (found by the line above)
 import expected_skips  # noqa: E402
+import shared_blender  # noqa: E402
 
 _HERE = os.path.dirname(os.path.abspath(__file__))
 _IS_WITHOUT = pytest.StashKey()  # of tests that need what the user says is not there
@@ -26,14 +27,14 @@ def _temporary_files():
     with tempfile.TemporaryDirectory(prefix="volley_") as folder, pytest.MonkeyPatch.context() as patch:
         patch.setenv("TMPDIR", folder)
         yield
-        blender_support.close_shared()
+        shared_blender.close()
 
 
 @pytest.fixture
 def blender(tmp_path, request):
     """A Blender to run functions in, one for all tests but those of the mark own_process."""
-    is_shared = request.node.get_closest_marker("own_process") is None
-    return blender_support.Blender(str(tmp_path), is_shared)
+    has_own = request.node.get_closest_marker("own_process") is not None
+    return (blender_support.Blender if has_own else shared_blender.SharedBlender)(str(tmp_path))
 
 
 @pytest.fixture
@@ -45,7 +46,7 @@ def window(blender):
 @pytest.fixture(scope="module")
 def blender_of_module(tmp_path_factory):
     """The same for fixtures whose results several tests look at."""
-    return blender_support.Blender(str(tmp_path_factory.mktemp("blender")), is_shared=True)
+    return shared_blender.SharedBlender(str(tmp_path_factory.mktemp("blender")))
 
 
 # What is missing -----------------------------------------------------------------------------------

@@ -3,21 +3,17 @@
 
 ``Blender().run(function, *arguments)`` starts ``blender -b`` with the staged add-on, imports the module
 the function stands in, calls it there and returns its result (anything that can be pickled; numpy arrays
-too). An exception inside, a crash or a time-out fails the test with Blender's output. Where it may be
-shared, one Blender answers all, each from the startup file: to start one takes longer than most tests.
+too). An exception inside, a crash or a time-out fails the test with Blender's output.
 
     VOLLEY_BLENDER        the Blender to run, else ``blender``
     BLENDER_USER_SCRIPTS  the user-scripts folder of the build, else build/blender
 """
 
-import ctypes
-import enum
 import functools
 import json
 import os
 import pickle
 import re
-import select
 import shutil
 import subprocess
 import sys
@@ -26,8 +22,6 @@ import tempfile
 SUPPORT = os.path.dirname(os.path.abspath(__file__))
 REPOSITORY = os.path.dirname(os.path.dirname(SUPPORT))
 _ANSWER = "answer.pickle"
-_SERVE = "serve"
-_LEAVING_SECONDS = 10.0
 
 
 class BlenderError(AssertionError):
@@ -74,14 +68,18 @@ def write_result(name, lines, errors):
         json.dump({"blender": full_version(), "errors": {case: float(error) for case, error in errors.items()}}, file)
 
 
-class Blender:
-    """Starts Blender in a folder of its own; ``output`` is what the last run wrote. Those that are shared let
-    one Blender answer what they run."""
+def command_line(options, *arguments):
+    """That of a Blender that runs inside_blender.py with these arguments."""
+    return [executable(), "-b", "--factory-startup", "--addons", "volley", *options,
+            "--python-exit-code", "3", "--python", os.path.join(SUPPORT, "inside_blender.py"), "--", *arguments]
 
-    def __init__(self, folder=None, is_shared=False):
+
+class Blender:
+    """Starts Blender in a folder of its own; ``output`` is what the last run wrote."""
+
+    def __init__(self, folder=None):
         self.folder = folder or tempfile.mkdtemp(prefix="volley_")
         self.output = ""
-        self._is_shared = is_shared
         self.options = []  # of the command line, for run()
 
     def command(self, *arguments):
@@ -91,13 +89,11 @@ class Blender:
 
     def run(self, function, *arguments, timeout=120):
         """Call a module-level function inside Blender and return what it returns."""
-        answer, line = self._request(function, arguments)
-        if self._is_shared and not self.options:
-            return self._answer(answer, self._ask(line[-1], timeout))
-        return self._answer(answer, self._start(line, timeout))
+        request, answer = self._request(function, arguments)
+        return self._answer(answer, self._start(command_line(self.options, request), timeout))
 
     def _request(self, function, arguments):
-        """Write down what to call; the answer's path and the command line."""
+        """Write down what to call; the paths of the request and of its answer."""
         answer = os.path.join(self.folder, _ANSWER)
         if os.path.exists(answer):
             os.remove(answer)
@@ -105,7 +101,7 @@ class Blender:
         module = os.path.abspath(sys.modules[function.__module__].__file__)
         with open(request, "wb") as file:
             pickle.dump((module, function.__name__, arguments, answer), file)
-        return answer, _command_line(self.options, request)
+        return request, answer
 
     def _answer(self, path, process):
         if not os.path.exists(path):
@@ -113,30 +109,15 @@ class Blender:
         with open(path, "rb") as file:
             result, error = pickle.load(file)
         if error:
-            close_shared()  # whose state nobody knows
             raise BlenderError(f"{error}\nBlender's output:\n{self.output}")
         return result
-
-    def _ask(self, request, timeout):
-        """Let the shared Blender answer; its process."""
-        global _shared
-        if _shared is not None and _shared.process.poll() is not None:
-            close_shared()
-        if _shared is None:
-            _shared = _Server()
-        try:
-            self.output = _shared.answer(request, self.folder, timeout)
-        except subprocess.TimeoutExpired as error:
-            close_shared()
-            raise BlenderError(f"Blender did not end within {timeout} s:\n{error.output}") from error
-        return _shared.process
 
     def run_in_window(self, function, *arguments, timeout=120, size=(640, 480)):
         """The same with a window of that size on a virtual display. The function returns a generator:
         what it yields is the seconds to let Blender draw, what it returns is the result."""
-        answer, line = self._request(function, arguments)
+        request, answer = self._request(function, arguments)
         display = ["xvfb-run", "-a", "-s", f"-screen 0 {size[0]}x{size[1]}x24 -fbdir {self.folder}"]
-        line = display + [argument for argument in line if argument != "-b"]
+        line = display + [part for part in command_line(self.options, request) if part != "-b"]
         position = line.index("--factory-startup")
         line[position:position] = ["--window-geometry", "0", "0", *map(str, size)]
         process = self._start(line, timeout, {"LIBGL_ALWAYS_SOFTWARE": "1",
@@ -153,152 +134,3 @@ class Blender:
             raise BlenderError(f"Blender did not end within {timeout} s:\n{error.output}") from error
         self.output = process.stdout
         return process
-
-
-def _command_line(options, *arguments):
-    return [executable(), "-b", "--factory-startup", "--addons", "volley", *options,
-            "--python-exit-code", "3", "--python", os.path.abspath(__file__), "--", *arguments]
-
-
-# The shared Blender --------------------------------------------------------------------------------
-
-_shared = None
-
-
-def close_shared():
-    """End the shared Blender, if there is one; the next request starts another."""
-    global _shared
-    if _shared is not None:
-        _shared.close()
-        _shared = None
-
-
-class _Server:
-    """A Blender that answers one request after the other."""
-
-    def __init__(self):
-        self._log = tempfile.TemporaryFile()
-        self._ready, ready = os.pipe()
-        self.process = subprocess.Popen(_command_line([], _SERVE, str(ready)), pass_fds=[ready],
-                                        env=dict(os.environ, BLENDER_USER_SCRIPTS=user_scripts()),
-                                        stdin=subprocess.PIPE, stdout=self._log, stderr=subprocess.STDOUT)
-        os.close(ready)
-
-    def answer(self, request, folder, timeout):
-        """Wait for it to call what a request asks for, in a folder; what it wrote meanwhile."""
-        log, begin = self._log.fileno(), os.fstat(self._log.fileno()).st_size
-        environment = dict(os.environ, BLENDER_USER_SCRIPTS=user_scripts())
-        line = json.dumps({"request": request, "folder": folder, "environment": environment})
-        try:
-            self.process.stdin.write(line.encode() + b"\n")
-            self.process.stdin.flush()
-            is_ready = select.select([self._ready], [], [], timeout)[0]
-        except BrokenPipeError:
-            is_ready = True
-        if is_ready and not os.read(self._ready, 1):
-            self.process.wait()
-        output = os.pread(log, os.fstat(log).st_size - begin, begin).decode(errors="replace")
-        if not is_ready:
-            raise subprocess.TimeoutExpired(self.process.args, timeout, output)
-        return output
-
-    def close(self):
-        self.process.stdin.close()  # at which it ends, and writes what coverage.sh counts
-        try:
-            self.process.wait(_LEAVING_SECONDS)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            self.process.wait()
-        self._log.close()
-        os.close(self._ready)
-
-
-def _serve(ready):
-    """Inside Blender: answer the requests of _Server.answer, each as if it were the first."""
-    import addon_utils
-    import bpy
-    os.set_inheritable(ready, False)
-    path = list(sys.path)
-    for line in sys.stdin:
-        order = json.loads(line)
-        bpy.ops.wm.read_homefile(use_factory_startup=True)
-        os.environ.clear()
-        os.environ.update(order["environment"])
-        os.chdir(order["folder"])
-        _answer_request(order["request"])
-        sys.path[:] = path
-        addon_utils.disable("volley")  # of which tests may have replaced parts
-        for name in _modules_below(os.path.dirname(SUPPORT), user_scripts()):
-            del sys.modules[name]
-        addon_utils.enable("volley")
-        sys.stdout.flush()
-        ctypes.CDLL(None).fflush(None)
-        os.write(ready, b".")
-
-
-def _modules_below(*folders):
-    """Names of imported modules whose files are there, but for the one that runs."""
-    files = {name: getattr(module, "__file__", None) or "" for name, module in sys.modules.items()}
-    return [name for name, file in files.items() if file.startswith(folders) and name != "__main__"]
-
-
-# Inside Blender ------------------------------------------------------------------------------------
-
-class _Answers(pickle.Pickler):
-    """Without the add-on's classes, which only Blender can import: its enumerators become numbers."""
-
-    def reducer_override(self, value):
-        return (int, (int(value),)) if isinstance(value, (enum.IntEnum, enum.IntFlag)) else NotImplemented
-
-
-def _answer_request(path):
-    """Inside Blender: import the test's module and call its function."""
-    import importlib.util
-    import traceback
-    with open(path, "rb") as file:
-        module_path, name, arguments, answer = pickle.load(file)
-
-    def finish(result, error=""):
-        with open(answer, "wb") as file:
-            _Answers(file).dump((result, error))
-
-    sys.path[:0] = [SUPPORT, os.path.dirname(module_path)]
-    try:
-        spec = importlib.util.spec_from_file_location("volley_inside", module_path)
-        module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
-        result = getattr(module, name)(*arguments)
-    except BaseException:
-        finish(None, traceback.format_exc())
-        _follow(iter(()), lambda _result: None)  # a window would stay
-        return
-    if hasattr(result, "send"):
-        _follow(result, finish)
-    else:
-        finish(result)
-
-
-def _follow(steps, finish):
-    """Run a generator from one of Blender's timers, so that windows are drawn between its steps."""
-    import traceback
-    import bpy
-
-    def step():
-        try:
-            return next(steps)
-        except StopIteration as end:
-            finish(end.value)
-        except BaseException:
-            finish(None, traceback.format_exc())
-        bpy.ops.wm.quit_blender()
-        return None
-
-    bpy.app.timers.register(step, first_interval=0.5, persistent=True)
-
-
-if __name__ == "__main__":
-    arguments = sys.argv[sys.argv.index("--") + 1:]
-    if arguments[0] == _SERVE:
-        _serve(int(arguments[1]))
-    else:
-        _answer_request(arguments[0])
