@@ -61,6 +61,9 @@ HAS_DEFENSIVE_SAMPLING = bpy.app.version < (4, 0, 0)
 # Thin films lie on metals, too, and thin ones do not fade away; seen in 5.2, not in 4.3.
 HAS_FILMED_METAL = bpy.app.version >= (5, 0, 0)
 
+# What has no material is a Principled as it is added, not a diffuse; seen in 5.2, not in 4.3.
+DEFAULT_IS_PRINCIPLED = bpy.app.version >= (5, 0, 0)
+
 # The coat of Principled keeps what light loses between its facets; seen in 5.2, not in 4.3.
 HAS_WHOLE_COAT = bpy.app.version >= (5, 0, 0)
 

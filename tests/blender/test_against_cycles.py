@@ -572,6 +572,25 @@ def test_light(light_means, kind):
     assert ours == pytest.approx(theirs, rel=MEAN_TOLERANCE)
 
 
+def inside_no_material():
+    """A floor without slots for materials, a ball whose slot is empty."""
+    import scenes
+    scene = scenes.empty(size=(64, 48))
+    floor, ball = _stage()
+    floor.data.materials.clear()
+    ball.data.materials[0] = None
+    assert len(ball.material_slots) == 1
+    _shine('SUN')
+    scenes.world_color(scene.world, (0.5, 0.6, 0.8))
+    return _seeds(LIGHT_SAMPLES)
+
+
+def test_no_material(blender):
+    ours, theirs = (np.asarray(side)[..., :3] for side in blender.run(inside_no_material))
+    mean, tile = compare.unexplained(ours, theirs)
+    assert mean < 1e-3 * theirs.mean() and tile < 5e-3 * theirs.mean()
+
+
 # Ambient occlusion -----------------------------------------------------------------------------------
 
 def inside_ambient():

@@ -5,13 +5,16 @@ import bpy
 
 from .. import abi, native
 from ..abi import DisplacementMethod, NodeType
-from ..compat import HAS_DEFENSIVE_SAMPLING, HAS_FACET_SHADOWING, LEAVES_BUMPS, cycles, has_light_tree, uses_nodes
-from . import flatten, instance, studio, tangents
+from ..compat import (
+    DEFAULT_IS_PRINCIPLED, HAS_DEFENSIVE_SAMPLING, HAS_FACET_SHADOWING, LEAVES_BUMPS, cycles, has_light_tree,
+    uses_nodes)
+from . import flatten, instance, nodes, studio, tangents
 from .attributes import Attributes
 from .changes import Changes
 from .inlined import shader_tree
 from .values import CONSTANT, DEFAULT, Value
 
+_DEFAULT_KEY = ("default",)
 _HOLDOUT_KEY = ("holdout",)
 _STUDIO_KEY = ("studio",)
 _DISPLACEMENTS = {'BUMP': DisplacementMethod.BUMP, 'DISPLACEMENT': DisplacementMethod.TRUE,
@@ -41,9 +44,9 @@ class Materials:
         self._aovs, self._has_light_tree = read
 
     def ids_of(self, made_of):
-        """The library's ids of evaluated materials, 0 (the default) for None; and whether each of them is of a
+        """The library's ids of evaluated materials, the default's for None; and whether each of them is of a
         volume alone, so that what is made of them is not there."""
-        entries = [_NO_ENTRY if material is None else self.entry_of(material) for material in made_of]
+        entries = [self._default_entry() if material is None else self.entry_of(material) for material in made_of]
         is_volume = bool(entries) and entries[0].is_volume and all([entry.is_volume for entry in entries])
         return tuple([entry.id for entry in entries]), is_volume
 
@@ -62,6 +65,14 @@ class Materials:
                          flags=_flags(material, is_volume, self._has_light_tree))
             self._entries[key].is_volume = is_volume
         return self._entries[key]
+
+    def _default_entry(self):
+        """The entry of what has no material."""
+        if not DEFAULT_IS_PRINCIPLED:
+            return _NO_ENTRY  # of the library's own default
+        if _DEFAULT_KEY not in self._seen:
+            self._update(_DEFAULT_KEY, _default_surface(), _DEFAULT_NAME)
+        return self._entries[_DEFAULT_KEY]
 
     def knows(self, name):
         """Whether the last sync had a material of that name."""
@@ -292,6 +303,12 @@ def _let_through(flat):
     white = CONSTANT, 0, (1.0, 1.0, 1.0)
     flat.nodes.append(flatten.FlatNode(NodeType.TRANSPARENT, [white]))
     flat.surface = len(flat.nodes) - 1
+
+
+def _default_surface():
+    walker = flatten.Walker("", None)
+    walker.flat.surface = nodes.emit_default_principled(walker)
+    return walker.flat
 
 
 def _plain_surface(material):

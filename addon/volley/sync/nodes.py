@@ -35,6 +35,8 @@ _DISTRIBUTIONS = {
     'BECKMANN': DistributionType.BECKMANN, 'SHARP': DistributionType.SHARP,
     'ASHIKHMIN_SHIRLEY': DistributionType.ASHIKHMIN}
 _CORRELATED = DistributionType.CORRELATED if HAS_CORRELATED_MICROFACETS else 0
+_LAYERED_MODES = ((DistributionType.FILMED_METAL if HAS_FILMED_METAL else 0) |
+                  (DistributionType.WHOLE_COAT if HAS_WHOLE_COAT else 0))
 
 _BLENDS, _MATH_OPERATIONS = BlendMode.__members__, Math.__members__
 _VECTOR_OPERATIONS = {
@@ -90,10 +92,8 @@ def _microfacets(node):
 
 def _layered(node):
     """The mode of the layered Principled."""
-    own = DistributionType.FILMED_METAL if HAS_FILMED_METAL else 0
-    own |= DistributionType.WHOLE_COAT if HAS_WHOLE_COAT else 0
-    distribution = _distribution(node)
-    return (DistributionType.MULTI_GGX if distribution == DistributionType.MULTI_GGX else DistributionType.GGX) | own
+    is_multiple = _distribution(node) == DistributionType.MULTI_GGX
+    return (DistributionType.MULTI_GGX if is_multiple else DistributionType.GGX) | _LAYERED_MODES
 
 
 def _diffuse_model(_node):
@@ -302,6 +302,15 @@ def _principled(walker, node, sockets):
     if _is_thin(sockets):
         mode |= DistributionType.THIN_WALL
     return {"BSDF": Value('s', walker.emit(kind, values, mode), 0)}
+
+
+def emit_default_principled(walker):
+    """Append a layered Principled as it is when it is added; returns its index."""
+    one, half = _constant('f', 1.0), _constant('f', 0.5)
+    values = arranged(NodeType.LAYERED_PRINCIPLED, {
+        "base_color": _constant('c', 0.8, 0.8, 0.8), "roughness": half, "ior": _constant('f', 1.5), "alpha": one,
+        "specular_ior_level": half, "specular_tint": _constant('c', 1.0, 1.0, 1.0)})
+    return walker.emit(NodeType.LAYERED_PRINCIPLED, values, DistributionType.MULTI_GGX | _LAYERED_MODES)
 
 
 def _is_thin(sockets):

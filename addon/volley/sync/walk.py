@@ -23,10 +23,10 @@ def dress(item, materials, each, view_layer, values_of, scene):
 
 
 def materials_of(blender_object, view_layer):
-    """What an object is made of, slot by slot, None where a slot is empty."""
+    """What an object is made of, slot by slot, None where a slot is empty and of one that has no slots."""
     if view_layer.material_override is not None:
         return [view_layer.material_override]
-    return [slot.material for slot in blender_object.material_slots]
+    return [slot.material for slot in blender_object.material_slots] or [None]
 
 
 @dataclass
