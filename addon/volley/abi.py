@@ -583,6 +583,7 @@ class MaterialFlags(IntFlag):
     DEFENSIVE_SAMPLING = 4
     FACET_SHADOWING = 8
     LIGHT_TREE = 16
+    KEEPS_NORMALS = 32
 
 
 class AlphaMode(IntEnum):

@@ -79,6 +79,9 @@ KEEPS_DIFFUSE_ENERGY = bpy.app.version >= (4, 3, 0)
 # The Bump node no longer keeps what its normals reflect above the surface: shaders do.
 LEAVES_BUMPS = bpy.app.version >= (4, 0, 0)
 
+# Shaders without microfacets take normals as they are; seen in 4.3, not in 3.4.
+KEEPS_NORMALS = bpy.app.version >= (4, 0, 0)
+
 # What lies in the shadow of bumps goes by other means; seen in 5.2, not in 4.3.
 HAS_FACET_SHADOWING = bpy.app.version >= (5, 0, 0)
 

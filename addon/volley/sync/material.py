@@ -6,8 +6,8 @@ import bpy
 from .. import abi, native
 from ..abi import DisplacementMethod, NodeType
 from ..compat import (
-    DEFAULT_IS_PRINCIPLED, HAS_DEFENSIVE_SAMPLING, HAS_FACET_SHADOWING, LEAVES_BUMPS, cycles, has_light_tree,
-    uses_nodes)
+    DEFAULT_IS_PRINCIPLED, HAS_DEFENSIVE_SAMPLING, HAS_FACET_SHADOWING, KEEPS_NORMALS, LEAVES_BUMPS, cycles,
+    has_light_tree, uses_nodes)
 from . import flatten, instance, nodes, studio, tangents
 from .attributes import Attributes
 from .changes import Changes
@@ -19,7 +19,11 @@ _HOLDOUT_KEY = ("holdout",)
 _STUDIO_KEY = ("studio",)
 _DISPLACEMENTS = {'BUMP': DisplacementMethod.BUMP, 'DISPLACEMENT': DisplacementMethod.TRUE,
                   'BOTH': DisplacementMethod.BOTH}
-_DEFAULT_NAME = "default_surface"  # of the library's default material in mattes
+_VERSION_FLAGS = ((abi.MaterialFlags.DEFENSIVE_SAMPLING if HAS_DEFENSIVE_SAMPLING else 0) |
+                  (abi.MaterialFlags.FACET_SHADOWING if HAS_FACET_SHADOWING else 0) |
+                  (abi.MaterialFlags.KEEPS_NORMALS if KEEPS_NORMALS else 0))
+_DEFAULT_COLOR = 0.8, 0.8, 0.8
+_DEFAULT_NAME = "default_surface"  # in mattes
 
 
 class Materials:
@@ -68,10 +72,8 @@ class Materials:
 
     def _default_entry(self):
         """The entry of what has no material."""
-        if not DEFAULT_IS_PRINCIPLED:
-            return _NO_ENTRY  # of the library's own default
         if _DEFAULT_KEY not in self._seen:
-            self._update(_DEFAULT_KEY, _default_surface(), _DEFAULT_NAME)
+            self._update(_DEFAULT_KEY, _default_surface(), _DEFAULT_NAME, flags=_VERSION_FLAGS)
         return self._entries[_DEFAULT_KEY]
 
     def knows(self, name):
@@ -206,7 +208,7 @@ class Materials:
         """A material's surface as a flat tree."""
         if uses_nodes(material):
             return self._flatten(material, label, _displacement_mode(material))
-        return _plain_surface(material)
+        return _plain_surface(material.diffuse_color)  # as in Cycles
 
     def volume_names(self):
         """The names of materials of this sync that are of volumes alone."""
@@ -273,14 +275,9 @@ class Entry:
         self.is_animated = False  # whether what it reads may be another in the next sync
 
 
-_NO_ENTRY = Entry()
-
-
 def _flags(material, is_volume, is_by_light_tree):
     has_transparent_shadow = is_volume or _has_transparent_shadow(material)
-    flags = abi.MaterialFlags.TRANSPARENT_SHADOW if has_transparent_shadow else 0
-    flags |= abi.MaterialFlags.DEFENSIVE_SAMPLING if HAS_DEFENSIVE_SAMPLING else 0
-    flags |= abi.MaterialFlags.FACET_SHADOWING if HAS_FACET_SHADOWING else 0
+    flags = _VERSION_FLAGS | (abi.MaterialFlags.TRANSPARENT_SHADOW if has_transparent_shadow else 0)
     flags |= abi.MaterialFlags.LIGHT_TREE if is_by_light_tree else 0
     if cycles(material, "sample_as_light", cycles(material, "emission_sampling", 'AUTO') != 'NONE'):
         flags |= abi.MaterialFlags.SAMPLE_EMISSION
@@ -306,16 +303,17 @@ def _let_through(flat):
 
 
 def _default_surface():
+    if not DEFAULT_IS_PRINCIPLED:
+        return _plain_surface(_DEFAULT_COLOR)
     walker = flatten.Walker("", None)
     walker.flat.surface = nodes.emit_default_principled(walker)
     return walker.flat
 
 
-def _plain_surface(material):
-    """A material without nodes: as in Cycles, a diffuse of its viewport colour."""
+def _plain_surface(color):
+    """A diffuse of that colour."""
     walker = flatten.Walker("", None)
-    values = (Value('c', CONSTANT, 0, tuple(material.diffuse_color)[:3]), Value('f', CONSTANT, 0),
-              Value('v', DEFAULT, 0))
+    values = (Value('c', CONSTANT, 0, tuple(color)[:3]), Value('f', CONSTANT, 0), Value('v', DEFAULT, 0))
     walker.flat.surface = walker.emit(NodeType.DIFFUSE, values)
     return walker.flat
 

@@ -407,7 +407,11 @@ enum trc_material_flags {
     /* Rays that Hair reflects below the surface keep all light of what lies wholly there, as with
      * Cycles' light tree, which never chooses such a light for a surface without transmission; else
      * they share it with samples of lights that Hair gives nothing of, and lose that part. */
-    TRC_MATERIAL_LIGHT_TREE = 16
+    TRC_MATERIAL_LIGHT_TREE = 16,
+    /* Lobes without microfacets (diffuse, translucent, sheen, velvet, toon) take normals as they
+     * are (Cycles 4 and 5); else these are turned back until a mirror would reflect the view above
+     * the surface, as those of all other lobes are (Cycles 3.4). */
+    TRC_MATERIAL_KEEPS_NORMALS = 32
 };
 
 /* A material from a node list, in use from the next commit on. INVALID_ARGUMENT, with the node and

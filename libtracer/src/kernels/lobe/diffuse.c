@@ -134,7 +134,7 @@ static void add_diffuse(struct trc_setup *c, const struct trc_leaf *leaf, vfloat
     const struct trc_operand *roughness = input(c, leaf, TRC_AT(DIFFUSE, roughness));
     const bool is_lambert = roughness->reg < 0 && roughness->value == 0.0f;
     const vvec3 base = colour(c, leaf, TRC_AT(DIFFUSE, color)), tint = v3_scale(base, weight);
-    const vvec3 n = trc_leaf_normal(c, leaf, TRC_AT(DIFFUSE, normal));
+    const vvec3 n = trc_matt_normal(c, leaf, TRC_AT(DIFFUSE, normal));
     const vfloat sigma = vf_saturate(trc_operand_value(roughness, c->regs));
     if (leaf->mode == TRC_DIFFUSE_KEEPS_ENERGY && !is_lambert)
         trc_add_energy_oren_nayar(c, tint, base, n, sigma);

@@ -22,10 +22,10 @@ static vfloat layered_sheen(struct trc_setup *c, const struct trc_leaf *leaf, vf
     const vvec3 tint =
         v3_scale(colour(c, leaf, TRC_AT(LAYERED_PRINCIPLED, sheen_tint)),
                  vf_max(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, sheen_weight)), vf_zero()));
-    const vvec3 bent = trc_leaf_normal(c, leaf, TRC_AT(LAYERED_PRINCIPLED, coat_normal));
+    const vvec3 bent = trc_matt_normal(c, leaf, TRC_AT(LAYERED_PRINCIPLED, coat_normal));
     const vfloat coat = vf_saturate(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, coat_weight)));
     const vvec3 n = v3_normalize(
-        v3_lerp(trc_leaf_normal(c, leaf, TRC_AT(LAYERED_PRINCIPLED, normal)), bent, coat));
+        v3_lerp(trc_matt_normal(c, leaf, TRC_AT(LAYERED_PRINCIPLED, normal)), bent, coat));
     const vfloat albedo =
         trc_add_fibres(c, v3_scale(tint, weight), n,
                        vf_saturate(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, sheen_roughness))));
@@ -327,11 +327,12 @@ static void add_layered_principled(struct trc_setup *c, const struct trc_leaf *l
         rest = v3_scale(rest, vf_one() - transmission);
     }
     rest = v3_scale(rest, layered_specular(c, leaf, rest, n));
+    const vvec3 matt = trc_matt_normal(c, leaf, TRC_AT(LAYERED_PRINCIPLED, normal));
     const struct trc_operand *sigma = input(c, leaf, TRC_AT(LAYERED_PRINCIPLED, diffuse_roughness));
     if (sigma->reg < 0 && sigma->value <= 0.0f)
-        trc_add_lambert(c, v3_mul(base, rest), n);
+        trc_add_lambert(c, v3_mul(base, rest), matt);
     else
-        trc_add_energy_oren_nayar(c, v3_mul(base, rest), base, n,
+        trc_add_energy_oren_nayar(c, v3_mul(base, rest), base, matt,
                                   vf_saturate(trc_operand_value(sigma, c->regs)));
 }
 

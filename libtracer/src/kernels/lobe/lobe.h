@@ -114,7 +114,9 @@ struct trc_lobe *trc_add_lobe(struct trc_setup *c, const struct trc_lobe_model *
 
 /* The normal of an input, turned so that the mirror direction is above the surface. */
 vvec3 trc_leaf_normal(struct trc_setup *c, const struct trc_leaf *leaf, uint32_t at);
-/* The same of an input that is not linked. */
+/* The same for a lobe without microfacets, which may take it as it is. */
+vvec3 trc_matt_normal(struct trc_setup *c, const struct trc_leaf *leaf, uint32_t at);
+/* That of facets, of an input that is not linked. */
 vvec3 trc_default_normal(struct trc_setup *c);
 
 /* The tangent of an anisotropic leaf, turned about n by rotation (in turns), then orthogonal to n.

@@ -33,13 +33,20 @@ TRC_INLINE vfloat bump_shadowing_of(const struct trc_lobe *lobe, const struct tr
                                  : bump_shadowing(s->n, lobe->n, wi, cos_i);
 }
 
-/* Of a lobe that wi meets at cos_i to its normal, from the bare value f and density. */
+/* Of a lobe that wi meets at cos_i to its normal, from the bare value f and density; bumps leave no
+ * shadow on it. */
+TRC_INLINE struct lobe_value upper_value(const struct trc_lobe *lobe, vfloat cos_i, vfloat f,
+                                         vfloat density) {
+    const vmask faces = vf_gt(cos_i, vf_zero());
+    const vfloat pdf = vf_where(faces, density);
+    return (struct lobe_value){v3_scale(lobe->weight, vf_where(faces, f)), pdf, pdf, pdf};
+}
+
+/* The same where they do. */
 TRC_INLINE struct lobe_value matt_value(const struct trc_lobe *lobe, const struct trc_surface *s,
                                         vvec3 wi, vfloat cos_i, vfloat f, vfloat density) {
-    const vmask faces = vf_gt(cos_i, vf_zero());
     const vfloat bumps = bump_shadowing_of(lobe, s, wi, v3_dot(lobe->n, wi));
-    const vfloat pdf = vf_where(faces, density);
-    return (struct lobe_value){v3_scale(lobe->weight, vf_where(faces, f * bumps)), pdf, pdf, pdf};
+    return upper_value(lobe, cos_i, f * bumps, density);
 }
 
 /* Density of the cosine, and of directions spread evenly over the hemisphere, which Cycles samples

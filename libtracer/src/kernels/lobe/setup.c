@@ -14,6 +14,12 @@ vvec3 trc_leaf_normal(struct trc_setup *c, const struct trc_leaf *leaf, uint32_t
     return trc_default_normal(c);
 }
 
+vvec3 trc_matt_normal(struct trc_setup *c, const struct trc_leaf *leaf, uint32_t at) {
+    if (!(c->material->flags & TRC_MATERIAL_KEEPS_NORMALS))
+        return trc_leaf_normal(c, leaf, at);
+    return is_unlinked(c, leaf, at) ? c->s->n : colour(c, leaf, at);
+}
+
 vvec3 trc_default_normal(struct trc_setup *c) {
     if (!c->has_default_n) {
         c->default_n = valid_normal(c->s, c->s->n);

@@ -42,7 +42,7 @@ TRC_INLINE vfloat fibres(const struct trc_lobe *lobe, vvec3 wo, vvec3 wi, vfloat
 static struct lobe_value fibres_value(const struct trc_lobe *lobe, const struct trc_surface *s,
                                       vvec3 wi) {
     const vfloat cos_i = v3_dot(lobe->n, wi);
-    const vfloat f = vf_where(vf_gt(lobe->cos_o, vf_zero()), fibres(lobe, s->wo, wi, cos_i));
+    const vfloat f = fibres(lobe, s->wo, wi, cos_i);
     return matt_value(lobe, s, wi, cos_i, f, f);
 }
 
@@ -78,8 +78,7 @@ static vfloat fibres_lean(vfloat x, vfloat y) {
 vfloat trc_add_fibres(struct trc_setup *c, vvec3 weight, vvec3 n, vfloat roughness) {
     const vfloat rough = vf_clamp(roughness, MIN_FIBRE_ROUGHNESS, 1.0f);
     const vfloat cosine = vf_saturate(v3_dot(n, c->s->wo));
-    const vfloat albedo =
-        vf_where(vf_gt(v3_dot(n, c->s->wo), vf_zero()), trc_fibres_albedo(cosine, rough));
+    const vfloat albedo = trc_fibres_albedo(cosine, rough);
     struct trc_lobe *lobe = trc_add_matt(c, &fibres_model, v3_scale(weight, albedo), n, rough);
     if (lobe)
         lobe->f0 = v3(fibres_scale(cosine, rough), fibres_lean(cosine, rough), vf_zero());
@@ -88,7 +87,7 @@ vfloat trc_add_fibres(struct trc_setup *c, vvec3 weight, vvec3 n, vfloat roughne
 
 static void add_sheen(struct trc_setup *c, const struct trc_leaf *leaf, vfloat weight) {
     trc_add_fibres(c, v3_scale(colour(c, leaf, TRC_AT(SHEEN, color)), weight),
-                   trc_leaf_normal(c, leaf, TRC_AT(SHEEN, normal)),
+                   trc_matt_normal(c, leaf, TRC_AT(SHEEN, normal)),
                    number(c, leaf, TRC_AT(SHEEN, roughness)));
 }
 
@@ -119,7 +118,7 @@ static struct lobe_value velvet_value(const struct trc_lobe *lobe, const struct 
     const vvec3 h = v3_normalize(v3_add(wi, s->wo));
     const vfloat f =
         velvet(lobe->roughness, cos_i, lobe->cos_o, v3_dot(lobe->n, h), v3_dot(s->wo, h));
-    return matt_value(lobe, s, wi, cos_i, f, even_density());
+    return upper_value(lobe, cos_i, f, even_density());
 }
 
 static const struct trc_lobe_model velvet_model = {.kind = TRC_LOBE_DIFFUSE, .value = velvet_value};
@@ -127,7 +126,7 @@ static const struct trc_lobe_model velvet_model = {.kind = TRC_LOBE_DIFFUSE, .va
 static void add_velvet(struct trc_setup *c, const struct trc_leaf *leaf, vfloat weight) {
     const vfloat sigma = vf_max(number(c, leaf, TRC_AT(VELVET, sigma)), vf_set(VELVET_MIN_SIGMA));
     trc_add_matt(c, &velvet_model, v3_scale(colour(c, leaf, TRC_AT(VELVET, color)), weight),
-                 trc_leaf_normal(c, leaf, TRC_AT(VELVET, normal)), vf_rcp(sigma * sigma));
+                 trc_matt_normal(c, leaf, TRC_AT(VELVET, normal)), vf_rcp(sigma * sigma));
 }
 
 const struct trc_closure TRC_CLOSURE_OF(VELVET) = {.add = add_velvet};

@@ -64,7 +64,7 @@ static void add_toon(struct trc_setup *c, const struct trc_leaf *leaf, vfloat we
     const vfloat angle = vf_saturate(number(c, leaf, TRC_AT(TOON, size))) * quarter;
     const vfloat fade = vf_saturate(number(c, leaf, TRC_AT(TOON, smooth))) * quarter;
     const vfloat whole = vf_min(angle + fade, quarter);
-    lobe->n = trc_leaf_normal(c, leaf, TRC_AT(TOON, normal));
+    lobe->n = trc_matt_normal(c, leaf, TRC_AT(TOON, normal));
     lobe->cos_o = v3_dot(lobe->n, c->s->wo);
     lobe->ior = vf_one();
     lobe->f0 = v3(angle, fade, vf_cos(whole));

@@ -20,7 +20,7 @@ static void add_translucent(struct trc_setup *c, const struct trc_leaf *leaf, vf
     static const struct trc_lobe_model model = {
         .kind = TRC_LOBE_TRANSLUCENT, .value = value, .direction = direction};
     trc_add_matt(c, &model, v3_scale(colour(c, leaf, TRC_AT(TRANSLUCENT, color)), weight),
-                 trc_leaf_normal(c, leaf, TRC_AT(TRANSLUCENT, normal)), vf_zero());
+                 trc_matt_normal(c, leaf, TRC_AT(TRANSLUCENT, normal)), vf_zero());
 }
 
 const struct trc_closure TRC_CLOSURE_OF(TRANSLUCENT) = {.add = add_translucent};

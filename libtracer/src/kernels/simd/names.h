@@ -54,6 +54,7 @@
 #define trc_curve_fetch(...) TRC_KERNEL(trc_curve_fetch)(__VA_ARGS__)
 #define trc_curve_lanes(...) TRC_KERNEL(trc_curve_lanes)(__VA_ARGS__)
 #define trc_data_passes(...) TRC_KERNEL(trc_data_passes)(__VA_ARGS__)
+#define trc_matt_normal(...) TRC_KERNEL(trc_matt_normal)(__VA_ARGS__)
 #define trc_default_normal(...) TRC_KERNEL(trc_default_normal)(__VA_ARGS__)
 #define trc_denoise_memory_bytes(...) TRC_KERNEL(trc_denoise_memory_bytes)(__VA_ARGS__)
 #define trc_denoise_tile(...) TRC_KERNEL(trc_denoise_tile)(__VA_ARGS__)

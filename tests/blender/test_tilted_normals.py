@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Normals far from the geometry's, of smooth meshes and given to shaders, each shader beside Cycles: a square seen
+straight on whose normals are turned by so many degrees, under a sun without size, so that nothing is random."""
+
+import math
+
+import pytest
+from blender import version
+
+TURNS_DEGREES = 20, 60, 80, 100
+SUNS_DEGREES = 80, 110  # from the view; the second is behind the square
+SAMPLES = 16
+RELATIVE, ABSOLUTE = 0.01, 3e-4
+
+_BASE = {"Base Color": (0.8, 0.8, 0.8)}
+_BARE = {"Base Color": (0.0, 0.0, 0.0), "IOR": 1.0, "Specular IOR Level": 0.0}
+_PRINCIPLED = "ShaderNodeBsdfPrincipled"
+# Name: node, inputs, settings.
+_SHADERS = {
+    "diffuse": ("ShaderNodeBsdfDiffuse", {"Color": (0.8, 0.8, 0.8)}, {}),
+    "rough diffuse": ("ShaderNodeBsdfDiffuse", {"Color": (0.8, 0.8, 0.8), "Roughness": 0.8}, {}),
+    "translucent": ("ShaderNodeBsdfTranslucent", {"Color": (0.8, 0.8, 0.8)}, {}),
+    "glossy": ("ShaderNodeBsdfAnisotropic", {"Color": (1.0, 1.0, 1.0), "Roughness": 0.5, "Anisotropy": 0.0}, {}),
+    "anisotropic": ("ShaderNodeBsdfAnisotropic", {"Color": (1.0, 1.0, 1.0), "Roughness": 0.5, "Anisotropy": 0.5}, {}),
+    "ashikhmin": ("ShaderNodeBsdfAnisotropic", {"Color": (1.0, 1.0, 1.0), "Roughness": 0.5, "Anisotropy": 0.0},
+                  {"distribution": 'ASHIKHMIN_SHIRLEY'}),
+    "glass": ("ShaderNodeBsdfGlass", {"Roughness": 0.5}, {}),
+    "toon": ("ShaderNodeBsdfToon", {"Size": 0.8, "Smooth": 0.5}, {}),
+    "glossy toon": ("ShaderNodeBsdfToon", {"Size": 0.8, "Smooth": 0.5}, {"component": 'GLOSSY'}),
+    "sheen": ("ShaderNodeBsdfSheen", {}, {}),
+    "velvet": ("ShaderNodeBsdfSheen", {}, {"distribution": 'ASHIKHMIN'}),
+    "velvet node": ("ShaderNodeBsdfVelvet", {"Sigma": 1.0}, {}),
+    "Principled diffuse": (_PRINCIPLED, {**_BARE, **_BASE}, {}),
+    "Principled gloss": (_PRINCIPLED, {"Base Color": (0.0, 0.0, 0.0), "Roughness": 0.5}, {}),
+    "Principled metal": (_PRINCIPLED, {**_BASE, "Metallic": 1.0, "Anisotropic": 0.5}, {}),
+    "Principled coat": (_PRINCIPLED, {**_BARE, "Coat Weight": 1.0, "Coat Roughness": 0.5}, {}),
+    "Principled glass": (_PRINCIPLED, {"Transmission Weight": 1.0, "Roughness": 0.5}, {}),
+}
+# Rational fits of its table are up to so far off where it is dark.
+_LOOSER = {"sheen": 0.25}
+# Cycles 3.4 lets light from behind the geometry onto these; no ray of ours comes from there.
+_LIT_FROM_BELOW_3 = {"glass", "glossy toon", "Principled glass"}
+
+
+def _square(turn, is_smooth):
+    """A square whose normals are turned if it is smooth; its normal."""
+    import bpy
+    import scenes
+    normal = math.sin(turn), -math.cos(turn), 0.0
+    # What lies behind it gives generated coordinates a depth, so that tangents are not along the view.
+    corners = [(-2, 0, -2), (2, 0, -2), (2, 0, 2), (-2, 0, 2), (2, 3, 2), (2, 3, 1.99), (1.99, 3, 2)]
+    square = scenes.mesh("Square", corners, [(0, 1, 2, 3), (4, 5, 6)], None)
+    if is_smooth:
+        if bpy.app.version < (4, 1, 0):
+            square.data.use_auto_smooth, square.data.auto_smooth_angle = True, math.pi
+        square.data.polygons[0].use_smooth = True
+        square.data.normals_split_custom_set([normal] * len(square.data.loops))
+    return square, normal
+
+
+def _shader(name, normal):
+    """A material of one of _SHADERS, None where this Blender has none; with a normal that is given if there is one."""
+    import scenes
+    node_type, inputs, settings = _SHADERS[name]
+    if not scenes.has_node(node_type, inputs, settings):
+        return None
+    made = scenes.material(name, node_type, **{key.replace(" ", "_"): value for key, value in inputs.items()})
+    shader, tree = scenes.shader_of(made), made.node_tree
+    for key, value in settings.items():
+        setattr(shader, key, value)
+    if normal is not None:
+        given = tree.nodes.new("ShaderNodeCombineXYZ")
+        for number in range(3):
+            given.inputs[number].default_value = normal[number]
+        for socket in ("Normal", "Coat Normal"):
+            if socket in shader.inputs:
+                tree.links.new(given.outputs[0], shader.inputs[socket])
+    return made
+
+
+def inside_means():
+    """{(shader, whether it is smooth, degrees of the sun, of the normal): (ours, theirs)}."""
+    import scenes
+    from mathutils import Vector
+    means = {}
+    for name in _SHADERS:
+        for is_smooth in (True, False):
+            for sun_degrees in SUNS_DEGREES:
+                for degrees in TURNS_DEGREES:
+                    scenes.empty(size=(4, 4))
+                    camera = scenes.camera(location=(0, -5, 0))
+                    camera.data.type, camera.data.ortho_scale = 'ORTHO', 1.0
+                    square, normal = _square(math.radians(degrees), is_smooth)
+                    made = _shader(name, None if is_smooth else normal)
+                    if made is None:
+                        continue
+                    square.data.materials.clear()
+                    square.data.materials.append(made)
+                    sun = math.radians(sun_degrees)
+                    light = scenes.light('SUN', energy=3.0, angle=0.0)
+                    to_light = Vector((math.sin(sun), -math.cos(sun), 0.0))
+                    light.rotation_euler = to_light.to_track_quat('Z', 'Y').to_euler()
+                    means[name, is_smooth, sun_degrees, degrees] = [
+                        float(picture[..., :3].mean()) for picture in scenes.by_both(SAMPLES)]
+    return means
+
+
+@pytest.fixture(scope="module")
+def all_means(blender_of_module):
+    """Of all shaders, from one Blender."""
+    return blender_of_module.run(inside_means, timeout=300)
+
+
+@pytest.mark.parametrize("is_smooth", (True, False), ids=("smooth", "given"))
+@pytest.mark.parametrize("name", _SHADERS)
+def test_tilted(all_means, name, is_smooth):
+    means = {key[2:]: pair for key, pair in all_means.items() if key[:2] == (name, is_smooth)}
+    if not means:
+        pytest.skip("this Blender has no such node")
+    assert len(means) == len(SUNS_DEGREES) * len(TURNS_DEGREES)
+    is_lit_from_below = version() < (4, 0) and name in _LIT_FROM_BELOW_3 and not is_smooth
+    for (sun_degrees, degrees), (ours, theirs) in means.items():
+        if is_lit_from_below and sun_degrees > 90:
+            assert ours == 0.0
+            continue
+        allowed = pytest.approx(theirs, rel=_LOOSER.get(name, RELATIVE), abs=ABSOLUTE)
+        assert ours == allowed, f"sun at {sun_degrees}, normal at {degrees} degrees"
