@@ -164,6 +164,10 @@ static struct truth hole(int x, int y) {
     const float alpha = x < EDGE + y / 3 ? 1.0f : 0.25f;
     return (struct truth){0.4f * alpha, alpha, 0.5f, 0.0f};
 }
+static struct truth half_still(int x, int y) {
+    (void)y;
+    return (struct truth){x < EDGE ? 0.3f : 0.4f, 1.0f, 0.5f, x < EDGE ? 0.0f : 0.4f};
+}
 
 /* ---- tests ---- */
 
@@ -264,6 +268,21 @@ static void calm_neighbors(void **state) {
                  most);
     assert_true(most < 0.03);
     trc_film_destroy(&film);
+}
+
+/* Surfaces without noise keep their light up to the border of noisy ones. */
+static void still_border(void **state) {
+    (void)state;
+    static struct picture p;
+    const trc_render_desc desc = desc_of(4);
+    film_show(&desc, half_still, &p);
+    double most = 0.0;
+    for (int i = 0; i < 4 * FRAME; i += 4)
+        if (i / 4 % WIDTH < EDGE)
+            most = fmax(most, fabs((double)(p.clean[i] - p.plain[i])));
+    print_figure("31: light without noise beside noisy light at 4 samples", "moves by %.2g at most",
+                 most);
+    assert_true(most < 1e-5);
 }
 
 /* Passes add up, and are the same combination of pixels. */
@@ -552,13 +571,21 @@ static void counts(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(noiseless),      cmocka_unit_test(noisy),
-        cmocka_unit_test(many_samples),   cmocka_unit_test(bright_sample),
-        cmocka_unit_test(calm_neighbors), cmocka_unit_test(sums),
-        cmocka_unit_test(same_bits),      cmocka_unit_test(scene_pictures),
-        cmocka_unit_test(counts),         cmocka_unit_test(preview_noiseless),
-        cmocka_unit_test(preview_noisy),  cmocka_unit_test(preview_bits),
-        cmocka_unit_test(scene_previews), cmocka_unit_test(crops),
+        cmocka_unit_test(noiseless),
+        cmocka_unit_test(noisy),
+        cmocka_unit_test(many_samples),
+        cmocka_unit_test(bright_sample),
+        cmocka_unit_test(calm_neighbors),
+        cmocka_unit_test(still_border),
+        cmocka_unit_test(sums),
+        cmocka_unit_test(same_bits),
+        cmocka_unit_test(scene_pictures),
+        cmocka_unit_test(counts),
+        cmocka_unit_test(preview_noiseless),
+        cmocka_unit_test(preview_noisy),
+        cmocka_unit_test(preview_bits),
+        cmocka_unit_test(scene_previews),
+        cmocka_unit_test(crops),
         cmocka_unit_test(guides),
     };
     if (!query_test_isa())

@@ -62,11 +62,12 @@ trc_status trc_film_add_halves(const trc_render_desc *desc, struct trc_film *fil
 trc_status trc_denoise_create(struct trc_film *film, struct trc_denoise *denoise) {
     const size_t pixels = (size_t)film->width * film->height;
     *denoise = (struct trc_denoise){.film = film};
-    float **const planes[] = {&denoise->variance, &denoise->error};
+    float **const planes[] = {&denoise->variance, &denoise->error, &denoise->missed[0],
+                              &denoise->missed[1], &denoise->change};
     bool ok = true;
     for (int k = 0; ok && k < TRC_FEATURE_COUNT; k++)
         ok = (denoise->features[k] = trc_alloc(pixels, sizeof(float))) != NULL;
-    for (int k = 0; ok && k < 2; k++)
+    for (size_t k = 0; ok && k < sizeof planes / sizeof *planes; k++)
         ok = (*planes[k] = trc_alloc(pixels, sizeof(float))) != NULL;
     return ok ? TRC_OK : trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for reconstruction");
 }
@@ -76,5 +77,8 @@ void trc_denoise_destroy(struct trc_denoise *denoise) {
         trc_free(denoise->features[k]);
     trc_free(denoise->variance);
     trc_free(denoise->error);
+    trc_free(denoise->missed[0]);
+    trc_free(denoise->missed[1]);
+    trc_free(denoise->change);
     memset(denoise, 0, sizeof *denoise);
 }

@@ -43,10 +43,13 @@ struct trc_denoise {
     float *features[TRC_FEATURE_COUNT]; /* width * height each */
     float *variance; /* of the plain pixel, relative to the light around it squared */
     float *error;    /* of the clean pixel, in the same way, with the noise of an estimate */
+    /* What these are of: by how much each half's prediction misses the half, and by how much the
+     * first half exceeds the other, relative to the light around. 0 where there is but one half. */
+    float *missed[2], *change;
 };
 
 /* Bytes of the above for each pixel. */
-#define TRC_DENOISE_PIXEL_BYTES ((TRC_FEATURE_COUNT + 2) * sizeof(float))
+#define TRC_DENOISE_PIXEL_BYTES ((TRC_FEATURE_COUNT + 5) * sizeof(float))
 
 /* A pixel of the frame beyond whose edges it is mirrored; far outside, its edge. */
 static inline uint32_t trc_mirror(int64_t x, uint32_t size) {

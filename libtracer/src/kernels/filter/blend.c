@@ -1,22 +1,45 @@
 /* How much of the clean film is kept: all where its estimated error is below half of the plain
- * pixel's, then less, by means over the pixels around, as estimates of single pixels are noise. */
+ * pixel's, then less, by means over the pixels around, as estimates of single pixels are noise. The
+ * same is asked of smoothed pictures, in which noise is less and what was blurred is not, and the
+ * smaller part is kept. */
 #include "kernels/filter/filter.h"
 
 /* Pixels on each side over which estimates are averaged. */
 #define REACH 4
 /* The part kept is that much of variance / (variance + error), which would be best for independent
- * estimates. */
+ * estimates; of smoothed ones more, as fewer are independent. */
 #define FAVOR 1.5f
+#define SMOOTH_FAVOR 3.0f
+/* Along a line of pixels, which tells surfaces without noise beside noisy ones: so much more that
+ * chance has no part in it. */
+#define LINE_FAVOR 1000.0f
+#define LINE_REACH 4
+/* Variance of the mean over that of the difference of halves that are about as large. */
+#define MEAN_VARIANCE (0.25f * (1.0f + TRC_HALVES_CORRELATION) / (1.0f - TRC_HALVES_CORRELATION))
+
+/* Of a pixel as it is or of smoothed pictures: the plain one's variance, the clean one's error. */
+struct estimate {
+    float *variance, *error;         /* with halo */
+    float *variance_sum, *error_sum; /* over squares of pixels, of the tile */
+};
 
 struct work {
-    float *estimate, *columns, *mean[2]; /* of variance, error */
+    struct estimate own, smooth;
+    float *half[3], *columns, *rest; /* half: missed by either, change */
 };
 
 static size_t carve(struct work *w, void *memory) {
     struct trc_carver c = {.base = memory};
-    float **const all[] = {&w->estimate, &w->columns, &w->mean[0], &w->mean[1]};
-    for (int i = 0; i < 4; i++)
+    float **const all[] = {&w->half[0], &w->half[1], &w->half[2], &w->columns, &w->rest};
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++)
         *all[i] = trc_plane_carve(&c);
+    struct estimate *const estimates[] = {&w->own, &w->smooth};
+    for (int i = 0; i < 2; i++) {
+        estimates[i]->variance = trc_plane_carve(&c);
+        estimates[i]->error = trc_plane_carve(&c);
+        estimates[i]->variance_sum = trc_plane_carve(&c);
+        estimates[i]->error_sum = trc_plane_carve(&c);
+    }
     return c.used;
 }
 
@@ -25,31 +48,97 @@ size_t trc_blend_bytes(void) {
     return carve(&w, NULL);
 }
 
-/* Sums over squares of pixels of the tile; beyond the frame its mirror image. */
-static void sum_squares(const struct trc_denoise_job *job, const float *values, struct work *w,
-                        float *sums) {
+/* Beyond the frame is its mirror image. */
+static void load(const struct trc_denoise_job *job, const float *values, float *plane) {
     const struct trc_film *film = job->denoise->film;
-    for (int y = -REACH; y < TRC_TILE_SIZE + REACH; y++) {
+    for (int y = -TRC_HALO; y < TRC_TILE_SIZE + TRC_HALO; y++) {
         const float *row =
             values + (size_t)trc_mirror((int64_t)job->y + y, film->height) * film->width;
-        for (int x = -REACH; x < TRC_TILE_SIZE + REACH; x++)
-            w->estimate[trc_plane_at(x, y)] = row[trc_mirror((int64_t)job->x + x, film->width)];
+        for (int x = -TRC_HALO; x < TRC_TILE_SIZE + TRC_HALO; x++)
+            plane[trc_plane_at(x, y)] = row[trc_mirror((int64_t)job->x + x, film->width)];
     }
+}
+
+/* Sums over squares of pixels of the tile. */
+static void sum_squares(const float *plane, float *columns, float *sums) {
     for (int y = 0; y < TRC_TILE_SIZE; y++) {
         for (int x = -TRC_HALO; x < TRC_PLANE_COLUMNS - TRC_HALO; x += TRC_WIDTH) {
-            const float *estimate = w->estimate + trc_plane_at(x, y);
+            const float *values = plane + trc_plane_at(x, y);
             vfloat sum = vf_set(0.0f);
             for (int j = -REACH; j <= REACH; j++)
-                sum = sum + vf_load(estimate + j * TRC_PLANE_STRIDE);
-            vf_store(w->columns + trc_plane_at(x, 0), sum);
+                sum = sum + vf_load(values + j * TRC_PLANE_STRIDE);
+            vf_store(columns + trc_plane_at(x, 0), sum);
         }
         for (int x = 0; x < TRC_TILE_SIZE; x += TRC_WIDTH) {
             vfloat sum = vf_set(0.0f);
             for (int i = -REACH; i <= REACH; i++)
-                sum = sum + vf_load(w->columns + trc_plane_at(x + i, 0));
+                sum = sum + vf_load(columns + trc_plane_at(x + i, 0));
             vf_store(sums + trc_plane_at(x, y), sum);
         }
     }
+}
+
+/* The error of smoothed pictures, and their variance, as regress.c has those of pixels. */
+static void estimate_smooth(const struct trc_denoise_job *job, struct work *w) {
+    const struct trc_denoise *d = job->denoise;
+    const float *const planes[3] = {d->missed[0], d->missed[1], d->change};
+    for (int k = 0; k < 3; k++) {
+        load(job, planes[k], w->half[k]);
+        trc_plane_smooth(w->half[k], w->rest, TRC_HALO - 1);
+        trc_plane_smooth(w->rest, w->half[k], TRC_HALO - 2);
+    }
+    for (int i = 0; i < TRC_PLANE_FLOATS; i += TRC_WIDTH) {
+        const vfloat first = vf_load(w->half[0] + i), second = vf_load(w->half[1] + i);
+        const vfloat change = vf_load(w->half[2] + i), change2 = change * change;
+        const vfloat noise2 = change2 * vf_set(1.0f / (1.0f - TRC_HALVES_CORRELATION));
+        const vfloat missed2 = first * first + second * second;
+        vf_store(w->smooth.variance + i, change2 * vf_set(MEAN_VARIANCE));
+        vf_store(w->smooth.error + i, vf_set(0.5f) * (missed2 - noise2));
+    }
+}
+
+static void estimate(const struct trc_denoise_job *job, struct work *w) {
+    load(job, job->denoise->variance, w->own.variance);
+    load(job, job->denoise->error, w->own.error);
+    estimate_smooth(job, w);
+    const struct estimate *const estimates[] = {&w->own, &w->smooth};
+    for (int i = 0; i < 2; i++) {
+        sum_squares(estimates[i]->variance, w->columns, estimates[i]->variance_sum);
+        sum_squares(estimates[i]->error, w->columns, estimates[i]->error_sum);
+    }
+}
+
+static float part_of(float variance, float error, float favor) {
+    const float sum = variance + (error > 0.0f ? error : 0.0f);
+    const float part = variance > 0.0f ? favor * variance / sum : 0.0f;
+    return part < 1.0f ? part : 1.0f;
+}
+
+/* By the pixels of a line through one that are step apart in a plane. */
+static float line_part(const struct estimate *e, int at, int step) {
+    float variance = 0.0f, error = 0.0f;
+    for (int i = -LINE_REACH; i <= LINE_REACH; i++) {
+        variance += e->variance[at + i * step];
+        error += e->error[at + i * step];
+    }
+    return error > 0.0f ? part_of(variance, error, LINE_FAVOR) : 1.0f;
+}
+
+static bool has_halves(const struct trc_film *film, size_t pixel) {
+    const uint32_t first = film->halves[pixel].count;
+    return first && first < film->sample_counts[pixel];
+}
+
+static float part_at(const struct work *w, int at, bool halves) {
+    float part = part_of(w->own.variance_sum[at], w->own.error_sum[at], FAVOR);
+    if (!halves)
+        return part;
+    const float others[] = {
+        part_of(w->smooth.variance_sum[at], w->smooth.error_sum[at], SMOOTH_FAVOR),
+        line_part(&w->own, at, 1), line_part(&w->own, at, TRC_PLANE_STRIDE)};
+    for (size_t i = 0; i < sizeof others / sizeof *others; i++)
+        part = others[i] < part ? others[i] : part;
+    return part;
 }
 
 /* The largest part with which no colour of Combined falls below 0, as a slope that is followed
@@ -82,12 +171,9 @@ static void find_parts(const struct trc_denoise_job *job, const struct work *w, 
     const struct trc_film *film = job->denoise->film;
     for (uint32_t y = 0; y < job->height; y++)
         for (uint32_t x = 0; x < job->width; x++) {
-            const int at = trc_plane_at((int)x, (int)y);
-            const float variance = w->mean[0][at];
-            const float error = w->mean[1][at] > 0.0f ? w->mean[1][at] : 0.0f;
-            float part = variance > 0.0f ? FAVOR * variance / (variance + error) : 0.0f;
-            part = part < 1.0f ? part : 1.0f;
             const size_t pixel = (size_t)(job->y + y) * film->width + job->x + x;
+            const int at = trc_plane_at((int)x, (int)y);
+            const float part = part_at(w, at, has_halves(film, pixel));
             parts[at] = (float)limit(film, pixel, (double)part);
         }
 }
@@ -121,8 +207,7 @@ void trc_blend(const struct trc_denoise_job *job) {
     const struct trc_film *film = d->film;
     struct work w;
     carve(&w, job->memory);
-    sum_squares(job, d->variance, &w, w.mean[0]);
-    sum_squares(job, d->error, &w, w.mean[1]);
+    estimate(job, &w);
     float *parts = w.columns;
     find_parts(job, &w, parts);
     for (uint32_t pass = 0; pass < TRC_SUM_COUNT; pass++)

@@ -7,6 +7,10 @@
 /* What the light of a pixel is compared by: square roots of its red, green and blue, and alpha. */
 #define TRC_GUIDE_CHANNELS 4
 
+/* How halves of a pixel's samples depend on each other, their correlation: points of a sequence
+ * fill the gaps of those before. Less would blur textures at few samples, more keeps noise. */
+#define TRC_HALVES_CORRELATION -0.3f
+
 /* Planes of a tile for regression. Variances are those of the mean of all samples, smoothed. */
 struct trc_guide {
     float *half[2][TRC_GUIDE_CHANNELS]; /* of either half of the samples */

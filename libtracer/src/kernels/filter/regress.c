@@ -29,13 +29,11 @@
 /* Differences of features that count as one: albedo, normal, logarithm of depth, of the window. */
 static const float feature_scale[TRC_FEATURE_COUNT] = {4.5f, 4.5f, 4.5f, 3.0f, 3.0f, 3.0f, 3.0f};
 #define PLACE_SCALE (1.0f / REACH)
-/* How halves of a pixel's samples depend on each other, their correlation: points of a sequence
- * fill the gaps of those before. Less would blur textures at few samples, more keeps noise. */
-#define HALVES_CORRELATION -0.3f
 /* Light that counts as dark, and errors as large as can be: one bright pixel shall not decide for
  * all around it. */
 #define DARK 0.01f
 #define MOST_ERROR 1e3f
+#define MOST_MISSED 32.0f /* about its root */
 #define MOST_LIGHT 1e30f
 /* Of what one half's weights take, which with those of the other half sum to 1. */
 #define LEAST_TOTAL 0.05f
@@ -211,7 +209,7 @@ static void solve(vfloat a[PRODUCTS], vfloat out[TERMS]) {
 
 /* ---- error ---- */
 
-/* The light around a pixel, squared: what errors are relative to. */
+/* The light around a pixel: what errors are relative to. */
 static vfloat light_around(const struct trc_guide *g, int at) {
     vfloat sum = vf_set(0.0f);
     for (int j = -2; j <= 2; j++)
@@ -219,9 +217,10 @@ static vfloat light_around(const struct trc_guide *g, int at) {
             const int q = at + j * TRC_PLANE_STRIDE + i;
             sum = sum + vf_load(g->light[0] + q) + vf_load(g->light[1] + q);
         }
-    const vfloat light = sum * vf_set(0.5f / 25.0f) + vf_set(DARK);
-    return light * light;
+    return sum * vf_set(0.5f / 25.0f) + vf_set(DARK);
 }
+
+#define STORED 5 /* planes of estimates */
 
 /* Where one half's weights make of the other half's light what is in the first half, there is no
  * error but the noise of that. */
@@ -233,23 +232,28 @@ static void store_error(const struct trc_denoise_job *job, const struct group *u
     const vfloat change = light[0] - light[1];
     const vmask alone = vf_le(more[0], vf_set(1.0f)); /* no halves: noise is a guess */
     const vfloat noise = vf_load(g->noise + u->at);
-    const vfloat change2 = change * change * vf_set(1.0f / (1.0f - HALVES_CORRELATION));
+    const vfloat change2 = change * change * vf_set(1.0f / (1.0f - TRC_HALVES_CORRELATION));
     const vfloat half_noise = vf_select(alone, noise, vf_set(0.5f) * change2);
-    const vfloat variance =
-        vf_select(alone, noise, change2 * vf_set(1.0f + HALVES_CORRELATION) / (more[0] * more[1]));
+    const vfloat variance = vf_select(
+        alone, noise, change2 * vf_set(1.0f + TRC_HALVES_CORRELATION) / (more[0] * more[1]));
     const vfloat missed[2] = {clean[0] - light[0], clean[1] - light[1]};
     const vfloat error =
         vf_set(0.5f) * (missed[0] * missed[0] + missed[1] * missed[1]) - half_noise;
-    const vfloat unit = vf_set(1.0f) / light_around(g, u->at);
-    float lanes[2][TRC_WIDTH];
+    const vfloat root = vf_set(1.0f) / light_around(g, u->at), unit = root * root;
+    float lanes[STORED][TRC_WIDTH];
     vf_store(lanes[0], vf_min(variance * unit, vf_set(MOST_ERROR)));
     vf_store(lanes[1], vf_clamp(error * unit, -MOST_ERROR, MOST_ERROR));
+    const vfloat of_halves[3] = {missed[0], missed[1], change};
+    for (int k = 0; k < 3; k++)
+        vf_store(lanes[2 + k], vf_select(alone, vf_set(0.0f),
+                                         vf_clamp(of_halves[k] * root, -MOST_MISSED, MOST_MISSED)));
     const struct trc_denoise *d = job->denoise;
+    float *const stored[STORED] = {d->variance, d->error, d->missed[0], d->missed[1], d->change};
     for (int i = 0; i < TRC_WIDTH && (uint32_t)(u->x + i) < job->width; i++) {
         const size_t pixel =
             (size_t)(job->y + (uint32_t)y) * d->film->width + job->x + (uint32_t)(u->x + i);
-        d->variance[pixel] = lanes[0][i];
-        d->error[pixel] = lanes[1][i];
+        for (int k = 0; k < STORED; k++)
+            stored[k][pixel] = lanes[k][i];
     }
 }
 
