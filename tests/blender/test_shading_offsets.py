@@ -24,6 +24,7 @@ CASES = {
     "gloss": ('AREA', "gloss", 0.0, 0.7),
     "mirror": ('AREA', "mirror", 0.1, 0.6),
     "both": ('POINT', "gloss", 0.3, 0.4),
+    "even world": ('WORLD', "diffuse", 0.5, 0.0),
     "distance": ('AO', "diffuse", 0.1, 0.0),
 }
 
@@ -80,8 +81,11 @@ def build(light, lobe, geometry, shading):
     _smooth("Ring", _ring, 0.0, material)
     for ball in balls:
         _set_offsets(ball, geometry, shading)
-    if light == 'AO':
+    if light in {'AO', 'WORLD'}:
         scenes.light_world((0.5, 0.6, 0.8))
+    if light == 'WORLD':
+        return scene
+    if light == 'AO':
         scene.world.cycles.sampling_method = 'NONE'
         scene.world.light_settings.distance = 3.0
         balls[0].cycles.ao_distance, balls[1].cycles.ao_distance = 0.4, 1.0

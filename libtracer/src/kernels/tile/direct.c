@@ -8,36 +8,48 @@
 #include "kernels/trace/mesh_fetch.h"
 #include "kernels/trace/spawn.h"
 
+/* Lanes whose light Cycles finds by continuation rays alone, which nothing lifts: an even world. */
+TRC_INLINE vmask is_found_alone(const struct trc_surface *s, const struct trc_light_sample *l) {
+    const struct trc_snapshot *snapshot = s->snapshot;
+    const int32_t none = -1;
+    return vi_eq(
+        l->light,
+        vi_set(snapshot->world.is_constant ? (int32_t)snapshot->lights->world_light : none));
+}
+
 /* Where light grazes a smooth surface, shadow rays start from the curved surface that the normals
  * describe, or the flat triangles would cast shadows with edges of their own. This is which part of
- * the way to it a ray towards w starts with; the transition, between cosine and 0 to both normals,
- * is as in Cycles. */
-TRC_INLINE vfloat lift(const struct trc_surface *s, vvec3 w, vfloat cosine, vfloat inverse) {
+ * the way to it a ray towards a light starts with; the transition, between cosine and 0 to both
+ * normals, is as in Cycles. */
+TRC_INLINE vfloat lift(const struct trc_surface *s, const struct trc_light_sample *l, vfloat cosine,
+                       vfloat inverse) {
+    const vvec3 w = l->wi;
     const vfloat zero = vf_set(0.0f), one = vf_set(1.0f);
     const vfloat cos_n = v3_dot(w, s->n), cos_g = v3_dot(w, s->ng);
     const vfloat near = vf_select(vf_lt(cos_n, cosine), vf_set(2.0f) - (cos_g + cos_n) * inverse,
                                   one - cos_g * inverse);
     const vfloat amount = vf_min(vf_max(near, zero), one);
-    return vf_select(vf_ge(cos_n, zero), amount, zero);
+    return vf_select(vm_andnot(vf_ge(cos_n, zero), is_found_alone(s, l)), amount, zero);
 }
 
-/* Origin of a shadow ray towards w. */
-TRC_INLINE vvec3 shadow_origin(const struct trc_surface *s, vvec3 w) {
-    const vvec3 o = trc_spawn_origin(s, vf_ge(v3_dot(w, s->n), vf_set(0.0f)));
+/* Origin of a shadow ray towards a light. */
+TRC_INLINE vvec3 shadow_origin(const struct trc_surface *s, const struct trc_light_sample *l) {
+    const vvec3 o = trc_spawn_origin(s, vf_ge(v3_dot(l->wi, s->n), vf_set(0.0f)));
     if (!vm_any(s->smooth))
         return o;
-    return v3_add(o, v3_scale(s->bulge, lift(s, w, vf_set(TRC_TERMINATOR_COSINE),
+    return v3_add(o, v3_scale(s->bulge, lift(s, l, vf_set(TRC_TERMINATOR_COSINE),
                                              vf_set(1.0f / TRC_TERMINATOR_COSINE))));
 }
 
 /* The same by the offset of each lane's instance. Where that is 0, no ray is lifted, and all leave
  * on the side that they go to. */
-static vvec3 own_origin(const struct trc_surface *s, vvec3 w) {
+static vvec3 own_origin(const struct trc_surface *s, const struct trc_light_sample *l) {
+    const vvec3 w = l->wi;
     const vfloat zero = vf_set(0.0f);
     const vfloat cosine = trc_instance_float(
         s->snapshot, s->instance, offsetof(struct trc_instance, terminator_cosine), s->active);
     const vmask lifts = vf_gt(cosine, zero);
-    const vfloat part = lift(s, w, cosine, vf_divide(vf_set(1.0f), cosine));
+    const vfloat part = lift(s, l, cosine, vf_divide(vf_set(1.0f), cosine));
     const vvec3 o =
         trc_spawn_origin(s, vm_select(lifts, vf_ge(v3_dot(w, s->n), zero), goes_out(s, w)));
     return v3_add(o, v3_scale(s->bulge, vf_select(lifts, part, zero)));
@@ -140,7 +152,7 @@ static __attribute__((noinline)) void push_own(struct trc_tile *t, const struct 
                                                const struct light_result *r, vuint cell,
                                                vmask active) {
     const bool has_offsets = t->snapshot->features & TRC_FEATURE_SHADOW_TERMINATORS;
-    const vvec3 o = has_offsets ? own_origin(s, l->wi) : shadow_origin(s, l->wi);
+    const vvec3 o = has_offsets ? own_origin(s, l) : shadow_origin(s, l);
     trc_shadow_push_from(t, a, s, l, r, &o, cell, active);
 }
 
@@ -150,7 +162,7 @@ void trc_shadow_push(struct trc_tile *t, const struct arrival *a, const struct t
     if (t->snapshot->features & (TRC_FEATURE_SHADOW_TERMINATORS | TRC_FEATURE_CURVES))
         push_own(t, a, s, l, r, cell, active);
     else
-        push(t, a, s, l, r, shadow_origin(s, l->wi), cell, active);
+        push(t, a, s, l, r, shadow_origin(s, l), cell, active);
 }
 
 /* What the lanes' light samples are in the Shadow pass if nothing is in the way: lamps count
