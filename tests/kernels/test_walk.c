@@ -68,8 +68,12 @@ static void joined_trees_are_for_their_rays(void **state) {
     trial_init(&t);
     add_wall(query_world_object(&t.world), -4, 0, 1);
     add_wall(query_world_mesh(&t.world), 0, 4, 0);
-    for (uint32_t k = 0; k < BEHIND; k++)
-        query_world_instance(&t.world, 1)->transforms[0][11] = 9.0f + 0.25f * (float)k;
+    for (uint32_t k = 0; k < BEHIND; k++) {
+        struct query_instance *instance = query_world_instance(&t.world, 1);
+        instance->transforms[0][11] = 9.0f + 0.25f * (float)k;
+        instance->key_count = 2; /* not joined */
+        memcpy(instance->transforms[1], instance->transforms[0], sizeof instance->transforms[0]);
+    }
     add_rays(&t, 0.0f, 0.0f);
     run(&t, true);
     for (uint32_t i = 0; i < t.rays.count; i++) {
@@ -93,7 +97,7 @@ static void one_origin_is_many_to_what_moves(void **state) {
     trial_init(&t);
     const float at[3] = {-50, -50, 5}, u[3] = {100, 0, 0}, v[3] = {0, 100, 0};
     mesh_add_grid(query_world_mesh(&t.world), at, u, v, 64, 64);
-    for (uint32_t k = 0; k < 2; k++) { /* two: neither is joined */
+    for (uint32_t k = 0; k < 2; k++) {
         struct query_instance *instance = query_world_instance(&t.world, 0);
         instance->key_count = 2;
         memcpy(instance->transforms[1], instance->transforms[0], sizeof instance->transforms[0]);

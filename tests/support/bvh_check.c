@@ -492,12 +492,14 @@ static bool check_thin(struct checker *c, uint32_t number) {
 }
 
 /* An instance without an item is invisible, has an empty tree, or is joined; only static ones are
- * joined, and their mesh is nobody else's. */
+ * joined. */
 static bool is_joined(const struct checker *c, uint32_t i, const uint8_t *placed) {
     const struct trc_instance *instance = &c->snapshot->instances[i];
-    if (placed[i] || instance->visibility != TRC_VISIBLE_ALL)
+    if (placed[i] || instance->visibility != TRC_VISIBLE_ALL || instance->key_count != 1 ||
+        c->snapshot->meshes[instance->mesh]->key_count != 1)
         return false;
-    return !blas_of(c, i);
+    const struct trc_blas *blas = blas_of(c, i);
+    return !blas || blas->tree.root != TRC_REF_EMPTY;
 }
 
 static bool check_joined(struct checker *c, const uint8_t *placed) {

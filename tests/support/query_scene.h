@@ -10,7 +10,7 @@
 #include "tracer/tracer.h"
 
 #define QUERY_MAX_MESHES 8
-#define QUERY_MAX_INSTANCES 64
+#define QUERY_MAX_INSTANCES 272
 #define QUERY_MAX_KEYS 5
 
 struct query_instance {

@@ -348,6 +348,37 @@ static void shapes_and_instances(void **state) {
     expect_good_world("instances", &world);
 }
 
+/* In final scenes static instances that share a mesh of few triangles are joined, while there are
+ * not too many together: then the smaller ones alone. */
+static void small_instances_are_joined(void **state) {
+    (void)state;
+    enum { SMALL = 80, MEDIUM = 4095, LARGE = 4096, TOTAL = 1 << 20 };
+    for (uint32_t is_final = 0; is_final < 2; is_final++)
+        for (uint32_t crowd = 0; crowd < 2; crowd++) {
+            struct query_world world;
+            struct rng rng = rng_seed(3);
+            query_world_init(&world);
+            mesh_add_icosphere(query_world_mesh(&world), origin, 1.0f, 1);
+            mesh_add_soup(query_world_mesh(&world), &rng, MEDIUM, unit_lower, unit_upper, 0.1f);
+            mesh_add_soup(query_world_mesh(&world), &rng, LARGE, unit_lower, unit_upper, 0.1f);
+            assert_int_equal(world.meshes[0].triangle_count, SMALL);
+            const uint32_t counts[] = {3, crowd ? TOTAL / MEDIUM + 1 : 3, 2};
+            float at = 0.0f;
+            for (uint32_t mesh = 0; mesh < 3; mesh++)
+                for (uint32_t i = 0; i < counts[mesh]; i++, at += 3.0f)
+                    query_world_instance(&world, mesh)->transforms[0][3] = at;
+            struct query_scene scene;
+            assert_ok(query_scene_create(&world, is_final, 1, &scene));
+            expect_good(scene.scene, "small instances");
+            const struct trc_bvh *bvh = query_scene_snapshot(scene.scene)->bvh;
+            assert_int_equal(!bvh->blas[0], is_final);
+            assert_int_equal(!bvh->blas[1], is_final && !crowd);
+            assert_non_null(bvh->blas[2]);
+            query_scene_destroy(&scene);
+            query_world_free(&world);
+        }
+}
+
 /* Cases 21, 23, 24: through the origin, a collapse, one vertex far ahead of the rest; and many
  * keys. */
 static void moving_meshes(void **state) {
@@ -765,6 +796,7 @@ int main(void) {
         cmocka_unit_test(wide_nodes_cost_the_least),
         cmocka_unit_test(any_number_of_triangles),
         cmocka_unit_test(shapes_and_instances),
+        cmocka_unit_test(small_instances_are_joined),
         cmocka_unit_test(moving_meshes),
         cmocka_unit_test(random_bits),
         cmocka_unit_test(skipped_triangles_are_counted),

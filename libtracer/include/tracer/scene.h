@@ -13,8 +13,9 @@ TRC_BEGIN_DECLS
 typedef struct trc_scene_desc {
     uint32_t struct_size;  /* of this structure; checked */
     uint32_t thread_count; /* for builds; 0: one per logical processor */
-    uint32_t is_final; /* 1: final frame, best trees, static meshes of one instance are joined in
-                          world space; 0: interactive, per-mesh trees that can be refitted */
+    uint32_t is_final;     /* 1: final frame, best trees, static meshes of one instance, and small
+                              ones of several, are joined in world space; 0: interactive, per-mesh trees
+                              that can be refitted */
     uint32_t image_megabytes; /* 2^20 bytes that images may take: when one more does not fit, the
                                  largest are halved, again and again, and a warning says so.
                                  0: no limit */

@@ -17,8 +17,8 @@ struct trc_bvh;
 struct trc_blas;
 
 struct trc_bvh_options {
-    bool is_final;    /* join static single-instance meshes into one world-space tree, and clip
-                         what slants there (bvh/clip.h) */
+    bool is_final;    /* join static instances, but those that share large meshes, into one
+                         world-space tree, and clip what slants there (bvh/clip.h) */
     bool keeps_grown; /* refitted trees whose SAH cost has grown too far stay for now, unless by
                          much: the caller builds them anew apart */
     struct trc_blas *const *rebuilt; /* per mesh, from trc_blas_build for any pose of it: what to

@@ -20,6 +20,10 @@
 #define REBUILD_GROWTH 1.4f
 /* The same where the caller builds such trees apart: beyond it a build costs less than the rays. */
 #define REBUILD_GROWTH_AT_ONCE 3.0f
+/* Instances of meshes of fewer triangles than 1 << (SHARED_CLASSES - 1) are joined, the smallest
+ * first, while they are no more triangles than that together: some 50 MiB. */
+#define SHARED_CLASSES 13u
+#define SHARED_TRIANGLES (1u << 20)
 
 struct create_job {
     const struct trc_snapshot *snapshot;
@@ -274,7 +278,33 @@ trc_status trc_blas_build(const struct trc_mesh *mesh, struct trc_pool *pool,
     return TRC_OK;
 }
 
-/* Which instances go to the joined tree: static, alone with their mesh, seen by all rays. */
+/* Sizes of meshes by powers of two: of fewer triangles than 1 << class. */
+static uint32_t size_class(uint32_t triangle_count) {
+    uint32_t class = 0;
+    while (class < SHARED_CLASSES && triangle_count >> class)
+        class ++;
+    return class;
+}
+
+/* The largest class of which, and of those below, all instances together are few enough triangles
+ * to be joined though they share their meshes. */
+static uint32_t shared_class(const struct create_job *job, const uint32_t *uses) {
+    const struct trc_snapshot *s = job->snapshot;
+    uint64_t triangles[SHARED_CLASSES + 1] = {0}, sum = 0;
+    for (uint32_t i = 0; i < s->instance_count; i++) {
+        const uint32_t mesh = s->instances[i].mesh, count = s->meshes[mesh]->triangle_count;
+        if (job->joined[i] && uses[mesh] > 1)
+            triangles[size_class(count)] += count;
+    }
+    uint32_t class = 0;
+    while (class < SHARED_CLASSES && sum + triangles[class] <= SHARED_TRIANGLES)
+        sum += triangles[class ++];
+    return class;
+}
+
+/* Which instances go to the joined tree: static, seen by all rays, alone with their mesh or sharing
+ * a small one. Boxes of small instances overlap, and each that a ray enters costs it a transform
+ * and a walk from the root. */
 static void join_select(struct create_job *job) {
     const struct trc_snapshot *s = job->snapshot;
     if (!job->options->is_final)
@@ -292,9 +322,12 @@ static void join_select(struct create_job *job) {
     }
     for (uint32_t i = 0; i < s->instance_count; i++)
         uses[s->instances[i].mesh]++;
-    for (uint32_t i = 0; i < s->instance_count; i++)
-        if (uses[s->instances[i].mesh] != 1)
+    const uint32_t class = shared_class(job, uses);
+    for (uint32_t i = 0; i < s->instance_count; i++) {
+        const uint32_t mesh = s->instances[i].mesh;
+        if (uses[mesh] > 1 && size_class(s->meshes[mesh]->triangle_count) >= class)
             job->joined[i] = 0;
+    }
     trc_free(uses);
 }
 
