@@ -13,8 +13,8 @@ import sys
 import time
 
 import compare_cycles
-from reporting import (blender_costs, curves, denoise, document, elsewhere, farm, frames, gate, hair, kernels, machine,
-                       povray, readme, repeated, scope as scopes)
+from reporting import (blender_costs, curves, denoise, document, elsewhere, farm, files, frames, gate, hair, kernels,
+                       machine, povray, readme, repeated, scope as scopes)
 
 
 def parse_arguments(arguments):
@@ -32,6 +32,7 @@ def parse_arguments(arguments):
     parser.add_argument("--baseline", action="store_true", help="write the baseline of the gate")
     parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS),
                         help="measure these alone; the others stay as they are")
+    parser.add_argument("--scenes", type=pathlib.Path, help="the folder of scenes that are not made here")
     parser.add_argument("--threads", type=int, default=0, help="0: all")
     parser.add_argument("--build", type=pathlib.Path, default=compare_cycles.PROJECT / "build")
     parser.add_argument("--blender", default="blender")
@@ -52,8 +53,10 @@ PARTS = {
     "denoise": lambda options: denoise.measure(options, options.scope, options.out / "pictures"),
     "farm": lambda options: farm.measure(options, options.scope),
     "hair": lambda options: hair.measure(options, options.scope, options.out / "pictures"),
+    "files": lambda options: files.measure(options, options.scope, options.out / "pictures"),
     "curves_trixie": lambda options: elsewhere.measure(options.scope, "trixie", "curves"),
     "curves_sid": lambda options: elsewhere.measure(options.scope, "sid", "curves"),
+    "files_trixie": lambda options: elsewhere.measure(options.scope, "trixie", "files"),
     "kernels_sid": lambda options: elsewhere.measure(options.scope, "sid", "kernels"),
 }
 

@@ -38,6 +38,7 @@ except ImportError:  # outside Blender only the table of scenes is of use
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 import effect_scenes  # noqa: E402  (the folder is on the path only now)
 import hair_scenes  # noqa: E402
+import large_scenes  # noqa: E402
 from scene_blocks import (  # noqa: E402
     add_area_light, add_ball, add_camera, add_floor, animate, open_blend, pose_from_action, set_world)
 
@@ -316,6 +317,8 @@ SCENES = {
        for name, (prepare, shutter) in effect_scenes.SCENES.items()},
     **{name: Scene(None, prepare, 320, 240, shutter=shutter)
        for name, (prepare, shutter) in hair_scenes.SCENES.items()},
+    **{name: Scene(source, prepare, 320, 240, shutter=shutter)
+       for name, (prepare, shutter, source) in large_scenes.SCENES.items()},
 }
 
 
@@ -324,7 +327,7 @@ def source_key(name, scenes_dir):
     scene = SCENES[name]
     module = inspect.getmodule(scene.prepare)
     # Scenes of a module of their own share its helpers.
-    text = inspect.getsource(module if module in (effect_scenes, hair_scenes) else scene.prepare)
+    text = inspect.getsource(module if module in (effect_scenes, hair_scenes, large_scenes) else scene.prepare)
     text += str(SETUP_VERSION)
     if scene.shutter > 0.0:
         text += str(scene.shutter)

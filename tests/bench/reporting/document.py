@@ -3,8 +3,8 @@
 
 import json
 
-from . import (denoise_section, elsewhere, error_sections, farm_section, frame_sections, hair, repeated,
-               scope as scopes)
+from . import (denoise_section, elsewhere, error_sections, farm_section, files, frame_sections, hair,
+               repeated, scope as scopes)
 from .machine import names
 from .tables import table
 
@@ -33,6 +33,7 @@ def text(results, out):
         parts.append(denoise_section.text(results["denoise"]))
     if results.get("hair"):
         parts.append(hair.section(results["hair"]))
+    parts.append(files.section(results))
     if results.get("kernels"):
         parts.append(error_sections.kernels_beside_embree(results["kernels"]))
     parts += [error_sections.kernels_elsewhere(run) for run in elsewhere.of_part(results, "kernels")]
@@ -94,6 +95,6 @@ def pictures(out):
         return ""
     lines = ["## Pictures",
              "Cycles above Volley: 1 sample per pixel, 16 and the reference. POV-Ray: its picture, "
-             "Volley's, the reference, 16 samples each. Hair: Cycles, Volley, 64 samples each, the reference."]
+             "Volley's, the reference, 16 samples each. Hair and whole files: Cycles, Volley, 64 samples each, the reference."]
     lines += [f"{name[:-4]}:\n\n![{name[:-4]}](pictures/{name})" for name in names]
     return "\n\n".join(lines)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sections about Volley beside Cycles, Embree and POV-Ray."""
 
-from . import curves, elsewhere, estimates, hair, kernels
+from . import curves, elsewhere, estimates, files, hair, kernels
 from .tables import digits, median_with_spread, ratio, table, words
 
 
@@ -28,6 +28,7 @@ def headline_lines(results):
         lines.append(povray_line(results["povray"]))
     if results.get("hair"):
         lines.append(hair.headline(results["hair"]))
+    lines += files.headlines(results)
     return [line for line in lines if line]
 
 
@@ -102,7 +103,7 @@ def losing_cases(results):
         lines += losing_kernels(run["made"], elsewhere.embree_name(run))
     lines = [*lines, *losing_builds(results.get("kernels", [])),
              *losing_distances(results.get("kernels", [])), *losing_povray(results.get("povray", {})),
-             *hair.losses(results.get("hair", {}))]
+             *hair.losses(results.get("hair", {})), *files.losses(results)]
     if not lines:
         return "## Where Volley loses\n\nNowhere in what was measured."
     return "## Where Volley loses\n\n" + "\n".join(f"- {line}" for line in lines)

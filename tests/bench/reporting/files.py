@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Whole files: a first F12 of scenes that others made, and of generated ones with many objects, lights, glass,
+leaves and triangles in motion."""
+
+from . import elsewhere, whole_renders
+from .tables import digits
+
+SIZE_PX = 320, 240
+FROM_FOLDER = ("conference", "robot", "knight", "lost_empire")  # of the folder of scenes, where there is one
+
+
+def measure(options, scope, pictures):
+    """{scene: what whole_renders.measure_scene() gives}; PNGs of both into a folder."""
+    names = scope.file_scenes + (FROM_FOLDER if options.scenes and scope.file_scenes else ())
+    return {name: whole_renders.measure_scene(name, SIZE_PX, options, scope, pictures) for name in names}
+
+
+def runs(results):
+    """(peer's name, {scene: engines}) of each Blender that was measured."""
+    own = [("Cycles", results["files"])] if results.get("files") else []
+    return own + [(f"Cycles of {run['blender']}", run["made"]) for run in elsewhere.of_part(results, "files")]
+
+
+def headlines(results):
+    """The least and the most gain beside each Blender's Cycles."""
+    lines = []
+    for cycles, made in runs(results):
+        ratios = [gain["ratio"] for _name, gain in whole_renders.gains(made)]
+        lines.append(f"A first F12 of {len(ratios)} whole files at {whole_renders.SAMPLES} samples takes {cycles} "
+                     f"{digits(ratios[0], 2)} to {digits(ratios[-1], 2)} times as long.")
+    return lines
+
+
+def losses(results):
+    """Scenes in which Cycles is done sooner, or has the smaller error."""
+    return [line for cycles, made in runs(results) for line in whole_renders.losses(made, cycles)]
+
+
+def section(results):
+    """Seconds and errors of each scene, a table for each Blender."""
+    tables = [f"{cycles}:\n\n{whole_renders.section_table(made)}" for cycles, made in runs(results)]
+    if not tables:
+        return ""
+    return "\n\n".join([
+        "## Whole files",
+        f"A first F12 in a new Blender at {SIZE_PX[0]}×{SIZE_PX[1]} and {whole_renders.SAMPLES} samples: evaluation, "
+        "sync, build and rays. Errors are against a Cycles picture of more samples, the same for both.", *tables])
