@@ -280,10 +280,10 @@ trc_status trc_blas_build(const struct trc_mesh *mesh, struct trc_pool *pool,
 
 /* Sizes of meshes by powers of two: of fewer triangles than 1 << class. */
 static uint32_t size_class(uint32_t triangle_count) {
-    uint32_t class = 0;
-    while (class < SHARED_CLASSES && triangle_count >> class)
-        class ++;
-    return class;
+    uint32_t size = 0;
+    while (size < SHARED_CLASSES && triangle_count >> size)
+        size++;
+    return size;
 }
 
 /* The largest class of which, and of those below, all instances together are few enough triangles
@@ -296,10 +296,10 @@ static uint32_t shared_class(const struct create_job *job, const uint32_t *uses)
         if (job->joined[i] && uses[mesh] > 1)
             triangles[size_class(count)] += count;
     }
-    uint32_t class = 0;
-    while (class < SHARED_CLASSES && sum + triangles[class] <= SHARED_TRIANGLES)
-        sum += triangles[class ++];
-    return class;
+    uint32_t size = 0;
+    while (size < SHARED_CLASSES && sum + triangles[size] <= SHARED_TRIANGLES)
+        sum += triangles[size++];
+    return size;
 }
 
 /* Which instances go to the joined tree: static, seen by all rays, alone with their mesh or sharing
@@ -322,10 +322,10 @@ static void join_select(struct create_job *job) {
     }
     for (uint32_t i = 0; i < s->instance_count; i++)
         uses[s->instances[i].mesh]++;
-    const uint32_t class = shared_class(job, uses);
+    const uint32_t size = shared_class(job, uses);
     for (uint32_t i = 0; i < s->instance_count; i++) {
         const uint32_t mesh = s->instances[i].mesh;
-        if (uses[mesh] > 1 && size_class(s->meshes[mesh]->triangle_count) >= class)
+        if (uses[mesh] > 1 && size_class(s->meshes[mesh]->triangle_count) >= size)
             job->joined[i] = 0;
     }
     trc_free(uses);
