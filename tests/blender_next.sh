@@ -9,7 +9,7 @@
 # Blender tests if no argument says which; --fast runs what a change of Blender's version touches most (see
 # CHANGED) and builds kernels for this processor alone;
 # --report writes JUnit XML, --results what tests measured, the tables of build/results. --measure measures a
-# part of tests/bench/report.sh there instead, curves or kernels (beside Embree), and leaves its JSON in DIR;
+# part of tests/bench/report.sh there instead, curves, files or kernels (beside Embree), and leaves its JSON in DIR;
 # with --fast what report.sh --quick measures.
 # Needs root, a Debian mirror and 2.5 GB; the folder is $XDG_CACHE_HOME/volley/SUITE and stays, so that the
 # next run takes only the build and the tests. Nothing stays mounted: /proc is there in a name space of its
@@ -93,7 +93,8 @@ measure() {
 CHANGED="test_sky or test_working_space or test_textures or test_shaders or test_thin_film or test_bump \
 or test_color_spaces or test_warnings or test_node_menus or test_registration or test_panels or test_passes \
 or test_follows_edits or test_view_through or test_ray_nodes or test_displacement or test_thin_wall \
-or test_no_material or test_tilted or test_shading_offsets or test_tracing_nodes or test_strands or test_settings or (test_movies and test_window)"
+or test_no_material or test_tilted or test_shading_offsets or test_tracing_nodes or test_strands or test_settings \
+or (test_movies and test_window)"
 
 main() {
     local report="" results="" part="" out="" suite=trixie isas="" is_fast="" scope=--next status=0 arguments=()
