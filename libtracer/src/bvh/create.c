@@ -278,7 +278,7 @@ trc_status trc_blas_build(const struct trc_mesh *mesh, struct trc_pool *pool,
     return TRC_OK;
 }
 
-/* Sizes of meshes by powers of two: of fewer triangles than 1 << class. */
+/* Sizes of meshes by powers of two: the first of which it has fewer triangles than 1 << size. */
 static uint32_t size_class(uint32_t triangle_count) {
     uint32_t size = 0;
     while (size < SHARED_CLASSES && triangle_count >> size)
