@@ -33,7 +33,7 @@ class Scope:
     farm: bool              # commands of farms
     hair_scenes: tuple      # a whole F12 in a new Blender
     file_scenes: tuple      # too, without those of the folder of scenes
-    hair_reference_samples: int  # of both
+    whole_reference_samples: int  # of both
     # POV-Ray.
     classic_scenes: tuple
     classic_width: int
@@ -57,7 +57,7 @@ QUICK = Scope(
     name="quick", minutes=4,
     scenes=("area_light", "gallery"), sampler_scenes=(), samples=(1, 4, 16), time_samples=(1, 4, 16),
     seeds=3, reference_samples=128, reference_seeds=2, light_samples=(1, 4), repeats=3, times_scale=2,
-    denoise=False, elsewhere=False, farm=False, hair_scenes=(), file_scenes=(), hair_reference_samples=128,
+    denoise=False, elsewhere=False, farm=False, hair_scenes=(), file_scenes=(), whole_reference_samples=128,
     classic_scenes=("classic",), classic_width=256,
     kernel_scenes=("character",),
     kernel_arguments=("--order", "auto", "--motion", "still", "--repeats", "3", "--tiles", "8",
@@ -72,7 +72,7 @@ MEDIUM = Scope(
     scenes=EFFECTS + JOINED, sampler_scenes=("gallery",), samples=(1, 4, 16, 64, 256, 1024),
     time_samples=(1, 4, 16, 64), seeds=10, reference_samples=1024, reference_seeds=4,
     light_samples=(1, 4), repeats=3, times_scale=2, denoise=True, elsewhere=True, farm=True,
-    hair_scenes=HAIR, file_scenes=FILES, hair_reference_samples=128,
+    hair_scenes=HAIR, file_scenes=FILES, whole_reference_samples=128,
     classic_scenes=("classic", "classic_soft"), classic_width=320,
     kernel_scenes=("conference", "pool_hall", "character"),
     kernel_arguments=("--order", "auto", "--repeats", "3", "--tiles", "8"), accuracy=True,
@@ -86,7 +86,7 @@ FULL = Scope(
     samples=tuple(2 ** i for i in range(11)), time_samples=tuple(2 ** i for i in range(11)),
     seeds=10, reference_samples=4096, reference_seeds=8, light_samples=(1, 2, 4, 8), repeats=5,
     times_scale=3, denoise=True, elsewhere=True, farm=True,
-    hair_scenes=HAIR, file_scenes=FILES, hair_reference_samples=1024,
+    hair_scenes=HAIR, file_scenes=FILES, whole_reference_samples=1024,
     classic_scenes=("classic", "classic_soft"), classic_width=640,
     kernel_scenes=("conference", "pool_hall", "character"),
     kernel_arguments=("--repeats", "9"), accuracy=True,

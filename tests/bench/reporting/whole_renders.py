@@ -57,7 +57,7 @@ def reference_stack(blend, scope, own):
     """Cycles' pictures of more samples, from one process."""
     with tempfile.TemporaryDirectory() as folder:
         paths = [Path(folder) / f"{seed}.exr" for seed in range(scope.reference_seeds)]
-        error_time.run_batch(blend, [("CYCLES", settings_of(own, scope.hair_reference_samples, seed), path)
+        error_time.run_batch(blend, [("CYCLES", settings_of(own, scope.whole_reference_samples, seed), path)
                                      for seed, path in enumerate(paths)], own)
         return np.stack([compare.read_rgb(path) for path in paths])
 
