@@ -95,6 +95,7 @@ def pictures(out):
         return ""
     lines = ["## Pictures",
              "Cycles above Volley: 1 sample per pixel, 16 and the reference. POV-Ray: its picture, "
-             "Volley's, the reference, 16 samples each. Hair and whole files: Cycles, Volley, 64 samples each, the reference."]
+             "Volley's, the reference, 16 samples each. Hair and whole files: Cycles, Volley, 64 samples each, "
+             "the reference."]
     lines += [f"{name[:-4]}:\n\n![{name[:-4]}](pictures/{name})" for name in names]
     return "\n\n".join(lines)
