@@ -78,7 +78,8 @@ def prepare_many_lights(_source, _folder):
         if i % 2:
             add_sphere((*at, 0.6), 0.6, diffuse(COLORS[i % 6]))
         else:
-            add_box((*at, 0.9), (0.8, 0.8, 1.8), diffuse(COLORS[i % 6]), rng.uniform(0.0, 1.5))
+            height = 1.8 + 0.01 * i  # boxes that overlap have no face in common
+            add_box((*at, 0.5 * height), (0.8, 0.8, height), diffuse(COLORS[i % 6]), rng.uniform(0.0, 1.5))
     data = []
     for color in COLORS:
         lamp = bpy.data.lights.new("Lamp", "POINT")
