@@ -584,6 +584,7 @@ class MaterialFlags(IntFlag):
     FACET_SHADOWING = 8
     LIGHT_TREE = 16
     KEEPS_NORMALS = 32
+    CUTS_OUT = 64
 
 
 class AlphaMode(IntEnum):

@@ -371,6 +371,7 @@ def test_attributes_in_triangle_order(blender):
 def inside_hidden_flags():
     import bpy
     import scenes
+    from volley import abi
     scene = scenes.empty()
     scenes.wall("Seen")
     scenes.wall("Holdout").is_holdout = True
@@ -383,8 +384,8 @@ def inside_hidden_flags():
     layer.layer_collection.children["Indirect"].indirect_only = True
     bpy.context.view_layer.update()
     _, told = _sync()
-    holdout = {number + 1 for number, (name, arguments, _) in enumerate(told.calls)
-               if name == "create_material" and arguments[0] and arguments[0][0].type == 11}
+    holdout = {number + 1 for number, (name, _, values) in enumerate(told.calls)
+               if name == "create_material" and values.get("flags", 0) & abi.MaterialFlags.CUTS_OUT}
     return sorted((v["visibility"], set(v["materials"]) <= holdout and bool(v["materials"]))
                   for _, v in told.all("create_instance"))
 

@@ -189,6 +189,49 @@ def inside_holes():
     return pictures
 
 
+def inside_clear_holes():
+    """Holdouts of materials that are clear in part: by Alpha, by a texture, coloured, joined with what shines,
+    of more than one slot, and of none; with and without a transparent film."""
+    import scenes
+    scene = _room()
+
+    def mixed(name, *parts, node="ShaderNodeMixShader"):
+        material = scenes.material(name, parts[0])
+        tree = material.node_tree
+        mix = tree.nodes.new(node)
+        sockets = [socket for socket in mix.inputs if socket.type == 'SHADER']
+        tree.links.new(scenes.shader_of(material).outputs[0], sockets[0])
+        other = tree.nodes.new(parts[1])
+        tree.links.new(other.outputs[0], sockets[1])
+        tree.links.new(mix.outputs[0], tree.nodes["Material Output"].inputs["Surface"])
+        return tree, mix, other
+
+    balls = [_ball(number, False) for number in range(COLUMNS)]
+    for number, ball in enumerate(balls):
+        ball.location.x, ball.is_holdout = _column(number), True
+        ball.data.materials.clear()
+    balls[0].data.materials.append(scenes.material("Alpha", "ShaderNodeBsdfPrincipled", Alpha=0.4))
+    tree, mix, _ = mixed("Checked", "ShaderNodeBsdfDiffuse", "ShaderNodeBsdfTransparent")
+    tree.links.new(tree.nodes.new("ShaderNodeTexChecker").outputs[1], mix.inputs[0])
+    _, _, clear = mixed("Coloured", "ShaderNodeBsdfGlass", "ShaderNodeBsdfTransparent")
+    clear.inputs["Color"].default_value = (0.9, 0.5, 0.1, 1.0)
+    mixed("Shining", "ShaderNodeEmission", "ShaderNodeBsdfTransparent", node="ShaderNodeAddShader")[2].inputs[
+        "Color"].default_value = (0.3, 0.3, 0.6, 1.0)
+    import bpy
+    for number, name in ((1, "Checked"), (2, "Coloured"), (3, "Shining")):
+        balls[number].data.materials.append(bpy.data.materials[name])
+    for name in ("Alpha", "Coloured"):
+        balls[4].data.materials.append(bpy.data.materials[name])
+    for polygon in balls[4].data.polygons:
+        polygon.material_index = polygon.index % 2
+    scenes.sphere("Behind", 0.3, (0.0, 3.0, 1.0), scenes.emitter((0.2, 0.5, 0.9), "Behind"))
+    pictures = {}
+    for is_transparent in (True, False):
+        scene.render.film_transparent = is_transparent
+        pictures[f"transparent film {is_transparent}"] = _pictures()
+    return pictures
+
+
 def inside_hidden():
     """What is not to be rendered: a member, an instancer, their collections, a maker without itself."""
     import bpy
@@ -305,8 +348,8 @@ def test_switches(blender, kind):
     _agree(blender.run(inside_switches, kind))
 
 
-@pytest.mark.parametrize("inside", [inside_makers, inside_holes, inside_hidden, inside_shadows, inside_motion,
-                                    inside_camera])
+@pytest.mark.parametrize("inside", [inside_makers, inside_holes, inside_clear_holes, inside_hidden, inside_shadows,
+                                    inside_motion, inside_camera])
 def test_pictures(blender, inside):
     _agree(blender.run(inside))
 

@@ -391,6 +391,17 @@ static void test_traits_of_simple_shaders(void **state) {
     graph_clear();
     add(TRC_NODE_HOLDOUT, 0, 0, NULL);
     assert_int_equal(traits(), TRC_MATERIAL_HAS_HOLDOUT);
+
+    /* Of what cuts out, transparency alone is left. */
+    graph_clear();
+    graph.flags = TRC_MATERIAL_CUTS_OUT;
+    const int32_t light = ADD(TRC_NODE_EMISSION, 0, white, value(2));
+    ADD(TRC_NODE_ADD_SHADER, 0, link_to(light, 0), link_to(add_diffuse(white), 0));
+    assert_int_equal(traits(), TRC_MATERIAL_HAS_HOLDOUT);
+    const int32_t clear = ADD(TRC_NODE_TRANSPARENT, 0, white);
+    ADD(TRC_NODE_ADD_SHADER, 0, link_to(light, 0), link_to(clear, 0));
+    assert_int_equal(traits(), TRC_MATERIAL_HAS_HOLDOUT | TRC_MATERIAL_HAS_TRANSPARENCY);
+    graph.flags = 0;
     graph_clear();
     ADD(TRC_NODE_BACKGROUND, 0, white, value(2));
     assert_int_equal(traits(), E);
@@ -618,8 +629,8 @@ static void test_refused_nodes(void **state) {
     graph.surface = add(TRC_NODE_OBJECT_INFO, 0, 0, NULL);
     refused(TRC_ERROR_INVALID_ARGUMENT, "surface", "shader");
     graph.surface = 0;
-    graph.flags = 64;
-    refused(TRC_ERROR_INVALID_ARGUMENT, "flags", "0x40");
+    graph.flags = 128;
+    refused(TRC_ERROR_INVALID_ARGUMENT, "flags", "0x80");
 }
 
 static void test_refused_tables(void **state) {

@@ -48,7 +48,7 @@ class Item:
     transforms: list           # a tuple of 12 floats for each motion key
     mesh_key: tuple = None     # the key of the item that owns the mesh
     materials: tuple = ()
-    hole: int = 0              # the material that the camera sees in place of them, 0 for none
+    holes: tuple = ()          # the materials that the camera sees in place of them, none: no others
     visibility: int = 0
     pass_index: int = 0
     random: float = 0.0
@@ -256,7 +256,7 @@ class Instances:
         return {entry.name for entry in entries}, {entry.asset for entry in entries}
 
     def _update_one(self, item, mesh_id):
-        signature = (mesh_id, tuple(item.transforms), item.materials, item.hole, item.visibility,
+        signature = (mesh_id, tuple(item.transforms), item.materials, item.holes, item.visibility,
                      item.pass_index, item.random, item.color, item.name, item.asset, item.light_group,
                      item.flags, item.links, item.offsets, item.values)
         entry = self._entries.get(item.key)
@@ -281,9 +281,9 @@ class Instances:
 
 def _parts(item):
     """What rays see of an item: all the same, or the camera a hole where others see what it is made of."""
-    if not item.hole:
+    if not item.holes:
         return [{"materials": item.materials, "visibility": item.visibility}]
-    return [{"materials": (item.hole,), "visibility": item.visibility & abi.VisibleRays.CAMERA},
+    return [{"materials": item.holes, "visibility": item.visibility & abi.VisibleRays.CAMERA},
             {"materials": item.materials, "visibility": item.visibility & ~abi.VisibleRays.CAMERA}]
 
 

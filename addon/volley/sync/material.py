@@ -15,7 +15,7 @@ from .inlined import shader_tree
 from .values import CONSTANT, DEFAULT, Value
 
 _DEFAULT_KEY = ("default",)
-_HOLDOUT_KEY = ("holdout",)
+_HOLE = "hole"
 _STUDIO_KEY = ("studio",)
 _DISPLACEMENTS = {'BUMP': DisplacementMethod.BUMP, 'DISPLACEMENT': DisplacementMethod.TRUE,
                   'BOTH': DisplacementMethod.BOTH}
@@ -56,7 +56,23 @@ class Materials:
 
     def entry_of(self, material):
         """The entry of an evaluated material, brought up to date once per sync."""
-        key = material.name_full
+        return self._entry(material.name_full, material)
+
+    def holes_of(self, made_of):
+        """The library's ids of what the camera sees of a holdout of these evaluated materials: what is
+        transparent stays so, all else punches a hole."""
+        return tuple([self._hole(material).id for material in made_of])
+
+    def _hole(self, material):
+        if material is not None:
+            return self._entry((_HOLE, material.name_full), material, abi.MaterialFlags.CUTS_OUT)
+        key = (_HOLE, None)
+        if key not in self._seen:
+            self._update(key, _default_surface(), flags=abi.MaterialFlags.CUTS_OUT)
+        return self._entries[key]
+
+    def _entry(self, key, material, flags=0):
+        """The entry of an evaluated material with flags besides its own."""
         if key not in self._seen and not self._keep(key):
             label = f"Material '{material.name}'"
             if not cycles(material, "use_bump_map_correction", True):
@@ -66,7 +82,7 @@ class Materials:
             if is_volume:  # nothing but the bounds of what is left out
                 _let_through(flat)
             self._update(key, flat, material.name, pass_index=material.pass_index,
-                         flags=_flags(material, is_volume, self._has_light_tree))
+                         flags=flags | _flags(material, is_volume, self._has_light_tree))
             self._entries[key].is_volume = is_volume
         return self._entries[key]
 
@@ -86,13 +102,15 @@ class Materials:
         self._changes = changes
         self._seen, self._lights = set(), set()
         for key in list(self._entries):
-            if isinstance(key, tuple):  # no material of Blender's
+            name = _material_name(key)
+            if name is None:
                 self._hold(key)
             elif not self._keep(key):
-                material = bpy.data.materials.get(key)
+                material = bpy.data.materials.get(name)
                 if material is None or not material.evaluated_get(depsgraph).is_evaluated:
                     return False
-                self.entry_of(material.evaluated_get(depsgraph))
+                material = material.evaluated_get(depsgraph)
+                self._entry(key, material, abi.MaterialFlags.CUTS_OUT if isinstance(key, tuple) else 0)
         return True
 
     def is_kept(self, material):
@@ -101,7 +119,7 @@ class Materials:
 
     def _is_kept(self, key):
         entry = self._entries.get(key)
-        return entry is not None and not entry.is_animated and not self._changes.material_of(key)
+        return entry is not None and not entry.is_animated and not self._changes.material_of(_material_name(key))
 
     def _keep(self, key):
         """Take a material as it is in the library, if it is there and has not changed."""
@@ -113,15 +131,6 @@ class Materials:
     def _hold(self, key):
         self._seen.add(key)
         self._images.keep(self._entries[key].images)
-
-    def holdout_id(self):
-        """A material that punches a hole."""
-        if _HOLDOUT_KEY not in self._seen:
-            flat = flatten.FlatTree()
-            flat.nodes.append(flatten.FlatNode(NodeType.HOLDOUT, []))
-            flat.surface = 0
-            self._update(_HOLDOUT_KEY, flat)
-        return self._entries[_HOLDOUT_KEY].id
 
     def world_id(self, world):
         """A world's surface as a material, and the sky_texture.Sun that it shows or None."""
@@ -273,6 +282,13 @@ class Entry:
         self.is_volume = False  # of a volume alone: what has no other is not there
         self.images = set()  # those it reads
         self.is_animated = False  # whether what it reads may be another in the next sync
+
+
+def _material_name(key):
+    """Of the key of an entry, the name of Blender's material that it is of; None where it is of no such."""
+    if not isinstance(key, tuple):
+        return key
+    return key[1] if key[0] == _HOLE else None
 
 
 def _flags(material, is_volume, is_by_light_tree):

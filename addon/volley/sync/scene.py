@@ -118,7 +118,7 @@ class SceneSync:
             return False
         item = instance.describe(each, view_layer, source.light_groups, shown.links)
         item.mesh_key, item.materials = known.mesh_key, ids
-        dress(item, self._materials, each, view_layer, self._materials.instance_values(),
+        dress(item, self._materials, each, made_of, view_layer, self._materials.instance_values(),
               source.depsgraph.scene_eval)
         self._instances.change(item, self._meshes.id_of(item.mesh_key))
         self._meshes.free_retired()

@@ -14,12 +14,13 @@ from .source import Cancelled
 _BREAK_INTERVAL = 32  # instances between two looks at whether the user pressed Esc
 
 
-def dress(item, materials, each, view_layer, values_of, scene):
-    """Note the id of the hole in place of an instance's materials, and the values that these read of it."""
+def dress(item, materials, each, made_of, view_layer, values_of, scene):
+    """Note the ids of the holes in place of an instance's materials, and the values that these read of it.
+    made_of: what materials_of() gave, or a part."""
     if values_of is not None:
         item.values = values_of(each, scene)
     if visibility.is_holdout(each.object, instance.maker_of(each), view_layer):
-        item.hole = materials.holdout_id()
+        item.holes = materials.holes_of(made_of)
 
 
 def materials_of(blender_object, view_layer):
@@ -121,12 +122,11 @@ class Walk:
             if v3d is None or instance.is_in_view(each, v3d):
                 yield each
 
-    def _ids_of(self, each):
-        """See material.Materials.ids_of."""
-        return self._sync._materials.ids_of(materials_of(each.object, self._view_layer))
+    def _materials_of(self, each):
+        return materials_of(each.object, self._view_layer)
 
-    def _dress(self, item, each):
-        dress(item, self._sync._materials, each, self._view_layer, self._values_of, self._scene)
+    def _dress(self, item, each, made_of):
+        dress(item, self._sync._materials, each, made_of, self._view_layer, self._values_of, self._scene)
 
     def _describe(self, each):
         return instance.describe(each, self._view_layer, self._source.light_groups, self.links)
@@ -141,12 +141,13 @@ class Walk:
 
     def _add_mesh_instance(self, each):
         blender_object = each.object
-        ids, is_volume = self._ids_of(each)
+        made_of = self._materials_of(each)
+        ids, is_volume = self._sync._materials.ids_of(made_of)
         if is_volume:  # those that pass many of its bounds would be seen through too often
             return
         item = self._describe(each)
         item.materials = ids
-        self._dress(item, each)
+        self._dress(item, each, made_of)
         if self._shutter is not None:
             item.motion_keys = motion.key_count(blender_object, instance.maker_of(each))
             item.transforms *= item.motion_keys
@@ -162,11 +163,9 @@ class Walk:
             self.tied.add(blender_object.name_full)  # only a walk sees what its hair does
             item = self._describe(each)
             item.key = instance.hair_key(each, number)
-            self._dress(item, each)
-            ids = self._ids_of(each)[0]
-            slot = max(min(modifier.particle_system.settings.material, len(ids)), 1) - 1
-            item.materials = ids[slot:slot + 1]
-            self._note_light(each, slot)
+            made_of = self._materials_of(each)
+            slot = max(min(modifier.particle_system.settings.material, len(made_of)), 1) - 1
+            self._make_of(item, each, made_of[slot])
             hair = strands.Hair(number, self._source.depsgraph, is_final, self._wanted_strands)
             self._add_made(each, item, (blender_object.name_full, number), hair)
 
@@ -180,17 +179,16 @@ class Walk:
     def _add_strands(self, each):
         """A Curves or Point Cloud object."""
         item = self._describe(each)
-        self._dress(item, each)
-        item.materials = self._ids_of(each)[0][:1]
-        self._note_light(each, 0)
+        self._make_of(item, each, self._materials_of(each)[0])
         self.tied.add(each.object.name_full)
         self._add_made(each, item, each.object.data.as_pointer(), strands.StrandObject(self._wanted_strands))
 
-    def _note_light(self, each, slot):
-        """Note whether strands or points of the material in that slot emit."""
-        for material in materials_of(each.object, self._view_layer)[slot:slot + 1]:
-            if material is not None and self._sync._materials.entry_of(material).emits:
-                self._shining.add(each.object.name)
+    def _make_of(self, item, each, material):
+        """Strands or points are of one material, maybe None. Those that emit are noted."""
+        item.materials, _ = self._sync._materials.ids_of([material])
+        self._dress(item, each, [material])
+        if material is not None and self._sync._materials.entry_of(material).emits:
+            self._shining.add(each.object.name)
 
     def _add_made(self, each, item, source, made_of):
         """An item of strands or points (strands.Hair or strands.StrandObject) whose mesh is made unless another

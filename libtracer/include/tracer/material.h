@@ -411,7 +411,10 @@ enum trc_material_flags {
     /* Lobes without microfacets (diffuse, translucent, sheen, velvet, toon) take normals as they
      * are (Cycles 4 and 5); else these are turned back until a mirror would reflect the view above
      * the surface, as those of all other lobes are (Cycles 3.4). */
-    TRC_MATERIAL_KEEPS_NORMALS = 32
+    TRC_MATERIAL_KEEPS_NORMALS = 32,
+    /* What the camera sees of a holdout that is made of it: what is transparent stays so, and all
+     * else, emission too, is a hole in the film. */
+    TRC_MATERIAL_CUTS_OUT = 64
 };
 
 /* A material from a node list, in use from the next commit on. INVALID_ARGUMENT, with the node and

@@ -1,5 +1,6 @@
 /* What a material may do over all values of its inputs, and what it emits. */
 #include <math.h>
+#include <string.h>
 
 #include "shading/build.h"
 
@@ -219,6 +220,11 @@ void trc_build_traits(const struct trc_build *b, struct trc_material *m) {
         m->has |= has | (is_lit_below(leaf, has, m->flags) ? TRC_MATERIAL_LIT_BELOW : 0u);
         m->branch_count += leaf_branches(leaf, in);
         add_emission(leaf, in, m);
+    }
+    if (m->flags & TRC_MATERIAL_CUTS_OUT) {
+        m->has = TRC_MATERIAL_HAS_HOLDOUT | (m->has & TRC_MATERIAL_HAS_TRANSPARENCY);
+        m->branch_count = 0;
+        memset(m->emission, 0, sizeof m->emission);
     }
     if (m->has & TRC_MATERIAL_HAS_TRANSPARENCY)
         m->branch_count++; /* all of it is one lobe */

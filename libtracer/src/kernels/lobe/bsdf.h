@@ -87,7 +87,7 @@ struct trc_lobes {
     int count;
     struct trc_lobe lobe[TRC_MAX_LOBES];
     vvec3 emission;         /* radiance towards wo */
-    vfloat holdout;         /* weight of holdout leaves */
+    vvec3 holdout;          /* weight of holdout leaves, or of all that cuts out */
     vfloat mix_weight;      /* sum over the lobes */
     vfloat continue_weight; /* sum of sample_weight */
     /* Lanes where light from below the geometric surface may reach reflecting lobes;

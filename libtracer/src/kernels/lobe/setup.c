@@ -95,6 +95,21 @@ static void set_chances(const struct trc_material *m, const struct trc_surface *
     }
 }
 
+/* Leaves what is transparent; all else is a hole. */
+static void cut_out(struct trc_lobes *out) {
+    vvec3 hole = v3_splat(vf_one());
+    int kept = 0;
+    for (int i = 0; i < out->count; i++) {
+        if (out->lobe[i].kind != TRC_LOBE_TRANSPARENT)
+            continue;
+        hole = v3_sub(hole, out->lobe[i].weight);
+        out->lobe[kept++] = out->lobe[i];
+    }
+    out->count = kept;
+    out->emission = v3_zero();
+    out->holdout = hole;
+}
+
 /* ---- leaves ---- */
 
 /* By the type of a leaf's node; all types that leaves have are there (tests/unit/test_nodes.c). */
@@ -108,7 +123,7 @@ void trc_lobes_setup(const struct trc_material *m, const struct trc_surface *s,
     struct trc_setup c = {m, s, regs, filter_alpha, v3_zero(), false, out};
     out->count = 0;
     out->emission = v3_zero();
-    out->holdout = vf_zero();
+    out->holdout = v3_zero();
     out->below_horizon = vm_none();
     out->clear_alpha2 = -1.0f;
     out->rare = 0;
@@ -124,6 +139,8 @@ void trc_lobes_setup(const struct trc_material *m, const struct trc_surface *s,
         if (closure->add)
             closure->add(&c, leaf, weight);
     }
+    if (m->flags & TRC_MATERIAL_CUTS_OUT)
+        cut_out(out);
     set_chances(m, s, out);
 }
 

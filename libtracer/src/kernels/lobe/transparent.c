@@ -31,7 +31,7 @@ const struct trc_closure TRC_CLOSURE_OF(TRANSPARENT) = {.add = add_leaf};
 
 static void add_holdout(struct trc_setup *c, const struct trc_leaf *leaf, vfloat weight) {
     (void)leaf;
-    c->out->holdout = c->out->holdout + vf_where(c->s->active, weight);
+    c->out->holdout = v3_add(c->out->holdout, v3_splat(vf_where(c->s->active, weight)));
 }
 
 const struct trc_closure TRC_CLOSURE_OF(HOLDOUT) = {.add = add_holdout};

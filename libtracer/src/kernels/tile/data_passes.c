@@ -284,7 +284,7 @@ static void add_mattes(struct trc_tile *t, const struct trc_surface *s,
     const float one = (float)t->job->film->matte_units;
     float weight[TRC_WIDTH];
     if (m->has & TRC_MATERIAL_HAS_HOLDOUT)
-        active = vm_and(active, vf_lt(lobes->holdout, vf_set(1.0f)));
+        active = vm_and(active, vf_lt(v3_average(lobes->holdout), vf_set(1.0f)));
     vf_store(weight, v3_average(seen));
     for (uint32_t bits = vm_bits(active); bits; bits &= bits - 1) {
         const int i = __builtin_ctz(bits);

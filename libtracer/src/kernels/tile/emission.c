@@ -191,7 +191,7 @@ void trc_emission_holdout(struct trc_tile *t, const struct arrival *a,
     float part[TRC_WIDTH];
     const vmask background = vi_eq((vint)(a->path & vu_set(TRC_PATH_TRANSPARENT_BACKGROUND)),
                                    vi_set(TRC_PATH_TRANSPARENT_BACKGROUND));
-    vf_store(part, v3_average(a->found_weight) * lobes->holdout);
+    vf_store(part, v3_average(v3_mul(a->found_weight, lobes->holdout)));
     for (uint32_t bits = vm_bits(vm_and(active, background)); bits; bits &= bits - 1) {
         const int i = __builtin_ctz(bits);
         t->samples.transparency[a->slots[i]] += part[i];
