@@ -138,10 +138,9 @@ def generated_coordinates(blender_object, mesh, positions):
     if not is_deformed:
         # A viewport's meshes do not keep it; the original has it if modifiers left its vertices.
         rest = blender_object.original.data
-        if not isinstance(rest, bpy.types.Mesh) or len(rest.vertices) != len(positions):
-            return None
-        undeformed = read_positions(rest)
-        is_deformed = not np.array_equal(undeformed, positions)
+        if isinstance(rest, bpy.types.Mesh) and len(rest.vertices) == len(positions):
+            undeformed = read_positions(rest)
+            is_deformed = not np.array_equal(undeformed, positions)
     location = np.array(mesh.texspace_location, np.float32)
     size = np.array(mesh.texspace_size, np.float32)
     if not is_deformed and _is_bounding_box(positions, location, size):
