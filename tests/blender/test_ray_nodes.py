@@ -8,6 +8,8 @@ SIZE = 64
 LIGHT_PATH = ("Is Camera Ray", "Is Diffuse Ray", "Is Glossy Ray", "Is Singular Ray", "Is Reflection Ray",
               "Is Transmission Ray", "Ray Length", "Ray Depth", "Diffuse Depth", "Glossy Depth",
               "Transparent Depth", "Transmission Depth")
+# What light samples say, too, who are no ray of any kind: others' share depends on how light is sampled.
+TRANSLUCENT = ("Is Glossy Ray", "Is Singular Ray", "Glossy Depth")
 GEOMETRY = ("Position", "Normal", "True Normal", "Incoming", "Parametric", "Backfacing")
 
 
@@ -59,6 +61,22 @@ def inside_light_path():
     veil = scenes.wall("Veil", y=-1.0, center=(2.0, 0.0), material=bpy.data.materials["transparent2"])
     veil.rotation_euler.x = 0.3
     return _pictures(_shines(material, "ShaderNodeLightPath"), LIGHT_PATH)
+
+
+def inside_translucent():
+    """A wall that shines with what it is told of a ray and lights a translucent panel before it."""
+    import scenes
+    scenes.empty(size=(SIZE // 2, SIZE // 2))
+    scenes.camera(type='ORTHO', ortho_scale=2.0)
+    scenes.wall("Panel", size=3.0, material=scenes.material("Panel", "ShaderNodeBsdfTranslucent"))
+    material = scenes.emitter((1.0, 1.0, 1.0))
+    choose = _shines(material, "ShaderNodeLightPath")
+    scenes.wall("Behind", size=60.0, y=3.0, material=material)
+    found = {}
+    for name in TRANSLUCENT:
+        choose(name)
+        found[name] = [picture[..., :3] for picture in scenes.seeds_by_both(64)]
+    return found
 
 
 def inside_shadows():
@@ -132,6 +150,11 @@ def test_outputs(pictures, name):
     ours, theirs = pictures[name]
     assert _beyond(ours, theirs, TOLERANCES.get(name, 1e-3)) <= (0.005 if name in LIGHT_PATH else 0.02)
     assert name in ALIKE or np.ptp(theirs) > 0.5, "the picture shows nothing"
+
+
+def test_translucent(blender):
+    for name, (ours, theirs) in blender.run(inside_translucent).items():
+        assert abs(ours.mean() / theirs.mean() - 1.0) < 2e-3, name
 
 
 def test_shadow_rays(blender):

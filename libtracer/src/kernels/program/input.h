@@ -570,8 +570,10 @@ static vfloat op_light_path(const struct trc_surface *s, uint32_t output) {
     case TRC_OUTPUT_OF(LIGHT_PATH, is_diffuse):
         return path_bit(s, TRC_VISIBLE_DIFFUSE);
     case TRC_OUTPUT_OF(LIGHT_PATH, is_glossy):
-        /* As in Cycles also what was refracted, unlike for visibility. */
-        return path_bit(s, TRC_VISIBLE_GLOSSY | TRC_VISIBLE_TRANSMISSION);
+        /* As in Cycles also what was refracted, unlike for visibility, but not through translucent
+         * lobes. */
+        return path_bit(s, TRC_VISIBLE_GLOSSY | TRC_VISIBLE_TRANSMISSION) *
+               (vf_one() - path_bit(s, TRC_VISIBLE_DIFFUSE));
     case TRC_OUTPUT_OF(LIGHT_PATH, is_singular):
         return path_bit(s, TRC_PATH_SINGULAR);
     case TRC_OUTPUT_OF(LIGHT_PATH, is_reflection):
