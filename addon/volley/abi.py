@@ -441,6 +441,7 @@ class DistributionType(IntEnum):
     FILMED_METAL = 32
     WHOLE_COAT = 64
     THIN_WALL = 128
+    CONDUCTOR = 256
 
 
 class BlendMode(IntEnum):

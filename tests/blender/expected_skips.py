@@ -38,6 +38,7 @@ SKIPS = (
     Skip(f"{_SHADER}[sheen *]", None, (4, 0), _SHEEN),
     Skip(f"{_LIGHT}[sheen]", None, (4, 0), _SHEEN),
     Skip(f"{_SHADER}[metallic *]", None, (4, 3), _METALLIC),
+    Skip(f"{_SHADER}[conductor *]", None, (4, 3), _METALLIC),
     Skip("test_thin_film.py::test_film[*]", None, (4, 2), _FILM),
     *(Skip(f"test_thin_film.py::test_film[{name}]", (4, 2), (5, 0), _LATER_FILM)
       for name in ("glass node", "metal*")),

@@ -38,6 +38,7 @@ KNOWN = {
     "glass roughness 0.5 ior 2.2 distribution BECKMANN":
         (0.01, 0.01, "not understood: light that is caught inside for long"),
     "sheen roughness 0.5": (0.005, 0.02, _SHEEN),
+    "metallic roughness 0.9 anisotropy 0.6 distribution BECKMANN": (0.005, 0.01, "not understood"),
     "principled clearcoat roughness 0.03": (0.015, 0.02, _COAT),
 }
 # Those of Blender 3.
@@ -124,7 +125,13 @@ for _what in ("", STRANDS):
     _add(_what + "principled hair", _PRINCIPLED_HAIR, {"Offset": 0.0},
          None, Absorption_Coefficient=((0.0, 0.0, 0.0), (0.3, 0.6, 1.5)), parametrization=('ABSORPTION',))
 _add("metallic", "ShaderNodeBsdfMetallic", {"Base Color": _GOLD, "Edge Tint": (0.5, 0.7, 0.9)},
-     {"fresnel_type": 'F82'}, Roughness=(0.1, 0.4, 0.9), Anisotropy=(0.0, 0.6))
+     {"fresnel_type": 'F82'}, Roughness=(0.1, 0.4, 0.9), Anisotropy=(0.0, 0.6),
+     distribution=('MULTI_GGX', 'BECKMANN'))
+_add("conductor", "ShaderNodeBsdfMetallic", {"IOR": (0.18, 0.42, 1.37), "Extinction": (3.42, 2.35, 1.77)},
+     {"fresnel_type": 'PHYSICAL_CONDUCTOR'}, Roughness=(0.1, 0.4, 0.9),
+     distribution=('GGX', 'MULTI_GGX', 'BECKMANN'))
+_add("conductor", "ShaderNodeBsdfMetallic", {}, {"fresnel_type": 'PHYSICAL_CONDUCTOR'},
+     IOR=((2.76, 2.51, 2.23), (1.1, 1.3, 0.9)), Extinction=((3.87, 3.4, 3.01), (0.3, 0.0, 0.6)))
 
 REFLECTING_HAIR = [name for name, (node, _inputs, settings) in CASES.items()
                    if node == _HAIR and settings["component"] == 'Reflection']

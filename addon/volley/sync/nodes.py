@@ -334,20 +334,16 @@ def _name_missing(walker, sockets):
 
 
 def _metallic(walker, node, sockets):
-    """The Metallic shader of 4.3: the metal of Principled. Of a physical conductor it gets the colours
-    head-on and at the edge."""
+    """The Metallic shader of 4.3: the metal of Principled, by its colours or by its complex index."""
+    mode = (DistributionType.BECKMANN if node.distribution == 'BECKMANN' else _layered(node)) | _LAYERED_MODES
     if node.fresnel_type == 'F82':
         base, edge = sockets.get('c', "Base Color"), sockets.get('c', "Edge Tint")
     else:
-        index, loss = sockets.get('v', "IOR"), sockets.get('v', "Extinction")
-        if index.node != CONSTANT or loss.node != CONSTANT:
-            return None
-        walker.warn("Metallic BSDF: a physical conductor is approximated by its colours")
-        pairs = tuple(zip(index.constant, loss.constant))
-        base = _constant('c', *(_conductor(n, k, 1.0) for n, k in pairs))
-        edge = _constant('c', *(_edge_tint(n, k) for n, k in pairs))
-    if node.distribution == 'BECKMANN':
-        walker.warn("Metallic BSDF: Beckmann's distribution is approximated by GGX")
+        base, edge = sockets.get('c', "IOR"), sockets.get('c', "Extinction")
+        mode |= DistributionType.CONDUCTOR
+        film = sockets.get('f', "Thin Film Thickness")
+        if HAS_FILMED_METAL and (film.node != CONSTANT or film.constant[0] > 0.0):
+            walker.warn("Metallic BSDF: a physical conductor under a film is approximated by its colours")
     one = _constant('f', 1.0)
     values = arranged(NodeType.LAYERED_PRINCIPLED, {
         "base_color": base, "metallic": one, "roughness": sockets.get('f', "Roughness"), "ior": one,
@@ -356,24 +352,7 @@ def _metallic(walker, node, sockets):
         "tangent": sockets.get('v', "Tangent"), "film_thickness": sockets.get('f', "Thin Film Thickness"),
         "film_ior": sockets.get('f', "Thin Film IOR")})
     _note_generated(walker, node, NodeType.LAYERED_PRINCIPLED, values)
-    return {"BSDF": Value('s', walker.emit(NodeType.LAYERED_PRINCIPLED, values, _layered(node)), 0)}
-
-
-_EDGE_COSINE = 1.0 / 7.0  # where the edge tint rules: 82 degrees
-
-
-def _conductor(n, k, cosine):
-    """Reflectance of a conductor of index n + ik."""
-    n2k2, c2 = n * n + k * k, cosine * cosine
-    parallel = (n2k2 * c2 - 2.0 * n * cosine + 1.0) / (n2k2 * c2 + 2.0 * n * cosine + 1.0)
-    across = (n2k2 - 2.0 * n * cosine + c2) / (n2k2 + 2.0 * n * cosine + c2)
-    return 0.5 * (parallel + across)
-
-
-def _edge_tint(n, k):
-    """A conductor's reflectance at the edge over Schlick's from its reflectance head-on."""
-    head_on = _conductor(n, k, 1.0)
-    return _conductor(n, k, _EDGE_COSINE) / (head_on + (1.0 - head_on) * (1.0 - _EDGE_COSINE) ** 5)
+    return {"BSDF": Value('s', walker.emit(NodeType.LAYERED_PRINCIPLED, values, mode), 0)}
 
 
 def _sheen(walker, node, sockets):

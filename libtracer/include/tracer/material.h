@@ -210,12 +210,15 @@ enum trc_distribution_type {
      * height, Fresnel by the micro-normal, the energy of MULTI_GGX by a factor. */
     TRC_DISTRIBUTION_CORRELATED = 16,
     /* Bit for Principled from 4.0 on, as Blender 5: thin films lie on metal, too, and interfere in
-     * full from 1 nm on in place of 30. */
+     * full from 1 nm on in place of 30; conductors of small indices are not approximated. */
     TRC_DISTRIBUTION_FILMED_METAL = 32,
     /* Bit for Principled from 4.0 on, as Blender 5: its coat has the energy of MULTI_GGX. */
     TRC_DISTRIBUTION_WHOLE_COAT = 64,
     /* Bit for Principled from 4.0 on, of Blender 5: its glass is a sheet without thickness. */
-    TRC_DISTRIBUTION_THIN_WALL = 128
+    TRC_DISTRIBUTION_THIN_WALL = 128,
+    /* Bit for Principled from 4.0 on, as the Metallic shader of 4.3: its metal reflects as one of
+     * the complex index base_color + i specular_tint, channel by channel. */
+    TRC_DISTRIBUTION_CONDUCTOR = 256
 };
 
 enum trc_blend_mode {

@@ -104,7 +104,12 @@ static vvec3 layered_coat(struct trc_setup *c, const struct trc_leaf *leaf, vflo
     return coat_passes(c, leaf, cos_o, coat, ior, albedo);
 }
 
-/* A GGX lobe with the node's roughness and anisotropy. */
+static uint32_t distribution(const struct trc_leaf *leaf) {
+    return leaf->mode & ~(uint32_t)(TRC_DISTRIBUTION_FILMED_METAL | TRC_DISTRIBUTION_WHOLE_COAT |
+                                    TRC_DISTRIBUTION_THIN_WALL | TRC_DISTRIBUTION_CONDUCTOR);
+}
+
+/* A lobe with the node's distribution, roughness and anisotropy. */
 static struct trc_lobe *add_anisotropic(struct trc_setup *c, const struct trc_leaf *leaf,
                                         vvec3 weight, vvec3 n, vfloat ior) {
     struct trc_lobe *lobe = trc_add_reflection(c, weight);
@@ -112,7 +117,8 @@ static struct trc_lobe *add_anisotropic(struct trc_setup *c, const struct trc_le
         return NULL;
     const vfloat alpha =
         vf_square(vf_saturate(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, roughness))));
-    lobe->distribution = TRC_LOBE_GGX;
+    lobe->distribution =
+        distribution(leaf) == TRC_DISTRIBUTION_BECKMANN ? TRC_LOBE_BECKMANN : TRC_LOBE_GGX;
     lobe->correlated = true;
     lobe->n = n;
     lobe->ior = ior;
@@ -136,35 +142,68 @@ static float whole_film(const struct trc_leaf *leaf) {
     return leaf->mode & TRC_DISTRIBUTION_FILMED_METAL ? TRC_WHOLE_FILM_5 : TRC_WHOLE_FILM_4;
 }
 
-static uint32_t distribution(const struct trc_leaf *leaf) {
-    return leaf->mode & ~(uint32_t)(TRC_DISTRIBUTION_FILMED_METAL | TRC_DISTRIBUTION_WHOLE_COAT |
-                                    TRC_DISTRIBUTION_THIN_WALL);
-}
-
 static vvec3 metal_reflectance(const struct trc_lobe *lobe, vfloat cos_m) {
     return v3(trc_metal_fresnel(lobe->f0.x, lobe->f90.x, cos_m),
               trc_metal_fresnel(lobe->f0.y, lobe->f90.y, cos_m),
               trc_metal_fresnel(lobe->f0.z, lobe->f90.z, cos_m));
 }
 
+/* f0, f90: the two parts of the index. */
+static vvec3 conductor_reflectance(const struct trc_lobe *lobe, vfloat cos_m) {
+    return v3(trc_conductor_fresnel(lobe->f0.x, lobe->f90.x, cos_m),
+              trc_conductor_fresnel(lobe->f0.y, lobe->f90.y, cos_m),
+              trc_conductor_fresnel(lobe->f0.z, lobe->f90.z, cos_m));
+}
+
+static vvec3 strong_conductor_reflectance(const struct trc_lobe *lobe, vfloat cos_m) {
+    return v3(trc_strong_conductor_fresnel(lobe->f0.x, lobe->f90.x, cos_m),
+              trc_strong_conductor_fresnel(lobe->f0.y, lobe->f90.y, cos_m),
+              trc_strong_conductor_fresnel(lobe->f0.z, lobe->f90.z, cos_m));
+}
+
+/* Reflectance of a metal head-on and at the cosine of TRC_METAL_EDGE. */
+static void metal_ends(const struct trc_setup *c, const struct trc_leaf *leaf,
+                       struct trc_lobe *lobe, vvec3 *f0, vvec3 *at_edge) {
+    const vvec3 base = colour(c, leaf, TRC_AT(LAYERED_PRINCIPLED, base_color));
+    const vvec3 other = colour(c, leaf, TRC_AT(LAYERED_PRINCIPLED, specular_tint));
+    if (leaf->mode & TRC_DISTRIBUTION_CONDUCTOR) {
+        const vfloat none = vf_zero();
+        lobe->f0 = v3(vf_max(base.x, none), vf_max(base.y, none), vf_max(base.z, none));
+        lobe->f90 = v3(vf_max(other.x, none), vf_max(other.y, none), vf_max(other.z, none));
+        lobe->reflectance = leaf->mode & TRC_DISTRIBUTION_FILMED_METAL
+                                ? conductor_reflectance
+                                : strong_conductor_reflectance;
+        *f0 = lobe->reflectance(lobe, vf_one());
+        *at_edge = lobe->reflectance(lobe, vf_set(TRC_METAL_EDGE));
+        return;
+    }
+    *f0 = v3_saturate(base);
+    *at_edge =
+        v3_mul(v3_lerp(*f0, v3_splat(vf_one()), vf_set(TRC_METAL_EDGE_POWER)), v3_saturate(other));
+}
+
+/* A conductor under a film is the metal that reflects as much head-on and at the edge. */
 static void layered_metal(struct trc_setup *c, const struct trc_leaf *leaf, vvec3 weight, vvec3 n) {
     struct trc_lobe *lobe = add_anisotropic(c, leaf, weight, n, vf_one());
     if (!lobe)
         return;
-    const vfloat one = vf_one(), power5 = vf_set(TRC_METAL_EDGE_POWER);
-    const vvec3 white = v3_splat(one),
-                f0 = v3_saturate(colour(c, leaf, TRC_AT(LAYERED_PRINCIPLED, base_color)));
-    const vvec3 edge = v3_saturate(colour(c, leaf, TRC_AT(LAYERED_PRINCIPLED, specular_tint)));
-    const vvec3 at_edge = v3_lerp(f0, white, power5);
+    vvec3 f0, at_edge;
+    metal_ends(c, leaf, lobe, &f0, &at_edge);
+    const bool is_filmed = (leaf->mode & TRC_DISTRIBUTION_FILMED_METAL) &&
+                           may_exceed_zero(c, leaf, TRC_AT(LAYERED_PRINCIPLED, film_thickness));
+    const vvec3 dip = v3(trc_metal_dip(f0.x, at_edge.x), trc_metal_dip(f0.y, at_edge.y),
+                         trc_metal_dip(f0.z, at_edge.z));
     lobe->fresnel = TRC_FRESNEL_OWN;
-    lobe->reflectance = metal_reflectance;
-    lobe->f0 = f0;
-    lobe->f90 = v3_scale(v3_mul(at_edge, v3_sub(white, edge)), vf_set(49.0f / 6.0f) / power5);
+    if (!(leaf->mode & TRC_DISTRIBUTION_CONDUCTOR) || is_filmed) {
+        lobe->reflectance = metal_reflectance;
+        lobe->f0 = f0;
+        lobe->f90 = dip;
+    }
     /* Schlick's mean over the hemisphere is 1/21 of the way to white. */
-    const vvec3 mean = v3_sub(v3_lerp(f0, white, vf_set(1.0f / 21.0f)),
-                              v3_scale(lobe->f90, vf_set(1.0f / 126.0f)));
+    const vvec3 mean = v3_sub(v3_lerp(f0, v3_splat(vf_one()), vf_set(1.0f / 21.0f)),
+                              v3_scale(dip, vf_set(1.0f / 126.0f)));
     vvec3 albedo = mean;
-    if (leaf->mode & TRC_DISTRIBUTION_FILMED_METAL) {
+    if (is_filmed) {
         const vmask covered = trc_thin_film_cover_metal(
             c, leaf, TRC_AT(LAYERED_PRINCIPLED, film_thickness), whole_film(leaf), lobe);
         if (vm_any(covered))

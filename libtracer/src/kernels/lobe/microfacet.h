@@ -59,6 +59,25 @@ TRC_INLINE vfloat trc_metal_dip(vfloat f0, vfloat at_edge) {
     return (schlick - at_edge) * (vf_set(49.0f / 6.0f) / vf_set(TRC_METAL_EDGE_POWER));
 }
 
+/* A conductor of index n + ik in air (M. Born and E. Wolf, "Principles of Optics", 14.2). */
+TRC_INLINE vfloat trc_conductor_fresnel(vfloat n, vfloat k, vfloat cos_m) {
+    const vfloat c = vf_saturate(cos_m), c2 = c * c, sin2 = vf_one() - c2, two = vf_set(2.0f);
+    const vfloat real = n * n - k * k - sin2, imaginary = two * n * k;
+    const vfloat size = vf_sqrt(real * real + imaginary * imaginary);
+    const vfloat twice = two * c * vf_safe_sqrt(vf_set(0.5f) * (size + real));
+    const vfloat across = vf_divide(size + c2 - twice, size + c2 + twice);
+    const vfloat sum = c2 * size + sin2 * sin2, part = twice * sin2;
+    return vf_set(0.5f) * (across + across * vf_divide(sum - part, sum + part));
+}
+/* The same where n^2 + k^2 is large beside 1, as Cycles 4 has it for all. */
+TRC_INLINE vfloat trc_strong_conductor_fresnel(vfloat n, vfloat k, vfloat cos_m) {
+    const vfloat c = vf_saturate(cos_m), c2 = c * c, square = n * n + k * k;
+    const vfloat twice = vf_set(2.0f) * n * c;
+    const vfloat along = vf_divide(square * c2 - twice + vf_one(), square * c2 + twice + vf_one());
+    const vfloat across = vf_divide(square - twice + c2, square + twice + c2);
+    return vf_set(0.5f) * (along + across);
+}
+
 /* Refracted direction of wo at the unit normal m (m . wo > 0); lanes of total reflection are not in
  * the result's mask. eta as above. */
 TRC_INLINE vmask trc_refract(vvec3 wo, vvec3 m, vfloat eta, vvec3 *wi) {
