@@ -102,6 +102,7 @@ class VisibleRays(IntFlag):
 class InstanceFlags(IntFlag):
     SHADOW_CATCHER = 1
     KEEPS_SHAPE = 2
+    WORLD_NORMALS = 4
 
 
 class LightType(IntEnum):

@@ -502,7 +502,7 @@ static void instances(void **state) {
     REFUSE_INSTANCE(LARGE, desc.material_count = UINT32_MAX);
     REFUSE_INSTANCE(HANDLE, desc.materials = stale_materials; desc.material_count = 2);
     REFUSE_INSTANCE(ARGUMENT, desc.visibility = 32);
-    REFUSE_INSTANCE(ARGUMENT, desc.flags = 4);
+    REFUSE_INSTANCE(ARGUMENT, desc.flags = 8);
     REFUSE_INSTANCE(ARGUMENT, desc.random = NAN);
     REFUSE_INSTANCE(ARGUMENT, desc.color[2] = INFINITY);
     REFUSE_INSTANCE(ARGUMENT, desc.cryptomatte_object = NAN);

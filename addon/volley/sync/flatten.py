@@ -9,7 +9,7 @@ Fallbacks: a node that is not supported leaves the input it feeds at that socket
 that is not supported becomes a diffuse of its colour. Each is named once in the warnings.
 """
 
-from ..abi import NodeType, VectorOperation as Vector
+from ..abi import DisplacementMethod, NodeType, VectorOperation as Vector
 from ..compat import BUMP_FILTER_WIDTH, aov_name
 from . import nodes, working_space
 from .node_list import input_number, output
@@ -60,6 +60,11 @@ class FlatTree:
         self.sun = None           # sky_texture.Sun that the tree shows
         self.follows_scene = False  # it reads where other objects are, or properties of the view layer
         self.has_volume = False   # something is linked to the output's Volume
+
+    def moves_vertices(self):
+        """Whether its displacement does."""
+        moving = DisplacementMethod.TRUE | DisplacementMethod.BOTH
+        return any(node.type == NodeType.DISPLACEMENT_OUTPUT and node.mode & moving for node in self.nodes)
 
     def emits(self):
         """Whether one of its shaders may emit light."""

@@ -6,6 +6,7 @@ mesh that many instances show is read once; the first of them to come along owns
 """
 
 import functools
+from collections import Counter
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -20,6 +21,7 @@ from .matrix import rows
 
 
 _SHADOW_CATCHER = int(abi.InstanceFlags.SHADOW_CATCHER)  # flags of Python's are slow
+WORLD_NORMALS = int(abi.InstanceFlags.WORLD_NORMALS)
 
 
 class Offsets(NamedTuple):
@@ -48,6 +50,7 @@ class Item:
     transforms: list           # a tuple of 12 floats for each motion key
     mesh_key: tuple = None     # the key of the item that owns the mesh
     materials: tuple = ()
+    is_displaced: bool = False  # some material moves vertices
     holes: tuple = ()          # the materials that the camera sees in place of them, none: no others
     visibility: int = 0
     pass_index: int = 0
@@ -222,14 +225,19 @@ class Instances:
     warnings: object
     _entries: dict = field(default_factory=dict)
 
-    def update(self, items, mesh_ids):
-        """Make the library's instances those of the items; mesh_ids: library id by mesh key. One that
-        the library refuses is left out."""
+    def update(self, items, mesh_ids, in_world):
+        """Make the library's instances those of the items; mesh_ids: library id by mesh key; in_world: keys of
+        meshes that Cycles would move to world space if they had one user. One that the library refuses is left
+        out."""
         seen = set()
+        users = Counter(item.mesh_key for item in items) if in_world else {}
         for item in items:
             mesh_id = mesh_ids.get(item.mesh_key)
             if mesh_id is None:
                 continue
+            if item.mesh_key in in_world and users[item.mesh_key] == 1 and not item.is_displaced \
+                    and len(collapse(item.transforms)) == 1:
+                item.flags |= WORLD_NORMALS
             try:
                 self._update_one(item, mesh_id)
                 seen.add(item.key)

@@ -54,6 +54,10 @@ class Materials:
         is_volume = bool(entries) and entries[0].is_volume and all([entry.is_volume for entry in entries])
         return tuple([entry.id for entry in entries]), is_volume
 
+    def move_vertices(self, made_of):
+        """Whether the displacement of some of these evaluated materials does."""
+        return any([self.entry_of(material).moves_vertices for material in made_of if material is not None])
+
     def entry_of(self, material):
         """The entry of an evaluated material, brought up to date once per sync."""
         return self._entry(material.name_full, material)
@@ -194,12 +198,13 @@ class Materials:
         return values_of
 
     def read_names(self):
-        """All that the materials of this sync read of meshes and instances, and which are of volumes alone:
-        where it stays the same, so does what the others need."""
+        """All that the materials of this sync read of meshes and instances, which are of volumes alone and which
+        move vertices: where it stays the same, so does what the others need."""
         entries = [self._entries[key] for key in self._seen]
         return (self.attribute_names(), self.volume_names(),
                 set().union(*(entry.instance_attributes for entry in entries)),
-                any(entry.needs_instancer for entry in entries))
+                any(entry.needs_instancer for entry in entries),
+                {key for key in self._seen if self._entries[key].moves_vertices})
 
     def tangents_read_by(self, materials):
         """The attributes of tangents that some of Blender's materials of this sync read."""
@@ -246,6 +251,7 @@ class Materials:
             self._send(entry, key, flat, values)
         entry.signature, entry.name = signature, name
         entry.uv_names, entry.color_names, entry.emits = flat.uv_names, flat.color_names, flat.emits()
+        entry.moves_vertices = flat.moves_vertices()
         entry.needs_generated, entry.sun = flat.needs_generated, flat.sun
         entry.needs_instancer, entry.instance_attributes = flat.needs_instancer, flat.instance_attributes
         entry.images, is_animated = self._images.take_asked()
@@ -279,6 +285,7 @@ class Entry:
         self.needs_generated, self.sun = False, None
         self.needs_instancer, self.instance_attributes = False, set()
         self.emits = False      # perhaps
+        self.moves_vertices = False
         self.is_volume = False  # of a volume alone: what has no other is not there
         self.images = set()  # those it reads
         self.is_animated = False  # whether what it reads may be another in the next sync

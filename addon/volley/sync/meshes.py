@@ -12,7 +12,7 @@ class MeshEntry:
     diced_by: see MeshData."""
 
     __slots__ = ("id", "pointer", "topology", "shape", "names", "corners", "normal_kind", "poses",
-                 "diced_by")
+                 "diced_by", "may_be_in_world")
 
 
 class Meshes:
@@ -61,6 +61,7 @@ class Meshes:
         entry.pointer, entry.topology, entry.shape, entry.names = pointer, topology, shape, names
         entry.poses, entry.corners, entry.normal_kind = data.poses, data.corners, data.normal_kind
         entry.diced_by = data.diced_by
+        entry.may_be_in_world = motion is None and not data.dicing
         self._seen.add(key)
 
     def pose(self, key, pointer, mesh, is_known):
@@ -111,6 +112,11 @@ class Meshes:
     def id_of(self, key):
         """Library id of one mesh."""
         return self._entries[key].id
+
+    def in_world(self):
+        """Keys of the meshes of this sync that Cycles moves to world space if one object alone shows
+        them and stands still: neither diced nor deforming."""
+        return {key for key in self._seen if self._entries[key].may_be_in_world}
 
     def ids(self):
         """Library id of each mesh of this sync, by key."""

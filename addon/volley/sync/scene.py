@@ -65,7 +65,8 @@ class SceneSync:
         if shutter is not None:
             walk.follow_motion(camera_keys)
         walk.send_deforming()
-        self._instances.update(walk.items.values(), self._meshes.ids())
+        in_world = self._meshes.in_world() if source.v3d is None else set()
+        self._instances.update(walk.items.values(), self._meshes.ids(), in_world)
         self._lights.update(walk.lights)
         self._sync_world(source)
         self._meshes.end()
@@ -118,6 +119,7 @@ class SceneSync:
             return False
         item = instance.describe(each, view_layer, source.light_groups, shown.links)
         item.mesh_key, item.materials = known.mesh_key, ids
+        item.flags |= known.flags & instance.WORLD_NORMALS
         dress(item, self._materials, each, made_of, view_layer, self._materials.instance_values(),
               source.depsgraph.scene_eval)
         self._instances.change(item, self._meshes.id_of(item.mesh_key))

@@ -145,7 +145,11 @@ enum trc_visible_rays {
  * not light it as footage. */
 enum trc_instance_flags {
     TRC_INSTANCE_SHADOW_CATCHER = 1,
-    TRC_INSTANCE_KEEPS_SHAPE = 2 /* displacement moves no vertices, as of hair */
+    TRC_INSTANCE_KEEPS_SHAPE = 2, /* displacement moves no vertices, as of hair */
+    /* Normals are made unit in world space before they are interpolated, as Cycles has them of what
+     * it moves to world space; else after. Of what neither moves nor is scaled unevenly both are
+     * one. */
+    TRC_INSTANCE_WORLD_NORMALS = 4
 };
 
 #define TRC_MAX_INSTANCE_VALUES 256

@@ -175,7 +175,7 @@ static trc_status check_instance(const trc_instance_desc *desc) {
     TRC_TRY(trc_check_finite(desc->color, 4, "color"));
     TRC_TRY(trc_check_finite(&desc->cryptomatte_object, 1, "cryptomatte_object"));
     TRC_TRY(trc_check_count(desc->light_group, 0, TRC_MAX_LIGHT_GROUPS, "light_group"));
-    TRC_TRY(trc_check_enum(desc->flags, 2 * TRC_INSTANCE_KEEPS_SHAPE, "flags"));
+    TRC_TRY(trc_check_enum(desc->flags, 2 * TRC_INSTANCE_WORLD_NORMALS, "flags"));
     TRC_TRY(trc_check_float(desc->ao_distance, 0.0f, FLT_MAX, "ao_distance"));
     TRC_TRY(trc_check_float(desc->shadow_terminator_geometry, 0.0f, 1.0f,
                             "shadow_terminator_geometry"));

@@ -250,6 +250,7 @@ static uint64_t fill_instances(const struct trc_scene_state *scene,
             .ao_distance = source->ao_distance,
             .first_light = UINT32_MAX,
             .keeps_shape = (source->flags & TRC_INSTANCE_KEEPS_SHAPE) != 0,
+            .world_normals = (source->flags & TRC_INSTANCE_WORLD_NORMALS) != 0,
         };
         memcpy(instance->color, source->color, sizeof instance->color);
         for (uint32_t m = 0; m < material_count; m++) {

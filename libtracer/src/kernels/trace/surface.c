@@ -8,7 +8,7 @@
 struct raw_hit {
     struct trc_corners p, n; /* object space; n only where smooth */
     struct trc_wide_affine m;
-    vmask smooth, flips, identity;
+    vmask smooth, flips, identity, world_normals;
 };
 
 /* ---- loading ---- */
@@ -24,6 +24,7 @@ static void load_uniform(const struct trc_surface *s, const struct trc_instance 
     trc_load_affine(instance, s->time, &out->m);
     out->flips = instance->flips ? vm_all_set() : vm_none();
     out->identity = instance->is_identity ? vm_all_set() : vm_none();
+    out->world_normals = instance->world_normals ? vm_all_set() : vm_none();
     out->smooth = vm_none();
     if (mesh->corner_normals) {
         const vint corner = s->triangle * vi_set(3);
@@ -49,7 +50,7 @@ static void load_uniform(const struct trc_surface *s, const struct trc_instance 
 }
 
 /* What load_lane says of a lane. */
-enum { LANE_SMOOTH = 1, LANE_FLIPS = 2, LANE_IDENTITY = 4 };
+enum { LANE_SMOOTH = 1, LANE_FLIPS = 2, LANE_IDENTITY = 4, LANE_WORLD_NORMALS = 8 };
 
 /* One lane: 9 positions, 9 normals, 12 elements. Returns LANE_* together. */
 static uint32_t load_lane(const struct trc_surface *s, int lane, float p[9], float n[9],
@@ -61,8 +62,9 @@ static uint32_t load_lane(const struct trc_surface *s, int lane, float p[9], flo
     const float time = vf_get(s->time, lane);
     trc_corner_at(mesh->positions, index, mesh->vertex_count, mesh->key_count, time, p);
     trc_affine_at(instance, time, m);
-    const uint32_t flags =
-        (instance->flips ? LANE_FLIPS : 0u) | (instance->is_identity ? LANE_IDENTITY : 0u);
+    const uint32_t flags = (instance->flips ? LANE_FLIPS : 0u) |
+                           (instance->is_identity ? LANE_IDENTITY : 0u) |
+                           (instance->world_normals ? LANE_WORLD_NORMALS : 0u);
     if (mesh->smooth ? !mesh->smooth[triangle] : !mesh->corner_normals)
         return flags;
     if (mesh->corner_normals) {
@@ -82,7 +84,7 @@ static void load_mixed(const struct trc_surface *s, struct raw_hit *out) {
     memset(p, 0, sizeof p);
     memset(n, 0, sizeof n);
     memset(m, 0, sizeof m);
-    uint32_t smooth = 0, flips = 0, identity = 0;
+    uint32_t smooth = 0, flips = 0, identity = 0, world_normals = 0;
     for (uint32_t lanes = vm_bits(s->active); lanes; lanes &= lanes - 1) {
         const int lane = __builtin_ctz(lanes);
         const uint32_t flags =
@@ -90,6 +92,7 @@ static void load_mixed(const struct trc_surface *s, struct raw_hit *out) {
         smooth |= (uint32_t)((flags & LANE_SMOOTH) != 0) << lane;
         flips |= (uint32_t)((flags & LANE_FLIPS) != 0) << lane;
         identity |= (uint32_t)((flags & LANE_IDENTITY) != 0) << lane;
+        world_normals |= (uint32_t)((flags & LANE_WORLD_NORMALS) != 0) << lane;
     }
     out->p = trc_corners_of(p);
     out->n = trc_corners_of(n);
@@ -103,6 +106,7 @@ static void load_mixed(const struct trc_surface *s, struct raw_hit *out) {
     out->smooth = vm_from_bits(smooth);
     out->flips = vm_from_bits(flips);
     out->identity = vm_from_bits(identity);
+    out->world_normals = vm_from_bits(world_normals);
 }
 
 /* ---- arithmetic ---- */
@@ -163,6 +167,12 @@ static vvec3 transform_normal(const struct trc_wide_affine *m, vvec3 n) {
                   v3_mad(v3_cross(c[2], c[0]), n.y, v3_scale(v3_cross(c[0], c[1]), n.z)));
 }
 
+/* What normals of the lanes are multiplied by to be unit in world space. */
+static vfloat world_normal_scale(const struct raw_hit *h, vvec3 n, vmask lanes) {
+    const vvec3 world = transform_normal(&h->m, n);
+    return vf_select(lanes, vf_divide(vf_one(), vf_sqrt(v3_dot(world, world))), vf_one());
+}
+
 /* The height of a point below the plane through a corner that is normal to its normal, at least 0;
  * where the surface is hollow there, below the higher of the two neighbours. da and db are how high
  * they lie above the plane, wa and wb the point's weights of them. */
@@ -206,9 +216,12 @@ static void set_normals(struct trc_surface *s, const struct raw_hit *h, vvec3 e1
     s->backfacing = vf_lt(v3_dot(ng, s->wo), vf_zero());
     const vfloat side = vf_select(s->backfacing, vf_set(-1.0f), vf_one());
     if (vm_any(h->smooth)) {
-        const vfloat w = vf_one() - s->u - s->v;
-        vvec3 sum =
-            v3_mad(h->n.corner[0], w, v3_mad(h->n.corner[1], s->u, v3_scale(h->n.corner[2], s->v)));
+        vfloat weight[3] = {vf_one() - s->u - s->v, s->u, s->v};
+        const vmask in_world = vm_and(h->world_normals, s->active);
+        for (int k = 0; k < 3 && vm_any(in_world); k++)
+            weight[k] = weight[k] * world_normal_scale(h, h->n.corner[k], in_world);
+        vvec3 sum = v3_mad(h->n.corner[0], weight[0],
+                           v3_mad(h->n.corner[1], weight[1], v3_scale(h->n.corner[2], weight[2])));
         const vvec3 up = trc_transform_vector(&h->m, sum);
         const vfloat turn =
             vf_select(vf_lt(v3_dot(up, ng) * side, vf_zero()), vf_set(-1.0f), vf_one());
