@@ -345,6 +345,16 @@ def _posed_column(material):
     return column
 
 
+def _generated():
+    """A material that shines with its Generated coordinates."""
+    import scenes
+    material = scenes.material("Generated", "ShaderNodeEmission")
+    tree = material.node_tree
+    tree.links.new(tree.nodes.new("ShaderNodeTexCoord").outputs["Generated"],
+                   tree.nodes["Emission"].inputs["Color"])
+    return material
+
+
 def inside_generated():
     """Generated coordinates as colours: of the pose, with a subdivision behind it, with a texture space
     of the mesh's own; and what the viewport's sync takes for them."""
@@ -353,11 +363,7 @@ def inside_generated():
     from volley.sync import mesh
     scenes.empty(size=(64, 64))
     scenes.camera(location=(0.5, -6.0, 0.5))
-    material = scenes.material("Generated", "ShaderNodeEmission")
-    tree = material.node_tree
-    tree.links.new(tree.nodes.new("ShaderNodeTexCoord").outputs["Generated"],
-                   tree.nodes["Emission"].inputs["Color"])
-    column = _posed_column(material)
+    column = _posed_column(_generated())
     pairs = {"posed": _seeds()}
     depsgraph = bpy.context.evaluated_depsgraph_get()
     evaluated = column.evaluated_get(depsgraph)
@@ -389,12 +395,8 @@ def inside_generated_modifiers():
     for kind in MODIFIERS:
         scenes.empty(size=(48, 48))
         scenes.camera(location=(0.9, -6.0, 0.0))
-        material = scenes.material("Generated", "ShaderNodeEmission")
-        tree = material.node_tree
-        tree.links.new(tree.nodes.new("ShaderNodeTexCoord").outputs["Generated"],
-                       tree.nodes["Emission"].inputs["Color"])
         bpy.ops.mesh.primitive_cone_add(vertices=9, rotation=(0.7, 0.4, 0.3))
-        bpy.context.object.data.materials.append(material)
+        bpy.context.object.data.materials.append(_generated())
         bpy.context.object.modifiers.new(kind, kind)
         found[kind] = _seeds()
     return found
