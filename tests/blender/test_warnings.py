@@ -135,6 +135,33 @@ def test_custom_cameras(blender):
     assert blender.run(inside_custom_cameras) == ["Camera 'Camera': type CUSTOM is not supported, perspective is used"]
 
 
+def inside_filmed_conductors():
+    """The warnings of a conductor, and of one under a film."""
+    import scenes
+    scenes.empty(size=(16, 16))
+    scenes.camera()
+    material = scenes.material("Metal", "ShaderNodeBsdfMetallic")
+    shader = scenes.shader_of(material)
+    shader.fresnel_type = 'PHYSICAL_CONDUCTOR'
+    scenes.wall(material=material)
+    told, found = _listen(), []
+    for thickness in (0.0, 300.0):
+        shader.inputs["Thin Film Thickness"].default_value = thickness
+        told.clear()
+        scenes.render()
+        found.append(list(told))
+    return found
+
+
+@pytest.mark.since((5, 0), "metals have films from 5.0 on")
+def test_filmed_conductors(blender):
+    import blender as blender_support
+    if blender_support.version() < (5, 0):
+        pytest.skip("metals have none")
+    assert blender.run(inside_filmed_conductors) == [
+        [], ["Material 'Metal': Metallic BSDF: a physical conductor under a film is approximated by its colours"]]
+
+
 def inside_shining_strands():
     """The warnings of hair that is matt, that emits, that emits nothing."""
     import bpy
