@@ -103,8 +103,22 @@ static void lines_and_points_are_not(void **state) {
     assert_true(inverse.m[0] == 42);
 }
 
+static void even_scales_keep_angles(void **state) {
+    (void)state;
+    const struct trc_affine even[] = {scaled(1, 1, 1), scaled(-2, 2, 2),
+                                      scaled(1e-18f, 1e-18f, 1e-18f), slanted(3, 3, 3),
+                                      slanted(-1e15f, 1e15f, 1e15f)};
+    const struct trc_affine uneven[] = {scaled(1, 1, 1.01f), slanted(1, 0.999f, 1), scaled(1, 0, 1),
+                                        slanted(1e15f, 1.01e15f, 1e15f)};
+    for (size_t i = 0; i < sizeof even / sizeof *even; i++)
+        assert_true(trc_affine_keeps_angles(&even[i]));
+    for (size_t i = 0; i < sizeof uneven / sizeof *uneven; i++)
+        assert_false(trc_affine_keeps_angles(&uneven[i]));
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(even_scales_keep_angles),
         cmocka_unit_test(thin_is_what_floats_cannot_undo),
         cmocka_unit_test(planes_are_undone),
         cmocka_unit_test(lost_coordinate_is_constant),

@@ -21,7 +21,7 @@ from .matrix import rows
 
 
 _SHADOW_CATCHER = int(abi.InstanceFlags.SHADOW_CATCHER)  # flags of Python's are slow
-WORLD_NORMALS = int(abi.InstanceFlags.WORLD_NORMALS)
+_WORLD_NORMALS = int(abi.InstanceFlags.WORLD_NORMALS)
 
 
 class Offsets(NamedTuple):
@@ -50,7 +50,6 @@ class Item:
     transforms: list           # a tuple of 12 floats for each motion key
     mesh_key: tuple = None     # the key of the item that owns the mesh
     materials: tuple = ()
-    is_displaced: bool = False  # some material moves vertices
     holes: tuple = ()          # the materials that the camera sees in place of them, none: no others
     visibility: int = 0
     pass_index: int = 0
@@ -224,22 +223,21 @@ class Instances:
     scene: object
     warnings: object
     _entries: dict = field(default_factory=dict)
+    _in_world: set = field(default_factory=set)
 
-    def update(self, items, mesh_ids, in_world):
-        """Make the library's instances those of the items; mesh_ids: library id by mesh key; in_world: keys of
-        meshes that Cycles would move to world space if they had one user. One that the library refuses is left
-        out."""
+    def update(self, items, mesh_ids, in_world, moving):
+        """Make the library's instances those of the items; mesh_ids: library id by mesh key. One that the library
+        refuses is left out. in_world: keys of meshes that Cycles moves to world space if they have one user, and
+        no material of moving, the ids of those that move vertices."""
         seen = set()
         users = Counter(item.mesh_key for item in items) if in_world else {}
+        self._in_world = {key for key in in_world if users[key] == 1}
         for item in items:
             mesh_id = mesh_ids.get(item.mesh_key)
             if mesh_id is None:
                 continue
-            if item.mesh_key in in_world and users[item.mesh_key] == 1 and not item.is_displaced \
-                    and len(collapse(item.transforms)) == 1:
-                item.flags |= WORLD_NORMALS
             try:
-                self._update_one(item, mesh_id)
+                self._update_one(item, mesh_id, moving)
                 seen.add(item.key)
             except native.TracerError as error:
                 if error.status != abi.StatusCode.ERROR_INVALID_ARGUMENT:
@@ -249,10 +247,10 @@ class Instances:
             for instance_id in self._entries.pop(key).ids:
                 self.scene.destroy_instance(instance_id)
 
-    def change(self, item, mesh_id):
-        """Bring one of them up to date; one that the library refuses goes on as it was."""
+    def change(self, item, mesh_id, moving):
+        """Bring one of them up to date, as update(); one that the library refuses goes on as it was."""
         try:
-            self._update_one(item, mesh_id)
+            self._update_one(item, mesh_id, moving)
         except native.TracerError as error:
             if error.status != abi.StatusCode.ERROR_INVALID_ARGUMENT:
                 raise
@@ -263,7 +261,9 @@ class Instances:
         entries = self._entries.values()
         return {entry.name for entry in entries}, {entry.asset for entry in entries}
 
-    def _update_one(self, item, mesh_id):
+    def _update_one(self, item, mesh_id, moving):
+        if item.mesh_key in self._in_world and moving.isdisjoint(item.materials):
+            item.flags |= _WORLD_NORMALS
         signature = (mesh_id, tuple(item.transforms), item.materials, item.holes, item.visibility,
                      item.pass_index, item.random, item.color, item.name, item.asset, item.light_group,
                      item.flags, item.links, item.offsets, item.values)

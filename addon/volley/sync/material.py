@@ -54,9 +54,9 @@ class Materials:
         is_volume = bool(entries) and entries[0].is_volume and all([entry.is_volume for entry in entries])
         return tuple([entry.id for entry in entries]), is_volume
 
-    def move_vertices(self, made_of):
-        """Whether the displacement of some of these evaluated materials does."""
-        return any([self.entry_of(material).moves_vertices for material in made_of if material is not None])
+    def moving(self):
+        """The library's ids of the materials of this sync whose displacement moves vertices."""
+        return {self._entries[key].id for key in self._seen if self._entries[key].moves_vertices}
 
     def entry_of(self, material):
         """The entry of an evaluated material, brought up to date once per sync."""
@@ -204,7 +204,7 @@ class Materials:
         return (self.attribute_names(), self.volume_names(),
                 set().union(*(entry.instance_attributes for entry in entries)),
                 any(entry.needs_instancer for entry in entries),
-                {key for key in self._seen if self._entries[key].moves_vertices})
+                self.moving())
 
     def tangents_read_by(self, materials):
         """The attributes of tangents that some of Blender's materials of this sync read."""

@@ -66,7 +66,7 @@ class SceneSync:
             walk.follow_motion(camera_keys)
         walk.send_deforming()
         in_world = self._meshes.in_world() if source.v3d is None else set()
-        self._instances.update(walk.items.values(), self._meshes.ids(), in_world)
+        self._instances.update(walk.items.values(), self._meshes.ids(), in_world, self._materials.moving())
         self._lights.update(walk.lights)
         self._sync_world(source)
         self._meshes.end()
@@ -119,10 +119,9 @@ class SceneSync:
             return False
         item = instance.describe(each, view_layer, source.light_groups, shown.links)
         item.mesh_key, item.materials = known.mesh_key, ids
-        item.flags |= known.flags & instance.WORLD_NORMALS
         dress(item, self._materials, each, made_of, view_layer, self._materials.instance_values(),
               source.depsgraph.scene_eval)
-        self._instances.change(item, self._meshes.id_of(item.mesh_key))
+        self._instances.change(item, self._meshes.id_of(item.mesh_key), self._materials.moving())
         self._meshes.free_retired()
         return True
 

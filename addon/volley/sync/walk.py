@@ -147,7 +147,6 @@ class Walk:
             return
         item = self._describe(each)
         item.materials = ids
-        item.is_displaced = self._sync._materials.move_vertices(made_of)
         self._dress(item, each, made_of)
         if self._shutter is not None:
             item.motion_keys = motion.key_count(blender_object, instance.maker_of(each))

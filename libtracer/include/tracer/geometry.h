@@ -147,8 +147,8 @@ enum trc_instance_flags {
     TRC_INSTANCE_SHADOW_CATCHER = 1,
     TRC_INSTANCE_KEEPS_SHAPE = 2, /* displacement moves no vertices, as of hair */
     /* Normals are made unit in world space before they are interpolated, as Cycles has them of what
-     * it moves to world space; else after. Of what neither moves nor is scaled unevenly both are
-     * one. */
+     * it moves to world space; else after. Both are one of what is scaled evenly, and of what moves
+     * they are always those of after. */
     TRC_INSTANCE_WORLD_NORMALS = 4
 };
 

@@ -140,7 +140,7 @@ struct trc_instance {
     uint32_t first_light;  /* first emissive-triangle light of this instance or UINT32_MAX */
     uint8_t flips;         /* 1: negative determinant at key 0 */
     uint8_t keeps_shape;   /* 1: displacement moves no vertices */
-    uint8_t world_normals; /* 1: TRC_INSTANCE_WORLD_NORMALS */
+    uint8_t world_normals; /* 1: TRC_INSTANCE_WORLD_NORMALS, and that is seen */
     uint8_t is_identity;   /* 1: one key, which changes no point */
     uint8_t is_thin; /* 1: some key's transform is (scene/affine.h); rays meet a tree of its own
                          in world space */

@@ -52,6 +52,21 @@ bool trc_affine_is_identity(const struct trc_affine *a) {
     return same;
 }
 
+bool trc_affine_keeps_angles(const struct trc_affine *a) {
+    const double rounding = 1e-5; /* of a product of rotations and a scale in floats, and more */
+    double product[3][3] = {{0}}; /* of the axes */
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            for (int k = 0; k < 3; k++)
+                product[i][j] += (double)a->m[4 * k + i] * (double)a->m[4 * k + j];
+    bool keeps = true;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            keeps = keeps && fabs(product[i][j] - (i == j ? product[0][0] : 0.0)) <=
+                                 rounding * product[0][0];
+    return keeps;
+}
+
 bool trc_affine_is_finite(const struct trc_affine *a) {
     bool finite = true;
     for (int i = 0; i < TRC_AFFINE_FLOATS; i++)

@@ -11,6 +11,9 @@ extern const struct trc_affine trc_affine_identity;
 /* Whether it leaves every point where it is. */
 bool trc_affine_is_identity(const struct trc_affine *a);
 
+/* Whether it keeps angles, but for rounding. */
+bool trc_affine_keeps_angles(const struct trc_affine *a);
+
 bool trc_affine_is_finite(const struct trc_affine *a);
 
 /* Whether the transform can be undone in floats; then *inverse_out is its inverse. Not finite or

@@ -152,6 +152,8 @@ static void place(struct trc_instance *instance, const struct trc_scene_instance
     }
     instance->flips = trc_affine_flips(&transforms[0]);
     instance->is_identity = instance->key_count == 1 && trc_affine_is_identity(&transforms[0]);
+    instance->world_normals = (source->flags & TRC_INSTANCE_WORLD_NORMALS) &&
+                              instance->key_count == 1 && !trc_affine_keeps_angles(&transforms[0]);
 }
 
 /* What sees an instance; an unblocked ray sees catchers alone. */
@@ -250,7 +252,6 @@ static uint64_t fill_instances(const struct trc_scene_state *scene,
             .ao_distance = source->ao_distance,
             .first_light = UINT32_MAX,
             .keeps_shape = (source->flags & TRC_INSTANCE_KEEPS_SHAPE) != 0,
-            .world_normals = (source->flags & TRC_INSTANCE_WORLD_NORMALS) != 0,
         };
         memcpy(instance->color, source->color, sizeof instance->color);
         for (uint32_t m = 0; m < material_count; m++) {

@@ -30,7 +30,8 @@ static float around_zero(struct rng *r) { return rng_unit(r) - 0.5f; }
 
 /* Mesh 0 static and flat, 1 with smooth vertex normals, 2 moving with corner normals, 3 far from
  * the origin, 4 moving with vertex normals. Vertices are in another order than corners. Instances:
- * the identity, said and not said to be it, others with scale and shear, mirrored, moving. */
+ * the identity, said and not said to be it, others with scale and shear, mirrored, moving; every
+ * other with normals that are unit in world space. */
 static void build(void) {
     struct rng r = rng_seed(1);
     memset(&scene, 0, sizeof scene);
@@ -62,6 +63,7 @@ static void build(void) {
         instance->mesh = (uint32_t)i % MESHES;
         instance->key_count = i >= 10 ? KEYS : 1;
         instance->is_identity = i < 3;
+        instance->world_normals = i % 2;
         instance->object_to_world = scene.to_world[i];
         for (int k = 0; k < KEYS; k++)
             for (int e = 0; e < 12; e++)
@@ -166,12 +168,11 @@ static struct truth exact(int instance_number, int triangle, float u, float v, f
                 m[4 * i] * c[k][0] + m[4 * i + 1] * c[k][1] + m[4 * i + 2] * c[k][2] + m[4 * i + 3];
     struct truth t;
     const long double a = (long double)u, b = (long double)v;
-    long double e1[3], e2[3], no[3], column[3][3], cofactor[3][3];
+    long double e1[3], e2[3], no[3] = {0}, column[3][3], cofactor[3][3];
     for (int i = 0; i < 3; i++) {
         e1[i] = w[1][i] - w[0][i];
         e2[i] = w[2][i] - w[0][i];
         t.p[i] = w[0][i] + a * e1[i] + b * e2[i];
-        no[i] = (1 - a - b) * n[0][i] + a * n[1][i] + b * n[2][i];
         for (int k = 0; k < 3; k++)
             column[k][i] = m[4 * i + k];
     }
@@ -180,6 +181,16 @@ static struct truth exact(int instance_number, int triangle, float u, float v, f
     for (int k = 0; k < 3; k++)
         cross(column[(k + 1) % 3], column[(k + 2) % 3], cofactor[k]);
     long double det = 0;
+    const long double weight[3] = {1 - a - b, a, b};
+    for (int k = 0; k < 3; k++) {
+        long double world[3];
+        for (int i = 0; i < 3; i++)
+            world[i] =
+                cofactor[0][i] * n[k][0] + cofactor[1][i] * n[k][1] + cofactor[2][i] * n[k][2];
+        const long double size = instance->world_normals ? normalize(world) : 1;
+        for (int i = 0; i < 3; i++)
+            no[i] += weight[k] / size * n[k][i];
+    }
     for (int i = 0; i < 3; i++) {
         t.n[i] = cofactor[0][i] * no[0] + cofactor[1][i] * no[1] + cofactor[2][i] * no[2];
         det += column[0][i] * cofactor[0][i];

@@ -167,10 +167,15 @@ static vvec3 transform_normal(const struct trc_wide_affine *m, vvec3 n) {
                   v3_mad(v3_cross(c[2], c[0]), n.y, v3_scale(v3_cross(c[0], c[1]), n.z)));
 }
 
-/* What normals of the lanes are multiplied by to be unit in world space. */
-static vfloat world_normal_scale(const struct raw_hit *h, vvec3 n, vmask lanes) {
-    const vvec3 world = transform_normal(&h->m, n);
-    return vf_select(lanes, vf_divide(vf_one(), vf_sqrt(v3_dot(world, world))), vf_one());
+/* The sum of the corners' normals, each made unit in world space. */
+static vvec3 sum_in_world(const struct trc_surface *s, const struct raw_hit *h) {
+    const vfloat weight[3] = {vf_one() - s->u - s->v, s->u, s->v};
+    vvec3 sum = v3_zero();
+    for (int k = 0; k < 3; k++) {
+        const vvec3 n = h->n.corner[k], world = transform_normal(&h->m, n);
+        sum = v3_mad(n, vf_divide(weight[k], vf_sqrt(v3_dot(world, world))), sum);
+    }
+    return sum;
 }
 
 /* The height of a point below the plane through a corner that is normal to its normal, at least 0;
@@ -216,16 +221,15 @@ static void set_normals(struct trc_surface *s, const struct raw_hit *h, vvec3 e1
     s->backfacing = vf_lt(v3_dot(ng, s->wo), vf_zero());
     const vfloat side = vf_select(s->backfacing, vf_set(-1.0f), vf_one());
     if (vm_any(h->smooth)) {
-        vfloat weight[3] = {vf_one() - s->u - s->v, s->u, s->v};
-        const vmask in_world = vm_and(h->world_normals, s->active);
-        for (int k = 0; k < 3 && vm_any(in_world); k++)
-            weight[k] = weight[k] * world_normal_scale(h, h->n.corner[k], in_world);
-        vvec3 sum = v3_mad(h->n.corner[0], weight[0],
-                           v3_mad(h->n.corner[1], weight[1], v3_scale(h->n.corner[2], weight[2])));
+        const vfloat w = vf_one() - s->u - s->v;
+        vvec3 sum =
+            v3_mad(h->n.corner[0], w, v3_mad(h->n.corner[1], s->u, v3_scale(h->n.corner[2], s->v)));
         const vvec3 up = trc_transform_vector(&h->m, sum);
         const vfloat turn =
             vf_select(vf_lt(v3_dot(up, ng) * side, vf_zero()), vf_set(-1.0f), vf_one());
         const vfloat height = bulge_of(s, h, v3_scale(e1, turn), v3_scale(e2, turn)) * turn;
+        if (vm_any(vm_and(h->world_normals, s->active)))
+            sum = v3_select(h->world_normals, sum_in_world(s, h), sum);
         sum = v3_normalize(v3_scale(transform_normal(&h->m, sum), sign));
         s->smooth = vm_and(h->smooth, vf_gt(v3_dot(sum, sum), vf_set(0.5f)));
         n = v3_select(s->smooth, sum, ng);
