@@ -150,6 +150,7 @@ class NodeType(IntEnum):
     RAY_PORTAL = 17
     HAIR = 18
     PRINCIPLED_HAIR = 19
+    HUANG_HAIR = 20
     IMAGE = 64
     ENVIRONMENT = 65
     UV_MAP = 66
@@ -1133,6 +1134,14 @@ NODES = {
          ("FLOAT", "melanin_redness"), ("FLOAT", "roughness"), ("FLOAT", "radial_roughness"),
          ("FLOAT", "coat"), ("FLOAT", "ior"), ("FLOAT", "offset"), ("FLOAT", "random_color"),
          ("FLOAT", "random_roughness"), ("FLOAT", "random"), ("TANGENT", "tangent")),
+        (("SHADER", "closure"),)),
+    NodeType.HUANG_HAIR: ("Principled Hair (Huang)",
+        (("COLOR", "color"), ("VECTOR", "absorption"), ("COLOR", "tint"), ("FLOAT", "melanin"),
+         ("FLOAT", "melanin_redness"), ("FLOAT", "roughness"), ("FLOAT", "radial_roughness"),
+         ("FLOAT", "aspect_ratio"), ("FLOAT", "ior"), ("FLOAT", "offset"), ("FLOAT", "random_color"),
+         ("FLOAT", "random_roughness"), ("FLOAT", "random"), ("VECTOR", "major"), ("FLOAT", "reflection"),
+         ("FLOAT", "transmission"), ("FLOAT", "second_reflection"), ("FLOAT", "radius"),
+         ("TANGENT", "tangent")),
         (("SHADER", "closure"),)),
     NodeType.IMAGE: ("Image",
         (("UV", "vector"), ("FLOAT", "blend")),

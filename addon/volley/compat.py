@@ -23,6 +23,9 @@ def _is_buffer(value):
 # Of float32; seen in 5.2, not in 4.3.
 VECTORS_ARE_BUFFERS = _is_buffer(Vector())
 
+# Principled Hair of particle hair takes the Z axis for its normal; seen in 5.2, not in 4.3.
+PARTICLE_HAIR_HAS_NORMALS = bpy.app.version >= (5, 0, 0)
+
 # Render passes were renamed in 5.0, which leaves nothing to look at but the version.
 HAS_LONG_PASS_NAMES = bpy.app.version >= (5, 0, 0)
 

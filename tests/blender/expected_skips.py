@@ -19,6 +19,7 @@ _MERGED = "Musgrave became a part of Noise, whose own cases have its types"
 _OCTAVES = "Voronoi has octaves since 4.0"
 _VELVET = "the Velvet shader gave way to Sheen"
 _SHEEN = "the Sheen shader came with 4.0"
+_HUANG = "Principled Hair has Huang's model since 4.0"
 _FILM = "Principled has a thin film since 4.2"
 _LATER_FILM = "Glass and metals have thin films since 5.0"
 _METALLIC = "the Metallic shader came with 4.3"
@@ -37,6 +38,7 @@ SKIPS = (
     Skip(f"{_TEXTURE}[noise * type *]", None, (4, 1), "the types were the Musgrave texture's"),
     Skip(f"{_SHADER}[sheen *]", None, (4, 0), _SHEEN),
     Skip(f"{_LIGHT}[sheen]", None, (4, 0), _SHEEN),
+    *(Skip(f"{_SHADER}[{what}huang hair *]", None, (4, 0), _HUANG) for what in ("", "strands of ")),
     Skip(f"{_SHADER}[metallic *]", None, (4, 3), _METALLIC),
     Skip(f"{_SHADER}[conductor *]", None, (4, 3), _METALLIC),
     Skip("test_thin_film.py::test_film[*]", None, (4, 2), _FILM),

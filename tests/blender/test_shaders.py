@@ -124,6 +124,18 @@ for _what in ("", STRANDS):
          parametrization=('MELANIN',))
     _add(_what + "principled hair", _PRINCIPLED_HAIR, {"Offset": 0.0},
          None, Absorption_Coefficient=((0.0, 0.0, 0.0), (0.3, 0.6, 1.5)), parametrization=('ABSORPTION',))
+    _HUANG = {"model": 'HUANG', "parametrization": 'ABSORPTION'}
+    _RED = {"Absorption Coefficient": (0.1, 0.3, 0.6)}
+    _add(_what + "huang hair", _PRINCIPLED_HAIR, {**_RED, "Offset": 0.1}, _HUANG, Roughness=(0.1, 0.3, 0.8),
+         Aspect_Ratio=(0.4, 1.0, 1.6))
+    _add(_what + "huang hair", _PRINCIPLED_HAIR, {**_RED, "Roughness": 0.3}, _HUANG, Offset=(-0.2, 0.2),
+         IOR=(1.3, 1.8))
+    _add(_what + "huang hair", _PRINCIPLED_HAIR, {**_RED, "Roughness": 0.3}, _HUANG, Reflection=(0.0, 0.5),
+         Transmission=(0.0, 0.5), Secondary_Reflection=(0.2, 0.5))
+    _add(_what + "huang hair", _PRINCIPLED_HAIR, {}, {"model": 'HUANG', "parametrization": 'COLOR'},
+         Color=(_GOLD, (0.1, 0.3, 0.6)))
+    _add(_what + "huang hair", _PRINCIPLED_HAIR, {"Tint": _PALE}, {"model": 'HUANG', "parametrization": 'MELANIN'},
+         Random_Color=(0.0, 0.9), Random_Roughness=(0.0, 0.8))
 _add("metallic", "ShaderNodeBsdfMetallic", {"Base Color": _GOLD, "Edge Tint": (0.5, 0.7, 0.9)},
      {"fresnel_type": 'F82'}, Roughness=(0.1, 0.4, 0.9), Anisotropy=(0.0, 0.6),
      distribution=('MULTI_GGX', 'BECKMANN'))

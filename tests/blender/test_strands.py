@@ -4,10 +4,13 @@
 import itertools
 import math
 
+import blender as blender_support
 import compare
 import numpy as np
+import pytest
 
 SAMPLES = 64
+SINCE = (4, 0), "Huang's model came with 4.0"
 # Beyond the noise that the seeds show, of pictures' means and of tiles' (see compare.unexplained): nothing is seen.
 OFF = 1e-4, 1e-3
 TUBE_OFF = 1e-3, 2e-3  # of normals of 3D curves, whose pieces are straight
@@ -472,17 +475,41 @@ def inside_bounces():
     scenes.light_world((0.6, 0.7, 0.8))
     _haired(count=60, radius_scale=0.15)
     tree, pictures = bpy.data.materials["Hair"].node_tree, {}
-    for name in ("Reflection", "Transmission", "Principled"):
-        node = tree.nodes.new("ShaderNodeBsdfHairPrincipled" if name == "Principled" else "ShaderNodeBsdfHair")
+    for name in ("Reflection", "Transmission", "Principled", "Huang"):
+        is_principled = name in ("Principled", "Huang")
+        node = tree.nodes.new("ShaderNodeBsdfHairPrincipled" if is_principled else "ShaderNodeBsdfHair")
+        if name == "Huang" and not hasattr(node, "model"):  # came with 4.0
+            continue
         node.inputs["Color"].default_value = (0.9, 0.8, 0.7, 1.0)
-        if name != "Principled":
+        if not is_principled:
             node.component = name
         elif hasattr(node, "model"):
-            node.model = 'CHIANG'
+            node.model = 'HUANG' if name == "Huang" else 'CHIANG'
         tree.links.new(node.outputs[0], tree.nodes["Material Output"].inputs["Surface"])
         for limit, count in itertools.product(LIMITS, (0, 1)):
             pictures[f"{name}, {limit} {count}"] = [_limited(scene, engine, limit, count)
                                                     for engine in ('VOLLEY', 'CYCLES')]
+    return pictures
+
+
+def inside_ellipses():
+    """Curves of Huang's model that are flat across, turned and with normals of their own: {name: both}."""
+    import bpy
+    import scenes
+    scenes.empty(size=(64, 48))
+    scenes.camera(location=(0.0, -7.0, 0.0))
+    scenes.light('SUN', energy=3.0, angle=0.2, rotation=(0.9, 0.3, 0.2))
+    scenes.world_color(bpy.context.scene.world, (0.3, 0.4, 0.5))
+    scenes.wall("Back", 20.0, 4.0, material=scenes.emitter((0.1, 0.2, 0.1), "Green"))
+    settings = {"model": 'HUANG', "parametrization": 'ABSORPTION'}
+    material = scenes.material("Flat", "ShaderNodeBsdfHairPrincipled", settings, Aspect_Ratio=0.3, Roughness=0.3,
+                               Absorption_Coefficient=(0.1, 0.3, 0.6))
+    made = _curves(material)
+    pictures = {}
+    for shape, turn in itertools.product(('THICK', 'RIBBONS'), ((0.0, 0.0, 0.0), (0.4, 0.9, -0.5))):
+        bpy.context.scene.cycles_curves.shape = shape
+        made.rotation_euler = turn
+        pictures[f"{shape} turned by {turn}"] = _both()
     return pictures
 
 
@@ -528,6 +555,13 @@ def test_curves_and_points(blender):
     _agree(blender.run(inside_points))
 
 
+@pytest.mark.since(*SINCE)
+def test_elliptic_strands(blender):
+    if blender_support.version() < SINCE[0]:
+        pytest.skip(SINCE[1])
+    _agree(blender.run(inside_ellipses), PASS_OFF)
+
+
 def test_shapes_are_those_of_the_scene_that_is_rendered(blender):
     pictures = blender.run(inside_shapes)
     shown = list(pictures.values())
@@ -553,7 +587,8 @@ def test_bounces(blender):
     _agree(pictures, PASS_OFF)
     means = {name: theirs.mean() for name, (_, theirs) in pictures.items()}
     gains = {name: means[f"{name} 1"] / means[f"{name} 0"] for name in
-             ("Reflection, glossy_bounces", "Transmission, transmission_bounces", "Principled, transmission_bounces")}
+             ("Reflection, glossy_bounces", "Transmission, transmission_bounces", "Principled, transmission_bounces",
+              "Huang, glossy_bounces") if f"{name} 0" in means}
     assert min(gains.values()) > 1.01, gains
 
 

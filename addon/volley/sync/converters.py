@@ -17,7 +17,7 @@ from ..compat import IES_ENDS, TRANSFORMS_NORMALS
 from . import ies, working_space
 from .instance import NO_PARTICLE_RANDOM, VALUES_LOCATION, VALUES_PARTICLE, VALUES_SPIN, VALUES_VELOCITY
 from .node_list import named_outputs, output
-from .strands import DIRECTION_ATTRIBUTE, HAIR_ATTRIBUTE
+from .strands import DIRECTION_ATTRIBUTE, HAIR_ATTRIBUTE, NORMAL_ATTRIBUTE
 from .values import CONSTANT, DEFAULT, Value
 
 
@@ -319,6 +319,17 @@ def _strand_values(walker):
 def strand_random(walker):
     """The number of its own that a strand has."""
     return _strand_values(walker)[3]
+
+
+def strand_radius(walker):
+    """Half the thickness, in object space."""
+    return _number(walker, Math.MULTIPLY, _strand_values(walker)[2], _constant('f', 0.5))
+
+
+def strand_normal(walker):
+    """The normals of a Curves object, 0 of hair that has none."""
+    walker.flat.color_names.add(NORMAL_ATTRIBUTE)
+    return Value('v', walker.emit(NodeType.COLOR_ATTRIBUTE, (), name=NORMAL_ATTRIBUTE), 0)
 
 
 def _hair_info(walker, node, _sockets):

@@ -18,7 +18,7 @@ from ..abi import (BlendMode, BumpMode, ClampType, DiffuseModel, DistributionTyp
 from ..compat import (HAS_CORRELATED_MICROFACETS, HAS_FILMED_METAL, HAS_UNIT_NORMALS, HAS_WHOLE_COAT,
                       KEEPS_DIFFUSE_ENERGY, LEAVES_BUMPS, RAMP_STEPS, SCALES_NORMAL_MAPS, TURNS_WINDOW_BUMPS)
 from . import tangents
-from .converters import CONVERTERS, instance_value, strand_random
+from .converters import CONVERTERS, instance_value, strand_normal, strand_radius, strand_random
 from .derived import ISLAND, POINTINESS
 from .image import image_color
 from .instance import VALUES_GENERATED, VALUES_UV
@@ -363,20 +363,28 @@ def _sheen(walker, node, sockets):
 
 
 def _principled_hair(walker, node, sockets):
-    """Principled Hair by Chiang's model; Huang's of Blender 4 is named in a warning. Strands that are given no
-    number have their own."""
-    if getattr(node, "model", 'CHIANG') != 'CHIANG':
-        walker.warn("Principled Hair BSDF: Huang's model is approximated by Chiang's")
-    values = {name.lower().replace(" ", "_"): sockets.get('f', name) for name in (
-        "Melanin", "Melanin Redness", "Roughness", "Radial Roughness", "Coat", "IOR", "Offset", "Random Color",
-        "Random Roughness")}
+    """Principled Hair by Chiang's model, or by Huang's of Blender 4. Strands that are given no number have their
+    own."""
+    def numbers(*names):
+        return {name.lower().replace(" ", "_"): sockets.get('f', name) for name in names}
+    values = numbers("Melanin", "Melanin Redness", "Roughness", "Radial Roughness", "IOR", "Offset", "Random Color",
+                     "Random Roughness")
     values.update(color=sockets.get('c', "Color"), tint=sockets.get('c', "Tint"),
                   absorption=sockets.get('v', "Absorption Coefficient"),
                   random=sockets.get('f', "Random") if sockets.is_linked("Random") else strand_random(walker),
                   tangent=absent('v'))
-    index = walker.emit(NodeType.PRINCIPLED_HAIR, arranged(NodeType.PRINCIPLED_HAIR, values),
-                        Pigment[node.parametrization])
-    return {"BSDF": Value('s', index, 0)}
+    if getattr(node, "model", 'CHIANG') == 'HUANG':
+        kind = NodeType.HUANG_HAIR
+        values.update(numbers("Aspect Ratio"))
+        aspect = values["aspect_ratio"]
+        is_round = aspect.node == CONSTANT and aspect.constant[0] == 1.0
+        values.update(major=_constant('v', 0.0) if is_round else strand_normal(walker),
+                      radius=strand_radius(walker), reflection=sockets.get('f', "R lobe"),
+                      transmission=sockets.get('f', "TT lobe"), second_reflection=sockets.get('f', "TRT lobe"))
+    else:
+        kind = NodeType.PRINCIPLED_HAIR
+        values.update(numbers("Coat"))
+    return {"BSDF": Value('s', walker.emit(kind, arranged(kind, values), Pigment[node.parametrization]), 0)}
 
 
 def _ray_portal(walker, _node, sockets):

@@ -7,12 +7,13 @@ import bpy
 import numpy as np
 
 from .. import abi
-from ..compat import VECTORS_ARE_BUFFERS
+from ..compat import PARTICLE_HAIR_HAS_NORMALS, VECTORS_ARE_BUFFERS
 from . import curves
 from .mesh import active_color_name, attribute_colors, wanted_uv_layers
 
 HAIR_ATTRIBUTE = ".hair"  # (intercept, length, thickness, random) of the Hair Info node
 DIRECTION_ATTRIBUTE = ".strand"  # (x, y, z) along the strand, unit, and 1
+NORMAL_ATTRIBUTE = ".normal"  # (x, y, z) of Curves objects' points in object space, and 1
 
 _DEFAULT_RADIUS = 0.005      # m; Cycles' of curves without the attribute
 _DEFAULT_POINT_RADIUS = 0.01
@@ -84,6 +85,9 @@ class Hair:
         real, modifier = self._find(instance)
         values = _root_values(real.data, modifier, _shown_strands(modifier.particle_system),
                               self._wanted.uv_names, self._wanted.color_names)
+        if PARTICLE_HAIR_HAS_NORMALS and NORMAL_ATTRIBUTE in self._wanted.color_names:
+            rows = np.tile(np.array((0.0, 0.0, 1.0, 1.0), np.float32), (len(strands.lengths), 1))
+            values.append((NORMAL_ATTRIBUTE, rows, True))
         is_kept = strands.keys_kept()
         strands = strands.only(is_kept)
         generated = None
@@ -194,6 +198,11 @@ def _object_values(data, uv_names, color_names):
             values = np.empty((len(attribute.data), 2), np.float32)
             attribute.data.foreach_get("vector", values.reshape(-1))
             found.append((attribute.name, values, attribute.domain == 'CURVE'))
+    if NORMAL_ATTRIBUTE in color_names and hasattr(data, "normals"):  # not of point clouds
+        normals, rows = np.empty((len(data.normals), 3), np.float32), np.ones((len(data.normals), 4), np.float32)
+        data.normals.foreach_get("vector", normals.reshape(-1))
+        rows[:, :3] = normals
+        found.append((NORMAL_ATTRIBUTE, rows, False))
     for name in sorted(color_names):
         attribute = data.attributes.get(name)
         values = None if attribute is None else attribute_colors(attribute)

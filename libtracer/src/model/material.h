@@ -74,7 +74,7 @@ enum {
     TRC_MATERIAL_EMISSION_VARIES = 1 << 10, /* emission depends on the program */
     TRC_MATERIAL_READS_LIGHT_PATH = 1 << 11,
     TRC_MATERIAL_READS_FOOTPRINT = 1 << 12, /* an image has smaller levels */
-    TRC_MATERIAL_READS_PIXEL = 1 << 13,     /* it has slopes of heights */
+    TRC_MATERIAL_READS_PIXEL = 1 << 13,     /* it has slopes of heights, or strands across pixels */
     TRC_MATERIAL_HAS_PORTAL = 1 << 14,      /* rays go on elsewhere; shadow rays end */
     TRC_MATERIAL_TRACES_RAYS = 1 << 15,     /* its program does */
     TRC_MATERIAL_LIT_BELOW = 1 << 16,       /* light is sampled on both sides of the surface */

@@ -110,6 +110,15 @@ static uint32_t layered_principled_bits(uint32_t mode, const struct trc_operand 
     return has;
 }
 
+/* Elliptic strands are clear where a ray passes them; how much a pixel sees of their width counts.
+ */
+static uint32_t huang_hair_bits(const struct trc_operand *in) {
+    const struct trc_operand aspect = in[TRC_AT(HUANG_HAIR, aspect_ratio)];
+    const bool is_round = trc_is_constant(aspect) && aspect.value == 1.0f;
+    return TRC_MATERIAL_HAS_GLOSSY | TRC_MATERIAL_HAS_REFRACTION | TRC_MATERIAL_READS_PIXEL |
+           (is_round ? 0u : TRC_MATERIAL_HAS_TRANSPARENCY);
+}
+
 static uint32_t leaf_bits(const struct trc_leaf *leaf, const struct trc_operand *in) {
     switch (leaf->type) {
 #define TRC_CLOSURE(NAME, lobes, branches) \

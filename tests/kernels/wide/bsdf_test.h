@@ -249,6 +249,24 @@ static inline struct model principled_hair(float absorption, float roughness, fl
     return m;
 }
 
+/* factors: of R, TT and TRT. */
+static inline struct model huang_hair(float absorption, float roughness, float aspect,
+                                      const float factors[3]) {
+    struct model m;
+    begin(&m, "Principled Hair (Huang)", TRC_NODE_HUANG_HAIR, TRC_PIGMENT_ABSORPTION,
+          TRC_AT(HUANG_HAIR, end));
+    set3(&m, TRC_AT(HUANG_HAIR, absorption), absorption, absorption, absorption);
+    set(&m, TRC_AT(HUANG_HAIR, roughness), roughness);
+    set(&m, TRC_AT(HUANG_HAIR, aspect_ratio), aspect);
+    set(&m, TRC_AT(HUANG_HAIR, ior), 1.55f);
+    set(&m, TRC_AT(HUANG_HAIR, random), 0.5f);
+    set(&m, TRC_AT(HUANG_HAIR, reflection), factors[0]);
+    set(&m, TRC_AT(HUANG_HAIR, transmission), factors[1]);
+    set(&m, TRC_AT(HUANG_HAIR, second_reflection), factors[2]);
+    set3(&m, TRC_AT(HUANG_HAIR, tangent), 0.6f, 0.8f, 0.0f);
+    return m;
+}
+
 /* ---- a shading point ---- */
 
 static inline vvec3 wide(double x, double y, double z) {

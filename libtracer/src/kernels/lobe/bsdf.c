@@ -90,18 +90,19 @@ void trc_bsdf_eval(const struct trc_lobes *l, const struct trc_surface *s, vvec3
 
 /* Of a lobe of hair, in lanes that it was chosen in. */
 static void take_sampled(const struct trc_lobe *lobe, const struct trc_surface *s, vvec3 wi,
-                         vmask lanes, struct lobe_value *r) {
-    const struct lobe_value own = lobe->model->sampled(lobe, s, wi);
+                         const struct trc_draw *draw, vmask lanes, struct lobe_value *r) {
+    const struct lobe_value own = lobe->model->sampled(lobe, s, wi, draw);
     r->value = v3_select(lanes, own.value, r->value);
     r->pdf = vf_select(lanes, own.pdf, r->pdf);
     r->pick = vf_select(lanes, own.pick, r->pick);
     r->claim = vf_select(lanes, own.claim, r->claim);
 }
 
-/* Sums over the lobes for a sampled rough direction; chosen: the number of the lobe, read if rare,
- * which is as above. */
+/* Sums over the lobes for a sampled rough direction; chosen: the number of the lobe, draw: what it
+ * was sampled by; both are read if rare, which is as above. */
 TRC_INLINE void weigh_direction(const struct trc_lobes *l, const struct trc_surface *s,
-                                vmask active, vint chosen, bool rare, struct trc_bsdf_sample *out) {
+                                vmask active, vint chosen, const struct trc_draw *draw, bool rare,
+                                struct trc_bsdf_sample *out) {
     vmask above, below;
     sides(l, s, out->wi, active, &above, &below);
     const bool any_above = vm_any(above), any_below = vm_any(below);
@@ -116,7 +117,7 @@ TRC_INLINE void weigh_direction(const struct trc_lobes *l, const struct trc_surf
         const vmask side = hair ? active : up ? above : below;
         struct lobe_value r = value_of(l, lobe, s, out->wi, side, rare);
         if (hair && lobe->model->sampled)
-            take_sampled(lobe, s, out->wi, vm_and(active, vi_eq(chosen, vi_set(i))), &r);
+            take_sampled(lobe, s, out->wi, draw, vm_and(active, vi_eq(chosen, vi_set(i))), &r);
         value = v3_add(value, r.value);
         pdf = pdf + r.pdf * lobe->sample_weight;
         claimed = claimed + r.claim * lobe->mix_weight;
@@ -192,6 +193,7 @@ TRC_INLINE void sample_lobes(const struct trc_lobes *l, const struct trc_surface
                              vfloat u1, vfloat u2, bool rare, struct trc_bsdf_sample *out) {
     clear_sample(out);
     vint chosen = vi_set(-1);
+    struct trc_draw draw = {u1, u2, vf_zero()};
     vmask waiting = vm_and(s->active, vf_gt(l->continue_weight, vf_zero()));
     vmask rough = vm_none();
     vfloat rest = u_lobe * l->continue_weight;
@@ -231,12 +233,14 @@ TRC_INLINE void sample_lobes(const struct trc_lobes *l, const struct trc_surface
             out->transmitted = vm_or(out->transmitted, crosses);
             const bool hair = rare && is_hair(lobe->kind);
             rough = vm_or(rough, hair ? alive : vm_select(crosses, below, above));
-            if (hair)
+            if (hair) {
                 chosen = vi_select(spread, vi_set(i), chosen);
+                draw.chosen_at = vf_select(spread, chosen_at, draw.chosen_at);
+            }
         }
     }
     if (vm_any(rough))
-        weigh_direction(l, s, rough, chosen, rare, out);
+        weigh_direction(l, s, rough, chosen, &draw, rare, out);
 }
 
 static __attribute__((noinline)) void sample_rare(const struct trc_lobes *l,

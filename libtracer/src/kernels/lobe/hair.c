@@ -69,7 +69,9 @@ static struct lobe_value reflection_value(const struct trc_lobe *lobe, const str
 }
 
 static struct lobe_value reflection_sampled(const struct trc_lobe *lobe,
-                                            const struct trc_surface *s, vvec3 wi) {
+                                            const struct trc_surface *s, vvec3 wi,
+                                            const struct trc_draw *draw) {
+    (void)draw;
     const struct fibre_angles a = angles_of(lobe, s->wo, wi);
     return lobe_value_of(lobe, a.upright,
                          reflected_around(lobe, a.phi) * density_along(lobe, s->wo, &a));
@@ -90,7 +92,9 @@ static struct lobe_value transmission_value(const struct trc_lobe *lobe,
 }
 
 static struct lobe_value transmission_sampled(const struct trc_lobe *lobe,
-                                              const struct trc_surface *s, vvec3 wi) {
+                                              const struct trc_surface *s, vvec3 wi,
+                                              const struct trc_draw *draw) {
+    (void)draw;
     const struct fibre_angles a = angles_of(lobe, s->wo, wi);
     return lobe_value_of(lobe, a.upright, transmitted_density(lobe, s->wo, &a));
 }

@@ -29,6 +29,11 @@ TRC_INLINE struct lobe_value value_where(vmask m, struct lobe_value r) {
                                vf_where(m, r.claim)};
 }
 
+/* The numbers that a direction was sampled by, as trc_lobe_model.direction has them. */
+struct trc_draw {
+    vfloat u1, u2, chosen_at;
+};
+
 /* The functions of a lobe. Those of the lanes of a group are the same. */
 struct trc_lobe_model {
     enum trc_lobe_kind kind;
@@ -37,9 +42,10 @@ struct trc_lobe_model {
     bool is_portal;
     /* Towards wi; lanes of the wrong side are dropped by the caller. NULL: straight through. */
     struct lobe_value (*value)(const struct trc_lobe *lobe, const struct trc_surface *s, vvec3 wi);
-    /* Of hair: the same of a direction that this lobe has sampled. NULL: no other. */
-    struct lobe_value (*sampled)(const struct trc_lobe *lobe, const struct trc_surface *s,
-                                 vvec3 wi);
+    /* Of hair: the same of a direction that this lobe has sampled by those numbers. NULL: no
+     * other. */
+    struct lobe_value (*sampled)(const struct trc_lobe *lobe, const struct trc_surface *s, vvec3 wi,
+                                 const struct trc_draw *draw);
     /* A direction of the lobe's density, of those that rays are continued for and that are not
      * always ideal. chosen_at, evenly below its sample_weight, decides between paired lobes. Lanes
      * leave *alive where total reflection leaves none, or where it is on the wrong side: other

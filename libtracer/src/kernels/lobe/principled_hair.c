@@ -14,50 +14,18 @@
  * normal of the ray outside and inside; multi_weight: the albedo. */
 #include "kernels/lobe/microfacet.h"
 
+#include "kernels/lobe/fibre.h"
 #include "kernels/lobe/lobe.h"
 
 enum { PATH_R, PATH_TT, PATH_TRT, PATH_REST, PATH_COUNT };
 
-/* Roughnesses are at least this (Cycles). */
-#define MIN_ROUGHNESS 1e-3f
 #define MIN_IOR 1e-5f
-/* What melanin leaves of 1 is at least this: its concentration is finite (Cycles). */
-#define MIN_LEFT 1e-4f
-/* Of random numbers whose logarithm is taken (Cycles). */
-#define MIN_RANDOM 1e-5f
 /* sqrt(pi / 8): of a normal distribution's width, that of the logistic one that is like it. */
 #define SQRT_PI_8 0.626657069f
 /* Albedos of whose paths inside all is kept would be infinite. */
 #define MAX_KEPT 0.99999f
 
 /* ---- distributions ---- */
-
-/* exp(-x) times the modified Bessel function of order 0, x >= 0: M. Abramowitz and I. Stegun,
- * "Handbook of Mathematical Functions" (1964), 9.8.1 and 9.8.2, within 2e-7. */
-static vfloat scaled_bessel(vfloat x) {
-    static const float near[] = {0.0045813f, 0.0360768f, 0.2659732f, 1.2067492f,
-                                 3.0899424f, 3.5156229f, 1.0f};
-    static const float far[] = {0.00392377f,  -0.01647633f, 0.02635537f, -0.02057706f, 0.00916281f,
-                                -0.00157565f, 0.00225319f,  0.01328592f, 0.39894228f};
-    const vfloat bound = vf_set(3.75f);
-    const vfloat inside = vf_min(x, bound) / bound, square = inside * inside;
-    const vfloat beyond = bound / vf_max(x, bound);
-    vfloat a = vf_zero(), b = vf_zero();
-    for (size_t i = 0; i < sizeof near / sizeof near[0]; i++)
-        a = a * square + vf_set(near[i]);
-    for (size_t i = 0; i < sizeof far / sizeof far[0]; i++)
-        b = b * beyond + vf_set(far[i]);
-    return vf_select(vf_lt(x, bound), a * vf_exp(-vf_min(x, bound)), b / vf_sqrt(vf_max(x, bound)));
-}
-
-/* Along the strand, of variance v; its exponent is that of the distance between both directions, in
- * which nothing cancels. */
-static vfloat longitudinal(vfloat sin_i, vfloat cos_i, vfloat sin_o, vfloat cos_o, vfloat v) {
-    const vfloat across = cos_i - cos_o, along = sin_i + sin_o, half = vf_set(0.5f);
-    const vfloat distance = half * (across * across + along * along) / v;
-    const vfloat norm = v * (vf_one() - vf_exp(vf_set(-2.0f) / v));
-    return scaled_bessel(cos_i * cos_o / v) * vf_exp(-distance) / norm;
-}
 
 /* Around the strand at x from the middle, of scale s, over one turn. */
 static vfloat azimuthal(vfloat x, vfloat s) {
@@ -145,7 +113,7 @@ static struct lobe_value value(const struct trc_lobe *lobe, const struct trc_sur
     vvec3 sum = v3_zero();
     vfloat pdf = vf_zero();
     for (int p = 0; p < PATH_COUNT; p++) {
-        vfloat part = longitudinal(sin_i, cos_i, f.sin_o[p], f.cos_o[p], f.variance[p]);
+        vfloat part = trc_along_strand(sin_i, cos_i, f.sin_o[p], f.cos_o[p], f.variance[p]);
         part = part * (p == PATH_REST ? vf_set(0.5f * TRC_INV_PI)
                                       : azimuthal(phi - f.turn[p], lobe->alpha_y));
         sum = v3_mad(f.attenuation[p], part, sum);
@@ -154,14 +122,15 @@ static struct lobe_value value(const struct trc_lobe *lobe, const struct trc_sur
     return (struct lobe_value){v3_mul(lobe->weight, sum), pdf, pdf, pdf};
 }
 
-/* What light samples get in Cycles 5: on faces nothing where the face's normal and the one across
- * the strand and wo, which it takes for the lobe's own, disagree on the side. */
 static struct lobe_value sided_value(const struct trc_lobe *lobe, const struct trc_surface *s,
                                      vvec3 wi) {
-    const vvec3 across = v3_cross(lobe->tangent, s->wo);
-    const vfloat agreement = v3_dot(s->n, wi) * v3_dot(s->n, across) * v3_dot(across, wi);
-    const vmask lit = vm_or(vf_ge(agreement, vf_zero()), trc_on_strand(s));
-    return value_where(lit, value(lobe, s, wi));
+    return value_where(trc_fibre_lit(lobe->tangent, s, wi), value(lobe, s, wi));
+}
+
+static struct lobe_value sampled_value(const struct trc_lobe *lobe, const struct trc_surface *s,
+                                       vvec3 wi, const struct trc_draw *draw) {
+    (void)draw;
+    return value(lobe, s, wi);
 }
 
 static vvec3 direction(const struct trc_lobe *lobe, const struct trc_surface *s, vfloat u1,
@@ -192,15 +161,7 @@ static vvec3 direction(const struct trc_lobe *lobe, const struct trc_surface *s,
         waiting = vm_andnot(waiting, m);
         rest = rest - f.chance[p];
     }
-    /* 1 less the cosine of how far it is off, along the strand and around an axis of it. */
-    const vfloat tail = vf_exp(vf_set(-2.0f) / v);
-    u = vf_clamp(u, MIN_RANDOM, 1.0f);
-    const vfloat off = vf_clamp(-v * vf_log(u + (one - u) * tail), 0.0f, 2.0f);
-    vfloat unused, cosine;
-    vf_sincos_turns(u2, &unused, &cosine);
-    const vfloat sin_i =
-        vf_clamp((off - one) * sin_o + vf_safe_sqrt(off * (vf_set(2.0f) - off)) * cosine * cos_o,
-                 -1.0f, 1.0f);
+    const vfloat sin_i = trc_along_strand_sampled(sin_o, cos_o, v, u, u2);
     const vfloat cos_i = vf_safe_sqrt(one - sin_i * sin_i);
     vfloat sin_phi, cos_phi;
     vf_sincos(phi, &sin_phi, &cos_phi);
@@ -234,44 +195,19 @@ static vfloat scale_of(vfloat roughness) {
            (vf_set(0.265f) * r + vf_set(1.194f) * r2 + vf_set(5.372f) * power_20(r) * r2);
 }
 
-/* Equation 9: how the albedo's logarithm grows with the root of the absorption. */
-static vfloat albedo_scale(vfloat roughness) {
-    static const float terms[] = {0.245f, 5.574f, -10.73f, 2.532f, -0.215f, 5.969f};
-    vfloat sum = vf_zero();
-    for (size_t i = 0; i < sizeof terms / sizeof terms[0]; i++)
-        sum = sum * roughness + vf_set(terms[i]);
-    return sum;
-}
-
-static vfloat absorbed(vfloat color, vfloat scale) {
-    return vf_square(vf_log(vf_max(color, vf_zero())) / scale);
-}
-
-static vvec3 absorption_of_color(vvec3 color, vfloat roughness) {
-    const vfloat scale = albedo_scale(roughness);
-    return v3(absorbed(color.x, scale), absorbed(color.y, scale), absorbed(color.z, scale));
-}
-
-/* Absorption by melanin, 0 to 1: E. d'Eon et al. 2011, with B. Bitterli's ratio of both kinds. */
-static vvec3 absorption_of_melanin(vfloat melanin, vfloat redness) {
-    static const float eumelanin[3] = {0.506f, 0.841f, 1.653f};
-    static const float pheomelanin[3] = {0.343f, 0.733f, 1.924f};
-    const vfloat amount = -vf_log(vf_max(vf_one() - melanin, vf_set(MIN_LEFT)));
-    const vfloat brown = amount * (vf_one() - redness), red = amount * redness;
-    return v3_mad(v3_set(eumelanin), brown, v3_scale(v3_set(pheomelanin), red));
-}
-
 static vvec3 absorption_of(const struct trc_setup *c, const struct trc_leaf *leaf,
                            vfloat randomness, vfloat roughness) {
 #define NUMBER(input) number(c, leaf, TRC_AT(PRINCIPLED_HAIR, input))
 #define COLOUR(input) colour(c, leaf, TRC_AT(PRINCIPLED_HAIR, input))
-    if (leaf->mode == TRC_PIGMENT_ABSORPTION)
-        return COLOUR(absorption);
-    if (leaf->mode == TRC_PIGMENT_COLOR)
-        return absorption_of_color(COLOUR(color), roughness);
-    const vfloat factor = vf_one() + randomness * vf_saturate(NUMBER(random_color));
-    return v3_add(absorption_of_melanin(NUMBER(melanin) * factor, NUMBER(melanin_redness)),
-                  absorption_of_color(COLOUR(tint), roughness));
+    const struct trc_strand_pigment pigment = {leaf->mode,
+                                               COLOUR(color),
+                                               COLOUR(absorption),
+                                               COLOUR(tint),
+                                               NUMBER(melanin),
+                                               NUMBER(melanin_redness),
+                                               vf_one() +
+                                                   randomness * vf_saturate(NUMBER(random_color))};
+    return trc_absorption(&pigment, roughness);
 }
 
 static void add_principled_hair(struct trc_setup *c, const struct trc_leaf *leaf, vfloat weight) {
@@ -279,7 +215,7 @@ static void add_principled_hair(struct trc_setup *c, const struct trc_leaf *leaf
         .kind = TRC_LOBE_HAIR_REFLECT, .value = value, .direction = direction};
     static const struct trc_lobe_model sided = {.kind = TRC_LOBE_HAIR_REFLECT,
                                                 .value = sided_value,
-                                                .sampled = value,
+                                                .sampled = sampled_value,
                                                 .direction = direction};
     const bool is_sided = c->material->flags & TRC_MATERIAL_FACET_SHADOWING;
     struct trc_lobe *lobe = trc_add_lobe(c, is_sided ? &sided : &model, v3_splat(weight));
@@ -298,12 +234,14 @@ static void add_principled_hair(struct trc_setup *c, const struct trc_leaf *leaf
     const vfloat randomness = vf_set(2.0f) * NUMBER(random) - one; /* -1 to 1 */
     const vfloat factor = one + randomness * NUMBER(random_roughness);
     const vfloat radial = NUMBER(radial_roughness) * factor;
-    const vfloat rough = vf_clamp(NUMBER(roughness) * factor, MIN_ROUGHNESS, 1.0f);
+    const vfloat rough = vf_clamp(NUMBER(roughness) * factor, TRC_MIN_FIBRE_ROUGHNESS, 1.0f);
     const vfloat coat = vf_saturate(NUMBER(coat));
     lobe->alpha_x = vf_max(variance_of(rough), c->filter_alpha);
     lobe->roughness =
-        vf_max(variance_of(vf_clamp((one - coat) * rough, MIN_ROUGHNESS, 1.0f)), c->filter_alpha);
-    lobe->alpha_y = vf_max(scale_of(vf_clamp(radial, MIN_ROUGHNESS, 1.0f)), c->filter_alpha);
+        vf_max(variance_of(vf_clamp((one - coat) * rough, TRC_MIN_FIBRE_ROUGHNESS, 1.0f)),
+               c->filter_alpha);
+    lobe->alpha_y =
+        vf_max(scale_of(vf_clamp(radial, TRC_MIN_FIBRE_ROUGHNESS, 1.0f)), c->filter_alpha);
     lobe->pair_tint = -vf_sin(NUMBER(offset));
 
     const vvec3 x = lobe->tangent, y = v3_normalize(v3_cross(x, s->wo)), z = v3_cross(x, y);
@@ -321,7 +259,7 @@ static void add_principled_hair(struct trc_setup *c, const struct trc_leaf *leaf
     const vfloat way = vf_divide(vf_set(2.0f) * vf_safe_sqrt(one - h_t * h_t), cos_t);
     lobe->f0 = v3(vf_exp(-sigma.x * way), vf_exp(-sigma.y * way), vf_exp(-sigma.z * way));
 
-    const vfloat scale = albedo_scale(lobe->alpha_x);
+    const vfloat scale = trc_albedo_scale(lobe->alpha_x);
     lobe->multi_weight = v3(vf_exp(-vf_safe_sqrt(sigma.x) * scale) + fresnel,
                             vf_exp(-vf_safe_sqrt(sigma.y) * scale) + fresnel,
                             vf_exp(-vf_safe_sqrt(sigma.z) * scale) + fresnel);
