@@ -310,7 +310,7 @@ enum {
     S = TRC_MATERIAL_HAS_SPECULAR,
     G = TRC_MATERIAL_HAS_GLOSSY,
     R = TRC_MATERIAL_HAS_REFRACTION | TRC_MATERIAL_LIT_BELOW,
-    T = TRC_MATERIAL_HAS_TRANSPARENCY,
+    T = TRC_MATERIAL_HAS_TRANSPARENCY | TRC_MATERIAL_CLEARS_SHADOWS,
     E = TRC_MATERIAL_HAS_EMISSION
 };
 
@@ -392,6 +392,18 @@ static void test_traits_of_simple_shaders(void **state) {
     add(TRC_NODE_HOLDOUT, 0, 0, NULL);
     assert_int_equal(traits(), TRC_MATERIAL_HAS_HOLDOUT);
 
+    /* Ellipses are clear beside themselves, but to shadow rays. */
+    trc_node_input strand[TRC_INPUT_OF(HUANG_HAIR, end)];
+    for (size_t i = 0; i < sizeof strand / sizeof *strand; i++)
+        strand[i] = value(1.0f);
+    graph_clear();
+    add(TRC_NODE_HUANG_HAIR, 0, TRC_INPUT_OF(HUANG_HAIR, end), strand);
+    assert_int_equal(traits(), G | R | TRC_MATERIAL_READS_PIXEL);
+    strand[TRC_INPUT_OF(HUANG_HAIR, aspect_ratio)] = value(0.5f);
+    graph_clear();
+    add(TRC_NODE_HUANG_HAIR, 0, TRC_INPUT_OF(HUANG_HAIR, end), strand);
+    assert_int_equal(traits(), G | R | TRC_MATERIAL_READS_PIXEL | TRC_MATERIAL_HAS_TRANSPARENCY);
+
     /* Of what cuts out, transparency alone is left. */
     graph_clear();
     graph.flags = TRC_MATERIAL_CUTS_OUT;
@@ -400,7 +412,8 @@ static void test_traits_of_simple_shaders(void **state) {
     assert_int_equal(traits(), TRC_MATERIAL_HAS_HOLDOUT);
     const int32_t clear = ADD(TRC_NODE_TRANSPARENT, 0, white);
     ADD(TRC_NODE_ADD_SHADER, 0, link_to(light, 0), link_to(clear, 0));
-    assert_int_equal(traits(), TRC_MATERIAL_HAS_HOLDOUT | TRC_MATERIAL_HAS_TRANSPARENCY);
+    assert_int_equal(traits(), TRC_MATERIAL_HAS_HOLDOUT | TRC_MATERIAL_HAS_TRANSPARENCY |
+                                   TRC_MATERIAL_CLEARS_SHADOWS);
     graph.flags = 0;
     graph_clear();
     ADD(TRC_NODE_BACKGROUND, 0, white, value(2));

@@ -78,6 +78,7 @@ enum {
     TRC_MATERIAL_HAS_PORTAL = 1 << 14,      /* rays go on elsewhere; shadow rays end */
     TRC_MATERIAL_TRACES_RAYS = 1 << 15,     /* its program does */
     TRC_MATERIAL_LIT_BELOW = 1 << 16,       /* light is sampled on both sides of the surface */
+    TRC_MATERIAL_CLEARS_SHADOWS = 1 << 17,  /* it is transparent to shadow rays, too */
     /* Lobes that no ray is continued for: only samples of lights bring them light. */
     TRC_MATERIAL_IS_MATT = TRC_MATERIAL_HAS_DIFFUSE | TRC_MATERIAL_HAS_TRANSLUCENT,
     /* All lobes that light samples light. */
@@ -108,7 +109,7 @@ struct trc_material {
 
 /* Whether shadow rays may pass it. */
 static inline uint8_t trc_material_shadows_transparent(const struct trc_material *m) {
-    return (m->has & TRC_MATERIAL_HAS_TRANSPARENCY) && (m->flags & TRC_MATERIAL_TRANSPARENT_SHADOW);
+    return (m->has & TRC_MATERIAL_CLEARS_SHADOWS) && (m->flags & TRC_MATERIAL_TRANSPARENT_SHADOW);
 }
 
 #endif

@@ -110,8 +110,8 @@ static uint32_t layered_principled_bits(uint32_t mode, const struct trc_operand 
     return has;
 }
 
-/* Elliptic strands are clear where a ray passes them; how much a pixel sees of their width counts.
- */
+/* Elliptic strands are clear where a ray passes them, but for shadow rays; how much a pixel sees of
+ * their width counts. */
 static uint32_t huang_hair_bits(const struct trc_operand *in) {
     const struct trc_operand aspect = in[TRC_AT(HUANG_HAIR, aspect_ratio)];
     const bool is_round = trc_is_constant(aspect) && aspect.value == 1.0f;
@@ -227,11 +227,14 @@ void trc_build_traits(const struct trc_build *b, struct trc_material *m) {
         const struct trc_operand *in = b->leaf_operands + leaf->first_operand;
         const uint32_t has = leaf_bits(leaf, in);
         m->has |= has | (is_lit_below(leaf, has, m->flags) ? TRC_MATERIAL_LIT_BELOW : 0u);
+        if ((has & TRC_MATERIAL_HAS_TRANSPARENCY) && leaf->type != TRC_NODE_HUANG_HAIR)
+            m->has |= TRC_MATERIAL_CLEARS_SHADOWS;
         m->branch_count += leaf_branches(leaf, in);
         add_emission(leaf, in, m);
     }
     if (m->flags & TRC_MATERIAL_CUTS_OUT) {
-        m->has = TRC_MATERIAL_HAS_HOLDOUT | (m->has & TRC_MATERIAL_HAS_TRANSPARENCY);
+        m->has = TRC_MATERIAL_HAS_HOLDOUT |
+                 (m->has & (TRC_MATERIAL_HAS_TRANSPARENCY | TRC_MATERIAL_CLEARS_SHADOWS));
         m->branch_count = 0;
         memset(m->emission, 0, sizeof m->emission);
     }

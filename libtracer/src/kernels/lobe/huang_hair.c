@@ -496,7 +496,10 @@ static void add_huang_hair(struct trc_setup *c, const struct trc_leaf *leaf, vfl
     const vfloat wx = v3_dot(x, s->wo) * inverse * aspect;
     const vfloat wy = v3_dot(v3_cross(z, x), s->wo) * inverse;
     const vfloat radius = vf_sqrt(wx * wx + wy * wy), off = v3_dot(s->ng, across) * inverse;
-    const vmask meets = vm_or(vf_lt(vf_abs(off), radius), vm_not(on_strand));
+    /* To shadow rays strands are round (Cycles). */
+    const vuint shadow = s->path & vu_set(TRC_VISIBLE_SHADOW);
+    const vmask is_round = vm_not(vm_and(on_strand, vi_eq((vint)shadow, vi_set(0))));
+    const vmask meets = vm_or(vf_lt(vf_abs(off), radius), is_round);
     if (vm_any(vm_andnot(s->active, meets)))
         trc_add_transparent(c, v3_splat(vf_where(vm_not(meets), weight)));
     struct trc_lobe *lobe =
