@@ -3,17 +3,16 @@
  * is reflected (R), goes through (TT), comes back from the far side (TRT), or goes on inside (the
  * rest), of which Chiang et al. (2016) sum up the series.
  *
- * Departures: where the paper integrates over the width of the strand, a shading point has a place
- * of its own; where it integrates over paths inside, one is drawn by random numbers of the shading
- * point. The mean over shading points is the integral. As in Cycles the rest is not the same in
- * samples of lights and in sampled directions, and every density counts as 1 where both are weighed
- * against each other.
+ * Departures: where the paper integrates over the width of the strand and paths inside, a few are
+ * drawn by random numbers of the shading point. The mean over shading points is the integral. As in
+ * Cycles the rest is not the same in samples of lights and in sampled directions, and every density
+ * counts as 1 where both are weighed against each other.
  *
  * Of its lobe the tangent is along the strand, alpha_x the roughness of the facets, alpha_y the
  * aspect ratio, roughness the tilt of the scales; g1_o and pair_tint the cosine and sine of the
- * longer axis in v3_frame of the tangent, multi_chance how far the ray passes the middle, over the
- * radius that it sees, -1 to 1, pdf_scale the same for samples of lights; f0 the absorption, f90
- * the factors of R, TT and TRT, multi_weight the albedo. */
+ * longer axis in v3_frame of the tangent; multi_chance how far the ray passes the middle, over the
+ * radius that it sees, -1 to 1, pdf_scale how far on both sides of that samples of lights go; f0
+ * the absorption, f90 the factors of R, TT and TRT, multi_weight the albedo. */
 #include "kernels/lobe/fibre.h"
 
 #include "kernels/lobe/ggx_energy.h"
@@ -30,25 +29,25 @@
 
 enum { PATH_R, PATH_TT, PATH_TRT, PATH_REST, PATH_COUNT };
 
-/* Random numbers of a shading point. Facets: two each. */
-enum {
-    NUMBER_ACROSS,
-    NUMBER_ENTRY, /* samples of lights alone: rays have the sampler's */
-    NUMBER_BACK = NUMBER_ENTRY + 2,
-    NUMBER_EXIT = NUMBER_BACK + 2,
-    NUMBER_REST = NUMBER_EXIT + 2,
-    NUMBER_COUNT = NUMBER_REST + 3
+/* Places of the width, and paths inside, that samples of lights are the mean of. */
+#define PLACES 8
+
+/* Random numbers of a shading point: for its place, for samples of lights, for a direction. */
+enum { OF_PLACE, OF_LIGHTS, OF_DIRECTION };
+struct numbers {
+    vuint word;
 };
 
-static void numbers_of(const struct trc_surface *s, vfloat *out, int count) {
+static struct numbers numbers_of(const struct trc_surface *s, uint32_t use) {
     const vuint of_ray[] = {vf_as_uint(s->wo.x), vf_as_uint(s->wo.y), vf_as_uint(s->wo.z)};
     const vuint key[] = {vf_as_uint(s->p.x), vf_as_uint(s->p.y), vf_as_uint(s->p.z),
                          hash_words(3, of_ray)};
-    vuint word = hash_words(4, key);
-    for (int i = 0; i < count; i++) {
-        word = vu_hash(word + vu_set(0x9e3779b9u));
-        out[i] = vf_min(hash_to_unit(word), vf_set(0x1.fffffep-1f));
-    }
+    return (struct numbers){vu_hash(hash_words(4, key) + vu_set(use))};
+}
+
+static vfloat next_number(struct numbers *n) {
+    n->word = vu_hash(n->word + vu_set(0x9e3779b9u));
+    return vf_min(hash_to_unit(n->word), vf_set(0x1.fffffep-1f));
 }
 
 /* ---- the strand ---- */
@@ -146,6 +145,11 @@ static vvec3 facet(const struct facets *e, vfloat u1, vfloat u2) {
     return v3_from_frame(trc_ggx_sample(o, e->alpha, e->alpha, vf_one(), u1, u2), a, b, e->n);
 }
 
+static vvec3 random_facet(const struct facets *e, struct numbers *random) {
+    const vfloat u = next_number(random);
+    return facet(e, u, next_number(random));
+}
+
 /* What facets that the light sees let go in direction to. */
 static vfloat unmasked(const struct facets *e, vvec3 to) {
     const vfloat lambda_to = lambda_of(e->alpha, v3_dot(e->n, to));
@@ -222,12 +226,10 @@ static vfloat rest_density(const struct fibre *f, const struct place *at, vvec3 
 /* All but R, by one path inside. */
 static vvec3 inner_value(const struct trc_lobe *lobe, const struct trc_surface *s,
                          const struct fibre *f, const struct place *at, const struct facets *entry,
-                         vvec3 wi) {
-    vfloat u[NUMBER_COUNT];
-    numbers_of(s, u, NUMBER_COUNT);
+                         vvec3 wi, struct numbers *random) {
     const vfloat one = vf_one(), rim = v3_dot(at->flat, s->wo);
     vvec3 w;
-    const vvec3 m1 = facet(entry, u[NUMBER_ENTRY], u[NUMBER_ENTRY + 1]);
+    const vvec3 m1 = random_facet(entry, random);
     vmask inside = vm_and(entry->met, trc_refract(entry->from, m1, entry->ior, &w));
     inside = vm_and(inside, vm_and(faces(entry, m1, entry->from), faces(entry, m1, v3_neg(w))));
     const vfloat cos_w = -v3_dot(entry->n, w);
@@ -244,7 +246,7 @@ static vvec3 inner_value(const struct trc_lobe *lobe, const struct trc_surface *
     vvec3 sum = v3_scale(left, lobe->f90.y * through * entering * turned);
 
     if (vm_any(vf_gt(lobe->f90.z, vf_zero()))) {
-        const vvec3 m2 = facet(&back, u[NUMBER_BACK], u[NUMBER_BACK + 1]);
+        const vvec3 m2 = random_facet(&back, random);
         const vfloat reflects = trc_fresnel_dielectric(v3_dot(back.from, m2), back.ior);
         const vvec3 w2 = v3_reflect(back.from, m2);
         const vfloat cos_w2 = v3_dot(back.n, w2);
@@ -272,13 +274,22 @@ static vvec3 inner_value(const struct trc_lobe *lobe, const struct trc_surface *
 static struct lobe_value value(const struct trc_lobe *lobe, const struct trc_surface *s, vvec3 wi) {
     struct fibre f;
     fibre_of(lobe, &f);
-    const struct place at = first_place(&f, s->wo, lobe->pdf_scale);
-    const struct facets entry = facets_at(&f, &at, false, s->wo);
-    vvec3 sum = v3_splat(lobe->f90.x * reflected(&entry, wi, v3_dot(at.flat, s->wo)));
-    if (vm_any(vf_gt(lobe->f90.y + lobe->f90.z, vf_zero())))
-        sum = v3_add(sum, inner_value(lobe, s, &f, &at, &entry, wi));
-    const vfloat one = vf_one();
-    return (struct lobe_value){v3_mul(lobe->weight, sum), one, one, one};
+    struct numbers random = numbers_of(s, OF_LIGHTS);
+    const vfloat one = vf_one(), part = vf_set(1.0f / PLACES);
+    const vfloat low = vf_max(lobe->multi_chance - lobe->pdf_scale, -one);
+    const vfloat width = vf_min(lobe->multi_chance + lobe->pdf_scale, one) - low;
+    const bool goes_in = vm_any(vf_gt(lobe->f90.y + lobe->f90.z, vf_zero()));
+    vvec3 sum = v3_zero();
+    for (int i = 0; i < PLACES; i++) {
+        const vfloat off = low + width * part * (vf_set((float)i) + next_number(&random));
+        const struct place at = first_place(&f, s->wo, vf_clamp(off, -1.0f, 1.0f));
+        const struct facets entry = facets_at(&f, &at, false, s->wo);
+        const vfloat r = lobe->f90.x * reflected(&entry, wi, v3_dot(at.flat, s->wo));
+        sum = v3_add(sum, v3_splat(r));
+        if (goes_in)
+            sum = v3_add(sum, inner_value(lobe, s, &f, &at, &entry, wi, &random));
+    }
+    return (struct lobe_value){v3_mul(lobe->weight, v3_scale(sum, part)), one, one, one};
 }
 
 static struct lobe_value sided_value(const struct trc_lobe *lobe, const struct trc_surface *s,
@@ -294,20 +305,20 @@ struct paths {
 };
 
 /* All directions alike around the strand. */
-static vvec3 rest_direction(const struct fibre *f, vvec3 wo, const vfloat *u) {
+static vvec3 rest_direction(const struct fibre *f, vvec3 wo, struct numbers *random) {
     const vfloat sin_o = vf_clamp(v3_dot(f->z, wo), -1.0f, 1.0f), one = vf_one();
+    const vfloat u1 = next_number(random), u2 = next_number(random);
     const vfloat sine = trc_along_strand_sampled(sin_o, vf_safe_sqrt(one - sin_o * sin_o),
-                                                 rest_variance(f), u[0], u[1]);
+                                                 rest_variance(f), u1, u2);
     vfloat sin_phi, cos_phi;
-    vf_sincos_turns(u[2], &sin_phi, &cos_phi);
+    vf_sincos_turns(next_number(random), &sin_phi, &cos_phi);
     const vvec3 around = v3_mad(f->x, cos_phi, v3_scale(f->y, sin_phi));
     return v3_mad(f->z, sine, v3_scale(around, vf_safe_sqrt(one - sine * sine)));
 }
 
 static void follow(const struct trc_lobe *lobe, const struct trc_surface *s, vfloat u1, vfloat u2,
                    struct paths *out) {
-    vfloat u[NUMBER_COUNT];
-    numbers_of(s, u, NUMBER_COUNT);
+    struct numbers random = numbers_of(s, OF_DIRECTION);
     struct fibre f;
     fibre_of(lobe, &f);
     const vfloat one = vf_one(), zero = vf_zero();
@@ -325,7 +336,7 @@ static void follow(const struct trc_lobe *lobe, const struct trc_surface *s, vfl
     inside = vm_and(inside, faces(&entry, m1, v3_neg(w)));
     const struct place far_side = next_place(&f, at, w, lobe->f0, &left);
     const struct facets back = facets_at(&f, &far_side, true, v3_neg(w));
-    const vvec3 m2 = facet(&back, u[NUMBER_BACK], u[NUMBER_BACK + 1]);
+    const vvec3 m2 = random_facet(&back, &random);
     inside = vm_and(inside, vm_and(back.met, faces(&back, m2, back.from)));
     const vfloat reflects2 = trc_fresnel_dielectric(v3_dot(back.from, m2), back.ior);
     const vfloat entering = (one - reflects1) * entry.gain * unmasked(&entry, w);
@@ -341,7 +352,7 @@ static void follow(const struct trc_lobe *lobe, const struct trc_surface *s, vfl
     const vvec3 w2 = v3_reflect(back.from, m2);
     const struct place near_side = next_place(&f, far_side, w2, lobe->f0, &left_back);
     const struct facets exit = facets_at(&f, &near_side, true, v3_neg(w2));
-    const vvec3 m3 = facet(&exit, u[NUMBER_EXIT], u[NUMBER_EXIT + 1]);
+    const vvec3 m3 = random_facet(&exit, &random);
     inside = vm_and(inside, exit.met);
     const vfloat reflects3 = trc_fresnel_dielectric(v3_dot(exit.from, m3), exit.ior);
     const vvec3 returning =
@@ -360,7 +371,7 @@ static void follow(const struct trc_lobe *lobe, const struct trc_surface *s, vfl
                           vf_sqrt(left.z * left_back.z));
     const vvec3 later = series(v3_scale(mean, out_mean), mean, one - out_mean);
     const vfloat turns = reflects3 * unmasked(&exit, v3_reflect(exit.from, m3));
-    out->wi[PATH_REST] = rest_direction(&f, s->wo, u + NUMBER_REST);
+    out->wi[PATH_REST] = rest_direction(&f, s->wo, &random);
     out->part[PATH_REST] = v3_where(inside, v3_mul(v3_scale(returning, turns), later));
 }
 
@@ -457,17 +468,14 @@ static vvec3 major_axis(const struct trc_setup *c, const struct trc_leaf *leaf, 
 static void set_place(const struct trc_setup *c, const struct trc_leaf *leaf, struct trc_lobe *lobe,
                       vfloat off, vfloat radius) {
     const struct trc_surface *s = c->s;
-    vfloat u;
-    numbers_of(s, &u, 1);
-    const vfloat pixel = vf_divide(vf_set(0.5f) * s->pixel, NUMBER(radius));
+    const vfloat pixel = vf_divide(vf_set(0.5f) * s->pixel, NUMBER(radius)), one = vf_one();
     vmask near = vm_and(vf_gt(NUMBER(radius), vf_zero()), vf_lt(pixel, radius));
     near = vm_and(near, vi_eq(s->depth, vi_set(0)));
-    const vfloat one = vf_one(), at = vf_clamp(vf_divide(off, radius), -1.0f, 1.0f);
-    const vfloat reach = vf_divide(pixel, radius);
-    const vfloat low = vf_select(near, vf_max(at - reach, -one), -one);
-    const vfloat high = vf_select(near, vf_min(at + reach, one), one);
-    lobe->pdf_scale = vf_lerp(low, high, u);
-    lobe->multi_chance = vf_select(near, at, lobe->pdf_scale);
+    struct numbers random = numbers_of(s, OF_PLACE);
+    const vfloat anywhere = vf_set(2.0f) * next_number(&random) - one;
+    const vfloat at = vf_clamp(vf_divide(off, radius), -1.0f, 1.0f);
+    lobe->multi_chance = vf_select(near, at, anywhere);
+    lobe->pdf_scale = vf_select(near, vf_divide(pixel, radius), vf_set(2.0f));
 }
 
 static void add_huang_hair(struct trc_setup *c, const struct trc_leaf *leaf, vfloat weight) {
