@@ -185,7 +185,8 @@ def inside_denoising():
         "Clear", "ShaderNodeBsdfTransparent", Color=(0.5, 0.9, 0.7))
     layer = bpy.context.view_layer
     layer.volley.denoising_store_passes = layer.cycles.denoising_store_passes = True
-    return _both(["Denoising Albedo", "Denoising Normal", "Denoising Depth"], 64)
+    later = ["Denoising Specular Albedo", "Denoising Roughness"] if bpy.app.version >= (5, 2, 0) else []
+    return _both(["Denoising Albedo", "Denoising Normal", "Denoising Depth", *later], 64)
 
 
 def test_denoising_data(blender):
