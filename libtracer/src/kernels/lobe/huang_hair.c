@@ -22,7 +22,8 @@
 #define MIN_ASPECT 1e-2f
 /* Of what light that grazes is divided by. */
 #define MIN_COSINE 1e-6f
-/* Of the rest, whose mean over the strand's width converges slowly there. */
+/* Of what is divided by the cosine to the flat surface, whose mean over the strand's width
+ * converges slowly where that is grazed. */
 #define MIN_RIM 0.02f
 /* What rough facets let out at least, on average (Cycles). */
 #define MIN_LEAVING 1e-5f
@@ -172,7 +173,8 @@ static vfloat reflected(const struct facets *e, vvec3 to, vfloat rim) {
     const vmask seen =
         vm_and(e->met, vm_and(vf_gt(rim, vf_zero()), vf_gt(v3_dot(e->flat, to), vf_zero())));
     const vfloat f = trc_fresnel_dielectric(v3_dot(e->from, m), e->ior);
-    return vf_where(seen, vf_set(0.25f) * f * e->gain * vf_divide(facet_density(e, m, to), rim));
+    return vf_where(seen, vf_set(0.25f) * f * e->gain * facet_density(e, m, to) /
+                              vf_max(rim, vf_set(MIN_RIM)));
 }
 
 /* Of light that goes through to a direction, over cosine (Walter et al. 2007, eq. 21 and 17). */
@@ -219,7 +221,7 @@ static vfloat rest_density(const struct fibre *f, const struct place *at, vvec3 
     const vfloat sin_i = vf_clamp(v3_dot(f->z, wi), -1.0f, 1.0f), one = vf_one();
     const vfloat along = trc_along_strand(sin_i, vf_safe_sqrt(one - sin_i * sin_i), sin_o,
                                           vf_safe_sqrt(one - sin_o * sin_o), rest_variance(f));
-    const vfloat rim = vf_max(v3_dot(at->flat, wo) * at->arc, vf_set(MIN_RIM));
+    const vfloat rim = vf_max(v3_dot(at->flat, wo), vf_set(MIN_RIM)) * at->arc;
     return vf_set(0.5f * TRC_INV_PI * 2.0f * TRC_INV_PI) * along / rim;
 }
 
@@ -237,7 +239,7 @@ static vvec3 inner_value(const struct trc_lobe *lobe, const struct trc_surface *
     const vfloat passes = one - trc_fresnel_dielectric(v3_dot(entry->from, m1), entry->ior);
     const vfloat entering = passes * entry->gain * unmasked(entry, w);
     /* From what the facets see to what meets the strand. */
-    const vfloat turned = vf_divide(entry->cosine, rim * at->arc);
+    const vfloat turned = entry->cosine / (vf_max(rim, vf_set(MIN_RIM)) * at->arc);
 
     vvec3 left, left_back;
     const struct place far_side = next_place(f, *at, w, lobe->f0, &left);
