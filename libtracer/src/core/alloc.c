@@ -10,6 +10,8 @@
 #define ALIGNMENT 64
 /* Of x86 and arm64. */
 #define LARGE_PAGE ((size_t)2 << 20)
+/* Any block of so many takes them: what its alignment may waste is little beside it. */
+#define MANY_LARGE_PAGES 4
 
 /* Stands directly before a block. */
 struct header {
@@ -67,17 +69,25 @@ static void *allocate(size_t count, size_t size, size_t alignment, bool zeroed) 
     return block;
 }
 
-void *trc_alloc(size_t count, size_t size) { return allocate(count, size, ALIGNMENT, false); }
+static void *allocate_large(size_t count, size_t size) {
+    void *block = allocate(count, size, LARGE_PAGE, false);
+    if (block)
+        trc_system_want_large_pages(block, count * size);
+    return block;
+}
+
+void *trc_alloc(size_t count, size_t size) {
+    if (size && count >= MANY_LARGE_PAGES * LARGE_PAGE / size)
+        return allocate_large(count, size);
+    return allocate(count, size, ALIGNMENT, false);
+}
 
 void *trc_alloc_zeroed(size_t count, size_t size) { return allocate(count, size, ALIGNMENT, true); }
 
 void *trc_alloc_large(size_t count, size_t size) {
     if (!size || count < LARGE_PAGE / size)
         return allocate(count, size, ALIGNMENT, false);
-    void *block = allocate(count, size, LARGE_PAGE, false);
-    if (block)
-        trc_system_want_large_pages(block, count * size);
-    return block;
+    return allocate_large(count, size);
 }
 
 void trc_free(void *block) {
