@@ -61,6 +61,8 @@ def copy(scene):
     for source, target in _COPIED:
         if hasattr(theirs, source):
             setattr(ours, target, getattr(theirs, source))
+    if theirs.pixel_filter_type == 'BOX':
+        ours.filter_width = 1.0  # Cycles' box has no other width
     ours.is_cycles_answered = True
     left = []
     for name, neutral, label in _UNMATCHED:

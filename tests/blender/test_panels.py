@@ -126,6 +126,9 @@ def inside_cycles_settings():
     found["pairs"] = {target: (getattr(theirs, source), getattr(ours, target))
                       for source, target in from_cycles._COPIED if hasattr(theirs, source)}
     found["left"] = from_cycles.copy(scene)
+    theirs.pixel_filter_type = 'BOX'
+    from_cycles.copy(scene)
+    found["box"] = ours.pixel_filter_type, ours.filter_width
     for file in sorted(name for name in os.listdir(presets._OWN) if name.endswith(".py")):
         bpy.ops.script.execute_preset(filepath=os.path.join(presets._OWN, file),
                                       menu_idname="VOLLEY_PT_sampling_presets")
@@ -142,6 +145,7 @@ def test_settings_of_cycles_are_taken_over(blender):
     assert all(theirs == ours for theirs, ours in found["pairs"].values()), found["pairs"]
     assert found["pairs"]["samples"][1] == 77 and found["pairs"]["texture_limit_render"][1] == '1024'
     assert "Volume Bounces" in found["left"]
+    assert found["box"] == ('BOX', 1.0)  # which is what Cycles draws
     assert "Diffuse Bounces" not in found["left"] and "Light Tree" not in found["left"]
     assert found["Default.py"] == ('DISTRIBUTION', 64) and found["Whitted.py"] == ('WHITTED', 1)
     assert "Settings copied from Cycles; Volley has nothing for" in blender.output
