@@ -150,6 +150,41 @@ def test_gallery(blender):
 
 # Mist ---------------------------------------------------------------------------------------------
 
+_VELVET_PASSES = ("GlossDir", "DiffDir", "GlossCol", "DiffCol")
+
+
+def inside_velvet():
+    """Passes of a ball of velvet by both, and its light where a lamp does without glossy or diffuse rays."""
+    import bpy
+    import scenes
+    scenes.empty(size=(32, 24))
+    scenes.camera()
+    is_own = scenes.has_node("ShaderNodeBsdfVelvet")
+    scenes.sphere(material=scenes.material("Velvet", "ShaderNodeBsdfVelvet") if is_own else scenes.material(
+        "Velvet", "ShaderNodeBsdfSheen", {"distribution": 'ASHIKHMIN'}))
+    lamp = scenes.light(energy=500.0)
+    layer = bpy.context.view_layer
+    layer.use_pass_glossy_direct = layer.use_pass_diffuse_direct = True
+    layer.use_pass_glossy_color = layer.use_pass_diffuse_color = True
+    pictures = _both(_VELVET_PASSES)
+    unlit = {}
+    for rays in ("visible_glossy", "visible_diffuse"):
+        setattr(lamp, rays, False)
+        unlit[rays] = [picture[..., :3].mean() for picture in scenes.by_both(SAMPLES)]
+        setattr(lamp, rays, True)
+    return pictures, unlit
+
+
+def test_velvet(blender):
+    pictures, unlit = blender.run(inside_velvet)
+    for name in ("GlossDir", "GlossCol"):
+        _agree(*pictures[name], name)
+    for name in ("DiffDir", "DiffCol"):
+        assert not any(picture[..., :3].any() for picture in pictures[name]), name
+    assert unlit["visible_glossy"] == pytest.approx([0.0, 0.0], abs=1e-6)
+    assert unlit["visible_diffuse"][0] == pytest.approx(unlit["visible_diffuse"][1], rel=0.01)
+
+
 def inside_mist():
     import bpy
     scene = _scene()

@@ -246,7 +246,7 @@ static void values_match_formulas(void **state) {
         {translucent(), translucent_below, DIFFUSE, true},
         {diffuse((float)SIGMA), oren_nayar, DIFFUSE, false},
         {burley_of(ROUGHNESS), burley, DIFFUSE, false},
-        {velvet(), velvet_of_sigma, DIFFUSE, false},
+        {velvet(), velvet_of_sigma, GLOSSY, false},
         {toon(0, (float)TOON_SIZE, (float)TOON_FADE), diffuse_toon, DIFFUSE, false},
         {toon(1, (float)TOON_SIZE, (float)TOON_FADE), glossy_toon, GLOSSY, false},
         {glossy(TRC_DISTRIBUTION_GGX, (float)ROUGHNESS, 0.0f), even_ggx, GLOSSY, false},

@@ -21,9 +21,7 @@ TRC_INLINE void sides(const struct trc_lobes *l, const struct trc_surface *s, vv
     *below = vm_and(active, vf_lt(cos_n, vf_zero()));
 }
 
-TRC_INLINE bool is_reflection(enum trc_lobe_kind kind) {
-    return kind == TRC_LOBE_DIFFUSE || kind == TRC_LOBE_REFLECT;
-}
+TRC_INLINE bool is_reflection(enum trc_lobe_kind kind) { return kind <= TRC_LOBE_REFLECT; }
 
 TRC_INLINE bool is_hair(enum trc_lobe_kind kind) {
     return kind == TRC_LOBE_HAIR_REFLECT || kind == TRC_LOBE_HAIR_TRANSMIT;
@@ -47,6 +45,13 @@ TRC_INLINE struct lobe_value value_of(const struct trc_lobes *l, const struct tr
     return value_where(side, r);
 }
 
+/* Whether a lobe's light is in the passes of reflection; rare: as in sum_lobes. */
+TRC_INLINE bool is_glossy(const struct trc_lobes *l, enum trc_lobe_kind kind, bool rare) {
+    return kind == TRC_LOBE_REFLECT ||
+           (rare && (kind == TRC_LOBE_HAIR_REFLECT ||
+                     (kind == TRC_LOBE_VELVET && (l->rare & TRC_LOBES_VELVET))));
+}
+
 /* rare: whether l has anything rare; a constant, so that others have no test of it. */
 TRC_INLINE void sum_lobes(const struct trc_lobes *l, const struct trc_surface *s, vvec3 wi,
                           vmask active, bool rare, struct trc_bsdf_value *out) {
@@ -63,7 +68,7 @@ TRC_INLINE void sum_lobes(const struct trc_lobes *l, const struct trc_surface *s
             continue;
         const vmask side = hair ? active : up ? above : below;
         const struct lobe_value r = value_of(l, lobe, s, wi, side, rare);
-        if (lobe->kind == TRC_LOBE_REFLECT || (rare && lobe->kind == TRC_LOBE_HAIR_REFLECT))
+        if (is_glossy(l, lobe->kind, rare))
             out->glossy = v3_add(out->glossy, r.value);
         else if (lobe->kind == TRC_LOBE_REFRACT || (rare && lobe->kind == TRC_LOBE_HAIR_TRANSMIT))
             out->transmission = v3_add(out->transmission, r.value);
@@ -121,7 +126,7 @@ TRC_INLINE void weigh_direction(const struct trc_lobes *l, const struct trc_surf
         value = v3_add(value, r.value);
         pdf = pdf + r.pdf * lobe->sample_weight;
         claimed = claimed + r.claim * lobe->mix_weight;
-        if (lobe->kind != TRC_LOBE_DIFFUSE)
+        if (!trc_lobe_ends(lobe->kind))
             picked = picked + r.pick * lobe->mix_weight;
     }
     pdf = vf_divide(pdf, l->continue_weight);
@@ -199,11 +204,11 @@ TRC_INLINE void sample_lobes(const struct trc_lobes *l, const struct trc_surface
     vfloat rest = u_lobe * l->continue_weight;
     int last = -1;
     for (int i = 0; i < l->count; i++)
-        if (l->lobe[i].kind != TRC_LOBE_DIFFUSE)
+        if (!trc_lobe_ends(l->lobe[i].kind))
             last = i;
     for (int i = 0; i <= last; i++) {
         const struct trc_lobe *lobe = &l->lobe[i];
-        if (lobe->kind == TRC_LOBE_DIFFUSE)
+        if (trc_lobe_ends(lobe->kind))
             continue;
         /* The last lobe takes what rounding left over, if it has any chance. */
         vmask m = vm_and(waiting, vf_gt(lobe->sample_weight, vf_zero()));
@@ -290,11 +295,9 @@ void trc_bsdf_albedo(const struct trc_lobes *l, const struct trc_surface *s, vve
         const struct trc_lobe *lobe = &l->lobe[i];
         if (lobe->kind == TRC_LOBE_TRANSPARENT)
             continue;
-        static const int pass_of[] = {[TRC_LOBE_REFLECT] = 1,
-                                      [TRC_LOBE_REFRACT] = 2,
-                                      [TRC_LOBE_HAIR_REFLECT] = 1,
-                                      [TRC_LOBE_HAIR_TRANSMIT] = 2};
-        const int k = pass_of[lobe->kind];
+        const bool is_transmission =
+            lobe->kind == TRC_LOBE_REFRACT || lobe->kind == TRC_LOBE_HAIR_TRANSMIT;
+        const int k = is_transmission ? 2 : is_glossy(l, lobe->kind, true);
         vvec3 albedo = v3_scale(lobe->weight, lobe->albedo_scale);
         if (lobe->correlated)
             albedo = v3_mul(albedo, mean_reflectance(lobe));
@@ -310,7 +313,7 @@ vfloat trc_lobe_alpha(const struct trc_lobe *lobe) {
 
 vvec3 trc_lobe_albedo(const struct trc_lobe *lobe, vvec3 wo) {
     const vvec3 albedo = v3_scale(lobe->weight, lobe->albedo_scale);
-    if (lobe->kind == TRC_LOBE_DIFFUSE || lobe->kind == TRC_LOBE_TRANSLUCENT)
+    if (trc_lobe_ends(lobe->kind) || lobe->kind == TRC_LOBE_TRANSLUCENT)
         return albedo;
     return v3_mul(albedo, facet_fresnel(lobe, v3_dot(lobe->n, wo)));
 }

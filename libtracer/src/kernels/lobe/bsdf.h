@@ -13,9 +13,10 @@
 
 /* Which side and which passes a lobe's light belongs to, and whether rays are continued for it. */
 enum trc_lobe_kind {
-    TRC_LOBE_DIFFUSE,     /* ends here: its light is all in light samples */
+    TRC_LOBE_DIFFUSE, /* ends here: its light is all in light samples */
+    TRC_LOBE_VELVET,  /* ends here, too; glossy in passes and for light visibility, as in Cycles */
+    TRC_LOBE_REFLECT, /* microfacet reflection or ideal mirror; the last that reflects alone */
     TRC_LOBE_TRANSLUCENT, /* counts as diffuse in passes and for light visibility, as in Cycles */
-    TRC_LOBE_REFLECT,     /* microfacet reflection or ideal mirror */
     TRC_LOBE_REFRACT,     /* microfacet refraction or ideal */
     TRC_LOBE_TRANSPARENT, /* straight through, or through a portal: the same path */
     /* Of fibres, from and to all around, in the passes of reflection and of transmission. */
@@ -79,9 +80,14 @@ struct trc_lobe {
 
 /* trc_lobes.rare */
 enum {
-    TRC_LOBES_TURN = 1 << 0, /* a shading offset: see turn */
-    TRC_LOBES_HAIR = 1 << 1  /* there are TRC_LOBE_HAIR_* */
+    TRC_LOBES_TURN = 1 << 0,  /* a shading offset: see turn */
+    TRC_LOBES_HAIR = 1 << 1,  /* there are TRC_LOBE_HAIR_* */
+    TRC_LOBES_VELVET = 1 << 2 /* there are TRC_LOBE_VELVET, whose light is glossy; without it they
+                                 are as diffuse ones */
 };
+
+/* Whether no ray is continued for a lobe of that kind. */
+static inline bool trc_lobe_ends(enum trc_lobe_kind kind) { return kind <= TRC_LOBE_VELVET; }
 
 struct trc_lobes {
     int count;

@@ -88,7 +88,7 @@ static void set_chances(const struct trc_material *m, const struct trc_surface *
         const vmask present = vf_gt(v3_max(lobe->weight), vf_zero());
         lobe->mix_weight = vf_where(present, vf_max(lobe->mix_weight, floor_weight));
         out->mix_weight = out->mix_weight + lobe->mix_weight;
-        if (lobe->kind == TRC_LOBE_DIFFUSE)
+        if (trc_lobe_ends(lobe->kind))
             continue;
         lobe->sample_weight = lobe->mix_weight;
         out->continue_weight = out->continue_weight + lobe->mix_weight;

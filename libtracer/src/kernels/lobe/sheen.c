@@ -121,12 +121,13 @@ static struct lobe_value velvet_value(const struct trc_lobe *lobe, const struct 
     return upper_value(lobe, cos_i, f, even_density());
 }
 
-static const struct trc_lobe_model velvet_model = {.kind = TRC_LOBE_DIFFUSE, .value = velvet_value};
+static const struct trc_lobe_model velvet_model = {.kind = TRC_LOBE_VELVET, .value = velvet_value};
 
 static void add_velvet(struct trc_setup *c, const struct trc_leaf *leaf, vfloat weight) {
     const vfloat sigma = vf_max(number(c, leaf, TRC_AT(VELVET, sigma)), vf_set(VELVET_MIN_SIGMA));
     trc_add_matt(c, &velvet_model, v3_scale(colour(c, leaf, TRC_AT(VELVET, color)), weight),
                  trc_matt_normal(c, leaf, TRC_AT(VELVET, normal)), vf_rcp(sigma * sigma));
+    c->out->rare |= TRC_LOBES_VELVET;
 }
 
 const struct trc_closure TRC_CLOSURE_OF(VELVET) = {.add = add_velvet};

@@ -169,6 +169,9 @@ static void shade_group(struct trc_tile *t, uint32_t material, vint index, vmask
     else if (m->instruction_count)
         trc_program_run(m, &s, &regs);
     trc_lobes_setup(m, &s, &regs, filter_alpha(t, &a), &lobes);
+    /* Whitted leaves the glossy light of what has an extent to continuation rays. */
+    if (lobes.rare && t->desc->integrator != TRC_INTEGRATOR_DISTRIBUTION)
+        lobes.rare &= ~(uint32_t)TRC_LOBES_VELVET;
     if (t->snapshot->features & TRC_FEATURE_SHADOW_TERMINATORS) {
         lobes.rare |= TRC_LOBES_TURN;
         lobes.turn = trc_instance_float(t->snapshot, s.instance,
