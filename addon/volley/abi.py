@@ -388,6 +388,7 @@ class VoronoiMode(IntEnum):
     FEATURE_SHIFT = 4
     NORMALIZE = 128
     PCG = 256
+    UNLIMITED = 512
 
 
 class WaveProfile(IntEnum):

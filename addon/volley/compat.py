@@ -113,6 +113,9 @@ TRANSFORMS_NORMALS = bpy.app.version >= (4, 0, 0)
 # STRAIGHT and PREMUL say what the colours of an image are, whatever its file says; seen in 5.2, not in 4.3.
 HAS_LITERAL_ALPHA = bpy.app.version >= (5, 0, 0)
 
+# Voronoi's points count however far they are; in 3.4 those nearer than 8.
+HAS_FAR_CELLS = bpy.app.version >= (4, 0, 0)
+
 # Voronoi's points in 2 to 4 dimensions come of another hash since 5.0.
 HASHES_CELLS_BY_PCG = bpy.app.version >= (5, 0, 0)
 

@@ -68,6 +68,9 @@ for _metric in ("MANHATTAN", "CHEBYCHEV", "MINKOWSKI"):
         _add(f"voronoi {_metric} {_feature} to 1", "ShaderNodeTexVoronoi", ("Distance", "Color"),
              {"distance": _metric, "feature": _feature, "normalize": True}, Vector='vector', Scale=2.5,
              Detail=1.0, Exponent=1.7, Smoothness=0.4, Randomness=0.8)
+        _add(f"voronoi {_metric} {_feature}, far", "ShaderNodeTexVoronoi", ("Distance", "Color"),
+             {"distance": _metric, "feature": _feature}, Vector='vector', Scale=2.5, Exponent=0.3,
+             Smoothness=0.4, Randomness=0.5)
 for _feature in ("F1", "DISTANCE_TO_EDGE"):
     for _name, _range in (("Detail", (-1.0, 3.0)), ("Roughness", (-0.2, 1.2)), ("Lacunarity", (0.2, 2.5))):
         _add(f"voronoi {_feature}, {_name} varies", "ShaderNodeTexVoronoi", ("Distance",),

@@ -135,8 +135,8 @@ static void test_counts_of_modes(void **state) {
         {TRC_NODE_INSTANCE_VALUES, TRC_MAX_INSTANCE_VALUES},
         {TRC_NODE_NOISE, 4 * 6},
         {TRC_NODE_MUSGRAVE, 4 * 5},
-        {TRC_NODE_VORONOI, 4 * 4 * 5 * 2 * 2}, /* dimensions, metric, feature, normalized, hash */
-        {TRC_NODE_WAVE, 3 * 2 * 4},            /* profile, bands or rings, direction */
+        {TRC_NODE_VORONOI, 4 * 4 * 5 * 2 * 2 * 2}, /* dimensions, metric, feature, flags */
+        {TRC_NODE_WAVE, 3 * 2 * 4},                /* profile, bands or rings, direction */
         {TRC_NODE_GRADIENT, 7},
         {TRC_NODE_WHITE_NOISE, 4},
         {TRC_NODE_RADIAL_TILING, 2},

@@ -8,7 +8,7 @@ values that its textures imply.
 
 from ..abi import (BrickMode, FractalType, GradientType, NodeType, NoiseMode, RadialTilingMode, VoronoiFeature,
                    VoronoiMetric, VoronoiMode, WaveDirection, WaveMode, WaveProfile)
-from ..compat import HASHES_CELLS_BY_PCG
+from ..compat import HAS_FAR_CELLS, HASHES_CELLS_BY_PCG
 from .node_list import named_outputs, output
 from .sky_texture import sky_texture
 from .values import CONSTANT, DEFAULT, Value
@@ -78,6 +78,8 @@ def _voronoi(walker, node, sockets):
         mode |= VoronoiMode.NORMALIZE
     if HASHES_CELLS_BY_PCG:
         mode |= VoronoiMode.PCG
+    if HAS_FAR_CELLS:
+        mode |= VoronoiMode.UNLIMITED
     index = walker.emit(NodeType.VORONOI, values, mode)
     return named_outputs(index, NodeType.VORONOI, ("Distance", "Color", "Position", "W", "Radius"))
 

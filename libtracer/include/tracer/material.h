@@ -170,7 +170,10 @@ enum trc_voronoi_mode {
     TRC_VORONOI_FEATURE_SHIFT = 4,
     TRC_VORONOI_NORMALIZE = 1 << 7, /* distance and color to about [0, 1] */
     /* Points of cells as in Blender 5: those of 2 dimensions and more are hashed otherwise. */
-    TRC_VORONOI_PCG = 1 << 8
+    TRC_VORONOI_PCG = 1 << 8,
+    /* Points of any distance count, as from Blender 4.0 on, not only those nearer than 8:
+     * Minkowski's distances of small exponents are long. */
+    TRC_VORONOI_UNLIMITED = 1 << 9
 };
 
 enum trc_wave_profile { TRC_WAVE_SINE = 0, TRC_WAVE_SAW, TRC_WAVE_TRIANGLE };

@@ -122,7 +122,7 @@ static uint32_t last_mode(uint32_t op) {
     case TRC_OP_WHITE_NOISE:
         return 3;
     case TRC_OP_VORONOI:
-        return TRC_VORONOI_PCG + TRC_VORONOI_NORMALIZE +
+        return TRC_VORONOI_UNLIMITED + TRC_VORONOI_PCG + TRC_VORONOI_NORMALIZE +
                (TRC_VORONOI_N_SPHERE_RADIUS << TRC_VORONOI_FEATURE_SHIFT) + 15;
     case TRC_OP_GRADIENT:
         return TRC_GRADIENT_SPHERICAL;

@@ -3,12 +3,14 @@
  * S. Worley, "A Cellular Texture Basis Function" (1996); the smooth minimum and the distance to the
  * edge after I. Quilez, "Smooth Voronoi" (2014) and "Voronoi Edges" (2012). Points, order of search
  * and limits as in Cycles 3.4, octaves and what their sums are divided by as in Cycles 4.3. */
+#include <math.h>
+
 #include "kernels/program/hash.h"
 #include "kernels/program/procedural.h"
 #include "kernels/program/values.h"
 #include "model/program.h"
 
-/* What is farther counts as nothing. */
+/* What is farther counts as nothing, unless TRC_VORONOI_UNLIMITED. */
 #define VORONOI_FAR 8.0f
 /* Two points whose distance squared is below it are one: no edge runs between them. */
 #define VORONOI_SAME 0.0001f
@@ -19,6 +21,7 @@ struct voronoi {
     int dims;
     uint32_t metric; /* TRC_VORONOI_* */
     bool has_pcg;    /* TRC_VORONOI_PCG, where it matters */
+    float far;       /* what is farther counts as nothing */
     vfloat exponent, randomness;
     vfloat cell[TRC_MAX_DIMENSIONS], local[TRC_MAX_DIMENSIONS];
 };
@@ -106,8 +109,8 @@ TRC_INLINE void voronoi_copy(int dims, vmask m, const struct voronoi_point *from
     }
 }
 
-static void voronoi_nothing(struct voronoi_point *p) {
-    p->distance = vf_set(VORONOI_FAR);
+static void voronoi_nothing(const struct voronoi *v, struct voronoi_point *p) {
+    p->distance = vf_set(v->far);
     for (int i = 0; i < TRC_MAX_DIMENSIONS; i++)
         p->offset[i] = p->at[i] = vf_zero();
 }
@@ -118,9 +121,9 @@ static void voronoi_nothing(struct voronoi_point *p) {
 static void voronoi_nearest(const struct voronoi *v, struct voronoi_point *first,
                             struct voronoi_point *second) {
     const int count = voronoi_cell_count(v->dims, 1);
-    voronoi_nothing(first);
+    voronoi_nothing(v, first);
     if (second)
-        voronoi_nothing(second);
+        voronoi_nothing(v, second);
     for (int k = 0; k < count; k++) {
         struct voronoi_point p;
         voronoi_offset(v->dims, 1, k, p.offset);
@@ -141,13 +144,18 @@ static void voronoi_smooth(const struct voronoi *v, vfloat smoothness, bool has_
                            struct voronoi_point *mean, vvec3 *color) {
     const vfloat one = vf_one(), half = vf_set(0.5f);
     const int count = voronoi_cell_count(v->dims, 2);
-    voronoi_nothing(mean);
+    voronoi_nothing(v, mean);
     *color = v3_zero();
     for (int k = 0; k < count; k++) {
         struct voronoi_point p;
         voronoi_offset(v->dims, 2, k, p.offset);
         voronoi_at(v, p.offset, p.at);
         p.distance = voronoi_distance(v, p.at, v->local);
+        if (k == 0 && isinf(v->far)) { /* which nothing can be mixed with */
+            voronoi_copy(v->dims, vm_all_set(), &p, mean);
+            *color = has_color ? voronoi_color(v, p.offset) : *color;
+            continue;
+        }
         const vfloat t = vf_saturate(half + half * (mean->distance - p.distance) / smoothness);
         const vfloat h = t * t * (vf_set(3.0f) - vf_set(2.0f) * t);
         const vfloat dip = smoothness * h * (one - h);
@@ -218,7 +226,7 @@ static vfloat voronoi_radius(const struct voronoi *v) {
     const int count = voronoi_cell_count(v->dims, 1);
     vfloat best = vf_set(VORONOI_FAR);
     struct voronoi_point other;
-    voronoi_nothing(&other); /* gcc 16 believes that coordinates beyond the dimensions are read */
+    voronoi_nothing(v, &other); /* gcc 16 believes that those beyond the dimensions are read */
     for (int k = 0; k < count; k++) {
         if (k == count / 2) /* the point itself */
             continue;
@@ -259,7 +267,7 @@ static void voronoi_octave(const struct voronoi *v, uint32_t feature, vfloat smo
     out->color = v3_zero();
     switch (feature) {
     case TRC_VORONOI_DISTANCE_TO_EDGE:
-        voronoi_nothing(&first);
+        voronoi_nothing(v, &first);
         first.distance = voronoi_edge(v);
         break;
     case TRC_VORONOI_F2:
@@ -349,6 +357,7 @@ void trc_program_voronoi(uint32_t mode, const vfloat *in, vfloat *out) {
     const int dims = (int)(mode & TRC_DIMENSIONS_MASK) + 1;
     struct voronoi v = {.dims = dims,
                         .has_pcg = dims > 1 && (mode & TRC_VORONOI_PCG),
+                        .far = mode & TRC_VORONOI_UNLIMITED ? INFINITY : VORONOI_FAR,
                         .metric = (mode >> TRC_VORONOI_METRIC_SHIFT) & TRC_VORONOI_METRIC_MASK,
                         .exponent = in[TRC_OP_AT(VORONOI, exponent)],
                         .randomness = vf_saturate(in[TRC_OP_AT(VORONOI, randomness)])};
