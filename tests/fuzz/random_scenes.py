@@ -1,0 +1,482 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Random scenes by Volley and by Cycles without diffuse bounces: how far they are apart.
+
+    random_scenes.py [--without PART]... [--keep DIR] FIRST COUNT
+
+A line for each seed: errors of the picture and of light passes beyond noise, over the mean of the picture. A
+seed is the same scene in each Blender that has its nodes. Each part draws its numbers from a generator of its
+own, so that a scene without a part is otherwise the same: what is wrong is found by leaving parts out. --keep
+writes the scenes as .blend files and Volley | Cycles | 8 times the difference beside them. Ends with 1 if a mean
+differs by 1 % or a tile by 3 %. Takes a few seconds for each scene.
+"""
+
+import argparse
+import math
+import os
+import pathlib
+import random
+import sys
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "support"))
+import numpy as np  # noqa: E402  (the folder is on the path only now)
+
+PARTS = ("textures", "normals", "mixes", "strands", "points", "instances", "motion", "lens", "world", "lamps",
+         "lamp_nodes", "film", "objects", "passes")
+SIZE, SAMPLES = (64, 48), 512
+MEAN_TOLERANCE, TILE_TOLERANCE = 0.01, 0.03
+DARKEST = 1e-4  # mean that errors are taken relative to
+PASSES = {"use_pass_diffuse_direct": "DiffDir", "use_pass_glossy_direct": "GlossDir",
+          "use_pass_glossy_indirect": "GlossInd", "use_pass_transmission_direct": "TransDir",
+          "use_pass_emit": "Emit", "use_pass_environment": "Env", "use_pass_diffuse_color": "DiffCol",
+          "use_pass_glossy_color": "GlossCol"}
+
+
+class Scene:
+    """A random scene; ``rng(part)`` are that part's numbers, ``has(part)`` whether it is there."""
+
+    def __init__(self, seed, without):
+        self.seed, self.without = seed, without
+        self.generators = {}
+
+    def rng(self, part):
+        if part not in self.generators:
+            self.generators[part] = random.Random(f"{self.seed} {part}")
+        return self.generators[part]
+
+    def has(self, part, chance):
+        drawn = self.rng(part + "?").random() < chance
+        return drawn and part not in self.without
+
+
+# Materials ---------------------------------------------------------------------------------------
+
+SHADERS = ("ShaderNodeBsdfDiffuse", "ShaderNodeBsdfGlossy", "ShaderNodeBsdfPrincipled", "ShaderNodeBsdfGlass",
+           "ShaderNodeBsdfRefraction", "ShaderNodeBsdfTranslucent", "ShaderNodeBsdfTransparent",
+           "ShaderNodeBsdfSheen", "ShaderNodeBsdfToon", "ShaderNodeBsdfMetallic", "ShaderNodeEmission")
+HAIR_SHADERS = ("ShaderNodeBsdfHair", "ShaderNodeBsdfHairPrincipled", "ShaderNodeBsdfDiffuse",
+                "ShaderNodeBsdfPrincipled", "ShaderNodeBsdfGlossy", "ShaderNodeBsdfTranslucent")
+# Left as they are: what Volley does without, or what makes noise of all.
+FIXED_INPUTS = ("Subsurface", "Emission", "Normal", "Tangent", "Weight", "Transmission", "Thin Film", "Coat Normal",
+                "Thin Wall", "Radius")
+TEXTURES = ("ShaderNodeTexNoise", "ShaderNodeTexVoronoi", "ShaderNodeTexChecker", "ShaderNodeTexWave",
+            "ShaderNodeTexGradient", "ShaderNodeTexMagic", "ShaderNodeTexBrick", "ShaderNodeTexWhiteNoise",
+            "ShaderNodeTexGabor")
+COORDINATES = ("Generated", "UV", "Object", "Normal", "Camera", "Window", "Reflection")
+
+
+def new_node(tree, kinds, rng):
+    """A node of one of the types that this Blender has."""
+    while True:
+        kind = rng.choice(kinds)
+        try:
+            return tree.nodes.new(kind)
+        except RuntimeError:
+            continue
+
+
+def draw_inputs(node, rng):
+    """Random values of a node's inputs."""
+    for socket in node.inputs:
+        value = rng.random(), rng.random(), rng.random(), rng.random()
+        if socket.name.startswith(FIXED_INPUTS) or not hasattr(socket, "default_value"):
+            continue
+        if socket.type == 'RGBA':
+            socket.default_value = (*value[:3], 1.0)
+        elif socket.type == 'VALUE':
+            low, high = {"IOR": (1.05, 2.0), "Roughness": (0.05, 1.0), "Scale": (1.0, 8.0), "Detail": (0.0, 4.0),
+                         "Strength": (0.2, 1.0), "Smoothness": (0.01, 1.0)}.get(socket.name, (0.0, 1.0))
+            socket.default_value = low + (high - low) * value[0]
+
+
+def draw_settings(node, rng):
+    """Random choices of a node's menus but those that say how its sockets are laid out."""
+    for setting in node.bl_rna.properties:
+        drawn = rng.random()
+        if setting.type == 'ENUM' and not setting.is_readonly and setting.identifier in (
+                "distribution", "component", "model", "parametrization", "wave_type", "wave_profile", "bands_direction",
+                "gradient_type", "feature", "distance", "noise_type", "blend_type", "gabor_type", "fresnel_type"):
+            names = [name for name in setting.enum_items.keys() if name != 'BECKMANN']
+            try:
+                setattr(node, setting.identifier, names[int(drawn * len(names))])
+            except TypeError:
+                pass
+
+
+def textured(scene, tree, socket):
+    """A texture, mapped somehow, into a socket."""
+    rng = scene.rng("textures")
+    texture = new_node(tree, TEXTURES, rng)
+    draw_settings(texture, rng)
+    draw_inputs(texture, rng)
+    if "Vector" in texture.inputs:
+        coordinates = tree.nodes.new("ShaderNodeTexCoord")
+        mapping = tree.nodes.new("ShaderNodeMapping")
+        mapping.inputs["Location"].default_value = [rng.uniform(-1, 1) for _ in range(3)]
+        mapping.inputs["Rotation"].default_value = [rng.uniform(-3, 3) for _ in range(3)]
+        mapping.inputs["Scale"].default_value = [rng.uniform(0.5, 2) for _ in range(3)]
+        tree.links.new(coordinates.outputs[rng.choice(COORDINATES)], mapping.inputs["Vector"])
+        tree.links.new(mapping.outputs[0], texture.inputs["Vector"])
+    outputs = [output for output in texture.outputs if output.enabled]
+    tree.links.new(rng.choice(outputs), socket)
+
+
+def shader_node(scene, tree, kinds, rng):
+    """A shader of random settings."""
+    node = new_node(tree, kinds, rng)
+    draw_settings(node, rng)
+    draw_inputs(node, rng)
+    if node.bl_idname == "ShaderNodeBsdfPrincipled" and rng.random() < 0.4:
+        node.inputs["Transmission Weight" if "Transmission Weight" in node.inputs else "Transmission"] \
+            .default_value = rng.random()
+    if node.bl_idname == "ShaderNodeBsdfPrincipled" and rng.random() < 0.6:
+        node.inputs["Alpha"].default_value = 1.0
+    color = next((socket for socket in node.inputs if socket.type == 'RGBA' and socket.enabled), None)
+    if color is not None and scene.has("textures", 0.7):
+        textured(scene, tree, color)
+    if "Normal" in node.inputs and scene.has("normals", 0.4):
+        bump = tree.nodes.new("ShaderNodeBump")
+        bump.inputs["Strength"].default_value = scene.rng("normals").uniform(0.1, 0.6)
+        bump.inputs["Distance"].default_value = 0.1
+        textured(scene, tree, bump.inputs["Height"])
+        tree.links.new(bump.outputs[0], node.inputs["Normal"])
+    return node
+
+
+def material(scene, kinds, rng):
+    """A material of a shader or a mix of two."""
+    import bpy
+    made = bpy.data.materials.new("Material")
+    made.use_nodes = True
+    tree = made.node_tree
+    tree.nodes.clear()
+    shader = shader_node(scene, tree, kinds, rng)
+    if scene.has("mixes", 0.4):
+        mix = tree.nodes.new(scene.rng("mixes").choice(("ShaderNodeMixShader", "ShaderNodeAddShader")))
+        other = shader_node(scene, tree, kinds, scene.rng("mixes"))
+        for node, socket in zip((shader, other), list(mix.inputs)[-2:]):
+            tree.links.new(node.outputs[0], socket)
+        if "Fac" in mix.inputs:
+            way = scene.rng("mixes").choice(("ShaderNodeFresnel", "ShaderNodeLayerWeight", None))
+            if way:
+                tree.links.new(tree.nodes.new(way).outputs[0], mix.inputs["Fac"])
+        shader = mix
+    tree.links.new(shader.outputs[0], tree.nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
+    return made
+
+
+# What is seen ----------------------------------------------------------------------------------------
+
+def add_objects(scene, rng):
+    """Some meshes, curves and texts of random places, materials and modifiers."""
+    import bpy
+    made = []
+    for _ in range(rng.randint(2, 4)):
+        kind = rng.choice(("sphere", "cube", "torus", "monkey", "curve", "text", "ball"))
+        place = rng.uniform(-1.6, 1.6), rng.uniform(-1.0, 1.5), rng.uniform(-1.0, 1.0)
+        if kind == "sphere":
+            bpy.ops.mesh.primitive_uv_sphere_add(segments=rng.choice((9, 32)), ring_count=12, location=place)
+        elif kind == "cube":
+            bpy.ops.mesh.primitive_cube_add(size=1.2, location=place)
+        elif kind == "torus":
+            bpy.ops.mesh.primitive_torus_add(location=place, major_segments=24, minor_segments=8)
+        elif kind == "monkey":
+            bpy.ops.mesh.primitive_monkey_add(location=place)
+        elif kind == "curve":
+            bpy.ops.curve.primitive_bezier_circle_add(location=place)
+            bpy.context.object.data.bevel_depth = 0.15
+        elif kind == "text":
+            bpy.ops.object.text_add(location=place)
+            bpy.context.object.data.extrude = 0.1
+        else:
+            bpy.ops.mesh.primitive_ico_sphere_add(location=place, subdivisions=3)
+        one = bpy.context.object
+        one.rotation_euler = [rng.uniform(-3, 3) for _ in range(3)]
+        one.scale = [rng.uniform(0.4, 1.0)] * 3 if rng.random() < 0.6 else [rng.uniform(0.3, 1.0) for _ in range(3)]
+        one.data.materials.append(material(scene, SHADERS, rng))
+        if one.type == 'MESH':
+            smooth = rng.random() < 0.5
+            for polygon in one.data.polygons:
+                polygon.use_smooth = smooth
+            modifier = rng.choice((None, None, 'SUBSURF', 'BEVEL', 'ARRAY', 'SOLIDIFY', 'DECIMATE'))
+            if modifier:
+                one.modifiers.new("Modifier", modifier)
+        made.append(one)
+    return made
+
+
+def draw_visibility(rng, one):
+    """What an object is to camera rays. What some rays meet and shadow rays do not, or the other way round,
+    depends on how an engine shares light between both."""
+    drawn = rng.random()
+    if drawn < 0.1:
+        one.is_holdout = True
+    elif drawn < 0.2:
+        one.visible_camera = False
+    one.pass_index = rng.randint(0, 5)
+    if rng.random() < 0.3:
+        one.color = [rng.random() for _ in range(3)] + [1.0]
+
+
+def add_strands(scene, rng, skin):
+    """Particle hair on a mesh."""
+    skin.modifiers.new("Hair", 'PARTICLE_SYSTEM')
+    settings = skin.particle_systems[0].settings
+    settings.type, settings.count = 'HAIR', rng.choice((20, 200))
+    settings.hair_length = rng.uniform(0.2, 0.6)
+    settings.use_advanced_hair = True
+    settings.render_step = rng.randint(1, 4)
+    settings.brownian_factor = rng.choice((0.0, 0.05))
+    settings.object_align_factor = [rng.uniform(-0.1, 0.1) for _ in range(3)]
+    settings.root_radius, settings.tip_radius = 1.0, rng.choice((0.0, 0.3, 1.0))
+    settings.radius_scale = rng.choice((0.01, 0.03, 0.08))
+    settings.use_close_tip = rng.random() < 0.5
+    if rng.random() < 0.4:
+        settings.child_type, settings.rendered_child_count = rng.choice(('SIMPLE', 'INTERPOLATED')), 5
+        settings.child_percent = 5
+    skin.data.materials.append(material(scene, HAIR_SHADERS, rng))
+    settings.material = len(skin.data.materials)
+    skin.show_instancer_for_render = rng.random() < 0.8
+    import bpy
+    curves = bpy.context.scene.cycles_curves
+    curves.shape, curves.subdivisions = rng.choice(('RIBBONS', 'THICK')), rng.randint(1, 3)
+
+
+def add_points(scene, rng, skin):
+    """A point cloud over a mesh."""
+    import scenes
+    distribute, to_points = scenes.geometry_nodes(skin, "GeometryNodeDistributePointsOnFaces",
+                                                  "GeometryNodeSetMaterial")
+    distribute.inputs["Density"].default_value = rng.choice((5.0, 40.0))
+    to_points.inputs["Material"].default_value = material(scene, SHADERS[:-1], rng)
+
+
+def add_instances(scene, rng, source):
+    """Copies of an object by a collection."""
+    import bpy
+    collection = bpy.data.collections.new("Source")
+    for other in list(source.users_collection):
+        other.objects.unlink(source)
+    collection.objects.link(source)
+    for _ in range(rng.randint(2, 6)):
+        placed = bpy.data.objects.new("Placed", None)
+        placed.instance_type, placed.instance_collection = 'COLLECTION', collection
+        placed.location = [rng.uniform(-1.2, 1.2) for _ in range(3)]
+        placed.rotation_euler = [rng.uniform(-3, 3) for _ in range(3)]
+        placed.scale = [rng.uniform(0.4, 1.1) for _ in range(3)]
+        bpy.context.scene.collection.objects.link(placed)
+
+
+def add_motion(rng, made):
+    """Motion of objects within the shutter."""
+    import bpy
+    bpy.context.scene.render.use_motion_blur = True
+    bpy.context.scene.render.motion_blur_shutter = rng.choice((0.5, 1.0))
+    for one in made:
+        drawn = [rng.uniform(-0.3, 0.3) for _ in range(6)]
+        if rng.random() < 0.4:
+            continue
+        for frame, side in ((0, -1.0), (2, 1.0)):
+            one.location = [x + side * d for x, d in zip(one.location, drawn[:3])]
+            one.rotation_euler = [x + side * d for x, d in zip(one.rotation_euler, drawn[3:])]
+            one.keyframe_insert("location", frame=frame)
+            one.keyframe_insert("rotation_euler", frame=frame)
+
+
+# Light and camera ------------------------------------------------------------------------------------
+
+def add_lamps(scene, rng):
+    import bpy
+    import scenes
+    for _ in range(rng.randint(1, 3)):
+        kind = rng.choice(('POINT', 'SPOT', 'AREA', 'SUN'))
+        place = [rng.uniform(-3, 3), rng.uniform(-4, -1), rng.uniform(1, 4)]
+        lamp = scenes.light(kind, location=place)
+        lamp.rotation_euler = [math.radians(rng.uniform(25, 65)), rng.uniform(-0.3, 0.3), rng.uniform(-0.6, 0.6)]
+        data = lamp.data
+        data.color = [rng.uniform(0.3, 1.0) for _ in range(3)]
+        data.energy = rng.uniform(0.5, 2.0) * (1.0 if kind == 'SUN' else 150.0)
+        size = rng.choice((0.0, 0.2, 0.8))
+        if kind == 'SUN':
+            data.angle = 0.3 * size
+        elif kind == 'AREA':
+            data.shape, data.size, data.size_y = rng.choice(('SQUARE', 'RECTANGLE', 'DISK', 'ELLIPSE')), 0.8, 0.3
+            if hasattr(data, "spread"):
+                data.spread = rng.choice((math.pi, math.radians(100.0), math.radians(30.0)))
+        else:
+            data.shadow_soft_size = size
+        if kind == 'SPOT':
+            data.spot_size, data.spot_blend = rng.uniform(0.6, 1.8), rng.random()
+        if scene.has("lamp_nodes", 0.5):
+            draw_lamp_nodes(scene, data)
+        if rng.random() < 0.2:
+            setattr(lamp, rng.choice(("visible_diffuse", "visible_glossy", "visible_transmission")), False)
+        if rng.random() < 0.2:
+            lamp.scale = [rng.uniform(0.5, 1.5) for _ in range(3)]
+        bpy.context.view_layer.update()
+
+
+def draw_lamp_nodes(scene, data):
+    """A program of a lamp's light."""
+    rng = scene.rng("lamp_nodes")
+    data.use_nodes = True
+    tree = data.node_tree
+    emission = tree.nodes["Emission"]
+    if rng.random() < 0.6:
+        textured(scene, tree, emission.inputs["Color"])
+    else:
+        falloff = tree.nodes.new("ShaderNodeLightFalloff")
+        falloff.inputs["Strength"].default_value = 1.0
+        falloff.inputs["Smooth"].default_value = rng.choice((0.0, 1.0))
+        tree.links.new(falloff.outputs[rng.choice((0, 1))], emission.inputs["Strength"])
+
+
+def set_world(scene, rng):
+    import bpy
+    world = bpy.context.scene.world
+    world.use_nodes = True
+    tree = world.node_tree
+    background = next(node for node in tree.nodes if node.bl_idname == "ShaderNodeBackground")
+    background.inputs["Color"].default_value = [rng.uniform(0.0, 0.6) for _ in range(3)] + [1.0]
+    kind = rng.choice(("even", "texture", "sky"))
+    if kind == "sky":
+        sky = tree.nodes.new("ShaderNodeTexSky")
+        sky.sun_elevation, sky.sun_rotation = rng.uniform(0.1, 1.2), rng.uniform(0, 6)
+        sky.sun_disc = rng.random() < 0.5
+        tree.links.new(sky.outputs[0], background.inputs["Color"])
+        background.inputs["Strength"].default_value = 0.1
+    elif kind == "texture":
+        gradient = tree.nodes.new("ShaderNodeTexGradient")
+        gradient.gradient_type = rng.choice(('LINEAR', 'SPHERICAL', 'EASING'))
+        coordinates = tree.nodes.new("ShaderNodeTexCoord")
+        tree.links.new(coordinates.outputs["Generated"], gradient.inputs["Vector"])
+        tree.links.new(gradient.outputs[0], background.inputs["Strength"])
+
+
+def add_camera(scene):
+    import scenes
+    made = scenes.camera((0.0, -6.0, 0.6), (math.radians(85.0), 0.0, 0.0))
+    if scene.has("lens", 0.6):
+        rng = scene.rng("lens")
+        data = made.data
+        kind = rng.choice(('PERSP', 'PERSP', 'ORTHO'))
+        data.type, data.ortho_scale = kind, 4.5
+        data.shift_x, data.shift_y = rng.uniform(-0.2, 0.2), rng.uniform(-0.1, 0.1)
+        if rng.random() < 0.5:
+            data.dof.use_dof, data.dof.focus_distance, data.dof.aperture_fstop = True, 5.5, 0.2
+            data.dof.aperture_blades, data.dof.aperture_ratio = rng.choice((0, 5)), rng.choice((1.0, 2.0))
+        data.clip_start = rng.choice((0.1, 5.5))
+
+
+def set_film(rng):
+    import bpy
+    both = bpy.context.scene
+    both.render.film_transparent = rng.random() < 0.5
+    both.render.pixel_aspect_x = rng.choice((1.0, 1.5))
+    exposure, width = rng.choice((1.0, 2.0)), rng.uniform(0.8, 2.5)
+    kind = rng.choice(('BOX', 'GAUSSIAN', 'BLACKMAN_HARRIS'))
+    width = 1.0 if kind == 'BOX' else width  # that of Cycles' has no other
+    for settings in (both.cycles, both.volley):
+        settings.film_exposure, settings.pixel_filter_type, settings.filter_width = exposure, kind, width
+        if both.render.film_transparent:
+            settings.film_transparent_glass = rng.random() < 0.5
+    both.volley.film_transparent_glass = both.cycles.film_transparent_glass
+
+
+def build(seed, without):
+    """Make the scene of a seed; the passes that are compared besides."""
+    import bpy
+    import scenes
+    scene = Scene(seed, without)
+    both = scenes.empty(size=SIZE, samples=SAMPLES)
+    both.volley.clamp_indirect = both.cycles.sample_clamp_indirect = 0.0  # they clamp other samples
+    rng = scene.rng("objects")
+    floor = scenes.mesh("Floor", [(-4, -3, -1.3), (4, -3, -1.3), (4, 5, -1.3), (-4, 5, -1.3)], [(0, 1, 2, 3)])
+    floor.data.materials.append(material(scene, SHADERS[:1], rng))
+    made = add_objects(scene, rng) if "objects" not in without else []
+    meshes = [one for one in made if one.type == 'MESH']
+    visibility = scene.rng("visibility")
+    for one in made:
+        draw_visibility(visibility, one)
+    if meshes and scene.has("strands", 0.5):
+        add_strands(scene, scene.rng("strands"), meshes[0])
+    elif meshes and scene.has("points", 0.4):
+        add_points(scene, scene.rng("points"), meshes[-1])
+    if scene.has("motion", 0.3):
+        add_motion(scene.rng("motion"), made)
+    elif meshes and scene.has("instances", 0.4):
+        add_instances(scene, scene.rng("instances"), meshes[0])
+    if scene.has("world", 0.6):
+        set_world(scene, scene.rng("world"))
+    if "lamps" not in without:
+        add_lamps(scene, scene.rng("lamps"))
+    add_camera(scene)
+    if scene.has("film", 0.5):
+        set_film(scene.rng("film"))
+    names = ["Combined"]
+    if scene.has("passes", 0.5):
+        for setting in scene.rng("passes").sample(sorted(PASSES), 3):
+            setattr(bpy.context.view_layer, setting, True)
+            names.append(PASSES[setting])
+    bpy.context.scene.frame_set(1)
+    return names
+
+
+def inside(seed, without, folder):
+    """{pass: (Volley's pictures, Cycles')} of a seed, and what Volley warned of."""
+    import bpy
+    import scenes
+    names = build(seed, without)
+    if folder:
+        bpy.ops.wm.save_as_mainfile(filepath=os.path.join(folder, f"{seed:04d}.blend"))
+    return scenes.passes_by_both(names, SAMPLES)
+
+
+# Around Blender --------------------------------------------------------------------------------------
+
+def measure(seed, options):
+    """The largest errors of a seed, (mean, tile), printed."""
+    import blender
+    import compare
+    started = blender.Blender()
+    folder = os.path.abspath(options.keep) if options.keep else None
+    try:
+        pictures = started.run(inside, seed, options.without, folder, timeout=options.timeout)
+    except blender.BlenderError as error:
+        print(f"{seed:4d} FAILED: {str(error)[-1500:]}", flush=True)
+        return 1.0, 1.0
+    told = [line for line in started.output.splitlines() if line.startswith("Volley:")]
+    worst = np.zeros(2)
+    words = []
+    scale = max(float(pictures["Combined"][1][..., :3].mean()), DARKEST)
+    for name, (ours, theirs) in pictures.items():
+        channels = 4 if name == "Combined" else 3
+        ours, theirs = np.nan_to_num(ours[..., :channels]), np.nan_to_num(theirs[..., :channels])
+        errors = np.array(compare.unexplained(ours, theirs)) / scale
+        worst = np.maximum(worst, errors)
+        words.append(f"{name} {ours.mean():.4f} {theirs.mean():.4f} {errors[0]:.2%} {errors[1]:.2%}")
+        if folder:
+            pair = compare.side_by_side(ours.mean(axis=0)[::-1], theirs.mean(axis=0)[::-1])
+            compare.write_png(os.path.join(options.keep, f"{seed:04d}_{name}.png"), pair)
+    is_off = bool((worst > (MEAN_TOLERANCE, TILE_TOLERANCE)).any())
+    print(f"{seed:4d} {'OFF' if is_off else 'ok '} mean {scale:.4f}  {', '.join(words)}",
+          *sorted(set(told)), sep="\n       ", flush=True)
+    return worst
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("first", type=int)
+    parser.add_argument("count", type=int)
+    parser.add_argument("--without", action="append", default=[], choices=PARTS, help="leave a part out")
+    parser.add_argument("--keep", metavar="DIR", help="write the scenes and pictures here")
+    parser.add_argument("--timeout", type=float, default=300.0, help="seconds for a scene")
+    options = parser.parse_args()
+    if options.keep:
+        os.makedirs(options.keep, exist_ok=True)
+    errors = [measure(seed, options) for seed in range(options.first, options.first + options.count)]
+    return int((np.array(errors) > (MEAN_TOLERANCE, TILE_TOLERANCE)).any())
+
+
+if __name__ == "__main__":
+    sys.exit(main())
