@@ -239,6 +239,11 @@ class Pigment(IntEnum):
     ABSORPTION = 2
 
 
+class PrincipledHairMode(IntEnum):
+    PIGMENT_MASK = 3
+    ALBEDO = 4
+
+
 class MappingType(IntEnum):
     POINT = 0
     TEXTURE = 1
@@ -951,20 +956,21 @@ ENUMERATIONS = {StatusCode: "TRC_", IsaId: "TRC_ISA_", CameraType: "TRC_CAMERA_"
                 AreaShape: "TRC_AREA_", LightFlags: "TRC_LIGHT_", AoMethod: "TRC_AO_", NodeType: "TRC_NODE_",
                 ModeFlags: "TRC_MODE_", TableSize: "TRC_TABLE_", DiffuseModel: "TRC_DIFFUSE_",
                 ToonComponent: "TRC_TOON_", HairComponent: "TRC_HAIR_", Pigment: "TRC_PIGMENT_",
-                MappingType: "TRC_MAPPING_", NormalMapSpace: "TRC_NORMAL_MAP_",
-                NormalMapFlags: "TRC_NORMAL_MAP_", BumpMode: "TRC_BUMP_", AmbientMode: "TRC_AMBIENT_",
-                RaycastMode: "TRC_RAYCAST_", DisplacementMethod: "TRC_DISPLACEMENT_",
-                RampInterpolation: "TRC_RAMP_", Gamut: "TRC_GAMUT_", CurvesExtension: "TRC_CURVES_",
-                SeparateMode: "TRC_SEPARATE_", ClampType: "TRC_CLAMP_", TangentSource: "TRC_TANGENT_",
-                SpaceId: "TRC_SPACE_", TransformedType: "TRC_TRANSFORMED_", VectorTransformMode: "TRC_",
-                RotateMode: "TRC_ROTATE_", RotateFlags: "TRC_ROTATE_", TextureMode: "TRC_",
-                FractalType: "TRC_FRACTAL_", NoiseMode: "TRC_NOISE_", VoronoiMetric: "TRC_VORONOI_",
-                VoronoiFeature: "TRC_VORONOI_", VoronoiMode: "TRC_VORONOI_", WaveProfile: "TRC_WAVE_",
-                WaveDirection: "TRC_WAVE_", WaveMode: "TRC_WAVE_", GradientType: "TRC_GRADIENT_",
-                RadialTilingMode: "TRC_RADIAL_TILING_", MagicDepth: "TRC_MAGIC_", BrickMode: "TRC_BRICK_",
-                DistributionType: "TRC_DISTRIBUTION_", BlendMode: "TRC_BLEND_", MathOperation: "TRC_MATH_",
-                VectorOperation: "TRC_VECTOR_", ImageInterpolation: "TRC_IMAGE_",
-                ImageExtension: "TRC_IMAGE_", ImageProjection: "TRC_IMAGE_", ImageMode: "TRC_IMAGE_",
+                PrincipledHairMode: "TRC_PRINCIPLED_HAIR_", MappingType: "TRC_MAPPING_",
+                NormalMapSpace: "TRC_NORMAL_MAP_", NormalMapFlags: "TRC_NORMAL_MAP_", BumpMode: "TRC_BUMP_",
+                AmbientMode: "TRC_AMBIENT_", RaycastMode: "TRC_RAYCAST_",
+                DisplacementMethod: "TRC_DISPLACEMENT_", RampInterpolation: "TRC_RAMP_", Gamut: "TRC_GAMUT_",
+                CurvesExtension: "TRC_CURVES_", SeparateMode: "TRC_SEPARATE_", ClampType: "TRC_CLAMP_",
+                TangentSource: "TRC_TANGENT_", SpaceId: "TRC_SPACE_", TransformedType: "TRC_TRANSFORMED_",
+                VectorTransformMode: "TRC_", RotateMode: "TRC_ROTATE_", RotateFlags: "TRC_ROTATE_",
+                TextureMode: "TRC_", FractalType: "TRC_FRACTAL_", NoiseMode: "TRC_NOISE_",
+                VoronoiMetric: "TRC_VORONOI_", VoronoiFeature: "TRC_VORONOI_", VoronoiMode: "TRC_VORONOI_",
+                WaveProfile: "TRC_WAVE_", WaveDirection: "TRC_WAVE_", WaveMode: "TRC_WAVE_",
+                GradientType: "TRC_GRADIENT_", RadialTilingMode: "TRC_RADIAL_TILING_",
+                MagicDepth: "TRC_MAGIC_", BrickMode: "TRC_BRICK_", DistributionType: "TRC_DISTRIBUTION_",
+                BlendMode: "TRC_BLEND_", MathOperation: "TRC_MATH_", VectorOperation: "TRC_VECTOR_",
+                ImageInterpolation: "TRC_IMAGE_", ImageExtension: "TRC_IMAGE_",
+                ImageProjection: "TRC_IMAGE_", ImageMode: "TRC_IMAGE_",
                 EnvironmentProjection: "TRC_ENVIRONMENT_", InputSource: "TRC_INPUT_",
                 MaterialFlags: "TRC_MATERIAL_", AlphaMode: "TRC_ALPHA_", IntegratorType: "TRC_INTEGRATOR_",
                 SamplerType: "TRC_SAMPLER_", AssemblyType: "TRC_ASSEMBLY_", FilterType: "TRC_FILTER_",

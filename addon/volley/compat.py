@@ -113,6 +113,9 @@ TRANSFORMS_NORMALS = bpy.app.version >= (4, 0, 0)
 # STRAIGHT and PREMUL say what the colours of an image are, whatever its file says; seen in 5.2, not in 4.3.
 HAS_LITERAL_ALPHA = bpy.app.version >= (5, 0, 0)
 
+# The Glossy Color pass of Principled Hair is its albedo; in 3.4 its weight, whatever it absorbs.
+HAS_HAIR_ALBEDO = bpy.app.version >= (4, 0, 0)
+
 # Voronoi's points count however far they are; in 3.4 those nearer than 8.
 HAS_FAR_CELLS = bpy.app.version >= (4, 0, 0)
 

@@ -72,6 +72,7 @@ _LIGHT_PASSES = {
 FIRST_SHARE, FIRST_STEP = 1e-3, 2e-3
 LEAST_COLOR = 0.02  # below it, light over colour is one noise over another
 SUM_TOLERANCE = 1e-4
+HAIR_OFF = 2e-3, 0.02
 BACKGROUND_OFF = 0.005  # pixels; measured: .001
 
 
@@ -183,6 +184,37 @@ def test_velvet(blender):
         assert not any(picture[..., :3].any() for picture in pictures[name]), name
     assert unlit["visible_glossy"] == pytest.approx([0.0, 0.0], abs=1e-6)
     assert unlit["visible_diffuse"][0] == pytest.approx(unlit["visible_diffuse"][1], rel=0.01)
+
+
+def inside_hair():
+    """{(model, parametrization): passes} of a ball of Principled Hair by both."""
+    import bpy
+    import scenes
+    found = {}
+    for model in ('CHIANG', 'HUANG'):
+        settings = {"model": model}
+        if not scenes.has_node("ShaderNodeBsdfHairPrincipled", settings=settings):
+            if model == 'HUANG':
+                continue
+            settings = {}
+        for parametrization, inputs in (('COLOR', {"Color": (0.05, 0.2, 0.4)}), ('MELANIN', {"Melanin": 0.5})):
+            scenes.empty(size=(32, 24))
+            scenes.camera()
+            scenes.sphere(material=scenes.material("Hair", "ShaderNodeBsdfHairPrincipled",
+                                                   {**settings, "parametrization": parametrization}, **inputs))
+            scenes.light(energy=500.0)
+            layer = bpy.context.view_layer
+            layer.use_pass_glossy_color = layer.use_pass_glossy_direct = True
+            found[model, parametrization] = _both(("GlossCol", "GlossDir"))
+    return found
+
+
+def test_hair(blender):
+    """Blender 3.4 has hair's light in the passes of transmission, too."""
+    for case, pictures in blender.run(inside_hair, timeout=300).items():
+        _agree(*pictures["GlossCol"], case, off=HAIR_OFF)
+        if blender_support.version() >= (4, 0):
+            _agree(*pictures["GlossDir"], case, off=HAIR_OFF)
 
 
 def inside_mist():

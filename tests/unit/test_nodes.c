@@ -122,6 +122,7 @@ static void test_counts_of_modes(void **state) {
         {TRC_NODE_PRINCIPLED, 2},
         {TRC_NODE_TRANSPARENT, 1},
         {TRC_NODE_TOON, 2},
+        {TRC_NODE_PRINCIPLED_HAIR, 3 * 2},
         {TRC_NODE_IMAGE, 3 * 4 * 4}, /* interpolation, extension, projection */
         {TRC_NODE_ENVIRONMENT, 3 * 2},
         {TRC_NODE_MAPPING, 4},

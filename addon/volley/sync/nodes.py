@@ -13,10 +13,11 @@ import numpy as np
 from ..abi import (BlendMode, BumpMode, ClampType, DiffuseModel, DistributionType, EnvironmentProjection,
                    HairComponent, ImageExtension, ImageInterpolation, ImageProjection, MappingType,
                    MathOperation as Math, ModeFlags, NodeType, NormalMapFlags, NormalMapSpace, Pigment,
-                   RampInterpolation, SeparateMode, SpaceId, TableSize, TangentSource, ToonComponent,
-                   VectorOperation as Vector)
-from ..compat import (HAS_CORRELATED_MICROFACETS, HAS_FILMED_METAL, HAS_UNIT_NORMALS, HAS_WHOLE_COAT,
-                      KEEPS_DIFFUSE_ENERGY, LEAVES_BUMPS, RAMP_STEPS, SCALES_NORMAL_MAPS, TURNS_WINDOW_BUMPS)
+                   PrincipledHairMode, RampInterpolation, SeparateMode, SpaceId, TableSize, TangentSource,
+                   ToonComponent, VectorOperation as Vector)
+from ..compat import (HAS_CORRELATED_MICROFACETS, HAS_FILMED_METAL, HAS_HAIR_ALBEDO, HAS_UNIT_NORMALS,
+                      HAS_WHOLE_COAT, KEEPS_DIFFUSE_ENERGY, LEAVES_BUMPS, RAMP_STEPS, SCALES_NORMAL_MAPS,
+                      TURNS_WINDOW_BUMPS)
 from . import tangents
 from .converters import CONVERTERS, instance_value, strand_normal, strand_radius, strand_random
 from .derived import ISLAND, POINTINESS
@@ -373,6 +374,7 @@ def _principled_hair(walker, node, sockets):
                   absorption=sockets.get('v', "Absorption Coefficient"),
                   random=sockets.get('f', "Random") if sockets.is_linked("Random") else strand_random(walker),
                   tangent=absent('v'))
+    mode = Pigment[node.parametrization]
     if getattr(node, "model", 'CHIANG') == 'HUANG':
         kind = NodeType.HUANG_HAIR
         values.update(numbers("Aspect Ratio"))
@@ -384,7 +386,9 @@ def _principled_hair(walker, node, sockets):
     else:
         kind = NodeType.PRINCIPLED_HAIR
         values.update(numbers("Coat"))
-    return {"BSDF": Value('s', walker.emit(kind, arranged(kind, values), Pigment[node.parametrization]), 0)}
+        if HAS_HAIR_ALBEDO:
+            mode |= PrincipledHairMode.ALBEDO
+    return {"BSDF": Value('s', walker.emit(kind, arranged(kind, values), mode), 0)}
 
 
 def _ray_portal(walker, _node, sockets):

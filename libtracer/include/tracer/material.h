@@ -31,6 +31,11 @@ enum trc_diffuse_model { TRC_DIFFUSE_LOSES_ENERGY = 0, TRC_DIFFUSE_KEEPS_ENERGY 
 enum trc_toon_component { TRC_TOON_DIFFUSE = 0, TRC_TOON_GLOSSY };
 enum trc_hair_component { TRC_HAIR_REFLECTION = 0, TRC_HAIR_TRANSMISSION };
 enum trc_pigment { TRC_PIGMENT_COLOR = 0, TRC_PIGMENT_MELANIN, TRC_PIGMENT_ABSORPTION };
+enum trc_principled_hair_mode {
+    TRC_PRINCIPLED_HAIR_PIGMENT_MASK = 3,
+    /* Passes of its colour have its albedo, as from Blender 4.0 on, not its weight alone. */
+    TRC_PRINCIPLED_HAIR_ALBEDO = 1 << 2
+};
 
 /* How rotation, scale and location apply. TEXTURE: the inverse of POINT; VECTOR is not moved;
  * NORMAL is divided by the scale, not moved, and made unit. */

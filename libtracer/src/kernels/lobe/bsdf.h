@@ -48,7 +48,8 @@ struct trc_lobe {
     enum trc_lobe_kind kind;  /* the model's */
     uint32_t distribution;
     uint32_t fresnel;
-    bool correlated;      /* microfacets mask and shadow by one height, as in Cycles 4 */
+    bool correlated;      /* microfacets mask and shadow by one height, and passes of the colour
+                             have the mean reflectance, of hair too: as in Cycles 4 */
     bool facet_shadowing; /* bent normals lie in shadow as microfacets do, as in Cycles 5 */
     bool anisotropic;     /* tangent is set and alpha_x may differ from alpha_y */
     vmask ideal;          /* lanes that scatter into one direction only */

@@ -539,6 +539,7 @@ static void add_huang_hair(struct trc_setup *c, const struct trc_leaf *leaf, vfl
     lobe->multi_weight = albedo_of(lobe, v3_dot(z, s->wo), off);
     lobe->fresnel = TRC_FRESNEL_OWN;
     lobe->reflectance = albedo;
+    lobe->correlated = true;
 }
 #undef NUMBER
 #undef COLOUR

@@ -199,7 +199,7 @@ static vvec3 absorption_of(const struct trc_setup *c, const struct trc_leaf *lea
                            vfloat randomness, vfloat roughness) {
 #define NUMBER(input) number(c, leaf, TRC_AT(PRINCIPLED_HAIR, input))
 #define COLOUR(input) colour(c, leaf, TRC_AT(PRINCIPLED_HAIR, input))
-    const struct trc_strand_pigment pigment = {leaf->mode,
+    const struct trc_strand_pigment pigment = {leaf->mode & TRC_PRINCIPLED_HAIR_PIGMENT_MASK,
                                                COLOUR(color),
                                                COLOUR(absorption),
                                                COLOUR(tint),
@@ -265,6 +265,7 @@ static void add_principled_hair(struct trc_setup *c, const struct trc_leaf *leaf
                             vf_exp(-vf_safe_sqrt(sigma.z) * scale) + fresnel);
     lobe->fresnel = TRC_FRESNEL_OWN;
     lobe->reflectance = albedo;
+    lobe->correlated = leaf->mode & TRC_PRINCIPLED_HAIR_ALBEDO;
 #undef NUMBER
 #undef COLOUR
 }
