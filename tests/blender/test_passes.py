@@ -149,7 +149,7 @@ def test_gallery(blender):
     assert all(pairs[name][1].any() for name in pairs if name != "TransDir")  # all is to be seen
 
 
-# Mist ---------------------------------------------------------------------------------------------
+# Velvet and hair ---------------------------------------------------------------------------------
 
 _VELVET_PASSES = ("GlossDir", "DiffDir", "GlossCol", "DiffCol")
 
@@ -216,6 +216,8 @@ def test_hair(blender):
         if blender_support.version() >= (4, 0):
             _agree(*pictures["GlossDir"], case, off=HAIR_OFF)
 
+
+# Mist ---------------------------------------------------------------------------------------------
 
 def inside_mist():
     import bpy
