@@ -61,7 +61,7 @@ class Meshes:
         entry.pointer, entry.topology, entry.shape, entry.names = pointer, topology, shape, names
         entry.poses, entry.corners, entry.normal_kind = data.poses, data.corners, data.normal_kind
         entry.diced_by = data.diced_by
-        entry.may_be_in_world = motion is None and not data.dicing
+        entry.may_be_in_world = not data.dicing
         self._seen.add(key)
 
     def pose(self, key, pointer, mesh, is_known):
@@ -115,7 +115,7 @@ class Meshes:
 
     def in_world(self):
         """Keys of the meshes of this sync that Cycles moves to world space if one object alone shows
-        them and stands still: neither diced nor deforming."""
+        them and stands still, deforming or not: those that are not diced."""
         return {key for key in self._seen if self._entries[key].may_be_in_world}
 
     def ids(self):
