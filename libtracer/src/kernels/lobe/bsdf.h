@@ -57,10 +57,12 @@ struct trc_lobe {
     vvec3 n;              /* the lobe's normal */
     vvec3 tangent; /* unit, orthogonal to n, anisotropic lobes only; bitangent is n x tangent */
     vfloat alpha_x, alpha_y;
-    vfloat ior;       /* refraction: relative index, transmitted over incident side; metal under a
-                         film: the film's */
-    vfloat roughness; /* Oren-Nayar sigma; Principled's roughness; velvet: 1 / sigma^2; metal under
-                         a film: its thickness */
+    vfloat mean_alpha; /* of facets: their geometric mean before Filter Glossy widened them, by
+                          which Cycles 4 puts back what scatters more than once */
+    vfloat ior;        /* refraction: relative index, transmitted over incident side; metal under a
+                          film: the film's */
+    vfloat roughness;  /* Oren-Nayar sigma; Principled's roughness; velvet: 1 / sigma^2; metal under
+                          a film: its thickness */
     /* Toon, f0: angle of full light, angle of its fading, cosine of both. Fibres, f0: the two
      * coefficients of their transform. Oren-Nayar that keeps energy, f0: factor of the part that
      * scatters more than once. Portals: where the ray goes on, and its

@@ -58,10 +58,13 @@ void trc_facets_finish(const struct trc_setup *c, struct trc_lobe *lobe, bool is
                    ? MIN_ALPHA
                    : 0.0f);
     if (is_sharp) {
-        lobe->alpha_x = lobe->alpha_y = vf_zero();
+        lobe->alpha_x = lobe->alpha_y = lobe->mean_alpha = vf_zero();
     } else {
-        lobe->alpha_x = vf_max(vf_min(vf_max(lobe->alpha_x, minimum), vf_one()), c->filter_alpha);
-        lobe->alpha_y = vf_max(vf_min(vf_max(lobe->alpha_y, minimum), vf_one()), c->filter_alpha);
+        const vfloat x = vf_min(vf_max(lobe->alpha_x, minimum), vf_one());
+        const vfloat y = vf_min(vf_max(lobe->alpha_y, minimum), vf_one());
+        lobe->mean_alpha = lobe->anisotropic ? vf_sqrt(x * y) : x;
+        lobe->alpha_x = vf_max(x, c->filter_alpha);
+        lobe->alpha_y = vf_max(y, c->filter_alpha);
     }
     const vfloat ax = lobe->alpha_x, ay = lobe->alpha_y;
     lobe->ideal = lobe->distribution == TRC_LOBE_ASHIKHMIN
@@ -125,8 +128,7 @@ vvec3 trc_facets_gain(vfloat cos_o, vfloat alpha, vvec3 per_bounce, vfloat *sing
 
 void trc_facets_keep_energy(struct trc_lobe *lobe, vvec3 per_bounce) {
     vfloat single;
-    const vvec3 gain =
-        trc_facets_gain(lobe->cos_o, vf_sqrt(lobe->alpha_x * lobe->alpha_y), per_bounce, &single);
+    const vvec3 gain = trc_facets_gain(lobe->cos_o, lobe->mean_alpha, per_bounce, &single);
     lobe->distribution = TRC_LOBE_GGX;
     lobe->weight = v3_mul(lobe->weight, gain);
     lobe->albedo_scale = single;

@@ -316,7 +316,7 @@ static vfloat layered_specular(struct trc_setup *c, const struct trc_leaf *leaf,
     set_fresnel(lobe, &fresnel);
     /* What it takes from below: of one bounce where the rest of the bounces is added; under a film
      * as if it were smooth, and the rest as without. */
-    const vfloat alpha = vf_sqrt(lobe->alpha_x * lobe->alpha_y), tiny = vf_set(1e-6f);
+    const vfloat alpha = lobe->mean_alpha, tiny = vf_set(1e-6f);
     const vvec3 white = v3_splat(one);
     vvec3 albedo = v3_lerp(low, white, trc_dielectric_share(lobe->cos_o, alpha, eta));
     if (vm_any(covered))

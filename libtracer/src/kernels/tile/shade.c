@@ -109,6 +109,14 @@ TRC_INLINE vfloat filter_alpha(const struct trc_tile *t, const struct arrival *a
                      vf_set(0.0f));
 }
 
+/* Whether a material has lobes that lamps light; so have mirrors that Filter Glossy made rough. */
+static bool scatters(const struct trc_material *m, vfloat filter, vmask active) {
+    if (m->has & TRC_MATERIAL_SCATTERS)
+        return true;
+    return (m->has & TRC_MATERIAL_HAS_SPECULAR) &&
+           vm_any(vm_and(active, vf_gt(filter, vf_set(0.0f))));
+}
+
 /* Of a path that a shadow catcher split, the half that goes on as ever writes the sample's data. */
 static vuint data_passes(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
                          const struct trc_material *m, const struct trc_registers *regs,
@@ -168,7 +176,8 @@ static void shade_group(struct trc_tile *t, uint32_t material, vint index, vmask
         program_run(t, &a, m, &s, &regs);
     else if (m->instruction_count)
         trc_program_run(m, &s, &regs);
-    trc_lobes_setup(m, &s, &regs, filter_alpha(t, &a), &lobes);
+    const vfloat filter = filter_alpha(t, &a);
+    trc_lobes_setup(m, &s, &regs, filter, &lobes);
     /* Whitted leaves the glossy light of what has an extent to continuation rays. */
     if (lobes.rare && t->desc->integrator != TRC_INTEGRATOR_DISTRIBUTION)
         lobes.rare &= ~(uint32_t)TRC_LOBES_VELVET;
@@ -198,7 +207,7 @@ static void shade_group(struct trc_tile *t, uint32_t material, vint index, vmask
         trc_bounce_straight(t, &a, &s, &lobes, material, vm_and(active, last));
     if (!vm_any(on))
         return;
-    if (m->has & TRC_MATERIAL_SCATTERS) {
+    if (scatters(m, filter, on)) {
         lobes.below_horizon = s.smooth;
         trc_direct_light(t, &a, &s, &lobes, on);
         lobes.below_horizon = vm_none();
