@@ -32,7 +32,6 @@ CASES = {
 def build(inputs):
     import scenes
     scene = scenes.empty(size=SIZE)
-    scene.cycles.blur_glossy = scene.volley.filter_glossy = 0.0  # Cycles' takes energy from the mirror
     scenes.camera(location=(0.0, -7.0, 2.0), rotation=(1.4, 0.0, 0.0))
     scenes.light_world((0.3, 0.35, 0.4))
     scenes.light('POINT', location=(2.0, -3.5, 4.0), energy=500.0, shadow_soft_size=0.4)

@@ -132,6 +132,7 @@ TRC_INLINE void weigh_direction(const struct trc_lobes *l, const struct trc_surf
     pdf = vf_divide(pdf, l->continue_weight);
     const vmask lit = vm_and(active, vf_gt(pdf, vf_zero()));
     out->pdf = vf_select(active, pdf, out->pdf);
+    out->whole_pdf = vf_select(active, vf_divide(claimed, l->mix_weight), out->whole_pdf);
     out->weight = v3_select(active, v3_where(lit, v3_scale(value, vf_rcp(pdf))), out->weight);
     out->indirect_scale = vf_select(lit, vf_divide(picked, claimed), out->indirect_scale);
     out->valid = vm_or(vm_andnot(out->valid, active), vm_and(lit, vf_gt(v3_max(value), vf_zero())));
@@ -159,7 +160,7 @@ static void clear_sample(struct trc_bsdf_sample *out) {
     out->wi = v3(vf_zero(), vf_zero(), vf_one());
     out->weight = v3_zero();
     out->indirect_scale = vf_one();
-    out->pdf = vf_zero();
+    out->pdf = out->whole_pdf = vf_zero();
     out->valid = out->singular = out->transparent = out->transmitted = out->diffuse = vm_none();
     out->clear = out->through_portal = vm_none();
 }

@@ -147,6 +147,7 @@ struct trc_bsdf_sample {
     vvec3 weight; /* value * cos / pdf, over all lobes for rough ones, for this lobe if ideal */
     vfloat indirect_scale; /* 1 for ideal and transparent ones */
     vfloat pdf;            /* as in trc_bsdf_eval; 0 where ideal or transparent */
+    vfloat whole_pdf;      /* the same over all lobes, as Cycles has it; of rough ones alone */
     vmask valid;           /* the ray is worth tracing */
     vmask singular, transparent,
         transmitted;      /* transmitted: to the other side, incl. translucent */

@@ -68,7 +68,7 @@ static void ray_push(struct trc_tile *t, const struct arrival *a, const struct t
     const vfloat pdf =
         vf_select(straight, a->pdf, vf_select(ideal, vf_set(-1.0f), b->pdf * a->chance));
     const vfloat min_pdf =
-        vf_select(vm_or(transparent, ideal), a->min_pdf, vf_min(a->min_pdf, b->pdf));
+        vf_select(vm_or(transparent, ideal), a->min_pdf, vf_min(a->min_pdf, b->whole_pdf));
 
     const vuint one = vu_set(1);
     vuint depths = a->depths;
