@@ -24,14 +24,18 @@ static void found_add(struct trc_tile *t, const struct arrival *a, vmask active,
     }
 }
 
-/* Emission or background found by rays. Returns what is added. */
+/* What radiance that rays found brings. */
+static vvec3 light_of(const struct trc_tile *t, const struct arrival *a, vvec3 radiance) {
+    const vvec3 c = v3_mul(a->found_weight, radiance);
+    return trc_clamps(t->desc) ? v3_scale(c, trc_clamp_factor(c, found_limit(t, a))) : c;
+}
+
+/* Emission found by rays. Returns what is added. */
 static vvec3 emission_add(struct trc_tile *t, const struct arrival *a, vmask active, vvec3 radiance,
                           uint32_t camera_pass) {
     if (!vm_any(active))
         return v3_zero();
-    vvec3 c = v3_mul(a->found_weight, radiance);
-    if (trc_clamps(t->desc))
-        c = v3_scale(c, trc_clamp_factor(c, found_limit(t, a)));
+    const vvec3 c = light_of(t, a, radiance);
     found_add(t, a, active, c, camera_pass);
     return c;
 }
@@ -58,25 +62,37 @@ static void one_group_add(struct trc_tile *t, const struct arrival *a, vmask act
         group_add(t, a, active, light, groups);
 }
 
-/* Rays that left the scene. */
+/* Lanes where a transparent film shows what is behind the picture, whose samples become as clear.
+ */
+static vmask see_through(struct trc_tile *t, const struct arrival *a, vmask missed) {
+    const vint straight = vi_set(TRC_PATH_TRANSPARENT_BACKGROUND);
+    const vmask seen = vm_and(missed, vi_eq((vint)a->path & straight, straight));
+    float through[TRC_WIDTH];
+    vf_store(through, v3_average(a->found_weight));
+    for (uint32_t bits = vm_bits(seen); bits; bits &= bits - 1) {
+        const int i = __builtin_ctz(bits);
+        t->samples.transparency[a->slots[i]] += through[i];
+    }
+    return seen;
+}
+
+/* Rays that left the scene. What a transparent film leaves out of the picture is in the environment
+ * pass, and where there is one in those of light groups and AOVs, too (Cycles). */
 void trc_emission_misses(struct trc_tile *t, const struct arrival *a, vmask missed) {
+    vmask clear = vm_none();
     if (t->desc->film_transparent) {
-        const vmask seen =
-            vm_and(missed, vi_eq((vint)(a->path & vu_set(TRC_PATH_TRANSPARENT_BACKGROUND)),
-                                 vi_set(TRC_PATH_TRANSPARENT_BACKGROUND)));
-        float through[TRC_WIDTH];
-        vf_store(through, v3_average(a->found_weight));
-        for (uint32_t bits = vm_bits(seen); bits; bits &= bits - 1) {
-            const int i = __builtin_ctz(bits);
-            t->samples.transparency[a->slots[i]] += through[i];
-        }
-        missed = vm_andnot(missed, seen);
+        clear = see_through(t, a, missed);
+        if (!t->samples.pass[TRC_PASS_ENVIRONMENT][0])
+            missed = vm_andnot(missed, clear);
     }
     if (!(t->snapshot->features & TRC_FEATURE_ENVIRONMENT) || !vm_any(missed))
         return;
     const vvec3 c = trc_world_radiance(t->snapshot, a->o, a->n_from, a->d, a->pdf,
                                        light_count_before(t, a->depths), a->path, missed);
-    const vvec3 added = emission_add(t, a, missed, c, TRC_PASS_ENVIRONMENT);
+    const vvec3 added = light_of(t, a, c);
+    found_add(t, a, vm_andnot(missed, clear), added, TRC_PASS_ENVIRONMENT);
+    if (vm_any(clear))
+        trc_pass_add_lanes(t, TRC_PASS_ENVIRONMENT, added, a->slots, vm_and(missed, clear));
     if (t->desc->light_group_count)
         one_group_add(t, a, missed, added, t->snapshot->world.light_group);
     const uint32_t material = t->snapshot->world.material;
