@@ -34,8 +34,11 @@ INPUTS = [("ShaderNodeTexCoord", name) for name in COORDINATES] \
     + [("ShaderNodeLightFalloff", name) for name in ("Quadratic", "Linear", "Constant")] \
     + [("ShaderNodeTexNoise", "Fac"), ("ShaderNodeBlackbody", "Color"), ("ShaderNodeTexImage", "Color")]
 
-# Blender 3.4's sun has any number for Parametric; the sun's rays have no length.
-UNLIKE = {('SUN', "Parametric"), ('SUN', "Ray Length"), ('SUN', "Linear"), ('SUN', "Constant")}
+# Blender 3.4's sun has any number for Parametric; the sun's rays have no length, which Light Falloff knows from
+# Blender 5.0 on.
+UNLIKE = {('SUN', "Parametric"), ('SUN', "Ray Length")}
+if blender_support.version() < (5, 0):
+    UNLIKE |= {('SUN', "Linear"), ('SUN', "Constant")}
 INPUT_CASES = [(kind, *each) for kind in KINDS for each in INPUTS if (kind, each[1]) not in UNLIKE]
 
 

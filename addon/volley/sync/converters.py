@@ -13,7 +13,7 @@ import numpy as np
 from ..abi import (AmbientMode, CurvesExtension, ImageExtension, MathOperation as Math, ModeFlags, NodeType,
                    RaycastMode, RotateFlags, RotateMode, SeparateMode, SpaceId, TableSize, TransformedType,
                    VectorOperation as Vector, VectorTransformMode)
-from ..compat import IES_ENDS, TRANSFORMS_NORMALS
+from ..compat import IES_ENDS, LEAVES_SUNS, TRANSFORMS_NORMALS
 from . import ies, working_space
 from .instance import NO_PARTICLE_RANDOM, VALUES_LOCATION, VALUES_PARTICLE, VALUES_SPIN, VALUES_VELOCITY
 from .node_list import named_outputs, output
@@ -178,6 +178,9 @@ def _wireframe(walker, node, sockets):
     return {"Fac": Value('f', walker.emit(NodeType.WIREFRAME, (sockets.get('f', "Size"),)), 0)}
 
 
+_ENDLESS = 1e30  # m; less than the length of a sun's ray, whose square is infinite
+
+
 def _light_falloff(walker, _node, sockets):
     """Strength times powers of the ray's length, since light fades with its square; faint nearby where
     it is smooth."""
@@ -187,6 +190,10 @@ def _light_falloff(walker, _node, sockets):
     if smooth.node != CONSTANT or smooth.constant[0] > 0.0:  # a sun's square is infinite
         loss = _number(walker, Math.ADD, _number(walker, Math.DIVIDE, smooth, square), 1.0)
         strength = _number(walker, Math.DIVIDE, strength, loss)
+    if LEAVES_SUNS:  # powers of 1
+        is_endless = _number(walker, Math.GREATER_THAN, length, _ENDLESS)
+        length = _number(walker, Math.MULTIPLY_ADD, length, _number(walker, Math.SUBTRACT, 1.0, is_endless), is_endless)
+        square = _number(walker, Math.MULTIPLY, length, length)
     return {"Quadratic": strength, "Linear": _number(walker, Math.MULTIPLY, strength, length),
             "Constant": _number(walker, Math.MULTIPLY, strength, square)}
 
