@@ -30,6 +30,7 @@ SKIPS = (
     Skip("test_packages.py::test_extension", None, (4, 2), "extensions came with 4.2"),
     Skip("test_packages.py::test_extension_by_operators", None, (4, 2), "extensions came with 4.2"),
     Skip("test_packages.py::test_repository", None, (4, 2), "extensions came with 4.2"),
+    Skip("test_balls.py::test_balls_like_cycles", None, (5, 0), "Cycles lit balls otherwise"),
     # Blender 3
     *(Skip(f"{_TEXTURE}[voronoi {kind}]", None, (4, 0), _OCTAVES) for kind in (
         "*, octaves", "* to 1", "* varies", "F1, no lacunarity")),

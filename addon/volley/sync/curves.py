@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .. import abi
-from ..compat import cycles_curves
+from ..compat import HAS_ROUND_BALLS, cycles_curves
 from .deform import KeyedShapes
 from .hashing import HASH_MAX, hash_numbers
 
@@ -139,7 +139,10 @@ class CurvesData:
 def curves_of(strands, wanted, values=(), generated=None):
     """Strands or points as CurvesData; values: (name, (keys | strands, 2 | 4), whether of strands)."""
     lengths = None if strands.lengths is None else strands.lengths.astype(np.uint32)
-    return CurvesData(strands.points(), lengths, wanted.shape, wanted.pieces,
+    shape = wanted.shape
+    if lengths is None:
+        shape = abi.CurveShape.RIBBON if HAS_ROUND_BALLS else abi.CurveShape.ROUND
+    return CurvesData(strands.points(), lengths, shape, wanted.pieces,
                       list(values)[:abi.MAX_ATTRIBUTES], generated)
 
 

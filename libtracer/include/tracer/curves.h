@@ -16,8 +16,13 @@ TRC_BEGIN_DECLS
 enum trc_curve_shape {
     TRC_CURVE_RIBBON = 0, /* flat, each ray sees it from the front, with the normals of a round
                               one; ends are cut; nothing nearer than its width to a ray's origin
-                              counts, which is how it does not meet itself */
-    TRC_CURVE_ROUND = 1   /* a tube, closed at its joints, cut upright and open at its ends */
+                              counts, which is how it does not meet itself; of points: balls
+                              whose back rays that ask for TRC_VISIBLE_SHADOW alone do not meet,
+                              and with normals away from the middle where an instance stretches
+                              them, as in Cycles 5 */
+    TRC_CURVE_ROUND = 1   /* a tube, closed at its joints, cut upright and open at its ends; of
+                              points: balls whose back all rays meet, ellipsoids where an
+                              instance stretches them, as in Cycles 4 */
 };
 
 /* A named value of each point, or of each strand. */
@@ -46,7 +51,7 @@ typedef struct trc_curves_desc {
     uint64_t point_value_count; /* number of floats, checked */
     const uint32_t *lengths;    /* points of each strand: they sum up to point_count, strands of
                                    fewer than two are left out; NULL: no strands, a ball at each
-                                   point, whatever the shape */
+                                   point, of either kind (shape) */
     uint64_t strand_count;      /* number of lengths */
     const float *generated;     /* Generated coordinates, 3 floats for each strand (or ball), the
                                    same at all keys; NULL: the bounding box is the unit cube */

@@ -31,8 +31,11 @@ enum trc_mesh_shape {
     TRC_SHAPE_TRIANGLES = 0,
     TRC_SHAPE_RIBBONS,
     TRC_SHAPE_ROUND,
-    TRC_SHAPE_BALLS
+    TRC_SHAPE_BALLS,       /* whose back shadow rays do not meet */
+    TRC_SHAPE_HOLLOW_BALLS /* whose back they do */
 };
+
+static inline bool trc_shape_is_balls(uint32_t shape) { return shape >= TRC_SHAPE_BALLS; }
 
 /* Geometry of a mesh, shared and immutable; refs counts the holders.
  *
@@ -72,7 +75,7 @@ static inline void trc_mesh_corners(const struct trc_mesh *mesh, uint32_t triang
         return;
     }
     corners_out[0] = corners_out[2] = triangle + mesh->strands[triangle];
-    corners_out[1] = corners_out[0] + (mesh->shape != TRC_SHAPE_BALLS);
+    corners_out[1] = corners_out[0] + !trc_shape_is_balls(mesh->shape);
 }
 
 /* Whether a piece of a curve is the first, or the last, of its strand. */

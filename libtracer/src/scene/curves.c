@@ -260,7 +260,7 @@ static trc_status add_attribute(struct trc_mesh_topology *t, const trc_curve_att
     struct trc_attribute *a = &t->attributes[t->attribute_count];
     a->width = desc->width;
     a->strands = t->strands;
-    a->piece_end = t->shape != TRC_SHAPE_BALLS;
+    a->piece_end = !trc_shape_is_balls(t->shape);
     TRC_TRY(trc_names_add(names, desc->name, &a->name));
     a->values = trc_alloc(vertices * desc->width, sizeof *a->values);
     if (!a->values)
@@ -276,9 +276,10 @@ static trc_status add_attribute(struct trc_mesh_topology *t, const trc_curve_att
 
 /* What strands there are, and how they are cut. */
 static trc_status fill_strands(struct trc_mesh_topology *t, const trc_curves_desc *desc) {
-    t->shape = !desc->lengths                    ? TRC_SHAPE_BALLS
-               : desc->shape == TRC_CURVE_RIBBON ? TRC_SHAPE_RIBBONS
-                                                 : TRC_SHAPE_ROUND;
+    if (desc->lengths)
+        t->shape = desc->shape == TRC_CURVE_RIBBON ? TRC_SHAPE_RIBBONS : TRC_SHAPE_ROUND;
+    else
+        t->shape = desc->shape == TRC_CURVE_RIBBON ? TRC_SHAPE_BALLS : TRC_SHAPE_HOLLOW_BALLS;
     t->normal_kind = TRC_NORMALS_NONE;
     t->point_count = (uint32_t)desc->point_count;
     t->strand_count = (uint32_t)(desc->lengths ? desc->strand_count : desc->point_count);

@@ -31,7 +31,7 @@ static void op_point_info(const struct trc_surface *s, vfloat *out) {
             continue;
         const struct trc_instance *instance = &s->snapshot->instances[id];
         const struct trc_mesh *mesh = s->snapshot->meshes[instance->mesh];
-        if (mesh->shape != TRC_SHAPE_BALLS)
+        if (!trc_shape_is_balls(mesh->shape))
             continue;
         uint32_t corners[3];
         float position[3];

@@ -35,7 +35,7 @@ static int32_t lane_load(const struct trc_surface *s, int lane, struct raw_curve
     uint32_t ends[3];
     float ignored;
     trc_mesh_corners(mesh, piece, ends);
-    const bool balls = mesh->shape == TRC_SHAPE_BALLS;
+    const bool balls = trc_shape_is_balls(mesh->shape);
     const bool first = balls || trc_piece_is_first(mesh, piece);
     const bool last = balls || trc_piece_is_last(mesh, piece);
     for (int end = 0; end < 2; end++)
@@ -166,7 +166,7 @@ void trc_curve_fetch(struct trc_surface *s, vmask lanes) {
     const vfloat u = raw_column(raw, RAW_AT(u)), one = vf_one(), zero = vf_zero();
     const vfloat shape = raw_column(raw, RAW_AT(shape));
     const vmask ribbon = vf_eq(shape, vf_set(TRC_SHAPE_RIBBONS)),
-                ball = vf_eq(shape, vf_set(TRC_SHAPE_BALLS));
+                ball = vf_ge(shape, vf_set(TRC_SHAPE_BALLS));
     const vvec3 p0 = raw_vector(raw, RAW_AT(p)), p1 = raw_vector(raw, RAW_AT(p) + 3);
     const vfloat r0 = raw_column(raw, RAW_AT(r)), r1 = raw_column(raw, RAW_AT(r) + 1);
     const vvec3 middle = trc_between3(p0, p1, u);
@@ -192,7 +192,11 @@ void trc_curve_fetch(struct trc_surface *s, vmask lanes) {
     vvec3 error = v3_mad(v3_abs(c[0]), reach.x,
                          v3_mad(v3_abs(c[1]), reach.y, v3_scale(v3_abs(c[2]), reach.z)));
     error = v3_scale(v3_add(error, v3_add(v3_abs(p), v3_abs(m.to_world.origin))), ERROR_STEPS);
-    vvec3 world = normal_to_world(&m, n);
+    /* Such balls are lit as round ones where they are stretched: by where their middle is. */
+    const vmask round = vf_eq(shape, vf_set(TRC_SHAPE_BALLS));
+    const vvec3 outward = trc_transform_vector(&m.to_world, n);
+    const vvec3 scaled = v3_scale(outward, vf_divide(one, v3_max(v3_abs(outward))));
+    vvec3 world = v3_select(round, v3_normalize(scaled), normal_to_world(&m, n));
     world = v3_select(vf_gt(v3_dot(world, world), vf_set(0.5f)), world, s->wo);
     const vmask back = vm_and(lanes, vf_lt(v3_dot(world, s->wo), zero));
     const vvec3 facing = v3_select(back, v3_neg(world), world);

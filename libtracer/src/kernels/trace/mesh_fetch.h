@@ -87,7 +87,7 @@ TRC_INLINE void trc_load_indices(const struct trc_mesh *mesh, vint triangle, vma
                                  vint index[3]) {
     if (mesh->strands) {
         index[0] = index[2] = triangle + vi_gather((const int32_t *)mesh->strands, triangle, m);
-        index[1] = index[0] + vi_set(mesh->shape != TRC_SHAPE_BALLS);
+        index[1] = index[0] + vi_set(!trc_shape_is_balls(mesh->shape));
         return;
     }
     const vint at = triangle * vi_set(3);

@@ -6,10 +6,19 @@
 #include "kernels/trace/curve.h"
 #include "kernels/trace/walk_leaf.h"
 
+/* Whether rays meet balls from within: all but shadow rays where Cycles culls the back for those.
+ */
+TRC_INLINE bool meets_within(const struct walk *w) {
+    const uint32_t visibility = w->packets->visibility;
+    return w->tree->shape == TRC_SHAPE_HOLLOW_BALLS ||
+           (visibility != TRC_VISIBLE_SHADOW && visibility != TRC_VISIBLE_SHADOW
+                                                                  << TRC_UNBLOCKED_SHIFT);
+}
+
 /* What tells a strand from others of its tree. */
 TRC_INLINE uint32_t slot_strand(const struct walk *w, const struct trc_slot *slot) {
-    return w->tree->shape == TRC_SHAPE_BALLS ? slot->triangle
-                                             : slot->instance & TRC_SLOT_STRAND_MASK;
+    return trc_shape_is_balls(w->tree->shape) ? slot->triangle
+                                              : slot->instance & TRC_SLOT_STRAND_MASK;
 }
 
 /* Numbers of the vertices of a piece: its ends, the one before and the one after. */
@@ -18,7 +27,7 @@ struct piece_vertices {
 };
 TRC_INLINE struct piece_vertices piece_vertices_of(const struct walk *w,
                                                    const struct trc_slot *slot) {
-    if (w->tree->shape == TRC_SHAPE_BALLS)
+    if (trc_shape_is_balls(w->tree->shape))
         return (struct piece_vertices){
             {slot->triangle, slot->triangle}, slot->triangle, slot->triangle};
     const uint32_t first = slot->triangle + (slot->instance & TRC_SLOT_STRAND_MASK);
@@ -133,7 +142,7 @@ TRC_INLINE void leaf_vertices_of(const struct walk *w, const struct trc_slot *sl
     word = (word & in) | ((int32_t)slots->instance & ~in);
     number = (number & in) | ((int32_t)slots->triangle & ~in);
     i8x first = number, last = number, before = number, after = number;
-    if (w->tree->shape != TRC_SHAPE_BALLS) {
+    if (!trc_shape_is_balls(w->tree->shape)) {
         const i8x none = {0};
         first = number + (word & (int32_t)TRC_SLOT_STRAND_MASK);
         last = first + 1;
@@ -200,7 +209,7 @@ TRC_INLINE struct trc_curve_hit_lanes curve_test_lanes(const struct walk *w,
         piece_lanes_join(w, v, motion, k, i, piece);
         return trc_round_hit_lanes(rays, piece, &pass);
     }
-    return trc_ball_test_lanes(rays, piece);
+    return trc_ball_test_lanes(rays, piece, meets_within(w));
 }
 
 /* Bits of chunk i of packet k that have left the strand. */
@@ -372,7 +381,7 @@ TRC_INLINE struct trc_curve_hit8 curve_test8(const struct walk *w, const struct 
         curve_leaf_join(w, leaf, motion, fraction);
         return trc_round_hit8(ray, &leaf->pieces, &pass);
     }
-    return trc_ball_test8(ray, &leaf->pieces);
+    return trc_ball_test8(ray, &leaf->pieces, meets_within(w));
 }
 
 /* Bits of the slots whose strands the ray has not left. */
