@@ -32,8 +32,8 @@ HAS_LONG_PASS_NAMES = bpy.app.version >= (5, 0, 0)
 # Light Falloff leaves the light of suns as it is, whose way is endless; seen in 5.2, not in 4.3.
 LEAVES_SUNS = bpy.app.version >= (5, 0, 0)
 
-# Shadow rays do not meet the backs of a point cloud's balls, which are lit as round ones where they are stretched;
-# seen in 5.2, not in 4.3. (3.4 has neither: no ray meets the backs there.)
+# Shadow rays meet each of a point cloud's balls once, and balls are lit as round ones where they are stretched; seen
+# in 5.2, not in 4.3. (3.4 has neither: no ray meets the backs there.)
 HAS_ROUND_BALLS = bpy.app.version >= (5, 0, 0)
 
 # The power of an area light became its radiance times pi and its area in 4.0; before, times 4 (Blender's

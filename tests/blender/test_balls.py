@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Balls of point clouds beside Cycles: in clouds that are stretched, lit, mirrored and in the shadow of each other, and
-such that light goes through, whose backs shadow rays do not meet. The table goes to
+such that light goes through, each of which shadow rays meet once. The table goes to
 results/balls.txt of the build."""
 
 import blender as blender_support
@@ -14,7 +14,7 @@ CASES = {  # shader, inputs, the cloud's scale, radius of the balls
     "lit": ("ShaderNodeBsdfDiffuse", {"Color": GREY}, (1.0, 0.5, 0.7), 0.5),
     "rough": ("ShaderNodeBsdfGlossy", {"Color": GREY, "Roughness": 0.5}, (0.5, 1.0, 0.8), 0.5),
     "clear": ("ShaderNodeBsdfTransparent", {"Color": GREY}, (1.0, 1.0, 1.0), 0.5),
-    "half clear": ("ShaderNodeBsdfPrincipled", {"Base Color": GREY, "Alpha": 0.5}, (0.8, 0.8, 0.8), 0.15),
+    "half clear": ("ShaderNodeBsdfPrincipled", {"Base Color": GREY, "Alpha": 0.5}, (0.8, 0.8, 0.8), 0.5),
 }
 
 

@@ -16,13 +16,13 @@ TRC_BEGIN_DECLS
 enum trc_curve_shape {
     TRC_CURVE_RIBBON = 0, /* flat, each ray sees it from the front, with the normals of a round
                               one; ends are cut; nothing nearer than its width to a ray's origin
-                              counts, which is how it does not meet itself; of points: balls
-                              whose back rays that ask for TRC_VISIBLE_SHADOW alone do not meet,
-                              and with normals away from the middle where an instance stretches
-                              them, as in Cycles 5 */
+                              counts, which is how it does not meet itself; of points: balls that
+                              take light of a shadow ray once, and have normals away from the
+                              middle where an instance stretches them, as in Cycles 5 */
     TRC_CURVE_ROUND = 1   /* a tube, closed at its joints, cut upright and open at its ends; of
-                              points: balls whose back all rays meet, ellipsoids where an
-                              instance stretches them, as in Cycles 4 */
+                              points: balls that take light where a shadow ray comes in and where
+                              it goes out, ellipsoids where an instance stretches them, as in
+                              Cycles 4 */
 };
 
 /* A named value of each point, or of each strand. */

@@ -31,8 +31,8 @@ enum trc_mesh_shape {
     TRC_SHAPE_TRIANGLES = 0,
     TRC_SHAPE_RIBBONS,
     TRC_SHAPE_ROUND,
-    TRC_SHAPE_BALLS,       /* whose back shadow rays do not meet */
-    TRC_SHAPE_HOLLOW_BALLS /* whose back they do */
+    TRC_SHAPE_BALLS,       /* which count once for a shadow ray, lit as round ones */
+    TRC_SHAPE_HOLLOW_BALLS /* which count where it comes in and goes out, lit as ellipsoids */
 };
 
 static inline bool trc_shape_is_balls(uint32_t shape) { return shape >= TRC_SHAPE_BALLS; }

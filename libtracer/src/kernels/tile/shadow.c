@@ -93,6 +93,12 @@ static vmask may_pass(const struct trc_tile *t, const uint32_t *order, uint32_t 
                            vi_set((int32_t)t->desc->max_transparent_depth)));
 }
 
+/* Lanes whose rays leave a ball that has taken its part where they came in: shadow rays of Cycles 5
+ * meet each once. */
+static vmask leaves_ball(const struct trc_packet_hits *hits, int i, vmask met) {
+    return vm_and(met, vf_gt(vf_load(&hits->v[i]), vf_set(1.5f * TRC_CURVE_WITHIN)));
+}
+
 /* Walks a packet's rays, those at order, from surface to surface; factor: what of their light
  * arrives. Returns the rays that are blocked after all. */
 static uint64_t transparency(struct trc_tile *t, struct trc_packet *p, const uint32_t *order,
@@ -113,9 +119,11 @@ static uint64_t transparency(struct trc_tile *t, struct trc_packet *p, const uin
             if (!vm_any(met))
                 continue;
             vvec3 f = v3_zero();
-            const vmask open = may_pass(t, order + i, passed, met);
+            const vmask leaves = p->left ? leaves_ball(hits, i, met) : vm_none();
+            const vmask open = vm_andnot(may_pass(t, order + i, passed, met), leaves);
             if (vm_any(open))
                 f = surface_transparency(t, p, hits, i, open, vu_set(TRC_VISIBLE_SHADOW));
+            f = v3_select(leaves, v3_splat(vf_one()), f);
             const vfloat channel[3] = {f.x, f.y, f.z};
             for (int k = 0; k < 3; k++)
                 vf_store(&factor[k][i], vf_select(met, vf_load(&factor[k][i]) * channel[k],

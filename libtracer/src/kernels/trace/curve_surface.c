@@ -175,7 +175,9 @@ void trc_curve_fetch(struct trc_surface *s, vmask lanes) {
     const vvec3 d = direction_to_object(&m, v3_neg(s->wo));
     const vmask within = vf_ge(s->v, vf_set(0.5f * TRC_CURVE_WITHIN));
     const vfloat front = vf_select(within, vf_set(-1.0f), one);
-    const vfloat v = vf_select(within, s->v - vf_set(TRC_CURVE_WITHIN), s->v);
+    const vfloat once = vf_where(within, vf_set(TRC_CURVE_WITHIN));
+    const vmask came_in = vf_ge(s->v, vf_set(1.5f * TRC_CURVE_WITHIN));
+    const vfloat v = s->v - vf_select(came_in, once + once, once);
     /* Across the curve and the ray, and towards the ray, across the curve. */
     const vvec3 side = v3_normalize(v3_cross(d, along));
     const vvec3 up = v3_normalize(v3_cross(side, along));

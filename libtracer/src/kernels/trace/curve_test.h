@@ -214,7 +214,7 @@ TRC_INLINE struct NAMED(trc_curve_hit)
 
 TRC_INLINE struct NAMED(trc_curve_hit)
     NAMED(trc_ball_test)(const struct NAMED(trc_curve_ray) * ray,
-                         const struct NAMED(trc_piece) * piece, bool from_within) {
+                         const struct NAMED(trc_piece) * piece, bool counts_once) {
     REAL x, y, z;
     NAMED(trc_piece_turn)(ray, piece->p[0], &x, &y, &z);
     const REAL zero = SET(0.0f), r = piece->r[0];
@@ -222,11 +222,14 @@ TRC_INLINE struct NAMED(trc_curve_hit)
     const REAL t_near = (z - in) * ray->per_length, t_far = (z + in) * ray->per_length;
     const REAL least = ray->tmin + SET(TRC_ROUND_AHEAD) * r * ray->per_length;
     struct NAMED(trc_curve_hit) h;
-    h.t = from_within ? SELECT_LE(least, t_near, t_near, t_far) : t_near;
+    h.t = SELECT_LE(least, t_near, t_near, t_far);
     h.hit = BOTH(LE(zero, g), LE(least, h.t));
     /* From the middle to the ray, in radii. */
     h.u = (zero - x) / r;
-    h.v = (zero - y) / r + SELECT_LE(least, t_near, zero, SET(TRC_CURVE_WITHIN));
+    const REAL within = SELECT_LE(least, t_near, zero, SET(TRC_CURVE_WITHIN));
+    h.v = (zero - y) / r + within;
+    if (counts_once)
+        h.v = h.v + SELECT_LE(t_near, zero, zero, within);
     return h;
 }
 

@@ -31,7 +31,8 @@ struct trc_packet {
     bool skip_transparent; /* occlusion: materials that shadow rays see through do not count */
 } __attribute__((aligned(64)));
 
-/* Added to the v of hits of round curves and balls that are met from within. */
+/* Added to the v of hits of round curves and balls that are met from within; of TRC_SHAPE_BALLS
+ * that the ray has come into since its origin once more. */
 #define TRC_CURVE_WITHIN 4.0f
 
 /* Written where a ray hits; instance must be TRC_NO_HIT before. u and v as in tracer/query.h. */

@@ -6,15 +6,6 @@
 #include "kernels/trace/curve.h"
 #include "kernels/trace/walk_leaf.h"
 
-/* Whether rays meet balls from within: all but shadow rays where Cycles culls the back for those.
- */
-TRC_INLINE bool meets_within(const struct walk *w) {
-    const uint32_t visibility = w->packets->visibility;
-    return w->tree->shape == TRC_SHAPE_HOLLOW_BALLS ||
-           (visibility != TRC_VISIBLE_SHADOW && visibility != TRC_VISIBLE_SHADOW
-                                                                  << TRC_UNBLOCKED_SHIFT);
-}
-
 /* What tells a strand from others of its tree. */
 TRC_INLINE uint32_t slot_strand(const struct walk *w, const struct trc_slot *slot) {
     return trc_shape_is_balls(w->tree->shape) ? slot->triangle
@@ -209,7 +200,7 @@ TRC_INLINE struct trc_curve_hit_lanes curve_test_lanes(const struct walk *w,
         piece_lanes_join(w, v, motion, k, i, piece);
         return trc_round_hit_lanes(rays, piece, &pass);
     }
-    return trc_ball_test_lanes(rays, piece, meets_within(w));
+    return trc_ball_test_lanes(rays, piece, w->tree->shape == TRC_SHAPE_BALLS);
 }
 
 /* Bits of chunk i of packet k that have left the strand. */
@@ -381,7 +372,7 @@ TRC_INLINE struct trc_curve_hit8 curve_test8(const struct walk *w, const struct 
         curve_leaf_join(w, leaf, motion, fraction);
         return trc_round_hit8(ray, &leaf->pieces, &pass);
     }
-    return trc_ball_test8(ray, &leaf->pieces, meets_within(w));
+    return trc_ball_test8(ray, &leaf->pieces, w->tree->shape == TRC_SHAPE_BALLS);
 }
 
 /* Bits of the slots whose strands the ray has not left. */
