@@ -22,13 +22,14 @@ import sys
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "support"))
 import numpy as np  # noqa: E402  (the folder is on the path only now)
 
-PARTS = ("textures", "normals", "mixes", "strands", "points", "instances", "motion", "lens", "world", "lamps",
-         "lamp_nodes", "film", "objects", "passes")
+PARTS = ("textures", "normals", "mixes", "strands", "points", "instances", "motion", "deform",
+         "shutter", "lens", "world", "lamps", "lamp_nodes", "film", "objects", "passes",
+         "rough_glass")
 SIZE, SAMPLES = (64, 48), 512
 MEAN_TOLERANCE, TILE_TOLERANCE = 0.01, 0.03
 DARKEST = 1e-4  # mean that errors are taken relative to
 PASSES = {"use_pass_diffuse_direct": "DiffDir", "use_pass_glossy_direct": "GlossDir",
-          "use_pass_glossy_indirect": "GlossInd", "use_pass_transmission_direct": "TransDir",
+          "use_pass_glossy_indirect": "GlossInd", "use_pass_transmission_direct": "TransDir", "use_pass_transmission_indirect": "TransInd",
           "use_pass_emit": "Emit", "use_pass_environment": "Env", "use_pass_diffuse_color": "DiffCol",
           "use_pass_glossy_color": "GlossCol"}
 
@@ -123,11 +124,13 @@ def textured(scene, tree, socket):
 
 
 def shader_node(scene, tree, kinds, rng):
-    """A shader of random settings."""
+    """A shader of random settings. Without rough glass, which Cycles 4 and 5 have otherwise, glass is clear."""
     node = new_node(tree, kinds, rng)
     draw_settings(node, rng)
     draw_inputs(node, rng)
-    if node.bl_idname == "ShaderNodeBsdfPrincipled" and rng.random() < 0.4:
+    if "rough_glass" in scene.without and node.bl_idname in {"ShaderNodeBsdfGlass", "ShaderNodeBsdfRefraction"}:
+        node.inputs["Roughness"].default_value = 0.0
+    if node.bl_idname == "ShaderNodeBsdfPrincipled" and rng.random() < 0.4 and "rough_glass" not in scene.without:
         node.inputs["Transmission Weight" if "Transmission Weight" in node.inputs else "Transmission"] \
             .default_value = rng.random()
     if node.bl_idname == "ShaderNodeBsdfPrincipled" and rng.random() < 0.6:
@@ -249,7 +252,11 @@ def add_points(scene, rng, skin):
     distribute, set_material = scenes.geometry_nodes(skin, "GeometryNodeDistributePointsOnFaces",
                                                      "GeometryNodeSetMaterial")
     distribute.inputs["Density"].default_value = rng.choice((5.0, 40.0))
-    set_material.inputs["Material"].default_value = material(scene, SHADERS[:-1], rng)
+    skin = material(scene, SHADERS[:-1], rng)
+    for node in skin.node_tree.nodes:  # without tangents Cycles' points are black
+        for name in {"Anisotropy", "Anisotropic"} & set(node.inputs.keys()):
+            node.inputs[name].default_value = 0.0
+    set_material.inputs["Material"].default_value = skin
 
 
 def add_instances(scene, rng, source):
@@ -282,6 +289,85 @@ def add_motion(rng, made):
             one.rotation_euler = [x + side * d for x, d in zip(one.rotation_euler, drawn[3:])]
             one.keyframe_insert("location", frame=frame)
             one.keyframe_insert("rotation_euler", frame=frame)
+
+
+def animate(owner, path, values, index=-1):
+    """Key frames before and after the picture's; owner: what has the property of that path."""
+    for frame, value in zip((0, 2), values):
+        setattr(owner, path, value)
+        owner.keyframe_insert(path, index=index, frame=frame)
+
+
+def add_shape_key(rng, one):
+    """Move the points of a mesh or curve."""
+    one.shape_key_add(name="Basis")
+    bent = one.shape_key_add(name="Bent")
+    bow, slant = rng.uniform(-0.5, 0.5), rng.uniform(-0.4, 0.4)
+    for point in bent.data:
+        x, y, z = point.co
+        point.co = (1.2 * x + bow * z * z, 0.8 * y + slant * x, z)
+    animate(bent, "value", (rng.uniform(0.0, 0.4), rng.uniform(0.5, 1.0)))
+
+
+def add_modifier(rng, one):
+    """A modifier that bends a mesh from frame to frame."""
+    kind = rng.choice(('SIMPLE_DEFORM', 'WAVE', 'CAST', 'DISPLACE', 'SMOOTH'))
+    modifier = one.modifiers.new("Moves", kind)
+    if kind == 'SIMPLE_DEFORM':
+        modifier.deform_method = rng.choice(('TWIST', 'BEND', 'TAPER', 'STRETCH'))
+        path = "factor" if modifier.deform_method in {'TAPER', 'STRETCH'} else "angle"
+        animate(modifier, path, (rng.uniform(-1.0, 0.0), rng.uniform(0.0, 1.0)))
+    elif kind == 'WAVE':
+        modifier.height, modifier.width, modifier.speed = 0.3, 0.6, rng.uniform(0.05, 0.3)
+    elif kind == 'SMOOTH':
+        modifier.iterations = 2
+        animate(modifier, "factor", (0.0, 0.8))
+    else:
+        animate(modifier, "factor" if kind == 'CAST' else "strength", (0.0, rng.uniform(-0.5, 0.5)))
+
+
+def add_deform(rng, made):
+    """Shapes that change within the shutter, objects whose scale or parent does."""
+    import bpy
+    bpy.context.scene.render.use_motion_blur = True
+    bpy.context.scene.render.motion_blur_shutter = rng.choice((0.5, 1.0))
+    for one in made:
+        kind = rng.choice(("still", "shape", "shape", "modifier", "scale", "parent"))
+        if kind == "shape" and one.type in {'MESH', 'CURVE'}:
+            add_shape_key(rng, one)
+        elif kind == "modifier" and one.type == 'MESH':
+            add_modifier(rng, one)
+        elif kind == "scale":
+            animate(one, "scale", [[x * rng.uniform(0.7, 1.4) for x in one.scale] for _ in range(2)])
+        elif kind == "parent":
+            parent = bpy.data.objects.new("Parent", None)
+            bpy.context.scene.collection.objects.link(parent)
+            one.parent = parent
+            animate(parent, "rotation_euler", [[rng.uniform(-0.4, 0.4) for _ in range(3)] for _ in range(2)])
+        one.cycles.motion_steps = rng.choice((1, 1, 1, 2, 3))
+        one.cycles.use_deform_motion = rng.random() < 0.9
+        one.cycles.use_motion_blur = rng.random() < 0.9
+
+
+def set_shutter(rng):
+    """The camera's motion, and how the shutter opens."""
+    import bpy
+    scene = bpy.context.scene
+    scene.render.use_motion_blur = True
+    scene.render.motion_blur_shutter = rng.choice((0.3, 1.0, 1.7))
+    where = scene.render if hasattr(scene.render, "motion_blur_position") else scene.cycles
+    where.motion_blur_position = rng.choice(('START', 'CENTER', 'END'))
+    if rng.random() < 0.3:
+        scene.cycles.rolling_shutter_type, scene.cycles.rolling_shutter_duration = 'TOP', rng.choice((0.1, 0.6))
+    camera = scene.camera
+    if rng.random() < 0.6:
+        animate(camera, "location", [[x + rng.uniform(-0.2, 0.2) for x in camera.location] for _ in range(2)])
+    if rng.random() < 0.3:
+        animate(camera.data, "lens", [camera.data.lens * rng.uniform(0.9, 1.1) for _ in range(2)])
+    if rng.random() < 0.4:
+        curve = scene.render.motion_blur_shutter_curve
+        curve.curves[0].points[0].location = (0.0, rng.uniform(0.0, 1.0))
+        curve.update()
 
 
 # Light and camera ------------------------------------------------------------------------------------
@@ -402,6 +488,8 @@ def build(seed, without):
         add_strands(scene, scene.rng("strands"), meshes[0])
     elif meshes and scene.has("points", 0.4):
         add_points(scene, scene.rng("points"), meshes[-1])
+    if scene.has("deform", 0.4):
+        add_deform(scene.rng("deform"), made)
     if scene.has("motion", 0.3):
         add_motion(scene.rng("motion"), made)
     elif meshes and scene.has("instances", 0.4):
@@ -411,6 +499,8 @@ def build(seed, without):
     if "lamps" not in without:
         add_lamps(scene, scene.rng("lamps"))
     add_camera(scene)
+    if scene.has("shutter", 0.3):
+        set_shutter(scene.rng("shutter"))
     if scene.has("film", 0.5):
         set_film(scene.rng("film"))
     names = ["Combined"]
