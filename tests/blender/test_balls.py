@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Balls of point clouds beside Cycles: in clouds that are stretched, lit, mirrored and in the shadow of each other, and
-such that light goes through, each of which shadow rays meet once. The table goes to
-results/balls.txt of the build."""
+such that light goes through, each of which shadow rays meet once. The table goes to results/balls.txt of the
+build."""
 
 import blender as blender_support
 import compare

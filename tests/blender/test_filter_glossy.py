@@ -34,7 +34,8 @@ def _build(ball, strength):
     scenes.camera(location=(0.0, -5.0, 1.6), rotation=(1.3, 0.0, 0.0))
     for x, turn in ((-3.0, -0.6), (3.5, 0.8)):
         scenes.light('AREA', location=(x, -2.0, 4.0), rotation=(0.5, turn, 0.0), energy=300.0, size=2.0)
-    floor = scenes.material("Floor", "ShaderNodeBsdfGlossy", {"distribution": 'GGX'}, Color=(0.8, 0.8, 0.8), Roughness=0.6)
+    floor = scenes.material("Floor", "ShaderNodeBsdfGlossy", {"distribution": 'GGX'}, Color=(0.8, 0.8, 0.8),
+                            Roughness=0.6)
     scenes.mesh("Floor", [(-4, -4, 0), (4, -4, 0), (4, 4, 0), (-4, 4, 0)], [(0, 1, 2, 3)], floor)
     kind, inputs, settings = BALLS[ball]
     material = scenes.material("Ball", kind, settings, **inputs)

@@ -11,8 +11,8 @@ OFF = 0.01  # of the mean in a tile; the other way is off by up to 55 %
 SHARP = "deforming, of faces and corners"
 SINCE = (4, 0), "Cycles 3.4 has other normals at sharp edges of what deforms"
 KINDS = ("alone", "mirrored", "of faces and corners", "instanced", "shared", "moving", "still in motion blur",
-         "displaced", "with persistent data", "deforming", "deforming, mirrored", SHARP,
-         "deforming, shared", "deforming and moving")
+         "displaced", "with persistent data", "deforming", "deforming, mirrored", SHARP, "deforming, shared",
+         "deforming and moving")
 
 
 # Inside Blender ------------------------------------------------------------------------------------
@@ -73,7 +73,8 @@ def _cone(kind):
             made.location.x = 0.1 + 0.2 * frame
             made.keyframe_insert("location", frame=frame)
     if kind in {"moving", "still in motion blur"} or "deforming" in kind:
-        scene.render.use_motion_blur, scene.render.motion_blur_shutter = True, 1.0 if "deforming" in kind else 0.01
+        scene.render.use_motion_blur = True
+        scene.render.motion_blur_shutter = 1.0 if "deforming" in kind else 0.01
         scene.frame_set(1)
     scene.render.use_persistent_data = kind == "with persistent data"
 

@@ -22,14 +22,14 @@ import sys
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "support"))
 import numpy as np  # noqa: E402  (the folder is on the path only now)
 
-PARTS = ("textures", "normals", "mixes", "strands", "points", "instances", "motion", "deform",
-         "shutter", "lens", "world", "lamps", "lamp_nodes", "film", "objects", "passes",
-         "rough_glass")
+PARTS = ("textures", "normals", "mixes", "strands", "points", "instances", "motion", "deform", "shutter", "lens",
+         "world", "lamps", "lamp_nodes", "film", "objects", "passes", "rough_glass")
 SIZE, SAMPLES = (64, 48), 512
 MEAN_TOLERANCE, TILE_TOLERANCE = 0.01, 0.03
 DARKEST = 1e-4  # mean that errors are taken relative to
 PASSES = {"use_pass_diffuse_direct": "DiffDir", "use_pass_glossy_direct": "GlossDir",
-          "use_pass_glossy_indirect": "GlossInd", "use_pass_transmission_direct": "TransDir", "use_pass_transmission_indirect": "TransInd",
+          "use_pass_glossy_indirect": "GlossInd", "use_pass_transmission_direct": "TransDir",
+          "use_pass_transmission_indirect": "TransInd",
           "use_pass_emit": "Emit", "use_pass_environment": "Env", "use_pass_diffuse_color": "DiffCol",
           "use_pass_glossy_color": "GlossCol"}
 

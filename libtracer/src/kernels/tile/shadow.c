@@ -86,11 +86,10 @@ static vvec3 surface_transparency(struct trc_tile *t, const struct trc_packet *p
 
 /* Lanes of the rays at order that may pass one more surface, having passed so many; those that
  * their path came through count, too. */
-static vmask may_pass(const struct trc_tile *t, const uint32_t *order, uint32_t passed, vmask m) {
+static vmask may_pass(const struct trc_tile *t, const uint32_t *order, vint passed, vmask m) {
     const vuint depths = vu_gather(t->shadows.depths, vi_load((const int32_t *)order), m);
     const vint before = (vint)trc_depth_of(depths, TRC_DEPTH_TRANSPARENT_SHIFT);
-    return vm_and(m, vi_lt(before + vi_set((int32_t)passed),
-                           vi_set((int32_t)t->desc->max_transparent_depth)));
+    return vm_and(m, vi_lt(before + passed, vi_set((int32_t)t->desc->max_transparent_depth)));
 }
 
 /* Lanes whose rays leave a ball that has taken its part where they came in: shadow rays of Cycles 5
@@ -105,9 +104,10 @@ static uint64_t transparency(struct trc_tile *t, struct trc_packet *p, const uin
                              float factor[3][TRC_PACKET_SIZE]) {
     struct trc_packet_hits *hits = t->packet_hits;
     float reach[TRC_PACKET_SIZE];
+    int32_t passed[TRC_PACKET_SIZE] = {0};
     uint64_t blocked = 0;
     memcpy(reach, p->t, sizeof reach);
-    for (uint32_t passed = 0; p->active; passed++) {
+    while (p->active) {
         memset(hits->instance, 0xff, sizeof hits->instance);
         trc_trace_closest(t->snapshot, p, hits, 1);
         uint64_t next = 0;
@@ -120,7 +120,9 @@ static uint64_t transparency(struct trc_tile *t, struct trc_packet *p, const uin
                 continue;
             vvec3 f = v3_zero();
             const vmask leaves = p->left ? leaves_ball(hits, i, met) : vm_none();
-            const vmask open = vm_andnot(may_pass(t, order + i, passed, met), leaves);
+            const vint before = vi_load(&passed[i]);
+            const vmask open = vm_andnot(may_pass(t, order + i, before, met), leaves);
+            vi_store(&passed[i], vi_select(leaves, before, before + vi_set(1)));
             if (vm_any(open))
                 f = surface_transparency(t, p, hits, i, open, vu_set(TRC_VISIBLE_SHADOW));
             f = v3_select(leaves, v3_splat(vf_one()), f);
