@@ -186,45 +186,6 @@ def test_velvet(blender):
     assert unlit["visible_diffuse"][0] == pytest.approx(unlit["visible_diffuse"][1], rel=0.01)
 
 
-def inside_transparent_film():
-    """{whether there is an Environment pass: {pass: pictures by both}} of a world of a light group and with an AOV,
-    behind a clear ball and a matt one, by a transparent film."""
-    import bpy
-    import scenes
-    found = {}
-    for has_environment in (False, True):
-        scene = scenes.empty(size=(32, 24))
-        scene.render.film_transparent = True
-        scenes.camera()
-        scenes.light_world((0.3, 0.5, 0.7))
-        scenes.sphere(material=scenes.material("Clear", "ShaderNodeBsdfTransparent", Color=(0.5, 0.5, 0.5)))
-        scenes.sphere("Matt", 0.5, (1.2, 0.0, 0.0), scenes.material("Matt", "ShaderNodeBsdfDiffuse"))
-        layer = bpy.context.view_layer
-        layer.use_pass_environment = has_environment
-        layer.lightgroups.add(name="World")
-        scene.world.lightgroup = "World"
-        layer.aovs.add().name = "Told"
-        told = scene.world.node_tree.nodes.new("ShaderNodeOutputAOV")
-        setattr(told, "aov_name" if hasattr(told, "aov_name") else "name", "Told")
-        told.inputs["Color"].default_value = (0.2, 0.4, 0.6, 1.0)
-        names = ["Combined", "Combined_World", "Told"] + ["Env"] * has_environment
-        found[has_environment] = _both(names)
-    return found
-
-
-@pytest.mark.parametrize("has_environment", (False, True))
-def test_transparent_film(blender, has_environment):
-    """What it leaves out is in the Environment pass, and with that in those of light groups and AOVs."""
-    pictures = blender.run(inside_transparent_film)[has_environment]
-    told = pictures.pop("Told")
-    assert all(picture[..., :3].any() == has_environment for picture in told)
-    if has_environment:
-        pictures["Told"] = told
-    for name, (ours, theirs) in pictures.items():
-        _agree(ours, theirs, name)
-    assert (pictures["Combined_World"][0][..., :3].mean() > 0.3) == has_environment
-
-
 def inside_hair():
     """{(model, parametrization): passes} of a ball of Principled Hair by both."""
     import bpy
@@ -254,6 +215,43 @@ def test_hair(blender):
         _agree(*pictures["GlossCol"], case, off=HAIR_OFF)
         if blender_support.version() >= (4, 0):
             _agree(*pictures["GlossDir"], case, off=HAIR_OFF)
+
+
+# Transparent film --------------------------------------------------------------------------------
+
+def inside_transparent_film(has_environment):
+    """{pass: pictures by both} of a world of a light group and with an AOV, behind a clear ball and a matt one, by a
+    transparent film, with an Environment pass or without."""
+    import bpy
+    import scenes
+    scene = scenes.empty(size=(32, 24))
+    scene.render.film_transparent = True
+    scenes.camera()
+    scenes.light_world((0.3, 0.5, 0.7))
+    scenes.sphere(material=scenes.material("Clear", "ShaderNodeBsdfTransparent", Color=(0.5, 0.5, 0.5)))
+    scenes.sphere("Matt", 0.5, (1.2, 0.0, 0.0), scenes.material("Matt", "ShaderNodeBsdfDiffuse"))
+    layer = bpy.context.view_layer
+    layer.use_pass_environment = has_environment
+    layer.lightgroups.add(name="World")
+    scene.world.lightgroup = "World"
+    layer.aovs.add().name = "Told"
+    told = scene.world.node_tree.nodes.new("ShaderNodeOutputAOV")
+    setattr(told, "aov_name" if hasattr(told, "aov_name") else "name", "Told")
+    told.inputs["Color"].default_value = (0.2, 0.4, 0.6, 1.0)
+    return _both(["Combined", "Combined_World", "Told"] + ["Env"] * has_environment)
+
+
+@pytest.mark.parametrize("has_environment", (False, True))
+def test_transparent_film(blender, has_environment):
+    """What it leaves out is in the Environment pass, and with that in those of light groups and AOVs."""
+    pictures = blender.run(inside_transparent_film, has_environment)
+    told = pictures.pop("Told")
+    assert all(picture[..., :3].any() == has_environment for picture in told)
+    if has_environment:
+        pictures["Told"] = told
+    for name, (ours, theirs) in pictures.items():
+        _agree(ours, theirs, name)
+    assert (pictures["Combined_World"][0][..., :3].mean() > 0.3) == has_environment
 
 
 # Mist ---------------------------------------------------------------------------------------------
