@@ -194,11 +194,14 @@ void trc_curve_fetch(struct trc_surface *s, vmask lanes) {
     vvec3 error = v3_mad(v3_abs(c[0]), reach.x,
                          v3_mad(v3_abs(c[1]), reach.y, v3_scale(v3_abs(c[2]), reach.z)));
     error = v3_scale(v3_add(error, v3_add(v3_abs(p), v3_abs(m.to_world.origin))), ERROR_STEPS);
+    vvec3 world = normal_to_world(&m, n);
     /* Such balls are lit as round ones where they are stretched: by where their middle is. */
     const vmask round = vf_eq(shape, vf_set(TRC_SHAPE_BALLS));
-    const vvec3 outward = trc_transform_vector(&m.to_world, n);
-    const vvec3 scaled = v3_scale(outward, vf_divide(one, v3_max(v3_abs(outward))));
-    vvec3 world = v3_select(round, v3_normalize(scaled), normal_to_world(&m, n));
+    if (vm_any(vm_and(lanes, round))) {
+        const vvec3 outward = trc_transform_vector(&m.to_world, n);
+        const vvec3 scaled = v3_scale(outward, vf_divide(one, v3_max(v3_abs(outward))));
+        world = v3_select(round, v3_normalize(scaled), world);
+    }
     world = v3_select(vf_gt(v3_dot(world, world), vf_set(0.5f)), world, s->wo);
     const vmask back = vm_and(lanes, vf_lt(v3_dot(world, s->wo), zero));
     const vvec3 facing = v3_select(back, v3_neg(world), world);
