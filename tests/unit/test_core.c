@@ -120,20 +120,24 @@ static void memory_is_aligned_and_counted(void **state) {
     trc_free(NULL);
 }
 
-/* In large pages: any size, all of it to write and to free. */
+/* In large pages: any size, all of it to write and to free, and cleared again where asked for. */
 static void large_blocks(void **state) {
     (void)state;
     const uint64_t before = trc_memory_bytes();
     for (size_t bytes = (size_t)1 << 20; bytes < (size_t)1 << 25; bytes = 2 * bytes + 4093) {
-        char *block = trc_alloc_large(bytes, 1);
-        assert_non_null(block);
-        assert_int_equal((uintptr_t)block % 64, 0);
-        assert_int_equal(trc_memory_bytes() - before, bytes);
-        memset(block, 0x5a, bytes);
-        trc_free(block);
+        for (int zeroed = 0; zeroed < 2; zeroed++) {
+            char *block = zeroed ? trc_alloc_zeroed(bytes, 1) : trc_alloc(bytes, 1);
+            assert_non_null(block);
+            assert_int_equal((uintptr_t)block % 64, 0);
+            assert_int_equal(trc_memory_bytes() - before, bytes);
+            for (size_t i = 0; zeroed && i < bytes; i++)
+                assert_int_equal(block[i], 0);
+            memset(block, 0x5a, bytes);
+            trc_free(block);
+        }
     }
     assert_int_equal(trc_memory_bytes(), before);
-    assert_null(trc_alloc_large(SIZE_MAX, 2));
+    assert_null(trc_alloc(SIZE_MAX, 2));
 }
 
 static void memory_sizes_do_not_wrap(void **state) {

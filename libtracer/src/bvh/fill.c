@@ -34,7 +34,7 @@ static trc_status tree_alloc(struct trc_tree *tree, uint32_t node_count, uint32_
                               .root = TRC_REF_EMPTY,
                               .is_top = is_top};
     tree->node_stride = TRC_NODE_CHILDREN_BYTES + (size_t)key_count * TRC_NODE_KEY_BYTES;
-    tree->nodes = trc_alloc_large(node_count ? node_count : 1, tree->node_stride);
+    tree->nodes = trc_alloc(node_count ? node_count : 1, tree->node_stride);
     size_t floats = (size_t)slot_count * key_count * TRC_TRIANGLE_FLOATS;
     if (mesh && mesh->shape) {
         tree->shape = mesh->shape;
@@ -42,7 +42,7 @@ static trc_status tree_alloc(struct trc_tree *tree, uint32_t node_count, uint32_
         floats = (size_t)mesh->vertex_count * key_count * TRC_CURVE_VERTEX_FLOATS;
     }
     if (!is_top) {
-        tree->vertices = trc_alloc_large(floats + LOAD_SLOTS, sizeof *tree->vertices);
+        tree->vertices = trc_alloc(floats + LOAD_SLOTS, sizeof *tree->vertices);
         tree->slots = slots ? slots : slots_alloc(slot_count);
         if (slots)
             atomic_fetch_add(&slots->refs, 1);
@@ -301,7 +301,7 @@ trc_status trc_tree_fill(const struct trc_topology *topology,
 }
 
 static struct trc_slot_vertices *slot_vertices_alloc(uint32_t count) {
-    struct trc_slot_vertices *v = trc_alloc_large(sizeof *v + count * sizeof v->index[0], 1);
+    struct trc_slot_vertices *v = trc_alloc(sizeof *v + count * sizeof v->index[0], 1);
     if (v)
         atomic_init(&v->refs, 1);
     return v;

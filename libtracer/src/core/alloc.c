@@ -8,10 +8,8 @@
 
 /* A cache line, and the widest vector register. */
 #define ALIGNMENT 64
-/* Of x86 and arm64. */
+/* Of x86 and arm64. Blocks of one or more take them. */
 #define LARGE_PAGE ((size_t)2 << 20)
-/* Any block of so many takes them: what its alignment may waste is little beside it. */
-#define MANY_LARGE_PAGES 4
 
 /* Stands directly before a block. */
 struct header {
@@ -50,14 +48,22 @@ static void count_block(size_t bytes) {
     }
 }
 
-static void *allocate(size_t count, size_t size, size_t alignment, bool zeroed) {
+/* Up to the end of its last large page, unless less than half of that is asked for. */
+static size_t whole_pages(size_t bytes) {
+    return bytes % LARGE_PAGE < LARGE_PAGE / 2 ? bytes : (bytes | (LARGE_PAGE - 1)) + 1;
+}
+
+static void *allocate(size_t count, size_t size, bool zeroed) {
     if (trc_memory_should_fail())
         return NULL;
-    if (size && count > (PTRDIFF_MAX - 2 * LARGE_PAGE) / size)
+    if (size && count > (PTRDIFF_MAX - 3 * LARGE_PAGE) / size)
         return NULL;
     const size_t bytes = count * size;
-    const size_t total = bytes + sizeof(struct header) + alignment - 1;
-    /* calloc leaves untouched pages of a large film to the system. */
+    const bool is_large = bytes >= LARGE_PAGE;
+    const size_t used = is_large ? whole_pages(bytes) : bytes;
+    const size_t alignment = is_large ? LARGE_PAGE : ALIGNMENT;
+    const size_t total = used + sizeof(struct header) + alignment - 1;
+    /* calloc leaves untouched pages of a large film to the system, large ones too. */
     char *base = zeroed ? calloc(1, total) : malloc(total);
     if (!base)
         return NULL;
@@ -65,30 +71,15 @@ static void *allocate(size_t count, size_t size, size_t alignment, bool zeroed) 
     char *block = base + sizeof(struct header) + (-first & (alignment - 1));
     const struct header header = {base, bytes};
     memcpy(block - sizeof header, &header, sizeof header);
+    if (is_large)
+        trc_system_want_large_pages(block, used);
     count_block(bytes);
     return block;
 }
 
-static void *allocate_large(size_t count, size_t size) {
-    void *block = allocate(count, size, LARGE_PAGE, false);
-    if (block)
-        trc_system_want_large_pages(block, count * size);
-    return block;
-}
+void *trc_alloc(size_t count, size_t size) { return allocate(count, size, false); }
 
-void *trc_alloc(size_t count, size_t size) {
-    if (size && count >= MANY_LARGE_PAGES * LARGE_PAGE / size)
-        return allocate_large(count, size);
-    return allocate(count, size, ALIGNMENT, false);
-}
-
-void *trc_alloc_zeroed(size_t count, size_t size) { return allocate(count, size, ALIGNMENT, true); }
-
-void *trc_alloc_large(size_t count, size_t size) {
-    if (!size || count < LARGE_PAGE / size)
-        return allocate(count, size, ALIGNMENT, false);
-    return allocate_large(count, size);
-}
+void *trc_alloc_zeroed(size_t count, size_t size) { return allocate(count, size, true); }
 
 void trc_free(void *block) {
     if (!block)

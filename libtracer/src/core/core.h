@@ -20,12 +20,10 @@ trc_status trc_fail(trc_status status, const char *format, ...)
     __attribute__((format(TRC_PRINTF, 2, 3)));
 
 /* Memory of the library: 64-byte aligned, counted, may fail (NULL). Sizes are count * size, checked
- * for overflow. trc_free(NULL) is fine. Freed blocks must come from here. */
+ * for overflow. trc_free(NULL) is fine. Freed blocks must come from here. Blocks of 2 MiB or more
+ * take large pages where there are any: the system clears each whole when it is met first. */
 void *trc_alloc(size_t count, size_t size);
 void *trc_alloc_zeroed(size_t count, size_t size);
-/* The same in large pages, where there are any, for what is read all over for long: each is cleared
- * whole when it is met first. */
-void *trc_alloc_large(size_t count, size_t size);
 void trc_free(void *block);
 
 /* Bytes in use now and at most. */
