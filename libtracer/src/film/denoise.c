@@ -60,25 +60,23 @@ trc_status trc_film_add_halves(const trc_render_desc *desc, struct trc_film *fil
 }
 
 trc_status trc_denoise_create(struct trc_film *film, struct trc_denoise *denoise) {
-    const size_t pixels = (size_t)film->width * film->height;
     *denoise = (struct trc_denoise){.film = film};
-    float **const planes[] = {&denoise->variance, &denoise->error, &denoise->missed[0],
-                              &denoise->missed[1], &denoise->change};
-    bool ok = true;
-    for (int k = 0; ok && k < TRC_FEATURE_COUNT; k++)
-        ok = (denoise->features[k] = trc_alloc(pixels, sizeof(float))) != NULL;
-    for (size_t k = 0; ok && k < sizeof planes / sizeof *planes; k++)
-        ok = (*planes[k] = trc_alloc(pixels, sizeof(float))) != NULL;
-    return ok ? TRC_OK : trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for reconstruction");
+    float **const planes[TRC_DENOISE_PLANES - TRC_FEATURE_COUNT] = {
+        &denoise->variance, &denoise->error, &denoise->missed[0], &denoise->missed[1],
+        &denoise->change};
+    /* One block, which may take large pages where a plane could not. */
+    const size_t pixels = (size_t)film->width * film->height;
+    denoise->memory = trc_alloc(pixels, TRC_DENOISE_PIXEL_BYTES);
+    if (!denoise->memory)
+        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for reconstruction");
+    for (int k = 0; k < TRC_FEATURE_COUNT; k++)
+        denoise->features[k] = denoise->memory + (size_t)k * pixels;
+    for (int k = TRC_FEATURE_COUNT; k < TRC_DENOISE_PLANES; k++)
+        *planes[k - TRC_FEATURE_COUNT] = denoise->memory + (size_t)k * pixels;
+    return TRC_OK;
 }
 
 void trc_denoise_destroy(struct trc_denoise *denoise) {
-    for (int k = 0; k < TRC_FEATURE_COUNT; k++)
-        trc_free(denoise->features[k]);
-    trc_free(denoise->variance);
-    trc_free(denoise->error);
-    trc_free(denoise->missed[0]);
-    trc_free(denoise->missed[1]);
-    trc_free(denoise->change);
+    trc_free(denoise->memory);
     memset(denoise, 0, sizeof *denoise);
 }

@@ -46,10 +46,12 @@ struct trc_denoise {
     /* What these are of: by how much each half's prediction misses the half, and by how much the
      * first half exceeds the other, relative to the light around. 0 where there is but one half. */
     float *missed[2], *change;
+    float *memory; /* all of the above */
 };
 
-/* Bytes of the above for each pixel. */
-#define TRC_DENOISE_PIXEL_BYTES ((TRC_FEATURE_COUNT + 5) * sizeof(float))
+/* Planes of the above, and their bytes for each pixel. */
+#define TRC_DENOISE_PLANES (TRC_FEATURE_COUNT + 5)
+#define TRC_DENOISE_PIXEL_BYTES (TRC_DENOISE_PLANES * sizeof(float))
 
 /* A pixel of the frame beyond whose edges it is mirrored; far outside, its edge. */
 static inline uint32_t trc_mirror(int64_t x, uint32_t size) {
