@@ -52,6 +52,8 @@ PASSES = tuple(Pass(index, (name, long_name), PASS_CHANNELS[index], setting)
                for index, (name, long_name, setting) in _BLENDER_PASSES.items())
 COMBINED = PASSES[0]
 
+_LARGE_PAGE_BYTES = 2 << 20
+
 # Name, setting of the view layer.
 CRYPTOMATTES = {CryptomatteKind.OBJECT: ("CryptoObject", "use_pass_cryptomatte_object"),
                 CryptomatteKind.MATERIAL: ("CryptoMaterial", "use_pass_cryptomatte_material"),
@@ -177,6 +179,15 @@ def request_fields(entries):
     }
 
 
+def _room(count):
+    """Float32 for the library to fill, flat. numpy asks for large pages of what is many, which it does not align."""
+    if count * 4 < _LARGE_PAGE_BYTES:
+        return np.empty(count, np.float32)
+    room = np.empty(count + _LARGE_PAGE_BYTES // 4, np.float32)
+    start = -room.ctypes.data % _LARGE_PAGE_BYTES // 4
+    return room[start:start + count]
+
+
 def write(render, layer, entries):
     """Copy the film into a render layer's passes with one assignment.
 
@@ -185,11 +196,14 @@ def write(render, layer, entries):
     by_name = {name_of(entry): entry for entry in entries}
     pixel_count = render.size[0] * render.size[1]
     targets = [(by_name.get(target.name), target.channels * pixel_count) for target in layer.passes]
-    flat = np.zeros(sum(count for _, count in targets), np.float32)
+    flat = _room(sum(count for _, count in targets))
     start = 0
     for entry, count in targets:
-        if entry is not None:
-            render.read(entry.index, flat[start:start + count])
+        pixels = flat[start:start + count]
+        if entry is None:
+            pixels[:] = 0.0
+        else:
+            render.read(entry.index, pixels)
         start += count
     layer.passes.foreach_set("rect", flat)
 
@@ -209,7 +223,7 @@ def read_shown(render, entry):
         return read_combined(render)
     width, height = render.size
     channels = len(entry.channels)
-    values = render.read(entry.index, np.empty(width * height * channels, np.float32))
+    values = render.read(entry.index, _room(width * height * channels))
     pixels = np.ones((height, width, 4), np.float32)
     pixels[..., :3] = values.reshape(height, width, channels)[..., :3]
     return pixels
@@ -218,11 +232,10 @@ def read_shown(render, entry):
 def read_preview(render):
     """The film's Combined pass as :func:`read_combined`, quickly reconstructed."""
     width, height = render.size
-    return render.read_preview(np.empty(width * height * 4, np.float32)).reshape(height, width, 4)
+    return render.read_preview(_room(width * height * 4)).reshape(height, width, 4)
 
 
 def read_combined(render):
     """The film's Combined pass, (height, width, 4) float32, bottom row first."""
     width, height = render.size
-    pixels = np.empty(width * height * 4, np.float32)
-    return render.read(COMBINED.index, pixels).reshape(height, width, 4)
+    return render.read(COMBINED.index, _room(width * height * 4)).reshape(height, width, 4)
