@@ -43,7 +43,7 @@ def error_options(options, scope, made):
         "--reference-samples", str(scope.reference_samples),
         "--reference-seeds", str(scope.reference_seeds), "--repeats", str(scope.repeats),
         "--times-scale", str(scope.times_scale), "--threads", str(options.threads),
-        "--build", str(options.build), "--blender", options.blender])
+        "--build", str(options.build), "--blender", options.blender, "--scenes", str(options.scenes or ".")])
     own.configurations = made
     return error_time.identify(own)
 

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Denoise: errors and times with it and without beside Cycles, what the filter costs, and whether the number of
-threads changes it."""
+"""Denoise: errors and times with it and without beside Cycles, flicker, what the filter costs, and whether the
+number of threads changes it."""
 
+import argparse
 import os
 import pathlib
 import statistics
@@ -15,29 +16,32 @@ import error_time
 import numpy as np
 
 from . import curves, estimates
+from .scope import FOLDER_CURVES
 
 DENOISED = "volley denoised"
 PLAIN = curves.DEFAULT
-# Enough to tell a tenth, in some 8 minutes of two quiet processors.
-NUMBERS = {"samples": (1, 4, 16, 64, 256), "time_samples": (4, 64), "seeds": 2, "reference_samples": 512,
-           "reference_seeds": 2, "repeats": 2, "times_scale": 2}
+# What is timed of a scope: enough to tell a tenth.
+TIMED = {"time_samples": (4, 64), "repeats": 2}
 COST_SCENE, COST_WIDTH, COST_HEIGHT, COST_SAMPLES, COST_REPEATS = "billiards", 960, 540, 2, 3
 PICTURE_SAMPLES = 16
+FLICKER_SCENES, FLICKER_FRAMES, FLICKER_SAMPLES, FLICKER_REFERENCE_SAMPLES = ("example_motion", "robot_motion"), 24, 16, 512
 
 
 def measure(options, scope, pictures):
-    """{"scenes": as curves.measure, "worst_tiles", "costs"}; empty where the scope leaves it out."""
+    """{"scenes": as curves.measure, "worst_tiles", "flicker", "costs"}; empty where the scope leaves it out."""
     if not scope.denoise:
         return {}
-    made, scenes, tiles = replace(scope, **NUMBERS), {}, {}
+    made, scenes, tiles = replace(scope, **TIMED), {}, {}
     configurations = [error_time.Configuration(curves.BASE, "CYCLES"), curves.volley("SOBOL", 1),
                       error_time.Configuration(DENOISED, "VOLLEY", {**curves.volley("SOBOL", 1).volley,
                                                                     "use_denoising": True})]
-    for name in scope.scenes:
+    names = scope.scenes + (FOLDER_CURVES if options.scenes else ())
+    for name in names:
         own = curves.error_options(options, made, configurations)
         scenes[name] = error_time.measure_scene(name, own)
         tiles[name] = _tiles_and_picture(name, own, pictures)
-    return {"scenes": scenes, "worst_tiles": tiles, "costs": costs(options)}
+    return {"scenes": scenes, "worst_tiles": tiles, "costs": costs(options),
+            "flicker": {name: flicker(name, options) for name in FLICKER_SCENES if name in names}}
 
 
 def _tiles_and_picture(name, options, folder):
@@ -47,20 +51,37 @@ def _tiles_and_picture(name, options, folder):
     blend, key, _name = compare_cycles.prepared_scene(own)
     seeds = list(range(error_time.FIRST_SEED, error_time.FIRST_SEED + own.seeds))
     points = [(samples, seeds) for samples in own.samples]
-    exact = error_time.reference_stack(blend, key, own).mean(axis=0).astype(np.float64)
+    reference = error_time.Reference.of_stack(error_time.reference_stack(blend, key, own))
     plain, clean = (dict(zip(own.samples, error_time.render_stacks(blend, key, configuration, points, own)))
                     for configuration in own.configurations if configuration.name in (PLAIN, DENOISED))
     folder.mkdir(parents=True, exist_ok=True)
     compare.write_png(folder / f"denoise-{name}.png", np.concatenate(
-        [plain[PICTURE_SAMPLES][0], clean[PICTURE_SAMPLES][0], exact], axis=1) * 2.0 ** own.stops)
-    return {samples: denoise.worst_tile(*(np.mean([denoise.relative_error(picture, exact) for picture in stacks[samples]],
-                                                  axis=0) for stacks in (plain, clean))) for samples in own.samples}
+        [plain[PICTURE_SAMPLES][0], clean[PICTURE_SAMPLES][0], reference.mean], axis=1) * 2.0 ** own.stops)
+    return {samples: denoise.worst_tile(*(_mean_error(stacks[samples], reference) for stacks in (plain, clean)))
+            for samples in own.samples}
+
+
+def _mean_error(stack, reference):
+    """relMSE by pixel, the mean over seeds; the reference's own variance is taken off."""
+    noise = (reference.weights("rel_mse") * reference.variance).mean(axis=-1)
+    return np.mean([denoise.relative_error(picture, reference.mean) for picture in stack], axis=0) - noise
+
+
+def flicker(name, options):
+    """{"with", "without": flicker over that of 4 times the samples} of successive frames of a scene."""
+    own = error_time.scene_options(name, curves.error_options(options, options.scope, []))
+    blend, _key, _name = compare_cycles.prepared_scene(own)
+    asked = argparse.Namespace(**{**vars(own), "frame": 1, "flicker": FLICKER_FRAMES, "samples": [FLICKER_SAMPLES],
+                                  "reference_samples": FLICKER_REFERENCE_SAMPLES})
+    row, = denoise.measure_flicker(pathlib.Path(blend), asked)
+    found, base = row["flicker"], row["flicker"]["plain, 4 times"]
+    return {"with": found["denoised"] / base, "without": found["plain"] / base}
 
 
 def costs(options):
     """For one thread and all: seconds a megapixel that the filter adds, and whether the picture has the same bits
     as by one thread."""
-    own = error_time.scene_options(COST_SCENE, curves.error_options(options, replace(options.scope, **NUMBERS), []))
+    own = error_time.scene_options(COST_SCENE, curves.error_options(options, replace(options.scope, **TIMED), []))
     blend, _key, _name = compare_cycles.prepared_scene(own)
     own.width, own.height, rows, first = COST_WIDTH, COST_HEIGHT, [], None
     with tempfile.TemporaryDirectory() as folder:

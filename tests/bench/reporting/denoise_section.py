@@ -24,7 +24,7 @@ def text(made):
     parts += ["The largest such relMSE of tiles of 32 x 32 pixels:",
               _ratios([(name, list(tiles.values())) for name, tiles in made["worst_tiles"].items()], samples, MAX_TILE),
               "Time of Cycles' plain picture over that of Volley for the same error, the filter's time included; – where "
-              "the errors measured do not reach that one.", _times(scenes), _costs(made["costs"])]
+              "the errors measured do not reach that one.", _times(scenes), _flicker(made["flicker"]), _costs(made["costs"])]
     return "\n\n".join(parts)
 
 
@@ -43,6 +43,16 @@ def _times(scenes):
     heads = [f"{curves.MEASURES[measure]}, {count} samples, {kind}" for measure in TIMED for count in PEER_SAMPLES
              for kind in ("Denoise", "plain")]
     return table(["scene", *heads], [*rows, ["median", *(digits(denoise.middle(column)) for column in zip(*found.values()))]])
+
+
+def _flicker(scenes):
+    """How much less or more the error changes from frame to frame than without the filter."""
+    return "\n\n".join([
+        f"Flicker over {denoise.FLICKER_FRAMES} frames at {denoise.FLICKER_SAMPLES} samples, each frame with another seed: the "
+        "relative square by which a pixel's error changes from one frame to the next, over that of plain pictures of 4 times "
+        "the samples:",
+        table(["scene", "with Denoise", "without"],
+              [[words(name), digits(row["with"]), digits(row["without"])] for name, row in scenes.items()])])
 
 
 def _costs(rows):
