@@ -28,20 +28,23 @@ FLICKER_SCENES, FLICKER_FRAMES, FLICKER_SAMPLES, FLICKER_REFERENCE_SAMPLES = ("e
 
 
 def measure(options, scope, pictures):
-    """{"scenes": as curves.measure, "worst_tiles", "flicker", "costs"}; empty where the scope leaves it out."""
+    """{"scenes": as curves.measure, "worst_tiles", "flicker", "costs"}; empty where the scope leaves it out. Pictures
+    go to a folder, those of files that others made beside what was built."""
     if not scope.denoise:
         return {}
     made, scenes, tiles = replace(scope, **TIMED), {}, {}
     configurations = [error_time.Configuration(curves.BASE, "CYCLES"), curves.volley("SOBOL", 1),
                       error_time.Configuration(DENOISED, "VOLLEY", {**curves.volley("SOBOL", 1).volley,
                                                                     "use_denoising": True})]
-    names = scope.scenes + (FOLDER_CURVES if options.scenes else ())
-    for name in names:
+    folders = dict.fromkeys(scope.scenes, pictures)
+    if options.scenes:
+        folders.update(dict.fromkeys(FOLDER_CURVES, options.build / "pictures"))
+    for name, folder in folders.items():
         own = curves.error_options(options, made, configurations)
         scenes[name] = error_time.measure_scene(name, own)
-        tiles[name] = _tiles_and_picture(name, own, pictures)
+        tiles[name] = _tiles_and_picture(name, own, folder)
     return {"scenes": scenes, "worst_tiles": tiles, "costs": costs(options),
-            "flicker": {name: flicker(name, options) for name in FLICKER_SCENES if name in names}}
+            "flicker": {name: flicker(name, options) for name in FLICKER_SCENES if name in folders}}
 
 
 def _tiles_and_picture(name, options, folder):

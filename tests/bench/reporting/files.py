@@ -10,9 +10,12 @@ FROM_FOLDER = ("conference", "robot", "knight", "lost_empire")  # of the folder 
 
 
 def measure(options, scope, pictures):
-    """{scene: what whole_renders.measure_scene() gives}; PNGs of both into a folder."""
-    names = scope.file_scenes + (FROM_FOLDER if options.scenes and scope.file_scenes else ())
-    return {name: whole_renders.measure_scene(name, SIZE_PX, options, scope, pictures) for name in names}
+    """{scene: what whole_renders.measure_scene() gives}; PNGs of both into a folder, those of files that others
+    made beside what was built."""
+    folders = dict.fromkeys(scope.file_scenes, pictures)
+    if options.scenes and scope.file_scenes:
+        folders.update(dict.fromkeys(FROM_FOLDER, options.build / "pictures"))
+    return {name: whole_renders.measure_scene(name, SIZE_PX, options, scope, folder) for name, folder in folders.items()}
 
 
 def runs(results):
