@@ -192,7 +192,7 @@ def equal_error(scenes):
     return ("## Time to equal error: Cycles over Volley\n\n"
             "Each figure is a geometric mean over the errors that both curves reach. `l4` has four "
             "shadow rays at each point that the camera sees. Both engines run inside Blender, times "
-            "are those of F12 with synchronising and saving.\n\n"
+            f"are those of F12 with synchronising and saving, at {timed_sizes(scenes)}.\n\n"
             "![Time to equal error](plots/time-to-equal-error.svg)\n\n" + equal_error_table(scenes))
 
 
@@ -200,7 +200,15 @@ def equal_error_elsewhere(run):
     """The same in a newer Blender."""
     return (f"### In {run['blender']}\n\n"
             f"Both engines in the Blender of {run['system']}, the library of its compiler, on the same machine, "
-            "with references by its own Cycles.\n\n" + equal_error_table(run["made"]))
+            f"with references by its own Cycles; timed at {timed_sizes(run['made'])}.\n\n"
+            + equal_error_table(run["made"]))
+
+
+def timed_sizes(scenes):
+    """The least and the most pixels of the pictures that were timed."""
+    sizes = sorted((scene["width"] * scene["times_scale"], scene["height"] * scene["times_scale"])
+                   for scene in scenes.values())
+    return " to ".join(dict.fromkeys(f"{width}×{height}" for width, height in (sizes[0], sizes[-1])))
 
 
 def curves_and_bias(scenes):
