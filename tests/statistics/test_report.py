@@ -75,7 +75,8 @@ def test_cost_outside_a_curve_is_unknown():
 def made_scene(speed, noise, seeds=6, bias=0.0):
     """A scene as JSON holds it: Volley is ``speed`` times as fast, its MSE ``noise`` times Cycles'."""
     generator = np.random.default_rng(11)
-    scene = {"curves": {}, "times": {}, "bias": {"volley sobol l1": {"tests": 3, "failed": 0}}}
+    scene = {"curves": {}, "times": {}, "bias": {"volley sobol l1": {"tests": 3, "failed": 0}},
+             "width": 128, "height": 72, "times_scale": 6}
     for name, cost, scale in (("cycles", 1.0, 1.0), ("volley sobol l1", 1.0 / speed, noise)):
         points, times = {}, {}
         for samples in (1, 4, 16, 64, 256):
@@ -130,7 +131,8 @@ def test_newer_blenders_have_their_own_figures():
     assert found["time at equal error"]["ball, volley sobol l1"][0] == pytest.approx(4.0, rel=0.08)
     assert found["time at equal error, Blender 9.9"]["ball, volley sobol l1"][0] == pytest.approx(
         0.5, rel=0.08)
-    assert "| ball |" in error_sections.equal_error_elsewhere(results["curves_sid"])
+    section = error_sections.equal_error_elsewhere(results["curves_sid"])
+    assert "| ball |" in section and "timed at 768×432." in section
 
 
 def test_hair_that_cycles_renders_sooner_is_a_loss():
