@@ -4,12 +4,12 @@
 #   bash tests/bench/report.sh [--quick|--full] [--out DIR] [--measure|--draw [--again DIR]]
 #                              [--baseline] [--parts PART...]
 #
-# On two quiet cores --quick takes about 4 minutes; the default an estimated 60, --full a night.
+# On two quiet cores --quick takes about 4 minutes; the default an estimated 240, --full a night.
 # --measure draws nothing; --draw draws the report of DIR anew from its JSON, with --again a second
 # run's beside it. DIR is build/report; tests/bench/report is the committed one. With --quick the
 # ratios are compared with the committed baseline: the exit code is 1 if one of them fell far in
 # repeated runs; with --baseline too, that baseline is written instead. A run into tests/bench/report
-# brings README.md up to it. `--parts denoise` takes some 8 minutes. What is missing is installed as
+# brings README.md up to it. `--parts denoise` takes some 30 minutes. What is missing is installed as
 # tests/setup.sh does it. curves_trixie, files_trixie and curves_sid are beside Cycles of Blender 4.3 and 5.2,
 # kernels_sid beside Embree 4 (see blender_next.sh); they are left out where those cannot be had. --scenes names
 # the folder of scenes that are not made here.

@@ -12,7 +12,7 @@ import pytest
 TESTS = pathlib.Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(TESTS / "support"), str(TESTS / "bench")]
 import flip  # noqa: E402  (the folders are on the path only now)
-from reporting import (curves, document, error_sections, estimates, frames, gate,  # noqa: E402
+from reporting import (curves, denoise, denoise_section, document, error_sections, estimates, frames, gate,  # noqa: E402
                        hair, machine, readme, repeated)
 
 
@@ -133,6 +133,23 @@ def test_newer_blenders_have_their_own_figures():
         0.5, rel=0.08)
     section = error_sections.equal_error_elsewhere(results["curves_sid"])
     assert "| ball |" in section and "timed at 768×432." in section
+
+
+def test_what_denoise_makes_worse_is_a_loss():
+    scene = made_scene(3.0, 1.0)
+    plain = scene["curves"][denoise.PLAIN]
+    scene["curves"][denoise.DENOISED] = {
+        count: {**point, "rel_mse": 0.5 * point["mse"], "flip": (1.2 if count == 16 else 0.9) * point["mse"],
+                "mse": 0.5 * point["mse"]} for count, point in plain.items()}
+    scene["curves"][denoise.PLAIN] = {count: {**point, "rel_mse": point["mse"], "flip": point["mse"]}
+                                      for count, point in plain.items()}
+    made = {"scenes": {"ball": scene}, "worst_tiles": {"ball": {1: 1.6, 16: 1.4}, "cube": {1: 1.4, 16: 0.3}},
+            "flicker": {"ball": {"with": 2.0, "without": 4.0}, "cube": {"with": 0.9, "without": 4.0}}}
+    found = denoise_section.losses(made)
+    assert len(found) == 3
+    assert found[0].startswith("ball, 16 samples: FLIP") and found[0].endswith("**1.20**")
+    assert found[1].startswith("ball, 1 samples: relMSE of the worst tile") and found[2].startswith("ball: flicker")
+    assert denoise_section.losses({}) == []
 
 
 def test_hair_that_cycles_renders_sooner_is_a_loss():

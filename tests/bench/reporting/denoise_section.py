@@ -10,6 +10,7 @@ MEASURES = ("mse", "rel_mse", "flip")
 PIXEL_BYTES = 172          # halves 48, clean Combined 32, features 28 and their passes' sums 56, estimates 8
 PASS_BYTES = 24            # three doubles
 MAX_RATIO, MAX_TILE = 1.05, 1.5  # of an error with Denoise to that without it; what is above is marked
+MAX_FLICKER = 1.0          # of that of plain pictures of 4 times the samples
 
 
 def text(made):
@@ -26,6 +27,27 @@ def text(made):
               "Time of Cycles' plain picture over that of Volley for the same error, the filter's time included; – where "
               "the errors measured do not reach that one.", _times(scenes), _flicker(made["flicker"]), _costs(made["costs"])]
     return "\n\n".join(parts)
+
+
+def losses(made):
+    """Errors, tiles and flicker that Denoise makes worse than it may, the worst number of samples of each scene."""
+    if not made:
+        return []
+    lines = []
+    for measure in MEASURES:
+        lines += _above(((name, {count: denoise.error_ratio(scene, measure, count) for count in scene["curves"][denoise.PLAIN]})
+                         for name, scene in made["scenes"].items()),
+                        f"{curves.MEASURES[measure]} with Denoise over that without", MAX_RATIO)
+    lines += _above(made["worst_tiles"].items(), "relMSE of the worst tile with Denoise over that without", MAX_TILE)
+    return lines + [f"{words(name)}: flicker with Denoise at {denoise.FLICKER_SAMPLES} samples over that of 4 times the "
+                    f"samples without **{digits(row['with'])}**"
+                    for name, row in made["flicker"].items() if row["with"] > MAX_FLICKER]
+
+
+def _above(scenes, what, most):
+    """A line for each (scene, {samples: ratio}) of which a ratio is above the most."""
+    worst = ((name, *max(ratios.items(), key=lambda row: row[1])) for name, ratios in scenes)
+    return [f"{words(name)}, {count} samples: {what} **{digits(value)}**" for name, count, value in worst if value > most]
 
 
 def _ratios(rows, samples, most):

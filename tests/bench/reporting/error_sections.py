@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sections about Volley beside Cycles, Embree and POV-Ray."""
 
-from . import curves, elsewhere, estimates, files, hair, kernels
+from . import curves, denoise_section, elsewhere, estimates, files, hair, kernels
 from .tables import digits, median_with_spread, ratio, table, words
 
 
@@ -103,7 +103,8 @@ def losing_cases(results):
         lines += losing_kernels(run["made"], elsewhere.embree_name(run))
     lines = [*lines, *losing_builds(results.get("kernels", [])),
              *losing_distances(results.get("kernels", [])), *losing_povray(results.get("povray", {})),
-             *hair.losses(results.get("hair", {})), *files.losses(results)]
+             *denoise_section.losses(results.get("denoise", {})), *hair.losses(results.get("hair", {})),
+             *files.losses(results)]
     if not lines:
         return "## Where Volley loses\n\nNowhere in what was measured."
     return "## Where Volley loses\n\n" + "\n".join(f"- {line}" for line in lines)

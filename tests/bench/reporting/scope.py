@@ -71,7 +71,7 @@ QUICK = Scope(
     largest_triangles=100_000, largest_lights=100, largest_instances=1000)
 
 MEDIUM = Scope(
-    name="medium", minutes=60,
+    name="medium", minutes=240,
     scenes=EFFECTS + JOINED, sampler_scenes=("gallery",), samples=(1, 4, 16, 64, 256, 1024),
     time_samples=(1, 4, 16, 64), seeds=10, reference_samples=1024, reference_seeds=4,
     light_samples=(1, 4), repeats=3, times_scale=TIMES_SCALE, denoise=True, elsewhere=True, farm=True,
@@ -86,7 +86,7 @@ MEDIUM = Scope(
 FULL = Scope(
     name="full", minutes=480,
     scenes=EFFECTS + JOINED, sampler_scenes=EFFECTS + JOINED,
-    samples=tuple(2 ** i for i in range(11)), time_samples=tuple(2 ** i for i in range(11)),
+    samples=tuple(2 ** i for i in range(11)), time_samples=(1, 4, 16, 64, 256),
     seeds=10, reference_samples=4096, reference_seeds=8, light_samples=(1, 2, 4, 8), repeats=5,
     times_scale=TIMES_SCALE, denoise=True, elsewhere=True, farm=True,
     hair_scenes=HAIR, file_scenes=FILES, whole_reference_samples=1024,
