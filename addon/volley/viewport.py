@@ -388,12 +388,12 @@ def _place_of(inner, outer, size):
 def _texture_of(pixels):
     """A half float texture of (height, width, 4) premultiplied scene-linear pixels."""
     height, width = pixels.shape[:2]
-    mend(pixels)
+    clip_to_half(pixels)
     buffer = gpu.types.Buffer('FLOAT', width * height * 4, pixels.reshape(-1))
     return gpu.types.GPUTexture((width, height), format='RGBA16F', data=buffer)
 
 
-def mend(pixels):
+def clip_to_half(pixels):
     """Bring what half floats cannot hold to the nearest that they can, NaN to 0, in place. Mostly there is none."""
     if not -MAX_HALF <= pixels.min() <= pixels.max() <= MAX_HALF:  # NaN is in no order
         np.nan_to_num(pixels, copy=False, nan=0.0, posinf=MAX_HALF, neginf=-MAX_HALF)

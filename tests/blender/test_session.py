@@ -115,19 +115,6 @@ def inside_viewport():
     return said, [each is opened for each in destroyed]
 
 
-def inside_pixels():
-    """Pixels that a viewport has mended, each with one number that half floats lack, or none."""
-    import numpy as np
-    from volley import viewport
-    mended = []
-    for bad in (0.5, float("nan"), float("inf"), float("-inf"), 1e6, -1e6):
-        pixels = np.full((2, 3, 4), 0.25, np.float32)
-        pixels[1, 2, 3] = bad
-        viewport.mend(pixels)
-        mended.append(pixels.reshape(-1).tolist())
-    return mended
-
-
 def test_a_viewport_warns_once_and_leaves_nothing(blender):
     said, freed = blender.run(inside_viewport)
     assert said == [({'WARNING'}, message) for message in ("no volumes", "no movies", "no links")]
@@ -176,6 +163,19 @@ def test_settings_of_the_next_render_are_taken(blender):
     assert counts == [1, 1, 2, 2, 3, 3]
     assert [tuple(each) for each in opened] == [(64, 1), (32, 1), (32, 2)]
     assert same == [[True, True], [False, True]]  # of the next frame, and of the first once more
+
+
+def inside_pixels():
+    """Pixels that a viewport has clipped, each with one number that half floats lack, or none."""
+    import numpy as np
+    from volley import viewport
+    clipped = []
+    for bad in (0.5, float("nan"), float("inf"), float("-inf"), 1e6, -1e6):
+        pixels = np.full((2, 3, 4), 0.25, np.float32)
+        pixels[1, 2, 3] = bad
+        viewport.clip_to_half(pixels)
+        clipped.append(pixels.reshape(-1).tolist())
+    return clipped
 
 
 def test_a_viewport_shows_what_half_floats_can_hold(blender):

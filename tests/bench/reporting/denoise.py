@@ -16,7 +16,7 @@ import error_time
 import numpy as np
 
 from . import curves, estimates
-from .scope import FOLDER_CURVES
+from .scope import FOLDER_CURVES, picture_folders
 
 DENOISED = "volley denoised"
 PLAIN = curves.DEFAULT
@@ -29,17 +29,14 @@ FLICKER_SCENES, FLICKER_FRAMES, FLICKER_SAMPLES, FLICKER_REFERENCE_SAMPLES = ("e
 
 
 def measure(options, scope, pictures):
-    """{"scenes": as curves.measure, "worst_tiles", "flicker", "costs"}; empty where the scope leaves it out. Pictures
-    go to a folder, those of files that others made beside what was built."""
+    """{"scenes": as curves.measure, "worst_tiles", "flicker", "costs"}; empty where the scope leaves it out."""
     if not scope.denoise:
         return {}
     made, scenes, tiles = replace(scope, **TIMED), {}, {}
     configurations = [error_time.Configuration(curves.BASE, "CYCLES"), curves.volley("SOBOL", 1),
                       error_time.Configuration(DENOISED, "VOLLEY", {**curves.volley("SOBOL", 1).volley,
                                                                     "use_denoising": True})]
-    folders = dict.fromkeys(scope.scenes, pictures)
-    if options.scenes:
-        folders.update(dict.fromkeys(FOLDER_CURVES, options.build / "pictures"))
+    folders = picture_folders(scope.scenes, FOLDER_CURVES, options, pictures)
     for name, folder in folders.items():
         own = curves.error_options(options, made, configurations)
         scenes[name] = error_time.measure_scene(name, own)

@@ -3,18 +3,15 @@
 leaves and triangles in motion."""
 
 from . import elsewhere, whole_renders
+from .scope import FOLDER_FILES, picture_folders
 from .tables import digits
 
 SIZE_PX = 320, 240
-FROM_FOLDER = ("conference", "robot", "knight", "lost_empire")  # of the folder of scenes, where there is one
 
 
 def measure(options, scope, pictures):
-    """{scene: what whole_renders.measure_scene() gives}; PNGs of both into a folder, those of files that others
-    made beside what was built."""
-    folders = dict.fromkeys(scope.file_scenes, pictures)
-    if options.scenes and scope.file_scenes:
-        folders.update(dict.fromkeys(FROM_FOLDER, options.build / "pictures"))
+    """{scene: what whole_renders.measure_scene() gives}; PNGs of both into a folder."""
+    folders = picture_folders(scope.file_scenes, FOLDER_FILES, options, pictures) if scope.file_scenes else {}
     return {name: whole_renders.measure_scene(name, SIZE_PX, options, scope, folder) for name, folder in folders.items()}
 
 

@@ -7,7 +7,9 @@ EFFECTS = ("edges", "defocus", "motion", "area_light", "gloss", "glass", "enviro
 JOINED = ("example_motion", "billiards", "gallery")
 HAIR = ("hair_head", "hair_fur", "hair_grass")
 FILES = ("example", "many_objects", "many_lights", "many_glasses", "foliage", "million_moving")
-FOLDER_CURVES = ("conference_motion", "robot_motion", "knight_motion")  # of the folder of scenes, where there is one
+# Of the folder of scenes that others made, where there is one.
+FOLDER_FILES = ("conference", "robot", "knight", "lost_empire")
+FOLDER_CURVES = ("conference_motion", "robot_motion", "knight_motion")
 SAMPLERS = ("SOBOL", "SUDOKU", "JITTER", "INDEPENDENT", "BLUE_NOISE")
 # Timed pictures are 768 x 432 and larger, as users render: in small ones Blender's own part of an F12 is half.
 TIMES_SCALE = 6
@@ -102,3 +104,10 @@ NEXT = replace(MEDIUM, name="next", samples=(1, 4, 16, 64, 256), sampler_scenes=
                elsewhere=False, farm=False)
 
 SCOPES = {scope.name: scope for scope in (QUICK, MEDIUM, FULL, NEXT)}
+
+
+def picture_folders(names, folder_names, options, pictures):
+    """{scene: folder of its PNGs}: those of the folder of scenes, where there is one, stay out of the report."""
+    if not options.scenes:
+        folder_names = ()
+    return {**dict.fromkeys(names, pictures), **dict.fromkeys(folder_names, options.build / "pictures")}
