@@ -40,8 +40,8 @@ def equal_error_line(scenes, cycles="Cycles"):
     lost = sum(value < 1.0 for value in ratios)
     middle = estimates.spread(ratios)["median"]
     return (f"{cycles} takes {digits(middle, 2)} times as long as Volley for the same error (median of "
-            f"{len(ratios)} scenes; {digits(min(ratios), 2)} to {digits(max(ratios), 2)}; Volley is "
-            f"slower in {lost}).")
+            f"{len(ratios)} scenes at {timed_sizes(scenes)}; {digits(min(ratios), 2)} to {digits(max(ratios), 2)}; "
+            f"Volley is slower in {lost}).")
 
 
 def kernel_line(rows, embree="Embree"):
