@@ -4,12 +4,14 @@
 import traceback
 
 import bpy
+from bpy.app.handlers import persistent
 
 from . import jobs, native, passes, viewport, writes
 from .farm import job
 from .farm.parts import PartError
 from .log import logger
 from .session import Session
+from .sync import image
 
 _RETRY_SECONDS = 0.5  # between two attempts to unregister during a render that cannot be waited for
 
@@ -33,6 +35,7 @@ class VolleyRenderEngine(bpy.types.RenderEngine):
         super().__init__(*args, **kwargs)
         self._session = None
         self._viewport = None
+        image.start_reader()  # before Blender evaluates the scene
 
     def __del__(self):
         jobs.forget(self)
@@ -149,6 +152,13 @@ def _leave_later():
     return None
 
 
+@persistent
+def _after_load(*_arguments):
+    """A file of this engine is open, which will be rendered before long."""
+    if any(scene.render.engine == VolleyRenderEngine.bl_idname for scene in bpy.data.scenes):
+        image.start_reader()
+
+
 def register():
     if bpy.app.timers.is_registered(_leave_later):
         bpy.app.timers.unregister(_leave_later)
@@ -158,8 +168,10 @@ def register():
     jobs.allow()
     if before is not VolleyRenderEngine:
         bpy.utils.register_class(VolleyRenderEngine)
+    bpy.app.handlers.load_post.append(_after_load)
 
 
 def unregister():
+    bpy.app.handlers.load_post.remove(_after_load)
     if not VolleyRenderEngine.leave():
         bpy.app.timers.register(_leave_later, first_interval=_RETRY_SECONDS, persistent=True)

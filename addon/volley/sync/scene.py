@@ -33,8 +33,7 @@ class SceneSync:
     """One scene of the library and what it was last given."""
 
     def __init__(self, is_final, thread_count, will_resync, image_megabytes=0, make_scene=native.Scene):
-        if image.has_files():
-            native.start_reader()
+        image.start_reader()
         self.scene = make_scene(is_final, thread_count, image_megabytes)
         self.warnings = Warnings()
         self._images = Images(self.scene, self.warnings)
