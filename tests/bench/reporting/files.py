@@ -6,7 +6,7 @@ from . import elsewhere, whole_renders
 from .scope import FOLDER_FILES, picture_folders
 from .tables import digits
 
-SIZE_PX = 320, 240
+SIZE_PX = 640, 480
 
 
 def measure(options, scope, pictures):
