@@ -70,6 +70,8 @@ class CameraType(IntEnum):
 class CurveShape(IntEnum):
     RIBBON = 0
     ROUND = 1
+    BALL = 2
+    HOLLOW_BALL = 3
 
 
 class NormalsLayout(IntEnum):

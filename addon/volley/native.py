@@ -334,7 +334,7 @@ class Scene:
     def create_curves(self, points, lengths=None, shape=abi.CurveShape.RIBBON, piece_count=1, attributes=(),
                       generated=None, tolerance=0.0):
         """Curves: points (keys, points, 4) float32, place and radius; lengths (strands,) uint32, points of
-        each, or None: balls; attributes: (name, array (points | strands, 2 | 4) float32, whether of strands),
+        each, None of balls; attributes: (name, array (points | strands, 2 | 4) float32, whether of strands),
         the default UV map first; generated: (strands, 3) or None; tolerance: in radii, 0 for piece_count
         pieces everywhere. They are a mesh to all else."""
         points, lengths = _array(points, np.float32), _array(lengths, np.uint32)

@@ -70,12 +70,13 @@ static trc_status create_curves(struct bytes *b, trc_scene scene, struct buffers
     bytes_floats(b, f->generated, (size_t)3 * points);
     trc_curves_desc desc = trc_curves_desc_default();
     desc.key_count = keys;
-    desc.shape = bytes_below(b, 2) ? TRC_CURVE_ROUND : TRC_CURVE_RIBBON;
+    desc.shape = bytes_below(b, TRC_CURVE_HOLLOW_BALL + 1);
     desc.piece_count = 1 + bytes_below(b, TRC_MAX_CURVE_PIECES);
     desc.point_count = points;
     desc.points = f->positions;
     desc.point_value_count = 4ull * points * keys;
-    desc.lengths = bytes_below(b, 4) ? f->lengths : NULL;
+    const bool has_lengths = desc.shape < TRC_CURVE_BALL;
+    desc.lengths = has_lengths != (bytes_below(b, 16) == 0) ? f->lengths : NULL;
     desc.strand_count = desc.lengths ? strands : 0;
     desc.generated = bytes_below(b, 2) ? f->generated : NULL;
     desc.generated_count = desc.generated ? 3ull * (desc.lengths ? strands : points) : 0;

@@ -8,6 +8,7 @@
 #define PIECES 3
 #define PIECES_OF_STRAND ((POINTS - 1) * PIECES)
 #define MAX_KEYS 3
+#define SHAPES (TRC_CURVE_HOLLOW_BALL + 1)
 #define RAYS 1200
 #define AIMED 20000 /* at once */
 /* A distance across a curve this near its edge, as a share of the radius, may go either way. */
@@ -23,11 +24,15 @@ struct strands {
     trc_id mesh;
 };
 
+static bool is_ball(uint32_t shape) {
+    return shape == TRC_CURVE_BALL || shape == TRC_CURVE_HOLLOW_BALL;
+}
+
 /* spacing: from strand to strand; 0: some cross. */
-static void strands_make(struct strands *s, struct rng *rng, uint32_t shape, bool balls,
-                         uint32_t key_count, bool moved, float spacing) {
+static void strands_make(struct strands *s, struct rng *rng, uint32_t shape, uint32_t key_count,
+                         bool moved, float spacing) {
     /* Pieces are longer than their radius, or open ends show what joints have of balls. */
-    const bool is_tube = shape == TRC_CURVE_ROUND && !balls;
+    const bool is_tube = shape == TRC_CURVE_ROUND, balls = is_ball(shape);
     s->desc = trc_curves_desc_default();
     for (uint32_t i = 0; i < STRANDS; i++) {
         float p[3], way[3];
@@ -268,18 +273,19 @@ static void expected(const struct strands *s, const struct ray_set *rays, uint32
     ray_set_get(rays, i, o, d);
     ray_to_object(s, o, d, rays->time[i], &ray);
     *sure = *unsure = INFINITY;
-    const uint32_t pieces = s->desc.lengths ? PIECES_OF_STRAND : POINTS;
+    const bool balls = is_ball(s->desc.shape);
+    const uint32_t pieces = balls ? POINTS : PIECES_OF_STRAND;
     for (uint32_t strand = 0; strand < STRANDS; strand++)
         for (uint32_t p = 0; p < pieces; p++) {
             double v[4][4], distance = INFINITY;
-            const bool first = p == 0, last = p + 1 == pieces, balls = !s->desc.lengths;
+            const bool first = p == 0, last = p + 1 == pieces;
             const uint32_t at = balls ? p * PIECES : p;
             vertex_at(s, strand, first || balls ? at : at - 1, rays->time[i], v[0]);
             vertex_at(s, strand, at, rays->time[i], v[1]);
             vertex_at(s, strand, balls ? at : at + 1, rays->time[i], v[2]);
             vertex_at(s, strand, balls ? at : last ? at + 1 : at + 2, rays->time[i], v[3]);
             const double(*const vertices)[4] = (const double(*)[4])v;
-            const enum answer answer = !balls && s->desc.shape == TRC_CURVE_RIBBON
+            const enum answer answer = s->desc.shape == TRC_CURVE_RIBBON
                                            ? meet_ribbon(&ray, vertices, &distance)
                                            : meet_round(&ray, vertices, first, last, &distance);
             if (answer == HITS && distance > 0)
@@ -348,11 +354,9 @@ static void check_against_oracle(struct strands *s, struct rng *rng) {
 static void test_against_double(void **state) {
     (void)state;
     struct rng rng = rng_seed(7);
-    for (uint32_t variant = 0; variant < 9; variant++) {
+    for (uint32_t variant = 0; variant < 3 * SHAPES; variant++) {
         static struct strands s;
-        const uint32_t kind = variant % 3;
-        strands_make(&s, &rng, kind == 1 ? TRC_CURVE_ROUND : TRC_CURVE_RIBBON, kind == 2, 1,
-                     variant / 3 == 1, 0.0f);
+        strands_make(&s, &rng, variant % SHAPES, 1, variant / SHAPES == 1, 0.0f);
         check_against_oracle(&s, &rng);
         assert_ok(trc_scene_destroy(s.scene));
     }
@@ -361,10 +365,9 @@ static void test_against_double(void **state) {
 static void test_moving(void **state) {
     (void)state;
     struct rng rng = rng_seed(8);
-    for (uint32_t kind = 0; kind < 3; kind++) {
+    for (uint32_t shape = 0; shape < SHAPES; shape++) {
         static struct strands s;
-        strands_make(&s, &rng, kind == 1 ? TRC_CURVE_ROUND : TRC_CURVE_RIBBON, kind == 2, MAX_KEYS,
-                     true, 0.0f);
+        strands_make(&s, &rng, shape, MAX_KEYS, true, 0.0f);
         check_against_oracle(&s, &rng);
         assert_ok(trc_scene_destroy(s.scene));
     }
@@ -432,7 +435,7 @@ static void test_aimed(void **state) {
         static struct strands s;
         uint64_t missed = 0;
         const uint32_t all = query_test_rays(AIMED);
-        strands_make(&s, &rng, variant % 2 ? TRC_CURVE_ROUND : TRC_CURVE_RIBBON, false,
+        strands_make(&s, &rng, variant % 2 ? TRC_CURVE_ROUND : TRC_CURVE_RIBBON,
                      variant / 2 ? MAX_KEYS : 1, variant / 2, 4.0f);
         for (uint32_t done = 0; done < all; done += AIMED)
             missed += missed_of(&s, &rng, all - done < AIMED ? all - done : AIMED);
@@ -458,7 +461,14 @@ static void test_bad_strands(void **state) {
     desc.points = points[0];
     desc.point_count = 6;
     desc.point_value_count = 24;
+    assert_int_equal(trc_curves_create(scene, &desc, &mesh), TRC_ERROR_INVALID_ARGUMENT);
     desc.lengths = lengths;
+    desc.strand_count = 4;
+    for (uint32_t shape = TRC_CURVE_BALL; shape <= SHAPES; shape++) { /* and one that is none */
+        desc.shape = shape;
+        assert_int_equal(trc_curves_create(scene, &desc, &mesh), TRC_ERROR_INVALID_ARGUMENT);
+    }
+    desc.shape = TRC_CURVE_RIBBON;
     desc.strand_count = 3;
     assert_int_equal(trc_curves_create(scene, &desc, &mesh), TRC_ERROR_INVALID_ARGUMENT);
     desc.strand_count = 4;

@@ -141,7 +141,7 @@ def curves_of(strands, wanted, values=(), generated=None):
     lengths = None if strands.lengths is None else strands.lengths.astype(np.uint32)
     shape = wanted.shape
     if lengths is None:
-        shape = abi.CurveShape.RIBBON if HAS_ROUND_BALLS else abi.CurveShape.ROUND
+        shape = abi.CurveShape.BALL if HAS_ROUND_BALLS else abi.CurveShape.HOLLOW_BALL
     return CurvesData(strands.points(), lengths, shape, wanted.pieces,
                       list(values)[:abi.MAX_ATTRIBUTES], generated)
 

@@ -12,17 +12,18 @@ TRC_BEGIN_DECLS
 /* Most pieces that a spline is cut into from one of its points to the next. */
 #define TRC_MAX_CURVE_PIECES 32
 
-/* What is around a curve. */
+/* What is around a curve, or a point. */
 enum trc_curve_shape {
-    TRC_CURVE_RIBBON = 0, /* flat, each ray sees it from the front, with the normals of a round
-                              one; ends are cut; nothing nearer than its width to a ray's origin
-                              counts, which is how it does not meet itself; of points: balls that
-                              take light of a shadow ray once, and have normals away from the
-                              middle where an instance stretches them, as in Cycles 5 */
-    TRC_CURVE_ROUND = 1   /* a tube, closed at its joints, cut upright and open at its ends; of
-                              points: balls that take light where a shadow ray comes in and where
-                              it goes out, ellipsoids where an instance stretches them, as in
-                              Cycles 4 */
+    TRC_CURVE_RIBBON = 0,     /* flat, each ray sees it from the front, with the normals of a round
+                                 one; ends are cut; nothing nearer than its width to a ray's origin
+                                 counts, which is how it does not meet itself */
+    TRC_CURVE_ROUND = 1,      /* a tube, closed at its joints, cut upright and open at its ends */
+    TRC_CURVE_BALL = 2,       /* at each point; takes light of a shadow ray once, and has normals
+                                 away from the middle where an instance stretches it, as in Cycles
+                                 5 */
+    TRC_CURVE_HOLLOW_BALL = 3 /* at each point; takes light where a shadow ray comes in and where it
+                                 goes out, an ellipsoid where an instance stretches it, as in Cycles
+                                 4 */
 };
 
 /* A named value of each point, or of each strand. */
@@ -50,8 +51,7 @@ typedef struct trc_curves_desc {
     const float *points;  /* 4 * point_count * key_count: x, y, z, radius in metres (below 0: 0) */
     uint64_t point_value_count; /* number of floats, checked */
     const uint32_t *lengths;    /* points of each strand: they sum up to point_count, strands of
-                                   fewer than two are left out; NULL: no strands, a ball at each
-                                   point, of either kind (shape) */
+                                   fewer than two are left out; NULL for balls */
     uint64_t strand_count;      /* number of lengths */
     const float *generated;     /* Generated coordinates, 3 floats for each strand (or ball), the
                                    same at all keys; NULL: the bounding box is the unit cube */

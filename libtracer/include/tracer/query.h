@@ -35,7 +35,7 @@ TRC_API trc_rays trc_rays_default(void);
 /* Arrays of count each, any may be NULL except instance. Barycentrics: hit = (1-u-v) p0 + u p1 + v
  * p2; of curves, u is along the piece, v across as the ray sees it, of round ones that are met from
  * within 4 more; of balls both are across, and v is 8 more where a ray leaves one of
- * TRC_CURVE_RIBBON that it came into. On a miss instance is TRC_NO_HIT and the rest is untouched.
+ * TRC_CURVE_BALL that it came into. On a miss instance is TRC_NO_HIT and the rest is untouched.
  * Of equal distances, the lowest (instance, triangle) in creation order wins. */
 typedef struct trc_hits {
     uint32_t struct_size; /* of this structure; checked */

@@ -6,6 +6,10 @@
 #include "scene/scene.h"
 #include "tracer/tracer.h"
 
+static bool is_ball(const trc_curves_desc *desc) {
+    return desc->shape == TRC_CURVE_BALL || desc->shape == TRC_CURVE_HOLLOW_BALL;
+}
+
 static trc_status check_attribute(const trc_curve_attribute *attribute,
                                   const trc_curves_desc *desc) {
     const char *name = "trc_curve_attribute";
@@ -25,7 +29,7 @@ static trc_status check_attribute(const trc_curve_attribute *attribute,
 static trc_status check_curves(const trc_curves_desc *desc) {
     TRC_TRY(trc_check_struct(desc, sizeof *desc, "trc_curves_desc"));
     TRC_TRY(trc_check_count(desc->key_count, 1, TRC_MAX_KEYS, "key_count"));
-    TRC_TRY(trc_check_enum(desc->shape, TRC_CURVE_ROUND + 1, "shape"));
+    TRC_TRY(trc_check_enum(desc->shape, TRC_CURVE_HOLLOW_BALL + 1, "shape"));
     TRC_TRY(trc_check_count(desc->piece_count, 1, TRC_MAX_CURVE_PIECES, "piece_count"));
     TRC_TRY(trc_check_float(desc->tolerance, 0.0f, 1e6f, "tolerance"));
     /* Singles first: later products of them cannot wrap. */
@@ -34,6 +38,10 @@ static trc_status check_curves(const trc_curves_desc *desc) {
     TRC_TRY(trc_check_array(desc->points, desc->point_value_count,
                             4 * desc->point_count * desc->key_count, sizeof(float), sizeof(float),
                             "points"));
+    if (is_ball(desc) && (desc->lengths || desc->strand_count))
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "trc_curves_desc: balls have no lengths");
+    if (!is_ball(desc) && !desc->lengths && desc->point_count)
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "trc_curves_desc: lengths is NULL");
     if (desc->lengths || desc->strand_count)
         TRC_TRY(trc_check_array(desc->lengths, desc->strand_count, desc->strand_count,
                                 sizeof(uint32_t), sizeof(uint32_t), "lengths"));

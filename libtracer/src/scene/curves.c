@@ -274,12 +274,17 @@ static trc_status add_attribute(struct trc_mesh_topology *t, const trc_curve_att
 
 #define GENERATED_FLOATS 3
 
+static uint32_t shape_of(const trc_curves_desc *desc) {
+    static const uint32_t shapes[] = {[TRC_CURVE_RIBBON] = TRC_SHAPE_RIBBONS,
+                                      [TRC_CURVE_ROUND] = TRC_SHAPE_ROUND,
+                                      [TRC_CURVE_BALL] = TRC_SHAPE_BALLS,
+                                      [TRC_CURVE_HOLLOW_BALL] = TRC_SHAPE_HOLLOW_BALLS};
+    return shapes[desc->shape];
+}
+
 /* What strands there are, and how they are cut. */
 static trc_status fill_strands(struct trc_mesh_topology *t, const trc_curves_desc *desc) {
-    if (desc->lengths)
-        t->shape = desc->shape == TRC_CURVE_RIBBON ? TRC_SHAPE_RIBBONS : TRC_SHAPE_ROUND;
-    else
-        t->shape = desc->shape == TRC_CURVE_RIBBON ? TRC_SHAPE_BALLS : TRC_SHAPE_HOLLOW_BALLS;
+    t->shape = shape_of(desc);
     t->normal_kind = TRC_NORMALS_NONE;
     t->point_count = (uint32_t)desc->point_count;
     t->strand_count = (uint32_t)(desc->lengths ? desc->strand_count : desc->point_count);
