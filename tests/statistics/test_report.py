@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tests of the report's estimates, its gate and its headline; no renders, no times."""
 
+import argparse
 import doctest
 import importlib
 import pathlib
@@ -13,7 +14,7 @@ TESTS = pathlib.Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(TESTS / "support"), str(TESTS / "bench")]
 import flip  # noqa: E402  (the folders are on the path only now)
 from reporting import (curves, denoise, denoise_section, document, error_sections, estimates, frames, gate,  # noqa: E402
-                       hair, machine, readme, repeated)
+                       hair, machine, readme, repeated, scope)
 
 
 @pytest.mark.parametrize("module", ["flip", "error_time", "stability", "reporting.estimates", "reporting.frames",
@@ -278,3 +279,12 @@ def test_readme_that_differs_is_found(tmp_path, name):
     assert not readme.agrees(changed)
     readme.write(changed)
     assert readme.agrees(changed)
+
+
+def test_pictures_of_the_folder_of_scenes_stay_out_of_the_report():
+    options = argparse.Namespace(scenes=None, build=pathlib.Path("build"))
+    report = pathlib.Path("report/pictures")
+    assert scope.picture_folders(("ours",), ("theirs",), options, report) == {"ours": report}
+    options.scenes = pathlib.Path("scenes")
+    assert scope.picture_folders(("ours",), ("theirs",), options, report) == {
+        "ours": report, "theirs": pathlib.Path("build/pictures")}

@@ -17,6 +17,7 @@ from .tables import digits, ratio, table, words
 
 SAMPLES = 64
 MAX_DEPTH = 12  # Cycles' own default
+PICTURE_WIDTH_PX = 320  # of the report's PNGs, at least
 ENGINES = "CYCLES", "VOLLEY"
 COLUMNS = ["scene", "Cycles, s", "Volley, s", "Cycles / Volley", "MSE, Volley / Cycles", "relMSE, Volley / Cycles",
            "Volley's mean / reference (R G B)"]
@@ -40,11 +41,18 @@ def measure_scene(name, size_px, options, scope, pictures):
                     compare_cycles.render(blend, engine, settings, own.frame, path, own)["engine_s"])
                 images[engine].append(compare.read_rgb(path))
     pictures.mkdir(parents=True, exist_ok=True)
-    compare.write_png(pictures / f"{name}.png",
-                      np.concatenate([*(images[engine][0] for engine in ENGINES), reference.mean], axis=1))
+    shown = [shrunk(picture) for picture in (*(images[engine][0] for engine in ENGINES), reference.mean)]
+    compare.write_png(pictures / f"{name}.png", np.concatenate(shown, axis=1))
     stacks = {engine: np.stack(made) for engine, made in images.items()}
     return {engine: {"seconds": seconds[engine], **error_time.point_errors(stacks[engine], reference)}
             for engine in ENGINES}
+
+
+def shrunk(picture):
+    """A picture by means of squares of pixels, no narrower than PICTURE_WIDTH_PX, where it is twice as wide."""
+    step = max(1, picture.shape[1] // PICTURE_WIDTH_PX)
+    height, width = (length // step for length in picture.shape[:2])
+    return picture[:height * step, :width * step].reshape(height, step, width, step, -1).mean(axis=(1, 3))
 
 
 def settings_of(own, samples, seed):
