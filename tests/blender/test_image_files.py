@@ -227,24 +227,12 @@ def test_projections(blender):
     assert np.abs(pictures['BOX', 0.4][1] - pictures['BOX', 0.0][1]).max() > 0.02
 
 
-def _child_count():
-    import os
-    import re
-    own, count = os.getpid(), 0
-    for name in filter(str.isdigit, os.listdir("/proc")):
-        try:
-            with open(f"/proc/{name}/stat", encoding="utf-8", errors="replace") as file:
-                count += int(re.match(r".*\) . (\d+)", file.read(), re.DOTALL)[1]) == own
-        except OSError:
-            pass
-    return count
-
-
 def inside_opened():
     """Processes that opening files starts: one of Cycles with an image, one of Volley without, one with."""
     import os
     import tempfile
     import bpy
+    import processes
     import scenes
     path = os.path.join(tempfile.mkdtemp(prefix="volley_"), "saved.blend")
     counts = []
@@ -255,9 +243,9 @@ def inside_opened():
             scenes.empty()
         bpy.context.scene.render.engine = engine
         bpy.ops.wm.save_as_mainfile(filepath=path)
-        before = _child_count()
+        before = processes.child_count(os.getpid())
         bpy.ops.wm.open_mainfile(filepath=path)
-        counts.append(_child_count() - before)
+        counts.append(processes.child_count(os.getpid()) - before)
     return counts
 
 

@@ -14,6 +14,7 @@ import re
 import threading
 
 import image_corpus
+import processes
 
 PLAIN_SHARE = 8    # one square of so many shows a valid image
 TOLERANCE = 0.01   # of valid images: what formats of bytes round to
@@ -168,12 +169,10 @@ class Memory(threading.Thread):
     def _find_children(self):
         """Descendants, by name."""
         parents = {}
-        living = {int(name) for name in os.listdir("/proc") if name.isdigit()}
+        living = processes.living()
         self._known = {pid: name for pid, name in self._known.items() if pid in living}
         for pid in living - set(self._known):
-            text = _read(f"/proc/{pid}/stat")
-            if text:
-                parents[pid] = int(text.rpartition(")")[2].split()[1]), text[text.index("(") + 1:text.rindex(")")]
+            parents[pid] = processes.parent_and_name(pid) or (None, "")
         for pid in sorted(parents):
             if parents[pid][0] in self._known:
                 self._known[pid] = parents[pid][1]
@@ -181,21 +180,13 @@ class Memory(threading.Thread):
     def _look(self):
         readers = 0.0
         for pid, name in self._known.items():
-            values = dict(re.findall(r"(VmHWM|RssAnon|RssShmem):\s+(\d+)", _read(f"/proc/{pid}/status")))
+            values = dict(re.findall(r"(VmHWM|RssAnon|RssShmem):\s+(\d+)", processes.text_of(pid, "status")))
             if pid == os.getpid() or "VmHWM" not in values:
                 continue
             self.largest[name] = max(self.largest[name], int(values["VmHWM"]) / 1024)
             if name == "tracer_reader":
                 readers += (int(values["RssAnon"]) + int(values["RssShmem"])) / 1024
         self.readers = max(self.readers, readers)
-
-
-def _read(path):
-    try:
-        with open(path, encoding="utf-8", errors="replace") as file:
-            return file.read()
-    except OSError:
-        return ""
 
 
 def run(blender, count, seed, side, whole=(), meshes=(), timeout=120):
