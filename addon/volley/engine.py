@@ -172,6 +172,7 @@ def register():
 
 
 def unregister():
-    bpy.app.handlers.load_post.remove(_after_load)
+    if _after_load in bpy.app.handlers.load_post:  # others may have cleared it
+        bpy.app.handlers.load_post.remove(_after_load)
     if not VolleyRenderEngine.leave():
         bpy.app.timers.register(_leave_later, first_interval=_RETRY_SECONDS, persistent=True)
