@@ -13,8 +13,8 @@ import pytest
 TESTS = pathlib.Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(TESTS / "support"), str(TESTS / "bench")]
 import flip  # noqa: E402  (the folders are on the path only now)
-from reporting import (curves, denoise, denoise_section, document, error_sections, estimates, frames, gate,  # noqa: E402
-                       hair, machine, readme, repeated, scope)
+from reporting import (curves, denoise, denoise_section, document, error_sections, estimates, files, frames,  # noqa: E402
+                       gate, hair, machine, readme, repeated, scope, whole_renders)
 
 
 @pytest.mark.parametrize("module", ["flip", "error_time", "stability", "reporting.estimates", "reporting.frames",
@@ -279,6 +279,24 @@ def test_readme_that_differs_is_found(tmp_path, name):
     assert not readme.agrees(changed)
     readme.write(changed)
     assert readme.agrees(changed)
+
+
+def test_files_say_size_time_and_error():
+    def engine(seconds, mse, rel_mse):
+        return {"seconds": [seconds] * 3, "mse": mse, "rel_mse": rel_mse, "p999": mse, "flip": mse, "mean_ratios": [1.0]}
+    results = {"files": {"one": {"CYCLES": engine(6.0, 2.0, 2.0), "VOLLEY": engine(2.0, 1.0, 2.5)},
+                         "two": {"CYCLES": engine(8.0, 4.0, 1.0), "VOLLEY": engine(2.0, 1.0, 1.0)}}}
+    line, = files.headlines(results)
+    assert "at 640×480 and 64 samples" in line and "3.0 to 4.0 times" in line and "0.25 to 0.50 of" in line
+    assert files.losses(results) == ["one: relMSE over Cycles' at equal samples **1.25**"]
+
+
+def test_large_pictures_are_shrunk():
+    picture = np.arange(2 * 1000 * 3.0).reshape(2, 1000, 3)
+    shrunk = whole_renders.shrunk(np.repeat(picture, 3, axis=0))
+    assert shrunk.shape == (2, 333, 3)
+    np.testing.assert_allclose(shrunk[:, :, 1], picture[:, 1:999:3, 1])
+    assert whole_renders.shrunk(picture[:, :639]).shape == (2, 639, 3)
 
 
 def test_pictures_of_the_folder_of_scenes_stay_out_of_the_report():

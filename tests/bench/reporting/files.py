@@ -26,8 +26,11 @@ def headlines(results):
     lines = []
     for cycles, made in runs(results):
         ratios = [gain["ratio"] for _name, gain in whole_renders.gains(made)]
-        lines.append(f"A first F12 of {len(ratios)} whole files at {whole_renders.SAMPLES} samples takes {cycles} "
-                     f"{digits(ratios[0], 2)} to {digits(ratios[-1], 2)} times as long.")
+        errors = sorted(whole_renders.error_ratios(engines)["mse"] for engines in made.values())
+        lines.append(f"A first F12 of {len(ratios)} whole files at {SIZE_PX[0]}×{SIZE_PX[1]} and "
+                     f"{whole_renders.SAMPLES} samples takes {cycles} {digits(ratios[0], 2)} to "
+                     f"{digits(ratios[-1], 2)} times as long; Volley's MSE is {digits(errors[0], 2)} to "
+                     f"{digits(errors[-1], 2)} of its.")
     return lines
 
 
