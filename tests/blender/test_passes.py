@@ -217,6 +217,33 @@ def test_hair(blender):
             _agree(*pictures["GlossDir"], case, off=HAIR_OFF)
 
 
+METALS = {"smooth": (0.0, 1.0), "half rough": (0.3, 1.0), "tinted": (0.3, 0.1), "rough": (0.8, 0.1)}
+METAL_OFF = 3e-3, 0.02  # the tables of both are off by that much; the dip of the tint is .1 of the mean
+
+
+def inside_metals():
+    """{kind: glossy colour} of a ball of metal by both, by roughness and red of the edge's tint."""
+    import bpy
+    import scenes
+    found = {}
+    for kind, (roughness, red) in METALS.items():
+        scenes.empty(size=(32, 24))
+        scenes.camera()
+        scenes.sphere(material=scenes.material(
+            "Metal", "ShaderNodeBsdfPrincipled", Metallic=1.0, Roughness=roughness,
+            **{"Base Color": (0.8, 0.5, 0.2), "Specular Tint": (red, 0.6, 0.9)}))
+        bpy.context.view_layer.use_pass_glossy_color = True
+        found[kind] = _both(("GlossCol",))["GlossCol"]
+    return found
+
+
+@pytest.mark.since((4, 0), "metal had no tint of its edge")
+def test_colour_of_metals(blender):
+    """Cycles' colour leaves the tint of the edge out."""
+    for kind, pictures in blender.run(inside_metals).items():
+        _agree(*pictures, kind, off=METAL_OFF)
+
+
 # Transparent film --------------------------------------------------------------------------------
 
 def inside_transparent_film(has_environment):

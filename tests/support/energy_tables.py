@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Writes the tables of libtracer/src/shading/ggx_energy_tables.c; takes some minutes.
+"""Writes the tables of libtracer/src/model/ggx_energy_tables.c; takes some minutes.
 
     energy_tables.py            how far the tables are from what this computes
     energy_tables.py --write    writes them
@@ -21,8 +21,8 @@ import sys
 
 import numpy as np
 
-SHADING = pathlib.Path(__file__).resolve().parents[2] / "libtracer/src/shading"
-HEADER, TABLES = SHADING / "ggx_energy_tables.h", SHADING / "ggx_energy_tables.c"
+MODEL = pathlib.Path(__file__).resolve().parents[2] / "libtracer/src/model"
+HEADER, TABLES = MODEL / "ggx_energy_tables.h", MODEL / "ggx_energy_tables.c"
 HEIGHTS, AZIMUTHS = 160, 80  # off by some 1e-4 at most, at a blurred critical angle
 LEAST_COS, LEAST_ALPHA = 1e-6, 1e-4  # in place of 0, where the albedo only has a limit
 BESIDE_ONE = 1e-5  # of the slice of ior 1: a surface yet
@@ -49,15 +49,20 @@ def fresnel(cosine, eta):
     return np.where(g2 > 0, np.minimum(0.5 * (rest / total) ** 2 * (1 + b * b), 1), 1)
 
 
+def schlick(cosine, _eta):
+    """How far Schlick's approximation is from the reflectance head-on to 1, whatever the index."""
+    return (1 - cosine) ** 5
+
+
 def shadow(alpha, height):
     """Lambda towards a direction."""
     tan2 = np.maximum(1 - height * height, 0) / (height * height)
     return 0.5 * (np.sqrt(1 + alpha * alpha * tan2) - 1)
 
 
-def albedos(alpha, cosine, eta=None):
+def albedos(alpha, cosine, eta=None, factor=fresnel):
     """Of reflection alone, by height and without Fresnel factor; with eta also of both together, separable
-    and by height, and of the part reflected, separable and by height.
+    and by height, and of the part reflected, separable and by height. factor: by cosine and eta, what is reflected.
 
     >>> [round(float(x), 3) for x in albedos(0.3, 0.5, 1.5)]
     [0.822, 0.947, 0.949, 0.061, 0.061]
@@ -84,7 +89,7 @@ def albedos(alpha, cosine, eta=None):
     separable, level = passes(2 * meets * normal - cosine)
     if eta is None:
         return [mean(level)]
-    f = fresnel(meets, eta)
+    f = factor(meets, eta)
     found = [mean(level), mean(f * separable), mean(f * level)]
     k = 1 - (1 - meets * meets) / (eta * eta)
     below = cosine / eta - (meets / eta - np.sqrt(np.maximum(k, 0))) * normal
@@ -191,6 +196,13 @@ def dielectric_share(sizes):
     return np.array(found)
 
 
+def schlick_share(sizes):
+    found = [[albedos(a, c, 1.5, schlick) for c in columns(sizes["TRC_SHARE_COLUMNS"])]
+             for a in rows(sizes["TRC_SHARE_ROWS"])]
+    found = np.array(found)
+    return (found[..., 4] / found[..., 0]).ravel()
+
+
 def compute(sizes):
     """Name and values of each table."""
     energy, mean = reflection(sizes)
@@ -202,6 +214,7 @@ def compute(sizes):
         "trc_correlated_glass_energy": np.rint(level * WHOLE).ravel(),
         "trc_glass_share": glass_share(sizes),
         "trc_dielectric_share_table": dielectric_share(sizes),
+        "trc_schlick_share_table": schlick_share(sizes),
     }
 
 

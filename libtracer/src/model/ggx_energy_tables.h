@@ -44,5 +44,7 @@ extern const float
  * to 1. */
 extern const float
     trc_dielectric_share_table[TRC_SHARE_SLICES * TRC_SHARE_ROWS * TRC_SHARE_COLUMNS];
+/* The same by Schlick's approximation. */
+extern const float trc_schlick_share_table[TRC_SHARE_ROWS * TRC_SHARE_COLUMNS];
 
 #endif

@@ -279,13 +279,15 @@ void trc_bsdf_ideal(const struct trc_lobes *l, int i, const struct trc_surface *
 }
 
 /* What a lobe of Blender 4 reflects under light from everywhere, over its weight. Where the factor
- * goes to white with the angle, micro-normals count; else it is that of the lobe's normal, as in
- * Cycles. */
+ * goes to white with the angle, micro-normals count, and the dip of metal does not; else it is that
+ * of the lobe's normal: all as in Cycles. */
 static vvec3 mean_reflectance(const struct trc_lobe *lobe) {
-    if (lobe->kind != TRC_LOBE_REFLECT || lobe->fresnel != TRC_FRESNEL_BLEND)
-        return facet_fresnel(lobe, lobe->cos_o);
     const vfloat alpha = vf_sqrt(lobe->alpha_x * lobe->alpha_y);
-    return v3_lerp(lobe->f0, lobe->f90, trc_dielectric_share(lobe->cos_o, alpha, lobe->ior));
+    if (lobe->fresnel == TRC_FRESNEL_METAL)
+        return v3_lerp(lobe->f0, v3_splat(vf_one()), trc_schlick_share(lobe->cos_o, alpha));
+    if (lobe->kind == TRC_LOBE_REFLECT && lobe->fresnel == TRC_FRESNEL_BLEND)
+        return v3_lerp(lobe->f0, lobe->f90, trc_dielectric_share(lobe->cos_o, alpha, lobe->ior));
+    return facet_fresnel(lobe, lobe->cos_o);
 }
 
 void trc_bsdf_albedo(const struct trc_lobes *l, const struct trc_surface *s, vvec3 albedo_out[3]) {

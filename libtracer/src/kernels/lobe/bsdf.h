@@ -34,15 +34,16 @@ enum {
     TRC_FRESNEL_BLEND,      /* f0 to f90 as the dielectric of index ior goes from F(0) to 1; 1 minus
                                it for refraction */
     TRC_FRESNEL_DIELECTRIC, /* F of ior for reflection, 1 - F for refraction */
-    TRC_FRESNEL_OWN         /* trc_lobe.reflectance; 1 minus it for refraction */
+    TRC_FRESNEL_OWN,        /* trc_lobe.reflectance; 1 minus it for refraction */
+    TRC_FRESNEL_METAL       /* the same, of trc_metal_fresnel: f90 is the dip */
 };
 
 struct trc_lobe_model; /* kernels/lobe/lobe.h */
 
 struct trc_lobe {
     const struct trc_lobe_model *model;
-    /* Reflected part of what meets a micro-normal at that cosine, of TRC_FRESNEL_OWN alone; f0 and
-     * f90 are what it makes of them. */
+    /* Reflected part of what meets a micro-normal at that cosine, from TRC_FRESNEL_OWN on; f0
+     * and f90 are what it makes of them. */
     vvec3 (*reflectance)(const struct trc_lobe *lobe, vfloat cos_m);
     const float *film_colors; /* of thin films: trc_material's; NULL: Rec.709 */
     enum trc_lobe_kind kind;  /* the model's */

@@ -65,7 +65,7 @@ TRC_INLINE bool meet(const struct trc_lobe *lobe, vvec3 wo, vvec3 wi, struct mee
 TRC_INLINE vvec3 facet_reflectance(const struct trc_lobe *lobe, vfloat cos_m) {
     if (lobe->fresnel == TRC_FRESNEL_BLEND)
         return v3_lerp(lobe->f0, lobe->f90, trc_fresnel_blend(cos_m, lobe->ior));
-    if (lobe->fresnel == TRC_FRESNEL_OWN)
+    if (lobe->fresnel >= TRC_FRESNEL_OWN)
         return lobe->reflectance(lobe, cos_m);
     if (lobe->fresnel == TRC_FRESNEL_DIELECTRIC)
         return v3_splat(trc_fresnel_dielectric(cos_m, lobe->ior));

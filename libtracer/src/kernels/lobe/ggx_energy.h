@@ -163,5 +163,13 @@ TRC_INLINE vfloat trc_dielectric_share(vfloat cos_theta, vfloat alpha, vfloat io
                    vf_lerp(trc_grid_row(table + step, at, x), trc_grid_row(below + step, at, x), y),
                    z);
 }
+TRC_INLINE vfloat trc_schlick_share(vfloat cos_theta, vfloat alpha) {
+    vfloat x, y;
+    const vint column = trc_grid_cell(vf_safe_sqrt(cos_theta), TRC_SHARE_COLUMNS, &x);
+    const vint row = trc_grid_cell(vf_safe_sqrt(alpha), TRC_SHARE_ROWS, &y);
+    const vint at = row * vi_set(TRC_SHARE_COLUMNS) + column;
+    return vf_lerp(trc_grid_row(trc_schlick_share_table, at, x),
+                   trc_grid_row(trc_schlick_share_table + TRC_SHARE_COLUMNS, at, x), y);
+}
 
 #endif

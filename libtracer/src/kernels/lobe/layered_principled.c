@@ -195,6 +195,7 @@ static void layered_metal(struct trc_setup *c, const struct trc_leaf *leaf, vvec
                          trc_metal_dip(f0.z, at_edge.z));
     lobe->fresnel = TRC_FRESNEL_OWN;
     if (!(leaf->mode & TRC_DISTRIBUTION_CONDUCTOR) || is_filmed) {
+        lobe->fresnel = TRC_FRESNEL_METAL;
         lobe->reflectance = metal_reflectance;
         lobe->f0 = f0;
         lobe->f90 = dip;

@@ -262,6 +262,7 @@ vmask trc_thin_film_cover_metal(const struct trc_setup *c, const struct trc_leaf
     vfloat thickness, index;
     const vmask covered = film_of(c, leaf, at, vf_one(), whole, &thickness, &index);
     if (vm_any(covered)) {
+        lobe->fresnel = TRC_FRESNEL_OWN;
         lobe->reflectance = film_metal_reflectance;
         lobe->film_colors = film_colors_of(c);
         lobe->roughness = thickness;
