@@ -367,6 +367,30 @@ static bool check_below(struct tree_check *t, uint32_t ref, uint32_t parent, uin
     return true;
 }
 
+/* Whether all below ref is transparent to shadow rays; *good: as its nodes say. */
+static bool check_see_through(struct tree_check *t, uint32_t ref, bool *good) {
+    const struct trc_tree *tree = t->tree;
+    const uint32_t index = ref & TRC_REF_INDEX_MASK;
+    if (ref & TRC_REF_LEAF) {
+        bool all = true;
+        for (uint32_t i = index; i < index + trc_leaf_count(ref); i++)
+            all &= tree->is_top ? tree->items[i].tree->is_see_through
+                                : (tree->slots->slots[i].instance & TRC_SLOT_TRANSPARENT) != 0;
+        return all;
+    }
+    uint32_t marks = 0;
+    for (uint32_t i = 0; i < TRC_NODE_WIDTH; i++) {
+        const uint32_t child = trc_node_children(tree, index)[i];
+        if (child == TRC_REF_EMPTY || check_see_through(t, child, good))
+            marks |= 1u << i;
+    }
+    const bool all = marks == (1u << TRC_NODE_WIDTH) - 1u;
+    if (tree->see_through ? tree->see_through[index] != marks : all)
+        *good = complain(t->checker, "%s: node %u says %02x of what is transparent, not %02x",
+                         t->name, index, tree->see_through ? tree->see_through[index] : 0, marks);
+    return all;
+}
+
 /* Shape and boxes from the root; every node and slot is reached. */
 static bool check_shape(struct tree_check *t) {
     const struct trc_tree *tree = t->tree;
@@ -381,13 +405,17 @@ static bool check_shape(struct tree_check *t) {
                   fabsf(tree->upper[axis]) <= tree->extent))
                 return complain(t->checker, "%s: the extent is too small", t->name);
     }
-    for (uint32_t i = 0; i < tree->node_count; i++)
+    bool good = true;
+    const bool all = tree->root != TRC_REF_EMPTY && check_see_through(t, tree->root, &good);
+    if (good && all != tree->is_see_through)
+        return complain(t->checker, "%s: all of it is transparent, or not", t->name);
+    for (uint32_t i = 0; good && i < tree->node_count; i++)
         if (!t->nodes[i])
             return complain(t->checker, "%s: node %u is not reached", t->name, i);
-    for (uint32_t i = 0; i < tree->slot_count; i++)
+    for (uint32_t i = 0; good && i < tree->slot_count; i++)
         if (!t->slots[i])
             return complain(t->checker, "%s: slot %u is not reached", t->name, i);
-    return true;
+    return good;
 }
 
 /* ---- whole trees ---- */

@@ -136,18 +136,22 @@ FIXTURE_INLINE trc_id fixture_glossy(trc_scene scene, float value, float roughne
 }
 
 /* A camera 1 m up that looks straight down at x from 0 to 4 m, in parallel rays. */
-FIXTURE_INLINE trc_scene fixture_level_view(void) {
+FIXTURE_INLINE trc_scene fixture_level_view_in(const trc_scene_desc *scene_desc) {
     static const float transform[12] = {1, 0, 0, 2, 0, 1, 0, 0, 0, 0, 1, 1};
     static const float window[4] = {-2.0f, 2.0f, -0.5f, 0.5f};
     trc_scene scene = 0;
-    const trc_scene_desc scene_desc = default_scene_desc();
     trc_camera_desc camera = default_camera_desc();
     camera.type = TRC_CAMERA_ORTHOGRAPHIC;
     camera.transforms = transform;
     camera.windows = window;
-    assert_int_equal(trc_scene_create(&scene_desc, &scene), TRC_OK);
+    assert_int_equal(trc_scene_create(scene_desc, &scene), TRC_OK);
     assert_int_equal(trc_scene_set_camera(scene, &camera), TRC_OK);
     return scene;
+}
+
+FIXTURE_INLINE trc_scene fixture_level_view(void) {
+    const trc_scene_desc desc = default_scene_desc();
+    return fixture_level_view_in(&desc);
 }
 
 #endif

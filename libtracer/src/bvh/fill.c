@@ -4,7 +4,9 @@
 #include <string.h>
 
 #include "bvh/leaf.h"
+#include "bvh/see_through.h"
 #include "bvh/tree.h"
+#include "core/checks.h"
 #include "core/core.h"
 #include "core/pool.h"
 
@@ -64,6 +66,7 @@ static trc_status tree_alloc(struct trc_tree *tree, uint32_t node_count, uint32_
 void trc_tree_destroy(struct trc_tree *tree) {
     trc_free(tree->nodes);
     trc_free(tree->vertices);
+    trc_free(tree->see_through);
     if (tree->slots && atomic_fetch_sub(&tree->slots->refs, 1) == 1)
         trc_free(tree->slots);
     if (tree->slot_vertices && atomic_fetch_sub(&tree->slot_vertices->refs, 1) == 1)
@@ -294,7 +297,9 @@ trc_status trc_tree_fill(const struct trc_topology *topology,
                             .parts = parts,
                             .tree = tree,
                             .cancel = cancel};
-    const trc_status filled = tree_fill(&fill, pool);
+    trc_status filled = tree_fill(&fill, pool);
+    if (filled == TRC_OK && fill.has_transparent)
+        filled = trc_tree_mark_see_through(tree);
     if (filled != TRC_OK)
         trc_tree_destroy(tree);
     return filled;
@@ -324,7 +329,9 @@ trc_status trc_tree_refit(const struct trc_tree *from, const struct trc_part *pa
         tree->slot_vertices = fill.learnt = slot_vertices_alloc(from->slot_count);
     if (tree->slot_vertices)
         tree->bytes += from->slot_count * (uint64_t)sizeof tree->slot_vertices->index[0];
-    const trc_status filled = tree_fill(&fill, pool);
+    trc_status filled = tree_fill(&fill, pool);
+    if (filled == TRC_OK)
+        filled = trc_tree_copy_see_through(from, tree);
     if (filled != TRC_OK)
         trc_tree_destroy(tree);
     return filled;
@@ -334,11 +341,12 @@ trc_status trc_tree_fill_top(const struct trc_topology *topology,
                              const struct trc_part_triangle *order, uint32_t count,
                              const struct trc_item *items, const struct box *boxes,
                              struct trc_item *items_out, struct trc_tree *tree) {
-    const trc_status status = tree_alloc(tree, topology->node_count, count, 1, NULL, NULL);
-    if (status != TRC_OK)
-        return status;
-    for (uint32_t slot = 0; slot < count; slot++)
+    TRC_TRY(tree_alloc(tree, topology->node_count, count, 1, NULL, NULL));
+    bool has_transparent = false;
+    for (uint32_t slot = 0; slot < count; slot++) {
         items_out[slot] = items[order[slot].triangle];
+        has_transparent |= items_out[slot].tree->is_see_through;
+    }
     tree->items = items_out;
     for (uint32_t n = tree->node_count; n-- > 0;) {
         uint32_t *children = (uint32_t *)trc_node_children(tree, n);
@@ -359,5 +367,8 @@ trc_status trc_tree_fill_top(const struct trc_topology *topology,
         }
     }
     tree->root = topology->root;
-    return TRC_OK;
+    const trc_status marked = has_transparent ? trc_tree_mark_see_through(tree) : TRC_OK;
+    if (marked != TRC_OK)
+        trc_tree_destroy(tree);
+    return marked;
 }

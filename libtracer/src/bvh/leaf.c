@@ -121,6 +121,8 @@ static void slot_fill(struct trc_fill *fill, uint32_t slot) {
     const uint32_t word = part->mesh->strands ? piece_word(part->mesh, triangle) : part->instance;
     fill->tree->slots->slots[slot] =
         (struct trc_slot){word | (transparent ? TRC_SLOT_TRANSPARENT : 0u), triangle};
+    if (transparent)
+        atomic_store_explicit(&fill->has_transparent, true, memory_order_relaxed);
 }
 
 /* The slot's part, and the three vertices of its triangle there. */

@@ -19,6 +19,7 @@ struct trc_fill {
     uint8_t *pending;                      /* per node: its box waits for nodes of other tasks */
     double *area_sums;                     /* per task: areas of the boxes that it set */
     atomic_bool spoiled;                   /* a coordinate is not finite */
+    atomic_bool has_transparent;           /* slots; of a new tree */
 };
 
 /* What of a leaf does not depend on the key: what a new tree's slots stand for, what a refit learns

@@ -96,6 +96,10 @@ struct trc_tree {
     struct trc_slot_block *slots;            /* slot_count; TLAS: NULL, as vertices are */
     struct trc_slot_vertices *slot_vertices; /* shared by refits of one tree; or NULL */
     const struct trc_item *items;            /* TLAS only, by slot */
+    /* Per node the bits of children below which there is nothing but what is transparent to shadow
+     * rays, and of no children; NULL: there is nothing of it. */
+    uint8_t *see_through;
+    bool is_see_through; /* all of the tree is */
     bool is_top;
     uint32_t shape;           /* TRC_SHAPE_* of what is in its leaves */
     uint32_t vertex_count;    /* curves */

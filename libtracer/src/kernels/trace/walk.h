@@ -145,6 +145,8 @@ TRC_INLINE int node_open(const struct walk *w, uint32_t node, const struct trc_l
     f8 lower[3], upper[3], key;
     boxes_load(w, node, motion, lower, upper);
     uint32_t bits = trc_beam_test(b, lower, upper, &key);
+    if (any && w->see_through)
+        bits &= ~(uint32_t)w->see_through[node];
     if (!bits)
         return top;
     const f8 slack = f8_set(b->slack);
@@ -398,12 +400,17 @@ static void walk_instance(struct walk *w, struct trc_live mask, bool any) {
     }
 }
 
+static void tree_enter(struct walk *w, const struct trc_tree *tree) {
+    w->tree = tree;
+    w->see_through = w->packets->skip_transparent ? tree->see_through : NULL;
+}
+
 static void item_packet(struct walk *w, const struct trc_item *item, struct trc_live mask,
                         bool any) {
     if (!(item->visibility & w->packets->visibility))
         return;
     const struct walk outer = *w;
-    w->tree = item->tree;
+    tree_enter(w, item->tree);
     w->instance = item->instance;
     if (item->instance == TRC_NO_HIT) { /* in world space, within the TLAS: the same beam */
         const float z1 = w->group->beam.z1;
@@ -424,13 +431,13 @@ static struct trc_live walk_run(const struct trc_snapshot *snapshot, struct trc_
                                 bool any) {
     struct trc_live active = {{0}};
     struct walk w = {.snapshot = snapshot,
-                     .tree = snapshot->bvh->tree,
                      .packets = packets,
                      .hits = hits,
                      .left = left,
                      .instance = TRC_NO_HIT};
     for (uint32_t k = 0; k < count; k++)
         active.of[k] = packets[k].active;
+    tree_enter(&w, snapshot->bvh->tree);
     if (trc_live_any(&active))
         walk_packets(&w, active, any);
     for (uint32_t k = 0; k < count; k++)

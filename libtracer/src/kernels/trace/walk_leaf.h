@@ -30,6 +30,7 @@ struct trc_turned; /* kernels/trace/curve.h */
 struct walk {
     const struct trc_snapshot *snapshot;
     const struct trc_tree *tree;
+    const uint8_t *see_through; /* the tree's, where its children do not count; or NULL */
     struct trc_packet *packets;
     struct trc_packet_hits *hits; /* closest only */
     struct trc_live occluded;     /* any only: found so far */

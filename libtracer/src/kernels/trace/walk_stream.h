@@ -190,7 +190,9 @@ TRC_INLINE void stream_walk(struct walk *w, uint32_t ref, const struct trc_live 
             uint32_t met[TRC_NODE_WIDTH];
             float nearest[TRC_NODE_WIDTH];
             TRC_COUNT(single_nodes, __builtin_popcount(rays));
-            const uint32_t bits = stream_node(w, ref, &s, rays, any, motion, met, nearest);
+            uint32_t bits = stream_node(w, ref, &s, rays, any, motion, met, nearest);
+            if (any && w->see_through)
+                bits &= ~(uint32_t)w->see_through[ref];
             top = stream_push(w, ref, bits, met, nearest, any, curves, stack, top);
         } else if (!curves && w->tree->is_top) {
             stream_item(w, ref, &s, rays, any);
