@@ -128,6 +128,7 @@
 #define trc_sample(...) TRC_KERNEL(trc_sample)(__VA_ARGS__)
 #define trc_samples(...) TRC_KERNEL(trc_samples)(__VA_ARGS__)
 #define trc_samples_render(...) TRC_KERNEL(trc_samples_render)(__VA_ARGS__)
+#define trc_see_through(...) TRC_KERNEL(trc_see_through)(__VA_ARGS__)
 #define trc_shade_batch(...) TRC_KERNEL(trc_shade_batch)(__VA_ARGS__)
 #define trc_shadow_flush(...) TRC_KERNEL(trc_shadow_flush)(__VA_ARGS__)
 #define trc_shadow_push(...) TRC_KERNEL(trc_shadow_push)(__VA_ARGS__)

@@ -29,6 +29,8 @@ struct trc_shadow_store {
     uint32_t *share; /* of the path (kernels/tile/light_split.h), or NULL: no light passes */
     uint32_t *strand_instance;         /* as struct trc_left_strands has it, or NULL: no curves */
     uint32_t *strand;                  /* the same */
+    float *tmin;                       /* how far a ray has come, or NULL: nothing is transparent */
+    uint32_t *passed;                  /* surfaces that it has come through, or NULL */
     float *lamp[3];                    /* for the Shadow pass, or NULL */
     float *scaled[TRC_SCALED_COLUMNS]; /* those that what is in the way takes from, RGB by RGB */
     uint32_t scaled_count;
@@ -37,9 +39,16 @@ struct trc_shadow_store {
     uint32_t *order;  /* own: the queue may be flushed while hits are shaded in t->order */
 };
 
-/* splits, lamps, strands: with the columns of light passes, of the Shadow pass, of curves. */
-TRC_INLINE void trc_shadows_carve(struct trc_carver *c, struct trc_shadow_store *q, bool splits,
-                                  bool lamps, bool strands) {
+/* Columns that not every picture needs. */
+struct trc_shadow_columns {
+    bool splits;  /* of light passes */
+    bool lamps;   /* of the Shadow pass */
+    bool strands; /* of curves */
+    bool passes;  /* of transparent materials */
+};
+
+TRC_INLINE void trc_shadows_carve(struct trc_carver *c, struct trc_shadow_store *q,
+                                  struct trc_shadow_columns with) {
     const size_t column = TRC_SHADOW_COLUMN * sizeof(float);
     for (int i = 0; i < 3; i++) {
         q->o[i] = trc_carve(c, column);
@@ -48,15 +57,19 @@ TRC_INLINE void trc_shadows_carve(struct trc_carver *c, struct trc_shadow_store 
     }
     q->tmax = trc_carve(c, column);
     q->time = trc_carve(c, column);
-    for (int i = 0; splits && i < 9; i++)
+    for (int i = 0; with.splits && i < 9; i++)
         q->split[i] = q->scaled[q->scaled_count++] = trc_carve(c, column);
-    if (splits)
+    if (with.splits)
         q->share = trc_carve(c, column);
-    if (strands) {
+    if (with.passes) {
+        q->tmin = trc_carve(c, column);
+        q->passed = trc_carve(c, column);
+    }
+    if (with.strands) {
         q->strand_instance = trc_carve(c, column);
         q->strand = trc_carve(c, column);
     }
-    for (int i = 0; lamps && i < 3; i++)
+    for (int i = 0; with.lamps && i < 3; i++)
         q->lamp[i] = q->scaled[q->scaled_count++] = trc_carve(c, column);
     uint32_t **const words[] = {&q->slot, &q->path, &q->target, &q->depths, &q->order};
     for (int i = 0; i < 5; i++)

@@ -78,7 +78,11 @@ static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc,
     for (uint32_t k = 0; k < TRC_CRYPTOMATTE_KINDS; k++)
         if (desc->cryptomattes >> k & 1)
             t->mattes[k] = trc_carve(&c, places * sizeof *t->mattes[k]);
-    trc_shadows_carve(&c, &t->shadows, splits_light, desc->passes >> TRC_PASS_SHADOW & 1, curves);
+    trc_shadows_carve(&c, &t->shadows,
+                      (struct trc_shadow_columns){.splits = splits_light,
+                                                  .lamps = desc->passes >> TRC_PASS_SHADOW & 1,
+                                                  .strands = curves,
+                                                  .passes = features & TRC_FEATURE_TRANSPARENCY});
     if (curves)
         t->left = trc_carve(&c, TRC_BUNDLE * sizeof *t->left);
     t->keys = trc_carve(&c, TRC_SHADOW_COLUMN * sizeof *t->keys);

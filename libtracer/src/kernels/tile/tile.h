@@ -225,6 +225,11 @@ void trc_world_aovs(struct trc_tile *t, vvec3 d, vuint path, const uint32_t slot
 /* Traces and empties the shadow queue. (kernels/tile/shadow.c) */
 void trc_shadow_flush(struct trc_tile *t);
 
+/* Traces count rays of the queue that nothing opaque blocks through what is transparent to shadow
+ * rays, and takes what of their light does not arrive. rays: is used up; visibility: of what they
+ * see. (kernels/tile/see_through.c) */
+void trc_see_through(struct trc_tile *t, uint32_t *rays, uint32_t count, uint32_t visibility);
+
 /* Makes room in the queue for so many shadow rays of each lane of a group. */
 TRC_INLINE void trc_shadow_reserve(struct trc_tile *t, uint32_t per_lane) {
     const uint32_t count = per_lane * TRC_WIDTH;
