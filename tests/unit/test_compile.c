@@ -712,6 +712,88 @@ static void test_memory_failures(void **state) {
     }
 }
 
+/* ---- what shadow rays need ---- */
+
+static int32_t add_transparent(trc_node_input c) { return ADD(TRC_NODE_TRANSPARENT, 0, c); }
+
+/* What a leaf lets through, where the random number of the object is that. */
+static float leaf_weight(const struct trc_material *m, uint32_t leaf, float random) {
+    struct trc_instance instance = {.random = random};
+    struct trc_mesh mesh = {.default_uv = -1}, *meshes[1] = {&mesh};
+    const struct trc_snapshot snapshot = {
+        .instance_count = 1, .instances = &instance, .mesh_count = 1, .meshes = meshes};
+    struct trc_surface s = {.snapshot = &snapshot, .active = vm_all_set()};
+    static struct trc_registers regs;
+    trc_program_run_scalar(m, &s, &regs);
+    return trc_operand_value(&m->leaves[leaf].weight, &regs);
+}
+
+/* Alpha, but not the colour beside it. */
+static void test_shadows_of_principled(void **state) {
+    (void)state;
+    static const float alphas[] = {-0.5f, 0.0f, 0.25f, 1.0f, 1.5f};
+    graph_clear();
+    graph.flags = TRC_MATERIAL_TRANSPARENT_SHADOW;
+    const int32_t info = add(TRC_NODE_OBJECT_INFO, 0, 0, NULL);
+    const int32_t image = add_image(3, "");
+    const int32_t principled = add_principled(0);
+    *input_of(principled, TRC_INPUT_OF(PRINCIPLED, base_color)) = link_to(image, 0);
+    *input_of(principled, TRC_INPUT_OF(PRINCIPLED, alpha)) = link_to(info, 5);
+    struct trc_material *m = compiled();
+    assert_int_equal(count_op(m, TRC_OP_IMAGE), 1);
+    assert_non_null(m->shadow);
+    assert_int_equal(count_op(m->shadow, TRC_OP_IMAGE), 0);
+    assert_int_equal(m->shadow->leaf_count, 1);
+    assert_int_equal(m->shadow->leaves[0].type, TRC_NODE_TRANSPARENT);
+    for (size_t i = 0; i < sizeof alphas / sizeof *alphas; i++) {
+        const float want = 1.0f - fminf(fmaxf(alphas[i], 0.0f), 1.0f);
+        assert_true(leaf_weight(m->shadow, 0, alphas[i]) == want);
+    }
+    trc_material_release(m);
+}
+
+static void test_shadows_of_mixes(void **state) {
+    (void)state;
+    graph_clear();
+    graph.flags = TRC_MATERIAL_TRANSPARENT_SHADOW;
+    const int32_t clear = add_transparent(color(.2f, .4f, .6f));
+    const int32_t principled = add_principled(0);
+    *input_of(principled, TRC_INPUT_OF(PRINCIPLED, alpha)) = value(.5f);
+    const int32_t both = add_mix(value(.25f), clear, principled);
+    add_mix(value(.5f), both, add_diffuse(color(1, 1, 1)));
+    struct trc_material *m = compiled();
+    assert_int_equal(m->leaf_count, 3);
+    assert_non_null(m->shadow);
+    assert_int_equal(m->shadow->instruction_count, 0);
+    assert_int_equal(m->shadow->leaf_count, 2);
+    float sum[3] = {0};
+    for (uint32_t i = 0; i < 2; i++)
+        for (int c = 0; c < 3; c++)
+            sum[c] += m->shadow->leaves[i].weight.value *
+                      m->shadow->operands[m->shadow->leaves[i].first_operand + c].value;
+    for (int c = 0; c < 3; c++) /* half of .75 of the colour and of .25 of .5 */
+        assert_float_equal(sum[c], .375f * .2f * (float)(c + 1) + .0625f, 1e-6);
+    trc_material_release(m);
+}
+
+/* Where shadow rays are blocked, need all of the material, or it is nothing but that. */
+static void test_materials_without_shadows_of_their_own(void **state) {
+    (void)state;
+    for (int kind = 0; kind < 3; kind++) {
+        graph_clear();
+        graph.flags = kind == 1 ? 0 : TRC_MATERIAL_TRANSPARENT_SHADOW;
+        if (kind == 2) {
+            add_transparent(color(.5f, .5f, .5f));
+        } else {
+            const int32_t principled = add_principled(0);
+            *input_of(principled, TRC_INPUT_OF(PRINCIPLED, alpha)) = value(kind ? .5f : 1.0f);
+        }
+        struct trc_material *m = compiled();
+        assert_null(m->shadow);
+        trc_material_release(m);
+    }
+}
+
 static void test_holders(void **state) {
     (void)state;
     graph_clear();
@@ -755,6 +837,9 @@ int main(void) {
         cmocka_unit_test(test_too_many_leaves),
         cmocka_unit_test(test_shared_shaders_do_not_multiply),
         cmocka_unit_test(test_aovs),
+        cmocka_unit_test(test_shadows_of_principled),
+        cmocka_unit_test(test_shadows_of_mixes),
+        cmocka_unit_test(test_materials_without_shadows_of_their_own),
         cmocka_unit_test(test_refused_inputs),
         cmocka_unit_test(test_refused_nodes),
         cmocka_unit_test(test_refused_tables),

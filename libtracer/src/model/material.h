@@ -105,6 +105,9 @@ struct trc_material {
     /* Of a material that moves vertices, else NULL: has no leaves, but an AOV that is how far. */
     struct trc_material *displacement;
     uint32_t keeps_normals; /* 1: normals of moved vertices stay */
+    /* What shadow rays need to know of a material that lets them through: its transparent leaves
+     * and the part of its program that these read. NULL: the material itself says it. */
+    struct trc_material *shadow;
 };
 
 /* Whether shadow rays may pass it. */

@@ -120,6 +120,10 @@ bool trc_op_reads_position(uint32_t op);
 trc_status trc_build_values(struct trc_build *b);
 /* Leaves, their weights and operands. (shading/leaves.c) */
 trc_status trc_build_leaves(struct trc_build *b);
+/* Leaves become what goes straight through them. (shading/leaves.c) */
+trc_status trc_build_shadow(struct trc_build *b);
+/* Whether that is all that shadow rays meet of the leaf. (shading/leaves.c) */
+bool trc_leaf_has_shadow(const struct trc_leaf *leaf);
 /* AOVs and their operands, after the leaves. (shading/leaves.c) */
 trc_status trc_build_aovs(struct trc_build *b);
 /* has and emission, from the leaves and the live operations. (shading/traits.c) */

@@ -21,6 +21,7 @@ static void build_free(struct trc_build *b) {
 
 static void material_free(struct trc_material *m) {
     trc_material_release(m->displacement);
+    trc_material_release(m->shadow);
     trc_free(m->aovs);
     trc_free(m->operands);
     trc_free(m->instructions);
@@ -44,6 +45,28 @@ static trc_status compile_offset(struct trc_build *b, struct trc_material *m) {
     TRC_TRY(trc_build_offset(b));
     TRC_TRY(trc_build_mark(b));
     return trc_build_emit(b, m);
+}
+
+/* What shadow rays need of it. */
+static trc_status compile_shadow(struct trc_build *b, struct trc_material *m) {
+    memset(b->buckets, 0xff, sizeof b->buckets);
+    TRC_TRY(trc_build_values(b));
+    TRC_TRY(trc_build_leaves(b));
+    TRC_TRY(trc_build_shadow(b));
+    TRC_TRY(trc_build_mark(b));
+    trc_build_traits(b, m);
+    return trc_build_emit(b, m);
+}
+
+/* Whether shadow rays need less than all of a material. */
+static bool has_shadow(const struct trc_material *m) {
+    bool has_more = false;
+    for (uint32_t i = 0; i < m->leaf_count; i++) {
+        if (!trc_leaf_has_shadow(&m->leaves[i]))
+            return false;
+        has_more |= m->leaves[i].type != TRC_NODE_TRANSPARENT;
+    }
+    return has_more && trc_material_shadows_transparent(m);
 }
 
 static trc_status build(const trc_material_desc *desc, const struct trc_compile_context *context,
@@ -83,14 +106,16 @@ trc_status trc_material_compile(const trc_material_desc *desc,
     struct trc_material *m;
     TRC_TRY(trc_material_validate(desc));
     TRC_TRY(build(desc, context, compile, &m));
+    trc_status status = TRC_OK;
     const uint32_t method = trc_displacement_method_of(trc_displacement_of(desc));
-    if (method != TRC_DISPLACEMENT_BUMP) {
-        const trc_status status = build(desc, context, compile_offset, &m->displacement);
-        if (status != TRC_OK) {
-            material_free(m);
-            return status;
-        }
-        m->keeps_normals = method == TRC_DISPLACEMENT_BOTH;
+    if (method != TRC_DISPLACEMENT_BUMP)
+        status = build(desc, context, compile_offset, &m->displacement);
+    m->keeps_normals = method == TRC_DISPLACEMENT_BOTH;
+    if (status == TRC_OK && has_shadow(m))
+        status = build(desc, context, compile_shadow, &m->shadow);
+    if (status != TRC_OK) {
+        material_free(m);
+        return status;
     }
     *material_out = m;
     return TRC_OK;

@@ -1,4 +1,6 @@
 /* The shader tree to a list of leaves with weights. */
+#include <string.h>
+
 #include "core/checks.h"
 #include "core/core.h"
 #include "shading/build.h"
@@ -130,6 +132,63 @@ trc_status trc_build_leaves(struct trc_build *b) {
     const trc_status status = weigh(b, weights);
     trc_free(weights);
     return status;
+}
+
+bool trc_leaf_has_shadow(const struct trc_leaf *leaf) {
+    switch (leaf->type) {
+    case TRC_NODE_RAY_PORTAL:
+    case TRC_NODE_HUANG_HAIR: /* depends on the strand */
+        return false;
+    case TRC_NODE_LAYERED_PRINCIPLED: /* thin walls are clear where they are smooth */
+        return !(leaf->mode & TRC_DISTRIBUTION_THIN_WALL);
+    default:
+        return true;
+    }
+}
+
+/* What of the light a leaf covers goes straight through it, three operands, and which part of the
+ * light it covers. False: nothing. */
+static bool shadow_of(const struct trc_leaf *leaf, const struct trc_operand *in,
+                      struct trc_operand color_out[3], struct trc_operand *alpha_out) {
+    for (int c = 0; c < 3; c++)
+        color_out[c] = trc_constant(1.0f);
+    *alpha_out = trc_constant(0.0f);
+    if (leaf->type == TRC_NODE_TRANSPARENT)
+        memcpy(color_out, in + TRC_AT(TRANSPARENT, color), 3 * sizeof *color_out);
+    else if (leaf->type == TRC_NODE_PRINCIPLED)
+        *alpha_out = in[TRC_AT(PRINCIPLED, alpha)];
+    else if (leaf->type == TRC_NODE_LAYERED_PRINCIPLED)
+        *alpha_out = in[TRC_AT(LAYERED_PRINCIPLED, alpha)];
+    else
+        return false;
+    return !trc_is_constant(*alpha_out) || !(alpha_out->value >= 1.0f);
+}
+
+trc_status trc_build_shadow(struct trc_build *b) {
+    const struct trc_operand zero = trc_constant(0.0f), one = trc_constant(1.0f);
+    struct trc_operand operands[TRC_MAX_LEAVES][3];
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < b->leaf_count; i++) {
+        const struct trc_leaf *leaf = &b->leaves[i];
+        struct trc_operand weight = leaf->weight, alpha, open;
+        if (!shadow_of(leaf, b->leaf_operands + leaf->first_operand, operands[count], &alpha))
+            continue;
+        if (!trc_is_value(alpha, 0.0f)) {
+            const struct trc_operand clamp[TRC_OP_AT(CLAMP, end)] = {alpha, zero, one};
+            TRC_TRY(trc_build_op(b, TRC_OP_CLAMP, TRC_CLAMP_MINMAX, TRC_NO_RESOURCE, clamp, &open));
+            TRC_TRY(trc_build_math(b, TRC_MATH_SUBTRACT, one, open, zero, &open));
+            TRC_TRY(multiply(b, weight, open, &weight));
+        }
+        b->leaves[count] = (struct trc_leaf){.type = TRC_NODE_TRANSPARENT,
+                                             .weight = weight,
+                                             .first_operand = 3 * count,
+                                             .operand_count = 3};
+        count++;
+    }
+    b->leaf_count = count;
+    b->leaf_operand_count = 3 * count;
+    memcpy(b->leaf_operands, operands, count * sizeof *operands);
+    return TRC_OK;
 }
 
 trc_status trc_build_aovs(struct trc_build *b) {

@@ -24,6 +24,8 @@ static vvec3 surface_transparency(const struct trc_tile *t, const struct trc_pac
         const struct trc_material *m = t->snapshot->materials[material];
         if (!trc_material_shadows_transparent(m))
             continue;
+        if (m->shadow)
+            m = m->shadow;
         struct trc_surface s = {.snapshot = t->snapshot, .active = vm_from_bits(same)};
         struct trc_registers regs;
         struct trc_lobes lobes;
