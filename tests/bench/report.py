@@ -32,6 +32,8 @@ def parse_arguments(arguments):
     parser.add_argument("--baseline", action="store_true", help="write the baseline of the gate")
     parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS),
                         help="measure these alone; the others stay as they are")
+    parser.add_argument("--only", nargs="+", metavar="SCENE",
+                        help="of the parts hair and files these scenes alone; the others stay as they are")
     parser.add_argument("--scenes", type=pathlib.Path, help="the folder of scenes that are not made here")
     parser.add_argument("--threads", type=int, default=0, help="0: all")
     parser.add_argument("--build", type=pathlib.Path, default=compare_cycles.PROJECT / "build")
@@ -39,11 +41,14 @@ def parse_arguments(arguments):
     options = parser.parse_args(arguments)
     if options.baseline and options.scope != "quick":
         parser.error("the baseline is that of --quick")
+    if options.only and not set(options.parts) <= SCENE_PARTS:
+        parser.error(f"--only is for the parts {', '.join(sorted(SCENE_PARTS))}")
     options.scope = scopes.SCOPES[options.scope or "medium"]
     options.out = options.out or options.build / "report"
     return options
 
 
+SCENE_PARTS = {"hair", "files"}  # results by scene
 PARTS = {
     "kernels": lambda options: kernels.measure(options, options.scope),
     "frames": lambda options: frames.measure(options, options.scope),
@@ -70,10 +75,27 @@ def measure(options):
     for name in options.parts:
         print(f"== {name}", flush=True)
         start = time.perf_counter()
-        write(data / f"{name}.json", PARTS[name](options))
-        described["parts"][name] = machine.of_part(described)
+        made = PARTS[name](options)
+        if options.only:
+            made = {**json.loads((data / f"{name}.json").read_text(encoding="utf-8")), **made}
+        write(data / f"{name}.json", made)
+        described["parts"] = with_measured(described["parts"], name, options.only, machine.of_part(described))
         write(data / "machine.json", described)
         print(f"   {time.perf_counter() - start:.0f} s", flush=True)
+
+
+def with_measured(parts, part, only, made):
+    """When parts were measured, with a further one, or scenes of it, in place of what was said of those.
+
+    >>> with_measured({"files": 1, "hair": 1}, "files", ["foliage"], 2)
+    {'files': 1, 'hair': 1, 'files, foliage': 2}
+    >>> with_measured({"files": 1, "hair": 1, "files, foliage": 2}, "files", None, 3)
+    {'hair': 1, 'files': 3}
+    """
+    if only:
+        return {**parts, **{f"{part}, {scene}": made for scene in only}}
+    others = {name: value for name, value in parts.items() if name.split(", ")[0] != part}
+    return {**others, part: made}
 
 
 def write(path, value):

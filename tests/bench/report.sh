@@ -2,7 +2,7 @@
 # Measures speed against error and writes a report: Markdown, SVG plots, pictures, raw JSON.
 #
 #   bash tests/bench/report.sh [--quick|--full] [--out DIR] [--measure|--draw [--again DIR]]
-#                              [--baseline] [--parts PART...]
+#                              [--baseline] [--parts PART... [--only SCENE...]]
 #
 # On two quiet cores --quick takes about 4 minutes; the default an estimated 240, --full a night.
 # --measure draws nothing; --draw draws the report of DIR anew from its JSON, with --again a second

@@ -13,11 +13,12 @@ import pytest
 TESTS = pathlib.Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(TESTS / "support"), str(TESTS / "bench")]
 import flip  # noqa: E402  (the folders are on the path only now)
+import report  # noqa: E402
 from reporting import (curves, denoise, denoise_section, document, error_sections, estimates, files, frames,  # noqa: E402
                        gate, hair, machine, readme, repeated, scope, whole_renders)
 
 
-@pytest.mark.parametrize("module", ["flip", "error_time", "stability", "reporting.estimates", "reporting.frames",
+@pytest.mark.parametrize("module", ["flip", "error_time", "report", "stability", "reporting.estimates", "reporting.frames",
                                     "reporting.gate", "reporting.readme", "reporting.repeated",
                                     "reporting.tables"])
 def test_examples_in_comments(module):
@@ -301,8 +302,16 @@ def test_large_pictures_are_shrunk():
 
 def test_pictures_of_the_folder_of_scenes_stay_out_of_the_report():
     options = argparse.Namespace(scenes=None, build=pathlib.Path("build"))
-    report = pathlib.Path("report/pictures")
-    assert scope.picture_folders(("ours",), ("theirs",), options, report) == {"ours": report}
+    pictures = pathlib.Path("report/pictures")
+    assert scope.picture_folders(("ours",), ("theirs",), options, pictures) == {"ours": pictures}
     options.scenes = pathlib.Path("scenes")
-    assert scope.picture_folders(("ours",), ("theirs",), options, report) == {
-        "ours": report, "theirs": pathlib.Path("build/pictures")}
+    assert scope.picture_folders(("ours",), ("theirs",), options, pictures) == {
+        "ours": pictures, "theirs": pathlib.Path("build/pictures")}
+
+
+def test_scenes_are_measured_alone_where_results_are_by_scene(monkeypatch):
+    options = report.parse_arguments(["--parts", "files", "--only", "theirs"])
+    monkeypatch.setattr(whole_renders, "measure_scene", lambda name, *_others: name)
+    assert whole_renders.measure({"ours": "a", "theirs": "b"}, (2, 1), options, None) == {"theirs": "theirs"}
+    with pytest.raises(SystemExit):
+        report.parse_arguments(["--parts", "files", "curves", "--only", "theirs"])

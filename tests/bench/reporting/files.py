@@ -10,9 +10,9 @@ SIZE_PX = 640, 480
 
 
 def measure(options, scope, pictures):
-    """{scene: what whole_renders.measure_scene() gives}; PNGs of both into a folder."""
+    """As whole_renders.measure(); PNGs of both into a folder."""
     folders = picture_folders(scope.file_scenes, FOLDER_FILES, options, pictures) if scope.file_scenes else {}
-    return {name: whole_renders.measure_scene(name, SIZE_PX, options, scope, folder) for name, folder in folders.items()}
+    return whole_renders.measure(folders, SIZE_PX, options, scope)
 
 
 def runs(results):

@@ -8,8 +8,8 @@ SIZE_PX = 240, 180
 
 
 def measure(options, scope, pictures):
-    """{scene: what whole_renders.measure_scene() gives}; PNGs of both into a folder."""
-    return {name: whole_renders.measure_scene(name, SIZE_PX, options, scope, pictures) for name in scope.hair_scenes}
+    """As whole_renders.measure(); PNGs of both into a folder."""
+    return whole_renders.measure(dict.fromkeys(scope.hair_scenes, pictures), SIZE_PX, options, scope)
 
 
 def headline(results):

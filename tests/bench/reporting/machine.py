@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a report was measured with: machine, compiler, versions, date."""
 
+import ctypes
 import datetime
 import json
 import os
@@ -89,16 +90,13 @@ def system_name():
 
 
 def library_isa(options):
-    """The instruction set that the library chooses."""
-    spec = "scene=tiny,width=8,height=8,eyes=1"
+    """The instruction set that the library chooses, "" if it is not built."""
     try:
-        done = subprocess.run([str(options.build / "bin" / "frame_bench"), "--repeats", "1", "--json",
-                               "/dev/stderr", spec], capture_output=True, text=True, check=False)
+        library = ctypes.CDLL(str(options.build / "lib" / "libtracer.so"))
     except OSError:
         return ""
-    found = re.search(r'"isa": "(\w+)"', done.stderr)
-    return found.group(1) if found else ""
-
+    library.trc_isa_name.restype = ctypes.c_char_p
+    return library.trc_isa_name(library.trc_isa()).decode()
 
 def compiler(options):
     """Compiler and its options for a release build."""

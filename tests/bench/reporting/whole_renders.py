@@ -23,6 +23,12 @@ COLUMNS = ["scene", "Cycles, s", "Volley, s", "Cycles / Volley", "MSE, Volley / 
            "Volley's mean / reference (R G B)"]
 
 
+def measure(folders, size_px, options, scope):
+    """{scene: what measure_scene() gives} of {scene: folder of its PNGs}; with options.only of those alone."""
+    return {name: measure_scene(name, size_px, options, scope, pictures) for name, pictures in folders.items()
+            if not options.only or name in options.only}
+
+
 def measure_scene(name, size_px, options, scope, pictures):
     """{engine: {"seconds": of each repeat, errors}} of one scene, each repeat with another seed; a PNG of both
     into a folder."""
