@@ -33,7 +33,11 @@ TRC_INLINE vfloat trc_grid_row(const float *table, vint at, vfloat x) {
     const vmask all = vm_all_set();
     return vf_lerp(vf_gather(table, at, all), vf_gather(table + 1, at, all), x);
 }
-/* The same in a table of parts of TRC_ENERGY_PARTS; the result is in such parts, too. */
+/* Between the four points of a cell of a slice with so many columns. */
+TRC_INLINE vfloat trc_grid_slice(const float *table, int columns, vint at, vfloat x, vfloat y) {
+    return vf_lerp(trc_grid_row(table, at, x), trc_grid_row(table + columns, at, x), y);
+}
+/* As trc_grid_row in a table of parts of TRC_ENERGY_PARTS; the result is in such parts, too. */
 #define TRC_ENERGY_PARTS 65535.0f
 TRC_INLINE vfloat trc_energy_row(const uint16_t *table, vint at, vfloat x) {
     const vuint pair = vu_gather_pair(table, at);
@@ -146,9 +150,8 @@ TRC_INLINE vfloat trc_glass_reflected_share(vfloat cos_theta, vfloat alpha, vflo
     vint slice = trc_grid_cell(vf_safe_sqrt(part), slices, &z);
     slice = vi_select(vf_lt(depth, vf_zero()), slice, slice + vi_set(slices));
     const vint at = (slice * vi_set(rows) + row) * vi_set(columns) + column;
-    const float *table = trc_glass_share, *next = table + rows * columns;
-    return vf_lerp(vf_lerp(trc_grid_row(table, at, x), trc_grid_row(table + columns, at, x), y),
-                   vf_lerp(trc_grid_row(next, at, x), trc_grid_row(next + columns, at, x), y), z);
+    return vf_lerp(trc_grid_slice(trc_glass_share, columns, at, x, y),
+                   trc_grid_slice(trc_glass_share + rows * columns, columns, at, x, y), z);
 }
 TRC_INLINE vfloat trc_dielectric_share(vfloat cos_theta, vfloat alpha, vfloat ior) {
     vfloat x, y, z;
@@ -157,19 +160,17 @@ TRC_INLINE vfloat trc_dielectric_share(vfloat cos_theta, vfloat alpha, vfloat io
     const vint row = trc_grid_cell(vf_safe_sqrt(alpha), TRC_SHARE_ROWS, &y);
     const vint slice = trc_grid_cell(depth * vf_set(1.0f / TRC_SHARE_REACH), TRC_SHARE_SLICES, &z);
     const vint at = (slice * vi_set(TRC_SHARE_ROWS) + row) * vi_set(TRC_SHARE_COLUMNS) + column;
-    const float *table = trc_dielectric_share_table, *below = table + TRC_SHARE_COLUMNS;
-    const int step = TRC_SHARE_ROWS * TRC_SHARE_COLUMNS;
-    return vf_lerp(vf_lerp(trc_grid_row(table, at, x), trc_grid_row(below, at, x), y),
-                   vf_lerp(trc_grid_row(table + step, at, x), trc_grid_row(below + step, at, x), y),
-                   z);
+    const float *table = trc_dielectric_share_table;
+    const int columns = TRC_SHARE_COLUMNS, step = TRC_SHARE_ROWS * columns;
+    return vf_lerp(trc_grid_slice(table, columns, at, x, y),
+                   trc_grid_slice(table + step, columns, at, x, y), z);
 }
 TRC_INLINE vfloat trc_schlick_share(vfloat cos_theta, vfloat alpha) {
     vfloat x, y;
     const vint column = trc_grid_cell(vf_safe_sqrt(cos_theta), TRC_SHARE_COLUMNS, &x);
     const vint row = trc_grid_cell(vf_safe_sqrt(alpha), TRC_SHARE_ROWS, &y);
     const vint at = row * vi_set(TRC_SHARE_COLUMNS) + column;
-    return vf_lerp(trc_grid_row(trc_schlick_share_table, at, x),
-                   trc_grid_row(trc_schlick_share_table + TRC_SHARE_COLUMNS, at, x), y);
+    return trc_grid_slice(trc_schlick_share_table, TRC_SHARE_COLUMNS, at, x, y);
 }
 
 #endif
