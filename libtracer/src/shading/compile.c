@@ -30,7 +30,6 @@ static void material_free(struct trc_material *m) {
 }
 
 static trc_status compile(struct trc_build *b, struct trc_material *m) {
-    memset(b->buckets, 0xff, sizeof b->buckets);
     TRC_TRY(trc_build_values(b));
     TRC_TRY(trc_build_leaves(b));
     TRC_TRY(trc_build_aovs(b));
@@ -41,7 +40,6 @@ static trc_status compile(struct trc_build *b, struct trc_material *m) {
 
 /* The program that moves vertices. */
 static trc_status compile_offset(struct trc_build *b, struct trc_material *m) {
-    memset(b->buckets, 0xff, sizeof b->buckets);
     TRC_TRY(trc_build_offset(b));
     TRC_TRY(trc_build_mark(b));
     return trc_build_emit(b, m);
@@ -49,7 +47,6 @@ static trc_status compile_offset(struct trc_build *b, struct trc_material *m) {
 
 /* What shadow rays need of it. */
 static trc_status compile_shadow(struct trc_build *b, struct trc_material *m) {
-    memset(b->buckets, 0xff, sizeof b->buckets);
     TRC_TRY(trc_build_values(b));
     TRC_TRY(trc_build_leaves(b));
     TRC_TRY(trc_build_shadow(b));
@@ -78,6 +75,7 @@ static trc_status build(const trc_material_desc *desc, const struct trc_compile_
     if (b && m) {
         b->desc = desc;
         b->context = context;
+        memset(b->buckets, 0xff, sizeof b->buckets);
         atomic_init(&m->refs, 1);
         m->flags = desc->flags;
         m->pass_index = desc->pass_index;
