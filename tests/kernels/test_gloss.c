@@ -295,7 +295,7 @@ static void rays_sent_seldom_choose_all_lobes(void **state) {
     (void)state;
     static const float left[12] = {-4, -9, -9, -4, -9, 9, -4, 9, 9, -4, 9, -9};
     static const float right[12] = {4, -9, -9, 4, 9, -9, 4, 9, 9, 4, -9, 9};
-    static const float weights[2] = {0.02f, 0.05f}, walls[2] = {1.0f, 4.0f};
+    static const float weights[2] = {0.002f, 0.005f}, walls[2] = {10.0f, 40.0f};
     static float pixels[4 * FRAME];
     const trc_scene scene = floor_scene(SOURCES, 0.0f, false);
     struct node_list list = {0};
@@ -331,11 +331,40 @@ static void rays_sent_seldom_choose_all_lobes(void **state) {
     assert_ok(trc_scene_destroy(scene));
 }
 
+/* What a weak narrow lobe finds is not left to chance: with one sample nearly each pixel of a
+ * floor under a wide bright ceiling has its share of it. (Where a lobe is as wide as a light's
+ * sample, that may have it.) */
+static void narrow_lobes_send_their_rays(void **state) {
+    (void)state;
+    static const float roughness[3] = {0.0f, 0.1f, 0.3f};
+    static float pixels[4 * FRAME];
+    const float weight = 0.05f, radiance = 10.0f;
+    for (int k = 0; k < 3; k++) {
+        const trc_scene scene = floor_scene(SOURCES, 0.0f, false);
+        fixture_level(scene, 1.0f, 0.1f, fixture_glossy(scene, weight, roughness[k]));
+        const float h = 50.0f, z = 4.0f;
+        const float ceiling[12] = {-h, -h, z, -h, h, z, h, h, z, h, -h, z};
+        fixture_quad(scene, ceiling, fixture_material(scene, TRC_NODE_EMISSION, radiance));
+        assert_ok(trc_scene_commit(scene));
+        const trc_render_desc desc = render_desc(SIDE, 1);
+        render(scene, &desc, pixels);
+        const double want = (double)(weight * radiance);
+        int near = 0;
+        for (int p = 0; p < FRAME; p++)
+            near += fabs((double)pixels[4 * p] / want - 1.0) < 0.5;
+        printf("  roughness %.1f: %d of %d pixels within a half of %.4f\n", (double)roughness[k],
+               near, FRAME, want);
+        assert_true(near > 0.9 * FRAME);
+        assert_ok(trc_scene_destroy(scene));
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(weights_count_light_samples),
         cmocka_unit_test(weights_count_rays_not_sent),
         cmocka_unit_test(rays_sent_seldom_choose_all_lobes),
+        cmocka_unit_test(narrow_lobes_send_their_rays),
         cmocka_unit_test(weights_pass_transparency),
         cmocka_unit_test(filter_glossy),
     };

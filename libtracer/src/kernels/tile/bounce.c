@@ -145,16 +145,35 @@ static vmask attenuate(const struct trc_tile *t, const struct arrival *a,
     return vm_andnot(active, vf_lt(size, vf_set(t->desc->attenuation_cutoff)));
 }
 
-/* Russian roulette: in proportion to what the ray can bring to the picture, certain from
- * ROULETTE_FULL on. A matt surface with a weak gloss sends a ray now and then instead of always. */
+/* Russian roulette: in proportion to what the ray can bring to the picture, certain from a full
+ * weight on. A matt surface with a weak gloss sends a ray now and then instead of always. The full
+ * weight grows with the roughness: rough lobes find the mean of much, and light samples have the
+ * most of their lights; what a narrow lobe finds its rays find alone, and then it is bright. */
 #define ROULETTE_FULL 0.25f
+#define ROULETTE_FULL_PER_ALPHA 0.4f
+#define ROULETTE_FULL_IDEAL 0.02f
+static vfloat full_weight_of(const struct trc_lobe *lobe) {
+    const vfloat largest = vf_set(ROULETTE_FULL);
+    if (lobe->kind != TRC_LOBE_REFLECT)
+        return largest;
+    const vfloat alpha = vf_where(vm_not(lobe->ideal), vf_min(lobe->alpha_x, lobe->alpha_y));
+    return vf_max(vf_min(alpha * vf_set(ROULETTE_FULL_PER_ALPHA), largest),
+                  vf_set(ROULETTE_FULL_IDEAL));
+}
+
 vfloat trc_bounce_chance(const struct trc_tile *t, const struct arrival *a,
                          const struct trc_lobes *lobes) {
     const vfloat one = vf_set(1.0f);
     if (t->desc->integrator != TRC_INTEGRATOR_DISTRIBUTION)
         return one;
+    vfloat full = vf_zero(); /* times continue_weight */
+    for (int i = 0; i < lobes->count; i++) {
+        if (!trc_lobe_ends(lobes->lobe[i].kind))
+            full = full + lobes->lobe[i].sample_weight * full_weight_of(&lobes->lobe[i]);
+    }
     const vfloat brings = v3_max(a->weight) * lobes->continue_weight;
-    return vf_min(brings * vf_set(1.0f / ROULETTE_FULL), one);
+    const vmask some = vf_gt(full, vf_zero());
+    return vf_where(some, vf_min(vf_divide(brings * lobes->continue_weight, full), one));
 }
 
 /* Straight on through transparency alone, for rays that may not bounce any more. */
