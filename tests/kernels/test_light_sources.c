@@ -325,6 +325,33 @@ static void lamps_below_the_horizon_are_chosen(void **state) {
     assert_ok(trc_scene_destroy(both));
 }
 
+/* A bright lamp that faces away takes no samples from a sun: the floor behind it has no noise. */
+static void lamps_are_not_chosen_behind_them(void **state) {
+    (void)state;
+    /* Faces up from .1 above the floor, beside the view. */
+    static const float face_up[12] = {1, 0, 0, 2, 0, -1, 0, 3, 0, 0, -1, 0.1f};
+    static float pixels[4 * LEVEL_PIXELS];
+    const trc_scene scene = fixture_level_view();
+    trc_light_desc lamp = default_light_desc(), sun = default_light_desc();
+    trc_id id = 0;
+    memcpy(lamp.transform, face_up, sizeof face_up);
+    lamp.size_x = lamp.size_y = 4.0f;
+    lamp.strength = 4000.0f;
+    assert_ok(trc_light_create(scene, &lamp, &id));
+    sun.type = TRC_LIGHT_SUN;
+    sun.size_x = sun.size_y = 0.0f;
+    sun.strength = (float)PI;
+    assert_ok(trc_light_create(scene, &sun, &id));
+    fixture_level(scene, 100.0f, 0.0f, fixture_material(scene, TRC_NODE_DIFFUSE, 0.5f));
+    assert_ok(trc_scene_commit(scene));
+    const trc_render_desc desc = default_render_desc(LEVEL_WIDTH, LEVEL_HEIGHT, 1);
+    fixture_draw(scene, &desc, TRC_PASS_COMBINED, pixels, (uint64_t)4 * LEVEL_PIXELS);
+    for (int p = 0; p < LEVEL_PIXELS; p++)
+        if (fabsf(pixels[4 * p] - 0.5f) > 1e-5f)
+            fail_msg("pixel %d has %g", p, (double)pixels[4 * p]);
+    assert_ok(trc_scene_destroy(scene));
+}
+
 /* A dark sky with one bright texel above the horizon, over a floor. */
 static trc_scene one_bright_texel(uint32_t is_sampled) {
     enum { WIDTH = 32, HEIGHT = 16 };
@@ -378,6 +405,7 @@ int main(void) {
         cmocka_unit_test(faces_that_shine_are_weighed_by_themselves),
         cmocka_unit_test(hidden_lamps_leave_nothing_to_rays),
         cmocka_unit_test(lamps_below_the_horizon_are_chosen),
+        cmocka_unit_test(lamps_are_not_chosen_behind_them),
         cmocka_unit_test(the_sky_is_sampled_where_it_is_bright),
     };
     if (!query_test_isa())

@@ -96,12 +96,15 @@ TRC_INLINE vfloat trc_sin_less(vfloat cos_a, vfloat sin_a, vfloat cos_b, vfloat 
 enum trc_bound_shape {
     TRC_BOUND_SPHERE,     /* shines everywhere */
     TRC_BOUND_HEMISPHERE, /* one normal, 90 degrees about it: flat lights */
+    TRC_BOUND_FLAT_LAMP,  /* the same of a single area lamp: all of it in a plane through center */
     TRC_BOUND_CONE
 };
 TRC_INLINE enum trc_bound_shape trc_shape_of(const struct trc_light_bound *b) {
     if (b->cos_o <= -1.0f)
         return TRC_BOUND_SPHERE;
-    return b->cos_o >= 1.0f && b->cos_e == 0.0f ? TRC_BOUND_HEMISPHERE : TRC_BOUND_CONE;
+    if (b->cos_o < 1.0f || b->cos_e != 0.0f)
+        return TRC_BOUND_CONE;
+    return b->child < 0 && !b->two_sided ? TRC_BOUND_FLAT_LAMP : TRC_BOUND_HEMISPHERE;
 }
 
 /* Maximum that nearness counts, over 1 / squared radius. With 1, as in the paper, a point close to
@@ -140,18 +143,23 @@ TRC_INLINE vfloat trc_bound_importance(const struct trc_wide_bound *b, const str
     if (shape != TRC_BOUND_SPHERE) {
         vfloat cos_l = -v3_dot(b->axis, w);
         cos_l = vf_select(b->two_sided, vf_abs(cos_l), cos_l);
-        vfloat limit = vf_zero();
-        if (shape == TRC_BOUND_HEMISPHERE) {
-            cos_light = cos_l + sin_b;
+        vfloat limit = vf_zero(), cos_nearest = cos_l;
+        if (shape == TRC_BOUND_FLAT_LAMP) {
+            /* Height over nearest distance. From behind no part is seen; if that were chosen, too,
+             * what does shine there would have few samples of great weight. */
+            cos_light = vf_divide(cos_l, vf_max(vf_one() - sin_b, vf_set(EDGE_SLACK)));
+            within = vm_none();
+        } else if (shape == TRC_BOUND_HEMISPHERE) {
+            cos_nearest = cos_light = cos_l + sin_b;
         } else {
             const vfloat sin_l = vf_safe_sqrt(vf_one() - cos_l * cos_l);
             const vfloat cos_x = trc_cos_less(cos_l, sin_l, b->cos_o, b->sin_o);
             const vfloat sin_x = trc_sin_less(cos_l, sin_l, b->cos_o, b->sin_o);
             const vfloat cos_b = vf_safe_sqrt(vf_one() - sin_b * sin_b);
-            cos_light = trc_cos_less(cos_x, sin_x, cos_b, sin_b);
+            cos_nearest = cos_light = trc_cos_less(cos_x, sin_x, cos_b, sin_b);
             limit = b->cos_e;
         }
-        reaches = vm_or(within, vf_gt(cos_light, limit - vf_set(EDGE_SLACK)));
+        reaches = vm_or(within, vf_gt(cos_nearest, limit - vf_set(EDGE_SLACK)));
     }
     const vfloat cos_receiver = vf_select(r->has_n, v3_dot(r->n, w) + sin_b, vf_one());
     reaches = vm_and(reaches, vm_or(within, vf_gt(cos_receiver, vf_set(-EDGE_SLACK))));
