@@ -148,12 +148,16 @@ static vmask attenuate(const struct trc_tile *t, const struct arrival *a,
 /* Russian roulette: in proportion to what the ray can bring to the picture, certain from a full
  * weight on. A matt surface with a weak gloss sends a ray now and then instead of always. The full
  * weight grows with the roughness: rough lobes find the mean of much, and light samples have the
- * most of their lights; what a narrow lobe finds its rays find alone, and then it is bright. */
+ * most of their lights; what a narrow lobe finds its rays find alone, and then it is bright. Rays
+ * between fibres find little that is new, and are the dearest. */
 #define ROULETTE_FULL 0.25f
+#define ROULETTE_FULL_HAIR 0.5f
 #define ROULETTE_FULL_PER_ALPHA 0.4f
 #define ROULETTE_FULL_IDEAL 0.02f
 static vfloat full_weight_of(const struct trc_lobe *lobe) {
     const vfloat largest = vf_set(ROULETTE_FULL);
+    if (lobe->kind >= TRC_LOBE_HAIR_REFLECT)
+        return vf_set(ROULETTE_FULL_HAIR);
     if (lobe->kind != TRC_LOBE_REFLECT)
         return largest;
     const vfloat alpha = vf_where(vm_not(lobe->ideal), vf_min(lobe->alpha_x, lobe->alpha_y));
