@@ -15,9 +15,12 @@ enum { WIDTH = 76, HEIGHT = 45, FRAME = WIDTH * HEIGHT };
 
 /* ---- made films ---- */
 
+#define NEAREST 4.0
+
 /* What is true of a pixel. */
 struct truth {
     float light, alpha, albedo, noise; /* noise: standard deviation of a sample, of the light */
+    float behind;                      /* depth beyond NEAREST */
 };
 typedef struct truth (*truth_of)(int x, int y);
 
@@ -51,7 +54,7 @@ static void add_samples(struct trc_film *film, int pixel, struct truth truth, ui
         }
         film->sums[TRC_PASS_COMBINED][4 * pixel + 3] += (double)truth.alpha;
         film->sums[TRC_PASS_DENOISING_NORMAL][3 * pixel + 2] += 1.0;
-        film->sums[TRC_PASS_DENOISING_DEPTH][pixel] += 4.0;
+        film->sums[TRC_PASS_DENOISING_DEPTH][pixel] += NEAREST + (double)truth.behind;
     }
 }
 
@@ -140,14 +143,14 @@ static double mean_of(const float *pixels, int begin, int end) {
 
 static struct truth still(int x, int y) {
     (void)x, (void)y;
-    return (struct truth){0.3f, 1.0f, 0.5f, 0.0f};
+    return (struct truth){0.3f, 1.0f, 0.5f, 0.0f, 0.0f};
 }
 static struct truth still_ramp(int x, int y) {
-    return (struct truth){0.1f + 0.01f * (float)x + 0.005f * (float)y, 1.0f, 0.5f, 0.0f};
+    return (struct truth){0.1f + 0.01f * (float)x + 0.005f * (float)y, 1.0f, 0.5f, 0.0f, 0.0f};
 }
 static struct truth flat(int x, int y) {
     (void)x, (void)y;
-    return (struct truth){0.3f, 1.0f, 0.5f, 0.2f};
+    return (struct truth){0.3f, 1.0f, 0.5f, 0.2f, 0.0f};
 }
 static struct truth ramp(int x, int y) {
     struct truth truth = still_ramp(x, y);
@@ -158,21 +161,35 @@ static struct truth ramp(int x, int y) {
 static struct truth edge(int x, int y) {
     (void)y;
     const float albedo = x < EDGE ? 0.2f : 0.8f;
-    return (struct truth){0.6f * albedo, 1.0f, albedo, 0.3f * albedo};
+    return (struct truth){0.6f * albedo, 1.0f, albedo, 0.3f * albedo, 0.0f};
 }
 static struct truth hole(int x, int y) {
     const float alpha = x < EDGE + y / 3 ? 1.0f : 0.25f;
-    return (struct truth){0.4f * alpha, alpha, 0.5f, 0.0f};
+    return (struct truth){0.4f * alpha, alpha, 0.5f, 0.0f, 0.0f};
 }
 static struct truth half_still(int x, int y) {
     (void)y;
-    return (struct truth){x < EDGE ? 0.3f : 0.4f, 1.0f, 0.5f, x < EDGE ? 0.0f : 0.4f};
+    return (struct truth){x < EDGE ? 0.3f : 0.4f, 1.0f, 0.5f, x < EDGE ? 0.0f : 0.4f, 0.0f};
+}
+
+/* Steps of depth two pixels wide, one in light and one in shadow. */
+static struct truth steps(int x, int y) {
+    (void)y;
+    const bool is_far = x & 2;
+    return (struct truth){is_far ? 0.3f : 0.5f, 1.0f, 0.5f, 0.5f, is_far ? 1.0f : 0.0f};
+}
+/* Light that falls with depth, and pixels in the dark that are as deep as it would be none. */
+static struct truth falling(int x, int y) {
+    const bool is_hole = x % 6 == 3 && y % 6 == 3;
+    const float behind = is_hole ? 3.0f : (float)(x % 12) / 8.0f;
+    const float light = is_hole ? 0.01f : 1.0f - 0.5f * behind;
+    return (struct truth){light, 1.0f, 0.5f, is_hole ? 0.005f : 0.5f, behind};
 }
 
 /* Waves that are lower than the noise of a pixel, and that no feature shows. */
 static struct truth waves(int x, int y) {
     const double wave = sin((double)x * (2.0 * PI / 14.0)) * sin((double)y * (2.0 * PI / 14.0));
-    return (struct truth){0.5f + 0.06f * (float)wave, 1.0f, 0.5f, 0.5f};
+    return (struct truth){0.5f + 0.06f * (float)wave, 1.0f, 0.5f, 0.5f, 0.0f};
 }
 
 /* The same of the means of squares of 5 x 5 pixels. */
@@ -263,6 +280,32 @@ static void broad_waves(void **state) {
                  "at 16, 64, 256 samples",
                  ratio[0], ratio[1], ratio[2]);
     assert_true(ratio[0] < 1.05 && ratio[1] < 1.05 && ratio[2] < 1.3);
+}
+
+/* Edges of depth stay, as features without noise are not blurred. */
+static void steps_of_depth(void **state) {
+    (void)state;
+    static struct picture p;
+    const trc_render_desc desc = desc_of(16);
+    film_show(&desc, steps, &p);
+    const double gain = error_of(p.plain, steps, 0, WIDTH) / error_of(p.clean, steps, 0, WIDTH);
+    print_figure("31: steps of depth at 16 samples", "error %.2f times lower", gain);
+    assert_true(gain > 4.0);
+}
+
+/* No slope leads below black. */
+static void nothing_below_black(void **state) {
+    (void)state;
+    static struct picture p;
+    float least = 0.0f;
+    for (uint32_t samples = 4; samples <= 64; samples *= 4) {
+        const trc_render_desc desc = desc_of(samples);
+        film_show(&desc, falling, &p);
+        for (int i = 0; i < 4 * FRAME; i++)
+            if (p.plain[i] >= 0.0f && p.clean[i] < least)
+                least = p.clean[i];
+    }
+    assert_true(least >= -1e-7f);
 }
 
 /* A single bright sample stays where it is. */
@@ -612,6 +655,7 @@ static void counts(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(noiseless),      cmocka_unit_test(noisy),
+        cmocka_unit_test(steps_of_depth), cmocka_unit_test(nothing_below_black),
         cmocka_unit_test(many_samples),   cmocka_unit_test(broad_waves),
         cmocka_unit_test(bright_sample),  cmocka_unit_test(calm_neighbors),
         cmocka_unit_test(still_border),   cmocka_unit_test(sums),
