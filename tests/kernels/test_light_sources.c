@@ -308,21 +308,56 @@ static trc_scene sunken(bool has_lamp, bool has_dim) {
     return scene;
 }
 
-/* Lights whose middle is below the horizon shine with what is above: two give the sum of both. */
-static void lamps_below_the_horizon_are_chosen(void **state) {
-    (void)state;
+/* Where both are, there is the light of one and of the other. */
+static void expect_sum(const char *what, trc_scene (*make)(bool has_lamp, bool has_dim)) {
     struct mean alone[2];
     for (int k = 0; k < 2; k++) {
-        const trc_scene scene = sunken(k == 0, k == 1);
+        const trc_scene scene = make(k == 0, k == 1);
         alone[k] = mean_of(scene, 256);
         assert_ok(trc_scene_destroy(scene));
     }
     assert_true(alone[0].value > 0.1 * alone[1].value);
     const struct mean sum = {alone[0].value + alone[1].value,
                              hypot(alone[0].error, alone[1].error)};
-    const trc_scene both = sunken(true, true);
-    expect_same("two lamps", mean_of(both, 256), sum);
+    const trc_scene both = make(true, true);
+    expect_same(what, mean_of(both, 256), sum);
     assert_ok(trc_scene_destroy(both));
+}
+
+/* Lights whose middle is below the horizon shine with what is above. */
+static void lamps_below_the_horizon_are_chosen(void **state) {
+    (void)state;
+    expect_sum("two lamps", sunken);
+}
+
+/* A spot of half a turn whose middle lies below the floor, which its sphere lights; a dim lamp. */
+static trc_scene half_turn(bool has_lamp, bool has_dim) {
+    const trc_scene scene = fixture_level_view();
+    static const float below[12] = {1, 0, 0, 2, 0, 1, 0, 0, 0, 0, 1, -0.2f};
+    trc_light_desc spot = default_light_desc(), dim = default_light_desc();
+    trc_id id = 0;
+    spot.type = TRC_LIGHT_SPOT;
+    memcpy(spot.transform, below, sizeof below);
+    spot.spot_angle = (float)PI;
+    spot.spot_blend = 0.0f;
+    spot.radius = 6.0f;
+    spot.strength = 2000.0f;
+    spot.cast_shadow = 0;
+    if (has_lamp)
+        assert_ok(trc_light_create(scene, &spot, &id));
+    dim.strength = 20.0f;
+    dim.type = TRC_LIGHT_POINT;
+    if (has_dim)
+        assert_ok(trc_light_create(scene, &dim, &id));
+    fixture_level(scene, 100.0f, 0.0f, matt(scene));
+    assert_ok(trc_scene_commit(scene));
+    return scene;
+}
+
+/* What is behind the middle of a sphere is not behind all of it. */
+static void spots_of_half_a_turn_are_chosen(void **state) {
+    (void)state;
+    expect_sum("spot and lamp", half_turn);
 }
 
 /* A bright lamp that faces away takes no samples from a sun: the floor behind it has no noise. */
@@ -405,6 +440,7 @@ int main(void) {
         cmocka_unit_test(faces_that_shine_are_weighed_by_themselves),
         cmocka_unit_test(hidden_lamps_leave_nothing_to_rays),
         cmocka_unit_test(lamps_below_the_horizon_are_chosen),
+        cmocka_unit_test(spots_of_half_a_turn_are_chosen),
         cmocka_unit_test(lamps_are_not_chosen_behind_them),
         cmocka_unit_test(the_sky_is_sampled_where_it_is_bright),
     };

@@ -99,12 +99,18 @@ enum trc_bound_shape {
     TRC_BOUND_FLAT_LAMP,  /* the same of a single area lamp: all of it in a plane through center */
     TRC_BOUND_CONE
 };
-TRC_INLINE enum trc_bound_shape trc_shape_of(const struct trc_light_bound *b) {
+TRC_INLINE enum trc_bound_shape trc_shape_of(const struct trc_light_table *t,
+                                             const struct trc_light_bound *b) {
     if (b->cos_o <= -1.0f)
         return TRC_BOUND_SPHERE;
     if (b->cos_o < 1.0f || b->cos_e != 0.0f)
         return TRC_BOUND_CONE;
-    return b->child < 0 && !b->two_sided ? TRC_BOUND_FLAT_LAMP : TRC_BOUND_HEMISPHERE;
+    if (b->child >= 0 || (uint32_t)b->light >= t->lamp_count)
+        return TRC_BOUND_HEMISPHERE;
+    /* Spots of half a turn have such bounds, too, but are spheres. */
+    const int32_t kind = t->lamps[b->light].kind;
+    const bool is_area = kind == TRC_KIND_RECTANGLE || kind == TRC_KIND_ELLIPSE;
+    return is_area ? TRC_BOUND_FLAT_LAMP : TRC_BOUND_HEMISPHERE;
 }
 
 /* Maximum that nearness counts, over 1 / squared radius. With 1, as in the paper, a point close to
@@ -194,7 +200,7 @@ TRC_INLINE vfloat trc_candidate_importance(const struct trc_light_table *t, uint
         return trc_distant_importance(t, i - t->cut_count, r);
     const struct trc_light_bound *bound = &t->bounds[t->cut[i]];
     const struct trc_wide_bound b = trc_bound_broadcast(bound);
-    return trc_bound_importance(&b, r, trc_shape_of(bound), bound->radius > 0.0f);
+    return trc_bound_importance(&b, r, trc_shape_of(t, bound), bound->radius > 0.0f);
 }
 
 /* Takes the weight from candidates that do not light the receiver. Those that are not kept have it
