@@ -20,6 +20,8 @@ import addon_utils
 import bpy
 from bpy.app.handlers import persistent
 
+from . import writes
+
 LONGEST_SECONDS = 20.0  # that unregistering waits
 _NAP_SECONDS = 0.002
 _DISABLED = "stopped, as the add-on was disabled"
@@ -129,12 +131,19 @@ def _have_ended(reason, seconds):
     """Have all jobs end within the time; whether they did. They cannot where one of them calls this, from
     a handler."""
     _Jobs.refusal = reason
+    if not _is_busy() or _is_own() or seconds <= 0.0:
+        return not _is_busy()
+    if threading.current_thread() is threading.main_thread():
+        return writes.run_in_operator(lambda: _wait_for_jobs(seconds))
+    return _wait_for_jobs(seconds)
+
+
+def _wait_for_jobs(seconds):
+    """Whether all jobs have ended after at most this time."""
     deadline = time.monotonic() + seconds
-    while _is_busy():
-        if _is_own() or time.monotonic() >= deadline:
-            return False
+    while _is_busy() and time.monotonic() < deadline:
         time.sleep(_NAP_SECONDS)
-    return True
+    return not _is_busy()
 
 
 def _is_busy():

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Keeps Blender from forbidding scripts to write for good.
 
-While an engine is in a call, Blender forbids Python to write to its data: by one switch for all threads,
-which every call sets, and puts back as it found it. Calls of two threads that do not end in the reverse
-order of their begin can leave it set: a render that begins within a draw of the viewport and ends after
-it, say; from then on timers and handlers of all add-ons fail. So a render that found the switch set ends
-within a call that did not, a draw that is made for it; one that did not ends after all that began
-meanwhile. What is kept here is guarded by Python's own lock.
+While an engine draws, Blender forbids Python to write to its data: by one switch for all threads, which a
+draw sets and a render or an operator clears, and which each puts back as it found it. Calls of two threads
+that do not end in the reverse order of their begin can leave it set: a render that begins within a draw of
+the viewport and ends after it; from then on timers and handlers of all add-ons fail. So a render that found
+the switch set ends within a call of Blender's own thread that did not: a draw that is made for it, or an
+operator where that thread waits for renders to end. What is kept here is guarded by Python's own lock.
 
 Of the calls of a viewport in a window the switch is set from the start. What has to be written there all the
 same, settings of temporary data, is written by a property's update function: those Blender lets write always
@@ -25,10 +25,11 @@ _WATCH_SECONDS = 0.05   # between two looks for renders that wait for a draw
 
 
 class _Call:
-    """One of Blender's calls of an engine, in progress."""
+    """One of Blender's calls, in progress."""
 
-    def __init__(self, found_set):
+    def __init__(self, found_set, is_render):
         self.found_set = found_set
+        self.is_render = is_render
         self.waits_for_draw = False
 
 
@@ -43,27 +44,55 @@ class _Switch:
 @contextlib.contextmanager
 def render_call():
     """Around a final render or a preview, on the thread that Blender renders on."""
-    call = _begin()
+    call = _begin(sets=False, is_render=True)
     try:
         yield
     finally:
-        call.waits_for_draw = call.found_set
-        _wait_until(lambda: _may_end(call))
+        if call.found_set:
+            call.waits_for_draw = True
+            _wait_until(lambda: any(not other.found_set and not other.is_render for other in _Switch.calls))
         _end(call)
 
 
 @contextlib.contextmanager
 def draw_call(redraw):
     """Around a call of the viewport, on Blender's own thread. redraw() has it drawn once more."""
-    call = _begin()
-    try:
-        yield
-    finally:
-        if any(other.found_set for other in _Switch.calls):
-            _watch(redraw)
-        if not call.found_set:
-            _wait_until(lambda: not _draw_is_awaited())
-        _end(call)
+    with _main_call(sets=True):
+        try:
+            yield
+        finally:
+            if any(other.found_set for other in _Switch.calls):
+                _watch(redraw)
+
+
+def run_in_operator(function):
+    """function() and its result, on Blender's own thread; renders can end meanwhile as they can within a
+    draw. For what waits for them."""
+    operator = getattr(bpy.types, "VOLLEY_OT_run", None)
+    if operator is None:  # this module is not registered
+        return function()
+    operator.function = staticmethod(function)
+    bpy.ops.volley.run()
+    (result, error), operator.result = operator.result, None
+    if error is not None:
+        raise error
+    return result
+
+
+class VOLLEY_OT_run(bpy.types.Operator):
+    """Run what the add-on wants to run in an operator"""
+
+    bl_idname = "volley.run"
+    bl_label = "Run"
+    bl_options = {'INTERNAL'}
+
+    function = result = None
+
+    def execute(self, _context):
+        cls = type(self)
+        with _main_call(sets=False):
+            cls.result = _result_of(cls.function)
+        return {'FINISHED'}
 
 
 def run(function):
@@ -97,18 +126,25 @@ class _Update:
 
 
 def _update(_window_manager, _context):
+    _Update.result = _result_of(_Update.function)
+
+
+def _result_of(function):
+    """(result, exception): Blender prints exceptions of what it calls, and goes on."""
     try:
-        _Update.result = _Update.function(), None
-    except Exception as error:  # Blender prints those of update functions and goes on
-        _Update.result = None, error
+        return function(), None
+    except Exception as error:
+        return None, error
 
 
 def register():
+    bpy.utils.register_class(VOLLEY_OT_run)
     bpy.types.WindowManager.volley_write = bpy.props.BoolProperty(update=_update, options={'HIDDEN', 'SKIP_SAVE'})
 
 
 def unregister():
     del bpy.types.WindowManager.volley_write
+    bpy.utils.unregister_class(VOLLEY_OT_run)
 
 
 def is_rendering():
@@ -116,21 +152,28 @@ def is_rendering():
     return any(bpy.app.is_job_running(kind) for kind in ('RENDER', 'RENDER_PREVIEW'))
 
 
-def _begin():
-    call = _Call(_Switch.is_set)
+@contextlib.contextmanager
+def _main_call(sets):
+    """A call on Blender's own thread; renders that wait for it end before it does."""
+    call = _begin(sets, is_render=False)
+    try:
+        yield
+    finally:
+        if not call.found_set:
+            _wait_until(lambda: not _draw_is_awaited())
+        _end(call)
+
+
+def _begin(sets, is_render):
+    call = _Call(_Switch.is_set, is_render)
     _Switch.calls.append(call)
-    _Switch.is_set = True
+    _Switch.is_set = sets
     return call
 
 
 def _end(call):
     _Switch.calls.remove(call)
     _Switch.is_set = call.found_set
-
-
-def _may_end(call):
-    others = [other.found_set for other in _Switch.calls if other is not call]
-    return not all(others) if call.found_set else not any(others)
 
 
 def _draw_is_awaited():

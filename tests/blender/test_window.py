@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 DRAW_SECONDS = 0.5
+ENDLESS = 1 << 20  # samples
 LONGEST_DRAWS = 60  # until a view must have come to rest, on a busy machine too
 
 
@@ -386,15 +387,16 @@ def test_panels_draw_and_previews_render(window):
     assert not window.complaints()
 
 
-def inside_render_that_begins_within_a_draw():
-    """Writes from a timer after a render that began while the viewport was being drawn; whether it did
-    begin there."""
+def inside_render_that_begins_within_a_draw(leaves):
+    """Writes from a timer after a render that began while the viewport was being drawn, and which ended by
+    itself or as the add-on was disabled; whether it did begin there."""
     import time
+    import addon_utils
     import bpy
     import scenes
     from volley import session, viewport
     yield 0.1
-    scene = scenes.empty(size=(64, 48), samples=4)
+    scene = scenes.empty(size=(64, 48), samples=ENDLESS if leaves else 4)
     scenes.camera((0.0, -9.0, 0.0))
     yield DRAW_SECONDS
     window, area, space = _view()
@@ -403,7 +405,7 @@ def inside_render_that_begins_within_a_draw():
     scene.volley.preview_samples = 1
     yield from _settled()
     region = next(region for region in area.regions if region.type == 'WINDOW')
-    drawing, was_within = [False], [False]
+    drawing, was_within, renders = [False], [False], [False]
     draw, render = viewport.Viewport.draw, session.Session.render
 
     def slow_draw(self, *arguments):
@@ -416,6 +418,7 @@ def inside_render_that_begins_within_a_draw():
         was_within[0] |= drawing[0]
         while drawing[0]:
             time.sleep(0.1)
+        renders[0] = True
         render(self, *arguments)
 
     bpy.app.handlers.render_pre.append(lambda *_: time.sleep(1.0))
@@ -426,15 +429,21 @@ def inside_render_that_begins_within_a_draw():
     region.tag_redraw()
     for _ in range(LONGEST_DRAWS):
         yield 0.1
-        if not bpy.app.is_job_running('RENDER'):
+        if renders[0] and leaves or not bpy.app.is_job_running('RENDER'):
             break
-    yield 3.0 * DRAW_SECONDS
+    if leaves:
+        addon_utils.disable("volley")
+        addon_utils.enable("volley")
+    else:
+        yield 3.0 * DRAW_SECONDS
     scene.volley.samples = 5  # fails where writing is forbidden
     return was_within[0]
 
 
-def test_scripts_may_write_after_a_render_that_begins_within_a_draw(window):
-    assert window.run_in_window(inside_render_that_begins_within_a_draw, timeout=60)
+@pytest.mark.parametrize("leaves", [False, True])
+def test_scripts_may_write_after_a_render_that_begins_within_a_draw(window, leaves):
+    assert window.run_in_window(inside_render_that_begins_within_a_draw, leaves, timeout=60)
+    assert not window.complaints()
 
 
 # The view through the camera, and what the shading menu says ----------------------------------------
