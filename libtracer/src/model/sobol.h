@@ -1,10 +1,11 @@
-/* The table behind every low-discrepancy number: Sobol's sequence in TRC_SOBOL_DIMENSIONS
- * dimensions.
+/* The table behind every low-discrepancy number: TRC_SOBOL_DIMENSIONS dimensions, in groups of one
+ * or two that are used together (the place in the pixel, on the lens, on a light, ...).
  *
- * Direction numbers: S. Joe and F. Y. Kuo, "Constructing Sobol sequences with better
- * two-dimensional projections" (2008). Which of their dimensions serves which use is chosen in
- * sobol.c so that the pairs that are used together (pixel, lens, place on a light, bounce
- * direction) are the best pairs.
+ * Every pair is the first two dimensions of Sobol's sequence, a perfect one: each box of area 2^-m
+ * has one of 2^m points, which no other two of Sobol's dimensions have. The groups differ in the
+ * order of the points, which keeps blocks of 2^k points whole and leaves each group as it is: H.
+ * Faure and S. Tezuka, "Another Random Scrambling of Digital (t,s)-Sequences" (2002). Which orders
+ * are good for several groups at once is found by search, see sobol.c.
  *
  * A number of the sequence is linear over GF(2) in the bits of its index, so three levels of
  * TRC_SOBOL_POINTS entries, xor-ed, give all indices below 2^30. Entries are bit-reversed (the

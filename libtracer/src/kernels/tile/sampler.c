@@ -4,10 +4,11 @@
  * Karras, "Stratified Sampling for Stochastic Transparency" (2011), the hash that scrambles a
  * number in Owen's sense when its digits are reversed; B. Burley, "Practical Hash-based Owen
  * Scrambling" (2020), shuffled padding; N. Vegdahl, "Building a Better LK Hash" (2021), constants
- * of the hash; A. Ahmed and P. Wonka, "Screen-Space Blue-Noise Diffusion of Monte Carlo Sampling
- * Error via Hierarchical Ordering of Pixels" (2020); A. Keller and W. Heidrich, "Interleaved
- * Sampling" (2001), and S. Boulos et al., "Packet-based Whitted and Distribution Ray Tracing"
- * (2007), the tile of static samples.
+ * of the hash; H. Faure and S. Tezuka, "Another Random Scrambling of Digital (t,s)-Sequences"
+ * (2002), orders of points (model/sobol.h); A. Ahmed and P. Wonka, "Screen-Space Blue-Noise
+ * Diffusion of Monte Carlo Sampling Error via Hierarchical Ordering of Pixels" (2020); A. Keller
+ * and W. Heidrich, "Interleaved Sampling" (2001), and S. Boulos et al., "Packet-based Whitted and
+ * Distribution Ray Tracing" (2007), the tile of static samples.
  *
  * Every number is a function of (seed, pixel, index, dimension) alone: pictures do not depend on
  * threads, tiles or widths. */
