@@ -285,6 +285,19 @@ static void hidden_lamps_leave_nothing_to_rays(void **state) {
     assert_ok(trc_scene_destroy(seen));
 }
 
+/* Commits a floor under the scene's lamp and, if asked for, a dim one. */
+static trc_scene over_floor(trc_scene scene, bool has_dim) {
+    trc_light_desc dim = default_light_desc();
+    trc_id id = 0;
+    dim.strength = 20.0f;
+    dim.type = TRC_LIGHT_POINT;
+    if (has_dim)
+        assert_ok(trc_light_create(scene, &dim, &id));
+    fixture_level(scene, 100.0f, 0.0f, matt(scene));
+    assert_ok(trc_scene_commit(scene));
+    return scene;
+}
+
 /* A lamp on edge, most of it below the floor; and a dim one of its own. */
 static trc_scene sunken(bool has_lamp, bool has_dim) {
     const trc_scene scene = fixture_level_view();
@@ -298,14 +311,7 @@ static trc_scene sunken(bool has_lamp, bool has_dim) {
     lamp.cast_shadow = 0;
     if (has_lamp)
         assert_ok(trc_light_create(scene, &lamp, &id));
-    trc_light_desc dim = default_light_desc();
-    dim.strength = 20.0f;
-    dim.type = TRC_LIGHT_POINT;
-    if (has_dim)
-        assert_ok(trc_light_create(scene, &dim, &id));
-    fixture_level(scene, 100.0f, 0.0f, matt(scene));
-    assert_ok(trc_scene_commit(scene));
-    return scene;
+    return over_floor(scene, has_dim);
 }
 
 /* Where both are, there is the light of one and of the other. */
@@ -334,7 +340,7 @@ static void lamps_below_the_horizon_are_chosen(void **state) {
 static trc_scene half_turn(bool has_lamp, bool has_dim) {
     const trc_scene scene = fixture_level_view();
     static const float below[12] = {1, 0, 0, 2, 0, 1, 0, 0, 0, 0, 1, -0.2f};
-    trc_light_desc spot = default_light_desc(), dim = default_light_desc();
+    trc_light_desc spot = default_light_desc();
     trc_id id = 0;
     spot.type = TRC_LIGHT_SPOT;
     memcpy(spot.transform, below, sizeof below);
@@ -345,13 +351,7 @@ static trc_scene half_turn(bool has_lamp, bool has_dim) {
     spot.cast_shadow = 0;
     if (has_lamp)
         assert_ok(trc_light_create(scene, &spot, &id));
-    dim.strength = 20.0f;
-    dim.type = TRC_LIGHT_POINT;
-    if (has_dim)
-        assert_ok(trc_light_create(scene, &dim, &id));
-    fixture_level(scene, 100.0f, 0.0f, matt(scene));
-    assert_ok(trc_scene_commit(scene));
-    return scene;
+    return over_floor(scene, has_dim);
 }
 
 /* What is behind the middle of a sphere is not behind all of it. */
