@@ -109,12 +109,32 @@ struct trc_world_sun {
     float share;        /* of the light samples where it is above the surface; 0: no sun */
 };
 
-/* Importance map of the world: cells of equal angle, v = 0 at +Z. */
+/* Blocks of the map's cells, and ranges of normals along a side of the octahedron's square: an odd
+ * number, so that those along axes are in the middle of theirs. */
+#define TRC_MAP_COLUMNS 16
+#define TRC_MAP_ROWS 8
+#define TRC_MAP_MAX_WIDTH 8192 /* in cells */
+#define TRC_MAP_BLOCKS (TRC_MAP_COLUMNS * TRC_MAP_ROWS)
+#define TRC_MAP_NORMALS 17
+/* And one for points that have no normal. */
+#define TRC_MAP_FACINGS (TRC_MAP_NORMALS * TRC_MAP_NORMALS + 1)
+
+/* How a range of normals weighs the blocks: their light times the cosine. */
+struct trc_map_facing {
+    float across[TRC_MAP_COLUMNS + 1];             /* running sums of the columns, 0 to 1 */
+    float down[TRC_MAP_COLUMNS][TRC_MAP_ROWS + 1]; /* of the blocks of each, 0 to 1 */
+    float factor[TRC_MAP_BLOCKS]; /* of the density in a block, down each column in turn */
+};
+#define TRC_MAP_FACING_WORDS ((int32_t)(sizeof(struct trc_map_facing) / sizeof(float)))
+
+/* Importance map of the world: cells of equal angle, v = 0 at +Z, in blocks of equally many. A
+ * direction is found by the chances of the blocks, then by the light of the cells in one. */
 struct trc_world_map {
     atomic_uint refs;
-    uint32_t width, height;
-    float *rows;      /* (width + 1) * height: running sums of each row, 0 to 1 */
-    float *marginal;  /* height + 1 */
+    uint32_t width, height;         /* multiples of TRC_MAP_COLUMNS and TRC_MAP_ROWS */
+    struct trc_map_facing *facings; /* TRC_MAP_FACINGS, normals by the octahedron's square */
+    float *down;      /* for each block, down each column in turn: sums of its rows, 0 to 1 */
+    float *along;     /* for each row, for each block in it: sums of its cells, 0 to 1 */
     float *density;   /* width * height: value over the mean, per unit square */
     float average[3]; /* mean radiance over the sphere */
     struct trc_world_sun sun;

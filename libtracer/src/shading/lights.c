@@ -214,7 +214,7 @@ static trc_status add_world(struct trc_light_table *table, const struct trc_snap
         } else {
             const uint32_t wanted =
                 world && world->map_resolution ? world->map_resolution : MAP_WIDTH;
-            const uint32_t width = wanted < 16 ? 16 : wanted > 8192 ? 8192 : wanted;
+            const uint32_t width = wanted < TRC_MAP_MAX_WIDTH ? wanted : TRC_MAP_MAX_WIDTH;
             const trc_status status = trc_world_map_create(s, width, options, &table->map);
             if (status != TRC_OK)
                 return status;

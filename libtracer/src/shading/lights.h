@@ -51,9 +51,12 @@ float trc_lamp_mean(const struct trc_light_table *table, const struct trc_snapsh
 trc_status trc_light_tree_build(struct trc_light_table *table, struct trc_light_bound *leaves,
                                 uint32_t count, uint32_t cut_max,
                                 const struct trc_light_options *options);
-trc_status trc_world_map_create(const struct trc_snapshot *snapshot, uint32_t width,
+/* Of the wanted width, at most TRC_MAP_MAX_WIDTH, or a little more: whole blocks. */
+trc_status trc_world_map_create(const struct trc_snapshot *snapshot, uint32_t wanted_width,
                                 const struct trc_light_options *options,
                                 struct trc_world_map **out);
+/* Sets map->facings, down and along by its density, which is nowhere 0. */
+void trc_world_map_set_chances(struct trc_world_map *map);
 void trc_world_map_release(struct trc_world_map *map);
 
 #endif

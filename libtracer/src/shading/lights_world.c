@@ -159,35 +159,24 @@ static void measure(struct measuring *m) {
         map->average[i] = (float)(total[i] / weight);
 }
 
-/* Running sums, each row's from 0 to 1; values become multiples of the mean. */
-static void accumulate(struct trc_world_map *map) {
+/* Values become multiples of the mean, none of them 0. */
+static void normalize(struct trc_world_map *map) {
     const uint32_t width = map->width, height = map->height;
-    double sum = 0.0;
-    for (size_t i = 0; i < (size_t)width * height; i++)
+    const size_t count = (size_t)width * height;
+    double sum = 0.0, total = 0.0;
+    for (size_t i = 0; i < count; i++)
         sum += (double)map->density[i];
-    const double mean = sum / ((double)width * height);
-    double down = 0.0;
+    const double scale = sum > 0.0 ? (double)count / sum : 0.0;
     for (uint32_t y = 0; y < height; y++) {
-        float *cell = map->density + (size_t)y * width, *row = map->rows + (size_t)y * (width + 1);
-        const double minimum = MIN_SHARE * sin(3.14159265358979 * (y + 0.5) / height);
-        double along = 0.0;
+        const double minimum = MIN_SHARE * (double)sample_weight(map, y);
         for (uint32_t x = 0; x < width; x++) {
-            cell[x] = (float)((mean > 0.0 ? (double)cell[x] / mean : 0.0) + minimum);
-            row[x] = (float)along;
-            along += (double)cell[x];
+            float *cell = map->density + (size_t)y * width + x;
+            *cell = (float)((double)*cell * scale + minimum);
+            total += (double)*cell;
         }
-        for (uint32_t x = 1; x < width; x++)
-            row[x] = (float)((double)row[x] / along);
-        row[width] = 1.0f;
-        map->marginal[y] = (float)down;
-        down += along / width;
     }
-    for (uint32_t y = 1; y < height; y++)
-        map->marginal[y] = (float)((double)map->marginal[y] / down);
-    map->marginal[height] = 1.0f;
-    const float scale = (float)(height / down);
-    for (size_t i = 0; i < (size_t)width * height; i++)
-        map->density[i] *= scale;
+    for (size_t i = 0; i < count; i++)
+        map->density[i] *= (float)((double)count / total);
 }
 
 static struct trc_world_map *create_map(uint32_t width, const trc_world_desc *world) {
@@ -198,18 +187,20 @@ static struct trc_world_map *create_map(uint32_t width, const trc_world_desc *wo
     map->width = width;
     map->height = width / 2;
     set_sun(&map->sun, world);
-    map->rows = trc_alloc((size_t)(width + 1) * map->height, sizeof(float));
-    map->marginal = trc_alloc((size_t)map->height + 1, sizeof(float));
+    map->facings = trc_alloc(TRC_MAP_FACINGS, sizeof *map->facings);
+    map->down = trc_alloc((map->height / TRC_MAP_ROWS + 1) * (size_t)TRC_MAP_BLOCKS, sizeof(float));
+    map->along = trc_alloc((size_t)(width + TRC_MAP_COLUMNS) * map->height, sizeof(float));
     map->density = trc_alloc((size_t)width * map->height, sizeof(float));
-    if (map->rows && map->marginal && map->density)
+    if (map->facings && map->down && map->along && map->density)
         return map;
     trc_world_map_release(map);
     return NULL;
 }
 
-trc_status trc_world_map_create(const struct trc_snapshot *snapshot, uint32_t width,
+trc_status trc_world_map_create(const struct trc_snapshot *snapshot, uint32_t wanted_width,
                                 const struct trc_light_options *options,
                                 struct trc_world_map **out) {
+    const uint32_t width = (wanted_width + TRC_MAP_COLUMNS - 1) / TRC_MAP_COLUMNS * TRC_MAP_COLUMNS;
     const size_t samples = (size_t)width * SAMPLES_PER_CELL * trc_pool_thread_count(options->pool);
     struct trc_world_map *map = create_map(width, options->world);
     struct measuring m = {.options = options,
@@ -235,7 +226,8 @@ trc_status trc_world_map_create(const struct trc_snapshot *snapshot, uint32_t wi
     }
     if (map->sun.square_chord > 0.0f)
         weigh_sun(snapshot, map);
-    accumulate(map);
+    normalize(map);
+    trc_world_map_set_chances(map);
     *out = map;
     return TRC_OK;
 }
@@ -243,8 +235,9 @@ trc_status trc_world_map_create(const struct trc_snapshot *snapshot, uint32_t wi
 void trc_world_map_release(struct trc_world_map *map) {
     if (!map || atomic_fetch_sub_explicit(&map->refs, 1, memory_order_acq_rel) != 1)
         return;
-    trc_free(map->rows);
-    trc_free(map->marginal);
+    trc_free(map->facings);
+    trc_free(map->down);
+    trc_free(map->along);
     trc_free(map->density);
     trc_free(map);
 }

@@ -5,8 +5,26 @@
 #include "kernels/light/place.h"
 #include "model/lights.h"
 
-/* Cell of the map and density per solid angle. theta by v, azimuth by u. */
-TRC_INLINE vfloat trc_map_density(const struct trc_world_map *map, vvec3 wi, vmask m) {
+/* Words before the range of normals that holds n. */
+TRC_INLINE vint trc_map_facing_at(vvec3 n, vmask has_n) {
+    const vfloat sum = vf_abs(n.x) + vf_abs(n.y) + vf_abs(n.z);
+    const vfloat scale = vf_rcp(vf_select(has_n, sum, vf_one()));
+    const vfloat x = n.x * scale, y = n.y * scale;
+    const vmask folds = vf_lt(n.z, vf_zero());
+    const vfloat folded_x = vf_copysign(vf_one() - vf_abs(y), x),
+                 folded_y = vf_copysign(vf_one() - vf_abs(x), y);
+    const vfloat half = vf_set(0.5f * TRC_MAP_NORMALS), last = vf_set(TRC_MAP_NORMALS - 1);
+    const vfloat right = vf_select(folds, folded_x, x) * half + half;
+    const vfloat up = vf_select(folds, folded_y, y) * half + half;
+    const vint column = vf_to_int(vf_min(right, last)), row = vf_to_int(vf_min(up, last));
+    const vint facing =
+        vi_select(has_n, row * vi_set(TRC_MAP_NORMALS) + column, vi_set(TRC_MAP_FACINGS - 1));
+    return facing * vi_set(TRC_MAP_FACING_WORDS);
+}
+
+/* Density per solid angle. theta by v, azimuth by u. */
+TRC_INLINE vfloat trc_map_density(const struct trc_world_map *map, vvec3 n, vmask has_n, vvec3 wi,
+                                  vmask m) {
     vfloat u = vf_atan2(wi.y, wi.x) * vf_set(0.5f * TRC_INV_PI);
     u = vf_select(vf_lt(u, vf_zero()), u + vf_one(), u);
     const vfloat v = vf_acos(wi.z) * vf_set(TRC_INV_PI);
@@ -14,8 +32,13 @@ TRC_INLINE vfloat trc_map_density(const struct trc_world_map *map, vvec3 wi, vma
     const vint x = vf_to_int(vf_min(u * width, width - vf_one()));
     const vint y = vf_to_int(vf_min(v * height, height - vf_one()));
     const vfloat density = vf_gather(map->density, y * vi_set((int32_t)map->width) + x, m);
+    const vfloat columns = vf_set(TRC_MAP_COLUMNS), rows = vf_set(TRC_MAP_ROWS);
+    const vint column = vf_to_int(vf_min(u * columns, columns - vf_one()));
+    const vint row = vf_to_int(vf_min(v * rows, rows - vf_one()));
+    const vint block = column * vi_set(TRC_MAP_ROWS) + row;
+    const vfloat factor = vf_gather(map->facings->factor, trc_map_facing_at(n, has_n) + block, m);
     const vfloat sine = vf_safe_sqrt((vf_one() - wi.z) * (vf_one() + wi.z));
-    return vf_divide(density, sine * vf_set(2.0f * TRC_PI * TRC_PI));
+    return vf_divide(density * factor, sine * vf_set(2.0f * TRC_PI * TRC_PI));
 }
 
 /* Interval of rising sums that holds u, and where in it: count intervals from base (per lane an
@@ -35,18 +58,28 @@ TRC_INLINE vint trc_sum_search(const float *sums, vint base, uint32_t count, vfl
     *within = vf_saturate(vf_divide(u - start, end - start));
     return low;
 }
-static inline vvec3 trc_map_sample(const struct trc_world_map *map, vfloat u1, vfloat u2, vmask m,
-                                   vfloat *pdf) {
-    vfloat dx, dy;
-    const vint y = trc_sum_search(map->marginal, vi_set(0), map->height, u2, m, &dy);
-    const vint row = y * vi_set((int32_t)map->width + 1);
-    const vint x = trc_sum_search(map->rows, row, map->width, u1, m, &dx);
-    const vfloat u = (vi_to_float(x) + dx) / vf_set((float)map->width);
-    const vfloat v = (vi_to_float(y) + dy) / vf_set((float)map->height);
+static inline vvec3 trc_map_sample(const struct trc_world_map *map, vvec3 n, vmask has_n, vfloat u1,
+                                   vfloat u2, vmask m, vfloat *pdf) {
+    const struct trc_map_facing *facings = map->facings;
+    const uint32_t across = map->width / TRC_MAP_COLUMNS, down = map->height / TRC_MAP_ROWS;
+    const vint facing = trc_map_facing_at(n, has_n);
+    const vint column = trc_sum_search(facings->across, facing, TRC_MAP_COLUMNS, u1, m, &u1);
+    const vint rows = facing + column * vi_set(TRC_MAP_ROWS + 1);
+    const vint row = trc_sum_search(facings->down[0], rows, TRC_MAP_ROWS, u2, m, &u2);
+    const vint block = column * vi_set(TRC_MAP_ROWS) + row;
+    const vint inner =
+        trc_sum_search(map->down, block * vi_set((int32_t)down + 1), down, u2, m, &u2);
+    const vint y = row * vi_set((int32_t)down) + inner;
+    const vint cells = (y * vi_set(TRC_MAP_COLUMNS) + column) * vi_set((int32_t)across + 1);
+    const vint x =
+        column * vi_set((int32_t)across) + trc_sum_search(map->along, cells, across, u1, m, &u1);
+    const vfloat u = (vi_to_float(x) + u1) / vf_set((float)map->width);
+    const vfloat v = (vi_to_float(y) + u2) / vf_set((float)map->height);
     vfloat sine, cosine, s, c;
     vf_sincos_turns(v * vf_set(0.5f), &sine, &cosine);
     vf_sincos_turns(u, &s, &c);
-    const vfloat density = vf_gather(map->density, y * vi_set((int32_t)map->width) + x, m);
+    const vfloat density = vf_gather(map->density, y * vi_set((int32_t)map->width) + x, m) *
+                           vf_gather(facings->factor, facing + block, m);
     *pdf = vf_divide(density, sine * vf_set(2.0f * TRC_PI * TRC_PI));
     return v3(sine * c, sine * s, cosine);
 }
@@ -79,7 +112,7 @@ TRC_INLINE vvec3 trc_world_sun_sample(const struct trc_world_sun *sun, vfloat u1
 TRC_INLINE vfloat trc_world_density(const struct trc_light_table *t, vvec3 n, vmask has_n, vvec3 wi,
                                     vmask m) {
     if (t->map) {
-        const vfloat density = trc_map_density(t->map, wi, m);
+        const vfloat density = trc_map_density(t->map, n, has_n, wi, m);
         if (!(t->map->sun.share > 0.0f))
             return density;
         const vfloat chance = trc_world_sun_chance(&t->map->sun, n, has_n);
@@ -100,12 +133,12 @@ TRC_INLINE struct trc_place trc_world_sample(const struct trc_light_table *t, vv
         const vfloat rest = vf_divide(u1 - chance, vf_one() - chance);
         u1 = vf_min(vf_select(is_sun, vf_divide(u1, chance), rest), vf_set(TRC_BELOW_ONE));
         const vvec3 to_sun = trc_world_sun_sample(&t->map->sun, u1, u2);
-        s.wi = v3_select(is_sun, to_sun, trc_map_sample(t->map, u1, u2, m, &s.pdf));
+        s.wi = v3_select(is_sun, to_sun, trc_map_sample(t->map, n, has_n, u1, u2, m, &s.pdf));
         s.pdf = trc_world_density(t, n, has_n, s.wi, m);
         return s;
     }
     if (t->map) {
-        s.wi = trc_map_sample(t->map, u1, u2, m, &s.pdf);
+        s.wi = trc_map_sample(t->map, n, has_n, u1, u2, m, &s.pdf);
         return s;
     }
     vvec3 a, b;
