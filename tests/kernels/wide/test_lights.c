@@ -609,6 +609,43 @@ static void maps_know_normals(void **state) {
     trc_world_map_release(map);
 }
 
+/* An even world lights both sides of what lets light through by the cosine: as many samples above
+ * as below, each of them worth the same, and rays weighed by the same density. */
+static void even_worlds_light_both_sides(void **state) {
+    (void)state;
+    struct scene s;
+    scene_begin(&s);
+    s.snapshot.world.material = 1;
+    for (int i = 0; i < 3; i++)
+        s.snapshot.world.radiance[i] = 2.0f;
+    scene_commit(&s, NULL, 0);
+    struct trc_surface r = receiver(&s, 0, 0, 0);
+    struct rng random = rng_seed(7);
+    int above = 0, count = 0;
+    for (int i = 0; i < 4096; i += TRC_WIDTH) {
+        float some[3];
+        rng_direction(&random, some);
+        const vvec3 n = v3_set(some), both = v3_scale(n, vf_set(TRC_BOTH_SIDES));
+        struct trc_light_sample l;
+        const vfloat u1 = (vi_to_float(vi_lane() + vi_set(i)) + vf_set(0.5f)) * vf_set(1.0f / 4096);
+        trc_light_sample(&r, both, vf_set(0.5f), u1, test_wide_uniform(&random), &l);
+        const vfloat bsdf_pdf = vf_set(0.2f);
+        const vvec3 seen = trc_world_radiance(&s.snapshot, r.p, both, l.wi, bsdf_pdf, vf_one(),
+                                              vu_set(TRC_VISIBLE_GLOSSY), vm_all_set());
+        for (int k = 0; k < TRC_WIDTH; k++) {
+            const double cosine = (double)vf_get(v3_dot(l.wi, n), k);
+            const double pdf = (double)vf_get(l.pdf, k);
+            assert_true(vm_bits(l.valid) >> k & 1u);
+            assert_true(fabs(pdf - fabs(cosine) / (2.0 * M_PI)) < 1e-5);
+            assert_true(fabs(implied_pdf((double)vf_get(seen.x, k), 2.0, 0.2) - pdf) < 1e-4);
+            above += cosine > 0.0;
+            count++;
+        }
+    }
+    assert_int_equal(2 * above, count);
+    scene_end(&s);
+}
+
 /* ---- many lights ---- */
 
 /* A cloud of triangles above and around the origin. */
@@ -930,6 +967,7 @@ int main(void) {
         cmocka_unit_test(densities_integrate_to_one),
         cmocka_unit_test(maps_are_sampled_by_their_density),
         cmocka_unit_test(maps_know_normals),
+        cmocka_unit_test(even_worlds_light_both_sides),
         cmocka_unit_test(many_triangles),
         cmocka_unit_test(chances_match),
         cmocka_unit_test(nearest_lights_are_found),

@@ -4,14 +4,16 @@
  * triangles.
  *
  * What n means below: the shading normal (s->n) of a point that scatters to its upper side only, or
- * the zero vector for one whose material lets light through (translucent, refracting lobes). Lights
- * wholly below n are not chosen. The same n must be passed when a light is sampled and when a
- * continuation ray of the same point asks for the weights. */
+ * TRC_BOTH_SIDES times it for one whose material lets light through (translucent, refracting
+ * lobes). Lights wholly below the former are not chosen. The same n must be passed when a light is
+ * sampled and when a continuation ray of the same point asks for the weights. */
 #ifndef TRACER_KERNELS_LIGHT_LIGHT_H
 #define TRACER_KERNELS_LIGHT_LIGHT_H
 
 #include "kernels/simd/simd.h"
 #include "kernels/trace/surface.h"
+
+#define TRC_BOTH_SIDES 0.25f
 
 struct trc_light_sample {
     vvec3 wi;        /* unit, from the point to the light */

@@ -108,7 +108,7 @@ TRC_INLINE vvec3 trc_world_sun_sample(const struct trc_world_sun *sun, vfloat u1
     return v3_normalize(v3_mad(off, vf_set(sun->tangent), middle));
 }
 
-/* Without a map: by cosine above n, or over the sphere. */
+/* Without a map: by cosine above n, or on both sides of it. */
 TRC_INLINE vfloat trc_world_density(const struct trc_light_table *t, vvec3 n, vmask has_n, vvec3 wi,
                                     vmask m) {
     if (t->map) {
@@ -119,8 +119,9 @@ TRC_INLINE vfloat trc_world_density(const struct trc_light_table *t, vvec3 n, vm
         const vfloat sun_density = trc_world_sun_density(&t->map->sun, wi);
         return density + chance * (sun_density - density);
     }
-    const vfloat cosine = vf_max(v3_dot(n, wi), vf_zero()) * vf_set(TRC_INV_PI);
-    return vf_select(has_n, cosine, vf_set(0.25f * TRC_INV_PI));
+    const vfloat cosine = v3_dot(n, wi);
+    return vf_select(has_n, vf_max(cosine, vf_zero()) * vf_set(TRC_INV_PI),
+                     vf_abs(cosine) * vf_set(0.5f * TRC_INV_PI / TRC_BOTH_SIDES));
 }
 TRC_INLINE struct trc_place trc_world_sample(const struct trc_light_table *t, vvec3 n, vmask has_n,
                                              vfloat u1, vfloat u2, vmask m) {
@@ -141,10 +142,16 @@ TRC_INLINE struct trc_place trc_world_sample(const struct trc_light_table *t, vv
         s.wi = trc_map_sample(t->map, n, has_n, u1, u2, m, &s.pdf);
         return s;
     }
+    /* Of both sides, the first half of the numbers goes to the upper one. */
+    const vfloat twice = u1 + u1;
+    const vmask is_lower = vm_andnot(vf_le(vf_one(), twice), has_n);
+    const vfloat within = vf_select(is_lower, twice - vf_one(), twice);
+    const vfloat scale =
+        vf_select(is_lower, vf_set(-1.0f / TRC_BOTH_SIDES), vf_set(1.0f / TRC_BOTH_SIDES));
+    const vvec3 side = v3_scale(n, vf_select(has_n, vf_one(), scale));
     vvec3 a, b;
-    v3_frame(n, &a, &b);
-    const vvec3 above = v3_from_frame(trc_warp_cosine(u1, u2), a, b, n);
-    s.wi = v3_select(has_n, above, trc_warp_sphere(u1, u2));
+    v3_frame(side, &a, &b);
+    s.wi = v3_from_frame(trc_warp_cosine(vf_select(has_n, u1, within), u2), a, b, side);
     s.pdf = trc_world_density(t, n, has_n, s.wi, m);
     return s;
 }

@@ -192,7 +192,7 @@ static void shade_group(struct trc_tile *t, uint32_t material, vint index, vmask
         lobes.clear_alpha2 = alpha * alpha;
     }
     a.chance = trc_bounce_chance(t, &a, &lobes);
-    a.receive_n = m->has & TRC_MATERIAL_LIT_BELOW ? v3_zero() : s.n;
+    a.receive_n = m->has & TRC_MATERIAL_LIT_BELOW ? v3_scale(s.n, vf_set(TRC_BOTH_SIDES)) : s.n;
     /* A lobe's own density fits an even world. Matt lobes send no rays. */
     a.world_alone = t->snapshot->world.is_constant && !(m->has & TRC_MATERIAL_IS_MATT);
     if (m->has & TRC_MATERIAL_HAS_HOLDOUT)
