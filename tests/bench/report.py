@@ -33,7 +33,7 @@ def parse_arguments(arguments):
     parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS),
                         help="measure these alone; the others stay as they are")
     parser.add_argument("--only", nargs="+", metavar="SCENE",
-                        help="of the parts hair and files these scenes alone; the others stay as they are")
+                        help="of parts with results by scene these scenes alone; the others stay as they are")
     parser.add_argument("--scenes", type=pathlib.Path, help="the folder of scenes that are not made here")
     parser.add_argument("--threads", type=int, default=0, help="0: all")
     parser.add_argument("--build", type=pathlib.Path, default=compare_cycles.PROJECT / "build")
@@ -48,7 +48,7 @@ def parse_arguments(arguments):
     return options
 
 
-SCENE_PARTS = {"hair", "files"}  # results by scene
+SCENE_PARTS = {"hair", "files", "curves", "denoise"}  # results by scene
 PARTS = {
     "kernels": lambda options: kernels.measure(options, options.scope),
     "frames": lambda options: frames.measure(options, options.scope),
@@ -77,11 +77,24 @@ def measure(options):
         start = time.perf_counter()
         made = PARTS[name](options)
         if options.only:
-            made = {**json.loads((data / f"{name}.json").read_text(encoding="utf-8")), **made}
+            made = with_scenes(json.loads((data / f"{name}.json").read_text(encoding="utf-8")), made)
         write(data / f"{name}.json", made)
         described["parts"] = with_measured(described["parts"], name, options.only, machine.of_part(described))
         write(data / "machine.json", described)
         print(f"   {time.perf_counter() - start:.0f} s", flush=True)
+
+
+def with_scenes(known, made):
+    """A part's results with those of some scenes in place of what was known of them; Denoise has several tables by
+    scene.
+
+    >>> with_scenes({"fur": 1, "head": 1}, {"fur": 2})
+    {'fur': 2, 'head': 1}
+    >>> with_scenes({"scenes": {"glass": 1, "gloss": 1}, "costs": 1}, {"scenes": {"gloss": 2}})
+    {'scenes': {'glass': 1, 'gloss': 2}, 'costs': 1}
+    """
+    tables = {key: {**known[key], **made[key]} for key in denoise.TABLES if key in made}
+    return {**known, **made, **tables}
 
 
 def with_measured(parts, part, only, made):

@@ -314,4 +314,4 @@ def test_scenes_are_measured_alone_where_results_are_by_scene(monkeypatch):
     monkeypatch.setattr(whole_renders, "measure_scene", lambda name, *_others: name)
     assert whole_renders.measure({"ours": "a", "theirs": "b"}, (2, 1), options, None) == {"theirs": "theirs"}
     with pytest.raises(SystemExit):
-        report.parse_arguments(["--parts", "files", "curves", "--only", "theirs"])
+        report.parse_arguments(["--parts", "files", "frames", "--only", "theirs"])

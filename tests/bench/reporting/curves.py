@@ -22,8 +22,9 @@ SHEET_SAMPLES = (1, 16)      # of the pictures to look at
 
 
 def measure(options, scope, pictures):
-    """{scene: errors, times and comparison}, pictures of each scene in a folder."""
-    return {name: measure_scene(name, options, scope, pictures) for name in scope.scenes}
+    """{scene: errors, times and comparison}, pictures of each scene in a folder; with options.only of those alone."""
+    return {name: measure_scene(name, options, scope, pictures) for name in scope.scenes
+            if not options.only or name in options.only}
 
 
 def measure_scene(name, options, scope, pictures):

@@ -25,23 +25,26 @@ TIMED = {"time_samples": (4, 64), "repeats": 2}
 # Without smooth meshes, whose normals Blender finds with other last digits by several threads.
 COST_SCENE, COST_WIDTH, COST_HEIGHT, COST_SAMPLES, COST_REPEATS = "texture", 960, 540, 2, 9
 PICTURE_SAMPLES = 16
+TABLES = ("scenes", "worst_tiles", "flicker")  # of what measure() gives, those by scene
 FLICKER_SCENES, FLICKER_FRAMES, FLICKER_SAMPLES, FLICKER_REFERENCE_SAMPLES = ("example_motion", "robot_motion"), 24, 16, 512
 
 
 def measure(options, scope, pictures):
-    """{"scenes": as curves.measure, "worst_tiles", "flicker", "costs"}; empty where the scope leaves it out."""
+    """{"scenes": as curves.measure, "worst_tiles", "flicker", "costs"}; empty where the scope leaves it out.
+    With options.only of those scenes alone, and without costs."""
     if not scope.denoise:
         return {}
     made, scenes, tiles = replace(scope, **TIMED), {}, {}
     configurations = [error_time.Configuration(curves.BASE, "CYCLES"), curves.volley("SOBOL", 1),
                       error_time.Configuration(DENOISED, "VOLLEY", {**curves.volley("SOBOL", 1).volley,
                                                                     "use_denoising": True})]
-    folders = picture_folders(scope.scenes, FOLDER_CURVES, options, pictures)
+    folders = {name: folder for name, folder in picture_folders(scope.scenes, FOLDER_CURVES, options, pictures).items()
+               if not options.only or name in options.only}
     for name, folder in folders.items():
         own = curves.error_options(options, made, configurations)
         scenes[name] = error_time.measure_scene(name, own)
         tiles[name] = _tiles_and_picture(name, own, folder)
-    return {"scenes": scenes, "worst_tiles": tiles, "costs": costs(options),
+    return {"scenes": scenes, "worst_tiles": tiles, **({} if options.only else {"costs": costs(options)}),
             "flicker": {name: flicker(name, options) for name in FLICKER_SCENES if name in folders}}
 
 
