@@ -4,6 +4,7 @@
  * over all levels of a hierarchy; here by one level, with the cosines of ranges of normals
  * beforehand. */
 #include <math.h>
+#include <string.h>
 
 #include "shading/lights.h"
 
@@ -14,8 +15,9 @@ static double accumulate(const float *values, uint32_t count, float *sums) {
     double total = 0.0, sum = 0.0;
     for (uint32_t i = 0; i < count; i++)
         total += (double)values[i];
+    const double inverse = 1.0 / total;
     for (uint32_t i = 0; i < count; i++) {
-        sums[i] = (float)(sum / total);
+        sums[i] = (float)(sum * inverse);
         sum += (double)values[i];
     }
     sums[count] = 1.0f;
@@ -39,32 +41,47 @@ static void accumulate_blocks(struct trc_world_map *map) {
 
 /* Parts of a block along a side, whose light a normal weighs by their middles. */
 #define BLOCK_PARTS 4
+#define PART_COLUMNS (TRC_MAP_COLUMNS * BLOCK_PARTS)
+#define PART_ROWS (TRC_MAP_ROWS * BLOCK_PARTS)
 #define PARTS (BLOCK_PARTS * BLOCK_PARTS)
 
-struct part {
-    float direction[3]; /* of its middle */
-    float light;        /* of that of the whole sphere */
+/* Blocks stand side by side, so that vectors of them are weighed at once. */
+struct parts {
+    float x[PARTS][TRC_MAP_BLOCKS], y[PARTS][TRC_MAP_BLOCKS], z[PARTS][TRC_MAP_BLOCKS];
+    float light[PARTS][TRC_MAP_BLOCKS]; /* over that of the whole sphere */
 };
 
-static struct part *part_at(struct part parts[TRC_MAP_BLOCKS][PARTS], uint32_t x, uint32_t y) {
-    const uint32_t block = x / BLOCK_PARTS * TRC_MAP_ROWS + y / BLOCK_PARTS;
-    return &parts[block][x % BLOCK_PARTS * BLOCK_PARTS + y % BLOCK_PARTS];
+/* Of part number i of count along a side; small maps leave some without. */
+static uint32_t first_cell(uint32_t i, uint32_t count, uint32_t cells) {
+    return (i * cells + count - 1) / count;
 }
 
-static void set_parts(const struct trc_world_map *map, struct part parts[TRC_MAP_BLOCKS][PARTS]) {
-    const uint32_t width = map->width, height = map->height;
-    const uint32_t columns = TRC_MAP_COLUMNS * BLOCK_PARTS, rows = TRC_MAP_ROWS * BLOCK_PARTS;
-    for (uint32_t i = 0; i < columns * rows; i++) {
-        const uint32_t x = i % columns, y = i / columns;
-        const float phi = 2.0f * PI * ((float)x + 0.5f) / (float)columns,
-                    theta = PI * ((float)y + 0.5f) / (float)rows;
-        *part_at(parts, x, y) =
-            (struct part){{sinf(theta) * cosf(phi), sinf(theta) * sinf(phi), cosf(theta)}, 0.0f};
+static float row_light(const struct trc_world_map *map, uint32_t y, uint32_t column) {
+    const float *row = map->density + (size_t)y * map->width;
+    const uint32_t end = first_cell(column + 1, PART_COLUMNS, map->width);
+    float sum = 0.0f;
+    for (uint32_t x = first_cell(column, PART_COLUMNS, map->width); x < end; x++)
+        sum += row[x];
+    return sum / ((float)map->width * (float)map->height);
+}
+
+static void set_parts(const struct trc_world_map *map, struct parts *parts) {
+    for (uint32_t column = 0; column < PART_COLUMNS; column++) {
+        const float phi = 2.0f * PI * ((float)column + 0.5f) / PART_COLUMNS;
+        for (uint32_t row = 0; row < PART_ROWS; row++) {
+            const float theta = PI * ((float)row + 0.5f) / PART_ROWS;
+            const uint32_t block = column / BLOCK_PARTS * TRC_MAP_ROWS + row / BLOCK_PARTS;
+            const uint32_t part = column % BLOCK_PARTS * BLOCK_PARTS + row % BLOCK_PARTS;
+            parts->x[part][block] = sinf(theta) * cosf(phi);
+            parts->y[part][block] = sinf(theta) * sinf(phi);
+            parts->z[part][block] = cosf(theta);
+            const uint32_t end = first_cell(row + 1, PART_ROWS, map->height);
+            float light = 0.0f;
+            for (uint32_t y = first_cell(row, PART_ROWS, map->height); y < end; y++)
+                light += row_light(map, y, column);
+            parts->light[part][block] = light;
+        }
     }
-    for (uint32_t y = 0; y < height; y++)
-        for (uint32_t x = 0; x < width; x++)
-            part_at(parts, x * columns / width, y * rows / height)->light +=
-                map->density[(size_t)y * width + x] / ((float)width * (float)height);
 }
 
 /* The middle of a range of normals. */
@@ -88,46 +105,49 @@ static void facing_normal(uint32_t facing, float n[3]) {
 
 /* The cosine, rounded off where it becomes 0: the mean over the margin. */
 static float soft_cosine(float cosine) {
-    if (cosine >= FACING_MARGIN)
-        return cosine;
-    const float above = fmaxf(cosine + FACING_MARGIN, 0.0f);
-    return above * above / (4.0f * FACING_MARGIN);
+    const float above = cosine > -FACING_MARGIN ? cosine + FACING_MARGIN : 0.0f;
+    const float rounded = above * above * (0.25f / FACING_MARGIN);
+    return cosine < FACING_MARGIN ? rounded : cosine;
 }
 
-/* Light of a block for a normal, NULL for none. */
-static float block_light(const struct part *parts, const float *n) {
-    float sum = 0.0f;
-    for (int i = 0; i < PARTS; i++) {
-        const float *d = parts[i].direction;
-        const float weight =
-            n ? soft_cosine(n[0] * d[0] + n[1] * d[1] + n[2] * d[2]) + LEAST_COSINE : 1.0f;
-        sum += parts[i].light * weight;
-    }
-    return sum;
+/* Light of the blocks for a normal, or as it is. */
+static void weigh_blocks(const struct parts *parts, const float n[3], float *light) {
+    memset(light, 0, TRC_MAP_BLOCKS * sizeof *light);
+    for (int i = 0; i < PARTS; i++)
+        for (int block = 0; block < TRC_MAP_BLOCKS; block++) {
+            const float cosine =
+                n[0] * parts->x[i][block] + n[1] * parts->y[i][block] + n[2] * parts->z[i][block];
+            light[block] += parts->light[i][block] * (soft_cosine(cosine) + LEAST_COSINE);
+        }
+}
+static void add_blocks(const struct parts *parts, float *light) {
+    memset(light, 0, TRC_MAP_BLOCKS * sizeof *light);
+    for (int i = 0; i < PARTS; i++)
+        for (int block = 0; block < TRC_MAP_BLOCKS; block++)
+            light[block] += parts->light[i][block];
 }
 
-static void set_facing(struct trc_map_facing *facing, const float *n,
-                       struct part parts[TRC_MAP_BLOCKS][PARTS]) {
-    float light[TRC_MAP_BLOCKS], columns[TRC_MAP_COLUMNS];
-    for (uint32_t block = 0; block < TRC_MAP_BLOCKS; block++)
-        light[block] = block_light(parts[block], n);
+/* By what the blocks bring and by their light as it is. */
+static void set_facing(struct trc_map_facing *facing, const float *weighed, const float *light) {
+    float columns[TRC_MAP_COLUMNS];
     for (uint32_t column = 0; column < TRC_MAP_COLUMNS; column++)
-        columns[column] = (float)accumulate(light + (size_t)column * TRC_MAP_ROWS, TRC_MAP_ROWS,
+        columns[column] = (float)accumulate(weighed + (size_t)column * TRC_MAP_ROWS, TRC_MAP_ROWS,
                                             facing->down[column]);
     const double total = accumulate(columns, TRC_MAP_COLUMNS, facing->across);
     for (uint32_t block = 0; block < TRC_MAP_BLOCKS; block++)
-        facing->factor[block] =
-            (float)((double)light[block] / total) / block_light(parts[block], NULL);
+        facing->factor[block] = (float)((double)weighed[block] / total) / light[block];
 }
 
 void trc_world_map_set_chances(struct trc_world_map *map) {
+    struct parts parts;
+    float light[TRC_MAP_BLOCKS], weighed[TRC_MAP_BLOCKS], n[3];
     accumulate_blocks(map);
-    struct part parts[TRC_MAP_BLOCKS][PARTS];
-    set_parts(map, parts);
+    set_parts(map, &parts);
+    add_blocks(&parts, light);
     for (uint32_t i = 0; i < TRC_MAP_FACINGS - 1; i++) {
-        float n[3];
         facing_normal(i, n);
-        set_facing(&map->facings[i], n, parts);
+        weigh_blocks(&parts, n, weighed);
+        set_facing(&map->facings[i], weighed, light);
     }
-    set_facing(&map->facings[TRC_MAP_FACINGS - 1], NULL, parts);
+    set_facing(&map->facings[TRC_MAP_FACINGS - 1], light, light);
 }
