@@ -116,7 +116,7 @@ struct trc_world_sun {
 #define TRC_MAP_MAX_WIDTH 8192 /* in cells */
 #define TRC_MAP_BLOCKS (TRC_MAP_COLUMNS * TRC_MAP_ROWS)
 #define TRC_MAP_NORMALS 17
-/* And one for points that have no normal. */
+/* And one for points that are lit from both sides. */
 #define TRC_MAP_FACINGS (TRC_MAP_NORMALS * TRC_MAP_NORMALS + 1)
 
 /* How a range of normals weighs the blocks: their light times the cosine. */

@@ -14,7 +14,7 @@
 /* Who receives: the point and the normal of kernels/light/light.h. */
 struct trc_receiver {
     vvec3 p, n;
-    vmask has_n;
+    vmask has_n;       /* the normal is of unit length: light from below does not count */
     const vuint *sets; /* the bit of its light set, low word first; read where lights are linked */
 };
 

@@ -5,7 +5,7 @@
 #include "kernels/light/place.h"
 #include "model/lights.h"
 
-/* Words before the range of normals that holds n. */
+/* Words before the range of normals that holds n, or before what serves both sides. */
 TRC_INLINE vint trc_map_facing_at(vvec3 n, vmask has_n) {
     const vfloat sum = vf_abs(n.x) + vf_abs(n.y) + vf_abs(n.z);
     const vfloat scale = vf_rcp(vf_select(has_n, sum, vf_one()));
@@ -142,16 +142,18 @@ TRC_INLINE struct trc_place trc_world_sample(const struct trc_light_table *t, vv
         s.wi = trc_map_sample(t->map, n, has_n, u1, u2, m, &s.pdf);
         return s;
     }
-    /* Of both sides, the first half of the numbers goes to the upper one. */
-    const vfloat twice = u1 + u1;
-    const vmask is_lower = vm_andnot(vf_le(vf_one(), twice), has_n);
-    const vfloat within = vf_select(is_lower, twice - vf_one(), twice);
-    const vfloat scale =
-        vf_select(is_lower, vf_set(-1.0f / TRC_BOTH_SIDES), vf_set(1.0f / TRC_BOTH_SIDES));
-    const vvec3 side = v3_scale(n, vf_select(has_n, vf_one(), scale));
-    vvec3 a, b;
+    vvec3 side = n, a, b;
+    const vmask both = vm_not(has_n);
+    if (vm_any(both)) {
+        /* The first half of the numbers goes to the upper side. */
+        const vmask is_lower = vm_and(both, vf_le(vf_set(0.5f), u1));
+        const vfloat length = vf_set(1.0f / TRC_BOTH_SIDES);
+        const vfloat scale = vf_select(is_lower, vf_zero() - length, length);
+        side = v3_select(both, v3_scale(n, scale), n);
+        u1 = vf_select(both, u1 + u1 - vf_where(is_lower, vf_one()), u1);
+    }
     v3_frame(side, &a, &b);
-    s.wi = v3_from_frame(trc_warp_cosine(vf_select(has_n, u1, within), u2), a, b, side);
+    s.wi = v3_from_frame(trc_warp_cosine(u1, u2), a, b, side);
     s.pdf = trc_world_density(t, n, has_n, s.wi, m);
     return s;
 }
