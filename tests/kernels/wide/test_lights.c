@@ -9,116 +9,10 @@
 #include "core/pool.h"
 #include "kernels/light/light.h"
 #include "kernels/light/select.h"
-#include "kernels/light/world_place.h"
 #include "kernels/simd/wide_math.h"
-#include "shading/lights.h"
-#include "wide_test.h"
+#include "light_scene.h"
 
 #define SAMPLES (1 << 18)
-#define MESH_TRIANGLES 600
-
-/* ---- a scene by hand ---- */
-
-struct scene {
-    struct trc_snapshot snapshot;
-    struct trc_light_table *table;
-    struct trc_mesh mesh, *meshes[1];
-    struct trc_instance instance;
-    struct trc_affine to_world[2];
-    struct trc_material material, plain, *materials[2];
-    uint32_t slots[2];
-    float positions[2 * 9 * MESH_TRIANGLES];
-    uint32_t indices[3 * MESH_TRIANGLES];
-    uint16_t material_index[MESH_TRIANGLES];
-};
-
-static const struct trc_affine identity = {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
-
-static void scene_begin(struct scene *s) {
-    memset(s, 0, sizeof *s);
-    s->meshes[0] = &s->mesh;
-    s->materials[0] = &s->material;
-    s->materials[1] = &s->plain;
-    s->slots[1] = 1;
-    s->mesh.key_count = 1;
-    s->mesh.positions = s->positions;
-    s->mesh.indices = s->indices;
-    s->mesh.material_index = s->material_index;
-    s->to_world[0] = s->to_world[1] = identity;
-    s->instance.key_count = 1;
-    s->instance.object_to_world = s->to_world;
-    s->instance.world_to_object = s->to_world;
-    s->instance.visibility = TRC_VISIBLE_ALL;
-    s->instance.materials = s->slots;
-    s->instance.material_count = 2;
-    s->snapshot.meshes = s->meshes;
-    s->snapshot.materials = s->materials;
-    s->snapshot.instances = &s->instance;
-    s->snapshot.mesh_count = 1;
-    s->snapshot.material_count = 2;
-    s->snapshot.world.material = UINT32_MAX;
-    s->snapshot.world.visibility = TRC_VISIBLE_ALL;
-    s->snapshot.world.is_constant = 1;
-}
-static void scene_emit(struct scene *s, float r, float g, float b) {
-    s->material.has = TRC_MATERIAL_HAS_EMISSION;
-    s->material.emission[0] = r;
-    s->material.emission[1] = g;
-    s->material.emission[2] = b;
-}
-static void scene_triangle(struct scene *s, const float corners[9], uint16_t material) {
-    const uint32_t n = s->mesh.triangle_count++;
-    memcpy(s->positions + 9 * n, corners, 9 * sizeof(float));
-    for (uint32_t k = 0; k < 3; k++)
-        s->indices[3 * n + k] = 3 * n + k;
-    s->material_index[n] = material;
-    s->mesh.vertex_count = 3 * s->mesh.triangle_count;
-    s->snapshot.instance_count = 1;
-}
-static void scene_commit_as(struct scene *s, const trc_light_desc *lights, uint32_t count,
-                            uint32_t scatters) {
-    struct trc_pool *pool;
-    assert_int_equal(trc_pool_create(2, &pool), TRC_OK);
-    const struct trc_light_options options = {
-        .lights = lights, .light_count = count, .scatters = scatters, .pool = pool};
-    assert_int_equal(trc_light_table_create(&s->snapshot, &options, &s->table), TRC_OK);
-    trc_pool_destroy(pool);
-    s->snapshot.lights = s->table;
-}
-static void scene_commit(struct scene *s, const trc_light_desc *lights, uint32_t count) {
-    scene_commit_as(s, lights, count, TRC_MATERIAL_SCATTERS);
-}
-static void scene_end(struct scene *s) { trc_light_table_destroy(s->table); }
-
-/* A lamp of 100 W at height z above the origin, shining down. */
-static trc_light_desc lamp(uint32_t type, float x, float y, float z) {
-    trc_light_desc d;
-    memset(&d, 0, sizeof d);
-    d.struct_size = sizeof d;
-    d.type = type;
-    d.transform[0] = d.transform[5] = d.transform[10] = 1.0f;
-    d.transform[3] = x;
-    d.transform[7] = y;
-    d.transform[11] = z;
-    d.color[0] = d.color[1] = d.color[2] = 1.0f;
-    d.strength = 100.0f;
-    d.size_x = d.size_y = 1.0f;
-    d.spread = 3.14159265f;
-    d.spot_angle = 3.0f;
-    d.visibility = TRC_VISIBLE_ALL;
-    d.cast_shadow = d.use_mis = 1;
-    return d;
-}
-
-static struct trc_surface receiver(const struct scene *scene, double x, double y, double z) {
-    struct trc_surface s;
-    memset(&s, 0, sizeof s);
-    s.snapshot = &scene->snapshot;
-    s.active = vm_all_set();
-    s.p = v3(vf_set((float)x), vf_set((float)y), vf_set((float)z));
-    s.n = s.ng = v3(vf_zero(), vf_zero(), vf_one());
-    return s;
-}
 
 /* ---- estimates ---- */
 
@@ -278,20 +172,14 @@ static void areas_match_closed_forms(void **state) {
     expect("scaled rectangle", e, 100.0 / 24 * polygon(corners, 4));
     /* A diffuse world. */
     struct scene s;
-    scene_begin(&s);
-    s.snapshot.world.material = 1;
-    for (int i = 0; i < 3; i++)
-        s.snapshot.world.radiance[i] = 2.0f;
+    scene_begin_in_even_world(&s);
     scene_commit(&s, NULL, 0);
     struct trc_surface r = receiver(&s, 0, 0, 0);
     assert_false(s.table->world_apart);
     expect("world", irradiance(&r), 2 * M_PI);
     scene_end(&s);
     /* Beside a lamp: each by samples of its own, and both are certain. */
-    scene_begin(&s);
-    s.snapshot.world.material = 1;
-    for (int i = 0; i < 3; i++)
-        s.snapshot.world.radiance[i] = 2.0f;
+    scene_begin_in_even_world(&s);
     scene_commit(&s, &scaled, 1);
     r = receiver(&s, 0, 0, 0);
     assert_true(s.table->world_apart);
@@ -338,12 +226,6 @@ static struct trc_light_ray seeing(vvec3 p, vvec3 n, vvec3 wi, vfloat tmax, vflo
                                   .bsdf_pdf = pdf,
                                   .light_sample_count = vf_one(),
                                   .path = vu_set(path)};
-}
-
-/* Density of light sampling that trc_light_hit weighs with, from the weight it gives. */
-static double implied_pdf(double seen, double radiance, double pb) {
-    const double w = seen / radiance;
-    return pb * sqrt(fmax(1.0 / w - 1.0, 0.0));
 }
 
 /* A sampled direction must be met by a ray, with the same density. */
@@ -469,181 +351,6 @@ static void densities_integrate_to_one(void **state) {
             assert_true(fabs(total - 1.0) < 3e-3);
         scene_end(&s);
     }
-}
-
-/* ---- the map of the world ---- */
-
-enum { MAP_WIDTH = 48, MAP_HEIGHT = MAP_WIDTH / 2, MAP_SIDE = 512 };
-
-/* A map of even light, or of light that differs from cell to cell, one of them a sun. */
-static struct trc_world_map *map_of(bool is_even) {
-    struct rng random = rng_seed(5);
-    struct trc_world_map *map = trc_alloc_zeroed(1, sizeof *map);
-    assert_non_null(map);
-    atomic_init(&map->refs, 1);
-    map->width = MAP_WIDTH;
-    map->height = MAP_HEIGHT;
-    map->facings = trc_alloc(TRC_MAP_FACINGS, sizeof *map->facings);
-    map->down = trc_alloc(TRC_MAP_BLOCKS * (MAP_HEIGHT / TRC_MAP_ROWS + 1), sizeof(float));
-    map->along = trc_alloc((MAP_WIDTH + TRC_MAP_COLUMNS) * MAP_HEIGHT, sizeof(float));
-    map->density = trc_alloc(MAP_WIDTH * MAP_HEIGHT, sizeof(float));
-    assert_true(map->facings && map->down && map->along && map->density);
-    double sum = 0.0;
-    for (int i = 0; i < MAP_WIDTH * MAP_HEIGHT; i++) {
-        const float sine = sinf((float)M_PI * ((float)(i / MAP_WIDTH) + 0.5f) / MAP_HEIGHT);
-        const float light = i == 7 * MAP_WIDTH + 31 ? 500.0f : rng_range(&random, 0.05f, 1.0f);
-        map->density[i] = is_even ? sine : sine * light;
-        sum += (double)map->density[i];
-    }
-    for (int i = 0; i < MAP_WIDTH * MAP_HEIGHT; i++)
-        map->density[i] *= (float)(MAP_WIDTH * MAP_HEIGHT / sum);
-    trc_world_map_set_chances(map);
-    return map;
-}
-
-/* Direction (u, v) of the map. */
-static vvec3 map_direction(double u, double v) {
-    return v3(vf_set((float)(sin(M_PI * v) * cos(2.0 * M_PI * u))),
-              vf_set((float)(sin(M_PI * v) * sin(2.0 * M_PI * u))), vf_set((float)cos(M_PI * v)));
-}
-
-/* What MAP_SIDE squared samples find. */
-struct map_samples {
-    double mean[3];        /* direction */
-    double differ;         /* share whose density is not that of their direction */
-    double cosine, square; /* means of the cosine over the density, and of its square */
-};
-
-static struct map_samples sample_map(const struct trc_world_map *map, vvec3 n, vmask has_n) {
-    struct map_samples found = {0};
-    const double share = 1.0 / ((double)MAP_SIDE * MAP_SIDE);
-    for (int i = 0; i < MAP_SIDE; i++)
-        for (int j = 0; j < MAP_SIDE; j += TRC_WIDTH) {
-            const vfloat u1 =
-                (vi_to_float(vi_lane() + vi_set(j)) + vf_set(0.5f)) * vf_set(1.0f / MAP_SIDE);
-            const vfloat u2 = vf_set(((float)i + 0.5f) / MAP_SIDE);
-            vfloat pdf;
-            const vvec3 wi = trc_map_sample(map, n, has_n, u1, u2, vm_all_set(), &pdf);
-            const vfloat density = trc_map_density(map, n, has_n, wi, vm_all_set());
-            const vfloat cosine = vf_max(v3_dot(n, wi), vf_zero()) / pdf;
-            for (int k = 0; k < TRC_WIDTH; k++) {
-                const double p = (double)vf_get(pdf, k), value = (double)vf_get(cosine, k);
-                assert_true(p > 0.0);
-                found.differ += fabs((double)vf_get(density, k) / p - 1.0) > 1e-3 ? share : 0.0;
-                found.mean[0] += share * (double)vf_get(wi.x, k);
-                found.mean[1] += share * (double)vf_get(wi.y, k);
-                found.mean[2] += share * (double)vf_get(wi.z, k);
-                found.cosine += share * value;
-                found.square += share * value * value;
-            }
-        }
-    return found;
-}
-
-/* The sum of the density over all cells, and its mean direction. */
-static double integrate_map(const struct trc_world_map *map, vvec3 n, vmask has_n, double mean[3]) {
-    enum { FINE = 8 }; /* places along a cell's side, for the mean */
-    const int columns = FINE * MAP_WIDTH, rows = FINE * MAP_HEIGHT;
-    double total = 0.0;
-    memset(mean, 0, 3 * sizeof *mean);
-    for (int y = 0; y < rows; y++)
-        for (int x = 0; x < columns; x++) {
-            const double v = (y + 0.5) / rows;
-            const vvec3 d = map_direction((x + 0.5) / columns, v);
-            const double p = (double)vf_get(trc_map_density(map, n, has_n, d, vm_all_set()), 0) *
-                             2.0 * M_PI * M_PI * sin(M_PI * v) / (columns * rows);
-            total += p;
-            mean[0] += p * (double)vf_get(d.x, 0);
-            mean[1] += p * (double)vf_get(d.y, 0);
-            mean[2] += p * (double)vf_get(d.z, 0);
-        }
-    return total;
-}
-
-/* For any normal, and for none: samples come by the density that they say, which integrates to
- * one. The first are along axes, at corners and edges of the octahedron's square. */
-static void maps_are_sampled_by_their_density(void **state) {
-    (void)state;
-    struct trc_world_map *map = map_of(false);
-    static const float normals[][3] = {{0, 0, 1},       {0, 0, -1},       {1, 0, 0},
-                                       {0, -1, 0},      {-0.6f, 0, 0.8f}, {0.3f, -0.4f, -0.866f},
-                                       {0.6f, 0.8f, 0}, {0, 0, 0}};
-    for (size_t i = 0; i < sizeof normals / sizeof *normals; i++) {
-        const vvec3 n = v3_normalize(v3_set(normals[i]));
-        const vmask has_n = vf_gt(v3_dot(v3_set(normals[i]), v3_set(normals[i])), vf_zero());
-        const struct map_samples found = sample_map(map, n, has_n);
-        double mean[3];
-        const double total = integrate_map(map, n, has_n, mean);
-        double off = 0.0;
-        for (int k = 0; k < 3; k++)
-            off = fmax(off, fabs(found.mean[k] - mean[k]));
-        printf("  normal %zu: %.5f, mean direction off by %.2g, %.2g %% differ\n", i, total, off,
-               100.0 * found.differ);
-        assert_true(fabs(total - 1.0) < 1e-4);
-        assert_true(off < 2e-3);
-        assert_true(found.differ < 2e-3); /* on edges of cells */
-    }
-    trc_world_map_release(map);
-}
-
-/* Under even light the cosine over the density has little variance left: a fifth of what it has
- * where the normal is not known. */
-static void maps_know_normals(void **state) {
-    (void)state;
-    struct trc_world_map *map = map_of(true);
-    struct rng random = rng_seed(6);
-    for (int i = 0; i < 8; i++) {
-        float some[3];
-        rng_direction(&random, some);
-        double relative[2];
-        for (int knows = 0; knows < 2; knows++) {
-            const struct map_samples found =
-                sample_map(map, v3_set(some), knows ? vm_all_set() : vm_none());
-            assert_true(fabs(found.cosine / M_PI - 1.0) < 5e-3);
-            relative[knows] = found.square / (found.cosine * found.cosine) - 1.0;
-        }
-        printf("  relative variance %.3f, of samples without normals %.3f\n", relative[1],
-               relative[0]);
-        assert_true(relative[1] < 0.2 * relative[0]);
-    }
-    trc_world_map_release(map);
-}
-
-/* An even world lights both sides of what lets light through by the cosine: as many samples above
- * as below, each of them worth the same, and rays weighed by the same density. */
-static void even_worlds_light_both_sides(void **state) {
-    (void)state;
-    struct scene s;
-    scene_begin(&s);
-    s.snapshot.world.material = 1;
-    for (int i = 0; i < 3; i++)
-        s.snapshot.world.radiance[i] = 2.0f;
-    scene_commit(&s, NULL, 0);
-    struct trc_surface r = receiver(&s, 0, 0, 0);
-    struct rng random = rng_seed(7);
-    int above = 0, count = 0;
-    for (int i = 0; i < 4096; i += TRC_WIDTH) {
-        float some[3];
-        rng_direction(&random, some);
-        const vvec3 n = v3_set(some), both = v3_scale(n, vf_set(TRC_BOTH_SIDES));
-        struct trc_light_sample l;
-        const vfloat u1 = (vi_to_float(vi_lane() + vi_set(i)) + vf_set(0.5f)) * vf_set(1.0f / 4096);
-        trc_light_sample(&r, both, vf_set(0.5f), u1, test_wide_uniform(&random), &l);
-        const vfloat bsdf_pdf = vf_set(0.2f);
-        const vvec3 seen = trc_world_radiance(&s.snapshot, r.p, both, l.wi, bsdf_pdf, vf_one(),
-                                              vu_set(TRC_VISIBLE_GLOSSY), vm_all_set());
-        for (int k = 0; k < TRC_WIDTH; k++) {
-            const double cosine = (double)vf_get(v3_dot(l.wi, n), k);
-            const double pdf = (double)vf_get(l.pdf, k);
-            assert_true(vm_bits(l.valid) >> k & 1u);
-            assert_true(fabs(pdf - fabs(cosine) / (2.0 * M_PI)) < 1e-5);
-            assert_true(fabs(implied_pdf((double)vf_get(seen.x, k), 2.0, 0.2) - pdf) < 1e-4);
-            above += cosine > 0.0;
-            count++;
-        }
-    }
-    assert_int_equal(2 * above, count);
-    scene_end(&s);
 }
 
 /* ---- many lights ---- */
@@ -965,9 +672,6 @@ int main(void) {
         cmocka_unit_test(triangles_match_closed_forms),
         cmocka_unit_test(rays_agree_with_samples),
         cmocka_unit_test(densities_integrate_to_one),
-        cmocka_unit_test(maps_are_sampled_by_their_density),
-        cmocka_unit_test(maps_know_normals),
-        cmocka_unit_test(even_worlds_light_both_sides),
         cmocka_unit_test(many_triangles),
         cmocka_unit_test(chances_match),
         cmocka_unit_test(nearest_lights_are_found),
