@@ -86,8 +86,9 @@ static void set_parts(const struct trc_world_map *map, struct parts *parts) {
 
 /* The middle of a range of normals. */
 static void facing_normal(uint32_t facing, float n[3]) {
-    const float x = 2.0f * ((float)(facing % TRC_MAP_NORMALS) + 0.5f) / TRC_MAP_NORMALS - 1.0f;
-    const float y = 2.0f * ((float)(facing / TRC_MAP_NORMALS) + 0.5f) / TRC_MAP_NORMALS - 1.0f;
+    const uint32_t column = facing % TRC_MAP_NORMALS, row = facing / TRC_MAP_NORMALS;
+    const float x = 2.0f * ((float)column + 0.5f) / TRC_MAP_NORMALS - 1.0f;
+    const float y = 2.0f * ((float)row + 0.5f) / TRC_MAP_NORMALS - 1.0f;
     const float z = 1.0f - fabsf(x) - fabsf(y);
     n[0] = z < 0.0f ? copysignf(1.0f - fabsf(y), x) : x;
     n[1] = z < 0.0f ? copysignf(1.0f - fabsf(x), y) : y;

@@ -7,6 +7,7 @@
 
 #include "core/pool.h"
 #include "kernels/light/light.h"
+#include "kernels/simd/wide_math.h"
 #include "shading/lights.h"
 #include "wide_test.h"
 
