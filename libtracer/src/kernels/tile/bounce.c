@@ -1,6 +1,7 @@
 /* Continuation rays: N rays in, N rays out (Boulos et al. 2007, section 4.1). Distribution chooses
- * one lobe per ray from the sample sequence; Whitted follows every lobe along its ideal direction.
- * Diffuse lobes end here: their light is all in the light samples. */
+ * one lobe per ray from the sample sequence, where the camera looks up to two; Whitted follows
+ * every lobe along its ideal direction. Diffuse lobes end here: their light is all in the light
+ * samples. */
 #include "kernels/program/hash.h"
 #include "kernels/tile/light_split.h"
 #include "kernels/tile/shade.h"
@@ -37,10 +38,10 @@ static vuint share_of(const struct trc_tile *t, const struct arrival *a,
     return (vuint)vi_select(first, (vint)word, (vint)before);
 }
 
-/* Pushes the lanes' rays. direction, weight factor, pdf (< 0: ideal). */
-static void ray_push(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
-                     const struct trc_lobes *lobes, const struct trc_bsdf_sample *b,
-                     uint32_t material, vmask active) {
+/* Appends the lanes' rays to a store. direction, weight factor, pdf (< 0: ideal). */
+static void ray_append(struct trc_tile *t, struct trc_ray_store *to, const struct arrival *a,
+                       const struct trc_surface *s, const struct trc_lobes *lobes,
+                       const struct trc_bsdf_sample *b, uint32_t material, vmask active) {
     const trc_render_desc *desc = t->desc;
     const vmask transparent = b->transparent;
     const vmask straight = vm_andnot(transparent, b->through_portal);
@@ -131,7 +132,13 @@ static void ray_push(struct trc_tile *t, const struct arrival *a, const struct t
         trc_strand_words(s, strand);
     const vuint words[TRC_RAY_WORDS] = {a->slot, path,  depths,    vu_set(material),
                                         left,    share, strand[0], strand[1]};
-    trc_rays_append(&t->stack, values, words, vm_bits(active));
+    trc_rays_append(to, values, words, vm_bits(active));
+}
+
+static void ray_push(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
+                     const struct trc_lobes *lobes, const struct trc_bsdf_sample *b,
+                     uint32_t material, vmask active) {
+    ray_append(t, &t->stack, a, s, lobes, b, material, active);
 }
 
 /* Lanes whose rays are worth tracing: Whitted prunes its tree where a ray would add next to nothing
@@ -201,6 +208,77 @@ void trc_bounce_straight(struct trc_tile *t, const struct arrival *a, const stru
         ray_push(t, a, s, lobes, &b, material, active);
 }
 
+/* ---- what the camera sees through glass ----
+ *
+ * Whether a sample sees what glass reflects or what it refracts is the most of its noise. So hits
+ * of the camera's rays may send two rays on: each lobe is followed this many times as often as if
+ * one were chosen, at most always, with a weight that is less by as much. Refraction, which has the
+ * most of the light, is nearly always there, at the price of some reflections more.
+ *
+ * Second rays wait until the paths of the first have ended: of a sample there is never more than
+ * one ray in a step, so that its light is added up in one order, whatever else is in the batch. */
+#define SPLIT_RAYS 2
+#define SPLIT_RATE 1.5f
+
+/* Part of the whole chance that a lobe has by itself. The two lobes of a pair are one choice. */
+static vfloat split_part(const struct trc_lobes *lobes, const struct trc_lobe *lobe) {
+    if (trc_lobe_ends(lobe->kind))
+        return vf_zero();
+    const vfloat part = vf_divide(lobe->sample_weight, lobes->continue_weight);
+    if (lobe->kind == TRC_LOBE_REFRACT)
+        return vf_where(vm_not(lobe->paired), part);
+    return vf_select(lobe->paired, part + part, part);
+}
+
+/* Systematic sampling of the lobes, each with a stretch as long as the chance to be followed, by
+ * the place x. Returns the lanes where there is a lobe. *u_lobe: what chooses it; *scale: on the
+ * weight of its ray. */
+static vmask split_choose(const struct trc_lobes *lobes, vfloat chance, vfloat x, vfloat *u_lobe,
+                          vfloat *scale) {
+    const vfloat one = vf_set(1.0f);
+    vfloat begin = vf_zero(), before = vf_zero();
+    vmask chosen = vm_none();
+    *u_lobe = vf_zero();
+    *scale = one;
+    for (int i = 0; i < lobes->count; i++) {
+        const vfloat part = split_part(lobes, &lobes->lobe[i]);
+        const vfloat stretch = chance * vf_min(part * vf_set(SPLIT_RATE), one);
+        const vmask here = vm_and(vf_ge(x, begin), vf_lt(x, begin + stretch));
+        const vfloat at = before + vf_divide(x - begin, stretch) * part;
+        *u_lobe = vf_select(here, vf_min(at, vf_set(TRC_BELOW_ONE)), *u_lobe);
+        *scale = vf_select(here, vf_divide(part, stretch), *scale);
+        chosen = vm_or(chosen, here);
+        begin = begin + stretch;
+        before = before + part;
+    }
+    return chosen;
+}
+
+static bool can_split(const struct trc_tile *t, const struct trc_lobes *lobes) {
+    int count = 0;
+    for (int i = 0; i < lobes->count; i++)
+        count += !trc_lobe_ends(lobes->lobe[i].kind);
+    return t->splits && t->generation == 0 && count > 1;
+}
+
+static void split(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
+                  const struct trc_lobes *lobes, uint32_t material, const vfloat u[3],
+                  vmask active) {
+    for (int i = 0; i < SPLIT_RAYS; i++) {
+        struct trc_bsdf_sample b;
+        vfloat u_lobe, scale;
+        const vfloat x = u[0] + vf_set((float)i);
+        const vmask chosen = vm_and(active, split_choose(lobes, a->chance, x, &u_lobe, &scale));
+        if (!vm_any(chosen))
+            continue;
+        trc_bsdf_sample(lobes, s, u_lobe, u[1], u[2], &b);
+        b.weight = v3_scale(b.weight, scale);
+        const vmask go = attenuate(t, a, &b, vm_and(chosen, b.valid));
+        if (vm_any(go))
+            ray_append(t, i ? &t->later : &t->stack, a, s, lobes, &b, material, go);
+    }
+}
+
 void trc_bounce(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
                 const struct trc_lobes *lobes, uint32_t material, vmask active) {
     struct trc_bsdf_sample b;
@@ -216,6 +294,10 @@ void trc_bounce(struct trc_tile *t, const struct arrival *a, const struct trc_su
     const uint32_t dimension = TRC_DIM_BOUNCE + t->generation * TRC_DIMS_PER_BOUNCE + TRC_DIM_LOBE;
     vfloat u[3];
     trc_samples(&t->sampler, a->pixel, a->sample, dimension, 3, 0, 1, u);
+    if (can_split(t, lobes)) {
+        split(t, a, s, lobes, material, u, active);
+        return;
+    }
     /* One stratified number for both choices: whether, and which lobe. */
     active = vm_and(active, vf_lt(u[0], a->chance));
     if (!vm_any(active))

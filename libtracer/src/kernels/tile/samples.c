@@ -35,12 +35,8 @@ static void samples_repeat(struct trc_tile *t) {
                    TRC_CATCHER_BATCH * sizeof *columns[k]);
 }
 
-static void batch_render(struct trc_tile *t) {
-    samples_clear(t);
-    if (t->catchers)
-        samples_repeat(t);
-    trc_camera_rays(t);
-    t->generation = 0;
+/* Follows the rays of the stack to their ends. */
+static void stack_render(struct trc_tile *t) {
     while (t->stack.count) {
         trc_rays_take(&t->stack, &t->work, trc_rays_step(&t->stack, &t->ray_room));
         trc_clock_trace(t);
@@ -50,6 +46,20 @@ static void batch_render(struct trc_tile *t) {
         trc_shadow_flush(t);
         if (t->generation < LAST_GENERATION)
             t->generation++;
+    }
+}
+
+static void batch_render(struct trc_tile *t) {
+    samples_clear(t);
+    if (t->catchers)
+        samples_repeat(t);
+    trc_camera_rays(t);
+    t->generation = 0;
+    stack_render(t);
+    if (t->splits && t->later.count) {
+        trc_rays_take(&t->later, &t->stack, t->later.count);
+        t->generation = 1;
+        stack_render(t);
     }
     trc_clock_other(t);
     trc_film_add(t);

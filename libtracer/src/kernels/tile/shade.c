@@ -249,6 +249,8 @@ void trc_shade_batch(struct trc_tile *t) {
     if (t->catchers)
         catch_shadows(t);
     trc_rays_reserve(&t->stack, t->work.count * t->hit_branches);
+    if (t->splits && t->generation == 0)
+        trc_rays_reserve(&t->later, t->work.count);
     /* Hits by material; those that missed have the last key. */
     uint32_t keys_count = t->snapshot->material_count + 1;
     if (keys_count > TRC_BINS)

@@ -55,8 +55,10 @@ static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc,
     t->remembers_left = features & (TRC_FEATURE_REFRACTION | TRC_FEATURE_LINKS);
     t->measures_paths = features & TRC_FEATURE_SLOPES;
     t->hit_branches = count_branches(desc, snapshot);
+    t->splits = desc->integrator == TRC_INTEGRATOR_DISTRIBUTION && snapshot->branch_count > 1;
     /* Whitted's rays may meet a catcher, which splits them before they branch. Of other integrators
-     * a sample has two rays at most, and a batch of them half as many samples. */
+     * a sample has two rays at most, and a batch of them half as many samples. Second rays of hits
+     * go on by themselves. */
     const bool splits = catchers && desc->integrator == TRC_INTEGRATOR_WHITTED;
     t->ray_room = trc_ray_room_of(desc, t->hit_branches * (splits ? 2 : 1));
     const size_t batch = (trc_column_entries(catchers) + TRC_WIDTH) * sizeof(float);
@@ -66,6 +68,8 @@ static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc,
                                             curves};
     trc_rays_carve(&c, &t->stack, t->ray_room.capacity, columns);
     trc_rays_carve(&c, &t->work, t->ray_room.capacity, columns);
+    if (t->splits)
+        trc_rays_carve(&c, &t->later, t->ray_room.capacity, columns);
     float **const hit_floats[] = {&t->hits.t, &t->hits.u, &t->hits.v};
     for (int i = 0; i < 3; i++)
         *hit_floats[i] = trc_carve(&c, batch);

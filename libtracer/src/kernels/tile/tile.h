@@ -61,7 +61,7 @@ enum trc_sample_row {
 };
 #define TRC_CATCHER_ROWS 4
 
-/* Entries of columns: of samples, and of the rays of a step. */
+/* Entries of columns of samples. */
 TRC_INLINE uint32_t trc_column_entries(bool catchers) {
     return catchers ? TRC_CATCHER_ROWS * TRC_CATCHER_BATCH : TRC_BATCH;
 }
@@ -105,9 +105,11 @@ struct trc_tile {
     double *clock, clock_start; /* the stage whose time is running */
     uint32_t generation;        /* bounces the rays of this step have behind them */
     struct trc_carver carver;   /* of the memory behind this */
-    uint32_t hit_branches;      /* rays that a hit sends on at most */
+    uint32_t hit_branches;      /* rays that a hit sends on at most, of the stack */
+    bool splits;                /* and one besides that waits, where the camera looks */
     struct trc_ray_room ray_room;
     struct trc_ray_store stack, work;
+    struct trc_ray_store later; /* second rays of hits, for when the stack is empty; if splits */
     struct trc_hit_store hits;
     struct trc_sample_store samples;
     struct trc_shadow_store shadows;
