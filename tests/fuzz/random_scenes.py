@@ -237,7 +237,7 @@ def add_strands(scene, rng, skin):
     settings.use_close_tip = rng.random() < 0.5
     if rng.random() < 0.4:
         settings.child_type, settings.rendered_child_count = rng.choice(('SIMPLE', 'INTERPOLATED')), 5
-        settings.child_percent = 5
+        setattr(settings, "child_percent" if hasattr(settings, "child_percent") else "child_nbr", 5)
     skin.data.materials.append(material(scene, HAIR_SHADERS, rng))
     settings.material = len(skin.data.materials)
     skin.show_instancer_for_render = rng.random() < 0.8
