@@ -255,10 +255,12 @@ static vmask split_choose(const struct trc_lobes *lobes, vfloat chance, vfloat x
 }
 
 static bool can_split(const struct trc_tile *t, const struct trc_lobes *lobes) {
+    if (!t->splits || t->generation > 0)
+        return false;
     int count = 0;
     for (int i = 0; i < lobes->count; i++)
         count += !trc_lobe_ends(lobes->lobe[i].kind);
-    return t->splits && t->generation == 0 && count > 1;
+    return count > 1;
 }
 
 static void split(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,

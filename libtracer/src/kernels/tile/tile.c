@@ -59,8 +59,8 @@ static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc,
     /* Whitted's rays may meet a catcher, which splits them before they branch. Of other integrators
      * a sample has two rays at most, and a batch of them half as many samples. Second rays of hits
      * go on by themselves. */
-    const bool splits = catchers && desc->integrator == TRC_INTEGRATOR_WHITTED;
-    t->ray_room = trc_ray_room_of(desc, t->hit_branches * (splits ? 2 : 1));
+    const bool doubles = catchers && desc->integrator == TRC_INTEGRATOR_WHITTED;
+    t->ray_room = trc_ray_room_of(desc, t->hit_branches * (doubles ? 2 : 1));
     const size_t batch = (trc_column_entries(catchers) + TRC_WIDTH) * sizeof(float);
     const bool splits_light = wants_light_passes(desc);
     const bool curves = features & TRC_FEATURE_CURVES;

@@ -61,7 +61,7 @@ enum trc_sample_row {
 };
 #define TRC_CATCHER_ROWS 4
 
-/* Entries of columns of samples. */
+/* Entries of columns: of samples, and of the rays of a step. */
 TRC_INLINE uint32_t trc_column_entries(bool catchers) {
     return catchers ? TRC_CATCHER_ROWS * TRC_CATCHER_BATCH : TRC_BATCH;
 }
