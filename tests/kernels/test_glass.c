@@ -39,32 +39,17 @@ static trc_id add_glass(trc_scene scene, const struct glass *glass) {
     return id;
 }
 
-static trc_id add_clear(trc_scene scene) {
-    struct node_list list = {0};
-    const uint32_t clear = NODE_ADD(&list, TRC_NODE_TRANSPARENT, 0, node_color(1, 1, 1));
-    const trc_material_desc desc = node_list_material(&list, clear);
-    trc_id id = 0;
-    assert_ok(trc_material_create(scene, &desc, &id));
-    return id;
-}
-
 static void render_pane(const struct glass *glass, bool is_behind_clear, uint32_t samples,
                         float pixels[4 * FRAME]) {
-    static const float transform[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 3};
-    static const float window[4] = {-HALF, HALF, -HALF, HALF};
     const float h = 50.0f, z = 4.0f;
     const float ceiling[12] = {-h, -h, z, -h, h, z, h, h, z, h, -h, z};
     const trc_scene scene = scene_create();
-    trc_camera_desc camera = default_camera_desc();
-    camera.type = TRC_CAMERA_ORTHOGRAPHIC;
-    camera.transforms = transform;
-    camera.windows = window;
-    assert_ok(trc_scene_set_camera(scene, &camera));
+    fixture_look_down(scene, 0.0f, 3.0f, HALF, HALF);
     fixture_level(scene, 1.0f, 0.0f, add_glass(scene, glass));
     fixture_level(scene, 1.0f, -0.05f, fixture_material(scene, TRC_NODE_EMISSION, BELOW));
     fixture_quad(scene, ceiling, fixture_material(scene, TRC_NODE_EMISSION, ABOVE));
     if (is_behind_clear)
-        fixture_level(scene, HALF + 0.02f, 2.0f, add_clear(scene));
+        fixture_level(scene, HALF + 0.02f, 2.0f, fixture_clear(scene));
     assert_ok(trc_scene_commit(scene));
     const trc_render_desc desc = render_desc(SIDE, samples);
     render(scene, &desc, pixels);

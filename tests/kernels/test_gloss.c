@@ -104,34 +104,14 @@ static void add_source(trc_scene scene, enum source source) {
     }
 }
 
-static trc_id add_clear(trc_scene scene) {
-    const trc_node_input inputs[] = {{.node = -1, .value = {1, 1, 1}}};
-    const trc_node node = {.type = TRC_NODE_TRANSPARENT, .input_count = 1};
-    const trc_material_desc desc = {.struct_size = sizeof desc,
-                                    .node_count = 1,
-                                    .nodes = &node,
-                                    .inputs = inputs,
-                                    .input_count = 1,
-                                    .flags = TRC_MATERIAL_TRANSPARENT_SHADOW};
-    trc_id id = 0;
-    assert_ok(trc_material_create(scene, &desc, &id));
-    return id;
-}
-
 static trc_scene floor_scene(enum source source, float value, bool is_behind_glass) {
-    static const float transform[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 3};
-    static const float window[4] = {-(float)HALF, (float)HALF, -(float)HALF, (float)HALF};
     const trc_scene scene = scene_create();
-    trc_camera_desc camera = default_camera_desc();
-    camera.type = TRC_CAMERA_ORTHOGRAPHIC;
-    camera.transforms = transform;
-    camera.windows = window;
-    assert_ok(trc_scene_set_camera(scene, &camera));
+    fixture_look_down(scene, 0.0f, 3.0f, (float)HALF, (float)HALF);
     fixture_level(scene, 1.0f, 0.0f, fixture_glossy(scene, value, (float)ROUGHNESS));
     add_source(scene, source);
     /* In the camera's way alone: what comes from the square passes below. */
     if (is_behind_glass)
-        fixture_level(scene, (float)HALF + 0.02f, 2.0f, add_clear(scene));
+        fixture_level(scene, (float)HALF + 0.02f, 2.0f, fixture_clear(scene));
     assert_ok(trc_scene_commit(scene));
     return scene;
 }
@@ -207,8 +187,6 @@ static void weights_pass_transparency(void **state) {
 static const double point_at[3] = {0.6, 0.0, 0.05};
 
 static trc_scene toon_and_ceiling(void) {
-    static const float transform[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0.5f};
-    static const float window[4] = {-0.001f, 0.001f, -0.001f, 0.001f};
     const trc_node_input inputs[] = {{.node = -1, .value = {1, 1, 1}},
                                      {.node = -1, .value = {(float)(CONE_ANGLE * 2.0 / PI)}},
                                      {.node = -1},
@@ -221,11 +199,7 @@ static trc_scene toon_and_ceiling(void) {
                                          .input_count = 4};
     const trc_scene scene = scene_create();
     trc_id material = 0, light = 0;
-    trc_camera_desc camera = default_camera_desc();
-    camera.type = TRC_CAMERA_ORTHOGRAPHIC;
-    camera.transforms = transform;
-    camera.windows = window;
-    assert_ok(trc_scene_set_camera(scene, &camera));
+    fixture_look_down(scene, 0.0f, 0.5f, 0.001f, 0.001f);
     assert_ok(trc_material_create(scene, &toon_desc, &material));
     fixture_level(scene, 0.5f, 0.0f, material);
     fixture_level(scene, 2.0f, 1.0f, fixture_glossy(scene, 1.0f, (float)CEILING_ROUGHNESS));

@@ -135,17 +135,38 @@ FIXTURE_INLINE trc_id fixture_glossy(trc_scene scene, float value, float roughne
     return id;
 }
 
-/* A camera 1 m up that looks straight down at x from 0 to 4 m, in parallel rays. */
-FIXTURE_INLINE trc_scene fixture_level_view_in(const trc_scene_desc *scene_desc) {
-    static const float transform[12] = {1, 0, 0, 2, 0, 1, 0, 0, 0, 0, 1, 1};
-    static const float window[4] = {-2.0f, 2.0f, -0.5f, 0.5f};
-    trc_scene scene = 0;
+/* Straight through, for shadow rays, too. */
+FIXTURE_INLINE trc_id fixture_clear(trc_scene scene) {
+    const trc_node_input inputs[] = {{.node = -1, .value = {1, 1, 1}}};
+    const trc_node node = {.type = TRC_NODE_TRANSPARENT, .input_count = 1};
+    const trc_material_desc desc = {.struct_size = sizeof desc,
+                                    .node_count = 1,
+                                    .nodes = &node,
+                                    .inputs = inputs,
+                                    .input_count = 1,
+                                    .flags = TRC_MATERIAL_TRANSPARENT_SHADOW};
+    trc_id id = 0;
+    assert_int_equal(trc_material_create(scene, &desc, &id), TRC_OK);
+    return id;
+}
+
+/* A camera that looks straight down from x, 0, z in parallel rays. */
+FIXTURE_INLINE void fixture_look_down(trc_scene scene, float x, float z, float half_x,
+                                      float half_y) {
+    const float transform[12] = {1, 0, 0, x, 0, 1, 0, 0, 0, 0, 1, z};
+    const float window[4] = {-half_x, half_x, -half_y, half_y};
     trc_camera_desc camera = default_camera_desc();
     camera.type = TRC_CAMERA_ORTHOGRAPHIC;
     camera.transforms = transform;
     camera.windows = window;
-    assert_int_equal(trc_scene_create(scene_desc, &scene), TRC_OK);
     assert_int_equal(trc_scene_set_camera(scene, &camera), TRC_OK);
+}
+
+/* A camera 1 m up that looks straight down at x from 0 to 4 m, in parallel rays. */
+FIXTURE_INLINE trc_scene fixture_level_view_in(const trc_scene_desc *scene_desc) {
+    trc_scene scene = 0;
+    assert_int_equal(trc_scene_create(scene_desc, &scene), TRC_OK);
+    fixture_look_down(scene, 2.0f, 1.0f, 2.0f, 0.5f);
     return scene;
 }
 
