@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Objects' shadow terminator offsets and distances of Fast GI beside Cycles: on coarse balls and a ring between
-them, which is hollow along its hole, matt, of rough and of smooth gloss, of different offsets. Means within
+them, which is hollow along its hole, matt, of rough and of smooth gloss, letting light through, of different offsets. Means within
 1 %, tiles within 2 %, beyond what noise explains. The table goes to results/shading_offsets.txt of the build."""
 
 import blender as blender_support
@@ -24,6 +24,9 @@ CASES = {
     "gloss": ('AREA', "gloss", 0.0, 0.7),
     "mirror": ('AREA', "mirror", 0.1, 0.6),
     "both": ('POINT', "gloss", 0.3, 0.4),
+    "through": ('SUN', "translucent", 0.1, 0.0),
+    "all through": ('SUN', "translucent", 1.0, 0.0),
+    "through from a world": ('WORLD', "translucent", 0.1, 0.0),
     "even world": ('WORLD', "diffuse", 0.5, 0.0),
     "distance": ('AO', "diffuse", 0.1, 0.0),
 }
@@ -64,8 +67,8 @@ def _smooth(name, add, x, material):
 
 def _material(lobe):
     import scenes
-    if lobe == "diffuse":
-        return scenes.material(lobe, "ShaderNodeBsdfDiffuse", Color=(0.8, 0.7, 0.6))
+    if lobe in {"diffuse", "translucent"}:
+        return scenes.material(lobe, f"ShaderNodeBsdf{lobe.title()}", Color=(0.8, 0.7, 0.6))
     return scenes.material(lobe, "ShaderNodeBsdfGlossy", Color=(0.8, 0.7, 0.6),
                            Roughness=0.0 if lobe == "mirror" else 0.4)
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Normals far from the geometry's, of smooth meshes and given to shaders, each shader beside Cycles: a square seen
-straight on whose normals are turned by so many degrees, under a sun without size, so that nothing is random."""
+straight on whose normals are turned by so many degrees, under a sun without size, so that nothing is random, and in
+an even world, whose light Cycles' rays find, not its samples of lights."""
 
 import math
 
@@ -11,6 +12,9 @@ TURNS_DEGREES = 20, 60, 80, 100
 SUNS_DEGREES = 80, 110  # from the view; the second is behind the square
 SAMPLES = 16
 RELATIVE, ABSOLUTE = 0.01, 3e-4
+# In the world of radiance 1.
+WORLD_SIZE, WORLD_SAMPLES, WORLD_ABSOLUTE = (16, 16), 256, 2e-3
+IN_WORLD = "diffuse", "rough diffuse", "translucent", "velvet", "velvet node"
 
 _BASE = {"Base Color": (0.8, 0.8, 0.8)}
 _BARE = {"Base Color": (0.0, 0.0, 0.0), "IOR": 1.0, "Specular IOR Level": 0.0}
@@ -78,6 +82,26 @@ def _shader(name, normal):
     return made
 
 
+def _stage(name, is_smooth, degrees, size):
+    """The square of a shader before a camera, alone; False where this Blender lacks the shader."""
+    import scenes
+    scenes.empty(size=size)
+    camera = scenes.camera(location=(0, -5, 0))
+    camera.data.type, camera.data.ortho_scale = 'ORTHO', 1.0
+    square, normal = _square(math.radians(degrees), is_smooth)
+    made = _shader(name, None if is_smooth else normal)
+    if made is None:
+        return False
+    square.data.materials.clear()
+    square.data.materials.append(made)
+    return True
+
+
+def _means_by_both(samples):
+    import scenes
+    return [float(picture[..., :3].mean()) for picture in scenes.by_both(samples)]
+
+
 def inside_means():
     """{(shader, whether it is smooth, degrees of the sun, of the normal): (ours, theirs)}."""
     import scenes
@@ -87,21 +111,27 @@ def inside_means():
         for is_smooth in (True, False):
             for sun_degrees in SUNS_DEGREES:
                 for degrees in TURNS_DEGREES:
-                    scenes.empty(size=(4, 4))
-                    camera = scenes.camera(location=(0, -5, 0))
-                    camera.data.type, camera.data.ortho_scale = 'ORTHO', 1.0
-                    square, normal = _square(math.radians(degrees), is_smooth)
-                    made = _shader(name, None if is_smooth else normal)
-                    if made is None:
+                    if not _stage(name, is_smooth, degrees, (4, 4)):
                         continue
-                    square.data.materials.clear()
-                    square.data.materials.append(made)
                     sun = math.radians(sun_degrees)
                     light = scenes.light('SUN', energy=3.0, angle=0.0)
                     to_light = Vector((math.sin(sun), -math.cos(sun), 0.0))
                     light.rotation_euler = to_light.to_track_quat('Z', 'Y').to_euler()
-                    means[name, is_smooth, sun_degrees, degrees] = [
-                        float(picture[..., :3].mean()) for picture in scenes.by_both(SAMPLES)]
+                    means[name, is_smooth, sun_degrees, degrees] = _means_by_both(SAMPLES)
+    return means
+
+
+def inside_means_in_world():
+    """{(shader, whether it is smooth, degrees of the normal): (ours, theirs)}."""
+    import bpy
+    import scenes
+    means = {}
+    for name in IN_WORLD:
+        for is_smooth in (True, False):
+            for degrees in TURNS_DEGREES:
+                if _stage(name, is_smooth, degrees, WORLD_SIZE):
+                    scenes.world_color(bpy.context.scene.world, (1.0, 1.0, 1.0))
+                    means[name, is_smooth, degrees] = _means_by_both(WORLD_SAMPLES)
     return means
 
 
@@ -125,3 +155,19 @@ def test_tilted(all_means, name, is_smooth):
             continue
         allowed = pytest.approx(theirs, rel=_LOOSER.get(name, RELATIVE), abs=ABSOLUTE)
         assert ours == allowed, f"sun at {sun_degrees}, normal at {degrees} degrees"
+
+
+@pytest.fixture(scope="module")
+def all_means_in_world(blender_of_module):
+    """Of IN_WORLD, from one Blender."""
+    return blender_of_module.run(inside_means_in_world, timeout=300)
+
+
+@pytest.mark.parametrize("is_smooth", (True, False), ids=("smooth", "given"))
+@pytest.mark.parametrize("name", IN_WORLD)
+def test_in_even_world(all_means_in_world, name, is_smooth):
+    means = {key[2]: pair for key, pair in all_means_in_world.items() if key[:2] == (name, is_smooth)}
+    if not means:
+        pytest.skip("this Blender has no such node")
+    for degrees, (ours, theirs) in means.items():
+        assert ours == pytest.approx(theirs, rel=RELATIVE, abs=WORLD_ABSOLUTE), f"normal at {degrees} degrees"

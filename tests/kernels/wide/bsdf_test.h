@@ -372,7 +372,8 @@ static inline void integrate_cell(const struct trc_lobes *l, const struct trc_su
                 z[k] = (float)c;
             }
             struct trc_bsdf_value v;
-            trc_bsdf_eval(l, s, v3(vf_load(x), vf_load(y), vf_load(z)), vm_all_set(), &v);
+            trc_bsdf_eval(l, s, v3(vf_load(x), vf_load(y), vf_load(z)), vm_all_set(), vm_none(),
+                          &v);
             for (int k = 0; k < TRC_WIDTH; k++) {
                 *density += (double)vf_get(v.pdf, k);
                 *value += (double)(vf_get(v.diffuse.x, k) + vf_get(v.glossy.x, k) +

@@ -173,7 +173,7 @@ static void lobes_are_reciprocal(void **state) {
                 struct trc_lobes l;
                 struct trc_bsdf_value v;
                 prepare(&models[i], k ? b : a, &s, &l);
-                trc_bsdf_eval(&l, &s, k ? a : b, vm_all_set(), &v);
+                trc_bsdf_eval(&l, &s, k ? a : b, vm_all_set(), vm_none(), &v);
                 f[k] = (vf_get(v.diffuse.x, 0) + vf_get(v.glossy.x, 0)) / (float)(k ? c1 : c2);
             }
             assert_true(fabsf(f[0] - f[1]) <= 2e-4f * fmaxf(f[0], f[1]) + 1e-6f);
@@ -214,7 +214,7 @@ static void values_match_formulas(void **state) {
             struct trc_lobes l;
             struct trc_bsdf_value v;
             prepare(&m, wide(o[0], o[1], o[2]), &s, &l);
-            trc_bsdf_eval(&l, &s, wide(i[0], i[1], i[2]), vm_all_set(), &v);
+            trc_bsdf_eval(&l, &s, wide(i[0], i[1], i[2]), vm_all_set(), vm_none(), &v);
             const double want = ggx_reference((double)(roughnesses[k] * roughnesses[k]), o, i);
             assert_true(fabs((double)vf_get(v.glossy.y, 0) - want) <= 2e-3 * want + 1e-7);
         }
@@ -259,7 +259,8 @@ static void extremes_stay_finite(void **state) {
                 most = fmax(most, least_energy(&h, EXTREME_SAMPLES));
                 for (int n = 0; n < 64; n++) {
                     struct trc_bsdf_value v;
-                    trc_bsdf_eval(&l, &s, direction(1.0 - n / 31.5, n), vm_all_set(), &v);
+                    trc_bsdf_eval(&l, &s, direction(1.0 - n / 31.5, n), vm_all_set(), vm_none(),
+                                  &v);
                     assert_true(isfinite(vf_get(v.diffuse.x + v.glossy.x + v.transmission.x, 0)));
                     assert_true(vf_get(v.pdf, 0) >= 0.0f && isfinite(vf_get(v.pdf, 0)));
                 }
@@ -287,7 +288,8 @@ static void nothing_shines_through(void **state) {
             s.n = direction(cos(0.87), 0.06 * n);
             trc_lobes_setup(material_of(&models[i]), &s, &regs, vf_zero(), &l);
             struct trc_bsdf_value v;
-            trc_bsdf_eval(&l, &s, direction(-0.05 - 0.009 * n, 0.06 * n), vm_all_set(), &v);
+            trc_bsdf_eval(&l, &s, direction(-0.05 - 0.009 * n, 0.06 * n), vm_all_set(), vm_none(),
+                          &v);
             count++;
             below += vf_get(v3_max(v.diffuse) + v3_max(v.glossy), 0) != 0.0f;
             struct trc_bsdf_sample b;
@@ -298,6 +300,69 @@ static void nothing_shines_through(void **state) {
     print_figure("37: shading normal against geometric normal",
                  "%d of %d samples and evaluations below the surface", below, count);
     assert_int_equal(below, 0);
+}
+
+/* Integral of what a model gives over all directions, of a surface whose normals are bent by an
+ * angle from the triangle's and that is seen along these. */
+#define BENT_STEPS 256
+static double bent_integral(struct model *m, double angle, bool as_sampled) {
+    struct trc_surface s;
+    struct trc_lobes l;
+    struct trc_registers regs;
+    memset(&regs, 0, sizeof regs);
+    point(&s, direction(1.0, 0.0), m);
+    s.n = direction(cos(angle), 0.3);
+    s.smooth = vm_all_set();
+    trc_lobes_setup(material_of(m), &s, &regs, vf_zero(), &l);
+    l.below_horizon = s.smooth;
+    double sum = 0.0;
+    for (int i = 0; i < BENT_STEPS; i++)
+        for (int j = 0; j < BENT_STEPS; j++) {
+            struct trc_bsdf_value v;
+            trc_bsdf_eval(
+                &l, &s,
+                direction(1.0 - 2.0 * (i + 0.5) / BENT_STEPS, 2 * M_PI * (j + 0.5) / BENT_STEPS),
+                vm_all_set(), as_sampled ? vm_all_set() : vm_none(), &v);
+            sum += (double)vf_get(v.diffuse.x, 0);
+        }
+    return sum * 4 * M_PI / ((double)BENT_STEPS * BENT_STEPS);
+}
+/* Of what is sampled by the cosine to the bent normal, the part on the wrong side of the triangle
+ * is lost: (1 - cos) / 2. Light from lights may come from there to what is smooth. */
+static void bent_normals_lose_what_is_sampled(void **state) {
+    (void)state;
+    struct model models[] = {diffuse(0.0f), translucent()};
+    double off = 0.0;
+    for (int i = 0; i < 2; i++)
+        for (double angle = 0.0; angle < 0.75; angle += 0.1) {
+            const double lost = 0.5 * (1.0 - cos(angle));
+            off = fmax(off, fabs(bent_integral(&models[i], angle, true) - (1.0 - lost)));
+            off = fmax(off, fabs(bent_integral(&models[i], angle, false) - 1.0));
+        }
+    print_figure("matt lobes of bent normals", "integrals off by %.2g", off);
+    assert_true(off < 2e-3);
+}
+
+/* The mean of sampled directions' weights is the integral of what they count. */
+static void bent_normals_are_sampled_as_evaluated(void **state) {
+    (void)state;
+    struct model m = translucent();
+    struct trc_surface s;
+    struct trc_lobes l;
+    struct trc_registers regs;
+    struct histogram h;
+    memset(&regs, 0, sizeof regs);
+    point(&s, direction(1.0, 0.0), &m);
+    s.n = direction(cos(0.6), 0.3);
+    s.smooth = vm_all_set();
+    trc_lobes_setup(material_of(&m), &s, &regs, vf_zero(), &l);
+    draw_samples(&l, &s, EXTREME_SAMPLES, &h);
+    const double mean = h.weight / EXTREME_SAMPLES, want = bent_integral(&m, 0.6, true);
+    const double deviation =
+        sqrt(fmax(h.weight2 / EXTREME_SAMPLES - mean * mean, 0.0) / EXTREME_SAMPLES);
+    print_figure("translucency of bent normals", "samples off by %.1f deviations",
+                 fabs(mean - want) / deviation);
+    assert_true(fabs(mean - want) < 4.0 * deviation);
 }
 
 /* Without lobes that end there is nothing to make up for; with them the factor is Cycles' share. */
@@ -353,6 +418,8 @@ int main(void) {
         cmocka_unit_test(values_match_formulas),
         cmocka_unit_test(extremes_stay_finite),
         cmocka_unit_test(nothing_shines_through),
+        cmocka_unit_test(bent_normals_lose_what_is_sampled),
+        cmocka_unit_test(bent_normals_are_sampled_as_evaluated),
         cmocka_unit_test(factor_beyond),
         cmocka_unit_test(light_weights_drop_out),
     };

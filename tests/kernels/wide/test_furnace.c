@@ -34,7 +34,7 @@ static double grazing_light(const struct trc_lobes *l, const struct trc_surface 
         z[k] = (float)c;
     }
     struct trc_bsdf_value v;
-    trc_bsdf_eval(l, s, v3(vf_load(x), vf_load(y), vf_load(z)), vm_all_set(), &v);
+    trc_bsdf_eval(l, s, v3(vf_load(x), vf_load(y), vf_load(z)), vm_all_set(), vm_none(), &v);
     double sum = 0.0;
     for (int k = 0; k < TRC_WIDTH; k++)
         sum += (double)vf_get(v.glossy.x, k) /
@@ -399,7 +399,7 @@ static struct strand_light strand_light(struct model *m, double cos_o) {
         vfloat sine, cosine;
         vf_sincos_turns(v, &sine, &cosine);
         struct trc_bsdf_value value;
-        trc_bsdf_eval(&l, &s, v3(r * cosine, r * sine, z), vm_all_set(), &value);
+        trc_bsdf_eval(&l, &s, v3(r * cosine, r * sine, z), vm_all_set(), vm_none(), &value);
         sum.evaluated += 4.0 * M_PI * active_sum(value.glossy.x, vm_all_set());
     }
     sum.sampled /= places;

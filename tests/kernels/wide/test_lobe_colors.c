@@ -18,7 +18,7 @@ static vvec3 mirrored(struct model *m, double cosine) {
     struct trc_lobes l;
     struct trc_bsdf_value v;
     prepare(m, direction(cosine, 0.0), &s, &l);
-    trc_bsdf_eval(&l, &s, direction(cosine, M_PI), vm_all_set(), &v);
+    trc_bsdf_eval(&l, &s, direction(cosine, M_PI), vm_all_set(), vm_none(), &v);
     return v.glossy;
 }
 

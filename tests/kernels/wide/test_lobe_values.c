@@ -272,7 +272,7 @@ static void values_match_formulas(void **state) {
             draw(&random, 0.05, 1.0, o);
             draw(&random, cases[n].is_below ? -1.0 : 0.05, cases[n].is_below ? -0.05 : 1.0, i);
             prepare(&m, wide_of(o), &s, &l);
-            trc_bsdf_eval(&l, &s, wide_of(i), vm_all_set(), &v);
+            trc_bsdf_eval(&l, &s, wide_of(i), vm_all_set(), vm_none(), &v);
             const double want = cases[n].formula(o, i), found = part_of(&v, cases[n].part);
             /* Single precision through some tens of operations; below 0.01, beside that. */
             worst = fmax(worst, fabs(found - want) / (want + 1e-2));
@@ -304,7 +304,7 @@ static void bent_normals_fade_at_the_terminator(void **state) {
         struct trc_lobes l;
         struct trc_bsdf_value v;
         prepare(&m, wide_of(o), &s, &l);
-        trc_bsdf_eval(&l, &s, wide_of(i), vm_all_set(), &v);
+        trc_bsdf_eval(&l, &s, wide_of(i), vm_all_set(), vm_none(), &v);
         const double g = i[2] / (dot(n, i) * n[2]);
         const double fade = g >= 1.0 ? 1.0 : g + g * g - g * g * g;
         const double want = dot(n, i) / M_PI * fade;

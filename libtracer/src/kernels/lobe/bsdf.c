@@ -1,8 +1,10 @@
 /* Evaluating and sampling lobes.
  *
- * A direction on the upper side of a reflecting lobe counts only if it is above the lobe's normal,
- * the shading normal and the geometric surface; for transmission below all three. So nothing shines
- * through a surface whose normals are bent, and evaluation and sampling have the same support.
+ * Where normals are bent, a direction that is sampled has other sides than one towards a light, as
+ * in Cycles. What is sampled is reflected above the lobe's normal and the geometric surface, and
+ * transmitted below the lobe's normal: near the silhouette of a smooth surface refraction may leave
+ * on the side of the flat triangle it came from, and still has to go on. Towards a light the
+ * shading normal has to agree, so that nothing shines through.
  *
  * Departures from Cycles 3.4: a sampled direction of a toon lobe fades as an evaluated one;
  * reflections are sampled by bounded visible normals, refractions by the spherical cap; densities
@@ -10,15 +12,23 @@
  * does to its pictures is kept in trc_bsdf_sample.indirect_scale. */
 #include "kernels/lobe/facets.h"
 
-/* Lanes in which wi counts as reflected, as transmitted. */
-TRC_INLINE void sides(const struct trc_lobes *l, const struct trc_surface *s, vvec3 wi,
-                      vmask active, vmask *above, vmask *below) {
+/* Lanes in which wi may be reflected, and transmitted; as_sampled: those that count as
+ * trc_bsdf_sample has them. */
+struct sides {
+    vmask above, below;
+};
+TRC_INLINE struct sides sides_of(const struct trc_lobes *l, const struct trc_surface *s, vvec3 wi,
+                                 vmask active, vmask as_sampled) {
     const vfloat cos_n = v3_dot(s->n, wi), cos_g = v3_dot(s->ng, wi);
-    const vmask over = vm_or(vf_gt(cos_g, vf_zero()), l->below_horizon);
-    *above = vm_and(active, vm_and(vf_gt(cos_n, vf_zero()), over));
-    /* By the shading normal alone, as Cycles: near the silhouette of a smooth surface refraction
-     * may leave on the side of the flat triangle it came from, and still has to go on. */
-    *below = vm_and(active, vf_lt(cos_n, vf_zero()));
+    const vmask over = vm_or(vf_gt(cos_g, vf_zero()), vm_andnot(l->below_horizon, as_sampled));
+    const vmask up = vm_or(vf_gt(cos_n, vf_zero()), as_sampled);
+    const vmask down = vm_or(vf_lt(cos_n, vf_zero()), as_sampled);
+    return (struct sides){vm_and(active, vm_and(up, over)), vm_and(active, down)};
+}
+
+/* Lanes in which a lobe transmits wi. */
+TRC_INLINE vmask through_lobe(const struct trc_lobe *lobe, vvec3 wi, vmask below) {
+    return vm_and(below, vf_lt(v3_dot(lobe->n, wi), vf_zero()));
 }
 
 TRC_INLINE bool is_reflection(enum trc_lobe_kind kind) { return kind <= TRC_LOBE_REFLECT; }
@@ -45,6 +55,16 @@ TRC_INLINE struct lobe_value value_of(const struct trc_lobes *l, const struct tr
     return value_where(side, r);
 }
 
+/* Of a lobe whose sampled directions have values of their own, in lanes where they count. */
+static void take_sampled(const struct trc_lobe *lobe, const struct trc_surface *s, vvec3 wi,
+                         const struct trc_draw *draw, vmask lanes, struct lobe_value *r) {
+    const struct lobe_value own = lobe->model->sampled(lobe, s, wi, draw);
+    r->value = v3_select(lanes, own.value, r->value);
+    r->pdf = vf_select(lanes, own.pdf, r->pdf);
+    r->pick = vf_select(lanes, own.pick, r->pick);
+    r->claim = vf_select(lanes, own.claim, r->claim);
+}
+
 /* Whether a lobe's light is in the passes of reflection; rare: as in sum_lobes. */
 TRC_INLINE bool is_glossy(const struct trc_lobes *l, enum trc_lobe_kind kind, bool rare) {
     return kind == TRC_LOBE_REFLECT ||
@@ -52,22 +72,28 @@ TRC_INLINE bool is_glossy(const struct trc_lobes *l, enum trc_lobe_kind kind, bo
                      (kind == TRC_LOBE_VELVET && (l->rare & TRC_LOBES_VELVET))));
 }
 
+/* Active lanes in which a lobe may have light from wi. */
+TRC_INLINE vmask side_of(const struct trc_lobe *lobe, vvec3 wi, struct sides sides, vmask active,
+                         bool rare) {
+    if (is_reflection(lobe->kind))
+        return sides.above;
+    return rare && is_hair(lobe->kind) ? active : through_lobe(lobe, wi, sides.below);
+}
+
 /* rare: whether l has anything rare; a constant, so that others have no test of it. */
 TRC_INLINE void sum_lobes(const struct trc_lobes *l, const struct trc_surface *s, vvec3 wi,
-                          vmask active, bool rare, struct trc_bsdf_value *out) {
-    vmask above, below;
-    sides(l, s, wi, active, &above, &below);
-    const bool any_above = vm_any(above), any_below = vm_any(below);
+                          vmask active, vmask as_sampled, bool rare, struct trc_bsdf_value *out) {
+    const struct sides sides = sides_of(l, s, wi, active, as_sampled);
     out->diffuse = out->glossy = out->transmission = v3_zero();
     out->pdf = vf_zero();
     for (int i = 0; i < l->count; i++) {
         const struct trc_lobe *lobe = &l->lobe[i];
-        const bool up = is_reflection(lobe->kind);
-        const bool hair = rare && is_hair(lobe->kind);
-        if (lobe->kind == TRC_LOBE_TRANSPARENT || (!hair && !(up ? any_above : any_below)))
+        const vmask side = side_of(lobe, wi, sides, active, rare);
+        if (lobe->kind == TRC_LOBE_TRANSPARENT || !vm_any(side))
             continue;
-        const vmask side = hair ? active : up ? above : below;
-        const struct lobe_value r = value_of(l, lobe, s, wi, side, rare);
+        struct lobe_value r = value_of(l, lobe, s, wi, side, rare);
+        if (rare && lobe->model->sampled && !is_hair(lobe->kind))
+            take_sampled(lobe, s, wi, NULL, vm_and(side, as_sampled), &r);
         if (is_glossy(l, lobe->kind, rare))
             out->glossy = v3_add(out->glossy, r.value);
         else if (lobe->kind == TRC_LOBE_REFRACT || (rare && lobe->kind == TRC_LOBE_HAIR_TRANSMIT))
@@ -81,26 +107,16 @@ TRC_INLINE void sum_lobes(const struct trc_lobes *l, const struct trc_surface *s
 
 static __attribute__((noinline)) void sum_rare(const struct trc_lobes *l,
                                                const struct trc_surface *s, vvec3 wi, vmask active,
-                                               struct trc_bsdf_value *out) {
-    sum_lobes(l, s, wi, active, true, out);
+                                               vmask as_sampled, struct trc_bsdf_value *out) {
+    sum_lobes(l, s, wi, active, as_sampled, true, out);
 }
 
 void trc_bsdf_eval(const struct trc_lobes *l, const struct trc_surface *s, vvec3 wi, vmask active,
-                   struct trc_bsdf_value *out) {
+                   vmask as_sampled, struct trc_bsdf_value *out) {
     if (l->rare)
-        sum_rare(l, s, wi, active, out);
+        sum_rare(l, s, wi, active, as_sampled, out);
     else
-        sum_lobes(l, s, wi, active, false, out);
-}
-
-/* Of a lobe of hair, in lanes that it was chosen in. */
-static void take_sampled(const struct trc_lobe *lobe, const struct trc_surface *s, vvec3 wi,
-                         const struct trc_draw *draw, vmask lanes, struct lobe_value *r) {
-    const struct lobe_value own = lobe->model->sampled(lobe, s, wi, draw);
-    r->value = v3_select(lanes, own.value, r->value);
-    r->pdf = vf_select(lanes, own.pdf, r->pdf);
-    r->pick = vf_select(lanes, own.pick, r->pick);
-    r->claim = vf_select(lanes, own.claim, r->claim);
+        sum_lobes(l, s, wi, active, as_sampled, false, out);
 }
 
 /* Sums over the lobes for a sampled rough direction; chosen: the number of the lobe, draw: what it
@@ -108,21 +124,17 @@ static void take_sampled(const struct trc_lobe *lobe, const struct trc_surface *
 TRC_INLINE void weigh_direction(const struct trc_lobes *l, const struct trc_surface *s,
                                 vmask active, vint chosen, const struct trc_draw *draw, bool rare,
                                 struct trc_bsdf_sample *out) {
-    vmask above, below;
-    sides(l, s, out->wi, active, &above, &below);
-    const bool any_above = vm_any(above), any_below = vm_any(below);
+    const struct sides sides = sides_of(l, s, out->wi, active, active);
     vvec3 value = v3_zero();
     vfloat pdf = vf_zero(), picked = vf_zero(), claimed = vf_zero();
     for (int i = 0; i < l->count; i++) {
         const struct trc_lobe *lobe = &l->lobe[i];
-        const bool up = is_reflection(lobe->kind);
-        const bool hair = rare && is_hair(lobe->kind);
-        if (lobe->kind == TRC_LOBE_TRANSPARENT || (!hair && !(up ? any_above : any_below)))
+        const vmask side = side_of(lobe, out->wi, sides, active, rare);
+        if (lobe->kind == TRC_LOBE_TRANSPARENT || !vm_any(side))
             continue;
-        const vmask side = hair ? active : up ? above : below;
         struct lobe_value r = value_of(l, lobe, s, out->wi, side, rare);
-        if (hair && lobe->model->sampled)
-            take_sampled(lobe, s, out->wi, draw, vm_and(active, vi_eq(chosen, vi_set(i))), &r);
+        if (rare && lobe->model->sampled)
+            take_sampled(lobe, s, out->wi, draw, vm_and(side, vi_eq(chosen, vi_set(i))), &r);
         value = v3_add(value, r.value);
         pdf = pdf + r.pdf * lobe->sample_weight;
         claimed = claimed + r.claim * lobe->mix_weight;
@@ -231,15 +243,17 @@ TRC_INLINE void sample_lobes(const struct trc_lobes *l, const struct trc_surface
         if (vm_any(exact))
             take_ideal(l, lobe, s, exact, lobe->sample_weight / l->continue_weight, out);
         if (vm_any(spread)) {
-            vmask alive = spread, crosses, above, below;
+            vmask alive = spread, crosses;
             const vvec3 wi =
                 v3_normalize(lobe->model->direction(lobe, s, u1, u2, chosen_at, &alive, &crosses));
-            sides(l, s, wi, alive, &above, &below);
             out->wi = v3_select(spread, wi, out->wi);
             out->transmitted = vm_or(out->transmitted, crosses);
-            const bool hair = rare && is_hair(lobe->kind);
-            rough = vm_or(rough, hair ? alive : vm_select(crosses, below, above));
-            if (hair) {
+            const struct sides sides = sides_of(l, s, wi, alive, alive);
+            rough =
+                vm_or(rough, rare && is_hair(lobe->kind)
+                                 ? alive
+                                 : vm_select(crosses, through_lobe(lobe, wi, alive), sides.above));
+            if (rare) {
                 chosen = vi_select(spread, vi_set(i), chosen);
                 draw.chosen_at = vf_select(spread, chosen_at, draw.chosen_at);
             }

@@ -84,10 +84,12 @@ struct trc_lobe {
 
 /* trc_lobes.rare */
 enum {
-    TRC_LOBES_TURN = 1 << 0,  /* a shading offset: see turn */
-    TRC_LOBES_HAIR = 1 << 1,  /* there are TRC_LOBE_HAIR_* */
-    TRC_LOBES_VELVET = 1 << 2 /* there are TRC_LOBE_VELVET, whose light is glossy; without it they
-                                 are as diffuse ones */
+    TRC_LOBES_TURN = 1 << 0,   /* a shading offset: see turn */
+    TRC_LOBES_HAIR = 1 << 1,   /* there are TRC_LOBE_HAIR_* */
+    TRC_LOBES_VELVET = 1 << 2, /* there are TRC_LOBE_VELVET, whose light is glossy; without it they
+                                  are as diffuse ones */
+    TRC_LOBES_BENT = 1 << 3    /* there are TRC_LOBE_TRANSLUCENT whose normals are not the
+                                  geometry's */
 };
 
 /* Whether no ray is continued for a lobe of that kind. */
@@ -100,7 +102,7 @@ struct trc_lobes {
     vvec3 holdout;          /* weight of holdout leaves, or of all that cuts out */
     vfloat mix_weight;      /* sum over the lobes */
     vfloat continue_weight; /* sum of sample_weight */
-    /* Lanes where light from below the geometric surface may reach reflecting lobes;
+    /* Lanes where a light below the geometric surface may reach reflecting lobes;
      * trc_lobes_setup sets none: nothing shines through. Direct light sets it for smooth surfaces,
      * as its shadow rays start off the flat triangle. */
     vmask below_horizon;
@@ -124,13 +126,14 @@ vvec3 trc_lobes_emission(const struct trc_material *m, const struct trc_register
  * density of trc_bsdf_sample for wi over the lobes that are continued (solid angle, 0 for
  * diffuse-only). Lanes outside active are 0. Where light samples and continuation rays share the
  * work, the weight of a light sample (p_l^2 / (p_l^2 + pdf^2)) goes to all three parts, diffuse
- * included: the weight of a sampled ray carries all three too. */
+ * included: the weight of a sampled ray carries all three too. as_sampled: lanes whose value is to
+ * be that of trc_bsdf_sample, which differs where normals are bent (kernels/lobe/bsdf.c). */
 struct trc_bsdf_value {
     vvec3 diffuse, glossy, transmission;
     vfloat pdf;
 };
 void trc_bsdf_eval(const struct trc_lobes *l, const struct trc_surface *s, vvec3 wi, vmask active,
-                   struct trc_bsdf_value *out);
+                   vmask as_sampled, struct trc_bsdf_value *out);
 
 /* One continuation ray per lane: the lobe by u_lobe in proportion to sample_weight, the direction
  * by u1, u2. Diffuse and sheen lobes are never continued; transparent and translucent are.

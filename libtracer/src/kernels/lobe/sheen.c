@@ -112,16 +112,28 @@ TRC_INLINE vfloat velvet(vfloat inverse_sigma2, vfloat cos_i, vfloat cos_o, vflo
     return vf_where(valid, vf_set(0.25f) * d * masking / cos_o);
 }
 
+TRC_INLINE vfloat velvet_towards(const struct trc_lobe *lobe, const struct trc_surface *s, vvec3 wi,
+                                 vfloat cos_i) {
+    const vvec3 h = v3_normalize(v3_add(wi, s->wo));
+    return velvet(lobe->roughness, cos_i, lobe->cos_o, v3_dot(lobe->n, h), v3_dot(s->wo, h));
+}
+
 static struct lobe_value velvet_value(const struct trc_lobe *lobe, const struct trc_surface *s,
                                       vvec3 wi) {
     const vfloat cos_i = v3_dot(lobe->n, wi);
-    const vvec3 h = v3_normalize(v3_add(wi, s->wo));
-    const vfloat f =
-        velvet(lobe->roughness, cos_i, lobe->cos_o, v3_dot(lobe->n, h), v3_dot(s->wo, h));
-    return upper_value(lobe, cos_i, f, even_density());
+    return upper_value(lobe, cos_i, velvet_towards(lobe, s, wi, cos_i), even_density());
 }
 
-static const struct trc_lobe_model velvet_model = {.kind = TRC_LOBE_VELVET, .value = velvet_value};
+/* As in Cycles, bumps leave a shadow on what is sampled alone. */
+static struct lobe_value velvet_sampled(const struct trc_lobe *lobe, const struct trc_surface *s,
+                                        vvec3 wi, const struct trc_draw *draw) {
+    (void)draw;
+    const vfloat cos_i = v3_dot(lobe->n, wi);
+    return matt_value(lobe, s, wi, cos_i, velvet_towards(lobe, s, wi, cos_i), even_density());
+}
+
+static const struct trc_lobe_model velvet_model = {
+    .kind = TRC_LOBE_VELVET, .value = velvet_value, .sampled = velvet_sampled};
 
 static void add_velvet(struct trc_setup *c, const struct trc_leaf *leaf, vfloat weight) {
     const vfloat sigma = vf_max(number(c, leaf, TRC_AT(VELVET, sigma)), vf_set(VELVET_MIN_SIGMA));

@@ -42,6 +42,7 @@
 #define trc_bsdf_eval(...) TRC_KERNEL(trc_bsdf_eval)(__VA_ARGS__)
 #define trc_bsdf_ideal(...) TRC_KERNEL(trc_bsdf_ideal)(__VA_ARGS__)
 #define trc_bsdf_sample(...) TRC_KERNEL(trc_bsdf_sample)(__VA_ARGS__)
+#define trc_bulge_behind(...) TRC_KERNEL(trc_bulge_behind)(__VA_ARGS__)
 #define trc_bundle_closest(...) TRC_KERNEL(trc_bundle_closest)(__VA_ARGS__)
 #define trc_bundle_occluded(...) TRC_KERNEL(trc_bundle_occluded)(__VA_ARGS__)
 #define trc_camera_rays(...) TRC_KERNEL(trc_camera_rays)(__VA_ARGS__)

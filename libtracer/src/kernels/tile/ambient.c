@@ -27,7 +27,7 @@ static vvec3 ambient_white(const struct trc_tile *t, const struct arrival *a,
 static vvec3 ambient_world(const struct trc_tile *t, const struct trc_surface *s,
                            const struct trc_lobes *lobes, vvec3 n, vvec3 wi, vmask active) {
     struct trc_bsdf_value f;
-    trc_bsdf_eval(lobes, s, wi, active, &f);
+    trc_bsdf_eval(lobes, s, wi, active, active, &f);
     const vfloat one = vf_set(1.0f), no_mis = vf_set(-1.0f);
     const vvec3 world = trc_world_radiance(t->snapshot, s->p, n, wi, no_mis, one,
                                            vu_set(TRC_VISIBLE_DIFFUSE), active);

@@ -24,7 +24,8 @@ static vuint share_of(const struct trc_tile *t, const struct arrival *a,
     if (!vm_any(vm_andnot(first, ideal)))
         return before;
     struct trc_bsdf_value f;
-    trc_bsdf_eval(lobes, s, b->wi, vm_andnot(first, ideal), &f);
+    const vmask rough = vm_andnot(first, ideal);
+    trc_bsdf_eval(lobes, s, b->wi, rough, rough, &f);
     const vvec3 sum = v3_add(f.diffuse, v3_add(f.glossy, f.transmission));
     const vvec3 share = share_in(f.diffuse, sum);
     vuint word = trc_share_pack(share);

@@ -17,42 +17,61 @@ TRC_INLINE vmask is_found_alone(const struct trc_surface *s, const struct trc_li
         vi_set(snapshot->world.is_constant ? (int32_t)snapshot->lights->world_light : none));
 }
 
+/* Lanes in which light comes to the side that is shaded as seen. */
+TRC_INLINE vmask goes_up(const struct trc_surface *s, vvec3 w) {
+    return vf_ge(v3_dot(w, s->n), vf_set(0.0f));
+}
+
 /* Where light grazes a smooth surface, shadow rays start from the curved surface that the normals
- * describe, or the flat triangles would cast shadows with edges of their own. This is which part of
- * the way to it a ray towards a light starts with; the transition, between cosine and 0 to both
- * normals, is as in Cycles. */
+ * describe, on the side of the light, or the flat triangles would cast shadows with edges of their
+ * own. This is which part of the way to it a ray towards a light starts with; the transition,
+ * between cosine and 0 to both normals, is as in Cycles. */
 TRC_INLINE vfloat lift(const struct trc_surface *s, const struct trc_light_sample *l, vfloat cosine,
                        vfloat inverse) {
     const vvec3 w = l->wi;
     const vfloat zero = vf_set(0.0f), one = vf_set(1.0f);
-    const vfloat cos_n = v3_dot(w, s->n), cos_g = v3_dot(w, s->ng);
+    const vfloat side = vf_select(goes_up(s, w), one, -one);
+    const vfloat cos_n = v3_dot(w, s->n) * side, cos_g = v3_dot(w, s->ng) * side;
     const vfloat near = vf_select(vf_lt(cos_n, cosine), vf_set(2.0f) - (cos_g + cos_n) * inverse,
                                   one - cos_g * inverse);
     const vfloat amount = vf_min(vf_max(near, zero), one);
-    return vf_select(vm_andnot(vf_ge(cos_n, zero), is_found_alone(s, l)), amount, zero);
+    return vf_select(is_found_alone(s, l), zero, amount);
+}
+
+/* That part of the way, of the active lanes. */
+TRC_INLINE vvec3 lifted(const struct trc_surface *s, const struct trc_light_sample *l, vfloat part,
+                        vmask active) {
+    vvec3 bulge = s->bulge;
+    const vmask behind =
+        vm_andnot(vm_and(vm_and(active, s->smooth), vf_gt(part, vf_set(0.0f))), goes_up(s, l->wi));
+    if (vm_any(behind))
+        bulge = v3_select(behind, trc_bulge_behind(s, behind), bulge);
+    return v3_scale(bulge, part);
 }
 
 /* Origin of a shadow ray towards a light. */
-TRC_INLINE vvec3 shadow_origin(const struct trc_surface *s, const struct trc_light_sample *l) {
-    const vvec3 o = trc_spawn_origin(s, vf_ge(v3_dot(l->wi, s->n), vf_set(0.0f)));
+TRC_INLINE vvec3 shadow_origin(const struct trc_surface *s, const struct trc_light_sample *l,
+                               vmask active) {
+    const vvec3 o = trc_spawn_origin(s, goes_up(s, l->wi));
     if (!vm_any(s->smooth))
         return o;
-    return v3_add(o, v3_scale(s->bulge, lift(s, l, vf_set(TRC_TERMINATOR_COSINE),
-                                             vf_set(1.0f / TRC_TERMINATOR_COSINE))));
+    const vfloat part =
+        lift(s, l, vf_set(TRC_TERMINATOR_COSINE), vf_set(1.0f / TRC_TERMINATOR_COSINE));
+    return v3_add(o, lifted(s, l, part, active));
 }
 
 /* The same by the offset of each lane's instance. Where that is 0, no ray is lifted, and all leave
  * on the side that they go to. */
-static vvec3 own_origin(const struct trc_surface *s, const struct trc_light_sample *l) {
+static vvec3 own_origin(const struct trc_surface *s, const struct trc_light_sample *l,
+                        vmask active) {
     const vvec3 w = l->wi;
     const vfloat zero = vf_set(0.0f);
     const vfloat cosine = trc_instance_float(
         s->snapshot, s->instance, offsetof(struct trc_instance, terminator_cosine), s->active);
     const vmask lifts = vf_gt(cosine, zero);
-    const vfloat part = lift(s, l, cosine, vf_divide(vf_set(1.0f), cosine));
-    const vvec3 o =
-        trc_spawn_origin(s, vm_select(lifts, vf_ge(v3_dot(w, s->n), zero), goes_out(s, w)));
-    return v3_add(o, v3_scale(s->bulge, vf_select(lifts, part, zero)));
+    const vfloat part = vf_where(lifts, lift(s, l, cosine, vf_divide(vf_set(1.0f), cosine)));
+    const vvec3 o = trc_spawn_origin(s, vm_select(lifts, goes_up(s, w), goes_out(s, w)));
+    return v3_add(o, lifted(s, l, part, active));
 }
 
 /* Contributions of the lanes' light samples, weighted; lanes that get nothing are dropped from
@@ -62,7 +81,7 @@ static vmask light_contribute(const struct trc_tile *t, const struct arrival *a,
                               const struct trc_light_sample *l, vfloat count, vmask active,
                               struct light_result *out) {
     struct trc_bsdf_value f;
-    trc_bsdf_eval(lobes, s, l->wi, active, &f);
+    trc_bsdf_eval(lobes, s, l->wi, active, is_found_alone(s, l), &f);
     const vfloat one = vf_set(1.0f), zero = vf_set(0.0f);
     const vuint seen = trc_light_visibility(t->snapshot, l, a->path);
     const vmask alone = vm_or(l->delta, l->no_mis);
@@ -152,7 +171,7 @@ static __attribute__((noinline)) void push_own(struct trc_tile *t, const struct 
                                                const struct light_result *r, vuint cell,
                                                vmask active) {
     const bool has_offsets = t->snapshot->features & TRC_FEATURE_SHADOW_TERMINATORS;
-    const vvec3 o = has_offsets ? own_origin(s, l) : shadow_origin(s, l);
+    const vvec3 o = has_offsets ? own_origin(s, l, active) : shadow_origin(s, l, active);
     trc_shadow_push_from(t, a, s, l, r, &o, cell, active);
 }
 
@@ -162,7 +181,7 @@ void trc_shadow_push(struct trc_tile *t, const struct arrival *a, const struct t
     if (t->snapshot->features & (TRC_FEATURE_SHADOW_TERMINATORS | TRC_FEATURE_CURVES))
         push_own(t, a, s, l, r, cell, active);
     else
-        push(t, a, s, l, r, shadow_origin(s, l), cell, active);
+        push(t, a, s, l, r, shadow_origin(s, l, active), cell, active);
 }
 
 /* What the lanes' light samples are in the Shadow pass if nothing is in the way: lamps count

@@ -204,6 +204,20 @@ static vfloat bulge_of(const struct trc_surface *s, const struct raw_hit *h, vve
     return vf_max(planes, vf_set(-0.5f) * arcs);
 }
 
+/* Between the normals of the corners, not unit, object space. */
+TRC_INLINE vvec3 normals_between(const struct trc_surface *s, const struct raw_hit *h) {
+    const vfloat w = vf_one() - s->u - s->v;
+    return v3_mad(h->n.corner[0], w, v3_mad(h->n.corner[1], s->u, v3_scale(h->n.corner[2], s->v)));
+}
+
+/* From p to the curved surface on the side that ng faces. */
+TRC_INLINE vvec3 bulge_towards(const struct trc_surface *s, const struct raw_hit *h, vvec3 e1,
+                               vvec3 e2, vvec3 ng) {
+    const vvec3 axis = trc_transform_vector(&h->m, normals_between(s, h));
+    const vfloat turn = vf_select(vf_lt(v3_dot(axis, ng), vf_zero()), vf_set(-1.0f), vf_one());
+    return v3_scale(axis, bulge_of(s, h, v3_scale(e1, turn), v3_scale(e2, turn)) * turn);
+}
+
 static void set_normals(struct trc_surface *s, const struct raw_hit *h, vvec3 e1, vvec3 e2) {
     /* The winding as the object has it: a mirroring matrix turns the world cross product over. */
     const vvec3 w1 = scaled_to_one(trc_transform_vector(&h->m, e1));
@@ -221,39 +235,49 @@ static void set_normals(struct trc_surface *s, const struct raw_hit *h, vvec3 e1
     s->backfacing = vf_lt(v3_dot(ng, s->wo), vf_zero());
     const vfloat side = vf_select(s->backfacing, vf_set(-1.0f), vf_one());
     if (vm_any(h->smooth)) {
-        const vfloat w = vf_one() - s->u - s->v;
-        vvec3 sum =
-            v3_mad(h->n.corner[0], w, v3_mad(h->n.corner[1], s->u, v3_scale(h->n.corner[2], s->v)));
-        const vvec3 up = trc_transform_vector(&h->m, sum);
-        const vfloat turn =
-            vf_select(vf_lt(v3_dot(up, ng) * side, vf_zero()), vf_set(-1.0f), vf_one());
-        const vfloat height = bulge_of(s, h, v3_scale(e1, turn), v3_scale(e2, turn)) * turn;
+        const vvec3 bulge = bulge_towards(s, h, e1, e2, v3_scale(ng, side));
+        vvec3 sum = normals_between(s, h);
         if (vm_any(vm_and(h->world_normals, s->active)))
             sum = v3_select(h->world_normals, sum_in_world(s, h), sum);
         sum = v3_normalize(v3_scale(transform_normal(&h->m, sum), sign));
         s->smooth = vm_and(h->smooth, vf_gt(v3_dot(sum, sum), vf_set(0.5f)));
         n = v3_select(s->smooth, sum, ng);
-        s->bulge = v3_where(s->smooth, v3_scale(up, height));
+        s->bulge = v3_where(s->smooth, bulge);
     }
     s->ng = v3_scale(ng, side);
     s->n = v3_scale(n, side);
+}
+
+static void raw_load(const struct trc_surface *s, struct raw_hit *out) {
+    const int32_t uniform = trc_uniform_instance(s->instance, s->active);
+    const struct trc_instance *instance = uniform >= 0 ? &s->snapshot->instances[uniform] : NULL;
+    const struct trc_mesh *mesh = instance ? s->snapshot->meshes[instance->mesh] : NULL;
+    if (mesh && trc_mesh_in_reach(mesh))
+        load_uniform(s, instance, mesh, out);
+    else
+        load_mixed(s, out);
+}
+
+TRC_INLINE vvec3 side_to(const struct raw_hit *h, int corner) {
+    return v3_sub(h->p.corner[corner], h->p.corner[0]);
 }
 
 void trc_triangle_fetch(struct trc_surface *s) {
     if (!vm_any(s->active))
         return;
     struct raw_hit h;
-    const int32_t uniform = trc_uniform_instance(s->instance, s->active);
-    const struct trc_instance *instance = uniform >= 0 ? &s->snapshot->instances[uniform] : NULL;
-    const struct trc_mesh *mesh = instance ? s->snapshot->meshes[instance->mesh] : NULL;
-    if (mesh && trc_mesh_in_reach(mesh))
-        load_uniform(s, instance, mesh, &h);
-    else
-        load_mixed(s, &h);
-    const vvec3 e1 = v3_sub(h.p.corner[1], h.p.corner[0]);
-    const vvec3 e2 = v3_sub(h.p.corner[2], h.p.corner[0]);
+    raw_load(s, &h);
+    const vvec3 e1 = side_to(&h, 1), e2 = side_to(&h, 2);
     set_position(s, &h, e1, e2);
     set_normals(s, &h, e1, e2);
+}
+
+vvec3 trc_bulge_behind(const struct trc_surface *s, vmask lanes) {
+    struct trc_surface part = *s;
+    struct raw_hit h;
+    part.active = lanes;
+    raw_load(&part, &h);
+    return bulge_towards(s, &h, side_to(&h, 1), side_to(&h, 2), v3_neg(s->ng));
 }
 
 void trc_surface_sides(const struct trc_surface *s, vvec3 *first, vvec3 *second) {

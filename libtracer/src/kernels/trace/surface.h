@@ -61,6 +61,12 @@ TRC_INLINE void trc_strand_words(const struct trc_surface *s, vuint out[2]) {
  * first corner. Of the active lanes. (kernels/trace/surface.c) */
 void trc_surface_sides(const struct trc_surface *s, vvec3 *first, vvec3 *second);
 
+/* What bulge would be on the side away from wo, for light that comes through: loads the triangles
+ * once more, so it is for the few lanes that ask. Of lanes that are smooth, at least one; others are
+ * undefined.
+ * (kernels/trace/surface.c) */
+vvec3 trc_bulge_behind(const struct trc_surface *s, vmask lanes);
+
 /* Lanes whose surface is a strand's. */
 TRC_INLINE vmask trc_on_strand(const struct trc_surface *s) {
     if (!(s->snapshot->features & TRC_FEATURE_CURVES))
