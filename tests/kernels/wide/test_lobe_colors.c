@@ -277,10 +277,30 @@ static void films_interfere_on_metals(void **state) {
     assert_true(least < 0.5);
 }
 
+/* Blender 3.4: glass that scatters more than once has one colour in its passes, all of it of the
+ * light that goes through; without bounces between facets it has what the others have. */
+static void multiple_glass_transmits_its_color(void **state) {
+    (void)state;
+    const double white[3] = {1.0, 1.0, 1.0};
+    for (int i = 0; i < 3; i++) {
+        struct model m = glass(TRC_DISTRIBUTION_MULTI_GGX, 0.2f + 0.3f * (float)i, 1.45f, false);
+        set3(&m, TRC_AT(GLASS, color), 0.8f, 0.8f, 0.8f);
+        struct trc_surface s;
+        struct trc_lobes l;
+        vvec3 albedo[3];
+        prepare(&m, direction(0.7, 0.3), &s, &l);
+        trc_bsdf_albedo(&l, &s, albedo);
+        assert_true(vf_get(v3_max(albedo[0]), 0) == 0.0f);
+        assert_true(vf_get(v3_max(albedo[1]), 0) == 0.0f);
+        expect_ratio("colour of the transmission", albedo[2], v3_splat(vf_set(0.8f)), white);
+    }
+}
+
 int main(void) {
     if (!test_cpu_can())
         return 77;
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(multiple_glass_transmits_its_color),
         cmocka_unit_test(specular_tint_is_the_hue),
         cmocka_unit_test(metals_have_their_tint_at_the_edge),
         cmocka_unit_test(layers_darken_by_their_strongest_channel),

@@ -120,12 +120,18 @@ void trc_add_multi_glass(struct trc_setup *c, vvec3 weight, vvec3 reflected, vve
     const vvec3 w = v3_mul(weight, gain);
     struct trc_lobe *reflect = trc_add_dielectric(c, TRC_LOBE_REFLECT, v3_mul(w, reflected), n,
                                                   rough, eta, TRC_DISTRIBUTION_GGX);
-    if (reflect)
+    /* To the passes of colours all of it is transmission, and bounces between facets add nothing:
+     * Cycles 3.4. */
+    if (reflect) {
         reflect->fresnel = TRC_FRESNEL_DIELECTRIC;
+        reflect->albedo_scale = vf_zero();
+    }
     struct trc_lobe *refract = trc_add_dielectric(c, TRC_LOBE_REFRACT, v3_mul(w, refracted), n,
                                                   rough, eta, TRC_DISTRIBUTION_GGX);
-    if (refract)
+    if (refract) {
         refract->fresnel = TRC_FRESNEL_DIELECTRIC;
+        refract->albedo_scale = vf_rcp(v3_average(gain));
+    }
     share_chances(reflect, refract, trc_fresnel_dielectric(v3_dot(n, c->s->wo), eta));
 }
 
