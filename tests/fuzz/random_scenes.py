@@ -117,7 +117,9 @@ def textured(scene, tree, socket):
         mapping.inputs["Location"].default_value = [rng.uniform(-1, 1) for _ in range(3)]
         mapping.inputs["Rotation"].default_value = [rng.uniform(-3, 3) for _ in range(3)]
         mapping.inputs["Scale"].default_value = [rng.uniform(0.5, 2) for _ in range(3)]
-        tree.links.new(coordinates.outputs[rng.choice(COORDINATES)], mapping.inputs["Vector"])
+        # Of a face's normal, which is the same all over it, white noise is what rounding makes of it.
+        names = [name for name in COORDINATES if name != "Normal" or texture.bl_idname != "ShaderNodeTexWhiteNoise"]
+        tree.links.new(coordinates.outputs[rng.choice(names)], mapping.inputs["Vector"])
         tree.links.new(mapping.outputs[0], texture.inputs["Vector"])
     outputs = [output for output in texture.outputs if output.enabled]
     tree.links.new(rng.choice(outputs), socket)
@@ -125,11 +127,14 @@ def textured(scene, tree, socket):
 
 def shader_node(scene, tree, kinds, rng):
     """A shader of random settings. Without rough glass, which Cycles 4 and 5 have otherwise, glass is clear."""
+    import bpy
     node = new_node(tree, kinds, rng)
     draw_settings(node, rng)
     draw_inputs(node, rng)
     if "rough_glass" in scene.without and node.bl_idname in {"ShaderNodeBsdfGlass", "ShaderNodeBsdfRefraction"}:
         node.inputs["Roughness"].default_value = 0.0
+    if node.bl_idname == "ShaderNodeBsdfToon" and bpy.app.version < (4, 0, 0):
+        node.inputs["Smooth"].default_value = 0.0  # Cycles samples it otherwise than it evaluates it
     if node.bl_idname == "ShaderNodeBsdfPrincipled" and rng.random() < 0.4 and "rough_glass" not in scene.without:
         node.inputs["Transmission Weight" if "Transmission Weight" in node.inputs else "Transmission"] \
             .default_value = rng.random()
