@@ -42,8 +42,8 @@ struct trc_lobe_model {
     bool is_portal;
     /* Towards wi; lanes of the wrong side are dropped by the caller. NULL: straight through. */
     struct lobe_value (*value)(const struct trc_lobe *lobe, const struct trc_surface *s, vvec3 wi);
-    /* The same of a direction that this lobe has sampled by those numbers; lobes that have it are
-     * rare (trc_lobes.rare). NULL: no other. */
+    /* The same of a direction that this lobe has sampled by those numbers, of hair alone; asked for
+     * where trc_lobes.rare is not 0. NULL: no other. */
     struct lobe_value (*sampled)(const struct trc_lobe *lobe, const struct trc_surface *s, vvec3 wi,
                                  const struct trc_draw *draw);
     /* A direction of the lobe's density, of those that rays are continued for and that are not
