@@ -62,9 +62,8 @@ TRC_INLINE void trc_strand_words(const struct trc_surface *s, vuint out[2]) {
 void trc_surface_sides(const struct trc_surface *s, vvec3 *first, vvec3 *second);
 
 /* What bulge would be on the side away from wo, for light that comes through: loads the triangles
- * once more, so it is for the few lanes that ask. Of lanes that are smooth, at least one; others are
- * undefined.
- * (kernels/trace/surface.c) */
+ * once more, so it is for the few lanes that ask. Of lanes that are smooth, at least one; others
+ * are undefined. (kernels/trace/surface.c) */
 vvec3 trc_bulge_behind(const struct trc_surface *s, vmask lanes);
 
 /* Lanes whose surface is a strand's. */
