@@ -124,10 +124,12 @@ static struct lobe_value velvet_value(const struct trc_lobe *lobe, const struct 
     return upper_value(lobe, cos_i, velvet_towards(lobe, s, wi, cos_i), even_density());
 }
 
-/* As in Cycles, bumps leave a shadow on what is sampled alone. */
+/* In Cycles 3 and 4 bumps leave a shadow on what is sampled, not on what lights bring. */
 static struct lobe_value velvet_sampled(const struct trc_lobe *lobe, const struct trc_surface *s,
                                         vvec3 wi, const struct trc_draw *draw) {
     (void)draw;
+    if (lobe->facet_shadowing)
+        return velvet_value(lobe, s, wi);
     const vfloat cos_i = v3_dot(lobe->n, wi);
     return matt_value(lobe, s, wi, cos_i, velvet_towards(lobe, s, wi, cos_i), even_density());
 }
