@@ -141,12 +141,21 @@ def all_means(blender_of_module):
     return blender_of_module.run(inside_means, timeout=300)
 
 
-@pytest.mark.parametrize("is_smooth", (True, False), ids=("smooth", "given"))
-@pytest.mark.parametrize("name", _SHADERS)
-def test_tilted(all_means, name, is_smooth):
+def _means_of(all_means, name, is_smooth):
+    """Those of a shader, by what is left of their keys; skips where this Blender has none."""
     means = {key[2:]: pair for key, pair in all_means.items() if key[:2] == (name, is_smooth)}
     if not means:
         pytest.skip("this Blender has no such node")
+    return means
+
+
+SMOOTH_OR_GIVEN = pytest.mark.parametrize("is_smooth", (True, False), ids=("smooth", "given"))
+
+
+@SMOOTH_OR_GIVEN
+@pytest.mark.parametrize("name", _SHADERS)
+def test_tilted(all_means, name, is_smooth):
+    means = _means_of(all_means, name, is_smooth)
     assert len(means) == len(SUNS_DEGREES) * len(TURNS_DEGREES)
     is_lit_from_below = version() < (4, 0) and name in _LIT_FROM_BELOW_3 and not is_smooth
     for (sun_degrees, degrees), (ours, theirs) in means.items():
@@ -163,11 +172,10 @@ def all_means_in_world(blender_of_module):
     return blender_of_module.run(inside_means_in_world, timeout=300)
 
 
-@pytest.mark.parametrize("is_smooth", (True, False), ids=("smooth", "given"))
+@SMOOTH_OR_GIVEN
 @pytest.mark.parametrize("name", IN_WORLD)
 def test_in_even_world(all_means_in_world, name, is_smooth):
-    means = {key[2]: pair for key, pair in all_means_in_world.items() if key[:2] == (name, is_smooth)}
-    if not means:
-        pytest.skip("this Blender has no such node")
-    for degrees, (ours, theirs) in means.items():
+    means = _means_of(all_means_in_world, name, is_smooth)
+    assert len(means) == len(TURNS_DEGREES)
+    for (degrees,), (ours, theirs) in means.items():
         assert ours == pytest.approx(theirs, rel=RELATIVE, abs=WORLD_ABSOLUTE), f"normal at {degrees} degrees"

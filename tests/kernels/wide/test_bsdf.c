@@ -302,19 +302,25 @@ static void nothing_shines_through(void **state) {
     assert_int_equal(below, 0);
 }
 
-/* Integral of what a model gives over all directions, of a surface whose normals are bent by an
- * angle from the triangle's and that is seen along these. */
+/* A smooth surface whose normals are bent by an angle from the triangle's, and that is seen along
+ * these. */
+static void prepare_bent(struct model *m, double angle, struct trc_surface *s,
+                         struct trc_lobes *l) {
+    struct trc_registers regs;
+    memset(&regs, 0, sizeof regs);
+    point(s, direction(1.0, 0.0), m);
+    s->n = direction(cos(angle), 0.3);
+    s->smooth = vm_all_set();
+    trc_lobes_setup(material_of(m), s, &regs, vf_zero(), l);
+    l->below_horizon = s->smooth;
+}
+
+/* Integral of what a model gives there over all directions. */
 #define BENT_STEPS 256
 static double bent_integral(struct model *m, double angle, bool as_sampled) {
     struct trc_surface s;
     struct trc_lobes l;
-    struct trc_registers regs;
-    memset(&regs, 0, sizeof regs);
-    point(&s, direction(1.0, 0.0), m);
-    s.n = direction(cos(angle), 0.3);
-    s.smooth = vm_all_set();
-    trc_lobes_setup(material_of(m), &s, &regs, vf_zero(), &l);
-    l.below_horizon = s.smooth;
+    prepare_bent(m, angle, &s, &l);
     double sum = 0.0;
     for (int i = 0; i < BENT_STEPS; i++)
         for (int j = 0; j < BENT_STEPS; j++) {
@@ -349,13 +355,8 @@ static void bent_normals_are_sampled_as_evaluated(void **state) {
     struct model m = translucent();
     struct trc_surface s;
     struct trc_lobes l;
-    struct trc_registers regs;
     struct histogram h;
-    memset(&regs, 0, sizeof regs);
-    point(&s, direction(1.0, 0.0), &m);
-    s.n = direction(cos(0.6), 0.3);
-    s.smooth = vm_all_set();
-    trc_lobes_setup(material_of(&m), &s, &regs, vf_zero(), &l);
+    prepare_bent(&m, 0.6, &s, &l);
     draw_samples(&l, &s, EXTREME_SAMPLES, &h);
     const double mean = h.weight / EXTREME_SAMPLES, want = bent_integral(&m, 0.6, true);
     const double deviation =

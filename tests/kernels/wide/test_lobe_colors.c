@@ -300,13 +300,13 @@ int main(void) {
     if (!test_cpu_can())
         return 77;
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(multiple_glass_transmits_its_color),
         cmocka_unit_test(specular_tint_is_the_hue),
         cmocka_unit_test(metals_have_their_tint_at_the_edge),
         cmocka_unit_test(layers_darken_by_their_strongest_channel),
         cmocka_unit_test(coats_tint_by_the_way_through_them),
         cmocka_unit_test(films_interfere),
         cmocka_unit_test(films_interfere_on_metals),
+        cmocka_unit_test(multiple_glass_transmits_its_color),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -86,8 +86,8 @@ struct trc_lobe {
 enum {
     TRC_LOBES_TURN = 1 << 0,   /* a shading offset: see turn */
     TRC_LOBES_HAIR = 1 << 1,   /* there are TRC_LOBE_HAIR_* */
-    TRC_LOBES_VELVET = 1 << 2, /* there are TRC_LOBE_VELVET, whose light is glossy; without it they
-                                  are as diffuse ones */
+    TRC_LOBES_VELVET = 1 << 2, /* there are TRC_LOBE_VELVET, whose light is glossy, and bumps shadow
+                                  it as sampled; without it they are as diffuse ones */
     TRC_LOBES_BENT = 1 << 3    /* there are TRC_LOBE_TRANSLUCENT whose normals are not the
                                   geometry's */
 };

@@ -21,17 +21,17 @@ static vuint share_of(const struct trc_tile *t, const struct arrival *a,
     *mixed = vm_none();
     const vuint before = word_column(t->work.w[TRC_RAY_SHARE], a);
     first = vm_andnot(first, b->transparent);
-    if (!vm_any(vm_andnot(first, ideal)))
+    const vmask rough = vm_andnot(first, ideal);
+    if (!vm_any(rough))
         return before;
     struct trc_bsdf_value f;
-    const vmask rough = vm_andnot(first, ideal);
     trc_bsdf_eval(lobes, s, b->wi, rough, rough, &f);
     const vvec3 sum = v3_add(f.diffuse, v3_add(f.glossy, f.transmission));
     const vvec3 share = share_in(f.diffuse, sum);
     vuint word = trc_share_pack(share);
     if (lobes->rare & TRC_LOBES_HAIR) {
         const vfloat least = vf_min(v3_max(f.glossy), v3_max(f.transmission));
-        *mixed = vm_and(vm_andnot(first, ideal), vf_gt(least, vf_set(0.0f)));
+        *mixed = vm_and(rough, vf_gt(least, vf_set(0.0f)));
         const vuint both =
             trc_mixed_pack(share, share_in(f.glossy, sum), hash3(b->wi.x, b->wi.y, b->wi.z));
         word = (vuint)vi_select(*mixed, (vint)both, (vint)word);
