@@ -4,13 +4,14 @@
 #
 #   bash tests/blender_next.sh [--suite SUITE] [--fast] [--report XML] [--results DIR] [PYTEST ARGUMENT]...
 #   bash tests/blender_next.sh [--suite SUITE] [--fast] --measure PART DIR
+#   bash tests/blender_next.sh [--suite SUITE] --install
 #
 # SUITE is trixie (Debian 13, Blender 4.3; the default) or sid (Debian unstable, Blender 5.2). Runs all
 # Blender tests if no argument says which; --fast runs what a change of Blender's version touches most (see
 # CHANGED) and builds kernels for this processor alone;
 # --report writes JUnit XML, --results what tests measured, the tables of build/results. --measure measures a
 # part of tests/bench/report.sh there instead, curves, files or kernels (beside Embree), and leaves its JSON in DIR;
-# with --fast what report.sh --quick measures.
+# with --fast what report.sh --quick measures. --install makes the folder with its packages and ends.
 # Needs root, a Debian mirror and 2.5 GB; the folder is $XDG_CACHE_HOME/volley/SUITE and stays, so that the
 # next run takes only the build and the tests. Nothing stays mounted: /proc is there in a name space of its
 # own, where there may be one. Exit code 77: it cannot be set up here, with the reason as the last line;
@@ -99,12 +100,14 @@ or (test_movies and test_window)"
 
 main() {
     local report="" results="" part="" out="" suite=trixie isas="" is_fast="" scope=--next status=0 arguments=()
+    local is_only_installed=""
     while [ $# -gt 0 ]; do
         case $1 in
             --suite) suite=${2:?--suite needs a name}; shift 2 ;;
             --fast) is_fast=1 isas=$(widest_isa) scope=--quick; shift ;;
             --report) report=${2:?--report needs a file}; shift 2 ;;
             --results) results=${2:?--results needs a folder}; shift 2 ;;
+            --install) is_only_installed=1; shift ;;
             --measure) part=${2:?--measure needs a part} out=${3:?--measure needs a folder}; shift 3 ;;
             *) break ;;
         esac
@@ -115,6 +118,7 @@ main() {
     [ -z "$is_fast" ] || arguments+=(-k "($CHANGED) and not test_shadow_catcher")
     make_root
     install_packages
+    [ -z "$is_only_installed" ] || exit 0
     copy_sources
     if [ -n "$part" ]; then
         if [ "$part" = kernels ]; then

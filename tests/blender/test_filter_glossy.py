@@ -6,7 +6,7 @@ light that scatters more than once in Cycles 3.4 is that of the wider ones."""
 import compare
 import pytest
 
-SAMPLES = 1024
+SAMPLES = 512
 OFF = 0.01, 0.03  # of the pass, in the mean and in a tile
 # Clear glass that is made rough is rough glass, which Cycles 4 and 5 have brighter under lamps.
 GLASS_OFF = 0.05, 0.3

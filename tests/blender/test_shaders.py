@@ -16,7 +16,7 @@ CELL_PX = 24       # pixels along each side of a ball's cell
 TILE_PX = 8        # parts of a cell that are tested for bias
 NOISE = 0.02               # of means, at most
 SEEDS = (11, 12, 13, 14, 15, 16)
-SAMPLES = 96       # of each seed
+SAMPLES = 64       # of each seed
 TOLERANCE = 0.005          # beyond noise, relative to the mean of the ball
 STRANDS_TILE = 0.015       # of a part of a ball of strands, of which they cover a third
 
