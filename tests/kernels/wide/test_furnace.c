@@ -377,7 +377,7 @@ static double active_sum(vfloat x, vmask m) {
 
 static struct strand_light strand_light(struct model *m, double cos_o) {
     static const struct trc_snapshot no_curves;
-    const int places = 1 << 18;
+    const int places = 1 << (TRC_WIDTH < 8 ? 16 : 18);
     const vfloat one = vf_one(), two = vf_set(2.0f);
     struct rng random = rng_seed(5);
     struct trc_registers regs;
