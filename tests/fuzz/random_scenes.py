@@ -61,9 +61,9 @@ HAIR_SHADERS = ("ShaderNodeBsdfHair", "ShaderNodeBsdfHairPrincipled", "ShaderNod
 # Left as they are: what Volley does without, or what makes noise of all.
 FIXED_INPUTS = ("Subsurface", "Emission", "Normal", "Tangent", "Weight", "Transmission", "Thin Film", "Coat Normal",
                 "Thin Wall", "Radius")
+# Without White Noise, which is what rounding makes of coordinates that are the same all over a face or a strand.
 TEXTURES = ("ShaderNodeTexNoise", "ShaderNodeTexVoronoi", "ShaderNodeTexChecker", "ShaderNodeTexWave",
-            "ShaderNodeTexGradient", "ShaderNodeTexMagic", "ShaderNodeTexBrick", "ShaderNodeTexWhiteNoise",
-            "ShaderNodeTexGabor")
+            "ShaderNodeTexGradient", "ShaderNodeTexMagic", "ShaderNodeTexBrick", "ShaderNodeTexGabor")
 COORDINATES = ("Generated", "UV", "Object", "Normal", "Camera", "Window", "Reflection")
 
 
@@ -117,9 +117,7 @@ def textured(scene, tree, socket):
         mapping.inputs["Location"].default_value = [rng.uniform(-1, 1) for _ in range(3)]
         mapping.inputs["Rotation"].default_value = [rng.uniform(-3, 3) for _ in range(3)]
         mapping.inputs["Scale"].default_value = [rng.uniform(0.5, 2) for _ in range(3)]
-        # Of a face's normal, which is the same all over it, white noise is what rounding makes of it.
-        names = [name for name in COORDINATES if name != "Normal" or texture.bl_idname != "ShaderNodeTexWhiteNoise"]
-        tree.links.new(coordinates.outputs[rng.choice(names)], mapping.inputs["Vector"])
+        tree.links.new(coordinates.outputs[rng.choice(COORDINATES)], mapping.inputs["Vector"])
         tree.links.new(mapping.outputs[0], texture.inputs["Vector"])
     outputs = [output for output in texture.outputs if output.enabled]
     tree.links.new(rng.choice(outputs), socket)
@@ -138,6 +136,8 @@ def shader_node(scene, tree, kinds, rng):
     if node.bl_idname == "ShaderNodeBsdfPrincipled" and rng.random() < 0.4 and "rough_glass" not in scene.without:
         node.inputs["Transmission Weight" if "Transmission Weight" in node.inputs else "Transmission"] \
             .default_value = rng.random()
+        if bpy.app.version < (4, 0, 0):
+            node.inputs["Sheen"].default_value = 0.0  # with which Cycles has no place left for the clearcoat
     if node.bl_idname == "ShaderNodeBsdfPrincipled" and rng.random() < 0.6:
         node.inputs["Alpha"].default_value = 1.0
     color = next((socket for socket in node.inputs if socket.type == 'RGBA' and socket.enabled), None)
@@ -446,6 +446,7 @@ def set_world(scene, rng):
 
 
 def add_camera(scene):
+    import bpy
     import scenes
     made = scenes.camera((0.0, -6.0, 0.6), (math.radians(85.0), 0.0, 0.0))
     if scene.has("lens", 0.6):
@@ -457,7 +458,10 @@ def add_camera(scene):
         if rng.random() < 0.5:
             data.dof.use_dof, data.dof.focus_distance, data.dof.aperture_fstop = True, 5.5, 0.2
             data.dof.aperture_blades, data.dof.aperture_ratio = rng.choice((0, 5)), rng.choice((1.0, 2.0))
-        data.clip_start = rng.choice((0.1, 5.5))
+        clip_start = rng.choice((0.1, 5.5))
+        # Cycles 3.4 measures the focus of orthographic cameras from there.
+        if bpy.app.version >= (4, 0) or kind != 'ORTHO' or not data.dof.use_dof:
+            data.clip_start = clip_start
 
 
 def set_film(rng):
