@@ -56,6 +56,8 @@ class Scene:
 SHADERS = ("ShaderNodeBsdfDiffuse", "ShaderNodeBsdfGlossy", "ShaderNodeBsdfPrincipled", "ShaderNodeBsdfGlass",
            "ShaderNodeBsdfRefraction", "ShaderNodeBsdfTranslucent", "ShaderNodeBsdfTransparent",
            "ShaderNodeBsdfSheen", "ShaderNodeBsdfToon", "ShaderNodeBsdfMetallic", "ShaderNodeEmission")
+# After which no ray goes on: two others added may give more than they get, from bounce to bounce.
+ENDING = {"ShaderNodeBsdfDiffuse", "ShaderNodeBsdfTranslucent", "ShaderNodeBsdfSheen", "ShaderNodeEmission"}
 HAIR_SHADERS = ("ShaderNodeBsdfHair", "ShaderNodeBsdfHairPrincipled", "ShaderNodeBsdfDiffuse",
                 "ShaderNodeBsdfPrincipled", "ShaderNodeBsdfGlossy", "ShaderNodeBsdfTranslucent")
 # Left as they are: what Volley does without, or what makes noise of all.
@@ -119,7 +121,8 @@ def textured(scene, tree, socket):
         mapping.inputs["Scale"].default_value = [rng.uniform(0.5, 2) for _ in range(3)]
         tree.links.new(coordinates.outputs[rng.choice(COORDINATES)], mapping.inputs["Vector"])
         tree.links.new(mapping.outputs[0], texture.inputs["Vector"])
-    outputs = [output for output in texture.outputs if output.enabled]
+    # Positions are negative: Cycles lets negative light through what is transparent.
+    outputs = [output for output in texture.outputs if output.enabled and output.name != "Position"]
     tree.links.new(rng.choice(outputs), socket)
 
 
@@ -161,8 +164,11 @@ def material(scene, kinds, rng):
     tree.nodes.clear()
     shader = shader_node(scene, tree, kinds, rng)
     if scene.has("mixes", 0.4):
-        mix = tree.nodes.new(scene.rng("mixes").choice(("ShaderNodeMixShader", "ShaderNodeAddShader")))
+        kind = scene.rng("mixes").choice(("ShaderNodeMixShader", "ShaderNodeAddShader"))
         other = shader_node(scene, tree, kinds, scene.rng("mixes"))
+        if not ENDING.intersection((shader.bl_idname, other.bl_idname)):
+            kind = "ShaderNodeMixShader"
+        mix = tree.nodes.new(kind)
         for node, socket in zip((shader, other), list(mix.inputs)[-2:]):
             tree.links.new(node.outputs[0], socket)
         if "Fac" in mix.inputs:
@@ -455,13 +461,11 @@ def add_camera(scene):
         kind = rng.choice(('PERSP', 'PERSP', 'ORTHO'))
         data.type, data.ortho_scale = kind, 4.5
         data.shift_x, data.shift_y = rng.uniform(-0.2, 0.2), rng.uniform(-0.1, 0.1)
-        if rng.random() < 0.5:
+        # Cycles 3.4 measures the focus of orthographic cameras from the start of the clip range.
+        if rng.random() < 0.5 and (kind != 'ORTHO' or bpy.app.version >= (4, 0)):
             data.dof.use_dof, data.dof.focus_distance, data.dof.aperture_fstop = True, 5.5, 0.2
             data.dof.aperture_blades, data.dof.aperture_ratio = rng.choice((0, 5)), rng.choice((1.0, 2.0))
-        clip_start = rng.choice((0.1, 5.5))
-        # Cycles 3.4 measures the focus of orthographic cameras from there.
-        if bpy.app.version >= (4, 0) or kind != 'ORTHO' or not data.dof.use_dof:
-            data.clip_start = clip_start
+        data.clip_start = rng.choice((0.1, 5.5))
 
 
 def set_film(rng):
