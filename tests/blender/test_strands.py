@@ -250,12 +250,14 @@ def inside_attributes():
     made = _curves(grey)
     if made is not None:
         data = made.data
+        _attribute(data, "uv_of_keys", 'FLOAT2', 'POINT', random.random((60, 2)))
+        pictures["no default UV"] = _shown(grey, "ShaderNodeUVMap", "UV")
         _attribute(data, "surface_uv_coordinate", 'FLOAT2', 'CURVE', random.random((12, 2)))
         _attribute(data, "other_uv", 'FLOAT2', 'CURVE', random.random((12, 2)))
         _attribute(data, "tint", 'FLOAT_COLOR', 'POINT', random.random((60, 4)))
         _attribute(data, "weight", 'FLOAT', 'CURVE', random.random((12, 1)))
         pictures["default UV"] = _shown(grey, "ShaderNodeUVMap", "UV")
-        for name in ("surface_uv_coordinate", "other_uv"):
+        for name in ("uv_of_keys", "surface_uv_coordinate", "other_uv"):
             pictures[name] = _shown(grey, "ShaderNodeUVMap", "UV", uv_map=name)
         pictures["texture coordinate"] = _shown(grey, "ShaderNodeTexCoord", "UV")
         pictures["tint"] = _shown(grey, "ShaderNodeAttribute", "Color", attribute_name="tint")
@@ -267,6 +269,32 @@ def inside_attributes():
     count = len(made.data.vertices)
     _attribute(made.data, "tint", 'FLOAT_COLOR', 'POINT', random.random((count, 4)))
     pictures["points' tint"] = _shown(grey, "ShaderNodeAttribute", "Color", attribute_name="tint")
+    pictures["points' UV"] = _shown(grey, "ShaderNodeTexCoord", "UV")
+    pictures["points' default UV"] = _shown(grey, "ShaderNodeUVMap", "UV")
+    pictures["points' map"] = _shown(grey, "ShaderNodeUVMap", "UV", uv_map=made.data.uv_layers[0].name)
+    return pictures
+
+
+def inside_places():
+    """Generated coordinates of curves and points, which have none of their own, and tangents around them."""
+    import bpy
+    import scenes
+    scenes.empty(size=(64, 48))
+    scenes.camera(location=(0.0, -7.0, 0.0))
+    scenes.wall("Back", 20.0, 4.0, material=scenes.emitter((0.3, 0.3, 0.4), "Grey"))
+    grey = scenes.material("White", "ShaderNodeBsdfDiffuse", Color=(0.8, 0.8, 0.8))
+    pictures = {}
+    for name, make in (("curves", _curves), ("points", _cloud)):
+        made = make(grey)
+        if made is None:
+            continue
+        made.location, made.rotation_euler = (0.3, 0.5, 0.2), (0.2, 0.4, 0.1)
+        for output in ("Generated", "Object"):
+            pictures[f"{name}, {output}"] = _shown(grey, "ShaderNodeTexCoord", output)
+        for axis in "XYZ":
+            pictures[f"{name}, around {axis}"] = _shown(grey, "ShaderNodeTangent", "Tangent",
+                                                        direction_type='RADIAL', axis=axis)
+        bpy.data.objects.remove(made)
     return pictures
 
 
@@ -538,6 +566,10 @@ def test_hair(blender):
 
 def test_attributes(blender):
     _agree(blender.run(inside_attributes))
+
+
+def test_places(blender):
+    _agree(blender.run(inside_places))
 
 
 def test_moving_hair(blender):

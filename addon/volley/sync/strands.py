@@ -124,11 +124,7 @@ class StrandObject:
     def curves(self, instance, strands):
         """Which keys of what was read are kept (None: all), and those as curves.CurvesData."""
         values = _object_values(instance.object.data, self._wanted.uv_names, self._wanted.color_names)
-        generated = None
-        if self._wanted.needs_generated:
-            lower, upper = strands.positions.min(axis=0), strands.positions.max(axis=0)
-            generated = _in_box(strands.first_points(), 0.5 * (lower + upper), 0.5 * (upper - lower))
-        return None, _curves(strands, self._wanted, values, generated)
+        return None, _curves(strands, self._wanted, values, None)
 
 
 def _has_force(blender_object):
@@ -189,12 +185,13 @@ def _root_values(mesh, modifier, strands, uv_names, color_names):
 
 
 def _object_values(data, uv_names, color_names):
-    """(name, (strands or keys, 2 or 4), whether of strands) of each attribute that is asked for. The first
-    of two numbers is the default UV map, as Cycles has it."""
+    """(name, (strands or keys, 2 or 4), whether of strands) of each attribute that is asked for. The first of two
+    numbers of each strand is the default UV map, as Cycles has it."""
     found = []
     maps = [each for each in data.attributes if each.data_type == 'FLOAT2'] if uv_names else []
-    for number, attribute in enumerate(maps):
-        if number == 0 or attribute.name in uv_names:
+    default = next((each.name for each in maps if each.domain == 'CURVE'), None)
+    for attribute in maps:
+        if attribute.name == default or attribute.name in uv_names:
             values = np.empty((len(attribute.data), 2), np.float32)
             attribute.data.foreach_get("vector", values.reshape(-1))
             found.append((attribute.name, values, attribute.domain == 'CURVE'))

@@ -70,7 +70,8 @@ class Walk:
         for each in self._instances():
             if each.is_instance:
                 self.tied.update(instance.names_of(each))
-            is_light = instance.is_light(each)
+            is_mesh = instance.has_mesh(each)
+            is_light = not is_mesh and instance.is_light(each)
             if culling and not is_light and culling.hides(each):
                 continue
             if shows_strands and each.show_particles:
@@ -79,7 +80,7 @@ class Walk:
                 continue
             if is_light:
                 self._add_light(each)
-            elif shows_solids and instance.has_mesh(each):
+            elif shows_solids and is_mesh:
                 self._add_mesh_instance(each)
             elif shows_strands and strands.has_strands(each):
                 self._add_strands(each)

@@ -54,9 +54,11 @@ typedef struct trc_curves_desc {
                                    fewer than two are left out; NULL for balls */
     uint64_t strand_count;      /* number of lengths */
     const float *generated;     /* Generated coordinates, 3 floats for each strand (or ball), the
-                                   same at all keys; NULL: the bounding box is the unit cube */
+                                   same at all keys; NULL: where a ray meets them, in the space of
+                                   the object, as in Cycles */
     uint64_t generated_count;   /* number of floats, checked */
-    const trc_curve_attribute *attributes; /* the first of width 2 is the default UV map */
+    const trc_curve_attribute *attributes; /* the default UV map is the first of width 2 that is one
+                                              of each strand; balls have none */
     uint32_t attribute_count;              /* 0..TRC_MAX_ATTRIBUTES */
     float tolerance; /* how far pieces may be from the spline at the first key, in radii: then
                         there are fewer where it bends little; 0: piece_count everywhere */

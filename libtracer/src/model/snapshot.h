@@ -59,7 +59,7 @@ struct trc_mesh {
     struct trc_attribute attributes[TRC_MAX_ATTRIBUTES];
     float *generated;   /* 3 * vertex_count or NULL */
     const float *rest;  /* positions before displacement, of as many keys; NULL: not displaced */
-    int32_t default_uv; /* index of the first attribute of width 2, or -1 */
+    int32_t default_uv; /* index of the attribute that is the default UV map, or -1 */
     float bounds_lower[3],
         bounds_upper[3]; /* object space, all keys: Generated coordinates use key 0 */
 };

@@ -265,6 +265,8 @@ static trc_status add_attribute(struct trc_mesh_topology *t, const trc_curve_att
     a->values = trc_alloc(vertices * desc->width, sizeof *a->values);
     if (!a->values)
         return no_memory();
+    if (desc->width == 2 && desc->per_strand && t->lengths && t->default_uv < 0)
+        t->default_uv = (int32_t)t->attribute_count;
     t->attribute_count++;
     t->bytes += vertices * desc->width * sizeof *a->values;
     (desc->per_strand ? spread_strands : spread_points)(t, desc->values, desc->width, a->values);
@@ -319,6 +321,7 @@ static trc_status fill_topology(struct trc_mesh_topology *t, const trc_curves_de
         spread_strands(t, desc->generated, GENERATED_FLOATS, t->generated);
         trc_clear_bad_values(t->generated, count);
     }
+    t->default_uv = -1;
     for (uint32_t i = 0; i < desc->attribute_count; i++)
         TRC_TRY(add_attribute(t, &desc->attributes[i], counts->vertices, names));
     return TRC_OK;

@@ -67,6 +67,8 @@ static trc_status copy_attribute(struct trc_mesh_topology *topology,
                            &attribute->values)) {
         return no_memory();
     }
+    if (desc->width == 2 && topology->default_uv < 0)
+        topology->default_uv = (int32_t)topology->attribute_count;
     topology->attribute_count++;
     trc_clear_bad_values(attribute->values, desc->value_count);
     return TRC_OK;
@@ -93,6 +95,7 @@ static trc_status fill_topology(struct trc_mesh_topology *topology, const trc_me
     }
     if (topology->generated)
         trc_clear_bad_values(topology->generated, desc->generated_count);
+    topology->default_uv = -1;
     for (uint32_t i = 0; i < desc->attribute_count; i++) {
         TRC_TRY(copy_attribute(topology, &desc->attributes[i], names));
     }
@@ -201,11 +204,7 @@ static void share_topology(struct trc_geometry *geometry, struct trc_mesh_topolo
     mesh->shape = topology->shape;
     mesh->attribute_count = topology->attribute_count;
     memcpy(mesh->attributes, topology->attributes, sizeof mesh->attributes);
-    mesh->default_uv = -1;
-    for (uint32_t i = 0; i < mesh->attribute_count && mesh->default_uv < 0; i++) {
-        if (mesh->attributes[i].width == 2)
-            mesh->default_uv = (int32_t)i;
-    }
+    mesh->default_uv = topology->default_uv;
 }
 
 trc_status trc_geometry_alloc(struct trc_mesh_topology *topology, uint32_t vertex_count,

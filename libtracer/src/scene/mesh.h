@@ -60,6 +60,7 @@ struct trc_mesh_topology {
     float *generated;
     struct trc_attribute attributes[TRC_MAX_ATTRIBUTES];
     uint32_t attribute_count;
+    int32_t default_uv; /* index of an attribute, or -1 */
     /* Corners (3 * triangle + corner) of each vertex, made when normals are first needed:
      * corners[corner_begin[v]] to corners[corner_begin[v + 1]]. */
     uint32_t *corner_begin, *corners;

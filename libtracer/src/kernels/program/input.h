@@ -298,10 +298,23 @@ static void op_color_attribute(const struct trc_surface *s, uint32_t name, vfloa
 
 /* ---- texture coordinates ---- */
 
+static vvec3 position_of_group(const struct trc_surface *s, const struct lane_group *g) {
+    struct trc_wide_affine a;
+    load_world_to_object(s, g, &a);
+    return trc_transform_point(&a, s->p);
+}
+
+/* Strands and points without coordinates of their own. */
+static bool has_no_generated(const struct trc_mesh *mesh) {
+    return mesh->strands && !mesh->generated;
+}
+
 /* Without coordinates of the mesh's own, Blender's default texture space: the bounding box becomes
  * the unit cube; a flat side becomes 0.5. */
 static vvec3 generated_of_group(const struct trc_surface *s, const struct lane_group *g) {
     const struct trc_mesh *mesh = g->mesh;
+    if (has_no_generated(mesh))
+        return position_of_group(s, g);
     vint index[3];
     struct trc_corners c;
     trc_load_indices(mesh, s->triangle, g->lanes, index);
@@ -319,12 +332,6 @@ static vvec3 generated_of_group(const struct trc_surface *s, const struct lane_g
         out[axis] = co[axis] * vf_set(scale) - vf_set(center * scale - 0.5f);
     }
     return v3_read(out);
-}
-
-static vvec3 position_of_group(const struct trc_surface *s, const struct lane_group *g) {
-    struct trc_wide_affine a;
-    load_world_to_object(s, g, &a);
-    return trc_transform_point(&a, s->p);
 }
 
 /* A lamp's are those of its object space. */

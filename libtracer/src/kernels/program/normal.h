@@ -158,10 +158,12 @@ static vvec3 op_normal_map(const struct trc_surface *s, uint32_t mode, uint32_t 
     return out;
 }
 
-/* Around an axis of the Generated coordinates, object space. */
+/* Around an axis of the Generated coordinates, object space; of what has none Cycles takes the
+ * place in the world. */
 static vvec3 tangent_around(const struct trc_surface *s, const struct lane_group *g,
                             uint32_t mode) {
-    const vvec3 half = v3_splat(vf_set(0.5f)), p = v3_sub(generated_of_group(s, g), half);
+    const vvec3 at = has_no_generated(g->mesh) ? s->p : generated_of_group(s, g);
+    const vvec3 half = v3_splat(vf_set(0.5f)), p = v3_sub(at, half);
     switch (mode) {
     case TRC_TANGENT_X:
         return v3(vf_zero(), -p.z, p.y);
