@@ -14,6 +14,7 @@ SINCE = (4, 0), "Huang's model came with 4.0"
 # Beyond the noise that the seeds show, of pictures' means and of tiles' (see compare.unexplained): nothing is seen.
 OFF = 1e-4, 1e-3
 TUBE_OFF = 1e-3, 2e-3  # of normals of 3D curves, whose pieces are straight
+TANGENT_OFF = 1e-3, 5e-3  # of tangents, which turn quickly next to the axis
 
 
 def _both(samples=SAMPLES):
@@ -250,7 +251,8 @@ def inside_attributes():
     made = _curves(grey)
     if made is not None:
         data = made.data
-        _attribute(data, "uv_of_keys", 'FLOAT2', 'POINT', random.random((60, 2)))
+        of_keys = np.repeat(np.random.default_rng(6).random((12, 2)), 5, axis=0)
+        _attribute(data, "uv_of_keys", 'FLOAT2', 'POINT', of_keys)
         pictures["no default UV"] = _shown(grey, "ShaderNodeUVMap", "UV")
         _attribute(data, "surface_uv_coordinate", 'FLOAT2', 'CURVE', random.random((12, 2)))
         _attribute(data, "other_uv", 'FLOAT2', 'CURVE', random.random((12, 2)))
@@ -569,7 +571,7 @@ def test_attributes(blender):
 
 
 def test_places(blender):
-    _agree(blender.run(inside_places))
+    _agree(blender.run(inside_places), TANGENT_OFF)
 
 
 def test_moving_hair(blender):
