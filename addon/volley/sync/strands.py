@@ -124,7 +124,7 @@ class StrandObject:
     def curves(self, instance, strands):
         """Which keys of what was read are kept (None: all), and those as curves.CurvesData."""
         values = _object_values(instance.object.data, self._wanted.uv_names, self._wanted.color_names)
-        return None, _curves(strands, self._wanted, values, None)
+        return None, _curves(strands, self._wanted, values)
 
 
 def _has_force(blender_object):
@@ -156,7 +156,7 @@ def _in_box(points, middle, half):
     return 0.5 + np.divide(points - middle, 2.0 * half, out=np.zeros(points.shape), where=half > 0.0)
 
 
-def _curves(strands, wanted, values, generated):
+def _curves(strands, wanted, values, generated=None):
     """curves.CurvesData of strands or points, with those values."""
     own = []
     if strands.lengths is not None:
