@@ -222,8 +222,9 @@ def _attribute(data, name, kind, domain, values):
     made.data.foreach_set(field, np.asarray(values, np.float32).reshape(-1))
 
 
-def _shown(material, kind, output, **settings):
-    """Pictures of what a node of that kind gives, -1 to 1, as emission."""
+def _shown(material, kind, output, beside=None, **settings):
+    """Pictures of what a node of that kind gives, -1 to 1, as emission; of half of it and what a socket gives beside
+    it."""
     tree = material.node_tree
     emission = next((n for n in tree.nodes if n.type == 'EMISSION'), None) or \
         tree.nodes.new("ShaderNodeEmission")
@@ -233,9 +234,18 @@ def _shown(material, kind, output, **settings):
     positive.operation = 'MULTIPLY_ADD'
     positive.inputs[1].default_value = positive.inputs[2].default_value = (0.5, 0.5, 0.5)
     tree.links.new(node.outputs[output], positive.inputs[0])
+    if beside is not None:
+        tree.links.new(beside, positive.inputs[2])
     tree.links.new(positive.outputs[0], emission.inputs["Color"])
     tree.links.new(emission.outputs[0], tree.nodes["Material Output"].inputs["Surface"])
     return _both()
+
+
+def _map(material, name):
+    """The socket of a UV map by its name."""
+    node = material.node_tree.nodes.new("ShaderNodeUVMap")
+    node.uv_map = name
+    return node.outputs["UV"]
 
 
 def inside_attributes():
@@ -253,7 +263,7 @@ def inside_attributes():
         data = made.data
         of_keys = np.repeat(np.random.default_rng(6).random((12, 2)), 5, axis=0)
         _attribute(data, "uv_of_keys", 'FLOAT2', 'POINT', of_keys)
-        pictures["no default UV"] = _shown(grey, "ShaderNodeUVMap", "UV")
+        pictures["no default UV"] = _shown(grey, "ShaderNodeUVMap", "UV", beside=_map(grey, "uv_of_keys"))
         _attribute(data, "surface_uv_coordinate", 'FLOAT2', 'CURVE', random.random((12, 2)))
         _attribute(data, "other_uv", 'FLOAT2', 'CURVE', random.random((12, 2)))
         _attribute(data, "tint", 'FLOAT_COLOR', 'POINT', random.random((60, 4)))
@@ -272,8 +282,8 @@ def inside_attributes():
     _attribute(made.data, "tint", 'FLOAT_COLOR', 'POINT', random.random((count, 4)))
     pictures["points' tint"] = _shown(grey, "ShaderNodeAttribute", "Color", attribute_name="tint")
     pictures["points' UV"] = _shown(grey, "ShaderNodeTexCoord", "UV")
-    pictures["points' default UV"] = _shown(grey, "ShaderNodeUVMap", "UV")
-    pictures["points' map"] = _shown(grey, "ShaderNodeUVMap", "UV", uv_map=made.data.uv_layers[0].name)
+    of_points = _map(grey, made.data.uv_layers[0].name)
+    pictures["points' map, no default UV"] = _shown(grey, "ShaderNodeUVMap", "UV", beside=of_points)
     return pictures
 
 
