@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Objects' shadow terminator offsets and distances of Fast GI beside Cycles: on coarse balls and a ring between
 them, which is hollow along its hole, matt, of rough and of smooth gloss, letting light through, of different
-offsets. Means within 1 %, tiles within 2 %, beyond what noise explains. The table goes to results/shading_offsets.txt of the build."""
+offsets. Means within 1 %, tiles within 2 %, beyond what noise explains. The table goes to
+results/shading_offsets.txt of the build."""
 
 import blender as blender_support
 import compare

@@ -103,8 +103,8 @@ class Strands:
         return directions
 
     def first_points(self):
-        """(strands, 3) the roots; of points themselves."""
-        return self.positions if self.lengths is None else self.positions[self._starts()]
+        """(strands, 3) the roots."""
+        return self.positions[self._starts()]
 
 
 @dataclass
