@@ -64,6 +64,8 @@ def inside_hair():
         tree.links.new(info.outputs[name], emission.inputs["Color"])
         pictures[name] = _both()
     pictures["Tangent Normal"] = _shown(bpy.data.materials["Hair"], "ShaderNodeHairInfo", "Tangent Normal")
+    pictures["Tangent"] = _shown(bpy.data.materials["Hair"], "ShaderNodeNewGeometry", "Tangent")
+    pictures["brushed"] = _brushed(tree)
     _paint(ball.data)
     for kind, layer, name, output in (("ShaderNodeUVMap", "uv_map", "Second", "UV"),
                                       ("ShaderNodeVertexColor", "layer_name", "Second Color", "Color")):
@@ -77,6 +79,18 @@ def inside_hair():
     _name_more_layers_than_meshes_have(ball.data)
     tree.links.new(info.outputs["Intercept"], emission.inputs["Color"])
     pictures["Intercept beside nine layers"] = _both()
+    return pictures
+
+
+def _brushed(tree):
+    """Pictures of anisotropic gloss of the default tangent, after which the surface is what it was."""
+    gloss = tree.nodes.new("ShaderNodeBsdfAnisotropic")
+    gloss.inputs["Roughness"].default_value, gloss.inputs["Anisotropy"].default_value = 0.5, 0.8
+    surface = tree.nodes["Material Output"].inputs["Surface"]
+    before = surface.links[0].from_socket
+    tree.links.new(gloss.outputs[0], surface)
+    pictures = _both()
+    tree.links.new(before, surface)
     return pictures
 
 
@@ -306,6 +320,8 @@ def inside_places():
         for axis in "XYZ":
             pictures[f"{name}, around {axis}"] = _shown(grey, "ShaderNodeTangent", "Tangent",
                                                         direction_type='RADIAL', axis=axis)
+        if name == "curves":
+            pictures["along curves"] = _shown(grey, "ShaderNodeNewGeometry", "Tangent")
         bpy.data.objects.remove(made)
     return pictures
 

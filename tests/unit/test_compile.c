@@ -453,7 +453,7 @@ static void test_emission_of_principled(void **state) {
     trc_material_release(m);
 }
 
-/* Anisotropy without a tangent gets the one around the object's Z axis; else nothing runs. */
+/* Anisotropy without a tangent gets the default one; else nothing runs. */
 static void test_default_tangent(void **state) {
     (void)state;
     for (int anisotropic = 0; anisotropic < 2; anisotropic++) {

@@ -119,6 +119,7 @@ static bool reads_normal(uint32_t op) {
     case TRC_OP_OBJECT_NORMAL:
     case TRC_OP_REFLECTION:
     case TRC_OP_TANGENT:
+    case TRC_OP_DEFAULT_TANGENT:
     case TRC_OP_TANGENT_VECTOR:
     case TRC_OP_NORMAL_MAP:
     case TRC_OP_IMAGE_BOX:

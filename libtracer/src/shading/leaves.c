@@ -60,7 +60,7 @@ static bool is_nothing(uint32_t type, const struct trc_operand *in) {
     }
 }
 
-/* The default tangent of an anisotropic leaf is the one around the object's Z axis. */
+/* Anisotropic leaves without a tangent have the default one. */
 static trc_status fill_tangent(struct trc_build *b, uint32_t type, struct trc_operand *in) {
     uint32_t anisotropy = TRC_AT(GLOSSY, anisotropy), tangent = TRC_AT(GLOSSY, tangent);
     if (type == TRC_NODE_PRINCIPLED) {
@@ -74,7 +74,7 @@ static trc_status fill_tangent(struct trc_build *b, uint32_t type, struct trc_op
     }
     if (in[tangent].reg != TRC_REG_DEFAULT || trc_is_value(in[anisotropy], 0.0f))
         return TRC_OK;
-    return trc_build_op(b, TRC_OP_TANGENT, TRC_TANGENT_Z, TRC_NO_RESOURCE, NULL, in + tangent);
+    return trc_build_op(b, TRC_OP_DEFAULT_TANGENT, 0, TRC_NO_RESOURCE, NULL, in + tangent);
 }
 
 static trc_status add_leaf(struct trc_build *b, const trc_node *node, struct trc_operand weight) {

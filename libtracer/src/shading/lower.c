@@ -178,7 +178,7 @@ static trc_status lower_texture_coordinate(const struct lowering *l) {
 }
 
 static trc_status lower_geometry(const struct lowering *l) {
-    static const uint16_t codes[] = {TRC_OP_POSITION,    TRC_OP_NORMAL,   TRC_OP_TANGENT,
+    static const uint16_t codes[] = {TRC_OP_POSITION,    TRC_OP_NORMAL,   TRC_OP_DEFAULT_TANGENT,
                                      TRC_OP_TRUE_NORMAL, TRC_OP_INCOMING, TRC_OP_PARAMETRIC,
                                      TRC_OP_BACKFACING};
     TRC_TRY(lower_outputs(l, codes, sizeof codes / sizeof *codes));

@@ -3,6 +3,7 @@
 #define TRACER_KERNELS_PROGRAM_NORMAL_H
 
 #include "kernels/program/input.h"
+#include "kernels/trace/curve_surface.h"
 
 /* Normals at the corners in object space (unit) and the lanes that have them: those of smooth
  * triangles. */
@@ -198,6 +199,20 @@ static vvec3 op_tangent(const struct trc_surface *s, uint32_t mode, uint32_t nam
         out = v3_select(g.lanes, t, out);
     }
     return out;
+}
+
+/* Along strands, unit; else around Z. */
+static vvec3 op_default_tangent(const struct trc_surface *s) {
+    const vvec3 around = op_tangent(s, TRC_TANGENT_Z, TRC_NO_RESOURCE);
+    if (!(s->snapshot->features & TRC_FEATURE_CURVES))
+        return around;
+    vmask strands = vm_none();
+    struct lane_group g = groups_begin(s);
+    while (groups_next(s, &g)) {
+        if (g.instance && g.mesh->strands && !trc_shape_is_balls(g.mesh->shape))
+            strands = vm_or(strands, g.lanes);
+    }
+    return vm_any(strands) ? v3_select(strands, trc_curve_along(s, strands), around) : around;
 }
 
 /* From tangent space to the world, about the shading normal; without that attribute the tangent is

@@ -150,6 +150,9 @@ static void run_at_surface(const struct trc_surface *s, const struct trc_instruc
     case TRC_OP_TANGENT:
         v3_write(out, op_tangent(s, i->mode, i->resource));
         break;
+    case TRC_OP_DEFAULT_TANGENT:
+        v3_write(out, op_default_tangent(s));
+        break;
     case TRC_OP_PARAMETRIC:
         out[TRC_OP_OUT_AT(PARAMETRIC, u)] = vf_one() - s->u - s->v;
         out[TRC_OP_OUT_AT(PARAMETRIC, v)] = s->u;
