@@ -128,6 +128,7 @@ static void weights_match_values(void **state) {
         principled_all(),
         clearcoat(0.6f),
         toon(1, 0.4f, 0.1f),
+        toon(1, 0.8f, 0.7f), /* the cone ends before its light does */
     };
     int failed = 0;
     for (size_t i = 0; i < sizeof models / sizeof models[0]; i++)

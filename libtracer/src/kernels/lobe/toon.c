@@ -1,16 +1,16 @@
 /* Toon: light from within a cone, about the normal or about the mirror direction. */
 #include "kernels/lobe/matt.h"
 
-/* Light from within an angle of the lobe's axis, fading beyond; cosine: to the axis. *pdf: of
- * directions spread evenly over all of that cone. */
+/* Light from within an angle of the lobe's axis, fading beyond, none outside of the whole cone, as
+ * in Cycles 4; cosine: to the axis. *pdf: of directions spread evenly over all of that cone. */
 TRC_INLINE vfloat toon(const struct trc_lobe *lobe, vfloat cosine, vfloat *pdf) {
-    const vfloat fade = lobe->f0.y, over = vf_acos(vf_max(cosine, vf_zero())) - lobe->f0.x;
+    const vfloat fade = lobe->f0.y, over = vf_acos(cosine) - lobe->f0.x;
     const vfloat soft = vf_saturate(vf_one() - vf_divide(over, fade));
     const vfloat light =
         vf_select(vf_lt(over, vf_zero()), vf_one(), vf_where(vf_gt(fade, vf_zero()), soft));
     const vfloat density = vf_divide(vf_set(0.5f * TRC_INV_PI), vf_one() - lobe->f0.z);
     *pdf = vf_where(vf_ge(cosine, lobe->f0.z), density);
-    return density * light;
+    return *pdf * light;
 }
 
 static struct lobe_value diffuse_toon_value(const struct trc_lobe *lobe,
