@@ -30,6 +30,7 @@ _MULTIPLE = "light that scatters more than once comes from a table here, from ra
 _SHEEN = "Cycles' fit, at the outline"
 _COAT = "Cycles 3.4 samples its coat by GGX but weighs the samples as GTR1; by lamps alone both agree"
 _TILT = "Cycles 3.4 tilts samples and what weighs them by angles that are not each other's"
+_FADE = "Cycles 3.4 samples what fades as if it did not, and has gloss of lamps beyond its cone"
 KNOWN = {
     "glossy roughness 0.8 distribution ASHIKHMIN_SHIRLEY":
         (0.02, 0.025, "Cycles keeps rays that go below the faces at the outline; inside it both agree"),
@@ -50,6 +51,8 @@ KNOWN_BEFORE_4 = {
        "parametrization MELANIN": (0.01, STRANDS_TILE, _TILT)
        for what in ("", "strands of ") for redness in (0.2, 1.0) for color in (0.0, 0.9)
        for roughness in (0.0, 0.8)},
+    **{f"toon size {size} smooth {smooth} component {component}": (0.12, 0.24, _FADE)
+       for size in (0.3, 0.8) for smooth in (0.2, 0.8) for component in ('DIFFUSE', 'GLOSSY')},
 }
 
 
@@ -144,6 +147,8 @@ _add("conductor", "ShaderNodeBsdfMetallic", {"IOR": (0.18, 0.42, 1.37), "Extinct
      distribution=('GGX', 'MULTI_GGX', 'BECKMANN'))
 _add("conductor", "ShaderNodeBsdfMetallic", {}, {"fresnel_type": 'PHYSICAL_CONDUCTOR'},
      IOR=((2.76, 2.51, 2.23), (1.1, 1.3, 0.9)), Extinction=((3.87, 3.4, 3.01), (0.3, 0.0, 0.6)))
+_add("toon", "ShaderNodeBsdfToon", {"Color": _GOLD}, Size=(0.3, 0.8), Smooth=(0.2, 0.8),
+     component=('DIFFUSE', 'GLOSSY'))
 
 REFLECTING_HAIR = [name for name, (node, _inputs, settings) in CASES.items()
                    if node == _HAIR and settings["component"] == 'Reflection']
@@ -204,9 +209,9 @@ def _cells(shown):
     return cells
 
 
-def inside_balls():
-    """The cells of all cases that this Blender has."""
-    waiting, cells = list(CASES.items()), {}
+def inside_balls(names):
+    """The cells of the cases that this Blender has."""
+    waiting, cells = [(name, CASES[name]) for name in names], {}
     while waiting:
         _stage()
         shown = []
@@ -268,9 +273,11 @@ def _known(name):
 # Comparison ----------------------------------------------------------------------------------------
 
 @pytest.fixture(scope="module")
-def errors(blender_of_module):
-    """The errors of all cases, from one Blender, and their table."""
-    pictures = blender_of_module.run(inside_balls, timeout=900)
+def errors(blender_of_module, request):
+    """The errors of the cases that were asked for, from one Blender, and their table."""
+    names = [item.callspec.params["name"] for item in request.session.items
+             if item.getparent(pytest.Module) is request.node and hasattr(item, "callspec")]
+    pictures = blender_of_module.run(inside_balls, names, timeout=900)
     found = {name: compare.agreed_errors(*pair, TILE_PX) for name, pair in pictures.items()}
     lines = [f"{'shader':75} {'mean error':>10} {'biased':>8} {'biased tile':>11}"]
     lines += [f"{name:75} {mean:10.3%} {biased:8.3%} {tile:11.3%}  {_known(name)[-1]}".rstrip()

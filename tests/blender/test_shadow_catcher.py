@@ -5,7 +5,7 @@ import compare
 import numpy as np
 import pytest
 
-SAMPLES = 1024
+SAMPLES = 512
 OFF = 1e-3  # beyond the noise that the seeds show
 
 

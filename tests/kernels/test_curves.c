@@ -314,7 +314,7 @@ static void random_rays(struct rng *rng, struct ray_set *rays, uint32_t count) {
 static void check_against_oracle(struct strands *s, struct rng *rng) {
     struct ray_set rays;
     struct hit_set hits, others;
-    const uint32_t count = trc_isa() == TRC_ISA_SCALAR ? RAYS / 4 : RAYS;
+    const uint32_t count = query_test_is_narrow() ? RAYS / 4 : RAYS;
     ray_set_init(&rays);
     random_rays(rng, &rays, count);
     hit_set_init(&hits, count);

@@ -36,13 +36,18 @@ QUERY_TEST_INLINE bool query_test_isa(void) {
     return !wanted || !*wanted || strcmp(wanted, trc_isa_name(trc_isa())) == 0;
 }
 
-/* Rays of a case: from the environment, else usual (a quarter of it for scalar kernels). */
+/* Kernels of few lanes, which take longer and are not the widest of a processor in use. */
+QUERY_TEST_INLINE bool query_test_is_narrow(void) {
+    return trc_isa() == TRC_ISA_SCALAR || trc_isa() == TRC_ISA_SSE42;
+}
+
+/* Rays of a case: from the environment, else usual (a quarter of it for narrow kernels). */
 QUERY_TEST_INLINE uint32_t query_test_rays(uint32_t usual) {
     const char *text = getenv(QUERY_TEST_RAYS);
     const long count = text ? strtol(text, NULL, 10) : 0;
     if (count > 0)
         return (uint32_t)count;
-    return trc_isa() == TRC_ISA_SCALAR ? (usual + 3) / 4 : usual;
+    return query_test_is_narrow() ? (usual + 3) / 4 : usual;
 }
 
 #define assert_ok(call) query_test_ok((call), __FILE__, __LINE__)

@@ -112,7 +112,7 @@ static void furnace_is_white(void **state) {
     double of_glossy = 0.0, of_metal = 0.0, of_glass = 0.0, half_width = 0.0;
     for (int k = 0; k < 6; k++)
         for (int j = 0; j < 6; j++) {
-            if ((k + j) % (TRC_WIDTH == 1 ? 5 : TRC_WIDTH < 8 ? 2 : 1))
+            if ((k + j) % (TRC_WIDTH == 1 ? 5 : TRC_WIDTH < 8 ? 3 : 1))
                 continue; /* the same formulas, for longer */
             const float r = roughnesses[j];
             const double c = cosines[k];
