@@ -108,7 +108,9 @@ def draw_settings(node, rng):
 
 
 def textured(scene, tree, socket):
-    """A texture, mapped somehow, into a socket."""
+    """A texture, mapped somehow, into a socket; heights of bumps without Window coordinates, along which those of
+    Cycles 5 are turned."""
+    import bpy
     rng = scene.rng("textures")
     texture = new_node(tree, TEXTURES, rng)
     draw_settings(texture, rng)
@@ -119,7 +121,10 @@ def textured(scene, tree, socket):
         mapping.inputs["Location"].default_value = [rng.uniform(-1, 1) for _ in range(3)]
         mapping.inputs["Rotation"].default_value = [rng.uniform(-3, 3) for _ in range(3)]
         mapping.inputs["Scale"].default_value = [rng.uniform(0.5, 2) for _ in range(3)]
-        tree.links.new(coordinates.outputs[rng.choice(COORDINATES)], mapping.inputs["Vector"])
+        place = rng.choice(COORDINATES)
+        if place == "Window" and socket.name == "Height" and bpy.app.version >= (5, 0, 0):
+            place = "Generated"
+        tree.links.new(coordinates.outputs[place], mapping.inputs["Vector"])
         tree.links.new(mapping.outputs[0], texture.inputs["Vector"])
     # Positions are negative: Cycles lets negative light through what is transparent.
     outputs = [output for output in texture.outputs if output.enabled and output.name != "Position"]
