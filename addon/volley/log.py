@@ -16,6 +16,14 @@ class Warnings:
         """Note a message; repeats are dropped."""
         self._messages.setdefault(message)
 
+    def count(self):
+        """How many there are."""
+        return len(self._messages)
+
+    def after(self, count):
+        """All messages but so many of the first."""
+        return list(self._messages)[count:]
+
     def take(self):
         """All messages since the last take."""
         messages, self._messages = list(self._messages), {}

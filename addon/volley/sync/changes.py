@@ -11,11 +11,10 @@ import bpy
 
 
 class Changes:
-    """What to look at again. ``full``: everything, but for meshes where ``keeps_meshes`` says so."""
+    """What to look at again. ``full``: everything."""
 
     def __init__(self, full=False):
         self.full = full
-        self.keeps_meshes = False  # those of objects that ``geometry`` does not name are as they were
         self.structure = False   # objects may have appeared, gone, or be hidden
         self.geometry = set()    # names of objects whose mesh may be another
         self.topology = set()    # those of them of which more than the vertices' places may differ
@@ -33,10 +32,11 @@ class Changes:
 
     @classmethod
     def since_render(cls, depsgraph):
-        """Marks for a final render that follows another of the same depsgraph, which was still all the
-        while: what Blender names since then, and all but the meshes."""
-        changes = cls(full=True)
-        changes.keeps_meshes = True
+        """Marks for a final render that follows another of the same depsgraph: what Blender names since then, and
+        what may read files and texts, of which it names none."""
+        changes = cls()
+        changes.all_materials = changes.world = True
+        changes.lights = {light.name_full for light in bpy.data.lights if light.use_nodes}
         for update in depsgraph.updates:
             changes._mark(update)
         return changes
@@ -67,7 +67,7 @@ class Changes:
 
     def geometry_of(self, name):
         """Whether an object's mesh must be read again."""
-        return name in self.geometry or (self.full and not self.keeps_meshes)
+        return self.full or name in self.geometry
 
     def material_of(self, name):
         """Whether a material must be flattened again."""

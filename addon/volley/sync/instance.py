@@ -96,11 +96,6 @@ def hair_key(instance, number):
     return key_of(instance) + ("hair", number)
 
 
-def is_shown(instance, v3d=None):
-    """Whether the instance takes part itself: instancers may be hidden."""
-    return instance.show_self and is_in_view(instance, v3d)
-
-
 # Types of objects that 3D views call otherwise.
 _VIEW_KINDS = {'SURFACE': "surf", 'GPENCIL': "grease_pencil", 'GREASEPENCIL': "grease_pencil"}
 

@@ -41,6 +41,10 @@ class Meshes:
         entry = self._entries.get(key)
         return None if entry is None else entry.diced_by
 
+    def are_diced(self):
+        """Whether any mesh is as a camera asked for."""
+        return any(entry.diced_by is not None and entry.diced_by[1] for entry in self._entries.values())
+
     def put(self, key, pointer, data, names, motion=None):
         """Bring a mesh up to date: nothing, positions alone, or all of it. One that the library
         refuses is left out."""

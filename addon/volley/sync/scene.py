@@ -34,6 +34,7 @@ class SceneSync:
 
     def __init__(self, is_final, thread_count, will_resync, image_megabytes=0, make_scene=native.Scene):
         image.start_reader()
+        self.is_final = is_final
         self.scene = make_scene(is_final, thread_count, image_megabytes)
         self.warnings = Warnings()
         self._images = Images(self.scene, self.warnings)
@@ -59,6 +60,7 @@ class SceneSync:
         self._materials.begin(source.depsgraph, source.changes, source.aovs)
         self._meshes.begin()
         self._sync_materials(source)
+        told = self.warnings.count()
         walk = Walk(self, source, shutter)
         walk.run()
         if shutter is not None:
@@ -67,17 +69,19 @@ class SceneSync:
         in_world = self._meshes.in_world() if source.v3d is None else set()
         self._instances.update(walk.items.values(), self._meshes.ids(), in_world, self._materials.moving())
         self._lights.update(walk.lights)
+        self._shown = Shown(walk, source, self.warnings.after(told)) if shutter is None else None
         self._sync_world(source)
         self._meshes.end()
         self._materials.end()
         self._images.end()
-        self._shown = Shown(walk, source) if shutter is None else None
 
     def _update_part(self, source):
         """Bring up to date what changed, without a walk over everything; False where one is needed,
         which is safe at any point before the end."""
         changes, shown = source.changes, self._shown
         if changes.full or changes.structure or shown is None or not shown.is_of(source) or source.culling:
+            return False
+        if self.is_final and self._meshes.are_diced():  # by a camera that may have moved
             return False
         if not all(self._materials.knows(name) for name in changes.materials):
             return False
@@ -97,6 +101,8 @@ class SceneSync:
             if each is not shown.IRRELEVANT and not self._change_object(each, shown, source):
                 return False
         self._images.end()
+        if self.is_final:
+            shown.warn_again(self.warnings)
         self._shown = shown
         return True
 
@@ -125,13 +131,14 @@ class SceneSync:
         return True
 
     def _change_mesh(self, each, known, shown, source):
-        """Send the mesh of one object, of a pose the places of its vertices alone; False where others
+        """Send the mesh of one object, of a viewport's pose the places of its vertices alone; False where others
         show it too or it has no faces now."""
         if shown.users[known.mesh_key] != 1:
             return False
         changes, blender_object = source.changes, each.object
         pointer = blender_object.data.as_pointer()
-        if known.owner not in changes.topology and deform.is_posable(blender_object):
+        is_pose = known.owner not in changes.topology and deform.is_posable(blender_object)
+        if is_pose and not self.is_final:  # renders cut bent faces as they would be cut anew
             is_known = deform.keeps_topology(blender_object) \
                 and blender_object.original.data.name_full not in changes.meshes
             with mesh.shown_mesh(blender_object) as shape:

@@ -16,20 +16,27 @@ class Shown:
     # These never show anything and never make instances.
     _SILENT_TYPES = {'ARMATURE', 'CAMERA', 'LATTICE', 'SPEAKER', 'LIGHT_PROBE', 'VOLUME'}
 
-    def __init__(self, walk, source):
+    def __init__(self, walk, source, warnings):
         self.items, self._lights, self._tied = walk.items, walk.lights, walk.tied
         self.links = walk.links
         self.users = Counter(item.mesh_key for item in walk.items.values())
         self._identity = self._identity_of(source)
+        self._warnings = warnings
 
     @staticmethod
     def _identity_of(source):
         depsgraph = source.depsgraph
-        return depsgraph.scene.name_full, depsgraph.view_layer.name, depsgraph.as_pointer()
+        return (depsgraph.scene.name_full, depsgraph.view_layer.name, depsgraph.as_pointer(), source.needs_uv,
+                source.aovs, source.light_groups)
 
     def is_of(self, source):
         """Whether a source shows the same scene and view layer."""
         return self._identity == self._identity_of(source)
+
+    def warn_again(self, warnings):
+        """Add what the walk warned of, which renders tell each time."""
+        for message in self._warnings:
+            warnings.add(message)
 
     def owners_of(self, lights):
         """Names of the objects that show these lights, by the names of their data."""
@@ -49,7 +56,8 @@ class Shown:
         each = instance.Plain(evaluated)
         key = instance.key_of(each)
         if key in self.items or key in self._lights:
-            return each if instance.is_shown(each, source.v3d) else None
+            is_hidden = evaluated.hide_render if source.v3d is None else not instance.is_in_view(each, source.v3d)
+            return None if is_hidden else each
         is_silent = evaluated.type in self._SILENT_TYPES or (
             evaluated.type == 'EMPTY' and evaluated.instance_type == 'NONE')
         return self.IRRELEVANT if is_silent else None

@@ -273,7 +273,7 @@ class Walk:
         data.diced_by = dicing and (dicing.settings, fields)
         if fields:
             mesh.dice(data, shape, {**fields, **dicing.creases_of(each, shape, fields)}, names[2])
-        elif self._sync._meshes.will_resync and deform.is_posable(blender_object):
+        elif not self._sync.is_final and deform.is_posable(blender_object):
             data.poses = mesh.Topology(shape)
         if cage is None and item.motion_keys > 1 and motion.may_deform(blender_object, instance.maker_of(each)):
             return data, deform.MeshMotion(shape, data, item.motion_keys)
