@@ -123,8 +123,8 @@ def _key(data, path, values):
 
 
 def _animate(scene):
-    """Something of every kind that takes no walk: where things are, whether they are shown, their shape and color,
-    lights, materials, the world and the camera."""
+    """Something of every kind: where things are, whether they are shown, their shape and color, lights, a material of
+    what is not instanced, the world and the camera."""
     import bpy
     import scenes
     objects = bpy.data.objects
@@ -132,7 +132,8 @@ def _animate(scene):
     _key(objects["Ball"], "color", [(x, 0.5, 0.2, 1.0) for x in (0.2, 0.6, 0.9, 0.4)])
     _key(objects["Light"].data, "energy", [300.0, 100.0, 500.0, 200.0])
     _key(scene.camera, "location", [(x, -9.0, 0.0) for x in (0.0, 0.2, 0.1, 0.3)])
-    colors = bpy.data.materials["Plain"].node_tree.nodes["Diffuse BSDF"].inputs["Color"]
+    own = scenes.material("Own", "ShaderNodeBsdfDiffuse")
+    colors = own.node_tree.nodes["Diffuse BSDF"].inputs["Color"]
     _key(colors, "default_value", [(x, 0.3, 0.2, 1.0) for x in (0.8, 0.2, 0.5, 0.9)])
     _key(scene.world.node_tree.nodes["Background"].inputs["Strength"], "default_value", [1.0, 3.0, 0.5, 2.0])
     shown = scenes.material("Shown", "ShaderNodeBsdfDiffuse")
@@ -140,7 +141,7 @@ def _animate(scene):
     shown.node_tree.links.new(info.outputs["Color"], shown.node_tree.nodes["Diffuse BSDF"].inputs["Color"])
     objects["Ball"].data.materials[0] = shown
     _key(scenes.sphere("Blinking", 0.4, (2.0, -1.0, -1.0), shown), "hide_render", [False, True, False, False])
-    bent = scenes.sphere("Bent", 0.5, (0.0, -1.0, -1.0), bpy.data.materials["Plain"])
+    bent = scenes.sphere("Bent", 0.5, (0.0, -1.0, -1.0), own)
     bent.shape_key_add(name="Basis")
     key = bent.shape_key_add(name="Tall")
     for point in key.data:
