@@ -494,6 +494,8 @@ def build(seed, without):
     scene = Scene(seed, without)
     both = scenes.empty(size=SIZE, samples=SAMPLES)
     both.volley.clamp_indirect = both.cycles.sample_clamp_indirect = 0.0  # they clamp other samples
+    if "rough_glass" in without:
+        both.volley.filter_glossy = both.cycles.blur_glossy = 0.0  # which makes clear glass rough
     rng = scene.rng("objects")
     floor = scenes.mesh("Floor", [(-4, -3, -1.3), (4, -3, -1.3), (4, 5, -1.3), (-4, 5, -1.3)], [(0, 1, 2, 3)])
     floor.data.materials.append(material(scene, SHADERS[:1], rng))
