@@ -23,8 +23,10 @@ from collections import Counter
 
 import bpy
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "support"))
-import scenes  # noqa: E402  (found by the line above)
+HERE = pathlib.Path(__file__).resolve().parent
+sys.path[:0] = [str(HERE.parent / "support"), str(HERE)]
+import edit_kinds  # noqa: E402  (found by the line above)
+import scenes  # noqa: E402
 import viewport_scenes  # noqa: E402
 
 SMALL_CELLS, LARGE_CELLS = 10, 32  # quads along a side of each object's grid
@@ -32,70 +34,11 @@ FINE_RINGS = 1000  # of the character with 100,100 vertices
 PICTURE = (960, 540)
 
 
-# Edits -----------------------------------------------------------------------------------------
-
-def transform(step):
-    bpy.data.objects["Object500"].location.z = 0.1 * (step + 1)
-
-
-def material(step):
-    tree = bpy.data.materials["Material1"].node_tree
-    tree.nodes["Diffuse BSDF"].inputs["Color"].default_value = (0.1 * (step % 9), 0.5, 0.5, 1.0)
-
-
-def node_link(_step):
-    tree = bpy.data.materials["Material1"].node_tree
-    color = tree.nodes["Diffuse BSDF"].inputs["Color"]
-    if color.is_linked:
-        tree.links.remove(color.links[0])
-        return
-    value = tree.nodes.get("RGB") or tree.nodes.new("ShaderNodeRGB")
-    tree.links.new(value.outputs[0], color)
-
-
-def light(step):
-    bpy.data.objects["Light"].data.energy = 1000.0 + step
-
-
-def world(step):
-    tree = bpy.context.scene.world.node_tree
-    tree.nodes["Background"].inputs["Strength"].default_value = 0.1 * (step + 1)
-
-
-def ray_visibility(step):
-    bpy.data.objects["Object500"].visible_shadow = bool(step % 2)
-
-
-def mesh_edit(step):
-    data = bpy.data.objects["Object500"].data
-    data.vertices[0].co.z = 0.1 * (step + 1)
-    data.update()
-
-
-def duplicate(step):
-    copy = scenes.link("Copy", bpy.data.objects["Object500"].data)
-    copy.location.z = 1.0 + step
-
-
-def delete(_step):
-    bpy.data.objects.remove(next(o for o in bpy.data.objects if o.name.startswith("Copy")))
-
-
-def hide(_step):
-    each = bpy.data.objects["Object500"]
-    each.hide_viewport = not each.hide_viewport
-
-
-def settings(step):
-    bpy.context.scene.volley.film_exposure = 1.0 + 0.1 * (step + 1)
-
-
 def view(_step):
     """The view's own camera moves: nothing of the scene does."""
 
 
-EDITS = (viewport_scenes.pose, transform, material, node_link, light, world, ray_visibility, mesh_edit,
-         duplicate, delete, hide, settings, view)
+EDITS = (*edit_kinds.ALL, view)
 
 
 # Measuring -------------------------------------------------------------------------------------
@@ -244,7 +187,7 @@ def main():
     rows = run("field", EDITS, arguments.repeats)
     scenes.empty(size=PICTURE)
     viewport_scenes.fill_character()
-    posed = run("character", (viewport_scenes.pose, light, view), arguments.repeats)
+    posed = run("character", (viewport_scenes.pose, edit_kinds.light, view), arguments.repeats)
     scenes.empty(size=PICTURE)
     viewport_scenes.fill_character(FINE_RINGS)
     fine = run("fine character", (viewport_scenes.pose,), arguments.repeats)

@@ -26,11 +26,11 @@ def grid(name, cells, material):
     return scenes.mesh(name, points.tolist(), faces.tolist(), material, smooth=True)
 
 
-def fill_field(cells):
-    """OBJECT_COUNT grids of cells * cells quads; a bone poses the first."""
+def fill_field(cells, count=OBJECT_COUNT):
+    """So many grids of cells * cells quads; a bone poses the first."""
     bpy.context.scene.world.use_nodes = True
     materials = [scenes.material(f"Material{i}", "ShaderNodeBsdfDiffuse") for i in range(10)]
-    for i in range(OBJECT_COUNT):
+    for i in range(count):
         made = grid(f"Object{i}", cells, materials[i % len(materials)])
         made.location = (i % SIDE - SIDE / 2, i // SIDE - SIDE / 2, 0.0)
     add_rig(bpy.data.objects["Object0"], 1, 1.0)
