@@ -208,9 +208,9 @@ static void leaf_box(const struct trc_tree *tree, uint32_t ref, uint32_t key, fl
 /* The tree of an instance, NULL where only the joined one has it. */
 static const struct trc_blas *blas_of(const struct checker *c, uint32_t number) {
     const struct trc_instance *instance = &c->snapshot->instances[number];
-    if (!instance->is_thin)
-        return c->bvh->blas[instance->mesh];
-    return c->bvh->thin && c->bvh->thin[number] ? &c->bvh->thin[number]->blas : NULL;
+    if (c->bvh->own && c->bvh->own[number])
+        return &c->bvh->own[number]->blas;
+    return c->bvh->is_joined[number] || instance->is_thin ? NULL : c->bvh->blas[instance->mesh];
 }
 
 /* ---- items of a top tree ---- */
@@ -220,7 +220,7 @@ static const struct trc_blas *blas_of(const struct checker *c, uint32_t number) 
 static void item_box(const struct trc_snapshot *s, const struct trc_item *item, double lower[3],
                      double upper[3]) {
     static const struct trc_affine identity = {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
-    const bool placed = item->instance != TRC_NO_HIT && !s->instances[item->instance].is_thin;
+    const bool placed = item->instance != TRC_NO_HIT && !s->instances[item->instance].in_world;
     const uint32_t key_count = placed ? s->instances[item->instance].key_count : 1;
     for (int axis = 0; axis < 3; axis++) {
         lower[axis] = INFINITY;
@@ -258,7 +258,8 @@ static bool check_item_box(struct tree_check *t, uint32_t slot, const float lowe
 static bool check_item(struct checker *c, const struct trc_item *item, uint8_t *placed) {
     const struct trc_snapshot *s = c->snapshot;
     if (item->instance == TRC_NO_HIT) {
-        if (item->tree != &c->bvh->joined || item->visibility != TRC_VISIBLE_ALL)
+        if (!c->bvh->joined || item->tree != &c->bvh->joined->tree ||
+            item->visibility != TRC_VISIBLE_ALL)
             return complain(c, "the joined tree's item is not right");
         return true;
     }
@@ -497,25 +498,26 @@ static bool check_blas(struct checker *c, uint32_t mesh) {
     return check_tree(&t, 1, &first);
 }
 
-static bool check_thin(struct checker *c, uint32_t number) {
+static bool check_own(struct checker *c, uint32_t number) {
     const struct trc_instance *instance = &c->snapshot->instances[number];
-    const struct trc_thin *thin = c->bvh->thin[number];
+    const struct trc_own_tree *own = c->bvh->own[number];
     const struct trc_mesh *mesh = c->snapshot->meshes[instance->mesh];
-    struct trc_mesh placed;
+    struct trc_mesh thin = {.positions = NULL};
     char name[32];
     uint64_t first;
-    if (!instance->is_thin || !trc_thin_is_of(thin, instance, mesh))
-        return complain(c, "the tree of thin instance %u is of another", number);
-    if (trc_thin_mesh(instance, mesh, &placed) != TRC_OK)
+    if (!instance->in_world || !trc_own_tree_is_of(own, instance, mesh))
+        return complain(c, "the own tree of instance %u is of another", number);
+    if (instance->is_thin && trc_thin_mesh(instance, mesh, &thin) != TRC_OK)
         return complain(c, "no memory to check a tree");
     (void)snprintf(name, sizeof name, "instance %u", number);
-    const struct trc_part part = {.mesh = &placed};
-    struct tree_check t = {.checker = c, .name = name, .tree = &thin->blas.tree, .parts = &part};
-    const bool good =
-        thin->blas.tree.key_count == placed.key_count
-            ? check_tree(&t, 1, &first)
-            : complain(c, "%s: the tree has %u keys", name, thin->blas.tree.key_count);
-    trc_free(placed.positions);
+    const struct trc_part part = {.mesh = instance->is_thin ? &thin : mesh,
+                                  .transform =
+                                      instance->is_thin ? NULL : instance->object_to_world};
+    struct tree_check t = {.checker = c, .name = name, .tree = &own->blas.tree, .parts = &part};
+    const bool good = own->blas.tree.key_count == part.mesh->key_count
+                          ? check_tree(&t, 1, &first)
+                          : complain(c, "%s: the tree has %u keys", name, own->blas.tree.key_count);
+    trc_free(thin.positions);
     return good;
 }
 
@@ -523,8 +525,8 @@ static bool check_thin(struct checker *c, uint32_t number) {
  * joined. */
 static bool is_joined(const struct checker *c, uint32_t i, const uint8_t *placed) {
     const struct trc_instance *instance = &c->snapshot->instances[i];
-    if (placed[i] || instance->visibility != TRC_VISIBLE_ALL || instance->key_count != 1 ||
-        c->snapshot->meshes[instance->mesh]->key_count != 1)
+    if (placed[i] || !c->bvh->is_joined[i] || instance->visibility != TRC_VISIBLE_ALL ||
+        instance->key_count != 1 || c->snapshot->meshes[instance->mesh]->key_count != 1)
         return false;
     const struct trc_blas *blas = blas_of(c, i);
     return !blas || blas->tree.root != TRC_REF_EMPTY;
@@ -546,10 +548,10 @@ static bool check_joined(struct checker *c, const uint8_t *placed) {
         else if (!placed[i] && instance->visibility && (!blas || blas->tree.root != TRC_REF_EMPTY))
             good = complain(c, "instance %u is nowhere", i);
     }
-    if (good) {
+    if (good && c->bvh->joined) {
         struct tree_check t = {.checker = c,
                                .name = "joined tree",
-                               .tree = &c->bvh->joined,
+                               .tree = &c->bvh->joined->tree,
                                .parts = parts,
                                .is_joined = true};
         good = check_tree(&t, s->instance_count, first);
@@ -573,7 +575,7 @@ static bool check_top(struct checker *c, uint8_t *placed) {
 bool bvh_check(const struct trc_bvh *bvh, const struct trc_snapshot *snapshot, char *message,
                uint32_t capacity) {
     struct checker c = {bvh, snapshot, message, capacity};
-    if (bvh->tree != &bvh->top && bvh->tree != &bvh->joined)
+    if (bvh->tree != &bvh->top && (!bvh->joined || bvh->tree != &bvh->joined->tree))
         return complain(&c, "the tree in use is neither of its own");
     if (bvh->blas_count != snapshot->mesh_count)
         return complain(&c, "trees for %u meshes, there are %u", bvh->blas_count,
@@ -581,11 +583,11 @@ bool bvh_check(const struct trc_bvh *bvh, const struct trc_snapshot *snapshot, c
     for (uint32_t i = 0; i < bvh->blas_count; i++)
         if (bvh->blas[i] && !check_blas(&c, i))
             return false;
-    if (bvh->thin && bvh->thin_count != snapshot->instance_count)
-        return complain(&c, "trees for %u instances, there are %u", bvh->thin_count,
+    if (bvh->instance_count != snapshot->instance_count)
+        return complain(&c, "trees for %u instances, there are %u", bvh->instance_count,
                         snapshot->instance_count);
-    for (uint32_t i = 0; i < bvh->thin_count; i++)
-        if (bvh->thin[i] && !check_thin(&c, i))
+    for (uint32_t i = 0; bvh->own && i < bvh->instance_count; i++)
+        if (bvh->own[i] && !check_own(&c, i))
             return false;
     uint8_t *placed = trc_alloc_zeroed(snapshot->instance_count, 1);
     if (!placed)

@@ -60,15 +60,19 @@ static trc_status create_mesh(trc_scene scene, const struct mesh *mesh, trc_id *
     return trc_mesh_create(scene, &desc, id);
 }
 
+static trc_instance_desc instance_desc(const struct query_instance *instance, trc_id mesh) {
+    return (trc_instance_desc){.struct_size = sizeof(trc_instance_desc),
+                               .key_count = instance->key_count,
+                               .mesh = mesh,
+                               .transforms = instance->transforms[0],
+                               .visibility = instance->visibility,
+                               .color = {1, 1, 1, 1},
+                               .shadow_terminator_geometry = 0.1f};
+}
+
 static trc_status create_instance(trc_scene scene, const struct query_instance *instance,
                                   trc_id mesh, trc_id *id) {
-    const trc_instance_desc desc = {.struct_size = sizeof desc,
-                                    .key_count = instance->key_count,
-                                    .mesh = mesh,
-                                    .transforms = instance->transforms[0],
-                                    .visibility = instance->visibility,
-                                    .color = {1, 1, 1, 1},
-                                    .shadow_terminator_geometry = 0.1f};
+    const trc_instance_desc desc = instance_desc(instance, mesh);
     return trc_instance_create(scene, &desc, id);
 }
 
@@ -104,6 +108,13 @@ trc_status query_scene_pose(struct query_scene *scene, const struct query_world 
         trc_mesh_update(scene->scene, scene->meshes[mesh], m->key_count, m->positions,
                         (uint64_t)3 * m->vertex_count * m->key_count, NULL, 0);
     return status == TRC_OK ? trc_scene_commit(scene->scene) : status;
+}
+
+trc_status query_scene_move(struct query_scene *scene, const struct query_world *world,
+                            uint32_t instance) {
+    const struct query_instance *moved = &world->instances[instance];
+    const trc_instance_desc desc = instance_desc(moved, scene->meshes[moved->mesh]);
+    return trc_instance_update(scene->scene, scene->instances[instance], &desc);
 }
 
 struct trc_snapshot *query_scene_snapshot(trc_scene scene) {

@@ -51,6 +51,10 @@ void query_scene_destroy(struct query_scene *scene);
 trc_status query_scene_pose(struct query_scene *scene, const struct query_world *world,
                             uint32_t mesh);
 
+/* Puts an instance of the scene where the world's is now, for the next commit. */
+trc_status query_scene_move(struct query_scene *scene, const struct query_world *world,
+                            uint32_t instance);
+
 struct trc_snapshot;
 /* The snapshot in force: valid until the next commit. */
 struct trc_snapshot *query_scene_snapshot(trc_scene scene);

@@ -500,7 +500,7 @@ static void poses_skip_triangles_too(void **state) {
 
 /* A posed scene gives the bits of one that was built with the pose. */
 static void expect_hits_of_new_scene(const struct query_scene *posed,
-                                     const struct query_world *world) {
+                                     const struct query_world *world, bool is_final) {
     struct query_scene built;
     struct ray_set rays;
     struct hit_set a, b;
@@ -514,7 +514,7 @@ static void expect_hits_of_new_scene(const struct query_scene *posed,
             d[axis] = 0.5f * d[axis] - 3.0f * o[axis], o[axis] *= 3.0f;
         ray_set_add(&rays, o, d, 0.0f, INFINITY, rng_unit(&rng));
     }
-    assert_ok(query_scene_create(world, false, 1, &built));
+    assert_ok(query_scene_create(world, is_final, 1, &built));
     hit_set_init(&a, rays.count);
     hit_set_init(&b, rays.count);
     assert_ok(hit_set_query(&a, posed->scene, &rays, 64));
@@ -546,7 +546,7 @@ static void small_poses_refit_and_large_ones_rebuild(void **state) {
             mesh->positions[i] += rng_range(&rng, -1e-3f, 1e-3f);
         assert_ok(query_scene_pose(&scene, &world, 0));
         expect_good(scene.scene, "small pose");
-        expect_hits_of_new_scene(&scene, &world);
+        expect_hits_of_new_scene(&scene, &world, false);
         assert_int_equal(stats_of(scene.scene).refitted_count, 1);
         assert_int_equal(stats_of(scene.scene).built_count, 0);
     }
@@ -555,9 +555,75 @@ static void small_poses_refit_and_large_ones_rebuild(void **state) {
     mesh->key_count = 1;
     assert_ok(query_scene_pose(&scene, &world, 0));
     expect_good(scene.scene, "large pose");
-    expect_hits_of_new_scene(&scene, &world);
+    expect_hits_of_new_scene(&scene, &world, false);
     assert_int_equal(stats_of(scene.scene).built_count, 1);
     assert_int_equal(stats_of(scene.scene).refitted_count, 0);
+    query_scene_destroy(&scene);
+    query_world_free(&world);
+}
+
+/* Instances that change in a final scene: how many are of trees of their own then, and how many
+ * trees were built. */
+static void expect_after_moves(struct query_scene *scene, const struct query_world *world,
+                               uint32_t own, uint32_t built) {
+    uint32_t found = 0;
+    assert_ok(trc_scene_commit(scene->scene));
+    expect_good(scene->scene, "changed instances");
+    expect_hits_of_new_scene(scene, world, true);
+    const struct trc_bvh *bvh = query_scene_snapshot(scene->scene)->bvh;
+    for (uint32_t i = 0; i < world->instance_count; i++)
+        found += trc_bvh_has_own_tree(bvh, i);
+    assert_int_equal(found, own);
+    assert_int_equal(stats_of(scene->scene).built_count, built);
+}
+
+/* The joined tree is built once without what moves, stays while the rest does, and is built of all
+ * again when much of it has moved; rays find the bits that they find in a new scene. */
+static void what_moves_leaves_the_joined_tree(void **state) {
+    (void)state;
+    enum { COUNT = 40 };
+    struct query_world world;
+    struct query_scene scene;
+    struct rng rng = rng_seed(23);
+    query_world_init(&world);
+    mesh_add_icosphere(query_world_mesh(&world), origin, 1.0f, 1);
+    for (uint32_t i = 0; i < COUNT; i++) {
+        float axis[3], scale[3], offset[3];
+        rng_direction(&rng, axis);
+        for (int k = 0; k < 3; k++) {
+            scale[k] = rng_range(&rng, 0.1f, 0.4f);
+            offset[k] = rng_range(&rng, -1.0f, 1.0f);
+        }
+        query_transform(axis, rng_range(&rng, 0.0f, 3.0f), scale, offset,
+                        query_world_instance(&world, 0)->transforms[0]);
+    }
+    assert_ok(query_scene_create(&world, true, 2, &scene));
+    assert_int_equal(stats_of(scene.scene).built_count, 1);
+    const struct trc_joined_tree *joined = NULL;
+    for (uint32_t frame = 0; frame < 4; frame++) {
+        world.instances[3].transforms[0][3] += 0.1f;
+        assert_ok(query_scene_move(&scene, &world, 3));
+        expect_after_moves(&scene, &world, 1, frame ? 1 : 2);
+        if (frame)
+            assert_ptr_equal(query_scene_snapshot(scene.scene)->bvh->joined, joined);
+        joined = query_scene_snapshot(scene.scene)->bvh->joined;
+    }
+    world.instances[COUNT - 1].transforms[0][7] -= 0.2f;
+    assert_ok(query_scene_move(&scene, &world, COUNT - 1));
+    expect_after_moves(&scene, &world, 2, 2);
+    world.instances[7].visibility = TRC_VISIBLE_CAMERA; /* a tree that others could share */
+    assert_ok(query_scene_move(&scene, &world, 7));
+    expect_after_moves(&scene, &world, 2, 2);
+    world.instances[7].visibility = TRC_VISIBLE_ALL;
+    assert_ok(query_scene_move(&scene, &world, 7));
+    expect_after_moves(&scene, &world, 3, 1);
+    for (uint32_t frame = 0; frame < 2; frame++) {
+        for (uint32_t i = 10; i <= 10 + COUNT / 4; i++) {
+            world.instances[i].transforms[0][11] += 0.1f;
+            assert_ok(query_scene_move(&scene, &world, i));
+        }
+        expect_after_moves(&scene, &world, 0, 1);
+    }
     query_scene_destroy(&scene);
     query_world_free(&world);
 }
@@ -797,6 +863,7 @@ int main(void) {
         cmocka_unit_test(any_number_of_triangles),
         cmocka_unit_test(shapes_and_instances),
         cmocka_unit_test(small_instances_are_joined),
+        cmocka_unit_test(what_moves_leaves_the_joined_tree),
         cmocka_unit_test(moving_meshes),
         cmocka_unit_test(random_bits),
         cmocka_unit_test(skipped_triangles_are_counted),

@@ -193,7 +193,7 @@ static void strips_world(struct query_world *world, uint32_t small, uint32_t str
 
 static const struct trc_tree *joined_tree(const struct query_scene *scene) {
     const struct trc_bvh *bvh = query_scene_snapshot(scene->scene)->bvh;
-    assert_ptr_equal(bvh->tree, &bvh->joined);
+    assert_ptr_equal(bvh->tree, &bvh->joined->tree);
     return bvh->tree;
 }
 

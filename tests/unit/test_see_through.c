@@ -118,7 +118,8 @@ static void expect_marked(trc_scene scene, bool expected) {
     uint32_t marked = 0;
     for (uint32_t i = 0; i < snapshot->bvh->blas_count; i++)
         marked += snapshot->bvh->blas[i] && snapshot->bvh->blas[i]->tree.see_through;
-    marked += snapshot->bvh->top.see_through || snapshot->bvh->joined.see_through;
+    const struct trc_joined_tree *joined = snapshot->bvh->joined;
+    marked += snapshot->bvh->top.see_through || (joined && joined->tree.see_through);
     assert_true(expected ? marked > 1 : marked == 0);
 }
 

@@ -24,14 +24,17 @@
  * first, while they are no more triangles than that together: some 50 MiB. */
 #define SHARED_CLASSES 13u
 #define SHARED_TRIANGLES (1u << 20)
+/* Instances that have changed have trees of their own while they are at most one in so many of the
+ * triangles that would be joined: the joined tree is built anew for more. */
+#define RESTLESS_PART 4u
 
 struct create_job {
-    const struct trc_snapshot *snapshot;
+    const struct trc_snapshot *snapshot, *before; /* before: the former one, or NULL */
     const struct trc_bvh_options *options;
     struct trc_pool *pool;
     struct trc_bvh *bvh;
     struct trc_bvh_build_stats *stats;
-    uint8_t *joined;      /* per instance: part of the joined tree */
+    uint8_t *is_restless; /* per instance: has a tree of its own, for it may change again */
     uint8_t *transparent; /* per material slot over all instances */
     uint32_t *first_slot; /* per instance */
     /* The instances of each mesh: the first, and after each the next; TRC_NO_HIT ends them. */
@@ -197,58 +200,66 @@ static trc_status blas_obtain(struct create_job *job, uint32_t mesh_index,
     return status;
 }
 
-/* ---- thin instances ---- */
+/* ---- instances with trees of their own ---- */
 
 /* The tree that the instance of that number had before, if nothing about it has changed. */
-static struct trc_thin *thin_previous(const struct create_job *job, uint32_t number,
-                                      const struct trc_bvh *previous, const uint8_t *slots) {
+static struct trc_own_tree *own_previous(const struct create_job *job, uint32_t number,
+                                         const uint8_t *slots) {
     const struct trc_instance *instance = &job->snapshot->instances[number];
-    if (!previous || !previous->thin || number >= previous->thin_count)
+    const struct trc_bvh *previous = job->before ? job->before->bvh : NULL;
+    if (!previous || !previous->own || number >= previous->instance_count)
         return NULL;
-    struct trc_thin *thin = previous->thin[number];
-    if (!thin || !trc_thin_is_of(thin, instance, job->snapshot->meshes[instance->mesh]) ||
-        !slots_match(&thin->blas, slots, instance->material_count))
+    struct trc_own_tree *own = previous->own[number];
+    if (!own || !trc_own_tree_is_of(own, instance, job->snapshot->meshes[instance->mesh]) ||
+        !slots_match(&own->blas, slots, instance->material_count))
         return NULL;
-    atomic_fetch_add(&thin->blas.refs, 1);
-    return thin;
+    atomic_fetch_add(&own->blas.refs, 1);
+    return own;
 }
 
-static trc_status thin_build(struct create_job *job, uint32_t number, const uint8_t *slots,
-                             struct trc_thin **thin_out) {
-    const struct trc_instance *instance = &job->snapshot->instances[number];
+/* Over the instance's triangles where they are in the world; of one that is not thin they are
+ * placed, and bounded, as in the joined tree, so that rays find the same. */
+static trc_status own_fill(struct create_job *job, const struct trc_instance *instance,
+                           const uint8_t *slots, struct trc_tree *tree) {
     const struct trc_mesh *mesh = job->snapshot->meshes[instance->mesh];
+    struct trc_part part = {mesh, 0, instance->object_to_world, slots, instance->material_count};
+    if (!instance->is_thin)
+        return tree_build(job, &part, 1, 1, true, tree);
     struct trc_mesh placed;
     TRC_TRY(trc_thin_mesh(instance, mesh, &placed));
-    struct trc_thin *thin = trc_thin_create(instance, mesh);
-    trc_status status = TRC_OK;
-    if (!thin)
-        status = trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for a tree");
-    const struct trc_part part = {&placed, 0, NULL, slots, instance->material_count};
-    if (thin)
-        status = slots_keep(&thin->blas, slots, instance->material_count);
-    if (thin && status == TRC_OK)
-        status = tree_build(job, &part, 1, placed.key_count, false, &thin->blas.tree);
+    part.mesh = &placed;
+    part.transform = NULL;
+    const trc_status status = tree_build(job, &part, 1, placed.key_count, false, tree);
     trc_free(placed.positions);
-    if (status == TRC_OK)
-        *thin_out = thin;
-    else if (thin)
-        trc_blas_release(&thin->blas);
     return status;
 }
 
-/* The tree of an instance that is not joined. */
-static trc_status thin_obtain(struct create_job *job, uint32_t number,
-                              const struct trc_bvh *previous) {
+static trc_status own_build(struct create_job *job, uint32_t number, const uint8_t *slots,
+                            struct trc_own_tree **own_out) {
+    const struct trc_instance *instance = &job->snapshot->instances[number];
+    struct trc_own_tree *own = trc_own_tree_create(instance, job->snapshot->meshes[instance->mesh]);
+    if (!own)
+        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for a tree");
+    trc_status status = slots_keep(&own->blas, slots, instance->material_count);
+    if (status == TRC_OK)
+        status = own_fill(job, instance, slots, &own->blas.tree);
+    if (status == TRC_OK)
+        *own_out = own;
+    else
+        trc_blas_release(&own->blas);
+    return status;
+}
+
+static trc_status own_obtain(struct create_job *job, uint32_t number) {
+    const uint8_t *slots = job->transparent + job->first_slot[number];
     struct trc_bvh *bvh = job->bvh;
-    if (!bvh->thin) {
-        bvh->thin_count = job->snapshot->instance_count;
-        bvh->thin = trc_alloc_zeroed(bvh->thin_count, sizeof(struct trc_thin *));
-        if (!bvh->thin)
+    if (!bvh->own) {
+        bvh->own = trc_alloc_zeroed(bvh->instance_count, sizeof(struct trc_own_tree *));
+        if (!bvh->own)
             return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for the trees");
     }
-    const uint8_t *slots = job->transparent + job->first_slot[number];
-    bvh->thin[number] = thin_previous(job, number, previous, slots);
-    return bvh->thin[number] ? TRC_OK : thin_build(job, number, slots, &bvh->thin[number]);
+    bvh->own[number] = own_previous(job, number, slots);
+    return bvh->own[number] ? TRC_OK : own_build(job, number, slots, &bvh->own[number]);
 }
 
 bool trc_bvh_has_grown(const struct trc_bvh *bvh, uint32_t mesh) {
@@ -293,7 +304,7 @@ static uint32_t shared_class(const struct create_job *job, const uint32_t *uses)
     uint64_t triangles[SHARED_CLASSES + 1] = {0}, sum = 0;
     for (uint32_t i = 0; i < s->instance_count; i++) {
         const uint32_t mesh = s->instances[i].mesh, count = s->meshes[mesh]->triangle_count;
-        if (job->joined[i] && uses[mesh] > 1)
+        if (job->bvh->is_joined[i] && uses[mesh] > 1)
             triangles[size_class(count)] += count;
     }
     uint32_t size = 0;
@@ -312,12 +323,12 @@ static void join_select(struct create_job *job) {
     for (uint32_t i = 0; i < s->instance_count; i++) {
         const struct trc_instance *instance = &s->instances[i];
         const struct trc_mesh *mesh = s->meshes[instance->mesh];
-        job->joined[i] = instance->key_count == 1 && mesh->key_count == 1 && !mesh->strands &&
-                         instance->visibility == TRC_VISIBLE_ALL;
+        job->bvh->is_joined[i] = instance->key_count == 1 && mesh->key_count == 1 &&
+                                 !mesh->strands && instance->visibility == TRC_VISIBLE_ALL;
     }
     uint32_t *uses = trc_alloc_zeroed(s->mesh_count ? s->mesh_count : 1, sizeof *uses);
     if (!uses) {
-        memset(job->joined, 0, s->instance_count); /* slower, not wrong */
+        memset(job->bvh->is_joined, 0, s->instance_count); /* slower, not wrong */
         return;
     }
     for (uint32_t i = 0; i < s->instance_count; i++)
@@ -326,30 +337,112 @@ static void join_select(struct create_job *job) {
     for (uint32_t i = 0; i < s->instance_count; i++) {
         const uint32_t mesh = s->instances[i].mesh;
         if (uses[mesh] > 1 && size_class(s->meshes[mesh]->triangle_count) >= size)
-            job->joined[i] = 0;
+            job->bvh->is_joined[i] = 0;
     }
     trc_free(uses);
 }
 
-static trc_status joined_build(struct create_job *job) {
+/* Whether an instance shows what it showed before, where it was. */
+static bool stands_still(const struct create_job *job, uint32_t number) {
+    const struct trc_snapshot *s = job->snapshot, *before = job->before;
+    const struct trc_instance *now = &s->instances[number], *then = &before->instances[number];
+    return before->meshes[then->mesh] == s->meshes[now->mesh] &&
+           memcmp(then->object_to_world, now->object_to_world, sizeof(struct trc_affine)) == 0;
+}
+
+/* What of the instances to be joined was not, or has changed, has trees of its own instead: what
+ * moves in one frame moves in the next, and the joined tree can stay. */
+static void restless_select(struct create_job *job) {
     const struct trc_snapshot *s = job->snapshot;
-    uint32_t count = 0;
-    for (uint32_t i = 0; i < s->instance_count; i++)
-        count += job->joined[i];
-    if (count == 0)
-        return TRC_OK;
+    const struct trc_bvh *previous = job->before ? job->before->bvh : NULL;
+    if (!previous || !previous->joined)
+        return;
+    uint64_t all = 0, restless = 0;
+    for (uint32_t i = 0; i < s->instance_count; i++) {
+        if (!job->bvh->is_joined[i])
+            continue;
+        const uint32_t triangles = s->meshes[s->instances[i].mesh]->triangle_count;
+        all += triangles;
+        job->is_restless[i] =
+            i >= previous->instance_count || !previous->is_joined[i] || !stands_still(job, i);
+        restless += job->is_restless[i] ? triangles : 0;
+    }
+    const bool are_few = restless * RESTLESS_PART <= all;
+    for (uint32_t i = 0; i < s->instance_count; i++) {
+        job->is_restless[i] &= are_few;
+        job->bvh->is_joined[i] &= !job->is_restless[i];
+    }
+}
+
+/* Whether the same triangles are joined as before, with the same flags. */
+static bool joins_the_same(const struct create_job *job) {
+    const struct trc_snapshot *s = job->snapshot, *before = job->before;
+    const struct trc_bvh *previous = before ? before->bvh : NULL;
+    if (!previous || !previous->joined)
+        return false;
+    for (uint32_t i = s->instance_count; i < previous->instance_count; i++)
+        if (previous->is_joined[i])
+            return false;
+    for (uint32_t i = 0; i < s->instance_count; i++) {
+        const bool was_joined = i < previous->instance_count && previous->is_joined[i];
+        if (was_joined != job->bvh->is_joined[i] || (was_joined && !stands_still(job, i)))
+            return false;
+        if (!was_joined)
+            continue;
+        const struct trc_instance *then = &before->instances[i];
+        if (then->material_count != s->instances[i].material_count)
+            return false;
+        for (uint32_t k = 0; k < then->material_count; k++)
+            if (job->transparent[job->first_slot[i] + k] !=
+                trc_material_shadows_transparent(before->materials[then->materials[k]]))
+                return false;
+    }
+    return true;
+}
+
+static void joined_release(struct trc_joined_tree *joined) {
+    if (!joined || atomic_fetch_sub(&joined->refs, 1) != 1)
+        return;
+    trc_tree_destroy(&joined->tree);
+    trc_free(joined);
+}
+
+static trc_status joined_build(struct create_job *job, uint32_t count) {
+    const struct trc_snapshot *s = job->snapshot;
     struct trc_part *parts = trc_alloc(count, sizeof *parts);
-    if (!parts)
+    struct trc_joined_tree *joined = trc_alloc_zeroed(1, sizeof *joined);
+    if (!parts || !joined) {
+        trc_free(parts);
+        trc_free(joined);
         return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for %u meshes", count);
+    }
+    atomic_init(&joined->refs, 1);
     uint32_t n = 0;
     for (uint32_t i = 0; i < s->instance_count; i++)
-        if (job->joined[i])
+        if (job->bvh->is_joined[i])
             parts[n++] = (struct trc_part){
                 s->meshes[s->instances[i].mesh], i, s->instances[i].object_to_world,
                 job->transparent + job->first_slot[i], s->instances[i].material_count};
-    const trc_status status = tree_build(job, parts, count, 1, true, &job->bvh->joined);
+    const trc_status status = tree_build(job, parts, count, 1, true, &joined->tree);
     trc_free(parts);
+    if (status == TRC_OK)
+        job->bvh->joined = joined;
+    else
+        joined_release(joined);
     return status;
+}
+
+static trc_status joined_obtain(struct create_job *job) {
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < job->snapshot->instance_count; i++)
+        count += job->bvh->is_joined[i];
+    if (count == 0)
+        return TRC_OK;
+    if (!joins_the_same(job))
+        return joined_build(job, count);
+    job->bvh->joined = job->before->bvh->joined;
+    atomic_fetch_add(&job->bvh->joined->refs, 1);
+    return TRC_OK;
 }
 
 /* World box of a box under all keys of an instance. M(t) p(t) is a convex combination of the keys'
@@ -374,23 +467,24 @@ static struct box instance_box(const struct trc_instance *instance, const struct
 
 static uint32_t items_collect(struct create_job *job, struct trc_item *items, struct box *boxes) {
     const struct trc_snapshot *s = job->snapshot;
+    const struct trc_bvh *bvh = job->bvh;
+    const struct trc_tree *joined = bvh->joined ? &bvh->joined->tree : NULL;
     uint32_t count = 0;
-    if (job->bvh->joined.root != TRC_REF_EMPTY) {
-        items[0] = (struct trc_item){&job->bvh->joined, TRC_NO_HIT, TRC_VISIBLE_ALL};
-        boxes[0] = (struct box){f4_load3(job->bvh->joined.lower), f4_load3(job->bvh->joined.upper)};
+    if (joined && joined->root != TRC_REF_EMPTY) {
+        items[0] = (struct trc_item){joined, TRC_NO_HIT, TRC_VISIBLE_ALL};
+        boxes[0] = (struct box){f4_load3(joined->lower), f4_load3(joined->upper)};
         count = 1;
     }
     for (uint32_t i = 0; i < s->instance_count; i++) {
         const struct trc_instance *instance = &s->instances[i];
-        if (job->joined[i] || !instance->visibility)
+        if (bvh->is_joined[i] || !instance->visibility)
             continue;
-        const struct trc_tree *tree = instance->is_thin ? &job->bvh->thin[i]->blas.tree
-                                                        : &job->bvh->blas[instance->mesh]->tree;
+        const struct trc_own_tree *own = bvh->own ? bvh->own[i] : NULL;
+        const struct trc_tree *tree = own ? &own->blas.tree : &bvh->blas[instance->mesh]->tree;
         if (tree->root == TRC_REF_EMPTY)
             continue;
         items[count] = (struct trc_item){tree, i, instance->visibility};
-        boxes[count] = instance->is_thin
-                           ? (struct box){f4_load3(tree->lower), f4_load3(tree->upper)}
+        boxes[count] = own ? (struct box){f4_load3(tree->lower), f4_load3(tree->upper)}
                            : instance_box(instance, tree);
         count++;
     }
@@ -448,7 +542,7 @@ static trc_status top_build(struct create_job *job) {
     if (status == TRC_OK) {
         const uint32_t count = items_collect(job, items, boxes);
         if (count == 1 && items[0].instance == TRC_NO_HIT) {
-            bvh->tree = &bvh->joined;
+            bvh->tree = &bvh->joined->tree;
         } else {
             status = items_build(job, items, boxes, count);
             bvh->tree = &bvh->top;
@@ -464,10 +558,12 @@ static trc_status slots_collect(struct create_job *job) {
     uint64_t total = 0;
     for (uint32_t i = 0; i < s->instance_count; i++)
         total += s->instances[i].material_count;
-    job->joined = trc_alloc_zeroed(s->instance_count ? s->instance_count : 1, 1);
+    const uint32_t count = s->instance_count ? s->instance_count : 1;
+    job->bvh->is_joined = trc_alloc_zeroed(count, 1);
+    job->is_restless = trc_alloc_zeroed(count, 1);
     job->transparent = trc_alloc_zeroed(total ? total : 1, 1);
-    job->first_slot = trc_alloc(s->instance_count ? s->instance_count : 1, sizeof *job->first_slot);
-    if (!job->joined || !job->transparent || !job->first_slot)
+    job->first_slot = trc_alloc(count, sizeof *job->first_slot);
+    if (!job->bvh->is_joined || !job->is_restless || !job->transparent || !job->first_slot)
         return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for %u instances", s->instance_count);
     uint32_t slot = 0;
     for (uint32_t i = 0; i < s->instance_count; i++) {
@@ -494,30 +590,30 @@ static trc_status users_collect(struct create_job *job) {
     return TRC_OK;
 }
 
-static trc_status trees_build(struct create_job *job, const struct trc_bvh *previous,
-                              struct trc_mesh *const *replaced) {
+static trc_status trees_build(struct create_job *job, struct trc_mesh *const *replaced) {
     const struct trc_snapshot *s = job->snapshot;
     trc_status status = slots_collect(job);
     if (status == TRC_OK)
         status = users_collect(job);
     if (status == TRC_OK)
-        status = trc_former_open(previous, &job->former);
+        status = trc_former_open(job->before ? job->before->bvh : NULL, &job->former);
     if (status == TRC_OK) {
         join_select(job);
-        status = joined_build(job);
+        restless_select(job);
+        status = joined_obtain(job);
     }
     for (uint32_t i = 0; i < s->instance_count && status == TRC_OK; i++) {
         const struct trc_instance *instance = &s->instances[i];
-        if (job->joined[i])
+        if (job->bvh->is_joined[i])
             continue;
-        if (instance->is_thin)
-            status = thin_obtain(job, i, previous);
+        if (instance->is_thin || job->is_restless[i])
+            status = own_obtain(job, i);
         else if (!job->bvh->blas[instance->mesh])
             status = blas_obtain(job, instance->mesh, replaced);
     }
     if (status == TRC_OK)
         status = top_build(job);
-    trc_free(job->joined);
+    trc_free(job->is_restless);
     trc_free(job->transparent);
     trc_free(job->first_slot);
     trc_free(job->first_user);
@@ -533,18 +629,19 @@ static void stats_add(const struct trc_tree *tree, struct trc_bvh_build_stats *s
 
 static void stats_collect(const struct trc_bvh *bvh, struct trc_bvh_build_stats *stats) {
     stats->bytes = bvh->top.bytes;
-    stats_add(&bvh->joined, stats);
+    if (bvh->joined)
+        stats_add(&bvh->joined->tree, stats);
     for (uint32_t i = 0; i < bvh->blas_count; i++)
         if (bvh->blas[i])
             stats_add(&bvh->blas[i]->tree, stats);
-    for (uint32_t i = 0; i < bvh->thin_count; i++)
-        if (bvh->thin[i])
-            stats_add(&bvh->thin[i]->blas.tree, stats);
+    for (uint32_t i = 0; bvh->own && i < bvh->instance_count; i++)
+        if (bvh->own[i])
+            stats_add(&bvh->own[i]->blas.tree, stats);
     memcpy(stats->bounds_lower, bvh->tree->lower, sizeof stats->bounds_lower);
     memcpy(stats->bounds_upper, bvh->tree->upper, sizeof stats->bounds_upper);
 }
 
-trc_status trc_bvh_create(const struct trc_snapshot *snapshot, const struct trc_bvh *previous,
+trc_status trc_bvh_create(const struct trc_snapshot *snapshot, const struct trc_snapshot *before,
                           struct trc_mesh *const *replaced, const struct trc_bvh_options *options,
                           struct trc_pool *pool, struct trc_bvh **bvh_out,
                           struct trc_bvh_build_stats *stats_out) {
@@ -553,12 +650,17 @@ trc_status trc_bvh_create(const struct trc_snapshot *snapshot, const struct trc_
     struct trc_bvh *bvh = trc_alloc_zeroed(1, sizeof *bvh);
     if (!bvh)
         return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for the trees");
-    bvh->top.root = bvh->joined.root = TRC_REF_EMPTY;
+    bvh->top.root = TRC_REF_EMPTY;
+    bvh->instance_count = snapshot->instance_count;
     bvh->blas_count = snapshot->mesh_count;
     bvh->blas = trc_alloc_zeroed(bvh->blas_count ? bvh->blas_count : 1, sizeof *bvh->blas);
-    struct create_job job = {
-        .snapshot = snapshot, .options = options, .pool = pool, .bvh = bvh, .stats = &stats};
-    trc_status status = bvh->blas ? trees_build(&job, previous, replaced)
+    struct create_job job = {.snapshot = snapshot,
+                             .before = before,
+                             .options = options,
+                             .pool = pool,
+                             .bvh = bvh,
+                             .stats = &stats};
+    trc_status status = bvh->blas ? trees_build(&job, replaced)
                                   : trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for the trees");
     if (status != TRC_OK) {
         trc_bvh_destroy(bvh);
@@ -571,18 +673,23 @@ trc_status trc_bvh_create(const struct trc_snapshot *snapshot, const struct trc_
     return TRC_OK;
 }
 
+bool trc_bvh_has_own_tree(const struct trc_bvh *bvh, uint32_t instance) {
+    return bvh->own && bvh->own[instance];
+}
+
 void trc_bvh_destroy(struct trc_bvh *bvh) {
     if (!bvh)
         return;
     for (uint32_t i = 0; bvh->blas && i < bvh->blas_count; i++)
         trc_blas_release(bvh->blas[i]);
-    for (uint32_t i = 0; bvh->thin && i < bvh->thin_count; i++)
-        if (bvh->thin[i])
-            trc_blas_release(&bvh->thin[i]->blas);
+    for (uint32_t i = 0; bvh->own && i < bvh->instance_count; i++)
+        if (bvh->own[i])
+            trc_blas_release(&bvh->own[i]->blas);
     trc_tree_destroy(&bvh->top);
-    trc_tree_destroy(&bvh->joined);
+    joined_release(bvh->joined);
     trc_free(bvh->items);
     trc_free(bvh->blas);
-    trc_free(bvh->thin);
+    trc_free(bvh->own);
+    trc_free(bvh->is_joined);
     trc_free(bvh);
 }

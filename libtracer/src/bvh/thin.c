@@ -69,9 +69,10 @@ trc_status trc_thin_mesh(const struct trc_instance *instance, const struct trc_m
     return TRC_OK;
 }
 
-struct trc_thin *trc_thin_create(const struct trc_instance *instance, const struct trc_mesh *mesh) {
+struct trc_own_tree *trc_own_tree_create(const struct trc_instance *instance,
+                                         const struct trc_mesh *mesh) {
     const size_t bytes = instance->key_count * sizeof(struct trc_affine);
-    struct trc_thin *thin = trc_alloc_zeroed(1, sizeof *thin + bytes);
+    struct trc_own_tree *thin = trc_alloc_zeroed(1, sizeof *thin + bytes);
     if (!thin)
         return NULL;
     atomic_init(&thin->blas.refs, 1);
@@ -81,8 +82,8 @@ struct trc_thin *trc_thin_create(const struct trc_instance *instance, const stru
     return thin;
 }
 
-bool trc_thin_is_of(const struct trc_thin *thin, const struct trc_instance *instance,
-                    const struct trc_mesh *mesh) {
+bool trc_own_tree_is_of(const struct trc_own_tree *thin, const struct trc_instance *instance,
+                        const struct trc_mesh *mesh) {
     return thin->blas.mesh == mesh && thin->key_count == instance->key_count &&
            memcmp(thin->transforms, instance->object_to_world,
                   instance->key_count * sizeof(struct trc_affine)) == 0;

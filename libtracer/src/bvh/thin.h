@@ -14,10 +14,11 @@ trc_status trc_thin_mesh(const struct trc_instance *instance, const struct trc_m
 /* A tree to be filled and released as a trc_blas, for that instance of that mesh; NULL out of
  * memory.
  */
-struct trc_thin *trc_thin_create(const struct trc_instance *instance, const struct trc_mesh *mesh);
+struct trc_own_tree *trc_own_tree_create(const struct trc_instance *instance,
+                                         const struct trc_mesh *mesh);
 
 /* Whether a tree is that of the instance as it stands. */
-bool trc_thin_is_of(const struct trc_thin *thin, const struct trc_instance *instance,
-                    const struct trc_mesh *mesh);
+bool trc_own_tree_is_of(const struct trc_own_tree *thin, const struct trc_instance *instance,
+                        const struct trc_mesh *mesh);
 
 #endif

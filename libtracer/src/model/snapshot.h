@@ -145,8 +145,8 @@ struct trc_instance {
     uint8_t keeps_shape;   /* 1: displacement moves no vertices */
     uint8_t world_normals; /* 1: TRC_INSTANCE_WORLD_NORMALS, and that is seen */
     uint8_t is_identity;   /* 1: one key, which changes no point */
-    uint8_t is_thin; /* 1: some key's transform is (scene/affine.h); rays meet a tree of its own
-                         in world space */
+    uint8_t is_thin;       /* 1: some key's transform is (scene/affine.h) */
+    uint8_t in_world;      /* 1: rays meet a tree of its own in world space */
 };
 
 /* Entries of trc_camera.shutter_cdf_inverse. */

@@ -123,22 +123,31 @@ struct trc_blas {
     uint32_t transparent_count;
 };
 
-/* The tree of a thin instance, in world space. */
-struct trc_thin {
+/* The tree of one instance, in world space: of a thin one, or of one that would be joined but for
+ * what has changed. */
+struct trc_own_tree {
     struct trc_blas blas; /* first: it is released as one */
     uint32_t key_count;   /* of the instance, whose transforms follow */
     struct trc_affine transforms[];
 };
 
+/* The tree over all joined instances, in world space, shared between snapshots. */
+struct trc_joined_tree {
+    atomic_uint refs;
+    struct trc_tree tree;
+};
+
 struct trc_bvh {
     const struct trc_tree *tree; /* the TLAS, or the joined tree when it is all there is */
-    struct trc_tree top, joined;
+    struct trc_tree top;
+    struct trc_joined_tree *joined; /* NULL: nothing is */
     struct trc_item *items;
     struct trc_blas **blas; /* per snapshot mesh, NULL where only the joined tree has it */
     uint32_t blas_count;
-    struct trc_thin **thin; /* per snapshot instance, NULL where it is not thin or is joined; NULL
-                               where none has one */
-    uint32_t thin_count;
+    struct trc_own_tree *
+        *own;           /* per snapshot instance, NULL where it has none; NULL where none has */
+    uint8_t *is_joined; /* per snapshot instance */
+    uint32_t instance_count;
 };
 
 static inline const uint32_t *trc_node_children(const struct trc_tree *t, uint32_t node) {

@@ -104,7 +104,7 @@ static trc_status build_bvh(struct trc_scene_state *scene, const struct trc_snap
                                             .rebuilt = rebuilt,
                                             .cancel = &scene->cancel};
     struct trc_bvh *bvh;
-    const trc_status status = trc_bvh_create(s, former ? former->snapshot.bvh : NULL, replaced,
+    const trc_status status = trc_bvh_create(s, former ? &former->snapshot : NULL, replaced,
                                              &options, scene->pool, &bvh, &block->build);
     trc_free(replaced);
     trc_free(rebuilt);
@@ -140,7 +140,10 @@ static trc_status collect_bvh(struct trc_scene_state *scene,
         block->takes_rebuild = trc_rebuild_is_done(scene->rebuild);
         TRC_TRY(build_bvh(scene, former, block));
     }
-    block->snapshot.bvh = block->bvh->object;
+    struct trc_snapshot *s = &block->snapshot;
+    s->bvh = block->bvh->object;
+    for (uint32_t i = 0; i < s->instance_count; i++)
+        s->instances[i].in_world = trc_bvh_has_own_tree(s->bvh, i);
     return TRC_OK;
 }
 

@@ -380,7 +380,7 @@ static void walk_packets(struct walk *w, struct trc_live mask, bool any) {
 /* The rays of mask through w's tree as w's instance has it. */
 static void walk_instance(struct walk *w, struct trc_live mask, bool any) {
     const struct trc_instance *instance = &w->snapshot->instances[w->instance];
-    if (instance->is_identity | instance->is_thin) { /* the tree is in world space */
+    if (instance->is_identity | instance->in_world) { /* the tree is in world space */
         walk_packets(w, mask, any);
         return;
     }
