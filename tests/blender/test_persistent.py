@@ -149,6 +149,24 @@ def _animate(scene):
     _key(key, "value", [0.0, 0.5, 1.0, 0.2])
 
 
+def _sprout(scene):
+    """An object whose nodes make instances from frame 3 on."""
+    import scenes
+    stem = scenes.sphere("Stem", 0.5, (1.5, -1.0, 1.0), scenes.material("Leaf", "ShaderNodeBsdfDiffuse"))
+    nodes = scenes.geometry_nodes(stem, "GeometryNodeJoinGeometry")
+    tree = stem.modifiers["Nodes"].node_group
+    points, leaf, time, later = (tree.nodes.new(kind) for kind in (
+        "GeometryNodeInstanceOnPoints", "GeometryNodeMeshCube", "GeometryNodeInputSceneTime", "ShaderNodeMath"))
+    leaf.inputs["Size"].default_value = (0.3, 0.3, 0.3)
+    later.operation, later.inputs[1].default_value = 'GREATER_THAN', 2.5
+    own = next(node for node in tree.nodes if node.type == 'GROUP_INPUT').outputs[0]
+    tree.links.new(own, points.inputs["Points"])
+    tree.links.new(leaf.outputs["Mesh"], points.inputs["Instance"])
+    tree.links.new(time.outputs["Frame"], later.inputs[0])
+    tree.links.new(later.outputs[0], points.inputs["Selection"])
+    tree.links.new(points.outputs[0], nodes[0].inputs[0])
+
+
 def _frames(scene, keeps):
     """Pictures of an animation, and how many walks it took until each was written."""
     import bpy
@@ -167,11 +185,11 @@ def _frames(scene, keeps):
     return [scenes.load(scene.render.frame_path(frame=frame)) for frame in frames], until
 
 
-def inside_animation():
+def inside_animation(animate):
     """[(walks until then, difference from a render that keeps nothing, from the frame before)] of frames 2, 3, 4."""
     import tempfile
     scene = _scene()
-    _animate(scene)
+    globals()[animate](scene)
     scene.frame_start, scene.frame_end = 1, 4
     scene.render.image_settings.file_format = 'OPEN_EXR'
     scene.render.filepath = tempfile.mkdtemp(prefix="volley_") + "/"
@@ -183,10 +201,16 @@ def inside_animation():
 
 def test_frames_are_those_of_renders_that_keep_nothing(blender):
     """What is animated alone is looked at; an object that is hidden or shown takes a walk."""
-    (first, *_), (second, *_), (third, *_) = found = blender.run(inside_animation)
+    (first, *_), (second, *_), (third, *_) = found = blender.run(inside_animation, "_animate")
     assert [difference for _walks, difference, _change in found] == [0.0] * 3
     assert all(change > 0.05 for _walks, _difference, change in found)
     assert (first, second, third) == (2, 3, 3), found
+
+
+def test_instances_may_appear_in_time(blender):
+    found = blender.run(inside_animation, "_sprout")
+    assert [difference for _walks, difference, _change in found] == [0.0] * 3
+    assert found[1][2] > 0.05, found
 
 
 def inside_warnings():

@@ -9,6 +9,8 @@ hides or shows objects names the scene or a collection, and so do the settings o
 
 import bpy
 
+from ..compat import uses_nodes
+
 
 class Changes:
     """What to look at again. ``full``: everything."""
@@ -36,7 +38,7 @@ class Changes:
         what may read files and texts, of which it names none."""
         changes = cls()
         changes.all_materials = changes.world = True
-        changes.lights = {light.name_full for light in bpy.data.lights if light.use_nodes}
+        changes.lights = {light.name_full for light in bpy.data.lights if uses_nodes(light)}
         for update in depsgraph.updates:
             changes._mark(update)
         return changes

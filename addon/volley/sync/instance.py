@@ -96,6 +96,12 @@ def hair_key(instance, number):
     return key_of(instance) + ("hair", number)
 
 
+def may_instance(evaluated):
+    """Whether an object may have begun to make instances of others: nodes may at any frame."""
+    return evaluated.instance_type != 'NONE' or any([modifier.type in {'NODES', 'PARTICLE_SYSTEM'}
+                                                     for modifier in evaluated.modifiers])
+
+
 # Types of objects that 3D views call otherwise.
 _VIEW_KINDS = {'SURFACE': "surf", 'GPENCIL': "grease_pencil", 'GREASEPENCIL': "grease_pencil"}
 

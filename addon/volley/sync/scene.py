@@ -69,11 +69,12 @@ class SceneSync:
         in_world = self._meshes.in_world() if source.v3d is None else set()
         self._instances.update(walk.items.values(), self._meshes.ids(), in_world, self._materials.moving())
         self._lights.update(walk.lights)
-        self._shown = Shown(walk, source, self.warnings.after(told)) if shutter is None else None
+        told_by_walk = self.warnings.after(told)
         self._sync_world(source)
         self._meshes.end()
         self._materials.end()
         self._images.end()
+        self._shown = Shown(walk, source, told_by_walk) if shutter is None else None
 
     def _update_part(self, source):
         """Bring up to date what changed, without a walk over everything; False where one is needed,

@@ -53,6 +53,8 @@ class Shown:
         evaluated = original.evaluated_get(source.depsgraph)
         if not evaluated.is_evaluated or not self.links.knows(evaluated):
             return None
+        if source.v3d is None and name in source.changes.geometry and instance.may_instance(evaluated):
+            return None
         each = instance.Plain(evaluated)
         key = instance.key_of(each)
         if key in self.items or key in self._lights:
