@@ -2,9 +2,9 @@
 """What an edit costs in a final render with persistent data, beside Cycles.
 
     BLENDER_USER_SCRIPTS=$PWD/build/blender blender -b --factory-startup --addons volley,cycles \\
-        --python tests/bench/final_edits.py -- [--repeats N] [--json FILE]
+        --python tests/bench/final_edits.py -- [--objects N...] [--repeats N] [--json FILE]
 
-Two fields of objects, each of a mesh of its own of 200 triangles, are rendered again after each edit of
+Fields of objects, each of a mesh of its own of 200 triangles, are rendered again after each edit of
 edit_kinds.py, after none and on a frame on which one object has moved: small pictures of one sample. Times
 are medians in milliseconds: sync is Python and the copies it makes, commit builds trees and tables, whole is
 the operator with Blender's own evaluation, cycles the same by Cycles.
@@ -26,7 +26,6 @@ import edit_kinds  # noqa: E402  (found by the line above)
 import scenes  # noqa: E402
 import viewport_scenes  # noqa: E402
 
-OBJECT_COUNTS = (1000, 10000)
 CELLS = 10  # quads along a side of each object's grid
 PICTURE = (96, 54)
 COLUMNS = ("sync_ms", "commit_ms", "whole_ms", "cycles_ms")
@@ -119,11 +118,12 @@ def run(count, repeats):
 
 def main():
     parser = argparse.ArgumentParser(prog="final_edits.py")
+    parser.add_argument("--objects", type=int, nargs="+", default=(1000, 10000), help="of each field")
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("--json", help="write the rows there, one object per line")
     arguments = parser.parse_args(sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else [])
     print(f"{'edit, ms':22}" + "".join(f"{key[:-3]:>10}" for key in COLUMNS))
-    rows = [row for count in OBJECT_COUNTS for row in run(count, arguments.repeats)]
+    rows = [row for count in arguments.objects for row in run(count, arguments.repeats)]
     if arguments.json:
         with open(arguments.json, "w", encoding="utf-8") as file:
             file.writelines(json.dumps(row) + "\n" for row in rows)

@@ -207,13 +207,13 @@ def test_parts_keep_what_they_were_measured_with(tmp_path):
 
 
 def test_parts_of_two_machines_are_told_apart():
-    old = machine.of_part({"date": "2026-01-01", "commit": "a", "cpu": "One", "processors": 2})
-    new = machine.of_part({"date": "2026-01-02", "commit": "b", "cpu": "Two", "processors": 4})
+    old = machine.of_part({"date": "2026-01-01", "commit": "a", "cpu": "One", "processors": 2, "isa": "avx2"})
+    new = machine.of_part({"date": "2026-01-02", "commit": "b", "cpu": "Two", "processors": 4, "isa": "neon"})
     assert machine.names({"parts": {"frames": old, "blender": old, "kernels": new}}) == [
-        "Two, 4 logical processors", "One, 2 logical processors"]
+        "Two, 4 logical processors, neon", "One, 2 logical processors, avx2"]
     assert document.where(new, {"parts": {"kernels": new}}) == ""
     assert document.where(old, {"parts": {"frames": old, "kernels": new}}) == (
-        ", One, 2 logical processors")
+        ", One, 2 logical processors, avx2")
 
 
 # FLIP --------------------------------------------------------------------------------------------

@@ -71,7 +71,6 @@ def head(results):
         ["load before", str(machine["load_before"])],
         ["system", machine["system"]],
         ["compiler", machine["compiler"]],
-        ["instruction set", machine["isa"]],
         ["Volley", ", ".join(f"{part} {made['commit']} ({made['date']}{where(made, machine)})"
                              for part, made in machine["parts"].items())],
         ["against", ", ".join(filter(None, (

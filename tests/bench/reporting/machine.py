@@ -38,8 +38,8 @@ def of_part(described):
 
 
 def name_of(described):
-    """A machine in a few words."""
-    return f"{described['cpu']}, {described['processors']} logical processors"
+    """A machine in a few words, with the instruction set that the library chooses there."""
+    return f"{described['cpu']}, {described['processors']} logical processors, {described['isa']}"
 
 
 def names(described):

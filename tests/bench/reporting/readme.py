@@ -32,7 +32,7 @@ def headline(report=COMMITTED):
     machine = results["machine"]
     lines = [f"- {line}" for line in error_sections.headline_lines(results)]
     lines += ["", f"Measured on {' and '.join(names(machine))}, "
-                  f"{machine['isa']}, {machine['date'][:10]}, by `bash tests/bench/report.sh`; all of "
+                  f"{machine['date'][:10]}, by `bash tests/bench/report.sh`; all of "
                   "it, losing cases first: [the report](tests/bench/report/report.md)."]
     for name, title in PLOTS.items():
         if (report / "plots" / f"{name}.svg").exists():

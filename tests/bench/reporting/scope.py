@@ -36,6 +36,7 @@ class Scope:
     denoise: bool           # Volley with Denoise beside it
     elsewhere: bool         # with newer Blenders and Embree too, in the scope of NEXT
     farm: bool              # commands of farms
+    edited_objects: tuple   # numbers of them in scenes that are edited between final renders
     hair_scenes: tuple      # a whole F12 in a new Blender
     file_scenes: tuple      # too, without those of the folder of scenes
     whole_reference_samples: int  # of both
@@ -62,7 +63,8 @@ QUICK = Scope(
     name="quick", minutes=4,
     scenes=("area_light", "gallery"), sampler_scenes=(), samples=(1, 4, 16), time_samples=(1, 4, 16),
     seeds=3, reference_samples=128, reference_seeds=2, light_samples=(1, 4), repeats=3, times_scale=2,
-    denoise=False, elsewhere=False, farm=False, hair_scenes=(), file_scenes=(), whole_reference_samples=128,
+    denoise=False, elsewhere=False, farm=False, edited_objects=(), hair_scenes=(), file_scenes=(),
+    whole_reference_samples=128,
     classic_scenes=("classic",), classic_width=256,
     kernel_scenes=("character",),
     kernel_arguments=("--order", "auto", "--motion", "still", "--repeats", "3", "--tiles", "8",
@@ -77,6 +79,7 @@ MEDIUM = Scope(
     scenes=EFFECTS + JOINED, sampler_scenes=("gallery",), samples=(1, 4, 16, 64, 256, 1024),
     time_samples=(1, 4, 16, 64), seeds=10, reference_samples=1024, reference_seeds=4,
     light_samples=(1, 4), repeats=3, times_scale=TIMES_SCALE, denoise=True, elsewhere=True, farm=True,
+    edited_objects=(1000, 10000),
     hair_scenes=HAIR, file_scenes=FILES, whole_reference_samples=128,
     classic_scenes=("classic", "classic_soft"), classic_width=320,
     kernel_scenes=("conference", "pool_hall", "character"),
@@ -90,7 +93,7 @@ FULL = Scope(
     scenes=EFFECTS + JOINED, sampler_scenes=EFFECTS + JOINED,
     samples=tuple(2 ** i for i in range(11)), time_samples=(1, 4, 16, 64, 256),
     seeds=10, reference_samples=4096, reference_seeds=8, light_samples=(1, 2, 4, 8), repeats=5,
-    times_scale=TIMES_SCALE, denoise=True, elsewhere=True, farm=True,
+    times_scale=TIMES_SCALE, denoise=True, elsewhere=True, farm=True, edited_objects=(1000, 10000),
     hair_scenes=HAIR, file_scenes=FILES, whole_reference_samples=1024,
     classic_scenes=("classic", "classic_soft"), classic_width=640,
     kernel_scenes=("conference", "pool_hall", "character"),
