@@ -21,7 +21,7 @@ static double million_per_second(const struct mesh *mesh, double seconds) {
 /* Of the tree that holds the mesh. */
 static double sah_cost(trc_scene scene) {
     const struct trc_bvh *bvh = query_scene_snapshot(scene)->bvh;
-    return (double)(bvh->blas[0] ? bvh->blas[0]->tree.sah_cost : bvh->joined.sah_cost);
+    return (double)(bvh->blas[0] ? bvh->blas[0]->tree.sah_cost : bvh->joined->tree.sah_cost);
 }
 
 static bool build_once(const struct query_world *world, uint32_t threads, bool keep,
