@@ -1,4 +1,5 @@
-/* Trees of thin instances, which rays cannot be taken to the object space of. */
+/* Trees that one instance has for itself in world space, and the meshes of those that are thin,
+ * which rays cannot be taken to the object space of. */
 #ifndef TRACER_BVH_THIN_H
 #define TRACER_BVH_THIN_H
 

@@ -144,8 +144,8 @@ struct trc_bvh {
     struct trc_item *items;
     struct trc_blas **blas; /* per snapshot mesh, NULL where only the joined tree has it */
     uint32_t blas_count;
-    struct trc_own_tree *
-        *own;           /* per snapshot instance, NULL where it has none; NULL where none has */
+    /* Per snapshot instance; NULL where it has none, or none has. */
+    struct trc_own_tree **own;
     uint8_t *is_joined; /* per snapshot instance */
     uint32_t instance_count;
 };
