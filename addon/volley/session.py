@@ -114,9 +114,9 @@ class Session:
         engine.update_stats("", "Reading the scene")
         scene = depsgraph.scene_eval
         now = motion.split_frame(scene.frame_current_final)
-        shown = depsgraph.as_pointer(), scene.name_full, depsgraph.view_layer_eval.name
         moved = shutter is not None
-        is_same = not moved and self._synchronised == shown
+        shown = depsgraph.as_pointer(), scene.name_full, depsgraph.view_layer_eval.name
+        is_same = self._synchronised == shown
         self._synchronised = None  # until all is done: Blender names what changed once
         changes = Changes.since_render(depsgraph) if is_same else Changes.everything()
         source = Source(depsgraph, changes, engine=engine,
@@ -128,6 +128,7 @@ class Session:
         try:
             if moved and shutter.frame_at(motion.CENTER) != now:
                 engine.frame_set(*shutter.frame_at(motion.CENTER))
+                changes.note(depsgraph)
             cameras.look(motion.CENTER)
             source.culling = culling.of(scene, next(iter(cameras.keys.values())))
             source.dicing = dicing.Dicing(scene, next(iter(cameras.keys.values())), frame, True,
@@ -136,8 +137,7 @@ class Session:
         finally:
             if moved:
                 engine.frame_set(*now)
-        if not moved:
-            self._synchronised = shown
+        self._synchronised = shown
         return list(cameras.keys.items())
 
     def _commit(self, engine):

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Final renders with persistent data read again what changed alone."""
 
+import pytest
+
 FRESH_EVERY = 10  # renders, of which the last is compared with one that keeps nothing
 
 
@@ -31,24 +33,32 @@ def _checking_reads(found):
     return undo
 
 
-def _scene():
-    """The scene of the edits with one view layer and without motion blur, which has every mesh read."""
+def _scene(shutter=None):
+    """The scene of the edits with one view layer; shutter: its position, None without motion blur."""
+    import bpy
     import edits
+    import scenes
     scene = edits.make_scene()
     scene.render.use_persistent_data = True
-    scene.render.use_motion_blur = False
+    if shutter is not None:
+        scenes.set_shutter(scene, shutter)
+        bone = bpy.data.objects["Rig"].pose.bones["Bone"]
+        bone.rotation_mode = 'XYZ'
+        for frame in (1, 20):
+            bone.rotation_euler.x = 0.1 * frame
+            bone.keyframe_insert("rotation_euler", frame=frame)
     for layer in scene.view_layers[1:]:
         layer.use = False
     scene.volley.samples = 1
     return scene
 
 
-def inside_random_edits(seed, count):
+def inside_random_edits(seed, count, shutter):
     import random
     import bpy
     import edits
     import scenes
-    scene = _scene()
+    scene = _scene(shutter)
     random = random.Random(seed)
     found = {"read": 0, "kept": 0, "stale": [], "renders": 0, "differ": []}
     scenes.render()
@@ -75,8 +85,12 @@ def inside_random_edits(seed, count):
     return found
 
 
-def test_meshes_that_are_kept_are_as_they_would_be_read(blender):
-    found = blender.run(inside_random_edits, 1, 150)
+SHUTTERS = pytest.mark.parametrize("shutter", [None, 'CENTER', 'START'])
+
+
+@SHUTTERS
+def test_meshes_that_are_kept_are_as_they_would_be_read(blender, shutter):
+    found = blender.run(inside_random_edits, 1, 150, shutter)
     assert found["stale"] == [] and found["differ"] == []
     assert found["read"] > 30 and found["kept"] > 30
     assert found["walks"] < found["renders"], found
@@ -149,6 +163,26 @@ def _animate(scene):
     _key(key, "value", [0.0, 0.5, 1.0, 0.2])
 
 
+def _jolt(_scene):
+    """An object and a shape that a handler has elsewhere for a short while, of which Blender hears only then."""
+    import bpy
+    import scenes
+    bent = scenes.sphere("Bent", 0.5, (0.0, -1.0, -1.0), bpy.data.materials["Plain"])
+    bent.shape_key_add(name="Basis")
+    tall = bent.shape_key_add(name="Tall")
+    tall.value = 0.0  # as it is before 5.0
+    for point in tall.data:
+        point.co.z *= 2.0
+    lid = scenes.wall("Jolted", 0.5, -1.0, material=bpy.data.materials["Plain"])
+
+    def jolt(scene, _depsgraph=None):
+        value = float(2.1 < scene.frame_current_final < 2.4)
+        if lid.location.x != value:
+            lid.location.x = tall.value = value
+
+    bpy.app.handlers.frame_change_pre.append(jolt)
+
+
 def _sprout(scene):
     """An object whose nodes make instances from frame 3 on."""
     import scenes
@@ -185,10 +219,10 @@ def _frames(scene, keeps):
     return [scenes.load(scene.render.frame_path(frame=frame)) for frame in frames], until
 
 
-def inside_animation(animate):
+def inside_animation(animate, shutter=None):
     """[(walks until then, difference from a render that keeps nothing, from the frame before)] of frames 2, 3, 4."""
     import tempfile
-    scene = _scene()
+    scene = _scene(shutter)
     globals()[animate](scene)
     scene.frame_start, scene.frame_end = 1, 4
     scene.render.image_settings.file_format = 'OPEN_EXR'
@@ -199,16 +233,25 @@ def inside_animation(animate):
             for n in range(1, 4)]
 
 
-def test_frames_are_those_of_renders_that_keep_nothing(blender):
+@SHUTTERS
+def test_frames_are_those_of_renders_that_keep_nothing(blender, shutter):
     """What is animated alone is looked at; an object that is hidden or shown takes a walk."""
-    (first, *_), (second, *_), (third, *_) = found = blender.run(inside_animation, "_animate")
+    (first, *_), (second, *_), (third, *_) = found = blender.run(inside_animation, "_animate", shutter)
     assert [difference for _walks, difference, _change in found] == [0.0] * 3
     assert all(change > 0.05 for _walks, _difference, change in found)
     assert (first, second, third) == (2, 3, 3), found
 
 
-def test_instances_may_appear_in_time(blender):
-    found = blender.run(inside_animation, "_sprout")
+@SHUTTERS
+def test_what_moved_for_a_moment_is_seen_to_stand_still(blender, shutter):
+    found = blender.run(inside_animation, "_jolt", shutter)
+    assert [difference for _walks, difference, _change in found] == [0.0] * 3
+    assert all(change > 0.05 for _walks, _difference, change in found[:2])
+
+
+@SHUTTERS
+def test_instances_may_appear_in_time(blender, shutter):
+    found = blender.run(inside_animation, "_sprout", shutter)
     assert [difference for _walks, difference, _change in found] == [0.0] * 3
     assert found[1][2] > 0.05, found
 

@@ -236,11 +236,7 @@ def inside_motion(position):
                 point.interpolation = 'LINEAR'
     scene = bpy.context.scene
     scene.frame_set(2)
-    scene.render.use_motion_blur, scene.render.motion_blur_shutter = True, 0.5
-    if hasattr(scene.render, "motion_blur_position"):
-        scene.render.motion_blur_position = position
-    else:
-        scene.cycles.motion_blur_position = position
+    scenes.set_shutter(scene, position)
     cube.cycles.motion_steps = 3
     told, original = _Recorder(), native.Scene
     told.stats_features = []

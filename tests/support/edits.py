@@ -193,6 +193,18 @@ def shadow_catcher(_random):
     ball.is_shadow_catcher = not ball.is_shadow_catcher
 
 
+def motion(random):
+    each = _some_mesh(random)
+    each.cycles.use_motion_blur, each.cycles.motion_steps = random.random() < 0.8, random.choice((1, 2))
+    each.update_tag()  # which properties of add-ons do only in the window
+
+
+def deform_motion(random):
+    each = _some_mesh(random)
+    each.cycles.use_deform_motion = not each.cycles.use_deform_motion
+    each.update_tag()
+
+
 def slot(random):
     each = _some_mesh(random)
     if each.material_slots:
@@ -231,4 +243,4 @@ def override(random):
 
 ALL = (pose, transform, move_instancer, move_light, light_energy, light_kind, material, node_link,
        node_group, image, world, settings, film_transparent, frame, add, duplicate, delete, hide,
-       ray_visibility, holdout, shadow_catcher, slot, vertices, shading, modifier, override)
+       ray_visibility, holdout, shadow_catcher, motion, deform_motion, slot, vertices, shading, modifier, override)

@@ -38,6 +38,13 @@ def empty(engine='VOLLEY', size=(64, 48), samples=4):
     return scene
 
 
+def set_shutter(scene, position='CENTER', length=0.5):
+    """Motion blur of a shutter (frames), of which that part is the current frame."""
+    scene.render.use_motion_blur, scene.render.motion_blur_shutter = True, length
+    owner = scene.render if hasattr(scene.render, "motion_blur_position") else scene.cycles
+    owner.motion_blur_position = position
+
+
 def set_engine(engine, samples):
     """Choose the engine; Cycles is held to the same light transport."""
     scene = bpy.context.scene

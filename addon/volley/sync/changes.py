@@ -39,20 +39,23 @@ class Changes:
         changes = cls()
         changes.all_materials = changes.world = True
         changes.lights = {light.name_full for light in bpy.data.lights if uses_nodes(light)}
-        for update in depsgraph.updates:
-            changes._mark(update)
+        changes.note(depsgraph)
         return changes
 
     @classmethod
     def of_depsgraph(cls, depsgraph):
         """Marks from the depsgraph's list of updates."""
         changes = cls()
-        for update in depsgraph.updates:
-            changes._mark(update)
+        changes.note(depsgraph)
         if not depsgraph.updates:
             # A frame change without animation, or something Blender does not name.
             changes.full = True
         return changes
+
+    def note(self, depsgraph):
+        """Add what Blender names, which it forgets at the next change of time."""
+        for update in depsgraph.updates:
+            self._mark(update)
 
     def merge(self, later):
         """Add the marks of a later update."""

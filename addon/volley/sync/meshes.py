@@ -12,7 +12,7 @@ class MeshEntry:
     diced_by: see MeshData."""
 
     __slots__ = ("id", "pointer", "topology", "shape", "names", "corners", "normal_kind", "poses",
-                 "diced_by", "may_be_in_world")
+                 "diced_by", "may_be_in_world", "is_deforming")
 
 
 class Meshes:
@@ -65,7 +65,7 @@ class Meshes:
         entry.pointer, entry.topology, entry.shape, entry.names = pointer, topology, shape, names
         entry.poses, entry.corners, entry.normal_kind = data.poses, data.corners, data.normal_kind
         entry.diced_by = data.diced_by
-        entry.may_be_in_world = not data.dicing
+        entry.may_be_in_world, entry.is_deforming = not data.dicing, len(positions) > 1
         self._seen.add(key)
 
     def pose(self, key, pointer, mesh, is_known):
@@ -107,6 +107,11 @@ class Meshes:
             self._retired.append(self._entries[key].id)
         self._entries[key] = entry
         return entry
+
+    def is_deforming(self, key):
+        """Whether a mesh has several shapes."""
+        entry = self._entries.get(key)
+        return entry is not None and entry.is_deforming
 
     def brings(self, key, color_names):
         """Whether a mesh was read with those attributes."""

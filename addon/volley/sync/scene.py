@@ -9,11 +9,12 @@ import bpy
 from .. import native
 from ..compat import uses_nodes
 from ..log import Warnings
-from . import camera, deform, image, instance, light, mesh, meshes, studio, world
+from . import camera, deform, image, instance, light, mesh, meshes, motion, studio, world
+from .changes import Changes
 from .image import Images
 from .material import Materials
 from .shown import Shown
-from .walk import Walk, dress, materials_of
+from .walk import Walk, materials_of
 
 
 @contextlib.contextmanager
@@ -44,6 +45,7 @@ class SceneSync:
         self._lights = light.Lights(self.scene, self.warnings)
         self._world = None   # what the library was last given of it
         self._shown = None   # what the last full walk found
+        self._moved, self._deformed = set(), set()  # names of objects that did so while the shutter was open
 
     def destroy(self):
         """Free the library's scene."""
@@ -54,7 +56,9 @@ class SceneSync:
         """Bring everything but the camera up to date. With a shutter, Blender is moved through it;
         camera_keys(fraction) is called at each time to look at the camera too. The caller restores
         the frame."""
-        if shutter is None and self._update_part(source):
+        source.changes.objects |= self._moved | self._deformed  # though they may stand still now
+        source.changes.geometry |= self._deformed
+        if self._update_part(source, shutter, camera_keys):
             return
         self._images.begin(source.changes, size_limit(source), source.depsgraph.scene_eval.frame_current)
         self._materials.begin(source.depsgraph, source.changes, source.aovs)
@@ -63,20 +67,23 @@ class SceneSync:
         told = self.warnings.count()
         walk = Walk(self, source, shutter)
         walk.run()
+        messages = self.warnings.after(told)
         if shutter is not None:
             walk.follow_motion(camera_keys)
+        told = self.warnings.count()  # what moves is looked at again by each sync
         walk.send_deforming()
         in_world = self._meshes.in_world() if source.v3d is None else set()
         self._instances.update(walk.items.values(), self._meshes.ids(), in_world, self._materials.moving())
         self._lights.update(walk.lights)
-        told_by_walk = self.warnings.after(told)
+        messages += self.warnings.after(told)
         self._sync_world(source)
         self._meshes.end()
         self._materials.end()
         self._images.end()
-        self._shown = Shown(walk, source, told_by_walk) if shutter is None else None
+        self._moved, self._deformed = walk.movers()
+        self._shown = Shown(walk, source, messages)
 
-    def _update_part(self, source):
+    def _update_part(self, source, shutter, camera_keys):
         """Bring up to date what changed, without a walk over everything; False where one is needed,
         which is safe at any point before the end."""
         changes, shown = source.changes, self._shown
@@ -98,54 +105,73 @@ class SceneSync:
             self._sync_world(source)
         if self._materials.read_names() != names:
             return False
+        walk = Walk(self, source, shutter, shown.links)
         for each in touched:
-            if each is not shown.IRRELEVANT and not self._change_object(each, shown, source):
+            if each is not shown.IRRELEVANT and not self._change_object(each, shown, walk, source):
                 return False
+        if shutter is not None and not self._follow_part(walk, shutter, camera_keys, source):
+            return False
+        walk.send_deforming()
+        for item in walk.items.values():
+            self._instances.change(item, self._meshes.id_of(item.mesh_key), self._materials.moving())
+        self._meshes.free_retired()
         self._images.end()
+        self._moved, self._deformed = walk.movers()
         if self.is_final:
             shown.warn_again(self.warnings)
         self._shown = shown
         return True
 
-    def _change_object(self, each, shown, source):
-        """Bring one object up to date; False where its mesh must be read in a walk."""
-        name, view_layer = each.object.name_full, source.depsgraph.view_layer_eval
-        if instance.is_light(each):
-            item = instance.describe(each, view_layer, source.light_groups, shown.links)
-            fields = light.describe(each.object, item, self._materials, self.warnings)
-            return fields is not None and self._lights.change(item.key, fields)
-        known = shown.items[instance.key_of(each)]
-        made_of = materials_of(each.object, view_layer)
-        ids, is_volume = self._materials.ids_of(made_of)
-        if is_volume:
-            return False
-        if not self._meshes.brings(known.mesh_key, self._materials.tangents_read_by(filter(None, made_of))):
-            return False
-        if name in source.changes.geometry and not self._change_mesh(each, known, shown, source):
-            return False
-        item = instance.describe(each, view_layer, source.light_groups, shown.links)
-        item.mesh_key, item.materials = known.mesh_key, ids
-        dress(item, self._materials, each, made_of, view_layer, self._materials.instance_values(),
-              source.depsgraph.scene_eval)
-        self._instances.change(item, self._meshes.id_of(item.mesh_key), self._materials.moving())
-        self._meshes.free_retired()
+    def _follow_part(self, walk, shutter, camera_keys, source):
+        """Look at what moves at its other times; False where Blender names anything else there, which is marked."""
+        depsgraph = source.depsgraph
+        for fraction in walk.times(camera_keys):
+            named = Changes()
+            named.note(depsgraph)
+            if named.structure or not (named.objects <= source.changes.objects
+                                       and named.geometry <= source.changes.geometry):
+                source.changes.merge(named)
+                source.engine.frame_set(*shutter.frame_at(motion.CENTER))
+                return False
+            for item in walk.items.values():
+                evaluated = bpy.data.objects[item.owner].evaluated_get(depsgraph)
+                walk.look_again(item, instance.Plain(evaluated), fraction)
         return True
 
-    def _change_mesh(self, each, known, shown, source):
+    def _change_object(self, each, shown, walk, source):
+        """Bring one object up to date, but for its instance, which becomes an item of the walk; False where its mesh
+        must be read in a walk over everything."""
+        if instance.is_light(each):
+            item = walk.describe(each)
+            fields = light.describe(each.object, item, self._materials, self.warnings)
+            return fields is not None and self._lights.change(item.key, fields)
+        item = walk.item_of(each)
+        if item is None:
+            return False
+        item.mesh_key = shown.items[item.key].mesh_key
+        made_of = materials_of(each.object, source.depsgraph.view_layer_eval)
+        if not self._meshes.brings(item.mesh_key, self._materials.tangents_read_by(filter(None, made_of))):
+            return False
+        if item.owner in source.changes.geometry and not self._change_mesh(item, each, shown, walk, source):
+            return False
+        walk.items[item.key] = item
+        return True
+
+    def _change_mesh(self, item, each, shown, walk, source):
         """Send the mesh of one object, of a viewport's pose the places of its vertices alone; False where others
         show it too or it has no faces now."""
-        if shown.users[known.mesh_key] != 1:
+        if shown.users[item.mesh_key] != 1:
             return False
         changes, blender_object = source.changes, each.object
         pointer = blender_object.data.as_pointer()
-        is_pose = known.owner not in changes.topology and deform.is_posable(blender_object)
+        is_pose = item.owner not in changes.topology and deform.is_posable(blender_object)
         if is_pose and not self.is_final:  # renders cut bent faces as they would be cut anew
             is_known = deform.keeps_topology(blender_object) \
                 and blender_object.original.data.name_full not in changes.meshes
             with mesh.shown_mesh(blender_object) as shape:
-                if self._meshes.pose(known.mesh_key, pointer, shape, is_known):
+                if self._meshes.pose(item.mesh_key, pointer, shape, is_known):
                     return True
-        return Walk(self, source, None).read_mesh(known, each, pointer)
+        return walk.read_mesh(item, each, pointer)
 
     def _sync_materials(self, source):
         """Flatten the materials first: they say which attributes the meshes must bring. Their images, and

@@ -14,15 +14,6 @@ from .source import Cancelled
 _BREAK_INTERVAL = 32  # instances between two looks at whether the user pressed Esc
 
 
-def dress(item, materials, each, made_of, view_layer, values_of, scene):
-    """Note the ids of the holes in place of an instance's materials, and the values that these read of it.
-    made_of: what materials_of() gave, or a part."""
-    if values_of is not None:
-        item.values = values_of(each, scene)
-    if visibility.is_holdout(each.object, instance.maker_of(each), view_layer):
-        item.holes = materials.holes_of(made_of)
-
-
 def materials_of(blender_object, view_layer):
     """What an object is made of, slot by slot, None where a slot is empty and of one that has no slots."""
     if view_layer.material_override is not None:
@@ -44,7 +35,7 @@ class _Deforming:
 class Walk:
     """One sync's walks over the depsgraph: the first finds everything, more follow motion."""
 
-    def __init__(self, sync, source, shutter):
+    def __init__(self, sync, source, shutter, links=None):
         self._sync, self._source, self._shutter = sync, source, shutter
         self._view_layer, self._scene = source.depsgraph.view_layer_eval, source.depsgraph.scene_eval
         uv_names, color_names, needs_generated, self._tangent_readers = sync._materials.attribute_names()
@@ -61,7 +52,7 @@ class Walk:
         self.tied = set()     # names of objects that are instanced or make instances
         self._volumes = set()  # names of objects of volumes
         self._shining = set()  # and of strands and points that emit
-        self.links = Links(source.depsgraph, sync.warnings)
+        self.links = Links(source.depsgraph, sync.warnings) if links is None else links
 
     def run(self):
         """Find what is there now."""
@@ -96,23 +87,34 @@ class Walk:
             also = f" and {more} more" if more else ""
             self._sync.warnings.add(f"{text}: object '{first}'{also} {does}")
 
-    def follow_motion(self, camera_keys):
-        """Look at every moving thing at its other times."""
+    def times(self, camera_keys):
+        """Go to the other times at which something that may move wants to be looked at, each in turn."""
         counts = {item.motion_keys for item in self.items.values()}
         counts.add(camera_keys.count)
         for fraction in motion.fractions_of(counts):
+            if self._source.is_cancelled():
+                raise Cancelled()
             self._source.engine.frame_set(*self._shutter.frame_at(fraction))
             camera_keys.look(fraction)
+            yield fraction
+
+    def follow_motion(self, camera_keys):
+        """Look at every moving thing at its other times."""
+        for fraction in self.times(camera_keys):
             for each in self._instances():
                 self._move_hair(each, fraction)
-                item = self.items.get(instance.key_of(each))
-                if item is not None:
-                    self._look_again(item, each, fraction)
+                self.look_again(self.items.get(instance.key_of(each)), each, fraction)
 
     def send_deforming(self):
         """Send the meshes that waited for their motion keys."""
         for key, waiting in self._deforming.items():
             self._sync._meshes.put(key, waiting.pointer, waiting.data, waiting.names, waiting.shapes)
+
+    def movers(self):
+        """Names of the objects that moved, and of those whose meshes changed their shapes, once these are sent."""
+        moved = {item.owner for item in self.items.values()
+                 if any(transform != item.transforms[0] for transform in item.transforms)}
+        return moved, {key[0] for key in self._deforming if self._sync._meshes.is_deforming(key)}
 
     def _instances(self):
         """Those that take part, by themselves or by their particles."""
@@ -127,34 +129,49 @@ class Walk:
         return materials_of(each.object, self._view_layer)
 
     def _dress(self, item, each, made_of):
-        dress(item, self._sync._materials, each, made_of, self._view_layer, self._values_of, self._scene)
+        """Note the ids of the holes in place of an instance's materials, and the values that these read of it.
+        made_of: what materials_of() gave, or a part."""
+        if self._values_of is not None:
+            item.values = self._values_of(each, self._scene)
+        if visibility.is_holdout(each.object, instance.maker_of(each), self._view_layer):
+            item.holes = self._sync._materials.holes_of(made_of)
 
-    def _describe(self, each):
+    def describe(self, each):
+        """The parts of an item that meshes and lights share."""
         return instance.describe(each, self._view_layer, self._source.light_groups, self.links)
 
     def _add_light(self, each):
         if not light.are_shown(self._source.v3d):
             return
-        item = self._describe(each)
+        item = self.describe(each)
         fields = light.describe(each.object, item, self._sync._materials, self._sync.warnings)
         if fields is not None:
             self.lights[item.key] = fields
 
     def _add_mesh_instance(self, each):
-        blender_object = each.object
+        item = self.item_of(each)
+        if item is not None:
+            item.mesh_key = self._mesh_key(item, each)
+            if item.mesh_key is not None:
+                self.items[item.key] = item
+
+    def item_of(self, each):
+        """An instance with a mesh as an item that has none yet, None where it is a volume."""
         made_of = self._materials_of(each)
         ids, is_volume = self._sync._materials.ids_of(made_of)
         if is_volume:  # those that pass many of its bounds would be seen through too often
-            return
-        item = self._describe(each)
+            return None
+        item = self.describe(each)
         item.materials = ids
         self._dress(item, each, made_of)
+        self._ask_keys(item, each)
+        return item
+
+    def _ask_keys(self, item, each):
+        """Have room for the motion keys that an object asks for."""
         if self._shutter is not None:
-            item.motion_keys = motion.key_count(blender_object, instance.maker_of(each))
+            item.motion_keys = motion.key_count(each.object, instance.maker_of(each))
             item.transforms *= item.motion_keys
-        item.mesh_key = self._mesh_key(item, each)
-        if item.mesh_key is not None:
-            self.items[item.key] = item
 
     def _add_hair(self, each):
         """The hair of an object's particle systems, each a mesh of one material."""
@@ -162,7 +179,7 @@ class Walk:
         is_final = self._source.v3d is None
         for number, modifier in strands.hair_systems(blender_object, is_final):
             self.tied.add(blender_object.name_full)  # only a walk sees what its hair does
-            item = self._describe(each)
+            item = self.describe(each)
             item.key = instance.hair_key(each, number)
             made_of = self._materials_of(each)
             slot = max(min(modifier.particle_system.settings.material, len(made_of)), 1) - 1
@@ -173,13 +190,11 @@ class Walk:
     def _move_hair(self, each, fraction):
         """Hair goes where its object goes, and by itself."""
         for number in range(len(each.object.particle_systems)):
-            item = self.items.get(instance.hair_key(each, number))
-            if item is not None:
-                self._look_again(item, each, fraction)
+            self.look_again(self.items.get(instance.hair_key(each, number)), each, fraction)
 
     def _add_strands(self, each):
         """A Curves or Point Cloud object."""
-        item = self._describe(each)
+        item = self.describe(each)
         self._make_of(item, each, self._materials_of(each)[0])
         self.tied.add(each.object.name_full)
         self._add_made(each, item, each.object.data.as_pointer(), strands.StrandObject(self._wanted_strands))
@@ -195,9 +210,7 @@ class Walk:
         """An item of strands or points (strands.Hair or strands.StrandObject) whose mesh is made unless another
         item of the same source has it. As in Cycles, displacement moves neither."""
         item.flags |= InstanceFlags.KEEPS_SHAPE
-        if self._shutter is not None:
-            item.motion_keys = motion.key_count(each.object, instance.maker_of(each))
-            item.transforms *= item.motion_keys
+        self._ask_keys(item, each)
         if source not in self._owners:
             self._owners[source] = item.key if self._put_made(each, item, source, made_of) else None
         item.mesh_key = self._owners[source]
@@ -299,8 +312,9 @@ class Walk:
                     names |= self._tangent_readers.get(material.name_full, set())
         return found
 
-    def _look_again(self, item, each, fraction):
-        index = motion.key_index(fraction, item.motion_keys)
+    def look_again(self, item, each, fraction):
+        """Note where an item, if there is one, is at that time, and which shape it has."""
+        index = None if item is None else motion.key_index(fraction, item.motion_keys)
         if index is None:
             return
         item.transforms[index] = rows(each.matrix_world)
