@@ -7,6 +7,7 @@ import bpy
 
 from ..abi import InstanceFlags
 from . import curves, deform, instance, light, mesh, motion, strands, visibility
+from .changes import Changes
 from .linking import Links
 from .matrix import rows
 from .source import Cancelled
@@ -100,8 +101,10 @@ class Walk:
 
     def follow_motion(self, camera_keys):
         """Look at every moving thing at its other times."""
+        named = Changes()
         for fraction in self.times(camera_keys):
-            for each in self._instances():
+            named.note(self._source.depsgraph)
+            for each in self._instances_of(named):
                 self._move_hair(each, fraction)
                 self.look_again(self.items.get(instance.key_of(each)), each, fraction)
 
@@ -124,6 +127,13 @@ class Walk:
                 raise Cancelled()
             if v3d is None or instance.is_in_view(each, v3d):
                 yield each
+
+    def _instances_of(self, named):
+        """The instances of what Blender has named; all where objects with hair or instances are among it."""
+        if named.structure or not self.tied.isdisjoint(named.objects):
+            return self._instances()
+        depsgraph = self._source.depsgraph
+        return [instance.Plain(bpy.data.objects[name].evaluated_get(depsgraph)) for name in named.objects]
 
     def _materials_of(self, each):
         return materials_of(each.object, self._view_layer)
