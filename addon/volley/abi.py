@@ -432,8 +432,10 @@ class RadialTilingMode(IntEnum):
     NORMALIZE = 1
 
 
-class MagicDepth(IntEnum):
+class MagicMode(IntEnum):
     MAX_DEPTH = 10
+    DEPTH_MASK = 15
+    SCALED_FIRST = 16
 
 
 class BrickMode(IntEnum):
@@ -969,7 +971,7 @@ ENUMERATIONS = {StatusCode: "TRC_", IsaId: "TRC_ISA_", CameraType: "TRC_CAMERA_"
                 VoronoiMetric: "TRC_VORONOI_", VoronoiFeature: "TRC_VORONOI_", VoronoiMode: "TRC_VORONOI_",
                 WaveProfile: "TRC_WAVE_", WaveDirection: "TRC_WAVE_", WaveMode: "TRC_WAVE_",
                 GradientType: "TRC_GRADIENT_", RadialTilingMode: "TRC_RADIAL_TILING_",
-                MagicDepth: "TRC_MAGIC_", BrickMode: "TRC_BRICK_", DistributionType: "TRC_DISTRIBUTION_",
+                MagicMode: "TRC_MAGIC_", BrickMode: "TRC_BRICK_", DistributionType: "TRC_DISTRIBUTION_",
                 BlendMode: "TRC_BLEND_", MathOperation: "TRC_MATH_", VectorOperation: "TRC_VECTOR_",
                 ImageInterpolation: "TRC_IMAGE_", ImageExtension: "TRC_IMAGE_",
                 ImageProjection: "TRC_IMAGE_", ImageMode: "TRC_IMAGE_",

@@ -83,6 +83,9 @@ HAS_BLENDED_FEATURES = bpy.app.version >= (5, 0, 0)
 # The vector pass has the motion of the background; seen in 5.2, not in 4.3.
 BACKGROUND_MOVES = bpy.app.version >= (5, 0, 0)
 
+# The Magic texture goes on where its coordinates are more than a turn; seen in 5.2, not in 4.3.
+SCALES_MAGIC_FIRST = bpy.app.version >= (5, 1, 0)
+
 # Rough diffuse surfaces keep their energy from 4.3 on.
 KEEPS_DIFFUSE_ENERGY = bpy.app.version >= (4, 3, 0)
 

@@ -94,6 +94,8 @@ for _kind in ("LINEAR", "QUADRATIC", "EASING", "DIAGONAL", "RADIAL", "QUADRATIC_
 for _depth in range(11):
     _add(f"magic {_depth}", "ShaderNodeTexMagic", ("Color", "Fac") if _depth == 2 else ("Color",),
          {"turbulence_depth": _depth}, Vector='vector', Scale=0.6, Distortion=1.3)
+_add("magic, far", "ShaderNodeTexMagic", ("Color",), {"turbulence_depth": 2}, Vector=(-30.0, 30.0), Scale=0.3,
+     Distortion=1.3)
 for _dimensions in ("2D", "3D"):
     for _anisotropy in (0.0, 0.6, 1.0):
         _add(f"gabor {_dimensions}, anisotropy {_anisotropy}", "ShaderNodeTexGabor",

@@ -141,7 +141,7 @@ static void test_counts_of_modes(void **state) {
         {TRC_NODE_GRADIENT, 7},
         {TRC_NODE_WHITE_NOISE, 4},
         {TRC_NODE_RADIAL_TILING, 2},
-        {TRC_NODE_MAGIC, 11},
+        {TRC_NODE_MAGIC, 11 * 2},
         {TRC_NODE_BRICK, 128 * 128},
         {TRC_NODE_VECTOR_TRANSFORM, 3 * 3 * 4},
         {TRC_NODE_VECTOR_ROTATE, 5 * 2},

@@ -6,9 +6,9 @@ None for a setting that is not supported. Sockets that 3.4 lacks (lacunarity, of
 values that its textures imply.
 """
 
-from ..abi import (BrickMode, FractalType, GradientType, NodeType, NoiseMode, RadialTilingMode, VoronoiFeature,
-                   VoronoiMetric, VoronoiMode, WaveDirection, WaveMode, WaveProfile)
-from ..compat import HAS_FAR_CELLS, HASHES_CELLS_BY_PCG
+from ..abi import (BrickMode, FractalType, GradientType, MagicMode, NodeType, NoiseMode, RadialTilingMode,
+                   VoronoiFeature, VoronoiMetric, VoronoiMode, WaveDirection, WaveMode, WaveProfile)
+from ..compat import HAS_FAR_CELLS, HASHES_CELLS_BY_PCG, SCALES_MAGIC_FIRST
 from .node_list import named_outputs, output
 from .sky_texture import sky_texture
 from .values import CONSTANT, DEFAULT, Value
@@ -123,7 +123,8 @@ def _gabor(walker, node, sockets):
 
 def _magic(walker, node, sockets):
     values = [sockets.get('v', "Vector"), sockets.get('f', "Scale"), sockets.get('f', "Distortion")]
-    index = walker.emit(NodeType.MAGIC, values, node.turbulence_depth)
+    mode = node.turbulence_depth | MagicMode.SCALED_FIRST * SCALES_MAGIC_FIRST
+    index = walker.emit(NodeType.MAGIC, values, mode)
     return named_outputs(index, NodeType.MAGIC, ("Color", "Fac"))
 
 

@@ -203,7 +203,13 @@ enum trc_gradient_type {
 
 enum trc_radial_tiling_mode { TRC_RADIAL_TILING_NORMALIZE = 1 };
 
-enum trc_magic_depth { TRC_MAGIC_MAX_DEPTH = 10 };
+enum trc_magic_mode {
+    TRC_MAGIC_MAX_DEPTH = 10,
+    TRC_MAGIC_DEPTH_MASK = 15,
+    /* Coordinates are scaled before whole turns are left out, as in Blender 5.2, not after it:
+     * where they are more than a turn, the pattern goes on without a seam. */
+    TRC_MAGIC_SCALED_FIRST = 1 << 4
+};
 
 enum trc_brick_mode { TRC_BRICK_ROWS_MASK = 127, TRC_BRICK_SQUASH_SHIFT = 7 };
 

@@ -129,7 +129,7 @@ static uint32_t last_mode(uint32_t op) {
     case TRC_OP_WAVE:
         return (3 << TRC_WAVE_DIRECTION_SHIFT) + TRC_WAVE_RINGS + TRC_WAVE_TRIANGLE;
     case TRC_OP_MAGIC:
-        return 10;
+        return TRC_MAGIC_SCALED_FIRST + TRC_MAGIC_MAX_DEPTH;
     case TRC_OP_BRICK:
         return 2 + (3 << TRC_BRICK_SQUASH_SHIFT);
     case TRC_OP_MAPPING:

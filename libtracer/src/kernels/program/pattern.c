@@ -1,4 +1,4 @@
-/* Regular patterns: the Wave, Magic and Brick textures, as in Cycles 3.4. */
+/* Regular patterns: the Wave, Magic and Brick textures, as in Cycles 3.4 (Magic: and 5.2). */
 #include "kernels/program/hash.h"
 #include "kernels/program/noise.h"
 #include "kernels/program/procedural.h"
@@ -80,17 +80,20 @@ TRC_INLINE vfloat magic_sum(const vfloat c[3], const int8_t of[3]) {
 
 void trc_program_magic(uint32_t mode, const vfloat *in, vfloat *out) {
     static const int8_t first[3][3] = {{1, 1, 1}, {-1, 1, -1}, {-1, -1, 1}};
-    const vfloat turn = vf_set(TRC_TWO_PI), scale = in[TRC_OP_AT(MAGIC, scale)];
+    const vfloat turn = vf_set(TRC_TWO_PI), one = vf_set(1.0f), scale = in[TRC_OP_AT(MAGIC, scale)];
+    const bool scaled_first = mode & TRC_MAGIC_SCALED_FIRST;
+    const vfloat before = scaled_first ? scale : one, after = scaled_first ? one : scale;
     const vfloat distortion = in[TRC_OP_AT(MAGIC, distortion)];
+    const uint32_t depth = mode & TRC_MAGIC_DEPTH_MASK;
     vfloat reduced[3], c[3];
     for (int i = 0; i < 3; i++)
-        reduced[i] = math_modulo(in[TRC_OP_AT(MAGIC, vector) + i], turn);
+        reduced[i] = math_modulo(in[TRC_OP_AT(MAGIC, vector) + i] * before, turn);
     for (int i = 0; i < 3; i++)
-        c[i] = magic_sum(reduced, first[i]) * vf_set(5.0f) * scale;
+        c[i] = magic_sum(reduced, first[i]) * vf_set(5.0f) * after;
     c[0] = vf_sin(c[0]);
     c[1] = vf_cos(c[1]);
     c[2] = -vf_cos(c[2]);
-    for (uint32_t k = 0; k < mode && k < TRC_MAGIC_MAX_DEPTH; k++) {
+    for (uint32_t k = 0; k < depth && k < TRC_MAGIC_MAX_DEPTH; k++) {
         const struct magic_fold *fold = &magic_folds[k];
         for (int i = 0; k == 0 && i < 3; i++)
             c[i] = c[i] * distortion;
