@@ -87,13 +87,13 @@ static void film_reconstruct(struct trc_film *film, const struct trc_kernels *ke
     void *memory = trc_alloc(kernels->denoise_memory_bytes(), 1);
     assert_non_null(memory);
     const uint32_t across = trc_film_tiles(WIDTH), count = across * trc_film_tiles(HEIGHT);
-    for (uint32_t phase = 0; phase < TRC_DENOISE_PHASE_COUNT; phase++)
+    for (uint32_t step = 0; step < denoise.step_count; step++)
         for (uint32_t i = 0; i < count; i++) {
             const uint32_t tile = backwards ? count - 1 - i : i;
             const uint32_t x = tile % across * TRC_TILE_SIZE, y = tile / across * TRC_TILE_SIZE;
             const struct trc_denoise_job job = {
                 &denoise,
-                phase,
+                step,
                 x,
                 y,
                 WIDTH - x < TRC_TILE_SIZE ? WIDTH - x : TRC_TILE_SIZE,
@@ -241,10 +241,10 @@ static void noisy(void **state) {
     const double light = mean_of(p.clean, EDGE, EDGE + 1) / (double)edge(EDGE, 0).light - 1.0;
     print_figure(
         "31: reconstruction of made films at 16 samples",
-        "error %.0f times lower on a flat surface, %.0f on a slope, %.0f at its border, %.0f "
+        "error %.1f times lower on a flat surface, %.1f on a slope, %.1f at its border, %.1f "
         "at an edge of albedo; means off by %.2g, %.2g and %.2g",
         flat_gain, ramp_gain, border_gain, edge_gain, flat_bias, dark, light);
-    assert_true(flat_gain > 6.5 && ramp_gain > 6.5 && border_gain > 4.0 && edge_gain > 2.0);
+    assert_true(flat_gain > 6.0 && ramp_gain > 6.0 && border_gain > 4.0 && edge_gain > 2.0);
     assert_true(fabs(flat_bias) < 0.01 && fabs(dark) < 0.06 && fabs(light) < 0.06);
 }
 
@@ -265,7 +265,7 @@ static void many_samples(void **state) {
 }
 
 /* What is lost in the noise of pixels but not in that of their surroundings is hardly blurred. With
- * estimates of single pixels alone the last ratio is 1.54. */
+ * estimates of single pixels alone the last ratio is 1.54, where no residue is given back 1.15. */
 static void broad_waves(void **state) {
     (void)state;
     static struct picture p;
@@ -279,7 +279,7 @@ static void broad_waves(void **state) {
                  "error of 5x5 pixels' means %.2f, %.2f, %.2f of plain ones' "
                  "at 16, 64, 256 samples",
                  ratio[0], ratio[1], ratio[2]);
-    assert_true(ratio[0] < 1.05 && ratio[1] < 1.05 && ratio[2] < 1.3);
+    assert_true(ratio[0] < 1.05 && ratio[1] < 1.05 && ratio[2] < 1.0);
 }
 
 /* Edges of depth stay, as features without noise are not blurred. */
@@ -566,7 +566,7 @@ static void scene_pictures(void **state) {
     }
     print_figure("31: a square's soft shadow at 16 samples", "error %.2f times lower",
                  before / after);
-    assert_true(after < before);
+    assert_true(before / after > 2.0);
     assert_ok(trc_scene_destroy(scene));
 }
 
@@ -574,7 +574,7 @@ static void scene_pictures(void **state) {
  * bits, though its tiles are others. */
 static void crops(void **state) {
     (void)state;
-    enum { LEFT = 21, BOTTOM = 7, ACROSS = WIDTH - LEFT, UP = HEIGHT - BOTTOM, REACH = 15 };
+    enum { LEFT = 21, BOTTOM = 7, ACROSS = WIDTH - LEFT, UP = HEIGHT - BOTTOM, REACH = 24 };
     static float whole[4 * FRAME], crop[4 * ACROSS * UP];
     const trc_scene scene = lit_scene();
     trc_render_desc desc = default_render_desc(WIDTH, HEIGHT, 16);

@@ -59,8 +59,18 @@ trc_status trc_film_add_halves(const trc_render_desc *desc, struct trc_film *fil
     return ok ? TRC_OK : trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for reconstruction");
 }
 
+static uint32_t channel_count_of(const struct trc_film *film) {
+    uint32_t count = film->clean.caught ? TRC_CAUGHT_CHANNELS : 0;
+    for (uint32_t pass = 0; pass < TRC_SUM_COUNT; pass++)
+        count += film->clean.sums[pass] ? trc_pass_info_of(pass)->sums : 0;
+    return count;
+}
+
 trc_status trc_denoise_create(struct trc_film *film, struct trc_denoise *denoise) {
-    *denoise = (struct trc_denoise){.film = film};
+    const uint32_t channels = channel_count_of(film);
+    const uint32_t batches = (channels + TRC_RESIDUE_CHANNELS - 1) / TRC_RESIDUE_CHANNELS;
+    *denoise = (struct trc_denoise){
+        .film = film, .channel_count = channels, .step_count = TRC_DENOISE_RESIDUE + 2 * batches};
     float **const planes[TRC_DENOISE_PLANES - TRC_FEATURE_COUNT] = {
         &denoise->variance, &denoise->error, &denoise->missed[0], &denoise->missed[1],
         &denoise->change};

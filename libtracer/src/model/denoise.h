@@ -13,9 +13,10 @@
  * choice among bandwidths the estimated error decides how much of the plain pixel stays.
  *
  * Two halves of each pixel's samples, a sum of the first one kept aside, tell noise from structure:
- * weights found in one half are tried on the other.
+ * weights found in one half are tried on the other. At last the film is filtered once more, by what
+ * is left of the plain one (J. W. Tukey, "Exploratory Data Analysis", 1977: twicing).
  *
- * Phases, each over all tiles before the next begins; within one, tiles are independent. */
+ * Steps, each over all tiles before the next begins; within one, tiles are independent. */
 #ifndef TRACER_MODEL_DENOISE_H
 #define TRACER_MODEL_DENOISE_H
 
@@ -25,11 +26,13 @@
 
 #include "model/film.h"
 
+/* The last two are taken again and again, each time for some of the film's channels. */
 enum trc_denoise_phase {
     TRC_DENOISE_FEATURES, /* film to features: noise of edges in motion or out of focus goes */
     TRC_DENOISE_REGRESS,  /* film and features to the clean film, and its estimated error */
     TRC_DENOISE_BLEND,    /* estimates to the part of the clean film that is kept */
-    TRC_DENOISE_PHASE_COUNT
+    TRC_DENOISE_RESIDUE,  /* plain less clean film, to planes */
+    TRC_DENOISE_TWICE     /* what of that is no noise is given back */
 };
 
 /* Albedo, normal, depth: of the passes that a render with reconstruction has. */
@@ -46,12 +49,18 @@ struct trc_denoise {
     /* What these are of: by how much each half's prediction misses the half, and by how much the
      * first half exceeds the other, relative to the light around. 0 where there is but one half. */
     float *missed[2], *change;
-    float *memory; /* all of the above */
+    float *memory;          /* all of the above, plane by plane; after blending, residue */
+    uint32_t channel_count; /* of light that is reconstructed, Combined's at first */
+    uint32_t step_count;
 };
 
 /* Planes of the above, and their bytes for each pixel. */
 #define TRC_DENOISE_PLANES (TRC_FEATURE_COUNT + 5)
 #define TRC_DENOISE_PIXEL_BYTES (TRC_DENOISE_PLANES * sizeof(float))
+
+/* Planes when they hold residue: the clean light, the part that is given back, then channels. */
+enum { TRC_RESIDUE_LIGHT, TRC_RESIDUE_PART, TRC_RESIDUE_PLANES };
+#define TRC_RESIDUE_CHANNELS (TRC_DENOISE_PLANES - TRC_RESIDUE_PLANES)
 
 /* A pixel of the frame beyond whose edges it is mirrored; far outside, its edge. */
 static inline uint32_t trc_mirror(int64_t x, uint32_t size) {
@@ -62,10 +71,10 @@ static inline uint32_t trc_mirror(int64_t x, uint32_t size) {
     return x < 0 ? 0 : x >= size ? size - 1 : (uint32_t)x;
 }
 
-/* A tile in a phase, for one thread. */
+/* A tile in a step, for one thread. */
 struct trc_denoise_job {
     const struct trc_denoise *denoise;
-    uint32_t phase;
+    uint32_t step;                /* a phase, or once more the last two */
     uint32_t x, y, width, height; /* of the crop, pixels; at most TRC_TILE_SIZE */
     void *memory; /* denoise_memory_bytes(...) bytes, 64-byte aligned, one thread's */
 };

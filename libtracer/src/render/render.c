@@ -47,7 +47,7 @@ struct trc_render_state {
     uint32_t *batch_tiles;  /* tiles done of each batch */
     uint32_t lowest_batch;  /* first batch that not all tiles have */
     uint32_t tiles_done;    /* with all their batches */
-    uint64_t denoise_done;  /* tiles of all phases of reconstruction */
+    uint64_t denoise_done;  /* tiles of all steps of reconstruction */
     uint64_t pixel_samples_done;
     uint32_t merged_count; /* samples that parts brought */
     struct trc_tile_counts counts;
@@ -201,18 +201,17 @@ static bool render_item_adaptive(struct trc_render_state *render, uint32_t tile,
 
 /* ---- reconstruction ---- */
 
-/* Tiles of all phases. */
+/* Tiles of all steps. */
 static uint64_t denoise_item_count(const struct trc_render_state *render) {
-    const uint64_t phases = render->denoise.film ? TRC_DENOISE_PHASE_COUNT : 0;
-    return phases * render->schedule.tile_count;
+    return (uint64_t)render->denoise.step_count * render->schedule.tile_count;
 }
 
-/* Waits until all tiles are through what comes before a phase; false if the render is cancelled. */
-static bool await_former_phase(struct trc_render_state *render, uint32_t phase) {
+/* Waits until all tiles are through what comes before a step; false if the render is cancelled. */
+static bool await_former_step(struct trc_render_state *render, uint32_t step) {
     const uint32_t tile_count = render->schedule.tile_count;
     pthread_mutex_lock(&render->lock);
     while (
-        (render->tiles_done < tile_count || render->denoise_done < (uint64_t)phase * tile_count) &&
+        (render->tiles_done < tile_count || render->denoise_done < (uint64_t)step * tile_count) &&
         !atomic_load(&render->cancel))
         pthread_cond_wait(&render->tile_done, &render->lock);
     pthread_mutex_unlock(&render->lock);
@@ -229,7 +228,7 @@ static void finish_denoise_item(struct trc_render_state *render) {
     pthread_mutex_unlock(&render->lock);
 }
 
-/* Takes tiles of the phases in their order until none is left. */
+/* Takes tiles of the steps in their order until none is left. */
 static void reconstruct(struct trc_render_state *render, void *memory) {
     const uint64_t item_count = denoise_item_count(render);
     while (!atomic_load(&render->cancel)) {
@@ -237,12 +236,12 @@ static void reconstruct(struct trc_render_state *render, void *memory) {
         if (item >= item_count)
             return;
         const uint32_t tile_count = render->schedule.tile_count;
-        const uint32_t phase = (uint32_t)(item / tile_count);
-        if (!await_former_phase(render, phase))
+        const uint32_t step = (uint32_t)(item / tile_count);
+        if (!await_former_step(render, step))
             return;
         const struct trc_tile_area area =
             trc_schedule_tile(&render->schedule, (uint32_t)(item % tile_count));
-        const struct trc_denoise_job job = {&render->denoise, phase,       area.x, area.y,
+        const struct trc_denoise_job job = {&render->denoise, step,        area.x, area.y,
                                             area.width,       area.height, memory};
         render->kernels->denoise_tile(&job);
         finish_denoise_item(render);

@@ -4,8 +4,6 @@
  * smaller part is kept. */
 #include "kernels/filter/filter.h"
 
-/* Pixels on each side over which estimates are averaged. */
-#define REACH 4
 /* The part kept is that much of variance / (variance + error), which would be best for independent
  * estimates; of smoothed ones more, as fewer are independent. */
 #define FAVOR 1.5f
@@ -48,42 +46,12 @@ size_t trc_blend_bytes(void) {
     return carve(&w, NULL);
 }
 
-/* Beyond the frame is its mirror image. */
-static void load(const struct trc_denoise_job *job, const float *values, float *plane) {
-    const struct trc_film *film = job->denoise->film;
-    for (int y = -TRC_HALO; y < TRC_TILE_SIZE + TRC_HALO; y++) {
-        const float *row =
-            values + (size_t)trc_mirror((int64_t)job->y + y, film->height) * film->width;
-        for (int x = -TRC_HALO; x < TRC_TILE_SIZE + TRC_HALO; x++)
-            plane[trc_plane_at(x, y)] = row[trc_mirror((int64_t)job->x + x, film->width)];
-    }
-}
-
-/* Sums over squares of pixels of the tile. */
-static void sum_squares(const float *plane, float *columns, float *sums) {
-    for (int y = 0; y < TRC_TILE_SIZE; y++) {
-        for (int x = -TRC_HALO; x < TRC_PLANE_COLUMNS - TRC_HALO; x += TRC_WIDTH) {
-            const float *values = plane + trc_plane_at(x, y);
-            vfloat sum = vf_set(0.0f);
-            for (int j = -REACH; j <= REACH; j++)
-                sum = sum + vf_load(values + j * TRC_PLANE_STRIDE);
-            vf_store(columns + trc_plane_at(x, 0), sum);
-        }
-        for (int x = 0; x < TRC_TILE_SIZE; x += TRC_WIDTH) {
-            vfloat sum = vf_set(0.0f);
-            for (int i = -REACH; i <= REACH; i++)
-                sum = sum + vf_load(columns + trc_plane_at(x + i, 0));
-            vf_store(sums + trc_plane_at(x, y), sum);
-        }
-    }
-}
-
 /* The error of smoothed pictures, and their variance, as regress.c has those of pixels. */
 static void estimate_smooth(const struct trc_denoise_job *job, struct work *w) {
     const struct trc_denoise *d = job->denoise;
     const float *const planes[3] = {d->missed[0], d->missed[1], d->change};
     for (int k = 0; k < 3; k++) {
-        load(job, planes[k], w->half[k]);
+        trc_plane_load(job, planes[k], w->half[k]);
         trc_plane_smooth(w->half[k], w->rest, TRC_HALO - 1);
         trc_plane_smooth(w->rest, w->half[k], TRC_HALO - 2);
     }
@@ -98,13 +66,13 @@ static void estimate_smooth(const struct trc_denoise_job *job, struct work *w) {
 }
 
 static void estimate(const struct trc_denoise_job *job, struct work *w) {
-    load(job, job->denoise->variance, w->own.variance);
-    load(job, job->denoise->error, w->own.error);
+    trc_plane_load(job, job->denoise->variance, w->own.variance);
+    trc_plane_load(job, job->denoise->error, w->own.error);
     estimate_smooth(job, w);
     const struct estimate *const estimates[] = {&w->own, &w->smooth};
     for (int i = 0; i < 2; i++) {
-        sum_squares(estimates[i]->variance, w->columns, estimates[i]->variance_sum);
-        sum_squares(estimates[i]->error, w->columns, estimates[i]->error_sum);
+        trc_plane_sum(estimates[i]->variance, w->columns, estimates[i]->variance_sum);
+        trc_plane_sum(estimates[i]->error, w->columns, estimates[i]->error_sum);
     }
 }
 
@@ -190,7 +158,7 @@ static void limit_caught(struct trc_caught *caught, double most_coverage) {
     }
 }
 
-static void limit_covers(const struct trc_denoise_job *job) {
+void trc_limit_covers(const struct trc_denoise_job *job) {
     const struct trc_film *film = job->denoise->film;
     for (uint32_t y = 0; y < job->height; y++)
         for (uint32_t x = 0; x < job->width; x++) {
@@ -217,5 +185,5 @@ void trc_blend(const struct trc_denoise_job *job) {
     if (film->clean.caught)
         blend(job, parts, (const double *)film->caught, (double *)film->clean.caught,
               TRC_CAUGHT_CHANNELS);
-    limit_covers(job);
+    trc_limit_covers(job);
 }

@@ -28,13 +28,35 @@ struct trc_guide {
 /* Fills the planes from the film and the features. (kernels/filter/guide.c) */
 void trc_guide_load(const struct trc_denoise_job *job, struct trc_guide *guide);
 
-/* The phases. (kernels/filter/features.c, regress.c, blend.c) */
+/* A channel of the film's light: sums of pixels, every stride doubles. */
+struct trc_light_channel {
+    const double *sums;
+    double *clean;
+    uint32_t stride;
+};
+
+/* The channel of that number, below denoise->channel_count: passes in their order, then what shadow
+ * catchers got. (kernels/filter/denoise.c) */
+struct trc_light_channel trc_light_channel_at(const struct trc_film *film, uint32_t number);
+
+/* Values of a plane of the film, by pixel, to a tile's; beyond the frame is its mirror image.
+ * (kernels/filter/denoise.c) */
+void trc_plane_load(const struct trc_denoise_job *job, const float *values, float *plane);
+
+/* Cuts what no reconstruction may be: alpha, and light of shadow catchers.
+ * (kernels/filter/blend.c) */
+void trc_limit_covers(const struct trc_denoise_job *job);
+
+/* The phases. (kernels/filter/features.c, regress.c, blend.c, twice.c) */
 size_t trc_features_bytes(void);
 void trc_features_filter(const struct trc_denoise_job *job);
 size_t trc_regress_bytes(void);
 void trc_regress(const struct trc_denoise_job *job);
 size_t trc_blend_bytes(void);
 void trc_blend(const struct trc_denoise_job *job);
+void trc_residue(const struct trc_denoise_job *job, uint32_t first);
+size_t trc_twice_bytes(void);
+void trc_twice(const struct trc_denoise_job *job, uint32_t first); /* the number of a channel */
 
 size_t trc_denoise_memory_bytes(void);
 void trc_denoise_tile(const struct trc_denoise_job *job);

@@ -45,6 +45,28 @@ TRC_INLINE void trc_plane_smooth(const float *in, float *out, int end) {
         }
 }
 
+/* Pixels on each side over which estimates are summed. */
+#define TRC_SUM_REACH 4
+
+/* Sums over squares of pixels, of the tile. columns: scratch. */
+TRC_INLINE void trc_plane_sum(const float *plane, float *columns, float *sums) {
+    for (int y = 0; y < TRC_TILE_SIZE; y++) {
+        for (int x = -TRC_HALO; x < TRC_PLANE_COLUMNS - TRC_HALO; x += TRC_WIDTH) {
+            const float *values = plane + trc_plane_at(x, y);
+            vfloat sum = vf_set(0.0f);
+            for (int j = -TRC_SUM_REACH; j <= TRC_SUM_REACH; j++)
+                sum = sum + vf_load(values + j * TRC_PLANE_STRIDE);
+            vf_store(columns + trc_plane_at(x, 0), sum);
+        }
+        for (int x = 0; x < TRC_TILE_SIZE; x += TRC_WIDTH) {
+            vfloat sum = vf_set(0.0f);
+            for (int i = -TRC_SUM_REACH; i <= TRC_SUM_REACH; i++)
+                sum = sum + vf_load(columns + trc_plane_at(x + i, 0));
+            vf_store(sums + trc_plane_at(x, y), sum);
+        }
+    }
+}
+
 /* A mean as a float within limits; NaN: the lower. Comparisons, as fminf may be a call. */
 TRC_INLINE float trc_cut(double mean, float low, float high) {
     const float value = (float)mean;

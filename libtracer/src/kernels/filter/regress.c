@@ -286,15 +286,8 @@ static void regress(const struct trc_denoise_job *job, struct work *w, const str
 
 /* ---- light ---- */
 
-/* Sums of one channel of the film's pixels. */
-struct channel {
-    const double *sums;
-    double *clean;
-    uint32_t stride; /* doubles of a pixel */
-};
-
 /* Means of a strip's pixels and those around, into the plane. */
-static void load_strip(const struct trc_denoise_job *job, const struct channel *c, int y,
+static void load_strip(const struct trc_denoise_job *job, const struct trc_light_channel *c, int y,
                        float *data) {
     const struct trc_film *film = job->denoise->film;
     for (int j = y - REACH; j < y + STRIP + REACH; j++)
@@ -312,7 +305,7 @@ static void load_strip(const struct trc_denoise_job *job, const struct channel *
 }
 
 static void take_channel(const struct trc_denoise_job *job, const struct work *w,
-                         const struct channel *c, int y) {
+                         const struct trc_light_channel *c, int y) {
     const struct trc_film *film = job->denoise->film;
     load_strip(job, c, y, w->data);
     for (int j = 0; j < STRIP && (uint32_t)(y + j) < job->height; j++)
@@ -332,20 +325,9 @@ static void take_channel(const struct trc_denoise_job *job, const struct work *w
         }
 }
 
-/* All light of the film: passes, and what shadow catchers got. */
 static void take_light(const struct trc_denoise_job *job, const struct work *w, int y) {
-    const struct trc_film *film = job->denoise->film;
-    for (uint32_t pass = 0; pass < TRC_SUM_COUNT; pass++) {
-        const uint32_t channels = film->clean.sums[pass] ? trc_pass_info_of(pass)->sums : 0;
-        for (uint32_t k = 0; k < channels; k++) {
-            const struct channel c = {film->sums[pass] + k, film->clean.sums[pass] + k, channels};
-            take_channel(job, w, &c, y);
-        }
-    }
-    const uint32_t channels = film->clean.caught ? TRC_CAUGHT_CHANNELS : 0;
-    for (uint32_t k = 0; k < channels; k++) {
-        const struct channel c = {(const double *)film->caught + k,
-                                  (double *)film->clean.caught + k, channels};
+    for (uint32_t k = 0; k < job->denoise->channel_count; k++) {
+        const struct trc_light_channel c = trc_light_channel_at(job->denoise->film, k);
         take_channel(job, w, &c, y);
     }
 }

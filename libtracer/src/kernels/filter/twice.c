@@ -1,0 +1,192 @@
+/* What a filter leaves of a noisy picture is noise, which differs from pixel to pixel, and light
+ * that it has moved, which is alike in pixels side by side: of trails of motion, edges out of focus
+ * and soft shadows whose features do not show where they are. Means of 3 x 3 pixels of what is left
+ * are given back, by the part of their squares, over the pixels around, that noise does not
+ * explain. */
+#include "kernels/filter/filter.h"
+
+/* The squares of means over those of pixels where there is noise alone. It would be a ninth of
+ * independent ones; but samplers spread noise over pixels evenly, and the slow part of it stays in
+ * the clean film. */
+#define NOISE_PART 0.06f
+/* Light that counts as dark, and residue as large as can be, over the light around. */
+#define DARK 0.01f
+#define MOST_RESIDUE 32.0f
+#define COLORS 3 /* the first channels, of Combined */
+
+struct work {
+    float *light, *part;
+    float *residue[COLORS], *mean[COLORS]; /* mean: of 3 x 3 pixels */
+    float *relative, *smooth;              /* over the light around, squared at last */
+    float *columns, *own_sum, *smooth_sum;
+};
+
+static size_t carve(struct work *w, void *memory) {
+    struct trc_carver c = {.base = memory};
+    float **const all[] = {&w->light,   &w->part,    &w->relative,  &w->smooth,
+                           &w->columns, &w->own_sum, &w->smooth_sum};
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++)
+        *all[i] = trc_plane_carve(&c);
+    for (int k = 0; k < COLORS; k++) {
+        w->residue[k] = trc_plane_carve(&c);
+        w->mean[k] = trc_plane_carve(&c);
+    }
+    return c.used;
+}
+
+size_t trc_twice_bytes(void) {
+    struct work w;
+    return carve(&w, NULL);
+}
+
+/* A plane of the film that holds residue. */
+static float *plane_of(const struct trc_denoise *d, uint32_t number) {
+    return d->memory + (size_t)number * d->film->width * d->film->height;
+}
+
+static uint32_t batch_of(const struct trc_denoise *d, uint32_t first) {
+    const uint32_t left = d->channel_count - first;
+    return left < TRC_RESIDUE_CHANNELS ? left : TRC_RESIDUE_CHANNELS;
+}
+
+static size_t pixel_at(const struct trc_denoise_job *job, uint32_t x, uint32_t y) {
+    return (size_t)(job->y + y) * job->denoise->film->width + job->x + x;
+}
+
+static void store_residue(const struct trc_denoise_job *job, uint32_t number, float *plane) {
+    const struct trc_film *film = job->denoise->film;
+    const struct trc_light_channel c = trc_light_channel_at(film, number);
+    for (uint32_t y = 0; y < job->height; y++)
+        for (uint32_t x = 0; x < job->width; x++) {
+            const size_t pixel = pixel_at(job, x, y), i = pixel * c.stride;
+            const uint32_t count = film->sample_counts[pixel];
+            const double left = count ? (c.sums[i] - c.clean[i]) / count : 0.0;
+            plane[pixel] = isfinite(left) ? (float)left : 0.0f;
+        }
+}
+
+static void store_light(const struct trc_denoise_job *job, float *plane) {
+    const struct trc_film *film = job->denoise->film;
+    const double *clean = film->clean.sums[TRC_PASS_COMBINED];
+    for (uint32_t y = 0; y < job->height; y++)
+        for (uint32_t x = 0; x < job->width; x++) {
+            const size_t pixel = pixel_at(job, x, y);
+            const double *color = clean + 4 * pixel;
+            const uint32_t count = film->sample_counts[pixel];
+            const double light =
+                count ? (color[0] + color[1] + color[2]) / (COLORS * (double)count) : 0.0;
+            plane[pixel] = isfinite(light) && light > 0.0 ? (float)light : 0.0f;
+        }
+}
+
+void trc_residue(const struct trc_denoise_job *job, uint32_t first) {
+    const struct trc_denoise *d = job->denoise;
+    for (uint32_t k = 0; k < batch_of(d, first); k++)
+        store_residue(job, first + k, plane_of(d, TRC_RESIDUE_PLANES + k));
+    if (first == 0)
+        store_light(job, plane_of(d, TRC_RESIDUE_LIGHT));
+}
+
+/* The mean of the colours' residue over the light around. */
+static void find_relative(struct work *w) {
+    trc_plane_smooth(w->light, w->smooth, TRC_HALO - 1);
+    for (int i = 0; i < TRC_PLANE_FLOATS; i += TRC_WIDTH) {
+        vfloat sum = vf_set(0.0f);
+        for (int k = 0; k < COLORS; k++)
+            sum = sum + vf_load(w->residue[k] + i);
+        const vfloat around = (vf_load(w->smooth + i) + vf_set(DARK)) * vf_set((float)COLORS);
+        vf_store(w->relative + i, vf_clamp(sum / around, -MOST_RESIDUE, MOST_RESIDUE));
+    }
+}
+
+static void square(float *plane) {
+    for (int i = 0; i < TRC_PLANE_FLOATS; i += TRC_WIDTH) {
+        const vfloat value = vf_load(plane + i);
+        vf_store(plane + i, value * value);
+    }
+}
+
+/* The part of the means that noise does not explain. */
+static void find_parts(struct work *w) {
+    find_relative(w);
+    trc_plane_smooth(w->relative, w->smooth, TRC_HALO - 2);
+    square(w->relative);
+    square(w->smooth);
+    trc_plane_sum(w->relative, w->columns, w->own_sum);
+    trc_plane_sum(w->smooth, w->columns, w->smooth_sum);
+    for (int i = 0; i < TRC_PLANE_FLOATS; i += TRC_WIDTH) {
+        const vfloat own = vf_load(w->own_sum + i), smooth = vf_load(w->smooth_sum + i);
+        const vfloat excess =
+            (smooth - own * vf_set(NOISE_PART)) * vf_set(1.0f / (1.0f - NOISE_PART));
+        const vfloat part = vf_clamp(excess / vf_max(smooth, vf_set(1e-30f)), 0.0f, 1.0f);
+        vf_store(w->part + i, part);
+    }
+}
+
+/* The part by which a pixel is moved no farther than it is from the plain one: what has no noise
+ * stays beside single bright samples. */
+static float limit_change(const struct work *w, int at) {
+    float own = 0.0f, given = 0.0f;
+    for (int k = 0; k < COLORS; k++) {
+        own += fabsf(w->residue[k][at]);
+        given += fabsf(w->mean[k][at]) * w->part[at];
+    }
+    return given > own ? w->part[at] * (own / given) : w->part[at];
+}
+
+/* The part by which no colour falls below 0. */
+static float limit_dark(const struct trc_film *film, const struct work *w, size_t pixel, int at,
+                        float part) {
+    for (int k = 0; k < COLORS; k++) {
+        const double clean = film->clean.sums[TRC_PASS_COMBINED][4 * pixel + (size_t)k];
+        const double given = (double)w->mean[k][at] * film->sample_counts[pixel];
+        if (clean >= 0.0 && clean + (double)part * given < 0.0)
+            part = (float)(clean / -given);
+    }
+    return part;
+}
+
+static void limit_parts(const struct trc_denoise_job *job, struct work *w) {
+    for (int k = 0; k < COLORS; k++)
+        trc_plane_smooth(w->residue[k], w->mean[k], 0);
+    float *const stored = plane_of(job->denoise, TRC_RESIDUE_PART);
+    for (uint32_t y = 0; y < job->height; y++)
+        for (uint32_t x = 0; x < job->width; x++) {
+            const size_t pixel = pixel_at(job, x, y);
+            const int at = trc_plane_at((int)x, (int)y);
+            stored[pixel] = limit_dark(job->denoise->film, w, pixel, at, limit_change(w, at));
+        }
+}
+
+static void give(const struct trc_denoise_job *job, struct work *w, uint32_t number,
+                 const float *residue) {
+    const struct trc_film *film = job->denoise->film;
+    const struct trc_light_channel c = trc_light_channel_at(film, number);
+    const float *parts = plane_of(job->denoise, TRC_RESIDUE_PART);
+    trc_plane_load(job, residue, w->relative);
+    trc_plane_smooth(w->relative, w->smooth, 0);
+    for (uint32_t y = 0; y < job->height; y++)
+        for (uint32_t x = 0; x < job->width; x++) {
+            const size_t pixel = pixel_at(job, x, y);
+            const float given = parts[pixel] * w->smooth[trc_plane_at((int)x, (int)y)];
+            c.clean[pixel * c.stride] += (double)given * film->sample_counts[pixel];
+        }
+}
+
+void trc_twice(const struct trc_denoise_job *job, uint32_t first) {
+    const struct trc_denoise *d = job->denoise;
+    const uint32_t count = batch_of(d, first);
+    struct work w;
+    carve(&w, job->memory);
+    if (first == 0) {
+        trc_plane_load(job, plane_of(d, TRC_RESIDUE_LIGHT), w.light);
+        for (uint32_t k = 0; k < COLORS; k++)
+            trc_plane_load(job, plane_of(d, TRC_RESIDUE_PLANES + k), w.residue[k]);
+        find_parts(&w);
+        limit_parts(job, &w);
+    }
+    for (uint32_t k = 0; k < count; k++)
+        give(job, &w, first + k, plane_of(d, TRC_RESIDUE_PLANES + k));
+    if (first + count == d->channel_count)
+        trc_limit_covers(job);
+}
