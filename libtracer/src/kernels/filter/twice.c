@@ -12,12 +12,16 @@
 /* Light that counts as dark, and residue as large as can be, over the light around. */
 #define DARK 0.01f
 #define MOST_RESIDUE 32.0f
-#define COLORS 3 /* the first channels, of Combined */
+/* Of a channel that is the same everywhere but for rounding, and its square summed. */
+#define LEAST_CHANGE 1e-5f
+#define LEAST_SQUARES 1e-9f
+/* The first channels, of Combined: three colours, and alpha. */
+enum { COLORS = 3, ALPHA = 3, CHANNELS };
 
 struct work {
     float *light, *part;
-    float *residue[COLORS], *mean[COLORS]; /* mean: of 3 x 3 pixels */
-    float *relative, *smooth;              /* over the light around, squared at last */
+    float *residue[CHANNELS], *mean[CHANNELS]; /* mean: of 3 x 3 pixels */
+    float *relative, *smooth;                  /* what is explained, squared at last */
     float *columns, *own_sum, *smooth_sum;
 };
 
@@ -27,7 +31,7 @@ static size_t carve(struct work *w, void *memory) {
                            &w->columns, &w->own_sum, &w->smooth_sum};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++)
         *all[i] = trc_plane_carve(&c);
-    for (int k = 0; k < COLORS; k++) {
+    for (int k = 0; k < CHANNELS; k++) {
         w->residue[k] = trc_plane_carve(&c);
         w->mean[k] = trc_plane_carve(&c);
     }
@@ -106,9 +110,16 @@ static void square(float *plane) {
     }
 }
 
-/* The part of the means that noise does not explain. */
-static void find_parts(struct work *w) {
-    find_relative(w);
+static bool has_residue(const float *plane) {
+    vmask found = vm_none();
+    for (int i = 0; i < TRC_PLANE_FLOATS; i += TRC_WIDTH)
+        found = vm_or(found, vf_gt(vf_abs(vf_load(plane + i)), vf_set(LEAST_CHANGE)));
+    return vm_any(found);
+}
+
+/* Leaves of the parts what noise of the relative residue does not explain of its means; where there
+ * is no residue, no more than that part. */
+static void explain(struct work *w, float without) {
     trc_plane_smooth(w->relative, w->smooth, TRC_HALO - 2);
     square(w->relative);
     square(w->smooth);
@@ -119,19 +130,34 @@ static void find_parts(struct work *w) {
         const vfloat excess =
             (smooth - own * vf_set(NOISE_PART)) * vf_set(1.0f / (1.0f - NOISE_PART));
         const vfloat part = vf_clamp(excess / vf_max(smooth, vf_set(1e-30f)), 0.0f, 1.0f);
-        vf_store(w->part + i, part);
+        const vmask is_none = vf_le(own, vf_set(LEAST_SQUARES));
+        vf_store(w->part + i,
+                 vf_min(vf_load(w->part + i), vf_select(is_none, vf_set(without), part)));
     }
 }
 
-/* The part by which a pixel is moved no farther than it is from the plain one: what has no noise
- * stays beside single bright samples. */
-static float limit_change(const struct work *w, int at) {
+/* By the colours, and by alpha where it has residue, too. */
+static void find_parts(struct work *w) {
+    for (int i = 0; i < TRC_PLANE_FLOATS; i += TRC_WIDTH)
+        vf_store(w->part + i, vf_set(1.0f));
+    find_relative(w);
+    explain(w, 0.0f);
+    if (!has_residue(w->residue[ALPHA]))
+        return;
+    memcpy(w->relative, w->residue[ALPHA], TRC_PLANE_FLOATS * sizeof *w->relative);
+    explain(w, 1.0f);
+}
+
+/* The part by which a pixel's channels from begin to end move no farther than they are from the
+ * plain ones: what has no noise stays beside single bright samples. */
+static float limit_change(const struct work *w, int at, float part, int begin, int end) {
     float own = 0.0f, given = 0.0f;
-    for (int k = 0; k < COLORS; k++) {
+    for (int k = begin; k < end; k++) {
         own += fabsf(w->residue[k][at]);
-        given += fabsf(w->mean[k][at]) * w->part[at];
+        given += fabsf(w->mean[k][at]) * part;
     }
-    return given > own ? w->part[at] * (own / given) : w->part[at];
+    own += LEAST_CHANGE;
+    return given > own ? part * (own / given) : part;
 }
 
 /* The part by which no colour falls below 0. */
@@ -147,14 +173,16 @@ static float limit_dark(const struct trc_film *film, const struct work *w, size_
 }
 
 static void limit_parts(const struct trc_denoise_job *job, struct work *w) {
-    for (int k = 0; k < COLORS; k++)
+    for (int k = 0; k < CHANNELS; k++)
         trc_plane_smooth(w->residue[k], w->mean[k], 0);
     float *const stored = plane_of(job->denoise, TRC_RESIDUE_PART);
     for (uint32_t y = 0; y < job->height; y++)
         for (uint32_t x = 0; x < job->width; x++) {
             const size_t pixel = pixel_at(job, x, y);
             const int at = trc_plane_at((int)x, (int)y);
-            stored[pixel] = limit_dark(job->denoise->film, w, pixel, at, limit_change(w, at));
+            float part = limit_change(w, at, w->part[at], 0, COLORS);
+            part = limit_change(w, at, part, ALPHA, CHANNELS);
+            stored[pixel] = limit_dark(job->denoise->film, w, pixel, at, part);
         }
 }
 
@@ -180,7 +208,7 @@ void trc_twice(const struct trc_denoise_job *job, uint32_t first) {
     carve(&w, job->memory);
     if (first == 0) {
         trc_plane_load(job, plane_of(d, TRC_RESIDUE_LIGHT), w.light);
-        for (uint32_t k = 0; k < COLORS; k++)
+        for (uint32_t k = 0; k < CHANNELS; k++)
             trc_plane_load(job, plane_of(d, TRC_RESIDUE_PLANES + k), w.residue[k]);
         find_parts(&w);
         limit_parts(job, &w);
