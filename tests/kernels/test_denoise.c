@@ -265,7 +265,7 @@ static void many_samples(void **state) {
 }
 
 /* What is lost in the noise of pixels but not in that of their surroundings is hardly blurred. With
- * estimates of single pixels alone the last ratio is 1.54, where no residue is given back 1.15. */
+ * estimates of single pixels alone the last ratio is 1.54, where no residual is given back 1.15. */
 static void broad_waves(void **state) {
     (void)state;
     static struct picture p;

@@ -68,9 +68,9 @@ static uint32_t channel_count_of(const struct trc_film *film) {
 
 trc_status trc_denoise_create(struct trc_film *film, struct trc_denoise *denoise) {
     const uint32_t channels = channel_count_of(film);
-    const uint32_t batches = (channels + TRC_RESIDUE_CHANNELS - 1) / TRC_RESIDUE_CHANNELS;
+    const uint32_t batches = (channels + TRC_RESIDUAL_CHANNELS - 1) / TRC_RESIDUAL_CHANNELS;
     *denoise = (struct trc_denoise){
-        .film = film, .channel_count = channels, .step_count = TRC_DENOISE_RESIDUE + 2 * batches};
+        .film = film, .channel_count = channels, .step_count = TRC_DENOISE_RESIDUAL + 2 * batches};
     float **const planes[TRC_DENOISE_PLANES - TRC_FEATURE_COUNT] = {
         &denoise->variance, &denoise->error, &denoise->missed[0], &denoise->missed[1],
         &denoise->change};

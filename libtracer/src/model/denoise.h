@@ -31,7 +31,7 @@ enum trc_denoise_phase {
     TRC_DENOISE_FEATURES, /* film to features: noise of edges in motion or out of focus goes */
     TRC_DENOISE_REGRESS,  /* film and features to the clean film, and its estimated error */
     TRC_DENOISE_BLEND,    /* estimates to the part of the clean film that is kept */
-    TRC_DENOISE_RESIDUE,  /* plain less clean film, to planes */
+    TRC_DENOISE_RESIDUAL, /* plain less clean film, to planes */
     TRC_DENOISE_TWICE     /* what of that is no noise is given back */
 };
 
@@ -49,7 +49,7 @@ struct trc_denoise {
     /* What these are of: by how much each half's prediction misses the half, and by how much the
      * first half exceeds the other, relative to the light around. 0 where there is but one half. */
     float *missed[2], *change;
-    float *memory;          /* all of the above, plane by plane; after blending, residue */
+    float *memory;          /* all of the above, plane by plane; after blending, residual */
     uint32_t channel_count; /* of light that is reconstructed, Combined's at first */
     uint32_t step_count;
 };
@@ -58,9 +58,9 @@ struct trc_denoise {
 #define TRC_DENOISE_PLANES (TRC_FEATURE_COUNT + 5)
 #define TRC_DENOISE_PIXEL_BYTES (TRC_DENOISE_PLANES * sizeof(float))
 
-/* Planes when they hold residue: the clean light, the part that is given back, then channels. */
-enum { TRC_RESIDUE_LIGHT, TRC_RESIDUE_PART, TRC_RESIDUE_PLANES };
-#define TRC_RESIDUE_CHANNELS (TRC_DENOISE_PLANES - TRC_RESIDUE_PLANES)
+/* Planes when they hold residual: the clean light, the part that is given back, then channels. */
+enum { TRC_RESIDUAL_LIGHT, TRC_RESIDUAL_PART, TRC_RESIDUAL_PLANES };
+#define TRC_RESIDUAL_CHANNELS (TRC_DENOISE_PLANES - TRC_RESIDUAL_PLANES)
 
 /* A pixel of the frame beyond whose edges it is mirrored; far outside, its edge. */
 static inline uint32_t trc_mirror(int64_t x, uint32_t size) {

@@ -34,8 +34,8 @@ size_t trc_denoise_memory_bytes(void) {
 
 void trc_denoise_tile(const struct trc_denoise_job *job) {
     const uint32_t batch =
-        job->step > TRC_DENOISE_TWICE ? (job->step - TRC_DENOISE_RESIDUE) / 2 : 0;
-    const uint32_t first = batch * TRC_RESIDUE_CHANNELS;
+        job->step > TRC_DENOISE_TWICE ? (job->step - TRC_DENOISE_RESIDUAL) / 2 : 0;
+    const uint32_t first = batch * TRC_RESIDUAL_CHANNELS;
     switch ((enum trc_denoise_phase)(job->step - 2 * batch)) {
     case TRC_DENOISE_FEATURES:
         trc_features_filter(job);
@@ -46,8 +46,8 @@ void trc_denoise_tile(const struct trc_denoise_job *job) {
     case TRC_DENOISE_BLEND:
         trc_blend(job);
         break;
-    case TRC_DENOISE_RESIDUE:
-        trc_residue(job, first);
+    case TRC_DENOISE_RESIDUAL:
+        trc_residual(job, first);
         break;
     case TRC_DENOISE_TWICE:
         trc_twice(job, first);

@@ -54,7 +54,7 @@ size_t trc_regress_bytes(void);
 void trc_regress(const struct trc_denoise_job *job);
 size_t trc_blend_bytes(void);
 void trc_blend(const struct trc_denoise_job *job);
-void trc_residue(const struct trc_denoise_job *job, uint32_t first);
+void trc_residual(const struct trc_denoise_job *job, uint32_t first);
 size_t trc_twice_bytes(void);
 void trc_twice(const struct trc_denoise_job *job, uint32_t first); /* the number of a channel */
 

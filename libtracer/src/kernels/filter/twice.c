@@ -9,9 +9,9 @@
  * independent ones; but samplers spread noise over pixels evenly, and the slow part of it stays in
  * the clean film. */
 #define NOISE_PART 0.06f
-/* Light that counts as dark, and residue as large as can be, over the light around. */
+/* Light that counts as dark, and residual as large as can be, over the light around. */
 #define DARK 0.01f
-#define MOST_RESIDUE 32.0f
+#define MOST_RESIDUAL 32.0f
 /* Of a channel that is the same everywhere but for rounding, and its square summed. */
 #define LEAST_CHANGE 1e-5f
 #define LEAST_SQUARES 1e-9f
@@ -20,8 +20,8 @@ enum { COLORS = 3, ALPHA = 3, CHANNELS };
 
 struct work {
     float *light, *part;
-    float *residue[CHANNELS], *mean[CHANNELS]; /* mean: of 3 x 3 pixels */
-    float *relative, *smooth;                  /* what is explained, squared at last */
+    float *residual[CHANNELS], *mean[CHANNELS]; /* mean: of 3 x 3 pixels */
+    float *relative, *smooth;                   /* what is explained, squared at last */
     float *columns, *own_sum, *smooth_sum;
 };
 
@@ -32,7 +32,7 @@ static size_t carve(struct work *w, void *memory) {
     for (size_t i = 0; i < sizeof all / sizeof *all; i++)
         *all[i] = trc_plane_carve(&c);
     for (int k = 0; k < CHANNELS; k++) {
-        w->residue[k] = trc_plane_carve(&c);
+        w->residual[k] = trc_plane_carve(&c);
         w->mean[k] = trc_plane_carve(&c);
     }
     return c.used;
@@ -43,21 +43,21 @@ size_t trc_twice_bytes(void) {
     return carve(&w, NULL);
 }
 
-/* A plane of the film that holds residue. */
+/* A plane of the film that holds residual. */
 static float *plane_of(const struct trc_denoise *d, uint32_t number) {
     return d->memory + (size_t)number * d->film->width * d->film->height;
 }
 
 static uint32_t batch_of(const struct trc_denoise *d, uint32_t first) {
     const uint32_t left = d->channel_count - first;
-    return left < TRC_RESIDUE_CHANNELS ? left : TRC_RESIDUE_CHANNELS;
+    return left < TRC_RESIDUAL_CHANNELS ? left : TRC_RESIDUAL_CHANNELS;
 }
 
 static size_t pixel_at(const struct trc_denoise_job *job, uint32_t x, uint32_t y) {
     return (size_t)(job->y + y) * job->denoise->film->width + job->x + x;
 }
 
-static void store_residue(const struct trc_denoise_job *job, uint32_t number, float *plane) {
+static void store_residual(const struct trc_denoise_job *job, uint32_t number, float *plane) {
     const struct trc_film *film = job->denoise->film;
     const struct trc_light_channel c = trc_light_channel_at(film, number);
     for (uint32_t y = 0; y < job->height; y++)
@@ -83,23 +83,23 @@ static void store_light(const struct trc_denoise_job *job, float *plane) {
         }
 }
 
-void trc_residue(const struct trc_denoise_job *job, uint32_t first) {
+void trc_residual(const struct trc_denoise_job *job, uint32_t first) {
     const struct trc_denoise *d = job->denoise;
     for (uint32_t k = 0; k < batch_of(d, first); k++)
-        store_residue(job, first + k, plane_of(d, TRC_RESIDUE_PLANES + k));
+        store_residual(job, first + k, plane_of(d, TRC_RESIDUAL_PLANES + k));
     if (first == 0)
-        store_light(job, plane_of(d, TRC_RESIDUE_LIGHT));
+        store_light(job, plane_of(d, TRC_RESIDUAL_LIGHT));
 }
 
-/* The mean of the colours' residue over the light around. */
+/* The mean of the colours' residual over the light around. */
 static void find_relative(struct work *w) {
     trc_plane_smooth(w->light, w->smooth, TRC_HALO - 1);
     for (int i = 0; i < TRC_PLANE_FLOATS; i += TRC_WIDTH) {
         vfloat sum = vf_set(0.0f);
         for (int k = 0; k < COLORS; k++)
-            sum = sum + vf_load(w->residue[k] + i);
+            sum = sum + vf_load(w->residual[k] + i);
         const vfloat around = (vf_load(w->smooth + i) + vf_set(DARK)) * vf_set((float)COLORS);
-        vf_store(w->relative + i, vf_clamp(sum / around, -MOST_RESIDUE, MOST_RESIDUE));
+        vf_store(w->relative + i, vf_clamp(sum / around, -MOST_RESIDUAL, MOST_RESIDUAL));
     }
 }
 
@@ -110,15 +110,15 @@ static void square(float *plane) {
     }
 }
 
-static bool has_residue(const float *plane) {
+static bool has_residual(const float *plane) {
     vmask found = vm_none();
     for (int i = 0; i < TRC_PLANE_FLOATS; i += TRC_WIDTH)
         found = vm_or(found, vf_gt(vf_abs(vf_load(plane + i)), vf_set(LEAST_CHANGE)));
     return vm_any(found);
 }
 
-/* Leaves of the parts what noise of the relative residue does not explain of its means; where there
- * is no residue, no more than that part. */
+/* Leaves of the parts what noise of the relative residual does not explain of its means; where
+ * there is no residual, no more than that part. */
 static void explain(struct work *w, float without) {
     trc_plane_smooth(w->relative, w->smooth, TRC_HALO - 2);
     square(w->relative);
@@ -136,15 +136,15 @@ static void explain(struct work *w, float without) {
     }
 }
 
-/* By the colours, and by alpha where it has residue, too. */
+/* By the colours, and by alpha where it has residual, too. */
 static void find_parts(struct work *w) {
     for (int i = 0; i < TRC_PLANE_FLOATS; i += TRC_WIDTH)
         vf_store(w->part + i, vf_set(1.0f));
     find_relative(w);
     explain(w, 0.0f);
-    if (!has_residue(w->residue[ALPHA]))
+    if (!has_residual(w->residual[ALPHA]))
         return;
-    memcpy(w->relative, w->residue[ALPHA], TRC_PLANE_FLOATS * sizeof *w->relative);
+    memcpy(w->relative, w->residual[ALPHA], TRC_PLANE_FLOATS * sizeof *w->relative);
     explain(w, 1.0f);
 }
 
@@ -153,7 +153,7 @@ static void find_parts(struct work *w) {
 static float limit_change(const struct work *w, int at, float part, int begin, int end) {
     float own = 0.0f, given = 0.0f;
     for (int k = begin; k < end; k++) {
-        own += fabsf(w->residue[k][at]);
+        own += fabsf(w->residual[k][at]);
         given += fabsf(w->mean[k][at]) * part;
     }
     own += LEAST_CHANGE;
@@ -174,8 +174,8 @@ static float limit_dark(const struct trc_film *film, const struct work *w, size_
 
 static void limit_parts(const struct trc_denoise_job *job, struct work *w) {
     for (int k = 0; k < CHANNELS; k++)
-        trc_plane_smooth(w->residue[k], w->mean[k], 0);
-    float *const stored = plane_of(job->denoise, TRC_RESIDUE_PART);
+        trc_plane_smooth(w->residual[k], w->mean[k], 0);
+    float *const stored = plane_of(job->denoise, TRC_RESIDUAL_PART);
     for (uint32_t y = 0; y < job->height; y++)
         for (uint32_t x = 0; x < job->width; x++) {
             const size_t pixel = pixel_at(job, x, y);
@@ -187,11 +187,11 @@ static void limit_parts(const struct trc_denoise_job *job, struct work *w) {
 }
 
 static void give(const struct trc_denoise_job *job, struct work *w, uint32_t number,
-                 const float *residue) {
+                 const float *residual) {
     const struct trc_film *film = job->denoise->film;
     const struct trc_light_channel c = trc_light_channel_at(film, number);
-    const float *parts = plane_of(job->denoise, TRC_RESIDUE_PART);
-    trc_plane_load(job, residue, w->relative);
+    const float *parts = plane_of(job->denoise, TRC_RESIDUAL_PART);
+    trc_plane_load(job, residual, w->relative);
     trc_plane_smooth(w->relative, w->smooth, 0);
     for (uint32_t y = 0; y < job->height; y++)
         for (uint32_t x = 0; x < job->width; x++) {
@@ -207,14 +207,14 @@ void trc_twice(const struct trc_denoise_job *job, uint32_t first) {
     struct work w;
     carve(&w, job->memory);
     if (first == 0) {
-        trc_plane_load(job, plane_of(d, TRC_RESIDUE_LIGHT), w.light);
+        trc_plane_load(job, plane_of(d, TRC_RESIDUAL_LIGHT), w.light);
         for (uint32_t k = 0; k < CHANNELS; k++)
-            trc_plane_load(job, plane_of(d, TRC_RESIDUE_PLANES + k), w.residue[k]);
+            trc_plane_load(job, plane_of(d, TRC_RESIDUAL_PLANES + k), w.residual[k]);
         find_parts(&w);
         limit_parts(job, &w);
     }
     for (uint32_t k = 0; k < count; k++)
-        give(job, &w, first + k, plane_of(d, TRC_RESIDUE_PLANES + k));
+        give(job, &w, first + k, plane_of(d, TRC_RESIDUAL_PLANES + k));
     if (first + count == d->channel_count)
         trc_limit_covers(job);
 }

@@ -129,7 +129,7 @@
 #define trc_regress(...) TRC_KERNEL(trc_regress)(__VA_ARGS__)
 #define trc_regress_bytes(...) TRC_KERNEL(trc_regress_bytes)(__VA_ARGS__)
 #define trc_relative_ior(...) TRC_KERNEL(trc_relative_ior)(__VA_ARGS__)
-#define trc_residue(...) TRC_KERNEL(trc_residue)(__VA_ARGS__)
+#define trc_residual(...) TRC_KERNEL(trc_residual)(__VA_ARGS__)
 #define trc_sample(...) TRC_KERNEL(trc_sample)(__VA_ARGS__)
 #define trc_samples(...) TRC_KERNEL(trc_samples)(__VA_ARGS__)
 #define trc_samples_render(...) TRC_KERNEL(trc_samples_render)(__VA_ARGS__)
