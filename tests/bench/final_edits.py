@@ -40,7 +40,13 @@ def frame(_step):
     bpy.context.scene.frame_set(bpy.context.scene.frame_current + 1)
 
 
-EDITS = (nothing, frame, *edit_kinds.ALL)
+def blurred_frame(step):
+    """The same with motion blur, which stays on."""
+    bpy.context.scene.render.use_motion_blur = True
+    frame(step)
+
+
+EDITS = (nothing, frame, *edit_kinds.ALL, blurred_frame)
 
 
 class Clock:
