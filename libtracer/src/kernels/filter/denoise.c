@@ -15,9 +15,15 @@ struct trc_light_channel trc_light_channel_at(const struct trc_film *film, uint3
 
 void trc_plane_load(const struct trc_denoise_job *job, const float *values, float *plane) {
     const struct trc_film *film = job->denoise->film;
+    const bool is_inside = job->x >= TRC_HALO && job->x + TRC_TILE_SIZE + TRC_HALO <= film->width;
     for (int y = -TRC_HALO; y < TRC_TILE_SIZE + TRC_HALO; y++) {
         const float *row =
             values + (size_t)trc_mirror((int64_t)job->y + y, film->height) * film->width;
+        if (is_inside) { /* most tiles, whole rows at once */
+            memcpy(plane + trc_plane_at(-TRC_HALO, y), row + job->x - TRC_HALO,
+                   (TRC_TILE_SIZE + 2 * TRC_HALO) * sizeof *plane);
+            continue;
+        }
         for (int x = -TRC_HALO; x < TRC_TILE_SIZE + TRC_HALO; x++)
             plane[trc_plane_at(x, y)] = row[trc_mirror((int64_t)job->x + x, film->width)];
     }
