@@ -186,17 +186,14 @@ static void limit_parts(const struct trc_denoise_job *job, struct work *w) {
         }
 }
 
-static void give(const struct trc_denoise_job *job, struct work *w, uint32_t number,
-                 const float *residual) {
+static void give(const struct trc_denoise_job *job, uint32_t number, const float *mean) {
     const struct trc_film *film = job->denoise->film;
     const struct trc_light_channel c = trc_light_channel_at(film, number);
     const float *parts = plane_of(job->denoise, TRC_RESIDUAL_PART);
-    trc_plane_load(job, residual, w->relative);
-    trc_plane_smooth(w->relative, w->smooth, 0);
     for (uint32_t y = 0; y < job->height; y++)
         for (uint32_t x = 0; x < job->width; x++) {
             const size_t pixel = pixel_at(job, x, y);
-            const float given = parts[pixel] * w->smooth[trc_plane_at((int)x, (int)y)];
+            const float given = parts[pixel] * mean[trc_plane_at((int)x, (int)y)];
             c.clean[pixel * c.stride] += (double)given * film->sample_counts[pixel];
         }
 }
@@ -213,8 +210,15 @@ void trc_twice(const struct trc_denoise_job *job, uint32_t first) {
         find_parts(&w);
         limit_parts(job, &w);
     }
-    for (uint32_t k = 0; k < count; k++)
-        give(job, &w, first + k, plane_of(d, TRC_RESIDUAL_PLANES + k));
+    for (uint32_t k = 0; k < count; k++) {
+        const bool is_made = first + k < CHANNELS;
+        float *const mean = is_made ? w.mean[k] : w.smooth;
+        if (!is_made) {
+            trc_plane_load(job, plane_of(d, TRC_RESIDUAL_PLANES + k), w.relative);
+            trc_plane_smooth(w.relative, mean, 0);
+        }
+        give(job, first + k, mean);
+    }
     if (first + count == d->channel_count)
         trc_limit_covers(job);
 }
