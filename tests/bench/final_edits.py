@@ -42,7 +42,9 @@ def frame(_step):
 
 def blurred_frame(step):
     """The same with motion blur, which stays on."""
-    bpy.context.scene.render.use_motion_blur = True
+    render = bpy.context.scene.render
+    if not render.use_motion_blur:  # being set names the scene
+        render.use_motion_blur = True
     frame(step)
 
 
