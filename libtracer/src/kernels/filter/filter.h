@@ -43,8 +43,8 @@ struct trc_light_channel trc_light_channel_at(const struct trc_film *film, uint3
  * (kernels/filter/denoise.c) */
 void trc_plane_load(const struct trc_denoise_job *job, const float *values, float *plane);
 
-/* Cuts what no reconstruction may be: alpha, and light of shadow catchers.
- * (kernels/filter/blend.c) */
+/* Cuts what no reconstruction may be: alpha, and light of shadow catchers. After blending, so that
+ * residuals are those of what may be, and at last. (kernels/filter/blend.c) */
 void trc_limit_covers(const struct trc_denoise_job *job);
 
 /* The phases. (kernels/filter/features.c, regress.c, blend.c, twice.c) */

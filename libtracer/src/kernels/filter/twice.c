@@ -117,8 +117,8 @@ static bool has_residual(const float *plane) {
     return vm_any(found);
 }
 
-/* Leaves of the parts what noise of the relative residual does not explain of its means; where
- * there is no residual, no more than that part. */
+/* Leaves of the parts what noise of the relative residual does not explain of its means. without:
+ * the part where there is no residual. */
 static void explain(struct work *w, float without) {
     trc_plane_smooth(w->relative, w->smooth, TRC_HALO - 2);
     square(w->relative);
@@ -136,7 +136,7 @@ static void explain(struct work *w, float without) {
     }
 }
 
-/* By the colours, and by alpha where it has residual, too. */
+/* By the colours, and by alpha, too, where there is a residual of it. */
 static void find_parts(struct work *w) {
     for (int i = 0; i < TRC_PLANE_FLOATS; i += TRC_WIDTH)
         vf_store(w->part + i, vf_set(1.0f));
