@@ -2,6 +2,7 @@
 """Strands and points as the library has them: Catmull-Rom splines with radii, and balls."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -37,7 +38,8 @@ class Wanted(NamedTuple):
 
 @dataclass
 class Strands:
-    """Strands or points at one time. The keys of a strand follow each other."""
+    """Strands or points at one time. The keys of a strand follow each other. Places and lengths stay as they are
+    made: what is found from them is kept."""
 
     positions: np.ndarray       # (keys, 3)
     radii: np.ndarray           # (keys,)
@@ -56,9 +58,8 @@ class Strands:
 
     def keys_kept(self):
         """(keys,) bool: which are not where the one before is; None: all."""
-        step = np.diff(self.positions, axis=0)
         is_kept = np.empty(len(self.positions), bool)
-        is_kept[1:] = np.einsum('ij,ij->i', step, step) > _SHORTEST ** 2
+        is_kept[1:] = self._steps > _SHORTEST
         is_kept[self._starts()] = True
         return None if is_kept.all() else is_kept
 
@@ -72,19 +73,28 @@ class Strands:
     def _starts(self):
         return np.cumsum(self.lengths) - self.lengths
 
+    @cached_property
+    def _steps(self):
+        """(keys - 1,) how far each key is from the one before."""
+        step = np.diff(self.positions, axis=0)
+        squares = np.einsum('ij,ij->i', step, step)
+        return np.sqrt(squares, out=squares)
+
+    @cached_property
     def fractions(self):
         """How far along its strand each key is, 0 to 1, and the strands' lengths."""
-        step = np.linalg.norm(np.diff(self.positions, axis=0), axis=1)
-        along = np.concatenate(((0.0,), np.cumsum(step, dtype=np.float64)))
+        along = np.zeros(len(self.positions))
+        np.cumsum(self._steps, dtype=np.float64, out=along[1:])
         starts = self._starts()
         whole = along[starts + self.lengths - 1] - along[starts]
         along -= np.repeat(along[starts], self.lengths)
-        return along / np.repeat(np.maximum(whole, _SHORTEST), self.lengths), whole
+        along /= np.repeat(np.maximum(whole, _SHORTEST), self.lengths)
+        return along, whole
 
     def info(self):
         """(keys, 4) float32: what strands.HAIR_ATTRIBUTE holds."""
         info = np.empty((len(self.positions), 4), np.float32)
-        info[:, 0], whole = self.fractions()
+        info[:, 0], whole = self.fractions
         info[:, 1] = np.repeat(whole, self.lengths)
         info[:, 2] = 2.0 * self.radii
         info[:, 3] = np.repeat(hash_numbers(np.arange(len(self.lengths))) / HASH_MAX, self.lengths)

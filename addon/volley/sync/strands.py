@@ -75,7 +75,8 @@ class Hair:
             return None
         keys = _places(real, system, shown, steps)
         matrix = np.array(real.matrix_world.inverted_safe())  # particles are in the world
-        keys = keys @ matrix[:3, :3].T + matrix[:3, 3]
+        keys = keys @ matrix[:3, :3].T
+        keys += matrix[:3, 3]
         strands = curves.Strands(keys, np.zeros(len(keys)), np.full(len(keys) // steps, steps))
         strands.radii = _hair_radii(settings, strands)
         return strands
@@ -231,7 +232,7 @@ def _values(data, name, field, width, default=0.0):
 
 def _hair_radii(settings, strands):
     """Radii of hair, from root to tip by the settings' shape."""
-    left = 1.0 - strands.fractions()[0].clip(0.0, 1.0)
+    left = 1.0 - strands.fractions[0].clip(0.0, 1.0)
     is_tip = left <= 0.0
     shape = settings.shape
     if shape < 0.0:
