@@ -51,6 +51,26 @@ static void test_three_points(void **state) {
     trc_material_release(m);
 }
 
+/* Normals as coordinates of a height are those of the point, unless their node says otherwise. */
+static void test_curved_normals(void **state) {
+    (void)state;
+    for (uint32_t mode = 0; mode <= TRC_COORDINATE_CURVED; mode++) {
+        graph_clear();
+        const int32_t coordinates = add(TRC_NODE_TEXTURE_COORDINATE, mode, 0, NULL);
+        const uint32_t normal = TRC_OUTPUT_OF(TEXTURE_COORDINATE, normal);
+        const int32_t height =
+            ADD(TRC_NODE_MATH, TRC_MATH_MULTIPLY, link_to(coordinates, normal), value(4), value(0));
+        add_bent(add_bump(link_to(height, 0), standard()));
+        struct trc_material *m = compiled();
+        assert_int_equal(count_op(m, TRC_OP_BESIDE), mode ? 2 : 0);
+        assert_int_equal(count_op(m, TRC_OP_BUMP), mode);
+        for (uint32_t i = 0; i < m->instruction_count; i++)
+            if (m->instructions[i].op == TRC_OP_BESIDE)
+                assert_int_equal(m->instructions[i].mode & ~TRC_BESIDE_Y, TRC_OP_OBJECT_NORMAL);
+        trc_material_release(m);
+    }
+}
+
 /* A second Bump node of the same height adds itself alone; the colour is that of the point. */
 static void test_heights_are_shared(void **state) {
     (void)state;
@@ -219,6 +239,7 @@ static void test_even_displacement(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_three_points),
+        cmocka_unit_test(test_curved_normals),
         cmocka_unit_test(test_heights_are_shared),
         cmocka_unit_test(test_even_heights),
         cmocka_unit_test(test_images_of_heights_are_whole),

@@ -10,14 +10,14 @@ from collections import namedtuple
 
 import numpy as np
 
-from ..abi import (BlendMode, BumpMode, ClampType, DiffuseModel, DistributionType, EnvironmentProjection,
-                   HairComponent, ImageExtension, ImageInterpolation, ImageProjection, MappingType,
-                   MathOperation as Math, ModeFlags, NodeType, NormalMapFlags, NormalMapSpace, Pigment,
+from ..abi import (BlendMode, BumpMode, ClampType, CoordinateMode, DiffuseModel, DistributionType,
+                   EnvironmentProjection, HairComponent, ImageExtension, ImageInterpolation, ImageProjection,
+                   MappingType, MathOperation as Math, ModeFlags, NodeType, NormalMapFlags, NormalMapSpace, Pigment,
                    PrincipledHairMode, RampInterpolation, SeparateMode, SpaceId, TableSize, TangentSource,
                    ToonComponent, VectorOperation as Vector)
-from ..compat import (HAS_CORRELATED_MICROFACETS, HAS_FILMED_METAL, HAS_HAIR_ALBEDO, HAS_UNIT_NORMALS,
-                      HAS_WHOLE_COAT, KEEPS_DIFFUSE_ENERGY, LEAVES_BUMPS, RAMP_STEPS, SCALES_NORMAL_MAPS,
-                      TURNS_WINDOW_BUMPS)
+from ..compat import (CURVES_NORMAL_BUMPS, HAS_CORRELATED_MICROFACETS, HAS_FILMED_METAL, HAS_HAIR_ALBEDO,
+                      HAS_UNIT_NORMALS, HAS_WHOLE_COAT, KEEPS_DIFFUSE_ENERGY, LEAVES_BUMPS, RAMP_STEPS,
+                      SCALES_NORMAL_MAPS, TURNS_WINDOW_BUMPS)
 from . import tangents
 from .converters import CONVERTERS, instance_value, strand_normal, strand_radius, strand_random
 from .derived import ISLAND, POINTINESS
@@ -485,7 +485,7 @@ def _texture_coordinate(walker, node, _sockets):
     if "UV" in linked:
         walker.flat.uv_names.add("")
     walker.flat.needs_generated |= "Generated" in linked
-    index = walker.emit(NodeType.TEXTURE_COORDINATE, ())
+    index = walker.emit(NodeType.TEXTURE_COORDINATE, (), CoordinateMode.CURVED * CURVES_NORMAL_BUMPS)
     outputs = named_outputs(index, NodeType.TEXTURE_COORDINATE, (
         "Generated", "Normal", "UV", "Object", "Camera", "Window", "Reflection"))
     if node.object is not None and "Object" in linked:

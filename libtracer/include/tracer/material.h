@@ -70,6 +70,10 @@ enum trc_normal_map_flags {
  * the surface, as in Blender before 4.0. */
 enum trc_bump_mode { TRC_BUMP_INVERT = 1, TRC_BUMP_ABOVE = 2 };
 
+/* CURVED: heights of normals see these turn from point to point where the surface is smooth, as in
+ * Blender 5; without it they are those of the shaded point. */
+enum trc_coordinate_mode { TRC_COORDINATE_CURVED = 1 };
+
 /* The number of samples, and bits. INSIDE: around the opposite of the normal. ONLY_LOCAL: of the
  * same instance alone. OF_WORLD: within the distance of trc_world_desc.
  */

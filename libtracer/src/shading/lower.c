@@ -27,8 +27,8 @@ static void copy3(struct trc_operand *out, const struct trc_operand *in) {
 
 /* ---- the point ---- */
 
-/* Whether it has another value at another place of the surface; normals, tangents, the ray and the
- * object count as the same. */
+/* Whether it has another value at another place of the surface, whatever its node says; normals,
+ * tangents, the ray and the object count as the same. */
 static bool varies_in_place(uint32_t code) {
     switch (code) {
     case TRC_OP_POSITION:
@@ -45,10 +45,9 @@ static bool varies_in_place(uint32_t code) {
     }
 }
 
-trc_status trc_build_point(struct trc_build *b, uint32_t code, uint32_t resource,
-                           struct trc_operand *outputs) {
-    if (b->place <= TRC_PLACE_MIDDLE || !varies_in_place(code))
-        return trc_build_op(b, code, 0, resource, NULL, outputs);
+/* An operation at the point beside that is being lowered. */
+static trc_status build_beside(struct trc_build *b, uint32_t code, uint32_t resource,
+                               struct trc_operand *outputs) {
     struct trc_operand out[TRC_OP_OUT_AT(BESIDE, end)];
     const uint32_t direction = b->place == TRC_PLACE_Y ? TRC_BESIDE_Y : 0;
     const struct trc_operand *width =
@@ -56,6 +55,15 @@ trc_status trc_build_point(struct trc_build *b, uint32_t code, uint32_t resource
     TRC_TRY(trc_build_op(b, TRC_OP_BESIDE, code | direction, resource, width, out));
     memcpy(outputs, out, trc_op_outputs(code) * sizeof *out);
     return TRC_OK;
+}
+
+static bool is_beside(const struct trc_build *b) { return b->place > TRC_PLACE_MIDDLE; }
+
+trc_status trc_build_point(struct trc_build *b, uint32_t code, uint32_t resource,
+                           struct trc_operand *outputs) {
+    return is_beside(b) && varies_in_place(code)
+               ? build_beside(b, code, resource, outputs)
+               : trc_build_op(b, code, 0, resource, NULL, outputs);
 }
 
 /* ---- inputs ---- */
@@ -174,7 +182,11 @@ static trc_status lower_texture_coordinate(const struct lowering *l) {
     static const uint16_t codes[] = {TRC_OP_GENERATED,       TRC_OP_OBJECT_NORMAL,   TRC_OP_UV,
                                      TRC_OP_OBJECT_POSITION, TRC_OP_CAMERA_POSITION, TRC_OP_WINDOW,
                                      TRC_OP_REFLECTION};
-    return lower_outputs(l, codes, sizeof codes / sizeof *codes);
+    TRC_TRY(lower_outputs(l, codes, sizeof codes / sizeof *codes));
+    if (!is_beside(l->b) || !(l->node->mode & TRC_COORDINATE_CURVED))
+        return TRC_OK;
+    return build_beside(l->b, TRC_OP_OBJECT_NORMAL, TRC_NO_RESOURCE,
+                        l->out + TRC_OUT_AT(TEXTURE_COORDINATE, normal));
 }
 
 static trc_status lower_geometry(const struct lowering *l) {

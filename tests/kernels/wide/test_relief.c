@@ -156,6 +156,37 @@ static void test_points_beside(void **state) {
     }
 }
 
+/* Normals beside the point are between those of the corners, on the side of the ray; of a flat
+ * triangle they are its own. */
+static void test_normals_beside(void **state) {
+    (void)state;
+    struct rng r = rng_seed(13);
+    static struct plane p;
+    for (int round = 0; round < 60; round++) {
+        const bool is_back = round & 1, is_y = round & 2, is_flat = round % 5 == 0;
+        float normals[9], parametric[4], out[4], here[4];
+        build_plane(&p, &r, is_back, .2f);
+        for (int k = 0; k < 9; k++)
+            normals[k] = (k % 3 == 2 ? 1 : 0) + rng_unit(&r) - .5f;
+        p.mesh.vertex_normals = is_flat ? NULL : normals;
+        beside(&p, TRC_OP_PARAMETRIC, 0, is_y, 1, parametric);
+        beside(&p, TRC_OP_OBJECT_NORMAL, 0, is_y, 1, out);
+        struct single program;
+        single_init(&program, TRC_OP_OBJECT_NORMAL, 0, 0);
+        run(&program, &p.s, here);
+        const double u = parametric[1], weight[3] = {parametric[0], u, 1.0 - parametric[0] - u};
+        double expected[3];
+        for (int i = 0; i < 3; i++)
+            expected[i] = is_flat ? here[i]
+                                  : (is_back ? -1 : 1) *
+                                        (weight[0] * normals[i] + weight[1] * normals[3 + i] +
+                                         weight[2] * normals[6 + i]);
+        normalize(expected);
+        for (int i = 0; i < 3; i++)
+            assert_true(fabs(out[i] - expected[i]) < 4e-6);
+    }
+}
+
 /* Heights of a known slope turn the normal n to n - distance * slope, or part of the way. */
 static void test_known_slopes(void **state) {
     (void)state;
@@ -241,6 +272,7 @@ int main(void) {
         return 77;
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_points_beside),
+        cmocka_unit_test(test_normals_beside),
         cmocka_unit_test(test_known_slopes),
         cmocka_unit_test(test_limits),
     };

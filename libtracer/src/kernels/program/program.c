@@ -268,8 +268,10 @@ static void run_beside(const struct trc_surface *s, const struct trc_instruction
                        const vfloat *in, vfloat *out) {
     struct trc_surface beside;
     point_beside(s, i->mode & TRC_BESIDE_Y, in[TRC_OP_AT(BESIDE, filter_width)], &beside);
-    const struct trc_instruction there = {.op = (uint16_t)(i->mode & ~TRC_BESIDE_Y),
-                                          .resource = i->resource};
+    const uint32_t op = i->mode & ~TRC_BESIDE_Y;
+    if (op == TRC_OP_OBJECT_NORMAL)
+        normal_beside(&beside);
+    const struct trc_instruction there = {.op = (uint16_t)op, .resource = i->resource};
     run_at_surface(&beside, &there, in, out);
 }
 

@@ -52,6 +52,17 @@ static void point_beside(const struct trc_surface *s, bool is_along_y, vfloat fi
     }
 }
 
+/* Gives a point beside the normal that smooth triangles have there; others keep theirs. */
+static void normal_beside(struct trc_surface *beside) {
+    vmask triangles = vm_none();
+    struct lane_group g = groups_begin(beside);
+    while (groups_next(beside, &g))
+        if (g.mesh && !g.mesh->shape)
+            triangles = vm_or(triangles, g.lanes);
+    if (vm_any(triangles))
+        beside->n = v3_select(triangles, trc_normal_between(beside, triangles), beside->n);
+}
+
 /* The point before displacement, and the mean length of both steps there, as Cycles has it, in
  * those of now. */
 static void op_rest(const struct trc_surface *s, vfloat *out) {

@@ -108,6 +108,7 @@
 #define trc_lobes_straight(...) TRC_KERNEL(trc_lobes_straight)(__VA_ARGS__)
 #define trc_lobes_transparency(...) TRC_KERNEL(trc_lobes_transparency)(__VA_ARGS__)
 #define trc_mixed_fetch(...) TRC_KERNEL(trc_mixed_fetch)(__VA_ARGS__)
+#define trc_normal_between(...) TRC_KERNEL(trc_normal_between)(__VA_ARGS__)
 #define trc_oren_nayar_albedo(...) TRC_KERNEL(trc_oren_nayar_albedo)(__VA_ARGS__)
 #define trc_pass_add_lanes(...) TRC_KERNEL(trc_pass_add_lanes)(__VA_ARGS__)
 #define trc_program_cast(...) TRC_KERNEL(trc_program_cast)(__VA_ARGS__)

@@ -218,6 +218,17 @@ TRC_INLINE vvec3 bulge_towards(const struct trc_surface *s, const struct raw_hit
     return v3_scale(axis, bulge_of(s, h, v3_scale(e1, turn), v3_scale(e2, turn)) * turn);
 }
 
+/* The unit normal between those of the corners, on the front, and where it is one. */
+static vvec3 smooth_normal(const struct trc_surface *s, const struct raw_hit *h, vmask *is_smooth) {
+    const vfloat sign = vf_select(h->flips, vf_set(-1.0f), vf_one());
+    vvec3 sum = normals_between(s, h);
+    if (vm_any(vm_and(h->world_normals, s->active)))
+        sum = v3_select(h->world_normals, sum_in_world(s, h), sum);
+    const vvec3 n = v3_normalize(v3_scale(transform_normal(&h->m, sum), sign));
+    *is_smooth = vm_and(h->smooth, vf_gt(v3_dot(n, n), vf_set(0.5f)));
+    return n;
+}
+
 static void set_normals(struct trc_surface *s, const struct raw_hit *h, vvec3 e1, vvec3 e2) {
     /* The winding as the object has it: a mirroring matrix turns the world cross product over. */
     const vvec3 w1 = scaled_to_one(trc_transform_vector(&h->m, e1));
@@ -236,12 +247,8 @@ static void set_normals(struct trc_surface *s, const struct raw_hit *h, vvec3 e1
     const vfloat side = vf_select(s->backfacing, vf_set(-1.0f), vf_one());
     if (vm_any(h->smooth)) {
         const vvec3 bulge = bulge_towards(s, h, e1, e2, v3_scale(ng, side));
-        vvec3 sum = normals_between(s, h);
-        if (vm_any(vm_and(h->world_normals, s->active)))
-            sum = v3_select(h->world_normals, sum_in_world(s, h), sum);
-        sum = v3_normalize(v3_scale(transform_normal(&h->m, sum), sign));
-        s->smooth = vm_and(h->smooth, vf_gt(v3_dot(sum, sum), vf_set(0.5f)));
-        n = v3_select(s->smooth, sum, ng);
+        const vvec3 smooth = smooth_normal(s, h, &s->smooth);
+        n = v3_select(s->smooth, smooth, ng);
         s->bulge = v3_where(s->smooth, bulge);
     }
     s->ng = v3_scale(ng, side);
@@ -278,6 +285,16 @@ vvec3 trc_bulge_behind(const struct trc_surface *s, vmask lanes) {
     part.active = lanes;
     raw_load(&part, &h);
     return bulge_towards(s, &h, side_to(&h, 1), side_to(&h, 2), v3_neg(s->ng));
+}
+
+vvec3 trc_normal_between(const struct trc_surface *s, vmask lanes) {
+    struct trc_surface part = *s;
+    struct raw_hit h;
+    vmask is_smooth;
+    part.active = lanes;
+    raw_load(&part, &h);
+    const vvec3 n = smooth_normal(&part, &h, &is_smooth);
+    return v3_select(is_smooth, v3_select(s->backfacing, v3_neg(n), n), s->n);
 }
 
 void trc_surface_sides(const struct trc_surface *s, vvec3 *first, vvec3 *second) {

@@ -66,6 +66,11 @@ void trc_surface_sides(const struct trc_surface *s, vvec3 *first, vvec3 *second)
  * are undefined. (kernels/trace/surface.c) */
 vvec3 trc_bulge_behind(const struct trc_surface *s, vmask lanes);
 
+/* The unit normal of triangles at u and v, on the side of the ray: between those of the corners
+ * where the surface is smooth, s->n elsewhere; other lanes are undefined. Loads the triangles once
+ * more. (kernels/trace/surface.c) */
+vvec3 trc_normal_between(const struct trc_surface *s, vmask lanes);
+
 /* Lanes whose surface is a strand's. */
 TRC_INLINE vmask trc_on_strand(const struct trc_surface *s) {
     if (!(s->snapshot->features & TRC_FEATURE_CURVES))
