@@ -273,6 +273,12 @@ class BumpMode(IntEnum):
     ABOVE = 2
 
 
+class WireframeMode(IntEnum):
+    PIXELS = 1
+    STEEP = 2
+    MASK = 3
+
+
 class CoordinateMode(IntEnum):
     CURVED = 1
 
@@ -966,7 +972,8 @@ ENUMERATIONS = {StatusCode: "TRC_", IsaId: "TRC_ISA_", CameraType: "TRC_CAMERA_"
                 ToonComponent: "TRC_TOON_", HairComponent: "TRC_HAIR_", Pigment: "TRC_PIGMENT_",
                 PrincipledHairMode: "TRC_PRINCIPLED_HAIR_", MappingType: "TRC_MAPPING_",
                 NormalMapSpace: "TRC_NORMAL_MAP_", NormalMapFlags: "TRC_NORMAL_MAP_", BumpMode: "TRC_BUMP_",
-                CoordinateMode: "TRC_COORDINATE_", AmbientMode: "TRC_AMBIENT_", RaycastMode: "TRC_RAYCAST_",
+                WireframeMode: "TRC_WIREFRAME_", CoordinateMode: "TRC_COORDINATE_",
+                AmbientMode: "TRC_AMBIENT_", RaycastMode: "TRC_RAYCAST_",
                 DisplacementMethod: "TRC_DISPLACEMENT_", RampInterpolation: "TRC_RAMP_", Gamut: "TRC_GAMUT_",
                 CurvesExtension: "TRC_CURVES_", SeparateMode: "TRC_SEPARATE_", ClampType: "TRC_CLAMP_",
                 TangentSource: "TRC_TANGENT_", SpaceId: "TRC_SPACE_", TransformedType: "TRC_TRANSFORMED_",

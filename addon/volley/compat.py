@@ -114,6 +114,9 @@ HAS_UNIT_NORMALS = bpy.app.version >= (5, 0, 0)
 # Of heights, in pixels: a whole one till the Bump node got an input for it in 4.4.
 BUMP_FILTER_WIDTH = 0.1 if bpy.app.version >= (4, 4, 0) else 1.0
 
+# Bumps of the Wireframe node have slopes over the length of a pixel; seen in 3.4 and 4.3, not in 5.2.
+HAS_STEEP_WIRES = bpy.app.version < (4, 4, 0)
+
 # Cycles' tables of colour ramps have 257 entries instead of 256.
 RAMP_STEPS = 256 if bpy.app.version >= (4, 0, 0) else 255
 

@@ -27,6 +27,10 @@ def _parametric(tree):
     return tree.add("NewGeometry"), "Parametric"
 
 
+def _wires(settings=(), **inputs):
+    return lambda tree: (tree.add("Wireframe", settings, **inputs), "Fac")
+
+
 def _gradient(tree):
     return tree.add("TexWave", {"wave_type": 'RINGS', "rings_direction": 'SPHERICAL'}, Scale=1.5,
                     Vector=(tree.add("TexCoord"), "Object")), "Fac"
@@ -87,6 +91,8 @@ HEIGHTS = {
     "image": (waves, {"Distance": 0.3}),
     "attribute": (_attribute, {"Distance": 0.4}),
     "parametric": (_parametric, {"Distance": 0.2}),
+    "wires": (_wires(Size=0.1), {"Distance": 0.1}),
+    "wires, pixels": (_wires({"use_pixel_size": True}, Size=3.0), {"Distance": 0.05}),
     "wave": (_gradient, {"Distance": 0.1}),
     "mixed": (_mixed, {"Distance": 0.1}),
 }

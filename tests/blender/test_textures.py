@@ -269,6 +269,7 @@ def _other_object(node):
 _add("coordinates of another object", "ShaderNodeTexCoord", ("Object",), {"object": _other_object})
 _add("camera data", "ShaderNodeCameraData", ("View Vector", "View Z Depth", "View Distance"))
 _add("wireframe", "ShaderNodeWireframe", ("Fac",), Size=0.3)
+_add("wireframe, pixels", "ShaderNodeWireframe", ("Fac",), {"use_pixel_size": True}, Size=6.0)
 _add("light falloff", "ShaderNodeLightFalloff", ("Quadratic", "Linear", "Constant"), Strength=0.1,
      Smooth=(0.0, 4.0))
 for _mode in ("RGB", "HSV", "HSL"):

@@ -71,6 +71,22 @@ static void test_curved_normals(void **state) {
     }
 }
 
+/* Wires are asked for at three places; steep ones also before the point, and not beside it. */
+static void test_wires(void **state) {
+    (void)state;
+    for (uint32_t mode = 0; mode <= TRC_WIREFRAME_MASK; mode++) {
+        graph_clear();
+        const int32_t wires = ADD(TRC_NODE_WIREFRAME, mode, value(.1f));
+        add_bent(add_bump(link_to(wires, 0), standard()));
+        struct trc_material *m = compiled();
+        assert_int_equal(count_op(m, TRC_OP_WIREFRAME), 3);
+        assert_int_equal(count_op(m, TRC_OP_BESIDE), 2);
+        assert_int_equal(count_op(m, TRC_OP_VECTOR_MEASURE), mode & TRC_WIREFRAME_STEEP ? 2 : 0);
+        assert_int_equal(count_op(m, TRC_OP_BUMP), 1);
+        trc_material_release(m);
+    }
+}
+
 /* A second Bump node of the same height adds itself alone; the colour is that of the point. */
 static void test_heights_are_shared(void **state) {
     (void)state;
@@ -240,6 +256,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_three_points),
         cmocka_unit_test(test_curved_normals),
+        cmocka_unit_test(test_wires),
         cmocka_unit_test(test_heights_are_shared),
         cmocka_unit_test(test_even_heights),
         cmocka_unit_test(test_images_of_heights_are_whole),

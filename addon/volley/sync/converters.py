@@ -12,8 +12,8 @@ import numpy as np
 
 from ..abi import (AmbientMode, CurvesExtension, ImageExtension, MathOperation as Math, ModeFlags, NodeType,
                    RaycastMode, RotateFlags, RotateMode, SeparateMode, SpaceId, TableSize, TransformedType,
-                   VectorOperation as Vector, VectorTransformMode)
-from ..compat import IES_ENDS, LEAVES_SUNS, TRANSFORMS_NORMALS
+                   VectorOperation as Vector, VectorTransformMode, WireframeMode)
+from ..compat import HAS_STEEP_WIRES, IES_ENDS, LEAVES_SUNS, TRANSFORMS_NORMALS
 from . import ies, working_space
 from .instance import NO_PARTICLE_RANDOM, VALUES_LOCATION, VALUES_PARTICLE, VALUES_SPIN, VALUES_VELOCITY
 from .node_list import named_outputs, output
@@ -173,9 +173,8 @@ def _camera_data(walker, _node, _sockets):
 
 
 def _wireframe(walker, node, sockets):
-    if node.use_pixel_size:
-        return None
-    return {"Fac": Value('f', walker.emit(NodeType.WIREFRAME, (sockets.get('f', "Size"),)), 0)}
+    mode = WireframeMode.PIXELS * node.use_pixel_size | WireframeMode.STEEP * HAS_STEEP_WIRES
+    return {"Fac": Value('f', walker.emit(NodeType.WIREFRAME, (sockets.get('f', "Size"),), mode), 0)}
 
 
 _ENDLESS = 1e30  # m; less than the length of a sun's ray, whose square is infinite

@@ -70,6 +70,14 @@ enum trc_normal_map_flags {
  * the surface, as in Blender before 4.0. */
 enum trc_bump_mode { TRC_BUMP_INVERT = 1, TRC_BUMP_ABOVE = 2 };
 
+/* PIXELS: the size is in pixels at the point, as the ray sees them. STEEP: heights of wires have
+ * slopes that are once more over the length of their step, as in Blender before 4.4. */
+enum trc_wireframe_mode {
+    TRC_WIREFRAME_PIXELS = 1,
+    TRC_WIREFRAME_STEEP = 2,
+    TRC_WIREFRAME_MASK = 3
+};
+
 /* CURVED: heights of normals see these turn from point to point where the surface is smooth, as in
  * Blender 5; without it they are those of the shaded point. */
 enum trc_coordinate_mode { TRC_COORDINATE_CURVED = 1 };

@@ -139,8 +139,7 @@ bool trc_op_reads_position(uint32_t op) {
 static bool is_changed(const struct trc_build *b, uint32_t op) {
     if (reads_normal(op))
         return true;
-    return b->moves_point &&
-           (trc_op_reads_position(op) || op == TRC_OP_BESIDE || op == TRC_OP_WIREFRAME);
+    return b->moves_point && (trc_op_reads_position(op) || op == TRC_OP_BESIDE);
 }
 
 static const struct trc_build_op *find_equal(const struct trc_build *b, uint32_t hash, uint32_t op,

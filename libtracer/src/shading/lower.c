@@ -416,6 +416,36 @@ static trc_status combine(struct trc_build *b, uint32_t mode, const struct trc_o
     return op(b, TRC_OP_VECTOR_MATH, mode, in, out);
 }
 
+/* Whether a place is on a wire. */
+static trc_status build_wire(const struct lowering *l, const struct trc_operand place[3],
+                             struct trc_operand *out) {
+    struct trc_operand in[TRC_OP_AT(WIREFRAME, end)];
+    in[TRC_OP_AT(WIREFRAME, size)] = l->in[TRC_AT(WIREFRAME, size)];
+    copy3(in + TRC_OP_AT(WIREFRAME, position), place);
+    return op(l->b, TRC_OP_WIREFRAME, l->node->mode & TRC_WIREFRAME_PIXELS, in, out);
+}
+
+/* Beside the point what is there, or, STEEP, what is at the point and its change since a step
+ * before it, over the length of the step. */
+static trc_status lower_wireframe(const struct lowering *l) {
+    struct trc_build *b = l->b;
+    const struct trc_operand none = trc_constant(0.0f);
+    struct trc_operand here[3], place[3], behind[3], on_wire, was_on_wire, change, length;
+    struct trc_operand step[TRC_OP_AT(VECTOR_MEASURE, end)] = {none, none, none, none, none, none};
+    TRC_TRY(trc_build_point(b, TRC_OP_POSITION, TRC_NO_RESOURCE, place));
+    if (!is_beside(b) || !(l->node->mode & TRC_WIREFRAME_STEEP))
+        return build_wire(l, place, l->out);
+    TRC_TRY(op(b, TRC_OP_POSITION, 0, NULL, here));
+    TRC_TRY(build_wire(l, here, &on_wire));
+    TRC_TRY(combine(b, TRC_VECTOR_SUBTRACT, place, here, step));
+    TRC_TRY(combine(b, TRC_VECTOR_SUBTRACT, here, step, behind));
+    TRC_TRY(build_wire(l, behind, &was_on_wire));
+    TRC_TRY(op(b, TRC_OP_VECTOR_MEASURE, TRC_VECTOR_LENGTH, step, &length));
+    TRC_TRY(trc_build_math(b, TRC_MATH_SUBTRACT, on_wire, was_on_wire, none, &change));
+    TRC_TRY(trc_build_math(b, TRC_MATH_DIVIDE, change, length, none, &change));
+    return trc_build_math(b, TRC_MATH_ADD, on_wire, change, none, l->out);
+}
+
 /* By way of world space. */
 static trc_status lower_vector_transform(const struct lowering *l) {
     const uint32_t from = l->node->mode & TRC_SPACE_MASK;
@@ -615,7 +645,7 @@ static trc_status lower_node(const struct lowering *l) {
     case TRC_NODE_RAYCAST_ATTRIBUTE:
         return lower_named(l, TRC_OP_RAYCAST_ATTRIBUTE, mode);
     case TRC_NODE_WIREFRAME:
-        return op(b, TRC_OP_WIREFRAME, 0, l->in, l->out);
+        return lower_wireframe(l);
     case TRC_NODE_SEPARATE:
         return lower_components(l, TRC_OP_SEPARATE);
     case TRC_NODE_COMBINE:

@@ -249,7 +249,7 @@ void trc_build_traits(const struct trc_build *b, struct trc_material *m) {
             m->has |= TRC_MATERIAL_HAS_TEXTURE;
         if (o->op == TRC_OP_UV_DENSITY)
             m->has |= TRC_MATERIAL_READS_FOOTPRINT;
-        if (o->op == TRC_OP_BUMP)
+        if (o->op == TRC_OP_BUMP || (o->op == TRC_OP_WIREFRAME && (o->mode & TRC_WIREFRAME_PIXELS)))
             m->has |= TRC_MATERIAL_READS_PIXEL;
         if (o->op == TRC_OP_AMBIENT_OCCLUSION || o->op == TRC_OP_BEVEL || o->op == TRC_OP_RAYCAST ||
             o->op == TRC_OP_RAYCAST_ATTRIBUTE)

@@ -468,8 +468,8 @@ static const struct expectation expectations[] = {
      {0, 0, 1},
      {{0, 0, -1}, {0, 0, -1}, {0, 0, -1}}},
     /* the point is sqrt(1/2) off the long side of its triangle */
-    {TRC_OP_WIREFRAME, 0, 0, {1.3f}, {{0}, {0}, {0}}},
-    {TRC_OP_WIREFRAME, 0, 0, {1.5f}, {{1}, {0}, {0}}},
+    {TRC_OP_WIREFRAME, 0, 0, {1.3f, 8, 21, 30}, {{0}, {0}, {0}}},
+    {TRC_OP_WIREFRAME, 0, 0, {1.5f, 8, 21, 30}, {{1}, {0}, {0}}},
     /* (-(y - .5), x - .5, 0) of Generated is (0, -.25, 0), which a quarter turn makes +X */
     {TRC_OP_TANGENT, TRC_TANGENT_Z, 0, {0}, {{1, 0, 0}, {0, -1, 0}, {0, 0, 0}}},
     {TRC_OP_TANGENT, TRC_TANGENT_UV, NAME_UV, {0}, {{1, 0, 0}, {0, 0, 0}, {0, 0, 0}}},

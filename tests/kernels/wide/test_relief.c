@@ -163,12 +163,14 @@ static void test_normals_beside(void **state) {
     struct rng r = rng_seed(13);
     static struct plane p;
     for (int round = 0; round < 60; round++) {
-        const bool is_back = round & 1, is_y = round & 2, is_flat = round % 5 == 0;
+        const bool is_back = round & 1, is_y = round & 2;
+        uint8_t is_smooth = round % 5 != 0;
         float normals[9], parametric[4], out[4], here[4];
         build_plane(&p, &r, is_back, .2f);
         for (int k = 0; k < 9; k++)
             normals[k] = (k % 3 == 2 ? 1 : 0) + rng_unit(&r) - .5f;
-        p.mesh.vertex_normals = is_flat ? NULL : normals;
+        p.mesh.vertex_normals = normals;
+        p.mesh.smooth = &is_smooth;
         beside(&p, TRC_OP_PARAMETRIC, 0, is_y, 1, parametric);
         beside(&p, TRC_OP_OBJECT_NORMAL, 0, is_y, 1, out);
         struct single program;
@@ -177,10 +179,10 @@ static void test_normals_beside(void **state) {
         const double u = parametric[1], weight[3] = {parametric[0], u, 1.0 - parametric[0] - u};
         double expected[3];
         for (int i = 0; i < 3; i++)
-            expected[i] = is_flat ? here[i]
-                                  : (is_back ? -1 : 1) *
-                                        (weight[0] * normals[i] + weight[1] * normals[3 + i] +
-                                         weight[2] * normals[6 + i]);
+            expected[i] = is_smooth ? (is_back ? -1 : 1) *
+                                          (weight[0] * normals[i] + weight[1] * normals[3 + i] +
+                                           weight[2] * normals[6 + i])
+                                    : here[i];
         normalize(expected);
         for (int i = 0; i < 3; i++)
             assert_true(fabs(out[i] - expected[i]) < 4e-6);

@@ -470,30 +470,6 @@ static vvec3 op_transform(const struct trc_surface *s, uint32_t mode, vvec3 v) {
     return out;
 }
 
-/* 1 within half the size of an edge of the triangle, both in world space. */
-static vfloat op_wireframe(const struct trc_surface *s, vfloat size) {
-    const vfloat reach2 = vf_square(size * vf_set(0.5f));
-    vmask out = vm_none();
-    struct lane_group g = groups_begin(s);
-    while (groups_next(s, &g)) {
-        if (!g.mesh)
-            continue;
-        struct trc_corners c;
-        struct trc_wide_affine a;
-        group_corners(s, &g, &c);
-        trc_load_affine(g.instance, s->time, &a);
-        for (int k = 0; k < 3; k++)
-            c.corner[k] = trc_transform_point(&a, c.corner[k]);
-        for (int k = 0; k < 3; k++) {
-            const vvec3 edge = v3_sub(c.corner[k], c.corner[(k + 2) % 3]);
-            const vvec3 across = v3_cross(edge, v3_sub(s->p, c.corner[k]));
-            const vmask near = vf_lt(v3_dot(across, across), v3_dot(edge, edge) * reach2);
-            out = vm_or(out, vm_and(g.lanes, near));
-        }
-    }
-    return vf_truth(out);
-}
-
 TRC_INLINE vvec3 op_reflection(const struct trc_surface *s) {
     const vvec3 mirrored = v3_sub(v3_scale(s->n, vf_set(2.0f) * v3_dot(s->n, s->wo)), s->wo);
     return v3_select(without_space(s), s->wo, mirrored);

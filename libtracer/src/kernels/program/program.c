@@ -246,7 +246,8 @@ static void run_at_surface(const struct trc_surface *s, const struct trc_instruc
         op_raycast_attribute(s, i, in, out);
         break;
     case TRC_OP_WIREFRAME:
-        out[0] = op_wireframe(s, in[0]);
+        out[0] = op_wireframe(s, i->mode, in[TRC_OP_AT(WIREFRAME, size)],
+                              v3_read(in + TRC_OP_AT(WIREFRAME, position)));
         break;
     case TRC_OP_IMAGE:
         texture_lookup(image_of(s, i->resource), i->mode, in[TRC_OP_AT(IMAGE, u)],

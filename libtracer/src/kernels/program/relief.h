@@ -1,4 +1,5 @@
-/* The Bump node: slopes of a height from its values at three points of the surface.
+/* The Bump node: slopes of a height from its values at three points of the surface; and wires,
+ * which may be pixels wide.
  *
  * J. Blinn, "Simulation of Wrinkled Surfaces" (1978), in the form of M. Mikkelsen, "Bump Mapping
  * Unparametrized Surfaces on the GPU" (2010). The two points beside are one pixel's width away,
@@ -18,6 +19,43 @@ static void pixel_steps(const struct trc_surface *s, vvec3 step[2]) {
     const vvec3 unit = v3_normalize(across);
     step[0] = v3_scale(unit, s->pixel);
     step[1] = v3_scale(v3_cross(n, unit), s->pixel);
+}
+
+/* How far pixels are apart, as the ray sees them: the mean of both steps. */
+static vfloat pixel_width(const struct trc_surface *s) {
+    vvec3 step[2];
+    vfloat sum = vf_zero();
+    pixel_steps(s, step);
+    for (int i = 0; i < 2; i++)
+        sum = sum + v3_length(v3_sub(step[i], v3_scale(s->wo, v3_dot(step[i], s->wo))));
+    return vf_set(0.5f) * sum;
+}
+
+/* 1 where a place on the triangle's plane is within half the size of one of its edges, in world
+ * space. */
+static vfloat op_wireframe(const struct trc_surface *s, uint32_t mode, vfloat size, vvec3 place) {
+    if (mode & TRC_WIREFRAME_PIXELS)
+        size = size * pixel_width(s);
+    const vfloat reach2 = vf_square(size * vf_set(0.5f));
+    vmask out = vm_none();
+    struct lane_group g = groups_begin(s);
+    while (groups_next(s, &g)) {
+        if (!g.mesh)
+            continue;
+        struct trc_corners c;
+        struct trc_wide_affine a;
+        group_corners(s, &g, &c);
+        trc_load_affine(g.instance, s->time, &a);
+        for (int k = 0; k < 3; k++)
+            c.corner[k] = trc_transform_point(&a, c.corner[k]);
+        for (int k = 0; k < 3; k++) {
+            const vvec3 edge = v3_sub(c.corner[k], c.corner[(k + 2) % 3]);
+            const vvec3 across = v3_cross(edge, v3_sub(place, c.corner[k]));
+            const vmask near = vf_lt(v3_dot(across, across), v3_dot(edge, edge) * reach2);
+            out = vm_or(out, vm_and(g.lanes, near));
+        }
+    }
+    return vf_truth(out);
 }
 
 /* What a step in the plane of a triangle adds to U and V. */
