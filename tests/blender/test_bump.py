@@ -85,7 +85,7 @@ HEIGHTS = {
     "noise, UV": (noise("UV", 8.0), {"Distance": 0.1}),
     "noise, object": (noise("Object"), {"Distance": 0.3, "Strength": 0.4}),
     "noise, camera": (noise("Camera"), {"Distance": 0.1, "invert": True}),
-    "noise, normal": (noise("Normal"), {"Distance": 0.2}),
+    "noise, normal": (noise("Normal"), {"Distance": 0.1}),
     "noise, window": (noise("Window", 8.0), {"Distance": 0.2}),
     "noise, position": (noise("Position"), {"Distance": 0.06, "Strength": 1.7}),
     "image": (waves, {"Distance": 0.3}),
