@@ -155,6 +155,28 @@ def inside_light():
     return pictures
 
 
+def inside_shadows():
+    """{name: [by Volley, by Cycles]} of what lies in the light of surfaces whose transparency has pixels' widths."""
+    import scenes
+    pictures = {}
+    for name in ("bumps", "wires"):
+        stage()
+        scenes.light('SUN', rotation=(1.2, 0.0, 0.3), energy=3.0, angle=0.0)
+        scenes.wall(size=6.0, y=2.0, material=scenes.material("Matt", "ShaderNodeBsdfDiffuse"))
+        tree = Tree()
+        opaque = (tree.add("Wireframe", {"use_pixel_size": True}, Size=4.0), "Fac")
+        if name == "bumps":
+            bump = tree.add("Bump", Height=noise("Object")(tree), Distance=0.05)
+            opaque = (tree.add("Fresnel", IOR=1.5, Normal=(bump, 0)), 0)
+        clear, matt = tree.add("BsdfTransparent"), tree.add("BsdfDiffuse")
+        tree.surface(tree.add("MixShader", _0=opaque, _1=(clear, 0), _2=(matt, 0)))
+        made = _shape()
+        made.data.materials.append(tree.material)
+        made.visible_camera = False
+        pictures[name] = scenes.by_both(1)
+    return pictures
+
+
 # Comparison ----------------------------------------------------------------------------------------
 
 def test_normals(blender):
@@ -167,3 +189,7 @@ def test_places(blender):
 
 def test_light(blender):
     check(blender.run(inside_light), SHARE_BEYOND)
+
+
+def test_shadows(blender):
+    check(blender.run(inside_shadows), SHARE_BEYOND)

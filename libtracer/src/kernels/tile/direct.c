@@ -145,6 +145,8 @@ TRC_INLINE void push(struct trc_tile *t, const struct arrival *a, const struct t
     }
     for (int k = 0; q->lamp[0] && k < 3; k++)
         vf_compress(q->lamp[k] + at, r->lamp, bits);
+    if (q->pixel) /* lights do not spread it */
+        vf_compress(q->pixel + at, trc_pixel_distance(t, a), bits);
 }
 
 /* Enters the strands that the lanes' rays have left, the last of the queue. */

@@ -5,9 +5,11 @@
 #include "kernels/tile/shadow_bundle.h"
 
 /* What the surfaces that the lanes' rays meet let through; 0 where a material is opaque to shadows.
- */
+ * order: of the rays. */
 static vvec3 surface_transparency(const struct trc_tile *t, const struct trc_packet *p,
-                                  const struct trc_packet_hits *hits, int i, vmask active) {
+                                  const struct trc_packet_hits *hits, int i, vint order,
+                                  vmask active) {
+    const float *pixel = t->shadows.pixel;
     vvec3 through = v3_zero();
     uint32_t todo = vm_bits(active);
     while (todo) {
@@ -40,7 +42,8 @@ static vvec3 surface_transparency(const struct trc_tile *t, const struct trc_pac
         s.ray_length = vf_load(&p->t[i]);
         s.depth = s.diffuse_depth = s.glossy_depth = s.transmission_depth = s.transparent_depth =
             vi_set(0);
-        s.footprint = s.pixel = s.raster_x = s.raster_y = vf_set(0.0f);
+        s.footprint = s.raster_x = s.raster_y = vf_set(0.0f);
+        s.pixel = pixel ? vf_gather(pixel, order, s.active) : vf_set(0.0f);
         trc_surface_fetch(&s);
         if (m->instruction_count)
             trc_program_run(m, &s, &regs);
@@ -76,10 +79,11 @@ static uint32_t chunk_take(struct trc_tile *t, const struct trc_packet *p,
     if (!vm_any(met))
         return 0;
     const vmask leaves = p->left ? leaves_ball(hits, i, met) : vm_none();
-    const vmask open = may_pass(t, vi_load((const int32_t *)order + i), vm_andnot(met, leaves));
+    const vint own = vi_load((const int32_t *)order + i);
+    const vmask open = may_pass(t, own, vm_andnot(met, leaves));
     vvec3 through = v3_zero();
     if (vm_any(open))
-        through = surface_transparency(t, p, hits, i, open);
+        through = surface_transparency(t, p, hits, i, own, open);
     through = v3_select(leaves, v3_splat(vf_one()), through);
     float factor[3][TRC_WIDTH];
     vf_store(factor[0], through.x);

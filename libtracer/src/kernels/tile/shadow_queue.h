@@ -31,6 +31,7 @@ struct trc_shadow_store {
     uint32_t *strand;                  /* the same */
     float *tmin;                       /* how far a ray has come, or NULL: nothing is transparent */
     uint32_t *passed;                  /* surfaces that it has come through, or NULL */
+    float *pixel;                      /* at what is lit (struct trc_surface), or NULL */
     float *lamp[3];                    /* for the Shadow pass, or NULL */
     float *scaled[TRC_SCALED_COLUMNS]; /* those that what is in the way takes from, RGB by RGB */
     uint32_t scaled_count;
@@ -45,6 +46,7 @@ struct trc_shadow_columns {
     bool lamps;   /* of the Shadow pass */
     bool strands; /* of curves */
     bool passes;  /* of transparent materials */
+    bool pixels;  /* of transparent materials where there are slopes */
 };
 
 TRC_INLINE void trc_shadows_carve(struct trc_carver *c, struct trc_shadow_store *q,
@@ -65,6 +67,8 @@ TRC_INLINE void trc_shadows_carve(struct trc_carver *c, struct trc_shadow_store 
         q->tmin = trc_carve(c, column);
         q->passed = trc_carve(c, column);
     }
+    if (with.pixels)
+        q->pixel = trc_carve(c, column);
     if (with.strands) {
         q->strand_instance = trc_carve(c, column);
         q->strand = trc_carve(c, column);
