@@ -608,6 +608,7 @@ class MaterialFlags(IntFlag):
     LIGHT_TREE = 16
     KEEPS_NORMALS = 32
     CUTS_OUT = 64
+    WIDE_SHADOWS = 128
 
 
 class AlphaMode(IntEnum):

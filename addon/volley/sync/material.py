@@ -6,8 +6,8 @@ import bpy
 from .. import abi, native
 from ..abi import DisplacementMethod, NodeType
 from ..compat import (
-    DEFAULT_IS_PRINCIPLED, HAS_DEFENSIVE_SAMPLING, HAS_FACET_SHADOWING, KEEPS_NORMALS, LEAVES_BUMPS, cycles,
-    has_light_tree, uses_nodes)
+    DEFAULT_IS_PRINCIPLED, HAS_DEFENSIVE_SAMPLING, HAS_FACET_SHADOWING, HAS_WIDE_SHADOWS, KEEPS_NORMALS, LEAVES_BUMPS,
+    cycles, has_light_tree, uses_nodes)
 from . import flatten, instance, nodes, studio, tangents
 from .attributes import Attributes
 from .changes import Changes
@@ -21,6 +21,7 @@ _DISPLACEMENTS = {'BUMP': DisplacementMethod.BUMP, 'DISPLACEMENT': DisplacementM
                   'BOTH': DisplacementMethod.BOTH}
 _VERSION_FLAGS = ((abi.MaterialFlags.DEFENSIVE_SAMPLING if HAS_DEFENSIVE_SAMPLING else 0) |
                   (abi.MaterialFlags.FACET_SHADOWING if HAS_FACET_SHADOWING else 0) |
+                  (abi.MaterialFlags.WIDE_SHADOWS if HAS_WIDE_SHADOWS else 0) |
                   (abi.MaterialFlags.KEEPS_NORMALS if KEEPS_NORMALS else 0))
 _DEFAULT_COLOR = 0.8, 0.8, 0.8
 _DEFAULT_NAME = "default_surface"  # in mattes

@@ -105,7 +105,7 @@ trc_status trc_material_validate(const trc_material_desc *desc) {
     const uint32_t known = TRC_MATERIAL_SAMPLE_EMISSION | TRC_MATERIAL_TRANSPARENT_SHADOW |
                            TRC_MATERIAL_DEFENSIVE_SAMPLING | TRC_MATERIAL_FACET_SHADOWING |
                            TRC_MATERIAL_LIGHT_TREE | TRC_MATERIAL_KEEPS_NORMALS |
-                           TRC_MATERIAL_CUTS_OUT;
+                           TRC_MATERIAL_CUTS_OUT | TRC_MATERIAL_WIDE_SHADOWS;
     TRC_TRY(trc_check_struct(desc, sizeof *desc, "trc_material_desc"));
     TRC_TRY(trc_check_count(desc->node_count, 0, TRC_MAX_NODES, "node_count"));
     TRC_TRY(

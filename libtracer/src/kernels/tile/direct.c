@@ -112,6 +112,13 @@ static vmask light_contribute(const struct trc_tile *t, const struct arrival *a,
     return vm_and(active, is_light(size));
 }
 
+/* How rough what is lit is for this light, by what Cycles widens rays: 1 where it is matt, 0 where
+ * it is not. Cycles weighs the lobes' own roughness by their densities. */
+static vfloat spread_of(const struct light_result *r) {
+    const vfloat matt = v3_max(r->diffuse), rest = v3_max(v3_add(r->glossy, r->transmission));
+    return vf_sqrt(vf_divide(matt, matt + rest));
+}
+
 TRC_INLINE void push(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
                      const struct trc_light_sample *l, const struct light_result *r, vvec3 o,
                      vuint cell, vmask active) {
@@ -145,8 +152,10 @@ TRC_INLINE void push(struct trc_tile *t, const struct arrival *a, const struct t
     }
     for (int k = 0; q->lamp[0] && k < 3; k++)
         vf_compress(q->lamp[k] + at, r->lamp, bits);
-    if (q->pixel) /* lights do not spread it */
+    if (q->pixel) {
         vf_compress(q->pixel + at, trc_pixel_distance(t, a), bits);
+        vf_compress(q->spread + at, spread_of(r), bits);
+    }
 }
 
 /* Enters the strands that the lanes' rays have left, the last of the queue. */

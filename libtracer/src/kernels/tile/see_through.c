@@ -4,12 +4,22 @@
 #include "kernels/simd/wide_math.h"
 #include "kernels/tile/shadow_bundle.h"
 
+/* How far apart neighbouring rays are where they meet a material. order: of the rays. */
+static vfloat pixel_of(const struct trc_shadow_store *q, const struct trc_material *m, vint order,
+                       vfloat length, vmask lanes) {
+    if (!q->pixel)
+        return vf_set(0.0f);
+    const vfloat pixel = vf_gather(q->pixel, order, lanes);
+    return m->flags & TRC_MATERIAL_WIDE_SHADOWS
+               ? pixel + length * vf_gather(q->spread, order, lanes)
+               : pixel;
+}
+
 /* What the surfaces that the lanes' rays meet let through; 0 where a material is opaque to shadows.
  * order: of the rays. */
 static vvec3 surface_transparency(const struct trc_tile *t, const struct trc_packet *p,
                                   const struct trc_packet_hits *hits, int i, vint order,
                                   vmask active) {
-    const float *pixel = t->shadows.pixel;
     vvec3 through = v3_zero();
     uint32_t todo = vm_bits(active);
     while (todo) {
@@ -36,14 +46,14 @@ static vvec3 surface_transparency(const struct trc_tile *t, const struct trc_pac
         s.u = vf_load(&hits->u[i]);
         s.v = vf_load(&hits->v[i]);
         s.time = t->object_motion ? vf_load(&p->time[i]) : vf_set(0.0f);
-        s.wo = v3_normalize(
-            v3_neg(v3(vf_load(&p->d[0][i]), vf_load(&p->d[1][i]), vf_load(&p->d[2][i]))));
+        const vvec3 d = v3(vf_load(&p->d[0][i]), vf_load(&p->d[1][i]), vf_load(&p->d[2][i]));
+        s.wo = v3_normalize(v3_neg(d));
         s.path = vu_set(TRC_VISIBLE_SHADOW);
         s.ray_length = vf_load(&p->t[i]);
         s.depth = s.diffuse_depth = s.glossy_depth = s.transmission_depth = s.transparent_depth =
             vi_set(0);
         s.footprint = s.raster_x = s.raster_y = vf_set(0.0f);
-        s.pixel = pixel ? vf_gather(pixel, order, s.active) : vf_set(0.0f);
+        s.pixel = pixel_of(&t->shadows, m, order, v3_length(d) * s.ray_length, s.active);
         trc_surface_fetch(&s);
         if (m->instruction_count)
             trc_program_run(m, &s, &regs);

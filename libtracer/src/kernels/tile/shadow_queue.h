@@ -32,6 +32,7 @@ struct trc_shadow_store {
     float *tmin;                       /* how far a ray has come, or NULL: nothing is transparent */
     uint32_t *passed;                  /* surfaces that it has come through, or NULL */
     float *pixel;                      /* at what is lit (struct trc_surface), or NULL */
+    float *spread;                     /* how much wider it may get per length, or NULL */
     float *lamp[3];                    /* for the Shadow pass, or NULL */
     float *scaled[TRC_SCALED_COLUMNS]; /* those that what is in the way takes from, RGB by RGB */
     uint32_t scaled_count;
@@ -67,8 +68,10 @@ TRC_INLINE void trc_shadows_carve(struct trc_carver *c, struct trc_shadow_store 
         q->tmin = trc_carve(c, column);
         q->passed = trc_carve(c, column);
     }
-    if (with.pixels)
+    if (with.pixels) {
         q->pixel = trc_carve(c, column);
+        q->spread = trc_carve(c, column);
+    }
     if (with.strands) {
         q->strand_instance = trc_carve(c, column);
         q->strand = trc_carve(c, column);
