@@ -748,6 +748,7 @@ class FeatureFlags(IntFlag):
     PORTALS = 2097152
     CURVES = 4194304
     SHADOW_TERMINATORS = 8388608
+    SHADOW_SLOPES = 16777216
 
 
 class CameraDesc(Structure):

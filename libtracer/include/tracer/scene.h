@@ -66,7 +66,8 @@ enum trc_feature_flags {
     TRC_FEATURE_PORTALS = 1 << 21, /* some surface sends rays on from elsewhere */
     TRC_FEATURE_CURVES = 1 << 22,
     /* Some instance has shadow terminator offsets other than the defaults. */
-    TRC_FEATURE_SHADOW_TERMINATORS = 1 << 23
+    TRC_FEATURE_SHADOW_TERMINATORS = 1 << 23,
+    TRC_FEATURE_SHADOW_SLOPES = 1 << 24 /* some surface that shadow rays pass has bumps there */
 };
 
 typedef struct trc_scene_stats {

@@ -30,6 +30,13 @@ static uint32_t material_features(uint32_t has) {
     return features;
 }
 
+static uint32_t surface_features(const struct trc_material *m) {
+    const struct trc_material *shadow = m->shadow ? m->shadow : m;
+    const bool has_slopes =
+        trc_material_shadows_transparent(m) && (shadow->has & TRC_MATERIAL_READS_PIXEL);
+    return material_features(m->has) | (has_slopes ? (uint32_t)TRC_FEATURE_SHADOW_SLOPES : 0u);
+}
+
 /* Meshes count whether or not the camera's shutter is open: queries have times of their own. */
 static uint32_t instance_features(const struct trc_snapshot *s) {
     uint32_t features = 0;
@@ -52,9 +59,8 @@ static uint32_t instance_features(const struct trc_snapshot *s) {
             features |= TRC_FEATURE_DEFORMATION;
         if (s->meshes[instance->mesh]->strands)
             features |= TRC_FEATURE_CURVES;
-        for (uint32_t m = 0; m < instance->material_count; m++) {
-            features |= material_features(s->materials[instance->materials[m]]->has);
-        }
+        for (uint32_t m = 0; m < instance->material_count; m++)
+            features |= surface_features(s->materials[instance->materials[m]]);
     }
     return features;
 }

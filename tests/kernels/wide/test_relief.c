@@ -189,6 +189,49 @@ static void test_normals_beside(void **state) {
     }
 }
 
+/* How far the point is from the nearest edge, in metres. */
+static double edge_distance(const struct plane *p) {
+    const double at[3] = {vf_get(p->s.p.x, 0), vf_get(p->s.p.y, 0), vf_get(p->s.p.z, 0)};
+    double nearest = INFINITY;
+    for (int k = 0; k < 3; k++) {
+        double edge[3], way[3], across[3];
+        for (int i = 0; i < 3; i++) {
+            edge[i] = p->world[3 * ((k + 1) % 3) + i] - p->world[3 * k + i];
+            way[i] = at[i] - p->world[3 * k + i];
+        }
+        cross(edge, way, across);
+        nearest = fmin(nearest, sqrt(dot(across, across) / dot(edge, edge)));
+    }
+    return nearest;
+}
+
+/* Wires reach half their size from the edges, in metres or in pixels; strands have none. */
+static void test_wires(void **state) {
+    (void)state;
+    struct rng r = rng_seed(14);
+    static struct plane p;
+    for (int round = 0; round < 60; round++) {
+        const float pixel = .02f;
+        const bool in_pixels = round & 1;
+        build_plane(&p, &r, round & 2, pixel);
+        const double whole = 2 * edge_distance(&p) / (in_pixels ? pixel : 1);
+        for (int beyond = 0; beyond < 2; beyond++)
+            for (uint32_t shape = 0; shape <= TRC_SHAPE_RIBBONS; shape += TRC_SHAPE_RIBBONS) {
+                struct single program;
+                float out[4];
+                single_init(&program, TRC_OP_WIREFRAME, in_pixels ? TRC_WIREFRAME_PIXELS : 0, 0);
+                program.operands[TRC_OP_AT(WIREFRAME, size)].value =
+                    (float)(whole * (beyond ? 1.001 : .999));
+                const float at[3] = {vf_get(p.s.p.x, 0), vf_get(p.s.p.y, 0), vf_get(p.s.p.z, 0)};
+                for (uint32_t i = 0; i < 3; i++)
+                    program.operands[TRC_OP_AT(WIREFRAME, position) + i].value = at[i];
+                p.mesh.shape = shape;
+                run(&program, &p.s, out);
+                assert_true(out[0] == (beyond && !shape ? 1 : 0));
+            }
+    }
+}
+
 /* Heights of a known slope turn the normal n to n - distance * slope, or part of the way. */
 static void test_known_slopes(void **state) {
     (void)state;
@@ -273,9 +316,8 @@ int main(void) {
     if (!test_cpu_can())
         return 77;
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_points_beside),
-        cmocka_unit_test(test_normals_beside),
-        cmocka_unit_test(test_known_slopes),
+        cmocka_unit_test(test_points_beside), cmocka_unit_test(test_normals_beside),
+        cmocka_unit_test(test_wires),         cmocka_unit_test(test_known_slopes),
         cmocka_unit_test(test_limits),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -10,6 +10,8 @@
 #include "kernels/program/input.h"
 #include "kernels/trace/valid_normal.h"
 
+static bool has_triangles(const struct lane_group *g) { return g->mesh && !g->mesh->shape; }
+
 /* Steps along the surface. */
 static void pixel_steps(const struct trc_surface *s, vvec3 step[2]) {
     const vvec3 n = s->ng;
@@ -40,7 +42,7 @@ static vfloat op_wireframe(const struct trc_surface *s, uint32_t mode, vfloat si
     vmask out = vm_none();
     struct lane_group g = groups_begin(s);
     while (groups_next(s, &g)) {
-        if (!g.mesh)
+        if (!has_triangles(&g))
             continue;
         struct trc_corners c;
         struct trc_wide_affine a;
@@ -95,7 +97,7 @@ static void normal_beside(struct trc_surface *beside) {
     vmask triangles = vm_none();
     struct lane_group g = groups_begin(beside);
     while (groups_next(beside, &g))
-        if (g.mesh && !g.mesh->shape)
+        if (has_triangles(&g))
             triangles = vm_or(triangles, g.lanes);
     if (vm_any(triangles))
         beside->n = v3_select(triangles, trc_normal_between(beside, triangles), beside->n);

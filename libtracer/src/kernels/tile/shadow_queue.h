@@ -47,7 +47,7 @@ struct trc_shadow_columns {
     bool lamps;   /* of the Shadow pass */
     bool strands; /* of curves */
     bool passes;  /* of transparent materials */
-    bool pixels;  /* of transparent materials where there are slopes */
+    bool pixels;  /* of those with slopes */
 };
 
 TRC_INLINE void trc_shadows_carve(struct trc_carver *c, struct trc_shadow_store *q,

@@ -64,7 +64,6 @@ static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc,
     const size_t batch = (trc_column_entries(catchers) + TRC_WIDTH) * sizeof(float);
     const bool splits_light = wants_light_passes(desc);
     const bool curves = features & TRC_FEATURE_CURVES;
-    const bool passes = features & TRC_FEATURE_TRANSPARENCY;
     const struct trc_ray_columns columns = {t->measures_paths, t->remembers_left, splits_light,
                                             curves};
     trc_rays_carve(&c, &t->stack, t->ray_room.capacity, columns);
@@ -87,8 +86,8 @@ static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc,
                       (struct trc_shadow_columns){.splits = splits_light,
                                                   .lamps = desc->passes >> TRC_PASS_SHADOW & 1,
                                                   .strands = curves,
-                                                  .passes = passes,
-                                                  .pixels = passes && t->measures_paths});
+                                                  .passes = features & TRC_FEATURE_TRANSPARENCY,
+                                                  .pixels = features & TRC_FEATURE_SHADOW_SLOPES});
     if (curves)
         t->left = trc_carve(&c, TRC_BUNDLE * sizeof *t->left);
     t->keys = trc_carve(&c, TRC_SHADOW_COLUMN * sizeof *t->keys);
