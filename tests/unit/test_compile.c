@@ -642,8 +642,8 @@ static void test_refused_nodes(void **state) {
     graph.surface = add(TRC_NODE_OBJECT_INFO, 0, 0, NULL);
     refused(TRC_ERROR_INVALID_ARGUMENT, "surface", "shader");
     graph.surface = 0;
-    graph.flags = 128;
-    refused(TRC_ERROR_INVALID_ARGUMENT, "flags", "0x80");
+    graph.flags = 256;
+    refused(TRC_ERROR_INVALID_ARGUMENT, "flags", "0x100");
 }
 
 static void test_refused_tables(void **state) {
