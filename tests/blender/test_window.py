@@ -639,7 +639,8 @@ def test_instances_of_what_is_linked_are_seen(window, tmp_path):
 
 
 def _noting(shown):
-    """Let viewports note what they show, by whether it is a preview that is cleaned, with the plain picture."""
+    """Let viewports note what they show, by whether it is a preview that is cleaned, with the plain picture; None
+    for that where samples came in between."""
     from volley import passes
     read_shown, read_preview = passes.read_shown, passes.read_preview
 
@@ -648,8 +649,10 @@ def _noting(shown):
         return read_shown(render, entry)
 
     def note_preview(render):
+        before = passes.read_combined(render).copy()
         picture = read_preview(render)
-        shown["previews"].append((picture.copy(), passes.read_combined(render)))
+        is_still = np.array_equal(before, passes.read_combined(render))
+        shown["previews"].append((picture.copy(), before if is_still else None))
         return picture
 
     passes.read_shown, passes.read_preview = note_shown, note_preview
@@ -679,7 +682,7 @@ def inside_denoised_previews():
     counts.append(len(shown["previews"]))
     scene.volley.preview_denoising_start_sample = 1
     yield from _settled()
-    previews = [pair for pair in shown["previews"] if pair[0].shape == exact.shape]
+    previews = [pair for pair in shown["previews"] if pair[1] is not None and pair[0].shape == exact.shape]
     return counts, [[float(((picture - exact) ** 2).mean()) for picture in pair] for pair in previews]
 
 
