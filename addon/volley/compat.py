@@ -98,7 +98,7 @@ KEEPS_NORMALS = bpy.app.version >= (4, 0, 0)
 # What lies in the shadow of bumps goes by other means; seen in 5.2, not in 4.3.
 HAS_FACET_SHADOWING = bpy.app.version >= (5, 0, 0)
 
-# Shadow rays from matt surfaces spread, so that bumps of what they go through are smooth; seen in 5.2, not in 4.3.
+# Shadow rays from rough surfaces spread, so that bumps of what they go through are smooth; seen in 5.2, not in 4.3.
 HAS_WIDE_SHADOWS = bpy.app.version >= (5, 0, 0)
 
 # Bumps of Window coordinates have their steps, along the picture's sides, along other directions of the

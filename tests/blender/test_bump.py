@@ -159,12 +159,13 @@ def inside_shadows():
     """{name: [by Volley, by Cycles]} of what lies in the light of surfaces whose transparency has pixels' widths."""
     import scenes
     pictures = {}
-    for name in ("bumps", "wires"):
+    for name, receiver, inputs in (("bumps", "Diffuse", {}), ("wires", "Diffuse", {}),
+                                   ("wires, gloss", "Glossy", {"Roughness": 0.7})):
         stage()
         scenes.light('SUN', rotation=(1.2, 0.0, 0.3), energy=3.0, angle=0.0)
-        scenes.wall(size=6.0, y=2.0, material=scenes.material("Matt", "ShaderNodeBsdfDiffuse"))
+        scenes.wall(size=6.0, y=2.0, material=scenes.material("Lit", "ShaderNodeBsdf" + receiver, **inputs))
         tree = Tree()
-        opaque = (tree.add("Wireframe", {"use_pixel_size": True}, Size=4.0), "Fac")
+        opaque = (tree.add("Wireframe", {"use_pixel_size": True}, Size=0.05), "Fac")
         if name == "bumps":
             bump = tree.add("Bump", Height=noise("Object")(tree), Distance=0.05)
             opaque = (tree.add("Fresnel", IOR=1.5, Normal=(bump, 0)), 0)
@@ -172,7 +173,7 @@ def inside_shadows():
         tree.surface(tree.add("MixShader", _0=opaque, _1=(clear, 0), _2=(matt, 0)))
         made = _shape()
         made.data.materials.append(tree.material)
-        made.visible_camera = False
+        made.visible_camera = made.visible_glossy = False
         pictures[name] = scenes.by_both(1)
     return pictures
 

@@ -444,8 +444,8 @@ enum trc_material_flags {
     /* What the camera sees of a holdout that is made of it: what is transparent stays so, and all
      * else, emission too, is a hole in the film. */
     TRC_MATERIAL_CUTS_OUT = 64,
-    /* Shadow rays that see its transparency are, from matt surfaces on, a pixel and as much as they
-     * are long apart (Cycles 5), so that bumps there are smooth; else a pixel. */
+    /* Shadow rays that see its transparency are a pixel and their length times the roughness of
+     * what is lit apart (Cycles 5), so that bumps there are smooth; else a pixel. */
     TRC_MATERIAL_WIDE_SHADOWS = 128
 };
 

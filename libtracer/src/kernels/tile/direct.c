@@ -112,11 +112,24 @@ static vmask light_contribute(const struct trc_tile *t, const struct arrival *a,
     return vm_and(active, is_light(size));
 }
 
-/* How rough what is lit is for this light, by what Cycles widens rays: 1 where it is matt, 0 where
- * it is not. Cycles weighs the lobes' own roughness by their densities. */
+/* The mean square alpha of the lobes that rays go on from, by how often they do. */
+static vfloat mean_alpha2(const struct trc_lobes *lobes) {
+    vfloat sum = vf_set(0.0f), weights = vf_set(0.0f);
+    for (int i = 0; i < lobes->count; i++) {
+        const struct trc_lobe *lobe = &lobes->lobe[i];
+        if (trc_lobe_ends(lobe->kind))
+            continue;
+        sum = sum + lobe->sample_weight * vf_square(trc_lobe_alpha(lobe));
+        weights = weights + lobe->sample_weight;
+    }
+    return vf_where(vf_gt(weights, vf_set(0.0f)), vf_divide(sum, weights));
+}
+
+/* How rough what is lit is, by which Cycles widens rays: the root of the mean square alpha, that of
+ * what is matt being 1, by what each brings. Cycles takes the mean by densities. */
 static vfloat spread_of(const struct light_result *r) {
     const vfloat matt = v3_max(r->diffuse), rest = v3_max(v3_add(r->glossy, r->transmission));
-    return vf_sqrt(vf_divide(matt, matt + rest));
+    return vf_sqrt(vf_divide(matt + rest * r->alpha2, matt + rest));
 }
 
 TRC_INLINE void push(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
@@ -153,7 +166,7 @@ TRC_INLINE void push(struct trc_tile *t, const struct arrival *a, const struct t
     for (int k = 0; q->lamp[0] && k < 3; k++)
         vf_compress(q->lamp[k] + at, r->lamp, bits);
     if (q->pixel) {
-        vf_compress(q->pixel + at, trc_pixel_distance(t, a), bits);
+        vf_compress(q->pixel + at, s->pixel, bits);
         vf_compress(q->spread + at, spread_of(r), bits);
     }
 }
@@ -227,6 +240,8 @@ static void sample_use(struct trc_tile *t, const struct arrival *a, const struct
     vmask lit = vm_and(active, sample->valid);
     if (vm_any(lit))
         lit = light_contribute(t, a, s, lobes, sample, count, lit, &r);
+    if (t->shadows.pixel)
+        r.alpha2 = mean_alpha2(lobes);
     if (t->shadows.lamp[0] && vm_any(lit))
         r.lamp = lamp_part(t, a, s, sample, count, lit);
     if (!vm_any(lit))

@@ -32,8 +32,8 @@ TRC_INLINE vfloat pixel_turn(vfloat x, vfloat y, float dx, float dy) {
 }
 
 /* The mean of both directions on the image, as Cycles has it: rays go apart as those of the camera
- * do, along the whole path, whatever they met on it. */
-vfloat trc_pixel_distance(const struct trc_tile *t, const struct arrival *a) {
+ * do, along the whole path, whatever they met on it. Of scenes with TRC_FEATURE_SLOPES. */
+static vfloat pixel_distance(const struct trc_tile *t, const struct arrival *a) {
     const struct trc_camera *c = &t->snapshot->camera;
     uint32_t key;
     float f, w[4];
@@ -90,7 +90,8 @@ static void surface_setup(struct trc_tile *t, const struct arrival *a, uint32_t 
     s->transmission_depth = (vint)trc_depth_of(a->depths, TRC_DEPTH_TRANSMISSION_SHIFT);
     s->transparent_depth = (vint)trc_depth_of(a->depths, TRC_DEPTH_TRANSPARENT_SHIFT);
     s->footprint = has & TRC_MATERIAL_READS_FOOTPRINT ? beam_width(t, a) : vf_set(0.0f);
-    s->pixel = has & TRC_MATERIAL_READS_PIXEL ? trc_pixel_distance(t, a) : vf_set(0.0f);
+    const bool needs_pixel = (has & TRC_MATERIAL_READS_PIXEL) || t->shadows.pixel;
+    s->pixel = needs_pixel ? pixel_distance(t, a) : vf_set(0.0f);
     s->raster_x = (vi_to_float((vint)(a->pixel & vu_set(TRC_PIXEL_X_MASK))) + vf_set(0.5f)) *
                   vf_set(1.0f / (float)t->desc->width);
     s->raster_y = (vi_to_float((vint)(a->pixel >> TRC_PIXEL_Y_SHIFT)) + vf_set(0.5f)) *

@@ -80,16 +80,14 @@ void trc_emission_holdout(struct trc_tile *t, const struct arrival *a,
 /* Of lights with a shadow class, of all rays of t->work that bounced. (kernels/tile/linked.c) */
 void trc_linked_lights(struct trc_tile *t);
 
-/* How far apart the rays of neighbouring pixels are where they arrive, of scenes with
- * TRC_FEATURE_SLOPES. (kernels/tile/shade.c) */
-vfloat trc_pixel_distance(const struct trc_tile *t, const struct arrival *a);
-
 /* ---- light that samples bring (kernels/tile/direct.c) ---- */
 
 /* What a light sample brings. */
 struct light_result {
     vvec3 diffuse, glossy, transmission; /* unshadowed contributions */
     vfloat lamp;                         /* and that to the Shadow pass */
+    vfloat alpha2; /* mean square alpha of the lobes of glossy and transmission; read where shadow
+                      rays know of pixels */
 };
 
 void trc_direct_light(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
