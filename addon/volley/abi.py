@@ -279,6 +279,10 @@ class WireframeMode(IntEnum):
     MASK = 3
 
 
+class AttributeMode(IntEnum):
+    LEVEL = 1
+
+
 class CoordinateMode(IntEnum):
     CURVED = 1
 
@@ -974,8 +978,8 @@ ENUMERATIONS = {StatusCode: "TRC_", IsaId: "TRC_ISA_", CameraType: "TRC_CAMERA_"
                 ToonComponent: "TRC_TOON_", HairComponent: "TRC_HAIR_", Pigment: "TRC_PIGMENT_",
                 PrincipledHairMode: "TRC_PRINCIPLED_HAIR_", MappingType: "TRC_MAPPING_",
                 NormalMapSpace: "TRC_NORMAL_MAP_", NormalMapFlags: "TRC_NORMAL_MAP_", BumpMode: "TRC_BUMP_",
-                WireframeMode: "TRC_WIREFRAME_", CoordinateMode: "TRC_COORDINATE_",
-                AmbientMode: "TRC_AMBIENT_", RaycastMode: "TRC_RAYCAST_",
+                WireframeMode: "TRC_WIREFRAME_", AttributeMode: "TRC_ATTRIBUTE_",
+                CoordinateMode: "TRC_COORDINATE_", AmbientMode: "TRC_AMBIENT_", RaycastMode: "TRC_RAYCAST_",
                 DisplacementMethod: "TRC_DISPLACEMENT_", RampInterpolation: "TRC_RAMP_", Gamut: "TRC_GAMUT_",
                 CurvesExtension: "TRC_CURVES_", SeparateMode: "TRC_SEPARATE_", ClampType: "TRC_CLAMP_",
                 TangentSource: "TRC_TANGENT_", SpaceId: "TRC_SPACE_", TransformedType: "TRC_TRANSFORMED_",

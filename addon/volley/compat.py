@@ -108,6 +108,9 @@ TURNS_WINDOW_BUMPS = bpy.app.version >= (5, 0, 0)
 # Bumps of Normal coordinates see smooth surfaces turn; seen in 5.2, not in 4.3.
 CURVES_NORMAL_BUMPS = bpy.app.version >= (5, 0, 0)
 
+# The Color Attribute node makes no bumps, other than the Attribute node; seen in 5.2, not in 4.3.
+LEVELS_COLOR_BUMPS = bpy.app.version >= (5, 0, 0)
+
 # The strength of a normal map of tangents scales what the map says; seen in 4.3, not in 3.4.
 SCALES_NORMAL_MAPS = bpy.app.version >= (4, 0, 0)
 

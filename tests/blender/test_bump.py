@@ -23,6 +23,10 @@ def _attribute(tree):
     return tree.add("Attribute", {"attribute_name": "Ramp"}), "Fac"
 
 
+def _colors(tree):
+    return tree.add("VertexColor", {"layer_name": "Tint"}), "Color"
+
+
 def _parametric(tree):
     return tree.add("NewGeometry"), "Parametric"
 
@@ -76,6 +80,9 @@ def _shape(smooth=True):
     made.rotation_euler, made.scale = (0.3, 0.2, 0.5), (1.1, 1.1, 1.1)
     ramp = made.data.attributes.new("Ramp", 'FLOAT', 'POINT')
     ramp.data.foreach_set("value", [v.co.x ** 2 for v in made.data.vertices])
+    tint = made.data.color_attributes.new("Tint", 'FLOAT_COLOR', 'POINT')
+    for each, vertex in zip(tint.data, made.data.vertices):
+        each.color = (vertex.co.x ** 2, vertex.co.y ** 2, vertex.co.z ** 2, 1.0)
     return made
 
 
@@ -90,6 +97,7 @@ HEIGHTS = {
     "noise, position": (noise("Position"), {"Distance": 0.06, "Strength": 1.7}),
     "image": (waves, {"Distance": 0.3}),
     "attribute": (_attribute, {"Distance": 0.4}),
+    "colors": (_colors, {"Distance": 0.4}),
     "parametric": (_parametric, {"Distance": 0.2}),
     "wires": (_wires(Size=0.1), {"Distance": 0.1}),
     "wires, pixels": (_wires({"use_pixel_size": True}, Size=3.0), {"Distance": 0.05}),

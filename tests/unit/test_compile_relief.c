@@ -71,6 +71,21 @@ static void test_curved_normals(void **state) {
     }
 }
 
+/* Colours of a mesh make bumps, unless their node is level. */
+static void test_level_colors(void **state) {
+    (void)state;
+    for (uint32_t mode = 0; mode <= TRC_ATTRIBUTE_LEVEL; mode++) {
+        graph_clear();
+        const int32_t colors = add(TRC_NODE_COLOR_ATTRIBUTE, mode, 0, NULL);
+        graph.nodes[colors].name = "Tint";
+        add_bent(add_bump(link_to(colors, 0), standard()));
+        struct trc_material *m = compiled();
+        assert_int_equal(count_op(m, TRC_OP_BUMP), !mode);
+        assert_int_equal(count_op(m, TRC_OP_BESIDE), mode ? 0 : 2);
+        trc_material_release(m);
+    }
+}
+
 /* Wires are asked for at three places; steep ones also before the point, and not beside it. */
 static void test_wires(void **state) {
     (void)state;
@@ -257,6 +272,7 @@ int main(void) {
         cmocka_unit_test(test_three_points),
         cmocka_unit_test(test_curved_normals),
         cmocka_unit_test(test_wires),
+        cmocka_unit_test(test_level_colors),
         cmocka_unit_test(test_heights_are_shared),
         cmocka_unit_test(test_even_heights),
         cmocka_unit_test(test_images_of_heights_are_whole),

@@ -10,14 +10,14 @@ from collections import namedtuple
 
 import numpy as np
 
-from ..abi import (BlendMode, BumpMode, ClampType, CoordinateMode, DiffuseModel, DistributionType,
+from ..abi import (AttributeMode, BlendMode, BumpMode, ClampType, CoordinateMode, DiffuseModel, DistributionType,
                    EnvironmentProjection, HairComponent, ImageExtension, ImageInterpolation, ImageProjection,
                    MappingType, MathOperation as Math, ModeFlags, NodeType, NormalMapFlags, NormalMapSpace, Pigment,
                    PrincipledHairMode, RampInterpolation, SeparateMode, SpaceId, TableSize, TangentSource,
                    ToonComponent, VectorOperation as Vector)
 from ..compat import (CURVES_NORMAL_BUMPS, HAS_CORRELATED_MICROFACETS, HAS_FILMED_METAL, HAS_HAIR_ALBEDO,
-                      HAS_UNIT_NORMALS, HAS_WHOLE_COAT, KEEPS_DIFFUSE_ENERGY, LEAVES_BUMPS, RAMP_STEPS,
-                      SCALES_NORMAL_MAPS, TURNS_WINDOW_BUMPS)
+                      HAS_UNIT_NORMALS, HAS_WHOLE_COAT, KEEPS_DIFFUSE_ENERGY, LEAVES_BUMPS, LEVELS_COLOR_BUMPS,
+                      RAMP_STEPS, SCALES_NORMAL_MAPS, TURNS_WINDOW_BUMPS)
 from . import tangents
 from .converters import CONVERTERS, instance_value, strand_normal, strand_radius, strand_random
 from .derived import ISLAND, POINTINESS
@@ -511,7 +511,8 @@ def _place_in(walker, blender_object):
 
 def _color_attribute(walker, node, _sockets):
     walker.flat.color_names.add(node.layer_name)
-    index = walker.emit(NodeType.COLOR_ATTRIBUTE, (), name=node.layer_name)
+    mode = AttributeMode.LEVEL * LEVELS_COLOR_BUMPS
+    index = walker.emit(NodeType.COLOR_ATTRIBUTE, (), mode, name=node.layer_name)
     return named_outputs(index, NodeType.COLOR_ATTRIBUTE, ("Color", "Alpha"))
 
 

@@ -78,6 +78,10 @@ enum trc_wireframe_mode {
     TRC_WIREFRAME_MASK = 3
 };
 
+/* LEVEL: heights of the attribute are those of the shaded point, as of the Color Attribute node in
+ * Blender 5. */
+enum trc_attribute_mode { TRC_ATTRIBUTE_LEVEL = 1 };
+
 /* CURVED: heights of normals see these turn from point to point where the surface is smooth, as in
  * Blender 5; without it they are those of the shaded point. */
 enum trc_coordinate_mode { TRC_COORDINATE_CURVED = 1 };

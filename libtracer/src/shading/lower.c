@@ -568,7 +568,8 @@ static trc_status lower_node(const struct lowering *l) {
     case TRC_NODE_UV_MAP:
         return lower_attribute(l, TRC_OP_UV);
     case TRC_NODE_COLOR_ATTRIBUTE:
-        return lower_attribute(l, TRC_OP_COLOR_ATTRIBUTE);
+        return mode & TRC_ATTRIBUTE_LEVEL ? lower_named(l, TRC_OP_COLOR_ATTRIBUTE, 0)
+                                          : lower_attribute(l, TRC_OP_COLOR_ATTRIBUTE);
     case TRC_NODE_BUMP:
         return trc_build_bump(b, l->node, l->in, l->out);
     case TRC_NODE_DISPLACEMENT:
