@@ -4,11 +4,11 @@
 #include "kernels/simd/wide_math.h"
 #include "kernels/tile/shadow_bundle.h"
 
-/* How far apart neighbouring rays are where they meet a material. order: of the rays. */
-static vfloat pixel_of(const struct trc_shadow_store *q, const struct trc_material *m, vint order,
-                       vfloat length, vmask lanes) {
-    if (!q->pixel)
-        return vf_set(0.0f);
+/* How far apart neighbouring rays are where they meet a material, of scenes with
+ * TRC_FEATURE_SHADOW_SLOPES. order: of the rays; length: how far they have come. */
+static __attribute__((noinline)) vfloat pixel_of(const struct trc_shadow_store *q,
+                                                 const struct trc_material *m, vint order,
+                                                 vfloat length, vmask lanes) {
     const vfloat pixel = vf_gather(q->pixel, order, lanes);
     return m->flags & TRC_MATERIAL_WIDE_SHADOWS
                ? pixel + length * vf_gather(q->spread, order, lanes)
@@ -52,8 +52,9 @@ static vvec3 surface_transparency(const struct trc_tile *t, const struct trc_pac
         s.ray_length = vf_load(&p->t[i]);
         s.depth = s.diffuse_depth = s.glossy_depth = s.transmission_depth = s.transparent_depth =
             vi_set(0);
-        s.footprint = s.raster_x = s.raster_y = vf_set(0.0f);
-        s.pixel = pixel_of(&t->shadows, m, order, v3_length(d) * s.ray_length, s.active);
+        s.footprint = s.pixel = s.raster_x = s.raster_y = vf_set(0.0f);
+        if (t->shadows.pixel)
+            s.pixel = pixel_of(&t->shadows, m, order, v3_length(d) * s.ray_length, s.active);
         trc_surface_fetch(&s);
         if (m->instruction_count)
             trc_program_run(m, &s, &regs);
