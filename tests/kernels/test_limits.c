@@ -19,15 +19,9 @@ static trc_id emission(trc_scene scene) {
     return fixture_material(scene, TRC_NODE_EMISSION, LIGHT);
 }
 
-static trc_id clear_glass(trc_scene scene) {
-    struct node_list list = {0};
-    NODE_ADD(&list, TRC_NODE_TRANSPARENT, 0, node_color(1.0f, 1.0f, 1.0f));
-    return level_material(scene, &list, 0, 0);
-}
-
 /* Clear panes above each other, the first at z. */
 static void add_panes(trc_scene scene, uint32_t count, float z) {
-    const trc_id glass = clear_glass(scene);
+    const trc_id glass = fixture_clear(scene);
     for (uint32_t k = 0; k < count; k++)
         fixture_level(scene, 20.0f, z + 0.25f * (float)k, glass);
 }
@@ -179,7 +173,7 @@ static void slots_beyond_the_materials_have_the_last(void **state) {
         desc.material_index = slots;
         assert_ok(trc_mesh_create(scene, &desc, &id));
         const trc_id matt = fixture_material(scene, TRC_NODE_DIFFUSE, 0.5f);
-        const trc_id clear = clear_glass(scene);
+        const trc_id clear = fixture_clear(scene);
         const trc_id materials[2] = {is_clear ? matt : clear, is_clear ? clear : matt};
         trc_instance_desc instance = default_instance_desc(id);
         instance.materials = materials;

@@ -135,19 +135,26 @@ FIXTURE_INLINE trc_id fixture_glossy(trc_scene scene, float value, float roughne
     return id;
 }
 
-/* Straight through, for shadow rays, too. */
-FIXTURE_INLINE trc_id fixture_clear(trc_scene scene) {
-    const trc_node_input inputs[] = {{.node = -1, .value = {1, 1, 1}}};
+/* Straight through, for shadow rays, too, by that share of each colour. name: of its matte, or
+ * NULL. */
+FIXTURE_INLINE trc_id fixture_transparent(trc_scene scene, float r, float g, float b,
+                                          const char *name) {
+    const trc_node_input inputs[] = {{.node = -1, .value = {r, g, b}}};
     const trc_node node = {.type = TRC_NODE_TRANSPARENT, .input_count = 1};
     const trc_material_desc desc = {.struct_size = sizeof desc,
                                     .node_count = 1,
                                     .nodes = &node,
                                     .inputs = inputs,
                                     .input_count = 1,
+                                    .cryptomatte = name ? trc_cryptomatte_id(name) : 0.0f,
                                     .flags = TRC_MATERIAL_TRANSPARENT_SHADOW};
     trc_id id = 0;
     assert_int_equal(trc_material_create(scene, &desc, &id), TRC_OK);
     return id;
+}
+
+FIXTURE_INLINE trc_id fixture_clear(trc_scene scene) {
+    return fixture_transparent(scene, 1.0f, 1.0f, 1.0f, NULL);
 }
 
 /* A camera that looks straight down from x, 0, z in parallel rays. */

@@ -263,25 +263,10 @@ static void same_mean(void **state) {
 static void mattes_are_of_samples_that_count(void **state) {
     (void)state;
     const trc_scene scene = fixture_scene();
-    const trc_node_input inputs[] = {{.node = -1, .value = {0.5f, 0.5f, 0.5f}}};
-    const trc_node node = {.type = TRC_NODE_TRANSPARENT, .input_count = 1};
-    const trc_material_desc veil = {.struct_size = sizeof veil,
-                                    .node_count = 1,
-                                    .nodes = &node,
-                                    .inputs = inputs,
-                                    .input_count = 1,
-                                    .flags = TRC_MATERIAL_TRANSPARENT_SHADOW};
     const float corners[12] = {-9, -9, 3, 9, -9, 3, 9, 9, 3, -9, 9, 3};
-    static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
-    trc_mesh_desc mesh = default_mesh_desc();
-    trc_id id = 0, material = 0;
-    mesh.vertex_count = 4;
-    mesh.triangle_count = 2;
-    mesh.positions = corners;
-    mesh.position_count = 12;
-    mesh.indices = indices;
-    mesh.index_count = 6;
-    assert_int_equal(trc_material_create(scene, &veil, &material), TRC_OK);
+    const trc_mesh_desc mesh = fixture_quad_desc(corners);
+    const trc_id material = fixture_transparent(scene, 0.5f, 0.5f, 0.5f, NULL);
+    trc_id id = 0;
     assert_int_equal(trc_mesh_create(scene, &mesh, &id), TRC_OK);
     trc_instance_desc instance = default_instance_desc(id);
     instance.materials = &material;

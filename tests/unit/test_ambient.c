@@ -123,19 +123,9 @@ static void corner(void **state) {
 static void behind_glass(void **state) {
     (void)state;
     const trc_scene scene = fixture_level_view();
-    const trc_node_input clear[] = {{.node = -1, .value = {1, 1, 1}}};
-    const trc_node node = {.type = TRC_NODE_TRANSPARENT, .input_count = 1};
-    const trc_material_desc desc = {.struct_size = sizeof desc,
-                                    .node_count = 1,
-                                    .nodes = &node,
-                                    .inputs = clear,
-                                    .input_count = 1,
-                                    .flags = TRC_MATERIAL_TRANSPARENT_SHADOW};
-    trc_id glass = 0;
     double column[WIDTH];
-    assert_int_equal(trc_material_create(scene, &desc, &glass), TRC_OK);
     fixture_level(scene, 100.0f, 0.0f, fixture_material(scene, TRC_NODE_DIFFUSE, 0.5f));
-    fixture_level(scene, 100.0f, 0.5f, glass);
+    fixture_level(scene, 100.0f, 0.5f, fixture_clear(scene));
     for (uint32_t lights = 1; lights <= 4; lights *= 4) {
         draw(scene, &(struct setting){.distance = 3.0f, .factor = 0.7f, .light_samples = lights}, 0,
              column);

@@ -148,7 +148,7 @@ static void add_square(trc_scene scene, trc_id mesh, float distance, float part,
 
 static trc_scene nested_squares(void) {
     trc_scene scene = 0;
-    trc_id mesh = 0, glass = 0;
+    trc_id mesh = 0;
     const trc_scene_desc scene_desc = default_scene_desc();
     assert_int_equal(trc_scene_create(&scene_desc, &scene), TRC_OK);
     trc_mesh_desc mesh_desc = default_mesh_desc();
@@ -156,15 +156,7 @@ static trc_scene nested_squares(void) {
     mesh_desc.index_count = 6;
     mesh_desc.triangle_count = 2;
     assert_int_equal(trc_mesh_create(scene, &mesh_desc, &mesh), TRC_OK);
-    const trc_node_input inputs[] = {{.node = -1, .value = {0.25f, 0.5f, 0.75f}}};
-    const trc_node node = {.type = TRC_NODE_TRANSPARENT, .input_count = 1};
-    const trc_material_desc glass_desc = {.struct_size = sizeof glass_desc,
-                                          .node_count = 1,
-                                          .nodes = &node,
-                                          .inputs = inputs,
-                                          .input_count = 1,
-                                          .cryptomatte = trc_cryptomatte_id("glass")};
-    assert_int_equal(trc_material_create(scene, &glass_desc, &glass), TRC_OK);
+    const trc_id glass = fixture_transparent(scene, 0.25f, 0.5f, 0.75f, "glass");
     const float both = trc_cryptomatte_id("both");
     add_square(scene, mesh, 4.0f, near_part, glass, trc_cryptomatte_id("near"), both);
     add_square(scene, mesh, 6.0f, middle_part, 0, trc_cryptomatte_id("middle"), both);

@@ -33,22 +33,6 @@ static trc_id add_square(trc_scene scene, float x, float z, trc_id material, con
     return instance;
 }
 
-/* Lets a third through: mattes of parts of samples. */
-static trc_id add_veil(trc_scene scene) {
-    const trc_node_input inputs[] = {{.node = -1, .value = {0.3f, 0.4f, 0.2f}}};
-    const trc_node node = {.type = TRC_NODE_TRANSPARENT, .input_count = 1};
-    const trc_material_desc desc = {.struct_size = sizeof desc,
-                                    .node_count = 1,
-                                    .nodes = &node,
-                                    .inputs = inputs,
-                                    .input_count = 1,
-                                    .cryptomatte = trc_cryptomatte_id("veil"),
-                                    .flags = TRC_MATERIAL_TRANSPARENT_SHADOW};
-    trc_id id = 0;
-    assert_int_equal(trc_material_create(scene, &desc, &id), TRC_OK);
-    return id;
-}
-
 enum view { STILL, MOVING, WIDE_LENS, VIEW_COUNT };
 
 static void set_camera(trc_scene scene, enum view view) {
@@ -74,7 +58,8 @@ static trc_scene create_scene(enum view view) {
     add_square(scene, 0.0f, 0.0f, grey, "floor", TRC_INSTANCE_SHADOW_CATCHER);
     add_square(scene, -1.2f, 0.5f, grey, "wall", 0);
     add_square(scene, 1.1f, 1.0f, fixture_glossy(scene, 0.8f, 0.4f), "gloss", 0);
-    const trc_id veil = add_veil(scene);
+    /* Mattes of parts of samples. */
+    const trc_id veil = fixture_transparent(scene, 0.3f, 0.4f, 0.2f, "veil");
     add_square(scene, 0.4f, 2.0f, veil, "veil", 0);
     add_square(scene, 0.7f, 2.2f, veil, "other veil", 0);
     trc_light_desc light = default_light_desc();

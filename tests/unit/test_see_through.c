@@ -89,12 +89,8 @@ static struct shade shade_make(bool is_final, bool clear) {
     assert_ok(trc_light_create(s.scene, &sun, &id));
     fixture_level(s.scene, 20.0f, 0.0f, fixture_material(s.scene, TRC_NODE_DIFFUSE, 0.5f));
     const trc_id matt = fixture_material(s.scene, TRC_NODE_DIFFUSE, 0.5f);
-    if (clear) { /* without the material shadow rays ask for what is in the way alone */
-        struct node_list list = {0};
-        const uint32_t node =
-            NODE_ADD(&list, TRC_NODE_TRANSPARENT, 0, node_color(1.0f, 1.0f, 1.0f));
-        s.clear = level_material(s.scene, &list, node, 0);
-    }
+    if (clear) /* without the material shadow rays ask for what is in the way alone */
+        s.clear = fixture_clear(s.scene);
     const trc_id mixed[2] = {matt, clear ? s.clear : matt}, all[2] = {s.clear, s.clear};
     soup_make(&still, 1);
     soup_make(&moving, KEYS);
