@@ -5,6 +5,7 @@ import argparse
 import doctest
 import importlib
 import pathlib
+import re
 import sys
 
 import numpy as np
@@ -152,6 +153,19 @@ def test_what_denoise_makes_worse_is_a_loss():
     assert found[0].startswith("ball, 16 samples: FLIP") and found[0].endswith("**1.20**")
     assert found[1].startswith("ball, 1 samples: relMSE of the worst tile") and found[2].startswith("ball: flicker")
     assert denoise_section.losses({}) == []
+
+
+def test_headline_of_denoise_has_times_of_both():
+    scene = made_scene(3.0, 1.0)
+    scene["curves"][denoise.DENOISED] = {
+        count: {"seeds": {measure: [0.5 * error for error in errors] for measure, errors in point["seeds"].items()}}
+        for count, point in scene["curves"][denoise.PLAIN].items()}
+    scene["times"][denoise.DENOISED] = scene["times"][denoise.PLAIN]
+    scene["curves"] = {name: {str(count): point for count, point in points.items()}
+                       for name, points in scene["curves"].items()}
+    line, = error_sections.headline_lines({"denoise": {"scenes": {"ball": scene}}})
+    found = [float(value) for value in re.findall(r"\d+\.\d+", line)]
+    assert found == pytest.approx([6.0, 6.0, 6.0, 3.0] * 2, rel=0.08)
 
 
 def test_hair_that_cycles_renders_sooner_is_a_loss():

@@ -29,6 +29,20 @@ def text(made):
     return "\n\n".join(parts)
 
 
+def headline(made):
+    """One sentence: times for the errors of Cycles' plain pictures of PEER_SAMPLES[0] samples."""
+    said = []
+    for measure in TIMED:
+        clean, plain = ([denoise.time_ratio(scene, name, measure, PEER_SAMPLES[0]) for scene in made["scenes"].values()]
+                        for name in (denoise.DENOISED, denoise.PLAIN))
+        known = [value for value in clean if value is not None]
+        if known:
+            said.append(f"{digits(denoise.middle(known), 2)} times as long for the same {curves.MEASURES[measure]} "
+                        f"({digits(min(known), 2)} to {digits(max(known), 2)}; without Denoise {digits(denoise.middle(plain), 2)})")
+    return (f"Beside Volley with Denoise, Cycles' plain pictures of {PEER_SAMPLES[0]} samples take "
+            f"{', '.join(said)}: medians of {len(made['scenes'])} scenes.") if said else ""
+
+
 def losses(made):
     """Errors, tiles and flicker that Denoise makes worse than it may, the worst number of samples of each scene."""
     if not made:

@@ -19,6 +19,8 @@ def headline_lines(results):
         lines.append(equal_error_line(results["curves"]))
     lines += [equal_error_line(run["made"], f"Cycles of {run['blender']}")
               for run in elsewhere.of_part(results, "curves")]
+    if results.get("denoise"):
+        lines.append(denoise_section.headline(results["denoise"]))
     if results.get("kernels"):
         lines.append(kernel_line(results["kernels"]))
     lines += [kernel_line(run["made"], elsewhere.embree_name(run)) for run in elsewhere.of_part(results, "kernels")]
