@@ -1,5 +1,5 @@
-/* How wide shadow rays are where they read it: the shadow of a net of wires that are as thick as a
- * share of a pixel is there, beside the area of a triangle that is farther from its edges. */
+/* How wide shadow rays are: the shadow of a net whose wires are as thick as a share of that width,
+ * beside the part of a triangle that is farther from its edges. */
 #include "level_test.h"
 
 #include "meshes.h"
@@ -40,7 +40,7 @@ static void add_net(trc_scene scene, trc_id material) {
     mesh_free(&net);
 }
 
-/* Half matt, half glossy; share: of the latter. */
+/* Matt and glossy; share: of the latter. */
 static trc_id floor_material(trc_scene scene, float share, float roughness) {
     struct node_list list = {0};
     const trc_node_input grey = node_color(0.5f, 0.5f, 0.5f), none = node_number(0.0f);
@@ -101,10 +101,10 @@ static void rays_are_a_pixel_apart(void **state) {
 static void wide_ones_are_as_far_apart_as_what_is_lit_is_rough(void **state) {
     (void)state;
     static const float roughness[] = {0.3f, 0.7f, 1.0f};
+    const double matt = floor_mean(0.0f, 0.7f, 0.0f, 0);
     expect_shadow(0.0f, 0.7f, TRC_MATERIAL_WIDE_SHADOWS, 1.0);
     for (int i = 0; i < 3; i++) {
         const double alpha = (double)roughness[i] * (double)roughness[i];
-        const double matt = floor_mean(0.0f, roughness[i], 0.0f, 0);
         const double gloss = floor_mean(1.0f, roughness[i], 0.0f, 0);
         expect_shadow(1.0f, roughness[i], TRC_MATERIAL_WIDE_SHADOWS, alpha);
         expect_shadow(0.5f, roughness[i], TRC_MATERIAL_WIDE_SHADOWS,

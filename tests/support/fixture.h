@@ -153,6 +153,7 @@ FIXTURE_INLINE trc_id fixture_transparent(trc_scene scene, float r, float g, flo
     return id;
 }
 
+/* The same of all light. */
 FIXTURE_INLINE trc_id fixture_clear(trc_scene scene) {
     return fixture_transparent(scene, 1.0f, 1.0f, 1.0f, NULL);
 }
