@@ -29,8 +29,8 @@ def text(made):
     return "\n\n".join(parts)
 
 
-def headline(made):
-    """One sentence: times for the errors of Cycles' plain pictures of PEER_SAMPLES[0] samples."""
+def headline(made, sizes):
+    """One sentence: times, of pictures of those sizes, for the errors of Cycles' plain ones of PEER_SAMPLES[0] samples."""
     said = []
     for measure in TIMED:
         clean, plain = ([denoise.time_ratio(scene, name, measure, PEER_SAMPLES[0]) for scene in made["scenes"].values()]
@@ -38,9 +38,10 @@ def headline(made):
         known = [value for value in clean if value is not None]
         if known:
             said.append(f"{digits(denoise.middle(known), 2)} times as long for the same {curves.MEASURES[measure]} "
-                        f"({digits(min(known), 2)} to {digits(max(known), 2)}; without Denoise {digits(denoise.middle(plain), 2)})")
+                        f"({digits(min(known), 2)} to {digits(max(known), 2)} in {len(known)} scenes; "
+                        f"without Denoise {digits(denoise.middle(plain), 2)})")
     return (f"Beside Volley with Denoise, Cycles' plain pictures of {PEER_SAMPLES[0]} samples take "
-            f"{', '.join(said)}: medians of {len(made['scenes'])} scenes.") if said else ""
+            f"{', '.join(said)}: medians at {sizes}.") if said else ""
 
 
 def losses(made):

@@ -20,7 +20,7 @@ def headline_lines(results):
     lines += [equal_error_line(run["made"], f"Cycles of {run['blender']}")
               for run in elsewhere.of_part(results, "curves")]
     if results.get("denoise"):
-        lines.append(denoise_section.headline(results["denoise"]))
+        lines.append(denoise_section.headline(results["denoise"], timed_sizes(results["denoise"]["scenes"])))
     if results.get("kernels"):
         lines.append(kernel_line(results["kernels"]))
     lines += [kernel_line(run["made"], elsewhere.embree_name(run)) for run in elsewhere.of_part(results, "kernels")]
