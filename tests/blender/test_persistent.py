@@ -101,9 +101,9 @@ def _counting_walks():
     from volley.sync import walk
     run, walks = walk.Walk.run, []
 
-    def counted(self):
+    def counted(self, former):
         walks.append(self)
-        run(self)
+        run(self, former)
 
     walk.Walk.run = counted
 
@@ -286,9 +286,9 @@ def inside_collections():
     _scene()
     run, seen = walk.Walk.run, []
 
-    def watched(self):
+    def watched(self, former):
         seen.append(gc.isenabled())
-        run(self)
+        run(self, former)
 
     walk.Walk.run = watched
     try:

@@ -28,6 +28,7 @@ def fill(scene):
     crate = scenes.link("Crates", None)
     crate.instance_type, crate.instance_collection = 'COLLECTION', collection
     crate.location = (0.0, -1.0, 1.5)
+    _make_collections(collection)
     scene.view_layers.new("Second")
     ball = bpy.data.objects["Ball"]
     for frame, height in ((1, 0.0), (20, 1.0)):
@@ -56,6 +57,33 @@ def _make_materials():
     node = grouped.node_tree.nodes.new("ShaderNodeGroup")
     node.node_tree = group
     grouped.node_tree.links.new(node.outputs[0], grouped.node_tree.nodes["Diffuse BSDF"].inputs[0])
+
+
+def _make_collections(crate):
+    """A collection with a parent and its child, and one whose instance is instanced again."""
+    side = bpy.data.collections.new("Side")
+    bpy.context.scene.collection.children.link(side)
+    handle = scenes.link("Handle", None)
+    sign = scenes.wall("Sign", 0.6, -0.5, (2.5, 1.5), _attributed())
+    sign.parent, sign["tint"] = handle, 0.4
+    for each in (handle, sign):
+        bpy.context.scene.collection.objects.unlink(each)
+        side.objects.link(each)
+    outer = bpy.data.collections.new("Outer")
+    for name, shown, owner in (("Middle", crate, outer), ("Outers", outer, bpy.context.scene.collection)):
+        maker = bpy.data.objects.new(name, None)
+        owner.objects.link(maker)
+        maker.instance_type, maker.instance_collection = 'COLLECTION', shown
+    maker.location = (-2.0, -1.0, -1.5)
+
+
+def _attributed():
+    """A material that reads an object's property."""
+    made = scenes.material("Attributed", "ShaderNodeBsdfDiffuse")
+    attribute = made.node_tree.nodes.new("ShaderNodeAttribute")
+    attribute.attribute_type, attribute.attribute_name = 'OBJECT', "tint"
+    made.node_tree.links.new(attribute.outputs["Fac"], made.node_tree.nodes["Diffuse BSDF"].inputs["Color"])
+    return made
 
 
 def _make_tube(material):
@@ -111,6 +139,76 @@ def light_energy(random):
 def light_kind(random):
     bpy.data.objects["Light.001"].data.type = random.choice(('POINT', 'SPOT', 'SUN'))
     bpy.data.objects["Light.001"].data.energy = 3.0
+
+
+def move_middle(random):
+    bpy.data.objects["Middle"].location.x = random.uniform(-1.0, 1.0)
+
+
+def move_parent(random):
+    _handle().location.x = random.uniform(-1.0, 0.5)
+
+
+def rename_parent(random):
+    _handle().name = random.choice(("Handle", "Grip"))
+
+
+def _handle():
+    return next(bpy.data.objects[name] for name in ("Handle", "Grip") if name in bpy.data.objects)
+
+
+def parent(random):
+    each = _some_mesh(random)
+    if each.name != "Sign":
+        each.parent = None if each.parent else _handle()
+
+
+def swap_names(_random):
+    ball, back = bpy.data.objects["Ball"], bpy.data.objects["Back"]
+    ball.name, back.name = "Swapped", "Ball"
+    ball.name = "Back"
+
+
+def swap_meshes(random):
+    ball, back = bpy.data.objects["Ball"], bpy.data.objects["Back"]
+    ball.data, back.data = back.data, ball.data
+
+
+def tint(random):
+    bpy.data.objects["Sign"]["tint"] = random.random()
+    bpy.data.objects["Sign"].update_tag()
+
+
+def side_collection(random):
+    layer = bpy.context.view_layer.layer_collection.children["Side"]
+    switch = random.choice(("holdout", "indirect_only", "exclude", "hide_viewport"))
+    setattr(layer, switch, not getattr(layer, switch))
+
+
+def member(random):
+    side, scene = bpy.data.collections["Side"], bpy.context.scene.collection
+    each = _some_mesh(random)
+    if each.name in scene.objects:
+        scene.objects.unlink(each)
+        if each.name not in side.objects:
+            side.objects.link(each)
+    elif each.name in side.objects and each.name != "Sign":
+        side.objects.unlink(each)
+        scene.objects.link(each)
+
+
+def linked_light(random):
+    if not hasattr(bpy.types.Object, "light_linking"):  # before 4.0
+        return light_energy(random)
+    linking = bpy.data.objects["Light"].light_linking
+    linking.receiver_collection = None if linking.receiver_collection else bpy.data.collections["Side"]
+    return None
+
+
+def mesh_slot(random):
+    materials = _some_mesh(random).data.materials
+    if materials:
+        materials[0] = bpy.data.materials[random.choice(("Plain", "Textured", "Attributed"))]
 
 
 def material(random):
@@ -241,6 +339,7 @@ def override(random):
     layer.material_override = bpy.data.materials["Plain"] if random.random() < 0.3 else None
 
 
-ALL = (pose, transform, move_instancer, move_light, light_energy, light_kind, material, node_link,
+ALL = (pose, transform, move_instancer, move_middle, move_parent, rename_parent, parent, swap_names, swap_meshes, tint,
+       side_collection, member, linked_light, mesh_slot, move_light, light_energy, light_kind, material, node_link,
        node_group, image, world, settings, film_transparent, frame, add, duplicate, delete, hide,
        ray_visibility, holdout, shadow_catcher, motion, deform_motion, slot, vertices, shading, modifier, override)

@@ -65,6 +65,9 @@ class Item:
     deforms: bool = False      # whether the mesh may change its shape in time
 
 
+_PLAIN_LENGTH = 2  # of the key of an object that stands for itself
+
+
 def key_of(instance):
     """What names an instance at every time and in every sync: object, instancer, numbers."""
     blender_object = instance.object
@@ -84,6 +87,16 @@ class Plain:
 
     def __init__(self, evaluated):
         self.object, self.matrix_world = evaluated, evaluated.matrix_world
+
+
+def names_in(key):
+    """Names of the object an instance shows and of the one that makes it, by its key; none of what stands for itself."""
+    return () if is_plain(key) else (key[0], key[2])
+
+
+def is_plain(key):
+    """Whether a key is of an object that stands for itself."""
+    return len(key) == _PLAIN_LENGTH
 
 
 def maker_of(instance):
@@ -143,7 +156,8 @@ def _random_number(number):
     return min(number / HASH_MAX, 1.0 - 2.0 ** -24)
 
 
-def _uppermost(blender_object):
+def uppermost(blender_object):
+    """The first of an object's parents, the object itself where it has none."""
     while blender_object.parent is not None:
         blender_object = blender_object.parent
     return blender_object
@@ -155,7 +169,7 @@ def describe(instance, view_layer, light_groups, links):
     blender_object, maker, key = instance.object, maker_of(instance), key_of(instance)
     return Item(
         key=key, owner=key[0],
-        name=blender_object.name, asset=_uppermost(blender_object).name,
+        name=blender_object.name, asset=uppermost(blender_object).name,
         transforms=[rows(instance.matrix_world)],
         visibility=visibility.instance_visibility(blender_object, maker, view_layer),
         pass_index=blender_object.pass_index, random=random_of(instance),
@@ -211,10 +225,9 @@ class InstanceEntry:
     """An instance in the library; a holdout is two, for the camera and for all other rays."""
 
     ids: tuple
-    mesh_id: int
-    signature: tuple
-    name: str
-    asset: str
+    item: Item
+    place: tuple      # its mesh in the library, where it is, and whether its normals are the world's
+    signature: tuple  # all else
 
 
 @dataclass
@@ -260,21 +273,23 @@ class Instances:
     def names(self):
         """The names in mattes, of objects and of assets: two sets."""
         entries = self._entries.values()
-        return {entry.name for entry in entries}, {entry.asset for entry in entries}
+        return {entry.item.name for entry in entries}, {entry.item.asset for entry in entries}
 
     def _update_one(self, item, mesh_id, moving):
-        if item.mesh_key in self._in_world and moving.isdisjoint(item.materials):
-            item.flags |= _WORLD_NORMALS
-        signature = (mesh_id, tuple(item.transforms), item.materials, item.holes, item.visibility,
-                     item.pass_index, item.random, item.color, item.name, item.asset, item.light_group,
-                     item.flags, item.links, item.offsets, item.values)
+        is_in_world = item.mesh_key in self._in_world and moving.isdisjoint(item.materials)
+        place = mesh_id, tuple(item.transforms), is_in_world
         entry = self._entries.get(item.key)
-        if entry is not None and entry.signature == signature:
+        if entry is not None and entry.item is item and entry.place == place:
+            return
+        signature = (item.materials, item.holes, item.visibility, item.pass_index, item.random, item.color, item.name,
+                     item.asset, item.light_group, item.flags, item.links, item.offsets, item.values)
+        if entry is not None and (entry.place, entry.signature) == (place, signature):
+            entry.item = item
             return
         transforms = motion.follow_turns(collapse(item.transforms))
         values = {"mesh": mesh_id, "transforms": transforms, "pass_index": item.pass_index,
                   "random": item.random, "color": item.color, "light_group": item.light_group,
-                  "flags": item.flags, **item.links._asdict(), **item.offsets._asdict(), "values": item.values,
+                  "flags": item.flags | _WORLD_NORMALS * is_in_world, **item.links._asdict(), **item.offsets._asdict(), "values": item.values,
                   "cryptomatte_object": native.cryptomatte_id(item.name),
                   "cryptomatte_asset": native.cryptomatte_id(item.asset)}
         parts = _parts(item)
@@ -285,7 +300,7 @@ class Instances:
             self.scene.update_instance(instance_id, **values, **part)
         for part in parts[len(ids):]:
             ids.append(self.scene.create_instance(**values, **part))
-        self._entries[item.key] = InstanceEntry(tuple(ids), mesh_id, signature, item.name, item.asset)
+        self._entries[item.key] = InstanceEntry(tuple(ids), item, place, signature)
 
 
 def _parts(item):

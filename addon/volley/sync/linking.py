@@ -100,6 +100,10 @@ class Links:
             warnings.add(f"Lights are linked to more than {_SET_MAX} different sets of objects: some of these "
                          "are taken for not linked")
 
+    def is_empty(self):
+        """Whether no object has such collections."""
+        return not self._collections
+
     def of(self, blender_object, maker):
         """What holds for an object or the instance of it that another one makes. As in Cycles, that is lit and
         shades as its maker, if this is in some collection, and emits as the object itself."""

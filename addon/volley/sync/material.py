@@ -55,6 +55,14 @@ class Materials:
         is_volume = bool(entries) and entries[0].is_volume and all([entry.is_volume for entry in entries])
         return tuple([entry.id for entry in entries]), is_volume
 
+    def ids(self):
+        """By name of material, the library's ids of this sync's and whether they are of volumes alone. The default,
+        which never changes, stays in the library if it is there."""
+        if _DEFAULT_KEY in self._entries:
+            self._seen.add(_DEFAULT_KEY)
+        return {key: (self._entries[key].id, self._entries[key].is_volume) for key in self._seen
+                if not isinstance(key, tuple)}
+
     def moving(self):
         """The library's ids of the materials of this sync whose displacement moves vertices."""
         return {self._entries[key].id for key in self._seen if self._entries[key].moves_vertices}

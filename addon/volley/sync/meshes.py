@@ -36,6 +36,15 @@ class Meshes:
         self._seen.add(key)
         return True
 
+    def pointers(self):
+        """By key, of whose data in Blender each mesh is."""
+        return {key: entry.pointer for key, entry in self._entries.items()}
+
+    def pointer_of(self, key):
+        """Of whose data in Blender one mesh is, None where there is no such mesh."""
+        entry = self._entries.get(key)
+        return None if entry is None else entry.pointer
+
     def diced_by(self, key):
         """What MeshData says of it, None where there is no such mesh or nobody asked."""
         entry = self._entries.get(key)

@@ -58,6 +58,7 @@ class SceneSync:
         the frame."""
         source.changes.objects |= self._moved | self._deformed  # though they may stand still now
         source.changes.geometry |= self._deformed
+        former = self._former(source)
         if self._update_part(source, shutter, camera_keys):
             return
         self._images.begin(source.changes, size_limit(source), source.depsgraph.scene_eval.frame_current)
@@ -65,8 +66,8 @@ class SceneSync:
         self._meshes.begin()
         self._sync_materials(source)
         told = self.warnings.count()
-        walk = Walk(self, source, shutter)
-        walk.run()
+        walk = Walk(self, source, shutter, former and former.links_now(source))
+        walk.run(former)
         messages = self.warnings.after(told)
         if shutter is not None:
             walk.follow_motion(camera_keys)
@@ -83,17 +84,24 @@ class SceneSync:
         self._moved, self._deformed = walk.movers()
         self._shown = Shown(walk, source, messages)
 
+    def _former(self, source):
+        """What the last walk found, None where another may not take anything over from it."""
+        shown = self._shown
+        if shown is None or source.changes.full or source.culling or not shown.is_of(source):
+            return None
+        if self.is_final and self._meshes.are_diced():  # by a camera that may have moved
+            return None
+        return shown
+
     def _update_part(self, source, shutter, camera_keys):
         """Bring up to date what changed, without a walk over everything; False where one is needed,
         which is safe at any point before the end."""
-        changes, shown = source.changes, self._shown
-        if changes.full or changes.structure or shown is None or not shown.is_of(source) or source.culling:
-            return False
-        if self.is_final and self._meshes.are_diced():  # by a camera that may have moved
+        changes, shown = source.changes, self._former(source)
+        if shown is None or changes.structure:
             return False
         if not all(self._materials.knows(name) for name in changes.materials):
             return False
-        touched = [shown.find(name, source) for name in changes.objects | shown.owners_of(changes.lights)]
+        touched = [shown.find(name, source) for name in changes.objects | shown.owners_of(changes.lights, source)]
         if not all(touched):
             return False
         self._shown = None  # until all is done
@@ -114,6 +122,7 @@ class SceneSync:
         walk.send_deforming()
         for item in walk.items.values():
             self._instances.change(item, self._meshes.id_of(item.mesh_key), self._materials.moving())
+        shown.items.update(walk.items)
         self._meshes.free_retired()
         self._images.end()
         self._moved, self._deformed = walk.movers()
@@ -134,7 +143,7 @@ class SceneSync:
                 source.engine.frame_set(*shutter.frame_at(motion.CENTER))
                 return False
             for item in walk.items.values():
-                evaluated = bpy.data.objects[item.owner].evaluated_get(depsgraph)
+                evaluated = source.originals.get(item.owner).evaluated_get(depsgraph)
                 walk.look_again(item, instance.Plain(evaluated), fraction)
         return True
 
@@ -152,7 +161,10 @@ class SceneSync:
         made_of = materials_of(each.object, source.depsgraph.view_layer_eval)
         if not self._meshes.brings(item.mesh_key, self._materials.tangents_read_by(filter(None, made_of))):
             return False
-        if item.owner in source.changes.geometry and not self._change_mesh(item, each, shown, walk, source):
+        if item.owner not in source.changes.geometry:
+            if self._meshes.pointer_of(item.mesh_key) != each.object.data.as_pointer():  # another has the name now
+                return False
+        elif not self._change_mesh(item, each, shown, walk, source):
             return False
         walk.items[item.key] = item
         return True

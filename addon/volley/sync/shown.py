@@ -3,8 +3,6 @@
 
 from collections import Counter
 
-import bpy
-
 from . import instance
 
 
@@ -17,9 +15,12 @@ class Shown:
     _SILENT_TYPES = {'ARMATURE', 'CAMERA', 'LATTICE', 'SPEAKER', 'LIGHT_PROBE', 'VOLUME'}
 
     def __init__(self, walk, source, warnings):
-        self.items, self._lights, self._tied = walk.items, walk.lights, walk.tied
-        self.links = walk.links
+        self.items, self._lights, self._tied, self.haired = walk.items, walk.lights, walk.tied, walk.haired
+        self.links, self.circumstances = walk.links, walk.circumstances
         self.users = Counter(item.mesh_key for item in walk.items.values())
+        assets = {item.asset for item in walk.items.values() if item.asset != item.name}
+        parents = filter(None, map(source.originals.get, assets))
+        self._asset_names = {parent.as_pointer(): parent.name for parent in parents}
         self._identity = self._identity_of(source)
         self._warnings = warnings
 
@@ -33,22 +34,31 @@ class Shown:
         """Whether a source shows the same scene and view layer."""
         return self._identity == self._identity_of(source)
 
+    def links_now(self, source):
+        """Who lights and shades whom, where that can be told without a look at every object, else None."""
+        named = [source.originals.get(name) for name in source.changes.objects]
+        is_empty = self.links.is_empty() and all(
+            [each is not None and self.links.knows(each.evaluated_get(source.depsgraph)) for each in named])
+        return self.links if is_empty else None
+
     def warn_again(self, warnings):
         """Add what the walk warned of, which renders tell each time."""
         for message in self._warnings:
             warnings.add(message)
 
-    def owners_of(self, lights):
+    def owners_of(self, lights, source):
         """Names of the objects that show these lights, by the names of their data."""
         if not lights:
             return set()
-        owners = filter(None, (bpy.data.objects.get(key[0]) for key in self._lights))
+        owners = filter(None, (source.originals.get(key[0]) for key in self._lights))
         return {owner.name_full for owner in owners if owner.data.name_full in lights}
 
     def find(self, name, source):
         """The object of that name as an instance, IRRELEVANT, or None where only a walk can tell."""
-        original = bpy.data.objects.get(name)
+        original = source.originals.get(name)
         if original is None or name in self._tied:
+            return None
+        if self._asset_names.get(original.as_pointer(), original.name) != original.name:  # what its children have
             return None
         evaluated = original.evaluated_get(source.depsgraph)
         if not evaluated.is_evaluated or not self.links.knows(evaluated):

@@ -3,11 +3,34 @@
 
 from dataclasses import dataclass, field
 
+import bpy
+
 from .changes import Changes
 
 
 class Cancelled(Exception):
     """The user stopped the sync."""
+
+
+_FEW = 8  # names that are looked up before it is worth to have all of them in a table
+
+
+class Originals:
+    """The file's objects by name. Blender looks through all of them for one, so that all by all would be quadratic."""
+
+    def __init__(self):
+        self._asked, self._table = 0, None
+
+    def get(self, name):
+        """The object of that name, None where there is none; of linked ones of one name, that which Blender gives."""
+        if self._table is None:
+            self._asked += 1
+            if self._asked <= _FEW:
+                return bpy.data.objects.get(name)
+            self._table = {}
+            for each in bpy.data.objects:
+                self._table.setdefault(each.name, each)
+        return self._table.get(name)
 
 
 @dataclass
@@ -25,5 +48,6 @@ class Source:
     aovs: dict = field(default_factory=dict)
     light_groups: dict = field(default_factory=dict)
     is_cancelled: object = staticmethod(lambda: False)
+    originals: Originals = field(default_factory=Originals)
     culling: object = None
     dicing: object = None

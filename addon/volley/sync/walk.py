@@ -8,6 +8,7 @@ import bpy
 from ..abi import InstanceFlags
 from . import curves, deform, instance, light, mesh, motion, strands, visibility
 from .changes import Changes
+from .kept import Circumstances, Kept
 from .linking import Links
 from .matrix import rows
 from .source import Cancelled
@@ -37,29 +38,36 @@ class Walk:
     """One sync's walks over the depsgraph: the first finds everything, more follow motion."""
 
     def __init__(self, sync, source, shutter, links=None):
-        self._sync, self._source, self._shutter = sync, source, shutter
+        self._sync, self._source, self.shutter = sync, source, shutter
         self._view_layer, self._scene = source.depsgraph.view_layer_eval, source.depsgraph.scene_eval
-        uv_names, color_names, needs_generated, self._tangent_readers = sync._materials.attribute_names()
+        uv_names, color_names, needs_generated, self.tangent_readers = sync._materials.attribute_names()
         self._values_of = sync._materials.instance_values()
         if source.needs_uv:
             uv_names.add("")
-        self._names = frozenset(uv_names), frozenset(color_names), needs_generated
-        self._wanted_strands = curves.Wanted.of_scene(self._names, self._scene)
+        self.names = frozenset(uv_names), frozenset(color_names), needs_generated
+        self._wanted_strands = curves.Wanted.of_scene(self.names, self._scene)
         self._tangents = None  # pointer of a mesh -> the tangents that its objects' materials read
         self._owners = {}     # pointer of a mesh -> key of its owner, within this walk
         self._deforming = {}  # owner key -> _Deforming
         self.items = {}       # key -> Item with a mesh
         self.lights = {}      # key -> fields of a light
         self.tied = set()     # names of objects that are instanced or make instances
+        self.haired = set()   # names of objects with hair or of strands or points
         self._volumes = set()  # names of objects of volumes
         self._shining = set()  # and of strands and points that emit
         self.links = Links(source.depsgraph, sync.warnings) if links is None else links
 
-    def run(self):
-        """Find what is there now."""
+    def run(self, former):
+        """Find what is there now; former: shown.Shown of the walk before, None where nothing may be taken over."""
+        self.circumstances = Circumstances.of(self, self._source, self._sync._materials)
+        if former is not None and not self.circumstances.are_as(former.circumstances):
+            former = None
+        self._kept = Kept(former, self._source, self._values_of, self._sync._meshes)
         culling = self._source.culling
         shows_solids, shows_strands = self._view_layer.use_solid, self._view_layer.use_strand
         for each in self._instances():
+            if self._take_over(each):
+                continue
             if each.is_instance:
                 self.tied.update(instance.names_of(each))
             is_mesh = instance.has_mesh(each)
@@ -81,6 +89,15 @@ class Walk:
         self._warn_of("Volumes are not supported", self._volumes, "is left out")
         self._warn_of("Light of strands and points is not sampled", self._shining, "lights nothing that is matt")
 
+    def _take_over(self, each):
+        """Whether the item of an instance is that of the walk before."""
+        item = self._kept.find(each)
+        if item is None or not self._kept.take(item, self._owners, self._names_of):
+            return False
+        self.items[item.key] = item
+        self.tied.update(instance.names_in(item.key))
+        return True
+
     def _warn_of(self, text, names, does):
         """One warning of all objects of those names, if there are any."""
         if names:
@@ -95,7 +112,7 @@ class Walk:
         for fraction in motion.fractions_of(counts):
             if self._source.is_cancelled():
                 raise Cancelled()
-            self._source.engine.frame_set(*self._shutter.frame_at(fraction))
+            self._source.engine.frame_set(*self.shutter.frame_at(fraction))
             camera_keys.look(fraction)
             yield fraction
 
@@ -133,7 +150,7 @@ class Walk:
         if named.structure or not self.tied.isdisjoint(named.objects):
             return self._instances()
         depsgraph = self._source.depsgraph
-        return [instance.Plain(bpy.data.objects[name].evaluated_get(depsgraph)) for name in named.objects]
+        return [instance.Plain(self._source.originals.get(name).evaluated_get(depsgraph)) for name in named.objects]
 
     def _materials_of(self, each):
         return materials_of(each.object, self._view_layer)
@@ -179,7 +196,7 @@ class Walk:
 
     def _ask_keys(self, item, each):
         """Have room for the motion keys that an object asks for."""
-        if self._shutter is not None:
+        if self.shutter is not None:
             item.motion_keys = motion.key_count(each.object, instance.maker_of(each))
             item.transforms *= item.motion_keys
 
@@ -188,7 +205,7 @@ class Walk:
         blender_object = each.object
         is_final = self._source.v3d is None
         for number, modifier in strands.hair_systems(blender_object, is_final):
-            self.tied.add(blender_object.name_full)  # only a walk sees what its hair does
+            self._note_hair(blender_object)
             item = self.describe(each)
             item.key = instance.hair_key(each, number)
             made_of = self._materials_of(each)
@@ -196,6 +213,11 @@ class Walk:
             self._make_of(item, each, made_of[slot])
             hair = strands.Hair(number, self._source.depsgraph, is_final, self._wanted_strands)
             self._add_made(each, item, (blender_object.name_full, number), hair)
+
+    def _note_hair(self, blender_object):
+        """Only a walk sees what the hair or the strands of an object do."""
+        self.tied.add(blender_object.name_full)
+        self.haired.add(blender_object.name_full)
 
     def _move_hair(self, each, fraction):
         """Hair goes where its object goes, and by itself."""
@@ -206,7 +228,7 @@ class Walk:
         """A Curves or Point Cloud object."""
         item = self.describe(each)
         self._make_of(item, each, self._materials_of(each)[0])
-        self.tied.add(each.object.name_full)
+        self._note_hair(each.object)
         self._add_made(each, item, each.object.data.as_pointer(), strands.StrandObject(self._wanted_strands))
 
     def _make_of(self, item, each, material):
@@ -249,7 +271,7 @@ class Walk:
     def _mesh_key(self, item, each):
         """The key of the mesh the item shows, which is read now if no other item showed it before."""
         pointer = each.object.data.as_pointer()
-        if pointer in self._owners:
+        if pointer in self._owners and not self._kept.is_stale(self._owners[pointer], pointer):
             return self._owners[pointer]
         self._owners[pointer] = item.key if self.read_mesh(item, each, pointer) else None
         return self._owners[pointer]
@@ -304,12 +326,12 @@ class Walk:
 
     def _names_of(self, pointer):
         """What a mesh brings: tangents only where they are read, as they take longest to make."""
-        if not self._tangent_readers:
-            return self._names
+        if not self.tangent_readers:
+            return self.names
         if self._tangents is None:
             self._tangents = self._find_tangents()
-        uv_names, color_names, needs_generated = self._names
-        every = set().union(*self._tangent_readers.values())
+        uv_names, color_names, needs_generated = self.names
+        every = set().union(*self.tangent_readers.values())
         return uv_names, color_names - (every - self._tangents.get(pointer, every)), needs_generated
 
     def _find_tangents(self):
@@ -319,7 +341,7 @@ class Walk:
             if each.data is not None:
                 names = found.setdefault(each.data.as_pointer(), set())
                 for material in filter(None, materials_of(each, self._view_layer)):
-                    names |= self._tangent_readers.get(material.name_full, set())
+                    names |= self.tangent_readers.get(material.name_full, set())
         return found
 
     def look_again(self, item, each, fraction):
