@@ -422,6 +422,65 @@ def test_an_edit_sends_what_it_touches(blender):
         "ray_visibility": ["update_instance"]}
 
 
+def inside_structural_reads():
+    """The objects that are described after edits that name the scene, by edit."""
+    import random
+    import bpy
+    import edits
+    from volley.sync import instance
+    from volley.sync.changes import Changes
+    edits.make_scene()
+    sync, _ = _sync()
+    describe, described, random = instance.describe, [], random.Random(1)
+
+    def noted(each, *arguments):
+        described.append(each.object.name)
+        return describe(each, *arguments)
+
+    def mark(_scene, depsgraph):
+        changes.merge(Changes.of_depsgraph(depsgraph))
+
+    def select(_random):
+        bpy.data.objects["Ball"].select_set(True)
+
+    def lone_instance(_random):
+        bpy.data.objects["Crates"].location.x = 0.5
+
+    bpy.context.view_layer.update()
+    bpy.app.handlers.depsgraph_update_post.append(mark)
+    instance.describe = noted
+    found = {}
+    for edit in (select, edits.add, edits.delete, edits.node_group, edits.image, lone_instance, edits.move_middle):
+        changes = Changes()
+        edit(random)
+        bpy.context.view_layer.update()
+        described.clear()
+        sync, _ = _sync(changes, sync)
+        found[edit.__name__] = sorted(each for each in described if not each.startswith("Light"))
+    instance.describe = describe
+    return found
+
+
+def test_an_edit_of_the_scene_reads_what_it_names(blender):
+    found = blender.run(inside_structural_reads)
+    assert found == {"select": [], "add": ["New"], "delete": [], "node_group": [], "image": [],
+                     "lone_instance": ["Lid", "Lid"], "move_middle": ["Lid"]}
+
+
+def inside_originals():
+    import bpy
+    import scenes
+    from volley.sync.source import Originals
+    scenes.empty()
+    names = [scenes.link(f"Object{number}", None).name for number in range(20)]
+    originals = Originals()
+    return all(originals.get(name) == bpy.data.objects[name] for name in names), originals.get("None such") is None
+
+
+def test_objects_are_found_by_name(blender):
+    assert blender.run(inside_originals) == (True, True)
+
+
 def inside_edited_topology():
     """What is sent when a face is turned while the mesh is posed, in ways that mark different things."""
     import random

@@ -65,7 +65,7 @@ def _make_collections(crate):
     bpy.context.scene.collection.children.link(side)
     handle = scenes.link("Handle", None)
     sign = scenes.wall("Sign", 0.6, -0.5, (2.5, 1.5), _attributed())
-    sign.parent, sign["tint"] = handle, 0.4
+    sign.parent, sign.data["tint"], sign["shade"] = handle, 0.4, 0.9
     for each in (handle, sign):
         bpy.context.scene.collection.objects.unlink(each)
         side.objects.link(each)
@@ -175,8 +175,15 @@ def swap_meshes(random):
 
 
 def tint(random):
-    bpy.data.objects["Sign"]["tint"] = random.random()
-    bpy.data.objects["Sign"].update_tag()
+    sign = bpy.data.objects["Sign"]
+    owner = random.choice((sign, sign.data))
+    owner["tint"] = random.random()
+    owner.update_tag()
+
+
+def attribute(random):
+    node = bpy.data.materials["Attributed"].node_tree.nodes["Attribute"]
+    node.attribute_name = random.choice(("tint", "shade"))
 
 
 def side_collection(random):
@@ -340,6 +347,6 @@ def override(random):
 
 
 ALL = (pose, transform, move_instancer, move_middle, move_parent, rename_parent, parent, swap_names, swap_meshes, tint,
-       side_collection, member, linked_light, mesh_slot, move_light, light_energy, light_kind, material, node_link,
+       attribute, side_collection, member, linked_light, mesh_slot, move_light, light_energy, light_kind, material, node_link,
        node_group, image, world, settings, film_transparent, frame, add, duplicate, delete, hide,
        ray_visibility, holdout, shadow_catcher, motion, deform_motion, slot, vertices, shading, modifier, override)

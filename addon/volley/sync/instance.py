@@ -99,6 +99,14 @@ def is_plain(key):
     return len(key) == _PLAIN_LENGTH
 
 
+_NO_NUMBER = 0x7FFFFFFF  # of Blender's persistent_id where there is no further maker
+
+
+def is_nested(key):
+    """Whether an instance's key is of one within another: only the outermost maker is in it."""
+    return key[3][1] != _NO_NUMBER
+
+
 def maker_of(instance):
     """What makes an instance, None for an object that stands for itself."""
     return instance.parent if instance.is_instance else None

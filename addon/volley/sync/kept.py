@@ -3,8 +3,8 @@
 
 Blender names every object of which anything is another, and those that come into its scene or are shown again.
 These are read; all are where a setting decides of all of them and is another, or where what is not named may
-be read otherwise: of instances whose makers may stand within others, and where lights are linked, tangents are
-read, or a collection makes holes."""
+be read otherwise: of instances within instances, whose makers have a maker, and where lights are linked, tangents
+are read, or a collection makes holes."""
 
 from typing import NamedTuple
 
@@ -58,11 +58,11 @@ class Kept:
         self._taken = set()  # keys of the items that were taken over and own their meshes
         self._pointers = meshes.pointers()
         named = source.changes.objects
-        keeps_instances = not any(_may_instance(name, source) for name in named)
+        keeps_nested = not any([_may_instance(name, source) for name in named])
         self._items = {} if shown is None else {
             key: item for key, item in shown.items.items()
             if key[0] not in named and key[0] not in shown.haired and not item.holes
-            and (instance.is_plain(key) or (keeps_instances and key[2] not in named))}
+            and (instance.is_plain(key) or (key[2] not in named and (keeps_nested or not instance.is_nested(key))))}
 
     def find(self, each):
         """The item of an instance of the depsgraph, None where it is to be read."""
@@ -73,6 +73,7 @@ class Kept:
         item = self._items.get(key)
         if item is None or (item.asset != item.name and item.asset != instance.uppermost(blender_object).name):
             return None
+        # Materials may have begun to read others.
         if self._values_of is not None and self._values_of(each, self._scene) != item.values:
             return None
         return item

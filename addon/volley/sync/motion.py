@@ -146,7 +146,10 @@ def follow_turns(transforms):
     count = len(transforms)
     if count == 1:
         return transforms
-    matrices = transforms.reshape(count, 3, 4).astype(np.float64)
+    matrices = transforms.reshape(count, 3, 4)
+    if (matrices[1:, :, :3] == matrices[0, :, :3]).all():  # as of most
+        return transforms
+    matrices = matrices.astype(np.float64)
     linear = matrices[:, :, :3]
     # A turn by an angle below pi moves the axes by its sine or more: most keys need no decomposition.
     if np.abs(np.diff(linear, axis=0)).max(initial=0.0) < math.sin(_MAX_TURN) * _smallest_axis(linear):

@@ -158,8 +158,7 @@ class SceneSync:
         if item is None:
             return False
         item.mesh_key = shown.items[item.key].mesh_key
-        made_of = materials_of(each.object, source.depsgraph.view_layer_eval)
-        if not self._meshes.brings(item.mesh_key, self._materials.tangents_read_by(filter(None, made_of))):
+        if walk.tangent_readers and not self._brings_tangents(item, each, source):
             return False
         if item.owner not in source.changes.geometry:
             if self._meshes.pointer_of(item.mesh_key) != each.object.data.as_pointer():  # another has the name now
@@ -168,6 +167,11 @@ class SceneSync:
             return False
         walk.items[item.key] = item
         return True
+
+    def _brings_tangents(self, item, each, source):
+        """Whether an item's mesh has those that its materials read."""
+        made_of = materials_of(each.object, source.depsgraph.view_layer_eval)
+        return self._meshes.brings(item.mesh_key, self._materials.tangents_read_by(filter(None, made_of)))
 
     def _change_mesh(self, item, each, shown, walk, source):
         """Send the mesh of one object, of a viewport's pose the places of its vertices alone; False where others
