@@ -63,7 +63,7 @@ class Viewport:
         """The scene changed: mark what."""
         if not native.load():
             raise native.TracerError(0, native.load_error())
-        self._changes.merge(Changes.of_depsgraph(depsgraph))
+        self._changes.follow(depsgraph)
         self._is_freed = False
         engine.tag_redraw()
 

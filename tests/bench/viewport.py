@@ -64,7 +64,7 @@ class Follower:
 
     def _mark(self, _scene, depsgraph):
         from volley.sync.changes import Changes
-        self._changes.merge(Changes.of_depsgraph(depsgraph))
+        self._changes.follow(depsgraph)
 
     def close(self):
         bpy.app.handlers.depsgraph_update_post.remove(self._mark)

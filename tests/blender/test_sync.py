@@ -401,7 +401,7 @@ def inside_edit_costs():
     told, random = {}, random.Random(1)
 
     def mark(_scene, depsgraph):
-        changes.merge(Changes.of_depsgraph(depsgraph))
+        changes.follow(depsgraph)
 
     bpy.context.view_layer.update()
     bpy.app.handlers.depsgraph_update_post.append(mark)
@@ -438,7 +438,7 @@ def inside_structural_reads():
         return describe(each, *arguments)
 
     def mark(_scene, depsgraph):
-        changes.merge(Changes.of_depsgraph(depsgraph))
+        changes.follow(depsgraph)
 
     def select(_random):
         bpy.data.objects["Ball"].select_set(True)
@@ -493,7 +493,7 @@ def inside_edited_topology():
     data, told = bpy.data.objects["Tube"].data, []
 
     def mark(_scene, depsgraph):
-        changes.merge(Changes.of_depsgraph(depsgraph))
+        changes.follow(depsgraph)
 
     def turn_in_place():
         data.polygons[5].vertices = tuple(reversed(data.polygons[5].vertices))

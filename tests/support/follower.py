@@ -21,7 +21,7 @@ class Follower:
         bpy.app.handlers.frame_change_post.append(self._mark)
 
     def _mark(self, _scene, depsgraph):
-        self._changes.merge(Changes.of_depsgraph(depsgraph))
+        self._changes.follow(depsgraph)
 
     def picture(self):
         changes, self._changes = self._changes, Changes()

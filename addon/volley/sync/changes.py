@@ -26,6 +26,7 @@ class Changes:
         self.lights = set()      # names of lights' data that was edited, for which Blender may name no object
         self.all_materials = False
         self.world = False
+        self._shaped = {}        # pointer of an object whose mesh may be another -> its name when that was noted
 
     @classmethod
     def everything(cls):
@@ -42,33 +43,17 @@ class Changes:
         changes.note(depsgraph)
         return changes
 
-    @classmethod
-    def of_depsgraph(cls, depsgraph):
-        """Marks from the depsgraph's list of updates."""
-        changes = cls()
-        changes.note(depsgraph)
+    def follow(self, depsgraph):
+        """Add what changed by one update of the depsgraph."""
+        self.note(depsgraph)
         if not depsgraph.updates:
             # A frame change without animation, or something Blender does not name.
-            changes.full = True
-        return changes
+            self.full = True
 
     def note(self, depsgraph):
         """Add what Blender names, which it forgets at the next change of time."""
         for update in depsgraph.updates:
             self._mark(update)
-
-    def merge(self, later):
-        """Add the marks of a later update."""
-        self.geometry |= later.geometry
-        self.topology |= later.topology
-        self.meshes |= later.meshes
-        self.objects |= later.objects
-        self.materials |= later.materials
-        self.lights |= later.lights
-        self.full |= later.full
-        self.structure |= later.structure
-        self.all_materials |= later.all_materials
-        self.world |= later.world
 
     def geometry_of(self, name):
         """Whether an object's mesh must be read again."""
@@ -113,8 +98,11 @@ class Changes:
         self.objects.add(name)
         if data.library is not None:
             self.structure = True  # names of linked objects need not be unique
+        if self._shaped and self._shaped.get(data.original.as_pointer(), name) != name:
+            self.full = True  # its name was another then, which may be another object's now
         if not update.is_updated_geometry:
             return
         self.geometry.add(name)
+        self._shaped[data.original.as_pointer()] = name
         if update.is_updated_shading:  # of an edited modifier or mesh, not of a pose
             self.topology.add(name)

@@ -139,7 +139,7 @@ class SceneSync:
             named.note(depsgraph)
             if named.structure or not (named.objects <= source.changes.objects
                                        and named.geometry <= source.changes.geometry):
-                source.changes.merge(named)
+                source.changes.note(depsgraph)
                 source.engine.frame_set(*shutter.frame_at(motion.CENTER))
                 return False
             for item in walk.items.values():
