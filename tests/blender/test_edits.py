@@ -109,13 +109,6 @@ def inside_edits_in_turn():
             ball.polygons[number].use_smooth = False
         ball.update()
 
-    def reshape_and_swap():
-        for polygon in ball.polygons:
-            polygon.use_smooth = False
-        ball.update()
-        bpy.context.view_layer.update()
-        edits.swap_names(None)
-
     def displace():
         modifier = first.modifiers.new("Displace", 'DISPLACE')
         modifier.direction, modifier.strength, modifier.mid_level = 'X', 0.6, 0.0
@@ -137,7 +130,6 @@ def inside_edits_in_turn():
     in_turn["object that it looks at"] = lambda: setattr(other, "location", (-0.9, -0.5, -0.7))
     in_turn["light's group"] = lambda: setattr(
         group.nodes["RGB"].outputs[0], "default_value", (0.9, 0.1, 0.1, 1.0))
-    in_turn["shape, and names swapped"] = reshape_and_swap
     follower = Follower()
     former, found = follower.picture(), {}
     for name, edit in in_turn.items():

@@ -467,6 +467,30 @@ def test_an_edit_of_the_scene_reads_what_it_names(blender):
                      "lone_instance": ["Lid", "Lid"], "move_middle": ["Lid"]}
 
 
+def inside_swapped_names():
+    """Whether everything is to be looked at again after names were swapped, without and with a new shape between."""
+    import bpy
+    import edits
+    from volley.sync.changes import Changes
+    edits.make_scene()
+    bpy.context.view_layer.update()
+    bpy.app.handlers.depsgraph_update_post.append(lambda _scene, depsgraph: changes.follow(depsgraph))
+    found = []
+    for edit in (lambda _random: None, edits.shading):
+        changes = Changes()
+        edits.swap_names(None)
+        edit(None)
+        bpy.context.view_layer.update()
+        edits.swap_names(None)
+        bpy.context.view_layer.update()
+        found.append(changes.full)
+    return found
+
+
+def test_a_shape_is_of_the_object_that_had_the_name(blender):
+    assert blender.run(inside_swapped_names) == [False, True]
+
+
 def inside_originals():
     import bpy
     import scenes
