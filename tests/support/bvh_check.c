@@ -53,12 +53,29 @@ static bool box_holds(const float lower[3], const float upper[3], const float in
     return true;
 }
 
+/* A packed bound, rounded away from what it bounds. */
+static float packed_bound(const struct trc_packed_boxes *boxes, uint32_t axis, uint32_t side,
+                          uint32_t child) {
+    const double x =
+        boxes->origin[axis] + (double)boxes->step[axis] * boxes->bytes[axis][side][child];
+    const float nearest = (float)x;
+    if (side)
+        return nearest < x ? nextafterf(nearest, INFINITY) : nearest;
+    return nearest > x ? nextafterf(nearest, -INFINITY) : nearest;
+}
+
 static void child_box(const struct trc_tree *tree, uint32_t node, uint32_t child, uint32_t key,
                       float lower[3], float upper[3]) {
-    const float *b = trc_node_bounds(tree, node, key);
     for (uint32_t axis = 0; axis < 3; axis++) {
-        lower[axis] = b[16 * axis + child];
-        upper[axis] = b[16 * axis + 8 + child];
+        if (tree->key_count > 1) {
+            const struct trc_packed_boxes *boxes = trc_node_packed(tree, node, key);
+            lower[axis] = packed_bound(boxes, axis, 0, child);
+            upper[axis] = packed_bound(boxes, axis, 1, child);
+        } else {
+            const float *b = trc_node_bounds(tree, node);
+            lower[axis] = b[16 * axis + child];
+            upper[axis] = b[16 * axis + 8 + child];
+        }
     }
 }
 
@@ -329,12 +346,19 @@ static bool check_box(struct tree_check *t, uint32_t ref, uint32_t key, const fl
 }
 
 /* An unused child must never be entered: its box is inverted. */
+static bool is_inverted(const struct trc_tree *tree, uint32_t node, uint32_t child, uint32_t key,
+                        int axis) {
+    if (tree->key_count < 2) {
+        const float *b = trc_node_bounds(tree, node) + 16 * axis + child;
+        return b[0] == INFINITY && b[8] == -INFINITY;
+    }
+    const struct trc_packed_boxes *boxes = trc_node_packed(tree, node, key);
+    return boxes->bytes[axis][0][child] == 255 && boxes->bytes[axis][1][child] == 0;
+}
 static bool check_empty(struct tree_check *t, uint32_t node, uint32_t child) {
     for (uint32_t key = 0; key < t->tree->key_count; key++) {
-        float low[3], high[3];
-        child_box(t->tree, node, child, key, low, high);
         for (int axis = 0; axis < 3; axis++)
-            if (low[axis] != INFINITY || high[axis] != -INFINITY)
+            if (!is_inverted(t->tree, node, child, key, axis))
                 return complain(t->checker, "%s: unused child %u of node %u has a box", t->name,
                                 child, node);
     }

@@ -725,8 +725,8 @@ static void trees_do_not_depend_on_threads(void **state) {
         for (uint32_t n = 0; n < a->node_count; n++) {
             assert_memory_equal(trc_node_children(a, n), trc_node_children(b, n),
                                 TRC_NODE_CHILDREN_BYTES);
-            assert_memory_equal(trc_node_bounds(a, n, 0), trc_node_bounds(b, n, 0),
-                                TRC_NODE_KEY_BYTES);
+            assert_memory_equal(trc_node_bounds(a, n), trc_node_bounds(b, n),
+                                TRC_NODE_BOUNDS_BYTES);
         }
         assert_memory_equal(a->slots->slots, b->slots->slots,
                             a->slot_count * sizeof a->slots->slots[0]);

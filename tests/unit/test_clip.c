@@ -256,7 +256,7 @@ static void the_check_finds_lost_pieces(void **state) {
     for (uint32_t n = 0; n < tree->node_count && tried < 50; n++)
         for (uint32_t i = 0; i < TRC_NODE_WIDTH && tried < 50; i++) {
             const uint32_t ref = trc_node_children(tree, n)[i];
-            float *upper = (float *)trc_node_bounds(tree, n, 0) + 8 + i;
+            float *upper = (float *)trc_node_bounds(tree, n) + 8 + i;
             const float whole = *upper;
             if (ref == TRC_REF_EMPTY || !(ref & TRC_REF_LEAF))
                 continue;

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "bvh/leaf.h"
+#include "bvh/packed.h"
 #include "bvh/see_through.h"
 #include "bvh/tree.h"
 #include "core/checks.h"
@@ -25,6 +26,13 @@ static struct trc_slot_block *slots_alloc(uint32_t count) {
     return block;
 }
 
+static size_t node_stride_of(uint32_t key_count) {
+    if (key_count < 2)
+        return TRC_NODE_CHILDREN_BYTES + TRC_NODE_BOUNDS_BYTES;
+    const size_t bytes = TRC_NODE_CHILDREN_BYTES + key_count * sizeof(struct trc_packed_boxes);
+    return (bytes + TRC_NODE_ALIGNMENT - 1) / TRC_NODE_ALIGNMENT * TRC_NODE_ALIGNMENT;
+}
+
 /* slots: to share, or NULL for new ones. mesh: whose shape is in it; NULL: a TLAS. */
 static trc_status tree_alloc(struct trc_tree *tree, uint32_t node_count, uint32_t slot_count,
                              uint32_t key_count, const struct trc_mesh *mesh,
@@ -35,7 +43,7 @@ static trc_status tree_alloc(struct trc_tree *tree, uint32_t node_count, uint32_
                               .slot_count = slot_count,
                               .root = TRC_REF_EMPTY,
                               .is_top = is_top};
-    tree->node_stride = TRC_NODE_CHILDREN_BYTES + (size_t)key_count * TRC_NODE_KEY_BYTES;
+    tree->node_stride = node_stride_of(key_count);
     tree->nodes = trc_alloc(node_count ? node_count : 1, tree->node_stride);
     size_t floats = (size_t)slot_count * key_count * TRC_TRIANGLE_FLOATS;
     if (mesh && mesh->shape) {
@@ -76,7 +84,11 @@ void trc_tree_destroy(struct trc_tree *tree) {
 
 static void node_bounds(const struct trc_tree *tree, uint32_t node, uint32_t key,
                         float lower_out[3], float upper_out[3]) {
-    const float *b = trc_node_bounds(tree, node, key);
+    if (tree->key_count > 1) {
+        trc_packed_hull(trc_node_packed(tree, node, key), lower_out, upper_out);
+        return;
+    }
+    const float *b = trc_node_bounds(tree, node);
     f4 lower[3], upper[3];
     for (int axis = 0; axis < 3; axis++, b += 16) {
         lower[axis] = f4_min(f4_load4(b), f4_load4(b + 4));
@@ -95,18 +107,21 @@ static void empty_bounds(float lower[3], float upper[3]) {
     }
 }
 
-static void child_store(struct trc_tree *tree, uint32_t node, uint32_t child, uint32_t key,
-                        const float lower[3], const float upper[3]) {
-    float *b = (float *)trc_node_bounds(tree, node, key);
+/* One of a node's boxes. */
+static void box_store(float boxes[TRC_BOXES_FLOATS], uint32_t child, const float lower[3],
+                      const float upper[3]) {
     for (int axis = 0; axis < 3; axis++) {
-        b[16 * axis + (int)child] = lower[axis];
-        b[16 * axis + 8 + (int)child] = upper[axis];
+        boxes[16 * axis + (int)child] = lower[axis];
+        boxes[16 * axis + 8 + (int)child] = upper[axis];
     }
 }
+static void child_store(struct trc_tree *tree, uint32_t node, uint32_t child, const float lower[3],
+                        const float upper[3]) {
+    box_store((float *)trc_node_bounds(tree, node), child, lower, upper);
+}
 
-/* Areas of the boxes of a node's children at key 0. */
-static double children_area(const struct trc_tree *tree, uint32_t node) {
-    const float *b = trc_node_bounds(tree, node, 0);
+/* Areas of a node's boxes. */
+static double boxes_area(const float b[TRC_BOXES_FLOATS]) {
     f4 sum = f4_set(0.0f);
     for (int i = 0; i < TRC_NODE_WIDTH; i += 4) {
         f4 size[3];
@@ -150,7 +165,14 @@ static void children_fill(struct trc_fill *fill, uint32_t n) {
     memcpy(fill->tree->nodes + n * fill->tree->node_stride, from, TRC_NODE_CHILDREN_BYTES);
 }
 
-/* The leaves of a node, and the boxes of those and of no children. */
+/* Fills a leaf at a key and gives its box. */
+static void leaf_fill(struct trc_fill *fill, uint32_t ref, uint32_t key, float lower[3],
+                      float upper[3]) {
+    if (!trc_leaf_fill(fill, ref, key, lower, upper))
+        atomic_store_explicit(&fill->spoiled, true, memory_order_relaxed);
+}
+
+/* The leaves of a node at rest, and the boxes of those and of no children. */
 static void leaves_fill(struct trc_fill *fill, uint32_t node) {
     struct trc_tree *tree = fill->tree;
     const uint32_t *children = trc_node_children(tree, node);
@@ -158,27 +180,61 @@ static void leaves_fill(struct trc_fill *fill, uint32_t node) {
         float lower[3], upper[3];
         if (is_node(children[i]))
             continue;
-        if (is_leaf(children[i]))
+        empty_bounds(lower, upper);
+        if (is_leaf(children[i])) {
             trc_leaf_prepare(fill, children[i]);
-        for (uint32_t key = 0; key < tree->key_count; key++) {
-            if (is_leaf(children[i]) && !trc_leaf_fill(fill, children[i], key, lower, upper))
-                atomic_store_explicit(&fill->spoiled, true, memory_order_relaxed);
-            if (children[i] == TRC_REF_EMPTY)
-                empty_bounds(lower, upper);
-            child_store(tree, node, i, key, lower, upper);
+            leaf_fill(fill, children[i], 0, lower, upper);
         }
+        child_store(tree, node, i, lower, upper);
     }
 }
 
-/* Boxes of a node's children that are nodes, whose own boxes must be there. */
-static void nodes_bound(struct trc_tree *tree, uint32_t node) {
+/* Boxes of the children of a node at rest that are nodes, whose own boxes must be there; the areas
+ * of all its boxes. */
+static double nodes_bound(struct trc_tree *tree, uint32_t node) {
     const uint32_t *children = trc_node_children(tree, node);
-    for (uint32_t i = 0; i < TRC_NODE_WIDTH; i++)
-        for (uint32_t key = 0; is_node(children[i]) && key < tree->key_count; key++) {
+    for (uint32_t i = 0; i < TRC_NODE_WIDTH; i++) {
+        float lower[3], upper[3];
+        if (!is_node(children[i]))
+            continue;
+        node_bounds(tree, children[i], 0, lower, upper);
+        child_store(tree, node, i, lower, upper);
+    }
+    return boxes_area(trc_node_bounds(tree, node));
+}
+
+/* The leaves and boxes of a moving node, whose child nodes must be there, all bytes of it; the areas
+ * of its boxes at key 0. */
+static double moving_node_fill(struct trc_fill *fill, uint32_t node) {
+    struct trc_tree *tree = fill->tree;
+    const uint32_t *children = trc_node_children(tree, node);
+    double area = 0.0;
+    for (int i = 0; i < TRC_NODE_WIDTH; i++)
+        if (is_leaf(children[i]))
+            trc_leaf_prepare(fill, children[i]);
+    for (uint32_t key = 0; key < tree->key_count; key++) {
+        float boxes[TRC_BOXES_FLOATS];
+        for (uint32_t i = 0; i < TRC_NODE_WIDTH; i++) {
             float lower[3], upper[3];
-            node_bounds(tree, children[i], key, lower, upper);
-            child_store(tree, node, i, key, lower, upper);
+            empty_bounds(lower, upper);
+            if (is_leaf(children[i]))
+                leaf_fill(fill, children[i], key, lower, upper);
+            else if (is_node(children[i]))
+                node_bounds(tree, children[i], key, lower, upper);
+            box_store(boxes, i, lower, upper);
         }
+        trc_boxes_pack(boxes, (struct trc_packed_boxes *)trc_node_packed(tree, node, key));
+        if (key == 0)
+            area = boxes_area(boxes);
+    }
+    uint8_t *end = (uint8_t *)trc_node_packed(tree, node, tree->key_count);
+    memset(end, 0, (size_t)(tree->nodes + (node + (size_t)1) * tree->node_stride - end));
+    return area;
+}
+
+/* What of a node waits for its child nodes: of one at rest their boxes, of a moving one all. */
+static double node_finish(struct trc_fill *fill, uint32_t node) {
+    return fill->tree->key_count > 1 ? moving_node_fill(fill, node) : nodes_bound(fill->tree, node);
 }
 
 static bool is_cancelled(const struct trc_fill *fill) { return fill->cancel && *fill->cancel; }
@@ -197,7 +253,8 @@ static void fill_task(void *context, uint32_t index, uint32_t worker) {
     for (uint32_t n = begin; n < end; n++) {
         trc_fetch(tree->nodes + (n + PREFETCH_NODES) * tree->node_stride, tree->node_stride);
         children_fill(fill, n);
-        leaves_fill(fill, n);
+        if (tree->key_count < 2)
+            leaves_fill(fill, n);
     }
     for (uint32_t n = end; n-- > begin;) {
         const uint32_t *children = trc_node_children(tree, n);
@@ -207,8 +264,7 @@ static void fill_task(void *context, uint32_t index, uint32_t worker) {
                 fill->pending[n] = true;
         if (fill->pending[n])
             continue;
-        nodes_bound(tree, n);
-        sum += children_area(tree, n);
+        sum += node_finish(fill, n);
     }
     fill->area_sums[index] = sum;
 }
@@ -219,8 +275,7 @@ static void root_leaf_fill(struct trc_fill *fill) {
     float lower[3], upper[3];
     trc_leaf_prepare(fill, tree->root);
     for (uint32_t key = 0; key < tree->key_count; key++) {
-        if (!trc_leaf_fill(fill, tree->root, key, lower, upper))
-            fill->spoiled = true;
+        leaf_fill(fill, tree->root, key, lower, upper);
         bounds_grow(tree, lower, upper);
     }
 }
@@ -235,10 +290,8 @@ static trc_status nodes_fill(struct trc_fill *fill, uint32_t task_count, struct 
     for (uint32_t i = 0; i < task_count; i++)
         sum += fill->area_sums[i];
     for (uint32_t n = tree->node_count; n-- > 0;)
-        if (fill->pending[n]) {
-            nodes_bound(tree, n);
-            sum += children_area(tree, n);
-        }
+        if (fill->pending[n])
+            sum += node_finish(fill, n);
     for (uint32_t key = 0; is_node(tree->root) && key < tree->key_count; key++) {
         float lower[3], upper[3];
         node_bounds(tree, tree->root, key, lower, upper);
@@ -363,7 +416,7 @@ trc_status trc_tree_fill_top(const struct trc_topology *topology,
             } else {
                 empty_bounds(lower, upper);
             }
-            child_store(tree, n, i, 0, lower, upper);
+            child_store(tree, n, i, lower, upper);
         }
     }
     tree->root = topology->root;

@@ -1,10 +1,10 @@
 /* The memory of a tree: 8-wide nodes and leaves of 1 to 8 triangles, with bounds and vertices at
  * every motion key.
  *
- * A node is 8 child references followed, for each key, by 48 floats: for each axis 8 lower bounds,
- * then 8 upper ones. It lies in four cache lines, in motion in seven, whether it begins with one or
- * in the middle of one. Unused children have inverted infinite bounds. Nodes stand before their
- * children, so that a backward walk refits.
+ * A node is 8 child references followed by 48 floats: for each axis 8 lower bounds, then 8 upper
+ * ones. It lies in four cache lines, whether it begins with one or in the middle of one. Unused
+ * children have inverted infinite bounds. In moving trees the bounds of each key are bytes, and two
+ * keys lie in three lines. Nodes stand before their children, so that a backward walk refits.
  *
  * Triangles stand in slots, those of a leaf side by side: its reference has the first and the
  * count. A leaf of n has, for each key, 9 n floats: vertex by axis by slot, without gaps between
@@ -31,8 +31,9 @@
 
 #define TRC_NODE_WIDTH 8
 #define TRC_NODE_CHILDREN_BYTES 32
-#define TRC_NODE_KEY_BYTES 192
+#define TRC_NODE_BOUNDS_BYTES 192 /* at rest */
 #define TRC_TRIANGLE_FLOATS 9
+#define TRC_NODE_ALIGNMENT 64 /* of moving trees */
 
 /* A reference: a node's index, or a leaf's first slot with TRC_REF_LEAF and its count - 1 in bits
  * 28-30. */
@@ -59,6 +60,13 @@
 #define TRC_CURVE_VERTEX_FLOATS 4
 
 struct trc_tree;
+
+/* Bounds of a moving tree's node at a key: origin + step * byte along each axis, [lower, upper] by
+ * child; of no child 255, 0. Kernels widen them by what rounding moves them (TRC_UNPACK_SLACK). */
+struct trc_packed_boxes {
+    float origin[3], step[3];
+    uint8_t bytes[3][2][TRC_NODE_WIDTH];
+};
 
 struct trc_slot {
     uint32_t instance; /* word, see above */
@@ -153,10 +161,16 @@ struct trc_bvh {
 static inline const uint32_t *trc_node_children(const struct trc_tree *t, uint32_t node) {
     return (const uint32_t *)(t->nodes + (size_t)node * t->node_stride);
 }
-/* 48 floats: [axis][lower, upper][child]. */
-static inline const float *trc_node_bounds(const struct trc_tree *t, uint32_t node, uint32_t key) {
-    return (const float *)(t->nodes + (size_t)node * t->node_stride + TRC_NODE_CHILDREN_BYTES +
-                           (size_t)key * TRC_NODE_KEY_BYTES);
+/* 48 floats of a tree at rest: [axis][lower, upper][child]. */
+static inline const float *trc_node_bounds(const struct trc_tree *t, uint32_t node) {
+    return (const float *)(t->nodes + (size_t)node * t->node_stride + TRC_NODE_CHILDREN_BYTES);
+}
+/* Of a moving tree; the next key's follow. */
+static inline const struct trc_packed_boxes *trc_node_packed(const struct trc_tree *t, uint32_t node,
+                                                             uint32_t key) {
+    return (const struct trc_packed_boxes *)(t->nodes + (size_t)node * t->node_stride +
+                                             TRC_NODE_CHILDREN_BYTES) +
+           key;
 }
 static inline uint32_t trc_leaf_first(uint32_t ref) { return ref & TRC_REF_INDEX_MASK; }
 static inline const struct trc_slot *trc_leaf_slots(const struct trc_tree *t, uint32_t ref) {

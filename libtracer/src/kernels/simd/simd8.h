@@ -13,6 +13,17 @@ TRC_INLINE f8 f8_load(const float *p) {
     memcpy(&v, p, sizeof v);
     return v;
 }
+/* Bytes as numbers. */
+TRC_INLINE f8 f8_load_bytes(const uint8_t p[8]) {
+#if defined(__AVX2__)
+    return (f8)_mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_loadl_epi64((const __m128i *)p)));
+#else
+    typedef uint8_t bytes __attribute__((vector_size(8)));
+    bytes b;
+    memcpy(&b, p, sizeof b);
+    return __builtin_convertvector(b, f8);
+#endif
+}
 TRC_INLINE void f8_store(float *p, f8 v) { memcpy(p, &v, sizeof v); }
 
 #if defined(__AVX__)

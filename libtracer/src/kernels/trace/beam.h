@@ -21,12 +21,24 @@
 #include "model/tree.h"
 
 #define TRC_SLACK 2.4e-6f
+/* Of the slack, what unpacked boxes are wider by: they are wrong by a half-ulp of their step times
+ * a byte and one of their bounds. */
+#define TRC_UNPACK_SLACK 0.1f
 /* Denormal coordinates: errors are absolute there. */
 #define TRC_MIN_SLACK 1e-42f
 /* Widest half of a narrow beam, per length. */
 #define TRC_NARROW_BEAM 0.03f
 /* Between planes nearer than this, slopes per z would overflow. */
 #define TRC_SHORT_BEAM 1e-37f
+
+/* Boxes of a moving node's children at a key. */
+TRC_INLINE void trc_boxes_unpack(const struct trc_packed_boxes *packed, f8 lower[3], f8 upper[3]) {
+    for (int axis = 0; axis < 3; axis++) {
+        const f8 origin = f8_set(packed->origin[axis]), step = f8_set(packed->step[axis]);
+        lower[axis] = f8_madd(f8_load_bytes(packed->bytes[axis][0]), step, origin);
+        upper[axis] = f8_madd(f8_load_bytes(packed->bytes[axis][1]), step, origin);
+    }
+}
 
 struct trc_beam {
     struct trc_shear axis;

@@ -37,21 +37,32 @@ struct entry {
 /* Boxes of a node's children: at rest, or hulled over the group's interval of time. */
 TRC_INLINE void boxes_load(const struct walk *w, uint32_t node, bool motion, f8 lower[3],
                            f8 upper[3]) {
-    const float *b = trc_node_bounds(w->tree, node, w->key);
-    for (int axis = 0; axis < 3; axis++) {
-        lower[axis] = f8_load(b + 16 * axis);
-        upper[axis] = f8_load(b + 16 * axis + 8);
-    }
-    if (!motion)
+    if (!motion) {
+        const float *b = trc_node_bounds(w->tree, node);
+        for (int axis = 0; axis < 3; axis++) {
+            lower[axis] = f8_load(b + 16 * axis);
+            upper[axis] = f8_load(b + 16 * axis + 8);
+        }
         return;
-    const float *e = b + TRC_NODE_KEY_BYTES / sizeof(float);
-    const f8 f0 = f8_set(w->group->f_min), f1 = f8_set(w->group->f_max);
-    for (int axis = 0; axis < 3; axis++) {
-        const f8 l = f8_load(e + 16 * axis) - lower[axis];
-        const f8 h = f8_load(e + 16 * axis + 8) - upper[axis];
-        lower[axis] = f8_min(lower[axis] + f0 * l, lower[axis] + f1 * l);
-        upper[axis] = f8_max(upper[axis] + f0 * h, upper[axis] + f1 * h);
     }
+    const struct trc_packed_boxes *packed = trc_node_packed(w->tree, node, w->key);
+    const f8 f0 = f8_set(w->group->f_min), f1 = f8_set(w->group->f_max);
+    const f8 slack = f8_set(TRC_UNPACK_SLACK * w->group->beam.slack);
+    f8 later_lower[3], later_upper[3];
+    trc_boxes_unpack(packed, lower, upper);
+    trc_boxes_unpack(packed + 1, later_lower, later_upper);
+    for (int axis = 0; axis < 3; axis++) {
+        const f8 l = later_lower[axis] - lower[axis], h = later_upper[axis] - upper[axis];
+        lower[axis] = f8_min(lower[axis] + f0 * l, lower[axis] + f1 * l) - slack;
+        upper[axis] = f8_max(upper[axis] + f0 * h, upper[axis] + f1 * h) + slack;
+    }
+}
+
+/* Bits of the children that a node has. */
+TRC_INLINE uint32_t node_used(const struct trc_tree *tree, uint32_t node) {
+    i8x children;
+    memcpy(&children, trc_node_children(tree, node), sizeof children);
+    return i8_nonzero(children != (int32_t)TRC_REF_EMPTY);
 }
 
 /* Rays of packet k in mask whose own slabs meet the box of the node's child. */
@@ -147,6 +158,8 @@ TRC_INLINE int node_open(const struct walk *w, uint32_t node, const struct trc_l
     uint32_t bits = trc_beam_test(b, lower, upper, &key);
     if (any && w->see_through)
         bits &= ~(uint32_t)w->see_through[node];
+    if (motion)
+        bits &= node_used(w->tree, node);
     if (!bits)
         return top;
     const f8 slack = f8_set(b->slack);

@@ -56,30 +56,52 @@ TRC_INLINE uint32_t stream_beyond(const struct stream *s, uint32_t rays, float d
     return rays & beyond;
 }
 
+/* Boxes of a node's children, wider by the slack; in motion at the first key, and the ways to the
+ * next. */
+struct stream_boxes {
+    f8 low[3], high[3], low_way[3], high_way[3];
+};
+TRC_INLINE void stream_boxes_load(const struct walk *w, uint32_t node, bool motion,
+                                  struct stream_boxes *out) {
+    if (!motion) {
+        const float *b = trc_node_bounds(w->tree, node);
+        const f8 slack = f8_set(w->group->beam.slack);
+        for (int axis = 0; axis < 3; axis++) {
+            out->low[axis] = f8_load(b + 16 * axis) - slack;
+            out->high[axis] = f8_load(b + 16 * axis + 8) + slack;
+        }
+        return;
+    }
+    const struct trc_packed_boxes *packed = trc_node_packed(w->tree, node, w->key);
+    const f8 slack = f8_set((1.0f + TRC_UNPACK_SLACK) * w->group->beam.slack);
+    trc_boxes_unpack(packed, out->low, out->high);
+    trc_boxes_unpack(packed + 1, out->low_way, out->high_way);
+    for (int axis = 0; axis < 3; axis++) {
+        out->low_way[axis] -= out->low[axis];
+        out->high_way[axis] -= out->high[axis];
+        out->low[axis] -= slack;
+        out->high[axis] += slack;
+    }
+}
+
 /* For each child of a node the rays that meet its box, and for closest hits the least distance at
  * which one does; returns the bits of children with any. */
 TRC_INLINE uint32_t stream_node(const struct walk *w, uint32_t node, const struct stream *s,
                                 uint32_t rays, bool any, bool motion, uint32_t met[TRC_NODE_WIDTH],
                                 float nearest[TRC_NODE_WIDTH]) {
-    const float *b = trc_node_bounds(w->tree, node, w->key);
-    const float *e = b + (motion ? TRC_NODE_KEY_BYTES / sizeof(float) : 0);
-    const f8 slack = f8_set(w->group->beam.slack);
-    f8 low[3], high[3];
-    for (int axis = 0; axis < 3; axis++) {
-        low[axis] = f8_load(b + 16 * axis) - slack;
-        high[axis] = f8_load(b + 16 * axis + 8) + slack;
-    }
+    struct stream_boxes boxes;
+    stream_boxes_load(w, node, motion, &boxes);
     i8x children, all = {0};
     f8 least = f8_set(INFINITY);
     for (; rays; rays &= rays - 1) {
         const int i = __builtin_ctz(rays);
         f8 near = f8_set(s->tmin[i]), far = f8_set(s->t[i]);
         for (int axis = 0; axis < 3; axis++) {
-            f8 l = low[axis], h = high[axis];
+            f8 l = boxes.low[axis], h = boxes.high[axis];
             if (motion) {
                 const f8 f = f8_set(s->f[i]);
-                l += f * (f8_load(e + 16 * axis) - f8_load(b + 16 * axis));
-                h += f * (f8_load(e + 16 * axis + 8) - f8_load(b + 16 * axis + 8));
+                l += f * boxes.low_way[axis];
+                h += f * boxes.high_way[axis];
             }
             const f8 inv = f8_set(s->inv[axis][i]), shift = f8_set(s->shift[axis][i]);
             l = f8_madd(l, inv, shift);
@@ -100,10 +122,12 @@ TRC_INLINE uint32_t stream_node(const struct walk *w, uint32_t node, const struc
 }
 
 #define CACHE_LINE 64
-#define NODE_LINES ((TRC_NODE_CHILDREN_BYTES + TRC_NODE_KEY_BYTES + CACHE_LINE - 1) / CACHE_LINE)
-#define LEAF_LINES 2 /* a leaf is of three triangles, mostly */
+#define NODE_LINES ((TRC_NODE_CHILDREN_BYTES + TRC_NODE_BOUNDS_BYTES + CACHE_LINE - 1) / CACHE_LINE)
+#define MOVING_NODE_LINES 3 /* with two keys */
+#define LEAF_LINES 2        /* a leaf is of three triangles, mostly */
 /* Asks for the memory of what waits on a stack; a TLAS is small. */
-TRC_INLINE void ref_prefetch(const struct walk *w, uint32_t ref, bool any, bool curves) {
+TRC_INLINE void ref_prefetch(const struct walk *w, uint32_t ref, bool any, bool motion,
+                             bool curves) {
     const bool is_leaf = ref & TRC_REF_LEAF;
     if (!curves && w->tree->is_top)
         return;
@@ -113,7 +137,8 @@ TRC_INLINE void ref_prefetch(const struct walk *w, uint32_t ref, bool any, bool 
     }
     const char *at = is_leaf ? (const char *)trc_leaf_vertices(w->tree, ref, w->key)
                              : (const char *)trc_node_children(w->tree, ref);
-    for (int line = 0; line < (is_leaf ? LEAF_LINES : NODE_LINES); line++)
+    const int node_lines = motion ? MOVING_NODE_LINES : NODE_LINES;
+    for (int line = 0; line < (is_leaf ? LEAF_LINES : node_lines); line++)
         __builtin_prefetch(at + line * CACHE_LINE);
     if (is_leaf && !any)
         __builtin_prefetch(trc_leaf_slots(w->tree, ref));
@@ -122,7 +147,8 @@ TRC_INLINE void ref_prefetch(const struct walk *w, uint32_t ref, bool any, bool 
 /* Pushes the children that are met: to the closest hit the nearest on top, to any in any order. */
 TRC_INLINE int stream_push(const struct walk *w, uint32_t node, uint32_t bits,
                            const uint32_t met[TRC_NODE_WIDTH], const float nearest[TRC_NODE_WIDTH],
-                           bool any, bool curves, struct stream_entry *stack, int top) {
+                           bool any, bool motion, bool curves, struct stream_entry *stack,
+                           int top) {
     const uint32_t *children = trc_node_children(w->tree, node);
     const int bottom = top;
     for (; bits; bits &= bits - 1) {
@@ -130,7 +156,7 @@ TRC_INLINE int stream_push(const struct walk *w, uint32_t node, uint32_t bits,
         const struct stream_entry entry = {children[child], met[child],
                                            any ? 0.0f : nearest[child]};
         int at = top++;
-        ref_prefetch(w, entry.ref, any, curves);
+        ref_prefetch(w, entry.ref, any, motion, curves);
         for (; !any && at > bottom && stack[at - 1].near < entry.near; at--)
             stack[at] = stack[at - 1];
         stack[at] = entry;
@@ -193,7 +219,7 @@ TRC_INLINE void stream_walk(struct walk *w, uint32_t ref, const struct trc_live 
             uint32_t bits = stream_node(w, ref, &s, rays, any, motion, met, nearest);
             if (any && w->see_through)
                 bits &= ~(uint32_t)w->see_through[ref];
-            top = stream_push(w, ref, bits, met, nearest, any, curves, stack, top);
+            top = stream_push(w, ref, bits, met, nearest, any, motion, curves, stack, top);
         } else if (!curves && w->tree->is_top) {
             stream_item(w, ref, &s, rays, any);
         } else {
