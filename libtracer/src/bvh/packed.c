@@ -17,10 +17,10 @@ static double bound_at(float origin, float step, double byte) {
 
 /* The least step with which the last byte reaches that far. */
 static float step_for(float origin, float end) {
-    float step = (float)(((double)end - origin) / STEPS);
-    if (!(step > 0.0f))
+    if (!(end > origin))
         return 0.0f;
-    step = fmaxf(step, FLT_MIN); /* denormal ones would lose what rounding is relative to */
+    /* Of denormal steps, rounding is not relative to what they are. */
+    float step = fmaxf((float)(((double)end - origin) / STEPS), FLT_MIN);
     while (bound_at(origin, step, STEPS) < end)
         step = nextafterf(step, INFINITY);
     return step;
