@@ -203,8 +203,8 @@ static double nodes_bound(struct trc_tree *tree, uint32_t node) {
     return boxes_area(trc_node_bounds(tree, node));
 }
 
-/* The leaves and boxes of a moving node, whose child nodes must be there, all bytes of it; the areas
- * of its boxes at key 0. */
+/* The leaves and boxes of a moving node, whose child nodes must be there, all bytes of it; the
+ * areas of its boxes at key 0. */
 static double moving_node_fill(struct trc_fill *fill, uint32_t node) {
     struct trc_tree *tree = fill->tree;
     const uint32_t *children = trc_node_children(tree, node);

@@ -166,8 +166,8 @@ static inline const float *trc_node_bounds(const struct trc_tree *t, uint32_t no
     return (const float *)(t->nodes + (size_t)node * t->node_stride + TRC_NODE_CHILDREN_BYTES);
 }
 /* Of a moving tree; the next key's follow. */
-static inline const struct trc_packed_boxes *trc_node_packed(const struct trc_tree *t, uint32_t node,
-                                                             uint32_t key) {
+static inline const struct trc_packed_boxes *trc_node_packed(const struct trc_tree *t,
+                                                             uint32_t node, uint32_t key) {
     return (const struct trc_packed_boxes *)(t->nodes + (size_t)node * t->node_stride +
                                              TRC_NODE_CHILDREN_BYTES) +
            key;
