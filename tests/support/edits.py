@@ -346,7 +346,8 @@ def override(random):
     layer.material_override = bpy.data.materials["Plain"] if random.random() < 0.3 else None
 
 
-ALL = (pose, transform, move_instancer, move_middle, move_parent, rename_parent, parent, swap_names, swap_meshes, tint,
-       attribute, side_collection, member, linked_light, mesh_slot, move_light, light_energy, light_kind, material, node_link,
-       node_group, image, world, settings, film_transparent, frame, add, duplicate, delete, hide,
-       ray_visibility, holdout, shadow_catcher, motion, deform_motion, slot, vertices, shading, modifier, override)
+ALL = (pose, transform, move_instancer, move_middle, move_parent, rename_parent, parent, swap_names,
+       swap_meshes, tint, attribute, side_collection, member, linked_light, mesh_slot, move_light,
+       light_energy, light_kind, material, node_link, node_group, image, world, settings, film_transparent,
+       frame, add, duplicate, delete, hide, ray_visibility, holdout, shadow_catcher, motion, deform_motion,
+       slot, vertices, shading, modifier, override)

@@ -90,7 +90,7 @@ class Plain:
 
 
 def names_in(key):
-    """Names of the object an instance shows and of the one that makes it, by its key; none of what stands for itself."""
+    """Names of the object an instance shows and of what makes it, by its key; none of what stands for itself."""
     return () if is_plain(key) else (key[0], key[2])
 
 
@@ -297,7 +297,8 @@ class Instances:
         transforms = motion.follow_turns(collapse(item.transforms))
         values = {"mesh": mesh_id, "transforms": transforms, "pass_index": item.pass_index,
                   "random": item.random, "color": item.color, "light_group": item.light_group,
-                  "flags": item.flags | _WORLD_NORMALS * is_in_world, **item.links._asdict(), **item.offsets._asdict(), "values": item.values,
+                  "flags": item.flags | _WORLD_NORMALS * is_in_world,
+                  **item.links._asdict(), **item.offsets._asdict(), "values": item.values,
                   "cryptomatte_object": native.cryptomatte_id(item.name),
                   "cryptomatte_asset": native.cryptomatte_id(item.asset)}
         parts = _parts(item)

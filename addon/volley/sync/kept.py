@@ -42,7 +42,7 @@ class Circumstances(NamedTuple):
 
 
 def _has_special(layer_collection):
-    """Whether a collection of a view layer, or one in it, is seen as a hole or by other rays than the camera's alone."""
+    """Whether a collection of a view layer, or one in it, is a hole or hidden from the camera alone."""
     return layer_collection.holdout or layer_collection.indirect_only or any(
         [_has_special(child) for child in layer_collection.children])
 

@@ -61,6 +61,8 @@ class SceneSync:
         former = self._former(source)
         if self._update_part(source, shutter, camera_keys):
             return
+        if source.changes.full:  # as may have turned out at another time
+            former = None
         self._images.begin(source.changes, size_limit(source), source.depsgraph.scene_eval.frame_current)
         self._materials.begin(source.depsgraph, source.changes, source.aovs)
         self._meshes.begin()

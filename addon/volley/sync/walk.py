@@ -56,13 +56,13 @@ class Walk:
         self._volumes = set()  # names of objects of volumes
         self._shining = set()  # and of strands and points that emit
         self.links = Links(source.depsgraph, sync.warnings) if links is None else links
+        self.circumstances = self._kept = None  # of a walk over everything
 
     def run(self, former):
         """Find what is there now; former: shown.Shown of the walk before, None where nothing may be taken over."""
         self.circumstances = Circumstances.of(self, self._source, self._sync._materials)
-        if former is not None and not self.circumstances.are_as(former.circumstances):
-            former = None
-        self._kept = Kept(former, self._source, self._values_of, self._sync._meshes)
+        holds = former is not None and self.circumstances.are_as(former.circumstances)
+        self._kept = Kept(former if holds else None, self._source, self._values_of, self._sync._meshes)
         culling = self._source.culling
         shows_solids, shows_strands = self._view_layer.use_solid, self._view_layer.use_strand
         for each in self._instances():
