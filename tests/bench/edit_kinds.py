@@ -11,6 +11,16 @@ def transform(step):
     bpy.data.objects["Object500"].location.z = 0.1 * (step + 1)
 
 
+def transforms(step):
+    for each in bpy.data.objects:
+        if each.name.startswith("Object"):
+            each.location.z = 0.01 * (step + 1)
+
+
+def select(step):
+    bpy.data.objects["Object500"].select_set(not step % 2)
+
+
 def material(step):
     tree = bpy.data.materials["Material1"].node_tree
     tree.nodes["Diffuse BSDF"].inputs["Color"].default_value = (0.1 * (step % 9), 0.5, 0.5, 1.0)
@@ -63,5 +73,5 @@ def settings(step):
     bpy.context.scene.volley.film_exposure = 1.0 + 0.1 * (step + 1)
 
 
-ALL = (viewport_scenes.pose, transform, material, node_link, light, world, ray_visibility, mesh_edit, duplicate, delete,
-       hide, settings)
+ALL = (viewport_scenes.pose, transform, transforms, select, material, node_link, light, world, ray_visibility,
+       mesh_edit, duplicate, delete, hide, settings)

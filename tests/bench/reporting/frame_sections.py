@@ -189,5 +189,6 @@ def _final_edits(rows):
               f"{row['cycles_ms'] / row['whole_ms']:.2f}"] for row in rows]
     return ["Milliseconds of F12 with persistent data after an edit, 96×54 and one sample: objects of 200 triangles, "
             "each of a mesh of its own. *Whole* is all that Blender does, *Cycles* the same by it; of the objects, "
-            "one moves in time: it is elsewhere on the next *frame*.",
+            "one moves in time: it is elsewhere on the next *frame*. *Transforms* moves all of them, *select* selects "
+            "one.",
             table(["objects", "edit", "sync", "commit", "whole", "Cycles", "Cycles / Volley"], lines)]
