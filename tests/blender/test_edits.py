@@ -4,7 +4,26 @@
 import pytest
 
 
-def inside_random_edits(seed, count):
+def _edit_or_undo(random, undoes):
+    """Make a random edit, or take one back or make it again; its name."""
+    import bpy
+    import edits
+    if undoes and random.random() < 0.35:
+        operator = random.choice((bpy.ops.ed.undo, bpy.ops.ed.undo, bpy.ops.ed.redo))
+        try:
+            operator()
+        except RuntimeError:  # nothing is left to be taken back or made again
+            return "nothing"
+        return operator.idname_py()
+    edit = random.choice(edits.ALL)
+    edit(random)
+    if undoes:
+        bpy.context.view_layer.update()
+        bpy.ops.ed.undo_push(message=edit.__name__)
+    return edit.__name__
+
+
+def inside_random_edits(seed, count, undoes):
     import random
     import bpy
     import edits
@@ -13,30 +32,30 @@ def inside_random_edits(seed, count):
     from volley.sync import SceneSync
     from volley.sync.changes import Changes
     edits.make_scene()
+    bpy.ops.ed.undo_push(message="scene")
     random = random.Random(seed)
     follower = Follower()
     follower.picture()
     worst, former, changed_count, misnamed = [], None, 0, []
     for number in range(count):
-        edit = random.choice(edits.ALL)
-        edit(random)
+        name = _edit_or_undo(random, undoes)
         bpy.context.view_layer.update()
         if random.random() < 0.3:  # several edits until the next draw
             continue
         followed = follower.picture()
         fresh_sync = SceneSync(is_final=False, thread_count=0, will_resync=False)
         fresh = picture(fresh_sync, Changes.everything())
-        misnamed += [edit.__name__] * (follower.sync.cryptomatte_names() != fresh_sync.cryptomatte_names())
+        misnamed += [name] * (follower.sync.cryptomatte_names() != fresh_sync.cryptomatte_names())
         fresh_sync.destroy()
         changed_count += former is None or not np.array_equal(former, fresh)
         former = fresh
-        worst.append((float(np.abs(followed - fresh).mean()), edit.__name__, number))
+        worst.append((float(np.abs(followed - fresh).mean()), name, number))
     return sorted(worst, reverse=True)[:8], changed_count / len(worst), misnamed
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-def test_random_edits_end_in_the_scene_as_it_is(blender, seed):
-    worst, changed_share, misnamed = blender.run(inside_random_edits, seed, 200)
+@pytest.mark.parametrize("seed, undoes", [(1, False), (2, False), (3, True)])
+def test_random_edits_end_in_the_scene_as_it_is(blender, seed, undoes):
+    worst, changed_share, misnamed = blender.run(inside_random_edits, seed, 200, undoes)
     assert worst[0][0] == 0.0 and misnamed == [], (worst, misnamed)
     assert changed_share > 0.5  # the edits are seen at all
 
