@@ -66,7 +66,7 @@ static trc_status check_hits(const trc_hits *hits, uint64_t count) {
     return TRC_OK;
 }
 
-static trc_status resolve_packet_size(uint32_t packet_size, uint32_t *size_out) {
+static trc_status check_packet_size(uint32_t packet_size) {
     switch (packet_size) {
     case 0:
     case 1:
@@ -74,7 +74,6 @@ static trc_status resolve_packet_size(uint32_t packet_size, uint32_t *size_out) 
     case 16:
     case 64:
     case 256:
-        *size_out = packet_size;
         return TRC_OK;
     default:
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT,
@@ -126,61 +125,67 @@ static bool chunks_next(struct chunks *c) {
     return true;
 }
 
-static trc_status check_closest(const trc_rays *rays, uint32_t packet_size, const trc_hits *hits,
-                                uint32_t *size_out) {
-    TRC_TRY(check_rays(rays));
-    TRC_TRY(check_hits(hits, rays->count));
-    return resolve_packet_size(packet_size, size_out);
+/* What a query was called with. */
+struct query {
+    const trc_rays *rays;
+    uint32_t packet_size;
+    bool any; /* whether anything is hit, into occluded; else what is nearest, into hits */
+    const trc_hits *hits;
+    uint8_t *occluded;
+    uint64_t occluded_count;
+};
+
+static trc_status query_check(const struct query *q) {
+    TRC_TRY(check_rays(q->rays));
+    if (!q->any)
+        TRC_TRY(check_hits(q->hits, q->rays->count));
+    else
+        TRC_TRY(
+            trc_check_array(q->occluded, q->occluded_count, q->rays->count, 1, 1, "occluded_out"));
+    return check_packet_size(q->packet_size);
+}
+
+static void query_chunk(const struct query *q, const struct trc_snapshot *snapshot,
+                        const struct chunks *c) {
+    const struct trc_kernels *kernels = trc_kernels_current();
+    if (!q->any)
+        kernels->query_closest(snapshot, q->rays, q->hits, c->begin, c->end, q->packet_size,
+                               c->order.order);
+    else
+        kernels->query_occluded(snapshot, q->rays, q->occluded, c->begin, c->end, q->packet_size,
+                                c->order.order);
+}
+
+static trc_status query_run(trc_scene scene, const struct query *q) {
+    struct trc_snapshot *snapshot = NULL;
+    TRC_TRY(take_snapshot(scene, &snapshot));
+    struct chunks chunks = {0};
+    trc_status status = query_check(q);
+    if (status == TRC_OK)
+        status = chunks_open(q->rays, &chunks);
+    if (status == TRC_OK) {
+        const uint64_t fp_state = trc_fp_enter();
+        while (chunks_next(&chunks))
+            query_chunk(q, snapshot, &chunks);
+        trc_fp_leave(fp_state);
+    }
+    trc_ray_order_close(&chunks.order);
+    trc_snapshot_release(snapshot);
+    return status;
 }
 
 trc_status trc_query_closest(trc_scene scene, const trc_rays *rays, uint32_t packet_size,
                              const trc_hits *hits_out) {
-    struct trc_snapshot *snapshot = NULL;
-    TRC_TRY(take_snapshot(scene, &snapshot));
-    uint32_t size = 0;
-    struct chunks chunks = {0};
-    trc_status status = check_closest(rays, packet_size, hits_out, &size);
-    if (status == TRC_OK)
-        status = chunks_open(rays, &chunks);
-    if (status == TRC_OK) {
-        const uint64_t fp_state = trc_fp_enter();
-        const struct trc_kernels *kernels = trc_kernels_current();
-        while (chunks_next(&chunks))
-            kernels->query_closest(snapshot, rays, hits_out, chunks.begin, chunks.end, size,
-                                   chunks.order.order);
-        trc_fp_leave(fp_state);
-    }
-    trc_ray_order_close(&chunks.order);
-    trc_snapshot_release(snapshot);
-    return status;
-}
-
-static trc_status check_occluded(const trc_rays *rays, uint32_t packet_size,
-                                 const uint8_t *occluded, uint64_t occluded_count,
-                                 uint32_t *size_out) {
-    TRC_TRY(check_rays(rays));
-    TRC_TRY(trc_check_array(occluded, occluded_count, rays->count, 1, 1, "occluded_out"));
-    return resolve_packet_size(packet_size, size_out);
+    const struct query query = {.rays = rays, .packet_size = packet_size, .hits = hits_out};
+    return query_run(scene, &query);
 }
 
 trc_status trc_query_occluded(trc_scene scene, const trc_rays *rays, uint32_t packet_size,
                               uint8_t *occluded_out, uint64_t occluded_count) {
-    struct trc_snapshot *snapshot = NULL;
-    TRC_TRY(take_snapshot(scene, &snapshot));
-    uint32_t size = 0;
-    struct chunks chunks = {0};
-    trc_status status = check_occluded(rays, packet_size, occluded_out, occluded_count, &size);
-    if (status == TRC_OK)
-        status = chunks_open(rays, &chunks);
-    if (status == TRC_OK) {
-        const uint64_t fp_state = trc_fp_enter();
-        const struct trc_kernels *kernels = trc_kernels_current();
-        while (chunks_next(&chunks))
-            kernels->query_occluded(snapshot, rays, occluded_out, chunks.begin, chunks.end, size,
-                                    chunks.order.order);
-        trc_fp_leave(fp_state);
-    }
-    trc_ray_order_close(&chunks.order);
-    trc_snapshot_release(snapshot);
-    return status;
+    const struct query query = {.rays = rays,
+                                .packet_size = packet_size,
+                                .any = true,
+                                .occluded = occluded_out,
+                                .occluded_count = occluded_count};
+    return query_run(scene, &query);
 }
