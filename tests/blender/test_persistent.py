@@ -256,6 +256,28 @@ def test_instances_may_appear_in_time(blender, shutter):
     assert found[1][2] > 0.05, found
 
 
+def inside_switched_blur():
+    """The largest differences of renders that keep what they read from those that do not, motion blur off and on."""
+    import scenes
+    scene = _scene('CENTER')
+    _jolt(scene)
+    scene.frame_set(2)
+    pictures = {}
+    for keeps in (True, False):
+        scene.render.use_persistent_data = keeps
+        pictures[keeps] = []
+        for is_on in (False, True, False, True):
+            scene.render.use_motion_blur = is_on
+            pictures[keeps].append(scenes.render())
+    changes = [float(abs(after - before).max()) for before, after in zip(pictures[False], pictures[False][1:])]
+    return [float(abs(a - b).max()) for a, b in zip(*pictures.values())], min(changes)
+
+
+def test_motion_blur_may_be_switched(blender):
+    differences, least_change = blender.run(inside_switched_blur)
+    assert differences == [0.0] * 4 and least_change > 0.0
+
+
 def inside_warnings():
     """What two renders of an unchanged scene warn of."""
     import bpy

@@ -345,7 +345,7 @@ static bool check_box(struct tree_check *t, uint32_t ref, uint32_t key, const fl
     return true;
 }
 
-/* An unused child must never be entered: its box is inverted. */
+/* Whether a box is that of no child. */
 static bool is_inverted(const struct trc_tree *tree, uint32_t node, uint32_t child, uint32_t key,
                         int axis) {
     if (tree->key_count < 2) {
@@ -355,6 +355,7 @@ static bool is_inverted(const struct trc_tree *tree, uint32_t node, uint32_t chi
     const struct trc_packed_boxes *boxes = trc_node_packed(tree, node, key);
     return boxes->bytes[axis][0][child] == 255 && boxes->bytes[axis][1][child] == 0;
 }
+/* An unused child must never be entered: its box is inverted. */
 static bool check_empty(struct tree_check *t, uint32_t node, uint32_t child) {
     for (uint32_t key = 0; key < t->tree->key_count; key++) {
         for (int axis = 0; axis < 3; axis++)

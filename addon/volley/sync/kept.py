@@ -13,13 +13,12 @@ from . import instance
 
 class Circumstances(NamedTuple):
     """What a walk finds decides of all objects: attributes that meshes bring, the view layer's override and
-    switches, whether anything moves in time, how meshes are diced, the library's ids of materials, and whether
+    switches, how meshes are diced, the library's ids of materials, and whether
     each object has to be asked: before 5, its light group changes without its being named."""
 
     names: tuple
     override: str
     switches: tuple
-    has_shutter: bool
     dicing: dict
     materials: dict
     asks_all: bool
@@ -32,7 +31,7 @@ class Circumstances(NamedTuple):
         asks_all = bool(source.light_groups or walk.tangent_readers or not walk.links.is_empty()
                         or _has_special(layer.layer_collection))
         return cls(walk.names, override and override.name_full, (layer.use_solid, layer.use_strand),
-                   walk.shutter is not None, source.dicing and source.dicing.settings, materials.ids(), asks_all)
+                   source.dicing and source.dicing.settings, materials.ids(), asks_all)
 
     def are_as(self, former):
         """Whether an object that is as it was then is shown as it was then; materials may have come."""

@@ -45,6 +45,7 @@ class SceneSync:
         self._lights = light.Lights(self.scene, self.warnings)
         self._world = None   # what the library was last given of it
         self._shown = None   # what the last full walk found
+        self._had_shutter = False
         self._moved, self._deformed = set(), set()  # names of objects that did so while the shutter was open
 
     def destroy(self):
@@ -58,6 +59,9 @@ class SceneSync:
         the frame."""
         source.changes.objects |= self._moved | self._deformed  # though they may stand still now
         source.changes.geometry |= self._deformed
+        # What was read at one time alone, or at several, may be named at none of them.
+        source.changes.full |= self._had_shutter != (shutter is not None)
+        self._had_shutter = shutter is not None
         former = self._former(source)
         if self._update_part(source, shutter, camera_keys):
             return

@@ -38,7 +38,7 @@ class Walk:
     """One sync's walks over the depsgraph: the first finds everything, more follow motion."""
 
     def __init__(self, sync, source, shutter, links=None):
-        self._sync, self._source, self.shutter = sync, source, shutter
+        self._sync, self._source, self._shutter = sync, source, shutter
         self._view_layer, self._scene = source.depsgraph.view_layer_eval, source.depsgraph.scene_eval
         uv_names, color_names, needs_generated, self.tangent_readers = sync._materials.attribute_names()
         self._values_of = sync._materials.instance_values()
@@ -112,7 +112,7 @@ class Walk:
         for fraction in motion.fractions_of(counts):
             if self._source.is_cancelled():
                 raise Cancelled()
-            self._source.engine.frame_set(*self.shutter.frame_at(fraction))
+            self._source.engine.frame_set(*self._shutter.frame_at(fraction))
             camera_keys.look(fraction)
             yield fraction
 
@@ -196,7 +196,7 @@ class Walk:
 
     def _ask_keys(self, item, each):
         """Have room for the motion keys that an object asks for."""
-        if self.shutter is not None:
+        if self._shutter is not None:
             item.motion_keys = motion.key_count(each.object, instance.maker_of(each))
             item.transforms *= item.motion_keys
 

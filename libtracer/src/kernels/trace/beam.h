@@ -21,8 +21,8 @@
 #include "model/tree.h"
 
 #define TRC_SLACK 2.4e-6f
-/* Of the slack, what unpacked boxes are wider by: they are wrong by a half-ulp of their step times
- * a byte and one of their bounds. */
+/* Of the slack, what unpacked boxes are wider by, 2 half-ulps of 2 M: a step times a byte is wrong
+ * by a half-ulp of 2 M at most, its sum with the origin by one of M. */
 #define TRC_UNPACK_SLACK 0.1f
 /* Denormal coordinates: errors are absolute there. */
 #define TRC_MIN_SLACK 1e-42f
