@@ -122,23 +122,33 @@ static void triangle_of(const struct trc_part *part, uint32_t triangle, uint32_t
         f4_store3(out[v], trc_part_point(part, corner[is_line ? 0 : v]));
 }
 
+/* A corner of the triangle in a leaf's slot i, at a key. */
+static void leaf_corner(const struct trc_tree *tree, uint32_t ref, uint32_t i, uint32_t corner,
+                        uint32_t key, float out[3]) {
+    const uint32_t count = trc_leaf_count(ref);
+    const struct trc_block *block = trc_leaf_block(tree, ref);
+    for (uint32_t axis = 0; axis < 3; axis++)
+        out[axis] = trc_tree_has_blocks(tree)
+                        ? trc_block_rows(
+                              block, count,
+                              key)[axis * block->vertex_count + block->corners[corner * count + i]]
+                        : trc_leaf_vertices(tree, ref)[(3 * corner + axis) * count + i];
+}
+
 /* The vertices in a leaf's slot i are those of a triangle of the part, and valid. */
 static bool check_vertices(struct tree_check *t, uint32_t ref, uint32_t i,
                            const struct trc_part *part, uint32_t triangle) {
-    const uint32_t count = trc_leaf_count(ref);
     for (uint32_t key = 0; key < t->tree->key_count; key++) {
-        const float *v = trc_leaf_vertices(t->tree, ref, key);
         float triangle_corners[3][3];
         triangle_of(part, triangle, key, triangle_corners);
         for (uint32_t corner = 0; corner < 3; corner++) {
             const float *expected = triangle_corners[corner];
             float actual[3];
-            for (uint32_t axis = 0; axis < 3; axis++)
-                actual[axis] = v[(3 * corner + axis) * count + i];
+            leaf_corner(t->tree, ref, i, corner, key, actual);
             if (memcmp(expected, actual, sizeof actual) != 0)
                 return complain(t->checker,
                                 "%s: slot %u: corner %u of triangle %u is not the mesh's at key %u",
-                                t->name, trc_leaf_first(ref) + i, corner, triangle, key);
+                                t->name, trc_leaf_first(t->tree, ref) + i, corner, triangle, key);
             if (!trc_point_is_valid(actual))
                 return complain(t->checker,
                                 "%s: triangle %u has an invalid vertex and is in a leaf", t->name,
@@ -177,19 +187,18 @@ static uint64_t points_within(const float corner[3][3], const float lower[3],
 static void points_cover(struct tree_check *t, uint32_t ref, const float lower[3],
                          const float upper[3]) {
     const uint32_t count = trc_leaf_count(ref);
-    const float *v = trc_leaf_vertices(t->tree, ref, 0);
     for (uint32_t i = 0; i < count; i++) {
         const struct trc_slot slot = trc_leaf_slots(t->tree, ref)[i];
         const uint64_t part = t->is_joined ? slot.instance & TRC_SLOT_INSTANCE_MASK : 0;
         float corner[3][3];
-        for (uint32_t k = 0; k < 9; k++)
-            corner[k / 3][k % 3] = v[k * count + i];
+        for (uint32_t k = 0; k < 3; k++)
+            leaf_corner(t->tree, ref, i, k, 0, corner[k]);
         t->covered[t->first[part] + slot.triangle] |= points_within(corner, lower, upper);
     }
 }
 
 static bool check_leaf(struct tree_check *t, uint32_t ref) {
-    const uint32_t first = trc_leaf_first(ref), count = trc_leaf_count(ref);
+    const uint32_t first = trc_leaf_first(t->tree, ref), count = trc_leaf_count(ref);
     for (uint32_t i = 0; i < count; i++) {
         const struct trc_part *part = slot_part(t, first + i);
         if (!part)
@@ -208,18 +217,19 @@ static bool check_leaf(struct tree_check *t, uint32_t ref) {
 
 static void leaf_box(const struct trc_tree *tree, uint32_t ref, uint32_t key, float lower[3],
                      float upper[3]) {
-    const uint32_t count = trc_leaf_count(ref);
-    const float *v = trc_leaf_vertices(tree, ref, key);
     for (uint32_t axis = 0; axis < 3; axis++) {
         lower[axis] = INFINITY;
         upper[axis] = -INFINITY;
-        for (uint32_t corner = 0; corner < 3; corner++)
-            for (uint32_t i = 0; i < count; i++) {
-                const float x = v[(3 * corner + axis) * count + i];
-                lower[axis] = fminf(lower[axis], x);
-                upper[axis] = fmaxf(upper[axis], x);
-            }
     }
+    for (uint32_t i = 0; i < trc_leaf_count(ref); i++)
+        for (uint32_t corner = 0; corner < 3; corner++) {
+            float p[3];
+            leaf_corner(tree, ref, i, corner, key, p);
+            for (uint32_t axis = 0; axis < 3; axis++) {
+                lower[axis] = fminf(lower[axis], p[axis]);
+                upper[axis] = fmaxf(upper[axis], p[axis]);
+            }
+        }
 }
 
 /* The tree of an instance, NULL where only the joined one has it. */
@@ -297,10 +307,29 @@ static bool check_item(struct checker *c, const struct trc_item *item, uint8_t *
 
 /* ---- nodes ---- */
 
+/* The leaf's block, if it has one, lies within the tree's memory, and its corners are vertices. */
+static bool check_block(struct tree_check *t, uint32_t ref) {
+    const struct trc_tree *tree = t->tree;
+    const uint32_t count = trc_leaf_count(ref);
+    const float *end = tree->vertices + tree->vertex_floats;
+    if (!trc_tree_has_blocks(tree))
+        return true;
+    const struct trc_block *block = trc_leaf_block(tree, ref);
+    const float *rows = trc_block_rows(block, count, 0);
+    if (rows > end || trc_block_rows(block, count, tree->key_count) > end)
+        return complain(t->checker, "%s: block of leaf %08x is out of range", t->name, ref);
+    for (uint32_t i = 0; i < 3 * count; i++)
+        if (block->corners[i] >= block->vertex_count)
+            return complain(t->checker, "%s: corner of leaf %08x is out of range", t->name, ref);
+    return true;
+}
+
 /* ref is new, in range, and comes after its parent. */
 static bool check_ref(struct tree_check *t, uint32_t ref, uint32_t parent) {
     const bool is_leaf = (ref & TRC_REF_LEAF) != 0;
-    const uint32_t index = ref & TRC_REF_INDEX_MASK;
+    if (is_leaf && !check_block(t, ref))
+        return false;
+    const uint32_t index = is_leaf ? trc_leaf_first(t->tree, ref) : ref;
     const uint32_t end = index + (is_leaf ? trc_leaf_count(ref) : 1u);
     if (end > (is_leaf ? t->tree->slot_count : t->tree->node_count))
         return complain(t->checker, "%s: reference %08x is out of range", t->name, ref);
@@ -399,7 +428,8 @@ static bool check_see_through(struct tree_check *t, uint32_t ref, bool *good) {
     const uint32_t index = ref & TRC_REF_INDEX_MASK;
     if (ref & TRC_REF_LEAF) {
         bool all = true;
-        for (uint32_t i = index; i < index + trc_leaf_count(ref); i++)
+        const uint32_t first = trc_leaf_first(tree, ref);
+        for (uint32_t i = first; i < first + trc_leaf_count(ref); i++)
             all &= tree->is_top ? tree->items[i].tree->is_see_through
                                 : (tree->slots->slots[i].instance & TRC_SLOT_TRANSPARENT) != 0;
         return all;

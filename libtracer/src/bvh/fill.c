@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "bvh/leaf.h"
+#include "bvh/block.h"
 #include "bvh/packed.h"
 #include "bvh/see_through.h"
 #include "bvh/tree.h"
@@ -11,12 +11,12 @@
 #include "core/core.h"
 #include "core/pool.h"
 
-/* Nodes whose leaves one task fills: large enough that handing out tasks costs nothing. */
-#define NODES_PER_TASK 256
 /* What is filled is fetched so many nodes ahead. */
 #define PREFETCH_NODES 4
-/* Kernels load this many slots from wherever a leaf begins. */
+/* Kernels load this many slots from wherever a leaf begins, and floats. */
 #define LOAD_SLOTS 8
+#define LOAD_FLOATS TRC_BLOCK_LOAD
+_Static_assert(LOAD_FLOATS >= LOAD_SLOTS, "blocks are loaded by more than other leaves");
 
 static struct trc_slot_block *slots_alloc(uint32_t count) {
     struct trc_slot_block *block =
@@ -33,9 +33,10 @@ static size_t node_stride_of(uint32_t key_count) {
     return (bytes + TRC_NODE_ALIGNMENT - 1) / TRC_NODE_ALIGNMENT * TRC_NODE_ALIGNMENT;
 }
 
-/* slots: to share, or NULL for new ones. mesh: whose shape is in it; NULL: a TLAS. */
+/* slots: to share, or NULL for new ones. mesh: whose shape is in it; NULL: a TLAS. floats: of its
+ * vertices, but for curves. */
 static trc_status tree_alloc(struct trc_tree *tree, uint32_t node_count, uint32_t slot_count,
-                             uint32_t key_count, const struct trc_mesh *mesh,
+                             uint32_t key_count, const struct trc_mesh *mesh, size_t floats,
                              struct trc_slot_block *slots) {
     const bool is_top = !mesh;
     *tree = (struct trc_tree){.key_count = key_count,
@@ -45,14 +46,14 @@ static trc_status tree_alloc(struct trc_tree *tree, uint32_t node_count, uint32_
                               .is_top = is_top};
     tree->node_stride = node_stride_of(key_count);
     tree->nodes = trc_alloc(node_count ? node_count : 1, tree->node_stride);
-    size_t floats = (size_t)slot_count * key_count * TRC_TRIANGLE_FLOATS;
     if (mesh && mesh->shape) {
         tree->shape = mesh->shape;
         tree->vertex_count = mesh->vertex_count;
         floats = (size_t)mesh->vertex_count * key_count * TRC_CURVE_VERTEX_FLOATS;
     }
     if (!is_top) {
-        tree->vertices = trc_alloc(floats + LOAD_SLOTS, sizeof *tree->vertices);
+        tree->vertex_floats = floats;
+        tree->vertices = trc_alloc(floats + LOAD_FLOATS, sizeof *tree->vertices);
         tree->slots = slots ? slots : slots_alloc(slot_count);
         if (slots)
             atomic_fetch_add(&slots->refs, 1);
@@ -64,8 +65,8 @@ static trc_status tree_alloc(struct trc_tree *tree, uint32_t node_count, uint32_
     }
     tree->bytes = node_count * (uint64_t)tree->node_stride;
     if (!is_top) {
-        memset(tree->vertices + floats, 0, LOAD_SLOTS * sizeof *tree->vertices);
-        tree->bytes += (floats + LOAD_SLOTS) * sizeof *tree->vertices +
+        memset(tree->vertices + floats, 0, LOAD_FLOATS * sizeof *tree->vertices);
+        tree->bytes += (floats + LOAD_FLOATS) * sizeof *tree->vertices +
                        slot_count * (uint64_t)sizeof tree->slots->slots[0];
     }
     return TRC_OK;
@@ -77,8 +78,7 @@ void trc_tree_destroy(struct trc_tree *tree) {
     trc_free(tree->see_through);
     if (tree->slots && atomic_fetch_sub(&tree->slots->refs, 1) == 1)
         trc_free(tree->slots);
-    if (tree->slot_vertices && atomic_fetch_sub(&tree->slot_vertices->refs, 1) == 1)
-        trc_free(tree->slot_vertices);
+    trc_slot_vertices_release(tree->slot_vertices);
     *tree = (struct trc_tree){.root = TRC_REF_EMPTY};
 }
 
@@ -154,21 +154,49 @@ static void tree_finish(struct trc_tree *tree, double area_sum) {
     tree->sah_cost = root_area > 0.0f ? (float)(area_sum / root_area) : 0.0f;
 }
 
-static bool is_leaf(uint32_t ref) { return ref != TRC_REF_EMPTY && (ref & TRC_REF_LEAF); }
 static bool is_node(uint32_t ref) { return !(ref & TRC_REF_LEAF); } /* the empty one has it too */
+
+/* A reference of what is filled from, as the tree has it. Leaves that are blocks are begun. */
+static uint32_t ref_fill(const struct trc_fill *fill, uint32_t from) {
+    uint32_t ref = from;
+    if (!trc_ref_is_leaf(from))
+        return from;
+    if (fill->plan)
+        ref = trc_leaf_ref(fill->plan->places[trc_fill_first(fill, from)], trc_leaf_count(from));
+    else if (!trc_tree_has_blocks(fill->tree))
+        ref = trc_leaf_ref(trc_fill_first(fill, from), trc_leaf_count(from));
+    if (trc_tree_has_blocks(fill->tree))
+        trc_block_begin(fill, from, ref);
+    return ref;
+}
 
 /* A node's references to its children: copied as its boxes are filled, so that its memory is met
  * once, and by all threads. */
 static void children_fill(struct trc_fill *fill, uint32_t n) {
-    const uint32_t *from =
-        fill->from ? trc_node_children(fill->from, n) : fill->topology->children[n];
-    memcpy(fill->tree->nodes + n * fill->tree->node_stride, from, TRC_NODE_CHILDREN_BYTES);
+    const uint32_t *from = trc_fill_children(fill, n);
+    uint32_t *children = (uint32_t *)trc_node_children(fill->tree, n);
+    for (int i = 0; i < TRC_NODE_WIDTH; i++)
+        children[i] = ref_fill(fill, from[i]);
 }
 
-/* Fills a leaf at a key and gives its box. */
-static void leaf_fill(struct trc_fill *fill, uint32_t ref, uint32_t key, float lower[3],
-                      float upper[3]) {
-    if (!trc_leaf_fill(fill, ref, key, lower, upper))
+/* A leaf while it is filled key by key. */
+struct leaf {
+    const uint32_t *vertices; /* of its block, or NULL */
+    uint32_t memory[TRC_BLOCK_VERTICES];
+};
+static void leaf_prepare(struct trc_fill *fill, uint32_t ref, struct leaf *leaf) {
+    leaf->vertices = NULL;
+    if (trc_tree_has_blocks(fill->tree))
+        leaf->vertices = trc_block_prepare(fill, ref, leaf->memory);
+    else
+        trc_leaf_prepare(fill, ref);
+}
+static void leaf_fill(struct trc_fill *fill, uint32_t ref, const struct leaf *leaf, uint32_t key,
+                      float lower[3], float upper[3]) {
+    const bool is_finite = leaf->vertices
+                               ? trc_block_fill(fill, ref, leaf->vertices, key, lower, upper)
+                               : trc_leaf_fill(fill, ref, key, lower, upper);
+    if (!is_finite)
         atomic_store_explicit(&fill->spoiled, true, memory_order_relaxed);
 }
 
@@ -178,12 +206,13 @@ static void leaves_fill(struct trc_fill *fill, uint32_t node) {
     const uint32_t *children = trc_node_children(tree, node);
     for (uint32_t i = 0; i < TRC_NODE_WIDTH; i++) {
         float lower[3], upper[3];
+        struct leaf leaf;
         if (is_node(children[i]))
             continue;
         empty_bounds(lower, upper);
-        if (is_leaf(children[i])) {
-            trc_leaf_prepare(fill, children[i]);
-            leaf_fill(fill, children[i], 0, lower, upper);
+        if (trc_ref_is_leaf(children[i])) {
+            leaf_prepare(fill, children[i], &leaf);
+            leaf_fill(fill, children[i], &leaf, 0, lower, upper);
         }
         child_store(tree, node, i, lower, upper);
     }
@@ -208,17 +237,18 @@ static double nodes_bound(struct trc_tree *tree, uint32_t node) {
 static double moving_node_fill(struct trc_fill *fill, uint32_t node) {
     struct trc_tree *tree = fill->tree;
     const uint32_t *children = trc_node_children(tree, node);
+    struct leaf leaves[TRC_NODE_WIDTH];
     double area = 0.0;
     for (int i = 0; i < TRC_NODE_WIDTH; i++)
-        if (is_leaf(children[i]))
-            trc_leaf_prepare(fill, children[i]);
+        if (trc_ref_is_leaf(children[i]))
+            leaf_prepare(fill, children[i], &leaves[i]);
     for (uint32_t key = 0; key < tree->key_count; key++) {
         float boxes[TRC_BOXES_FLOATS];
         for (uint32_t i = 0; i < TRC_NODE_WIDTH; i++) {
             float lower[3], upper[3];
             empty_bounds(lower, upper);
-            if (is_leaf(children[i]))
-                leaf_fill(fill, children[i], key, lower, upper);
+            if (trc_ref_is_leaf(children[i]))
+                leaf_fill(fill, children[i], &leaves[i], key, lower, upper);
             else if (is_node(children[i]))
                 node_bounds(tree, children[i], key, lower, upper);
             box_store(boxes, i, lower, upper);
@@ -245,8 +275,8 @@ static void fill_task(void *context, uint32_t index, uint32_t worker) {
     (void)worker;
     struct trc_fill *fill = context;
     struct trc_tree *tree = fill->tree;
-    const uint32_t begin = index * NODES_PER_TASK, left = tree->node_count - begin;
-    const uint32_t end = begin + (left < NODES_PER_TASK ? left : NODES_PER_TASK);
+    const uint32_t begin = index * TRC_FILL_NODES, left = tree->node_count - begin;
+    const uint32_t end = begin + (left < TRC_FILL_NODES ? left : TRC_FILL_NODES);
     double sum = 0.0;
     if (is_cancelled(fill))
         return;
@@ -273,9 +303,10 @@ static void fill_task(void *context, uint32_t index, uint32_t worker) {
 static void root_leaf_fill(struct trc_fill *fill) {
     struct trc_tree *tree = fill->tree;
     float lower[3], upper[3];
-    trc_leaf_prepare(fill, tree->root);
+    struct leaf leaf;
+    leaf_prepare(fill, tree->root, &leaf);
     for (uint32_t key = 0; key < tree->key_count; key++) {
-        leaf_fill(fill, tree->root, key, lower, upper);
+        leaf_fill(fill, tree->root, &leaf, key, lower, upper);
         bounds_grow(tree, lower, upper);
     }
 }
@@ -313,11 +344,12 @@ static void curve_vertices_fill(const struct trc_mesh *mesh, struct trc_tree *tr
     }
 }
 
-static trc_status tree_fill(struct trc_fill *fill, struct trc_pool *pool) {
+/* root: of what is filled from. */
+static trc_status tree_fill(struct trc_fill *fill, uint32_t root, struct trc_pool *pool) {
     struct trc_tree *tree = fill->tree;
     if (tree->shape)
         curve_vertices_fill(fill->parts->mesh, tree);
-    const uint32_t task_count = (tree->node_count + NODES_PER_TASK - 1) / NODES_PER_TASK;
+    const uint32_t task_count = trc_fill_tasks(tree->node_count);
     fill->pending = trc_alloc(tree->node_count ? tree->node_count : 1, sizeof *fill->pending);
     fill->area_sums = trc_alloc(task_count ? task_count : 1, sizeof *fill->area_sums);
     trc_status status = TRC_OK;
@@ -325,7 +357,9 @@ static trc_status tree_fill(struct trc_fill *fill, struct trc_pool *pool) {
     if (!fill->pending || !fill->area_sums)
         status = trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory to fill a tree of %u nodes",
                           tree->node_count);
-    if (status == TRC_OK && is_leaf(tree->root))
+    if (status == TRC_OK)
+        tree->root = ref_fill(fill, root);
+    if (status == TRC_OK && trc_ref_is_leaf(tree->root))
         root_leaf_fill(fill);
     if (status == TRC_OK)
         status = nodes_fill(fill, task_count, pool);
@@ -334,67 +368,103 @@ static trc_status tree_fill(struct trc_fill *fill, struct trc_pool *pool) {
     return status;
 }
 
+/* Floats of a tree's leaves, but for curves. */
+static size_t leaf_floats(const struct trc_fill *fill, uint32_t slot_count, uint32_t key_count) {
+    if (fill->plan)
+        return (size_t)fill->plan->unit_count * (TRC_BLOCK_UNIT / sizeof(float));
+    return key_count > 1 && fill->from ? fill->from->vertex_floats
+                                       : (size_t)slot_count * TRC_TRIANGLE_FLOATS;
+}
+
+/* Whether leaves are blocks that what they are filled from does not have. */
+static bool needs_plan(const struct trc_fill *fill, uint32_t key_count) {
+    return key_count > 1 && !fill->parts->mesh->shape &&
+           !(fill->from && fill->from->key_count == key_count);
+}
+
 trc_status trc_tree_fill(const struct trc_topology *topology,
                          const struct trc_part_triangle *triangles, const struct box *boxes,
                          uint32_t count, const struct trc_part *parts, uint32_t key_count,
                          struct trc_pool *pool, const atomic_uint *cancel, struct trc_tree *tree) {
-    const trc_status status =
-        tree_alloc(tree, topology->node_count, count, key_count, parts->mesh, NULL);
-    if (status != TRC_OK)
-        return status;
-    tree->root = topology->root;
-    tree->has_pieces = boxes != NULL;
     struct trc_fill fill = {.topology = topology,
                             .triangles = triangles,
                             .boxes = boxes,
                             .parts = parts,
                             .tree = tree,
                             .cancel = cancel};
-    trc_status filled = tree_fill(&fill, pool);
-    if (filled == TRC_OK && fill.has_transparent)
-        filled = trc_tree_mark_see_through(tree);
-    if (filled != TRC_OK)
-        trc_tree_destroy(tree);
-    return filled;
+    struct trc_block_plan plan = {0};
+    trc_status status = TRC_OK;
+    if (needs_plan(&fill, key_count)) {
+        status = trc_block_plan_make(&fill, topology->node_count, topology->root, count, key_count,
+                                     pool, &plan);
+        fill.plan = &plan;
+        fill.known = plan.vertices;
+    }
+    if (status == TRC_OK)
+        status = tree_alloc(tree, topology->node_count, count, key_count, parts->mesh,
+                            leaf_floats(&fill, count, key_count), NULL);
+    if (status == TRC_OK) {
+        tree->has_pieces = boxes != NULL;
+        status = tree_fill(&fill, topology->root, pool);
+        if (status == TRC_OK && fill.has_transparent)
+            status = trc_tree_mark_see_through(tree);
+        if (status != TRC_OK)
+            trc_tree_destroy(tree);
+    }
+    trc_block_plan_destroy(&plan);
+    return status;
 }
 
-static struct trc_slot_vertices *slot_vertices_alloc(uint32_t count) {
-    struct trc_slot_vertices *v = trc_alloc(sizeof *v + count * sizeof v->index[0], 1);
-    if (v)
-        atomic_init(&v->refs, 1);
-    return v;
+/* What a refit knows of slots, or learns for the next: without memory for it, that asks the mesh
+ * again. */
+static void slot_vertices_share(struct trc_fill *fill) {
+    struct trc_tree *tree = fill->tree;
+    const bool is_learnt_alike =
+        trc_tree_has_blocks(fill->from) == trc_tree_has_blocks(tree) && !tree->shape;
+    fill->known = is_learnt_alike ? fill->from->slot_vertices : NULL;
+    if (fill->plan)
+        fill->known = fill->plan->vertices;
+    if (fill->known) {
+        tree->slot_vertices = (struct trc_slot_vertices *)fill->known;
+        atomic_fetch_add(&tree->slot_vertices->refs, 1);
+    } else if (!tree->shape) {
+        tree->slot_vertices = fill->learnt = trc_slot_vertices_alloc(tree->slot_count);
+    }
+    if (tree->slot_vertices)
+        tree->bytes += tree->slot_count * (uint64_t)sizeof tree->slot_vertices->index[0];
 }
 
 trc_status trc_tree_refit(const struct trc_tree *from, const struct trc_part *part,
                           uint32_t key_count, struct trc_pool *pool, const atomic_uint *cancel,
                           struct trc_tree *tree) {
-    const trc_status status =
-        tree_alloc(tree, from->node_count, from->slot_count, key_count, part->mesh, from->slots);
-    if (status != TRC_OK)
-        return status;
-    tree->root = from->root;
-    struct trc_fill fill = {
-        .from = from, .parts = part, .tree = tree, .known = from->slot_vertices, .cancel = cancel};
-    tree->slot_vertices = from->slot_vertices;
-    if (tree->slot_vertices)
-        atomic_fetch_add(&tree->slot_vertices->refs, 1);
-    else if (!tree->shape) /* without memory for it, the next refit asks the mesh again */
-        tree->slot_vertices = fill.learnt = slot_vertices_alloc(from->slot_count);
-    if (tree->slot_vertices)
-        tree->bytes += from->slot_count * (uint64_t)sizeof tree->slot_vertices->index[0];
-    trc_status filled = tree_fill(&fill, pool);
-    if (filled == TRC_OK)
-        filled = trc_tree_copy_see_through(from, tree);
-    if (filled != TRC_OK)
-        trc_tree_destroy(tree);
-    return filled;
+    struct trc_fill fill = {.from = from, .parts = part, .tree = tree, .cancel = cancel};
+    struct trc_block_plan plan = {0};
+    trc_status status = TRC_OK;
+    if (needs_plan(&fill, key_count)) {
+        status = trc_block_plan_make(&fill, from->node_count, from->root, from->slot_count,
+                                     key_count, pool, &plan);
+        fill.plan = &plan;
+    }
+    if (status == TRC_OK)
+        status = tree_alloc(tree, from->node_count, from->slot_count, key_count, part->mesh,
+                            leaf_floats(&fill, from->slot_count, key_count), from->slots);
+    if (status == TRC_OK) {
+        slot_vertices_share(&fill);
+        status = tree_fill(&fill, from->root, pool);
+        if (status == TRC_OK)
+            status = trc_tree_copy_see_through(from, tree);
+        if (status != TRC_OK)
+            trc_tree_destroy(tree);
+    }
+    trc_block_plan_destroy(&plan);
+    return status;
 }
 
 trc_status trc_tree_fill_top(const struct trc_topology *topology,
                              const struct trc_part_triangle *order, uint32_t count,
                              const struct trc_item *items, const struct box *boxes,
                              struct trc_item *items_out, struct trc_tree *tree) {
-    TRC_TRY(tree_alloc(tree, topology->node_count, count, 1, NULL, NULL));
+    TRC_TRY(tree_alloc(tree, topology->node_count, count, 1, NULL, 0, NULL));
     bool has_transparent = false;
     for (uint32_t slot = 0; slot < count; slot++) {
         items_out[slot] = items[order[slot].triangle];
@@ -407,8 +477,8 @@ trc_status trc_tree_fill_top(const struct trc_topology *topology,
         for (uint32_t i = 0; i < TRC_NODE_WIDTH; i++) {
             float lower[3], upper[3];
             const uint32_t ref = children[i];
-            if (is_leaf(ref)) {
-                const struct box *box = &boxes[order[trc_leaf_first(ref)].triangle];
+            if (trc_ref_is_leaf(ref)) {
+                const struct box *box = &boxes[order[trc_ref_index(ref)].triangle];
                 f4_store3(lower, box->lower);
                 f4_store3(upper, box->upper);
             } else if (is_node(ref)) {

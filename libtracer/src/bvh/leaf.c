@@ -136,10 +136,11 @@ static inline const struct trc_part *slot_source(const struct trc_fill *fill, ui
 }
 
 void trc_leaf_prepare(struct trc_fill *fill, uint32_t ref) {
-    const uint32_t first = trc_leaf_first(ref), count = trc_leaf_count(ref);
+    const uint32_t first = trc_leaf_first(fill->tree, ref), count = trc_leaf_count(ref);
+    const bool learns = fill->learnt && !trc_tree_has_blocks(fill->tree);
     for (uint32_t slot = first; !fill->from && slot < first + count; slot++)
         slot_fill(fill, slot);
-    for (uint32_t slot = first; fill->learnt && slot < first + count; slot++) {
+    for (uint32_t slot = first; learns && slot < first + count; slot++) {
         const uint32_t *index;
         (void)slot_source(fill, slot, &index);
         memcpy(fill->learnt->index[slot], index, sizeof fill->learnt->index[slot]);
@@ -182,7 +183,7 @@ static inline void rows_store(float *row, uint32_t count, const struct triangles
 /* The box of a leaf's pieces of curves, as trc_leaf_fill. */
 static bool pieces_bound(const struct trc_fill *fill, uint32_t ref, uint32_t key,
                          float lower_out[3], float upper_out[3]) {
-    const uint32_t first = trc_leaf_first(ref), count = trc_leaf_count(ref);
+    const uint32_t first = trc_ref_index(ref), count = trc_leaf_count(ref);
     f4 lower = f4_set(INFINITY), upper = f4_set(-INFINITY);
     bool is_finite = true;
     for (uint32_t slot = first; slot < first + count; slot++) {
@@ -205,9 +206,9 @@ bool trc_leaf_fill(const struct trc_fill *fill, uint32_t ref, uint32_t key, floa
                    float upper_out[3]) {
     if (fill->tree->shape)
         return pieces_bound(fill, ref, key, lower_out, upper_out);
-    const uint32_t first = trc_leaf_first(ref), count = trc_leaf_count(ref);
+    const uint32_t first = trc_ref_index(ref), count = trc_leaf_count(ref);
     const uint32_t last = count > 4 ? count - 4 : 0;
-    float *v = trc_leaf_vertices(fill->tree, ref, key);
+    float *v = trc_leaf_vertices(fill->tree, ref);
     f4 lower[3], upper[3], sum = f4_set(0.0f);
     trc_fetch((char *)v + PREFETCH_VERTEX_BYTES, count * TRC_TRIANGLE_FLOATS * sizeof *v);
     for (int axis = 0; axis < 3; axis++) {
@@ -236,4 +237,18 @@ bool trc_leaf_fill(const struct trc_fill *fill, uint32_t ref, uint32_t key, floa
     f4_store3(lower_out, box.lower);
     f4_store3(upper_out, box.upper);
     return i4_all(f4_abs(sum) < f4_set(INFINITY));
+}
+
+/* ---- vertices of slots ---- */
+
+struct trc_slot_vertices *trc_slot_vertices_alloc(uint32_t slot_count) {
+    struct trc_slot_vertices *v = trc_alloc(sizeof *v + slot_count * sizeof v->index[0], 1);
+    if (v)
+        atomic_init(&v->refs, 1);
+    return v;
+}
+
+void trc_slot_vertices_release(struct trc_slot_vertices *vertices) {
+    if (vertices && atomic_fetch_sub(&vertices->refs, 1) == 1)
+        trc_free(vertices);
 }

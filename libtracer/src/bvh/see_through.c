@@ -20,8 +20,9 @@ static bool is_see_through(const struct trc_tree *tree, const uint8_t *marks, ui
         return true;
     if (!(ref & TRC_REF_LEAF))
         return marks[ref] == ALL_CHILDREN;
+    const uint32_t first = trc_leaf_first(tree, ref);
     for (uint32_t i = 0; i < trc_leaf_count(ref); i++)
-        if (!slot_is_see_through(tree, trc_leaf_first(ref) + i))
+        if (!slot_is_see_through(tree, first + i))
             return false;
     return true;
 }

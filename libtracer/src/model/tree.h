@@ -7,10 +7,13 @@
  * keys lie in three lines. Nodes stand before their children, so that a backward walk refits.
  *
  * Triangles stand in slots, those of a leaf side by side: its reference has the first and the
- * count. A leaf of n has, for each key, 9 n floats: vertex by axis by slot, without gaps between
- * leaves, since fetching leaves is a good part of an incoherent ray's time. Kernels load 8 slots
- * whatever the count and ignore the lanes beyond it; after the last leaf there is room for that.
- * What a hit needs to know of a slot is kept apart.
+ * count. A leaf of n has 9 n floats: vertex by axis by slot, without gaps between leaves, since
+ * fetching leaves is a good part of an incoherent ray's time. Kernels load 8 slots whatever the
+ * count and ignore the lanes beyond it; after the last leaf there is room for that. What a hit
+ * needs to know of a slot is kept apart.
+ *
+ * In moving trees the triangles of a leaf share their vertices, each of which is there once for
+ * each key: the leaf's reference has the place of its block instead, which has the first slot.
  *
  * All of that is the same for every instruction set, whatever its width, to the bit: trees serve
  * each of them.
@@ -35,8 +38,8 @@
 #define TRC_TRIANGLE_FLOATS 9
 #define TRC_NODE_ALIGNMENT 64 /* of moving trees */
 
-/* A reference: a node's index, or a leaf's first slot with TRC_REF_LEAF and its count - 1 in bits
- * 28-30. */
+/* A reference: a node's index, or a leaf's first slot (where it has a block, the place of that in
+ * units of TRC_BLOCK_UNIT) with TRC_REF_LEAF and its count - 1 in bits 28-30. */
 #define TRC_REF_LEAF 0x80000000u
 #define TRC_REF_INDEX_MASK 0x0fffffffu
 #define TRC_REF_EMPTY 0xffffffffu
@@ -68,6 +71,19 @@ struct trc_packed_boxes {
     uint8_t bytes[3][2][TRC_NODE_WIDTH];
 };
 
+/* A leaf of a moving tree of triangles, at a multiple of TRC_BLOCK_UNIT bytes: corners has for each
+ * of three corners and each triangle the number of its vertex; from the next multiple of 4 bytes on
+ * there are for each key the x of all vertices, y, and z. Kernels load TRC_BLOCK_LOAD vertices at
+ * once, and 8 corners; where there are more vertices, each corner has its own, in order. */
+#define TRC_BLOCK_UNIT 16
+#define TRC_BLOCK_LOAD 16
+#define TRC_BLOCK_VERTICES (3 * TRC_NODE_WIDTH) /* at most */
+struct trc_block {
+    uint32_t first_slot;
+    uint8_t vertex_count;
+    uint8_t corners[]; /* [3][triangles] */
+};
+
 struct trc_slot {
     uint32_t instance; /* word, see above */
     uint32_t triangle; /* of the mesh */
@@ -87,7 +103,8 @@ struct trc_slot_block {
 };
 
 /* Vertices of the triangle in each slot, in the order in which refits meet them: without it, when
- * they are asked of the mesh, a refit takes a fifth longer. */
+ * they are asked of the mesh, a refit takes a fifth longer. Of a block those of its vertices, side
+ * by side from its first slot on. */
 struct trc_slot_vertices {
     atomic_uint refs;
     uint32_t index[][3];
@@ -99,8 +116,9 @@ struct trc_tree {
     uint32_t root; /* reference; TRC_REF_EMPTY for no triangles */
     size_t node_stride;
     uint8_t *nodes;                          /* node_count * node_stride, 32-byte aligned */
-    float *vertices;                         /* slot_count * key_count * 9, and a load beyond;
+    float *vertices;                         /* slot_count * 9, and a load beyond; blocks;
                                                 curves: key by key vertex_count * 4 */
+    size_t vertex_floats;                    /* without the load beyond */
     struct trc_slot_block *slots;            /* slot_count; TLAS: NULL, as vertices are */
     struct trc_slot_vertices *slot_vertices; /* shared by refits of one tree; or NULL */
     const struct trc_item *items;            /* TLAS only, by slot */
@@ -172,18 +190,43 @@ static inline const struct trc_packed_boxes *trc_node_packed(const struct trc_tr
                                              TRC_NODE_CHILDREN_BYTES) +
            key;
 }
-static inline uint32_t trc_leaf_first(uint32_t ref) { return ref & TRC_REF_INDEX_MASK; }
-static inline const struct trc_slot *trc_leaf_slots(const struct trc_tree *t, uint32_t ref) {
-    return t->slots->slots + trc_leaf_first(ref);
+/* Whether the tree's leaves are blocks: it moves, and has triangles. */
+static inline bool trc_tree_has_blocks(const struct trc_tree *t) {
+    return t->key_count > 1 && !t->shape;
 }
+/* Of a leaf, not of a node or no child. */
+static inline bool trc_ref_is_leaf(uint32_t ref) {
+    return ref != TRC_REF_EMPTY && (ref & TRC_REF_LEAF);
+}
+static inline uint32_t trc_ref_index(uint32_t ref) { return ref & TRC_REF_INDEX_MASK; }
 static inline uint32_t trc_leaf_count(uint32_t ref) { return ((ref >> 28) & 7u) + 1u; }
-static inline uint32_t trc_leaf_ref(uint32_t first, uint32_t count) {
-    return TRC_REF_LEAF | (count - 1) << 28 | first;
+static inline uint32_t trc_leaf_ref(uint32_t index, uint32_t count) {
+    return TRC_REF_LEAF | (count - 1) << 28 | index;
 }
-/* 9 * count floats: [vertex][axis][slot]; the next key's follow. */
-static inline float *trc_leaf_vertices(const struct trc_tree *t, uint32_t ref, uint32_t key) {
-    return t->vertices + TRC_TRIANGLE_FLOATS * ((size_t)trc_leaf_first(ref) * t->key_count +
-                                                (size_t)key * trc_leaf_count(ref));
+static inline struct trc_block *trc_leaf_block(const struct trc_tree *t, uint32_t ref) {
+    return (struct trc_block *)((uint8_t *)t->vertices +
+                                (size_t)TRC_BLOCK_UNIT * trc_ref_index(ref));
+}
+/* A leaf's first slot, of any tree; kernels know which kind theirs is. */
+static inline uint32_t trc_leaf_first(const struct trc_tree *t, uint32_t ref) {
+    return trc_tree_has_blocks(t) ? trc_leaf_block(t, ref)->first_slot : trc_ref_index(ref);
+}
+/* Of a leaf without a block. */
+static inline const struct trc_slot *trc_leaf_slots(const struct trc_tree *t, uint32_t ref) {
+    return t->slots->slots + trc_ref_index(ref);
+}
+/* 9 * count floats of a tree at rest: [vertex][axis][slot]. */
+static inline float *trc_leaf_vertices(const struct trc_tree *t, uint32_t ref) {
+    return t->vertices + TRC_TRIANGLE_FLOATS * (size_t)trc_ref_index(ref);
+}
+/* Bytes of a block before its vertices. */
+static inline size_t trc_block_head_bytes(uint32_t triangles) {
+    return (offsetof(struct trc_block, corners) + 3 * triangles + 3) / 4 * 4;
+}
+/* The x of a block's vertices at a key, behind which are y and z. */
+static inline float *trc_block_rows(const struct trc_block *b, uint32_t triangles, uint32_t key) {
+    return (float *)((uint8_t *)b + trc_block_head_bytes(triangles)) +
+           3 * (size_t)b->vertex_count * key;
 }
 
 #endif

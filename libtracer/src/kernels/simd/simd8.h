@@ -24,6 +24,35 @@ TRC_INLINE f8 f8_load_bytes(const uint8_t p[8]) {
     return __builtin_convertvector(b, f8);
 #endif
 }
+TRC_INLINE i8x i8_load_bytes(const uint8_t p[8]) {
+#if defined(__AVX2__)
+    return (i8x)_mm256_cvtepu8_epi32(_mm_loadl_epi64((const __m128i *)p));
+#else
+    typedef uint8_t bytes __attribute__((vector_size(8)));
+    bytes b;
+    memcpy(&b, p, sizeof b);
+    return __builtin_convertvector(b, i8x);
+#endif
+}
+/* In each lane that one of sixteen floats, low before high; beyond 15 any. */
+TRC_INLINE f8 f8_pick(f8 low, f8 high, i8x lane) {
+#if defined(__AVX512VL__)
+    return (f8)_mm256_permutex2var_ps((__m256)low, (__m256i)lane, (__m256)high);
+#elif defined(__AVX2__)
+    const __m256 l = _mm256_permutevar8x32_ps((__m256)low, (__m256i)lane);
+    const __m256 h = _mm256_permutevar8x32_ps((__m256)high, (__m256i)lane);
+    const __m256i is_high = _mm256_slli_epi32((__m256i)lane, 28); /* bit 3 as the sign */
+    return (f8)_mm256_blendv_ps(l, h, _mm256_castsi256_ps(is_high));
+#else
+    float from[16];
+    f8 r;
+    memcpy(from, &low, sizeof low);
+    memcpy(from + 8, &high, sizeof high);
+    for (int i = 0; i < 8; i++)
+        r[i] = from[lane[i] & 15];
+    return r;
+#endif
+}
 TRC_INLINE void f8_store(float *p, f8 v) { memcpy(p, &v, sizeof v); }
 
 #if defined(__AVX__)

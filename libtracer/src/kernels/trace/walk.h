@@ -233,7 +233,7 @@ TRC_INLINE void packet_walk(struct walk *w, struct trc_live mask, bool any, bool
                 TRC_COUNT(nodes, 1);
                 top = node_open(w, ref, &live, any, motion, level, &opened[level], stack, top);
             } else if (!curves && w->tree->is_top) {
-                item_packet(w, &w->tree->items[trc_leaf_first(ref)], live, any);
+                item_packet(w, &w->tree->items[trc_ref_index(ref)], live, any);
                 if (!any)
                     beam_shorten(w, &mask);
             } else if (leaf_rays(w, ref, live, any, motion, curves) && !any) {

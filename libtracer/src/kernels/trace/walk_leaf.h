@@ -41,26 +41,75 @@ struct walk {
     const uint32_t *left;      /* looking back, one instance: those of the packet's rays */
 };
 
-/* ---- packets ---- */
+/* ---- what a leaf has ---- */
 
-/* The leaf's triangles [vertex][axis u, v, z]; in motion: as the group's interval of time begins,
- * and in later as it ends. */
-TRC_INLINE void leaf_corners(const struct walk *w, const float *v, uint32_t count, bool motion,
-                             f8 now[3][3], f8 later[3][3]) {
-    const int order[3] = {w->group->beam.axis.u, w->group->beam.axis.v, w->group->beam.axis.z};
-    const float *e = v + TRC_TRIANGLE_FLOATS * count; /* the next key */
-    for (int corner = 0; corner < 3; corner++)
-        for (int axis = 0; axis < 3; axis++) {
-            const uint32_t at = (uint32_t)(3 * corner + order[axis]) * count;
-            const f8 p = f8_load(v + at);
-            now[corner][axis] = p;
-            if (!motion)
-                continue;
-            const f8 way = f8_load(e + at) - p;
-            now[corner][axis] = p + f8_set(w->group->f_min) * way;
-            later[corner][axis] = p + f8_set(w->group->f_max) * way;
-        }
+/* A leaf on its way through packets. */
+struct leaf {
+    const float *vertices;  /* at rest [vertex][axis][slot]; moving: a block's at the first key */
+    const uint8_t *corners; /* moving: of the block, [corner][slot] */
+    uint32_t vertex_count;  /* moving */
+    uint32_t count;
+    const struct trc_slot *ids;
+    struct trc_precision8 precision; /* see trc_triangle_test */
+    bool filter;                     /* edges is set: rays of one origin, at rest */
+    struct trc_edge_filter edges;
+};
+
+TRC_INLINE void leaf_find(const struct walk *w, uint32_t ref, bool motion, struct leaf *leaf) {
+    leaf->count = trc_leaf_count(ref);
+    if (!motion) {
+        leaf->vertices = trc_leaf_vertices(w->tree, ref);
+        leaf->ids = trc_leaf_slots(w->tree, ref);
+        return;
+    }
+    const struct trc_block *block = trc_leaf_block(w->tree, ref);
+    leaf->vertices = trc_block_rows(block, leaf->count, w->key);
+    leaf->corners = block->corners;
+    leaf->vertex_count = block->vertex_count;
+    leaf->ids = w->tree->slots->slots + block->first_slot;
 }
+
+/* Eight floats between the keys of a block's row. */
+TRC_INLINE f8 row_between(const float *row, const float *next, uint32_t at, f8 f) {
+    const f8 p = f8_load(row + at);
+    return p + f * (f8_load(next + at) - p);
+}
+
+/* The leaf's triangles [vertex][axis u, v, z]; moving: at a place f between the keys. */
+TRC_INLINE void leaf_corners(const struct walk *w, const struct leaf *leaf, bool motion, float f,
+                             f8 out[3][3]) {
+    const uint32_t count = leaf->count;
+    const uint32_t order[3] = {(uint32_t)w->group->beam.axis.u, (uint32_t)w->group->beam.axis.v,
+                               (uint32_t)w->group->beam.axis.z};
+    if (!motion) {
+        for (uint32_t corner = 0; corner < 3; corner++)
+            for (int axis = 0; axis < 3; axis++)
+                out[corner][axis] = f8_load(leaf->vertices + (3 * corner + order[axis]) * count);
+        return;
+    }
+    const uint32_t vertices = leaf->vertex_count;
+    const f8 between = f8_set(f);
+    if (__builtin_expect(vertices > TRC_BLOCK_LOAD, 0)) {
+        for (int axis = 0; axis < 3; axis++) {
+            const float *row = leaf->vertices + order[axis] * vertices, *next = row + 3 * vertices;
+            for (uint32_t corner = 0; corner < 3; corner++)
+                out[corner][axis] = row_between(row, next, corner * count, between);
+        }
+        return;
+    }
+    i8x number[3];
+    for (uint32_t corner = 0; corner < 3; corner++)
+        number[corner] = i8_load_bytes(leaf->corners + corner * count);
+    for (int axis = 0; axis < 3; axis++) {
+        const float *row = leaf->vertices + order[axis] * vertices, *next = row + 3 * vertices;
+        const f8 low = row_between(row, next, 0, between),
+                 high = row_between(row, next, 8, between);
+        for (int corner = 0; corner < 3; corner++)
+            out[corner][axis] = f8_pick(low, high, number[corner]);
+    }
+}
+
+/* ---- packets ---- */
 
 /* Beam cull of the leaf's triangles. */
 TRC_INLINE uint32_t leaf_candidates(const struct walk *w, f8 v[3][3], f8 later[3][3],
@@ -78,19 +127,27 @@ TRC_INLINE uint32_t leaf_candidates(const struct walk *w, f8 v[3][3], f8 later[3
            ((1u << count) - 1u);
 }
 
-/* Broadcasts the triangle of v's first slot, or interpolates it for each ray of chunk i of packet
- * k. */
-TRC_INLINE void lanes_load(const struct walk *w, const float *v, uint32_t count, bool motion, int k,
-                           int i, struct trc_triangle_lanes *tri) {
-    const int order[3] = {w->group->beam.axis.u, w->group->beam.axis.v, w->group->beam.axis.z};
-    const float *e = v + TRC_TRIANGLE_FLOATS * count;
-    const vfloat f = motion ? vf_load(&w->group->of[k].f[i]) : vf_set(0.0f);
-    for (int corner = 0; corner < 3; corner++)
-        for (int axis = 0; axis < 3; axis++) {
-            const uint32_t at = (uint32_t)(3 * corner + order[axis]) * count;
-            const vfloat a = vf_set(v[at]);
-            tri->v[corner][axis] = motion ? a + f * (vf_set(e[at]) - a) : a;
+/* Broadcasts the triangle in a slot, or interpolates it for each ray of chunk i of packet k. */
+TRC_INLINE void lanes_load(const struct walk *w, const struct leaf *leaf, int slot, bool motion,
+                           int k, int i, struct trc_triangle_lanes *tri) {
+    const uint32_t order[3] = {(uint32_t)w->group->beam.axis.u, (uint32_t)w->group->beam.axis.v,
+                               (uint32_t)w->group->beam.axis.z};
+    const uint32_t count = leaf->count, vertices = leaf->vertex_count;
+    for (uint32_t corner = 0; corner < 3; corner++) {
+        if (!motion) {
+            for (int axis = 0; axis < 3; axis++)
+                tri->v[corner][axis] =
+                    vf_set(leaf->vertices[(3 * corner + order[axis]) * count + (uint32_t)slot]);
+            continue;
         }
+        const vfloat f = vf_load(&w->group->of[k].f[i]);
+        const float *p = leaf->vertices + leaf->corners[corner * count + (uint32_t)slot];
+        for (int axis = 0; axis < 3; axis++) {
+            const uint32_t at = order[axis] * vertices;
+            const vfloat a = vf_set(p[at]);
+            tri->v[corner][axis] = a + f * (vf_set(p[at + 3 * vertices]) - a);
+        }
+    }
 }
 
 TRC_INLINE uint32_t slot_instance(const struct walk *w, struct trc_slot slot) {
@@ -166,16 +223,6 @@ TRC_INLINE uint32_t hits_keep(const struct walk *w, int k, int i, vmask hit, vfl
     return vm_bits(keep);
 }
 
-/* A leaf on its way through packets. */
-struct leaf {
-    const float *vertices; /* of all its triangles */
-    uint32_t count;
-    const struct trc_slot *ids;
-    struct trc_precision8 precision; /* see trc_triangle_test */
-    bool filter;                     /* edges is set: rays of one origin, at rest */
-    struct trc_edge_filter edges;
-};
-
 /* Of mask, the rays of packet k that pass the edges of the triangle in a slot, or may. For all
  * chunks, live or not, and all packets before the first test: to branch by masks that are still in
  * the making costs more than it spares. */
@@ -193,7 +240,7 @@ TRC_INLINE uint64_t slot_edges(const struct walk *w, const struct leaf *leaf, in
     }
     for (int i = 0; i < TRC_PACKET_SIZE; i += TRC_WIDTH) {
         if (motion)
-            lanes_load(w, leaf->vertices + slot, leaf->count, true, k, i, tri);
+            lanes_load(w, leaf, slot, true, k, i, tri);
         const vmask near = trc_triangle_near(
             tri, vf_load(&p->o[axis.u][i]), vf_load(&p->o[axis.v][i]), vf_load(&p->o[axis.z][i]),
             vf_load(&g->su[i]), vf_load(&g->sv[i]), maximum->weight_error);
@@ -217,7 +264,7 @@ TRC_INLINE uint64_t slot_packet(struct walk *w, const struct leaf *leaf, int slo
             continue;
         const int i = c * TRC_WIDTH;
         if (motion)
-            lanes_load(w, leaf->vertices + slot, leaf->count, true, k, i, tri);
+            lanes_load(w, leaf, slot, true, k, i, tri);
         TRC_COUNT(triangle_rays, __builtin_popcount(bits));
         vfloat t, bu, bv;
         vmask hit = trc_triangle_test(tri, vf_load(&p->o[axis.u][i]), vf_load(&p->o[axis.v][i]),
@@ -241,13 +288,13 @@ TRC_INLINE uint64_t slot_packet(struct walk *w, const struct leaf *leaf, int slo
 TRC_INLINE bool leaf_packet(struct walk *w, uint32_t ref, struct trc_live mask, bool any,
                             bool motion) {
     const struct trc_group *g = w->group;
-    struct leaf leaf = {.vertices = trc_leaf_vertices(w->tree, ref, w->key),
-                        .count = trc_leaf_count(ref),
-                        .ids = trc_leaf_slots(w->tree, ref),
-                        .filter = !motion && trc_edge_filter_applies(w->packets, g)};
+    struct leaf leaf = {.filter = !motion && trc_edge_filter_applies(w->packets, g)};
     f8 corners[3][3], later[3][3];
     uint64_t found = 0;
-    leaf_corners(w, leaf.vertices, leaf.count, motion, corners, later);
+    leaf_find(w, ref, motion, &leaf);
+    leaf_corners(w, &leaf, motion, g->f_min, corners);
+    if (motion)
+        leaf_corners(w, &leaf, true, g->f_max, later);
     /* The filter has the edges, closer. */
     uint32_t slots =
         leaf_candidates(w, corners, later, leaf.count, motion, !leaf.filter, &leaf.precision);
@@ -260,7 +307,7 @@ TRC_INLINE bool leaf_packet(struct walk *w, uint32_t ref, struct trc_live mask, 
         const struct trc_precision maximum = trc_precision_of(&leaf.precision, slot);
         struct trc_triangle_lanes tri;
         if (!motion)
-            lanes_load(w, leaf.vertices + slot, leaf.count, false, 0, 0, &tri);
+            lanes_load(w, &leaf, slot, false, 0, 0, &tri);
         struct trc_live pass = mask;
         for (int k = 0; k < TRC_WALK_PACKETS; k++)
             if (mask.of[k])
@@ -316,22 +363,13 @@ TRC_INLINE bool ray_keep(struct walk *w, const struct trc_slot *ids, int k, int 
 TRC_INLINE bool leaf_single(struct walk *w, uint32_t ref, int k, int ray, bool any, bool motion) {
     struct trc_packet *p = &w->packets[k];
     const struct trc_sheared *g = &w->group->of[k];
-    const uint32_t count = trc_leaf_count(ref);
-    const struct trc_slot *ids = trc_leaf_slots(w->tree, ref);
     const struct trc_shear axis = w->group->beam.axis;
-    const int order[3] = {axis.u, axis.v, axis.z};
-    const float *v = trc_leaf_vertices(w->tree, ref, w->key);
-    const float *e = v + TRC_TRIANGLE_FLOATS * count;
+    struct leaf leaf;
     struct trc_triangle8 tri;
-    for (int corner = 0; corner < 3; corner++)
-        for (int a = 0; a < 3; a++) {
-            const uint32_t at = (uint32_t)(3 * corner + order[a]) * count;
-            tri.v[corner][a] = f8_load(v + at);
-            if (motion) {
-                const f8 way = f8_load(e + at) - tri.v[corner][a];
-                tri.v[corner][a] = tri.v[corner][a] + f8_set(g->f[ray]) * way;
-            }
-        }
+    leaf_find(w, ref, motion, &leaf);
+    leaf_corners(w, &leaf, motion, motion ? g->f[ray] : 0.0f, tri.v);
+    const uint32_t count = leaf.count;
+    const struct trc_slot *ids = leaf.ids;
     f8 t, bu, bv;
     TRC_COUNT(single_leaves, 1);
     TRC_COUNT(single_triangles, count);

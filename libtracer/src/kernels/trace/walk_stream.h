@@ -124,7 +124,8 @@ TRC_INLINE uint32_t stream_node(const struct walk *w, uint32_t node, const struc
 #define CACHE_LINE 64
 #define NODE_LINES ((TRC_NODE_CHILDREN_BYTES + TRC_NODE_BOUNDS_BYTES + CACHE_LINE - 1) / CACHE_LINE)
 #define MOVING_NODE_LINES 3 /* with two keys */
-#define LEAF_LINES 2        /* a leaf is of three triangles, mostly */
+#define MOVING_LEAF_LINES 3
+#define LEAF_LINES 2 /* a leaf is of three triangles, mostly */
 /* Asks for the memory of what waits on a stack; a TLAS is small. */
 TRC_INLINE void ref_prefetch(const struct walk *w, uint32_t ref, bool any, bool motion,
                              bool curves) {
@@ -135,12 +136,15 @@ TRC_INLINE void ref_prefetch(const struct walk *w, uint32_t ref, bool any, bool 
         __builtin_prefetch(trc_leaf_slots(w->tree, ref));
         return;
     }
-    const char *at = is_leaf ? (const char *)trc_leaf_vertices(w->tree, ref, w->key)
-                             : (const char *)trc_node_children(w->tree, ref);
+    const char *at = (const char *)trc_node_children(w->tree, ref);
+    if (is_leaf)
+        at = motion ? (const char *)trc_leaf_block(w->tree, ref)
+                    : (const char *)trc_leaf_vertices(w->tree, ref);
     const int node_lines = motion ? MOVING_NODE_LINES : NODE_LINES;
-    for (int line = 0; line < (is_leaf ? LEAF_LINES : node_lines); line++)
+    const int leaf_lines = motion ? MOVING_LEAF_LINES : LEAF_LINES;
+    for (int line = 0; line < (is_leaf ? leaf_lines : node_lines); line++)
         __builtin_prefetch(at + line * CACHE_LINE);
-    if (is_leaf && !any)
+    if (is_leaf && !any && !motion)
         __builtin_prefetch(trc_leaf_slots(w->tree, ref));
 }
 
@@ -172,7 +176,7 @@ TRC_INLINE void stream_item(struct walk *w, uint32_t ref, struct stream *s, uint
         const uint32_t ray = s->ray[__builtin_ctz(m)];
         live.of[ray / TRC_PACKET_SIZE] |= 1ull << ray % TRC_PACKET_SIZE;
     }
-    item_packet(w, &w->tree->items[trc_leaf_first(ref)], live, any);
+    item_packet(w, &w->tree->items[trc_ref_index(ref)], live, any);
     for (uint32_t m = rays; m; m &= m - 1) {
         const int i = __builtin_ctz(m);
         const uint32_t k = s->ray[i] / TRC_PACKET_SIZE, ray = s->ray[i] % TRC_PACKET_SIZE;
