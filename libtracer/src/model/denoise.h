@@ -88,18 +88,19 @@ struct trc_denoise_job {
  * wider wavelets fade as samples gather, and the part of the plain pixel that stays follows the
  * estimated error. */
 
-/* Pixels of a tile, and around it: of three wavelets, and smoothed estimates. */
+/* Pixels of a row of a strip, and around the strip: of three wavelets, and smoothed estimates. */
 #define TRC_PREVIEW_WIDTH 128
-#define TRC_PREVIEW_HEIGHT 64
 #define TRC_PREVIEW_HALO 10
-/* Planes of floats, rows of so many; the tile begins at TRC_PREVIEW_LEFT. */
+/* Planes of floats, rows of so many; the strip begins at TRC_PREVIEW_LEFT. Each row has the place
+ * of the one so many before it. What is added to a plane keeps rows of planes in sets of their own
+ * in a cache. */
 #define TRC_PREVIEW_LEFT 16
 #define TRC_PREVIEW_STRIDE (TRC_PREVIEW_WIDTH + 2 * TRC_PREVIEW_LEFT)
-#define TRC_PREVIEW_ROWS (TRC_PREVIEW_HEIGHT + 2 * TRC_PREVIEW_HALO)
-#define TRC_PREVIEW_FLOATS (TRC_PREVIEW_ROWS * TRC_PREVIEW_STRIDE)
+#define TRC_PREVIEW_ROWS 16
+#define TRC_PREVIEW_FLOATS (TRC_PREVIEW_ROWS * TRC_PREVIEW_STRIDE + 48)
 
 /* What is in the planes: sums of a pixel's samples, from which the filter makes means first; the
- * colour becomes what is shown. */
+ * colour becomes what is shown, TRC_PREVIEW_HALO rows later. */
 enum trc_preview_plane {
     TRC_PREVIEW_COLOR = 0,  /* and alpha */
     TRC_PREVIEW_ALBEDO = 4, /* three */
@@ -109,12 +110,13 @@ enum trc_preview_plane {
     TRC_PREVIEW_HALF_COUNT, /* samples of the first half; 0: there are no halves */
     TRC_PREVIEW_COUNT,      /* samples of all */
     TRC_PREVIEW_INPUTS,
-    TRC_PREVIEW_PLANES = TRC_PREVIEW_INPUTS + 16 /* the others are the filter's own */
+    TRC_PREVIEW_PLANES = TRC_PREVIEW_INPUTS + 20 /* the others are the filter's own */
 };
 
-/* Where the tile's pixel x, y is in a plane. */
+/* Where the strip's pixel x, y is in a plane; y is -2 * TRC_PREVIEW_HALO at least. */
 static inline int trc_preview_at(int x, int y) {
-    return (y + TRC_PREVIEW_HALO) * TRC_PREVIEW_STRIDE + x + TRC_PREVIEW_LEFT;
+    return (y + 2 * TRC_PREVIEW_ROWS) % TRC_PREVIEW_ROWS * TRC_PREVIEW_STRIDE + x +
+           TRC_PREVIEW_LEFT;
 }
 
 #endif

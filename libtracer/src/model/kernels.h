@@ -62,9 +62,10 @@ struct trc_kernels {
     /* Bytes of scratch memory a job of reconstruction needs, and the job; never fails. */
     size_t (*denoise_memory_bytes)(void);
     void (*denoise_tile)(const struct trc_denoise_job *job);
-    /* Quick reconstruction of a tile, in place: memory has TRC_PREVIEW_PLANES planes, the inputs
-     * filled in; 64-byte aligned. exposure: a factor of the colour. Never fails. */
-    void (*preview_filter)(float *memory, float exposure);
+    /* Quick reconstruction of a strip, row by row: memory has TRC_PREVIEW_PLANES planes, the inputs
+     * of row y filled in, from -TRC_PREVIEW_HALO on; row y - TRC_PREVIEW_HALO is done then. 64-byte
+     * aligned. exposure: a factor of the colour. Never fails. */
+    void (*preview_filter)(float *memory, int y, float exposure);
     /* trc_query_*: arguments already validated; chunk [begin, end) of the arrays. packet_size
      * resolved. order: of the chunk's rays, less begin, with api/ray_order.h's room behind, or
      * NULL. */

@@ -62,6 +62,6 @@ size_t trc_denoise_memory_bytes(void);
 void trc_denoise_tile(const struct trc_denoise_job *job);
 
 /* The quick filter. (kernels/filter/preview.c) */
-void trc_preview_filter(float *memory, float exposure);
+void trc_preview_filter(float *memory, int y, float exposure);
 
 #endif

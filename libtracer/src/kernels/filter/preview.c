@@ -1,4 +1,8 @@
-/* The quick filter of model/denoise.h, of one tile's planes. */
+/* The quick filter of model/denoise.h.
+ *
+ * Rows go through all of it one after the other, each step as many rows behind the newest one as
+ * those around it reach that it needs: what a strip is filtered in stays in the cache, whatever its
+ * height. */
 #include "kernels/filter/filter.h"
 
 /* Wavelets, of steps of 1, 2 and 4 pixels. */
@@ -26,13 +30,12 @@ static const float fade_begin[LEVELS] = {0.0f, 16.0f, 4.0f},
 /* Of pixels without samples, which are unlike all others. */
 #define NO_DEPTH -1e4f
 
-#define AT(x, y) trc_preview_at(x, y)
-#define STRIDE TRC_PREVIEW_STRIDE
-
 struct planes {
     float *color, *albedo, *normal, *depth, *half, *half_count, *count;
-    float *light[2][4], *light_mean, *variance[2], *smooth, *slope, *own, *first_variance;
-    float *estimate;
+    /* [level & 1]: what a wavelet begins with, the next one's else. */
+    float *light[2][4], *light_mean[2], *variance[2];
+    float *steepness, *slope, *own, *first_variance;
+    float *estimate[2], *columns[2]; /* variance, error */
 };
 
 static struct planes planes_of(float *memory) {
@@ -46,34 +49,42 @@ static struct planes planes_of(float *memory) {
         .count = memory + TRC_PREVIEW_COUNT * TRC_PREVIEW_FLOATS,
     };
     float *next = memory + TRC_PREVIEW_INPUTS * TRC_PREVIEW_FLOATS;
-    for (int k = 0; k < 2; k++) {
-        for (int c = 0; c < 4; c++, next += TRC_PREVIEW_FLOATS)
-            p.light[k][c] = next;
-        p.variance[k] = next;
-        next += TRC_PREVIEW_FLOATS;
-    }
-    float **const others[] = {&p.light_mean, &p.smooth,         &p.slope,
-                              &p.own,        &p.first_variance, &p.estimate};
-    for (size_t i = 0; i < sizeof others / sizeof *others; i++, next += TRC_PREVIEW_FLOATS)
-        *others[i] = next;
+    float **const own[] = {&p.light[0][0],   &p.light[0][1],   &p.light[0][2], &p.light[0][3],
+                           &p.light[1][0],   &p.light[1][1],   &p.light[1][2], &p.light[1][3],
+                           &p.light_mean[0], &p.light_mean[1], &p.variance[0], &p.variance[1],
+                           &p.steepness,     &p.slope,         &p.own,         &p.first_variance,
+                           &p.estimate[0],   &p.estimate[1],   &p.columns[0],  &p.columns[1]};
+    _Static_assert(sizeof own / sizeof *own == TRC_PREVIEW_PLANES - TRC_PREVIEW_INPUTS,
+                   "a plane for each");
+    for (size_t i = 0; i < sizeof own / sizeof *own; i++, next += TRC_PREVIEW_FLOATS)
+        *own[i] = next;
     return p;
+}
+
+/* Rows a step above, at, and a step below one. */
+struct rows {
+    int at[3];
+};
+static struct rows rows_around(int y, int step) {
+    return (struct rows){
+        {trc_preview_at(0, y - step), trc_preview_at(0, y), trc_preview_at(0, y + step)}};
 }
 
 static vfloat albedo_at(const struct planes *p, int c, int at) {
     return vf_load(p->albedo + c * TRC_PREVIEW_FLOATS + at) + vf_set(LEAST_ALBEDO);
 }
 
-/* Calls body for vectors of the tile and as many pixels around it. */
-#define FOR_PIXELS(margin, at)                                                        \
-    for (int y_ = -(margin); y_ < TRC_PREVIEW_HEIGHT + (margin); y_++)                \
-        for (int at = AT(0, y_) - ((margin) + TRC_WIDTH - 1) / TRC_WIDTH * TRC_WIDTH; \
-             at < AT(TRC_PREVIEW_WIDTH + (margin), y_); at += TRC_WIDTH)
+/* Vectors of a row of the strip, and of as many pixels beside it: x of the first. */
+#define FOR_ROW(margin, x)                                            \
+    for (int x = -((margin) + TRC_WIDTH - 1) / TRC_WIDTH * TRC_WIDTH; \
+         x < TRC_PREVIEW_WIDTH + (margin); x += TRC_WIDTH)
 
-static vfloat box(const float *in, int at) {
+/* The mean of three by three pixels. */
+static vfloat box(const float *in, const struct rows *rows, int x) {
     vfloat sum = vf_set(0.0f);
-    for (int j = -1; j <= 1; j++)
+    for (int j = 0; j < 3; j++)
         for (int i = -1; i <= 1; i++)
-            sum = sum + vf_load(in + at + j * STRIDE + i);
+            sum = sum + vf_load(in + rows->at[j] + x + i);
     return sum * vf_set(1.0f / 9.0f);
 }
 
@@ -120,8 +131,9 @@ static void prepare_means(const struct planes *p, int at, float exposure) {
     vf_store(p->depth + at, vf_select(some, vf_log1p(vf_load(p->depth + at)), vf_set(NO_DEPTH)));
 }
 
-static void prepare_light(const struct planes *p, float exposure) {
-    FOR_PIXELS(TRC_PREVIEW_HALO, at) {
+static void prepare_light(const struct planes *p, int y, float exposure) {
+    FOR_ROW(TRC_PREVIEW_HALO, x) {
+        const int at = trc_preview_at(x, y);
         const vfloat deviation = change_at(p, at, exposure);
         prepare_means(p, at, exposure);
         vfloat mean = vf_set(0.0f), albedo_mean = vf_set(0.0f);
@@ -133,7 +145,7 @@ static void prepare_light(const struct planes *p, float exposure) {
             albedo_mean = albedo_mean + albedo;
         }
         vf_store(p->light[0][3] + at, vf_load(p->color + 3 * TRC_PREVIEW_FLOATS + at));
-        vf_store(p->light_mean + at, mean * vf_set(1.0f / 3.0f));
+        vf_store(p->light_mean[0] + at, mean * vf_set(1.0f / 3.0f));
         const vfloat change = deviation * vf_set(3.0f) / albedo_mean;
         vf_store(p->first_variance + at, change * change);
         vf_store(p->own + at, vf_set(1.0f));
@@ -141,18 +153,20 @@ static void prepare_light(const struct planes *p, float exposure) {
 }
 
 /* Pixels without halves have the variance of what is around them. */
-static void prepare_variance(const struct planes *p) {
-    FOR_PIXELS(TRC_PREVIEW_HALO - 1, at) {
+static void prepare_variance(const struct planes *p, int y) {
+    const struct rows rows = rows_around(y, 1);
+    FOR_ROW(TRC_PREVIEW_HALO - 1, x) {
+        const int at = rows.at[1] + x;
         const vmask without = without_halves(p, at);
         if (!vm_any(without)) {
             vf_store(p->variance[0] + at, vf_load(p->first_variance + at));
             continue;
         }
-        const vfloat mean = box(p->light_mean, at);
+        const vfloat mean = box(p->light_mean[0], &rows, x);
         vfloat square = vf_set(0.0f);
-        for (int j = -1; j <= 1; j++)
+        for (int j = 0; j < 3; j++)
             for (int i = -1; i <= 1; i++) {
-                const vfloat apart = vf_load(p->light_mean + at + j * STRIDE + i) - mean;
+                const vfloat apart = vf_load(p->light_mean[0] + rows.at[j] + x + i) - mean;
                 square = square + apart * apart;
             }
         const vfloat variance =
@@ -163,19 +177,22 @@ static void prepare_variance(const struct planes *p) {
 }
 
 /* How fast depth changes from pixel to pixel on the flatter sides. */
-static void prepare_slope(const struct planes *p) {
-    FOR_PIXELS(TRC_PREVIEW_HALO - 1, at) {
-        const vfloat depth = vf_load(p->depth + at);
-        vfloat slope = vf_set(0.0f);
-        for (int axis = 0; axis < 2; axis++) {
-            const int step = axis ? STRIDE : 1;
-            slope = slope + vf_min(vf_abs(vf_load(p->depth + at + step) - depth),
-                                   vf_abs(vf_load(p->depth + at - step) - depth));
-        }
-        vf_store(p->smooth + at, slope);
+static void prepare_steepness(const struct planes *p, int y) {
+    const struct rows rows = rows_around(y, 1);
+    FOR_ROW(TRC_PREVIEW_HALO - 1, x) {
+        const float *depths = p->depth + x;
+        const vfloat depth = vf_load(depths + rows.at[1]);
+        const vfloat across = vf_min(vf_abs(vf_load(depths + rows.at[1] + 1) - depth),
+                                     vf_abs(vf_load(depths + rows.at[1] - 1) - depth));
+        const vfloat along = vf_min(vf_abs(vf_load(depths + rows.at[2]) - depth),
+                                    vf_abs(vf_load(depths + rows.at[0]) - depth));
+        vf_store(p->steepness + rows.at[1] + x, across + along);
     }
-    FOR_PIXELS(TRC_PREVIEW_HALO - 2, at)
-    vf_store(p->slope + at, box(p->smooth, at));
+}
+static void prepare_slope(const struct planes *p, int y) {
+    const struct rows rows = rows_around(y, 1);
+    FOR_ROW(TRC_PREVIEW_HALO - 2, x)
+    vf_store(p->slope + rows.at[1] + x, box(p->steepness, &rows, x));
 }
 
 /* ---- wavelets ---- */
@@ -185,19 +202,22 @@ struct center {
     vfloat light, normal[3], depth, per_light, slope;
 };
 
-static struct center center_at(const struct planes *p, int at) {
-    struct center c = {.light = vf_load(p->light_mean + at),
+static struct center center_at(const struct planes *p, int level, const struct rows *near, int x) {
+    const int at = near->at[1] + x;
+    struct center c = {.light = vf_load(p->light_mean[level & 1] + at),
                        .depth = vf_load(p->depth + at),
                        .slope = vf_load(p->slope + at)};
     for (int k = 0; k < 3; k++)
         c.normal[k] = vf_load(p->normal + k * TRC_PREVIEW_FLOATS + at);
-    c.per_light = vf_set(1.0f) / (vf_sqrt(vf_load(p->smooth + at)) * vf_set(LIGHT_WIDTH) +
-                                  vf_set(LEAST_LIGHT_WIDTH));
+    c.per_light =
+        vf_set(1.0f) / (vf_sqrt(box(p->variance[level & 1], near, x)) * vf_set(LIGHT_WIDTH) +
+                        vf_set(LEAST_LIGHT_WIDTH));
     return c;
 }
 
-static vfloat weight_at(const struct planes *p, const struct center *c, int q, vfloat per_depth) {
-    vfloat apart = vf_abs(vf_load(p->light_mean + q) - c->light) * c->per_light +
+static vfloat weight_at(const struct planes *p, int level, const struct center *c, int q,
+                        vfloat per_depth) {
+    vfloat apart = vf_abs(vf_load(p->light_mean[level & 1] + q) - c->light) * c->per_light +
                    vf_abs(vf_load(p->depth + q) - c->depth) * per_depth;
     vfloat normal2 = vf_set(0.0f);
     for (int k = 0; k < 3; k++) {
@@ -224,7 +244,10 @@ static void keep_pixels(const struct planes *p, int level, int at) {
     vf_store(p->variance[~level & 1] + at, vf_load(p->variance[level & 1] + at));
 }
 
-static void filter_pixels(const struct planes *p, int level, int at) {
+/* near, far: the rows around, and those that the wavelet takes. */
+static void filter_pixels(const struct planes *p, int level, const struct rows *near,
+                          const struct rows *far, int x) {
+    const int at = near->at[1] + x;
     const vfloat rest = rest_of(p, level, at);
     if (!vm_any(vf_gt(rest, vf_set(0.0f)))) {
         keep_pixels(p, level, at);
@@ -232,7 +255,7 @@ static void filter_pixels(const struct planes *p, int level, int at) {
     }
     float *const *in = p->light[level & 1], *const *out = p->light[~level & 1];
     const float *variance = p->variance[level & 1];
-    const struct center center = center_at(p, at);
+    const struct center center = center_at(p, level, near, x);
     vfloat sums[4], total = vf_set(0.25f), noise = vf_set(0.0625f) * vf_load(variance + at);
     for (int c = 0; c < 4; c++)
         sums[c] = vf_set(0.25f) * vf_load(in[c] + at);
@@ -245,10 +268,10 @@ static void filter_pixels(const struct planes *p, int level, int at) {
         for (int i = -1; i <= 1; i++) {
             if (!i && !j)
                 continue;
-            const int q = at + step * (j * STRIDE + i);
+            const int q = far->at[j + 1] + x + step * i;
             const bool corner = i && j;
-            const vfloat weight =
-                weight_at(p, &center, q, per_depth[corner]) * vf_set(corner ? 0.0625f : 0.125f);
+            const vfloat weight = weight_at(p, level, &center, q, per_depth[corner]) *
+                                  vf_set(corner ? 0.0625f : 0.125f);
             for (int c = 0; c < 4; c++)
                 sums[c] = sums[c] + weight * vf_load(in[c] + q);
             total = total + weight;
@@ -273,29 +296,30 @@ static int margin_of(int level) {
     return margin;
 }
 
-static void filter_level(const struct planes *p, int level) {
+static void filter_row(const struct planes *p, int level, int y) {
     const int margin = margin_of(level);
-    FOR_PIXELS(margin, at)
-    vf_store(p->smooth + at, box(p->variance[level & 1], at));
-    FOR_PIXELS(margin, at)
-    filter_pixels(p, level, at);
+    const struct rows near = rows_around(y, 1), far = rows_around(y, 1 << level);
     float *const *light = p->light[~level & 1];
-    if (level + 1 < LEVELS)
-        FOR_PIXELS(margin, at)
-    vf_store(p->light_mean + at,
-             (vf_load(light[0] + at) + vf_load(light[1] + at) + vf_load(light[2] + at)) *
-                 vf_set(1.0f / 3.0f));
+    FOR_ROW(margin, x)
+    filter_pixels(p, level, &near, &far, x);
+    FOR_ROW(margin, x) {
+        const int at = near.at[1] + x;
+        vf_store(p->light_mean[~level & 1] + at,
+                 (vf_load(light[0] + at) + vf_load(light[1] + at) + vf_load(light[2] + at)) *
+                     vf_set(1.0f / 3.0f));
+    }
 }
 
 /* ---- how much of it is kept ---- */
 
 /* Sums of five estimates above each other, and of five such sums side by side. */
-static void sum_columns(const float *estimate, float *columns) {
-    FOR_PIXELS(2, at) {
-        vfloat sum = vf_load(estimate + at);
+static void sum_columns(const float *estimate, float *columns, int y) {
+    FOR_ROW(2, x) {
+        vfloat sum = vf_load(estimate + trc_preview_at(x, y));
         for (int j = 1; j <= 2; j++)
-            sum = sum + vf_load(estimate + at + j * STRIDE) + vf_load(estimate + at - j * STRIDE);
-        vf_store(columns + at, sum);
+            sum = sum + vf_load(estimate + trc_preview_at(x, y + j)) +
+                  vf_load(estimate + trc_preview_at(x, y - j));
+        vf_store(columns + trc_preview_at(x, y), sum);
     }
 }
 static vfloat around(const float *columns, int at) {
@@ -306,10 +330,11 @@ static vfloat around(const float *columns, int at) {
 }
 
 /* Estimates of the plain pixel's variance and the filtered one's error, over the light there,
- * squared: into smooth and estimate. Light gets its albedo again. */
-static void estimate(const struct planes *p) {
+ * squared. Light gets its albedo again. */
+static void estimate(const struct planes *p, int y) {
     float *const *light = p->light[LEVELS & 1];
-    FOR_PIXELS(2, at) {
+    FOR_ROW(2, x) {
+        const int at = trc_preview_at(x, y);
         vfloat change2 = vf_set(0.0f), mean = vf_set(0.0f), albedo_mean = vf_set(0.0f);
         for (int c = 0; c < 3; c++) {
             const vfloat albedo = albedo_at(p, c, at), clean = vf_load(light[c] + at) * albedo;
@@ -326,20 +351,20 @@ static void estimate(const struct planes *p) {
         const vfloat variance =
             vf_min(vf_load(p->first_variance + at) * scale * unit, vf_set(MOST_ERROR));
         const vfloat own = vf_set(1.0f) - vf_set(2.0f) * vf_load(p->own + at);
-        vf_store(p->smooth + at, variance);
-        vf_store(p->estimate + at,
+        vf_store(p->estimate[0] + at, variance);
+        vf_store(p->estimate[1] + at,
                  vf_min(change2 * third * unit, vf_set(MOST_ERROR)) - variance * own);
     }
 }
 
-static void blend(const struct planes *p) {
+static void blend(const struct planes *p, int y) {
     float *const *light = p->light[LEVELS & 1];
-    estimate(p);
-    sum_columns(p->smooth, p->variance[0]);
-    sum_columns(p->estimate, p->variance[1]);
-    FOR_PIXELS(0, at) {
-        const vfloat variance = around(p->variance[0], at);
-        const vfloat error = vf_max(around(p->variance[1], at), vf_set(0.0f));
+    for (int k = 0; k < 2; k++)
+        sum_columns(p->estimate[k], p->columns[k], y);
+    FOR_ROW(0, x) {
+        const int at = trc_preview_at(x, y);
+        const vfloat variance = around(p->columns[0], at);
+        const vfloat error = vf_max(around(p->columns[1], at), vf_set(0.0f));
         const vfloat kept = vf_set(FAVOR) * variance / (variance + error + vf_set(1e-12f));
         const vfloat part =
             vf_select(without_halves(p, at), vf_set(1.0f), vf_min(kept, vf_set(1.0f)));
@@ -351,12 +376,19 @@ static void blend(const struct planes *p) {
     }
 }
 
-void trc_preview_filter(float *memory, float exposure) {
+void trc_preview_filter(float *memory, int y, float exposure) {
     const struct planes p = planes_of(memory);
-    prepare_light(&p, exposure);
-    prepare_variance(&p);
-    prepare_slope(&p);
-    for (int level = 0; level < LEVELS; level++)
-        filter_level(&p, level);
-    blend(&p);
+    prepare_light(&p, y, exposure);
+    prepare_variance(&p, y - 1);
+    prepare_steepness(&p, y - 1);
+    prepare_slope(&p, y - 2);
+    for (int level = 0, behind = 1; level < LEVELS; level++) {
+        behind += 1 << level;
+        if (y - behind >= -margin_of(level))
+            filter_row(&p, level, y - behind);
+    }
+    if (y - TRC_PREVIEW_HALO + 2 >= -2)
+        estimate(&p, y - TRC_PREVIEW_HALO + 2);
+    if (y - TRC_PREVIEW_HALO >= 0)
+        blend(&p, y - TRC_PREVIEW_HALO);
 }
