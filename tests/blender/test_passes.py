@@ -186,6 +186,9 @@ def test_velvet(blender):
     assert unlit["visible_diffuse"][0] == pytest.approx(unlit["visible_diffuse"][1], rel=0.01)
 
 
+HAIR_COLORS = {'COLOR': {"Color": (0.05, 0.2, 0.4), "Roughness": 0.6}, 'MELANIN': {"Melanin": 0.5}}
+
+
 def inside_hair():
     """{(model, parametrization): passes} of a ball of Principled Hair by both."""
     import bpy
@@ -197,7 +200,7 @@ def inside_hair():
             if model == 'HUANG':
                 continue
             settings = {}
-        for parametrization, inputs in (('COLOR', {"Color": (0.05, 0.2, 0.4)}), ('MELANIN', {"Melanin": 0.5})):
+        for parametrization, inputs in HAIR_COLORS.items():
             scenes.empty(size=(32, 24))
             scenes.camera()
             scenes.sphere(material=scenes.material("Hair", "ShaderNodeBsdfHairPrincipled",

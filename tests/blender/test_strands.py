@@ -549,7 +549,8 @@ def inside_bounces():
 
 
 def inside_ellipses():
-    """Curves of Huang's model that are flat across, turned and with normals of their own: {name: both}."""
+    """Curves of Huang's model that are flat across, turned and with normals of their own: {name: both}. Turned, by
+    their colour, too."""
     import bpy
     import scenes
     scenes.empty(size=(64, 48))
@@ -565,7 +566,10 @@ def inside_ellipses():
     for shape, turn in itertools.product(('THICK', 'RIBBONS'), ((0.0, 0.0, 0.0), (0.4, 0.9, -0.5))):
         bpy.context.scene.cycles_curves.shape = shape
         made.rotation_euler = turn
-        pictures[f"{shape} turned by {turn}"] = _both()
+        names = ("Combined", "GlossCol") if any(turn) else ("Combined",)
+        bpy.context.view_layer.use_pass_glossy_color = any(turn)
+        for name, both in scenes.passes_by_both(names, SAMPLES).items():
+            pictures[f"{shape} turned by {turn}: {name}"] = tuple(each[..., :3] for each in both)
     return pictures
 
 

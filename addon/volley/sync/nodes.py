@@ -368,8 +368,7 @@ def _principled_hair(walker, node, sockets):
     own."""
     def numbers(*names):
         return {name.lower().replace(" ", "_"): sockets.get('f', name) for name in names}
-    values = numbers("Melanin", "Melanin Redness", "Roughness", "Radial Roughness", "IOR", "Offset", "Random Color",
-                     "Random Roughness")
+    values = numbers("Melanin", "Melanin Redness", "Roughness", "IOR", "Offset", "Random Color", "Random Roughness")
     values.update(color=sockets.get('c', "Color"), tint=sockets.get('c', "Tint"),
                   absorption=sockets.get('v', "Absorption Coefficient"),
                   random=sockets.get('f', "Random") if sockets.is_linked("Random") else strand_random(walker),
@@ -385,7 +384,7 @@ def _principled_hair(walker, node, sockets):
                       transmission=sockets.get('f', "TT lobe"), second_reflection=sockets.get('f', "TRT lobe"))
     else:
         kind = NodeType.PRINCIPLED_HAIR
-        values.update(numbers("Coat"))
+        values.update(numbers("Radial Roughness", "Coat"))
         if HAS_HAIR_ALBEDO:
             mode |= PrincipledHairMode.ALBEDO
     return {"BSDF": Value('s', walker.emit(kind, arranged(kind, values), mode), 0)}

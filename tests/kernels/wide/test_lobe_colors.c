@@ -296,6 +296,66 @@ static void multiple_glass_transmits_its_color(void **state) {
     }
 }
 
+/* ---- hair ---- */
+
+/* Chiang et al. 2016, equation 9: what a strand of that roughness absorbs to have a colour. */
+static double absorption_of(double color, double roughness) {
+    const double terms[] = {5.969, -0.215, 2.532, -10.73, 5.574, 0.245};
+    double scale = 0.0, power = 1.0;
+    for (int i = 0; i < 6; i++, power *= roughness)
+        scale += terms[i] * power;
+    return pow(log(color) / scale, 2.0);
+}
+
+/* The part of light that a smooth round strand gives back, which it meets at that cosine, cos_t
+ * beneath its surface; sin_o: along it. */
+static double strand_gives(double cosine, double sin_o, double ior, double absorption) {
+    const double cos_t = sqrt(1.0 - (1.0 - cosine * cosine) / (ior * ior));
+    const double s = (cosine - ior * cos_t) / (cosine + ior * cos_t),
+                 p = (cos_t - ior * cosine) / (cos_t + ior * cosine);
+    const double f = 0.5 * (s * s + p * p), sin_t = sin_o / ior;
+    const double left = exp(-2.0 * absorption * cos_t / (1.0 - sin_t * sin_t));
+    return f + (1.0 - f) * (1.0 - f) * left / (1.0 - f * left);
+}
+
+/* By the colours of Huang's hair: the roughness says how dark a colour is; of a strand that is an
+ * ellipse across, the place on its width is taken along its axes (Cycles). */
+static void huang_hair_has_its_color(void **state) {
+    (void)state;
+    static const float ones[3] = {1.0f, 1.0f, 1.0f};
+    static const struct trc_snapshot curves = {.features = TRC_FEATURE_CURVES};
+    double worst = 0.0;
+    for (int n = 0; n < 3 * 2 * 5; n++) {
+        const double roughness = 0.1 + 0.3 * (n / 10), off = 0.2 * (n % 5) - 0.4,
+                     up = sqrt(1.0 - off * off);
+        const bool is_flat = n / 5 % 2;
+        struct model m = huang_hair(0.0f, (float)roughness, is_flat ? 0.8f : 1.0f, ones);
+        struct trc_registers regs;
+        struct trc_surface s;
+        struct trc_lobes l;
+        vvec3 albedo[3];
+        memset(&regs, 0, sizeof regs);
+        m.material.leaves[0].mode = TRC_PIGMENT_COLOR;
+        set3(&m, TRC_AT(HUANG_HAIR, color), tint[0], tint[1], tint[2]);
+        set3(&m, TRC_AT(HUANG_HAIR, tangent), 0.0f, 1.0f, 0.0f);
+        set3(&m, TRC_AT(HUANG_HAIR, major), 0.8f, 0.0f, 0.6f);
+        point(&s, wide(0.0, 0.6, 0.8), &m);
+        s.snapshot = &curves;
+        s.ng = s.n = wide(off, 0.0, up);
+        trc_lobes_setup(material_of(&m), &s, &regs, vf_zero(), &l);
+        trc_bsdf_albedo(&l, &s, albedo);
+        /* The ray comes along z, across the strand; its axes are turned by an angle of sine .6. */
+        const double cosine = 0.8 * (is_flat ? fabs(0.8 * up - 0.6 * off) : up);
+        for (int c = 0; c < 3; c++) {
+            const double want =
+                strand_gives(cosine, 0.6, 1.55, absorption_of((double)tint[c], roughness));
+            worst = fmax(worst, fabs((double)channel(albedo[1], c) - want));
+        }
+    }
+    print_message("colours of Huang's hair: off by at most %.1e\n", worst);
+    assert_true(worst <= 1e-5);
+}
+
 int main(void) {
     if (!test_cpu_can())
         return 77;
@@ -307,6 +367,7 @@ int main(void) {
         cmocka_unit_test(films_interfere),
         cmocka_unit_test(films_interfere_on_metals),
         cmocka_unit_test(multiple_glass_transmits_its_color),
+        cmocka_unit_test(huang_hair_has_its_color),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -431,10 +431,10 @@ static vvec3 albedo(const struct trc_lobe *lobe, vfloat cos_o) {
     return lobe->multi_weight;
 }
 
-/* Of a smooth strand that is round: R and all that follows it, by a geometric series. */
-static vvec3 albedo_of(const struct trc_lobe *lobe, vfloat sin_o, vfloat off) {
+/* Of a smooth strand that is round: R and all that follows it, by a geometric series. sin_o: along
+ * it; cosine: where the ray meets it. */
+static vvec3 albedo_of(const struct trc_lobe *lobe, vfloat sin_o, vfloat cosine) {
     const vfloat one = vf_one(), eta = lobe->ior;
-    const vfloat cosine = vf_safe_sqrt(one - sin_o * sin_o) * vf_safe_sqrt(one - off * off);
     const vfloat f = trc_fresnel_dielectric(cosine, eta), sin_t = sin_o / eta;
     const vfloat cos_t = vf_safe_sqrt(one - (one - cosine * cosine) / (eta * eta));
     const vfloat way = vf_divide(vf_set(2.0f) * cos_t, one - sin_t * sin_t);
@@ -533,10 +533,15 @@ static void add_huang_hair(struct trc_setup *c, const struct trc_leaf *leaf, vfl
     lobe->roughness = -NUMBER(offset);
     lobe->ior = vf_max(NUMBER(ior), vf_set(TRC_MIN_IOR));
     const struct trc_strand_pigment pigment = pigment_of(c, leaf, randomness);
-    lobe->f0 = trc_absorption(&pigment, NUMBER(radial_roughness));
+    lobe->f0 = trc_absorption(&pigment, rough);
     lobe->f90 = v3(vf_max(NUMBER(reflection), zero), vf_max(NUMBER(transmission), zero),
                    vf_max(NUMBER(second_reflection), zero));
-    lobe->multi_weight = albedo_of(lobe, v3_dot(z, s->wo), off);
+    /* Cycles has the place on the width of elliptical strands from their axes, not from the ray. */
+    const vfloat sin_o = v3_dot(z, s->wo), up = vf_safe_sqrt(one - off * off);
+    const vfloat turned = vf_abs(up * v3_dot(v3_cross(x, z), s->wo) - off * v3_dot(x, s->wo));
+    const vmask is_elliptical = vm_andnot(on_strand, vf_eq(aspect, one));
+    lobe->multi_weight = albedo_of(
+        lobe, sin_o, vf_select(is_elliptical, turned, up * vf_safe_sqrt(one - sin_o * sin_o)));
     lobe->fresnel = TRC_FRESNEL_OWN;
     lobe->reflectance = albedo;
     lobe->correlated = true;
