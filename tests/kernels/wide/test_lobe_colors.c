@@ -296,6 +296,29 @@ static void multiple_glass_transmits_its_color(void **state) {
     }
 }
 
+/* From within, at an index of 1.5, all is reflected below a cosine of .745: there Blender 4 has no
+ * colour of refraction, 3.4 has. */
+static void refraction_has_no_color_beyond_the_critical_angle(void **state) {
+    (void)state;
+    for (int i = 0; i < 4; i++) {
+        const bool is_inside = i & 1, is_correlated = i & 2;
+        const uint32_t mode =
+            TRC_DISTRIBUTION_GGX | (is_correlated ? TRC_DISTRIBUTION_CORRELATED : 0);
+        const double cosines[] = {0.7, 0.8};
+        for (int k = 0; k < 2; k++) {
+            struct model m = refraction(mode, 0.3f, 1.5f);
+            struct trc_surface s;
+            struct trc_lobes l;
+            vvec3 albedo[3];
+            m.back = is_inside;
+            prepare(&m, direction(cosines[k], 0.3), &s, &l);
+            trc_bsdf_albedo(&l, &s, albedo);
+            assert_true(channel(albedo[2], 0) ==
+                        (is_inside && is_correlated && k == 0 ? 0.0f : 1.0f));
+        }
+    }
+}
+
 /* ---- hair ---- */
 
 /* Chiang et al. 2016, equation 9: what a strand of that roughness absorbs to have a colour. */
@@ -367,6 +390,7 @@ int main(void) {
         cmocka_unit_test(films_interfere),
         cmocka_unit_test(films_interfere_on_metals),
         cmocka_unit_test(multiple_glass_transmits_its_color),
+        cmocka_unit_test(refraction_has_no_color_beyond_the_critical_angle),
         cmocka_unit_test(huang_hair_has_its_color),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -205,11 +205,15 @@ static void add_glass(struct trc_setup *c, const struct trc_leaf *leaf, vfloat w
 const struct trc_closure TRC_CLOSURE_OF(GLASS) = {.add = add_glass};
 
 static void add_refraction(struct trc_setup *c, const struct trc_leaf *leaf, vfloat weight) {
-    trc_add_dielectric(c, TRC_LOBE_REFRACT,
-                       v3_scale(colour(c, leaf, TRC_AT(REFRACTION, color)), weight),
-                       trc_leaf_normal(c, leaf, TRC_AT(REFRACTION, normal)),
-                       vf_square(number(c, leaf, TRC_AT(REFRACTION, roughness))),
-                       trc_relative_ior(c, number(c, leaf, TRC_AT(REFRACTION, ior))), leaf->mode);
+    const vvec3 n = trc_leaf_normal(c, leaf, TRC_AT(REFRACTION, normal));
+    const vfloat eta = trc_relative_ior(c, number(c, leaf, TRC_AT(REFRACTION, ior)));
+    struct trc_lobe *lobe = trc_add_dielectric(
+        c, TRC_LOBE_REFRACT, v3_scale(colour(c, leaf, TRC_AT(REFRACTION, color)), weight), n,
+        vf_square(number(c, leaf, TRC_AT(REFRACTION, roughness))), eta, leaf->mode);
+    /* Of what is reflected totally, if the surface is smooth, Cycles 4 has no colour. */
+    if (lobe && lobe->correlated)
+        lobe->albedo_scale =
+            vf_where(vf_lt(trc_fresnel_dielectric(v3_dot(n, c->s->wo), eta), vf_one()), vf_one());
 }
 
 const struct trc_closure TRC_CLOSURE_OF(REFRACTION) = {.add = add_refraction};
