@@ -6,65 +6,19 @@
 #include "model/kernels.h"
 #include "model/sequence.h"
 
-/* Rows of a strip: more are filtered with fewer around them, fewer keep more threads busy. */
-#define STRIP_HEIGHT 128
+/* So many strips for each thread keep all busy to the end, but a strip has so many rows: with
+ * fewer, most of what is filtered are rows around it. */
+#define STRIPS_PER_THREAD 4
+#define LEAST_STRIP_HEIGHT 64
 
 struct preview {
+    uint32_t strip_height;
     const struct trc_film *film;
     const struct trc_kernels *kernels;
     float exposure;
     float *memory; /* planes of each worker */
     float *out;
 };
-
-static float load_float(const float *p) {
-    float value;
-    __atomic_load(p, &value, __ATOMIC_RELAXED);
-    return value;
-}
-
-static void load_sums(const double *sums, uint32_t channels, float *plane) {
-    for (uint32_t k = 0; k < channels; k++)
-        plane[k * TRC_PREVIEW_FLOATS] = (float)trc_sum_load(&sums[k]);
-}
-
-/* Asks for what the pixel above will take: a row is too short for processors to look ahead. */
-static void fetch_pixel(const struct trc_film *film, size_t pixel) {
-    const size_t next = pixel + film->width;
-    if (next >= (size_t)film->width * film->height)
-        return;
-    __builtin_prefetch(film->sums[TRC_PASS_COMBINED] + 4 * next);
-    if (film->guides != TRC_GUIDES_NONE)
-        __builtin_prefetch(film->sums[TRC_PASS_DENOISING_ALBEDO] + 3 * next);
-    if (film->guides == TRC_GUIDES_ALBEDO_NORMAL) {
-        __builtin_prefetch(film->sums[TRC_PASS_DENOISING_NORMAL] + 3 * next);
-        __builtin_prefetch(film->sums[TRC_PASS_DENOISING_DEPTH] + next);
-    }
-    __builtin_prefetch(&film->halves[next]);
-    __builtin_prefetch(&film->sample_counts[next]);
-}
-
-/* A pixel of the film into planes that begin at its place. */
-static void load_pixel(const struct trc_film *film, size_t pixel, float *at) {
-    load_sums(film->sums[TRC_PASS_COMBINED] + 4 * pixel, 4,
-              at + TRC_PREVIEW_COLOR * TRC_PREVIEW_FLOATS);
-    if (film->guides != TRC_GUIDES_NONE)
-        load_sums(film->sums[TRC_PASS_DENOISING_ALBEDO] + 3 * pixel, 3,
-                  at + TRC_PREVIEW_ALBEDO * TRC_PREVIEW_FLOATS);
-    if (film->guides == TRC_GUIDES_ALBEDO_NORMAL) {
-        load_sums(film->sums[TRC_PASS_DENOISING_NORMAL] + 3 * pixel, 3,
-                  at + TRC_PREVIEW_NORMAL * TRC_PREVIEW_FLOATS);
-        load_sums(film->sums[TRC_PASS_DENOISING_DEPTH] + pixel, 1,
-                  at + TRC_PREVIEW_DEPTH * TRC_PREVIEW_FLOATS);
-    }
-    const struct trc_half *half = &film->halves[pixel];
-    at[TRC_PREVIEW_HALF * TRC_PREVIEW_FLOATS] =
-        load_float(&half->light[0]) + load_float(&half->light[1]) + load_float(&half->light[2]);
-    at[TRC_PREVIEW_HALF_COUNT * TRC_PREVIEW_FLOATS] =
-        (float)__atomic_load_n(&half->count, __ATOMIC_RELAXED);
-    at[TRC_PREVIEW_COUNT * TRC_PREVIEW_FLOATS] =
-        (float)__atomic_load_n(&film->sample_counts[pixel], __ATOMIC_RELAXED);
-}
 
 /* Pixels [x, x_end) of a row, counted from a strip, that are in one tile of the film. */
 struct run {
@@ -96,10 +50,8 @@ static void load_run(const struct preview *p, const struct run *run, float *memo
     unsigned number;
     do {
         number = trc_film_await_writer(sequence);
-        for (int x = run->x; x < run->x_end; x++)
-            fetch_pixel(film, run->pixel + (size_t)(x - run->x));
-        for (int x = run->x; x < run->x_end; x++)
-            load_pixel(film, run->pixel + (size_t)(x - run->x), memory + trc_preview_at(x, run->y));
+        p->kernels->preview_load(film, run->pixel, run->x_end - run->x,
+                                 memory + trc_preview_at(run->x, run->y));
     } while (!trc_sequence_is_whole(sequence, number));
 }
 
@@ -115,12 +67,10 @@ static void load_row(const struct preview *p, uint32_t left, uint32_t bottom, in
 static void store_row(const struct preview *p, uint32_t left, uint32_t bottom, int y,
                       const float *memory) {
     const struct trc_film *film = p->film;
-    for (uint32_t x = 0; x < TRC_PREVIEW_WIDTH && left + x < film->width; x++) {
-        float *out = p->out + 4 * ((size_t)(bottom + (uint32_t)y) * film->width + left + x);
-        const float *from = memory + trc_preview_at((int)x, y);
-        for (int c = 0; c < 4; c++)
-            out[c] = from[c * TRC_PREVIEW_FLOATS];
-    }
+    const uint32_t right = film->width - left;
+    p->kernels->preview_store(memory + trc_preview_at(0, y),
+                              (int)(right < TRC_PREVIEW_WIDTH ? right : TRC_PREVIEW_WIDTH),
+                              p->out + 4 * ((size_t)(bottom + (uint32_t)y) * film->width + left));
 }
 
 static uint32_t strips_along(uint32_t pixels, uint32_t size) {
@@ -131,8 +81,9 @@ static void show_strip(void *context, uint32_t index, uint32_t worker) {
     const struct preview *p = context;
     const uint32_t across = strips_along(p->film->width, TRC_PREVIEW_WIDTH);
     const uint32_t left = index % across * TRC_PREVIEW_WIDTH;
-    const uint32_t bottom = index / across * STRIP_HEIGHT, rest = p->film->height - bottom;
-    const int height = (int)(rest < STRIP_HEIGHT ? rest : STRIP_HEIGHT);
+    const uint32_t bottom = index / across * p->strip_height;
+    const uint32_t rest = p->film->height - bottom;
+    const int height = (int)(rest < p->strip_height ? rest : p->strip_height);
     float *memory = p->memory + (size_t)worker * TRC_PREVIEW_PLANES * TRC_PREVIEW_FLOATS;
     for (int y = -TRC_PREVIEW_HALO; y < height + TRC_PREVIEW_HALO; y++) {
         load_row(p, left, bottom, y, memory);
@@ -142,6 +93,13 @@ static void show_strip(void *context, uint32_t index, uint32_t worker) {
     }
 }
 
+/* Rows of a strip. What is shown does not depend on it. */
+static uint32_t strip_height(const struct trc_film *film, uint32_t across, uint32_t thread_count) {
+    const uint32_t rows = strips_along(STRIPS_PER_THREAD * thread_count, across);
+    const uint32_t height = strips_along(film->height, rows ? rows : 1);
+    return height < LEAST_STRIP_HEIGHT ? LEAST_STRIP_HEIGHT : height;
+}
+
 trc_status trc_film_read_preview(const struct trc_film *film, const struct trc_kernels *kernels,
                                  uint32_t thread_count, float exposure, float *out,
                                  uint64_t float_count) {
@@ -149,11 +107,12 @@ trc_status trc_film_read_preview(const struct trc_film *film, const struct trc_k
         return trc_film_read(film, TRC_PASS_COMBINED, exposure, out, float_count);
     TRC_TRY(trc_check_array(out, float_count, (uint64_t)film->width * film->height * 4,
                             sizeof(float), sizeof(float), "pixels_out"));
-    const uint32_t strips =
-        strips_along(film->width, TRC_PREVIEW_WIDTH) * strips_along(film->height, STRIP_HEIGHT);
+    const uint32_t across = strips_along(film->width, TRC_PREVIEW_WIDTH);
+    struct preview preview = {
+        strip_height(film, across, thread_count), film, kernels, exposure, NULL, out};
+    const uint32_t strips = across * strips_along(film->height, preview.strip_height);
     struct trc_pool *pool;
     TRC_TRY(trc_pool_create(thread_count < strips ? thread_count : strips, &pool));
-    struct preview preview = {film, kernels, exposure, NULL, out};
     preview.memory = trc_alloc_zeroed(trc_pool_thread_count(pool),
                                       TRC_PREVIEW_PLANES * TRC_PREVIEW_FLOATS * sizeof(float));
     if (preview.memory)

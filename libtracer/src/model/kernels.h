@@ -62,10 +62,16 @@ struct trc_kernels {
     /* Bytes of scratch memory a job of reconstruction needs, and the job; never fails. */
     size_t (*denoise_memory_bytes)(void);
     void (*denoise_tile)(const struct trc_denoise_job *job);
+    /* Sums of pixels side by side, at most TRC_TILE_SIZE of one tile of the film, into planes of
+     * quick reconstruction, which begin at the first one's place. Read while they may be written:
+     * the tile's sequence number tells. */
+    void (*preview_load)(const struct trc_film *film, size_t pixel, int count, float *planes);
     /* Quick reconstruction of a strip, row by row: memory has TRC_PREVIEW_PLANES planes, the inputs
      * of row y filled in, from -TRC_PREVIEW_HALO on; row y - TRC_PREVIEW_HALO is done then. 64-byte
      * aligned. exposure: a factor of the colour. Never fails. */
     void (*preview_filter)(float *memory, int y, float exposure);
+    /* What is shown of pixels side by side, from planes that begin at the first one's place. */
+    void (*preview_store)(const float *planes, int count, float *rgba);
     /* trc_query_*: arguments already validated; chunk [begin, end) of the arrays. packet_size
      * resolved. order: of the chunk's rays, less begin, with api/ray_order.h's room behind, or
      * NULL. */

@@ -88,6 +88,65 @@ static vfloat box(const float *in, const struct rows *rows, int x) {
     return sum * vf_set(1.0f / 9.0f);
 }
 
+/* ---- sums of a film ---- */
+
+/* What is read here may be written by others, and is read again then (model/sequence.h). By
+ * vectors, which are not atomic: they are, number by number, on all processors that there are
+ * kernels for. */
+#define MAY_BE_WRITTEN __attribute__((no_sanitize("thread")))
+
+/* Asks for what the row above will take: rows are too short for processors to look ahead. What is
+ * behind the film is asked for in vain. */
+#define CACHE_LINE 64
+static void fetch_above(const void *run, size_t row_bytes, size_t run_bytes) {
+    for (size_t i = 0; i < run_bytes; i += CACHE_LINE)
+        __builtin_prefetch((const char *)run + row_bytes + i);
+}
+
+/* channels is a constant of each call. */
+TRC_INLINE MAY_BE_WRITTEN void load_sums(const struct trc_film *film, uint32_t pass, size_t pixel,
+                                         int channels, int count, float *plane) {
+    const size_t bytes = (size_t)channels * sizeof(double);
+    const double *sums = film->sums[pass] + (size_t)channels * pixel;
+    float row[4 * TRC_TILE_SIZE];
+    fetch_above(sums, bytes * film->width, bytes * (size_t)count);
+    for (int i = 0; i < channels * count; i++)
+        row[i] = (float)sums[i];
+    for (int k = 0; k < channels; k++)
+        for (int i = 0; i < count; i++)
+            plane[k * TRC_PREVIEW_FLOATS + i] = row[channels * i + k];
+}
+
+/* Of a pixel with one sample there is no half, and its memory is not read. */
+TRC_INLINE MAY_BE_WRITTEN void load_half(const struct trc_half *half, bool some, float *at) {
+    at[TRC_PREVIEW_HALF * TRC_PREVIEW_FLOATS] =
+        some ? half->light[0] + half->light[1] + half->light[2] : 0.0f;
+    at[TRC_PREVIEW_HALF_COUNT * TRC_PREVIEW_FLOATS] = some ? (float)half->count : 0.0f;
+}
+
+MAY_BE_WRITTEN void trc_preview_load(const struct trc_film *film, size_t pixel, int count,
+                                     float *planes) {
+    const uint32_t *counts = film->sample_counts + pixel;
+    load_sums(film, TRC_PASS_COMBINED, pixel, 4, count,
+              planes + TRC_PREVIEW_COLOR * TRC_PREVIEW_FLOATS);
+    if (film->guides != TRC_GUIDES_NONE)
+        load_sums(film, TRC_PASS_DENOISING_ALBEDO, pixel, 3, count,
+                  planes + TRC_PREVIEW_ALBEDO * TRC_PREVIEW_FLOATS);
+    if (film->guides == TRC_GUIDES_ALBEDO_NORMAL) {
+        load_sums(film, TRC_PASS_DENOISING_NORMAL, pixel, 3, count,
+                  planes + TRC_PREVIEW_NORMAL * TRC_PREVIEW_FLOATS);
+        load_sums(film, TRC_PASS_DENOISING_DEPTH, pixel, 1, count,
+                  planes + TRC_PREVIEW_DEPTH * TRC_PREVIEW_FLOATS);
+    }
+    if (counts[0] > 1)
+        fetch_above(&film->halves[pixel], film->width * sizeof *film->halves,
+                    (size_t)count * sizeof *film->halves);
+    for (int i = 0; i < count; i++) {
+        load_half(&film->halves[pixel + (size_t)i], counts[i] > 1, planes + i);
+        planes[TRC_PREVIEW_COUNT * TRC_PREVIEW_FLOATS + i] = (float)counts[i];
+    }
+}
+
 /* ---- what there is ---- */
 
 /* Within limits; NaN: the lower. */
@@ -391,4 +450,11 @@ void trc_preview_filter(float *memory, int y, float exposure) {
         estimate(&p, y - TRC_PREVIEW_HALO + 2);
     if (y - TRC_PREVIEW_HALO >= 0)
         blend(&p, y - TRC_PREVIEW_HALO);
+}
+
+void trc_preview_store(const float *planes, int count, float *rgba) {
+    const float *from = planes + TRC_PREVIEW_COLOR * TRC_PREVIEW_FLOATS;
+    for (int i = 0; i < count; i++)
+        for (int c = 0; c < 4; c++)
+            rgba[4 * i + c] = from[c * TRC_PREVIEW_FLOATS + i];
 }

@@ -62,6 +62,8 @@
 #define trc_denoise_memory_bytes(...) TRC_KERNEL(trc_denoise_memory_bytes)(__VA_ARGS__)
 #define trc_denoise_tile(...) TRC_KERNEL(trc_denoise_tile)(__VA_ARGS__)
 #define trc_plane_load(...) TRC_KERNEL(trc_plane_load)(__VA_ARGS__)
+#define trc_preview_load(...) TRC_KERNEL(trc_preview_load)(__VA_ARGS__)
+#define trc_preview_store(...) TRC_KERNEL(trc_preview_store)(__VA_ARGS__)
 #define trc_preview_filter(...) TRC_KERNEL(trc_preview_filter)(__VA_ARGS__)
 #define trc_denoising_passes(...) TRC_KERNEL(trc_denoising_passes)(__VA_ARGS__)
 #define trc_direct_light(...) TRC_KERNEL(trc_direct_light)(__VA_ARGS__)
