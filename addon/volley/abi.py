@@ -683,7 +683,8 @@ class PassId(IntEnum):
     DENOISING_ROUGHNESS = 27
     DENOISING_SPECULAR_ALBEDO = 28
     NOISY_COMBINED = 29
-    COUNT = 30
+    DENOISING_EMISSION = 30
+    COUNT = 31
 
 
 class PassRange(IntEnum):
@@ -1398,6 +1399,7 @@ PASS_CHANNELS = {
     PassId.DENOISING_ROUGHNESS: "X",
     PassId.DENOISING_SPECULAR_ALBEDO: "RGB",
     PassId.NOISY_COMBINED: "RGBA",
+    PassId.DENOISING_EMISSION: "RGB",
 }
 
 # Passes of each range, and their channels.

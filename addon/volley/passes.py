@@ -167,8 +167,11 @@ def request_fields(entries):
     def numbers(first):
         return [entry.index - first for entry in entries if 0 <= entry.index - first < PASS_RANGES[first][0]]
     layers = [divmod(number, MAX_CRYPTOMATTE_LAYERS) for number in numbers(PassRange.FIRST_CRYPTOMATTE)]
+    asked = {entry.index for entry in entries if entry.index < PassId.COUNT}
+    if PassId.DENOISING_ALBEDO in asked:  # which has it added
+        asked.add(PassId.DENOISING_EMISSION)
     return {
-        "passes": sum(1 << entry.index for entry in entries if entry.index < PassId.COUNT),
+        "passes": sum(1 << index for index in asked),
         "aov_value_count": len(numbers(PassRange.FIRST_AOV_VALUE)),
         "aov_color_count": len(numbers(PassRange.FIRST_AOV_COLOR)),
         "light_group_count": len(numbers(PassRange.FIRST_LIGHT_GROUP)),

@@ -353,6 +353,37 @@ def test_denoising_data(blender):
         _agree(ours, theirs, name)
 
 
+def inside_denoising_emission():
+    """The albedo of what shines, a surface and the background, seen directly, in a mirror and through a coloured pane,
+    not in rough gloss; and on a transparent film."""
+    import bpy
+    import scenes
+    scene = scenes.empty(size=(32, 24))
+    scenes.camera()
+    scenes.sphere("Mirror", 0.8, (-0.9, 0.0, 0.6), material=scenes.material(
+        "Metal", "ShaderNodeBsdfGlossy", Roughness=0.0, Color=(0.8, 0.6, 0.9)))
+    scenes.sphere("Shining", 0.7, (0.9, 0.0, 0.6), material=scenes.emitter((0.9, 0.4, 1.5), "Shining"))
+    scenes.sphere("Rough", 0.6, (0.0, 0.0, -1.0), material=scenes.material(
+        "Rough", "ShaderNodeBsdfGlossy", Roughness=0.6, Color=(0.6, 0.5, 0.2)))
+    scenes.wall("Pane", 0.7, -1.5, material=scenes.material(
+        "Clear", "ShaderNodeBsdfTransparent", Color=(0.5, 0.9, 0.7)))
+    scenes.world_color(bpy.context.scene.world, (0.3, 0.2, 0.5))
+    layer = bpy.context.view_layer
+    layer.volley.denoising_store_passes = layer.cycles.denoising_store_passes = True
+    found = {}
+    for case, scene.render.film_transparent, layer.use_pass_environment in (
+            ("opaque", False, False), ("clear", True, False), ("clear, environment", True, True)):
+        found[case] = _both(["Denoising Albedo"], 64)["Denoising Albedo"]
+    return found
+
+
+def test_denoising_emission(blender):
+    found = blender.run(inside_denoising_emission)
+    for case, (ours, theirs) in found.items():
+        _agree(ours, theirs, case)
+    assert found["opaque"][1].mean() > 1.1 * found["clear"][1].mean()
+
+
 # Vector ---------------------------------------------------------------------------------------------
 
 def inside_vector():

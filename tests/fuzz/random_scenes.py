@@ -23,7 +23,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "support"))
 import numpy as np  # noqa: E402  (the folder is on the path only now)
 
 PARTS = ("textures", "normals", "mixes", "strands", "points", "instances", "motion", "deform", "shutter", "lens",
-         "world", "lamps", "lamp_nodes", "film", "objects", "passes", "rough_glass")
+         "world", "lamps", "lamp_nodes", "film", "objects", "passes", "guides", "rough_glass")
 SIZE, SAMPLES = (64, 48), 512
 MEAN_TOLERANCE, TILE_TOLERANCE = 0.01, 0.03
 DARKEST = 1e-4  # mean that errors are taken relative to
@@ -31,7 +31,8 @@ PASSES = {"use_pass_diffuse_direct": "DiffDir", "use_pass_glossy_direct": "Gloss
           "use_pass_glossy_indirect": "GlossInd", "use_pass_transmission_direct": "TransDir",
           "use_pass_transmission_indirect": "TransInd",
           "use_pass_emit": "Emit", "use_pass_environment": "Env", "use_pass_diffuse_color": "DiffCol",
-          "use_pass_glossy_color": "GlossCol"}
+          "use_pass_glossy_color": "GlossCol", "use_pass_transmission_color": "TransCol", "use_pass_mist": "Mist"}
+GUIDES = ("Denoising Albedo", "Denoising Normal")  # their errors are over their own means
 
 
 class Scene:
@@ -528,6 +529,10 @@ def build(seed, without):
         for setting in scene.rng("passes").sample(sorted(PASSES), 3):
             setattr(bpy.context.view_layer, setting, True)
             names.append(PASSES[setting])
+    if scene.has("guides", 0.4):
+        layer = bpy.context.view_layer
+        layer.volley.denoising_store_passes = layer.cycles.denoising_store_passes = True
+        names += GUIDES
     bpy.context.scene.frame_set(1)
     return names
 
@@ -560,16 +565,19 @@ def measure(seed, options):
     words = []
     scale = max(float(pictures["Combined"][1][..., :3].mean()), DARKEST)
     for name, (ours, theirs) in pictures.items():
-        channels = 4 if name == "Combined" else 3
+        channels = {"Combined": 4, "Mist": 1}.get(name, 3)
         ours, theirs = ours[..., :channels], np.nan_to_num(theirs[..., :channels])
         if not np.isfinite(ours).all():
             print(f"{seed:4d} NOT FINITE: {name}", flush=True)
             return 1.0, 1.0
-        errors = np.array(compare.unexplained(ours, theirs)) / scale
+        over = max(float(np.abs(theirs).mean()), DARKEST) if name in GUIDES else scale
+        errors = np.array(compare.unexplained(ours, theirs)) / over
         worst = np.maximum(worst, errors)
         words.append(f"{name} {ours.mean():.4f} {theirs.mean():.4f} {errors[0]:.2%} {errors[1]:.2%}")
         if folder:
-            pair = compare.side_by_side(ours.mean(axis=0)[::-1], theirs.mean(axis=0)[::-1])
+            shown = [np.broadcast_to(each.mean(axis=0)[::-1, :, :3], each.shape[1:3] + (3,))
+                     for each in (ours, theirs)]
+            pair = compare.side_by_side(*shown)
             compare.write_png(os.path.join(options.keep, f"{seed:04d}_{name}.png"), pair)
     is_off = bool((worst > (MEAN_TOLERANCE, TILE_TOLERANCE)).any())
     print(f"{seed:4d} {'OFF' if is_off else 'ok '} mean {scale:.4f}  {', '.join(words)}",

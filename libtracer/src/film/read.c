@@ -90,6 +90,8 @@ static void read_sums(const struct reading *r, struct row row) {
     const uint32_t channels = r->info->channels, stride = r->info->sums;
     const double *sums = sums_of(r, r->pass);
     const double *divisor = r->info->color != TRC_PASS_NONE ? sums_of(r, r->info->color) : NULL;
+    const double *emission =
+        r->pass == TRC_PASS_DENOISING_ALBEDO ? sums_of(r, TRC_PASS_DENOISING_EMISSION) : NULL;
     const double light = kind == TRC_PASS_KIND_LIGHT ? r->exposure : 1.0;
     for (uint64_t i = row.first; i < row.end; i++) {
         const uint32_t count = load_count(r->film, i);
@@ -101,6 +103,8 @@ static void read_sums(const struct reading *r, struct row row) {
         for (uint32_t c = 0; c < channels; c++) {
             const bool is_alpha = r->pass == TRC_PASS_COMBINED && c == 3;
             double value = trc_sum_load(&sums[i * stride + c]);
+            if (emission)
+                value += trc_sum_load(&emission[i * stride + c]);
             if (divisor) {
                 /* Both are sums of the same samples: the counts cancel. */
                 const double by = trc_sum_load(&divisor[i * channels + c]);

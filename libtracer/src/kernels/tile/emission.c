@@ -2,6 +2,22 @@
 #include "kernels/tile/light_split.h"
 #include "kernels/tile/shade.h"
 
+/* Of light found by rays, what denoisers know as albedo: that of paths whose features are not taken
+ * yet. */
+static void features_add(struct trc_tile *t, const struct arrival *a, vmask active, vvec3 c) {
+    const vint path = (vint)a->path, done = vi_set(TRC_PATH_FEATURES_DONE);
+    vmask open = vi_eq(path & done, vi_set(0));
+    if (t->desc->pass_flags & TRC_PASSES_BLENDED_FEATURES) {
+        const vint straight = vi_set(TRC_PATH_TRANSPARENT_BACKGROUND);
+        open = vm_or(open, vi_eq(path & straight, straight));
+    }
+    const vfloat one = vf_one();
+    const vvec3 w = v3(vf_min(a->found_weight.x, one), vf_min(a->found_weight.y, one),
+                       vf_min(a->found_weight.z, one));
+    trc_pass_add_lanes(t, TRC_PASS_DENOISING_EMISSION, v3_mul(w, c), a->slots,
+                       vm_and(active, open));
+}
+
 /* Light found by rays, weighted and clamped: to the samples, and to the pass its depth says.
  * camera_pass: what camera rays see it as. */
 static void found_add(struct trc_tile *t, const struct arrival *a, vmask active, vvec3 c,
@@ -9,6 +25,8 @@ static void found_add(struct trc_tile *t, const struct arrival *a, vmask active,
     const vuint depth = trc_depth_of(a->depths, TRC_DEPTH_ALL_SHIFT);
     float lanes[3][TRC_WIDTH];
     uint32_t depths[TRC_WIDTH], path[TRC_WIDTH], share[TRC_WIDTH];
+    if (t->samples.pass[TRC_PASS_DENOISING_EMISSION][0])
+        features_add(t, a, active, c);
     if (t->light_passes)
         vu_store(share, word_column(t->work.w[TRC_RAY_SHARE], a));
     vf_store(lanes[0], c.x), vf_store(lanes[1], c.y), vf_store(lanes[2], c.z);
@@ -77,7 +95,7 @@ static vmask see_through(struct trc_tile *t, const struct arrival *a, vmask miss
 }
 
 /* Rays that left the scene. What a transparent film leaves out of the picture is in the environment
- * pass, and where there is one in those of light groups and AOVs, too (Cycles). */
+ * pass, and where there is one in those of light groups, AOVs and for denoisers, too (Cycles). */
 void trc_emission_misses(struct trc_tile *t, const struct arrival *a, vmask missed) {
     vmask clear = vm_none();
     if (t->desc->film_transparent) {
@@ -93,6 +111,8 @@ void trc_emission_misses(struct trc_tile *t, const struct arrival *a, vmask miss
     found_add(t, a, vm_andnot(missed, clear), added, TRC_PASS_ENVIRONMENT);
     if (vm_any(clear))
         trc_pass_add_lanes(t, TRC_PASS_ENVIRONMENT, added, a->slots, vm_and(missed, clear));
+    if (vm_any(clear) && t->samples.pass[TRC_PASS_DENOISING_EMISSION][0])
+        features_add(t, a, vm_and(missed, clear), added);
     if (t->desc->light_group_count)
         one_group_add(t, a, missed, added, t->snapshot->world.light_group);
     const uint32_t material = t->snapshot->world.material;

@@ -198,10 +198,10 @@ static void shade_group(struct trc_tile *t, uint32_t material, vint index, vmask
     a.world_alone = t->snapshot->world.is_constant && !(m->has & TRC_MATERIAL_IS_MATT);
     if (m->has & TRC_MATERIAL_HAS_HOLDOUT)
         trc_emission_holdout(t, &a, &lobes, active);
-    if (t->extra_passes)
-        a.path = data_passes(t, &a, &s, m, &regs, &lobes);
     if (m->has & TRC_MATERIAL_HAS_EMISSION)
         trc_emission_surface(t, &a, &s, &lobes, active);
+    if (t->extra_passes) /* after what is emitted, which denoisers know before features are taken */
+        a.path = data_passes(t, &a, &s, m, &regs, &lobes);
     const vmask last = vi_eq((vint)(a.path & vu_set(TRC_PATH_LAST)), vi_set(TRC_PATH_LAST));
     const vmask on = vm_andnot(active, last);
     if ((m->has & TRC_MATERIAL_HAS_TRANSPARENCY) && vm_any(vm_and(active, last)))
