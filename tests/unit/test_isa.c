@@ -71,8 +71,8 @@ static void expect_same_tree(const struct trc_tree *a, const struct trc_tree *b)
     assert_int_equal(a->root, b->root);
     assert_int_equal(a->node_stride, b->node_stride);
     expect_equal(a->nodes, b->nodes, a->node_count * a->node_stride, "nodes");
-    expect_equal(a->vertices, b->vertices,
-                 sizeof(float) * TRC_TRIANGLE_FLOATS * a->slot_count * a->key_count, "vertices");
+    assert_int_equal(a->vertex_floats, b->vertex_floats);
+    expect_equal(a->vertices, b->vertices, sizeof(float) * a->vertex_floats, "vertices");
     if (a->slots && b->slots)
         expect_equal(a->slots->slots, b->slots->slots, a->slot_count * sizeof(struct trc_slot),
                      "slots");
