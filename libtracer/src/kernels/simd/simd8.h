@@ -14,16 +14,6 @@ TRC_INLINE f8 f8_load(const float *p) {
     return v;
 }
 /* Bytes as numbers. */
-TRC_INLINE f8 f8_load_bytes(const uint8_t p[8]) {
-#if defined(__AVX2__)
-    return (f8)_mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_loadl_epi64((const __m128i *)p)));
-#else
-    typedef uint8_t bytes __attribute__((vector_size(8)));
-    bytes b;
-    memcpy(&b, p, sizeof b);
-    return __builtin_convertvector(b, f8);
-#endif
-}
 TRC_INLINE i8x i8_load_bytes(const uint8_t p[8]) {
 #if defined(__AVX2__)
     return (i8x)_mm256_cvtepu8_epi32(_mm_loadl_epi64((const __m128i *)p));
@@ -33,6 +23,9 @@ TRC_INLINE i8x i8_load_bytes(const uint8_t p[8]) {
     memcpy(&b, p, sizeof b);
     return __builtin_convertvector(b, i8x);
 #endif
+}
+TRC_INLINE f8 f8_load_bytes(const uint8_t p[8]) {
+    return __builtin_convertvector(i8_load_bytes(p), f8);
 }
 /* In each lane that one of sixteen floats, low before high; beyond 15 any. */
 TRC_INLINE f8 f8_pick(f8 low, f8 high, i8x lane) {
