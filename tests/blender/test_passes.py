@@ -220,6 +220,45 @@ def test_hair(blender):
             _agree(*pictures["GlossDir"], case, off=HAIR_OFF)
 
 
+def inside_holdouts():
+    """{kind, pass: both} of a ball that is held out by its object, by its material, or in part."""
+    import bpy
+    import scenes
+    found = {}
+    for kind in ("object", "material", "part"):
+        scenes.empty(size=(32, 24))
+        scenes.camera()
+        matt = scenes.material("Matt", "ShaderNodeBsdfDiffuse", Color=(0.5, 0.6, 0.7))
+        held = matt
+        if kind != "object":
+            held = matt.copy()
+            nodes, links = held.node_tree.nodes, held.node_tree.links
+            mix = nodes.new("ShaderNodeMixShader")
+            mix.inputs[0].default_value = 0.4 if kind == "part" else 0.0
+            links.new(nodes.new("ShaderNodeHoldout").outputs[0], mix.inputs[1])
+            surface = next(link for link in links if link.to_socket.name == "Surface")
+            links.new(surface.from_socket, mix.inputs[2])
+            links.new(mix.outputs[0], surface.to_socket)
+        ball = scenes.sphere(material=held)
+        ball.is_holdout, ball.pass_index = kind == "object", 3
+        scenes.wall("Back", 6.0, 2.0, material=matt).pass_index = 7
+        scenes.light(energy=300.0)
+        layer = bpy.context.view_layer
+        for name in ("z", "mist", "normal", "uv", "object_index", "diffuse_color"):
+            setattr(layer, f"use_pass_{name}", True)
+        layer.volley.denoising_store_passes = layer.cycles.denoising_store_passes = True
+        both = _both(["Depth", "Mist", "Normal", "UV", "IndexOB", "DiffCol", "Denoising Depth"], 64)
+        found.update(((kind, name), pair) for name, pair in both.items())
+    return found
+
+
+def test_holdouts(blender):
+    """Where all is held out there is nothing, not even depth."""
+    for (kind, name), (ours, theirs) in blender.run(inside_holdouts).items():
+        ours, theirs = (np.minimum(each[:, 12, 16], 100.0) for each in (ours, theirs))
+        assert ours == pytest.approx(theirs, rel=0.02, abs=0.03), f"{kind}, {name}"
+
+
 def inside_refraction():
     """Colour of the transmission of a ball of which the camera sees the inside, by both."""
     import bpy

@@ -276,15 +276,13 @@ static bool is_counted(const struct trc_tile *t, size_t pixel) {
 #define MAX_MATTE_WEIGHT 2.0f
 
 /* What the surfaces cover goes to the pixel's table at once, as a sample may meet any number of
- * them. Whole holdouts are in no matte, as in Cycles. */
+ * them. */
 static void add_mattes(struct trc_tile *t, const struct trc_surface *s,
-                       const struct trc_material *m, const struct trc_lobes *lobes, vvec3 seen,
-                       const uint32_t *slots, vmask active) {
+                       const struct trc_material *m, vvec3 seen, const uint32_t *slots,
+                       vmask active) {
     const uint32_t places = t->job->film->matte_count;
     const float one = (float)t->job->film->matte_units;
     float weight[TRC_WIDTH];
-    if (m->has & TRC_MATERIAL_HAS_HOLDOUT)
-        active = vm_and(active, vf_lt(v3_average(lobes->holdout), vf_set(1.0f)));
     vf_store(weight, v3_average(seen));
     for (uint32_t bits = vm_bits(active); bits; bits &= bits - 1) {
         const int i = __builtin_ctz(bits);
@@ -339,13 +337,27 @@ void trc_world_aovs(struct trc_tile *t, vvec3 d, vuint path, const uint32_t slot
     add_aovs(t, m, &regs, slots, active);
 }
 
+/* Those that are seen straight. */
+static vmask seen_straight(const struct trc_surface *s) {
+    const vint straight = vi_set(TRC_PATH_TRANSPARENT_BACKGROUND);
+    return vm_and(s->active, vi_eq((vint)s->path & straight, straight));
+}
+
 vuint trc_data_passes(struct trc_tile *t, const struct trc_surface *s, const struct trc_material *m,
                       const struct trc_registers *regs, const struct trc_lobes *lobes,
                       vvec3 found_weight, vfloat indirect_scale, vfloat length,
                       const uint32_t slots[TRC_WIDTH]) {
+    struct trc_surface solid;
+    if (m->aov_count)
+        add_aovs(t, m, regs, slots, vm_and(seen_straight(s), is_not_done(s->path)));
+    if (m->has & TRC_MATERIAL_HAS_HOLDOUT) { /* whole ones have nothing else, as in Cycles */
+        const vmask whole = vf_ge(v3_average(lobes->holdout), vf_set(1.0f));
+        solid = *s;
+        solid.active = vm_andnot(s->active, vm_and(seen_straight(s), whole));
+        s = &solid;
+    }
     const vuint path = trc_denoising_passes(t, s, lobes, found_weight, length, slots);
-    const vint straight = vi_set(TRC_PATH_TRANSPARENT_BACKGROUND);
-    const vmask on = vm_and(s->active, vi_eq((vint)s->path & straight, straight));
+    const vmask on = seen_straight(s);
     if (!vm_any(on))
         return path;
     const vvec3 weight = v3_scale(found_weight, indirect_scale);
@@ -354,10 +366,8 @@ vuint trc_data_passes(struct trc_tile *t, const struct trc_surface *s, const str
     add_colors(t, s, lobes, weight, slots, on);
     add_mist(t, s, v3_mul(weight, alpha), slots, on);
     if (t->desc->cryptomattes)
-        add_mattes(t, s, m, lobes, v3_mul(weight, alpha), slots, on);
+        add_mattes(t, s, m, v3_mul(weight, alpha), slots, on);
     vmask first = vm_and(on, is_not_done(s->path));
-    if (m->aov_count)
-        add_aovs(t, m, regs, slots, first);
     if (m->has & (TRC_MATERIAL_HAS_TRANSPARENCY | TRC_MATERIAL_HAS_PORTAL))
         first = vm_and(first, vf_ge(v3_average(alpha), vf_set(ALPHA_THRESHOLD)));
     if (!vm_any(first))
