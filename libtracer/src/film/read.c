@@ -90,8 +90,6 @@ static void read_sums(const struct reading *r, struct row row) {
     const uint32_t channels = r->info->channels, stride = r->info->sums;
     const double *sums = sums_of(r, r->pass);
     const double *divisor = r->info->color != TRC_PASS_NONE ? sums_of(r, r->info->color) : NULL;
-    const double *emission =
-        r->pass == TRC_PASS_DENOISING_ALBEDO ? sums_of(r, TRC_PASS_DENOISING_EMISSION) : NULL;
     const double light = kind == TRC_PASS_KIND_LIGHT ? r->exposure : 1.0;
     for (uint64_t i = row.first; i < row.end; i++) {
         const uint32_t count = load_count(r->film, i);
@@ -103,8 +101,6 @@ static void read_sums(const struct reading *r, struct row row) {
         for (uint32_t c = 0; c < channels; c++) {
             const bool is_alpha = r->pass == TRC_PASS_COMBINED && c == 3;
             double value = trc_sum_load(&sums[i * stride + c]);
-            if (emission)
-                value += trc_sum_load(&emission[i * stride + c]);
             if (divisor) {
                 /* Both are sums of the same samples: the counts cancel. */
                 const double by = trc_sum_load(&divisor[i * channels + c]);
@@ -112,6 +108,17 @@ static void read_sums(const struct reading *r, struct row row) {
             }
             pixel[c] = count ? to_float(value * factor * (is_alpha ? 1.0 : light)) : 0.0f;
         }
+    }
+}
+
+/* What shines is albedo to denoisers, where it is a pass. */
+static void add_emission(const struct reading *r, struct row row) {
+    const uint32_t channels = r->info->channels;
+    const double *sums = sums_of(r, TRC_PASS_DENOISING_EMISSION);
+    for (uint64_t i = row.first; sums && i < row.end; i++) {
+        const uint32_t count = load_count(r->film, i);
+        for (uint32_t c = 0; count && c < channels; c++)
+            r->out[i * channels + c] += to_float(trc_sum_load(&sums[i * channels + c]) / count);
     }
 }
 
@@ -182,6 +189,8 @@ static void read_row(const struct reading *r, struct row row) {
     }
     if (r->pass == TRC_PASS_COMBINED && film->caught && !film->shows_shadows)
         add_shadows(r, row);
+    if (r->pass == TRC_PASS_DENOISING_ALBEDO)
+        add_emission(r, row);
 }
 
 /* ---- tiles ---- */
