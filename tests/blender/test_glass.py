@@ -171,3 +171,24 @@ def test_pane_in_a_world_of_spots(blender):
         off = abs(ours[..., :3].mean() / theirs[..., :3].mean() - 1.0)
         print(f"{distribution} {roughness} {ior}: {off:.4f}")
         assert off < (0.02 if is_walk else 0.006), (distribution, roughness, ior)
+
+
+def inside_refraction():
+    """Colour of the transmission of a ball of which the camera sees the inside, by both."""
+    import bpy
+    import scenes
+    scenes.empty(size=(32, 24))
+    camera = scenes.camera()
+    scenes.sphere(material=scenes.material("Refraction", "ShaderNodeBsdfRefraction", Color=(0.8, 0.6, 0.3),
+                                           Roughness=0.3, IOR=1.5))
+    camera.data.clip_start = -camera.location.y
+    bpy.context.view_layer.use_pass_transmission_color = True
+    return [seeds[..., :3] for seeds in scenes.passes_by_both(("TransCol",), SAMPLES)["TransCol"]]
+
+
+def test_colour_of_refraction(blender):
+    """From Blender 4 on it has none where a smooth surface would reflect all."""
+    ours, theirs = blender.run(inside_refraction)
+    assert theirs.any()
+    whole, tile = compare.unexplained(ours, theirs)
+    assert whole <= 5e-4 and tile <= 0.01

@@ -259,25 +259,6 @@ def test_holdouts(blender):
         assert ours == pytest.approx(theirs, rel=0.02, abs=0.03), f"{kind}, {name}"
 
 
-def inside_refraction():
-    """Colour of the transmission of a ball of which the camera sees the inside, by both."""
-    import bpy
-    import scenes
-    scenes.empty(size=(32, 24))
-    camera = scenes.camera()
-    scenes.sphere(material=scenes.material("Refraction", "ShaderNodeBsdfRefraction", Color=(0.8, 0.6, 0.3),
-                                           Roughness=0.3, IOR=1.5))
-    camera.data.clip_start = -camera.location.y
-    bpy.context.view_layer.use_pass_transmission_color = True
-    return _both(("TransCol",))["TransCol"]
-
-
-def test_refraction(blender):
-    """From Blender 4 on it has no colour where a smooth surface would reflect all."""
-    ours, theirs = blender.run(inside_refraction)
-    _agree(ours, theirs, "from within")
-
-
 METALS = {"smooth": (0.0, 1.0), "half rough": (0.3, 1.0), "tinted": (0.3, 0.1), "rough": (0.8, 0.1)}
 TINTED_SINCE = (4, 0), "metal had no tint of its edge"
 METAL_OFF = 3e-3, 0.02  # the tables of both are off by that much; the dip of the tint is .1 of the mean
@@ -428,7 +409,6 @@ def test_denoising_emission(blender):
 def inside_vector():
     """A camera that moves and turns, objects that move, turn and deform; with misses around."""
     import bpy
-    import scenes
     scene = _scene()
     bpy.context.view_layer.use_pass_vector = bpy.context.view_layer.use_pass_z = True
     bpy.data.objects.remove(bpy.data.objects["Back"])

@@ -24,7 +24,6 @@ struct preview {
 struct run {
     int x, x_end, y;
     size_t pixel; /* the first */
-    int step;     /* to the next one: -1 in the frame's mirror image */
 };
 
 /* The run that begins at a place of the strip and ends by x_end. */
@@ -33,7 +32,7 @@ static struct run run_of(const struct preview *p, int64_t left, int64_t bottom, 
     const struct trc_film *film = p->film;
     const uint32_t first = trc_mirror(left + x, film->width);
     struct run run = {x, x + 1, y,
-                      (size_t)trc_mirror(bottom + y, film->height) * film->width + first, 1};
+                      (size_t)trc_mirror(bottom + y, film->height) * film->width + first};
     const bool inside = left + x >= 0 && left + x < film->width;
     const uint32_t end = (first / TRC_TILE_SIZE + 1) * TRC_TILE_SIZE;
     if (inside)

@@ -124,8 +124,8 @@ TRC_INLINE uint32_t stream_node(const struct walk *w, uint32_t node, const struc
 #define CACHE_LINE 64
 #define NODE_LINES ((TRC_NODE_CHILDREN_BYTES + TRC_NODE_BOUNDS_BYTES + CACHE_LINE - 1) / CACHE_LINE)
 #define MOVING_NODE_LINES 3 /* with two keys */
-#define MOVING_LEAF_LINES 3
-#define LEAF_LINES 2 /* a leaf is of three triangles, mostly */
+#define MOVING_LEAF_LINES 3 /* three triangles, five vertices, two keys: 144 bytes */
+#define LEAF_LINES 2        /* a leaf is of three triangles, mostly */
 /* Asks for the memory of what waits on a stack; a TLAS is small. */
 TRC_INLINE void ref_prefetch(const struct walk *w, uint32_t ref, bool any, bool motion,
                              bool curves) {
