@@ -84,6 +84,52 @@ def test_floor_below_a_block(blender):
     assert theirs[0] * (1.0 - TOLERANCE) < ours[0] < theirs[0] * (2.0 + TOLERANCE) < 0.5 * ours[1]
 
 
+# Coloured balls of many bounces between facets: {name: (shader node, its inputs)}.
+COLOURED = {
+    "glass": ("ShaderNodeBsdfGlass", {"Color": (0.8, 0.4, 0.1, 1.0)}),
+    "Principled": ("ShaderNodeBsdfPrincipled", {"Base Color": (0.8, 0.4, 0.1, 1.0), "Transmission": 1.0}),
+    "black Principled": ("ShaderNodeBsdfPrincipled", {"Base Color": (0.0, 0.0, 0.0, 1.0), "Transmission": 1.0}),
+}
+COLOURED_ROUGHNESSES = (0.4, 0.6, 0.9)
+
+
+def inside_coloured_balls():
+    """{(name, roughness): [mean colour of a ball that fills the picture by Volley, by Cycles]}"""
+    import bpy
+    import scenes
+    scene = scenes.empty(size=(SIZE, SIZE))
+    scenes.camera(location=(0.0, -6.0, 0.0), lens=150.0)
+    scenes.world_color(scene.world, (WORLD,) * 3)
+    ball = scenes.sphere("Ball", 1.6)
+    means = {}
+    for name, (kind, inputs) in COLOURED.items():
+        for roughness in COLOURED_ROUGHNESSES:
+            made = scenes.material(name, kind, Roughness=roughness, IOR=1.45)
+            node = scenes.shader_of(made)
+            node.distribution = 'MULTI_GGX'
+            for socket, value in inputs.items():
+                node.inputs[socket if socket in node.inputs else "Transmission Weight"].default_value = value
+            ball.data.materials.clear()
+            ball.data.materials.append(made)
+            pair = []
+            for engine in ('VOLLEY', 'CYCLES'):
+                scenes.set_engine(engine, 4 * SAMPLES)
+                scene.volley.clamp_indirect = scene.cycles.sample_clamp_indirect = 0.0
+                pair.append(scenes.render()[..., :3].mean(axis=(0, 1)).tolist())
+            means[name, roughness] = pair
+    return means, bpy.app.version
+
+
+def test_coloured_balls(blender):
+    """Each bounce between facets takes the colour. Before Blender 4 Cycles walks from facet to facet, which is
+    followed from afar."""
+    means, version = blender.run(inside_coloured_balls)
+    for case, (ours, theirs) in means.items():
+        off = max(abs(a - b) for a, b in zip(ours, theirs)) / max(theirs)
+        print(*case, f"{off:.4f}")
+        assert off < (0.18 if version < (4, 0, 0) else 0.01), case
+
+
 # What the film's alpha says behind glass: {name: (shader node, its inputs)}.
 SEEN_THROUGH = {
     "clear": ("ShaderNodeBsdfGlass", {"Roughness": 0.0}),

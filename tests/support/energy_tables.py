@@ -138,27 +138,34 @@ def fitted(table):
     return np.clip(result, 0, 1)
 
 
+def mean_of_line(line, root=None):
+    """Over the cosine-weighted hemisphere, what is looked up in a row of a table, so that the rest adds up to what is
+    missing; root: of its alpha, None where columns go by the root of the cosine.
+
+    >>> round(float(mean_of_line(np.array([1.0, 1.0]), 0.5)), 6)
+    1.0
+    """
+    part = (np.arange(20000) + 0.5) / 20000
+    cosines, weights = part**2, 4 * part**3 / 20000
+    at = part if root is None else np.sqrt(cosines / (cosines + root * np.sqrt(1 - cosines * cosines)))
+    return (np.interp(at, steps(len(line)), line) * weights).sum()
+
+
 def reflection(sizes):
     size = sizes["TRC_GGX_ENERGY_SIZE"]
     table = np.array([[albedos(a, c)[0] for c in columns(size, np.sqrt(a))] for a in rows(size)])
     table = fitted(table)
-    # The mean of what is looked up, so that the rest adds up to what is missing; finer, for little is
-    # missing of a smooth surface, and most of that at grazing angles.
-    part = (np.arange(20000) + 0.5) / 20000
-    cosines, weights = part**2, 4 * part**3 / 20000
-    sines = np.sqrt(1 - cosines * cosines)
+    # Finer, for little is missing of a smooth surface, and most of that at grazing angles.
     mean = []
     for root in steps(sizes["TRC_GGX_ENERGY_MEANS"]):
-        at = np.sqrt(cosines / (cosines + root * sines))
         row = min(int(root * (size - 1)), size - 2)
         y = root * (size - 1) - row
-        line = table[row] * (1 - y) + table[row + 1] * y
-        mean.append((np.interp(at, steps(size), line) * weights).sum())
+        mean.append(mean_of_line(table[row] * (1 - y) + table[row + 1] * y, root))
     return table, np.array(mean)
 
 
 def glass(sizes):
-    """Both tables, from inside and then from outside."""
+    """Both tables, from inside and then from outside, and the means of the second."""
     count = sizes["TRC_GLASS_ENERGY_COLUMNS"]
     found = []
     for inside in (True, False):
@@ -168,7 +175,11 @@ def glass(sizes):
             found.append([[albedos(a, c, eta)[1:3] for c in columns(count, None if inside else np.sqrt(a))]
                           for a in rows(sizes["TRC_GLASS_ENERGY_ROWS"])])
     found = np.moveaxis(np.array(found), -1, 0)
-    return fitted(found[0]), fitted(found[1])
+    separable, level = fitted(found[0]), fitted(found[1])
+    roots = steps(sizes["TRC_GLASS_ENERGY_ROWS"])
+    means = [mean_of_line(line, None if slice_number < sizes["TRC_GLASS_ENERGY_INSIDE"] else root)
+             for slice_number, lines in enumerate(level) for root, line in zip(roots, lines)]
+    return separable, level, np.array(means)
 
 
 def glass_share(sizes):
@@ -206,16 +217,22 @@ def schlick_share(sizes):
 def compute(sizes):
     """Name and values of each table."""
     energy, mean = reflection(sizes)
-    separable, level = glass(sizes)
+    separable, level, level_mean = glass(sizes)
     return {
         "trc_ggx_energy": np.rint(energy * WHOLE).ravel(),
         "trc_ggx_energy_mean": mean,
         "trc_glass_energy": np.rint(separable * WHOLE).ravel(),
         "trc_correlated_glass_energy": np.rint(level * WHOLE).ravel(),
+        "trc_correlated_glass_energy_mean": np.rint(level_mean * WHOLE),
         "trc_glass_share": glass_share(sizes),
         "trc_dielectric_share_table": dielectric_share(sizes),
         "trc_schlick_share_table": schlick_share(sizes),
     }
+
+
+def is_whole(name):
+    """Whether a table is of parts of WHOLE."""
+    return "energy" in name and name != "trc_ggx_energy_mean"
 
 
 def read_sizes():
@@ -235,9 +252,8 @@ def as_source(tables):
     lines = ["/* Written by tests/support/energy_tables.py, which says how: change that, not this. */",
              '#include "model/ggx_energy_tables.h"', "", "/* clang-format off */"]
     for name, values in tables.items():
-        whole = "energy" in name and "mean" not in name
-        form, kind, line = ("%d", "uint16_t", 16) if whole else ("%.4ff", "float", 12)
-        if name.endswith("mean"):
+        form, kind, line = ("%d", "uint16_t", 16) if is_whole(name) else ("%.4ff", "float", 12)
+        if name == "trc_ggx_energy_mean":
             form, line = "%.7ff", 8
         lines.append(f"const {kind} {name}[] = {{")
         for start in range(0, len(values), line):
@@ -254,7 +270,7 @@ def main():
     worst = 0.0
     for name, values in tables.items():
         if name in present and len(present[name]) == len(values):
-            scale = WHOLE if "energy" in name and "mean" not in name else 1
+            scale = WHOLE if is_whole(name) else 1
             off = float(np.abs(values - present[name]).max()) / scale
             worst = max(worst, off)
             print(f"{name}: {len(values)} values, off by at most {off:.5f}")

@@ -13,9 +13,9 @@
 #define TRC_GLASS_ENERGY_OUTSIDE 11
 #define TRC_GLASS_ENERGY_ROWS 32
 #define TRC_GLASS_ENERGY_COLUMNS 36
-#define TRC_GLASS_ENERGY_COUNT                              \
-    ((TRC_GLASS_ENERGY_INSIDE + TRC_GLASS_ENERGY_OUTSIDE) * \
-     (TRC_GLASS_ENERGY_ROWS * TRC_GLASS_ENERGY_COLUMNS))
+#define TRC_GLASS_ENERGY_MEANS \
+    ((TRC_GLASS_ENERGY_INSIDE + TRC_GLASS_ENERGY_OUTSIDE) * TRC_GLASS_ENERGY_ROWS)
+#define TRC_GLASS_ENERGY_COUNT (TRC_GLASS_ENERGY_MEANS * TRC_GLASS_ENERGY_COLUMNS)
 #define TRC_GLASS_SHARE_SLICES 5 /* for each side of the surface */
 #define TRC_GLASS_SHARE_ROWS 5
 #define TRC_GLASS_SHARE_COLUMNS 9
@@ -36,6 +36,8 @@ extern const float trc_ggx_energy_mean[TRC_GGX_ENERGY_MEANS];
 extern const uint16_t trc_glass_energy[TRC_GLASS_ENERGY_COUNT];
 /* The same with height-correlated masking. */
 extern const uint16_t trc_correlated_glass_energy[TRC_GLASS_ENERGY_COUNT];
+/* Its mean over the cosine-weighted hemisphere, by slice and row. */
+extern const uint16_t trc_correlated_glass_energy_mean[TRC_GLASS_ENERGY_MEANS];
 /* Which part of trc_glass_energy is reflected: what colours light that scatters more than once,
  * where the factor of the macro normal is far off (rough glass from inside). */
 extern const float

@@ -151,6 +151,34 @@ static void furnace_is_white(void **state) {
     assert_true(half_width <= 0.0005);
 }
 
+/* Bounces between facets take the colour, too: of what one bounce lets out of a white furnace, and
+ * its mean, follows what all let out (Kulla and Conty 2017). */
+static void coloured_glass_takes_colour(void **state) {
+    (void)state;
+    const uint32_t single = TRC_DISTRIBUTION_GGX | TRC_DISTRIBUTION_CORRELATED;
+    const uint32_t multi = TRC_DISTRIBUTION_MULTI_GGX | TRC_DISTRIBUTION_CORRELATED;
+    /* Gauss and Legendre's points and weights over [0, 1]. */
+    const double x[] = {0.04691008, 0.23076534, 0.5, 0.76923466, 0.95308992};
+    const double w[] = {0.11846344, 0.23931434, 0.28444444, 0.23931434, 0.11846344};
+    const double colour = 0.5;
+    double worst = 0.0;
+    for (int i = 0; i < 6; i++) {
+        const float roughness = (float[]){0.4f, 0.6f, 0.9f}[i / 2];
+        struct model white = glass(single, roughness, 1.45f, i % 2);
+        double mean = 0.0;
+        for (int k = 0; k < 5; k++)
+            mean += 2.0 * w[k] * x[k] * furnace(&white, x[k], 0.0005, false).mean;
+        const double again = colour * mean / (1.0 - colour * (1.0 - mean));
+        struct model coloured = glass(multi, roughness, 1.45f, i % 2);
+        set3(&coloured, TRC_AT(GLASS, color), (float)colour, (float)colour, (float)colour);
+        const double cos_o = i < 3 ? 0.3 : 0.8, kept = furnace(&white, cos_o, 0.0005, false).mean;
+        const double found = furnace(&coloured, cos_o, 0.0005, false).mean;
+        worst = fmax(worst, fabs(found - colour * (kept + (1.0 - kept) * again)));
+    }
+    print_figure("39: white furnace, coloured glass", "off by at most %.4f", worst);
+    assert_true(worst <= 0.002);
+}
+
 /* Of fibres that absorb nothing, whose lobes are whole densities: all samples weigh 1 and no
  * density integrates to more. The Hair shader's share of directions beyond its strand is not found
  * by samples of lights. */
@@ -445,6 +473,7 @@ int main(void) {
         return 77;
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(furnace_is_white),
+        cmocka_unit_test(coloured_glass_takes_colour),
         cmocka_unit_test(huang_strands_keep_all_light),
         cmocka_unit_test(huang_samples_match_values),
         cmocka_unit_test(diffuse_albedos),

@@ -116,12 +116,10 @@ void trc_facets_set_multiple(struct trc_lobe *lobe, vvec3 wo, vvec3 per_bounce, 
 }
 
 vvec3 trc_facets_gain(vfloat cos_o, vfloat alpha, vvec3 per_bounce, vfloat *single_out) {
-    const vfloat mean = trc_ggx_mean_albedo(alpha), one = vf_one(), lost = one - mean;
+    const vfloat one = vf_one();
     const vfloat single = vf_max(trc_ggx_albedo(cos_o, alpha), vf_set(1e-3f));
     const vfloat missing = (one - single) / single;
-    const vvec3 again = v3(per_bounce.x * mean / (one - per_bounce.x * lost),
-                           per_bounce.y * mean / (one - per_bounce.y * lost),
-                           per_bounce.z * mean / (one - per_bounce.z * lost));
+    const vvec3 again = colour_of_bounces(per_bounce, trc_ggx_mean_albedo(alpha));
     *single_out = single;
     return v3_mad(again, missing, v3_splat(one));
 }

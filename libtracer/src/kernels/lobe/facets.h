@@ -179,6 +179,19 @@ TRC_INLINE vfloat mean_blend(vfloat ior) {
     return vf_saturate((mean - f0) / (vf_one() - f0));
 }
 
+/* Bound on what bounces between facets let out of the light that comes back to them. */
+#define MIN_KEPT 0.1f
+
+/* What the bounces after the first keep where each takes a colour from the light, over what they
+ * keep of white (Kulla and Conty 2017); mean: what one lets out, over the cosine-weighted
+ * hemisphere. */
+TRC_INLINE vvec3 colour_of_bounces(vvec3 per_bounce, vfloat mean) {
+    const vfloat one = vf_one(), lost = one - mean, minimum = vf_set(MIN_KEPT);
+    return v3(per_bounce.x * mean / vf_max(one - per_bounce.x * lost, minimum),
+              per_bounce.y * mean / vf_max(one - per_bounce.y * lost, minimum),
+              per_bounce.z * mean / vf_max(one - per_bounce.z * lost, minimum));
+}
+
 /* ---- kernels/lobe/facets.c ---- */
 
 /* As trc_lobe_model.direction, of all distributions. */

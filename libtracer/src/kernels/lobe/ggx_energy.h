@@ -95,34 +95,28 @@ TRC_INLINE vfloat trc_ggx_anisotropic_albedo(vvec3 wo, vfloat alpha_x, vfloat al
 /* A roughness of 0.1. */
 #define TRC_GLASS_ROUGH_ALPHA 0.01f
 
-/* Of one of the tables of glass. */
-TRC_INLINE vfloat trc_glass_energy_lookup(const uint16_t *table, vfloat cos_theta, vfloat alpha,
-                                          vfloat ior) {
-    const int columns = TRC_GLASS_ENERGY_COLUMNS, size = TRC_GLASS_ENERGY_ROWS * columns;
-    const vfloat depth = (ior - vf_one()) / (ior + vf_one()), root = vf_safe_sqrt(alpha);
+/* The first of the four slices of glass that a cubic runs through, and where between them. */
+struct trc_glass_slices {
+    vint first;
+    vfloat place;
+};
+TRC_INLINE struct trc_glass_slices trc_glass_slices_of(vfloat ior) {
+    const vfloat depth = (ior - vf_one()) / (ior + vf_one());
     const vmask inside = vf_lt(depth, vf_zero());
-    vfloat x, y;
-    const vfloat across =
-        vf_select(inside, vf_safe_sqrt(cos_theta), trc_energy_column(cos_theta, root));
-    const vint column = trc_grid_cell(across, columns, &x);
-    const vint row = trc_grid_cell(root, TRC_GLASS_ENERGY_ROWS, &y);
-    /* The first of the four slices that the cubic runs through, and where between them. */
     const vfloat part = vf_saturate(vf_abs(depth));
     const vfloat slices = vf_select(inside, vf_set((float)TRC_GLASS_ENERGY_INSIDE),
                                     vf_set((float)TRC_GLASS_ENERGY_OUTSIDE));
     const vfloat place = vf_sqrt(vf_sqrt(part * vf_sqrt(part))) * (slices - vf_one());
     const vfloat first =
         vf_max(vf_min(vf_floor(place) - vf_one(), slices - vf_set(4.0f)), vf_zero());
-    const vint slice =
-        vf_to_int(first) + vi_select(inside, vi_set(0), vi_set(TRC_GLASS_ENERGY_INSIDE));
-    const vint at = slice * vi_set(size) + row * vi_set(columns) + column;
-    vfloat value[4];
-    for (int i = 0; i < 4; i++) {
-        const uint16_t *here = table + i * size;
-        value[i] = vf_lerp(trc_energy_row(here, at, x), trc_energy_row(here + columns, at, x), y);
-    }
+    return (struct trc_glass_slices){
+        vf_to_int(first) + vi_select(inside, vi_set(0), vi_set(TRC_GLASS_ENERGY_INSIDE)),
+        place - first};
+}
+/* What is kept, by the parts in four slices. */
+TRC_INLINE vfloat trc_between_slices(const vfloat value[4], vfloat z, vfloat alpha) {
     /* Newton's form by forward differences. */
-    const vfloat z = place - first, z1 = z - vf_one(), z2 = z1 - vf_one();
+    const vfloat z1 = z - vf_one(), z2 = z1 - vf_one();
     const vfloat d0 = value[1] - value[0], d1 = value[2] - value[1], d2 = value[3] - value[2];
     const vfloat e0 = d1 - d0, e1 = d2 - d1;
     const vfloat parts =
@@ -133,11 +127,41 @@ TRC_INLINE vfloat trc_glass_energy_lookup(const uint16_t *table, vfloat cos_thet
     const vfloat rough = vf_saturate(alpha * vf_set(1.0f / TRC_GLASS_ROUGH_ALPHA));
     return vf_one() - (vf_one() - energy) * rough;
 }
+/* Of one of the tables of glass. */
+TRC_INLINE vfloat trc_glass_energy_lookup(const uint16_t *table, vfloat cos_theta, vfloat alpha,
+                                          vfloat ior) {
+    const int columns = TRC_GLASS_ENERGY_COLUMNS, size = TRC_GLASS_ENERGY_ROWS * columns;
+    const vfloat root = vf_safe_sqrt(alpha);
+    vfloat x, y;
+    const vfloat across = vf_select(vf_lt(ior, vf_one()), vf_safe_sqrt(cos_theta),
+                                    trc_energy_column(cos_theta, root));
+    const vint column = trc_grid_cell(across, columns, &x);
+    const vint row = trc_grid_cell(root, TRC_GLASS_ENERGY_ROWS, &y);
+    const struct trc_glass_slices slices = trc_glass_slices_of(ior);
+    const vint at = slices.first * vi_set(size) + row * vi_set(columns) + column;
+    vfloat value[4];
+    for (int i = 0; i < 4; i++) {
+        const uint16_t *here = table + i * size;
+        value[i] = vf_lerp(trc_energy_row(here, at, x), trc_energy_row(here + columns, at, x), y);
+    }
+    return trc_between_slices(value, slices.place, alpha);
+}
 TRC_INLINE vfloat trc_glass_albedo(vfloat cos_theta, vfloat alpha, vfloat ior) {
     return trc_glass_energy_lookup(trc_glass_energy, cos_theta, alpha, ior);
 }
 TRC_INLINE vfloat trc_correlated_glass_albedo(vfloat cos_theta, vfloat alpha, vfloat ior) {
     return trc_glass_energy_lookup(trc_correlated_glass_energy, cos_theta, alpha, ior);
+}
+/* Its mean over the cosine-weighted hemisphere. */
+TRC_INLINE vfloat trc_correlated_glass_mean_albedo(vfloat alpha, vfloat ior) {
+    vfloat y, value[4];
+    const vint row = trc_grid_cell(vf_safe_sqrt(alpha), TRC_GLASS_ENERGY_ROWS, &y);
+    const struct trc_glass_slices slices = trc_glass_slices_of(ior);
+    const vint at = slices.first * vi_set(TRC_GLASS_ENERGY_ROWS) + row;
+    for (int i = 0; i < 4; i++)
+        value[i] =
+            trc_energy_row(trc_correlated_glass_energy_mean + i * TRC_GLASS_ENERGY_ROWS, at, y);
+    return trc_between_slices(value, slices.place, alpha);
 }
 TRC_INLINE vfloat trc_glass_reflected_share(vfloat cos_theta, vfloat alpha, vfloat ior) {
     const int slices = TRC_GLASS_SHARE_SLICES, rows = TRC_GLASS_SHARE_ROWS;

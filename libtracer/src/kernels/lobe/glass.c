@@ -98,9 +98,7 @@ static vfloat kept_by_glass(vfloat albedo, vfloat eta) {
     return vf_select(is_nothing, vf_one(), albedo);
 }
 
-/* Bounds on what is taken from tables: the part that single scattering keeps, and of the rest the
- * share that is reflected. */
-#define MIN_KEPT 0.1f
+/* Bounds on the share of reflection that is taken from tables. */
 #define MIN_SHARE 0.05f
 #define MAX_SHARE 0.95f
 
@@ -149,7 +147,22 @@ static vvec3 smooth_reflectance(const struct trc_lobe *lobe, vfloat cos_o) {
     return v3_lerp(lobe->f0, lobe->f90, vf_saturate(trc_fresnel_blend(cos_o, lobe->ior)));
 }
 
-void trc_add_correlated_glass(struct trc_setup *c, vvec3 reflected, vvec3 refracted,
+/* What all bounces between facets keep of a colour after its first: each takes what refraction does
+ * or, where nothing is refracted, what reflection does. kept: what the first lets out. */
+static vvec3 coloured_again(vvec3 reflected, vvec3 refracted, const struct trc_fresnel *fresnel,
+                            vfloat kept, vfloat alpha, vfloat eta) {
+    const vvec3 of_reflection =
+        v3_saturate(v3_mul(reflected, v3_lerp(fresnel->f0, fresnel->f90, mean_blend(eta))));
+    const vvec3 per_bounce =
+        v3_select(vf_gt(v3_max(refracted), vf_zero()), refracted, of_reflection);
+    const vvec3 taken = v3_sub(per_bounce, v3_splat(vf_one()));
+    if (!vm_any(vf_ne(v3_dot(taken, taken), vf_zero())))
+        return v3_splat(vf_one());
+    const vfloat mean = kept_by_glass(trc_correlated_glass_mean_albedo(alpha, eta), eta);
+    return v3_lerp(colour_of_bounces(per_bounce, mean), v3_splat(vf_one()), kept);
+}
+
+void trc_add_correlated_glass(struct trc_setup *c, vvec3 weight, vvec3 reflected, vvec3 refracted,
                               const struct trc_fresnel *fresnel, vvec3 n, vfloat alpha, vfloat eta,
                               uint32_t mode) {
     const vfloat cos_o = v3_dot(n, c->s->wo);
@@ -157,9 +170,11 @@ void trc_add_correlated_glass(struct trc_setup *c, vvec3 reflected, vvec3 refrac
     if (distribution_of(mode) == TRC_LOBE_MULTI_GGX) {
         kept = kept_by_glass(trc_correlated_glass_albedo(cos_o, alpha, eta), eta);
         kept = vf_max(kept, vf_set(MIN_KEPT));
-        reflected = v3_scale(reflected, vf_rcp(kept));
-        refracted = v3_scale(refracted, vf_rcp(kept));
+        weight = v3_mul(weight, coloured_again(reflected, refracted, fresnel, kept, alpha, eta));
+        weight = v3_scale(weight, vf_rcp(kept));
     }
+    reflected = v3_mul(weight, reflected);
+    refracted = v3_mul(weight, refracted);
     struct trc_lobe *reflect =
         trc_add_dielectric(c, TRC_LOBE_REFLECT, reflected, n, alpha, eta, mode);
     if (reflect)
@@ -180,7 +195,7 @@ vfloat trc_reflected_part(vfloat f) {
 }
 
 static void add_glass(struct trc_setup *c, const struct trc_leaf *leaf, vfloat weight) {
-    const vvec3 tint = v3_scale(colour(c, leaf, TRC_AT(GLASS, color)), weight);
+    const vvec3 color = colour(c, leaf, TRC_AT(GLASS, color));
     const vvec3 n = trc_leaf_normal(c, leaf, TRC_AT(GLASS, normal));
     const vfloat alpha = vf_square(number(c, leaf, TRC_AT(GLASS, roughness)));
     const vfloat ior = number(c, leaf, TRC_AT(GLASS, ior)), eta = trc_relative_ior(c, ior);
@@ -188,14 +203,16 @@ static void add_glass(struct trc_setup *c, const struct trc_leaf *leaf, vfloat w
         struct trc_fresnel fresnel = blend_to_white(v3_splat(trc_fresnel_normal(eta)));
         trc_thin_film_cover(c, leaf, TRC_AT(GLASS, film_thickness), trc_ior_above(c, ior),
                             TRC_WHOLE_FILM_5, &fresnel);
-        trc_add_correlated_glass(c, tint, tint, &fresnel, n, vf_saturate(alpha), eta, leaf->mode);
+        trc_add_correlated_glass(c, v3_splat(weight), color, color, &fresnel, n, vf_saturate(alpha),
+                                 eta, leaf->mode);
         return;
     }
     if (leaf->mode == TRC_DISTRIBUTION_MULTI_GGX) {
-        const vvec3 color = v3_saturate(colour(c, leaf, TRC_AT(GLASS, color)));
-        trc_add_multi_glass(c, v3_splat(weight), color, color, n, alpha, eta);
+        const vvec3 tint = v3_saturate(color);
+        trc_add_multi_glass(c, v3_splat(weight), tint, tint, n, alpha, eta);
         return;
     }
+    const vvec3 tint = v3_scale(color, weight);
     const vfloat f = trc_reflected_part(trc_fresnel_dielectric(v3_dot(n, c->s->wo), eta));
     trc_add_dielectric(c, TRC_LOBE_REFLECT, v3_scale(tint, f), n, alpha, eta, leaf->mode);
     trc_add_dielectric(c, TRC_LOBE_REFRACT, v3_scale(tint, vf_one() - f), n, alpha, eta,

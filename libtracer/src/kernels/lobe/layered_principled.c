@@ -227,7 +227,7 @@ static void layered_glass(struct trc_setup *c, const struct trc_leaf *leaf, vvec
     trc_thin_film_cover(c, leaf, TRC_AT(LAYERED_PRINCIPLED, film_thickness), trc_ior_above(c, ior),
                         whole_film(leaf), &fresnel);
     trc_add_correlated_glass(
-        c, weight, v3_mul(weight, tint), &fresnel, n,
+        c, weight, v3_splat(vf_one()), tint, &fresnel, n,
         vf_square(vf_saturate(number(c, leaf, TRC_AT(LAYERED_PRINCIPLED, roughness)))), eta,
         distribution(leaf) | TRC_DISTRIBUTION_CORRELATED);
 }

@@ -201,8 +201,9 @@ void trc_add_thin_glass(struct trc_setup *c, const struct trc_thin_glass *glass)
  * keep all energy together. reflected, refracted: colours of the lobes. */
 void trc_add_multi_glass(struct trc_setup *c, vvec3 weight, vvec3 reflected, vvec3 refracted,
                          vvec3 n, vfloat alpha, vfloat eta);
-/* Glass of Cycles 4: both lobes with the factor of the micro-normal. */
-void trc_add_correlated_glass(struct trc_setup *c, vvec3 reflected, vvec3 refracted,
+/* Glass of Cycles 4: both lobes with the factor of the micro-normal. reflected, refracted: their
+ * colours. */
+void trc_add_correlated_glass(struct trc_setup *c, vvec3 weight, vvec3 reflected, vvec3 refracted,
                               const struct trc_fresnel *fresnel, vvec3 n, vfloat alpha, vfloat eta,
                               uint32_t mode);
 
