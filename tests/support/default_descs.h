@@ -79,7 +79,9 @@ struct default_material {
 
 DEFAULT_INLINE void default_material_init(struct default_material *m, uint32_t type) {
     memset(m, 0, sizeof *m);
-    const uint32_t input_count = type == TRC_NODE_DIFFUSE ? 3 : 2; /* emission, background: 2 */
+    const uint32_t input_count = type == TRC_NODE_DIFFUSE       ? 3
+                                 : type == TRC_NODE_TRANSPARENT ? 1
+                                                                : 2; /* emission, background */
     m->node = (trc_node){.type = type, .input_count = input_count};
     m->inputs[0] = (trc_node_input){.node = TRC_INPUT_CONSTANT, .value = {0.5f, 0.5f, 0.5f}};
     m->inputs[1] = (trc_node_input){.node = TRC_INPUT_CONSTANT, .value = {1.0f}};

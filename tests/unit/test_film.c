@@ -225,10 +225,37 @@ static void catchers_while_written(void **state) {
     assert_int_equal(trc_scene_destroy(scene), TRC_OK);
 }
 
+/* What passes on more than all light covers nothing, not less. */
+static void alpha_is_a_part(void **state) {
+    (void)state;
+    enum { FLOATS = 4 * SMALL * SMALL };
+    static float pixels[FLOATS];
+    const trc_scene scene = fixture_level_view();
+    const float corners[12] = {-9, -9, 0, 9, -9, 0, 9, 9, 0, -9, 9, 0};
+    fixture_quad(scene, corners, fixture_material(scene, TRC_NODE_TRANSPARENT, 3.0f));
+    assert_int_equal(trc_scene_commit(scene), TRC_OK);
+    trc_render_desc desc = default_render_desc(SMALL, SMALL, 4);
+    desc.film_transparent = 1;
+    desc.denoise = TRC_DENOISE_PREVIEW;
+    trc_render render = 0;
+    assert_int_equal(trc_render_start(scene, &desc, &render), TRC_OK);
+    assert_int_equal(trc_render_wait(render, -1.0), TRC_OK);
+    assert_int_equal(trc_render_read(render, TRC_PASS_COMBINED, pixels, FLOATS), TRC_OK);
+    for (int i = 0; i < FLOATS; i++)
+        assert_true(pixels[i] == 0.0f);
+    assert_int_equal(trc_render_read_preview(render, pixels, FLOATS), TRC_OK);
+    for (int i = 0; i < FLOATS; i++)
+        assert_true(pixels[i] == 0.0f);
+    assert_int_equal(trc_render_destroy(render), TRC_OK);
+    assert_int_equal(trc_scene_destroy(scene), TRC_OK);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(all_samples), cmocka_unit_test(interleavings),
-        cmocka_unit_test(whole_batches), cmocka_unit_test(never_too_bright),
-        cmocka_unit_test(catchers_while_written)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(all_samples),
+                                       cmocka_unit_test(interleavings),
+                                       cmocka_unit_test(whole_batches),
+                                       cmocka_unit_test(never_too_bright),
+                                       cmocka_unit_test(catchers_while_written),
+                                       cmocka_unit_test(alpha_is_a_part)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -83,6 +83,10 @@ static void read_counts(const struct reading *r, struct row row) {
         r->out[i] = (float)load_count(r->film, i);
 }
 
+/* How much of a pixel the picture covers, of the sum of so many samples. What is transparent by
+ * more than white, of which the sum tells less than nothing, covers nothing, as in Cycles. */
+static double coverage(double sum, double count) { return fmin(fmax(sum / count, 0.0), 1.0); }
+
 /* Passes that are sums or values of samples. Light is divided by its colour as Cycles divides it.
  */
 static void read_sums(const struct reading *r, struct row row) {
@@ -99,15 +103,16 @@ static void read_sums(const struct reading *r, struct row row) {
             weight = trc_sum_load(&sums[i * stride + channels]);
         const double factor = count && weight > 0.0 ? 1.0 / weight : 0.0;
         for (uint32_t c = 0; c < channels; c++) {
-            const bool is_alpha = r->pass == TRC_PASS_COMBINED && c == 3;
             double value = trc_sum_load(&sums[i * stride + c]);
             if (divisor) {
                 /* Both are sums of the same samples: the counts cancel. */
                 const double by = trc_sum_load(&divisor[i * channels + c]);
                 value = by != 0.0 ? value / by * count : 0.0;
             }
-            pixel[c] = count ? to_float(value * factor * (is_alpha ? 1.0 : light)) : 0.0f;
+            pixel[c] = count ? to_float(value * factor * light) : 0.0f;
         }
+        if (r->pass == TRC_PASS_COMBINED && count)
+            pixel[3] = (float)coverage(trc_sum_load(&sums[i * stride + 3]), count);
     }
 }
 
@@ -138,7 +143,9 @@ static void read_shadows(const struct reading *r, struct row row) {
     for (uint64_t i = row.first; i < row.end; i++) {
         double remains[3] = {1.0, 1.0, 1.0}, part = 0.0;
         if (caught) {
-            const double open = load_count(film, i) - trc_sum_load(&combined[4 * i + 3]);
+            const double count = load_count(film, i);
+            const double sum = trc_sum_load(&combined[4 * i + 3]);
+            const double open = count > 0.0 ? count * (1.0 - coverage(sum, count)) : 0.0;
             remains_of(&caught[i], remains);
             part = open > 0.0 ? fmin(trc_sum_load(&caught[i].coverage) / open, 1.0) : 0.0;
         }
@@ -161,7 +168,8 @@ static void add_shadows(const struct reading *r, struct row row) {
         remains_of(caught, remains);
         const double light = fmin(fmax((remains[0] + remains[1] + remains[2]) / 3.0, 0.0), 1.0);
         float *pixel = r->out + 4 * i;
-        pixel[3] = to_float(pixel[3] + part * (film->is_transparent ? 1.0 - light : 1.0));
+        pixel[3] =
+            to_float(fmin(pixel[3] + part * (film->is_transparent ? 1.0 - light : 1.0), 1.0));
         for (int c = 0; c < 3; c++)
             pixel[c] = to_float(pixel[c] +
                                 trc_sum_load(&caught->background[c]) / count * light * r->exposure);

@@ -185,7 +185,8 @@ static void prepare_means(const struct planes *p, int at, float exposure) {
         mean_of(p->albedo + c * TRC_PREVIEW_FLOATS, at, scale, 0.0f);
         mean_of(p->normal + c * TRC_PREVIEW_FLOATS, at, scale, -MOST);
     }
-    mean_of(p->color + 3 * TRC_PREVIEW_FLOATS, at, scale, 0.0f);
+    float *alpha = p->color + 3 * TRC_PREVIEW_FLOATS + at;
+    vf_store(alpha, vf_min(cut(vf_load(alpha) * scale, 0.0f), vf_set(1.0f)));
     mean_of(p->depth, at, scale, 0.0f);
     vf_store(p->depth + at, vf_select(some, vf_log1p(vf_load(p->depth + at)), vf_set(NO_DEPTH)));
 }
