@@ -1033,6 +1033,7 @@ FUNCTIONS = {
     "trc_instance_desc_default": (InstanceDesc, ()),
     "trc_instance_create": (c_int32, (c_uint64, POINTER(InstanceDesc), POINTER(c_uint64))),
     "trc_instance_update": (c_int32, (c_uint64, c_uint64, POINTER(InstanceDesc))),
+    "trc_instances_move": (c_int32, (c_uint64, c_void_p, c_uint64, c_uint32, c_void_p, c_uint64)),
     "trc_instance_destroy": (c_int32, (c_uint64, c_uint64)),
     "trc_light_desc_default": (LightDesc, ()),
     "trc_light_create": (c_int32, (c_uint64, POINTER(LightDesc), POINTER(c_uint64))),

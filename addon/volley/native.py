@@ -374,6 +374,12 @@ class Scene:
         desc, keep = self._instance_desc(**values)
         self._edit("trc_instance_update", instance, ctypes.byref(desc))
 
+    def move_instances(self, instances, transforms):
+        """New transforms (instances, keys, 12) for several, which keep their numbers of keys."""
+        ids, transforms = _array(instances, np.uint64), _array(transforms, np.float32)
+        self._edit("trc_instances_move", _address(ids), len(ids), transforms.shape[1], _address(transforms),
+                   transforms.size)
+
     def destroy_instance(self, instance):
         self._edit("trc_instance_destroy", instance)
 

@@ -196,7 +196,7 @@ def inside_resync():
 def test_a_second_sync_sends_only_what_differs(blender):
     told = blender.run(inside_resync)
     assert told["nothing"] == []
-    assert told["moved"] == ["update_instance"]
+    assert told["moved"] == ["move_instances"]
     assert told["posed"] == ["update_mesh"]
     assert told["topology"] == ["create_mesh", "destroy_mesh", "update_instance"]
     assert told["material"] == ["update_material"]
@@ -417,7 +417,7 @@ def inside_edit_costs():
 
 def test_an_edit_sends_what_it_touches(blender):
     assert blender.run(inside_edit_costs) == {
-        "pose": ["update_mesh"], "transform": ["update_instance"], "material": ["update_material"],
+        "pose": ["update_mesh"], "transform": ["move_instances"], "material": ["update_material"],
         "light_energy": ["update_light"], "move_light": ["update_light"], "world": ["update_material"],
         "ray_visibility": ["update_instance"]}
 

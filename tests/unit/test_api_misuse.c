@@ -40,6 +40,7 @@ static void refuse_scene(trc_scene bad) {
     REFUSED(HANDLE, trc_mesh_destroy(bad, 1));
     REFUSED(HANDLE, trc_instance_create(bad, &instance, &id));
     REFUSED(HANDLE, trc_instance_update(bad, 1, &instance));
+    REFUSED(HANDLE, trc_instances_move(bad, &id, 1, 1, identity_transform, 12));
     REFUSED(HANDLE, trc_instance_destroy(bad, 1));
     REFUSED(HANDLE, trc_material_create(bad, &material.desc, &id));
     REFUSED(HANDLE, trc_material_update(bad, 1, &material.desc));
@@ -116,6 +117,7 @@ static void bad_ids(void **state) {
         REFUSED(HANDLE, trc_mesh_destroy(scene, bad[i]));
         REFUSED(HANDLE, trc_instance_create(scene, &instance, &id));
         REFUSED(HANDLE, trc_instance_update(scene, bad[i], &instance));
+        REFUSED(HANDLE, trc_instances_move(scene, &bad[i], 1, 1, identity_transform, 12));
         REFUSED(HANDLE, trc_instance_destroy(scene, bad[i]));
         REFUSED(HANDLE, trc_material_update(scene, bad[i], &material.desc));
         REFUSED(HANDLE, trc_material_destroy(scene, bad[i]));

@@ -5,7 +5,7 @@
 /* A floor under a roof, a sun above, and what is edited of them. */
 struct edited {
     trc_scene scene;
-    trc_id roof, roof_mesh, world, image;
+    trc_id roof, roof_mesh, roof_instance, world, image;
 };
 
 static trc_material_desc node_material(struct node_list *list, uint32_t type, float value) {
@@ -58,7 +58,7 @@ static struct edited edited_make(uint32_t roof, float value, uint32_t bright) {
     static const float corners[12] = {1, -1, 3, 2, -1, 3, 2, 1, 3, 1, 1, 3};
     const trc_mesh_desc quad = fixture_quad_desc(corners);
     assert_ok(trc_mesh_create(e.scene, &quad, &e.roof_mesh));
-    fixture_instance(e.scene, e.roof_mesh, identity_transform, e.roof, 0);
+    e.roof_instance = fixture_instance(e.scene, e.roof_mesh, identity_transform, e.roof, 0);
     trc_light_desc sun = default_light_desc();
     trc_id id = 0;
     sun.type = TRC_LIGHT_SUN;
@@ -154,11 +154,47 @@ static void images_of_the_world_change(void **state) {
     expect_same(&e, &fresh, before);
 }
 
+/* Several at once, as one by one; all or none. */
+static void instances_move(void **state) {
+    (void)state;
+    static const float places[24] = {1, 0, 0, 0.7f, 0, 1, 0, 0,    0, 0, 1, 0,
+                                     1, 0, 0, 1.5f, 0, 1, 0, 0.3f, 0, 0, 1, 1};
+    static float before[4 * LEVEL_PIXELS], after[4 * LEVEL_PIXELS];
+    const struct edited e = edited_make(TRC_NODE_DIFFUSE, 0.5f, 40);
+    const struct edited fresh = edited_make(TRC_NODE_DIFFUSE, 0.5f, 40);
+    trc_id moved[2] = {e.roof_instance};
+    moved[1] = fixture_instance(e.scene, e.roof_mesh, identity_transform, e.roof, 0);
+    draw(e.scene, before);
+    const trc_id refused[2] = {moved[0], e.roof_mesh};
+    assert_int_equal(trc_instances_move(e.scene, refused, 2, 1, places, 24),
+                     TRC_ERROR_INVALID_HANDLE);
+    assert_int_equal(trc_instances_move(e.scene, moved, 1, 2, places, 24),
+                     TRC_ERROR_INVALID_ARGUMENT); /* it has one key */
+    assert_int_equal(trc_instances_move(e.scene, moved, 2, 1, places, 12),
+                     TRC_ERROR_INVALID_ARGUMENT);
+    assert_int_equal(trc_instances_move(e.scene, moved, UINT64_MAX / 16, 32, places, 24),
+                     TRC_ERROR_TOO_LARGE);
+    assert_int_equal(trc_instances_move(e.scene, NULL, 2, 1, places, 24),
+                     TRC_ERROR_INVALID_ARGUMENT);
+    assert_ok(trc_instances_move(e.scene, NULL, 0, 1, NULL, 0));
+    draw(e.scene, after);
+    assert_memory_equal(before, after, sizeof before);
+    assert_ok(trc_instances_move(e.scene, moved, 2, 1, places, 24));
+    trc_instance_desc desc = default_instance_desc(fresh.roof_mesh);
+    desc.transforms = places;
+    desc.materials = &fresh.roof;
+    desc.material_count = 1;
+    assert_ok(trc_instance_update(fresh.scene, fresh.roof_instance, &desc));
+    fixture_instance(fresh.scene, fresh.roof_mesh, places + 12, fresh.roof, 0);
+    expect_same(&e, &fresh, before);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(materials_change),
         cmocka_unit_test(trees_of_transparent_meshes_stay),
         cmocka_unit_test(images_of_the_world_change),
+        cmocka_unit_test(instances_move),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

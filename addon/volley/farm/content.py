@@ -42,6 +42,12 @@ class NotedScene(native.Scene):
         super().set_world(**values)
         self._single["world"], self._told = values, None
 
+    def move_instances(self, instances, transforms):
+        super().move_instances(instances, transforms)
+        self._told = None
+        for key, places in zip(instances, transforms):
+            self._noted["instance"][key].update(_kept({"transforms": places}))
+
     def content(self):
         """{what: digest} and {what: [sum, how far two of them may be apart]}."""
         if self._told is None:

@@ -70,14 +70,17 @@ _PLAIN_LENGTH = 2  # of the key of an object that stands for itself
 
 def key_of(instance):
     """What names an instance at every time and in every sync: object, instancer, numbers."""
-    blender_object = instance.object
-    data = blender_object.data
-    kind = type(data).__name__ if data is not None else ""
+    if type(instance) is Plain:
+        return instance.key
     if not instance.is_instance:
-        return (blender_object.name_full, kind)
+        return _plain_key(instance.object)
     parent = instance.parent
-    return (blender_object.name_full, kind, parent.name_full if parent else "",
-            tuple(instance.persistent_id))
+    return (*_plain_key(instance.object), parent.name_full if parent else "", tuple(instance.persistent_id))
+
+
+def _plain_key(blender_object):
+    data = blender_object.data
+    return blender_object.name_full, type(data).__name__ if data is not None else ""
 
 
 class Plain:
@@ -86,7 +89,7 @@ class Plain:
     is_instance, parent, show_self, show_particles = False, None, True, True
 
     def __init__(self, evaluated):
-        self.object, self.matrix_world = evaluated, evaluated.matrix_world
+        self.object, self.matrix_world, self.key = evaluated, evaluated.matrix_world, _plain_key(evaluated)
 
 
 def names_in(key):
@@ -234,8 +237,10 @@ class InstanceEntry:
 
     ids: tuple
     item: Item
-    place: tuple      # its mesh in the library, where it is, and whether its normals are the world's
-    signature: tuple  # all else
+    transforms: tuple  # where the item was
+    key_count: int     # of the library's transforms
+    mesh: tuple        # its mesh in the library, and whether its normals are the world's
+    signature: tuple   # all else
 
 
 @dataclass
@@ -246,55 +251,60 @@ class Instances:
     warnings: object
     _entries: dict = field(default_factory=dict)
     _in_world: set = field(default_factory=set)
+    _moved: list = field(default_factory=list)  # entries of which only the transforms are others, yet to be sent
 
     def update(self, items, mesh_ids, in_world, moving):
         """Make the library's instances those of the items; mesh_ids: library id by mesh key. One that the library
         refuses is left out. in_world: keys of meshes that Cycles moves to world space if they have one user, and
         no material of moving, the ids of those that move vertices."""
-        seen = set()
         users = Counter(item.mesh_key for item in items) if in_world else {}
         self._in_world = {key for key in in_world if users[key] == 1}
-        for item in items:
-            mesh_id = mesh_ids.get(item.mesh_key)
-            if mesh_id is None:
-                continue
-            try:
-                self._update_one(item, mesh_id, moving)
-                seen.add(item.key)
-            except native.TracerError as error:
-                if error.status != abi.StatusCode.ERROR_INVALID_ARGUMENT:
-                    raise
-                self.warnings.add(f"Object '{item.owner}': {error}; it is left out")
+        shown = [item for item in items if mesh_ids.get(item.mesh_key) is not None]
+        refused = self._update_all(shown, mesh_ids, moving, "it is left out")
+        seen = {item.key for item in shown} - refused
         for key in [key for key in self._entries if key not in seen]:
             for instance_id in self._entries.pop(key).ids:
                 self.scene.destroy_instance(instance_id)
 
-    def change(self, item, mesh_id, moving):
-        """Bring one of them up to date, as update(); one that the library refuses goes on as it was."""
-        try:
-            self._update_one(item, mesh_id, moving)
-        except native.TracerError as error:
-            if error.status != abi.StatusCode.ERROR_INVALID_ARGUMENT:
-                raise
-            self.warnings.add(f"Object '{item.owner}': {error}; it stays as it was")
+    def change(self, items, mesh_ids, moving):
+        """Bring some of them up to date, as update(); what the library refuses goes on as it was."""
+        self._update_all(items, mesh_ids, moving, "it stays as it was")
 
     def names(self):
         """The names in mattes, of objects and of assets: two sets."""
         entries = self._entries.values()
         return {entry.item.name for entry in entries}, {entry.item.asset for entry in entries}
 
+    def _update_all(self, items, mesh_ids, moving, outcome):
+        """Bring instances up to date; the keys of those that the library refused, which are warned of."""
+        refused = set()
+        for item in items:
+            try:
+                self._update_one(item, mesh_ids[item.mesh_key], moving)
+            except native.TracerError as error:
+                if error.status != abi.StatusCode.ERROR_INVALID_ARGUMENT:
+                    raise
+                self.warnings.add(f"Object '{item.owner}': {error}; {outcome}")
+                refused.add(item.key)
+        self._send_moved()
+        return refused
+
     def _update_one(self, item, mesh_id, moving):
+        """Send an item, or note its entry among those that moved."""
         is_in_world = item.mesh_key in self._in_world and moving.isdisjoint(item.materials)
-        place = mesh_id, tuple(item.transforms), is_in_world
+        shown = mesh_id, is_in_world
         entry = self._entries.get(item.key)
-        if entry is not None and entry.item is item and entry.place == place:
-            return
-        signature = (item.materials, item.holes, item.visibility, item.pass_index, item.random, item.color, item.name,
-                     item.asset, item.light_group, item.flags, item.links, item.offsets, item.values)
-        if entry is not None and (entry.place, entry.signature) == (place, signature):
+        if entry is not None and entry.mesh == shown and (
+                entry.item is item or entry.signature == _signature(item)):
             entry.item = item
-            return
-        transforms = motion.follow_turns(collapse(item.transforms))
+            if entry.transforms != tuple(item.transforms):
+                self._moved.append(entry)
+        else:
+            self._send(item, entry, shown, motion.follow_turns(collapse(item.transforms)))
+
+    def _send(self, item, entry, shown, transforms):
+        """Have all of an item in the library; entry: the former one, None where there is none."""
+        mesh_id, is_in_world = shown
         values = {"mesh": mesh_id, "transforms": transforms, "pass_index": item.pass_index,
                   "random": item.random, "color": item.color, "light_group": item.light_group,
                   "flags": item.flags | _WORLD_NORMALS * is_in_world,
@@ -309,7 +319,43 @@ class Instances:
             self.scene.update_instance(instance_id, **values, **part)
         for part in parts[len(ids):]:
             ids.append(self.scene.create_instance(**values, **part))
-        self._entries[item.key] = InstanceEntry(tuple(ids), item, place, signature)
+        self._entries[item.key] = InstanceEntry(
+            tuple(ids), item, tuple(item.transforms), len(transforms), shown, _signature(item))
+
+    def _send_moved(self):
+        """Send the transforms of what moved, together where the numbers of keys stay."""
+        moved, self._moved = self._moved, []
+        together = {}  # number of keys -> (ids, transforms)
+        for entry, transforms in zip(moved, _keys_of([entry.item.transforms for entry in moved])):
+            if len(transforms) != entry.key_count:
+                self._send(entry.item, entry, entry.mesh, transforms)
+                continue
+            ids, places = together.setdefault(len(transforms), ([], []))
+            ids += entry.ids
+            places += [transforms] * len(entry.ids)
+            entry.transforms = tuple(entry.item.transforms)
+        for ids, places in together.values():
+            self.scene.move_instances(ids, places)
+
+
+def _signature(item):
+    """All of an item that its instance in the library has but its mesh and where it is."""
+    return (item.materials, item.holes, item.visibility, item.pass_index, item.random, item.color, item.name,
+            item.asset, item.light_group, item.flags, item.links, item.offsets, item.values)
+
+
+def _keys_of(items_transforms):
+    """The transforms of several items as the library takes them, (keys, 12) float32 each."""
+    by_length = {}
+    for number, transforms in enumerate(items_transforms):
+        by_length.setdefault(len(transforms), []).append(number)
+    keys = [None] * len(items_transforms)
+    for numbers in by_length.values():
+        stacked = np.array([items_transforms[number] for number in numbers], np.float32)
+        are_still = (stacked == stacked[:, :1]).all(axis=(1, 2))
+        for number, transforms, is_still in zip(numbers, stacked, are_still):
+            keys[number] = transforms[:1] if is_still else motion.follow_turns(transforms)
+    return keys
 
 
 def _parts(item):

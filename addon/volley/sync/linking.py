@@ -122,6 +122,9 @@ class Links:
 
     def knows(self, evaluated):
         """Whether the object's collections are as they were found."""
-        names = [None if each is None else each.name_full for each in _collections_of(evaluated)]
+        collections = _collections_of(evaluated)
+        if self.is_empty():
+            return not any(collections)
+        names = [None if each is None else each.name_full for each in collections]
         known = self._collections.get(evaluated.name_full, (None, None))
         return names == [None if each is None else each.name_full for each in known]

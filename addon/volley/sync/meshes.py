@@ -127,10 +127,6 @@ class Meshes:
         entry = self._entries.get(key)
         return entry is not None and color_names <= entry.names[1]
 
-    def id_of(self, key):
-        """Library id of one mesh."""
-        return self._entries[key].id
-
     def in_world(self):
         """Keys of the meshes of this sync that Cycles moves to world space if one object alone shows
         them and stands still, deforming or not: those that are not diced."""
@@ -139,6 +135,10 @@ class Meshes:
     def ids(self):
         """Library id of each mesh of this sync, by key."""
         return {key: self._entries[key].id for key in self._seen}
+
+    def ids_of(self, keys):
+        """Library id of each of some meshes, by key."""
+        return {key: self._entries[key].id for key in keys}
 
     def end(self):
         """Free what this sync did not see; call after the instances were updated."""

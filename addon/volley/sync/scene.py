@@ -126,8 +126,9 @@ class SceneSync:
         if shutter is not None and not self._follow_part(walk, shutter, camera_keys, source):
             return False
         walk.send_deforming()
-        for item in walk.items.values():
-            self._instances.change(item, self._meshes.id_of(item.mesh_key), self._materials.moving())
+        items = walk.items.values()
+        mesh_ids = self._meshes.ids_of({item.mesh_key for item in items})
+        self._instances.change(items, mesh_ids, self._materials.moving())
         shown.items.update(walk.items)
         self._meshes.free_retired()
         self._images.end()

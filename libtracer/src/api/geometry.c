@@ -214,6 +214,30 @@ trc_status trc_instance_update(trc_scene scene, trc_id instance, const trc_insta
     return status;
 }
 
+static trc_status check_moves(const trc_id *instances, uint64_t instance_count, uint32_t key_count,
+                              const float *transforms, uint64_t float_count) {
+    TRC_TRY(trc_check_count(key_count, 1, TRC_MAX_KEYS, "key_count"));
+    TRC_TRY(trc_check_array(instances, instance_count, instance_count, sizeof(trc_id),
+                            sizeof(trc_id), "instances"));
+    uint64_t floats;
+    if (!trc_multiply_u64(instance_count, 12 * key_count, &floats))
+        floats = UINT64_MAX; /* TOO_LARGE below */
+    return trc_check_array(transforms, float_count, floats, sizeof(float), sizeof(float),
+                           "transforms");
+}
+
+trc_status trc_instances_move(trc_scene scene, const trc_id *instances, uint64_t instance_count,
+                              uint32_t key_count, const float *transforms, uint64_t float_count) {
+    struct trc_scene_access access;
+    TRC_TRY(trc_scene_enter(scene, &access));
+    trc_status status = check_moves(instances, instance_count, key_count, transforms, float_count);
+    if (status == TRC_OK)
+        status = trc_scene_move_instances(access.scene, instances, instance_count, key_count,
+                                          transforms);
+    trc_scene_leave(&access);
+    return status;
+}
+
 trc_status trc_instance_destroy(trc_scene scene, trc_id instance) {
     struct trc_scene_access access;
     TRC_TRY(trc_scene_enter(scene, &access));

@@ -200,6 +200,27 @@ trc_status trc_scene_change_instance(struct trc_scene_state *scene, trc_id id,
     return TRC_OK;
 }
 
+trc_status trc_scene_move_instances(struct trc_scene_state *scene, const trc_id *ids,
+                                    uint64_t count, uint32_t key_count, const float *transforms) {
+    for (uint64_t i = 0; i < count; i++) {
+        void *object;
+        TRC_TRY(trc_store_find(&scene->instances, ids[i], &object));
+        const uint32_t keys = ((struct trc_scene_instance *)object)->key_count;
+        if (keys != key_count)
+            return trc_fail(TRC_ERROR_INVALID_ARGUMENT,
+                            "instance %" PRIu64 " has %" PRIu32 " keys, not %" PRIu32, i, keys,
+                            key_count);
+    }
+    const size_t bytes = key_count * sizeof(struct trc_affine);
+    for (uint64_t i = 0; i < count; i++) {
+        struct trc_scene_instance *instance = trc_store_get(&scene->instances, ids[i]);
+        memcpy(instance->transforms, transforms + 12 * key_count * i, bytes);
+    }
+    if (count)
+        scene->changed |= TRC_CHANGED_INSTANCES;
+    return TRC_OK;
+}
+
 trc_status trc_scene_remove_instance(struct trc_scene_state *scene, trc_id id) {
     void *object;
     TRC_TRY(trc_store_find(&scene->instances, id, &object));

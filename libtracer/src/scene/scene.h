@@ -44,8 +44,8 @@ struct trc_scene_instance {
     trc_id mesh;
     uint32_t key_count;
     uint32_t material_count;
-    const struct trc_affine *transforms; /* key_count */
-    const trc_id *materials;             /* material_count; 0: default */
+    struct trc_affine *transforms; /* key_count */
+    const trc_id *materials;       /* material_count; 0: default */
     uint32_t value_count;
     const float *values;
     uint32_t visibility;
@@ -112,6 +112,8 @@ trc_status trc_scene_add_instance(struct trc_scene_state *scene, const trc_insta
                                   trc_id *id);
 trc_status trc_scene_change_instance(struct trc_scene_state *scene, trc_id id,
                                      const trc_instance_desc *desc);
+trc_status trc_scene_move_instances(struct trc_scene_state *scene, const trc_id *ids,
+                                    uint64_t count, uint32_t key_count, const float *transforms);
 trc_status trc_scene_remove_instance(struct trc_scene_state *scene, trc_id id);
 
 trc_status trc_scene_add_material(struct trc_scene_state *scene, const trc_material_desc *desc,
