@@ -186,6 +186,27 @@ def inside_shadows():
     return pictures
 
 
+def inside_normal_pass():
+    """{name: [by Volley, by Cycles]} of the Normal pass: the mean of what all lobes have, weighted."""
+    import bpy
+    import scenes
+    pictures = {}
+    for name in ("bump", "two lobes", "transparent"):
+        stage()
+        bpy.context.view_layer.use_pass_normal = True
+        tree = Tree()
+        bump = tree.add("Bump", Height=noise("Object")(tree), Distance=0.1)
+        surface = tree.add("BsdfDiffuse", Normal=(bump, 0), Color=(0.8, 0.8, 0.8, 1.0))
+        if name != "bump":
+            other = tree.add("BsdfTransparent") if name == "transparent" else tree.add(
+                "BsdfGlossy", Roughness=0.5, Color=(0.4, 0.4, 0.4, 1.0))
+            surface = tree.add("MixShader", _0=0.3, _1=(surface, 0), _2=(other, 0))
+        tree.surface(surface)
+        _shape().data.materials.append(tree.material)
+        pictures[name] = [seeds[0, ..., :3] for seeds in scenes.passes_by_both(["Normal"], 1)["Normal"]]
+    return pictures
+
+
 # Comparison ----------------------------------------------------------------------------------------
 
 def test_normals(blender):
@@ -202,3 +223,7 @@ def test_light(blender):
 
 def test_shadows(blender):
     check(blender.run(inside_shadows), SHARE_BEYOND)
+
+
+def test_normal_pass(blender):
+    check(blender.run(inside_normal_pass), 2 * SHARE_BEYOND)  # of normals themselves, not half of them

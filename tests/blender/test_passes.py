@@ -208,7 +208,8 @@ def inside_hair():
             scenes.light(energy=500.0)
             layer = bpy.context.view_layer
             layer.use_pass_glossy_color = layer.use_pass_glossy_direct = True
-            found[model, parametrization] = _both(("GlossCol", "GlossDir"))
+            layer.volley.denoising_store_passes = layer.cycles.denoising_store_passes = True
+            found[model, parametrization] = _both(("GlossCol", "GlossDir", "Denoising Normal"))
     return found
 
 
@@ -216,6 +217,7 @@ def test_hair(blender):
     """Blender 3.4 has hair's light in the passes of transmission, too."""
     for case, pictures in blender.run(inside_hair, timeout=300).items():
         _agree(*pictures["GlossCol"], case, off=HAIR_OFF)
+        _agree(*pictures["Denoising Normal"], case)
         if blender_support.version() >= (4, 0):
             _agree(*pictures["GlossDir"], case, off=HAIR_OFF)
 

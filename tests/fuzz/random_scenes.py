@@ -31,8 +31,10 @@ PASSES = {"use_pass_diffuse_direct": "DiffDir", "use_pass_glossy_direct": "Gloss
           "use_pass_glossy_indirect": "GlossInd", "use_pass_transmission_direct": "TransDir",
           "use_pass_transmission_indirect": "TransInd",
           "use_pass_emit": "Emit", "use_pass_environment": "Env", "use_pass_diffuse_color": "DiffCol",
-          "use_pass_glossy_color": "GlossCol", "use_pass_transmission_color": "TransCol", "use_pass_mist": "Mist"}
-GUIDES = ("Denoising Albedo", "Denoising Normal")  # their errors are over their own means
+          "use_pass_glossy_color": "GlossCol", "use_pass_transmission_color": "TransCol", "use_pass_mist": "Mist",
+          "use_pass_normal": "Normal"}
+GUIDES = ("Denoising Albedo", "Denoising Normal")
+NO_LIGHT = (*GUIDES, "Normal")  # their errors are over their own means
 
 
 class Scene:
@@ -570,7 +572,7 @@ def measure(seed, options):
         if not np.isfinite(ours).all():
             print(f"{seed:4d} NOT FINITE: {name}", flush=True)
             return 1.0, 1.0
-        over = max(float(np.abs(theirs).mean()), DARKEST) if name in GUIDES else scale
+        over = max(float(np.abs(theirs).mean()), DARKEST) if name in NO_LIGHT else scale
         errors = np.array(compare.unexplained(ours, theirs)) / over
         worst = np.maximum(worst, errors)
         words.append(f"{name} {ours.mean():.4f} {theirs.mean():.4f} {errors[0]:.2%} {errors[1]:.2%}")

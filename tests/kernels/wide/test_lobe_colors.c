@@ -379,6 +379,35 @@ static void huang_hair_has_its_color(void **state) {
     assert_true(worst <= 1e-5);
 }
 
+static bool is_vector(vvec3 found, float x, float y, float z) {
+    return fabsf(vf_get(found.x, 0) - x) < 1e-6f && fabsf(vf_get(found.y, 0) - y) < 1e-6f &&
+           fabsf(vf_get(found.z, 0) - z) < 1e-6f;
+}
+
+/* The normals of strands that passes have: across the ray, of an ellipse along its axis; for
+ * denoisers the strand itself (Cycles from Blender 4 on). */
+static void huang_hair_has_normals_of_its_own(void **state) {
+    (void)state;
+    static const float ones[3] = {1.0f, 1.0f, 1.0f};
+    static const struct trc_snapshot curves = {.features = TRC_FEATURE_CURVES};
+    for (int is_flat = 0; is_flat < 2; is_flat++) {
+        struct model m = huang_hair(0.5f, 0.3f, is_flat ? 0.8f : 1.0f, ones);
+        struct trc_registers regs;
+        struct trc_surface s;
+        struct trc_lobes l;
+        memset(&regs, 0, sizeof regs);
+        set3(&m, TRC_AT(HUANG_HAIR, tangent), 0.0f, 1.0f, 0.0f);
+        set3(&m, TRC_AT(HUANG_HAIR, major), 0.8f, 0.0f, 0.6f);
+        point(&s, wide(0.0, 0.6, 0.8), &m);
+        s.snapshot = &curves;
+        trc_lobes_setup(material_of(&m), &s, &regs, vf_zero(), &l);
+        assert_int_equal(l.count, 1);
+        assert_true(is_vector(trc_lobe_feature(&l.lobe[0], &s), 0.0f, 1.0f, 0.0f));
+        assert_true(is_flat ? is_vector(trc_lobes_normal(&l, &s), 0.8f, 0.0f, 0.6f)
+                            : is_vector(trc_lobes_normal(&l, &s), 1.0f, 0.0f, 0.0f));
+    }
+}
+
 int main(void) {
     if (!test_cpu_can())
         return 77;
@@ -392,6 +421,7 @@ int main(void) {
         cmocka_unit_test(multiple_glass_transmits_its_color),
         cmocka_unit_test(refraction_has_no_color_beyond_the_critical_angle),
         cmocka_unit_test(huang_hair_has_its_color),
+        cmocka_unit_test(huang_hair_has_normals_of_its_own),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -322,6 +322,23 @@ void trc_bsdf_albedo(const struct trc_lobes *l, const struct trc_surface *s, vve
     }
 }
 
+static vvec3 normal_of(const struct trc_lobe *lobe, const struct trc_surface *s) {
+    if (lobe->kind == TRC_LOBE_TRANSPARENT)
+        return s->n;
+    return lobe->model->normal ? lobe->model->normal(lobe, s->wo) : lobe->n;
+}
+
+vvec3 trc_lobes_normal(const struct trc_lobes *l, const struct trc_surface *s) {
+    vvec3 n = v3_zero();
+    for (int i = 0; i < l->count; i++)
+        n = v3_mad(normal_of(&l->lobe[i], s), v3_average(l->lobe[i].weight), n);
+    return v3_select(vf_gt(v3_dot(n, n), vf_zero()), v3_normalize(n), s->n);
+}
+
+vvec3 trc_lobe_feature(const struct trc_lobe *lobe, const struct trc_surface *s) {
+    return lobe->model->is_strand ? lobe->tangent : normal_of(lobe, s);
+}
+
 vfloat trc_lobe_alpha(const struct trc_lobe *lobe) {
     if (!lobe->model->has_facets)
         return vf_one();

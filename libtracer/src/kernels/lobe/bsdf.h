@@ -179,6 +179,13 @@ vvec3 trc_lobe_albedo(const struct trc_lobe *lobe, vvec3 wo);
 /* How rough one lobe is: the mean alpha of its facets, 0 where it is ideal, 1 without facets. */
 vfloat trc_lobe_alpha(const struct trc_lobe *lobe);
 
+/* The mean of the lobes' normals by their weights, as the Normal pass has it, which bumps turn; the
+ * surface's own without lobes. */
+vvec3 trc_lobes_normal(const struct trc_lobes *l, const struct trc_surface *s);
+
+/* What denoisers know a lobe by: its normal, of Huang's hair the direction of the strand. */
+vvec3 trc_lobe_feature(const struct trc_lobe *lobe, const struct trc_surface *s);
+
 /* What ambient light meets: the weights of diffuse lobes, translucent ones too, and the mean of
  * their normals, the shading normal without any. */
 vvec3 trc_lobes_diffuse(const struct trc_lobes *l, const struct trc_surface *s, vvec3 *normal_out);

@@ -480,10 +480,23 @@ static void set_place(const struct trc_setup *c, const struct trc_leaf *leaf, st
     lobe->pdf_scale = vf_select(near, vf_divide(pixel, radius), vf_set(2.0f));
 }
 
+/* Cycles' normal: across the ray, of elliptical strands along the longer axis. */
+static vvec3 normal(const struct trc_lobe *lobe, vvec3 wo) {
+    struct fibre f;
+    fibre_of(lobe, &f);
+    return v3_select(vf_eq(f.aspect, vf_one()), v3_normalize(v3_cross(f.z, wo)), f.x);
+}
+
 static void add_huang_hair(struct trc_setup *c, const struct trc_leaf *leaf, vfloat weight) {
-    static const struct trc_lobe_model model = {
-        .kind = TRC_LOBE_HAIR_REFLECT, .value = value, .sampled = sampled, .direction = direction};
+    static const struct trc_lobe_model model = {.kind = TRC_LOBE_HAIR_REFLECT,
+                                                .is_strand = true,
+                                                .normal = normal,
+                                                .value = value,
+                                                .sampled = sampled,
+                                                .direction = direction};
     static const struct trc_lobe_model sided = {.kind = TRC_LOBE_HAIR_REFLECT,
+                                                .is_strand = true,
+                                                .normal = normal,
                                                 .value = sided_value,
                                                 .sampled = sampled,
                                                 .direction = direction};

@@ -38,6 +38,9 @@ struct trc_draw {
 struct trc_lobe_model {
     enum trc_lobe_kind kind;
     bool has_facets; /* its alpha says how rough it is */
+    bool is_strand;  /* denoisers go by its tangent, not its normal */
+    /* What the passes of normals have for n. NULL: n. */
+    vvec3 (*normal)(const struct trc_lobe *lobe, vvec3 wo);
     /* Of TRC_LOBE_TRANSPARENT: the ray goes on from f0, in the direction f90, which is unit. */
     bool is_portal;
     /* Towards wi; lanes of the wrong side are dropped by the caller. NULL: straight through. */

@@ -210,10 +210,16 @@ static vvec3 absorption_of(const struct trc_setup *c, const struct trc_leaf *lea
     return trc_absorption(&pigment, roughness);
 }
 
+/* Cycles' normal: from Blender 4 on across the ray. */
+static vvec3 normal(const struct trc_lobe *lobe, vvec3 wo) {
+    return lobe->correlated ? v3_normalize(v3_cross(lobe->tangent, wo)) : lobe->n;
+}
+
 static void add_principled_hair(struct trc_setup *c, const struct trc_leaf *leaf, vfloat weight) {
     static const struct trc_lobe_model model = {
-        .kind = TRC_LOBE_HAIR_REFLECT, .value = value, .direction = direction};
+        .kind = TRC_LOBE_HAIR_REFLECT, .normal = normal, .value = value, .direction = direction};
     static const struct trc_lobe_model sided = {.kind = TRC_LOBE_HAIR_REFLECT,
+                                                .normal = normal,
                                                 .value = sided_value,
                                                 .sampled = sampled_value,
                                                 .direction = direction};

@@ -104,6 +104,8 @@
 #define trc_linked_lights(...) TRC_KERNEL(trc_linked_lights)(__VA_ARGS__)
 #define trc_lobe_albedo(...) TRC_KERNEL(trc_lobe_albedo)(__VA_ARGS__)
 #define trc_lobe_alpha(...) TRC_KERNEL(trc_lobe_alpha)(__VA_ARGS__)
+#define trc_lobe_feature(...) TRC_KERNEL(trc_lobe_feature)(__VA_ARGS__)
+#define trc_lobes_normal(...) TRC_KERNEL(trc_lobes_normal)(__VA_ARGS__)
 #define trc_lobes_diffuse(...) TRC_KERNEL(trc_lobes_diffuse)(__VA_ARGS__)
 #define trc_lobes_emission(...) TRC_KERNEL(trc_lobes_emission)(__VA_ARGS__)
 #define trc_lobes_setup(...) TRC_KERNEL(trc_lobes_setup)(__VA_ARGS__)

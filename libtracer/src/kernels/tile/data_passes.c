@@ -178,10 +178,13 @@ static void uv_corners(const struct trc_mesh *mesh, uint32_t triangle,
 }
 
 static void first_surface(struct trc_tile *t, const struct trc_surface *s,
-                          const struct trc_material *m, const uint32_t *slots, vmask write) {
+                          const struct trc_material *m, const struct trc_lobes *lobes,
+                          const uint32_t *slots, vmask write) {
     float z[TRC_WIDTH], n[3][TRC_WIDTH], p[3][TRC_WIDTH], uv[2][TRC_WIDTH];
     vf_store(z, depth_of(t, s->p));
-    vf_store(n[0], s->n.x), vf_store(n[1], s->n.y), vf_store(n[2], s->n.z);
+    const vvec3 normal =
+        t->samples.pass[TRC_PASS_NORMAL][0] ? trc_lobes_normal(lobes, s) : v3_zero();
+    vf_store(n[0], normal.x), vf_store(n[1], normal.y), vf_store(n[2], normal.z);
     vf_store(p[0], s->p.x), vf_store(p[1], s->p.y), vf_store(p[2], s->p.z);
     vf_store(uv[0], s->u), vf_store(uv[1], s->v);
     for (uint32_t bits = vm_bits(write); bits; bits &= bits - 1) {
@@ -372,6 +375,6 @@ vuint trc_data_passes(struct trc_tile *t, const struct trc_surface *s, const str
         first = vm_and(first, vf_ge(v3_average(alpha), vf_set(ALPHA_THRESHOLD)));
     if (!vm_any(first))
         return path;
-    first_surface(t, s, m, slots, first);
+    first_surface(t, s, m, lobes, slots, first);
     return (vuint)vi_select(first, (vint)path | vi_set(TRC_PATH_DATA_DONE), (vint)path);
 }

@@ -54,7 +54,7 @@ static void features_of(const struct trc_lobes *l, const struct trc_surface *s,
     for (int i = 0; i < l->count; i++) {
         const struct trc_lobe *lobe = &l->lobe[i];
         const vmask counts = is_rough(lobe);
-        const vvec3 n = lobe->kind == TRC_LOBE_TRANSPARENT ? s->n : lobe->n;
+        const vvec3 n = trc_lobe_feature(lobe, s);
         normal = v3_mad(n, lobe->mix_weight, normal);
         all = all + lobe->mix_weight;
         rough = rough + vf_where(counts, lobe->mix_weight);
@@ -68,7 +68,7 @@ static void features_of(const struct trc_lobes *l, const struct trc_surface *s,
         specular = v3_mad(color, mirror, specular);
         blended = v3_mad(color, vf_one() - mirror, blended);
         blurred = blurred + share * (vf_one() - mirror);
-        solid = v3_mad(lobe->n, share, solid);
+        solid = v3_mad(n, share, solid);
         alpha = alpha + trc_lobe_alpha(lobe) * share;
         scattered = scattered + share;
     }
