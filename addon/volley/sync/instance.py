@@ -251,7 +251,6 @@ class Instances:
     warnings: object
     _entries: dict = field(default_factory=dict)
     _in_world: set = field(default_factory=set)
-    _moved: list = field(default_factory=list)  # entries of which only the transforms are others, yet to be sent
 
     def update(self, items, mesh_ids, in_world, moving):
         """Make the library's instances those of the items; mesh_ids: library id by mesh key. One that the library
@@ -277,34 +276,34 @@ class Instances:
 
     def _update_all(self, items, mesh_ids, moving, outcome):
         """Bring instances up to date; the keys of those that the library refused, which are warned of."""
-        refused = set()
+        refused, moved = set(), []
         for item in items:
             try:
-                self._update_one(item, mesh_ids[item.mesh_key], moving)
+                moved += self._update_one(item, mesh_ids[item.mesh_key], moving)
             except native.TracerError as error:
                 if error.status != abi.StatusCode.ERROR_INVALID_ARGUMENT:
                     raise
                 self.warnings.add(f"Object '{item.owner}': {error}; {outcome}")
                 refused.add(item.key)
-        self._send_moved()
+        self._send_moved(moved)
         return refused
 
     def _update_one(self, item, mesh_id, moving):
-        """Send an item, or note its entry among those that moved."""
+        """Send an item where it differs; its entry where only the transforms do, which then wait."""
         is_in_world = item.mesh_key in self._in_world and moving.isdisjoint(item.materials)
         shown = mesh_id, is_in_world
         entry = self._entries.get(item.key)
         if entry is not None and entry.mesh == shown and (
                 entry.item is item or entry.signature == _signature(item)):
             entry.item = item
-            if entry.transforms != tuple(item.transforms):
-                self._moved.append(entry)
-        else:
-            self._send(item, entry, shown, motion.follow_turns(collapse(item.transforms)))
+            return (entry,) if entry.transforms != tuple(item.transforms) else ()
+        self._send(item, entry, shown)
+        return ()
 
-    def _send(self, item, entry, shown, transforms):
+    def _send(self, item, entry, shown):
         """Have all of an item in the library; entry: the former one, None where there is none."""
         mesh_id, is_in_world = shown
+        transforms = _keys_of(item)
         values = {"mesh": mesh_id, "transforms": transforms, "pass_index": item.pass_index,
                   "random": item.random, "color": item.color, "light_group": item.light_group,
                   "flags": item.flags | _WORLD_NORMALS * is_in_world,
@@ -322,40 +321,26 @@ class Instances:
         self._entries[item.key] = InstanceEntry(
             tuple(ids), item, tuple(item.transforms), len(transforms), shown, _signature(item))
 
-    def _send_moved(self):
-        """Send the transforms of what moved, together where the numbers of keys stay."""
-        moved, self._moved = self._moved, []
-        together = {}  # number of keys -> (ids, transforms)
-        for entry, transforms in zip(moved, _keys_of([entry.item.transforms for entry in moved])):
-            if len(transforms) != entry.key_count:
-                self._send(entry.item, entry, entry.mesh, transforms)
-                continue
-            ids, places = together.setdefault(len(transforms), ([], []))
-            ids += entry.ids
-            places += [transforms] * len(entry.ids)
-            entry.transforms = tuple(entry.item.transforms)
-        for ids, places in together.values():
-            self.scene.move_instances(ids, places)
+    def _send_moved(self, moved):
+        """Send the transforms of entries that moved, together where the numbers of keys stay."""
+        together = {}  # number of keys -> [(entry, transforms)]
+        for entry in moved:
+            transforms = _keys_of(entry.item)
+            if len(transforms) == entry.key_count:
+                together.setdefault(entry.key_count, []).append((entry, transforms))
+            else:
+                self._send(entry.item, entry, entry.mesh)
+        for group in together.values():
+            ids = [instance_id for entry, _ in group for instance_id in entry.ids]
+            self.scene.move_instances(ids, [transforms for entry, transforms in group for _ in entry.ids])
+            for entry, _ in group:
+                entry.transforms = tuple(entry.item.transforms)
 
 
 def _signature(item):
     """All of an item that its instance in the library has but its mesh and where it is."""
     return (item.materials, item.holes, item.visibility, item.pass_index, item.random, item.color, item.name,
             item.asset, item.light_group, item.flags, item.links, item.offsets, item.values)
-
-
-def _keys_of(items_transforms):
-    """The transforms of several items as the library takes them, (keys, 12) float32 each."""
-    by_length = {}
-    for number, transforms in enumerate(items_transforms):
-        by_length.setdefault(len(transforms), []).append(number)
-    keys = [None] * len(items_transforms)
-    for numbers in by_length.values():
-        stacked = np.array([items_transforms[number] for number in numbers], np.float32)
-        are_still = (stacked == stacked[:, :1]).all(axis=(1, 2))
-        for number, transforms, is_still in zip(numbers, stacked, are_still):
-            keys[number] = transforms[:1] if is_still else motion.follow_turns(transforms)
-    return keys
 
 
 def _parts(item):
@@ -366,7 +351,9 @@ def _parts(item):
             {"materials": item.materials, "visibility": item.visibility & ~abi.VisibleRays.CAMERA}]
 
 
-def collapse(arrays):
-    """Equal motion keys as one; (keys, ...) float32."""
-    stacked = np.array(arrays, np.float32)
-    return stacked[:1] if len(arrays) > 1 and (stacked == stacked[0]).all() else stacked
+def _keys_of(item):
+    """The transforms of an item as the library takes them, (keys, 12) float32: equal ones as one."""
+    stacked = np.array(item.transforms, np.float32)
+    if len(stacked) > 1 and (stacked == stacked[0]).all():
+        return stacked[:1]
+    return motion.follow_turns(stacked)
