@@ -191,16 +191,18 @@ def inside_normal_pass():
     import bpy
     import scenes
     pictures = {}
-    for name in ("bump", "two lobes", "transparent"):
+    for name, (other, inputs) in {
+            "bump": (None, {}),
+            "transparent": ("BsdfTransparent", {}),
+            "gloss": ("BsdfGlossy", {"Roughness": 0.5, "Color": (0.4, 0.4, 0.4, 1.0)}),
+            "glass": ("BsdfGlass", {"Roughness": 0.6})}.items():
         stage()
         bpy.context.view_layer.use_pass_normal = True
         tree = Tree()
         bump = tree.add("Bump", Height=noise("Object")(tree), Distance=0.1)
         surface = tree.add("BsdfDiffuse", Normal=(bump, 0), Color=(0.8, 0.8, 0.8, 1.0))
-        if name != "bump":
-            other = tree.add("BsdfTransparent") if name == "transparent" else tree.add(
-                "BsdfGlossy", Roughness=0.5, Color=(0.4, 0.4, 0.4, 1.0))
-            surface = tree.add("MixShader", _0=0.3, _1=(surface, 0), _2=(other, 0))
+        if other is not None:
+            surface = tree.add("MixShader", _0=0.3, _1=(surface, 0), _2=(tree.add(other, **inputs), 0))
         tree.surface(surface)
         _shape().data.materials.append(tree.material)
         pictures[name] = [seeds[0, ..., :3] for seeds in scenes.passes_by_both(["Normal"], 1)["Normal"]]

@@ -328,10 +328,23 @@ static vvec3 normal_of(const struct trc_lobe *lobe, const struct trc_surface *s)
     return lobe->model->normal ? lobe->model->normal(lobe, s->wo) : lobe->n;
 }
 
+/* How much a lobe's normal counts beside those of others: as much as Cycles' closure weighs,
+ * without the energy of further bounces that a weight has here. Glass is one closure: of its two
+ * lobes the refracting one, which follows, counts. */
+static vfloat normal_weight(const struct trc_lobes *l, int i) {
+    const struct trc_lobe *lobe = &l->lobe[i], *next = i + 1 < l->count ? lobe + 1 : lobe;
+    const bool is_half = lobe->kind == TRC_LOBE_REFLECT && next->kind == TRC_LOBE_REFRACT &&
+                         next->fresnel != TRC_FRESNEL_NONE;
+    if (is_half)
+        return vf_zero();
+    const vfloat scale = lobe->albedo_scale; /* 0: it has no colour in passes, but its normal */
+    return v3_average(lobe->weight) * vf_select(vf_gt(scale, vf_zero()), scale, vf_one());
+}
+
 vvec3 trc_lobes_normal(const struct trc_lobes *l, const struct trc_surface *s) {
     vvec3 n = v3_zero();
     for (int i = 0; i < l->count; i++)
-        n = v3_mad(normal_of(&l->lobe[i], s), v3_average(l->lobe[i].weight), n);
+        n = v3_mad(normal_of(&l->lobe[i], s), normal_weight(l, i), n);
     return v3_select(vf_gt(v3_dot(n, n), vf_zero()), v3_normalize(n), s->n);
 }
 
