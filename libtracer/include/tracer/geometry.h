@@ -208,10 +208,10 @@ TRC_API trc_status trc_instance_update(trc_scene scene, trc_id instance,
                                        const trc_instance_desc *desc);
 
 /* Replaces the transforms of so many instances, which keep their number of keys, and nothing else:
- * 12 floats for each key of each instance, key by key. As trc_instance_update does, at a fraction
- * of its cost. Of an instance named twice the last counts. All or nothing: INVALID_HANDLE for one
- * that the scene does not have, INVALID_ARGUMENT for one of other than key_count keys, or where
- * float_count is not 12 * key_count * instance_count. */
+ * 12 floats for each key of each instance, key by key. Takes no memory. Of an instance named twice
+ * the last counts. All or nothing: INVALID_HANDLE for one that the scene does not have,
+ * INVALID_ARGUMENT for one of other than key_count keys, or where float_count is not
+ * 12 * key_count * instance_count. */
 TRC_API trc_status trc_instances_move(trc_scene scene, const trc_id *instances,
                                       uint64_t instance_count, uint32_t key_count,
                                       const float *transforms, uint64_t float_count);

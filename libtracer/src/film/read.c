@@ -91,7 +91,9 @@ static double coverage(double sum, double count) { return fmin(fmax(sum / count,
  */
 static void read_sums(const struct reading *r, struct row row) {
     const enum trc_pass_kind kind = r->info->kind;
+    const bool has_alpha = r->pass == TRC_PASS_COMBINED;
     const uint32_t channels = r->info->channels, stride = r->info->sums;
+    const uint32_t plain = has_alpha ? channels - 1 : channels;
     const double *sums = sums_of(r, r->pass);
     const double *divisor = r->info->color != TRC_PASS_NONE ? sums_of(r, r->info->color) : NULL;
     const double light = kind == TRC_PASS_KIND_LIGHT ? r->exposure : 1.0;
@@ -102,7 +104,7 @@ static void read_sums(const struct reading *r, struct row row) {
         if (kind == TRC_PASS_KIND_HITS)
             weight = trc_sum_load(&sums[i * stride + channels]);
         const double factor = count && weight > 0.0 ? 1.0 / weight : 0.0;
-        for (uint32_t c = 0; c < channels; c++) {
+        for (uint32_t c = 0; c < plain; c++) {
             double value = trc_sum_load(&sums[i * stride + c]);
             if (divisor) {
                 /* Both are sums of the same samples: the counts cancel. */
@@ -111,8 +113,8 @@ static void read_sums(const struct reading *r, struct row row) {
             }
             pixel[c] = count ? to_float(value * factor * light) : 0.0f;
         }
-        if (r->pass == TRC_PASS_COMBINED && count)
-            pixel[3] = (float)coverage(trc_sum_load(&sums[i * stride + 3]), count);
+        if (has_alpha)
+            pixel[3] = count ? (float)coverage(trc_sum_load(&sums[i * stride + 3]), count) : 0.0f;
     }
 }
 
