@@ -58,25 +58,29 @@ static void add_samples(struct trc_film *film, int pixel, struct truth truth, ui
     }
 }
 
+/* Fills a pixel without samples, and its half. */
+static void fill_pixel(struct trc_film *film, int i, struct truth truth, uint32_t samples,
+                       struct rng *rng) {
+    struct trc_half *half = &film->halves[i];
+    add_samples(film, i, truth, 0, samples / 2, rng);
+    for (int c = 0; c < 4; c++)
+        half->light[c] = (float)film->sums[TRC_PASS_COMBINED][4 * i + c];
+    for (int c = 0; c < 3; c++) {
+        half->features[c] = (float)film->sums[TRC_PASS_DENOISING_ALBEDO][3 * i + c];
+        half->features[3 + c] = (float)film->sums[TRC_PASS_DENOISING_NORMAL][3 * i + c];
+    }
+    half->features[6] = (float)film->sums[TRC_PASS_DENOISING_DEPTH][i];
+    half->count = samples / 2;
+    add_samples(film, i, truth, samples / 2, samples, rng);
+    film->sample_counts[i] = samples;
+}
+
 static void film_make(const trc_render_desc *desc, truth_of truth_at, struct trc_film *film) {
     struct rng rng = rng_seed(7);
     assert_ok(trc_film_create(desc, film));
     assert_ok(trc_film_add_halves(desc, film));
-    for (int i = 0; i < FRAME; i++) {
-        const struct truth truth = truth_at(i % WIDTH, i / WIDTH);
-        struct trc_half *half = &film->halves[i];
-        add_samples(film, i, truth, 0, desc->sample_count / 2, &rng);
-        for (int c = 0; c < 4; c++)
-            half->light[c] = (float)film->sums[TRC_PASS_COMBINED][4 * i + c];
-        for (int c = 0; c < 3; c++) {
-            half->features[c] = (float)film->sums[TRC_PASS_DENOISING_ALBEDO][3 * i + c];
-            half->features[3 + c] = (float)film->sums[TRC_PASS_DENOISING_NORMAL][3 * i + c];
-        }
-        half->features[6] = (float)film->sums[TRC_PASS_DENOISING_DEPTH][i];
-        half->count = desc->sample_count / 2;
-        add_samples(film, i, truth, desc->sample_count / 2, desc->sample_count, &rng);
-        film->sample_counts[i] = desc->sample_count;
-    }
+    for (int i = 0; i < FRAME; i++)
+        fill_pixel(film, i, truth_at(i % WIDTH, i / WIDTH), desc->sample_count, &rng);
 }
 
 /* All phases, tiles in their order or against it. */
@@ -493,6 +497,31 @@ static void preview_noisy(void **state) {
     assert_true(edge_gains[0] > 1.5 && edge_gains[1] > 1.5 && edge_gains[2] > 0.95);
 }
 
+/* Pictures of several strips side by side and above each other have no seams: what repeats itself
+ * every PERIOD pixels does so in the preview, but for what is near the left and right edges. */
+static void preview_seams(void **state) {
+    (void)state;
+    enum { WIDE = 2 * TRC_PREVIEW_MAX_WIDTH + 20, HIGH = 150, PERIOD = 23 };
+    static float found[4 * WIDE * HIGH];
+    trc_render_desc desc = desc_of(4);
+    desc.denoise = TRC_DENOISE_PREVIEW;
+    desc.width = desc.crop_width = WIDE;
+    desc.height = desc.crop_height = HIGH;
+    struct trc_film film;
+    assert_ok(trc_film_create(&desc, &film));
+    assert_ok(trc_film_add_halves(&desc, &film));
+    for (int i = 0; i < WIDE * HIGH; i++) {
+        struct rng rng = rng_seed(7 + (uint32_t)(i / WIDE * PERIOD + i % WIDE % PERIOD));
+        fill_pixel(&film, i, flat(i % WIDE, i / WIDE), desc.sample_count, &rng);
+    }
+    assert_ok(trc_film_read_preview(&film, trc_kernels_current(), 4, 1.0f, found, 4 * WIDE * HIGH));
+    for (int y = 0; y < HIGH; y++)
+        for (int x = TRC_PREVIEW_HALO; x < WIDE - PERIOD - TRC_PREVIEW_HALO; x++)
+            assert_memory_equal(found + 4 * (y * WIDE + x), found + 4 * (y * WIDE + x + PERIOD),
+                                4 * sizeof *found);
+    trc_film_destroy(&film);
+}
+
 /* The same bits as scalar kernels make, by any number of threads; the plain picture where the film
  * has no halves. */
 static void preview_bits(void **state) {
@@ -661,9 +690,9 @@ int main(void) {
         cmocka_unit_test(still_border),   cmocka_unit_test(sums),
         cmocka_unit_test(same_bits),      cmocka_unit_test(scene_pictures),
         cmocka_unit_test(counts),         cmocka_unit_test(preview_noiseless),
-        cmocka_unit_test(preview_noisy),  cmocka_unit_test(preview_bits),
-        cmocka_unit_test(scene_previews), cmocka_unit_test(crops),
-        cmocka_unit_test(guides),
+        cmocka_unit_test(preview_noisy),  cmocka_unit_test(preview_seams),
+        cmocka_unit_test(preview_bits),   cmocka_unit_test(scene_previews),
+        cmocka_unit_test(crops),          cmocka_unit_test(guides),
     };
     if (!query_test_isa())
         return QUERY_TEST_SKIPPED;

@@ -8,11 +8,13 @@
 
 /* So many strips for each thread keep all busy to the end, but a strip has so many rows: with
  * fewer, most of what is filtered are rows around it. */
-#define STRIPS_PER_THREAD 4
+#define STRIPS_PER_THREAD 2
 #define LEAST_STRIP_HEIGHT 64
+/* Pixels of the widest vector. */
+#define VECTOR 16
 
 struct preview {
-    uint32_t strip_height;
+    uint32_t strip_width, strip_height;
     const struct trc_film *film;
     const struct trc_kernels *kernels;
     float exposure;
@@ -56,8 +58,9 @@ static void load_run(const struct preview *p, const struct run *run, float *memo
 
 static void load_row(const struct preview *p, uint32_t left, uint32_t bottom, int y,
                      float *memory) {
-    for (int x = -TRC_PREVIEW_HALO; x < TRC_PREVIEW_WIDTH + TRC_PREVIEW_HALO;) {
-        const struct run run = run_of(p, left, bottom, x, y, TRC_PREVIEW_WIDTH + TRC_PREVIEW_HALO);
+    const int end = (int)p->strip_width + TRC_PREVIEW_HALO;
+    for (int x = -TRC_PREVIEW_HALO; x < end;) {
+        const struct run run = run_of(p, left, bottom, x, y, end);
         load_run(p, &run, memory);
         x = run.x_end;
     }
@@ -68,7 +71,7 @@ static void store_row(const struct preview *p, uint32_t left, uint32_t bottom, i
     const struct trc_film *film = p->film;
     const uint32_t right = film->width - left;
     p->kernels->preview_store(memory + trc_preview_at(0, y),
-                              (int)(right < TRC_PREVIEW_WIDTH ? right : TRC_PREVIEW_WIDTH),
+                              (int)(right < p->strip_width ? right : p->strip_width),
                               p->out + 4 * ((size_t)(bottom + (uint32_t)y) * film->width + left));
 }
 
@@ -78,18 +81,25 @@ static uint32_t strips_along(uint32_t pixels, uint32_t size) {
 
 static void show_strip(void *context, uint32_t index, uint32_t worker) {
     const struct preview *p = context;
-    const uint32_t across = strips_along(p->film->width, TRC_PREVIEW_WIDTH);
-    const uint32_t left = index % across * TRC_PREVIEW_WIDTH;
+    const uint32_t across = strips_along(p->film->width, p->strip_width);
+    const uint32_t left = index % across * p->strip_width;
     const uint32_t bottom = index / across * p->strip_height;
     const uint32_t rest = p->film->height - bottom;
     const int height = (int)(rest < p->strip_height ? rest : p->strip_height);
     float *memory = p->memory + (size_t)worker * TRC_PREVIEW_PLANES * TRC_PREVIEW_FLOATS;
     for (int y = -TRC_PREVIEW_HALO; y < height + TRC_PREVIEW_HALO; y++) {
         load_row(p, left, bottom, y, memory);
-        p->kernels->preview_filter(memory, y, p->exposure);
+        p->kernels->preview_filter(memory, (int)p->strip_width, y, p->exposure);
         if (y >= TRC_PREVIEW_HALO)
             store_row(p, left, bottom, y - TRC_PREVIEW_HALO, memory);
     }
+}
+
+/* Pixels of a strip's row, in whole vectors: as few strips side by side as there can be, all alike.
+ */
+static uint32_t strip_width(const struct trc_film *film) {
+    const uint32_t across = strips_along(film->width, TRC_PREVIEW_MAX_WIDTH);
+    return strips_along(strips_along(film->width, across), VECTOR) * VECTOR;
 }
 
 /* Rows of a strip. What is shown does not depend on it. */
@@ -106,9 +116,13 @@ trc_status trc_film_read_preview(const struct trc_film *film, const struct trc_k
         return trc_film_read(film, TRC_PASS_COMBINED, exposure, out, float_count);
     TRC_TRY(trc_check_array(out, float_count, (uint64_t)film->width * film->height * 4,
                             sizeof(float), sizeof(float), "pixels_out"));
-    const uint32_t across = strips_along(film->width, TRC_PREVIEW_WIDTH);
-    struct preview preview = {
-        strip_height(film, across, thread_count), film, kernels, exposure, NULL, out};
+    struct preview preview = {.strip_width = strip_width(film),
+                              .film = film,
+                              .kernels = kernels,
+                              .exposure = exposure,
+                              .out = out};
+    const uint32_t across = strips_along(film->width, preview.strip_width);
+    preview.strip_height = strip_height(film, across, thread_count);
     const uint32_t strips = across * strips_along(film->height, preview.strip_height);
     struct trc_pool *pool;
     TRC_TRY(trc_pool_create(thread_count < strips ? thread_count : strips, &pool));

@@ -84,18 +84,19 @@ struct trc_denoise_job {
  * Wavelets with holes whose weights follow variance and features (H. Dammertz, D. Sewtz, J. Hanika,
  * H. Lensch, "Edge-Avoiding A-Trous Wavelet Transform for fast Global Illumination Filtering", HPG
  * 2010; C. Schied and others, "Spatiotemporal Variance-Guided Filtering", HPG 2017), of light over
- * albedo. Departures: nothing of former pictures; noise comes from two halves of the samples, the
- * wider wavelets fade as samples gather, and the part of the plain pixel that stays follows the
- * estimated error. */
+ * albedo. Departures: nothing of former pictures; a wavelet takes four pixels instead of 24 or
+ * eight; noise comes from two halves of the samples, the wider wavelets fade as samples gather, and
+ * the part of the plain pixel that stays follows the estimated error. */
 
-/* Pixels of a row of a strip, and around the strip: of three wavelets, and smoothed estimates. */
-#define TRC_PREVIEW_WIDTH 128
+/* Most pixels of a row of a strip, and those around the strip: of three wavelets, and smoothed
+ * estimates. */
+#define TRC_PREVIEW_MAX_WIDTH 256
 #define TRC_PREVIEW_HALO 10
 /* Planes of floats, rows of so many; the strip begins at TRC_PREVIEW_LEFT. Each row has the place
  * of the one so many before it. What is added to a plane keeps rows of planes in sets of their own
  * in a cache. */
 #define TRC_PREVIEW_LEFT 16
-#define TRC_PREVIEW_STRIDE (TRC_PREVIEW_WIDTH + 2 * TRC_PREVIEW_LEFT)
+#define TRC_PREVIEW_STRIDE (TRC_PREVIEW_MAX_WIDTH + 2 * TRC_PREVIEW_LEFT)
 #define TRC_PREVIEW_ROWS 16
 #define TRC_PREVIEW_FLOATS (TRC_PREVIEW_ROWS * TRC_PREVIEW_STRIDE + 48)
 

@@ -69,7 +69,7 @@ struct trc_kernels {
     /* Quick reconstruction of a strip, row by row: memory has TRC_PREVIEW_PLANES planes, the inputs
      * of row y filled in, from -TRC_PREVIEW_HALO on; row y - TRC_PREVIEW_HALO is done then. 64-byte
      * aligned. exposure: a factor of the colour. Never fails. */
-    void (*preview_filter)(float *memory, int y, float exposure);
+    void (*preview_filter)(float *memory, int width, int y, float exposure);
     /* What is shown of pixels side by side, from planes that begin at the first one's place. */
     void (*preview_store)(const float *planes, int count, float *rgba);
     /* trc_query_*: arguments already validated; chunk [begin, end) of the arrays. packet_size

@@ -63,7 +63,7 @@ void trc_denoise_tile(const struct trc_denoise_job *job);
 
 /* The quick filter. (kernels/filter/preview.c) */
 void trc_preview_load(const struct trc_film *film, size_t pixel, int count, float *planes);
-void trc_preview_filter(float *memory, int y, float exposure);
+void trc_preview_filter(float *memory, int width, int y, float exposure);
 void trc_preview_store(const float *planes, int count, float *rgba);
 
 #endif
