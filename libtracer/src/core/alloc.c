@@ -63,14 +63,17 @@ static void *allocate(size_t count, size_t size, bool zeroed) {
     const size_t used = is_large ? whole_pages(bytes) : bytes;
     const size_t alignment = is_large ? LARGE_PAGE : ALIGNMENT;
     const size_t total = used + sizeof(struct header) + alignment - 1;
-    /* calloc leaves untouched pages of a large film to the system, large ones too. */
-    char *base = zeroed ? calloc(1, total) : malloc(total);
+    /* calloc leaves untouched pages of a large film to the system, large ones too; what is smaller
+     * is used at once, and calloc may fetch new pages for it where malloc has old ones. */
+    char *base = zeroed && is_large ? calloc(1, total) : malloc(total);
     if (!base)
         return NULL;
     const uintptr_t first = (uintptr_t)base + sizeof(struct header);
     char *block = base + sizeof(struct header) + (-first & (alignment - 1));
     const struct header header = {base, bytes};
     memcpy(block - sizeof header, &header, sizeof header);
+    if (zeroed && !is_large)
+        memset(block, 0, bytes);
     if (is_large)
         trc_system_want_large_pages(block, used);
     count_block(bytes);
