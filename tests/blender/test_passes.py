@@ -72,7 +72,6 @@ _LIGHT_PASSES = {
 FIRST_SHARE, FIRST_STEP = 1e-3, 2e-3
 LEAST_COLOR = 0.02  # below it, light over colour is one noise over another
 SUM_TOLERANCE = 1e-4
-HAIR_OFF = 2e-3, 0.02
 BACKGROUND_OFF = 0.005  # pixels; measured: .001
 
 
@@ -149,7 +148,7 @@ def test_gallery(blender):
     assert all(pairs[name][1].any() for name in pairs if name != "TransDir")  # all is to be seen
 
 
-# Velvet and hair ---------------------------------------------------------------------------------
+# Velvet and holdouts -----------------------------------------------------------------------------
 
 _VELVET_PASSES = ("GlossDir", "DiffDir", "GlossCol", "DiffCol")
 
@@ -184,42 +183,6 @@ def test_velvet(blender):
         assert not any(picture[..., :3].any() for picture in pictures[name]), name
     assert unlit["visible_glossy"] == pytest.approx([0.0, 0.0], abs=1e-6)
     assert unlit["visible_diffuse"][0] == pytest.approx(unlit["visible_diffuse"][1], rel=0.01)
-
-
-HAIR_COLORS = {'COLOR': {"Color": (0.05, 0.2, 0.4), "Roughness": 0.6}, 'MELANIN': {"Melanin": 0.5}}
-
-
-def inside_hair():
-    """{(model, parametrization): passes} of a ball of Principled Hair by both."""
-    import bpy
-    import scenes
-    found = {}
-    for model in ('CHIANG', 'HUANG'):
-        settings = {"model": model}
-        if not scenes.has_node("ShaderNodeBsdfHairPrincipled", settings=settings):
-            if model == 'HUANG':
-                continue
-            settings = {}
-        for parametrization, inputs in HAIR_COLORS.items():
-            scenes.empty(size=(32, 24))
-            scenes.camera()
-            scenes.sphere(material=scenes.material("Hair", "ShaderNodeBsdfHairPrincipled",
-                                                   {**settings, "parametrization": parametrization}, **inputs))
-            scenes.light(energy=500.0)
-            layer = bpy.context.view_layer
-            layer.use_pass_glossy_color = layer.use_pass_glossy_direct = True
-            layer.volley.denoising_store_passes = layer.cycles.denoising_store_passes = True
-            found[model, parametrization] = _both(("GlossCol", "GlossDir", "Denoising Normal"))
-    return found
-
-
-def test_hair(blender):
-    """Blender 3.4 has hair's light in the passes of transmission, too."""
-    for case, pictures in blender.run(inside_hair, timeout=300).items():
-        _agree(*pictures["GlossCol"], case, off=HAIR_OFF)
-        _agree(*pictures["Denoising Normal"], case)
-        if blender_support.version() >= (4, 0):
-            _agree(*pictures["GlossDir"], case, off=HAIR_OFF)
 
 
 def inside_holdouts():

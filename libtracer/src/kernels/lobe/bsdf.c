@@ -174,7 +174,7 @@ static void clear_sample(struct trc_bsdf_sample *out) {
     out->indirect_scale = vf_one();
     out->pdf = out->whole_pdf = vf_zero();
     out->valid = out->singular = out->transparent = out->transmitted = out->diffuse = vm_none();
-    out->clear = out->through_portal = vm_none();
+    out->fibre = out->clear = out->through_portal = vm_none();
 }
 
 /* Lanes of m that a lobe lets through clearly where it refracts. */
@@ -254,6 +254,8 @@ TRC_INLINE void sample_lobes(const struct trc_lobes *l, const struct trc_surface
                                  ? alive
                                  : vm_select(crosses, through_lobe(lobe, wi, alive), sides.above));
             if (rare) {
+                if (lobe->kind == TRC_LOBE_HAIR_REFLECT)
+                    out->fibre = vm_or(out->fibre, spread);
                 chosen = vi_select(spread, vi_set(i), chosen);
                 draw.chosen_at = vf_select(spread, chosen_at, draw.chosen_at);
             }

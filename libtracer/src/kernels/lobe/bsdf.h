@@ -156,6 +156,7 @@ struct trc_bsdf_sample {
     vmask singular, transparent,
         transmitted;      /* transmitted: to the other side, incl. translucent */
     vmask diffuse;        /* the lobe was translucent: a diffuse transmission ray */
+    vmask fibre;          /* the lobe was of fibres, in the passes of reflection on either side */
     vmask clear;          /* by what is smooth enough, where lobes ask */
     vmask through_portal; /* transparent lanes that go on from origin instead of straight */
     vvec3 origin;

@@ -13,12 +13,12 @@ static vvec3 share_in(vvec3 part, vvec3 sum) {
 }
 
 /* The diffuse lobes' share of what the lanes' rays bring, as a word: of rays that bounce for the
- * first time what lobes have in their direction, unless that is ideal; else as before. mixed: lanes
- * whose word is of TRC_CATEGORY_MIXED. */
+ * first time what lobes have in their direction, unless that is ideal; else as before. category: in
+ * place, of first bounces; fibres reflect to all sides, and their words may be of
+ * TRC_CATEGORY_MIXED. */
 static vuint share_of(const struct trc_tile *t, const struct arrival *a,
                       const struct trc_surface *s, const struct trc_lobes *lobes,
-                      const struct trc_bsdf_sample *b, vmask first, vmask ideal, vmask *mixed) {
-    *mixed = vm_none();
+                      const struct trc_bsdf_sample *b, vmask first, vmask ideal, vint *category) {
     const vuint before = word_column(t->work.w[TRC_RAY_SHARE], a);
     first = vm_andnot(first, b->transparent);
     const vmask rough = vm_andnot(first, ideal);
@@ -30,11 +30,15 @@ static vuint share_of(const struct trc_tile *t, const struct arrival *a,
     const vvec3 share = share_in(f.diffuse, sum);
     vuint word = trc_share_pack(share);
     if (lobes->rare & TRC_LOBES_HAIR) {
-        const vfloat least = vf_min(v3_max(f.glossy), v3_max(f.transmission));
-        *mixed = vm_and(rough, vf_gt(least, vf_set(0.0f)));
+        /* What fibres scatter to where no light sample would be taken has no value there. */
+        const vmask unlit = vm_andnot(b->fibre, vf_gt(v3_max(sum), vf_set(0.0f)));
+        const vmask glossy = vm_and(rough, vm_or(unlit, vf_gt(v3_max(f.glossy), vf_set(0.0f))));
+        const vmask mixed = vm_and(glossy, vf_gt(v3_max(f.transmission), vf_set(0.0f)));
         const vuint both =
             trc_mixed_pack(share, share_in(f.glossy, sum), hash3(b->wi.x, b->wi.y, b->wi.z));
-        word = (vuint)vi_select(*mixed, (vint)both, (vint)word);
+        word = (vuint)vi_select(mixed, (vint)both, (vint)word);
+        *category = vi_select(glossy, vi_set(TRC_CATEGORY_GLOSSY), *category);
+        *category = vi_select(mixed, vi_set(TRC_CATEGORY_MIXED), *category);
     }
     return (vuint)vi_select(first, (vint)word, (vint)before);
 }
@@ -91,9 +95,12 @@ static void ray_append(struct trc_tile *t, struct trc_ray_store *to, const struc
     const vuint category = a->path & vu_set(3u << TRC_PATH_CATEGORY_SHIFT);
     const vmask first =
         vi_eq((vint)category, vi_set(TRC_CATEGORY_CAMERA << TRC_PATH_CATEGORY_SHIFT));
-    const vint own =
-        vi_select(b->transmitted, vi_set(TRC_CATEGORY_TRANSMISSION), vi_set(TRC_CATEGORY_GLOSSY))
-        << TRC_PATH_CATEGORY_SHIFT;
+    vint own =
+        vi_select(b->transmitted, vi_set(TRC_CATEGORY_TRANSMISSION), vi_set(TRC_CATEGORY_GLOSSY));
+    vuint share = vu_set(0);
+    if (t->light_passes)
+        share = share_of(t, a, s, lobes, b, first, ideal, &own);
+    own = own << TRC_PATH_CATEGORY_SHIFT;
     vuint kind = (vuint)vi_select(b->transmitted, vi_set(TRC_VISIBLE_TRANSMISSION),
                                   vi_set(TRC_VISIBLE_GLOSSY | TRC_PATH_REFLECTED));
     kind = kind | (vuint)vi_select(ideal, vi_set(TRC_PATH_SINGULAR), vi_set(0));
@@ -119,13 +126,7 @@ static void ray_append(struct trc_tile *t, struct trc_ray_store *to, const struc
     const vfloat values[TRC_RAY_FLOATS] = {
         o.x,      o.y,      o.z, w.x,     w.y, w.z, tmin, tmax,           a->time,    weight.x,
         weight.y, weight.z, pdf, min_pdf, n.x, n.y, n.z,  indirect_scale, path_length};
-    vuint left = vu_set(0), share = vu_set(0), strand[2] = {vu_set(0), vu_set(0)};
-    if (t->light_passes) {
-        vmask mixed;
-        share = share_of(t, a, s, lobes, b, first, ideal, &mixed);
-        const vint both = vi_set(TRC_CATEGORY_MIXED << TRC_PATH_CATEGORY_SHIFT);
-        path = path | (vuint)vi_select(mixed, both, vi_set(0));
-    }
+    vuint left = vu_set(0), strand[2] = {vu_set(0), vu_set(0)};
     if (t->remembers_left)
         left = (vuint)vi_select(transparent, (vint)word_column(t->work.w[TRC_RAY_LEFT], a),
                                 s->instance);
