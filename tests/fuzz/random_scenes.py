@@ -7,7 +7,7 @@
 A line for each seed: errors of the picture and of light passes beyond noise, over the mean of the picture. A
 seed is the same scene in each Blender that has its nodes. Each part draws its numbers from a generator of its
 own, so that a scene without a part is mostly the same (without textures, normals or mixes other textures are
-drawn): what is wrong is found by leaving parts out. --keep writes the scenes as .blend files and Volley | Cycles
+drawn): what is wrong is found by leaving parts out. Light by kind must add up to the picture as it does in Cycles. --keep writes the scenes as .blend files and Volley | Cycles
 | 8 times the difference beside them. Ends with 1 if a mean differs by 1 % or a tile by 3 %, or a picture of
 Volley's is not finite. Takes a few seconds for each scene.
 """
@@ -26,6 +26,7 @@ PARTS = ("textures", "normals", "mixes", "strands", "points", "instances", "moti
          "world", "lamps", "lamp_nodes", "film", "objects", "passes", "guides", "rough_glass")
 SIZE, SAMPLES = (64, 48), 512
 MEAN_TOLERANCE, TILE_TOLERANCE = 0.01, 0.03
+SUM_TOLERANCE = 0.002  # of the mean, by which light by kind may miss Combined by more than Cycles' does
 DARKEST = 1e-4  # mean that errors are taken relative to
 PASSES = {"use_pass_diffuse_direct": "DiffDir", "use_pass_glossy_direct": "GlossDir",
           "use_pass_glossy_indirect": "GlossInd", "use_pass_transmission_direct": "TransDir",
@@ -33,6 +34,10 @@ PASSES = {"use_pass_diffuse_direct": "DiffDir", "use_pass_glossy_direct": "Gloss
           "use_pass_emit": "Emit", "use_pass_environment": "Env", "use_pass_diffuse_color": "DiffCol",
           "use_pass_glossy_color": "GlossCol", "use_pass_transmission_color": "TransCol", "use_pass_mist": "Mist",
           "use_pass_normal": "Normal"}
+# Of each seed; they add up to Combined, light times its colour.
+LIGHT_SETTINGS = [f"use_pass_{kind}_{part}" for kind in ("diffuse", "glossy", "transmission")
+                  for part in ("direct", "indirect", "color")] + ["use_pass_emit", "use_pass_environment"]
+LIGHT_PASSES = [kind + part for kind in ("Diff", "Gloss", "Trans") for part in ("Dir", "Ind", "Col")] + ["Emit", "Env"]
 GUIDES = ("Denoising Albedo", "Denoising Normal")
 NO_LIGHT = (*GUIDES, "Normal")  # their errors are over their own means
 
@@ -528,9 +533,9 @@ def build(seed, without):
         set_film(scene.rng("film"))
     names = ["Combined"]
     if scene.has("passes", 0.5):
-        for setting in scene.rng("passes").sample(sorted(PASSES), 3):
-            setattr(bpy.context.view_layer, setting, True)
-            names.append(PASSES[setting])
+        names += [PASSES[setting] for setting in scene.rng("passes").sample(sorted(PASSES), 3)]
+    for setting in (*PASSES, *LIGHT_SETTINGS):
+        setattr(bpy.context.view_layer, setting, True)
     if scene.has("guides", 0.4):
         layer = bpy.context.view_layer
         layer.volley.denoising_store_passes = layer.cycles.denoising_store_passes = True
@@ -540,16 +545,24 @@ def build(seed, without):
 
 
 def inside(seed, without, folder):
-    """{pass: (Volley's pictures, Cycles')} of a seed."""
+    """{pass: (Volley's pictures, Cycles')} of a seed, and the names of those that are compared."""
     import bpy
     import scenes
     names = build(seed, without)
     if folder:
         bpy.ops.wm.save_as_mainfile(filepath=os.path.join(folder, f"{seed:04d}.blend"))
-    return scenes.passes_by_both(names, SAMPLES)
+    return scenes.passes_by_both(list(dict.fromkeys(names + LIGHT_PASSES)), SAMPLES), names
 
 
 # Around Blender --------------------------------------------------------------------------------------
+
+def unsummed(pictures, side):
+    """The mean by which light by kind does not add up to Combined; side: 0 for Volley, 1 for Cycles."""
+    part = {name: np.nan_to_num(pictures[name][side][..., :3]) for name in ("Combined", *LIGHT_PASSES)}
+    total = part["Emit"] + part["Env"] + sum((part[f"{kind}Dir"] + part[f"{kind}Ind"]) * part[f"{kind}Col"]
+                                             for kind in ("Diff", "Gloss", "Trans"))
+    return float(np.abs(total - part["Combined"]).mean())
+
 
 def measure(seed, options):
     """The largest errors of a seed, (mean, tile), printed."""
@@ -558,7 +571,7 @@ def measure(seed, options):
     started = blender.Blender()
     folder = os.path.abspath(options.keep) if options.keep else None
     try:
-        pictures = started.run(inside, seed, options.without, folder, timeout=options.timeout)
+        pictures, names = started.run(inside, seed, options.without, folder, timeout=options.timeout)
     except blender.BlenderError as error:
         print(f"{seed:4d} FAILED: {str(error)[-1500:]}", flush=True)
         return 1.0, 1.0
@@ -566,7 +579,8 @@ def measure(seed, options):
     worst = np.zeros(2)
     words = []
     scale = max(float(pictures["Combined"][1][..., :3].mean()), DARKEST)
-    for name, (ours, theirs) in pictures.items():
+    for name in names:
+        ours, theirs = pictures[name]
         channels = {"Combined": 4, "Mist": 1}.get(name, 3)
         ours, theirs = ours[..., :channels], np.nan_to_num(theirs[..., :channels])
         if not np.isfinite(ours).all():
@@ -581,6 +595,10 @@ def measure(seed, options):
                      for each in (ours, theirs)]
             pair = compare.side_by_side(*shown)
             compare.write_png(os.path.join(options.keep, f"{seed:04d}_{name}.png"), pair)
+    rest, their_rest = (unsummed(pictures, side) / scale for side in (0, 1))
+    if rest > their_rest + SUM_TOLERANCE:
+        words.append(f"light by kind does not add up: {rest:.2%} (Cycles {their_rest:.2%})")
+        worst = np.maximum(worst, 1.0)
     is_off = bool((worst > (MEAN_TOLERANCE, TILE_TOLERANCE)).any())
     print(f"{seed:4d} {'OFF' if is_off else 'ok '} mean {scale:.4f}  {', '.join(words)}",
           *sorted(set(told)), sep="\n       ", flush=True)
