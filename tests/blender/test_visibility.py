@@ -14,6 +14,9 @@ COLUMN_PX = 16
 SAMPLES = 64
 SWITCHES = ("visible_camera", "visible_diffuse", "visible_glossy", "visible_transmission", "visible_shadow")
 OFF = 1e-3  # beyond the noise that the seeds show
+# Of Cycles' light, which depends on how densely each of the two samples a mesh.
+MESH_PARTS = {"mesh hidden from transmission": (1.1, 1.5), "mesh hidden from diffuse": (0.2, 0.6)}
+DARK_OFF = 2e-3  # where shadow rays to the world and diffuse rays may see other things
 
 
 # Inside Blender ------------------------------------------------------------------------------------
@@ -335,6 +338,38 @@ def inside_camera():
     return pictures
 
 
+def inside_translucent():
+    """{what is hidden from which rays: pictures by both} of a translucent ball, whose rays are diffuse and
+    transmitted ones: lamps and the world, and what is dark before an even world."""
+    import bpy
+    import scenes
+    found = {}
+    for what in ("lamp", "panel", "world", "dark", "mesh"):
+        for switch in ("", "diffuse", "glossy", "transmission"):
+            scene = scenes.empty(size=(32, 24))
+            scenes.camera()
+            scenes.sphere(material=scenes.material("Leaf", "ShaderNodeBsdfTranslucent", Color=(0.8, 0.7, 0.6)))
+            if what == "lamp":
+                hidden = scenes.light('POINT', (0.0, 2.0, 1.0), energy=200.0)
+                hidden.data.shadow_soft_size = 0.9
+            elif what == "panel":
+                hidden = scenes.light('AREA', (0.0, 3.0, 1.0), (-1.5, 0.0, 0.0), energy=200.0)
+                hidden.data.size = 2.0
+            elif what == "mesh":
+                hidden = scenes.sphere("Glow", 1.0, (0.0, 3.0, 1.0), scenes.emitter((1.0, 1.0, 1.0), strength=3.0))
+                hidden.visible_camera = False
+            else:
+                scenes.world_color(scene.world, (0.5, 0.6, 0.7))
+                hidden = scene.world.cycles_visibility
+            if what == "dark":
+                hidden = scenes.sphere("Dark", 1.0, (0.0, 1.7, 1.2), scenes.emitter((0.0, 0.0, 0.0)))
+                hidden.visible_camera = hidden.visible_shadow = False
+            if switch:
+                setattr(hidden, switch if what == "world" else f"visible_{switch}", False)
+            found[f"{what} hidden from {switch or 'nothing'}"] = scenes.seeds_by_both(4 * SAMPLES)
+    return found
+
+
 # Comparison ----------------------------------------------------------------------------------------
 
 def _agree(pictures):
@@ -352,6 +387,17 @@ def test_switches(blender, kind):
                                     inside_motion, inside_camera])
 def test_pictures(blender, inside):
     _agree(blender.run(inside))
+
+
+def test_translucent(blender):
+    for name, (ours, theirs) in blender.run(inside_translucent, timeout=300).items():
+        errors = compare.unexplained(ours, theirs)
+        print(f"{name}: means {ours[..., :3].mean():.5f} and {theirs[..., :3].mean():.5f}, beyond noise {errors}")
+        if name in MESH_PARTS:
+            low, high = MESH_PARTS[name]
+            assert low < ours[..., :3].mean() / theirs[..., :3].mean() < high, name
+        else:
+            assert max(errors) < (DARK_OFF if name.startswith("dark") else OFF), name
 
 
 # Simplify's culling ------------------------------------------------------------------------------------

@@ -7,9 +7,10 @@
 A line for each seed: errors of the picture and of light passes beyond noise, over the mean of the picture. A
 seed is the same scene in each Blender that has its nodes. Each part draws its numbers from a generator of its
 own, so that a scene without a part is mostly the same (without textures, normals or mixes other textures are
-drawn): what is wrong is found by leaving parts out. Light by kind must add up to the picture as it does in Cycles. --keep writes the scenes as .blend files and Volley | Cycles
-| 8 times the difference beside them. Ends with 1 if a mean differs by 1 % or a tile by 3 %, or a picture of
-Volley's is not finite. Takes a few seconds for each scene.
+drawn): what is wrong is found by leaving parts out. Light by kind must add up to the picture as it does in
+Cycles. --keep writes the scenes as .blend files and Volley | Cycles | 8 times the difference beside them. Ends
+with 1 if a mean differs by 1 % or a tile by 3 %, light does not add up, or a picture of Volley's is not finite.
+Takes a few seconds for each scene.
 """
 
 import argparse

@@ -211,8 +211,6 @@ vfloat trc_light_chosen(const struct trc_surface *s, vvec3 n, const struct trc_l
 
 vuint trc_light_visibility(const struct trc_snapshot *snapshot,
                            const struct trc_light_sample *sample, vuint path) {
-    if (!snapshot->lights->hides)
-        return vu_set(TRC_VISIBLE_ALL);
     const vmask chosen = vm_not(vi_lt(sample->light, vi_set(0)));
     const vuint bits = visibility_of(snapshot, sample->light, chosen);
     const vint hidden = (vint)(path & ~bits & vu_set(TRC_VISIBLE_UNBLOCKED));
@@ -234,14 +232,14 @@ vuint trc_light_shadow_class(const struct trc_snapshot *snapshot, vint light, vm
     return vu_load(classes);
 }
 
-/* A continuation ray towards wi is a glossy one above the surface and a transmitted one below. */
+/* A continuation ray towards wi is a glossy one above the surface. Below it all weights stay: what
+ * translucent surfaces have of a light that transmitted rays do not see lacks the rays' part, as in
+ * Cycles. */
 static void mark_hidden(const struct draw *d, vmask m) {
-    const vuint bits = visibility_of(d->scene, d->light, m);
+    const vint bits = (vint)visibility_of(d->scene, d->light, m);
     const vmask above = vf_gt(v3_dot(d->s->ng, d->out->wi), vf_zero());
-    const vint wanted =
-        vi_select(above, vi_set(TRC_VISIBLE_GLOSSY), vi_set(TRC_VISIBLE_TRANSMISSION));
-    const vmask unseen = vi_eq((vint)bits & wanted, vi_set(0));
-    d->out->no_mis = vm_or(d->out->no_mis, vm_and(m, unseen));
+    const vmask unseen = vi_eq(bits & vi_set(TRC_VISIBLE_GLOSSY), vi_set(0));
+    d->out->no_mis = vm_or(d->out->no_mis, vm_and(m, vm_and(above, unseen)));
 }
 
 /* ---- interface ---- */

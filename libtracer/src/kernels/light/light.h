@@ -49,8 +49,8 @@ vfloat trc_light_chosen(const struct trc_surface *s, vvec3 n, const struct trc_l
                         vmask m);
 
 /* Visibility bits (TRC_VISIBLE_*) of the light each lane chose, none where unblocked rays, by their
- * path, are not to have it; all bits in lanes that chose none. When the scene's lights hide from
- * nothing, the caller can skip it: trc_light_table.hides is false. */
+ * path, are not to have it; all bits in lanes that chose none. Of scenes whose lights hide from
+ * something (trc_light_table.hides). */
 vuint trc_light_visibility(const struct trc_snapshot *snapshot,
                            const struct trc_light_sample *sample, vuint path);
 

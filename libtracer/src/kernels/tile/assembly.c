@@ -81,7 +81,7 @@ static void packet_load(struct trc_tile *t, const uint32_t *order, uint32_t coun
     p->active = count < TRC_PACKET_SIZE ? (1ull << count) - 1 : ~0ull;
     p->visibility = t->desc->assembly == TRC_ASSEMBLY_BLIND && all_see_the_same(t)
                         ? TRC_VISIBLE_ALL
-                        : path & TRC_VISIBLE_ALL;
+                        : trc_ray_visibility(path);
     if (path & TRC_VISIBLE_UNBLOCKED)
         p->visibility <<= TRC_UNBLOCKED_SHIFT;
     p->common_origin = (path & TRC_VISIBLE_CAMERA) && t->camera_common;

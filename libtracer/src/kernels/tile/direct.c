@@ -74,6 +74,18 @@ static vvec3 own_origin(const struct trc_surface *s, const struct trc_light_samp
     return v3_add(o, lifted(s, l, part, active));
 }
 
+/* Kinds of rays (TRC_VISIBLE_*) that see the lanes' lights. What rays alone would find in Cycles,
+ * transmitted ones find behind the surface, diffuse ones among them. */
+static vuint light_seen(const struct trc_tile *t, const struct trc_surface *s,
+                        const struct trc_light_sample *l, vuint path) {
+    if (!t->snapshot->lights->hides)
+        return vu_set(TRC_VISIBLE_ALL);
+    const vuint seen = trc_light_visibility(t->snapshot, l, path);
+    const vint transmitted = (vint)(seen & vu_set(TRC_VISIBLE_TRANSMISSION));
+    const vmask behind = vm_and(is_found_alone(s, l), vf_lt(v3_dot(s->ng, l->wi), vf_set(0.0f)));
+    return (vuint)vi_select(vm_and(behind, vi_eq(transmitted, vi_set(0))), vi_set(0), (vint)seen);
+}
+
 /* Contributions of the lanes' light samples, weighted; lanes that get nothing are dropped from
  * active. */
 static vmask light_contribute(const struct trc_tile *t, const struct arrival *a,
@@ -83,7 +95,7 @@ static vmask light_contribute(const struct trc_tile *t, const struct arrival *a,
     struct trc_bsdf_value f;
     trc_bsdf_eval(lobes, s, l->wi, active, is_found_alone(s, l), &f);
     const vfloat one = vf_set(1.0f), zero = vf_set(0.0f);
-    const vuint seen = trc_light_visibility(t->snapshot, l, a->path);
+    const vuint seen = light_seen(t, s, l, a->path);
     const vmask alone = vm_or(l->delta, l->no_mis);
     vfloat mis, mis_diffuse = one;
     if (t->desc->integrator == TRC_INTEGRATOR_DISTRIBUTION) {

@@ -72,7 +72,7 @@ static vmask is_visible(const struct arrival *a, const struct trc_surface *s, vm
     for (uint32_t bits = vm_bits(active); bits; bits &= bits - 1) {
         const int i = __builtin_ctz(bits);
         const uint32_t visibility = s->snapshot->instances[vi_get(s->instance, i)].visibility;
-        seen |= (uint32_t)((visibility & path[i] & TRC_VISIBLE_ALL) != 0) << i;
+        seen |= (uint32_t)((visibility & trc_ray_visibility(path[i])) != 0) << i;
     }
     return vm_from_bits(seen);
 }

@@ -28,6 +28,13 @@ enum {
     TRC_PATH_CLASS_SHIFT = 24         /* shadow rays: the shadow class of their light, 4 bits */
 };
 
+/* What objects a ray of that path word may see by: diffuse rays that are transmitted count as
+ * transmitted alone, as in Cycles; lamps tell them by either (kernels/light/hit.c). */
+TRC_INLINE uint32_t trc_ray_visibility(uint32_t path) {
+    const uint32_t bits = path & TRC_VISIBLE_ALL;
+    return bits & TRC_VISIBLE_TRANSMISSION ? bits & ~(uint32_t)TRC_VISIBLE_DIFFUSE : bits;
+}
+
 /* What a path's first bounce was. */
 enum {
     TRC_CATEGORY_CAMERA, /* there was none */
