@@ -46,6 +46,8 @@ KNOWN = {
 KNOWN_BEFORE_4 = {
     **{f"{what}principled hair coat {coat} ior {ior} parametrization COLOR": (0.015, 0.035, _TILT)
        for what in ("", "strands of ") for coat in (0.0, 0.8) for ior in (1.2, 1.8)},
+    **{f"rough principled hair coat {coat} offset 0.8 parametrization COLOR": (0.08, 0.2, _TILT)
+       for coat in (0.4, 0.9)},
     # These have the node's own Offset, two degrees.
     **{f"{what}principled hair melanin redness {redness} random color {color} random roughness {roughness} "
        "parametrization MELANIN": (0.01, STRANDS_TILE, _TILT)
@@ -122,6 +124,8 @@ for _what in ("", STRANDS):
          None, Roughness=(0.1, 0.4), Radial_Roughness=(0.2, 0.7), parametrization=('COLOR',))
     _add(_what + "principled hair", _PRINCIPLED_HAIR, {"Color": _GOLD, "Offset": 0.2},
          None, Coat=(0.0, 0.8), IOR=(1.2, 1.8), parametrization=('COLOR',))
+    _add(_what + "rough principled hair", _PRINCIPLED_HAIR, {"Color": _GOLD, "Roughness": 0.6},
+         None, Coat=(0.4, 0.9), Offset=(0.0, 0.8), parametrization=('COLOR',))
     _add(_what + "principled hair", _PRINCIPLED_HAIR, {"Melanin": 0.6, "Tint": _PALE},
          None, Melanin_Redness=(0.2, 1.0), Random_Color=(0.0, 0.9), Random_Roughness=(0.0, 0.8),
          parametrization=('MELANIN',))

@@ -15,7 +15,7 @@ SAMPLES = 64
 SWITCHES = ("visible_camera", "visible_diffuse", "visible_glossy", "visible_transmission", "visible_shadow")
 OFF = 1e-3  # beyond the noise that the seeds show
 # Of Cycles' light, which depends on how densely each of the two samples a mesh.
-MESH_PARTS = {"mesh hidden from transmission": (1.1, 1.5), "mesh hidden from diffuse": (0.2, 0.6)}
+MESH_PARTS = {"mesh hidden from transmission": (1.02, 1.5), "mesh hidden from diffuse": (0.2, 0.8)}
 DARK_OFF = 2e-3  # where shadow rays to the world and diffuse rays may see other things
 
 
