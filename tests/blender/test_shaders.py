@@ -41,12 +41,16 @@ KNOWN = {
     "sheen roughness 0.5": (0.005, 0.02, _SHEEN),
     "metallic roughness 0.9 anisotropy 0.6 distribution BECKMANN": (0.005, 0.01, "not understood"),
     "principled clearcoat roughness 0.03": (0.015, 0.02, _COAT),
+    **{f"rough principled hair coat {coat} offset {offset} parametrization COLOR":
+       (0.01, 0.02, "Cycles samples a coat by the roughness without it")
+       for coat in (0.4, 0.9) for offset in (0.0, 0.8)},
 }
 # Those of Blender 3.
 KNOWN_BEFORE_4 = {
     **{f"{what}principled hair coat {coat} ior {ior} parametrization COLOR": (0.015, 0.035, _TILT)
        for what in ("", "strands of ") for coat in (0.0, 0.8) for ior in (1.2, 1.8)},
-    **{f"rough principled hair coat {coat} offset 0.8 parametrization COLOR": (0.08, 0.2, _TILT)
+    # By the place on the stage up to twice as much.
+    **{f"rough principled hair coat {coat} offset 0.8 parametrization COLOR": (0.2, 0.4, _TILT)
        for coat in (0.4, 0.9)},
     # These have the node's own Offset, two degrees.
     **{f"{what}principled hair melanin redness {redness} random color {color} random roughness {roughness} "
