@@ -93,6 +93,18 @@ COLOURED = {
 COLOURED_ROUGHNESSES = (0.4, 0.6, 0.9)
 
 
+def _unclamped_means():
+    """Means of the scene by channel, by both."""
+    import bpy
+    import scenes
+    pair = []
+    for engine in ('VOLLEY', 'CYCLES'):
+        scenes.set_engine(engine, 4 * SAMPLES)
+        bpy.context.scene.volley.clamp_indirect = bpy.context.scene.cycles.sample_clamp_indirect = 0.0
+        pair.append(scenes.render()[..., :3].mean(axis=(0, 1)).tolist())
+    return pair
+
+
 def inside_coloured_balls():
     """{(name, roughness): [mean colour of a ball that fills the picture by Volley, by Cycles]}"""
     import bpy
@@ -111,12 +123,7 @@ def inside_coloured_balls():
                 node.inputs[socket if socket in node.inputs else "Transmission Weight"].default_value = value
             ball.data.materials.clear()
             ball.data.materials.append(made)
-            pair = []
-            for engine in ('VOLLEY', 'CYCLES'):
-                scenes.set_engine(engine, 4 * SAMPLES)
-                scene.volley.clamp_indirect = scene.cycles.sample_clamp_indirect = 0.0
-                pair.append(scenes.render()[..., :3].mean(axis=(0, 1)).tolist())
-            means[name, roughness] = pair
+            means[name, roughness] = _unclamped_means()
     return means, bpy.app.version
 
 
@@ -139,7 +146,7 @@ def inside_balls_before_a_lamp():
     """{roughness: mean of a ball of Multiscatter GGX glass under an area lamp by Volley over that by Cycles}"""
     import bpy
     import scenes
-    scene = scenes.empty(size=(48, 36))
+    scenes.empty(size=(48, 36))
     scenes.camera()
     scenes.light('AREA', location=(-1.0, -4.0, 3.0), rotation=(0.9, 0.0, -0.3), energy=300.0, size=1.0)
     ball = scenes.sphere("Ball", 1.6)
@@ -149,12 +156,8 @@ def inside_balls_before_a_lamp():
         scenes.shader_of(glass).distribution = 'MULTI_GGX'
         ball.data.materials.clear()
         ball.data.materials.append(glass)
-        means = []
-        for engine in ('VOLLEY', 'CYCLES'):
-            scenes.set_engine(engine, 4 * SAMPLES)
-            scene.volley.clamp_indirect = scene.cycles.sample_clamp_indirect = 0.0
-            means.append(float(scenes.render()[..., :3].mean()))
-        found[roughness] = means[0] / means[1]
+        ours, theirs = (sum(means) for means in _unclamped_means())
+        found[roughness] = ours / theirs
     return found, bpy.app.version
 
 

@@ -11,13 +11,13 @@ COLORS = {'COLOR': {"Color": (0.05, 0.2, 0.4), "Roughness": 0.6}, 'MELANIN': {"M
 OFF = 2e-3, 0.02
 NORMAL_OFF = 5e-4, 0.01
 SUM_TOLERANCE = 1e-5
-LIGHT_PASSES = [f"{kind}{when}" for kind in ("Diff", "Gloss", "Trans") for when in ("Dir", "Ind", "Col")]
 
 
 def inside_hair():
     """{(model, parametrization, light): {pass: both}} of a ball of Principled Hair before a lamp, or an even world,
     of which rays that go on find the most."""
     import bpy
+    import compare
     import scenes
     found = {}
     for model in ('CHIANG', 'HUANG'):
@@ -37,13 +37,10 @@ def inside_hair():
                 if light == "lamp":
                     scenes.light(energy=500.0)
                 layer = bpy.context.view_layer
-                for kind in ("diffuse", "glossy", "transmission"):
-                    for when in ("direct", "indirect", "color"):
-                        setattr(layer, f"use_pass_{kind}_{when}", True)
-                layer.use_pass_environment = True
+                scenes.show_light(layer)
                 layer.volley.denoising_store_passes = layer.cycles.denoising_store_passes = True
                 found[model, parametrization, light] = scenes.passes_by_both(
-                    ["Combined", "Env", "Denoising Normal", *LIGHT_PASSES], SAMPLES)
+                    ["Combined", "Denoising Normal", *compare.LIGHT_PASSES], SAMPLES)
     return found
 
 
@@ -63,6 +60,4 @@ def test_hair(blender):
             for name in ("GlossDir", "GlossInd"):
                 _agree(both[name], case, name)
         ours = {name: pictures[0][..., :3] for name, pictures in both.items()}  # by seed
-        total = ours["Env"] + sum((ours[f"{kind}Dir"] + ours[f"{kind}Ind"]) * ours[f"{kind}Col"]
-                                  for kind in ("Diff", "Gloss", "Trans"))
-        assert np.abs(total - ours["Combined"]).max() <= SUM_TOLERANCE, case
+        assert np.abs(compare.light_sum(ours) - ours["Combined"]).max() <= SUM_TOLERANCE, case

@@ -35,10 +35,6 @@ PASSES = {"use_pass_diffuse_direct": "DiffDir", "use_pass_glossy_direct": "Gloss
           "use_pass_emit": "Emit", "use_pass_environment": "Env", "use_pass_diffuse_color": "DiffCol",
           "use_pass_glossy_color": "GlossCol", "use_pass_transmission_color": "TransCol", "use_pass_mist": "Mist",
           "use_pass_normal": "Normal"}
-# Of each seed; they add up to Combined, light times its colour.
-LIGHT_SETTINGS = [f"use_pass_{kind}_{part}" for kind in ("diffuse", "glossy", "transmission")
-                  for part in ("direct", "indirect", "color")] + ["use_pass_emit", "use_pass_environment"]
-LIGHT_PASSES = [kind + part for kind in ("Diff", "Gloss", "Trans") for part in ("Dir", "Ind", "Col")] + ["Emit", "Env"]
 GUIDES = ("Denoising Albedo", "Denoising Normal")
 NO_LIGHT = (*GUIDES, "Normal")  # their errors are over their own means
 
@@ -535,10 +531,12 @@ def build(seed, without):
     names = ["Combined"]
     if scene.has("passes", 0.5):
         names += [PASSES[setting] for setting in scene.rng("passes").sample(sorted(PASSES), 3)]
-    for setting in (*PASSES, *LIGHT_SETTINGS):
-        setattr(bpy.context.view_layer, setting, True)
+    layer = bpy.context.view_layer
+    scenes.show_light(layer)
+    for setting, name in PASSES.items():
+        if name in names:
+            setattr(layer, setting, True)
     if scene.has("guides", 0.4):
-        layer = bpy.context.view_layer
         layer.volley.denoising_store_passes = layer.cycles.denoising_store_passes = True
         names += GUIDES
     bpy.context.scene.frame_set(1)
@@ -548,21 +546,21 @@ def build(seed, without):
 def inside(seed, without, folder):
     """{pass: (Volley's pictures, Cycles')} of a seed, and the names of those that are compared."""
     import bpy
+    import compare
     import scenes
     names = build(seed, without)
     if folder:
         bpy.ops.wm.save_as_mainfile(filepath=os.path.join(folder, f"{seed:04d}.blend"))
-    return scenes.passes_by_both(list(dict.fromkeys(names + LIGHT_PASSES)), SAMPLES), names
+    return scenes.passes_by_both(list(dict.fromkeys(names + compare.LIGHT_PASSES)), SAMPLES), names
 
 
 # Around Blender --------------------------------------------------------------------------------------
 
 def unsummed(pictures, side):
     """The mean by which light by kind does not add up to Combined; side: 0 for Volley, 1 for Cycles."""
-    part = {name: np.nan_to_num(pictures[name][side][..., :3]) for name in ("Combined", *LIGHT_PASSES)}
-    total = part["Emit"] + part["Env"] + sum((part[f"{kind}Dir"] + part[f"{kind}Ind"]) * part[f"{kind}Col"]
-                                             for kind in ("Diff", "Gloss", "Trans"))
-    return float(np.abs(total - part["Combined"]).mean())
+    import compare
+    part = {name: np.nan_to_num(pictures[name][side][..., :3]) for name in ("Combined", *compare.LIGHT_PASSES)}
+    return float(np.abs(compare.light_sum(part) - part["Combined"]).mean())
 
 
 def measure(seed, options):

@@ -295,6 +295,17 @@ def largest_errors(found):
     return {name: max(mean, tile) for name, (mean, _biased, tile) in found.items()}
 
 
+# The passes of light by kind; each is divided by its kind's colour.
+LIGHT_KINDS = ("Diff", "Gloss", "Trans")
+LIGHT_PASSES = [f"{kind}{part}" for kind in LIGHT_KINDS for part in ("Dir", "Ind", "Col")] + ["Emit", "Env"]
+
+
+def light_sum(pictures):
+    """What must be Combined, of {pass name: array}: light of all kinds by its colour, emission and environment."""
+    return pictures["Emit"] + pictures["Env"] + sum(
+        (pictures[f"{kind}Dir"] + pictures[f"{kind}Ind"]) * pictures[f"{kind}Col"] for kind in LIGHT_KINDS)
+
+
 def unexplained(seeds_a, seeds_b, tile_px=TILE_PX, errors=NOISE_ERRORS):
     """How far two sets of seeds are apart by more than noise explains: the largest excess in the mean of a
     channel, and in the mean of a tile and channel.

@@ -359,6 +359,14 @@ def render_passes(names):
     return {name: load(os.path.join(folder, file)) for name, file in zip(names, files)}
 
 
+def show_light(layer):
+    """Ask a view layer for the passes of compare.LIGHT_PASSES."""
+    for kind in ("diffuse", "glossy", "transmission"):
+        for part in ("direct", "indirect", "color"):
+            setattr(layer, f"use_pass_{kind}_{part}", True)
+    layer.use_pass_emit = layer.use_pass_environment = True
+
+
 def passes_by_both(names, samples, seeds=SEEDS):
     """{pass name: as seeds_by_both} of the active view layer."""
     sides = [[render_passes(names) for _ in each_seed(engine, samples, seeds)]

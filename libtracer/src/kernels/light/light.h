@@ -24,7 +24,7 @@ struct trc_light_sample {
     vfloat pdf;      /* density, times the chance of having chosen this light */
     vmask valid;     /* pdf > 0 and radiance > 0 */
     vmask delta;     /* point light or sun without extent: no MIS */
-    vmask no_mis;    /* continuation rays towards wi do not see this light: weight 1 */
+    vmask no_mis;    /* reflected rays towards wi do not see this light: weight 1 */
     vmask casts_shadow;
     vint light; /* number for sorting shadow rays; emissive triangles and world included */
 };
