@@ -226,17 +226,117 @@ static void groups_are_exposed(void **state) {
     assert_ok(trc_scene_destroy(scene));
 }
 
+/* ---- what is no number ---- */
+
+/* Beyond floats, by an object's colour. */
+static uint32_t add_infinite(struct node_list *list) {
+    const uint32_t info = node_add(list, TRC_NODE_OBJECT_INFO, 0, 0, NULL);
+    const uint32_t huge =
+        NODE_ADD(list, TRC_NODE_VECTOR_MATH, TRC_VECTOR_MULTIPLY, node_link(info, 1),
+                 node_color(3e38f, 3e38f, 3e38f), node_number(0.0f), node_number(1.0f));
+    return NODE_ADD(list, TRC_NODE_VECTOR_MATH, TRC_VECTOR_MULTIPLY, node_link(huge, 0),
+                    node_color(3e38f, 3e38f, 3e38f), node_number(0.0f), node_number(1.0f));
+}
+
+/* Emission, and AOVs: 0 infinite or 2, 1 of 3. */
+static trc_id add_part(trc_scene scene, float light, bool is_infinite, bool has_infinite_aov) {
+    struct node_list list = {0};
+    const uint32_t infinite = add_infinite(&list);
+    const trc_node_input none = node_link(infinite, 0);
+    const uint32_t surface =
+        NODE_ADD(&list, TRC_NODE_EMISSION, 0, is_infinite ? none : node_color(light, light, light),
+                 node_number(1.0f));
+    NODE_ADD(&list, TRC_NODE_AOV_COLOR, 0, has_infinite_aov ? none : node_color(2.0f, 2.0f, 2.0f));
+    NODE_ADD(&list, TRC_NODE_AOV_COLOR, 1, node_color(3.0f, 3.0f, 3.0f));
+    return level_material(scene, &list, surface, 0);
+}
+
+/* A ground, and in front of a part of it, which ends within a pixel, something else. Counts of
+ * samples end within vectors, and with halves of a pixel's samples. */
+#define EDGE_COLUMN 4
+#define EDGE_SAMPLES 37
+static trc_scene parts_create(float light, bool is_infinite, bool has_infinite_aov,
+                              trc_render_desc *desc_out) {
+    const trc_scene scene = fixture_level_view();
+    const float left[12] = {-9, -9, 0.5f, 1.1f, -9, 0.5f, 1.1f, 9, 0.5f, -9, 9, 0.5f};
+    fixture_quad(scene, left, add_part(scene, light, is_infinite, has_infinite_aov));
+    fixture_level(scene, 20.0f, 0.0f, add_part(scene, LIGHT, false, false));
+    assert_ok(trc_scene_commit(scene));
+    trc_render_desc desc = level_desc(EDGE_SAMPLES);
+    desc.filter_width = 1.0f;
+    desc.passes = UINT64_C(1) << TRC_PASS_SAMPLE_COUNT | UINT64_C(1) << TRC_PASS_EMISSION;
+    desc.aov_color_count = 2;
+    desc.denoise = TRC_DENOISE_PREVIEW; /* keeps sums of halves */
+    *desc_out = desc;
+    return scene;
+}
+
+/* What the other samples of the pixel have stays whole: as many as show the ground where what is
+ * in front of it is black. */
+static void samples_without_a_number_take_no_others(void **state) {
+    (void)state;
+    trc_render_desc desc;
+    float seen[4 * LEVEL_PIXELS];
+    const trc_scene black = parts_create(0.0f, false, false, &desc);
+    fixture_draw(black, &desc, TRC_PASS_COMBINED, seen, 4 * LEVEL_PIXELS);
+    assert_ok(trc_scene_destroy(black));
+    const trc_scene scene = parts_create(1.0f, true, false, &desc);
+    trc_render render_id = 0;
+    trc_render_progress progress = {.struct_size = sizeof progress};
+    float light[4 * LEVEL_PIXELS], emission[3 * LEVEL_PIXELS], aov[4 * LEVEL_PIXELS];
+    float counts[LEVEL_PIXELS];
+    double counted = 0.0;
+    assert_ok(trc_render_start(scene, &desc, &render_id));
+    assert_ok(trc_render_wait(render_id, INFINITY));
+    assert_ok(trc_render_read(render_id, TRC_PASS_COMBINED, light, 4 * LEVEL_PIXELS));
+    assert_ok(trc_render_read(render_id, TRC_PASS_EMISSION, emission, 3 * LEVEL_PIXELS));
+    assert_ok(trc_render_read(render_id, TRC_PASS_AOV_COLOR(1), aov, 4 * LEVEL_PIXELS));
+    assert_ok(trc_render_read(render_id, TRC_PASS_SAMPLE_COUNT, counts, LEVEL_PIXELS));
+    assert_ok(trc_render_poll(render_id, &progress));
+    assert_ok(trc_render_destroy(render_id));
+    for (int p = 0; p < LEVEL_PIXELS; p++) {
+        const int column = p % LEVEL_WIDTH;
+        counted += (double)counts[p];
+        assert_float_equal(counts[p], seen[4 * p] / LIGHT * EDGE_SAMPLES, 1e-3f);
+        if (column == EDGE_COLUMN)
+            assert_in_range(counts[p], 1, EDGE_SAMPLES - 1);
+        if (column < EDGE_COLUMN)
+            continue;
+        assert_float_equal(light[4 * p], LIGHT, 1e-6f);
+        assert_float_equal(emission[3 * p], LIGHT, 1e-6f);
+        assert_float_equal(aov[4 * p], 3.0f, 1e-6f);
+    }
+    assert_float_equal(counted + (double)progress.dropped_samples, LEVEL_PIXELS * EDGE_SAMPLES,
+                       0.0);
+    assert_ok(trc_scene_destroy(scene));
+}
+
+/* Values of a pass that are no number count as 0, those of other passes as they are. */
+static void passes_without_a_number_take_no_others(void **state) {
+    (void)state;
+    trc_render_desc desc;
+    const trc_scene scene = parts_create(0.0f, false, true, &desc);
+    float light[4 * LEVEL_PIXELS], aov[2][4 * LEVEL_PIXELS];
+    fixture_draw(scene, &desc, TRC_PASS_COMBINED, light, 4 * LEVEL_PIXELS);
+    for (uint32_t k = 0; k < 2; k++)
+        fixture_draw(scene, &desc, TRC_PASS_AOV_COLOR(k), aov[k], 4 * LEVEL_PIXELS);
+    for (int p = 0; p < LEVEL_PIXELS; p++) {
+        const float part = light[4 * p] / LIGHT;
+        if (p % LEVEL_WIDTH == EDGE_COLUMN)
+            assert_true(part > 0.0f && part < 1.0f);
+        assert_float_equal(aov[0][4 * p], 2.0f * part, 1e-6f);
+        assert_float_equal(aov[1][4 * p], 3.0f, 1e-6f);
+    }
+    assert_ok(trc_scene_destroy(scene));
+}
+
 /* Light that is no number is left out of the film, and its samples are counted. */
 static void samples_without_a_number_are_reported(void **state) {
     (void)state;
     const trc_scene scene = fixture_level_view();
     struct node_list list = {0};
-    const uint32_t info = node_add(&list, TRC_NODE_OBJECT_INFO, 0, 0, NULL);
-    const uint32_t huge =
-        NODE_ADD(&list, TRC_NODE_VECTOR_MATH, TRC_VECTOR_MULTIPLY, node_link(info, 1),
-                 node_color(3e38f, 3e38f, 3e38f), node_number(0.0f), node_number(1.0f));
     const uint32_t light =
-        NODE_ADD(&list, TRC_NODE_EMISSION, 0, node_link(huge, 0), node_number(3e38f));
+        NODE_ADD(&list, TRC_NODE_EMISSION, 0, node_link(add_infinite(&list), 0), node_number(1.0f));
     fixture_level(scene, 20.0f, 0.0f, level_material(scene, &list, light, 0));
     assert_ok(trc_scene_commit(scene));
     const trc_render_desc desc = level_desc(4);
@@ -265,6 +365,8 @@ int main(void) {
         cmocka_unit_test(a_world_can_hide_from_the_camera),
         cmocka_unit_test(groups_are_exposed),
         cmocka_unit_test(samples_without_a_number_are_reported),
+        cmocka_unit_test(samples_without_a_number_take_no_others),
+        cmocka_unit_test(passes_without_a_number_take_no_others),
     };
     if (!query_test_isa())
         return QUERY_TEST_SKIPPED;

@@ -89,6 +89,14 @@ static inline bool trc_film_ends_half(const struct trc_film *film, uint32_t coun
     return film->half_count ? count == film->half_count : count && !(count & (count - 1));
 }
 
+/* The least count above this one with which a first half ends, UINT32_MAX where there is none. */
+static inline uint32_t trc_film_next_half(const struct trc_film *film, uint32_t count) {
+    const uint32_t all = count + film->sample_offset;
+    const uint64_t power = all ? UINT64_C(2) << (31 - __builtin_clz(all)) : 1;
+    const uint64_t next = film->half_count ? film->half_count : power;
+    return next > all && next < UINT32_MAX ? (uint32_t)next - film->sample_offset : UINT32_MAX;
+}
+
 /* Keeps the sums of a pixel's first half of samples: what it has so far, count samples of which sum
  * is Combined. */
 void trc_film_keep_half(const struct trc_film *film, size_t pixel, const double sum[4],

@@ -10,6 +10,31 @@ TRC_INLINE bool is_finite_sample(const struct trc_tile *t, uint32_t slot) {
                     t->samples.radiance[2][slot]);
 }
 
+/* The first of the slots [begin, end) at which the sum of the columns is not finite, else end. */
+static uint32_t finite_end(const float *const *columns, int count, uint32_t begin, uint32_t end) {
+    for (uint32_t slot = begin; slot < end; slot += TRC_WIDTH) { /* columns are a vector longer */
+        vfloat sum = vf_load(columns[0] + slot);
+        for (int k = 1; k < count; k++)
+            sum = sum + vf_load(columns[k] + slot);
+        const vmask is_finite = vf_lt(vf_abs(sum), vf_set(INFINITY));
+        const uint32_t others = vm_bits(vm_andnot(vm_first((int32_t)(end - slot)), is_finite));
+        if (others)
+            return slot + (uint32_t)__builtin_ctz(others);
+    }
+    return end;
+}
+
+/* The end of the samples from begin on that are finite and in one half of a pixel's samples, of
+ * which it has count. */
+static uint32_t stretch_end(const struct trc_tile *t, uint32_t begin, uint32_t end,
+                            uint32_t count) {
+    const struct trc_film *film = t->job->film;
+    const uint32_t left = film->halves ? trc_film_next_half(film, count) - count : end - begin;
+    const float *const columns[3] = {t->samples.radiance[0], t->samples.radiance[1],
+                                     t->samples.radiance[2]};
+    return finite_end(columns, 3, begin, left < end - begin ? begin + left : end);
+}
+
 /* Adds what shadow catchers of a sample got to its pixel, if it is finite. */
 static void film_add_caught(struct trc_tile *t, uint32_t sample, size_t pixel) {
     const uint32_t blocked = sample + TRC_ROW_BLOCKED * TRC_CATCHER_BATCH;
@@ -33,26 +58,69 @@ static void film_add_caught(struct trc_tile *t, uint32_t sample, size_t pixel) {
     trc_sum_add(&sum->coverage, -(double)t->samples.transparency[blocked]);
 }
 
-/* Adds a sample's passes to its pixel. has_any: it has samples. Samples may come in another order
- * than that of their numbers; the first is the one with the first number, unless that was dropped.
- */
-static void film_add_passes(struct trc_tile *t, uint32_t slot, size_t pixel, bool has_any) {
-    const bool is_first = t->samples.index[slot] == t->desc->sample_offset;
+/* The value of the sample with the first number, unless that was dropped. Samples may come in
+ * another order than that of their numbers. */
+static void film_take_first(struct trc_tile *t, uint32_t pass, uint32_t begin, uint32_t end,
+                            double *sums, bool has_any) {
+    for (uint32_t slot = begin; slot < end; slot++) {
+        const bool is_first = t->samples.index[slot] == t->desc->sample_offset;
+        for (uint32_t k = 0; k < trc_pass_info_of(pass)->sums; k++) {
+            const double value = (double)t->samples.pass[pass][k][slot];
+            if (isfinite(value) && (is_first || (!has_any && slot == begin)))
+                trc_sum_store(&sums[k], value);
+        }
+    }
+}
+
+/* Columns of samples and the sums that their values go to. */
+#define ABREAST 8 /* additions that wait for none of each other */
+struct addends {
+    uint32_t count;
+    const float *values[ABREAST];
+    double *sums[ABREAST];
+    double sum[ABREAST]; /* so far */
+};
+
+/* Adds the values [begin, end) that are finite, one after the other, and takes the columns out. */
+static void add_values(struct addends *a, uint32_t begin, uint32_t end) {
+    for (uint32_t k = a->count; k < ABREAST; k++)
+        a->values[k] = a->values[0];
+    if (finite_end(a->values, ABREAST, begin, end) == end)
+        for (uint32_t slot = begin; slot < end; slot++)
+            for (int k = 0; k < ABREAST; k++)
+                a->sum[k] += (double)a->values[k][slot];
+    else
+        for (uint32_t slot = begin; slot < end; slot++)
+            for (int k = 0; k < ABREAST; k++)
+                a->sum[k] += isfinite(a->values[k][slot]) ? (double)a->values[k][slot] : 0.0;
+    for (uint32_t k = 0; k < a->count; k++)
+        trc_sum_store(a->sums[k], a->sum[k]);
+    a->count = 0;
+}
+
+/* Adds the passes of the samples [begin, end) of one pixel to it; has_any: it has samples. */
+static void film_add_passes(struct trc_tile *t, uint32_t begin, uint32_t end, size_t pixel,
+                            bool has_any) {
+    struct addends a = {.count = 0};
     for (uint32_t i = 0; i < t->samples.pass_count; i++) {
         const uint32_t pass = t->samples.passes[i];
         const struct trc_pass_info *info = trc_pass_info_of(pass);
-        double *sum = t->job->film->sums[pass] + info->sums * pixel;
+        double *sums = t->job->film->sums[pass] + info->sums * pixel;
+        if (info->kind == TRC_PASS_KIND_FIRST) {
+            film_take_first(t, pass, begin, end, sums, has_any);
+            continue;
+        }
         for (uint32_t k = 0; k < info->sums; k++) {
-            const double value = (double)t->samples.pass[pass][k][slot];
-            if (!isfinite(value))
-                continue;
-            if (!has_any || (info->kind == TRC_PASS_KIND_FIRST && is_first))
-                trc_sum_store(&sum[k], value);
-            else if (info->kind != TRC_PASS_KIND_FIRST)
-                trc_sum_add(&sum[k], value);
+            a.values[a.count] = t->samples.pass[pass][k];
+            a.sums[a.count] = &sums[k];
+            a.sum[a.count++] = has_any ? sums[k] : 0.0;
+            if (a.count == ABREAST)
+                add_values(&a, begin, end);
         }
     }
-    if (t->catchers)
+    if (a.count)
+        add_values(&a, begin, end);
+    for (uint32_t slot = begin; t->catchers && slot < end; slot++)
         film_add_caught(t, slot, pixel);
 }
 
@@ -67,19 +135,23 @@ static void film_add_run(struct trc_tile *t, uint32_t begin, uint32_t end, size_
     uint32_t count = film->sample_counts[pixel];
     if (count)
         memcpy(sum, combined, sizeof sum);
-    for (uint32_t slot = begin; slot < end; slot++) {
-        if (!is_finite_sample(t, slot)) {
+    for (uint32_t slot = begin, stop; slot < end; slot = stop) {
+        stop = stretch_end(t, slot, end, count);
+        if (stop == slot) {
             t->job->counts.dropped_samples++;
+            stop++;
             continue;
         }
-        if (t->extra_passes && film->halves && trc_film_ends_half(film, count))
+        if (film->halves && trc_film_ends_half(film, count))
             trc_film_keep_half(film, pixel, sum, count);
-        for (int c = 0; c < 3; c++)
-            sum[c] += (double)t->samples.radiance[c][slot];
-        sum[3] += 1.0 - (double)t->samples.transparency[slot];
+        for (uint32_t i = slot; i < stop; i++) {
+            for (int c = 0; c < 3; c++)
+                sum[c] += (double)t->samples.radiance[c][i];
+            sum[3] += 1.0 - (double)t->samples.transparency[i];
+        }
         if (t->extra_passes)
-            film_add_passes(t, slot, pixel, count > 0);
-        count++;
+            film_add_passes(t, slot, stop, pixel, count > 0);
+        count += stop - slot;
     }
     for (int c = 0; c < 4; c++)
         trc_sum_store(&combined[c], sum[c]);
@@ -91,44 +163,40 @@ static void film_add_run(struct trc_tile *t, uint32_t begin, uint32_t end, size_
                              film->matte_count);
 }
 
-/* Adds the batch's samples to the film in the order of their slots. */
-static void film_add_runs(struct trc_tile *t) {
-    const uint32_t *pixel = t->samples.pixel, count = t->samples.count;
-    for (uint32_t begin = 0; begin < count;) {
-        uint32_t end = begin + 1;
-        while (end < count && pixel[end] == pixel[begin])
-            end++;
-        film_add_run(t, begin, end, trc_film_pixel(t, begin));
-        begin = end;
-    }
-}
-
 /* The same with adaptive sampling, whose sums may go on where the film's count has ended. */
-static void film_add_adaptive(struct trc_tile *t) {
-    for (uint32_t slot = 0; slot < t->samples.count; slot++) {
-        if (!is_finite_sample(t, slot)) {
-            t->job->counts.dropped_samples++;
+static void adaptive_add_run(struct trc_tile *t, uint32_t begin, uint32_t end, size_t pixel) {
+    struct trc_adaptive_pixel *p = &t->job->adaptive->pixels[pixel];
+    for (uint32_t slot = begin; slot < end; slot++) {
+        if (!is_finite_sample(t, slot))
             continue;
-        }
-        const size_t pixel = trc_film_pixel(t, slot);
-        struct trc_adaptive_pixel *p = &t->job->adaptive->pixels[pixel];
         for (int c = 0; c < 3; c++)
             p->sum[c] += (double)t->samples.radiance[c][slot];
         /* A catcher's light is as noisy as the shadow on it. */
         for (int c = 0; t->catchers && c < 3; c++)
             p->sum[c] += (double)t->samples.radiance[c][slot + TRC_ROW_BLOCKED * TRC_CATCHER_BATCH];
-        if (p->reasons & TRC_PIXEL_COUNTS)
-            film_add_run(t, slot, slot + 1, pixel);
+    }
+    if (p->reasons & TRC_PIXEL_COUNTS)
+        film_add_run(t, begin, end, pixel);
+}
+
+/* Adds the batch's samples to the film in the order of their slots. */
+static void film_add_runs(struct trc_tile *t) {
+    const uint32_t *pixel = t->samples.pixel, count = t->samples.count;
+    for (uint32_t begin = 0, end; begin < count; begin = end) {
+        end = begin + 1;
+        while (end < count && pixel[end] == pixel[begin])
+            end++;
+        if (t->job->adaptive)
+            adaptive_add_run(t, begin, end, trc_film_pixel(t, begin));
+        else
+            film_add_run(t, begin, end, trc_film_pixel(t, begin));
     }
 }
 
 void trc_film_add(struct trc_tile *t) {
     atomic_uint *sequence = trc_film_sequence(t->job->film, t->job->x, t->job->y);
     trc_sequence_write_begin(sequence);
-    if (t->job->adaptive)
-        film_add_adaptive(t);
-    else
-        film_add_runs(t);
+    film_add_runs(t);
     trc_sequence_write_end(sequence);
 }
 

@@ -19,10 +19,12 @@ static void samples_clear(struct trc_tile *t) {
     memset(t->samples.transparency, 0, bytes);
     for (uint32_t i = 0; i < t->samples.pass_count; i++) {
         const uint32_t pass = t->samples.passes[i];
-        const struct trc_pass_info *info = trc_pass_info_of(pass);
-        for (uint32_t k = 0; k < info->sums; k++)
+        const float miss = trc_pass_info_of(pass)->miss;
+        for (uint32_t k = 0; k < trc_pass_info_of(pass)->sums; k++) {
+            float *values = t->samples.pass[pass][k];
             for (uint32_t slot = 0; slot < entries; slot++)
-                t->samples.pass[pass][k][slot] = info->miss;
+                values[slot] = miss;
+        }
     }
 }
 
