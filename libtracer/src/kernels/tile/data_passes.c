@@ -12,6 +12,18 @@
 /* Cycles' default of the view layer's Alpha Threshold. */
 #define ALPHA_THRESHOLD 0.5f
 
+#define BIT(NAME) (1ull << TRC_PASS_##NAME)
+#define COLOR_PASSES (BIT(DIFFUSE_COLOR) | BIT(GLOSSY_COLOR) | BIT(TRANSMISSION_COLOR))
+#define FIRST_SURFACE_PASSES                                                  \
+    (BIT(DEPTH) | BIT(NORMAL) | BIT(POSITION) | BIT(UV) | BIT(OBJECT_INDEX) | \
+     BIT(MATERIAL_INDEX) | BIT(VECTOR))
+
+/* Whether something is asked for besides light and features for denoisers. */
+static bool wants_data(const trc_render_desc *desc) {
+    return desc->passes & (COLOR_PASSES | FIRST_SURFACE_PASSES | BIT(MIST)) || desc->cryptomattes ||
+           desc->aov_value_count || desc->aov_color_count;
+}
+
 static void store_vector(struct trc_tile *t, uint32_t pass, uint32_t slot, float x, float y,
                          float z) {
     float *const *p = t->samples.pass[pass];
@@ -25,8 +37,16 @@ static void store_vector(struct trc_tile *t, uint32_t pass, uint32_t slot, float
 
 void trc_pass_add_lanes(struct trc_tile *t, uint32_t pass, vvec3 value,
                         const uint32_t slots[TRC_WIDTH], vmask active) {
-    if (!t->samples.pass[pass][0])
+    float *const *columns = t->samples.pass[pass];
+    uint32_t first;
+    if (!columns[0] || !vm_any(active))
         return;
+    if (trc_slots_follow(slots, active, &first)) {
+        const vfloat values[3] = {value.x, value.y, value.z};
+        for (int k = 0; k < 3 && columns[k]; k++)
+            trc_column_add(columns[k], first, values[k], active);
+        return;
+    }
     float lanes[3][TRC_WIDTH];
     vf_store(lanes[0], value.x), vf_store(lanes[1], value.y), vf_store(lanes[2], value.z);
     for (uint32_t bits = vm_bits(active); bits; bits &= bits - 1) {
@@ -238,6 +258,8 @@ static void add_colors(struct trc_tile *t, const struct trc_surface *s,
                        vmask active) {
     static const uint32_t pass[3] = {TRC_PASS_DIFFUSE_COLOR, TRC_PASS_GLOSSY_COLOR,
                                      TRC_PASS_TRANSMISSION_COLOR};
+    if (!(t->desc->passes & COLOR_PASSES))
+        return;
     vvec3 albedo[3];
     trc_bsdf_albedo(lobes, s, albedo);
     for (int k = 0; k < 3; k++)
@@ -361,7 +383,7 @@ vuint trc_data_passes(struct trc_tile *t, const struct trc_surface *s, const str
     }
     const vuint path = trc_denoising_passes(t, s, lobes, found_weight, length, slots);
     const vmask on = seen_straight(s);
-    if (!vm_any(on))
+    if (!wants_data(t->desc) || !vm_any(on))
         return path;
     const vvec3 weight = v3_scale(found_weight, indirect_scale);
     const vvec3 one = v3(vf_set(1.0f), vf_set(1.0f), vf_set(1.0f));

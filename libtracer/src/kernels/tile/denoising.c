@@ -10,10 +10,11 @@
 #include "kernels/tile/tile.h"
 #include "kernels/trace/panorama.h"
 
-#define DENOISING_PASSES                                                       \
-    (1ull << TRC_PASS_DENOISING_ALBEDO | 1ull << TRC_PASS_DENOISING_NORMAL |   \
-     1ull << TRC_PASS_DENOISING_DEPTH | 1ull << TRC_PASS_DENOISING_ROUGHNESS | \
-     1ull << TRC_PASS_DENOISING_SPECULAR_ALBEDO)
+#define SHARED_PASSES \
+    (1ull << TRC_PASS_DENOISING_ROUGHNESS | 1ull << TRC_PASS_DENOISING_SPECULAR_ALBEDO)
+#define DENOISING_PASSES                                                     \
+    (1ull << TRC_PASS_DENOISING_ALBEDO | 1ull << TRC_PASS_DENOISING_NORMAL | \
+     1ull << TRC_PASS_DENOISING_DEPTH | SHARED_PASSES)
 
 /* Rougher lobes blur what they show too much for its features to be of use. */
 #define FEATURE_ALPHA 0.075f
@@ -24,9 +25,13 @@
 
 struct features {
     vvec3 normal, albedo; /* mean of all lobes; sum of the rough ones */
-    vvec3 specular;       /* albedo of the lobes that are nearly mirrors */
-    vfloat alpha;         /* mean of all lobes but transparent ones, by albedo */
     vmask are_taken;      /* lanes whose lobes are rough enough, or that have none */
+};
+
+/* Features by how specular lobes are. */
+struct shared_features {
+    vvec3 specular; /* albedo of the lobes that are nearly mirrors */
+    vfloat alpha;   /* mean of all lobes but transparent ones, by albedo */
     /* Blended: the mean normal of lobes but transparent ones, times their part of all; albedo that
      * is not specular; lanes where those are taken. */
     vvec3 solid_normal, blended_albedo;
@@ -48,36 +53,45 @@ static vmask is_rough(const struct trc_lobe *lobe) {
 static void features_of(const struct trc_lobes *l, const struct trc_surface *s,
                         struct features *out) {
     const vfloat zero = vf_zero();
-    vvec3 normal = v3_zero(), albedo = v3_zero(), specular = v3_zero();
-    vvec3 solid = v3_zero(), blended = v3_zero();
-    vfloat all = zero, rough = zero, alpha = zero, scattered = zero, clear = zero, blurred = zero;
+    vvec3 normal = v3_zero(), albedo = v3_zero();
+    vfloat all = zero, rough = zero;
     for (int i = 0; i < l->count; i++) {
         const struct trc_lobe *lobe = &l->lobe[i];
         const vmask counts = is_rough(lobe);
-        const vvec3 n = trc_lobe_feature(lobe, s);
-        normal = v3_mad(n, lobe->mix_weight, normal);
+        normal = v3_mad(trc_lobe_feature(lobe, s), lobe->mix_weight, normal);
         all = all + lobe->mix_weight;
         rough = rough + vf_where(counts, lobe->mix_weight);
+        if (vm_any(counts))
+            albedo = v3_add(albedo, v3_where(counts, trc_lobe_albedo(lobe, s->wo)));
+    }
+    const vmask some = vf_gt(all, zero);
+    out->normal = v3_where(some, v3_scale(normal, vf_rcp(vf_select(some, all, vf_one()))));
+    out->albedo = albedo;
+    out->are_taken = vm_or(vm_not(some), vf_gt(rough * vf_set(1.0f / ROUGH_SHARE), all));
+}
+
+static void shared_features_of(const struct trc_lobes *l, const struct trc_surface *s,
+                               struct shared_features *out) {
+    const vfloat zero = vf_zero();
+    vvec3 specular = v3_zero(), solid = v3_zero(), blended = v3_zero();
+    vfloat alpha = zero, scattered = zero, clear = zero, blurred = zero;
+    for (int i = 0; i < l->count; i++) {
+        const struct trc_lobe *lobe = &l->lobe[i];
         if (lobe->kind == TRC_LOBE_TRANSPARENT) {
             clear = clear + v3_average(lobe->weight);
             continue;
         }
         const vvec3 color = trc_lobe_albedo(lobe, s->wo);
         const vfloat share = v3_average(color), mirror = specular_share(trc_lobe_alpha(lobe));
-        albedo = v3_add(albedo, v3_where(counts, color));
         specular = v3_mad(color, mirror, specular);
         blended = v3_mad(color, vf_one() - mirror, blended);
         blurred = blurred + share * (vf_one() - mirror);
-        solid = v3_mad(n, share, solid);
+        solid = v3_mad(trc_lobe_feature(lobe, s), share, solid);
         alpha = alpha + trc_lobe_alpha(lobe) * share;
         scattered = scattered + share;
     }
-    const vmask some = vf_gt(all, zero);
-    out->normal = v3_where(some, v3_scale(normal, vf_rcp(vf_select(some, all, vf_one()))));
-    out->albedo = albedo;
     out->specular = specular;
     out->alpha = vf_divide(alpha, scattered);
-    out->are_taken = vm_or(vm_not(some), vf_gt(rough * vf_set(1.0f / ROUGH_SHARE), all));
     out->solid_normal = v3_scale(solid, vf_divide(vf_one(), scattered + clear));
     out->blended_albedo = blended;
     out->blended_taken = vf_gt(blurred * vf_set(1.0f / ROUGH_SHARE), scattered);
@@ -134,20 +148,29 @@ vuint trc_denoising_passes(struct trc_tile *t, const struct trc_surface *s,
         on = vm_or(on, seen);
     if (!(t->desc->passes & DENOISING_PASSES) || !vm_any(vm_or(on, seen)))
         return s->path;
-    struct features f;
-    features_of(lobes, s, &f);
-    add_number(t, TRC_PASS_DENOISING_ROUGHNESS, v3_average(weight) * vf_sqrt(f.alpha), slots, seen);
-    trc_pass_add_lanes(t, TRC_PASS_DENOISING_SPECULAR_ALBEDO, v3_mul(weight, f.specular), slots,
-                       seen);
     add_number(t, TRC_PASS_DENOISING_DEPTH, v3_average(weight) * length, slots, on);
-    const vmask taken = vm_and(on, is_blended ? f.blended_taken : f.are_taken);
-    const vvec3 albedo = is_blended ? f.blended_albedo : f.albedo;
-    trc_pass_add_lanes(t, TRC_PASS_DENOISING_ALBEDO, v3_mul(weight, albedo), slots, taken);
-    if (is_blended)
-        trc_pass_add_lanes(t, TRC_PASS_DENOISING_NORMAL,
-                           v3_scale(normal_to_camera(t, f.solid_normal), v3_average(weight)), slots,
-                           taken);
-    else
+    struct shared_features shared;
+    if (is_blended || t->desc->passes & SHARED_PASSES) {
+        shared_features_of(lobes, s, &shared);
+        add_number(t, TRC_PASS_DENOISING_ROUGHNESS, v3_average(weight) * vf_sqrt(shared.alpha),
+                   slots, seen);
+        trc_pass_add_lanes(t, TRC_PASS_DENOISING_SPECULAR_ALBEDO, v3_mul(weight, shared.specular),
+                           slots, seen);
+    }
+    vmask taken;
+    if (is_blended) {
+        taken = vm_and(on, shared.blended_taken);
+        trc_pass_add_lanes(t, TRC_PASS_DENOISING_ALBEDO, v3_mul(weight, shared.blended_albedo),
+                           slots, taken);
+        const vvec3 normal = normal_to_camera(t, shared.solid_normal);
+        trc_pass_add_lanes(t, TRC_PASS_DENOISING_NORMAL, v3_scale(normal, v3_average(weight)),
+                           slots, taken);
+    } else {
+        struct features f;
+        features_of(lobes, s, &f);
+        taken = vm_and(on, f.are_taken);
+        trc_pass_add_lanes(t, TRC_PASS_DENOISING_ALBEDO, v3_mul(weight, f.albedo), slots, taken);
         write_normal(t, f.normal, slots, taken);
+    }
     return (vuint)vi_select(taken, (vint)s->path | done, (vint)s->path);
 }

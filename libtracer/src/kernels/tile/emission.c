@@ -18,15 +18,36 @@ static void features_add(struct trc_tile *t, const struct arrival *a, vmask acti
                        vm_and(active, open));
 }
 
+/* The same as found_add for lanes whose slots follow each other from first on, without passes of
+ * light by kind. */
+static void found_add_row(struct trc_tile *t, const struct arrival *a, vmask active, vvec3 c,
+                          uint32_t camera_pass, uint32_t first) {
+    const vint category = (vint)(a->path >> TRC_PATH_CATEGORY_SHIFT & vu_set(3u));
+    const vmask straight = vm_and(active, vi_eq(category, vi_set(TRC_CATEGORY_CAMERA)));
+    const vfloat values[3] = {c.x, c.y, c.z};
+    for (int k = 0; k < 3; k++) {
+        trc_column_add(t->samples.radiance[k], first, values[k], active);
+        if (t->samples.pass[camera_pass][k])
+            trc_column_add(t->samples.pass[camera_pass][k], first, values[k], straight);
+    }
+}
+
 /* Light found by rays, weighted and clamped: to the samples, and to the pass its depth says.
  * camera_pass: what camera rays see it as. */
 static void found_add(struct trc_tile *t, const struct arrival *a, vmask active, vvec3 c,
                       uint32_t camera_pass) {
+    uint32_t first;
+    if (!vm_any(active))
+        return;
+    if (t->samples.pass[TRC_PASS_DENOISING_EMISSION][0])
+        features_add(t, a, active, c);
+    if (!t->light_passes && trc_slots_follow(a->slots, active, &first)) {
+        found_add_row(t, a, active, c, camera_pass, first);
+        return;
+    }
     const vuint depth = trc_depth_of(a->depths, TRC_DEPTH_ALL_SHIFT);
     float lanes[3][TRC_WIDTH];
     uint32_t depths[TRC_WIDTH], path[TRC_WIDTH], share[TRC_WIDTH];
-    if (t->samples.pass[TRC_PASS_DENOISING_EMISSION][0])
-        features_add(t, a, active, c);
     if (t->light_passes)
         vu_store(share, word_column(t->work.w[TRC_RAY_SHARE], a));
     vf_store(lanes[0], c.x), vf_store(lanes[1], c.y), vf_store(lanes[2], c.z);

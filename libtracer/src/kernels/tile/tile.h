@@ -261,6 +261,22 @@ TRC_INLINE size_t trc_tile_pixel(const struct trc_tile *t, uint32_t slot) {
     return (size_t)y * TRC_TILE_SIZE + x;
 }
 
+/* Whether the slots of the active lanes, of which there are some, follow each other as the lanes
+ * do, as those of neighbouring samples that see one material; the slot that lane 0 has then. */
+TRC_INLINE bool trc_slots_follow(const uint32_t slots[TRC_WIDTH], vmask active,
+                                 uint32_t *first_out) {
+    const uint32_t lane = (uint32_t)__builtin_ctz(vm_bits(active)), first = slots[lane] - lane;
+    const vint expected = vi_lane() + vi_set((int32_t)first);
+    const vmask others = vm_andnot(active, vi_eq((vint)vu_load(slots), expected));
+    *first_out = first;
+    return slots[lane] >= lane && !vm_any(others);
+}
+
+/* Adds the active lanes' values to a column, from the slot of lane 0 on. */
+TRC_INLINE void trc_column_add(float *column, uint32_t first, vfloat value, vmask active) {
+    vf_store(column + first, vf_load(column + first) + vf_select(active, value, vf_set(0.0f)));
+}
+
 /* Adds light that reached a sample to its radiance, to a pass. */
 TRC_INLINE void trc_sample_add(struct trc_tile *t, uint32_t slot, const float rgb[3]) {
     for (int c = 0; c < 3; c++)
