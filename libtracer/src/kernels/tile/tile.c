@@ -92,7 +92,8 @@ static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc,
         t->left = trc_carve(&c, TRC_BUNDLE * sizeof *t->left);
     t->keys = trc_carve(&c, TRC_SHADOW_COLUMN * sizeof *t->keys);
     t->order = trc_carve(&c, batch);
-    t->bins = trc_carve(&c, (TRC_BINS + 1) * sizeof *t->bins);
+    for (int k = 0; k < 2; k++)
+        t->bins[k] = trc_carve(&c, TRC_BINS * sizeof *t->bins[k]);
     t->carver = c;
     return c.used;
 }

@@ -123,8 +123,9 @@ struct trc_tile {
     /* Tables of the tile's pixels (trc_film.matte_count places each, rows of TRC_TILE_SIZE): those
      * of the film with the samples in flight. NULL: not asked for. */
     struct trc_matte *mattes[TRC_CRYPTOMATTE_KINDS];
-    uint32_t *order;       /* of the rays of a step */
-    uint32_t *keys, *bins; /* scratch of sorts: TRC_SHADOW_COLUMN, bins */
+    uint32_t *order;   /* of the rays of a step */
+    uint32_t *keys;    /* scratch of sorts: TRC_SHADOW_COLUMN */
+    uint32_t *bins[2]; /* and TRC_BINS each */
     struct trc_packet packets[TRC_BUNDLE];
     struct trc_packet_hits packet_hits[TRC_BUNDLE];
     struct trc_left_strands *left; /* TRC_BUNDLE, of the packets; NULL: there are no curves */
