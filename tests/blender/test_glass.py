@@ -2,7 +2,9 @@
 """Rough glass against Cycles': what many bounces inside a ball keep of an even world's light, and a pane that a
 world of spots lights."""
 
+import blender as blender_support
 import compare
+import numpy as np
 import pytest
 
 SAMPLES = 64
@@ -281,3 +283,56 @@ def test_colour_of_refraction(blender):
     assert theirs.any()
     whole, tile = compare.unexplained(ours, theirs)
     assert whole <= 5e-4 and tile <= 0.01
+
+
+# ---- passes of light ----
+
+SUM_TOLERANCE = 1e-5
+PASS_TOLERANCE, PASS_FLOOR = 0.02, 1e-4  # of means, of glass that scatters more than once
+KINDS = ("glass", "principled", "glass and gloss")
+
+
+def inside_light_by_kind():
+    """{(kind, light): {pass: both}} of a white ball of rough glass before a lamp, or in an even world."""
+    import bpy
+    import compare
+    import scenes
+    found = {}
+    for kind in KINDS:
+        for light in ("lamp", "world"):
+            scene = scenes.empty(size=(32, 24))
+            scenes.camera()
+            if light == "world":
+                scenes.world_color(scene.world, (0.5, 0.6, 0.7))
+            else:
+                scenes.light(energy=500.0)
+            if kind == "principled":
+                material = scenes.material("Glass", "ShaderNodeBsdfPrincipled", {"distribution": 'MULTI_GGX'},
+                                           **{"Base Color": (1.0, 1.0, 1.0), "Roughness": 0.5, "Transmission": 1.0})
+            else:
+                material = scenes.material("Glass", "ShaderNodeBsdfGlass", {"distribution": 'MULTI_GGX'},
+                                           Color=(1.0, 1.0, 1.0), Roughness=0.5)
+            if kind == "glass and gloss":
+                tree = material.node_tree
+                glass, output = tree.nodes["Glass BSDF"], tree.nodes["Material Output"]
+                gloss, both = (tree.nodes.new(name) for name in ("ShaderNodeBsdfGlossy", "ShaderNodeMixShader"))
+                for number, node in enumerate((glass, gloss)):
+                    tree.links.new(node.outputs[0], both.inputs[1 + number])
+                tree.links.new(both.outputs[0], output.inputs["Surface"])
+            scenes.sphere(material=material)
+            scenes.show_light(bpy.context.view_layer)
+            found[kind, light] = scenes.passes_by_both(["Combined", *compare.LIGHT_PASSES], SAMPLES)
+    return found
+
+
+def test_light_by_kind(blender):
+    """It adds up to the picture. In Blender 3.4 all light of glass that scatters more than once is transmission."""
+    for (kind, light), both in blender.run(inside_light_by_kind, timeout=600).items():
+        ours, theirs = ({name: pair[side][..., :3] for name, pair in both.items()} for side in (0, 1))
+        assert np.abs(compare.light_sum(ours) - ours["Combined"]).max() <= SUM_TOLERANCE, (kind, light)
+        if blender_support.version() < (4, 0) and kind == "glass":
+            assert not theirs["GlossDir"].any() and not theirs["GlossInd"].any()
+            assert not ours["GlossDir"].any() and not ours["GlossInd"].any()
+        for name in ("TransInd", "GlossInd") if light == "world" else ():
+            light_of = [(side[name] * side[f"{name[:-3]}Col"]).mean() for side in (ours, theirs)]
+            assert light_of[0] == pytest.approx(light_of[1], rel=PASS_TOLERANCE, abs=PASS_FLOOR), (kind, name)

@@ -66,10 +66,17 @@ static void take_sampled(const struct trc_lobe *lobe, const struct trc_surface *
 }
 
 /* Whether a lobe's light is in the passes of reflection; rare: as in sum_lobes. */
-TRC_INLINE bool is_glossy(const struct trc_lobes *l, enum trc_lobe_kind kind, bool rare) {
-    return kind == TRC_LOBE_REFLECT ||
-           (rare && (kind == TRC_LOBE_HAIR_REFLECT ||
-                     (kind == TRC_LOBE_VELVET && (l->rare & TRC_LOBES_VELVET))));
+TRC_INLINE bool is_glossy(const struct trc_lobes *l, const struct trc_lobe *lobe, bool rare) {
+    if (lobe->kind == TRC_LOBE_REFLECT)
+        return !rare || !lobe->is_whole_glass;
+    return rare && (lobe->kind == TRC_LOBE_HAIR_REFLECT ||
+                    (lobe->kind == TRC_LOBE_VELVET && (l->rare & TRC_LOBES_VELVET)));
+}
+
+/* The same of transmission, of lobes that are not glossy. */
+TRC_INLINE bool is_transmissive(const struct trc_lobe *lobe, bool rare) {
+    return lobe->kind == TRC_LOBE_REFRACT ||
+           (rare && (lobe->kind == TRC_LOBE_HAIR_TRANSMIT || lobe->is_whole_glass));
 }
 
 /* Active lanes in which a lobe may have light from wi. */
@@ -94,9 +101,9 @@ TRC_INLINE void sum_lobes(const struct trc_lobes *l, const struct trc_surface *s
         struct lobe_value r = value_of(l, lobe, s, wi, side, rare);
         if (rare && lobe->model->sampled && !is_hair(lobe->kind))
             take_sampled(lobe, s, wi, NULL, vm_and(side, as_sampled), &r);
-        if (is_glossy(l, lobe->kind, rare))
+        if (is_glossy(l, lobe, rare))
             out->glossy = v3_add(out->glossy, r.value);
-        else if (lobe->kind == TRC_LOBE_REFRACT || (rare && lobe->kind == TRC_LOBE_HAIR_TRANSMIT))
+        else if (is_transmissive(lobe, rare))
             out->transmission = v3_add(out->transmission, r.value);
         else
             out->diffuse = v3_add(out->diffuse, r.value);
@@ -174,7 +181,7 @@ static void clear_sample(struct trc_bsdf_sample *out) {
     out->indirect_scale = vf_one();
     out->pdf = out->whole_pdf = vf_zero();
     out->valid = out->singular = out->transparent = out->transmitted = out->diffuse = vm_none();
-    out->fibre = out->clear = out->through_portal = vm_none();
+    out->fibre = out->whole_glass = out->clear = out->through_portal = vm_none();
 }
 
 /* Lanes of m that a lobe lets through clearly where it refracts. */
@@ -240,6 +247,8 @@ TRC_INLINE void sample_lobes(const struct trc_lobes *l, const struct trc_surface
             out->clear = vm_or(out->clear, clear_lanes(l, lobe, m));
         if (lobe->kind == TRC_LOBE_TRANSLUCENT)
             out->diffuse = vm_or(out->diffuse, m);
+        if (rare && lobe->is_whole_glass)
+            out->whole_glass = vm_or(out->whole_glass, m);
         if (vm_any(exact))
             take_ideal(l, lobe, s, exact, lobe->sample_weight / l->continue_weight, out);
         if (vm_any(spread)) {
@@ -289,6 +298,8 @@ void trc_bsdf_ideal(const struct trc_lobes *l, int i, const struct trc_surface *
         return;
     if (lobe->kind == TRC_LOBE_REFRACT)
         out->transmitted = s->active;
+    if (lobe->is_whole_glass)
+        out->whole_glass = s->active;
     if (lobe->kind == TRC_LOBE_REFRACT && l->clear_alpha2 >= 0.0f)
         out->clear = clear_lanes(l, lobe, s->active);
     take_ideal(l, lobe, s, s->active, vf_one(), out);
@@ -314,9 +325,7 @@ void trc_bsdf_albedo(const struct trc_lobes *l, const struct trc_surface *s, vve
         const struct trc_lobe *lobe = &l->lobe[i];
         if (lobe->kind == TRC_LOBE_TRANSPARENT)
             continue;
-        const bool is_transmission =
-            lobe->kind == TRC_LOBE_REFRACT || lobe->kind == TRC_LOBE_HAIR_TRANSMIT;
-        const int k = is_transmission ? 2 : is_glossy(l, lobe->kind, true);
+        const int k = is_transmissive(lobe, true) ? 2 : is_glossy(l, lobe, true);
         vvec3 albedo = v3_scale(lobe->weight, lobe->albedo_scale);
         if (lobe->correlated)
             albedo = v3_mul(albedo, mean_reflectance(lobe));

@@ -51,6 +51,8 @@ struct trc_lobe {
     uint32_t fresnel;
     bool correlated;      /* microfacets mask and shadow by one height, and passes of the colour
                              have the mean reflectance, of hair too: as in Cycles 4 */
+    bool is_whole_glass;  /* half of glass whose reflection is in the passes of transmission, as in
+                             Cycles 3.4 where facets scatter more than once */
     bool facet_shadowing; /* bent normals lie in shadow as microfacets do, as in Cycles 5 */
     bool anisotropic;     /* tangent is set and alpha_x may differ from alpha_y */
     vmask ideal;          /* lanes that scatter into one direction only */
@@ -88,8 +90,9 @@ enum {
     TRC_LOBES_HAIR = 1 << 1,   /* there are TRC_LOBE_HAIR_* */
     TRC_LOBES_VELVET = 1 << 2, /* there are TRC_LOBE_VELVET, whose light is glossy, and bumps shadow
                                   it as sampled; without it they are as diffuse ones */
-    TRC_LOBES_BENT = 1 << 3    /* there are TRC_LOBE_TRANSLUCENT whose normals are not the
+    TRC_LOBES_BENT = 1 << 3,   /* there are TRC_LOBE_TRANSLUCENT whose normals are not the
                                   geometry's */
+    TRC_LOBES_WHOLE_GLASS = 1 << 4 /* there are some with is_whole_glass; for passes of light */
 };
 
 /* Whether no ray is continued for a lobe of that kind. */
@@ -157,6 +160,7 @@ struct trc_bsdf_sample {
         transmitted;      /* transmitted: to the other side, incl. translucent */
     vmask diffuse;        /* the lobe was translucent: a diffuse transmission ray */
     vmask fibre;          /* the lobe was of fibres, in the passes of reflection on either side */
+    vmask whole_glass;    /* it was of such glass; where TRC_LOBES_WHOLE_GLASS is set */
     vmask clear;          /* by what is smooth enough, where lobes ask */
     vmask through_portal; /* transparent lanes that go on from origin instead of straight */
     vvec3 origin;

@@ -123,13 +123,16 @@ void trc_add_multi_glass(struct trc_setup *c, vvec3 weight, vvec3 reflected, vve
     if (reflect) {
         reflect->fresnel = TRC_FRESNEL_DIELECTRIC;
         reflect->albedo_scale = vf_zero();
+        reflect->is_whole_glass = true;
     }
     struct trc_lobe *refract = trc_add_dielectric(c, TRC_LOBE_REFRACT, v3_mul(w, refracted), n,
                                                   rough, eta, TRC_DISTRIBUTION_GGX);
     if (refract) {
         refract->fresnel = TRC_FRESNEL_DIELECTRIC;
         refract->albedo_scale = vf_rcp(v3_average(gain));
+        refract->is_whole_glass = true;
     }
+    c->out->rare |= TRC_LOBES_WHOLE_GLASS;
     share_chances(reflect, refract, trc_fresnel_dielectric(v3_dot(n, c->s->wo), eta));
 }
 

@@ -59,7 +59,7 @@ struct trc_lobe *trc_add_lobe(struct trc_setup *c, const struct trc_lobe_model *
     lobe->kind = model->kind;
     lobe->distribution = TRC_LOBE_GGX;
     lobe->fresnel = TRC_FRESNEL_NONE;
-    lobe->correlated = false;
+    lobe->correlated = lobe->is_whole_glass = false;
     lobe->facet_shadowing = c->material->flags & TRC_MATERIAL_FACET_SHADOWING;
     lobe->albedo_scale = vf_one();
     lobe->anisotropic = false;

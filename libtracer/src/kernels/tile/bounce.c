@@ -14,8 +14,8 @@ static vvec3 share_in(vvec3 part, vvec3 sum) {
 
 /* The diffuse lobes' share of what the lanes' rays bring, as a word: of rays that bounce for the
  * first time what lobes have in their direction, unless that is ideal; else as before. category: in
- * place, of first bounces; fibres reflect to all sides, and their words may be of
- * TRC_CATEGORY_MIXED. */
+ * place, of first bounces; fibres reflect to all sides, some glass counts as transmission on both,
+ * and their words may be of TRC_CATEGORY_MIXED. */
 static vuint share_of(const struct trc_tile *t, const struct arrival *a,
                       const struct trc_surface *s, const struct trc_lobes *lobes,
                       const struct trc_bsdf_sample *b, vmask first, vmask ideal, vint *category) {
@@ -29,7 +29,7 @@ static vuint share_of(const struct trc_tile *t, const struct arrival *a,
     const vvec3 sum = v3_add(f.diffuse, v3_add(f.glossy, f.transmission));
     const vvec3 share = share_in(f.diffuse, sum);
     vuint word = trc_share_pack(share);
-    if (lobes->rare & TRC_LOBES_HAIR) {
+    if (lobes->rare & (TRC_LOBES_HAIR | TRC_LOBES_WHOLE_GLASS)) {
         /* What fibres scatter to where no light sample would be taken has no value there. */
         const vmask unlit = vm_andnot(b->fibre, vf_gt(v3_max(sum), vf_set(0.0f)));
         const vmask glossy = vm_and(rough, vm_or(unlit, vf_gt(v3_max(f.glossy), vf_set(0.0f))));
@@ -95,8 +95,8 @@ static void ray_append(struct trc_tile *t, struct trc_ray_store *to, const struc
     const vuint category = a->path & vu_set(3u << TRC_PATH_CATEGORY_SHIFT);
     const vmask first =
         vi_eq((vint)category, vi_set(TRC_CATEGORY_CAMERA << TRC_PATH_CATEGORY_SHIFT));
-    vint own =
-        vi_select(b->transmitted, vi_set(TRC_CATEGORY_TRANSMISSION), vi_set(TRC_CATEGORY_GLOSSY));
+    vint own = vi_select(vm_or(b->transmitted, b->whole_glass), vi_set(TRC_CATEGORY_TRANSMISSION),
+                         vi_set(TRC_CATEGORY_GLOSSY));
     vuint share = vu_set(0);
     if (t->light_passes)
         share = share_of(t, a, s, lobes, b, first, ideal, &own);

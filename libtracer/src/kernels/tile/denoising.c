@@ -10,11 +10,11 @@
 #include "kernels/tile/tile.h"
 #include "kernels/trace/panorama.h"
 
-#define SHARED_PASSES \
+#define SPECULAR_PASSES \
     (1ull << TRC_PASS_DENOISING_ROUGHNESS | 1ull << TRC_PASS_DENOISING_SPECULAR_ALBEDO)
 #define DENOISING_PASSES                                                     \
     (1ull << TRC_PASS_DENOISING_ALBEDO | 1ull << TRC_PASS_DENOISING_NORMAL | \
-     1ull << TRC_PASS_DENOISING_DEPTH | SHARED_PASSES)
+     1ull << TRC_PASS_DENOISING_DEPTH | SPECULAR_PASSES)
 
 /* Rougher lobes blur what they show too much for its features to be of use. */
 #define FEATURE_ALPHA 0.075f
@@ -29,9 +29,9 @@ struct features {
 };
 
 /* Features by how specular lobes are. */
-struct shared_features {
-    vvec3 specular; /* albedo of the lobes that are nearly mirrors */
-    vfloat alpha;   /* mean of all lobes but transparent ones, by albedo */
+struct specular_features {
+    vvec3 specular_albedo; /* of the lobes that are nearly mirrors */
+    vfloat alpha;          /* mean of all lobes but transparent ones, by albedo */
     /* Blended: the mean normal of lobes but transparent ones, times their part of all; albedo that
      * is not specular; lanes where those are taken. */
     vvec3 solid_normal, blended_albedo;
@@ -70,8 +70,8 @@ static void features_of(const struct trc_lobes *l, const struct trc_surface *s,
     out->are_taken = vm_or(vm_not(some), vf_gt(rough * vf_set(1.0f / ROUGH_SHARE), all));
 }
 
-static void shared_features_of(const struct trc_lobes *l, const struct trc_surface *s,
-                               struct shared_features *out) {
+static void specular_features_of(const struct trc_lobes *l, const struct trc_surface *s,
+                                 struct specular_features *out) {
     const vfloat zero = vf_zero();
     vvec3 specular = v3_zero(), solid = v3_zero(), blended = v3_zero();
     vfloat alpha = zero, scattered = zero, clear = zero, blurred = zero;
@@ -90,7 +90,7 @@ static void shared_features_of(const struct trc_lobes *l, const struct trc_surfa
         alpha = alpha + trc_lobe_alpha(lobe) * share;
         scattered = scattered + share;
     }
-    out->specular = specular;
+    out->specular_albedo = specular;
     out->alpha = vf_divide(alpha, scattered);
     out->solid_normal = v3_scale(solid, vf_divide(vf_one(), scattered + clear));
     out->blended_albedo = blended;
@@ -149,20 +149,20 @@ vuint trc_denoising_passes(struct trc_tile *t, const struct trc_surface *s,
     if (!(t->desc->passes & DENOISING_PASSES) || !vm_any(vm_or(on, seen)))
         return s->path;
     add_number(t, TRC_PASS_DENOISING_DEPTH, v3_average(weight) * length, slots, on);
-    struct shared_features shared;
-    if (is_blended || t->desc->passes & SHARED_PASSES) {
-        shared_features_of(lobes, s, &shared);
-        add_number(t, TRC_PASS_DENOISING_ROUGHNESS, v3_average(weight) * vf_sqrt(shared.alpha),
+    struct specular_features specular;
+    if (is_blended || t->desc->passes & SPECULAR_PASSES) {
+        specular_features_of(lobes, s, &specular);
+        add_number(t, TRC_PASS_DENOISING_ROUGHNESS, v3_average(weight) * vf_sqrt(specular.alpha),
                    slots, seen);
-        trc_pass_add_lanes(t, TRC_PASS_DENOISING_SPECULAR_ALBEDO, v3_mul(weight, shared.specular),
-                           slots, seen);
+        trc_pass_add_lanes(t, TRC_PASS_DENOISING_SPECULAR_ALBEDO,
+                           v3_mul(weight, specular.specular_albedo), slots, seen);
     }
     vmask taken;
     if (is_blended) {
-        taken = vm_and(on, shared.blended_taken);
-        trc_pass_add_lanes(t, TRC_PASS_DENOISING_ALBEDO, v3_mul(weight, shared.blended_albedo),
+        taken = vm_and(on, specular.blended_taken);
+        trc_pass_add_lanes(t, TRC_PASS_DENOISING_ALBEDO, v3_mul(weight, specular.blended_albedo),
                            slots, taken);
-        const vvec3 normal = normal_to_camera(t, shared.solid_normal);
+        const vvec3 normal = normal_to_camera(t, specular.solid_normal);
         trc_pass_add_lanes(t, TRC_PASS_DENOISING_NORMAL, v3_scale(normal, v3_average(weight)),
                            slots, taken);
     } else {

@@ -182,6 +182,8 @@ static void shade_group(struct trc_tile *t, uint32_t material, vint index, vmask
     /* Whitted leaves the glossy light of what has an extent to continuation rays. */
     if (lobes.rare && t->desc->integrator != TRC_INTEGRATOR_DISTRIBUTION)
         lobes.rare &= ~(uint32_t)TRC_LOBES_VELVET;
+    if (!t->light_passes)
+        lobes.rare &= ~(uint32_t)TRC_LOBES_WHOLE_GLASS;
     if (t->snapshot->features & TRC_FEATURE_SHADOW_TERMINATORS) {
         lobes.rare |= TRC_LOBES_TURN;
         lobes.turn = trc_instance_float(t->snapshot, s.instance,
