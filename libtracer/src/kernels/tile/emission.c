@@ -18,12 +18,10 @@ static void features_add(struct trc_tile *t, const struct arrival *a, vmask acti
                        vm_and(active, open));
 }
 
-/* The same as found_add for lanes whose slots follow each other from first on, without passes of
- * light by kind. */
-static void found_add_row(struct trc_tile *t, const struct arrival *a, vmask active, vvec3 c,
+/* The same as found_add for lanes whose slots follow each other from first on, and that are
+ * straight or of no pass. */
+static void found_add_row(struct trc_tile *t, vmask active, vmask straight, vvec3 c,
                           uint32_t camera_pass, uint32_t first) {
-    const vint category = (vint)(a->path >> TRC_PATH_CATEGORY_SHIFT & vu_set(3u));
-    const vmask straight = vm_and(active, vi_eq(category, vi_set(TRC_CATEGORY_CAMERA)));
     const vfloat values[3] = {c.x, c.y, c.z};
     for (int k = 0; k < 3; k++) {
         trc_column_add(t->samples.radiance[k], first, values[k], active);
@@ -41,8 +39,11 @@ static void found_add(struct trc_tile *t, const struct arrival *a, vmask active,
         return;
     if (t->samples.pass[TRC_PASS_DENOISING_EMISSION][0])
         features_add(t, a, active, c);
-    if (!t->light_passes && trc_slots_follow(a->slots, active, &first)) {
-        found_add_row(t, a, active, c, camera_pass, first);
+    const vint category = (vint)(a->path >> TRC_PATH_CATEGORY_SHIFT & vu_set(3u));
+    const vmask straight = vm_and(active, vi_eq(category, vi_set(TRC_CATEGORY_CAMERA)));
+    const bool is_split = t->light_passes && vm_any(vm_andnot(active, straight));
+    if (!is_split && trc_slots_follow(a->slots, active, &first)) {
+        found_add_row(t, active, straight, c, camera_pass, first);
         return;
     }
     const vuint depth = trc_depth_of(a->depths, TRC_DEPTH_ALL_SHIFT);
