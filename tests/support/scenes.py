@@ -16,7 +16,7 @@ import numpy as np
 SEEDS = (1, 2, 3, 4)  # of pictures whose noise is measured
 
 # Sockets of Principled that 4.0 renamed.
-_RENAMED_SOCKETS = {"Specular": "Specular IOR Level", "Sheen": "Sheen Weight"}
+_RENAMED_SOCKETS = {"Specular": "Specular IOR Level", "Sheen": "Sheen Weight", "Transmission": "Transmission Weight"}
 
 
 def empty(engine='VOLLEY', size=(64, 48), samples=4):
