@@ -47,4 +47,16 @@ static inline uint64_t trc_passes_divided(void) {
         ;
 }
 
+/* Bits of the passes of what surfaces are, features for denoisers among them. */
+static inline uint64_t trc_passes_data(void) {
+#define TRC_PASS(NAME, number, channels, kind, color, miss)    \
+    | (uint64_t)(TRC_PASS_KIND_##kind == TRC_PASS_KIND_MEAN || \
+                 TRC_PASS_KIND_##kind == TRC_PASS_KIND_HITS || \
+                 TRC_PASS_KIND_##kind == TRC_PASS_KIND_FIRST)  \
+            << number
+    return 0
+#include "tracer/passes.def"
+        ;
+}
+
 #endif

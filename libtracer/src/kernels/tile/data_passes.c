@@ -14,13 +14,14 @@
 
 #define BIT(NAME) (1ull << TRC_PASS_##NAME)
 #define COLOR_PASSES (BIT(DIFFUSE_COLOR) | BIT(GLOSSY_COLOR) | BIT(TRANSMISSION_COLOR))
-#define FIRST_SURFACE_PASSES                                                  \
-    (BIT(DEPTH) | BIT(NORMAL) | BIT(POSITION) | BIT(UV) | BIT(OBJECT_INDEX) | \
-     BIT(MATERIAL_INDEX) | BIT(VECTOR))
+/* What is found elsewhere: kernels/tile/denoising.c and emission.c. */
+#define FEATURE_PASSES                                                      \
+    (BIT(DENOISING_ALBEDO) | BIT(DENOISING_NORMAL) | BIT(DENOISING_DEPTH) | \
+     BIT(DENOISING_ROUGHNESS) | BIT(DENOISING_SPECULAR_ALBEDO) | BIT(DENOISING_EMISSION))
 
 /* Whether something is asked for besides light and features for denoisers. */
 static bool wants_data(const trc_render_desc *desc) {
-    return desc->passes & (COLOR_PASSES | FIRST_SURFACE_PASSES | BIT(MIST)) || desc->cryptomattes ||
+    return desc->passes & trc_passes_data() & ~FEATURE_PASSES || desc->cryptomattes ||
            desc->aov_value_count || desc->aov_color_count;
 }
 
