@@ -234,15 +234,15 @@ static void flat_ranges_are_cut_into_squares(void **state) {
 #define BINARY_NODES 12
 
 /* A tree of so many inner nodes, of any shape; parents are no smaller than their children. */
-static uint32_t binary_random(struct rng *rng, struct trc_binary_node *nodes, float *areas,
+static uint32_t binary_random(struct rng *rng, const struct trc_binary *made, float *areas,
                               uint32_t count, uint32_t *next, float area) {
     if (count == 0)
         return trc_leaf_ref(rng_below(rng, 1000), 1 + rng_below(rng, 8));
     const uint32_t left_count = rng_below(rng, count);
-    const uint32_t left = binary_random(rng, nodes, areas, left_count, next, area * rng_unit(rng));
+    const uint32_t left = binary_random(rng, made, areas, left_count, next, area * rng_unit(rng));
     const uint32_t right =
-        binary_random(rng, nodes, areas, count - 1 - left_count, next, area * rng_unit(rng));
-    nodes[*next] = trc_binary_node(nodes, left, right, area);
+        binary_random(rng, made, areas, count - 1 - left_count, next, area * rng_unit(rng));
+    trc_binary_join(made, *next, left, right, area);
     areas[*next] = area;
     return (*next)++;
 }
@@ -297,15 +297,17 @@ static void wide_nodes_cost_the_least(void **state) {
     struct rng rng = rng_seed(23);
     for (int tree = 0; tree < 300; tree++) {
         struct trc_binary_node nodes[BINARY_NODES];
+        struct trc_binary_cost costs[BINARY_NODES];
+        const struct trc_binary made = {nodes, costs};
         float areas[BINARY_NODES];
         const uint32_t count = 1 + rng_below(&rng, BINARY_NODES);
         uint32_t next = 0, leaves = 0;
         const float area = tree % 10 ? 1.0f : 0.0f; /* of triangles in one place: none */
-        const uint32_t root = binary_random(&rng, nodes, areas, count, &next, area);
+        const uint32_t root = binary_random(&rng, &made, areas, count, &next, area);
         const float sum = collapsed(nodes, areas, root, &leaves);
         assert_int_equal(leaves, count + 1);
         assert_float_equal(sum, least_of_all(nodes, areas, count), 1e-5f);
-        assert_float_equal(sum, nodes[root].cost[0], 1e-5f);
+        assert_float_equal(sum, costs[root].children[0], 1e-5f);
     }
 }
 

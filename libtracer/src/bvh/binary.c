@@ -2,15 +2,16 @@
 #include "bvh/binary.h"
 
 /* Leaves stay in any case. */
-static const float *costs_of(const struct trc_binary_node *nodes, uint32_t node) {
+static const float *costs_of(const struct trc_binary *tree, uint32_t node) {
     static const float nothing[TRC_NODE_WIDTH - 1];
-    return node & TRC_REF_LEAF ? nothing : nodes[node].cost;
+    return node & TRC_REF_LEAF ? nothing : tree->costs[node].children;
 }
 
-struct trc_binary_node trc_binary_node(const struct trc_binary_node *nodes, uint32_t left,
-                                       uint32_t right, float area) {
+void trc_binary_join(const struct trc_binary *tree, uint32_t node, uint32_t left, uint32_t right,
+                     float area) {
     struct trc_binary_node n = {.left = left, .right = right};
-    const float *l = costs_of(nodes, left), *r = costs_of(nodes, right);
+    struct trc_binary_cost cost;
+    const float *l = costs_of(tree, left), *r = costs_of(tree, right);
     float apart[TRC_NODE_WIDTH - 1]; /* as i + 2 children, some of either side */
     for (int i = 0; i < TRC_NODE_WIDTH - 1; i++) {
         int best = 0; /* left's, less one */
@@ -20,14 +21,16 @@ struct trc_binary_node trc_binary_node(const struct trc_binary_node *nodes, uint
         apart[i] = l[best] + r[i - best];
         n.left_count[i] = (uint8_t)(best + 1);
     }
-    n.cost[0] = area + apart[TRC_NODE_WIDTH - 2];
+    cost.children[0] = area + apart[TRC_NODE_WIDTH - 2];
+    cost.unused = 0.0f;
     for (int i = 1; i < TRC_NODE_WIDTH - 1; i++) {
-        const bool fewer = n.cost[i - 1] < apart[i - 1];
-        n.cost[i] = fewer ? n.cost[i - 1] : apart[i - 1];
+        const bool fewer = cost.children[i - 1] < apart[i - 1];
+        cost.children[i] = fewer ? cost.children[i - 1] : apart[i - 1];
         if (fewer)
             n.left_count[i - 1] = 0;
     }
-    return n;
+    tree->nodes[node] = n;
+    tree->costs[node] = cost;
 }
 
 /* What stands for a node as no more than so many children. */

@@ -9,19 +9,29 @@
 
 #include "bvh/tree.h"
 
-/* An inner node. Its sides, and nodes wherever they are named: indices, or references of leaves. */
+/* An inner node, in two parts that are as large as a ref each, for builders keep them where refs
+ * were. Its sides, and nodes wherever they are named: indices, or references of leaves. */
 struct trc_binary_node {
     uint32_t left, right;
-    /* Least sum of the areas of inner nodes that stay, this one and below, if it is to be no more
-     * than i + 1 children of another. */
-    float cost[TRC_NODE_WIDTH - 1];
     /* Of i + 2 children, how many are left's; 0: no better than one fewer. */
     uint8_t left_count[TRC_NODE_WIDTH - 1];
+    bool is_upper; /* the builder's */
+    uint32_t unused[4];
+};
+struct trc_binary_cost {
+    /* Least sum of the areas of inner nodes that stay, this one and below, if it is to be no more
+     * than i + 1 children of another. */
+    float children[TRC_NODE_WIDTH - 1];
+    float unused;
+};
+struct trc_binary {
+    struct trc_binary_node *nodes;
+    struct trc_binary_cost *costs; /* by node */
 };
 
-/* A node over two sides, inner ones among nodes, of half that surface. */
-struct trc_binary_node trc_binary_node(const struct trc_binary_node *nodes, uint32_t left,
-                                       uint32_t right, float area);
+/* Makes a node over two sides that are there, of half that surface. */
+void trc_binary_join(const struct trc_binary *tree, uint32_t node, uint32_t left, uint32_t right,
+                     float area);
 
 /* The children of the wide node that stands for an inner one. Returns their number, 2 to
  * TRC_NODE_WIDTH. */

@@ -30,12 +30,14 @@ struct arena {
 /* A small range, and the binary tree over it. */
 struct task {
     struct trc_range range;
+    uint32_t first_ref; /* of all */
     uint32_t level;
-    uint32_t next, root; /* where in nodes the next one goes; the root */
+    uint32_t root; /* node, or a leaf's reference */
 };
 
 /* A split of the upper part. Its sides: forks, or tasks with FORK_TASK. */
 struct fork {
+    uint32_t node;
     uint32_t left, right;
     float area;
 };
@@ -60,8 +62,7 @@ struct builder {
     uint32_t task_count, task_capacity;
     struct fork *forks; /* children before parents */
     uint32_t fork_count, fork_capacity;
-    struct trc_binary_node *nodes; /* one for each ref of the tasks, then one for each fork */
-    uint32_t first_fork;           /* in nodes */
+    struct trc_binary binary;
     struct piece *pieces;
     uint32_t piece_count, piece_capacity;
     bool failed;
@@ -166,8 +167,18 @@ static bool has_room(struct builder *b, void **array, uint32_t count, uint32_t *
     return !b->failed;
 }
 
+/* A node stands where the last ref of its left side was, of all refs and their spare memory: no
+ * other has that place, and nobody reads it any more once both sides are made. */
+static uint32_t node_between(uint32_t first_ref, const struct trc_range *left) {
+    return first_ref + left->count - 1;
+}
+_Static_assert(sizeof(struct trc_binary_node) == sizeof(struct trc_ref) &&
+                   sizeof(struct trc_binary_cost) == sizeof(struct trc_ref),
+               "nodes stand where refs were");
+
 /* The upper part over r, down to what are tasks; the side of a fork that it is. */
-static uint32_t upper_build(struct builder *b, const struct trc_range *r, uint32_t level) {
+static uint32_t upper_build(struct builder *b, const struct trc_range *r, uint32_t first_ref,
+                            uint32_t level) {
     struct trc_range left, right;
     void *array;
     if (b->failed || is_cancelled(b))
@@ -177,59 +188,58 @@ static uint32_t upper_build(struct builder *b, const struct trc_range *r, uint32
         if (!has_room(b, &array, b->task_count, &b->task_capacity, sizeof *b->tasks))
             return FORK_TASK;
         b->tasks = array;
-        b->tasks[b->task_count] = (struct task){.range = *r, .level = level};
+        b->tasks[b->task_count] =
+            (struct task){.range = *r, .first_ref = first_ref, .level = level};
         return FORK_TASK | b->task_count++;
     }
-    const uint32_t l = upper_build(b, &left, level + 1), k = upper_build(b, &right, level + 1);
+    const uint32_t l = upper_build(b, &left, first_ref, level + 1),
+                   k = upper_build(b, &right, first_ref + left.count, level + 1);
     array = b->forks;
     if (!has_room(b, &array, b->fork_count, &b->fork_capacity, sizeof *b->forks))
         return FORK_TASK;
     b->forks = array;
-    b->forks[b->fork_count] = (struct fork){l, k, box_area(r->bounds)};
+    b->forks[b->fork_count] =
+        (struct fork){node_between(first_ref, &left), l, k, box_area(r->bounds)};
     return b->fork_count++;
 }
 
 /* The binary tree over r, children first; its root. */
-static uint32_t task_build(struct builder *b, struct task *t, const struct trc_range *r,
+static uint32_t task_build(struct builder *b, const struct trc_range *r, uint32_t first_ref,
                            uint32_t level) {
     struct trc_range left, right;
     if (!range_divide(b, r, level, &left, &right))
         return build_leaf(b, r);
-    const uint32_t l = task_build(b, t, &left, level + 1), k = task_build(b, t, &right, level + 1);
-    b->nodes[t->next] = trc_binary_node(b->nodes, l, k, box_area(r->bounds));
-    return t->next++;
+    const uint32_t l = task_build(b, &left, first_ref, level + 1),
+                   k = task_build(b, &right, first_ref + left.count, level + 1),
+                   node = node_between(first_ref, &left);
+    trc_binary_join(&b->binary, node, l, k, box_area(r->bounds));
+    return node;
 }
 
 static void task_run(void *context, uint32_t index, uint32_t worker) {
     (void)worker;
     struct builder *b = context;
     struct task *t = &b->tasks[index];
-    t->root = task_build(b, t, &t->range, t->level);
+    t->root = task_build(b, &t->range, t->first_ref, t->level);
 }
 
-/* Where in nodes a side of a fork stands. */
+/* The node, or leaf, that is a side of a fork. */
 static uint32_t side_node(const struct builder *b, uint32_t side) {
-    return side & FORK_TASK ? b->tasks[side & ~FORK_TASK].root : b->first_fork + side;
+    return side & FORK_TASK ? b->tasks[side & ~FORK_TASK].root : b->forks[side].node;
 }
 
-/* The binary tree; false without memory. */
-static bool binary_build(struct builder *b, struct trc_pool *pool, uint32_t ref_count) {
-    uint32_t next = 0;
-    b->first_fork = ref_count;
-    b->nodes = trc_alloc((size_t)b->first_fork + b->fork_count, sizeof *b->nodes);
-    if (!b->nodes)
-        return false;
-    for (uint32_t i = 0; i < b->task_count; i++) {
-        b->tasks[i].next = next;
-        next += b->tasks[i].range.count;
-    }
+static void binary_build(struct builder *b, struct trc_pool *pool) {
     trc_pool_run(pool, b->task_count, task_run, b);
     for (uint32_t i = 0; i < b->fork_count; i++) {
         const struct fork *f = &b->forks[i];
-        b->nodes[b->first_fork + i] =
-            trc_binary_node(b->nodes, side_node(b, f->left), side_node(b, f->right), f->area);
+        trc_binary_join(&b->binary, f->node, side_node(b, f->left), side_node(b, f->right),
+                        f->area);
+        b->binary.nodes[f->node].is_upper = true;
     }
-    return true;
+}
+
+static bool is_upper(const struct builder *b, uint32_t binary) {
+    return !(binary & TRC_REF_LEAF) && b->binary.nodes[binary].is_upper;
 }
 
 /* The wide node that stands for a binary one, and those below it, depth first. Those below forks
@@ -241,9 +251,9 @@ static uint32_t collapse(struct builder *b, struct arena *a, uint32_t binary) {
     const uint32_t node = arena_node(a);
     if (a->failed)
         return TRC_REF_EMPTY;
-    const int count = trc_binary_children(b->nodes, binary, child);
+    const int count = trc_binary_children(b->binary.nodes, binary, child);
     for (int i = 0; i < count; i++) {
-        if (binary >= b->first_fork && child[i] < b->first_fork) {
+        if (is_upper(b, binary) && !(child[i] & TRC_REF_LEAF) && !is_upper(b, child[i])) {
             void *array = b->pieces;
             if (!has_room(b, &array, b->piece_count, &b->piece_capacity, sizeof *b->pieces))
                 return TRC_REF_EMPTY;
@@ -304,11 +314,13 @@ trc_status trc_topology_build(const struct trc_range *all, uint32_t leaf_size,
                               struct trc_pool *pool, const atomic_uint *cancel,
                               struct trc_part_triangle *triangles_out, struct box *boxes_out,
                               struct trc_topology *out) {
-    struct builder b = {.kernels = trc_kernels_current(),
-                        .leaf_size = leaf_size,
-                        .cancel = cancel,
-                        .triangles = triangles_out,
-                        .boxes = boxes_out};
+    struct builder b = {
+        .kernels = trc_kernels_current(),
+        .leaf_size = leaf_size,
+        .cancel = cancel,
+        .triangles = triangles_out,
+        .boxes = boxes_out,
+        .binary = {(struct trc_binary_node *)all->refs, (struct trc_binary_cost *)all->spare}};
     struct arena top = {0};
     *out = (struct trc_topology){.root = TRC_REF_EMPTY};
     if (all->count == 0)
@@ -323,10 +335,11 @@ trc_status trc_topology_build(const struct trc_range *all, uint32_t leaf_size,
                             all->triangles);
         *b.blocks = (struct trc_split_blocks){.pool = pool, .cancel = cancel};
     }
-    const uint32_t side = upper_build(&b, all, 0);
+    const uint32_t side = upper_build(&b, all, 0, 0);
     uint32_t root = TRC_REF_EMPTY;
-    b.failed = b.failed || is_cancelled(&b) || !binary_build(&b, pool, all->count);
+    b.failed = b.failed || is_cancelled(&b);
     if (!b.failed) {
+        binary_build(&b, pool);
         root = collapse(&b, &top, side_node(&b, side));
         trc_pool_run(pool, b.piece_count, piece_run, &b);
     }
@@ -334,7 +347,6 @@ trc_status trc_topology_build(const struct trc_range *all, uint32_t leaf_size,
     for (uint32_t i = 0; i < b.piece_count; i++)
         trc_free(b.pieces[i].arena.children);
     trc_free(b.pieces);
-    trc_free(b.nodes);
     trc_free(b.forks);
     trc_free(b.tasks);
     trc_free(top.children);

@@ -71,6 +71,7 @@ static trc_status tree_build(struct create_job *job, const struct trc_part *part
     if (status == TRC_OK)
         status = trc_topology_build(&refs.all, TRC_NODE_WIDTH, job->pool, job->options->cancel,
                                     triangles, boxes, &topology);
+    trc_free(refs.memory); /* before the tree needs as much */
     if (status == TRC_OK) {
         status = trc_tree_fill(&topology, triangles, boxes, slot_count, parts, key_count, job->pool,
                                job->options->cancel, tree);
@@ -78,7 +79,6 @@ static trc_status tree_build(struct create_job *job, const struct trc_part *part
     }
     trc_free(boxes);
     trc_free(triangles);
-    trc_free(refs.memory);
     if (status != TRC_OK)
         return status;
     tree->triangle_count = refs.triangle_count;

@@ -33,10 +33,10 @@ struct trc_topology {
 };
 
 /* Binned SAH (Wald, "On fast construction of SAH-based bounding volume hierarchies", 2007) over
- * measured refs, which are used up, as 8-wide nodes of the least cost (bvh/binary.h): triangles_out
- * gets what stands in the slots, boxes_out at the first slots of clipped leaves their boxes (NULL
- * where no ref is clipped). leaf_size: most triangles of a leaf, 1..8. Same result for any thread
- * count. OUT_OF_MEMORY, TOO_LARGE or CANCELLED. */
+ * measured refs, which are used up with their spare memory, as 8-wide nodes of the least cost
+ * (bvh/binary.h): triangles_out gets what stands in the slots, boxes_out at the first slots of
+ * clipped leaves their boxes (NULL where no ref is clipped). leaf_size: most triangles of a leaf,
+ * 1..8. Same result for any thread count. OUT_OF_MEMORY, TOO_LARGE or CANCELLED. */
 trc_status trc_topology_build(const struct trc_range *all, uint32_t leaf_size,
                               struct trc_pool *pool, const atomic_uint *cancel,
                               struct trc_part_triangle *triangles_out, struct box *boxes_out,
