@@ -169,17 +169,20 @@ def test_headline_of_denoise_has_times_of_both():
 
 
 def test_hair_that_cycles_renders_sooner_is_a_loss():
-    def engine(seconds, mse):
-        return {"seconds": [seconds] * 3, "mse": mse, "rel_mse": mse, "mean_ratios": [1.0]}
-    results = {"hair": {"fast": {"CYCLES": engine(6.0, 2.0), "VOLLEY": engine(2.0, 1.0)},
-                        "slow": {"CYCLES": engine(1.0, 1.0), "VOLLEY": engine(2.0, 3.0)}}}
+    def engine(seconds, large_seconds, mse):
+        return {"seconds": [seconds] * 3, "large_seconds": [large_seconds] * 2, "mse": mse, "rel_mse": mse,
+                "mean_ratios": [1.0]}
+    results = {"hair": {"fast": {"CYCLES": engine(6.0, 60.0, 2.0), "VOLLEY": engine(2.0, 15.0, 1.0)},
+                        "slow": {"CYCLES": engine(1.0, 9.0, 1.0), "VOLLEY": engine(2.0, 10.0, 3.0)}}}
     line, = error_sections.headline_lines(results)
-    assert "0.50 to 3.0 times" in line
+    assert "0.50 to 3.0 times as long at 240×180, 0.90 to 4.0 times as long at 768×432." in line
     assert hair.losses(results["hair"]) == ["slow: F12 of Cycles over Volley's **0.50** (0.50–0.50)",
-                                            "slow: MSE over Cycles' at equal samples **3.00**"]
-    rows = hair.section(results["hair"]).splitlines()[-2:]
-    assert [row.split(" | ")[0] for row in rows] == ["| slow", "| fast"]
+                                            "slow: MSE over Cycles' at equal samples **3.00**",
+                                            "slow, 768×432: F12 of Cycles over Volley's **0.90** (0.90–0.90)"]
+    rows = [line for line in hair.section(results["hair"]).splitlines() if line.startswith(("| slow", "| fast"))]
+    assert [row.split(" | ")[0] for row in rows] == ["| slow", "| fast"] * 2
     assert "3.00 (3.00–3.00) | 0.500 | 0.500" in rows[1]
+    assert "60.0 | 15.0 | 4.00 (4.00–4.00)" in rows[3]
     assert hair.losses({}) == []
 
 

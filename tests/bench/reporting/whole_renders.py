@@ -32,26 +32,47 @@ def measure(folders, size_px, options, scope):
 def measure_scene(name, size_px, options, scope, pictures):
     """{engine: {"seconds": of each repeat, errors}} of one scene, each repeat with another seed; a PNG of both
     into a folder."""
-    own = compare_cycles.parse_arguments([
-        "--scene", name, "--width", str(size_px[0]), "--height", str(size_px[1]), "--threads", str(options.threads),
-        "--build", str(options.build), "--blender", options.blender, "--scenes", str(options.scenes or ".")])
+    own = arguments_of(name, size_px, options)
     blend, _key, _name = compare_cycles.prepared_scene(own)
     reference = error_time.Reference.of_stack(reference_stack(blend, scope, own))
     seconds, images = {engine: [] for engine in ENGINES}, {engine: [] for engine in ENGINES}
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "picture.exr"
-        for repeat in range(scope.repeats):
-            for engine in ENGINES:
-                settings = settings_of(own, SAMPLES, compare_cycles.FIRST_REPEAT_SEED + repeat)
-                seconds[engine].append(
-                    compare_cycles.render(blend, engine, settings, own.frame, path, own)["engine_s"])
-                images[engine].append(compare.read_rgb(path))
+    for engine, took, picture in renders(blend, own, scope.repeats):
+        seconds[engine].append(took)
+        images[engine].append(picture)
     pictures.mkdir(parents=True, exist_ok=True)
     shown = [shrunk(picture) for picture in (*(images[engine][0] for engine in ENGINES), reference.mean)]
     compare.write_png(pictures / f"{name}.png", np.concatenate(shown, axis=1))
     stacks = {engine: np.stack(made) for engine, made in images.items()}
     return {engine: {"seconds": seconds[engine], **error_time.point_errors(stacks[engine], reference)}
             for engine in ENGINES}
+
+
+def seconds_of(name, size_px, options, repeats):
+    """{engine: seconds of each repeat} of one scene at that size, without its errors."""
+    own = arguments_of(name, size_px, options)
+    blend, _key, _name = compare_cycles.prepared_scene(own)
+    seconds = {engine: [] for engine in ENGINES}
+    for engine, took, _picture in renders(blend, own, repeats):
+        seconds[engine].append(took)
+    return seconds
+
+
+def renders(blend, own, repeats):
+    """(engine, its seconds, picture) of both engines in turns, each repeat with another seed."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "picture.exr"
+        for repeat in range(repeats):
+            settings = settings_of(own, SAMPLES, compare_cycles.FIRST_REPEAT_SEED + repeat)
+            for engine in ENGINES:
+                took = compare_cycles.render(blend, engine, settings, own.frame, path, own)["engine_s"]
+                yield engine, took, compare.read_rgb(path)
+
+
+def arguments_of(name, size_px, options):
+    """compare_cycles' options of a scene at that size."""
+    return compare_cycles.parse_arguments([
+        "--scene", name, "--width", str(size_px[0]), "--height", str(size_px[1]), "--threads", str(options.threads),
+        "--build", str(options.build), "--blender", options.blender, "--scenes", str(options.scenes or ".")])
 
 
 def shrunk(picture):
@@ -76,10 +97,10 @@ def reference_stack(blend, scope, own):
         return np.stack([compare.read_rgb(path) for path in paths])
 
 
-def gains(results):
-    """(scene, seconds of Cycles over Volley's with interval) of each, the lowest first."""
-    found = [(name, estimates.ratio_with_interval(*(engines[engine]["seconds"] for engine in ENGINES)))
-             for name, engines in results.items()]
+def gains(results, key="seconds"):
+    """(scene, seconds of Cycles over Volley's with interval) of each that has them, the lowest first."""
+    found = [(name, estimates.ratio_with_interval(*(engines[engine][key] for engine in ENGINES)))
+             for name, engines in results.items() if key in engines[ENGINES[0]]]
     return sorted(found, key=lambda row: row[1]["ratio"])
 
 
