@@ -48,5 +48,5 @@ def section(results):
         "growing of the strands, sync, build and rays. Errors are against a Cycles picture of more samples, the same "
         "for both.",
         whole_renders.section_table(results),
-        f"The same at {LARGE_SIZE_PX[0]}×{LARGE_SIZE_PX[1]}, its time alone:",
-        table(whole_renders.COLUMNS[:4], large)])
+        *([f"The same at {LARGE_SIZE_PX[0]}×{LARGE_SIZE_PX[1]}, its time alone:",
+           table(whole_renders.COLUMNS[:4], large)] if large else [])])
