@@ -5,6 +5,7 @@ The library wants the view window on the plane at distance 1 (perspective), in m
 shares of the panorama for the whole frame; sensor fit, shift and pixel aspect are folded into it here.
 """
 
+import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -14,6 +15,12 @@ from . import motion, panorama
 from .matrix import rows12
 
 VIEW_SENSOR_MM = 72.0  # the viewport's lens is meant for a sensor of twice Blender's default
+
+
+# Lights that are seen through have a picture that would be so wide at the angle of a spot, others than spots at that of
+# a new one; what is no light has the lens of a new camera. All as in Cycles.
+_LIGHT_WIDTH_MM, _LIGHT_ANGLE = 32.0, math.radians(45.0)
+_OTHER_CLIP = 1e-5, 1e5  # m
 
 
 @dataclass(frozen=True)
@@ -143,7 +150,9 @@ def focus_distance(camera_object):
 
 
 def lens_of(camera_object, warnings, shift_x=None):
-    """The lens of an evaluated camera object; shift_x replaces the camera's own (stereo views)."""
+    """The lens of an evaluated object that is seen through; shift_x replaces a camera's own (stereo views)."""
+    if camera_object.type != 'CAMERA':
+        return _lens_of_other(camera_object)
     data = camera_object.data
     is_ortho = data.type == 'ORTHO'
     if data.type not in {'PERSP', 'ORTHO', 'PANO'}:
@@ -164,10 +173,20 @@ def lens_of(camera_object, warnings, shift_x=None):
         aperture_ratio=max(dof.aperture_ratio, 1e-5))
 
 
+def _lens_of_other(seen_through):
+    """The lens of an object that is no camera."""
+    lens = Lens(clip_start=_OTHER_CLIP[0], clip_end=_OTHER_CLIP[1])
+    if seen_through.type != 'LIGHT':
+        return lens
+    angle = getattr(seen_through.data, "spot_size", _LIGHT_ANGLE)
+    return replace(lens, focal_mm=0.5 * _LIGHT_WIDTH_MM / math.tan(0.5 * angle))
+
+
 def render_camera(engine, camera_object, frame, warnings):
     """The camera of the active view of a render at the depsgraph's present time, with one key."""
-    is_spherical = engine.use_spherical_stereo(camera_object)
-    shift_x = engine.camera_shift_x(camera_object, use_spherical_stereo=is_spherical)
+    is_camera = camera_object.type == 'CAMERA'  # Blender falls where it is asked for the rest of others
+    is_spherical = is_camera and engine.use_spherical_stereo(camera_object)
+    shift_x = engine.camera_shift_x(camera_object, use_spherical_stereo=is_spherical) if is_camera else None
     lens = _with_sensor(lens_of(camera_object, warnings, shift_x), frame)
     if is_spherical:
         lens = replace(lens, stereo=panorama.stereo_fields(camera_object.data, engine.active_view_get()))
