@@ -715,6 +715,7 @@ class GuidesType(IntEnum):
 class PassesFlags(IntFlag):
     BLENDED_FEATURES = 1
     BACKGROUND_MOTION = 2
+    MEAN_REFRACTION = 4
 
 
 class ProgressState(IntEnum):

@@ -80,6 +80,9 @@ HAS_WHOLE_COAT = bpy.app.version >= (5, 0, 0)
 # Passes for denoisers weigh normals by what transparency and mirrors pass on; seen in 5.2, not in 4.3.
 HAS_BLENDED_FEATURES = bpy.app.version >= (5, 0, 0)
 
+# Colours of rough glass's refraction are what micro-normals do not reflect on average; seen in 5.2, not in 4.3.
+HAS_MEAN_REFRACTION = bpy.app.version >= (5, 0, 0)
+
 # The vector pass has the motion of the background; seen in 5.2, not in 4.3.
 BACKGROUND_MOVES = bpy.app.version >= (5, 0, 0)
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from .abi import (CRYPTOMATTE_LAYER_RANKS, MAX_AOVS, MAX_CRYPTOMATTE_DEPTH, MAX_CRYPTOMATTE_LAYERS,
                   MAX_LIGHT_GROUPS, PASS_CHANNELS, PASS_RANGES, CryptomatteKind, PassesFlags, PassId, PassRange)
-from .compat import BACKGROUND_MOVES, HAS_BLENDED_FEATURES, HAS_LONG_PASS_NAMES
+from .compat import BACKGROUND_MOVES, HAS_BLENDED_FEATURES, HAS_LONG_PASS_NAMES, HAS_MEAN_REFRACTION
 
 # index: a PassId, or a number of a PassRange; names: before 5.0 and since; channels: one letter each;
 # setting: path below the view layer.
@@ -178,7 +178,8 @@ def request_fields(entries):
         "cryptomattes": sum(1 << kind for kind in {kind for kind, _ in layers}),
         "cryptomatte_depth": CRYPTOMATTE_LAYER_RANKS * max((layer + 1 for _, layer in layers), default=0),
         "pass_flags": (PassesFlags.BLENDED_FEATURES if HAS_BLENDED_FEATURES else 0)
-        | (PassesFlags.BACKGROUND_MOTION if BACKGROUND_MOVES else 0),
+        | (PassesFlags.BACKGROUND_MOTION if BACKGROUND_MOVES else 0)
+        | (PassesFlags.MEAN_REFRACTION if HAS_MEAN_REFRACTION else 0),
     }
 
 

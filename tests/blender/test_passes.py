@@ -244,6 +244,50 @@ def inside_metals():
     return found
 
 
+# Rough enough for denoisers' albedo: node and inputs.
+ROUGH = {
+    "tinted metal": ("ShaderNodeBsdfPrincipled", {
+        "Metallic": 1.0, "Roughness": 0.6, "Base Color": (0.5, 0.5, 0.5), "Specular Tint": (0.05, 0.05, 0.9)}),
+    "coat": ("ShaderNodeBsdfPrincipled", {
+        "Base Color": (0.0, 0.0, 0.0), "Roughness": 0.8, "Coat Weight": 1.0, "Coat Roughness": 0.7}),
+    "dense": ("ShaderNodeBsdfPrincipled", {
+        "Base Color": (0.0, 0.0, 0.0), "Roughness": 0.6, "IOR": 2.0, "Specular Tint": (0.2, 0.6, 0.9)}),
+    "transmission": ("ShaderNodeBsdfPrincipled", {
+        "Base Color": (0.8, 0.5, 0.2), "Roughness": 0.6, "Transmission Weight": 1.0}),
+    "glass": ("ShaderNodeBsdfGlass", {"Color": (0.8, 0.5, 0.2), "Roughness": 0.7})}
+ROUGH_PASSES = "GlossCol", "TransCol", "Denoising Albedo"
+ROUGH_OFF = 3e-3, 8e-3
+
+
+def inside_rough():
+    """{kind: {pass: pictures by both}} of rough balls in the dark."""
+    import bpy
+    import scenes
+    found = {}
+    for kind, (node, inputs) in ROUGH.items():
+        scenes.empty(size=(32, 24))
+        scenes.camera()
+        scenes.sphere(material=scenes.material("Rough", node, **inputs))
+        layer = bpy.context.view_layer
+        layer.use_pass_glossy_color = layer.use_pass_transmission_color = True
+        layer.volley.denoising_store_passes = layer.cycles.denoising_store_passes = True
+        found[kind] = _both(ROUGH_PASSES)
+    return found
+
+
+@pytest.mark.since(*TINTED_SINCE)
+def test_colours_of_rough_lobes(blender):
+    """Light from everywhere that tables say they give back: in colours and for denoisers."""
+    if blender_support.version() < TINTED_SINCE[0]:
+        pytest.skip(TINTED_SINCE[1])
+    for kind, passes in blender.run(inside_rough).items():
+        for name, (ours, theirs) in passes.items():
+            if theirs[..., :3].any():
+                _agree(ours, theirs, f"{kind}, {name}", off=ROUGH_OFF)
+            else:
+                assert not ours[..., :3].any(), (kind, name)
+
+
 @pytest.mark.since(*TINTED_SINCE)
 def test_colour_of_metals(blender):
     """Cycles' colour leaves the tint of the edge out."""

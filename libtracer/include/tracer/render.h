@@ -97,11 +97,14 @@ TRC_API float trc_cryptomatte_id(const char *name);
 
 /* What passes mean in Blender 5 and not before. */
 enum trc_passes_flags {
-    TRC_PASSES_BLENDED_FEATURES = 1, /* in TRC_PASS_DENOISING_NORMAL and ALBEDO what mirrors and
-                                        transparent surfaces show counts by how much they pass on;
-                                        else a sample has its first surface's alone */
-    TRC_PASSES_BACKGROUND_MOTION = 2 /* TRC_PASS_VECTOR has the motion of the background, as of
-                                        points far away; 0 for orthographic cameras */
+    TRC_PASSES_BLENDED_FEATURES = 1,  /* in TRC_PASS_DENOISING_NORMAL and ALBEDO what mirrors and
+                                         transparent surfaces show counts by how much they pass on;
+                                         else a sample has its first surface's alone */
+    TRC_PASSES_BACKGROUND_MOTION = 2, /* TRC_PASS_VECTOR has the motion of the background, as of
+                                         points far away; 0 for orthographic cameras */
+    TRC_PASSES_MEAN_REFRACTION = 4    /* in TRC_PASS_TRANSMISSION_COLOR and the denoising albedo
+                                         rough glass has what its micro-normals do not reflect on
+                                         average; else what its normal does not */
 };
 
 typedef struct trc_render_desc {

@@ -92,7 +92,7 @@ static trc_status check_film(const trc_render_desc *desc) {
     TRC_TRY(trc_check_count(desc->light_group_count, 0, TRC_MAX_LIGHT_GROUPS, "light_group_count"));
     TRC_TRY(trc_check_enum(desc->denoise, TRC_DENOISE_PREVIEW + 1, "denoise"));
     TRC_TRY(trc_check_enum(desc->guides, TRC_GUIDES_NONE + 1, "guides"));
-    TRC_TRY(trc_check_enum(desc->pass_flags, 2 * TRC_PASSES_BACKGROUND_MOTION, "pass_flags"));
+    TRC_TRY(trc_check_enum(desc->pass_flags, 2 * TRC_PASSES_MEAN_REFRACTION, "pass_flags"));
     return desc->passes >> TRC_PASS_MIST & 1 ? check_mist(desc) : TRC_OK;
 }
 

@@ -305,20 +305,24 @@ void trc_bsdf_ideal(const struct trc_lobes *l, int i, const struct trc_surface *
     take_ideal(l, lobe, s, s->active, vf_one(), out);
 }
 
-/* What a lobe of Blender 4 reflects under light from everywhere, over its weight. Where the factor
- * goes to white with the angle, micro-normals count, and the dip of metal does not; else it is that
- * of the lobe's normal: all as in Cycles. */
-static vvec3 mean_reflectance(const struct trc_lobe *lobe) {
+/* What a lobe of Blender 4 gives back under light from everywhere, over its weight. Where the
+ * factor goes to white with the angle, micro-normals count, of refraction with
+ * TRC_PASSES_MEAN_REFRACTION, and the dip of metal does not; else it is that of the lobe's normal:
+ * all as in Cycles. */
+static vvec3 mean_fresnel(const struct trc_lobe *lobe, uint32_t pass_flags) {
     const vfloat alpha = vf_sqrt(lobe->alpha_x * lobe->alpha_y);
+    const bool reflects = lobe->kind == TRC_LOBE_REFLECT;
     if (lobe->fresnel == TRC_FRESNEL_METAL)
         return v3_lerp(lobe->f0, v3_splat(vf_one()), trc_schlick_share(lobe->cos_o, alpha));
-    if (lobe->kind == TRC_LOBE_REFLECT && lobe->fresnel == TRC_FRESNEL_BLEND)
-        return v3_lerp(lobe->f0, lobe->f90, trc_dielectric_share(lobe->cos_o, alpha, lobe->ior));
-    return facet_fresnel(lobe, lobe->cos_o);
+    if (lobe->fresnel != TRC_FRESNEL_BLEND ||
+        !(reflects || pass_flags & TRC_PASSES_MEAN_REFRACTION))
+        return facet_fresnel(lobe, lobe->cos_o);
+    const vvec3 reflected =
+        v3_lerp(lobe->f0, lobe->f90, trc_dielectric_share(lobe->cos_o, alpha, lobe->ior));
+    return reflects ? reflected : v3_sub(v3_splat(vf_one()), reflected);
 }
 
-void trc_bsdf_albedo(const struct trc_lobes *l, const struct trc_surface *s, vvec3 albedo_out[3]) {
-    (void)s;
+void trc_bsdf_albedo(const struct trc_lobes *l, uint32_t pass_flags, vvec3 albedo_out[3]) {
     for (int k = 0; k < 3; k++)
         albedo_out[k] = v3_zero();
     for (int i = 0; i < l->count; i++) {
@@ -328,7 +332,7 @@ void trc_bsdf_albedo(const struct trc_lobes *l, const struct trc_surface *s, vve
         const int k = is_transmissive(lobe, true) ? 2 : is_glossy(l, lobe, true);
         vvec3 albedo = v3_scale(lobe->weight, lobe->albedo_scale);
         if (lobe->correlated)
-            albedo = v3_mul(albedo, mean_reflectance(lobe));
+            albedo = v3_mul(albedo, mean_fresnel(lobe, pass_flags));
         albedo_out[k] = v3_add(albedo_out[k], albedo);
     }
 }
@@ -369,11 +373,12 @@ vfloat trc_lobe_alpha(const struct trc_lobe *lobe) {
     return vf_select(lobe->ideal, vf_zero(), vf_sqrt(lobe->alpha_x * lobe->alpha_y));
 }
 
-vvec3 trc_lobe_albedo(const struct trc_lobe *lobe, vvec3 wo) {
+vvec3 trc_lobe_albedo(const struct trc_lobe *lobe, vvec3 wo, uint32_t pass_flags) {
     const vvec3 albedo = v3_scale(lobe->weight, lobe->albedo_scale);
     if (trc_lobe_ends(lobe->kind) || lobe->kind == TRC_LOBE_TRANSLUCENT)
         return albedo;
-    return v3_mul(albedo, facet_fresnel(lobe, v3_dot(lobe->n, wo)));
+    return v3_mul(albedo, lobe->correlated ? mean_fresnel(lobe, pass_flags)
+                                           : facet_fresnel(lobe, v3_dot(lobe->n, wo)));
 }
 
 vvec3 trc_lobes_diffuse(const struct trc_lobes *l, const struct trc_surface *s, vvec3 *normal_out) {

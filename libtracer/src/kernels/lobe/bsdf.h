@@ -175,11 +175,12 @@ void trc_bsdf_ideal(const struct trc_lobes *l, int i, const struct trc_surface *
 
 /* Albedo of the lobes for the colour passes: diffuse, glossy, transmission. As Cycles: the weights,
  * without what a Fresnel factor or masking takes; of correlated lobes with the mean Fresnel factor.
- */
-void trc_bsdf_albedo(const struct trc_lobes *l, const struct trc_surface *s, vvec3 albedo_out[3]);
+ * pass_flags: TRC_PASSES_*. */
+void trc_bsdf_albedo(const struct trc_lobes *l, uint32_t pass_flags, vvec3 albedo_out[3]);
 
-/* Albedo of one lobe towards wo, Fresnel factors included. */
-vvec3 trc_lobe_albedo(const struct trc_lobe *lobe, vvec3 wo);
+/* Albedo of one lobe towards wo, Fresnel factors included: that of its normal, of correlated lobes
+ * the mean one. */
+vvec3 trc_lobe_albedo(const struct trc_lobe *lobe, vvec3 wo, uint32_t pass_flags);
 
 /* How rough one lobe is: the mean alpha of its facets, 0 where it is ideal, 1 without facets. */
 vfloat trc_lobe_alpha(const struct trc_lobe *lobe);

@@ -254,15 +254,14 @@ void trc_background_motion(struct trc_tile *t, vvec3 d, vuint path, const uint32
 
 /* ---- of all surfaces of a straight path ---- */
 
-static void add_colors(struct trc_tile *t, const struct trc_surface *s,
-                       const struct trc_lobes *lobes, vvec3 weight, const uint32_t *slots,
-                       vmask active) {
+static void add_colors(struct trc_tile *t, const struct trc_lobes *lobes, vvec3 weight,
+                       const uint32_t *slots, vmask active) {
     static const uint32_t pass[3] = {TRC_PASS_DIFFUSE_COLOR, TRC_PASS_GLOSSY_COLOR,
                                      TRC_PASS_TRANSMISSION_COLOR};
     if (!(t->desc->passes & COLOR_PASSES))
         return;
     vvec3 albedo[3];
-    trc_bsdf_albedo(lobes, s, albedo);
+    trc_bsdf_albedo(lobes, t->desc->pass_flags, albedo);
     for (int k = 0; k < 3; k++)
         trc_pass_add_lanes(t, pass[k], v3_mul(weight, albedo[k]), slots, active);
 }
@@ -389,7 +388,7 @@ vuint trc_data_passes(struct trc_tile *t, const struct trc_surface *s, const str
     const vvec3 weight = v3_scale(found_weight, indirect_scale);
     const vvec3 one = v3(vf_set(1.0f), vf_set(1.0f), vf_set(1.0f));
     const vvec3 alpha = v3_sub(one, trc_lobes_transparency(lobes));
-    add_colors(t, s, lobes, weight, slots, on);
+    add_colors(t, lobes, weight, slots, on);
     add_mist(t, s, v3_mul(weight, alpha), slots, on);
     if (t->desc->cryptomattes)
         add_mattes(t, s, m, v3_mul(weight, alpha), slots, on);

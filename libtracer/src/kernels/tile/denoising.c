@@ -50,7 +50,7 @@ static vmask is_rough(const struct trc_lobe *lobe) {
     return vf_gt(trc_lobe_alpha(lobe), vf_set(FEATURE_ALPHA));
 }
 
-static void features_of(const struct trc_lobes *l, const struct trc_surface *s,
+static void features_of(const struct trc_lobes *l, const struct trc_surface *s, uint32_t pass_flags,
                         struct features *out) {
     const vfloat zero = vf_zero();
     vvec3 normal = v3_zero(), albedo = v3_zero();
@@ -62,7 +62,7 @@ static void features_of(const struct trc_lobes *l, const struct trc_surface *s,
         all = all + lobe->mix_weight;
         rough = rough + vf_where(counts, lobe->mix_weight);
         if (vm_any(counts))
-            albedo = v3_add(albedo, v3_where(counts, trc_lobe_albedo(lobe, s->wo)));
+            albedo = v3_add(albedo, v3_where(counts, trc_lobe_albedo(lobe, s->wo, pass_flags)));
     }
     const vmask some = vf_gt(all, zero);
     out->normal = v3_where(some, v3_scale(normal, vf_rcp(vf_select(some, all, vf_one()))));
@@ -71,7 +71,7 @@ static void features_of(const struct trc_lobes *l, const struct trc_surface *s,
 }
 
 static void specular_features_of(const struct trc_lobes *l, const struct trc_surface *s,
-                                 struct specular_features *out) {
+                                 uint32_t pass_flags, struct specular_features *out) {
     const vfloat zero = vf_zero();
     vvec3 specular = v3_zero(), solid = v3_zero(), blended = v3_zero();
     vfloat alpha = zero, scattered = zero, clear = zero, blurred = zero;
@@ -81,7 +81,7 @@ static void specular_features_of(const struct trc_lobes *l, const struct trc_sur
             clear = clear + v3_average(lobe->weight);
             continue;
         }
-        const vvec3 color = trc_lobe_albedo(lobe, s->wo);
+        const vvec3 color = trc_lobe_albedo(lobe, s->wo, pass_flags);
         const vfloat share = v3_average(color), mirror = specular_share(trc_lobe_alpha(lobe));
         specular = v3_mad(color, mirror, specular);
         blended = v3_mad(color, vf_one() - mirror, blended);
@@ -141,7 +141,8 @@ vuint trc_denoising_passes(struct trc_tile *t, const struct trc_surface *s,
                            const uint32_t slots[TRC_WIDTH]) {
     const vint done = vi_set(TRC_PATH_FEATURES_DONE);
     const vint straight = vi_set(TRC_PATH_TRANSPARENT_BACKGROUND);
-    const bool is_blended = t->desc->pass_flags & TRC_PASSES_BLENDED_FEATURES;
+    const uint32_t flags = t->desc->pass_flags;
+    const bool is_blended = flags & TRC_PASSES_BLENDED_FEATURES;
     const vmask seen = vm_and(s->active, vi_eq((vint)s->path & straight, straight));
     vmask on = vm_and(s->active, vi_eq((vint)s->path & done, vi_set(0)));
     if (is_blended) /* what is behind transparency counts besides what is before it */
@@ -151,7 +152,7 @@ vuint trc_denoising_passes(struct trc_tile *t, const struct trc_surface *s,
     add_number(t, TRC_PASS_DENOISING_DEPTH, v3_average(weight) * length, slots, on);
     struct specular_features specular;
     if (is_blended || t->desc->passes & SPECULAR_PASSES) {
-        specular_features_of(lobes, s, &specular);
+        specular_features_of(lobes, s, flags, &specular);
         add_number(t, TRC_PASS_DENOISING_ROUGHNESS, v3_average(weight) * vf_sqrt(specular.alpha),
                    slots, seen);
         trc_pass_add_lanes(t, TRC_PASS_DENOISING_SPECULAR_ALBEDO,
@@ -167,7 +168,7 @@ vuint trc_denoising_passes(struct trc_tile *t, const struct trc_surface *s,
                            slots, taken);
     } else {
         struct features f;
-        features_of(lobes, s, &f);
+        features_of(lobes, s, flags, &f);
         taken = vm_and(on, f.are_taken);
         trc_pass_add_lanes(t, TRC_PASS_DENOISING_ALBEDO, v3_mul(weight, f.albedo), slots, taken);
         write_normal(t, f.normal, slots, taken);
