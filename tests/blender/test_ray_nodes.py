@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What nodes say of the ray that asks and of the surface it met, beside Cycles."""
 
+import compare
 import numpy as np
 import pytest
 
@@ -161,3 +162,45 @@ def test_shadow_rays(blender):
     for ours, theirs in blender.run(inside_shadows):
         assert _beyond(ours, theirs, 5e-3) <= 0.04  # pixels at the shadow's edge, as wide as Cycles' box
         assert np.ptp(theirs) > 0.05
+
+
+# Worlds ----------------------------------------------------------------------------------------------
+
+WORLD_KINDS = ("Is Camera Ray", "Is Diffuse Ray", "Is Glossy Ray", "Is Reflection Ray", "Is Transmission Ray",
+               "Is Singular Ray")
+LIT = {"diffuse": ("ShaderNodeBsdfDiffuse", {}), "glossy": ("ShaderNodeBsdfGlossy", {"Roughness": 0.4}),
+       "translucent": ("ShaderNodeBsdfTranslucent", {}), "refraction": ("ShaderNodeBsdfRefraction", {"Roughness": 0.3})}
+WORLD_OFF = 0.003, 0.01  # of the mean
+
+
+def inside_world(kind):
+    """{output: pictures by both} of a ball in an even world that is another to rays for which an output of Light
+    Path is 1."""
+    import bpy
+    import scenes
+    scene = scenes.empty(size=(32, 24))
+    scenes.camera()
+    node_type, inputs = LIT[kind]
+    scenes.sphere(material=scenes.material("Lit", node_type, Color=(0.8, 0.8, 0.8, 1.0), **inputs))
+    scenes.light_world((0.3, 0.3, 0.3))
+    tree = scene.world.node_tree
+    nodes = {node.bl_idname: node for node in tree.nodes}
+    other, asked, mix = (tree.nodes.new(f"ShaderNode{name}") for name in ("Background", "LightPath", "MixShader"))
+    other.inputs["Color"].default_value = (1.0, 0.2, 0.1, 1.0)
+    tree.links.new(nodes["ShaderNodeBackground"].outputs[0], mix.inputs[1])
+    tree.links.new(other.outputs[0], mix.inputs[2])
+    tree.links.new(mix.outputs[0], nodes["ShaderNodeOutputWorld"].inputs["Surface"])
+    found = {}
+    for output in WORLD_KINDS:
+        tree.links.new(asked.outputs[output], mix.inputs[0])
+        found[output] = scenes.seeds_by_both(64)
+    return found
+
+
+@pytest.mark.parametrize("kind", LIT)
+def test_even_world(blender, kind):
+    """Cycles has no light samples of it: what rays find is what they are told."""
+    for output, pictures in blender.run(inside_world, kind).items():
+        ours, theirs = (seeds[..., :3] for seeds in pictures)
+        assert all(error <= off * theirs.mean()
+                   for error, off in zip(compare.unexplained(ours, theirs), WORLD_OFF)), output

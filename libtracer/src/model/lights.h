@@ -137,6 +137,7 @@ struct trc_world_map {
     float *along;     /* for each row, for each block in it: sums of its cells, 0 to 1 */
     float *density;   /* width * height: value over the mean, per unit square */
     float average[3]; /* mean radiance over the sphere */
+    bool is_even;     /* to rays of no kind it is as bright everywhere */
     struct trc_world_sun sun;
 };
 
@@ -180,6 +181,8 @@ struct trc_light_table {
     uint32_t *instance_triangles; /* per instance: how many of its triangles are lights */
     struct trc_world_map *map;    /* NULL: cosine or uniform sampling */
     uint32_t world_visibility;    /* of its light samples */
+    bool world_asks_rays; /* its light depends on the kind of ray, and Cycles has no samples of it:
+                             all that it lights is found by rays there */
 };
 
 #endif

@@ -159,6 +159,20 @@ static void measure(struct measuring *m) {
         map->average[i] = (float)(total[i] / weight);
 }
 
+/* How far cells of an even world may be apart: rounding. */
+#define EVEN_TOLERANCE 1e-4f
+
+static bool is_even(const struct trc_world_map *map) {
+    const float mean = trc_luminance(map->average);
+    bool even = map->sun.square_chord == 0.0f;
+    for (uint32_t y = 0; y < map->height && even; y++) {
+        const float want = mean * sample_weight(map, y);
+        for (uint32_t x = 0; x < map->width && even; x++)
+            even = fabsf(map->density[(size_t)y * map->width + x] - want) <= EVEN_TOLERANCE * want;
+    }
+    return even;
+}
+
 /* Values become multiples of the mean, none of them 0. */
 static void normalize(struct trc_world_map *map) {
     const uint32_t width = map->width, height = map->height;
@@ -224,6 +238,7 @@ trc_status trc_world_map_create(const struct trc_snapshot *snapshot, uint32_t wa
         trc_world_map_release(map);
         return status;
     }
+    map->is_even = is_even(map);
     if (map->sun.square_chord > 0.0f)
         weigh_sun(snapshot, map);
     normalize(map);

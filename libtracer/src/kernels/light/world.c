@@ -50,6 +50,16 @@ vvec3 trc_world_shade(const struct trc_snapshot *snapshot, vvec3 direction, vuin
     return v3_where(active, trc_lobes_emission(m, &regs));
 }
 
+void trc_world_shade_kinds(const struct trc_snapshot *snapshot, vvec3 direction, vmask behind,
+                           vmask active, vvec3 seen_out[3]) {
+    const vint diffuse = vi_select(behind, vi_set(TRC_VISIBLE_DIFFUSE | TRC_VISIBLE_TRANSMISSION),
+                                   vi_set(TRC_VISIBLE_DIFFUSE | TRC_PATH_REFLECTED));
+    const vuint kinds[3] = {(vuint)diffuse, vu_set(TRC_VISIBLE_GLOSSY | TRC_PATH_REFLECTED),
+                            vu_set(TRC_VISIBLE_TRANSMISSION)};
+    for (int i = 0; i < 3; i++)
+        seen_out[i] = trc_world_shade(snapshot, direction, kinds[i], active);
+}
+
 void trc_world_evaluate(const struct trc_snapshot *snapshot, const float *directions,
                         float *radiance, uint32_t count) {
     const vuint path = vu_set(0);

@@ -10,6 +10,11 @@
 vvec3 trc_world_shade(const struct trc_snapshot *snapshot, vvec3 direction, vuint path,
                       vmask active);
 
+/* The same to rays by the lobes that send them: diffuse (translucent where it goes behind the
+ * surface), glossy, transmission. */
+void trc_world_shade_kinds(const struct trc_snapshot *snapshot, vvec3 direction, vmask behind,
+                           vmask active, vvec3 seen_out[3]);
+
 /* Runs the world's material, which there must be; the same arguments. */
 const struct trc_material *trc_world_run(const struct trc_snapshot *snapshot, vvec3 direction,
                                          vuint path, vmask active, struct trc_registers *regs);

@@ -164,5 +164,6 @@
 #define trc_world_radiance(...) TRC_KERNEL(trc_world_radiance)(__VA_ARGS__)
 #define trc_world_run(...) TRC_KERNEL(trc_world_run)(__VA_ARGS__)
 #define trc_world_shade(...) TRC_KERNEL(trc_world_shade)(__VA_ARGS__)
+#define trc_world_shade_kinds(...) TRC_KERNEL(trc_world_shade_kinds)(__VA_ARGS__)
 
 #endif

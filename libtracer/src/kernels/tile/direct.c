@@ -4,6 +4,7 @@
  * and L. Guibas 1995, power heuristic). */
 #include <stddef.h>
 
+#include "kernels/light/world.h"
 #include "kernels/tile/shade.h"
 #include "kernels/trace/mesh_fetch.h"
 #include "kernels/trace/spawn.h"
@@ -86,6 +87,21 @@ static vuint light_seen(const struct trc_tile *t, const struct trc_surface *s,
     return (vuint)vi_select(vm_and(behind, vi_eq(transmitted, vi_set(0))), vi_set(0), (vint)seen);
 }
 
+/* Replaces the light of lanes whose sample is of the world by what rays would find there. */
+static void world_light_by_kind(const struct arrival *a, const struct trc_surface *s,
+                                const struct trc_light_sample *l, vfloat scale, vmask active,
+                                vvec3 light[3]) {
+    const vint world = vi_set((int32_t)s->snapshot->lights->world_light);
+    const vmask m = vm_and(active, vi_eq(l->light, world));
+    const vmask behind = vf_lt(v3_dot(s->ng, l->wi), vf_set(0.0f));
+    vvec3 seen[3];
+    if (!vm_any(m))
+        return;
+    trc_world_shade_kinds(s->snapshot, l->wi, behind, m, seen);
+    for (int k = 0; k < 3; k++)
+        light[k] = v3_select(m, v3_mul(a->weight, v3_scale(seen[k], scale)), light[k]);
+}
+
 /* Contributions of the lanes' light samples, weighted; lanes that get nothing are dropped from
  * active. */
 static vmask light_contribute(const struct trc_tile *t, const struct arrival *a,
@@ -110,14 +126,19 @@ static vmask light_contribute(const struct trc_tile *t, const struct arrival *a,
         mis = vf_select(alone, one, zero);
     }
     const vfloat scale = one / (l->pdf * count);
-    const vvec3 light = v3_mul(a->weight, v3_scale(l->radiance, scale));
+    vvec3 light[3]; /* by what it is for: diffuse, glossy, transmission */
+    light[0] = light[1] = light[2] = v3_mul(a->weight, v3_scale(l->radiance, scale));
+    if (t->snapshot->lights->world_asks_rays)
+        world_light_by_kind(a, s, l, scale, active, light);
 #define SEEN(bit) vi_eq((vint)(seen & vu_set(bit)), vi_set(bit))
-    out->diffuse = v3_mul(
-        light, v3_scale(v3_select(SEEN(TRC_VISIBLE_DIFFUSE), f.diffuse, v3_zero()), mis_diffuse));
+    out->diffuse =
+        v3_mul(light[0],
+               v3_scale(v3_select(SEEN(TRC_VISIBLE_DIFFUSE), f.diffuse, v3_zero()), mis_diffuse));
     out->glossy =
-        v3_mul(light, v3_scale(v3_select(SEEN(TRC_VISIBLE_GLOSSY), f.glossy, v3_zero()), mis));
-    out->transmission = v3_mul(
-        light, v3_scale(v3_select(SEEN(TRC_VISIBLE_TRANSMISSION), f.transmission, v3_zero()), mis));
+        v3_mul(light[1], v3_scale(v3_select(SEEN(TRC_VISIBLE_GLOSSY), f.glossy, v3_zero()), mis));
+    out->transmission =
+        v3_mul(light[2],
+               v3_scale(v3_select(SEEN(TRC_VISIBLE_TRANSMISSION), f.transmission, v3_zero()), mis));
 #undef SEEN
     const vvec3 sum = v3_add(out->diffuse, v3_add(out->glossy, out->transmission));
     const vfloat size = v3_max(sum);
