@@ -171,11 +171,12 @@ WORLD_KINDS = ("Is Camera Ray", "Is Diffuse Ray", "Is Glossy Ray", "Is Reflectio
 LIT = {"diffuse": ("ShaderNodeBsdfDiffuse", {}), "glossy": ("ShaderNodeBsdfGlossy", {"Roughness": 0.4}),
        "translucent": ("ShaderNodeBsdfTranslucent", {}), "refraction": ("ShaderNodeBsdfRefraction", {"Roughness": 0.3})}
 WORLD_OFF = 0.003, 0.01  # of the mean
+VARIED_OFF = 0.05, 0.2   # both engines have densities of their own for light samples
 
 
-def inside_world(kind):
-    """{output: pictures by both} of a ball in an even world that is another to rays for which an output of Light
-    Path is 1."""
+def inside_world(kind, is_varied=False):
+    """{output: pictures by both} of a ball in an even world, or one that is brighter on one side, that is another to
+    rays for which an output of Light Path is 1."""
     import bpy
     import scenes
     scene = scenes.empty(size=(32, 24))
@@ -187,6 +188,10 @@ def inside_world(kind):
     nodes = {node.bl_idname: node for node in tree.nodes}
     other, asked, mix = (tree.nodes.new(f"ShaderNode{name}") for name in ("Background", "LightPath", "MixShader"))
     other.inputs["Color"].default_value = (1.0, 0.2, 0.1, 1.0)
+    if is_varied:
+        place, gradient = (tree.nodes.new(f"ShaderNode{name}") for name in ("TexCoord", "TexGradient"))
+        tree.links.new(place.outputs["Generated"], gradient.inputs["Vector"])
+        tree.links.new(gradient.outputs["Color"], nodes["ShaderNodeBackground"].inputs["Color"])
     tree.links.new(nodes["ShaderNodeBackground"].outputs[0], mix.inputs[1])
     tree.links.new(other.outputs[0], mix.inputs[2])
     tree.links.new(mix.outputs[0], nodes["ShaderNodeOutputWorld"].inputs["Surface"])
@@ -200,7 +205,17 @@ def inside_world(kind):
 @pytest.mark.parametrize("kind", LIT)
 def test_even_world(blender, kind):
     """Cycles has no light samples of it: what rays find is what they are told."""
-    for output, pictures in blender.run(inside_world, kind).items():
+    _expect_worlds(blender.run(inside_world, kind), WORLD_OFF)
+
+
+@pytest.mark.parametrize("kind", ("diffuse", "translucent"))
+def test_varied_world(blender, kind):
+    """Cycles' light samples are told of no ray, and matt surfaces have the rest by rays."""
+    _expect_worlds(blender.run(inside_world, kind, True), VARIED_OFF)
+
+
+def _expect_worlds(found, off):
+    for output, pictures in found.items():
         ours, theirs = (seeds[..., :3] for seeds in pictures)
-        assert all(error <= off * theirs.mean()
-                   for error, off in zip(compare.unexplained(ours, theirs), WORLD_OFF)), output
+        errors = compare.unexplained(ours, theirs)
+        assert all(error <= limit * theirs.mean() for error, limit in zip(errors, off)), output

@@ -181,8 +181,7 @@ struct trc_light_table {
     uint32_t *instance_triangles; /* per instance: how many of its triangles are lights */
     struct trc_world_map *map;    /* NULL: cosine or uniform sampling */
     uint32_t world_visibility;    /* of its light samples */
-    bool world_asks_rays; /* its light depends on the kind of ray, and Cycles has no samples of it:
-                             all that it lights is found by rays there */
+    bool world_asks_rays;         /* its light depends on the kind of ray */
 };
 
 #endif

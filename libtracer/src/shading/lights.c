@@ -230,7 +230,7 @@ static trc_status add_world(struct trc_light_table *table, const struct trc_snap
         trc_world_map_release(table->map);
         table->map = NULL;
     }
-    table->world_asks_rays = asks && !table->map;
+    table->world_asks_rays = asks;
     return TRC_OK;
 }
 

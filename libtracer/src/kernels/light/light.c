@@ -171,15 +171,16 @@ static void sample_triangles(const struct draw *d, vmask m) {
 static void sample_world(const struct draw *d, vmask m) {
     struct trc_place place =
         trc_world_sample(d->table, d->receiver.n, d->receiver.has_n, d->u1, d->u2, m);
-    if (d->table->world_asks_rays) { /* none of them must be lost */
+    /* No kind of ray: Cycles evaluates light samples without any either. */
+    place.radiance = trc_world_shade(d->scene, place.wi, vu_set(0), m);
+    if (d->table->world_asks_rays) { /* what rays of some kind see must not be lost */
         vvec3 seen[3];
         const vmask behind = vf_lt(v3_dot(d->s->ng, place.wi), vf_zero());
         trc_world_shade_kinds(d->scene, place.wi, behind, m, seen);
-        place.radiance = v3(vf_max(seen[0].x, vf_max(seen[1].x, seen[2].x)),
-                            vf_max(seen[0].y, vf_max(seen[1].y, seen[2].y)),
-                            vf_max(seen[0].z, vf_max(seen[1].z, seen[2].z)));
-    } else { /* no kind of ray: Cycles evaluates light samples without any either */
-        place.radiance = trc_world_shade(d->scene, place.wi, vu_set(0), m);
+        for (int k = 0; k < 3; k++)
+            place.radiance =
+                v3(vf_max(place.radiance.x, seen[k].x), vf_max(place.radiance.y, seen[k].y),
+                   vf_max(place.radiance.z, seen[k].z));
     }
     set_place(d, &place, m);
 }

@@ -87,17 +87,32 @@ static vuint light_seen(const struct trc_tile *t, const struct trc_surface *s,
     return (vuint)vi_select(vm_and(behind, vi_eq(transmitted, vi_set(0))), vi_set(0), (vint)seen);
 }
 
-/* Replaces the light of lanes whose sample is of the world by what rays would find there. */
+/* What the world's light is to diffuse, glossy and transmitted rays that go where samples of it do.
+ * Where Cycles has no samples, rays find it all. Else samples are told of no ray, and rays find the
+ * rest: those of matt lobes, which are not followed, by the densities of both there. */
+static void world_by_kind(const struct trc_surface *s, const struct trc_light_sample *l, vmask m,
+                          vvec3 seen[3]) {
+    const vmask behind = vf_lt(v3_dot(s->ng, l->wi), vf_set(0.0f));
+    trc_world_shade_kinds(s->snapshot, l->wi, behind, m, seen);
+    if (!s->snapshot->lights->map)
+        return;
+    const vfloat by_ray = vf_abs(v3_dot(s->n, l->wi)) * vf_set(TRC_INV_PI);
+    const vfloat pl2 = vf_square(l->pdf), pb2 = vf_square(by_ray);
+    const vvec3 sampled = trc_world_shade(s->snapshot, l->wi, vu_set(0), m);
+    seen[0] = v3_lerp(seen[0], sampled, vf_divide(pl2, pl2 + pb2));
+    seen[1] = seen[2] = sampled;
+}
+
+/* Replaces the light of lanes whose sample is of the world by that. */
 static void world_light_by_kind(const struct arrival *a, const struct trc_surface *s,
                                 const struct trc_light_sample *l, vfloat scale, vmask active,
                                 vvec3 light[3]) {
     const vint world = vi_set((int32_t)s->snapshot->lights->world_light);
     const vmask m = vm_and(active, vi_eq(l->light, world));
-    const vmask behind = vf_lt(v3_dot(s->ng, l->wi), vf_set(0.0f));
     vvec3 seen[3];
     if (!vm_any(m))
         return;
-    trc_world_shade_kinds(s->snapshot, l->wi, behind, m, seen);
+    world_by_kind(s, l, m, seen);
     for (int k = 0; k < 3; k++)
         light[k] = v3_select(m, v3_mul(a->weight, v3_scale(seen[k], scale)), light[k]);
 }
