@@ -111,6 +111,10 @@ TURNS_WINDOW_BUMPS = bpy.app.version >= (5, 0, 0)
 # Bumps of Normal coordinates see smooth surfaces turn; seen in 5.2, not in 4.3.
 CURVES_NORMAL_BUMPS = bpy.app.version >= (5, 0, 0)
 
+# Cycles asks for attributes as geometry nodes do: of all types of numbers, vertex groups among them, and those of
+# edges by Blender's own means; seen in 4.3, not in 3.4.
+HAS_BLENDERS_ATTRIBUTES = bpy.app.version >= (4, 1, 0)
+
 # The Color Attribute node makes no bumps, other than the Attribute node; seen in 5.2, not in 4.3.
 LEVELS_COLOR_BUMPS = bpy.app.version >= (5, 0, 0)
 

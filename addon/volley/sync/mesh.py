@@ -15,6 +15,7 @@ import numpy as np
 
 from .. import abi, native
 from . import derived, tangents
+from .attribute_values import colors_at_vertices, colors_of, widen
 
 _HAS_UNDEFORMED = "undeformed_co" in bpy.types.MeshVertex.bl_rna.properties
 # Blender's interface holds corners' vertices and triangles for unsigned; reading them as signed takes some
@@ -355,7 +356,7 @@ def _colors(mesh, data, names, loops):
         elif name in layers:
             values = _tangents(mesh, data, layers[name], loops)
         elif source in _DERIVED:
-            values = _widen(_DERIVED[source](mesh)[:, None])[_corner_vertices(mesh)[loops.of_triangles]]
+            values = widen(_DERIVED[source](mesh)[:, None])[_corner_vertices(mesh)[loops.of_triangles]]
         elif source:
             values = _attribute_values(mesh, source, loops)
         if values is not None:
@@ -379,43 +380,26 @@ _DERIVED = {  # attributes that Blender does not have: (vertices,) float32 of a 
         read_positions(mesh), vertex_normals(mesh), _edges(mesh)),
     derived.ISLAND: lambda mesh: derived.island_numbers(len(mesh.vertices), _edges(mesh))}
 
-_WIDTHS = {'FLOAT_COLOR': ("color", 4), 'BYTE_COLOR': ("color", 4), 'FLOAT_VECTOR': ("vector", 3),
-           'FLOAT2': ("vector", 2), 'FLOAT': ("value", 1), 'INT': ("value", 1)}
-
 
 def _attribute_values(mesh, name, loops):
     """Any attribute as (triangles * 3, 4) float32, None if it is missing or of an odd type."""
-    if name in mesh.uv_layers:
-        return _widen(_uv_values(mesh.uv_layers[name], len(mesh.loops)))[loops.of_triangles]
-    attribute = mesh.attributes.get(name)
-    values = None if attribute is None else attribute_colors(attribute)
+    domain, values = _items_of(mesh, name)
     if values is None:
         return None
-    if attribute.domain == 'CORNER':
+    if domain == 'CORNER':
         return values[loops.of_triangles]
-    if attribute.domain == 'POINT':
+    if domain == 'POINT':
         return values[_corner_vertices(mesh)[loops.of_triangles]]
-    if attribute.domain == 'FACE':
-        return values[np.repeat(loops.polygons, 3)]
-    return None
+    return values[np.repeat(loops.polygons, 3)]
 
 
-def attribute_colors(attribute):
-    """(items, 4) float32 of an attribute of any domain, None if it is of an odd type."""
-    if attribute.data_type not in _WIDTHS:
-        return None
-    field_name, width = _WIDTHS[attribute.data_type]
-    dtype = np.int32 if attribute.data_type == 'INT' else np.float32
-    values = _read(attribute.data, field_name, (len(attribute.data), width), dtype)
-    return _widen(values.astype(np.float32, copy=False))
-
-
-def _widen(values):
-    """1 to 4 components as a colour: a number is grey, what is missing is 0, alpha 1."""
-    width = values.shape[1]
-    if width == 4:
-        return values
-    rgba = np.zeros((len(values), 4), np.float32)
-    rgba[:, 3] = 1.0
-    rgba[:, :3 if width == 1 else width] = values
-    return rgba
+def _items_of(mesh, name):
+    """Any attribute as its domain, 'CORNER', 'POINT' or 'FACE', and (items, 4) float32, None as above."""
+    if name in mesh.uv_layers:
+        return 'CORNER', widen(_uv_values(mesh.uv_layers[name], len(mesh.loops)))
+    attribute = mesh.attributes.get(name)
+    if attribute is None:
+        return 'POINT', None
+    if attribute.domain == 'EDGE':
+        return 'POINT', colors_at_vertices(attribute, _edges(mesh), len(mesh.vertices))
+    return attribute.domain, colors_of(attribute)

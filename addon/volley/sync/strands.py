@@ -9,7 +9,8 @@ import numpy as np
 from .. import abi
 from ..compat import PARTICLE_HAIR_HAS_NORMALS, VECTORS_ARE_BUFFERS
 from . import curves
-from .mesh import active_color_name, attribute_colors, wanted_uv_layers
+from .attribute_values import colors_of, linear
+from .mesh import active_color_name, wanted_uv_layers
 
 HAIR_ATTRIBUTE = ".hair"  # (intercept, length, thickness, random) of the Hair Info node
 DIRECTION_ATTRIBUTE = ".strand"  # (x, y, z) along the strand, unit, and 1
@@ -179,8 +180,8 @@ def _root_values(mesh, modifier, strands, uv_names, color_names):
         number = colors.find(source)
         if number >= 0:
             values = np.ones((len(strands), 4), np.float32)
-            values[:, :3] = _linear(_at_roots(modifier.particle_system.mcol_on_emitter, modifier, strands,
-                                              vcol_no=number))
+            values[:, :3] = linear(_at_roots(modifier.particle_system.mcol_on_emitter, modifier, strands,
+                                             vcol_no=number))
             found.append((name, values, True))
     return found
 
@@ -203,15 +204,10 @@ def _object_values(data, uv_names, color_names):
         found.append((NORMAL_ATTRIBUTE, rows, False))
     for name in sorted(color_names):
         attribute = data.attributes.get(name)
-        values = None if attribute is None else attribute_colors(attribute)
+        values = None if attribute is None else colors_of(attribute)
         if values is not None and all(name != known for known, _, _ in found):
             found.append((name, values, attribute.domain == 'CURVE'))
     return found
-
-
-def _linear(values):
-    """sRGB-encoded colours, which is how Blender tells those of roots, as scene-linear ones."""
-    return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
 
 
 def _at_roots(read, modifier, strands, **layer):

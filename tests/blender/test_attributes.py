@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Attributes of meshes and points beside Cycles': every type on every domain, each shown by an emission, one sample
+for each pixel."""
+
+import numpy as np
+
+CELL = 32          # pixels of a case, along either side
+COLUMNS = 6
+TOLERANCE = 5e-3   # 0.01 of a pixel of the steepest
+SHARE_WITHIN = 0.98  # of a case's pixels; its outline may fall on either side
+
+
+# Inside Blender ------------------------------------------------------------------------------------
+
+def _grid(name):
+    """A square of 3 x 3 faces that faces -Y, of 0.9 along its sides."""
+    import scenes
+    places = [(0.3 * x - 0.45, 0.0, 0.3 * z - 0.45) for z in range(4) for x in range(4)]
+    return scenes.mesh(name, places, [(i, i + 1, i + 5, i + 4) for i in range(11) if i % 4 != 3])
+
+
+def _fill(attribute, random):
+    """Give an attribute values, those of rotations of unit length."""
+    count, kind = len(attribute.data), attribute.data_type
+    fields = {'BYTE_COLOR': ("color", 4), 'FLOAT_COLOR': ("color", 4), 'FLOAT_VECTOR': ("vector", 3),
+              'FLOAT2': ("vector", 2), 'QUATERNION': ("value", 4)}
+    field, width = fields.get(kind, ("value", 1))
+    values = random.random((count, width))
+    if kind in {'INT', 'INT8', 'BOOLEAN'}:
+        values = np.floor(values * (2 if kind == 'BOOLEAN' else 4))
+    if kind == 'QUATERNION':
+        values /= np.linalg.norm(values, axis=1, keepdims=True)
+    for item, value in zip(attribute.data, values.tolist()):
+        plain = {'BOOLEAN': bool, 'INT': int, 'INT8': int}.get(kind, float)(value[0])
+        setattr(item, field, plain if width == 1 else value)
+
+
+def _shining(output, **settings):
+    """A material that shines with what an Attribute node gives, 0.1 added."""
+    import scenes
+    made = scenes.emitter((0.0, 0.0, 0.0), output)
+    tree = made.node_tree
+    node, shown = tree.nodes.new("ShaderNodeAttribute"), tree.nodes.new("ShaderNodeVectorMath")
+    for name, value in settings.items():
+        setattr(node, name, value)
+    shown.operation, shown.inputs[1].default_value = 'ADD', (0.1, 0.1, 0.1)
+    tree.links.new(node.outputs[output], shown.inputs[0])
+    tree.links.new(shown.outputs[0], scenes.shader_of(made).inputs["Color"])
+    return made
+
+
+def _pictures_of(owners):
+    """{case: [by Volley, by Cycles]} of objects {case: object}, which are put side by side."""
+    import scenes
+    rows = -(-len(owners) // COLUMNS)
+    scene = scenes.bpy.context.scene
+    scene.render.resolution_x, scene.render.resolution_y = COLUMNS * CELL, rows * CELL
+    scenes.camera(location=(0.0, -6.0, 0.0), type='ORTHO', ortho_scale=float(max(COLUMNS, rows)))
+    scenes.sharpen()
+    for number, owner in enumerate(owners.values()):
+        owner.location = (number % COLUMNS - 0.5 * (COLUMNS - 1), 0.0, number // COLUMNS - 0.5 * (rows - 1))
+    pictures = scenes.by_both(1)
+    return {case: [picture[number // COLUMNS * CELL:, number % COLUMNS * CELL:][:CELL, :CELL, :3]
+                   for picture in pictures] for number, case in enumerate(owners)}
+
+
+def inside_types():
+    """Pictures of every type on every domain."""
+    import bpy
+    import scenes
+    scenes.empty()
+    random, owners = np.random.default_rng(7), {}
+    material = _shining("Color", attribute_name="at")
+    known = {item.identifier for item in bpy.types.Attribute.bl_rna.properties["data_type"].enum_items}
+    for kind in ('FLOAT', 'INT', 'INT8', 'BOOLEAN', 'FLOAT_VECTOR', 'FLOAT2', 'FLOAT_COLOR', 'BYTE_COLOR',
+                 'QUATERNION'):
+        for domain in ('POINT', 'EDGE', 'FACE', 'CORNER') if kind in known else ():
+            made = _grid(f"{kind} {domain}")
+            _fill(made.data.attributes.new("at", kind, domain), random)
+            made.data.materials.append(material)
+            owners[made.name] = made
+    return _pictures_of(owners)
+
+
+def inside_points():
+    """Pictures of numbers and switches of a cloud's points."""
+    import scenes
+    scenes.empty()
+    owners = {}
+    for kind in ('FLOAT', 'BOOLEAN'):
+        made = owners[f"points' {kind}"] = _grid(kind)
+        points, store, assign = scenes.geometry_nodes(made, "GeometryNodeMeshToPoints",
+                                                      "GeometryNodeStoreNamedAttribute", "GeometryNodeSetMaterial")
+        points.inputs["Radius"].default_value = 0.12
+        store.data_type, store.domain, store.inputs["Name"].default_value = kind, 'POINT', "at"
+        group = store.id_data
+        random = group.nodes.new("FunctionNodeRandomValue")
+        random.data_type = kind
+        value = next(socket for socket in random.outputs if socket.enabled)
+        group.links.new(value, next(each for each in store.inputs if each.name == "Value" and each.enabled))
+        assign.inputs["Material"].default_value = _shining("Color", attribute_name="at")
+    return _pictures_of(owners)
+
+
+# Comparison ----------------------------------------------------------------------------------------
+
+def _compare(pictures, shows_nothing=()):
+    """Hold each case to Cycles; all but some are more than one colour there."""
+    lines = []
+    for case, (ours, theirs) in pictures.items():
+        beyond = (np.abs(ours - theirs) > TOLERANCE).any(axis=-1).mean()
+        lines.append(f"{case:24} {ours.mean():.4f} {theirs.mean():.4f} {beyond:.2%}")
+    print("\n".join(lines))
+    for line, (case, (_, theirs)) in zip(lines, pictures.items()):
+        inner = theirs[CELL // 4:-CELL // 4, CELL // 4:-CELL // 4]
+        assert case in shows_nothing or inner.std() > 0.01, f"shows nothing: {line}"
+        assert float(line.split()[-1][:-1]) <= 100.0 * (1.0 - SHARE_WITHIN), line
+
+
+def test_types(blender):
+    import blender as blender_support
+    pictures = blender.run(inside_types)
+    assert len(pictures) >= 32
+    has_no_bytes = blender_support.version() < (4, 1)
+    _compare(pictures, [case for case in pictures if has_no_bytes and case.startswith("INT8")])
+
+
+def test_points(blender):
+    _compare(blender.run(inside_points))
