@@ -2,8 +2,10 @@
 """Attributes of meshes and points beside Cycles': every type on every domain, each shown by an emission, one sample
 for each pixel."""
 
+import blender as blender_support
 import numpy as np
 
+IS_OLD = blender_support.version() < (4, 1)  # Cycles reads neither small integers nor vertex groups
 CELL = 32          # pixels of a case, along either side
 COLUMNS = 6
 TOLERANCE = 5e-3   # 0.01 of a pixel of the steepest
@@ -102,6 +104,24 @@ def inside_points():
     return _pictures_of(owners)
 
 
+def inside_groups():
+    """Pictures of vertex groups, of meshes and of what modifiers make of them."""
+    import scenes
+    scenes.empty()
+    owners = {}
+    material = _shining("Color", attribute_name="at")
+    for number, name in enumerate(("of a mesh", "subdivided", "solid")):
+        made = owners[name] = _grid(name)
+        made.vertex_groups.new(name="other").add(range(16), 0.9, 'REPLACE')
+        group = made.vertex_groups.new(name="at")
+        for vertex in (0, 5, 6, 10, 11, 13):
+            group.add((vertex,), 0.1 * (number + 1) + 0.05 * vertex, 'REPLACE')
+        made.data.materials.append(material)
+    owners["subdivided"].modifiers.new("Subdivision", 'SUBSURF')
+    owners["solid"].modifiers.new("Solidify", 'SOLIDIFY').thickness = 0.1
+    return _pictures_of(owners)
+
+
 # Comparison ----------------------------------------------------------------------------------------
 
 def _compare(pictures, shows_nothing=()):
@@ -118,12 +138,15 @@ def _compare(pictures, shows_nothing=()):
 
 
 def test_types(blender):
-    import blender as blender_support
     pictures = blender.run(inside_types)
     assert len(pictures) >= 32
-    has_no_bytes = blender_support.version() < (4, 1)
-    _compare(pictures, [case for case in pictures if has_no_bytes and case.startswith("INT8")])
+    _compare(pictures, [case for case in pictures if IS_OLD and case.startswith("INT8")])
 
 
 def test_points(blender):
     _compare(blender.run(inside_points))
+
+
+def test_vertex_groups(blender):
+    pictures = blender.run(inside_groups)
+    _compare(pictures, pictures if IS_OLD else ())

@@ -44,6 +44,21 @@ def linear(values):
     return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
 
 
+def group_names(blender_object):
+    """Names of the vertex groups that Cycles takes for attributes of an evaluated object's mesh, by their number."""
+    return [group.name for group in blender_object.vertex_groups] if HAS_BLENDERS_ATTRIBUTES else []
+
+
+def group_colors(mesh, number):
+    """(vertices, 4) float32: the weights of a mesh's vertices in a vertex group; 0 of those outside."""
+    weights = np.zeros((len(mesh.vertices), 1), np.float32)
+    for index, vertex in enumerate(mesh.vertices):  # Blender gives them one by one alone
+        for element in vertex.groups:
+            if element.group == number:
+                weights[index] = element.weight
+    return widen(weights)
+
+
 # From edges to vertices ----------------------------------------------------------------------------
 
 def colors_at_vertices(attribute, edges, vertex_count):

@@ -15,7 +15,7 @@ import numpy as np
 
 from .. import abi, native
 from . import derived, tangents
-from .attribute_values import colors_at_vertices, colors_of, widen
+from .attribute_values import colors_at_vertices, colors_of, group_colors, widen
 
 _HAS_UNDEFORMED = "undeformed_co" in bpy.types.MeshVertex.bl_rna.properties
 # Blender's interface holds corners' vertices and triangles for unsigned; reading them as signed takes some
@@ -85,9 +85,9 @@ def is_sculpted_multires(blender_object):
                for modifier in blender_object.modifiers if modifier.type == 'MULTIRES')
 
 
-def extract(mesh, uv_names=(), color_names=(), material_count=1):
-    """A Blender mesh as MeshData, None when it has no triangle. Only the named attributes are taken;
-    with one material, slots are left out."""
+def extract(mesh, uv_names=(), color_names=(), material_count=1, group_names=()):
+    """A Blender mesh as MeshData, None when it has no triangle. Only the named attributes are taken, vertex groups
+    of group_names among them; with one material, slots are left out."""
     mesh.calc_loop_triangles()
     triangle_count = len(mesh.loop_triangles)
     if triangle_count == 0:
@@ -98,7 +98,7 @@ def extract(mesh, uv_names=(), color_names=(), material_count=1):
     if material_count > 1:
         data.material_index = _material_index(mesh, loops)
     read_normals(mesh, data, loops)
-    data.attributes = _uv_maps(mesh, uv_names, loops) + _colors(mesh, data, color_names, loops)
+    data.attributes = _uv_maps(mesh, uv_names, loops) + _colors(mesh, data, color_names, loops, group_names)
     del data.attributes[abi.MAX_ATTRIBUTES:]
     return data
 
@@ -344,7 +344,7 @@ def _normals_of_corners(data):
     return np.where(data.smooth[:, None, None], data.normals[data.indices], flat)
 
 
-def _colors(mesh, data, names, loops):
+def _colors(mesh, data, names, loops, group_names):
     """The named attributes as colours per triangle corner; "" is the active colour attribute. It comes
     first, black where there is none, as the first is the library's default."""
     found, layers = [], _tangent_layers(mesh, names)
@@ -358,7 +358,7 @@ def _colors(mesh, data, names, loops):
         elif source in _DERIVED:
             values = widen(_DERIVED[source](mesh)[:, None])[_corner_vertices(mesh)[loops.of_triangles]]
         elif source:
-            values = _attribute_values(mesh, source, loops)
+            values = _attribute_values(mesh, source, loops, group_names)
         if values is not None:
             found.append((name, values))
     return found
@@ -381,9 +381,9 @@ _DERIVED = {  # attributes that Blender does not have: (vertices,) float32 of a 
     derived.ISLAND: lambda mesh: derived.island_numbers(len(mesh.vertices), _edges(mesh))}
 
 
-def _attribute_values(mesh, name, loops):
-    """Any attribute as (triangles * 3, 4) float32, None if it is missing or of an odd type."""
-    domain, values = _items_of(mesh, name)
+def _attribute_values(mesh, name, loops, group_names):
+    """Any attribute or vertex group as (triangles * 3, 4) float32, None if it is missing or of an odd type."""
+    domain, values = _items_of(mesh, name, group_names)
     if values is None:
         return None
     if domain == 'CORNER':
@@ -393,13 +393,13 @@ def _attribute_values(mesh, name, loops):
     return values[np.repeat(loops.polygons, 3)]
 
 
-def _items_of(mesh, name):
-    """Any attribute as its domain, 'CORNER', 'POINT' or 'FACE', and (items, 4) float32, None as above."""
+def _items_of(mesh, name, group_names):
+    """The same as its domain, 'CORNER', 'POINT' or 'FACE', and (items, 4) float32, None as above."""
     if name in mesh.uv_layers:
         return 'CORNER', widen(_uv_values(mesh.uv_layers[name], len(mesh.loops)))
     attribute = mesh.attributes.get(name)
     if attribute is None:
-        return 'POINT', None
+        return 'POINT', group_colors(mesh, group_names.index(name)) if name in group_names else None
     if attribute.domain == 'EDGE':
         return 'POINT', colors_at_vertices(attribute, _edges(mesh), len(mesh.vertices))
     return attribute.domain, colors_of(attribute)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import bpy
 
 from ..abi import InstanceFlags
-from . import curves, deform, instance, light, mesh, motion, strands, visibility
+from . import attribute_values, curves, deform, instance, light, mesh, motion, strands, visibility
 from .changes import Changes
 from .kept import Circumstances, Kept
 from .linking import Links
@@ -309,7 +309,7 @@ class Walk:
         dicing = self._source.dicing
         cage = dicing and dicing.cage_of(each)
         shape = cage or shape
-        data = mesh.extract(shape, *names[:2], slot_count)
+        data = mesh.extract(shape, *names[:2], slot_count, attribute_values.group_names(blender_object))
         if data is None:
             return None, None
         if names[2]:
