@@ -122,6 +122,37 @@ def inside_groups():
     return _pictures_of(owners)
 
 
+# What Attribute nodes show: type and domain of the attribute, its name in the node, output.
+OUTPUTS = (
+    ('FLOAT2', 'POINT', "at", "Fac"), ('FLOAT2', 'EDGE', "at", "Fac"), ('FLOAT_VECTOR', 'FACE', "at", "Fac"),
+    ('FLOAT_COLOR', 'CORNER', "at", "Fac"), ('FLOAT', 'FACE', "UVMap", "Fac"), ('FLOAT', 'FACE', "UVMap", "Alpha"),
+    ('FLOAT_COLOR', 'POINT', "at", "Alpha"), ('BYTE_COLOR', 'FACE', "at", "Alpha"),
+    ('BYTE_COLOR', 'EDGE', "at", "Alpha"), ('FLOAT', 'POINT', "at", "Alpha"), ('FLOAT', 'POINT', "nowhere", "Alpha"),
+    ('FLOAT', 'POINT', "nowhere", "Color"), ('FLOAT', 'POINT', "", "Color"), ('FLOAT', 'POINT', "", "Vector"),
+    ('FLOAT', 'POINT', "", "Fac"), ('FLOAT', 'POINT', "", "Alpha"))
+
+
+def inside_outputs():
+    """Pictures of what the outputs of Attribute nodes give, and the warnings."""
+    import scenes
+    import volley.session
+    scenes.empty()
+    told = []
+    volley.session.report_warning = lambda _engine, message: told.append(message)
+    random, owners = np.random.default_rng(11), {}
+    for kind, domain, name, output in OUTPUTS:
+        case = f"{kind} {domain} '{name}' {output}"
+        made = owners[case] = _grid(case)
+        _fill(made.data.attributes.new("at", kind, domain), random)
+        for item in made.data.uv_layers.new(name="UVMap").data:
+            item.uv = random.random(2)
+        made.data.materials.append(_shining(output, attribute_name=name))
+    for kind in ('OBJECT', 'INSTANCER', 'VIEW_LAYER'):
+        made = owners[f"{kind} ''"] = _grid(kind)
+        made.data.materials.append(_shining("Color", attribute_name="", attribute_type=kind))
+    return _pictures_of(owners), told
+
+
 # Comparison ----------------------------------------------------------------------------------------
 
 def _compare(pictures, shows_nothing=()):
@@ -150,3 +181,11 @@ def test_points(blender):
 def test_vertex_groups(blender):
     pictures = blender.run(inside_groups)
     _compare(pictures, pictures if IS_OLD else ())
+
+
+def test_outputs(blender):
+    pictures, told = blender.run(inside_outputs)
+    of_one_colour = [case for case in pictures if "''" in case or "nowhere" in case
+                     or case.startswith("FLOAT ") and case.endswith("Alpha")]
+    _compare(pictures, of_one_colour)
+    assert told == []

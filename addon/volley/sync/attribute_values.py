@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Attributes of meshes, curves and points as colours, as Cycles reads Blender's."""
 
+import zlib
+
 import numpy as np
 
 from ..compat import HAS_BLENDERS_ATTRIBUTES
@@ -43,6 +45,44 @@ def linear(values):
     """Colours encoded by sRGB as scene-linear ones."""
     return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
 
+
+# What Attribute nodes make of them -----------------------------------------------------------------
+
+def lack_name(name):
+    """The library's attribute for what the alpha of an attribute lacks of 1, as a missing one's is 1."""
+    return f".lack {zlib.crc32(name.encode()):08x}"
+
+
+def excess_name(name):
+    """The library's attribute for how far the number of an attribute is above the mean of its colour: of two
+    components, the first one counts."""
+    return f".excess {zlib.crc32(name.encode()):08x}"
+
+
+def named_colors(name, names, read, is_pair):
+    """The colours of an attribute, read(name), None for none. The name may also be one that lack_name or excess_name
+    made of another of names: None where that is 0 all over. is_pair(name): whether it has two components."""
+    for source in names:
+        if name == lack_name(source):
+            values = read(source)
+            return None if values is None else _grey(1.0 - values[:, 3:])
+        if name == excess_name(source):
+            values = read(source) if is_pair(source) else None
+            return None if values is None else _grey(values[:, :1] - values[:, :3].mean(axis=1, keepdims=True))
+    return read(name)
+
+
+def _grey(values):
+    return widen(values) if values.any() else None
+
+
+def is_pair(attributes, name):
+    """Whether the attribute of that name is there and has two components."""
+    attribute = attributes.get(name)
+    return attribute is not None and attribute.data_type == 'FLOAT2'
+
+
+# Vertex groups -------------------------------------------------------------------------------------
 
 def group_names(blender_object):
     """Names of the vertex groups that Cycles takes for attributes of an evaluated object's mesh, by their number."""

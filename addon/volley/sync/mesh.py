@@ -15,7 +15,7 @@ import numpy as np
 
 from .. import abi, native
 from . import derived, tangents
-from .attribute_values import colors_at_vertices, colors_of, group_colors, widen
+from .attribute_values import colors_at_vertices, colors_of, group_colors, is_pair, named_colors, widen
 
 _HAS_UNDEFORMED = "undeformed_co" in bpy.types.MeshVertex.bl_rna.properties
 # Blender's interface holds corners' vertices and triangles for unsigned; reading them as signed takes some
@@ -358,7 +358,8 @@ def _colors(mesh, data, names, loops, group_names):
         elif source in _DERIVED:
             values = widen(_DERIVED[source](mesh)[:, None])[_corner_vertices(mesh)[loops.of_triangles]]
         elif source:
-            values = _attribute_values(mesh, source, loops, group_names)
+            values = named_colors(source, names, lambda each: _attribute_values(mesh, each, loops, group_names),
+                                  lambda each: each in mesh.uv_layers or is_pair(mesh.attributes, each))
         if values is not None:
             found.append((name, values))
     return found

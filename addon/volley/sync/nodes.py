@@ -19,6 +19,7 @@ from ..compat import (CURVES_NORMAL_BUMPS, HAS_CORRELATED_MICROFACETS, HAS_FILME
                       HAS_UNIT_NORMALS, HAS_WHOLE_COAT, KEEPS_DIFFUSE_ENERGY, LEAVES_BUMPS, LEVELS_COLOR_BUMPS,
                       RAMP_STEPS, SCALES_NORMAL_MAPS, TURNS_WINDOW_BUMPS)
 from . import tangents
+from .attribute_values import excess_name, lack_name
 from .converters import CONVERTERS, instance_value, strand_normal, strand_radius, strand_random
 from .derived import ISLAND, POINTINESS
 from .image import image_color
@@ -517,21 +518,44 @@ def _color_attribute(walker, node, _sockets):
 
 def _attribute(walker, node, _sockets):
     """An attribute of any type as a colour, whose mean is its number: of the mesh, or of the object, what
-    made the instance or the view layer."""
+    made the instance or the view layer. Without a name it is black."""
+    is_of_mesh, excess = node.attribute_type == 'GEOMETRY', None
     if not node.attribute_name:
-        return None
-    if node.attribute_type == 'GEOMETRY':
-        walker.flat.color_names.add(node.attribute_name)
-        index = walker.emit(NodeType.COLOR_ATTRIBUTE, (), name=node.attribute_name)
-        outputs = named_outputs(index, NodeType.COLOR_ATTRIBUTE, ("Color", "Alpha"))
+        color, alpha = _constant('c', 0.0), _constant('f', float(is_of_mesh))
+    elif is_of_mesh:
+        color, alpha, excess = _mesh_attribute(walker, node)
     else:
         values = walker.attributes and walker.attributes.read(walker, node.attribute_type, node.attribute_name)
         if not values:
             return None
-        outputs = dict(zip(("Color", "Alpha"), values))
-    outputs["Vector"] = outputs["Color"]._replace(kind='v')
-    outputs["Fac"] = walker.convert(outputs["Vector"], 'f')
-    return outputs
+        color, alpha = values
+    vector = color._replace(kind='v')
+    number = walker.convert(vector, 'f')
+    if excess is not None:
+        number = _number(walker, Math.ADD, number, excess)
+    return {"Color": color, "Vector": vector, "Fac": number, "Alpha": alpha}
+
+
+def _mesh_attribute(walker, node):
+    """The colour of a mesh's attribute, its alpha, and how far its number is above the mean of the colour, None
+    where nobody asks."""
+    name, alpha, excess = node.attribute_name, _constant('f', 1.0), None
+    if node.outputs["Alpha"].is_linked:
+        alpha = _number(walker, Math.SUBTRACT, alpha, _attribute_number(walker, lack_name(name)))
+    if node.outputs["Fac"].is_linked:
+        excess = _attribute_number(walker, excess_name(name))
+    return _attribute_color(walker, name), alpha, excess
+
+
+def _attribute_color(walker, name):
+    """The colour of an attribute that meshes have to bring."""
+    walker.flat.color_names.add(name)
+    return Value('c', walker.emit(NodeType.COLOR_ATTRIBUTE, (), name=name), 0)
+
+
+def _attribute_number(walker, name):
+    """The same of a grey one, as a number."""
+    return Value('f', walker.emit(NodeType.SEPARATE, (_attribute_color(walker, name),)), 0)
 
 
 def _math(walker, node, sockets):

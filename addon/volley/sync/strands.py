@@ -9,7 +9,7 @@ import numpy as np
 from .. import abi
 from ..compat import PARTICLE_HAIR_HAS_NORMALS, VECTORS_ARE_BUFFERS
 from . import curves
-from .attribute_values import colors_of, linear
+from .attribute_values import colors_of, is_pair, linear, named_colors
 from .mesh import active_color_name, wanted_uv_layers
 
 HAIR_ATTRIBUTE = ".hair"  # (intercept, length, thickness, random) of the Hair Info node
@@ -203,11 +203,17 @@ def _object_values(data, uv_names, color_names):
         rows[:, :3] = normals
         found.append((NORMAL_ATTRIBUTE, rows, False))
     for name in sorted(color_names):
-        attribute = data.attributes.get(name)
-        values = None if attribute is None else colors_of(attribute)
+        values = named_colors(name, color_names, lambda each: _colors(data, each),
+                              lambda each: is_pair(data.attributes, each))
         if values is not None and all(name != known for known, _, _ in found):
-            found.append((name, values, attribute.domain == 'CURVE'))
+            found.append((name, values, len(values) != len(data.points)))  # where both are as many, it is one
     return found
+
+
+def _colors(data, name):
+    """Colours of an attribute of Curves or a Point Cloud, None if it is missing or of an odd type."""
+    attribute = data.attributes.get(name)
+    return None if attribute is None else colors_of(attribute)
 
 
 def _at_roots(read, modifier, strands, **layer):
