@@ -122,6 +122,34 @@ def inside_groups():
     return _pictures_of(owners)
 
 
+def inside_many():
+    """The warnings of renders of meshes and clouds whose materials read eight attributes and ten."""
+    import scenes
+    import volley.session
+    told = {}
+    for count in (8, 10):
+        for kind in ("mesh", "cloud"):
+            scenes.empty()
+            scenes.camera(location=(0.0, -6.0, 0.0))
+            made, lines = _grid("Grid"), told.setdefault(f"{kind}, {count}", [])
+            volley.session.report_warning = lambda _engine, message, lines=lines: lines.append(message)
+            material = scenes.emitter((1.0, 1.0, 1.0))
+            tree, shown = material.node_tree, scenes.shader_of(material).inputs["Color"]
+            for number in range(count):
+                made.data.attributes.new(f"at{number}", 'FLOAT', 'POINT')
+                node, add = tree.nodes.new("ShaderNodeAttribute"), tree.nodes.new("ShaderNodeVectorMath")
+                node.attribute_name = f"at{number}"
+                tree.links.new(node.outputs["Color"], add.inputs[0])
+                tree.links.new(add.outputs[0], shown)
+                shown = add.inputs[1]
+            made.data.materials.append(material)
+            if kind == "cloud":
+                _, assign = scenes.geometry_nodes(made, "GeometryNodeMeshToPoints", "GeometryNodeSetMaterial")
+                assign.inputs["Material"].default_value = material
+            scenes.render()
+    return told
+
+
 # What Attribute nodes show: type and domain of the attribute, its name in the node, output.
 OUTPUTS = (
     ('FLOAT2', 'POINT', "at", "Fac"), ('FLOAT2', 'EDGE', "at", "Fac"), ('FLOAT_VECTOR', 'FACE', "at", "Fac"),
@@ -189,3 +217,11 @@ def test_outputs(blender):
                      or case.startswith("FLOAT ") and case.endswith("Alpha")]
     _compare(pictures, of_one_colour)
     assert told == []
+
+
+def test_those_without_room_are_named(blender):
+    told = blender.run(inside_many)
+    for kind in ("mesh", "cloud"):
+        assert not any("attributes" in line for line in told[f"{kind}, 8"]), told
+        assert [line for line in told[f"{kind}, 10"] if "attributes" in line] == [
+            "Object 'Grid': has more than 8 attributes that materials read, without 'at8', 'at9'"], told

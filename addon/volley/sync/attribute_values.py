@@ -59,6 +59,9 @@ def excess_name(name):
     return f".excess {zlib.crc32(name.encode()):08x}"
 
 
+_SPOKEN = ((".tangent ", "tangents of a UV map"), (".lack ", "an alpha"), (".excess ", "a number of two"))
+
+
 def named_colors(name, names, read, is_pair):
     """The colours of an attribute, read(name), None for none. The name may also be one that lack_name or excess_name
     made of another of names: None where that is 0 all over. is_pair(name): whether it has two components."""
@@ -74,6 +77,12 @@ def named_colors(name, names, read, is_pair):
 
 def _grey(values):
     return widen(values) if values.any() else None
+
+
+def spoken(names):
+    """The library's names of attributes for a message."""
+    known = (next((text for prefix, text in _SPOKEN if name.startswith(prefix)), f"'{name}'") for name in names)
+    return ", ".join(dict.fromkeys(known))
 
 
 def is_pair(attributes, name):

@@ -126,6 +126,7 @@ class CurvesData:
     shape: int = abi.CurveShape.RIBBON
     pieces: int = 1
     attributes: list = field(default_factory=list)  # (name, (keys | strands, 2 | 4) float32, whether of strands)
+    left_out: list = field(default_factory=list)    # names of attributes that there is no room for
     generated: np.ndarray = None      # (strands, 3) float32
     normals = corners = poses = dicing = diced_by = None
     normal_kind = abi.NormalsLayout.NONE
@@ -147,13 +148,14 @@ class CurvesData:
 
 
 def curves_of(strands, wanted, values=(), generated=None):
-    """Strands or points as CurvesData; values: (name, (keys | strands, 2 | 4), whether of strands)."""
+    """Strands or points as CurvesData; values: (name, (keys | strands, 2 | 4), whether of strands), of which as many
+    are taken as there is room for."""
     lengths = None if strands.lengths is None else strands.lengths.astype(np.uint32)
     shape = wanted.shape
     if lengths is None:
         shape = abi.CurveShape.BALL if HAS_ROUND_BALLS else abi.CurveShape.HOLLOW_BALL
-    return CurvesData(strands.points(), lengths, shape, wanted.pieces,
-                      list(values)[:abi.MAX_ATTRIBUTES], generated)
+    return CurvesData(strands.points(), lengths, shape, wanted.pieces, list(values)[:abi.MAX_ATTRIBUTES],
+                      [name for name, *_ in values[abi.MAX_ATTRIBUTES:]], generated)
 
 
 class StrandMotion(KeyedShapes):

@@ -34,6 +34,7 @@ class MeshData:
     smooth: np.ndarray = None         # (triangles,) uint8
     material_index: np.ndarray = None  # (triangles,) uint16
     attributes: list = field(default_factory=list)  # (name, (triangles * 3, 2 | 4) float32)
+    left_out: list = field(default_factory=list)  # names of attributes that there is no room for
     generated: np.ndarray = None      # (vertices, 3) float32
     corners: np.ndarray = None        # (triangles * 3,) integers: Blender's corners, for corner normals
     dicing: dict = None               # fields of abi.DicingDesc, those of faces and creases as arrays
@@ -99,6 +100,7 @@ def extract(mesh, uv_names=(), color_names=(), material_count=1, group_names=())
         data.material_index = _material_index(mesh, loops)
     read_normals(mesh, data, loops)
     data.attributes = _uv_maps(mesh, uv_names, loops) + _colors(mesh, data, color_names, loops, group_names)
+    data.left_out = [name for name, _ in data.attributes[abi.MAX_ATTRIBUTES:]]
     del data.attributes[abi.MAX_ATTRIBUTES:]
     return data
 

@@ -164,7 +164,8 @@ def _curves(strands, wanted, values, generated=None):
     if strands.lengths is not None:
         own = [(name, tell(), False) for name, tell in (
             (HAIR_ATTRIBUTE, strands.info), (DIRECTION_ATTRIBUTE, strands.directions)) if name in wanted.color_names]
-    return curves.curves_of(strands, wanted, values[:abi.MAX_ATTRIBUTES - len(own)] + own, generated)
+    room = abi.MAX_ATTRIBUTES - len(own)  # the first is the library's default
+    return curves.curves_of(strands, wanted, values[:room] + own + values[room:], generated)
 
 
 def _root_values(mesh, modifier, strands, uv_names, color_names):

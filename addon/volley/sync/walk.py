@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import bpy
 
-from ..abi import InstanceFlags
+from ..abi import MAX_ATTRIBUTES, InstanceFlags
 from . import attribute_values, curves, deform, instance, light, mesh, motion, strands, visibility
 from .changes import Changes
 from .kept import Circumstances, Kept
@@ -260,6 +260,7 @@ class Walk:
         if shape is None:
             return False
         is_kept, data = made_of.curves(each, shape)
+        self._tell_left_out(each.object, data)
         may_deform = item.motion_keys > 1 and motion.may_deform(each.object, instance.maker_of(each))
         if may_deform and made_of.may_move(each):
             shapes = curves.StrandMotion(shape, is_kept, data, item.motion_keys)
@@ -312,6 +313,7 @@ class Walk:
         data = mesh.extract(shape, *names[:2], slot_count, attribute_values.group_names(blender_object))
         if data is None:
             return None, None
+        self._tell_left_out(blender_object, data)
         if names[2]:
             data.generated = mesh.generated_coordinates(blender_object, shape, data.positions)
         fields = dicing and dicing.fields_of(each)
@@ -323,6 +325,12 @@ class Walk:
         if cage is None and item.motion_keys > 1 and motion.may_deform(blender_object, instance.maker_of(each)):
             return data, deform.MeshMotion(shape, data, item.motion_keys)
         return data, None
+
+    def _tell_left_out(self, blender_object, data):
+        """Warn of the attributes that there is no room for."""
+        if data.left_out:
+            self._sync.warnings.add(f"Object '{blender_object.name}': has more than {MAX_ATTRIBUTES} attributes that "
+                                    f"materials read, without {attribute_values.spoken(data.left_out)}")
 
     def _names_of(self, pointer):
         """What a mesh brings: tangents only where they are read, as they take longest to make."""
