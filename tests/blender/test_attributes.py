@@ -122,6 +122,41 @@ def inside_groups():
     return _pictures_of(owners)
 
 
+def inside_instances():
+    """Pictures of what nodes gave instances, and instances of those, the warnings, and whether this Blender lets
+    anyone read them."""
+    import bpy
+    import scenes
+    import volley.session
+    scenes.empty()
+    told, owners = [], {}
+    volley.session.report_warning = lambda _engine, message: told.append(message)
+    for kind, depth in (('FLOAT_COLOR', 1), ('FLOAT', 1), ('BOOLEAN', 1), ('FLOAT', 2)):
+        made = owners[f"{kind} {depth}"] = _grid(f"{kind} {depth}")
+        *inner, outer, store = scenes.geometry_nodes(
+            made, *("GeometryNodeInstanceOnPoints",) * depth, "GeometryNodeStoreNamedAttribute")
+        group = outer.id_data
+        cube, assign = group.nodes.new("GeometryNodeMeshCube"), group.nodes.new("GeometryNodeSetMaterial")
+        cube.inputs["Size"].default_value = (0.2 / depth,) * 3
+        assign.inputs["Material"].default_value = _shining("Color", attribute_name="at", attribute_type='INSTANCER')
+        group.links.new(cube.outputs["Mesh"], assign.inputs["Geometry"])
+        shown = assign.outputs["Geometry"]
+        for node in inner:  # a line of two on each point
+            line = group.nodes.new("GeometryNodeMeshLine")
+            line.inputs["Count"].default_value, line.inputs["Offset"].default_value = 2, (0.0, 0.0, 0.12)
+            group.links.new(line.outputs["Mesh"], node.inputs["Points"])
+            group.links.new(shown, node.inputs["Instance"])
+            shown = node.outputs["Instances"]
+        group.links.new(next(n for n in group.nodes if n.type == 'GROUP_INPUT').outputs[0], outer.inputs["Points"])
+        group.links.new(shown, outer.inputs["Instance"])
+        store.data_type, store.domain, store.inputs["Name"].default_value = kind, 'INSTANCE', "at"
+        random = group.nodes.new("FunctionNodeRandomValue")
+        random.data_type = {'FLOAT_COLOR': 'FLOAT_VECTOR'}.get(kind, kind)
+        value = next(socket for socket in random.outputs if socket.enabled)
+        group.links.new(value, next(each for each in store.inputs if each.name == "Value" and each.enabled))
+    return _pictures_of(owners), told, hasattr(bpy.types.Object, "evaluated_geometry")
+
+
 def inside_many():
     """The warnings of renders of meshes and clouds whose materials read eight attributes and ten."""
     import scenes
@@ -225,3 +260,10 @@ def test_those_without_room_are_named(blender):
         assert not any("attributes" in line for line in told[f"{kind}, 8"]), told
         assert [line for line in told[f"{kind}, 10"] if "attributes" in line] == [
             "Object 'Grid': has more than 8 attributes that materials read, without 'at8', 'at9'"], told
+
+
+def test_instances_of_nodes(blender):
+    pictures, told, can_read = blender.run(inside_instances)
+    if can_read:
+        _compare(pictures)
+    assert any("attributes that nodes give instances" in line for line in told) != can_read, told

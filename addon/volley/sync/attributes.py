@@ -10,6 +10,7 @@ import bpy
 
 from ..abi import MAX_INSTANCE_VALUES, NodeType
 from .instance import VALUES_END
+from .instance_levels import HAS_GEOMETRIES, InstanceLevels
 from .values import CONSTANT, Value
 
 _COMPONENTS = 4  # RGBA
@@ -20,17 +21,18 @@ class Attributes:
     """Where the values of attributes of instances stand among those that the library has of an instance,
     the same for all materials of a scene."""
 
-    def __init__(self):
+    def __init__(self, warnings):
+        self._warnings = warnings
         self._firsts = {}  # (type of attribute, name): number of the first of four
-        self._depsgraph = None
+        self._depsgraph, self._levels = None, InstanceLevels()
 
     def begin(self, depsgraph):
         """Look into a depsgraph until end()."""
-        self._depsgraph = depsgraph
+        self._depsgraph, self._levels = depsgraph, InstanceLevels()
 
     def end(self):
         """Keep nothing of Blender."""
-        self._depsgraph = None
+        self._depsgraph, self._levels = None, InstanceLevels()
 
     def read(self, walker, attribute_type, name):
         """An attribute's colour and alpha as Values; None where there is no room for it."""
@@ -50,7 +52,7 @@ class Attributes:
     def _of_view_layer(self, name):
         """Looked up in the view layer, the scene and the world."""
         scene = self._depsgraph.scene_eval
-        return _first_found((self._depsgraph.view_layer_eval, scene, scene.world), name)
+        return _first_found((self._depsgraph.view_layer_eval, scene, scene.world), name) or _NOTHING
 
     def add_values(self, wanted, instance, values):
         """The values of an instance with the attributes that are wanted, a set of (type, name)."""
@@ -59,22 +61,37 @@ class Attributes:
         firsts = {self._firsts[key]: key for key in wanted}
         values = list(values) + [0.0] * (max(firsts) + _COMPONENTS - len(values))
         for first, (attribute_type, name) in firsts.items():
-            owners = [instance.object, instance.object.data]
-            if attribute_type == 'INSTANCER' and instance.is_instance:
-                system = instance.particle_system
-                owners = [system.settings if system is not None else None, instance.parent, *owners]
-            values[first:first + _COMPONENTS] = _first_found(owners, name)
+            read = self._of_instancer if attribute_type == 'INSTANCER' and instance.is_instance else _of_object
+            values[first:first + _COMPONENTS] = read(instance, name) or _NOTHING
         return tuple(values)
+
+    def _of_instancer(self, instance, name):
+        """Looked up in the settings of particles, in what nodes gave the instance, in its maker and the object."""
+        system, maker = instance.particle_system, instance.parent
+        value = None if system is None else _first_found((system.settings,), name)
+        is_of_nodes = system is None and any(each.type == 'NODES' for each in maker.modifiers)
+        if value is None and is_of_nodes and HAS_GEOMETRIES:
+            value = self._levels.find(instance, name)
+        if value is None:
+            value = _first_found((maker,), name) or _of_object(instance, name)
+        if value is None and is_of_nodes and not HAS_GEOMETRIES:
+            self._warnings.add(f"Object '{maker.name}': attributes that nodes give instances, such as '{name}', "
+                               "cannot be read in this Blender")
+        return value
+
+
+def _of_object(instance, name):
+    return _first_found((instance.object, instance.object.data), name)
 
 
 def _first_found(owners, name):
-    """The value of the first data-block that has it, RGBA."""
+    """The value of the first data-block that has it, RGBA; None where none has."""
     for owner in owners:
         for path in (f'["{bpy.utils.escape_identifier(name)}"]', name):
             value = _resolved(owner, path)
             if value is not None:
                 return value
-    return _NOTHING
+    return None
 
 
 def _resolved(owner, path):

@@ -37,7 +37,7 @@ class Materials:
         self._lights = set()  # keys of the lights that are flattened in this sync
         self._changes = Changes.everything()
         self._aovs, self._has_light_tree = {}, False
-        self._attributes = Attributes()
+        self._attributes = Attributes(warnings)
 
     def begin(self, depsgraph, changes, aovs):
         """Start a sync: nothing has been asked for yet. Materials that changes does not name are taken
