@@ -100,7 +100,7 @@ CHANGED="test_sky or test_working_space or test_textures or test_shaders or test
 or test_color_spaces or test_warnings or test_node_menus or test_registration or test_panels or test_passes \
 or test_follows_edits or test_view_through or test_ray_nodes or test_displacement or test_thin_wall \
 or test_no_material or test_tilted or test_scaled_normals or test_pane_in or test_generated or clear_holes \
-or test_shading_offsets or test_tracing_nodes or test_strands or test_settings or test_persistent \
+or test_shading_offsets or test_tracing_nodes or test_strands or test_settings or test_persistent or test_links \
 or (test_movies and test_window)"
 
 main() {

@@ -22,6 +22,7 @@ TABLES = {
     "thin_wall": ("Principled's Thin Wall", _OF_PICTURE),
     "textures": ("outputs of texture and value nodes", "panel, mean of pixels"),
     "tracing_nodes": ("nodes that trace: Ambient Occlusion, Bevel, Raycast", _OF_PICTURE),
+    "links": ("muted nodes, reroutes and groups", _OF_PICTURE),
     "light_nodes": ("input nodes in lights", "worst pixel, over the brightest"),
     "light_webs": ("IES profiles", "worst pixel, over the brightest"),
     "light_patterns": ("nodes in soft lights", _OF_PICTURE),

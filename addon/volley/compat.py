@@ -32,6 +32,11 @@ HAS_LONG_PASS_NAMES = bpy.app.version >= (5, 0, 0)
 # Light Falloff leaves the light of suns as it is, whose way is endless; seen in 5.2, not in 4.3.
 LEAVES_SUNS = bpy.app.version >= (5, 0, 0)
 
+# Trees are rendered without their groups, reroutes and muted nodes: where nothing comes through these, what they
+# feed has its own value, and values of groups' sockets are as if linked. Before, nothing was 0, but where both it and
+# such values fed what has coordinates or normals by default, these stayed. Seen in 5.2, not in 4.3.
+INLINES_GROUPS = bpy.app.version >= (5, 0, 0)
+
 # Shadow rays meet each of a point cloud's balls once, and balls are lit as round ones where they are stretched; seen
 # in 5.2, not in 4.3. (3.4 has neither: no ray meets the backs there.)
 HAS_ROUND_BALLS = bpy.app.version >= (5, 0, 0)

@@ -10,13 +10,17 @@ that is not supported becomes a diffuse of its colour. Each is named once in the
 """
 
 from ..abi import DisplacementMethod, NodeType, VectorOperation as Vector
-from ..compat import BUMP_FILTER_WIDTH, aov_name
+from ..compat import BUMP_FILTER_WIDTH, INLINES_GROUPS, aov_name
 from . import nodes, working_space
 from .node_list import input_number, output
 from .values import CONSTANT, DEFAULT, NO_SHADER, Value
 
 _KINDS = {'VALUE': 'f', 'INT': 'f', 'BOOLEAN': 'f', 'RGBA': 'c', 'VECTOR': 'v', 'ROTATION': 'v',
           'SHADER': 's'}
+# Inputs whose value is hidden though nothing stands in for it.
+_WITHOUT_DEFAULT = {
+    ("ShaderNodeVectorRotate", "Vector"), ("ShaderNodeMapRange", "Vector"), ("ShaderNodeTexWhiteNoise", "Vector"),
+    ("ShaderNodeBsdfRayPortal", "Direction"), ("ShaderNodeOutputMaterial", "Displacement")}
 _MAX_DEPTH = 120  # nodes in a chain; Python's own stack ends at about a thousand calls
 
 
@@ -178,13 +182,11 @@ class Walker:
 
     def input_value(self, socket, path):
         """What an input socket holds, in the socket's own kind."""
-        kind = _KINDS.get(socket.type, 'f')
         source = _source(socket)
-        if source is not None:
-            value = self._output_value(source, path)
-            if value is not None:
-                return self.convert(value, kind)
-        return socket_constant(socket, kind)
+        value = None if source is None else self._output_value(source, path)
+        if value is None or value.is_loose and _has_default(socket):
+            return socket_constant(socket, _kind(socket))
+        return self.convert(value, _kind(socket))._replace(is_loose=False)
 
     def is_linked(self, socket):
         """Whether a link that counts ends at the socket."""
@@ -198,9 +200,7 @@ class Walker:
         if node.mute:
             return self._through_muted(node, socket, path)
         if node.type == 'REROUTE':
-            source = _source(node.inputs[0])
-            return self._output_value(source, path) if source is not None \
-                else socket_constant(node.inputs[0], _KINDS.get(socket.type, 'f'))
+            return self._passed_on(node.inputs[0], socket, path)
         if node.type == 'GROUP':
             return self._into_group(node, socket, path)
         if node.type == 'GROUP_INPUT':
@@ -210,9 +210,14 @@ class Walker:
     def _through_muted(self, node, socket, path):
         for link in node.internal_links:
             if link.to_socket == socket:
-                return self.input_value(link.from_socket, path)
-        return NO_SHADER if socket.type == 'SHADER' \
-            else Value(_KINDS.get(socket.type, 'f'), CONSTANT, 0)
+                return self._passed_on(link.from_socket, socket, path)
+        return None
+
+    def _passed_on(self, socket, end, path):
+        """What comes to a socket and leaves at an output, end; see _nothing where nothing does."""
+        source = _source(socket)
+        value = None if source is None else self._output_value(source, path)
+        return _nothing(end) if value is None else self.convert(value, _kind(end))
 
     def _into_group(self, node, socket, path):
         tree = node.node_tree
@@ -264,7 +269,7 @@ class Walker:
 
     def _spread(self, value, kind):
         if value.node == CONSTANT:
-            return Value(kind, CONSTANT, 0, (value.constant[0],) * 3)
+            return value._replace(kind=kind, constant=(value.constant[0],) * 3)
         if value.node == DEFAULT:
             return value._replace(kind=kind)
         return Value(kind, self.emit(NodeType.COMBINE, (value, value, value)), 0)
@@ -295,6 +300,21 @@ def _source(socket):
         if link.is_valid and not link.is_muted and not link.from_socket.is_unavailable:
             return link.from_socket
     return None
+
+
+def _kind(socket):
+    return _KINDS.get(socket.type, 'f')
+
+
+def _nothing(socket):
+    """What leaves at an output to which nothing comes, None where that counts as no link."""
+    return None if INLINES_GROUPS else Value(_kind(socket), CONSTANT, 0, is_loose=True)
+
+
+def _has_default(socket):
+    """Whether an input has coordinates, a normal or a tangent where nothing is linked to it."""
+    return (socket.hide_value and _kind(socket) == 'v' and
+            (socket.node.bl_idname, socket.identifier) not in _WITHOUT_DEFAULT)
 
 
 def socket_constant(socket, kind):

@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What comes through muted nodes, reroutes and groups beside Cycles, on a wall that shines before a grey world. Means
+and tiles within 1 %, beyond what noise explains. The table goes to results/links.txt of the build."""
+
+import blender as blender_support
+import compare
+import pytest
+
+SIZE = (32, 24)
+SEEDS = (71, 72)
+SAMPLES = 32
+TOLERANCE = 0.01  # relative to the mean of the picture
+COLOR = (0.2, 0.4, 0.8, 1.0)
+
+
+# Inside Blender ------------------------------------------------------------------------------------
+
+class Wall:
+    """The tree of a wall that shines, with short names for what builds it."""
+
+    def __init__(self):
+        import scenes
+        scenes.empty(size=SIZE)
+        scenes.camera()
+        scenes.light_world((0.2, 0.2, 0.2))
+        material = scenes.emitter((0.9, 0.7, 0.5))
+        scenes.wall(size=2.6, material=material)
+        self.tree, self.emission = material.node_tree, scenes.shader_of(material)
+        self.output = self.tree.nodes["Material Output"]
+
+    def add(self, kind, *values, tree=None, **settings):
+        """A node whose first inputs have those values, None for one that keeps its own."""
+        node = (tree or self.tree).nodes.new(kind)
+        for name, value in settings.items():
+            setattr(node, name, value)
+        for socket, value in zip(node.inputs, values):
+            if value is not None:
+                socket.default_value = value
+        return node
+
+    def link(self, output, socket):
+        """Link two sockets of one tree; returns the node that is linked to."""
+        socket.id_data.links.new(output, socket)
+        return socket.node
+
+    def show(self, node):
+        """Shine with a node's first output."""
+        self.link(node.outputs[0], self.emission.inputs["Color"])
+
+
+def _muted(kind, *values):
+    """Shine with a muted node."""
+    def build(wall):
+        wall.show(wall.add(kind, *values, mute=True))
+    return build
+
+
+def _into(kind, *values, number, through):
+    """Shine with a node to whose input of that number nodes are linked that pass on nothing."""
+    def build(wall):
+        node = wall.add(kind, *values)
+        first, *others = [wall.add(each, mute=each != "NodeReroute") for each in through]
+        for each in others:
+            first = wall.link(first.outputs[0], each.inputs[0])
+        wall.show(wall.link(first.outputs[0], node.inputs[number]))
+    return build
+
+
+def _factor(wall):
+    """A reroute that nothing is linked to, as the factor between two shaders."""
+    mix = wall.add("ShaderNodeMixShader", 0.25)
+    other = wall.add("ShaderNodeEmission", (0.1, 0.9, 0.3, 1.0))
+    wall.link(wall.add("NodeReroute").outputs[0], mix.inputs[0])
+    wall.link(wall.emission.outputs[0], mix.inputs[1])
+    wall.link(other.outputs[0], mix.inputs[2])
+    wall.link(mix.outputs[0], wall.output.inputs["Surface"])
+
+
+def _bent(wall):
+    """A muted vector for the normal of a matt wall under a sun."""
+    import scenes
+    scenes.light('SUN', energy=2.0)
+    diffuse = wall.add("ShaderNodeBsdfDiffuse")
+    wall.link(wall.add("ShaderNodeVectorMath", mute=True).outputs[0], diffuse.inputs["Normal"])
+    wall.link(diffuse.outputs[0], wall.output.inputs["Surface"])
+
+
+LOOSE = {
+    "muted mix": _muted("ShaderNodeMixRGB", None, COLOR, COLOR),
+    "muted number": _muted("ShaderNodeMath", 0.3),
+    "muted colour": _muted("ShaderNodeRGB"),
+    "muted noise": _muted("ShaderNodeTexNoise"),
+    "muted mapping": _into("ShaderNodeTexNoise", number=0, through=("ShaderNodeMapping",)),
+    "muted number to a texture": _into("ShaderNodeTexNoise", number=0, through=("ShaderNodeMath",)),
+    "muted colour to a reroute": _into("ShaderNodeMath", 0.7, 0.2, number=0, through=("ShaderNodeRGB", "NodeReroute")),
+    "muted normal": _bent,
+    "reroute to a texture": _into("ShaderNodeTexNoise", number=0, through=("NodeReroute",)),
+    "reroutes to a texture": _into("ShaderNodeTexNoise", number=0, through=("NodeReroute", "NodeReroute")),
+    "reroute to a number": _into("ShaderNodeMath", 0.7, 0.2, number=0, through=("NodeReroute",)),
+    "reroute to a vector": _into("ShaderNodeVectorRotate", (0.9, 0.3, 0.1), number=0, through=("NodeReroute",)),
+    "reroute to a factor": _factor,
+}
+CASES = LOOSE
+
+
+def inside_pictures(names):
+    """{case: (pictures by Volley, pictures by Cycles)}, one for each seed."""
+    import scenes
+    pictures = {}
+    for name in names:
+        CASES[name](Wall())
+        pictures[name] = scenes.seeds_by_both(SAMPLES * len(SEEDS), SEEDS)
+    return pictures
+
+
+# Comparison ----------------------------------------------------------------------------------------
+
+@pytest.fixture(scope="module")
+def errors(blender_of_module):
+    """The errors of all cases, from one Blender, and their table."""
+    pictures = blender_of_module.run(inside_pictures, list(CASES), timeout=600)
+    found, lines = compare.errors_of_cases(pictures)
+    blender_support.write_result("links", lines, compare.largest_errors(found))
+    return found
+
+
+@pytest.mark.parametrize("name", list(CASES))
+def test_against_cycles(errors, name):
+    _mean, biased, tile = errors[name]
+    assert biased < TOLERANCE
+    assert tile < TOLERANCE
