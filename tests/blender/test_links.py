@@ -48,6 +48,28 @@ class Wall:
         self.link(node.outputs[0], self.emission.inputs["Color"])
 
 
+    def group(self, inputs, output='Color'):
+        """A group in the tree with inputs {name: kind of socket} and one output: its node, and the nodes in it that
+        stand for its inputs and for its output."""
+        import bpy
+        made = bpy.data.node_groups.new("Group", "ShaderNodeTree")
+        for name, kind, side in [(*each, 'INPUT') for each in inputs.items()] + [("Shown", output, 'OUTPUT')]:
+            if hasattr(made, "interface"):
+                made.interface.new_socket(name, in_out=side, socket_type=f"NodeSocket{kind}")
+            else:
+                getattr(made, side.lower() + "s").new(f"NodeSocket{kind}", name)
+        node = self.add("ShaderNodeGroup", node_tree=made)
+        return node, self.add("NodeGroupInput", tree=made), self.add("NodeGroupOutput", tree=made)
+
+
+def _hide_value(tree):
+    """Hide the value of a group's first input, as its user may."""
+    if hasattr(tree, "interface"):
+        next(each for each in tree.interface.items_tree if each.in_out == 'INPUT').hide_value = True
+    else:
+        tree.inputs[0].hide_value = True
+
+
 def _muted(kind, *values):
     """Shine with a muted node."""
     def build(wall):
@@ -85,6 +107,45 @@ def _bent(wall):
     wall.link(diffuse.outputs[0], wall.output.inputs["Surface"])
 
 
+def _within(kind, *values, name, value=(0.3, 0.6, 0.9), socket='Vector', is_hidden=False):
+    """A group's input, to which nothing is linked, feeds the input of that name of a node in the group."""
+    def build(wall):
+        node, begin, end = wall.group({"Given": socket})
+        if is_hidden:
+            _hide_value(node.node_tree)
+        node.inputs[0].default_value = value
+        inner = wall.add(kind, *values, tree=node.node_tree)
+        wall.link(begin.outputs[0], inner.inputs[name])
+        wall.link(inner.outputs[0], end.inputs[0])
+        wall.show(node)
+    return build
+
+
+def _nested(wall):
+    """As _within of a texture, in a group within a group."""
+    outer, outer_begin, outer_end = wall.group({"Given": 'Vector'})
+    inner, inner_begin, inner_end = wall.group({"Given": 'Vector'})
+    moved = wall.add("ShaderNodeGroup", tree=outer.node_tree, node_tree=inner.node_tree)
+    wall.tree.nodes.remove(inner)
+    noise = wall.add("ShaderNodeTexNoise", tree=moved.node_tree)
+    wall.link(inner_begin.outputs[0], noise.inputs["Vector"])
+    wall.link(noise.outputs[0], inner_end.inputs[0])
+    wall.link(outer_begin.outputs[0], moved.inputs[0])
+    wall.link(moved.outputs[0], outer_end.inputs[0])
+    wall.show(outer)
+
+
+def _ending(kind, *values, name):
+    """A group's output, to which nothing is linked in it, feeds the input of that name of a node."""
+    def build(wall):
+        group, _begin, end = wall.group({}, 'Vector')
+        end.inputs[0].default_value = (0.3, 0.6, 0.9)
+        node = wall.add(kind, *values)
+        wall.link(group.outputs[0], node.inputs[name])
+        wall.show(node)
+    return build
+
+
 LOOSE = {
     "muted mix": _muted("ShaderNodeMixRGB", None, COLOR, COLOR),
     "muted number": _muted("ShaderNodeMath", 0.3),
@@ -100,7 +161,18 @@ LOOSE = {
     "reroute to a vector": _into("ShaderNodeVectorRotate", (0.9, 0.3, 0.1), number=0, through=("NodeReroute",)),
     "reroute to a factor": _factor,
 }
-CASES = LOOSE
+GROUPS = {
+    "group's vector to a texture": _within("ShaderNodeTexNoise", name="Vector"),
+    "group's hidden vector to a texture": _within("ShaderNodeTexNoise", name="Vector", is_hidden=True),
+    "group's number to a texture": _within("ShaderNodeTexNoise", name="Vector", value=0.7, socket='Float'),
+    "group's hidden vector to a sum": _within("ShaderNodeVectorMath", None, (0.1, 0.2, 0.05), name=0, is_hidden=True),
+    "group's vector to a turn": _within("ShaderNodeVectorRotate", name="Vector"),
+    "group's vector to white noise": _within("ShaderNodeTexWhiteNoise", name="Vector"),
+    "group's vector in a group": _nested,
+    "group's own output to a texture": _ending("ShaderNodeTexNoise", name="Vector"),
+    "group's own output to a sum": _ending("ShaderNodeVectorMath", None, (0.1, 0.2, 0.05), name=0),
+}
+CASES = {**LOOSE, **GROUPS}
 
 
 def inside_pictures(names):

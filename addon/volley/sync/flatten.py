@@ -200,7 +200,7 @@ class Walker:
         if node.mute:
             return self._through_muted(node, socket, path)
         if node.type == 'REROUTE':
-            return self._passed_on(node.inputs[0], socket, path)
+            return self._passed_on(node.inputs[0], socket, path, _nothing(socket))
         if node.type == 'GROUP':
             return self._into_group(node, socket, path)
         if node.type == 'GROUP_INPUT':
@@ -210,35 +210,35 @@ class Walker:
     def _through_muted(self, node, socket, path):
         for link in node.internal_links:
             if link.to_socket == socket:
-                return self._passed_on(link.from_socket, socket, path)
+                return self._passed_on(link.from_socket, socket, path, _nothing(socket))
         return None
 
-    def _passed_on(self, socket, end, path):
-        """What comes to a socket and leaves at an output, end; see _nothing where nothing does."""
+    def _passed_on(self, socket, end, path, otherwise):
+        """What comes to a socket and leaves at an output, end; otherwise, where nothing comes."""
         source = _source(socket)
         value = None if source is None else self._output_value(source, path)
-        return _nothing(end) if value is None else self.convert(value, _kind(end))
+        return otherwise if value is None else self.convert(value, _kind(end))
 
     def _into_group(self, node, socket, path):
         tree = node.node_tree
         if tree is None:
-            return None
+            return _nothing(socket)
         if len(path) >= _MAX_DEPTH or any(entered.node_tree == tree for entered in path):
             self.warn(f"group '{tree.name}' contains itself, its value is left out")
             return None
         outputs = [n for n in tree.nodes if n.type == 'GROUP_OUTPUT']
         active = next((n for n in outputs if n.is_active_output), outputs[0] if outputs else None)
         if active is None:
-            return None
+            return _nothing(socket)
         inside = next((s for s in active.inputs if s.identifier == socket.identifier), None)
-        return None if inside is None else self.input_value(inside, path + (node,))
+        return None if inside is None else self._passed_on(inside, socket, path + (node,), _held(inside))
 
     def _out_of_group(self, socket, path):
         if not path:
             return None
         group = path[-1]
         outside = next((s for s in group.inputs if s.identifier == socket.identifier), None)
-        return None if outside is None else self.input_value(outside, path[:-1])
+        return None if outside is None else self._passed_on(outside, socket, path[:-1], _held(outside))
 
     def _node_outputs(self, node, path):
         key = (tuple(group.name for group in path), node.name)
@@ -311,6 +311,11 @@ def _nothing(socket):
     return None if INLINES_GROUPS else Value(_kind(socket), CONSTANT, 0, is_loose=True)
 
 
+def _held(socket):
+    """The value of a group's socket, hidden or not."""
+    return _own_constant(socket, _kind(socket))._replace(is_loose=not INLINES_GROUPS)
+
+
 def _has_default(socket):
     """Whether an input has coordinates, a normal or a tangent where nothing is linked to it."""
     return (socket.hide_value and _kind(socket) == 'v' and
@@ -320,10 +325,14 @@ def _has_default(socket):
 def socket_constant(socket, kind):
     """An input's own value. Vectors that Blender hides the value of (normals, texture coordinates)
     take the library's default."""
-    if kind == 's':
-        return NO_SHADER
     if socket.hide_value and kind == 'v':
         return Value(kind, DEFAULT, 0)
+    return _own_constant(socket, kind)
+
+
+def _own_constant(socket, kind):
+    if kind == 's':
+        return NO_SHADER
     default = getattr(socket, "default_value", 0.0)
     if kind == 'f':
         return Value('f', CONSTANT, 0, (float(default), 0.0, 0.0))
