@@ -37,6 +37,10 @@ LEAVES_SUNS = bpy.app.version >= (5, 0, 0)
 # such values fed what has coordinates or normals by default, these stayed. Seen in 5.2, not in 4.3.
 INLINES_GROUPS = bpy.app.version >= (5, 0, 0)
 
+# Groups have switches in them, whole numbers till 5.0; before, what they feed has its own value. Seen in 4.3, not in
+# 3.4.
+HAS_BOOLEAN_SOCKETS = bpy.app.version >= (4, 0, 0)
+
 # Shadow rays meet each of a point cloud's balls once, and balls are lit as round ones where they are stretched; seen
 # in 5.2, not in 4.3. (3.4 has neither: no ray meets the backs there.)
 HAS_ROUND_BALLS = bpy.app.version >= (5, 0, 0)

@@ -38,6 +38,12 @@ class Wall:
                 socket.default_value = value
         return node
 
+    def constant(self, number):
+        """A Value node of that number."""
+        node = self.add("ShaderNodeValue")
+        node.outputs[0].default_value = number
+        return node
+
     def link(self, output, socket):
         """Link two sockets of one tree; returns the node that is linked to."""
         socket.id_data.links.new(output, socket)
@@ -146,6 +152,43 @@ def _ending(kind, *values, name):
     return build
 
 
+def _converted(number, socket, output='Color'):
+    """A number goes into a group by a socket of one kind and out of it by one of another, and three eighths of it are
+    added to two."""
+    def build(wall):
+        group, begin, end = wall.group({"Given": socket}, output)
+        wall.link(begin.outputs[0], end.inputs[0])
+        if isinstance(number, bool):
+            group.inputs[0].default_value = number
+        else:
+            given = number(wall) if callable(number) else wall.constant(number)
+            wall.link(given.outputs[0], group.inputs[0])
+        shown = wall.add("ShaderNodeMath", None, 0.375, 2.0, operation='MULTIPLY_ADD')
+        wall.show(wall.link(group.outputs[0], shown.inputs[0]))
+    return build
+
+
+def _coordinate(scale, offset):
+    """The first UV coordinate, scaled and moved."""
+    def build(wall):
+        parts = wall.add("ShaderNodeSeparateXYZ")
+        wall.link(wall.add("ShaderNodeTexCoord").outputs["UV"], parts.inputs[0])
+        moved = wall.add("ShaderNodeMath", None, scale, offset, operation='MULTIPLY_ADD')
+        return wall.link(parts.outputs[0], moved.inputs[0])
+    return build
+
+
+def _color(wall):
+    """A colour whose grey is between 1 and 2, and its mean between 2 and 3."""
+    node = wall.add("ShaderNodeRGB")
+    node.outputs[0].default_value = (0.5, 0.9, 7.0, 1.0)
+    return node
+
+
+def _vector(wall):
+    return wall.add("ShaderNodeCombineXYZ", 0.5, 0.9, 7.0)
+
+
 LOOSE = {
     "muted mix": _muted("ShaderNodeMixRGB", None, COLOR, COLOR),
     "muted number": _muted("ShaderNodeMath", 0.3),
@@ -172,7 +215,20 @@ GROUPS = {
     "group's own output to a texture": _ending("ShaderNodeTexNoise", name="Vector"),
     "group's own output to a sum": _ending("ShaderNodeVectorMath", None, (0.1, 0.2, 0.05), name=0),
 }
-CASES = {**LOOSE, **GROUPS}
+KINDS = {
+    "whole number": _converted(2.7, 'Int'),
+    "whole number below 0": _converted(-2.7, 'Int'),
+    "whole number of a coordinate": _converted(_coordinate(6.0, -3.0), 'Int'),
+    "whole number of a colour": _converted(_color, 'Int'),
+    "whole number of a vector": _converted(_vector, 'Int'),
+    "whole number at the output": _converted(2.7, 'Float', 'Int'),
+    "switch by a fraction": _converted(0.3, 'Bool'),
+    "switch by a number below 0": _converted(-1.3, 'Bool'),
+    "switch by a coordinate": _converted(_coordinate(6.0, -3.0), 'Bool'),
+    "switch that is on": _converted(True, 'Bool'),
+    "switch at the output": _converted(2.7, 'Float', 'Bool'),
+}
+CASES = {**LOOSE, **GROUPS, **KINDS}
 
 
 def inside_pictures(names):

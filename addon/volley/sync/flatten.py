@@ -9,8 +9,10 @@ Fallbacks: a node that is not supported leaves the input it feeds at that socket
 that is not supported becomes a diffuse of its colour. Each is named once in the warnings.
 """
 
-from ..abi import DisplacementMethod, NodeType, VectorOperation as Vector
-from ..compat import BUMP_FILTER_WIDTH, INLINES_GROUPS, aov_name
+import math
+
+from ..abi import DisplacementMethod, MathOperation as Math, NodeType, VectorOperation as Vector
+from ..compat import BUMP_FILTER_WIDTH, HAS_BOOLEAN_SOCKETS, INLINES_GROUPS, aov_name
 from . import nodes, working_space
 from .node_list import input_number, output
 from .values import CONSTANT, DEFAULT, NO_SHADER, Value
@@ -186,7 +188,7 @@ class Walker:
         value = None if source is None else self._output_value(source, path)
         if value is None or value.is_loose and _has_default(socket):
             return socket_constant(socket, _kind(socket))
-        return self.convert(value, _kind(socket))._replace(is_loose=False)
+        return self._held_by(socket, value)._replace(is_loose=False)
 
     def is_linked(self, socket):
         """Whether a link that counts ends at the socket."""
@@ -215,9 +217,11 @@ class Walker:
 
     def _passed_on(self, socket, end, path, otherwise):
         """What comes to a socket and leaves at an output, end; otherwise, where nothing comes."""
+        if end.type == 'BOOLEAN' and not HAS_BOOLEAN_SOCKETS:
+            return None
         source = _source(socket)
         value = None if source is None else self._output_value(source, path)
-        return otherwise if value is None else self.convert(value, _kind(end))
+        return otherwise if value is None else self._held_by(end, value)
 
     def _into_group(self, node, socket, path):
         tree = node.node_tree
@@ -254,6 +258,20 @@ class Walker:
         return outputs
 
     # Conversions
+
+    def _held_by(self, socket, value):
+        """What a socket holds of a value that comes to it."""
+        value = self.convert(value, _kind(socket))
+        if socket.type == 'BOOLEAN' and INLINES_GROUPS:  # before, they were whole numbers
+            return self._math(Math.GREATER_THAN, value, lambda number: float(number > 0.0))
+        return self._math(Math.TRUNC, value, math.trunc) if socket.type in {'INT', 'BOOLEAN'} else value
+
+    def _math(self, operation, value, function):
+        """The result of a Math node whose other inputs are 0, at once where the value is a constant."""
+        if value.node == CONSTANT:
+            return value._replace(constant=(float(function(value.constant[0])), 0.0, 0.0))
+        zero = Value('f', CONSTANT, 0)
+        return Value('f', self.emit(NodeType.MATH, (value, zero, zero), operation), 0)
 
     def convert(self, value, kind):
         """A value as another kind, by Blender's rules for links."""
