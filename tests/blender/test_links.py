@@ -189,6 +189,54 @@ def _vector(wall):
     return wall.add("ShaderNodeCombineXYZ", 0.5, 0.9, 7.0)
 
 
+def _with_output(wall, color, socket="Surface"):
+    """A group that nothing is linked to, with an output of its own: its node, and that output."""
+    group, _begin, _end = wall.group({})
+    end = wall.add("ShaderNodeOutputMaterial", tree=group.node_tree)
+    wall.link(wall.add("ShaderNodeEmission", color, tree=group.node_tree).outputs[0], end.inputs[socket])
+    return group, end
+
+
+def _output_in_group(wall):
+    _with_output(wall, COLOR)
+    wall.tree.nodes.remove(wall.output)
+
+
+def _output_in_nested(wall):
+    """An output in a group of a group."""
+    inner, _end = _with_output(wall, COLOR)
+    outer, _begin, _end = wall.group({})
+    wall.add("ShaderNodeGroup", tree=outer.node_tree, node_tree=inner.node_tree)
+    wall.tree.nodes.remove(inner)
+    wall.tree.nodes.remove(wall.output)
+
+
+def _outputs_in_groups(wall):
+    for color in (COLOR, (0.9, 0.1, 0.3, 1.0)):
+        _with_output(wall, color)
+    wall.tree.nodes.remove(wall.output)
+
+
+def _output_in_muted(wall):
+    group, _end = _with_output(wall, COLOR)
+    group.mute = True
+
+
+def _muted_output_in_group(wall):
+    _group, end = _with_output(wall, COLOR)
+    end.mute = True
+
+
+def _muted_output(wall):
+    wall.output.mute = True
+
+
+def _empty_output(wall):
+    """An output in a group, and one outside that nothing is linked to."""
+    _with_output(wall, COLOR)
+    wall.tree.links.remove(wall.output.inputs["Surface"].links[0])
+
+
 LOOSE = {
     "muted mix": _muted("ShaderNodeMixRGB", None, COLOR, COLOR),
     "muted number": _muted("ShaderNodeMath", 0.3),
@@ -228,7 +276,17 @@ KINDS = {
     "switch that is on": _converted(True, 'Bool'),
     "switch at the output": _converted(2.7, 'Float', 'Bool'),
 }
-CASES = {**LOOSE, **GROUPS, **KINDS}
+OUTPUTS = {
+    "output in a group": _output_in_group,
+    "output in a nested group": _output_in_nested,
+    "outputs in groups": _outputs_in_groups,
+    "output in a group and outside": lambda wall: _with_output(wall, COLOR),
+    "output in a group and an empty one": _empty_output,
+    "output in a muted group": _output_in_muted,
+    "muted output": _muted_output,
+    "muted output in a group": _muted_output_in_group,
+}
+CASES = {**LOOSE, **GROUPS, **KINDS, **OUTPUTS}
 
 
 def inside_pictures(names):

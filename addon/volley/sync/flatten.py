@@ -90,17 +90,14 @@ def flatten(tree, label, warnings, images=None, aovs=None, attributes=None, disp
     those of meshes alone are read; displacement: the mode of a DISPLACEMENT_OUTPUT, None where there is
     none."""
     walker = Walker(label, warnings, images, attributes)
-    end = tree.get_output_node('CYCLES')
-    if end is None:
-        return walker.flat
-    sockets = {socket.identifier: socket for socket in end.inputs}
-    if "Volume" in sockets and walker.is_linked(sockets["Volume"]):
+    sockets = _end_sockets(_ends(tree))
+    if "Volume" in sockets:
         warnings.add(f"{label}: volume is not supported and is left out")
-    walker.is_displaced = displacement is not None and walker.is_linked(sockets["Displacement"])
+    walker.is_displaced = displacement is not None and "Displacement" in sockets
     try:
-        value = walker.input_value(sockets["Surface"], ())
+        value = walker.input_value(*sockets["Surface"]) if "Surface" in sockets else NO_SHADER
         if walker.is_displaced:
-            walker.emit_displacement(sockets["Displacement"], displacement)
+            walker.emit_displacement(*sockets["Displacement"], displacement)
         if aovs:
             walker.emit_aovs(tree, aovs, ())
     except RecursionError:
@@ -108,8 +105,29 @@ def flatten(tree, label, warnings, images=None, aovs=None, attributes=None, disp
         return FlatTree()
     if value.kind == 's' and value.node >= 0:
         walker.flat.surface = value.node
-    walker.flat.has_volume = "Volume" in sockets and walker.is_linked(sockets["Volume"])
+    walker.flat.has_volume = "Volume" in sockets
     return walker.flat
+
+
+def _ends(tree, path=()):
+    """The outputs of a tree and of the groups in it that count, those first that have their way, each with its
+    path."""
+    inner = [each for node in tree.nodes if _is_entered(node, path)
+             for each in _ends(node.node_tree, path + (node,))]
+    end = tree.get_output_node('CYCLES')
+    own = [] if end is None or end.mute and not INLINES_GROUPS else [(end, path)]
+    return (own + inner)[:1] if INLINES_GROUPS else inner + own
+
+
+def _is_entered(node, path):
+    """Whether a node on a path is a group in which nodes work by themselves, not by what is linked to it."""
+    return node.type == 'GROUP' and not node.mute and node.node_tree is not None and len(path) < _MAX_DEPTH
+
+
+def _end_sockets(ends):
+    """{identifier: (socket, path)} of what is linked to outputs: each socket of the first where it is."""
+    return {socket.identifier: (socket, path) for end, path in reversed(ends) for socket in end.inputs
+            if _source(socket) is not None}
 
 
 class Walker:
@@ -161,20 +179,18 @@ class Walker:
                 waiting.append(source)
         return False
 
-    def emit_displacement(self, socket, mode):
+    def emit_displacement(self, socket, path, mode):
         """Append the output for what comes to a socket of a tree's end."""
-        vector = self.convert(self.input_value(socket, ()), 'v')
+        vector = self.convert(self.input_value(socket, path), 'v')
         width = Value('f', CONSTANT, 0, (BUMP_FILTER_WIDTH, 0.0, 0.0))
         self.emit(NodeType.DISPLACEMENT_OUTPUT, (vector, width), mode)
 
     def emit_aovs(self, tree, aovs, path):
         """Append the AOV outputs of a tree and of the groups in it, wherever they stand."""
         for node in tree.nodes:
-            if node.mute:
-                continue
-            if node.type == 'GROUP' and node.node_tree is not None and len(path) < _MAX_DEPTH:
+            if _is_entered(node, path):
                 self.emit_aovs(node.node_tree, aovs, path + (node,))
-            elif node.type == 'OUTPUT_AOV' and aov_name(node) in aovs:
+            elif node.type == 'OUTPUT_AOV' and not node.mute and aov_name(node) in aovs:
                 aov_type, number = aovs[aov_name(node)]
                 socket = node.inputs["Value" if aov_type == 'VALUE' else "Color"]
                 node_type = NodeType.AOV_VALUE if aov_type == 'VALUE' else NodeType.AOV_COLOR
