@@ -156,11 +156,8 @@ def _vector_transform(walker, node, sockets):
 
 
 def _vector_rotate(walker, node, sockets):
-    vector = sockets.get('v', "Vector")
-    if vector.node == DEFAULT:
-        vector = _constant('v')
-    values = (vector, sockets.get('v', "Center"), sockets.get('v', "Axis"), sockets.get('f', "Angle"),
-              sockets.get('v', "Rotation"))
+    values = [sockets.get(kind, name) for kind, name in (
+        ('v', "Vector"), ('v', "Center"), ('v', "Axis"), ('f', "Angle"), ('v', "Rotation"))]
     mode = _ROTATIONS[node.rotation_type] | (RotateFlags.INVERSE if node.invert else 0)
     return {"Vector": Value('v', walker.emit(NodeType.VECTOR_ROTATE, values, mode), 0)}
 

@@ -19,7 +19,7 @@ from .values import CONSTANT, DEFAULT, NO_SHADER, Value
 
 _KINDS = {'VALUE': 'f', 'INT': 'f', 'BOOLEAN': 'f', 'RGBA': 'c', 'VECTOR': 'v', 'ROTATION': 'v',
           'SHADER': 's'}
-# Inputs whose value is hidden though nothing stands in for it.
+# Inputs whose value is hidden though it counts: nothing stands in for it.
 _WITHOUT_DEFAULT = {
     ("ShaderNodeVectorRotate", "Vector"), ("ShaderNodeMapRange", "Vector"), ("ShaderNodeTexWhiteNoise", "Vector"),
     ("ShaderNodeBsdfRayPortal", "Direction"), ("ShaderNodeOutputMaterial", "Displacement")}
@@ -203,7 +203,7 @@ class Walker:
         source = _source(socket)
         value = None if source is None else self._output_value(source, path)
         if value is None or value.is_loose and _has_default(socket):
-            return socket_constant(socket, _kind(socket))
+            return _unlinked(socket)
         return self._held_by(socket, value)._replace(is_loose=False)
 
     def is_linked(self, socket):
@@ -347,7 +347,7 @@ def _nothing(socket):
 
 def _held(socket):
     """The value of a group's socket, hidden or not."""
-    return _own_constant(socket, _kind(socket))._replace(is_loose=not INLINES_GROUPS)
+    return _own_constant(socket)._replace(is_loose=not INLINES_GROUPS)
 
 
 def _has_default(socket):
@@ -356,18 +356,15 @@ def _has_default(socket):
             (socket.node.bl_idname, socket.identifier) not in _WITHOUT_DEFAULT)
 
 
-def socket_constant(socket, kind):
-    """An input's own value. Vectors that Blender hides the value of (normals, texture coordinates)
-    take the library's default."""
-    if socket.hide_value and kind == 'v':
-        return Value(kind, DEFAULT, 0)
-    return _own_constant(socket, kind)
+def _unlinked(socket):
+    """What an input of a node holds by itself: the library's default where Blender hides its value."""
+    return Value('v', DEFAULT, 0) if _has_default(socket) else _own_constant(socket)
 
 
-def _own_constant(socket, kind):
+def _own_constant(socket):
+    kind, default = _kind(socket), getattr(socket, "default_value", 0.0)
     if kind == 's':
         return NO_SHADER
-    default = getattr(socket, "default_value", 0.0)
     if kind == 'f':
         return Value('f', CONSTANT, 0, (float(default), 0.0, 0.0))
     components = tuple(default) if hasattr(default, "__len__") else (float(default),) * 3

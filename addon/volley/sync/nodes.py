@@ -148,6 +148,8 @@ _SPECS = {
     "ShaderNodeBsdfHair": Spec(
         NodeType.HAIR, ("Color", "Offset", "RoughnessU", "RoughnessV", "Tangent"), _SHADER,
         lambda node: HairComponent[node.component.upper()]),
+    # Without a linked direction, which is 0 then, the ray keeps its own.
+    "ShaderNodeBsdfRayPortal": Spec(NodeType.RAY_PORTAL, ("Color", "Position", "Direction"), _SHADER),
     "ShaderNodeEmission": Spec(NodeType.EMISSION, ("Color", "Strength"), ("Emission",)),
     "ShaderNodeBackground": Spec(NodeType.BACKGROUND, ("Color", "Strength"), ("Background",)),
     "ShaderNodeMixShader": Spec(NodeType.MIX_SHADER, ("Fac", "Shader", "Shader_001"), ("Shader",)),
@@ -389,14 +391,6 @@ def _principled_hair(walker, node, sockets):
         if HAS_HAIR_ALBEDO:
             mode |= PrincipledHairMode.ALBEDO
     return {"BSDF": Value('s', walker.emit(kind, arranged(kind, values), mode), 0)}
-
-
-def _ray_portal(walker, _node, sockets):
-    """Without a linked direction the ray keeps its own."""
-    color, position, direction = sockets.all_of(NodeType.RAY_PORTAL, ("Color", "Position", "Direction"))
-    if direction.node == DEFAULT:
-        direction = _constant('v', 0.0)
-    return {"BSDF": Value('s', walker.emit(NodeType.RAY_PORTAL, (color, position, direction)), 0)}
 
 
 def _value(walker, node, _sockets):
@@ -692,8 +686,7 @@ def _clamped(walker, value, is_clamped):
 
 _SPECIAL = {
     "ShaderNodeBsdfPrincipled": _principled, "ShaderNodeBsdfSheen": _sheen,
-    "ShaderNodeBsdfMetallic": _metallic, "ShaderNodeBsdfRayPortal": _ray_portal,
-    "ShaderNodeBsdfHairPrincipled": _principled_hair,
+    "ShaderNodeBsdfMetallic": _metallic, "ShaderNodeBsdfHairPrincipled": _principled_hair,
     "ShaderNodeValue": _value, "ShaderNodeRGB": _rgb,
     "ShaderNodeNewGeometry": _geometry, "ShaderNodeNormal": _normal, "ShaderNodeTexImage": _image,
     "ShaderNodeTexEnvironment": _environment, "ShaderNodeUVMap": _uv_map,

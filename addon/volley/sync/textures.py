@@ -11,7 +11,7 @@ from ..abi import (BrickMode, FractalType, GradientType, MagicMode, NodeType, No
 from ..compat import HAS_FAR_CELLS, HASHES_CELLS_BY_PCG, SCALES_MAGIC_FIRST
 from .node_list import named_outputs, output
 from .sky_texture import sky_texture
-from .values import CONSTANT, DEFAULT, Value
+from .values import CONSTANT, Value
 
 _DIMENSIONS = ('1D', '2D', '3D', '4D')
 _FRACTALS = FractalType.__members__
@@ -108,8 +108,6 @@ def _grey(walker, value):
 
 def _white_noise(walker, node, sockets):
     dimensions, vector, w = _place(node, sockets)
-    if vector.node == DEFAULT:  # unlike other textures', an unlinked vector is 0
-        vector = Value('v', CONSTANT, 0)
     index = walker.emit(NodeType.WHITE_NOISE, [vector, w], dimensions)
     return named_outputs(index, NodeType.WHITE_NOISE, ("Value", "Color"))
 
