@@ -35,7 +35,8 @@ LEAVES_SUNS = bpy.app.version >= (5, 0, 0)
 # Trees are rendered without their groups, reroutes and muted nodes: where nothing comes through these, what they
 # feed has its own value, and values of groups' sockets are as if linked. Before, nothing was 0, but where both it and
 # such values fed what has coordinates or normals by default, these stayed. Outputs that are muted still work, which
-# they did not, and outputs in groups come after those outside, which they went before. Seen in 5.2, not in 4.3.
+# they did not, and outputs in groups come after those outside, which they went before. What is no constant takes on
+# the kind of the last socket alone. Seen in 5.2, not in 4.3.
 INLINES_GROUPS = bpy.app.version >= (5, 0, 0)
 
 # Groups have switches in them, whole numbers till 5.0; before, what they feed has its own value. Seen in 4.3, not in

@@ -19,6 +19,10 @@ from .values import CONSTANT, DEFAULT, NO_SHADER, Value
 
 _KINDS = {'VALUE': 'f', 'INT': 'f', 'BOOLEAN': 'f', 'RGBA': 'c', 'VECTOR': 'v', 'ROTATION': 'v',
           'SHADER': 's'}
+# What Blender 5 computes where all inputs are constants.
+_FOLDED = {NodeType.MATH, NodeType.VECTOR_MATH, NodeType.COMBINE, NodeType.SEPARATE, NodeType.MIX_COLOR, NodeType.CLAMP,
+           NodeType.MAP_RANGE, NodeType.RGB_TO_BW}
+
 # Inputs whose value is hidden though it counts: nothing stands in for it.
 _WITHOUT_DEFAULT = {
     ("ShaderNodeVectorRotate", "Vector"), ("ShaderNodeMapRange", "Vector"), ("ShaderNodeTexWhiteNoise", "Vector"),
@@ -237,7 +241,9 @@ class Walker:
             return None
         source = _source(socket)
         value = None if source is None else self._output_value(source, path)
-        return otherwise if value is None else self._held_by(end, value)
+        if value is None:
+            return otherwise
+        return self._held_by(end, value) if self._converts_on_the_way(value) else value
 
     def _into_group(self, node, socket, path):
         tree = node.node_tree
@@ -274,6 +280,23 @@ class Walker:
         return outputs
 
     # Conversions
+
+    def _converts_on_the_way(self, value):
+        """Whether a value takes on the kind of each socket that it comes through, not that of the last alone."""
+        return not INLINES_GROUPS or self._is_folded(value.node)
+
+    def _is_folded(self, index):
+        """Whether Blender makes a constant of a node when it inlines groups."""
+        waiting, seen = [index], {CONSTANT}
+        while waiting:
+            index = waiting.pop()
+            if index in seen:
+                continue
+            if index < 0 or self.flat.nodes[index].type not in _FOLDED:
+                return False
+            seen.add(index)
+            waiting.extend(source for source, _output, _constant in self.flat.nodes[index].inputs)
+        return True
 
     def _held_by(self, socket, value):
         """What a socket holds of a value that comes to it."""
