@@ -283,7 +283,8 @@ class Walker:
 
     def _converts_on_the_way(self, value):
         """Whether a value takes on the kind of each socket that it comes through, not that of the last alone."""
-        return not INLINES_GROUPS or self._is_folded(value.node)
+        is_rgb = value.kind == 'c' and value.node == CONSTANT  # RGB nodes stay, Value nodes do not
+        return not INLINES_GROUPS or (self._is_folded(value.node) and not is_rgb)
 
     def _is_folded(self, index):
         """Whether Blender makes a constant of a node when it inlines groups."""
