@@ -244,17 +244,15 @@ def inside_metals():
     return found
 
 
-# Rough enough for denoisers' albedo: node and inputs.
+# Rough enough for denoisers' albedo: ShaderNodeBsdf... and inputs.
 ROUGH = {
-    "tinted metal": ("ShaderNodeBsdfPrincipled", {
+    "tinted metal": ("Principled", {
         "Metallic": 1.0, "Roughness": 0.6, "Base Color": (0.5, 0.5, 0.5), "Specular Tint": (0.05, 0.05, 0.9)}),
-    "coat": ("ShaderNodeBsdfPrincipled", {
-        "Base Color": (0.0, 0.0, 0.0), "Roughness": 0.8, "Coat Weight": 1.0, "Coat Roughness": 0.7}),
-    "dense": ("ShaderNodeBsdfPrincipled", {
-        "Base Color": (0.0, 0.0, 0.0), "Roughness": 0.6, "IOR": 2.0, "Specular Tint": (0.2, 0.6, 0.9)}),
-    "transmission": ("ShaderNodeBsdfPrincipled", {
-        "Base Color": (0.8, 0.5, 0.2), "Roughness": 0.6, "Transmission Weight": 1.0}),
-    "glass": ("ShaderNodeBsdfGlass", {"Color": (0.8, 0.5, 0.2), "Roughness": 0.7})}
+    "coat": ("Principled", {"Base Color": (0.0,) * 3, "Roughness": 0.8, "Coat Weight": 1.0, "Coat Roughness": 0.7}),
+    "dense": ("Principled", {
+        "Base Color": (0.0,) * 3, "Roughness": 0.6, "IOR": 2.0, "Specular Tint": (0.2, 0.6, 0.9)}),
+    "transmission": ("Principled", {"Base Color": (0.8, 0.5, 0.2), "Roughness": 0.6, "Transmission Weight": 1.0}),
+    "glass": ("Glass", {"Color": (0.8, 0.5, 0.2), "Roughness": 0.7})}
 ROUGH_PASSES = "GlossCol", "TransCol", "Denoising Albedo"
 ROUGH_OFF = 3e-3, 8e-3
 
@@ -267,7 +265,7 @@ def inside_rough():
     for kind, (node, inputs) in ROUGH.items():
         scenes.empty(size=(32, 24))
         scenes.camera()
-        scenes.sphere(material=scenes.material("Rough", node, **inputs))
+        scenes.sphere(material=scenes.material("Rough", f"ShaderNodeBsdf{node}", **inputs))
         layer = bpy.context.view_layer
         layer.use_pass_glossy_color = layer.use_pass_transmission_color = True
         layer.volley.denoising_store_passes = layer.cycles.denoising_store_passes = True
