@@ -263,6 +263,21 @@ static void test_factors_are_clamped(void **state) {
     }
 }
 
+static void test_what_light_path_tells(void **state) {
+    (void)state;
+    static const uint32_t of_lobes = 1u << TRC_OUTPUT_OF(LIGHT_PATH, is_diffuse) |
+                                     1u << TRC_OUTPUT_OF(LIGHT_PATH, is_glossy) |
+                                     1u << TRC_OUTPUT_OF(LIGHT_PATH, is_reflection) |
+                                     1u << TRC_OUTPUT_OF(LIGHT_PATH, is_transmission);
+    for (uint32_t output = 0; output < TRC_OUTPUT_OF(LIGHT_PATH, end); output++) {
+        graph_clear();
+        const int32_t path = add(TRC_NODE_LIGHT_PATH, 0, 0, NULL);
+        const int32_t a = add_diffuse(color(1, 0, 0)), b = add_emission(color(0, 1, 0), 1);
+        add_mix(link_to(path, (int32_t)output), a, b);
+        assert_int_equal(!(traits() & TRC_MATERIAL_READS_LOBES), !(of_lobes >> output & 1u));
+    }
+}
+
 static void test_varying_factor(void **state) {
     (void)state;
     graph_clear();
@@ -824,6 +839,7 @@ int main(void) {
         cmocka_unit_test(test_ramps_share_tables),
         cmocka_unit_test(test_mixes_become_weights),
         cmocka_unit_test(test_factors_are_clamped),
+        cmocka_unit_test(test_what_light_path_tells),
         cmocka_unit_test(test_varying_factor),
         cmocka_unit_test(test_shaders_without_effect),
         cmocka_unit_test(test_traits_of_principled),

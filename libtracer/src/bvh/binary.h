@@ -15,7 +15,7 @@ struct trc_binary_node {
     uint32_t left, right;
     /* Of i + 2 children, how many are left's; 0: no better than one fewer. */
     uint8_t left_count[TRC_NODE_WIDTH - 1];
-    bool is_upper; /* the builder's */
+    bool is_upper; /* for builders: made after all below it, which may be tasks of their own */
     uint32_t unused[4];
 };
 struct trc_binary_cost {

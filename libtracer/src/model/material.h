@@ -79,6 +79,7 @@ enum {
     TRC_MATERIAL_TRACES_RAYS = 1 << 15,     /* its program does */
     TRC_MATERIAL_LIT_BELOW = 1 << 16,       /* light is sampled on both sides of the surface */
     TRC_MATERIAL_CLEARS_SHADOWS = 1 << 17,  /* it is transparent to shadow rays, too */
+    TRC_MATERIAL_READS_LOBES = 1 << 18,     /* Light Path tells it what lobes rays come from */
     /* Lobes that no ray is continued for: only samples of lights bring them light. */
     TRC_MATERIAL_IS_MATT = TRC_MATERIAL_HAS_DIFFUSE | TRC_MATERIAL_HAS_TRANSLUCENT,
     /* All lobes that light samples light. */

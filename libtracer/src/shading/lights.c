@@ -223,8 +223,8 @@ static trc_status add_world(struct trc_light_table *table, const struct trc_snap
     }
     table->distant[table->distant_count] = table->world_light;
     table->distant_irradiance[table->distant_count++] = PI * fmaxf(trc_brightness(average), 1e-6f);
-    const bool asks = !s->world.is_constant &&
-                      (s->materials[s->world.material]->has & TRC_MATERIAL_READS_LIGHT_PATH);
+    const bool asks =
+        !s->world.is_constant && (s->materials[s->world.material]->has & TRC_MATERIAL_READS_LOBES);
     /* As in Cycles, the same light from everywhere is not sampled. */
     if (table->map && ((world && !world->use_sampling) || (asks && table->map->is_even))) {
         trc_world_map_release(table->map);

@@ -24,6 +24,14 @@ static bool is_constant3(const struct trc_operand *o) {
     return trc_is_constant(o[0]) && trc_is_constant(o[1]) && trc_is_constant(o[2]);
 }
 
+/* Whether an output of Light Path is another to light by different lobes. */
+static bool tells_lobes(uint32_t output) {
+    return output == TRC_OUTPUT_OF(LIGHT_PATH, is_diffuse) ||
+           output == TRC_OUTPUT_OF(LIGHT_PATH, is_glossy) ||
+           output == TRC_OUTPUT_OF(LIGHT_PATH, is_reflection) ||
+           output == TRC_OUTPUT_OF(LIGHT_PATH, is_transmission);
+}
+
 /* ---- microfacets ---- */
 
 /* Ideal, rough or both, for roughness between low and high; alpha is its square. */
@@ -255,6 +263,7 @@ void trc_build_traits(const struct trc_build *b, struct trc_material *m) {
             o->op == TRC_OP_RAYCAST_ATTRIBUTE)
             m->has |= TRC_MATERIAL_TRACES_RAYS;
         if (o->op == TRC_OP_LIGHT_PATH)
-            m->has |= TRC_MATERIAL_READS_LIGHT_PATH;
+            m->has |=
+                TRC_MATERIAL_READS_LIGHT_PATH | (tells_lobes(o->mode) * TRC_MATERIAL_READS_LOBES);
     }
 }
