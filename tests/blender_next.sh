@@ -3,15 +3,16 @@
 # tested as a user of that Debian would.
 #
 #   bash tests/blender_next.sh [--suite SUITE] [--fast] [--report XML] [--results DIR] [PYTEST ARGUMENT]...
-#   bash tests/blender_next.sh [--suite SUITE] [--fast] --measure PART DIR
+#   bash tests/blender_next.sh [--suite SUITE] [--fast] [--scenes FOLDER] --measure PART DIR [--only SCENE...]
 #   bash tests/blender_next.sh [--suite SUITE] --install
 #
 # SUITE is trixie (Debian 13, Blender 4.3; the default) or sid (Debian unstable, Blender 5.2). Runs all
 # Blender tests if no argument says which; --fast runs what a change of Blender's version touches most (see
 # CHANGED) and builds kernels for this processor alone;
 # --report writes JUnit XML, --results what tests measured, the tables of build/results. --measure measures a
-# part of tests/bench/report.sh there instead, curves, files or kernels (beside Embree), and leaves its JSON in DIR;
-# with --fast what report.sh --quick measures. --install makes the folder with its packages and ends.
+# part of tests/bench/report.sh there instead, curves, denoise, hair, files or kernels (beside Embree), and leaves
+# its JSON in DIR; --scenes and --only are report.sh's; with --fast what report.sh --quick measures. --install makes
+# the folder with its packages and ends.
 # Needs root, a Debian mirror and 2.5 GB; the folder is $XDG_CACHE_HOME/volley/SUITE and stays, so that the
 # next run takes only the build and the tests. Nothing stays mounted: /proc is there in a name space of its
 # own, where there may be one. Exit code 77: it cannot be set up here, with the reason as the last line;
@@ -85,12 +86,19 @@ run_tests() {
         bash /volley/tests/run_pytest.sh python3 build/pytest.xml --junit-prefix "next_$SUITE" "$@"
 }
 
+# Measures a part: its name, the folder for its JSON, report.sh's scope and folder of scenes ("" for none), and
+# report.sh's other arguments.
 measure() {
-    local part=$1 out=$2 scope=$3
+    local part=$1 out=$2 scope=$3 scenes=$4 arguments=("${@:5}")
+    if [ -n "$scenes" ]; then
+        rm -rf "$ROOT/volley/scenes"
+        cp -r "$scenes" "$ROOT/volley/scenes"
+        arguments+=(--scenes /volley/scenes)
+    fi
     say "$part with $(inside blender --version 2>/dev/null | head -n 1)"
     rm -rf "$ROOT/volley/build/report"
-    inside sh -c 'cd /volley && exec python3 tests/bench/report.py "$2" --measure --parts "$1" \
-        --out build/report' measure "$part" "$scope"
+    inside env -C /volley python3 tests/bench/report.py "$scope" --measure --parts "$part" --out build/report \
+        "${arguments[@]}"
     mkdir -p "$out"
     cp "$ROOT"/volley/build/report/data/*.json "$out"
 }
@@ -104,7 +112,8 @@ or test_shading_offsets or test_tracing_nodes or test_strands or test_settings o
 or (test_movies and test_window)"
 
 main() {
-    local report="" results="" part="" out="" suite=trixie isas="" is_fast="" scope=--next status=0 arguments=()
+    local report="" results="" part="" out="" suite=trixie isas="" is_fast="" scope=--next scenes="" status=0
+    local arguments=()
     local is_only_installed=""
     while [ $# -gt 0 ]; do
         case $1 in
@@ -113,6 +122,7 @@ main() {
             --report) report=${2:?--report needs a file}; shift 2 ;;
             --results) results=${2:?--results needs a folder}; shift 2 ;;
             --install) is_only_installed=1; shift ;;
+            --scenes) scenes=${2:?--scenes needs a folder}; shift 2 ;;
             --measure) part=${2:?--measure needs a part} out=${3:?--measure needs a folder}; shift 3 ;;
             *) break ;;
         esac
@@ -131,7 +141,7 @@ main() {
         else
             build "$isas"
         fi
-        measure "$part" "$out" "$scope"
+        measure "$part" "$out" "$scope" "$scenes" "$@"
         exit
     fi
     build "$isas"

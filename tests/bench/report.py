@@ -48,7 +48,6 @@ def parse_arguments(arguments):
     return options
 
 
-SCENE_PARTS = {"hair", "files", "curves", "denoise"}  # results by scene
 PARTS = {
     "kernels": lambda options: kernels.measure(options, options.scope),
     "frames": lambda options: frames.measure(options, options.scope),
@@ -59,11 +58,15 @@ PARTS = {
     "farm": lambda options: farm.measure(options, options.scope),
     "hair": lambda options: hair.measure(options, options.scope, options.out / "pictures"),
     "files": lambda options: files.measure(options, options.scope, options.out / "pictures"),
-    "curves_trixie": lambda options: elsewhere.measure(options.scope, "trixie", "curves"),
-    "curves_sid": lambda options: elsewhere.measure(options.scope, "sid", "curves"),
-    "files_trixie": lambda options: elsewhere.measure(options.scope, "trixie", "files"),
-    "kernels_sid": lambda options: elsewhere.measure(options.scope, "sid", "kernels"),
+    "curves_trixie": lambda options: elsewhere.measure(options, "trixie", "curves"),
+    "files_trixie": lambda options: elsewhere.measure(options, "trixie", "files"),
+    "curves_sid": lambda options: elsewhere.measure(options, "sid", "curves"),
+    "denoise_sid": lambda options: elsewhere.measure(options, "sid", "denoise"),
+    "hair_sid": lambda options: elsewhere.measure(options, "sid", "hair"),
+    "files_sid": lambda options: elsewhere.measure(options, "sid", "files"),
+    "kernels_sid": lambda options: elsewhere.measure(options, "sid", "kernels"),
 }
+SCENE_PARTS = {name for name in PARTS if name.split("_")[0] in ("hair", "files", "curves", "denoise")}  # by scene
 
 
 def measure(options):
@@ -77,7 +80,8 @@ def measure(options):
         start = time.perf_counter()
         made = PARTS[name](options)
         if options.only:
-            made = with_scenes(json.loads((data / f"{name}.json").read_text(encoding="utf-8")), made)
+            path = data / f"{name}.json"
+            made = with_scenes(json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}, made)
         write(data / f"{name}.json", made)
         described["parts"] = with_measured(described["parts"], name, options.only, machine.of_part(described))
         write(data / "machine.json", described)
@@ -92,8 +96,15 @@ def with_scenes(known, made):
     {'fur': 2, 'head': 1}
     >>> with_scenes({"scenes": {"glass": 1, "gloss": 1}, "costs": 1}, {"scenes": {"gloss": 2}})
     {'scenes': {'glass': 1, 'gloss': 2}, 'costs': 1}
+    >>> with_scenes({"blender": "5.2", "made": {"fur": 1}}, {"blender": "5.2", "made": {"head": 2}})
+    {'blender': '5.2', 'made': {'fur': 1, 'head': 2}}
+    >>> with_scenes({"blender": "5.2", "made": {"fur": 1}}, {"blender": "5.3", "made": {"head": 2}})
+    {'blender': '5.3', 'made': {'head': 2}}
     """
-    tables = {key: {**known[key], **made[key]} for key in denoise.TABLES if key in made}
+    if "made" in made:
+        same = known.get("blender") == made["blender"]
+        return {**made, "made": with_scenes(known["made"] if same else {}, made["made"])}
+    tables = {key: {**known.get(key, {}), **made[key]} for key in denoise.TABLES if key in made}
     return {**known, **made, **tables}
 
 

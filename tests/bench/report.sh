@@ -10,9 +10,9 @@
 # ratios are compared with the committed baseline: the exit code is 1 if one of them fell far in
 # repeated runs; with --baseline too, that baseline is written instead. A run into tests/bench/report
 # brings README.md up to it. `--parts denoise` takes some 30 minutes. What is missing is installed as
-# tests/setup.sh does it. curves_trixie, files_trixie and curves_sid are beside Cycles of Blender 4.3 and 5.2,
-# kernels_sid beside Embree 4 (see blender_next.sh); they are left out where those cannot be had. --scenes names
-# the folder of scenes that are not made here.
+# tests/setup.sh does it. Parts in _trixie and _sid are beside Cycles of Blender 4.3 and 5.2, kernels_sid beside
+# Embree 4 (see blender_next.sh); they are left out where those cannot be had. --scenes names the folder of scenes
+# that are not made here.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 

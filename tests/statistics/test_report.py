@@ -148,10 +148,12 @@ def test_what_denoise_makes_worse_is_a_loss():
                                       for count, point in plain.items()}
     made = {"scenes": {"ball": scene}, "worst_tiles": {"ball": {1: 1.6, 16: 1.4}, "cube": {1: 1.4, 16: 0.3}},
             "flicker": {"ball": {"with": 2.0, "without": 4.0}, "cube": {"with": 0.9, "without": 4.0}}}
-    found = denoise_section.losses(made)
+    found = denoise_section.losses({"denoise": made})
     assert len(found) == 3
     assert found[0].startswith("ball, 16 samples: FLIP") and found[0].endswith("**1.20**")
     assert found[1].startswith("ball, 1 samples: relMSE of the worst tile") and found[2].startswith("ball: flicker")
+    beside = {"system": "Debian 19", "blender": "Blender 9.9", "embree": "", "made": made}
+    assert denoise_section.losses({"denoise_sid": beside}) == [f"Blender 9.9, {line}" for line in found]
     assert denoise_section.losses({}) == []
 
 
@@ -176,14 +178,24 @@ def test_hair_that_cycles_renders_sooner_is_a_loss():
                         "slow": {"CYCLES": engine(1.0, 9.0, 1.0), "VOLLEY": engine(2.0, 10.0, 3.0)}}}
     line, = error_sections.headline_lines(results)
     assert "0.50 to 3.0 times as long at 240×180, 0.90 to 4.0 times as long at 768×432." in line
-    assert hair.losses(results["hair"]) == ["slow: F12 of Cycles over Volley's **0.50** (0.50–0.50)",
-                                            "slow: MSE over Cycles' at equal samples **3.00**",
-                                            "slow, 768×432: F12 of Cycles over Volley's **0.90** (0.90–0.90)"]
-    rows = [line for line in hair.section(results["hair"]).splitlines() if line.startswith(("| slow", "| fast"))]
+    assert hair.losses(results) == ["slow: F12 of Cycles over Volley's **0.50** (0.50–0.50)",
+                                    "slow: MSE over Cycles' at equal samples **3.00**",
+                                    "slow, 768×432: F12 of Cycles over Volley's **0.90** (0.90–0.90)"]
+    rows = [line for line in hair.section(results).splitlines() if line.startswith(("| slow", "| fast"))]
     assert [row.split(" | ")[0] for row in rows] == ["| slow", "| fast"] * 2
     assert "3.00 (3.00–3.00) | 0.500 | 0.500" in rows[1]
     assert "60.0 | 15.0 | 4.00 (4.00–4.00)" in rows[3]
     assert hair.losses({}) == []
+
+
+def test_hair_in_newer_blenders_is_beside_their_cycles():
+    scene = {engine: {"seconds": [seconds] * 3, "mse": 1.0, "rel_mse": 1.0, "mean_ratios": [1.0]}
+             for engine, seconds in (("CYCLES", 6.0), ("VOLLEY", 8.0))}
+    results = {"hair_sid": {"system": "Debian 19", "blender": "Blender 9.9", "embree": "", "made": {"head": scene}}}
+    line, = error_sections.headline_lines(results)
+    assert "takes Cycles of Blender 9.9 0.75 to 0.75 times as long at 240×180." in line
+    assert hair.losses(results) == ["head: F12 of Cycles of Blender 9.9 over Volley's **0.75** (0.75–0.75)"]
+    assert "Cycles of Blender 9.9:\n\n| scene |" in hair.section(results)
 
 
 # Accuracy ----------------------------------------------------------------------------------------

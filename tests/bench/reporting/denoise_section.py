@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The section about Denoise."""
 
-from . import curves, denoise
+from . import curves, denoise, elsewhere
 from .tables import digits, table, words
 
 PEER_SAMPLES = (64, 256)   # of Cycles' plain pictures
@@ -13,10 +13,16 @@ MAX_RATIO, MAX_TILE = 1.05, 1.5  # of an error with Denoise to that without it; 
 MAX_FLICKER = 1.0          # of that of plain pictures of 4 times the samples
 
 
-def text(made):
-    """The whole section."""
+def section(results):
+    """Errors, times, flicker and costs, those of each Blender after the other."""
+    parts = [f"{cycles}:\n\n{_tables(made, cycles)}" for cycles, made in elsewhere.beside(results, "denoise")]
+    return "\n\n".join(["## Denoise", *parts]) if parts else ""
+
+
+def _tables(made, cycles):
+    """Those of one Blender."""
     scenes, samples = made["scenes"], list(next(iter(made["worst_tiles"].values())))
-    parts = ["## Denoise"]
+    parts = []
     for measure in MEASURES:
         rows = [(name, [denoise.error_ratio(scene, measure, count) for count in samples])
                 for name, scene in scenes.items()]
@@ -24,12 +30,12 @@ def text(made):
                   _ratios(rows, samples, MAX_RATIO)]
     parts += ["The largest such relMSE of tiles of 32 x 32 pixels:",
               _ratios([(name, list(tiles.values())) for name, tiles in made["worst_tiles"].items()], samples, MAX_TILE),
-              "Time of Cycles' plain picture over that of Volley for the same error, the filter's time included; – where "
-              "the errors measured do not reach that one.", _times(scenes), _flicker(made["flicker"]), _costs(made["costs"])]
-    return "\n\n".join(parts)
+              f"Time of {cycles}' plain picture over that of Volley for the same error, the filter's time included; – where "
+              "the errors measured do not reach that one.", _times(scenes), _flicker(made["flicker"]), _costs(made.get("costs"))]
+    return "\n\n".join(filter(None, parts))
 
 
-def headline(made, sizes):
+def headline(made, sizes, cycles="Cycles"):
     """One sentence: times, of pictures of those sizes, for the errors of Cycles' plain ones of PEER_SAMPLES[0] samples."""
     said = []
     for measure in TIMED:
@@ -40,14 +46,19 @@ def headline(made, sizes):
             said.append(f"{digits(denoise.middle(known), 2)} times as long for the same {curves.MEASURES[measure]} "
                         f"({digits(min(known), 2)} to {digits(max(known), 2)} in {len(known)} scenes; "
                         f"without Denoise {digits(denoise.middle(plain), 2)})")
-    return (f"Beside Volley with Denoise, Cycles' plain pictures of {PEER_SAMPLES[0]} samples take "
+    return (f"Beside Volley with Denoise, {cycles}' plain pictures of {PEER_SAMPLES[0]} samples take "
             f"{', '.join(said)}: medians at {sizes}.") if said else ""
 
 
-def losses(made):
+def losses(results):
     """Errors, tiles and flicker that Denoise makes worse than it may, the worst number of samples of each scene."""
-    if not made:
-        return []
+    lines = _losses(results["denoise"]) if results.get("denoise") else []
+    return lines + [f"{run['blender']}, {line}" for run in elsewhere.of_part(results, "denoise")
+                    for line in _losses(run["made"])]
+
+
+def _losses(made):
+    """Those of one Blender."""
     lines = []
     for measure in MEASURES:
         lines += _above(((name, {count: denoise.error_ratio(scene, measure, count) for count in scene["curves"][denoise.PLAIN]})
@@ -83,7 +94,9 @@ def _times(scenes):
 
 
 def _flicker(scenes):
-    """How much less or more the error changes from frame to frame than without the filter."""
+    """How much less or more the error changes from frame to frame than without the filter; "" of no scenes."""
+    if not scenes:
+        return ""
     return "\n\n".join([
         f"Flicker over {denoise.FLICKER_FRAMES} frames at {denoise.FLICKER_SAMPLES} samples, each frame with another seed: the "
         "relative square by which a pixel's error changes from one frame to the next, over that of plain pictures of 4 times "
@@ -93,7 +106,9 @@ def _flicker(scenes):
 
 
 def _costs(rows):
-    """What the filter costs, by threads."""
+    """What the filter costs, by threads; "" where that was not measured."""
+    if not rows:
+        return ""
     said = "; ".join(f"{row['threads']} thread{'s' * (row['threads'] > 1)}: {digits(denoise.middle(row['seconds']))} s a "
                      f"megapixel ({digits(min(row['seconds']))} to {digits(max(row['seconds']))})" for row in rows)
     same = "the same bits" if all(row["same_bits"] for row in rows) else "**other bits**"

@@ -29,11 +29,7 @@ def text(results, out):
     parts += [error_sections.equal_error_elsewhere(run) for run in elsewhere.of_part(results, "curves")]
     if results.get("curves"):
         parts.append(error_sections.curves_and_bias(results["curves"]))
-    if results.get("denoise"):
-        parts.append(denoise_section.text(results["denoise"]))
-    if results.get("hair"):
-        parts.append(hair.section(results["hair"]))
-    parts.append(files.section(results))
+    parts += [denoise_section.section(results), hair.section(results), files.section(results)]
     if results.get("kernels"):
         parts.append(error_sections.kernels_beside_embree(results["kernels"]))
     parts += [error_sections.kernels_elsewhere(run) for run in elsewhere.of_part(results, "kernels")]

@@ -19,8 +19,8 @@ def headline_lines(results):
         lines.append(equal_error_line(results["curves"]))
     lines += [equal_error_line(run["made"], f"Cycles of {run['blender']}")
               for run in elsewhere.of_part(results, "curves")]
-    if results.get("denoise"):
-        lines.append(denoise_section.headline(results["denoise"], timed_sizes(results["denoise"]["scenes"])))
+    lines += [denoise_section.headline(made, timed_sizes(made["scenes"]), cycles)
+              for cycles, made in elsewhere.beside(results, "denoise")]
     if results.get("kernels"):
         lines.append(kernel_line(results["kernels"]))
     lines += [kernel_line(run["made"], elsewhere.embree_name(run)) for run in elsewhere.of_part(results, "kernels")]
@@ -28,9 +28,7 @@ def headline_lines(results):
         lines.append(accuracy_line(results["kernels"]))
     if results.get("povray"):
         lines.append(povray_line(results["povray"]))
-    if results.get("hair"):
-        lines.append(hair.headline(results["hair"]))
-    lines += files.headlines(results)
+    lines += [*hair.headlines(results), *files.headlines(results)]
     return [line for line in lines if line]
 
 
@@ -105,8 +103,7 @@ def losing_cases(results):
         lines += losing_kernels(run["made"], elsewhere.embree_name(run))
     lines = [*lines, *losing_builds(results.get("kernels", [])),
              *losing_distances(results.get("kernels", [])), *losing_povray(results.get("povray", {})),
-             *denoise_section.losses(results.get("denoise", {})), *hair.losses(results.get("hair", {})),
-             *files.losses(results)]
+             *denoise_section.losses(results), *hair.losses(results), *files.losses(results)]
     if not lines:
         return "## Where Volley loses\n\nNowhere in what was measured."
     return "## Where Volley loses\n\n" + "\n".join(f"- {line}" for line in lines)

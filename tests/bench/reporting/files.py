@@ -15,16 +15,10 @@ def measure(options, scope, pictures):
     return whole_renders.measure(folders, SIZE_PX, options, scope)
 
 
-def runs(results):
-    """(peer's name, {scene: engines}) of each Blender that was measured."""
-    own = [("Cycles", results["files"])] if results.get("files") else []
-    return own + [(f"Cycles of {run['blender']}", run["made"]) for run in elsewhere.of_part(results, "files")]
-
-
 def headlines(results):
     """The least and the most gain beside each Blender's Cycles."""
     lines = []
-    for cycles, made in runs(results):
+    for cycles, made in elsewhere.beside(results, "files"):
         ratios = [gain["ratio"] for _name, gain in whole_renders.gains(made)]
         errors = sorted(whole_renders.error_ratios(engines)["mse"] for engines in made.values())
         lines.append(f"A first F12 of {len(ratios)} whole files at {SIZE_PX[0]}×{SIZE_PX[1]} and "
@@ -36,12 +30,13 @@ def headlines(results):
 
 def losses(results):
     """Scenes in which Cycles is done sooner, or has the smaller error."""
-    return [line for cycles, made in runs(results) for line in whole_renders.losses(made, cycles)]
+    return [line for cycles, made in elsewhere.beside(results, "files")
+            for line in whole_renders.losses(made, cycles)]
 
 
 def section(results):
     """Seconds and errors of each scene, a table for each Blender."""
-    tables = [f"{cycles}:\n\n{whole_renders.section_table(made)}" for cycles, made in runs(results)]
+    tables = [f"{cycles}:\n\n{whole_renders.section_table(made)}" for cycles, made in elsewhere.beside(results, "files")]
     if not tables:
         return ""
     return "\n\n".join([

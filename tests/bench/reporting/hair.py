@@ -3,7 +3,7 @@
 
 import statistics
 
-from . import whole_renders
+from . import elsewhere, whole_renders
 from .tables import digits, ratio, table, words
 
 SIZE_PX = 240, 180
@@ -21,32 +21,46 @@ def measure(options, scope, pictures):
     return made
 
 
-def headline(results):
-    """The least and the most gain at each size."""
-    at = [f"{digits(ratios[0], 2)} to {digits(ratios[-1], 2)} times as long at {width}×{height}"
-          for (width, height), ratios in ((size, [gain["ratio"] for _name, gain in whole_renders.gains(results, key)])
-                                          for size, key in ((SIZE_PX, "seconds"), (LARGE_SIZE_PX, LARGE))) if ratios]
-    return (f"With {len(results)} scenes of hair, a first F12 of {whole_renders.SAMPLES} samples takes Cycles "
-            f"{', '.join(at)}.")
+def headlines(results):
+    """The least and the most gain at each size beside each Blender's Cycles."""
+    lines = []
+    for cycles, made in elsewhere.beside(results, "hair"):
+        at = [f"{digits(ratios[0], 2)} to {digits(ratios[-1], 2)} times as long at {width}×{height}"
+              for (width, height), ratios in ((size, [gain["ratio"] for _name, gain in whole_renders.gains(made, key)])
+                                              for size, key in ((SIZE_PX, "seconds"), (LARGE_SIZE_PX, LARGE))) if ratios]
+        lines.append(f"With {len(made)} scenes of hair, a first F12 of {whole_renders.SAMPLES} samples takes {cycles} "
+                     f"{', '.join(at)}.")
+    return lines
 
 
 def losses(results):
     """Scenes in which Cycles is done sooner, or has the smaller error."""
-    slower = [f"{words(name)}, {LARGE_SIZE_PX[0]}×{LARGE_SIZE_PX[1]}: F12 of Cycles over Volley's {ratio(gain)}"
-              for name, gain in whole_renders.gains(results, LARGE) if gain["ratio"] < 1.0]
-    return whole_renders.losses(results) + slower
+    lines = []
+    for cycles, made in elsewhere.beside(results, "hair"):
+        lines += whole_renders.losses(made, cycles)
+        lines += [f"{words(name)}, {LARGE_SIZE_PX[0]}×{LARGE_SIZE_PX[1]}: F12 of {cycles} over Volley's {ratio(gain)}"
+                  for name, gain in whole_renders.gains(made, LARGE) if gain["ratio"] < 1.0]
+    return lines
 
 
 def section(results):
-    """Seconds and errors of each scene."""
-    engines = whole_renders.ENGINES
-    large = [[words(name), *(digits(statistics.median(results[name][engine][LARGE])) for engine in engines),
-              ratio(gain)] for name, gain in whole_renders.gains(results, LARGE)]
+    """Seconds and errors of each scene, tables for each Blender."""
+    tables = [f"{cycles}:\n\n{_tables(made)}" for cycles, made in elsewhere.beside(results, "hair")]
+    if not tables:
+        return ""
     return "\n\n".join([
         "## Hair",
         f"A first F12 in a new Blender at {SIZE_PX[0]}×{SIZE_PX[1]} and {whole_renders.SAMPLES} samples: Blender's "
         "growing of the strands, sync, build and rays. Errors are against a Cycles picture of more samples, the same "
-        "for both.",
+        "for both.", *tables])
+
+
+def _tables(results):
+    """Those of one Blender."""
+    engines = whole_renders.ENGINES
+    large = [[words(name), *(digits(statistics.median(results[name][engine][LARGE])) for engine in engines),
+              ratio(gain)] for name, gain in whole_renders.gains(results, LARGE)]
+    return "\n\n".join([
         whole_renders.section_table(results),
         *([f"The same at {LARGE_SIZE_PX[0]}×{LARGE_SIZE_PX[1]}, its time alone:",
            table(whole_renders.COLUMNS[:4], large)] if large else [])])
