@@ -126,6 +126,12 @@ struct trc_snapshot *query_scene_snapshot(trc_scene scene) {
     return snapshot;
 }
 
+trc_scene_stats query_scene_stats(trc_scene scene) {
+    trc_scene_stats stats = {.struct_size = sizeof stats};
+    (void)trc_scene_get_stats(scene, &stats);
+    return stats;
+}
+
 void query_transform(const float axis[3], float radians, const float scale[3],
                      const float offset[3], float transform_out[12]) {
     const float length = sqrtf(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]);

@@ -59,6 +59,9 @@ struct trc_snapshot;
 /* The snapshot in force: valid until the next commit. */
 struct trc_snapshot *query_scene_snapshot(trc_scene scene);
 
+/* Counts of the last commit. */
+trc_scene_stats query_scene_stats(trc_scene scene);
+
 /* mesh_add_needle_fan about the origin, turned so that no coordinate is a round number, into an
  * empty mesh. */
 void query_turned_needles(struct mesh *mesh, uint32_t count, float aspect);

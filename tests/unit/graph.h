@@ -148,6 +148,22 @@ GRAPH_INLINE uint32_t traits(void) {
     return has;
 }
 
+/* An Image node at a UV map. */
+GRAPH_INLINE int32_t add_image(trc_id image, const char *uv) {
+    const int32_t map = add(TRC_NODE_UV_MAP, 0, 0, NULL);
+    graph.nodes[map].name = uv;
+    const int32_t node = ADD(TRC_NODE_IMAGE, TRC_IMAGE_EXTEND, link_to(map, 0), value(0));
+    graph.nodes[node].image = image;
+    return node;
+}
+
+GRAPH_INLINE uint32_t count_op(const struct trc_material *m, uint32_t op) {
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < m->instruction_count; i++)
+        count += m->instructions[i].op == op;
+    return count;
+}
+
 /* The graph must be refused with that status and a message with these words. */
 GRAPH_INLINE void refused(trc_status expected, const char *first, const char *second) {
     struct trc_material *m = NULL;

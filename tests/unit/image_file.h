@@ -9,6 +9,7 @@
 #include "core/core.h"
 #include "image/image.h"
 #include "image/reader.h"
+#include "model/texel.h"
 
 /* Of the file written last: the test removes it. */
 static char path[256];
@@ -79,5 +80,37 @@ static const char color_config[] =
     "  - !<ColorSpace>\n"
     "    name: root\n"
     "    to_reference: !<ExponentTransform> {value: [2, 2, 2, 1]}\n";
+
+/* Pixels of bytes or floats, RGBA, straight alpha. */
+static inline trc_image_desc pixels_desc(uint32_t width, uint32_t height, const void *pixels,
+                                         bool is_float) {
+    return (trc_image_desc){.struct_size = sizeof(trc_image_desc),
+                            .width = width,
+                            .height = height,
+                            .alpha_mode = TRC_ALPHA_STRAIGHT,
+                            .is_float = is_float,
+                            .pixels = pixels,
+                            .pixel_bytes = (uint64_t)width * height * (is_float ? 16 : 4)};
+}
+
+/* An image that must not load, with that status and a message, and nothing kept. */
+static inline void refused(const trc_image_desc *desc, trc_status expected) {
+    struct trc_image *image = NULL;
+    const uint64_t bytes = memory_of_images();
+    const trc_status status = trc_image_load(desc, &source, &image);
+    if (status != expected)
+        fail_msg("status %d: %s", status, trc_last_message());
+    assert_true(trc_last_message()[0] != '\0');
+    assert_null(image);
+    assert_true(memory_of_images() == bytes);
+}
+
+/* A value of a smaller level, by its place among the level's. */
+static inline float level_value(const struct trc_image *image, uint32_t level, uint64_t channel) {
+    const void *texels = image->levels[level].texels;
+    return image->level_format == TRC_TEXEL_F32
+               ? ((const float *)texels)[channel]
+               : trc_half_to_float(((const uint16_t *)texels)[channel]);
+}
 
 #endif

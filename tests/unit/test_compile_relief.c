@@ -3,13 +3,6 @@
 
 #include "model/nodes.h"
 
-static uint32_t count_op(const struct trc_material *m, uint32_t op) {
-    uint32_t count = 0;
-    for (uint32_t i = 0; i < m->instruction_count; i++)
-        count += m->instructions[i].op == op;
-    return count;
-}
-
 static int32_t add_bump(trc_node_input height, trc_node_input normal) {
     return ADD(TRC_NODE_BUMP, 0, value(1), value(.5f), value(.1f), height, normal);
 }

@@ -4,15 +4,7 @@
 #include "core/core.h"
 #include "model/snapshot.h"
 #include "node_list.h"
-#include "scene/scene.h"
-
-static const struct trc_snapshot *snapshot_of(trc_scene scene) {
-    struct trc_scene_access access;
-    assert_int_equal(trc_scene_enter(scene, &access), TRC_OK);
-    const struct trc_snapshot *snapshot = access.scene->snapshot;
-    trc_scene_leave(&access);
-    return snapshot;
-}
+#include "query_scene.h"
 
 /* A square of two triangles, smooth, in the plane z = 0, in two slots. */
 static const float square[12] = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0};
@@ -95,7 +87,7 @@ static void vertices_move(void **state) {
         struct stage s;
         const trc_material_desc desc = mover(&list, 0.5f, TRC_DISPLACEMENT_TRUE);
         build(&s, &desc, &desc);
-        const struct trc_mesh *mesh = snapshot_of(s.scene)->meshes[0];
+        const struct trc_mesh *mesh = query_scene_snapshot(s.scene)->meshes[0];
         for (uint32_t v = 0; v < 4; v++)
             expect_moved(mesh, v, 0.5f);
         assert_int_equal(trc_scene_destroy(s.scene), TRC_OK);
@@ -112,7 +104,7 @@ static void slots_move_their_own(void **state) {
     const trc_material_desc first = mover(&moving, 0.5f, TRC_DISPLACEMENT_TRUE);
     const trc_material_desc second = mover(&still, 0.5f, TRC_DISPLACEMENT_BUMP);
     build(&s, &first, &second);
-    const struct trc_mesh *mesh = snapshot_of(s.scene)->meshes[0];
+    const struct trc_mesh *mesh = query_scene_snapshot(s.scene)->meshes[0];
     for (uint32_t v = 0; v < 3; v++)
         expect_moved(mesh, v, 0.5f);
     expect_moved(mesh, 3, 0.0f);
@@ -127,7 +119,7 @@ static void first_triangles_rule(void **state) {
     const trc_material_desc first = mover(&near, 0.25f, TRC_DISPLACEMENT_TRUE);
     const trc_material_desc second = mover(&far, 1.0f, TRC_DISPLACEMENT_TRUE);
     build(&s, &first, &second);
-    const struct trc_mesh *mesh = snapshot_of(s.scene)->meshes[0];
+    const struct trc_mesh *mesh = query_scene_snapshot(s.scene)->meshes[0];
     for (uint32_t v = 0; v < 3; v++)
         expect_moved(mesh, v, 0.25f);
     expect_moved(mesh, 3, 1.0f);
@@ -147,7 +139,7 @@ static void shapes_are_kept(void **state) {
         assert_int_equal(trc_instance_update(s.scene, s.instance, &s.desc), TRC_OK);
         assert_int_equal(trc_scene_commit(s.scene), TRC_OK);
         for (uint32_t v = 0; v < 4; v++)
-            expect_moved(snapshot_of(s.scene)->meshes[0], v, round ? 0.5f : 0.0f);
+            expect_moved(query_scene_snapshot(s.scene)->meshes[0], v, round ? 0.5f : 0.0f);
     }
     assert_int_equal(trc_scene_destroy(s.scene), TRC_OK);
 }
@@ -178,7 +170,7 @@ static void normals_are_made_anew(void **state) {
         const trc_material_desc first = mover(&near, 0.25f, method);
         const trc_material_desc second = mover(&far, 1.0f, method);
         build(&s, &first, &second);
-        const struct trc_mesh *mesh = snapshot_of(s.scene)->meshes[0];
+        const struct trc_mesh *mesh = query_scene_snapshot(s.scene)->meshes[0];
         double n[2][3], sum[3], length = 0;
         unit_normal(mesh, 0, n[0]);
         unit_normal(mesh, 1, n[1]);
@@ -205,7 +197,7 @@ static void generated_coordinates_stay(void **state) {
     struct stage s;
     const trc_material_desc desc = mover(&list, 0.5f, TRC_DISPLACEMENT_TRUE);
     build(&s, &desc, &desc);
-    const struct trc_mesh *mesh = snapshot_of(s.scene)->meshes[0];
+    const struct trc_mesh *mesh = query_scene_snapshot(s.scene)->meshes[0];
     assert_non_null(mesh->generated);
     for (uint32_t v = 0; v < 4; v++) {
         assert_true(mesh->generated[3 * v] == square[3 * v]);
@@ -222,32 +214,33 @@ static void edits_are_followed(void **state) {
     struct stage s;
     trc_material_desc desc = mover(&list, 0.5f, TRC_DISPLACEMENT_TRUE);
     build(&s, &desc, &desc);
-    const struct trc_mesh *moved = snapshot_of(s.scene)->meshes[0];
-    const struct trc_bvh *bvh = snapshot_of(s.scene)->bvh;
+    const struct trc_mesh *moved = query_scene_snapshot(s.scene)->meshes[0];
+    const struct trc_bvh *bvh = query_scene_snapshot(s.scene)->bvh;
     const trc_camera_desc camera = default_camera_desc();
     assert_int_equal(trc_scene_set_camera(s.scene, &camera), TRC_OK);
     assert_int_equal(trc_scene_commit(s.scene), TRC_OK);
-    assert_ptr_equal(snapshot_of(s.scene)->meshes[0], moved);
-    assert_ptr_equal(snapshot_of(s.scene)->bvh, bvh);
+    assert_ptr_equal(query_scene_snapshot(s.scene)->meshes[0], moved);
+    assert_ptr_equal(query_scene_snapshot(s.scene)->bvh, bvh);
 
     desc = mover(&list, 0.125f, TRC_DISPLACEMENT_TRUE);
     assert_int_equal(trc_material_update(s.scene, s.materials[0], &desc), TRC_OK);
     assert_int_equal(trc_material_update(s.scene, s.materials[1], &desc), TRC_OK);
     assert_int_equal(trc_scene_commit(s.scene), TRC_OK);
     for (uint32_t v = 0; v < 4; v++)
-        expect_moved(snapshot_of(s.scene)->meshes[0], v, 0.125f);
-    assert_ptr_not_equal(snapshot_of(s.scene)->bvh, bvh);
+        expect_moved(query_scene_snapshot(s.scene)->meshes[0], v, 0.125f);
+    assert_ptr_not_equal(query_scene_snapshot(s.scene)->bvh, bvh);
 
     s.transform[3] = 5; /* along X: the place moves by more */
     assert_int_equal(trc_instance_update(s.scene, s.instance, &s.desc), TRC_OK);
     assert_int_equal(trc_scene_commit(s.scene), TRC_OK);
-    assert_true(fabsf(snapshot_of(s.scene)->meshes[0]->positions[0] - 0.125f * 2.5f) < 1e-6f);
+    assert_true(fabsf(query_scene_snapshot(s.scene)->meshes[0]->positions[0] - 0.125f * 2.5f) <
+                1e-6f);
 
     desc = mover(&list, 0.125f, TRC_DISPLACEMENT_BUMP);
     assert_int_equal(trc_material_update(s.scene, s.materials[0], &desc), TRC_OK);
     assert_int_equal(trc_material_update(s.scene, s.materials[1], &desc), TRC_OK);
     assert_int_equal(trc_scene_commit(s.scene), TRC_OK);
-    assert_memory_equal(snapshot_of(s.scene)->meshes[0]->positions, square, sizeof square);
+    assert_memory_equal(query_scene_snapshot(s.scene)->meshes[0]->positions, square, sizeof square);
     assert_int_equal(trc_scene_destroy(s.scene), TRC_OK);
 }
 
@@ -264,7 +257,7 @@ static void memory_may_end(void **state) {
     trc_status status = TRC_ERROR_OUT_OF_MEMORY;
     uint32_t failures = 0;
     for (; status != TRC_OK && failures < 1000; failures++) {
-        expect_moved(snapshot_of(s.scene)->meshes[0], 2, 0.5f);
+        expect_moved(query_scene_snapshot(s.scene)->meshes[0], 2, 0.5f);
         trc_memory_fail_at(failures, true);
         status = trc_scene_commit(s.scene);
         trc_memory_fail_at(-1, false);
@@ -273,7 +266,7 @@ static void memory_may_end(void **state) {
     assert_int_equal(status, TRC_OK);
     assert_true(failures > 15); /* those of the displacement among them */
     for (uint32_t v = 0; v < 4; v++)
-        expect_moved(snapshot_of(s.scene)->meshes[0], v, 0.25f);
+        expect_moved(query_scene_snapshot(s.scene)->meshes[0], v, 0.25f);
     assert_int_equal(trc_scene_destroy(s.scene), TRC_OK);
 }
 
@@ -284,7 +277,7 @@ static void bad_numbers_move_nothing(void **state) {
     struct stage s;
     const trc_material_desc desc = mover(&list, 3e38f, TRC_DISPLACEMENT_TRUE);
     build(&s, &desc, &desc);
-    const struct trc_mesh *mesh = snapshot_of(s.scene)->meshes[0];
+    const struct trc_mesh *mesh = query_scene_snapshot(s.scene)->meshes[0];
     for (uint32_t i = 0; i < 12; i++)
         assert_true(isfinite(mesh->positions[i]));
     assert_int_equal(trc_scene_destroy(s.scene), TRC_OK);

@@ -1,6 +1,7 @@
 /* A scene that has been edited shows what one shows that was made so: the same bits, whatever of
  * the former state a commit keeps. */
 #include "level_test.h"
+#include "query_scene.h"
 
 /* A floor under a roof, a sun above, and what is edited of them. */
 struct edited {
@@ -115,12 +116,6 @@ static void materials_change(void **state) {
     }
 }
 
-static trc_scene_stats stats_of(trc_scene scene) {
-    trc_scene_stats stats = {.struct_size = sizeof stats};
-    assert_ok(trc_scene_get_stats(scene, &stats));
-    return stats;
-}
-
 /* Trees whose leaves say what is transparent stay while that does, and are refitted. */
 static void trees_of_transparent_meshes_stay(void **state) {
     (void)state;
@@ -129,14 +124,14 @@ static void trees_of_transparent_meshes_stay(void **state) {
     const struct edited e = edited_make(TRC_NODE_TRANSPARENT, 0.5f, 40);
     const struct edited fresh = edited_make(TRC_NODE_TRANSPARENT, 0.5f, 40);
     draw(e.scene, before);
-    assert_int_equal(stats_of(e.scene).built_count, 2);
+    assert_int_equal(query_scene_stats(e.scene).built_count, 2);
     fixture_quad(e.scene, moved, e.roof);
     assert_ok(trc_scene_commit(e.scene));
-    assert_int_equal(stats_of(e.scene).built_count, 1); /* the new one */
+    assert_int_equal(query_scene_stats(e.scene).built_count, 1); /* the new one */
     assert_ok(trc_mesh_update(e.scene, e.roof_mesh, 1, moved, 12, NULL, 0));
     assert_ok(trc_scene_commit(e.scene));
-    assert_int_equal(stats_of(e.scene).built_count, 0);
-    assert_int_equal(stats_of(e.scene).refitted_count, 1);
+    assert_int_equal(query_scene_stats(e.scene).built_count, 0);
+    assert_int_equal(query_scene_stats(e.scene).refitted_count, 1);
     assert_ok(trc_mesh_update(fresh.scene, fresh.roof_mesh, 1, moved, 12, NULL, 0));
     fixture_quad(fresh.scene, moved, fresh.roof);
     expect_same(&e, &fresh, before);

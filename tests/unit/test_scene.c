@@ -3,38 +3,20 @@
 #include "fixture.h"
 
 #include <pthread.h>
-#include <sched.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 
-#include "bvh/bvh.h"
-#include "bvh_check.h"
 #include "core/core.h"
 #include "model/film.h"
-#include "scene/rebuild.h"
+#include "query_scene.h"
 #include "scene/scene.h"
 
 /* ---- scene to snapshot ---- */
 
-/* Runs body on the scene's state, as a public call would. */
-static struct trc_snapshot *snapshot_of(trc_scene scene) {
-    struct trc_scene_access access;
-    assert_int_equal(trc_scene_enter(scene, &access), TRC_OK);
-    struct trc_snapshot *snapshot = access.scene->snapshot;
-    trc_scene_leave(&access);
-    return snapshot;
-}
-
-static trc_scene_stats stats_of(trc_scene scene) {
-    trc_scene_stats stats = {.struct_size = sizeof stats};
-    assert_int_equal(trc_scene_get_stats(scene, &stats), TRC_OK);
-    return stats;
-}
-
 static void commits_share_what_stays(void **state) {
     (void)state;
     const trc_scene scene = fixture_scene();
-    const struct trc_snapshot *first = snapshot_of(scene);
+    const struct trc_snapshot *first = query_scene_snapshot(scene);
     const struct trc_bvh *bvh = first->bvh;
     const struct trc_light_table *lights = first->lights;
     assert_int_equal(first->instance_count, 1);
@@ -44,25 +26,25 @@ static void commits_share_what_stays(void **state) {
     camera.aperture_radius = 0.1f;
     assert_int_equal(trc_scene_set_camera(scene, &camera), TRC_OK);
     assert_int_equal(trc_scene_commit(scene), TRC_OK);
-    const struct trc_snapshot *second = snapshot_of(scene);
+    const struct trc_snapshot *second = query_scene_snapshot(scene);
     assert_ptr_equal(second->bvh, bvh);
     assert_ptr_equal(second->lights, lights);
     assert_true(second->features & TRC_FEATURE_LENS);
-    assert_int_equal(stats_of(scene).built_count, 0);
+    assert_int_equal(query_scene_stats(scene).built_count, 0);
 
     trc_light_desc light = default_light_desc();
     trc_id id = 0;
     assert_int_equal(trc_light_create(scene, &light, &id), TRC_OK);
     assert_int_equal(trc_scene_commit(scene), TRC_OK);
-    assert_ptr_equal(snapshot_of(scene)->bvh, bvh);
-    assert_int_equal(stats_of(scene).light_count, 2);
+    assert_ptr_equal(query_scene_snapshot(scene)->bvh, bvh);
+    assert_int_equal(query_scene_stats(scene).light_count, 2);
     assert_int_equal(trc_scene_destroy(scene), TRC_OK);
 }
 
 static void features_are_what_the_scene_uses(void **state) {
     (void)state;
     const trc_scene scene = fixture_scene();
-    uint32_t features = stats_of(scene).features;
+    uint32_t features = query_scene_stats(scene).features;
     assert_int_equal(features, TRC_FEATURE_LIGHTS | TRC_FEATURE_AREA_LIGHTS);
     trc_id mesh = 0, instance = 0;
     const trc_mesh_desc mesh_desc = default_mesh_desc();
@@ -75,13 +57,14 @@ static void features_are_what_the_scene_uses(void **state) {
     desc.key_count = 2;
     assert_int_equal(trc_instance_create(scene, &desc, &instance), TRC_OK);
     assert_int_equal(trc_scene_commit(scene), TRC_OK);
-    assert_false(stats_of(scene).features & TRC_FEATURE_OBJECT_MOTION); /* it stands still */
+    assert_false(query_scene_stats(scene).features &
+                 TRC_FEATURE_OBJECT_MOTION); /* it stands still */
     transforms[15] = 1.0f;
     desc.visibility = TRC_VISIBLE_CAMERA;
     assert_int_equal(trc_instance_update(scene, instance, &desc), TRC_OK);
     assert_int_equal(trc_instance_create(scene, &desc, &instance), TRC_OK);
     assert_int_equal(trc_scene_commit(scene), TRC_OK);
-    features = stats_of(scene).features;
+    features = query_scene_stats(scene).features;
     assert_true(features & TRC_FEATURE_OBJECT_MOTION);
     assert_true(features & TRC_FEATURE_VISIBILITY);
     assert_true(features & TRC_FEATURE_INSTANCES);
@@ -94,243 +77,13 @@ static void features_are_what_the_scene_uses(void **state) {
     world.ao_factor = 0.5f;
     assert_int_equal(trc_scene_set_world(scene, &world), TRC_OK);
     assert_int_equal(trc_scene_commit(scene), TRC_OK);
-    features = stats_of(scene).features;
+    features = query_scene_stats(scene).features;
     assert_true(features & TRC_FEATURE_DEFORMATION);
     assert_true(features & TRC_FEATURE_AMBIENT_OCCLUSION);
     assert_false(features & TRC_FEATURE_ENVIRONMENT);
-    assert_int_equal(stats_of(scene).refitted_count + stats_of(scene).built_count > 0, 1);
-    assert_int_equal(trc_scene_destroy(scene), TRC_OK);
-}
-
-/* ---- trees that grow bad ---- */
-
-#define SHEET_SIDE 40u
-#define SHEET_VERTICES (SHEET_SIDE * SHEET_SIDE)
-#define SHEET_TRIANGLES (2 * (SHEET_SIDE - 1) * (SHEET_SIDE - 1))
-
-/* A flat sheet, each vertex a share of the way to where another one was. */
-static void sheet_positions(float share, float positions[3 * SHEET_VERTICES]) {
-    for (uint32_t i = 0; i < SHEET_VERTICES; i++) {
-        const uint32_t other = i * 611u % SHEET_VERTICES; /* coprime: no two go to the same */
-        const float x = (float)(i % SHEET_SIDE), y = (float)(i / SHEET_SIDE);
-        const float to_x = (float)(other % SHEET_SIDE), to_y = (float)(other / SHEET_SIDE);
-        positions[3 * i] = ((1.0f - share) * x + share * to_x) / SHEET_SIDE - 0.5f;
-        positions[3 * i + 1] = ((1.0f - share) * y + share * to_y) / SHEET_SIDE - 0.5f;
-        positions[3 * i + 2] = 0.01f * share * (float)(i % 7);
-    }
-}
-
-struct sheet {
-    trc_scene scene;
-    trc_id mesh, instance;
-};
-
-static struct sheet sheet_create(uint32_t is_final, float share) {
-    static float positions[3 * SHEET_VERTICES];
-    static uint32_t indices[3 * SHEET_TRIANGLES];
-    uint32_t *index = indices;
-    for (uint32_t y = 0; y + 1 < SHEET_SIDE; y++)
-        for (uint32_t x = 0; x + 1 < SHEET_SIDE; x++) {
-            const uint32_t i = y * SHEET_SIDE + x;
-            const uint32_t corners[6] = {
-                i, i + 1, i + SHEET_SIDE, i + 1, i + SHEET_SIDE + 1, i + SHEET_SIDE};
-            memcpy(index, corners, sizeof corners);
-            index += 6;
-        }
-    sheet_positions(share, positions);
-    trc_mesh_desc mesh = default_mesh_desc();
-    mesh.vertex_count = SHEET_VERTICES;
-    mesh.triangle_count = SHEET_TRIANGLES;
-    mesh.positions = positions;
-    mesh.position_count = 3 * SHEET_VERTICES;
-    mesh.indices = indices;
-    mesh.index_count = 3 * SHEET_TRIANGLES;
-    trc_scene_desc desc = default_scene_desc();
-    desc.is_final = is_final;
-    struct sheet sheet = {0};
-    assert_int_equal(trc_scene_create(&desc, &sheet.scene), TRC_OK);
-    assert_int_equal(trc_mesh_create(sheet.scene, &mesh, &sheet.mesh), TRC_OK);
-    trc_instance_desc instance = default_instance_desc(sheet.mesh);
-    instance.visibility = TRC_VISIBLE_CAMERA; /* keeps it out of a joined tree */
-    assert_int_equal(trc_instance_create(sheet.scene, &instance, &sheet.instance), TRC_OK);
-    assert_int_equal(trc_scene_commit(sheet.scene), TRC_OK);
-    return sheet;
-}
-
-static void sheet_pose(const struct sheet *sheet, float share) {
-    static float positions[3 * SHEET_VERTICES];
-    sheet_positions(share, positions);
     assert_int_equal(
-        trc_mesh_update(sheet->scene, sheet->mesh, 1, positions, 3 * SHEET_VERTICES, NULL, 0),
-        TRC_OK);
-    assert_int_equal(trc_scene_commit(sheet->scene), TRC_OK);
-}
-
-/* Waits for a rebuild that is under way; whether there is one. */
-static bool await_rebuild(trc_scene scene) {
-    struct trc_scene_access access;
-    assert_int_equal(trc_scene_enter(scene, &access), TRC_OK);
-    const struct trc_rebuild *rebuild = access.scene->rebuild;
-    while (rebuild && !trc_rebuild_is_done(rebuild))
-        sched_yield();
-    trc_scene_leave(&access);
-    return rebuild != NULL;
-}
-
-/* Poses until a rebuild has started; the share of the last. No pose builds at once. */
-static float pose_until_grown(const struct sheet *sheet) {
-    float share = 0.0f;
-    while (!await_rebuild(sheet->scene)) {
-        share += 0.002f;
-        assert_true(share < 0.5f);
-        sheet_pose(sheet, share);
-        assert_int_equal(stats_of(sheet->scene).built_count, 0);
-        assert_int_equal(stats_of(sheet->scene).refitted_count, 1);
-    }
-    return share;
-}
-
-/* The same hits as in a scene that was made with that pose, and a sound tree. */
-static void expect_fresh_hits(const struct sheet *sheet, float share) {
-    enum { RAYS = 1000 };
-    static float o[3][RAYS], d[3][RAYS], distance[2][RAYS];
-    static uint32_t instance[RAYS], triangle[2][RAYS];
-    for (uint32_t i = 0; i < RAYS; i++) {
-        o[0][i] = (float)(i * 7919u % RAYS) / RAYS - 0.5f;
-        o[1][i] = (float)(i * 6101u % RAYS) / RAYS - 0.5f;
-        o[2][i] = 1.0f;
-        d[0][i] = 0.1f;
-        d[1][i] = -0.05f;
-        d[2][i] = -1.0f;
-    }
-    const trc_rays rays = {.struct_size = sizeof rays,
-                           .visibility = TRC_VISIBLE_ALL,
-                           .count = RAYS,
-                           .origin_x = o[0],
-                           .origin_y = o[1],
-                           .origin_z = o[2],
-                           .direction_x = d[0],
-                           .direction_y = d[1],
-                           .direction_z = d[2]};
-    const struct sheet fresh = sheet_create(0, share);
-    for (int i = 0; i < 2; i++) {
-        const trc_hits hits = {.struct_size = sizeof hits,
-                               .instance = instance,
-                               .triangle = triangle[i],
-                               .distance = distance[i]};
-        assert_int_equal(trc_query_closest(i ? fresh.scene : sheet->scene, &rays, 0, &hits),
-                         TRC_OK);
-    }
-    assert_true(instance[RAYS / 2] == 0);
-    assert_memory_equal(triangle[0], triangle[1], sizeof triangle[0]);
-    assert_memory_equal(distance[0], distance[1], sizeof distance[0]);
-    assert_int_equal(trc_scene_destroy(fresh.scene), TRC_OK);
-    char message[256];
-    const struct trc_snapshot *snapshot = snapshot_of(sheet->scene);
-    if (!bvh_check(snapshot->bvh, snapshot, message, sizeof message))
-        fail_msg("%s", message);
-}
-
-static void grown_trees_are_rebuilt_apart(void **state) {
-    (void)state;
-    const struct sheet sheet = sheet_create(0, 0.0f);
-    const float grown = pose_until_grown(&sheet);
-    assert_true(trc_bvh_has_grown(snapshot_of(sheet.scene)->bvh, 0));
-    expect_fresh_hits(&sheet, grown);
-    sheet_pose(&sheet, grown + 0.002f); /* takes the tree of the pose before */
-    assert_int_equal(stats_of(sheet.scene).built_count, 0);
-    assert_false(trc_bvh_has_grown(snapshot_of(sheet.scene)->bvh, 0));
-    assert_false(await_rebuild(sheet.scene));
-    expect_fresh_hits(&sheet, grown + 0.002f);
-    assert_int_equal(trc_scene_destroy(sheet.scene), TRC_OK);
-}
-
-/* Another edit takes the tree as it is; an edit of the view leaves it for later. */
-static void rebuilt_trees_wait_to_be_taken(void **state) {
-    (void)state;
-    const struct sheet sheet = sheet_create(0, 0.0f);
-    const float grown = pose_until_grown(&sheet);
-    const trc_camera_desc camera = default_camera_desc();
-    assert_int_equal(trc_scene_set_camera(sheet.scene, &camera), TRC_OK);
-    assert_int_equal(trc_scene_commit(sheet.scene), TRC_OK);
-    assert_true(trc_bvh_has_grown(snapshot_of(sheet.scene)->bvh, 0));
-    trc_instance_desc instance = default_instance_desc(sheet.mesh);
-    assert_int_equal(trc_instance_update(sheet.scene, sheet.instance, &instance), TRC_OK);
-    assert_int_equal(trc_scene_commit(sheet.scene), TRC_OK);
-    assert_int_equal(stats_of(sheet.scene).built_count + stats_of(sheet.scene).refitted_count, 0);
-    assert_false(trc_bvh_has_grown(snapshot_of(sheet.scene)->bvh, 0));
-    expect_fresh_hits(&sheet, grown);
-    assert_int_equal(trc_scene_destroy(sheet.scene), TRC_OK);
-}
-
-/* A mesh that goes, or the scene, while its tree is under way; final scenes build at once. */
-static void rebuilds_end_with_what_they_are_for(void **state) {
-    (void)state;
-    const struct sheet gone = sheet_create(0, 0.0f), freed = sheet_create(0, 0.0f);
-    (void)pose_until_grown(&gone);
-    assert_int_equal(trc_instance_destroy(gone.scene, gone.instance), TRC_OK);
-    assert_int_equal(trc_mesh_destroy(gone.scene, gone.mesh), TRC_OK);
-    assert_int_equal(trc_scene_commit(gone.scene), TRC_OK);
-    assert_false(await_rebuild(gone.scene));
-    assert_int_equal(trc_scene_destroy(gone.scene), TRC_OK);
-    const float grown = pose_until_grown(&freed);
-    assert_int_equal(trc_scene_destroy(freed.scene), TRC_OK);
-    const struct sheet final = sheet_create(1, 0.0f);
-    sheet_pose(&final, grown);
-    assert_int_equal(stats_of(final.scene).built_count, 1);
-    assert_false(await_rebuild(final.scene));
-    assert_int_equal(trc_scene_destroy(final.scene), TRC_OK);
-}
-
-static bool has_rebuild(trc_scene scene) {
-    struct trc_scene_access access;
-    assert_int_equal(trc_scene_enter(scene, &access), TRC_OK);
-    const bool found = access.scene->rebuild != NULL;
-    trc_scene_leave(&access);
-    return found;
-}
-
-/* Destroys the sheet while its tree is under way and puts a cube in its place; false if the tree
- * was done before the cube was committed. */
-static bool replace_sheet(struct sheet *sheet) {
-    for (float share = 0.002f; !has_rebuild(sheet->scene); share += 0.002f) {
-        assert_true(share < 0.5f);
-        sheet_pose(sheet, share);
-    }
-    const trc_mesh_desc cube = default_mesh_desc();
-    assert_int_equal(trc_instance_destroy(sheet->scene, sheet->instance), TRC_OK);
-    assert_int_equal(trc_mesh_destroy(sheet->scene, sheet->mesh), TRC_OK);
-    assert_int_equal(trc_mesh_create(sheet->scene, &cube, &sheet->mesh), TRC_OK);
-    trc_instance_desc instance = default_instance_desc(sheet->mesh);
-    instance.visibility = TRC_VISIBLE_CAMERA;
-    assert_int_equal(trc_instance_create(sheet->scene, &instance, &sheet->instance), TRC_OK);
-    assert_int_equal(trc_scene_commit(sheet->scene), TRC_OK);
-    return has_rebuild(sheet->scene);
-}
-
-/* The tree of a mesh that has gone is not for the one in its place. */
-static void rebuilds_are_for_their_own_mesh(void **state) {
-    (void)state;
-    bool is_under_way = false;
-    for (int trial = 0; trial < 200 && !is_under_way; trial++) {
-        struct sheet sheet = sheet_create(0, 0.0f);
-        is_under_way = replace_sheet(&sheet);
-        if (is_under_way) {
-            float posed[24];
-            char message[256];
-            assert_true(await_rebuild(sheet.scene));
-            for (int i = 0; i < 24; i++)
-                posed[i] = 1.01f * cube_positions[i];
-            assert_int_equal(trc_mesh_update(sheet.scene, sheet.mesh, 1, posed, 24, NULL, 0),
-                             TRC_OK);
-            assert_int_equal(trc_scene_commit(sheet.scene), TRC_OK);
-            const struct trc_snapshot *snapshot = snapshot_of(sheet.scene);
-            if (!bvh_check(snapshot->bvh, snapshot, message, sizeof message))
-                fail_msg("%s", message);
-        }
-        assert_int_equal(trc_scene_destroy(sheet.scene), TRC_OK);
-    }
-    assert_true(is_under_way);
+        query_scene_stats(scene).refitted_count + query_scene_stats(scene).built_count > 0, 1);
+    assert_int_equal(trc_scene_destroy(scene), TRC_OK);
 }
 
 /* ---- queries ---- */
@@ -339,7 +92,7 @@ static void rebuilds_are_for_their_own_mesh(void **state) {
 static void queries_hold_the_snapshot_no_longer(void **state) {
     (void)state;
     const trc_scene scene = fixture_scene();
-    struct trc_snapshot *snapshot = (struct trc_snapshot *)snapshot_of(scene);
+    struct trc_snapshot *snapshot = query_scene_snapshot(scene);
     const uint32_t refs = (uint32_t)atomic_load(&snapshot->refs);
     const float zero = 0.0f, down = -1.0f, up = 5.0f;
     uint32_t instance = 0;
@@ -377,12 +130,12 @@ static void removed_lights_are_gone(void **state) {
     trc_id light = 0;
     assert_int_equal(trc_light_create(scene, &desc, &light), TRC_OK);
     assert_int_equal(trc_scene_commit(scene), TRC_OK);
-    assert_int_equal(stats_of(scene).light_count, 2);
+    assert_int_equal(query_scene_stats(scene).light_count, 2);
     assert_int_equal(trc_light_destroy(scene, light), TRC_OK);
     assert_int_equal(trc_light_destroy(scene, light), TRC_ERROR_INVALID_HANDLE);
-    assert_int_equal(stats_of(scene).light_count, 2); /* until the commit */
+    assert_int_equal(query_scene_stats(scene).light_count, 2); /* until the commit */
     assert_int_equal(trc_scene_commit(scene), TRC_OK);
-    assert_int_equal(stats_of(scene).light_count, 1);
+    assert_int_equal(query_scene_stats(scene).light_count, 1);
     assert_int_equal(trc_scene_destroy(scene), TRC_OK);
 }
 
@@ -404,7 +157,8 @@ static void cameras_move_if_their_keys_differ(void **state) {
         windows[4] = changed == 2 ? -0.4f : -0.5f;
         assert_int_equal(trc_scene_set_camera(scene, &desc), TRC_OK);
         assert_int_equal(trc_scene_commit(scene), TRC_OK);
-        assert_int_equal((stats_of(scene).features & TRC_FEATURE_CAMERA_MOTION) != 0, changed != 0);
+        assert_int_equal((query_scene_stats(scene).features & TRC_FEATURE_CAMERA_MOTION) != 0,
+                         changed != 0);
     }
     assert_int_equal(trc_scene_destroy(scene), TRC_OK);
 }
@@ -446,8 +200,8 @@ static void singular_instances_are_hidden_and_counted(void **state) {
     desc.transforms = transform;
     assert_int_equal(trc_instance_create(scene, &desc, &instance), TRC_OK);
     assert_int_equal(trc_scene_commit(scene), TRC_OK);
-    assert_int_equal(stats_of(scene).skipped_instance_count, 1);
-    const struct trc_snapshot *s = snapshot_of(scene);
+    assert_int_equal(query_scene_stats(scene).skipped_instance_count, 1);
+    const struct trc_snapshot *s = query_scene_snapshot(scene);
     assert_int_equal(s->instance_count, 2);
     assert_int_equal(s->instances[1].visibility, 0);
     assert_false(s->features & TRC_FEATURE_DEFORMATION); /* what nobody sees costs nothing */
@@ -461,15 +215,15 @@ static void singular_instances_are_hidden_and_counted(void **state) {
     transform[5] = 1.0f; /* flat */
     assert_int_equal(trc_instance_update(scene, instance, &desc), TRC_OK);
     assert_int_equal(trc_scene_commit(scene), TRC_OK);
-    assert_int_equal(stats_of(scene).skipped_instance_count, 0);
-    assert_int_equal(snapshot_of(scene)->instances[1].visibility, TRC_VISIBLE_ALL);
-    assert_true(snapshot_of(scene)->instances[1].is_thin);
+    assert_int_equal(query_scene_stats(scene).skipped_instance_count, 0);
+    assert_int_equal(query_scene_snapshot(scene)->instances[1].visibility, TRC_VISIBLE_ALL);
+    assert_true(query_scene_snapshot(scene)->instances[1].is_thin);
     transform[10] = -2.0f;
     assert_int_equal(trc_instance_update(scene, instance, &desc), TRC_OK);
     assert_int_equal(trc_scene_commit(scene), TRC_OK);
-    assert_int_equal(stats_of(scene).skipped_instance_count, 0);
-    assert_int_equal(snapshot_of(scene)->instances[1].flips, 1);
-    assert_false(snapshot_of(scene)->instances[1].is_thin);
+    assert_int_equal(query_scene_stats(scene).skipped_instance_count, 0);
+    assert_int_equal(query_scene_snapshot(scene)->instances[1].flips, 1);
+    assert_false(query_scene_snapshot(scene)->instances[1].is_thin);
     assert_int_equal(trc_scene_destroy(scene), TRC_OK);
 }
 
@@ -486,12 +240,12 @@ static void trees_of_flat_instances_are_kept(void **state) {
     for (int i = 0; i < 2; i++)
         assert_int_equal(trc_instance_create(scene, &desc, &flat[i]), TRC_OK);
     assert_int_equal(trc_scene_commit(scene), TRC_OK);
-    assert_true(stats_of(scene).built_count >= 2);
+    assert_true(query_scene_stats(scene).built_count >= 2);
     for (int moved = 0; moved < 2; moved++) {
         transform[3] = (float)moved;
         assert_int_equal(trc_instance_update(scene, flat[1], &desc), TRC_OK);
         assert_int_equal(trc_scene_commit(scene), TRC_OK);
-        assert_int_equal(stats_of(scene).built_count, moved);
+        assert_int_equal(query_scene_stats(scene).built_count, moved);
     }
     assert_int_equal(trc_scene_destroy(scene), TRC_OK);
 }
@@ -512,14 +266,14 @@ static void destroyed_materials_leave_the_default(void **state) {
     desc.material_count = 2;
     assert_int_equal(trc_instance_create(scene, &desc, &instance), TRC_OK);
     assert_int_equal(trc_scene_commit(scene), TRC_OK);
-    const struct trc_instance *placed = &snapshot_of(scene)->instances[1];
+    const struct trc_instance *placed = &query_scene_snapshot(scene)->instances[1];
     assert_int_equal(placed->materials[0], 1);
     assert_int_equal(placed->materials[1], 2);
     assert_int_equal(trc_material_destroy(scene, materials[0]), TRC_OK);
     trc_id replacement = 0; /* takes the slot, not the place */
     assert_int_equal(trc_material_create(scene, &material.desc, &replacement), TRC_OK);
     assert_int_equal(trc_scene_commit(scene), TRC_OK);
-    placed = &snapshot_of(scene)->instances[1];
+    placed = &query_scene_snapshot(scene)->instances[1];
     assert_int_equal(placed->materials[0], 0);
     assert_int_equal(placed->materials[1], 2);
     assert_int_equal(trc_scene_destroy(scene), TRC_OK);
@@ -550,13 +304,14 @@ static void instruction_sets_may_change(void **state) {
     (void)state;
     const trc_scene scene = fixture_scene();
     const uint32_t isa = trc_isa();
-    const struct trc_bvh *bvh = snapshot_of(scene)->bvh;
+    const struct trc_bvh *bvh = query_scene_snapshot(scene)->bvh;
     assert_int_equal(trc_scene_commit(scene), TRC_OK);
-    assert_ptr_equal(snapshot_of(scene)->bvh, bvh);
+    assert_ptr_equal(query_scene_snapshot(scene)->bvh, bvh);
     assert_int_equal(trc_set_isa(TRC_ISA_SCALAR), TRC_OK);
     assert_int_equal(trc_scene_commit(scene), TRC_OK);
-    assert_ptr_equal(snapshot_of(scene)->bvh, bvh);
-    assert_int_equal(stats_of(scene).built_count + stats_of(scene).refitted_count, 0);
+    assert_ptr_equal(query_scene_snapshot(scene)->bvh, bvh);
+    assert_int_equal(query_scene_stats(scene).built_count + query_scene_stats(scene).refitted_count,
+                     0);
     trc_render_desc desc = default_render_desc(16, 16, 1);
     desc.thread_count = 0; /* all processors */
     free(render_image(scene, &desc));
@@ -775,7 +530,7 @@ static void cancelled_commits_leave_the_snapshot(void **state) {
     const trc_scene scene = job.scene;
     assert_int_equal(trc_scene_cancel(scene), TRC_OK); /* none runs: no effect on the next */
     assert_int_equal(trc_scene_commit(scene), TRC_OK);
-    const struct trc_snapshot *before = snapshot_of(scene);
+    const struct trc_snapshot *before = query_scene_snapshot(scene);
     create_large_mesh(scene);
     pthread_t thread;
     assert_int_equal(pthread_create(&thread, NULL, cancel_commits, &job), 0);
@@ -783,13 +538,13 @@ static void cancelled_commits_leave_the_snapshot(void **state) {
         const double start = trc_seconds();
         assert_int_equal(trc_scene_commit(scene), TRC_ERROR_CANCELLED);
         assert_true(trc_seconds() - start < 5.0);
-        assert_ptr_equal(snapshot_of(scene), before);
+        assert_ptr_equal(query_scene_snapshot(scene), before);
     }
     atomic_store(&job.stop, 1);
     pthread_join(thread, NULL);
-    assert_int_equal(stats_of(scene).mesh_count, 1);
+    assert_int_equal(query_scene_stats(scene).mesh_count, 1);
     assert_int_equal(trc_scene_commit(scene), TRC_OK);
-    assert_int_equal(stats_of(scene).mesh_count, 2);
+    assert_int_equal(query_scene_stats(scene).mesh_count, 2);
     assert_int_equal(trc_scene_destroy(scene), TRC_OK);
 }
 
@@ -797,10 +552,6 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(commits_share_what_stays),
         cmocka_unit_test(features_are_what_the_scene_uses),
-        cmocka_unit_test(grown_trees_are_rebuilt_apart),
-        cmocka_unit_test(rebuilt_trees_wait_to_be_taken),
-        cmocka_unit_test(rebuilds_end_with_what_they_are_for),
-        cmocka_unit_test(rebuilds_are_for_their_own_mesh),
         cmocka_unit_test(queries_hold_the_snapshot_no_longer),
         cmocka_unit_test(removed_lights_are_gone),
         cmocka_unit_test(cameras_move_if_their_keys_differ),
