@@ -31,7 +31,7 @@ case $platform in
         own=sse42
         run=(qemu-aarch64 -L /usr/aarch64-linux-gnu)
         # Programs that they start are not emulated, and limits of memory are the emulator's.
-        left_out='^unit\.(memory|reader|image_python)$'
+        left_out='^unit\.(memory|reader|image_(files|colors)_python)$'
         ;;
     *) die "the platform is windows-x64 or linux-arm64" ;;
 esac

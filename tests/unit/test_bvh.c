@@ -2,13 +2,11 @@
  * posed, and the check finds trees that do not. */
 #include "query_test.h"
 
-#include "bvh/binary.h"
-#include "bvh/cluster.h"
+#include "bvh/tree.h"
 #include "core/core.h"
 #include "core/pool.h"
 #include "figures.h"
-#include "model/kernels.h"
-#include "model/split.h"
+#include "model/tree.h"
 
 static const float unit_lower[3] = {-1, -1, -1}, unit_upper[3] = {1, 1, 1}, origin[3] = {0, 0, 0};
 
