@@ -194,6 +194,19 @@ def inside_edits():
     return [np.abs(a - b).max() for a, b in pairs], [float(a.mean()) for a, _b in pairs]
 
 
+def inside_with_denoising_data():
+    """Pictures without passes for denoisers, and with them; None without light linking."""
+    import bpy
+    import scenes
+    if "light_linking" not in bpy.types.Object.bl_rna.properties:
+        return None
+    _build(*CASES["blockers"])
+    pictures = []
+    for bpy.context.view_layer.volley.denoising_store_passes in (False, True):
+        pictures.append(scenes.render())
+    return pictures
+
+
 # Comparison ----------------------------------------------------------------------------------------
 
 @pytest.fixture(scope="module")
@@ -223,3 +236,12 @@ def test_edits_are_followed(blender):
     differences, means = found
     assert max(differences) == 0.0
     assert all(abs(a - b) > 1e-3 for a, b in zip(means, means[1:]))  # each edit shows
+
+
+def test_denoising_data_changes_nothing(blender):
+    """What surfaces took of passes and what blocks shadow rays share bits of path words."""
+    found = blender.run(inside_with_denoising_data)
+    if found is None:
+        pytest.skip("lights have no links")
+    plain, with_passes = found
+    assert (plain == with_passes).all()

@@ -16,34 +16,6 @@ LIGHT_OFF = 1e-3, 0.03  # of light seen in mirrors .019, beside 4.3 as beside 3.
 SHADOW_OFF = 3e-3, 0.1  # on rough metal it ends a little before that of Cycles does
 
 
-def _scene(size=(96, 64)):
-    """Spheres and walls at several distances; one half transparent, one a mirror, one rough metal."""
-    import scenes
-    scene = scenes.empty(size=size)
-    scenes.camera(location=(0.5, -7.0, 1.0), rotation=(np.pi / 2 - 0.15, 0.0, 0.1))
-    scenes.wall("Back", 14.0, 4.0, material=scenes.material(
-        "Matt", "ShaderNodeBsdfDiffuse", Color=(0.6, 0.4, 0.2)))
-    scenes.sphere("Mirror", 1.0, (-1.6, 0.0, 0.0), material=scenes.material(
-        "Mirror", "ShaderNodeBsdfGlossy", Color=(0.9, 0.8, 0.7), Roughness=0.0))
-    scenes.sphere("Metal", 0.9, (1.8, 1.0, 0.2), material=scenes.material(
-        "Metal", "ShaderNodeBsdfGlossy", Color=(0.5, 0.7, 0.9), Roughness=0.6))
-    scenes.wall("Veil", 1.5, -2.0, (0.3, 0.4), _veil())
-    return scene
-
-
-def _veil():
-    """Diffuse and transparent, 40 to 60."""
-    import scenes
-    made = scenes.material("Veil", "ShaderNodeBsdfDiffuse", Color=(0.2, 0.8, 0.3))
-    tree = made.node_tree
-    mix, clear = tree.nodes.new("ShaderNodeMixShader"), tree.nodes.new("ShaderNodeBsdfTransparent")
-    mix.inputs[0].default_value = 0.6
-    tree.links.new(tree.nodes["Diffuse BSDF"].outputs[0], mix.inputs[1])
-    tree.links.new(clear.outputs[0], mix.inputs[2])
-    tree.links.new(mix.outputs[0], tree.nodes["Material Output"].inputs["Surface"])
-    return made
-
-
 def _both(names, samples=SAMPLES):
     """Those passes by Volley and by Cycles, with several seeds."""
     import scenes
@@ -84,9 +56,10 @@ def _name_of(names):
 def inside_gallery():
     """What every kind of light and surface gives: pairs of pictures of passes by their short names."""
     import bpy
+    import pass_scenes
     import scenes
     from volley import passes
-    scene = _scene()
+    scene = pass_scenes.gallery()
     scenes.world_color(scene.world, (0.4, 0.5, 0.7))
     scenes.light('AREA', location=(2.0, -3.0, 4.0), rotation=(0.8, 0.0, 0.5), energy=300.0, size=1.5)
     scenes.sphere("Glass", 0.7, (-2.4, -1.0, -0.2), scenes.material(
@@ -336,7 +309,8 @@ def test_transparent_film(blender, has_environment):
 
 def inside_mist():
     import bpy
-    scene = _scene()
+    import pass_scenes
+    scene = pass_scenes.gallery()
     layer = bpy.context.view_layer
     layer.use_pass_mist = True
     mist = scene.world.mist_settings
@@ -358,64 +332,13 @@ def test_mist(blender):
         assert 0.0 <= ours.min() and ours.max() <= 1.0, name
 
 
-# Denoising ------------------------------------------------------------------------------------------
-
-def inside_denoising():
-    import bpy
-    import scenes
-    _scene()
-    # Without the diffuse part, on which Cycles would lose paths.
-    bpy.data.objects["Veil"].data.materials[0] = scenes.material(
-        "Clear", "ShaderNodeBsdfTransparent", Color=(0.5, 0.9, 0.7))
-    layer = bpy.context.view_layer
-    layer.volley.denoising_store_passes = layer.cycles.denoising_store_passes = True
-    later = ["Denoising Specular Albedo", "Denoising Roughness"] if bpy.app.version >= (5, 2, 0) else []
-    return _both(["Denoising Albedo", "Denoising Normal", "Denoising Depth", *later], 64)
-
-
-def test_denoising_data(blender):
-    pairs = blender.run(inside_denoising)
-    for name, (ours, theirs) in pairs.items():
-        _agree(ours, theirs, name)
-
-
-def inside_denoising_emission():
-    """The albedo of what shines, a surface and the background, seen directly, in a mirror and through a coloured pane,
-    not in rough gloss; and on a transparent film."""
-    import bpy
-    import scenes
-    scene = scenes.empty(size=(32, 24))
-    scenes.camera()
-    scenes.sphere("Mirror", 0.8, (-0.9, 0.0, 0.6), material=scenes.material(
-        "Metal", "ShaderNodeBsdfGlossy", Roughness=0.0, Color=(0.8, 0.6, 0.9)))
-    scenes.sphere("Shining", 0.7, (0.9, 0.0, 0.6), material=scenes.emitter((0.9, 0.4, 1.5), "Shining"))
-    scenes.sphere("Rough", 0.6, (0.0, 0.0, -1.0), material=scenes.material(
-        "Rough", "ShaderNodeBsdfGlossy", Roughness=0.6, Color=(0.6, 0.5, 0.2)))
-    scenes.wall("Pane", 0.7, -1.5, material=scenes.material(
-        "Clear", "ShaderNodeBsdfTransparent", Color=(0.5, 0.9, 0.7)))
-    scenes.world_color(bpy.context.scene.world, (0.3, 0.2, 0.5))
-    layer = bpy.context.view_layer
-    layer.volley.denoising_store_passes = layer.cycles.denoising_store_passes = True
-    found = {}
-    for case, scene.render.film_transparent, layer.use_pass_environment in (
-            ("opaque", False, False), ("clear", True, False), ("clear, environment", True, True)):
-        found[case] = _both(["Denoising Albedo"], 64)["Denoising Albedo"]
-    return found
-
-
-def test_denoising_emission(blender):
-    found = blender.run(inside_denoising_emission)
-    for case, (ours, theirs) in found.items():
-        _agree(ours, theirs, case)
-    assert found["opaque"][1].mean() > 1.1 * found["clear"][1].mean()
-
-
 # Vector ---------------------------------------------------------------------------------------------
 
 def inside_vector():
     """A camera that moves and turns, objects that move, turn and deform; with misses around."""
     import bpy
-    scene = _scene()
+    import pass_scenes
+    scene = pass_scenes.gallery()
     bpy.context.view_layer.use_pass_vector = bpy.context.view_layer.use_pass_z = True
     bpy.data.objects.remove(bpy.data.objects["Back"])
     made, metal, mirror = scene.camera, bpy.data.objects["Metal"], bpy.data.objects["Mirror"]
@@ -499,8 +422,9 @@ MATTED = "Metal,Veil"
 def _crypto_scene():
     """Objects with and without materials, instances, a group, transparency, depth of field."""
     import bpy
+    import pass_scenes
     import scenes
-    scene = _scene()
+    scene = pass_scenes.gallery()
     made = scene.camera
     made.data.dof.use_dof, made.data.dof.focus_distance = True, 5.0
     made.data.dof.aperture_fstop = 0.3
@@ -634,8 +558,9 @@ def _aov_scene():
     """Values and colours of nodes that the surface needs, and of others, in a group too; seen through
     a tinted veil with an AOV of its own, and in the world."""
     import bpy
+    import pass_scenes
     import scenes
-    scene = _scene()
+    scene = pass_scenes.gallery()
     scene.world.use_nodes = True
     layer = bpy.context.view_layer
     for name, kind in (("height", 'VALUE'), ("tint", 'COLOR'), ("facing", 'VALUE'), ("unused", 'COLOR')):
@@ -697,8 +622,9 @@ def test_aovs(blender):
 def _occluded_scene():
     """The objects stand on a floor under lamps of several kinds, with shadows of transparent ones."""
     import bpy
+    import pass_scenes
     import scenes
-    scene = _scene()
+    scene = pass_scenes.gallery()
     floor = scenes.wall("Floor", 20.0, 1.2, (0.0, 0.0), scenes.material(
         "Floor", "ShaderNodeBsdfDiffuse", Color=(0.7, 0.7, 0.7)))
     floor.rotation_euler.x = -np.pi / 2

@@ -112,7 +112,7 @@ static void ray_append(struct trc_tile *t, struct trc_ray_store *to, const struc
             kind | (vuint)vi_select(vm_and(b->clear, b->transmitted), (vint)straight_on, vi_set(0));
     }
     kind = kind |
-           (a->path & vu_set(TRC_PATH_DATA_DONE | TRC_PATH_FEATURES_DONE | TRC_VISIBLE_UNBLOCKED |
+           (a->path & vu_set(TRC_PATH_DATA_DONE | TRC_PATH_FEATURES | TRC_VISIBLE_UNBLOCKED |
                              TRC_PATH_PORTALS << TRC_PATH_PORTALS_SHIFT)) |
            vu_set(a->world_alone ? TRC_PATH_WORLD_ALONE : 0);
     vuint path = (vuint)vi_select(transparent, (vint)same_path, (vint)kind);

@@ -4,8 +4,7 @@
  * As Cycles of 3.4, or with TRC_PASSES_BLENDED_FEATURES of 5.2, whose roughness and specular
  * albedo are for both. Departures: Cycles loses the paths that pick diffuse lobes (diffuse bounces
  * are 0), and with them a part of what lies behind surfaces that have some and yet pass on their
- * features; Cycles 5.2 fades between surfaces that give their features and such that do not, here
- * it is either. */
+ * features; what a surface leaves to those behind it has no colour here. */
 #include "kernels/simd/wide_math.h"
 #include "kernels/tile/tile.h"
 #include "kernels/trace/panorama.h"
@@ -20,8 +19,10 @@
 #define FEATURE_ALPHA 0.075f
 /* From this alpha on, a lobe's albedo is not specular. */
 #define SPECULAR_ALPHA 0.15f
-/* Part of all lobes that must be rough: by mix_weight, or by albedo. */
+/* Part of all lobes that must be rough, by mix_weight. */
 #define ROUGH_SHARE 0.25f
+/* Blended: part of the lobes' albedo that is not specular, from which on a surface takes all. */
+#define WHOLE_SHARE 0.5f
 
 struct features {
     vvec3 normal, albedo; /* mean of all lobes; sum of the rough ones */
@@ -33,15 +34,15 @@ struct specular_features {
     vvec3 specular_albedo; /* of the lobes that are nearly mirrors */
     vfloat alpha;          /* mean of all lobes but transparent ones, by albedo */
     /* Blended: the mean normal of lobes but transparent ones, times their part of all; albedo that
-     * is not specular; lanes where those are taken. */
+     * is not specular; how much of both is taken, and how much is left to what those lobes show. */
     vvec3 solid_normal, blended_albedo;
-    vmask blended_taken;
+    vfloat taken, left;
 };
 
-/* How much of a lobe's albedo is specular: 1 at an alpha of 0, fading smoothly. */
-static vfloat specular_share(vfloat alpha) {
-    const vfloat t = vf_saturate(alpha * vf_set(1.0f / SPECULAR_ALPHA));
-    return vf_one() - t * t * (vf_set(3.0f) - t - t);
+/* From 0 to 1 smoothly as x goes from 0 to end. */
+static vfloat fade(vfloat x, float end) {
+    const vfloat t = vf_saturate(x * vf_set(1.0f / end));
+    return t * t * (vf_set(3.0f) - t - t);
 }
 
 static vmask is_rough(const struct trc_lobe *lobe) {
@@ -82,10 +83,10 @@ static void specular_features_of(const struct trc_lobes *l, const struct trc_sur
             continue;
         }
         const vvec3 color = trc_lobe_albedo(lobe, s->wo, pass_flags);
-        const vfloat share = v3_average(color), mirror = specular_share(trc_lobe_alpha(lobe));
-        specular = v3_mad(color, mirror, specular);
-        blended = v3_mad(color, vf_one() - mirror, blended);
-        blurred = blurred + share * (vf_one() - mirror);
+        const vfloat share = v3_average(color), rough = fade(trc_lobe_alpha(lobe), SPECULAR_ALPHA);
+        specular = v3_mad(color, vf_one() - rough, specular);
+        blended = v3_mad(color, rough, blended);
+        blurred = blurred + share * rough;
         solid = v3_mad(trc_lobe_feature(lobe, s), share, solid);
         alpha = alpha + trc_lobe_alpha(lobe) * share;
         scattered = scattered + share;
@@ -94,7 +95,9 @@ static void specular_features_of(const struct trc_lobes *l, const struct trc_sur
     out->alpha = vf_divide(alpha, scattered);
     out->solid_normal = v3_scale(solid, vf_divide(vf_one(), scattered + clear));
     out->blended_albedo = blended;
-    out->blended_taken = vf_gt(blurred * vf_set(1.0f / ROUGH_SHARE), scattered);
+    const vfloat part = vf_divide(blurred, scattered);
+    out->taken = fade(part, WHOLE_SHARE);
+    out->left = (vf_one() - out->taken) * (vf_one() - part);
 }
 
 /* A normal in the space that shaders see as the camera's: x right, y up, z forward; of panoramas
@@ -136,20 +139,26 @@ static void add_number(struct trc_tile *t, uint32_t pass, vfloat value, const ui
     trc_pass_add_lanes(t, pass, v3(value, vf_zero(), vf_zero()), slots, active);
 }
 
+static vuint with_features_left(vuint path, vfloat left) {
+    const vint taken = vf_to_int((vf_one() - left) * vf_set(255.0f) + vf_set(0.5f));
+    return (path & vu_set(~TRC_PATH_FEATURES)) | (vuint)taken << TRC_PATH_FEATURES_SHIFT;
+}
+
 vuint trc_denoising_passes(struct trc_tile *t, const struct trc_surface *s,
                            const struct trc_lobes *lobes, vvec3 weight, vfloat length,
                            const uint32_t slots[TRC_WIDTH]) {
-    const vint done = vi_set(TRC_PATH_FEATURES_DONE);
     const vint straight = vi_set(TRC_PATH_TRANSPARENT_BACKGROUND);
     const uint32_t flags = t->desc->pass_flags;
     const bool is_blended = flags & TRC_PASSES_BLENDED_FEATURES;
     const vmask seen = vm_and(s->active, vi_eq((vint)s->path & straight, straight));
-    vmask on = vm_and(s->active, vi_eq((vint)s->path & done, vi_set(0)));
+    vfloat left = trc_features_left(s->path);
     if (is_blended) /* what is behind transparency counts besides what is before it */
-        on = vm_or(on, seen);
+        left = vf_select(seen, vf_one(), left);
+    const vmask on = vm_and(s->active, vf_gt(left, vf_zero()));
     if (!(t->desc->passes & DENOISING_PASSES) || !vm_any(vm_or(on, seen)))
         return s->path;
-    add_number(t, TRC_PASS_DENOISING_DEPTH, v3_average(weight) * length, slots, on);
+    const vvec3 open_weight = v3_scale(weight, left);
+    add_number(t, TRC_PASS_DENOISING_DEPTH, v3_average(open_weight) * length, slots, on);
     struct specular_features specular;
     if (is_blended || t->desc->passes & SPECULAR_PASSES) {
         specular_features_of(lobes, s, flags, &specular);
@@ -158,20 +167,21 @@ vuint trc_denoising_passes(struct trc_tile *t, const struct trc_surface *s,
         trc_pass_add_lanes(t, TRC_PASS_DENOISING_SPECULAR_ALBEDO,
                            v3_mul(weight, specular.specular_albedo), slots, seen);
     }
-    vmask taken;
     if (is_blended) {
-        taken = vm_and(on, specular.blended_taken);
-        trc_pass_add_lanes(t, TRC_PASS_DENOISING_ALBEDO, v3_mul(weight, specular.blended_albedo),
-                           slots, taken);
+        const vvec3 taken_weight = v3_scale(open_weight, specular.taken);
+        trc_pass_add_lanes(t, TRC_PASS_DENOISING_ALBEDO,
+                           v3_mul(taken_weight, specular.blended_albedo), slots, on);
         const vvec3 normal = normal_to_camera(t, specular.solid_normal);
-        trc_pass_add_lanes(t, TRC_PASS_DENOISING_NORMAL, v3_scale(normal, v3_average(weight)),
-                           slots, taken);
+        trc_pass_add_lanes(t, TRC_PASS_DENOISING_NORMAL, v3_scale(normal, v3_average(taken_weight)),
+                           slots, on);
+        left = left * specular.left;
     } else {
         struct features f;
         features_of(lobes, s, flags, &f);
-        taken = vm_and(on, f.are_taken);
+        const vmask taken = vm_and(on, f.are_taken);
         trc_pass_add_lanes(t, TRC_PASS_DENOISING_ALBEDO, v3_mul(weight, f.albedo), slots, taken);
         write_normal(t, f.normal, slots, taken);
+        left = vf_select(taken, vf_zero(), left);
     }
-    return (vuint)vi_select(taken, (vint)s->path | done, (vint)s->path);
+    return (vuint)vi_select(on, (vint)with_features_left(s->path, left), (vint)s->path);
 }

@@ -196,7 +196,7 @@ TRC_INLINE void push(struct trc_tile *t, const struct arrival *a, const struct t
         .time = a->time,
         .radiance = {sum.x, sum.y, sum.z},
         .slot = a->slot,
-        .path = a->path,
+        .path = a->path & vu_set(~TRC_PATH_FEATURES),
         .target = (vuint)l->light * vu_set(TRC_DIRECTION_CELLS) + cell,
         .depths = a->depths,
     };

@@ -2,20 +2,18 @@
 #include "kernels/tile/light_split.h"
 #include "kernels/tile/shade.h"
 
-/* Of light found by rays, what denoisers know as albedo: that of paths whose features are not taken
- * yet. */
+/* Of light found by rays, what denoisers know as albedo: as much as paths have left to take. */
 static void features_add(struct trc_tile *t, const struct arrival *a, vmask active, vvec3 c) {
-    const vint path = (vint)a->path, done = vi_set(TRC_PATH_FEATURES_DONE);
-    vmask open = vi_eq(path & done, vi_set(0));
+    const vfloat one = vf_one();
+    vfloat left = trc_features_left(a->path);
     if (t->desc->pass_flags & TRC_PASSES_BLENDED_FEATURES) {
         const vint straight = vi_set(TRC_PATH_TRANSPARENT_BACKGROUND);
-        open = vm_or(open, vi_eq(path & straight, straight));
+        left = vf_select(vi_eq((vint)a->path & straight, straight), one, left);
     }
-    const vfloat one = vf_one();
     const vvec3 w = v3(vf_min(a->found_weight.x, one), vf_min(a->found_weight.y, one),
                        vf_min(a->found_weight.z, one));
-    trc_pass_add_lanes(t, TRC_PASS_DENOISING_EMISSION, v3_mul(w, c), a->slots,
-                       vm_and(active, open));
+    trc_pass_add_lanes(t, TRC_PASS_DENOISING_EMISSION, v3_scale(v3_mul(w, c), left), a->slots,
+                       active);
 }
 
 /* The same as found_add for lanes whose slots follow each other from first on, and that are

@@ -33,7 +33,7 @@ static void found_push(struct trc_tile *t, const struct arrival *a, vvec3 radian
         .time = a->time,
         .radiance = {c.x, c.y, c.z},
         .slot = a->slot,
-        .path = a->path | path,
+        .path = (a->path & vu_set(~TRC_PATH_FEATURES)) | path,
         .target = (vuint)light * vu_set(TRC_DIRECTION_CELLS) + trc_direction_cell(a->d),
         .depths = a->depths,
     };

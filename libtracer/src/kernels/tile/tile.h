@@ -17,16 +17,24 @@
 
 /* Bits of a ray's path word above those of kernels/trace/surface.h. */
 enum {
-    TRC_PATH_CATEGORY_SHIFT = 12,     /* TRC_CATEGORY_* */
-    TRC_PATH_LAST = 1 << 14,          /* only emission counts at the next surface */
-    TRC_PATH_DATA_DONE = 1 << 15,     /* data passes of the sample are written */
-    TRC_PATH_FEATURES_DONE = 1 << 16, /* and its denoising passes, along this path */
-    TRC_PATH_OCCLUSION = 1 << 17,     /* shadow rays: of the pass of ambient occlusion, no light */
-    TRC_PATH_CAUGHT = 1 << 18,        /* the camera sees this path through a shadow catcher */
-    TRC_PATH_CLAMPED = 1 << 19,       /* shadow rays: what they carry is clamped already */
-    TRC_PATH_FOUND = 1 << 23,         /* shadow rays: along a ray of the path (linked.c) */
-    TRC_PATH_CLASS_SHIFT = 24         /* shadow rays: the shadow class of their light, 4 bits */
+    TRC_PATH_CATEGORY_SHIFT = 12, /* TRC_CATEGORY_* */
+    TRC_PATH_LAST = 1 << 14,      /* only emission counts at the next surface */
+    TRC_PATH_DATA_DONE = 1 << 15, /* data passes of the sample are written */
+    TRC_PATH_OCCLUSION = 1 << 17, /* shadow rays: of the pass of ambient occlusion, no light */
+    TRC_PATH_CAUGHT = 1 << 18,    /* the camera sees this path through a shadow catcher */
+    TRC_PATH_CLAMPED = 1 << 19,   /* shadow rays: what they carry is clamped already */
+    TRC_PATH_FOUND = 1 << 23,     /* shadow rays: along a ray of the path (linked.c) */
+    TRC_PATH_CLASS_SHIFT = 24,    /* shadow rays: the shadow class of their light, 4 bits */
+    TRC_PATH_FEATURES_SHIFT = 24  /* others: what its surfaces took of the sample's denoising
+                                     passes, 8 bits: 255 for all */
 };
+#define TRC_PATH_FEATURES (255u << TRC_PATH_FEATURES_SHIFT)
+
+/* What part of the denoising passes the surfaces of a path have left to what comes next. */
+TRC_INLINE vfloat trc_features_left(vuint path) {
+    return vf_set(1.0f) -
+           vi_to_float((vint)(path >> TRC_PATH_FEATURES_SHIFT)) * vf_set(1.0f / 255.0f);
+}
 
 /* What objects a ray of that path word may see by: diffuse rays that are transmitted count as
  * transmitted alone, as in Cycles; lamps tell them by either (kernels/light/hit.c). */
