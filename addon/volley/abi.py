@@ -844,7 +844,7 @@ class WorldDesc(Structure):
     _fields_ = (("struct_size", c_uint32), ("use_sampling", c_uint32), ("material", c_uint64),
                 ("visibility", c_uint32), ("map_resolution", c_uint32), ("ao_distance", c_float),
                 ("ao_factor", c_float), ("ao_method", c_uint32), ("light_group", c_uint32),
-                ("sun_direction", c_float * 3), ("sun_angle", c_float))
+                ("sun_direction", c_float * 3), ("sun_angle", c_float), ("cast_shadow", c_uint32))
 
 
 class NodeInput(Structure):

@@ -100,3 +100,46 @@ def test_against_cycles(errors, name):
     _mean, biased, tile = errors[name]
     assert biased < TOLERANCE
     assert tile < TOLERANCE
+
+
+# Worlds without shadows --------------------------------------------------------------------------
+
+SHADOWLESS_SINCE = (5, 2), "worlds always cast shadows"
+
+
+def inside_shadowless():
+    """{(world, material): pictures by both}: a ball above a floor, in a world that casts no shadows."""
+    import scenes
+    materials = {"matt": ("ShaderNodeBsdfDiffuse", {}), "rough": ("ShaderNodeBsdfGlossy", {"Roughness": 0.5}),
+                 "translucent": ("ShaderNodeBsdfTranslucent", {})}
+    pictures = {}
+    for is_even, (name, (node, inputs)) in itertools.product((True, False), materials.items()):
+        scene = scenes.empty(size=SIZE)
+        scenes.camera(location=(0.0, -6.0, 1.5), rotation=(1.4, 0.0, 0.0))
+        material = scenes.material(name, node, Color=(0.8, 0.8, 0.8), **inputs)
+        scenes.mesh("Floor", [(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0)], [(0, 1, 2, 3)], material)
+        scenes.sphere("Ball", 1.0, (0.0, 0.0, 1.0), material)
+        scenes.world_color(scene.world, (0.5, 0.5, 0.5))
+        if not is_even:
+            _fade(scene.world.node_tree)
+        scene.world.cycles.use_shadows = False
+        pictures["even" if is_even else "varied", name] = scenes.seeds_by_both(SAMPLES * len(SEEDS), SEEDS)
+    return pictures
+
+
+def _fade(tree):
+    """Let a world be the brighter the farther along X."""
+    gradient, place = tree.nodes.new("ShaderNodeTexGradient"), tree.nodes.new("ShaderNodeTexCoord")
+    background = next(node for node in tree.nodes if node.type == 'BACKGROUND')
+    tree.links.new(place.outputs["Generated"], gradient.inputs["Vector"])
+    tree.links.new(gradient.outputs["Color"], background.inputs["Color"])
+
+
+@pytest.mark.since(*SHADOWLESS_SINCE)
+def test_world_without_shadows(blender):
+    """Errors within noise; with its shadows translucent surfaces would be 28 % too dark."""
+    if blender_support.version() < SHADOWLESS_SINCE[0]:
+        pytest.skip(SHADOWLESS_SINCE[1])
+    for case, (ours, theirs) in blender.run(inside_shadowless).items():
+        ours, theirs = ours[..., :3], theirs[..., :3]
+        assert all(error <= TOLERANCE * theirs.mean() for error in compare.unexplained(ours, theirs)), case

@@ -114,7 +114,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
                                   .map_resolution = bytes_byte(&b),
                                   .ao_distance = bytes_float(&b),
                                   .ao_factor = bytes_float(&b),
-                                  .ao_method = bytes_below(&b, 3)};
+                                  .ao_method = bytes_below(&b, 3),
+                                  .cast_shadow = bytes_below(&b, 3)};
     (void)trc_scene_set_world(scene, &world);
     const trc_render_desc render = read_render(&b);
     stage_run(scene, &render);

@@ -643,6 +643,7 @@ static void worlds(void **state) {
         REFUSED(status, trc_scene_set_world(scene, &desc)); \
     } while (0)
     REFUSE_WORLD(ARGUMENT, desc.use_sampling = 2);
+    REFUSE_WORLD(ARGUMENT, desc.cast_shadow = 2);
     REFUSE_WORLD(ARGUMENT, desc.visibility = 32);
     REFUSE_WORLD(LARGE, desc.map_resolution = UINT32_MAX);
     REFUSE_WORLD(ARGUMENT, desc.ao_method = 2);

@@ -28,6 +28,7 @@ def describe(world, material_id, sun, settings, light_groups):
     method = cycles(world, "sampling_method", 'AUTOMATIC')
     fields["visibility"] = world_visibility(world)
     fields["use_sampling"] = int(method != 'NONE')
+    fields["cast_shadow"] = int(cycles(world, "use_shadows", True))
     if method == 'MANUAL':
         fields["map_resolution"] = cycles(world, "sample_map_resolution", 0)
     return fields
@@ -40,8 +41,6 @@ def note_unread(world, warnings):
     """Warn of settings that change Cycles' picture alone."""
     if cycles(world, "max_bounces", _MANY_BOUNCES) < _MANY_BOUNCES:
         warnings.add(f"World '{world.name}': Max Bounces is not supported, light of the world goes on for all bounces")
-    if not cycles(world, "use_shadows", True):
-        warnings.add(f"World '{world.name}': Cast Shadow is not supported, the world casts shadows nonetheless")
 
 
 def mist_fields(world):

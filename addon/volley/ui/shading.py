@@ -168,6 +168,7 @@ class VOLLEY_WORLD_PT_settings(_WorldPanel, Panel):
         column.prop(settings, "sampling_method", text="Sampling")
         if settings.sampling_method == 'MANUAL':
             column.prop(settings, "sample_map_resolution")
+        prop_if_present(column, settings, "use_shadows", text="Cast Shadow")
 
 
 class VOLLEY_WORLD_PT_lightgroup(_WorldPanel, Panel):

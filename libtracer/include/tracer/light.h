@@ -107,6 +107,8 @@ typedef struct trc_world_desc {
      * itself instead of through the map. */
     float sun_direction[3]; /* towards it, of any length but 0; not read without sun_angle */
     float sun_angle;        /* its diameter in radians, 0..pi; 0: none */
+    uint32_t cast_shadow;   /* 0: where it is sampled by importance nothing blocks the samples; rays
+                               find it as ever */
 } trc_world_desc;
 
 /* Black, without ambient occlusion; a material that it gets is sampled and seen by all rays. */

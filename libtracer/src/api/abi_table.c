@@ -844,6 +844,7 @@ const struct trc_abi_entry trc_abi_entries[] = {
     {"trc_world_desc.ao_distance", offsetof(trc_world_desc, ao_distance)},
     {"trc_world_desc.ao_factor", offsetof(trc_world_desc, ao_factor)},
     {"trc_world_desc.ao_method", offsetof(trc_world_desc, ao_method)},
+    {"trc_world_desc.cast_shadow", offsetof(trc_world_desc, cast_shadow)},
     {"trc_world_desc.light_group", offsetof(trc_world_desc, light_group)},
     {"trc_world_desc.map_resolution", offsetof(trc_world_desc, map_resolution)},
     {"trc_world_desc.material", offsetof(trc_world_desc, material)},

@@ -72,7 +72,8 @@ trc_world_desc trc_world_desc_default(void) {
     return (trc_world_desc){.struct_size = sizeof(trc_world_desc),
                             .use_sampling = 1,
                             .visibility = TRC_VISIBLE_ALL,
-                            .ao_distance = 10.0f};
+                            .ao_distance = 10.0f,
+                            .cast_shadow = 1};
 }
 
 trc_camera_desc trc_camera_desc_default(void) {

@@ -72,6 +72,7 @@ trc_status trc_light_destroy(trc_scene scene, trc_id light) {
 static trc_status check_world(const trc_world_desc *desc) {
     TRC_TRY(trc_check_struct(desc, sizeof *desc, "trc_world_desc"));
     TRC_TRY(trc_check_enum(desc->use_sampling, 2, "use_sampling"));
+    TRC_TRY(trc_check_enum(desc->cast_shadow, 2, "cast_shadow"));
     TRC_TRY(trc_check_enum(desc->visibility, TRC_VISIBLE_ALL + 1, "visibility"));
     TRC_TRY(trc_check_count(desc->map_resolution, 0, MAX_MAP_RESOLUTION, "map_resolution"));
     TRC_TRY(trc_check_enum(desc->ao_method, TRC_AO_REPLACE + 1, "ao_method"));

@@ -15,8 +15,8 @@ struct trc_light_options {
     uint32_t scatters; /* TRC_MATERIAL_HAS_* of all surfaces, of TRC_MATERIAL_SCATTERS. 0: lamps are
                           seen alone and there is nothing to choose from. Without what is matt, a
                           constant world and emission that is not to be sampled are left to rays */
-    const trc_world_desc *world; /* use_sampling, map_resolution and the sun are read; NULL stands
-                                    for 1, 0 and none */
+    const trc_world_desc *world; /* use_sampling, map_resolution, cast_shadow and the sun are read;
+                                    NULL stands for 1, 0 and none */
     const struct trc_light_table
         *previous; /* of an earlier snapshot whose world, materials and
                       images are the same: its map is shared; may be NULL */

@@ -183,6 +183,8 @@ static void sample_world(const struct draw *d, vmask m) {
                    vf_max(place.radiance.z, seen[k].z));
     }
     set_place(d, &place, m);
+    if (!d->table->world_casts_shadow)
+        d->out->casts_shadow = vm_andnot(d->out->casts_shadow, m);
 }
 
 /* ---- visibility ---- */
