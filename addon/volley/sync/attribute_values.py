@@ -91,6 +91,20 @@ def is_pair(attributes, name):
     return attribute is not None and attribute.data_type == 'FLOAT2'
 
 
+# What Cycles moves by an attribute ------------------------------------------------------------------
+
+VELOCITY = "velocity"  # metres a second, in object space
+
+
+def has_velocity(attributes):
+    """Whether an attribute of that name moves what has it. Cycles before 4.1 takes vectors and colours of points
+    alone."""
+    attribute = attributes.get(VELOCITY)
+    return attribute is not None and (
+        HAS_BLENDERS_ATTRIBUTES or
+        attribute.domain == 'POINT' and attribute.data_type in {'FLOAT_VECTOR', 'FLOAT_COLOR'})
+
+
 # Vertex groups -------------------------------------------------------------------------------------
 
 def group_names(blender_object):

@@ -168,7 +168,7 @@ class StrandMotion(KeyedShapes):
     def set_key(self, index, strands):
         """Take strands as that key; False (and no motion) where they are not as many of as many keys."""
         if strands is None or not strands.is_like(self._strands):
-            self.is_dropped = True
+            self.drop()
             return False
         self.positions[index] = strands.only(self._is_kept).points()
         return True

@@ -5,6 +5,7 @@ import numpy as np
 
 from .. import abi
 from .mesh import LazyLoops, Topology, corner_normals, read_positions, shown_mesh, vertex_normals
+from .tangents import face_normals
 
 # Modifiers that move vertices, or make new ones by a rule that does not look at where they are.
 _POSING_MODIFIERS = {
@@ -28,19 +29,24 @@ def is_posable(blender_object):
 
 
 class KeyedShapes:
-    """Shapes of a mesh over the shutter, one slot per motion key."""
+    """Shapes of a mesh over the shutter, one slot per motion key. awaits_keys: whether they are still to be told at
+    other times; motion is dropped where that ends early."""
 
     def __init__(self, data, key_count):
         self._data = data
+        self.awaits_keys = True
         self.positions = [data.positions] * key_count
         self.normals = [data.normals] * key_count
-        self.is_dropped = False
+
+    def drop(self):
+        """Leave what moves as it is in the middle of the shutter."""
+        self.positions, self.awaits_keys = [self._data.positions], False
 
     def keys(self):
         """positions and normals, (keys, ...) each; one key when nothing moves or motion is dropped."""
         base = self._data
         is_static = all(np.array_equal(p, base.positions) for p in self.positions)
-        if self.is_dropped or is_static:
+        if is_static:
             return base.positions[None], None if base.normals is None else base.normals[None]
         return np.stack(self.positions), None if base.normals is None else np.stack(self.normals)
 
@@ -63,7 +69,7 @@ class MeshMotion(KeyedShapes):
 
     def _set_key(self, index, mesh):
         if not self._topology.is_of(mesh):
-            self.is_dropped = True
+            self.drop()
             return False
         self.positions[index] = read_positions(mesh)
         if self._data.normal_kind == abi.NormalsLayout.CORNER:
@@ -71,3 +77,35 @@ class MeshMotion(KeyedShapes):
         elif self._data.normal_kind == abi.NormalsLayout.VERTEX:
             self.normals[index] = np.array(vertex_normals(mesh))
         return True
+
+
+class CarriedShapes(KeyedShapes):
+    """Shapes of what goes along velocities, at the begin, in the middle and at the end of the shutter. ways: (points,
+    3), how far each point goes in all of it (m)."""
+
+    def __init__(self, data, ways):
+        super().__init__(data, 3)
+        self.awaits_keys = False
+        for index, share in ((0, -0.5), (2, 0.5)):
+            positions = data.positions.copy()
+            positions[:, :3] += np.float32(share) * ways
+            self.positions[index] = positions
+            if data.normals is not None:
+                self.normals[index] = _bent_normals(data, positions)
+
+
+def _bent_normals(data, positions):
+    """The normals of a mesh once its vertices are elsewhere: by as much others as the means of its triangles' are."""
+    change = _vertex_means(data.indices, positions) - _vertex_means(data.indices, data.positions)
+    vertices = data.indices.reshape(-1) if data.normal_kind == abi.NormalsLayout.CORNER else slice(None)
+    normals = data.normals + change[vertices]
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.divide(normals, length, out=data.normals.copy(), where=length > 0.0)
+
+
+def _vertex_means(indices, positions):
+    """(vertices, 3) float32: the unit mean of the normals of the triangles at each vertex, 0 without one."""
+    corners, normals = indices.reshape(-1), np.repeat(face_normals(positions[indices]), 3, axis=0)
+    means = np.stack([np.bincount(corners, part, len(positions)) for part in normals.T], axis=1)
+    length = np.linalg.norm(means, axis=1, keepdims=True)
+    return np.divide(means, length, out=np.zeros(means.shape), where=length > 0.0).astype(np.float32)

@@ -396,6 +396,18 @@ def _attribute_values(mesh, name, loops, group_names):
     return values[np.repeat(loops.polygons, 3)]
 
 
+def colors_of_vertices(mesh, name, group_names):
+    """The same as (vertices, 4), None as above: the mean of what a vertex' corners or faces have."""
+    domain, values = _items_of(mesh, name, group_names)
+    if values is None or domain == 'POINT':
+        return values
+    if domain == 'FACE':
+        values = np.repeat(values, _read(mesh.polygons, "loop_total", (len(mesh.polygons),), np.int32), axis=0)
+    vertices, count = _corner_vertices(mesh), len(mesh.vertices)
+    sums = np.stack([np.bincount(vertices, part, count) for part in values.T], axis=1)
+    return (sums / np.maximum(np.bincount(vertices, minlength=count), 1)[:, None]).astype(np.float32)
+
+
 def _items_of(mesh, name, group_names):
     """The same as its domain, 'CORNER', 'POINT' or 'FACE', and (items, 4) float32, None as above."""
     if name in mesh.uv_layers:

@@ -35,6 +35,10 @@ class Shutter:
     curve: np.ndarray
     row_delay: float = 0.0
 
+    def seconds(self, scene):
+        """How long it is open, in the time of a scene."""
+        return self.length * scene.render.fps_base / scene.render.fps
+
     def frame_at(self, fraction):
         """The frame at a fraction of the shutter time, as (whole frame, rest in [0, 1))."""
         return split_frame(self.center + (fraction - CENTER) * self.length)
@@ -116,11 +120,14 @@ def key_count(blender_object, parent=None):
     return min((2 << (steps - 1)) + 1, abi.MAX_KEYS)
 
 
-def may_deform(blender_object, parent=None):
+def blurs_shapes(blender_object, parent=None):
+    """Whether changes of an object's shape count; an instancer's setting does too."""
+    return all(cycles(each, "use_deform_motion", True) for each in _chain(blender_object, parent))
+
+
+def may_deform(blender_object):
     """Whether an object's mesh may change its shape in time: modifiers, shape keys, or a mesh that is
-    made anew on each frame; an instancer's setting counts too."""
-    if not all(cycles(each, "use_deform_motion", True) for each in _chain(blender_object, parent)):
-        return False
+    made anew on each frame."""
     original = blender_object.original or blender_object
     if original.type != 'MESH':
         return True

@@ -9,7 +9,7 @@ import numpy as np
 from .. import abi
 from ..compat import PARTICLE_HAIR_HAS_NORMALS, VECTORS_ARE_BUFFERS
 from . import curves
-from .attribute_values import colors_of, is_pair, linear, named_colors
+from .attribute_values import VELOCITY, colors_of, has_velocity, is_pair, linear, named_colors
 from .mesh import active_color_name, wanted_uv_layers
 
 HAIR_ATTRIBUTE = ".hair"  # (intercept, length, thickness, random) of the Hair Info node
@@ -82,6 +82,11 @@ class Hair:
         strands.radii = _hair_radii(settings, strands)
         return strands
 
+    @staticmethod
+    def velocities(_instance):
+        """As StrandObject's."""
+        return None
+
     def curves(self, instance, strands):
         """Which keys of what was read are kept, None for all, and those as curves.CurvesData."""
         real, modifier = self._find(instance)
@@ -127,6 +132,17 @@ class StrandObject:
         """Which keys of what was read are kept (None: all), and those as curves.CurvesData."""
         values = _object_values(instance.object.data, self._wanted.uv_names, self._wanted.color_names)
         return None, _curves(strands, self._wanted, values)
+
+    @staticmethod
+    def velocities(instance):
+        """(points, 3) m/s of what moves it, None where there is nothing."""
+        data = instance.object.data
+        values = colors_of(data.attributes[VELOCITY]) if has_velocity(data.attributes) else None
+        if values is not None and len(values) != len(data.points):  # of strands
+            lengths = np.empty(len(data.curves), np.int32)
+            data.curves.foreach_get("points_length", lengths)
+            values = np.repeat(values, lengths, axis=0)
+        return None if values is None else values[:, :3]
 
 
 def _has_force(blender_object):

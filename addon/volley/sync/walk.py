@@ -261,9 +261,14 @@ class Walk:
             return False
         is_kept, data = made_of.curves(each, shape)
         self._tell_left_out(each.object, data)
-        may_deform = item.motion_keys > 1 and motion.may_deform(each.object, instance.maker_of(each))
-        if may_deform and made_of.may_move(each):
-            shapes = curves.StrandMotion(shape, is_kept, data, item.motion_keys)
+        shapes = None
+        if self._blurs_shapes(item, each):
+            velocities = made_of.velocities(each)
+            if velocities is not None:
+                shapes = self._carried(data, velocities)
+            elif motion.may_deform(each.object) and made_of.may_move(each):
+                shapes = curves.StrandMotion(shape, is_kept, data, item.motion_keys)
+        if shapes is not None:
             self._deforming[item.key] = _Deforming(source, data, self._wanted_strands, shapes, made_of.read)
         else:
             meshes.put(item.key, source, data, self._wanted_strands)
@@ -300,8 +305,8 @@ class Walk:
         return diced_by is None or dicing is None or dicing.would_repeat(each, *diced_by)
 
     def _extract(self, item, each, shape, names):
-        """The mesh that an instance shows as MeshData, None where it has no face, and as deform.MeshMotion
-        where it has to wait for its shapes, else None."""
+        """The mesh that an instance shows as MeshData, None where it has no face, and its shapes
+        in time (deform.KeyedShapes), None where it has one."""
         blender_object = each.object
         if mesh.is_sculpted_multires(blender_object):
             self._sync.warnings.add(f"Object '{blender_object.name}': while it is sculpted, the mesh below its "
@@ -310,7 +315,8 @@ class Walk:
         dicing = self._source.dicing
         cage = dicing and dicing.cage_of(each)
         shape = cage or shape
-        data = mesh.extract(shape, *names[:2], slot_count, attribute_values.group_names(blender_object))
+        group_names = attribute_values.group_names(blender_object)
+        data = mesh.extract(shape, *names[:2], slot_count, group_names)
         if data is None:
             return None, None
         self._tell_left_out(blender_object, data)
@@ -322,9 +328,21 @@ class Walk:
             mesh.dice(data, shape, {**fields, **dicing.creases_of(each, shape, fields)}, names[2])
         elif not self._sync.is_final and deform.is_posable(blender_object):
             data.poses = mesh.Topology(shape)
-        if cage is None and item.motion_keys > 1 and motion.may_deform(blender_object, instance.maker_of(each)):
-            return data, deform.MeshMotion(shape, data, item.motion_keys)
-        return data, None
+        if cage is not None or not self._blurs_shapes(item, each):
+            return data, None
+        if attribute_values.has_velocity(shape.attributes):
+            velocities = mesh.colors_of_vertices(shape, attribute_values.VELOCITY, group_names)
+            if velocities is not None:
+                return data, self._carried(data, velocities[:, :3])
+        return data, deform.MeshMotion(shape, data, item.motion_keys) if motion.may_deform(blender_object) else None
+
+    def _blurs_shapes(self, item, each):
+        """Whether an instance is looked at while the shutter is open, and its shapes count."""
+        return item.motion_keys > 1 and motion.blurs_shapes(each.object, instance.maker_of(each))
+
+    def _carried(self, data, velocities):
+        """The shapes of data whose points go along velocities (m/s), whatever else moves it, as in Cycles."""
+        return deform.CarriedShapes(data, velocities * self._shutter.seconds(self._scene))
 
     def _tell_left_out(self, blender_object, data):
         """Warn of the attributes that there is no room for."""
@@ -359,7 +377,7 @@ class Walk:
             return
         item.transforms[index] = rows(each.matrix_world)
         waiting = self._deforming.get(item.key)
-        if waiting is None or waiting.shapes.is_dropped:
+        if waiting is None or not waiting.shapes.awaits_keys:
             return
         if not waiting.shapes.set_key(index, waiting.read(each)):
             self._sync.warnings.add(
