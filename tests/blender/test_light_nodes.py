@@ -12,6 +12,7 @@ SIZE = (16, 16)
 SHARP = 2e-3        # relative to the brightest pixel
 WEB = 5e-3          # the same, of IES files: at the pole those of type B have every value of the horizon's
 SOFT = 0.01         # means and tiles, relative to the mean of the picture
+ATTRIBUTE_OFF = 5e-3  # of means up to 3
 SEEDS = (31, 32, 33, 34, 35, 36)
 SAMPLES = 64
 
@@ -195,6 +196,63 @@ def inside_soft():
     return pictures
 
 
+# Types of attributes, names and outputs that are read of a light, or of what makes an instance of one, and of a world.
+OF_OBJECT = [("OBJECT", *each) for each in (
+    ("own", "Color"), ("own", "Alpha"), ("own", "Fac"), ("of data", "Color"), ("color", "Alpha"), ("pass_index", "Color"),
+    ("nowhere", "Color"), ("nowhere", "Alpha"), ("", "Alpha"))]
+OF_MAKER = [("INSTANCER", *each) for each in (
+    ("own", "Color"), ("of maker", "Color"), ("of maker", "Alpha"), ("of data", "Fac"), ("", "Alpha"))]
+OF_LAYER = [("VIEW_LAYER", *each) for each in (
+    ("of scene", "Color"), ("of scene", "Alpha"), ("nowhere", "Alpha"), ("", "Alpha"))]
+
+
+def _read(tree, shown, kind, name, output):
+    """Let an Attribute node feed a colour."""
+    node = tree.nodes.new("ShaderNodeAttribute")
+    node.attribute_type, node.attribute_name = kind, name
+    tree.links.new(node.outputs[output], shown.inputs["Color"])
+
+
+def _instanced(lamp):
+    """Two instances of a light instead of it, whose makers have other properties."""
+    import bpy
+    import scenes
+    collection = bpy.data.collections.new("Lamps")
+    collection.objects.link(lamp)
+    bpy.context.scene.collection.objects.unlink(lamp)
+    for number in range(2):
+        maker = scenes.link(f"Maker {number}", None)
+        maker.instance_type, maker.instance_collection = 'COLLECTION', collection
+        maker["of maker"] = (0.2 + 0.6 * number, 0.5, 0.7 - 0.3 * number, 0.4 + 0.1 * number)
+
+
+def inside_attributes():
+    """{(owner, type, name, output): (mean by Volley, by Cycles)}, and the warnings."""
+    import bpy
+    import scenes
+    import volley.session
+    means, told = {}, []
+    for owner, cases in (("light", OF_OBJECT + OF_LAYER), ("instances", OF_OBJECT[:1] + OF_MAKER),
+                         ("world", OF_OBJECT + OF_MAKER + OF_LAYER)):
+        for case in cases:
+            scene = _floor(scenes, size=(4, 4))
+            volley.session.report_warning = lambda _engine, message: told.append(message)
+            scene["of scene"] = (0.3, 0.8, 0.4, 0.6)
+            lamp, emission = _lamp(scenes, 'SUN', KINDS['SUN'])
+            lamp["own"], lamp.data["of data"] = (0.3, 0.5, 0.7, 0.2), (0.6, 0.1, 0.2, 0.9)
+            if owner == "world":
+                bpy.data.objects.remove(lamp)
+                scene.world.use_nodes = True
+                scene.world["own"] = (0.3, 0.5, 0.7, 0.2)
+                _read(scene.world.node_tree, scene.world.node_tree.nodes["Background"], *case)
+            else:
+                _read(lamp.data.node_tree, emission, *case)
+            if owner == "instances":
+                _instanced(lamp)
+            means[owner, *case] = [picture[..., :3].mean(axis=(0, 1)) for picture in scenes.by_both(64)]
+    return means, told
+
+
 # Comparison ----------------------------------------------------------------------------------------
 
 def _difference(ours, theirs):
@@ -245,3 +303,15 @@ def test_soft_lights(soft, name):
     _mean, biased, tile = soft[name]
     assert biased < SOFT
     assert tile < SOFT
+
+
+def test_attributes(blender):
+    """Lights of Blender 5 have those of objects, others and worlds an alpha of 1."""
+    means, told = blender.run(inside_attributes, timeout=300)
+    assert told == []
+    for case, (ours, theirs) in means.items():
+        print(case, ours, theirs)
+    for case, (ours, theirs) in means.items():
+        assert np.abs(ours - theirs).max() < ATTRIBUTE_OFF, case
+    is_object = blender_support.version() >= (5, 0)
+    assert (means["light", "OBJECT", "own", "Color"][1].max() > 0.1) == is_object

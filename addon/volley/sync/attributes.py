@@ -15,6 +15,7 @@ from .values import CONSTANT, Value
 
 _COMPONENTS = 4  # RGBA
 _NOTHING = (0.0,) * _COMPONENTS
+_NO_OBJECT = 0.0, 0.0, 0.0, 1.0  # of what is no object
 
 
 class Attributes:
@@ -36,10 +37,11 @@ class Attributes:
 
     def read(self, walker, attribute_type, name):
         """An attribute's colour and alpha as Values; None where there is no room for it."""
+        if not name:
+            return _constants(_NOTHING)
         if attribute_type == 'VIEW_LAYER':
             walker.flat.follows_scene = True
-            red, green, blue, alpha = self._of_view_layer(name)
-            return Value('c', CONSTANT, 0, (red, green, blue)), Value('f', CONSTANT, 0, (alpha, 0.0, 0.0))
+            return _constants(self._of_view_layer(name))
         key = attribute_type, name
         first = self._firsts.setdefault(key, VALUES_END + _COMPONENTS * len(self._firsts))
         if first + _COMPONENTS > MAX_INSTANCE_VALUES:
@@ -61,9 +63,13 @@ class Attributes:
         firsts = {self._firsts[key]: key for key in wanted}
         values = list(values) + [0.0] * (max(firsts) + _COMPONENTS - len(values))
         for first, (attribute_type, name) in firsts.items():
-            read = self._of_instancer if attribute_type == 'INSTANCER' and instance.is_instance else _of_object
-            values[first:first + _COMPONENTS] = read(instance, name) or _NOTHING
+            values[first:first + _COMPONENTS] = self.value_of(attribute_type, name, instance)
         return tuple(values)
+
+    def value_of(self, attribute_type, name, instance):
+        """An attribute of an instance, RGBA."""
+        read = self._of_instancer if attribute_type == 'INSTANCER' and instance.is_instance else _of_object
+        return read(instance, name) or _NOTHING
 
     def _of_instancer(self, instance, name):
         """Looked up in the settings of particles, in what nodes gave the instance, in its maker and the object."""
@@ -78,6 +84,29 @@ class Attributes:
             self._warnings.add(f"Object '{maker.name}': attributes that nodes give instances, such as '{name}', "
                                "cannot be read in this Blender")
         return value
+
+
+class FixedAttributes:
+    """The same for one light or world: constants, as no other instance shows its nodes. instance: of the light where
+    it is an object, else None."""
+
+    def __init__(self, attributes, instance=None):
+        self._attributes, self._instance = attributes, instance
+
+    def read(self, walker, attribute_type, name):
+        """As Attributes'."""
+        if attribute_type == 'VIEW_LAYER':
+            return self._attributes.read(walker, attribute_type, name)
+        if self._instance is None:
+            return _constants(_NO_OBJECT)
+        walker.flat.instance_attributes.add((attribute_type, name))
+        return _constants(self._attributes.value_of(attribute_type, name, self._instance) if name else _NOTHING)
+
+
+def _constants(rgba):
+    """A colour and its alpha as Values."""
+    *color, alpha = rgba
+    return Value('c', CONSTANT, 0, tuple(color)), Value('f', CONSTANT, 0, (alpha, 0.0, 0.0))
 
 
 def _of_object(instance, name):

@@ -18,10 +18,10 @@ def are_shown(v3d):
     return v3d is None or v3d.shading.type != 'RENDERED' or v3d.shading.use_scene_lights_render
 
 
-def describe(light_object, item, materials, warnings):
-    """The fields of trc_light_desc for an evaluated light object, described as an item too, or None for
+def describe(instance, item, materials, warnings):
+    """The fields of trc_light_desc for an instance of an evaluated light, described as an item too, or None for
     one that is skipped; materials: material.Materials, which takes its nodes."""
-    light = light_object.data
+    light_object, light = instance.object, instance.object.data
     if light.type not in abi.LightType.__members__:
         warnings.add(f"Light '{light.name}': type {light.type} is not supported, it is left out")
         return None
@@ -39,7 +39,7 @@ def describe(light_object, item, materials, warnings):
         "shadow_exclude": item.links.shadow_exclude,
         "random": item.random,
         "bounce_limit": _bounce_limit(light),
-        "material": materials.light_id(light) if uses_nodes(light) else 0,
+        "material": materials.light_id(instance) if uses_nodes(light) else 0,
         "cast_shadow": int(casts_shadow(light)),
         "use_mis": int(cycles(light, "use_multiple_importance_sampling", True)),
     }

@@ -7,9 +7,9 @@ from .. import abi, native
 from ..abi import DisplacementMethod, NodeType
 from ..compat import (
     DEFAULT_IS_PRINCIPLED, HAS_DEFENSIVE_SAMPLING, HAS_FACET_SHADOWING, HAS_WIDE_SHADOWS, KEEPS_NORMALS, LEAVES_BUMPS,
-    cycles, has_light_tree, uses_nodes)
+    LIGHT_IS_OBJECT, cycles, has_light_tree, uses_nodes)
 from . import flatten, instance, nodes, studio, tangents
-from .attributes import Attributes
+from .attributes import Attributes, FixedAttributes
 from .changes import Changes
 from .inlined import shader_tree
 from .values import CONSTANT, DEFAULT, Value
@@ -150,24 +150,32 @@ class Materials:
         key = ("world", world.name_full)
         label = f"World '{world.name}'"
         if uses_nodes(world):
-            flat = self._flatten(world, label)
+            flat = self._flatten(world, label, FixedAttributes(self._attributes))
         else:
             flat = _background(world.color)
         self._update(key, flat)
         entry = self._entries[key]
         return entry.id, entry.sun
 
-    def light_id(self, light):
-        """The nodes of an evaluated light as a material, flattened once per sync."""
+    def light_id(self, each):
+        """The nodes of the evaluated light that an instance shows as a material, flattened once per sync; for each
+        instance where they read attributes of that."""
+        light = each.object.data
         key = ("light", light.name_full)
-        if key not in self._lights:
-            self._lights.add(key)
+        own = (*key, instance.key_of(each))
+        if self._lights.isdisjoint({key, own}):
+            attributes = FixedAttributes(self._attributes, each if LIGHT_IS_OBJECT else None)
             with shader_tree(light) as (tree, is_made):
-                flat = flatten.flatten(tree, f"Light '{light.name}'", self._warnings, self._images)
+                flat = flatten.flatten(tree, f"Light '{light.name}'", self._warnings, self._images,
+                                       attributes=attributes)
+            if flat.instance_attributes:
+                key = own
             flat.follows_scene |= is_made
-            flat.uv_names, flat.color_names = set(), set()  # no mesh has to bring them
+            flat.uv_names, flat.color_names, flat.instance_attributes = set(), set(), set()  # nobody has to bring them
             flat.needs_generated = flat.needs_instancer = False
+            self._lights.add(key)
             self._update(key, flat)
+        key = key if key in self._lights else own
         self._seen.add(key)
         return self._entries[key].id
 
@@ -230,18 +238,17 @@ class Materials:
     def flatten(self, material, label):
         """A material's surface as a flat tree."""
         if uses_nodes(material):
-            return self._flatten(material, label, _displacement_mode(material))
+            return self._flatten(material, label, self._attributes, _displacement_mode(material))
         return _plain_surface(material.diffuse_color)  # as in Cycles
 
     def volume_names(self):
         """The names of materials of this sync that are of volumes alone."""
         return {key for key in self._seen if self._entries[key].is_volume}
 
-    def _flatten(self, data, label, displacement=None):
+    def _flatten(self, data, label, attributes, displacement=None):
         """The tree of an evaluated material or world; one of Blender's making may be another in the next sync."""
         with shader_tree(data) as (tree, is_made):
-            flat = flatten.flatten(tree, label, self._warnings, self._images, self._aovs, self._attributes,
-                                   displacement)
+            flat = flatten.flatten(tree, label, self._warnings, self._images, self._aovs, attributes, displacement)
         flat.follows_scene |= is_made
         return flat
 

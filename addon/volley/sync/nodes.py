@@ -514,8 +514,8 @@ def _attribute(walker, node, _sockets):
     """An attribute of any type as a colour, whose mean is its number: of the mesh, or of the object, what
     made the instance or the view layer. Without a name it is black."""
     is_of_mesh, excess = node.attribute_type == 'GEOMETRY', None
-    if not node.attribute_name:
-        color, alpha = _constant('c', 0.0), _constant('f', float(is_of_mesh))
+    if is_of_mesh and not node.attribute_name:
+        color, alpha = _constant('c', 0.0), _constant('f', 1.0)
     elif is_of_mesh:
         color, alpha, excess = _mesh_attribute(walker, node)
     else:

@@ -159,7 +159,7 @@ class SceneSync:
         must be read in a walk over everything."""
         if instance.is_light(each):
             item = walk.describe(each)
-            fields = light.describe(each.object, item, self._materials, self.warnings)
+            fields = light.describe(each, item, self._materials, self.warnings)
             return fields is not None and self._lights.change(item.key, fields)
         item = walk.item_of(each)
         if item is None:

@@ -171,7 +171,7 @@ class Walk:
         if not light.are_shown(self._source.v3d):
             return
         item = self.describe(each)
-        fields = light.describe(each.object, item, self._sync._materials, self._sync.warnings)
+        fields = light.describe(each, item, self._sync._materials, self._sync.warnings)
         if fields is not None:
             self.lights[item.key] = fields
 
