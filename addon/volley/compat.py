@@ -126,6 +126,9 @@ CURVES_NORMAL_BUMPS = bpy.app.version >= (5, 0, 0)
 # edges by Blender's own means; seen in 4.3, not in 3.4.
 HAS_BLENDERS_ATTRIBUTES = bpy.app.version >= (4, 1, 0)
 
+# Fewer names of attributes stand for what Cycles knows of a mesh; seen in 5.2, not in 4.3.
+HAS_FEW_STANDARD_ATTRIBUTES = bpy.app.version >= (5, 0, 0)
+
 # The Color Attribute node makes no bumps, other than the Attribute node; seen in 5.2, not in 4.3.
 LEVELS_COLOR_BUMPS = bpy.app.version >= (5, 0, 0)
 

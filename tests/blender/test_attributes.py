@@ -12,6 +12,11 @@ TOLERANCE = 5e-3   # 0.01 of a pixel of the steepest
 RIM = 5  # pixels
 SHARE_WITHIN = 0.98  # of a case's pixels; its outline may fall on either side
 
+NAMES = (("N", "Vector"), ("uv", "Vector"), ("uv", "Fac"), ("generated", "Vector"), ("tangent", "Vector"),
+         ("UVMap.tangent", "Vector"), ("UVMap.tangent", "Fac"), ("pointiness", "Fac"), ("random_per_island", "Fac"),
+         ("color", "Color"), ("color", "Alpha"), ("velocity", "Vector"), ("temperature", "Fac"),
+         ("curve_length", "Fac"), ("plain", "Vector"))
+
 
 # Inside Blender ------------------------------------------------------------------------------------
 
@@ -217,6 +222,32 @@ def inside_outputs():
     return _pictures_of(owners), told
 
 
+def inside_names():
+    """Pictures of the names that Cycles keeps for itself: of a mesh without such attributes, and of one that has
+    them; the warnings."""
+    import scenes
+    import volley.session
+    scenes.empty()
+    told, owners = [], {}
+    volley.session.report_warning = lambda _engine, message: told.append(message)
+    for name, output in NAMES:
+        for is_own in (False, True):
+            made = owners[f"{name} {output}{' own' * is_own}"] = scenes.sphere(radius=0.4)
+            made.scale, made.rotation_euler = (1.0, 1.0, 0.8), (0.3, 0.2, 0.5)
+            if is_own:
+                for item in made.data.attributes.new(name, 'FLOAT_COLOR', 'POINT').data:
+                    item.color = 0.7, 0.4, 0.2, 0.5
+            made.data.materials.append(_shining(output, attribute_name=name))
+    layer = owners["layer"] = scenes.sphere(radius=0.4)
+    _fill(layer.data.attributes.new("color", 'FLOAT_COLOR', 'POINT'), np.random.default_rng(3))
+    material = scenes.emitter((0.0, 0.0, 0.0), "Layer")
+    node = material.node_tree.nodes.new("ShaderNodeVertexColor")
+    node.layer_name = "color"
+    material.node_tree.links.new(node.outputs["Color"], scenes.shader_of(material).inputs["Color"])
+    layer.data.materials.append(material)
+    return _pictures_of(owners), told
+
+
 # Comparison ----------------------------------------------------------------------------------------
 
 def _compare(pictures, shows_nothing=()):
@@ -269,3 +300,12 @@ def test_instances_of_nodes(blender):
         _compare({case: [np.pad(each[RIM:-RIM, RIM:-RIM], ((RIM, RIM), (RIM, RIM), (0, 0))) for each in pair]
                   for case, pair in pictures.items()})
     assert any("attributes that nodes give instances" in line for line in told) != can_read, told
+
+
+def test_names_that_cycles_keeps(blender):
+    """Without them, meshes without an attribute of that name are black, and those with one show it."""
+    pictures, told = blender.run(inside_names)
+    _compare(pictures, pictures)
+    assert told == []
+    shown = [case for case, (_, theirs) in pictures.items() if theirs[8:-8, 8:-8].std() > 0.03]
+    assert {"N Vector", "uv Fac own", "tangent Vector", "UVMap.tangent Vector", "plain Vector own"} <= set(shown)

@@ -155,6 +155,15 @@ def _vector_transform(walker, node, sockets):
     return {"Vector": Value('v', index, 0)}
 
 
+def normal_to_world(walker, normal):
+    """A normal in object space as one of the world, as long as it was."""
+    mode = _transform_mode(SpaceId.OBJECT, SpaceId.WORLD, TransformedType.NORMAL)
+    unit = Value('v', walker.emit(NodeType.VECTOR_TRANSFORM, (normal,), mode), 0)
+    values = normal, _constant('v', 0.0), _constant('v', 0.0), _constant('f', 1.0)
+    length = output(walker.emit(NodeType.VECTOR_MATH, values, Vector.LENGTH), NodeType.VECTOR_MATH, "value")
+    return _vector(walker, Vector.SCALE, unit, scale=length)
+
+
 def _vector_rotate(walker, node, sockets):
     values = [sockets.get(kind, name) for kind, name in (
         ('v', "Vector"), ('v', "Center"), ('v', "Axis"), ('f', "Angle"), ('v', "Rotation"))]

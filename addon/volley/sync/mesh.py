@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 
 from .. import abi, native
-from . import derived, tangents
+from . import derived, standard_attributes, tangents
 from .attribute_values import colors_at_vertices, colors_of, group_colors, is_pair, named_colors, widen
 
 _HAS_UNDEFORMED = "undeformed_co" in bpy.types.MeshVertex.bl_rna.properties
@@ -330,10 +330,10 @@ def _tangent_layers(mesh, names):
     return {tangents.attribute_name(name): layer for name, layer in layers}
 
 
-def _tangents(mesh, data, layer, loops):
-    """What tangents.of_corners says of a UV map."""
+def _tangents(mesh, data, layer, loops, tell=tangents.of_corners):
+    """What tell, a function of tangents, says of a UV map."""
     uvs = _uv_values(layer, len(mesh.loops))[loops.of_triangles].reshape(-1, 3, 2)
-    return tangents.of_corners(data.positions[data.indices], _normals_of_corners(data), uvs)
+    return tell(data.positions[data.indices], _normals_of_corners(data), uvs)
 
 
 def _normals_of_corners(data):
@@ -360,8 +360,9 @@ def _colors(mesh, data, names, loops, group_names):
         elif source in _DERIVED:
             values = widen(_DERIVED[source](mesh)[:, None])[_corner_vertices(mesh)[loops.of_triangles]]
         elif source:
-            values = named_colors(source, names, lambda each: _attribute_values(mesh, each, loops, group_names),
-                                  lambda each: each in mesh.uv_layers or is_pair(mesh.attributes, each))
+            values = named_colors(source, names, lambda each: _named_values(mesh, data, each, loops, group_names),
+                                  lambda each: each == standard_attributes.UV or each in mesh.uv_layers
+                                  or is_pair(mesh.attributes, each))
         if values is not None:
             found.append((name, values))
     return found
@@ -382,6 +383,19 @@ _DERIVED = {  # attributes that Blender does not have: (vertices,) float32 of a 
     derived.POINTINESS: lambda mesh: derived.pointiness(
         read_positions(mesh), vertex_normals(mesh), _edges(mesh)),
     derived.ISLAND: lambda mesh: derived.island_numbers(len(mesh.vertices), _edges(mesh))}
+
+
+def _named_values(mesh, data, name, loops, group_names):
+    """The same as below, or what a standard attribute of that name holds."""
+    if name == standard_attributes.NORMAL:
+        return widen(np.array(vertex_normals(mesh)))[_corner_vertices(mesh)[loops.of_triangles]]
+    if name == standard_attributes.UV:
+        layer = next((each for each in mesh.uv_layers if each.active_render), None)
+        return None if layer is None else widen(_uv_values(layer, len(mesh.loops))[loops.of_triangles])
+    layer = standard_attributes.map_of_tangents(mesh, name)
+    if layer is not None:
+        return widen(_tangents(mesh, data, layer, loops, tangents.vectors_of_corners))
+    return _attribute_values(mesh, name, loops, group_names)
 
 
 def _attribute_values(mesh, name, loops, group_names):

@@ -18,9 +18,9 @@ from ..abi import (AttributeMode, BlendMode, BumpMode, ClampType, CoordinateMode
 from ..compat import (CURVES_NORMAL_BUMPS, HAS_CORRELATED_MICROFACETS, HAS_FILMED_METAL, HAS_HAIR_ALBEDO,
                       HAS_UNIT_NORMALS, HAS_WHOLE_COAT, KEEPS_DIFFUSE_ENERGY, LEAVES_BUMPS, LEVELS_COLOR_BUMPS,
                       RAMP_STEPS, SCALES_NORMAL_MAPS, TURNS_WINDOW_BUMPS)
-from . import tangents
+from . import standard_attributes, tangents
 from .attribute_values import excess_name, lack_name
-from .converters import CONVERTERS, instance_value, strand_normal, strand_radius, strand_random
+from .converters import CONVERTERS, instance_value, normal_to_world, strand_normal, strand_radius, strand_random
 from .derived import ISLAND, POINTINESS
 from .image import image_color
 from .instance import VALUES_GENERATED, VALUES_UV
@@ -504,9 +504,10 @@ def _place_in(walker, blender_object):
 
 
 def _color_attribute(walker, node, _sockets):
-    walker.flat.color_names.add(node.layer_name)
+    name = standard_attributes.source(node.layer_name)
+    walker.flat.color_names.add(name)
     mode = AttributeMode.LEVEL * LEVELS_COLOR_BUMPS
-    index = walker.emit(NodeType.COLOR_ATTRIBUTE, (), mode, name=node.layer_name)
+    index = walker.emit(NodeType.COLOR_ATTRIBUTE, (), mode, name=name)
     return named_outputs(index, NodeType.COLOR_ATTRIBUTE, ("Color", "Alpha"))
 
 
@@ -533,12 +534,19 @@ def _attribute(walker, node, _sockets):
 def _mesh_attribute(walker, node):
     """The colour of a mesh's attribute, its alpha, and how far its number is above the mean of the colour, None
     where nobody asks."""
-    name, alpha, excess = node.attribute_name, _constant('f', 1.0), None
+    name, alpha, excess = standard_attributes.source(node.attribute_name), _constant('f', 1.0), None
+    if name == standard_attributes.GENERATED:
+        walker.flat.needs_generated = True
+        index = walker.emit(NodeType.TEXTURE_COORDINATE, (), CoordinateMode.CURVED * CURVES_NORMAL_BUMPS)
+        return output(index, NodeType.TEXTURE_COORDINATE, "generated")._replace(kind='c'), alpha, excess
     if node.outputs["Alpha"].is_linked:
         alpha = _number(walker, Math.SUBTRACT, alpha, _attribute_number(walker, lack_name(name)))
     if node.outputs["Fac"].is_linked:
         excess = _attribute_number(walker, excess_name(name))
-    return _attribute_color(walker, name), alpha, excess
+    color = _attribute_color(walker, name)
+    if name == standard_attributes.NORMAL and standard_attributes.IS_NORMAL_WORLD:
+        color = normal_to_world(walker, color._replace(kind='v'))._replace(kind='c')
+    return color, alpha, excess
 
 
 def _attribute_color(walker, name):

@@ -31,6 +31,16 @@ def of_corners(points, normals, uvs):
     along a (p1 - p0) + b (p2 - p0), made perpendicular to the corner's normal; the handedness, 1 or -1; 0.
 
     Told so, tangents go along with a triangle that is turned and stretched."""
+    return _coordinates(*_shared(points, normals, uvs))
+
+
+def vectors_of_corners(points, normals, uvs):
+    """(triangles * 3, 3) float32 of the same: the tangents themselves, of unit length."""
+    return _shared(points, normals, uvs)[0].reshape(-1, 3).astype(np.float32)
+
+
+def _shared(points, normals, uvs):
+    """What _coordinates takes: the tangents of corners that are alike as one."""
     points, uvs = points.astype(np.float64), uvs.astype(np.float64)
     sides = points[:, 1:] - points[:, :1]
     (u1, v1), (u2, v2) = ((uvs[:, i] - uvs[:, 0]).T for i in (1, 2))
@@ -40,7 +50,7 @@ def of_corners(points, normals, uvs):
     shared = _fans(_welded(points, normals, uvs, sign))
     weighted = (directions * _angles(points, normals)[..., None]).reshape(-1, 3)
     tangents = _unit(np.stack([np.bincount(shared, part) for part in weighted.T], axis=1))[shared]
-    return _coordinates(tangents.reshape(points.shape), normals, sides, sign)
+    return tangents.reshape(points.shape), normals, sides, sign
 
 
 def face_normals(points):

@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Names of attributes that Cycles keeps for what it knows of a mesh itself, whatever attributes Blender has."""
+
+from ..compat import HAS_FEW_STANDARD_ATTRIBUTES
+from .derived import ISLAND, POINTINESS
+
+NOTHING = ".nothing"  # an attribute that no mesh brings
+NORMAL, UV, GENERATED, TANGENT = "N", "uv", "generated", "tangent"
+OF_MAP = "." + TANGENT  # after the name of a UV map
+IS_NORMAL_WORLD = HAS_FEW_STANDARD_ATTRIBUTES  # in Cycles of objects that stand still and alone, which are most
+
+# Of volumes, strands, points or of Cycles' own: attributes of Blender under such a name cannot be read.
+_FOREIGN = {"color", "velocity", "density", "temperature", "heat", "flame", "particle", "undeformed", "curve_length",
+            "curve_intercept", "curve_random", "point_random", "vertex_color", "shadow_transparency"}
+_FOREIGN |= {"undisplaced"} if HAS_FEW_STANDARD_ATTRIBUTES else {"tangent_sign", "motion_P"}
+_DERIVED = {"pointiness": POINTINESS, "random_per_island": ISLAND}
+
+
+def source(name):
+    """The library's attribute for an attribute that a node names."""
+    return NOTHING if name in _FOREIGN else _DERIVED.get(name, name)
+
+
+def map_of_tangents(mesh, name):
+    """The UV map of a mesh whose tangents an attribute of that name is, None for none. From Cycles 5 on
+    attributes of Blender go first."""
+    if name == TANGENT:
+        return next((layer for layer in mesh.uv_layers if layer.active_render), None)
+    if not name.endswith(OF_MAP) or HAS_FEW_STANDARD_ATTRIBUTES and name in mesh.attributes:
+        return None
+    return mesh.uv_layers.get(name[:-len(OF_MAP)])
