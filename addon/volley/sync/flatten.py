@@ -14,7 +14,7 @@ import math
 from ..abi import DisplacementMethod, MathOperation as Math, NodeType, VectorOperation as Vector
 from ..compat import BUMP_FILTER_WIDTH, HAS_BOOLEAN_SOCKETS, INLINES_GROUPS, aov_name
 from . import nodes, working_space
-from .node_list import input_number, output
+from .node_list import input_number, output, takes_generated
 from .values import CONSTANT, DEFAULT, NO_SHADER, Value
 
 _KINDS = {'VALUE': 'f', 'INT': 'f', 'BOOLEAN': 'f', 'RGBA': 'c', 'VECTOR': 'v', 'ROTATION': 'v',
@@ -165,6 +165,7 @@ class Walker:
     def emit(self, node_type, values, mode=0, image=0, name="", table=None):
         """Append a node; values: its inputs as Values in the library's order. Returns its index."""
         inputs = [(value.node, value.output, value.constant) for value in values]
+        self.flat.needs_generated |= takes_generated(node_type, values)
         self.flat.nodes.append(FlatNode(node_type, inputs, mode, image, name, table))
         return len(self.flat.nodes) - 1
 

@@ -16,6 +16,8 @@ _INPUT_KINDS = {node_type: _kinds(inputs) for node_type, (_, inputs, _) in NODES
 _OUTPUT_KINDS = {node_type: _kinds(outputs) for node_type, (_, _, outputs) in NODES.items()}
 _INPUT_NUMBERS = {(node_type, name): number for node_type, (_, inputs, _) in NODES.items()
                   for number, (_, name) in enumerate(inputs)}
+_GENERATED_INPUTS = {node_type: tuple(number for number, (kind, _) in enumerate(inputs) if kind == "GENERATED")
+                     for node_type, (_, inputs, _) in NODES.items()}
 _OUTPUT_NUMBERS = {(node_type, name): number for node_type, (_, _, outputs) in NODES.items()
                    for number, (_, name) in enumerate(outputs)}
 
@@ -35,6 +37,11 @@ def output_kinds(node_type, mode=0):
 def input_number(node_type, name):
     """Where an input of the library's name stands."""
     return _INPUT_NUMBERS[node_type, name]
+
+
+def takes_generated(node_type, values):
+    """Whether an input of a type takes Generated coordinates as its default; values: in the library's order."""
+    return any(values[number].node == DEFAULT for number in _GENERATED_INPUTS[node_type])
 
 
 def absent(kind):
